@@ -1,0 +1,171 @@
+//! The equidistant fisheye lens.
+
+use nalgebra::{Matrix2x3, Unit, Vector2, Vector3};
+
+/// `theta_d = theta (1 + k1 theta^2 + k2 theta^4 + k3 theta^6 + k4 theta^8)`, `pixel = f * theta_d * (x, y)/r + c`,
+/// where theta is the angle from the optical axis (z) and r = |(x, y)|. Pixel centres at whole numbers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fisheye {
+    pub focal_px: [f64; 2],
+    pub center_px: [f64; 2],
+    pub distortion: [f64; 4],
+    pub resolution_px: [u32; 2],
+    /// Half of the field of view; nothing beyond it is seen.
+    pub max_view_angle_rad: f64,
+}
+
+impl Fisheye {
+    fn distorted(&self, theta: f64) -> f64 {
+        let [k1, k2, k3, k4] = self.distortion;
+        let t2 = theta * theta;
+        theta * (1.0 + t2 * (k1 + t2 * (k2 + t2 * (k3 + t2 * k4))))
+    }
+
+    fn distorted_slope(&self, theta: f64) -> f64 {
+        let [k1, k2, k3, k4] = self.distortion;
+        let t2 = theta * theta;
+        1.0 + t2 * (3.0 * k1 + t2 * (5.0 * k2 + t2 * (7.0 * k3 + t2 * 9.0 * k4)))
+    }
+
+    /// Whether the projected radius grows with the angle over the whole field of view, so that pixels have one bearing.
+    #[must_use]
+    pub fn is_monotonic(&self) -> bool {
+        (0..=200).all(|i| self.distorted_slope(self.max_view_angle_rad * f64::from(i) / 200.0) > 0.0)
+    }
+
+    /// Projects a point (camera frame, m); `None` beyond the field of view or at the camera itself.
+    #[must_use]
+    pub fn project(&self, point_m: &Vector3<f64>) -> Option<Vector2<f64>> {
+        let r = point_m.x.hypot(point_m.y);
+        let theta = r.atan2(point_m.z);
+        if theta > self.max_view_angle_rad || point_m.norm_squared() < 1e-18 {
+            return None;
+        }
+        // theta_d / r tends to 1 / z on the axis.
+        let scale = if r > 1e-9 * point_m.z.abs() { self.distorted(theta) / r } else { 1.0 / point_m.z };
+        Some(Vector2::new(
+            self.focal_px[0] * scale * point_m.x + self.center_px[0],
+            self.focal_px[1] * scale * point_m.y + self.center_px[1],
+        ))
+    }
+
+    /// Projection and its Jacobian d(pixel)/d(point), px/m.
+    #[must_use]
+    pub fn project_with_jacobian(&self, point_m: &Vector3<f64>) -> Option<(Vector2<f64>, Matrix2x3<f64>)> {
+        let pixel = self.project(point_m)?;
+        let (x, y, z) = (point_m.x, point_m.y, point_m.z);
+        let r2 = x * x + y * y;
+        let r = r2.sqrt();
+        let [fx, fy] = self.focal_px;
+        if r <= 1e-9 * z.abs() {
+            let mut jacobian = Matrix2x3::zeros();
+            jacobian[(0, 0)] = fx / z;
+            jacobian[(1, 1)] = fy / z;
+            return Some((pixel, jacobian));
+        }
+        let theta = r.atan2(z);
+        let theta_d = self.distorted(theta);
+        let slope = self.distorted_slope(theta);
+        let d2 = r2 + z * z;
+        // d theta / d(x, y, z); theta = atan2(r, z).
+        let dtheta = Vector3::new(x * z / (r * d2), y * z / (r * d2), -r / d2);
+        let (ux, uy) = (x / r, y / r);
+        let r3 = r2 * r;
+        let dux = Vector3::new(y * y / r3, -x * y / r3, 0.0);
+        let duy = Vector3::new(-x * y / r3, x * x / r3, 0.0);
+        let row_x = (dtheta * (slope * ux) + dux * theta_d) * fx;
+        let row_y = (dtheta * (slope * uy) + duy * theta_d) * fy;
+        Some((pixel, Matrix2x3::from_rows(&[row_x.transpose(), row_y.transpose()])))
+    }
+
+    /// The direction (camera frame, unit) that a pixel sees; `None` beyond the field of view.
+    #[must_use]
+    pub fn unproject(&self, pixel_px: &Vector2<f64>) -> Option<Unit<Vector3<f64>>> {
+        let mx = (pixel_px.x - self.center_px[0]) / self.focal_px[0];
+        let my = (pixel_px.y - self.center_px[1]) / self.focal_px[1];
+        let theta_d = mx.hypot(my);
+        if !theta_d.is_finite() || theta_d > self.distorted(self.max_view_angle_rad) {
+            return None;
+        }
+        let theta = self.undistorted(theta_d);
+        let scale = if theta_d > 1e-12 { theta.sin() / theta_d } else { 1.0 };
+        Some(Unit::new_normalize(Vector3::new(mx * scale, my * scale, theta.cos())))
+    }
+
+    /// Inverts [`Self::distorted`] by Newton's method kept inside a shrinking bracket, so that it cannot run away.
+    fn undistorted(&self, theta_d: f64) -> f64 {
+        let (mut low, mut high) = (0.0, self.max_view_angle_rad);
+        let mut theta = theta_d.min(high);
+        for _ in 0..50 {
+            let error = self.distorted(theta) - theta_d;
+            if error > 0.0 {
+                high = theta;
+            } else {
+                low = theta;
+            }
+            let newton = theta - error / self.distorted_slope(theta);
+            let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
+            if (next - theta).abs() < 1e-15 {
+                return next;
+            }
+            theta = next;
+        }
+        theta
+    }
+
+    /// Whether a pixel lies in the image.
+    #[must_use]
+    pub fn contains(&self, pixel_px: &Vector2<f64>) -> bool {
+        let [w, h] = self.resolution_px.map(f64::from);
+        (0.0..=w - 1.0).contains(&pixel_px.x) && (0.0..=h - 1.0).contains(&pixel_px.y)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn lens() -> Fisheye {
+        Fisheye {
+            focal_px: [387.33, 387.06],
+            center_px: [633.6, 510.9],
+            distortion: [0.02268, -0.01345, 0.01296, -0.00418],
+            resolution_px: [1224, 1024],
+            max_view_angle_rad: 1.45,
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn unproject_undoes_project(x in -2.0f64..2.0, y in -2.0f64..2.0, z in 0.25f64..2.0) {
+            let point = Vector3::new(x, y, z);
+            if let Some(pixel) = lens().project(&point) {
+                let bearing = lens().unproject(&pixel).expect("a projected point lies in the field of view");
+                prop_assert!(bearing.cross(&point.normalize()).norm() < 1e-10);
+            }
+        }
+
+        #[test]
+        fn jacobian_agrees_with_central_differences(x in -1.0f64..1.0, y in -1.0f64..1.0, z in 0.3f64..2.0) {
+            let point = Vector3::new(x, y, z);
+            let Some((_, jacobian)) = lens().project_with_jacobian(&point) else { return Ok(()) };
+            let h = 1e-6;
+            for axis in 0..3 {
+                let mut step = Vector3::zeros();
+                step[axis] = h;
+                let (Some(plus), Some(minus)) = (lens().project(&(point + step)), lens().project(&(point - step)))
+                else { return Ok(()) };
+                let difference = (plus - minus) / (2.0 * h);
+                prop_assert!((jacobian.column(axis) - difference).norm() < 1e-4 * (1.0 + difference.norm()));
+            }
+        }
+    }
+
+    #[test]
+    fn the_optical_axis_is_regular() {
+        let (pixel, jacobian) = lens().project_with_jacobian(&Vector3::new(0.0, 0.0, 2.0)).expect("in view");
+        assert!((pixel - Vector2::new(633.6, 510.9)).norm() < 1e-12);
+        assert!((jacobian[(0, 0)] - 387.33 / 2.0).abs() < 1e-9);
+    }
+}

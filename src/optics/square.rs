@@ -1,0 +1,228 @@
+//! The pose of a square tag from its four corner pixels.
+//!
+//! A homography between the tag's plane and the bearings (turned so that the tag lies ahead, which keeps fisheye
+//! angles beyond 90 deg regular) gives the start; Gauss-Newton on the pixels refines it. A square seen nearly head-on
+//! has two poses that fit almost equally well (Collins and Bartoli 2014): both are refined, the better one is taken,
+//! and the ratio of their costs is reported. The tag's centre hardly depends on which one it is.
+
+use nalgebra::{Isometry3, Matrix2x6, Matrix3, Matrix6, Point3, Rotation3, SMatrix, SVector, Translation3};
+use nalgebra::{UnitQuaternion, Vector2, Vector3, Vector6};
+
+use super::fisheye::Fisheye;
+use crate::spatial::{Camera, Pose, Tag, skew};
+
+/// A tag's pose in the camera frame, and how well it fits.
+#[derive(Clone, Copy, Debug)]
+pub struct SquarePose {
+    pub camera_from_tag: Pose<Camera, Tag>,
+    /// Root mean square over the 8 corner coordinates, px.
+    pub rms_px: f64,
+    /// Cost of the other solution over this one's, 1 or more; near 1 the tilt is ambiguous.
+    pub ambiguity: f64,
+    /// Covariance of the pose for 1 px corners, on the right: (translation m, rotation rad), tag frame.
+    pub covariance_unit_px: Matrix6<f64>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum SquareError {
+    #[error("a corner lies outside of the lens's field of view")]
+    OutOfView,
+    #[error("the corners do not form a square seen from its front")]
+    Degenerate,
+}
+
+/// The four corners of a square in its own frame, m, in the order of a detection: bottom left, bottom right, top right,
+/// top left as printed.
+#[must_use]
+pub fn square_corners(size_m: f64) -> [Point3<f64>; 4] {
+    let h = 0.5 * size_m;
+    [[-h, -h], [h, -h], [h, h], [-h, h]].map(|[x, y]| Point3::new(x, y, 0.0))
+}
+
+/// Solves for the pose of a tag of `size_m` whose corners are seen at `corners_px`.
+///
+/// # Errors
+/// [`SquareError`] when the pixels have no bearing or no square fits them.
+pub fn solve_square(lens: &Fisheye, size_m: f64, corners_px: &[[f64; 2]; 4]) -> Result<SquarePose, SquareError> {
+    let corners_tag = square_corners(size_m);
+    let mut bearings = [Vector3::zeros(); 4];
+    for (bearing, corner) in bearings.iter_mut().zip(corners_px) {
+        *bearing = lens.unproject(&Vector2::from(*corner)).ok_or(SquareError::OutOfView)?.into_inner();
+    }
+    let first = start_from_homography(&bearings, &corners_tag)?;
+    let best = refine(lens, first, &corners_tag, corners_px);
+    let other = refine(lens, flipped(&first), &corners_tag, corners_px);
+    let (best, other) = match (best, other) {
+        (Some(a), Some(b)) if b.cost < a.cost => (b, Some(a)),
+        (Some(a), b) => (a, b),
+        (None, Some(b)) => (b, None),
+        (None, None) => return Err(SquareError::Degenerate),
+    };
+    let covariance = best.normal.try_inverse().ok_or(SquareError::Degenerate)?;
+    Ok(SquarePose {
+        camera_from_tag: Pose::from_isometry(best.pose),
+        rms_px: (best.cost / 8.0).sqrt(),
+        ambiguity: other.map_or(f64::INFINITY, |o| (o.cost / best.cost.max(1e-12)).max(1.0)),
+        covariance_unit_px: covariance,
+    })
+}
+
+/// Homography of the square by the direct linear transform, with bearings turned so that their mean is the z axis.
+fn start_from_homography(
+    bearings: &[Vector3<f64>; 4],
+    corners_tag: &[Point3<f64>; 4],
+) -> Result<Isometry3<f64>, SquareError> {
+    let mean = bearings.iter().sum::<Vector3<f64>>();
+    let turn = UnitQuaternion::rotation_between(&mean, &Vector3::z()).ok_or(SquareError::Degenerate)?;
+    let mut system = SMatrix::<f64, 8, 8>::zeros();
+    let mut right = SVector::<f64, 8>::zeros();
+    for (k, (bearing, corner)) in bearings.iter().zip(corners_tag).enumerate() {
+        let ahead = turn * bearing;
+        if ahead.z < 0.05 {
+            return Err(SquareError::Degenerate);
+        }
+        let (u, v) = (ahead.x / ahead.z, ahead.y / ahead.z);
+        let (x, y) = (corner.x, corner.y);
+        system.set_row(2 * k, &SMatrix::from([[x], [y], [1.0], [0.0], [0.0], [0.0], [-u * x], [-u * y]]));
+        system.set_row(2 * k + 1, &SMatrix::from([[0.0], [0.0], [0.0], [x], [y], [1.0], [-v * x], [-v * y]]));
+        right[2 * k] = u;
+        right[2 * k + 1] = v;
+    }
+    let h = system.lu().solve(&right).ok_or(SquareError::Degenerate)?;
+    let (h1, h2, h3) = (Vector3::new(h[0], h[3], h[6]), Vector3::new(h[1], h[4], h[7]), Vector3::new(h[2], h[5], 1.0));
+    let scale = 2.0 / (h1.norm() + h2.norm());
+    if !scale.is_finite() {
+        return Err(SquareError::Degenerate);
+    }
+    let (r1, r2) = (h1 * scale, h2 * scale);
+    let raw = Matrix3::from_columns(&[r1, r2, r1.cross(&r2)]);
+    let svd = raw.svd(true, true);
+    let (Some(u), Some(vt)) = (svd.u, svd.v_t) else { return Err(SquareError::Degenerate) };
+    let rotation = u * Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, (u * vt).determinant())) * vt;
+    let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rotation));
+    let ahead = Isometry3::from_parts(Translation3::from(h3 * scale), rotation);
+    Ok(Isometry3::from_parts(Translation3::identity(), turn.inverse()) * ahead)
+}
+
+/// The mirror solution: the tag's normal reflected about the line of sight.
+fn flipped(pose: &Isometry3<f64>) -> Isometry3<f64> {
+    let sight = pose.translation.vector.normalize();
+    let normal = pose.rotation * Vector3::z();
+    let mirrored = 2.0 * normal.dot(&sight) * sight - normal;
+    let turn = UnitQuaternion::rotation_between(&normal, &mirrored).unwrap_or_else(UnitQuaternion::identity);
+    Isometry3::from_parts(pose.translation, turn * pose.rotation)
+}
+
+struct Refined {
+    pose: Isometry3<f64>,
+    cost: f64,
+    normal: Matrix6<f64>,
+}
+
+fn refine(
+    lens: &Fisheye,
+    start: Isometry3<f64>,
+    corners_tag: &[Point3<f64>; 4],
+    corners_px: &[[f64; 2]; 4],
+) -> Option<Refined> {
+    let mut best = linearize(lens, &start, corners_tag, corners_px)?;
+    let mut damping = 1e-4;
+    for _ in 0..30 {
+        let mut normal = best.normal;
+        for k in 0..6 {
+            normal[(k, k)] *= 1.0 + damping;
+        }
+        let step = normal.cholesky()?.solve(&best.gradient);
+        let trial = best.pose * crate::spatial::exp(&step);
+        match linearize(lens, &trial, corners_tag, corners_px) {
+            Some(next) if next.cost <= best.cost => {
+                let done = step.norm() < 1e-12;
+                best = next;
+                damping = (damping * 0.1).max(1e-12);
+                if done {
+                    break;
+                }
+            }
+            _ => {
+                damping *= 10.0;
+                if damping > 1e8 {
+                    break;
+                }
+            }
+        }
+    }
+    // A tag is printed on one side: its z axis must point towards the camera.
+    let faces_camera = (best.pose.rotation * Vector3::z()).dot(&best.pose.translation.vector) < 0.0;
+    faces_camera.then_some(Refined { pose: best.pose, cost: best.cost, normal: best.normal })
+}
+
+struct Linearized {
+    pose: Isometry3<f64>,
+    cost: f64,
+    normal: Matrix6<f64>,
+    gradient: Vector6<f64>,
+}
+
+/// Residual = measured - predicted; Jacobian of the prediction for a perturbation on the right, pose * exp(xi).
+fn linearize(
+    lens: &Fisheye,
+    pose: &Isometry3<f64>,
+    corners_tag: &[Point3<f64>; 4],
+    corners_px: &[[f64; 2]; 4],
+) -> Option<Linearized> {
+    let rotation = pose.rotation.to_rotation_matrix();
+    let mut out = Linearized { pose: *pose, cost: 0.0, normal: Matrix6::zeros(), gradient: Vector6::zeros() };
+    for (corner, measured) in corners_tag.iter().zip(corners_px) {
+        let point = pose * corner;
+        let (pixel, by_point) = lens.project_with_jacobian(&point.coords)?;
+        let mut jacobian = Matrix2x6::zeros();
+        let by_translation = by_point * rotation.matrix();
+        jacobian.fixed_columns_mut::<3>(0).copy_from(&by_translation);
+        jacobian.fixed_columns_mut::<3>(3).copy_from(&(-by_translation * skew(&corner.coords)));
+        let residual = Vector2::from(*measured) - pixel;
+        out.cost += residual.norm_squared();
+        out.normal += jacobian.transpose() * jacobian;
+        out.gradient += jacobian.transpose() * residual;
+    }
+    Some(out)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn lens() -> Fisheye {
+        Fisheye {
+            focal_px: [387.33, 387.06],
+            center_px: [633.6, 510.9],
+            distortion: [0.02268, -0.01345, 0.01296, -0.00418],
+            resolution_px: [1224, 1024],
+            max_view_angle_rad: 1.45,
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn recovers_the_pose_of_a_noiseless_tag(
+            x in -0.8f64..0.8, y in -0.8f64..0.8, z in 0.3f64..1.5,
+            tilt in 0.2f64..0.9, azimuth in -3.0f64..3.0, spin in -3.0f64..3.0,
+        ) {
+            // z of the tag towards the camera, tilted away from the line of sight.
+            let sight = Vector3::new(x, y, z);
+            let facing = UnitQuaternion::rotation_between(&Vector3::z(), &-sight).expect("not opposite");
+            let lean = UnitQuaternion::from_scaled_axis(Vector3::new(azimuth.cos(), azimuth.sin(), 0.0) * tilt);
+            let turn = UnitQuaternion::from_scaled_axis(Vector3::z() * spin);
+            let pose = Isometry3::from_parts(Translation3::from(sight), facing * lean * turn);
+            let mut corners = [[0.0; 2]; 4];
+            for (pixel, corner) in corners.iter_mut().zip(square_corners(0.15)) {
+                let Some(p) = lens().project(&(pose * corner).coords) else { return Ok(()) };
+                *pixel = p.into();
+            }
+            let solved = solve_square(&lens(), 0.15, &corners).expect("a clean square");
+            prop_assert!(solved.rms_px < 1e-6, "rms {}", solved.rms_px);
+            let error = crate::spatial::log(&(solved.camera_from_tag.isometry().inverse() * pose));
+            prop_assert!(error.norm() < 1e-6, "error {}", error.norm());
+        }
+    }
+}

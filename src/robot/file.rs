@@ -1,0 +1,346 @@
+//! robot.toml to checked types.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+
+use super::error::{FileIssue, RobotError, parse_toml, read_text};
+use super::urdf::{LinkBody, UrdfModel};
+use super::vehicle::check_place;
+use crate::joints::JointAngles;
+use crate::kinematics::{Attachment, Chain};
+use crate::optics::Fisheye;
+use crate::spatial::{Base, Pose, Tag};
+
+/// An arm as drawn and surveyed.
+#[derive(Clone, Debug)]
+pub struct Robot {
+    pub name: String,
+    pub folder: PathBuf,
+    pub urdf_name: String,
+    pub urdf_text: String,
+    pub base_link: String,
+    pub chain: Chain,
+    /// Bodies 0..=n_joints: base first.
+    pub bodies: Vec<LinkBody>,
+    pub sensors: Vec<JointSensorSpec>,
+    pub tool: ToolSpec,
+    pub camera: CameraSpec,
+    pub tags: Vec<SurveyedTag>,
+    pub base_tag: u32,
+    pub stowed: JointAngles,
+}
+
+/// Kind of joint sensor; decides which effects belief expects of it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SensorKind {
+    Potentiometer,
+    Encoder,
+    Resolver,
+}
+
+/// A joint sensor by its datasheet: `angle = center + wrap(counts - counts(center)) / counts_per_rad`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct JointSensorSpec {
+    pub joint: String,
+    pub kind: SensorKind,
+    /// The reading at angle zero.
+    pub offset_counts: f64,
+    pub counts_per_rad: f64,
+    pub wrap_counts: f64,
+    /// The middle of the joint's range: gain errors are meant about it.
+    pub center_rad: f64,
+    /// One sigma of the relative gain error.
+    pub gain_std: f64,
+    pub offset_std_rad: f64,
+    /// The worst that planning keeps clear for.
+    pub gain_bound: f64,
+    pub offset_bound_rad: f64,
+    pub noise_std_counts: f64,
+    /// One sigma of what a straight line leaves of the sensor's error: nonlinearity, temperature, wear.
+    pub linearity_std_rad: f64,
+    pub max_rate_rad_s: f64,
+}
+
+#[derive(Clone, Debug)]
+pub struct ToolSpec {
+    /// The tool point, axes of the link that carries it.
+    pub mount: Attachment,
+}
+
+#[derive(Clone, Debug)]
+pub struct CameraSpec {
+    pub name: String,
+    pub mount: Attachment,
+    pub lens: Fisheye,
+    pub corner_std_px: f64,
+    /// One sigma per axis of the mount's error.
+    pub mount_std_m: f64,
+    pub mount_std_rad: f64,
+}
+
+/// A tag whose place is known by survey.
+#[derive(Clone, Debug)]
+pub struct SurveyedTag {
+    pub id: u32,
+    pub size_m: f64,
+    pub base_from_tag: Pose<Base, Tag>,
+    pub position_std_m: f64,
+    pub rotation_std_rad: f64,
+}
+
+impl Robot {
+    #[must_use]
+    pub fn n_joints(&self) -> usize {
+        self.chain.n_joints()
+    }
+
+    #[must_use]
+    pub fn tag(&self, id: u32) -> Option<&SurveyedTag> {
+        self.tags.iter().find(|tag| tag.id == id)
+    }
+
+    #[must_use]
+    pub fn joint_names(&self) -> Vec<String> {
+        self.sensors.iter().map(|s| s.joint.clone()).collect()
+    }
+
+    /// Whether the arm can be simulated: each moving body has mass.
+    ///
+    /// # Errors
+    /// [`RobotError::ZeroMass`] naming the first link without.
+    pub fn require_masses(&self) -> Result<(), RobotError> {
+        match self.bodies[1..].iter().find(|body| body.mass_kg <= 0.0) {
+            None => Ok(()),
+            Some(body) => Err(RobotError::ZeroMass {
+                file: self.folder.join(&self.urdf_name),
+                link: body.name.clone(),
+                mass_kg: body.mass_kg,
+            }),
+        }
+    }
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RobotFile {
+    version: u32,
+    name: String,
+    urdf: PathBuf,
+    base_link: String,
+    base_tag: u32,
+    stowed_rad: Vec<f64>,
+    tool: ToolFile,
+    joint_sensor: Vec<SensorFile>,
+    camera: CameraFile,
+    #[serde(default)]
+    tag: Vec<TagFile>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ToolFile {
+    link: String,
+    point_m: [f64; 3],
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SensorFile {
+    joint: String,
+    kind: SensorKind,
+    offset_counts: f64,
+    /// Counts per degree: sources state this round figure, and dividing keeps it exact.
+    scale_counts_per_deg: f64,
+    wrap_counts: f64,
+    gain_std: f64,
+    offset_std_rad: f64,
+    gain_bound: f64,
+    offset_bound_rad: f64,
+    noise_std_counts: f64,
+    linearity_std_rad: f64,
+    max_rate_rad_s: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CameraFile {
+    name: String,
+    link: String,
+    model: String,
+    resolution_px: [u32; 2],
+    focal_px: [f64; 2],
+    center_px: [f64; 2],
+    distortion: [f64; 4],
+    max_view_angle_rad: f64,
+    corner_std_px: f64,
+    mount_std_m: f64,
+    mount_std_rad: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct TagFile {
+    id: u32,
+    family: String,
+    size_m: f64,
+    position_m: [f64; 3],
+    quaternion_wxyz: [f64; 4],
+    position_std_m: f64,
+    rotation_std_rad: f64,
+}
+
+/// Reads a robot folder: robot.toml and the URDF that it names.
+///
+/// # Errors
+/// [`RobotError`] naming file, key and allowed range.
+pub fn load(folder: &Path) -> Result<Robot, RobotError> {
+    let file = folder.join("robot.toml");
+    let raw: RobotFile = parse_toml(&file, &read_text(&file)?)?;
+    FileIssue::check_range(&file, "version", f64::from(raw.version), 1.0..=1.0)?;
+    let urdf = UrdfModel::read(&folder.join(&raw.urdf))?;
+    let chain = urdf.chain(&raw.base_link, &[&raw.tool.link, &raw.camera.link])?;
+    let bodies = urdf.bodies(&raw.base_link, &chain)?;
+    let sensors = check_sensors(&file, &raw.joint_sensor, &chain)?;
+    if raw.stowed_rad.len() != chain.n_joints() || !raw.stowed_rad.iter().all(|v| v.abs() <= 100.0) {
+        let problem = format!("needs {} angles within 100 rad, one a joint", chain.n_joints());
+        return Err(FileIssue::new(&file, "stowed_rad", problem).into());
+    }
+    let mut tool = urdf.attachment(&raw.base_link, &raw.tool.link, &chain)?;
+    for value in raw.tool.point_m {
+        FileIssue::check_range(&file, "tool.point_m", value, -10.0..=10.0)?;
+    }
+    tool.link_from_frame *= nalgebra::Translation3::from(raw.tool.point_m);
+    let camera_mount = urdf.attachment(&raw.base_link, &raw.camera.link, &chain)?;
+    let camera = check_camera(&file, raw.camera, camera_mount)?;
+    let tags = check_tags(&file, &raw.tag, raw.base_tag)?;
+    Ok(Robot {
+        name: raw.name,
+        folder: folder.to_owned(),
+        urdf_name: raw.urdf.file_name().map_or_else(|| "robot.urdf".to_owned(), |n| n.to_string_lossy().into_owned()),
+        urdf_text: urdf.text,
+        base_link: raw.base_link,
+        stowed: JointAngles::from_slice(&raw.stowed_rad),
+        tool: ToolSpec { mount: tool },
+        base_tag: raw.base_tag,
+        chain,
+        bodies,
+        sensors,
+        camera,
+        tags,
+    })
+}
+
+fn check_sensors(file: &Path, raw: &[SensorFile], chain: &Chain) -> Result<Vec<JointSensorSpec>, RobotError> {
+    let names: Vec<&str> = raw.iter().map(|s| s.joint.as_str()).collect();
+    let expected: Vec<&str> = chain.joints().iter().map(|j| j.name.as_str()).collect();
+    if names != expected {
+        let problem =
+            format!("the URDF's moving joints are {expected:?}, in this order, but the sensors name {names:?}");
+        return Err(FileIssue::new(file, "joint_sensor", problem).into());
+    }
+    raw.iter()
+        .zip(chain.joints())
+        .map(|(s, joint)| {
+            let check = |key: &str, value: f64, range| {
+                FileIssue::check_range(file, &format!("joint_sensor `{}`: {key}", s.joint), value, range)
+            };
+            if let Some(limits) = joint.limits {
+                let range_counts = (limits.upper_rad - limits.lower_rad).to_degrees() * s.scale_counts_per_deg.abs();
+                if s.wrap_counts < range_counts {
+                    let key = format!("joint_sensor `{}`: wrap_counts", s.joint);
+                    let problem =
+                        format!("{} is less than the {range_counts:.0} counts of the joint's range", s.wrap_counts);
+                    return Err(FileIssue::new(file, key, problem).into());
+                }
+            }
+            let sign = if s.scale_counts_per_deg < 0.0 { -1.0 } else { 1.0 };
+            Ok(JointSensorSpec {
+                joint: s.joint.clone(),
+                kind: s.kind,
+                offset_counts: check("offset_counts", s.offset_counts, -1e9..=1e9)?,
+                counts_per_rad: sign
+                    * check("scale_counts_per_deg (size)", s.scale_counts_per_deg.abs(), 1e-3..=1e9)?
+                    * 180.0
+                    / std::f64::consts::PI,
+                wrap_counts: check("wrap_counts", s.wrap_counts, 1.0..=1e12)?,
+                center_rad: joint.limits.map_or(0.0, |l| 0.5 * (l.lower_rad + l.upper_rad)),
+                gain_std: check("gain_std", s.gain_std, 0.0..=10.0)?,
+                offset_std_rad: check("offset_std_rad", s.offset_std_rad, 0.0..=6.3)?,
+                gain_bound: check("gain_bound", s.gain_bound, 0.0..=0.5)?,
+                offset_bound_rad: check("offset_bound_rad", s.offset_bound_rad, 0.0..=3.2)?,
+                linearity_std_rad: check("linearity_std_rad", s.linearity_std_rad, 0.0..=1.0)?,
+                noise_std_counts: check("noise_std_counts", s.noise_std_counts, 0.0..=1e6)?,
+                max_rate_rad_s: check("max_rate_rad_s", s.max_rate_rad_s, 1e-3..=20.0)?,
+            })
+        })
+        .collect()
+}
+
+fn check_camera(file: &Path, raw: CameraFile, mount: Attachment) -> Result<CameraSpec, RobotError> {
+    if raw.model != "equidistant" {
+        let problem = format!("`{}` is not supported; use \"equidistant\" (Kannala-Brandt)", raw.model);
+        return Err(FileIssue::new(file, "camera.model", problem).into());
+    }
+    let check = |key: &str, value: f64, range| FileIssue::check_range(file, &format!("camera.{key}"), value, range);
+    for k in 0..2 {
+        check("resolution_px", f64::from(raw.resolution_px[k]), 16.0..=65536.0)?;
+        check("focal_px", raw.focal_px[k], 1.0..=1e6)?;
+        check("center_px", raw.center_px[k], -1e6..=1e6)?;
+    }
+    for value in raw.distortion {
+        check("distortion", value, -10.0..=10.0)?;
+    }
+    let max_view_angle_rad = check("max_view_angle_rad", raw.max_view_angle_rad, 0.1..=3.0)?;
+    let lens = Fisheye {
+        focal_px: raw.focal_px,
+        center_px: raw.center_px,
+        distortion: raw.distortion,
+        resolution_px: raw.resolution_px,
+        max_view_angle_rad,
+    };
+    if !lens.is_monotonic() {
+        let problem =
+            "the projected radius does not grow up to max_view_angle_rad; lower the angle or correct distortion";
+        return Err(FileIssue::new(file, "camera.distortion", problem).into());
+    }
+    Ok(CameraSpec {
+        name: raw.name,
+        mount,
+        lens,
+        corner_std_px: check("corner_std_px", raw.corner_std_px, 1e-3..=100.0)?,
+        mount_std_m: check("mount_std_m", raw.mount_std_m, 0.0..=1.0)?,
+        mount_std_rad: check("mount_std_rad", raw.mount_std_rad, 0.0..=1.0)?,
+    })
+}
+
+fn check_tags(file: &Path, raw: &[TagFile], base_tag: u32) -> Result<Vec<SurveyedTag>, RobotError> {
+    let mut seen = BTreeSet::new();
+    let mut tags = Vec::new();
+    for tag in raw {
+        let key = |name: &str| format!("tag {}: {name}", tag.id);
+        if !seen.insert(tag.id) {
+            return Err(FileIssue::new(file, key("id"), "stands twice").into());
+        }
+        if tag.family != "36h11" {
+            let problem = format!("`{}` is not supported; use \"36h11\"", tag.family);
+            return Err(FileIssue::new(file, key("family"), problem).into());
+        }
+        check_place(file, &key("position_m"), &tag.position_m)?;
+        let base_from_tag = Pose::from_position_quaternion_wxyz(tag.position_m, tag.quaternion_wxyz)
+            .ok_or_else(|| FileIssue::new(file, key("position_m, quaternion_wxyz"), "must be finite, not zero"))?;
+        tags.push(SurveyedTag {
+            id: tag.id,
+            size_m: FileIssue::check_range(file, &key("size_m"), tag.size_m, 1e-3..=10.0)?,
+            base_from_tag,
+            position_std_m: FileIssue::check_range(file, &key("position_std_m"), tag.position_std_m, 0.0..=1.0)?,
+            rotation_std_rad: FileIssue::check_range(file, &key("rotation_std_rad"), tag.rotation_std_rad, 0.0..=1.0)?,
+        });
+    }
+    if !tags.is_empty() && !seen.contains(&base_tag) {
+        return Err(FileIssue::new(file, "base_tag", format!("tag {base_tag} is not among the [[tag]]s")).into());
+    }
+    Ok(tags)
+}

@@ -1,0 +1,320 @@
+//! URDF to a serial chain with bodies, or a named reason why not.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+use nalgebra::{Isometry3, Matrix3, Translation3, Unit, UnitQuaternion, Vector3};
+use urdf_rs::{Geometry, JointType};
+
+use super::error::{FileIssue, RobotError, read_text};
+use super::shape::{PlacedShape, Shape};
+use crate::joints::MAX_JOINTS;
+use crate::kinematics::{Attachment, Chain, ChainJoint, JointLimits};
+
+/// The most collision shapes that an arm may have, so that planning places them without allocating.
+pub const MAX_COLLISION_SHAPES: usize = 64;
+
+/// Mass and shapes of everything that moves with one joint (fixed children included), in that joint's link frame.
+#[derive(Clone, Debug)]
+pub struct LinkBody {
+    pub name: String,
+    pub mass_kg: f64,
+    pub com_m: Vector3<f64>,
+    /// About the centre of mass, axes of the link.
+    pub inertia_kg_m2: Matrix3<f64>,
+    pub visuals: Vec<PlacedShape>,
+    pub collisions: Vec<PlacedShape>,
+}
+
+/// A URDF file read and checked: the tree, not yet a chain.
+#[derive(Clone, Debug)]
+pub struct UrdfModel {
+    pub file: PathBuf,
+    pub text: String,
+    robot: urdf_rs::Robot,
+    /// Child link -> joint index.
+    joint_of_child: BTreeMap<String, usize>,
+}
+
+fn isometry(origin: &urdf_rs::Pose) -> Isometry3<f64> {
+    let [roll, pitch, yaw] = origin.rpy.0;
+    Isometry3::from_parts(
+        Translation3::from(Vector3::from(origin.xyz.0)),
+        UnitQuaternion::from_euler_angles(roll, pitch, yaw),
+    )
+}
+
+impl UrdfModel {
+    /// Reads `file` and checks that it is a tree of known links with finite numbers.
+    ///
+    /// # Errors
+    /// [`RobotError`] naming the file and the link or joint.
+    pub fn read(file: &Path) -> Result<Self, RobotError> {
+        let text = read_text(file)?;
+        let robot = urdf_rs::read_from_string(&text)
+            .map_err(|error| RobotError::Syntax { file: file.to_owned(), message: error.to_string() })?;
+        let links: BTreeSet<&str> = robot.links.iter().map(|l| l.name.as_str()).collect();
+        let mut joint_of_child = BTreeMap::new();
+        let mut joint_names = BTreeSet::new();
+        for (idx, joint) in robot.joints.iter().enumerate() {
+            if !joint_names.insert(joint.name.as_str()) {
+                return Err(FileIssue::new(file, format!("joint `{}`", joint.name), "stands twice").into());
+            }
+            for link in [&joint.parent.link, &joint.child.link] {
+                if !links.contains(link.as_str()) {
+                    return Err(RobotError::MissingLink {
+                        file: file.to_owned(),
+                        joint: joint.name.clone(),
+                        link: link.clone(),
+                    });
+                }
+            }
+            if joint_of_child.insert(joint.child.link.clone(), idx).is_some() {
+                return Err(RobotError::Loop { file: file.to_owned(), link: joint.child.link.clone() });
+            }
+            check_joint_numbers(file, joint)?;
+        }
+        let model = Self { file: file.to_owned(), text, robot, joint_of_child };
+        model.check_acyclic()?;
+        Ok(model)
+    }
+
+    fn check_acyclic(&self) -> Result<(), RobotError> {
+        for link in &self.robot.links {
+            let mut at = link.name.as_str();
+            for _ in 0..=self.robot.joints.len() {
+                match self.joint_of_child.get(at) {
+                    Some(&joint) => at = &self.robot.joints[joint].parent.link,
+                    None => break,
+                }
+            }
+            if self.joint_of_child.contains_key(at) {
+                return Err(RobotError::Loop { file: self.file.clone(), link: link.name.clone() });
+            }
+        }
+        Ok(())
+    }
+
+    /// Joint indices from `base` down to `tip`.
+    fn path(&self, base: &str, tip: &str) -> Result<Vec<usize>, RobotError> {
+        let no_chain = || RobotError::NoChain { file: self.file.clone(), from: base.to_owned(), to: tip.to_owned() };
+        let mut path = Vec::new();
+        let mut at = tip;
+        while at != base {
+            let &joint = self.joint_of_child.get(at).ok_or_else(no_chain)?;
+            path.push(joint);
+            at = &self.robot.joints[joint].parent.link;
+        }
+        path.reverse();
+        Ok(path)
+    }
+
+    /// The chain of moving joints from `base` that carries every link named in `tips`.
+    ///
+    /// # Errors
+    /// [`RobotError::NoChain`] when the tips do not hang on one chain, [`RobotError::JointKind`] for other joints.
+    pub fn chain(&self, base: &str, tips: &[&str]) -> Result<Chain, RobotError> {
+        let mut longest: Vec<usize> = Vec::new();
+        for tip in tips {
+            let path = self.path(base, tip)?;
+            if self.moving(&path).count() > self.moving(&longest).count() || longest.is_empty() {
+                longest = path;
+            }
+        }
+        let mut joints = Vec::new();
+        let mut pending = Isometry3::identity();
+        for &idx in &longest {
+            let joint = &self.robot.joints[idx];
+            pending *= isometry(&joint.origin);
+            let limits = match joint.joint_type {
+                JointType::Fixed => continue,
+                JointType::Continuous => None,
+                JointType::Revolute => Some(JointLimits { lower_rad: joint.limit.lower, upper_rad: joint.limit.upper }),
+                ref other => {
+                    return Err(RobotError::JointKind {
+                        file: self.file.clone(),
+                        joint: joint.name.clone(),
+                        kind: format!("{other:?}").to_lowercase(),
+                    });
+                }
+            };
+            joints.push(ChainJoint {
+                name: joint.name.clone(),
+                child_link: joint.child.link.clone(),
+                parent_from_joint: pending,
+                axis: Unit::new_normalize(Vector3::from(joint.axis.xyz.0)),
+                limits,
+            });
+            pending = Isometry3::identity();
+        }
+        if joints.is_empty() || joints.len() > MAX_JOINTS {
+            let problem =
+                format!("{} moving joints between `{base}` and {tips:?}, 1 .. {MAX_JOINTS} allowed", joints.len());
+            return Err(FileIssue::new(&self.file, "joint", problem).into());
+        }
+        Ok(Chain::new(joints))
+    }
+
+    fn moving<'a>(&'a self, path: &'a [usize]) -> impl Iterator<Item = usize> + 'a {
+        path.iter().copied().filter(|&idx| self.robot.joints[idx].joint_type != JointType::Fixed)
+    }
+
+    /// Where the frame of `link` hangs on `chain`.
+    ///
+    /// # Errors
+    /// [`RobotError::NoChain`] when it hangs elsewhere.
+    pub fn attachment(&self, base: &str, link: &str, chain: &Chain) -> Result<Attachment, RobotError> {
+        let mut n_joints = 0;
+        let mut link_from_frame = Isometry3::identity();
+        for idx in self.path(base, link)? {
+            let joint = &self.robot.joints[idx];
+            if joint.joint_type == JointType::Fixed {
+                link_from_frame *= isometry(&joint.origin);
+            } else if chain.joints().get(n_joints).is_some_and(|j| j.name == joint.name) {
+                n_joints += 1;
+                link_from_frame = Isometry3::identity();
+            } else {
+                let (from, to) = (base.to_owned(), link.to_owned());
+                return Err(RobotError::NoChain { file: self.file.clone(), from, to });
+            }
+        }
+        Ok(Attachment { n_joints, link_from_frame })
+    }
+
+    /// Bodies 0..=n: what is fixed to the base, then what moves with each joint of the chain.
+    ///
+    /// # Errors
+    /// [`RobotError::Value`] for numbers or shapes that no body can have.
+    pub fn bodies(&self, base: &str, chain: &Chain) -> Result<Vec<LinkBody>, RobotError> {
+        let mut names = vec![base.to_owned()];
+        names.extend(chain.joints().iter().map(|j| j.child_link.clone()));
+        let mut bodies: Vec<LinkBody> = names.into_iter().map(LinkBody::empty).collect();
+        for link in &self.robot.links {
+            let Ok(attachment) = self.attachment(base, &link.name, chain) else { continue };
+            self.add_link(&mut bodies[attachment.n_joints], link, &attachment.link_from_frame)?;
+        }
+        let n_shapes: usize = bodies.iter().map(|body| body.collisions.len()).sum();
+        if n_shapes > MAX_COLLISION_SHAPES {
+            let problem = format!("{n_shapes} shapes on the chain, 0 .. {MAX_COLLISION_SHAPES} allowed");
+            return Err(FileIssue::new(&self.file, "collision", problem).into());
+        }
+        Ok(bodies)
+    }
+
+    fn add_link(
+        &self,
+        body: &mut LinkBody,
+        link: &urdf_rs::Link,
+        body_from_link: &Isometry3<f64>,
+    ) -> Result<(), RobotError> {
+        let inertial = &link.inertial;
+        let mass_key = format!("link `{}`: mass", link.name);
+        let mass_kg = FileIssue::check_range(&self.file, &mass_key, inertial.mass.value, 0.0..=1e6)?;
+        let i = &inertial.inertia;
+        let inertia = Matrix3::new(i.ixx, i.ixy, i.ixz, i.ixy, i.iyy, i.iyz, i.ixz, i.iyz, i.izz);
+        if !inertia.iter().all(|v| v.is_finite()) {
+            let key = format!("link `{}`: inertia", link.name);
+            return Err(FileIssue::new(&self.file, key, "is not finite").into());
+        }
+        if mass_kg > 0.0 {
+            FileIssue::check_range(&self.file, &mass_key, mass_kg, 1e-6..=1e6)?;
+            if inertia.cholesky().is_none() {
+                let key = format!("link `{}`: inertia", link.name);
+                return Err(FileIssue::new(&self.file, key, "is not positive definite; no body turns like that").into());
+            }
+            let body_from_com = body_from_link * isometry(&inertial.origin);
+            body.add_mass(mass_kg, &body_from_com, &inertia);
+        }
+        for visual in &link.visual {
+            let color = visual.material.as_ref().and_then(|m| self.color(m)).unwrap_or([160, 160, 160]);
+            let placed = self.placed(&link.name, &visual.origin, &visual.geometry, body_from_link, color)?;
+            body.visuals.push(placed);
+        }
+        for collision in &link.collision {
+            let placed = self.placed(&link.name, &collision.origin, &collision.geometry, body_from_link, [0; 3])?;
+            body.collisions.push(placed);
+        }
+        Ok(())
+    }
+
+    fn color(&self, material: &urdf_rs::Material) -> Option<[u8; 3]> {
+        let named = self.robot.materials.iter().find(|m| m.name == material.name);
+        let color = material.color.as_ref().or_else(|| named.and_then(|m| m.color.as_ref()))?;
+        Some([0, 1, 2].map(|k| (color.rgba.0[k].clamp(0.0, 1.0) * 255.0).round() as u8))
+    }
+
+    fn placed(
+        &self,
+        link: &str,
+        origin: &urdf_rs::Pose,
+        geometry: &Geometry,
+        body_from_link: &Isometry3<f64>,
+        color_rgb: [u8; 3],
+    ) -> Result<PlacedShape, RobotError> {
+        let shape = match *geometry {
+            Geometry::Box { size } => Shape::Box { size_m: size.0 },
+            Geometry::Cylinder { radius, length } => Shape::Cylinder { radius_m: radius, length_m: length },
+            Geometry::Capsule { radius, length } => Shape::Capsule { radius_m: radius, length_m: length },
+            Geometry::Sphere { radius } => Shape::Sphere { radius_m: radius },
+            Geometry::Mesh { .. } => {
+                let key = format!("link `{link}`: geometry");
+                let problem = "meshes are not supported; use box, cylinder, capsule or sphere";
+                return Err(FileIssue::new(&self.file, key, problem).into());
+            }
+        };
+        for (name, length) in shape.lengths() {
+            FileIssue::check_range(&self.file, &format!("link `{link}`: {name}"), length, 1e-6..=1e4)?;
+        }
+        for value in origin.xyz.0.iter().chain(&origin.rpy.0) {
+            FileIssue::check_range(&self.file, &format!("link `{link}`: origin"), *value, -1e4..=1e4)?;
+        }
+        Ok(PlacedShape { owner_from_shape: body_from_link * isometry(origin), shape, color_rgb })
+    }
+}
+
+fn check_joint_numbers(file: &Path, joint: &urdf_rs::Joint) -> Result<(), RobotError> {
+    let numbers = joint.origin.xyz.0.iter().chain(&joint.origin.rpy.0).chain(&joint.axis.xyz.0);
+    for value in numbers {
+        FileIssue::check_range(file, &format!("joint `{}`: origin or axis", joint.name), *value, -1e4..=1e4)?;
+    }
+    if joint.joint_type == JointType::Fixed {
+        return Ok(());
+    }
+    if Vector3::from(joint.axis.xyz.0).norm() < 1e-6 {
+        return Err(FileIssue::new(file, format!("joint `{}`: axis", joint.name), "has no direction").into());
+    }
+    FileIssue::check_range(file, &format!("joint `{}`: effort", joint.name), joint.limit.effort, 0.0..=1e7)?;
+    let (lower, upper) = (joint.limit.lower, joint.limit.upper);
+    if joint.joint_type == JointType::Revolute && !(lower.is_finite() && upper.is_finite() && lower < upper) {
+        let key = format!("joint `{}`: limit", joint.name);
+        return Err(FileIssue::new(file, key, format!("lower {lower} must lie below upper {upper}")).into());
+    }
+    Ok(())
+}
+
+impl LinkBody {
+    fn empty(name: String) -> Self {
+        Self {
+            name,
+            mass_kg: 0.0,
+            com_m: Vector3::zeros(),
+            inertia_kg_m2: Matrix3::zeros(),
+            visuals: Vec::new(),
+            collisions: Vec::new(),
+        }
+    }
+
+    /// Adds a rigid part; `inertia` about its centre of mass in the axes of `body_from_com` (parallel axis theorem).
+    fn add_mass(&mut self, mass_kg: f64, body_from_com: &Isometry3<f64>, inertia: &Matrix3<f64>) {
+        let rotation = body_from_com.rotation.to_rotation_matrix();
+        let part = rotation * inertia * rotation.transpose();
+        let com = body_from_com.translation.vector;
+        let total = self.mass_kg + mass_kg;
+        let new_com = (self.com_m * self.mass_kg + com * mass_kg) / total;
+        let shift = |d: Vector3<f64>, m: f64| (Matrix3::identity() * d.norm_squared() - d * d.transpose()) * m;
+        self.inertia_kg_m2 += shift(self.com_m - new_com, self.mass_kg);
+        self.inertia_kg_m2 += part + shift(com - new_com, mass_kg);
+        self.com_m = new_com;
+        self.mass_kg = total;
+    }
+}
