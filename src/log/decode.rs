@@ -1,0 +1,265 @@
+//! From the bytes of ROS messages to messages, or to the reason why not.
+
+use serde::Deserialize;
+
+use super::cdr;
+use super::error::Rejection;
+use super::ros::{self, Time};
+use super::topics::Stream;
+use crate::streams::{
+    Attitude, CaptureSet, JointAngles, JointCommand, JointCounts, JointSensorSample, JointStateBelief, LogLevel,
+    LogLine, MAX_JOINTS, Mark, MarkKind, Message, Phase, PressureSample, ReachAttempt, ReachTask, TagDetection,
+    TagDetections, TemperatureSample, Thermometer,
+};
+
+/// How far a quaternion's length may be from 1. Float32 senders are within 1e-6; a zero quaternion is far off.
+const QUATERNION_LENGTH_TOLERANCE: f64 = 0.01;
+
+/// Names that a topic's joint messages began with; `None` before the first.
+pub(super) type FirstNames = Option<Vec<String>>;
+
+/// `sensor_msgs/msg/JointState` that borrows its texts from the file's bytes.
+#[derive(Deserialize)]
+struct JointStateView<'a> {
+    stamp: Time,
+    #[serde(borrow)]
+    _frame_id: &'a str,
+    #[serde(borrow)]
+    name: Vec<&'a str>,
+    position: Vec<f64>,
+    _velocity: Vec<f64>,
+    _effort: Vec<f64>,
+}
+
+/// Decodes and checks one message of `stream`. Every number that it gives back is finite.
+///
+/// # Errors
+/// [`Rejection`], whatever the bytes are.
+pub(super) fn decode_message(stream: Stream, bytes: &[u8], names: &mut FirstNames) -> Result<Message, Rejection> {
+    Ok(match stream {
+        Stream::JointSensors => {
+            let joints = joints(bytes, names)?;
+            let counts = JointCounts::from_slice(&joints.position);
+            Message::JointSensors(JointSensorSample { stamp: joints.stamp.try_into()?, counts })
+        }
+        Stream::JointCommands => {
+            let joints = joints(bytes, names)?;
+            let counts = JointCounts::from_slice(&joints.position);
+            Message::JointCommand(JointCommand { stamp: joints.stamp.try_into()?, counts })
+        }
+        Stream::JointStates => {
+            let joints = joints(bytes, names)?;
+            let angles = JointAngles::from_slice(&joints.position);
+            Message::JointStates(JointStateBelief { stamp: joints.stamp.try_into()?, angles })
+        }
+        Stream::Detections => Message::Detections(detections(&cdr::decode(bytes)?)?),
+        Stream::OilTemperature => Message::Temperature(temperature(&cdr::decode(bytes)?, Thermometer::Oil)?),
+        Stream::WaterTemperature => Message::Temperature(temperature(&cdr::decode(bytes)?, Thermometer::Water)?),
+        Stream::DepthPressure => Message::Pressure(pressure(&cdr::decode(bytes)?)?),
+        Stream::VehicleImu => Message::Attitude(attitude(&cdr::decode(bytes)?)?),
+        Stream::Task => Message::Task(task(&cdr::decode(bytes)?)?),
+        Stream::Marks => Message::Mark(mark(&cdr::decode(bytes)?)?),
+        Stream::Log => Message::Log(log_line(cdr::decode(bytes)?)?),
+    })
+}
+
+fn finite(field: &'static str, values: impl IntoIterator<Item = f64>) -> Result<(), Rejection> {
+    if values.into_iter().all(f64::is_finite) { Ok(()) } else { Err(Rejection::NotFinite { field }) }
+}
+
+fn joints<'a>(bytes: &'a [u8], names: &mut FirstNames) -> Result<JointStateView<'a>, Rejection> {
+    let joints: JointStateView<'a> = cdr::decode(bytes)?;
+    let n = joints.position.len();
+    if n > MAX_JOINTS {
+        return Err(Rejection::TooManyJoints { got: n });
+    }
+    if n == 0 {
+        return Err(Rejection::NoJoints);
+    }
+    if let Some(first) = names.as_ref().filter(|first| first.len() != n) {
+        return Err(Rejection::JointCount { got: n, expected: first.len() });
+    }
+    if joints.name.len() != n {
+        return Err(Rejection::NameCount { names: joints.name.len(), positions: n });
+    }
+    if names.as_ref().is_some_and(|first| *first != joints.name) {
+        return Err(Rejection::NamesChanged);
+    }
+    finite("position", joints.position.iter().copied())?;
+    names.get_or_insert_with(|| joints.name.iter().map(|name| (*name).to_owned()).collect());
+    Ok(joints)
+}
+
+fn detections(m: &ros::AprilTagDetectionArray) -> Result<TagDetections, Rejection> {
+    let tags = m.detections.iter().map(detection).collect::<Result<_, _>>()?;
+    Ok(TagDetections { stamp: m.header.stamp.try_into()?, tags })
+}
+
+fn detection(tag: &ros::AprilTagDetection) -> Result<TagDetection, Rejection> {
+    let corners_px = tag.corners.map(|corner| [corner.x, corner.y]);
+    finite("corners", corners_px.into_iter().flatten())?;
+    finite("decision_margin", [f64::from(tag.decision_margin)])?;
+    Ok(TagDetection {
+        id: u32::try_from(tag.id).map_err(|_| Rejection::NegativeTagId)?,
+        corners_px,
+        decision_margin: f64::from(tag.decision_margin),
+    })
+}
+
+fn variance(value: f64) -> Result<f64, Rejection> {
+    finite("variance", [value])?;
+    if value < 0.0 { Err(Rejection::NegativeVariance) } else { Ok(value) }
+}
+
+fn temperature(m: &ros::Temperature, thermometer: Thermometer) -> Result<TemperatureSample, Rejection> {
+    finite("temperature", [m.temperature])?;
+    Ok(TemperatureSample {
+        stamp: m.header.stamp.try_into()?,
+        thermometer,
+        temperature_c: m.temperature,
+        variance_c2: variance(m.variance)?,
+    })
+}
+
+fn pressure(m: &ros::FluidPressure) -> Result<PressureSample, Rejection> {
+    finite("fluid_pressure", [m.fluid_pressure])?;
+    Ok(PressureSample {
+        stamp: m.header.stamp.try_into()?,
+        pressure_pa: m.fluid_pressure,
+        variance_pa2: variance(m.variance)?,
+    })
+}
+
+fn attitude(m: &ros::Imu) -> Result<Attitude, Rejection> {
+    if m.orientation_covariance[0] < 0.0 {
+        return Err(Rejection::NoOrientation);
+    }
+    let quaternion_wxyz = m.orientation.wxyz();
+    finite("orientation", quaternion_wxyz)?;
+    let length = quaternion_wxyz.iter().map(|c| c * c).sum::<f64>().sqrt();
+    if (length - 1.0).abs() > QUATERNION_LENGTH_TOLERANCE {
+        return Err(Rejection::QuaternionLength);
+    }
+    let angular_velocity_rad_s = m.angular_velocity.into();
+    let specific_force_m_s2 = m.linear_acceleration.into();
+    finite("angular_velocity", angular_velocity_rad_s)?;
+    finite("linear_acceleration", specific_force_m_s2)?;
+    let stamp = m.header.stamp.try_into()?;
+    Ok(Attitude { stamp, quaternion_wxyz, angular_velocity_rad_s, specific_force_m_s2 })
+}
+
+fn task(m: &ros::ReachTask) -> Result<ReachTask, Rejection> {
+    let targets_m: Vec<[f64; 3]> = m.targets.iter().copied().map(Into::into).collect();
+    finite("targets", targets_m.iter().flatten().copied())?;
+    finite("tolerance_m", [m.tolerance_m])?;
+    if m.tolerance_m <= 0.0 {
+        return Err(Rejection::Tolerance);
+    }
+    Ok(ReachTask { stamp: m.header.stamp.try_into()?, targets_m, tolerance_m: m.tolerance_m })
+}
+
+fn mark(m: &ros::Mark) -> Result<Mark, Rejection> {
+    let kind = match m.kind.as_str() {
+        "capture_fit" => MarkKind::Capture { set: CaptureSet::Fit, pose_idx: m.index },
+        "capture_held_out" => MarkKind::Capture { set: CaptureSet::HeldOut, pose_idx: m.index },
+        "reach_before" => MarkKind::Reach { attempt: ReachAttempt::Before, target_idx: m.index },
+        "reach_after" => MarkKind::Reach { attempt: ReachAttempt::After, target_idx: m.index },
+        "phase_plan" => MarkKind::Phase(Phase::Plan),
+        "phase_move" => MarkKind::Phase(Phase::Move),
+        "phase_settle" => MarkKind::Phase(Phase::Settle),
+        "phase_capture" => MarkKind::Phase(Phase::Capture),
+        "phase_calibrate" => MarkKind::Phase(Phase::Calibrate),
+        "phase_reach" => MarkKind::Phase(Phase::Reach),
+        "phase_done" => MarkKind::Phase(Phase::Done),
+        _ => return Err(Rejection::MarkKind),
+    };
+    let mark = Mark { start: m.start.try_into()?, end: m.end.try_into()?, kind };
+    if mark.end < mark.start { Err(Rejection::MarkSpan) } else { Ok(mark) }
+}
+
+/// Levels between the named ones fall to the lower name.
+fn log_line(m: ros::Log) -> Result<LogLine, Rejection> {
+    let level = match m.level {
+        0..=19 => LogLevel::Debug,
+        20..=29 => LogLevel::Info,
+        30..=39 => LogLevel::Warn,
+        40.. => LogLevel::Error,
+    };
+    Ok(LogLine { stamp: m.stamp.try_into()?, level, name: m.name, text: m.msg })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::log::encode::encode_message;
+    use crate::log::samples;
+
+    fn bytes_of(value: &impl serde::Serialize) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        cdr::encode(value, &mut bytes).unwrap();
+        bytes
+    }
+
+    fn joint_state(names: &[&str], position: &[f64]) -> Vec<u8> {
+        let name = names.iter().map(|&name| name.into()).collect();
+        bytes_of(&ros::JointState { name, position: position.to_vec(), ..Default::default() })
+    }
+
+    #[test]
+    fn every_message_round_trips_through_its_bytes() {
+        let mut bytes = Vec::new();
+        for message in samples::one_of_each() {
+            encode_message(&message, &samples::header(), &mut bytes).unwrap();
+            assert_eq!(decode_message(Stream::of(&message), &bytes, &mut None), Ok(message));
+        }
+    }
+
+    #[test]
+    fn joint_names_and_count_are_fixed_by_the_first_message() {
+        let mut names = None;
+        let mut decode = |n: &[&str], p: &[f64]| decode_message(Stream::JointSensors, &joint_state(n, p), &mut names);
+        assert_eq!(decode(&["a", "b"], &[1.0, f64::NAN]), Err(Rejection::NotFinite { field: "position" }));
+        assert!(decode(&["a", "b"], &[1.0, 2.0]).is_ok());
+        assert_eq!(decode(&["a"], &[1.0]), Err(Rejection::JointCount { got: 1, expected: 2 }));
+        assert_eq!(decode(&["a", "c"], &[1.0, 2.0]), Err(Rejection::NamesChanged));
+        assert_eq!(decode(&[], &[1.0, 2.0]), Err(Rejection::NameCount { names: 0, positions: 2 }));
+        assert_eq!(decode(&["a"; 9], &[0.0; 9]), Err(Rejection::TooManyJoints { got: 9 }));
+        assert_eq!(decode(&[], &[]), Err(Rejection::NoJoints));
+        assert!(decode(&["a", "b"], &[3.0, 4.0]).is_ok());
+    }
+
+    #[test]
+    fn values_that_no_sensor_gives_are_rejected() {
+        let mut imu = ros::Imu::default();
+        assert_eq!(attitude(&imu), Err(Rejection::QuaternionLength));
+        imu.orientation.w = 1.0;
+        assert!(attitude(&imu).is_ok());
+        imu.linear_acceleration.z = f64::INFINITY;
+        assert_eq!(attitude(&imu), Err(Rejection::NotFinite { field: "linear_acceleration" }));
+        imu.orientation_covariance[0] = -1.0;
+        assert_eq!(attitude(&imu), Err(Rejection::NoOrientation));
+
+        let hot = ros::Temperature { temperature: f64::NAN, ..Default::default() };
+        assert_eq!(temperature(&hot, Thermometer::Oil), Err(Rejection::NotFinite { field: "temperature" }));
+        let tag = ros::AprilTagDetection { id: -1, ..Default::default() };
+        assert_eq!(detection(&tag), Err(Rejection::NegativeTagId));
+        let kind = ros::Mark { kind: "nap".into(), ..Default::default() };
+        assert_eq!(mark(&kind), Err(Rejection::MarkKind));
+    }
+
+    #[test]
+    fn flipped_bits_and_cut_bytes_never_panic() {
+        let (mut bytes, mut accepted) = (Vec::new(), 0);
+        for message in samples::one_of_each() {
+            let stream = Stream::of(&message);
+            encode_message(&message, &samples::header(), &mut bytes).unwrap();
+            for at in 0..bytes.len() * 8 {
+                let mut damaged = bytes.clone();
+                damaged[at / 8] ^= 1 << (at % 8);
+                accepted += u32::from(decode_message(stream, &damaged, &mut None).is_ok());
+                let _ = decode_message(stream, &damaged[..at / 8], &mut None);
+            }
+        }
+        assert!(accepted > 0);
+    }
+}

@@ -1,0 +1,87 @@
+//! What can go wrong with a recording, and why single messages are refused.
+
+use std::path::PathBuf;
+
+use super::cdr::CdrError;
+use crate::time::Stamp;
+
+/// Why a recording could not be read or written at all.
+#[derive(Debug, thiserror::Error)]
+pub enum LogError {
+    #[error("{}: cannot be read: {source}", path.display())]
+    Read { path: PathBuf, source: std::io::Error },
+    #[error("{}: the file is empty, not a recording", path.display())]
+    Empty { path: PathBuf },
+    #[error("{}: not an MCAP recording: it begins with the bytes {found}, not with 89 4d 43 41 50 30 0d 0a", path.display())]
+    NotMcap { path: PathBuf, found: String },
+    #[error("{}: the directory {} does not exist", path.display(), directory.display())]
+    NoDirectory { path: PathBuf, directory: PathBuf },
+    #[error("{}: cannot be created: {source}", path.display())]
+    Create { path: PathBuf, source: std::io::Error },
+    #[error("{}: source and destination are one file", path.display())]
+    SameFile { path: PathBuf },
+    #[error("{}: cannot be written: {source}", path.display())]
+    Write { path: PathBuf, source: mcap::McapError },
+    #[error("{}: topic {topic}: {source}", path.display())]
+    Encode { path: PathBuf, topic: String, source: EncodeError },
+    #[error("{}: topic {topic} holds {first}, it cannot take {now} as well", path.display())]
+    SchemaChanged { path: PathBuf, topic: String, first: String, now: String },
+}
+
+/// Why a message has no form in the file.
+#[derive(Debug, thiserror::Error)]
+pub enum EncodeError {
+    #[error("the message has {got} joints, the recording names {expected}")]
+    JointCount { got: usize, expected: usize },
+    #[error("the stamp {} ns is outside of what a ROS time holds, the years 1901 to 2038", stamp.nanos)]
+    StampRange { stamp: Stamp },
+    #[error("the log time {} ns lies before 1970", log_time.nanos)]
+    LogTimeRange { log_time: Stamp },
+    #[error("tag id {id} exceeds the largest id, {}", i32::MAX)]
+    TagId { id: u32 },
+    #[error(transparent)]
+    Cdr(#[from] CdrError),
+}
+
+/// Why a message of a recording is not used; counted by topic, never silent.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Rejection {
+    #[error("message encoding is {found:?}, not \"cdr\"")]
+    MessageEncoding { found: String },
+    #[error("type is {found:?}, not {expected:?}")]
+    Type { found: String, expected: &'static str },
+    #[error("cannot be decoded: {0}")]
+    Undecodable(#[from] CdrError),
+    #[error("log time is past the year 2262")]
+    LogTimeRange,
+    #[error("stamp has {nanosec} ns in its second")]
+    StampNanos { nanosec: u32 },
+    #[error("{field} is not finite")]
+    NotFinite { field: &'static str },
+    #[error("{names} names for {positions} positions")]
+    NameCount { names: usize, positions: usize },
+    #[error("{got} joints, the recording began with {expected}")]
+    JointCount { got: usize, expected: usize },
+    #[error("{got} joints, the most that an arm may have is {}", crate::streams::MAX_JOINTS)]
+    TooManyJoints { got: usize },
+    #[error("no joints")]
+    NoJoints,
+    #[error("joint names differ from those that the topic began with")]
+    NamesChanged,
+    #[error("joint names differ from those of the joint sensors")]
+    OtherJoints,
+    #[error("a tag id is negative")]
+    NegativeTagId,
+    #[error("variance is negative")]
+    NegativeVariance,
+    #[error("the sensor gives no orientation")]
+    NoOrientation,
+    #[error("the quaternion's length differs from 1 by more than 1 %")]
+    QuaternionLength,
+    #[error("tolerance_m is not above 0")]
+    Tolerance,
+    #[error("unknown kind of mark")]
+    MarkKind,
+    #[error("the mark ends before it starts")]
+    MarkSpan,
+}

@@ -1,0 +1,168 @@
+//! The few MCAP records that messages need, parsed with a check on every length.
+
+use std::collections::BTreeMap;
+use std::rc::Rc;
+
+use super::{Channel, RawMessage, Schema};
+
+/// Bytes at both ends of the file.
+pub const MAGIC: &[u8] = mcap::MAGIC;
+/// Opcode and length in front of each record.
+pub const PREFIX_BYTES: usize = 9;
+pub const FOOTER_BYTES: u64 = 20;
+pub const DATA_END_BYTES: u64 = 4;
+
+/// The longest chunk head: prefix, times, sizes, checksum and a compression name of four letters.
+pub const CHUNK_HEAD_BYTES: usize = PREFIX_BYTES + 44;
+
+/// Opcode and length of a record.
+#[derive(Clone, Copy, Debug)]
+pub struct Prefix {
+    pub opcode: u8,
+    pub len: u64,
+}
+
+impl Prefix {
+    pub fn parse(bytes: &[u8]) -> Option<Self> {
+        let mut fields = Fields(bytes);
+        Some(Self { opcode: fields.u8()?, len: fields.u64()? })
+    }
+}
+
+/// Reads little-endian fields one after the other; `None` at the end of the bytes.
+pub struct Fields<'a>(pub &'a [u8]);
+
+impl<'a> Fields<'a> {
+    fn take(&mut self, n: usize) -> Option<&'a [u8]> {
+        let (taken, rest) = self.0.split_at_checked(n)?;
+        self.0 = rest;
+        Some(taken)
+    }
+
+    fn array<const N: usize>(&mut self) -> Option<[u8; N]> {
+        let (taken, rest) = self.0.split_first_chunk::<N>()?;
+        self.0 = rest;
+        Some(*taken)
+    }
+
+    pub fn u8(&mut self) -> Option<u8> {
+        self.array::<1>().map(|[byte]| byte)
+    }
+
+    pub fn u16(&mut self) -> Option<u16> {
+        self.array().map(u16::from_le_bytes)
+    }
+
+    pub fn u32(&mut self) -> Option<u32> {
+        self.array().map(u32::from_le_bytes)
+    }
+
+    pub fn u64(&mut self) -> Option<u64> {
+        self.array().map(u64::from_le_bytes)
+    }
+
+    /// Bytes behind a length of four bytes.
+    fn blob(&mut self) -> Option<&'a [u8]> {
+        let len = self.u32()?;
+        self.take(usize::try_from(len).ok()?)
+    }
+
+    fn text(&mut self) -> Option<String> {
+        self.blob().and_then(|bytes| std::str::from_utf8(bytes).ok()).map(str::to_owned)
+    }
+}
+
+/// Head of a chunk record.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ChunkHead {
+    pub record_len: u64,
+    pub uncompressed_bytes: u64,
+    /// "zstd", "lz4" or "".
+    pub compression: &'static str,
+    pub compressed_bytes: u64,
+    /// From the record's opcode to the compressed bytes.
+    pub head_bytes: usize,
+}
+
+impl ChunkHead {
+    /// From the chunk's opcode on; `None` where this is not the whole head of a chunk of a known compression.
+    pub fn parse(bytes: &[u8]) -> Option<Self> {
+        Self::parse_body(bytes).filter(|_| bytes[0] == mcap::records::op::CHUNK)
+    }
+
+    /// The same whatever the opcode.
+    pub fn parse_body(bytes: &[u8]) -> Option<Self> {
+        let prefix = Prefix::parse(bytes)?;
+        let mut fields = Fields(&bytes[PREFIX_BYTES..]);
+        let _start_and_end_time = (fields.u64()?, fields.u64()?);
+        let uncompressed_bytes = fields.u64()?;
+        let _checksum = fields.u32()?;
+        let compression = match fields.blob()? {
+            b"" => "",
+            b"zstd" => "zstd",
+            b"lz4" => "lz4",
+            _ => return None,
+        };
+        let compressed_bytes = fields.u64()?;
+        let head_bytes = bytes.len() - fields.0.len();
+        Some(Self { record_len: prefix.len, uncompressed_bytes, compression, compressed_bytes, head_bytes })
+    }
+
+    /// Whether the record's two lengths agree and the record fits into the `available` bytes from its opcode on. By chance,
+    /// 1 of 2^64 places passes.
+    pub fn is_consistent(&self, available: u64) -> bool {
+        let body = (self.head_bytes - PREFIX_BYTES) as u64;
+        self.compressed_bytes.checked_add(body) == Some(self.record_len)
+            && self.record_len <= available.saturating_sub(PREFIX_BYTES as u64)
+    }
+}
+
+/// Whether the first bytes of a message index fit its length.
+pub fn is_message_index(body: &[u8], len: u64) -> bool {
+    let mut fields = Fields(body);
+    let _channel = fields.u16();
+    fields.u32().is_some_and(|array_bytes| u64::from(array_bytes) + 6 == len && array_bytes % 16 == 0)
+}
+
+/// Schemas and channels seen so far.
+#[derive(Debug, Default)]
+pub struct Tables {
+    schemas: BTreeMap<u16, Rc<Schema>>,
+    channels: BTreeMap<u16, Channel>,
+}
+
+impl Tables {
+    /// Keeps a schema record; `None` if it is malformed.
+    pub fn add_schema(&mut self, body: &[u8]) -> Option<()> {
+        let mut fields = Fields(body);
+        let id = fields.u16()?;
+        let schema = Schema { name: fields.text()?, encoding: fields.text()?, data: fields.blob()?.to_vec() };
+        self.schemas.insert(id, Rc::new(schema));
+        Some(())
+    }
+
+    /// Keeps a channel record; `None` if it is malformed.
+    pub fn add_channel(&mut self, body: &[u8]) -> Option<()> {
+        let mut fields = Fields(body);
+        let id = fields.u16()?;
+        let schema = self.schemas.get(&fields.u16()?).cloned();
+        let topic = fields.text()?;
+        let message_encoding = fields.text()?;
+        let mut pairs = Fields(fields.blob()?);
+        let mut metadata = BTreeMap::new();
+        while !pairs.0.is_empty() {
+            metadata.insert(pairs.text()?, pairs.text()?);
+        }
+        self.channels.insert(id, Channel { topic, message_encoding, metadata, schema });
+        Some(())
+    }
+
+    /// The message of a record; `None` if it is malformed or its channel is unknown.
+    pub fn message<'a>(&'a self, body: &'a [u8]) -> Option<RawMessage<'a>> {
+        let mut fields = Fields(body);
+        let channel = self.channels.get(&fields.u16()?)?;
+        let sequence = fields.u32()?;
+        let (log_time_nanos, publish_time_nanos) = (fields.u64()?, fields.u64()?);
+        Some(RawMessage { channel, log_time_nanos, publish_time_nanos, sequence, data: fields.0 })
+    }
+}

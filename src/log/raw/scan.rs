@@ -1,0 +1,353 @@
+//! Walks through a file record by record, and finds its way again behind damage.
+
+use std::io::{self, Read, Seek};
+
+use mcap::records::op;
+
+use super::chunk;
+use super::record::{
+    CHUNK_HEAD_BYTES, ChunkHead, DATA_END_BYTES, FOOTER_BYTES, Fields, MAGIC, PREFIX_BYTES, Prefix, Tables,
+    is_message_index,
+};
+use super::window::Window;
+use super::{Completeness, RawMessage, RawSummary};
+
+/// Bytes looked through at once for the next chunk.
+const SEARCH_BYTES: u64 = 1 << 18;
+/// Prefix and fields of the last record, and the magic behind it.
+const TAIL_BYTES: u64 = PREFIX_BYTES as u64 + FOOTER_BYTES + MAGIC.len() as u64;
+
+/// Why nothing of a file can be read.
+#[derive(Debug)]
+pub enum ScanError {
+    Read(io::Error),
+    Empty,
+    NotMcap { found: String },
+}
+
+impl From<io::Error> for ScanError {
+    fn from(error: io::Error) -> Self {
+        Self::Read(error)
+    }
+}
+
+/// Where the walk goes on after a record.
+enum Next {
+    At(u64),
+    /// Nothing more can be read.
+    Over,
+}
+
+#[derive(Default)]
+struct Damage {
+    /// The first of all.
+    reason: Option<String>,
+    chunks: u64,
+    bytes: u64,
+}
+
+impl Damage {
+    fn note(&mut self, at: u64, what: &str) {
+        self.reason.get_or_insert_with(|| format!("at byte {at}: {what}"));
+    }
+}
+
+struct Scan<R, F> {
+    window: Window<R>,
+    visit: F,
+    tables: Tables,
+    damage: Damage,
+    cut: Option<String>,
+    readable: u64,
+    /// Messages that the file's own summary counts.
+    counted: Option<u64>,
+    ends_with_magic: bool,
+    has_chunks: bool,
+    is_past_data: bool,
+    /// Behind the last chunk, or the start: here the walk was surely at a record's begin.
+    verified_end: u64,
+}
+
+/// Hands every readable message of `source` to `visit`.
+pub fn scan<R: Read + Seek>(source: R, visit: impl FnMut(&RawMessage<'_>)) -> Result<RawSummary, ScanError> {
+    let mut window = Window::new(source)?;
+    let start_len = window.len().min(MAGIC.len() as u64) as usize;
+    let start = window.bytes(0, start_len)?;
+    if start.is_empty() {
+        return Err(ScanError::Empty);
+    }
+    if start != MAGIC {
+        let found = start.iter().map(|byte| format!("{byte:02x}")).collect::<Vec<_>>().join(" ");
+        return Err(ScanError::NotMcap { found });
+    }
+    let mut scan = Scan {
+        window,
+        visit,
+        tables: Tables::default(),
+        damage: Damage::default(),
+        cut: None,
+        readable: 0,
+        counted: None,
+        ends_with_magic: false,
+        has_chunks: false,
+        is_past_data: false,
+        verified_end: MAGIC.len() as u64,
+    };
+    scan.read_summary()?;
+    scan.walk()?;
+    Ok(RawSummary { readable_messages: scan.readable, completeness: scan.completeness() })
+}
+
+impl<R: Read + Seek, F: FnMut(&RawMessage<'_>)> Scan<R, F> {
+    /// Takes channels and the count of messages from the end of a finished file, so that a damaged chunk that declared
+    /// channels does not take the messages of all others with it.
+    fn read_summary(&mut self) -> io::Result<()> {
+        let len = self.window.len();
+        if len < MAGIC.len() as u64 + TAIL_BYTES {
+            return Ok(());
+        }
+        let tail = self.window.bytes(len - TAIL_BYTES, TAIL_BYTES as usize)?;
+        self.ends_with_magic = tail.ends_with(MAGIC);
+        let is_footer =
+            Prefix::parse(tail).is_some_and(|prefix| prefix.opcode == op::FOOTER && prefix.len == FOOTER_BYTES);
+        if !self.ends_with_magic || !is_footer {
+            return Ok(());
+        }
+        let summary_start = Fields(&tail[PREFIX_BYTES..]).u64().unwrap_or(0);
+        if summary_start == 0 {
+            return Ok(()); // A writer may leave the summary out.
+        }
+        let end = len - MAGIC.len() as u64;
+        let start = summary_start.checked_sub(PREFIX_BYTES as u64 + DATA_END_BYTES);
+        let Some(start) = start.filter(|&start| start < end) else {
+            self.damage.note(len - TAIL_BYTES, "the footer points nowhere");
+            return Ok(());
+        };
+        let bytes = self.window.bytes(start, usize::try_from(end - start).unwrap_or(usize::MAX))?;
+        match chunk::verified_summary(bytes) {
+            Ok(records) => self.take_summary(&records),
+            Err(error) => self.damage.note(summary_start, &format!("the summary cannot be used: {error}")),
+        }
+        Ok(())
+    }
+
+    fn take_summary(&mut self, records: &[(u8, Vec<u8>)]) {
+        for (opcode, body) in records {
+            match *opcode {
+                op::SCHEMA => _ = self.tables.add_schema(body),
+                op::CHANNEL => _ = self.tables.add_channel(body),
+                op::STATISTICS => self.counted = Fields(body).u64(),
+                _ => {}
+            }
+        }
+    }
+
+    fn walk(&mut self) -> io::Result<()> {
+        let mut at = MAGIC.len() as u64;
+        while let Next::At(next) = self.record(at)? {
+            at = next;
+        }
+        Ok(())
+    }
+
+    fn record(&mut self, at: u64) -> io::Result<Next> {
+        let left = self.window.len() - at;
+        if left < PREFIX_BYTES as u64 {
+            let what = if left == 0 { "the file ends without a footer" } else { "the file ends within a record" };
+            return self.broken(at, None, what);
+        }
+        let Some(prefix) = Prefix::parse(self.window.bytes(at, PREFIX_BYTES)?) else {
+            return self.broken(at, None, "the file ends within a record");
+        };
+        let opcode = Some(prefix.opcode);
+        let body_left = left - PREFIX_BYTES as u64;
+        if prefix.opcode == 0 {
+            return self.broken(at, opcode, "no record begins with 00");
+        }
+        if prefix.len > body_left {
+            return self.broken(at, opcode, &format!("a record of {} bytes has {body_left}", prefix.len));
+        }
+        match prefix.opcode {
+            op::CHUNK => return self.chunk(at, left),
+            op::FOOTER => return self.footer(at, prefix),
+            _ => {}
+        }
+        if let Some(what) = self.contradiction(at, prefix)? {
+            return self.broken(at, opcode, what);
+        }
+        match prefix.opcode {
+            op::DATA_END => self.is_past_data = true,
+            op::SCHEMA | op::CHANNEL | op::MESSAGE => self.unchunked(at, prefix)?,
+            _ => {}
+        }
+        Ok(Next::At(at + PREFIX_BYTES as u64 + prefix.len))
+    }
+
+    /// Why a record cannot be what its opcode says: an opcode has no checksum, and a changed one must not hide a record
+    /// or make messages of something else.
+    fn contradiction(&mut self, at: u64, prefix: Prefix) -> io::Result<Option<&'static str>> {
+        let left = self.window.len() - at;
+        let start = self.window.bytes(at, left.min(CHUNK_HEAD_BYTES as u64) as usize)?;
+        if ChunkHead::parse_body(start).is_some_and(|head| head.is_consistent(left)) {
+            return Ok(Some("a chunk has another opcode"));
+        }
+        let is_index = is_message_index(&start[PREFIX_BYTES..], prefix.len);
+        let is_first = at == MAGIC.len() as u64;
+        Ok(match prefix.opcode {
+            opcode if is_first && opcode != op::HEADER => Some("the first record is no header"),
+            op::DATA_END if prefix.len != DATA_END_BYTES => Some("the data end has a wrong length"),
+            op::MESSAGE_INDEX if !is_index => Some("a message index has a wrong length"),
+            op::MESSAGE if self.is_past_data => Some("a message lies behind the data"),
+            op::MESSAGE if self.has_chunks && is_index => Some("a message index has another opcode"),
+            _ => None,
+        })
+    }
+
+    fn unchunked(&mut self, at: u64, prefix: Prefix) -> io::Result<()> {
+        let body = self.window.bytes(at + PREFIX_BYTES as u64, prefix.len as usize)?;
+        if deliver(&mut self.tables, &mut self.visit, &mut self.readable, prefix.opcode, body).is_none() {
+            self.damage.note(at, "a record cannot be used");
+            self.damage.bytes += PREFIX_BYTES as u64 + prefix.len;
+        }
+        Ok(())
+    }
+
+    fn footer(&mut self, at: u64, prefix: Prefix) -> io::Result<Next> {
+        let left = self.window.len() - at;
+        if prefix.len != FOOTER_BYTES || left > TAIL_BYTES {
+            return self.broken(at, Some(prefix.opcode), "a footer is not at the end");
+        }
+        if left < TAIL_BYTES {
+            return self.broken(at, Some(prefix.opcode), "the file ends within the closing bytes");
+        }
+        if !self.ends_with_magic {
+            self.damage.note(at, "the closing bytes behind the footer are wrong");
+        }
+        Ok(Next::Over)
+    }
+
+    fn chunk(&mut self, at: u64, left: u64) -> io::Result<Next> {
+        let head = ChunkHead::parse(self.window.bytes(at, left.min(CHUNK_HEAD_BYTES as u64) as usize)?);
+        let Some(head) = head.filter(|head| head.is_consistent(left)) else {
+            return self.broken(at, Some(op::CHUNK), "the head of a chunk contradicts itself");
+        };
+        let record_bytes = PREFIX_BYTES as u64 + head.record_len;
+        self.has_chunks = true;
+        self.verified_end = at + record_bytes;
+        let bytes = self.window.bytes(at, usize::try_from(record_bytes).unwrap_or(usize::MAX))?;
+        let (tables, visit, readable) = (&mut self.tables, &mut self.visit, &mut self.readable);
+        let mut unusable = 0_u64;
+        let read = chunk::for_each_record(bytes, &head, |opcode, body| {
+            if deliver(tables, visit, readable, opcode, body).is_none() {
+                unusable += 1;
+            }
+        });
+        if let Err(error) = read {
+            self.damage.note(at, &format!("a chunk cannot be read: {error}"));
+            self.damage.chunks += 1;
+            self.damage.bytes += record_bytes;
+        } else if unusable > 0 {
+            self.damage
+                .note(at, &format!("{unusable} records of a chunk cannot be used, their topic's declaration is lost"));
+        }
+        Ok(Next::At(at + record_bytes))
+    }
+
+    /// Goes on at the next chunk behind a record that cannot be; without one, this is the end.
+    fn broken(&mut self, at: u64, opcode: Option<u8>, what: &str) -> io::Result<Next> {
+        let is_chunk = opcode == Some(op::CHUNK);
+        // Not from here: a wrong length before may have led astray, past chunks. A broken chunk is no candidate.
+        if let Some(next) = self.find_chunk(self.verified_end)? {
+            self.damage.note(at, what);
+            self.damage.chunks += u64::from(is_chunk);
+            self.damage.bytes += next - self.verified_end;
+            return Ok(Next::At(next));
+        }
+        if self.ends_with_magic {
+            self.damage.note(at, what);
+            self.damage.chunks += u64::from(is_chunk);
+            self.damage.bytes += self.window.len() - at;
+            return Ok(Next::Over);
+        }
+        self.cut = Some(format!("at byte {at} of {}: {what}", self.window.len()));
+        if is_chunk {
+            self.salvage(at)?;
+        }
+        Ok(Next::Over)
+    }
+
+    /// Takes the messages from the beginning of a cut chunk.
+    fn salvage(&mut self, at: u64) -> io::Result<()> {
+        let left = usize::try_from(self.window.len() - at).unwrap_or(usize::MAX);
+        let bytes = self.window.bytes(at, left)?;
+        let Some(head) = ChunkHead::parse(&bytes[..left.min(CHUNK_HEAD_BYTES)]) else {
+            return Ok(());
+        };
+        let (tables, visit, readable) = (&mut self.tables, &mut self.visit, &mut self.readable);
+        chunk::for_each_record_of_cut(bytes, &head, |opcode, body| {
+            let _ = deliver(tables, visit, readable, opcode, body);
+        });
+        Ok(())
+    }
+
+    /// The first place from `from` on where a whole chunk may begin.
+    fn find_chunk(&mut self, from: u64) -> io::Result<Option<u64>> {
+        let overlap = CHUNK_HEAD_BYTES as u64 - 1;
+        let mut at = from;
+        while at < self.window.len() {
+            let left = self.window.len() - at;
+            let bytes = self.window.bytes(at, left.min(SEARCH_BYTES + overlap) as usize)?;
+            let found = (0..bytes.len().min(SEARCH_BYTES as usize)).find(|&offset| {
+                let bytes = &bytes[offset..];
+                bytes[0] == op::CHUNK
+                    && ChunkHead::parse(&bytes[..bytes.len().min(CHUNK_HEAD_BYTES)])
+                        .is_some_and(|head| head.is_consistent(left - offset as u64))
+            });
+            if let Some(offset) = found {
+                return Ok(Some(at + offset as u64));
+            }
+            at += SEARCH_BYTES;
+        }
+        Ok(None)
+    }
+
+    fn completeness(self) -> Completeness {
+        let missing = self.counted.map(|counted| counted.saturating_sub(self.readable));
+        let miscounted = missing
+            .filter(|&missing| missing > 0)
+            .map(|missing| format!("{missing} messages that the summary counts are missing"));
+        let readable_messages = self.readable;
+        match (self.damage.reason.or(miscounted), self.cut) {
+            (Some(reason), cut) => Completeness::Damaged {
+                reason: cut.map_or_else(|| reason.clone(), |cut| format!("{reason}; and cut {cut}")),
+                lost_chunks: self.damage.chunks,
+                lost_bytes: self.damage.bytes,
+                lost_messages: missing,
+                readable_messages,
+            },
+            (None, Some(reason)) => Completeness::Cut { reason, readable_messages },
+            (None, None) => Completeness::Whole,
+        }
+    }
+}
+
+/// Takes one schema, channel or message record; `None` if it cannot be used. Others are passed over.
+fn deliver(
+    tables: &mut Tables,
+    visit: &mut impl FnMut(&RawMessage<'_>),
+    readable: &mut u64,
+    opcode: u8,
+    body: &[u8],
+) -> Option<()> {
+    match opcode {
+        op::SCHEMA => tables.add_schema(body),
+        op::CHANNEL => tables.add_channel(body),
+        op::MESSAGE => {
+            let message = tables.message(body)?;
+            *readable += 1;
+            visit(&message);
+            Some(())
+        }
+        _ => Some(()),
+    }
+}

@@ -1,0 +1,268 @@
+//! Cuts, flipped bits and foreign files.
+
+use std::io::Cursor;
+use std::path::Path;
+
+use super::scan::{ScanError, scan};
+use super::*;
+use crate::log::samples;
+
+const PER_CHUNK: usize = 60;
+
+/// Bytes of a recording of several chunks, and the data of its messages in the order of the file.
+fn recording() -> (Vec<u8>, Vec<Vec<u8>>) {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("run.mcap");
+    samples::write(&path, &samples::stream(300), PER_CHUNK);
+    let bytes = std::fs::read(&path).unwrap();
+    let (messages, summary) = read(&bytes).unwrap();
+    assert_eq!(summary.completeness, Completeness::Whole);
+    assert_eq!(messages.len(), 330);
+    (bytes, messages)
+}
+
+fn read(bytes: &[u8]) -> Result<(Vec<Vec<u8>>, RawSummary), ScanError> {
+    let mut messages = Vec::new();
+    let summary = scan(Cursor::new(bytes), |message| messages.push(message.data.to_vec()))?;
+    assert_eq!(summary.readable_messages, messages.len() as u64);
+    Ok((messages, summary))
+}
+
+/// Whether `part` is `whole` with some left out, in the same order.
+fn is_subsequence(part: &[Vec<u8>], whole: &[Vec<u8>]) -> bool {
+    let mut rest = whole.iter();
+    part.iter().all(|message| rest.any(|other| other == message))
+}
+
+/// Where the records outside of chunks begin, and how long they are.
+fn records(bytes: &[u8]) -> Vec<(usize, usize)> {
+    let mut at = 8;
+    let mut records = Vec::new();
+    while at + 9 <= bytes.len() - 8 {
+        let len = 9 + u64::from_le_bytes(bytes[at + 1..at + 9].try_into().unwrap()) as usize;
+        records.push((at, len));
+        at += len;
+    }
+    records
+}
+
+/// The chunks among them.
+fn chunks(bytes: &[u8]) -> Vec<(usize, usize)> {
+    records(bytes).into_iter().filter(|(at, _)| bytes[*at] == 6).collect()
+}
+
+#[test]
+fn a_cut_anywhere_leaves_the_beginning() {
+    let (bytes, messages) = recording();
+    let chunks = chunks(&bytes);
+    assert_eq!(chunks.len(), 6);
+    let is_near_a_border =
+        |end: usize| chunks.iter().any(|(at, len)| end.abs_diff(*at) < 60 || end.abs_diff(at + len) < 30);
+    for end in (0..bytes.len()).filter(|&end| end % 17 == 0 || end + 200 > bytes.len() || is_near_a_border(end)) {
+        let Ok((read, summary)) = read(&bytes[..end]) else {
+            assert!(end < 8, "{end}");
+            continue;
+        };
+        assert!(messages.starts_with(&read), "{end}");
+        let whole_chunks = chunks.iter().filter(|(at, len)| at + len <= end).count();
+        assert!(read.len() >= (whole_chunks * PER_CHUNK).min(messages.len()), "{end}: {}", read.len());
+        assert!(matches!(summary.completeness, Completeness::Cut { .. }), "{end}: {:?}", summary.completeness);
+    }
+}
+
+#[test]
+fn messages_before_the_cut_within_a_chunk_are_saved() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("run.mcap");
+    let stream = samples::stream(30_000);
+    samples::write(&path, &stream, usize::MAX);
+    let bytes = std::fs::read(&path).unwrap();
+    let (at, len) = chunks(&bytes)[0];
+    let (messages, _) = read(&bytes[..at + len * 9 / 10]).unwrap();
+    assert!(messages.len() > 1000, "{}", messages.len());
+}
+
+/// Checks what is read of `bytes` after one bit of them was flipped.
+fn check_flip(bytes: &[u8], messages: &[Vec<u8>], at: usize, bit: u8) {
+    let mut damaged = bytes.to_vec();
+    damaged[at] ^= 1 << bit;
+    let Ok((read, summary)) = read(&damaged) else {
+        return assert!(at < 8, "{at}");
+    };
+    let place = format!("byte {at} bit {bit}: {:?}", summary.completeness);
+    assert!(is_subsequence(&read, messages), "{place}");
+    assert!(read.len() >= messages.len() - PER_CHUNK, "{place}");
+    let lost = (messages.len() - read.len()) as u64;
+    if let Completeness::Damaged { lost_messages, .. } = summary.completeness {
+        assert!(lost_messages.is_none_or(|counted| counted == lost), "{place}");
+    } else {
+        assert_eq!(lost, 0, "{place}");
+    }
+}
+
+#[test]
+fn a_flipped_bit_anywhere_loses_what_it_hit_and_never_panics() {
+    let (bytes, messages) = recording();
+    for at in (0..bytes.len()).step_by(31) {
+        for bit in [0, 3, 7] {
+            check_flip(&bytes, &messages, at, bit);
+        }
+    }
+}
+
+#[test]
+fn a_flipped_bit_in_the_head_of_any_record_loses_what_it_hit() {
+    let (bytes, messages) = recording();
+    for (at, len) in records(&bytes) {
+        for at in at..at + len.min(9) {
+            for bit in 0..8 {
+                check_flip(&bytes, &messages, at, bit);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_flipped_bit_in_the_head_of_a_record_is_noticed_in_an_unfinished_file() {
+    let (bytes, messages) = recording();
+    let (last_at, last_len) = *chunks(&bytes).last().unwrap();
+    let unfinished = &bytes[..last_at + last_len];
+    for (at, len) in records(&bytes).into_iter().filter(|(at, _)| *at < last_at && *at > chunks(&bytes)[0].0) {
+        for at in at..at + len.min(53) {
+            for bit in 0..8 {
+                let mut damaged = unfinished.to_vec();
+                damaged[at] ^= 1 << bit;
+                let (read, summary) = read(&damaged).unwrap();
+                let place = format!("byte {at} bit {bit}: {:?}", summary.completeness);
+                assert!(is_subsequence(&read, &messages), "{place}");
+                let is_damaged = matches!(summary.completeness, Completeness::Damaged { .. });
+                assert!(read.len() == messages.len() || is_damaged, "{place}");
+            }
+        }
+    }
+}
+
+#[test]
+fn many_flipped_bits_never_panic() {
+    let (bytes, messages) = recording();
+    let mut state = 7_u64;
+    let mut random = |n: usize| {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        ((state >> 33) as usize) % n
+    };
+    for _ in 0..300 {
+        let mut damaged = bytes.clone();
+        for _ in 0..1 + random(20) {
+            let at = 8 + random(bytes.len() - 8);
+            damaged[at] ^= 1 << random(8);
+        }
+        damaged.truncate(8 + random(bytes.len() * 2).min(bytes.len() - 8));
+        let (read, _) = read(&damaged).unwrap();
+        assert!(read.len() <= messages.len());
+    }
+}
+
+#[test]
+fn a_lost_chunk_is_counted_and_the_rest_is_read() {
+    let (mut bytes, messages) = recording();
+    // The first chunk declares most channels; the summary at the end repeats them.
+    let (at, len) = chunks(&bytes)[0];
+    bytes[at + len / 2] ^= 0x10;
+    let (read, summary) = read(&bytes).unwrap();
+    assert!(read == messages[PER_CHUNK..]);
+    let Completeness::Damaged { lost_chunks, lost_bytes, lost_messages, readable_messages, .. } = summary.completeness
+    else {
+        panic!("{summary:?}");
+    };
+    assert_eq!((lost_chunks, lost_bytes), (1, len as u64));
+    assert_eq!((lost_messages, readable_messages), (Some(PER_CHUNK as u64), read.len() as u64));
+}
+
+#[test]
+fn huge_lengths_are_not_believed() {
+    let (bytes, messages) = recording();
+    let (at, _) = chunks(&bytes)[2];
+    // The record's length, the unpacked size, and the packed size, in turn.
+    for (field, lost) in [(1, PER_CHUNK), (25, PER_CHUNK), (45, PER_CHUNK)] {
+        let mut damaged = bytes.clone();
+        damaged[at + field..at + field + 8].copy_from_slice(&(u64::MAX / 3).to_le_bytes());
+        let (read, summary) = read(&damaged).unwrap();
+        assert_eq!(read.len(), messages.len() - lost, "{summary:?}");
+        assert!(matches!(summary.completeness, Completeness::Damaged { .. }));
+    }
+}
+
+#[test]
+fn zeros_behind_a_crash_are_a_cut() {
+    let (bytes, messages) = recording();
+    let (at, len) = chunks(&bytes)[3];
+    let mut crashed = bytes[..at + len].to_vec();
+    crashed.resize(bytes.len(), 0);
+    let (read, summary) = read(&crashed).unwrap();
+    assert!(read == messages[..4 * PER_CHUNK]);
+    assert!(matches!(summary.completeness, Completeness::Cut { .. }), "{summary:?}");
+}
+
+#[test]
+fn files_of_other_writers_are_read() {
+    use mcap::{Compression, WriteOptions};
+    let plain = || WriteOptions::new().compression_threads(0);
+    let variants = [
+        plain().compression(None),
+        plain().compression(Some(Compression::Lz4)),
+        plain().use_chunks(false),
+        plain().calculate_chunk_crcs(false),
+        plain().emit_summary_records(false).emit_summary_offsets(false),
+    ];
+    for (n, options) in variants.into_iter().enumerate() {
+        let mut file = Cursor::new(Vec::new());
+        let mut writer = options.create(&mut file).unwrap();
+        let channel = writer.add_channel(0, "/x", "json", &BTreeMap::new()).unwrap();
+        for sequence in 0..500 {
+            let log_time = u64::from(sequence);
+            let header = mcap::records::MessageHeader { channel_id: channel, sequence, log_time, publish_time: 0 };
+            writer.write_to_known_channel(&header, &[sequence as u8; 200]).unwrap();
+        }
+        writer.finish().unwrap();
+        drop(writer);
+        let bytes = file.into_inner();
+        let (messages, summary) = read(&bytes).unwrap();
+        assert_eq!((messages.len(), summary.completeness), (500, Completeness::Whole), "variant {n}");
+        for end in (8..bytes.len()).step_by(97) {
+            let (cut, _) = read(&bytes[..end]).unwrap();
+            assert!(messages.starts_with(&cut), "variant {n}, {end}");
+        }
+    }
+}
+
+#[test]
+fn a_file_whose_writer_was_killed_within_a_chunk_is_read() {
+    // mcap's seeking writer leaves a chunk head of placeholders when killed.
+    let mut writer = mcap::WriteOptions::new().compression_threads(0).create(Cursor::new(Vec::new())).unwrap();
+    let channel = writer.add_channel(0, "/x", "json", &BTreeMap::new()).unwrap();
+    let mut state = 1_u32;
+    for sequence in 0..20_000 {
+        let log_time = u64::from(sequence);
+        let header = mcap::records::MessageHeader { channel_id: channel, sequence, log_time, publish_time: 0 };
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        writer.write_to_known_channel(&header, &state.to_le_bytes()).unwrap();
+    }
+    let bytes = writer.into_inner().into_inner();
+    let (messages, summary) = read(&bytes).unwrap();
+    assert!(messages.len() > 5000, "{}", messages.len());
+    assert!(matches!(summary.completeness, Completeness::Cut { .. }));
+}
+
+#[test]
+fn empty_and_foreign_files_are_errors_that_name_the_file() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("notes.txt");
+    let read = |path: &Path| for_each_raw(path, |_| {}).unwrap_err();
+    assert!(matches!(read(&path), LogError::Read { .. }));
+    std::fs::write(&path, "").unwrap();
+    assert!(matches!(read(&path), LogError::Empty { .. }));
+    std::fs::write(&path, "hello, this is a text").unwrap();
+    let message = read(&path).to_string();
+    assert!(message.contains("notes.txt: not an MCAP recording"), "{message}");
+    assert!(matches!(read(dir.path()), LogError::Read { .. }));
+}

@@ -1,0 +1,307 @@
+//! Reads a recording of a simulated or real arm into messages.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+use super::decode::{FirstNames, decode_message};
+use super::error::{LogError, Rejection};
+use super::raw::{Completeness, RawMessage, for_each_raw};
+use super::topics::{Stream, VIEWER_TOPICS};
+use crate::streams::Message;
+use crate::time::Stamp;
+
+/// Where a recording differs from ours, and what else to keep.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct TopicMap {
+    /// The topic of the raw joint readings, instead of `/joint_sensors`. What our recordings have on it is then not read.
+    pub joint_sensors: Option<String>,
+    /// The topic of the detections, instead of `/camera/wrist/detections`.
+    pub detections: Option<String>,
+    /// Topics whose messages are kept undecoded, such as `/tf`. None of them yields [`Message`]s.
+    pub raw: BTreeSet<String>,
+}
+
+/// A message kept undecoded, see [`TopicMap::raw`]; `super::decode` reads its bytes.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RawRecord {
+    pub topic: String,
+    /// Name of its type; empty where the file has none.
+    pub schema_name: String,
+    pub message_encoding: String,
+    pub log_time: Stamp,
+    pub data: Vec<u8>,
+}
+
+/// The messages of a recording, checked: every number in them is finite, and all joint messages have the same joints.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Recording {
+    pub path: PathBuf,
+    /// With their log times, ordered by them; those of equal log time are in the order of the file.
+    pub messages: Vec<(Stamp, Message)>,
+    /// As the joint messages name them, base first; empty if there are none.
+    pub joint_names: Vec<String>,
+    pub completeness: Completeness,
+    /// Messages kept undecoded, in the same order.
+    pub raw: Vec<RawRecord>,
+    /// Messages on topics that nobody knows or asked for, by topic.
+    pub unknown_topics: BTreeMap<String, u64>,
+    /// Messages that were refused, by "topic: reason".
+    pub rejected: BTreeMap<String, u64>,
+    /// How often, in the order of the file, log time went backwards.
+    pub non_monotonic: u64,
+}
+
+/// Reads a recording with our own topic names, see [`read_recording_with`].
+///
+/// # Errors
+/// As [`read_recording_with`].
+pub fn read_recording(path: impl AsRef<Path>) -> Result<Recording, LogError> {
+    read_recording_with(path, &TopicMap::default())
+}
+
+/// Reads a recording. Cuts, damage and unusable messages are no errors: the result counts them.
+///
+/// # Errors
+/// [`LogError::Read`], [`LogError::Empty`], [`LogError::NotMcap`].
+pub fn read_recording_with(path: impl AsRef<Path>, map: &TopicMap) -> Result<Recording, LogError> {
+    let path = path.as_ref();
+    let mut collector = Collector::new(map);
+    let summary = for_each_raw(path, |message| collector.take(message))?;
+    Ok(collector.finish(path, summary.completeness))
+}
+
+struct Collector<'a> {
+    map: &'a TopicMap,
+    streams: BTreeMap<&'a str, Stream>,
+    /// Topic and joint names of each stream of joints.
+    names: BTreeMap<Stream, (String, FirstNames)>,
+    messages: Vec<(Stamp, Message)>,
+    raw: Vec<RawRecord>,
+    unknown_topics: BTreeMap<String, u64>,
+    rejected: BTreeMap<String, u64>,
+    latest: Stamp,
+    non_monotonic: u64,
+}
+
+impl<'a> Collector<'a> {
+    fn new(map: &'a TopicMap) -> Self {
+        let mut streams: BTreeMap<&str, Stream> = Stream::ALL.iter().map(|&stream| (stream.topic(), stream)).collect();
+        let mapped = [(Stream::JointSensors, &map.joint_sensors), (Stream::Detections, &map.detections)];
+        for (stream, topic) in mapped {
+            if let Some(topic) = topic {
+                streams.remove(stream.topic());
+                streams.insert(topic, stream);
+            }
+        }
+        streams.retain(|&topic, _| !map.raw.contains(topic));
+        Self {
+            map,
+            streams,
+            names: BTreeMap::new(),
+            messages: Vec::new(),
+            raw: Vec::new(),
+            unknown_topics: BTreeMap::new(),
+            rejected: BTreeMap::new(),
+            latest: Stamp { nanos: i64::MIN },
+            non_monotonic: 0,
+        }
+    }
+
+    fn take(&mut self, raw: &RawMessage<'_>) {
+        let topic = raw.topic();
+        let Some(&stream) = self.streams.get(topic) else {
+            return self.take_other(raw);
+        };
+        let (_, names) = self.names.entry(stream).or_insert_with(|| (topic.to_owned(), None));
+        match check(stream, raw).and_then(|()| decode_message(stream, raw.data, names)) {
+            Ok(message) => {
+                self.count_order(raw.log_time());
+                self.messages.push((raw.log_time(), message));
+            }
+            Err(rejection) => self.reject(topic, &rejection, 1),
+        }
+    }
+
+    fn take_other(&mut self, raw: &RawMessage<'_>) {
+        let topic = raw.topic();
+        if self.map.raw.contains(topic) {
+            self.count_order(raw.log_time());
+            self.raw.push(RawRecord {
+                topic: topic.to_owned(),
+                schema_name: raw.schema_name().to_owned(),
+                message_encoding: raw.channel.message_encoding.clone(),
+                log_time: raw.log_time(),
+                data: raw.data.to_vec(),
+            });
+        } else if !VIEWER_TOPICS.contains(&topic) {
+            *self.unknown_topics.entry(topic.to_owned()).or_default() += 1;
+        }
+    }
+
+    fn count_order(&mut self, log_time: Stamp) {
+        self.non_monotonic += u64::from(log_time < self.latest);
+        self.latest = log_time;
+    }
+
+    fn reject(&mut self, topic: &str, rejection: &Rejection, count: u64) {
+        *self.rejected.entry(format!("{topic}: {rejection}")).or_default() += count;
+    }
+
+    fn finish(mut self, path: &Path, completeness: Completeness) -> Recording {
+        let joint_names = self.settle_joint_names();
+        self.messages.sort_by_key(|(log_time, _)| *log_time);
+        self.raw.sort_by_key(|record| record.log_time);
+        Recording {
+            path: path.to_owned(),
+            messages: self.messages,
+            joint_names,
+            completeness,
+            raw: self.raw,
+            unknown_topics: self.unknown_topics,
+            rejected: self.rejected,
+            non_monotonic: self.non_monotonic,
+        }
+    }
+
+    /// The joint sensors say which joints the arm has, else the first other stream of joints that has names. Messages of
+    /// streams that name other joints go.
+    fn settle_joint_names(&mut self) -> Vec<String> {
+        // Stream orders the sensors first.
+        let named: Vec<(Stream, String, Vec<String>)> = std::mem::take(&mut self.names)
+            .into_iter()
+            .filter_map(|(stream, (topic, names))| Some((stream, topic, names?)))
+            .collect();
+        let Some((_, _, joint_names)) = named.first().cloned() else {
+            return Vec::new();
+        };
+        for (stream, topic, _) in named.iter().filter(|(_, _, names)| *names != joint_names) {
+            let before = self.messages.len();
+            self.messages.retain(|(_, message)| Stream::of(message) != *stream);
+            self.reject(topic, &Rejection::OtherJoints, (before - self.messages.len()) as u64);
+        }
+        joint_names
+    }
+}
+
+/// What the file says of a message, before its bytes are looked at.
+fn check(stream: Stream, raw: &RawMessage<'_>) -> Result<(), Rejection> {
+    if raw.channel.message_encoding != "cdr" {
+        return Err(Rejection::MessageEncoding { found: raw.channel.message_encoding.clone() });
+    }
+    let expected = stream.schema().name;
+    // ROS writes package/msg/Type; some converters leave out the middle.
+    if raw.schema_name() != expected && raw.schema_name() != expected.replace("/msg/", "/") {
+        return Err(Rejection::Type { found: raw.schema_name().to_owned(), expected });
+    }
+    if i64::try_from(raw.log_time_nanos).is_err() {
+        return Err(Rejection::LogTimeRange);
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::ros::{self, JointState, TfMessage};
+    use super::super::schema::RosMessage;
+    use super::super::{RecordingWriter, decode, samples, topics};
+    use super::*;
+    use crate::streams::Sink;
+    use crate::time::SIMULATION_EPOCH;
+
+    fn joint_state(names: &[&str], position: &[f64]) -> JointState {
+        let name = names.iter().map(|&name| name.into()).collect();
+        JointState { name, position: position.to_vec(), ..Default::default() }
+    }
+
+    /// A recording of joint states on any topics.
+    fn of_joints(path: &Path, messages: &[(&str, JointState)]) {
+        let mut writer = RecordingWriter::create(path, samples::header()).unwrap();
+        for (topic, message) in messages {
+            writer.write_ros(topic, &JointState::SCHEMA, SIMULATION_EPOCH, message).unwrap();
+        }
+        writer.finish().unwrap();
+    }
+
+    #[test]
+    fn every_message_round_trips_through_a_file() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("run.mcap");
+        let messages: Vec<_> = samples::one_of_each().into_iter().map(|m| (SIMULATION_EPOCH, m)).collect();
+        samples::write(&path, &messages, 1000);
+        let recording = read_recording(&path).unwrap();
+        assert_eq!(recording.messages, messages);
+        assert_eq!(recording.joint_names, samples::header().joint_names);
+        assert_eq!(recording.completeness, Completeness::Whole);
+        assert!(recording.rejected.is_empty() && recording.unknown_topics.is_empty());
+    }
+
+    #[test]
+    fn bad_values_are_counted_by_topic_and_reason() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("run.mcap");
+        let good = joint_state(&["a", "b"], &[1.0, 2.0]);
+        let messages = [
+            ("/joint_sensors", joint_state(&["a", "b"], &[f64::NAN, 2.0])),
+            ("/joint_sensors", good.clone()),
+            ("/joint_sensors", joint_state(&["a", "b"], &[f64::INFINITY, 2.0])),
+            ("/joint_sensors", joint_state(&["b", "a"], &[1.0, 2.0])),
+            ("/joint_states", joint_state(&["gripper"], &[0.1])),
+            ("/elsewhere", good),
+            ("/marks", joint_state(&["a", "b"], &[1.0, 2.0])),
+        ];
+        of_joints(&path, &messages);
+        let recording = read_recording(&path).unwrap();
+        assert_eq!(recording.messages.len(), 1);
+        assert_eq!(recording.joint_names, ["a", "b"]);
+        let rejected: Vec<_> = recording.rejected.iter().map(|(key, count)| (key.as_str(), *count)).collect();
+        assert_eq!(
+            rejected,
+            [
+                ("/joint_sensors: joint names differ from those that the topic began with", 1),
+                ("/joint_sensors: position is not finite", 2),
+                ("/joint_states: joint names differ from those of the joint sensors", 1),
+                ("/marks: type is \"sensor_msgs/msg/JointState\", not \"armcal_msgs/msg/Mark\"", 1),
+            ]
+        );
+        assert_eq!(recording.unknown_topics, [("/elsewhere".to_string(), 1)].into());
+    }
+
+    #[test]
+    fn topic_map_renames_and_keeps_raw_messages() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("run.mcap");
+        let mut writer = RecordingWriter::create(&path, samples::header()).unwrap();
+        let joints = joint_state(&["a"], &[5.0]);
+        writer.write_ros("/joint_states", &JointState::SCHEMA, SIMULATION_EPOCH, &joints).unwrap();
+        let tf = TfMessage { transforms: vec![ros::TransformStamped::default()] };
+        writer.write_ros(topics::TF, &TfMessage::SCHEMA, SIMULATION_EPOCH, &tf).unwrap();
+        writer.finish().unwrap();
+
+        let map = TopicMap {
+            joint_sensors: Some("/joint_states".into()),
+            raw: [topics::TF.to_string()].into(),
+            ..Default::default()
+        };
+        let recording = read_recording_with(&path, &map).unwrap();
+        assert!(matches!(&recording.messages[..], [(_, Message::JointSensors(sample))] if sample.counts[0] == 5.0));
+        assert_eq!(recording.raw.len(), 1);
+        assert_eq!(decode::<TfMessage>(&recording.raw[0].data), Ok(tf));
+    }
+
+    #[test]
+    fn messages_are_ordered_by_log_time_and_steps_back_are_counted() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("run.mcap");
+        let mut messages = samples::stream(30);
+        messages.swap(3, 9);
+        let mut writer = RecordingWriter::create(&path, samples::header()).unwrap();
+        for (log_time, message) in &messages {
+            writer.record(*log_time, message).unwrap();
+        }
+        writer.finish().unwrap();
+        let recording = read_recording(&path).unwrap();
+        assert!(recording.non_monotonic > 0);
+        messages.sort_by_key(|(log_time, _)| *log_time);
+        assert!(recording.messages == messages);
+    }
+}

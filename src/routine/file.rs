@@ -1,0 +1,233 @@
+//! A routine file to checked types.
+
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use super::scene::Scene;
+use crate::robot::{FileIssue, PartFile, RobotError, parse_toml, read_text};
+
+/// A calibration method by its name in files and on the command line.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Method {
+    /// The paper's proposed method: least sum of distances to known landmarks.
+    #[default]
+    MinimumDistance,
+}
+
+impl std::fmt::Display for Method {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::MinimumDistance => "minimum_distance",
+        })
+    }
+}
+
+impl std::str::FromStr for Method {
+    type Err = String;
+    fn from_str(name: &str) -> Result<Self, String> {
+        match name {
+            "minimum_distance" => Ok(Self::MinimumDistance),
+            other => Err(format!("method `{other}` is not known; there is: minimum_distance")),
+        }
+    }
+}
+
+/// A checked routine.
+#[derive(Clone, Debug)]
+pub struct Routine {
+    pub file: PathBuf,
+    pub name: String,
+    pub robot_folder: PathBuf,
+    pub vehicle_file: PathBuf,
+    pub seed: u64,
+    pub method: Method,
+    pub scene: Scene,
+    /// The scene alone, as TOML, to travel with a recording.
+    pub scene_toml: String,
+    pub capture: CaptureSettings,
+    pub task: TaskSettings,
+    /// The truth's settings, unread.
+    pub world: toml::Table,
+}
+
+/// How views are captured.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CaptureSettings {
+    /// Views that the fit uses.
+    #[serde(default = "CaptureSettings::default_poses")]
+    pub poses: u32,
+    /// Views that only the verdict uses.
+    #[serde(default = "CaptureSettings::default_held_out")]
+    pub held_out: u32,
+    /// Tags that a planned view must be expected to see.
+    #[serde(default = "CaptureSettings::default_min_tags")]
+    pub min_tags: u32,
+    /// Free water kept between the arm and everything else, beyond the sensors' error.
+    #[serde(default = "CaptureSettings::default_clearance_m")]
+    pub clearance_m: f64,
+    /// How long the settled arm is watched.
+    #[serde(default = "CaptureSettings::default_dwell_s")]
+    pub dwell_s: f64,
+}
+
+impl CaptureSettings {
+    fn default_poses() -> u32 {
+        30
+    }
+    fn default_held_out() -> u32 {
+        8
+    }
+    fn default_min_tags() -> u32 {
+        3
+    }
+    fn default_clearance_m() -> f64 {
+        0.05
+    }
+    fn default_dwell_s() -> f64 {
+        1.0
+    }
+}
+
+impl Default for CaptureSettings {
+    fn default() -> Self {
+        Self {
+            poses: Self::default_poses(),
+            held_out: Self::default_held_out(),
+            min_tags: Self::default_min_tags(),
+            clearance_m: Self::default_clearance_m(),
+            dwell_s: Self::default_dwell_s(),
+        }
+    }
+}
+
+/// What the arm is calibrated for.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TaskSettings {
+    /// How near the tool must come to count as a hit.
+    pub tolerance_m: f64,
+    /// Tool positions in the base frame.
+    pub targets_m: Vec<[f64; 3]>,
+}
+
+/// Why a routine was refused.
+#[derive(Debug, thiserror::Error)]
+pub enum RoutineError {
+    #[error(transparent)]
+    File(#[from] RobotError),
+}
+
+impl From<FileIssue> for RoutineError {
+    fn from(issue: FileIssue) -> Self {
+        Self::File(issue.into())
+    }
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RoutineFile {
+    version: u32,
+    name: String,
+    robot: PathBuf,
+    vehicle: PathBuf,
+    #[serde(default = "first_seed")]
+    seed: u64,
+    #[serde(default)]
+    method: Method,
+    #[serde(default)]
+    site: SiteFile,
+    #[serde(default)]
+    obstacle: Vec<PartFile>,
+    #[serde(default)]
+    capture: CaptureSettings,
+    task: TaskSettings,
+    #[serde(default)]
+    world: toml::Table,
+}
+
+fn first_seed() -> u64 {
+    1
+}
+
+#[derive(Clone, Default, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+struct SiteFile {
+    seafloor_z_m: Option<f64>,
+}
+
+/// The part of a routine that says what surrounds the vehicle.
+#[derive(Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+struct SceneFile {
+    #[serde(default)]
+    site: SiteFile,
+    #[serde(default)]
+    obstacle: Vec<PartFile>,
+}
+
+impl SceneFile {
+    fn check(&self, file: &Path) -> Result<Scene, RoutineError> {
+        if let Some(z) = self.site.seafloor_z_m {
+            FileIssue::check_range(file, "site.seafloor_z_m", z, -1e4..=0.0)?;
+        }
+        let obstacles = self.obstacle.iter().map(|part| part.check(file, "obstacle")).collect::<Result<_, _>>()?;
+        Ok(Scene { seafloor_z_m: self.site.seafloor_z_m, obstacles })
+    }
+}
+
+/// Reads the scene that travelled with a recording.
+///
+/// # Errors
+/// [`RoutineError`] naming file, key and allowed range.
+pub fn load_scene(file: &Path) -> Result<Scene, RoutineError> {
+    parse_toml::<SceneFile>(file, &read_text(file)?)?.check(file)
+}
+
+/// Reads a routine file.
+///
+/// # Errors
+/// [`RoutineError`] naming file, key and allowed range.
+pub fn load(file: &Path) -> Result<Routine, RoutineError> {
+    let raw: RoutineFile = parse_toml(file, &read_text(file)?)?;
+    let check = |key: &str, value: f64, range| FileIssue::check_range(file, key, value, range);
+    check("version", f64::from(raw.version), 1.0..=1.0)?;
+    check("capture.poses", f64::from(raw.capture.poses), 3.0..=1000.0)?;
+    check("capture.held_out", f64::from(raw.capture.held_out), 3.0..=1000.0)?;
+    check("capture.min_tags", f64::from(raw.capture.min_tags), 1.0..=100.0)?;
+    check("capture.clearance_m", raw.capture.clearance_m, 0.0..=1.0)?;
+    check("capture.dwell_s", raw.capture.dwell_s, 0.2..=60.0)?;
+    check("task.tolerance_m", raw.task.tolerance_m, 1e-4..=1.0)?;
+    if raw.task.targets_m.is_empty() {
+        return Err(FileIssue::new(file, "task.targets_m", "needs one target or more").into());
+    }
+    for (k, target) in raw.task.targets_m.iter().enumerate() {
+        for value in target {
+            check(&format!("task.targets_m[{k}]"), *value, -100.0..=100.0)?;
+        }
+    }
+    if raw.name.is_empty() || !raw.name.chars().all(|c| c.is_ascii_alphanumeric() || "-_".contains(c)) {
+        let problem = format!("`{}` must be letters, digits, - and _: it names the output folder", raw.name);
+        return Err(FileIssue::new(file, "name", problem).into());
+    }
+    let folder = file.parent().unwrap_or(Path::new("."));
+    let scene_file = SceneFile { site: raw.site, obstacle: raw.obstacle };
+    let scene = scene_file.check(file)?;
+    let scene_toml = toml::to_string(&scene_file)
+        .map_err(|error| FileIssue::new(file, "obstacle", format!("has no TOML form: {error}")))?;
+    Ok(Routine {
+        file: file.to_owned(),
+        name: raw.name,
+        robot_folder: folder.join(raw.robot),
+        vehicle_file: folder.join(raw.vehicle),
+        seed: raw.seed,
+        method: raw.method,
+        scene,
+        scene_toml,
+        capture: raw.capture,
+        task: raw.task,
+        world: raw.world,
+    })
+}

@@ -1,0 +1,49 @@
+//! The two ends of the streams.
+
+use super::message::Message;
+use crate::joints::JointCounts;
+use crate::time::Stamp;
+
+/// Takes messages as they come; a recording, a viewer, or both.
+pub trait Sink {
+    /// # Errors
+    /// When the message cannot be kept (disk full, closed stream).
+    fn record(&mut self, log_time: Stamp, message: &Message) -> Result<(), SinkError>;
+}
+
+/// Why a sink did not keep a message, free of any file format.
+pub type SinkError = Box<dyn std::error::Error + Send + Sync>;
+
+/// Why an arm did not do as told.
+#[derive(Debug, thiserror::Error)]
+pub enum ArmError {
+    #[error("the arm's stream could not be recorded: {0}")]
+    Sink(#[source] SinkError),
+    #[error("the set-point names {got} joints, the arm has {expected}")]
+    JointCount { got: usize, expected: usize },
+    #[error("joint {joint}: set-point {counts} counts is not a finite number")]
+    SetPoint { joint: usize, counts: f64 },
+    #[error("the arm's state is no longer finite at {at_s:.3} s: the step is too large for its stiffness")]
+    NotFinite { at_s: f64 },
+}
+
+/// An arm that can be told where to go, simulated or real. It tells back only through messages.
+pub trait Arm {
+    /// The arm's present time, by the joint sensors' clock.
+    fn now(&self) -> Stamp;
+
+    /// Sets where the arm's own controller shall drive its own sensors, raw counts.
+    ///
+    /// # Errors
+    /// [`ArmError::JointCount`], [`ArmError::SetPoint`].
+    fn command(&mut self, set_point: &JointCounts) -> Result<(), ArmError>;
+
+    /// Lets one control period pass and hands every message of it to `sink` in the order of log time.
+    ///
+    /// # Errors
+    /// [`ArmError::Sink`] when the sink refuses, [`ArmError::NotFinite`] when a simulated arm broke down.
+    fn step(&mut self, sink: &mut dyn Sink) -> Result<(), ArmError>;
+
+    /// Length of a control period, s.
+    fn period_s(&self) -> f64;
+}

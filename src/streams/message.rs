@@ -1,0 +1,160 @@
+//! The messages, free of any file format. Stamps are the sender's clock; the log time is the recorder's.
+
+use crate::joints::{JointAngles, JointCounts};
+use crate::time::Stamp;
+
+/// Everything that a recording of an arm may hold.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Message {
+    /// Raw readings of the joint sensors.
+    JointSensors(JointSensorSample),
+    /// Set-points sent to the arm's controller.
+    JointCommand(JointCommand),
+    /// The same joints in radians, under the belief of that moment.
+    JointStates(JointStateBelief),
+    /// AprilTags seen in one camera image.
+    Detections(TagDetections),
+    Temperature(TemperatureSample),
+    Pressure(PressureSample),
+    /// The vehicle's attitude sensor.
+    Attitude(Attitude),
+    /// What the arm is calibrated for.
+    Task(ReachTask),
+    /// A span of the recording that means something.
+    Mark(Mark),
+    Log(LogLine),
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub struct JointSensorSample {
+    pub stamp: Stamp,
+    pub counts: JointCounts,
+}
+
+/// Set-points in raw counts: the arm's own controller closes its loop on its own sensors.
+#[derive(Clone, Debug, PartialEq)]
+pub struct JointCommand {
+    pub stamp: Stamp,
+    pub counts: JointCounts,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub struct JointStateBelief {
+    pub stamp: Stamp,
+    pub angles: JointAngles,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub struct TagDetections {
+    pub stamp: Stamp,
+    pub tags: Vec<TagDetection>,
+}
+
+/// One tag in one image. Corners in raw (distorted) pixels: bottom left, bottom right, top right, top left as printed,
+/// that is tag-frame (-s/2, -s/2), (s/2, -s/2), (s/2, s/2), (-s/2, s/2).
+#[derive(Clone, Debug, PartialEq)]
+pub struct TagDetection {
+    pub id: u32,
+    pub corners_px: [[f64; 2]; 4],
+    /// The detector's decision margin, larger is surer; as apriltag gives it.
+    pub decision_margin: f64,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Thermometer {
+    Oil,
+    Water,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub struct TemperatureSample {
+    pub stamp: Stamp,
+    pub thermometer: Thermometer,
+    pub temperature_c: f64,
+    pub variance_c2: f64,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub struct PressureSample {
+    pub stamp: Stamp,
+    pub pressure_pa: f64,
+    pub variance_pa2: f64,
+}
+
+/// Attitude of the vehicle in the world, with its body rates and specific force, as an IMU gives them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Attitude {
+    pub stamp: Stamp,
+    pub quaternion_wxyz: [f64; 4],
+    pub angular_velocity_rad_s: [f64; 3],
+    pub specific_force_m_s2: [f64; 3],
+}
+
+/// Positions that the tool is to reach, in the base frame, and how near counts as a hit.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ReachTask {
+    pub stamp: Stamp,
+    pub targets_m: Vec<[f64; 3]>,
+    pub tolerance_m: f64,
+}
+
+/// Which share of the data a captured view belongs to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum CaptureSet {
+    /// The fit uses it.
+    Fit,
+    /// The fit never sees it; the verdict rests on it.
+    HeldOut,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum ReachAttempt {
+    Before,
+    After,
+}
+
+/// What the arm is doing, for people who watch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Phase {
+    Plan,
+    Move,
+    Settle,
+    Capture,
+    Calibrate,
+    Reach,
+    Done,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum MarkKind {
+    /// The arm stood still over the mark's span: detections and readings in it belong together.
+    Capture { set: CaptureSet, pose_idx: u32 },
+    /// The arm came to rest for a target.
+    Reach { attempt: ReachAttempt, target_idx: u32 },
+    /// A phase began at `start`.
+    Phase(Phase),
+}
+
+/// A span `start..=end` by the joint sensors' clock.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Mark {
+    pub start: Stamp,
+    pub end: Stamp,
+    pub kind: MarkKind,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum LogLevel {
+    Debug,
+    Info,
+    Warn,
+    Error,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub struct LogLine {
+    pub stamp: Stamp,
+    pub level: LogLevel,
+    pub name: String,
+    pub text: String,
+}

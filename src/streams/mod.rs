@@ -1,0 +1,15 @@
+//! What flows between an arm and those who watch it: messages, and the traits of their ends.
+//!
+//! Truth (a simulated arm) and belief (calibration, planning) meet here and in `log`, nowhere else. Every value in a
+//! message is one that a real arm, camera, recorder or operator could have given: raw counts, corner pixels, readings.
+
+mod arm;
+mod message;
+
+pub use crate::joints::{JointAngles, JointCounts, MAX_JOINTS};
+pub use arm::{Arm, ArmError, Sink, SinkError};
+pub use message::{
+    Attitude, CaptureSet, JointCommand, JointSensorSample, JointStateBelief, LogLevel, LogLine, Mark, MarkKind,
+    Message, Phase, PressureSample, ReachAttempt, ReachTask, TagDetection, TagDetections, TemperatureSample,
+    Thermometer,
+};
