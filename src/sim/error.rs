@@ -1,0 +1,27 @@
+//! What can keep a world from being built, or its truth from being kept.
+
+use std::path::PathBuf;
+
+use crate::robot::{FileIssue, RobotError};
+use crate::streams::SinkError;
+
+/// Why there is no simulated world.
+#[derive(Debug, thiserror::Error)]
+pub enum SimError {
+    /// A wrong value in the routine's `[world]`.
+    #[error(transparent)]
+    Spec(#[from] FileIssue),
+    /// The robot lacks what a simulated arm needs.
+    #[error(transparent)]
+    Robot(#[from] RobotError),
+    #[error("{}: joint `{joint}` has effort limit {effort_n_m}; a simulated joint needs one above 0", file.display())]
+    NoEffort { file: PathBuf, joint: String, effort_n_m: f64 },
+    #[error("the physics engine refused joint `{joint}`")]
+    Joint { joint: String },
+    #[error("world spec cannot be written as text: {0}")]
+    SpecText(#[from] toml::ser::Error),
+    #[error("the truth could not be kept: {0}")]
+    Truth(#[source] SinkError),
+    #[error("{}: {problem}", path.display())]
+    TruthFile { path: PathBuf, problem: String },
+}

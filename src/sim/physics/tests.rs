@@ -1,0 +1,286 @@
+//! The arm of the engine against kinematics, and the moving base against equations of motion.
+
+use nalgebra::Matrix3;
+
+use super::*;
+use crate::kinematics::ChainJoint;
+use crate::robot::{Robot, load};
+use crate::sim::spec::VehicleMotionSpec;
+use crate::sim::vehicle::{GRAVITY_M_S2, VehicleMotion};
+use crate::spatial::Pose;
+use crate::stats::stream_rng;
+use rand::RngExt;
+
+const DRY: WaterSpec = WaterSpec {
+    density_kg_m3: 0.0,
+    drag_coefficient: 0.0,
+    buoyancy_fraction: 0.0,
+    joint_friction_n_m_s_rad: 0.0,
+    depth_m: 0.0,
+    pressure_noise_pa: 0.0,
+};
+
+fn titan() -> Robot {
+    load(std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/robots/titan4"))).expect("the robot reads")
+}
+
+#[test]
+fn links_lie_where_kinematics_has_them() {
+    /// Quaternion products through six joints of 2 m.
+    const TOLERANCE_M: f64 = 1e-9;
+    let robot = titan();
+    let mut rng = stream_rng(1, "poses");
+    let input = PhysicsInput {
+        chain: &robot.chain,
+        bodies: &robot.bodies,
+        solids: None,
+        water: &DRY,
+        step_s: 0.001,
+        angles: robot.stowed,
+    };
+    let mut physics = ArmPhysics::new(&input).expect("a multibody");
+    assert!(physics.angles().max_abs_difference(&robot.stowed) < 1e-12);
+    for _ in 0..20 {
+        let angles = JointAngles::from_fn(6, |_| rng.random_range(-3.0..3.0));
+        physics.set_angles(&angles);
+        assert!(physics.angles().max_abs_difference(&angles) < 1e-12);
+        let poses = robot.chain.link_poses(&angles);
+        for body in 1..=6 {
+            let error = physics.link(body).inverse() * poses.link(body);
+            assert!(error.translation.vector.norm() < TOLERANCE_M, "body {body}");
+            assert!(error.rotation.angle() < TOLERANCE_M, "body {body}");
+        }
+    }
+}
+
+#[test]
+fn links_still_lie_there_after_a_swing() {
+    let robot = titan();
+    let input = PhysicsInput {
+        chain: &robot.chain,
+        bodies: &robot.bodies,
+        solids: None,
+        water: &DRY,
+        step_s: 0.001,
+        angles: robot.stowed,
+    };
+    let mut physics = ArmPhysics::new(&input).expect("a multibody");
+    for _ in 0..500 {
+        physics.step(&still(Vector3::new(0.0, 0.0, -9.81)));
+    }
+    let angles = physics.angles();
+    assert!(angles.max_abs_difference(&robot.stowed) > 0.1, "it falls");
+    let poses = robot.chain.link_poses(&angles);
+    for body in 1..=6 {
+        let error = physics.link(body).inverse() * poses.link(body);
+        assert!(error.translation.vector.norm() < 1e-9 && error.rotation.angle() < 1e-9, "body {body}");
+    }
+}
+
+fn still(gravity: Vector3<f64>) -> BaseState {
+    let zero = Vector3::zeros();
+    BaseState {
+        world_from_vehicle: Pose::identity(),
+        world_from_base: Pose::identity(),
+        velocity: zero,
+        acceleration: zero,
+        angular_velocity: zero,
+        angular_acceleration: zero,
+        gravity,
+        vehicle_rate: zero,
+        vehicle_specific_force: zero,
+    }
+}
+
+/// A bar of 5 kg with its centre 0.5 m from the joint.
+const MASS: f64 = 5.0;
+const LENGTH: f64 = 0.5;
+const INERTIA: f64 = 0.1;
+
+/// One joint at `origin` about `axis`, the bar along `along`.
+fn pendulum(
+    origin: Vector3<f64>,
+    axis: Unit<Vector3<f64>>,
+    along: Vector3<f64>,
+    step_s: f64,
+    angle: f64,
+) -> ArmPhysics {
+    let joint = ChainJoint {
+        name: "j".into(),
+        child_link: "bar".into(),
+        parent_from_joint: Isometry3::translation(origin.x, origin.y, origin.z),
+        axis,
+        limits: None,
+    };
+    let body = |name: &str| LinkBody {
+        name: name.into(),
+        mass_kg: MASS,
+        com_m: LENGTH * along,
+        inertia_kg_m2: Matrix3::identity() * INERTIA,
+        visuals: Vec::new(),
+        collisions: Vec::new(),
+    };
+    ArmPhysics::new(&PhysicsInput {
+        chain: &Chain::new(vec![joint]),
+        bodies: &[body("base"), body("bar")],
+        solids: None,
+        water: &DRY,
+        step_s,
+        angles: JointAngles::from_slice(&[angle]),
+    })
+    .expect("a multibody")
+}
+
+/// `angle'' = f(t, angle)` by classic Runge-Kutta.
+fn runge_kutta(f: impl Fn(f64, f64) -> f64, start: f64, end_s: f64) -> f64 {
+    let (n, mut q, mut v) = (200_000, start, 0.0);
+    let h = end_s / f64::from(n);
+    for i in 0..n {
+        let t = f64::from(i) * h;
+        let k1 = (v, f(t, q));
+        let k2 = (v + 0.5 * h * k1.1, f(t + 0.5 * h, q + 0.5 * h * k1.0));
+        let k3 = (v + 0.5 * h * k2.1, f(t + 0.5 * h, q + 0.5 * h * k2.0));
+        let k4 = (v + h * k3.1, f(t + h, q + h * k3.0));
+        q += h / 6.0 * (k1.0 + 2.0 * k2.0 + 2.0 * k3.0 + k4.0);
+        v += h / 6.0 * (k1.1 + 2.0 * k2.1 + 2.0 * k3.1 + k4.1);
+    }
+    q
+}
+
+const SWING_S: f64 = 6.0;
+
+/// A pendulum that hangs from a base shaken by 0.3 m at 0.5 Hz along x.
+fn shaken(step_s: f64) -> f64 {
+    let mut physics = pendulum(Vector3::zeros(), Vector3::y_axis(), -Vector3::z(), step_s, 0.5);
+    for i in 0..(SWING_S / step_s).round() as u32 {
+        let mut base = still(Vector3::new(0.0, 0.0, -9.81));
+        base.acceleration.x = shake(f64::from(i) * step_s);
+        physics.step(&base);
+    }
+    physics.angles()[0]
+}
+
+fn shake(t_s: f64) -> f64 {
+    let w = std::f64::consts::TAU * 0.5;
+    -0.3 * w * w * (w * t_s).sin()
+}
+
+/// A base that moves kinematically gives a multibody no inertial force at all: the pendulum would not notice the
+/// shaking.
+#[test]
+fn a_shaken_base_swings_the_pendulum() {
+    // The bar's centre is at LENGTH (-sin q, -cos q) in x and z for a turn q about y.
+    let total = INERTIA + MASS * LENGTH * LENGTH;
+    let exact = runge_kutta(|t, q| MASS * LENGTH * (shake(t) * q.cos() - 9.81 * q.sin()) / total, 0.5, SWING_S);
+    let unshaken = runge_kutta(|_, q| -MASS * LENGTH * 9.81 * q.sin() / total, 0.5, SWING_S);
+    let [coarse, fine] = [1e-3, 1e-4].map(|step_s| shaken(step_s) - exact);
+    eprintln!("exact {exact:.6} coarse {coarse:.2e} fine {fine:.2e} unshaken {unshaken:.4}");
+    assert!((exact - unshaken).abs() > 0.3, "the shaking must matter");
+    // The integrator is of first order: a tenth of the step leaves a tenth of the error.
+    assert!(coarse.abs() < 2e-2, "{coarse}");
+    assert!(fine.abs() < 2e-3, "{fine}");
+}
+
+/// On a turntable the bar swings about the outward direction: centrifugal force, and Coriolis' through the joint alone.
+#[test]
+fn a_turning_base_pulls_the_bar_outwards() {
+    let (radius, w) = (1.5, 2.0);
+    let total = INERTIA + MASS * LENGTH * LENGTH;
+    let exact = runge_kutta(|_, q| -MASS * radius * LENGTH * w * w * q.sin() / total, 0.8, 4.0);
+    let [coarse, fine] = [1e-3, 1e-4].map(|step_s| {
+        let mut physics = pendulum(Vector3::x() * radius, Vector3::z_axis(), Vector3::x(), step_s, 0.8);
+        let mut base = still(Vector3::zeros());
+        base.angular_velocity.z = w;
+        for _ in 0..(4.0 / step_s).round() as u32 {
+            physics.step(&base);
+        }
+        physics.angles()[0] - exact
+    });
+    eprintln!("exact {exact:.6} coarse {coarse:.2e} fine {fine:.2e}");
+    assert!(coarse.abs() < 1e-2, "{coarse}");
+    assert!(fine.abs() < 1e-3, "{fine}");
+}
+
+/// Without torque about its axis a bar keeps its direction in the world however the base turns about that axis.
+#[test]
+fn a_base_that_speeds_up_leaves_a_free_bar_behind() {
+    let mut physics = pendulum(Vector3::zeros(), Vector3::z_axis(), Vector3::x(), 1e-3, 0.0);
+    let mut turned = 0.0;
+    for i in 0..2000 {
+        let t = f64::from(i) * 1e-3;
+        let mut base = still(Vector3::zeros());
+        base.angular_acceleration.z = (2.0 * t).cos();
+        base.angular_velocity.z = 0.5 * (2.0 * t).sin();
+        turned = 0.25 * (1.0 - (2.0 * (t + 1e-3)).cos());
+        physics.step(&base);
+    }
+    assert!((physics.angles()[0] + turned).abs() < 2e-3, "{} against {}", physics.angles()[0], -turned);
+}
+
+/// The whole arm falls free on a base that moves in all six directions: d'Alembert's principle in the world frame, with
+/// accelerations by differences of poses, must leave no torque about any joint.
+#[test]
+fn no_torque_is_missing_on_a_moving_base() {
+    const STEP_S: f64 = 1e-4;
+    /// Of torques of several 100 N m: a first-order step of 0.1 ms, and second differences.
+    const LIMIT_N_M: f64 = 1.0;
+    let robot = titan();
+    let spec = VehicleMotionSpec {
+        rotation_rms_rad: 0.25,
+        translation_rms_m: 0.5,
+        period_min_s: 2.0,
+        period_max_s: 4.0,
+        ramp_s: 0.0,
+        ..VehicleMotionSpec::default()
+    };
+    let motion = VehicleMotion::new(&spec, Pose::from_position_rpy([1.7, -0.6, 0.1], [0.1, 0.2, -0.4]), 5);
+    let mut physics = ArmPhysics::new(&PhysicsInput {
+        chain: &robot.chain,
+        bodies: &robot.bodies,
+        solids: None,
+        water: &DRY,
+        step_s: STEP_S,
+        angles: robot.stowed,
+    })
+    .expect("a multibody");
+    let steps = 4000;
+    for i in 0..steps {
+        physics.step(&motion.at(f64::from(i) * STEP_S));
+    }
+    let t = f64::from(steps) * STEP_S;
+    let (q, v) = (physics.angles(), physics.rates());
+    physics.step(&motion.at(t));
+    let after = physics.rates();
+    let path = |s: f64| {
+        let at = |j: usize| q[j] + v[j] * s + 0.5 * (after[j] - v[j]) / STEP_S * s * s;
+        let poses = robot.chain.link_poses(&JointAngles::from_fn(6, at));
+        (*motion.at(t + s).world_from_base.isometry(), poses)
+    };
+    let h = 1e-3;
+    let [past, now, next] = [path(-h), path(0.0), path(h)];
+    // Angular momentum halfway between two instants.
+    let momentum = |body: usize, from: f64, to: f64| {
+        let [a, middle, b] = [from, 0.5 * (from + to), to].map(path).map(|p| p.0 * p.1.link(body));
+        let rate = (b.rotation * a.rotation.inverse()).scaled_axis() / (to - from);
+        let r = middle.rotation.to_rotation_matrix();
+        r * robot.bodies[body].inertia_kg_m2 * r.transpose() * rate
+    };
+    let mut torques = [Vector3::zeros(); 6];
+    for body in 1..=6 {
+        let com = |p: &(Isometry3<f64>, crate::kinematics::LinkPoses)| {
+            ((p.0 * p.1.link(body)) * nalgebra::Point3::from(robot.bodies[body].com_m)).coords
+        };
+        let acceleration = (com(&next) - com(&now) * 2.0 + com(&past)) / (h * h);
+        let mass = robot.bodies[body].mass_kg;
+        let force = mass * (acceleration + Vector3::z() * GRAVITY_M_S2);
+        let spin = (momentum(body, 0.0, h) - momentum(body, -h, 0.0)) / h;
+        for (j, torque) in torques.iter_mut().enumerate().take(body) {
+            let origin = (now.0 * nalgebra::Point3::from(*now.1.joint_origin(j))).coords;
+            *torque += (com(&now) - origin).cross(&force) + spin;
+        }
+    }
+    let missing: Vec<f64> = (0..6).map(|j| (now.0.rotation * now.1.axis(j)).dot(&torques[j])).collect();
+    eprintln!("missing torques {missing:.3?} N m at rates {:.2?}", v.to_vec());
+    assert!(v.iter().any(|rate| rate.abs() > 0.5), "it must move");
+    assert!(missing.iter().all(|torque| torque.abs() < LIMIT_N_M), "{missing:?}");
+}

@@ -1,0 +1,261 @@
+//! Every solid thing once: for collision, clearance and what hides a tag.
+
+use nalgebra::{Isometry3, Point3, Vector3};
+use parry3d::math::Pose3;
+use parry3d::query::{self, Ray};
+use parry3d::shape::SharedShape;
+
+use super::convert::to_rapier;
+use super::loads::shape_pose;
+use super::places::BodyPoses;
+use crate::robot::{PlacedShape, Robot, Shape, Vehicle, parry_pose};
+use crate::routine::Scene;
+
+/// Solid shapes with their places in the base frame, and which pairs of parts may touch.
+#[derive(Clone)]
+pub(super) struct Solids {
+    names: Vec<String>,
+    shapes: Vec<Solid>,
+    /// `base_from_shape` of each shape, as last placed.
+    placed: Vec<Pose3>,
+    pairs: PairTable,
+    n_bodies: usize,
+}
+
+#[derive(Clone)]
+pub(super) struct Solid {
+    pub part: usize,
+    pub carrier: Carrier,
+    pub carrier_from_shape: Pose3,
+    pub shape: SharedShape,
+    radius_m: f64,
+}
+
+/// What a shape is fixed to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Carrier {
+    /// Body of the arm: 0 is the base, and with it the vehicle.
+    Body(usize),
+    /// The ground.
+    World,
+}
+
+/// Which pairs of parts are looked at.
+#[derive(Clone, Debug)]
+pub(super) struct PairTable {
+    n_parts: usize,
+    watched: Vec<bool>,
+}
+
+/// The nearest pair of parts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Nearest {
+    pub distance_m: f64,
+    pub part_a: usize,
+    pub part_b: usize,
+}
+
+/// Shapes nearer to the camera's eye than this are its own housing, m.
+const HOUSING_M: f64 = 0.03;
+/// Side of the seafloor, m: wider than any arm's reach.
+const SEAFLOOR_SIDE_M: f64 = 40.0;
+
+impl Solids {
+    /// Parts 0..=n are the bodies of the arm, then those of the vehicle, then seafloor and obstacles.
+    pub(super) fn new(robot: &Robot, vehicle: &Vehicle, scene: &Scene) -> Self {
+        let mut solids = Self {
+            names: Vec::new(),
+            shapes: Vec::new(),
+            placed: Vec::new(),
+            pairs: PairTable { n_parts: 0, watched: Vec::new() },
+            n_bodies: robot.bodies.len(),
+        };
+        for (body, link) in robot.bodies.iter().enumerate() {
+            let part = solids.name(&link.name);
+            for placed in &link.collisions {
+                solids.push(part, Carrier::Body(body), placed, &Isometry3::identity());
+            }
+        }
+        let base_from_vehicle = vehicle.vehicle_from_base.inverse();
+        for part in &vehicle.parts {
+            let index = solids.name(&part.name);
+            solids.push(index, Carrier::Body(0), &part.placed, base_from_vehicle.isometry());
+        }
+        if let Some(z_m) = scene.seafloor_z_m {
+            let index = solids.name("seafloor");
+            solids.push(index, Carrier::World, &seafloor(z_m), &Isometry3::identity());
+        }
+        for obstacle in &scene.obstacles {
+            let index = solids.name(&obstacle.name);
+            solids.push(index, Carrier::World, &obstacle.placed, &Isometry3::identity());
+        }
+        solids.watch_pairs(robot);
+        solids
+    }
+
+    fn name(&mut self, name: &str) -> usize {
+        self.names.push(name.to_owned());
+        self.names.len() - 1
+    }
+
+    fn push(&mut self, part: usize, carrier: Carrier, placed: &PlacedShape, carrier_from_owner: &Isometry3<f64>) {
+        let pose = parry_pose(carrier_from_owner) * shape_pose(placed);
+        let radius_m = placed.shape.bounding_radius_m();
+        let shape = placed.shape.to_parry();
+        self.shapes.push(Solid { part, carrier, carrier_from_shape: pose, shape, radius_m });
+        self.placed.push(pose);
+    }
+
+    /// Watches every link against everything, except neighbours in the chain and parts that overlap where the drawings
+    /// have the arm stowed: those are drawn into each other.
+    fn watch_pairs(&mut self, robot: &Robot) {
+        let n_parts = self.names.len();
+        self.pairs = PairTable { n_parts, watched: vec![false; n_parts * n_parts] };
+        let stowed = BodyPoses::drawn(robot.n_joints(), &robot.chain.link_poses(&robot.stowed));
+        self.place(&stowed, &Isometry3::identity());
+        for a in 1..self.n_bodies {
+            for b in (0..n_parts).filter(|&b| b < a.saturating_sub(1) || b >= self.n_bodies) {
+                let on_ground = self.shapes.iter().any(|s| s.part == b && s.carrier == Carrier::World);
+                if on_ground || self.distance_of_parts(a, b) > 0.0 {
+                    self.pairs.watch(a, b);
+                }
+            }
+        }
+    }
+
+    fn distance_of_parts(&self, a: usize, b: usize) -> f64 {
+        let mut nearest = f64::INFINITY;
+        for i in (0..self.shapes.len()).filter(|&i| self.shapes[i].part == a) {
+            for j in (0..self.shapes.len()).filter(|&j| self.shapes[j].part == b) {
+                nearest = nearest.min(self.distance(i, j));
+            }
+        }
+        nearest
+    }
+
+    /// Distance of two shapes, m; infinite where parry has no answer (it has one for every shape of `Shape`).
+    fn distance(&self, i: usize, j: usize) -> f64 {
+        let (a, b) = (&self.shapes[i], &self.shapes[j]);
+        query::distance(&self.placed[i], a.shape.as_ref(), &self.placed[j], b.shape.as_ref())
+            .map_or(f64::INFINITY, |found| found.distance)
+    }
+
+    pub(super) fn shapes(&self) -> &[Solid] {
+        &self.shapes
+    }
+
+    pub(super) fn pairs(&self) -> &PairTable {
+        &self.pairs
+    }
+
+    pub(super) fn part_name(&self, part: usize) -> &str {
+        &self.names[part]
+    }
+
+    /// Brings every shape to where it is now.
+    pub(super) fn place(&mut self, links: &BodyPoses, base_from_world: &Isometry3<f64>) {
+        let ground = parry_pose(base_from_world);
+        for (placed, solid) in self.placed.iter_mut().zip(&self.shapes) {
+            *placed = match solid.carrier {
+                Carrier::Body(0) => solid.carrier_from_shape,
+                Carrier::Body(body) => parry_pose(links.link(body)) * solid.carrier_from_shape,
+                Carrier::World => ground * solid.carrier_from_shape,
+            };
+        }
+    }
+
+    /// The smallest distance of a moving link to anything that is not the arm, as placed; `None` if nothing is watched.
+    pub(super) fn nearest(&self) -> Option<Nearest> {
+        let mut nearest: Option<Nearest> = None;
+        for (i, a) in self.shapes.iter().enumerate() {
+            for (j, b) in self.shapes.iter().enumerate().skip(i + 1) {
+                let is_own = a.part < self.n_bodies && b.part < self.n_bodies;
+                if is_own || !self.pairs.is_watched(a.part, b.part) {
+                    continue;
+                }
+                let bound =
+                    (self.placed[i].translation - self.placed[j].translation).length() - a.radius_m - b.radius_m;
+                let best = nearest.map_or(f64::INFINITY, |n| n.distance_m);
+                if bound < best {
+                    let distance_m = self.distance(i, j);
+                    if distance_m < best {
+                        nearest = Some(Nearest { distance_m, part_a: a.part, part_b: b.part });
+                    }
+                }
+            }
+        }
+        nearest
+    }
+
+    /// Shapes that make up the camera's housing: on its link, and near its eye by the drawing.
+    pub(super) fn housing(&self, robot: &Robot) -> Vec<usize> {
+        let mount = &robot.camera.mount;
+        let eye = to_rapier(&mount.link_from_frame.translation.vector);
+        let is_near = |solid: &Solid| {
+            let local = solid.carrier_from_shape.inverse_transform_point(eye);
+            parry3d::query::PointQuery::distance_to_local_point(solid.shape.as_ref(), local, true) < HOUSING_M
+        };
+        let on_link = |solid: &Solid| solid.carrier == Carrier::Body(mount.n_joints);
+        (0..self.shapes.len()).filter(|&i| on_link(&self.shapes[i]) && is_near(&self.shapes[i])).collect()
+    }
+
+    /// Whether any shape but those in `ignored` lies on the way from `eye` to `target` (base frame).
+    pub(super) fn hides(&self, eye: &Point3<f64>, target: &Point3<f64>, ignored: &[usize]) -> bool {
+        let way: Vector3<f64> = target - eye;
+        let length = way.norm();
+        let ray = Ray::new(to_rapier(&eye.coords), to_rapier(&(way / length)));
+        self.shapes
+            .iter()
+            .zip(&self.placed)
+            .enumerate()
+            .any(|(i, (solid, pose))| !ignored.contains(&i) && solid.shape.intersects_ray(pose, &ray, length))
+    }
+}
+
+/// A slab of 1 m with its upper face at `z_m`.
+fn seafloor(z_m: f64) -> PlacedShape {
+    PlacedShape {
+        owner_from_shape: Isometry3::translation(0.0, 0.0, z_m - 0.5),
+        shape: Shape::Box { size_m: [SEAFLOOR_SIDE_M, SEAFLOOR_SIDE_M, 1.0] },
+        color_rgb: [0; 3],
+    }
+}
+
+impl PairTable {
+    fn watch(&mut self, a: usize, b: usize) {
+        self.watched[a * self.n_parts + b] = true;
+        self.watched[b * self.n_parts + a] = true;
+    }
+
+    pub(super) fn is_watched(&self, a: usize, b: usize) -> bool {
+        self.watched[a * self.n_parts + b]
+    }
+
+    pub(super) fn n_parts(&self) -> usize {
+        self.n_parts
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::robot::{load, load_vehicle};
+
+    #[test]
+    fn of_the_standard_arm_only_neighbours_go_unwatched() {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots");
+        let robot = load(&root.join("titan4")).expect("the robot reads");
+        let vehicle = load_vehicle(&root.join("vehicles/work-class-front.toml")).expect("the vehicle reads");
+        let scene = Scene { seafloor_z_m: Some(-1.1), obstacles: Vec::new() };
+        let solids = Solids::new(&robot, &vehicle, &scene);
+        let unwatched: Vec<(usize, usize)> = (1..robot.bodies.len())
+            .flat_map(|a| (0..solids.pairs.n_parts()).map(move |b| (a, b)))
+            .filter(|&(a, b)| !solids.pairs.is_watched(a, b) && (b >= robot.bodies.len() || a.abs_diff(b) > 1))
+            .collect();
+        let names: Vec<_> = unwatched.iter().map(|&(a, b)| (solids.part_name(a), solids.part_name(b))).collect();
+        assert!(names.is_empty(), "{names:?}");
+        assert_eq!(solids.housing(&robot).len(), 1, "the camera's own cylinder");
+    }
+}
