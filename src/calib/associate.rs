@@ -1,0 +1,231 @@
+//! From messages to views: which readings and which corners belong to one standing arm.
+//!
+//! A capture mark gives the span by the joint sensors' clock. Readings in it are averaged as travel (never as raw
+//! words, which wrap), corners of one tag over the frames in it; the arm stands still there, so a camera clock that is
+//! some ten milliseconds late changes nothing.
+
+use std::collections::BTreeMap;
+
+use nalgebra::Vector3;
+
+use crate::log::Recording;
+use crate::optics::solve_square;
+use crate::robot::Robot;
+use crate::sensor::ArmSensors;
+use crate::streams::{CaptureSet, JointAngles, Mark, MarkKind, Message, ReachTask, TagDetections, Thermometer};
+use crate::time::Stamp;
+
+/// A standing arm looking at tags.
+#[derive(Clone, Debug)]
+pub struct View {
+    pub pose_idx: u32,
+    pub end: Stamp,
+    /// Mean travel of each joint from the middle of its range by the datasheet, rad.
+    pub travel_rad: JointAngles,
+    pub tags: Vec<TagView>,
+}
+
+/// One tag in one view.
+#[derive(Clone, Copy, Debug)]
+pub struct TagView {
+    pub id: u32,
+    /// Index into the robot's surveyed tags.
+    pub tag_idx: usize,
+    /// The tag's centre in the camera frame, m.
+    pub center_in_camera_m: Vector3<f64>,
+    /// Corners averaged over the frames, px.
+    pub corners_px: [[f64; 2]; 4],
+    pub n_frames: usize,
+}
+
+/// Why a detection was not used.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Rejection {
+    /// The robot's survey does not know this id.
+    UnknownTag,
+    /// The corners are not those of a square seen from its front.
+    NotASquare,
+    /// A corner has no bearing in the lens model.
+    OutOfView,
+    /// The mark's span holds no joint readings.
+    NoReadings,
+}
+
+impl Rejection {
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::UnknownTag => "unknown_tag",
+            Self::NotASquare => "not_a_square",
+            Self::OutOfView => "out_of_view",
+            Self::NoReadings => "no_joint_readings",
+        }
+    }
+}
+
+/// All that calibration takes from a recording.
+#[derive(Clone, Debug, Default)]
+pub struct CaptureData {
+    pub fit: Vec<View>,
+    pub held_out: Vec<View>,
+    pub task: Option<ReachTask>,
+    pub n_marks: usize,
+    pub rejected: BTreeMap<Rejection, usize>,
+    pub ids_seen: Vec<u32>,
+    /// Lowest and highest reading over the captured spans, C.
+    pub oil_c: Option<(f64, f64)>,
+    pub water_c: Option<(f64, f64)>,
+    pub pressure_pa: Option<(f64, f64)>,
+    /// Indices of the recording's messages that were used, ascending.
+    pub used: Vec<usize>,
+}
+
+/// Corners that fit a square worse than this are no tag: three times the worst that the lens prior allows.
+const MAX_SQUARE_RMS_PX: f64 = 3.0;
+
+/// Collects the captured views of `recording`.
+#[must_use]
+pub fn associate(recording: &Recording, robot: &Robot) -> CaptureData {
+    let mut data = CaptureData::default();
+    let sensors = ArmSensors::nominal(robot);
+    let index = Index::new(recording);
+    for (idx, message) in recording.messages.iter().map(|(_, m)| m).enumerate() {
+        match message {
+            Message::Task(task) if data.task.is_none() => {
+                data.task = Some(task.clone());
+                data.used.push(idx);
+            }
+            Message::Mark(mark) => {
+                let MarkKind::Capture { set, pose_idx } = mark.kind else { continue };
+                data.n_marks += 1;
+                data.used.push(idx);
+                let Some(view) = index.view(mark, pose_idx, robot, &sensors, &mut data) else { continue };
+                match set {
+                    CaptureSet::Fit => data.fit.push(view),
+                    CaptureSet::HeldOut => data.held_out.push(view),
+                }
+            }
+            _ => {}
+        }
+    }
+    // A view's meaning does not depend on when it was marked; sorting makes the result independent of that order, too.
+    data.fit.sort_by_key(|view| view.pose_idx);
+    data.held_out.sort_by_key(|view| view.pose_idx);
+    data.used.sort_unstable();
+    data.used.dedup();
+    data.ids_seen.sort_unstable();
+    data.ids_seen.dedup();
+    data
+}
+
+/// Messages of a recording sorted by their own stamps.
+struct Index<'a> {
+    messages: &'a [(Stamp, Message)],
+    by_stamp: Vec<(Stamp, usize)>,
+}
+
+impl<'a> Index<'a> {
+    fn new(recording: &'a Recording) -> Self {
+        let mut by_stamp: Vec<(Stamp, usize)> = recording
+            .messages
+            .iter()
+            .enumerate()
+            .filter_map(|(idx, (_, message))| {
+                let stamp = match message {
+                    Message::JointSensors(sample) => sample.stamp,
+                    Message::Detections(detections) => detections.stamp,
+                    Message::Temperature(sample) => sample.stamp,
+                    Message::Pressure(sample) => sample.stamp,
+                    _ => return None,
+                };
+                Some((stamp, idx))
+            })
+            .collect();
+        by_stamp.sort_unstable();
+        Self { messages: &recording.messages, by_stamp }
+    }
+
+    fn span(&self, mark: &Mark) -> &[(Stamp, usize)] {
+        let from = self.by_stamp.partition_point(|(stamp, _)| *stamp < mark.start);
+        let to = self.by_stamp.partition_point(|(stamp, _)| *stamp <= mark.end);
+        &self.by_stamp[from..to.max(from)]
+    }
+
+    fn view(
+        &self,
+        mark: &Mark,
+        pose_idx: u32,
+        robot: &Robot,
+        sensors: &ArmSensors,
+        data: &mut CaptureData,
+    ) -> Option<View> {
+        let mut travel_sum = JointAngles::zeros(robot.n_joints());
+        let mut n_readings = 0usize;
+        let mut corners: BTreeMap<u32, ([[f64; 2]; 4], usize)> = BTreeMap::new();
+        for &(_, idx) in self.span(mark) {
+            match &self.messages[idx].1 {
+                Message::JointSensors(sample) => {
+                    for (sum, (model, counts)) in travel_sum.iter_mut().zip(sensors.models.iter().zip(&*sample.counts))
+                    {
+                        *sum += model.nominal_travel_rad(*counts);
+                    }
+                    n_readings += 1;
+                }
+                Message::Detections(detections) => add_corners(detections, &mut corners),
+                Message::Temperature(sample) => {
+                    let range = match sample.thermometer {
+                        Thermometer::Oil => &mut data.oil_c,
+                        Thermometer::Water => &mut data.water_c,
+                    };
+                    widen(range, sample.temperature_c);
+                }
+                Message::Pressure(sample) => widen(&mut data.pressure_pa, sample.pressure_pa),
+                _ => continue,
+            }
+            data.used.push(idx);
+        }
+        if n_readings == 0 {
+            *data.rejected.entry(Rejection::NoReadings).or_default() += corners.len().max(1);
+            return None;
+        }
+        let travel_rad = JointAngles::from_fn(robot.n_joints(), |j| travel_sum[j] / n_readings as f64);
+        let mut tags = Vec::new();
+        for (id, (sums, n_frames)) in corners {
+            data.ids_seen.push(id);
+            let corners_px = sums.map(|corner| corner.map(|v| v / n_frames as f64));
+            match tag_view(robot, id, corners_px, n_frames) {
+                Ok(tag) => tags.push(tag),
+                Err(rejection) => *data.rejected.entry(rejection).or_default() += 1,
+            }
+        }
+        Some(View { pose_idx, end: mark.end, travel_rad, tags })
+    }
+}
+
+fn add_corners(detections: &TagDetections, corners: &mut BTreeMap<u32, ([[f64; 2]; 4], usize)>) {
+    for tag in &detections.tags {
+        let (sums, n_frames) = corners.entry(tag.id).or_default();
+        for (sum, corner) in sums.iter_mut().flatten().zip(tag.corners_px.iter().flatten()) {
+            *sum += corner;
+        }
+        *n_frames += 1;
+    }
+}
+
+fn tag_view(robot: &Robot, id: u32, corners_px: [[f64; 2]; 4], n_frames: usize) -> Result<TagView, Rejection> {
+    let tag_idx = robot.tags.iter().position(|tag| tag.id == id).ok_or(Rejection::UnknownTag)?;
+    let solved = solve_square(&robot.camera.lens, robot.tags[tag_idx].size_m, &corners_px).map_err(|e| match e {
+        crate::optics::SquareError::OutOfView => Rejection::OutOfView,
+        crate::optics::SquareError::Degenerate => Rejection::NotASquare,
+    })?;
+    if solved.rms_px > MAX_SQUARE_RMS_PX {
+        return Err(Rejection::NotASquare);
+    }
+    let center_in_camera_m = solved.camera_from_tag.origin().vector();
+    Ok(TagView { id, tag_idx, center_in_camera_m, corners_px, n_frames })
+}
+
+fn widen(range: &mut Option<(f64, f64)>, value: f64) {
+    let (low, high) = range.unwrap_or((value, value));
+    *range = Some((low.min(value), high.max(value)));
+}

@@ -1,0 +1,232 @@
+//! The geometry that all methods share: parameters, predicted tag positions, residuals and Jacobians.
+//!
+//! `theta_j = center_j + gain_j * travel_j + offset_j` (the paper's equation 2), and a tag seen at `z_c` in the camera
+//! lies in the base frame at `z_b = base_from_camera(theta) * z_c`. Residual = predicted base position - survey, m.
+
+use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, Point3, Vector2, Vector3};
+
+use super::associate::View;
+use crate::kinematics::LinkPoses;
+use crate::robot::{Robot, SurveyedTag};
+use crate::sensor::{ArmSensors, Correction};
+use crate::spatial::skew;
+use crate::streams::{JointAngles, MAX_JOINTS};
+
+/// Gain (dimensionless, 1 = datasheet) and offset (rad) of every joint.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JointParameters {
+    pub gain: [f64; MAX_JOINTS],
+    pub offset_rad: [f64; MAX_JOINTS],
+}
+
+impl Default for JointParameters {
+    fn default() -> Self {
+        Self { gain: [1.0; MAX_JOINTS], offset_rad: [0.0; MAX_JOINTS] }
+    }
+}
+
+impl JointParameters {
+    #[must_use]
+    pub fn get(&self, parameter: Parameter) -> f64 {
+        match parameter.kind {
+            ParameterKind::Gain => self.gain[parameter.joint],
+            ParameterKind::Offset => self.offset_rad[parameter.joint],
+        }
+    }
+
+    pub fn set(&mut self, parameter: Parameter, value: f64) {
+        match parameter.kind {
+            ParameterKind::Gain => self.gain[parameter.joint] = value,
+            ParameterKind::Offset => self.offset_rad[parameter.joint] = value,
+        }
+    }
+
+    /// The sensors of `robot` with these parameters.
+    #[must_use]
+    pub fn sensors(&self, robot: &Robot) -> ArmSensors {
+        let mut sensors = ArmSensors::nominal(robot);
+        for (joint, model) in sensors.models.iter_mut().enumerate() {
+            model.correction = Correction { gain: self.gain[joint], offset_rad: self.offset_rad[joint] };
+        }
+        sensors
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum ParameterKind {
+    Gain,
+    Offset,
+}
+
+/// One number that may be estimated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Parameter {
+    pub joint: usize,
+    pub kind: ParameterKind,
+}
+
+impl Parameter {
+    /// Its value by the datasheet.
+    #[must_use]
+    pub fn nominal(self) -> f64 {
+        match self.kind {
+            ParameterKind::Gain => 1.0,
+            ParameterKind::Offset => 0.0,
+        }
+    }
+
+    /// One sigma of the datasheet's prior, in the parameter's unit.
+    #[must_use]
+    pub fn prior_std(self, robot: &Robot) -> f64 {
+        let spec = &robot.sensors[self.joint];
+        match self.kind {
+            ParameterKind::Gain => spec.gain_std,
+            ParameterKind::Offset => spec.offset_std_rad,
+        }
+    }
+
+    /// `shoulder_yaw gain`.
+    #[must_use]
+    pub fn name(self, robot: &Robot) -> String {
+        let kind = match self.kind {
+            ParameterKind::Gain => "gain",
+            ParameterKind::Offset => "offset",
+        };
+        format!("{} {kind}", robot.sensors[self.joint].joint)
+    }
+}
+
+/// Views with known landmarks.
+#[derive(Clone, Debug)]
+pub struct PositionProblem<'a> {
+    pub robot: &'a Robot,
+    pub views: &'a [View],
+}
+
+/// One observation's residual, with all that Jacobians need.
+pub(crate) struct Observation<'a> {
+    pub view_idx: usize,
+    pub tag: &'a super::associate::TagView,
+    pub travel_rad: &'a JointAngles,
+    pub poses: &'a LinkPoses,
+    pub base_from_camera: &'a Isometry3<f64>,
+    /// The tag's centre in the base frame as predicted.
+    pub predicted_m: Vector3<f64>,
+    /// Predicted - surveyed, m.
+    pub residual_m: Vector3<f64>,
+}
+
+impl<'a> PositionProblem<'a> {
+    #[must_use]
+    pub fn new(robot: &'a Robot, views: &'a [View]) -> Self {
+        Self { robot, views }
+    }
+
+    /// Calls `f` for every tag of every view.
+    pub(crate) fn each(&self, parameters: &JointParameters, mut f: impl FnMut(&Observation<'_>)) {
+        for (view_idx, view) in self.views.iter().enumerate() {
+            if view.tags.is_empty() {
+                continue;
+            }
+            let poses = self.robot.chain.link_poses(&self.angles(view, parameters));
+            let base_from_camera = poses.frame(&self.robot.camera.mount);
+            for tag in &view.tags {
+                let predicted_m = (base_from_camera * Point3::from(tag.center_in_camera_m)).coords;
+                let surveyed = self.robot.tags[tag.tag_idx].base_from_tag.origin().vector();
+                f(&Observation {
+                    view_idx,
+                    tag,
+                    travel_rad: &view.travel_rad,
+                    poses: &poses,
+                    base_from_camera: &base_from_camera,
+                    predicted_m,
+                    residual_m: predicted_m - surveyed,
+                });
+            }
+        }
+    }
+
+    fn angles(&self, view: &View, parameters: &JointParameters) -> JointAngles {
+        JointAngles::from_fn(self.robot.n_joints(), |j| {
+            let center_rad = self.robot.sensors[j].center_rad;
+            center_rad + parameters.gain[j] * view.travel_rad[j] + parameters.offset_rad[j]
+        })
+    }
+
+    #[must_use]
+    pub fn n_observations(&self) -> usize {
+        self.views.iter().map(|view| view.tags.len()).sum()
+    }
+
+    /// The paper's objective: the sum of distances between seen and surveyed landmarks, m.
+    #[must_use]
+    pub fn sum_of_distances_m(&self, parameters: &JointParameters) -> f64 {
+        let mut sum = 0.0;
+        self.each(parameters, |o| sum += o.residual_m.norm());
+        sum
+    }
+
+    /// Root mean square distance between seen and surveyed landmarks, m; `None` without observations.
+    #[must_use]
+    pub fn rms_m(&self, parameters: &JointParameters) -> Option<f64> {
+        let (mut sum, mut n) = (0.0, 0usize);
+        self.each(parameters, |o| {
+            sum += o.residual_m.norm_squared();
+            n += 1;
+        });
+        (n > 0).then(|| (sum / n as f64).sqrt())
+    }
+
+    /// Root mean square reprojection error per corner (2D), px; corners predicted out of view count as unseen.
+    #[must_use]
+    pub fn reprojection_rms_px(&self, parameters: &JointParameters) -> Option<f64> {
+        let (mut sum, mut n) = (0.0, 0usize);
+        self.each(parameters, |o| {
+            let tag: &SurveyedTag = &self.robot.tags[o.tag.tag_idx];
+            let camera_from_tag = o.base_from_camera.inverse() * tag.base_from_tag.isometry();
+            for (corner, measured) in crate::optics::square_corners(tag.size_m).iter().zip(&o.tag.corners_px) {
+                if let Some(pixel) = self.robot.camera.lens.project(&(camera_from_tag * corner).coords) {
+                    sum += (Vector2::from(*measured) - pixel).norm_squared();
+                    n += 1;
+                }
+            }
+        });
+        (n > 0).then(|| (sum / n as f64).sqrt())
+    }
+
+    /// Residuals (m, three a tag) and their Jacobian by `parameters` in `columns`, in the parameters' own units.
+    #[must_use]
+    pub fn linearize(&self, parameters: &JointParameters, columns: &[Parameter]) -> (DVector<f64>, DMatrix<f64>) {
+        let rows = 3 * self.n_observations();
+        let mut residuals = DVector::zeros(rows);
+        let mut jacobian = DMatrix::zeros(rows, columns.len());
+        let mut row = 0;
+        self.each(parameters, |o| {
+            residuals.fixed_rows_mut::<3>(row).copy_from(&o.residual_m);
+            for (column, &parameter) in columns.iter().enumerate() {
+                let by_parameter = self.derivative(o, parameter);
+                jacobian.fixed_view_mut::<3, 1>(row, column).copy_from(&by_parameter);
+            }
+            row += 3;
+        });
+        (residuals, jacobian)
+    }
+
+    /// d(residual)/d(parameter): a joint turns everything behind it, `axis x (point - origin)` times d(angle)/d(parameter).
+    pub(crate) fn derivative(&self, o: &Observation<'_>, parameter: Parameter) -> Vector3<f64> {
+        if parameter.joint >= self.robot.camera.mount.n_joints {
+            return Vector3::zeros();
+        }
+        let by_angle = o.poses.point_jacobian(parameter.joint, &o.predicted_m);
+        match parameter.kind {
+            ParameterKind::Gain => by_angle * o.travel_rad[parameter.joint],
+            ParameterKind::Offset => by_angle,
+        }
+    }
+
+    /// d(residual)/d(camera mount), perturbed on the right of `link_from_camera`: (translation m, rotation rad).
+    pub(crate) fn mount_derivative(o: &Observation<'_>) -> (Matrix3<f64>, Matrix3<f64>) {
+        let rotation = *o.base_from_camera.rotation.to_rotation_matrix().matrix();
+        (rotation, -rotation * skew(&o.tag.center_in_camera_m))
+    }
+}

@@ -1,0 +1,155 @@
+//! How sure the answer is, in its own units and in millimetres at the tool.
+//!
+//! For an estimator that minimizes a sum of norms, the sandwich `A^-1 B A^-1` (Huber 1967): `A` is the objective's
+//! curvature, `B` the scatter of its gradient. `B` is summed by views, for all tags of one view share one camera pose
+//! and its error. Errors common to all views (camera mount, survey of a tag) do not show in any scatter; they are added
+//! from the priors through the same curvature. What a straight line leaves of a sensor's error (nonlinearity,
+//! temperature) is there again at every new pose; at the tool it is added from the datasheet's linearity.
+
+use nalgebra::{Const, DMatrix, DVector, Dyn, Matrix3, OMatrix, Vector3};
+
+use super::problem::{JointParameters, Parameter, ParameterKind, PositionProblem};
+use crate::kinematics::{IkGoal, IkSettings, JointLimits, solve_position};
+use crate::robot::Robot;
+use crate::sensor::ArmSensors;
+use crate::stats::Summary;
+use crate::streams::{JointAngles, ReachTask};
+
+/// Covariance of the free parameters, in their own units (gain: 1, offset: rad).
+#[derive(Clone, Debug)]
+pub struct ParameterCovariance {
+    pub parameters: Vec<Parameter>,
+    pub matrix: DMatrix<f64>,
+}
+
+/// What the tool's position error is expected to be at the task's targets.
+#[derive(Clone, Debug)]
+pub struct ToolErrorPrediction {
+    pub error_m: Summary,
+}
+
+/// Distances below this do not make the objective's curvature larger: it is where pixel noise sits, m.
+const DISTANCE_FLOOR_M: f64 = 1e-4;
+
+impl ParameterCovariance {
+    /// Estimates the covariance at the solution. A singular curvature gives infinite variances.
+    #[must_use]
+    pub fn estimate(problem: &PositionProblem<'_>, free: &[Parameter], at: &JointParameters) -> Self {
+        let n = free.len();
+        let n_tags = problem.robot.tags.len();
+        let mut curvature = DMatrix::zeros(n, n);
+        let mut view_gradients = DMatrix::zeros(n, problem.views.len());
+        // Columns: mount translation, mount rotation, then each tag's survey position.
+        let mut by_common = DMatrix::zeros(n, 6 + 3 * n_tags);
+        problem.each(at, |o| {
+            let distance = o.residual_m.norm().max(DISTANCE_FLOOR_M);
+            let unit = o.residual_m / distance;
+            let hessian = (Matrix3::identity() - unit * unit.transpose()) / distance;
+            let mut jacobian = DMatrix::zeros(3, n);
+            for (column, &parameter) in free.iter().enumerate() {
+                jacobian.fixed_view_mut::<3, 1>(0, column).copy_from(&problem.derivative(o, parameter));
+            }
+            let transposed = jacobian.transpose();
+            curvature += &transposed * hessian * &jacobian;
+            let gradient: DVector<f64> = &transposed * unit;
+            let mut sum = view_gradients.column_mut(o.view_idx);
+            sum += gradient;
+            let (by_translation, by_rotation) = PositionProblem::mount_derivative(o);
+            let weighted = &transposed * hessian;
+            add_columns(&mut by_common, 0, &(&weighted * by_translation));
+            add_columns(&mut by_common, 3, &(&weighted * by_rotation));
+            add_columns(&mut by_common, 6 + 3 * o.tag.tag_idx, &(-&weighted));
+        });
+        let matrix = match curvature.try_inverse() {
+            None => DMatrix::from_diagonal_element(n, n, f64::INFINITY),
+            Some(inverse) => {
+                let used = problem.views.iter().filter(|view| !view.tags.is_empty()).count();
+                let small_sample = used as f64 / (used.saturating_sub(1)).max(1) as f64;
+                let scatter = &view_gradients * view_gradients.transpose() * small_sample;
+                let common = &inverse * by_common;
+                &inverse * scatter * &inverse + &common * common_variances(problem.robot) * common.transpose()
+            }
+        };
+        Self { parameters: free.to_vec(), matrix }
+    }
+
+    /// One sigma of a parameter; `None` if it is not among the estimated ones.
+    #[must_use]
+    pub fn std(&self, parameter: Parameter) -> Option<f64> {
+        let row = self.parameters.iter().position(|p| *p == parameter)?;
+        Some(self.matrix[(row, row)].max(0.0).sqrt())
+    }
+
+    /// Covariance of the tool's position (base frame, m^2) for an arm at `angles`.
+    ///
+    /// Estimated parameters enter with their covariance, the others with the datasheet's sigma, and every sensor with
+    /// its linearity.
+    #[must_use]
+    pub fn tool_position_m2(&self, robot: &Robot, sensors: &ArmSensors, angles: &JointAngles) -> Matrix3<f64> {
+        let poses = robot.chain.link_poses(angles);
+        let tool = poses.frame(&robot.tool.mount).translation.vector;
+        let mut estimated = DMatrix::zeros(3, self.parameters.len());
+        let mut covariance = Matrix3::zeros();
+        for joint in 0..robot.tool.mount.n_joints {
+            let by_angle = poses.point_jacobian(joint, &tool);
+            let correction = sensors.models[joint].correction;
+            let spec = &robot.sensors[joint];
+            let travel = (angles[joint] - spec.center_rad - correction.offset_rad) / correction.gain;
+            for (kind, by_parameter) in [(ParameterKind::Gain, by_angle * travel), (ParameterKind::Offset, by_angle)] {
+                let parameter = Parameter { joint, kind };
+                match self.parameters.iter().position(|p| *p == parameter) {
+                    Some(column) => estimated.fixed_view_mut::<3, 1>(0, column).copy_from(&by_parameter),
+                    None => covariance += outer(&(by_parameter * parameter.prior_std(robot))),
+                }
+            }
+            covariance += outer(&(by_angle * spec.linearity_std_rad));
+        }
+        let full = &estimated * &self.matrix * estimated.transpose();
+        covariance + full.fixed_view::<3, 3>(0, 0)
+    }
+}
+
+fn outer(v: &Vector3<f64>) -> Matrix3<f64> {
+    v * v.transpose()
+}
+
+fn add_columns(matrix: &mut DMatrix<f64>, column: usize, block: &OMatrix<f64, Dyn, Const<3>>) {
+    let mut view = matrix.fixed_columns_mut::<3>(column);
+    view += block;
+}
+
+fn common_variances(robot: &Robot) -> DMatrix<f64> {
+    let mut variances = vec![robot.camera.mount_std_m.powi(2); 3];
+    variances.extend([robot.camera.mount_std_rad.powi(2); 3]);
+    for tag in &robot.tags {
+        variances.extend([tag.position_std_m.powi(2); 3]);
+    }
+    DMatrix::from_diagonal(&DVector::from_vec(variances))
+}
+
+/// Expected size of the tool's position error at each target of `task`: `sqrt(trace(covariance))`, summarized.
+#[must_use]
+pub fn predict_tool_error(
+    robot: &Robot,
+    at: &JointParameters,
+    covariance: &ParameterCovariance,
+    task: Option<&ReachTask>,
+) -> Option<ToolErrorPrediction> {
+    let sensors = at.sensors(robot);
+    let open = JointLimits { lower_rad: -std::f64::consts::TAU, upper_rad: std::f64::consts::TAU };
+    let settings = IkSettings {
+        limits: robot.chain.joints().iter().map(|joint| joint.limits.unwrap_or(open)).collect(),
+        locked: (0..robot.n_joints()).map(|j| j >= robot.tool.mount.n_joints).collect(),
+        tolerance_m: 1e-4,
+        max_iterations: 200,
+    };
+    let mut errors = Vec::new();
+    for target in &task?.targets_m {
+        let goal = IkGoal { position_m: Vector3::from(*target) };
+        let Ok(angles) = solve_position(&robot.chain, &robot.tool.mount, &goal, &robot.stowed, &settings) else {
+            continue;
+        };
+        errors.push(covariance.tool_position_m2(robot, &sensors, &angles).trace().max(0.0).sqrt());
+    }
+    Some(ToolErrorPrediction { error_m: Summary::of(&errors)? })
+}
