@@ -1,0 +1,46 @@
+//! BELIEF: which poses to look from, and how to get there without touching anything while the joints are still wrong.
+//!
+//! `bounds` says how far a joint may truly be from where it is believed; `clearance` measures free water for every arm
+//! within those bounds; `visibility` predicts which tags a pose sees; `poses` chooses the most telling ones; `path`
+//! connects them by edges that are certified, not sampled; `targets` does the same for the reach task.
+
+mod bounds;
+mod clearance;
+mod path;
+mod poses;
+mod targets;
+mod visibility;
+
+pub use bounds::JointErrorBounds;
+pub use clearance::{ClearanceModel, Nearest};
+pub use path::{Path, PathError, PathPlanner};
+pub use poses::{PosePlan, PoseRequest, choose_poses};
+pub use targets::{TargetRequest, plan_targets};
+pub use visibility::VisibilityModel;
+
+use crate::kinematics::IkError;
+
+/// Why there is no plan.
+#[derive(Debug, thiserror::Error)]
+pub enum PlanError {
+    #[error("target {target} at ({x:.3}, {y:.3}, {z:.3}) m: {source}", x = at_m[0], y = at_m[1], z = at_m[2])]
+    TargetOutOfReach { target: usize, at_m: [f64; 3], source: IkError },
+    #[error(
+        "target {target} at ({x:.3}, {y:.3}, {z:.3}) m: reached only with {clearance_m:.3} m of clearance between \
+         {nearest}; {needed_m:.3} m are needed for every arm within the sensors' error",
+        x = at_m[0], y = at_m[1], z = at_m[2]
+    )]
+    TargetTooClose { target: usize, at_m: [f64; 3], clearance_m: f64, nearest: String, needed_m: f64 },
+    #[error(
+        "the arm starts too close: {clearance_m:.3} m between {nearest}; {needed_m:.3} m are needed (0: in collision)"
+    )]
+    StartTooClose { clearance_m: f64, nearest: String, needed_m: f64 },
+    #[error(
+        "no pose was found that sees {min_tags} of the {n_tags} surveyed tags and keeps {clearance_m:.3} m clear ({tried} tried)"
+    )]
+    NoUsefulPose { min_tags: u32, n_tags: usize, clearance_m: f64, tried: usize },
+    #[error("only {found} of {wanted} poses were found that see {min_tags} tags and keep clear")]
+    TooFewPoses { found: usize, wanted: usize, min_tags: u32 },
+    #[error(transparent)]
+    Path(#[from] PathError),
+}

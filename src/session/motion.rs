@@ -1,0 +1,165 @@
+//! Drives an arm along believed angles and waits until its own sensors say that it stands.
+
+use super::{Recorder, SessionError};
+use crate::plan::Path;
+use crate::robot::Robot;
+use crate::routine::TaskSettings;
+use crate::sensor::ArmSensors;
+use crate::streams::{
+    Arm, ArmError, JointAngles, JointCommand, JointStateBelief, LogLevel, LogLine, Mark, MarkKind, Message, Phase,
+    ReachTask, Sink,
+};
+use crate::time::Stamp;
+
+/// The arm, what is recorded of it, and the sensors as believed at the moment.
+pub(super) struct Driver<'b> {
+    robot: &'b Robot,
+    arm: &'b mut dyn Arm,
+    pub recorder: &'b mut Recorder,
+    pub sensors: ArmSensors,
+    start: Stamp,
+    /// Where the arm was last told to be, believed angles.
+    set_point: JointAngles,
+    ticks: u64,
+    pub motion_s: f64,
+}
+
+/// Share of a joint's rate that set-points use; the rest is left to the controller.
+const RATE_SHARE: f64 = 0.7;
+/// Set-points follow a cubic from rest to rest, whose peak rate is 1.5 times its mean.
+const CUBIC_PEAK: f64 = 1.5;
+/// The arm stands when every sensor has been this near to its set-point, rad ...
+const REST_RAD: f64 = 0.0016;
+/// ... for this long, s.
+const REST_S: f64 = 0.4;
+const SETTLE_LIMIT_S: f64 = 12.0;
+/// Believed angles and commands are recorded each so many control periods.
+const BELIEF_EVERY: u64 = 4;
+
+impl<'b> Driver<'b> {
+    pub fn new(
+        robot: &'b Robot,
+        arm: &'b mut dyn Arm,
+        recorder: &'b mut Recorder,
+        sensors: ArmSensors,
+    ) -> Result<Self, SessionError> {
+        let start = arm.now();
+        // One period, to learn where the arm is.
+        arm.step(recorder)?;
+        let counts = recorder.latest_counts.ok_or(SessionError::NoReadings)?;
+        let set_point = sensors.angles(&counts);
+        let mut driver = Self { robot, arm, recorder, sensors, start, set_point, ticks: 0, motion_s: 0.0 };
+        driver.command()?;
+        Ok(driver)
+    }
+
+    pub fn elapsed_s(&self) -> f64 {
+        self.arm.now().since_s(self.start)
+    }
+
+    pub fn set_point(&self) -> JointAngles {
+        self.set_point
+    }
+
+    /// Where the arm believes to be by its latest readings.
+    pub fn believed_angles(&self) -> Result<JointAngles, SessionError> {
+        let counts = self.recorder.latest_counts.ok_or(SessionError::NoReadings)?;
+        Ok(self.sensors.angles(&counts))
+    }
+
+    /// Takes over other sensors; the arm stays where it is, only what that is called changes.
+    pub fn believe(&mut self, sensors: ArmSensors) {
+        self.set_point = sensors.angles(&self.sensors.counts(&self.set_point));
+        self.sensors = sensors;
+    }
+
+    pub fn record(&mut self, message: &Message) -> Result<(), SessionError> {
+        let now = self.arm.now();
+        self.recorder.record(now, message).map_err(ArmError::Sink)?;
+        Ok(())
+    }
+
+    pub fn record_task(&mut self, task: &TaskSettings) -> Result<(), SessionError> {
+        let stamp = self.arm.now();
+        let (targets_m, tolerance_m) = (task.targets_m.clone(), task.tolerance_m);
+        self.record(&Message::Task(ReachTask { stamp, targets_m, tolerance_m }))
+    }
+
+    pub fn phase(&mut self, phase: Phase) -> Result<(), SessionError> {
+        let now = self.arm.now();
+        self.record(&Message::Mark(Mark { start: now, end: now, kind: MarkKind::Phase(phase) }))
+    }
+
+    pub fn log(&mut self, level: LogLevel, text: &str) -> Result<(), SessionError> {
+        let stamp = self.arm.now();
+        self.record(&Message::Log(LogLine { stamp, level, name: "session".to_owned(), text: text.to_owned() }))
+    }
+
+    fn command(&mut self) -> Result<(), SessionError> {
+        let counts = self.sensors.counts(&self.set_point);
+        self.arm.command(&counts)?;
+        Ok(())
+    }
+
+    fn step(&mut self) -> Result<(), SessionError> {
+        self.arm.step(self.recorder)?;
+        self.ticks += 1;
+        if self.ticks.is_multiple_of(BELIEF_EVERY) {
+            let stamp = self.arm.now();
+            let angles = self.believed_angles()?;
+            self.record(&Message::JointStates(JointStateBelief { stamp, angles }))?;
+            let counts = self.sensors.counts(&self.set_point);
+            self.record(&Message::JointCommand(JointCommand { stamp, counts }))?;
+        }
+        Ok(())
+    }
+
+    /// Moves along the path, from rest to rest on each edge.
+    pub fn follow(&mut self, path: &Path) -> Result<(), SessionError> {
+        for pair in path.waypoints.windows(2) {
+            let (from, to) = (pair[0], pair[1]);
+            let slowest = |(joint, (a, b)): (usize, (&f64, &f64))| {
+                (b - a).abs() / (RATE_SHARE * self.robot.sensors[joint].max_rate_rad_s)
+            };
+            let duration_s = CUBIC_PEAK * from.iter().zip(to.iter()).enumerate().map(slowest).fold(0.0, f64::max);
+            let steps = (duration_s / self.arm.period_s()).ceil().max(1.0);
+            for k in 1..=steps as u64 {
+                let u = k as f64 / steps;
+                let share = u * u * (3.0 - 2.0 * u);
+                self.set_point = JointAngles::from_fn(from.len(), |j| from[j] + share * (to[j] - from[j]));
+                self.command()?;
+                self.step()?;
+            }
+            self.motion_s += steps * self.arm.period_s();
+        }
+        Ok(())
+    }
+
+    /// Waits until the arm stands at its set-point; `false` when it does not within the limit.
+    pub fn settle(&mut self) -> Result<bool, SessionError> {
+        let (mut at_rest_s, mut waited_s) = (0.0, 0.0);
+        while waited_s < SETTLE_LIMIT_S {
+            self.step()?;
+            waited_s += self.arm.period_s();
+            let near = self.believed_angles()?.max_abs_difference(&self.set_point) < REST_RAD;
+            at_rest_s = if near { at_rest_s + self.arm.period_s() } else { 0.0 };
+            if at_rest_s >= REST_S {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
+    /// Stands for `seconds` and marks the span; gives how many tags were seen in it.
+    pub fn dwell(&mut self, seconds: f64, kind: MarkKind) -> Result<usize, SessionError> {
+        let start = self.arm.now();
+        self.recorder.tags_seen = 0;
+        let steps = (seconds / self.arm.period_s()).ceil() as u64;
+        for _ in 0..steps {
+            self.step()?;
+        }
+        let end = self.arm.now();
+        self.record(&Message::Mark(Mark { start, end, kind }))?;
+        Ok(self.recorder.tags_seen)
+    }
+}

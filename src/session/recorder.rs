@@ -1,0 +1,45 @@
+//! Keeps every message and remembers the latest of those that the loop steers by.
+
+use crate::log::{LogError, Recording, RecordingWriter, read_recording};
+use crate::streams::{JointCounts, Message, Sink, SinkError};
+use crate::time::Stamp;
+
+/// A recording being written, and the latest readings.
+pub struct Recorder {
+    pub(super) writer: RecordingWriter,
+    pub(super) latest_counts: Option<JointCounts>,
+    /// Tags seen since it was last set to zero.
+    pub(super) tags_seen: usize,
+}
+
+impl Recorder {
+    #[must_use]
+    pub fn new(writer: RecordingWriter) -> Self {
+        Self { writer, latest_counts: None, tags_seen: 0 }
+    }
+
+    /// The recording so far, read from its bytes on disk.
+    ///
+    /// # Errors
+    /// [`LogError`] when it cannot be flushed or read.
+    pub fn read_back(&mut self) -> Result<Recording, LogError> {
+        self.writer.flush()?;
+        read_recording(self.writer.path())
+    }
+
+    #[must_use]
+    pub fn into_writer(self) -> RecordingWriter {
+        self.writer
+    }
+}
+
+impl Sink for Recorder {
+    fn record(&mut self, log_time: Stamp, message: &Message) -> Result<(), SinkError> {
+        match message {
+            Message::JointSensors(sample) => self.latest_counts = Some(sample.counts),
+            Message::Detections(detections) => self.tags_seen += detections.tags.len(),
+            _ => {}
+        }
+        self.writer.record(log_time, message)
+    }
+}
