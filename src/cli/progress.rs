@@ -1,0 +1,45 @@
+//! Progress on stderr.
+
+use indicatif::{ProgressBar, ProgressStyle};
+
+use crate::session::Progress;
+use crate::streams::Phase;
+
+/// One line that says what the arm is doing.
+pub(super) struct Bar {
+    bar: ProgressBar,
+}
+
+impl Bar {
+    pub fn new() -> Self {
+        let bar = ProgressBar::new(1);
+        let template = "{elapsed_precise} {msg:<44} {wide_bar} {pos}/{len}";
+        if let Ok(style) = ProgressStyle::with_template(template) {
+            bar.set_style(style);
+        }
+        Self { bar }
+    }
+
+    pub fn finish(&self) {
+        self.bar.finish_and_clear();
+    }
+}
+
+impl Progress for Bar {
+    fn update(&mut self, phase: Phase, done: usize, total: usize, simulated_s: f64) {
+        let what = match phase {
+            Phase::Plan => "planning",
+            Phase::Move | Phase::Settle | Phase::Capture => "capturing views",
+            Phase::Calibrate => "calibrating",
+            Phase::Reach => "reaching for targets",
+            Phase::Done => "done",
+        };
+        self.bar.set_length(total as u64);
+        self.bar.set_position(done as u64);
+        self.bar.set_message(format!("{what}, {simulated_s:.0} s of simulated time"));
+    }
+
+    fn wall_s(&self) -> f64 {
+        self.bar.elapsed().as_secs_f64()
+    }
+}

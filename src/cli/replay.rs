@@ -1,0 +1,91 @@
+//! `armcal replay`: a recording in the Rerun viewer.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result};
+use clap::Args;
+
+use super::calibrate::warn_of_losses;
+use super::exit::{Exit, UsageError};
+use super::files;
+use crate::log::{read_attachments, read_recording};
+use crate::replay::{ReplayInput, open_viewer, write_rrd};
+use crate::robot::{self, Robot, Vehicle};
+use crate::routine::{self, Scene};
+
+#[derive(Debug, Args)]
+pub(super) struct ReplayArgs {
+    /// The recording (.mcap); a truth.mcap beside it is shown with it
+    recording: PathBuf,
+    /// Write this .rrd file instead of opening the viewer
+    #[arg(long)]
+    save: Option<PathBuf>,
+    /// Folder of the robot, where the recording does not carry its drawings
+    #[arg(long)]
+    robot: Option<PathBuf>,
+}
+
+pub(super) fn replay(args: &ReplayArgs) -> Result<Exit> {
+    let recording = read_recording(&args.recording)?;
+    let lost = warn_of_losses(&recording);
+    let drawings = Drawings::find(args)?;
+    let truth = args.recording.with_file_name("truth.mcap");
+    let truth = (truth != args.recording && truth.is_file()).then_some(truth);
+    let input = ReplayInput {
+        recording: &recording,
+        truth: truth.as_deref(),
+        robot: &drawings.robot,
+        vehicle: drawings.vehicle.as_ref(),
+        scene: drawings.scene.as_ref(),
+        summary_markdown: None,
+    };
+    match &args.save {
+        Some(out) => {
+            write_rrd(&input, &files::partial(out))?;
+            files::complete(out)?;
+            println!("written      {}", out.display());
+        }
+        None => {
+            let folder = tempfile::tempdir().context("no temporary folder can be made")?.keep();
+            let out = folder.join("replay.rrd");
+            write_rrd(&input, &out)?;
+            open_viewer(&out)?;
+        }
+    }
+    Ok(if lost { Exit::DataLost } else { Exit::Ok })
+}
+
+/// The arm and its surroundings as drawn, from the recording's own attachments or a robot folder.
+struct Drawings {
+    robot: Robot,
+    vehicle: Option<Vehicle>,
+    scene: Option<Scene>,
+}
+
+impl Drawings {
+    fn find(args: &ReplayArgs) -> Result<Self> {
+        let folder = tempfile::tempdir().context("no temporary folder can be made")?;
+        let mut names = Vec::new();
+        for (name, bytes) in read_attachments(&args.recording)? {
+            // Only plain names: an attachment must not choose where it is written.
+            if Path::new(&name).file_name().is_some_and(|plain| plain.to_str() == Some(&name)) {
+                std::fs::write(folder.path().join(&name), bytes).context("an attachment cannot be unpacked")?;
+                names.push(name);
+            }
+        }
+        let has = |name: &str| names.iter().any(|n| n == name);
+        let robot = match &args.robot {
+            Some(robot) => robot::load(robot)?,
+            None if has("robot.toml") => robot::load(folder.path())?,
+            None => {
+                let recording = args.recording.display();
+                let problem = "carries no drawings of its robot (attachment robot.toml); name its folder with --robot";
+                return Err(UsageError(format!("{recording}: {problem}")).into());
+            }
+        };
+        let vehicle =
+            has("vehicle.toml").then(|| robot::load_vehicle(&folder.path().join("vehicle.toml"))).transpose()?;
+        let scene = has("scene.toml").then(|| routine::load_scene(&folder.path().join("scene.toml"))).transpose()?;
+        Ok(Self { robot, vehicle, scene })
+    }
+}

@@ -1,0 +1,30 @@
+//! Calibrates the joint sensors of hydraulic arms in place, with the wrist camera and a few AprilTags.
+//!
+//! Layers, imports go down only: `cli` > `score`, `report`, `replay` > belief (`calib`, `plan`, `verify`, `session`) and
+//! truth (`sim`), which do not know each other > `streams`, `log`, `routine` > `robot`, `sensor`, `kinematics`, `optics`
+//! > `joints`, `spatial`, `stats`, `time`. docs/architecture.md has the map and the invariants.
+#![forbid(unsafe_code)]
+
+pub mod calib;
+pub mod cli;
+pub mod joints;
+pub mod kinematics;
+pub mod log;
+pub mod optics;
+pub mod plan;
+#[cfg(feature = "viewer")]
+pub mod replay;
+pub mod report;
+pub mod robot;
+pub mod routine;
+#[cfg(feature = "sim")]
+pub mod score;
+pub mod sensor;
+pub mod session;
+#[cfg(feature = "sim")]
+pub mod sim;
+pub mod spatial;
+pub mod stats;
+pub mod streams;
+pub mod time;
+pub mod verify;

@@ -1,0 +1,15 @@
+//! What people and programs get to see; computes nothing new.
+//!
+//! `RunSummary` is summary.json; `table` the closing table on the terminal; `html` report.html, one file that needs no
+//! network. `markdown` the replay's panel.
+//! All show the same figures.
+
+mod html;
+mod markdown;
+mod summary;
+mod table;
+
+pub use html::html;
+pub use markdown::markdown;
+pub use summary::{CalibrationSummary, CaptureSummary, HeldOutSummary, JointScore, RunSummary, Score, ScoreSide};
+pub use table::table;

@@ -1,0 +1,148 @@
+//! summary.json. Lengths in m, angles in rad, times in s.
+
+use serde::{Deserialize, Serialize};
+
+use crate::calib::{Calibration, Status};
+use crate::stats::Summary;
+
+/// The figures of a run or of a calibration, for programs.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RunSummary {
+    pub version: u32,
+    /// `None` where a recording was calibrated without a routine.
+    pub routine: Option<String>,
+    pub robot: String,
+    pub seed: Option<u64>,
+    pub method: String,
+    pub status: Status,
+    pub refusal: Option<String>,
+    /// By the arm's clock, first to last step.
+    pub simulated_s: Option<f64>,
+    /// Of that, the time in which the arm was on its way.
+    pub motion_s: Option<f64>,
+    pub wall_s: f64,
+    pub capture: CaptureSummary,
+    pub calibration: CalibrationSummary,
+    pub held_out: HeldOutSummary,
+    /// From truth; absent for a real recording.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub score: Option<Score>,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CaptureSummary {
+    pub poses: usize,
+    pub poses_skipped: usize,
+    pub targets_skipped: usize,
+    /// Views with tags that the fit used.
+    pub views: usize,
+    pub detections: usize,
+    pub rejected: usize,
+    /// Contacts of the arm with anything, from truth.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub collisions: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub min_clearance_m: Option<f64>,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CalibrationSummary {
+    pub outcome: String,
+    pub evaluations: usize,
+    pub wall_s: f64,
+    pub residual_rms_px: f64,
+    pub cost_initial: f64,
+    pub cost_final: f64,
+    pub unobservable: Vec<String>,
+    pub predicted_tool_error_m: Option<Summary>,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct HeldOutSummary {
+    pub views: usize,
+    pub rms_px: Option<f64>,
+    pub rms_m: Option<f64>,
+    /// The same views with the datasheet's sensors.
+    pub nominal_rms_m: Option<f64>,
+}
+
+/// Truth against belief.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Score {
+    pub before: ScoreSide,
+    /// Absent when the calibration was refused: the arm then kept its old belief.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub after: Option<ScoreSide>,
+    /// Mean normalized squared error of the tool's position at the task, 3 when the prediction is right.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub nees: Option<f64>,
+    pub joints: Vec<JointScore>,
+}
+
+/// Errors over the task's targets.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ScoreSide {
+    /// Where the arm believes its tool is, against where it is.
+    pub tool_error_m: Option<Summary>,
+    pub tool_error_rad: Option<Summary>,
+    /// Target against where the tool came to rest.
+    pub reach_error_m: Option<Summary>,
+    /// Targets reached within the task's tolerance.
+    pub hits: usize,
+}
+
+/// Error of one joint's believed angle, estimate less truth.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct JointScore {
+    pub name: String,
+    /// Root mean square over the task's resting poses, before and after.
+    pub angle_error_before_rad: Option<f64>,
+    pub angle_error_after_rad: Option<f64>,
+    pub estimated: bool,
+}
+
+impl RunSummary {
+    /// The part that a calibration alone can fill.
+    #[must_use]
+    pub fn of_calibration(calibration: &Calibration, calibration_wall_s: f64) -> Self {
+        Self {
+            version: 1,
+            routine: None,
+            robot: calibration.robot.clone(),
+            seed: None,
+            method: calibration.method.to_string(),
+            status: calibration.status,
+            refusal: calibration.refusal.clone(),
+            simulated_s: None,
+            motion_s: None,
+            wall_s: calibration_wall_s,
+            capture: CaptureSummary {
+                poses: calibration.fit.views + calibration.held_out.views,
+                poses_skipped: 0,
+                targets_skipped: 0,
+                views: calibration.fit.views,
+                detections: calibration.fit.tags_seen,
+                rejected: calibration.fit.rejected,
+                collisions: None,
+                min_clearance_m: None,
+            },
+            calibration: CalibrationSummary {
+                outcome: calibration.fit.outcome.clone(),
+                evaluations: calibration.fit.evaluations,
+                wall_s: calibration_wall_s,
+                residual_rms_px: calibration.fit.rms_px,
+                cost_initial: calibration.fit.cost_initial,
+                cost_final: calibration.fit.cost_final,
+                unobservable: calibration.unobservable.clone(),
+                predicted_tool_error_m: calibration.predicted_tool_error_m,
+            },
+            held_out: HeldOutSummary {
+                views: calibration.held_out.views,
+                rms_px: calibration.held_out.rms_px,
+                rms_m: calibration.held_out.rms_m,
+                nominal_rms_m: calibration.held_out.nominal_rms_m,
+            },
+            score: None,
+        }
+    }
+}

@@ -1,0 +1,163 @@
+//! The closing table on the terminal. Millimetres and degrees: people read it.
+
+use comfy_table::presets::UTF8_FULL_CONDENSED;
+use comfy_table::{CellAlignment, Table};
+
+use super::summary::{RunSummary, ScoreSide};
+use crate::calib::Status;
+use crate::stats::Summary;
+
+/// Lays a summary out for a terminal.
+#[must_use]
+pub fn table(summary: &RunSummary) -> String {
+    let mut text = String::new();
+    if let Some(score) = &summary.score {
+        text.push_str(&score_table(&score.before, score.after.as_ref()).to_string());
+        text.push('\n');
+    }
+    text.push_str(&joint_table(summary).map_or_else(String::new, |t| format!("{t}\n")));
+    text.push_str(&check_lines(summary).join("\n"));
+    text
+}
+
+/// One line of the score: which statistic, which figure of it, and in what unit people read it.
+struct Figure {
+    name: &'static str,
+    pick: fn(&ScoreSide) -> Option<Summary>,
+    of: fn(&Summary) -> f64,
+    scale: f64,
+    unit: &'static str,
+}
+
+const RAD_TO_DEG: f64 = 180.0 / std::f64::consts::PI;
+
+const FIGURES: [Figure; 6] = [
+    Figure { name: "tool position error, median", pick: |s| s.tool_error_m, of: |s| s.median, scale: 1e3, unit: "mm" },
+    Figure { name: "tool position error, 95 %", pick: |s| s.tool_error_m, of: |s| s.p95, scale: 1e3, unit: "mm" },
+    Figure { name: "tool position error, worst", pick: |s| s.tool_error_m, of: |s| s.max, scale: 1e3, unit: "mm" },
+    Figure {
+        name: "tool orientation error, median",
+        pick: |s| s.tool_error_rad,
+        of: |s| s.median,
+        scale: RAD_TO_DEG,
+        unit: "deg",
+    },
+    Figure { name: "miss at the target, median", pick: |s| s.reach_error_m, of: |s| s.median, scale: 1e3, unit: "mm" },
+    Figure { name: "miss at the target, worst", pick: |s| s.reach_error_m, of: |s| s.max, scale: 1e3, unit: "mm" },
+];
+
+/// Rows of (what, before, after, ratio); shared with the HTML report.
+pub(super) fn score_rows(before: &ScoreSide, after: Option<&ScoreSide>) -> Vec<[String; 4]> {
+    let mut rows = Vec::new();
+    for figure in &FIGURES {
+        let value = |side: &ScoreSide| (figure.pick)(side).map(|s| (figure.of)(&s) * figure.scale);
+        let unit = figure.unit;
+        let (b, a) = (value(before), after.and_then(value));
+        let show = |v: Option<f64>| v.map_or_else(|| "-".to_owned(), |v| format!("{v:.2} {unit}"));
+        let ratio = match (b, a) {
+            (Some(b), Some(a)) if a > 0.0 => format!("{:.1} x better", b / a),
+            _ => "-".to_owned(),
+        };
+        rows.push([figure.name.to_owned(), show(b), show(a), ratio]);
+    }
+    let hits = |side: &ScoreSide| format!("{} of {}", side.hits, side.reach_error_m.map_or(0, |s| s.n));
+    rows.push([
+        "targets hit within tolerance".to_owned(),
+        hits(before),
+        after.map_or_else(|| "-".to_owned(), hits),
+        String::new(),
+    ]);
+    rows
+}
+
+fn score_table(before: &ScoreSide, after: Option<&ScoreSide>) -> Table {
+    let mut table = Table::new();
+    table.load_preset(UTF8_FULL_CONDENSED).set_header(["reach task, against the truth", "before", "after", ""]);
+    for row in score_rows(before, after) {
+        table.add_row(row);
+    }
+    align_right(&mut table, 1..4);
+    table
+}
+
+fn joint_table(summary: &RunSummary) -> Option<Table> {
+    let score = summary.score.as_ref()?;
+    let mut table = Table::new();
+    table.load_preset(UTF8_FULL_CONDENSED).set_header(["joint angle error, rms", "before", "after", ""]);
+    for joint in &score.joints {
+        let show = |v: Option<f64>| v.map_or_else(|| "-".to_owned(), |v| format!("{:.3} deg", v.to_degrees()));
+        let note = if joint.estimated { "" } else { "not calibrated" };
+        let (before, after) = (show(joint.angle_error_before_rad), show(joint.angle_error_after_rad));
+        table.add_row([joint.name.as_str(), &before, &after, note]);
+    }
+    align_right(&mut table, 1..3);
+    Some(table)
+}
+
+fn align_right(table: &mut Table, columns: std::ops::Range<usize>) {
+    for index in columns {
+        if let Some(column) = table.column_mut(index) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+    }
+}
+
+/// Every check line begins with a label of this width.
+const LABEL_WIDTH: usize = 13;
+
+/// A check line as its label and its text.
+pub(super) fn labelled(line: &str) -> (&str, &str) {
+    let (label, text) = line.split_at_checked(LABEL_WIDTH).unwrap_or((line, ""));
+    (label.trim_end(), text)
+}
+
+/// What the arm itself knows, and what was lost on the way; shared with the HTML report.
+pub(super) fn check_lines(summary: &RunSummary) -> Vec<String> {
+    let mm = |v: Option<f64>| v.map_or_else(|| "-".to_owned(), |v| format!("{:.1} mm", v * 1e3));
+    let mut lines = vec![match (summary.status, &summary.refusal) {
+        (Status::Accepted, _) => "calibration  ACCEPTED".to_owned(),
+        (Status::Refused, why) => format!("calibration  REFUSED: {}", why.as_deref().unwrap_or("no reason given")),
+    }];
+    let held_out = &summary.held_out;
+    lines.push(format!(
+        "held out     {} views the fit did not use: tags off by {} rms (datasheet sensors: {}), {} in the image",
+        held_out.views,
+        mm(held_out.rms_m),
+        mm(held_out.nominal_rms_m),
+        held_out.rms_px.map_or_else(|| "-".to_owned(), |v| format!("{v:.1} px")),
+    ));
+    if let Some(predicted) = summary.calibration.predicted_tool_error_m {
+        lines.push(format!(
+            "predicted    tool error {} median, {} worst over the targets, from the recording and the datasheets",
+            mm(Some(predicted.median)),
+            mm(Some(predicted.max))
+        ));
+    }
+    let capture = &summary.capture;
+    lines.push(format!(
+        "captured     {} poses, {} skipped; {} tags in {} fitted views, {} rejected; {} targets skipped",
+        capture.poses,
+        capture.poses_skipped,
+        capture.detections,
+        capture.views,
+        capture.rejected,
+        capture.targets_skipped
+    ));
+    if let (Some(collisions), clearance) = (capture.collisions, capture.min_clearance_m) {
+        lines.push(format!(
+            "contacts     {collisions}; nearest the arm came to vehicle, obstacles or seafloor: {}",
+            mm(clearance)
+        ));
+    }
+    for line in &summary.calibration.unobservable {
+        lines.push(format!("not known    {line}"));
+    }
+    if let (Some(simulated_s), Some(motion_s)) = (summary.simulated_s, summary.motion_s) {
+        lines.push(format!(
+            "time         {simulated_s:.0} s simulated ({motion_s:.0} s of them moving) in {:.1} s: {:.0} times real time",
+            summary.wall_s,
+            simulated_s / summary.wall_s.max(1e-9)
+        ));
+    }
+    lines
+}
