@@ -1,0 +1,154 @@
+//! The true and the believed arm, the camera's reach, the views taken and the tool's path.
+
+use nalgebra::Vector3;
+use rerun::{LineStrips3D, Points3D};
+
+use super::Run;
+use super::colors;
+use super::rrd::Stream;
+use super::scenery::{BASE, Mover};
+use super::shapes::{Look, fix_shapes, path_part, transform, vector};
+use crate::spatial::{Base, Pose, Tool};
+use crate::streams::{CaptureSet, JointAngles, MarkKind};
+
+/// The tool's path is drawn this far back, s, with so many points a second.
+const TRAIL_S: f64 = 12.0;
+const TRAIL_HZ: f64 = 5.0;
+/// How far the lines of sight at the image's corners are drawn, m.
+const SIGHT_M: f64 = 0.22;
+
+impl Run<'_> {
+    /// The best known joint angles: true, else believed.
+    pub(super) fn shown_angles(&self, time_s: f64) -> Option<JointAngles> {
+        let truth = self.truth.as_ref().and_then(|truth| truth.angles(time_s));
+        truth.or_else(|| self.tracks.believed.at(time_s).copied())
+    }
+
+    /// Where the arm believed its tool to be.
+    pub(super) fn believed_tool(&self, time_s: f64) -> Option<Pose<Base, Tool>> {
+        let angles = self.tracks.believed.at(time_s)?;
+        Some(Pose::from_isometry(self.robot.chain.link_poses(angles).frame(&self.robot.tool.mount)))
+    }
+
+    /// The tool by truth, else as believed.
+    pub(super) fn shown_tool(&self, time_s: f64) -> Option<Pose<Base, Tool>> {
+        let truth = self.truth.as_ref().and_then(|truth| truth.base_from_tool(time_s));
+        truth.or_else(|| self.believed_tool(time_s))
+    }
+
+    /// Whether true joint angles are known.
+    pub(super) fn has_true_joints(&self) -> bool {
+        self.truth.as_ref().is_some_and(|truth| truth.angles(0.0).is_some())
+    }
+
+    /// Whether the tool's true pose is known.
+    pub(super) fn has_true_tool(&self) -> bool {
+        self.truth.as_ref().is_some_and(|truth| truth.base_from_tool(0.0).is_some())
+    }
+}
+
+/// Draws the arms and what belongs to them.
+pub(super) fn draw(run: &Run, stream: &mut Stream) {
+    let mut shown = Arm::new(run, stream, "arm", Look::Drawn);
+    fix_camera(run, stream, &shown);
+    for time_s in run.tracks.frames() {
+        if let Some(angles) = run.shown_angles(time_s) {
+            shown.place(run, stream, time_s, &angles);
+        }
+    }
+    if run.has_true_joints() && !run.tracks.believed.is_empty() {
+        let mut believed = Arm::new(run, stream, "believed_arm", Look::Ghost(colors::GHOST));
+        for time_s in run.tracks.frames() {
+            if let Some(angles) = run.tracks.believed.at(time_s) {
+                believed.place(run, stream, time_s, angles);
+            }
+        }
+    }
+    draw_trail(run, stream);
+    draw_captures(run, stream);
+}
+
+/// One drawn arm: a moving entity for each body.
+struct Arm {
+    bodies: Vec<Mover>,
+}
+
+impl Arm {
+    fn new(run: &Run, stream: &mut Stream, name: &str, look: Look) -> Self {
+        let mut bodies = Vec::new();
+        for (n, body) in run.robot.bodies.iter().enumerate() {
+            let entity = format!("{BASE}/{name}/{n}_{}", path_part(&body.name));
+            // The base does not move in itself: one drawing of it is enough.
+            if n > 0 || matches!(look, Look::Drawn) {
+                fix_shapes(stream, &entity, &body.visuals, look);
+            }
+            bodies.push(Mover::new(entity));
+        }
+        Self { bodies }
+    }
+
+    fn place(&mut self, run: &Run, stream: &mut Stream, time_s: f64, angles: &JointAngles) {
+        let poses = run.robot.chain.link_poses(angles);
+        for (n, body) in self.bodies.iter_mut().enumerate() {
+            body.place(stream, time_s, poses.link(n));
+        }
+    }
+}
+
+/// The camera's lines of sight towards the corners of its image.
+fn fix_camera(run: &Run, stream: &mut Stream, arm: &Arm) {
+    let camera = &run.robot.camera;
+    let Some(carrier) = arm.bodies.get(camera.mount.n_joints) else { return };
+    let entity = format!("{}/camera", carrier.entity());
+    stream.fix(&entity, &transform(&camera.mount.link_from_frame));
+    // The image's corners may lie beyond the field of view: a cone of a narrower angle shows the direction as well.
+    let half_angle_rad = camera.lens.max_view_angle_rad.min(0.6);
+    let rays = [[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]].map(|[x, y]: [f64; 2]| {
+        let across = SIGHT_M * half_angle_rad.tan();
+        vector(&Vector3::new(0.75 * across * x, 0.63 * across * y, SIGHT_M))
+    });
+    let mut strips: Vec<Vec<[f32; 3]>> = rays.iter().map(|ray| vec![[0.0; 3], *ray]).collect();
+    strips.push(vec![rays[0], rays[1], rays[2], rays[3], rays[0]]);
+    let cone = LineStrips3D::new(strips).with_radii([0.003]).with_colors([colors::CAMERA]);
+    stream.fix(&format!("{entity}/view"), &cone);
+}
+
+/// The last seconds of the tool's path.
+fn draw_trail(run: &Run, stream: &mut Stream) {
+    let mut points: Vec<[f32; 3]> = Vec::new();
+    let kept = (TRAIL_S * TRAIL_HZ) as usize;
+    let entity = format!("{BASE}/tool_path");
+    stream.fix(&entity, &LineStrips3D::update_fields().with_radii([0.004]).with_colors([colors::TRAIL]));
+    let mut drawn: Vec<[f32; 3]> = Vec::new();
+    for time_s in run.tracks.ticks(TRAIL_HZ) {
+        let Some(tool) = run.shown_tool(time_s) else { continue };
+        points.push(vector(&tool.origin().vector()));
+        let first = points.len().saturating_sub(kept);
+        // To a tenth of a millimetre, a tool at rest has one point.
+        let mut trail: Vec<[f32; 3]> = points[first..].iter().map(|p| p.map(|v| (v * 1e4).round() / 1e4)).collect();
+        trail.dedup();
+        if trail != drawn {
+            stream.draw(&entity, time_s, &LineStrips3D::update_fields().with_strips([trail.clone()]));
+            drawn = trail;
+        }
+    }
+}
+
+/// Where the camera stood for each view that was taken: one colour for views that are fitted, one for those held out.
+fn draw_captures(run: &Run, stream: &mut Stream) {
+    let (mut places, mut shades) = (Vec::new(), Vec::new());
+    let mut marks: Vec<_> = run.tracks.marks.iter().collect();
+    marks.sort_by(|a, b| a.end_s.total_cmp(&b.end_s));
+    for mark in marks {
+        let MarkKind::Capture { set, .. } = mark.kind else { continue };
+        let Some(angles) = run.shown_angles(mark.end_s) else { continue };
+        let camera = run.robot.chain.link_poses(&angles).frame(&run.robot.camera.mount);
+        places.push(vector(&camera.translation.vector));
+        shades.push(match set {
+            CaptureSet::Fit => colors::FIT_VIEW,
+            CaptureSet::HeldOut => colors::HELD_OUT_VIEW,
+        });
+        let points = Points3D::new(places.iter().copied()).with_colors(shades.iter().copied());
+        stream.draw(&format!("{BASE}/views"), mark.end_s, &points.with_radii([0.02]));
+    }
+}

@@ -1,0 +1,135 @@
+//! The wrist camera's image plane: tags as seen, and where the believed arm expects them.
+
+use nalgebra::{Isometry3, Point3, Vector2, Vector3};
+use rerun::{Image, LineStrips2D, Radius};
+
+use super::Run;
+use super::colors;
+use super::rrd::Stream;
+use crate::optics::Fisheye;
+use crate::robot::SurveyedTag;
+use crate::streams::TagDetection;
+
+/// The image plane's entity; raw pixels.
+pub(super) const CAMERA: &str = "/camera";
+
+/// The image is drawn at most this often.
+const VIEWS_HZ: f64 = 12.5;
+/// Without a new frame for this long, what was seen is taken down, s.
+const STALE_S: f64 = 0.6;
+/// Rerun has a pixel's corner at whole numbers, the lens its centre.
+const PIXEL_CENTER: f32 = 0.5;
+/// Bearings whose circles are drawn, rad.
+const RINGS_RAD: [f64; 2] = [std::f64::consts::FRAC_PI_6, std::f64::consts::FRAC_PI_3];
+
+/// Draws the image plane.
+pub(super) fn draw(run: &Run, stream: &mut Stream) {
+    let lens = &run.robot.camera.lens;
+    let [width, height] = lens.resolution_px;
+    stream.fix(&format!("{CAMERA}/background"), &Image::from_rgb24(background(lens), [width, height]));
+    let rings = LineStrips2D::new(RINGS_RAD.iter().map(|&angle_rad| ring(lens, angle_rad)));
+    stream.fix(&format!("{CAMERA}/rings"), &rings.with_radii([0.7]).with_colors([[52, 76, 96, 255]]));
+    draw_expected(run, stream);
+    draw_seen(run, stream);
+}
+
+/// Dark water inside of the field of view, black outside.
+fn background(lens: &Fisheye) -> Vec<u8> {
+    let [width, height] = lens.resolution_px;
+    let mut pixels = Vec::with_capacity(3 * width as usize * height as usize);
+    for y in 0..height {
+        for x in 0..width {
+            let inside = lens.unproject(&Vector2::new(f64::from(x), f64::from(y))).is_some();
+            pixels.extend_from_slice(if inside { &[18, 34, 48] } else { &[4, 5, 6] });
+        }
+    }
+    pixels
+}
+
+/// The circle of all bearings at an angle from the optical axis.
+fn ring(lens: &Fisheye, angle_rad: f64) -> Vec<[f32; 2]> {
+    let around = (0..=96).map(|n| f64::from(n) * std::f64::consts::TAU / 96.0);
+    let bearings = around.map(|a| Vector3::new(angle_rad.sin() * a.cos(), angle_rad.sin() * a.sin(), angle_rad.cos()));
+    bearings.filter_map(|bearing| lens.project(&bearing)).map(|pixel| corner(pixel.into())).collect()
+}
+
+fn corner([x, y]: [f64; 2]) -> [f32; 2] {
+    [x as f32 + PIXEL_CENTER, y as f32 + PIXEL_CENTER]
+}
+
+/// The tags that were seen, until frames stop coming.
+fn draw_seen(run: &Run, stream: &mut Stream) {
+    let entity = format!("{CAMERA}/seen");
+    let style = LineStrips2D::update_fields().with_radii([Radius::new_ui_points(1.5)]).with_colors([colors::SEEN]);
+    stream.fix(&entity, &style.with_show_labels(true).with_draw_order(30.0));
+    let mut views = run.tracks.views.clone();
+    views.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut drawn: Option<f64> = None;
+    for (n, (time_s, view)) in views.iter().enumerate() {
+        // Two frames of one moment: the later one stands.
+        let next_s = views.get(n + 1).map_or(f64::INFINITY, |(next_s, _)| *next_s);
+        let is_last_for_long = next_s - time_s > STALE_S;
+        if drawn.is_some_and(|last_s| time_s - last_s < 1.0 / VIEWS_HZ) && !is_last_for_long {
+            continue;
+        }
+        stream.draw(&entity, *time_s, &quads(view.tags.iter().map(seen_quad)));
+        drawn = Some(*time_s);
+        if is_last_for_long && time_s + STALE_S < run.tracks.duration_s {
+            stream.draw(&entity, time_s + STALE_S, &quads(std::iter::empty()));
+        }
+    }
+}
+
+/// A closed outline and what stands beside it.
+type Quad = (Vec<[f32; 2]>, String);
+
+fn seen_quad(tag: &TagDetection) -> Quad {
+    (closed(tag.corners_px.map(corner)), format!("{}", tag.id))
+}
+
+fn closed(corners: [[f32; 2]; 4]) -> Vec<[f32; 2]> {
+    corners.into_iter().chain([corners[0]]).collect()
+}
+
+fn quads(quads: impl Iterator<Item = Quad>) -> LineStrips2D {
+    let (strips, labels): (Vec<_>, Vec<_>) = quads.unzip();
+    LineStrips2D::update_fields().with_strips(strips).with_labels(labels)
+}
+
+/// Where the believed arm expects the surveyed tags.
+fn draw_expected(run: &Run, stream: &mut Stream) {
+    let entity = format!("{CAMERA}/expected");
+    let style = LineStrips2D::update_fields().with_radii([Radius::new_ui_points(1.0)]).with_colors([colors::BELIEVED]);
+    stream.fix(&entity, &style.with_draw_order(20.0));
+    let mut drawn: Option<Vec<Vec<[f32; 2]>>> = None;
+    for time_s in run.tracks.ticks(VIEWS_HZ) {
+        let Some(angles) = run.tracks.believed.at(time_s) else { continue };
+        let base_from_camera = run.robot.chain.link_poses(angles).frame(&run.robot.camera.mount);
+        let strips: Vec<_> =
+            run.robot.tags.iter().filter_map(|tag| expected_outline(run, &base_from_camera, tag)).collect();
+        if drawn.as_ref() != Some(&strips) {
+            stream.draw(&entity, time_s, &LineStrips2D::update_fields().with_strips(strips.clone()));
+            drawn = Some(strips);
+        }
+    }
+}
+
+/// The outline of a tag in the image, rounded to a tenth of a pixel; `None` if the camera cannot see it.
+fn expected_outline(run: &Run, base_from_camera: &Isometry3<f64>, tag: &SurveyedTag) -> Option<Vec<[f32; 2]>> {
+    let lens = &run.robot.camera.lens;
+    let camera_from_tag = base_from_camera.inv_mul(tag.base_from_tag.isometry());
+    let normal = camera_from_tag.rotation * Vector3::z();
+    if normal.dot(&camera_from_tag.translation.vector) >= 0.0 {
+        return None;
+    }
+    let mut outline = [[0.0; 2]; 4];
+    for (pixel, point) in outline.iter_mut().zip(crate::optics::square_corners(tag.size_m)) {
+        let in_camera: Point3<f64> = camera_from_tag * point;
+        let projected = lens.project(&in_camera.coords)?;
+        if !lens.contains(&projected) {
+            return None;
+        }
+        *pixel = corner(projected.into()).map(|v| (v * 10.0).round() / 10.0);
+    }
+    Some(closed(outline))
+}

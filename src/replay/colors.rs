@@ -1,0 +1,43 @@
+//! The colours, chosen to be told apart on a dark ground and by most colour-blind eyes.
+
+/// Red, green, blue, opacity.
+pub(super) type Rgba = [u8; 4];
+
+/// Deep water behind the scene.
+pub(super) const WATER: Rgba = [16, 30, 44, 255];
+pub(super) const SEAFLOOR: Rgba = [92, 84, 66, 255];
+/// The arm as believed, drawn through the true one.
+pub(super) const GHOST: Rgba = [255, 60, 220, 110];
+pub(super) const BELIEVED: Rgba = [255, 90, 225, 255];
+/// What the camera measured.
+pub(super) const SEEN: Rgba = [60, 230, 120, 255];
+/// The lens's reach into the scene and in the image.
+pub(super) const CAMERA: Rgba = [70, 200, 255, 255];
+pub(super) const TARGET: Rgba = [255, 205, 60, 255];
+pub(super) const HIT: Rgba = [60, 220, 90, 255];
+pub(super) const MISS: Rgba = [255, 70, 60, 255];
+/// The first attempts, once later ones are there.
+pub(super) const PAST: Rgba = [150, 110, 105, 255];
+pub(super) const TRAIL: Rgba = [240, 240, 245, 255];
+pub(super) const FIT_VIEW: Rgba = [90, 150, 255, 255];
+pub(super) const HELD_OUT_VIEW: Rgba = [255, 170, 60, 255];
+pub(super) const BASE_TAG: Rgba = [70, 140, 255, 255];
+pub(super) const OIL: Rgba = [255, 150, 60, 255];
+pub(super) const COLD: Rgba = [90, 170, 255, 255];
+
+/// One colour a joint, base first.
+pub(super) const JOINTS: [Rgba; crate::streams::MAX_JOINTS] = [
+    [240, 90, 80, 255],
+    [255, 175, 60, 255],
+    [240, 230, 90, 255],
+    [90, 210, 110, 255],
+    [80, 180, 255, 255],
+    [190, 130, 255, 255],
+    [255, 130, 200, 255],
+    [200, 200, 200, 255],
+];
+
+/// The same hue, darker.
+pub(super) fn dimmed([r, g, b, a]: Rgba) -> Rgba {
+    [r / 2, g / 2, b / 2, a]
+}

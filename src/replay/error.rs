@@ -1,0 +1,30 @@
+//! Why a recording cannot be shown.
+
+use std::path::PathBuf;
+
+use rerun::external::re_log_encoding::EncodeError;
+
+use crate::log::{CdrError, LogError};
+
+/// Why no .rrd was written.
+#[derive(Debug, thiserror::Error)]
+pub enum ReplayError {
+    #[error("{}: the recording has no messages, there is nothing to show", path.display())]
+    Empty { path: PathBuf },
+    #[error("{}: the recording has {got} joints, the robot `{robot}` has {expected}", path.display())]
+    JointCount { path: PathBuf, robot: String, got: usize, expected: usize },
+    #[error("{}: the recording spans {got_s:.0} s; the viewer shows at most {limit_s:.0} s", path.display())]
+    TooLong { path: PathBuf, got_s: f64, limit_s: f64 },
+    #[error(transparent)]
+    Truth(#[from] LogError),
+    #[error("{}: no topic begins with /truth/; is it a truth file?", path.display())]
+    NoTruth { path: PathBuf },
+    #[error("{}: topic {topic}: {source}", path.display())]
+    TruthMessage { path: PathBuf, topic: String, source: CdrError },
+    #[error("{}: topic {topic}: joints {got:?}, the robot has {expected:?}", path.display())]
+    TruthJoints { path: PathBuf, topic: String, got: Vec<String>, expected: Vec<String> },
+    #[error("{}: cannot be written: {source}", path.display())]
+    Create { path: PathBuf, source: std::io::Error },
+    #[error("{}: cannot be written: {source}", path.display())]
+    Encode { path: PathBuf, source: EncodeError },
+}

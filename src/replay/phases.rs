@@ -1,0 +1,136 @@
+//! What the arm was doing, as lanes of states, and the log.
+
+use std::collections::BTreeMap;
+
+use rerun::{StateChange, StateConfiguration, TextLog, TextLogLevel};
+
+use super::Run;
+use super::colors::{self, Rgba};
+use super::rrd::Stream;
+use super::shapes::path_part;
+use super::tracks::Span;
+use crate::streams::{CaptureSet, LogLevel, MarkKind, Phase, ReachAttempt};
+
+pub(super) const STATE: &str = "/state";
+pub(super) const LOG: &str = "/log";
+
+/// Draws the lanes and the log.
+pub(super) fn draw(run: &Run, stream: &mut Stream) {
+    draw_phases(run, stream);
+    draw_lane(run, stream, "views", view_state);
+    draw_lane(run, stream, "reach", reach_state);
+    draw_log(run, stream);
+}
+
+fn draw_phases(run: &Run, stream: &mut Stream) {
+    const PHASES: [(Phase, &str, Rgba); 7] = [
+        (Phase::Plan, "plan", [130, 130, 150, 255]),
+        (Phase::Move, "move", [80, 120, 200, 255]),
+        (Phase::Settle, "settle", [70, 160, 170, 255]),
+        (Phase::Capture, "capture", [70, 170, 90, 255]),
+        (Phase::Calibrate, "calibrate", [200, 80, 190, 255]),
+        (Phase::Reach, "reach", [215, 150, 50, 255]),
+        (Phase::Done, "done", [110, 110, 110, 255]),
+    ];
+    let entity = format!("{STATE}/phase");
+    let look = StateConfiguration::new().with_values(PHASES.map(|(_, name, _)| name));
+    stream.fix(&entity, &look.with_colors(PHASES.map(|(_, _, color)| color)));
+    let mut shown = None;
+    for mark in &run.tracks.marks {
+        let MarkKind::Phase(phase) = mark.kind else { continue };
+        let name = PHASES.iter().find(|(other, ..)| *other == phase).map(|(_, name, _)| *name);
+        if let Some(name) = name.filter(|_| shown != Some(phase)) {
+            stream.draw(&entity, mark.start_s, &StateChange::single(name));
+            shown = Some(phase);
+        }
+    }
+}
+
+/// What a lane says of a mark.
+struct State {
+    /// Tells it from the lane's other states.
+    name: String,
+    /// What is written on it, short because spans are.
+    label: String,
+    color: Rgba,
+}
+
+fn view_state(_: &Run, mark: &Span) -> Option<State> {
+    let MarkKind::Capture { set, pose_idx } = mark.kind else { return None };
+    let (set, color) = match set {
+        CaptureSet::Fit => ("to fit", colors::FIT_VIEW),
+        CaptureSet::HeldOut => ("held out", colors::HELD_OUT_VIEW),
+    };
+    let n = u64::from(pose_idx) + 1;
+    Some(State { name: format!("view {n}, {set}"), label: n.to_string(), color: colors::dimmed(color) })
+}
+
+fn reach_state(run: &Run, mark: &Span) -> Option<State> {
+    let MarkKind::Reach { attempt, target_idx } = mark.kind else { return None };
+    let when = match attempt {
+        ReachAttempt::Before => "before",
+        ReachAttempt::After => "after",
+    };
+    let (verdict, color) = match run.arrival(mark) {
+        None => ("reached for", colors::TARGET),
+        Some(arrival) if arrival.hit => ("hit", colors::HIT),
+        Some(_) => ("missed", colors::MISS),
+    };
+    let n = u64::from(target_idx) + 1;
+    let name = format!("target {n} {verdict}, {when} calibration");
+    Some(State { name, label: n.to_string(), color: colors::dimmed(color) })
+}
+
+/// A lane with a state for each mark that `state` knows, and gaps between them.
+fn draw_lane(run: &Run, stream: &mut Stream, name: &str, state: fn(&Run, &Span) -> Option<State>) {
+    let spans: Vec<_> =
+        run.tracks.marks.iter().filter_map(|mark| Some((mark.start_s, mark.end_s, state(run, mark)?))).collect();
+    if spans.is_empty() {
+        return;
+    }
+    let entity = format!("{STATE}/{name}");
+    let looks: BTreeMap<&str, &State> = spans.iter().map(|(_, _, state)| (state.name.as_str(), state)).collect();
+    let look = StateConfiguration::new().with_values(looks.keys().copied());
+    let look = look.with_labels(looks.values().map(|state| state.label.as_str()));
+    stream.fix(&entity, &look.with_colors(looks.values().map(|state| state.color)));
+    for (n, (start_s, end_s, state)) in spans.iter().enumerate() {
+        stream.draw(&entity, *start_s, &StateChange::single(state.name.as_str()));
+        let next_s = spans.get(n + 1).map_or(f64::INFINITY, |(next_s, ..)| *next_s);
+        if *end_s < next_s && end_s > start_s {
+            // An empty state is a gap.
+            stream.draw(&entity, *end_s, &StateChange::single(""));
+        }
+    }
+}
+
+/// The log's lines by their senders, and a line for each arrival.
+fn draw_log(run: &Run, stream: &mut Stream) {
+    let mut lines: Vec<(f64, String, TextLog)> = Vec::new();
+    for (time_s, line) in &run.tracks.log {
+        let level = match line.level {
+            LogLevel::Debug => TextLogLevel::DEBUG,
+            LogLevel::Info => TextLogLevel::INFO,
+            LogLevel::Warn => TextLogLevel::WARN,
+            LogLevel::Error => TextLogLevel::ERROR,
+        };
+        lines.push((*time_s, path_part(&line.name), TextLog::new(line.text.as_str()).with_level(level)));
+    }
+    for arrival in run.arrivals() {
+        let when = match arrival.attempt {
+            ReachAttempt::Before => "before",
+            ReachAttempt::After => "after",
+        };
+        let verdict = if arrival.hit { "hit" } else { "missed" };
+        let text = format!(
+            "{when} calibration: target {} {verdict}, tool rests {:.1} mm away",
+            arrival.target_idx + 1,
+            1000.0 * arrival.miss_m
+        );
+        lines.push((arrival.time_s, "truth".to_owned(), TextLog::new(text).with_level(TextLogLevel::INFO)));
+    }
+    lines.sort_by(|a, b| a.0.total_cmp(&b.0));
+    for (time_s, sender, line) in lines {
+        let sender = if sender.is_empty() { "run" } else { sender.as_str() };
+        stream.draw(&format!("{LOG}/{sender}"), time_s, &line);
+    }
+}

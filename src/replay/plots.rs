@@ -1,0 +1,136 @@
+//! Scalars over time.
+
+use rerun::components::MarkerShape;
+use rerun::{Scalars, SeriesLines, SeriesPoints};
+
+use super::Run;
+use super::colors::{self, Rgba};
+use super::rrd::Stream;
+use crate::streams::{JointAngles, ReachAttempt};
+
+pub(super) const JOINT_ERROR: &str = "/plots/joint_error";
+pub(super) const JOINT_ANGLE: &str = "/plots/joint_angle";
+pub(super) const TOOL_ERROR: &str = "/plots/tool_error";
+pub(super) const TEMPERATURE: &str = "/plots/temperature";
+pub(super) const COUNTS: &str = "/plots/counts";
+
+/// Samples of what moves, and of what does not, a second.
+const FAST_HZ: f64 = 12.5;
+const SLOW_HZ: f64 = 2.0;
+
+/// Draws all plots.
+pub(super) fn draw(run: &Run, stream: &mut Stream) {
+    draw_angles(run, stream);
+    draw_joint_error(run, stream);
+    draw_tool_error(run, stream);
+    draw_temperatures(run, stream);
+    let names = run.robot.joint_names();
+    style(stream, COUNTS, &names, &colors::JOINTS, 1.2);
+    for time_s in run.tracks.ticks(FAST_HZ) {
+        if let Some(counts) = run.tracks.counts.at(time_s) {
+            stream.draw(COUNTS, time_s, &Scalars::new(counts.iter().copied()));
+        }
+    }
+}
+
+fn style(stream: &mut Stream, entity: &str, names: &[String], shades: &[Rgba], width: f32) {
+    let shades = shades.iter().copied().take(names.len());
+    let lines = SeriesLines::new().with_names(names.iter().map(String::as_str)).with_colors(shades);
+    stream.fix(entity, &lines.with_widths(names.iter().map(|_| width)));
+}
+
+/// What is believed as bright lines, what is true as dark ones of the same colours.
+fn draw_angles(run: &Run, stream: &mut Stream) {
+    let names = run.robot.joint_names();
+    let (believed, truth) = (format!("{JOINT_ANGLE}/believed"), format!("{JOINT_ANGLE}/true"));
+    if run.has_true_joints() {
+        let true_names: Vec<String> = names.iter().map(|name| format!("{name} (true)")).collect();
+        style(stream, &truth, &true_names, &colors::JOINTS.map(colors::dimmed), 2.5);
+    }
+    style(stream, &believed, &names, &colors::JOINTS, 1.2);
+    for time_s in run.tracks.ticks(FAST_HZ) {
+        if let Some(angles) = run.tracks.believed.at(time_s) {
+            stream.draw(&believed, time_s, &degrees(angles));
+        }
+        if let Some(angles) = run.truth.as_ref().and_then(|truth| truth.angles(time_s)) {
+            stream.draw(&truth, time_s, &degrees(&angles));
+        }
+    }
+}
+
+fn degrees(angles: &JointAngles) -> Scalars {
+    Scalars::new(angles.iter().map(|angle_rad| angle_rad.to_degrees()))
+}
+
+/// Believed - true, by the shorter way round, at the moments of the belief so that motion adds nothing.
+fn draw_joint_error(run: &Run, stream: &mut Stream) {
+    let Some(truth) = run.truth.as_ref().filter(|_| run.has_true_joints()) else { return };
+    style(stream, JOINT_ERROR, &run.robot.joint_names(), &colors::JOINTS, 1.5);
+    let mut next_s = 0.0;
+    for (time_s, believed) in run.tracks.believed.iter() {
+        if *time_s < next_s {
+            continue;
+        }
+        next_s = time_s + 0.9 / FAST_HZ;
+        if let Some(angles) = truth.angles(*time_s) {
+            let difference = |j: usize| (believed[j] - angles[j]).to_degrees();
+            let errors = (0..believed.len()).map(|j| (difference(j) + 180.0).rem_euclid(360.0) - 180.0);
+            stream.draw(JOINT_ERROR, *time_s, &Scalars::new(errors));
+        }
+    }
+}
+
+/// How far the believed tool is from the true one, and what each arrival missed its target by, mm.
+fn draw_tool_error(run: &Run, stream: &mut Stream) {
+    if !run.has_true_tool() {
+        return;
+    }
+    let name = "believed tool to true tool".to_owned();
+    let believed = format!("{TOOL_ERROR}/believed");
+    style(stream, &believed, &[name], &[colors::BELIEVED], 1.5);
+    let mut next_s = 0.0;
+    for (time_s, angles) in run.tracks.believed.iter() {
+        if *time_s < next_s {
+            continue;
+        }
+        next_s = time_s + 0.9 / FAST_HZ;
+        let Some(truth) = run.truth.as_ref().and_then(|truth| truth.base_from_tool(*time_s)) else { continue };
+        let tool = run.robot.chain.link_poses(angles).frame(&run.robot.tool.mount);
+        let error_m = (tool.translation.vector - truth.origin().vector()).norm();
+        stream.draw(&believed, *time_s, &Scalars::single(1000.0 * error_m));
+    }
+    let Some((since_s, task)) = run.tracks.task else { return };
+    let tolerance = format!("{TOOL_ERROR}/tolerance");
+    style(stream, &tolerance, &["tolerance".to_owned()], &[colors::HIT], 1.0);
+    for time_s in [since_s, run.tracks.duration_s] {
+        stream.draw(&tolerance, time_s, &Scalars::single(1000.0 * task.tolerance_m));
+    }
+    for (attempt, name, shade, marker) in [
+        (ReachAttempt::Before, "before", colors::MISS, MarkerShape::Cross),
+        (ReachAttempt::After, "after", colors::TARGET, MarkerShape::Diamond),
+    ] {
+        let arrivals: Vec<_> = run.arrivals().into_iter().filter(|arrival| arrival.attempt == attempt).collect();
+        if arrivals.is_empty() {
+            continue;
+        }
+        let entity = format!("{TOOL_ERROR}/{name}");
+        let points = SeriesPoints::new().with_names([format!("miss at target, {name}")]).with_colors([shade]);
+        stream.fix(&entity, &points.with_markers([marker]).with_marker_sizes([5.0]));
+        for arrival in arrivals {
+            stream.draw(&entity, arrival.time_s, &Scalars::single(1000.0 * arrival.miss_m));
+        }
+    }
+}
+
+fn draw_temperatures(run: &Run, stream: &mut Stream) {
+    let tracks = [("oil", &run.tracks.oil_c, colors::OIL), ("water", &run.tracks.water_c, colors::COLD)];
+    for (name, track, shade) in tracks.into_iter().filter(|(_, track, _)| !track.is_empty()) {
+        let entity = format!("{TEMPERATURE}/{name}");
+        style(stream, &entity, &[name.to_owned()], &[shade], 1.5);
+        for time_s in run.tracks.ticks(SLOW_HZ) {
+            if let Some(value_c) = track.at(time_s) {
+                stream.draw(&entity, time_s, &Scalars::single(*value_c));
+            }
+        }
+    }
+}

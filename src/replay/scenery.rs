@@ -1,0 +1,120 @@
+//! What stands still about the arm: seafloor, obstacles, vehicle and tags; and how the vehicle moves.
+
+use nalgebra::{Isometry3, Translation3};
+use rerun::{Boxes3D, FillMode, Points3D, ViewCoordinates};
+
+use super::Run;
+use super::colors;
+use super::rrd::Stream;
+use super::shapes::{Look, fix_shapes, quaternion, transform, vector};
+use crate::robot::SurveyedTag;
+use crate::spatial::{Pose, Vehicle, World};
+
+/// Entities that carry the frames.
+pub(super) const WORLD: &str = "/world";
+pub(super) const VEHICLE: &str = "/world/vehicle";
+pub(super) const BASE: &str = "/world/vehicle/base";
+
+/// Half of the seafloor that is drawn, m.
+const SEAFLOOR_HALF_M: f64 = 8.0;
+/// Movements below these are not drawn again.
+const SAME_M: f64 = 2e-5;
+const SAME_RAD: f64 = 2e-5;
+
+impl Run<'_> {
+    /// Where the vehicle was: by truth, else turned as its attitude sensor says, else at rest.
+    pub(super) fn world_from_vehicle(&self, time_s: f64) -> Pose<World, Vehicle> {
+        let measured = || {
+            let turn = self.tracks.attitude.at(time_s)?;
+            Some(Pose::from_isometry(Isometry3::from_parts(Translation3::identity(), *turn)))
+        };
+        let truth = self.truth.as_ref().and_then(|truth| truth.world_from_vehicle(time_s));
+        truth.or_else(measured).unwrap_or_else(Pose::identity)
+    }
+}
+
+/// An entity that moves; what stands still is not drawn again.
+pub(super) struct Mover {
+    entity: String,
+    last: Option<Isometry3<f64>>,
+}
+
+impl Mover {
+    pub fn new(entity: String) -> Self {
+        Self { entity, last: None }
+    }
+
+    pub fn entity(&self) -> &str {
+        &self.entity
+    }
+
+    /// Draws the pose that the entity has in its parent from `time_s` on.
+    pub fn place(&mut self, stream: &mut Stream, time_s: f64, pose: &Isometry3<f64>) {
+        let same = self.last.is_some_and(|last| {
+            (last.translation.vector - pose.translation.vector).norm() < SAME_M
+                && last.rotation.angle_to(&pose.rotation) < SAME_RAD
+        });
+        if !same {
+            stream.draw(&self.entity, time_s, &transform(pose));
+            self.last = Some(*pose);
+        }
+    }
+}
+
+/// Draws the scenery.
+pub(super) fn draw(run: &Run, stream: &mut Stream) {
+    stream.fix(WORLD, &ViewCoordinates::RIGHT_HAND_Z_UP());
+    draw_site(run, stream);
+    let mut mover = Mover::new(VEHICLE.to_owned());
+    for time_s in run.tracks.frames() {
+        mover.place(stream, time_s, run.world_from_vehicle(time_s).isometry());
+    }
+    if let Some(vehicle) = run.vehicle {
+        let parts = vehicle.parts.iter().map(|part| &part.placed);
+        fix_shapes(stream, &format!("{VEHICLE}/body"), parts, Look::Drawn);
+        stream.fix(BASE, &transform(vehicle.vehicle_from_base.isometry()));
+    }
+    draw_tags(run, stream);
+}
+
+fn draw_site(run: &Run, stream: &mut Stream) {
+    let Some(scene) = run.scene else { return };
+    if let Some(z_m) = scene.seafloor_z_m {
+        let half_m = [SEAFLOOR_HALF_M as f32, SEAFLOOR_HALF_M as f32, 0.02];
+        let floor = Boxes3D::from_centers_and_half_sizes([[0.0, 0.0, z_m as f32 - half_m[2]]], [half_m]);
+        let floor = floor.with_colors([colors::SEAFLOOR]).with_fill_mode(FillMode::Solid);
+        stream.fix(&format!("{WORLD}/seafloor"), &floor);
+    }
+    let obstacles = scene.obstacles.iter().map(|part| &part.placed);
+    fix_shapes(stream, &format!("{WORLD}/obstacles"), obstacles, Look::Drawn);
+}
+
+/// Each tag as a white plate with a black square and a white middle; the base tag's plate is blue.
+fn draw_tags(run: &Run, stream: &mut Stream) {
+    let tags = &run.robot.tags;
+    if tags.is_empty() {
+        return;
+    }
+    let layers = [(1.25, 0.0), (1.0, 0.002), (0.5, 0.004)];
+    let (mut centers, mut sizes, mut turns, mut shades) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    for tag in tags {
+        let plate = if tag.id == run.robot.base_tag { colors::BASE_TAG } else { [245, 245, 245, 255] };
+        let fills = [plate, [15, 15, 15, 255], plate];
+        for ((share, height_m), fill) in layers.into_iter().zip(fills) {
+            let place = tag.base_from_tag.isometry() * Translation3::new(0.0, 0.0, height_m);
+            centers.push(vector(&place.translation.vector));
+            turns.push(quaternion(&place.rotation));
+            let half_m = (0.5 * share * tag.size_m) as f32;
+            sizes.push([half_m, half_m, 0.001]);
+            shades.push(fill);
+        }
+    }
+    let plates = Boxes3D::from_centers_and_half_sizes(centers, sizes).with_quaternions(turns);
+    stream.fix(&format!("{BASE}/tags"), &plates.with_colors(shades).with_fill_mode(FillMode::Solid));
+    let label = |tag: &SurveyedTag| {
+        if tag.id == run.robot.base_tag { format!("base tag {}", tag.id) } else { format!("tag {}", tag.id) }
+    };
+    let anchors = tags.iter().map(|tag| vector(&tag.base_from_tag.origin().vector()));
+    let anchors = Points3D::new(anchors).with_radii([0.004]).with_labels(tags.iter().map(label));
+    stream.fix(&format!("{BASE}/tags/ids"), &anchors.with_show_labels(true).with_colors([[225, 225, 225, 255]]));
+}

@@ -1,0 +1,119 @@
+//! Primitives and poses in Rerun's terms.
+
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use rerun::{Boxes3D, Capsules3D, Cylinders3D, Ellipsoids3D, FillMode, Transform3D};
+
+use super::colors::Rgba;
+use super::rrd::Stream;
+use crate::robot::{PlacedShape, Shape};
+
+/// How a body looks.
+#[derive(Clone, Copy)]
+pub(super) enum Look {
+    /// In the colours of its drawing.
+    Drawn,
+    /// See-through, in one colour.
+    Ghost(Rgba),
+}
+
+/// One batch of shapes of a kind.
+#[derive(Default)]
+struct Batch {
+    sizes: Vec<[f32; 3]>,
+    places: Vec<Isometry3<f64>>,
+    colors: Vec<Rgba>,
+}
+
+impl Batch {
+    fn push(&mut self, size: [f64; 3], place: Isometry3<f64>, color: Rgba) {
+        self.sizes.push(size.map(|v| v as f32));
+        self.places.push(place);
+        self.colors.push(color);
+    }
+
+    fn centers(&self) -> Vec<[f32; 3]> {
+        self.places.iter().map(|place| vector(&place.translation.vector)).collect()
+    }
+
+    fn turns(&self) -> Vec<rerun::Quaternion> {
+        self.places.iter().map(|place| quaternion(&place.rotation)).collect()
+    }
+
+    fn lengths(&self) -> Vec<f32> {
+        self.sizes.iter().map(|size| size[2]).collect()
+    }
+
+    fn radii(&self) -> Vec<f32> {
+        self.sizes.iter().map(|size| size[0]).collect()
+    }
+}
+
+/// Draws shapes, fixed in the frame of `entity`, under it.
+pub(super) fn fix_shapes<'a>(
+    stream: &mut Stream,
+    entity: &str,
+    shapes: impl IntoIterator<Item = &'a PlacedShape>,
+    look: Look,
+) {
+    let [mut boxes, mut cylinders, mut capsules, mut balls] = [(); 4].map(|()| Batch::default());
+    for placed in shapes {
+        let [r, g, b] = placed.color_rgb;
+        let color = match look {
+            Look::Drawn => [r, g, b, 255],
+            Look::Ghost(color) => color,
+        };
+        let place = placed.owner_from_shape;
+        match placed.shape {
+            Shape::Box { size_m } => boxes.push(size_m.map(|v| 0.5 * v), place, color),
+            Shape::Cylinder { radius_m, length_m } => cylinders.push([radius_m, radius_m, length_m], place, color),
+            Shape::Capsule { radius_m, length_m } => {
+                // Rerun's capsule begins at its origin, ours has its centre there.
+                let begin = place * Translation3::new(0.0, 0.0, -0.5 * length_m);
+                capsules.push([radius_m, radius_m, length_m], begin, color);
+            }
+            Shape::Sphere { radius_m } => balls.push([radius_m; 3], place, color),
+        }
+    }
+    let fill = match look {
+        Look::Drawn => FillMode::Solid,
+        Look::Ghost(_) => FillMode::TransparentFillMajorWireframe,
+    };
+    if !boxes.sizes.is_empty() {
+        let shown = Boxes3D::from_centers_and_half_sizes(boxes.centers(), boxes.sizes.iter().copied());
+        let shown = shown.with_quaternions(boxes.turns()).with_colors(boxes.colors).with_fill_mode(fill);
+        stream.fix(&format!("{entity}/boxes"), &shown);
+    }
+    if !cylinders.sizes.is_empty() {
+        let shown = Cylinders3D::from_lengths_and_radii(cylinders.lengths(), cylinders.radii());
+        let shown = shown.with_centers(cylinders.centers()).with_quaternions(cylinders.turns());
+        stream.fix(&format!("{entity}/cylinders"), &shown.with_colors(cylinders.colors).with_fill_mode(fill));
+    }
+    if !capsules.sizes.is_empty() {
+        let shown = Capsules3D::from_lengths_and_radii(capsules.lengths(), capsules.radii());
+        let shown = shown.with_translations(capsules.centers()).with_quaternions(capsules.turns());
+        stream.fix(&format!("{entity}/capsules"), &shown.with_colors(capsules.colors).with_fill_mode(fill));
+    }
+    if !balls.sizes.is_empty() {
+        let shown = Ellipsoids3D::from_centers_and_radii(balls.centers(), balls.radii());
+        stream.fix(&format!("{entity}/balls"), &shown.with_colors(balls.colors).with_fill_mode(fill));
+    }
+}
+
+/// Single precision, as Rerun has it.
+pub(super) fn vector(v: &Vector3<f64>) -> [f32; 3] {
+    [v.x as f32, v.y as f32, v.z as f32]
+}
+
+pub(super) fn quaternion(q: &UnitQuaternion<f64>) -> rerun::Quaternion {
+    rerun::Quaternion::from_xyzw([q.i as f32, q.j as f32, q.k as f32, q.w as f32])
+}
+
+/// The pose of an entity in its parent.
+pub(super) fn transform(pose: &Isometry3<f64>) -> Transform3D {
+    Transform3D::from_translation_rotation(vector(&pose.translation.vector), quaternion(&pose.rotation))
+}
+
+/// A name as one part of an entity's path.
+pub(super) fn path_part(name: &str) -> String {
+    name.chars().map(|c| if c.is_ascii_alphanumeric() || c == '_' || c == '-' { c } else { '_' }).collect()
+}

@@ -1,0 +1,70 @@
+//! A page of text: the run's own summary, or what the recording holds; then how to read the picture.
+
+use std::fmt::Write;
+
+use rerun::TextDocument;
+
+use super::rrd::Stream;
+use super::{ReplayInput, Run};
+use crate::log::Completeness;
+use crate::streams::ReachAttempt;
+
+pub(super) const SUMMARY: &str = "/summary";
+
+/// Draws the page.
+pub(super) fn draw(run: &Run, input: &ReplayInput, stream: &mut Stream) {
+    let text = match input.summary_markdown {
+        Some(text) => format!("{}\n\n{}", text.trim_end(), legend(run)),
+        None => format!("{}\n{}", contents(run, input), legend(run)),
+    };
+    stream.fix(SUMMARY, &TextDocument::from_markdown(text));
+}
+
+fn contents(run: &Run, input: &ReplayInput) -> String {
+    let recording = input.recording;
+    let mut text = format!("# {}\n\n", run.robot.name);
+    // Writing to a String cannot fail.
+    let _ = writeln!(text, "- {:.0} s, {} messages", run.tracks.duration_s, recording.messages.len());
+    if recording.completeness != Completeness::Whole {
+        let _ = writeln!(text, "- **the recording is cut or damaged**: something of it is missing");
+    }
+    let rejected: u64 = recording.rejected.values().sum();
+    if rejected > 0 {
+        let _ = writeln!(text, "- {rejected} messages were unusable");
+    }
+    if let Some((_, task)) = run.tracks.task {
+        let arrivals = run.arrivals();
+        for (attempt, name) in [(ReachAttempt::Before, "before"), (ReachAttempt::After, "after")] {
+            let of_attempt: Vec<_> = arrivals.iter().filter(|arrival| arrival.attempt == attempt).collect();
+            let hits = of_attempt.iter().filter(|arrival| arrival.hit).count();
+            if !of_attempt.is_empty() {
+                let (n, tolerance_mm) = (of_attempt.len(), 1000.0 * task.tolerance_m);
+                let _ =
+                    writeln!(text, "- reached {name} calibration: {hits} of {n} targets within {tolerance_mm:.0} mm");
+            }
+        }
+    }
+    text
+}
+
+fn legend(run: &Run) -> String {
+    let arms = if run.has_true_joints() {
+        "- solid arm: where it truly is; **pink ghost**: where it believes to be\n"
+    } else {
+        "- arm: where it believes to be (this recording has no truth)\n"
+    };
+    let rests = if run.has_true_tool() {
+        "; a line leads to where the tool truly came to rest (red missed, green hit, grey: before calibration), \
+         labels say by how much"
+    } else {
+        ""
+    };
+    format!(
+        "### How to read the picture\n\n{arms}\
+         - numbered yellow balls: targets{rests}\n\
+         - white line: the tool's last seconds; blue cone: the camera's line of sight\n\
+         - blue and orange dots: where views were taken to fit and to check the calibration\n\
+         - camera: **green** outlines are tags as seen, **pink** ones are where the believed arm expects them; \
+         they agree once the calibration is right. Circles: 30 and 60 degrees off axis\n"
+    )
+}

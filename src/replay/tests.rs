@@ -1,0 +1,294 @@
+//! A small made-up run, shown.
+
+use std::path::{Path, PathBuf};
+
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+
+use super::*;
+use crate::kinematics::{IkGoal, IkSettings, JointLimits, solve_position};
+use crate::log::{RecordingHeader, RecordingWriter, RosMessage, read_recording, ros};
+use crate::sensor::ArmSensors;
+use crate::streams::{
+    CaptureSet, JointAngles, JointSensorSample, JointStateBelief, LogLevel, LogLine, Mark, MarkKind, Message, Phase,
+    ReachAttempt, ReachTask, Sink, TagDetection, TagDetections, TemperatureSample, Thermometer,
+};
+use crate::time::SIMULATION_EPOCH;
+
+/// Errors of the joint sensors before and after the made-up calibration, rad.
+const ERROR_BEFORE_RAD: [f64; 6] = [0.03, -0.035, 0.05, -0.02, 0.04, 0.03];
+const ERROR_AFTER_RAD: [f64; 6] = [0.0006, -0.0005, 0.0008, 0.0004, -0.0006, 0.03];
+
+fn robots() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("robots")
+}
+
+/// One leg: to `goal` as believed, then a rest in which something is marked.
+struct Leg {
+    goal: JointAngles,
+    move_s: f64,
+    rest_s: f64,
+    phase: Phase,
+    mark: Option<MarkKind>,
+}
+
+/// A run that is fabricated leg by leg.
+struct Fabric {
+    robot: Robot,
+    run: RecordingWriter,
+    truth: RecordingWriter,
+    time_s: f64,
+    at: JointAngles,
+    error_rad: [f64; 6],
+}
+
+impl Fabric {
+    fn record(&mut self, message: &Message) {
+        self.run.record(SIMULATION_EPOCH.plus_s(self.time_s), message).unwrap();
+    }
+
+    fn phase(&mut self, phase: Phase) {
+        let stamp = SIMULATION_EPOCH.plus_s(self.time_s);
+        self.record(&Message::Mark(Mark { start: stamp, end: stamp, kind: MarkKind::Phase(phase) }));
+    }
+
+    fn say(&mut self, level: LogLevel, text: &str) {
+        let stamp = SIMULATION_EPOCH.plus_s(self.time_s);
+        self.record(&Message::Log(LogLine { stamp, level, name: "session".into(), text: text.into() }));
+    }
+
+    fn leg(&mut self, leg: &Leg) {
+        let (from, step_s) = (self.at, 0.02);
+        self.phase(Phase::Move);
+        for n in 1..=(leg.move_s / step_s) as u32 {
+            let share = f64::from(n) * step_s / leg.move_s;
+            let smooth = share * share * (3.0 - 2.0 * share);
+            self.at = JointAngles::from_fn(6, |j| from[j] + smooth * (leg.goal[j] - from[j]));
+            self.step(step_s, n);
+        }
+        self.at = leg.goal;
+        self.phase(leg.phase);
+        let start = SIMULATION_EPOCH.plus_s(self.time_s);
+        for n in 1..=(leg.rest_s / step_s) as u32 {
+            self.step(step_s, n);
+        }
+        let end = SIMULATION_EPOCH.plus_s(self.time_s);
+        if let Some(kind) = leg.mark {
+            self.record(&Message::Mark(Mark { start, end, kind }));
+        }
+    }
+
+    fn step(&mut self, step_s: f64, n: u32) {
+        self.time_s += step_s;
+        let stamp = SIMULATION_EPOCH.plus_s(self.time_s);
+        let actual = JointAngles::from_fn(6, |j| self.at[j] - self.error_rad[j]);
+        let counts = ArmSensors::nominal(&self.robot).counts(&actual);
+        self.record(&Message::JointSensors(JointSensorSample { stamp, counts }));
+        self.record(&Message::JointStates(JointStateBelief { stamp, angles: self.at }));
+        self.tell_truth(&actual);
+        if n.is_multiple_of(5) {
+            self.look(&actual);
+        }
+        if n.is_multiple_of(50) {
+            let warm = 12.0 + 9.0 * (1.0 - (-self.time_s / 60.0).exp());
+            for (thermometer, temperature_c) in [(Thermometer::Oil, warm), (Thermometer::Water, 4.2)] {
+                let sample = TemperatureSample { stamp, thermometer, temperature_c, variance_c2: 0.01 };
+                self.record(&Message::Temperature(sample));
+            }
+        }
+    }
+
+    fn tell_truth(&mut self, actual: &JointAngles) {
+        let log_time = SIMULATION_EPOCH.plus_s(self.time_s);
+        let header = ros::Header { stamp: log_time.try_into().unwrap(), frame_id: "base_link".into() };
+        let joints = ros::JointState {
+            header: header.clone(),
+            name: self.robot.joint_names(),
+            position: actual.to_vec(),
+            ..Default::default()
+        };
+        self.truth.write_ros("/truth/joint_states", &ros::JointState::SCHEMA, log_time, &joints).unwrap();
+        let sway = (0.4 * self.time_s).sin();
+        let vehicle = Isometry3::from_parts(
+            Translation3::new(0.01 * sway, 0.005 * sway, 0.01 * sway),
+            UnitQuaternion::from_euler_angles(0.01 * sway, 0.005 * sway, 0.0),
+        );
+        let tool = self.robot.chain.link_poses(actual).frame(&self.robot.tool.mount);
+        for (topic, pose) in [("/truth/vehicle_pose", vehicle), ("/truth/tool_pose", tool)] {
+            let pose = ros::PoseStamped { header: header.clone(), pose: ros_pose(&pose) };
+            self.truth.write_ros(topic, &ros::PoseStamped::SCHEMA, log_time, &pose).unwrap();
+        }
+    }
+
+    fn look(&mut self, actual: &JointAngles) {
+        let camera = &self.robot.camera;
+        let base_from_camera = self.robot.chain.link_poses(actual).frame(&camera.mount);
+        let mut tags = Vec::new();
+        for tag in &self.robot.tags {
+            let camera_from_tag = base_from_camera.inv_mul(tag.base_from_tag.isometry());
+            let normal = camera_from_tag.rotation * Vector3::z();
+            let corners = crate::optics::square_corners(tag.size_m)
+                .map(|corner| camera.lens.project(&(camera_from_tag * corner).coords));
+            if let [Some(a), Some(b), Some(c), Some(d)] = corners
+                && normal.dot(&camera_from_tag.translation.vector) < 0.0
+                && [a, b, c, d].iter().all(|pixel| camera.lens.contains(pixel))
+            {
+                let corners_px = [a, b, c, d].map(Into::into);
+                tags.push(TagDetection { id: tag.id, corners_px, decision_margin: 60.0 });
+            }
+        }
+        let stamp = SIMULATION_EPOCH.plus_s(self.time_s);
+        self.record(&Message::Detections(TagDetections { stamp, tags }));
+    }
+}
+
+fn ros_pose(pose: &Isometry3<f64>) -> ros::Pose {
+    let (t, q) = (pose.translation.vector, pose.rotation);
+    let orientation = ros::Quaternion { x: q.i, y: q.j, z: q.k, w: q.w };
+    ros::Pose { position: [t.x, t.y, t.z].into(), orientation }
+}
+
+/// Joint angles that bring the believed tool to a target.
+fn reaching(robot: &Robot, target_m: [f64; 3]) -> JointAngles {
+    let limits = robot
+        .chain
+        .joints()
+        .iter()
+        .map(|joint| joint.limits.unwrap_or(JointLimits { lower_rad: -3.0, upper_rad: 3.0 }));
+    let settings = IkSettings {
+        limits: limits.collect(),
+        locked: vec![false, false, false, false, false, true],
+        tolerance_m: 1e-6,
+        max_iterations: 500,
+    };
+    let goal = IkGoal { position_m: Vector3::from(target_m) };
+    solve_position(&robot.chain, &robot.tool.mount, &goal, &robot.stowed, &settings).unwrap_or(robot.stowed)
+}
+
+/// Files of a run with `n_views` views, in `dir`: reach, look about, calibrate, reach again.
+fn fabricate(dir: &Path, n_views: u32) -> (PathBuf, PathBuf) {
+    let robot = crate::robot::load(&robots().join("titan4")).unwrap();
+    let (run_path, truth_path) = (dir.join("run.mcap"), dir.join("truth.mcap"));
+    let header = || RecordingHeader::new(robot.joint_names());
+    let mut fabric = Fabric {
+        run: RecordingWriter::create(&run_path, header()).unwrap(),
+        truth: RecordingWriter::create(&truth_path, header()).unwrap(),
+        at: robot.stowed,
+        robot: robot.clone(),
+        time_s: 0.0,
+        error_rad: ERROR_BEFORE_RAD,
+    };
+    let targets_m = vec![[0.9, 0.4, -0.3], [1.1, 0.0, -0.1], [1.0, 0.7, 0.0], [1.2, 0.3, 0.2]];
+    let task = ReachTask { stamp: SIMULATION_EPOCH, targets_m: targets_m.clone(), tolerance_m: 0.01 };
+    fabric.record(&Message::Task(task));
+    fabric.phase(Phase::Plan);
+    fabric.say(LogLevel::Info, "reach task before calibration, 4 targets");
+    for attempt in [ReachAttempt::Before, ReachAttempt::After] {
+        for (n, target) in targets_m.iter().enumerate() {
+            let mark = Some(MarkKind::Reach { attempt, target_idx: n as u32 });
+            let goal = reaching(&robot, *target);
+            fabric.leg(&Leg { goal, move_s: 2.0, rest_s: 1.0, phase: Phase::Reach, mark });
+        }
+        if attempt == ReachAttempt::Before {
+            look_about(&mut fabric, n_views);
+            fabric.phase(Phase::Calibrate);
+            fabric.say(LogLevel::Info, "calibrating from the recording");
+            fabric.leg(&Leg { goal: robot.stowed, move_s: 1.0, rest_s: 0.5, phase: Phase::Calibrate, mark: None });
+            fabric.error_rad = ERROR_AFTER_RAD;
+            fabric.say(LogLevel::Warn, "wrist_rotate cannot be calibrated from this camera");
+        }
+    }
+    fabric.phase(Phase::Done);
+    fabric.run.finish().unwrap();
+    fabric.truth.finish().unwrap();
+    (run_path, truth_path)
+}
+
+fn look_about(fabric: &mut Fabric, n_views: u32) {
+    let stowed = fabric.robot.stowed;
+    for n in 0..n_views {
+        let spread = |j: usize| (f64::from(n) * 1.7 + j as f64 * 2.1).sin() * 0.3;
+        let goal = JointAngles::from_fn(6, |j| stowed[j] + if j == 1 { -spread(j).abs() } else { spread(j) });
+        let set = if n % 4 == 3 { CaptureSet::HeldOut } else { CaptureSet::Fit };
+        let mark = Some(MarkKind::Capture { set, pose_idx: n });
+        fabric.leg(&Leg { goal, move_s: 1.6, rest_s: 0.8, phase: Phase::Capture, mark });
+    }
+}
+
+fn small() -> (tempfile::TempDir, Recording, PathBuf, Robot) {
+    let dir = tempfile::tempdir().unwrap();
+    let (run, truth) = fabricate(dir.path(), 1);
+    let recording = read_recording(&run).unwrap();
+    let robot = crate::robot::load(&robots().join("titan4")).unwrap();
+    (dir, recording, truth, robot)
+}
+
+fn input<'a>(recording: &'a Recording, robot: &'a Robot) -> ReplayInput<'a> {
+    ReplayInput { recording, truth: None, robot, vehicle: None, scene: None, summary_markdown: None }
+}
+
+/// Entities of the recording in a file, as Rerun's own decoder reads it, with their rows.
+fn entities(rrd: &Path) -> std::collections::BTreeMap<String, usize> {
+    use rerun::external::re_log_encoding::DecoderApp;
+    let file = std::io::BufReader::new(std::fs::File::open(rrd).unwrap());
+    let mut entities = std::collections::BTreeMap::new();
+    for message in DecoderApp::decode_eager(file).unwrap() {
+        if let rerun::log::LogMsg::ArrowMsg(store, message) = message.unwrap()
+            && store.is_recording()
+        {
+            let chunk = rerun::log::Chunk::from_arrow_msg(&message).unwrap();
+            *entities.entry(chunk.entity_path().to_string()).or_default() += chunk.num_rows();
+        }
+    }
+    entities
+}
+
+#[test]
+fn a_run_becomes_a_file_that_rerun_reads() {
+    let (dir, recording, truth, robot) = small();
+    let out = dir.path().join("run.rrd");
+    write_rrd(&ReplayInput { truth: Some(&truth), ..input(&recording, &robot) }, &out).unwrap();
+    let entities = entities(&out);
+    for entity in ["/plots/joint_error", "/plots/tool_error/believed", "/camera/seen", "/state/phase", "/summary"] {
+        assert!(entities.contains_key(entity), "{entity} is not among {:?}", entities.keys());
+    }
+    assert!(entities.keys().any(|entity| entity.contains("/believed_arm/6_")));
+    assert!(entities["/plots/joint_error"] > 100);
+}
+
+#[test]
+fn same_input_gives_the_same_bytes() {
+    let (dir, recording, truth, robot) = small();
+    let moved = Robot { folder: "elsewhere".into(), ..robot.clone() };
+    let (a, b) = (dir.path().join("a.rrd"), dir.path().join("b.rrd"));
+    for (robot, out) in [(&robot, &a), (&moved, &b)] {
+        write_rrd(&ReplayInput { truth: Some(&truth), ..input(&recording, robot) }, out).unwrap();
+    }
+    assert!(std::fs::read(a).unwrap() == std::fs::read(b).unwrap());
+}
+
+#[test]
+fn without_truth_there_is_one_arm_and_no_error() {
+    let (dir, recording, _, robot) = small();
+    let out = dir.path().join("run.rrd");
+    write_rrd(&input(&recording, &robot), &out).unwrap();
+    let entities = entities(&out);
+    assert!(entities.keys().any(|entity| entity.contains("/base/arm/6_")));
+    assert!(!entities.keys().any(|entity| entity.contains("believed_arm") || entity.contains("error")));
+}
+
+#[test]
+fn what_cannot_be_shown_is_refused() {
+    let (dir, mut recording, truth, mut robot) = small();
+    let out = dir.path().join("run.rrd");
+    let wrong_truth = ReplayInput { truth: Some(&recording.path), ..input(&recording, &robot) };
+    assert!(matches!(write_rrd(&wrong_truth, &out), Err(ReplayError::NoTruth { .. })));
+    let nowhere = dir.path().join("no/run.rrd");
+    assert!(matches!(write_rrd(&input(&recording, &robot), &nowhere), Err(ReplayError::Create { .. })));
+    robot.sensors[0].joint = "other".into();
+    let other_joints = ReplayInput { truth: Some(&truth), ..input(&recording, &robot) };
+    assert!(matches!(write_rrd(&other_joints, &out), Err(ReplayError::TruthJoints { .. })));
+    recording.messages.clear();
+    let error = write_rrd(&input(&recording, &robot), &out).unwrap_err();
+    assert!(matches!(error, ReplayError::Empty { .. }), "{error}");
+    assert!(!out.exists());
+}

@@ -1,0 +1,190 @@
+//! The recording's messages sorted by kind, on the viewer's timeline.
+
+use nalgebra::{Isometry3, UnitQuaternion};
+
+use super::error::ReplayError;
+use crate::log::Recording;
+use crate::robot::Robot;
+use crate::spatial::{Pose, Vehicle, World};
+use crate::streams::{
+    JointAngles, JointCounts, LogLine, Mark, MarkKind, Message, ReachTask, TagDetections, Thermometer,
+};
+use crate::time::Stamp;
+
+/// A message's own stamp places it if it is this near to its log time; else its clock is not the recorder's.
+const CLOCKS_AGREE_S: f64 = 1.0;
+/// Samples nearer in time than this are dropped: nothing is drawn that fast.
+const MIN_SPACING_S: f64 = 0.0095;
+/// Above this a stray log time, not a run, is the likely reason.
+const LONGEST_S: f64 = 7.0 * 24.0 * 3600.0;
+/// Steps of everything that moves.
+const FRAME_HZ: f64 = 25.0;
+
+/// Values over time, s, ascending.
+#[derive(Clone, Debug)]
+pub(super) struct Track<T> {
+    samples: Vec<(f64, T)>,
+}
+
+impl<T> Default for Track<T> {
+    fn default() -> Self {
+        Self { samples: Vec::new() }
+    }
+}
+
+impl<T> Track<T> {
+    /// Keeps a sample unless it follows the last one too closely or comes before it.
+    pub fn push(&mut self, time_s: f64, value: T) {
+        if self.samples.last().is_none_or(|(last_s, _)| time_s - last_s >= MIN_SPACING_S) {
+            self.samples.push((time_s, value));
+        }
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.samples.is_empty()
+    }
+
+    pub fn iter(&self) -> impl Iterator<Item = &(f64, T)> {
+        self.samples.iter()
+    }
+
+    /// The latest value at `time_s`; the first one before it.
+    pub fn at(&self, time_s: f64) -> Option<&T> {
+        let after = self.samples.partition_point(|(t, _)| *t <= time_s);
+        self.samples.get(after.saturating_sub(1)).map(|(_, value)| value)
+    }
+
+    /// The value at `time_s` between its two neighbours, by `blend(before, after, share)`.
+    pub fn between(&self, time_s: f64, blend: impl Fn(&T, &T, f64) -> T) -> Option<T> {
+        let after = self.samples.partition_point(|(t, _)| *t <= time_s);
+        let (t0, before) = self.samples.get(after.saturating_sub(1))?;
+        let (t1, next) = self.samples.get(after).unwrap_or_else(|| &self.samples[self.samples.len() - 1]);
+        let share = if t1 > t0 { ((time_s - t0) / (t1 - t0)).clamp(0.0, 1.0) } else { 0.0 };
+        Some(blend(before, next, share))
+    }
+}
+
+/// Linear between two sets of joint angles.
+pub(super) fn blend_angles(a: &JointAngles, b: &JointAngles, share: f64) -> JointAngles {
+    JointAngles::from_fn(a.len(), |j| a[j] + share * (b[j] - a[j]))
+}
+
+/// A straight line and the shorter turn between two poses.
+pub(super) fn blend_poses(a: &Isometry3<f64>, b: &Isometry3<f64>, share: f64) -> Isometry3<f64> {
+    a.try_lerp_slerp(b, share, 1e-9).unwrap_or(*a)
+}
+
+/// A mark on the timeline.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Span {
+    pub start_s: f64,
+    pub end_s: f64,
+    pub kind: MarkKind,
+}
+
+/// The recording, sorted by kind.
+pub(super) struct Tracks<'a> {
+    start: Stamp,
+    pub duration_s: f64,
+    pub believed: Track<JointAngles>,
+    pub counts: Track<JointCounts>,
+    pub attitude: Track<UnitQuaternion<f64>>,
+    pub oil_c: Track<f64>,
+    pub water_c: Track<f64>,
+    pub views: Vec<(f64, &'a TagDetections)>,
+    pub task: Option<(f64, &'a ReachTask)>,
+    pub marks: Vec<Span>,
+    pub log: Vec<(f64, &'a LogLine)>,
+}
+
+impl<'a> Tracks<'a> {
+    /// Sorts the messages and checks that the joints are those of `robot`.
+    pub fn new(recording: &'a Recording, robot: &Robot) -> Result<Self, ReplayError> {
+        let path = || recording.path.clone();
+        let (Some((start, _)), Some((end, _))) = (recording.messages.first(), recording.messages.last()) else {
+            return Err(ReplayError::Empty { path: path() });
+        };
+        let duration_s = end.since_s(*start);
+        if duration_s > LONGEST_S {
+            return Err(ReplayError::TooLong { path: path(), got_s: duration_s, limit_s: LONGEST_S });
+        }
+        let mut tracks = Self {
+            start: *start,
+            duration_s,
+            believed: Track::default(),
+            counts: Track::default(),
+            attitude: Track::default(),
+            oil_c: Track::default(),
+            water_c: Track::default(),
+            views: Vec::new(),
+            task: None,
+            marks: Vec::new(),
+            log: Vec::new(),
+        };
+        for (log_time, message) in &recording.messages {
+            if let Some(got) = joint_count(message).filter(|&n| n != robot.n_joints()) {
+                let (robot, expected) = (robot.name.clone(), robot.n_joints());
+                return Err(ReplayError::JointCount { path: path(), robot, got, expected });
+            }
+            tracks.take(*log_time, message);
+        }
+        tracks.marks.sort_by(|a, b| a.start_s.total_cmp(&b.start_s));
+        Ok(tracks)
+    }
+
+    fn take(&mut self, log_time: Stamp, message: &'a Message) {
+        let at = |stamp| self.place_s(log_time, stamp);
+        match message {
+            Message::JointStates(m) => self.believed.push(at(m.stamp), m.angles),
+            Message::JointSensors(m) => self.counts.push(at(m.stamp), m.counts),
+            Message::Attitude(m) => {
+                let turn = Pose::<World, Vehicle>::from_position_quaternion_wxyz([0.0; 3], m.quaternion_wxyz);
+                if let Some(turn) = turn {
+                    self.attitude.push(at(m.stamp), turn.rotation());
+                }
+            }
+            Message::Temperature(m) => match m.thermometer {
+                Thermometer::Oil => self.oil_c.push(at(m.stamp), m.temperature_c),
+                Thermometer::Water => self.water_c.push(at(m.stamp), m.temperature_c),
+            },
+            Message::Detections(m) => self.views.push((at(m.stamp), m)),
+            Message::Task(m) => self.task = Some((at(m.stamp), m)),
+            Message::Mark(m) => self.marks.push(self.span(log_time, m)),
+            Message::Log(m) => self.log.push((at(m.stamp), m)),
+            Message::JointCommand(_) | Message::Pressure(_) => {}
+        }
+    }
+
+    /// A mark is logged when its span is over.
+    fn span(&self, log_time: Stamp, mark: &Mark) -> Span {
+        let end_s = self.place_s(log_time, mark.end);
+        let start_s = (end_s - mark.end.since_s(mark.start)).max(0.0);
+        Span { start_s, end_s, kind: mark.kind }
+    }
+
+    /// Where a message belongs: by its own stamp if that clock agrees with the recorder's, else by its log time.
+    pub fn place_s(&self, log_time: Stamp, stamp: Stamp) -> f64 {
+        let (logged_s, stamped_s) = (log_time.since_s(self.start), stamp.since_s(self.start));
+        let placed_s = if (stamped_s - logged_s).abs() <= CLOCKS_AGREE_S { stamped_s } else { logged_s };
+        placed_s.clamp(0.0, self.duration_s)
+    }
+
+    /// The moments at which moving things are drawn, s.
+    pub fn frames(&self) -> impl Iterator<Item = f64> + use<> {
+        self.ticks(FRAME_HZ)
+    }
+
+    /// Moments at `rate_hz` from the start to the end, s.
+    pub fn ticks(&self, rate_hz: f64) -> impl Iterator<Item = f64> + use<> {
+        let n = (self.duration_s * rate_hz).floor() as u64;
+        (0..=n).map(move |i| i as f64 / rate_hz)
+    }
+}
+
+fn joint_count(message: &Message) -> Option<usize> {
+    match message {
+        Message::JointStates(m) => Some(m.angles.len()),
+        Message::JointSensors(m) => Some(m.counts.len()),
+        _ => None,
+    }
+}
