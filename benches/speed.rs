@@ -1,0 +1,118 @@
+//! Where the time goes: kinematics, the objective, the solver, clearance, one simulated second.
+//!
+//! `cargo bench --bench speed`. Compare figures of one run only; machines differ and are noisy.
+
+use std::hint::black_box;
+use std::path::Path;
+
+use armcal::calib::{JointParameters, Parameter, ParameterKind, PositionProblem, TagView, View, minimum_distance};
+use armcal::plan::{ClearanceModel, JointErrorBounds};
+use armcal::robot::{Robot, Vehicle, load, load_vehicle};
+use armcal::routine::Scene;
+use armcal::stats::stream_rng;
+use armcal::streams::JointAngles;
+use armcal::time::SIMULATION_EPOCH;
+use criterion::{Criterion, criterion_group, criterion_main};
+use rand::RngExt;
+
+const N_VIEWS: u32 = 40;
+const TAGS_A_VIEW: usize = 6;
+
+fn robot() -> Robot {
+    load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/titan4")).expect("the robot is part of the repository")
+}
+
+fn vehicle() -> Vehicle {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/vehicles/work-class-front.toml");
+    load_vehicle(&file).expect("the vehicle is part of the repository")
+}
+
+fn random_angles(robot: &Robot, rng: &mut rand_chacha::ChaCha8Rng) -> JointAngles {
+    JointAngles::from_fn(robot.n_joints(), |j| {
+        let limits = robot.chain.joints()[j].limits;
+        limits.map_or(0.0, |l| rng.random_range(l.lower_rad..=l.upper_rad))
+    })
+}
+
+/// Views of an arm whose sensors are 2 % and 2 deg off, with 3 mm of noise on each tag's position.
+fn views(robot: &Robot) -> Vec<View> {
+    let mut rng = stream_rng(1, "bench");
+    (0..N_VIEWS)
+        .map(|pose_idx| {
+            let angles = random_angles(robot, &mut rng);
+            let camera_from_base = robot.chain.link_poses(&angles).frame(&robot.camera.mount).inverse();
+            let tag = |tag_idx: usize, noise_m: [f64; 3]| {
+                let center =
+                    camera_from_base * nalgebra::Point3::from(robot.tags[tag_idx].base_from_tag.origin().vector());
+                TagView {
+                    id: robot.tags[tag_idx].id,
+                    tag_idx,
+                    center_in_camera_m: center.coords + nalgebra::Vector3::from(noise_m),
+                    corners_px: [[0.0; 2]; 4],
+                    n_frames: 1,
+                }
+            };
+            let tags = (0..TAGS_A_VIEW).map(|t| tag(t, [0; 3].map(|_| rng.random_range(-0.003..0.003)))).collect();
+            let travel_rad =
+                JointAngles::from_fn(robot.n_joints(), |j| (angles[j] - robot.sensors[j].center_rad - 0.035) / 1.02);
+            View { pose_idx, end: SIMULATION_EPOCH, travel_rad, tags }
+        })
+        .collect()
+}
+
+fn calibration(c: &mut Criterion) {
+    let robot = robot();
+    let views = views(&robot);
+    let problem = PositionProblem::new(&robot, &views);
+    let free: Vec<Parameter> = (0..robot.camera.mount.n_joints)
+        .flat_map(|joint| [ParameterKind::Gain, ParameterKind::Offset].map(|kind| Parameter { joint, kind }))
+        .collect();
+    let angles = views[0].travel_rad;
+    c.bench_function("forward kinematics", |b| b.iter(|| robot.chain.link_poses(black_box(&angles))));
+    c.bench_function("sum of distances, 40 x 6", |b| {
+        b.iter(|| problem.sum_of_distances_m(black_box(&JointParameters::default())));
+    });
+    c.bench_function("minimum distance by BOBYQA, 40 x 6", |b| b.iter(|| minimum_distance(black_box(&problem), &free)));
+}
+
+fn planning(c: &mut Criterion) {
+    let (robot, vehicle) = (robot(), vehicle());
+    let scene = Scene { seafloor_z_m: Some(-2.2), obstacles: Vec::new() };
+    let clearance = ClearanceModel::new(&robot, &vehicle, &scene);
+    let bounds = JointErrorBounds::prior(&robot);
+    c.bench_function("clearance of one arm", |b| b.iter(|| clearance.nearest(black_box(&robot.stowed))));
+    c.bench_function("clearance of every arm within the bounds", |b| {
+        b.iter(|| clearance.nearest_under(black_box(&robot.stowed), &bounds, 0.05));
+    });
+}
+
+#[cfg(feature = "sim")]
+fn simulation(c: &mut Criterion) {
+    use armcal::sim::{World, WorldInput, WorldSpec};
+    use armcal::streams::{Arm, Message, Sink, SinkError};
+
+    struct Nothing;
+    impl Sink for Nothing {
+        fn record(&mut self, _: armcal::time::Stamp, _: &Message) -> Result<(), SinkError> {
+            Ok(())
+        }
+    }
+    let (robot, vehicle) = (robot(), vehicle());
+    let scene = Scene { seafloor_z_m: Some(-2.2), obstacles: Vec::new() };
+    let spec = WorldSpec::default();
+    let input = WorldInput { robot: &robot, vehicle: &vehicle, scene: &scene, spec, seed: 1 };
+    let mut world = World::new(input).expect("the standard world");
+    c.bench_function("one simulated second", |b| {
+        b.iter(|| (0..100).for_each(|_| world.step(&mut Nothing).expect("a sink that takes everything")));
+    });
+}
+
+#[cfg(not(feature = "sim"))]
+fn simulation(_: &mut Criterion) {}
+
+criterion_group! {
+    name = benches;
+    config = Criterion::default().sample_size(20);
+    targets = calibration, planning, simulation
+}
+criterion_main!(benches);

@@ -1,0 +1,144 @@
+//! Good files that ask for what cannot be: refused before anything moves, with the place.
+
+use std::path::Path;
+
+use armcal::log::read_recording;
+use armcal::streams::Message;
+
+use crate::support::{
+    Answer, ShortRoutine, calibrate, edit, read, robot_copy, run, shared_run, temp, vehicle_file, write,
+};
+
+fn run_short(routine: &ShortRoutine, folder: &Path) -> Answer {
+    run(&routine.write(folder), &folder.join("out"))
+}
+
+/// Nothing moved, so nothing is worth keeping: neither results nor half a recording lie in the folder.
+#[track_caller]
+fn assert_nothing_left(folder: &Path) {
+    let left: Vec<_> = std::fs::read_dir(folder.join("out")).into_iter().flatten().flatten().collect();
+    assert!(left.is_empty(), "{left:?}");
+}
+
+#[test]
+fn a_target_out_of_reach_is_named_with_its_place() {
+    let folder = temp();
+    let mut routine = ShortRoutine::default();
+    routine.targets_m[2] = [2.5, 0.0, 0.0];
+    run_short(&routine, folder.path()).expect("far", 2, &["target 2", "2.500", "out of reach"]);
+    assert_nothing_left(folder.path());
+}
+
+#[test]
+fn a_target_within_the_vehicle_is_named_with_what_is_in_the_way() {
+    let folder = temp();
+    let mut routine = ShortRoutine::default();
+    // The face of the starboard toe plate.
+    routine.targets_m[1] = [1.34, -0.1, -0.99];
+    run_short(&routine, folder.path()).expect("inside", 2, &["target 1", "clearance", "toe_plate_starboard"]);
+    assert_nothing_left(folder.path());
+}
+
+#[test]
+fn a_start_in_collision_is_refused_and_names_the_obstacle() {
+    let folder = temp();
+    // Round the forearm of the stowed arm: the vehicle frame's origin is 1.7 m behind the base.
+    let tail =
+        "[[obstacle]]\nname = \"crate\"\nshape = \"box\"\nsize_m = [1.2, 1.2, 1.2]\nposition_m = [2.3, -0.6, 0.6]\n";
+    let routine = ShortRoutine { tail: tail.to_owned(), ..ShortRoutine::default() };
+    run_short(&routine, folder.path()).expect("in collision", 2, &["starts too close", "crate"]);
+    assert_nothing_left(folder.path());
+}
+
+#[test]
+fn more_tags_than_there_are_cannot_be_seen() {
+    let folder = temp();
+    let routine = ShortRoutine { min_tags: 9, ..ShortRoutine::default() };
+    run_short(&routine, folder.path()).expect("9 tags", 2, &["no pose", "9 of the 8"]);
+    assert_nothing_left(folder.path());
+}
+
+#[test]
+fn tags_that_face_away_leave_no_pose() {
+    let folder = temp();
+    let robot = robot_copy(folder.path());
+    let file = robot.join("robot.toml");
+    let turned = |line: &str| -> String {
+        let Some(numbers) = line.strip_prefix("quaternion_wxyz = [").and_then(|rest| rest.strip_suffix(']')) else {
+            return format!("{line}\n");
+        };
+        let q: Vec<f64> = numbers.split(", ").map(|n| n.parse().expect("a number")).collect();
+        // Half a turn about the tag's own y.
+        format!("quaternion_wxyz = [{:?}, {:?}, {:?}, {:?}]\n", -q[2], -q[3], q[0], q[1])
+    };
+    write(&file, &read(&file).lines().map(turned).collect::<String>());
+    let routine = ShortRoutine { robot, ..ShortRoutine::default() };
+    run_short(&routine, folder.path()).expect("turned tags", 2, &["no pose", "3 of the 8"]);
+    assert_nothing_left(folder.path());
+}
+
+#[test]
+fn a_robot_without_tags_is_refused() {
+    let folder = temp();
+    let robot = robot_copy(folder.path());
+    let file = robot.join("robot.toml");
+    let text = read(&file);
+    write(&file, &text[..text.find("[[tag]]").expect("tags")]);
+    let routine = ShortRoutine { robot, ..ShortRoutine::default() };
+    run_short(&routine, folder.path()).expect("no tags", 2, &["no pose", "of the 0"]);
+}
+
+/// A number that arithmetic does not survive is wrong input, not a crash.
+#[test]
+fn absurd_lengths_are_refused() {
+    let folder = temp();
+    let robot = robot_copy(folder.path());
+    edit(
+        &robot.join("titan4.urdf"),
+        "<origin xyz=\"-0.17691 0.83228 0\" rpy=\"1.5708",
+        "<origin xyz=\"1e300 0 0\" rpy=\"1.5708",
+    );
+    run_short(&ShortRoutine { robot, ..ShortRoutine::default() }, folder.path()).expect("URDF", 2, &["titan4.urdf"]);
+    let robot = robot_copy(folder.path());
+    edit(&robot.join("titan4.urdf"), "effort=\"1600\"", "effort=\"1e300\"");
+    run_short(&ShortRoutine { robot, ..ShortRoutine::default() }, folder.path()).expect("effort", 2, &["effort"]);
+    let vehicle = folder.path().join("vehicle.toml");
+    write(&vehicle, &read(&vehicle_file()));
+    edit(&vehicle, "position_m = [1.7, -0.6, 0.1]", "position_m = [1e300, -0.6, 0.1]");
+    run_short(&ShortRoutine { vehicle, ..ShortRoutine::default() }, folder.path()).expect(
+        "mount",
+        2,
+        &["vehicle.toml"],
+    );
+}
+
+/// A datasheet without any uncertainty leaves nothing to calibrate.
+#[test]
+fn sensors_that_cannot_be_wrong_leave_nothing_to_fit() {
+    let folder = temp();
+    let robot = robot_copy(folder.path());
+    let file = robot.join("robot.toml");
+    let exact = read(&file)
+        .replace("gain_std = 0.03", "gain_std = 0.0")
+        .replace("offset_std_rad = 0.05", "offset_std_rad = 0.0");
+    write(&file, &exact);
+    let recording = shared_run().file("run.mcap");
+    calibrate(&recording, &robot, &folder.path().join("out")).expect("exact sensors", 2, &["run.mcap", "no joint"]);
+}
+
+/// An arm that never comes to rest is told apart from a recording that lacks its marks.
+#[test]
+fn an_arm_that_never_settles_leaves_nothing_to_calibrate() {
+    let folder = temp();
+    let tail = "[world.joint_sensors]\nnoise_rms_counts = 500.0\n".to_owned();
+    let mut routine = ShortRoutine { poses: 3, held_out: 3, tail, ..ShortRoutine::default() };
+    routine.targets_m.truncate(1);
+    let answer = run_short(&routine, folder.path());
+    assert_eq!(answer.code, 1, "{answer:#?}");
+    assert!(answer.stderr.contains("6 planned poses"), "{answer:#?}");
+    assert!(!folder.path().join("out/calibration.toml").exists());
+    let kept = read_recording(folder.path().join("out/run.mcap.partial")).expect("the kept recording reads");
+    let said =
+        kept.messages.iter().filter(|(_, m)| matches!(m, Message::Log(line) if line.text.contains("did not settle")));
+    assert_eq!(said.count(), 6, "each pose is given up aloud");
+}

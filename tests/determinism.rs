@@ -1,0 +1,56 @@
+//! One routine and one seed give one result, whatever the machine does meanwhile.
+
+use serde_json::Value;
+
+use crate::support::{ShortRoutine, answer, finished, program, shared_run, temp};
+
+/// summary.json without what the wall clock says.
+fn without_wall_time(summary: &[u8]) -> Value {
+    let mut value: Value = serde_json::from_slice(summary).expect("JSON");
+    value["wall_s"] = Value::Null;
+    value["calibration"]["wall_s"] = Value::Null;
+    value
+}
+
+#[test]
+fn a_routine_repeats_byte_for_byte_on_one_thread_and_in_another_place() {
+    let first = shared_run();
+    let folder = temp();
+    let out = folder.path().join("again");
+    let mut again = program();
+    again.env("RAYON_NUM_THREADS", "1").env("TZ", "Pacific/Chatham").env("LC_ALL", "tr_TR.UTF-8");
+    again.current_dir(folder.path());
+    answer(again.arg("run").arg(&first.routine).arg("--out").arg(&out)).expect("again", 0, &["ACCEPTED"]);
+    for name in ["run.mcap", "truth.mcap", "calibration.toml"] {
+        assert!(first.bytes(name) == std::fs::read(out.join(name)).expect("written"), "{name} differs");
+    }
+    let again = std::fs::read(out.join("summary.json")).expect("written");
+    assert_eq!(without_wall_time(&first.bytes("summary.json")), without_wall_time(&again));
+}
+
+#[test]
+fn calibrating_a_recording_twice_gives_the_same_bytes() {
+    let run = shared_run();
+    let folder = temp();
+    let [a, b] = ["a", "b"].map(|name| {
+        let out = folder.path().join(name);
+        crate::support::calibrate(&run.file("run.mcap"), &crate::support::robot_folder(), &out).expect(name, 0, &[]);
+        ["calibration.toml", "summary.json"].map(|file| std::fs::read(out.join(file)).expect("written"))
+    });
+    assert!(a[0] == b[0]);
+    assert_eq!(without_wall_time(&a[1]), without_wall_time(&b[1]));
+}
+
+#[test]
+fn another_seed_gives_another_recording() {
+    let folder = temp();
+    let tiny = ShortRoutine { poses: 10, held_out: 3, ..ShortRoutine::default() };
+    let tiny = ShortRoutine { targets_m: tiny.targets_m[..1].to_vec(), ..tiny };
+    let [first, second] = [1, 2].map(|seed| {
+        let run = finished(&ShortRoutine { seed, ..tiny.clone() }, &folder.path().join(seed.to_string()));
+        ["run.mcap", "truth.mcap", "calibration.toml"].map(|name| run.bytes(name))
+    });
+    for (a, b) in first.iter().zip(&second) {
+        assert!(a != b);
+    }
+}

@@ -1,0 +1,106 @@
+//! Figures that others published: the paper's kinematics of the arm and its maker's datasheet.
+
+use armcal::kinematics::LinkPoses;
+use armcal::robot::Robot;
+use armcal::streams::JointAngles;
+use nalgebra::Vector3;
+
+use crate::support::titan;
+
+/// m. The published origins have four digits.
+const PUBLISHED_ORIGIN_M: f64 = 6e-5;
+/// The published axes have four digits.
+const PUBLISHED_AXIS: f64 = 6e-5;
+
+/// Joint origins (m) and axes in the base at the zero pose.
+const ZERO_POSE: [([f64; 3], [f64; 3]); 6] = [
+    ([0.0, 0.0, 0.0], [0.0, 0.0, 1.0]),
+    ([0.0043, 0.1211, -0.0016], [0.9994, -0.0356, 0.0]),
+    ([0.0115, 0.3228, 0.8250], [0.9994, -0.0356, 0.0]),
+    ([0.0258, 0.7253, 0.5591], [0.9994, -0.0356, 0.0]),
+    ([0.0288, 0.8033, 0.4510], [-0.0289, -0.8101, -0.5856]),
+    ([0.0314, 0.8506, 0.3858], [-0.0328, -0.5848, 0.8105]),
+];
+
+#[test]
+fn joints_lie_where_the_paper_has_them_at_zero() {
+    let robot = titan();
+    let poses = robot.chain.link_poses(&JointAngles::zeros(6));
+    for (joint, (origin_m, axis)) in ZERO_POSE.iter().enumerate() {
+        let off_m = (poses.joint_origin(joint) - Vector3::from(*origin_m)).amax();
+        let off_axis = (poses.axis(joint) - Vector3::from(*axis)).amax();
+        assert!(off_m < PUBLISHED_ORIGIN_M, "joint {joint}: origin {:?}", poses.joint_origin(joint));
+        assert!(off_axis < PUBLISHED_AXIS, "joint {joint}: axis {:?}", poses.axis(joint));
+    }
+}
+
+fn tool_m(robot: &Robot, poses: &LinkPoses) -> Vector3<f64> {
+    poses.frame(&robot.tool.mount).translation.vector
+}
+
+/// Climbs joint by joint with shrinking steps from `start`, whatever the limits.
+fn largest_reach_from(robot: &Robot, start: JointAngles) -> f64 {
+    let reach = |angles: &JointAngles| tool_m(robot, &robot.chain.link_poses(angles)).norm();
+    let (mut at, mut best, mut step_rad) = (start, reach(&start), 1.0);
+    while step_rad > 1e-7 {
+        let mut has_gained = false;
+        for joint in 0..at.len() {
+            for turn in [step_rad, -step_rad] {
+                let mut trial = at;
+                trial[joint] += turn;
+                let length = reach(&trial);
+                if length > best {
+                    (at, best, has_gained) = (trial, length, true);
+                }
+            }
+        }
+        step_rad = if has_gained { step_rad } else { 0.5 * step_rad };
+    }
+    best
+}
+
+/// The datasheet says 1922 mm; these kinematics come to 1.9216 m.
+#[test]
+fn the_largest_reach_is_the_datasheets() {
+    /// m. The figure has four decimals; the search ends within micrometres of a maximum.
+    const TOLERANCE_M: f64 = 2e-4;
+    let robot = titan();
+    let starts = [
+        [0.0; 6],
+        [0.0, -1.0, 1.4, -0.4, 0.0, 0.0],
+        [-1.5, -0.5, 2.5, 0.5, -0.5, 1.0],
+        [-3.0, -2.0, -0.8, 1.2, 1.5, 0.0],
+    ];
+    let largest = starts
+        .iter()
+        .map(|start| largest_reach_from(&robot, JointAngles::from_slice(start)))
+        .inspect(|reach| eprintln!("reach {reach:.5} m"))
+        .fold(0.0, f64::max);
+    assert!((largest - 1.9216).abs() < TOLERANCE_M, "{largest}");
+}
+
+#[test]
+fn joint_ranges_and_weight_are_the_datasheets() {
+    /// deg. The datasheet has whole degrees.
+    const RANGE_DEG: f64 = 0.1;
+    /// kg. The datasheet has whole kilograms; the bracket that stays still is not among the links.
+    const MASS_KG: f64 = 0.5;
+    let robot = titan();
+    let ranges = robot.chain.joints().iter().map(|j| j.limits.map(|l| (l.upper_rad - l.lower_rad).to_degrees()));
+    let ranges: Vec<Option<f64>> = ranges.collect();
+    for (found, published) in ranges.iter().zip([240.0, 120.0, 260.0, 180.0, 180.0]) {
+        assert!(found.is_some_and(|range| (range - published).abs() < RANGE_DEG), "{ranges:?}");
+    }
+    assert_eq!(ranges[5], None, "the wrist turns without end");
+    let mass_kg: f64 = robot.bodies.iter().map(|body| body.mass_kg).sum();
+    assert!((mass_kg - 100.0).abs() < MASS_KG, "{mass_kg} kg");
+}
+
+/// The tool point lies on the last joint's axis, so that no tool position can show that joint's error.
+#[test]
+fn the_last_joint_does_not_move_the_tool_point() {
+    let robot = titan();
+    let poses = robot.chain.link_poses(&robot.stowed);
+    assert!(poses.point_jacobian(5, &tool_m(&robot, &poses)).norm() < 1e-12);
+    assert_eq!(robot.camera.mount.n_joints, 5, "the camera hangs before the last joint");
+}

@@ -1,0 +1,173 @@
+//! Recordings of an arm whose errors are known, made without the estimator's code: readings by the datasheet's formula,
+//! pixels by a projection of its own. Only the forward kinematics is the library's; Pinocchio vouches for it (`oracle`).
+
+use armcal::kinematics::Attachment;
+use armcal::log::{Completeness, Recording};
+use armcal::optics::Fisheye;
+use armcal::robot::Robot;
+use armcal::streams::{
+    CaptureSet, JointAngles, JointCounts, JointSensorSample, Mark, MarkKind, Message, ReachTask, TagDetection,
+    TagDetections,
+};
+use armcal::time::{SIMULATION_EPOCH, Stamp};
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+/// The first joints, those that the wrist camera sees.
+pub const N_SEEN: usize = 5;
+
+/// An arm as it really is. `theta = center + gain travel + offset`, travel by the datasheet.
+#[derive(Clone, Debug)]
+pub struct TrueArm<'a> {
+    pub robot: &'a Robot,
+    pub gain: Vec<f64>,
+    pub offset_rad: Vec<f64>,
+    pub camera: Attachment,
+    pub base_from_tag: Vec<Isometry3<f64>>,
+}
+
+/// One standing arm and what its camera saw: (id, corners).
+#[derive(Clone, Debug)]
+pub struct Shot {
+    pub set: CaptureSet,
+    pub angles: JointAngles,
+    pub tags: Vec<(u32, [[f64; 2]; 4])>,
+}
+
+pub fn normal(rng: &mut ChaCha8Rng) -> f64 {
+    StandardNormal.sample(rng)
+}
+
+fn normal3(rng: &mut ChaCha8Rng) -> Vector3<f64> {
+    Vector3::from_fn(|_, _| normal(rng))
+}
+
+impl<'a> TrueArm<'a> {
+    /// Gains within 5 %, offsets within 5 deg, all else as drawn.
+    pub fn with_sensor_errors(robot: &'a Robot, rng: &mut ChaCha8Rng) -> Self {
+        Self {
+            robot,
+            gain: (0..robot.n_joints()).map(|_| 1.0 + rng.random_range(-0.05..0.05)).collect(),
+            offset_rad: (0..robot.n_joints()).map(|_| rng.random_range(-0.0873..0.0873)).collect(),
+            camera: robot.camera.mount,
+            base_from_tag: robot.tags.iter().map(|tag| *tag.base_from_tag.isometry()).collect(),
+        }
+    }
+
+    /// Moves camera and tags off their drawing by what robot.toml says of them.
+    pub fn misplace(&mut self, rng: &mut ChaCha8Rng) {
+        let camera = &self.robot.camera;
+        self.camera.link_from_frame *= small_motion(camera.mount_std_m, camera.mount_std_rad, rng);
+        for (tag, surveyed) in self.base_from_tag.iter_mut().zip(&self.robot.tags) {
+            *tag *= small_motion(surveyed.position_std_m, surveyed.rotation_std_rad, rng);
+        }
+    }
+
+    /// The raw words at true `angles`: `raw = offset_counts + scale * angle`, not rounded.
+    pub fn counts(&self, angles: &JointAngles) -> JointCounts {
+        JointCounts::from_fn(angles.len(), |j| {
+            let spec = &self.robot.sensors[j];
+            let travel_rad = (angles[j] - spec.center_rad - self.offset_rad[j]) / self.gain[j];
+            (spec.offset_counts + spec.counts_per_rad * (spec.center_rad + travel_rad)).rem_euclid(spec.wrap_counts)
+        })
+    }
+
+    /// The corners of a tag as the camera at true `angles` sees them, if it does.
+    pub fn corners(&self, angles: &JointAngles, tag_idx: usize) -> Option<[[f64; 2]; 4]> {
+        let camera_from_base = self.robot.chain.link_poses(angles).frame(&self.camera).inverse();
+        let camera_from_tag = camera_from_base * self.base_from_tag[tag_idx];
+        let center = camera_from_tag.translation.vector;
+        let facing = -(camera_from_tag.rotation * Vector3::z()).dot(&center) / center.norm();
+        if !(0.25..2.0).contains(&center.norm()) || facing < 0.45 {
+            return None;
+        }
+        let h = 0.5 * self.robot.tags[tag_idx].size_m;
+        let mut corners = [[0.0; 2]; 4];
+        for (corner, [x, y]) in corners.iter_mut().zip([[-h, -h], [h, -h], [h, h], [-h, h]]) {
+            *corner = pixel(&self.robot.camera.lens, &(camera_from_tag * Point3::new(x, y, 0.0)))?;
+        }
+        Some(corners)
+    }
+
+    /// `n` random poses that see three tags or more.
+    pub fn shots(&self, set: CaptureSet, n: usize, rng: &mut ChaCha8Rng) -> Vec<Shot> {
+        let mut shots = Vec::new();
+        while shots.len() < n {
+            let angles = self.random_angles(rng);
+            let tags: Vec<_> = (0..self.robot.tags.len())
+                .filter_map(|idx| Some((self.robot.tags[idx].id, self.corners(&angles, idx)?)))
+                .collect();
+            if tags.len() >= 3 {
+                shots.push(Shot { set, angles, tags });
+            }
+        }
+        shots
+    }
+
+    /// Uniform within the limits; the last joint moves neither camera nor tool point and stays.
+    pub fn random_angles(&self, rng: &mut ChaCha8Rng) -> JointAngles {
+        JointAngles::from_fn(self.robot.n_joints(), |j| {
+            self.robot.chain.joints()[j].limits.map_or(0.0, |l| rng.random_range(l.lower_rad..l.upper_rad))
+        })
+    }
+
+    /// The messages of `shots`: readings, one image and a mark each, after the task.
+    pub fn messages(&self, shots: &[Shot]) -> Vec<(Stamp, Message)> {
+        let task = ReachTask {
+            stamp: SIMULATION_EPOCH,
+            targets_m: vec![[0.500, 1.620, 0.323], [1.242, -0.887, 0.457], [0.595, -0.966, -0.015]],
+            tolerance_m: 0.05,
+        };
+        let mut messages = vec![(SIMULATION_EPOCH, Message::Task(task))];
+        for (k, shot) in shots.iter().enumerate() {
+            let start = SIMULATION_EPOCH.plus_s(2.0 * (k + 1) as f64);
+            let (stamp, end) = (start.plus_s(0.2), start.plus_s(0.5));
+            let counts = self.counts(&shot.angles);
+            messages.push((stamp, Message::JointSensors(JointSensorSample { stamp, counts })));
+            let tags = shot.tags.iter().map(|&(id, corners_px)| TagDetection { id, corners_px, decision_margin: 60.0 });
+            messages.push((stamp, Message::Detections(TagDetections { stamp, tags: tags.collect() })));
+            let kind = MarkKind::Capture { set: shot.set, pose_idx: k as u32 };
+            messages.push((end, Message::Mark(Mark { start, end, kind })));
+        }
+        messages
+    }
+
+    pub fn recording(&self, shots: &[Shot]) -> Recording {
+        Recording {
+            path: "synthetic.mcap".into(),
+            messages: self.messages(shots),
+            joint_names: self.robot.joint_names(),
+            completeness: Completeness::Whole,
+            raw: Vec::new(),
+            unknown_topics: Default::default(),
+            rejected: Default::default(),
+            non_monotonic: 0,
+        }
+    }
+}
+
+/// Adds pixel noise to every corner coordinate.
+pub fn add_noise(shots: &mut [Shot], std_px: f64, rng: &mut ChaCha8Rng) {
+    for value in shots.iter_mut().flat_map(|s| &mut s.tags).flat_map(|(_, corners)| corners.as_flattened_mut()) {
+        *value += std_px * normal(rng);
+    }
+}
+
+fn small_motion(std_m: f64, std_rad: f64, rng: &mut ChaCha8Rng) -> Isometry3<f64> {
+    let translation = Translation3::from(std_m * normal3(rng));
+    Isometry3::from_parts(translation, UnitQuaternion::from_scaled_axis(std_rad * normal3(rng)))
+}
+
+/// Kannala-Brandt in polar form, within 1.25 rad of the axis and 10 px of the border.
+fn pixel(lens: &Fisheye, p: &Point3<f64>) -> Option<[f64; 2]> {
+    let theta = p.x.hypot(p.y).atan2(p.z);
+    let [k1, k2, k3, k4] = lens.distortion;
+    let radius = theta + k1 * theta.powi(3) + k2 * theta.powi(5) + k3 * theta.powi(7) + k4 * theta.powi(9);
+    let azimuth = p.y.atan2(p.x);
+    let u = lens.center_px[0] + lens.focal_px[0] * radius * azimuth.cos();
+    let v = lens.center_px[1] + lens.focal_px[1] * radius * azimuth.sin();
+    let [width, height] = lens.resolution_px.map(f64::from);
+    (theta < 1.25 && (10.0..width - 10.0).contains(&u) && (10.0..height - 10.0).contains(&v)).then_some([u, v])
+}

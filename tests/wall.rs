@@ -1,0 +1,257 @@
+//! What belief does not know: it gets a recording and a robot folder, and nothing of the truth comes with them.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use armcal::calib::Calibration;
+use armcal::log::{RecordingHeader, RecordingWriter, for_each_raw, read_attachments, read_recording, strip};
+use armcal::sim::truth::read_truth;
+use armcal::streams::{JointCounts, Message, Sink};
+
+use crate::support::{
+    SHARED_PUMP_FLOW_L_MIN, SHARED_SEED, calibrate, edit, read, robot_copy, robot_folder, root, shared_run, temp,
+};
+
+/// calibration.toml of a recording, made by the program.
+#[track_caller]
+fn calibration_of(recording: &Path, robot: &Path) -> String {
+    let out = temp();
+    calibrate(recording, robot, out.path()).expect("calibrate", 0, &["ACCEPTED"]);
+    read(&out.path().join("calibration.toml"))
+}
+
+#[test]
+fn a_recording_and_a_robot_are_all_that_calibration_takes() {
+    let run = shared_run();
+    let expected = read(&run.file("calibration.toml"));
+    assert!(calibration_of(&run.file("run.mcap"), &robot_folder()) == expected);
+
+    // In a folder of its own: nothing lies beside it.
+    let folder = temp();
+    let alone = folder.path().join("alone.mcap");
+    fs::copy(run.file("run.mcap"), &alone).expect("copied");
+    assert!(calibration_of(&alone, &robot_folder()) == expected, "without the truth");
+    fs::write(folder.path().join("truth.mcap"), "no truth at all").expect("written");
+    assert!(calibration_of(&alone, &robot_folder()) == expected, "beside a garbled truth");
+}
+
+#[test]
+fn attachments_and_metadata_do_not_matter() {
+    let run = shared_run();
+    let folder = temp();
+    let bare = folder.path().join("bare.mcap");
+    strip(run.file("run.mcap"), &bare).expect("stripped");
+    assert!(read_attachments(&bare).expect("it reads").is_empty());
+    assert!(calibration_of(&bare, &robot_folder()) == read(&run.file("calibration.toml")));
+}
+
+/// The same words twice as fine, in recording and datasheet alike.
+#[test]
+fn counts_twice_as_fine_halve_the_gains_and_change_nothing_else() {
+    let run = shared_run();
+    let recording = read_recording(run.file("run.mcap")).expect("it reads");
+    let folder = temp();
+    let path = folder.path().join("doubled.mcap");
+    let header = RecordingHeader::new(recording.joint_names.clone());
+    let mut writer = RecordingWriter::create(&path, header).expect("a file");
+    let double = |counts: &mut JointCounts| counts.iter_mut().for_each(|value| *value *= 2.0);
+    for (log_time, mut message) in recording.messages {
+        match &mut message {
+            Message::JointSensors(sample) => double(&mut sample.counts),
+            Message::JointCommand(command) => double(&mut command.counts),
+            _ => {}
+        }
+        writer.record(log_time, &message).expect("recorded");
+    }
+    writer.finish().expect("finished");
+
+    let robot = robot_copy(folder.path());
+    let fine = ["offset_counts", "scale_counts_per_deg", "wrap_counts", "noise_std_counts"];
+    let lines: Vec<String> = read(&robot.join("robot.toml"))
+        .lines()
+        .map(|line| match line.split_once(" = ") {
+            Some((key, value)) if fine.contains(&key) => {
+                format!("{key} = {:?}", 2.0 * value.parse::<f64>().expect("a number"))
+            }
+            _ => line.to_owned(),
+        })
+        .collect();
+    crate::support::write(&robot.join("robot.toml"), &lines.join("\n"));
+
+    let out = temp();
+    calibrate(&path, &robot, out.path()).expect("doubled", 0, &[]);
+    let doubled = Calibration::read(&out.path().join("calibration.toml")).expect("it reads");
+    let mut expected = Calibration::read(&run.file("calibration.toml")).expect("it reads");
+    assert_ne!(doubled.messages_hash, expected.messages_hash);
+    expected.messages_hash.clone_from(&doubled.messages_hash);
+    for joint in &mut expected.joint {
+        joint.gain_rad_per_count *= 0.5;
+        joint.gain_std_rad_per_count *= 0.5;
+    }
+    // Halving is exact in binary, so the rest is not just near but the same.
+    assert_eq!(doubled, expected);
+}
+
+/// Everything in a recording that a program could read: messages, types, channels, attachments, metadata, headers.
+fn all_contents(path: &Path) -> Vec<u8> {
+    let mut contents = Vec::new();
+    for_each_raw(path, |message| {
+        contents.extend_from_slice(message.data);
+        contents.extend(format!("{:?}", message.channel).bytes());
+    })
+    .expect("it reads");
+    for (name, bytes) in read_attachments(path).expect("it reads") {
+        contents.extend(name.bytes());
+        contents.extend(bytes);
+    }
+    let file = fs::read(path).expect("a file");
+    for record in mcap::read::LinearReader::new(&file).expect("an MCAP file") {
+        match record.expect("a whole record") {
+            mcap::records::Record::Metadata(metadata) => contents.extend(format!("{metadata:?}").bytes()),
+            mcap::records::Record::Header(header) => contents.extend(format!("{header:?}").bytes()),
+            _ => {}
+        }
+    }
+    // What is not compressed lies here once more.
+    contents.extend(file);
+    contents
+}
+
+fn find(contents: &[u8], needle: &[u8]) -> bool {
+    let first = needle[0];
+    contents.windows(needle.len()).any(|window| window[0] == first && window == needle)
+}
+
+#[test]
+fn the_recording_holds_neither_seed_nor_world() {
+    let run = shared_run();
+    let contents = all_contents(&run.file("run.mcap"));
+    let lower = contents.to_ascii_lowercase();
+    for word in ["seed", "gain_error", "as_built", "[world", "backlash", "harmonic", "drift_rad", "miss_probability"] {
+        assert!(!find(&lower, word.as_bytes()), "the recording holds `{word}`");
+    }
+    for text in [SHARED_SEED.to_string(), format!("{SHARED_SEED:x}"), SHARED_PUMP_FLOW_L_MIN.to_string()] {
+        assert!(!find(&contents, text.as_bytes()), "the recording holds `{text}`");
+    }
+    assert!(!find(&contents, &SHARED_SEED.to_le_bytes()) && !find(&contents, &SHARED_SEED.to_be_bytes()));
+
+    // The numbers themselves, as the truth has them; the search is good for something, for it finds them there.
+    let truth = read_truth(run.file("truth.mcap")).expect("it reads");
+    assert_eq!(truth.header.seed, SHARED_SEED);
+    let truth_contents = all_contents(&run.file("truth.mcap"));
+    assert!(find(&truth_contents, SHARED_SEED.to_string().as_bytes()));
+    for joint in &truth.header.as_built.joints {
+        for value in [joint.gain_error, joint.offset_error_rad, joint.harmonics[0].amplitude_rad] {
+            assert!(find(&truth_contents, value.to_string().as_bytes()) || find(&truth_contents, &value.to_le_bytes()));
+            assert!(!find(&contents, &value.to_le_bytes()) && !find(&contents, value.to_string().as_bytes()));
+        }
+    }
+    for state in truth.states.iter().step_by(997) {
+        assert!(!find(&contents, &state.angles[0].to_le_bytes()), "a true angle at {:?}", state.stamp);
+    }
+}
+
+#[test]
+fn attached_drawings_are_the_files_that_belief_may_read() {
+    let run = shared_run();
+    let attached: BTreeMap<String, Vec<u8>> =
+        read_attachments(run.file("run.mcap")).expect("it reads").into_iter().collect();
+    let names: Vec<&str> = attached.keys().map(String::as_str).collect();
+    assert_eq!(names, ["robot.toml", "scene.toml", "titan4.urdf", "vehicle.toml"]);
+    let robot_toml = fs::read(robot_folder().join("robot.toml")).expect("a file");
+    assert!(attached["robot.toml"] == robot_toml);
+}
+
+fn sources(folder: &Path) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    for entry in fs::read_dir(folder).expect("a source folder").flatten() {
+        let path = entry.path();
+        if path.is_dir() {
+            found.extend(sources(&path));
+        } else if path.extension().is_some_and(|extension| extension == "rs") {
+            found.push(path);
+        }
+    }
+    found
+}
+
+/// Top-level modules of the crate that a source names, by `crate::name` or `crate::{name, ..}`.
+fn modules_named(source: &str) -> Vec<String> {
+    let word = |text: &str| text.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect::<String>();
+    let mut names = Vec::new();
+    for prefix in ["crate::", "armcal::"] {
+        for (at, _) in source.match_indices(prefix) {
+            let rest = &source[at + prefix.len()..];
+            let Some(group) = rest.strip_prefix('{') else {
+                names.push(word(rest));
+                continue;
+            };
+            let mut depth = 0;
+            let mut is_start = true;
+            for (at, c) in group.char_indices() {
+                match c {
+                    '}' if depth == 0 => break,
+                    '{' => depth += 1,
+                    '}' => depth -= 1,
+                    ',' => is_start = true,
+                    c if is_start && depth == 0 && !c.is_whitespace() => {
+                        names.push(word(&group[at..]));
+                        is_start = false;
+                    }
+                    _ => {}
+                }
+            }
+        }
+    }
+    names
+}
+
+#[test]
+fn the_source_scan_sees_grouped_imports() {
+    let names = modules_named("use crate::{robot::{self, sim}, sim::World,\n stats};\nlet x = armcal::calib::y;");
+    assert_eq!(names, ["robot", "sim", "stats", "calib"]);
+}
+
+#[test]
+fn belief_never_names_the_simulator_and_truth_never_names_belief() {
+    let belief = ["calib", "plan", "verify", "session"];
+    for (folders, forbidden) in [(&belief[..], &["sim", "score", "cli", "report"][..]), (&["sim"], &belief[..])] {
+        for folder in folders {
+            let files = sources(&root().join("src").join(folder));
+            assert!(!files.is_empty(), "{folder}");
+            for file in files {
+                for name in modules_named(&read(&file)) {
+                    assert!(!forbidden.contains(&name.as_str()), "{} names crate::{name}", file.display());
+                }
+            }
+        }
+    }
+}
+
+/// Where streams and files of both sides meet, neither side is named.
+#[test]
+fn the_meeting_place_names_neither_side() {
+    for folder in ["streams", "log", "routine", "robot", "sensor", "kinematics", "optics", "spatial", "stats", "time"] {
+        for file in sources(&root().join("src").join(folder)) {
+            for name in modules_named(&read(&file)) {
+                let is_above =
+                    ["calib", "plan", "verify", "session", "sim", "score", "report", "cli"].contains(&name.as_str());
+                assert!(!is_above, "{} names crate::{name}", file.display());
+            }
+        }
+    }
+}
+
+/// The wall is of this robot: an edit of its drawing does change the result, so the tests above compare something.
+#[test]
+fn the_robot_folder_does_matter() {
+    let run = shared_run();
+    let folder = temp();
+    let robot = robot_copy(folder.path());
+    edit(&robot.join("robot.toml"), "position_m = [-0.4785, 0.45, -0.4]", "position_m = [-0.4785, 0.46, -0.4]");
+    let out = temp();
+    let answer = calibrate(&run.file("run.mcap"), &robot, out.path());
+    assert!([0, 4].contains(&answer.code), "{answer:?}");
+    assert!(read(&out.path().join("calibration.toml")) != read(&run.file("calibration.toml")));
+}
