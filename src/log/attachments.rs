@@ -1,44 +1,36 @@
 //! Files attached to a recording. For viewers: belief never reads them.
 
+use std::fs::File;
+use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
 
-use mcap::records::Record;
-use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
+use mcap::records::{Record, op};
 
 use super::error::LogError;
+use super::raw::file_contents;
 
 /// Attachments are drawings; a larger one is passed over.
-const MAX_BYTES: usize = 16 << 20;
+const MAX_BYTES: u64 = 16 << 20;
 
-/// Name and bytes of every readable attachment, in the order of the file. A cut file gives those before the cut.
+/// Name and bytes of every attachment that passes its checksum, in the order of the file. A cut file gives those before
+/// the cut. Messages are passed over unread.
 ///
 /// # Errors
-/// [`LogError::Read`].
+/// As [`super::for_each_raw`].
 pub fn read_attachments(path: impl AsRef<Path>) -> Result<Vec<(String, Vec<u8>)>, LogError> {
     let path = path.as_ref();
     let read = |source| LogError::Read { path: path.to_owned(), source };
-    let bytes = std::fs::read(path).map_err(read)?;
-    let mut rest = bytes.as_slice();
-    let options = LinearReaderOptions::default().with_skip_end_magic(true).with_emit_chunks(true);
-    let mut reader = LinearReader::new_with_options(options.with_record_length_limit(bytes.len()));
+    let contents = file_contents(path)?;
+    let mut file = File::open(path).map_err(read)?;
     let mut found = Vec::new();
-    while let Some(event) = reader.next_event() {
-        match event {
-            Ok(LinearReadEvent::ReadRequest(wanted)) => {
-                let n = wanted.min(rest.len());
-                reader.insert(n).copy_from_slice(&rest[..n]);
-                reader.notify_read(n);
-                rest = &rest[n..];
-            }
-            Ok(LinearReadEvent::Record { data, opcode }) => {
-                if let Ok(Record::Attachment { header, data, .. }) = mcap::parse_record(opcode, data)
-                    && data.len() <= MAX_BYTES
-                {
-                    found.push((header.name, data.into_owned()));
-                }
-            }
-            // What follows a damage cannot be found without its lengths; what came before it is good.
-            Err(_) => break,
+    for attachment in contents.attachments.iter().filter(|attachment| attachment.bytes <= MAX_BYTES) {
+        let (at, len) = attachment.record;
+        let mut record = Vec::new();
+        file.seek(SeekFrom::Start(at)).map_err(read)?;
+        // The head is small beside the data, or it is none.
+        Read::by_ref(&mut file).take(len.min(2 * MAX_BYTES)).read_to_end(&mut record).map_err(read)?;
+        if let Ok(Record::Attachment { header, data, .. }) = mcap::parse_record(op::ATTACHMENT, &record) {
+            found.push((header.name, data.into_owned()));
         }
     }
     Ok(found)

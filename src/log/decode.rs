@@ -1,5 +1,7 @@
 //! From the bytes of ROS messages to messages, or to the reason why not.
 
+use std::collections::BTreeSet;
+
 use serde::Deserialize;
 
 use super::cdr;
@@ -8,8 +10,8 @@ use super::ros::{self, Time};
 use super::topics::Stream;
 use crate::streams::{
     Attitude, CaptureSet, JointAngles, JointCommand, JointCounts, JointSensorSample, JointStateBelief, LogLevel,
-    LogLine, MAX_JOINTS, Mark, MarkKind, Message, Phase, PressureSample, ReachAttempt, ReachTask, TagDetection,
-    TagDetections, TemperatureSample, Thermometer,
+    LogLine, MAX_JOINTS, Mark, MarkKind, Message, Phase, PressureSample, ReachAttempt, ReachTask, RecordedSurvey,
+    RecordedTag, Start, TagDetection, TagDetections, TemperatureSample, Thermometer,
 };
 
 /// How far a quaternion's length may be from 1. Float32 senders are within 1e-6; a zero quaternion is far off.
@@ -58,6 +60,7 @@ pub(super) fn decode_message(stream: Stream, bytes: &[u8], names: &mut FirstName
         Stream::DepthPressure => Message::Pressure(pressure(&cdr::decode(bytes)?)?),
         Stream::VehicleImu => Message::Attitude(attitude(&cdr::decode(bytes)?)?),
         Stream::Task => Message::Task(task(&cdr::decode(bytes)?)?),
+        Stream::TagSurvey => Message::Survey(survey(&cdr::decode(bytes)?)?),
         Stream::Marks => Message::Mark(mark(&cdr::decode(bytes)?)?),
         Stream::Log => Message::Log(log_line(cdr::decode(bytes)?)?),
     })
@@ -130,16 +133,21 @@ fn pressure(m: &ros::FluidPressure) -> Result<PressureSample, Rejection> {
     })
 }
 
+fn orientation(quaternion: &ros::Quaternion) -> Result<[f64; 4], Rejection> {
+    let wxyz = quaternion.wxyz();
+    finite("orientation", wxyz)?;
+    let length = wxyz.iter().map(|c| c * c).sum::<f64>().sqrt();
+    if (length - 1.0).abs() > QUATERNION_LENGTH_TOLERANCE {
+        return Err(Rejection::QuaternionLength);
+    }
+    Ok(wxyz)
+}
+
 fn attitude(m: &ros::Imu) -> Result<Attitude, Rejection> {
     if m.orientation_covariance[0] < 0.0 {
         return Err(Rejection::NoOrientation);
     }
-    let quaternion_wxyz = m.orientation.wxyz();
-    finite("orientation", quaternion_wxyz)?;
-    let length = quaternion_wxyz.iter().map(|c| c * c).sum::<f64>().sqrt();
-    if (length - 1.0).abs() > QUATERNION_LENGTH_TOLERANCE {
-        return Err(Rejection::QuaternionLength);
-    }
+    let quaternion_wxyz = orientation(&m.orientation)?;
     let angular_velocity_rad_s = m.angular_velocity.into();
     let specific_force_m_s2 = m.linear_acceleration.into();
     finite("angular_velocity", angular_velocity_rad_s)?;
@@ -158,10 +166,47 @@ fn task(m: &ros::ReachTask) -> Result<ReachTask, Rejection> {
     Ok(ReachTask { stamp: m.header.stamp.try_into()?, targets_m, tolerance_m: m.tolerance_m })
 }
 
+/// A survey is used whole or not at all: one tag at a wrong place would spoil the rest.
+fn survey(m: &ros::TagSurvey) -> Result<RecordedSurvey, Rejection> {
+    let tags = m.tags.iter().map(surveyed_tag).collect::<Result<Vec<_>, _>>()?;
+    let ids: BTreeSet<u32> = tags.iter().map(|tag| tag.id).collect();
+    if ids.len() != tags.len() {
+        return Err(Rejection::TagTwice);
+    }
+    if !ids.contains(&m.base_tag) {
+        return Err(Rejection::NoBaseTag);
+    }
+    Ok(RecordedSurvey { stamp: m.header.stamp.try_into()?, base_tag: m.base_tag, tags })
+}
+
+fn surveyed_tag(tag: &ros::SurveyedTag) -> Result<RecordedTag, Rejection> {
+    let position_m = tag.pose.position.into();
+    finite("position", position_m)?;
+    finite("size_m", [tag.size_m])?;
+    finite("standard deviation", [tag.position_std_m, tag.rotation_std_rad])?;
+    if tag.size_m <= 0.0 {
+        return Err(Rejection::TagSize);
+    }
+    if tag.position_std_m < 0.0 || tag.rotation_std_rad < 0.0 {
+        return Err(Rejection::NegativeVariance);
+    }
+    Ok(RecordedTag {
+        id: tag.id,
+        size_m: tag.size_m,
+        position_m,
+        quaternion_wxyz: orientation(&tag.pose.orientation)?,
+        position_std_m: tag.position_std_m,
+        rotation_std_rad: tag.rotation_std_rad,
+    })
+}
+
 fn mark(m: &ros::Mark) -> Result<Mark, Rejection> {
     let kind = match m.kind.as_str() {
         "capture_fit" => MarkKind::Capture { set: CaptureSet::Fit, pose_idx: m.index },
         "capture_held_out" => MarkKind::Capture { set: CaptureSet::HeldOut, pose_idx: m.index },
+        "identify" => MarkKind::Identify { joint_idx: m.index },
+        "calibrate" => MarkKind::Calibrate(Start::Fresh),
+        "recalibrate" => MarkKind::Calibrate(Start::Warm),
         "reach_before" => MarkKind::Reach { attempt: ReachAttempt::Before, target_idx: m.index },
         "reach_after" => MarkKind::Reach { attempt: ReachAttempt::After, target_idx: m.index },
         "phase_plan" => MarkKind::Phase(Phase::Plan),
@@ -170,6 +215,7 @@ fn mark(m: &ros::Mark) -> Result<Mark, Rejection> {
         "phase_capture" => MarkKind::Phase(Phase::Capture),
         "phase_calibrate" => MarkKind::Phase(Phase::Calibrate),
         "phase_reach" => MarkKind::Phase(Phase::Reach),
+        "phase_wait" => MarkKind::Phase(Phase::Wait),
         "phase_done" => MarkKind::Phase(Phase::Done),
         _ => return Err(Rejection::MarkKind),
     };
@@ -243,6 +289,27 @@ mod tests {
         assert_eq!(temperature(&hot, Thermometer::Oil), Err(Rejection::NotFinite { field: "temperature" }));
         let tag = ros::AprilTagDetection { id: -1, ..Default::default() };
         assert_eq!(detection(&tag), Err(Rejection::NegativeTagId));
+        let survey_of = |edit: fn(&mut ros::TagSurvey)| {
+            let mut tag = ros::SurveyedTag { id: 3, size_m: 0.1, ..Default::default() };
+            tag.pose.orientation.w = 1.0;
+            let mut m = ros::TagSurvey {
+                base_tag: 3,
+                tags: vec![tag.clone(), ros::SurveyedTag { id: 4, ..tag }],
+                ..Default::default()
+            };
+            edit(&mut m);
+            survey(&m).map(|m| m.tags.len())
+        };
+        assert_eq!(survey_of(|_| ()), Ok(2));
+        assert_eq!(survey_of(|m| m.base_tag = 5), Err(Rejection::NoBaseTag));
+        assert_eq!(survey_of(|m| m.tags[1].id = 3), Err(Rejection::TagTwice));
+        assert_eq!(survey_of(|m| m.tags[1].size_m = 0.0), Err(Rejection::TagSize));
+        assert_eq!(survey_of(|m| m.tags[0].position_std_m = -1.0), Err(Rejection::NegativeVariance));
+        assert_eq!(survey_of(|m| m.tags[0].pose.orientation.w = 0.0), Err(Rejection::QuaternionLength));
+        assert_eq!(
+            survey_of(|m| m.tags[0].pose.position.x = f64::NAN),
+            Err(Rejection::NotFinite { field: "position" })
+        );
         let kind = ros::Mark { kind: "nap".into(), ..Default::default() };
         assert_eq!(mark(&kind), Err(Rejection::MarkKind));
     }

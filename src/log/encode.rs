@@ -8,7 +8,7 @@ use super::ros::{self, PixelPoint, Quaternion, Time};
 use super::writer::RecordingHeader;
 use crate::streams::{
     Attitude, CaptureSet, LogLevel, LogLine, Mark, MarkKind, Message, Phase, PressureSample, ReachAttempt, ReachTask,
-    TagDetection, TagDetections, TemperatureSample,
+    RecordedSurvey, RecordedTag, Start, TagDetection, TagDetections, TemperatureSample,
 };
 use crate::time::Stamp;
 
@@ -41,6 +41,7 @@ pub(super) fn encode_message(
         Message::Pressure(m) => Ok(cdr::encode(&pressure(m, header)?, out)?),
         Message::Attitude(m) => Ok(cdr::encode(&attitude(m, header)?, out)?),
         Message::Task(m) => Ok(cdr::encode(&task(m, header)?, out)?),
+        Message::Survey(m) => Ok(cdr::encode(&survey(m, header)?, out)?),
         Message::Mark(m) => Ok(cdr::encode(&mark(m)?, out)?),
         Message::Log(m) => Ok(cdr::encode(&log_line(m)?, out)?),
     }
@@ -111,6 +112,21 @@ fn task(m: &ReachTask, header: &RecordingHeader) -> Result<ros::ReachTask, Encod
     })
 }
 
+fn survey(m: &RecordedSurvey, header: &RecordingHeader) -> Result<ros::TagSurvey, EncodeError> {
+    let tag = |tag: &RecordedTag| ros::SurveyedTag {
+        id: tag.id,
+        size_m: tag.size_m,
+        pose: ros::Pose { position: tag.position_m.into(), orientation: Quaternion::from_wxyz(tag.quaternion_wxyz) },
+        position_std_m: tag.position_std_m,
+        rotation_std_rad: tag.rotation_std_rad,
+    };
+    Ok(ros::TagSurvey {
+        header: ros_header(m.stamp, &header.base_frame)?,
+        base_tag: m.base_tag,
+        tags: m.tags.iter().map(tag).collect(),
+    })
+}
+
 fn mark(m: &Mark) -> Result<ros::Mark, EncodeError> {
     let (kind, index) = mark_kind(m.kind);
     Ok(ros::Mark { start: m.start.try_into()?, end: m.end.try_into()?, kind: kind.to_owned(), index })
@@ -121,6 +137,9 @@ fn mark_kind(kind: MarkKind) -> (&'static str, u32) {
     match kind {
         MarkKind::Capture { set: CaptureSet::Fit, pose_idx } => ("capture_fit", pose_idx),
         MarkKind::Capture { set: CaptureSet::HeldOut, pose_idx } => ("capture_held_out", pose_idx),
+        MarkKind::Identify { joint_idx } => ("identify", joint_idx),
+        MarkKind::Calibrate(Start::Fresh) => ("calibrate", 0),
+        MarkKind::Calibrate(Start::Warm) => ("recalibrate", 0),
         MarkKind::Reach { attempt: ReachAttempt::Before, target_idx } => ("reach_before", target_idx),
         MarkKind::Reach { attempt: ReachAttempt::After, target_idx } => ("reach_after", target_idx),
         MarkKind::Phase(phase) => {
@@ -131,6 +150,7 @@ fn mark_kind(kind: MarkKind) -> (&'static str, u32) {
                 Phase::Capture => "phase_capture",
                 Phase::Calibrate => "phase_calibrate",
                 Phase::Reach => "phase_reach",
+                Phase::Wait => "phase_wait",
                 Phase::Done => "phase_done",
             };
             (name, 0)

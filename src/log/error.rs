@@ -12,7 +12,7 @@ pub enum LogError {
     Read { path: PathBuf, source: std::io::Error },
     #[error("{}: the file is empty, not a recording", path.display())]
     Empty { path: PathBuf },
-    #[error("{}: not an MCAP recording: it begins with the bytes {found}, not with 89 4d 43 41 50 30 0d 0a", path.display())]
+    #[error("{}: not an MCAP recording: {found}", path.display())]
     NotMcap { path: PathBuf, found: String },
     #[error("{}: the directory {} does not exist", path.display(), directory.display())]
     NoDirectory { path: PathBuf, directory: PathBuf },
@@ -80,6 +80,12 @@ pub enum Rejection {
     QuaternionLength,
     #[error("tolerance_m is not above 0")]
     Tolerance,
+    #[error("a surveyed tag has no size")]
+    TagSize,
+    #[error("the survey has a tag twice")]
+    TagTwice,
+    #[error("the survey's base tag is none of its tags")]
+    NoBaseTag,
     #[error("unknown kind of mark")]
     MarkKind,
     #[error("the mark ends before it starts")]

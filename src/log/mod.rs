@@ -26,8 +26,11 @@ pub use attachments::read_attachments;
 pub use cdr::{CdrError, decode, encode};
 pub use error::{EncodeError, LogError, Rejection};
 pub use hash::{MessageHasher, hash_messages};
-pub use raw::{Channel, Completeness, RawMessage, RawSummary, Schema, for_each_raw};
-pub use reader::{RawRecord, Recording, TopicMap, read_recording, read_recording_with};
+pub use raw::{
+    AttachmentInfo, Channel, ChunkTotals, Completeness, FileContents, RawMessage, RawSummary, Schema, file_contents,
+    for_each_raw,
+};
+pub use reader::{RawRecord, Recording, TopicMap, read_recording, read_recording_with, scan_recording};
 pub use schema::{RosMessage, RosSchema};
 pub use strip::strip;
 pub use writer::{RecordingHeader, RecordingWriter};

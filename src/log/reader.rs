@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::decode::{FirstNames, decode_message};
 use super::error::{LogError, Rejection};
-use super::raw::{Completeness, RawMessage, for_each_raw};
+use super::raw::{Completeness, RawMessage, RawSummary, for_each_raw};
 use super::topics::{Stream, VIEWER_TOPICS};
 use crate::streams::Message;
 use crate::time::Stamp;
@@ -64,13 +64,31 @@ pub fn read_recording(path: impl AsRef<Path>) -> Result<Recording, LogError> {
 /// # Errors
 /// [`LogError::Read`], [`LogError::Empty`], [`LogError::NotMcap`].
 pub fn read_recording_with(path: impl AsRef<Path>, map: &TopicMap) -> Result<Recording, LogError> {
-    let path = path.as_ref();
-    let mut collector = Collector::new(map);
-    let summary = for_each_raw(path, |message| collector.take(message))?;
-    Ok(collector.finish(path, summary.completeness))
+    scan_recording(path, map, |_| {}, |_, _| true).map(|(recording, _)| recording)
 }
 
-struct Collector<'a> {
+/// Reads a recording of any length: `on_raw` gets every message before it is decoded, and of those that are decoded only
+/// the ones stay in memory for which `keep` says so. The counts of the result are of all messages.
+///
+/// # Errors
+/// As [`read_recording_with`].
+pub fn scan_recording(
+    path: impl AsRef<Path>,
+    map: &TopicMap,
+    mut on_raw: impl FnMut(&RawMessage<'_>),
+    keep: impl FnMut(Stamp, &Message) -> bool,
+) -> Result<(Recording, RawSummary), LogError> {
+    let path = path.as_ref();
+    let mut collector = Collector::new(map, keep);
+    let summary = for_each_raw(path, |message| {
+        on_raw(message);
+        collector.take(message);
+    })?;
+    Ok((collector.finish(path, summary.completeness.clone()), summary))
+}
+
+struct Collector<'a, F> {
+    keep: F,
     map: &'a TopicMap,
     streams: BTreeMap<&'a str, Stream>,
     /// Topic and joint names of each stream of joints.
@@ -83,8 +101,8 @@ struct Collector<'a> {
     non_monotonic: u64,
 }
 
-impl<'a> Collector<'a> {
-    fn new(map: &'a TopicMap) -> Self {
+impl<'a, F: FnMut(Stamp, &Message) -> bool> Collector<'a, F> {
+    fn new(map: &'a TopicMap, keep: F) -> Self {
         let mut streams: BTreeMap<&str, Stream> = Stream::ALL.iter().map(|&stream| (stream.topic(), stream)).collect();
         let mapped = [(Stream::JointSensors, &map.joint_sensors), (Stream::Detections, &map.detections)];
         for (stream, topic) in mapped {
@@ -95,6 +113,7 @@ impl<'a> Collector<'a> {
         }
         streams.retain(|&topic, _| !map.raw.contains(topic));
         Self {
+            keep,
             map,
             streams,
             names: BTreeMap::new(),
@@ -116,7 +135,9 @@ impl<'a> Collector<'a> {
         match check(stream, raw).and_then(|()| decode_message(stream, raw.data, names)) {
             Ok(message) => {
                 self.count_order(raw.log_time());
-                self.messages.push((raw.log_time(), message));
+                if (self.keep)(raw.log_time(), &message) {
+                    self.messages.push((raw.log_time(), message));
+                }
             }
             Err(rejection) => self.reject(topic, &rejection, 1),
         }

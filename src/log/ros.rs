@@ -243,6 +243,24 @@ pub struct ReachTask {
     pub tolerance_m: f64,
 }
 
+/// armcal_msgs/msg/SurveyedTag: `pose` in the frame of the survey's header, m; one sigma per axis.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct SurveyedTag {
+    pub id: u32,
+    pub size_m: f64,
+    pub pose: Pose,
+    pub position_std_m: f64,
+    pub rotation_std_rad: f64,
+}
+
+/// armcal_msgs/msg/TagSurvey: where the tags are.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct TagSurvey {
+    pub header: Header,
+    pub base_tag: u32,
+    pub tags: Vec<SurveyedTag>,
+}
+
 /// armcal_msgs/msg/Mark: what the span `start..=end` was for.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Mark {

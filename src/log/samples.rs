@@ -3,8 +3,8 @@
 use super::writer::{RecordingHeader, RecordingWriter};
 use crate::streams::{
     Attitude, CaptureSet, JointAngles, JointCommand, JointCounts, JointSensorSample, JointStateBelief, LogLevel,
-    LogLine, Mark, MarkKind, Message, Phase, PressureSample, ReachAttempt, ReachTask, Sink, TagDetection,
-    TagDetections, TemperatureSample, Thermometer,
+    LogLine, Mark, MarkKind, Message, Phase, PressureSample, ReachAttempt, ReachTask, RecordedSurvey, RecordedTag,
+    Sink, Start, TagDetection, TagDetections, TemperatureSample, Thermometer,
 };
 use crate::time::{SIMULATION_EPOCH, Stamp};
 use std::path::Path;
@@ -17,10 +17,22 @@ fn marks(stamp: Stamp) -> Vec<Message> {
     let kinds = [
         MarkKind::Capture { set: CaptureSet::Fit, pose_idx: 3 },
         MarkKind::Capture { set: CaptureSet::HeldOut, pose_idx: 4 },
+        MarkKind::Identify { joint_idx: 2 },
+        MarkKind::Calibrate(Start::Fresh),
+        MarkKind::Calibrate(Start::Warm),
         MarkKind::Reach { attempt: ReachAttempt::Before, target_idx: 5 },
         MarkKind::Reach { attempt: ReachAttempt::After, target_idx: 6 },
     ];
-    let phases = [Phase::Plan, Phase::Move, Phase::Settle, Phase::Capture, Phase::Calibrate, Phase::Reach, Phase::Done];
+    let phases = [
+        Phase::Plan,
+        Phase::Move,
+        Phase::Settle,
+        Phase::Capture,
+        Phase::Calibrate,
+        Phase::Reach,
+        Phase::Wait,
+        Phase::Done,
+    ];
     let kinds = kinds.into_iter().chain(phases.map(MarkKind::Phase));
     kinds.map(|kind| Message::Mark(Mark { start: stamp, end: stamp.plus_s(0.5), kind })).collect()
 }
@@ -34,6 +46,14 @@ pub fn one_of_each() -> Vec<Message> {
         Message::Temperature(TemperatureSample { stamp, thermometer, temperature_c: 41.3, variance_c2: 0.04 })
     };
     let log = |level| Message::Log(LogLine { stamp, level, name: "arm".into(), text: "µ settled".into() });
+    let tag_at = |id, x_m| RecordedTag {
+        id,
+        size_m: 0.15,
+        position_m: [x_m, -0.4, 0.123_456_789],
+        quaternion_wxyz: [0.1, 0.7, -0.1, 0.7],
+        position_std_m: 0.001,
+        rotation_std_rad: 0.0035,
+    };
     let mut messages = vec![
         Message::JointSensors(JointSensorSample { stamp, counts: JointCounts::from_slice(&[1.0, 2047.5, 4095.0]) }),
         Message::JointCommand(JointCommand { stamp, counts: JointCounts::from_slice(&[-1.0, 0.1, 4095.0]) }),
@@ -50,6 +70,7 @@ pub fn one_of_each() -> Vec<Message> {
             specific_force_m_s2: [0.0, 0.1, 9.81],
         }),
         Message::Task(ReachTask { stamp, targets_m: vec![[1.0, 0.2, -0.3], [0.9, 0.0, 0.1]], tolerance_m: 0.01 }),
+        Message::Survey(RecordedSurvey { stamp, base_tag: 12, tags: vec![tag_at(3, 1.1), tag_at(12, -0.2)] }),
     ];
     messages.extend(marks(stamp));
     messages.extend([LogLevel::Debug, LogLevel::Info, LogLevel::Warn, LogLevel::Error].map(log));

@@ -169,6 +169,20 @@ message!(
 );
 
 message!(
+    ros::TagSurvey,
+    "armcal_msgs/msg/TagSurvey",
+    "std_msgs/Header header\nuint32 base_tag\narmcal_msgs/SurveyedTag[] tags\n",
+    header!(),
+    dependency!(
+        "armcal_msgs/SurveyedTag",
+        "uint32 id\nfloat64 size_m\ngeometry_msgs/Pose pose\nfloat64 position_std_m\nfloat64 rotation_std_rad\n"
+    ),
+    dependency!("geometry_msgs/Pose", "geometry_msgs/Point position\ngeometry_msgs/Quaternion orientation\n"),
+    point!(),
+    quaternion!(),
+);
+
+message!(
     ros::Mark,
     "armcal_msgs/msg/Mark",
     "builtin_interfaces/Time start\nbuiltin_interfaces/Time end\nstring kind\nuint32 index\n",
@@ -193,6 +207,7 @@ mod tests {
             ros::Log::SCHEMA,
             ros::AprilTagDetectionArray::SCHEMA,
             ros::ReachTask::SCHEMA,
+            ros::TagSurvey::SCHEMA,
             ros::Mark::SCHEMA,
         ];
         for schema in schemas {

@@ -16,6 +16,7 @@ pub const WATER_TEMPERATURE: &str = "/temperature/water";
 pub const DEPTH_PRESSURE: &str = "/depth_pressure";
 pub const VEHICLE_IMU: &str = "/vehicle/imu";
 pub const TASK: &str = "/task";
+pub const TAG_SURVEY: &str = "/tag_survey";
 pub const MARKS: &str = "/marks";
 pub const LOG: &str = "/log";
 
@@ -40,12 +41,13 @@ pub enum Stream {
     DepthPressure,
     VehicleImu,
     Task,
+    TagSurvey,
     Marks,
     Log,
 }
 
 impl Stream {
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 12] = [
         Self::JointSensors,
         Self::JointCommands,
         Self::JointStates,
@@ -55,6 +57,7 @@ impl Stream {
         Self::DepthPressure,
         Self::VehicleImu,
         Self::Task,
+        Self::TagSurvey,
         Self::Marks,
         Self::Log,
     ];
@@ -74,6 +77,7 @@ impl Stream {
             Message::Pressure(_) => Self::DepthPressure,
             Message::Attitude(_) => Self::VehicleImu,
             Message::Task(_) => Self::Task,
+            Message::Survey(_) => Self::TagSurvey,
             Message::Mark(_) => Self::Marks,
             Message::Log(_) => Self::Log,
         }
@@ -92,6 +96,7 @@ impl Stream {
             Self::DepthPressure => DEPTH_PRESSURE,
             Self::VehicleImu => VEHICLE_IMU,
             Self::Task => TASK,
+            Self::TagSurvey => TAG_SURVEY,
             Self::Marks => MARKS,
             Self::Log => LOG,
         }
@@ -107,6 +112,7 @@ impl Stream {
             Self::DepthPressure => &ros::FluidPressure::SCHEMA,
             Self::VehicleImu => &ros::Imu::SCHEMA,
             Self::Task => &ros::ReachTask::SCHEMA,
+            Self::TagSurvey => &ros::TagSurvey::SCHEMA,
             Self::Marks => &ros::Mark::SCHEMA,
             Self::Log => &ros::Log::SCHEMA,
         }

@@ -25,6 +25,8 @@ pub enum ArmError {
     SetPoint { joint: usize, counts: f64 },
     #[error("the arm's state is no longer finite at {at_s:.3} s: the step is too large for its stiffness")]
     NotFinite { at_s: f64 },
+    #[error("fault number {number} cannot be brought about: the arm knows {known}")]
+    NoSuchFault { number: usize, known: usize },
 }
 
 /// An arm that can be told where to go, simulated or real. It tells back only through messages.
@@ -46,4 +48,24 @@ pub trait Arm {
 
     /// Length of a control period, s.
     fn period_s(&self) -> f64;
+
+    /// Lets at least `seconds` pass with the arm at rest; an arm may send fewer messages meanwhile than [`Self::step`] does.
+    ///
+    /// # Errors
+    /// As [`Self::step`].
+    fn idle(&mut self, seconds: f64, sink: &mut dyn Sink) -> Result<(), ArmError> {
+        let until = self.now().plus_s(seconds);
+        while self.now() < until {
+            self.step(sink)?;
+        }
+        Ok(())
+    }
+
+    /// Something breaks now: fault `number` of a list that only a simulated arm holds. Nobody tells the caller what it is.
+    ///
+    /// # Errors
+    /// [`ArmError::NoSuchFault`]; always, for a real arm.
+    fn fault(&mut self, number: usize) -> Result<(), ArmError> {
+        Err(ArmError::NoSuchFault { number, known: 0 })
+    }
 }

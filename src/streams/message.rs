@@ -20,6 +20,8 @@ pub enum Message {
     Attitude(Attitude),
     /// What the arm is calibrated for.
     Task(ReachTask),
+    /// Where the tags are, where the vehicle says it and not the robot's file.
+    Survey(RecordedSurvey),
     /// A span of the recording that means something.
     Mark(Mark),
     Log(LogLine),
@@ -98,6 +100,27 @@ pub struct ReachTask {
     pub tolerance_m: f64,
 }
 
+/// Tags as surveyed before the dive, in the base frame: what belief takes for known.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RecordedSurvey {
+    pub stamp: Stamp,
+    /// The tag beside the base; one of `tags`.
+    pub base_tag: u32,
+    pub tags: Vec<RecordedTag>,
+}
+
+/// One tag of a survey: `base_from_tag` as numbers, that they come out of a file as they went in.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RecordedTag {
+    pub id: u32,
+    /// Side of the black square.
+    pub size_m: f64,
+    pub position_m: [f64; 3],
+    pub quaternion_wxyz: [f64; 4],
+    pub position_std_m: f64,
+    pub rotation_std_rad: f64,
+}
+
 /// Which share of the data a captured view belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum CaptureSet {
@@ -107,9 +130,21 @@ pub enum CaptureSet {
     HeldOut,
 }
 
+/// What a calibration starts from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Start {
+    /// The datasheet.
+    Fresh,
+    /// The last accepted calibration of the same recording; what the new views do not determine keeps its value.
+    Warm,
+}
+
+/// Under which sensors a target was reached for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum ReachAttempt {
+    /// The datasheet's.
     Before,
+    /// Calibrated ones.
     After,
 }
 
@@ -122,6 +157,8 @@ pub enum Phase {
     Capture,
     Calibrate,
     Reach,
+    /// The arm rests while the world goes on.
+    Wait,
     Done,
 }
 
@@ -129,6 +166,11 @@ pub enum Phase {
 pub enum MarkKind {
     /// The arm stood still over the mark's span: detections and readings in it belong together.
     Capture { set: CaptureSet, pose_idx: u32 },
+    /// The arm stood still, and since the first such view of `joint_idx` no other joint was told to move: what the camera's
+    /// turn against the readings says about the sensor's scale.
+    Identify { joint_idx: u32 },
+    /// A calibration from the views captured within the span.
+    Calibrate(Start),
     /// The arm came to rest for a target.
     Reach { attempt: ReachAttempt, target_idx: u32 },
     /// A phase began at `start`.

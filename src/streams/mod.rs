@@ -5,11 +5,12 @@
 
 mod arm;
 mod message;
+mod survey;
 
 pub use crate::joints::{JointAngles, JointCounts, MAX_JOINTS};
 pub use arm::{Arm, ArmError, Sink, SinkError};
 pub use message::{
     Attitude, CaptureSet, JointCommand, JointSensorSample, JointStateBelief, LogLevel, LogLine, Mark, MarkKind,
-    Message, Phase, PressureSample, ReachAttempt, ReachTask, TagDetection, TagDetections, TemperatureSample,
-    Thermometer,
+    Message, Phase, PressureSample, ReachAttempt, ReachTask, RecordedSurvey, RecordedTag, Start, TagDetection,
+    TagDetections, TemperatureSample, Thermometer,
 };

@@ -5,6 +5,8 @@
 //! against the file's size. Memory needed is that of the largest chunk, not of the file.
 
 mod chunk;
+mod contents;
+mod foreign;
 mod record;
 mod scan;
 mod window;
@@ -19,6 +21,7 @@ use std::rc::Rc;
 
 use super::error::LogError;
 use crate::time::Stamp;
+pub use contents::{AttachmentInfo, ChunkTotals, FileContents};
 use scan::ScanError;
 
 /// Type of a topic's messages, as the file declares it.
@@ -95,6 +98,7 @@ pub enum Completeness {
 pub struct RawSummary {
     pub completeness: Completeness,
     pub readable_messages: u64,
+    pub contents: FileContents,
 }
 
 /// Hands every readable message of an MCAP file to `visit`, in the order of the file.
@@ -106,11 +110,44 @@ pub struct RawSummary {
 /// [`LogError::Read`], [`LogError::Empty`], [`LogError::NotMcap`]. Damage and cuts are no errors, see [`Completeness`].
 pub fn for_each_raw(path: impl AsRef<Path>, visit: impl FnMut(&RawMessage<'_>)) -> Result<RawSummary, LogError> {
     let path = path.as_ref();
-    let read_error = |source| LogError::Read { path: path.to_owned(), source };
-    let file = File::open(path).map_err(read_error)?;
-    scan::scan(file, visit).map_err(|error| match error {
-        ScanError::Read(source) => read_error(source),
+    scan::scan(open(path)?, visit).map_err(|error| of_scan(path, error))
+}
+
+/// What a file holds besides messages. Its messages are passed over, so damage within chunks is not noticed, and large
+/// files are read quickly.
+///
+/// # Errors
+/// As [`for_each_raw`].
+pub fn file_contents(path: impl AsRef<Path>) -> Result<FileContents, LogError> {
+    let path = path.as_ref();
+    scan::scan_contents(open(path)?).map_err(|error| of_scan(path, error))
+}
+
+fn open(path: &Path) -> Result<File, LogError> {
+    if path.is_dir() {
+        let source = std::io::Error::other(describe_folder(path));
+        return Err(LogError::Read { path: path.to_owned(), source });
+    }
+    File::open(path).map_err(|source| LogError::Read { path: path.to_owned(), source })
+}
+
+/// Recordings in the folder, for it may be that of a run or of a ROS 2 bag.
+fn describe_folder(path: &Path) -> String {
+    let names = std::fs::read_dir(path).into_iter().flatten().flatten().map(|entry| entry.file_name());
+    let mut names: Vec<String> = names.filter_map(|name| name.into_string().ok()).collect();
+    names.retain(|name| name.ends_with(".mcap") || name.ends_with(".mcap.partial"));
+    names.sort();
+    match names.len() {
+        0 => "it is a folder, and no .mcap file lies in it".to_owned(),
+        n if n <= 8 => format!("it is a folder; name one of its files: {}", names.join(", ")),
+        n => format!("it is a folder; name one of its {n} .mcap files"),
+    }
+}
+
+fn of_scan(path: &Path, error: ScanError) -> LogError {
+    match error {
+        ScanError::Read(source) => LogError::Read { path: path.to_owned(), source },
         ScanError::Empty => LogError::Empty { path: path.to_owned() },
         ScanError::NotMcap { found } => LogError::NotMcap { path: path.to_owned(), found },
-    })
+    }
 }

@@ -67,8 +67,18 @@ impl<'a> Fields<'a> {
         self.take(usize::try_from(len).ok()?)
     }
 
-    fn text(&mut self) -> Option<String> {
+    pub fn text(&mut self) -> Option<String> {
         self.blob().and_then(|bytes| std::str::from_utf8(bytes).ok()).map(str::to_owned)
+    }
+
+    /// Pairs of texts behind a length of four bytes.
+    pub fn pairs(&mut self) -> Option<BTreeMap<String, String>> {
+        let mut fields = Fields(self.blob()?);
+        let mut pairs = BTreeMap::new();
+        while !fields.0.is_empty() {
+            pairs.insert(fields.text()?, fields.text()?);
+        }
+        Some(pairs)
     }
 }
 
@@ -148,11 +158,7 @@ impl Tables {
         let schema = self.schemas.get(&fields.u16()?).cloned();
         let topic = fields.text()?;
         let message_encoding = fields.text()?;
-        let mut pairs = Fields(fields.blob()?);
-        let mut metadata = BTreeMap::new();
-        while !pairs.0.is_empty() {
-            metadata.insert(pairs.text()?, pairs.text()?);
-        }
+        let metadata = fields.pairs()?;
         self.channels.insert(id, Channel { topic, message_encoding, metadata, schema });
         Some(())
     }

@@ -5,6 +5,8 @@ use std::io::{self, Read, Seek};
 use mcap::records::op;
 
 use super::chunk;
+use super::contents::{FileContents, MAX_HEAD_BYTES};
+use super::foreign;
 use super::record::{
     CHUNK_HEAD_BYTES, ChunkHead, DATA_END_BYTES, FOOTER_BYTES, Fields, MAGIC, PREFIX_BYTES, Prefix, Tables,
     is_message_index,
@@ -14,6 +16,8 @@ use super::{Completeness, RawMessage, RawSummary};
 
 /// Bytes looked through at once for the next chunk.
 const SEARCH_BYTES: u64 = 1 << 18;
+/// A summary or a cut chunk longer than this is not looked at: memory for it is bounded by nothing else.
+const MAX_UNCHECKED_BYTES: u64 = 1 << 28;
 /// Prefix and fields of the last record, and the magic behind it.
 const TAIL_BYTES: u64 = PREFIX_BYTES as u64 + FOOTER_BYTES + MAGIC.len() as u64;
 
@@ -64,23 +68,41 @@ struct Scan<R, F> {
     ends_with_magic: bool,
     has_chunks: bool,
     is_past_data: bool,
+    contents: FileContents,
+    /// Whether chunks are only counted.
+    skips_chunks: bool,
     /// Behind the last chunk, or the start: here the walk was surely at a record's begin.
     verified_end: u64,
 }
 
 /// Hands every readable message of `source` to `visit`.
 pub fn scan<R: Read + Seek>(source: R, visit: impl FnMut(&RawMessage<'_>)) -> Result<RawSummary, ScanError> {
+    let mut scan = begin(source, visit)?;
+    scan.read_summary()?;
+    scan.walk()?;
+    let contents = std::mem::take(&mut scan.contents);
+    Ok(RawSummary { readable_messages: scan.readable, completeness: scan.completeness(), contents })
+}
+
+/// What `source` holds besides messages; its chunks are not read.
+pub fn scan_contents<R: Read + Seek>(source: R) -> Result<FileContents, ScanError> {
+    let mut scan = begin(source, |_| {})?;
+    scan.skips_chunks = true;
+    scan.walk()?;
+    Ok(scan.contents)
+}
+
+fn begin<R: Read + Seek, F: FnMut(&RawMessage<'_>)>(source: R, visit: F) -> Result<Scan<R, F>, ScanError> {
     let mut window = Window::new(source)?;
-    let start_len = window.len().min(MAGIC.len() as u64) as usize;
-    let start = window.bytes(0, start_len)?;
+    let bytes = window.len();
+    let start = window.bytes(0, bytes.min(foreign::START_BYTES as u64) as usize)?;
     if start.is_empty() {
         return Err(ScanError::Empty);
     }
-    if start != MAGIC {
-        let found = start.iter().map(|byte| format!("{byte:02x}")).collect::<Vec<_>>().join(" ");
-        return Err(ScanError::NotMcap { found });
+    if !start.starts_with(MAGIC) {
+        return Err(ScanError::NotMcap { found: foreign::describe(start) });
     }
-    let mut scan = Scan {
+    Ok(Scan {
         window,
         visit,
         tables: Tables::default(),
@@ -91,11 +113,10 @@ pub fn scan<R: Read + Seek>(source: R, visit: impl FnMut(&RawMessage<'_>)) -> Re
         ends_with_magic: false,
         has_chunks: false,
         is_past_data: false,
+        contents: FileContents { bytes, ..FileContents::default() },
+        skips_chunks: false,
         verified_end: MAGIC.len() as u64,
-    };
-    scan.read_summary()?;
-    scan.walk()?;
-    Ok(RawSummary { readable_messages: scan.readable, completeness: scan.completeness() })
+    })
 }
 
 impl<R: Read + Seek, F: FnMut(&RawMessage<'_>)> Scan<R, F> {
@@ -123,6 +144,10 @@ impl<R: Read + Seek, F: FnMut(&RawMessage<'_>)> Scan<R, F> {
             self.damage.note(len - TAIL_BYTES, "the footer points nowhere");
             return Ok(());
         };
+        if end - start > MAX_UNCHECKED_BYTES {
+            self.damage.note(summary_start, "the summary is too long");
+            return Ok(());
+        }
         let bytes = self.window.bytes(start, usize::try_from(end - start).unwrap_or(usize::MAX))?;
         match chunk::verified_summary(bytes) {
             Ok(records) => self.take_summary(&records),
@@ -177,7 +202,13 @@ impl<R: Read + Seek, F: FnMut(&RawMessage<'_>)> Scan<R, F> {
         }
         match prefix.opcode {
             op::DATA_END => self.is_past_data = true,
-            op::SCHEMA | op::CHANNEL | op::MESSAGE => self.unchunked(at, prefix)?,
+            op::SCHEMA | op::CHANNEL | op::MESSAGE if !self.skips_chunks => self.unchunked(at, prefix)?,
+            op::HEADER | op::ATTACHMENT | op::METADATA => {
+                let (at, len) = (at + PREFIX_BYTES as u64, prefix.len);
+                let body = self.window.bytes(at, len.min(MAX_HEAD_BYTES) as usize)?;
+                // Malformed ones are left out: belief never reads them.
+                let _ = self.contents.take(prefix.opcode, body, (at, len));
+            }
             _ => {}
         }
         Ok(Next::At(at + PREFIX_BYTES as u64 + prefix.len))
@@ -234,6 +265,9 @@ impl<R: Read + Seek, F: FnMut(&RawMessage<'_>)> Scan<R, F> {
         let record_bytes = PREFIX_BYTES as u64 + head.record_len;
         self.has_chunks = true;
         self.verified_end = at + record_bytes;
+        if self.skips_chunks {
+            return Ok(Next::At(at + record_bytes));
+        }
         let bytes = self.window.bytes(at, usize::try_from(record_bytes).unwrap_or(usize::MAX))?;
         let (tables, visit, readable) = (&mut self.tables, &mut self.visit, &mut self.readable);
         let mut unusable = 0_u64;
@@ -246,7 +280,10 @@ impl<R: Read + Seek, F: FnMut(&RawMessage<'_>)> Scan<R, F> {
             self.damage.note(at, &format!("a chunk cannot be read: {error}"));
             self.damage.chunks += 1;
             self.damage.bytes += record_bytes;
-        } else if unusable > 0 {
+            return Ok(Next::At(at + record_bytes));
+        }
+        self.contents.add_chunk(&head);
+        if unusable > 0 {
             self.damage
                 .note(at, &format!("{unusable} records of a chunk cannot be used, their topic's declaration is lost"));
         }
@@ -278,7 +315,10 @@ impl<R: Read + Seek, F: FnMut(&RawMessage<'_>)> Scan<R, F> {
 
     /// Takes the messages from the beginning of a cut chunk.
     fn salvage(&mut self, at: u64) -> io::Result<()> {
-        let left = usize::try_from(self.window.len() - at).unwrap_or(usize::MAX);
+        if self.skips_chunks {
+            return Ok(());
+        }
+        let left = (self.window.len() - at).min(MAX_UNCHECKED_BYTES) as usize;
         let bytes = self.window.bytes(at, left)?;
         let Some(head) = ChunkHead::parse(&bytes[..left.min(CHUNK_HEAD_BYTES)]) else {
             return Ok(());

@@ -1,0 +1,72 @@
+//! What a file holds besides messages.
+
+use std::collections::BTreeMap;
+
+use mcap::records::op;
+
+use super::record::{ChunkHead, Fields};
+
+/// Bytes of a header, metadata or attachment record that are looked at.
+pub const MAX_HEAD_BYTES: u64 = 1 << 20;
+
+/// How many bytes lie in chunks of one compression.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ChunkTotals {
+    pub chunks: u64,
+    pub compressed_bytes: u64,
+    pub uncompressed_bytes: u64,
+}
+
+/// An attached file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct AttachmentInfo {
+    pub name: String,
+    pub media_type: String,
+    pub bytes: u64,
+    /// The record's fields: where they begin in the file, and their length.
+    pub(in crate::log) record: (u64, u64),
+}
+
+/// What a file holds besides messages, as far as it can be read.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct FileContents {
+    /// Length of the file, bytes.
+    pub bytes: u64,
+    /// `ros2`, `ros1`, empty or another.
+    pub profile: String,
+    /// The program that wrote it.
+    pub library: String,
+    /// Readable chunks by compression: `zstd`, `lz4` or empty.
+    pub chunks: BTreeMap<&'static str, ChunkTotals>,
+    pub attachments: Vec<AttachmentInfo>,
+    pub metadata: Vec<(String, BTreeMap<String, String>)>,
+}
+
+impl FileContents {
+    pub(super) fn add_chunk(&mut self, head: &ChunkHead) {
+        let totals = self.chunks.entry(head.compression).or_default();
+        totals.chunks += 1;
+        totals.compressed_bytes += head.compressed_bytes;
+        totals.uncompressed_bytes += head.uncompressed_bytes;
+    }
+
+    /// Takes a header, metadata or attachment record, of whose `record` fields `body` is the beginning; `None` if it is
+    /// malformed.
+    pub(super) fn take(&mut self, opcode: u8, body: &[u8], record: (u64, u64)) -> Option<()> {
+        let mut fields = Fields(body);
+        match opcode {
+            op::HEADER => (self.profile, self.library) = (fields.text()?, fields.text()?),
+            op::METADATA => self.metadata.push((fields.text()?, fields.pairs()?)),
+            op::ATTACHMENT => {
+                let _log_and_create_time = (fields.u64()?, fields.u64()?);
+                let (name, media_type, bytes) = (fields.text()?, fields.text()?, fields.u64()?);
+                if bytes > record.1 {
+                    return None;
+                }
+                self.attachments.push(AttachmentInfo { name, media_type, bytes, record });
+            }
+            _ => {}
+        }
+        Some(())
+    }
+}

@@ -1,0 +1,36 @@
+//! A survey of tags on its way into a recording and out of it.
+
+use super::message::{RecordedSurvey, RecordedTag};
+use crate::robot::{SurveyedTag, TagSurvey};
+use crate::spatial::Pose;
+use crate::time::Stamp;
+
+impl RecordedSurvey {
+    #[must_use]
+    pub fn new(stamp: Stamp, survey: &TagSurvey) -> Self {
+        let tag = |tag: &SurveyedTag| RecordedTag {
+            id: tag.id,
+            size_m: tag.size_m,
+            position_m: tag.base_from_tag.origin().to_array(),
+            quaternion_wxyz: tag.base_from_tag.quaternion_wxyz(),
+            position_std_m: tag.position_std_m,
+            rotation_std_rad: tag.rotation_std_rad,
+        };
+        Self { stamp, base_tag: survey.base_tag, tags: survey.tags.iter().map(tag).collect() }
+    }
+
+    /// The survey that it holds; a tag without a direction, which no recording gives back, is left out.
+    #[must_use]
+    pub fn survey(&self) -> TagSurvey {
+        let tag = |tag: &RecordedTag| {
+            Some(SurveyedTag {
+                id: tag.id,
+                size_m: tag.size_m,
+                base_from_tag: Pose::from_position_quaternion_wxyz(tag.position_m, tag.quaternion_wxyz)?,
+                position_std_m: tag.position_std_m,
+                rotation_std_rad: tag.rotation_std_rad,
+            })
+        };
+        TagSurvey { base_tag: self.base_tag, tags: self.tags.iter().filter_map(tag).collect() }
+    }
+}
