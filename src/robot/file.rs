@@ -1,17 +1,17 @@
 //! robot.toml to checked types.
 
-use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
 use super::error::{FileIssue, RobotError, parse_toml, read_text};
+use super::survey::{SurveyedTag, TagFile, TagSurvey, check_tags};
 use super::urdf::{LinkBody, UrdfModel};
-use super::vehicle::check_place;
+use super::vehicle::Vehicle;
 use crate::joints::JointAngles;
 use crate::kinematics::{Attachment, Chain};
 use crate::optics::Fisheye;
-use crate::spatial::{Base, Pose, Tag};
+use crate::spatial::{Base, Pose};
 
 /// An arm as drawn and surveyed.
 #[derive(Clone, Debug)]
@@ -30,6 +30,8 @@ pub struct Robot {
     pub tags: Vec<SurveyedTag>,
     pub base_tag: u32,
     pub stowed: JointAngles,
+    /// Weight of the displaced sea water over the arm's own weight.
+    pub buoyancy_fraction: f64,
 }
 
 /// Kind of joint sensor; decides which effects belief expects of it.
@@ -61,7 +63,21 @@ pub struct JointSensorSpec {
     pub noise_std_counts: f64,
     /// One sigma of what a straight line leaves of the sensor's error: nonlinearity, temperature, wear.
     pub linearity_std_rad: f64,
+    /// One sigma of what the offset changes by with the oil's temperature.
+    pub temperature_std_rad_per_k: f64,
+    /// One sigma of what the offset walks away by in an hour; it grows with the root of time.
+    pub drift_std_rad_per_sqrt_h: f64,
     pub max_rate_rad_s: f64,
+}
+
+impl JointSensorSpec {
+    /// The same sensor with `ratio` times as many counts per radian; the reading in the middle of the range stays.
+    #[must_use]
+    pub fn with_scale(&self, ratio: f64) -> Self {
+        let counts_per_rad = ratio * self.counts_per_rad;
+        let offset_counts = self.offset_counts + (self.counts_per_rad - counts_per_rad) * self.center_rad;
+        Self { counts_per_rad, offset_counts, ..self.clone() }
+    }
 }
 
 #[derive(Clone, Debug)]
@@ -81,16 +97,6 @@ pub struct CameraSpec {
     pub mount_std_rad: f64,
 }
 
-/// A tag whose place is known by survey.
-#[derive(Clone, Debug)]
-pub struct SurveyedTag {
-    pub id: u32,
-    pub size_m: f64,
-    pub base_from_tag: Pose<Base, Tag>,
-    pub position_std_m: f64,
-    pub rotation_std_rad: f64,
-}
-
 impl Robot {
     #[must_use]
     pub fn n_joints(&self) -> usize {
@@ -105,6 +111,44 @@ impl Robot {
     #[must_use]
     pub fn joint_names(&self) -> Vec<String> {
         self.sensors.iter().map(|s| s.joint.clone()).collect()
+    }
+
+    /// The same arm with the tags of `survey`.
+    #[must_use]
+    pub fn with_survey(mut self, survey: TagSurvey) -> Self {
+        self.tags = survey.tags;
+        self.base_tag = survey.base_tag;
+        self
+    }
+
+    /// The arm on `vehicle`: with the vehicle's tags and the angles that it stows this arm at, where it has any.
+    ///
+    /// # Errors
+    /// [`RobotError`] naming the vehicle's file when it stows another number of joints.
+    pub fn mounted_on(mut self, vehicle: &Vehicle) -> Result<Self, RobotError> {
+        if let Some(stowed_rad) = vehicle.stowed_rad.get(&self.name) {
+            let key = format!("stowed_rad.{}", self.name);
+            self.stowed = check_stowed(&vehicle.file, &key, stowed_rad, self.n_joints())?;
+        }
+        Ok(match &vehicle.survey {
+            Some(survey) => self.with_survey(survey.clone()),
+            None => self,
+        })
+    }
+
+    /// The same arm with sensors `scale` times as far from a straight line.
+    #[must_use]
+    pub fn with_linearity(mut self, scale: f64) -> Self {
+        for sensor in &mut self.sensors {
+            sensor.linearity_std_rad *= scale;
+        }
+        self
+    }
+
+    /// The tags around the arm.
+    #[must_use]
+    pub fn survey(&self) -> TagSurvey {
+        TagSurvey { base_tag: self.base_tag, tags: self.tags.clone() }
     }
 
     /// Whether the arm can be simulated: each moving body has mass.
@@ -132,6 +176,9 @@ struct RobotFile {
     base_link: String,
     base_tag: u32,
     stowed_rad: Vec<f64>,
+    /// A Titan's, where the file says nothing: 100 kg in air, 78 kg in sea water.
+    #[serde(default = "usual_buoyancy")]
+    buoyancy_fraction: f64,
     tool: ToolFile,
     joint_sensor: Vec<SensorFile>,
     camera: CameraFile,
@@ -161,7 +208,16 @@ struct SensorFile {
     offset_bound_rad: f64,
     noise_std_counts: f64,
     linearity_std_rad: f64,
+    #[serde(default = "usual_change")]
+    temperature_std_rad_per_k: f64,
+    #[serde(default = "usual_change")]
+    drift_std_rad_per_sqrt_h: f64,
     max_rate_rad_s: f64,
+}
+
+/// 0.02 deg a kelvin and 0.02 deg in an hour, for datasheets that say nothing.
+fn usual_change() -> f64 {
+    0.00035
 }
 
 #[derive(Deserialize)]
@@ -180,16 +236,8 @@ struct CameraFile {
     mount_std_rad: f64,
 }
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct TagFile {
-    id: u32,
-    family: String,
-    size_m: f64,
-    position_m: [f64; 3],
-    quaternion_wxyz: [f64; 4],
-    position_std_m: f64,
-    rotation_std_rad: f64,
+fn usual_buoyancy() -> f64 {
+    0.22
 }
 
 /// Reads a robot folder: robot.toml and the URDF that it names.
@@ -204,10 +252,7 @@ pub fn load(folder: &Path) -> Result<Robot, RobotError> {
     let chain = urdf.chain(&raw.base_link, &[&raw.tool.link, &raw.camera.link])?;
     let bodies = urdf.bodies(&raw.base_link, &chain)?;
     let sensors = check_sensors(&file, &raw.joint_sensor, &chain)?;
-    if raw.stowed_rad.len() != chain.n_joints() || !raw.stowed_rad.iter().all(|v| v.abs() <= 100.0) {
-        let problem = format!("needs {} angles within 100 rad, one a joint", chain.n_joints());
-        return Err(FileIssue::new(&file, "stowed_rad", problem).into());
-    }
+    let stowed = check_stowed(&file, "stowed_rad", &raw.stowed_rad, chain.n_joints())?;
     let mut tool = urdf.attachment(&raw.base_link, &raw.tool.link, &chain)?;
     for value in raw.tool.point_m {
         FileIssue::check_range(&file, "tool.point_m", value, -10.0..=10.0)?;
@@ -215,14 +260,15 @@ pub fn load(folder: &Path) -> Result<Robot, RobotError> {
     tool.link_from_frame *= nalgebra::Translation3::from(raw.tool.point_m);
     let camera_mount = urdf.attachment(&raw.base_link, &raw.camera.link, &chain)?;
     let camera = check_camera(&file, raw.camera, camera_mount)?;
-    let tags = check_tags(&file, &raw.tag, raw.base_tag)?;
+    let tags = check_tags(&file, &raw.tag, raw.base_tag, &Pose::<Base, Base>::identity())?;
     Ok(Robot {
         name: raw.name,
         folder: folder.to_owned(),
         urdf_name: raw.urdf.file_name().map_or_else(|| "robot.urdf".to_owned(), |n| n.to_string_lossy().into_owned()),
         urdf_text: urdf.text,
         base_link: raw.base_link,
-        stowed: JointAngles::from_slice(&raw.stowed_rad),
+        stowed,
+        buoyancy_fraction: FileIssue::check_range(&file, "buoyancy_fraction", raw.buoyancy_fraction, 0.0..=0.95)?,
         tool: ToolSpec { mount: tool },
         base_tag: raw.base_tag,
         chain,
@@ -231,6 +277,14 @@ pub fn load(folder: &Path) -> Result<Robot, RobotError> {
         camera,
         tags,
     })
+}
+
+fn check_stowed(file: &Path, key: &str, angles_rad: &[f64], n_joints: usize) -> Result<JointAngles, RobotError> {
+    if angles_rad.len() != n_joints || !angles_rad.iter().all(|v| v.abs() <= 100.0) {
+        let problem = format!("needs {n_joints} angles within 100 rad, one a joint");
+        return Err(FileIssue::new(file, key, problem).into());
+    }
+    Ok(JointAngles::from_slice(angles_rad))
 }
 
 fn check_sensors(file: &Path, raw: &[SensorFile], chain: &Chain) -> Result<Vec<JointSensorSpec>, RobotError> {
@@ -272,6 +326,8 @@ fn check_sensors(file: &Path, raw: &[SensorFile], chain: &Chain) -> Result<Vec<J
                 gain_bound: check("gain_bound", s.gain_bound, 0.0..=0.5)?,
                 offset_bound_rad: check("offset_bound_rad", s.offset_bound_rad, 0.0..=3.2)?,
                 linearity_std_rad: check("linearity_std_rad", s.linearity_std_rad, 0.0..=1.0)?,
+                temperature_std_rad_per_k: check("temperature_std_rad_per_k", s.temperature_std_rad_per_k, 0.0..=0.1)?,
+                drift_std_rad_per_sqrt_h: check("drift_std_rad_per_sqrt_h", s.drift_std_rad_per_sqrt_h, 0.0..=0.1)?,
                 noise_std_counts: check("noise_std_counts", s.noise_std_counts, 0.0..=1e6)?,
                 max_rate_rad_s: check("max_rate_rad_s", s.max_rate_rad_s, 1e-3..=20.0)?,
             })
@@ -314,33 +370,4 @@ fn check_camera(file: &Path, raw: CameraFile, mount: Attachment) -> Result<Camer
         mount_std_m: check("mount_std_m", raw.mount_std_m, 0.0..=1.0)?,
         mount_std_rad: check("mount_std_rad", raw.mount_std_rad, 0.0..=1.0)?,
     })
-}
-
-fn check_tags(file: &Path, raw: &[TagFile], base_tag: u32) -> Result<Vec<SurveyedTag>, RobotError> {
-    let mut seen = BTreeSet::new();
-    let mut tags = Vec::new();
-    for tag in raw {
-        let key = |name: &str| format!("tag {}: {name}", tag.id);
-        if !seen.insert(tag.id) {
-            return Err(FileIssue::new(file, key("id"), "stands twice").into());
-        }
-        if tag.family != "36h11" {
-            let problem = format!("`{}` is not supported; use \"36h11\"", tag.family);
-            return Err(FileIssue::new(file, key("family"), problem).into());
-        }
-        check_place(file, &key("position_m"), &tag.position_m)?;
-        let base_from_tag = Pose::from_position_quaternion_wxyz(tag.position_m, tag.quaternion_wxyz)
-            .ok_or_else(|| FileIssue::new(file, key("position_m, quaternion_wxyz"), "must be finite, not zero"))?;
-        tags.push(SurveyedTag {
-            id: tag.id,
-            size_m: FileIssue::check_range(file, &key("size_m"), tag.size_m, 1e-3..=10.0)?,
-            base_from_tag,
-            position_std_m: FileIssue::check_range(file, &key("position_std_m"), tag.position_std_m, 0.0..=1.0)?,
-            rotation_std_rad: FileIssue::check_range(file, &key("rotation_std_rad"), tag.rotation_std_rad, 0.0..=1.0)?,
-        });
-    }
-    if !tags.is_empty() && !seen.contains(&base_tag) {
-        return Err(FileIssue::new(file, "base_tag", format!("tag {base_tag} is not among the [[tag]]s")).into());
-    }
-    Ok(tags)
 }

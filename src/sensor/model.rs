@@ -106,6 +106,8 @@ mod tests {
             offset_bound_rad: 0.0873,
             noise_std_counts: 2.0,
             linearity_std_rad: 0.002,
+            temperature_std_rad_per_k: 0.0,
+            drift_std_rad_per_sqrt_h: 0.0,
             max_rate_rad_s: 0.5,
         }
     }

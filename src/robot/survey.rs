@@ -1,0 +1,91 @@
+//! Tags whose places are known: those of robot.toml, or of the vehicle that carries them.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use super::error::{FileIssue, RobotError};
+use super::part::check_place;
+use crate::spatial::{Base, Frame, Pose, Tag};
+
+/// A tag whose place is known by survey.
+#[derive(Clone, Debug)]
+pub struct SurveyedTag {
+    pub id: u32,
+    pub size_m: f64,
+    pub base_from_tag: Pose<Base, Tag>,
+    pub position_std_m: f64,
+    pub rotation_std_rad: f64,
+}
+
+/// All tags around an arm.
+#[derive(Clone, Debug)]
+pub struct TagSurvey {
+    /// The tag beside the base; shown in the replay.
+    pub base_tag: u32,
+    pub tags: Vec<SurveyedTag>,
+}
+
+impl TagSurvey {
+    /// The tags of these numbers alone. The base tag is the first of them if it is not among them itself.
+    pub(crate) fn only(&self, ids: &[u32]) -> Result<Self, String> {
+        let known: Vec<u32> = self.tags.iter().map(|tag| tag.id).collect();
+        match ids.iter().find(|id| !known.contains(id)) {
+            Some(id) => return Err(format!("tag {id} is none of {known:?}")),
+            None if ids.is_empty() => return Err("needs one tag or more".to_owned()),
+            None => {}
+        }
+        let base_tag = if ids.contains(&self.base_tag) { self.base_tag } else { ids[0] };
+        let tags = self.tags.iter().filter(|tag| ids.contains(&tag.id)).cloned().collect();
+        Ok(Self { base_tag, tags })
+    }
+}
+
+/// A `[[tag]]` as files write it, placed in the owner's frame.
+#[derive(Clone, Debug, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct TagFile {
+    id: u32,
+    family: String,
+    size_m: f64,
+    position_m: [f64; 3],
+    quaternion_wxyz: [f64; 4],
+    position_std_m: f64,
+    rotation_std_rad: f64,
+}
+
+/// Checks the tags of `file`, which places them in the frame `Owner`.
+pub(super) fn check_tags<Owner: Frame>(
+    file: &Path,
+    raw: &[TagFile],
+    base_tag: u32,
+    base_from_owner: &Pose<Base, Owner>,
+) -> Result<Vec<SurveyedTag>, RobotError> {
+    let mut seen = BTreeSet::new();
+    let mut tags = Vec::new();
+    for tag in raw {
+        let key = |name: &str| format!("tag {}: {name}", tag.id);
+        if !seen.insert(tag.id) {
+            return Err(FileIssue::new(file, key("id"), "stands twice").into());
+        }
+        if tag.family != "36h11" {
+            let problem = format!("`{}` is not supported; use \"36h11\"", tag.family);
+            return Err(FileIssue::new(file, key("family"), problem).into());
+        }
+        check_place(file, &key("position_m"), &tag.position_m)?;
+        let owner_from_tag: Pose<Owner, Tag> = Pose::from_position_quaternion_wxyz(tag.position_m, tag.quaternion_wxyz)
+            .ok_or_else(|| FileIssue::new(file, key("position_m, quaternion_wxyz"), "must be finite, not zero"))?;
+        tags.push(SurveyedTag {
+            id: tag.id,
+            size_m: FileIssue::check_range(file, &key("size_m"), tag.size_m, 1e-3..=10.0)?,
+            base_from_tag: *base_from_owner * owner_from_tag,
+            position_std_m: FileIssue::check_range(file, &key("position_std_m"), tag.position_std_m, 0.0..=1.0)?,
+            rotation_std_rad: FileIssue::check_range(file, &key("rotation_std_rad"), tag.rotation_std_rad, 0.0..=1.0)?,
+        });
+    }
+    if !tags.is_empty() && !seen.contains(&base_tag) {
+        return Err(FileIssue::new(file, "base_tag", format!("tag {base_tag} is not among the [[tag]]s")).into());
+    }
+    Ok(tags)
+}
