@@ -4,8 +4,12 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
+use super::campaign::{CampaignFile, CampaignSettings, RegressSettings};
+use super::overrides::{Overrides, read_with};
 use super::scene::Scene;
-use crate::robot::{FileIssue, PartFile, RobotError, parse_toml, read_text};
+use super::script::{self, Script};
+use super::step::{MoveGoal, Step};
+use crate::robot::{self, FileIssue, PartFile, Robot, RobotError, Vehicle, check_parts, parse_toml, read_text};
 
 /// A calibration method by its name in files and on the command line.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -44,12 +48,67 @@ pub struct Routine {
     pub seed: u64,
     pub method: Method,
     pub scene: Scene,
+    /// The only tags that are there; all of the vehicle's or the robot's where it says nothing.
+    pub tags: Option<Vec<u32>>,
     /// The scene alone, as TOML, to travel with a recording.
     pub scene_toml: String,
     pub capture: CaptureSettings,
     pub task: TaskSettings,
+    /// What to do, in order.
+    pub steps: Vec<Step>,
     /// The truth's settings, unread.
     pub world: toml::Table,
+    /// What breaks at the script's `fault` steps, unread.
+    pub faults: Vec<toml::Table>,
+    /// What `armcal campaign` runs; a single run does not look at it.
+    pub campaign: CampaignSettings,
+    /// What `armcal regress` lets pass.
+    pub regress: RegressSettings,
+}
+
+impl Routine {
+    /// Reads the robot and its vehicle, with the tags that the routine says are there.
+    ///
+    /// # Errors
+    /// [`RoutineError`] naming file, key and allowed range.
+    pub fn load_arm(&self) -> Result<(Robot, Vehicle), RoutineError> {
+        let mut vehicle = robot::load_vehicle(&self.vehicle_file)?;
+        let mut robot = robot::load(&self.robot_folder)?.mounted_on(&vehicle)?;
+        if let Some(ids) = &self.tags {
+            let survey =
+                robot.survey().only(ids).map_err(|problem| FileIssue::new(&self.file, "site.tags", problem))?;
+            robot = robot.with_survey(survey.clone());
+            vehicle.survey = Some(survey);
+        }
+        self.check_against(&robot)?;
+        Ok((robot, vehicle))
+    }
+
+    /// What only the robot can tell: whether the steps fit its joints.
+    ///
+    /// # Errors
+    /// [`RoutineError`] naming the step.
+    fn check_against(&self, robot: &Robot) -> Result<(), RoutineError> {
+        let joints = robot.joint_names();
+        for (index, step) in self.steps.iter().enumerate() {
+            let key = format!("step {} ({})", index + 1, step.name());
+            let problem = match step {
+                Step::Identify(settings) => match joints.iter().position(|name| *name == settings.joint) {
+                    None => format!("joint `{}` is none of {joints:?}", settings.joint),
+                    Some(joint) if joint >= robot.camera.mount.n_joints => {
+                        format!("joint `{}` does not move the camera, so no view can tell its scale", settings.joint)
+                    }
+                    Some(_) => continue,
+                },
+                Step::Move(MoveGoal::Angles(angles)) if angles.len() != joints.len() => {
+                    format!("to_rad has {} angles, robot `{}` has {} joints", angles.len(), robot.name, joints.len())
+                }
+                _ => continue,
+            };
+            return Err(FileIssue::new(&self.file, key, problem).into());
+        }
+        Ok(())
+    }
 }
 
 /// How views are captured.
@@ -88,6 +147,20 @@ impl CaptureSettings {
     }
     fn default_dwell_s() -> f64 {
         1.0
+    }
+}
+
+impl CaptureSettings {
+    /// `prefix` goes before the keys in messages.
+    pub(super) fn check(&self, file: &Path, prefix: &str) -> Result<(), FileIssue> {
+        let check =
+            |key: &str, value: f64, range| FileIssue::check_range(file, &format!("{prefix}{key}"), value, range);
+        check("poses", f64::from(self.poses), 3.0..=1000.0)?;
+        check("held_out", f64::from(self.held_out), 3.0..=1000.0)?;
+        check("min_tags", f64::from(self.min_tags), 1.0..=100.0)?;
+        check("clearance_m", self.clearance_m, 0.0..=1.0)?;
+        check("dwell_s", self.dwell_s, 0.2..=60.0)?;
+        Ok(())
     }
 }
 
@@ -145,7 +218,13 @@ struct RoutineFile {
     capture: CaptureSettings,
     task: TaskSettings,
     #[serde(default)]
+    step: Vec<toml::Table>,
+    #[serde(default)]
     world: toml::Table,
+    #[serde(default)]
+    campaign: CampaignFile,
+    #[serde(default)]
+    regress: RegressSettings,
 }
 
 fn first_seed() -> u64 {
@@ -156,6 +235,8 @@ fn first_seed() -> u64 {
 #[serde(deny_unknown_fields)]
 struct SiteFile {
     seafloor_z_m: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    tags: Option<Vec<u32>>,
 }
 
 /// The part of a routine that says what surrounds the vehicle.
@@ -169,12 +250,13 @@ struct SceneFile {
 }
 
 impl SceneFile {
-    fn check(&self, file: &Path) -> Result<Scene, RoutineError> {
+    /// The scene, and itself without the files of meshes.
+    fn check(self, file: &Path) -> Result<(Scene, Self), RoutineError> {
         if let Some(z) = self.site.seafloor_z_m {
             FileIssue::check_range(file, "site.seafloor_z_m", z, -1e4..=0.0)?;
         }
-        let obstacles = self.obstacle.iter().map(|part| part.check(file, "obstacle")).collect::<Result<_, _>>()?;
-        Ok(Scene { seafloor_z_m: self.site.seafloor_z_m, obstacles })
+        let (obstacles, plain) = check_parts(&self.obstacle, file, "obstacle")?;
+        Ok((Scene { seafloor_z_m: self.site.seafloor_z_m, obstacles }, Self { obstacle: plain, ..self }))
     }
 }
 
@@ -183,7 +265,7 @@ impl SceneFile {
 /// # Errors
 /// [`RoutineError`] naming file, key and allowed range.
 pub fn load_scene(file: &Path) -> Result<Scene, RoutineError> {
-    parse_toml::<SceneFile>(file, &read_text(file)?)?.check(file)
+    Ok(parse_toml::<SceneFile>(file, &read_text(file)?)?.check(file)?.0)
 }
 
 /// Reads a routine file.
@@ -191,14 +273,18 @@ pub fn load_scene(file: &Path) -> Result<Scene, RoutineError> {
 /// # Errors
 /// [`RoutineError`] naming file, key and allowed range.
 pub fn load(file: &Path) -> Result<Routine, RoutineError> {
-    let raw: RoutineFile = parse_toml(file, &read_text(file)?)?;
+    load_with(file, &Overrides::default())
+}
+
+/// Reads a routine file with some keys replaced.
+///
+/// # Errors
+/// [`RoutineError`] naming file, key and allowed range, or the override that has no place in a routine.
+pub fn load_with(file: &Path, overrides: &Overrides) -> Result<Routine, RoutineError> {
+    let raw: RoutineFile = read_with(file, &overrides.set)?;
     let check = |key: &str, value: f64, range| FileIssue::check_range(file, key, value, range);
     check("version", f64::from(raw.version), 1.0..=1.0)?;
-    check("capture.poses", f64::from(raw.capture.poses), 3.0..=1000.0)?;
-    check("capture.held_out", f64::from(raw.capture.held_out), 3.0..=1000.0)?;
-    check("capture.min_tags", f64::from(raw.capture.min_tags), 1.0..=100.0)?;
-    check("capture.clearance_m", raw.capture.clearance_m, 0.0..=1.0)?;
-    check("capture.dwell_s", raw.capture.dwell_s, 0.2..=60.0)?;
+    raw.capture.check(file, "capture.")?;
     check("task.tolerance_m", raw.task.tolerance_m, 1e-4..=1.0)?;
     if raw.task.targets_m.is_empty() {
         return Err(FileIssue::new(file, "task.targets_m", "needs one target or more").into());
@@ -212,22 +298,34 @@ pub fn load(file: &Path) -> Result<Routine, RoutineError> {
         let problem = format!("`{}` must be letters, digits, - and _: it names the output folder", raw.name);
         return Err(FileIssue::new(file, "name", problem).into());
     }
+    raw.regress.check(file)?;
+    let campaign = raw.campaign.check(file)?;
     let folder = file.parent().unwrap_or(Path::new("."));
-    let scene_file = SceneFile { site: raw.site, obstacle: raw.obstacle };
-    let scene = scene_file.check(file)?;
+    let tags = raw.site.tags.clone();
+    let (scene, scene_file) = SceneFile { site: raw.site, obstacle: raw.obstacle }.check(file)?;
     let scene_toml = toml::to_string(&scene_file)
         .map_err(|error| FileIssue::new(file, "obstacle", format!("has no TOML form: {error}")))?;
+    let script = if raw.step.is_empty() {
+        Script { steps: script::standard(raw.capture, &raw.task), faults: Vec::new() }
+    } else {
+        script::read(file, raw.step, raw.capture, &raw.task)?
+    };
     Ok(Routine {
         file: file.to_owned(),
         name: raw.name,
-        robot_folder: folder.join(raw.robot),
-        vehicle_file: folder.join(raw.vehicle),
+        robot_folder: overrides.robot.clone().unwrap_or_else(|| folder.join(raw.robot)),
+        vehicle_file: overrides.vehicle.clone().unwrap_or_else(|| folder.join(raw.vehicle)),
         seed: raw.seed,
         method: raw.method,
         scene,
+        tags,
         scene_toml,
         capture: raw.capture,
         task: raw.task,
+        steps: script.steps,
         world: raw.world,
+        faults: script.faults,
+        campaign,
+        regress: raw.regress,
     })
 }

@@ -1,10 +1,21 @@
 //! Routines: what to do with which arm, as users script it in TOML.
 //!
 //! `load` reads and checks a routine; paths in it are relative to the routine's own file. Its `[world]` table belongs to
-//! the simulator and is handed on unread: belief must not learn from it.
+//! the simulator and is handed on unread, and so are the tables of `fault` steps: belief must not learn from them.
+//! `step` has the script's steps, `script` reads them. `load_with` replaces keys on the way (`--set`); `[campaign]` and `[regress]` are for running a
+//! routine many times.
 
+mod campaign;
 mod file;
+mod overrides;
 mod scene;
+mod script;
+mod step;
 
-pub use file::{CaptureSettings, Method, Routine, RoutineError, TaskSettings, load, load_scene};
+pub use campaign::{CampaignSettings, RegressSettings, SeedRange};
+pub use file::{CaptureSettings, Method, Routine, RoutineError, TaskSettings, load, load_scene, load_with};
+pub use overrides::{Override, Overrides, effective_table};
 pub use scene::Scene;
+pub use step::{
+    AssertLimits, CalibrateSettings, CalibrateViews, IdentifySettings, MoveGoal, OnRefusal, ReachSettings, Step,
+};

@@ -1,0 +1,197 @@
+//! What a routine says about being run many times: `[campaign]` and `[regress]`.
+
+use std::fmt;
+use std::ops::RangeInclusive;
+use std::path::Path;
+use std::str::FromStr;
+
+use serde::Deserialize;
+use toml::{Table, Value};
+
+use super::{Override, RoutineError};
+use crate::robot::FileIssue;
+
+/// Seeds from the first to the last, both included.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SeedRange {
+    first: u64,
+    last: u64,
+}
+
+impl SeedRange {
+    /// `None` where `last` is below `first`.
+    #[must_use]
+    pub fn new(first: u64, last: u64) -> Option<Self> {
+        (first <= last).then_some(Self { first, last })
+    }
+
+    #[must_use]
+    pub fn seeds(self) -> RangeInclusive<u64> {
+        self.first..=self.last
+    }
+
+    #[must_use]
+    pub fn contains(self, seed: u64) -> bool {
+        self.seeds().contains(&seed)
+    }
+}
+
+impl FromStr for SeedRange {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let problem = || format!("`{text}` is neither A..B, both included and A not above B, nor one number");
+        let (first, last) = text.split_once("..").unwrap_or((text, text));
+        let parse = |part: &str| part.trim().parse::<u64>().map_err(|_| problem());
+        Self::new(parse(first)?, parse(last)?).ok_or_else(problem)
+    }
+}
+
+impl fmt::Display for SeedRange {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}..{}", self.first, self.last)
+    }
+}
+
+/// `[campaign]`: which seeds, and which settings each of them meets.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct CampaignSettings {
+    pub seeds: Option<SeedRange>,
+    /// Keys with their values, sorted by key; the full product is run.
+    pub matrix: Vec<(String, Vec<Value>)>,
+}
+
+/// `[regress]`: how much worse than the baseline is still the same.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct RegressSettings {
+    /// Limits of new over baseline, median over the pairs.
+    pub tool_error_ratio: f64,
+    pub reach_error_ratio: f64,
+    pub residual_ratio: f64,
+    pub held_out_ratio: f64,
+    pub corner_scatter_ratio: f64,
+    pub time_ratio: f64,
+    /// Limits of the new value itself, median over the seeds, m.
+    pub tool_error_m: Option<f64>,
+    pub reach_error_m: Option<f64>,
+}
+
+impl Default for RegressSettings {
+    fn default() -> Self {
+        Self {
+            tool_error_ratio: 1.10,
+            reach_error_ratio: 1.10,
+            residual_ratio: 1.10,
+            held_out_ratio: 1.10,
+            corner_scatter_ratio: 1.10,
+            time_ratio: 1.10,
+            tool_error_m: None,
+            reach_error_m: None,
+        }
+    }
+}
+
+impl RegressSettings {
+    pub(super) fn check(&self, file: &Path) -> Result<(), RoutineError> {
+        let ratios = [
+            ("tool_error_ratio", self.tool_error_ratio),
+            ("reach_error_ratio", self.reach_error_ratio),
+            ("residual_ratio", self.residual_ratio),
+            ("held_out_ratio", self.held_out_ratio),
+            ("corner_scatter_ratio", self.corner_scatter_ratio),
+            ("time_ratio", self.time_ratio),
+        ];
+        for (key, value) in ratios {
+            FileIssue::check_range(file, &format!("regress.{key}"), value, 1.0..=1000.0)?;
+        }
+        for (key, value) in [("tool_error_m", self.tool_error_m), ("reach_error_m", self.reach_error_m)] {
+            if let Some(value) = value {
+                FileIssue::check_range(file, &format!("regress.{key}"), value, 1e-6..=10.0)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct CampaignFile {
+    seeds: Option<String>,
+    #[serde(default)]
+    matrix: Table,
+}
+
+impl CampaignFile {
+    pub(super) fn check(&self, file: &Path) -> Result<CampaignSettings, RoutineError> {
+        let seeds = self.seeds.as_deref().map(str::parse).transpose();
+        let seeds = seeds.map_err(|problem: String| FileIssue::new(file, "campaign.seeds", problem))?;
+        let mut matrix = Vec::new();
+        flatten(&self.matrix, "", &mut matrix)
+            .map_err(|(key, problem)| FileIssue::new(file, format!("campaign.matrix.{key}"), problem))?;
+        matrix.sort_by(|a, b| a.0.cmp(&b.0));
+        Ok(CampaignSettings { seeds, matrix })
+    }
+}
+
+/// Dotted keys stand quoted or not: unquoted ones are tables in tables.
+fn flatten(table: &Table, prefix: &str, into: &mut Vec<(String, Vec<Value>)>) -> Result<(), (String, String)> {
+    for (key, value) in table {
+        let key = format!("{prefix}{key}");
+        match value {
+            Value::Table(inner) => flatten(inner, &format!("{key}."), into)?,
+            Value::Array(values) if values.is_empty() => return Err((key, "needs one value or more".to_owned())),
+            Value::Array(values) => {
+                Override::new(&key, Value::Boolean(true)).map_err(|problem| (key.clone(), problem))?;
+                if key == "seed" || key.starts_with("campaign") {
+                    return Err((key, "cannot be varied; seeds are given by `seeds`".to_owned()));
+                }
+                into.push((key, values.clone()));
+            }
+            _ => return Err((key, "must be a list of values".to_owned())),
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn seed_ranges_include_both_ends() {
+        let seeds = |text: &str| text.parse::<SeedRange>().map(|range| range.seeds().collect::<Vec<_>>());
+        assert_eq!(seeds("2..4"), Ok(vec![2, 3, 4]));
+        assert_eq!(seeds("7"), Ok(vec![7]));
+        assert_eq!(seeds(" 7 .. 7 "), Ok(vec![7]));
+        for bad in ["", "..", "1..", "..3", "4..2", "-1..3", "a..b", "1..2..3", "1..=3"] {
+            assert!(seeds(bad).is_err(), "{bad}");
+        }
+        assert_eq!(
+            "0..18446744073709551615".parse::<SeedRange>().expect("a range").to_string(),
+            "0..18446744073709551615"
+        );
+    }
+
+    #[test]
+    fn a_matrix_takes_quoted_and_unquoted_keys() {
+        let read = |text: &str| toml::from_str::<CampaignFile>(text).expect("TOML").check(Path::new("r.toml"));
+        let quoted = read("seeds = \"1..3\"\n[matrix]\nmethod = [\"a\"]\n\"world.camera.rate_hz\" = [1.0, 2.0]");
+        let unquoted = read("seeds = \"1..3\"\n[matrix]\nworld.camera.rate_hz = [1.0, 2.0]\nmethod = [\"a\"]");
+        let quoted = quoted.expect("good");
+        assert_eq!(quoted, unquoted.expect("good"));
+        assert_eq!(
+            quoted.matrix.iter().map(|(key, _)| key.as_str()).collect::<Vec<_>>(),
+            ["method", "world.camera.rate_hz"]
+        );
+        for bad in [
+            "seeds = \"3..1\"",
+            "[matrix]\na = []",
+            "[matrix]\na = 1",
+            "[matrix]\nseed = [1]",
+            "[matrix]\n\"a b\" = [1]",
+        ] {
+            assert!(read(bad).expect_err(bad).to_string().contains("r.toml: campaign."), "{bad}");
+        }
+    }
+}

@@ -1,0 +1,346 @@
+//! `[[step]]` tables to checked steps: each by itself, then what no step can do before another one did something.
+
+use std::path::Path;
+
+use serde::Deserialize;
+use serde::de::DeserializeOwned;
+
+use super::file::{CaptureSettings, RoutineError, TaskSettings};
+use super::step::{
+    AssertLimits, CalibrateSettings, CalibrateViews, IdentifySettings, MoveGoal, OnRefusal, ReachSettings, Step,
+};
+use crate::robot::FileIssue;
+
+/// The script of a routine without `[[step]]`: the standard closed loop.
+pub(super) fn standard(capture: CaptureSettings, task: &TaskSettings) -> Vec<Step> {
+    let reach = || Step::Reach(ReachSettings { targets: (0..task.targets_m.len()).collect() });
+    let calibrate = CalibrateSettings { warm: false, views: CalibrateViews::New, on_refusal: OnRefusal::Stop };
+    vec![reach(), Step::Capture(capture), Step::Calibrate(calibrate), reach()]
+}
+
+const NAMES: &str = "move, reach, capture, identify, calibrate, recalibrate, wait, fault, assert";
+
+/// Steps in order, and the tables of the faults in order, unread.
+pub(super) struct Script {
+    pub steps: Vec<Step>,
+    pub faults: Vec<toml::Table>,
+}
+
+/// Reads `[[step]]` tables.
+pub(super) fn read(
+    file: &Path,
+    tables: Vec<toml::Table>,
+    capture: CaptureSettings,
+    task: &TaskSettings,
+) -> Result<Script, RoutineError> {
+    let mut script = Script { steps: Vec::new(), faults: Vec::new() };
+    for (index, mut table) in tables.into_iter().enumerate() {
+        let number = index + 1;
+        let name = match table.remove("do") {
+            Some(toml::Value::String(name)) => name,
+            Some(other) => {
+                let problem = format!("{other} is no text; it is one of {NAMES}");
+                return Err(FileIssue::new(file, format!("step {number}: do"), problem).into());
+            }
+            None => {
+                let problem = format!("is missing; it is one of {NAMES}");
+                return Err(FileIssue::new(file, format!("step {number}: do"), problem).into());
+            }
+        };
+        let reader = StepReader { file, key: format!("step {number} ({name})"), table };
+        let step = match name.as_str() {
+            "move" => reader.move_goal()?,
+            "reach" => reader.reach(task)?,
+            "capture" => reader.capture(capture)?,
+            "identify" => reader.identify()?,
+            "calibrate" => reader.calibrate(false)?,
+            "recalibrate" => reader.calibrate(true)?,
+            "wait" => reader.wait()?,
+            "assert" => reader.assert()?,
+            "fault" => {
+                script.faults.push(reader.table);
+                Step::Fault { number: script.faults.len() - 1 }
+            }
+            other => {
+                let problem = format!("`{other}` is none of {NAMES}");
+                return Err(FileIssue::new(file, format!("step {number}: do"), problem).into());
+            }
+        };
+        script.steps.push(step);
+    }
+    check_order(file, &script.steps)?;
+    Ok(script)
+}
+
+struct StepReader<'a> {
+    file: &'a Path,
+    key: String,
+    table: toml::Table,
+}
+
+impl StepReader<'_> {
+    fn parse<T: DeserializeOwned>(&self) -> Result<T, FileIssue> {
+        toml::Value::Table(self.table.clone())
+            .try_into()
+            .map_err(|error: toml::de::Error| FileIssue::new(self.file, &self.key, error.message().trim_end()))
+    }
+
+    fn key(&self, name: &str) -> String {
+        format!("{}: {name}", self.key)
+    }
+
+    fn range(&self, name: &str, value: f64, range: std::ops::RangeInclusive<f64>) -> Result<f64, FileIssue> {
+        FileIssue::check_range(self.file, &self.key(name), value, range)
+    }
+
+    fn move_goal(&self) -> Result<Step, FileIssue> {
+        #[derive(Deserialize)]
+        #[serde(deny_unknown_fields)]
+        struct Raw {
+            to: Option<String>,
+            to_rad: Option<Vec<f64>>,
+        }
+        let raw: Raw = self.parse()?;
+        match (raw.to.as_deref(), raw.to_rad) {
+            (Some("stowed"), None) => Ok(Step::Move(MoveGoal::Stowed)),
+            (None, Some(angles)) => {
+                for angle in &angles {
+                    self.range("to_rad", *angle, -100.0..=100.0)?;
+                }
+                Ok(Step::Move(MoveGoal::Angles(angles)))
+            }
+            _ => Err(FileIssue::new(
+                self.file,
+                &self.key,
+                "needs either to = \"stowed\" or to_rad = [one angle a joint]",
+            )),
+        }
+    }
+
+    fn reach(&self, task: &TaskSettings) -> Result<Step, FileIssue> {
+        #[derive(Deserialize)]
+        #[serde(deny_unknown_fields)]
+        struct Raw {
+            targets: Option<Vec<usize>>,
+        }
+        let n = task.targets_m.len();
+        let targets = self.parse::<Raw>()?.targets.unwrap_or_else(|| (0..n).collect());
+        if targets.is_empty() {
+            return Err(FileIssue::new(self.file, self.key("targets"), "needs one number or more"));
+        }
+        for &target in &targets {
+            self.range("targets", target as f64, 0.0..=(n - 1) as f64)?;
+        }
+        Ok(Step::Reach(ReachSettings { targets }))
+    }
+
+    fn capture(&self, general: CaptureSettings) -> Result<Step, FileIssue> {
+        #[derive(Deserialize)]
+        #[serde(deny_unknown_fields)]
+        struct Raw {
+            poses: Option<u32>,
+            held_out: Option<u32>,
+            min_tags: Option<u32>,
+            clearance_m: Option<f64>,
+            dwell_s: Option<f64>,
+        }
+        let raw: Raw = self.parse()?;
+        let settings = CaptureSettings {
+            poses: raw.poses.unwrap_or(general.poses),
+            held_out: raw.held_out.unwrap_or(general.held_out),
+            min_tags: raw.min_tags.unwrap_or(general.min_tags),
+            clearance_m: raw.clearance_m.unwrap_or(general.clearance_m),
+            dwell_s: raw.dwell_s.unwrap_or(general.dwell_s),
+        };
+        settings.check(self.file, &self.key(""))?;
+        Ok(Step::Capture(settings))
+    }
+
+    fn identify(&self) -> Result<Step, FileIssue> {
+        #[derive(Deserialize)]
+        #[serde(deny_unknown_fields)]
+        struct Raw {
+            joint: String,
+            #[serde(default = "four")]
+            gain_max: f64,
+            #[serde(default = "sixty")]
+            travel_counts: f64,
+            #[serde(default = "seven_degrees")]
+            swing_rad: f64,
+            #[serde(default = "nine")]
+            views: u32,
+        }
+        fn four() -> f64 {
+            4.0
+        }
+        fn sixty() -> f64 {
+            60.0
+        }
+        fn seven_degrees() -> f64 {
+            0.12
+        }
+        fn nine() -> u32 {
+            9
+        }
+        let raw: Raw = self.parse()?;
+        Ok(Step::Identify(IdentifySettings {
+            joint: raw.joint,
+            gain_max: self.range("gain_max", raw.gain_max, 1.0..=20.0)?,
+            travel_counts: self.range("travel_counts", raw.travel_counts, 1.0..=1e6)?,
+            swing_rad: self.range("swing_rad", raw.swing_rad, 0.01..=0.5)?,
+            views: self.range("views", f64::from(raw.views), 3.0..=100.0)? as u32,
+        }))
+    }
+
+    fn calibrate(&self, warm: bool) -> Result<Step, FileIssue> {
+        #[derive(Deserialize)]
+        #[serde(deny_unknown_fields)]
+        struct Raw {
+            #[serde(default)]
+            views: CalibrateViews,
+            #[serde(default)]
+            on_refusal: OnRefusal,
+        }
+        let raw: Raw = self.parse()?;
+        Ok(Step::Calibrate(CalibrateSettings { warm, views: raw.views, on_refusal: raw.on_refusal }))
+    }
+
+    fn wait(&self) -> Result<Step, FileIssue> {
+        #[derive(Deserialize)]
+        #[serde(deny_unknown_fields)]
+        struct Raw {
+            seconds: f64,
+        }
+        Ok(Step::Wait { seconds: self.range("seconds", self.parse::<Raw>()?.seconds, 0.01..=1e6)? })
+    }
+
+    fn assert(&self) -> Result<Step, FileIssue> {
+        let limits: AssertLimits = self.parse()?;
+        if limits.each().next().is_none() {
+            return Err(FileIssue::new(self.file, &self.key, "holds the run against nothing: name one limit or more"));
+        }
+        for (key, limit) in limits.each() {
+            self.range(key, limit, 0.0..=1e9)?;
+        }
+        Ok(Step::Assert(limits))
+    }
+}
+
+/// What no step can do before another one did something.
+fn check_order(file: &Path, steps: &[Step]) -> Result<(), FileIssue> {
+    let (mut captures, mut calibrations, mut reaches, mut moved) = (0, 0, 0, false);
+    for (index, step) in steps.iter().enumerate() {
+        let wrong = |problem: &str| {
+            Err(FileIssue::new(file, format!("step {} ({})", index + 1, step.name()), problem.to_owned()))
+        };
+        match step {
+            Step::Move(_) => moved = true,
+            Step::Reach(_) => (reaches, moved) = (reaches + 1, true),
+            Step::Capture(_) => (captures, moved) = (captures + 1, true),
+            Step::Identify(_) if moved => {
+                return wrong("must come before the first move, reach or capture: none of them is safe before it");
+            }
+            Step::Calibrate(settings) => {
+                if captures == 0 {
+                    return wrong(
+                        "has no views: no `capture` comes before it (or between it and the last calibration)",
+                    );
+                }
+                if settings.warm && calibrations == 0 {
+                    return wrong("has nothing to start from: no `calibrate` comes before it");
+                }
+                calibrations += 1;
+                captures = if settings.views == CalibrateViews::All { captures } else { 0 };
+            }
+            Step::Assert(limits) => {
+                let of_calibration = limits.held_out_rms_m.or(limits.held_out_rms_px).or(limits.predicted_tool_error_m);
+                let of_reach = limits.tool_error_m.or(limits.reach_error_m).or(limits.reach_error_max_m);
+                if of_calibration.is_some() && calibrations == 0 {
+                    return wrong("speaks of a calibration, but no `calibrate` comes before it");
+                }
+                if of_reach.is_some() && reaches == 0 {
+                    return wrong("speaks of a reach, but no `reach` comes before it");
+                }
+            }
+            Step::Identify(_) | Step::Wait { .. } | Step::Fault { .. } => {}
+        }
+    }
+    if calibrations == 0 {
+        return Err(FileIssue::new(file, "step", "a script needs a `calibrate` step"));
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn script(text: &str) -> Result<Script, RoutineError> {
+        #[derive(Deserialize)]
+        struct Steps {
+            step: Vec<toml::Table>,
+        }
+        let steps: Steps = toml::from_str(text).expect("valid TOML");
+        let task = TaskSettings { tolerance_m: 0.02, targets_m: vec![[1.0, 0.0, 0.0]; 3] };
+        read(Path::new("r.toml"), steps.step, CaptureSettings::default(), &task)
+    }
+
+    fn problem(text: &str) -> String {
+        script(text).err().expect("refused").to_string()
+    }
+
+    const LOOP: &str = "[[step]]\ndo = \"capture\"\n[[step]]\ndo = \"calibrate\"\n";
+
+    #[test]
+    fn steps_come_in_their_order_and_faults_stay_unread() {
+        let text =
+            format!("{LOOP}[[step]]\ndo = \"fault\"\nkind = \"anything\"\n[[step]]\ndo = \"reach\"\ntargets = [2]\n");
+        let script = script(&text).expect("a script");
+        let names: Vec<_> = script.steps.iter().map(Step::name).collect();
+        assert_eq!(names, ["capture", "calibrate", "fault", "reach"]);
+        assert_eq!(script.faults[0]["kind"].as_str(), Some("anything"));
+        assert!(matches!(&script.steps[3], Step::Reach(reach) if reach.targets == [2]));
+    }
+
+    #[test]
+    fn a_capture_takes_what_it_does_not_say_from_the_general_settings() {
+        let script = script("[[step]]\ndo = \"capture\"\nposes = 7\n[[step]]\ndo = \"calibrate\"").expect("a script");
+        let Step::Capture(capture) = &script.steps[0] else { panic!("a capture") };
+        assert_eq!((capture.poses, capture.held_out), (7, CaptureSettings::default().held_out));
+    }
+
+    #[test]
+    fn mistakes_are_named_by_step_key_and_what_would_be_right() {
+        let cases = [
+            ("[[step]]\ndo = \"dance\"", "step 1: do: `dance` is none of move, reach"),
+            ("[[step]]\nposes = 3", "step 1: do: is missing"),
+            ("[[step]]\ndo = 3", "step 1: do: 3 is no text"),
+            ("[[step]]\ndo = \"wait\"", "step 1 (wait): missing field `seconds`"),
+            ("[[step]]\ndo = \"wait\"\nseconds = -1.0", "step 1 (wait): seconds: -1 is outside"),
+            ("[[step]]\ndo = \"move\"", "needs either to = \"stowed\""),
+            ("[[step]]\ndo = \"reach\"\ntargets = [3]", "step 1 (reach): targets: 3 is outside 0 .. 2"),
+            ("[[step]]\ndo = \"reach\"\ntargets = []", "needs one number"),
+            ("[[step]]\ndo = \"capture\"\nposes = 1", "step 1 (capture): poses: 1 is outside"),
+            ("[[step]]\ndo = \"capture\"\npose = 30", "unknown field `pose`"),
+            ("[[step]]\ndo = \"calibrate\"", "no `capture` comes before it"),
+            ("[[step]]\ndo = \"capture\"\n[[step]]\ndo = \"recalibrate\"", "no `calibrate` comes before it"),
+            ("[[step]]\ndo = \"reach\"", "a script needs a `calibrate` step"),
+            ("[[step]]\ndo = \"assert\"\ntool_error_m = 0.01", "no `reach` comes before it"),
+            ("[[step]]\ndo = \"assert\"\nheld_out_rms_m = 0.01", "no `calibrate` comes before it"),
+            ("[[step]]\ndo = \"assert\"", "name one limit or more"),
+            ("[[step]]\ndo = \"assert\"\ntool_eror_m = 0.01", "unknown field `tool_eror_m`"),
+            (
+                "[[step]]\ndo = \"move\"\nto = \"stowed\"\n[[step]]\ndo = \"identify\"\njoint = \"j\"",
+                "must come before",
+            ),
+        ];
+        for (text, expected) in cases {
+            let found = problem(text);
+            assert!(found.starts_with("r.toml: ") && found.contains(expected), "{found} lacks {expected}");
+        }
+        assert!(
+            problem(&format!("{LOOP}[[step]]\ndo = \"calibrate\"")).contains("between it and the last calibration")
+        );
+        assert!(script(&format!("{LOOP}{LOOP}")).is_ok());
+    }
+}
