@@ -4,17 +4,21 @@
 //! obstacles and the seafloor (fixed in the world; the vehicle's motion about its station is added to the margin).
 //! Links closer than two joints apart cannot be told from a joint and are not tested against each other.
 
-use nalgebra::{Isometry3, Vector3};
-use parry3d::bounding_volume::Aabb;
+use std::ops::Range;
+
+use nalgebra::Vector3;
 use parry3d::math::{Pose3, Vec3};
 use parry3d::query;
-use parry3d::shape::{HalfSpace, SharedShape};
+use parry3d::shape::SharedShape;
 
 use super::bounds::JointErrorBounds;
+use super::certify::{Pair, Sweep};
+use super::separation::{Placed, Shapes, gap_m, separate};
+use super::shapes::{Moving, Standing, VEHICLE_MOTION_M, pairs, vec3};
 use crate::kinematics::LinkPoses;
-use crate::robot::{MAX_COLLISION_SHAPES, PlacedShape, Robot, Vehicle, parry_pose};
+use crate::robot::{MAX_COLLISION_SHAPES, Robot, Vehicle, parry_pose};
 use crate::routine::Scene;
-use crate::streams::{JointAngles, MAX_JOINTS};
+use crate::streams::JointAngles;
 
 /// The closest pair and their distance.
 #[derive(Clone, Debug, PartialEq)]
@@ -31,28 +35,6 @@ impl std::fmt::Display for Nearest {
     }
 }
 
-struct Moving {
-    body: usize,
-    name: String,
-    shape: SharedShape,
-    body_from_shape: Isometry3<f64>,
-    radius_m: f64,
-    /// Of the box around the shape in its own axes.
-    half_extents_m: Vector3<f64>,
-}
-
-struct Standing {
-    name: String,
-    shape: SharedShape,
-    pose: Pose3,
-    bounds: Aabb,
-    center_m: Vector3<f64>,
-    /// Infinite for the seafloor.
-    radius_m: f64,
-    /// What the vehicle's motion may take from the distance; zero for its own parts.
-    motion_m: f64,
-}
-
 /// The arm, what is around it, and which pairs may touch.
 pub struct ClearanceModel<'a> {
     robot: &'a Robot,
@@ -60,21 +42,15 @@ pub struct ClearanceModel<'a> {
     standing: Vec<Standing>,
     /// Joints whose error moves a collision shape in a way that matters.
     n_error_joints: usize,
-    levers_m: [f64; MAX_JOINTS],
+    pairs: Vec<Pair>,
 }
 
 /// Distances beyond this are all the same to planning, m.
 const FAR_M: f64 = 0.4;
-/// Free water in which a lower bound serves as well as the true distance, m.
-const AMPLE_M: f64 = 0.15;
-/// Bodies nearer along the chain than this share a joint or a short link and always nearly touch.
-const MIN_BODY_GAP: usize = 2;
-/// Larger than any site, m.
-const EVERYWHERE_M: f64 = 1e6;
+/// Shapes that touch are never clear, whatever is asked for, m.
+const TOUCHING_M: f64 = 1e-6;
 /// Links of one arm neither sway against each other nor are surveyed: they need less water than the vehicle does.
 const SELF_EASE_M: f64 = 0.03;
-/// The vehicle sways about its station: three times 3 cm, and 0.5 deg three times over at 2 m.
-const VEHICLE_MOTION_M: f64 = 0.15;
 
 impl<'a> ClearanceModel<'a> {
     #[must_use]
@@ -82,16 +58,7 @@ impl<'a> ClearanceModel<'a> {
         let mut moving = Vec::new();
         for (body, link) in robot.bodies.iter().enumerate() {
             for placed in &link.collisions {
-                let shape = placed.shape.to_parry();
-                let half = shape.compute_local_aabb().half_extents();
-                moving.push(Moving {
-                    body,
-                    name: link.name.clone(),
-                    shape,
-                    half_extents_m: Vector3::new(half.x, half.y, half.z),
-                    body_from_shape: placed.owner_from_shape * placed.shape.axis_fix(),
-                    radius_m: placed.shape.bounding_radius_m(),
-                });
+                moving.push(Moving::new(robot, body, &link.name, placed));
             }
         }
         let base_from_vehicle = *vehicle.vehicle_from_base.inverse().isometry();
@@ -106,8 +73,8 @@ impl<'a> ClearanceModel<'a> {
         }
         // The last joint turns a nearly round gripper about its own axis: its error moves no outline.
         let n_error_joints = robot.chain.joints().iter().filter(|joint| joint.limits.is_some()).count();
-        let levers_m = levers(robot, &moving);
-        Self { robot, moving, standing, n_error_joints, levers_m }
+        let pairs = pairs(&moving, &standing);
+        Self { robot, moving, standing, n_error_joints, pairs }
     }
 
     /// The closest pair for one arm exactly at `angles`; distances are cut off at 0.4 m.
@@ -117,85 +84,69 @@ impl<'a> ClearanceModel<'a> {
         self.nearest_below(&poses, FAR_M)
     }
 
-    /// The closest pair over every arm within `bounds` whose sensors read `believed`: the corners of the error box.
-    ///
-    /// Stops early at the first arm nearer than `enough_m`, for then the answer is no.
+    /// Whether one arm exactly at `angles` has anything nearer than `margin_m`.
     #[must_use]
-    pub fn nearest_under(&self, believed: &JointAngles, bounds: &JointErrorBounds, enough_m: f64) -> Nearest {
-        let mut worst = self.nearest(believed);
-        // What the error can move the arm by at most; where the free water exceeds it by far, no corner needs a look.
-        let error_m = self.motion_bound_m(|joint| {
-            if joint < self.n_error_joints { bounds.error_rad(joint, believed[joint]) } else { 0.0 }
-        });
-        if worst.distance_m - error_m >= AMPLE_M.max(enough_m) {
-            worst.distance_m -= error_m;
-            return worst;
-        }
-        for corner in 0..1usize << self.n_error_joints {
-            if worst.distance_m < enough_m {
-                break;
-            }
-            let poses = self.robot.chain.link_poses(&bounds.corner(believed, self.n_error_joints, corner));
-            let nearest = self.nearest_below(&poses, worst.distance_m);
-            if nearest.distance_m < worst.distance_m {
-                worst = nearest;
-            }
-        }
-        worst
+    pub fn is_nearer_than(&self, angles: &JointAngles, margin_m: f64) -> bool {
+        self.nearest_below(&self.link_poses(angles), margin_m).distance_m < margin_m
     }
 
-    /// Upper bound on how far any point of the arm moves when the joints move by `delta_rad`, m (Schwarzer et al.).
+    /// A pair that some arm within `bounds` whose sensors read `believed` brings, or may bring, nearer than `margin_m`;
+    /// `None` proves that there is none.
     #[must_use]
-    pub fn motion_bound_m(&self, delta_rad: impl Fn(usize) -> f64) -> f64 {
-        (0..self.robot.n_joints()).map(|joint| self.levers_m[joint] * delta_rad(joint).abs()).sum()
+    pub fn too_near(&self, believed: &JointAngles, bounds: &JointErrorBounds, margin_m: f64) -> Option<Nearest> {
+        self.too_near_between(believed, believed, bounds, margin_m)
+    }
+
+    /// The same for every arm along the straight edge between two believed poses.
+    #[must_use]
+    pub fn too_near_between(
+        &self,
+        from: &JointAngles,
+        to: &JointAngles,
+        bounds: &JointErrorBounds,
+        margin_m: f64,
+    ) -> Option<Nearest> {
+        Sweep { model: self, from: *from, to: *to, bounds, margin_m }.first_too_near()
+    }
+
+    /// The closest pair over every arm within `bounds` whose sensors read `believed`, as far as the answer matters: its
+    /// distance is at least `enough_m` where all of them are proven to keep that, else it is that of one which does not.
+    #[must_use]
+    pub fn nearest_under(&self, believed: &JointAngles, bounds: &JointErrorBounds, enough_m: f64) -> Nearest {
+        self.too_near(believed, bounds, enough_m).unwrap_or_else(|| {
+            let nearest = self.nearest(believed);
+            Nearest { distance_m: nearest.distance_m.max(enough_m), ..nearest }
+        })
     }
 
     fn nearest_below(&self, poses: &LinkPoses, limit_m: f64) -> Nearest {
-        let mut best = Nearest { distance_m: limit_m, first: String::new(), second: String::new() };
-        let mut pair = None;
         let placed = self.placed(poses);
-        for (i, (moving, at)) in self.moving.iter().zip(&placed).enumerate() {
-            // What is fixed to the base stands where it is bolted on.
-            let standing: &[Standing] = if moving.body > 0 { &self.standing } else { &[] };
-            for (k, standing) in standing.iter().enumerate() {
-                if gap_m(&at.bounds, &standing.bounds) - standing.motion_m >= best.distance_m {
-                    continue;
-                }
-                let distance = distance_m(&at.pose, &moving.shape, &standing.pose, &standing.shape) - standing.motion_m;
-                if distance < best.distance_m {
-                    best.distance_m = distance;
-                    pair = Some((i, Err(k)));
-                }
+        let mut best_m = limit_m;
+        let mut nearest = None;
+        for &pair in &self.pairs {
+            let at = [placed[pair.outer()], *self.other_placed(pair, &placed)];
+            let enough_m = self.needed_m(pair, best_m);
+            if gap_m(&at[0].bounds, &at[1].bounds) >= enough_m {
+                continue;
             }
-            for (j, (other, other_at)) in self.moving.iter().zip(&placed).enumerate().skip(i + 1) {
-                let near = other.body.abs_diff(moving.body) < MIN_BODY_GAP;
-                if near || gap_m(&at.bounds, &other_at.bounds) + SELF_EASE_M >= best.distance_m {
-                    continue;
-                }
-                let distance = eased(distance_m(&at.pose, &moving.shape, &other_at.pose, &other.shape));
-                if distance < best.distance_m {
-                    best.distance_m = distance;
-                    pair = Some((i, Ok(j)));
-                }
+            let (shapes, guess) = (self.shapes(pair), at[0].bounds_direction(&at[1]));
+            if guess != Vec3::ZERO && shapes.gap_along_m(&at, guess).is_some_and(|gap| gap >= enough_m) {
+                continue;
+            }
+            let distance_m = self.in_margin_m(pair, separate(&shapes, &at, guess).distance_m);
+            if distance_m < best_m {
+                best_m = distance_m;
+                nearest = Some(pair);
             }
         }
-        // An obstacle inside the margin for the vehicle's motion is as near as touching.
-        best.distance_m = best.distance_m.max(0.0);
-        if let Some((i, other)) = pair {
-            best.first.clone_from(&self.moving[i].name);
-            best.second.clone_from(match other {
-                Ok(j) => &self.moving[j].name,
-                Err(k) => &self.standing[k].name,
-            });
-        }
-        best
+        let (first, second) = nearest.map_or_else(Default::default, |pair| self.names(pair));
+        Nearest { distance_m: best_m, first, second }
     }
 
-    fn placed(&self, poses: &LinkPoses) -> [Placed; MAX_COLLISION_SHAPES] {
-        let mut placed = [Placed { pose: Pose3::IDENTITY, bounds: Aabb::new_invalid() }; MAX_COLLISION_SHAPES];
+    pub(super) fn placed(&self, poses: &LinkPoses) -> [Placed; MAX_COLLISION_SHAPES] {
+        let mut placed = [Placed::NOWHERE; MAX_COLLISION_SHAPES];
         for (slot, moving) in placed.iter_mut().zip(&self.moving) {
-            let isometry = poses.link(moving.body) * moving.body_from_shape;
-            *slot = Placed { pose: parry_pose(&isometry), bounds: moving.bounds(&isometry) };
+            *slot = moving.placed(poses);
         }
         placed
     }
@@ -219,7 +170,7 @@ impl<'a> ClearanceModel<'a> {
             let along = (center - start).dot(&direction).clamp(0.0, reach);
             (center - (start + direction * along)).norm() > radius_m
         };
-        self.standing.iter().any(|s| !beside(&s.center_m, s.radius_m) && hit(&s.pose, &s.shape))
+        self.standing.iter().any(|s| !beside(&s.center_m, s.radius_m) && hit(&s.placed.pose, &s.shape))
             || self.moving.iter().any(|m| {
                 let isometry = poses.link(m.body) * m.body_from_shape;
                 !beside(&isometry.translation.vector, m.radius_m) && hit(&parry_pose(&isometry), &m.shape)
@@ -227,84 +178,90 @@ impl<'a> ClearanceModel<'a> {
     }
 }
 
-impl Moving {
-    /// The box along the base's axes around the turned box of the shape itself; a little large, and cheap.
-    fn bounds(&self, base_from_shape: &Isometry3<f64>) -> Aabb {
-        let turn = base_from_shape.rotation.to_rotation_matrix();
-        let half = vec3(&(turn.matrix().abs() * self.half_extents_m));
-        let center = vec3(&base_from_shape.translation.vector);
-        Aabb::new(center - half, center + half)
+/// What the proof of clearance asks of the model.
+impl ClearanceModel<'_> {
+    pub(super) fn link_poses(&self, angles: &JointAngles) -> LinkPoses {
+        self.robot.chain.link_poses(angles)
     }
-}
 
-/// A moving shape at one configuration.
-#[derive(Clone, Copy)]
-struct Placed {
-    pose: Pose3,
-    bounds: Aabb,
-}
+    pub(super) fn pairs(&self) -> &[Pair] {
+        &self.pairs
+    }
 
-/// Distance between two boxes along the axes, a lower bound on that of what they hold, m.
-fn gap_m(a: &Aabb, b: &Aabb) -> f64 {
-    let apart = (a.mins - b.maxs).max(b.mins - a.maxs).max(Vec3::ZERO);
-    apart.length()
-}
+    pub(super) fn n_error_joints(&self) -> usize {
+        self.n_error_joints
+    }
 
-impl Standing {
-    fn new(name: &str, placed: &PlacedShape, base_from_owner: &Isometry3<f64>, motion_m: f64) -> Self {
-        let isometry = base_from_owner * placed.owner_from_shape * placed.shape.axis_fix();
-        Self {
-            name: name.to_owned(),
-            shape: placed.shape.to_parry(),
-            bounds: placed.shape.to_parry().compute_aabb(&parry_pose(&isometry)),
-            pose: parry_pose(&isometry),
-            center_m: isometry.translation.vector,
-            radius_m: placed.shape.bounding_radius_m(),
-            motion_m,
+    /// Joints that move the pair's shapes against each other.
+    pub(super) fn joints_between(&self, pair: Pair) -> Range<usize> {
+        match pair {
+            Pair::Standing { moving, .. } => 0..self.moving[moving].body,
+            Pair::Links { outer, inner } => self.moving[inner].body..self.moving[outer].body,
         }
     }
 
-    fn seafloor(z_m: f64, base_from_world: &Isometry3<f64>) -> Self {
-        let isometry = base_from_world * Isometry3::translation(0.0, 0.0, z_m);
-        Self {
-            name: "seafloor".to_owned(),
-            shape: SharedShape::new(HalfSpace::new(Vec3::new(0.0, 0.0, 1.0))),
-            // A tilted base tilts the half-space too, so no box leaves it out.
-            bounds: Aabb::new(Vec3::splat(-EVERYWHERE_M), Vec3::splat(EVERYWHERE_M)),
-            pose: parry_pose(&isometry),
-            center_m: isometry.translation.vector,
-            radius_m: f64::INFINITY,
-            motion_m: VEHICLE_MOTION_M,
+    /// An upper bound on the distance of a moving shape from the axis of a joint before it, m.
+    pub(super) fn lever_m(&self, shape: usize, joint: usize) -> f64 {
+        self.moving[shape].levers_m[joint]
+    }
+
+    pub(super) fn shapes(&self, pair: Pair) -> Shapes<'_> {
+        match pair {
+            Pair::Standing { moving, standing } => {
+                Shapes { outer: &self.moving[moving].shape, other: &self.standing[standing].shape }
+            }
+            Pair::Links { outer, inner } => {
+                Shapes { outer: &self.moving[outer].shape, other: &self.moving[inner].shape }
+            }
         }
     }
-}
 
-fn vec3(v: &Vector3<f64>) -> Vec3 {
-    Vec3::new(v.x, v.y, v.z)
-}
-
-fn distance_m(pose1: &Pose3, shape1: &SharedShape, pose2: &Pose3, shape2: &SharedShape) -> f64 {
-    // An unsupported pair of shapes cannot occur (convex primitives and a half-space); taking it as contact is safe.
-    query::distance(pose1, shape1.as_ref(), pose2, shape2.as_ref()).map_or(0.0, |found| found.distance)
-}
-
-/// Distance between two links, raised by what they need less; links that touch stay at zero.
-fn eased(distance_m: f64) -> f64 {
-    if distance_m > 0.0 { distance_m + SELF_EASE_M } else { 0.0 }
-}
-
-/// For each joint, an upper bound on the distance from its axis to any point of the arm behind it, over all angles.
-fn levers(robot: &Robot, moving: &[Moving]) -> [f64; MAX_JOINTS] {
-    let mut levers = [0.0; MAX_JOINTS];
-    for (joint, lever) in levers.iter_mut().enumerate().take(robot.n_joints()) {
-        for shape in moving.iter().filter(|shape| shape.body > joint) {
-            let links: f64 = robot.chain.joints()[joint + 1..shape.body]
-                .iter()
-                .map(|next| next.parent_from_joint.translation.vector.norm())
-                .sum();
-            let own = shape.body_from_shape.translation.vector.norm() + shape.radius_m;
-            *lever = f64::max(*lever, links + own);
+    /// The pair's second shape where it is.
+    pub(super) fn other_placed<'b>(&'b self, pair: Pair, placed: &'b [Placed]) -> &'b Placed {
+        match pair {
+            Pair::Standing { standing, .. } => &self.standing[standing].placed,
+            Pair::Links { inner, .. } => &placed[inner],
         }
     }
-    levers
+
+    pub(super) fn placed_pair(&self, pair: Pair, poses: &LinkPoses) -> [Placed; 2] {
+        match pair {
+            Pair::Standing { moving, standing } => [self.moving[moving].placed(poses), self.standing[standing].placed],
+            Pair::Links { outer, inner } => [self.moving[outer].placed(poses), self.moving[inner].placed(poses)],
+        }
+    }
+
+    /// The true distance at which a pair keeps `margin_m`.
+    pub(super) fn needed_m(&self, pair: Pair, margin_m: f64) -> f64 {
+        let needed_m = match pair {
+            Pair::Standing { standing, .. } => margin_m + self.standing[standing].motion_m,
+            Pair::Links { .. } => margin_m - SELF_EASE_M,
+        };
+        needed_m.max(TOUCHING_M)
+    }
+
+    /// A true distance in the terms of the margin; shapes that touch stay at zero.
+    pub(super) fn in_margin_m(&self, pair: Pair, distance_m: f64) -> f64 {
+        match pair {
+            // An obstacle inside the margin for the vehicle's motion is as near as touching.
+            Pair::Standing { standing, .. } => (distance_m - self.standing[standing].motion_m).max(0.0),
+            Pair::Links { .. } if distance_m > 0.0 => distance_m + SELF_EASE_M,
+            Pair::Links { .. } => 0.0,
+        }
+    }
+
+    fn names(&self, pair: Pair) -> (String, String) {
+        match pair {
+            Pair::Standing { moving, standing } => {
+                (self.moving[moving].name.clone(), self.standing[standing].name.clone())
+            }
+            Pair::Links { outer, inner } => (self.moving[inner].name.clone(), self.moving[outer].name.clone()),
+        }
+    }
+
+    /// The pair at a true distance.
+    pub(super) fn named(&self, pair: Pair, distance_m: f64) -> Nearest {
+        let (first, second) = self.names(pair);
+        Nearest { distance_m: self.in_margin_m(pair, distance_m), first, second }
+    }
 }

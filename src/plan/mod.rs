@@ -5,13 +5,16 @@
 //! connects them by edges that are certified, not sampled; `targets` does the same for the reach task.
 
 mod bounds;
+mod certify;
 mod clearance;
 mod path;
 mod poses;
+mod separation;
+mod shapes;
 mod targets;
 mod visibility;
 
-pub use bounds::JointErrorBounds;
+pub use bounds::{Age, JointErrorBounds, UnknownScale};
 pub use clearance::{ClearanceModel, Nearest};
 pub use path::{Path, PathError, PathPlanner};
 pub use poses::{PosePlan, PoseRequest, choose_poses};

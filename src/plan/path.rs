@@ -25,6 +25,7 @@ pub enum PathError {
 }
 
 /// Plans paths under one belief.
+#[derive(Clone, Copy)]
 pub struct PathPlanner<'a> {
     pub clearance: &'a ClearanceModel<'a>,
     pub bounds: &'a JointErrorBounds,
@@ -34,8 +35,6 @@ pub struct PathPlanner<'a> {
     pub max_samples: usize,
 }
 
-/// An edge whose halves are shorter than this and still not certified counts as blocked, rad.
-const SHORTEST_EDGE_RAD: f64 = 0.004;
 /// Longest step by which a tree grows, rad.
 const STEP_RAD: f64 = 0.35;
 
@@ -43,25 +42,13 @@ impl PathPlanner<'_> {
     /// Whether every arm within the bounds keeps the margin at `angles`.
     #[must_use]
     pub fn is_free(&self, angles: &JointAngles) -> bool {
-        self.clearance.nearest_under(angles, self.bounds, self.margin_m).distance_m >= self.margin_m
+        self.clearance.too_near(angles, self.bounds, self.margin_m).is_none()
     }
 
     /// Whether every arm within the bounds keeps the margin along the straight edge.
     #[must_use]
     pub fn is_edge_free(&self, from: &JointAngles, to: &JointAngles) -> bool {
-        let middle = JointAngles::from_fn(from.len(), |j| 0.5 * (from[j] + to[j]));
-        let clearance_m = self.clearance.nearest_under(&middle, self.bounds, self.margin_m).distance_m;
-        let moved_m = self.bounds.step_factor() * self.clearance.motion_bound_m(|j| 0.5 * (to[j] - from[j]));
-        if clearance_m < self.margin_m {
-            return false;
-        }
-        if moved_m <= clearance_m - self.margin_m {
-            return true;
-        }
-        if from.max_abs_difference(to) < SHORTEST_EDGE_RAD {
-            return false;
-        }
-        self.is_edge_free(from, &middle) && self.is_edge_free(&middle, to)
+        self.clearance.too_near_between(from, to, self.bounds, self.margin_m).is_none()
     }
 
     /// A path from `from` to `to`, both of which must be free.
@@ -135,7 +122,7 @@ impl PathPlanner<'_> {
             .map(|k| {
                 JointAngles::from_fn(from.len(), |j| from[j] + (to[j] - from[j]) * f64::from(k) / f64::from(steps))
             })
-            .map(|angles| self.clearance.nearest_under(&angles, self.bounds, self.margin_m))
+            .filter_map(|angles| self.clearance.too_near(&angles, self.bounds, self.margin_m))
             .min_by(|a, b| a.distance_m.total_cmp(&b.distance_m))
             .map_or_else(String::new, |nearest| nearest.to_string())
     }

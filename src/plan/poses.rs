@@ -124,14 +124,14 @@ fn assess(request: &PoseRequest<'_>, angles: JointAngles) -> Option<Candidate> {
         return None;
     }
     let margin_m = request.capture.clearance_m;
-    if request.clearance.nearest(&angles).distance_m < margin_m {
+    if request.clearance.is_nearer_than(&angles, margin_m) {
         return None;
     }
     let seen = expected_tags(request, &angles);
     if seen.iter().map(|(_, share)| share).sum::<f64>() < min_tags as f64 {
         return None;
     }
-    if request.clearance.nearest_under(&angles, request.bounds, margin_m).distance_m < margin_m {
+    if request.clearance.too_near(&angles, request.bounds, margin_m).is_some() {
         return None;
     }
     let information = information(request, &angles, &seen);
