@@ -4,6 +4,7 @@
 //! words, which wrap), corners of one tag over the frames in it; the arm stands still there, so a camera clock that is
 //! some ten milliseconds late changes nothing.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use nalgebra::Vector3;
@@ -12,7 +13,9 @@ use crate::log::Recording;
 use crate::optics::solve_square;
 use crate::robot::Robot;
 use crate::sensor::ArmSensors;
-use crate::streams::{CaptureSet, JointAngles, Mark, MarkKind, Message, ReachTask, TagDetections, Thermometer};
+use crate::streams::{
+    CaptureSet, JointAngles, Mark, MarkKind, Message, ReachTask, RecordedSurvey, TagDetections, Thermometer,
+};
 use crate::time::Stamp;
 
 /// A standing arm looking at tags.
@@ -68,6 +71,8 @@ impl Rejection {
 pub struct CaptureData {
     pub fit: Vec<View>,
     pub held_out: Vec<View>,
+    /// Views in which only one joint moved, by that joint; in the order of time.
+    pub identify: BTreeMap<u32, Vec<View>>,
     pub task: Option<ReachTask>,
     pub n_marks: usize,
     pub rejected: BTreeMap<Rejection, usize>,
@@ -83,34 +88,74 @@ pub struct CaptureData {
 /// Corners that fit a square worse than this are no tag: three times the worst that the lens prior allows.
 const MAX_SQUARE_RMS_PX: f64 = 3.0;
 
-/// Collects the captured views of `recording`.
+/// The survey that a recording carries, and its index among the messages; the earliest, should there be several.
+fn recorded_survey(recording: &Recording) -> Option<(usize, &RecordedSurvey)> {
+    let surveys = recording.messages.iter().enumerate().filter_map(|(idx, (_, message))| match message {
+        Message::Survey(survey) => Some((idx, survey)),
+        _ => None,
+    });
+    surveys.min_by_key(|(_, survey)| survey.stamp)
+}
+
+/// `robot` with the tags that the recording says were around it; with those of its own file where it says nothing.
+#[must_use]
+pub fn surveyed<'a>(recording: &Recording, robot: &'a Robot) -> Cow<'a, Robot> {
+    match recorded_survey(recording) {
+        Some((_, recorded)) => Cow::Owned(robot.clone().with_survey(recorded.survey())),
+        None => Cow::Borrowed(robot),
+    }
+}
+
+/// Collects the captured views of `recording`; `robot` as [`surveyed`] gives it.
 #[must_use]
 pub fn associate(recording: &Recording, robot: &Robot) -> CaptureData {
+    associate_within(recording, robot, None)
+}
+
+/// Collects the views that were captured within a span by the joint sensors' clock; `None` is the whole recording.
+///
+/// Views of `identify` marks count wherever they lie before the span's end: what they tell of a sensor stays true.
+#[must_use]
+pub fn associate_within(recording: &Recording, robot: &Robot, span: Option<(Stamp, Stamp)>) -> CaptureData {
     let mut data = CaptureData::default();
     let sensors = ArmSensors::nominal(robot);
     let index = Index::new(recording);
+    let (from, to) = span.unwrap_or((Stamp { nanos: i64::MIN }, Stamp { nanos: i64::MAX }));
+    let recorded = recorded_survey(recording);
     for (idx, message) in recording.messages.iter().map(|(_, m)| m).enumerate() {
         match message {
             Message::Task(task) if data.task.is_none() => {
                 data.task = Some(task.clone());
                 data.used.push(idx);
             }
-            Message::Mark(mark) => {
-                let MarkKind::Capture { set, pose_idx } = mark.kind else { continue };
-                data.n_marks += 1;
-                data.used.push(idx);
-                let Some(view) = index.view(mark, pose_idx, robot, &sensors, &mut data) else { continue };
-                match set {
-                    CaptureSet::Fit => data.fit.push(view),
-                    CaptureSet::HeldOut => data.held_out.push(view),
+            Message::Survey(_) if recorded.is_some_and(|(at, _)| at == idx) => data.used.push(idx),
+            Message::Mark(mark) if mark.end <= to => match mark.kind {
+                MarkKind::Capture { set, pose_idx } if mark.start >= from => {
+                    data.n_marks += 1;
+                    data.used.push(idx);
+                    let Some(view) = index.view(mark, pose_idx, robot, &sensors, &mut data) else { continue };
+                    match set {
+                        CaptureSet::Fit => data.fit.push(view),
+                        CaptureSet::HeldOut => data.held_out.push(view),
+                    }
                 }
-            }
+                MarkKind::Identify { joint_idx } => {
+                    data.used.push(idx);
+                    if let Some(view) = index.view(mark, 0, robot, &sensors, &mut data) {
+                        data.identify.entry(joint_idx).or_default().push(view);
+                    }
+                }
+                _ => {}
+            },
             _ => {}
         }
     }
     // A view's meaning does not depend on when it was marked; sorting makes the result independent of that order, too.
     data.fit.sort_by_key(|view| view.pose_idx);
     data.held_out.sort_by_key(|view| view.pose_idx);
+    for views in data.identify.values_mut() {
+        views.sort_by_key(|view| view.end);
+    }
     data.used.sort_unstable();
     data.used.dedup();
     data.ids_seen.sort_unstable();

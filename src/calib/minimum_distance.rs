@@ -45,14 +45,14 @@ const RHO_END: f64 = 1e-7;
 /// The paper's authors allow as many.
 const MAX_EVALUATIONS: usize = 10_000;
 
-/// Minimizes [`PositionProblem::sum_of_distances_m`] over `free`, from the datasheet's values.
+/// Minimizes [`PositionProblem::sum_of_distances_m`] over `free`, from `guess`; the other parameters stay there.
 #[must_use]
-pub fn minimum_distance(problem: &PositionProblem<'_>, free: &[Parameter]) -> Solution {
+pub fn minimum_distance(problem: &PositionProblem<'_>, free: &[Parameter], guess: &JointParameters) -> Solution {
     let scale: Vec<f64> = free.iter().map(|p| p.prior_std(problem.robot)).collect();
     let at = |x: &[f64]| {
-        let mut parameters = JointParameters::default();
+        let mut parameters = *guess;
         for ((parameter, &scaled), std) in free.iter().zip(x).zip(&scale) {
-            parameters.set(*parameter, parameter.nominal() + scaled * std);
+            parameters.set(*parameter, guess.get(*parameter) + scaled * std);
         }
         parameters
     };

@@ -1,10 +1,13 @@
 //! BELIEF: from a recording and a nominal robot to calibrated joint sensors.
 //!
-//! `associate` turns recorded messages into views; `problem` is the geometry shared by all methods; one file per
+//! `associate` turns recorded messages into views; `identify` measures the scale of a sensor of which nobody knows it;
+//! `problem` is the geometry shared by all methods; one file per
 //! method solves it; `observability` names what the data cannot determine before solving; `uncertainty` says how good
-//! the answer is and `verdict` whether to use it; `result` is calibration.toml. Nothing here knows of a simulator.
+//! the answer is and `verdict` whether to use it; `result` is calibration.toml, `compact` its short form. Nothing here knows of a simulator.
 
 mod associate;
+mod compact;
+mod identify;
 mod minimum_distance;
 mod observability;
 mod problem;
@@ -12,16 +15,21 @@ mod result;
 mod uncertainty;
 mod verdict;
 
-pub use associate::{CaptureData, Rejection, TagView, View, associate};
+pub use associate::{CaptureData, Rejection, TagView, View, associate, associate_within, surveyed};
+pub use compact::{CompactCalibration, CompactError, CompactJoint, MAX_COMPACT_BYTES, PredictedToolError};
+pub use identify::{IdentifiedScale, identify_scales};
 pub use minimum_distance::{Solution, SolveOutcome, minimum_distance};
 pub use observability::{Unobservable, free_parameters};
 pub use problem::{JointParameters, Parameter, ParameterKind, PositionProblem};
 pub use result::{Calibration, CalibrationFileError, FitFigures, HeldOutFigures, JointResult, Status, ValidRange};
 pub use uncertainty::{ParameterCovariance, ToolErrorPrediction};
+pub use verdict::{MIN_HELD_OUT_VIEWS, MIN_VIEWS_PER_PARAMETER};
 
 use crate::log::Recording;
 use crate::robot::Robot;
 use crate::routine::Method;
+use crate::streams::{Mark, MarkKind, Message, Start};
+use crate::time::Stamp;
 
 /// Why no calibration came out at all; a poor one comes out refused instead.
 #[derive(Debug, thiserror::Error)]
@@ -30,66 +38,135 @@ pub enum CalibError {
     JointNames { recording: String, robot: String, recorded: Vec<String>, expected: Vec<String> },
     #[error("{recording}: holds no captured views (no marks `capture_fit` on /marks), so there is nothing to fit")]
     NoCaptures { recording: String },
+    #[error("{recording}: holds no view to fit; the arm came to rest for held-out views alone ({held_out})")]
+    NoFitViews { recording: String, held_out: usize },
     #[error(
-        "{recording}: no surveyed tag was seen in any captured view; tags of robot `{robot}`: {known:?}, seen: {seen:?}"
+        "{recording}: no surveyed tag was seen in any view to fit; tags of robot `{robot}`: {known:?}, seen: {seen:?}"
     )]
     NoTags { recording: String, robot: String, known: Vec<u32>, seen: Vec<u32> },
     #[error("{recording}: only {views} captured views show a surveyed tag; at least {needed} are needed")]
     TooFewViews { recording: String, views: usize, needed: usize },
     #[error("{recording}: no joint lies between the base and the camera with a sensor that the views determine")]
     NothingObservable { recording: String },
+    #[error("the scale of joint `{joint}` cannot be measured: {problem}")]
+    Identify { joint: String, problem: String },
 }
 
 /// The fewest views that may be fitted at all.
 pub const MIN_VIEWS: usize = 3;
 
-/// Calibrates `robot`'s joint sensors from the captured views of a recording.
+/// Calibrates `robot`'s joint sensors from the captured views of a recording, by the tags that it says were there.
+///
+/// A recording that marks its calibrations is worked through as it was marked, and the last one is the result: each uses the
+/// views of its mark's span, a warm one starts from the last accepted one before it. Without such a mark all captured
+/// views make one calibration. Sensors whose scale was measured on the way (`identify` marks) take it from there.
 ///
 /// # Errors
 /// [`CalibError`] when the recording holds nothing to fit. A doubtful fit is returned with [`Status::Refused`].
 pub fn calibrate(recording: &Recording, robot: &Robot, method: Method) -> Result<Calibration, CalibError> {
-    let name = recording.path.display().to_string();
     if recording.joint_names != robot.joint_names() {
         return Err(CalibError::JointNames {
-            recording: name,
+            recording: recording.path.display().to_string(),
             robot: robot.name.clone(),
             recorded: recording.joint_names.clone(),
             expected: robot.joint_names(),
         });
     }
-    let data = associate(recording, robot);
+    let robot = &*surveyed(recording, robot);
+    let mut accepted: Option<Calibration> = None;
+    let mut used = Vec::new();
+    let (last, earlier) = rounds(recording).split_last().map(|(last, rest)| (*last, rest.to_vec())).unwrap_or_default();
+    for round in earlier {
+        // One that came to nothing is in the way of nothing: the arm went on with what it believed in before.
+        if let Ok(calibration) = one_round(recording, robot, method, &round, accepted.as_ref(), &mut used)
+            && calibration.status == Status::Accepted
+        {
+            accepted = Some(calibration);
+        }
+    }
+    one_round(recording, robot, method, &last, accepted.as_ref(), &mut used)
+}
+
+/// One marked calibration; the default is the whole recording from the datasheet.
+#[derive(Clone, Copy, Default)]
+struct Round {
+    message_idx: Option<usize>,
+    span: Option<(Stamp, Stamp)>,
+    is_warm: bool,
+}
+
+fn rounds(recording: &Recording) -> Vec<Round> {
+    let mut rounds: Vec<(Stamp, Round)> = Vec::new();
+    for (idx, (_, message)) in recording.messages.iter().enumerate() {
+        let Message::Mark(Mark { start, end, kind: MarkKind::Calibrate(from) }) = message else { continue };
+        let is_warm = *from == Start::Warm;
+        rounds.push((*end, Round { message_idx: Some(idx), span: Some((*start, *end)), is_warm }));
+    }
+    rounds.sort_by_key(|(end, _)| *end);
+    rounds.into_iter().map(|(_, round)| round).collect()
+}
+
+fn one_round(
+    recording: &Recording,
+    robot: &Robot,
+    method: Method,
+    round: &Round,
+    accepted: Option<&Calibration>,
+    used: &mut Vec<usize>,
+) -> Result<Calibration, CalibError> {
+    let name = || recording.path.display().to_string();
+    let mut data = associate_within(recording, robot, round.span);
+    let (robot, identified) = identify_scales(&data, robot)?;
+    if !identified.is_empty() {
+        // Travel is counted in the sensor's own scale.
+        data = associate_within(recording, &robot, round.span);
+    }
+    used.extend(data.used.iter().chain(&round.message_idx));
+    used.sort_unstable();
+    used.dedup();
+    data.used.clone_from(used);
     if data.n_marks == 0 {
-        return Err(CalibError::NoCaptures { recording: name });
+        return Err(CalibError::NoCaptures { recording: name() });
+    }
+    if data.fit.is_empty() {
+        return Err(CalibError::NoFitViews { recording: name(), held_out: data.held_out.len() });
     }
     let views = data.fit.iter().filter(|view| !view.tags.is_empty()).count();
     if views == 0 {
         let known = robot.tags.iter().map(|tag| tag.id).collect();
-        return Err(CalibError::NoTags { recording: name, robot: robot.name.clone(), known, seen: data.ids_seen });
+        return Err(CalibError::NoTags { recording: name(), robot: robot.name.clone(), known, seen: data.ids_seen });
     }
     if views < MIN_VIEWS {
-        return Err(CalibError::TooFewViews { recording: name, views, needed: MIN_VIEWS });
+        return Err(CalibError::TooFewViews { recording: name(), views, needed: MIN_VIEWS });
     }
-    let fit = PositionProblem::new(robot, &data.fit);
-    let (free, unobservable) = free_parameters(&fit);
+    let prior = accepted.filter(|_| round.is_warm);
+    let guess = prior.map_or_else(JointParameters::default, |prior| prior.parameters(&robot));
+    let fit = PositionProblem::new(&robot, &data.fit);
+    let (free, unobservable) = free_parameters(&fit, &guess);
     if free.is_empty() {
-        return Err(CalibError::NothingObservable { recording: name });
+        return Err(CalibError::NothingObservable { recording: name() });
     }
     let solution = match method {
-        Method::MinimumDistance => minimum_distance(&fit, &free),
+        Method::MinimumDistance => minimum_distance(&fit, &free, &guess),
     };
     let covariance = ParameterCovariance::estimate(&fit, &free, &solution.parameters);
-    let task = uncertainty::predict_tool_error(robot, &solution.parameters, &covariance, data.task.as_ref());
-    let held_out = PositionProblem::new(robot, &data.held_out);
+    let held_out = PositionProblem::new(&robot, &data.held_out);
+    let linearity_scale = uncertainty::linearity_scale(&fit, &held_out, &solution.parameters, free.len());
+    let as_found = robot.clone().with_linearity(linearity_scale);
+    let task = uncertainty::predict_tool_error(&as_found, &solution.parameters, &covariance, data.task.as_ref());
     Ok(result::assemble(&result::Parts {
         recording,
-        robot,
+        robot: &robot,
         method,
         data: &data,
+        prior,
+        identified: &identified,
         fit: &fit,
         held_out: &held_out,
         solution: &solution,
         covariance: &covariance,
         unobservable: &unobservable,
+        linearity_scale,
         task,
     }))
 }

@@ -20,9 +20,9 @@ pub struct Unobservable {
 /// 2 mm and a survey off by 1 mm come to at 1 m. It decides only what is hopeless, so its exact size matters little.
 const POSITION_STD_M: f64 = 0.004;
 
-/// The parameters worth estimating, and those that are not.
+/// The parameters worth estimating, and those that are not, linearized at `guess`.
 #[must_use]
-pub fn free_parameters(problem: &PositionProblem<'_>) -> (Vec<Parameter>, Vec<Unobservable>) {
+pub fn free_parameters(problem: &PositionProblem<'_>, guess: &JointParameters) -> (Vec<Parameter>, Vec<Unobservable>) {
     let robot = problem.robot;
     let mut free = Vec::new();
     let mut unobservable = Vec::new();
@@ -37,7 +37,7 @@ pub fn free_parameters(problem: &PositionProblem<'_>) -> (Vec<Parameter>, Vec<Un
             }
         }
     }
-    while let Some((worst, ratio)) = least_determined(problem, &free) {
+    while let Some((worst, ratio)) = least_determined(problem, &free, guess) {
         if ratio <= 1.0 {
             break;
         }
@@ -54,17 +54,21 @@ pub fn free_parameters(problem: &PositionProblem<'_>) -> (Vec<Parameter>, Vec<Un
 }
 
 /// The free parameter with the largest ratio of its uncertainty from data alone to its prior one.
-fn least_determined(problem: &PositionProblem<'_>, free: &[Parameter]) -> Option<(usize, f64)> {
+fn least_determined(
+    problem: &PositionProblem<'_>,
+    free: &[Parameter],
+    guess: &JointParameters,
+) -> Option<(usize, f64)> {
     if free.is_empty() {
         return None;
     }
-    let scaled_std = data_std_in_prior_units(problem, free);
+    let scaled_std = data_std_in_prior_units(problem, free, guess);
     scaled_std.into_iter().enumerate().max_by(|a, b| a.1.total_cmp(&b.1))
 }
 
 /// Standard deviation of each parameter from the data alone over its prior's; infinite in a null direction.
-fn data_std_in_prior_units(problem: &PositionProblem<'_>, free: &[Parameter]) -> Vec<f64> {
-    let (_, mut jacobian) = problem.linearize(&JointParameters::default(), free);
+fn data_std_in_prior_units(problem: &PositionProblem<'_>, free: &[Parameter], guess: &JointParameters) -> Vec<f64> {
+    let (_, mut jacobian) = problem.linearize(guess, free);
     for (column, parameter) in free.iter().enumerate() {
         let std = parameter.prior_std(problem.robot);
         jacobian.column_mut(column).scale_mut(std / POSITION_STD_M);

@@ -66,15 +66,6 @@ pub struct Parameter {
 }
 
 impl Parameter {
-    /// Its value by the datasheet.
-    #[must_use]
-    pub fn nominal(self) -> f64 {
-        match self.kind {
-            ParameterKind::Gain => 1.0,
-            ParameterKind::Offset => 0.0,
-        }
-    }
-
     /// One sigma of the datasheet's prior, in the parameter's unit.
     #[must_use]
     pub fn prior_std(self, robot: &Robot) -> f64 {

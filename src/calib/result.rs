@@ -5,6 +5,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::associate::CaptureData;
+use super::identify::IdentifiedScale;
 use super::minimum_distance::Solution;
 use super::observability::Unobservable;
 use super::problem::{JointParameters, Parameter, ParameterKind, PositionProblem};
@@ -64,6 +65,13 @@ pub struct FitFigures {
     pub rejected: usize,
     pub rms_m: f64,
     pub rms_px: f64,
+    /// How many times the datasheets' linearity the sensors deviate from a straight line, by the residuals; at least 1.
+    #[serde(default = "as_the_datasheet_says")]
+    pub linearity_scale: f64,
+}
+
+fn as_the_datasheet_says() -> f64 {
+    1.0
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -107,6 +115,13 @@ pub struct JointResult {
     pub offset_estimated: bool,
     /// Angles that the captured views covered.
     pub covered_rad: [f64; 2],
+    /// The gain over the datasheet's; negative where the counts run the other way.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gain_over_datasheet: Option<f64>,
+    /// Counts per radian over the datasheet's, where they were measured first because nobody knew them; the gain's relative
+    /// standard deviation in `covariance` is about that scale.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub identified_ratio: Option<f64>,
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -130,11 +145,15 @@ pub(super) struct Parts<'a> {
     pub robot: &'a Robot,
     pub method: Method,
     pub data: &'a CaptureData,
+    /// What a warm calibration started from.
+    pub prior: Option<&'a Calibration>,
+    pub identified: &'a [IdentifiedScale],
     pub fit: &'a PositionProblem<'a>,
     pub held_out: &'a PositionProblem<'a>,
     pub solution: &'a Solution,
     pub covariance: &'a ParameterCovariance,
     pub unobservable: &'a [Unobservable],
+    pub linearity_scale: f64,
     pub task: Option<ToolErrorPrediction>,
 }
 
@@ -173,6 +192,7 @@ pub(super) fn assemble(parts: &Parts<'_>) -> Calibration {
             rejected: parts.data.rejected.values().sum(),
             rms_m: fit_rms_m,
             rms_px: parts.fit.reprojection_rms_px(at).unwrap_or(f64::NAN),
+            linearity_scale: parts.linearity_scale,
         },
         held_out,
         predicted_tool_error_m: predicted,
@@ -242,19 +262,30 @@ fn joint_results(parts: &Parts<'_>) -> Vec<JointResult> {
             let (low, high) =
                 travel.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), t| (low.min(t), high.max(t)));
             let angle = |t: f64| spec.center_rad + model.correction.gain * t + model.correction.offset_rad;
+            // What the new views did not determine is as sure as it was before.
+            let before = parts.prior.map(|prior| &prior.joint[joint]);
+            let gain_std_before =
+                before.map_or(spec.gain_std / spec.counts_per_rad.abs(), |j| j.gain_std_rad_per_count);
             JointResult {
                 name: spec.joint.clone(),
                 center_rad: spec.center_rad,
                 gain_rad_per_count: model.correction.gain / spec.counts_per_rad,
                 offset_rad: model.correction.offset_rad,
-                gain_std_rad_per_count: gain_std.unwrap_or(spec.gain_std) / spec.counts_per_rad.abs(),
-                offset_std_rad: offset_std.unwrap_or(spec.offset_std_rad),
-                gain_estimated: gain_std.is_some(),
-                offset_estimated: offset_std.is_some(),
-                covered_rad: [angle(low), angle(high)],
+                gain_std_rad_per_count: gain_std.map_or(gain_std_before, |std| std / spec.counts_per_rad.abs()),
+                offset_std_rad: offset_std.unwrap_or(before.map_or(spec.offset_std_rad, |j| j.offset_std_rad)),
+                gain_estimated: gain_std.is_some() || before.is_some_and(|j| j.gain_estimated),
+                offset_estimated: offset_std.is_some() || before.is_some_and(|j| j.offset_estimated),
+                covered_rad: if low <= high { [angle(low), angle(high)] } else { [spec.center_rad; 2] },
+                gain_over_datasheet: Some(model.correction.gain / ratio_of(parts, joint)),
+                identified_ratio: parts.identified.iter().find(|scale| scale.joint == joint).map(|scale| scale.ratio),
             }
         })
         .collect()
+}
+
+/// Counts per radian that the fit was made with, over the datasheet's.
+fn ratio_of(parts: &Parts<'_>, joint: usize) -> f64 {
+    parts.identified.iter().find(|scale| scale.joint == joint).map_or(1.0, |scale| scale.ratio)
 }
 
 impl Calibration {
@@ -278,6 +309,29 @@ impl Calibration {
                 Correction { gain: joint.gain_rad_per_count * model.spec.counts_per_rad, offset_rad: joint.offset_rad };
         }
         Ok(sensors)
+    }
+
+    /// `robot` with the sensor scales that were measured on the way, which the covariance's gains are relative to, and with
+    /// sensors as far from straight as the residuals say.
+    #[must_use]
+    pub fn scaled_robot(&self, robot: &Robot) -> Robot {
+        let mut scaled = robot.clone().with_linearity(self.fit.linearity_scale);
+        for (spec, joint) in scaled.sensors.iter_mut().zip(&self.joint) {
+            if let Some(ratio) = joint.identified_ratio {
+                *spec = spec.with_scale(ratio);
+            }
+        }
+        scaled
+    }
+
+    /// The parameters relative to the sensors of `robot`, whose joints must be this calibration's.
+    pub(super) fn parameters(&self, robot: &Robot) -> JointParameters {
+        let mut parameters = JointParameters::default();
+        for (joint, (result, spec)) in self.joint.iter().zip(&robot.sensors).enumerate() {
+            parameters.gain[joint] = result.gain_rad_per_count * spec.counts_per_rad;
+            parameters.offset_rad[joint] = result.offset_rad;
+        }
+        parameters
     }
 
     /// The covariance of the estimated parameters for `robot`'s joints; rows that name no joint of it are left out.
@@ -312,7 +366,15 @@ impl Calibration {
     /// # Errors
     /// [`CalibrationFileError`] naming file, key and allowed range.
     pub fn read(file: &Path) -> Result<Self, CalibrationFileError> {
-        let calibration: Self = parse_toml(file, &read_text(file)?)?;
+        Self::parse(file, &read_text(file)?)
+    }
+
+    /// Reads the text of a calibration file; `file` is for messages.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn parse(file: &Path, text: &str) -> Result<Self, CalibrationFileError> {
+        let calibration: Self = parse_toml(file, text)?;
         calibration.check(file).map_err(RobotError::from)?;
         Ok(calibration)
     }

@@ -4,10 +4,12 @@
 //! curvature, `B` the scatter of its gradient. `B` is summed by views, for all tags of one view share one camera pose
 //! and its error. Errors common to all views (camera mount, survey of a tag) do not show in any scatter; they are added
 //! from the priors through the same curvature. What a straight line leaves of a sensor's error (nonlinearity,
-//! temperature) is there again at every new pose; at the tool it is added from the datasheet's linearity.
+//! temperature) is there again at every new pose; at the tool it is added from the datasheet's linearity, or from more than
+//! that where the residuals say that the sensors are worse than their datasheet.
 
 use nalgebra::{Const, DMatrix, DVector, Dyn, Matrix3, OMatrix, Vector3};
 
+use super::associate::TagView;
 use super::problem::{JointParameters, Parameter, ParameterKind, PositionProblem};
 use crate::kinematics::{IkGoal, IkSettings, JointLimits, solve_position};
 use crate::robot::Robot;
@@ -107,6 +109,48 @@ impl ParameterCovariance {
         let full = &estimated * &self.matrix * estimated.transpose();
         covariance + full.fixed_view::<3, 3>(0, 0)
     }
+}
+
+/// How many times the datasheets' linearity the sensors must have for the residuals to be what they are; at least 1.
+///
+/// `sum |residual|^2 = sum (tr(mount) + tr(survey) + tr(corners) + s^2 tr(linearity))` over all tags of fitted and held-out
+/// views, solved for `s`. Fitted views count for the share that the parameters leave free: a view adds about three numbers.
+#[must_use]
+pub fn linearity_scale(
+    fit: &PositionProblem<'_>,
+    held_out: &PositionProblem<'_>,
+    at: &JointParameters,
+    n: usize,
+) -> f64 {
+    let [mut found_m2, mut from_drawing_m2, mut from_sensors_m2] = [0.0; 3];
+    for (problem, n_fitted) in [(fit, n), (held_out, 0)] {
+        let views = problem.views.iter().filter(|view| !view.tags.is_empty()).count();
+        let free_share = (1.0 - n_fitted as f64 / (3 * views).max(1) as f64).max(0.1);
+        problem.each(at, |o| {
+            let robot = problem.robot;
+            found_m2 += o.residual_m.norm_squared();
+            from_drawing_m2 += free_share * drawing_variance_m2(robot, o.tag);
+            for (joint, spec) in robot.sensors.iter().enumerate().take(robot.camera.mount.n_joints) {
+                let by_angle = o.poses.point_jacobian(joint, &o.predicted_m);
+                from_sensors_m2 += free_share * (by_angle * spec.linearity_std_rad).norm_squared();
+            }
+        });
+    }
+    let scale = ((found_m2 - from_drawing_m2) / from_sensors_m2).max(1.0).sqrt();
+    if scale.is_finite() { scale } else { 1.0 }
+}
+
+/// Expected square of a tag's distance from its survey with perfect sensors: mount, survey and corner noise, m^2.
+fn drawing_variance_m2(robot: &Robot, tag: &TagView) -> f64 {
+    let (camera, survey) = (&robot.camera, &robot.tags[tag.tag_idx]);
+    let range_m = tag.center_in_camera_m.norm();
+    let bearing_rad = camera.corner_std_px / camera.lens.focal_px[0];
+    // The range comes from the apparent size: `range^2 / size` times the bearing's error.
+    let along_m = range_m * range_m * bearing_rad / survey.size_m;
+    let across_m = range_m * bearing_rad;
+    3.0 * (camera.mount_std_m.powi(2) + survey.position_std_m.powi(2))
+        + 2.0 * (range_m * camera.mount_std_rad).powi(2)
+        + (along_m.powi(2) + 2.0 * across_m.powi(2)) / tag.n_frames.max(1) as f64
 }
 
 fn outer(v: &Vector3<f64>) -> Matrix3<f64> {

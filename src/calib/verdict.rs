@@ -19,11 +19,11 @@ pub struct Evidence {
 }
 
 /// Fewer views say nothing about views not seen.
-const MIN_HELD_OUT_VIEWS: usize = 3;
+pub const MIN_HELD_OUT_VIEWS: usize = 3;
 /// Held-out views this much worse than fitted ones mean that the fit learnt its own noise.
 const MAX_HELD_OUT_OVER_FIT: f64 = 2.5;
 /// Each view adds about three numbers that do not share its camera-pose error; fewer views than parameters overfit.
-const MIN_VIEWS_PER_PARAMETER: f64 = 1.0;
+pub const MIN_VIEWS_PER_PARAMETER: f64 = 1.0;
 
 /// `None` to accept, else the reason to refuse, with the figures.
 #[must_use]
