@@ -30,7 +30,15 @@ pub struct JointAsBuilt {
     pub offset_error_rad: f64,
     pub temperature_offset_rad_per_k: f64,
     pub temperature_gain_per_k: f64,
+    /// Counts per radian over the datasheet's.
+    #[serde(default = "one_to_one")]
+    pub gear_ratio: f64,
     pub harmonics: Vec<Harmonic>,
+}
+
+/// Truths recorded before there were gears.
+fn one_to_one() -> f64 {
+    1.0
 }
 
 /// One term of the nonlinearity: `amplitude * sin(2 pi order (theta - center) / range + phase)`.
@@ -128,6 +136,7 @@ fn draw_joint(robot: &Robot, joint: usize, spec: &WorldSpec, seed: u64) -> Joint
         offset_error_rad: sensors.offset_error_max_rad * offset.random_range(-1.0..=1.0),
         temperature_offset_rad_per_k: normal("temperature_offset", sensors.temperature_offset_std_rad_per_k),
         temperature_gain_per_k: normal("temperature_gain", sensors.temperature_gain_std_per_k),
+        gear_ratio: spec.gear_ratio.get(name).copied().unwrap_or(1.0),
         harmonics: Vec::new(),
     };
     built.harmonics = draw_harmonics(&built, sensors.nonlinearity_peak, &mut rng("nonlinearity"));

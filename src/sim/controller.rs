@@ -40,10 +40,16 @@ enum Rest {
 }
 
 impl Controller {
-    /// Starts at rest where `measured` says.
-    pub(super) fn new(spec: &HydraulicsSpec, sensors: &[JointSensorSpec], measured: &JointCounts) -> Self {
-        let joints = sensors.iter().zip(measured.iter()).map(|(sensor, &counts)| JointLoop {
-            counts_per_rad: sensor.counts_per_rad,
+    /// Starts at rest where `measured` says. `gear_ratio`, one a joint: it was tuned on this arm and knows which way the
+    /// counts run, else it would drive away from its set-points.
+    pub(super) fn new(
+        spec: &HydraulicsSpec,
+        sensors: &[JointSensorSpec],
+        gear_ratio: &[f64],
+        measured: &JointCounts,
+    ) -> Self {
+        let joints = sensors.iter().zip(gear_ratio).zip(measured.iter()).map(|((sensor, ratio), &counts)| JointLoop {
+            counts_per_rad: ratio * sensor.counts_per_rad,
             wrap_counts: sensor.wrap_counts,
             rate_limit_rad_s: sensor.max_rate_rad_s,
             set_counts: counts,
@@ -96,7 +102,8 @@ impl Controller {
 impl JointLoop {
     fn update(&mut self, spec: &HydraulicsSpec, filter_share: f64, counts: f64) -> f64 {
         self.filtered_counts += filter_share * wrap(counts - self.filtered_counts, self.wrap_counts);
-        let error_rad = wrap(self.set_counts - self.filtered_counts, self.wrap_counts) / self.counts_per_rad;
+        let away_rad = wrap(self.set_counts - self.filtered_counts, self.wrap_counts) / self.counts_per_rad;
+        let error_rad = away_rad + spec.controller_bias_rad;
         let band = match self.rest {
             Rest::Closed => 2.0 * spec.rest_band_rad,
             Rest::Open => spec.rest_band_rad,
@@ -123,7 +130,11 @@ mod tests {
     use super::*;
 
     fn controller(set: f64) -> Controller {
-        let spec = HydraulicsSpec { controller_filter_s: 0.0, ..HydraulicsSpec::default() };
+        biased_controller(set, 0.0)
+    }
+
+    fn biased_controller(set: f64, controller_bias_rad: f64) -> Controller {
+        let spec = HydraulicsSpec { controller_filter_s: 0.0, controller_bias_rad, ..HydraulicsSpec::default() };
         let sensor = JointSensorSpec {
             joint: "j".into(),
             kind: crate::robot::SensorKind::Potentiometer,
@@ -137,9 +148,11 @@ mod tests {
             offset_bound_rad: 0.0,
             noise_std_counts: 0.0,
             linearity_std_rad: 0.0,
+            temperature_std_rad_per_k: 0.0,
+            drift_std_rad_per_sqrt_h: 0.0,
             max_rate_rad_s: 0.5,
         };
-        Controller::new(&spec, &[sensor], &JointCounts::from_slice(&[set]))
+        Controller::new(&spec, &[sensor], &[1.0], &JointCounts::from_slice(&[set]))
     }
 
     #[test]
@@ -148,6 +161,15 @@ mod tests {
         controller.command(&JointCounts::from_slice(&[100.0]));
         let command = controller.update(&JointCounts::from_slice(&[65_500.0]));
         assert!(command[0] > 0.0, "136 counts up, not 65400 down");
+    }
+
+    #[test]
+    fn a_bias_moves_the_place_of_rest_by_itself() {
+        let bias_rad = 0.01;
+        let mut controller = biased_controller(1000.0, bias_rad);
+        assert!(controller.update(&JointCounts::from_slice(&[1000.0]))[0] > 0.0, "it leaves the set-point upwards");
+        let biased = 1000.0 + bias_rad * 2600.0;
+        assert_eq!(controller.update(&JointCounts::from_slice(&[biased]))[0], 0.0, "it rests beside it");
     }
 
     #[test]

@@ -9,7 +9,7 @@ use parry3d::math::Pose3;
 
 use super::spec::WaterSpec;
 use super::vehicle::BaseState;
-use crate::robot::{LinkBody, PlacedShape, Shape, parry_pose};
+use crate::robot::{LinkBody, PlacedShape, parry_pose};
 
 /// What the loads on one link depend on.
 #[derive(Clone, Debug)]
@@ -56,7 +56,7 @@ impl LinkLoads {
             com_m: body.com_m,
             inertia_kg_m2: body.inertia_kg_m2,
             center_of_buoyancy_m: volume_centroid(&body.collisions).unwrap_or(body.com_m),
-            buoyancy_fraction: if water.density_kg_m3 > 0.0 { water.buoyancy_fraction } else { 0.0 },
+            buoyancy_fraction: if water.density_kg_m3 > 0.0 { water.buoyancy() } else { 0.0 },
             drag: body.collisions.iter().map(|placed| drag_shape(placed, water)).collect(),
         }
     }
@@ -143,14 +143,7 @@ fn volume_centroid(shapes: &[PlacedShape]) -> Option<Vector3<f64>> {
 
 /// Each point takes a third of the areas of the box about the shape.
 fn drag_shape(placed: &PlacedShape, water: &WaterSpec) -> DragShape {
-    let size = match placed.shape {
-        Shape::Box { size_m } => Vector3::from(size_m),
-        Shape::Cylinder { radius_m, length_m } => Vector3::new(2.0 * radius_m, 2.0 * radius_m, length_m),
-        Shape::Capsule { radius_m, length_m } => {
-            Vector3::new(2.0 * radius_m, 2.0 * radius_m, length_m + 2.0 * radius_m)
-        }
-        Shape::Sphere { radius_m } => Vector3::repeat(2.0 * radius_m),
-    };
+    let size = Vector3::from(placed.shape.box_m());
     let areas = Vector3::new(size.y * size.z, size.x * size.z, size.x * size.y);
     let long = size.imax();
     let owner_from_shape = placed.owner_from_shape;
@@ -174,6 +167,7 @@ pub(super) fn shape_pose(placed: &PlacedShape) -> Pose3 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::robot::Shape;
 
     /// A 0.84 m x 0.14 m cylinder at 0.5 m/s feels about 17 N (Morison, Cd 1.2).
     #[test]

@@ -10,6 +10,7 @@ mod contact;
 mod controller;
 mod convert;
 mod error;
+mod fault;
 mod hydraulics;
 mod loads;
 mod physics;
@@ -23,6 +24,7 @@ mod world;
 
 pub use as_built::{AsBuilt, Harmonic, JointAsBuilt, PlainPose, TagAsBuilt};
 pub use error::SimError;
+pub use fault::Fault;
 pub use spec::{
     CameraWorldSpec, ClockSpec, HydraulicsSpec, JointSensorsSpec, PhysicsSpec, TagsSpec, TemperatureSpec,
     VehicleMotionSpec, WaterSpec, WorldSpec,

@@ -1,7 +1,7 @@
 //! Every solid thing once: for collision, clearance and what hides a tag.
 
 use nalgebra::{Isometry3, Point3, Vector3};
-use parry3d::math::Pose3;
+use parry3d::math::{Pose3, Vec3};
 use parry3d::query::{self, Ray};
 use parry3d::shape::SharedShape;
 
@@ -29,6 +29,8 @@ pub(super) struct Solid {
     pub carrier_from_shape: Pose3,
     pub shape: SharedShape,
     radius_m: f64,
+    /// Of a box about the shape's origin, in its own axes.
+    half_extents_m: Vec3,
 }
 
 /// What a shape is fixed to.
@@ -102,7 +104,9 @@ impl Solids {
         let pose = parry_pose(carrier_from_owner) * shape_pose(placed);
         let radius_m = placed.shape.bounding_radius_m();
         let shape = placed.shape.to_parry();
-        self.shapes.push(Solid { part, carrier, carrier_from_shape: pose, shape, radius_m });
+        let bounds = shape.compute_local_aabb();
+        let half_extents_m = bounds.mins.abs().max(bounds.maxs.abs());
+        self.shapes.push(Solid { part, carrier, carrier_from_shape: pose, shape, radius_m, half_extents_m });
         self.placed.push(pose);
     }
 
@@ -164,6 +168,35 @@ impl Solids {
         }
     }
 
+    /// The smallest distance of the given shapes, as placed; from `far_m` on not told apart.
+    pub(super) fn least_distance_m(&self, pairs: &[(usize, usize)], far_m: f64) -> f64 {
+        pairs.iter().fold(far_m, |least_m, &(i, j)| {
+            if self.is_farther(i, j, least_m) { least_m } else { least_m.min(self.distance(i, j)) }
+        })
+    }
+
+    /// Whether a cheap bound already puts two shapes at least `distance_m` apart.
+    fn is_farther(&self, i: usize, j: usize, distance_m: f64) -> bool {
+        let (a, b) = (&self.shapes[i], &self.shapes[j]);
+        let between = self.placed[j].translation - self.placed[i].translation;
+        if between.length() - a.radius_m - b.radius_m >= distance_m {
+            return true;
+        }
+        // One shape's box in its own axes against the other's sphere.
+        let beside = |place: &Pose3, half: Vec3, center: Vec3, radius_m: f64| {
+            let local = place.inverse_transform_point(center);
+            (local.abs() - half).max(Vec3::ZERO).length() - radius_m >= distance_m
+        };
+        beside(&self.placed[j], b.half_extents_m, self.placed[i].translation, a.radius_m)
+            || beside(&self.placed[i], a.half_extents_m, self.placed[j].translation, b.radius_m)
+    }
+
+    /// How far the shapes on a carrier reach from its origin, m.
+    pub(super) fn extent_m(&self, carrier: Carrier) -> f64 {
+        let on_it = self.shapes.iter().filter(|solid| solid.carrier == carrier);
+        on_it.map(|solid| solid.carrier_from_shape.translation.length() + solid.radius_m).fold(0.0, f64::max)
+    }
+
     /// The smallest distance of a moving link to anything that is not the arm, as placed; `None` if nothing is watched.
     pub(super) fn nearest(&self) -> Option<Nearest> {
         let mut nearest: Option<Nearest> = None;
@@ -173,10 +206,8 @@ impl Solids {
                 if is_own || !self.pairs.is_watched(a.part, b.part) {
                     continue;
                 }
-                let bound =
-                    (self.placed[i].translation - self.placed[j].translation).length() - a.radius_m - b.radius_m;
                 let best = nearest.map_or(f64::INFINITY, |n| n.distance_m);
-                if bound < best {
+                if !self.is_farther(i, j, best) {
                     let distance_m = self.distance(i, j);
                     if distance_m < best {
                         nearest = Some(Nearest { distance_m, part_a: a.part, part_b: b.part });
@@ -244,10 +275,18 @@ mod tests {
     use crate::robot::{load, load_vehicle};
 
     #[test]
-    fn of_the_standard_arm_only_neighbours_go_unwatched() {
+    fn of_any_arm_on_any_vehicle_only_neighbours_go_unwatched() {
+        for vehicle in ["work-class-front", "open-frame", "tight-basket", "under-ice"] {
+            for arm in ["titan4", "kraft-predator"] {
+                only_neighbours_go_unwatched(arm, vehicle);
+            }
+        }
+    }
+
+    fn only_neighbours_go_unwatched(arm: &str, vehicle: &str) {
         let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots");
-        let robot = load(&root.join("titan4")).expect("the robot reads");
-        let vehicle = load_vehicle(&root.join("vehicles/work-class-front.toml")).expect("the vehicle reads");
+        let vehicle = load_vehicle(&root.join(format!("vehicles/{vehicle}.toml"))).expect("the vehicle reads");
+        let robot = load(&root.join(arm)).and_then(|robot| robot.mounted_on(&vehicle)).expect("the robot reads");
         let scene = Scene { seafloor_z_m: Some(-1.1), obstacles: Vec::new() };
         let solids = Solids::new(&robot, &vehicle, &scene);
         let unwatched: Vec<(usize, usize)> = (1..robot.bodies.len())

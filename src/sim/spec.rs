@@ -2,6 +2,7 @@
 //!
 //! Every key is optional; a missing one takes the figure of the standard world. Angles are rad, temperatures Celsius.
 
+use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 use std::path::Path;
 
@@ -9,7 +10,8 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 use super::error::SimError;
-use crate::robot::FileIssue;
+use super::fault::Fault;
+use crate::robot::{FileIssue, Robot};
 
 /// Length of a control period, s: the arm's own controller runs at 100 Hz.
 pub(super) const CONTROL_PERIOD_S: f64 = 0.01;
@@ -83,6 +85,10 @@ table!(
         oil_time_constant_s = 300.0, in 1.0..=1e5;
         /// Noise of both thermometers.
         thermometer_noise_k = 0.05, in 0.0..=5.0;
+        /// The water changes by this much in the long run (a dive into colder water); the oil follows with its own time
+        /// constant.
+        water_change_k = 0.0, in -60.0..=60.0;
+        water_time_constant_s = 1800.0, in 1.0..=1e6;
     }
 );
 
@@ -165,27 +171,63 @@ table!(
         controller_filter_s = 0.05, in 0.0..=1.0;
         /// Below this error the controller closes the valve; it opens it again at twice the error.
         rest_band_rad = 0.02 * DEG, in 1e-6..=0.1;
+        /// The controller drives each sensor to its set-point plus this, by the datasheet's scale.
+        controller_bias_rad = 0.0, in -0.5..=0.5;
     }
 );
 
-table!(
-    /// Sea water about the arm.
-    WaterSpec {
-        density_kg_m3 = 1025.0, in 0.0..=2000.0;
-        /// Of every link, per axis of its shapes.
-        drag_coefficient = 1.2, in 0.0..=10.0;
-        /// Weight of the displaced water over the arm's own: 100 kg in air, 78 kg in sea water.
-        buoyancy_fraction = 0.22, in 0.0..=0.95;
-        /// Linear friction of each joint, for slow motion.
-        joint_friction_n_m_s_rad = 5.0, in 0.0..=1e4;
-        /// Of the vehicle's station below the surface.
-        depth_m = 500.0, in 0.0..=12000.0;
-        pressure_noise_pa = 200.0, in 0.0..=1e6;
+/// Sea water about the arm.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct WaterSpec {
+    pub density_kg_m3: f64,
+    /// Of every link, per axis of its shapes.
+    pub drag_coefficient: f64,
+    /// Weight of the displaced water over the arm's own; the robot's own figure where there is none.
+    pub buoyancy_fraction: Option<f64>,
+    /// Linear friction of each joint, for slow motion.
+    pub joint_friction_n_m_s_rad: f64,
+    /// Of the vehicle's station below the surface.
+    pub depth_m: f64,
+    pub pressure_noise_pa: f64,
+}
+
+impl Default for WaterSpec {
+    fn default() -> Self {
+        Self {
+            density_kg_m3: 1025.0,
+            drag_coefficient: 1.2,
+            buoyancy_fraction: None,
+            joint_friction_n_m_s_rad: 5.0,
+            depth_m: 500.0,
+            pressure_noise_pa: 200.0,
+        }
     }
-);
+}
+
+impl WaterSpec {
+    /// Weight of the displaced water over the arm's own: as set here, else none at all.
+    pub(super) fn buoyancy(&self) -> f64 {
+        self.buoyancy_fraction.unwrap_or(0.0)
+    }
+}
+
+impl CheckedTable for WaterSpec {
+    fn check(&self, file: &Path, table: &str) -> Result<(), FileIssue> {
+        let check =
+            |key: &str, value: f64, range| FileIssue::check_range(file, &format!("{table}.{key}"), value, range);
+        check("density_kg_m3", self.density_kg_m3, 0.0..=2000.0)?;
+        check("drag_coefficient", self.drag_coefficient, 0.0..=10.0)?;
+        check("buoyancy_fraction", self.buoyancy(), 0.0..=0.95)?;
+        check("joint_friction_n_m_s_rad", self.joint_friction_n_m_s_rad, 0.0..=1e4)?;
+        check("depth_m", self.depth_m, 0.0..=12000.0)?;
+        check("pressure_noise_pa", self.pressure_noise_pa, 0.0..=1e6)?;
+        Ok(())
+    }
+}
 
 /// `[world]`, checked.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct WorldSpec {
     pub physics: PhysicsSpec,
     pub joint_sensors: JointSensorsSpec,
@@ -196,13 +238,18 @@ pub struct WorldSpec {
     pub vehicle: VehicleMotionSpec,
     pub hydraulics: HydraulicsSpec,
     pub water: WaterSpec,
+    /// By joint: counts per radian over the datasheet's. Negative: they run the other way. The arm's own controller knows.
+    pub gear_ratio: BTreeMap<String, f64>,
+    /// What breaks, in the order of the routine's `fault` steps.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub fault: Vec<Fault>,
 }
 
 table!(
     /// The integrator and the rate of the truth's record.
     PhysicsSpec {
         /// Step of the rigid-body integration; a control period (10 ms) must be a whole number of steps.
-        step_s = 0.001, in 5e-5..=0.005;
+        step_s = 0.002, in 5e-5..=0.005;
         /// Rate of the truth's states, at most that of the controller.
         truth_rate_hz = 50.0, in 0.1..=100.0;
         /// Rate at which the clearance is measured.
@@ -216,9 +263,20 @@ impl WorldSpec {
     /// # Errors
     /// [`SimError::Spec`] naming file, key and the allowed range; NaN is in no range.
     pub fn from_table(table: &toml::Table, file: &Path) -> Result<Self, SimError> {
-        const TABLES: [&str; 9] =
-            ["physics", "joint_sensors", "temperature", "clock", "camera", "tags", "vehicle", "hydraulics", "water"];
-        if let Some(key) = table.keys().find(|key| !TABLES.contains(&key.as_str())) {
+        const TABLES: [&str; 10] = [
+            "physics",
+            "joint_sensors",
+            "temperature",
+            "clock",
+            "camera",
+            "tags",
+            "vehicle",
+            "hydraulics",
+            "water",
+            "gear_ratio",
+        ];
+        // Faults come with a routine's steps; in a spec's own text they stand beside the tables.
+        if let Some(key) = table.keys().find(|key| !TABLES.contains(&key.as_str()) && *key != "fault") {
             let problem = format!("is unknown; [world] has the tables {}", TABLES.join(", "));
             return Err(FileIssue::new(file, format!("world.{key}"), problem).into());
         }
@@ -233,7 +291,13 @@ impl WorldSpec {
             vehicle: reader.read("vehicle")?,
             hydraulics: reader.read("hydraulics")?,
             water: reader.read("water")?,
+            gear_ratio: reader.parse("gear_ratio")?,
+            fault: reader.parse("fault")?,
         };
+        for (joint, ratio) in &spec.gear_ratio {
+            let key = format!("world.gear_ratio.{joint} (size)");
+            FileIssue::check_range(file, &key, ratio.abs(), 0.01..=100.0)?;
+        }
         spec.check_relations(file)?;
         Ok(spec)
     }
@@ -244,6 +308,13 @@ impl WorldSpec {
     /// [`SimError::SpecText`], which no checked spec causes.
     pub fn to_toml(&self) -> Result<String, SimError> {
         Ok(toml::to_string(self)?)
+    }
+
+    /// With what only the robot says filled in.
+    #[must_use]
+    pub fn completed(mut self, robot: &Robot) -> Self {
+        self.water.buoyancy_fraction.get_or_insert(robot.buoyancy_fraction);
+        self
     }
 
     /// Physics steps in a control period.
@@ -274,15 +345,18 @@ struct Reader<'a> {
 
 impl Reader<'_> {
     fn read<T: CheckedTable>(&self, name: &str) -> Result<T, FileIssue> {
-        let key = format!("world.{name}");
-        let parsed = match self.table.get(name) {
-            None => T::default(),
-            Some(value) => value.clone().try_into().map_err(|error: toml::de::Error| {
-                FileIssue::new(self.file, key.clone(), error.message().trim_end().to_owned())
-            })?,
-        };
-        parsed.check(self.file, &key)?;
+        let parsed: T = self.parse(name)?;
+        parsed.check(self.file, &format!("world.{name}"))?;
         Ok(parsed)
+    }
+
+    fn parse<T: DeserializeOwned + Default>(&self, name: &str) -> Result<T, FileIssue> {
+        match self.table.get(name) {
+            None => Ok(T::default()),
+            Some(value) => value.clone().try_into().map_err(|error: toml::de::Error| {
+                FileIssue::new(self.file, format!("world.{name}"), error.message().trim_end().to_owned())
+            }),
+        }
     }
 }
 
@@ -301,7 +375,7 @@ mod tests {
     #[test]
     fn an_empty_world_is_the_standard_one() {
         assert_eq!(read("").expect("valid"), WorldSpec::default());
-        assert_eq!(WorldSpec::default().steps_per_period(), 10);
+        assert_eq!(WorldSpec::default().steps_per_period(), 5);
     }
 
     #[test]
@@ -317,6 +391,20 @@ mod tests {
         assert!(problem("[vehicle]\nperiod_min_s = 20.0").contains("period_max_s"));
         assert!(problem("[physics]\nstep_s = 0.003").contains("step_s"));
         assert!(problem("[camera]\nrate_hz = \"fast\"").contains("world.camera"));
+    }
+
+    #[test]
+    fn what_the_water_carries_is_the_arms_own_figure_unless_the_world_has_one() {
+        for (arm, fraction) in [("titan4", 0.22), ("kraft-predator", 0.3625)] {
+            let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots").join(arm);
+            let robot = crate::robot::load(&folder).expect("the robot reads");
+            let spec = |text: &str| read(text).expect("valid").completed(&robot);
+            assert_eq!(spec("").water.buoyancy(), fraction);
+            assert_eq!(spec("[water]\nbuoyancy_fraction = 0.5").water.buoyancy(), 0.5);
+            assert!(spec("").to_toml().expect("text").contains(&format!("buoyancy_fraction = {fraction}")));
+        }
+        assert!(problem("[water]\nbuoyancy_fraction = 1.0").contains("world.water.buoyancy_fraction"));
+        assert!(problem("[water]\ndrag = 1.0").contains("drag"));
     }
 
     #[test]

@@ -3,15 +3,19 @@
 //! Each joint hangs on its oil column: an implicit spring towards the piston, which the hydraulics move. Everything
 //! else (gravity, buoyancy, drag, the base's motion) comes as forces of `loads`, set anew in each step.
 
+mod guard;
+
 use nalgebra::{Isometry3, Unit, UnitQuaternion, Vector3};
 use rapier3d::dynamics::{
     GenericJoint, JointAxesMask, Multibody, MultibodyJointHandle, RigidBodyBuilder, RigidBodyHandle,
 };
-use rapier3d::geometry::ColliderBuilder;
+use rapier3d::geometry::{ColliderBuilder, ColliderHandle};
 use rapier3d::math::{Matrix, Vector};
 use rapier3d::parry::mass_properties::MassProperties;
 use rapier3d::pipeline::{ActiveHooks, PairFilterContext, PhysicsHooks, PhysicsWorld};
 use rapier3d::prelude::SolverFlags;
+
+use guard::ContactGuard;
 
 use super::convert::{from_rapier, to_rapier};
 use super::error::SimError;
@@ -35,6 +39,12 @@ pub(super) struct ArmPhysics {
     ground: RigidBodyHandle,
     loads: Vec<LinkLoads>,
     filter: PairFilter,
+    colliders: Vec<ColliderHandle>,
+    /// `None` for an arm that collides with nothing.
+    guard: Option<ContactGuard>,
+    /// Whether the engine looks for contacts.
+    is_colliding: bool,
+    is_ground_placed: bool,
 }
 
 pub(super) struct PhysicsInput<'a> {
@@ -85,12 +95,22 @@ impl ArmPhysics {
             links.push(link);
         }
         let tip = tip.ok_or_else(|| SimError::Joint { joint: "(none)".into() })?;
-        if let Some(solids) = input.solids {
-            add_colliders(&mut engine, solids, &links, ground);
-        }
+        let colliders = input.solids.map_or(Vec::new(), |solids| add_colliders(&mut engine, solids, &links, ground));
+        let guard = input.solids.map(|solids| ContactGuard::new(input.chain, solids, &input.angles));
         let loads = input.bodies[1..].iter().map(|body| LinkLoads::new(body, input.water)).collect();
         let filter = PairFilter { pairs: input.solids.map(|s| s.pairs().clone()) };
-        let mut physics = Self { engine, links, tip, ground, loads, filter };
+        let mut physics = Self {
+            engine,
+            links,
+            tip,
+            ground,
+            loads,
+            filter,
+            colliders,
+            guard,
+            is_colliding: true,
+            is_ground_placed: false,
+        };
         physics.set_angles(&input.angles);
         physics.set_damping(&[0.0; MAX_JOINTS]);
         Ok(physics)
@@ -166,9 +186,32 @@ impl ArmPhysics {
     pub(super) fn step(&mut self, base: &BaseState) {
         self.apply_loads(base);
         if let Some(ground) = self.engine.bodies.get_mut(self.ground) {
-            ground.set_next_kinematic_position(parry_pose(base.world_from_base.inverse().isometry()));
+            let base_from_world = parry_pose(base.world_from_base.inverse().isometry());
+            if !self.is_ground_placed {
+                // Driven there from the origin it would fly through the arm.
+                ground.set_position(base_from_world, false);
+                self.is_ground_placed = true;
+            }
+            ground.set_next_kinematic_position(base_from_world);
         }
+        self.guard_contacts();
         self.engine.step_with_events(&self.filter, &());
+    }
+
+    /// Lets the engine look for contacts only while there can be any.
+    fn guard_contacts(&mut self) {
+        let Some(mut guard) = self.guard.take() else { return };
+        let ground = isometry(self.engine.bodies[self.ground].position());
+        let needed = guard.contact_is_possible(&self.angles(), || self.poses(), &ground);
+        self.guard = Some(guard);
+        if needed != self.is_colliding {
+            self.is_colliding = needed;
+            for &handle in &self.colliders {
+                if let Some(collider) = self.engine.colliders.get_mut(handle) {
+                    collider.set_enabled(needed);
+                }
+            }
+        }
     }
 
     fn apply_loads(&mut self, base: &BaseState) {
@@ -225,6 +268,8 @@ fn empty_engine(step_s: f64) -> PhysicsWorld {
     // Springs and damping are implicit and outside of the iterative solver: it only has contacts to resolve.
     parameters.num_solver_iterations = 1;
     parameters.num_internal_pgs_iterations = 4;
+    // Nothing moves its own size in a step.
+    parameters.max_ccd_substeps = 0;
     engine
 }
 
@@ -258,7 +303,13 @@ fn revolute(parent_from_joint: &Isometry3<f64>, axis: &Unit<Vector3<f64>>) -> Ge
     joint
 }
 
-fn add_colliders(engine: &mut PhysicsWorld, solids: &Solids, links: &[RigidBodyHandle], ground: RigidBodyHandle) {
+fn add_colliders(
+    engine: &mut PhysicsWorld,
+    solids: &Solids,
+    links: &[RigidBodyHandle],
+    ground: RigidBodyHandle,
+) -> Vec<ColliderHandle> {
+    let mut handles = Vec::new();
     for solid in solids.shapes() {
         let parent = match solid.carrier {
             Carrier::Body(body) => links[body],
@@ -270,8 +321,9 @@ fn add_colliders(engine: &mut PhysicsWorld, solids: &Solids, links: &[RigidBodyH
             .density(0.0)
             .active_hooks(ActiveHooks::FILTER_CONTACT_PAIRS)
             .user_data(solid.part as u128);
-        engine.colliders.insert_with_parent(collider, parent, &mut engine.bodies);
+        handles.push(engine.colliders.insert_with_parent(collider, parent, &mut engine.bodies));
     }
+    handles
 }
 
 #[cfg(test)]

@@ -14,7 +14,7 @@ use rand::RngExt;
 const DRY: WaterSpec = WaterSpec {
     density_kg_m3: 0.0,
     drag_coefficient: 0.0,
-    buoyancy_fraction: 0.0,
+    buoyancy_fraction: Some(0.0),
     joint_friction_n_m_s_rad: 0.0,
     depth_m: 0.0,
     pressure_noise_pa: 0.0,

@@ -4,6 +4,8 @@
 //! image, its shortest side is long enough to decode, and neither its centre nor a corner is hidden by the arm or the
 //! vehicle. Corner noise per coordinate: `s (0.8 + 0.2 range / 1 m) / sqrt(cos(incidence))`.
 
+use std::collections::BTreeSet;
+
 use nalgebra::{Isometry3, Point3, Vector2, Vector3};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -34,6 +36,10 @@ pub(in crate::sim) struct WristCamera {
     tags: Vec<TagInBase>,
     /// Shapes that cannot hide anything, for they hold the camera.
     housing: Vec<usize>,
+    /// By id: those that fell off.
+    lost: BTreeSet<u32>,
+    /// Nothing is seen before this.
+    blind_until: Option<Stamp>,
     corner_noise: ChaCha8Rng,
     misses: ChaCha8Rng,
     jitter: ChaCha8Rng,
@@ -81,6 +87,8 @@ impl WristCamera {
             mount: built.camera_attachment(robot),
             tags,
             housing: solids.housing(robot),
+            lost: BTreeSet::new(),
+            blind_until: None,
             corner_noise: stream_rng(seed, "camera/corners"),
             misses: stream_rng(seed, "camera/misses"),
             jitter: stream_rng(seed, "camera/clock"),
@@ -92,16 +100,30 @@ impl WristCamera {
         links.frame(&self.mount)
     }
 
+    /// A tag falls off.
+    pub(in crate::sim) fn lose(&mut self, id: u32) {
+        self.lost.insert(id);
+    }
+
+    /// Silt hides everything until then.
+    pub(in crate::sim) fn blind(&mut self, until: Stamp) {
+        self.blind_until = Some(until);
+    }
+
     /// Takes an image; `solids` must be placed for `links`. The stamp is late and jitters.
     pub(in crate::sim) fn expose(&mut self, links: &BodyPoses, solids: &Solids, exposure: Stamp) -> TagDetections {
         let base_from_camera = self.base_from_camera(links);
         let mut tags = Vec::new();
+        let is_blind = self.blind_until.is_some_and(|until| exposure < until);
         for i in 0..self.tags.len() {
             let tag = self.tags[i];
             // Every tag takes its share of the random stream, seen or not: one more tag in view moves no other's noise.
             let is_missed = self.misses.random_range(0.0..1.0) < self.spec.miss_probability;
             let noise: [Vector2<f64>; 4] = std::array::from_fn(|_| self.corner_normal());
-            let Some(view) = self.view(&tag, &base_from_camera, solids).filter(|_| !is_missed) else { continue };
+            if is_missed || is_blind || self.lost.contains(&tag.id) {
+                continue;
+            }
+            let Some(view) = self.view(&tag, &base_from_camera, solids) else { continue };
             let std_px = self.corner_std_px(&view);
             let noisy: [Vector2<f64>; 4] = std::array::from_fn(|k| view.corners_px[k] + std_px * noise[k]);
             if noisy.iter().all(|pixel| self.lens.contains(pixel)) {

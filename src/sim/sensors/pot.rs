@@ -20,6 +20,12 @@ pub(in crate::sim) struct Pot {
     spec: JointSensorsSpec,
     shaft_rad: f64,
     drift_rad: f64,
+    /// What a slip on the shaft added.
+    jump_rad: f64,
+    /// The word of a sensor that is stuck.
+    stuck_counts: Option<f64>,
+    /// The last word.
+    counts: f64,
     noise: ChaCha8Rng,
     walk: ChaCha8Rng,
 }
@@ -46,6 +52,9 @@ impl Pot {
             spec: *spec,
             shaft_rad: built.center_rad,
             drift_rad: 0.0,
+            jump_rad: 0.0,
+            stuck_counts: None,
+            counts: 0.0,
             noise: stream_rng(seed, &format!("pot/noise/{}", nominal.joint)),
             walk: stream_rng(seed, &format!("pot/drift/{}", nominal.joint)),
         }
@@ -67,6 +76,17 @@ impl Pot {
             + built.offset_error_rad
             + built.temperature_offset_rad_per_k * warm_k
             + self.drift_rad
+            + self.jump_rad
+    }
+
+    /// It slips: reads `by_rad` more from now on.
+    pub(in crate::sim) fn jump(&mut self, by_rad: f64) {
+        self.jump_rad += by_rad;
+    }
+
+    /// It keeps its last word from now on.
+    pub(in crate::sim) fn stick(&mut self) {
+        self.stuck_counts = Some(self.counts);
     }
 
     /// The shaft angle at which it reads `reading_rad`: fixed-point iteration, for the nonlinearity is slight.
@@ -85,12 +105,15 @@ impl Pot {
         let step: f64 = StandardNormal.sample(&mut self.walk);
         self.drift_rad += self.spec.drift_rad_per_sqrt_h * (input.elapsed_s / 3600.0).sqrt() * step;
         let noise: f64 = StandardNormal.sample(&mut self.noise);
-        let exact =
-            self.nominal.offset_counts + self.nominal.counts_per_rad * self.reading_rad(self.shaft_rad, input.oil_c);
+        // Gears between shaft and sensor turn about the middle of the range, where both agree.
+        let center_rad = self.built.center_rad;
+        let travel_rad = self.built.gear_ratio * (self.reading_rad(self.shaft_rad, input.oil_c) - center_rad);
+        let exact = self.nominal.offset_counts + self.nominal.counts_per_rad * (center_rad + travel_rad);
         let noisy = exact + self.spec.noise_rms_counts * noise;
         let resolution = self.spec.resolution_counts;
         let rounded = if resolution > 0.0 { (noisy / resolution).round() * resolution } else { noisy };
-        rounded.rem_euclid(self.nominal.wrap_counts)
+        self.counts = self.stuck_counts.unwrap_or(rounded.rem_euclid(self.nominal.wrap_counts));
+        self.counts
     }
 }
 
@@ -123,6 +146,7 @@ mod tests {
             offset_error_rad: 0.0,
             temperature_offset_rad_per_k: 0.0,
             temperature_gain_per_k: 0.0,
+            gear_ratio: 1.0,
             harmonics: Vec::new(),
         }
     }
@@ -141,6 +165,8 @@ mod tests {
             offset_bound_rad: 0.0,
             noise_std_counts: 0.0,
             linearity_std_rad: 0.0,
+            temperature_std_rad_per_k: 0.0,
+            drift_std_rad_per_sqrt_h: 0.0,
             max_rate_rad_s: 1.0,
         };
         Pot::new(&nominal, built, spec, 1)
@@ -166,6 +192,24 @@ mod tests {
         let built = JointAsBuilt { gain_error: 0.05, ..perfect() };
         assert_reads(&built, at(-1.5, 10.0), -1.5);
         assert_reads(&built, at(0.5, 10.0), 0.5 + 0.05 * 2.0);
+    }
+
+    #[test]
+    fn gears_multiply_the_travel_about_the_middle_and_may_reverse_it() {
+        let built = JointAsBuilt { gear_ratio: -2.0, offset_error_rad: 0.1, ..perfect() };
+        assert_reads(&built, at(-1.5, 10.0), -1.5 - 2.0 * 0.1);
+        assert_reads(&built, at(-1.2, 10.0), -1.5 - 2.0 * 0.4);
+    }
+
+    #[test]
+    fn a_slip_adds_and_a_stuck_sensor_keeps_its_word() {
+        let mut pot = pot(&perfect(), &silent());
+        let before = pot.sample(&at(-1.0, 10.0));
+        pot.jump(0.05);
+        let after = pot.sample(&at(-1.0, 10.0));
+        assert!((after - before - 0.05 * COUNTS_PER_RAD).abs() < TOLERANCE_COUNTS);
+        pot.stick();
+        assert_eq!(pot.sample(&at(0.3, 10.0)), after);
     }
 
     #[test]

@@ -12,21 +12,32 @@ use crate::time::Stamp;
 /// Of the air at the surface.
 const ATMOSPHERE_PA: f64 = 101_325.0;
 
-/// True temperatures over time: water constant, oil warming.
+/// True temperatures over time: water that may change, oil that warms and follows it.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::sim) struct Temperatures {
     pub spec: TemperatureSpec,
 }
 
 impl Temperatures {
-    /// `start + rise (1 - exp(-t / time constant))`, Celsius.
+    /// `start + rise (1 - exp(-t / b)) + change (1 - (a exp(-t / a) - b exp(-t / b)) / (a - b))`, Celsius: its own warming
+    /// with time constant b, and the water's change (time constant a) behind the same lag.
     pub(in crate::sim) fn oil_c(&self, t_s: f64) -> f64 {
         let spec = &self.spec;
-        spec.oil_start_c + spec.oil_rise_k * (1.0 - (-t_s / spec.oil_time_constant_s).exp())
+        let (water_s, oil_s) = (spec.water_time_constant_s, spec.oil_time_constant_s);
+        let (by_water, by_oil) = ((-t_s / water_s).exp(), (-t_s / oil_s).exp());
+        // Equal time constants: the limit of the quotient.
+        let followed = if (water_s - oil_s).abs() < 1e-6 * oil_s {
+            1.0 - by_oil * (1.0 + t_s / oil_s)
+        } else {
+            1.0 - (water_s * by_water - oil_s * by_oil) / (water_s - oil_s)
+        };
+        spec.oil_start_c + spec.oil_rise_k * (1.0 - by_oil) + spec.water_change_k * followed
     }
 
-    pub(in crate::sim) fn water_c(&self) -> f64 {
-        self.spec.water_c
+    /// `water + change (1 - exp(-t / a))`, Celsius.
+    pub(in crate::sim) fn water_c(&self, t_s: f64) -> f64 {
+        let spec = &self.spec;
+        spec.water_c + spec.water_change_k * (1.0 - (-t_s / spec.water_time_constant_s).exp())
     }
 }
 

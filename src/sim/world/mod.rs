@@ -1,5 +1,7 @@
 //! The world: arm, vehicle, water and sensors in step.
 
+mod meanwhile;
+
 use std::collections::VecDeque;
 
 use super::as_built::AsBuilt;
@@ -27,11 +29,13 @@ use crate::time::{SIMULATION_EPOCH, Stamp};
 
 const ATTITUDE_PERIODS: u64 = 5;
 const SLOW_PERIODS: u64 = 100;
+/// The end of a wait that passes step by step, s.
+const AWAKE_S: f64 = 2.0;
 /// An arm that starts nearer to an end stop than this starts at this distance, rad.
 const END_STOP_MARGIN_RAD: f64 = 1e-3;
 
 /// What a world is made of.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct WorldInput<'a> {
     pub robot: &'a Robot,
     pub vehicle: &'a Vehicle,
@@ -69,10 +73,13 @@ pub struct World {
 impl World {
     /// # Errors
     /// [`SimError`] when the robot lacks masses or effort limits.
-    pub fn new(input: WorldInput) -> Result<Self, SimError> {
-        let WorldInput { robot, vehicle, scene, spec, seed } = input;
+    pub fn new(mut input: WorldInput) -> Result<Self, SimError> {
+        input.spec = input.spec.completed(input.robot);
+        let WorldInput { robot, vehicle, scene, seed, .. } = input;
+        let spec = input.spec.clone();
         robot.require_masses()?;
         let built = AsBuilt::draw(robot, &spec, seed);
+        let gear_ratios: Vec<f64> = built.joints.iter().map(|joint| joint.gear_ratio).collect();
         let step_s = CONTROL_PERIOD_S / spec.steps_per_period() as f64;
         let temperatures = Temperatures { spec: spec.temperature };
         let sensors = robot.sensors.iter().zip(&built.joints);
@@ -94,7 +101,7 @@ impl World {
         hydraulics.balance(&angles, &physics.static_torques(&robot.chain, &motion.at(0.0), &angles));
         let measured = sample_pots(&mut pots, &angles, temperatures.oil_c(0.0), 0.0);
         Ok(Self {
-            controller: Controller::new(&spec.hydraulics, &robot.sensors, &measured),
+            controller: Controller::new(&spec.hydraulics, &robot.sensors, &gear_ratios, &measured),
             slow: SlowSensors::new(&spec.temperature, &spec.water, seed),
             attitude: AttitudeSensor::new(&spec.vehicle, seed),
             camera: WristCamera::new(&CameraInput { robot, built: &built, solids: &solids, spec: &spec, seed }),
@@ -205,14 +212,27 @@ impl World {
             self.outbox.push((now, Message::Attitude(attitude)));
         }
         if period.is_multiple_of(SLOW_PERIODS) {
-            let oil = self.slow.temperature(Thermometer::Oil, oil_c, now);
-            let water = self.slow.temperature(Thermometer::Water, self.temperatures.water_c(), now);
-            let heave_m = self.motion.at(t_s).world_from_vehicle.origin().vector().z;
-            let pressure = self.slow.pressure(heave_m, now);
-            self.outbox.push((now, Message::Temperature(oil)));
-            self.outbox.push((now, Message::Temperature(water)));
-            self.outbox.push((now, Message::Pressure(pressure)));
+            self.sample_slow_sensors(now, t_s);
         }
+    }
+
+    /// Thermometers and depth gauge.
+    fn sample_slow_sensors(&mut self, now: Stamp, t_s: f64) {
+        let oil_c = self.temperatures.oil_c(t_s);
+        let oil = self.slow.temperature(Thermometer::Oil, oil_c, now);
+        let water = self.slow.temperature(Thermometer::Water, self.temperatures.water_c(t_s), now);
+        let heave_m = self.motion.at(t_s).world_from_vehicle.origin().vector().z;
+        let pressure = self.slow.pressure(heave_m, now);
+        self.outbox.push((now, Message::Temperature(oil)));
+        self.outbox.push((now, Message::Temperature(water)));
+        self.outbox.push((now, Message::Pressure(pressure)));
+    }
+
+    fn hand_over(&mut self, sink: &mut dyn Sink) -> Result<(), ArmError> {
+        for (log_time, message) in self.outbox.drain(..) {
+            sink.record(log_time, &message).map_err(ArmError::Sink)?;
+        }
+        self.record_truth()
     }
 
     fn record_truth(&mut self) -> Result<(), ArmError> {
@@ -254,7 +274,7 @@ impl World {
             base_from_camera: Pose::from_isometry(self.camera.base_from_camera(&links)),
             world_from_vehicle: self.motion.at(t_s).world_from_vehicle,
             oil_c: self.temperatures.oil_c(t_s),
-            water_c: self.temperatures.water_c(),
+            water_c: self.temperatures.water_c(t_s),
         }
     }
 }
@@ -285,14 +305,19 @@ impl Arm for World {
             return Err(ArmError::NotFinite { at_s: self.time_s() });
         }
         self.collect_messages();
-        for (log_time, message) in self.outbox.drain(..) {
-            sink.record(log_time, &message).map_err(ArmError::Sink)?;
-        }
-        self.record_truth()
+        self.hand_over(sink)
     }
 
     fn period_s(&self) -> f64 {
         CONTROL_PERIOD_S
+    }
+
+    fn idle(&mut self, seconds: f64, sink: &mut dyn Sink) -> Result<(), ArmError> {
+        self.rest(seconds, sink)
+    }
+
+    fn fault(&mut self, number: usize) -> Result<(), ArmError> {
+        self.break_something(number)
     }
 }
 
