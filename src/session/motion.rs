@@ -1,13 +1,14 @@
 //! Drives an arm along believed angles and waits until its own sensors say that it stands.
 
-use super::{Recorder, SessionError};
+use super::stillness::Stillness;
+use super::{Progress, Recorder, SessionError};
 use crate::plan::Path;
-use crate::robot::Robot;
+use crate::robot::{Robot, Vehicle};
 use crate::routine::TaskSettings;
 use crate::sensor::ArmSensors;
 use crate::streams::{
-    Arm, ArmError, JointAngles, JointCommand, JointStateBelief, LogLevel, LogLine, Mark, MarkKind, Message, Phase,
-    ReachTask, Sink,
+    Arm, ArmError, JointAngles, JointCommand, JointCounts, JointStateBelief, LogLevel, LogLine, Mark, MarkKind,
+    Message, Phase, ReachTask, RecordedSurvey, Sink,
 };
 use crate::time::Stamp;
 
@@ -17,21 +18,23 @@ pub(super) struct Driver<'b> {
     arm: &'b mut dyn Arm,
     pub recorder: &'b mut Recorder,
     pub sensors: ArmSensors,
+    pub progress: &'b mut dyn Progress,
     start: Stamp,
     /// Where the arm was last told to be, believed angles.
     set_point: JointAngles,
     ticks: u64,
     pub motion_s: f64,
+    pub waited_s: f64,
 }
 
 /// Share of a joint's rate that set-points use; the rest is left to the controller.
 const RATE_SHARE: f64 = 0.7;
 /// Set-points follow a cubic from rest to rest, whose peak rate is 1.5 times its mean.
 const CUBIC_PEAK: f64 = 1.5;
-/// The arm stands when every sensor has been this near to its set-point, rad ...
-const REST_RAD: f64 = 0.0016;
-/// ... for this long, s.
+/// The arm counts as settled when it has stood for this long, s.
 const REST_S: f64 = 0.4;
+/// A long wait is asked at this distance whether it shall go on, s.
+const WAIT_STRIDE_S: f64 = 600.0;
 const SETTLE_LIMIT_S: f64 = 12.0;
 /// Believed angles and commands are recorded each so many control periods.
 const BELIEF_EVERY: u64 = 4;
@@ -42,13 +45,15 @@ impl<'b> Driver<'b> {
         arm: &'b mut dyn Arm,
         recorder: &'b mut Recorder,
         sensors: ArmSensors,
+        progress: &'b mut dyn Progress,
     ) -> Result<Self, SessionError> {
         let start = arm.now();
         // One period, to learn where the arm is.
         arm.step(recorder)?;
         let counts = recorder.latest_counts.ok_or(SessionError::NoReadings)?;
         let set_point = sensors.angles(&counts);
-        let mut driver = Self { robot, arm, recorder, sensors, start, set_point, ticks: 0, motion_s: 0.0 };
+        let mut driver =
+            Self { robot, arm, recorder, sensors, progress, start, set_point, ticks: 0, motion_s: 0.0, waited_s: 0.0 };
         driver.command()?;
         Ok(driver)
     }
@@ -57,14 +62,40 @@ impl<'b> Driver<'b> {
         self.arm.now().since_s(self.start)
     }
 
+    pub fn now(&self) -> Stamp {
+        self.arm.now()
+    }
+
     pub fn set_point(&self) -> JointAngles {
         self.set_point
     }
 
     /// Where the arm believes to be by its latest readings.
     pub fn believed_angles(&self) -> Result<JointAngles, SessionError> {
-        let counts = self.recorder.latest_counts.ok_or(SessionError::NoReadings)?;
-        Ok(self.sensors.angles(&counts))
+        Ok(self.sensors.angles(&self.counts()?))
+    }
+
+    /// The latest raw readings.
+    pub fn counts(&self) -> Result<JointCounts, SessionError> {
+        self.recorder.latest_counts.ok_or(SessionError::NoReadings)
+    }
+
+    /// Lets time pass with the arm at rest.
+    pub fn wait(&mut self, seconds: f64) -> Result<(), SessionError> {
+        let before = self.arm.now();
+        let until = before.plus_s(seconds);
+        while self.arm.now() < until {
+            if self.progress.stop_requested() {
+                return Err(self.interrupt()?);
+            }
+            self.arm.idle(until.since_s(self.arm.now()).min(WAIT_STRIDE_S), self.recorder)?;
+        }
+        self.waited_s += self.arm.now().since_s(before);
+        Ok(())
+    }
+
+    pub fn fault(&mut self, number: usize) -> Result<(), SessionError> {
+        Ok(self.arm.fault(number)?)
     }
 
     /// Takes over other sensors; the arm stays where it is, only what that is called changes.
@@ -85,6 +116,12 @@ impl<'b> Driver<'b> {
         self.record(&Message::Task(ReachTask { stamp, targets_m, tolerance_m }))
     }
 
+    /// The tags, where the vehicle brings its own: the estimator has nothing but the recording and the robot's file.
+    pub fn record_survey(&mut self, vehicle: &Vehicle) -> Result<(), SessionError> {
+        let Some(survey) = &vehicle.survey else { return Ok(()) };
+        self.record(&Message::Survey(RecordedSurvey::new(self.arm.now(), survey)))
+    }
+
     pub fn phase(&mut self, phase: Phase) -> Result<(), SessionError> {
         let now = self.arm.now();
         self.record(&Message::Mark(Mark { start: now, end: now, kind: MarkKind::Phase(phase) }))
@@ -102,6 +139,9 @@ impl<'b> Driver<'b> {
     }
 
     fn step(&mut self) -> Result<(), SessionError> {
+        if self.progress.stop_requested() {
+            return Err(self.interrupt()?);
+        }
         self.arm.step(self.recorder)?;
         self.ticks += 1;
         if self.ticks.is_multiple_of(BELIEF_EVERY) {
@@ -112,6 +152,16 @@ impl<'b> Driver<'b> {
             self.record(&Message::JointCommand(JointCommand { stamp, counts }))?;
         }
         Ok(())
+    }
+
+    /// Tells the arm to stay where it was last sent, and the recording why it ends here.
+    fn interrupt(&mut self) -> Result<SessionError, SessionError> {
+        self.command()?;
+        let (stamp, at_s) = (self.arm.now(), self.elapsed_s());
+        let counts = self.sensors.counts(&self.set_point);
+        self.record(&Message::JointCommand(JointCommand { stamp, counts }))?;
+        self.log(LogLevel::Warn, "stopped on request; the arm holds its last set-point")?;
+        Ok(SessionError::Interrupted { at_s })
     }
 
     /// Moves along the path, from rest to rest on each edge.
@@ -137,13 +187,13 @@ impl<'b> Driver<'b> {
 
     /// Waits until the arm stands at its set-point; `false` when it does not within the limit.
     pub fn settle(&mut self) -> Result<bool, SessionError> {
-        let (mut at_rest_s, mut waited_s) = (0.0, 0.0);
+        let mut stillness = Stillness::new(self.believed_angles()?);
+        let mut waited_s = 0.0;
         while waited_s < SETTLE_LIMIT_S {
             self.step()?;
             waited_s += self.arm.period_s();
-            let near = self.believed_angles()?.max_abs_difference(&self.set_point) < REST_RAD;
-            at_rest_s = if near { at_rest_s + self.arm.period_s() } else { 0.0 };
-            if at_rest_s >= REST_S {
+            let now = self.believed_angles()?;
+            if stillness.update(&now, &self.set_point, self.arm.period_s()) >= REST_S {
                 return Ok(true);
             }
         }

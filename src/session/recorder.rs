@@ -1,13 +1,15 @@
 //! Keeps every message and remembers the latest of those that the loop steers by.
 
 use crate::log::{LogError, Recording, RecordingWriter, read_recording};
-use crate::streams::{JointCounts, Message, Sink, SinkError};
+use crate::streams::{JointCounts, MarkKind, Message, Sink, SinkError, Thermometer};
 use crate::time::Stamp;
 
 /// A recording being written, and the latest readings.
 pub struct Recorder {
     pub(super) writer: RecordingWriter,
     pub(super) latest_counts: Option<JointCounts>,
+    /// Latest of the oil's thermometer.
+    pub(super) oil_c: Option<f64>,
     /// Tags seen since it was last set to zero.
     pub(super) tags_seen: usize,
 }
@@ -15,7 +17,7 @@ pub struct Recorder {
 impl Recorder {
     #[must_use]
     pub fn new(writer: RecordingWriter) -> Self {
-        Self { writer, latest_counts: None, tags_seen: 0 }
+        Self { writer, latest_counts: None, oil_c: None, tags_seen: 0 }
     }
 
     /// The recording so far, read from its bytes on disk.
@@ -37,9 +39,17 @@ impl Sink for Recorder {
     fn record(&mut self, log_time: Stamp, message: &Message) -> Result<(), SinkError> {
         match message {
             Message::JointSensors(sample) => self.latest_counts = Some(sample.counts),
+            Message::Temperature(sample) if sample.thermometer == Thermometer::Oil => {
+                self.oil_c = Some(sample.temperature_c)
+            }
             Message::Detections(detections) => self.tags_seen += detections.tags.len(),
             _ => {}
         }
-        self.writer.record(log_time, message)
+        self.writer.record(log_time, message)?;
+        // A view that was captured is on disk before the arm moves on.
+        if matches!(message, Message::Mark(mark) if !matches!(mark.kind, MarkKind::Phase(_))) {
+            self.writer.flush()?;
+        }
+        Ok(())
     }
 }

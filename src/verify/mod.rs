@@ -19,22 +19,24 @@ pub struct ReachRest {
     pub target_m: [f64; 3],
     pub start: Stamp,
     pub end: Stamp,
-    /// Joint angles as believed under the sensors of that attempt.
+    /// Joint angles as believed under the sensors of that moment.
     pub believed: JointAngles,
     /// The tool as believed, base frame, m.
     pub believed_tool_m: Vector3<f64>,
 }
 
-/// The sensors that the arm believed in at each attempt.
-#[derive(Clone, Copy, Debug)]
-pub struct Beliefs<'a> {
-    pub before: &'a ArmSensors,
-    pub after: &'a ArmSensors,
+/// The sensors that the arm believed in, each from its stamp on; in the order of time, and not empty.
+pub type Beliefs<'a> = [(Stamp, &'a ArmSensors)];
+
+/// Those believed in at `stamp`: the first of all before the first stamp.
+fn believed_at<'a>(beliefs: &Beliefs<'a>, stamp: Stamp) -> Option<&'a ArmSensors> {
+    let later = beliefs.partition_point(|(from, _)| *from <= stamp);
+    beliefs.get(later.saturating_sub(1)).map(|(_, sensors)| *sensors)
 }
 
 /// Every reach of a recording, in the order of its marks. Marks without readings or without a target are left out.
 #[must_use]
-pub fn reaches(recording: &Recording, robot: &Robot, beliefs: Beliefs<'_>) -> Vec<ReachRest> {
+pub fn reaches(recording: &Recording, robot: &Robot, beliefs: &Beliefs<'_>) -> Vec<ReachRest> {
     let task = recording.messages.iter().find_map(|(_, message)| match message {
         Message::Task(task) => Some(task),
         _ => None,
@@ -56,10 +58,7 @@ pub fn reaches(recording: &Recording, robot: &Robot, beliefs: Beliefs<'_>) -> Ve
         .filter_map(|mark| {
             let MarkKind::Reach { attempt, target_idx } = mark.kind else { return None };
             let target_m = *task.targets_m.get(target_idx as usize)?;
-            let sensors = match attempt {
-                ReachAttempt::Before => beliefs.before,
-                ReachAttempt::After => beliefs.after,
-            };
+            let sensors = believed_at(beliefs, mark.start)?;
             let from = readings.partition_point(|sample| sample.stamp < mark.start);
             let to = readings.partition_point(|sample| sample.stamp <= mark.end);
             let span = readings.get(from..to).filter(|span| !span.is_empty())?;

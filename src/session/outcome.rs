@@ -1,0 +1,75 @@
+//! What a run leaves, as far as the arm itself can tell.
+
+use crate::calib::Calibration;
+use crate::sensor::ArmSensors;
+use crate::streams::ReachAttempt;
+use crate::time::Stamp;
+
+/// What came out.
+#[derive(Debug)]
+pub struct Outcome {
+    /// The last one, accepted or refused.
+    pub calibration: Calibration,
+    /// Poses at which the arm settled and was recorded.
+    pub poses: usize,
+    /// Poses given up: no path, or the arm did not settle.
+    pub poses_skipped: usize,
+    /// Targets given up, over all attempts.
+    pub targets_skipped: usize,
+    pub duration_s: f64,
+    /// Time for which the arm was moving, not standing, s.
+    pub motion_s: f64,
+    /// Time spent in the script's `wait` steps, s.
+    pub waited_s: f64,
+    /// Time that the estimator itself took, by the watcher's clock.
+    pub calibration_wall_s: f64,
+    /// What the arm believed, since when.
+    pub epochs: Vec<Epoch>,
+    pub reaches: Vec<ReachStep>,
+    pub asserts: Vec<AssertResult>,
+    /// Why the script ended before its last step.
+    pub stopped: Option<String>,
+}
+
+/// The sensors that the arm believed in from a moment on.
+#[derive(Clone, Debug)]
+pub struct Epoch {
+    pub from: Stamp,
+    pub sensors: ArmSensors,
+    /// Where they come from; `None` for the datasheet.
+    pub calibration: Option<Calibration>,
+}
+
+/// One `reach` step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ReachStep {
+    /// Number of the step in the script, from 1.
+    pub step: usize,
+    pub attempt: ReachAttempt,
+    pub start: Stamp,
+    pub end: Stamp,
+}
+
+/// One limit of an `assert` step, and how it came out.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AssertResult {
+    /// Number of the step in the script, from 1.
+    pub step: usize,
+    pub key: &'static str,
+    pub limit: f64,
+    /// `None`: the arm itself cannot know it, or there is no such figure.
+    pub value: Option<f64>,
+    /// When it was asked; `None` if the script did not come to it.
+    pub at: Option<Stamp>,
+    /// The last reach before it, an index into [`Outcome::reaches`].
+    pub last_reach: Option<usize>,
+}
+
+impl AssertResult {
+    /// Whether the limit holds; `None` where the figure is not known.
+    #[must_use]
+    pub fn holds(&self) -> Option<bool> {
+        let value = self.value?;
+        Some(if self.key == "clearance_m" { value >= self.limit } else { value <= self.limit })
+    }
+}

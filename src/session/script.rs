@@ -1,0 +1,372 @@
+//! Goes through a routine's steps.
+
+use rand_chacha::ChaCha8Rng;
+
+use super::motion::Driver;
+use super::outcome::{AssertResult, Epoch, Outcome, ReachStep};
+use super::{Progress, Recorder, SessionError, Setup};
+use crate::calib::{Calibration, Status, calibrate};
+use crate::plan::{
+    Age, ClearanceModel, JointErrorBounds, PathPlanner, PlanError, PosePlan, TargetRequest, plan_targets,
+};
+use crate::robot::Robot;
+use crate::routine::{AssertLimits, CalibrateSettings, CalibrateViews, CaptureSettings, MoveGoal, OnRefusal, Step};
+use crate::sensor::ArmSensors;
+use crate::stats::stream_rng;
+use crate::streams::{Arm, JointAngles, LogLevel, Mark, MarkKind, Message, Phase, ReachAttempt, Start};
+use crate::time::Stamp;
+
+/// Samples that a path planner may try before it gives a pose up.
+const MAX_PATH_SAMPLES: usize = 400;
+/// Shares of the clearance that are tried for a path from where the arm is, in this order.
+const START_SHARES: [f64; 4] = [1.0, 0.5, 0.2, 0.05];
+
+pub(super) fn run(
+    setup: &Setup<'_>,
+    arm: &mut dyn Arm,
+    recorder: &mut Recorder,
+    progress: &mut dyn Progress,
+) -> Result<Outcome, SessionError> {
+    let clearance = ClearanceModel::new(setup.robot, setup.vehicle, &setup.routine.scene);
+    let sensors = ArmSensors::nominal(setup.robot);
+    let mut driver = Driver::new(setup.robot, arm, recorder, sensors.clone(), progress)?;
+    driver.record_survey(setup.vehicle)?;
+    driver.phase(Phase::Plan)?;
+    let began = driver.now();
+    let mut run = Run {
+        setup,
+        robot: setup.robot.clone(),
+        bounds: JointErrorBounds::prior(setup.robot),
+        fresh: None,
+        rng: stream_rng(setup.seed, "plan"),
+        clearance: &clearance,
+        planned: None,
+        began,
+        views_since: began,
+        poses_marked: 0,
+        calibration: None,
+        tally: Tally::default(),
+        epochs: vec![Epoch { from: began, sensors, calibration: None }],
+        reaches: Vec::new(),
+        asserts: Vec::new(),
+        driver,
+    };
+    // A script that begins by measuring a sensor cannot plan before it has.
+    if !setup.routine.steps.iter().any(|step| matches!(step, Step::Identify(_))) {
+        run.prepare()?;
+    }
+    let stopped = run.steps()?;
+    run.driver.phase(Phase::Done)?;
+    run.finish(stopped)
+}
+
+/// Counts of a run.
+#[derive(Default)]
+pub(super) struct Tally {
+    pub poses: usize,
+    pub poses_skipped: usize,
+    pub targets_skipped: usize,
+    pub calibration_wall_s: f64,
+}
+
+/// Bounds of a calibration, and when and how warm it was.
+struct FreshBounds {
+    bounds: JointErrorBounds,
+    at: Stamp,
+    oil_c: Option<f64>,
+}
+
+/// What was planned before anything moved.
+pub(super) struct Planned {
+    /// Believed angles at each of the task's targets.
+    pub targets: Vec<JointAngles>,
+    /// For the first capture, if the sensors are still believed to be the datasheet's by then.
+    pub first_capture: Option<PosePlan>,
+}
+
+pub(super) struct Run<'a, 'b> {
+    pub setup: &'a Setup<'a>,
+    /// With the sensor scales that were measured on the way.
+    pub robot: Robot,
+    /// How wrong the sensors believed in may be by now.
+    pub bounds: JointErrorBounds,
+    /// And how wrong they were when they were new: none for a datasheet's, which hold for good.
+    fresh: Option<FreshBounds>,
+    pub rng: ChaCha8Rng,
+    pub clearance: &'a ClearanceModel<'a>,
+    pub driver: Driver<'b>,
+    pub planned: Option<Planned>,
+    began: Stamp,
+    /// Views captured from here on have been in no calibration.
+    views_since: Stamp,
+    /// Views marked so far; numbers them.
+    pub poses_marked: u32,
+    calibration: Option<Calibration>,
+    pub tally: Tally,
+    pub epochs: Vec<Epoch>,
+    reaches: Vec<ReachStep>,
+    asserts: Vec<AssertResult>,
+}
+
+impl Run<'_, '_> {
+    pub fn progress_at(&mut self, phase: Phase, done: usize, total: usize) {
+        let elapsed_s = self.driver.elapsed_s();
+        self.driver.progress.update(phase, done, total, elapsed_s);
+    }
+
+    pub fn margin_m(&self) -> f64 {
+        self.setup.routine.capture.clearance_m
+    }
+
+    /// Whether the arm believes in a calibration.
+    pub fn attempt(&self) -> ReachAttempt {
+        match self.epochs.last().and_then(|epoch| epoch.calibration.as_ref()) {
+            None => ReachAttempt::Before,
+            Some(_) => ReachAttempt::After,
+        }
+    }
+
+    /// Plans all that can be planned, so that a task that cannot be done is refused before anything moves.
+    pub fn prepare(&mut self) -> Result<(), SessionError> {
+        let routine = self.setup.routine;
+        let margin_m = self.margin_m();
+        let start = self.driver.believed_angles()?;
+        self.progress_at(Phase::Plan, 0, 2);
+        let nearest = self.clearance.nearest_under(&start, &self.bounds, margin_m);
+        if nearest.distance_m < margin_m {
+            let clearance_m = nearest.distance_m;
+            return Err(
+                PlanError::StartTooClose { clearance_m, nearest: nearest.to_string(), needed_m: margin_m }.into()
+            );
+        }
+        let request = TargetRequest { targets_m: &routine.task.targets_m, preferred: None, margin_m };
+        let planned = plan_targets(&self.robot, self.clearance, &self.bounds, &request, &mut self.rng);
+        let targets = planned.into_iter().collect::<Result<Vec<_>, _>>()?;
+        self.planned = Some(Planned { targets, first_capture: None });
+        self.progress_at(Phase::Plan, 1, 2);
+        if let Some(capture) = first_capture(&routine.steps) {
+            let plan = self.plan_views(capture)?;
+            self.planned = self.planned.take().map(|planned| Planned { first_capture: Some(plan), ..planned });
+        }
+        self.driver.record_task(&routine.task)?;
+        self.progress_at(Phase::Plan, 2, 2);
+        Ok(())
+    }
+
+    /// Carries out the steps; gives why it stopped before the last, if it did.
+    fn steps(&mut self) -> Result<Option<String>, SessionError> {
+        let routine = self.setup.routine;
+        for (index, step) in routine.steps.iter().enumerate() {
+            let number = index + 1;
+            self.age();
+            match step {
+                Step::Move(goal) => self.move_to(number, goal)?,
+                Step::Reach(reach) => {
+                    let (start, attempt) = (self.driver.now(), self.attempt());
+                    self.reach(&reach.targets)?;
+                    self.reaches.push(ReachStep { step: number, attempt, start, end: self.driver.now() });
+                }
+                Step::Capture(capture) => self.capture(capture)?,
+                Step::Identify(settings) => self.identify(number, settings)?,
+                Step::Calibrate(settings) => {
+                    let refusal = self.calibrate(settings)?;
+                    if let (Some(why), OnRefusal::Stop) = (refusal, settings.on_refusal) {
+                        self.pass_over(&routine.steps[index + 1..], number);
+                        return Ok(Some(format!("step {number}: the calibration was refused: {why}")));
+                    }
+                }
+                Step::Wait { seconds } => {
+                    self.driver.phase(Phase::Wait)?;
+                    self.progress_at(Phase::Wait, 0, 1);
+                    self.driver.wait(*seconds)?;
+                }
+                Step::Fault { number } => self.driver.fault(*number)?,
+                Step::Assert(limits) => self.assert(number, limits),
+            }
+        }
+        Ok(None)
+    }
+
+    fn finish(self, stopped: Option<String>) -> Result<Outcome, SessionError> {
+        let calibration = self
+            .calibration
+            .ok_or_else(|| SessionError::Step { step: 0, problem: "the script calibrated nothing".to_owned() })?;
+        Ok(Outcome {
+            calibration,
+            poses: self.tally.poses,
+            poses_skipped: self.tally.poses_skipped,
+            targets_skipped: self.tally.targets_skipped,
+            duration_s: self.driver.elapsed_s(),
+            motion_s: self.driver.motion_s,
+            waited_s: self.driver.waited_s,
+            calibration_wall_s: self.tally.calibration_wall_s,
+            epochs: self.epochs,
+            reaches: self.reaches,
+            asserts: self.asserts,
+            stopped,
+        })
+    }
+
+    /// Goes to believed angles by a certified path; `false` when there is none.
+    pub fn go(&mut self, to: &JointAngles) -> Result<bool, SessionError> {
+        let limits = self.bounds.safe_limits(&self.robot);
+        let from = self.driver.set_point();
+        let mut planner = PathPlanner {
+            clearance: self.clearance,
+            bounds: &self.bounds,
+            limits: &limits,
+            margin_m: self.margin_m(),
+            max_samples: MAX_PATH_SAMPLES,
+        };
+        // A new calibration may find the arm nearer to something than it believed to be: it must get away from there.
+        let margins_m = START_SHARES.map(|share| share * self.margin_m());
+        if let Some(margin_m) =
+            margins_m.into_iter().find(|&margin_m| PathPlanner { margin_m, ..planner }.is_free(&from))
+        {
+            planner.margin_m = margin_m;
+        }
+        if planner.margin_m < self.margin_m() {
+            let text = format!("starts with {:.3} m of clearance only, and keeps as much on the way", planner.margin_m);
+            self.driver.log(LogLevel::Warn, &text)?;
+        }
+        match planner.plan(&from, to, &mut self.rng) {
+            Ok(path) => {
+                self.driver.follow(&path)?;
+                Ok(true)
+            }
+            Err(blocked) => {
+                self.driver.log(LogLevel::Warn, &format!("a pose is left out: {blocked}"))?;
+                Ok(false)
+            }
+        }
+    }
+
+    fn move_to(&mut self, step: usize, goal: &MoveGoal) -> Result<(), SessionError> {
+        let wrong = |problem: String| SessionError::Step { step, problem };
+        let to = match goal {
+            MoveGoal::Stowed => self.robot.stowed,
+            MoveGoal::Angles(angles) if angles.len() == self.robot.n_joints() => JointAngles::from_slice(angles),
+            MoveGoal::Angles(angles) => {
+                let problem = format!("to_rad has {} angles, the arm {} joints", angles.len(), self.robot.n_joints());
+                return Err(wrong(problem));
+            }
+        };
+        self.driver.phase(Phase::Move)?;
+        self.progress_at(Phase::Move, 0, 1);
+        let nearest = self.clearance.nearest_under(&to, &self.bounds, self.margin_m());
+        if nearest.distance_m < self.margin_m() {
+            return Err(wrong(format!(
+                "the pose comes within {:.3} m of clearance between {nearest} for an arm within the sensors' error; {:.3} m are needed",
+                nearest.distance_m,
+                self.margin_m()
+            )));
+        }
+        if !self.go(&to)? {
+            return Err(wrong("no path leads there".to_owned()));
+        }
+        self.driver.phase(Phase::Settle)?;
+        if !self.driver.settle()? {
+            self.driver.log(LogLevel::Warn, "the arm did not settle after a move")?;
+        }
+        Ok(())
+    }
+
+    /// Calibrates from the recording's bytes; gives the reason if it was refused.
+    fn calibrate(&mut self, settings: &CalibrateSettings) -> Result<Option<String>, SessionError> {
+        self.driver.phase(Phase::Calibrate)?;
+        self.progress_at(Phase::Calibrate, 0, 1);
+        let end = self.driver.now();
+        let start = match settings.views {
+            CalibrateViews::New => self.views_since,
+            CalibrateViews::All => self.began,
+        };
+        let kind = MarkKind::Calibrate(if settings.warm { Start::Warm } else { Start::Fresh });
+        self.driver.record(&Message::Mark(Mark { start, end, kind }))?;
+        let recording = self.driver.recorder.read_back()?;
+        let began_s = self.driver.progress.wall_s();
+        let calibration = calibrate(&recording, self.setup.robot, self.setup.routine.method)?;
+        self.tally.calibration_wall_s += self.driver.progress.wall_s() - began_s;
+        self.views_since = end;
+        self.driver.log(LogLevel::Info, &verdict_line(&calibration))?;
+        if calibration.status == Status::Accepted {
+            self.believe(&calibration);
+        }
+        let refusal = calibration.refusal.clone();
+        self.calibration = Some(calibration);
+        Ok(refusal)
+    }
+
+    /// Widens the bounds by what time and temperature have done to the sensors since the calibration.
+    fn age(&mut self) {
+        let Some(fresh) = &self.fresh else { return };
+        let warmed_k = self.driver.recorder.oil_c.zip(fresh.oil_c).map_or(0.0, |(now, then)| now - then);
+        let age = Age { seconds: self.driver.now().since_s(fresh.at), warmed_k };
+        self.bounds = fresh.bounds.aged(&self.robot, age);
+    }
+
+    fn believe(&mut self, calibration: &Calibration) {
+        let sensors = calibration.sensors(self.setup.robot).expect("made for this robot a moment ago");
+        self.bounds = JointErrorBounds::calibrated(&self.robot, &estimated(calibration, &self.robot));
+        let (bounds, at, oil_c) = (self.bounds.clone(), self.driver.now(), self.driver.recorder.oil_c);
+        self.fresh = Some(FreshBounds { bounds, at, oil_c });
+        self.driver.believe(sensors.clone());
+        let from = self.driver.now();
+        self.epochs.push(Epoch { from, sensors, calibration: Some(calibration.clone()) });
+    }
+
+    fn assert(&mut self, step: usize, limits: &AssertLimits) {
+        let at = Some(self.driver.now());
+        let last_reach = self.reaches.len().checked_sub(1);
+        for (key, limit) in limits.each() {
+            let value = self.known(key);
+            self.asserts.push(AssertResult { step, key, limit, value, at, last_reach });
+        }
+    }
+
+    /// A figure that the arm itself can tell.
+    fn known(&self, key: &str) -> Option<f64> {
+        let calibration = self.calibration.as_ref();
+        match key {
+            "held_out_rms_m" => calibration?.held_out.rms_m,
+            "held_out_rms_px" => calibration?.held_out.rms_px,
+            "predicted_tool_error_m" => calibration?.predicted_tool_error_m.map(|summary| summary.p95),
+            "simulated_s" => Some(self.driver.elapsed_s()),
+            _ => None,
+        }
+    }
+
+    /// Limits that the script did not come to.
+    fn pass_over(&mut self, rest: &[Step], before: usize) {
+        for (offset, step) in rest.iter().enumerate() {
+            if let Step::Assert(limits) = step {
+                let step = before + 1 + offset;
+                let never = |(key, limit)| AssertResult { step, key, limit, value: None, at: None, last_reach: None };
+                self.asserts.extend(limits.each().map(never));
+            }
+        }
+    }
+}
+
+/// The first capture, if no calibration comes before it.
+fn first_capture(steps: &[Step]) -> Option<&CaptureSettings> {
+    steps.iter().find_map(|step| match step {
+        Step::Capture(capture) => Some(capture),
+        _ => None,
+    })
+}
+
+fn verdict_line(calibration: &Calibration) -> String {
+    match &calibration.refusal {
+        None => "calibration accepted".to_owned(),
+        Some(why) => format!("calibration refused: {why}"),
+    }
+}
+
+/// (gain sigma, offset sigma) of each joint, where estimated.
+fn estimated(calibration: &Calibration, robot: &Robot) -> Vec<(Option<f64>, Option<f64>)> {
+    let one = |(joint, spec): (&crate::calib::JointResult, &crate::robot::JointSensorSpec)| {
+        let gain_std = joint.gain_std_rad_per_count * spec.counts_per_rad.abs();
+        (joint.gain_estimated.then_some(gain_std), joint.offset_estimated.then_some(joint.offset_std_rad))
+    };
+    calibration.joint.iter().zip(&robot.sensors).map(one).collect()
+}
