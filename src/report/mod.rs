@@ -2,14 +2,18 @@
 //!
 //! `RunSummary` is summary.json; `table` the closing table on the terminal; `html` report.html, one file that needs no
 //! network. `markdown` the replay's panel.
-//! All show the same figures.
+//! All show the same figures. `inspection` is what a recording holds and what could be calibrated from it.
 
 mod html;
+pub mod inspection;
 mod markdown;
 mod summary;
 mod table;
 
 pub use html::html;
 pub use markdown::markdown;
-pub use summary::{CalibrationSummary, CaptureSummary, HeldOutSummary, JointScore, RunSummary, Score, ScoreSide};
+pub use summary::{
+    AssertSummary, CalibrationSummary, CaptureSummary, HeldOutSummary, JointScore, ReachScore, RunSummary, Score,
+    ScoreSide,
+};
 pub use table::table;

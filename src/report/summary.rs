@@ -20,13 +20,21 @@ pub struct RunSummary {
     pub simulated_s: Option<f64>,
     /// Of that, the time in which the arm was on its way.
     pub motion_s: Option<f64>,
+    /// And in which the script only waited.
+    pub waited_s: Option<f64>,
     pub wall_s: f64,
+    /// Why the script ended before its last step.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stopped: Option<String>,
     pub capture: CaptureSummary,
     pub calibration: CalibrationSummary,
     pub held_out: HeldOutSummary,
     /// From truth; absent for a real recording.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub score: Option<Score>,
+    /// The script's `assert` steps.
+    #[serde(default)]
+    pub asserts: Vec<AssertSummary>,
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -77,6 +85,32 @@ pub struct Score {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub nees: Option<f64>,
     pub joints: Vec<JointScore>,
+    /// Every `reach` step of the script. `before` is the first of them under the datasheet's sensors, `after` the last under
+    /// calibrated ones.
+    pub reaches: Vec<ReachScore>,
+}
+
+/// One `reach` step.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ReachScore {
+    /// Number of the step in the script, from 1.
+    pub step: usize,
+    /// Whether the arm believed in a calibration by then.
+    pub calibrated: bool,
+    #[serde(flatten)]
+    pub side: ScoreSide,
+}
+
+/// One limit of an `assert` step.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct AssertSummary {
+    /// Number of the step in the script, from 1.
+    pub step: usize,
+    pub key: String,
+    pub limit: f64,
+    /// `None` when the script did not come to it, or there is no such figure.
+    pub value: Option<f64>,
+    pub holds: bool,
 }
 
 /// Errors over the task's targets.
@@ -115,6 +149,8 @@ impl RunSummary {
             refusal: calibration.refusal.clone(),
             simulated_s: None,
             motion_s: None,
+            waited_s: None,
+            stopped: None,
             wall_s: calibration_wall_s,
             capture: CaptureSummary {
                 poses: calibration.fit.views + calibration.held_out.views,
@@ -143,6 +179,19 @@ impl RunSummary {
                 nominal_rms_m: calibration.held_out.nominal_rms_m,
             },
             score: None,
+            asserts: Vec::new(),
         }
+    }
+
+    /// Accepted, and every `assert` of the script holds.
+    #[must_use]
+    pub fn is_good(&self) -> bool {
+        self.status == Status::Accepted && self.asserts_hold()
+    }
+
+    /// Whether every `assert` of the script holds.
+    #[must_use]
+    pub fn asserts_hold(&self) -> bool {
+        self.asserts.iter().all(|limit| limit.holds)
     }
 }

@@ -3,7 +3,7 @@
 use comfy_table::presets::UTF8_FULL_CONDENSED;
 use comfy_table::{CellAlignment, Table};
 
-use super::summary::{RunSummary, ScoreSide};
+use super::summary::{AssertSummary, ReachScore, RunSummary, ScoreSide};
 use crate::calib::Status;
 use crate::stats::Summary;
 
@@ -152,12 +152,43 @@ pub(super) fn check_lines(summary: &RunSummary) -> Vec<String> {
     for line in &summary.calibration.unobservable {
         lines.push(format!("not known    {line}"));
     }
+    lines.extend(reach_lines(summary));
+    lines.extend(summary.asserts.iter().map(assert_line));
+    lines.extend(summary.stopped.iter().map(|why| format!("stopped      {why}")));
     if let (Some(simulated_s), Some(motion_s)) = (summary.simulated_s, summary.motion_s) {
+        let waited_s = summary.waited_s.unwrap_or(0.0);
+        let waited = if waited_s > 0.0 { format!(", {waited_s:.0} s waiting") } else { String::new() };
         lines.push(format!(
-            "time         {simulated_s:.0} s simulated ({motion_s:.0} s of them moving) in {:.1} s: {:.0} times real time",
+            "time         {simulated_s:.0} s simulated ({motion_s:.0} s of them moving{waited}) in {:.1} s: {:.0} times real time",
             summary.wall_s,
-            simulated_s / summary.wall_s.max(1e-9)
+            (simulated_s - waited_s) / summary.wall_s.max(1e-9)
         ));
     }
     lines
+}
+
+/// Every reach of a script that has more than the usual two.
+fn reach_lines(summary: &RunSummary) -> Vec<String> {
+    let reaches = summary.score.as_ref().map(|score| score.reaches.as_slice()).unwrap_or_default();
+    if reaches.len() <= 2 {
+        return Vec::new();
+    }
+    let mm = |v: Option<Summary>| v.map_or_else(|| "-".to_owned(), |v| format!("{:.2} mm", v.median * 1e3));
+    let line = |reach: &ReachScore| {
+        let belief = if reach.calibrated { "calibrated" } else { "datasheet" };
+        let (tool, miss) = (mm(reach.side.tool_error_m), mm(reach.side.reach_error_m));
+        format!("reach        step {} ({belief}): tool position error {tool}, miss {miss}, medians", reach.step)
+    };
+    reaches.iter().map(line).collect()
+}
+
+fn assert_line(limit: &AssertSummary) -> String {
+    let verdict = if limit.holds { "holds" } else { "FAILS" };
+    // Limits stand in the routine in metres; people read millimetres.
+    let (scale, unit) = if limit.key.ends_with("_m") { (1e3, " mm") } else { (1.0, "") };
+    let value = limit.value.map_or_else(
+        || "there is no such figure (the script did not come to it, or nothing was measured)".to_owned(),
+        |value| format!("{:.2}{unit}", value * scale),
+    );
+    format!("assert       {verdict}: step {}, {} {}{unit} against {value}", limit.step, limit.key, limit.limit * scale)
 }

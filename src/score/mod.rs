@@ -1,23 +1,22 @@
 //! Truth against belief: the only place that opens truth.mcap, after belief has finished.
 //!
-//! At each reach mark the tool as believed (from the recording, under the sensors of that attempt) is compared with
+//! At each reach mark the tool as believed (from the recording, under the sensors of that moment) is compared with
 //! the tool as it was, and the target with where the tool came to rest.
 
 use std::path::Path;
 
 use nalgebra::Vector3;
 
-use crate::calib::Calibration;
 use crate::log::Recording;
-use crate::report::{JointScore, Score, ScoreSide};
+use crate::report::{JointScore, ReachScore, Score, ScoreSide};
 use crate::robot::Robot;
-use crate::sensor::ArmSensors;
+use crate::session::{AssertResult, Outcome, ReachStep};
 use crate::sim::SimError;
 use crate::sim::truth::{Truth, read_truth};
 use crate::spatial::{Base, Pose, Tool};
 use crate::stats::Summary;
 use crate::streams::ReachAttempt;
-use crate::verify::{Beliefs, ReachRest, reaches};
+use crate::verify::{ReachRest, reaches};
 
 /// What truth adds to a run's figures.
 #[derive(Clone, Debug)]
@@ -25,6 +24,8 @@ pub struct Scored {
     pub score: Score,
     pub collisions: usize,
     pub min_clearance_m: Option<f64>,
+    /// The script's limits, with the figures that only the truth knows.
+    pub asserts: Vec<AssertResult>,
 }
 
 /// What is compared.
@@ -32,9 +33,7 @@ pub struct ScoreInput<'a> {
     pub recording: &'a Recording,
     pub truth: &'a Path,
     pub robot: &'a Robot,
-    pub calibration: &'a Calibration,
-    /// The sensors that the arm believed in after calibration (the datasheet's if it was refused).
-    pub after: &'a ArmSensors,
+    pub outcome: &'a Outcome,
     pub tolerance_m: f64,
 }
 
@@ -44,21 +43,51 @@ pub struct ScoreInput<'a> {
 /// [`SimError::TruthFile`] when the truth cannot be read.
 pub fn score(input: &ScoreInput<'_>) -> Result<Scored, SimError> {
     let truth = read_truth(input.truth)?;
-    let before = ArmSensors::nominal(input.robot);
-    let beliefs = Beliefs { before: &before, after: input.after };
-    let rests = reaches(input.recording, input.robot, beliefs);
-    let side = |attempt: ReachAttempt| -> Vec<Compared> {
-        rests.iter().filter(|r| r.attempt == attempt).filter_map(|rest| compare(rest, input.robot, &truth)).collect()
+    let outcome = input.outcome;
+    let beliefs: Vec<_> = outcome.epochs.iter().map(|epoch| (epoch.from, &epoch.sensors)).collect();
+    let rests = reaches(input.recording, input.robot, &beliefs);
+    let compared: Vec<Compared> = rests.iter().filter_map(|rest| compare(rest, input.robot, &truth)).collect();
+    let of_step = |step: &ReachStep| -> Vec<&Compared> {
+        compared.iter().filter(|c| (step.start..=step.end).contains(&c.rest.start)).collect()
     };
-    let (before, after) = (side(ReachAttempt::Before), side(ReachAttempt::After));
-    let joints = joint_scores(input, &before, &after);
+    let reaches: Vec<ReachScore> = outcome
+        .reaches
+        .iter()
+        .map(|step| ReachScore {
+            step: step.step,
+            calibrated: step.attempt == ReachAttempt::After,
+            side: side_figures(&of_step(step), input.tolerance_m),
+        })
+        .collect();
+    let first = outcome.reaches.iter().find(|step| step.attempt == ReachAttempt::Before).map(of_step);
+    let last = outcome.reaches.iter().rev().find(|step| step.attempt == ReachAttempt::After).map(of_step);
+    let (before, after) = (first.unwrap_or_default(), last.unwrap_or_default());
     let score = Score {
         before: side_figures(&before, input.tolerance_m),
         after: (!after.is_empty()).then(|| side_figures(&after, input.tolerance_m)),
         nees: nees(input, &after),
-        joints,
+        joints: joint_scores(input, &before, &after),
+        reaches,
     };
-    Ok(Scored { score, collisions: truth.contacts.len(), min_clearance_m: truth.min_clearance_m() })
+    let asserts = outcome.asserts.iter().map(|limit| completed(limit, &score, &truth)).collect();
+    Ok(Scored { score, collisions: truth.contacts.len(), min_clearance_m: truth.min_clearance_m(), asserts })
+}
+
+/// The limit with its figure, if the truth has it.
+fn completed(limit: &AssertResult, score: &Score, truth: &Truth) -> AssertResult {
+    let reach = limit.last_reach.and_then(|reach| score.reaches.get(reach)).map(|reach| &reach.side);
+    let value = limit.at.and_then(|at| match limit.key {
+        "tool_error_m" => Some(reach?.tool_error_m?.median),
+        "reach_error_m" => Some(reach?.reach_error_m?.median),
+        "reach_error_max_m" => Some(reach?.reach_error_m?.max),
+        "contacts" => Some(truth.contacts.iter().filter(|contact| contact.stamp <= at).count() as f64),
+        "clearance_m" => {
+            let until = truth.clearances.iter().filter(|clearance| clearance.stamp <= at);
+            until.map(|clearance| clearance.distance_m).min_by(f64::total_cmp)
+        }
+        _ => limit.value,
+    });
+    AssertResult { value, ..limit.clone() }
 }
 
 /// One rest, believed and true.
@@ -92,8 +121,8 @@ fn wrapped(angle_rad: f64) -> f64 {
     (angle_rad + PI).rem_euclid(TAU) - PI
 }
 
-fn side_figures(compared: &[Compared<'_>], tolerance_m: f64) -> ScoreSide {
-    let summary = |f: fn(&Compared<'_>) -> f64| Summary::of(&compared.iter().map(f).collect::<Vec<_>>());
+fn side_figures(compared: &[&Compared<'_>], tolerance_m: f64) -> ScoreSide {
+    let summary = |f: fn(&Compared<'_>) -> f64| Summary::of(&compared.iter().map(|c| f(c)).collect::<Vec<_>>());
     ScoreSide {
         tool_error_m: summary(|c| c.tool_error_m.norm()),
         tool_error_rad: summary(|c| c.tool_error_rad),
@@ -102,8 +131,8 @@ fn side_figures(compared: &[Compared<'_>], tolerance_m: f64) -> ScoreSide {
     }
 }
 
-fn joint_scores(input: &ScoreInput<'_>, before: &[Compared<'_>], after: &[Compared<'_>]) -> Vec<JointScore> {
-    let rms = |side: &[Compared<'_>], joint: usize| {
+fn joint_scores(input: &ScoreInput<'_>, before: &[&Compared<'_>], after: &[&Compared<'_>]) -> Vec<JointScore> {
+    let rms = |side: &[&Compared<'_>], joint: usize| {
         let mean_square = side.iter().map(|c| c.joint_error_rad[joint].powi(2)).sum::<f64>() / side.len() as f64;
         (!side.is_empty()).then(|| mean_square.sqrt())
     };
@@ -113,17 +142,22 @@ fn joint_scores(input: &ScoreInput<'_>, before: &[Compared<'_>], after: &[Compar
         angle_error_after_rad: rms(after, joint),
         estimated: result.gain_estimated || result.offset_estimated,
     };
-    input.calibration.joint.iter().enumerate().map(joint_score).collect()
+    input.outcome.calibration.joint.iter().enumerate().map(joint_score).collect()
 }
 
 /// Mean of `e^T P^-1 e` over the targets; `None` when the prediction has no inverse.
-fn nees(input: &ScoreInput<'_>, after: &[Compared<'_>]) -> Option<f64> {
-    let covariance = input.calibration.parameter_covariance(input.robot);
+fn nees(input: &ScoreInput<'_>, after: &[&Compared<'_>]) -> Option<f64> {
+    let first = after.first()?;
+    let epoch = input.outcome.epochs.iter().rev().find(|epoch| epoch.from <= first.rest.start)?;
+    let calibration = epoch.calibration.as_ref()?;
+    let robot = calibration.scaled_robot(input.robot);
+    let covariance = calibration.parameter_covariance(&robot);
+    let sensors = calibration.sensors(&robot).ok()?;
     let mut sum = 0.0;
     for compared in after {
-        let predicted = covariance.tool_position_m2(input.robot, input.after, &compared.rest.believed);
+        let predicted = covariance.tool_position_m2(&robot, &sensors, &compared.rest.believed);
         let inverse = predicted.try_inverse().filter(|p| p.iter().all(|v| v.is_finite()))?;
         sum += compared.tool_error_m.dot(&(inverse * compared.tool_error_m));
     }
-    (!after.is_empty()).then(|| sum / after.len() as f64)
+    Some(sum / after.len() as f64)
 }

@@ -1,0 +1,136 @@
+//! What a robot's calibration could take from the recording.
+
+use std::path::Path;
+
+use serde::Serialize;
+
+use super::is_capture;
+use crate::calib::{
+    JointParameters, MIN_HELD_OUT_VIEWS, MIN_VIEWS, MIN_VIEWS_PER_PARAMETER, PositionProblem, View, associate,
+    free_parameters, identify_scales, surveyed,
+};
+use crate::log::{LogError, Recording, TopicMap, scan_recording};
+use crate::robot::Robot;
+use crate::streams::{Mark, Message};
+use crate::time::Stamp;
+
+/// Views and parameters, in words.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Determined {
+    pub robot: String,
+    /// Captured views that show a tag of the survey, for the fit and for the verdict.
+    pub views: usize,
+    pub held_out_views: usize,
+    /// Tags in the views for the fit.
+    pub tags_used: usize,
+    /// Ids that were seen in captured views and are not in the robot's survey.
+    pub unknown_tags: Vec<u32>,
+    /// Parameters that the views determine better than the datasheet does: `joint gain`, `joint offset`.
+    pub parameters: Vec<String>,
+    /// `joint gain: why` of those that would stay at the datasheet's values.
+    pub undetermined: Vec<String>,
+    /// What is missing for a calibration that could be accepted; empty if nothing.
+    pub missing: Vec<String>,
+}
+
+/// `marked` holds the marks of the recording at `path`.
+pub(super) fn determined(path: &Path, robot: &Robot, marked: &Recording) -> Result<Determined, LogError> {
+    let mut determined = Determined {
+        robot: robot.name.clone(),
+        views: 0,
+        held_out_views: 0,
+        tags_used: 0,
+        unknown_tags: Vec::new(),
+        parameters: Vec::new(),
+        undetermined: Vec::new(),
+        missing: Vec::new(),
+    };
+    if marked.joint_names != robot.joint_names() {
+        let (found, wanted) = (marked.joint_names.join(", "), robot.joint_names().join(", "));
+        determined.missing.push(format!("joint readings of this robot: the recording has [{found}], not [{wanted}]"));
+        return Ok(determined);
+    }
+    let spans = Spans::of(marked);
+    let (recording, _) = scan_recording(
+        path,
+        &TopicMap::default(),
+        |_| {},
+        |_, m| is_capture(m) || matches!(m, Message::Survey(_)) || stamp(m).is_some_and(|s| spans.hold(s)),
+    )?;
+    let robot = &*surveyed(&recording, robot);
+    let as_drawn = associate(&recording, robot);
+    // A scale that cannot be measured leaves the datasheet's; what `calibrate` says of it is for `calibrate` to say.
+    let scaled = identify_scales(&as_drawn, robot).map_or_else(|_| robot.clone(), |(scaled, _)| scaled);
+    let (data, robot) = (associate(&recording, &scaled), &scaled);
+    let with_tags = |views: &[View]| views.iter().filter(|view| !view.tags.is_empty()).count();
+    determined.views = with_tags(&data.fit);
+    determined.held_out_views = with_tags(&data.held_out);
+    determined.unknown_tags =
+        data.ids_seen.iter().copied().filter(|id| robot.tags.iter().all(|tag| tag.id != *id)).collect();
+    if determined.views > 0 {
+        let problem = PositionProblem::new(robot, &data.fit);
+        determined.tags_used = problem.n_observations();
+        let (free, unobservable) = free_parameters(&problem, &JointParameters::default());
+        determined.parameters = free.iter().map(|parameter| parameter.name(robot)).collect();
+        let line = |u: &crate::calib::Unobservable| format!("{}: {}", u.parameter.name(robot), u.reason);
+        determined.undetermined = unobservable.iter().map(line).collect();
+    }
+    determined.missing = missing(&determined);
+    Ok(determined)
+}
+
+fn missing(determined: &Determined) -> Vec<String> {
+    let mut missing = Vec::new();
+    let parameters = determined.parameters.len();
+    let wanted = MIN_VIEWS.max((MIN_VIEWS_PER_PARAMETER * parameters as f64).ceil() as usize);
+    if determined.views < wanted {
+        let views = determined.views;
+        let of = if views == 0 { String::new() } else { format!(" for {parameters} parameters") };
+        missing.push(format!("views: {views} captured ones show a surveyed tag, at least {wanted} are needed{of}"));
+    }
+    if determined.held_out_views < MIN_HELD_OUT_VIEWS {
+        let views = determined.held_out_views;
+        missing.push(format!("held-out views: {views} show a surveyed tag, a verdict needs {MIN_HELD_OUT_VIEWS}"));
+    }
+    if determined.views > 0 && parameters == 0 {
+        missing.push("a sensor that the views determine".to_owned());
+    }
+    missing
+}
+
+/// The stamp of what a view is made of.
+fn stamp(message: &Message) -> Option<Stamp> {
+    match message {
+        Message::JointSensors(sample) => Some(sample.stamp),
+        Message::Detections(detections) => Some(detections.stamp),
+        _ => None,
+    }
+}
+
+/// Spans of time without overlap, in order.
+struct Spans(Vec<(Stamp, Stamp)>);
+
+impl Spans {
+    /// Those of the captured views.
+    fn of(recording: &Recording) -> Self {
+        let mark = |message: &Message| match message {
+            Message::Mark(Mark { start, end, .. }) if is_capture(message) => Some((*start, *end)),
+            _ => None,
+        };
+        let mut all: Vec<_> = recording.messages.iter().filter_map(|(_, message)| mark(message)).collect();
+        all.sort_unstable();
+        let mut joined: Vec<(Stamp, Stamp)> = Vec::new();
+        for (start, end) in all {
+            match joined.last_mut() {
+                Some(last) if start <= last.1 => last.1 = last.1.max(end),
+                _ => joined.push((start, end)),
+            }
+        }
+        Self(joined)
+    }
+
+    fn hold(&self, stamp: Stamp) -> bool {
+        let after = self.0.partition_point(|(start, _)| *start <= stamp);
+        after.checked_sub(1).is_some_and(|n| stamp <= self.0[n].1)
+    }
+}

@@ -1,0 +1,200 @@
+//! An inspection for people: plain lines.
+
+use comfy_table::presets::NOTHING;
+use comfy_table::{CellAlignment, Table};
+
+use super::determined::Determined;
+use super::{Inspection, State};
+
+/// Of sea water, and at its surface.
+const PA_PER_M: f64 = 10_055.0;
+const SURFACE_PA: f64 = 101_325.0;
+
+/// Lays an inspection out for a terminal.
+#[must_use]
+pub fn to_text(inspection: &Inspection) -> String {
+    let mut lines = head(inspection);
+    if !inspection.topics.is_empty() {
+        lines.push(String::new());
+        lines.push(topic_table(inspection));
+    }
+    lines.push(String::new());
+    lines.extend(arm_lines(inspection));
+    if let Some(determined) = &inspection.determined {
+        lines.push(String::new());
+        lines.extend(determined_lines(determined));
+    }
+    if !inspection.hints.is_empty() {
+        lines.push(String::new());
+        lines.extend(inspection.hints.iter().map(|hint| format!("note         {hint}")));
+    }
+    lines.iter().map(|line| printable(line)).collect::<Vec<_>>().join("\n")
+}
+
+/// Names in a file are the file's; they must not steer the terminal.
+fn printable(line: &str) -> String {
+    line.chars().map(|c| if c.is_control() && c != '\n' { '\u{fffd}' } else { c }).collect()
+}
+
+fn head(inspection: &Inspection) -> Vec<String> {
+    let i = inspection;
+    let mut lines = vec![format!("recording    {}, {}", i.recording, size(i.bytes))];
+    let by = if i.library.is_empty() { String::new() } else { format!(", written by {}", i.library) };
+    let profile = if i.profile.is_empty() { "no profile" } else { i.profile.as_str() };
+    lines.push(format!("format       MCAP, {profile}{by}"));
+    let state = match i.completeness.state {
+        State::Whole => "whole".to_owned(),
+        State::Cut => format!("cut: {}", i.completeness.reason.as_deref().unwrap_or_default()),
+        State::Damaged => {
+            let c = &i.completeness;
+            let messages = c.lost_messages.map_or_else(|| "unknown".to_owned(), |n| n.to_string());
+            format!(
+                "damaged: {}; lost: {} chunks, {}, {messages} messages",
+                c.reason.as_deref().unwrap_or_default(),
+                c.lost_chunks,
+                size(c.lost_bytes)
+            )
+        }
+    };
+    lines.push(format!("state        {state}"));
+    match (i.time_nanos, i.duration_s) {
+        (Some([first, last]), Some(duration_s)) => {
+            lines.push(format!("time         {} to {}, {duration_s:.1} s", utc(first), utc(last)));
+        }
+        _ => lines.push("time         -".to_owned()),
+    }
+    lines.push(format!("messages     {} on {} topics", i.messages, i.topics.len()));
+    for c in &i.compression {
+        let (packed, plain) = (size(c.compressed_bytes), size(c.uncompressed_bytes));
+        lines.push(format!("chunks       {} with compression {}: {packed} of {plain}", c.chunks, c.name));
+    }
+    for (what, n) in &i.rejected {
+        lines.push(format!("unusable     {n} messages on {what}"));
+    }
+    if i.non_monotonic > 0 {
+        lines.push(format!("order        log time goes backwards {} times", i.non_monotonic));
+    }
+    for a in &i.attachments {
+        lines.push(format!("attachment   {} ({}), {}", a.name, a.media_type, size(a.bytes)));
+    }
+    for m in &i.metadata {
+        let entries: Vec<String> = m.entries.iter().map(|(key, value)| format!("{key} = {}", short(value))).collect();
+        lines.push(format!("metadata     {}: {}", m.name, entries.join(", ")));
+    }
+    lines
+}
+
+fn topic_table(inspection: &Inspection) -> String {
+    let mut table = Table::new();
+    table.load_preset(NOTHING);
+    table.set_header(["topic", "type", "encoding", "messages", "Hz", "first s", "last s", "what"]);
+    let start = inspection.time_nanos.map_or(0, |[first, _]| first);
+    let seconds = |nanos: u64| format!("{:.2}", (nanos - start) as f64 * 1e-9);
+    for t in &inspection.topics {
+        let what = t.known_as.or(t.may_be.as_ref().map(|_| "see below")).unwrap_or_default();
+        table.add_row([
+            t.topic.clone(),
+            t.schema.clone(),
+            t.encoding.clone(),
+            t.messages.to_string(),
+            t.rate_hz.map_or_else(|| "-".to_owned(), |rate| format!("{rate:.2}")),
+            seconds(t.time_nanos[0]),
+            seconds(t.time_nanos[1]),
+            what.to_owned(),
+        ]);
+    }
+    for column in 3..7 {
+        if let Some(column) = table.column_mut(column) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+    }
+    // The last column is padded.
+    table.to_string().lines().map(str::trim_end).collect::<Vec<_>>().join("\n")
+}
+
+fn arm_lines(inspection: &Inspection) -> Vec<String> {
+    let arm = &inspection.arm;
+    let mut lines = Vec::new();
+    let none = || "none".to_owned();
+    let joints = if arm.joints.is_empty() { none() } else { arm.joints.join(", ") };
+    lines.push(format!("joints       {joints}; {} readings", arm.joint_readings));
+    lines.push(format!("views        {} for the fit, {} held out", arm.views_fit, arm.views_held_out));
+    let tags: Vec<String> = arm.tags.iter().map(|tag| format!("{} ({})", tag.id, tag.detections)).collect();
+    let frames = arm.detection_frames;
+    let tags = if tags.is_empty() { none() } else { format!("{}; id (detections)", tags.join(", ")) };
+    lines.push(format!("tags         {tags} in {frames} frames"));
+    if let Some(task) = &arm.task {
+        let (n, mm) = (task.targets_m.len(), task.tolerance_m * 1e3);
+        lines.push(format!("task         {n} targets within {mm:.1} mm"));
+    }
+    lines.push(format!("reaches      {} before, {} after calibration", arm.reaches_before, arm.reaches_after));
+    for (what, range) in [("oil", arm.oil_c), ("water", arm.water_c)] {
+        if let Some([low, high]) = range {
+            lines.push(format!("{what:<13}{low:.1} to {high:.1} C"));
+        }
+    }
+    if let Some([low, high]) = arm.pressure_pa {
+        let depth = |pa: f64| (pa - SURFACE_PA) / PA_PER_M;
+        lines.push(format!(
+            "pressure     {low:.0} to {high:.0} Pa, some {:.0} to {:.0} m of sea",
+            depth(low),
+            depth(high)
+        ));
+    }
+    lines
+}
+
+fn determined_lines(d: &Determined) -> Vec<String> {
+    let mut lines = vec![format!(
+        "robot        {}: {} views and {} held-out ones show its tags, {} tags to fit",
+        d.robot, d.views, d.held_out_views, d.tags_used
+    )];
+    if !d.unknown_tags.is_empty() {
+        let ids: Vec<String> = d.unknown_tags.iter().map(u32::to_string).collect();
+        lines.push(format!("unknown      tags that its survey lacks: {}", ids.join(", ")));
+    }
+    if !d.parameters.is_empty() {
+        lines.push(format!("determined   {}", d.parameters.join(", ")));
+    }
+    lines.extend(d.undetermined.iter().map(|line| format!("undetermined {line}")));
+    lines.extend(d.missing.iter().map(|line| format!("missing      {line}")));
+    if d.missing.is_empty() {
+        lines.push("enough       views for a calibration and a verdict".to_owned());
+    }
+    lines
+}
+
+/// A value that may be a whole file.
+fn short(value: &str) -> String {
+    let line = value.lines().next().unwrap_or_default();
+    let told: String = line.chars().take(60).collect();
+    if told.len() == value.len() { told } else { format!("{told} ..") }
+}
+
+fn size(bytes: u64) -> String {
+    const UNITS: [&str; 4] = ["bytes", "kB", "MB", "GB"];
+    let mut value = bytes as f64;
+    let mut unit = 0;
+    while value >= 1000.0 && unit + 1 < UNITS.len() {
+        value /= 1000.0;
+        unit += 1;
+    }
+    if unit == 0 { format!("{bytes} bytes") } else { format!("{value:.2} {}", UNITS[unit]) }
+}
+
+/// `2026-01-01T00:00:00.000Z`.
+pub(super) fn utc(nanos: u64) -> String {
+    let (seconds, millis) = (nanos / 1_000_000_000, nanos / 1_000_000 % 1000);
+    let (days, second) = (seconds / 86_400, seconds % 86_400);
+    // Years from 1 March, so that the leap day is the last.
+    let shifted = days + 719_468;
+    let (era, day_of_era) = (shifted / 146_097, shifted % 146_097);
+    let year_of_era = (day_of_era - day_of_era / 1460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
+    let day_of_year = day_of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
+    let shifted_month = (5 * day_of_year + 2) / 153;
+    let day = day_of_year - (153 * shifted_month + 2) / 5 + 1;
+    let month = if shifted_month < 10 { shifted_month + 3 } else { shifted_month - 9 };
+    let year = year_of_era + era * 400 + u64::from(month <= 2);
+    let (hour, minute, second) = (second / 3600, second / 60 % 60, second % 60);
+    format!("{year:04}-{month:02}-{day:02}T{hour:02}:{minute:02}:{second:02}.{millis:03}Z")
+}

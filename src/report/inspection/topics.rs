@@ -1,0 +1,210 @@
+//! Counts by topic, and what topics of others may hold.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use serde::Serialize;
+
+use crate::log::ros::{AprilTagDetectionArray, JointState, TfMessage};
+use crate::log::topics::{self, Stream};
+use crate::log::{RawMessage, decode};
+
+/// One topic.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct TopicContents {
+    pub topic: String,
+    /// Name of the messages' type; empty where the file declares none.
+    pub schema: String,
+    /// `cdr`, `ros1`, `json`, `protobuf` or another.
+    pub encoding: String,
+    pub messages: u64,
+    /// Of the messages themselves, uncompressed.
+    pub bytes: u64,
+    /// Lowest and highest log time, nanoseconds since the Unix epoch.
+    pub time_nanos: [u64; 2],
+    /// Mean over its own span; `None` for fewer than two messages or none of them later.
+    pub rate_hz: Option<f64>,
+    /// What armcal's own recordings have on a topic of that name and type.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub known_as: Option<&'static str>,
+    /// What a topic of another's recording may be good for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub may_be: Option<String>,
+}
+
+/// Messages of a topic that are looked into.
+const MAX_SAMPLES: u64 = 200;
+/// Names that are told of one topic.
+const MAX_NAMES: usize = 12;
+
+#[derive(Default)]
+struct Seen {
+    schema: String,
+    encoding: String,
+    messages: u64,
+    bytes: u64,
+    first_nanos: u64,
+    last_nanos: u64,
+    names: BTreeSet<String>,
+    /// In the order of the message.
+    joints: Vec<String>,
+    largest: f64,
+}
+
+/// Collects from every message of a file.
+#[derive(Default)]
+pub(super) struct Collector {
+    /// By topic; one topic may have several types.
+    seen: BTreeMap<String, Vec<Seen>>,
+}
+
+impl Collector {
+    pub fn take(&mut self, raw: &RawMessage<'_>) {
+        if !self.seen.contains_key(raw.topic()) {
+            self.seen.insert(raw.topic().to_owned(), Vec::new());
+        }
+        let Some(types) = self.seen.get_mut(raw.topic()) else { return };
+        let (schema, encoding) = (raw.schema_name(), raw.channel.message_encoding.as_str());
+        let known = types.iter().position(|seen| seen.schema == schema && seen.encoding == encoding);
+        let known = known.unwrap_or_else(|| {
+            let first_nanos = raw.log_time_nanos;
+            types.push(Seen { schema: schema.into(), encoding: encoding.into(), first_nanos, ..Seen::default() });
+            types.len() - 1
+        });
+        let seen = &mut types[known];
+        seen.messages += 1;
+        seen.bytes += raw.data.len() as u64;
+        seen.first_nanos = seen.first_nanos.min(raw.log_time_nanos);
+        seen.last_nanos = seen.last_nanos.max(raw.log_time_nanos);
+        if seen.messages <= MAX_SAMPLES && encoding == "cdr" {
+            seen.look_into(&plain(schema), raw.data);
+        }
+    }
+
+    pub fn time_nanos(&self) -> Option<[u64; 2]> {
+        let first = self.seen.values().flatten().map(|seen| seen.first_nanos).min()?;
+        let last = self.seen.values().flatten().map(|seen| seen.last_nanos).max()?;
+        Some([first, last])
+    }
+
+    pub fn finish(self) -> Vec<TopicContents> {
+        let of_topic =
+            |(topic, types): (String, Vec<Seen>)| types.into_iter().map(move |seen| seen.finish(topic.clone()));
+        self.seen.into_iter().flat_map(of_topic).collect()
+    }
+}
+
+/// `sensor_msgs/JointState` for `sensor_msgs/msg/JointState`.
+fn plain(schema: &str) -> String {
+    schema.replace("/msg/", "/")
+}
+
+impl Seen {
+    fn look_into(&mut self, schema: &str, data: &[u8]) {
+        match schema {
+            "sensor_msgs/JointState" => {
+                if let Ok(message) = decode::<JointState>(data) {
+                    let size = |value: &f64| if value.is_finite() { value.abs() } else { 0.0 };
+                    self.largest = message.position.iter().map(size).fold(self.largest, f64::max);
+                    if self.joints.is_empty() {
+                        self.joints = message.name;
+                    }
+                }
+            }
+            "apriltag_msgs/AprilTagDetectionArray" => {
+                if let Ok(message) = decode::<AprilTagDetectionArray>(data) {
+                    self.names.extend(message.detections.iter().map(|tag| tag.id.to_string()));
+                }
+            }
+            "tf2_msgs/TFMessage" => {
+                if let Ok(message) = decode::<TfMessage>(data) {
+                    let name = |t: &crate::log::ros::TransformStamped| {
+                        format!("{} to {}", t.header.frame_id, t.child_frame_id)
+                    };
+                    self.names.extend(message.transforms.iter().map(name));
+                }
+            }
+            _ => {}
+        }
+    }
+
+    fn finish(self, topic: String) -> TopicContents {
+        let span_s = (self.last_nanos - self.first_nanos) as f64 * 1e-9;
+        let rate_hz = (self.messages > 1 && span_s > 0.0).then(|| (self.messages - 1) as f64 / span_s);
+        TopicContents {
+            known_as: known_as(&topic, &self.schema),
+            may_be: self.may_be(&plain(&self.schema)),
+            messages: self.messages,
+            bytes: self.bytes,
+            time_nanos: [self.first_nanos, self.last_nanos],
+            rate_hz,
+            topic,
+            schema: self.schema,
+            encoding: self.encoding,
+        }
+    }
+
+    fn may_be(&self, schema: &str) -> Option<String> {
+        // Foxglove's types have dots.
+        let (_, name) = schema.rsplit_once(['/', '.']).unwrap_or(("", schema));
+        Some(match name {
+            "JointState" | "JointStates" => self.joint_sensors(),
+            "DynamicJointState" => "joint sensors".to_owned(),
+            "AprilTagDetectionArray" | "AprilTagDetections" | "ArucoMarkers" | "FiducialArray" => {
+                with_names("detections of tags", "ids", &self.names)
+            }
+            "TFMessage" | "FrameTransform" | "FrameTransforms" | "tfMessage" => {
+                with_names("poses of a camera, tags or links", "frames", &self.names)
+            }
+            "CameraInfo" | "CameraCalibration" => "a camera's lens".to_owned(),
+            "Image" | "CompressedImage" | "RawImage" | "CompressedVideo" => {
+                "images; armcal takes detections of tags, so a detector must look at them first".to_owned()
+            }
+            _ => return None,
+        })
+    }
+
+    fn joint_sensors(&self) -> String {
+        let joints = match self.joints.len() {
+            0 => return "joint sensors".to_owned(),
+            n if n > MAX_NAMES => format!("{n} joints, {} ..", self.joints[..MAX_NAMES].join(", ")),
+            n => format!("{n} joints, {}", self.joints.join(", ")),
+        };
+        // No joint of an arm turns more than two turns either way.
+        let unit = if self.largest > 4.0 * std::f64::consts::PI { "raw counts or degrees" } else { "radians" };
+        format!("joint sensors: {joints}; the values look like {unit}, the largest is {:.4}", self.largest)
+    }
+}
+
+fn with_names(what: &str, of: &str, names: &BTreeSet<String>) -> String {
+    if names.is_empty() {
+        return what.to_owned();
+    }
+    let told: Vec<&str> = names.iter().take(MAX_NAMES).map(String::as_str).collect();
+    let more = if names.len() > MAX_NAMES { ", .." } else { "" };
+    format!("{what}: {of} {}{more}", told.join(", "))
+}
+
+fn known_as(topic: &str, schema: &str) -> Option<&'static str> {
+    if let Some(stream) = Stream::ALL.into_iter().find(|stream| stream.topic() == topic) {
+        return (plain(stream.schema().name) == plain(schema)).then_some(match stream {
+            Stream::JointSensors => "joint readings, counts",
+            Stream::JointCommands => "set-points, counts",
+            Stream::JointStates => "believed angles",
+            Stream::Detections => "tag detections",
+            Stream::OilTemperature => "oil temperature",
+            Stream::WaterTemperature => "water temperature",
+            Stream::DepthPressure => "depth",
+            Stream::VehicleImu => "vehicle's attitude",
+            Stream::Task => "reach task",
+            Stream::TagSurvey => "where the tags are",
+            Stream::Marks => "marks of views and phases",
+            Stream::Log => "log",
+        });
+    }
+    match topic {
+        topics::ROBOT_DESCRIPTION => Some("URDF, for viewers"),
+        topics::CAMERA_INFO => Some("lens, for viewers"),
+        topics::TF_STATIC => Some("base on vehicle, for viewers"),
+        _ => None,
+    }
+}
