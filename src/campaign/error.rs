@@ -1,0 +1,48 @@
+//! What keeps a campaign from being run, continued or merged. A run that fails is none of these: it is a row.
+
+use std::path::PathBuf;
+
+use crate::output::OutputError;
+use crate::routine::RoutineError;
+use crate::run::RunError;
+
+/// Why a campaign did not start, or could not keep its rows.
+#[derive(Debug, thiserror::Error)]
+pub enum CampaignError {
+    #[error("{0}")]
+    Routine(#[from] RoutineError),
+    #[error("{0}")]
+    Input(#[from] RunError),
+    #[error("{}: cannot be read: {source}", path.display())]
+    Read { path: PathBuf, source: std::io::Error },
+    #[error("{}: {problem}", path.display())]
+    Table { path: PathBuf, problem: String },
+    #[error(
+        "{}: these rows are of another campaign: routine, overrides, robot, vehicle or program have changed since; \
+         --fresh throws them away and begins anew, --out keeps them and writes elsewhere",
+        path.display()
+    )]
+    OtherCampaign { path: PathBuf },
+    #[error("{}: another campaign is writing to it at this moment", path.display())]
+    Busy { path: PathBuf },
+    #[error("{}: the row of setting {setting}, seed {seed} is not the same in both files", path.display())]
+    Conflict { path: PathBuf, setting: u32, seed: u64 },
+    #[error("{0}")]
+    Usage(String),
+    #[error("{0}")]
+    Output(#[from] OutputError),
+    #[error("{}: cannot be written: {source}", path.display())]
+    Parquet { path: PathBuf, source: parquet::errors::ParquetError },
+    #[error("the summary has no text: {0}")]
+    Json(#[from] serde_json::Error),
+    #[error("no threads can be made: {0}")]
+    Threads(#[from] rayon::ThreadPoolBuildError),
+}
+
+impl CampaignError {
+    /// Whether the user's input is at fault, not the machine. [`Self::Input`] leaves that to its source.
+    #[must_use]
+    pub fn is_invalid_input(&self) -> bool {
+        !matches!(self, Self::Output(_) | Self::Input(_) | Self::Parquet { .. } | Self::Json(_) | Self::Threads(_))
+    }
+}

@@ -1,0 +1,125 @@
+//! What is to be run: the settings' checked inputs, and one job for each of their seeds.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use super::matrix::{Setting, settings};
+use super::{CampaignError, Columns, Shard, fingerprint};
+use crate::routine::{self, Overrides, Routine, SeedRange, effective_table};
+use crate::run::RunInputs;
+
+/// A routine and its overrides, as given.
+#[derive(Clone, Debug)]
+pub struct Request {
+    pub routine: PathBuf,
+    pub overrides: Overrides,
+}
+
+/// Everything read and checked before the first run.
+#[derive(Debug)]
+pub struct Prepared {
+    pub request: Request,
+    /// The routine with the overrides, before any point of the matrix.
+    pub routine: Routine,
+    pub settings: Vec<Setting>,
+    /// One for each setting.
+    pub inputs: Vec<RunInputs>,
+    pub columns: Columns,
+    pub fingerprint: String,
+}
+
+/// One run to be made.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Job {
+    /// Index of the setting.
+    pub setting: u32,
+    pub settings: String,
+    pub seed: u64,
+    /// Repeats it.
+    pub command: String,
+}
+
+impl Prepared {
+    /// Reads the routine, and all that any point of its matrix names.
+    ///
+    /// # Errors
+    /// [`CampaignError`] naming file, key and allowed range.
+    pub fn load(request: Request) -> Result<Self, CampaignError> {
+        let Request { routine: file, overrides } = &request;
+        let routine = routine::load_with(file, overrides)?;
+        let matrix = &routine.campaign.matrix;
+        if let Some(twice) = overrides.set.iter().find(|one| matrix.iter().any(|(key, _)| *key == one.key)) {
+            let problem = format!("--set {twice}: campaign.matrix gives values of this key, too");
+            return Err(CampaignError::Usage(problem));
+        }
+        let settings = settings(matrix)?;
+        let load = |setting: &Setting| {
+            let set = overrides.set.iter().chain(&setting.set).cloned().collect();
+            RunInputs::load(file, &Overrides { set, ..overrides.clone() })
+        };
+        let inputs = settings.iter().map(load).collect::<Result<Vec<_>, _>>()?;
+        let mut joints: Vec<String> = Vec::new();
+        for name in inputs.iter().flat_map(|inputs| inputs.robot.joint_names()) {
+            if !joints.contains(&name) {
+                joints.push(name);
+            }
+        }
+        let fingerprint = fingerprint(&effective_table(file, &overrides.set)?, &inputs)?;
+        Ok(Self { routine, settings, inputs, columns: Columns::new(joints), fingerprint, request })
+    }
+
+    /// The run of one seed under one setting.
+    #[must_use]
+    pub fn job(&self, setting: &Setting, seed: u64) -> Job {
+        Job { setting: setting.index, settings: setting.text(), seed, command: self.command(setting, seed) }
+    }
+
+    fn command(&self, setting: &Setting, seed: u64) -> String {
+        let Request { routine, overrides } = &self.request;
+        let text = |path: &Path| path.display().to_string();
+        let mut words =
+            vec!["armcal".to_owned(), "run".to_owned(), text(routine), "--seed".to_owned(), seed.to_string()];
+        for (option, path) in [("--robot", &overrides.robot), ("--vehicle", &overrides.vehicle)] {
+            words.extend(path.iter().flat_map(|path| [option.to_owned(), text(path)]));
+        }
+        let set = overrides.set.iter().chain(&setting.set);
+        words.extend(set.flat_map(|one| ["--set".to_owned(), one.to_string()]));
+        words.iter().map(|word| quoted(word)).collect::<Vec<_>>().join(" ")
+    }
+}
+
+/// The jobs of a campaign that are not done yet, seed by seed, so that the settings of a seed stay together.
+#[must_use]
+pub fn jobs(prepared: &Prepared, range: SeedRange, shard: Option<Shard>, done: &BTreeSet<(u32, u64)>) -> Vec<Job> {
+    let taken = (0..).zip(range.seeds()).filter(|(place, _)| shard.is_none_or(|shard| shard.takes(*place)));
+    taken
+        .flat_map(|(_, seed)| prepared.settings.iter().map(move |setting| (setting, seed)))
+        .filter(|(setting, seed)| !done.contains(&(setting.index, *seed)))
+        .map(|(setting, seed)| prepared.job(setting, seed))
+        .collect()
+}
+
+/// A word as a shell takes it.
+fn quoted(word: &str) -> String {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "_-./=:,+@%".contains(c);
+    if !word.is_empty() && word.chars().all(is_plain) {
+        return word.to_owned();
+    }
+    format!("'{}'", word.replace('\'', "'\\''"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_are_quoted_where_a_shell_would_take_them_apart() {
+        for plain in ["a.toml", "--seed", "world.camera.rate_hz=5.0", "../robots/titan4"] {
+            assert_eq!(quoted(plain), plain);
+        }
+        assert_eq!(quoted("a b"), "'a b'");
+        assert_eq!(quoted("k=[1.0, 2.0]"), "'k=[1.0, 2.0]'");
+        assert_eq!(quoted("it's $HOME"), "'it'\\''s $HOME'");
+        assert_eq!(quoted(""), "''");
+    }
+}

@@ -1,0 +1,39 @@
+//! Many runs of one routine: seeds times settings, one row of figures a run.
+//!
+//! `Prepared` holds the settings' checked inputs, `jobs` what is to be run, `run_jobs` runs it on some threads, `Store`
+//! keeps every finished row at once and puts the sorted files in place at the end, `statistics` sums rows up, `regress`
+//! compares rows with those of a baseline, pair by pair. Rows hold no wall time: files do not depend on the number of
+//! threads, nor on how often a campaign was broken off. Exit codes come in from the command line.
+
+mod columns;
+mod engine;
+mod error;
+mod fingerprint;
+mod jobs;
+mod matrix;
+mod merge;
+mod parquet_file;
+mod regress;
+mod row;
+mod shard;
+mod single;
+mod statistics;
+mod store;
+mod table_file;
+mod tables;
+
+pub use columns::{Columns, Kind};
+pub use engine::{Engine, run_jobs};
+pub use error::CampaignError;
+pub use fingerprint::fingerprint;
+pub use jobs::{Job, Prepared, Request, jobs};
+pub use matrix::{Setting, settings};
+pub use merge::merge;
+pub use regress::{Comparison, compare, regress_table};
+pub use row::{Row, RunStatus};
+pub use shard::Shard;
+pub use single::{SingleRun, run_job};
+pub use statistics::{CampaignSummary, FigureStatistics, SettingStatistics, statistics};
+pub use store::{Store, write_results};
+pub use table_file::{Table, read_table, table_text};
+pub use tables::{markdown, table};

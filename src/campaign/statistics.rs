@@ -1,0 +1,157 @@
+//! Rows summed up: per setting, how runs ended and how each figure is spread over the seeds.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use super::{Row, RunStatus, Table};
+use crate::stats::{median_interval, quantile};
+
+/// The summary beside a campaign's table.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CampaignSummary {
+    pub version: u32,
+    pub routine: String,
+    pub fingerprint: String,
+    pub settings: Vec<SettingStatistics>,
+}
+
+/// All runs of one point of the matrix.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SettingStatistics {
+    pub setting: u32,
+    pub settings: String,
+    pub runs: usize,
+    pub accepted: usize,
+    /// Accepted, but an `assert` of the routine does not hold.
+    pub missed: usize,
+    pub refused: usize,
+    pub failed: usize,
+    /// Runs in which the arm touched anything.
+    pub with_contacts: usize,
+    pub figures: Vec<FigureStatistics>,
+    /// Runs without a result, by seed; the first few.
+    pub failures: Vec<FailureLine>,
+}
+
+/// One figure over the seeds; of all runs that have it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FigureStatistics {
+    pub name: String,
+    pub n: usize,
+    pub median: f64,
+    /// 95 % interval of the median, by the percentile bootstrap over the seeds.
+    pub median_low: f64,
+    pub median_high: f64,
+    pub p95: f64,
+    pub worst: f64,
+    pub worst_seed: u64,
+}
+
+/// A run that was refused or failed.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FailureLine {
+    pub seed: u64,
+    pub status: String,
+    pub failure: String,
+    pub command: String,
+}
+
+/// Failures that a summary names; the table has them all.
+const MAX_FAILURES: usize = 10;
+const COVERAGE: f64 = 0.95;
+/// Figures of which less is worse.
+const LESS_IS_WORSE: [&str; 6] =
+    ["tool_error_improvement", "hits_before", "hits_after", "min_clearance_m", "views", "detections"];
+
+/// Sums a table up.
+#[must_use]
+pub fn statistics(table: &Table, routine: &str, fingerprint: &str) -> CampaignSummary {
+    let mut by_setting: BTreeMap<u32, Vec<&Row>> = BTreeMap::new();
+    for row in &table.rows {
+        by_setting.entry(row.setting).or_default().push(row);
+    }
+    let settings = by_setting.into_values().map(|rows| of_setting(table, &rows)).collect();
+    CampaignSummary { version: 1, routine: routine.to_owned(), fingerprint: fingerprint.to_owned(), settings }
+}
+
+/// `rows`: one or more.
+fn of_setting(table: &Table, rows: &[&Row]) -> SettingStatistics {
+    let count = |status| rows.iter().filter(|row| row.status == status).count();
+    let contacts = table.figure("contacts");
+    let touched = |row: &&&Row| contacts.and_then(|k| row.figures[k]).is_some_and(|n| n > 0.0);
+    let failures = rows.iter().filter(|row| row.status != RunStatus::Accepted).take(MAX_FAILURES);
+    SettingStatistics {
+        setting: rows[0].setting,
+        settings: rows[0].settings.clone(),
+        runs: rows.len(),
+        accepted: count(RunStatus::Accepted),
+        missed: count(RunStatus::Missed),
+        refused: count(RunStatus::Refused),
+        failed: count(RunStatus::Failed),
+        with_contacts: rows.iter().filter(touched).count(),
+        figures: (0..table.names.len()).filter_map(|k| of_figure(&table.names[k], k, rows)).collect(),
+        failures: failures
+            .map(|row| FailureLine {
+                seed: row.seed,
+                status: row.status.name().to_owned(),
+                failure: row.failure.clone(),
+                command: row.command.clone(),
+            })
+            .collect(),
+    }
+}
+
+fn of_figure(name: &str, place: usize, rows: &[&Row]) -> Option<FigureStatistics> {
+    let value = |row: &&Row| row.figures[place].filter(|value| value.is_finite()).map(|value| (value, row.seed));
+    let pairs: Vec<(f64, u64)> = rows.iter().filter_map(value).collect();
+    let values: Vec<f64> = pairs.iter().map(|(value, _)| *value).collect();
+    let sign = if LESS_IS_WORSE.contains(&name) { -1.0 } else { 1.0 };
+    // Of equals the first seed.
+    let &(worst, worst_seed) = pairs.iter().min_by(|a, b| (sign * b.0).total_cmp(&(sign * a.0)).then(a.1.cmp(&b.1)))?;
+    let interval = median_interval(&values, COVERAGE)?;
+    Some(FigureStatistics {
+        name: name.to_owned(),
+        n: values.len(),
+        median: quantile(&values, 0.5)?,
+        median_low: interval.low,
+        median_high: interval.high,
+        p95: quantile(&values, if sign > 0.0 { 0.95 } else { 0.05 })?,
+        worst,
+        worst_seed,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::table_file::tests::{names, row};
+    use super::*;
+
+    #[test]
+    fn rows_are_counted_by_setting_and_the_worst_seed_is_named() {
+        let failed =
+            Row { status: RunStatus::Failed, failure: "why".to_owned(), figures: vec![None, None, None], ..row(0, 9) };
+        let refused = Row { status: RunStatus::Refused, figures: vec![Some(9.0), Some(0.0), None], ..row(0, 4) };
+        let table = Table { names: names(), rows: vec![row(0, 1), row(0, 2), refused, failed, row(1, 1)] };
+        let summary = statistics(&table, "r", "f");
+        assert_eq!(summary.settings.len(), 2);
+        let first = &summary.settings[0];
+        assert_eq!((first.runs, first.accepted, first.refused, first.failed, first.with_contacts), (4, 2, 1, 1, 2));
+        assert_eq!(first.failures.iter().map(|f| f.seed).collect::<Vec<_>>(), [4, 9]);
+        let time = &first.figures[0];
+        assert_eq!(
+            (time.name.as_str(), time.n, time.median, time.worst, time.worst_seed),
+            ("simulated_s", 3, 0.5, 9.0, 4)
+        );
+        assert!(time.median_low <= time.median && time.median <= time.median_high);
+    }
+
+    #[test]
+    fn of_clearance_the_least_is_the_worst() {
+        let rows: Vec<Row> = (1..=5).map(|seed| Row { figures: vec![Some(seed as f64)], ..row(0, seed) }).collect();
+        let table = Table { names: vec!["min_clearance_m".to_owned()], rows };
+        let figure = &statistics(&table, "r", "f").settings[0].figures[0];
+        assert_eq!((figure.worst, figure.worst_seed), (1.0, 1));
+        assert!(figure.p95 < 2.0);
+    }
+}

@@ -1,0 +1,335 @@
+//! The folder that a run writes to: one run at a time, all results at once or none, and no recording lost.
+//!
+//! Everything grows in `NAME.partial`. [`OutputFolder::commit`] puts all of it in place at the end: the old summary.json
+//! goes first and the new one comes last, so a folder with a summary.json holds the files of one run. What a killed or
+//! broken run leaves is moved to `run-cut-N.mcap` and `truth-cut-N.mcap`.
+
+use std::fs::{self, File, TryLockError};
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+
+use super::{OutputError, check_replaceable, complete, make_folder, partial};
+use crate::log::{LogError, for_each_raw, topics};
+
+/// What a run leaves, in the order in which it is put in place.
+const RESULTS: [&str; 6] = ["truth.mcap", "run.rrd", "calibration.toml", "report.html", "run.mcap", SUMMARY];
+/// Its presence says that the files beside it are those of one run.
+const SUMMARY: &str = "summary.json";
+const LOCK: &str = "armcal.lock";
+const RECORDINGS: [&str; 2] = ["run", "truth"];
+
+/// An output folder that belongs to this run as long as the value lives.
+#[derive(Debug)]
+pub struct OutputFolder {
+    folder: PathBuf,
+    is_new: bool,
+    lock: Option<File>,
+}
+
+impl OutputFolder {
+    /// Makes the folder, keeps other runs out, and moves aside what a killed run left in it: gives where its recording is now.
+    ///
+    /// # Errors
+    /// When the folder cannot be made or written to, belongs to another run, or something is in the way of a result.
+    pub fn open(folder: &Path) -> Result<(Self, Option<PathBuf>), OutputError> {
+        let is_new = !folder.exists();
+        make_folder(folder)?;
+        let mut output = Self { folder: folder.to_owned(), is_new, lock: None };
+        output.lock = Some(lock(folder)?);
+        for name in RESULTS {
+            check_replaceable(&folder.join(name))?;
+            check_replaceable(&output.partial(name))?;
+        }
+        let kept = output.set_aside()?;
+        Ok((output, kept))
+    }
+
+    /// Where the result `name` grows.
+    pub fn partial(&self, name: &str) -> PathBuf {
+        partial(&self.folder.join(name))
+    }
+
+    /// Writes a small result, to be put in place by [`Self::commit`].
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn write(&self, name: &str, bytes: &[u8]) -> Result<(), OutputError> {
+        let path = self.partial(name);
+        fs::write(&path, bytes).map_err(OutputError::of(&path, "cannot be written"))
+    }
+
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.folder
+    }
+
+    /// Puts every result in place and removes those of an earlier run that this one does not have.
+    ///
+    /// # Errors
+    /// When a file cannot be written to disk or renamed.
+    pub fn commit(&self) -> Result<(), OutputError> {
+        let has: Vec<bool> = RESULTS.iter().map(|name| self.partial(name).is_file()).collect();
+        for (name, _) in RESULTS.iter().zip(&has).filter(|(_, has)| **has) {
+            // On disk before it takes a name that promises so.
+            let path = self.partial(name);
+            File::open(&path)
+                .and_then(|file| file.sync_all())
+                .map_err(OutputError::of(&path, "cannot be written to disk"))?;
+        }
+        remove(&self.folder.join(SUMMARY))?;
+        for (name, has) in RESULTS.iter().zip(&has) {
+            let path = self.folder.join(name);
+            if *has { complete(&path)? } else { remove(&path)? }
+        }
+        Ok(())
+    }
+
+    /// Removes all that this run wrote.
+    pub fn discard(&self) {
+        for name in RESULTS {
+            // Nothing of value is in them; if they cannot be removed they do no harm.
+            let _ = fs::remove_file(self.partial(name));
+        }
+    }
+
+    /// Moves unfinished recordings to names of their own and removes unfinished results; gives the belief's recordings.
+    ///
+    /// # Errors
+    /// When a file cannot be renamed or removed.
+    pub fn set_aside(&self) -> Result<Option<PathBuf>, OutputError> {
+        let run = self.partial("run.mcap");
+        let mut kept = None;
+        if run.is_file() && is_worth_keeping(&run) {
+            let number = (1_u32..)
+                .find(|n| RECORDINGS.iter().all(|name| !self.cut(name, *n).exists()))
+                .ok_or_else(|| OutputError::new(&run, "no name is left for the unfinished recording"))?;
+            for name in RECORDINGS {
+                let (from, to) = (self.partial(&format!("{name}.mcap")), self.cut(name, number));
+                if from.is_file() {
+                    let problem = format!("cannot be renamed to {}", to.display());
+                    fs::rename(&from, &to).map_err(OutputError::of(&from, problem))?;
+                }
+            }
+            kept = Some(self.cut("run", number));
+        }
+        for name in RESULTS {
+            remove(&self.partial(name))?;
+        }
+        Ok(kept)
+    }
+
+    fn cut(&self, name: &str, number: u32) -> PathBuf {
+        self.folder.join(format!("{name}-cut-{number}.mcap"))
+    }
+}
+
+impl Drop for OutputFolder {
+    fn drop(&mut self) {
+        if self.lock.is_some() {
+            // Removed while it is held: whoever opens it after this makes a new one.
+            let _ = fs::remove_file(self.folder.join(LOCK));
+        }
+        if self.is_new {
+            // Only if nothing is in it.
+            let _ = fs::remove_dir(&self.folder);
+        }
+    }
+}
+
+/// A recording with any reading of the arm, or one that cannot be read and might hold some.
+fn is_worth_keeping(path: &Path) -> bool {
+    let mut readings = 0_u64;
+    match for_each_raw(path, |message| readings += u64::from(message.topic() == topics::JOINT_SENSORS)) {
+        Ok(_) => readings > 0,
+        Err(LogError::Empty { .. }) => false,
+        Err(_) => true,
+    }
+}
+
+fn remove(path: &Path) -> Result<(), OutputError> {
+    match fs::remove_file(path) {
+        Err(error) if error.kind() != ErrorKind::NotFound => Err(OutputError::of(path, "cannot be removed")(error)),
+        _ => Ok(()),
+    }
+}
+
+/// Keeps a second run out of the folder; the system gives the lock back however the program ends.
+fn lock(folder: &Path) -> Result<File, OutputError> {
+    let path = folder.join(LOCK);
+    loop {
+        let file = File::options()
+            .create(true)
+            .write(true)
+            .truncate(false)
+            .open(&path)
+            .map_err(OutputError::of(folder, "cannot write into this folder"))?;
+        match file.try_lock() {
+            Err(TryLockError::WouldBlock) => {
+                return Err(OutputError::new(
+                    folder,
+                    "another run is writing into this folder; choose another with --out",
+                ));
+            }
+            // A file system without locks keeps nobody out, but it can hold a run.
+            Err(TryLockError::Error(error)) if error.kind() != ErrorKind::Unsupported => {
+                return Err(OutputError::of(&path, "cannot be locked")(error));
+            }
+            _ => {}
+        }
+        // The run before may have removed the file between our opening and locking it.
+        if is_at(&file, &path) {
+            return Ok(file);
+        }
+    }
+}
+
+#[cfg(unix)]
+fn is_at(file: &File, path: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    let id = |metadata: fs::Metadata| (metadata.dev(), metadata.ino());
+    file.metadata().ok().map(id) == fs::metadata(path).ok().map(id)
+}
+
+#[cfg(not(unix))]
+fn is_at(_: &File, path: &Path) -> bool {
+    path.exists()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::log::{RecordingHeader, RecordingWriter};
+    use crate::streams::{JointCounts, JointSensorSample, Message, Sink};
+    use crate::time::SIMULATION_EPOCH;
+
+    fn names(folder: &Path) -> Vec<String> {
+        let mut names: Vec<String> =
+            fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        names
+    }
+
+    fn record(path: &Path, readings: usize) {
+        let mut writer = RecordingWriter::create(path, RecordingHeader::new(vec!["a".to_owned()])).unwrap();
+        for n in 0..readings {
+            let stamp = SIMULATION_EPOCH.plus_s(n as f64);
+            let sample = JointSensorSample { stamp, counts: JointCounts::from_slice(&[1.0]) };
+            writer.record(stamp, &Message::JointSensors(sample)).unwrap();
+        }
+    }
+
+    #[test]
+    fn leftovers_with_readings_are_kept_under_new_names_and_others_go() {
+        let dir = tempfile::tempdir().unwrap();
+        for round in 1..=2 {
+            record(&dir.path().join("run.mcap.partial"), 5);
+            record(&dir.path().join("truth.mcap.partial"), 5);
+            fs::write(dir.path().join("summary.json.partial"), "{").unwrap();
+            let output = OutputFolder::open(dir.path()).unwrap().0;
+            drop(output);
+            assert_eq!(names(dir.path()).len(), 2 * round, "{:?}", names(dir.path()));
+        }
+        assert_eq!(names(dir.path()), ["run-cut-1.mcap", "run-cut-2.mcap", "truth-cut-1.mcap", "truth-cut-2.mcap"]);
+        record(&dir.path().join("run.mcap.partial"), 0);
+        fs::write(dir.path().join("truth.mcap.partial"), "").unwrap();
+        drop(OutputFolder::open(dir.path()).unwrap().0);
+        assert_eq!(names(dir.path()).len(), 4);
+        // What cannot be read might be worth something.
+        fs::write(dir.path().join("run.mcap.partial"), "scribble").unwrap();
+        drop(OutputFolder::open(dir.path()).unwrap().0);
+        assert_eq!(fs::read(dir.path().join("run-cut-3.mcap")).unwrap(), b"scribble");
+    }
+
+    #[test]
+    fn one_run_at_a_time() {
+        let dir = tempfile::tempdir().unwrap();
+        let first = OutputFolder::open(dir.path()).unwrap().0;
+        let error = OutputFolder::open(dir.path()).unwrap_err().to_string();
+        assert!(error.contains("another run"), "{error}");
+        drop(first);
+        drop(OutputFolder::open(dir.path()).unwrap().0);
+        assert!(names(dir.path()).is_empty());
+    }
+
+    /// The lock of the first is taken away under the second while it waits between opening and locking.
+    #[test]
+    fn locks_hold_while_many_come_and_go() {
+        let dir = tempfile::tempdir().unwrap();
+        let inside = std::sync::atomic::AtomicUsize::new(0);
+        let entered = std::sync::atomic::AtomicUsize::new(0);
+        std::thread::scope(|scope| {
+            for _ in 0..4 {
+                scope.spawn(|| {
+                    for _ in 0..300 {
+                        let Ok((output, _)) = OutputFolder::open(dir.path()) else { continue };
+                        use std::sync::atomic::Ordering::SeqCst;
+                        assert_eq!(inside.fetch_add(1, SeqCst), 0, "two runs in one folder");
+                        entered.fetch_add(1, SeqCst);
+                        std::thread::yield_now();
+                        inside.fetch_sub(1, SeqCst);
+                        drop(output);
+                    }
+                });
+            }
+        });
+        assert!(entered.into_inner() >= 300);
+    }
+
+    #[test]
+    fn results_come_together_and_nothing_old_stays() {
+        let dir = tempfile::tempdir().unwrap();
+        for name in RESULTS {
+            fs::write(dir.path().join(name), "old").unwrap();
+        }
+        fs::write(dir.path().join("notes.txt"), "mine").unwrap();
+        let output = OutputFolder::open(dir.path()).unwrap().0;
+        for name in ["run.mcap", "truth.mcap", "calibration.toml", "summary.json"] {
+            output.write(name, b"new").unwrap();
+        }
+        assert_eq!(fs::read(dir.path().join("run.mcap")).unwrap(), b"old");
+        output.commit().unwrap();
+        drop(output);
+        assert_eq!(names(dir.path()), ["calibration.toml", "notes.txt", "run.mcap", "summary.json", "truth.mcap"]);
+        assert_eq!(fs::read(dir.path().join("summary.json")).unwrap(), b"new");
+    }
+
+    /// Wherever putting in place breaks off, no summary stands beside a mixture.
+    #[test]
+    fn a_broken_commit_leaves_no_summary() {
+        for blocked in ["truth.mcap", "report.html", "run.mcap"] {
+            let dir = tempfile::tempdir().unwrap();
+            for name in RESULTS {
+                fs::write(dir.path().join(name), "old").unwrap();
+            }
+            let output = OutputFolder::open(dir.path()).unwrap().0;
+            for name in RESULTS {
+                output.write(name, b"new").unwrap();
+            }
+            fs::remove_file(dir.path().join(blocked)).unwrap();
+            fs::create_dir_all(dir.path().join(blocked).join("full")).unwrap();
+            let error = output.commit().unwrap_err().to_string();
+            assert!(error.contains(blocked), "{error}");
+            assert!(!dir.path().join("summary.json").exists());
+        }
+    }
+
+    #[test]
+    fn a_new_folder_with_nothing_in_it_goes_again() {
+        let dir = tempfile::tempdir().unwrap();
+        let folder = dir.path().join("out");
+        let output = OutputFolder::open(&folder).unwrap().0;
+        output.write("run.mcap", b"x").unwrap();
+        output.discard();
+        drop(output);
+        assert!(!folder.exists());
+    }
+
+    #[test]
+    fn what_is_in_the_way_is_named_before_anything_is_written() {
+        let dir = tempfile::tempdir().unwrap();
+        fs::create_dir(dir.path().join("report.html")).unwrap();
+        let error = OutputFolder::open(dir.path()).unwrap_err().to_string();
+        assert!(error.contains("report.html"), "{error}");
+        assert_eq!(names(dir.path()), ["report.html"]);
+    }
+}

@@ -1,0 +1,94 @@
+//! Where a run failed, and of what.
+
+use std::path::PathBuf;
+
+use crate::log::LogError;
+use crate::output::OutputError;
+use crate::robot::RobotError;
+use crate::routine::RoutineError;
+use crate::session::SessionError;
+use crate::sim::SimError;
+
+/// How far a run came.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stage {
+    /// Reading routine, robot, vehicle, world.
+    Input,
+    /// Building the world and opening the streams.
+    World,
+    Plan,
+    /// The arm was on its way.
+    Motion,
+    Calibrate,
+    /// The recording is whole; it is compared with the truth and written out.
+    Results,
+}
+
+impl Stage {
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Input => "input",
+            Self::World => "world",
+            Self::Plan => "plan",
+            Self::Motion => "motion",
+            Self::Calibrate => "calibrate",
+            Self::Results => "results",
+        }
+    }
+}
+
+/// Why a run gave no result. Sources stand behind the message, not in its place: the exit code depends on their type.
+#[derive(Debug, thiserror::Error)]
+pub enum RunError {
+    #[error("{0}")]
+    Routine(#[from] RoutineError),
+    #[error("{0}")]
+    Robot(#[from] RobotError),
+    #[error("{0}")]
+    Sim(#[from] SimError),
+    #[error("{0}")]
+    Log(#[from] LogError),
+    #[error("{0}")]
+    Session(#[from] SessionError),
+    #[error("{0}")]
+    Output(#[from] OutputError),
+    #[error("summary.json: {0}")]
+    Json(#[from] serde_json::Error),
+    #[cfg(feature = "viewer")]
+    #[error("{0}")]
+    Replay(#[from] crate::replay::ReplayError),
+}
+
+/// A run that failed.
+#[derive(Debug)]
+pub struct Failure {
+    pub stage: Stage,
+    /// Boxed: results are handed on by value.
+    pub error: Box<RunError>,
+    /// The recording up to the failure, where one is worth a look.
+    pub kept: Option<PathBuf>,
+}
+
+impl Failure {
+    /// For errors at `stage`.
+    pub(super) fn at<E: Into<RunError>>(stage: Stage) -> impl FnOnce(E) -> Self {
+        move |error| Self { stage, error: Box::new(error.into()), kept: None }
+    }
+
+    /// A folder for the run that could not be made.
+    #[must_use]
+    pub fn of_output(error: OutputError) -> Self {
+        Self { stage: Stage::World, error: Box::new(error.into()), kept: None }
+    }
+
+    /// A loop that broke off.
+    pub(super) fn of_session(error: SessionError) -> Self {
+        let stage = match error {
+            SessionError::Plan(_) => Stage::Plan,
+            SessionError::Calib(_) => Stage::Calibrate,
+            _ => Stage::Motion,
+        };
+        Self { stage, error: Box::new(error.into()), kept: None }
+    }
+}
