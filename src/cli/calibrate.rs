@@ -8,7 +8,8 @@ use clap::Args;
 
 use super::exit::Exit;
 use super::files;
-use crate::calib::{Status, calibrate as estimate};
+use super::stdout::say;
+use crate::calib::{CompactCalibration, Status, calibrate as estimate};
 use crate::log::{Completeness, Recording, read_recording};
 use crate::report::{RunSummary, table};
 use crate::robot;
@@ -27,6 +28,9 @@ pub(super) struct CalibrateArgs {
     /// Where to write calibration.toml and summary.json
     #[arg(long, default_value = ".")]
     out: PathBuf,
+    /// Print the calibration as one line below 512 bytes instead of the table
+    #[arg(long)]
+    compact: bool,
 }
 
 pub(super) fn calibrate(args: &CalibrateArgs) -> Result<Exit> {
@@ -36,11 +40,16 @@ pub(super) fn calibrate(args: &CalibrateArgs) -> Result<Exit> {
     let started = Instant::now();
     let calibration = estimate(&recording, &robot, args.method)?;
     let summary = RunSummary::of_calibration(&calibration, started.elapsed().as_secs_f64());
+    // Before anything is written: what has no compact form shall leave no half of the answer.
+    let shown =
+        if args.compact { CompactCalibration::of(&calibration)?.to_text()? } else { table(&summary).to_string() };
     files::make_folder(&args.out)?;
-    files::write_whole(&args.out.join("calibration.toml"), calibration.to_toml().as_bytes())?;
     let json = serde_json::to_string_pretty(&summary).context("summary.json")?;
-    files::write_whole(&args.out.join("summary.json"), format!("{json}\n").as_bytes())?;
-    println!("{}", table(&summary));
+    files::write_together(&[
+        (&args.out.join("calibration.toml"), calibration.to_toml().as_bytes()),
+        (&args.out.join("summary.json"), format!("{json}\n").as_bytes()),
+    ])?;
+    say(&shown)?;
     Ok(match (calibration.status, lost) {
         (Status::Refused, _) => Exit::Refused,
         (Status::Accepted, true) => Exit::DataLost,

@@ -6,21 +6,28 @@ use anyhow::{Context, Result};
 use clap::Args;
 
 use super::exit::{Exit, UsageError};
+use super::overrides::OverrideArgs;
 use crate::calib::Calibration;
+#[cfg(feature = "sim")]
+use crate::campaign::Request;
 use crate::robot::{self, Robot};
-use crate::routine::{self, Routine};
+use crate::routine::{self, Overrides, Step};
 
 #[derive(Debug, Args)]
 pub(super) struct CheckArgs {
     /// Robot folders or robot.toml files, routines, vehicles, calibrations
     #[arg(required = true)]
     files: Vec<PathBuf>,
+    /// For the routines among them
+    #[command(flatten)]
+    overrides: OverrideArgs,
 }
 
 pub(super) fn check(args: &CheckArgs) -> Result<Exit> {
+    let overrides = args.overrides.overrides();
     let mut all_good = true;
     for file in &args.files {
-        match check_one(file) {
+        match check_one(file, &overrides) {
             Ok(found) => println!("ok: {}: {found}", file.display()),
             Err(error) => {
                 all_good = false;
@@ -31,7 +38,7 @@ pub(super) fn check(args: &CheckArgs) -> Result<Exit> {
     Ok(if all_good { Exit::Ok } else { Exit::InvalidInput })
 }
 
-fn check_one(file: &Path) -> Result<String> {
+fn check_one(file: &Path, overrides: &Overrides) -> Result<String> {
     if file.is_dir() {
         return Ok(describe_robot(&robot::load(file)?));
     }
@@ -41,11 +48,12 @@ fn check_one(file: &Path) -> Result<String> {
     let text = std::fs::read_to_string(file).with_context(|| format!("{}: cannot be read", file.display()))?;
     let table: toml::Table = toml::from_str(&text).with_context(|| format!("{}: is no TOML", file.display()))?;
     if table.contains_key("robot") && table.contains_key("vehicle") {
-        return check_routine(&routine::load(file)?);
+        return check_routine(file, overrides);
     }
     if table.contains_key("part") {
         let vehicle = robot::load_vehicle(file)?;
-        return Ok(format!("vehicle `{}`, {} parts", vehicle.name, vehicle.parts.len()));
+        let tags = vehicle.survey.as_ref().map_or_else(String::new, |survey| format!(", {} tags", survey.tags.len()));
+        return Ok(format!("vehicle `{}`, {} parts{tags}", vehicle.name, vehicle.parts.len()));
     }
     if table.contains_key("messages_hash") {
         let calibration = Calibration::read(file)?;
@@ -65,19 +73,31 @@ fn describe_robot(robot: &Robot) -> String {
     )
 }
 
-fn check_routine(routine: &Routine) -> Result<String> {
-    let robot = robot::load(&routine.robot_folder)?;
-    let vehicle = robot::load_vehicle(&routine.vehicle_file)?;
+fn check_routine(file: &Path, overrides: &Overrides) -> Result<String> {
+    let routine = &routine::load_with(file, overrides)?;
+    let (robot, vehicle) = routine.load_arm()?;
     #[cfg(feature = "sim")]
-    crate::sim::WorldSpec::from_table(&routine.world, &routine.file)?;
+    crate::sim::WorldSpec::from_routine(routine, &robot)?;
+    #[cfg(feature = "sim")]
+    if !routine.campaign.matrix.is_empty() {
+        // Every point of the matrix is a routine of its own.
+        crate::campaign::Prepared::load(Request { routine: file.to_owned(), overrides: overrides.clone() })?;
+    }
     let farthest = routine.task.targets_m.iter().map(|t| nalgebra::Vector3::from(*t).norm()).fold(0.0, f64::max);
     Ok(format!(
-        "routine `{}`: robot `{}` on `{}`, {} poses and {} held out, {} targets up to {farthest:.2} m from the base",
+        "routine `{}`: robot `{}` on `{}`, {} steps ({}), {} targets up to {farthest:.2} m from the base",
         routine.name,
         robot.name,
         vehicle.name,
-        routine.capture.poses,
-        routine.capture.held_out,
+        routine.steps.len(),
+        routine.steps.iter().map(described).collect::<Vec<_>>().join(", "),
         routine.task.targets_m.len()
     ))
+}
+
+fn described(step: &Step) -> String {
+    match step {
+        Step::Capture(capture) => format!("capture of {} poses and {} held out", capture.poses, capture.held_out),
+        step => step.name().to_owned(),
+    }
 }

@@ -2,7 +2,7 @@
 
 use std::process::ExitCode;
 
-use crate::calib::{CalibError, CalibrationFileError};
+use crate::calib::{CalibError, CalibrationFileError, CompactError};
 use crate::log::LogError;
 use crate::plan::PlanError;
 use crate::robot::RobotError;
@@ -22,16 +22,30 @@ pub enum Exit {
     Refused,
 }
 
+impl Exit {
+    /// As the system gets it.
+    #[must_use]
+    pub fn code(self) -> u8 {
+        match self {
+            Self::Ok => 0,
+            Self::Failure => 1,
+            Self::InvalidInput => 2,
+            Self::DataLost => 3,
+            Self::Refused => 4,
+        }
+    }
+}
+
 impl From<Exit> for ExitCode {
     fn from(exit: Exit) -> Self {
-        Self::from(match exit {
-            Exit::Ok => 0,
-            Exit::Failure => 1,
-            Exit::InvalidInput => 2,
-            Exit::DataLost => 3,
-            Exit::Refused => 4,
-        })
+        Self::from(exit.code())
     }
+}
+
+/// A run that came to its end: accepted and every limit held, or not.
+#[cfg(feature = "sim")]
+pub(super) fn of_good(is_good: bool) -> Exit {
+    if is_good { Exit::Ok } else { Exit::Refused }
 }
 
 /// Something is missing on the command line.
@@ -41,16 +55,23 @@ pub(super) struct UsageError(pub String);
 
 /// Input that cannot be used gives 2, recordings with nothing to fit too; all else 1.
 pub(super) fn of_error(error: &anyhow::Error) -> Exit {
-    let invalid = error.chain().any(|cause| {
+    of_cause(error.as_ref())
+}
+
+/// The same for an error as the library gives it.
+pub(super) fn of_cause(error: &(dyn std::error::Error + 'static)) -> Exit {
+    let invalid = std::iter::successors(Some(error), |error| error.source()).any(|cause| {
         cause.is::<UsageError>()
             || cause.is::<RobotError>()
             || cause.is::<RoutineError>()
             || cause.is::<CalibrationFileError>()
             || cause.is::<CalibError>()
+            || cause.is::<CompactError>()
             || cause.is::<PlanError>()
             || cause.downcast_ref::<LogError>().is_some_and(|e| !is_write_failure(e))
             || matches!(cause.downcast_ref::<SessionError>(), Some(SessionError::Plan(_) | SessionError::Calib(_)))
             || is_invalid_world(cause)
+            || is_invalid_campaign(cause)
     });
     if invalid { Exit::InvalidInput } else { Exit::Failure }
 }
@@ -63,6 +84,17 @@ fn is_invalid_world(cause: &(dyn std::error::Error + 'static)) -> bool {
 
 #[cfg(not(feature = "sim"))]
 fn is_invalid_world(_: &(dyn std::error::Error + 'static)) -> bool {
+    false
+}
+
+#[cfg(feature = "sim")]
+fn is_invalid_campaign(cause: &(dyn std::error::Error + 'static)) -> bool {
+    use crate::campaign::CampaignError;
+    cause.downcast_ref::<CampaignError>().is_some_and(CampaignError::is_invalid_input)
+}
+
+#[cfg(not(feature = "sim"))]
+fn is_invalid_campaign(_: &(dyn std::error::Error + 'static)) -> bool {
     false
 }
 

@@ -1,21 +1,34 @@
 //! The command line: parse, dispatch, progress, exit code. The only place with a clock.
 
 mod calibrate;
+#[cfg(feature = "sim")]
+mod campaign;
 mod check;
 mod exit;
-mod files;
+mod export;
+mod inspect;
+#[cfg(feature = "sim")]
+mod interrupt;
+#[cfg(feature = "sim")]
+mod many;
+mod overrides;
 #[cfg(feature = "sim")]
 mod progress;
+#[cfg(feature = "sim")]
+mod regress;
 #[cfg(feature = "viewer")]
 mod replay;
 #[cfg(feature = "sim")]
 mod run;
+mod stdout;
 
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
 pub use exit::Exit;
+
+use crate::output as files;
 
 /// Calibrates the joint sensors of arms that nobody can walk up to.
 #[derive(Debug, Parser)]
@@ -30,8 +43,18 @@ enum Command {
     /// Run a routine in simulation: reach, plan, capture, calibrate, reach again
     #[cfg(feature = "sim")]
     Run(run::RunArgs),
+    /// Run a routine for many seeds and settings, and sum the figures up
+    #[cfg(feature = "sim")]
+    Campaign(Box<campaign::CampaignArgs>),
+    /// Run a routine for the seeds of a baseline, and say whether it has become worse
+    #[cfg(feature = "sim")]
+    Regress(Box<regress::RegressArgs>),
     /// Calibrate from a recording, simulated or of a real arm
     Calibrate(calibrate::CalibrateArgs),
+    /// Say what is in a recording, whether it is whole, and what could be calibrated from it
+    Inspect(inspect::InspectArgs),
+    /// Write a calibration as YAML, TOML or one compact line to stdout
+    Export(export::ExportArgs),
     /// Open a recording in the Rerun viewer, or write it as .rrd
     #[cfg(feature = "viewer")]
     Replay(replay::ReplayArgs),
@@ -52,7 +75,13 @@ pub fn main() -> ExitCode {
     let result = match cli.command {
         #[cfg(feature = "sim")]
         Command::Run(args) => run::run(&args),
+        #[cfg(feature = "sim")]
+        Command::Campaign(args) => campaign::campaign(&args),
+        #[cfg(feature = "sim")]
+        Command::Regress(args) => regress::regress(&args),
         Command::Calibrate(args) => calibrate::calibrate(&args),
+        Command::Inspect(args) => inspect::inspect(&args),
+        Command::Export(args) => export::export(&args),
         #[cfg(feature = "viewer")]
         Command::Replay(args) => replay::replay(&args),
         Command::Check(args) => check::check(&args),

@@ -1,23 +1,29 @@
 //! Progress on stderr.
 
+use std::time::Instant;
+
 use indicatif::{ProgressBar, ProgressStyle};
 
+use super::interrupt::Interrupt;
 use crate::session::Progress;
 use crate::streams::Phase;
 
 /// One line that says what the arm is doing.
 pub(super) struct Bar {
     bar: ProgressBar,
+    started: Instant,
+    interrupt: Interrupt,
 }
 
 impl Bar {
-    pub fn new() -> Self {
+    /// `started`: when the command began. Stops the run when `interrupt` says so.
+    pub fn new(started: Instant, interrupt: Interrupt) -> Self {
         let bar = ProgressBar::new(1);
         let template = "{elapsed_precise} {msg:<44} {wide_bar} {pos}/{len}";
         if let Ok(style) = ProgressStyle::with_template(template) {
             bar.set_style(style);
         }
-        Self { bar }
+        Self { bar, started, interrupt }
     }
 
     pub fn finish(&self) {
@@ -32,6 +38,7 @@ impl Progress for Bar {
             Phase::Move | Phase::Settle | Phase::Capture => "capturing views",
             Phase::Calibrate => "calibrating",
             Phase::Reach => "reaching for targets",
+            Phase::Wait => "waiting",
             Phase::Done => "done",
         };
         self.bar.set_length(total as u64);
@@ -40,6 +47,10 @@ impl Progress for Bar {
     }
 
     fn wall_s(&self) -> f64 {
-        self.bar.elapsed().as_secs_f64()
+        self.started.elapsed().as_secs_f64()
+    }
+
+    fn stop_requested(&self) -> bool {
+        self.interrupt.is_requested()
     }
 }

@@ -8,7 +8,8 @@ use clap::Args;
 use super::calibrate::warn_of_losses;
 use super::exit::{Exit, UsageError};
 use super::files;
-use crate::log::{read_attachments, read_recording};
+use crate::calib::surveyed;
+use crate::log::{Recording, read_attachments, read_recording};
 use crate::replay::{ReplayInput, open_viewer, write_rrd};
 use crate::robot::{self, Robot, Vehicle};
 use crate::routine::{self, Scene};
@@ -28,8 +29,8 @@ pub(super) struct ReplayArgs {
 pub(super) fn replay(args: &ReplayArgs) -> Result<Exit> {
     let recording = read_recording(&args.recording)?;
     let lost = warn_of_losses(&recording);
-    let drawings = Drawings::find(args)?;
-    let truth = args.recording.with_file_name("truth.mcap");
+    let drawings = Drawings::find(args, &recording)?;
+    let truth = truth_beside(&args.recording);
     let truth = (truth != args.recording && truth.is_file()).then_some(truth);
     let input = ReplayInput {
         recording: &recording,
@@ -41,6 +42,7 @@ pub(super) fn replay(args: &ReplayArgs) -> Result<Exit> {
     };
     match &args.save {
         Some(out) => {
+            files::check_replaceable(out)?;
             write_rrd(&input, &files::partial(out))?;
             files::complete(out)?;
             println!("written      {}", out.display());
@@ -55,6 +57,15 @@ pub(super) fn replay(args: &ReplayArgs) -> Result<Exit> {
     Ok(if lost { Exit::DataLost } else { Exit::Ok })
 }
 
+/// The truth of the same run: truth-cut-2.mcap beside run-cut-2.mcap, else truth.mcap.
+fn truth_beside(recording: &Path) -> PathBuf {
+    let unfinished = recording
+        .file_name()
+        .and_then(|name| name.to_str()?.strip_prefix("run"))
+        .filter(|rest| rest.starts_with("-cut-") || *rest == ".mcap.partial");
+    recording.with_file_name(format!("truth{}", unfinished.unwrap_or(".mcap")))
+}
+
 /// The arm and its surroundings as drawn, from the recording's own attachments or a robot folder.
 struct Drawings {
     robot: Robot,
@@ -63,7 +74,7 @@ struct Drawings {
 }
 
 impl Drawings {
-    fn find(args: &ReplayArgs) -> Result<Self> {
+    fn find(args: &ReplayArgs, recording: &Recording) -> Result<Self> {
         let folder = tempfile::tempdir().context("no temporary folder can be made")?;
         let mut names = Vec::new();
         for (name, bytes) in read_attachments(&args.recording)? {
@@ -85,6 +96,10 @@ impl Drawings {
         };
         let vehicle =
             has("vehicle.toml").then(|| robot::load_vehicle(&folder.path().join("vehicle.toml"))).transpose()?;
+        let robot = match &vehicle {
+            Some(vehicle) => robot.mounted_on(vehicle)?,
+            None => surveyed(recording, &robot).into_owned(),
+        };
         let scene = has("scene.toml").then(|| routine::load_scene(&folder.path().join("scene.toml"))).transpose()?;
         Ok(Self { robot, vehicle, scene })
     }

@@ -23,13 +23,14 @@ pub(super) fn draw(run: &Run, stream: &mut Stream) {
 }
 
 fn draw_phases(run: &Run, stream: &mut Stream) {
-    const PHASES: [(Phase, &str, Rgba); 7] = [
+    const PHASES: [(Phase, &str, Rgba); 8] = [
         (Phase::Plan, "plan", [130, 130, 150, 255]),
         (Phase::Move, "move", [80, 120, 200, 255]),
         (Phase::Settle, "settle", [70, 160, 170, 255]),
         (Phase::Capture, "capture", [70, 170, 90, 255]),
         (Phase::Calibrate, "calibrate", [200, 80, 190, 255]),
         (Phase::Reach, "reach", [215, 150, 50, 255]),
+        (Phase::Wait, "wait", [90, 90, 120, 255]),
         (Phase::Done, "done", [110, 110, 110, 255]),
     ];
     let entity = format!("{STATE}/phase");

@@ -1,11 +1,11 @@
 //! Primitives and poses in Rerun's terms.
 
-use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
-use rerun::{Boxes3D, Capsules3D, Cylinders3D, Ellipsoids3D, FillMode, Transform3D};
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
+use rerun::{Boxes3D, Capsules3D, Cylinders3D, Ellipsoids3D, FillMode, Mesh3D, Transform3D};
 
 use super::colors::Rgba;
 use super::rrd::Stream;
-use crate::robot::{PlacedShape, Shape};
+use crate::robot::{Hull, PlacedShape, Shape};
 
 /// How a body looks.
 #[derive(Clone, Copy)]
@@ -56,6 +56,7 @@ pub(super) fn fix_shapes<'a>(
     look: Look,
 ) {
     let [mut boxes, mut cylinders, mut capsules, mut balls] = [(); 4].map(|()| Batch::default());
+    let mut n_hulls = 0;
     for placed in shapes {
         let [r, g, b] = placed.color_rgb;
         let color = match look {
@@ -64,6 +65,10 @@ pub(super) fn fix_shapes<'a>(
         };
         let place = placed.owner_from_shape;
         match placed.shape {
+            Shape::Hull(ref hull) => {
+                stream.fix(&format!("{entity}/hulls/{n_hulls}"), &mesh(hull, &place, color));
+                n_hulls += 1;
+            }
             Shape::Box { size_m } => boxes.push(size_m.map(|v| 0.5 * v), place, color),
             Shape::Cylinder { radius_m, length_m } => cylinders.push([radius_m, radius_m, length_m], place, color),
             Shape::Capsule { radius_m, length_m } => {
@@ -97,6 +102,22 @@ pub(super) fn fix_shapes<'a>(
         let shown = Ellipsoids3D::from_centers_and_radii(balls.centers(), balls.radii());
         stream.fix(&format!("{entity}/balls"), &shown.with_colors(balls.colors).with_fill_mode(fill));
     }
+}
+
+/// A hull as a mesh in its owner's frame. Each triangle has corners of its own: a body with edges, not a soft one.
+fn mesh(hull: &Hull, place: &Isometry3<f64>, color: Rgba) -> Mesh3D {
+    let (mut corners, mut normals) = (Vec::new(), Vec::new());
+    for triangle in hull.triangles() {
+        let at = triangle.map(|k| place * Point3::from(hull.corners_m()[k as usize]));
+        let normal = (at[1] - at[0]).cross(&(at[2] - at[0])).try_normalize(0.0).unwrap_or_else(Vector3::zeros);
+        corners.extend(at.map(|point| vector(&point.coords)));
+        normals.extend([vector(&normal); 3]);
+    }
+    let n = corners.len() as u32;
+    let triangles = (0..n / 3).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]);
+    let [r, g, b, a] = color;
+    let color = rerun::Rgba32::from_unmultiplied_rgba(r, g, b, a);
+    Mesh3D::new(corners).with_vertex_normals(normals).with_triangle_indices(triangles).with_albedo_factor(color)
 }
 
 /// Single precision, as Rerun has it.

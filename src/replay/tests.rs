@@ -7,6 +7,8 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use super::*;
 use crate::kinematics::{IkGoal, IkSettings, JointLimits, solve_position};
 use crate::log::{RecordingHeader, RecordingWriter, RosMessage, read_recording, ros};
+use crate::robot::{Hull, Part, PlacedShape, Shape};
+use crate::routine::Scene;
 use crate::sensor::ArmSensors;
 use crate::streams::{
     CaptureSet, JointAngles, JointSensorSample, JointStateBelief, LogLevel, LogLine, Mark, MarkKind, Message, Phase,
@@ -246,9 +248,21 @@ fn entities(rrd: &Path) -> std::collections::BTreeMap<String, usize> {
 fn a_run_becomes_a_file_that_rerun_reads() {
     let (dir, recording, truth, robot) = small();
     let out = dir.path().join("run.rrd");
-    write_rrd(&ReplayInput { truth: Some(&truth), ..input(&recording, &robot) }, &out).unwrap();
+    let corners = [-0.5, 0.5].map(|x| [-0.5, 0.5].map(|y| [-0.5, 0.5].map(|z| [x, y, z])));
+    let shape = Shape::Hull(Hull::new(corners.as_flattened().as_flattened()).unwrap());
+    let placed = PlacedShape { owner_from_shape: Isometry3::identity(), shape, color_rgb: [9; 3] };
+    let scene = Scene { seafloor_z_m: None, obstacles: vec![Part { name: "rock".into(), placed }] };
+    let shown = ReplayInput { truth: Some(&truth), scene: Some(&scene), ..input(&recording, &robot) };
+    write_rrd(&shown, &out).unwrap();
     let entities = entities(&out);
-    for entity in ["/plots/joint_error", "/plots/tool_error/believed", "/camera/seen", "/state/phase", "/summary"] {
+    for entity in [
+        "/world/obstacles/hulls/0",
+        "/plots/joint_error",
+        "/plots/tool_error/believed",
+        "/camera/seen",
+        "/state/phase",
+        "/summary",
+    ] {
         assert!(entities.contains_key(entity), "{entity} is not among {:?}", entities.keys());
     }
     assert!(entities.keys().any(|entity| entity.contains("/believed_arm/6_")));

@@ -151,7 +151,7 @@ impl<'a> Tracks<'a> {
             Message::Task(m) => self.task = Some((at(m.stamp), m)),
             Message::Mark(m) => self.marks.push(self.span(log_time, m)),
             Message::Log(m) => self.log.push((at(m.stamp), m)),
-            Message::JointCommand(_) | Message::Pressure(_) => {}
+            Message::JointCommand(_) | Message::Pressure(_) | Message::Survey(_) => {}
         }
     }
 

@@ -1,0 +1,103 @@
+//! `armcal campaign`: one routine, many seeds and settings.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use anyhow::Result;
+use clap::Args;
+
+use super::exit::{Exit, UsageError};
+use super::files;
+use super::many::{CampaignBar, Many, check_name, exit_of, interrupts, range_of, run_many};
+use super::overrides::OverrideArgs;
+use crate::campaign::{CampaignSummary, Prepared, Request, Shard, Store, jobs, merge, table, write_results};
+use crate::routine::SeedRange;
+
+#[derive(Debug, Args)]
+pub(super) struct CampaignArgs {
+    /// The routine (.toml); [campaign] in it may give seeds and a matrix of settings
+    #[arg(required_unless_present = "merge", conflicts_with = "merge")]
+    routine: Option<PathBuf>,
+    /// Seeds A..B, both included, or one number; the routine's campaign.seeds if not given
+    #[arg(long, value_name = "A..B")]
+    seeds: Option<SeedRange>,
+    /// Only every N-th seed, beginning with the K-th
+    #[arg(long, value_name = "K/N")]
+    shard: Option<Shard>,
+    /// The table (.csv); .parquet, -summary.json and -summary.md are written beside it.
+    /// recordings/ROUTINE-NAME/campaign.csv if not given
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Threads, one run on each; all cores if not given
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+    #[command(flatten)]
+    overrides: OverrideArgs,
+    /// Keep each run's folder, as `armcal run` leaves it, in FILE.runs
+    #[arg(long)]
+    keep: bool,
+    /// Throw away the rows that are there
+    #[arg(long)]
+    fresh: bool,
+    /// Put the tables of shards together, into --out
+    #[arg(long, value_name = "FILE", num_args = 1.., requires = "out",
+          conflicts_with_all = ["seeds", "shard", "threads", "keep", "fresh", "set", "robot", "vehicle"])]
+    merge: Vec<PathBuf>,
+}
+
+pub(super) fn campaign(args: &CampaignArgs) -> Result<Exit> {
+    match (&args.routine, &args.out) {
+        (None, Some(out)) => merged(&args.merge, out),
+        (Some(routine), _) => run(args, routine),
+        (None, None) => Err(UsageError("a routine is missing".to_owned()).into()),
+    }
+}
+
+fn merged(paths: &[PathBuf], out: &Path) -> Result<Exit> {
+    check_name(out)?;
+    let (rows, summary) = merge(paths)?;
+    files::make_folder(files::parent(out))?;
+    write_results(out, &rows, &summary)?;
+    Ok(show(&summary, out))
+}
+
+fn run(args: &CampaignArgs, routine: &Path) -> Result<Exit> {
+    let started = Instant::now();
+    let stop = interrupts()?;
+    let request = Request { routine: routine.to_owned(), overrides: args.overrides.overrides() };
+    let prepared = Prepared::load(request)?;
+    let out =
+        args.out.clone().unwrap_or_else(|| Path::new("recordings").join(&prepared.routine.name).join("campaign.csv"));
+    check_name(&out)?;
+    let range = range_of(args.seeds, &prepared)?;
+    let mut store = Store::open(&out, &prepared.fingerprint, prepared.columns.names(), args.fresh)?;
+    let n_before = store.table().rows.len();
+    let jobs = jobs(&prepared, range, args.shard, &store.done());
+    if n_before > 0 {
+        eprintln!("{n_before} rows are there already; {} runs are left", jobs.len());
+    }
+    let folder = files::with_suffix(&out, if args.keep { ".runs" } else { ".work" });
+    let many = Many { prepared: &prepared, folder: &folder, keep: args.keep, threads: args.threads, stop: &stop };
+    let mut bar = CampaignBar::new(&prepared, store.table(), jobs.len());
+    let whole = run_many(&many, &jobs, &mut |row| {
+        bar.add(&row);
+        store.append(row)
+    });
+    bar.finish();
+    if !whole? {
+        let done = store.table().rows.len();
+        eprintln!("stopped with {done} rows kept; the same command goes on from there");
+        return Ok(Exit::Failure);
+    }
+    let (_, summary) = store.finish(&prepared.routine.name)?;
+    if !jobs.is_empty() {
+        eprintln!("{} runs in {:.0} s", jobs.len(), started.elapsed().as_secs_f64());
+    }
+    Ok(show(&summary, &out))
+}
+
+fn show(summary: &CampaignSummary, out: &Path) -> Exit {
+    print!("{}", table(summary));
+    println!("written      {}", out.display());
+    exit_of(summary)
+}

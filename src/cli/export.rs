@@ -1,0 +1,133 @@
+//! `armcal export`: a calibration in another form, on stdout.
+
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result};
+use clap::{Args, ValueEnum};
+use serde::Serialize;
+
+use super::exit::{Exit, UsageError};
+use super::stdout::say;
+use crate::calib::{Calibration, CompactCalibration};
+use crate::robot::{self, Robot};
+
+#[derive(Debug, Args)]
+pub(super) struct ExportArgs {
+    /// calibration.toml, or a file with the compact text; - for stdin
+    file: PathBuf,
+    /// The form that is wanted
+    #[arg(long = "as", value_enum)]
+    form: Form,
+    /// Robot folder: turns a compact text's corrections into the keys of calibration.toml
+    #[arg(long)]
+    robot: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Form {
+    /// All of it, for programs that read YAML
+    Yaml,
+    /// All of it, as calibration.toml has it
+    Toml,
+    /// One line below 512 bytes
+    Compact,
+}
+
+/// Larger inputs are no calibration; nothing larger is read.
+const MAX_INPUT_BYTES: u64 = 16 << 20;
+
+enum Input {
+    Full(Box<Calibration>),
+    Compact(CompactCalibration),
+}
+
+pub(super) fn export(args: &ExportArgs) -> Result<Exit> {
+    let robot = args.robot.as_deref().map(robot::load).transpose()?;
+    let text = match (read_input(&args.file)?, args.form) {
+        (Input::Full(calibration), form) => {
+            if let Some(robot) = &robot {
+                calibration.sensors(robot)?;
+            }
+            of_full(&calibration, form)?
+        }
+        (Input::Compact(compact), form) => of_compact(&compact, robot.as_ref(), form)?,
+    };
+    say(text.trim_end())?;
+    Ok(Exit::Ok)
+}
+
+fn of_full(calibration: &Calibration, form: Form) -> Result<String> {
+    Ok(match form {
+        Form::Yaml => to_yaml(calibration)?,
+        Form::Toml => calibration.to_toml(),
+        Form::Compact => CompactCalibration::of(calibration)?.to_text()?,
+    })
+}
+
+fn of_compact(compact: &CompactCalibration, robot: Option<&Robot>, form: Form) -> Result<String> {
+    let joints = robot.map(|robot| joints_of(compact, robot)).transpose()?;
+    let view = CompactView { compact, joint_of_robot: joints };
+    Ok(match form {
+        Form::Yaml => to_yaml(&view)?,
+        Form::Toml => toml::to_string(&view).context("the compact calibration has no TOML form")?,
+        Form::Compact => compact.to_text()?,
+    })
+}
+
+fn to_yaml<T: Serialize>(value: &T) -> Result<String> {
+    serde_saphyr::to_string(value).context("the calibration has no YAML form")
+}
+
+/// A compact calibration, and with its robot at hand the same corrections under the keys of calibration.toml.
+#[derive(Serialize)]
+struct CompactView<'a> {
+    #[serde(flatten)]
+    compact: &'a CompactCalibration,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    joint_of_robot: Option<Vec<JointOfRobot>>,
+}
+
+/// As in calibration.toml.
+#[derive(Serialize)]
+struct JointOfRobot {
+    name: String,
+    center_rad: f64,
+    gain_rad_per_count: f64,
+    offset_rad: f64,
+}
+
+fn joints_of(compact: &CompactCalibration, robot: &Robot) -> Result<Vec<JointOfRobot>> {
+    let one = |model: crate::sensor::SensorModel| JointOfRobot {
+        gain_rad_per_count: model.correction.gain / model.spec.counts_per_rad,
+        offset_rad: model.correction.offset_rad,
+        center_rad: model.spec.center_rad,
+        name: model.spec.joint,
+    };
+    Ok(compact.sensors(robot)?.models.into_iter().map(one).collect())
+}
+
+fn read_input(file: &Path) -> Result<Input> {
+    let is_stdin = file == Path::new("-");
+    let name = if is_stdin { "stdin".to_owned() } else { file.display().to_string() };
+    let mut bytes = Vec::new();
+    let read = |source: Box<dyn Read>, bytes: &mut Vec<u8>| source.take(MAX_INPUT_BYTES).read_to_end(bytes);
+    let opened: std::io::Result<Box<dyn Read>> = if is_stdin {
+        Ok(Box::new(std::io::stdin().lock()))
+    } else {
+        std::fs::File::open(file).map(|file| Box::new(file) as Box<dyn Read>)
+    };
+    opened
+        .and_then(|source| read(source, &mut bytes))
+        .map_err(|error| UsageError(format!("{name}: cannot be read: {error}")))?;
+    let not_text = |_| UsageError(format!("{name}: is no text: neither a calibration.toml nor a compact calibration"));
+    let text = std::str::from_utf8(&bytes).map_err(not_text)?;
+    if text.trim_start().starts_with("armcal") {
+        return Ok(Input::Compact(CompactCalibration::from_text(text).with_context(|| name)?));
+    }
+    if !text.contains("[[joint]]") {
+        let what = "neither a calibration.toml nor a compact calibration (which begins with `armcal1`)";
+        return Err(UsageError(format!("{name}: is {what}")).into());
+    }
+    Ok(Input::Full(Box::new(Calibration::parse(Path::new(&name), text)?)))
+}

@@ -1,0 +1,59 @@
+//! `armcal inspect`: what is in a recording, whether it is whole, what could be calibrated from it.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result};
+use clap::Args;
+
+use super::exit::Exit;
+use super::stdout::say;
+use crate::log::{LogError, read_attachments};
+use crate::report::inspection::{State, inspect as look, to_text};
+use crate::robot::{self, Robot};
+
+/// Exits with 0 for a whole recording, 3 for one that is cut or damaged, 2 for what is no recording.
+#[derive(Debug, Args)]
+pub(super) struct InspectArgs {
+    /// The recording (.mcap), of armcal or of any other arm
+    recording: PathBuf,
+    /// Robot folder: says which of its parameters the recording would determine; the attached drawings if not given
+    #[arg(long)]
+    robot: Option<PathBuf>,
+    /// Print JSON instead of text
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn inspect(args: &InspectArgs) -> Result<Exit> {
+    let robot = match &args.robot {
+        Some(folder) => Some(robot::load(folder)?),
+        None => attached_robot(&args.recording)?,
+    };
+    let inspection = look(&args.recording, robot.as_ref())?;
+    if args.json {
+        say(&serde_json::to_string_pretty(&inspection).context("the inspection has no JSON form")?)?;
+    } else {
+        say(&to_text(&inspection))?;
+    }
+    Ok(match inspection.completeness.state {
+        State::Whole => Exit::Ok,
+        State::Cut | State::Damaged => Exit::DataLost,
+    })
+}
+
+/// The robot as attached to the recording; `None` where that is missing or cannot be used, for it is a help, no more.
+fn attached_robot(recording: &Path) -> Result<Option<Robot>, LogError> {
+    let attachments = read_attachments(recording)?;
+    if !attachments.iter().any(|(name, _)| name == "robot.toml") {
+        return Ok(None);
+    }
+    let Ok(folder) = tempfile::tempdir() else { return Ok(None) };
+    for (name, bytes) in attachments {
+        // Only plain names: an attachment must not choose where it is written.
+        let is_plain = Path::new(&name).file_name().is_some_and(|plain| plain.to_str() == Some(&name));
+        if is_plain && std::fs::write(folder.path().join(&name), bytes).is_err() {
+            return Ok(None);
+        }
+    }
+    Ok(robot::load(folder.path()).ok())
+}

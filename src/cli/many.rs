@@ -1,0 +1,152 @@
+//! What `campaign` and `regress` share: runs on all cores, progress, Ctrl-C.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use std::time::Instant;
+
+use anyhow::{Context, Result};
+use indicatif::{ProgressBar, ProgressStyle};
+
+use super::exit::{Exit, UsageError, of_cause, of_good};
+use super::files;
+use crate::campaign::{
+    CampaignError, CampaignSummary, Engine, Job, Prepared, Row, RunStatus, SingleRun, Table, run_job, run_jobs,
+};
+use crate::routine::SeedRange;
+use crate::run::RunError;
+use crate::session::Progress;
+use crate::stats::quantile;
+use crate::streams::Phase;
+
+/// How the runs are made.
+pub(super) struct Many<'a> {
+    pub prepared: &'a Prepared,
+    /// Runs have their folders in here.
+    pub folder: &'a Path,
+    pub keep: bool,
+    pub threads: Option<u16>,
+    pub stop: &'a AtomicBool,
+}
+
+/// Runs the jobs; `false` when it was stopped before the last one.
+pub(super) fn run_many(
+    many: &Many<'_>,
+    jobs: &[Job],
+    on_row: &mut (dyn FnMut(Row) -> Result<(), CampaignError> + Send),
+) -> Result<bool> {
+    let single = SingleRun { prepared: many.prepared, folder: many.folder, keep: many.keep, exit_code: &exit_code };
+    let engine = Engine {
+        threads: many.threads.map(usize::from),
+        stop: many.stop,
+        n_figures: many.prepared.columns.names().len(),
+        panic_exit_code: Exit::Failure.code(),
+    };
+    let result = run_jobs(&engine, jobs, &|job| run_job(&single, job, &mut Unwatched(Instant::now())), on_row);
+    if !many.keep {
+        // Empty but for what a killed campaign left; it does no harm where it cannot be removed.
+        let _ = std::fs::remove_dir_all(many.folder);
+    }
+    Ok(result?)
+}
+
+/// What `armcal run` exits with.
+fn exit_code(result: Result<bool, &RunError>) -> u8 {
+    result.map_or_else(|error| of_cause(error), of_good).code()
+}
+
+/// The worst that happened to any row.
+pub(super) fn exit_of(summary: &CampaignSummary) -> Exit {
+    let any = |of: fn(&crate::campaign::SettingStatistics) -> usize| summary.settings.iter().any(|s| of(s) > 0);
+    if any(|s| s.failed) {
+        Exit::Failure
+    } else if any(|s| s.refused + s.missed) {
+        Exit::Refused
+    } else {
+        Exit::Ok
+    }
+}
+
+/// The seeds asked for, or else the routine's.
+pub(super) fn range_of(asked: Option<SeedRange>, prepared: &Prepared) -> Result<SeedRange> {
+    let problem = || {
+        let file = prepared.routine.file.display();
+        UsageError(format!("which seeds? Give --seeds A..B, or seeds in [campaign] of {file}"))
+    };
+    Ok(asked.or(prepared.routine.campaign.seeds).ok_or_else(problem)?)
+}
+
+/// Tables are .csv: the other files' names come from it.
+pub(super) fn check_name(out: &Path) -> Result<()> {
+    if out.extension().is_some_and(|extension| extension == "csv") {
+        return files::make_folder(files::parent(out)).map_err(Into::into);
+    }
+    Err(UsageError(format!("{}: the name of a table must end in .csv", out.display())).into())
+}
+
+/// A flag that Ctrl-C or a polite kill sets; the second time the program ends at once.
+pub(super) fn interrupts() -> Result<Arc<AtomicBool>> {
+    let stop = Arc::new(AtomicBool::new(false));
+    for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
+        let code = i32::from(Exit::Failure.code());
+        signal_hook::flag::register_conditional_shutdown(signal, code, Arc::clone(&stop))
+            .and_then(|_| signal_hook::flag::register(signal, Arc::clone(&stop)))
+            .context("Ctrl-C cannot be watched")?;
+    }
+    Ok(stop)
+}
+
+/// A clock alone: nobody watches a single run of many.
+struct Unwatched(Instant);
+
+impl Progress for Unwatched {
+    fn update(&mut self, _: Phase, _: usize, _: usize, _: f64) {}
+
+    fn wall_s(&self) -> f64 {
+        self.0.elapsed().as_secs_f64()
+    }
+}
+
+/// One line on stderr: how many runs are over, how many failed, the median so far.
+pub(super) struct CampaignBar {
+    bar: ProgressBar,
+    tool_error: Option<usize>,
+    tool_errors_m: Vec<f64>,
+    failed: usize,
+    refused: usize,
+}
+
+impl CampaignBar {
+    /// `before`: rows that are there already.
+    pub fn new(prepared: &Prepared, before: &Table, n_jobs: usize) -> Self {
+        let bar = ProgressBar::new(n_jobs as u64);
+        if let Ok(style) = ProgressStyle::with_template("{elapsed_precise} {msg} {wide_bar} {pos}/{len}, {eta} left") {
+            bar.set_style(style);
+        }
+        let tool_error = prepared.columns.names().iter().position(|name| name == "tool_error_after_median_m");
+        let mut made = Self { bar, tool_error, tool_errors_m: Vec::new(), failed: 0, refused: 0 };
+        for row in &before.rows {
+            made.count(row);
+        }
+        made
+    }
+
+    fn count(&mut self, row: &Row) {
+        self.failed += usize::from(row.status == RunStatus::Failed);
+        self.refused += usize::from(matches!(row.status, RunStatus::Refused | RunStatus::Missed));
+        self.tool_errors_m.extend(self.tool_error.and_then(|place| row.figures.get(place).copied().flatten()));
+    }
+
+    pub fn add(&mut self, row: &Row) {
+        self.count(row);
+        let median =
+            quantile(&self.tool_errors_m, 0.5).map_or_else(|| "-".to_owned(), |m| format!("{:.2} mm", m * 1e3));
+        let (failed, refused) = (self.failed, self.refused);
+        self.bar.set_message(format!("tool error {median} (median), {refused} refused or missed, {failed} failed"));
+        self.bar.inc(1);
+    }
+
+    pub fn finish(&self) {
+        self.bar.finish_and_clear();
+    }
+}

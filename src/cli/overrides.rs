@@ -1,0 +1,26 @@
+//! Options that replace parts of a routine; the same for every command that runs one.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use crate::routine::{Override, Overrides};
+
+#[derive(Clone, Debug, Default, Args)]
+pub(super) struct OverrideArgs {
+    /// Replace a key of the routine, as world.camera.corner_noise_px=0.45; may be given many times
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<Override>,
+    /// Folder of another robot than the routine's
+    #[arg(long, value_name = "DIR")]
+    robot: Option<PathBuf>,
+    /// Another vehicle file than the routine's
+    #[arg(long, value_name = "FILE")]
+    vehicle: Option<PathBuf>,
+}
+
+impl OverrideArgs {
+    pub fn overrides(&self) -> Overrides {
+        Overrides { set: self.set.clone(), robot: self.robot.clone(), vehicle: self.vehicle.clone() }
+    }
+}
