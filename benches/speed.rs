@@ -72,7 +72,9 @@ fn calibration(c: &mut Criterion) {
     c.bench_function("sum of distances, 40 x 6", |b| {
         b.iter(|| problem.sum_of_distances_m(black_box(&JointParameters::default())));
     });
-    c.bench_function("minimum distance by BOBYQA, 40 x 6", |b| b.iter(|| minimum_distance(black_box(&problem), &free)));
+    c.bench_function("minimum distance by BOBYQA, 40 x 6", |b| {
+        b.iter(|| minimum_distance(black_box(&problem), &free, &JointParameters::default()))
+    });
 }
 
 fn planning(c: &mut Criterion) {
@@ -81,8 +83,18 @@ fn planning(c: &mut Criterion) {
     let clearance = ClearanceModel::new(&robot, &vehicle, &scene);
     let bounds = JointErrorBounds::prior(&robot);
     c.bench_function("clearance of one arm", |b| b.iter(|| clearance.nearest(black_box(&robot.stowed))));
-    c.bench_function("clearance of every arm within the bounds", |b| {
-        b.iter(|| clearance.nearest_under(black_box(&robot.stowed), &bounds, 0.05));
+    let mut rng = stream_rng(1, "bench poses");
+    let poses: Vec<JointAngles> = (0..256).map(|_| random_angles(&robot, &mut rng)).collect();
+    c.bench_function("256 poses, clear for every arm within the bounds?", |b| {
+        b.iter(|| poses.iter().filter(|at| clearance.too_near(at, black_box(&bounds), 0.05).is_none()).count());
+    });
+    c.bench_function("256 edges, clear for every arm within the bounds?", |b| {
+        b.iter(|| {
+            let is_clear = |edge: &&[JointAngles]| {
+                clearance.too_near_between(&edge[0], &edge[1], black_box(&bounds), 0.05).is_none()
+            };
+            poses.windows(2).filter(is_clear).count()
+        });
     });
 }
 

@@ -1,8 +1,11 @@
 //! The program from outside: exit codes, messages, and no panic whatever it is given.
 
+mod campaigns;
 mod inputs;
+mod inspect;
 mod recordings;
 mod situations;
+mod small;
 
 use crate::support::{answer, calibrate, program, robot_folder, run, shared_run, temp, write};
 

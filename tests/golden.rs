@@ -1,11 +1,11 @@
-//! Figures that others published: the paper's kinematics of the arm and its maker's datasheet.
+//! Figures that others published: the paper's kinematics of the Titan 4, and the makers' datasheets of both arms.
 
 use armcal::kinematics::LinkPoses;
-use armcal::robot::Robot;
+use armcal::robot::{Robot, load};
 use armcal::streams::JointAngles;
 use nalgebra::Vector3;
 
-use crate::support::titan;
+use crate::support::{root, titan};
 
 /// m. The published origins have four digits.
 const PUBLISHED_ORIGIN_M: f64 = 6e-5;
@@ -100,6 +100,59 @@ fn joint_ranges_and_weight_are_the_datasheets() {
 #[test]
 fn the_last_joint_does_not_move_the_tool_point() {
     let robot = titan();
+    let poses = robot.chain.link_poses(&robot.stowed);
+    assert!(poses.point_jacobian(5, &tool_m(&robot, &poses)).norm() < 1e-12);
+    assert_eq!(robot.camera.mount.n_joints, 5, "the camera hangs before the last joint");
+}
+
+fn kraft() -> Robot {
+    load(&root().join("robots/kraft-predator")).expect("the robot reads")
+}
+
+/// Datasheet: 875, 566, 121 and 359 mm from axis to axis to tip, 2013 mm of reach; the arm is straight at zero.
+#[test]
+fn the_second_arm_has_the_lengths_and_the_reach_of_its_datasheet() {
+    /// m. Sums of three-digit figures.
+    const TOLERANCE_M: f64 = 1e-9;
+    let robot = kraft();
+    let zero = JointAngles::zeros(6);
+    let poses = robot.chain.link_poses(&zero);
+    let tool = tool_m(&robot, &poses);
+    let axes: Vec<Vector3<f64>> = (1..5).map(|joint| *poses.joint_origin(joint)).collect();
+    let lengths = [axes[1] - axes[0], axes[2] - axes[1], axes[3] - axes[2], tool - axes[3]].map(|d| d.norm());
+    for (length_m, published_m) in lengths.iter().zip([0.875, 0.566, 0.121, 0.359]) {
+        assert!((length_m - published_m).abs() < TOLERANCE_M, "{lengths:?}");
+    }
+    let within =
+        robot.chain.joints().iter().all(|j| j.limits.is_some_and(|l| l.lower_rad <= 0.0 && l.upper_rad >= 0.0));
+    assert!(within, "the straight arm is one that its joints allow");
+    assert!((tool.norm() - 2.013).abs() < TOLERANCE_M, "{}", tool.norm());
+    for start in [[0.3; 6], [1.0, 0.5, -1.5, 1.0, -1.0, 0.0]] {
+        let largest = largest_reach_from(&robot, JointAngles::from_slice(&start));
+        eprintln!("reach {largest:.6} m");
+        // It ends within micrometres of a maximum, and never above it.
+        assert!((largest - 2.013).abs() < 1e-5, "{largest}");
+    }
+}
+
+#[test]
+fn the_second_arms_ranges_and_weights_are_its_datasheets() {
+    let robot = kraft();
+    let ranges = robot.chain.joints().iter().map(|j| j.limits.map(|l| (l.upper_rad - l.lower_rad).to_degrees()));
+    let ranges: Vec<Option<f64>> = ranges.collect();
+    for (found, published) in ranges.iter().zip([270.0, 120.0, 125.0, 200.0, 200.0, 340.0]) {
+        assert!(found.is_some_and(|range| (range - published).abs() < 1e-3), "{ranges:?}");
+    }
+    let mass_kg: f64 = robot.bodies.iter().map(|body| body.mass_kg).sum();
+    assert!((mass_kg - 80.0).abs() < 1e-9, "{mass_kg} kg");
+    assert!((mass_kg * (1.0 - robot.buoyancy_fraction) - 51.0).abs() < 1e-9, "in sea water");
+    assert_eq!(titan().buoyancy_fraction, 0.22, "78 of 100 kg");
+    // The flange of either arm is bolted on 0.325 m below its base frame.
+    for robot in [kraft(), titan()] {
+        let base = &robot.bodies[0].collisions[0];
+        let lowest_m = base.owner_from_shape.translation.z - 0.5 * base.shape.box_m()[2];
+        assert!((lowest_m + 0.325).abs() < 1e-9, "{}: {lowest_m}", robot.name);
+    }
     let poses = robot.chain.link_poses(&robot.stowed);
     assert!(poses.point_jacobian(5, &tool_m(&robot, &poses)).norm() < 1e-12);
     assert_eq!(robot.camera.mount.n_joints, 5, "the camera hangs before the last joint");

@@ -10,6 +10,19 @@ use serde::de::DeserializeOwned;
 
 use crate::support::{root, titan};
 
+/// The robots and the files that Pinocchio made of them.
+const ARMS: [(&str, &str); 2] = [("titan4", "kinematics.json"), ("kraft-predator", "kinematics-kraft-predator.json")];
+
+fn arms() -> impl Iterator<Item = (armcal::robot::Robot, Kinematics)> {
+    ARMS.into_iter().map(|(name, file)| {
+        let robot = armcal::robot::load(&root().join("robots").join(name)).expect("the robot reads");
+        let file: Kinematics = golden(file);
+        assert_eq!(file.joint_names, robot.joint_names());
+        assert!(file.cases.len() >= 50);
+        (robot, file)
+    })
+}
+
 fn golden<T: DeserializeOwned>(name: &str) -> T {
     let path = root().join("tests/golden").join(name);
     let text = std::fs::read_to_string(&path).expect("a golden file");
@@ -54,43 +67,41 @@ const KINEMATICS_TOLERANCE: f64 = 1e-9;
 
 #[test]
 fn poses_are_those_of_pinocchio() {
-    let robot = titan();
-    let file: Kinematics = golden("kinematics.json");
-    assert_eq!(file.joint_names, robot.joint_names());
-    assert!(file.cases.len() >= 50);
-    let mut worst: f64 = 0.0;
-    for case in &file.cases {
-        let poses = robot.chain.link_poses(&JointAngles::from_slice(&case.joint_angles_rad));
-        for (body, link) in robot.bodies.iter().enumerate() {
-            worst = worst.max(case.base_from_link[&link.name].difference(poses.link(body)));
+    for (robot, file) in arms() {
+        let mut worst: f64 = 0.0;
+        for case in &file.cases {
+            let poses = robot.chain.link_poses(&JointAngles::from_slice(&case.joint_angles_rad));
+            for (body, link) in robot.bodies.iter().enumerate() {
+                worst = worst.max(case.base_from_link[&link.name].difference(poses.link(body)));
+            }
+            worst = worst.max(case.base_from_camera.difference(&poses.frame(&robot.camera.mount)));
+            let tool_m = poses.frame(&robot.tool.mount).translation.vector;
+            worst = worst.max((tool_m - Vector3::from(case.tool_point_in_base_m)).amax());
         }
-        worst = worst.max(case.base_from_camera.difference(&poses.frame(&robot.camera.mount)));
-        let tool_m = poses.frame(&robot.tool.mount).translation.vector;
-        worst = worst.max((tool_m - Vector3::from(case.tool_point_in_base_m)).amax());
+        assert_eq!(robot.bodies.last().map(|body| body.name.as_str()), Some(file.tool_link.as_str()));
+        eprintln!("{}: largest difference from Pinocchio {worst:.1e}", robot.name);
+        assert!(worst < KINEMATICS_TOLERANCE, "{}: {worst}", robot.name);
     }
-    assert_eq!(robot.bodies.last().map(|body| body.name.as_str()), Some(file.tool_link.as_str()));
-    eprintln!("largest difference from Pinocchio {worst:.1e}");
-    assert!(worst < KINEMATICS_TOLERANCE, "{worst}");
 }
 
 #[test]
 fn jacobians_are_those_of_pinocchio() {
-    let robot = titan();
-    let file: Kinematics = golden("kinematics.json");
-    let mut worst: f64 = 0.0;
-    for case in &file.cases {
-        let poses = robot.chain.link_poses(&JointAngles::from_slice(&case.joint_angles_rad));
-        let tool_m = poses.frame(&robot.tool.mount).translation.vector;
-        for joint in 0..robot.n_joints() {
-            let (linear, angular) = (poses.point_jacobian(joint, &tool_m), poses.axis(joint));
-            let golden = |row: usize| case.tool_point_jacobian_rows[row][joint];
-            for row in 0..3 {
-                worst = worst.max((linear[row] - golden(row)).abs()).max((angular[row] - golden(row + 3)).abs());
+    for (robot, file) in arms() {
+        let mut worst: f64 = 0.0;
+        for case in &file.cases {
+            let poses = robot.chain.link_poses(&JointAngles::from_slice(&case.joint_angles_rad));
+            let tool_m = poses.frame(&robot.tool.mount).translation.vector;
+            for joint in 0..robot.n_joints() {
+                let (linear, angular) = (poses.point_jacobian(joint, &tool_m), poses.axis(joint));
+                let golden = |row: usize| case.tool_point_jacobian_rows[row][joint];
+                for row in 0..3 {
+                    worst = worst.max((linear[row] - golden(row)).abs()).max((angular[row] - golden(row + 3)).abs());
+                }
             }
         }
+        eprintln!("{}: largest difference from Pinocchio {worst:.1e} m/rad", robot.name);
+        assert!(worst < KINEMATICS_TOLERANCE, "{}: {worst}", robot.name);
     }
-    eprintln!("largest difference from Pinocchio {worst:.1e} m/rad");
-    assert!(worst < KINEMATICS_TOLERANCE, "{worst}");
 }
 
 #[derive(Deserialize)]

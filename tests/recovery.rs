@@ -1,11 +1,11 @@
 //! Known sensor errors go in; the estimator gets them back, and knows how well.
 
-use armcal::calib::{Calibration, Status, calibrate};
-use armcal::log::{RecordingHeader, RecordingWriter, read_recording};
+use armcal::calib::{Calibration, Status, associate, calibrate, identify_scales};
+use armcal::log::{Recording, RecordingHeader, RecordingWriter, read_recording};
 use armcal::robot::Robot;
 use armcal::routine::Method;
 use armcal::stats::{quantile, stream_rng};
-use armcal::streams::{CaptureSet, JointAngles, Sink};
+use armcal::streams::{CaptureSet, JointAngles, MarkKind, Message, Sink};
 use nalgebra::{DMatrix, Vector3};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -241,4 +241,75 @@ fn too_few_views_are_refused_with_a_reason() {
     let refused = calibrated(&arm, &few);
     assert_eq!(refused.status, Status::Refused);
     assert!(refused.refusal.as_ref().is_some_and(|why| why.contains("too few")), "{:?}", refused.refusal);
+}
+
+/// Views in which only one joint moves, of an arm whose other joints are wrong, too.
+fn identify_messages(arm: &TrueArm, joint: usize, rng: &mut ChaCha8Rng) -> Recording {
+    let swing = [0.0, 0.03, -0.03, -0.12, -0.09, -0.06, -0.03, 0.0, 0.03, 0.06, 0.09, 0.12];
+    let mut shots: Vec<Shot> = Vec::new();
+    for turn in swing {
+        let angles = JointAngles::from_fn(arm.robot.n_joints(), |j| {
+            arm.robot.stowed[j] + arm.offset_rad[j] + if j == joint { turn } else { 0.0 }
+        });
+        let seen = |idx: usize| Some((arm.robot.tags[idx].id, arm.corners(&angles, idx)?));
+        shots.push(Shot { set: CaptureSet::Fit, angles, tags: (0..arm.robot.tags.len()).filter_map(seen).collect() });
+    }
+    // Five frames a view.
+    add_noise(&mut shots, NOISE_PX / 5.0_f64.sqrt(), rng);
+    let mut recording = arm.recording(&shots);
+    for (_, message) in &mut recording.messages {
+        if let Message::Mark(mark) = message {
+            mark.kind = MarkKind::Identify { joint_idx: joint as u32 };
+        }
+    }
+    recording
+}
+
+/// The gain of one sensor is off by any factor and either sign; the other sensors, the camera and the tags are as wrong as
+/// their datasheets allow.
+#[test]
+fn an_unknown_scale_is_recovered_with_its_sign() {
+    let robot = titan();
+    let mut errors = Vec::new();
+    let mut n_within = 0;
+    for seed in SEEDS {
+        let mut rng = stream_rng(seed, "identify");
+        let mut arm = TrueArm::with_sensor_errors(&robot, &mut rng);
+        arm.misplace(&mut rng);
+        let joint = rng.random_range(0..N_SEEN);
+        let sign = if rng.random_range(0.0..1.0) < 0.5 { -1.0 } else { 1.0 };
+        arm.gain[joint] = sign * 4.0_f64.powf(rng.random_range(-1.0..1.0));
+        let recording = identify_messages(&arm, joint, &mut rng);
+        let (_, scales) = identify_scales(&associate(&recording, &robot), &robot).expect("measured");
+        let error = scales[0].ratio * arm.gain[joint] - 1.0;
+        n_within += usize::from(error.abs() < 2.0 * scales[0].relative_std);
+        errors.push(error.abs());
+    }
+    let (median, worst) = (median(&errors), errors.iter().copied().fold(0.0, f64::max));
+    let n = errors.len();
+    eprintln!("relative error of the scale: median {median:.5}, worst {worst:.5}; {n_within} of {n} within 2 sigma");
+    assert!(median < 0.004 && worst < 0.02, "{median} {worst}");
+    assert!(n_within * 100 >= n * 85, "{n_within} of {n}");
+}
+
+#[test]
+fn a_scale_that_the_views_do_not_tell_is_refused_by_name() {
+    let robot = titan();
+    let mut rng = stream_rng(1, "identify");
+    let arm = TrueArm::with_sensor_errors(&robot, &mut rng);
+    let mut recording = identify_messages(&arm, 2, &mut rng);
+    let first = recording.messages.iter().find_map(|(_, message)| match message {
+        Message::JointSensors(sample) => Some(sample.counts),
+        _ => None,
+    });
+    for (_, message) in &mut recording.messages {
+        if let Message::JointSensors(sample) = message {
+            sample.counts = first.expect("readings");
+        }
+    }
+    let error = identify_scales(&associate(&recording, &robot), &robot).expect_err("a stuck sensor").to_string();
+    assert!(error.contains("forearm_pitch") && error.contains("did not change"), "{error}");
+    let behind = identify_messages(&arm, 5, &mut rng);
+    let error = identify_scales(&associate(&behind, &robot), &robot).expect_err("behind the camera").to_string();
+    assert!(error.contains("wrist_rotate"), "{error}");
 }

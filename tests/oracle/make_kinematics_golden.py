@@ -1,4 +1,4 @@
-"""Link poses, tool point, camera and Jacobians of robots/titan4 by Pinocchio -> tests/golden/kinematics.json."""
+"""Link poses, tool point, camera and Jacobians of the robots by Pinocchio -> tests/golden/kinematics*.json."""
 
 import json
 import tomllib
@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio
 
 ROOT = Path(__file__).resolve().parents[2]
-ROBOT = ROOT / "robots" / "titan4"
+ROBOTS = {"titan4": "kinematics.json", "kraft-predator": "kinematics-kraft-predator.json"}
 N_RANDOM = 49
 SEED = 20240117
 
@@ -21,8 +21,14 @@ def pose(transform):
 
 
 def main():
-    robot = tomllib.loads((ROBOT / "robot.toml").read_text())
-    model = pinocchio.buildModelFromUrdf(str(ROBOT / robot["urdf"]))
+    for name, out in ROBOTS.items():
+        make(name, ROOT / "tests" / "golden" / out)
+
+
+def make(name, out):
+    folder = ROOT / "robots" / name
+    robot = tomllib.loads((folder / "robot.toml").read_text())
+    model = pinocchio.buildModelFromUrdf(str(folder / robot["urdf"]))
     tool_link = model.getFrameId(robot["tool"]["link"])
     tool_in_link = pinocchio.SE3(np.eye(3), np.array(robot["tool"]["point_m"]))
     parent = model.frames[tool_link].parentJoint
@@ -51,7 +57,7 @@ def main():
         cases.append(
             {
                 "joint_angles_rad": theta.tolist(),
-                "base_from_link": {name: pose(data.oMf[model.getFrameId(name)]) for name in links},
+                "base_from_link": {link: pose(data.oMf[model.getFrameId(link)]) for link in links},
                 "tool_point_in_base_m": data.oMf[tool_frame].translation.tolist(),
                 "base_from_camera": pose(data.oMf[model.getFrameId(robot["camera"]["link"])]),
                 "tool_point_jacobian_rows": jacobian.tolist(),
@@ -59,7 +65,7 @@ def main():
         )
 
     golden = {
-        "what": "Forward kinematics and geometric Jacobian of robots/titan4/titan4.urdf. Base frame throughout. Jacobian: 6 x n_joints, "
+        "what": f"Forward kinematics and geometric Jacobian of robots/{name}/{robot['urdf']}. Base frame throughout. Jacobian: 6 x n_joints, "
         "rows vx vy vz (m per rad) then wx wy wz (rad per rad), of the tool point, in axes parallel to the base frame.",
         "tool": "pinocchio",
         "tool_version": pinocchio.__version__,
@@ -69,7 +75,6 @@ def main():
         "tool_point_in_link_m": robot["tool"]["point_m"],
         "cases": cases,
     }
-    out = ROOT / "tests" / "golden" / "kinematics.json"
     out.write_text(dump(golden))
     print(f"{out.relative_to(ROOT)}: {len(cases)} joint vectors")
 

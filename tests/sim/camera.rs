@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use armcal::robot::{Part, PlacedShape, Shape};
+use armcal::robot::{Hull, Part, PlacedShape, Shape};
 use armcal::sim::WorldSpec;
 use armcal::streams::{Arm, Message};
 use nalgebra::Isometry3;
@@ -105,18 +105,23 @@ fn nothing_is_seen_through_an_obstacle() {
     spec.joint_sensors.gain_error_max = 0.0;
     spec.joint_sensors.offset_error_max_rad = 0.0;
     let mut free = Tape::default();
-    free.run(&mut site.world(spec, 3), 0.5);
+    free.run(&mut site.world(spec.clone(), 3), 0.5);
     assert!(last_tags(&free).len() >= 5, "{:?}", last_tags(&free));
 
     let base_from_camera = site.robot.chain.link_poses(&site.robot.stowed).frame(&site.robot.camera.mount);
     let world_from_camera = site.vehicle.vehicle_from_base.isometry() * base_from_camera;
-    let plate = PlacedShape {
-        owner_from_shape: world_from_camera * Isometry3::translation(0.0, 0.0, 0.1),
-        shape: Shape::Box { size_m: [2.0, 2.0, 0.01] },
-        color_rgb: [0; 3],
-    };
-    site.scene.obstacles.push(Part { name: "plate".into(), placed: plate });
-    let mut hidden = Tape::default();
-    hidden.run(&mut site.world(spec, 3), 0.5);
-    assert!(last_tags(&hidden).is_empty(), "{:?}", last_tags(&hidden));
+    // A box so large that the gripper is in it; and, of a mesh, a plate that fits between lens and gripper.
+    let corners = [-0.065, 0.065].map(|x| [-0.065, 0.065].map(|y| [-0.001, 0.001].map(|z| [x, y, z])));
+    let hull = Hull::new(corners.as_flattened().as_flattened()).expect("a plate");
+    for (shape, ahead_m) in [(Shape::Box { size_m: [2.0, 2.0, 0.01] }, 0.1), (Shape::Hull(hull), 0.02)] {
+        let plate = PlacedShape {
+            owner_from_shape: world_from_camera * Isometry3::translation(0.0, 0.0, ahead_m),
+            shape,
+            color_rgb: [0; 3],
+        };
+        site.scene.obstacles = vec![Part { name: "plate".into(), placed: plate }];
+        let mut hidden = Tape::default();
+        hidden.run(&mut site.world(spec.clone(), 3), 0.5);
+        assert!(last_tags(&hidden).is_empty(), "{:?}", last_tags(&hidden));
+    }
 }

@@ -1,6 +1,7 @@
 //! The simulated world from outside: what it answers, and what its truth says.
 
 mod camera;
+mod happenings;
 mod moves;
 mod streams;
 mod truth;

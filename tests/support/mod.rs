@@ -183,7 +183,7 @@ pub fn shared_run() -> &'static FinishedRun {
 }
 
 /// A folder that outlives the tests, for nothing is called when they end; those of an hour ago are removed.
-fn lasting_folder() -> PathBuf {
+pub fn lasting_folder() -> PathBuf {
     let parent = Path::new(env!("CARGO_TARGET_TMPDIR")).join("shared-runs");
     fs::create_dir_all(&parent).expect("a folder in the target directory");
     for entry in fs::read_dir(&parent).into_iter().flatten().flatten() {

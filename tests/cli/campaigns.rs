@@ -1,0 +1,200 @@
+//! Campaigns: one result on any number of threads, however often broken off; failures are rows.
+
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
+
+use crate::support::{Answer, ShortRoutine, answer, program, read, root, temp, write};
+
+/// Least runs: three views are too few, so the calibration is refused. With nine tags of eight nothing can be planned.
+const MATRIX: &str = "[world.physics]\ntruth_rate_hz = 5.0\n\
+    [campaign]\nseeds = \"1..3\"\n[campaign.matrix]\n\"capture.min_tags\" = [3, 9]\n";
+const RESULTS: [&str; 4] = ["c.csv", "c.parquet", "c-summary.json", "c-summary.md"];
+
+fn least(tail: &str) -> ShortRoutine {
+    let mut routine = ShortRoutine { poses: 3, held_out: 3, tail: tail.to_owned(), ..ShortRoutine::default() };
+    routine.targets_m.truncate(1);
+    routine
+}
+
+fn campaign(routine: &Path, out: &Path, more: &[&str]) -> Command {
+    let mut command = program();
+    command.arg("campaign").arg(routine).arg("--out").arg(out).args(more);
+    command
+}
+
+fn results(folder: &Path) -> [Vec<u8>; 4] {
+    RESULTS.map(|name| std::fs::read(folder.join(name)).expect("a result"))
+}
+
+/// Waits until the campaign has kept `n` rows; they follow two lines.
+fn wait_for_rows(partial: &Path, n: usize, child: &mut Child) {
+    for _ in 0..6000 {
+        let lines = std::fs::read(partial).unwrap_or_default().iter().filter(|byte| **byte == b'\n').count();
+        if lines >= 2 + n {
+            return;
+        }
+        assert!(child.try_wait().expect("a process").is_none(), "it ended with {lines} lines");
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    panic!("no {n} rows within a minute");
+}
+
+fn started(routine: &Path, out: &Path) -> Child {
+    let mut command = campaign(routine, out, &["--threads", "1"]);
+    command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("the program starts")
+}
+
+fn expect_left(answer: &Answer, there: usize, left: usize) {
+    let words = format!("{there} rows are there already; {left} runs are left");
+    answer.expect("continued", 1, &[&words]);
+}
+
+#[test]
+fn threads_interrupts_and_kills_leave_the_same_files() {
+    let folder = temp();
+    let routine = least(MATRIX).write(folder.path());
+    let whole = folder.path().join("whole");
+    let words = ["3 refused", "3 failed", "--seed 2 --set capture.min_tags=9", "no pose was found"];
+    answer(&mut campaign(&routine, &whole.join("c.csv"), &["--threads", "2"])).expect("two threads", 1, &words);
+    let rows = read(&whole.join("c.csv"));
+    assert_eq!(rows.lines().count(), 7, "{rows}");
+    assert_eq!(rows.matches(",refused,4,,3 views are too few").count(), 3, "{rows}");
+    assert_eq!(rows.matches(",failed,2,plan,").count(), 3, "{rows}");
+
+    let broken = folder.path().join("broken");
+    let out = broken.join("c.csv");
+    let partial = broken.join("c.csv.partial");
+    let mut child = started(&routine, &out);
+    wait_for_rows(&partial, 1, &mut child);
+    let interrupted = Command::new("kill").arg("-INT").arg(child.id().to_string()).status().expect("kill runs");
+    assert!(interrupted.success());
+    let ended = child.wait_with_output().expect("it ends");
+    let said = String::from_utf8_lossy(&ended.stderr).into_owned();
+    assert_eq!(ended.status.code(), Some(1), "{said}");
+    assert!(said.contains("goes on from there"), "{said}");
+    assert!(!out.exists());
+
+    let before = read(&partial).lines().count();
+    let mut child = started(&routine, &out);
+    wait_for_rows(&partial, before - 1, &mut child);
+    child.kill().expect("killed");
+    child.wait().expect("it ends");
+    // As if the kill had come in the middle of a line.
+    let mut torn = std::fs::read(&partial).expect("rows");
+    let there = torn.iter().filter(|byte| **byte == b'\n').count() - 2;
+    torn.extend(b"1,capture.min_ta");
+    std::fs::write(&partial, torn).expect("torn");
+
+    let finished = answer(&mut campaign(&routine, &out, &["--threads", "1"]));
+    expect_left(&finished, there, 6 - there);
+    assert!(results(&broken) == results(&whole), "files differ");
+    let mut left: Vec<_> = std::fs::read_dir(&broken).expect("a folder").flatten().map(|e| e.file_name()).collect();
+    left.sort();
+    assert_eq!(left.len(), RESULTS.len(), "{left:?}");
+
+    expect_left(&answer(&mut campaign(&routine, &out, &[])), 6, 0);
+    assert!(results(&broken) == results(&whole), "a second start changed something");
+    let other = answer(&mut campaign(&routine, &out, &["--set", "capture.poses=4"]));
+    other.expect("another campaign", 2, &["c.csv", "another campaign", "--fresh"]);
+    assert!(results(&broken) == results(&whole), "a refused start changed something");
+    merged_shards_are_the_whole(&rows, folder.path(), &whole);
+}
+
+/// Every second row in another file.
+fn merged_shards_are_the_whole(rows: &str, folder: &Path, whole: &Path) {
+    let (header, lines) = rows.split_once('\n').expect("lines");
+    let shard = |odd: usize| -> PathBuf {
+        let path = folder.join(format!("shard{odd}.csv"));
+        let lines = lines.lines().enumerate().filter(|(k, _)| k % 2 == odd).map(|(_, line)| format!("{line}\n"));
+        write(&path, &format!("{header}\n{}", lines.collect::<String>()));
+        path
+    };
+    let out = folder.join("merged/c.csv");
+    let mut merge = program();
+    merge.arg("campaign").arg("--out").arg(&out).arg("--merge").args([shard(1), shard(0)]);
+    answer(&mut merge).expect("merge", 1, &["3 refused", "3 failed"]);
+    assert_eq!(read(&out), rows);
+    assert!(results(out.parent().expect("a folder"))[1] == results(whole)[1], "the Parquet files differ");
+    write(&folder.join("shard0.csv"), "seed,error\n1,2\n");
+    answer(&mut merge).expect("no table", 2, &["shard0.csv", "columns"]);
+}
+
+#[test]
+fn wrong_campaigns_are_refused_before_anything_runs() {
+    let folder = temp();
+    let routine = least("").write(folder.path());
+    let out = folder.path().join("c.csv");
+    let with = |more: &[&str]| answer(&mut campaign(&routine, &out, more));
+    with(&[]).expect("no seeds", 2, &["--seeds", "short.toml"]);
+    with(&["--seeds", "3..1"]).expect("a range backwards", 2, &["3..1"]);
+    with(&["--seeds", "1", "--shard", "3/2"]).expect("no such shard", 2, &["3/2"]);
+    with(&["--seeds", "1", "--set", "capture.posess=3"]).expect("no such key", 2, &["short.toml", "posess"]);
+    with(&["--seeds", "1", "--set", "campaign.matrix.method=[\"best\"]"]).expect("a bad point", 2, &["method", "best"]);
+    with(&["--seeds", "1", "--merge", "a.csv"]).expect("both", 2, &["--merge"]);
+    let bad_name = answer(&mut campaign(&routine, &folder.path().join("c.txt"), &["--seeds", "1"]));
+    bad_name.expect("no csv", 2, &["c.txt", ".csv"]);
+    assert!(!out.exists() && !folder.path().join("c.csv.partial").exists());
+    answer(program().arg("regress").arg(&routine)).expect("no baseline", 2, &["--baseline"]);
+    let absent = folder.path().join("absent.csv");
+    answer(program().arg("regress").arg(&routine).arg("--baseline").arg(&absent)).expect("absent", 2, &["absent.csv"]);
+}
+
+#[test]
+fn overrides_pass_the_checks_of_the_file() {
+    let folder = temp();
+    let routine = least("").write(folder.path());
+    let refused: [(&[&str], &[&str]); 6] = [
+        (&["--set", "capture.posess=3"], &["short.toml", "--set capture.posess=3", "unknown field"]),
+        (&["--set", "capture.poses=2"], &["short.toml", "capture.poses", "3 .. 1000"]),
+        (&["--set", "capture.poses=many"], &["short.toml", "capture.poses=many"]),
+        (&["--set", "world.camera.corner_noise=1"], &["short.toml", "world.camera", "corner_noise"]),
+        (&["--set", "capture"], &["KEY=VALUE"]),
+        (&["--robot", "nowhere"], &["nowhere"]),
+    ];
+    for (options, words) in refused {
+        let mut run = program();
+        run.arg("run").arg(&routine).arg("--out").arg(folder.path().join("out")).args(options);
+        answer(&mut run).expect(options[1], 2, words);
+    }
+    let mut check = program();
+    check.arg("check").arg(&routine).args(["--set", "capture.poses=17", "--set", "world.camera.rate_hz=2"]);
+    answer(&mut check).expect("check", 0, &["17 poses"]);
+}
+
+/// The gate stands open for the same program, and shuts when the camera or the controller is worse.
+#[test]
+fn a_regression_is_found_and_none_is_found_where_none_is() {
+    let folder = temp();
+    let mut short = ShortRoutine { poses: 10, held_out: 3, ..ShortRoutine::default() };
+    short.targets_m.truncate(1);
+    let routine = short.write(folder.path());
+    let baseline = folder.path().join("baseline.csv");
+    let regress = |more: &[&str]| {
+        let mut command = program();
+        answer(command.arg("regress").arg(&routine).args(more).arg(&baseline))
+    };
+    regress(&["--seeds", "1..2", "--write-baseline"]).expect("baseline", 0, &["2 accepted"]);
+    regress(&["--baseline"]).expect("itself", 0, &["is the same", "not worse"]);
+    let noise = regress(&["--set", "world.camera.corner_noise_px=0.45", "--baseline"]);
+    noise.expect(
+        "noise",
+        4,
+        &["corner scatter", "x 1.49", "--seed 1 --set world.camera.corner_noise_px=0.45", "WORSE than"],
+    );
+    // 0.2 degrees.
+    let bias = regress(&["--set", "world.hydraulics.controller_bias_rad=0.0034907", "--baseline"]);
+    bias.expect("bias", 4, &["WORSE than", "--set world.hydraulics.controller_bias_rad=0.0034907"]);
+    regress(&["--seeds", "3", "--baseline"]).expect("no such seed", 2, &["baseline.csv", "seeds"]);
+}
+
+/// What the project itself is held against: the stored baseline, in small. The whole of it: `armcal regress
+/// routines/regression.toml --baseline routines/regression-baseline.csv`.
+#[test]
+fn the_routine_of_the_project_is_not_worse_than_its_baseline() {
+    let [routine, baseline] =
+        ["regression.toml", "regression-baseline.csv"].map(|name| root().join("routines").join(name));
+    let mut regress = program();
+    regress.arg("regress").arg(routine).arg("--baseline").arg(baseline).args(["--seeds", "1..2"]);
+    answer(&mut regress).expect("regress", 0, &["not worse", "miss at the target"]);
+}

@@ -1,0 +1,345 @@
+//! Runs that do not end well: killed, interrupted, out of disk, two at once. No recording is lost, and what lies in the
+//! folder never looks like what it is not.
+//!
+//! `ARMCAL_KILLS=50` makes the kill study longer than the three kills of every test run.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::sync::OnceLock;
+use std::time::{Duration, Instant};
+
+use armcal::log::read_recording;
+use armcal::report::inspection::{State, inspect as look};
+use armcal::stats::stream_rng;
+use armcal::streams::{MarkKind, Message};
+use rand::RngExt;
+
+use crate::support::{
+    Answer, FinishedRun, ShortRoutine, answer, calibrate, finished, program, robot_folder, run, temp,
+};
+
+const RESULTS: [&str; 6] = ["run.mcap", "truth.mcap", "run.rrd", "calibration.toml", "report.html", "summary.json"];
+
+/// A run that takes as little time as one can.
+fn quick() -> ShortRoutine {
+    let mut routine = ShortRoutine { poses: 12, held_out: 3, ..ShortRoutine::default() };
+    routine.targets_m.truncate(2);
+    routine
+}
+
+/// One such run to its end, and how long that took.
+fn reference() -> &'static (FinishedRun, Duration) {
+    static RUN: OnceLock<(FinishedRun, Duration)> = OnceLock::new();
+    RUN.get_or_init(|| {
+        let folder = crate::support::lasting_folder();
+        let began = Instant::now();
+        let run = finished(&quick(), &folder);
+        (run, began.elapsed())
+    })
+}
+
+fn start(routine: &Path, out: &Path) -> Child {
+    let mut command = program();
+    command.arg("run").arg(routine).arg("--out").arg(out);
+    command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the program starts")
+}
+
+fn end(child: Child) -> (Option<i32>, String) {
+    let output = child.wait_with_output().expect("it ends");
+    (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+}
+
+#[cfg(unix)]
+fn signal(child: &Child, name: &str) {
+    let status = Command::new("kill").arg(format!("-{name}")).arg(child.id().to_string()).status();
+    assert!(status.expect("kill").success());
+}
+
+fn names(folder: &Path) -> Vec<String> {
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    let mut names: Vec<String> = entries.map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
+    names.sort();
+    names
+}
+
+fn inspect(recording: &Path) -> Answer {
+    answer(program().arg("inspect").arg(recording))
+}
+
+/// Waits until the arm has moved for a while: the recording has grown beyond what is written before it moves.
+fn wait_until_it_moves(child: &mut Child, partial: &Path) {
+    let began = Instant::now();
+    while fs::metadata(partial).map_or(0, |file| file.len()) < 100_000 {
+        assert!(child.try_wait().expect("a state").is_none(), "the run ended before it moved");
+        assert!(began.elapsed() < Duration::from_secs(300), "the arm never moved");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+}
+
+#[derive(Debug, Default, PartialEq)]
+struct Tally {
+    kills: u32,
+    /// Killed before the recording was made.
+    no_file: u32,
+    /// The file was made, with nothing in it yet.
+    empty: u32,
+    /// Cut, and read to the last completed chunk.
+    readable: u32,
+    /// The run had ended before the kill came.
+    ended: u32,
+    /// Of the readable ones, those that calibrate.
+    calibrated: u32,
+}
+
+/// Looks at what a kill left in `out`, where an earlier run's results lay.
+fn look_at_leftover(out: &Path, earlier: &[(&str, Vec<u8>)], whole: &[u8], tally: &mut Tally) {
+    let partial = out.join("run.mcap.partial");
+    let is_old = |(name, bytes): &(&str, Vec<u8>)| fs::read(out.join(name)).is_ok_and(|found| found == *bytes);
+    let has_summary = out.join("summary.json").exists();
+    if !partial.exists() && fs::read(out.join("run.mcap")).is_ok_and(|found| found == whole) {
+        tally.ended += 1;
+        assert_eq!(inspect(&out.join("run.mcap")).code, 0);
+        return;
+    }
+    // Results of the earlier run are untouched, or the summary that vouches for them is gone.
+    assert!(!has_summary || earlier.iter().all(is_old), "{:?}", names(out));
+    let Ok(left) = fs::read(&partial) else {
+        tally.no_file += 1;
+        return;
+    };
+    assert!(whole.starts_with(&left), "what is left is the beginning of the whole recording");
+    if left.is_empty() {
+        tally.empty += 1;
+        return;
+    }
+    // A run that was killed while it wrote its results has a finished recording.
+    let (code, state) = if left == whole { (0, "state        whole") } else { (3, "state        cut") };
+    inspect(&partial).expect("a leftover", code, &[state]);
+    tally.readable += 1;
+    let found = look(&partial, Some(&crate::support::titan())).expect("it reads");
+    if found.determined.expect("a robot").missing.is_empty() {
+        calibrate(&partial, &robot_folder(), &out.join("calibrated")).expect(
+            "a leftover with views",
+            code,
+            &["ACCEPTED"],
+        );
+        tally.calibrated += 1;
+    }
+}
+
+/// kill -9 at random moments of a run.
+#[test]
+fn a_killed_run_leaves_a_readable_recording() {
+    let kills: u32 = std::env::var("ARMCAL_KILLS").ok().and_then(|n| n.parse().ok()).unwrap_or(3);
+    let (reference, took) = reference();
+    let whole = reference.bytes("run.mcap");
+    let earlier: Vec<(&str, Vec<u8>)> =
+        RESULTS.iter().map(|name| (*name, format!("earlier {name}").into_bytes())).collect();
+    let mut rng = stream_rng(1, "kills");
+    let mut tally = Tally::default();
+    for kill in 0..kills {
+        let folder = temp();
+        let out = folder.path().join("out");
+        fs::create_dir_all(&out).expect("a folder");
+        for (name, bytes) in &earlier {
+            fs::write(out.join(name), bytes).expect("written");
+        }
+        let mut child = start(&reference.routine, &out);
+        // The first in the first moments, the others anywhere.
+        let share = if kill == 0 { 0.02 } else { rng.random_range(0.0..1.0) };
+        std::thread::sleep(took.mul_f64(share));
+        child.kill().expect("killed");
+        child.wait().expect("gone");
+        tally.kills += 1;
+        look_at_leftover(&out, &earlier, &whole, &mut tally);
+    }
+    eprintln!("{tally:?}");
+    assert_eq!(tally.no_file + tally.empty + tally.readable + tally.ended, kills, "{tally:?}");
+}
+
+/// The next run into the folder keeps what the killed one left.
+#[cfg(unix)]
+#[test]
+fn the_run_after_a_killed_one_keeps_its_recording() {
+    let folder = temp();
+    let routine = quick().write(folder.path());
+    let out = folder.path().join("out");
+    let partial = out.join("run.mcap.partial");
+    let mut first = start(&routine, &out);
+    wait_until_it_moves(&mut first, &partial);
+
+    // Meanwhile nobody else may write there.
+    run(&routine, &out).expect("two runs at once", 1, &["another run", "--out"]);
+    first.kill().expect("killed");
+    first.wait().expect("gone");
+    let left = fs::read(&partial).expect("left");
+
+    let mut second = start(&routine, &out);
+    while !out.join("truth-cut-1.mcap").exists() {
+        assert!(second.try_wait().expect("a state").is_none(), "the run ended");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    wait_until_it_moves(&mut second, &partial);
+    assert!(fs::read(out.join("run-cut-1.mcap")).expect("kept") == left);
+    assert!(out.join("truth-cut-1.mcap").exists());
+    signal(&second, "INT");
+    let (code, said) = end(second);
+    assert_eq!(code, Some(1), "{said}");
+    assert!(said.contains("run-cut-1.mcap"), "{said}");
+    assert!(said.contains("stopped on request") && said.contains("run-cut-2.mcap"), "{said}");
+    assert_eq!(names(&out), ["run-cut-1.mcap", "run-cut-2.mcap", "truth-cut-1.mcap", "truth-cut-2.mcap"]);
+    check_interrupted(&out.join("run-cut-2.mcap"));
+    inspect(&out.join("truth-cut-2.mcap")).expect("the truth", 0, &["state        whole"]);
+}
+
+/// Finished properly: whole, and the last word is that the arm was told to hold.
+fn check_interrupted(path: &Path) {
+    inspect(path).expect("interrupted", 0, &["state        whole"]);
+    let recording = read_recording(path).expect("it reads");
+    let mut last = recording.messages.iter().rev().map(|(_, message)| message);
+    assert!(matches!(last.next(), Some(Message::Log(line)) if line.text.contains("holds its last set-point")));
+    let commands: Vec<_> = recording
+        .messages
+        .iter()
+        .rev()
+        .filter_map(|(_, m)| if let Message::JointCommand(command) = m { Some(command.counts) } else { None })
+        .take(2)
+        .collect();
+    let moved: f64 = commands[0].iter().zip(commands[1].iter()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    assert!(moved < 500.0, "the set-point does not jump: {moved} counts");
+}
+
+#[cfg(unix)]
+#[test]
+fn sigterm_stops_a_run_and_a_second_signal_ends_it_at_once() {
+    let folder = temp();
+    let routine = quick().write(folder.path());
+    let out = folder.path().join("out");
+    let mut child = start(&routine, &out);
+    wait_until_it_moves(&mut child, &out.join("run.mcap.partial"));
+    signal(&child, "TERM");
+    let (code, said) = end(child);
+    assert_eq!(code, Some(1), "{said}");
+    check_interrupted(&out.join("run-cut-1.mcap"));
+
+    // While it plans the first signal waits; the second does not.
+    let out = folder.path().join("twice");
+    let mut child = start(&routine, &out);
+    while !out.join("run.mcap.partial").exists() {
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    signal(&child, "INT");
+    std::thread::sleep(Duration::from_millis(50));
+    if child.try_wait().expect("a state").is_none() {
+        signal(&child, "INT");
+    }
+    let (code, said) = end(child);
+    assert!(matches!(code, Some(1 | 130)), "{code:?} {said}");
+}
+
+/// A limit on the size of files stands for the full disk: it needs no rights.
+#[cfg(unix)]
+#[test]
+fn a_full_disk_is_told_and_costs_nothing_that_was_there() {
+    let (reference, _) = reference();
+    let folder = temp();
+    for (limit, is_early) in [(0, true), (200, false), (3000, false)] {
+        let out = folder.path().join(format!("out{limit}"));
+        fs::create_dir_all(&out).expect("a folder");
+        for name in RESULTS {
+            fs::write(out.join(name), "earlier").expect("written");
+        }
+        let mut shell = Command::new("sh");
+        let line = format!("ulimit -f {limit}; exec \"$0\" run \"$1\" --out \"$2\"");
+        shell.arg("-c").arg(line).arg(env!("CARGO_BIN_EXE_armcal")).arg(&reference.routine).arg(&out);
+        let said = answer(&mut shell);
+        assert_eq!(said.code, 1, "limit {limit}: {said:#?}");
+        assert!(said.stderr.contains(".partial: cannot be written"), "limit {limit}: {said:#?}");
+        for name in RESULTS {
+            assert_eq!(fs::read(out.join(name)).expect("there"), b"earlier", "limit {limit}: {name}");
+        }
+        assert!(names(&out).iter().all(|name| !name.ends_with(".partial")), "{:?}", names(&out));
+        let kept: PathBuf = out.join("run-cut-1.mcap");
+        assert_eq!(kept.exists(), !is_early, "limit {limit}: {said:#?}");
+        if !is_early {
+            let found = look(&kept, None).expect("it reads");
+            assert!(found.messages > 500, "limit {limit}: {} messages", found.messages);
+            assert!(limit < 3000 || found.arm.views_fit > 0, "limit {limit}: no view");
+            assert!(found.completeness.state != State::Damaged, "limit {limit}: {:?}", found.completeness);
+        }
+    }
+}
+
+#[test]
+fn a_run_into_a_used_folder_leaves_its_own_files_alone() {
+    let (reference, _) = reference();
+    let folder = temp();
+    for name in ["summary.json", "run.rrd", "notes.txt"] {
+        fs::write(folder.path().join(name), "earlier").expect("written");
+    }
+    run(&reference.routine, folder.path()).expect("a run", 0, &["ACCEPTED"]);
+    let mut expected: Vec<String> = RESULTS.iter().map(|name| (*name).to_owned()).collect();
+    expected.push("notes.txt".to_owned());
+    expected.sort();
+    assert_eq!(names(folder.path()), expected);
+    for name in ["run.mcap", "truth.mcap", "calibration.toml"] {
+        assert!(fs::read(folder.path().join(name)).expect("there") == reference.bytes(name), "{name}");
+    }
+}
+
+/// Refused before anything moves, and nothing is left.
+#[test]
+fn an_output_that_cannot_take_a_run_is_refused_at_once() {
+    let (reference, took) = reference();
+    let folder = temp();
+    let file = folder.path().join("file");
+    fs::write(&file, "in the way").expect("written");
+    let out = folder.path().join("out");
+    fs::create_dir_all(out.join("summary.json")).expect("a folder in the way");
+    let mut cases = vec![(file, "cannot be made"), (out.clone(), "summary.json: cannot be put in place")];
+    if cfg!(target_os = "linux") {
+        // Nobody can make files there, not even root.
+        cases.push((PathBuf::from("/proc/self"), "cannot write into this folder"));
+    }
+    for (out, words) in cases {
+        let began = Instant::now();
+        let said = run(&reference.routine, &out);
+        said.expect("refused", 1, &[words, out.to_str().expect("UTF-8")]);
+        assert!(began.elapsed() < took.mul_f64(0.5), "before anything is simulated");
+    }
+    assert_eq!(names(&out), ["summary.json"]);
+}
+
+/// No more than two seconds of the arm's time are in memory alone, and a captured view is on disk at once.
+#[test]
+fn chunks_are_short_and_end_with_captured_views() {
+    let (reference, _) = reference();
+    let bytes = reference.bytes("run.mcap");
+    let recording = read_recording(reference.file("run.mcap")).expect("it reads");
+    let marks: Vec<_> = recording
+        .messages
+        .iter()
+        .filter_map(|(at, m)| match m {
+            Message::Mark(mark) if !matches!(mark.kind, MarkKind::Phase(_)) => Some(*at),
+            _ => None,
+        })
+        .collect();
+    let (mut at, mut ends, mut longest_s, mut largest) = (8, Vec::new(), 0.0_f64, 0);
+    while at + 9 <= bytes.len() - 8 {
+        let len = 9 + u64::from_le_bytes(bytes[at + 1..at + 9].try_into().expect("8 bytes")) as usize;
+        if bytes[at] == 6 {
+            let time =
+                |field: usize| u64::from_le_bytes(bytes[at + field..at + field + 8].try_into().expect("8 bytes"));
+            longest_s = longest_s.max((time(17) - time(9)) as f64 * 1e-9);
+            largest = largest.max(len);
+            ends.push(time(17));
+        }
+        at += len;
+    }
+    eprintln!("{} chunks, at most {longest_s:.2} s and {largest} bytes", ends.len());
+    assert!(longest_s <= 2.01, "{longest_s} s");
+    for mark in &marks {
+        assert!(ends.contains(&(mark.nanos as u64)), "a view is on disk when it is marked");
+    }
+}

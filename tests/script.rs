@@ -1,0 +1,161 @@
+//! Routines as scripts: steps in order, the world going on meanwhile, and the recording as the only thing belief has.
+
+use armcal::calib::Calibration;
+use armcal::sim::truth::read_truth;
+
+use crate::support::{ShortRoutine, answer, calibrate, edit, finished, program, read, robot_folder, temp};
+
+const CAPTURE: &str = "[[step]]\ndo = \"capture\"\nposes = 11\nheld_out = 3\n";
+const REACH: &str = "[[step]]\ndo = \"reach\"\ntargets = [0, 2]\n";
+const CALIBRATE: &str = "[[step]]\ndo = \"calibrate\"\n";
+/// Found in no drawing, so that it can be looked for in the recording.
+const JUMP_RAD: f64 = 0.061_803_398_875;
+
+fn jump() -> String {
+    format!("[[step]]\ndo = \"fault\"\nkind = \"sensor_jump\"\njoint = \"wrist_pitch\"\nby_rad = {JUMP_RAD}\n")
+}
+
+fn routine(steps: &[&str]) -> ShortRoutine {
+    ShortRoutine { tail: steps.concat(), ..ShortRoutine::default() }
+}
+
+#[track_caller]
+fn same_from_the_recording_alone(run: &crate::support::FinishedRun) {
+    let out = temp();
+    calibrate(&run.file("run.mcap"), &robot_folder(), out.path()).expect("from the recording", 0, &["ACCEPTED"]);
+    assert!(read(&out.path().join("calibration.toml")) == read(&run.file("calibration.toml")));
+}
+
+/// A sensor slips after the first calibration: the next reach misses, a recalibration mends it, and the estimator finds
+/// both calibrations again in the recording.
+#[test]
+fn a_slipped_sensor_is_mended_by_a_recalibration() {
+    let recalibrate = "[[step]]\ndo = \"recalibrate\"\n";
+    let limits =
+        "[[step]]\ndo = \"assert\"\ntool_error_m = 0.02\ncontacts = 0\nclearance_m = 0.02\nheld_out_rms_m = 0.03\n";
+    let wait = "[[step]]\ndo = \"wait\"\nseconds = 120\n";
+    let steps = [REACH, CAPTURE, CALIBRATE, REACH, wait, &jump(), REACH, CAPTURE, recalibrate, REACH, limits];
+    let folder = temp();
+    let run = finished(&routine(&steps), folder.path());
+    let summary = run.summary();
+    let score = summary.score.as_ref().expect("scored");
+    let median_m = |reach: usize| score.reaches[reach].side.tool_error_m.expect("reached").median;
+    let medians_m: Vec<f64> = (0..4).map(median_m).collect();
+    eprintln!("tool errors of the four reaches: {medians_m:.4?} m");
+    assert_eq!(
+        score.reaches.iter().map(|r| (r.step, r.calibrated)).collect::<Vec<_>>(),
+        [(1, false), (4, true), (7, true), (10, true)]
+    );
+    // 0.06 rad half a metre from the tool.
+    assert!(medians_m[2] > medians_m[1] + 0.01 && medians_m[3] < medians_m[2] - 0.01, "{medians_m:?}");
+    assert_eq!(score.after.as_ref(), Some(&score.reaches[3].side));
+    assert!(summary.asserts_hold() && summary.asserts.len() == 4);
+    assert!((119.0..122.0).contains(&summary.waited_s.expect("known")));
+    same_from_the_recording_alone(&run);
+    // What broke is the truth's alone.
+    let (recorded, truth) = (run.bytes("run.mcap"), read_truth(run.file("truth.mcap")).expect("it reads"));
+    assert!(truth.header.spec_toml.contains(&JUMP_RAD.to_string()));
+    let holds = |needle: &[u8]| recorded.windows(needle.len()).any(|window| window == needle);
+    assert!(!holds(JUMP_RAD.to_string().as_bytes()) && !holds(&JUMP_RAD.to_le_bytes()) && !holds(b"sensor_jump"));
+}
+
+/// Twice the counts, backwards: nobody knows, and after the first step the arm does.
+#[test]
+fn an_unknown_gear_ratio_is_measured_with_its_sign() {
+    for (seed, joint, ratio) in [(1, "forearm_pitch", -2.0), (2, "wrist_yaw", 0.5), (3, "shoulder_yaw", -1.3)] {
+        let identify = format!("[[step]]\ndo = \"identify\"\njoint = {joint:?}\n");
+        let world = format!("[world.gear_ratio]\n{joint} = {ratio:?}\n");
+        let folder = temp();
+        let short = ShortRoutine { seed, ..routine(&[&identify, REACH, CAPTURE, CALIBRATE, REACH, &world]) };
+        let run = finished(&short, folder.path());
+        let calibration = Calibration::read(&run.file("calibration.toml")).expect("it reads");
+        let result = calibration.joint.iter().find(|j| j.name == joint).expect("a joint of the arm");
+        let measured = result.identified_ratio.expect("measured");
+        let truth = read_truth(run.file("truth.mcap")).expect("it reads");
+        let built = truth.header.as_built.joints.iter().find(|j| j.name == joint).expect("a joint of the arm");
+        let true_ratio = ratio * (1.0 + built.gain_error);
+        eprintln!("seed {seed}, {joint}: {measured:.4}, truly {true_ratio:.4}");
+        // The nonlinearity bends the slope over the short excursion by up to 2.5 %.
+        assert!((measured / true_ratio - 1.0).abs() < 0.04, "{measured} {true_ratio}");
+        let summary = run.summary();
+        let tool_m = summary.score.and_then(|s| s.after).and_then(|s| s.tool_error_m).expect("reached").median;
+        assert!(tool_m < 0.012, "seed {seed}: {tool_m}");
+        assert_eq!(summary.capture.collisions, Some(0));
+        same_from_the_recording_alone(&run);
+    }
+}
+
+#[test]
+fn a_limit_that_does_not_hold_gives_exit_code_4_and_says_which() {
+    let folder = temp();
+    let limits = "[[step]]\ndo = \"assert\"\nheld_out_rms_m = 1e-6\nsimulated_s = 1e6\ntool_error_m = 1e-6\n";
+    let file = routine(&["[[step]]\ndo = \"reach\"\ntargets = [1]\n", CAPTURE, CALIBRATE, limits]).write(folder.path());
+    let run = crate::support::run(&file, &folder.path().join("run"));
+    run.expect(
+        "limits",
+        4,
+        &["ACCEPTED", "FAILS: step 4, held_out_rms_m", "holds: step 4, simulated_s", "FAILS: step 4, tool"],
+    );
+}
+
+/// Three poses are too few for ten parameters: the verdict is no, and what then happens is the script's to say.
+#[test]
+fn a_refusal_stops_a_script_unless_it_says_otherwise() {
+    let few = "[[step]]\ndo = \"capture\"\nposes = 3\nheld_out = 3\n";
+    let limits = "[[step]]\ndo = \"assert\"\ncontacts = 0\n";
+    let folder = temp();
+    let mut short = routine(&[few, CALIBRATE, CAPTURE, CALIBRATE, limits]);
+    let file = short.write(folder.path());
+    let stopped = crate::support::run(&file, &folder.path().join("stopped"));
+    stopped.expect("stopped", 4, &["REFUSED", "stopped      step 2", "FAILS: step 5, contacts", "no such figure"]);
+    short.tail = short.tail.replacen("\"calibrate\"\n", "\"calibrate\"\non_refusal = \"continue\"\n", 1);
+    let file = short.write(folder.path());
+    let went_on = crate::support::run(&file, &folder.path().join("went-on"));
+    went_on.expect("went on", 0, &["ACCEPTED", "holds: step 5, contacts"]);
+}
+
+#[test]
+fn check_explains_what_is_wrong_with_a_script() {
+    let folder = temp();
+    let check = |tail: &str| {
+        let file = ShortRoutine { tail: tail.to_owned(), ..ShortRoutine::default() }.write(folder.path());
+        answer(program().arg("check").arg(file))
+    };
+    let body = format!("{CAPTURE}{CALIBRATE}");
+    check(&body).expect("a good one", 0, &["2 steps (capture of 11 poses and 3 held out, calibrate)"]);
+    let cases = [
+        ("[[step]]\ndo = \"identify\"\njoint = \"elbow\"\n", "step 1 (identify): joint `elbow` is none of"),
+        ("[[step]]\ndo = \"identify\"\njoint = \"wrist_rotate\"\n", "does not move the camera"),
+        ("[[step]]\ndo = \"move\"\nto_rad = [0.0]\n", "to_rad has 1 angles, robot `titan4` has 6 joints"),
+        ("[[step]]\ndo = \"fault\"\nkind = \"flood\"\n", "step 1 (fault): unknown variant `flood`"),
+        ("[[step]]\ndo = \"fault\"\nkind = \"sensor_stuck\"\njoint = \"elbow\"\n", "joint `elbow` is none of"),
+        ("[[step]]\ndo = \"fault\"\nkind = \"tag_lost\"\nid = 99\n", "tag 99 is none of"),
+        (
+            "[[step]]\ndo = \"fault\"\nkind = \"sensor_jump\"\njoint = \"wrist_yaw\"\nby_rad = 9.0\n",
+            "by_rad: 9 is outside",
+        ),
+        ("[[step]]\ndo = \"reach\"\ntarget = 3\n", "step 1 (reach): unknown field `target`"),
+    ];
+    for (step, expected) in cases {
+        check(&format!("{step}{body}")).expect(step, 2, &["short.toml", expected]);
+    }
+    let matrix = "[campaign.matrix]\n\"world.camera.corner_noise\" = [0.3]\n";
+    check(&format!("{body}{matrix}")).expect("matrix", 2, &["world.camera", "corner_noise"]);
+    check(&format!("{body}[world.gear_ratio]\nelbow = 2.0\n")).expect("gears", 2, &["world.gear_ratio: joint `elbow`"]);
+    let fault = "[[world.fault]]\nkind = \"silt\"\nseconds = 1.0\n";
+    check(&format!("{body}{fault}")).expect("a fault without a step", 2, &["world.fault", "[[step]]"]);
+    check(&format!("{body}[world.gear_ratio]\nwrist_yaw = 0.0\n")).expect("gears", 2, &["world.gear_ratio.wrist_yaw"]);
+}
+
+/// A recording that marks no calibration is one as a whole, as those made before there were scripts are.
+#[test]
+fn an_old_recording_still_calibrates() {
+    let folder = temp();
+    let recording = crate::support::root().join("recordings/sample/run.mcap");
+    calibrate(&recording, &robot_folder(), folder.path()).expect("the sample", 0, &["ACCEPTED"]);
+    let file = folder.path().join("calibration.toml");
+    let before = Calibration::read(&file).expect("it reads");
+    assert!(before.joint.iter().all(|joint| joint.identified_ratio.is_none()));
+    edit(&file, "version = 1", "version = 2");
+    assert!(Calibration::read(&file).is_err());
+}
