@@ -32,6 +32,7 @@ impl OutputError {
 }
 
 /// Writes `bytes` beside `path` and puts them in its place in one step.
+#[cfg(feature = "sim")]
 pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
     write_together(&[(path, bytes)])
 }
