@@ -114,6 +114,18 @@ fn a_refusal_stops_a_script_unless_it_says_otherwise() {
     went_on.expect("went on", 0, &["ACCEPTED", "holds: step 5, contacts"]);
 }
 
+/// The arm has moved by then: what was recorded is not thrown away with the plan.
+#[test]
+fn a_plan_that_fails_in_the_middle_of_a_script_keeps_the_recording() {
+    let folder = temp();
+    let hopeless = "[[step]]\ndo = \"capture\"\nmin_tags = 100\n";
+    let file = routine(&[CAPTURE, CALIBRATE, hopeless]).write(folder.path());
+    let out = folder.path().join("run");
+    crate::support::run(&file, &out).expect("hopeless", 1, &["step 3: no pose was found", "run-cut-1.mcap"]);
+    let left = out.join("run-cut-1.mcap");
+    calibrate(&left, &robot_folder(), &folder.path().join("left")).expect("what is left", 0, &["ACCEPTED"]);
+}
+
 #[test]
 fn check_explains_what_is_wrong_with_a_script() {
     let folder = temp();

@@ -155,7 +155,7 @@ impl Run<'_> {
         Failure { kept: self.output.set_aside().unwrap_or_default(), ..failure }
     }
 
-    /// Attaches the drawings (never the world or the seed) and puts both streams in place.
+    /// Attaches the drawings (never the world or the seed) and closes the recording.
     fn finish_recording(&self, recorder: Recorder) -> Result<(), RunError> {
         let mut writer = recorder.into_writer();
         let (robot, routine) = (&self.inputs.robot, &self.inputs.routine);

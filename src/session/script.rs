@@ -166,8 +166,10 @@ impl Run<'_, '_> {
                     self.reach(&reach.targets)?;
                     self.reaches.push(ReachStep { step: number, attempt, start, end: self.driver.now() });
                 }
-                Step::Capture(capture) => self.capture(capture)?,
-                Step::Identify(settings) => self.identify(number, settings)?,
+                Step::Capture(capture) => self.capture(capture).map_err(|error| after_motion(number, error))?,
+                Step::Identify(settings) => {
+                    self.identify(number, settings).map_err(|error| after_motion(number, error))?;
+                }
                 Step::Calibrate(settings) => {
                     let refusal = self.calibrate(settings)?;
                     if let (Some(why), OnRefusal::Stop) = (refusal, settings.on_refusal) {
@@ -347,7 +349,15 @@ impl Run<'_, '_> {
     }
 }
 
-/// The first capture, if no calibration comes before it.
+/// A plan that fails in the middle of a script is no wrong input any more: there is a recording to be kept.
+fn after_motion(step: usize, error: SessionError) -> SessionError {
+    match error {
+        SessionError::Plan(plan) => SessionError::Step { step, problem: plan.to_string() },
+        error => error,
+    }
+}
+
+/// The first capture; no calibration can come before it.
 fn first_capture(steps: &[Step]) -> Option<&CaptureSettings> {
     steps.iter().find_map(|step| match step {
         Step::Capture(capture) => Some(capture),
