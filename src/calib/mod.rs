@@ -1,9 +1,9 @@
 //! BELIEF: from a recording and a nominal robot to calibrated joint sensors.
 //!
 //! `associate` turns recorded messages into views; `identify` measures the scale of a sensor of which nobody knows it;
-//! `problem` is the geometry shared by all methods; one file per
-//! method solves it; `observability` names what the data cannot determine before solving; `uncertainty` says how good
-//! the answer is and `verdict` whether to use it; `result` is calibration.toml, `compact` its short form. Nothing here knows of a simulator.
+//! `problem` is the geometry shared by all methods; one file per method solves it; `observability` names what the data
+//! cannot determine before solving; `uncertainty` says how good the answer is and `verdict` whether to use it; `result` is
+//! calibration.toml, `compact` its short form. Nothing here knows of a simulator.
 
 mod associate;
 mod compact;
