@@ -1,4 +1,4 @@
-//! Where the arm's bodies truly are: read from the physics engine, not from belief's kinematics.
+//! Where the arm's bodies truly are.
 
 use nalgebra::Isometry3;
 

@@ -6,7 +6,6 @@ use parry3d::query::{self, Ray};
 use parry3d::shape::SharedShape;
 
 use super::convert::to_rapier;
-use super::loads::shape_pose;
 use super::places::BodyPoses;
 use crate::robot::{PlacedShape, Robot, Shape, Vehicle, parry_pose};
 use crate::routine::Scene;
@@ -241,6 +240,11 @@ impl Solids {
             .enumerate()
             .any(|(i, (solid, pose))| !ignored.contains(&i) && solid.shape.intersects_ray(pose, &ray, length))
     }
+}
+
+/// A shape's pose in its owner's frame as parry has it, its axis turned.
+fn shape_pose(placed: &PlacedShape) -> Pose3 {
+    parry_pose(&(placed.owner_from_shape * placed.shape.axis_fix()))
 }
 
 /// A slab of 1 m with its upper face at `z_m`.

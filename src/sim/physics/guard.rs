@@ -6,9 +6,9 @@
 
 use nalgebra::Isometry3;
 
-use super::super::places::BodyPoses;
-use super::super::solids::{Carrier, Solids};
 use crate::kinematics::Chain;
+use crate::sim::places::BodyPoses;
+use crate::sim::solids::{Carrier, Solids};
 use crate::streams::{JointAngles, MAX_JOINTS};
 
 /// The engine makes contacts of pairs nearer than 20 mm, its prediction distance, m.

@@ -1,0 +1,169 @@
+//! One step: ROS2, a linearly implicit Runge-Kutta method of second order (Verwer, Spee, Blom, Hundsdorfer, SIAM J. Sci.
+//! Comput. 20, 1999), `gamma = 1 - 1/sqrt 2`, L-stable.
+//!
+//! For `y' = f(y)` and any matrix `A` near its Jacobian: `(1 - g h A) k1 = f(y)`, `(1 - g h A) w = f(y + h k1) - 2 g h A k1`,
+//! `y += h/2 (k1 + w)`. The order does not depend on `A`, stability does: here it holds the springs and dampers about the
+//! joints and those of contacts. Their blocks put `g h C + g2 h2 K` on top of the inertia, so that a step costs two
+//! factorisations of it. A free base moves on its group, by the exponential of its twist.
+
+use nalgebra::{Isometry3, Vector6};
+
+use super::equations::{BaseCoupling, Equations, Multibody, Surroundings};
+use super::spatial::{Force, Motion};
+use super::system::{Coordinates, MAX_DOF, Symmetric};
+use crate::sim::joint_load::JointLoad;
+use crate::spatial::exp;
+use crate::streams::{JointAngles, MAX_JOINTS};
+
+/// Where the system is and how it moves.
+#[derive(Clone, Copy, Debug)]
+pub struct SystemState {
+    pub angles: JointAngles,
+    pub rates: JointAngles,
+    /// Of a free base; of one that moves as prescribed the caller knows.
+    pub world_from_base: Isometry3<f64>,
+    pub base_velocity: Motion,
+}
+
+/// A spring and a damper along one direction of the generalised coordinates: `force = start - stiffness travel - damping rate`.
+#[derive(Clone, Copy, Debug)]
+pub struct ContactRow {
+    pub direction: Coordinates,
+    pub start_n: f64,
+    pub stiffness_n_m: f64,
+    pub damping_n_s_m: f64,
+}
+
+/// What acts during one step.
+pub struct StepInput<'a> {
+    pub step_s: f64,
+    pub loads: &'a [JointLoad; MAX_JOINTS],
+    /// On each body about the base's origin, base axes.
+    pub extra: &'a [Force; MAX_JOINTS + 1],
+    pub contacts: &'a [ContactRow],
+    /// Whether the base is free.
+    pub is_free: bool,
+    /// Surroundings at the start and at the end, of a base placed and moving as given.
+    pub around: &'a dyn Fn(Stage, &SystemState) -> (Surroundings, BaseCoupling),
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stage {
+    Start,
+    End,
+}
+
+/// `1 - 1/sqrt 2`.
+const GAMMA: f64 = 1.0 - std::f64::consts::FRAC_1_SQRT_2;
+
+/// Rates of all coordinates: of positions and of velocities.
+struct Slope {
+    position: Coordinates,
+    velocity: Coordinates,
+}
+
+impl Multibody {
+    /// Moves the state by one step.
+    pub fn step(&self, state: &mut SystemState, input: &StepInput) {
+        let h = input.step_s;
+        let first_joint = if input.is_free { 6 } else { 0 };
+        let first = self.slope(input, Stage::Start, state, None);
+        let predicted = advanced(state, &first, h, first_joint);
+        let second = self.slope(input, Stage::End, &predicted, Some(&first));
+        let mean = Slope {
+            position: std::array::from_fn(|i| 0.5 * (first.position[i] + second.position[i])),
+            velocity: std::array::from_fn(|i| 0.5 * (first.velocity[i] + second.velocity[i])),
+        };
+        *state = advanced(state, &mean, h, first_joint);
+    }
+
+    /// The stage at `at`; `first` is the slope of the stage before it.
+    fn slope(&self, input: &StepInput, stage: Stage, at: &SystemState, first: Option<&Slope>) -> Slope {
+        let gh = GAMMA * input.step_s;
+        let (around, base) = (input.around)(stage, at);
+        let Equations { mut inertia, bias, first_joint } =
+            self.equations(&at.angles, &at.rates, &around, &base, input.extra);
+        let n = first_joint + self.chain().n_joints();
+        let mut velocity = coordinates(at, first_joint);
+        let mut forces: Coordinates = std::array::from_fn(|i| -bias[i]);
+        if let Some(first) = first {
+            for (slot, rate) in velocity.iter_mut().zip(&first.velocity) {
+                *slot -= 2.0 * gh * rate;
+            }
+        }
+        for (j, load) in input.loads.iter().enumerate().take(self.chain().n_joints()) {
+            let i = first_joint + j;
+            let (k, c) = (load.stiffness_n_m_rad, load.damping_n_m_s_rad);
+            forces[i] += load.torque_n_m(at.angles[j], at.rates[j]) - gh * k * velocity[i];
+            if let Some(first) = first {
+                forces[i] += 2.0 * gh * (k * first.position[i] + c * first.velocity[i]);
+            }
+            inertia.add(i, i, gh * (c + gh * k));
+        }
+        if !input.contacts.is_empty() {
+            let now = coordinates(at, first_joint);
+            let travel: Coordinates = first.map_or([0.0; MAX_DOF], |f| f.position.map(|rate| rate * input.step_s));
+            for row in input.contacts {
+                add_row(
+                    row,
+                    gh,
+                    n,
+                    &mut inertia,
+                    &mut forces,
+                    &RowState { now: &now, travel: &travel, velocity: &velocity, first },
+                );
+            }
+        }
+        let acceleration = inertia.solve(&forces);
+        Slope { position: std::array::from_fn(|i| velocity[i] + gh * acceleration[i]), velocity: acceleration }
+    }
+}
+
+/// What a contact's force in a stage depends on.
+struct RowState<'a> {
+    now: &'a Coordinates,
+    /// Since the step's start.
+    travel: &'a Coordinates,
+    /// That the implicit part works with.
+    velocity: &'a Coordinates,
+    first: Option<&'a Slope>,
+}
+
+fn add_row(row: &ContactRow, gh: f64, n: usize, inertia: &mut Symmetric, forces: &mut Coordinates, state: &RowState) {
+    let along = |v: &Coordinates| (0..n).map(|i| row.direction[i] * v[i]).sum::<f64>();
+    let (k, c) = (row.stiffness_n_m, row.damping_n_s_m);
+    let mut force = row.start_n - k * along(state.travel) - c * along(state.now) - gh * k * along(state.velocity);
+    if let Some(first) = state.first {
+        force += 2.0 * gh * (k * along(&first.position) + c * along(&first.velocity));
+    }
+    for (slot, share) in forces.iter_mut().zip(&row.direction) {
+        *slot += force * share;
+    }
+    inertia.add_outer(gh * (c + gh * k), &row.direction);
+}
+
+/// Velocities as coordinates.
+fn coordinates(state: &SystemState, first_joint: usize) -> Coordinates {
+    let mut v = [0.0; MAX_DOF];
+    if first_joint > 0 {
+        v[..6].copy_from_slice(&state.base_velocity.to_array());
+    }
+    for (slot, rate) in v[first_joint..].iter_mut().zip(state.rates.iter()) {
+        *slot = *rate;
+    }
+    v
+}
+
+fn advanced(state: &SystemState, slope: &Slope, h: f64, first_joint: usize) -> SystemState {
+    let n = state.angles.len();
+    let mut next = *state;
+    next.angles = JointAngles::from_fn(n, |j| state.angles[j] + h * slope.position[first_joint + j]);
+    next.rates = JointAngles::from_fn(n, |j| state.rates[j] + h * slope.velocity[first_joint + j]);
+    if first_joint > 0 {
+        let twist = Motion::from_slice(&slope.position);
+        let (l, a) = (twist.linear * h, twist.angular * h);
+        next.world_from_base = state.world_from_base * exp(&Vector6::new(l.x, l.y, l.z, a.x, a.y, a.z));
+        next.base_velocity = state.base_velocity + Motion::from_slice(&slope.velocity) * h;
+    }
+    next
+}

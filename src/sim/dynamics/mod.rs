@@ -1,0 +1,23 @@
+//! Rigid-body dynamics of arm and vehicle as one system, in water.
+//!
+//! [`Multibody`] has the drawing's masses and what the water adds to them; [`Multibody::equations`] gives the joint-space
+//! inertia and the bias forces of one state (composite rigid bodies and recursive Newton-Euler, Featherstone 2008,
+//! chapters 5, 6 and 9), on a base that moves as prescribed or floats free. `integrate` takes the steps, linearly implicit
+//! in what acts about the joints. No allocation, no engine: oracles compare it with Pinocchio.
+
+mod body;
+mod equations;
+mod integrate;
+mod spatial;
+mod system;
+
+pub use super::joint_load::JointLoad;
+pub(in crate::sim) use body::WaterProperties;
+pub use body::{Body, HullDrag, Surface};
+pub use equations::{BaseCoupling, Equations, Multibody, Surroundings};
+pub use integrate::{ContactRow, Stage, StepInput, SystemState};
+pub use spatial::{Force, Inertia, Motion};
+pub use system::{Coordinates, MAX_DOF, Symmetric};
+
+#[cfg(test)]
+mod tests;
