@@ -22,8 +22,47 @@ pub struct Vehicle {
     pub survey: Option<TagSurvey>,
     /// By the robot's name: the angles that it starts from on this vehicle, instead of its own.
     pub stowed_rad: BTreeMap<String, Vec<f64>>,
+    /// What a vehicle needs that floats free; `None` where the file has none.
+    pub dynamics: Option<VehicleDynamics>,
     /// The file's text, to travel with a recording; with meshes, the same as hulls, point by point.
     pub text: String,
+}
+
+/// The vehicle as a body in water: about its origin, the centre of mass, in its own axes. Sixes are x, y, z, then about
+/// x, y, z.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct VehicleDynamics {
+    pub inertia_kg_m2: [f64; 3],
+    pub added_mass_kg: [f64; 3],
+    pub added_inertia_kg_m2: [f64; 3],
+    /// Only its height matters: the vehicle is ballasted so that it floats level with the arm stowed.
+    pub center_of_buoyancy_m: [f64; 3],
+    /// N s/m and N m s/rad.
+    pub drag_linear: [f64; 6],
+    /// N s2/m2 and N m s2/rad2.
+    pub drag_quadratic: [f64; 6],
+    /// Of the thrusters together; 0 where they have no authority.
+    pub thrust_max_n: [f64; 3],
+    pub moment_max_n_m: [f64; 3],
+}
+
+impl VehicleDynamics {
+    fn check(&self, file: &Path) -> Result<(), FileIssue> {
+        let each = |key: &str, values: &[f64], range: std::ops::RangeInclusive<f64>| {
+            values.iter().enumerate().try_for_each(|(i, value)| {
+                FileIssue::check_range(file, &format!("dynamics.{key}[{i}]"), *value, range.clone()).map(|_| ())
+            })
+        };
+        each("inertia_kg_m2", &self.inertia_kg_m2, 0.1..=1e8)?;
+        each("added_mass_kg", &self.added_mass_kg, 0.0..=1e7)?;
+        each("added_inertia_kg_m2", &self.added_inertia_kg_m2, 0.0..=1e8)?;
+        each("center_of_buoyancy_m", &self.center_of_buoyancy_m, -10.0..=10.0)?;
+        each("drag_linear", &self.drag_linear, 0.0..=1e7)?;
+        each("drag_quadratic", &self.drag_quadratic, 0.0..=1e7)?;
+        each("thrust_max_n", &self.thrust_max_n, 0.0..=1e6)?;
+        each("moment_max_n_m", &self.moment_max_n_m, 0.0..=1e6)
+    }
 }
 
 #[derive(Deserialize, Serialize)]
@@ -37,6 +76,8 @@ struct VehicleFile {
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     stowed_rad: BTreeMap<String, Vec<f64>>,
     mount: PlaceFile,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    dynamics: Option<VehicleDynamics>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     tag: Vec<TagFile>,
     part: Vec<PartFile>,
@@ -63,6 +104,9 @@ pub fn load_vehicle(file: &Path) -> Result<Vehicle, RobotError> {
         Pose::from_position_quaternion_wxyz(raw.mount.position_m, raw.mount.quaternion_wxyz).ok_or_else(|| {
             FileIssue::new(file, "mount", "position and quaternion must be finite and the quaternion not zero")
         })?;
+    if let Some(dynamics) = &raw.dynamics {
+        dynamics.check(file)?;
+    }
     let survey = check_survey(file, &raw, &mount)?;
     let (parts, plain) = check_parts(&raw.part, file, "part")?;
     if raw.part.iter().any(PartFile::is_mesh) {
@@ -78,6 +122,7 @@ pub fn load_vehicle(file: &Path) -> Result<Vehicle, RobotError> {
         parts,
         survey,
         stowed_rad: raw.stowed_rad,
+        dynamics: raw.dynamics,
         text,
     })
 }

@@ -1,0 +1,196 @@
+//! A vehicle that floats free: its body for the equations of motion, and the thrusters that keep it on station.
+
+use nalgebra::{Isometry3, Matrix3, Vector3};
+use rand::RngExt;
+
+use super::BaseState;
+use crate::robot::{FileIssue, Vehicle, VehicleDynamics};
+use crate::sim::dynamics::{Body, Force, HullDrag, Inertia, Motion, Multibody};
+use crate::sim::error::SimError;
+use crate::sim::fault::Knock;
+use crate::sim::spec::{VehicleMotionSpec, WaterSpec};
+use crate::stats::stream_rng;
+use crate::streams::JointAngles;
+
+const N_WOBBLES: usize = 6;
+/// How long a knock lasts, s: short against the vehicle's motion, long against a step.
+const KNOCK_S: f64 = 0.1;
+
+/// Thrusters, and what pushes the vehicle besides the water that it moves through.
+#[derive(Clone, Debug)]
+pub(in crate::sim) struct FreeVehicle {
+    spec: VehicleMotionSpec,
+    dynamics: VehicleDynamics,
+    base_from_vehicle: Isometry3<f64>,
+    /// Mass and inertia that the controller reckons with, added mass included, vehicle axes: linear, then angular.
+    reckoned: [f64; 6],
+    integral: [f64; 6],
+    /// Thrust and moment as they are, behind the thrusters' lag, vehicle axes.
+    thrust: [f64; 6],
+    wobble: [[Wobble; N_WOBBLES]; 6],
+    knock: Option<(f64, Knock)>,
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+struct Wobble {
+    amplitude: f64,
+    rate_rad_s: f64,
+    phase_rad: f64,
+}
+
+impl FreeVehicle {
+    /// # Errors
+    /// [`SimError::Spec`] for a vehicle without `[dynamics]`.
+    pub(in crate::sim) fn new(vehicle: &Vehicle, spec: &VehicleMotionSpec, seed: u64) -> Result<Self, SimError> {
+        let Some(dynamics) = vehicle.dynamics else {
+            let problem = "is needed for a vehicle that floats free ([world.vehicle] motion = \"free\")";
+            return Err(FileIssue::new(&vehicle.file, "dynamics", problem).into());
+        };
+        let linear = dynamics.added_mass_kg.map(|added| vehicle.mass_kg + added);
+        let angular: [f64; 3] = std::array::from_fn(|i| dynamics.inertia_kg_m2[i] + dynamics.added_inertia_kg_m2[i]);
+        Ok(Self {
+            spec: spec.clone(),
+            dynamics,
+            base_from_vehicle: *vehicle.vehicle_from_base.inverse().isometry(),
+            reckoned: std::array::from_fn(|i| if i < 3 { linear[i] } else { angular[i - 3] }),
+            integral: [0.0; 6],
+            thrust: [0.0; 6],
+            wobble: draw_wobble(spec, seed),
+            knock: None,
+        })
+    }
+
+    /// The vehicle as body 0 of the system, ballasted so that it floats level with the arm as it is now: its displacement
+    /// carries vehicle and arm, and the centre of buoyancy lies above the common centre of weight.
+    pub(in crate::sim) fn body(
+        &self,
+        vehicle: &Vehicle,
+        water: &WaterSpec,
+        arm: &Multibody,
+        angles: &JointAngles,
+    ) -> Body {
+        let d = &self.dynamics;
+        let to_base = &self.base_from_vehicle;
+        let diagonal = |v: &[f64; 3]| Matrix3::from_diagonal(&Vector3::from(*v));
+        let rigid = Inertia::rigid(vehicle.mass_kg, &Vector3::zeros(), &diagonal(&d.inertia_kg_m2)).placed(to_base);
+        let is_wet = water.density_kg_m3 > 0.0;
+        let mut body = Body::dry(vehicle.mass_kg, to_base.translation.vector, &Matrix3::zeros());
+        body.rigid = rigid;
+        if !is_wet {
+            return body;
+        }
+        let added = Inertia {
+            rotational: diagonal(&d.added_inertia_kg_m2),
+            coupling: Matrix3::zeros(),
+            linear: diagonal(&d.added_mass_kg),
+        };
+        body.added = added.placed(to_base);
+        body.hull = Some(HullDrag { base_from_hull: *to_base, linear: d.drag_linear, quadratic: d.drag_quadratic });
+        let (weight, moment) = wet_weight(arm, angles);
+        let down = to_base.rotation * -Vector3::z();
+        body.displaced_kg = vehicle.mass_kg + weight;
+        // Level: the moments of all weights (the vehicle's own at its origin) and of the buoyancy balance about the base.
+        let weights = moment + vehicle.mass_kg * body.com_m;
+        let above = to_base.rotation * Vector3::new(0.0, 0.0, d.center_of_buoyancy_m[2]);
+        let center = weights / body.displaced_kg;
+        body.center_of_buoyancy_m = center - down * down.dot(&(center - body.com_m)) + above;
+        body
+    }
+
+    /// Something hits the vehicle.
+    pub(in crate::sim) fn knock(&mut self, t_s: f64, knock: &Knock) {
+        self.knock = Some((t_s, *knock));
+    }
+
+    /// What acts on the vehicle in the step from `t_s`, about the base's origin in base axes.
+    pub(in crate::sim) fn force(&mut self, t_s: f64, step_s: f64, base: &BaseState) -> Force {
+        self.keep_station(step_s, base);
+        let mut total = self.thrust;
+        for (slot, axis) in total.iter_mut().zip(&self.wobble) {
+            *slot += axis.iter().map(|w| w.amplitude * (w.rate_rad_s * t_s + w.phase_rad).sin()).sum::<f64>();
+        }
+        if let Some((start_s, knock)) = &self.knock {
+            let since = t_s - start_s;
+            if (0.0..KNOCK_S).contains(&since) {
+                // Half a sine: its mean is 2/pi of its height.
+                let shape = (std::f64::consts::PI * since / KNOCK_S).sin() * std::f64::consts::FRAC_PI_2 / KNOCK_S;
+                for i in 0..3 {
+                    total[i] += shape * knock.impulse_n_s[i];
+                    total[3 + i] += shape * knock.angular_impulse_n_m_s[i];
+                }
+            }
+        }
+        let to_base = &self.base_from_vehicle;
+        let force = to_base.rotation * Vector3::from_column_slice(&total[..3]);
+        let moment = to_base.rotation * Vector3::from_column_slice(&total[3..]);
+        Force::new(moment + to_base.translation.vector.cross(&force), force)
+    }
+
+    /// PID on position and attitude, as dynamic positioning has it, with the thrusters' lag and limits. It knows where it is.
+    fn keep_station(&mut self, step_s: f64, base: &BaseState) {
+        let w = self.spec.station_keeping_rad_s;
+        if w == 0.0 {
+            return;
+        }
+        let pose = &base.world_from_vehicle;
+        let to_vehicle = pose.rotation().inverse();
+        // Of the vehicle's origin, in its own axes.
+        let at_base = Motion::new(base.angular_velocity, base.velocity).at(&self.base_from_vehicle.translation.vector);
+        let velocity = self.base_from_vehicle.rotation.inverse() * at_base;
+        let away = to_vehicle * pose.origin().vector();
+        let turned = pose.rotation().scaled_axis();
+        let lag = 1.0 - (-step_s / self.spec.thruster_lag_s.max(step_s)).exp();
+        for i in 0..6 {
+            let (error, rate, limit) = if i < 3 {
+                (-away[i], velocity[i], self.dynamics.thrust_max_n[i])
+            } else {
+                (-turned[i - 3], base.vehicle_rate[i - 3], self.dynamics.moment_max_n_m[i - 3])
+            };
+            let m = self.reckoned[i];
+            // A vehicle without thrusters about an axis leaves it to its buoyancy.
+            let wanted = m * (w * w * error - 2.0 * self.spec.station_damping_ratio * w * rate + self.integral[i]);
+            let given = wanted.clamp(-limit, limit);
+            if given == wanted {
+                self.integral[i] += 0.1 * w * w * w * error * step_s;
+            }
+            self.thrust[i] += (given - self.thrust[i]) * lag;
+        }
+    }
+}
+
+/// Wet mass of the arm, kg, and its first moment about the base's origin, kg m.
+fn wet_weight(arm: &Multibody, angles: &JointAngles) -> (f64, Vector3<f64>) {
+    let poses = arm.chain().link_poses(angles);
+    let (mut mass, mut moment) = (0.0, Vector3::zeros());
+    for (i, body) in arm.bodies().iter().enumerate().skip(1) {
+        let place = poses.link(i);
+        let at = |p: &Vector3<f64>| place.rotation * p + place.translation.vector;
+        mass += body.mass_kg - body.displaced_kg;
+        moment += body.mass_kg * at(&body.com_m) - body.displaced_kg * at(&body.center_of_buoyancy_m);
+    }
+    (mass, moment)
+}
+
+/// Random forces and moments of given rms, in the band of the motion's periods.
+fn draw_wobble(spec: &VehicleMotionSpec, seed: u64) -> [[Wobble; N_WOBBLES]; 6] {
+    let (low, high) = (spec.period_min_s.ln(), spec.period_max_s.ln());
+    let mut all = [[Wobble::default(); N_WOBBLES]; 6];
+    for (axis, wobbles) in all.iter_mut().enumerate() {
+        let rms = if axis < 3 { spec.wobble_force_rms_n } else { spec.wobble_moment_rms_n_m };
+        if rms == 0.0 {
+            continue;
+        }
+        let mut rng = stream_rng(seed, &format!("vehicle/wobble/{axis}"));
+        for (k, wobble) in wobbles.iter_mut().enumerate() {
+            let place = (k as f64 + rng.random_range(0.0..1.0)) / N_WOBBLES as f64;
+            wobble.rate_rad_s = std::f64::consts::TAU / (low + place * (high - low)).exp();
+            wobble.amplitude = rng.random_range(0.5..1.0);
+            wobble.phase_rad = rng.random_range(0.0..std::f64::consts::TAU);
+        }
+        let norm = wobbles.iter().map(|w| 0.5 * w.amplitude * w.amplitude).sum::<f64>().sqrt();
+        for wobble in wobbles {
+            wobble.amplitude *= rms / norm;
+        }
+    }
+    all
+}

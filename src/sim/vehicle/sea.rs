@@ -1,0 +1,111 @@
+//! How the water moves about the vehicle: a current, and waves that fade with depth.
+//!
+//! Waves are a sum of linear deep-water waves, `w2 = g k`, whose orbits have radius `a exp(-k depth)`; their amplitudes follow the
+//! spectrum of Pierson and Moskowitz for the asked significant height and peak period (DNV-RP-C205, section 3.5.5). The motion is
+//! that at the vehicle's station, the same all about the arm, for the waves that reach down are much longer than an arm.
+
+use nalgebra::Vector3;
+use rand::RngExt;
+
+use super::GRAVITY_M_S2;
+use crate::sim::spec::WaterSpec;
+use crate::stats::stream_rng;
+
+const N_WAVES: usize = 16;
+
+/// Current and waves.
+#[derive(Clone, Debug)]
+pub(in crate::sim) struct Sea {
+    current: Vector3<f64>,
+    /// Horizontal direction in which the waves run, unit.
+    heading: Vector3<f64>,
+    waves: Vec<Wave>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Wave {
+    /// Of the orbit at the vehicle's depth, m.
+    radius_m: f64,
+    rate_rad_s: f64,
+    phase_rad: f64,
+}
+
+/// The water's motion against the world, in world axes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(in crate::sim) struct WaterMotion {
+    /// m/s.
+    pub velocity: Vector3<f64>,
+    /// m/s2.
+    pub acceleration: Vector3<f64>,
+}
+
+impl Sea {
+    pub(in crate::sim) fn new(spec: &WaterSpec, seed: u64) -> Self {
+        let (sin, cos) = spec.wave_direction_rad.sin_cos();
+        let waves = if spec.wave_height_m > 0.0 { draw_waves(spec, seed) } else { Vec::new() };
+        Self { current: Vector3::from(spec.current_m_s), heading: Vector3::new(cos, sin, 0.0), waves }
+    }
+
+    /// The water at `t_s`; z is up.
+    pub(in crate::sim) fn at(&self, t_s: f64) -> WaterMotion {
+        let mut motion = WaterMotion { velocity: self.current, acceleration: Vector3::zeros() };
+        for wave in &self.waves {
+            let (sin, cos) = (wave.rate_rad_s * t_s + wave.phase_rad).sin_cos();
+            let speed = wave.radius_m * wave.rate_rad_s;
+            motion.velocity += speed * (cos * self.heading + sin * Vector3::z());
+            motion.acceleration += speed * wave.rate_rad_s * (-sin * self.heading + cos * Vector3::z());
+        }
+        motion
+    }
+}
+
+/// Frequencies in equal shares of 0.6 to 3 times the peak's, each somewhere within its share; random phases.
+fn draw_waves(spec: &WaterSpec, seed: u64) -> Vec<Wave> {
+    let mut rng = stream_rng(seed, "waves");
+    let peak = std::f64::consts::TAU / spec.wave_period_s;
+    let share = 2.4 * peak / N_WAVES as f64;
+    let mut waves: Vec<Wave> = (0..N_WAVES)
+        .map(|i| {
+            let rate_rad_s = 0.6 * peak + (i as f64 + rng.random_range(0.0..1.0)) * share;
+            let ratio = peak / rate_rad_s;
+            let density = ratio.powi(5) * (-1.25 * ratio.powi(4)).exp();
+            let phase_rad = rng.random_range(0.0..std::f64::consts::TAU);
+            Wave { radius_m: (2.0 * density * share).sqrt(), rate_rad_s, phase_rad }
+        })
+        .collect();
+    // At the surface: the significant height is four times the standard deviation of the elevation.
+    let std_m = waves.iter().map(|w| 0.5 * w.radius_m * w.radius_m).sum::<f64>().sqrt();
+    for wave in &mut waves {
+        let wave_number = wave.rate_rad_s * wave.rate_rad_s / GRAVITY_M_S2;
+        wave.radius_m *= 0.25 * spec.wave_height_m / std_m * (-wave_number * spec.depth_m).exp();
+    }
+    waves
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sea(depth_m: f64) -> Sea {
+        let spec = WaterSpec { wave_height_m: 2.0, depth_m, current_m_s: [0.3, 0.0, 0.0], ..WaterSpec::default() };
+        Sea::new(&spec, 7)
+    }
+
+    #[test]
+    fn acceleration_is_the_rate_of_velocity() {
+        let sea = sea(15.0);
+        for t in [0.0, 3.1, 77.7] {
+            let slope = (sea.at(t + 1e-4).velocity - sea.at(t - 1e-4).velocity) / 2e-4;
+            assert!((slope - sea.at(t).acceleration).norm() < 1e-7, "{t}");
+        }
+    }
+
+    /// Heave of a particle at the surface: a quarter of the significant height.
+    #[test]
+    fn waves_have_their_height_and_fade_with_depth() {
+        let rms = |depth_m: f64| sea(depth_m).waves.iter().map(|w| 0.5 * w.radius_m * w.radius_m).sum::<f64>().sqrt();
+        assert!((rms(0.0) - 0.5).abs() < 1e-12);
+        assert!(rms(20.0) < 0.5 * rms(0.0) && rms(20.0) > 0.05 * rms(0.0), "{}", rms(20.0));
+        assert!(rms(500.0) < 1e-3 * rms(0.0), "{}", rms(500.0));
+    }
+}
