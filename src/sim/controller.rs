@@ -1,9 +1,10 @@
 //! The arm's own controller: closes the loop on its own sensors, in raw counts, at 100 Hz.
 //!
-//! Proportional with feed-forward of the set-point's rate; readings are low-pass filtered; the valve's deadband is
-//! jumped over, and the valve closes within a small band about the set-point. Counts become angles by the datasheet's
-//! scale only, for the controller knows neither gain nor offset errors. The word's wrap is honoured: the short way
-//! round counts.
+//! Proportional with feed-forward of the set-point's rate; readings are low-pass filtered, and wild ones left out; the
+//! valve's deadband is jumped over, and the valve closes within a small band about the set-point. A joint that creeps
+//! faster than the loop can answer is held against what it creeps, learnt with the valve open near the set-point. Counts
+//! become angles by the datasheet's scale only, for the controller knows neither gain nor offset errors. The word's wrap
+//! is honoured: the short way round counts.
 
 use super::spec::{CONTROL_PERIOD_S, HydraulicsSpec};
 use crate::robot::JointSensorSpec;
@@ -12,14 +13,33 @@ use crate::streams::{JointCounts, MAX_JOINTS};
 /// Set-points that come no farther apart than this make a path with a rate, periods.
 const PATH_PERIODS: u32 = 10;
 
+/// How far about the set-point creep is learnt, rest bands.
+const FAR_BANDS: f64 = 8.0;
+/// What a joint may do, over what its open valve gives it, before its readings count as wild: it swings on its oil.
+const REACHABLE: f64 = 2.0;
+/// Noise that no reading is called wild for.
+const NOISE_SIGMAS: f64 = 8.0;
+/// A valve that has been open near its set-point for longer than this works against creep, s.
+const CREEP_TIME_S: f64 = 1.0;
+/// Slower creep is left to the rest band, rad/s.
+const CREEP_RAD_S: f64 = 1e-3;
+/// Faster creep, as a share of the rate limit, is not held.
+const CREEP_LIMIT: f64 = 0.05;
+
 #[derive(Clone, Debug)]
 pub(super) struct Controller {
-    spec: HydraulicsSpec,
     joints: Vec<JointLoop>,
-    filter_share: f64,
+    tuning: Tuning,
     periods_since_command: u32,
     /// How long the present feed-forward holds, periods.
     path_periods: u32,
+}
+
+/// What all joints' loops have in common.
+#[derive(Clone, Copy, Debug)]
+struct Tuning {
+    spec: HydraulicsSpec,
+    filter_share: f64,
 }
 
 #[derive(Clone, Debug)]
@@ -27,9 +47,20 @@ struct JointLoop {
     counts_per_rad: f64,
     wrap_counts: f64,
     rate_limit_rad_s: f64,
+    noise_counts: f64,
     set_counts: f64,
+    /// The last reading that was believed, and the readings left out since.
+    believed_counts: f64,
+    n_rejected: f64,
     filtered_counts: f64,
     feed_forward_rad_s: f64,
+    /// What the joint creeps by itself, the other way: learnt at rest.
+    hold_rad_s: f64,
+    /// With the valve open near the set-point.
+    periods_near: u32,
+    /// Where the spool was sent.
+    spool: f64,
+    play_side: f64,
     rest: Rest,
 }
 
@@ -52,19 +83,22 @@ impl Controller {
             counts_per_rad: ratio * sensor.counts_per_rad,
             wrap_counts: sensor.wrap_counts,
             rate_limit_rad_s: sensor.max_rate_rad_s,
+            noise_counts: sensor.noise_std_counts,
             set_counts: counts,
+            believed_counts: counts,
+            n_rejected: 0.0,
             filtered_counts: counts,
             feed_forward_rad_s: 0.0,
+            hold_rad_s: 0.0,
+            periods_near: 0,
+            spool: 0.0,
+            play_side: 0.0,
             rest: Rest::Closed,
         });
+        let share = |time_s: f64| if time_s > 0.0 { 1.0 - (-CONTROL_PERIOD_S / time_s).exp() } else { 1.0 };
         Self {
-            spec: *spec,
             joints: joints.collect(),
-            filter_share: if spec.controller_filter_s > 0.0 {
-                1.0 - (-CONTROL_PERIOD_S / spec.controller_filter_s).exp()
-            } else {
-                1.0
-            },
+            tuning: Tuning { spec: *spec, filter_share: share(spec.controller_filter_s) },
             periods_since_command: PATH_PERIODS,
             path_periods: 0,
         }
@@ -93,30 +127,97 @@ impl Controller {
             if !on_path {
                 joint.feed_forward_rad_s = 0.0;
             }
-            *command = joint.update(&self.spec, self.filter_share, counts);
+            *command = joint.update(&self.tuning, counts);
         }
         commands
     }
 }
 
 impl JointLoop {
-    fn update(&mut self, spec: &HydraulicsSpec, filter_share: f64, counts: f64) -> f64 {
-        self.filtered_counts += filter_share * wrap(counts - self.filtered_counts, self.wrap_counts);
-        let away_rad = wrap(self.set_counts - self.filtered_counts, self.wrap_counts) / self.counts_per_rad;
-        let error_rad = away_rad + spec.controller_bias_rad;
-        let band = match self.rest {
+    fn update(&mut self, tuning: &Tuning, counts: f64) -> f64 {
+        let spec = &tuning.spec;
+        self.believe(spec, counts);
+        self.filtered_counts += tuning.filter_share * self.wrap(self.believed_counts - self.filtered_counts);
+        let error_rad = self.error_rad(self.filtered_counts) + spec.controller_bias_rad;
+        self.open_or_close(spec, error_rad);
+        let rate = match self.rest {
+            Rest::Closed => 0.0,
+            Rest::Open => {
+                self.integrate(spec, error_rad);
+                self.wanted_rad_s(spec, error_rad)
+            }
+        };
+        self.valve_command(spec, rate)
+    }
+
+    /// Leaves out a reading that the joint cannot have come to since the last believed one, but not too many in a row.
+    fn believe(&mut self, spec: &HydraulicsSpec, counts: f64) {
+        let elapsed_s = (self.n_rejected + 1.0) * CONTROL_PERIOD_S;
+        let travel_rad = REACHABLE * self.rate_limit_rad_s * spec.rate_margin * elapsed_s;
+        let reachable_counts = travel_rad * self.counts_per_rad.abs() + NOISE_SIGMAS * self.noise_counts;
+        let is_wild = self.wrap(counts - self.believed_counts).abs() > reachable_counts;
+        if is_wild && self.n_rejected < spec.controller_jump_reject {
+            self.n_rejected += 1.0;
+        } else {
+            self.n_rejected = 0.0;
+            self.believed_counts = counts;
+        }
+    }
+
+    /// The valve closes within the rest band, and opens again for a path or beyond twice the band. It stays open to hold a
+    /// joint against its creep.
+    fn open_or_close(&mut self, spec: &HydraulicsSpec, error_rad: f64) {
+        let band_rad = match self.rest {
             Rest::Closed => 2.0 * spec.rest_band_rad,
             Rest::Open => spec.rest_band_rad,
         };
-        if error_rad.abs() < band && self.feed_forward_rad_s == 0.0 {
+        let is_there = error_rad.abs() < band_rad && self.feed_forward_rad_s == 0.0;
+        if is_there && self.hold_rad_s.abs() < CREEP_RAD_S {
             self.rest = Rest::Closed;
-            return 0.0;
+            self.hold_rad_s = 0.0;
+            self.periods_near = 0;
+        } else {
+            self.rest = Rest::Open;
         }
-        self.rest = Rest::Open;
-        let wanted = self.feed_forward_rad_s + spec.controller_gain_per_s * error_rad;
-        let rate = wanted.clamp(-self.rate_limit_rad_s, self.rate_limit_rad_s);
-        let share = rate / (self.rate_limit_rad_s * spec.rate_margin);
-        share.signum() * (spec.deadband + (1.0 - spec.deadband) * share.abs())
+    }
+
+    /// A joint that does not arrive creeps faster than the error asks for: from then on the error's integral holds it.
+    fn integrate(&mut self, spec: &HydraulicsSpec, error_rad: f64) {
+        if self.feed_forward_rad_s != 0.0 || error_rad.abs() >= FAR_BANDS * spec.rest_band_rad {
+            self.periods_near = 0;
+            return;
+        }
+        self.periods_near = self.periods_near.saturating_add(1);
+        if self.hold_rad_s != 0.0 || f64::from(self.periods_near) * CONTROL_PERIOD_S > CREEP_TIME_S {
+            let limit_rad_s = CREEP_LIMIT * self.rate_limit_rad_s;
+            let step_rad_s = spec.controller_creep_gain * spec.controller_gain_per_s * error_rad * CONTROL_PERIOD_S;
+            self.hold_rad_s = (self.hold_rad_s + step_rad_s).clamp(-limit_rad_s, limit_rad_s);
+        }
+    }
+
+    fn wanted_rad_s(&self, spec: &HydraulicsSpec, error_rad: f64) -> f64 {
+        let wanted = self.feed_forward_rad_s + self.hold_rad_s + spec.controller_gain_per_s * error_rad;
+        wanted.clamp(-self.rate_limit_rad_s, self.rate_limit_rad_s)
+    }
+
+    /// The valve's command for a rate: over the deadband, and over the play to the side that the spool moves to.
+    fn valve_command(&mut self, spec: &HydraulicsSpec, rate_rad_s: f64) -> f64 {
+        let share = rate_rad_s / (self.rate_limit_rad_s * spec.rate_margin);
+        let spool =
+            if share == 0.0 { 0.0 } else { share.signum() * (spec.deadband + (1.0 - spec.deadband) * share.abs()) };
+        if spool != self.spool {
+            self.play_side = (spool - self.spool).signum();
+            self.spool = spool;
+        }
+        if spool == 0.0 { 0.0 } else { spool + 0.5 * spec.spool_hysteresis * self.play_side }
+    }
+
+    fn error_rad(&self, counts: f64) -> f64 {
+        self.wrap(self.set_counts - counts) / self.counts_per_rad
+    }
+
+    fn wrap(&self, counts: f64) -> f64 {
+        wrap(counts, self.wrap_counts)
     }
 }
 
@@ -189,5 +290,52 @@ mod tests {
         assert_eq!(controller.update(&JointCounts::from_slice(&[set]))[0], 0.0, "the path has ended");
         controller.command(&JointCounts::from_slice(&[set + 2000.0]));
         assert_eq!(controller.joints[0].feed_forward_rad_s, 0.0);
+    }
+
+    /// The command after each reading, for a controller that rests at 1000 counts.
+    fn commands(controller_jump_reject: f64, readings: &[f64]) -> Vec<f64> {
+        let mut controller = controller(1000.0);
+        controller.tuning.spec.controller_jump_reject = controller_jump_reject;
+        readings.iter().map(|counts| controller.update(&JointCounts::from_slice(&[*counts]))[0]).collect()
+    }
+
+    #[test]
+    fn a_reading_from_nowhere_moves_nothing() {
+        let readings = [1000.0, 0.0, 0.0, 1000.0, 65_535.0, 1000.0];
+        assert_eq!(commands(10.0, &readings), [0.0; 6], "a worn wiper lifts off for a moment");
+        let believing = commands(0.0, &readings);
+        assert!(believing[1] > 0.1 && believing[4] > 0.1, "{believing:?}");
+    }
+
+    #[test]
+    fn readings_that_stay_elsewhere_are_believed_in_the_end() {
+        let commands = commands(10.0, &[2000.0; 12]);
+        assert_eq!(commands[..10], [0.0; 10]);
+        assert!(commands[10] < -0.1 && commands[11] < -0.1, "{commands:?}");
+    }
+
+    #[test]
+    fn a_joint_at_its_full_rate_is_believed() {
+        let mut controller = controller(1000.0);
+        let counts_a_period = 0.5 * 1.3 * 2600.0 * CONTROL_PERIOD_S;
+        for period in 1..100 {
+            let counts = 1000.0 + f64::from(period) * counts_a_period;
+            controller.update(&JointCounts::from_slice(&[counts]));
+            assert_eq!(controller.joints[0].believed_counts, counts);
+        }
+    }
+
+    #[test]
+    fn the_play_is_taken_up_on_the_side_that_the_spool_moves_to() {
+        let mut controller = controller(1000.0);
+        let mut command = |rate: f64| {
+            let spec = HydraulicsSpec { spool_hysteresis: 0.02, ..HydraulicsSpec::default() };
+            controller.joints[0].valve_command(&spec, rate)
+        };
+        let spool = |rate: f64| 0.03 + 0.97 * rate / (0.5 * 1.3);
+        assert!((command(0.1) - (spool(0.1) + 0.01)).abs() < 1e-12, "opening");
+        assert!((command(0.1) - (spool(0.1) + 0.01)).abs() < 1e-12, "still the same side");
+        assert!((command(0.05) - (spool(0.05) - 0.01)).abs() < 1e-12, "closing");
+        assert_eq!(command(0.0), 0.0);
     }
 }
