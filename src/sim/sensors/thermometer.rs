@@ -1,8 +1,12 @@
 //! Thermometers in oil and water, and the depth gauge, at 1 Hz.
+//!
+//! A thermometer follows with a first-order lag (exact for temperatures that change evenly between its samples), and
+//! adds its bias and noise; its converter has a step. `gauge = (1 + scale error) pressure + bias + noise`.
 
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
+use crate::sim::as_built::GaugesAsBuilt;
 use crate::sim::spec::{TemperatureSpec, WaterSpec};
 use crate::sim::vehicle::GRAVITY_M_S2;
 use crate::stats::stream_rng;
@@ -12,67 +16,64 @@ use crate::time::Stamp;
 /// Of the air at the surface.
 const ATMOSPHERE_PA: f64 = 101_325.0;
 
-/// True temperatures over time: water that may change, oil that warms and follows it.
-#[derive(Clone, Copy, Debug)]
-pub(in crate::sim) struct Temperatures {
-    pub spec: TemperatureSpec,
-}
-
-impl Temperatures {
-    /// `start + rise (1 - exp(-t / b)) + change (1 - (a exp(-t / a) - b exp(-t / b)) / (a - b))`, Celsius: its own warming
-    /// with time constant b, and the water's change (time constant a) behind the same lag.
-    pub(in crate::sim) fn oil_c(&self, t_s: f64) -> f64 {
-        let spec = &self.spec;
-        let (water_s, oil_s) = (spec.water_time_constant_s, spec.oil_time_constant_s);
-        let (by_water, by_oil) = ((-t_s / water_s).exp(), (-t_s / oil_s).exp());
-        // Equal time constants: the limit of the quotient.
-        let followed = if (water_s - oil_s).abs() < 1e-6 * oil_s {
-            1.0 - by_oil * (1.0 + t_s / oil_s)
-        } else {
-            1.0 - (water_s * by_water - oil_s * by_oil) / (water_s - oil_s)
-        };
-        spec.oil_start_c + spec.oil_rise_k * (1.0 - by_oil) + spec.water_change_k * followed
-    }
-
-    /// `water + change (1 - exp(-t / a))`, Celsius.
-    pub(in crate::sim) fn water_c(&self, t_s: f64) -> f64 {
-        let spec = &self.spec;
-        spec.water_c + spec.water_change_k * (1.0 - (-t_s / spec.water_time_constant_s).exp())
-    }
-}
-
 /// The slow sensors.
 #[derive(Clone, Debug)]
 pub(in crate::sim) struct SlowSensors {
-    noise_k: f64,
+    spec: TemperatureSpec,
     water: WaterSpec,
-    oil: ChaCha8Rng,
-    sea: ChaCha8Rng,
+    built: GaugesAsBuilt,
+    oil: Probe,
+    sea: Probe,
     gauge: ChaCha8Rng,
 }
 
+/// The lag of a thermometer.
+#[derive(Clone, Debug)]
+struct Probe {
+    rng: ChaCha8Rng,
+    last: Option<Followed>,
+}
+
+/// At the last sample.
+#[derive(Clone, Copy, Debug)]
+struct Followed {
+    stamp: Stamp,
+    true_c: f64,
+    probe_c: f64,
+}
+
 impl SlowSensors {
-    pub(in crate::sim) fn new(temperature: &TemperatureSpec, water: &WaterSpec, seed: u64) -> Self {
+    pub(in crate::sim) fn new(
+        temperature: &TemperatureSpec,
+        water: &WaterSpec,
+        built: &GaugesAsBuilt,
+        seed: u64,
+    ) -> Self {
+        let probe = |name: &str| Probe { rng: stream_rng(seed, name), last: None };
         Self {
-            noise_k: temperature.thermometer_noise_k,
+            spec: *temperature,
             water: *water,
-            oil: stream_rng(seed, "thermometer/oil"),
-            sea: stream_rng(seed, "thermometer/water"),
+            built: *built,
+            oil: probe("thermometer/oil"),
+            sea: probe("thermometer/water"),
             gauge: stream_rng(seed, "depth_gauge"),
         }
     }
 
     pub(in crate::sim) fn temperature(&mut self, which: Thermometer, true_c: f64, stamp: Stamp) -> TemperatureSample {
-        let rng = match which {
-            Thermometer::Oil => &mut self.oil,
-            Thermometer::Water => &mut self.sea,
+        let (probe, bias_k) = match which {
+            Thermometer::Oil => (&mut self.oil, self.built.oil_bias_k),
+            Thermometer::Water => (&mut self.sea, self.built.water_bias_k),
         };
-        let noise: f64 = StandardNormal.sample(rng);
+        let noise_k = self.spec.thermometer_noise_k;
+        let noise: f64 = StandardNormal.sample(&mut probe.rng);
+        let shown_c = probe.follow(true_c, stamp, self.spec.thermometer_lag_s) + bias_k + noise_k * noise;
+        let step_k = self.spec.thermometer_resolution_k;
         TemperatureSample {
             stamp,
             thermometer: which,
-            temperature_c: true_c + self.noise_k * noise,
-            variance_c2: self.noise_k * self.noise_k,
+            temperature_c: if step_k > 0.0 { (shown_c / step_k).round() * step_k } else { shown_c },
+            variance_c2: noise_k * noise_k,
         }
     }
 
@@ -80,20 +81,83 @@ impl SlowSensors {
     pub(in crate::sim) fn pressure(&mut self, heave_m: f64, stamp: Stamp) -> PressureSample {
         let noise: f64 = StandardNormal.sample(&mut self.gauge);
         let depth_m = self.water.depth_m - heave_m;
-        let true_pa = ATMOSPHERE_PA + self.water.density_kg_m3 * GRAVITY_M_S2 * depth_m;
+        let true_pa = ATMOSPHERE_PA + gauge_pressure_pa(&self.water, depth_m);
         let noise_pa = self.water.pressure_noise_pa;
-        PressureSample { stamp, pressure_pa: true_pa + noise_pa * noise, variance_pa2: noise_pa * noise_pa }
+        let shown_pa = true_pa * (1.0 + self.built.pressure_scale_error) + self.built.pressure_bias_pa;
+        PressureSample { stamp, pressure_pa: shown_pa + noise_pa * noise, variance_pa2: noise_pa * noise_pa }
     }
+}
+
+impl Probe {
+    /// A probe that was never read has had time to settle.
+    fn follow(&mut self, true_c: f64, stamp: Stamp, lag_s: f64) -> f64 {
+        let probe_c = match self.last {
+            Some(last) if lag_s > 0.0 => {
+                let elapsed_s = stamp.since_s(last.stamp).max(f64::MIN_POSITIVE);
+                // Behind an even change the probe settles one lag late.
+                let late_k = lag_s * (true_c - last.true_c) / elapsed_s;
+                let unsettled_k = last.probe_c - (last.true_c - late_k);
+                true_c - late_k + unsettled_k * (-elapsed_s / lag_s).exp()
+            }
+            _ => true_c,
+        };
+        self.last = Some(Followed { stamp, true_c, probe_c });
+        probe_c
+    }
+}
+
+/// Of the water at a depth, above the surface's, Pa.
+pub(in crate::sim) fn gauge_pressure_pa(water: &WaterSpec, depth_m: f64) -> f64 {
+    water.density_kg_m3 * GRAVITY_M_S2 * depth_m
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::time::SIMULATION_EPOCH;
+
+    fn sensors(temperature: &TemperatureSpec, built: &GaugesAsBuilt) -> SlowSensors {
+        let silent = TemperatureSpec { thermometer_noise_k: 0.0, ..*temperature };
+        let water = WaterSpec { pressure_noise_pa: 0.0, ..WaterSpec::default() };
+        SlowSensors::new(&silent, &water, built, 1)
+    }
+
+    /// A step, then an even rise: closed forms of a first-order lag, at 1 Hz and at uneven times.
+    #[test]
+    fn a_thermometer_lags_as_its_closed_form() {
+        let spec = TemperatureSpec { thermometer_lag_s: 20.0, ..TemperatureSpec::default() };
+        for seconds in [vec![1.0; 120], vec![0.5, 3.0, 7.5, 40.0, 69.0]] {
+            for (jump_k, rise_k_s) in [(5.0, 0.0), (0.0, 0.03)] {
+                let mut slow = sensors(&spec, &GaugesAsBuilt::default());
+                let mut read = |true_c: f64, t_s: f64| {
+                    slow.temperature(Thermometer::Oil, true_c, SIMULATION_EPOCH.plus_s(t_s)).temperature_c
+                };
+                assert_eq!(read(10.0, 0.0), 10.0);
+                // The step lies just after the first sample.
+                let mut t_s = 1e-6;
+                let mut shown = read(10.0 + jump_k, t_s);
+                for elapsed_s in &seconds {
+                    t_s += elapsed_s;
+                    shown = read(10.0 + jump_k + rise_k_s * t_s, t_s);
+                }
+                let left = (-t_s / 20.0_f64).exp();
+                let expected = 10.0 + jump_k * (1.0 - left) + rise_k_s * (t_s - 20.0 * (1.0 - left));
+                // The step takes a microsecond, over which the probe already follows.
+                assert!((shown - expected).abs() < 1e-6, "{shown} against {expected}");
+            }
+        }
+    }
 
     #[test]
-    fn the_oil_warms_by_six_kelvin_within_ten_minutes() {
-        let temperatures = Temperatures { spec: TemperatureSpec::default() };
-        assert!((temperatures.oil_c(0.0) - 10.0).abs() < 1e-12);
-        assert!(temperatures.oil_c(600.0) - temperatures.oil_c(0.0) > 6.0);
+    fn biases_add_scales_multiply_and_steps_round() {
+        let built =
+            GaugesAsBuilt { oil_bias_k: 0.3, water_bias_k: -0.2, pressure_bias_pa: 700.0, pressure_scale_error: 1e-3 };
+        let spec = TemperatureSpec { thermometer_resolution_k: 0.25, ..TemperatureSpec::default() };
+        let mut slow = sensors(&spec, &built);
+        let at = SIMULATION_EPOCH;
+        assert_eq!(slow.temperature(Thermometer::Oil, 10.0, at).temperature_c, 10.25);
+        assert_eq!(slow.temperature(Thermometer::Water, 4.0, at).temperature_c, 3.75);
+        let true_pa = 101_325.0 + 1025.0 * 9.806_65 * 498.0;
+        assert!((slow.pressure(2.0, at).pressure_pa - (true_pa * 1.001 + 700.0)).abs() < 1e-6);
     }
 }

@@ -1,0 +1,90 @@
+//! What is drawn, and what of it the truth writes down.
+
+use std::path::Path;
+
+use super::*;
+use crate::robot::{SensorKind, load, load_vehicle};
+
+fn robot() -> Robot {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots");
+    let vehicle = load_vehicle(&root.join("vehicles/work-class-front.toml")).expect("it reads");
+    load(&root.join("titan4")).expect("it reads").mounted_on(&vehicle).expect("it fits")
+}
+
+fn rms(values: &[f64]) -> f64 {
+    (values.iter().map(|x| x * x).sum::<f64>() / values.len() as f64).sqrt()
+}
+
+/// Effects that are off leave no trace in the truth, and truths without them read.
+#[test]
+fn the_standard_world_writes_down_what_it_always_did() {
+    let built = AsBuilt::draw(&robot(), &WorldSpec::default(), 5);
+    let text = toml::to_string(&built).expect("text");
+    for key in ["worn_spot", "pressure", "eccentricity", "resolver", "gauges", "attitude", "lens", "dome"] {
+        assert!(!text.contains(key), "{key} in {text}");
+    }
+    assert_eq!(toml::from_str::<AsBuilt>(&text).expect("it reads"), built);
+}
+
+#[test]
+fn a_rich_world_reads_back() {
+    let mut spec = WorldSpec::default();
+    spec.joint_sensors.worn_spot_peak_rad = 0.01;
+    spec.joint_sensors.pressure_offset_std_rad_per_mpa = 1e-4;
+    spec.joint_sensors.encoder_eccentricity_rad = 1e-3;
+    spec.joint_sensors.resolver_imbalance_std = 1e-3;
+    spec.temperature.thermometer_bias_std_k = 0.2;
+    spec.vehicle.gyro_bias_std_rad_s = 1e-4;
+    spec.camera.focal_std = 1e-3;
+    spec.camera.port = crate::sim::spec::PortKind::Dome;
+    spec.camera.dome_decentre_std_m = 1e-3;
+    let mut robot = robot();
+    robot.sensors[1].kind = SensorKind::Encoder;
+    robot.sensors[2].kind = SensorKind::Resolver;
+    let built = AsBuilt::draw(&robot, &spec, 5);
+    let text = toml::to_string(&built).expect("text");
+    assert_eq!(toml::from_str::<AsBuilt>(&text).expect("it reads"), built);
+    let [pot, encoder, resolver] = [0, 1, 2].map(|j| &built.joints[j]);
+    assert!(pot.worn_spot.is_some() && pot.eccentricity.is_none() && pot.resolver.is_none());
+    assert!(encoder.eccentricity.is_some() && encoder.worn_spot.is_none() && encoder.harmonics.is_empty());
+    assert!(resolver.resolver.is_some() && resolver.eccentricity.is_none());
+    for other in [encoder, resolver] {
+        let of_a_track = [
+            other.gain_error,
+            other.temperature_offset_rad_per_k,
+            other.temperature_gain_per_k,
+            other.pressure_offset_rad_per_mpa,
+        ];
+        assert_eq!(of_a_track, [0.0; 4]);
+        assert!(other.offset_error_rad != 0.0);
+    }
+    // One more effect moves no other.
+    let plain = AsBuilt::draw(&robot, &WorldSpec::default(), 5);
+    assert_eq!(plain.joints[0].harmonics, pot.harmonics);
+    assert_eq!(plain.joints[0].gain_error, pot.gain_error);
+    assert_eq!((plain.camera_mount, plain.tags), (built.camera_mount, built.tags));
+}
+
+#[test]
+fn joints_differ_as_the_world_asks() {
+    let mut spec = WorldSpec::default();
+    spec.joint_sensors.worn_spot_peak_rad = 0.01;
+    spec.joint_sensors.pressure_offset_std_rad_per_mpa = 1e-4;
+    spec.joint_sensors.pressure_gain_std_per_mpa = 2e-5;
+    let robot = robot();
+    let joints: Vec<JointAsBuilt> = (0..400).flat_map(|seed| AsBuilt::draw(&robot, &spec, seed).joints).collect();
+    let n = joints.len() as f64;
+    // Standard deviations are known to 1 / sqrt(2 n), 1.4 %.
+    let offsets: Vec<f64> = joints.iter().map(|j| j.pressure_offset_rad_per_mpa).collect();
+    let gains: Vec<f64> = joints.iter().map(|j| j.pressure_gain_per_mpa).collect();
+    assert!((rms(&offsets) / 1e-4 - 1.0).abs() < 0.06 && (rms(&gains) / 2e-5 - 1.0).abs() < 0.06);
+    let spots: Vec<WornSpot> = joints.iter().map(|j| j.worn_spot.expect("a spot")).collect();
+    let places: Vec<f64> =
+        spots.iter().zip(&joints).map(|(s, j)| (s.center_rad - j.center_rad) / j.range_rad).collect();
+    assert!(places.iter().all(|place| place.abs() <= 0.4), "within the middle 80 %");
+    // Uniform: rms 0.4 / sqrt(3), known to 0.45 / sqrt(n).
+    assert!((rms(&places) * 3.0_f64.sqrt() / 0.4 - 1.0).abs() < 4.0 * 0.45 / n.sqrt(), "{}", rms(&places));
+    let up = spots.iter().filter(|spot| spot.peak_rad > 0.0).count() as f64 / n;
+    assert!((up - 0.5).abs() < 4.0 * 0.5 / n.sqrt(), "{up}");
+    assert!(spots.iter().all(|spot| spot.peak_rad.abs() == 0.01));
+}

@@ -1,0 +1,94 @@
+//! How one tag is seen. Sight lines are straight: what hides a tag lies in the water like the tag.
+
+use nalgebra::{Isometry3, Point3, Vector2, Vector3};
+
+use super::eye::Eye;
+use crate::optics::square_corners;
+use crate::sim::solids::Solids;
+use crate::sim::spec::CameraWorldSpec;
+
+/// Sight lines end this far before the tag: it is glued to something, and its place is not exact.
+const CLEAR_OF_BACKING_M: f64 = 0.006;
+
+#[derive(Clone, Copy, Debug)]
+pub(super) struct TagInBase {
+    pub id: u32,
+    pub size_m: f64,
+    pub base_from_tag: Isometry3<f64>,
+}
+
+/// How a tag is seen.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct View {
+    pub corners_px: [Vector2<f64>; 4],
+    range_m: f64,
+    cos_incidence: f64,
+    side_px: f64,
+    /// The farthest that a corner moved while the shutter was open.
+    blur_px: f64,
+}
+
+/// What it takes to see.
+#[derive(Clone, Copy)]
+pub(super) struct Sight<'a> {
+    pub spec: &'a CameraWorldSpec,
+    pub eye: &'a Eye,
+    pub solids: &'a Solids,
+    pub housing: &'a [usize],
+}
+
+impl Sight<'_> {
+    pub(super) fn view(&self, tag: &TagInBase, base_from_camera: &Isometry3<f64>) -> Option<View> {
+        let camera_from_tag = base_from_camera.inverse() * tag.base_from_tag;
+        let center = camera_from_tag.translation.vector;
+        let range_m = center.norm();
+        let normal = camera_from_tag.rotation * Vector3::z();
+        let cos_incidence = -normal.dot(&center) / range_m;
+        if range_m > self.spec.max_range_m || cos_incidence < self.spec.max_incidence_rad.cos() {
+            return None;
+        }
+        let corners_px = self.corners_px(tag, &camera_from_tag)?;
+        let side_px = (0..4).map(|k| (corners_px[k] - corners_px[(k + 1) % 4]).norm()).fold(f64::INFINITY, f64::min);
+        let eye = Point3::from(base_from_camera.translation.vector);
+        let lifted = |p: &Point3<f64>| tag.base_from_tag * (p + Vector3::z() * CLEAR_OF_BACKING_M);
+        let hidden = |p: &Point3<f64>| self.solids.hides(&eye, &lifted(p), self.housing);
+        let corners = square_corners(tag.size_m);
+        if side_px < self.spec.min_side_px || hidden(&Point3::origin()) || corners.iter().any(hidden) {
+            return None;
+        }
+        Some(View { corners_px, range_m, cos_incidence, side_px, blur_px: 0.0 })
+    }
+
+    /// The mean over the time that the shutter was open, from where the camera was at its start and halfway; `None` for a tag
+    /// that was not in the image all the time.
+    pub(super) fn smeared(&self, view: View, tag: &TagInBase, before: Option<&[Isometry3<f64>; 2]>) -> Option<View> {
+        let Some([start, middle]) = before else { return Some(view) };
+        let start = self.corners_px(tag, &(start.inverse() * tag.base_from_tag))?;
+        let middle = self.corners_px(tag, &(middle.inverse() * tag.base_from_tag))?;
+        let end = view.corners_px;
+        let corners_px = std::array::from_fn(|k| (start[k] + middle[k] * 4.0 + end[k]) / 6.0);
+        let blur_px = (0..4).map(|k| (end[k] - start[k]).norm()).fold(0.0, f64::max);
+        Some(View { corners_px, blur_px, ..view })
+    }
+
+    fn corners_px(&self, tag: &TagInBase, camera_from_tag: &Isometry3<f64>) -> Option<[Vector2<f64>; 4]> {
+        let mut corners_px = [Vector2::zeros(); 4];
+        for (pixel, corner) in corners_px.iter_mut().zip(&square_corners(tag.size_m)) {
+            *pixel = self.eye.project(&(camera_from_tag * corner).coords).filter(|p| self.eye.contains(p))?;
+        }
+        Some(corners_px)
+    }
+}
+
+impl View {
+    /// Per coordinate.
+    pub(super) fn corner_std_px(&self, spec: &CameraWorldSpec) -> f64 {
+        let sharp_px = spec.corner_noise_px * (0.8 + 0.2 * self.range_m) / self.cos_incidence.sqrt();
+        sharp_px * (1.0 + spec.blur_noise_per_px * self.blur_px)
+    }
+
+    /// Plausible figures for a reader who filters by margin: large and frontal tags near 100.
+    pub(super) fn decision_margin(&self) -> f64 {
+        100.0 * self.cos_incidence * (1.0 - (-self.side_px / 40.0).exp())
+    }
+}
