@@ -9,10 +9,11 @@ use super::error::Rejection;
 use super::ros::{self, Time};
 use super::topics::Stream;
 use crate::streams::{
-    Attitude, CaptureSet, JointAngles, JointCommand, JointCounts, JointSensorSample, JointStateBelief, LogLevel,
-    LogLine, MAX_JOINTS, Mark, MarkKind, Message, Phase, PressureSample, ReachAttempt, ReachTask, RecordedSurvey,
-    RecordedTag, Start, TagDetection, TagDetections, TemperatureSample, Thermometer,
+    Attitude, CaptureSet, GripperCommand, GripperSample, JointAngles, JointCommand, JointCounts, JointSensorSample,
+    JointStateBelief, LogLevel, LogLine, MAX_JOINTS, Mark, MarkKind, Message, Phase, PressureSample, ReachAttempt,
+    ReachTask, RecordedSurvey, RecordedTag, Start, TagDetection, TagDetections, TemperatureSample, Thermometer,
 };
+use crate::time::Stamp;
 
 /// How far a quaternion's length may be from 1. Float32 senders are within 1e-6; a zero quaternion is far off.
 const QUATERNION_LENGTH_TOLERANCE: f64 = 0.01;
@@ -59,6 +60,14 @@ pub(super) fn decode_message(stream: Stream, bytes: &[u8], names: &mut FirstName
         Stream::WaterTemperature => Message::Temperature(temperature(&cdr::decode(bytes)?, Thermometer::Water)?),
         Stream::DepthPressure => Message::Pressure(pressure(&cdr::decode(bytes)?)?),
         Stream::VehicleImu => Message::Attitude(attitude(&cdr::decode(bytes)?)?),
+        Stream::GripperState => {
+            let (stamp, opening_m) = gripper(&cdr::decode(bytes)?)?;
+            Message::Gripper(GripperSample { stamp, opening_m })
+        }
+        Stream::GripperCommand => {
+            let (stamp, opening_m) = gripper(&cdr::decode(bytes)?)?;
+            Message::GripperCommand(GripperCommand { stamp, opening_m })
+        }
         Stream::Task => Message::Task(task(&cdr::decode(bytes)?)?),
         Stream::TagSurvey => Message::Survey(survey(&cdr::decode(bytes)?)?),
         Stream::Marks => Message::Mark(mark(&cdr::decode(bytes)?)?),
@@ -156,6 +165,15 @@ fn attitude(m: &ros::Imu) -> Result<Attitude, Rejection> {
     Ok(Attitude { stamp, quaternion_wxyz, angular_velocity_rad_s, specific_force_m_s2 })
 }
 
+/// One joint by any name: its position is the gap between the jaws, m.
+fn gripper(m: &ros::JointState) -> Result<(Stamp, f64), Rejection> {
+    let [opening_m] = m.position[..] else {
+        return Err(Rejection::JointCount { got: m.position.len(), expected: 1 });
+    };
+    finite("position", [opening_m])?;
+    Ok((m.header.stamp.try_into()?, opening_m))
+}
+
 fn task(m: &ros::ReachTask) -> Result<ReachTask, Rejection> {
     let targets_m: Vec<[f64; 3]> = m.targets.iter().copied().map(Into::into).collect();
     finite("targets", targets_m.iter().flatten().copied())?;
@@ -209,6 +227,7 @@ fn mark(m: &ros::Mark) -> Result<Mark, Rejection> {
         "recalibrate" => MarkKind::Calibrate(Start::Warm),
         "reach_before" => MarkKind::Reach { attempt: ReachAttempt::Before, target_idx: m.index },
         "reach_after" => MarkKind::Reach { attempt: ReachAttempt::After, target_idx: m.index },
+        "touch" => MarkKind::Touch { target_idx: m.index },
         "phase_plan" => MarkKind::Phase(Phase::Plan),
         "phase_move" => MarkKind::Phase(Phase::Move),
         "phase_settle" => MarkKind::Phase(Phase::Settle),

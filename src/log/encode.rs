@@ -23,6 +23,9 @@ struct JointStateView<'a> {
     effort: &'a [f64],
 }
 
+/// Name of the one joint on the gripper's topics.
+const GRIPPER_JOINT: &str = "gripper";
+
 /// Encodes `message` into `out`, whose former content goes.
 ///
 /// # Errors
@@ -40,6 +43,8 @@ pub(super) fn encode_message(
         Message::Temperature(m) => Ok(cdr::encode(&temperature(m, header)?, out)?),
         Message::Pressure(m) => Ok(cdr::encode(&pressure(m, header)?, out)?),
         Message::Attitude(m) => Ok(cdr::encode(&attitude(m, header)?, out)?),
+        Message::Gripper(m) => Ok(cdr::encode(&gripper(m.stamp, m.opening_m)?, out)?),
+        Message::GripperCommand(m) => Ok(cdr::encode(&gripper(m.stamp, m.opening_m)?, out)?),
         Message::Task(m) => Ok(cdr::encode(&task(m, header)?, out)?),
         Message::Survey(m) => Ok(cdr::encode(&survey(m, header)?, out)?),
         Message::Mark(m) => Ok(cdr::encode(&mark(m)?, out)?),
@@ -104,6 +109,16 @@ fn attitude(m: &Attitude, header: &RecordingHeader) -> Result<ros::Imu, EncodeEr
     })
 }
 
+/// The jaws as one joint: its position is the gap between them.
+fn gripper(stamp: Stamp, opening_m: f64) -> Result<ros::JointState, EncodeError> {
+    Ok(ros::JointState {
+        header: ros_header(stamp, "")?,
+        name: vec![GRIPPER_JOINT.to_owned()],
+        position: vec![opening_m],
+        ..ros::JointState::default()
+    })
+}
+
 fn task(m: &ReachTask, header: &RecordingHeader) -> Result<ros::ReachTask, EncodeError> {
     Ok(ros::ReachTask {
         header: ros_header(m.stamp, &header.base_frame)?,
@@ -142,6 +157,7 @@ fn mark_kind(kind: MarkKind) -> (&'static str, u32) {
         MarkKind::Calibrate(Start::Warm) => ("recalibrate", 0),
         MarkKind::Reach { attempt: ReachAttempt::Before, target_idx } => ("reach_before", target_idx),
         MarkKind::Reach { attempt: ReachAttempt::After, target_idx } => ("reach_after", target_idx),
+        MarkKind::Touch { target_idx } => ("touch", target_idx),
         MarkKind::Phase(phase) => {
             let name = match phase {
                 Phase::Plan => "phase_plan",

@@ -2,9 +2,9 @@
 
 use super::writer::{RecordingHeader, RecordingWriter};
 use crate::streams::{
-    Attitude, CaptureSet, JointAngles, JointCommand, JointCounts, JointSensorSample, JointStateBelief, LogLevel,
-    LogLine, Mark, MarkKind, Message, Phase, PressureSample, ReachAttempt, ReachTask, RecordedSurvey, RecordedTag,
-    Sink, Start, TagDetection, TagDetections, TemperatureSample, Thermometer,
+    Attitude, CaptureSet, GripperCommand, GripperSample, JointAngles, JointCommand, JointCounts, JointSensorSample,
+    JointStateBelief, LogLevel, LogLine, Mark, MarkKind, Message, Phase, PressureSample, ReachAttempt, ReachTask,
+    RecordedSurvey, RecordedTag, Sink, Start, TagDetection, TagDetections, TemperatureSample, Thermometer,
 };
 use crate::time::{SIMULATION_EPOCH, Stamp};
 use std::path::Path;
@@ -22,6 +22,7 @@ fn marks(stamp: Stamp) -> Vec<Message> {
         MarkKind::Calibrate(Start::Warm),
         MarkKind::Reach { attempt: ReachAttempt::Before, target_idx: 5 },
         MarkKind::Reach { attempt: ReachAttempt::After, target_idx: 6 },
+        MarkKind::Touch { target_idx: 6 },
     ];
     let phases = [
         Phase::Plan,
@@ -69,6 +70,8 @@ pub fn one_of_each() -> Vec<Message> {
             angular_velocity_rad_s: [0.01, 0.02, -0.03],
             specific_force_m_s2: [0.0, 0.1, 9.81],
         }),
+        Message::Gripper(GripperSample { stamp, opening_m: 0.0985 }),
+        Message::GripperCommand(GripperCommand { stamp, opening_m: 0.1 }),
         Message::Task(ReachTask { stamp, targets_m: vec![[1.0, 0.2, -0.3], [0.9, 0.0, 0.1]], tolerance_m: 0.01 }),
         Message::Survey(RecordedSurvey { stamp, base_tag: 12, tags: vec![tag_at(3, 1.1), tag_at(12, -0.2)] }),
     ];

@@ -15,6 +15,10 @@ pub const OIL_TEMPERATURE: &str = "/temperature/oil";
 pub const WATER_TEMPERATURE: &str = "/temperature/water";
 pub const DEPTH_PRESSURE: &str = "/depth_pressure";
 pub const VEHICLE_IMU: &str = "/vehicle/imu";
+/// The gap between the jaws, m in `position`.
+pub const GRIPPER_STATE: &str = "/gripper_state";
+/// The gap that the jaws are driven to, m in `position`.
+pub const GRIPPER_COMMAND: &str = "/gripper_command";
 pub const TASK: &str = "/task";
 pub const TAG_SURVEY: &str = "/tag_survey";
 pub const MARKS: &str = "/marks";
@@ -40,6 +44,8 @@ pub enum Stream {
     WaterTemperature,
     DepthPressure,
     VehicleImu,
+    GripperState,
+    GripperCommand,
     Task,
     TagSurvey,
     Marks,
@@ -47,7 +53,7 @@ pub enum Stream {
 }
 
 impl Stream {
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 14] = [
         Self::JointSensors,
         Self::JointCommands,
         Self::JointStates,
@@ -56,6 +62,8 @@ impl Stream {
         Self::WaterTemperature,
         Self::DepthPressure,
         Self::VehicleImu,
+        Self::GripperState,
+        Self::GripperCommand,
         Self::Task,
         Self::TagSurvey,
         Self::Marks,
@@ -76,6 +84,8 @@ impl Stream {
             },
             Message::Pressure(_) => Self::DepthPressure,
             Message::Attitude(_) => Self::VehicleImu,
+            Message::Gripper(_) => Self::GripperState,
+            Message::GripperCommand(_) => Self::GripperCommand,
             Message::Task(_) => Self::Task,
             Message::Survey(_) => Self::TagSurvey,
             Message::Mark(_) => Self::Marks,
@@ -95,6 +105,8 @@ impl Stream {
             Self::WaterTemperature => WATER_TEMPERATURE,
             Self::DepthPressure => DEPTH_PRESSURE,
             Self::VehicleImu => VEHICLE_IMU,
+            Self::GripperState => GRIPPER_STATE,
+            Self::GripperCommand => GRIPPER_COMMAND,
             Self::Task => TASK,
             Self::TagSurvey => TAG_SURVEY,
             Self::Marks => MARKS,
@@ -106,7 +118,11 @@ impl Stream {
     #[must_use]
     pub fn schema(self) -> &'static RosSchema {
         match self {
-            Self::JointSensors | Self::JointCommands | Self::JointStates => &ros::JointState::SCHEMA,
+            Self::JointSensors
+            | Self::JointCommands
+            | Self::JointStates
+            | Self::GripperState
+            | Self::GripperCommand => &ros::JointState::SCHEMA,
             Self::Detections => &ros::AprilTagDetectionArray::SCHEMA,
             Self::OilTemperature | Self::WaterTemperature => &ros::Temperature::SCHEMA,
             Self::DepthPressure => &ros::FluidPressure::SCHEMA,

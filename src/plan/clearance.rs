@@ -43,6 +43,8 @@ pub struct ClearanceModel<'a> {
     /// Joints whose error moves a collision shape in a way that matters.
     n_error_joints: usize,
     pairs: Vec<Pair>,
+    /// By how much the gripper stands out beyond its shapes, m.
+    gripper_growth_m: f64,
 }
 
 /// Distances beyond this are all the same to planning, m.
@@ -74,7 +76,13 @@ impl<'a> ClearanceModel<'a> {
         // The last joint turns a nearly round gripper about its own axis: its error moves no outline.
         let n_error_joints = robot.chain.joints().iter().filter(|joint| joint.limits.is_some()).count();
         let pairs = pairs(&moving, &standing);
-        Self { robot, moving, standing, n_error_joints, pairs }
+        Self { robot, moving, standing, n_error_joints, pairs, gripper_growth_m: 0.0 }
+    }
+
+    /// The same with a gripper that stands out by `growth_m` more than its shapes: its jaws are open.
+    #[must_use]
+    pub fn with_grown_gripper(self, growth_m: f64) -> Self {
+        Self { gripper_growth_m: growth_m, ..self }
     }
 
     /// The closest pair for one arm exactly at `angles`; distances are cut off at 0.4 m.
@@ -237,11 +245,22 @@ impl ClearanceModel<'_> {
             Pair::Standing { standing, .. } => margin_m + self.standing[standing].motion_m,
             Pair::Links { .. } => margin_m - SELF_EASE_M,
         };
-        needed_m.max(TOUCHING_M)
+        needed_m.max(TOUCHING_M) + self.growth_m(pair)
+    }
+
+    /// What open jaws take from the distance of a pair.
+    fn growth_m(&self, pair: Pair) -> f64 {
+        let is_gripper = |moving: usize| self.moving[moving].body == self.robot.tool.mount.n_joints;
+        let grows = match pair {
+            Pair::Standing { moving, .. } => is_gripper(moving),
+            Pair::Links { outer, inner } => is_gripper(outer) || is_gripper(inner),
+        };
+        if grows { self.gripper_growth_m } else { 0.0 }
     }
 
     /// A true distance in the terms of the margin; shapes that touch stay at zero.
     pub(super) fn in_margin_m(&self, pair: Pair, distance_m: f64) -> f64 {
+        let distance_m = (distance_m - self.growth_m(pair)).max(0.0);
         match pair {
             // An obstacle inside the margin for the vehicle's motion is as near as touching.
             Pair::Standing { standing, .. } => (distance_m - self.standing[standing].motion_m).max(0.0),

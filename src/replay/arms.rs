@@ -36,6 +36,11 @@ impl Run<'_> {
         truth.or_else(|| self.believed_tool(time_s))
     }
 
+    /// The gap between the jaws as measured, m.
+    fn opening_m(&self, time_s: f64) -> Option<f64> {
+        self.tracks.gripper.between(time_s, |a, b, share| a + share * (b - a))
+    }
+
     /// Whether true joint angles are known.
     pub(super) fn has_true_joints(&self) -> bool {
         self.truth.as_ref().is_some_and(|truth| truth.angles(0.0).is_some())
@@ -68,9 +73,10 @@ pub(super) fn draw(run: &Run, stream: &mut Stream) {
     draw_captures(run, stream);
 }
 
-/// One drawn arm: a moving entity for each body.
+/// One drawn arm: a moving entity for each body and each jaw.
 struct Arm {
     bodies: Vec<Mover>,
+    jaws: Vec<Mover>,
 }
 
 impl Arm {
@@ -84,13 +90,24 @@ impl Arm {
             }
             bodies.push(Mover::new(entity));
         }
-        Self { bodies }
+        let mut jaws = Vec::new();
+        for (n, jaw) in run.robot.gripper.iter().flat_map(|gripper| &gripper.jaws).enumerate() {
+            let entity = format!("{BASE}/{name}/jaw_{n}_{}", path_part(&jaw.name));
+            fix_shapes(stream, &entity, &jaw.visuals, look);
+            jaws.push(Mover::new(entity));
+        }
+        Self { bodies, jaws }
     }
 
     fn place(&mut self, run: &Run, stream: &mut Stream, time_s: f64, angles: &JointAngles) {
         let poses = run.robot.chain.link_poses(angles);
         for (n, body) in self.bodies.iter_mut().enumerate() {
             body.place(stream, time_s, poses.link(n));
+        }
+        let Some(gripper) = &run.robot.gripper else { return };
+        let opening_m = run.opening_m(time_s).unwrap_or(gripper.rest_opening_m);
+        for (n, jaw) in self.jaws.iter_mut().enumerate() {
+            jaw.place(stream, time_s, &(poses.link(gripper.body) * gripper.shift(n, opening_m)));
         }
     }
 }

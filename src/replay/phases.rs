@@ -129,6 +129,10 @@ fn draw_log(run: &Run, stream: &mut Stream) {
         );
         lines.push((arrival.time_s, "truth".to_owned(), TextLog::new(text).with_level(TextLogLevel::INFO)));
     }
+    for (time_s, fault) in run.truth.iter().flat_map(|truth| &truth.faults) {
+        let line = TextLog::new(format!("fault: {fault}")).with_level(TextLogLevel::WARN);
+        lines.push((*time_s, "truth".to_owned(), line));
+    }
     lines.sort_by(|a, b| a.0.total_cmp(&b.0));
     for (time_s, sender, line) in lines {
         let sender = if sender.is_empty() { "run" } else { sender.as_str() };

@@ -11,8 +11,8 @@ use crate::robot::{Hull, Part, PlacedShape, Shape};
 use crate::routine::Scene;
 use crate::sensor::ArmSensors;
 use crate::streams::{
-    CaptureSet, JointAngles, JointSensorSample, JointStateBelief, LogLevel, LogLine, Mark, MarkKind, Message, Phase,
-    ReachAttempt, ReachTask, Sink, TagDetection, TagDetections, TemperatureSample, Thermometer,
+    CaptureSet, GripperSample, JointAngles, JointSensorSample, JointStateBelief, LogLevel, LogLine, Mark, MarkKind,
+    Message, Phase, ReachAttempt, ReachTask, Sink, TagDetection, TagDetections, TemperatureSample, Thermometer,
 };
 use crate::time::SIMULATION_EPOCH;
 
@@ -267,6 +267,55 @@ fn a_run_becomes_a_file_that_rerun_reads() {
     }
     assert!(entities.keys().any(|entity| entity.contains("/believed_arm/6_")));
     assert!(entities["/plots/joint_error"] > 100);
+}
+
+#[test]
+fn jaws_move_while_the_arm_rests() {
+    let (dir, mut recording, _, robot) = small();
+    let rows = |recording: &Recording, name: &str| {
+        let out = dir.path().join(name);
+        write_rrd(&input(recording, &robot), &out).unwrap();
+        let entities = entities(&out);
+        let of = |part: &str| {
+            let found = entities.iter().find(|(entity, _)| entity.contains(part));
+            *found.unwrap_or_else(|| panic!("{part} is not among {:?}", entities.keys())).1
+        };
+        (of("/base/arm/6_"), of("/base/arm/jaw_0_jaw_left_link"), of("/base/arm/jaw_1_jaw_right_link"))
+    };
+    let (link, left, right) = rows(&recording, "still.rrd");
+    assert!(left == link && right == link, "{link} {left} {right}");
+    let (start, end) = (recording.messages[0].0, recording.messages[recording.messages.len() - 1].0);
+    let n = (end.since_s(start) * 25.0) as u32;
+    for k in 0..n {
+        let stamp = start.plus_s(0.04 * f64::from(k));
+        let opening_m = 0.1 * f64::from(k) / f64::from(n);
+        recording.messages.push((stamp, Message::Gripper(GripperSample { stamp, opening_m })));
+    }
+    recording.messages.sort_by_key(|(log_time, _)| *log_time);
+    let (link, left, right) = rows(&recording, "opening.rrd");
+    assert!(left > link + 20 && right == left, "{link} {left} {right}");
+}
+
+#[test]
+fn what_broke_stands_in_the_log() {
+    #[derive(serde::Serialize)]
+    struct Fault {
+        header: ros::Header,
+        kind: &'static str,
+        details: &'static str,
+    }
+    let (dir, recording, _, robot) = small();
+    let truth = dir.path().join("faults.mcap");
+    let mut writer = RecordingWriter::create(&truth, RecordingHeader::new(Vec::new())).unwrap();
+    let schema = crate::log::RosSchema { name: "armcal_msgs/msg/Fault", text: "" };
+    let stamp = SIMULATION_EPOCH.plus_s(2.0);
+    let header = ros::Header { stamp: stamp.try_into().unwrap(), frame_id: String::new() };
+    let fault = Fault { header, kind: "tag_lost", details: "id = 3" };
+    writer.write_ros("/truth/faults", &schema, stamp, &fault).unwrap();
+    writer.finish().unwrap();
+    let out = dir.path().join("run.rrd");
+    write_rrd(&ReplayInput { truth: Some(&truth), ..input(&recording, &robot) }, &out).unwrap();
+    assert_eq!(entities(&out).get("/log/truth"), Some(&1));
 }
 
 #[test]

@@ -91,6 +91,8 @@ pub(super) struct Tracks<'a> {
     pub attitude: Track<UnitQuaternion<f64>>,
     pub oil_c: Track<f64>,
     pub water_c: Track<f64>,
+    /// Between the jaws, m.
+    pub gripper: Track<f64>,
     pub views: Vec<(f64, &'a TagDetections)>,
     pub task: Option<(f64, &'a ReachTask)>,
     pub marks: Vec<Span>,
@@ -116,6 +118,7 @@ impl<'a> Tracks<'a> {
             attitude: Track::default(),
             oil_c: Track::default(),
             water_c: Track::default(),
+            gripper: Track::default(),
             views: Vec::new(),
             task: None,
             marks: Vec::new(),
@@ -147,11 +150,12 @@ impl<'a> Tracks<'a> {
                 Thermometer::Oil => self.oil_c.push(at(m.stamp), m.temperature_c),
                 Thermometer::Water => self.water_c.push(at(m.stamp), m.temperature_c),
             },
+            Message::Gripper(m) => self.gripper.push(at(m.stamp), m.opening_m),
             Message::Detections(m) => self.views.push((at(m.stamp), m)),
             Message::Task(m) => self.task = Some((at(m.stamp), m)),
             Message::Mark(m) => self.marks.push(self.span(log_time, m)),
             Message::Log(m) => self.log.push((at(m.stamp), m)),
-            Message::JointCommand(_) | Message::Pressure(_) | Message::Survey(_) => {}
+            Message::JointCommand(_) | Message::GripperCommand(_) | Message::Pressure(_) | Message::Survey(_) => {}
         }
     }
 

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use nalgebra::Isometry3;
+use serde::Deserialize;
 
 use super::error::ReplayError;
 use super::tracks::{Track, Tracks, blend_angles, blend_poses};
@@ -15,6 +16,7 @@ use crate::time::Stamp;
 const JOINT_STATES: &str = "/truth/joint_states";
 const VEHICLE_POSE: &str = "/truth/vehicle_pose";
 const TOOL_POSE: &str = "/truth/tool_pose";
+const FAULTS: &str = "/truth/faults";
 
 /// What was true; any track may be empty.
 #[derive(Default)]
@@ -22,6 +24,16 @@ pub(super) struct Truth {
     joints: Track<JointAngles>,
     world_from_vehicle: Track<Isometry3<f64>>,
     base_from_tool: Track<Isometry3<f64>>,
+    /// What broke, each with its time, s.
+    pub faults: Vec<(f64, String)>,
+}
+
+/// armcal_msgs/msg/Fault.
+#[derive(Deserialize)]
+struct FaultMessage {
+    header: ros::Header,
+    kind: String,
+    details: String,
 }
 
 impl Truth {
@@ -88,6 +100,11 @@ impl Reader<'_> {
                 if let Some(pose) = isometry::<Base, Tool>(&pose.pose) {
                     self.truth.base_from_tool.push(time_s, pose);
                 }
+            }
+            FAULTS => {
+                let fault: FaultMessage = decode(message.data).map_err(failed)?;
+                let time_s = self.time_s(message, fault.header.stamp);
+                self.truth.faults.push((time_s, format!("{}: {}", fault.kind, fault.details)));
             }
             _ => {}
         }

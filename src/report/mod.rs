@@ -14,6 +14,6 @@ pub use html::html;
 pub use markdown::markdown;
 pub use summary::{
     AssertSummary, CalibrationSummary, CaptureSummary, HeldOutSummary, JointScore, ReachScore, RunSummary, Score,
-    ScoreSide,
+    ScoreSide, TouchScore,
 };
 pub use table::table;

@@ -99,6 +99,17 @@ pub struct ReachScore {
     pub calibrated: bool,
     #[serde(flatten)]
     pub side: ScoreSide,
+    /// Where the jaws closed on the targets.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub touches: Option<TouchScore>,
+}
+
+/// Targets on which the jaws closed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct TouchScore {
+    pub tried: usize,
+    /// Of those, the ones that lay between the jaws.
+    pub touched: usize,
 }
 
 /// One limit of an `assert` step.

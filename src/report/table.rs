@@ -167,17 +167,21 @@ pub(super) fn check_lines(summary: &RunSummary) -> Vec<String> {
     lines
 }
 
-/// Every reach of a script that has more than the usual two.
+/// Every reach of a script that has more than the usual two, or in which targets are touched.
 fn reach_lines(summary: &RunSummary) -> Vec<String> {
     let reaches = summary.score.as_ref().map(|score| score.reaches.as_slice()).unwrap_or_default();
-    if reaches.len() <= 2 {
+    if reaches.len() <= 2 && reaches.iter().all(|reach| reach.touches.is_none()) {
         return Vec::new();
     }
     let mm = |v: Option<Summary>| v.map_or_else(|| "-".to_owned(), |v| format!("{:.2} mm", v.median * 1e3));
     let line = |reach: &ReachScore| {
         let belief = if reach.calibrated { "calibrated" } else { "datasheet" };
         let (tool, miss) = (mm(reach.side.tool_error_m), mm(reach.side.reach_error_m));
-        format!("reach        step {} ({belief}): tool position error {tool}, miss {miss}, medians", reach.step)
+        let touches = reach.touches.map(|t| format!("; touched {} of {}", t.touched, t.tried)).unwrap_or_default();
+        format!(
+            "reach        step {} ({belief}): tool position error {tool}, miss {miss}, medians{touches}",
+            reach.step
+        )
     };
     reaches.iter().map(line).collect()
 }

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 use super::error::{FileIssue, RobotError, parse_toml, read_text};
+use super::gripper::{GripperFile, GripperSpec};
 use super::survey::{SurveyedTag, TagFile, TagSurvey, check_tags};
 use super::urdf::{LinkBody, UrdfModel};
 use super::vehicle::Vehicle;
@@ -26,6 +27,8 @@ pub struct Robot {
     pub bodies: Vec<LinkBody>,
     pub sensors: Vec<JointSensorSpec>,
     pub tool: ToolSpec,
+    /// Where the tool is a gripper that opens and closes.
+    pub gripper: Option<GripperSpec>,
     pub camera: CameraSpec,
     pub tags: Vec<SurveyedTag>,
     pub base_tag: u32,
@@ -180,6 +183,7 @@ struct RobotFile {
     #[serde(default = "usual_buoyancy")]
     buoyancy_fraction: f64,
     tool: ToolFile,
+    gripper: Option<GripperFile>,
     joint_sensor: Vec<SensorFile>,
     camera: CameraFile,
     #[serde(default)]
@@ -250,13 +254,15 @@ pub fn load(folder: &Path) -> Result<Robot, RobotError> {
     FileIssue::check_range(&file, "version", f64::from(raw.version), 1.0..=1.0)?;
     let urdf = UrdfModel::read(&folder.join(&raw.urdf))?;
     let chain = urdf.chain(&raw.base_link, &[&raw.tool.link, &raw.camera.link])?;
-    let bodies = urdf.bodies(&raw.base_link, &chain)?;
+    let jaws = raw.gripper.as_ref().map(GripperFile::jaws).unwrap_or_default();
+    let bodies = urdf.bodies(&raw.base_link, &chain, jaws)?;
     let sensors = check_sensors(&file, &raw.joint_sensor, &chain)?;
     let stowed = check_stowed(&file, "stowed_rad", &raw.stowed_rad, chain.n_joints())?;
     let mut tool = urdf.attachment(&raw.base_link, &raw.tool.link, &chain)?;
     for value in raw.tool.point_m {
         FileIssue::check_range(&file, "tool.point_m", value, -10.0..=10.0)?;
     }
+    let gripper = raw.gripper.map(|gripper| gripper.check(&file, &urdf, &raw.base_link, &chain, &tool)).transpose()?;
     tool.link_from_frame *= nalgebra::Translation3::from(raw.tool.point_m);
     let camera_mount = urdf.attachment(&raw.base_link, &raw.camera.link, &chain)?;
     let camera = check_camera(&file, raw.camera, camera_mount)?;
@@ -270,6 +276,7 @@ pub fn load(folder: &Path) -> Result<Robot, RobotError> {
         stowed,
         buoyancy_fraction: FileIssue::check_range(&file, "buoyancy_fraction", raw.buoyancy_fraction, 0.0..=0.95)?,
         tool: ToolSpec { mount: tool },
+        gripper,
         base_tag: raw.base_tag,
         chain,
         bodies,

@@ -6,6 +6,7 @@
 
 mod error;
 mod file;
+mod gripper;
 mod hull;
 mod mesh;
 mod part;
@@ -17,10 +18,11 @@ mod vehicle;
 pub use error::{FileIssue, RobotError};
 pub(crate) use error::{parse_toml, read_text};
 pub use file::{CameraSpec, JointSensorSpec, Robot, SensorKind, ToolSpec, load};
+pub use gripper::{GripperSpec, Jaw};
 pub use hull::{Hull, HullError, MAX_HULL_POINTS};
 pub use part::{MAX_PARTS, Part};
 pub(crate) use part::{PartFile, check_parts};
 pub use shape::{PlacedShape, Shape, parry_pose};
 pub use survey::{SurveyedTag, TagSurvey};
 pub use urdf::{LinkBody, MAX_COLLISION_SHAPES, UrdfModel};
-pub use vehicle::{Vehicle, load_vehicle};
+pub use vehicle::{Vehicle, VehicleDynamics, load_vehicle};

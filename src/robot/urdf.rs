@@ -181,17 +181,39 @@ impl UrdfModel {
         Ok(Attachment { n_joints, link_from_frame })
     }
 
-    /// Bodies 0..=n: what is fixed to the base, then what moves with each joint of the chain.
+    pub(super) fn has_link(&self, name: &str) -> bool {
+        self.robot.links.iter().any(|link| link.name == name)
+    }
+
+    /// What is drawn of the link `name`, in the frame of the chain's link that carries it.
+    ///
+    /// # Errors
+    /// [`RobotError`] for a link that hangs elsewhere or shapes that no body can have.
+    pub(super) fn visuals_of(&self, base: &str, name: &str, chain: &Chain) -> Result<Vec<PlacedShape>, RobotError> {
+        let attachment = self.attachment(base, name, chain)?;
+        let mut body = LinkBody::empty(name.to_owned());
+        for link in self.robot.links.iter().filter(|link| link.name == name) {
+            self.add_visuals(&mut body, link, &attachment.link_from_frame)?;
+        }
+        Ok(body.visuals)
+    }
+
+    /// Bodies 0..=n: what is fixed to the base, then what moves with each joint of the chain. Of the links in `apart` nothing is
+    /// drawn: they move by themselves.
     ///
     /// # Errors
     /// [`RobotError::Value`] for numbers or shapes that no body can have.
-    pub fn bodies(&self, base: &str, chain: &Chain) -> Result<Vec<LinkBody>, RobotError> {
+    pub fn bodies(&self, base: &str, chain: &Chain, apart: &[String]) -> Result<Vec<LinkBody>, RobotError> {
         let mut names = vec![base.to_owned()];
         names.extend(chain.joints().iter().map(|j| j.child_link.clone()));
         let mut bodies: Vec<LinkBody> = names.into_iter().map(LinkBody::empty).collect();
         for link in &self.robot.links {
             let Ok(attachment) = self.attachment(base, &link.name, chain) else { continue };
-            self.add_link(&mut bodies[attachment.n_joints], link, &attachment.link_from_frame)?;
+            let body = &mut bodies[attachment.n_joints];
+            self.add_link(body, link, &attachment.link_from_frame)?;
+            if !apart.contains(&link.name) {
+                self.add_visuals(body, link, &attachment.link_from_frame)?;
+            }
         }
         let n_shapes: usize = bodies.iter().map(|body| body.collisions.len()).sum();
         if n_shapes > MAX_COLLISION_SHAPES {
@@ -225,14 +247,23 @@ impl UrdfModel {
             let body_from_com = body_from_link * isometry(&inertial.origin);
             body.add_mass(mass_kg, &body_from_com, &inertia);
         }
+        for collision in &link.collision {
+            let placed = self.placed(&link.name, &collision.origin, &collision.geometry, body_from_link, [0; 3])?;
+            body.collisions.push(placed);
+        }
+        Ok(())
+    }
+
+    fn add_visuals(
+        &self,
+        body: &mut LinkBody,
+        link: &urdf_rs::Link,
+        body_from_link: &Isometry3<f64>,
+    ) -> Result<(), RobotError> {
         for visual in &link.visual {
             let color = visual.material.as_ref().and_then(|m| self.color(m)).unwrap_or([160, 160, 160]);
             let placed = self.placed(&link.name, &visual.origin, &visual.geometry, body_from_link, color)?;
             body.visuals.push(placed);
-        }
-        for collision in &link.collision {
-            let placed = self.placed(&link.name, &collision.origin, &collision.geometry, body_from_link, [0; 3])?;
-            body.collisions.push(placed);
         }
         Ok(())
     }

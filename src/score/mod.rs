@@ -3,6 +3,8 @@
 //! At each reach mark the tool as believed (from the recording, under the sensors of that moment) is compared with
 //! the tool as it was, and the target with where the tool came to rest.
 
+mod touch;
+
 use std::path::Path;
 
 use nalgebra::Vector3;
@@ -57,6 +59,7 @@ pub fn score(input: &ScoreInput<'_>) -> Result<Scored, SimError> {
             step: step.step,
             calibrated: step.attempt == ReachAttempt::After,
             side: side_figures(&of_step(step), input.tolerance_m),
+            touches: touch::touches(input.recording, &truth, input.robot, step, input.tolerance_m),
         })
         .collect();
     let first = outcome.reaches.iter().find(|step| step.attempt == ReachAttempt::Before).map(of_step);

@@ -1,10 +1,11 @@
 //! BELIEF: the closed loop, a routine's script carried out on any [`Arm`].
 //!
 //! It knows the arm only through its messages. `script` goes through the steps, `reach` and `capture` plan and move for
-//! them, `identify` measures a sensor's unknown scale, `motion` drives and waits until `stillness` says that the arm stands, `recorder` keeps every message,
+//! them, `grip` moves the jaws, `identify` measures a sensor's unknown scale, `motion` drives and waits until `stillness` says that the arm stands, `recorder` keeps every message,
 //! `outcome` is what is left when it is over; `Progress` tells whoever watches.
 
 mod capture;
+mod grip;
 mod identify;
 mod motion;
 mod outcome;

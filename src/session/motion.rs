@@ -15,7 +15,7 @@ use crate::time::Stamp;
 /// The arm, what is recorded of it, and the sensors as believed at the moment.
 pub(super) struct Driver<'b> {
     robot: &'b Robot,
-    arm: &'b mut dyn Arm,
+    pub(super) arm: &'b mut dyn Arm,
     pub recorder: &'b mut Recorder,
     pub sensors: ArmSensors,
     pub progress: &'b mut dyn Progress,
@@ -138,7 +138,7 @@ impl<'b> Driver<'b> {
         Ok(())
     }
 
-    fn step(&mut self) -> Result<(), SessionError> {
+    pub(super) fn step(&mut self) -> Result<(), SessionError> {
         if self.progress.stop_requested() {
             return Err(self.interrupt()?);
         }

@@ -3,14 +3,19 @@
 use super::SessionError;
 use super::script::Run;
 use crate::plan::{PlanError, TargetRequest, plan_targets};
+use crate::routine::ReachSettings;
 use crate::streams::{JointAngles, LogLevel, MarkKind, Phase, ReachAttempt};
 
 /// How long the arm is watched at a target, s.
 const REACH_DWELL_S: f64 = 0.6;
 
 impl Run<'_, '_> {
-    /// Goes to each of `targets` (numbers of the task's) and rests there for a moment.
-    pub(super) fn reach(&mut self, targets: &[usize]) -> Result<(), SessionError> {
+    /// Goes to each target and rests there for a moment; if it is to be touched, with open jaws, which then close on it.
+    pub(super) fn reach(&mut self, step: usize, settings: &ReachSettings) -> Result<(), SessionError> {
+        let ReachSettings { targets, touch } = settings;
+        if *touch {
+            self.grip(step, 1.0)?;
+        }
         let attempt = self.attempt();
         let postures = self.postures(targets, attempt)?;
         self.driver.phase(Phase::Reach)?;
@@ -26,6 +31,12 @@ impl Run<'_, '_> {
             }
             let kind = MarkKind::Reach { attempt, target_idx: target as u32 };
             self.driver.dwell(REACH_DWELL_S, kind)?;
+            if *touch {
+                self.touch(step, target)?;
+            }
+        }
+        if *touch {
+            self.rest_jaws(step)?;
         }
         Ok(())
     }

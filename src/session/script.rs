@@ -27,7 +27,10 @@ pub(super) fn run(
     recorder: &mut Recorder,
     progress: &mut dyn Progress,
 ) -> Result<Outcome, SessionError> {
-    let clearance = ClearanceModel::new(setup.robot, setup.vehicle, &setup.routine.scene);
+    let model = || ClearanceModel::new(setup.robot, setup.vehicle, &setup.routine.scene);
+    let clearance = model();
+    let growth_m = setup.robot.gripper.as_ref().map_or(0.0, |gripper| gripper.outline_growth_m(gripper.opening_max_m));
+    let open_clearance = model().with_grown_gripper(growth_m);
     let sensors = ArmSensors::nominal(setup.robot);
     let mut driver = Driver::new(setup.robot, arm, recorder, sensors.clone(), progress)?;
     driver.record_survey(setup.vehicle)?;
@@ -40,6 +43,7 @@ pub(super) fn run(
         fresh: None,
         rng: stream_rng(setup.seed, "plan"),
         clearance: &clearance,
+        jaws: Jaws { at_rest: &clearance, open: &open_clearance },
         planned: None,
         began,
         views_since: began,
@@ -84,6 +88,12 @@ pub(super) struct Planned {
     pub first_capture: Option<PosePlan>,
 }
 
+/// The arm among what surrounds it, by its jaws.
+pub(super) struct Jaws<'a> {
+    pub at_rest: &'a ClearanceModel<'a>,
+    pub open: &'a ClearanceModel<'a>,
+}
+
 pub(super) struct Run<'a, 'b> {
     pub setup: &'a Setup<'a>,
     /// With the sensor scales that were measured on the way.
@@ -93,7 +103,9 @@ pub(super) struct Run<'a, 'b> {
     /// And how wrong they were when they were new: none for a datasheet's, which hold for good.
     fresh: Option<FreshBounds>,
     pub rng: ChaCha8Rng,
+    /// With the jaws as they are now.
     pub clearance: &'a ClearanceModel<'a>,
+    pub jaws: Jaws<'a>,
     pub driver: Driver<'b>,
     pub planned: Option<Planned>,
     began: Stamp,
@@ -140,7 +152,7 @@ impl Run<'_, '_> {
             );
         }
         let request = TargetRequest { targets_m: &routine.task.targets_m, preferred: None, margin_m };
-        let planned = plan_targets(&self.robot, self.clearance, &self.bounds, &request, &mut self.rng);
+        let planned = plan_targets(&self.robot, self.clearance_at_targets(), &self.bounds, &request, &mut self.rng);
         let targets = planned.into_iter().collect::<Result<Vec<_>, _>>()?;
         self.planned = Some(Planned { targets, first_capture: None });
         self.progress_at(Phase::Plan, 1, 2);
@@ -163,7 +175,7 @@ impl Run<'_, '_> {
                 Step::Move(goal) => self.move_to(number, goal)?,
                 Step::Reach(reach) => {
                     let (start, attempt) = (self.driver.now(), self.attempt());
-                    self.reach(&reach.targets)?;
+                    self.reach(number, reach)?;
                     self.reaches.push(ReachStep { step: number, attempt, start, end: self.driver.now() });
                 }
                 Step::Capture(capture) => self.capture(capture).map_err(|error| after_motion(number, error))?,
@@ -177,6 +189,7 @@ impl Run<'_, '_> {
                         return Ok(Some(format!("step {number}: the calibration was refused: {why}")));
                     }
                 }
+                Step::Grip { opening } => self.grip(number, *opening)?,
                 Step::Wait { seconds } => {
                     self.driver.phase(Phase::Wait)?;
                     self.progress_at(Phase::Wait, 0, 1);

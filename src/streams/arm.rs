@@ -27,6 +27,10 @@ pub enum ArmError {
     NotFinite { at_s: f64 },
     #[error("fault number {number} cannot be brought about: the arm knows {known}")]
     NoSuchFault { number: usize, known: usize },
+    #[error("the arm has no gripper that opens and closes")]
+    NoGripper,
+    #[error("gripper: an opening of {opening} is outside 0 (closed) .. 1 (open)")]
+    Opening { opening: f64 },
 }
 
 /// An arm that can be told where to go, simulated or real. It tells back only through messages.
@@ -59,6 +63,16 @@ pub trait Arm {
             self.step(sink)?;
         }
         Ok(())
+    }
+
+    /// Tells the jaws where to go, from 0 (closed) to 1 (open); they take their time. An arm without jaws refuses: a script that
+    /// closed nothing on a target would else look like one that touched it.
+    ///
+    /// # Errors
+    /// [`ArmError::NoGripper`], [`ArmError::Opening`].
+    fn grip(&mut self, opening: f64) -> Result<(), ArmError> {
+        let _ = opening;
+        Err(ArmError::NoGripper)
     }
 
     /// Something breaks now: fault `number` of a list that only a simulated arm holds. Nobody tells the caller what it is.

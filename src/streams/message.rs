@@ -18,6 +18,10 @@ pub enum Message {
     Pressure(PressureSample),
     /// The vehicle's attitude sensor.
     Attitude(Attitude),
+    /// How far the gripper is open, as measured.
+    Gripper(GripperSample),
+    /// How far the gripper is told to open.
+    GripperCommand(GripperCommand),
     /// What the arm is calibrated for.
     Task(ReachTask),
     /// Where the tags are, where the vehicle says it and not the robot's file.
@@ -90,6 +94,20 @@ pub struct Attitude {
     pub quaternion_wxyz: [f64; 4],
     pub angular_velocity_rad_s: [f64; 3],
     pub specific_force_m_s2: [f64; 3],
+}
+
+/// The gap between the jaws, 0 where they meet.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GripperSample {
+    pub stamp: Stamp,
+    pub opening_m: f64,
+}
+
+/// The gap between the jaws that they are driven to.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GripperCommand {
+    pub stamp: Stamp,
+    pub opening_m: f64,
 }
 
 /// Positions that the tool is to reach, in the base frame, and how near counts as a hit.
@@ -173,6 +191,8 @@ pub enum MarkKind {
     Calibrate(Start),
     /// The arm came to rest for a target.
     Reach { attempt: ReachAttempt, target_idx: u32 },
+    /// The jaws closed on a target, from wide open.
+    Touch { target_idx: u32 },
     /// A phase began at `start`.
     Phase(Phase),
 }

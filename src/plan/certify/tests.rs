@@ -151,3 +151,36 @@ fn what_is_refused_has_a_name_and_a_distance_below_the_margin() {
         }
     }
 }
+
+/// Open jaws take their width from the distances of the gripper, and from no others.
+#[test]
+fn a_grown_gripper_is_nearer_and_nothing_else_is() {
+    const GROWTH_M: f64 = 0.039;
+    let site = site();
+    let model = || ClearanceModel::new(&site.robot, &site.vehicle, &site.scene);
+    let (at_rest, open) = (model(), model().with_grown_gripper(GROWTH_M));
+    let bounds = JointErrorBounds::prior(&site.robot);
+    let mut rng = stream_rng(5, "grown gripper");
+    let (mut of_gripper, mut of_others) = (0, 0);
+    for _ in 0..8000 {
+        let angles = random_angles(&site.robot, &bounds, &mut rng);
+        let (before, after) = (at_rest.nearest(&angles), open.nearest(&angles));
+        let is_gripper = |nearest: &crate::plan::Nearest| {
+            [&nearest.first, &nearest.second].contains(&&"manipulator_link".to_owned())
+        };
+        if is_gripper(&before) {
+            // Not so near that jaws would touch, nor so far that nothing is told apart.
+            if (0.08..0.39).contains(&before.distance_m) {
+                let nearer_m = before.distance_m - after.distance_m;
+                assert!((nearer_m - GROWTH_M).abs() < 1e-6, "{before:?} {after:?}");
+                let margin_m = before.distance_m - 0.5 * GROWTH_M;
+                assert!(!at_rest.is_nearer_than(&angles, margin_m) && open.is_nearer_than(&angles, margin_m));
+                of_gripper += 1;
+            }
+        } else if !is_gripper(&after) {
+            assert_eq!(before, after);
+            of_others += 1;
+        }
+    }
+    assert!(of_gripper > 20 && of_others > 20, "{of_gripper} {of_others}");
+}

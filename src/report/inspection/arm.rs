@@ -72,7 +72,7 @@ impl Collector {
                 MarkKind::Capture { set: CaptureSet::HeldOut, .. } => self.captures[1] += 1,
                 MarkKind::Reach { attempt: ReachAttempt::Before, .. } => self.reaches[0] += 1,
                 MarkKind::Reach { attempt: ReachAttempt::After, .. } => self.reaches[1] += 1,
-                MarkKind::Phase(_) | MarkKind::Identify { .. } | MarkKind::Calibrate(_) => {}
+                MarkKind::Phase(_) | MarkKind::Identify { .. } | MarkKind::Calibrate(_) | MarkKind::Touch { .. } => {}
             },
             Message::Temperature(sample) => match sample.thermometer {
                 Thermometer::Oil => widen(&mut self.oil_c, sample.temperature_c),

@@ -195,6 +195,8 @@ fn known_as(topic: &str, schema: &str) -> Option<&'static str> {
             Stream::WaterTemperature => "water temperature",
             Stream::DepthPressure => "depth",
             Stream::VehicleImu => "vehicle's attitude",
+            Stream::GripperState => "gap between the jaws",
+            Stream::GripperCommand => "gap told to the jaws",
             Stream::Task => "reach task",
             Stream::TagSurvey => "where the tags are",
             Stream::Marks => "marks of views and phases",

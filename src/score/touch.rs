@@ -1,0 +1,71 @@
+//! What the jaws closed on, by the truth.
+
+use nalgebra::Vector3;
+
+use crate::log::Recording;
+use crate::report::TouchScore;
+use crate::robot::Robot;
+use crate::session::ReachStep;
+use crate::sim::truth::Truth;
+use crate::streams::{Mark, MarkKind, Message};
+
+/// The touches of one `reach` step; `None` where none was asked for.
+///
+/// A target was touched if it lay between the jaws when they began to close: across, in the direction in which they close, nearer
+/// to the tool point than half the gap as measured, and along the jaws' faces not farther than the task's tolerance.
+pub(super) fn touches(
+    recording: &Recording,
+    truth: &Truth,
+    robot: &Robot,
+    step: &ReachStep,
+    tolerance_m: f64,
+) -> Option<TouchScore> {
+    let gripper = robot.gripper.as_ref()?;
+    let targets_m = recording.messages.iter().find_map(|(_, message)| match message {
+        Message::Task(task) => Some(&task.targets_m),
+        _ => None,
+    })?;
+    let gaps: Vec<_> = recording
+        .messages
+        .iter()
+        .filter_map(|(_, message)| match message {
+            Message::Gripper(sample) => Some((sample.stamp, sample.opening_m)),
+            _ => None,
+        })
+        .collect();
+    let mut score = TouchScore { tried: 0, touched: 0 };
+    for (_, message) in &recording.messages {
+        let Message::Mark(Mark { start, kind: MarkKind::Touch { target_idx }, .. }) = message else { continue };
+        if !(step.start..=step.end).contains(start) {
+            continue;
+        }
+        score.tried += 1;
+        let gap_m = gaps[..gaps.partition_point(|(stamp, _)| stamp <= start)].last().map(|(_, gap_m)| *gap_m);
+        let target_m = targets_m.get(*target_idx as usize);
+        let (Some(target_m), Some(state), Some(gap_m)) = (target_m, truth.state_at(*start), gap_m) else { continue };
+        let tool = state.base_from_tool.isometry();
+        let error_m = tool.inverse_transform_vector(&(Vector3::from(*target_m) - tool.translation.vector));
+        score.touched += usize::from(is_between(&error_m, &gripper.opens_along, gap_m, tolerance_m));
+    }
+    (score.tried > 0).then_some(score)
+}
+
+/// `error_m` is the target from the tool point, in the axes in which the jaws open along `across`.
+fn is_between(error_m: &Vector3<f64>, across: &Vector3<f64>, gap_m: f64, tolerance_m: f64) -> bool {
+    let across_m = error_m.dot(across);
+    let along_m = (error_m - across_m * across).norm();
+    across_m.abs() < 0.5 * gap_m && along_m <= tolerance_m
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn jaws_forgive_across_what_they_do_not_along() {
+        let between = |x, y, z| is_between(&Vector3::new(x, y, z), &Vector3::x(), 0.1, 0.02);
+        assert!(between(0.049, 0.0, 0.0) && between(-0.049, 0.0, 0.019) && between(0.0, 0.014, 0.014));
+        assert!(!between(0.051, 0.0, 0.0) && !between(-0.051, 0.0, 0.0));
+        assert!(!between(0.0, 0.021, 0.0) && !between(0.0, 0.015, 0.015));
+    }
+}

@@ -1,0 +1,46 @@
+//! The gripper in step with the world: it moves once in a control period and tells its gap when that changes.
+
+use super::{SLOW_PERIODS, World};
+use crate::sim::spec::CONTROL_PERIOD_S;
+use crate::streams::{ArmError, GripperSample, Message};
+
+/// While the jaws move, their gap is told each so many periods: 25 Hz.
+const TOLD_EVERY: u64 = 4;
+/// What the measured gap is rounded to, m (assumed).
+const RESOLUTION_M: f64 = 1e-4;
+
+impl World {
+    pub(super) fn tell_jaws(&mut self, opening: f64) -> Result<(), ArmError> {
+        if !(0.0..=1.0).contains(&opening) {
+            return Err(ArmError::Opening { opening });
+        }
+        self.gripper.as_mut().ok_or(ArmError::NoGripper)?.command(opening);
+        Ok(())
+    }
+
+    /// Lets a control period pass for the jaws.
+    pub(super) fn move_jaws(&mut self, period: u64) {
+        let Some(jaws) = &mut self.gripper else { return };
+        let was_moving = jaws.is_moving();
+        jaws.step(CONTROL_PERIOD_S);
+        // The slow streams tell it in any case.
+        if was_moving && period.is_multiple_of(TOLD_EVERY) && !period.is_multiple_of(SLOW_PERIODS) {
+            self.report_gap();
+        }
+    }
+
+    /// Lets the jaws come to rest in a stride that is skipped.
+    pub(super) fn settle_jaws(&mut self) {
+        if let Some(jaws) = &mut self.gripper {
+            jaws.arrive();
+        }
+    }
+
+    pub(super) fn report_gap(&mut self) {
+        let stamp = self.stamp();
+        if let Some(jaws) = &self.gripper {
+            let opening_m = (jaws.opening_m / RESOLUTION_M).round() * RESOLUTION_M;
+            self.outbox.push((stamp, Message::Gripper(GripperSample { stamp, opening_m })));
+        }
+    }
+}
