@@ -2,6 +2,8 @@
 
 use armcal::calib::Calibration;
 use armcal::sim::truth::read_truth;
+use armcal::streams::{Mark, MarkKind, Message};
+use armcal::time::Stamp;
 
 use crate::support::{ShortRoutine, answer, calibrate, edit, finished, program, read, robot_folder, temp};
 
@@ -10,6 +12,10 @@ const REACH: &str = "[[step]]\ndo = \"reach\"\ntargets = [0, 2]\n";
 const CALIBRATE: &str = "[[step]]\ndo = \"calibrate\"\n";
 /// Found in no drawing, so that it can be looked for in the recording.
 const JUMP_RAD: f64 = 0.061_803_398_875;
+
+/// Found in no drawing either: a tag falls off on the way, whatever the script does at that time.
+const TIMED_S: f64 = 70.718_281_828;
+const TIMED: &str = "[[world.fault]]\nat_s = 70.718281828\nkind = \"tag_lost\"\nid = 7\n";
 
 fn jump() -> String {
     format!("[[step]]\ndo = \"fault\"\nkind = \"sensor_jump\"\njoint = \"wrist_pitch\"\nby_rad = {JUMP_RAD}\n")
@@ -34,7 +40,7 @@ fn a_slipped_sensor_is_mended_by_a_recalibration() {
     let limits =
         "[[step]]\ndo = \"assert\"\ntool_error_m = 0.02\ncontacts = 0\nclearance_m = 0.02\nheld_out_rms_m = 0.03\n";
     let wait = "[[step]]\ndo = \"wait\"\nseconds = 120\n";
-    let steps = [REACH, CAPTURE, CALIBRATE, REACH, wait, &jump(), REACH, CAPTURE, recalibrate, REACH, limits];
+    let steps = [REACH, CAPTURE, CALIBRATE, REACH, wait, &jump(), REACH, CAPTURE, recalibrate, REACH, limits, TIMED];
     let folder = temp();
     let run = finished(&routine(&steps), folder.path());
     let summary = run.summary();
@@ -53,10 +59,29 @@ fn a_slipped_sensor_is_mended_by_a_recalibration() {
     assert!((119.0..122.0).contains(&summary.waited_s.expect("known")));
     same_from_the_recording_alone(&run);
     // What broke is the truth's alone.
+    let recording = armcal::log::read_recording(run.file("run.mcap")).expect("it reads");
     let (recorded, truth) = (run.bytes("run.mcap"), read_truth(run.file("truth.mcap")).expect("it reads"));
     assert!(truth.header.spec_toml.contains(&JUMP_RAD.to_string()));
     let holds = |needle: &[u8]| recorded.windows(needle.len()).any(|window| window == needle);
     assert!(!holds(JUMP_RAD.to_string().as_bytes()) && !holds(&JUMP_RAD.to_le_bytes()) && !holds(b"sensor_jump"));
+    assert!(!holds(b"tag_lost") && !holds(TIMED_S.to_string().as_bytes()) && !holds(&TIMED_S.to_le_bytes()));
+    let told: Vec<(&str, &str)> = truth.faults.iter().map(|f| (f.kind.as_str(), f.details.as_str())).collect();
+    let jumped = format!("by_rad = {JUMP_RAD}, joint = \"wrist_pitch\"");
+    assert_eq!(told, [("tag_lost", "id = 7"), ("sensor_jump", jumped.as_str())]);
+    let start = armcal::time::SIMULATION_EPOCH;
+    assert!((truth.faults[0].stamp.since_s(start) - TIMED_S).abs() < 0.0101, "{:?}", truth.faults);
+    // The views after that time lack the tag, and nobody was told.
+    let views = |lost: bool| {
+        let images = recording.messages.iter().filter_map(|(_, message)| match message {
+            Message::Detections(image) => Some(image),
+            _ => None,
+        });
+        images
+            .filter(|image| (image.stamp > truth.faults[0].stamp.plus_s(0.1)) == lost)
+            .filter(|image| image.tags.iter().any(|tag| tag.id == 7))
+            .count()
+    };
+    assert!(views(false) > 0 && views(true) == 0, "{} {}", views(false), views(true));
 }
 
 /// Twice the counts, backwards: nobody knows, and after the first step the arm does.
@@ -114,6 +139,48 @@ fn a_refusal_stops_a_script_unless_it_says_otherwise() {
     went_on.expect("went on", 0, &["ACCEPTED", "holds: step 5, contacts"]);
 }
 
+/// Calibrated, the jaws close about the targets; the recording says so, and belief is the same with it.
+#[test]
+fn calibrated_jaws_close_on_their_targets() {
+    let touch = "[[step]]\ndo = \"reach\"\ntargets = [0, 2]\ntouch = true\n";
+    let grip = "[[step]]\ndo = \"grip\"\nopening = 0.5\n";
+    let folder = temp();
+    let run = finished(&routine(&[REACH, CAPTURE, CALIBRATE, touch, grip]), folder.path());
+    let summary = run.summary();
+    let reaches = &summary.score.as_ref().expect("scored").reaches;
+    assert!(reaches[0].touches.is_none(), "nobody asked");
+    let touches = reaches[1].touches.expect("asked for");
+    eprintln!("touched {} of {}; miss {:?}", touches.touched, touches.tried, reaches[1].side.reach_error_m);
+    assert_eq!((touches.tried, touches.touched), (2, 2));
+    assert_eq!((summary.capture.targets_skipped, summary.capture.collisions), (0, Some(0)));
+    let recording = armcal::log::read_recording(run.file("run.mcap")).expect("it reads");
+    let mut touched = Vec::new();
+    let (mut told, mut gaps) = (Vec::new(), Vec::new());
+    for (_, message) in &recording.messages {
+        match message {
+            Message::Mark(Mark { start, end, kind: MarkKind::Touch { target_idx } }) => {
+                touched.push(*target_idx);
+                let within = |(stamp, gap_m): &(Stamp, f64)| (start <= stamp && stamp <= end).then_some(*gap_m);
+                let closing: Vec<f64> = gaps.iter().filter_map(within).collect();
+                assert!(closing.len() > 20 && closing[0] > 0.095 && closing[closing.len() - 1] < 0.0011, "{closing:?}");
+            }
+            Message::Gripper(sample) => gaps.push((sample.stamp, sample.opening_m)),
+            Message::GripperCommand(command) => told.push((command.opening_m * 1e3).round() as i32),
+            _ => {}
+        }
+    }
+    assert_eq!(touched, [0, 2]);
+    assert_eq!(told, [100, 0, 100, 0, 100, 22, 50]);
+    assert!((gaps[gaps.len() - 1].1 - 0.05).abs() < 0.0011, "{:?}", gaps.last());
+    assert!(recording.rejected.is_empty() && recording.unknown_topics.is_empty());
+    answer(program().arg("inspect").arg(run.file("run.mcap"))).expect(
+        "inspect",
+        0,
+        &["/gripper_state", "gap between the jaws", "/gripper_command"],
+    );
+    same_from_the_recording_alone(&run);
+}
+
 /// The arm has moved by then: what was recorded is not thrown away with the plan.
 #[test]
 fn a_plan_that_fails_in_the_middle_of_a_script_keeps_the_recording() {
@@ -155,7 +222,35 @@ fn check_explains_what_is_wrong_with_a_script() {
     check(&format!("{body}{matrix}")).expect("matrix", 2, &["world.camera", "corner_noise"]);
     check(&format!("{body}[world.gear_ratio]\nelbow = 2.0\n")).expect("gears", 2, &["world.gear_ratio: joint `elbow`"]);
     let fault = "[[world.fault]]\nkind = \"silt\"\nseconds = 1.0\n";
-    check(&format!("{body}{fault}")).expect("a fault without a step", 2, &["world.fault", "[[step]]"]);
+    check(&format!("{body}{fault}")).expect("a fault without a time", 2, &["world.fault.0", "at_s", "[[step]]"]);
+    check(&format!("{body}{fault}at_s = 0.0\n")).expect("a fault with a time", 0, &[]);
+    let faults = [
+        ("at_s = -1.0\nkind = \"silt\"\nseconds = 1.0", "world.fault.0: at_s: -1 is outside 0 .. 1000000"),
+        ("at_s = nan\nkind = \"silt\"\nseconds = 1.0", "world.fault.0: at_s"),
+        ("at_s = 1.0\nkind = \"silt\"\nseconds = 1.0\nuntil_s = 2.0", "world.fault.0: unknown field `until_s`"),
+        ("at_s = 1.0\nkind = \"silt\"", "world.fault.0: missing field `seconds`"),
+        ("at_s = 1.0\nkind = \"joint_locked\"\njoint = \"elbow\"", "world.fault.0: joint `elbow` is none of"),
+        ("at_s = 1.0\nkind = \"pressure_lost\"\nratio = 1.5", "world.fault.0: ratio: 1.5 is outside 0 .. 1"),
+        ("at_s = 1.0\nkind = \"tag_moved\"\nid = 99", "world.fault.0: tag 99 is none of"),
+        ("at_s = 1.0\nkind = \"tag_moved\"\nid = 3\nby_m = [9.0, 0, 0]", "world.fault.0: by_m: 9 is outside -2 .. 2"),
+        ("at_s = 1.0\nkind = \"tag_misread\"\nid = 3\nas_id = 3", "as_id: 3 is the tag's own id"),
+        (
+            "at_s = 1.0\nkind = \"vehicle_knocked\"\nforce_n = [1.0, 0, 0]\nduration_s = 0.0",
+            "world.fault.0: duration_s: 0 is outside 0.01 .. 10",
+        ),
+        (
+            "at_s = 1.0\nkind = \"arm_bumped\"\nlink = \"base_link\"\nforce_n = [1.0, 0, 0]\nduration_s = 0.1",
+            "world.fault.0: link `base_link` is none of",
+        ),
+    ];
+    for (entry, expected) in faults {
+        check(&format!("{body}[[world.fault]]\n{entry}\n")).expect(entry, 2, &["short.toml", expected]);
+    }
+    check(&format!("[[step]]\ndo = \"fault\"\nkind = \"silt\"\nseconds = 1.0\nat_s = 3.0\n{body}")).expect(
+        "a step with a time",
+        2,
+        &["step 1 (fault): unknown field `at_s`"],
+    );
     check(&format!("{body}[world.gear_ratio]\nwrist_yaw = 0.0\n")).expect("gears", 2, &["world.gear_ratio.wrist_yaw"]);
 }
 

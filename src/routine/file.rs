@@ -8,7 +8,7 @@ use super::campaign::{CampaignFile, CampaignSettings, RegressSettings};
 use super::overrides::{Overrides, read_with};
 use super::scene::Scene;
 use super::script::{self, Script};
-use super::step::{MoveGoal, Step};
+use super::step::{MoveGoal, ReachSettings, Step};
 use crate::robot::{self, FileIssue, PartFile, Robot, RobotError, Vehicle, check_parts, parse_toml, read_text};
 
 /// A calibration method by its name in files and on the command line.
@@ -102,6 +102,9 @@ impl Routine {
                 },
                 Step::Move(MoveGoal::Angles(angles)) if angles.len() != joints.len() => {
                     format!("to_rad has {} angles, robot `{}` has {} joints", angles.len(), robot.name, joints.len())
+                }
+                Step::Grip { .. } | Step::Reach(ReachSettings { touch: true, .. }) if robot.gripper.is_none() => {
+                    format!("robot `{}` has no [gripper] in its robot.toml", robot.name)
                 }
                 _ => continue,
             };

@@ -13,12 +13,12 @@ use crate::robot::FileIssue;
 
 /// The script of a routine without `[[step]]`: the standard closed loop.
 pub(super) fn standard(capture: CaptureSettings, task: &TaskSettings) -> Vec<Step> {
-    let reach = || Step::Reach(ReachSettings { targets: (0..task.targets_m.len()).collect() });
+    let reach = || Step::Reach(ReachSettings { targets: (0..task.targets_m.len()).collect(), touch: false });
     let calibrate = CalibrateSettings { warm: false, views: CalibrateViews::New, on_refusal: OnRefusal::Stop };
     vec![reach(), Step::Capture(capture), Step::Calibrate(calibrate), reach()]
 }
 
-const NAMES: &str = "move, reach, capture, identify, calibrate, recalibrate, wait, fault, assert";
+const NAMES: &str = "move, reach, grip, capture, identify, calibrate, recalibrate, wait, fault, assert";
 
 /// Steps in order, and the tables of the faults in order, unread.
 pub(super) struct Script {
@@ -51,6 +51,7 @@ pub(super) fn read(
         let step = match name.as_str() {
             "move" => reader.move_goal()?,
             "reach" => reader.reach(task)?,
+            "grip" => reader.grip()?,
             "capture" => reader.capture(capture)?,
             "identify" => reader.identify()?,
             "calibrate" => reader.calibrate(false)?,
@@ -122,16 +123,28 @@ impl StepReader<'_> {
         #[serde(deny_unknown_fields)]
         struct Raw {
             targets: Option<Vec<usize>>,
+            #[serde(default)]
+            touch: bool,
         }
         let n = task.targets_m.len();
-        let targets = self.parse::<Raw>()?.targets.unwrap_or_else(|| (0..n).collect());
+        let Raw { targets, touch } = self.parse()?;
+        let targets = targets.unwrap_or_else(|| (0..n).collect());
         if targets.is_empty() {
             return Err(FileIssue::new(self.file, self.key("targets"), "needs one number or more"));
         }
         for &target in &targets {
             self.range("targets", target as f64, 0.0..=(n - 1) as f64)?;
         }
-        Ok(Step::Reach(ReachSettings { targets }))
+        Ok(Step::Reach(ReachSettings { targets, touch }))
+    }
+
+    fn grip(&self) -> Result<Step, FileIssue> {
+        #[derive(Deserialize)]
+        #[serde(deny_unknown_fields)]
+        struct Raw {
+            opening: f64,
+        }
+        Ok(Step::Grip { opening: self.range("opening", self.parse::<Raw>()?.opening, 0.0..=1.0)? })
     }
 
     fn capture(&self, general: CaptureSettings) -> Result<Step, FileIssue> {
@@ -262,7 +275,7 @@ fn check_order(file: &Path, steps: &[Step]) -> Result<(), FileIssue> {
                     return wrong("speaks of a reach, but no `reach` comes before it");
                 }
             }
-            Step::Identify(_) | Step::Wait { .. } | Step::Fault { .. } => {}
+            Step::Identify(_) | Step::Grip { .. } | Step::Wait { .. } | Step::Fault { .. } => {}
         }
     }
     if calibrations == 0 {
@@ -320,6 +333,8 @@ mod tests {
             ("[[step]]\ndo = \"move\"", "needs either to = \"stowed\""),
             ("[[step]]\ndo = \"reach\"\ntargets = [3]", "step 1 (reach): targets: 3 is outside 0 .. 2"),
             ("[[step]]\ndo = \"reach\"\ntargets = []", "needs one number"),
+            ("[[step]]\ndo = \"grip\"", "step 1 (grip): missing field `opening`"),
+            ("[[step]]\ndo = \"grip\"\nopening = 1.5", "step 1 (grip): opening: 1.5 is outside 0 .. 1"),
             ("[[step]]\ndo = \"capture\"\nposes = 1", "step 1 (capture): poses: 1 is outside"),
             ("[[step]]\ndo = \"capture\"\npose = 30", "unknown field `pose`"),
             ("[[step]]\ndo = \"calibrate\"", "no `capture` comes before it"),

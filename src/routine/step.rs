@@ -11,6 +11,10 @@ pub enum Step {
     Move(MoveGoal),
     /// Reaches for targets of the task under the sensors believed in.
     Reach(ReachSettings),
+    /// Opens or closes the gripper: 0 closed, 1 open.
+    Grip {
+        opening: f64,
+    },
     /// Plans views, visits them and records what is seen.
     Capture(CaptureSettings),
     /// Moves one joint a little and measures with the camera how many counts a radian has.
@@ -34,6 +38,7 @@ impl Step {
         match self {
             Self::Move(_) => "move",
             Self::Reach(_) => "reach",
+            Self::Grip { .. } => "grip",
             Self::Capture(_) => "capture",
             Self::Identify(_) => "identify",
             Self::Calibrate(CalibrateSettings { warm: false, .. }) => "calibrate",
@@ -59,6 +64,8 @@ pub enum MoveGoal {
 pub struct ReachSettings {
     /// Numbers of the task's targets, from 0.
     pub targets: Vec<usize>,
+    /// Whether the jaws close on each of them.
+    pub touch: bool,
 }
 
 /// How the scale of one sensor is measured.

@@ -6,7 +6,7 @@ use armcal::streams::{Arm, ArmError, Message};
 use super::{Site, Tape, Witness};
 
 fn spec(fault: Fault) -> WorldSpec {
-    WorldSpec { fault: vec![fault], ..WorldSpec::default() }
+    WorldSpec { fault: vec![fault.into()], ..WorldSpec::default() }
 }
 
 fn detections(tape: &Tape) -> Vec<usize> {

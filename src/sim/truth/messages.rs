@@ -19,6 +19,8 @@ pub const OIL_TEMPERATURE: &str = "/truth/oil_temperature";
 pub const WATER_TEMPERATURE: &str = "/truth/water_temperature";
 pub const CLEARANCE: &str = "/truth/clearance";
 pub const CONTACTS: &str = "/truth/contacts";
+/// What broke, when it did.
+pub const FAULTS: &str = "/truth/faults";
 
 /// armcal_msgs/msg/Contact: two parts began to touch.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -37,6 +39,14 @@ pub struct Clearance {
     pub part_b: String,
 }
 
+/// armcal_msgs/msg/Fault: what broke, with `details` as the routine has them.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct FaultMessage {
+    pub header: Header,
+    pub kind: String,
+    pub details: String,
+}
+
 macro_rules! with_header {
     ($fields:literal) => {
         concat!(
@@ -53,6 +63,11 @@ macro_rules! with_header {
 impl RosMessage for Contact {
     const SCHEMA: RosSchema =
         RosSchema { name: "armcal_msgs/msg/Contact", text: with_header!("string part_a\nstring part_b\n") };
+}
+
+impl RosMessage for FaultMessage {
+    const SCHEMA: RosSchema =
+        RosSchema { name: "armcal_msgs/msg/Fault", text: with_header!("string kind\nstring details\n") };
 }
 
 impl RosMessage for Clearance {

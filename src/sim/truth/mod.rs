@@ -7,8 +7,8 @@ mod record;
 use serde::{Deserialize, Serialize};
 
 pub use messages::{
-    CAMERA_POSE, CLEARANCE, CONTACTS, Clearance, Contact, JOINT_STATES, OIL_TEMPERATURE, TOOL_POSE, VEHICLE_POSE,
-    WATER_TEMPERATURE, WORLD,
+    CAMERA_POSE, CLEARANCE, CONTACTS, Clearance, Contact, FAULTS, JOINT_STATES, OIL_TEMPERATURE, TOOL_POSE,
+    VEHICLE_POSE, WATER_TEMPERATURE, WORLD,
 };
 pub use read::{Truth, read_truth};
 pub use record::TruthRecorder;
@@ -64,6 +64,16 @@ pub struct TruthClearance {
     pub part_b: String,
 }
 
+/// Something broke.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct TruthFault {
+    pub stamp: Stamp,
+    /// As routines name it.
+    pub kind: String,
+    /// What the routine says of it beside that: `joint = "wrist_yaw"`.
+    pub details: String,
+}
+
 /// Takes the truth as it comes, in the order of time.
 pub trait TruthSink {
     /// Comes first, once.
@@ -83,6 +93,10 @@ pub trait TruthSink {
     /// # Errors
     /// See [`Self::begin`].
     fn clearance(&mut self, clearance: &TruthClearance) -> Result<(), SinkError>;
+
+    /// # Errors
+    /// See [`Self::begin`].
+    fn fault(&mut self, fault: &TruthFault) -> Result<(), SinkError>;
 
     /// Comes last, once.
     ///

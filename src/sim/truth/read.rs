@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use super::messages::{self, Clearance, Contact};
-use super::{TruthClearance, TruthContact, TruthHeader, TruthState};
+use super::messages::{self, Clearance, Contact, FaultMessage};
+use super::{TruthClearance, TruthContact, TruthFault, TruthHeader, TruthState};
 use crate::log::ros::{self, JointState, PoseStamped, StringMessage, Temperature};
 use crate::log::{Completeness, RawMessage, decode, for_each_raw};
 use crate::sim::error::SimError;
@@ -19,6 +19,8 @@ pub struct Truth {
     pub states: Vec<TruthState>,
     pub contacts: Vec<TruthContact>,
     pub clearances: Vec<TruthClearance>,
+    /// What broke, in the order of time.
+    pub faults: Vec<TruthFault>,
     /// How much of the file could be read.
     pub completeness: Completeness,
 }
@@ -47,6 +49,7 @@ pub fn read_truth(path: impl AsRef<Path>) -> Result<Truth, SimError> {
         states: reader.states,
         contacts: reader.contacts,
         clearances: reader.clearances,
+        faults: reader.faults,
         completeness: summary.completeness,
     })
 }
@@ -99,6 +102,7 @@ struct Reader {
     states: Vec<TruthState>,
     contacts: Vec<TruthContact>,
     clearances: Vec<TruthClearance>,
+    faults: Vec<TruthFault>,
     joints: Option<JointState>,
     tool: Option<Pose<Base, Tool>>,
     camera: Option<Pose<Base, Camera>>,
@@ -126,6 +130,10 @@ impl Reader {
             messages::CLEARANCE => {
                 let Clearance { header, distance_m, part_a, part_b } = decoded(message)?;
                 self.clearances.push(TruthClearance { stamp: stamp(header.stamp)?, distance_m, part_a, part_b });
+            }
+            messages::FAULTS => {
+                let FaultMessage { header, kind, details } = decoded(message)?;
+                self.faults.push(TruthFault { stamp: stamp(header.stamp)?, kind, details });
             }
             _ => {}
         }

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::messages::{self, Clearance, Contact};
-use super::{TruthClearance, TruthContact, TruthHeader, TruthSink, TruthState};
+use super::messages::{self, Clearance, Contact, FaultMessage};
+use super::{TruthClearance, TruthContact, TruthFault, TruthHeader, TruthSink, TruthState};
 use crate::log::ros::{Header, JointState, Pose as RosPose, PoseStamped, Quaternion, StringMessage, Temperature, Time};
 use crate::log::{LogError, RecordingHeader, RecordingWriter, RosMessage};
 use crate::spatial::{Frame, Pose};
@@ -97,6 +97,11 @@ impl TruthSink for TruthRecorder {
         let TruthClearance { stamp, distance_m, part_a, part_b } = clearance.clone();
         let message = Clearance { header: header(stamp, BASE)?, distance_m, part_a, part_b };
         self.write(messages::CLEARANCE, stamp, &message)
+    }
+
+    fn fault(&mut self, fault: &TruthFault) -> Result<(), SinkError> {
+        let TruthFault { stamp, kind, details } = fault.clone();
+        self.write(messages::FAULTS, stamp, &FaultMessage { header: header(stamp, BASE)?, kind, details })
     }
 
     fn finish(self: Box<Self>) -> Result<(), SinkError> {

@@ -1,0 +1,131 @@
+//! Things break: at steps of the script, or when their time has come, and the truth's stream says so.
+
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+
+use super::World;
+use crate::sim::fault::{Fault, Knock, ScheduledFault};
+use crate::sim::truth::TruthFault;
+use crate::streams::ArmError;
+
+/// Times are met to this, s: whole periods are not exact in binary.
+const SAME_TIME_S: f64 = 1e-9;
+
+/// The faults that have a time, in its order.
+#[derive(Clone, Debug)]
+pub(super) struct Timeline {
+    /// Time and place in the spec's list, the next one last.
+    ahead: Vec<(f64, usize)>,
+    /// When something last broke, at a step or by itself.
+    last_s: Option<f64>,
+}
+
+impl Timeline {
+    pub(super) fn new(faults: &[ScheduledFault]) -> Self {
+        let timed = faults.iter().enumerate().filter_map(|(index, scheduled)| Some((scheduled.at_s?, index)));
+        let mut ahead: Vec<(f64, usize)> = timed.collect();
+        // Stable: of one time, those that stand first happen first.
+        ahead.sort_by(|a, b| a.0.total_cmp(&b.0));
+        ahead.reverse();
+        Self { ahead, last_s: None }
+    }
+
+    fn take_due(&mut self, time_s: f64) -> Option<usize> {
+        let (_, index) = self.ahead.pop_if(|(at_s, _)| *at_s <= time_s + SAME_TIME_S)?;
+        Some(index)
+    }
+
+    /// Whether nothing broke in the last `before_s` and nothing will in the next `after_s`.
+    pub(super) fn is_calm(&self, time_s: f64, before_s: f64, after_s: f64) -> bool {
+        self.last_s.is_none_or(|last_s| time_s - last_s >= before_s)
+            && self.ahead.last().is_none_or(|(at_s, _)| *at_s > time_s + after_s)
+    }
+}
+
+impl World {
+    /// Brings fault `number` of the script's steps about.
+    pub(super) fn break_something(&mut self, number: usize) -> Result<(), ArmError> {
+        let of_steps = || self.spec.fault.iter().enumerate().filter(|(_, scheduled)| scheduled.at_s.is_none());
+        let Some((index, _)) = of_steps().nth(number) else {
+            return Err(ArmError::NoSuchFault { number, known: of_steps().count() });
+        };
+        self.bring_about(index)
+    }
+
+    /// Brings about what is due at the beginning of a period.
+    pub(super) fn break_what_is_due(&mut self) -> Result<(), ArmError> {
+        while let Some(index) = self.timeline.take_due(self.time_s()) {
+            self.bring_about(index)?;
+        }
+        Ok(())
+    }
+
+    fn bring_about(&mut self, index: usize) -> Result<(), ArmError> {
+        let fault = self.spec.fault[index].fault.clone();
+        self.timeline.last_s = Some(self.time_s());
+        let stamp = self.stamp();
+        if let Some(truth) = &mut self.truth {
+            let told = TruthFault { stamp, kind: fault.kind().to_owned(), details: fault.details() };
+            truth.fault(&told).map_err(ArmError::Sink)?;
+        }
+        match fault {
+            Fault::SensorJump { joint, by_rad } => self.at_sensor(&joint, |pot| pot.jump(by_rad)),
+            Fault::SensorStuck { joint } => self.at_sensor(&joint, super::JointSensor::stick),
+            Fault::SensorDead { joint } => self.at_sensor(&joint, super::JointSensor::die),
+            Fault::JointLocked { joint } => {
+                if let Some(joint) = self.joint(&joint) {
+                    self.hydraulics.lock(joint);
+                }
+            }
+            Fault::PressureLost { joint: None, ratio } => self.hydraulics.lose_pump(1.0 - ratio),
+            Fault::PressureLost { joint: Some(joint), ratio } => {
+                if let Some(joint) = self.joint(&joint) {
+                    self.hydraulics.lose_pressure(joint, 1.0 - ratio);
+                }
+            }
+            Fault::TagLost { id } => self.camera.lose(id),
+            Fault::TagMoved { id, by_m, by_rad } => {
+                let turn = UnitQuaternion::from_scaled_axis(Vector3::from(by_rad));
+                self.camera.move_tag(id, Isometry3::from_parts(Translation3::from(by_m), turn));
+            }
+            Fault::TagMisread { id, as_id } => self.camera.misread(id, as_id),
+            Fault::Silt { seconds } => self.camera.blind(stamp.plus_s(seconds)),
+            Fault::VehicleKnocked { force_n, duration_s, at_m } => {
+                self.knock(&Knock::new(force_n, duration_s, at_m));
+            }
+            Fault::ArmBumped { link, force_n, duration_s } => self.bump(&link, force_n, duration_s),
+        }
+        Ok(())
+    }
+
+    fn joint(&self, name: &str) -> Option<usize> {
+        self.robot.sensors.iter().position(|sensor| sensor.joint == name)
+    }
+
+    fn at_sensor(&mut self, joint: &str, act: impl FnOnce(&mut super::JointSensor)) {
+        if let Some(pot) = self.joint(joint).and_then(|joint| self.pots.get_mut(joint)) {
+            act(pot);
+        }
+    }
+
+    /// A blow to the vehicle: a free one takes the impulse, one on a prescribed path swings out as its impulse says and comes back.
+    fn knock(&mut self, knock: &Knock) {
+        let t_s = self.time_s();
+        match &mut self.free {
+            Some(free) => free.knock(t_s, knock),
+            None => {
+                let mass_kg = self.vehicle.mass_kg;
+                // Without figures of its own: a radius of gyration of 0.9 m (assumed).
+                let inertia = self.vehicle.dynamics.map_or([0.81 * mass_kg; 3], |dynamics| dynamics.inertia_kg_m2);
+                self.motion.knock(t_s, knock, mass_kg, &Vector3::from(inertia));
+            }
+        }
+    }
+
+    /// A push at a link's centre of mass, force in base axes.
+    fn bump(&mut self, link: &str, force_n: [f64; 3], duration_s: f64) {
+        let body = self.robot.bodies.iter().position(|body| body.name == link);
+        if let Some(body) = body {
+            self.physics.push(body, &self.robot.bodies[body].com_m, &Vector3::from(force_n), duration_s);
+        }
+    }
+}
