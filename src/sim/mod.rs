@@ -2,19 +2,22 @@
 //!
 //! [`World`] is an `Arm` like any other: it takes set-points in raw counts and answers with messages. What it knows
 //! beyond them (as-built sensors, true poses, contacts) goes into a truth stream of its own, which only the score
-//! reads. The arm is a multibody in base axes on compliant oil columns; the vehicle moves as prescribed; every error of
+//! reads. Arm and vehicle are one multibody in water, on compliant oil columns; the vehicle moves as prescribed or floats free; every error of
 //! [`WorldSpec`] is drawn from a random stream named after it, so that one seed gives one world, byte for byte.
 
 mod as_built;
 mod contact;
 mod controller;
 mod convert;
+pub mod dynamics;
 mod error;
 mod fault;
+mod gripper;
 mod hydraulics;
-mod loads;
+mod joint_load;
 mod physics;
 mod places;
+mod recorded;
 mod sensors;
 mod solids;
 mod spec;
@@ -22,11 +25,15 @@ pub mod truth;
 mod vehicle;
 mod world;
 
-pub use as_built::{AsBuilt, Harmonic, JointAsBuilt, PlainPose, TagAsBuilt};
+pub use as_built::{
+    AsBuilt, AttitudeAsBuilt, GaugesAsBuilt, Harmonic, JointAsBuilt, LensAsBuilt, PlainPose, ResolverAsBuilt,
+    TagAsBuilt, WornSpot,
+};
 pub use error::SimError;
-pub use fault::Fault;
+pub use fault::{Fault, ScheduledFault};
+pub use recorded::{RecordedMotion, VehicleJet};
 pub use spec::{
-    CameraWorldSpec, ClockSpec, HydraulicsSpec, JointSensorsSpec, PhysicsSpec, TagsSpec, TemperatureSpec,
-    VehicleMotionSpec, WaterSpec, WorldSpec,
+    CameraWorldSpec, ClockSpec, HydraulicsSpec, JointSensorsSpec, MotionKind, PhysicsSpec, Points, PortKind, TagsSpec,
+    TemperatureSpec, VehicleMotionSpec, WaterSpec, WorldSpec,
 };
 pub use world::{World, WorldInput};

@@ -1,29 +1,40 @@
 //! The world: arm, vehicle, water and sensors in step.
 
+mod faults;
+mod jaws;
 mod meanwhile;
+mod setup;
 
 use std::collections::VecDeque;
+
+use faults::Timeline;
+pub(super) use setup::check_step;
+use setup::{actuators, header, sample_pots, stowed_angles, surroundings};
 
 use super::as_built::AsBuilt;
 use super::contact::ContactWatch;
 use super::controller::Controller;
+use super::dynamics::Force;
 use super::error::SimError;
-use super::hydraulics::{ActuatorInput, Hydraulics};
-use super::physics::{ArmPhysics, PhysicsInput};
+use super::gripper::Gripper;
+use super::hydraulics::Hydraulics;
+use super::joint_load::JointLoad;
+use super::physics::{ArmPhysics, Drive, PhysicsInput};
 use super::places::BodyPoses;
 use super::sensors::attitude::AttitudeSensor;
-use super::sensors::camera::{CameraInput, WristCamera};
-use super::sensors::pot::{Pot, PotInput};
-use super::sensors::thermometer::{SlowSensors, Temperatures};
+use super::sensors::camera::{ArmMotion, CameraInput, WristCamera};
+use super::sensors::joint::JointSensor;
+use super::sensors::temperatures::Temperatures;
+use super::sensors::thermometer::SlowSensors;
 use super::solids::Solids;
-use super::spec::{CONTROL_PERIOD_S, WorldSpec};
+use super::spec::{CONTROL_PERIOD_S, MotionKind, WorldSpec};
 use super::truth::{TruthClearance, TruthContact, TruthHeader, TruthSink, TruthState};
-use super::vehicle::{BaseState, VehicleMotion};
+use super::vehicle::{BaseState, FreeVehicle, Sea, VehicleMotion, WaterMotion};
 use crate::robot::{Robot, Vehicle};
 use crate::routine::Scene;
 use crate::spatial::Pose;
 use crate::streams::{
-    Arm, ArmError, JointAngles, JointCounts, JointSensorSample, MAX_JOINTS, Message, Sink, TagDetections, Thermometer,
+    Arm, ArmError, JointCounts, JointSensorSample, MAX_JOINTS, Message, Sink, TagDetections, Thermometer,
 };
 use crate::time::{SIMULATION_EPOCH, Stamp};
 
@@ -31,9 +42,6 @@ const ATTITUDE_PERIODS: u64 = 5;
 const SLOW_PERIODS: u64 = 100;
 /// The end of a wait that passes step by step, s.
 const AWAKE_S: f64 = 2.0;
-/// An arm that starts nearer to an end stop than this starts at this distance, rad.
-const END_STOP_MARGIN_RAD: f64 = 1e-3;
-
 /// What a world is made of.
 #[derive(Clone, Debug)]
 pub struct WorldInput<'a> {
@@ -50,12 +58,22 @@ pub struct World {
     spec: WorldSpec,
     robot: Robot,
     header: TruthHeader,
+    /// Of a vehicle whose motion is prescribed.
     motion: VehicleMotion,
+    /// A vehicle that floats.
+    free: Option<FreeVehicle>,
+    sea: Sea,
+    /// The water now.
+    water: WaterMotion,
+    /// The base now.
+    base: BaseState,
+    vehicle: Vehicle,
     solids: Solids,
     physics: ArmPhysics,
     hydraulics: Hydraulics,
+    gripper: Option<Gripper>,
     controller: Controller,
-    pots: Vec<Pot>,
+    pots: Vec<JointSensor>,
     temperatures: Temperatures,
     slow: SlowSensors,
     attitude: AttitudeSensor,
@@ -67,6 +85,7 @@ pub struct World {
     outbox: Vec<(Stamp, Message)>,
     measured: JointCounts,
     step: u64,
+    timeline: Timeline,
     truth: Option<Box<dyn TruthSink>>,
 }
 
@@ -81,40 +100,57 @@ impl World {
         let built = AsBuilt::draw(robot, &spec, seed);
         let gear_ratios: Vec<f64> = built.joints.iter().map(|joint| joint.gear_ratio).collect();
         let step_s = CONTROL_PERIOD_S / spec.steps_per_period() as f64;
-        let temperatures = Temperatures { spec: spec.temperature };
+        let temperatures = Temperatures::new(&spec.temperature, spec.water.depth_m);
         let sensors = robot.sensors.iter().zip(&built.joints);
-        let mut pots: Vec<Pot> =
-            sensors.map(|(nominal, joint)| Pot::new(nominal, joint, &spec.joint_sensors, seed)).collect();
-        let angles = stowed_angles(robot, &mut pots, temperatures.oil_c(0.0));
+        let mut pots: Vec<JointSensor> =
+            sensors.map(|(nominal, joint)| JointSensor::new(nominal, joint, &spec.joint_sensors, seed)).collect();
+        let around = surroundings(&spec, &temperatures, 0.0, spec.water.depth_m);
+        let angles = stowed_angles(robot, &mut pots, &around);
         let solids = Solids::new(robot, vehicle, scene);
-        let motion = VehicleMotion::new(&spec.vehicle, vehicle.vehicle_from_base, seed);
+        let motion = VehicleMotion::new(&spec.vehicle, spec.recorded.as_ref(), vehicle.vehicle_from_base, seed);
+        let base = motion.at(0.0);
         let mut hydraulics = Hydraulics::new(&spec.hydraulics, &actuators(robot)?, step_s);
         let mut physics = ArmPhysics::new(&PhysicsInput {
             chain: &robot.chain,
             bodies: &robot.bodies,
             solids: Some(&solids),
             water: &spec.water,
-            step_s,
+            spec: &spec.physics,
             angles,
-        })?;
-        physics.set_damping(&hydraulics.damping().map(|column| column + spec.water.joint_friction_n_m_s_rad));
-        hydraulics.balance(&angles, &physics.static_torques(&robot.chain, &motion.at(0.0), &angles));
-        let measured = sample_pots(&mut pots, &angles, temperatures.oil_c(0.0), 0.0);
+        });
+        let free = match spec.vehicle.motion {
+            MotionKind::Free => Some(FreeVehicle::new(vehicle, &spec.vehicle, seed)?),
+            MotionKind::Swell | MotionKind::Recorded => None,
+        };
+        if let Some(free) = &free {
+            let body = free.body(vehicle, &spec.water, physics.multibody(), &angles);
+            physics.set_free(body, base.world_from_base.isometry());
+        }
+        hydraulics.balance(&angles, &physics.static_torques(&base.gravity, &angles));
+        let sea = Sea::new(&spec.water, seed);
+        let measured = sample_pots(&mut pots, &angles, &around, 0.0);
         Ok(Self {
             controller: Controller::new(&spec.hydraulics, &robot.sensors, &gear_ratios, &measured),
-            slow: SlowSensors::new(&spec.temperature, &spec.water, seed),
-            attitude: AttitudeSensor::new(&spec.vehicle, seed),
+            slow: SlowSensors::new(&spec.temperature, &spec.water, &built.gauges, seed),
+            attitude: AttitudeSensor::new(&spec.vehicle, &built.attitude, seed),
             camera: WristCamera::new(&CameraInput { robot, built: &built, solids: &solids, spec: &spec, seed }),
             contacts: ContactWatch::new(solids.pairs(), step_s),
             images: VecDeque::new(),
             n_images: 0,
             outbox: Vec::with_capacity(16),
+            gripper: robot.gripper.as_ref().map(|gripper| Gripper::new(gripper, spec.hydraulics.valve_lag_s)),
             step: 0,
+            timeline: Timeline::new(&spec.fault),
             truth: None,
             header: header(&input, built)?,
             robot: robot.clone(),
             spec,
             motion,
+            free,
+            water: sea.at(0.0),
+            sea,
+            base,
+            vehicle: vehicle.clone(),
             solids,
             physics,
             hydraulics,
@@ -152,14 +188,30 @@ impl World {
     }
 
     fn physics_step(&mut self, commands: &[f64; MAX_JOINTS]) -> Result<(), ArmError> {
-        let base = self.motion.at(self.time_s());
-        let angles = self.physics.angles();
-        self.hydraulics.step(commands, &angles);
-        for joint in 0..angles.len() {
-            self.physics.set_column(joint, &self.hydraulics.column(joint));
-        }
-        self.physics.step(&base);
+        let (angles, rates) = (self.physics.angles(), self.physics.rates());
+        self.hydraulics.step(commands, &angles, &rates);
+        let friction =
+            JointLoad { damping_n_m_s_rad: self.spec.water.joint_friction_n_m_s_rad, ..JointLoad::default() };
+        let loads = std::array::from_fn(|j| {
+            if j < angles.len() { self.hydraulics.load(j) + friction } else { JointLoad::default() }
+        });
+        let (t_s, step_s) = (self.time_s(), self.spec.physics.step_s);
         self.step += 1;
+        let next_s = self.time_s();
+        let vehicle_force = match &mut self.free {
+            Some(free) => free.force(t_s, step_s, &self.base),
+            None => Force::zero(),
+        };
+        let water_next = self.sea.at(next_s);
+        let next = if self.free.is_some() { self.base } else { self.motion.at(next_s) };
+        self.physics.step(&Drive {
+            base: [&self.base, &next],
+            water: [self.water, water_next],
+            vehicle_force,
+            loads: &loads,
+        });
+        self.water = water_next;
+        self.base = if self.free.is_some() { self.physics.base_state(&self.vehicle.vehicle_from_base) } else { next };
         self.watch_contacts()?;
         let next_image_s = (self.n_images + 1) as f64 / self.spec.camera.rate_hz;
         if self.time_s() >= next_image_s - 1e-9 {
@@ -182,17 +234,18 @@ impl World {
     }
 
     fn expose(&mut self) {
-        let links = self.place_solids(&self.motion.at(self.time_s()));
+        let links = self.place_solids();
         let exposure = self.stamp();
-        let image = self.camera.expose(&links, &self.solids, exposure);
-        // It arrives when its late clock says that it was taken, but never before the image ahead of it.
-        let arrival = self.images.back().map_or(image.stamp, |(ahead, _)| image.stamp.max(*ahead));
+        let motion = ArmMotion { chain: &self.robot.chain, angles: self.physics.angles(), rates: self.physics.rates() };
+        let (arrival, image) = self.camera.expose(&links, &self.solids, &motion, exposure);
+        // It never arrives before the image ahead of it.
+        let arrival = self.images.back().map_or(arrival, |(ahead, _)| arrival.max(*ahead));
         self.images.push_back((arrival, image));
     }
 
-    fn place_solids(&mut self, base: &BaseState) -> BodyPoses {
+    fn place_solids(&mut self) -> BodyPoses {
         let links = self.physics.poses();
-        self.solids.place(&links, base.world_from_base.inverse().isometry());
+        self.solids.place(&links, self.base.world_from_base.inverse().isometry());
         links
     }
 
@@ -203,12 +256,14 @@ impl World {
         while let Some((arrival, image)) = self.images.pop_front_if(|(arrival, _)| *arrival <= now) {
             self.outbox.push((arrival, Message::Detections(image)));
         }
-        let oil_c = self.temperatures.oil_c(t_s);
-        self.measured = sample_pots(&mut self.pots, &self.physics.angles(), oil_c, CONTROL_PERIOD_S);
+        self.warm(t_s, CONTROL_PERIOD_S);
+        let around = surroundings(&self.spec, &self.temperatures, t_s, self.depth_m());
+        self.measured = sample_pots(&mut self.pots, &self.physics.angles(), &around, CONTROL_PERIOD_S);
         let sample = JointSensorSample { stamp: now, counts: self.measured };
         self.outbox.push((now, Message::JointSensors(sample)));
+        self.move_jaws(period);
         if period.is_multiple_of(ATTITUDE_PERIODS) {
-            let attitude = self.attitude.sample(&self.motion.at(t_s), now);
+            let attitude = self.attitude.sample(&self.base, now);
             self.outbox.push((now, Message::Attitude(attitude)));
         }
         if period.is_multiple_of(SLOW_PERIODS) {
@@ -216,16 +271,22 @@ impl World {
         }
     }
 
+    /// Water and oil until `t_s`: what the drives take from the pump and do not pass on as work warms the oil.
+    fn warm(&mut self, t_s: f64, elapsed_s: f64) {
+        self.temperatures.advance(t_s, elapsed_s, self.hydraulics.power_w().max(0.0), self.depth_m());
+    }
+
     /// Thermometers and depth gauge.
     fn sample_slow_sensors(&mut self, now: Stamp, t_s: f64) {
         let oil_c = self.temperatures.oil_c(t_s);
         let oil = self.slow.temperature(Thermometer::Oil, oil_c, now);
         let water = self.slow.temperature(Thermometer::Water, self.temperatures.water_c(t_s), now);
-        let heave_m = self.motion.at(t_s).world_from_vehicle.origin().vector().z;
+        let heave_m = self.base.world_from_vehicle.origin().vector().z;
         let pressure = self.slow.pressure(heave_m, now);
         self.outbox.push((now, Message::Temperature(oil)));
         self.outbox.push((now, Message::Temperature(water)));
         self.outbox.push((now, Message::Pressure(pressure)));
+        self.report_gap();
     }
 
     fn hand_over(&mut self, sink: &mut dyn Sink) -> Result<(), ArmError> {
@@ -248,7 +309,7 @@ impl World {
             }
         }
         if is_due(self.spec.physics.clearance_rate_hz) {
-            self.place_solids(&self.motion.at(self.time_s()));
+            self.place_solids();
             let stamp = self.stamp();
             if let (Some(nearest), Some(truth)) = (self.solids.nearest(), &mut self.truth) {
                 let name = |part| self.solids.part_name(part).to_owned();
@@ -261,18 +322,18 @@ impl World {
     }
 
     fn truth_state(&self) -> TruthState {
-        let angles = self.physics.angles();
+        let (angles, rates) = (self.physics.angles(), self.physics.rates());
         let links = self.physics.poses();
         let t_s = self.time_s();
         TruthState {
             stamp: self.stamp(),
             angles,
-            rates: self.physics.rates(),
-            torques: self.hydraulics.torques(&angles),
+            rates,
+            torques: self.hydraulics.torques(&angles, &rates),
             // The engine's raw poses get their names here: the tool and the camera in the base frame.
             base_from_tool: Pose::from_isometry(links.frame(&self.robot.tool.mount)),
             base_from_camera: Pose::from_isometry(self.camera.base_from_camera(&links)),
-            world_from_vehicle: self.motion.at(t_s).world_from_vehicle,
+            world_from_vehicle: self.base.world_from_vehicle,
             oil_c: self.temperatures.oil_c(t_s),
             water_c: self.temperatures.water_c(t_s),
         }
@@ -297,6 +358,7 @@ impl Arm for World {
     }
 
     fn step(&mut self, sink: &mut dyn Sink) -> Result<(), ArmError> {
+        self.break_what_is_due()?;
         let commands = self.controller.update(&self.measured);
         for _ in 0..self.spec.steps_per_period() {
             self.physics_step(&commands)?;
@@ -316,6 +378,10 @@ impl Arm for World {
         self.rest(seconds, sink)
     }
 
+    fn grip(&mut self, opening: f64) -> Result<(), ArmError> {
+        self.tell_jaws(opening)
+    }
+
     fn fault(&mut self, number: usize) -> Result<(), ArmError> {
         self.break_something(number)
     }
@@ -324,52 +390,6 @@ impl Arm for World {
 /// Whole control periods between samples of about `rate_hz`.
 fn periods_between(rate_hz: f64) -> u64 {
     (1.0 / (rate_hz * CONTROL_PERIOD_S)).round().max(1.0) as u64
-}
-
-/// The true angles at which every sensor reads `stowed` by the datasheet, kept within the end stops.
-fn stowed_angles(robot: &Robot, pots: &mut [Pot], oil_c: f64) -> JointAngles {
-    JointAngles::from_fn(robot.n_joints(), |j| {
-        let wanted = pots[j].angle_for_reading(robot.stowed[j], oil_c);
-        let angle = robot.chain.joints()[j].limits.map_or(wanted, |limits| {
-            wanted.clamp(limits.lower_rad + END_STOP_MARGIN_RAD, limits.upper_rad - END_STOP_MARGIN_RAD)
-        });
-        pots[j].settle(angle);
-        angle
-    })
-}
-
-fn sample_pots(pots: &mut [Pot], angles: &JointAngles, oil_c: f64, elapsed_s: f64) -> JointCounts {
-    JointCounts::from_fn(pots.len(), |j| pots[j].sample(&PotInput { angle_rad: angles[j], oil_c, elapsed_s }))
-}
-
-/// Torque limits from the URDF's effort, rates from the sensors' table.
-fn actuators(robot: &Robot) -> Result<Vec<ActuatorInput>, SimError> {
-    let file = robot.folder.join("robot.toml");
-    let urdf = urdf_rs::read_from_string(&robot.urdf_text).ok();
-    let effort =
-        |name: &str| urdf.iter().flat_map(|u| &u.joints).find(|j| j.name == name).map_or(0.0, |j| j.limit.effort);
-    let joints = robot.chain.joints().iter().zip(&robot.sensors);
-    joints
-        .map(|(joint, sensor)| {
-            let effort_n_m = effort(&joint.name);
-            if !(effort_n_m.is_finite() && effort_n_m > 0.0) {
-                return Err(SimError::NoEffort { file: file.clone(), joint: joint.name.clone(), effort_n_m });
-            }
-            let rate_limit_rad_s = sensor.max_rate_rad_s;
-            Ok(ActuatorInput { limits: joint.limits, torque_max_n_m: effort_n_m, rate_limit_rad_s })
-        })
-        .collect()
-}
-
-fn header(input: &WorldInput, as_built: AsBuilt) -> Result<TruthHeader, SimError> {
-    Ok(TruthHeader {
-        robot: input.robot.name.clone(),
-        vehicle: input.vehicle.name.clone(),
-        joint_names: input.robot.joint_names(),
-        seed: input.seed,
-        spec_toml: input.spec.to_toml()?,
-        as_built,
-    })
 }
 
 #[cfg(test)]

@@ -1,0 +1,87 @@
+//! `[world.clock]`, `[world.camera]`, `[world.tags]`.
+
+use std::ops::RangeInclusive;
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use super::{CheckedTable, DEG, table};
+use crate::robot::FileIssue;
+
+/// The window between lens and water.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PortKind {
+    /// Rays go straight, as through a dome about the lens's pupil.
+    #[default]
+    None,
+    /// A sphere whose centre may lie beside the pupil.
+    Dome,
+    /// A plane across the lens's axis.
+    Flat,
+}
+
+table!(
+    /// The camera's clock against the joint sensors'.
+    #[derive(Copy)]
+    ClockSpec {
+        /// Its stamps are late by this, on average.
+        camera_latency_s = 0.020, in 0.0..=1.0;
+        /// Standard deviation of the lateness.
+        camera_jitter_s = 0.005, in 0.0..=0.2;
+        /// Its clock gains this on the joint sensors' from the start on. Quartz: 1 to 100 ppm.
+        camera_clock_drift_ppm = 0.0, in -1000.0..=1000.0;
+    }
+);
+
+table!(
+    /// The wrist camera and its detector.
+    #[derive(Copy)]
+    CameraWorldSpec {
+        /// Standard deviation per corner coordinate at 1 m, seen head-on; see `sensors::camera` for how it grows.
+        corner_noise_px = 0.3, in 0.0..=20.0;
+        /// Share of visible tags that the detector misses.
+        miss_probability = 0.02, in 0.0..=1.0;
+        /// Standard deviation per axis of the mount's error.
+        mount_std_rad = 0.2 * DEG, in 0.0..=0.5;
+        mount_std_m = 0.002, in 0.0..=0.2;
+        rate_hz = 5.0, in 0.1..=100.0;
+        max_range_m = 2.5, in 0.1..=50.0;
+        /// Angle between the tag's normal and the line of sight.
+        max_incidence_rad = 70.0 * DEG, in 0.1..=1.55;
+        /// Shortest side in the image that the detector still decodes.
+        min_side_px = 16.0, in 1.0..=1000.0;
+        /// How long the shutter is open before an image's instant; corners are means over it.
+        exposure_s = 0.0, in 0.0..=0.5;
+        /// Relative growth of the corner noise per px that a corner moves meanwhile. Assumed.
+        blur_noise_per_px = 0.0, in 0.0..=10.0;
+        /// Share of detections that come with the id of another tag of the map. Assumed.
+        wrong_id_probability = 0.0, in 0.0..=1.0;
+        /// Standard deviation of the focal length's relative error, common to both axes. Assumed.
+        focal_std = 0.0, in 0.0..=0.1;
+        /// Standard deviation per axis of the image centre's error. Assumed.
+        center_std_px = 0.0, in 0.0..=100.0;
+        /// Standard deviation of each distortion coefficient's error. Assumed.
+        distortion_std = 0.0, in 0.0..=0.002;
+        /// Inner radius of a dome port. Assumed.
+        dome_radius_m = 0.05, in 0.01..=0.5;
+        /// Standard deviation per axis of the dome's centre about the lens's pupil. Assumed.
+        dome_decentre_std_m = 0.0, in 0.0..=0.02;
+        /// From the lens's pupil to a flat port. Assumed.
+        port_distance_m = 0.02, in 0.0..=0.5;
+        /// Of a dome or a flat port. Assumed.
+        port_thickness_m = 0.01, in 0.0..=0.1;
+    } and {
+        /// What the camera looks through.
+        port: PortKind = PortKind::None;
+    }
+);
+
+table!(
+    /// How well the tags were surveyed.
+    #[derive(Copy)]
+    TagsSpec {
+        survey_std_m = 0.001, in 0.0..=0.2;
+        survey_std_rad = 0.2 * DEG, in 0.0..=0.5;
+    }
+);

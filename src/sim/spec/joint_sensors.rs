@@ -1,0 +1,88 @@
+//! `[world.joint_sensors]`.
+
+use std::num::NonZeroU8;
+use std::ops::RangeInclusive;
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use super::{CheckedTable, DEG, table};
+use crate::robot::FileIssue;
+
+table!(
+    /// Errors of the joint sensors; see `sensors::joint` for the equations. robot.toml says which joint has which kind.
+    #[derive(Copy)]
+    JointSensorsSpec {
+        /// Relative gain error of a potentiometer, uniform in +- this, about the middle of the joint's range.
+        gain_error_max = 0.05, in 0.0..=0.5;
+        /// Offset error of any kind, uniform in +- this.
+        offset_error_max_rad = 5.0 * DEG, in 0.0..=1.0;
+        /// Peak of the potentiometer's smooth nonlinearity, as a fraction of the joint's range.
+        nonlinearity_peak = 0.001, in 0.0..=0.2;
+        /// Standard deviation over joints.
+        temperature_offset_std_rad_per_k = 0.02 * DEG, in 0.0..=0.1;
+        /// Standard deviation over joints, relative gain per K.
+        temperature_gain_std_per_k = 20e-6, in 0.0..=0.01;
+        /// Oil temperature at which the temperature terms vanish.
+        reference_c = 10.0, in -10.0..=80.0;
+        /// Random walk of the offset.
+        drift_rad_per_sqrt_h = 0.02 * DEG, in 0.0..=0.1;
+        /// Full width of the play between joint and sensor shaft.
+        backlash_rad = 0.02 * DEG, in 0.0..=0.1;
+        /// Of potentiometers and resolvers.
+        noise_rms_counts = 1.5, in 0.0..=1000.0;
+        /// Step of the converter; 0 for none. A word of `wrap_counts` then has log2(wrap / step) bits.
+        resolution_counts = 1.0, in 0.0..=1000.0;
+        /// Height of the bump that a worn spot of the track puts on the reading, one spot a joint. Assumed.
+        worn_spot_peak_rad = 0.0, in 0.0..=0.2;
+        /// Its standard width; not below the peak, for the reading must keep growing with the angle. Assumed.
+        worn_spot_width_rad = 2.0 * DEG, in 1e-3..=1.0;
+        /// Standard deviation over joints, per MPa above the surface's pressure. No public figures: assumed.
+        pressure_offset_std_rad_per_mpa = 0.0, in 0.0..=0.01;
+        /// Standard deviation over joints, relative gain per MPa. No public figures: assumed.
+        pressure_gain_std_per_mpa = 0.0, in 0.0..=0.001;
+        /// Random walk of the offset with use: its variance grows with the shaft's travel, in turns. Assumed.
+        drift_rad_per_sqrt_turn = 0.0, in 0.0..=0.1;
+        /// Width of the wiper's hysteresis: readings on the way up and down differ by it. Datasheets of precision
+        /// potentiometers state repeatabilities of 0.004 to 0.1 deg.
+        hysteresis_rad = 0.0, in 0.0..=0.1;
+        /// Share of the wiper that drags; 1 makes a dead zone of the hysteresis, like the shaft's play. Assumed.
+        hysteresis_share = 0.5, in 0.05..=1.0;
+        /// Drop-outs of the wiper anywhere on the track. Assumed.
+        dropout_per_s = 0.0, in 0.0..=100.0;
+        /// More of them in the middle of the worn spot, fewer beside it. Assumed.
+        worn_dropout_per_s = 0.0, in 0.0..=100.0;
+        /// Mean length of a drop-out. Assumed.
+        dropout_mean_s = 0.05, in 1e-3..=100.0;
+        /// Steps that an encoder tells apart in a turn; 0 for as many as its word has.
+        encoder_steps_per_turn = 0.0, in 0.0..=1e9;
+        /// Once-a-turn error of an encoder: the disc's distance from its axis over the radius of its lines.
+        encoder_eccentricity_rad = 0.0, in 0.0..=0.1;
+        /// Relative difference of a resolver's two windings, standard deviation over joints. Assumed.
+        resolver_imbalance_std = 0.0, in 0.0..=0.1;
+        /// What the two windings lack to a right angle, electrical; standard deviation over joints. Assumed.
+        resolver_quadrature_std_rad = 0.0, in 0.0..=0.1;
+        /// Of a resolver's offset with its cable and converter; standard deviation over joints. Assumed.
+        resolver_temperature_std_rad_per_k = 0.0, in 0.0..=0.01;
+    } and {
+        /// Electrical turns of a resolver in one of its shaft, 1 .. 255.
+        resolver_pole_pairs: NonZeroU8 = NonZeroU8::MIN;
+    }
+);
+
+impl JointSensorsSpec {
+    /// A bump as steep as the scale would give one reading to several angles.
+    pub(super) fn check_relations(&self, file: &Path) -> Result<(), FileIssue> {
+        let (peak, width) = (self.worn_spot_peak_rad, self.worn_spot_width_rad);
+        if peak > width {
+            let problem = format!("{peak} is above worn_spot_width_rad, {width}");
+            return Err(FileIssue::new(file, "world.joint_sensors.worn_spot_peak_rad", problem));
+        }
+        Ok(())
+    }
+
+    /// Whether the joints' tracks have a worn spot at all.
+    pub(in crate::sim) fn wears(&self) -> bool {
+        self.worn_spot_peak_rad > 0.0 || self.worn_dropout_per_s > 0.0
+    }
+}

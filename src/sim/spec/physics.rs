@@ -1,0 +1,28 @@
+//! `[world.physics]`.
+
+use std::ops::RangeInclusive;
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use super::{CheckedTable, table};
+use crate::robot::FileIssue;
+
+table!(
+    /// The integrator and the rate of the truth's record.
+    #[derive(Copy)]
+    PhysicsSpec {
+        /// Step of the rigid-body integration; a control period (10 ms) must be a whole number of steps.
+        step_s = 0.002, in 5e-5..=0.005;
+        /// Rate of the truth's states, at most that of the controller.
+        truth_rate_hz = 50.0, in 0.1..=100.0;
+        /// Rate at which the clearance is measured.
+        clearance_rate_hz = 5.0, in 0.1..=100.0;
+        /// Of two parts that touch (assumed: structure and hoses give, not steel alone), shared by their points of contact.
+        contact_stiffness_n_m = 5e5, in 1e3..=1e9;
+        /// Damping of a contact over its stiffness (assumed: it hardly rebounds).
+        contact_damping_s = 0.01, in 0.0..=1.0;
+        /// Coulomb friction of a contact (assumed: wet steel); viscous below 1 mm/s.
+        contact_friction = 0.3, in 0.0..=2.0;
+    }
+);

@@ -1,0 +1,152 @@
+//! `[world.temperature]`.
+
+use std::ops::RangeInclusive;
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use super::{CheckedTable, table};
+use crate::robot::FileIssue;
+
+/// The longest profile of the water.
+const MAX_POINTS: usize = 16;
+
+table!(
+    /// Oil and water. The oil warms as `start + rise * (1 - exp(-t / time constant))`, or by the arm's work.
+    #[derive(Copy)]
+    TemperatureSpec {
+        water_c = 4.0, in -3.0..=40.0;
+        oil_start_c = 10.0, in -3.0..=80.0;
+        oil_rise_k = 8.0, in 0.0..=60.0;
+        /// 300 s: 6.9 K of the 8 K within 10 minutes.
+        oil_time_constant_s = 300.0, in 1.0..=1e5;
+        /// Noise of both thermometers.
+        thermometer_noise_k = 0.05, in 0.0..=5.0;
+        /// The water changes by this much in the long run (a dive into colder water); the oil follows with its own time
+        /// constant.
+        water_change_k = 0.0, in -60.0..=60.0;
+        water_time_constant_s = 1800.0, in 1.0..=1e6;
+        /// Heat capacity of the oil and what it warms. Above 0 the oil warms by the power that the hydraulics lose and cools
+        /// towards the water with its time constant, and `oil_rise_k` does not count. Assumed: 20 L of oil hold 3.3e4 J/K.
+        oil_heat_capacity_j_per_k = 0.0, in 0.0..=1e9;
+        /// Standard deviation of each thermometer's constant error. Assumed.
+        thermometer_bias_std_k = 0.0, in 0.0..=5.0;
+        /// Time constant of each thermometer, of a probe in its well. Assumed.
+        thermometer_lag_s = 0.0, in 0.0..=3600.0;
+        /// Step of each thermometer's converter; 0 for none.
+        thermometer_resolution_k = 0.0, in 0.0..=5.0;
+    } and {
+        /// Depths of `profile_c`, ascending, 16 at most; none for water that is the same everywhere.
+        profile_depth_m: Points = Points::default();
+        /// The water's temperature at those depths, linear between them and constant beyond; replaces `water_c`.
+        profile_c: Points = Points::default();
+    }
+);
+
+/// A few figures, written as a list.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Vec<f64>", into = "Vec<f64>")]
+pub struct Points {
+    n: usize,
+    values: [f64; MAX_POINTS],
+}
+
+impl Points {
+    #[must_use]
+    pub fn as_slice(&self) -> &[f64] {
+        &self.values[..self.n]
+    }
+}
+
+impl TryFrom<Vec<f64>> for Points {
+    type Error = String;
+
+    fn try_from(list: Vec<f64>) -> Result<Self, String> {
+        let mut points = Self { n: list.len(), ..Self::default() };
+        let slots = points.values.get_mut(..list.len());
+        let too_long = || format!("a list of {} figures; {MAX_POINTS} at most", list.len());
+        slots.ok_or_else(too_long)?.copy_from_slice(&list);
+        Ok(points)
+    }
+}
+
+impl From<Points> for Vec<f64> {
+    fn from(points: Points) -> Self {
+        points.as_slice().to_vec()
+    }
+}
+
+impl TemperatureSpec {
+    pub(super) fn check_relations(&self, file: &Path) -> Result<(), FileIssue> {
+        const DEPTHS: &str = "world.temperature.profile_depth_m";
+        const TEMPERATURES: &str = "world.temperature.profile_c";
+        let (depths, temperatures) = (self.profile_depth_m.as_slice(), self.profile_c.as_slice());
+        for depth in depths {
+            FileIssue::check_range(file, DEPTHS, *depth, 0.0..=12_000.0)?;
+        }
+        for temperature in temperatures {
+            FileIssue::check_range(file, TEMPERATURES, *temperature, -2.0..=30.0)?;
+        }
+        if let Some(pair) = depths.windows(2).find(|pair| pair[0] >= pair[1]) {
+            return Err(FileIssue::new(file, DEPTHS, format!("{} does not come before {}", pair[0], pair[1])));
+        }
+        if depths.len() != temperatures.len() {
+            let problem = format!("has {} figures for {} of profile_depth_m", temperatures.len(), depths.len());
+            return Err(FileIssue::new(file, TEMPERATURES, problem));
+        }
+        Ok(())
+    }
+
+    /// The water at the start, at a depth.
+    pub(in crate::sim) fn water_at_c(&self, depth_m: f64) -> f64 {
+        let (depths, temperatures) = (self.profile_depth_m.as_slice(), self.profile_c.as_slice());
+        let deeper = depths.partition_point(|depth| *depth <= depth_m);
+        match (deeper, temperatures.last()) {
+            (_, None) => self.water_c,
+            (0, Some(_)) => temperatures[0],
+            (n, Some(deepest)) if n == depths.len() => *deepest,
+            (n, Some(_)) => {
+                let share = (depth_m - depths[n - 1]) / (depths[n] - depths[n - 1]);
+                temperatures[n - 1] + share * (temperatures[n] - temperatures[n - 1])
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Result<TemperatureSpec, String> {
+        let spec: TemperatureSpec = toml::from_str(text).map_err(|error| error.message().to_owned())?;
+        spec.check_relations(Path::new("r.toml")).map_err(|issue| issue.to_string())?;
+        Ok(spec)
+    }
+
+    #[test]
+    fn the_water_is_linear_between_the_profiles_depths() {
+        let spec = read("profile_depth_m = [0, 50.0, 1050]\nprofile_c = [24.0, 14.0, 4.0]").expect("valid");
+        for (depth_m, expected_c) in [(-1.0, 24.0), (0.0, 24.0), (25.0, 19.0), (50.0, 14.0), (300.0, 11.5), (9e3, 4.0)]
+        {
+            assert!((spec.water_at_c(depth_m) - expected_c).abs() < 1e-12, "{depth_m} m");
+        }
+        assert_eq!(TemperatureSpec::default().water_at_c(300.0), 4.0);
+        let text = toml::to_string(&spec).expect("text");
+        assert_eq!(read(&text).expect("it reads back"), spec);
+    }
+
+    #[test]
+    fn a_profile_that_is_none_is_refused_with_the_reason() {
+        let long = format!("profile_depth_m = {:?}", (0..17).map(f64::from).collect::<Vec<_>>());
+        for (text, reason) in [
+            ("profile_depth_m = [0.0, 10.0]\nprofile_c = [4.0]", "1 figures for 2"),
+            ("profile_depth_m = [10.0, 10.0]\nprofile_c = [4.0, 5.0]", "10 does not come before 10"),
+            ("profile_depth_m = [nan]\nprofile_c = [4.0]", "profile_depth_m: NaN is outside"),
+            ("profile_depth_m = [1.0]\nprofile_c = [31.0]", "profile_c: 31 is outside -2 .. 30"),
+            (&long, "17 figures; 16 at most"),
+        ] {
+            let problem = read(text).expect_err("refused");
+            assert!(problem.contains(reason), "{problem}");
+        }
+    }
+}

@@ -1,0 +1,88 @@
+//! `[world.water]`.
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use super::CheckedTable;
+use crate::robot::FileIssue;
+
+/// Sea water about the arm.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct WaterSpec {
+    pub density_kg_m3: f64,
+    /// Of every link, per axis of its shapes.
+    pub drag_coefficient: f64,
+    /// Weight of the displaced water over the arm's own; the robot's own figure where there is none.
+    pub buoyancy_fraction: Option<f64>,
+    /// Linear friction of each joint, for slow motion.
+    pub joint_friction_n_m_s_rad: f64,
+    /// Standard deviation of the depth gauge's constant error; assumed.
+    pub pressure_bias_std_pa: f64,
+    /// Standard deviation of its relative scale error; assumed.
+    pub pressure_scale_std: f64,
+    /// Of the vehicle's station below the surface.
+    pub depth_m: f64,
+    pub pressure_noise_pa: f64,
+    /// Scale of the links' theoretical added mass; 0 for none.
+    pub added_mass_coefficient: f64,
+    /// Steady current in the world's axes, z up.
+    pub current_m_s: [f64; 3],
+    /// Significant height of the waves at the surface; 0 for none.
+    pub wave_height_m: f64,
+    /// Peak period of the waves.
+    pub wave_period_s: f64,
+    /// Where they run, from the world's x axis about z.
+    pub wave_direction_rad: f64,
+}
+
+impl Default for WaterSpec {
+    fn default() -> Self {
+        Self {
+            density_kg_m3: 1025.0,
+            drag_coefficient: 1.2,
+            buoyancy_fraction: None,
+            joint_friction_n_m_s_rad: 5.0,
+            pressure_bias_std_pa: 0.0,
+            pressure_scale_std: 0.0,
+            depth_m: 500.0,
+            pressure_noise_pa: 200.0,
+            added_mass_coefficient: 1.0,
+            current_m_s: [0.0; 3],
+            wave_height_m: 0.0,
+            wave_period_s: 8.0,
+            wave_direction_rad: 0.0,
+        }
+    }
+}
+
+impl WaterSpec {
+    /// Weight of the displaced water over the arm's own: as set here, else none at all.
+    pub(in crate::sim) fn buoyancy(&self) -> f64 {
+        self.buoyancy_fraction.unwrap_or(0.0)
+    }
+}
+
+impl CheckedTable for WaterSpec {
+    fn check(&self, file: &Path, table: &str) -> Result<(), FileIssue> {
+        let check =
+            |key: &str, value: f64, range| FileIssue::check_range(file, &format!("{table}.{key}"), value, range);
+        check("density_kg_m3", self.density_kg_m3, 0.0..=2000.0)?;
+        check("drag_coefficient", self.drag_coefficient, 0.0..=10.0)?;
+        check("buoyancy_fraction", self.buoyancy(), 0.0..=0.95)?;
+        check("joint_friction_n_m_s_rad", self.joint_friction_n_m_s_rad, 0.0..=1e4)?;
+        check("pressure_bias_std_pa", self.pressure_bias_std_pa, 0.0..=1e7)?;
+        check("pressure_scale_std", self.pressure_scale_std, 0.0..=0.1)?;
+        check("depth_m", self.depth_m, 0.0..=12000.0)?;
+        check("pressure_noise_pa", self.pressure_noise_pa, 0.0..=1e6)?;
+        check("added_mass_coefficient", self.added_mass_coefficient, 0.0..=10.0)?;
+        for (axis, speed) in self.current_m_s.iter().enumerate() {
+            check(&format!("current_m_s[{axis}]"), *speed, -5.0..=5.0)?;
+        }
+        check("wave_height_m", self.wave_height_m, 0.0..=20.0)?;
+        check("wave_period_s", self.wave_period_s, 1.0..=30.0)?;
+        check("wave_direction_rad", self.wave_direction_rad, -6.3..=6.3)?;
+        Ok(())
+    }
+}
