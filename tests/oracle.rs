@@ -1,6 +1,10 @@
 //! Against tools that share no code with ours; `tests/oracle` has the scripts that made the files of `tests/golden`.
 
+mod dynamics;
+mod paths;
 mod pendulum;
+mod steps;
+mod water;
 
 use armcal::optics::Fisheye;
 use armcal::streams::JointAngles;
