@@ -71,6 +71,15 @@ const WORLD: &[(&str, &[&str])] = &[
     ("[world.clock]\ncamera_jitter_s = nan", &["short.toml", "world.clock.camera_jitter_s", "NaN"]),
     ("[world.camera]\nmiss_probability = 1.5", &["short.toml", "world.camera.miss_probability", "0 .. 1"]),
     ("[world.physics]\nstep_s = 0.003", &["short.toml", "world.physics.step_s"]),
+    (
+        "[world.hydraulics]\nbulk_modulus_pa = 1e11\n[world.physics]\nstep_s = 0.005",
+        &["short.toml", "world.physics.step_s", "too large for the oil's stiffness", "at most"],
+    ),
+    ("[world.vehicle]\nmotion = \"adrift\"", &["short.toml", "world.vehicle", "adrift", "free"]),
+    ("[world.vehicle]\nmotion = \"recorded\"", &["short.toml", "world.vehicle.motion_file"]),
+    ("[world.vehicle]\nmotion_file = \"dive.csv\"", &["short.toml", "world.vehicle.motion_file"]),
+    ("[world.vehicle]\nmotion = \"recorded\"\nmotion_file = \"none.csv\"", &["none.csv"]),
+    ("[world.water]\ncurrent_m_s = [0.0, nan, 0.0]", &["short.toml", "world.water.current_m_s[1]", "NaN"]),
     ("[world]\nseed = 3", &["short.toml", "world.seed"]),
     (
         "[[obstacle]]\nname = \"a\"\nshape = \"cone\"\nposition_m = [0.0, 0.0, 0.0]",
@@ -95,12 +104,31 @@ const ROBOT: &[Spoilt] = &[
     ("stowed_rad = [-1.32, ", "stowed_rad = [", &["robot.toml", "stowed_rad", "6"]),
     ("base_link = \"base_link\"", "base_link = \"bottom\"", &["titan4.urdf", "bottom"]),
     ("link = \"fisheye\"", "link = \"eye\"", &["titan4.urdf", "eye"]),
+    ("opening_max_m = 0.1", "opening_max_m = 0.0", &["robot.toml", "gripper.opening_max_m", "0.001 .. 2"]),
+    ("rest_opening_m = 0.022", "rest_opening_m = 0.2", &["robot.toml", "gripper.rest_opening_m", "0 .. 0.1"]),
+    ("closing_time_s = 2.0", "closing_time_s = nan", &["robot.toml", "gripper.closing_time_s", "NaN"]),
+    (
+        "opens_along = [1.0, 0.0, 0.0]",
+        "opens_along = [0.0, 0.0, 0.0]",
+        &["robot.toml", "gripper.opens_along", "direction"],
+    ),
+    ("\"jaw_left_link\", ", "\"claw\", ", &["robot.toml", "gripper.jaws", "`claw` is no link"]),
+    ("\"jaw_left_link\", ", "\"fisheye\", ", &["robot.toml", "gripper.jaws", "not fixed to the link of the tool"]),
+    ("\"jaw_left_link\", ", "\"jaw_right_link\", ", &["robot.toml", "gripper.jaws", "twice"]),
+    ("closing_time_s = 2.0", "closing_time_s = 2.0\nforce_n = 4.0", &["robot.toml", "force_n"]),
     ("urdf = \"titan4.urdf\"", "urdf = \"titan5.urdf\"", &["titan5.urdf"]),
 ];
 
 const VEHICLE: &[Spoilt] = &[
     ("mass_kg = 4000.0", "mass_kg = 4000.0\nlength_m = 3.0", &["vehicle.toml", "length_m"]),
     ("mass_kg = 4000.0", "mass_kg = nan", &["vehicle.toml", "mass_kg", "NaN"]),
+    ("mass_kg = 4000.0", "mass_kg = -4000.0", &["vehicle.toml", "mass_kg", "1 .. 10000000"]),
+    (
+        "inertia_kg_m2 = [1700.0,",
+        "inertia_kg_m2 = [-1700.0,",
+        &["vehicle.toml", "dynamics.inertia_kg_m2[0]", "0.1 .. 100000000"],
+    ),
+    ("thrust_max_n = [3200.0,", "thrust_max_n = [nan,", &["vehicle.toml", "dynamics.thrust_max_n[0]", "NaN"]),
     ("size_m = [2.6, 1.7, 0.5]", "size_m = [2.6, -1.7, 0.5]", &["vehicle.toml", "float_block", "size_m[1]"]),
     ("position_m = [1.7, -0.6, 0.1]", "position_m = [nan, -0.6, 0.1]", &["vehicle.toml", "mount"]),
     ("shape = \"box\"", "shape = \"hull\"", &["vehicle.toml", "float_block", "hull"]),
@@ -127,6 +155,7 @@ const URDF: &[Spoilt] = &[
     ("<sphere radius=\"0.084\"/>", "<sphere radius=\"-1\"/>", &["titan4.urdf", "upperarm_link", "radius"]),
     ("<sphere radius=\"0.084\"/>", "<mesh filename=\"a.stl\"/>", &["titan4.urdf", "upperarm_link", "mesh"]),
     ("mass value=\"18.709626\"", "mass value=\"nan\"", &["titan4.urdf", "forearm_link", "mass"]),
+    ("mass value=\"18.709626\"", "mass value=\"-18.7\"", &["titan4.urdf", "forearm_link", "mass"]),
     ("<link name=\"fisheye\">", "<link name=\"fisheye\"", &["titan4.urdf"]),
 ];
 
@@ -146,6 +175,29 @@ fn a_wrong_world_or_scene_is_refused_with_file_and_key() {
         let text = crate::support::read(&kit.routine);
         write(&kit.routine, &format!("{text}{tail}\n"));
         kit.expect_refused(tail, words);
+    }
+}
+
+/// A motion with gaps, numbers that are none, or jumps: the line is named.
+#[test]
+fn a_wrong_motion_is_refused_with_file_and_line() {
+    const HEADER: &str = "time_s,x_m,y_m,z_m,roll_rad,pitch_rad,yaw_rad";
+    let row = |time_s: &str, x_m: &str| format!("{time_s},{x_m},0,0,0,0,0\n");
+    let still = |times: [&str; 5]| times.map(|time_s| row(time_s, "0")).concat();
+    let cases = [
+        (still(["0", "0.2", "1.6", "1.8", "2.0"]), ["line 4", "time_s"]),
+        (still(["0", "0.2", "nan", "0.6", "0.8"]), ["line 4", "NaN"]),
+        (still(["0", "0.4", "0.2", "0.6", "0.8"]), ["line 4", "time_s"]),
+        (still(["0", "0.2", "0.4", "0.6", "0.8"]) + &row("1.0", "40"), ["line", "m/s2"]),
+        (row("0", "0"), ["4", "samples"]),
+    ];
+    for (rows, words) in cases {
+        let kit = Kit::new();
+        write(&kit.folder.path().join("dive.csv"), &format!("{HEADER}\n{rows}"));
+        let text = crate::support::read(&kit.routine);
+        let tail = "[world.vehicle]\nmotion = \"recorded\"\nmotion_file = \"dive.csv\"\n";
+        write(&kit.routine, &format!("{text}{tail}"));
+        kit.expect_refused(&rows, &["dive.csv", words[0], words[1]]);
     }
 }
 

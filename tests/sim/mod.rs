@@ -1,6 +1,8 @@
 //! The simulated world from outside: what it answers, and what its truth says.
 
 mod camera;
+mod faults;
+mod gripper;
 mod happenings;
 mod moves;
 mod streams;
@@ -13,7 +15,7 @@ use std::rc::Rc;
 use armcal::robot::{Robot, Vehicle, load, load_vehicle};
 use armcal::routine::Scene;
 use armcal::sensor::ArmSensors;
-use armcal::sim::truth::{TruthClearance, TruthContact, TruthHeader, TruthSink, TruthState};
+use armcal::sim::truth::{TruthClearance, TruthContact, TruthFault, TruthHeader, TruthSink, TruthState};
 use armcal::sim::{World, WorldInput, WorldSpec};
 use armcal::streams::{Arm, JointAngles, JointCounts, Message, Sink, SinkError};
 use armcal::time::Stamp;
@@ -88,6 +90,7 @@ struct Witness {
     states: Rc<RefCell<Vec<TruthState>>>,
     contacts: Rc<RefCell<Vec<TruthContact>>>,
     clearances: Rc<RefCell<Vec<TruthClearance>>>,
+    faults: Rc<RefCell<Vec<TruthFault>>>,
 }
 
 impl TruthSink for Witness {
@@ -108,6 +111,11 @@ impl TruthSink for Witness {
 
     fn clearance(&mut self, clearance: &TruthClearance) -> Result<(), SinkError> {
         self.clearances.borrow_mut().push(clearance.clone());
+        Ok(())
+    }
+
+    fn fault(&mut self, fault: &TruthFault) -> Result<(), SinkError> {
+        self.faults.borrow_mut().push(fault.clone());
         Ok(())
     }
 

@@ -124,7 +124,17 @@ fn a_target_in_the_vehicle_ends_in_contact() {
 fn a_target_in_the_seafloor_ends_in_contact() {
     let mut site = Site::titan();
     site.scene.seafloor_z_m = Some(-1.1);
-    assert_touched(&driven_to(&site, [1.0, -0.5, -1.3]), "seafloor");
+    // Twice: through open water, and onto the seafloor, which stops it.
+    let depth = |witness: &Witness| {
+        let states = witness.states.borrow();
+        let last = &states[states.len() - 1];
+        (last.world_from_vehicle * site.vehicle.vehicle_from_base * last.base_from_tool).origin().vector().z
+    };
+    let stopped = driven_to(&site, [0.8, -0.4, -1.45]);
+    assert_touched(&stopped, "seafloor");
+    let free = depth(&driven_to(&Site::titan(), [0.8, -0.4, -1.45]));
+    eprintln!("the tool comes to z = {:.3} m, without a seafloor to {free:.3} m", depth(&stopped));
+    assert!(free < -1.2 && depth(&stopped) > -1.12, "{free} {}", depth(&stopped));
 }
 
 /// Whatever the sensors hide, the stowed arm is clear of the vehicle and sees tags.
