@@ -117,6 +117,61 @@ fn simulation(c: &mut Criterion) {
     c.bench_function("one simulated second", |b| {
         b.iter(|| (0..100).for_each(|_| world.step(&mut Nothing).expect("a sink that takes everything")));
     });
+    // Current, waves, a free vehicle, and the arm always on its way.
+    let mut spec = WorldSpec::default();
+    spec.vehicle.motion = armcal::sim::MotionKind::Free;
+    spec.water.current_m_s = [0.2, 0.1, 0.0];
+    (spec.water.wave_height_m, spec.water.depth_m) = (2.0, 20.0);
+    spec.hydraulics.leakage_rad_s = 1e-3;
+    let mut world = World::new(WorldInput { robot: &robot, vehicle: &vehicle, scene: &scene, spec, seed: 1 })
+        .expect("a world with everything on");
+    let sensors = armcal::sensor::ArmSensors::nominal(&robot);
+    let mut second = 0_u32;
+    c.bench_function("physics: one second, all effects", |b| {
+        b.iter(|| {
+            second += 1;
+            let shift = if second.is_multiple_of(2) { -0.15 } else { 0.15 };
+            let goal = JointAngles::from_fn(robot.n_joints(), |j| robot.stowed[j] + shift);
+            world.command(&sensors.counts(&goal)).expect("a set-point");
+            (0..100).for_each(|_| world.step(&mut Nothing).expect("a sink that takes everything"));
+        });
+    });
+    one_step(c, &robot);
+}
+
+/// The arm on its oil columns in sea water, without sensors, hydraulics or contacts.
+#[cfg(feature = "sim")]
+fn one_step(c: &mut Criterion, robot: &Robot) {
+    use armcal::sim::dynamics::{
+        BaseCoupling, Body, Force, JointLoad, Motion, Multibody, Stage, StepInput, Surroundings, SystemState,
+    };
+    use armcal::streams::MAX_JOINTS;
+
+    let bodies = robot.bodies.iter().map(|link| Body::in_sea_water(link, robot.buoyancy_fraction)).collect();
+    let arm = Multibody::new(robot.chain.clone(), bodies);
+    let mut state = SystemState {
+        angles: robot.stowed,
+        rates: JointAngles::from_fn(robot.n_joints(), |_| 0.0),
+        world_from_base: nalgebra::Isometry3::identity(),
+        base_velocity: Motion::zero(),
+    };
+    let loads = std::array::from_fn(|j| {
+        JointLoad::spring(5e4, 500.0, if j < robot.n_joints() { robot.stowed[j] } else { 0.0 }, 0.0)
+    });
+    let around = |_: Stage, _: &SystemState| (Surroundings::still(9.806_65), BaseCoupling::Prescribed(Motion::zero()));
+    c.bench_function("dynamics: one step", |b| {
+        b.iter(|| {
+            let input = StepInput {
+                step_s: 0.002,
+                loads: &loads,
+                extra: &[Force::zero(); MAX_JOINTS + 1],
+                contacts: &[],
+                is_free: false,
+                around: &around,
+            };
+            arm.step(black_box(&mut state), &input);
+        });
+    });
 }
 
 #[cfg(not(feature = "sim"))]
