@@ -1,18 +1,16 @@
 //! A vehicle that floats free: its body for the equations of motion, and the thrusters that keep it on station.
 
 use nalgebra::{Isometry3, Matrix3, Vector3};
-use rand::RngExt;
 
 use super::BaseState;
+use super::swell::{Axis, draw_axis, sum};
 use crate::robot::{FileIssue, Vehicle, VehicleDynamics};
 use crate::sim::dynamics::{Body, Force, HullDrag, Inertia, Motion, Multibody};
 use crate::sim::error::SimError;
 use crate::sim::fault::Knock;
 use crate::sim::spec::{VehicleMotionSpec, WaterSpec};
-use crate::stats::stream_rng;
 use crate::streams::JointAngles;
 
-const N_WOBBLES: usize = 6;
 /// How long a knock lasts, s: short against the vehicle's motion, long against a step.
 const KNOCK_S: f64 = 0.1;
 
@@ -27,15 +25,9 @@ pub(in crate::sim) struct FreeVehicle {
     integral: [f64; 6],
     /// Thrust and moment as they are, behind the thrusters' lag, vehicle axes.
     thrust: [f64; 6],
-    wobble: [[Wobble; N_WOBBLES]; 6],
+    /// Random forces and moments, in the band of the motion's periods.
+    wobble: [Axis; 6],
     knock: Option<(f64, Knock)>,
-}
-
-#[derive(Clone, Copy, Debug, Default)]
-struct Wobble {
-    amplitude: f64,
-    rate_rad_s: f64,
-    phase_rad: f64,
 }
 
 impl FreeVehicle {
@@ -55,7 +47,10 @@ impl FreeVehicle {
             reckoned: std::array::from_fn(|i| if i < 3 { linear[i] } else { angular[i - 3] }),
             integral: [0.0; 6],
             thrust: [0.0; 6],
-            wobble: draw_wobble(spec, seed),
+            wobble: std::array::from_fn(|axis| {
+                let rms = if axis < 3 { spec.wobble_force_rms_n } else { spec.wobble_moment_rms_n_m };
+                draw_axis(spec, rms, seed, &format!("wobble/{axis}"))
+            }),
             knock: None,
         })
     }
@@ -107,7 +102,7 @@ impl FreeVehicle {
         self.keep_station(step_s, base);
         let mut total = self.thrust;
         for (slot, axis) in total.iter_mut().zip(&self.wobble) {
-            *slot += axis.iter().map(|w| w.amplitude * (w.rate_rad_s * t_s + w.phase_rad).sin()).sum::<f64>();
+            *slot += sum(axis, t_s)[0];
         }
         if let Some((start_s, knock)) = &self.knock {
             let since = t_s - start_s;
@@ -169,28 +164,4 @@ fn wet_weight(arm: &Multibody, angles: &JointAngles) -> (f64, Vector3<f64>) {
         moment += body.mass_kg * at(&body.com_m) - body.displaced_kg * at(&body.center_of_buoyancy_m);
     }
     (mass, moment)
-}
-
-/// Random forces and moments of given rms, in the band of the motion's periods.
-fn draw_wobble(spec: &VehicleMotionSpec, seed: u64) -> [[Wobble; N_WOBBLES]; 6] {
-    let (low, high) = (spec.period_min_s.ln(), spec.period_max_s.ln());
-    let mut all = [[Wobble::default(); N_WOBBLES]; 6];
-    for (axis, wobbles) in all.iter_mut().enumerate() {
-        let rms = if axis < 3 { spec.wobble_force_rms_n } else { spec.wobble_moment_rms_n_m };
-        if rms == 0.0 {
-            continue;
-        }
-        let mut rng = stream_rng(seed, &format!("vehicle/wobble/{axis}"));
-        for (k, wobble) in wobbles.iter_mut().enumerate() {
-            let place = (k as f64 + rng.random_range(0.0..1.0)) / N_WOBBLES as f64;
-            wobble.rate_rad_s = std::f64::consts::TAU / (low + place * (high - low)).exp();
-            wobble.amplitude = rng.random_range(0.5..1.0);
-            wobble.phase_rad = rng.random_range(0.0..std::f64::consts::TAU);
-        }
-        let norm = wobbles.iter().map(|w| 0.5 * w.amplitude * w.amplitude).sum::<f64>().sqrt();
-        for wobble in wobbles {
-            wobble.amplitude *= rms / norm;
-        }
-    }
-    all
 }

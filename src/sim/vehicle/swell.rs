@@ -17,16 +17,19 @@ const AXES: [&str; 6] = ["x", "y", "z", "roll", "pitch", "yaw"];
 /// Sums of sinusoids over time.
 #[derive(Clone, Debug)]
 pub(super) struct Swell {
-    axes: [[Sinusoid; N_SINUSOIDS]; 6],
+    axes: [Axis; 6],
     ramp_s: f64,
 }
 
 #[derive(Clone, Copy, Debug, Default)]
-struct Sinusoid {
+pub(super) struct Sinusoid {
     amplitude: f64,
     rate_rad_s: f64,
     phase_rad: f64,
 }
+
+/// One axis: a sum of sinusoids.
+pub(super) type Axis = [Sinusoid; N_SINUSOIDS];
 
 /// Value, first and second derivative.
 pub(super) type Jet = [f64; 3];
@@ -62,7 +65,7 @@ impl Swell {
 }
 
 /// Random shares and phases, periods spread evenly in their logarithm; the rms of the sum of sinusoids is exact.
-fn draw_axis(spec: &VehicleMotionSpec, rms: f64, seed: u64, name: &str) -> [Sinusoid; N_SINUSOIDS] {
+pub(super) fn draw_axis(spec: &VehicleMotionSpec, rms: f64, seed: u64, name: &str) -> Axis {
     let mut rng = stream_rng(seed, &format!("vehicle/{name}"));
     let (low, high) = (spec.period_min_s.ln(), spec.period_max_s.ln());
     let mut axis = [Sinusoid::default(); N_SINUSOIDS];
@@ -80,7 +83,8 @@ fn draw_axis(spec: &VehicleMotionSpec, rms: f64, seed: u64, name: &str) -> [Sinu
     axis
 }
 
-fn sum(axis: &[Sinusoid; N_SINUSOIDS], t_s: f64) -> Jet {
+/// Value and derivatives of the sum.
+pub(super) fn sum(axis: &Axis, t_s: f64) -> Jet {
     let mut jet = [0.0; 3];
     for s in axis {
         let (sin, cos) = (s.rate_rad_s * t_s + s.phase_rad).sin_cos();
