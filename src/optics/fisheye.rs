@@ -124,17 +124,8 @@ impl Fisheye {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::optics::fixture::lens;
     use proptest::prelude::*;
-
-    fn lens() -> Fisheye {
-        Fisheye {
-            focal_px: [387.33, 387.06],
-            center_px: [633.6, 510.9],
-            distortion: [0.02268, -0.01345, 0.01296, -0.00418],
-            resolution_px: [1224, 1024],
-            max_view_angle_rad: 1.45,
-        }
-    }
 
     proptest! {
         #[test]

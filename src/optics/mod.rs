@@ -9,3 +9,19 @@ mod square;
 
 pub use fisheye::Fisheye;
 pub use square::{SquareError, SquarePose, solve_square, square_corners};
+
+/// The wrist camera's lens, for tests.
+#[cfg(test)]
+pub(crate) mod fixture {
+    use super::Fisheye;
+
+    pub(crate) fn lens() -> Fisheye {
+        Fisheye {
+            focal_px: [387.33, 387.06],
+            center_px: [633.6, 510.9],
+            distortion: [0.02268, -0.01345, 0.01296, -0.00418],
+            resolution_px: [1224, 1024],
+            max_view_angle_rad: 1.45,
+        }
+    }
+}

@@ -236,23 +236,7 @@ mod tests {
 
     fn biased_controller(set: f64, controller_bias_rad: f64) -> Controller {
         let spec = HydraulicsSpec { controller_filter_s: 0.0, controller_bias_rad, ..HydraulicsSpec::default() };
-        let sensor = JointSensorSpec {
-            joint: "j".into(),
-            kind: crate::robot::SensorKind::Potentiometer,
-            offset_counts: 0.0,
-            counts_per_rad: 2600.0,
-            wrap_counts: 65536.0,
-            center_rad: 0.0,
-            gain_std: 0.0,
-            offset_std_rad: 0.0,
-            gain_bound: 0.0,
-            offset_bound_rad: 0.0,
-            noise_std_counts: 0.0,
-            linearity_std_rad: 0.0,
-            temperature_std_rad_per_k: 0.0,
-            drift_std_rad_per_sqrt_h: 0.0,
-            max_rate_rad_s: 0.5,
-        };
+        let sensor = JointSensorSpec::exact(2600.0, 0.5);
         Controller::new(&spec, &[sensor], &[1.0], &JointCounts::from_slice(&[set]))
     }
 

@@ -12,6 +12,8 @@ mod convert;
 pub mod dynamics;
 mod error;
 mod fault;
+#[cfg(test)]
+mod fixture;
 mod gripper;
 mod hydraulics;
 mod joint_load;

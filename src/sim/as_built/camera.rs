@@ -65,17 +65,8 @@ pub(super) fn draw_dome_center(spec: &CameraWorldSpec, seed: u64) -> Option<[f64
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::optics::fixture::lens;
     use crate::stats::Summary;
-
-    fn lens() -> Fisheye {
-        Fisheye {
-            focal_px: [387.33, 387.06],
-            center_px: [633.6, 510.9],
-            distortion: [0.02268, -0.01345, 0.01296, -0.00418],
-            resolution_px: [1224, 1024],
-            max_view_angle_rad: 1.45,
-        }
-    }
 
     fn assert_normal(what: &str, samples: &[f64], std: f64) {
         let n = samples.len() as f64;

@@ -218,7 +218,7 @@ fn assemble(
         }
         bias[first + j] = axes[j].dot(&force[j + 1]);
         if first > 0 {
-            for (k, value) in force_array(&carried).into_iter().enumerate() {
+            for (k, value) in carried.to_array().into_iter().enumerate() {
                 inertia.set(first + j, k, value);
             }
         }
@@ -232,12 +232,7 @@ fn assemble(
                 inertia.set(3 + row, 3 + column, whole.linear[(row, column)]);
             }
         }
-        bias[..6].copy_from_slice(&force_array(&force[0]));
+        bias[..6].copy_from_slice(&force[0].to_array());
     }
     Equations { inertia, bias, first_joint: first }
-}
-
-/// Moment, then force.
-fn force_array(f: &Force) -> [f64; 6] {
-    [f.moment.x, f.moment.y, f.moment.z, f.force.x, f.force.y, f.force.z]
 }

@@ -114,6 +114,13 @@ impl Force {
         Self::new(Vector3::zeros(), Vector3::zeros())
     }
 
+    /// The six components, those of the moment first.
+    #[must_use]
+    pub fn to_array(&self) -> [f64; 6] {
+        let (m, f) = (self.moment, self.force);
+        [m.x, m.y, m.z, f.x, f.y, f.z]
+    }
+
     /// A force that acts at `point`.
     #[must_use]
     pub fn at(point: &Vector3<f64>, force: &Vector3<f64>) -> Self {

@@ -14,7 +14,7 @@ use crate::robot::parry_pose;
 use crate::sim::convert::from_rapier;
 use crate::sim::dynamics::{ContactRow, Coordinates, Force, MAX_DOF, Motion};
 use crate::sim::places::BodyPoses;
-use crate::sim::solids::{Carrier, PairTable, Solids};
+use crate::sim::solids::{Carrier, PairTable, Solid, Solids};
 use crate::sim::spec::PhysicsSpec;
 use crate::streams::{JointAngles, MAX_JOINTS};
 
@@ -85,7 +85,7 @@ impl ContactWorld {
     }
 
     /// Springs and dampers of everything that touches now.
-    pub(super) fn update(&mut self, solids: &[crate::sim::solids::Solid], state: &ContactState) -> &[ContactRow] {
+    pub(super) fn update(&mut self, solids: &[Solid], state: &ContactState) -> &[ContactRow] {
         self.rows.clear();
         self.touching.clear();
         let n = state.angles.len();
@@ -107,7 +107,7 @@ impl ContactWorld {
         &self.rows
     }
 
-    fn place(&mut self, solids: &[crate::sim::solids::Solid], state: &ContactState) {
+    fn place(&mut self, solids: &[Solid], state: &ContactState) {
         for ((handle, carrier), solid) in self.colliders.iter().zip(solids) {
             let Some(collider) = self.engine.colliders.get_mut(*handle) else { continue };
             let place = match carrier {
@@ -212,9 +212,7 @@ impl Contact {
                 direction[state.first_joint + joint] += sign * turning.dot(&unit);
             }
             if state.first_joint > 0 {
-                for (slot, value) in
-                    direction.iter_mut().zip([unit.moment.x, unit.moment.y, unit.moment.z, axis.x, axis.y, axis.z])
-                {
+                for (slot, value) in direction.iter_mut().zip(unit.to_array()) {
                     *slot += sign * value;
                 }
             }

@@ -6,7 +6,7 @@ use rand::RngExt;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::*;
-use crate::robot::{JointSensorSpec, SensorKind};
+use crate::robot::JointSensorSpec;
 use crate::sim::controller::Controller;
 use crate::sim::spec::CONTROL_PERIOD_S;
 use crate::stats::stream_rng;
@@ -21,23 +21,7 @@ const LIMIT_RAD: f64 = 0.05 * std::f64::consts::PI / 180.0;
 const WRIST: ActuatorInput = ActuatorInput { limits: None, torque_max_n_m: 170.0, rate_limit_rad_s: 1.5 };
 
 fn sensor(max_rate_rad_s: f64) -> JointSensorSpec {
-    JointSensorSpec {
-        joint: "j".into(),
-        kind: SensorKind::Potentiometer,
-        offset_counts: 0.0,
-        counts_per_rad: COUNTS_PER_RAD,
-        wrap_counts: WRAP_COUNTS,
-        center_rad: 0.0,
-        gain_std: 0.0,
-        offset_std_rad: 0.0,
-        gain_bound: 0.0,
-        offset_bound_rad: 0.0,
-        noise_std_counts: 2.0,
-        linearity_std_rad: 0.0,
-        temperature_std_rad_per_k: 0.0,
-        drift_std_rad_per_sqrt_h: 0.0,
-        max_rate_rad_s,
-    }
+    JointSensorSpec { noise_std_counts: 2.0, ..JointSensorSpec::exact(COUNTS_PER_RAD, max_rate_rad_s) }
 }
 
 /// One joint under a load of `load_ratio` of its torque, which the vehicle rocks by a hundredth.

@@ -43,21 +43,11 @@ pub(super) fn perfect() -> JointAsBuilt {
 
 fn sensor_of(kind: SensorKind, built: &JointAsBuilt, spec: &JointSensorsSpec, seed: u64) -> JointSensor {
     let nominal = JointSensorSpec {
-        joint: "j".into(),
         kind,
         offset_counts: OFFSET_COUNTS,
-        counts_per_rad: COUNTS_PER_RAD,
         wrap_counts: WRAP_COUNTS,
         center_rad: built.center_rad,
-        gain_std: 0.0,
-        offset_std_rad: 0.0,
-        gain_bound: 0.0,
-        offset_bound_rad: 0.0,
-        noise_std_counts: 0.0,
-        linearity_std_rad: 0.0,
-        temperature_std_rad_per_k: 0.0,
-        drift_std_rad_per_sqrt_h: 0.0,
-        max_rate_rad_s: 1.0,
+        ..JointSensorSpec::exact(COUNTS_PER_RAD, 1.0)
     };
     JointSensor::new(&nominal, built, spec, seed)
 }
