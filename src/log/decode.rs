@@ -9,9 +9,10 @@ use super::error::Rejection;
 use super::ros::{self, Time};
 use super::topics::Stream;
 use crate::streams::{
-    Attitude, CaptureSet, GripperCommand, GripperSample, JointAngles, JointCommand, JointCounts, JointSensorSample,
-    JointStateBelief, LogLevel, LogLine, MAX_JOINTS, Mark, MarkKind, Message, Phase, PressureSample, ReachAttempt,
-    ReachTask, RecordedSurvey, RecordedTag, Start, TagDetection, TagDetections, TemperatureSample, Thermometer,
+    Attitude, CameraImage, CaptureSet, DetectionReject, DetectionRejects, GripperCommand, GripperSample, JointAngles,
+    JointCommand, JointCounts, JointSensorSample, JointStateBelief, LogLevel, LogLine, MAX_JOINTS, Mark, MarkKind,
+    Message, Phase, PressureSample, ReachAttempt, ReachTask, RecordedSurvey, RecordedTag, RejectReason, Start,
+    TagDetection, TagDetections, TemperatureSample, Thermometer,
 };
 use crate::time::Stamp;
 
@@ -56,6 +57,8 @@ pub(super) fn decode_message(stream: Stream, bytes: &[u8], names: &mut FirstName
             Message::JointStates(JointStateBelief { stamp: joints.stamp.try_into()?, angles })
         }
         Stream::Detections => Message::Detections(detections(&cdr::decode(bytes)?)?),
+        Stream::Rejects => Message::Rejects(rejects(&cdr::decode(bytes)?)?),
+        Stream::Images => Message::Image(image(cdr::decode(bytes)?)?),
         Stream::OilTemperature => Message::Temperature(temperature(&cdr::decode(bytes)?, Thermometer::Oil)?),
         Stream::WaterTemperature => Message::Temperature(temperature(&cdr::decode(bytes)?, Thermometer::Water)?),
         Stream::DepthPressure => Message::Pressure(pressure(&cdr::decode(bytes)?)?),
@@ -116,6 +119,24 @@ fn detection(tag: &ros::AprilTagDetection) -> Result<TagDetection, Rejection> {
         corners_px,
         decision_margin: f64::from(tag.decision_margin),
     })
+}
+
+fn rejects(m: &ros::DetectionRejects) -> Result<DetectionRejects, Rejection> {
+    let reject = |r: &ros::DetectionReject| -> Result<DetectionReject, Rejection> {
+        let corners_px = r.corners.map(|corner| [corner.x, corner.y]);
+        finite("corners", corners_px.into_iter().flatten())?;
+        let reason = RejectReason::ALL.into_iter().find(|reason| reason.name() == r.reason);
+        Ok(DetectionReject { id: r.id, corners_px, reason: reason.ok_or(Rejection::UnknownReason)? })
+    };
+    let rejects = m.rejects.iter().map(reject).collect::<Result<_, _>>()?;
+    Ok(DetectionRejects { stamp: m.header.stamp.try_into()?, rejects })
+}
+
+fn image(m: ros::CompressedImage) -> Result<CameraImage, Rejection> {
+    if m.format != "jpeg" && !m.format.contains("jpeg") {
+        return Err(Rejection::ImageFormat);
+    }
+    Ok(CameraImage { stamp: m.header.stamp.try_into()?, jpeg: m.data })
 }
 
 fn variance(value: f64) -> Result<f64, Rejection> {
@@ -201,7 +222,11 @@ fn surveyed_tag(tag: &ros::SurveyedTag) -> Result<RecordedTag, Rejection> {
     let position_m = tag.pose.position.into();
     finite("position", position_m)?;
     finite("size_m", [tag.size_m])?;
-    finite("standard deviation", [tag.position_std_m, tag.rotation_std_rad])?;
+    // Infinite where nothing is known of the tag's place.
+    let is_unknown = tag.position_std_m == f64::INFINITY && tag.rotation_std_rad == f64::INFINITY;
+    if !is_unknown {
+        finite("standard deviation", [tag.position_std_m, tag.rotation_std_rad])?;
+    }
     if tag.size_m <= 0.0 {
         return Err(Rejection::TagSize);
     }
@@ -270,6 +295,11 @@ mod tests {
         bytes_of(&ros::JointState { name, position: position.to_vec(), ..Default::default() })
     }
 
+    /// As of a tag of which only the size is known.
+    fn unknown_place(tag: &mut ros::SurveyedTag) {
+        (tag.position_std_m, tag.rotation_std_rad) = (f64::INFINITY, f64::INFINITY);
+    }
+
     #[test]
     fn every_message_round_trips_through_its_bytes() {
         let mut bytes = Vec::new();
@@ -324,6 +354,9 @@ mod tests {
         assert_eq!(survey_of(|m| m.tags[1].id = 3), Err(Rejection::TagTwice));
         assert_eq!(survey_of(|m| m.tags[1].size_m = 0.0), Err(Rejection::TagSize));
         assert_eq!(survey_of(|m| m.tags[0].position_std_m = -1.0), Err(Rejection::NegativeVariance));
+        assert_eq!(survey_of(|m| m.tags.iter_mut().for_each(unknown_place)), Ok(2));
+        assert!(survey_of(|m| m.tags[0].position_std_m = f64::INFINITY).is_err(), "half of a pose");
+        assert!(survey_of(|m| m.tags[0].rotation_std_rad = f64::NAN).is_err());
         assert_eq!(survey_of(|m| m.tags[0].pose.orientation.w = 0.0), Err(Rejection::QuaternionLength));
         assert_eq!(
             survey_of(|m| m.tags[0].pose.position.x = f64::NAN),

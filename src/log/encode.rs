@@ -7,8 +7,9 @@ use super::error::EncodeError;
 use super::ros::{self, PixelPoint, Quaternion, Time};
 use super::writer::RecordingHeader;
 use crate::streams::{
-    Attitude, CaptureSet, LogLevel, LogLine, Mark, MarkKind, Message, Phase, PressureSample, ReachAttempt, ReachTask,
-    RecordedSurvey, RecordedTag, Start, TagDetection, TagDetections, TemperatureSample,
+    Attitude, CameraImage, CaptureSet, DetectionRejects, LogLevel, LogLine, Mark, MarkKind, Message, Phase,
+    PressureSample, ReachAttempt, ReachTask, RecordedSurvey, RecordedTag, Start, TagDetection, TagDetections,
+    TemperatureSample,
 };
 use crate::time::Stamp;
 
@@ -40,6 +41,8 @@ pub(super) fn encode_message(
         Message::JointCommand(m) => joints(m.stamp, &m.counts, header, out),
         Message::JointStates(m) => joints(m.stamp, &m.angles, header, out),
         Message::Detections(m) => Ok(cdr::encode(&detections(m, header)?, out)?),
+        Message::Rejects(m) => Ok(cdr::encode(&rejects(m, header)?, out)?),
+        Message::Image(m) => Ok(cdr::encode(&image(m, header)?, out)?),
         Message::Temperature(m) => Ok(cdr::encode(&temperature(m, header)?, out)?),
         Message::Pressure(m) => Ok(cdr::encode(&pressure(m, header)?, out)?),
         Message::Attitude(m) => Ok(cdr::encode(&attitude(m, header)?, out)?),
@@ -86,6 +89,23 @@ fn detection(tag: &TagDetection, family: &str) -> Result<ros::AprilTagDetection,
         corners: tag.corners_px.map(|[x, y]| PixelPoint { x, y }),
         homography: [0.0; 9],
     })
+}
+
+fn rejects(m: &DetectionRejects, header: &RecordingHeader) -> Result<ros::DetectionRejects, EncodeError> {
+    let reject = |r: &crate::streams::DetectionReject| ros::DetectionReject {
+        id: r.id,
+        reason: r.reason.name().to_owned(),
+        corners: r.corners_px.map(|[x, y]| PixelPoint { x, y }),
+    };
+    Ok(ros::DetectionRejects {
+        header: ros_header(m.stamp, &header.camera_frame)?,
+        rejects: m.rejects.iter().map(reject).collect(),
+    })
+}
+
+fn image(m: &CameraImage, header: &RecordingHeader) -> Result<ros::CompressedImage, EncodeError> {
+    let header = ros_header(m.stamp, &header.camera_frame)?;
+    Ok(ros::CompressedImage { header, format: "jpeg".to_owned(), data: m.jpeg.clone() })
 }
 
 fn temperature(m: &TemperatureSample, header: &RecordingHeader) -> Result<ros::Temperature, EncodeError> {

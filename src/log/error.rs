@@ -86,6 +86,10 @@ pub enum Rejection {
     TagTwice,
     #[error("the survey's base tag is none of its tags")]
     NoBaseTag,
+    #[error("unknown reason for a reject")]
+    UnknownReason,
+    #[error("an image that is no JPEG")]
+    ImageFormat,
     #[error("unknown kind of mark")]
     MarkKind,
     #[error("the mark ends before it starts")]

@@ -11,6 +11,7 @@ mod decode;
 mod encode;
 mod error;
 mod hash;
+mod images;
 mod raw;
 mod reader;
 pub mod ros;
@@ -26,6 +27,7 @@ pub use attachments::read_attachments;
 pub use cdr::{CdrError, decode, encode};
 pub use error::{EncodeError, LogError, Rejection};
 pub use hash::{MessageHasher, hash_messages};
+pub use images::for_each_image;
 pub use raw::{
     AttachmentInfo, Channel, ChunkTotals, Completeness, FileContents, RawMessage, RawSummary, Schema, file_contents,
     for_each_raw,

@@ -51,15 +51,17 @@ pub struct Recording {
     pub non_monotonic: u64,
 }
 
-/// Reads a recording with our own topic names, see [`read_recording_with`].
+/// Reads a recording with our own topic names, see [`read_recording_with`]; camera images stay in the file, where
+/// `for_each_image` finds them.
 ///
 /// # Errors
 /// As [`read_recording_with`].
 pub fn read_recording(path: impl AsRef<Path>) -> Result<Recording, LogError> {
-    read_recording_with(path, &TopicMap::default())
+    let is_kept = |_: Stamp, message: &Message| !matches!(message, Message::Image(_));
+    scan_recording(path, &TopicMap::default(), |_| {}, is_kept).map(|(recording, _)| recording)
 }
 
-/// Reads a recording. Cuts, damage and unusable messages are no errors: the result counts them.
+/// Reads a recording, images and all. Cuts, damage and unusable messages are no errors: the result counts them.
 ///
 /// # Errors
 /// [`LogError::Read`], [`LogError::Empty`], [`LogError::NotMcap`].
@@ -249,8 +251,11 @@ mod tests {
         let path = dir.path().join("run.mcap");
         let messages: Vec<_> = samples::one_of_each().into_iter().map(|m| (SIMULATION_EPOCH, m)).collect();
         samples::write(&path, &messages, 1000);
-        let recording = read_recording(&path).unwrap();
+        let recording = read_recording_with(&path, &TopicMap::default()).unwrap();
         assert_eq!(recording.messages, messages);
+        let without: Vec<_> = messages.iter().filter(|(_, m)| !matches!(m, Message::Image(_))).cloned().collect();
+        assert!(without.len() < messages.len());
+        assert_eq!(read_recording(&path).unwrap().messages, without);
         assert_eq!(recording.joint_names, samples::header().joint_names);
         assert_eq!(recording.completeness, Completeness::Whole);
         assert!(recording.rejected.is_empty() && recording.unknown_topics.is_empty());

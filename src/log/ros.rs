@@ -235,6 +235,29 @@ pub struct AprilTagDetectionArray {
     pub detections: Vec<AprilTagDetection>,
 }
 
+/// armcal_msgs/msg/DetectionReject: corners as in apriltag_msgs/msg/AprilTagDetection.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct DetectionReject {
+    pub id: u32,
+    pub reason: String,
+    pub corners: [PixelPoint; 4],
+}
+
+/// armcal_msgs/msg/DetectionRejects: what looked like a tag in one image and was not taken for one.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct DetectionRejects {
+    pub header: Header,
+    pub rejects: Vec<DetectionReject>,
+}
+
+/// sensor_msgs/msg/CompressedImage.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct CompressedImage {
+    pub header: Header,
+    pub format: String,
+    pub data: Vec<u8>,
+}
+
 /// armcal_msgs/msg/ReachTask: `targets` in the frame `header.frame_id`, m.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ReachTask {

@@ -2,9 +2,10 @@
 
 use super::writer::{RecordingHeader, RecordingWriter};
 use crate::streams::{
-    Attitude, CaptureSet, GripperCommand, GripperSample, JointAngles, JointCommand, JointCounts, JointSensorSample,
-    JointStateBelief, LogLevel, LogLine, Mark, MarkKind, Message, Phase, PressureSample, ReachAttempt, ReachTask,
-    RecordedSurvey, RecordedTag, Sink, Start, TagDetection, TagDetections, TemperatureSample, Thermometer,
+    Attitude, CameraImage, CaptureSet, DetectionReject, DetectionRejects, GripperCommand, GripperSample, JointAngles,
+    JointCommand, JointCounts, JointSensorSample, JointStateBelief, LogLevel, LogLine, Mark, MarkKind, Message, Phase,
+    PressureSample, ReachAttempt, ReachTask, RecordedSurvey, RecordedTag, RejectReason, Sink, Start, TagDetection,
+    TagDetections, TemperatureSample, Thermometer,
 };
 use crate::time::{SIMULATION_EPOCH, Stamp};
 use std::path::Path;
@@ -61,6 +62,11 @@ pub fn one_of_each() -> Vec<Message> {
         Message::JointStates(JointStateBelief { stamp, angles: JointAngles::from_slice(&[0.1, -0.2, 3.0]) }),
         Message::Detections(TagDetections { stamp, tags: vec![tag.clone(), TagDetection { id: 8, ..tag }] }),
         Message::Detections(TagDetections { stamp, tags: vec![] }),
+        Message::Rejects(DetectionRejects {
+            stamp,
+            rejects: RejectReason::ALL.map(|reason| DetectionReject { id: 9, corners_px, reason }).to_vec(),
+        }),
+        Message::Image(CameraImage { stamp, jpeg: vec![0xff, 0xd8, 0, 7, 0xff, 0xd9] }),
         temperature(Thermometer::Oil),
         temperature(Thermometer::Water),
         Message::Pressure(PressureSample { stamp, pressure_pa: 2.0e7, variance_pa2: 1.0e4 }),
@@ -83,7 +89,8 @@ pub fn one_of_each() -> Vec<Message> {
 /// `n` steps of one joint sample each, with one of the other messages every tenth step. Numbers vary so that chunks do not
 /// shrink to nothing.
 pub fn stream(n: usize) -> Vec<(Stamp, Message)> {
-    let others = one_of_each();
+    // Those that are read back by default.
+    let others: Vec<_> = one_of_each().into_iter().filter(|m| !matches!(m, Message::Image(_))).collect();
     let mut messages = Vec::new();
     let mut state = 1_u64;
     for step in 0..n {

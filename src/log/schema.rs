@@ -161,6 +161,22 @@ message!(
 );
 
 message!(
+    ros::DetectionRejects,
+    "armcal_msgs/msg/DetectionRejects",
+    "std_msgs/Header header\narmcal_msgs/DetectionReject[] rejects\n",
+    header!(),
+    dependency!("armcal_msgs/DetectionReject", "uint32 id\nstring reason\napriltag_msgs/Point[4] corners\n"),
+    dependency!("apriltag_msgs/Point", "float64 x\nfloat64 y\n"),
+);
+
+message!(
+    ros::CompressedImage,
+    "sensor_msgs/msg/CompressedImage",
+    "std_msgs/Header header\nstring format\nuint8[] data\n",
+    header!(),
+);
+
+message!(
     ros::ReachTask,
     "armcal_msgs/msg/ReachTask",
     "std_msgs/Header header\ngeometry_msgs/Point[] targets\nfloat64 tolerance_m\n",
@@ -206,6 +222,8 @@ mod tests {
             ros::PoseStamped::SCHEMA,
             ros::Log::SCHEMA,
             ros::AprilTagDetectionArray::SCHEMA,
+            ros::DetectionRejects::SCHEMA,
+            ros::CompressedImage::SCHEMA,
             ros::ReachTask::SCHEMA,
             ros::TagSurvey::SCHEMA,
             ros::Mark::SCHEMA,

@@ -11,6 +11,9 @@ pub const JOINT_STATES: &str = "/joint_states";
 /// Set-points, counts.
 pub const JOINT_COMMANDS: &str = "/joint_commands";
 pub const DETECTIONS: &str = "/camera/wrist/detections";
+/// What looked like a tag and was not taken for one.
+pub const REJECTS: &str = "/camera/wrist/rejects";
+pub const IMAGES: &str = "/camera/wrist/image/compressed";
 pub const OIL_TEMPERATURE: &str = "/temperature/oil";
 pub const WATER_TEMPERATURE: &str = "/temperature/water";
 pub const DEPTH_PRESSURE: &str = "/depth_pressure";
@@ -40,6 +43,8 @@ pub enum Stream {
     JointCommands,
     JointStates,
     Detections,
+    Rejects,
+    Images,
     OilTemperature,
     WaterTemperature,
     DepthPressure,
@@ -53,11 +58,13 @@ pub enum Stream {
 }
 
 impl Stream {
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 16] = [
         Self::JointSensors,
         Self::JointCommands,
         Self::JointStates,
         Self::Detections,
+        Self::Rejects,
+        Self::Images,
         Self::OilTemperature,
         Self::WaterTemperature,
         Self::DepthPressure,
@@ -78,6 +85,8 @@ impl Stream {
             Message::JointCommand(_) => Self::JointCommands,
             Message::JointStates(_) => Self::JointStates,
             Message::Detections(_) => Self::Detections,
+            Message::Rejects(_) => Self::Rejects,
+            Message::Image(_) => Self::Images,
             Message::Temperature(sample) => match sample.thermometer {
                 Thermometer::Oil => Self::OilTemperature,
                 Thermometer::Water => Self::WaterTemperature,
@@ -101,6 +110,8 @@ impl Stream {
             Self::JointCommands => JOINT_COMMANDS,
             Self::JointStates => JOINT_STATES,
             Self::Detections => DETECTIONS,
+            Self::Rejects => REJECTS,
+            Self::Images => IMAGES,
             Self::OilTemperature => OIL_TEMPERATURE,
             Self::WaterTemperature => WATER_TEMPERATURE,
             Self::DepthPressure => DEPTH_PRESSURE,
@@ -124,6 +135,8 @@ impl Stream {
             | Self::GripperState
             | Self::GripperCommand => &ros::JointState::SCHEMA,
             Self::Detections => &ros::AprilTagDetectionArray::SCHEMA,
+            Self::Rejects => &ros::DetectionRejects::SCHEMA,
+            Self::Images => &ros::CompressedImage::SCHEMA,
             Self::OilTemperature | Self::WaterTemperature => &ros::Temperature::SCHEMA,
             Self::DepthPressure => &ros::FluidPressure::SCHEMA,
             Self::VehicleImu => &ros::Imu::SCHEMA,

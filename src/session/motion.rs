@@ -205,9 +205,11 @@ impl<'b> Driver<'b> {
         let start = self.arm.now();
         self.recorder.tags_seen = 0;
         let steps = (seconds / self.arm.period_s()).ceil() as u64;
+        self.arm.look(true);
         for _ in 0..steps {
             self.step()?;
         }
+        self.arm.look(false);
         let end = self.arm.now();
         self.record(&Message::Mark(Mark { start, end, kind }))?;
         Ok(self.recorder.tags_seen)

@@ -27,6 +27,8 @@ pub enum ArmError {
     NotFinite { at_s: f64 },
     #[error("fault number {number} cannot be brought about: the arm knows {known}")]
     NoSuchFault { number: usize, known: usize },
+    #[error("the camera: {0}")]
+    Camera(#[source] Box<dyn std::error::Error + Send + Sync>),
     #[error("the arm has no gripper that opens and closes")]
     NoGripper,
     #[error("gripper: an opening of {opening} is outside 0 (closed) .. 1 (open)")]
@@ -73,6 +75,12 @@ pub trait Arm {
     fn grip(&mut self, opening: f64) -> Result<(), ArmError> {
         let _ = opening;
         Err(ArmError::NoGripper)
+    }
+
+    /// The camera is wanted from now on, or no longer. An arm whose camera is always on need not care; one that pays for every
+    /// image may take few of them while nobody looks.
+    fn look(&mut self, is_wanted: bool) {
+        let _ = is_wanted;
     }
 
     /// Something breaks now: fault `number` of a list that only a simulated arm holds. Nobody tells the caller what it is.

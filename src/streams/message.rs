@@ -14,6 +14,10 @@ pub enum Message {
     JointStates(JointStateBelief),
     /// AprilTags seen in one camera image.
     Detections(TagDetections),
+    /// What the detector saw in one camera image and did not take for a tag.
+    Rejects(DetectionRejects),
+    /// One camera image, compressed.
+    Image(CameraImage),
     Temperature(TemperatureSample),
     Pressure(PressureSample),
     /// The vehicle's attitude sensor.
@@ -64,6 +68,73 @@ pub struct TagDetection {
     pub corners_px: [[f64; 2]; 4],
     /// The detector's decision margin, larger is surer; as apriltag gives it.
     pub decision_margin: f64,
+}
+
+/// Why a detector did not believe what it saw.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum RejectReason {
+    /// More bits are wrong than the code may have corrected.
+    WrongBits,
+    /// Black and white are too near each other.
+    LowContrast,
+    /// The sides are too short in the image.
+    TooSmall,
+    /// The image about the edges is not that of a square tag.
+    PoorEdges,
+    /// The same id at two places of one image: neither can be trusted.
+    SeenTwice,
+    /// A corner has no bearing in the lens model, or lies outside of the image.
+    OutOfView,
+    /// No tag with this id belongs to the vehicle or the arm.
+    UnknownId,
+}
+
+impl RejectReason {
+    pub const ALL: [Self; 7] = [
+        Self::WrongBits,
+        Self::LowContrast,
+        Self::TooSmall,
+        Self::PoorEdges,
+        Self::SeenTwice,
+        Self::OutOfView,
+        Self::UnknownId,
+    ];
+
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::WrongBits => "wrong_bits",
+            Self::LowContrast => "low_contrast",
+            Self::TooSmall => "too_small",
+            Self::PoorEdges => "poor_edges",
+            Self::SeenTwice => "seen_twice",
+            Self::OutOfView => "out_of_view",
+            Self::UnknownId => "unknown_id",
+        }
+    }
+}
+
+/// Something like a tag that was not taken for one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DetectionReject {
+    /// As decoded, right or wrong.
+    pub id: u32,
+    pub corners_px: [[f64; 2]; 4],
+    pub reason: RejectReason,
+}
+
+/// What was rejected in one image.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DetectionRejects {
+    pub stamp: Stamp,
+    pub rejects: Vec<DetectionReject>,
+}
+
+/// A camera image as JPEG.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CameraImage {
+    pub stamp: Stamp,
+    pub jpeg: Vec<u8>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -135,6 +206,7 @@ pub struct RecordedTag {
     pub size_m: f64,
     pub position_m: [f64; 3],
     pub quaternion_wxyz: [f64; 4],
+    /// Infinite, as the rotation's, where only the tag's size is known; the pose is then the identity.
     pub position_std_m: f64,
     pub rotation_std_rad: f64,
 }

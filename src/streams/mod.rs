@@ -10,7 +10,8 @@ mod survey;
 pub use crate::joints::{JointAngles, JointCounts, MAX_JOINTS};
 pub use arm::{Arm, ArmError, Sink, SinkError};
 pub use message::{
-    Attitude, CaptureSet, GripperCommand, GripperSample, JointCommand, JointSensorSample, JointStateBelief, LogLevel,
-    LogLine, Mark, MarkKind, Message, Phase, PressureSample, ReachAttempt, ReachTask, RecordedSurvey, RecordedTag,
-    Start, TagDetection, TagDetections, TemperatureSample, Thermometer,
+    Attitude, CameraImage, CaptureSet, DetectionReject, DetectionRejects, GripperCommand, GripperSample, JointCommand,
+    JointSensorSample, JointStateBelief, LogLevel, LogLine, Mark, MarkKind, Message, Phase, PressureSample,
+    ReachAttempt, ReachTask, RecordedSurvey, RecordedTag, RejectReason, Start, TagDetection, TagDetections,
+    TemperatureSample, Thermometer,
 };

@@ -2,19 +2,24 @@
 
 use super::message::{RecordedSurvey, RecordedTag};
 use crate::robot::{SurveyedTag, TagSurvey};
-use crate::spatial::Pose;
+use crate::spatial::{Base, Pose, Tag};
 use crate::time::Stamp;
 
 impl RecordedSurvey {
     #[must_use]
     pub fn new(stamp: Stamp, survey: &TagSurvey) -> Self {
-        let tag = |tag: &SurveyedTag| RecordedTag {
-            id: tag.id,
-            size_m: tag.size_m,
-            position_m: tag.base_from_tag.origin().to_array(),
-            quaternion_wxyz: tag.base_from_tag.quaternion_wxyz(),
-            position_std_m: tag.position_std_m,
-            rotation_std_rad: tag.rotation_std_rad,
+        // Of an unknown tag's place not even the drawing goes into a recording: nobody can use it by mistake.
+        let unknown = Pose::<Base, Tag>::from_position_rpy([0.0; 3], [0.0; 3]);
+        let tag = |tag: &SurveyedTag| {
+            let pose = if tag.is_known() { &tag.base_from_tag } else { &unknown };
+            RecordedTag {
+                id: tag.id,
+                size_m: tag.size_m,
+                position_m: pose.origin().to_array(),
+                quaternion_wxyz: pose.quaternion_wxyz(),
+                position_std_m: tag.position_std_m,
+                rotation_std_rad: tag.rotation_std_rad,
+            }
         };
         Self { stamp, base_tag: survey.base_tag, tags: survey.tags.iter().map(tag).collect() }
     }

@@ -191,6 +191,8 @@ fn known_as(topic: &str, schema: &str) -> Option<&'static str> {
             Stream::JointCommands => "set-points, counts",
             Stream::JointStates => "believed angles",
             Stream::Detections => "tag detections",
+            Stream::Rejects => "what was not taken for a tag",
+            Stream::Images => "camera images",
             Stream::OilTemperature => "oil temperature",
             Stream::WaterTemperature => "water temperature",
             Stream::DepthPressure => "depth",

@@ -1,0 +1,25 @@
+//! Camera images, one at a time: they are most of a recording, and few who read it want them.
+
+use std::path::Path;
+
+use super::decode::decode_message;
+use super::error::LogError;
+use super::raw::for_each_raw;
+use super::topics::Stream;
+use crate::streams::{CameraImage, Message};
+use crate::time::Stamp;
+
+/// Calls `take` with every readable camera image of a recording and its log time, in the order of the file.
+///
+/// # Errors
+/// As [`super::read_recording`].
+pub fn for_each_image(path: impl AsRef<Path>, mut take: impl FnMut(Stamp, CameraImage)) -> Result<(), LogError> {
+    for_each_raw(path.as_ref(), |raw| {
+        if raw.topic() == Stream::Images.topic()
+            && let Ok(Message::Image(image)) = decode_message(Stream::Images, raw.data, &mut None)
+        {
+            take(raw.log_time(), image);
+        }
+    })?;
+    Ok(())
+}
