@@ -15,6 +15,30 @@ pub struct Fisheye {
 }
 
 impl Fisheye {
+    /// A lens of which no field of view is given: as far from the axis as the projected radius grows, but no farther than
+    /// half as far again as the image's corners, nor than 172 deg.
+    #[must_use]
+    pub fn with_widest_view(
+        focal_px: [f64; 2],
+        center_px: [f64; 2],
+        distortion: [f64; 4],
+        resolution_px: [u32; 2],
+    ) -> Self {
+        let mut lens = Self { focal_px, center_px, distortion, resolution_px, max_view_angle_rad: 0.0 };
+        let farthest = 1.5 * super::radtan::farthest_corner(focal_px, center_px, resolution_px);
+        for i in 1..=600 {
+            let theta = 0.005 * f64::from(i);
+            if lens.distorted_slope(theta) <= 0.0 {
+                break;
+            }
+            lens.max_view_angle_rad = theta;
+            if lens.distorted(theta) > farthest {
+                break;
+            }
+        }
+        lens
+    }
+
     fn distorted(&self, theta: f64) -> f64 {
         let [k1, k2, k3, k4] = self.distortion;
         let t2 = theta * theta;

@@ -1,14 +1,22 @@
 //! Cameras: points to pixels and back.
 //!
 //! `Fisheye` is the equidistant model of Kannala and Brandt (2006, eq. 6 to the fourth odd term), as OpenCV's
-//! `cv::fisheye` and Kalibr's `equidistant` use it; `square` finds a tag's pose from its four corners through it.
+//! `cv::fisheye` and Kalibr's `equidistant` use it; `Radtan` is Brown's pinhole, `CameraModel` either of them; `square` finds a
+//! tag's pose from its four corners through any [`Lens`].
 //! Oracle: OpenCV (tests/oracle).
 
+mod camera;
+mod corner_noise;
 mod fisheye;
+mod radtan;
 mod square;
+pub mod tag36h11;
 
+pub use camera::{CameraModel, Lens};
+pub use corner_noise::{CornerNoise, DetectionChance};
 pub use fisheye::Fisheye;
-pub use square::{SquareError, SquarePose, solve_square, square_corners};
+pub use radtan::Radtan;
+pub use square::{SquareError, SquarePose, solve_square, solve_square_both, square_corners};
 
 /// The wrist camera's lens, for tests.
 #[cfg(test)]

@@ -8,7 +8,7 @@
 use nalgebra::{Isometry3, Matrix2x6, Matrix3, Matrix6, Point3, Rotation3, SMatrix, SVector, Translation3};
 use nalgebra::{UnitQuaternion, Vector2, Vector3, Vector6};
 
-use super::fisheye::Fisheye;
+use super::camera::Lens;
 use crate::spatial::{Camera, Pose, Tag, skew};
 
 /// A tag's pose in the camera frame, and how well it fits.
@@ -43,29 +43,54 @@ pub fn square_corners(size_m: f64) -> [Point3<f64>; 4] {
 ///
 /// # Errors
 /// [`SquareError`] when the pixels have no bearing or no square fits them.
-pub fn solve_square(lens: &Fisheye, size_m: f64, corners_px: &[[f64; 2]; 4]) -> Result<SquarePose, SquareError> {
+pub fn solve_square(lens: &impl Lens, size_m: f64, corners_px: &[[f64; 2]; 4]) -> Result<SquarePose, SquareError> {
+    let (best, other) = both(lens, &square_corners(size_m), corners_px)?;
+    best.pose(other.map(|o| o.cost)).ok_or(SquareError::Degenerate)
+}
+
+/// Both poses that a square seen at `corners_px` may have, the better one first; the second is `None` where there is none but
+/// the first.
+///
+/// # Errors
+/// As [`solve_square`].
+pub fn solve_square_both(
+    lens: &impl Lens,
+    size_m: f64,
+    corners_px: &[[f64; 2]; 4],
+) -> Result<(SquarePose, Option<SquarePose>), SquareError> {
     let corners_tag = square_corners(size_m);
+    let (best, other) = both(lens, &corners_tag, corners_px)?;
+    let differs = |o: &Refined| o.pose.rotation.angle_to(&best.pose.rotation) > SAME_SOLUTION_RAD;
+    // Both starts may have led to one; the mirror image of the answer is a better start than that of the homography.
+    let other = other.filter(differs);
+    let other = other.or_else(|| refine(lens, flipped(&best.pose), &corners_tag, corners_px).filter(differs));
+    let first = best.pose(other.as_ref().map(|o| o.cost)).ok_or(SquareError::Degenerate)?;
+    Ok((first, other.and_then(|o| o.pose(Some(best.cost)))))
+}
+
+/// The better solution first.
+fn both(
+    lens: &impl Lens,
+    corners_tag: &[Point3<f64>; 4],
+    corners_px: &[[f64; 2]; 4],
+) -> Result<(Refined, Option<Refined>), SquareError> {
     let mut bearings = [Vector3::zeros(); 4];
     for (bearing, corner) in bearings.iter_mut().zip(corners_px) {
         *bearing = lens.unproject(&Vector2::from(*corner)).ok_or(SquareError::OutOfView)?.into_inner();
     }
-    let first = start_from_homography(&bearings, &corners_tag)?;
-    let best = refine(lens, first, &corners_tag, corners_px);
-    let other = refine(lens, flipped(&first), &corners_tag, corners_px);
-    let (best, other) = match (best, other) {
-        (Some(a), Some(b)) if b.cost < a.cost => (b, Some(a)),
-        (Some(a), b) => (a, b),
-        (None, Some(b)) => (b, None),
-        (None, None) => return Err(SquareError::Degenerate),
-    };
-    let covariance = best.normal.try_inverse().ok_or(SquareError::Degenerate)?;
-    Ok(SquarePose {
-        camera_from_tag: Pose::from_isometry(best.pose),
-        rms_px: (best.cost / 8.0).sqrt(),
-        ambiguity: other.map_or(f64::INFINITY, |o| (o.cost / best.cost.max(1e-12)).max(1.0)),
-        covariance_unit_px: covariance,
-    })
+    let first = start_from_homography(&bearings, corners_tag)?;
+    let best = refine(lens, first, corners_tag, corners_px);
+    let other = refine(lens, flipped(&first), corners_tag, corners_px);
+    match (best, other) {
+        (Some(a), Some(b)) if b.cost < a.cost => Ok((b, Some(a))),
+        (Some(a), b) => Ok((a, b)),
+        (None, Some(b)) => Ok((b, None)),
+        (None, None) => Err(SquareError::Degenerate),
+    }
 }
+
+/// Two solutions nearer to each other than this are one.
+const SAME_SOLUTION_RAD: f64 = 1e-4;
 
 /// Homography of the square by the direct linear transform, with bearings turned so that their mean is the z axis.
 fn start_from_homography(
@@ -119,8 +144,20 @@ struct Refined {
     normal: Matrix6<f64>,
 }
 
+impl Refined {
+    /// `None` where the corners do not determine it.
+    fn pose(&self, other_cost: Option<f64>) -> Option<SquarePose> {
+        Some(SquarePose {
+            camera_from_tag: Pose::from_isometry(self.pose),
+            rms_px: (self.cost / 8.0).sqrt(),
+            ambiguity: other_cost.map_or(f64::INFINITY, |other| (other / self.cost.max(1e-12)).max(1.0)),
+            covariance_unit_px: self.normal.try_inverse()?,
+        })
+    }
+}
+
 fn refine(
-    lens: &Fisheye,
+    lens: &impl Lens,
     start: Isometry3<f64>,
     corners_tag: &[Point3<f64>; 4],
     corners_px: &[[f64; 2]; 4],
@@ -165,7 +202,7 @@ struct Linearized {
 
 /// Residual = measured - predicted; Jacobian of the prediction for a perturbation on the right, pose * exp(xi).
 fn linearize(
-    lens: &Fisheye,
+    lens: &impl Lens,
     pose: &Isometry3<f64>,
     corners_tag: &[Point3<f64>; 4],
     corners_px: &[[f64; 2]; 4],
