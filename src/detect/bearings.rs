@@ -1,0 +1,108 @@
+//! Pixels to a plane about a tag: the lens's inverse from a table, and a pinhole view that looks at the tag.
+
+use nalgebra::{Matrix2, Rotation3, Vector2, Vector3};
+
+use crate::optics::Fisheye;
+
+const N_NODES: usize = 4096;
+/// A tag's pixels lie within this of its middle: cosine of 80 deg.
+const MIN_DEPTH: f64 = 0.17;
+
+/// Bearings of pixels: linear in a table over the squared radius, to 1e-8 rad.
+#[derive(Clone, Debug)]
+pub(super) struct BearingTable {
+    focal_px: [f64; 2],
+    center_px: [f64; 2],
+    nodes_per_square: f64,
+    /// (sin(theta)/theta_d, cos(theta)) at squared distorted angles.
+    nodes: Vec<[f64; 2]>,
+}
+
+impl BearingTable {
+    pub(super) fn new(lens: &Fisheye) -> Self {
+        let [fx, cx, cy] = [lens.focal_px[0], lens.center_px[0], lens.center_px[1]];
+        let edge = Vector3::new(lens.max_view_angle_rad.sin(), 0.0, lens.max_view_angle_rad.cos());
+        let largest = lens.project(&(edge * (1.0 - 1e-12))).map_or(0.0, |pixel| ((pixel.x - cx) / fx).powi(2));
+        let nodes_per_square = (N_NODES - 1) as f64 / largest.max(1e-9);
+        let at = |k: usize| {
+            let theta_d = (k as f64 / nodes_per_square).sqrt().min(largest.sqrt() * (1.0 - 1e-9));
+            let bearing = lens.unproject(&Vector2::new(fx * theta_d + cx, cy));
+            bearing.map_or([1.0, 1.0], |b| [if theta_d > 1e-9 { b.x / theta_d } else { 1.0 }, b.z])
+        };
+        let nodes = (0..N_NODES).map(at).collect();
+        Self { focal_px: lens.focal_px, center_px: lens.center_px, nodes_per_square, nodes }
+    }
+
+    /// The direction (camera frame, of length 1 to 1e-8) that a pixel sees; `None` beyond the field of view.
+    #[inline]
+    pub(super) fn bearing(&self, pixel_px: [f64; 2]) -> Option<Vector3<f64>> {
+        let x = (pixel_px[0] - self.center_px[0]) / self.focal_px[0];
+        let y = (pixel_px[1] - self.center_px[1]) / self.focal_px[1];
+        let place = (x * x + y * y) * self.nodes_per_square;
+        let k = place as usize;
+        let [a, b] = [self.nodes.get(k)?, self.nodes.get(k + 1)?];
+        let share = place - k as f64;
+        let scale = a[0] + share * (b[0] - a[0]);
+        Some(Vector3::new(x * scale, y * scale, a[1] + share * (b[1] - a[1])))
+    }
+}
+
+/// A pinhole camera of focal length 1 at the same place that looks at a tag: in its image a tag's sides are straight.
+#[derive(Clone, Debug)]
+pub(super) struct TagView<'a> {
+    table: &'a BearingTable,
+    turn: Rotation3<f64>,
+}
+
+impl<'a> TagView<'a> {
+    pub(super) fn new(table: &'a BearingTable, corners_px: &[[f64; 2]; 4]) -> Option<Self> {
+        let mut sum = Vector3::zeros();
+        for corner in corners_px {
+            sum += table.bearing(*corner)?;
+        }
+        let turn = Rotation3::rotation_between(&sum, &Vector3::z())?;
+        Some(Self { table, turn })
+    }
+
+    /// Where a pixel's line of sight meets the plane z = 1.
+    #[inline]
+    pub(super) fn plane(&self, pixel_px: [f64; 2]) -> Option<Vector2<f64>> {
+        let ahead = self.turn * self.table.bearing(pixel_px)?;
+        (ahead.z > MIN_DEPTH).then(|| Vector2::new(ahead.x / ahead.z, ahead.y / ahead.z))
+    }
+
+    /// The same with its derivative by the pixel.
+    #[inline]
+    pub(super) fn plane_with_jacobian(&self, pixel_px: [f64; 2]) -> Option<(Vector2<f64>, Matrix2<f64>)> {
+        const H: f64 = 0.5;
+        let [x, y] = pixel_px;
+        let here = self.plane(pixel_px)?;
+        let (left, right) = (self.plane([x - H, y])?, self.plane([x + H, y])?);
+        let (up, down) = (self.plane([x, y - H])?, self.plane([x, y + H])?);
+        Some((here, Matrix2::from_columns(&[(right - left) / (2.0 * H), (down - up) / (2.0 * H)])))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::optics::fixture::lens;
+
+    #[test]
+    fn the_table_is_the_lens() {
+        let (lens, table) = (lens(), BearingTable::new(&lens()));
+        let mut n = 0;
+        for x in (0..1224).step_by(37) {
+            for y in (0..1024).step_by(41) {
+                let pixel = [f64::from(x), f64::from(y)];
+                let (Some(exact), Some(ours)) = (lens.unproject(&pixel.into()), table.bearing(pixel)) else {
+                    assert_eq!(lens.unproject(&pixel.into()).is_some(), table.bearing(pixel).is_some(), "{pixel:?}");
+                    continue;
+                };
+                n += 1;
+                assert!((exact.into_inner() - ours).norm() < 3e-8, "{pixel:?}");
+            }
+        }
+        assert!(n > 500, "{n}");
+    }
+}

@@ -1,0 +1,337 @@
+//! Where a tag's corners are: the known pattern, seen through the lens and out of focus, fitted to the pixels.
+//!
+//! `I = a.(1, s, t) + P(s, t; blur) g.(1, s, t)`: black level and contrast with a linear gradient each, P the tag's cells
+//! convolved with a Gaussian of any shape (defocus, motion, the pixel itself). Unknown are the eight corner coordinates (a
+//! homography of the bearings, so that the lens's curves are in it), three of the blur and six of the light. Gauss-Newton
+//! with damping; Huber's weights from the second pass on, for snow and whatever lies in front. The inverse normal matrix
+//! times the residual variance is the corners' covariance.
+
+use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
+
+use super::GreyImage;
+use super::bearings::{BearingTable, TagView};
+use super::homography::Homography;
+use super::normal::NormalTable;
+use super::pattern::Cells;
+use super::samples::{HALF, Sample, collect};
+
+const N: usize = 17;
+type Normal = SMatrix<f64, N, N>;
+type Parameters = SVector<f64, N>;
+
+/// First parameters of blur and light.
+const BLUR: usize = 8;
+const BLACK: usize = 11;
+const GAIN: usize = 14;
+
+const COARSE_SAMPLES: usize = 500;
+const FINE_SAMPLES: usize = 2500;
+const COARSE_ITERATIONS: usize = 12;
+const FINE_ITERATIONS: usize = 6;
+/// Fitting ends when no corner moves further.
+const DONE_PX: f64 = 2e-3;
+/// A pixel averages over itself: variance of a box.
+const PIXEL_VARIANCE_PX2: f64 = 1.0 / 12.0;
+/// Blur before anything is known: variance, and how far it may be off, px2.
+const BLUR_PX2: [f64; 2] = [0.5, 2.0];
+/// Light's slopes over half a tag, as a share of the contrast: how large they may be.
+const SLOPE_STD: f64 = 0.3;
+/// Residuals beyond this many standard deviations pull no stronger.
+const HUBER: f64 = 2.5;
+/// A camera's bytes are never better than this: rounding, grey levels.
+const MIN_RESIDUAL_STD: f64 = 0.3;
+
+/// What a fit found.
+#[derive(Clone, Debug)]
+pub(super) struct Fit {
+    pub corners_px: [[f64; 2]; 4],
+    /// From residuals and normal matrix alone.
+    pub covariances_px2: [Matrix2<f64>; 4],
+    /// Difference of the blur's variances along and across its longest direction.
+    pub motion_px2: f64,
+    /// White minus black, grey levels.
+    pub contrast: f64,
+    /// Of the residuals, grey levels.
+    pub residual_std: f64,
+    /// Share of the pixels' variance that the pattern explains.
+    pub explained: f64,
+}
+
+/// Buffers and tables, reused.
+#[derive(Debug)]
+pub(super) struct Fitter {
+    normal: NormalTable,
+    samples: Vec<Sample>,
+    sizes: Vec<f64>,
+}
+
+struct Linearized {
+    cost: f64,
+    /// Over the pixels: sums of weights, and of weighted squared residuals.
+    weight: f64,
+    squares: f64,
+    matrix: Normal,
+    gradient: Parameters,
+}
+
+/// One tag's view and pattern.
+struct Scene<'a> {
+    view: TagView<'a>,
+    cells: &'a Cells,
+}
+
+impl Fitter {
+    pub(super) fn new() -> Self {
+        Self { normal: NormalTable::new(), samples: Vec::new(), sizes: Vec::new() }
+    }
+
+    /// Fits from corners that are off by some pixels; `None` where they have no bearing or nothing fits.
+    pub(super) fn fit(
+        &mut self,
+        image: &GreyImage,
+        table: &BearingTable,
+        cells: &Cells,
+        start_px: &[[f64; 2]; 4],
+    ) -> Option<Fit> {
+        let scene = Scene { view: TagView::new(table, start_px)?, cells };
+        let (homography, _) = scene.homography(start_px)?;
+        collect(&mut self.samples, image, &scene.view, &homography, cells, start_px, FINE_SAMPLES);
+        let n_coarse = self.samples.len().min(COARSE_SAMPLES);
+        if n_coarse < 4 * N {
+            return None;
+        }
+        let mut x = self.start(&scene, start_px, n_coarse)?;
+        self.iterate(&scene, &mut x, n_coarse, f64::INFINITY, COARSE_ITERATIONS)?;
+        let scale = self.residual_std(&scene, &x, n_coarse)?;
+        let n = self.samples.len();
+        let end = self.iterate(&scene, &mut x, n, HUBER * scale, FINE_ITERATIONS)?;
+        self.finish(&x, &end)
+    }
+
+    fn start(&self, scene: &Scene, start_px: &[[f64; 2]; 4], n: usize) -> Option<Parameters> {
+        let mut x = Parameters::zeros();
+        for (k, corner) in start_px.iter().enumerate() {
+            x[2 * k] = corner[0];
+            x[2 * k + 1] = corner[1];
+        }
+        x[BLUR] = BLUR_PX2[0];
+        x[BLUR + 2] = BLUR_PX2[0];
+        // Black and white by regression on the pattern where it stands now.
+        let (homography, _) = scene.homography(start_px)?;
+        let (mut sp, mut spp, mut sy, mut spy) = (0.0, 0.0, 0.0, 0.0);
+        for sample in &self.samples[..n] {
+            let place = homography.place(&sample.plane);
+            let at = [(place.s + 1.0) * HALF, (place.t + 1.0) * HALF];
+            let p = scene.cells.blurred(&self.normal, at, [0.1, 0.0, 0.1]).p;
+            sp += p;
+            spp += p * p;
+            sy += sample.value;
+            spy += p * sample.value;
+        }
+        let n = n as f64;
+        let spread = spp - sp * sp / n;
+        let gain = (spy - sp * sy / n) / spread;
+        if gain.is_nan() || gain <= 0.0 {
+            return None;
+        }
+        x[GAIN] = gain;
+        x[BLACK] = (sy - gain * sp) / n;
+        Some(x)
+    }
+
+    fn iterate(
+        &self,
+        scene: &Scene,
+        x: &mut Parameters,
+        n: usize,
+        bend: f64,
+        n_iterations: usize,
+    ) -> Option<Linearized> {
+        let mut here = self.linearize(scene, x, n, bend)?;
+        let mut damping = 1e-3;
+        for _ in 0..n_iterations {
+            let mut damped = here.matrix;
+            for k in 0..N {
+                damped[(k, k)] *= 1.0 + damping;
+            }
+            let step = damped.cholesky()?.solve(&here.gradient);
+            let mut trial = *x + step;
+            keep_blur(&mut trial);
+            match self.linearize(scene, &trial, n, bend).filter(|there| there.cost <= here.cost) {
+                Some(there) => {
+                    let largest = step.fixed_rows::<8>(0).amax();
+                    *x = trial;
+                    here = there;
+                    damping = (damping * 0.1).max(1e-9);
+                    if largest < DONE_PX {
+                        break;
+                    }
+                }
+                None => {
+                    damping *= 10.0;
+                    if damping > 1e4 {
+                        break;
+                    }
+                }
+            }
+        }
+        Some(here)
+    }
+
+    /// Cost with Huber's bend at `bend` grey levels, and its quadratic model; priors in units of the residual variance.
+    fn linearize(&self, scene: &Scene, x: &Parameters, n: usize, bend: f64) -> Option<Linearized> {
+        let corners = corners_of(x);
+        let (homography, jacobians) = scene.homography(&corners)?;
+        let mut out =
+            Linearized { cost: 0.0, weight: 0.0, squares: 0.0, matrix: Normal::zeros(), gradient: Parameters::zeros() };
+        let mut sums = [[0.0; N]; N];
+        for sample in &self.samples[..n] {
+            let (value, row) = self.predict(scene, &homography, x, sample);
+            // Beyond the sensor's range a pixel tells only that it is beyond.
+            let residual = sample.value - value.clamp(0.0, 255.0);
+            if !(0.0..=255.0).contains(&value) && residual == 0.0 {
+                continue;
+            }
+            let size = residual.abs();
+            let weight = if size > bend { bend / size } else { 1.0 };
+            out.cost += if size > bend { bend * (2.0 * size - bend) } else { residual * residual };
+            out.weight += weight;
+            out.squares += weight * residual * residual;
+            for i in 0..N {
+                let wi = weight * row[i];
+                for j in i..N {
+                    sums[i][j] += wi * row[j];
+                }
+                out.gradient[i] += wi * residual;
+            }
+        }
+        let mut to_corners = Normal::identity();
+        to_corners.fixed_view_mut::<8, 8>(0, 0).copy_from(&homography.by_corners(&jacobians));
+        let raw = Normal::from_fn(|i, j| sums[i.min(j)][i.max(j)]);
+        out.matrix = to_corners.transpose() * raw * to_corners;
+        out.gradient = to_corners.transpose() * out.gradient;
+        let variance = (out.squares / out.weight.max(1.0)).max(MIN_RESIDUAL_STD * MIN_RESIDUAL_STD);
+        add_priors(&mut out, x, variance);
+        out.cost.is_finite().then_some(out)
+    }
+
+    /// Grey level at a sample and its derivatives by g (homography), blur and light.
+    #[inline]
+    fn predict(&self, scene: &Scene, homography: &Homography, x: &Parameters, sample: &Sample) -> (f64, [f64; N]) {
+        let place = homography.place(&sample.plane);
+        let (s, t) = (place.s, place.t);
+        let m = homography.slope(&place) * sample.jacobian * HALF;
+        let [xx, xy, yy] = [x[BLUR] + PIXEL_VARIANCE_PX2, x[BLUR + 1], x[BLUR + 2] + PIXEL_VARIANCE_PX2];
+        let by_blur = |a: usize, b: usize| {
+            let (ax, ay, bx, by) = (m[(a, 0)], m[(a, 1)], m[(b, 0)], m[(b, 1)]);
+            [ax * bx, ax * by + ay * bx, ay * by]
+        };
+        let (uu, uv, vv) = (by_blur(0, 0), by_blur(0, 1), by_blur(1, 1));
+        let dot = |w: [f64; 3]| w[0] * xx + w[1] * xy + w[2] * yy;
+        let covariance = [dot(uu), dot(uv), dot(vv)];
+        let b = scene.cells.blurred(&self.normal, [(s + 1.0) * HALF, (t + 1.0) * HALF], covariance);
+        let black = x[BLACK] + x[BLACK + 1] * s + x[BLACK + 2] * t;
+        let gain = x[GAIN] + x[GAIN + 1] * s + x[GAIN + 2] * t;
+        let by_s = x[BLACK + 1] + x[GAIN + 1] * b.p + gain * HALF * b.u;
+        let by_t = x[BLACK + 2] + x[GAIN + 2] * b.p + gain * HALF * b.v;
+        let (px, py) = (sample.plane.x * place.scale, sample.plane.y * place.scale);
+        let both = by_s * s + by_t * t;
+        let heat = |k: usize| gain * (0.5 * b.uu * uu[k] + b.uv * uv[k] + 0.5 * b.vv * vv[k]);
+        let row = [
+            by_s * px,
+            by_s * py,
+            by_s * place.scale,
+            by_t * px,
+            by_t * py,
+            by_t * place.scale,
+            -both * px,
+            -both * py,
+            heat(0),
+            heat(1),
+            heat(2),
+            1.0,
+            s,
+            t,
+            b.p,
+            b.p * s,
+            b.p * t,
+        ];
+        (black + gain * b.p, row)
+    }
+
+    /// Robust: 1.48 times the median size.
+    fn residual_std(&mut self, scene: &Scene, x: &Parameters, n: usize) -> Option<f64> {
+        let (homography, _) = scene.homography(&corners_of(x))?;
+        let mut sizes = std::mem::take(&mut self.sizes);
+        sizes.clear();
+        let size = |sample: &Sample| (sample.value - self.predict(scene, &homography, x, sample).0).abs();
+        sizes.extend(self.samples[..n].iter().map(size));
+        let middle = sizes.len() / 2;
+        let (_, median, _) = sizes.select_nth_unstable_by(middle, f64::total_cmp);
+        let std = (1.4826 * *median).max(MIN_RESIDUAL_STD);
+        self.sizes = sizes;
+        Some(std)
+    }
+
+    fn finish(&self, x: &Parameters, end: &Linearized) -> Option<Fit> {
+        let n = self.samples.len() as f64;
+        let variance = (end.squares / (end.weight - N as f64).max(1.0)).max(MIN_RESIDUAL_STD * MIN_RESIDUAL_STD);
+        let inverse = end.matrix.cholesky()?.inverse();
+        let covariances_px2 = std::array::from_fn(|k| inverse.fixed_view::<2, 2>(2 * k, 2 * k) * variance);
+        let mean = self.samples.iter().map(|sample| sample.value).sum::<f64>() / n;
+        let total = self.samples.iter().map(|sample| (sample.value - mean).powi(2)).sum::<f64>() / n;
+        Some(Fit {
+            corners_px: corners_of(x),
+            covariances_px2,
+            motion_px2: 2.0 * (0.5 * (x[BLUR] - x[BLUR + 2])).hypot(x[BLUR + 1]),
+            contrast: x[GAIN],
+            residual_std: variance.sqrt(),
+            explained: 1.0 - end.squares / end.weight / total.max(1e-9),
+        })
+    }
+}
+
+impl Scene<'_> {
+    /// The homography that these corners give, and d(plane)/d(pixel) at each.
+    fn homography(&self, corners_px: &[[f64; 2]; 4]) -> Option<(Homography, [Matrix2<f64>; 4])> {
+        let mut planes = [Vector2::zeros(); 4];
+        let mut jacobians = [Matrix2::zeros(); 4];
+        for k in 0..4 {
+            (planes[k], jacobians[k]) = self.view.plane_with_jacobian(corners_px[k])?;
+        }
+        Some((Homography::new(&planes)?, jacobians))
+    }
+}
+
+fn corners_of(x: &Parameters) -> [[f64; 2]; 4] {
+    std::array::from_fn(|k| [x[2 * k], x[2 * k + 1]])
+}
+
+/// No blur is less than none.
+fn keep_blur(x: &mut Parameters) {
+    for k in [BLUR, BLUR + 2] {
+        x[k] = x[k].clamp(0.0, 100.0);
+    }
+    let limit = 0.95 * ((x[BLUR] + PIXEL_VARIANCE_PX2) * (x[BLUR + 2] + PIXEL_VARIANCE_PX2)).sqrt();
+    x[BLUR + 1] = x[BLUR + 1].clamp(-limit, limit);
+}
+
+/// Weak knowledge of blur and slopes, so that a tag of few pixels has a fit.
+fn add_priors(out: &mut Linearized, x: &Parameters, variance: f64) {
+    let slope_std = SLOPE_STD * x[GAIN].abs().max(1.0);
+    let priors = [
+        (BLUR, BLUR_PX2[0], BLUR_PX2[1]),
+        (BLUR + 1, 0.0, BLUR_PX2[1]),
+        (BLUR + 2, BLUR_PX2[0], BLUR_PX2[1]),
+        (BLACK + 1, 0.0, slope_std),
+        (BLACK + 2, 0.0, slope_std),
+        (GAIN + 1, 0.0, slope_std),
+        (GAIN + 2, 0.0, slope_std),
+    ];
+    for (k, mean, std) in priors {
+        let weight = variance / (std * std);
+        out.cost += weight * (x[k] - mean).powi(2);
+        out.matrix[(k, k)] += weight;
+        out.gradient[k] += weight * (mean - x[k]);
+    }
+}

@@ -1,0 +1,153 @@
+//! What a tag looks like out of focus: its cells convolved with a Gaussian, and the derivatives of that.
+//!
+//! Place (u, v) in cells from the bottom left corner of the black square as printed, u right, v up, 0 .. 8; beyond is white.
+//! The separable part is a product of normal integrals; the blur's cross term enters to first order, for convolution with a
+//! Gaussian obeys the heat equation: dP/dC_uv = d2P/(du dv).
+
+use super::normal::{NormalTable, REACH};
+
+pub(super) use crate::optics::tag36h11::TAG_CELLS as N_CELLS;
+
+const MAX_CELLS: usize = N_CELLS + 2;
+
+/// A tag's cells with a white rim: `[row from the bottom + 1][column + 1]`, 1 = white.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Cells([[f64; MAX_CELLS]; MAX_CELLS]);
+
+/// Reflectance (0 black, 1 white) and its derivatives by u and v, cells.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Blurred {
+    pub p: f64,
+    pub u: f64,
+    pub v: f64,
+    pub uu: f64,
+    pub uv: f64,
+    pub vv: f64,
+}
+
+/// How much the cells along one axis weigh at a place, with derivatives.
+struct Axis {
+    /// Index of the first, the rim counted.
+    first: usize,
+    n: usize,
+    weights: [[f64; 3]; MAX_CELLS],
+}
+
+impl Axis {
+    #[inline]
+    fn at(table: &NormalTable, place: f64, std: f64) -> Self {
+        let first_edge = (place - REACH * std).ceil().clamp(0.0, 9.0) as usize;
+        let last_edge = (place + REACH * std).floor().clamp(-1.0, N_CELLS as f64);
+        let mut axis = Self { first: 0, n: 1, weights: [[0.0; 3]; MAX_CELLS] };
+        let n_edges = (last_edge + 1.0) as usize - first_edge.min((last_edge + 1.0) as usize);
+        if n_edges == 0 {
+            axis.first = (place.floor() + 1.0).clamp(0.0, (MAX_CELLS - 1) as f64) as usize;
+            axis.weights[0] = [1.0, 0.0, 0.0];
+            return axis;
+        }
+        axis.first = first_edge;
+        axis.n = n_edges + 1;
+        let mut before = [0.0; 3];
+        let inverse = 1.0 / std;
+        for k in 0..n_edges {
+            let z = ((first_edge + k) as f64 - place) * inverse;
+            let [integral, density] = table.at(z);
+            let here = [integral, -density * inverse, -z * density * inverse * inverse];
+            axis.weights[k] = [here[0] - before[0], here[1] - before[1], here[2] - before[2]];
+            before = here;
+        }
+        axis.weights[n_edges] = [1.0 - before[0], -before[1], -before[2]];
+        axis
+    }
+}
+
+impl Cells {
+    /// From the cells as printed, rows from the top, true for white.
+    pub(super) fn new(printed: &[[bool; N_CELLS]; N_CELLS]) -> Self {
+        let mut cells = [[1.0; MAX_CELLS]; MAX_CELLS];
+        for (line, row) in cells[1..=N_CELLS].iter_mut().zip(printed.iter().rev()) {
+            for (cell, is_white) in line[1..=N_CELLS].iter_mut().zip(row) {
+                *cell = f64::from(u8::from(*is_white));
+            }
+        }
+        Self(cells)
+    }
+
+    /// `covariance`: of the blur, uu, uv, vv, cells squared.
+    #[inline]
+    pub(super) fn blurred(&self, table: &NormalTable, place: [f64; 2], covariance: [f64; 3]) -> Blurred {
+        let along_u = Axis::at(table, place[0], covariance[0].sqrt());
+        let along_v = Axis::at(table, place[1], covariance[2].sqrt());
+        let mut out = Blurred::default();
+        for j in 0..along_v.n {
+            let line = &self.0[along_v.first + j];
+            let mut sums = [0.0; 3];
+            for i in 0..along_u.n {
+                let cell = line[along_u.first + i];
+                for (sum, weight) in sums.iter_mut().zip(along_u.weights[i]) {
+                    *sum += cell * weight;
+                }
+            }
+            let [w, w1, w2] = along_v.weights[j];
+            out.p += w * sums[0];
+            out.u += w * sums[1];
+            out.uu += w * sums[2];
+            out.v += w1 * sums[0];
+            out.uv += w1 * sums[1];
+            out.vv += w2 * sums[0];
+        }
+        out.p += covariance[1] * out.uv;
+        out
+    }
+
+    /// Whether all cells within a rectangle about a place are alike, so that nothing changes there.
+    pub(super) fn is_flat(&self, place: [f64; 2], reach: [f64; 2]) -> bool {
+        let index = |x: f64| (x.floor() + 1.0).clamp(0.0, (MAX_CELLS - 1) as f64) as usize;
+        let [columns, rows] = std::array::from_fn(|k| index(place[k] - reach[k])..=index(place[k] + reach[k]));
+        let first = self.0[*rows.start()][*columns.start()];
+        rows.clone().all(|row| columns.clone().all(|column| self.0[row][column] == first))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cells() -> Cells {
+        let is_inner = |k: usize| (1..=6).contains(&k);
+        Cells::new(&std::array::from_fn(|row| {
+            std::array::from_fn(|column| is_inner(row) && is_inner(column) && (row * 7 + column * 5) % 3 == 0)
+        }))
+    }
+
+    #[test]
+    fn derivatives_agree_with_differences() {
+        let (table, cells) = (NormalTable::new(), cells());
+        let h = 1e-3;
+        let c = [0.09, 0.0, 0.16];
+        for (u, v) in [(0.1, 0.2), (1.1, 3.4), (7.9, 8.2), (2.5, -0.3), (4.0, 5.05)] {
+            let at = |du: f64, dv: f64| cells.blurred(&table, [u + du, v + dv], c);
+            let b = at(0.0, 0.0);
+            let near = |a: f64, b: f64| assert!((a - b).abs() < 3e-3, "{a} {b} at {u} {v}");
+            near(b.u, (at(h, 0.0).p - at(-h, 0.0).p) / (2.0 * h));
+            near(b.v, (at(0.0, h).p - at(0.0, -h).p) / (2.0 * h));
+            near(b.uu, (at(h, 0.0).u - at(-h, 0.0).u) / (2.0 * h));
+            near(b.uv, (at(0.0, h).u - at(0.0, -h).u) / (2.0 * h));
+            near(b.vv, (at(0.0, h).v - at(0.0, -h).v) / (2.0 * h));
+        }
+    }
+
+    #[test]
+    fn a_sharp_pattern_is_its_cells_and_a_wide_one_their_mean() {
+        let (table, cells) = (NormalTable::new(), cells());
+        let tiny = [1e-6, 0.0, 1e-6];
+        assert_eq!(cells.blurred(&table, [0.5, 0.5], tiny).p, 0.0);
+        assert_eq!(cells.blurred(&table, [-0.5, 4.0], tiny).p, 1.0);
+        // The top left inner cell, row 1 and column 1, is white.
+        assert_eq!(cells.blurred(&table, [1.5, 6.5], tiny).p, 1.0);
+        assert_eq!(cells.blurred(&table, [2.5, 6.5], tiny).p, 0.0);
+        assert_eq!(cells.blurred(&table, [1.5, 5.5], tiny).p, 0.0);
+        let wide = cells.blurred(&table, [4.0, 4.0], [4.0, 0.0, 4.0]);
+        assert!((0.1..0.5).contains(&wide.p), "{}", wide.p);
+    }
+}

@@ -1,0 +1,144 @@
+//! Images of tags by brute force, for tests: every pixel is the mean of many rays. Shares no code with the fit but the lens.
+
+use std::ops::Range;
+
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector2, Vector3};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+use crate::optics::{Fisheye, square_corners, tag36h11};
+
+/// A tag in the camera frame.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Placed {
+    pub id: u32,
+    pub size_m: f64,
+    pub camera_from_tag: Isometry3<f64>,
+}
+
+impl Placed {
+    /// Towards `direction`, leaning by `incidence_rad` about a line at `azimuth_rad`, turned by `spin_rad`.
+    pub(super) fn new(
+        id: u32,
+        size_m: f64,
+        center_m: Vector3<f64>,
+        [incidence_rad, azimuth_rad, spin_rad]: [f64; 3],
+    ) -> Self {
+        let facing = UnitQuaternion::rotation_between(&Vector3::z(), &-center_m).expect("ahead");
+        let axis = Vector3::new(azimuth_rad.cos(), azimuth_rad.sin(), 0.0);
+        let lean = UnitQuaternion::from_scaled_axis(axis * incidence_rad);
+        let turn = UnitQuaternion::from_scaled_axis(Vector3::z() * spin_rad);
+        Self { id, size_m, camera_from_tag: Isometry3::from_parts(Translation3::from(center_m), facing * lean * turn) }
+    }
+
+    pub(super) fn corners_px(&self, lens: &Fisheye) -> Option<[[f64; 2]; 4]> {
+        let pixels = square_corners(self.size_m).map(|c| lens.project(&(self.camera_from_tag * c).coords));
+        let mut out = [[0.0; 2]; 4];
+        for (corner, pixel) in out.iter_mut().zip(pixels) {
+            *corner = pixel.filter(|p| lens.contains(p))?.into();
+        }
+        Some(out)
+    }
+}
+
+/// Light and optics of an image.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Look {
+    pub black: f64,
+    pub white: f64,
+    pub around: f64,
+    /// Standard deviation of the blur, px.
+    pub blur_px: f64,
+    /// White noise of a pixel, grey levels.
+    pub noise: f64,
+}
+
+pub(super) const CLEAN: Look = Look { black: 30.0, white: 200.0, around: 90.0, blur_px: 0.5, noise: 0.0 };
+
+/// Reflectance at (x, y), m; `None` beside the tag and its rim.
+fn reflectance(tag: &Placed, x: f64, y: f64) -> Option<bool> {
+    let cell = tag.size_m / 8.0;
+    let (column, row) = ((x / cell + 4.0).floor(), (4.0 - y / cell).floor());
+    if !(-1.0..=8.0).contains(&column) || !(-1.0..=8.0).contains(&row) {
+        return None;
+    }
+    if !(0.0..=7.0).contains(&column) || !(0.0..=7.0).contains(&row) {
+        return Some(true);
+    }
+    Some(tag36h11::cells(tag.id).expect("an id of the family")[row as usize][column as usize])
+}
+
+fn ray(lens: &Fisheye, look: &Look, tags: &[Placed], pixel: Vector2<f64>) -> f64 {
+    let Some(bearing) = lens.unproject(&pixel) else { return 0.0 };
+    for tag in tags {
+        let inverse = tag.camera_from_tag.inverse();
+        let (origin, direction) = (inverse.translation.vector, inverse.rotation * bearing.into_inner());
+        let along = -origin.z / direction.z;
+        if along > 0.0 {
+            let at = origin + direction * along;
+            if let Some(is_white) = reflectance(tag, at.x, at.y) {
+                return if is_white { look.white } else { look.black };
+            }
+        }
+    }
+    look.around
+}
+
+/// Rays along a pixel's side.
+const N: usize = 8;
+
+/// Renders tags, the first in front; pixels beside them are not traced.
+pub(super) fn render(lens: &Fisheye, look: &Look, tags: &[Placed], rng: &mut ChaCha8Rng) -> Vec<u8> {
+    let [width, height] = lens.resolution_px.map(|n| n as usize);
+    let mut grey = vec![look.around; width * height];
+    for tag in tags {
+        let Some(corners) = tag.corners_px(lens) else { continue };
+        let range = |axis: usize, size: usize| {
+            let low = corners.iter().map(|c| c[axis]).fold(f64::INFINITY, f64::min);
+            let high = corners.iter().map(|c| c[axis]).fold(0.0, f64::max);
+            let rim = 0.3 * (high - low) + 4.0;
+            (low - rim).max(0.0) as usize..((high + rim) as usize + 1).min(size)
+        };
+        draw(lens, look, tags, [range(0, width), range(1, height)], &mut grey);
+    }
+    let mut noisy = |value: f64| {
+        let normal: f64 = if look.noise > 0.0 { StandardNormal.sample(rng) } else { 0.0 };
+        (value + look.noise * normal).round().clamp(0.0, 255.0) as u8
+    };
+    grey.into_iter().map(&mut noisy).collect()
+}
+
+/// Traces a window at N x N rays a pixel, blurs that, and averages.
+fn draw(lens: &Fisheye, look: &Look, tags: &[Placed], [columns, rows]: [Range<usize>; 2], grey: &mut [f64]) {
+    let width = lens.resolution_px[0] as usize;
+    let (nx, ny) = (columns.len() * N, rows.len() * N);
+    let at = |start: usize, k: usize| start as f64 - 0.5 + (k as f64 + 0.5) / N as f64;
+    let fine: Vec<f64> = (0..nx * ny)
+        .map(|i| ray(lens, look, tags, Vector2::new(at(columns.start, i % nx), at(rows.start, i / nx))))
+        .collect();
+    let across = blur(&fine, nx, 1, look.blur_px);
+    let both = blur(&across, ny, nx, look.blur_px);
+    for (j, y) in rows.enumerate() {
+        for (i, x) in columns.clone().enumerate() {
+            let rays = (0..N * N).map(|k| both[(j * N + k / N) * nx + i * N + k % N]);
+            grey[y * width + x] = rays.sum::<f64>() / (N * N) as f64;
+        }
+    }
+}
+
+/// Convolves lines of `n` values, `stride` apart, with a Gaussian.
+fn blur(values: &[f64], n: usize, stride: usize, std_px: f64) -> Vec<f64> {
+    let std = (std_px * N as f64).max(1e-3);
+    let reach = (4.0 * std) as isize;
+    let weights: Vec<f64> = (-reach..=reach).map(|k| (-0.5 * (k as f64 / std).powi(2)).exp()).collect();
+    let sum: f64 = weights.iter().sum();
+    let mut out = vec![0.0; values.len()];
+    for (i, out) in out.iter_mut().enumerate() {
+        let place = (i / stride % n) as isize;
+        for (k, weight) in (-reach..=reach).zip(&weights) {
+            let other = (place + k).clamp(0, n as isize - 1);
+            *out += weight / sum * values[(i as isize + (other - place) * stride as isize) as usize];
+        }
+    }
+    out
+}

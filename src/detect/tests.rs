@@ -1,0 +1,244 @@
+//! Corners found against corners projected, and what is not taken for a tag, on images with known truth.
+
+use std::f64::consts::TAU;
+
+use nalgebra::{Vector2, Vector3};
+use rand::RngExt;
+
+use super::synthetic::{CLEAN, Look, Placed, render};
+use super::*;
+use crate::optics::Fisheye;
+use crate::optics::fixture::lens;
+use crate::stats::{quantile, stream_rng};
+use crate::streams::RejectReason;
+
+fn detector(lens: &Fisheye, settings: DetectorSettings) -> TagDetector {
+    TagDetector::new(lens, settings).expect("it starts")
+}
+
+fn look_at(lens: &Fisheye, settings: DetectorSettings, data: &[u8]) -> Detected {
+    let [width, height] = lens.resolution_px.map(|n| n as usize);
+    detector(lens, settings).detect(GreyImage { width, height, data }).expect("an image of the lens")
+}
+
+fn drawn(lens: &Fisheye, look: &Look, tags: &[Placed]) -> Vec<u8> {
+    render(lens, look, tags, &mut stream_rng(1, "detect/test"))
+}
+
+fn ahead(id: u32, x_m: f64, z_m: f64) -> Placed {
+    Placed::new(id, 0.15, Vector3::new(x_m, 0.05, z_m), [0.3, 0.5, 0.2])
+}
+
+fn reasons(seen: &Detected) -> Vec<(u32, RejectReason)> {
+    seen.rejects.iter().map(|reject| (reject.id, reject.reason)).collect()
+}
+
+#[derive(Default)]
+struct Found {
+    n_drawn: usize,
+    n_found: usize,
+    errors_px: Vec<f64>,
+    /// Squared errors in units of their covariance: chi-square of 2 degrees.
+    normalised: Vec<f64>,
+}
+
+impl Found {
+    /// Per coordinate.
+    fn rms_px(&self) -> f64 {
+        (self.errors_px.iter().map(|e| e * e).sum::<f64>() / self.errors_px.len() as f64 / 2.0).sqrt()
+    }
+
+    fn mean_normalised(&self) -> f64 {
+        self.normalised.iter().sum::<f64>() / self.normalised.len() as f64
+    }
+}
+
+/// One tag an image, anywhere in view.
+fn trials(seeds: std::ops::Range<u64>, look: &Look, ranges_m: [f64; 2], incidences_rad: [f64; 2]) -> Found {
+    let lens = lens();
+    let mut detector = detector(&lens, DetectorSettings::default());
+    let mut found = Found::default();
+    for seed in seeds {
+        let mut rng = stream_rng(seed, "detect/trials");
+        let mut uniform = |[a, b]: [f64; 2]| rng.random_range(a..=b);
+        let (angle, around, range) = (uniform([0.0, 1.1]), uniform([0.0, TAU]), uniform(ranges_m));
+        let center = Vector3::new(angle.sin() * around.cos(), angle.sin() * around.sin(), angle.cos()) * range;
+        let pose = [uniform(incidences_rad), uniform([0.0, TAU]), uniform([0.0, TAU])];
+        let tag = Placed::new((seed * 7 % 587) as u32, 0.15, center, pose);
+        let Some(truth) = tag.corners_px(&lens) else { continue };
+        let data = render(&lens, look, &[tag], &mut rng);
+        found.n_drawn += 1;
+        let seen = detector.detect(GreyImage { width: 1224, height: 1024, data: &data }).expect("of the lens");
+        let Some(seen) = seen.tags.first() else { continue };
+        assert_eq!(seen.detection.id, tag.id);
+        found.n_found += 1;
+        for ((corner, truth), covariance) in seen.detection.corners_px.iter().zip(truth).zip(&seen.covariances_px2) {
+            let error = Vector2::from(*corner) - Vector2::from(truth);
+            let inverse = covariance.try_inverse().expect("regular");
+            found.errors_px.push(error.norm());
+            found.normalised.push((error.transpose() * inverse * error).x);
+        }
+    }
+    found
+}
+
+/// Any spin and place: the order of the corners is right, or errors would be as large as a side.
+#[test]
+fn clean_corners_are_those_of_the_projection() {
+    for (ranges, incidences) in [([0.4, 0.8], [0.0, 0.9]), ([0.8, 1.6], [0.0, 0.9]), ([1.6, 2.5], [0.0, 0.6])] {
+        let found = trials(0..12, &CLEAN, ranges, incidences);
+        let worst = quantile(&found.errors_px, 0.95).expect("some");
+        eprintln!(
+            "{ranges:?} m: {} of {}, rms {:.4} px, 95 % below {worst:.4} px",
+            found.n_found,
+            found.n_drawn,
+            found.rms_px()
+        );
+        assert_eq!(found.n_found, found.n_drawn);
+        assert!(found.rms_px() < 0.02 && worst < 0.05, "{} {worst}", found.rms_px());
+    }
+}
+
+/// In white noise the covariances are 1.5 times too large, which snow needs: means of 2/1.5. Those of some 150 squares have a
+/// standard deviation of 0.11; the floor makes the largest contrast's errors smaller than said.
+#[test]
+fn noisy_corners_err_as_their_covariance_says() {
+    for (contrast, blur_px, band) in [(120.0, 1.0, 0.5..=2.2), (40.0, 0.4, 0.9..=2.2), (30.0, 1.0, 0.9..=2.2)] {
+        let look = Look { white: 40.0 + contrast, black: 40.0, around: 60.0, blur_px, noise: 3.0 };
+        let found = trials(100..140, &look, [0.5, 2.0], [0.0, 0.9]);
+        let mean = found.mean_normalised();
+        let [middle, high] = [0.5, 0.95].map(|q| quantile(&found.normalised, q).expect("some"));
+        eprintln!(
+            "contrast {contrast}, blur {blur_px}: {} of {}, rms {:.4} px, squares mean {mean:.2}, 50 % {middle:.2}, 95 % {high:.2}",
+            found.n_found,
+            found.n_drawn,
+            found.rms_px()
+        );
+        assert!(found.n_found + 1 >= found.n_drawn && found.rms_px() < 0.1);
+        // Chi-square of 2 degrees: median 1.39, 95 % below 5.99.
+        assert!(band.contains(&mean) && middle < 1.9 && high < 8.0, "{mean} {middle} {high}");
+    }
+}
+
+#[test]
+fn noise_shows_nothing() {
+    let lens = lens();
+    for seed in 0..4 {
+        let mut rng = stream_rng(seed, "detect/noise");
+        let data: Vec<u8> = (0..1224 * 1024).map(|_| rng.random_range(0..=255)).collect();
+        let seen = look_at(&lens, DetectorSettings::default(), &data);
+        assert!(seen.tags.is_empty(), "{:?}", seen.tags);
+    }
+    // Patches of random cells in place of a tag's, as large as one: nothing of the family.
+    let mut rng = stream_rng(9, "detect/noise");
+    for _ in 0..3 {
+        let cells: Vec<u8> = (0..128 * 154).map(|_| if rng.random_range(0.0..1.0) < 0.5 { 20 } else { 220 }).collect();
+        let data: Vec<u8> = (0..1224 * 1024).map(|i| cells[i / 1224 / 8 * 154 + i % 1224 / 8]).collect();
+        let seen = look_at(&lens, DetectorSettings::default(), &data);
+        assert!(seen.tags.is_empty(), "{:?}", seen.tags);
+    }
+}
+
+#[test]
+fn an_id_at_two_places_is_no_tag() {
+    let lens = lens();
+    let tags = [ahead(5, -0.2, 0.8), ahead(5, 0.2, 0.8), ahead(6, 0.0, 1.4)];
+    let seen = look_at(&lens, DetectorSettings::default(), &drawn(&lens, &CLEAN, &tags));
+    assert_eq!(seen.tags.iter().map(|tag| tag.detection.id).collect::<Vec<_>>(), [6]);
+    assert_eq!(reasons(&seen), [(5, RejectReason::SeenTwice); 2]);
+}
+
+/// Cells painted over: as many as are corrected, and more.
+#[test]
+fn wrong_bits_are_counted() {
+    let lens = lens();
+    let tag = ahead(3, 0.02, 0.5);
+    let clean = drawn(&lens, &CLEAN, &[tag]);
+    let cells = crate::optics::tag36h11::cells(3).expect("in the family");
+    let inverse = tag.camera_from_tag.inverse();
+    // The first cells of the second row within the border, in the colour that they do not have.
+    let painted = |n_wrong: usize| {
+        let mut data = clean.clone();
+        for (i, value) in data.iter_mut().enumerate() {
+            let Some(bearing) = lens.unproject(&Vector2::new((i % 1224) as f64, (i / 1224) as f64)) else { continue };
+            let (origin, direction) = (inverse.translation.vector, inverse.rotation * bearing.into_inner());
+            let at = origin - direction * (origin.z / direction.z);
+            let cell_m = tag.size_m / 8.0;
+            let (column, row) = ((at.x / cell_m + 4.0).floor(), (4.0 - at.y / cell_m).floor());
+            if row == 2.0 && (1.0..=n_wrong as f64).contains(&column) {
+                *value = if cells[2][column as usize] { CLEAN.black } else { CLEAN.white } as u8;
+            }
+        }
+        data
+    };
+    let strict = || DetectorSettings { max_wrong_bits: 0, ..DetectorSettings::default() };
+    assert_eq!(look_at(&lens, strict(), &clean).tags.len(), 1);
+    assert_eq!(look_at(&lens, DetectorSettings::default(), &painted(2)).tags.len(), 1);
+    let seen = look_at(&lens, strict(), &painted(1));
+    assert!(seen.tags.is_empty());
+    assert_eq!(reasons(&seen), [(3, RejectReason::WrongBits)]);
+    assert!(look_at(&lens, DetectorSettings::default(), &painted(4)).tags.is_empty());
+}
+
+#[test]
+fn doubtful_tags_are_rejected_with_the_reason() {
+    let lens = lens();
+    let tag = ahead(42, 0.1, 0.9);
+    let clean = drawn(&lens, &CLEAN, &[tag]);
+    let default = DetectorSettings::default;
+    let other = DetectorSettings { known_ids: Some(vec![41]), ..default() };
+    assert_eq!(reasons(&look_at(&lens, other, &clean)), [(42, RejectReason::UnknownId)]);
+    let large = DetectorSettings { min_side_px: 300.0, ..default() };
+    assert_eq!(reasons(&look_at(&lens, large, &clean)), [(42, RejectReason::TooSmall)]);
+    let contrast = DetectorSettings { min_contrast: 200.0, ..default() };
+    assert_eq!(reasons(&look_at(&lens, contrast, &clean)), [(42, RejectReason::LowContrast)]);
+    // A tag whose border the image does not have where the code says: half of it hidden by a grey bar.
+    let sure = DetectorSettings { max_corner_std_px: 1e-4, ..default() };
+    assert_eq!(reasons(&look_at(&lens, sure, &clean)), [(42, RejectReason::PoorEdges)]);
+    // Beyond the field of view that belief has.
+    let narrow = Fisheye { max_view_angle_rad: 0.05, ..lens };
+    let seen = look_at(&narrow, default(), &clean);
+    assert_eq!(reasons(&seen), [(42, RejectReason::OutOfView)]);
+}
+
+/// Tags near the rim, where the lens bends most, and those that the image cuts off.
+#[test]
+fn the_rim_of_the_image_is_no_trap() {
+    let lens = lens();
+    let (mut n_whole, mut n_found) = (0, 0);
+    for step in 0..12 {
+        let angle = 1.1 + 0.03 * f64::from(step);
+        let center = Vector3::new(angle.sin(), 0.1, angle.cos()) * 0.7;
+        let tag = Placed::new(step, 0.15, center, [0.2, f64::from(step), 0.0]);
+        let truth = tag.corners_px(&lens);
+        // The whole scene is drawn even where corners are beyond the rim.
+        let seen = look_at(&lens, DetectorSettings::default(), &drawn(&lens, &CLEAN, &[tag]));
+        let Some(truth) = truth else {
+            assert!(seen.tags.is_empty());
+            continue;
+        };
+        n_whole += 1;
+        for found in &seen.tags {
+            n_found += 1;
+            for (a, b) in found.detection.corners_px.iter().zip(truth) {
+                assert!((a[0] - b[0]).hypot(a[1] - b[1]) < 0.1, "{a:?} {b:?}");
+            }
+        }
+    }
+    assert!(n_whole >= 6 && n_found + 1 >= n_whole, "{n_found} of {n_whole}");
+}
+
+#[test]
+fn the_same_image_gives_the_same_bytes_and_a_wrong_size_an_error() {
+    let lens = lens();
+    let data = drawn(&lens, &Look { noise: 4.0, ..CLEAN }, &[ahead(7, 0.1, 0.9), ahead(8, -0.3, 1.2)]);
+    let image = GreyImage { width: 1224, height: 1024, data: &data };
+    let mut detector = detector(&lens, DetectorSettings::default());
+    let first = detector.detect(image).expect("detected");
+    assert_eq!(first.tags.len(), 2);
+    assert_eq!(detector.detect(image).expect("detected"), first);
+    let short = GreyImage { data: &data[1..], ..image };
+    assert_eq!(detector.detect(short), Err(DetectError::Size { bytes: data.len() - 1, width: 1224, height: 1024 }));
+    let error = detector.detect(GreyImage { width: 1024, height: 1224, data: &data }).expect_err("turned");
+    assert!(error.to_string().contains("1024 x 1224") && error.to_string().contains("1224 x 1024"), "{error}");
+}
