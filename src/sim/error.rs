@@ -20,6 +20,10 @@ pub enum SimError {
     Joint { joint: String },
     #[error("world spec cannot be written as text: {0}")]
     SpecText(#[from] toml::ser::Error),
+    #[error("the tag detector: {0}")]
+    Detector(String),
+    #[error("an image could not be compressed: {0}")]
+    Jpeg(String),
     #[error("the truth could not be kept: {0}")]
     Truth(#[source] SinkError),
     #[error("{}: {problem}", path.display())]

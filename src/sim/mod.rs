@@ -16,6 +16,7 @@ mod fault;
 mod fixture;
 mod gripper;
 mod hydraulics;
+pub mod imaging;
 mod joint_load;
 mod physics;
 mod places;
@@ -35,7 +36,7 @@ pub use error::SimError;
 pub use fault::{Fault, ScheduledFault};
 pub use recorded::{RecordedMotion, VehicleJet};
 pub use spec::{
-    CameraWorldSpec, ClockSpec, HydraulicsSpec, JointSensorsSpec, MotionKind, PhysicsSpec, Points, PortKind, TagsSpec,
-    TemperatureSpec, VehicleMotionSpec, WaterSpec, WorldSpec,
+    CameraMode, CameraWorldSpec, ClockSpec, HydraulicsSpec, ImageSpec, JointSensorsSpec, MotionKind, PhysicsSpec,
+    Points, PortKind, TagsSpec, TemperatureSpec, VehicleMotionSpec, WaterKind, WaterSpec, WorldSpec,
 };
 pub use world::{World, WorldInput};

@@ -57,7 +57,7 @@ pub(super) struct Nearest {
 }
 
 /// Shapes nearer to the camera's eye than this are its own housing, m.
-const HOUSING_M: f64 = 0.03;
+pub(super) const HOUSING_M: f64 = 0.03;
 /// Side of the seafloor, m: wider than any arm's reach.
 const SEAFLOOR_SIDE_M: f64 = 40.0;
 
@@ -248,7 +248,7 @@ fn shape_pose(placed: &PlacedShape) -> Pose3 {
 }
 
 /// A slab of 1 m with its upper face at `z_m`.
-fn seafloor(z_m: f64) -> PlacedShape {
+pub(super) fn seafloor(z_m: f64) -> PlacedShape {
     PlacedShape {
         owner_from_shape: Isometry3::translation(0.0, 0.0, z_m - 0.5),
         shape: Shape::Box { size_m: [SEAFLOOR_SIDE_M, SEAFLOOR_SIDE_M, 1.0] },

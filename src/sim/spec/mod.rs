@@ -4,6 +4,7 @@
 
 mod camera;
 mod hydraulics;
+mod image;
 mod joint_sensors;
 mod physics;
 mod temperature;
@@ -21,8 +22,9 @@ use super::error::SimError;
 use super::fault::{self, ScheduledFault};
 use super::recorded::RecordedMotion;
 use crate::robot::{FileIssue, Robot};
-pub use camera::{CameraWorldSpec, ClockSpec, PortKind, TagsSpec};
+pub use camera::{CameraWorldSpec, ClockSpec, CornerNoiseKind, PortKind, TagsSpec};
 pub use hydraulics::HydraulicsSpec;
+pub use image::{CameraMode, ImageSpec, WaterKind};
 pub use joint_sensors::JointSensorsSpec;
 pub use physics::PhysicsSpec;
 pub use temperature::{Points, TemperatureSpec};
@@ -83,6 +85,9 @@ pub struct WorldSpec {
     pub clock: ClockSpec,
     pub camera: CameraWorldSpec,
     pub tags: TagsSpec,
+    /// Written out where images are rendered or it was set.
+    #[serde(skip_serializing_if = "ImageSpec::is_default")]
+    pub image: ImageSpec,
     pub vehicle: VehicleMotionSpec,
     pub hydraulics: HydraulicsSpec,
     pub water: WaterSpec,
@@ -102,13 +107,14 @@ impl WorldSpec {
     /// # Errors
     /// [`SimError::Spec`] naming file, key and the allowed range; NaN is in no range.
     pub fn from_table(table: &toml::Table, file: &Path) -> Result<Self, SimError> {
-        const TABLES: [&str; 11] = [
+        const TABLES: [&str; 12] = [
             "physics",
             "joint_sensors",
             "temperature",
             "clock",
             "camera",
             "tags",
+            "image",
             "vehicle",
             "hydraulics",
             "water",
@@ -127,6 +133,7 @@ impl WorldSpec {
             clock: reader.read("clock")?,
             camera: reader.read("camera")?,
             tags: reader.read("tags")?,
+            image: reader.read("image")?,
             vehicle: reader.read("vehicle")?,
             hydraulics: reader.read("hydraulics")?,
             water: reader.read("water")?,
@@ -158,7 +165,11 @@ impl WorldSpec {
     /// # Errors
     /// [`SimError::SpecText`], which no checked spec causes.
     pub fn to_toml(&self) -> Result<String, SimError> {
-        Ok(toml::to_string(self)?)
+        let mut text = toml::to_string(self)?;
+        if self.camera.mode == CameraMode::Rendered && self.image.is_default() {
+            text = format!("{text}\n[image]\n{}", toml::to_string(&self.image)?);
+        }
+        Ok(text)
     }
 
     /// With what only the robot says filled in.
@@ -172,6 +183,22 @@ impl WorldSpec {
     #[must_use]
     pub fn steps_per_period(&self) -> u64 {
         (CONTROL_PERIOD_S / self.physics.step_s).round() as u64
+    }
+
+    /// Images are rendered for rays through one point.
+    fn check_view_point(&self, file: &Path) -> Result<(), FileIssue> {
+        let camera = &self.camera;
+        let has_one = match camera.port {
+            PortKind::None => true,
+            PortKind::Dome => camera.dome_decentre_std_m == 0.0,
+            PortKind::Flat => false,
+        };
+        if camera.mode == CameraMode::Geometric || has_one {
+            return Ok(());
+        }
+        let problem = "a flat port or a dome beside the pupil sees from no single point: with mode = \"rendered\" only \
+                       \"none\", or \"dome\" with dome_decentre_std_m = 0, are allowed";
+        Err(FileIssue::new(file, "world.camera.port", problem))
     }
 
     fn check_relations(&self, file: &Path) -> Result<(), FileIssue> {
@@ -190,6 +217,9 @@ impl WorldSpec {
             let problem = format!("{step_s} does not divide the control period of {CONTROL_PERIOD_S} s");
             return Err(FileIssue::new(file, "world.physics.step_s", problem));
         }
+        self.image.check_relations(file)?;
+        self.check_view_point(file)?;
+        self.tags.check_options(file)?;
         self.temperature.check_relations(file)?;
         self.joint_sensors.check_relations(file)
     }
@@ -262,6 +292,27 @@ mod tests {
         }
         assert!(problem("[water]\nbuoyancy_fraction = 1.0").contains("world.water.buoyancy_fraction"));
         assert!(problem("[water]\ndrag = 1.0").contains("drag"));
+    }
+
+    #[test]
+    fn images_have_their_keys_and_limits() {
+        let spec =
+            read("[camera]\nmode = \"rendered\"\n[image]\nwater = \"coastal\"\nsnow_per_m3 = 10.0").expect("valid");
+        assert_eq!((spec.camera.mode, spec.image.water), (CameraMode::Rendered, WaterKind::Coastal));
+        assert!(problem("[image]\nblur_px = 11.0").contains("world.image.blur_px"));
+        assert!(problem("[image]\nwater = \"muddy\"").contains("world.image"));
+        assert!(problem("[image]\ndirect_per_m = [0.1, -0.1, 0.1]").contains("world.image.direct_per_m"));
+        for port in ["port = \"flat\"", "port = \"dome\"\ndome_decentre_std_m = 0.001"] {
+            let text = problem(&format!("[camera]\nmode = \"rendered\"\n{port}"));
+            assert!(text.contains("world.camera.port") && text.contains("no single point"), "{text}");
+        }
+        assert!(read("[camera]\nmode = \"rendered\"\nport = \"dome\"").is_ok());
+        // Worlds without images are written as ever.
+        let text = WorldSpec::default().to_toml().expect("text");
+        assert!(!text.contains("image") && !text.contains("mode"), "{text}");
+        let rendered = read("[camera]\nmode = \"rendered\"").expect("valid").to_toml().expect("text");
+        assert!(rendered.contains("turbidity = 1.0") && rendered.contains("mode = \"rendered\""), "{rendered}");
+        assert_eq!(read(&rendered).expect("valid").to_toml().expect("text"), rendered);
     }
 
     #[test]

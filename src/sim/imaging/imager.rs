@@ -1,0 +1,171 @@
+//! The camera of a scene: made once, shot often.
+
+use nalgebra::{Isometry3, Unit, Vector3};
+use rayon::prelude::*;
+
+use super::frame::Frame;
+use super::light::Light;
+use super::rays::Rays;
+use super::scene::{Look, Object};
+use super::sensor::{BAND_ROWS, Sensor};
+use super::shade::Shader;
+use super::shape::Form;
+use super::snow::{self, Flake};
+use super::tag::Board;
+use super::texture::Texture;
+use super::trace::{Canvas, Tracer};
+use crate::optics::Fisheye;
+use crate::robot::Shape;
+use crate::sim::spec::ImageSpec;
+use crate::stats::stream_rng;
+
+/// A printed tag: its frame has x right and y up as printed, z out of the print; `size_m` is the outer side of its black border.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TagPlane {
+    pub id: u32,
+    pub size_m: f64,
+    /// When the shutter opens, halfway, and when it closes.
+    pub base_from_tag: [Isometry3<f64>; 3],
+}
+
+impl TagPlane {
+    /// One that does not move against the base.
+    #[must_use]
+    pub fn fixed(id: u32, size_m: f64, base_from_tag: Isometry3<f64>) -> Self {
+        Self { id, size_m, base_from_tag: [base_from_tag; 3] }
+    }
+}
+
+/// A solid thing, wherever it is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SolidShape {
+    pub shape: Shape,
+    /// As a screen shows it.
+    pub color_rgb: [u8; 3],
+    /// It bears the seafloor's texture in place of its colour.
+    pub is_ground: bool,
+}
+
+/// What one image is taken of.
+#[derive(Clone, Copy, Debug)]
+pub struct Shot<'a> {
+    /// When the shutter opens, halfway, and when it closes; the camera's frame has x right, y down, z along its axis.
+    pub base_from_camera: [Isometry3<f64>; 3],
+    pub tags: &'a [TagPlane],
+    /// `base_from_shape` of each of the imager's solids, or of none, at the same instants.
+    pub solids: &'a [[Isometry3<f64>; 3]],
+    /// Towards the surface of the sea, base frame.
+    pub up: Unit<Vector3<f64>>,
+    /// Stirred up sediment hides everything.
+    pub is_silty: bool,
+    /// Number of the image: its noise and snow are drawn for it.
+    pub number: u64,
+}
+
+impl<'a> Shot<'a> {
+    /// Tags alone, before a camera that stands still, up along z of the base.
+    #[must_use]
+    pub fn of_tags(base_from_camera: Isometry3<f64>, tags: &'a [TagPlane], number: u64) -> Self {
+        let base_from_camera = [base_from_camera; 3];
+        Self { base_from_camera, tags, solids: &[], up: Vector3::z_axis(), is_silty: false, number }
+    }
+}
+
+/// Renders images with one lens in one water.
+#[derive(Clone, Debug)]
+pub struct Imager {
+    lens: Fisheye,
+    spec: ImageSpec,
+    lights: Vec<Light>,
+    solids: Vec<(Form, Look)>,
+    rays: Rays,
+    texture: Texture,
+    canvas: Canvas,
+    flakes: Vec<Flake>,
+    sensor: Sensor,
+    seed: u64,
+    frame: Frame,
+}
+
+/// What silt sends back, cd/m2: grey brown. Assumed.
+const SILT_CD_M2: [f32; 3] = [9.0, 8.0, 6.0];
+
+impl Imager {
+    /// Noise and snow are drawn for `seed`.
+    #[must_use]
+    pub fn new(lens: &Fisheye, spec: &ImageSpec, lights: &[Light], seed: u64) -> Self {
+        use rand::Rng;
+        let rays = Rays::new(lens);
+        let n_pixels = rays.width * rays.height;
+        let key = |name: &str| stream_rng(seed, name).next_u64();
+        Self {
+            lens: *lens,
+            spec: *spec,
+            lights: lights.to_vec(),
+            solids: Vec::new(),
+            texture: Texture::new(),
+            canvas: Canvas::new(n_pixels),
+            flakes: Vec::new(),
+            sensor: Sensor::new(spec, key("image/noise")),
+            seed: key("image/snow"),
+            frame: Frame { width: rays.width, height: rays.height, rgb: vec![0; 3 * n_pixels] },
+            rays,
+        }
+    }
+
+    /// What is there besides tags.
+    pub fn set_solids(&mut self, solids: &[SolidShape]) {
+        let look = |solid: &SolidShape| {
+            let linear = |value: u8| (f32::from(value) / 255.0).powf(2.2);
+            if solid.is_ground { Look::Ground } else { Look::Plain(solid.color_rgb.map(linear)) }
+        };
+        self.solids = solids.iter().map(|solid| (Form::of_shape(&solid.shape), look(solid))).collect();
+    }
+
+    /// Takes an image.
+    pub fn shoot(&mut self, shot: &Shot) -> &Frame {
+        let camera_from_base = shot.base_from_camera[1].inverse();
+        let shader = Shader::new(&self.spec, &self.lights, &camera_from_base, &shot.up, &self.rays);
+        if shot.is_silty {
+            self.canvas.planes.iter_mut().zip(SILT_CD_M2).for_each(|(plane, value)| plane.fill(value));
+        } else {
+            self.draw(shot, &shader);
+        }
+        let planes = &mut self.canvas.planes;
+        self.sensor.blur(planes, self.rays.width);
+        let exposure = self.sensor.expose(&self.spec, planes, &self.rays);
+        self.sensor.read(&self.spec, exposure, planes, &self.rays, shot.number, &mut self.frame.rgb);
+        &self.frame
+    }
+
+    fn draw(&mut self, shot: &Shot, shader: &Shader) {
+        let focal_px = self.rays.focal_px;
+        let boards: Vec<Form> = shot.tags.iter().map(|tag| Form::Tag(Board::new(tag.id, tag.size_m))).collect();
+        let tags = boards
+            .iter()
+            .zip(shot.tags)
+            .map(|(board, tag)| Object::new(board, Look::Tag, &tag.base_from_tag, &shot.base_from_camera, focal_px));
+        let solids = self.solids.iter().zip(shot.solids).map(|((form, look), base_from_solid)| {
+            Object::new(form, *look, base_from_solid, &shot.base_from_camera, focal_px)
+        });
+        let objects: Vec<Object> = tags.chain(solids).collect();
+        let (rays, texture) = (&self.rays, &self.texture);
+        self.canvas.trace(&Tracer { rays, objects: &objects, shader, texture });
+        if self.spec.snow_per_m3 > 0.0 {
+            snow::fall(&self.spec, &self.lens, shader, self.seed, shot.number, &mut self.flakes);
+            let flakes = &self.flakes;
+            let Canvas { ranges, planes: [red, green, blue], .. } = &mut self.canvas;
+            let ranges = &*ranges;
+            let band = rays.width * BAND_ROWS;
+            let bands = red.par_chunks_mut(band).zip(green.par_chunks_mut(band)).zip(blue.par_chunks_mut(band));
+            bands.enumerate().for_each(|(n, ((red, green), blue))| {
+                snow::draw(flakes, rays, ranges, n * BAND_ROWS, &mut [red, green, blue]);
+            });
+        }
+    }
+
+    #[must_use]
+    pub fn lens(&self) -> &Fisheye {
+        &self.lens
+    }
+}

@@ -1,0 +1,227 @@
+//! What one image may show, placed before the camera, and which part of it each tile of the image may meet.
+
+use nalgebra::{Isometry3, Point3};
+
+use super::rays::Rays;
+use super::shape::{Form, Lanes, Place};
+use super::{Rgb, Vec3};
+use crate::spatial::{exp, log};
+
+/// Samples of place and time on a pixel that an edge crosses.
+pub(super) const SAMPLES: usize = 32;
+/// Side of a tile, px.
+pub(super) const TILE_PX: usize = 32;
+/// A face of an object takes its lowest bits, the object's number plus one the others; 0 is open water.
+pub(super) const FACE_BITS: u32 = 3;
+/// What moves less than this while the shutter is open stands still, px.
+const STILL_PX: f32 = 0.01;
+/// Cells that are narrower than this in the image are sampled everywhere, px.
+const FINE_CELL_PX: f32 = 2.5;
+
+/// What a surface looks like.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Look {
+    Tag,
+    Plain(Rgb),
+    /// The seafloor's texture.
+    Ground,
+}
+
+/// One object before the camera.
+#[derive(Clone, Debug)]
+pub(super) struct Object<'a> {
+    pub form: &'a Form,
+    pub look: Look,
+    /// Halfway through the exposure.
+    pub place: Place,
+    /// At each sample's time, where it moves against the camera.
+    pub moving: Option<Box<[Place; SAMPLES]>>,
+    /// The farthest that any of it may move in the image while the shutter is open.
+    pub motion_px: f32,
+    /// Its pattern is too small in the image for pixels to be told by their neighbours.
+    pub is_fine: bool,
+    /// Spheres that hold it together, camera frame.
+    bounds: Vec<Bound>,
+}
+
+/// The three instants of an exposure.
+pub(super) type Instants = [Isometry3<f64>; 3];
+
+impl<'a> Object<'a> {
+    /// `base_from_object` and `base_from_camera` when the shutter opens, halfway and when it closes.
+    pub(super) fn new(
+        form: &'a Form,
+        look: Look,
+        base_from_object: &Instants,
+        base_from_camera: &Instants,
+        focal_px: f32,
+    ) -> Self {
+        let relative: Instants = std::array::from_fn(|k| base_from_object[k].inverse() * base_from_camera[k]);
+        let camera_from_object = relative[1].inverse();
+        let (first, last) = (log(&(relative[1].inverse() * relative[0])), log(&(relative[1].inverse() * relative[2])));
+        let bounds: Vec<(Vec3, f32)> = form
+            .bounds()
+            .into_iter()
+            .map(|(center, radius)| ((camera_from_object * Point3::from(center)).coords.cast(), radius))
+            .collect();
+        let largest = |v: &dyn Fn(&nalgebra::Vector6<f64>) -> f64| v(&first).max(v(&last)) as f32;
+        let (way_m, turn_rad) =
+            (largest(&|xi| xi.fixed_rows::<3>(0).norm()), largest(&|xi| xi.fixed_rows::<3>(3).norm()));
+        let range_m = bounds.iter().map(|(c, r)| c.norm() - r).fold(f32::INFINITY, f32::min).max(0.1);
+        let motion_px = 2.0 * focal_px * (way_m / range_m + turn_rad);
+        let moving = (motion_px > STILL_PX).then(|| {
+            // The parabola through the three poses, in the tangent space at the middle one.
+            Box::new(std::array::from_fn(|sample| {
+                let t = 2.0 * f64::from(offset(sample)[2]);
+                Place::new(&(relative[1] * exp(&(first * (0.5 * t * (t - 1.0)) + last * (0.5 * t * (t + 1.0))))))
+            }))
+        });
+        let is_fine = matches!(form, Form::Tag(board) if {
+            let eye = relative[1].translation.vector;
+            let range_m = eye.norm().max(1e-3);
+            focal_px * board.cell_m() * (eye.z.abs() / (range_m * range_m)) as f32 <= FINE_CELL_PX
+        });
+        let margin_rad = motion_px / focal_px;
+        let bounds = bounds.iter().map(|(center, radius)| Bound::new(center, *radius, margin_rad)).collect();
+        Self { form, look, place: Place::new(&relative[1]), moving, motion_px, is_fine, bounds }
+    }
+
+    /// At the time of a sample.
+    #[inline]
+    pub(super) fn place_at(&self, sample: usize) -> &Place {
+        self.moving.as_ref().map_or(&self.place, |places| &places[sample])
+    }
+}
+
+/// Where a sample lies on its pixel, px from the centre, and when in the exposure; each in -0.5..0.5 and of mean 0. A rank-1
+/// lattice (1, 7, 5)/32: its planes are 0.18 apart in place, and each coordinate takes 32 even steps.
+pub(super) fn offset(sample: usize) -> [f32; 3] {
+    [1, 7, 5].map(|step| (((sample * step) % SAMPLES) as f32 + 0.5) / SAMPLES as f32 - 0.5)
+}
+
+/// A sphere around part of an object, as a cone from the eye sees it.
+#[derive(Clone, Copy, Debug)]
+struct Bound {
+    towards: Vec3,
+    nearest_m: f32,
+    /// Of the angle that it takes up to either side; a sphere that holds the eye takes up everything.
+    cos: f32,
+    sin: f32,
+}
+
+impl Bound {
+    fn new(center: &Vec3, radius_m: f32, margin_rad: f32) -> Self {
+        let range_m = center.norm();
+        let half_rad =
+            if range_m <= radius_m { std::f32::consts::PI } else { (radius_m / range_m).asin() + margin_rad };
+        let half_rad = half_rad.min(std::f32::consts::PI);
+        Self {
+            towards: center / range_m.max(1e-6),
+            nearest_m: (range_m - radius_m).max(0.0),
+            cos: half_rad.cos(),
+            sin: half_rad.sin(),
+        }
+    }
+}
+
+/// The cone around a tile's rays.
+struct Cone {
+    axis: Vec3,
+    cos: f32,
+    sin: f32,
+}
+
+/// Objects that a tile's rays may meet, the nearest first, each with a bound that no ray beats.
+pub(super) fn candidates(objects: &[Object], rays: &Rays, column: usize, row: usize) -> Vec<(f32, u16)> {
+    let Some(cone) = Cone::new(rays, column, row) else { return Vec::new() };
+    let nearest = |object: &Object| {
+        let seen = object.bounds.iter().filter(|bound| cone.touches(bound));
+        seen.map(|bound| bound.nearest_m).fold(f32::INFINITY, f32::min)
+    };
+    let mut found: Vec<(f32, u16)> = objects
+        .iter()
+        .enumerate()
+        .map(|(n, object)| (nearest(object), n as u16))
+        .filter(|(m, _)| m.is_finite())
+        .collect();
+    found.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    found
+}
+
+impl Cone {
+    /// `None` for a tile that sees nothing.
+    fn new(rays: &Rays, column: usize, row: usize) -> Option<Self> {
+        /// Rays on the rim that are looked at.
+        const EVERY_PX: usize = 8;
+        let (right, bottom) = ((column + TILE_PX).min(rays.width) - 1, (row + TILE_PX).min(rays.height) - 1);
+        let steps = |from: usize, to: usize| (from..to).step_by(EVERY_PX).chain([to]);
+        let rim = || {
+            steps(column, right)
+                .flat_map(move |x| [(x, row), (x, bottom)])
+                .chain(steps(row, bottom).flat_map(move |y| [(column, y), (right, y)]))
+                .filter(|&(x, y)| rays.sees(x, y))
+                .map(|(x, y)| rays.at(x, y))
+        };
+        let axis = rim().sum::<Vec3>().try_normalize(1e-6)?;
+        let cos = rim().map(|ray| ray.dot(&axis)).fold(1.0, f32::min);
+        // Some pixels more, for samples beside the centres, rays between those of the rim, and the edge of the field of view.
+        let half_rad = cos.clamp(-1.0, 1.0).acos() + 10.0 / rays.focal_px;
+        Some(Self { axis, cos: half_rad.cos(), sin: half_rad.sin() })
+    }
+
+    #[inline]
+    fn touches(&self, bound: &Bound) -> bool {
+        // The angle between the axes against the sum of the halves, by their cosines.
+        let together_cos = self.cos * bound.cos - self.sin * bound.sin;
+        bound.cos <= -self.cos || bound.towards.dot(&self.axis) >= together_cos
+    }
+}
+
+impl Form {
+    /// Spheres that hold the form together, own frame: several in a row where it is long.
+    fn bounds(&self) -> Vec<(nalgebra::Vector3<f64>, f32)> {
+        let half = match self {
+            Self::Tag(board) => [board.half_m, board.half_m, 0.0],
+            Self::Box { half } => *half,
+            Self::Cylinder { radius, half } => [*radius, *radius, *half],
+            Self::Capsule { radius, half } => [*radius, *radius, half + radius],
+            Self::Sphere { radius } => return vec![(nalgebra::Vector3::zeros(), *radius)],
+            Self::Hull { radius, .. } => return vec![(nalgebra::Vector3::zeros(), *radius)],
+        };
+        let long = (0..3).fold(0, |best, i| if half[i] > half[best] { i } else { best });
+        let across = (0..3).filter(|&i| i != long).map(|i| half[i] * half[i]).sum::<f32>().sqrt();
+        let n = (half[long] / across.max(1e-3)).ceil().clamp(1.0, 16.0);
+        let each = half[long] / n;
+        let radius = across.hypot(each) * 1.0001;
+        (0..n as usize)
+            .map(|k| {
+                let mut center = nalgebra::Vector3::zeros();
+                center[long] = f64::from(-half[long] + each * (2.0 * k as f32 + 1.0));
+                (center, radius)
+            })
+            .collect()
+    }
+}
+
+/// The nearest object on each of several rays at one time: range and number plus one.
+#[inline]
+pub(super) fn first_met<const N: usize>(
+    objects: &[Object],
+    candidates: &[(f32, u16)],
+    rays: &Lanes<N>,
+) -> ([f32; N], [u16; N]) {
+    let (mut range, mut number) = ([f32::INFINITY; N], [0; N]);
+    for &(nearest_m, n) in candidates {
+        if range.iter().all(|range| *range < nearest_m) {
+            break;
+        }
+        let object = &objects[n as usize];
+        let entered = object.form.enter(&object.place, rays);
+        for k in 0..N {
+            if entered[k] < range[k] {
+                (range[k], number[k]) = (entered[k], n + 1);
+            }
+        }
+    }
+    (range, number)
+}

@@ -1,0 +1,238 @@
+//! From radiance to bytes: the lens's blur and vignetting, exposure, shot and read noise, 8 bits.
+//!
+//! A pixel collects `N = q e V L` electrons, q electrons for 1 cd/m2, `V = 1 - v (r / r_max)^2`, and reads `N + sqrt(s^2 N + n^2)`
+//! times a normal number. The camera chooses the exposure share e <= 1 and the gain g >= 1 so that its bright pixels come to a
+//! set share of full scale. The response is linear, as machine vision cameras have it.
+
+use rayon::prelude::*;
+
+use super::math::{hash, max};
+use super::rays::Rays;
+use crate::sim::spec::ImageSpec;
+
+/// Bright pixels: so large a share of those that see is at or above the level that is set.
+const BRIGHT_SHARE: f64 = 0.002;
+/// What they come to, of full scale.
+const BRIGHT_LEVEL: f32 = 0.85;
+/// Every so many pixels across and down are looked at for it.
+const LOOK_PX: usize = 3;
+/// Bits of a float below the buckets' width: 64 in each octave.
+const BUCKET_SHIFT: u32 = 17;
+const BUCKETS: usize = 1 << (31 - BUCKET_SHIFT);
+/// Rows that one thread works on.
+pub(super) const BAND_ROWS: usize = 32;
+const NORMALS: usize = 4096;
+
+/// The sensor and what it needs for every image.
+#[derive(Clone, Debug)]
+pub(super) struct Sensor {
+    /// Half of a symmetric kernel, its middle first; empty without blur.
+    kernel: Vec<f32>,
+    /// Quantiles of the normal distribution, scaled to unit variance.
+    normals: Vec<f32>,
+    buckets: Vec<u32>,
+    spare: Vec<f32>,
+    seed: u64,
+}
+
+/// What the camera set for an image.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Exposure {
+    pub share: f32,
+    pub gain: f32,
+}
+
+impl Sensor {
+    pub(super) fn new(spec: &ImageSpec, seed: u64) -> Self {
+        Self { kernel: gaussian(spec.blur_px), normals: normals(), buckets: vec![0; BUCKETS], spare: Vec::new(), seed }
+    }
+
+    /// The lens's blur.
+    pub(super) fn blur(&mut self, planes: &mut [Vec<f32>; 3], width: usize) {
+        let Some((middle, sides)) = self.kernel.split_first() else { return };
+        let height = planes[0].len() / width;
+        for plane in planes {
+            self.spare.resize(plane.len(), 0.0);
+            self.spare.par_chunks_mut(width).zip(plane.par_chunks(width)).for_each(|(out, line)| {
+                across(line, *middle, sides, out);
+            });
+            let spare = &self.spare;
+            let row_of = |row: usize| &spare[row * width..(row + 1) * width];
+            plane.par_chunks_mut(width).enumerate().for_each(|(row, out)| {
+                out.iter_mut().zip(row_of(row)).for_each(|(out, value)| *out = middle * value);
+                for (k, weight) in sides.iter().enumerate() {
+                    let (above, below) = (row_of(row.saturating_sub(k + 1)), row_of((row + k + 1).min(height - 1)));
+                    for ((out, a), b) in out.iter_mut().zip(above).zip(below) {
+                        *out += weight * (a + b);
+                    }
+                }
+            });
+        }
+    }
+
+    /// What the camera sets by itself, or was told.
+    pub(super) fn expose(&mut self, spec: &ImageSpec, planes: &[Vec<f32>; 3], rays: &Rays) -> Exposure {
+        if spec.gain > 0.0 {
+            return Exposure { share: 1.0, gain: spec.gain as f32 };
+        }
+        let electrons = self.bright(planes, rays) * spec.electrons_per_cd_m2 as f32;
+        let wanted = BRIGHT_LEVEL * spec.full_well_electrons as f32;
+        if electrons > wanted {
+            return Exposure { share: wanted / electrons, gain: 1.0 };
+        }
+        Exposure { share: 1.0, gain: (wanted / electrons.max(1e-3)).min(spec.gain_max as f32) }
+    }
+
+    /// The level that the bright pixels reach, cd/m2, to a part in 64.
+    fn bright(&mut self, planes: &[Vec<f32>; 3], rays: &Rays) -> f32 {
+        self.buckets.fill(0);
+        let mut n_seen = 0_u32;
+        for row in (0..rays.height).step_by(LOOK_PX) {
+            let [first, behind] = rays.spans[row];
+            for i in (row * rays.width + first..row * rays.width + behind).step_by(LOOK_PX) {
+                let brightest = planes.iter().map(|plane| plane[i]).fold(0.0, max);
+                self.buckets[(brightest.to_bits() >> BUCKET_SHIFT) as usize] += 1;
+                n_seen += 1;
+            }
+        }
+        let wanted = (f64::from(n_seen) * BRIGHT_SHARE) as u32;
+        let mut above = 0;
+        let bucket = (0..BUCKETS).rev().find(|&bucket| {
+            above += self.buckets[bucket];
+            above > wanted
+        });
+        f32::from_bits((bucket.unwrap_or(0) as u32) << BUCKET_SHIFT)
+    }
+
+    /// The bytes of image `number`.
+    pub(super) fn read(
+        &self,
+        spec: &ImageSpec,
+        exposure: Exposure,
+        planes: &[Vec<f32>; 3],
+        rays: &Rays,
+        number: u64,
+        rgb: &mut [u8],
+    ) {
+        let width = rays.width;
+        let readout = Readout::new(spec, exposure, rays, hash(self.seed ^ hash(number)), &self.normals);
+        rgb.par_chunks_mut(3 * width * BAND_ROWS).enumerate().for_each(|(band, out)| {
+            for (k, line) in out.chunks_mut(3 * width).enumerate() {
+                let row = band * BAND_ROWS + k;
+                let at = row * width..(row + 1) * width;
+                readout.line(row, [&planes[0][at.clone()], &planes[1][at.clone()], &planes[2][at]], line);
+            }
+        });
+    }
+}
+
+/// All that is the same for each pixel of an image.
+struct Readout<'a> {
+    electrons_per_cd_m2: f32,
+    counts_per_electron: f32,
+    read_variance: f32,
+    shot_variance: f32,
+    is_noisy: bool,
+    vignetting: f32,
+    center_px: [f32; 2],
+    key: u64,
+    normals: &'a [f32],
+}
+
+impl<'a> Readout<'a> {
+    fn new(spec: &ImageSpec, exposure: Exposure, rays: &Rays, key: u64, normals: &'a [f32]) -> Self {
+        let (read, shot) = (spec.read_noise_electrons as f32, spec.shot_noise as f32);
+        let half_diagonal_px = 0.5 * (rays.width as f32).hypot(rays.height as f32);
+        Self {
+            electrons_per_cd_m2: spec.electrons_per_cd_m2 as f32 * exposure.share,
+            counts_per_electron: 255.0 * exposure.gain / spec.full_well_electrons as f32,
+            read_variance: read * read,
+            shot_variance: shot * shot,
+            is_noisy: read > 0.0 || shot > 0.0,
+            vignetting: spec.vignetting as f32 / (half_diagonal_px * half_diagonal_px),
+            center_px: rays.center_px,
+            key,
+            normals,
+        }
+    }
+
+    fn line(&self, row: usize, planes: [&[f32]; 3], out: &mut [u8]) {
+        let dy = row as f32 - self.center_px[1];
+        let pixels = planes[0].iter().zip(planes[1]).zip(planes[2]).zip(out.as_chunks_mut::<3>().0);
+        let first = self.key.wrapping_add((row as u64) << 32);
+        for (column, (((red, green), blue), out)) in pixels.enumerate() {
+            let dx = column as f32 - self.center_px[0];
+            let kept = max(1.0 - self.vignetting * (dx * dx + dy * dy), 0.0) * self.electrons_per_cd_m2;
+            let bits = if self.is_noisy { hash(first.wrapping_add(column as u64)) } else { 0 };
+            for (k, (out, radiance)) in out.iter_mut().zip([red, green, blue]).enumerate() {
+                let mut electrons = kept * radiance;
+                if self.is_noisy {
+                    let normal = self.normals[(bits >> (20 * k)) as usize & (NORMALS - 1)];
+                    electrons += normal * (self.read_variance + self.shot_variance * electrons).sqrt();
+                }
+                // The cast clamps.
+                *out = (electrons * self.counts_per_electron + 0.5) as u8;
+            }
+        }
+    }
+}
+
+/// A row blurred; beyond its ends the last pixels go on.
+fn across(line: &[f32], middle: f32, sides: &[f32], out: &mut [f32]) {
+    let (n, reach) = (line.len(), sides.len());
+    let slow = |i: usize| {
+        let side = |(k, weight): (usize, &f32)| weight * (line[i.saturating_sub(k + 1)] + line[(i + k + 1).min(n - 1)]);
+        middle * line[i] + sides.iter().enumerate().map(side).sum::<f32>()
+    };
+    if n <= 2 * reach {
+        out.iter_mut().enumerate().for_each(|(i, out)| *out = slow(i));
+        return;
+    }
+    for i in (0..reach).chain(n - reach..n) {
+        out[i] = slow(i);
+    }
+    let inner = &mut out[reach..n - reach];
+    inner.iter_mut().zip(&line[reach..]).for_each(|(out, value)| *out = middle * value);
+    for (k, weight) in sides.iter().enumerate() {
+        let (before, after) = (&line[reach - k - 1..], &line[reach + k + 1..]);
+        for ((out, a), b) in inner.iter_mut().zip(before).zip(after) {
+            *out += weight * (a + b);
+        }
+    }
+}
+
+/// Half of a Gaussian kernel of unit sum, out to 3 sigma and half a pixel.
+fn gaussian(sigma_px: f64) -> Vec<f32> {
+    if sigma_px <= 0.0 {
+        return Vec::new();
+    }
+    let reach = (3.0 * sigma_px + 0.5).floor() as i32;
+    let weight = |k: i32| (-0.5 * (f64::from(k) / sigma_px).powi(2)).exp();
+    let sum: f64 = (-reach..=reach).map(weight).sum();
+    (0..=reach).map(|k| (weight(k) / sum) as f32).collect()
+}
+
+/// The normal distribution's quantiles at the middles of even shares, by bisection of its distribution function (the series of
+/// Marsaglia 2004), scaled to a variance of one.
+fn normals() -> Vec<f32> {
+    let below = |x: f64| {
+        let (mut sum, mut term, mut n) = (x, x, 1.0);
+        while f64::abs(term) > 1e-17 {
+            n += 2.0;
+            term *= x * x / n;
+            sum += term;
+        }
+        0.5 + sum * (-0.5 * x * x).exp() / std::f64::consts::TAU.sqrt()
+    };
+    let quantile = |share: f64| {
+        let (mut low, mut high) = (-5.0, 5.0);
+        for _ in 0..40 {
+            let middle = 0.5 * (low + high);
+            if below(middle) < share { low = middle } else { high = middle }
+        }
+        0.5 * (low + high)
+    };
+    let half: Vec<f64> = (0..NORMALS / 2).map(|k| -quantile((k as f64 + 0.5) / NORMALS as f64)).collect();
+    let variance = half.iter().map(|x| x * x).sum::<f64>() / half.len() as f64;
+    half.iter().flat_map(|x| [1.0, -1.0].map(|sign| (sign * x / variance.sqrt()) as f32)).collect()
+}

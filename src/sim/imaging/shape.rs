@@ -1,0 +1,290 @@
+//! Rays against convex shapes, several at a time. Rays start outside: what holds the eye is not seen.
+
+use super::Vec3;
+use super::math::{max, min};
+use super::tag::Board;
+use crate::robot::Shape;
+
+/// What an object is to a ray, in its own frame; lengths in m.
+#[derive(Clone, Debug)]
+pub(super) enum Form {
+    Tag(Board),
+    Box {
+        half: [f32; 3],
+    },
+    /// Along z.
+    Cylinder {
+        radius: f32,
+        half: f32,
+    },
+    Capsule {
+        radius: f32,
+        half: f32,
+    },
+    Sphere {
+        radius: f32,
+    },
+    /// Outer normals and distances from the origin.
+    Hull {
+        planes: Vec<[f32; 4]>,
+        radius: f32,
+    },
+}
+
+/// Where an object stands to the camera.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Place {
+    /// Rows of `object_from_camera`'s rotation.
+    rows: [[f32; 3]; 3],
+    /// The eye in the object's frame, m.
+    eye: [f32; 3],
+}
+
+/// Directions of several rays, camera frame, unit vectors.
+pub(super) type Lanes<const N: usize> = [[f32; N]; 3];
+
+impl Place {
+    pub(super) fn new(object_from_camera: &nalgebra::Isometry3<f64>) -> Self {
+        let rotation = object_from_camera.rotation.to_rotation_matrix();
+        Self {
+            rows: std::array::from_fn(|i| std::array::from_fn(|j| rotation[(i, j)] as f32)),
+            eye: object_from_camera.translation.vector.cast().into(),
+        }
+    }
+
+    #[inline]
+    fn turn<const N: usize>(&self, rays: &Lanes<N>) -> Lanes<N> {
+        std::array::from_fn(|i| {
+            let [a, b, c] = self.rows[i];
+            std::array::from_fn(|k| a * rays[0][k] + b * rays[1][k] + c * rays[2][k])
+        })
+    }
+
+    /// A point on a ray, object frame.
+    #[inline]
+    pub(super) fn point(&self, ray: &Vec3, range_m: f32) -> Vec3 {
+        let turned = self.turn(&[[ray.x], [ray.y], [ray.z]]);
+        Vec3::from_fn(|i, _| self.eye[i] + range_m * turned[i][0])
+    }
+
+    /// Where a ray meets the plane z = 0, x and y in the object's frame, m.
+    #[inline]
+    pub(super) fn on_plane(&self, ray: [f32; 3]) -> [f32; 2] {
+        let d = self.turn(&ray.map(|v| [v]));
+        let range = -self.eye[2] / d[2][0];
+        [self.eye[0] + range * d[0][0], self.eye[1] + range * d[1][0]]
+    }
+
+    /// From object to camera axes.
+    #[inline]
+    pub(super) fn back(&self, v: &Vec3) -> Vec3 {
+        Vec3::from_fn(|j, _| (0..3).map(|i| self.rows[i][j] * v[i]).sum())
+    }
+}
+
+impl Form {
+    pub(super) fn of_shape(shape: &Shape) -> Self {
+        match shape {
+            Shape::Box { size_m } => Self::Box { half: size_m.map(|s| (0.5 * s) as f32) },
+            Shape::Cylinder { radius_m, length_m } => {
+                Self::Cylinder { radius: *radius_m as f32, half: (0.5 * length_m) as f32 }
+            }
+            Shape::Capsule { radius_m, length_m } => {
+                Self::Capsule { radius: *radius_m as f32, half: (0.5 * length_m) as f32 }
+            }
+            Shape::Sphere { radius_m } => Self::Sphere { radius: *radius_m as f32 },
+            Shape::Hull(hull) => {
+                let corner = |i: u32| nalgebra::Vector3::from(hull.corners_m()[i as usize]);
+                let planes = hull.triangles().iter().filter_map(|&[a, b, c]| {
+                    let normal = (corner(b) - corner(a)).cross(&(corner(c) - corner(a))).try_normalize(1e-18)?;
+                    Some([normal.x, normal.y, normal.z, normal.dot(&corner(a))].map(|v| v as f32))
+                });
+                Self::Hull { planes: planes.collect(), radius: hull.radius_m() as f32 }
+            }
+        }
+    }
+
+    /// Ranges at which rays enter, m, infinite for those that miss. A tag's counts as nearer by what it is glued on.
+    #[inline]
+    pub(super) fn enter<const N: usize>(&self, place: &Place, rays: &Lanes<N>) -> [f32; N] {
+        let d = place.turn(rays);
+        let e = &place.eye;
+        match self {
+            Self::Tag(board) => enter_board(board.half_m, e, &d),
+            Self::Box { half } => enter_box(half, e, &d),
+            Self::Cylinder { radius, half } => enter_cylinder(*radius, *half, e, &d),
+            Self::Capsule { radius, half } => enter_capsule(*radius, *half, e, &d),
+            Self::Sphere { radius } => enter_sphere(*radius, e, &d),
+            Self::Hull { planes, .. } => enter_hull(planes, e, &d),
+        }
+    }
+
+    /// The face that a ray meets, which enters at `range_m`.
+    #[inline]
+    pub(super) fn face(&self, place: &Place, ray: &Vec3, range_m: f32) -> u16 {
+        match self {
+            Self::Tag(board) if place.eye[2] > 0.0 => {
+                let [x, y] = place.on_plane([ray.x, ray.y, ray.z]);
+                board.face(x, y)
+            }
+            Self::Tag(_) => super::tag::FACE_BACK,
+            Self::Capsule { .. } | Self::Sphere { .. } => 0,
+            _ => self.normal(&place.point(ray, range_m)).0,
+        }
+    }
+
+    /// Whether each face has one normal.
+    #[inline]
+    pub(super) fn is_flat(&self) -> bool {
+        matches!(self, Self::Tag(_) | Self::Box { .. })
+    }
+
+    /// The true range of what enters at `range_m`: a tag's counts as nearer.
+    #[inline]
+    pub(super) fn true_range(&self, place: &Place, ray: &Vec3, range_m: f32) -> f32 {
+        let is_tag = matches!(self, Self::Tag(_));
+        if is_tag { -place.eye[2] / Vec3::from(place.rows[2]).dot(ray) } else { range_m }
+    }
+
+    /// What a ray that enters at `range_m` meets: the true range, the face and the outer normal (camera frame).
+    pub(super) fn meet(&self, place: &Place, ray: &Vec3, range_m: f32) -> (f32, u16, Vec3) {
+        if let Self::Tag(board) = self {
+            let range_m = self.true_range(place, ray, range_m);
+            let point = place.point(ray, range_m);
+            let is_front = place.eye[2] > 0.0;
+            let face = if is_front { board.face(point.x, point.y) } else { super::tag::FACE_BACK };
+            let normal = Vec3::from(place.rows[2]) * if is_front { 1.0 } else { -1.0 };
+            return (range_m, face, normal);
+        }
+        let point = place.point(ray, range_m);
+        let (face, normal) = self.normal(&point);
+        (range_m, face, place.back(&normal))
+    }
+
+    /// Face and outer normal at a point of the surface, own frame.
+    fn normal(&self, p: &Vec3) -> (u16, Vec3) {
+        match self {
+            Self::Tag(_) => (0, Vec3::z()),
+            Self::Box { half } => {
+                let excess: [f32; 3] = std::array::from_fn(|i| p[i].abs() - half[i]);
+                let axis = (0..3).fold(0, |best, i| if excess[i] > excess[best] { i } else { best });
+                let mut normal = Vec3::zeros();
+                normal[axis] = p[axis].signum();
+                (axis as u16, normal)
+            }
+            Self::Cylinder { radius, half } => {
+                let aside = p.x.hypot(p.y);
+                if p.z.abs() - half > aside - radius {
+                    (1, Vec3::new(0.0, 0.0, p.z.signum()))
+                } else {
+                    (0, Vec3::new(p.x, p.y, 0.0) / aside.max(1e-9))
+                }
+            }
+            Self::Capsule { half, .. } => {
+                let from_axis = Vec3::new(p.x, p.y, p.z - p.z.clamp(-half, *half));
+                (0, from_axis / from_axis.norm().max(1e-9))
+            }
+            Self::Sphere { .. } => (0, p / p.norm().max(1e-9)),
+            Self::Hull { planes, .. } => {
+                let out = |i: usize| {
+                    let [a, b, c, d] = planes[i];
+                    a * p.x + b * p.y + c * p.z - d
+                };
+                let best = (0..planes.len()).fold(0, |best, i| if out(i) > out(best) { i } else { best });
+                let [a, b, c, _] = planes[best];
+                // Few bits: neighbours seldom share them.
+                ((best % 8) as u16, Vec3::new(a, b, c))
+            }
+        }
+    }
+}
+
+#[inline]
+fn enter_board<const N: usize>(half: f32, e: &[f32; 3], d: &Lanes<N>) -> [f32; N] {
+    let lift = if e[2] > 0.0 { super::tag::CLEAR_OF_BACKING_M } else { 0.0 };
+    std::array::from_fn(|k| {
+        let inverse = 1.0 / d[2][k];
+        let range = -e[2] * inverse;
+        let (x, y) = (e[0] + range * d[0][k], e[1] + range * d[1][k]);
+        let is_on = range > 0.0 && x.abs() <= half && y.abs() <= half;
+        let nearer = range - lift * inverse.abs();
+        if is_on { max(nearer, 1e-6) } else { f32::INFINITY }
+    })
+}
+
+#[inline]
+fn enter_box<const N: usize>(half: &[f32; 3], e: &[f32; 3], d: &Lanes<N>) -> [f32; N] {
+    std::array::from_fn(|k| {
+        let (mut near, mut far) = (f32::NEG_INFINITY, f32::INFINITY);
+        for i in 0..3 {
+            let inverse = 1.0 / d[i][k];
+            let (a, b) = ((-half[i] - e[i]) * inverse, (half[i] - e[i]) * inverse);
+            near = max(near, min(a, b));
+            far = min(far, max(a, b));
+        }
+        if near <= far && near > 0.0 { near } else { f32::INFINITY }
+    })
+}
+
+#[inline]
+fn enter_cylinder<const N: usize>(radius: f32, half: f32, e: &[f32; 3], d: &Lanes<N>) -> [f32; N] {
+    let c = e[0] * e[0] + e[1] * e[1] - radius * radius;
+    std::array::from_fn(|k| {
+        let a = max(d[0][k] * d[0][k] + d[1][k] * d[1][k], 1e-12);
+        let b = e[0] * d[0][k] + e[1] * d[1][k];
+        let root = b * b - a * c;
+        let width = max(root, 0.0).sqrt();
+        let inverse = 1.0 / d[2][k];
+        let (low, high) = ((-half - e[2]) * inverse, (half - e[2]) * inverse);
+        let near = max((-b - width) / a, min(low, high));
+        let far = min((-b + width) / a, max(low, high));
+        if root >= 0.0 && near <= far && near > 0.0 { near } else { f32::INFINITY }
+    })
+}
+
+#[inline]
+fn enter_sphere<const N: usize>(radius: f32, e: &[f32; 3], d: &Lanes<N>) -> [f32; N] {
+    let c = e[0] * e[0] + e[1] * e[1] + e[2] * e[2] - radius * radius;
+    std::array::from_fn(|k| {
+        let b = e[0] * d[0][k] + e[1] * d[1][k] + e[2] * d[2][k];
+        let root = b * b - c;
+        let near = -b - max(root, 0.0).sqrt();
+        if root >= 0.0 && near > 0.0 { near } else { f32::INFINITY }
+    })
+}
+
+#[inline]
+fn enter_capsule<const N: usize>(radius: f32, half: f32, e: &[f32; 3], d: &Lanes<N>) -> [f32; N] {
+    let c = e[0] * e[0] + e[1] * e[1] - radius * radius;
+    let below = enter_sphere(radius, &[e[0], e[1], e[2] + half], d);
+    let above = enter_sphere(radius, &[e[0], e[1], e[2] - half], d);
+    std::array::from_fn(|k| {
+        let a = max(d[0][k] * d[0][k] + d[1][k] * d[1][k], 1e-12);
+        let b = e[0] * d[0][k] + e[1] * d[1][k];
+        let root = b * b - a * c;
+        let near = (-b - max(root, 0.0).sqrt()) / a;
+        let z = e[2] + near * d[2][k];
+        let is_side = root >= 0.0 && near > 0.0 && z.abs() <= half;
+        min(if is_side { near } else { f32::INFINITY }, min(below[k], above[k]))
+    })
+}
+
+#[inline]
+fn enter_hull<const N: usize>(planes: &[[f32; 4]], e: &[f32; 3], d: &Lanes<N>) -> [f32; N] {
+    let (mut near, mut far) = ([f32::NEG_INFINITY; N], [f32::INFINITY; N]);
+    for [a, b, c, offset] in planes {
+        let out = a * e[0] + b * e[1] + c * e[2] - offset;
+        for k in 0..N {
+            let along = a * d[0][k] + b * d[1][k] + c * d[2][k];
+            let range = -out / along;
+            if along < 0.0 {
+                near[k] = max(near[k], range);
+            } else if along > 0.0 {
+                far[k] = min(far[k], range);
+            } else if out > 0.0 {
+                far[k] = f32::NEG_INFINITY;
+            }
+        }
+    }
+    std::array::from_fn(|k| if near[k] <= far[k] && near[k] > 0.0 { near[k] } else { f32::INFINITY })
+}

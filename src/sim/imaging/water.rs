@@ -1,0 +1,43 @@
+//! What the water does to light: `I = J exp(-bD z) + Binf (1 - exp(-bB z))` for each channel (Akkaynak and Treibitz 2018).
+//!
+//! Of absorption a and scattering b after Jerlov (1976): `bD = a + b`, what is left of a narrow beam. The veil closes in by
+//! `bB = 2 a + b` (assumed): its light has a way out, too, on which it is absorbed, while scattering is mostly forward. `Binf`
+//! is what lamps and sun send back from far away (`shade`).
+
+use super::Rgb;
+use crate::sim::spec::{ImageSpec, WaterKind};
+
+/// Coefficients for red, green and blue, 1/m.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Water {
+    pub direct_per_m: Rgb,
+    pub backscatter_per_m: Rgb,
+    /// Share of light scattered back for each metre and steradian.
+    pub in_scatter_per_m_sr: Rgb,
+    pub scatter_per_m: Rgb,
+}
+
+impl Water {
+    pub(super) fn new(spec: &ImageSpec) -> Self {
+        let (absorption, scatter) = jerlov(spec.water);
+        let scaled = |values: [f64; 3]| values.map(|value| (value * spec.turbidity) as f32);
+        let each = |f: &dyn Fn(usize) -> f64| std::array::from_fn(f);
+        let direct = spec.direct_per_m.unwrap_or_else(|| each(&|k| absorption[k] + scatter[k]));
+        let backscatter = spec.backscatter_per_m.unwrap_or_else(|| each(&|k| 2.0 * absorption[k] + scatter[k]));
+        Self {
+            direct_per_m: scaled(direct),
+            backscatter_per_m: scaled(backscatter),
+            in_scatter_per_m_sr: scaled(scatter.map(|b| b * spec.backscatter_per_sr)),
+            scatter_per_m: scaled(scatter),
+        }
+    }
+}
+
+/// Absorption and scattering, 1/m, for red, green and blue.
+fn jerlov(kind: WaterKind) -> ([f64; 3], [f64; 3]) {
+    match kind {
+        WaterKind::Clear => ([0.460, 0.062, 0.018], [0.001, 0.002, 0.004]),
+        WaterKind::Coastal => ([0.473, 0.071, 0.084], [0.415, 0.597, 0.874]),
+        WaterKind::Turbid => ([0.604, 0.272, 0.847], [1.96, 2.81, 4.11]),
+    }
+}
