@@ -2,10 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
+use nalgebra::{Isometry3, Matrix6};
 use serde::Deserialize;
 
+use super::camera::{CameraFile, check_camera};
 use super::error::{FileIssue, RobotError, parse_toml, read_text};
 use super::gripper::{GripperFile, GripperSpec};
+use super::gripper_tag::{GripperTag, GripperTagFile};
 use super::survey::{SurveyedTag, TagFile, TagSurvey, check_tags};
 use super::urdf::{LinkBody, UrdfModel};
 use super::vehicle::Vehicle;
@@ -29,6 +32,8 @@ pub struct Robot {
     pub tool: ToolSpec,
     /// Where the tool is a gripper that opens and closes.
     pub gripper: Option<GripperSpec>,
+    /// Where one is glued behind the camera.
+    pub gripper_tag: Option<GripperTag>,
     pub camera: CameraSpec,
     pub tags: Vec<SurveyedTag>,
     pub base_tag: u32,
@@ -133,10 +138,11 @@ impl Robot {
             let key = format!("stowed_rad.{}", self.name);
             self.stowed = check_stowed(&vehicle.file, &key, stowed_rad, self.n_joints())?;
         }
-        Ok(match &vehicle.survey {
-            Some(survey) => self.with_survey(survey.clone()),
-            None => self,
-        })
+        let Some(survey) = &vehicle.survey else { return Ok(self) };
+        if let Some(tag) = &self.gripper_tag {
+            tag.check_id(&vehicle.file, &survey.tags)?;
+        }
+        Ok(self.with_survey(survey.clone()))
     }
 
     /// The same arm with sensors `scale` times as far from a straight line.
@@ -145,6 +151,15 @@ impl Robot {
         for sensor in &mut self.sensors {
             sensor.linearity_std_rad *= scale;
         }
+        self
+    }
+
+    /// The same arm with its camera where it was found to hang, with the covariance of that (translation m, rotation rad).
+    #[must_use]
+    pub fn with_camera_at(mut self, link_from_camera: Isometry3<f64>, covariance: &Matrix6<f64>) -> Self {
+        let rms = |from: usize| ((0..3).map(|k| covariance[(from + k, from + k)]).sum::<f64>() / 3.0).max(0.0).sqrt();
+        self.camera.mount.link_from_frame = link_from_camera;
+        (self.camera.mount_std_m, self.camera.mount_std_rad) = (rms(0), rms(3));
         self
     }
 
@@ -184,6 +199,7 @@ struct RobotFile {
     buoyancy_fraction: f64,
     tool: ToolFile,
     gripper: Option<GripperFile>,
+    gripper_tag: Option<GripperTagFile>,
     joint_sensor: Vec<SensorFile>,
     camera: CameraFile,
     #[serde(default)]
@@ -224,22 +240,6 @@ fn usual_change() -> f64 {
     0.00035
 }
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct CameraFile {
-    name: String,
-    link: String,
-    model: String,
-    resolution_px: [u32; 2],
-    focal_px: [f64; 2],
-    center_px: [f64; 2],
-    distortion: [f64; 4],
-    max_view_angle_rad: f64,
-    corner_std_px: f64,
-    mount_std_m: f64,
-    mount_std_rad: f64,
-}
-
 fn usual_buoyancy() -> f64 {
     0.22
 }
@@ -252,7 +252,7 @@ pub fn load(folder: &Path) -> Result<Robot, RobotError> {
     let file = folder.join("robot.toml");
     let raw: RobotFile = parse_toml(&file, &read_text(&file)?)?;
     FileIssue::check_range(&file, "version", f64::from(raw.version), 1.0..=1.0)?;
-    let urdf = UrdfModel::read(&folder.join(&raw.urdf))?;
+    let urdf = UrdfModel::read(&drawing_file(folder, &raw.urdf))?;
     let chain = urdf.chain(&raw.base_link, &[&raw.tool.link, &raw.camera.link])?;
     let jaws = raw.gripper.as_ref().map(GripperFile::jaws).unwrap_or_default();
     let bodies = urdf.bodies(&raw.base_link, &chain, jaws)?;
@@ -267,6 +267,11 @@ pub fn load(folder: &Path) -> Result<Robot, RobotError> {
     let camera_mount = urdf.attachment(&raw.base_link, &raw.camera.link, &chain)?;
     let camera = check_camera(&file, raw.camera, camera_mount)?;
     let tags = check_tags(&file, &raw.tag, raw.base_tag, &Pose::<Base, Base>::identity())?;
+    let gripper_tag =
+        raw.gripper_tag.map(|tag| tag.check(&file, &urdf, &raw.base_link, &chain, &camera.mount)).transpose()?;
+    if let Some(tag) = &gripper_tag {
+        tag.check_id(&file, &tags)?;
+    }
     Ok(Robot {
         name: raw.name,
         folder: folder.to_owned(),
@@ -277,6 +282,7 @@ pub fn load(folder: &Path) -> Result<Robot, RobotError> {
         buoyancy_fraction: FileIssue::check_range(&file, "buoyancy_fraction", raw.buoyancy_fraction, 0.0..=0.95)?,
         tool: ToolSpec { mount: tool },
         gripper,
+        gripper_tag,
         base_tag: raw.base_tag,
         chain,
         bodies,
@@ -284,6 +290,16 @@ pub fn load(folder: &Path) -> Result<Robot, RobotError> {
         camera,
         tags,
     })
+}
+
+/// Where robot.toml says that the URDF is; beside it where it is not there, for a recording carries the two side by side.
+fn drawing_file(folder: &Path, urdf: &Path) -> PathBuf {
+    let named = folder.join(urdf);
+    let beside = urdf.file_name().map(|name| folder.join(name));
+    match beside {
+        Some(beside) if !named.is_file() && beside.is_file() => beside,
+        _ => named,
+    }
 }
 
 fn check_stowed(file: &Path, key: &str, angles_rad: &[f64], n_joints: usize) -> Result<JointAngles, RobotError> {
@@ -340,41 +356,4 @@ fn check_sensors(file: &Path, raw: &[SensorFile], chain: &Chain) -> Result<Vec<J
             })
         })
         .collect()
-}
-
-fn check_camera(file: &Path, raw: CameraFile, mount: Attachment) -> Result<CameraSpec, RobotError> {
-    if raw.model != "equidistant" {
-        let problem = format!("`{}` is not supported; use \"equidistant\" (Kannala-Brandt)", raw.model);
-        return Err(FileIssue::new(file, "camera.model", problem).into());
-    }
-    let check = |key: &str, value: f64, range| FileIssue::check_range(file, &format!("camera.{key}"), value, range);
-    for k in 0..2 {
-        check("resolution_px", f64::from(raw.resolution_px[k]), 16.0..=65536.0)?;
-        check("focal_px", raw.focal_px[k], 1.0..=1e6)?;
-        check("center_px", raw.center_px[k], -1e6..=1e6)?;
-    }
-    for value in raw.distortion {
-        check("distortion", value, -10.0..=10.0)?;
-    }
-    let max_view_angle_rad = check("max_view_angle_rad", raw.max_view_angle_rad, 0.1..=3.0)?;
-    let lens = Fisheye {
-        focal_px: raw.focal_px,
-        center_px: raw.center_px,
-        distortion: raw.distortion,
-        resolution_px: raw.resolution_px,
-        max_view_angle_rad,
-    };
-    if !lens.is_monotonic() {
-        let problem =
-            "the projected radius does not grow up to max_view_angle_rad; lower the angle or correct distortion";
-        return Err(FileIssue::new(file, "camera.distortion", problem).into());
-    }
-    Ok(CameraSpec {
-        name: raw.name,
-        mount,
-        lens,
-        corner_std_px: check("corner_std_px", raw.corner_std_px, 1e-3..=100.0)?,
-        mount_std_m: check("mount_std_m", raw.mount_std_m, 0.0..=1.0)?,
-        mount_std_rad: check("mount_std_rad", raw.mount_std_rad, 0.0..=1.0)?,
-    })
 }

@@ -4,10 +4,13 @@
 //! what stands around the arm, meshes as convex hulls. Everything here is known before the dive. As-built values live under `sim`, estimates
 //! under `calib`.
 
+mod camera;
 mod error;
 mod file;
 mod gripper;
+mod gripper_tag;
 mod hull;
+mod lamp;
 mod mesh;
 mod part;
 mod shape;
@@ -19,10 +22,12 @@ pub use error::{FileIssue, RobotError};
 pub(crate) use error::{parse_toml, read_text};
 pub use file::{CameraSpec, JointSensorSpec, Robot, SensorKind, ToolSpec, load};
 pub use gripper::{GripperSpec, Jaw};
+pub use gripper_tag::GripperTag;
 pub use hull::{Hull, HullError, MAX_HULL_POINTS};
+pub use lamp::VehicleLight;
 pub use part::{MAX_PARTS, Part};
 pub(crate) use part::{PartFile, check_parts};
 pub use shape::{PlacedShape, Shape, parry_pose};
-pub use survey::{SurveyedTag, TagSurvey};
+pub use survey::{BaseTagStd, MapKnowledge, SurveyedTag, TagSurvey};
 pub use urdf::{LinkBody, MAX_COLLISION_SHAPES, UrdfModel};
 pub use vehicle::{Vehicle, VehicleDynamics, load_vehicle};

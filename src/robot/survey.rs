@@ -9,14 +9,43 @@ use super::error::{FileIssue, RobotError};
 use super::part::check_place;
 use crate::spatial::{Base, Frame, Pose, Tag};
 
-/// A tag whose place is known by survey.
+/// A tag whose place is known by survey, or of which it is known only that it is there.
 #[derive(Clone, Debug)]
 pub struct SurveyedTag {
     pub id: u32,
     pub size_m: f64,
+    /// Where nothing is known of it, at best where a drawing has it.
     pub base_from_tag: Pose<Base, Tag>,
+    /// One sigma per axis; infinite where nothing is known of the tag's place.
     pub position_std_m: f64,
     pub rotation_std_rad: f64,
+}
+
+impl SurveyedTag {
+    /// Whether anything is known of its place.
+    #[must_use]
+    pub fn is_known(&self) -> bool {
+        self.position_std_m.is_finite() && self.rotation_std_rad.is_finite()
+    }
+}
+
+/// How much of a survey the arm may use.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum MapKnowledge {
+    /// Where every tag is.
+    #[default]
+    Known,
+    /// Where these and the base tag are; of the others that they are there, and how large.
+    Partly(Vec<u32>),
+    /// Where the base tag is.
+    Unknown,
+}
+
+/// How well the base tag's place is known, where that differs from its file.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct BaseTagStd {
+    pub position_std_m: Option<f64>,
+    pub rotation_std_rad: Option<f64>,
 }
 
 /// All tags around an arm.
@@ -39,6 +68,29 @@ impl TagSurvey {
         let base_tag = if ids.contains(&self.base_tag) { self.base_tag } else { ids[0] };
         let tags = self.tags.iter().filter(|tag| ids.contains(&tag.id)).cloned().collect();
         Ok(Self { base_tag, tags })
+    }
+}
+
+impl TagSurvey {
+    /// The survey as far as `knowledge` goes: all else of the tags' places is forgotten but the drawing.
+    pub(crate) fn knowing(mut self, knowledge: &MapKnowledge, base: BaseTagStd) -> Result<Self, String> {
+        let known: &[u32] = match knowledge {
+            MapKnowledge::Partly(known) => known,
+            MapKnowledge::Known | MapKnowledge::Unknown => &[],
+        };
+        if let Some(id) = known.iter().find(|id| self.tags.iter().all(|tag| tag.id != **id)) {
+            let ids: Vec<u32> = self.tags.iter().map(|tag| tag.id).collect();
+            return Err(format!("tag {id} is none of {ids:?}"));
+        }
+        for tag in &mut self.tags {
+            if tag.id == self.base_tag {
+                tag.position_std_m = base.position_std_m.unwrap_or(tag.position_std_m);
+                tag.rotation_std_rad = base.rotation_std_rad.unwrap_or(tag.rotation_std_rad);
+            } else if *knowledge != MapKnowledge::Known && !known.contains(&tag.id) {
+                (tag.position_std_m, tag.rotation_std_rad) = (f64::INFINITY, f64::INFINITY);
+            }
+        }
+        Ok(self)
     }
 }
 

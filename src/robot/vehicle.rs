@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::error::{FileIssue, RobotError, parse_toml, read_text};
+use super::lamp::{LampFile, VehicleLight};
 use super::part::{Part, PartFile, check_parts, check_place};
 use super::survey::{TagFile, TagSurvey, check_tags};
 use crate::spatial::{Base, Pose, Vehicle as VehicleFrame};
@@ -20,6 +21,7 @@ pub struct Vehicle {
     pub parts: Vec<Part>,
     /// The tags that it carries; `None` where those of the robot's own file hold.
     pub survey: Option<TagSurvey>,
+    pub lights: Vec<VehicleLight>,
     /// By the robot's name: the angles that it starts from on this vehicle, instead of its own.
     pub stowed_rad: BTreeMap<String, Vec<f64>>,
     /// What a vehicle needs that floats free; `None` where the file has none.
@@ -80,6 +82,8 @@ struct VehicleFile {
     dynamics: Option<VehicleDynamics>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     tag: Vec<TagFile>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    light: Vec<LampFile>,
     part: Vec<PartFile>,
 }
 
@@ -108,6 +112,7 @@ pub fn load_vehicle(file: &Path) -> Result<Vehicle, RobotError> {
         dynamics.check(file)?;
     }
     let survey = check_survey(file, &raw, &mount)?;
+    let lights = raw.light.iter().enumerate().map(|(n, light)| light.check(file, n)).collect::<Result<_, _>>()?;
     let (parts, plain) = check_parts(&raw.part, file, "part")?;
     if raw.part.iter().any(PartFile::is_mesh) {
         raw.part = plain;
@@ -121,6 +126,7 @@ pub fn load_vehicle(file: &Path) -> Result<Vehicle, RobotError> {
         vehicle_from_base: mount,
         parts,
         survey,
+        lights,
         stowed_rad: raw.stowed_rad,
         dynamics: raw.dynamics,
         text,

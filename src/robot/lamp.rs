@@ -1,0 +1,54 @@
+//! `[[light]]` of a vehicle's file: lamps for the cameras.
+
+use std::path::Path;
+
+use nalgebra::{Point3, Unit, Vector3};
+use serde::{Deserialize, Serialize};
+
+use super::error::FileIssue;
+use super::part::check_place;
+
+/// A white lamp on a vehicle, in the vehicle's frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct VehicleLight {
+    pub name: String,
+    pub position_m: Point3<f64>,
+    pub direction: Unit<Vector3<f64>>,
+    pub flux_lm: f64,
+    /// From the beam's axis to where it has half its intensity.
+    pub half_angle_rad: f64,
+}
+
+#[derive(Clone, Debug, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct LampFile {
+    name: String,
+    position_m: [f64; 3],
+    direction: [f64; 3],
+    flux_lm: f64,
+    half_angle_rad: f64,
+}
+
+impl LampFile {
+    /// The `n`th of the list, checked.
+    ///
+    /// # Errors
+    /// [`FileIssue`] naming file, key and allowed range.
+    pub(super) fn check(&self, file: &Path, n: usize) -> Result<VehicleLight, FileIssue> {
+        let at = |key: &str| format!("light[{n}].{key}");
+        let check = |key: &str, value: f64, range| FileIssue::check_range(file, &at(key), value, range);
+        check_place(file, &at("position_m"), &self.position_m)?;
+        for value in self.direction {
+            check("direction", value, -1e3..=1e3)?;
+        }
+        let direction = Unit::try_new(Vector3::from(self.direction), 1e-6)
+            .ok_or_else(|| FileIssue::new(file, at("direction"), "has no direction"))?;
+        Ok(VehicleLight {
+            name: self.name.clone(),
+            position_m: Point3::from(self.position_m),
+            direction,
+            flux_lm: check("flux_lm", self.flux_lm, 0.0..=1e7)?,
+            half_angle_rad: check("half_angle_rad", self.half_angle_rad, 0.02..=3.0)?,
+        })
+    }
+}
