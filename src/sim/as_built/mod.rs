@@ -24,6 +24,9 @@ pub struct AsBuilt {
     /// `link_from_camera` on the link that carries the camera.
     pub camera_mount: PlainPose,
     pub tags: Vec<TagAsBuilt>,
+    /// `link_from_tag` of the tag on the gripper.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gripper_tag: Option<PlainPose>,
     #[serde(default, skip_serializing_if = "GaugesAsBuilt::is_exact")]
     pub gauges: GaugesAsBuilt,
     #[serde(default, skip_serializing_if = "AttitudeAsBuilt::is_exact")]
@@ -61,11 +64,18 @@ impl AsBuilt {
             Pose::from_isometry(robot.camera.mount.link_from_frame).perturbed(&mount_error);
         let tags = robot.tags.iter().map(|tag| {
             let stream = format!("as_built/tag/{}", tag.id);
-            let error = normal_twist(seed, &stream, spec.tags.survey_std_m, spec.tags.survey_std_rad);
+            let (std_m, std_rad) = spec.tags.survey_std(tag.id == robot.base_tag);
+            let error = normal_twist(seed, &stream, std_m, std_rad);
             TagAsBuilt { id: tag.id, size_m: tag.size_m, pose: PlainPose::of(&tag.base_from_tag.perturbed(&error)) }
+        });
+        let gripper_tag = robot.gripper_tag.map(|tag| {
+            let (std_m, std_rad) = spec.tags.gripper_std();
+            let error = normal_twist(seed, "as_built/gripper_tag", std_m, std_rad);
+            PlainPose::of(&Pose::<Link, Tag>::from_isometry(tag.mount.link_from_frame).perturbed(&error))
         });
         Self {
             joints,
+            gripper_tag,
             camera_mount: PlainPose::of(&link_from_camera),
             tags: tags.collect(),
             gauges: GaugesAsBuilt::draw(spec, seed),
@@ -79,6 +89,13 @@ impl AsBuilt {
     pub(super) fn camera_attachment(&self, robot: &Robot) -> Attachment {
         let link_from_camera: Pose<Link, Camera> = self.camera_mount.to_pose();
         Attachment { n_joints: robot.camera.mount.n_joints, link_from_frame: *link_from_camera.isometry() }
+    }
+
+    /// Where the tag on the gripper truly is, on the link that carries it.
+    pub(super) fn gripper_tag_attachment(&self, robot: &Robot) -> Option<Attachment> {
+        let link_from_tag: Pose<Link, Tag> = self.gripper_tag?.to_pose();
+        let n_joints = robot.gripper_tag?.mount.n_joints;
+        Some(Attachment { n_joints, link_from_frame: *link_from_tag.isometry() })
     }
 }
 

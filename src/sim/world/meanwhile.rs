@@ -50,8 +50,8 @@ impl World {
         }
         self.water = self.sea.at(t_s);
         self.n_images = (t_s * self.spec.camera.rate_hz + 1e-9).floor() as u64;
-        while let Some((arrival, image)) = self.images.pop_front() {
-            self.outbox.push((arrival.min(now), Message::Detections(image)));
+        while let Some(image) = self.images.pop_front() {
+            self.deliver(image.arrival.min(now), image);
         }
         self.warm(t_s, STRIDE_S);
         let around = surroundings(&self.spec, &self.temperatures, t_s, self.depth_m());

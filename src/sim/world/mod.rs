@@ -1,6 +1,7 @@
 //! The world: arm, vehicle, water and sensors in step.
 
 mod faults;
+mod images;
 mod jaws;
 mod meanwhile;
 mod setup;
@@ -22,7 +23,7 @@ use super::joint_load::JointLoad;
 use super::physics::{ArmPhysics, Drive, PhysicsInput};
 use super::places::BodyPoses;
 use super::sensors::attitude::AttitudeSensor;
-use super::sensors::camera::{ArmMotion, CameraInput, WristCamera};
+use super::sensors::camera::{CameraInput, Exposed, RenderInput, WristCamera};
 use super::sensors::joint::JointSensor;
 use super::sensors::temperatures::Temperatures;
 use super::sensors::thermometer::SlowSensors;
@@ -33,9 +34,7 @@ use super::vehicle::{BaseState, FreeVehicle, Sea, VehicleMotion, WaterMotion};
 use crate::robot::{Robot, Vehicle};
 use crate::routine::Scene;
 use crate::spatial::Pose;
-use crate::streams::{
-    Arm, ArmError, JointCounts, JointSensorSample, MAX_JOINTS, Message, Sink, TagDetections, Thermometer,
-};
+use crate::streams::{Arm, ArmError, JointCounts, JointSensorSample, MAX_JOINTS, Message, Sink, Thermometer};
 use crate::time::{SIMULATION_EPOCH, Stamp};
 
 const ATTITUDE_PERIODS: u64 = 5;
@@ -79,8 +78,10 @@ pub struct World {
     attitude: AttitudeSensor,
     camera: WristCamera,
     contacts: ContactWatch,
-    /// Images under way, with their time of arrival; the line keeps their order.
-    images: VecDeque<(Stamp, TagDetections)>,
+    /// Images under way; the line keeps their order.
+    images: VecDeque<Exposed>,
+    /// Somebody waits for images.
+    is_looked: bool,
     n_images: u64,
     outbox: Vec<(Stamp, Message)>,
     measured: JointCounts,
@@ -129,13 +130,16 @@ impl World {
         hydraulics.balance(&angles, &physics.static_torques(&base.gravity, &angles));
         let sea = Sea::new(&spec.water, seed);
         let measured = sample_pots(&mut pots, &angles, &around, 0.0);
+        let mut camera = WristCamera::new(&CameraInput { robot, built: &built, solids: &solids, spec: &spec, seed });
+        camera.render(&RenderInput { robot, vehicle, scene, spec: &spec, seed })?;
         Ok(Self {
             controller: Controller::new(&spec.hydraulics, &robot.sensors, &gear_ratios, &measured),
             slow: SlowSensors::new(&spec.temperature, &spec.water, &built.gauges, seed),
             attitude: AttitudeSensor::new(&spec.vehicle, &built.attitude, seed),
-            camera: WristCamera::new(&CameraInput { robot, built: &built, solids: &solids, spec: &spec, seed }),
+            camera,
             contacts: ContactWatch::new(solids.pairs(), step_s),
             images: VecDeque::new(),
+            is_looked: false,
             n_images: 0,
             outbox: Vec::with_capacity(16),
             gripper: robot.gripper.as_ref().map(|gripper| Gripper::new(gripper, spec.hydraulics.valve_lag_s)),
@@ -216,7 +220,7 @@ impl World {
         let next_image_s = (self.n_images + 1) as f64 / self.spec.camera.rate_hz;
         if self.time_s() >= next_image_s - 1e-9 {
             self.n_images += 1;
-            self.expose();
+            self.expose()?;
         }
         Ok(())
     }
@@ -233,16 +237,6 @@ impl World {
         Ok(())
     }
 
-    fn expose(&mut self) {
-        let links = self.place_solids();
-        let exposure = self.stamp();
-        let motion = ArmMotion { chain: &self.robot.chain, angles: self.physics.angles(), rates: self.physics.rates() };
-        let (arrival, image) = self.camera.expose(&links, &self.solids, &motion, exposure);
-        // It never arrives before the image ahead of it.
-        let arrival = self.images.back().map_or(arrival, |(ahead, _)| arrival.max(*ahead));
-        self.images.push_back((arrival, image));
-    }
-
     fn place_solids(&mut self) -> BodyPoses {
         let links = self.physics.poses();
         self.solids.place(&links, self.base.world_from_base.inverse().isometry());
@@ -253,8 +247,8 @@ impl World {
     fn collect_messages(&mut self) {
         let (now, t_s) = (self.stamp(), self.time_s());
         let period = self.step / self.spec.steps_per_period();
-        while let Some((arrival, image)) = self.images.pop_front_if(|(arrival, _)| *arrival <= now) {
-            self.outbox.push((arrival, Message::Detections(image)));
+        while let Some(image) = self.images.pop_front_if(|image| image.arrival <= now) {
+            self.deliver(image.arrival, image);
         }
         self.warm(t_s, CONTROL_PERIOD_S);
         let around = surroundings(&self.spec, &self.temperatures, t_s, self.depth_m());
@@ -376,6 +370,10 @@ impl Arm for World {
 
     fn idle(&mut self, seconds: f64, sink: &mut dyn Sink) -> Result<(), ArmError> {
         self.rest(seconds, sink)
+    }
+
+    fn look(&mut self, is_wanted: bool) {
+        self.is_looked = is_wanted;
     }
 
     fn grip(&mut self, opening: f64) -> Result<(), ArmError> {

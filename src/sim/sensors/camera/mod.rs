@@ -7,6 +7,8 @@
 
 mod eye;
 mod port;
+mod rendered;
+mod scenery;
 mod view;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -17,18 +19,24 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use crate::kinematics::{Attachment, Chain};
+use crate::optics::CornerNoise;
 use crate::robot::Robot;
 use crate::sim::as_built::AsBuilt;
+use crate::sim::error::SimError;
+use crate::sim::imaging::TagPlane;
 use crate::sim::places::BodyPoses;
 use crate::sim::solids::Solids;
-use crate::sim::spec::{CameraWorldSpec, ClockSpec, WorldSpec};
+use crate::sim::spec::{CameraMode, CameraWorldSpec, ClockSpec, CornerNoiseKind, WaterKind, WorldSpec};
 use crate::stats::stream_rng;
-use crate::streams::{JointAngles, TagDetection, TagDetections};
+use crate::streams::{DetectionReject, JointAngles, TagDetection, TagDetections};
 use crate::time::{SIMULATION_EPOCH, Stamp};
 use eye::Eye;
-use view::{Sight, TagInBase};
+pub(in crate::sim) use rendered::RenderInput;
+use rendered::{Read, Rendered, Scenario};
+pub(in crate::sim) use scenery::Places;
+use view::{Sight, TagInBase, TagOnLink};
 
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(in crate::sim) struct WristCamera {
     spec: CameraWorldSpec,
     clock: ClockSpec,
@@ -37,6 +45,7 @@ pub(in crate::sim) struct WristCamera {
     mount: Attachment,
     /// As built, by id.
     tags: Vec<TagInBase>,
+    gripper_tag: Option<TagOnLink>,
     /// Shapes that cannot hide anything, for they hold the camera.
     housing: Vec<usize>,
     /// By id: those that fell off.
@@ -45,10 +54,31 @@ pub(in crate::sim) struct WristCamera {
     misread: BTreeMap<u32, u32>,
     /// Nothing is seen before this.
     blind_until: Option<Stamp>,
-    corner_noise: ChaCha8Rng,
-    misses: ChaCha8Rng,
+    /// In place of the standard noise.
+    fitted: Option<CornerNoise>,
+    draws: TagDraws,
+    /// The tag on the gripper has streams of its own: it moves no other's noise.
+    gripper_draws: TagDraws,
     jitter: ChaCha8Rng,
     wrong_ids: ChaCha8Rng,
+    /// Where detections come from pixels.
+    rendered: Option<Box<Rendered>>,
+}
+
+/// What happens to a tag in one image.
+#[derive(Clone, Debug)]
+struct TagDraws {
+    corner_noise: ChaCha8Rng,
+    misses: ChaCha8Rng,
+}
+
+impl TagDraws {
+    /// A uniform number for whether the detector misses the tag, and the noise of its corners in standard deviations.
+    fn draw(&mut self) -> (f64, [Vector2<f64>; 4]) {
+        let luck = self.misses.random_range(0.0..1.0);
+        let noise = [(); 4].map(|()| Vector2::from_fn(|_, _| StandardNormal.sample(&mut self.corner_noise)));
+        (luck, noise)
+    }
 }
 
 /// What the camera is made from.
@@ -70,6 +100,27 @@ pub(in crate::sim) struct ArmMotion<'a> {
     pub rates: JointAngles,
 }
 
+/// When the shutter closes.
+#[derive(Clone, Copy)]
+pub(in crate::sim) struct Moment<'a> {
+    pub places: Places<'a>,
+    /// Placed for it.
+    pub solids: &'a Solids,
+    pub motion: ArmMotion<'a>,
+    pub closed: Stamp,
+    /// Whether somebody waits for images.
+    pub is_wanted: bool,
+}
+
+/// An image as it arrives.
+#[derive(Clone, Debug)]
+pub(in crate::sim) struct Exposed {
+    pub arrival: Stamp,
+    pub detections: TagDetections,
+    pub rejects: Vec<DetectionReject>,
+    pub jpeg: Option<Vec<u8>>,
+}
+
 impl WristCamera {
     pub(in crate::sim) fn new(input: &CameraInput) -> Self {
         let CameraInput { robot, built, solids, spec, seed } = *input;
@@ -85,15 +136,39 @@ impl WristCamera {
             eye: Eye::new(&robot.camera.lens, built, &spec.camera),
             mount: built.camera_attachment(robot),
             tags,
+            gripper_tag: robot.gripper_tag.zip(built.gripper_tag_attachment(robot)).map(|(tag, mount)| TagOnLink {
+                id: tag.id,
+                size_m: tag.size_m,
+                mount,
+            }),
             housing: solids.housing(robot),
             lost: BTreeSet::new(),
             misread: BTreeMap::new(),
             blind_until: None,
-            corner_noise: stream_rng(seed, "camera/corners"),
-            misses: stream_rng(seed, "camera/misses"),
+            fitted: fitted_noise(spec),
+            draws: TagDraws {
+                corner_noise: stream_rng(seed, "camera/corners"),
+                misses: stream_rng(seed, "camera/misses"),
+            },
+            gripper_draws: TagDraws {
+                corner_noise: stream_rng(seed, "camera/gripper_tag/corners"),
+                misses: stream_rng(seed, "camera/gripper_tag/misses"),
+            },
             jitter: stream_rng(seed, "camera/clock"),
             wrong_ids: stream_rng(seed, "camera/wrong_ids"),
+            rendered: None,
         }
+    }
+
+    /// Renders from now on if the world says so.
+    ///
+    /// # Errors
+    /// [`SimError`] where there is no light, or no detector.
+    pub(in crate::sim) fn render(&mut self, input: &RenderInput) -> Result<(), SimError> {
+        if input.spec.camera.mode == CameraMode::Rendered {
+            self.rendered = Some(Box::new(Rendered::new(input, &self.eye)?));
+        }
+        Ok(())
     }
 
     /// Where the camera truly is.
@@ -123,6 +198,56 @@ impl WristCamera {
         self.blind_until = Some(until);
     }
 
+    /// Takes an image; `None` where none is due.
+    ///
+    /// # Errors
+    /// [`SimError`] when the detector or the compression fails.
+    pub(in crate::sim) fn take(&mut self, moment: &Moment) -> Result<Option<Exposed>, SimError> {
+        let Moment { places, solids, motion, closed, is_wanted } = *moment;
+        let Some(mut rendered) = self.rendered.take() else {
+            let (arrival, detections) = self.expose(places.links, solids, &motion, closed);
+            return Ok(Some(Exposed { arrival, detections, rejects: Vec::new(), jpeg: None }));
+        };
+        let read = if rendered.is_due(is_wanted, closed) {
+            self.shoot(&mut rendered, &places, &motion, closed).map(Some)
+        } else {
+            Ok(None)
+        };
+        self.rendered = Some(rendered);
+        Ok(read?.map(|Read { tags, rejects, jpeg }| {
+            let (arrival, stamp) = self.stamps(closed);
+            Exposed { arrival, detections: TagDetections { stamp, tags }, rejects, jpeg }
+        }))
+    }
+
+    fn shoot(
+        &self,
+        rendered: &mut Rendered,
+        places: &Places,
+        motion: &ArmMotion,
+        closed: Stamp,
+    ) -> Result<Read, SimError> {
+        let now = self.base_from_camera(places.links);
+        let path =
+            |body: usize| self.before(&now, motion, body).map_or([now; 3], |[start, middle]| [start, middle, now]);
+        let base_from_camera = path(0);
+        // What is on a body stood to the camera at each instant as it would have stood to a camera on that path.
+        let carried = |body: usize| {
+            let seen_from = path(body);
+            std::array::from_fn(|k| base_from_camera[k] * seen_from[k].inverse())
+        };
+        let on_gripper = self.gripper_tag.map_or([Isometry3::identity(); 3], |tag| carried(tag.mount.n_joints));
+        let plane = |(i, tag): (usize, TagInBase)| {
+            let id = self.misread.get(&tag.id).copied().unwrap_or(tag.id);
+            let moved = if i < self.tags.len() { [Isometry3::identity(); 3] } else { on_gripper };
+            let base_from_tag = moved.map(|moved| moved * tag.base_from_tag);
+            (!self.lost.contains(&tag.id)).then_some(TagPlane { id, size_m: tag.size_m, base_from_tag })
+        };
+        let tags: Vec<TagPlane> = self.tags_at(places.links).into_iter().enumerate().filter_map(plane).collect();
+        let is_silty = self.blind_until.is_some_and(|until| closed < until);
+        rendered.shoot(&Scenario { base_from_camera, tags: &tags, places: *places, is_silty }, &carried, closed)
+    }
+
     /// Takes an image whose shutter closes at `closed`; `solids` must be placed for `links`. Gives the time of its arrival,
     /// late with jitter, and the image, whose stamp is that by the camera's own clock.
     pub(in crate::sim) fn expose(
@@ -133,23 +258,28 @@ impl WristCamera {
         closed: Stamp,
     ) -> (Stamp, TagDetections) {
         let base_from_camera = self.base_from_camera(links);
-        let before = self.before(&base_from_camera, motion);
+        let before = self.before(&base_from_camera, motion, 0);
+        let before_gripper =
+            self.gripper_tag.and_then(|tag| self.before(&base_from_camera, motion, tag.mount.n_joints));
         let mut tags = Vec::new();
         let is_blind = self.blind_until.is_some_and(|until| closed < until);
-        for i in 0..self.tags.len() {
-            let tag = self.tags[i];
+        let n_standing = self.tags.len();
+        for (i, tag) in self.tags_at(links).into_iter().enumerate() {
             // Every tag takes its share of the random streams, seen or not: one more tag in view moves no other's noise.
-            let is_missed = self.misses.random_range(0.0..1.0) < self.spec.miss_probability;
-            let noise: [Vector2<f64>; 4] = std::array::from_fn(|_| self.corner_normal());
-            let id = self.read_id(tag.id);
+            let is_standing = i < n_standing;
+            let draws = if is_standing { &mut self.draws } else { &mut self.gripper_draws };
+            let (luck, noise) = draws.draw();
+            let is_missed = self.fitted.is_none() && luck < self.spec.miss_probability;
+            let id = if is_standing { self.read_id(tag.id) } else { tag.id };
+            let before = if is_standing { &before } else { &before_gripper };
             if is_missed || is_blind || self.lost.contains(&tag.id) {
                 continue;
             }
-            let sight = Sight { spec: &self.spec, eye: &self.eye, solids, housing: &self.housing };
+            let fitted = self.fitted.as_ref();
+            let sight = Sight { spec: &self.spec, eye: &self.eye, solids, housing: &self.housing, fitted };
             let seen = sight.view(&tag, &base_from_camera);
             let Some(view) = seen.and_then(|view| sight.smeared(view, &tag, before.as_ref())) else { continue };
-            let std_px = view.corner_std_px(&self.spec);
-            let noisy: [Vector2<f64>; 4] = std::array::from_fn(|k| view.corners_px[k] + std_px * noise[k]);
+            let Some(noisy) = view.detected(&sight, luck, &noise) else { continue };
             if noisy.iter().all(|pixel| self.eye.contains(pixel)) {
                 let corners_px = noisy.map(Into::into);
                 tags.push(TagDetection { id, corners_px, decision_margin: view.decision_margin() });
@@ -157,14 +287,32 @@ impl WristCamera {
         }
         // A detector lists what it read.
         tags.sort_by_key(|tag| tag.id);
+        let (arrival, stamp) = self.stamps(closed);
+        (arrival, TagDetections { stamp, tags })
+    }
+
+    /// When an image arrives, late with jitter, and its stamp by the camera's own clock.
+    fn stamps(&mut self, closed: Stamp) -> (Stamp, Stamp) {
         let jitter: f64 = StandardNormal.sample(&mut self.jitter);
         let late_s = (self.clock.camera_latency_s + self.clock.camera_jitter_s * jitter).max(0.0);
         let gained_s = 1e-6 * self.clock.camera_clock_drift_ppm * closed.since_s(SIMULATION_EPOCH);
-        (closed.plus_s(late_s), TagDetections { stamp: closed.plus_s(late_s + gained_s), tags })
+        (closed.plus_s(late_s), closed.plus_s(late_s + gained_s))
     }
 
-    /// Where the camera was when the shutter opened, and halfway, if it takes its time. The joints' rates hold meanwhile.
-    fn before(&self, base_from_camera: &Isometry3<f64>, motion: &ArmMotion) -> Option<[Isometry3<f64>; 2]> {
+    /// All tags in the base frame for links as they are now: those around the arm by id, fallen ones among them, then that on
+    /// the gripper.
+    fn tags_at(&self, links: &BodyPoses) -> Vec<TagInBase> {
+        self.tags.iter().copied().chain(self.gripper_tag.map(|tag| tag.at(links))).collect()
+    }
+
+    /// Where the camera was when the shutter opened, and halfway, if it takes its time: as a tag on `body` (0: the base) saw it, by
+    /// where that body is now. The joints' rates hold meanwhile.
+    fn before(
+        &self,
+        base_from_camera: &Isometry3<f64>,
+        motion: &ArmMotion,
+        body: usize,
+    ) -> Option<[Isometry3<f64>; 2]> {
         let exposure_s = self.spec.exposure_s;
         if exposure_s <= 0.0 {
             return None;
@@ -173,7 +321,8 @@ impl WristCamera {
         // By the drawing, relative to the drawing's end: the camera itself is where the bodies are.
         let drawn = |earlier_s: f64| {
             let then = JointAngles::from_fn(angles.len(), |j| angles[j] - earlier_s * rates[j]);
-            chain.link_poses(&then).frame(&self.mount)
+            let poses = chain.link_poses(&then);
+            poses.link(body).inverse() * poses.frame(&self.mount)
         };
         let from_end = base_from_camera * drawn(0.0).inverse();
         Some([from_end * drawn(exposure_s), from_end * drawn(0.5 * exposure_s)])
@@ -191,10 +340,15 @@ impl WristCamera {
         let other = self.tags.iter().map(|tag| tag.id).filter(|other| *other != id).nth(pick);
         if is_wrong { other.unwrap_or(known) } else { known }
     }
+}
 
-    fn corner_normal(&mut self) -> Vector2<f64> {
-        Vector2::from_fn(|_, _| StandardNormal.sample(&mut self.corner_noise))
-    }
+/// What detections in the world's kind of water were measured to be like, if the world asks for it.
+fn fitted_noise(spec: &WorldSpec) -> Option<CornerNoise> {
+    (spec.camera.noise == CornerNoiseKind::Fitted).then_some(match spec.image.water {
+        WaterKind::Clear => CornerNoise::CLEAR,
+        WaterKind::Coastal => CornerNoise::COASTAL,
+        WaterKind::Turbid => CornerNoise::TURBID,
+    })
 }
 
 #[cfg(test)]

@@ -10,6 +10,8 @@ use crate::robot::{load, load_vehicle};
 use crate::routine::Scene;
 use crate::sim::spec::PortKind;
 
+mod rendered;
+
 struct Site {
     robot: Robot,
     built: AsBuilt,
@@ -75,6 +77,44 @@ fn an_instant_shows_where_the_corners_are() {
     for tag in &image.tags {
         assert!(largest_px(&tag.corners_px, &site.drawn_corners(tag.id, 0.0, 0.0)) < 1e-9);
     }
+}
+
+/// The tag on the gripper is where the last joint carries it, is hidden by the wrist behind it, and moves no other tag's noise.
+#[test]
+fn the_tag_on_the_gripper_turns_with_the_last_joint_until_the_wrist_hides_it() {
+    let mut with = site(|spec| spec.camera.corner_noise_px = 0.3);
+    let without = with.image(&mut with.camera(), 0.0, 1.0).1;
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots");
+    with.robot.gripper_tag = load(&root.join("titan4-gripper-tag")).expect("it reads").gripper_tag;
+    with.built = AsBuilt::draw(&with.robot, &with.spec, 4);
+    let tag = with.robot.gripper_tag.expect("a tag");
+    let built = with.built.gripper_tag_attachment(&with.robot).expect("a tag");
+    assert!((built.link_from_frame.translation.vector - tag.mount.link_from_frame.translation.vector).norm() < 0.003);
+    let image = with.image(&mut with.camera(), 0.0, 1.0).1;
+    let others: Vec<_> = image.tags.iter().filter(|seen| seen.id != tag.id).cloned().collect();
+    assert_eq!(others, without.tags);
+
+    with.spec.camera.corner_noise_px = 0.0;
+    let mut seen_at = Vec::new();
+    for degrees in (-180..180).step_by(10) {
+        let turn_rad = f64::from(degrees).to_radians();
+        let angles = JointAngles::from_fn(6, |j| if j == 5 { turn_rad } else { with.robot.stowed[j] });
+        let poses = with.robot.chain.link_poses(&angles);
+        with.links = BodyPoses::drawn(6, &poses);
+        with.solids.place(&with.links, &Isometry3::identity());
+        let image = with.image(&mut with.camera(), 0.0, 1.0).1;
+        let Some(seen) = image.tags.iter().find(|seen| seen.id == tag.id) else { continue };
+        let camera_from_tag = with.built.camera_attachment(&with.robot);
+        let camera_from_tag = poses.frame(&camera_from_tag).inverse() * poses.frame(&built);
+        let corners = square_corners(tag.size_m)
+            .map(|corner| with.robot.camera.lens.project(&(camera_from_tag * corner).coords).expect("in view"));
+        assert!(largest_px(&seen.corners_px, &corners) < 1e-9);
+        seen_at.push(degrees);
+    }
+    let (first, last) = (seen_at[0], seen_at[seen_at.len() - 1]);
+    eprintln!("seen from {first} to {last} deg");
+    assert!((-100..=-60).contains(&first) && (50..=100).contains(&last), "{seen_at:?}");
+    assert_eq!(seen_at.len() as i32, (last - first) / 10 + 1, "without a gap");
 }
 
 /// Against the mean over 2000 instants of the same motion; it lags by half of the exposure.
@@ -277,4 +317,43 @@ fn ports_keep_the_focal_length_near_the_axis() {
     assert!(bent.iter().all(|px| (0.1..20.0).contains(px)), "{bent:?}");
     let centred = |spec: &mut CameraWorldSpec| spec.port = PortKind::Dome;
     assert_eq!(shift(&centred, 0.7, 1.0), 0.0);
+}
+
+/// Squared errors in units of the model's covariance are chi-square of 2 degrees, and tags are found as often as it says.
+#[test]
+fn fitted_noise_and_misses_are_those_of_the_model() {
+    let site = site(|spec| spec.camera.noise = CornerNoiseKind::Fitted);
+    let mut camera = site.camera();
+    let standing = site.built.camera_attachment(&site.robot);
+    let base_from_camera = site.robot.chain.link_poses(&site.robot.stowed).frame(&standing);
+    let model = CornerNoise::CLEAR;
+    let (mut squares, mut n_found, n_images) = (Vec::new(), BTreeMap::<u32, u32>::new(), 500);
+    for image in 0..n_images {
+        for tag in site.image(&mut camera, 0.0, f64::from(image)).1.tags {
+            *n_found.entry(tag.id).or_default() += 1;
+            let truth = site.drawn_corners(tag.id, 0.0, 0.0);
+            let built = site.built.tags.iter().find(|built| built.id == tag.id).expect("a known tag");
+            let to_tag = base_from_camera.inverse() * built.base_from_tag().isometry();
+            let range_m = to_tag.translation.vector.norm();
+            let covariances = model.covariances_px2(&truth.map(Into::into), range_m, 0.0);
+            for ((corner, truth), covariance) in tag.corners_px.iter().zip(truth).zip(covariances) {
+                let error = Vector2::from(*corner) - truth;
+                let inverse = covariance.try_inverse().expect("regular");
+                squares.push((error.transpose() * inverse * error).x);
+            }
+        }
+    }
+    // Variance 4 each.
+    let mean = squares.iter().sum::<f64>() / squares.len() as f64;
+    assert!((mean - 2.0).abs() < 5.0 * 2.0 / (squares.len() as f64).sqrt(), "{mean} of {}", squares.len());
+    for (id, n) in n_found {
+        let truth = site.drawn_corners(id, 0.0, 0.0);
+        let side_px = (0..4).map(|k| (truth[k] - truth[(k + 1) % 4]).norm()).fold(f64::INFINITY, f64::min);
+        let built = site.built.tags.iter().find(|built| built.id == id).expect("a known tag");
+        let range_m = (base_from_camera.inverse() * built.base_from_tag().isometry()).translation.vector.norm();
+        let chance = model.chance.of(side_px, range_m);
+        let std = (chance * (1.0 - chance) / f64::from(n_images)).sqrt();
+        let rate = f64::from(n) / f64::from(n_images);
+        assert!((rate - chance).abs() < 5.0 * std + 0.005, "tag {id}: {rate} {chance}");
+    }
 }

@@ -3,7 +3,9 @@
 use nalgebra::{Isometry3, Point3, Vector2, Vector3};
 
 use super::eye::Eye;
-use crate::optics::square_corners;
+use crate::kinematics::Attachment;
+use crate::optics::{CornerNoise, square_corners};
+use crate::sim::places::BodyPoses;
 use crate::sim::solids::Solids;
 use crate::sim::spec::CameraWorldSpec;
 
@@ -15,6 +17,21 @@ pub(super) struct TagInBase {
     pub id: u32,
     pub size_m: f64,
     pub base_from_tag: Isometry3<f64>,
+}
+
+/// A tag on a moving link.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct TagOnLink {
+    pub id: u32,
+    pub size_m: f64,
+    /// As built.
+    pub mount: Attachment,
+}
+
+impl TagOnLink {
+    pub(super) fn at(&self, links: &BodyPoses) -> TagInBase {
+        TagInBase { id: self.id, size_m: self.size_m, base_from_tag: links.frame(&self.mount) }
+    }
 }
 
 /// How a tag is seen.
@@ -35,7 +52,12 @@ pub(super) struct Sight<'a> {
     pub eye: &'a Eye,
     pub solids: &'a Solids,
     pub housing: &'a [usize],
+    /// In place of the standard noise and limits.
+    pub fitted: Option<&'a CornerNoise>,
 }
+
+/// With fitted noise the chance of a detection takes care of range, incidence and size; beyond this nothing shows, cosine.
+const MIN_COS_INCIDENCE: f64 = 0.05;
 
 impl Sight<'_> {
     pub(super) fn view(&self, tag: &TagInBase, base_from_camera: &Isometry3<f64>) -> Option<View> {
@@ -44,7 +66,11 @@ impl Sight<'_> {
         let range_m = center.norm();
         let normal = camera_from_tag.rotation * Vector3::z();
         let cos_incidence = -normal.dot(&center) / range_m;
-        if range_m > self.spec.max_range_m || cos_incidence < self.spec.max_incidence_rad.cos() {
+        let is_beyond_limits = match self.fitted {
+            Some(_) => cos_incidence < MIN_COS_INCIDENCE,
+            None => range_m > self.spec.max_range_m || cos_incidence < self.spec.max_incidence_rad.cos(),
+        };
+        if is_beyond_limits {
             return None;
         }
         let corners_px = self.corners_px(tag, &camera_from_tag)?;
@@ -53,7 +79,8 @@ impl Sight<'_> {
         let lifted = |p: &Point3<f64>| tag.base_from_tag * (p + Vector3::z() * CLEAR_OF_BACKING_M);
         let hidden = |p: &Point3<f64>| self.solids.hides(&eye, &lifted(p), self.housing);
         let corners = square_corners(tag.size_m);
-        if side_px < self.spec.min_side_px || hidden(&Point3::origin()) || corners.iter().any(hidden) {
+        let is_too_small = self.fitted.is_none() && side_px < self.spec.min_side_px;
+        if is_too_small || hidden(&Point3::origin()) || corners.iter().any(hidden) {
             return None;
         }
         Some(View { corners_px, range_m, cos_incidence, side_px, blur_px: 0.0 })
@@ -81,8 +108,26 @@ impl Sight<'_> {
 }
 
 impl View {
+    /// Corners with noise, from normal numbers of unit variance; `None` for a tag that goes undetected. `luck` is uniform in 0..1.
+    pub(super) fn detected(&self, sight: &Sight, luck: f64, noise: &[Vector2<f64>; 4]) -> Option<[Vector2<f64>; 4]> {
+        let Some(fitted) = sight.fitted else {
+            let std_px = self.corner_std_px(sight.spec);
+            return Some(std::array::from_fn(|k| self.corners_px[k] + std_px * noise[k]));
+        };
+        if luck >= fitted.chance.of(self.side_px, self.range_m) {
+            return None;
+        }
+        let corners_px = self.corners_px.map(Into::into);
+        let covariances = fitted.covariances_px2(&corners_px, self.range_m, self.blur_px);
+        let mut noisy = self.corners_px;
+        for ((corner, covariance), noise) in noisy.iter_mut().zip(covariances).zip(noise) {
+            *corner += covariance.cholesky()?.l() * noise;
+        }
+        Some(noisy)
+    }
+
     /// Per coordinate.
-    pub(super) fn corner_std_px(&self, spec: &CameraWorldSpec) -> f64 {
+    fn corner_std_px(&self, spec: &CameraWorldSpec) -> f64 {
         let sharp_px = spec.corner_noise_px * (0.8 + 0.2 * self.range_m) / self.cos_incidence.sqrt();
         sharp_px * (1.0 + spec.blur_noise_per_px * self.blur_px)
     }

@@ -1,0 +1,77 @@
+//! The rendered camera against the geometric one.
+
+use super::*;
+
+impl Site {
+    /// Moments of a rendered camera: the images that it gives, one a second.
+    fn rendered(&self, rates_rad_s: f64, seconds: u32, change: impl Fn(&mut WristCamera, u32)) -> Vec<Exposed> {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/vehicles/work-class-front.toml");
+        let vehicle = load_vehicle(&root).expect("it reads");
+        let Self { robot, solids, spec, links, .. } = self;
+        let mut camera = self.camera();
+        let scene = Scene { seafloor_z_m: Some(-2.2), obstacles: Vec::new() };
+        camera.render(&RenderInput { robot, vehicle: &vehicle, scene: &scene, spec, seed: 4 }).expect("a camera");
+        let rates = JointAngles::from_fn(robot.n_joints(), |_| rates_rad_s);
+        let take = |second: u32| {
+            change(&mut camera, second);
+            let places = Places {
+                links,
+                base_from_world: vehicle.vehicle_from_base.inverse().isometry().to_owned(),
+                jaws: [Isometry3::identity(); 2],
+            };
+            let motion = ArmMotion { chain: &robot.chain, angles: robot.stowed, rates };
+            let closed = SIMULATION_EPOCH.plus_s(f64::from(second));
+            camera.take(&Moment { places, solids, motion, closed, is_wanted: true }).expect("an image")
+        };
+        (0..seconds).filter_map(take).collect()
+    }
+}
+
+fn clear_deep_water(spec: &mut WorldSpec) {
+    spec.camera.mode = CameraMode::Rendered;
+}
+
+/// The geometric camera's corners, read from pixels, at rest and on the way.
+#[test]
+fn the_detector_reads_what_the_projection_says() {
+    for (exposure_s, rate_rad_s) in [(0.0, 0.0), (0.02, 0.1)] {
+        let site = site(|spec| {
+            clear_deep_water(spec);
+            spec.camera.exposure_s = exposure_s;
+        });
+        let (_, expected) = site.image(&mut site.camera(), rate_rad_s, 1.0);
+        let images = site.rendered(rate_rad_s, 3, |_, _| {});
+        let (mut sum_px2, mut n) = (0.0, 0);
+        for image in &images {
+            assert!(image.detections.tags.len() + 1 >= expected.tags.len(), "{:?}", all_ids(&image.detections));
+            for tag in &image.detections.tags {
+                let Some(known) = expected.tags.iter().find(|known| known.id == tag.id) else { continue };
+                for (a, b) in tag.corners_px.iter().zip(&known.corners_px) {
+                    sum_px2 += (a[0] - b[0]).powi(2) + (a[1] - b[1]).powi(2);
+                    n += 2;
+                }
+            }
+        }
+        let rms_px = f64::sqrt(sum_px2 / f64::from(n));
+        eprintln!("{exposure_s} s: {rms_px:.3} px per coordinate over {n}");
+        assert!(n > 80 && rms_px < 0.15, "{rms_px} px over {n}");
+    }
+}
+
+#[test]
+fn faults_show_in_the_pixels() {
+    let site = site(clear_deep_water);
+    let images = site.rendered(0.0, 4, |camera, second| match second {
+        1 => camera.lose(3),
+        2 => camera.misread(2, 40),
+        3 => camera.blind(SIMULATION_EPOCH.plus_s(9.0)),
+        _ => {}
+    });
+    let ids: Vec<Vec<u32>> = images.iter().map(|image| all_ids(&image.detections)).collect();
+    assert!(ids[0].contains(&2) && ids[0].contains(&3), "{ids:?}");
+    assert!(ids[1].contains(&2) && !ids[1].contains(&3), "{ids:?}");
+    assert!(ids[2].contains(&40) && !ids[2].contains(&2), "{ids:?}");
+    assert!(ids[3].is_empty(), "{ids:?}");
+    let jpeg = images[0].jpeg.as_ref().expect("the first image is kept");
+    assert!(jpeg.starts_with(&[0xff, 0xd8]) && (10_000..400_000).contains(&jpeg.len()), "{}", jpeg.len());
+}
