@@ -8,6 +8,8 @@ use crate::plan::PlanError;
 use crate::robot::RobotError;
 use crate::routine::RoutineError;
 use crate::session::SessionError;
+use crate::tagmap::TagMapError;
+use crate::tagmap::recording::ViewsError;
 
 /// How a command ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -68,6 +70,8 @@ pub(super) fn of_cause(error: &(dyn std::error::Error + 'static)) -> Exit {
             || cause.is::<CalibError>()
             || cause.is::<CompactError>()
             || cause.is::<PlanError>()
+            || cause.is::<TagMapError>()
+            || cause.is::<ViewsError>()
             || cause.downcast_ref::<LogError>().is_some_and(|e| !is_write_failure(e))
             || matches!(cause.downcast_ref::<SessionError>(), Some(SessionError::Plan(_) | SessionError::Calib(_)))
             || is_invalid_world(cause)

@@ -1,0 +1,224 @@
+//! `armcal tagmap`: where the tags are, from camera views alone.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Result;
+use clap::{Args, ValueEnum};
+use comfy_table::presets::UTF8_FULL_CONDENSED;
+use comfy_table::{CellAlignment, Table};
+
+use super::exit::Exit;
+use super::files;
+use super::stdout::say;
+use crate::calib::surveyed;
+use crate::log::{Completeness, read_recording, topics};
+use crate::robot::{self, Robot};
+use crate::tagmap::files::{NamedCamera, TagFile, map_to_text, read_cameras, read_tags};
+use crate::tagmap::recording::{RecordedViews, read_views};
+use crate::tagmap::{Body, GroupFrame, MapInput, MapMode, MapSettings, TagMap, TagPrior, solve};
+
+#[derive(Debug, Args)]
+pub(super) struct TagmapArgs {
+    /// The recording (.mcap)
+    recording: PathBuf,
+    /// Folder of the robot: its camera, its tags, its base tag
+    #[arg(long, required_unless_present_all = ["camera", "tags"], conflicts_with_all = ["camera", "tags"])]
+    robot: Option<PathBuf>,
+    /// Cameras: cameras.yaml of TagSLAM or camchain.yaml of Kalibr
+    #[arg(long, requires = "tags")]
+    camera: Option<PathBuf>,
+    /// Tags: tagslam.yaml, a target of Kalibr (.yaml), or a tag map (.toml)
+    #[arg(long, requires = "camera")]
+    tags: Option<PathBuf>,
+    /// Topic of the detections; else the one that the camera file names, or the only one there is
+    #[arg(long)]
+    topic: Option<String>,
+    /// How much of the places given is believed; `unknown` with --robot, `partly-known` with --tags
+    #[arg(long, value_enum)]
+    mode: Option<Mode>,
+    /// Where to write the map: .toml, or .yaml for TagSLAM
+    #[arg(long)]
+    out: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Mode {
+    /// Every place given is exact: only the cameras are located
+    Known,
+    /// Places given hold to within their standard deviations
+    PartlyKnown,
+    /// Only the base tag's place is used
+    Unknown,
+}
+
+impl From<Mode> for MapMode {
+    fn from(mode: Mode) -> Self {
+        match mode {
+            Mode::Known => Self::Known,
+            Mode::PartlyKnown => Self::PartlyKnown,
+            Mode::Unknown => Self::Unknown,
+        }
+    }
+}
+
+/// Share of the detections that may be rejected before the map counts as made of bad data. Assumed.
+const MAX_REJECTED_SHARE: f64 = 0.2;
+
+pub(super) fn tagmap(args: &TagmapArgs) -> Result<Exit> {
+    let (cameras, tags, settings) = match (&args.robot, &args.camera, &args.tags) {
+        (Some(folder), ..) => of_robot(&args.recording, &robot::load(folder)?)?,
+        (None, Some(camera), Some(tags)) => of_files(camera, tags)?,
+        _ => return Err(super::exit::UsageError("name --robot, or --camera and --tags".to_owned()).into()),
+    };
+    let settings = MapSettings { mode: args.mode.map_or(settings.mode, MapMode::from), ..settings };
+    let read = read_views(&args.recording, &cameras, args.topic.as_deref(), &tags)?;
+    let models: Vec<_> = cameras.iter().map(|camera| camera.model).collect();
+    let input = MapInput { cameras: &models, views: &read.views, bodies: &tags.bodies, tags: &tags.tags };
+    let file = args.recording.display();
+    let map = solve(&input, &settings).map_err(|error| anyhow::Error::from(error).context(format!("{file}")))?;
+    if let Some(out) = &args.out {
+        let text = map_to_text(out, &map, &input).map_err(robot::RobotError::from)?;
+        files::write_together(&[(out, text.as_bytes())])?;
+    }
+    say(&describe(&map, &read, &cameras))?;
+    Ok(warn(&file.to_string(), &map, &read, &tags))
+}
+
+type Known = (Vec<NamedCamera>, TagFile, MapSettings);
+
+/// The camera and the tags around an arm; those that the recording says were there, where it does.
+fn of_robot(recording: &Path, robot: &Robot) -> Result<Known> {
+    let read = read_recording(recording)?;
+    let robot = &*surveyed(&read, robot);
+    let camera = NamedCamera {
+        name: robot.camera.name.clone(),
+        model: robot.camera.lens.into(),
+        image_topic: None,
+        tag_topic: Some(topics::DETECTIONS.to_owned()),
+    };
+    let prior = |tag: &crate::robot::SurveyedTag| {
+        let (p, r) = (tag.position_std_m, tag.rotation_std_rad);
+        let std = (p + r > 0.0).then_some([p, p, p, r, r, r]);
+        let pose = tag.is_known().then(|| *tag.base_from_tag.isometry());
+        TagPrior { id: tag.id, size_m: tag.size_m, body: 0, pose, std: std.filter(|_| tag.is_known()) }
+    };
+    let tags = TagFile {
+        frame: robot.base_link.clone(),
+        bodies: vec![Body { name: robot.base_link.clone(), is_static: true, pose: None }],
+        tags: robot.tags.iter().map(prior).collect(),
+        base_tag: Some(robot.base_tag),
+        ..TagFile::default()
+    };
+    let settings = MapSettings {
+        mode: MapMode::Unknown,
+        base_tag: Some(robot.base_tag),
+        corner_std_px: robot.camera.corner_std_px,
+        ..MapSettings::default()
+    };
+    Ok((vec![camera], tags, settings))
+}
+
+fn of_files(camera: &Path, tags: &Path) -> Result<Known> {
+    let cameras = read_cameras(camera)?;
+    let tags = read_tags(tags)?;
+    // The attitude sensor is the vehicle's: the moving body that carries the base tag.
+    let of_base = tags.tags.iter().find(|tag| Some(tag.id) == tags.base_tag).map(|tag| tag.body);
+    let settings = MapSettings {
+        base_tag: tags.base_tag,
+        default_tag: tags.default_tag,
+        attitude_body: of_base.filter(|body| !tags.bodies[*body].is_static),
+        ..MapSettings::default()
+    };
+    Ok((cameras, tags, settings))
+}
+
+/// Millimetres and degrees: people read it.
+fn describe(map: &TagMap, read: &RecordedViews, cameras: &[NamedCamera]) -> String {
+    let mut out = String::new();
+    for (idx, group) in map.groups.iter().enumerate() {
+        let frame = match &group.frame {
+            GroupFrame::Body(name) => format!("frame of `{name}`"),
+            GroupFrame::Tag(id) => format!("frame of tag {id}: nothing ties these tags to the others"),
+        };
+        out.push_str(&format!("{frame}; {} tags, {} views\n", group.tags.len(), group.n_views));
+        let mut table = Table::new();
+        let header = [
+            "tag",
+            "size mm",
+            "x m",
+            "y m",
+            "z m",
+            "std x mm",
+            "std y mm",
+            "std z mm",
+            "std rot deg",
+            "views",
+            "rms px",
+        ];
+        table.load_preset(UTF8_FULL_CONDENSED).set_header(header);
+        for tag in map.tags.iter().filter(|tag| tag.group == idx) {
+            let position = tag.frame_from_tag.translation.vector;
+            let std = tag.position_std_m().map(|std| format!("{:.3}", std * 1e3));
+            let turn = tag.rotation_std_rad().into_iter().fold(0.0, f64::max).to_degrees();
+            let name = if tag.is_fixed { format!("{} (held)", tag.id) } else { tag.id.to_string() };
+            let mut row = vec![name, format!("{:.1}", tag.size_m * 1e3)];
+            row.extend(position.iter().map(|value| format!("{value:.5}")));
+            row.extend(std);
+            row.extend([format!("{turn:.3}"), tag.n_views.to_string(), format!("{:.4}", tag.rms_px)]);
+            table.add_row(row);
+        }
+        for column in 1..header.len() {
+            if let Some(column) = table.column_mut(column) {
+                column.set_cell_alignment(CellAlignment::Right);
+            }
+        }
+        out.push_str(&format!("{table}\n"));
+    }
+    let used: Vec<String> =
+        read.topics.iter().map(|(camera, topic)| format!("{} of camera {}", topic, cameras[*camera].name)).collect();
+    out.push_str(&format!("detections   {} of {} used; {}\n", map.n_used, map.n_detections, used.join(", ")));
+    out.push_str(&format!(
+        "reprojection rms {:.4} px, median {:.4} px; with rejected ones rms {:.4} px\n",
+        map.rms_px, map.median_px, map.rms_all_px
+    ));
+    out.push_str(&format!(
+        "noise        chi-square {:.0} of {} degrees of freedom, corners' standard deviation times {:.3}\n",
+        map.chi_square, map.degrees_of_freedom, map.noise_scale
+    ));
+    let rejected: Vec<String> =
+        map.rejected_by_reason().iter().map(|(reason, n)| format!("{} {n}", reason.name())).collect();
+    let rejected = if rejected.is_empty() { "none".to_owned() } else { rejected.join(", ") };
+    out.push_str(&format!("rejected     {rejected}"));
+    out
+}
+
+/// Says on stderr what is wrong with data and map; how the command ends.
+fn warn(file: &str, map: &TagMap, read: &RecordedViews, tags: &TagFile) -> Exit {
+    let is_whole = read.completeness == Completeness::Whole;
+    if !is_whole {
+        eprintln!("warning: {file}: is not whole; what could be read is used");
+    }
+    for (what, n) in &read.left_out {
+        eprintln!("warning: {file}: {n} {what} left out");
+    }
+    for key in &tags.ignored_keys {
+        eprintln!("warning: {key} has no effect here");
+    }
+    for warning in &map.scale_warnings {
+        eprintln!("warning: {warning}");
+    }
+    for warning in &map.warnings {
+        eprintln!("warning: {warning}");
+    }
+    if !map.has_converged {
+        eprintln!("warning: the fit did not come to rest");
+    }
+    let faults = map.rejected.iter().filter(|rejected| rejected.reason.is_fault()).count();
+    let too_many = faults as f64 > MAX_REJECTED_SHARE * map.n_detections as f64;
+    if too_many {
+        eprintln!("warning: {file}: {faults} of {} detections rejected", map.n_detections);
+    }
+    let is_sound =
+        is_whole && read.n_unreadable == 0 && !too_many && map.has_converged && map.scale_warnings.is_empty();
+    if is_sound { Exit::Ok } else { Exit::DataLost }
+}

@@ -1,0 +1,151 @@
+//! The map, and how good it is.
+
+use std::collections::BTreeMap;
+
+use nalgebra::{DMatrix, Isometry3, Matrix3, Matrix6};
+
+use super::scale::ScaleWarning;
+use super::sparse::Factor;
+use super::types::{MapRejection, RejectedDetection};
+
+/// A tag's estimate.
+#[derive(Clone, Debug)]
+pub struct MappedTag {
+    pub id: u32,
+    pub size_m: f64,
+    /// Index into [`TagMap::groups`].
+    pub group: usize,
+    /// In the group's frame.
+    pub frame_from_tag: Isometry3<f64>,
+    /// Of a perturbation on the right, `frame_from_tag * exp(xi)`, xi = (translation m, rotation rad) along the tag's axes. It is
+    /// relative to what anchors the group: zero for a tag that is held.
+    pub covariance: Matrix6<f64>,
+    pub n_views: usize,
+    /// Of its corners: root mean square distance between measured and predicted pixel; 0 where none is used.
+    pub rms_px: f64,
+    /// Held at the place it was given, or at the origin.
+    pub is_fixed: bool,
+    /// Index into the solver's free tags.
+    pub(super) node: Option<usize>,
+}
+
+impl MappedTag {
+    /// Covariance of the tag's position along the axes of the group's frame, m^2.
+    #[must_use]
+    pub fn position_covariance_m2(&self) -> Matrix3<f64> {
+        let turn = self.frame_from_tag.rotation.to_rotation_matrix();
+        turn * self.covariance.fixed_view::<3, 3>(0, 0).into_owned() * turn.transpose()
+    }
+
+    /// Standard deviations along the axes of the group's frame, m.
+    #[must_use]
+    pub fn position_std_m(&self) -> [f64; 3] {
+        let covariance = self.position_covariance_m2();
+        [0, 1, 2].map(|k| covariance[(k, k)].max(0.0).sqrt())
+    }
+
+    /// Standard deviations of the rotation about the tag's axes, rad.
+    #[must_use]
+    pub fn rotation_std_rad(&self) -> [f64; 3] {
+        [3, 4, 5].map(|k| self.covariance[(k, k)].max(0.0).sqrt())
+    }
+}
+
+/// In which frame a group's tags are.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum GroupFrame {
+    /// That of a body, by tags whose places on it are known.
+    Body(String),
+    /// That of one of its tags, for nothing ties the group to any other.
+    Tag(u32),
+}
+
+/// Tags that views connect with each other, and with no others.
+#[derive(Clone, Debug)]
+pub struct MapGroup {
+    pub frame: GroupFrame,
+    /// Indices into the input's bodies.
+    pub bodies: Vec<usize>,
+    /// Ascending.
+    pub tags: Vec<u32>,
+    pub n_views: usize,
+}
+
+/// Where one group was seen from another's frame, in one view that shows both.
+#[derive(Clone, Debug)]
+pub struct RelativeBodyPose {
+    /// Index into the input's views.
+    pub view: usize,
+    /// Indices into [`TagMap::groups`].
+    pub first: usize,
+    pub second: usize,
+    /// Frame of the first group from that of the second.
+    pub first_from_second: Isometry3<f64>,
+    /// On the right, (translation m, rotation rad) along the axes of the second group's frame.
+    pub covariance: Matrix6<f64>,
+}
+
+/// What [`super::solve`] finds.
+#[derive(Clone, Debug)]
+pub struct TagMap {
+    /// The anchored groups first, then by their smallest tag.
+    pub groups: Vec<MapGroup>,
+    /// By id.
+    pub tags: Vec<MappedTag>,
+    /// For each view of the input and each group: frame_from_camera, where it shows tags of the group.
+    pub views: Vec<BTreeMap<usize, Isometry3<f64>>>,
+    pub relative: Vec<RelativeBodyPose>,
+    pub n_detections: usize,
+    /// Detections in the fit.
+    pub n_used: usize,
+    /// Root mean square distance between measured and predicted corner over all that are in the fit, px.
+    pub rms_px: f64,
+    /// The same over those too that were rejected as inconsistent but have a prediction.
+    pub rms_all_px: f64,
+    pub median_px: f64,
+    /// Sum of squared whitened residuals and its degrees of freedom.
+    pub chi_square: f64,
+    pub degrees_of_freedom: usize,
+    /// By what the corners' standard deviations were multiplied in the end; 1 if the noise was given.
+    pub noise_scale: f64,
+    pub rejected: Vec<RejectedDetection>,
+    pub scale_warnings: Vec<ScaleWarning>,
+    pub warnings: Vec<String>,
+    pub has_converged: bool,
+    pub(super) factor: Option<Factor>,
+}
+
+impl TagMap {
+    #[must_use]
+    pub fn tag(&self, id: u32) -> Option<&MappedTag> {
+        self.tags.binary_search_by_key(&id, |tag| tag.id).ok().map(|idx| &self.tags[idx])
+    }
+
+    /// How many detections were rejected for each reason.
+    #[must_use]
+    pub fn rejected_by_reason(&self) -> BTreeMap<MapRejection, usize> {
+        let mut counts = BTreeMap::new();
+        for rejected in &self.rejected {
+            *counts.entry(rejected.reason).or_default() += 1;
+        }
+        counts
+    }
+
+    /// Joint covariance of several tags, 6 rows for each in the order asked for, as [`MappedTag::covariance`]; `None` if one of
+    /// them is not in the map.
+    #[must_use]
+    pub fn joint_covariance(&self, ids: &[u32]) -> Option<DMatrix<f64>> {
+        let nodes = ids.iter().map(|id| self.tag(*id).map(|tag| tag.node)).collect::<Option<Vec<_>>>()?;
+        let mut out = DMatrix::zeros(6 * ids.len(), 6 * ids.len());
+        let Some(factor) = &self.factor else { return Some(out) };
+        for (column, node) in nodes.iter().enumerate() {
+            let Some(node) = node else { continue };
+            let blocks = factor.inverse_column(*node);
+            for (row, other) in nodes.iter().enumerate() {
+                let Some(other) = other else { continue };
+                out.fixed_view_mut::<6, 6>(6 * row, 6 * column).copy_from(&blocks[*other]);
+            }
+        }
+        Some(out)
+    }
+}

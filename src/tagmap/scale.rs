@@ -1,0 +1,168 @@
+//! Tag sizes that are off, by tags whose distance is known.
+//!
+//! A square solved with a size that is too large by a factor lies farther away by the same factor, along the same line of
+//! sight. So with two tags of known distance D at p_a and p_b (camera frame), `|s_a p_a - s_b p_b| = D` tells the factors s by which
+//! the sizes must be multiplied: 1 where they are right.
+
+use nalgebra::Vector3;
+
+use super::screen::Screened;
+use super::start::is_rigid;
+use super::types::MapInput;
+
+/// A size that cannot be right.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ScaleWarning {
+    /// The tags whose sizes are off by the same factor; all with a known place, or one.
+    pub tags: Vec<u32>,
+    /// Their sizes times this would agree with the known distances.
+    pub factor: f64,
+}
+
+impl std::fmt::Display for ScaleWarning {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let ids: Vec<String> = self.tags.iter().map(u32::to_string).collect();
+        let tags = if ids.len() == 1 { "tag" } else { "tags" };
+        let (ids, factor) = (ids.join(", "), self.factor);
+        write!(
+            f,
+            "size_m of {tags} {ids} disagrees with the known distances between tags; {factor:.3} times it would agree"
+        )
+    }
+}
+
+/// Sizes nearer to right than this are not spoken of: a square's distance is itself uncertain by some percent.
+const LEAST_FACTOR: f64 = 1.15;
+/// A measured distance that is off by more than this (natural logarithm) counts as this.
+const FARTHEST: f64 = 1.0;
+/// An explanation must leave less than this share of the disagreement.
+const EXPLAINS: f64 = 0.5;
+const MAX_SAMPLES: usize = 400;
+const MAX_ROOTS: usize = 60;
+
+/// Two tags of known distance in one image.
+struct Sample {
+    a: u32,
+    b: u32,
+    at_a: Vector3<f64>,
+    at_b: Vector3<f64>,
+    distance_m: f64,
+}
+
+impl Sample {
+    /// How far the distance is from the known one, with the sizes multiplied.
+    fn disagreement(&self, factor_of: &impl Fn(u32) -> f64) -> f64 {
+        let measured = (self.at_a * factor_of(self.a) - self.at_b * factor_of(self.b)).norm();
+        (measured / self.distance_m).ln().abs().min(FARTHEST)
+    }
+
+    /// Factors of tag `of` alone that give the known distance.
+    fn roots(&self, of: u32) -> Vec<f64> {
+        let (free, held) = if of == self.a { (&self.at_a, &self.at_b) } else { (&self.at_b, &self.at_a) };
+        let (a, b) = (free.norm_squared(), free.dot(held));
+        let c = held.norm_squared() - self.distance_m * self.distance_m;
+        let under = b * b - a * c;
+        if under < 0.0 {
+            // No factor reaches the distance; the nearest approach is the best there is.
+            return vec![b / a];
+        }
+        vec![(b - under.sqrt()) / a, (b + under.sqrt()) / a]
+    }
+}
+
+pub(super) fn check(input: &MapInput<'_>, screened: &Screened) -> Vec<ScaleWarning> {
+    let samples = samples(input, screened);
+    let mut ids: Vec<u32> = samples.iter().flat_map(|sample| [sample.a, sample.b]).collect();
+    ids.sort_unstable();
+    ids.dedup();
+    let mean = |factor_of: &dyn Fn(u32) -> f64| {
+        samples.iter().map(|s| s.disagreement(&|id| factor_of(id))).sum::<f64>() / samples.len().max(1) as f64
+    };
+    let mut warnings: Vec<ScaleWarning> = Vec::new();
+    let mut now = mean(&|_| 1.0);
+    while now > LEAST_FACTOR.ln() * 0.5 && warnings.len() < ids.len() {
+        let before = |id: u32| warnings.iter().filter(|w| w.tags.contains(&id)).map(|w| w.factor).product::<f64>();
+        let mut best: Option<(f64, ScaleWarning)> = None;
+        let mut consider = |tags: &[u32], factor: f64| {
+            if !(factor.is_finite() && factor > 0.0) {
+                return;
+            }
+            let left = mean(&|id| before(id) * if tags.contains(&id) { factor } else { 1.0 });
+            if best.as_ref().is_none_or(|(least, _)| left < *least) {
+                best = Some((left, ScaleWarning { tags: tags.to_vec(), factor }));
+            }
+        };
+        // All of them first: of explanations that are as good it is the likelier one.
+        if warnings.is_empty() {
+            let ratio = |s: &Sample| s.distance_m / (s.at_a - s.at_b).norm();
+            thinned(samples.iter().map(ratio).collect(), MAX_ROOTS)
+                .into_iter()
+                .for_each(|factor| consider(&ids, factor));
+        }
+        for id in ids.iter().filter(|id| before(**id) == 1.0) {
+            let of_tag = samples.iter().filter(|sample| sample.a == *id || sample.b == *id);
+            let roots = of_tag.flat_map(|sample| sample.roots(*id)).collect();
+            thinned(roots, MAX_ROOTS).into_iter().for_each(|factor| consider(&[*id], factor));
+        }
+        let Some((left, warning)) = best else { break };
+        let is_small = (1.0 / LEAST_FACTOR..=LEAST_FACTOR).contains(&warning.factor);
+        // With several sizes off, one explanation takes only its share.
+        let share = 1.0 - (1.0 - EXPLAINS) / ids.len().max(1) as f64;
+        if is_small || left > share * now {
+            break;
+        }
+        now = left;
+        warnings.push(warning);
+    }
+    warnings
+}
+
+/// Evenly over the sorted values.
+fn thinned(mut values: Vec<f64>, most: usize) -> Vec<f64> {
+    values.sort_by(f64::total_cmp);
+    let n = values.len();
+    if n <= most { values } else { (0..most).map(|k| values[k * n / most]).collect() }
+}
+
+fn samples(input: &MapInput<'_>, screened: &Screened) -> Vec<Sample> {
+    let place = |id: u32| {
+        let tag = input.tags.iter().find(|tag| tag.id == id)?;
+        // A place that is hardly known tells no distance.
+        let is_sure = tag.std.is_none_or(|std| std[..3].iter().all(|std| *std < 0.25 * tag.size_m));
+        let pose = tag.pose.filter(|_| is_sure)?;
+        let body = &input.bodies[tag.body];
+        Some((tag.body, body.pose.map(|body| body * pose), pose))
+    };
+    let places: Vec<_> = screened.tags.iter().map(|tag| place(tag.id)).collect();
+    let mut samples = Vec::new();
+    for of_view in screened.observations.chunk_by(|a, b| a.view == b.view) {
+        for (i, a) in of_view.iter().enumerate() {
+            for b in &of_view[i + 1..] {
+                let (Some(of_a), Some(of_b)) = (&places[a.tag], &places[b.tag]) else { continue };
+                let between = match (of_a, of_b) {
+                    (a, b) if a.0 == b.0 => a.2.translation.vector - b.2.translation.vector,
+                    ((body_a, Some(a), _), (body_b, Some(b), _)) if is_rigid(input.bodies, *body_a, *body_b) => {
+                        a.translation.vector - b.translation.vector
+                    }
+                    _ => continue,
+                };
+                let center =
+                    |seen: &super::problem::Observation| seen.best.camera_from_tag.isometry().translation.vector;
+                let (a, b, at_a, at_b) = (screened.tags[a.tag].id, screened.tags[b.tag].id, center(a), center(b));
+                let distance_m = between.norm();
+                if distance_m > 1e-6 {
+                    samples.push(Sample { a, b, at_a, at_b, distance_m });
+                }
+            }
+        }
+    }
+    let n = samples.len();
+    if n > MAX_SAMPLES {
+        let mut at = 0;
+        samples.retain(|_| {
+            at += 1;
+            (at * MAX_SAMPLES) / n != ((at - 1) * MAX_SAMPLES) / n
+        });
+    }
+    samples
+}

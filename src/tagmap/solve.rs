@@ -1,0 +1,175 @@
+//! From views to a map, step by step.
+
+use super::adjust::{approach, finish, select};
+use super::assemble::assemble;
+use super::attitude::{self, Wanted};
+use super::check::check;
+use super::groups::{Group, build};
+use super::linearize::Loss;
+use super::localize::{localize, place_tag, tag_misfit, view_misfit};
+use super::problem::{Observation, Problem};
+use super::result::TagMap;
+use super::scale;
+use super::screen::{Screened, screen};
+use super::start::lay_out;
+use super::types::{MapInput, MapSettings, NoiseScale, TagMapError};
+use super::{adjust, linearize};
+
+/// Rounds of choosing detections and fitting again.
+const MAX_ROUNDS: usize = 8;
+/// A pose found anew replaces one that fits worse by this factor.
+const MUCH_WORSE: f64 = 1.25;
+
+/// Finds where the tags are, by bundle adjustment on the corner pixels of all views (Triggs et al. 2000).
+///
+/// Nothing but the views, the tags' sizes and the places of some tags enters. The result does not depend on the order of
+/// views, tags or detections.
+///
+/// # Errors
+/// [`TagMapError`] when the input cannot be meant, or shows none of the tags that would anchor the map.
+pub fn solve(input: &MapInput<'_>, settings: &MapSettings) -> Result<TagMap, TagMapError> {
+    check(input, settings)?;
+    let mut screened = screen(input, settings);
+    if screened.observations.is_empty() {
+        return Err(nothing_left(&screened));
+    }
+    let scale_warnings = scale::check(input, &screened);
+    let layout = lay_out(input.cameras, &screened.observations, &screened.tags, input.bodies, settings);
+    for (tag, pose) in screened.tags.iter_mut().zip(&layout.pose) {
+        tag.pose = *pose;
+    }
+    let mut problem = Problem {
+        cameras: input.cameras,
+        observations: std::mem::take(&mut screened.observations),
+        tags: std::mem::take(&mut screened.tags),
+        blocks: Vec::new(),
+        extras: Vec::new(),
+        links: Vec::new(),
+        n_nodes: 0,
+    };
+    let setting_up = SettingUp { input, settings, screened: &screened, label: &layout.label };
+    let mut groups = setting_up.build(&mut problem);
+    approach(&mut problem);
+    for _ in 0..3 {
+        if !repair(&mut problem) {
+            break;
+        }
+        approach(&mut problem);
+    }
+    let mut has_converged = false;
+    for _ in 0..MAX_ROUNDS {
+        let changed = select(&mut problem, settings.reject_beyond_sigmas);
+        if changed {
+            groups = setting_up.build(&mut problem);
+        }
+        has_converged = finish(&mut problem);
+        if !changed {
+            break;
+        }
+    }
+    let noise_scale = match settings.noise {
+        NoiseScale::Given => 1.0,
+        NoiseScale::Estimated => rescale(&mut problem),
+    };
+    if noise_scale != 1.0 {
+        has_converged = finish(&mut problem);
+    }
+    let mut map = assemble(input, &screened, &problem, &groups, noise_scale);
+    map.has_converged = has_converged;
+    map.scale_warnings = scale_warnings;
+    map.warnings.extend(layout.warnings);
+    if map.n_used == 0 {
+        return Err(nothing_left(&screened));
+    }
+    Ok(map)
+}
+
+fn nothing_left(screened: &Screened) -> TagMapError {
+    let mut counts = std::collections::BTreeMap::<_, usize>::new();
+    for rejected in &screened.rejected {
+        *counts.entry(rejected.reason).or_default() += 1;
+    }
+    let reasons: Vec<String> = counts.iter().map(|(reason, n)| format!("{} {n}", reason.name())).collect();
+    TagMapError::NothingLeft { rejected: screened.n_detections, reasons: reasons.join(", ") }
+}
+
+struct SettingUp<'a, 'b> {
+    input: &'b MapInput<'a>,
+    settings: &'b MapSettings,
+    screened: &'b Screened,
+    label: &'b [usize],
+}
+
+impl SettingUp<'_, '_> {
+    /// Groups, unknowns and attitude links for the observations in use.
+    fn build(&self, problem: &mut Problem<'_>) -> Vec<Group> {
+        let groups = build(problem, self.label, self.input.bodies, self.settings);
+        let Some(moving) = self.settings.attitude_body else { return groups };
+        let attitudes: Vec<_> = self.screened.views.iter().map(|view| view.attitude).collect();
+        let body_of = |group: &Group| problem.tags[group.tags[0]].body;
+        let of_moving = groups.iter().position(|group| body_of(group) == moving);
+        let of_static = groups.iter().position(|group| {
+            let body = body_of(group);
+            body != moving && self.input.bodies[body].is_static
+        });
+        if let (Some(moving_group), Some(fixed_group)) = (of_moving, of_static) {
+            let information = self.settings.attitude_std_rad.powi(-2);
+            attitude::link(problem, &attitudes, &Wanted { moving_group, fixed_group, information });
+        }
+        groups
+    }
+}
+
+/// Finds cameras and tags that have come to rest in a wrong place (the mirror image of the right one, mostly), and puts them
+/// where their images fit better; whether there were any.
+fn repair(problem: &mut Problem<'_>) -> bool {
+    let mut changed = false;
+    for idx in 0..problem.blocks.len() {
+        let block = &problem.blocks[idx];
+        let seen: Vec<(&Observation, _)> =
+            problem.observations[block.range.clone()].iter().map(|seen| (seen, problem.tags[seen.tag].pose)).collect();
+        let now = view_misfit(problem.cameras, &seen, &block.pose);
+        if let Some((pose, misfit)) = localize(problem.cameras, &seen)
+            && misfit * MUCH_WORSE < now
+        {
+            problem.blocks[idx].pose = pose;
+            changed = true;
+        }
+    }
+    let mut images = vec![Vec::new(); problem.tags.len()];
+    for block in &problem.blocks {
+        for at in block.range.clone() {
+            images[problem.observations[at].tag].push((&problem.observations[at], block.pose));
+        }
+    }
+    let mut moved = Vec::new();
+    for (idx, tag) in problem.tags.iter().enumerate().filter(|(_, tag)| tag.node.is_some()) {
+        let now = tag_misfit(problem.cameras, &images[idx], &tag.pose);
+        if let Some((pose, misfit)) = place_tag(problem.cameras, &images[idx])
+            && misfit * MUCH_WORSE < now
+        {
+            moved.push((idx, pose));
+        }
+    }
+    changed |= !moved.is_empty();
+    for (idx, pose) in moved {
+        problem.tags[idx].pose = pose;
+    }
+    changed
+}
+
+/// Makes the corners' standard deviations what the residuals show; the factor.
+fn rescale(problem: &mut Problem<'_>) -> f64 {
+    let freedom = adjust::degrees_of_freedom(problem);
+    if freedom < 8 {
+        return 1.0;
+    }
+    let chi_square = linearize::cost(problem, Loss::Huber { k: f64::INFINITY });
+    let scale = (chi_square / freedom as f64).sqrt().max(1e-6);
+    for seen in &mut problem.observations {
+        for whiten in &mut seen.whiten {
+            *whiten /= scale;
+        }
+    }
+    scale
+}
