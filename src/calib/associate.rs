@@ -9,12 +9,14 @@ use std::collections::BTreeMap;
 
 use nalgebra::Vector3;
 
+use super::frames::agreeing_mean;
 use crate::log::Recording;
-use crate::optics::solve_square;
+use crate::optics::{SquareError, SquarePose, solve_square};
 use crate::robot::Robot;
 use crate::sensor::ArmSensors;
 use crate::streams::{
-    CaptureSet, JointAngles, Mark, MarkKind, Message, ReachTask, RecordedSurvey, TagDetections, Thermometer,
+    CaptureSet, JointAngles, Mark, MarkKind, Message, ReachTask, RecordedSurvey, RejectReason, TagDetections,
+    Thermometer,
 };
 use crate::time::Stamp;
 
@@ -26,6 +28,15 @@ pub struct View {
     /// Mean travel of each joint from the middle of its range by the datasheet, rad.
     pub travel_rad: JointAngles,
     pub tags: Vec<TagView>,
+    /// The tag on the gripper, where the robot has one and it was seen.
+    pub gripper_tag: Option<SeenCorners>,
+}
+
+/// Corners of one tag, averaged over the frames of a view.
+#[derive(Clone, Copy, Debug)]
+pub struct SeenCorners {
+    pub corners_px: [[f64; 2]; 4],
+    pub n_frames: usize,
 }
 
 /// One tag in one view.
@@ -52,6 +63,10 @@ pub enum Rejection {
     OutOfView,
     /// The mark's span holds no joint readings.
     NoReadings,
+    /// In some frame of a view a tag lies elsewhere than in most: one of them is another tag, misread.
+    InconsistentFrame,
+    /// The detector itself did not believe it.
+    Detector(RejectReason),
 }
 
 impl Rejection {
@@ -62,6 +77,8 @@ impl Rejection {
             Self::NotASquare => "not_a_square",
             Self::OutOfView => "out_of_view",
             Self::NoReadings => "no_joint_readings",
+            Self::InconsistentFrame => "inconsistent_frame",
+            Self::Detector(reason) => reason.name(),
         }
     }
 }
@@ -83,6 +100,18 @@ pub struct CaptureData {
     pub pressure_pa: Option<(f64, f64)>,
     /// Indices of the recording's messages that were used, ascending.
     pub used: Vec<usize>,
+}
+
+impl CaptureData {
+    /// How many were rejected under each name; what the detector and the estimator reject alike has one.
+    #[must_use]
+    pub fn rejected_by_reason(&self) -> BTreeMap<String, usize> {
+        let mut counts = BTreeMap::new();
+        for (why, n) in &self.rejected {
+            *counts.entry(why.name().to_owned()).or_default() += n;
+        }
+        counts
+    }
 }
 
 /// Corners that fit a square worse than this are no tag: three times the worst that the lens prior allows.
@@ -179,6 +208,7 @@ impl<'a> Index<'a> {
                 let stamp = match message {
                     Message::JointSensors(sample) => sample.stamp,
                     Message::Detections(detections) => detections.stamp,
+                    Message::Rejects(rejects) => rejects.stamp,
                     Message::Temperature(sample) => sample.stamp,
                     Message::Pressure(sample) => sample.stamp,
                     _ => return None,
@@ -206,7 +236,7 @@ impl<'a> Index<'a> {
     ) -> Option<View> {
         let mut travel_sum = JointAngles::zeros(robot.n_joints());
         let mut n_readings = 0usize;
-        let mut corners: BTreeMap<u32, ([[f64; 2]; 4], usize)> = BTreeMap::new();
+        let mut frames: BTreeMap<u32, Vec<[[f64; 2]; 4]>> = BTreeMap::new();
         for &(_, idx) in self.span(mark) {
             match &self.messages[idx].1 {
                 Message::JointSensors(sample) => {
@@ -216,7 +246,12 @@ impl<'a> Index<'a> {
                     }
                     n_readings += 1;
                 }
-                Message::Detections(detections) => add_corners(detections, &mut corners),
+                Message::Detections(detections) => add_corners(detections, &mut frames),
+                Message::Rejects(rejects) => {
+                    for reject in &rejects.rejects {
+                        *data.rejected.entry(Rejection::Detector(reject.reason)).or_default() += 1;
+                    }
+                }
                 Message::Temperature(sample) => {
                     let range = match sample.thermometer {
                         Thermometer::Oil => &mut data.oil_c,
@@ -230,44 +265,52 @@ impl<'a> Index<'a> {
             data.used.push(idx);
         }
         if n_readings == 0 {
-            *data.rejected.entry(Rejection::NoReadings).or_default() += corners.len().max(1);
+            *data.rejected.entry(Rejection::NoReadings).or_default() += frames.len().max(1);
             return None;
         }
         let travel_rad = JointAngles::from_fn(robot.n_joints(), |j| travel_sum[j] / n_readings as f64);
-        let mut tags = Vec::new();
-        for (id, (sums, n_frames)) in corners {
+        let mut view = View { pose_idx, end: mark.end, travel_rad, tags: Vec::new(), gripper_tag: None };
+        for (id, frames) in frames {
             data.ids_seen.push(id);
-            let corners_px = sums.map(|corner| corner.map(|v| v / n_frames as f64));
-            match tag_view(robot, id, corners_px, n_frames) {
-                Ok(tag) => tags.push(tag),
-                Err(rejection) => *data.rejected.entry(rejection).or_default() += 1,
+            let (seen, n_apart) = agreeing_mean(&frames, robot.camera.corner_std_px);
+            if n_apart > 0 {
+                *data.rejected.entry(Rejection::InconsistentFrame).or_default() += n_apart;
+            }
+            let Some(seen) = seen else { continue };
+            let taken = match &robot.gripper_tag {
+                Some(tag) if tag.id == id => {
+                    check_square(robot, tag.size_m, &seen).map(|_| view.gripper_tag = Some(seen))
+                }
+                _ => tag_view(robot, id, &seen).map(|tag| view.tags.push(tag)),
+            };
+            if let Err(rejection) = taken {
+                *data.rejected.entry(rejection).or_default() += 1;
             }
         }
-        Some(View { pose_idx, end: mark.end, travel_rad, tags })
+        Some(view)
     }
 }
 
-fn add_corners(detections: &TagDetections, corners: &mut BTreeMap<u32, ([[f64; 2]; 4], usize)>) {
+fn add_corners(detections: &TagDetections, frames: &mut BTreeMap<u32, Vec<[[f64; 2]; 4]>>) {
     for tag in &detections.tags {
-        let (sums, n_frames) = corners.entry(tag.id).or_default();
-        for (sum, corner) in sums.iter_mut().flatten().zip(tag.corners_px.iter().flatten()) {
-            *sum += corner;
-        }
-        *n_frames += 1;
+        frames.entry(tag.id).or_default().push(tag.corners_px);
     }
 }
 
-fn tag_view(robot: &Robot, id: u32, corners_px: [[f64; 2]; 4], n_frames: usize) -> Result<TagView, Rejection> {
+fn tag_view(robot: &Robot, id: u32, seen: &SeenCorners) -> Result<TagView, Rejection> {
     let tag_idx = robot.tags.iter().position(|tag| tag.id == id).ok_or(Rejection::UnknownTag)?;
-    let solved = solve_square(&robot.camera.lens, robot.tags[tag_idx].size_m, &corners_px).map_err(|e| match e {
-        crate::optics::SquareError::OutOfView => Rejection::OutOfView,
-        crate::optics::SquareError::Degenerate => Rejection::NotASquare,
-    })?;
-    if solved.rms_px > MAX_SQUARE_RMS_PX {
-        return Err(Rejection::NotASquare);
-    }
+    let solved = check_square(robot, robot.tags[tag_idx].size_m, seen)?;
     let center_in_camera_m = solved.camera_from_tag.origin().vector();
-    Ok(TagView { id, tag_idx, center_in_camera_m, corners_px, n_frames })
+    Ok(TagView { id, tag_idx, center_in_camera_m, corners_px: seen.corners_px, n_frames: seen.n_frames })
+}
+
+/// The tag's pose by its corners, if they are those of a square of that size.
+fn check_square(robot: &Robot, size_m: f64, seen: &SeenCorners) -> Result<SquarePose, Rejection> {
+    let solved = solve_square(&robot.camera.lens, size_m, &seen.corners_px).map_err(|e| match e {
+        SquareError::OutOfView => Rejection::OutOfView,
+        SquareError::Degenerate => Rejection::NotASquare,
+    })?;
+    if solved.rms_px > MAX_SQUARE_RMS_PX { Err(Rejection::NotASquare) } else { Ok(solved) }
 }
 
 fn widen(range: &mut Option<(f64, f64)>, value: f64) {

@@ -1,28 +1,37 @@
 //! BELIEF: from a recording and a nominal robot to calibrated joint sensors.
 //!
-//! `associate` turns recorded messages into views; `identify` measures the scale of a sensor of which nobody knows it;
+//! `associate` turns recorded messages into views (of the `frames` that agree); `gripper_tag` finds where the camera hangs, `map` the tags where no survey does; `identify` measures the scale of a sensor of which nobody knows it;
 //! `problem` is the geometry shared by all methods; one file per method solves it; `observability` names what the data
 //! cannot determine before solving; `uncertainty` says how good the answer is and `verdict` whether to use it; `result` is
 //! calibration.toml, `compact` its short form. Nothing here knows of a simulator.
 
 mod associate;
+mod camera_mount;
 mod compact;
+mod frames;
+mod gripper_tag;
 mod identify;
+mod map;
 mod minimum_distance;
 mod observability;
 mod problem;
 mod result;
 mod uncertainty;
+mod valid_range;
 mod verdict;
 
-pub use associate::{CaptureData, Rejection, TagView, View, associate, associate_within, surveyed};
+pub use associate::{CaptureData, Rejection, SeenCorners, TagView, View, associate, associate_within, surveyed};
+pub use camera_mount::CameraMount;
 pub use compact::{CompactCalibration, CompactError, CompactJoint, MAX_COMPACT_BYTES, PredictedToolError};
+pub use gripper_tag::{MountEstimate, mount_by_gripper_tag};
 pub use identify::{IdentifiedScale, identify_scales};
+pub use map::{Known, MapResult, MapTag};
 pub use minimum_distance::{Solution, SolveOutcome, minimum_distance};
 pub use observability::{Unobservable, free_parameters};
 pub use problem::{JointParameters, Parameter, ParameterKind, PositionProblem};
-pub use result::{Calibration, CalibrationFileError, FitFigures, HeldOutFigures, JointResult, Status, ValidRange};
-pub use uncertainty::{ParameterCovariance, ToolErrorPrediction};
+pub use result::{Calibration, CalibrationFileError, FitFigures, HeldOutFigures, JointResult, Status};
+pub use uncertainty::{CommonErrors, ParameterCovariance, ToolErrorPrediction};
+pub use valid_range::ValidRange;
 pub use verdict::{MIN_HELD_OUT_VIEWS, MIN_VIEWS_PER_PARAMETER};
 
 use crate::log::Recording;
@@ -48,6 +57,8 @@ pub enum CalibError {
     TooFewViews { recording: String, views: usize, needed: usize },
     #[error("{recording}: no joint lies between the base and the camera with a sensor that the views determine")]
     NothingObservable { recording: String },
+    #[error("{recording}: no map of the tags can be made from its views: {problem}")]
+    Map { recording: String, problem: String },
     #[error("the scale of joint `{joint}` cannot be measured: {problem}")]
     Identify { joint: String, problem: String },
 }
@@ -64,15 +75,15 @@ pub const MIN_VIEWS: usize = 3;
 /// # Errors
 /// [`CalibError`] when the recording holds nothing to fit. A doubtful fit is returned with [`Status::Refused`].
 pub fn calibrate(recording: &Recording, robot: &Robot, method: Method) -> Result<Calibration, CalibError> {
-    if recording.joint_names != robot.joint_names() {
-        return Err(CalibError::JointNames {
-            recording: recording.path.display().to_string(),
-            robot: robot.name.clone(),
-            recorded: recording.joint_names.clone(),
-            expected: robot.joint_names(),
-        });
-    }
-    let robot = &*surveyed(recording, robot);
+    calibrate_among(recording, &surveyed(recording, robot), method)
+}
+
+/// The same, by the tags of `robot` whatever the recording says of them: a survey or a map that was made elsewhere.
+///
+/// # Errors
+/// As [`calibrate`].
+pub fn calibrate_among(recording: &Recording, robot: &Robot, method: Method) -> Result<Calibration, CalibError> {
+    check_joints(recording, robot)?;
     let mut accepted: Option<Calibration> = None;
     let mut used = Vec::new();
     let (last, earlier) = rounds(recording).split_last().map(|(last, rest)| (*last, rest.to_vec())).unwrap_or_default();
@@ -85,6 +96,18 @@ pub fn calibrate(recording: &Recording, robot: &Robot, method: Method) -> Result
         }
     }
     one_round(recording, robot, method, &last, accepted.as_ref(), &mut used)
+}
+
+fn check_joints(recording: &Recording, robot: &Robot) -> Result<(), CalibError> {
+    if recording.joint_names != robot.joint_names() {
+        return Err(CalibError::JointNames {
+            recording: recording.path.display().to_string(),
+            robot: robot.name.clone(),
+            recorded: recording.joint_names.clone(),
+            expected: robot.joint_names(),
+        });
+    }
+    Ok(())
 }
 
 /// One marked calibration; the default is the whole recording from the datasheet.
@@ -106,6 +129,13 @@ fn rounds(recording: &Recording) -> Vec<Round> {
     rounds.into_iter().map(|(_, round)| round).collect()
 }
 
+/// The views that tell of the camera's mount where these are more than the round's own: what the tag on the gripper said before
+/// stays true for a warm start; a fresh one forgets it.
+fn gripper_views(recording: &Recording, robot: &Robot, round: &Round) -> Option<CaptureData> {
+    let (_, to) = round.span.filter(|_| round.is_warm && robot.gripper_tag.is_some())?;
+    Some(associate_within(recording, robot, Some((Stamp { nanos: i64::MIN }, to))))
+}
+
 fn one_round(
     recording: &Recording,
     robot: &Robot,
@@ -121,7 +151,9 @@ fn one_round(
         // Travel is counted in the sensor's own scale.
         data = associate_within(recording, &robot, round.span);
     }
-    used.extend(data.used.iter().chain(&round.message_idx));
+    let watched = gripper_views(recording, &robot, round);
+    let of_watched = watched.iter().flat_map(|watched| &watched.used);
+    used.extend(data.used.iter().chain(of_watched).chain(&round.message_idx));
     used.sort_unstable();
     used.dedup();
     data.used.clone_from(used);
@@ -139,17 +171,41 @@ fn one_round(
     if views < MIN_VIEWS {
         return Err(CalibError::TooFewViews { recording: name(), views, needed: MIN_VIEWS });
     }
+    let mut robot = robot;
+    let mut errors = CommonErrors::priors(&robot);
+    let mut map = None;
+    if robot.tags.iter().any(|tag| !tag.is_known()) {
+        let mapped =
+            map::map_tags(&mut data, &robot).map_err(|problem| CalibError::Map { recording: name(), problem })?;
+        (robot, errors, map) = (mapped.robot, mapped.errors, Some(mapped.result));
+    }
     let prior = accepted.filter(|_| round.is_warm);
-    let guess = prior.map_or_else(JointParameters::default, |prior| prior.parameters(&robot));
+    let mut guess = prior.map_or_else(JointParameters::default, |prior| prior.parameters(&robot));
+    let mount = robot.gripper_tag.map(|tag| {
+        let views = watched.as_ref().map_or(&data.fit, |watched| &watched.fit);
+        mount_by_gripper_tag(&robot, &tag, views, &guess)
+    });
+    let mount = mount.transpose();
+    let mut determined = Vec::new();
+    if let Ok(Some(mount)) = &mount {
+        determined = mount.determined(&robot);
+        errors.mount = mount.mount_covariance();
+        guess = mount.parameters;
+        robot = robot.with_camera_at(mount.link_from_camera, &errors.mount);
+    }
     let fit = PositionProblem::new(&robot, &data.fit);
-    let (free, unobservable) = free_parameters(&fit, &guess);
+    let (free, mut unobservable) = free_parameters(&fit, &guess);
+    unobservable.retain(|left_out| !determined.contains(&left_out.parameter));
     if free.is_empty() {
         return Err(CalibError::NothingObservable { recording: name() });
     }
     let solution = match method {
         Method::MinimumDistance => minimum_distance(&fit, &free, &guess),
     };
-    let covariance = ParameterCovariance::estimate(&fit, &free, &solution.parameters);
+    let (mut covariance, by_mount) = ParameterCovariance::estimate(&fit, &free, &solution.parameters, &errors);
+    if let Ok(Some(mount)) = &mount {
+        covariance = covariance.with_gripper_tag(mount, &determined, &by_mount);
+    }
     let held_out = PositionProblem::new(&robot, &data.held_out);
     let linearity_scale = uncertainty::linearity_scale(&fit, &held_out, &solution.parameters, free.len());
     let as_found = robot.clone().with_linearity(linearity_scale);
@@ -165,6 +221,9 @@ fn one_round(
         held_out: &held_out,
         solution: &solution,
         covariance: &covariance,
+        n_fitted: free.len(),
+        mount: &mount,
+        map,
         unobservable: &unobservable,
         linearity_scale,
         task,

@@ -8,6 +8,7 @@
 use nalgebra::DMatrix;
 
 use super::problem::{JointParameters, Parameter, ParameterKind, PositionProblem};
+use crate::robot::Robot;
 
 /// A parameter that stays at its datasheet value, and why.
 #[derive(Clone, Debug, PartialEq)]
@@ -91,4 +92,19 @@ fn data_std_in_prior_units(problem: &PositionProblem<'_>, free: &[Parameter], gu
             variance.sqrt()
         })
         .collect()
+}
+
+/// `wrist_rotate gain and offset: why`, one line a joint and reason.
+pub(super) fn grouped_names(robot: &Robot, unobservable: &[Unobservable]) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    let mut rest = unobservable.iter().peekable();
+    while let Some(first) = rest.next() {
+        let twin = |next: &&Unobservable| next.parameter.joint == first.parameter.joint && next.reason == first.reason;
+        let name = first.parameter.name(robot);
+        match rest.next_if(twin) {
+            Some(_) => lines.push(format!("{name} and offset: {}", first.reason)),
+            None => lines.push(format!("{name}: {}", first.reason)),
+        }
+    }
+    lines
 }

@@ -1,22 +1,26 @@
 //! calibration.toml: the answer, how sure it is, what it rests on and where it holds.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
 use super::associate::CaptureData;
+use super::camera_mount::CameraMount;
+use super::gripper_tag::MountEstimate;
 use super::identify::IdentifiedScale;
+use super::map::MapResult;
 use super::minimum_distance::Solution;
-use super::observability::Unobservable;
+use super::observability::{Unobservable, grouped_names};
 use super::problem::{JointParameters, Parameter, ParameterKind, PositionProblem};
 use super::uncertainty::{ParameterCovariance, ToolErrorPrediction};
+use super::valid_range::ValidRange;
 use super::verdict::{Evidence, refusal};
 use crate::log::{Recording, hash_messages};
 use crate::robot::{FileIssue, Robot, RobotError, parse_toml, read_text};
 use crate::routine::Method;
 use crate::sensor::{ArmSensors, Correction};
 use crate::stats::Summary;
-use crate::time::Stamp;
 
 /// Whether the answer may be used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -48,6 +52,12 @@ pub struct Calibration {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub predicted_tool_error_m: Option<Summary>,
     pub valid: ValidRange,
+    /// Where the robot has a tag on the gripper.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub camera_mount: Option<CameraMount>,
+    /// Where the tags were found to be, where no survey said it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub map: Option<MapResult>,
     pub joint: Vec<JointResult>,
     /// Estimated parameters in the order of the covariance's rows, `joint gain` (relative) or `joint offset` (rad).
     pub covariance: CovarianceTable,
@@ -63,6 +73,9 @@ pub struct FitFigures {
     pub views: usize,
     pub tags_seen: usize,
     pub rejected: usize,
+    /// The same by reason; not in the file.
+    #[serde(default, skip_serializing)]
+    pub rejected_by_reason: BTreeMap<String, usize>,
     pub rms_m: f64,
     pub rms_px: f64,
     /// How many times the datasheets' linearity the sensors deviate from a straight line, by the residuals; at least 1.
@@ -85,20 +98,6 @@ pub struct HeldOutFigures {
     /// The same views with the datasheet's sensors.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub nominal_rms_m: Option<f64>,
-}
-
-/// What the captured views covered; beyond it the result is a guess.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ValidRange {
-    /// When the last view was captured, nanoseconds since the epoch.
-    pub time_nanos: i64,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub oil_c: Option<[f64; 2]>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub water_c: Option<[f64; 2]>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub pressure_pa: Option<[f64; 2]>,
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -152,6 +151,11 @@ pub(super) struct Parts<'a> {
     pub held_out: &'a PositionProblem<'a>,
     pub solution: &'a Solution,
     pub covariance: &'a ParameterCovariance,
+    /// Parameters that the views of tags around the arm determined.
+    pub n_fitted: usize,
+    /// By the tag on the gripper, or why not; none where the robot has none.
+    pub mount: &'a Result<Option<MountEstimate>, String>,
+    pub map: Option<MapResult>,
     pub unobservable: &'a [Unobservable],
     pub linearity_scale: f64,
     pub task: Option<ToolErrorPrediction>,
@@ -169,7 +173,7 @@ pub(super) fn assemble(parts: &Parts<'_>) -> Calibration {
         held_out_rms_m: held_out.rms_m,
         held_out_nominal_rms_m: held_out.nominal_rms_m,
         fit_rms_m,
-        n_parameters: parts.covariance.parameters.len(),
+        n_parameters: parts.n_fitted,
         fit_views: views,
         predicted_tool_error_m: predicted.map(|p| p.p95),
         tolerance_m: parts.data.task.as_ref().map(|task| task.tolerance_m),
@@ -190,13 +194,16 @@ pub(super) fn assemble(parts: &Parts<'_>) -> Calibration {
             views,
             tags_seen: parts.fit.n_observations(),
             rejected: parts.data.rejected.values().sum(),
+            rejected_by_reason: parts.data.rejected_by_reason(),
             rms_m: fit_rms_m,
             rms_px: parts.fit.reprojection_rms_px(at).unwrap_or(f64::NAN),
             linearity_scale: parts.linearity_scale,
         },
         held_out,
         predicted_tool_error_m: predicted,
-        valid: valid_range(parts.data),
+        valid: ValidRange::of(parts.data),
+        camera_mount: CameraMount::of(parts.robot, parts.mount),
+        map: parts.map.clone(),
         joint: joint_results(parts),
         covariance: CovarianceTable {
             parameters: parts.covariance.parameters.iter().map(|p| p.name(parts.robot)).collect(),
@@ -218,32 +225,6 @@ fn held_out_figures(parts: &Parts<'_>) -> HeldOutFigures {
         rms_m: parts.held_out.rms_m(at),
         rms_px: parts.held_out.reprojection_rms_px(at),
         nominal_rms_m: parts.held_out.rms_m(&JointParameters::default()),
-    }
-}
-
-/// `wrist_rotate gain and offset: why`, one line a joint and reason.
-fn grouped_names(robot: &Robot, unobservable: &[Unobservable]) -> Vec<String> {
-    let mut lines: Vec<String> = Vec::new();
-    let mut rest = unobservable.iter().peekable();
-    while let Some(first) = rest.next() {
-        let twin = |next: &&Unobservable| next.parameter.joint == first.parameter.joint && next.reason == first.reason;
-        let name = first.parameter.name(robot);
-        match rest.next_if(twin) {
-            Some(_) => lines.push(format!("{name} and offset: {}", first.reason)),
-            None => lines.push(format!("{name}: {}", first.reason)),
-        }
-    }
-    lines
-}
-
-fn valid_range(data: &CaptureData) -> ValidRange {
-    let pair = |range: Option<(f64, f64)>| range.map(|(low, high)| [low, high]);
-    let last = data.fit.iter().map(|view| view.end).max().unwrap_or(Stamp { nanos: 0 });
-    ValidRange {
-        time_nanos: last.nanos,
-        oil_c: pair(data.oil_c),
-        water_c: pair(data.water_c),
-        pressure_pa: pair(data.pressure_pa),
     }
 }
 

@@ -7,9 +7,10 @@
 //! temperature) is there again at every new pose; at the tool it is added from the datasheet's linearity, or from more than
 //! that where the residuals say that the sensors are worse than their datasheet.
 
-use nalgebra::{Const, DMatrix, DVector, Dyn, Matrix3, OMatrix, Vector3};
+use nalgebra::{Const, DMatrix, DVector, Dyn, Matrix3, Matrix6, OMatrix, Vector3, Vector6};
 
 use super::associate::TagView;
+use super::gripper_tag::MountEstimate;
 use super::problem::{JointParameters, Parameter, ParameterKind, PositionProblem};
 use crate::kinematics::{IkGoal, IkSettings, JointLimits, solve_position};
 use crate::robot::Robot;
@@ -33,10 +34,46 @@ pub struct ToolErrorPrediction {
 /// Distances below this do not make the objective's curvature larger: it is where pixel noise sits, m.
 const DISTANCE_FLOOR_M: f64 = 1e-4;
 
-impl ParameterCovariance {
-    /// Estimates the covariance at the solution. A singular curvature gives infinite variances.
+/// Errors that all views share.
+#[derive(Clone, Debug)]
+pub struct CommonErrors {
+    /// Covariance of the camera's mount (translation m, rotation rad), on the right.
+    pub mount: Matrix6<f64>,
+    /// Covariance of the tags' positions in the base frame, m^2, three rows a tag of the robot.
+    pub tags_m2: DMatrix<f64>,
+}
+
+impl CommonErrors {
+    /// What robot.toml and the survey say: every axis and every tag by itself.
     #[must_use]
-    pub fn estimate(problem: &PositionProblem<'_>, free: &[Parameter], at: &JointParameters) -> Self {
+    pub fn priors(robot: &Robot) -> Self {
+        let (std_m, std_rad) = (robot.camera.mount_std_m, robot.camera.mount_std_rad);
+        let mount = Vector6::from_fn(|row, _| if row < 3 { std_m } else { std_rad }.powi(2));
+        let tags = robot.tags.iter().flat_map(|tag| [tag.position_std_m.powi(2); 3]);
+        let tags_m2 = DMatrix::from_diagonal(&DVector::from_iterator(3 * robot.tags.len(), tags));
+        Self { mount: Matrix6::from_diagonal(&mount), tags_m2 }
+    }
+
+    /// Mount first, then the tags.
+    fn matrix(&self) -> DMatrix<f64> {
+        let n = 6 + self.tags_m2.nrows();
+        let mut matrix = DMatrix::zeros(n, n);
+        matrix.view_mut((0, 0), (6, 6)).copy_from(&self.mount);
+        matrix.view_mut((6, 6), (n - 6, n - 6)).copy_from(&self.tags_m2);
+        matrix
+    }
+}
+
+impl ParameterCovariance {
+    /// Estimates the covariance at the solution, and by how much the parameters go along with an error of the mount
+    /// (d parameter / d mount, six columns). A singular curvature gives infinite variances.
+    #[must_use]
+    pub fn estimate(
+        problem: &PositionProblem<'_>,
+        free: &[Parameter],
+        at: &JointParameters,
+        errors: &CommonErrors,
+    ) -> (Self, DMatrix<f64>) {
         let n = free.len();
         let n_tags = problem.robot.tags.len();
         let mut curvature = DMatrix::zeros(n, n);
@@ -62,17 +99,37 @@ impl ParameterCovariance {
             add_columns(&mut by_common, 3, &(&weighted * by_rotation));
             add_columns(&mut by_common, 6 + 3 * o.tag.tag_idx, &(-&weighted));
         });
-        let matrix = match curvature.try_inverse() {
-            None => DMatrix::from_diagonal_element(n, n, f64::INFINITY),
+        let (matrix, by_mount) = match curvature.try_inverse() {
+            None => (DMatrix::from_diagonal_element(n, n, f64::INFINITY), DMatrix::zeros(n, 6)),
             Some(inverse) => {
                 let used = problem.views.iter().filter(|view| !view.tags.is_empty()).count();
                 let small_sample = used as f64 / (used.saturating_sub(1)).max(1) as f64;
                 let scatter = &view_gradients * view_gradients.transpose() * small_sample;
                 let common = &inverse * by_common;
-                &inverse * scatter * &inverse + &common * common_variances(problem.robot) * common.transpose()
+                let matrix = &inverse * scatter * &inverse + &common * errors.matrix() * common.transpose();
+                (matrix, -common.columns(0, 6))
             }
         };
-        Self { parameters: free.to_vec(), matrix }
+        (Self { parameters: free.to_vec(), matrix }, by_mount)
+    }
+
+    /// The same with the joints that the tag on the gripper determined; `by_mount` as [`Self::estimate`] gives it.
+    #[must_use]
+    pub fn with_gripper_tag(self, mount: &MountEstimate, determined: &[Parameter], by_mount: &DMatrix<f64>) -> Self {
+        let rows: Vec<usize> = determined.iter().filter_map(|p| mount.row(*p)).collect();
+        let (n, k) = (self.parameters.len(), rows.len());
+        let mut matrix = DMatrix::zeros(n + k, n + k);
+        matrix.view_mut((0, 0), (n, n)).copy_from(&self.matrix);
+        for (i, &row) in rows.iter().enumerate() {
+            for (j, &column) in rows.iter().enumerate() {
+                matrix[(n + i, n + j)] = mount.covariance[(row, column)];
+            }
+            let with_mount: DVector<f64> = mount.covariance.view((0, row), (6, 1)).column(0).into_owned();
+            let shared = by_mount * with_mount;
+            matrix.view_mut((0, n + i), (n, 1)).copy_from(&shared);
+            matrix.view_mut((n + i, 0), (1, n)).copy_from(&shared.transpose());
+        }
+        Self { parameters: self.parameters.into_iter().chain(determined.iter().copied()).collect(), matrix }
     }
 
     /// One sigma of a parameter; `None` if it is not among the estimated ones.
@@ -160,15 +217,6 @@ fn outer(v: &Vector3<f64>) -> Matrix3<f64> {
 fn add_columns(matrix: &mut DMatrix<f64>, column: usize, block: &OMatrix<f64, Dyn, Const<3>>) {
     let mut view = matrix.fixed_columns_mut::<3>(column);
     view += block;
-}
-
-fn common_variances(robot: &Robot) -> DMatrix<f64> {
-    let mut variances = vec![robot.camera.mount_std_m.powi(2); 3];
-    variances.extend([robot.camera.mount_std_rad.powi(2); 3]);
-    for tag in &robot.tags {
-        variances.extend([tag.position_std_m.powi(2); 3]);
-    }
-    DMatrix::from_diagonal(&DVector::from_vec(variances))
 }
 
 /// Expected size of the tool's position error at each target of `task`: `sqrt(trace(covariance))`, summarized.

@@ -12,7 +12,8 @@ use super::{OutputError, check_replaceable, complete, make_folder, partial};
 use crate::log::{LogError, for_each_raw, topics};
 
 /// What a run leaves, in the order in which it is put in place.
-const RESULTS: [&str; 6] = ["truth.mcap", "run.rrd", "calibration.toml", "report.html", "run.mcap", SUMMARY];
+const RESULTS: [&str; 7] =
+    ["truth.mcap", "run.rrd", "tagmap.toml", "calibration.toml", "report.html", "run.mcap", SUMMARY];
 /// Its presence says that the files beside it are those of one run.
 const SUMMARY: &str = "summary.json";
 const LOCK: &str = "armcal.lock";

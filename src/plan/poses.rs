@@ -45,6 +45,8 @@ struct Candidate {
     angles: JointAngles,
     /// Information on the parameters in prior units.
     information: DMatrix<f64>,
+    /// Whether it shows a tag whose place is known, to most arms within the bounds.
+    shows_known_tag: bool,
 }
 
 const MAX_DRAWS: usize = 400_000;
@@ -54,9 +56,18 @@ const CANDIDATES_PER_POSE: usize = 8;
 const TARGET_DISTANCE_M: f64 = 0.15;
 /// Errors of a seen tag that do not average out (mount, survey), across the line of sight, m.
 const LATERAL_STD_M: f64 = 0.003;
-/// Joints from this one on move nothing that the camera sees; they stay where they are.
+/// Joints from this one on do not move the camera; they stay where they are, but for those that turn a tag on the gripper.
 fn n_seen(robot: &Robot) -> usize {
     robot.camera.mount.n_joints
+}
+
+/// Where tags have to be mapped first, one view in so many shows one whose place is known: the map hangs on that tag, and is turned
+/// about it by as much as its corners leave its direction open.
+const ANCHORED_EVERY: usize = 2;
+
+/// Whether a joint turns the tag on the gripper in the camera's view: then the views need many of its angles.
+fn shows_gripper_tag(robot: &Robot, joint: usize) -> bool {
+    robot.gripper_tag.is_some_and(|tag| tag.joints(&robot.camera.mount).contains(&joint))
 }
 
 /// Chooses `capture.poses` views for the fit and `capture.held_out` for the verdict.
@@ -80,7 +91,8 @@ pub fn choose_poses(request: &PoseRequest<'_>, rng: &mut ChaCha8Rng) -> Result<P
         return Err(PlanError::TooFewPoses { found, wanted, min_tags: request.capture.min_tags });
     }
     let task = task_jacobians(request);
-    let (mut poses, variance_m2) = pick_greedily(&mut candidates, n_fit, &task);
+    let anchored_every = if request.robot.tags.iter().all(|tag| tag.is_known()) { 1 } else { ANCHORED_EVERY };
+    let (mut poses, variance_m2) = pick_greedily(&mut candidates, n_fit, &task, anchored_every);
     for _ in 0..n_held_out {
         let k = rng.random_range(0..candidates.len());
         poses.push((CaptureSet::HeldOut, candidates.swap_remove(k).angles));
@@ -103,7 +115,7 @@ fn draw_candidates(request: &PoseRequest<'_>, enough: usize, rng: &mut ChaCha8Rn
         }
         let angles = JointAngles::from_fn(robot.n_joints(), |j| {
             let drawn = rng.random_range(0.0..1.0) * (limits[j].upper_rad - limits[j].lower_rad) + limits[j].lower_rad;
-            if j < n_seen(robot) { drawn } else { request.start[j] }
+            if j < n_seen(robot) || shows_gripper_tag(robot, j) { drawn } else { request.start[j] }
         });
         if let Some(candidate) = assess(request, angles) {
             candidates.push(candidate);
@@ -118,6 +130,10 @@ fn assess(request: &PoseRequest<'_>, angles: JointAngles) -> Option<Candidate> {
     let min_tags = request.capture.min_tags as usize;
     let poses = robot.chain.link_poses(&angles);
     request.visibility.in_view(robot, &poses).nth(min_tags.saturating_sub(1))?;
+    if robot.gripper_tag.is_some_and(|tag| !request.visibility.sees_gripper_tag(robot, &tag, request.clearance, &poses))
+    {
+        return None;
+    }
     let tool = poses.frame(&robot.tool.mount).translation.vector;
     let near_target = |target: &[f64; 3]| (tool - Vector3::from(*target)).norm() < TARGET_DISTANCE_M;
     if request.targets_m.iter().any(near_target) {
@@ -135,7 +151,8 @@ fn assess(request: &PoseRequest<'_>, angles: JointAngles) -> Option<Candidate> {
         return None;
     }
     let information = information(request, &angles, &seen);
-    Some(Candidate { angles, information })
+    let shows_known_tag = seen.iter().any(|&(idx, share)| share > 0.5 && robot.tags[idx].is_known());
+    Some(Candidate { angles, information, shows_known_tag })
 }
 
 /// Tags with the share of arms within the bounds that see them there.
@@ -210,21 +227,27 @@ fn task_jacobians(request: &PoseRequest<'_>) -> Vec<DMatrix<f64>> {
     request.task.iter().map(jacobian).collect()
 }
 
-/// Takes `n` candidates one by one, each the best beside those taken; gives them with the final mean tool variance, m^2.
+/// Takes `n` candidates one by one, each the best beside those taken; gives them with the final mean tool variance, m^2. The first of
+/// every `anchored_every` shows a known tag, as long as there are such candidates.
 fn pick_greedily(
     candidates: &mut Vec<Candidate>,
     n: usize,
     task: &[DMatrix<f64>],
+    anchored_every: usize,
 ) -> (Vec<(CaptureSet, JointAngles)>, f64) {
     let size = candidates[0].information.nrows();
     // The prior: one sigma each, in prior units.
     let mut total: DMatrix<f64> = DMatrix::identity(size, size);
     let mut variance_m2 = tool_variance_m2(&total, task);
     let mut picked = Vec::new();
-    for _ in 0..n {
+    for turn in 0..n {
+        let is_anchored = anchored_every > 1
+            && turn % anchored_every == 0
+            && candidates.iter().any(|candidate| candidate.shows_known_tag);
         let best = candidates
             .iter()
             .enumerate()
+            .filter(|(_, candidate)| !is_anchored || candidate.shows_known_tag)
             .map(|(k, candidate)| (k, tool_variance_m2(&(&total + &candidate.information), task)))
             .min_by(|a, b| a.1.total_cmp(&b.1));
         let Some((k, variance)) = best else { break };

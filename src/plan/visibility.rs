@@ -4,7 +4,7 @@ use nalgebra::{Point3, Vector3};
 
 use super::clearance::ClearanceModel;
 use crate::kinematics::LinkPoses;
-use crate::robot::Robot;
+use crate::robot::{GripperTag, Robot};
 use crate::streams::JointAngles;
 
 /// Conditions under which a detector reads a tag reliably.
@@ -51,6 +51,30 @@ impl VisibilityModel {
                 }
             })
             .map(|(idx, _)| idx)
+    }
+
+    /// Whether the camera sees the tag on the gripper, whose links hide it at some angles. It is meant to be near: only the
+    /// incidence, the image and what lies between count.
+    #[must_use]
+    pub fn sees_gripper_tag(
+        &self,
+        robot: &Robot,
+        tag: &GripperTag,
+        clearance: &ClearanceModel<'_>,
+        poses: &LinkPoses,
+    ) -> bool {
+        let base_from_camera = poses.frame(&robot.camera.mount);
+        let base_from_tag = poses.frame(&tag.mount);
+        let camera_from_base = base_from_camera.inverse();
+        let eye = base_from_camera.translation.vector;
+        let sight = eye - base_from_tag.translation.vector;
+        let normal = base_from_tag.rotation * Vector3::z();
+        normal.dot(&sight) > sight.norm() * self.max_incidence_rad.cos()
+            && crate::optics::square_corners(tag.size_m).iter().all(|corner| {
+                let in_base = base_from_tag * corner;
+                self.in_image(robot, &(camera_from_base * in_base))
+                    && !clearance.blocks_sight(poses, &eye, &in_base.coords, 0.01)
+            })
     }
 
     fn in_image(&self, robot: &Robot, in_camera: &Point3<f64>) -> bool {

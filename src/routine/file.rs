@@ -8,8 +8,11 @@ use super::campaign::{CampaignFile, CampaignSettings, RegressSettings};
 use super::overrides::{Overrides, read_with};
 use super::scene::Scene;
 use super::script::{self, Script};
+use super::site::SiteFile;
 use super::step::{MoveGoal, ReachSettings, Step};
-use crate::robot::{self, FileIssue, PartFile, Robot, RobotError, Vehicle, check_parts, parse_toml, read_text};
+use crate::robot::{
+    self, BaseTagStd, FileIssue, MapKnowledge, PartFile, Robot, RobotError, Vehicle, check_parts, parse_toml, read_text,
+};
 
 /// A calibration method by its name in files and on the command line.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -50,6 +53,9 @@ pub struct Routine {
     pub scene: Scene,
     /// The only tags that are there; all of the vehicle's or the robot's where it says nothing.
     pub tags: Option<Vec<u32>>,
+    /// How much of the tags' places is known.
+    pub map: MapKnowledge,
+    pub base_tag_std: BaseTagStd,
     /// The scene alone, as TOML, to travel with a recording.
     pub scene_toml: String,
     pub capture: CaptureSettings,
@@ -80,6 +86,12 @@ impl Routine {
             robot = robot.with_survey(survey.clone());
             vehicle.survey = Some(survey);
         }
+        if self.map != MapKnowledge::Known || self.base_tag_std != BaseTagStd::default() {
+            let survey = robot.survey().knowing(&self.map, self.base_tag_std);
+            let survey = survey.map_err(|problem| FileIssue::new(&self.file, "site.known_tags", problem))?;
+            robot = robot.with_survey(survey.clone());
+            vehicle.survey = Some(survey);
+        }
         self.check_against(&robot)?;
         Ok((robot, vehicle))
     }
@@ -93,6 +105,10 @@ impl Routine {
         for (index, step) in self.steps.iter().enumerate() {
             let key = format!("step {} ({})", index + 1, step.name());
             let problem = match step {
+                Step::Identify(_) if self.map != MapKnowledge::Known => {
+                    "needs a survey: a scale is measured before there are views to map the tags from (site.map)"
+                        .to_owned()
+                }
                 Step::Identify(settings) => match joints.iter().position(|name| *name == settings.joint) {
                     None => format!("joint `{}` is none of {joints:?}", settings.joint),
                     Some(joint) if joint >= robot.camera.mount.n_joints => {
@@ -223,6 +239,8 @@ struct RoutineFile {
     #[serde(default)]
     step: Vec<toml::Table>,
     #[serde(default)]
+    camera: CameraFile,
+    #[serde(default)]
     world: toml::Table,
     #[serde(default)]
     campaign: CampaignFile,
@@ -234,12 +252,34 @@ fn first_seed() -> u64 {
     1
 }
 
-#[derive(Clone, Default, Deserialize, Serialize)]
+/// What the routine says of the camera as a user sees it.
+#[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct SiteFile {
-    seafloor_z_m: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    tags: Option<Vec<u32>>,
+struct CameraFile {
+    mode: Option<String>,
+}
+
+impl CameraFile {
+    /// The world's table with the mode in it: where images come from is the truth's business.
+    fn into_world(self, file: &Path, mut world: toml::Table) -> Result<toml::Table, FileIssue> {
+        const MODES: [&str; 2] = ["geometric", "rendered"];
+        let Some(mode) = self.mode else { return Ok(world) };
+        if !MODES.contains(&mode.as_str()) {
+            return Err(FileIssue::new(file, "camera.mode", format!("`{mode}` is none of {}", MODES.join(", "))));
+        }
+        let camera = world.entry("camera").or_insert_with(|| toml::Table::new().into());
+        // What is no table is refused where the world is read.
+        if let Some(camera) = camera.as_table_mut() {
+            match camera.get("mode").map(|other| other.as_str().unwrap_or_default()) {
+                Some(other) if other != mode => {
+                    let problem = format!("`{mode}`, but world.camera.mode is `{other}`: leave one of them out");
+                    return Err(FileIssue::new(file, "camera.mode", problem));
+                }
+                _ => drop(camera.insert("mode".to_owned(), mode.into())),
+            }
+        }
+        Ok(world)
+    }
 }
 
 /// The part of a routine that says what surrounds the vehicle.
@@ -305,6 +345,7 @@ pub fn load_with(file: &Path, overrides: &Overrides) -> Result<Routine, RoutineE
     let campaign = raw.campaign.check(file)?;
     let folder = file.parent().unwrap_or(Path::new("."));
     let tags = raw.site.tags.clone();
+    let (map, base_tag_std) = (raw.site.map(file)?, raw.site.base_tag_std(file)?);
     let (scene, scene_file) = SceneFile { site: raw.site, obstacle: raw.obstacle }.check(file)?;
     let scene_toml = toml::to_string(&scene_file)
         .map_err(|error| FileIssue::new(file, "obstacle", format!("has no TOML form: {error}")))?;
@@ -322,11 +363,13 @@ pub fn load_with(file: &Path, overrides: &Overrides) -> Result<Routine, RoutineE
         method: raw.method,
         scene,
         tags,
+        map,
+        base_tag_std,
         scene_toml,
         capture: raw.capture,
         task: raw.task,
         steps: script.steps,
-        world: raw.world,
+        world: raw.camera.into_world(file, raw.world)?,
         faults: script.faults,
         campaign,
         regress: raw.regress,

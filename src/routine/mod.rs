@@ -10,6 +10,7 @@ mod file;
 mod overrides;
 mod scene;
 mod script;
+mod site;
 mod step;
 
 pub use campaign::{CampaignSettings, RegressSettings, SeedRange};

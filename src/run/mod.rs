@@ -212,6 +212,9 @@ impl Run<'_> {
 
     fn write_texts(&self, calibration: &Calibration, summary: &RunSummary) -> Result<(), RunError> {
         self.output.write("calibration.toml", calibration.to_toml().as_bytes())?;
+        if let Some(map) = &calibration.map {
+            self.output.write("tagmap.toml", map.to_toml().as_bytes())?;
+        }
         let json = serde_json::to_string_pretty(summary)?;
         self.output.write("summary.json", format!("{json}\n").as_bytes())?;
         Ok(self.output.write("report.html", html(summary, calibration).as_bytes())?)

@@ -1,10 +1,12 @@
 //! Recordings of an arm whose errors are known, made without the estimator's code: readings by the datasheet's formula,
 //! pixels by a projection of its own. Only the forward kinematics is the library's; Pinocchio vouches for it (`oracle`).
 
+use armcal::calib::Calibration;
 use armcal::kinematics::Attachment;
 use armcal::log::{Completeness, Recording};
 use armcal::optics::Fisheye;
 use armcal::robot::Robot;
+use armcal::stats::{quantile, stream_rng};
 use armcal::streams::{
     CaptureSet, JointAngles, JointCounts, JointSensorSample, Mark, MarkKind, Message, ReachTask, TagDetection,
     TagDetections,
@@ -26,6 +28,8 @@ pub struct TrueArm<'a> {
     pub offset_rad: Vec<f64>,
     pub camera: Attachment,
     pub base_from_tag: Vec<Isometry3<f64>>,
+    /// The tag on the gripper, on the last link.
+    pub link_from_gripper_tag: Option<Isometry3<f64>>,
 }
 
 /// One standing arm and what its camera saw: (id, corners).
@@ -53,6 +57,7 @@ impl<'a> TrueArm<'a> {
             offset_rad: (0..robot.n_joints()).map(|_| rng.random_range(-0.0873..0.0873)).collect(),
             camera: robot.camera.mount,
             base_from_tag: robot.tags.iter().map(|tag| *tag.base_from_tag.isometry()).collect(),
+            link_from_gripper_tag: robot.gripper_tag.map(|tag| tag.mount.link_from_frame),
         }
     }
 
@@ -62,6 +67,27 @@ impl<'a> TrueArm<'a> {
         self.camera.link_from_frame *= small_motion(camera.mount_std_m, camera.mount_std_rad, rng);
         for (tag, surveyed) in self.base_from_tag.iter_mut().zip(&self.robot.tags) {
             *tag *= small_motion(surveyed.position_std_m, surveyed.rotation_std_rad, rng);
+        }
+        if let (Some(tag), Some(drawn)) = (&mut self.link_from_gripper_tag, &self.robot.gripper_tag) {
+            *tag *= small_motion(drawn.position_std_m, drawn.rotation_std_rad, rng);
+        }
+    }
+
+    /// Turns the last joint of every shot at random within `range_rad` of zero, and adds the tag on the gripper.
+    pub fn see_gripper_tag(&self, shots: &mut [Shot], range_rad: f64, rng: &mut ChaCha8Rng) {
+        let (tag, built) = self.robot.gripper_tag.zip(self.link_from_gripper_tag).expect("a tag on the gripper");
+        let h = 0.5 * tag.size_m;
+        for shot in shots {
+            let last = self.robot.n_joints() - 1;
+            shot.angles[last] = rng.random_range(-range_rad..range_rad);
+            let poses = self.robot.chain.link_poses(&shot.angles);
+            let camera_from_tag = poses.frame(&self.camera).inverse() * poses.link(last + 1) * built;
+            let corners = [[-h, -h], [h, -h], [h, h], [-h, h]];
+            let seen =
+                corners.map(|[x, y]| pixel(&self.robot.camera.lens, &(camera_from_tag * Point3::new(x, y, 0.0))));
+            if let [Some(a), Some(b), Some(c), Some(d)] = seen {
+                shot.tags.push((tag.id, [a, b, c, d]));
+            }
         }
     }
 
@@ -145,6 +171,38 @@ impl<'a> TrueArm<'a> {
             rejected: Default::default(),
             non_monotonic: 0,
         }
+    }
+}
+
+/// Where an arm believes its tool to be, less where it is, over poses all over its range.
+#[derive(Clone, Copy, Debug)]
+pub struct ToolFigures {
+    /// Medians.
+    pub error_m: f64,
+    pub predicted_m: f64,
+    /// Mean of the squared error over its covariance; 3 if that is right.
+    pub nees: f64,
+}
+
+impl TrueArm<'_> {
+    pub fn tool_figures(&self, calibration: &Calibration) -> ToolFigures {
+        let tool =
+            |angles: &JointAngles| self.robot.chain.link_poses(angles).frame(&self.robot.tool.mount).translation.vector;
+        let sensors = calibration.sensors(self.robot).expect("made for this robot");
+        let covariance = calibration.parameter_covariance(self.robot);
+        let mut rng = stream_rng(0, "test angles");
+        let poses: Vec<JointAngles> = (0..40).map(|_| self.random_angles(&mut rng)).collect();
+        let (mut errors_m, mut predicted_m, mut nees) = (Vec::new(), Vec::new(), 0.0);
+        for angles in &poses {
+            let believed = sensors.angles(&self.counts(angles));
+            let error = tool(&believed) - tool(angles);
+            let predicted = covariance.tool_position_m2(self.robot, &sensors, &believed);
+            nees += error.dot(&(predicted.try_inverse().expect("a covariance") * error)) / poses.len() as f64;
+            errors_m.push(error.norm());
+            predicted_m.push(predicted.trace().sqrt());
+        }
+        let [error_m, predicted_m] = [errors_m, predicted_m].map(|values| quantile(&values, 0.5).expect("poses"));
+        ToolFigures { error_m, predicted_m, nees }
     }
 }
 

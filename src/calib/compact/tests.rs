@@ -2,7 +2,8 @@
 
 use proptest::prelude::*;
 
-use super::super::result::{CovarianceTable, FitFigures, HeldOutFigures, ValidRange};
+use super::super::result::{CovarianceTable, FitFigures, HeldOutFigures};
+use super::super::valid_range::ValidRange;
 use super::*;
 use crate::stats::Summary;
 
@@ -65,6 +66,7 @@ fn calibration(robot: &str, joints: &[Joint], refusal: Option<String>) -> Calibr
             views: 14,
             tags_seen: 81,
             rejected: 0,
+            rejected_by_reason: Default::default(),
             rms_m: 0.01,
             rms_px: 2.3,
             linearity_scale: 1.0,
@@ -72,6 +74,8 @@ fn calibration(robot: &str, joints: &[Joint], refusal: Option<String>) -> Calibr
         held_out: HeldOutFigures { views: 4, rms_m: Some(0.01), rms_px: Some(2.6), nominal_rms_m: Some(0.2) },
         predicted_tool_error_m: Some(Summary { n: 4, median: 0.005_879_45, p95: 0.006_070_3, max: 0.006_085 }),
         valid: ValidRange { time_nanos: 1_767_225_749_230_000_000, oil_c: None, water_c: None, pressure_pa: None },
+        camera_mount: None,
+        map: None,
         joint,
         covariance: CovarianceTable { parameters, rows },
     }

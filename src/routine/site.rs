@@ -1,0 +1,56 @@
+//! `[site]` of a routine: the seafloor, the tags that are there, and how much of their places is known.
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use crate::robot::{BaseTagStd, FileIssue, MapKnowledge};
+
+#[derive(Clone, Default, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct SiteFile {
+    pub(super) seafloor_z_m: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) tags: Option<Vec<u32>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    map: Option<MapFile>,
+    /// With map = "partly".
+    #[serde(skip_serializing_if = "Option::is_none")]
+    known_tags: Option<Vec<u32>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    base_tag_position_std_m: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    base_tag_rotation_std_rad: Option<f64>,
+}
+
+/// How much of the tags' places is known, as files write it.
+#[derive(Clone, Copy, Deserialize, Serialize)]
+#[serde(rename_all = "snake_case")]
+enum MapFile {
+    Known,
+    Partly,
+    Unknown,
+}
+
+impl SiteFile {
+    pub(super) fn map(&self, file: &Path) -> Result<MapKnowledge, FileIssue> {
+        let stray = || FileIssue::new(file, "site.known_tags", "goes with map = \"partly\", and that with it");
+        match (self.map.unwrap_or(MapFile::Known), &self.known_tags) {
+            (MapFile::Known, None) => Ok(MapKnowledge::Known),
+            (MapFile::Unknown, None) => Ok(MapKnowledge::Unknown),
+            (MapFile::Partly, Some(known)) => Ok(MapKnowledge::Partly(known.clone())),
+            _ => Err(stray()),
+        }
+    }
+
+    pub(super) fn base_tag_std(&self, file: &Path) -> Result<BaseTagStd, FileIssue> {
+        let check = |key: &str, value: Option<f64>| match value {
+            Some(value) => FileIssue::check_range(file, key, value, 0.0..=1.0).map(Some),
+            None => Ok(None),
+        };
+        Ok(BaseTagStd {
+            position_std_m: check("site.base_tag_position_std_m", self.base_tag_position_std_m)?,
+            rotation_std_rad: check("site.base_tag_rotation_std_rad", self.base_tag_rotation_std_rad)?,
+        })
+    }
+}
