@@ -21,6 +21,9 @@ mod replay;
 #[cfg(feature = "sim")]
 mod run;
 mod stdout;
+#[cfg(feature = "sim")]
+mod study;
+mod tagmap;
 
 use std::process::ExitCode;
 
@@ -49,8 +52,13 @@ enum Command {
     /// Run a routine for the seeds of a baseline, and say whether it has become worse
     #[cfg(feature = "sim")]
     Regress(Box<regress::RegressArgs>),
+    /// Measure a part on its own against known truth
+    #[cfg(feature = "sim")]
+    Study(study::StudyArgs),
     /// Calibrate from a recording, simulated or of a real arm
     Calibrate(calibrate::CalibrateArgs),
+    /// Find where the tags are, from camera views alone
+    Tagmap(tagmap::TagmapArgs),
     /// Say what is in a recording, whether it is whole, and what could be calibrated from it
     Inspect(inspect::InspectArgs),
     /// Write a calibration as YAML, TOML or one compact line to stdout
@@ -79,7 +87,10 @@ pub fn main() -> ExitCode {
         Command::Campaign(args) => campaign::campaign(&args),
         #[cfg(feature = "sim")]
         Command::Regress(args) => regress::regress(&args),
+        #[cfg(feature = "sim")]
+        Command::Study(args) => study::study(&args),
         Command::Calibrate(args) => calibrate::calibrate(&args),
+        Command::Tagmap(args) => tagmap::tagmap(&args),
         Command::Inspect(args) => inspect::inspect(&args),
         Command::Export(args) => export::export(&args),
         #[cfg(feature = "viewer")]

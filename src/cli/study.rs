@@ -1,0 +1,115 @@
+//! `armcal study`: parts on their own, against known truth.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use anyhow::{Context, Result};
+use clap::{Args, Subcommand};
+
+use super::exit::Exit;
+use super::files;
+use crate::detect::{DetectorSettings, GreyImage};
+use crate::optics::Fisheye;
+use crate::sim::WaterKind;
+use crate::stats::quantile;
+use crate::study::{
+    StudyError, Watcher, conditions, conditions_csv, detection_study, fit_noise, report, trials_csv, truth_csv,
+};
+
+#[derive(Debug, Args)]
+pub(super) struct StudyArgs {
+    #[command(subcommand)]
+    study: Study,
+}
+
+#[derive(Debug, Subcommand)]
+enum Study {
+    /// Render tags at set ranges and incidences in three kinds of water, detect them, and compare with the truth
+    Detection(DetectionArgs),
+}
+
+#[derive(Debug, Args)]
+struct DetectionArgs {
+    /// Folder for trials.csv, conditions.csv and report.txt
+    #[arg(long, value_name = "DIR", default_value = "recordings/study-detection")]
+    out: PathBuf,
+    /// Robot folder whose camera it is
+    #[arg(long, value_name = "DIR", default_value = "robots/titan4")]
+    robot: PathBuf,
+    /// Images under each condition
+    #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    repeats: u32,
+    /// Seed of places and noise
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Side of the blocks of pixels that the search takes for one
+    #[arg(long, value_name = "N", default_value_t = 1.0)]
+    decimation: f32,
+    /// The same of the second look, at an image of evened contrast; 0 for none
+    #[arg(long, value_name = "N", default_value_t = 2.0)]
+    second_decimation: f32,
+    /// Folder for the images (PNG) and truth.csv, for other detectors
+    #[arg(long, value_name = "DIR")]
+    images: Option<PathBuf>,
+}
+
+pub(super) fn study(args: &StudyArgs) -> Result<Exit> {
+    match &args.study {
+        Study::Detection(args) => detection(args),
+    }
+}
+
+fn detection(args: &DetectionArgs) -> Result<Exit> {
+    let lens: Fisheye = crate::robot::load(&args.robot)?.camera.lens;
+    let settings = DetectorSettings {
+        decimation: args.decimation,
+        second_decimation: args.second_decimation,
+        ..DetectorSettings::default()
+    };
+    files::make_folder(&args.out)?;
+    if let Some(folder) = &args.images {
+        files::make_folder(folder)?;
+    }
+    let mut clock = Clock { start: Instant::now(), images: args.images.as_deref() };
+    let study = detection_study(&lens, &settings, &conditions(args.repeats), args.seed, &mut clock)?;
+    let fitted = [WaterKind::Clear, WaterKind::Coastal, WaterKind::Turbid].map(|water| fit_noise(&study, water));
+    let text = report(&study, &fitted);
+    let write = |folder: &Path, name: &str, text: &str| {
+        let path = folder.join(name);
+        fs::write(&path, text).with_context(|| format!("{}: cannot be written", path.display()))
+    };
+    write(&args.out, "trials.csv", &trials_csv(&study))?;
+    write(&args.out, "conditions.csv", &conditions_csv(&study))?;
+    write(&args.out, "report.txt", &text)?;
+    if let Some(folder) = &args.images {
+        write(folder, "truth.csv", &truth_csv(&study))?;
+        let ms = 1e3 * quantile(&study.detect_s, 0.5).unwrap_or(f64::NAN);
+        write(folder, "time_ms.txt", &format!("{ms:.2}"))?;
+    }
+    print!("{text}");
+    println!("written      {}", args.out.display());
+    Ok(Exit::Ok)
+}
+
+struct Clock<'a> {
+    start: Instant,
+    images: Option<&'a Path>,
+}
+
+impl Watcher for Clock<'_> {
+    fn wall_s(&self) -> f64 {
+        self.start.elapsed().as_secs_f64()
+    }
+
+    fn image(&mut self, name: &str, image: GreyImage, n_done: usize, n_all: usize) -> Result<(), StudyError> {
+        if n_done.is_multiple_of(50) {
+            eprintln!("{n_done} of {n_all} images");
+        }
+        let Some(folder) = self.images else { return Ok(()) };
+        let path = folder.join(name);
+        let size = [image.width, image.height].map(|n| u32::try_from(n).unwrap_or(u32::MAX));
+        image::save_buffer(&path, image.data, size[0], size[1], image::ExtendedColorType::L8)
+            .map_err(|error| StudyError::Watcher(format!("{}: {error}", path.display())))
+    }
+}
