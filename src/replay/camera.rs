@@ -1,14 +1,14 @@
 //! The wrist camera's image plane: tags as seen, and where the believed arm expects them.
 
 use nalgebra::{Isometry3, Point3, Vector2, Vector3};
-use rerun::{Image, LineStrips2D, Radius};
+use rerun::{Clear, EncodedImage, Image, LineStrips2D, Radius};
 
 use super::Run;
 use super::colors;
 use super::rrd::Stream;
 use crate::optics::Fisheye;
 use crate::robot::SurveyedTag;
-use crate::streams::TagDetection;
+use crate::streams::{DetectionReject, TagDetection};
 
 /// The image plane's entity; raw pixels.
 pub(super) const CAMERA: &str = "/camera";
@@ -17,6 +17,8 @@ pub(super) const CAMERA: &str = "/camera";
 const VIEWS_HZ: f64 = 12.5;
 /// Without a new frame for this long, what was seen is taken down, s.
 const STALE_S: f64 = 0.6;
+/// And the image itself.
+const STALE_IMAGE_S: f64 = 2.5;
 /// Rerun has a pixel's corner at whole numbers, the lens its centre.
 const PIXEL_CENTER: f32 = 0.5;
 /// Bearings whose circles are drawn, rad.
@@ -26,11 +28,29 @@ const RINGS_RAD: [f64; 2] = [std::f64::consts::FRAC_PI_6, std::f64::consts::FRAC
 pub(super) fn draw(run: &Run, stream: &mut Stream) {
     let lens = &run.robot.camera.lens;
     let [width, height] = lens.resolution_px;
-    stream.fix(&format!("{CAMERA}/background"), &Image::from_rgb24(background(lens), [width, height]));
+    if run.tracks.images.is_empty() {
+        stream.fix(&format!("{CAMERA}/background"), &Image::from_rgb24(background(lens), [width, height]));
+    } else {
+        draw_images(run, stream);
+    }
     let rings = LineStrips2D::new(RINGS_RAD.iter().map(|&angle_rad| ring(lens, angle_rad)));
     stream.fix(&format!("{CAMERA}/rings"), &rings.with_radii([0.7]).with_colors([[52, 76, 96, 255]]));
     draw_expected(run, stream);
     draw_seen(run, stream);
+    draw_rejected(run, stream);
+}
+
+/// The camera's images as they were compressed, each until the next or until there has been none for a while.
+fn draw_images(run: &Run, stream: &mut Stream) {
+    let entity = format!("{CAMERA}/image");
+    for (n, (time_s, image)) in run.tracks.images.iter().enumerate() {
+        let picture = EncodedImage::new(image.jpeg.clone()).with_media_type("image/jpeg");
+        stream.draw(&entity, *time_s, &picture);
+        let next_s = run.tracks.images.get(n + 1).map_or(f64::INFINITY, |(next_s, _)| *next_s);
+        if next_s - time_s > STALE_IMAGE_S && time_s + STALE_IMAGE_S < run.tracks.duration_s {
+            stream.draw(&entity, time_s + STALE_IMAGE_S, &Clear::flat());
+        }
+    }
 }
 
 /// Dark water inside of the field of view, black outside.
@@ -62,7 +82,25 @@ fn draw_seen(run: &Run, stream: &mut Stream) {
     let entity = format!("{CAMERA}/seen");
     let style = LineStrips2D::update_fields().with_radii([Radius::new_ui_points(1.5)]).with_colors([colors::SEEN]);
     stream.fix(&entity, &style.with_show_labels(true).with_draw_order(30.0));
-    let mut views = run.tracks.views.clone();
+    let views = run.tracks.views.iter().map(|(time_s, view)| (*time_s, view.tags.iter().map(seen_quad).collect()));
+    draw_quads(run, stream, &entity, views.collect());
+}
+
+/// What the detector did not believe, and why.
+fn draw_rejected(run: &Run, stream: &mut Stream) {
+    if run.tracks.rejects.is_empty() {
+        return;
+    }
+    let entity = format!("{CAMERA}/rejected");
+    let style = LineStrips2D::update_fields().with_radii([Radius::new_ui_points(1.0)]).with_colors([colors::REJECTED]);
+    stream.fix(&entity, &style.with_show_labels(true).with_draw_order(25.0));
+    let views =
+        run.tracks.rejects.iter().map(|(time_s, view)| (*time_s, view.rejects.iter().map(rejected_quad).collect()));
+    draw_quads(run, stream, &entity, views.collect());
+}
+
+/// Outlines by time, each until the next or until there has been none for a while.
+fn draw_quads(run: &Run, stream: &mut Stream, entity: &str, mut views: Vec<(f64, Vec<Quad>)>) {
     views.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut drawn: Option<f64> = None;
     for (n, (time_s, view)) in views.iter().enumerate() {
@@ -72,10 +110,10 @@ fn draw_seen(run: &Run, stream: &mut Stream) {
         if drawn.is_some_and(|last_s| time_s - last_s < 1.0 / VIEWS_HZ) && !is_last_for_long {
             continue;
         }
-        stream.draw(&entity, *time_s, &quads(view.tags.iter().map(seen_quad)));
+        stream.draw(entity, *time_s, &quads(view.iter().cloned()));
         drawn = Some(*time_s);
         if is_last_for_long && time_s + STALE_S < run.tracks.duration_s {
-            stream.draw(&entity, time_s + STALE_S, &quads(std::iter::empty()));
+            stream.draw(entity, time_s + STALE_S, &quads(std::iter::empty()));
         }
     }
 }
@@ -85,6 +123,10 @@ type Quad = (Vec<[f32; 2]>, String);
 
 fn seen_quad(tag: &TagDetection) -> Quad {
     (closed(tag.corners_px.map(corner)), format!("{}", tag.id))
+}
+
+fn rejected_quad(reject: &DetectionReject) -> Quad {
+    (closed(reject.corners_px.map(corner)), format!("{}: {}", reject.id, reject.reason.name().replace('_', " ")))
 }
 
 fn closed(corners: [[f32; 2]; 4]) -> Vec<[f32; 2]> {

@@ -11,6 +11,8 @@ pub(super) const GHOST: Rgba = [255, 60, 220, 110];
 pub(super) const BELIEVED: Rgba = [255, 90, 225, 255];
 /// What the camera measured.
 pub(super) const SEEN: Rgba = [60, 230, 120, 255];
+/// What the detector did not believe.
+pub(super) const REJECTED: Rgba = [255, 120, 50, 255];
 /// The lens's reach into the scene and in the image.
 pub(super) const CAMERA: Rgba = [70, 200, 255, 255];
 pub(super) const TARGET: Rgba = [255, 205, 60, 255];

@@ -76,7 +76,12 @@ fn scene_view(b: &mut Builder, run: &Run) -> Part {
 }
 
 fn camera_view(b: &mut Builder, run: &Run) -> Part {
-    let view = b.view("2D", "Wrist camera: green = tags seen, pink = expected", CAMERA);
+    let title = if run.tracks.rejects.is_empty() {
+        "Wrist camera: green = tags seen, pink = expected"
+    } else {
+        "Wrist camera: green seen, orange rejected, pink expected"
+    };
+    let view = b.view("2D", title, CAMERA);
     let [width, height] = run.robot.camera.lens.resolution_px.map(f64::from);
     let bounds = VisualBounds2D::new(Range2D { x_range: [0.0, width].into(), y_range: [0.0, height].into() });
     b.property(&view, "VisualBounds2D", bounds);

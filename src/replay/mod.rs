@@ -65,7 +65,11 @@ struct Run<'a> {
 /// # Errors
 /// [`ReplayError`]: nothing to show, a truth file or joints that do not fit, or a file that cannot be written.
 pub fn write_rrd(input: &ReplayInput, out: &Path) -> Result<(), ReplayError> {
-    let tracks = Tracks::new(input.recording, input.robot)?;
+    let mut tracks = Tracks::new(input.recording, input.robot)?;
+    // A recording that was never in a file has no images.
+    if input.recording.path.is_file() {
+        tracks.take_images(&input.recording.path)?;
+    }
     let truth = match input.truth {
         Some(path) => Some(Truth::read(path, input.robot, &tracks)?),
         None => None,

@@ -101,7 +101,9 @@ impl Identity {
         }
         // Where the robot's drawings lie does not matter.
         let robot = Robot { folder: PathBuf::new(), ..input.robot.clone() };
-        hasher.update(format!("{robot:?}{:?}{:?}", input.vehicle, input.scene).as_bytes());
+        // What a robot or a vehicle may lack is not in the identity of one that does.
+        let drawings = format!("{robot:?}{:?}{:?}", input.vehicle, input.scene);
+        hasher.update(drawings.replace("gripper_tag: None, ", "").replace("lights: [], ", "").as_bytes());
         hasher.update(input.summary_markdown.unwrap_or_default().as_bytes());
         Ok(Self { recording_id: hasher.finalize().to_hex()[..32].to_owned() })
     }

@@ -11,8 +11,9 @@ use crate::robot::{Hull, Part, PlacedShape, Shape};
 use crate::routine::Scene;
 use crate::sensor::ArmSensors;
 use crate::streams::{
-    CaptureSet, GripperSample, JointAngles, JointSensorSample, JointStateBelief, LogLevel, LogLine, Mark, MarkKind,
-    Message, Phase, ReachAttempt, ReachTask, Sink, TagDetection, TagDetections, TemperatureSample, Thermometer,
+    CameraImage, CaptureSet, DetectionReject, DetectionRejects, GripperSample, JointAngles, JointSensorSample,
+    JointStateBelief, LogLevel, LogLine, Mark, MarkKind, Message, Phase, ReachAttempt, ReachTask, RejectReason, Sink,
+    TagDetection, TagDetections, TemperatureSample, Thermometer,
 };
 use crate::time::SIMULATION_EPOCH;
 
@@ -242,6 +243,35 @@ fn entities(rrd: &Path) -> std::collections::BTreeMap<String, usize> {
         }
     }
     entities
+}
+
+/// Images as they are in the recording, under what was seen and what was not believed.
+#[test]
+fn images_and_rejects_are_shown_where_there_are_any() {
+    let dir = tempfile::tempdir().unwrap();
+    let (run, out) = (dir.path().join("run.mcap"), dir.path().join("run.rrd"));
+    let robot = crate::robot::load(&robots().join("titan4")).unwrap();
+    let mut writer = RecordingWriter::create(&run, RecordingHeader::new(robot.joint_names())).unwrap();
+    // No more than its mark at both ends: nobody decodes it on the way.
+    let jpeg = [&[0xff, 0xd8][..], b"not decoded by anybody", &[0xff, 0xd9]].concat();
+    let reject = DetectionReject { id: 7, corners_px: [[9.0; 2]; 4], reason: RejectReason::LowContrast };
+    for n in 0..40 {
+        let stamp = SIMULATION_EPOCH.plus_s(0.2 * f64::from(n));
+        writer.record(stamp, &Message::JointStates(JointStateBelief { stamp, angles: robot.stowed })).unwrap();
+        if n < 10 {
+            writer.record(stamp, &Message::Image(CameraImage { stamp, jpeg: jpeg.clone() })).unwrap();
+            let rejects = vec![reject.clone()];
+            writer.record(stamp, &Message::Rejects(DetectionRejects { stamp, rejects })).unwrap();
+        }
+    }
+    writer.finish().unwrap();
+    let recording = read_recording(&run).unwrap();
+    write_rrd(&input(&recording, &robot), &out).unwrap();
+    let entities = entities(&out);
+    // Ten images and the end of the last; ten rejects, their style and their end.
+    assert_eq!(entities.get("/camera/image"), Some(&11), "{entities:?}");
+    assert_eq!(entities.get("/camera/rejected"), Some(&12), "{entities:?}");
+    assert!(!entities.contains_key("/camera/background"));
 }
 
 #[test]

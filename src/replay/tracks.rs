@@ -1,13 +1,16 @@
 //! The recording's messages sorted by kind, on the viewer's timeline.
 
+use std::path::Path;
+
 use nalgebra::{Isometry3, UnitQuaternion};
 
 use super::error::ReplayError;
-use crate::log::Recording;
+use crate::log::{LogError, Recording, for_each_image};
 use crate::robot::Robot;
 use crate::spatial::{Pose, Vehicle, World};
 use crate::streams::{
-    JointAngles, JointCounts, LogLine, Mark, MarkKind, Message, ReachTask, TagDetections, Thermometer,
+    CameraImage, DetectionRejects, JointAngles, JointCounts, LogLine, Mark, MarkKind, Message, ReachTask,
+    TagDetections, Thermometer,
 };
 use crate::time::Stamp;
 
@@ -15,6 +18,8 @@ use crate::time::Stamp;
 const CLOCKS_AGREE_S: f64 = 1.0;
 /// Samples nearer in time than this are dropped: nothing is drawn that fast.
 const MIN_SPACING_S: f64 = 0.0095;
+/// The same for images, which take most of the file.
+const MIN_IMAGE_SPACING_S: f64 = 0.095;
 /// Above this a stray log time, not a run, is the likely reason.
 const LONGEST_S: f64 = 7.0 * 24.0 * 3600.0;
 /// Steps of everything that moves.
@@ -94,6 +99,10 @@ pub(super) struct Tracks<'a> {
     /// Between the jaws, m.
     pub gripper: Track<f64>,
     pub views: Vec<(f64, &'a TagDetections)>,
+    /// What the detector saw and did not believe.
+    pub rejects: Vec<(f64, &'a DetectionRejects)>,
+    /// Camera images, ascending.
+    pub images: Vec<(f64, CameraImage)>,
     pub task: Option<(f64, &'a ReachTask)>,
     pub marks: Vec<Span>,
     pub log: Vec<(f64, &'a LogLine)>,
@@ -120,6 +129,8 @@ impl<'a> Tracks<'a> {
             water_c: Track::default(),
             gripper: Track::default(),
             views: Vec::new(),
+            rejects: Vec::new(),
+            images: Vec::new(),
             task: None,
             marks: Vec::new(),
             log: Vec::new(),
@@ -152,11 +163,29 @@ impl<'a> Tracks<'a> {
             },
             Message::Gripper(m) => self.gripper.push(at(m.stamp), m.opening_m),
             Message::Detections(m) => self.views.push((at(m.stamp), m)),
+            Message::Rejects(m) => self.rejects.push((at(m.stamp), m)),
             Message::Task(m) => self.task = Some((at(m.stamp), m)),
             Message::Mark(m) => self.marks.push(self.span(log_time, m)),
             Message::Log(m) => self.log.push((at(m.stamp), m)),
-            Message::JointCommand(_) | Message::GripperCommand(_) | Message::Pressure(_) | Message::Survey(_) => {}
+            Message::JointCommand(_)
+            | Message::GripperCommand(_)
+            | Message::Pressure(_)
+            | Message::Survey(_)
+            | Message::Image(_) => {}
         }
+    }
+
+    /// Takes the images, which a recording in memory leaves in its file, unless they follow each other too closely.
+    pub fn take_images(&mut self, file: &Path) -> Result<(), LogError> {
+        let mut images = Vec::new();
+        for_each_image(file, |log_time, image| images.push((self.place_s(log_time, image.stamp), image)))?;
+        images.sort_by(|a, b| a.0.total_cmp(&b.0));
+        for (time_s, image) in images {
+            if self.images.last().is_none_or(|(last_s, _)| time_s - last_s >= MIN_IMAGE_SPACING_S) {
+                self.images.push((time_s, image));
+            }
+        }
+        Ok(())
     }
 
     /// A mark is logged when its span is over.

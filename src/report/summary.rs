@@ -1,8 +1,10 @@
 //! summary.json. Lengths in m, angles in rad, times in s.
 
+use std::collections::BTreeMap;
+
 use serde::{Deserialize, Serialize};
 
-use crate::calib::{Calibration, Status};
+use crate::calib::{Calibration, CameraMount, MapResult, Status};
 use crate::stats::Summary;
 
 /// The figures of a run or of a calibration, for programs.
@@ -46,6 +48,9 @@ pub struct CaptureSummary {
     pub views: usize,
     pub detections: usize,
     pub rejected: usize,
+    /// The same by reason.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub rejected_by_reason: BTreeMap<String, usize>,
     /// Contacts of the arm with anything, from truth.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub collisions: Option<usize>,
@@ -63,6 +68,12 @@ pub struct CalibrationSummary {
     pub cost_final: f64,
     pub unobservable: Vec<String>,
     pub predicted_tool_error_m: Option<Summary>,
+    /// By the tag on the gripper, where the robot has one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub camera_mount: Option<CameraMount>,
+    /// Where no survey says where the tags are.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub map: Option<MapResult>,
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -170,6 +181,7 @@ impl RunSummary {
                 views: calibration.fit.views,
                 detections: calibration.fit.tags_seen,
                 rejected: calibration.fit.rejected,
+                rejected_by_reason: calibration.fit.rejected_by_reason.clone(),
                 collisions: None,
                 min_clearance_m: None,
             },
@@ -182,6 +194,8 @@ impl RunSummary {
                 cost_final: calibration.fit.cost_final,
                 unobservable: calibration.unobservable.clone(),
                 predicted_tool_error_m: calibration.predicted_tool_error_m,
+                camera_mount: calibration.camera_mount.clone(),
+                map: calibration.map.clone(),
             },
             held_out: HeldOutSummary {
                 views: calibration.held_out.views,

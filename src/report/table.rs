@@ -4,7 +4,7 @@ use comfy_table::presets::UTF8_FULL_CONDENSED;
 use comfy_table::{CellAlignment, Table};
 
 use super::summary::{AssertSummary, ReachScore, RunSummary, ScoreSide};
-use crate::calib::Status;
+use crate::calib::{CameraMount, Known, MapResult, Status};
 use crate::stats::Summary;
 
 /// Lays a summary out for a terminal.
@@ -143,6 +143,12 @@ pub(super) fn check_lines(summary: &RunSummary) -> Vec<String> {
         capture.rejected,
         capture.targets_skipped
     ));
+    if !capture.rejected_by_reason.is_empty() {
+        let reasons = capture.rejected_by_reason.iter().map(|(why, n)| format!("{n} {}", why.replace('_', " ")));
+        lines.push(format!("rejected     {}", reasons.collect::<Vec<_>>().join(", ")));
+    }
+    lines.extend(summary.calibration.camera_mount.as_ref().map(mount_line));
+    lines.extend(summary.calibration.map.iter().flat_map(map_lines));
     if let (Some(collisions), clearance) = (capture.collisions, capture.min_clearance_m) {
         lines.push(format!(
             "contacts     {collisions}; nearest the arm came to vehicle, obstacles or seafloor: {}",
@@ -164,6 +170,37 @@ pub(super) fn check_lines(summary: &RunSummary) -> Vec<String> {
             (simulated_s - waited_s) / summary.wall_s.max(1e-9)
         ));
     }
+    lines
+}
+
+fn mount_line(mount: &CameraMount) -> String {
+    match &mount.left_out {
+        Some(why) => format!("camera mount by the drawing: {why}"),
+        None => {
+            let rms = |v: [f64; 3]| (v.iter().map(|v| v * v).sum::<f64>() / 3.0).sqrt();
+            let (std_mm, std_deg) = (rms(mount.position_std_m) * 1e3, rms(mount.rotation_std_rad).to_degrees());
+            let (views, rms_px) = (mount.views, mount.rms_px.unwrap_or(f64::NAN));
+            format!(
+                "camera mount by the tag on the gripper in {views} views ({rms_px:.2} px): known to {std_mm:.1} mm, {std_deg:.2} deg"
+            )
+        }
+    }
+}
+
+fn map_lines(map: &MapResult) -> Vec<String> {
+    let known = match map.known {
+        Known::Partly => "some of it surveyed",
+        Known::BaseTagAlone => "nothing surveyed but the base tag",
+    };
+    let worst_m = map.tag.iter().flat_map(|tag| tag.position_std_m).fold(0.0, f64::max);
+    let mut lines = vec![format!(
+        "tag map      {} tags from {} views, {known}: {:.2} px rms, known to {:.1} mm or better",
+        map.tag.len(),
+        map.views,
+        map.rms_px,
+        worst_m * 1e3
+    )];
+    lines.extend(map.left_out.iter().map(|why| format!("left out     {why}")));
     lines
 }
 

@@ -22,6 +22,9 @@ pub struct ArmContents {
     /// Messages with detections, tags in them or not.
     pub detection_frames: u64,
     pub tags: Vec<TagSeen>,
+    /// What the detector saw and did not believe, by reason.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub detections_rejected: BTreeMap<String, u64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub task: Option<TaskSeen>,
     /// Lowest and highest reading.
@@ -52,6 +55,7 @@ pub(super) struct Collector {
     reaches: [u64; 2],
     frames: u64,
     tags: BTreeMap<u32, u64>,
+    detections_rejected: BTreeMap<String, u64>,
     oil_c: Option<[f64; 2]>,
     water_c: Option<[f64; 2]>,
     pressure_pa: Option<[f64; 2]>,
@@ -61,6 +65,11 @@ impl Collector {
     pub fn take(&mut self, message: &Message) {
         match message {
             Message::JointSensors(_) => self.joint_readings += 1,
+            Message::Rejects(rejects) => {
+                for reject in &rejects.rejects {
+                    *self.detections_rejected.entry(reject.reason.name().to_owned()).or_default() += 1;
+                }
+            }
             Message::Detections(detections) => {
                 self.frames += 1;
                 for tag in &detections.tags {
@@ -97,6 +106,7 @@ impl Collector {
             reaches_before: self.reaches[0],
             reaches_after: self.reaches[1],
             detection_frames: self.frames,
+            detections_rejected: self.detections_rejected,
             tags: self.tags.into_iter().map(|(id, detections)| TagSeen { id, detections }).collect(),
             task,
             oil_c: self.oil_c,

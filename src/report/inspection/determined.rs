@@ -6,8 +6,8 @@ use serde::Serialize;
 
 use super::is_capture;
 use crate::calib::{
-    JointParameters, MIN_HELD_OUT_VIEWS, MIN_VIEWS, MIN_VIEWS_PER_PARAMETER, PositionProblem, View, associate,
-    free_parameters, identify_scales, surveyed,
+    JointParameters, MIN_HELD_OUT_VIEWS, MIN_VIEWS, MIN_VIEWS_PER_PARAMETER, Parameter, PositionProblem, View,
+    associate, free_parameters, identify_scales, mount_by_gripper_tag, surveyed,
 };
 use crate::log::{LogError, Recording, TopicMap, scan_recording};
 use crate::robot::Robot;
@@ -65,18 +65,29 @@ pub(super) fn determined(path: &Path, robot: &Robot, marked: &Recording) -> Resu
     let with_tags = |views: &[View]| views.iter().filter(|view| !view.tags.is_empty()).count();
     determined.views = with_tags(&data.fit);
     determined.held_out_views = with_tags(&data.held_out);
-    determined.unknown_tags =
-        data.ids_seen.iter().copied().filter(|id| robot.tags.iter().all(|tag| tag.id != *id)).collect();
+    determined.unknown_tags = data.ids_seen.iter().copied().filter(|id| !knows(robot, *id)).collect();
     if determined.views > 0 {
         let problem = PositionProblem::new(robot, &data.fit);
         determined.tags_used = problem.n_observations();
-        let (free, unobservable) = free_parameters(&problem, &JointParameters::default());
-        determined.parameters = free.iter().map(|parameter| parameter.name(robot)).collect();
+        let (free, mut unobservable) = free_parameters(&problem, &JointParameters::default());
+        let by_gripper_tag = behind_the_camera(robot, &data.fit);
+        unobservable.retain(|left_out| !by_gripper_tag.contains(&left_out.parameter));
+        determined.parameters = free.iter().chain(&by_gripper_tag).map(|parameter| parameter.name(robot)).collect();
         let line = |u: &crate::calib::Unobservable| format!("{}: {}", u.parameter.name(robot), u.reason);
         determined.undetermined = unobservable.iter().map(line).collect();
     }
     determined.missing = missing(&determined);
     Ok(determined)
+}
+
+fn knows(robot: &Robot, id: u32) -> bool {
+    robot.tags.iter().map(|tag| tag.id).chain(robot.gripper_tag.map(|tag| tag.id)).any(|known| known == id)
+}
+
+/// What a tag on the gripper determines.
+fn behind_the_camera(robot: &Robot, views: &[View]) -> Vec<Parameter> {
+    let found = robot.gripper_tag.map(|tag| mount_by_gripper_tag(robot, &tag, views, &JointParameters::default()));
+    found.and_then(Result::ok).map(|mount| mount.determined(robot)).unwrap_or_default()
 }
 
 fn missing(determined: &Determined) -> Vec<String> {

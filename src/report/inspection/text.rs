@@ -123,6 +123,10 @@ fn arm_lines(inspection: &Inspection) -> Vec<String> {
     let frames = arm.detection_frames;
     let tags = if tags.is_empty() { none() } else { format!("{}; id (detections)", tags.join(", ")) };
     lines.push(format!("tags         {tags} in {frames} frames"));
+    if !arm.detections_rejected.is_empty() {
+        let reasons = arm.detections_rejected.iter().map(|(why, n)| format!("{} ({n})", why.replace('_', " ")));
+        lines.push(format!("not believed {}; reason (candidates)", reasons.collect::<Vec<_>>().join(", ")));
+    }
     if let Some(task) = &arm.task {
         let (n, mm) = (task.targets_m.len(), task.tolerance_m * 1e3);
         lines.push(format!("task         {n} targets within {mm:.1} mm"));
