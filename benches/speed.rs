@@ -1,4 +1,4 @@
-//! Where the time goes: kinematics, the objective, the solver, clearance, one simulated second.
+//! Where the time goes: kinematics, the objective, the solver, the tag map, clearance, one simulated second.
 //!
 //! `cargo bench --bench speed`. Compare figures of one run only; machines differ and are noisy.
 
@@ -55,7 +55,7 @@ fn views(robot: &Robot) -> Vec<View> {
             let tags = (0..TAGS_A_VIEW).map(|t| tag(t, [0; 3].map(|_| rng.random_range(-0.003..0.003)))).collect();
             let travel_rad =
                 JointAngles::from_fn(robot.n_joints(), |j| (angles[j] - robot.sensors[j].center_rad - 0.035) / 1.02);
-            View { pose_idx, end: SIMULATION_EPOCH, travel_rad, tags }
+            View { pose_idx, end: SIMULATION_EPOCH, travel_rad, tags, gripper_tag: None }
         })
         .collect()
 }
@@ -98,6 +98,53 @@ fn planning(c: &mut Criterion) {
     });
 }
 
+/// 300 images of up to 8 tags through the wrist camera, 0.3 px of noise; from pixels to map with covariances.
+fn tag_map(c: &mut Criterion) {
+    use armcal::tagmap::{Body, MapInput, MapSettings, MapView, SeenTag, TagPrior, solve};
+    use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+
+    let lens = robot().camera.lens;
+    let mut rng = stream_rng(1, "bench tag map");
+    let tags: Vec<Isometry3<f64>> = (0..8)
+        .map(|k| {
+            let lean = Vector3::new(rng.random_range(-0.4..0.4), rng.random_range(-0.4..0.4), 0.0);
+            let place = Translation3::new(0.4 * f64::from(k % 4) - 0.6, 0.4 * f64::from(k / 4) - 0.2, 0.0);
+            Isometry3::from_parts(place, UnitQuaternion::from_scaled_axis(lean))
+        })
+        .collect();
+    let view = |k: i64, rng: &mut rand_chacha::ChaCha8Rng| {
+        let mut draw = |size: f64| rng.random_range(-size..size);
+        let turn = Vector3::new(draw(0.4), draw(0.4), draw(3.0));
+        let place = Translation3::new(draw(0.6), draw(0.5), 1.2 + draw(0.3));
+        let face = UnitQuaternion::from_scaled_axis(Vector3::x() * std::f64::consts::PI);
+        let camera = Isometry3::from_parts(place, face * UnitQuaternion::from_scaled_axis(turn)).inverse();
+        let seen = (0_u32..).zip(&tags).filter_map(|(id, tag)| {
+            let mut corners_px = [[0.0; 2]; 4];
+            for (pixel, corner) in corners_px.iter_mut().zip(armcal::optics::square_corners(0.15)) {
+                let exact = lens.project(&(camera * tag * corner).coords).filter(|pixel| lens.contains(pixel))?;
+                *pixel = [exact.x + draw(0.5), exact.y + draw(0.5)];
+            }
+            Some(SeenTag { id, corners_px, covariance_px2: None })
+        });
+        let stamp = armcal::time::Stamp { nanos: k };
+        MapView { camera: 0, stamp, tags: seen.collect(), attitude: None }
+    };
+    let views: Vec<MapView> = (0..300).map(|k| view(k, &mut rng)).collect();
+    let bodies = [Body { name: "base".to_owned(), is_static: true, pose: None }];
+    let prior = |(id, pose): (u32, &Isometry3<f64>)| TagPrior {
+        id,
+        size_m: 0.15,
+        body: 0,
+        pose: (id == 0).then_some(*pose),
+        std: None,
+    };
+    let priors: Vec<TagPrior> = (0_u32..).zip(&tags).map(prior).collect();
+    let cameras = [lens.into()];
+    let input = MapInput { cameras: &cameras, views: &views, bodies: &bodies, tags: &priors };
+    let settings = MapSettings { base_tag: Some(0), ..MapSettings::default() };
+    c.bench_function("tagmap: 300 images of up to 8 tags", |b| b.iter(|| solve(black_box(&input), &settings)));
+}
+
 #[cfg(feature = "sim")]
 fn simulation(c: &mut Criterion) {
     use armcal::sim::{World, WorldInput, WorldSpec};
@@ -137,6 +184,68 @@ fn simulation(c: &mut Criterion) {
         });
     });
     one_step(c, &robot);
+    images(c, &robot, &vehicle, &scene);
+}
+
+/// The wrist camera's view of the stowed arm, the vehicle and its tags, at half and at full resolution, and the same with
+/// detection.
+#[cfg(feature = "sim")]
+fn images(c: &mut Criterion, robot: &Robot, vehicle: &Vehicle, scene: &Scene) {
+    use armcal::detect::{DetectorSettings, GreyImage, TagDetector};
+    use armcal::optics::Fisheye;
+    use armcal::robot::PlacedShape;
+    use armcal::sim::imaging::{ImageSpec, Imager, Light, Shot, SolidShape, TagPlane};
+
+    let base_from_vehicle = *vehicle.vehicle_from_base.inverse().isometry();
+    let links = robot.chain.link_poses(&robot.stowed);
+    let on_link = |body: usize, placed: &PlacedShape| (*links.link(body) * placed.owner_from_shape, placed.clone());
+    let camera_body = robot.camera.mount.n_joints;
+    let of_arm = robot.bodies.iter().enumerate().filter(|(body, _)| *body != camera_body);
+    let arm = of_arm.flat_map(|(body, link)| link.visuals.iter().map(move |placed| on_link(body, placed)));
+    let parts = vehicle.parts.iter().map(|p| (base_from_vehicle * p.placed.owner_from_shape, p.placed.clone()));
+    let (poses, shapes): (Vec<_>, Vec<_>) = arm
+        .chain(parts)
+        .map(|(pose, placed)| {
+            ([pose; 3], SolidShape { shape: placed.shape, color_rgb: placed.color_rgb, is_ground: false })
+        })
+        .unzip();
+    assert!(scene.obstacles.is_empty() && !poses.is_empty());
+    let tags: Vec<TagPlane> =
+        robot.tags.iter().map(|tag| TagPlane::fixed(tag.id, tag.size_m, *tag.base_from_tag.isometry())).collect();
+    let lights: Vec<Light> = vehicle
+        .lights
+        .iter()
+        .map(|light| Light {
+            position_m: base_from_vehicle * light.position_m,
+            direction: nalgebra::Unit::new_normalize(base_from_vehicle * light.direction.into_inner()),
+            flux_lm: light.flux_lm,
+            half_angle_rad: light.half_angle_rad,
+        })
+        .collect();
+    let half = robot.camera.lens;
+    let full = Fisheye {
+        focal_px: half.focal_px.map(|f| 2.0 * f),
+        center_px: half.center_px.map(|c| 2.0 * (c + 0.5) - 0.5),
+        resolution_px: half.resolution_px.map(|n| 2 * n),
+        ..half
+    };
+    let spec = ImageSpec { snow_per_m3: 100.0, ..ImageSpec::default() };
+    let shot = Shot { solids: &poses, ..Shot::of_tags(links.frame(&robot.camera.mount), &tags, 0) };
+    for (name, lens) in [("half", half), ("full", full)] {
+        let mut imager = Imager::new(&lens, &spec, &lights, 1);
+        imager.set_solids(&shapes);
+        c.bench_function(&format!("render: one image, {name} resolution"), |b| b.iter(|| imager.shoot(&shot).rgb[0]));
+        let mut detector = TagDetector::new(&lens, DetectorSettings::default()).expect("a detector");
+        let mut grey = Vec::new();
+        c.bench_function(&format!("render and detect: one image, {name} resolution"), |b| {
+            b.iter(|| {
+                let frame = imager.shoot(&shot);
+                frame.grey(&mut grey);
+                let image = GreyImage { width: frame.width, height: frame.height, data: &grey };
+                detector.detect(image).expect("an image").tags.len()
+            });
+        });
+    }
 }
 
 /// The arm on its oil columns in sea water, without sensors, hydraulics or contacts.
@@ -174,12 +283,45 @@ fn one_step(c: &mut Criterion, robot: &Robot) {
     });
 }
 
+/// Eight tags before the camera at 0.7 to 1.8 m, in clear water.
+#[cfg(feature = "sim")]
+fn detect(c: &mut Criterion) {
+    use armcal::detect::{DetectorSettings, GreyImage, TagDetector};
+    use armcal::sim::ImageSpec;
+    use armcal::sim::imaging::{Imager, Light, Shot, TagPlane};
+    use nalgebra::{Isometry3, Unit, UnitQuaternion, Vector3};
+
+    let lens = robot().camera.lens;
+    // The tag's z axis against the camera's.
+    let facing = UnitQuaternion::from_scaled_axis(Vector3::x() * std::f64::consts::PI);
+    let tags: Vec<TagPlane> = (0..8_u32)
+        .map(|k| {
+            let (column, row) = (f64::from(k % 4) - 1.5, f64::from(k / 4) - 0.5);
+            let place = Vector3::new(0.35 * column, 0.4 * row, 0.7 + 0.15 * f64::from(k));
+            TagPlane::fixed(k, 0.15, Isometry3::from_parts(place.into(), facing))
+        })
+        .collect();
+    let direction = Unit::new_normalize(Vector3::z());
+    let light = Light { position_m: [0.0, -0.5, -0.3].into(), direction, flux_lm: 2e4, half_angle_rad: 1.0 };
+    let mut grey = Vec::new();
+    let shot = Shot::of_tags(Isometry3::identity(), &tags, 1);
+    Imager::new(&lens, &ImageSpec::default(), &[light], 1).shoot(&shot).grey(&mut grey);
+    let [width, height] = lens.resolution_px.map(|n| n as usize);
+    let mut detector = TagDetector::new(&lens, DetectorSettings::default()).expect("it starts");
+    let image = GreyImage { width, height, data: &grey };
+    assert_eq!(detector.detect(image).expect("of the lens").tags.len(), tags.len());
+    c.bench_function("detect: eight tags, 1224 x 1024", |b| b.iter(|| detector.detect(black_box(image))));
+}
+
+#[cfg(not(feature = "sim"))]
+fn detect(_: &mut Criterion) {}
+
 #[cfg(not(feature = "sim"))]
 fn simulation(_: &mut Criterion) {}
 
 criterion_group! {
     name = benches;
     config = Criterion::default().sample_size(20);
-    targets = calibration, planning, simulation
+    targets = calibration, planning, tag_map, detect, simulation
 }
 criterion_main!(benches);

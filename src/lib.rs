@@ -9,6 +9,8 @@ pub mod calib;
 #[cfg(feature = "sim")]
 pub mod campaign;
 pub mod cli;
+#[cfg(feature = "detect")]
+pub mod detect;
 pub mod joints;
 pub mod kinematics;
 pub mod log;
@@ -31,5 +33,8 @@ pub mod sim;
 pub mod spatial;
 pub mod stats;
 pub mod streams;
+#[cfg(feature = "sim")]
+pub mod study;
+pub mod tagmap;
 pub mod time;
 pub mod verify;

@@ -67,6 +67,13 @@ const ROUTINE: &[Spoilt] = &[
 
 const WORLD: &[(&str, &[&str])] = &[
     ("[world.camera]\nrate = 5.0", &["short.toml", "world.camera", "rate"]),
+    ("[world.camera]\nmode = \"rendered\"\nport = \"flat\"", &["short.toml", "world.camera.port", "no single point"]),
+    (
+        "[camera]\nmode = \"rendered\"\n[world.camera]\nmode = \"geometric\"",
+        &["short.toml", "camera.mode", "leave one of them out"],
+    ),
+    ("[camera]\nmode = \"painted\"", &["short.toml", "camera.mode", "geometric, rendered"]),
+    ("[world.image]\nblur_px = -1.0", &["short.toml", "world.image.blur_px", "0 .. 10"]),
     ("[world.weather]\nwind = 5.0", &["short.toml", "world.weather"]),
     ("[world.clock]\ncamera_jitter_s = nan", &["short.toml", "world.clock.camera_jitter_s", "NaN"]),
     ("[world.camera]\nmiss_probability = 1.5", &["short.toml", "world.camera.miss_probability", "0 .. 1"]),
@@ -132,6 +139,8 @@ const VEHICLE: &[Spoilt] = &[
     ("size_m = [2.6, 1.7, 0.5]", "size_m = [2.6, -1.7, 0.5]", &["vehicle.toml", "float_block", "size_m[1]"]),
     ("position_m = [1.7, -0.6, 0.1]", "position_m = [nan, -0.6, 0.1]", &["vehicle.toml", "mount"]),
     ("shape = \"box\"", "shape = \"hull\"", &["vehicle.toml", "float_block", "hull"]),
+    ("half_angle_rad = 0.8", "half_angle_rad = 9.0", &["vehicle.toml", "light[0].half_angle_rad", "0.02 .. 3"]),
+    ("flux_lm = 15000.0", "flux_lm = nan", &["vehicle.toml", "light[0].flux_lm", "NaN"]),
 ];
 
 const URDF: &[Spoilt] = &[
