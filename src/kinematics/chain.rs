@@ -77,6 +77,17 @@ impl Chain {
         }
         poses
     }
+
+    /// The pose of one attached frame in the base frame at `angles` (rad), to the bit that of [`Self::link_poses`].
+    #[must_use]
+    pub fn frame(&self, angles: &JointAngles, attachment: &Attachment) -> Isometry3<f64> {
+        let mut base_from_link = Isometry3::identity();
+        for (joint, &angle_rad) in self.joints[..attachment.n_joints].iter().zip(angles.iter()) {
+            let turn = UnitQuaternion::from_axis_angle(&joint.axis, angle_rad);
+            base_from_link = base_from_link * joint.parent_from_joint * turn;
+        }
+        base_from_link * attachment.link_from_frame
+    }
 }
 
 impl LinkPoses {
@@ -109,5 +120,35 @@ impl LinkPoses {
     #[must_use]
     pub fn point_jacobian(&self, joint: usize, point_m: &Vector3<f64>) -> Vector3<f64> {
         self.axis(joint).cross(&(point_m - self.joint_origin(joint)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Translation3;
+    use rand::RngExt;
+
+    #[test]
+    fn a_frame_alone_is_to_the_bit_that_of_all_links() {
+        let mut rng = crate::stats::stream_rng(1, "chain");
+        let mut draw = || std::array::from_fn::<f64, 3, _>(|_| rng.random_range(-1.0..1.0));
+        let mut pose = || {
+            let (place, turn) = (draw(), draw());
+            Isometry3::from_parts(Translation3::from(place), UnitQuaternion::from_scaled_axis(Vector3::from(turn)))
+        };
+        let joint = |k: usize, parent_from_joint: Isometry3<f64>| ChainJoint {
+            name: format!("joint {k}"),
+            child_link: format!("link {k}"),
+            parent_from_joint,
+            axis: Unit::new_normalize(parent_from_joint.translation.vector),
+            limits: None,
+        };
+        let chain = Chain::new((0..6).map(|k| joint(k, pose())).collect());
+        for n_joints in 0..=6 {
+            let attachment = Attachment { n_joints, link_from_frame: pose() };
+            let angles = JointAngles::from_fn(6, |j| pose().translation.vector[j % 3]);
+            assert_eq!(chain.frame(&angles, &attachment), chain.link_poses(&angles).frame(&attachment));
+        }
     }
 }

@@ -76,30 +76,35 @@ impl Fisheye {
     /// Projection and its Jacobian d(pixel)/d(point), px/m.
     #[must_use]
     pub fn project_with_jacobian(&self, point_m: &Vector3<f64>) -> Option<(Vector2<f64>, Matrix2x3<f64>)> {
-        let pixel = self.project(point_m)?;
         let (x, y, z) = (point_m.x, point_m.y, point_m.z);
-        let r2 = x * x + y * y;
-        let r = r2.sqrt();
-        let [fx, fy] = self.focal_px;
-        if r <= 1e-9 * z.abs() {
-            let mut jacobian = Matrix2x3::zeros();
-            jacobian[(0, 0)] = fx / z;
-            jacobian[(1, 1)] = fy / z;
-            return Some((pixel, jacobian));
-        }
+        let r = x.hypot(y);
         let theta = r.atan2(z);
-        let theta_d = self.distorted(theta);
-        let slope = self.distorted_slope(theta);
-        let d2 = r2 + z * z;
-        // d theta / d(x, y, z); theta = atan2(r, z).
-        let dtheta = Vector3::new(x * z / (r * d2), y * z / (r * d2), -r / d2);
+        let d2 = r * r + z * z;
+        if theta > self.max_view_angle_rad || d2 < 1e-18 {
+            return None;
+        }
+        let [fx, fy] = self.focal_px;
+        // theta_d / r tends to 1 / z on the axis, and so do all derivatives along the image.
+        let is_on_axis = r <= 1e-9 * z.abs();
+        let scale = if is_on_axis { 1.0 / z } else { self.distorted(theta) / r };
+        let pixel = Vector2::new(fx * scale * x + self.center_px[0], fy * scale * y + self.center_px[1]);
+        if is_on_axis {
+            return Some((pixel, Matrix2x3::new(fx * scale, 0.0, 0.0, 0.0, fy * scale, 0.0)));
+        }
         let (ux, uy) = (x / r, y / r);
-        let r3 = r2 * r;
-        let dux = Vector3::new(y * y / r3, -x * y / r3, 0.0);
-        let duy = Vector3::new(-x * y / r3, x * x / r3, 0.0);
-        let row_x = (dtheta * (slope * ux) + dux * theta_d) * fx;
-        let row_y = (dtheta * (slope * uy) + duy * theta_d) * fy;
-        Some((pixel, Matrix2x3::from_rows(&[row_x.transpose(), row_y.transpose()])))
+        // With theta = atan2(r, z): along the radius, across it (theta_d / r), and along the axis.
+        let slope = self.distorted_slope(theta);
+        let (along, axial) = (slope * z / d2, -slope * r / d2);
+        let both = (along - scale) * ux * uy;
+        let jacobian = Matrix2x3::new(
+            fx * (along * ux * ux + scale * uy * uy),
+            fx * both,
+            fx * axial * ux,
+            fy * both,
+            fy * (along * uy * uy + scale * ux * ux),
+            fy * axial * uy,
+        );
+        Some((pixel, jacobian))
     }
 
     /// The direction (camera frame, unit) that a pixel sees; `None` beyond the field of view.

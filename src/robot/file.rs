@@ -7,6 +7,7 @@ use serde::Deserialize;
 
 use super::camera::{CameraFile, check_camera};
 use super::error::{FileIssue, RobotError, parse_toml, read_text};
+use super::failed::FailedJoint;
 use super::gripper::{GripperFile, GripperSpec};
 use super::gripper_tag::{GripperTag, GripperTagFile};
 use super::survey::{SurveyedTag, TagFile, TagSurvey, check_tags};
@@ -40,6 +41,8 @@ pub struct Robot {
     pub stowed: JointAngles,
     /// Weight of the displaced sea water over the arm's own weight.
     pub buoyancy_fraction: f64,
+    /// Joints that are declared to have failed; no robot folder says it.
+    pub failed: Vec<FailedJoint>,
 }
 
 /// Kind of joint sensor; decides which effects belief expects of it.
@@ -62,6 +65,8 @@ pub struct JointSensorSpec {
     pub wrap_counts: f64,
     /// The middle of the joint's range: gain errors are meant about it.
     pub center_rad: f64,
+    /// Half of the joint's range; of a joint without limits half a turn.
+    pub half_range_rad: f64,
     /// One sigma of the relative gain error.
     pub gain_std: f64,
     pub offset_std_rad: f64,
@@ -273,6 +278,7 @@ pub fn load(folder: &Path) -> Result<Robot, RobotError> {
         tag.check_id(&file, &tags)?;
     }
     Ok(Robot {
+        failed: Vec::new(),
         name: raw.name,
         folder: folder.to_owned(),
         urdf_name: raw.urdf.file_name().map_or_else(|| "robot.urdf".to_owned(), |n| n.to_string_lossy().into_owned()),
@@ -344,6 +350,9 @@ fn check_sensors(file: &Path, raw: &[SensorFile], chain: &Chain) -> Result<Vec<J
                     / std::f64::consts::PI,
                 wrap_counts: check("wrap_counts", s.wrap_counts, 1.0..=1e12)?,
                 center_rad: joint.limits.map_or(0.0, |l| 0.5 * (l.lower_rad + l.upper_rad)),
+                half_range_rad: joint
+                    .limits
+                    .map_or(std::f64::consts::PI, |l| 0.5 * (l.upper_rad - l.lower_rad).max(f64::MIN_POSITIVE)),
                 gain_std: check("gain_std", s.gain_std, 0.0..=10.0)?,
                 offset_std_rad: check("offset_std_rad", s.offset_std_rad, 0.0..=6.3)?,
                 gain_bound: check("gain_bound", s.gain_bound, 0.0..=0.5)?,

@@ -6,6 +6,7 @@
 
 mod camera;
 mod error;
+mod failed;
 mod file;
 mod gripper;
 mod gripper_tag;
@@ -20,6 +21,7 @@ mod vehicle;
 
 pub use error::{FileIssue, RobotError};
 pub(crate) use error::{parse_toml, read_text};
+pub use failed::{FailedJoint, FailedKind};
 pub use file::{CameraSpec, JointSensorSpec, Robot, SensorKind, ToolSpec, load};
 pub use gripper::{GripperSpec, Jaw};
 pub use gripper_tag::GripperTag;

@@ -13,6 +13,7 @@ use crate::spatial::{Base, Frame, Pose, Tag};
 #[derive(Clone, Debug)]
 pub struct SurveyedTag {
     pub id: u32,
+    /// Side of the black square; NaN of a landmark that is used by its position or pose alone, where nobody knows it.
     pub size_m: f64,
     /// Where nothing is known of it, at best where a drawing has it.
     pub base_from_tag: Pose<Base, Tag>,

@@ -4,9 +4,11 @@
 //! the summaries of samples that reports use, with the bootstrap's interval of a median.
 
 mod bootstrap;
+mod chi_square;
 mod rng;
 mod summary;
 
 pub use bootstrap::{Interval, median_interval};
+pub use chi_square::{chi_square_above, chi_square_quantile};
 pub use rng::stream_rng;
 pub use summary::{Summary, quantile};
