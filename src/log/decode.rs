@@ -8,6 +8,7 @@ use super::cdr;
 use super::error::Rejection;
 use super::ros::{self, Time};
 use super::topics::Stream;
+use crate::robot::{FailedJoint, FailedKind};
 use crate::streams::{
     Attitude, CameraImage, CaptureSet, DetectionReject, DetectionRejects, GripperCommand, GripperSample, JointAngles,
     JointCommand, JointCounts, JointSensorSample, JointStateBelief, LogLevel, LogLine, MAX_JOINTS, Mark, MarkKind,
@@ -261,10 +262,23 @@ fn mark(m: &ros::Mark) -> Result<Mark, Rejection> {
         "phase_reach" => MarkKind::Phase(Phase::Reach),
         "phase_wait" => MarkKind::Phase(Phase::Wait),
         "phase_done" => MarkKind::Phase(Phase::Done),
-        _ => return Err(Rejection::MarkKind),
+        other if other.starts_with("failed_") => MarkKind::Failed(failed_joint(other, m.index)?),
+        other => MarkKind::Stop { joint_idx: m.index, angle_rad: stop_angle_rad(other)? },
     };
     let mark = Mark { start: m.start.try_into()?, end: m.end.try_into()?, kind };
     if mark.end < mark.start { Err(Rejection::MarkSpan) } else { Ok(mark) }
+}
+
+/// `failed_KIND`.
+fn failed_joint(kind: &str, index: u32) -> Result<FailedJoint, Rejection> {
+    let kind = kind.strip_prefix("failed_").and_then(FailedKind::of_name).ok_or(Rejection::MarkKind)?;
+    Ok(FailedJoint { joint: index as usize, kind })
+}
+
+/// `stop ANGLE`.
+fn stop_angle_rad(kind: &str) -> Result<f64, Rejection> {
+    let angle = kind.strip_prefix("stop ").and_then(|angle| angle.parse::<f64>().ok());
+    angle.filter(|angle| angle.is_finite()).ok_or(Rejection::MarkKind)
 }
 
 /// Levels between the named ones fall to the lower name.
@@ -362,8 +376,12 @@ mod tests {
             survey_of(|m| m.tags[0].pose.position.x = f64::NAN),
             Err(Rejection::NotFinite { field: "position" })
         );
-        let kind = ros::Mark { kind: "nap".into(), ..Default::default() };
-        assert_eq!(mark(&kind), Err(Rejection::MarkKind));
+        for kind in ["nap", "stop", "stop ", "stop inf", "stop 1.0 rad"] {
+            let kind = ros::Mark { kind: kind.into(), ..Default::default() };
+            assert_eq!(mark(&kind), Err(Rejection::MarkKind));
+        }
+        let kind = ros::Mark { kind: "stop -3.6296".into(), index: 4, ..Default::default() };
+        assert_eq!(mark(&kind).map(|m| m.kind), Ok(MarkKind::Stop { joint_idx: 4, angle_rad: -3.6296 }));
     }
 
     #[test]

@@ -1,11 +1,14 @@
 //! From messages to the bytes of their ROS form.
 
+use std::borrow::Cow;
+
 use serde::Serialize;
 
 use super::cdr;
 use super::error::EncodeError;
 use super::ros::{self, PixelPoint, Quaternion, Time};
 use super::writer::RecordingHeader;
+use crate::robot::FailedJoint;
 use crate::streams::{
     Attitude, CameraImage, CaptureSet, DetectionRejects, LogLevel, LogLine, Mark, MarkKind, Message, Phase,
     PressureSample, ReachAttempt, ReachTask, RecordedSurvey, RecordedTag, Start, TagDetection, TagDetections,
@@ -164,15 +167,20 @@ fn survey(m: &RecordedSurvey, header: &RecordingHeader) -> Result<ros::TagSurvey
 
 fn mark(m: &Mark) -> Result<ros::Mark, EncodeError> {
     let (kind, index) = mark_kind(m.kind);
-    Ok(ros::Mark { start: m.start.try_into()?, end: m.end.try_into()?, kind: kind.to_owned(), index })
+    Ok(ros::Mark { start: m.start.try_into()?, end: m.end.try_into()?, kind: kind.into_owned(), index })
 }
 
 /// Name and index of a mark in the file; `decode` has the inverse.
-fn mark_kind(kind: MarkKind) -> (&'static str, u32) {
-    match kind {
+fn mark_kind(kind: MarkKind) -> (Cow<'static, str>, u32) {
+    let (name, index) = match kind {
+        // The one kind with a number that is no index: in the text, so that the message's form stays what it was.
+        MarkKind::Stop { joint_idx, angle_rad } => return (format!("stop {angle_rad}").into(), joint_idx),
         MarkKind::Capture { set: CaptureSet::Fit, pose_idx } => ("capture_fit", pose_idx),
         MarkKind::Capture { set: CaptureSet::HeldOut, pose_idx } => ("capture_held_out", pose_idx),
         MarkKind::Identify { joint_idx } => ("identify", joint_idx),
+        MarkKind::Failed(FailedJoint { joint, kind }) => {
+            return (format!("failed_{}", kind.name()).into(), joint as u32);
+        }
         MarkKind::Calibrate(Start::Fresh) => ("calibrate", 0),
         MarkKind::Calibrate(Start::Warm) => ("recalibrate", 0),
         MarkKind::Reach { attempt: ReachAttempt::Before, target_idx } => ("reach_before", target_idx),
@@ -191,7 +199,8 @@ fn mark_kind(kind: MarkKind) -> (&'static str, u32) {
             };
             (name, 0)
         }
-    }
+    };
+    (name.into(), index)
 }
 
 fn log_line(m: &LogLine) -> Result<ros::Log, EncodeError> {

@@ -12,6 +12,7 @@ mod encode;
 mod error;
 mod hash;
 mod images;
+mod order;
 mod raw;
 mod reader;
 pub mod ros;
@@ -28,6 +29,7 @@ pub use cdr::{CdrError, decode, encode};
 pub use error::{EncodeError, LogError, Rejection};
 pub use hash::{MessageHasher, hash_messages};
 pub use images::for_each_image;
+pub use order::{Disorder, StampOrder};
 pub use raw::{
     AttachmentInfo, Channel, ChunkTotals, Completeness, FileContents, RawMessage, RawSummary, Schema, file_contents,
     for_each_raw,

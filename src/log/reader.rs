@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::decode::{FirstNames, decode_message};
 use super::error::{LogError, Rejection};
+use super::order::{Disorder, StampOrder};
 use super::raw::{Completeness, RawMessage, RawSummary, for_each_raw};
 use super::topics::{Stream, VIEWER_TOPICS};
 use crate::streams::Message;
@@ -49,6 +50,8 @@ pub struct Recording {
     pub rejected: BTreeMap<String, u64>,
     /// How often, in the order of the file, log time went backwards.
     pub non_monotonic: u64,
+    /// The first disorder among the stamps of joint sensors and detections, by topic.
+    pub disorder: BTreeMap<String, Disorder>,
 }
 
 /// Reads a recording with our own topic names, see [`read_recording_with`]; camera images stay in the file, where
@@ -101,6 +104,7 @@ struct Collector<'a, F> {
     rejected: BTreeMap<String, u64>,
     latest: Stamp,
     non_monotonic: u64,
+    order: BTreeMap<Stream, StampOrder>,
 }
 
 impl<'a, F: FnMut(Stamp, &Message) -> bool> Collector<'a, F> {
@@ -125,6 +129,7 @@ impl<'a, F: FnMut(Stamp, &Message) -> bool> Collector<'a, F> {
             rejected: BTreeMap::new(),
             latest: Stamp { nanos: i64::MIN },
             non_monotonic: 0,
+            order: BTreeMap::new(),
         }
     }
 
@@ -137,6 +142,9 @@ impl<'a, F: FnMut(Stamp, &Message) -> bool> Collector<'a, F> {
         match check(stream, raw).and_then(|()| decode_message(stream, raw.data, names)) {
             Ok(message) => {
                 self.count_order(raw.log_time());
+                if let Some(stamp) = ordered_stamp(&message) {
+                    self.order.entry(stream).or_default().add(stamp);
+                }
                 if (self.keep)(raw.log_time(), &message) {
                     self.messages.push((raw.log_time(), message));
                 }
@@ -171,6 +179,14 @@ impl<'a, F: FnMut(Stamp, &Message) -> bool> Collector<'a, F> {
     }
 
     fn finish(mut self, path: &Path, completeness: Completeness) -> Recording {
+        let disorder = self
+            .order
+            .iter()
+            .filter_map(|(stream, order)| {
+                let named = self.streams.iter().find(|(_, of)| *of == stream);
+                Some((named?.0.to_string(), order.first_disorder()?))
+            })
+            .collect();
         let joint_names = self.settle_joint_names();
         self.messages.sort_by_key(|(log_time, _)| *log_time);
         self.raw.sort_by_key(|record| record.log_time);
@@ -183,6 +199,7 @@ impl<'a, F: FnMut(Stamp, &Message) -> bool> Collector<'a, F> {
             unknown_topics: self.unknown_topics,
             rejected: self.rejected,
             non_monotonic: self.non_monotonic,
+            disorder,
         }
     }
 
@@ -203,6 +220,15 @@ impl<'a, F: FnMut(Stamp, &Message) -> bool> Collector<'a, F> {
             self.reject(topic, &Rejection::OtherJoints, (before - self.messages.len()) as u64);
         }
         joint_names
+    }
+}
+
+/// The stamp of a message whose stream is in the order of time.
+fn ordered_stamp(message: &Message) -> Option<Stamp> {
+    match message {
+        Message::JointSensors(sample) => Some(sample.stamp),
+        Message::Detections(detections) => Some(detections.stamp),
+        _ => None,
     }
 }
 

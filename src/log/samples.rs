@@ -1,6 +1,7 @@
 //! Messages for the tests of this folder.
 
 use super::writer::{RecordingHeader, RecordingWriter};
+use crate::robot::{FailedJoint, FailedKind};
 use crate::streams::{
     Attitude, CameraImage, CaptureSet, DetectionReject, DetectionRejects, GripperCommand, GripperSample, JointAngles,
     JointCommand, JointCounts, JointSensorSample, JointStateBelief, LogLevel, LogLine, Mark, MarkKind, Message, Phase,
@@ -19,6 +20,8 @@ fn marks(stamp: Stamp) -> Vec<Message> {
         MarkKind::Capture { set: CaptureSet::Fit, pose_idx: 3 },
         MarkKind::Capture { set: CaptureSet::HeldOut, pose_idx: 4 },
         MarkKind::Identify { joint_idx: 2 },
+        MarkKind::Stop { joint_idx: 1, angle_rad: -2.064_400_000_000_1 },
+        MarkKind::Failed(FailedJoint { joint: 2, kind: FailedKind::Dead }),
         MarkKind::Calibrate(Start::Fresh),
         MarkKind::Calibrate(Start::Warm),
         MarkKind::Reach { attempt: ReachAttempt::Before, target_idx: 5 },

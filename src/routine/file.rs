@@ -11,22 +11,36 @@ use super::script::{self, Script};
 use super::site::SiteFile;
 use super::step::{MoveGoal, ReachSettings, Step};
 use crate::robot::{
-    self, BaseTagStd, FileIssue, MapKnowledge, PartFile, Robot, RobotError, Vehicle, check_parts, parse_toml, read_text,
+    self, BaseTagStd, FailedJoint, FileIssue, MapKnowledge, PartFile, Robot, RobotError, Vehicle, check_parts,
+    parse_toml, read_text,
 };
 
 /// A calibration method by its name in files and on the command line.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
+    /// Nominal end stops against the readings there (Williams 1991); needs no camera.
+    JointLimits,
+    /// The paper's first method: least spread of every landmark's positions; needs no map, and cannot find the first offset.
+    MinimumVariance,
     /// The paper's proposed method: least sum of distances to known landmarks.
-    #[default]
     MinimumDistance,
+    /// Maximum a posteriori over all that the measurements depend on.
+    #[default]
+    Bundle,
+}
+
+impl Method {
+    pub const ALL: [Self; 4] = [Self::JointLimits, Self::MinimumVariance, Self::MinimumDistance, Self::Bundle];
 }
 
 impl std::fmt::Display for Method {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(match self {
+            Self::JointLimits => "joint_limits",
+            Self::MinimumVariance => "minimum_variance",
             Self::MinimumDistance => "minimum_distance",
+            Self::Bundle => "bundle",
         })
     }
 }
@@ -34,10 +48,10 @@ impl std::fmt::Display for Method {
 impl std::str::FromStr for Method {
     type Err = String;
     fn from_str(name: &str) -> Result<Self, String> {
-        match name {
-            "minimum_distance" => Ok(Self::MinimumDistance),
-            other => Err(format!("method `{other}` is not known; there is: minimum_distance")),
-        }
+        Self::ALL.into_iter().find(|method| method.to_string() == name).ok_or_else(|| {
+            let known = Self::ALL.map(|method| method.to_string()).join(", ");
+            format!("method `{name}` is not known; there are: {known}")
+        })
     }
 }
 
@@ -56,6 +70,8 @@ pub struct Routine {
     /// How much of the tags' places is known.
     pub map: MapKnowledge,
     pub base_tag_std: BaseTagStd,
+    /// Joints that are declared to have failed, by name and kind.
+    pub failed_joints: Vec<FailedJointEntry>,
     /// The scene alone, as TOML, to travel with a recording.
     pub scene_toml: String,
     pub capture: CaptureSettings,
@@ -93,7 +109,17 @@ impl Routine {
             vehicle.survey = Some(survey);
         }
         self.check_against(&robot)?;
+        let failed = self.failed_of(&robot)?;
+        let robot = robot.with_failed(&failed);
         Ok((robot, vehicle))
+    }
+
+    fn failed_of(&self, robot: &Robot) -> Result<Vec<FailedJoint>, RoutineError> {
+        let of = |(index, entry): (usize, &FailedJointEntry)| {
+            FailedJoint::of_names(&entry.joint, &entry.kind, robot)
+                .map_err(|problem| FileIssue::new(&self.file, format!("failed_joint.{index}"), problem).into())
+        };
+        self.failed_joints.iter().enumerate().map(of).collect()
     }
 
     /// What only the robot can tell: whether the steps fit its joints.
@@ -116,6 +142,10 @@ impl Routine {
                     }
                     Some(_) => continue,
                 },
+                Step::Stops(settings) => match settings.joints.iter().find(|name| !joints.contains(name)) {
+                    None => continue,
+                    Some(name) => format!("joint `{name}` is none of {joints:?}"),
+                },
                 Step::Move(MoveGoal::Angles(angles)) if angles.len() != joints.len() => {
                     format!("to_rad has {} angles, robot `{}` has {} joints", angles.len(), robot.name, joints.len())
                 }
@@ -128,6 +158,15 @@ impl Routine {
         }
         Ok(())
     }
+}
+
+/// `[[failed_joint]]`.
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FailedJointEntry {
+    pub joint: String,
+    /// `locked`, `dead`, `stuck` or `jumps`.
+    pub kind: String,
 }
 
 /// How views are captured.
@@ -175,7 +214,7 @@ impl CaptureSettings {
         let check =
             |key: &str, value: f64, range| FileIssue::check_range(file, &format!("{prefix}{key}"), value, range);
         check("poses", f64::from(self.poses), 3.0..=1000.0)?;
-        check("held_out", f64::from(self.held_out), 3.0..=1000.0)?;
+        check("held_out", f64::from(self.held_out), 0.0..=1000.0)?;
         check("min_tags", f64::from(self.min_tags), 1.0..=100.0)?;
         check("clearance_m", self.clearance_m, 0.0..=1.0)?;
         check("dwell_s", self.dwell_s, 0.2..=60.0)?;
@@ -238,6 +277,8 @@ struct RoutineFile {
     task: TaskSettings,
     #[serde(default)]
     step: Vec<toml::Table>,
+    #[serde(default)]
+    failed_joint: Vec<FailedJointEntry>,
     #[serde(default)]
     camera: CameraFile,
     #[serde(default)]
@@ -303,6 +344,18 @@ impl SceneFile {
     }
 }
 
+/// A method that does not leave its own views out in turn needs others for its verdict.
+fn check_held_out(file: &Path, method: Method, steps: &[Step]) -> Result<(), FileIssue> {
+    if matches!(method, Method::Bundle | Method::JointLimits) {
+        return Ok(());
+    }
+    let held_out =
+        steps.iter().filter_map(|step| if let Step::Capture(settings) = step { Some(settings.held_out) } else { None });
+    held_out.min().map_or(Ok(()), |least| {
+        FileIssue::check_range(file, "capture.held_out", f64::from(least), 3.0..=1000.0).map(drop)
+    })
+}
+
 /// Reads the scene that travelled with a recording.
 ///
 /// # Errors
@@ -354,6 +407,7 @@ pub fn load_with(file: &Path, overrides: &Overrides) -> Result<Routine, RoutineE
     } else {
         script::read(file, raw.step, raw.capture, &raw.task)?
     };
+    check_held_out(file, raw.method, &script.steps)?;
     Ok(Routine {
         file: file.to_owned(),
         name: raw.name,
@@ -373,5 +427,6 @@ pub fn load_with(file: &Path, overrides: &Overrides) -> Result<Routine, RoutineE
         faults: script.faults,
         campaign,
         regress: raw.regress,
+        failed_joints: raw.failed_joint,
     })
 }

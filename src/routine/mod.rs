@@ -14,9 +14,12 @@ mod site;
 mod step;
 
 pub use campaign::{CampaignSettings, RegressSettings, SeedRange};
-pub use file::{CaptureSettings, Method, Routine, RoutineError, TaskSettings, load, load_scene, load_with};
+pub use file::{
+    CaptureSettings, FailedJointEntry, Method, Routine, RoutineError, TaskSettings, load, load_scene, load_with,
+};
 pub use overrides::{Override, Overrides, effective_table};
 pub use scene::Scene;
 pub use step::{
     AssertLimits, CalibrateSettings, CalibrateViews, IdentifySettings, MoveGoal, OnRefusal, ReachSettings, Step,
+    StopsSettings,
 };

@@ -8,6 +8,7 @@ use serde::de::DeserializeOwned;
 use super::file::{CaptureSettings, RoutineError, TaskSettings};
 use super::step::{
     AssertLimits, CalibrateSettings, CalibrateViews, IdentifySettings, MoveGoal, OnRefusal, ReachSettings, Step,
+    StopsSettings,
 };
 use crate::robot::FileIssue;
 
@@ -18,7 +19,7 @@ pub(super) fn standard(capture: CaptureSettings, task: &TaskSettings) -> Vec<Ste
     vec![reach(), Step::Capture(capture), Step::Calibrate(calibrate), reach()]
 }
 
-const NAMES: &str = "move, reach, grip, capture, identify, calibrate, recalibrate, wait, fault, assert";
+const NAMES: &str = "move, reach, grip, capture, identify, stops, calibrate, recalibrate, wait, fault, assert";
 
 /// Steps in order, and the tables of the faults in order, unread.
 pub(super) struct Script {
@@ -54,6 +55,7 @@ pub(super) fn read(
             "grip" => reader.grip()?,
             "capture" => reader.capture(capture)?,
             "identify" => reader.identify()?,
+            "stops" => reader.stops()?,
             "calibrate" => reader.calibrate(false)?,
             "recalibrate" => reader.calibrate(true)?,
             "wait" => reader.wait()?,
@@ -205,6 +207,22 @@ impl StepReader<'_> {
         }))
     }
 
+    fn stops(&self) -> Result<Step, FileIssue> {
+        #[derive(Deserialize)]
+        #[serde(deny_unknown_fields)]
+        struct Raw {
+            #[serde(default)]
+            joints: Vec<String>,
+            #[serde(default = "one_second")]
+            dwell_s: f64,
+        }
+        fn one_second() -> f64 {
+            1.0
+        }
+        let Raw { joints, dwell_s } = self.parse()?;
+        Ok(Step::Stops(StopsSettings { joints, dwell_s: self.range("dwell_s", dwell_s, 0.2..=60.0)? }))
+    }
+
     fn calibrate(&self, warm: bool) -> Result<Step, FileIssue> {
         #[derive(Deserialize)]
         #[serde(deny_unknown_fields)]
@@ -247,7 +265,7 @@ fn check_order(file: &Path, steps: &[Step]) -> Result<(), FileIssue> {
             Err(FileIssue::new(file, format!("step {} ({})", index + 1, step.name()), problem.to_owned()))
         };
         match step {
-            Step::Move(_) => moved = true,
+            Step::Move(_) | Step::Stops(_) => moved = true,
             Step::Reach(_) => (reaches, moved) = (reaches + 1, true),
             Step::Capture(_) => (captures, moved) = (captures + 1, true),
             Step::Identify(_) if moved => {

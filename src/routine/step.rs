@@ -19,6 +19,8 @@ pub enum Step {
     Capture(CaptureSettings),
     /// Moves one joint a little and measures with the camera how many counts a radian has.
     Identify(IdentifySettings),
+    /// Drives joints to their nominal end stops and records the readings there.
+    Stops(StopsSettings),
     Calibrate(CalibrateSettings),
     /// The arm rests while the world goes on.
     Wait {
@@ -41,6 +43,7 @@ impl Step {
             Self::Grip { .. } => "grip",
             Self::Capture(_) => "capture",
             Self::Identify(_) => "identify",
+            Self::Stops(_) => "stops",
             Self::Calibrate(CalibrateSettings { warm: false, .. }) => "calibrate",
             Self::Calibrate(CalibrateSettings { warm: true, .. }) => "recalibrate",
             Self::Wait { .. } => "wait",
@@ -80,6 +83,15 @@ pub struct IdentifySettings {
     pub swing_rad: f64,
     /// Views of the second excursion.
     pub views: u32,
+}
+
+/// Which joints are driven to their end stops.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StopsSettings {
+    /// By name; all that have stops where none is named.
+    pub joints: Vec<String>,
+    /// How long the readings at a stop are averaged.
+    pub dwell_s: f64,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]

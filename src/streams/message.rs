@@ -1,6 +1,7 @@
 //! The messages, free of any file format. Stamps are the sender's clock; the log time is the recorder's.
 
 use crate::joints::{JointAngles, JointCounts};
+use crate::robot::FailedJoint;
 use crate::time::Stamp;
 
 /// Everything that a recording of an arm may hold.
@@ -259,6 +260,10 @@ pub enum MarkKind {
     /// The arm stood still, and since the first such view of `joint_idx` no other joint was told to move: what the camera's
     /// turn against the readings says about the sensor's scale.
     Identify { joint_idx: u32 },
+    /// The joint stood at one of its nominal end stops, where the drawing has this angle.
+    Stop { joint_idx: u32, angle_rad: f64 },
+    /// Somebody declared that this joint, or its sensor, has failed; it holds for the whole recording.
+    Failed(FailedJoint),
     /// A calibration from the views captured within the span.
     Calibrate(Start),
     /// The arm came to rest for a target.
