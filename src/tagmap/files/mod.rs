@@ -1,10 +1,12 @@
 //! Files about cameras and tags: TagSLAM's, Kalibr's and our own.
 //!
 //! `cameras` reads and writes cameras.yaml and camchain.yaml, which are of one form; `tagslam` tagslam.yaml, `kalibr` a target's
-//! yaml, `own` our TOML. What they say of tags comes together in a [`TagFile`].
+//! yaml, `own` our TOML. What they say of tags comes together in a [`TagFile`]; `landmarks` makes the survey of it that joints are
+//! calibrated by.
 
 mod cameras;
 mod kalibr;
+mod landmarks;
 mod own;
 mod tagslam;
 mod yaml;
@@ -15,6 +17,7 @@ use std::path::Path;
 use nalgebra::{Isometry3, Matrix6};
 
 pub use cameras::{NamedCamera, cameras_to_yaml, parse_cameras, read_cameras};
+pub use landmarks::{FIRST_NAMED_ID, Landmark, LandmarkFile, NamedSurvey, UNKNOWN_ROTATION_STD_RAD, read_landmarks};
 
 use super::check::SIZE_RANGE_M;
 use super::result::{GroupFrame, TagMap};

@@ -1,7 +1,7 @@
 //! Our tag map file.
 //!
-//! `version = 1`, `frame`, and one `[[tag]]` each with `id`, `size_m`, `position_m`, `quaternion_wxyz`, `position_std_m`. Further
-//! keys, all optional: `base_tag` and `default_size_m` (of tags that are not named) at the top; `rotation_std_rad` and `frame`
+//! `version = 1`, `frame`, and one `[[tag]]` each with `id` (or `name`, for a landmark that is no AprilTag), `size_m`, `position_m`,
+//! `quaternion_wxyz`, `position_std_m`; all but the first may be absent where nobody knows them. Further keys, all optional: `base_tag` and `default_size_m` (of tags that are not named) at the top; `rotation_std_rad` and `frame`
 //! of a tag that is in another frame than the file's, such as a group that nothing ties to the first; `[[body]]` with `name`
 //! and `moving`, for frames that move.
 
@@ -11,6 +11,7 @@ use std::path::Path;
 use nalgebra::Isometry3;
 use serde::Deserialize;
 
+use super::landmarks::{FIRST_NAMED_ID, Landmark, LandmarkFile};
 use super::{TagFile, WrittenGroup};
 use crate::robot::{FileIssue, RobotError, parse_toml};
 use crate::spatial::{Base, Pose, Tag};
@@ -50,11 +51,56 @@ struct TagToml {
     rotation_std_rad: Option<[f64; 3]>,
 }
 
-pub(super) fn parse(file: &Path, text: &str) -> Result<TagFile, RobotError> {
+fn raw(file: &Path, text: &str) -> Result<MapToml, RobotError> {
     let raw: MapToml = parse_toml(file, text)?;
     if raw.version != 1 {
         return Err(FileIssue::new(file, "version", format!("{} is not supported; use 1", raw.version)).into());
     }
+    Ok(raw)
+}
+
+/// The landmarks in the file's frame; those of other frames are left out.
+pub(super) fn parse_landmarks(file: &Path, text: &str) -> Result<LandmarkFile, RobotError> {
+    let raw = raw(file, text)?;
+    let mut landmarks = Vec::new();
+    for (k, tag) in raw.tag.iter().enumerate() {
+        let label = match (tag.id, &tag.name) {
+            (Some(id), _) => format!("tag {id}"),
+            (None, Some(name)) => format!("tag `{name}`"),
+            (None, None) => {
+                return Err(FileIssue::new(file, format!("tag number {}", k + 1), "has neither id nor name").into());
+            }
+        };
+        let key = |of: &str| format!("{label}: {of}");
+        let size_m = tag.size_m.or(raw.default_size_m.filter(|_| tag.id.is_some()));
+        if let Some(size_m) = size_m {
+            FileIssue::check_range(file, &key("size_m"), size_m, SIZE_RANGE_M)?;
+        }
+        if let (position, Some(wxyz)) = (tag.position_m, tag.quaternion_wxyz) {
+            pose(file, &key("position_m, quaternion_wxyz"), position.unwrap_or_default(), wxyz)?;
+        }
+        for value in tag.position_m.iter().flatten() {
+            FileIssue::check_range(file, &key("position_m"), *value, -1e4..=1e4)?;
+        }
+        let std = std(file, tag, &key)?.unwrap_or_default();
+        if tag.frame.as_ref().is_some_and(|frame| *frame != raw.frame) {
+            continue;
+        }
+        landmarks.push(Landmark {
+            id: tag.id.unwrap_or(FIRST_NAMED_ID + k as u32),
+            name: tag.name.clone(),
+            size_m,
+            position_m: tag.position_m,
+            quaternion_wxyz: tag.quaternion_wxyz,
+            position_std_m: std[0],
+            rotation_std_rad: std[3..].iter().copied().fold(0.0, f64::max),
+        });
+    }
+    Ok(LandmarkFile { frame: raw.frame, base_tag: raw.base_tag, landmarks })
+}
+
+pub(super) fn parse(file: &Path, text: &str) -> Result<TagFile, RobotError> {
+    let raw = raw(file, text)?;
     let mut out = TagFile { frame: raw.frame.clone(), base_tag: raw.base_tag, ..TagFile::default() };
     body_of(&mut out, &raw.body, &raw.frame);
     for tag in &raw.tag {

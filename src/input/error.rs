@@ -1,0 +1,46 @@
+//! Why a recording of a real arm cannot be used.
+
+use crate::log::{CdrError, Disorder, LogError};
+
+/// A message by its topic and its number there, from 1, in the order of the file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct BadPlace {
+    pub topic: String,
+    pub message: u64,
+}
+
+impl std::fmt::Display for BadPlace {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "topic {}: message {}", self.topic, self.message)
+    }
+}
+
+/// Why a recording of a real arm was refused; `file` is the recording.
+#[derive(Debug, thiserror::Error)]
+pub enum InputError {
+    #[error(transparent)]
+    Log(#[from] LogError),
+    #[error("{file}: no message on topic {topic} of the input map; topics there: {found:?}")]
+    NoTopic { file: String, topic: String, found: Vec<String> },
+    #[error("{file}: topic {topic} holds {found:?}, not {expected}")]
+    Type { file: String, topic: String, found: String, expected: &'static str },
+    #[error("{file}: topic {topic} is encoded as {found:?}, not \"cdr\"")]
+    Encoding { file: String, topic: String, found: String },
+    #[error("{file}: {place}: cannot be decoded: {error}")]
+    Undecodable { file: String, place: BadPlace, error: CdrError },
+    #[error("{file}: {place}: {names} names for {positions} positions")]
+    NameCount { file: String, place: BadPlace, names: usize, positions: usize },
+    #[error("{file}: {place}: {field} of `{of}` is {value}, not a finite number")]
+    NotFinite { file: String, place: BadPlace, field: &'static str, of: String, value: f64 },
+    #[error("{file}: topic {topic}: {disorder}")]
+    Disorder { file: String, topic: String, disorder: Disorder },
+    #[error(
+        "{file}: topic {topic}: the joints {recorded:?} lack {missing:?} of the robot's {expected:?}; names that differ go into \
+         `joint_sensors.names` of the input map"
+    )]
+    JointNames { file: String, topic: String, recorded: Vec<String>, missing: Vec<String>, expected: Vec<String> },
+    #[error("{file}: topic {topic}: no tag in it: {problem}")]
+    NoTags { file: String, topic: String, problem: String },
+    #[error("{file}: topic {topic} holds {held}; `tags.use` of the input map must be {allowed}")]
+    Use { file: String, topic: String, held: &'static str, allowed: &'static str },
+}

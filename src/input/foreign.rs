@@ -1,0 +1,133 @@
+//! Reads a recording by an input map.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use super::error::InputError;
+use super::joints::{JointReader, Reading};
+use super::map::{InputMap, TagUse};
+use super::tags::{TagFrame, TagReader};
+use crate::log::ros::Time;
+use crate::log::{Completeness, RawMessage, for_each_raw};
+use crate::robot::Robot;
+use crate::time::Stamp;
+
+/// What a recording of a real arm holds for calibration.
+#[derive(Clone, Debug)]
+pub struct ForeignRecording {
+    pub path: PathBuf,
+    /// By their stamps.
+    pub readings: Vec<Reading>,
+    /// By their stamps; each has a tag.
+    pub frames: Vec<TagFrame>,
+    /// Joints of the robot that no reading has, by index; none of them moves the camera.
+    pub absent_joints: Vec<usize>,
+    /// Recorded joints that the robot lacks.
+    pub extra_joints: Vec<String>,
+    /// What was not used, by reason.
+    pub left_out: BTreeMap<String, u64>,
+    pub completeness: Completeness,
+}
+
+/// A header's stamp; the recorder's where the sender left it zero or it is none.
+pub(super) fn stamp_or_log_time(stamp: Time, log_time: Stamp) -> Stamp {
+    Stamp::try_from(stamp).ok().filter(|stamp| stamp.nanos != 0).unwrap_or(log_time)
+}
+
+/// Reads the joint readings and tags of a recording; joints are matched by name, in whatever order they come.
+///
+/// Joints behind the camera may be absent, unless the robot has a tag on its gripper.
+///
+/// # Errors
+/// [`InputError`], naming file, topic, message and field.
+pub fn read_foreign(path: &Path, map: &InputMap, robot: &Robot) -> Result<ForeignRecording, InputError> {
+    let file = path.display().to_string();
+    let joints = robot.joint_names();
+    let n_needed = if robot.gripper_tag.is_some() { joints.len() } else { robot.camera.mount.n_joints };
+    let mut topics: BTreeMap<String, String> = BTreeMap::new();
+    let mut readings = JointReader::new(&file, map, &joints, n_needed);
+    let mut tags = TagReader::new(&file, map);
+    let mut first_error = None;
+    let summary = for_each_raw(path, |raw| {
+        if !topics.contains_key(raw.topic()) {
+            topics.insert(raw.topic().to_owned(), raw.schema_name().to_owned());
+        }
+        if first_error.is_some() {
+            return;
+        }
+        let taken = if raw.topic() == map.joint_topic {
+            check_type(&file, raw, &["JointState"], "sensor_msgs/msg/JointState")
+                .and_then(|()| readings.take(raw, digest(raw)))
+        } else if raw.topic() == map.tag_topic {
+            check_tags(&file, raw, map).and_then(|()| tags.take(raw, digest(raw)))
+        } else {
+            Ok(())
+        };
+        first_error = taken.err();
+    })?;
+    if let Some(error) = first_error {
+        return Err(error);
+    }
+    for topic in [&map.joint_topic, &map.tag_topic] {
+        if !topics.contains_key(topic) {
+            let found = topics.into_keys().collect();
+            return Err(InputError::NoTopic { file: file.clone(), topic: topic.clone(), found });
+        }
+    }
+    if readings.readings.is_empty() {
+        return Err(readings.no_reading());
+    }
+    for (topic, order) in [(&map.joint_topic, &readings.order), (&map.tag_topic, &tags.order)] {
+        if let Some(disorder) = order.first_disorder() {
+            return Err(InputError::Disorder { file: file.clone(), topic: topic.clone(), disorder });
+        }
+    }
+    if tags.is_empty() {
+        let (topic, problem) = (map.tag_topic.clone(), tags.problem());
+        return Err(InputError::NoTags { file: file.clone(), topic, problem });
+    }
+    let absent_joints = (n_needed..joints.len()).filter(|joint| !readings.present.contains(joint)).collect();
+    let extra_joints = readings.extra();
+    let (mut sorted, mut left_out) = (readings.readings, readings.left_out);
+    sorted.sort_by_key(|reading| reading.stamp);
+    let (frames, of_tags) = tags.finish();
+    left_out.extend(of_tags);
+    let completeness = summary.completeness;
+    let path = path.to_owned();
+    Ok(ForeignRecording { path, readings: sorted, frames, absent_joints, extra_joints, left_out, completeness })
+}
+
+/// Of topic, log time and bytes, each with its length.
+fn digest(raw: &RawMessage<'_>) -> [u8; 32] {
+    let mut hasher = blake3::Hasher::new();
+    hasher.update(&(raw.topic().len() as u64).to_le_bytes());
+    hasher.update(raw.topic().as_bytes());
+    hasher.update(&raw.log_time_nanos.to_le_bytes());
+    hasher.update(raw.data);
+    *hasher.finalize().as_bytes()
+}
+
+/// ROS writes package/msg/Type; some converters leave out the middle.
+fn check_type(file: &str, raw: &RawMessage<'_>, types: &[&str], expected: &'static str) -> Result<(), InputError> {
+    let (file, topic) = (|| file.to_owned(), || raw.topic().to_owned());
+    if raw.channel.message_encoding != "cdr" {
+        let found = raw.channel.message_encoding.clone();
+        return Err(InputError::Encoding { file: file(), topic: topic(), found });
+    }
+    match raw.schema_name().rsplit('/').next() {
+        Some(name) if types.contains(&name) => Ok(()),
+        _ => Err(InputError::Type { file: file(), topic: topic(), found: raw.schema_name().to_owned(), expected }),
+    }
+}
+
+fn check_tags(file: &str, raw: &RawMessage<'_>, map: &InputMap) -> Result<(), InputError> {
+    const EXPECTED: &str = "tf2_msgs/msg/TFMessage or apriltag_msgs/msg/AprilTagDetectionArray";
+    check_type(file, raw, &["TFMessage", "AprilTagDetectionArray"], EXPECTED)?;
+    let is_transform = raw.schema_name().ends_with("/TFMessage");
+    let (held, allowed) = match (is_transform, map.tag_use) {
+        (true, TagUse::Corners) => ("transforms, which have no corners", "\"position\" or \"pose\""),
+        (false, TagUse::Position | TagUse::Pose) => ("corners in the image", "\"corners\""),
+        _ => return Ok(()),
+    };
+    Err(InputError::Use { file: file.to_owned(), topic: raw.topic().to_owned(), held, allowed })
+}

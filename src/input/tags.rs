@@ -1,0 +1,239 @@
+//! What the camera saw: transforms of `tf2_msgs/msg/TFMessage`, or corners of `apriltag_msgs/msg/AprilTagDetectionArray`.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
+
+use super::error::{BadPlace, InputError};
+use super::foreign::stamp_or_log_time;
+use super::map::{InputMap, NotFinite, TagUse, without_slash};
+use crate::log::ros::{AprilTagDetectionArray, TfMessage, TransformStamped};
+use crate::log::{RawMessage, StampOrder, decode};
+use crate::time::Stamp;
+
+/// One landmark in one image.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sighting {
+    /// Its number; `None` is the one landmark of a plain `child_frame`.
+    pub id: Option<u32>,
+    pub seen: Seen,
+}
+
+/// How it was seen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Seen {
+    /// Raw pixels: bottom left, bottom right, top right, top left as printed.
+    Corners([[f64; 2]; 4]),
+    /// Its position in the camera frame, m.
+    Position(Vector3<f64>),
+    /// `camera_from_tag`.
+    Pose(Isometry3<f64>),
+}
+
+/// What the camera saw at one stamp.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct TagFrame {
+    pub stamp: Stamp,
+    pub tags: Vec<Sighting>,
+    /// Hashes of the messages that it comes from.
+    pub digests: Vec<[u8; 32]>,
+}
+
+/// How far a quaternion's length may be from 1.
+const QUATERNION_LENGTH_TOLERANCE: f64 = 0.01;
+/// A landmark in the lens itself is a transform that nobody filled in, m.
+const MIN_DISTANCE_M: f64 = 1e-6;
+/// Names of frames that an error lists.
+const MAX_LISTED: usize = 20;
+
+/// Reads the messages of one topic.
+pub(super) struct TagReader<'a> {
+    file: &'a str,
+    map: &'a InputMap,
+    frames: BTreeMap<Stamp, TagFrame>,
+    pub order: StampOrder,
+    pub left_out: BTreeMap<String, u64>,
+    /// `parent -> child` of transforms, or frames of detections, that the map does not name.
+    others: BTreeSet<String>,
+    messages: u64,
+}
+
+impl<'a> TagReader<'a> {
+    pub fn new(file: &'a str, map: &'a InputMap) -> Self {
+        Self {
+            file,
+            map,
+            frames: BTreeMap::new(),
+            order: StampOrder::default(),
+            left_out: BTreeMap::new(),
+            others: BTreeSet::new(),
+            messages: 0,
+        }
+    }
+
+    pub fn take(&mut self, raw: &RawMessage<'_>, digest: [u8; 32]) -> Result<(), InputError> {
+        self.messages += 1;
+        let place = BadPlace { topic: raw.topic().to_owned(), message: self.messages };
+        let undecodable = |error| InputError::Undecodable { file: self.file.to_owned(), place: place.clone(), error };
+        if raw.schema_name().ends_with("/TFMessage") {
+            let message: TfMessage = decode(raw.data).map_err(undecodable)?;
+            for transform in &message.transforms {
+                self.transform(transform, raw.log_time(), &place, digest)?;
+            }
+        } else {
+            let message: AprilTagDetectionArray = decode(raw.data).map_err(undecodable)?;
+            self.detections(&message, raw.log_time(), &place, digest)?;
+        }
+        Ok(())
+    }
+
+    fn transform(
+        &mut self,
+        transform: &TransformStamped,
+        log_time: Stamp,
+        place: &BadPlace,
+        digest: [u8; 32],
+    ) -> Result<(), InputError> {
+        let (parent, child) = (without_slash(&transform.header.frame_id), without_slash(&transform.child_frame_id));
+        let camera = self.map.camera_frame.as_deref();
+        let id_of = |frame: &str| self.map.child_frame.as_ref()?.id_of(frame);
+        let (id, of, is_inverse) = match (id_of(child), id_of(parent)) {
+            (Some(id), _) if Some(parent) == camera => (id, child, false),
+            (_, Some(id)) if Some(child) == camera => (id, parent, true),
+            _ => {
+                self.others.insert(format!("{parent} -> {child}"));
+                return Ok(());
+            }
+        };
+        let stamp = stamp_or_log_time(transform.header.stamp, log_time);
+        self.order.add_of(place.message, stamp);
+        let position: [f64; 3] = transform.transform.translation.into();
+        let [w, x, y, z] = transform.transform.rotation.wxyz();
+        if let Some(value) = position.into_iter().find(|value| !value.is_finite()) {
+            return self.not_finite(place, "translation", of, value);
+        }
+        let quaternion = Quaternion::new(w, x, y, z);
+        let needs_rotation = is_inverse || self.map.tag_use == TagUse::Pose;
+        if needs_rotation && let Some(value) = [w, x, y, z].into_iter().find(|value| !value.is_finite()) {
+            return self.not_finite(place, "rotation", of, value);
+        }
+        let is_unit = (quaternion.norm() - 1.0).abs() <= QUATERNION_LENGTH_TOLERANCE;
+        if needs_rotation && !is_unit {
+            self.count("transforms whose quaternion's length differs from 1 by more than 1 %");
+            return Ok(());
+        }
+        let position = Vector3::from(position);
+        if position.norm() < MIN_DISTANCE_M {
+            self.count("transforms that put a landmark into the camera itself");
+            return Ok(());
+        }
+        let rotation = if is_unit { UnitQuaternion::from_quaternion(quaternion) } else { UnitQuaternion::identity() };
+        let given = Isometry3::from_parts(Translation3::from(position), rotation);
+        let camera_from_tag = if is_inverse { given.inverse() } else { given };
+        let seen = match self.map.tag_use {
+            TagUse::Pose => Seen::Pose(camera_from_tag),
+            _ => Seen::Position(camera_from_tag.translation.vector),
+        };
+        self.add(stamp, digest, Some(id), seen);
+        Ok(())
+    }
+
+    fn detections(
+        &mut self,
+        message: &AprilTagDetectionArray,
+        log_time: Stamp,
+        place: &BadPlace,
+        digest: [u8; 32],
+    ) -> Result<(), InputError> {
+        let frame = without_slash(&message.header.frame_id);
+        if self.map.camera_frame.as_deref().is_some_and(|camera| !frame.is_empty() && frame != camera) {
+            self.others.insert(frame.to_owned());
+            return Ok(());
+        }
+        let stamp = stamp_or_log_time(message.header.stamp, log_time);
+        self.order.add_of(place.message, stamp);
+        for tag in &message.detections {
+            let Ok(id) = u32::try_from(tag.id) else {
+                self.count("detections with a negative id");
+                continue;
+            };
+            let corners_px = tag.corners.map(|corner| [corner.x, corner.y]);
+            if let Some(value) = corners_px.iter().flatten().find(|value| !value.is_finite()) {
+                self.not_finite(place, "corners", &format!("tag {id}"), *value)?;
+                continue;
+            }
+            self.add(stamp, digest, Some(id), Seen::Corners(corners_px));
+        }
+        Ok(())
+    }
+
+    fn not_finite(&mut self, place: &BadPlace, field: &'static str, of: &str, value: f64) -> Result<(), InputError> {
+        if self.map.not_finite == NotFinite::LeaveOut {
+            self.count("tags with a number that is not finite");
+            return Ok(());
+        }
+        let (file, of) = (self.file.to_owned(), of.to_owned());
+        Err(InputError::NotFinite { file, place: place.clone(), field, of, value })
+    }
+
+    fn add(&mut self, stamp: Stamp, digest: [u8; 32], id: Option<u32>, seen: Seen) {
+        let id = match self.map.child_frame {
+            Some(super::map::ChildFrame::Plain(_)) if !matches!(seen, Seen::Corners(_)) => None,
+            _ => id,
+        };
+        let frame = self.frames.entry(stamp).or_default();
+        frame.stamp = stamp;
+        frame.tags.push(Sighting { id, seen });
+        if frame.digests.last() != Some(&digest) {
+            frame.digests.push(digest);
+        }
+    }
+
+    fn count(&mut self, what: &str) {
+        *self.left_out.entry(what.to_owned()).or_default() += 1;
+    }
+
+    /// In the order of time. A tag that is twice in one frame at different places is in it no more.
+    pub fn finish(mut self) -> (Vec<TagFrame>, BTreeMap<String, u64>) {
+        let mut frames: Vec<TagFrame> = std::mem::take(&mut self.frames).into_values().collect();
+        for frame in &mut frames {
+            let mut once: Vec<Sighting> = Vec::new();
+            let mut twice = BTreeSet::new();
+            for sighting in std::mem::take(&mut frame.tags) {
+                match once.iter().find(|other| other.id == sighting.id) {
+                    Some(other) if other.seen == sighting.seen => {}
+                    Some(_) => drop(twice.insert(sighting.id)),
+                    None => once.push(sighting),
+                }
+            }
+            once.retain(|sighting| !twice.contains(&sighting.id));
+            once.sort_by_key(|sighting| sighting.id);
+            frame.tags = once;
+            for _ in &twice {
+                self.count("tags seen at two places at one time");
+            }
+        }
+        frames.retain(|frame| !frame.tags.is_empty());
+        (frames, self.left_out)
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.frames.is_empty()
+    }
+
+    /// Why nothing of the topic could be used.
+    pub fn problem(&self) -> String {
+        let others: Vec<&String> = self.others.iter().take(MAX_LISTED).collect();
+        let left_out: Vec<String> = self.left_out.iter().map(|(what, n)| format!("{n} {what}")).collect();
+        match (others.is_empty(), left_out.is_empty()) {
+            (false, _) => format!(
+                "the input map wants `{}` seen from `{}`; in its {} messages are {others:?}",
+                self.map.child_frame.as_ref().map_or_else(|| "any tag".to_owned(), super::map::ChildFrame::text),
+                self.map.camera_frame.as_deref().unwrap_or("any camera"),
+                self.messages
+            ),
+            (true, false) => left_out.join(", "),
+            (true, true) => format!("its {} messages are empty", self.messages),
+        }
+    }
+}
