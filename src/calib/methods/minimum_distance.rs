@@ -1,0 +1,10 @@
+//! The paper's proposed method: least sum of distances between seen and surveyed landmarks, over all landmarks, by BOBYQA.
+
+use super::{PositionMethod, SearchOptions, Solution};
+use crate::calib::problem::{JointParameters, Parameter, PositionProblem};
+
+/// Minimizes [`PositionProblem::sum_of_distances_m`] over `free`, from `guess`; the other parameters stay there.
+#[must_use]
+pub fn minimum_distance(problem: &PositionProblem<'_>, free: &[Parameter], guess: &JointParameters) -> Solution {
+    PositionMethod::MinimumDistance.solve(problem, free, guess, &SearchOptions::default())
+}
