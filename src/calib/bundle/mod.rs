@@ -1,0 +1,40 @@
+//! BUNDLE: maximum a posteriori over everything that the measurements depend on.
+//!
+//! `model` says what has a column and which sizes are not known; `problem` puts views and priors into form; `sighting` linearizes one
+//! tag in one view, `linearize` sums the normal equations with the views' own parameters eliminated, `solve` is
+//! Levenberg-Marquardt; `evidence` fits noise and prior sizes, `select` decides on doubtful terms; `estimate` is the way from a robust start to the answer.
+
+mod alarm;
+mod detect;
+mod eliminated;
+mod estimate;
+mod evidence;
+mod failed;
+mod held_out;
+mod linearize;
+mod model;
+mod observability;
+mod prior;
+mod prior_terms;
+mod problem;
+mod readings;
+mod robust;
+mod select;
+mod sighting;
+mod solve;
+
+pub use alarm::{Change, Piece, Suspect};
+pub use detect::failures;
+pub use estimate::{
+    BundleInput, Estimate, Evidence, LeastSquares, MIN_GRIPPER_VIEWS, Outlier, estimate, least_squares, model_for,
+    reference,
+};
+pub use failed::{Applied, Failure, Found, Reading, set_by_camera};
+pub use held_out::{Innovations, JointInnovation};
+pub use model::{Model, SHAPE_LENGTH, Scales};
+pub use observability::{Observability, observability};
+pub use prior::{Agreement, MOUNT_ROWS, WarmStart, with_mount_rows};
+pub use select::{Doubtful, Selection, estimate_selecting};
+
+#[cfg(test)]
+mod tests;
