@@ -7,16 +7,18 @@
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 
-use nalgebra::Vector3;
+use nalgebra::{Isometry3, Vector3};
 
 use super::frames::agreeing_mean;
+use super::methods::StopReading;
+use super::surroundings::{Slope, Surroundings};
 use crate::log::Recording;
 use crate::optics::{SquareError, SquarePose, solve_square};
-use crate::robot::Robot;
-use crate::sensor::ArmSensors;
+use crate::robot::{FailedJoint, Robot};
+use crate::sensor::{ArmSensors, Conditions};
 use crate::streams::{
-    CaptureSet, JointAngles, Mark, MarkKind, Message, ReachTask, RecordedSurvey, RejectReason, TagDetections,
-    Thermometer,
+    CaptureSet, JointAngles, MAX_JOINTS, Mark, MarkKind, Message, ReachTask, RecordedSurvey, RejectReason,
+    TagDetections, Thermometer,
 };
 use crate::time::Stamp;
 
@@ -27,9 +29,38 @@ pub struct View {
     pub end: Stamp,
     /// Mean travel of each joint from the middle of its range by the datasheet, rad.
     pub travel_rad: JointAngles,
+    /// How many readings that mean has.
+    pub n_readings: usize,
+    /// How fast the travel changed over the view, rad/s.
+    pub rate_rad_s: JointAngles,
+    /// The way that each joint moved last before the view: -1, 1, or 0 where that is not known.
+    pub approach: [f64; MAX_JOINTS],
+    /// Joints whose reading says nothing in this view: `travel_rad` is then but a guess.
+    pub is_free: [bool; MAX_JOINTS],
+    /// Under which the readings were taken.
+    pub conditions: Conditions,
     pub tags: Vec<TagView>,
     /// The tag on the gripper, where the robot has one and it was seen.
     pub gripper_tag: Option<SeenCorners>,
+}
+
+impl View {
+    /// One reading of an arm at rest, nothing known of its surroundings, no tags yet.
+    #[must_use]
+    pub fn of_reading(pose_idx: u32, end: Stamp, travel_rad: JointAngles) -> Self {
+        Self {
+            pose_idx,
+            end,
+            travel_rad,
+            n_readings: 1,
+            rate_rad_s: JointAngles::zeros(travel_rad.len()),
+            approach: [0.0; MAX_JOINTS],
+            is_free: [false; MAX_JOINTS],
+            conditions: Conditions::default(),
+            tags: Vec::new(),
+            gripper_tag: None,
+        }
+    }
 }
 
 /// Corners of one tag, averaged over the frames of a view.
@@ -37,6 +68,19 @@ pub struct View {
 pub struct SeenCorners {
     pub corners_px: [[f64; 2]; 4],
     pub n_frames: usize,
+    /// Sum over frames and the eight coordinates of the squared deviation from the mean; it has `8 (n_frames - 1)` degrees of freedom.
+    pub scatter_px2: f64,
+}
+
+/// What a view tells of a tag or landmark.
+#[derive(Clone, Copy, Debug)]
+pub enum Measured {
+    /// Its corners in the image.
+    Corners(SeenCorners),
+    /// Its position in the camera frame, and no more.
+    Position,
+    /// `camera_from_tag`.
+    Pose(Isometry3<f64>),
 }
 
 /// One tag in one view.
@@ -47,9 +91,18 @@ pub struct TagView {
     pub tag_idx: usize,
     /// The tag's centre in the camera frame, m.
     pub center_in_camera_m: Vector3<f64>,
-    /// Corners averaged over the frames, px.
-    pub corners_px: [[f64; 2]; 4],
-    pub n_frames: usize,
+    pub measured: Measured,
+}
+
+impl TagView {
+    /// Its corners, where the recording has them.
+    #[must_use]
+    pub fn corners(&self) -> Option<&SeenCorners> {
+        match &self.measured {
+            Measured::Corners(seen) => Some(seen),
+            Measured::Position | Measured::Pose(_) => None,
+        }
+    }
 }
 
 /// Why a detection was not used.
@@ -65,6 +118,10 @@ pub enum Rejection {
     NoReadings,
     /// In some frame of a view a tag lies elsewhere than in most: one of them is another tag, misread.
     InconsistentFrame,
+    /// The arm was on its way.
+    ArmMoving,
+    /// It does not agree with what all other sightings say.
+    Outlier,
     /// The detector itself did not believe it.
     Detector(RejectReason),
 }
@@ -78,6 +135,8 @@ impl Rejection {
             Self::OutOfView => "out_of_view",
             Self::NoReadings => "no_joint_readings",
             Self::InconsistentFrame => "inconsistent_frame",
+            Self::Outlier => "outlier",
+            Self::ArmMoving => "arm_moving",
             Self::Detector(reason) => reason.name(),
         }
     }
@@ -90,16 +149,22 @@ pub struct CaptureData {
     pub held_out: Vec<View>,
     /// Views in which only one joint moved, by that joint; in the order of time.
     pub identify: BTreeMap<u32, Vec<View>>,
+    /// Readings at nominal end stops, in the order of time.
+    pub stops: Vec<(Stamp, StopReading)>,
     pub task: Option<ReachTask>,
     pub n_marks: usize,
     pub rejected: BTreeMap<Rejection, usize>,
     pub ids_seen: Vec<u32>,
+    /// Names of landmarks that are no numbered tags, by the number that stands for them.
+    pub landmark_names: BTreeMap<u32, String>,
     /// Lowest and highest reading over the captured spans, C.
     pub oil_c: Option<(f64, f64)>,
     pub water_c: Option<(f64, f64)>,
     pub pressure_pa: Option<(f64, f64)>,
     /// Indices of the recording's messages that were used, ascending.
     pub used: Vec<usize>,
+    /// Those beyond them that only sensors with terms rest on: thermometers near the views, readings before them. Ascending.
+    pub used_for_terms: Vec<usize>,
 }
 
 impl CaptureData {
@@ -135,6 +200,21 @@ pub fn surveyed<'a>(recording: &Recording, robot: &'a Robot) -> Cow<'a, Robot> {
     }
 }
 
+/// `robot` of which the joints have failed that the recording says have.
+#[must_use]
+pub(super) fn declared_failed(recording: &Recording, robot: &Robot) -> Robot {
+    let failed: Vec<FailedJoint> = recording
+        .messages
+        .iter()
+        .filter_map(|(_, message)| match message {
+            Message::Mark(Mark { kind: MarkKind::Failed(failed), .. }) => Some(*failed),
+            _ => None,
+        })
+        .filter(|failed| failed.joint < robot.n_joints())
+        .collect();
+    robot.clone().with_failed(&failed)
+}
+
 /// Collects the captured views of `recording`; `robot` as [`surveyed`] gives it.
 #[must_use]
 pub fn associate(recording: &Recording, robot: &Robot) -> CaptureData {
@@ -150,6 +230,7 @@ pub fn associate_within(recording: &Recording, robot: &Robot, span: Option<(Stam
     let sensors = ArmSensors::nominal(robot);
     let index = Index::new(recording);
     let (from, to) = span.unwrap_or((Stamp { nanos: i64::MIN }, Stamp { nanos: i64::MAX }));
+    let surroundings = Surroundings::heard_until(recording, to);
     let recorded = recorded_survey(recording);
     for (idx, message) in recording.messages.iter().map(|(_, m)| m).enumerate() {
         match message {
@@ -162,16 +243,28 @@ pub fn associate_within(recording: &Recording, robot: &Robot, span: Option<(Stam
                 MarkKind::Capture { set, pose_idx } if mark.start >= from => {
                     data.n_marks += 1;
                     data.used.push(idx);
-                    let Some(view) = index.view(mark, pose_idx, robot, &sensors, &mut data) else { continue };
+                    let Some(mut view) = index.view(mark, pose_idx, robot, &sensors, &mut data) else { continue };
+                    view.conditions = surroundings.over_noting(mark.start, mark.end, &mut data.used_for_terms);
+                    view.approach = index.approach(mark, &view.travel_rad, &sensors, &mut data.used_for_terms);
                     match set {
                         CaptureSet::Fit => data.fit.push(view),
                         CaptureSet::HeldOut => data.held_out.push(view),
                     }
                 }
+                MarkKind::Failed(_) => data.used.push(idx),
                 MarkKind::Identify { joint_idx } => {
                     data.used.push(idx);
                     if let Some(view) = index.view(mark, 0, robot, &sensors, &mut data) {
                         data.identify.entry(joint_idx).or_default().push(view);
+                    }
+                }
+                MarkKind::Stop { joint_idx, angle_rad } if mark.start >= from => {
+                    data.used.push(idx);
+                    let joint = joint_idx as usize;
+                    if let Some(view) = index.view(mark, 0, robot, &sensors, &mut data)
+                        && let Some(&travel_rad) = view.travel_rad.get(joint)
+                    {
+                        data.stops.push((mark.end, StopReading { joint, angle_rad, travel_rad }));
                     }
                 }
                 _ => {}
@@ -179,6 +272,7 @@ pub fn associate_within(recording: &Recording, robot: &Robot, span: Option<(Stam
             _ => {}
         }
     }
+    data.stops.sort_by_key(|(end, _)| *end);
     // A view's meaning does not depend on when it was marked; sorting makes the result independent of that order, too.
     data.fit.sort_by_key(|view| view.pose_idx);
     data.held_out.sort_by_key(|view| view.pose_idx);
@@ -187,15 +281,18 @@ pub fn associate_within(recording: &Recording, robot: &Robot, span: Option<(Stam
     }
     data.used.sort_unstable();
     data.used.dedup();
+    data.used_for_terms.sort_unstable();
+    data.used_for_terms.dedup();
+    data.used_for_terms.retain(|idx| data.used.binary_search(idx).is_err());
     data.ids_seen.sort_unstable();
     data.ids_seen.dedup();
     data
 }
 
 /// Messages of a recording sorted by their own stamps.
-struct Index<'a> {
-    messages: &'a [(Stamp, Message)],
-    by_stamp: Vec<(Stamp, usize)>,
+pub(super) struct Index<'a> {
+    pub(super) messages: &'a [(Stamp, Message)],
+    pub(super) by_stamp: Vec<(Stamp, usize)>,
 }
 
 impl<'a> Index<'a> {
@@ -236,14 +333,16 @@ impl<'a> Index<'a> {
     ) -> Option<View> {
         let mut travel_sum = JointAngles::zeros(robot.n_joints());
         let mut n_readings = 0usize;
+        let mut slope = Slope::over(mark);
         let mut frames: BTreeMap<u32, Vec<[[f64; 2]; 4]>> = BTreeMap::new();
         for &(_, idx) in self.span(mark) {
             match &self.messages[idx].1 {
                 Message::JointSensors(sample) => {
-                    for (sum, (model, counts)) in travel_sum.iter_mut().zip(sensors.models.iter().zip(&*sample.counts))
-                    {
-                        *sum += model.nominal_travel_rad(*counts);
+                    let travel_rad = sensors.travel_rad(&sample.counts);
+                    for (sum, travel_rad) in travel_sum.iter_mut().zip(travel_rad.iter()) {
+                        *sum += travel_rad;
                     }
+                    slope.add(sample.stamp, &travel_rad, sensors);
                     n_readings += 1;
                 }
                 Message::Detections(detections) => add_corners(detections, &mut frames),
@@ -269,7 +368,8 @@ impl<'a> Index<'a> {
             return None;
         }
         let travel_rad = JointAngles::from_fn(robot.n_joints(), |j| travel_sum[j] / n_readings as f64);
-        let mut view = View { pose_idx, end: mark.end, travel_rad, tags: Vec::new(), gripper_tag: None };
+        let rate_rad_s = slope.rad_s(robot.n_joints());
+        let mut view = View { n_readings, rate_rad_s, ..View::of_reading(pose_idx, mark.end, travel_rad) };
         for (id, frames) in frames {
             data.ids_seen.push(id);
             let (seen, n_apart) = agreeing_mean(&frames, robot.camera.corner_std_px);
@@ -301,11 +401,11 @@ fn tag_view(robot: &Robot, id: u32, seen: &SeenCorners) -> Result<TagView, Rejec
     let tag_idx = robot.tags.iter().position(|tag| tag.id == id).ok_or(Rejection::UnknownTag)?;
     let solved = check_square(robot, robot.tags[tag_idx].size_m, seen)?;
     let center_in_camera_m = solved.camera_from_tag.origin().vector();
-    Ok(TagView { id, tag_idx, center_in_camera_m, corners_px: seen.corners_px, n_frames: seen.n_frames })
+    Ok(TagView { id, tag_idx, center_in_camera_m, measured: Measured::Corners(*seen) })
 }
 
 /// The tag's pose by its corners, if they are those of a square of that size.
-fn check_square(robot: &Robot, size_m: f64, seen: &SeenCorners) -> Result<SquarePose, Rejection> {
+pub(super) fn check_square(robot: &Robot, size_m: f64, seen: &SeenCorners) -> Result<SquarePose, Rejection> {
     let solved = solve_square(&robot.camera.lens, size_m, &seen.corners_px).map_err(|e| match e {
         SquareError::OutOfView => Rejection::OutOfView,
         SquareError::Degenerate => Rejection::NotASquare,

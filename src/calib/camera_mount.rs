@@ -1,7 +1,10 @@
 //! `[camera_mount]` of calibration.toml.
 
+use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
+use super::associate::View;
+use super::bundle::{Estimate, MIN_GRIPPER_VIEWS};
 use super::gripper_tag::MountEstimate;
 use crate::robot::Robot;
 use crate::spatial::{Camera, Link, Pose};
@@ -26,6 +29,13 @@ pub struct CameraMount {
 }
 
 impl CameraMount {
+    /// `None` where the quaternion is none.
+    pub(super) fn link_from_camera(&self) -> Option<Isometry3<f64>> {
+        let [w, x, y, z] = self.quaternion_wxyz;
+        let rotation = UnitQuaternion::try_new(Quaternion::new(w, x, y, z), 1e-6)?;
+        Some(Isometry3::from_parts(Vector3::from(self.position_m).into(), rotation))
+    }
+
     /// Of `robot`, whose camera is where it was found to hang; `None` where no tag is on the gripper.
     pub(super) fn of(robot: &Robot, mount: &Result<Option<MountEstimate>, String>) -> Option<Self> {
         let camera = &robot.camera;
@@ -52,6 +62,26 @@ impl CameraMount {
                     ..drawn
                 })
             }
+        }
+    }
+
+    /// As `bundle` found it; tags around the arm tell of it, too.
+    pub(super) fn found(robot: &Robot, found: &Estimate<'_>, views: &[View]) -> Self {
+        let (mount, covariance) = found.mount();
+        let link_from_camera: Pose<Link, Camera> = Pose::from_isometry(mount);
+        let std = |row: usize| covariance[(row, row)].max(0.0).sqrt();
+        let seen = views.iter().filter(|view| view.gripper_tag.is_some()).count();
+        let left_out = robot.gripper_tag.filter(|_| !found.model.gripper_tag).map(|tag| {
+            format!("the tag on the gripper ({}) was seen in {seen} views; {MIN_GRIPPER_VIEWS} are needed", tag.id)
+        });
+        Self {
+            left_out,
+            position_m: link_from_camera.origin().to_array(),
+            quaternion_wxyz: link_from_camera.quaternion_wxyz(),
+            position_std_m: [0, 1, 2].map(std),
+            rotation_std_rad: [3, 4, 5].map(std),
+            views: if found.model.gripper_tag { seen } else { 0 },
+            rms_px: None,
         }
     }
 }

@@ -67,16 +67,21 @@ fn spread_px(frames: &[Corners]) -> f64 {
     (0..4).flat_map(|corner| [range(corner, 0), range(corner, 1)]).fold(0.0, f64::max)
 }
 
-fn mean<'a>(frames: impl Iterator<Item = &'a Corners>) -> Option<SeenCorners> {
+fn mean<'a>(frames: impl Iterator<Item = &'a Corners> + Clone) -> Option<SeenCorners> {
     let (mut sums, mut n_frames) = ([[0.0; 2]; 4], 0);
-    for frame in frames {
+    for frame in frames.clone() {
         for (sum, value) in sums.iter_mut().flatten().zip(frame.iter().flatten()) {
             *sum += value;
         }
         n_frames += 1;
     }
     let corners_px = sums.map(|corner| corner.map(|sum: f64| sum / n_frames as f64));
-    (n_frames > 0).then_some(SeenCorners { corners_px, n_frames })
+    let squares = frames.map(|frame| {
+        let pairs = frame.iter().flatten().zip(corners_px.iter().flatten());
+        pairs.map(|(value, mean)| (value - mean).powi(2)).sum::<f64>()
+    });
+    let scatter_px2 = squares.sum();
+    (n_frames > 0).then_some(SeenCorners { corners_px, n_frames, scatter_px2 })
 }
 
 #[cfg(test)]

@@ -107,7 +107,7 @@ fn common_axis(turns: &[Vector3<f64>], drawn: &Vector3<f64>) -> Vector3<f64> {
 fn camera_pose(robot: &Robot, view: &View) -> Option<Isometry3<f64>> {
     let starts = view.tags.iter().filter_map(|seen| {
         let tag = &robot.tags[seen.tag_idx];
-        let solved = solve_square(&robot.camera.lens, tag.size_m, &seen.corners_px).ok()?;
+        let solved = solve_square(&robot.camera.lens, tag.size_m, &seen.corners()?.corners_px).ok()?;
         Some(tag.base_from_tag.isometry() * solved.camera_from_tag.isometry().inverse())
     });
     // A tag seen head-on may start from its mirrored tilt; the other tags then tell.
@@ -128,7 +128,8 @@ fn refine(robot: &Robot, view: &View, start: Isometry3<f64>) -> Option<(Isometry
         cost = 0.0;
         for seen in &view.tags {
             let tag = &robot.tags[seen.tag_idx];
-            for (corner, measured) in square_corners(tag.size_m).iter().zip(&seen.corners_px) {
+            let Some(corners) = seen.corners() else { continue };
+            for (corner, measured) in square_corners(tag.size_m).iter().zip(&corners.corners_px) {
                 let in_camera = (camera_from_base * (tag.base_from_tag.isometry() * corner)).coords;
                 let (pixel, by_point) = robot.camera.lens.project_with_jacobian(&in_camera)?;
                 let residual = Vector2::from(*measured) - pixel;

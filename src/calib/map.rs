@@ -11,6 +11,7 @@ use nalgebra::{DMatrix, Isometry3, Matrix2, Matrix3};
 use serde::{Deserialize, Serialize};
 
 use super::associate::{CaptureData, View};
+use super::bundle::Estimate;
 use super::uncertainty::CommonErrors;
 use crate::optics::CameraModel;
 use crate::robot::{Robot, SurveyedTag, TagSurvey};
@@ -101,6 +102,38 @@ impl MapResult {
     }
 }
 
+impl MapResult {
+    /// The same tags where `bundle` found them.
+    #[must_use]
+    pub(super) fn with_tags_of(mut self, robot: &Robot, found: &Estimate<'_>) -> Self {
+        for tag in &mut self.tag {
+            let Some(tag_idx) = robot.tags.iter().position(|known| known.id == tag.id) else { continue };
+            let (pose, Some(covariance)) = found.tag(tag_idx) else { continue };
+            let pose: Pose<Base, Tag> = Pose::from_isometry(pose);
+            let turn = *pose.rotation().to_rotation_matrix().matrix();
+            let position = turn * covariance.fixed_view::<3, 3>(0, 0) * turn.transpose();
+            tag.position_m = pose.origin().to_array();
+            tag.quaternion_wxyz = pose.quaternion_wxyz();
+            tag.position_std_m = [0, 1, 2].map(|k| position[(k, k)].max(0.0).sqrt());
+            tag.rotation_std_rad = [3, 4, 5].map(|k| covariance[(k, k)].max(0.0).sqrt());
+        }
+        self
+    }
+}
+
+impl Mapped {
+    /// The mapped tags as a start: those that were unknown stay so, known ones stay where the survey has them.
+    pub(super) fn start(&self, drawn: &Robot) -> Robot {
+        let mut start = drawn.clone();
+        for (tag, mapped) in start.tags.iter_mut().zip(&self.robot.tags) {
+            if !tag.is_known() {
+                tag.base_from_tag = mapped.base_from_tag;
+            }
+        }
+        start
+    }
+}
+
 /// What the estimator goes on with.
 pub(super) struct Mapped {
     /// With the map's tags; those that are left out stand nowhere and are in no view.
@@ -143,10 +176,11 @@ pub(super) fn map_tags(data: &mut CaptureData, robot: &Robot) -> Result<Mapped, 
 }
 
 fn map_view(view: &View, robot: &Robot) -> MapView {
-    let tags = view.tags.iter().map(|seen| {
+    let corners = view.tags.iter().filter_map(|tag| Some((tag.id, tag.corners()?)));
+    let tags = corners.map(|(id, seen)| {
         let variance_px2 = robot.camera.corner_std_px.powi(2) / seen.n_frames.max(1) as f64;
         let covariance_px2 = Some([Matrix2::from_diagonal_element(variance_px2); 4]);
-        SeenTag { id: seen.id, corners_px: seen.corners_px, covariance_px2 }
+        SeenTag { id, corners_px: seen.corners_px, covariance_px2 }
     });
     MapView { camera: 0, stamp: view.end, tags: tags.collect(), attitude: None }
 }

@@ -5,10 +5,10 @@
 
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, Point3, Vector2, Vector3};
 
-use super::associate::View;
+use super::associate::{Measured, View};
 use crate::kinematics::LinkPoses;
-use crate::robot::{Robot, SurveyedTag};
-use crate::sensor::{ArmSensors, Correction};
+use crate::robot::{JointSensorSpec, Robot, SurveyedTag};
+use crate::sensor::{ArmSensors, Conditions, Correction, Departure, N_SHAPE, Terms, shape_basis};
 use crate::spatial::skew;
 use crate::streams::{JointAngles, MAX_JOINTS};
 
@@ -17,11 +17,20 @@ use crate::streams::{JointAngles, MAX_JOINTS};
 pub struct JointParameters {
     pub gain: [f64; MAX_JOINTS],
     pub offset_rad: [f64; MAX_JOINTS],
+    /// Zero under methods that estimate straight sensors.
+    pub terms: [Terms; MAX_JOINTS],
+    /// What the terms are counted from.
+    pub reference: Conditions,
 }
 
 impl Default for JointParameters {
     fn default() -> Self {
-        Self { gain: [1.0; MAX_JOINTS], offset_rad: [0.0; MAX_JOINTS] }
+        Self {
+            gain: [1.0; MAX_JOINTS],
+            offset_rad: [0.0; MAX_JOINTS],
+            terms: [Terms::default(); MAX_JOINTS],
+            reference: Conditions::default(),
+        }
     }
 }
 
@@ -31,6 +40,12 @@ impl JointParameters {
         match parameter.kind {
             ParameterKind::Gain => self.gain[parameter.joint],
             ParameterKind::Offset => self.offset_rad[parameter.joint],
+            ParameterKind::Shape(h) => self.terms[parameter.joint].shape_rad[usize::from(h)],
+            ParameterKind::OffsetPerK => self.terms[parameter.joint].offset_rad_per_k,
+            ParameterKind::GainPerK => self.terms[parameter.joint].gain_per_k,
+            ParameterKind::OffsetPerMpa => self.terms[parameter.joint].offset_rad_per_mpa,
+            ParameterKind::DriftPerH => self.terms[parameter.joint].drift_rad_per_h,
+            ParameterKind::HalfPlay => self.terms[parameter.joint].half_play_rad,
         }
     }
 
@@ -38,7 +53,24 @@ impl JointParameters {
         match parameter.kind {
             ParameterKind::Gain => self.gain[parameter.joint] = value,
             ParameterKind::Offset => self.offset_rad[parameter.joint] = value,
+            ParameterKind::Shape(h) => self.terms[parameter.joint].shape_rad[usize::from(h)] = value,
+            ParameterKind::OffsetPerK => self.terms[parameter.joint].offset_rad_per_k = value,
+            ParameterKind::GainPerK => self.terms[parameter.joint].gain_per_k = value,
+            ParameterKind::OffsetPerMpa => self.terms[parameter.joint].offset_rad_per_mpa = value,
+            ParameterKind::DriftPerH => self.terms[parameter.joint].drift_rad_per_h = value,
+            ParameterKind::HalfPlay => self.terms[parameter.joint].half_play_rad = value,
         }
+    }
+
+    #[must_use]
+    pub fn correction(&self, joint: usize) -> Correction {
+        Correction { gain: self.gain[joint], offset_rad: self.offset_rad[joint], terms: self.terms[joint] }
+    }
+
+    /// Whether there is nothing but gains and offsets.
+    #[must_use]
+    pub fn are_straight(&self) -> bool {
+        self.terms.iter().all(Terms::are_zero)
     }
 
     /// The sensors of `robot` with these parameters.
@@ -46,8 +78,9 @@ impl JointParameters {
     pub fn sensors(&self, robot: &Robot) -> ArmSensors {
         let mut sensors = ArmSensors::nominal(robot);
         for (joint, model) in sensors.models.iter_mut().enumerate() {
-            model.correction = Correction { gain: self.gain[joint], offset_rad: self.offset_rad[joint] };
+            model.correction = self.correction(joint);
         }
+        sensors.reference = self.reference;
         sensors
     }
 }
@@ -56,6 +89,43 @@ impl JointParameters {
 pub enum ParameterKind {
     Gain,
     Offset,
+    /// A coefficient of the nonlinearity, 0 .. [`N_SHAPE`](crate::sensor::N_SHAPE).
+    Shape(u8),
+    OffsetPerK,
+    GainPerK,
+    OffsetPerMpa,
+    DriftPerH,
+    HalfPlay,
+}
+
+impl ParameterKind {
+    /// All of them, in their order.
+    pub fn all() -> impl Iterator<Item = Self> {
+        let shape = (0..N_SHAPE as u8).map(Self::Shape);
+        let rest = [Self::OffsetPerK, Self::GainPerK, Self::OffsetPerMpa, Self::DriftPerH, Self::HalfPlay];
+        [Self::Gain, Self::Offset].into_iter().chain(shape).chain(rest)
+    }
+
+    /// d(angle)/d(parameter) at `travel_rad`, in rad per the parameter's unit.
+    #[must_use]
+    pub fn angle_derivative(
+        self,
+        spec: &JointSensorSpec,
+        travel_rad: f64,
+        departure: &Departure,
+        approach: f64,
+    ) -> f64 {
+        match self {
+            Self::Gain => travel_rad,
+            Self::Offset => 1.0,
+            Self::Shape(h) => shape_basis(travel_rad / spec.half_range_rad)[usize::from(h)],
+            Self::OffsetPerK => departure.oil_k,
+            Self::GainPerK => departure.oil_k * travel_rad,
+            Self::OffsetPerMpa => departure.pressure_mpa,
+            Self::DriftPerH => departure.elapsed_h,
+            Self::HalfPlay => approach,
+        }
+    }
 }
 
 /// One number that may be estimated.
@@ -66,13 +136,15 @@ pub struct Parameter {
 }
 
 impl Parameter {
-    /// One sigma of the datasheet's prior, in the parameter's unit.
+    /// One sigma of the datasheet's prior, in the parameter's unit; zero for terms that the datasheet does not know.
     #[must_use]
     pub fn prior_std(self, robot: &Robot) -> f64 {
         let spec = &robot.sensors[self.joint];
         match self.kind {
             ParameterKind::Gain => spec.gain_std,
             ParameterKind::Offset => spec.offset_std_rad,
+            ParameterKind::OffsetPerK => spec.temperature_std_rad_per_k,
+            _ => 0.0,
         }
     }
 
@@ -82,6 +154,12 @@ impl Parameter {
         let kind = match self.kind {
             ParameterKind::Gain => "gain",
             ParameterKind::Offset => "offset",
+            ParameterKind::Shape(h) => return format!("{} shape {}", robot.sensors[self.joint].joint, h + 1),
+            ParameterKind::OffsetPerK => "offset per K",
+            ParameterKind::GainPerK => "gain per K",
+            ParameterKind::OffsetPerMpa => "offset per MPa",
+            ParameterKind::DriftPerH => "drift per h",
+            ParameterKind::HalfPlay => "half play",
         };
         format!("{} {kind}", robot.sensors[self.joint].joint)
     }
@@ -98,7 +176,9 @@ pub struct PositionProblem<'a> {
 pub(crate) struct Observation<'a> {
     pub view_idx: usize,
     pub tag: &'a super::associate::TagView,
-    pub travel_rad: &'a JointAngles,
+    pub view: &'a View,
+    /// Of the view from the parameters' reference.
+    pub departure: Departure,
     pub poses: &'a LinkPoses,
     pub base_from_camera: &'a Isometry3<f64>,
     /// The tag's centre in the base frame as predicted.
@@ -115,11 +195,18 @@ impl<'a> PositionProblem<'a> {
 
     /// Calls `f` for every tag of every view.
     pub(crate) fn each(&self, parameters: &JointParameters, mut f: impl FnMut(&Observation<'_>)) {
+        let are_straight = parameters.are_straight();
         for (view_idx, view) in self.views.iter().enumerate() {
             if view.tags.is_empty() {
                 continue;
             }
-            let poses = self.robot.chain.link_poses(&self.angles(view, parameters));
+            let departure = view.conditions.departure_from(&parameters.reference);
+            let angles = if are_straight {
+                self.straight_angles(view, parameters)
+            } else {
+                self.angles(view, &departure, parameters)
+            };
+            let poses = self.robot.chain.link_poses(&angles);
             let base_from_camera = poses.frame(&self.robot.camera.mount);
             for tag in &view.tags {
                 let predicted_m = (base_from_camera * Point3::from(tag.center_in_camera_m)).coords;
@@ -127,7 +214,8 @@ impl<'a> PositionProblem<'a> {
                 f(&Observation {
                     view_idx,
                     tag,
-                    travel_rad: &view.travel_rad,
+                    view,
+                    departure,
                     poses: &poses,
                     base_from_camera: &base_from_camera,
                     predicted_m,
@@ -137,10 +225,18 @@ impl<'a> PositionProblem<'a> {
         }
     }
 
-    fn angles(&self, view: &View, parameters: &JointParameters) -> JointAngles {
+    /// The same without asking for terms: this is where solvers spend their time.
+    fn straight_angles(&self, view: &View, parameters: &JointParameters) -> JointAngles {
         JointAngles::from_fn(self.robot.n_joints(), |j| {
             let center_rad = self.robot.sensors[j].center_rad;
             center_rad + parameters.gain[j] * view.travel_rad[j] + parameters.offset_rad[j]
+        })
+    }
+
+    fn angles(&self, view: &View, departure: &Departure, parameters: &JointParameters) -> JointAngles {
+        JointAngles::from_fn(self.robot.n_joints(), |j| {
+            let spec = &self.robot.sensors[j];
+            parameters.correction(j).angle_rad(spec, view.travel_rad[j], departure, view.approach[j])
         })
     }
 
@@ -152,8 +248,21 @@ impl<'a> PositionProblem<'a> {
     /// The paper's objective: the sum of distances between seen and surveyed landmarks, m.
     #[must_use]
     pub fn sum_of_distances_m(&self, parameters: &JointParameters) -> f64 {
+        // What `each` gives, without what only Jacobians need.
+        let are_straight = parameters.are_straight();
         let mut sum = 0.0;
-        self.each(parameters, |o| sum += o.residual_m.norm());
+        for view in self.views {
+            let angles = if are_straight {
+                self.straight_angles(view, parameters)
+            } else {
+                self.angles(view, &view.conditions.departure_from(&parameters.reference), parameters)
+            };
+            let base_from_camera = self.robot.chain.frame(&angles, &self.robot.camera.mount);
+            for tag in &view.tags {
+                let predicted_m = (base_from_camera * Point3::from(tag.center_in_camera_m)).coords;
+                sum += (predicted_m - self.robot.tags[tag.tag_idx].base_from_tag.origin().vector()).norm();
+            }
+        }
         sum
     }
 
@@ -168,6 +277,13 @@ impl<'a> PositionProblem<'a> {
         (n > 0).then(|| (sum / n as f64).sqrt())
     }
 
+    /// How far the camera is from where a landmark's measured pose has it, m; `None` where its pose was not measured.
+    pub(crate) fn camera_off_m(&self, o: &Observation<'_>) -> Option<f64> {
+        let Measured::Pose(camera_from_tag) = o.tag.measured else { return None };
+        let measured = self.robot.tags[o.tag.tag_idx].base_from_tag.isometry() * camera_from_tag.inverse();
+        Some((o.base_from_camera.translation.vector - measured.translation.vector).norm())
+    }
+
     /// Root mean square reprojection error per corner (2D), px; corners predicted out of view count as unseen.
     #[must_use]
     pub fn reprojection_rms_px(&self, parameters: &JointParameters) -> Option<f64> {
@@ -175,7 +291,8 @@ impl<'a> PositionProblem<'a> {
         self.each(parameters, |o| {
             let tag: &SurveyedTag = &self.robot.tags[o.tag.tag_idx];
             let camera_from_tag = o.base_from_camera.inverse() * tag.base_from_tag.isometry();
-            for (corner, measured) in crate::optics::square_corners(tag.size_m).iter().zip(&o.tag.corners_px) {
+            let Some(seen) = o.tag.corners() else { return };
+            for (corner, measured) in crate::optics::square_corners(tag.size_m).iter().zip(&seen.corners_px) {
                 if let Some(pixel) = self.robot.camera.lens.project(&(camera_from_tag * corner).coords) {
                     sum += (Vector2::from(*measured) - pixel).norm_squared();
                     n += 1;
@@ -209,10 +326,9 @@ impl<'a> PositionProblem<'a> {
             return Vector3::zeros();
         }
         let by_angle = o.poses.point_jacobian(parameter.joint, &o.predicted_m);
-        match parameter.kind {
-            ParameterKind::Gain => by_angle * o.travel_rad[parameter.joint],
-            ParameterKind::Offset => by_angle,
-        }
+        let (travel_rad, approach) = (o.view.travel_rad[parameter.joint], o.view.approach[parameter.joint]);
+        let spec = &self.robot.sensors[parameter.joint];
+        by_angle * parameter.kind.angle_derivative(spec, travel_rad, &o.departure, approach)
     }
 
     /// d(residual)/d(camera mount), perturbed on the right of `link_from_camera`: (translation m, rotation rad).

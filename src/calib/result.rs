@@ -1,25 +1,28 @@
 //! calibration.toml: the answer, how sure it is, what it rests on and where it holds.
 
 use std::collections::BTreeMap;
-use std::path::Path;
 
+use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
 use super::associate::CaptureData;
 use super::camera_mount::CameraMount;
+use super::failed_joint::{FailedJointTable, PriorTable};
 use super::gripper_tag::MountEstimate;
 use super::identify::IdentifiedScale;
 use super::map::MapResult;
-use super::minimum_distance::Solution;
+use super::methods::{Solution, StopReading};
+use super::model_table::ModelTable;
 use super::observability::{Unobservable, grouped_names};
 use super::problem::{JointParameters, Parameter, ParameterKind, PositionProblem};
+use super::terms_table::{ReferenceTable, TermsTable};
 use super::uncertainty::{ParameterCovariance, ToolErrorPrediction};
 use super::valid_range::ValidRange;
 use super::verdict::{Evidence, refusal};
-use crate::log::{Recording, hash_messages};
-use crate::robot::{FileIssue, Robot, RobotError, parse_toml, read_text};
+use super::verdict_tables::{ObservabilityTable, VerdictTable};
+use crate::robot::Robot;
 use crate::routine::Method;
-use crate::sensor::{ArmSensors, Correction};
+use crate::sensor::Departure;
 use crate::stats::Summary;
 
 /// Whether the answer may be used.
@@ -47,19 +50,40 @@ pub struct Calibration {
     pub messages_hash: String,
     /// What the data did not determine, and why; these keep the datasheet's values.
     pub unobservable: Vec<String>,
+    /// Sightings that were left out because they do not agree with the rest: `pose 12: tag 3: 45 sigma`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub outliers: Vec<String>,
     pub fit: FitFigures,
     pub held_out: HeldOutFigures,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub predicted_tool_error_m: Option<Summary>,
     pub valid: ValidRange,
+    /// What the joints' terms are counted from, where there are any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reference: Option<ReferenceTable>,
     /// Where the robot has a tag on the gripper.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera_mount: Option<CameraMount>,
     /// Where the tags were found to be, where no survey said it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub map: Option<MapResult>,
+    /// Of `bundle`: what the data determine, before solving.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub observability: Option<ObservabilityTable>,
+    /// Of `bundle`: what the verdict rests on beside `held_out`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub verdict: Option<VerdictTable>,
+    /// What `bundle` took for its model.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub model: Option<ModelTable>,
     pub joint: Vec<JointResult>,
-    /// Estimated parameters in the order of the covariance's rows, `joint gain` (relative) or `joint offset` (rad).
+    /// Joints that failed, or whose sensors did.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub failed_joint: Vec<FailedJointTable>,
+    /// What a warm calibration by `bundle` started from.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub prior: Option<PriorTable>,
+    /// Estimated parameters in the order of the covariance's rows, by [`Parameter::name`]: gains relative, offsets in rad, ...
     pub covariance: CovarianceTable,
 }
 
@@ -77,7 +101,9 @@ pub struct FitFigures {
     #[serde(default, skip_serializing)]
     pub rejected_by_reason: BTreeMap<String, usize>,
     pub rms_m: f64,
-    pub rms_px: f64,
+    /// Absent where the recording has positions or poses and no corners.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rms_px: Option<f64>,
     /// How many times the datasheets' linearity the sensors deviate from a straight line, by the residuals; at least 1.
     #[serde(default = "as_the_datasheet_says")]
     pub linearity_scale: f64,
@@ -91,8 +117,17 @@ fn as_the_datasheet_says() -> f64 {
 #[serde(deny_unknown_fields)]
 pub struct HeldOutFigures {
     pub views: usize,
+    /// Every view was held out in turn and fitted in the end; else the fit never saw these.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub in_turn: bool,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rms_m: Option<f64>,
+    /// The mean of the same distances, where views were held out in turn.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mean_m: Option<f64>,
+    /// Mean distance of the camera from where the landmarks' measured poses have it, m; where the recording has poses.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub camera_mean_m: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rms_px: Option<f64>,
     /// The same views with the datasheet's sensors.
@@ -121,6 +156,12 @@ pub struct JointResult {
     /// standard deviation in `covariance` is about that scale.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub identified_ratio: Option<f64>,
+    /// One sigma of what the parameters leave of the sensor's error; absent where that is the datasheet's linearity.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub residual_std_rad: Option<f64>,
+    /// What the sensor is beyond a straight line.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub terms: Option<TermsTable>,
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -130,17 +171,8 @@ pub struct CovarianceTable {
     pub rows: Vec<Vec<f64>>,
 }
 
-/// Why a calibration file was refused.
-#[derive(Debug, thiserror::Error)]
-pub enum CalibrationFileError {
-    #[error(transparent)]
-    File(#[from] RobotError),
-    #[error("{file}: is for robot `{found}` with joints {found_joints:?}, not for `{expected}`")]
-    OtherRobot { file: String, found: String, found_joints: Vec<String>, expected: String },
-}
-
 pub(super) struct Parts<'a> {
-    pub recording: &'a Recording,
+    pub messages_hash: String,
     pub robot: &'a Robot,
     pub method: Method,
     pub data: &'a CaptureData,
@@ -151,19 +183,21 @@ pub(super) struct Parts<'a> {
     pub held_out: &'a PositionProblem<'a>,
     pub solution: &'a Solution,
     pub covariance: &'a ParameterCovariance,
-    /// Parameters that the views of tags around the arm determined.
-    pub n_fitted: usize,
+    /// Parameters of sensors that move the camera, determined or not.
+    pub n_wanted: usize,
     /// By the tag on the gripper, or why not; none where the robot has none.
     pub mount: &'a Result<Option<MountEstimate>, String>,
     pub map: Option<MapResult>,
     pub unobservable: &'a [Unobservable],
     pub linearity_scale: f64,
     pub task: Option<ToolErrorPrediction>,
+    /// Of views that were left out in turn, where the method does that; else the recording's own held-out views count.
+    pub cross_validated: Option<HeldOutFigures>,
 }
 
 pub(super) fn assemble(parts: &Parts<'_>) -> Calibration {
     let at = &parts.solution.parameters;
-    let held_out = held_out_figures(parts);
+    let held_out = parts.cross_validated.clone().unwrap_or_else(|| held_out_figures(parts));
     let views = parts.data.fit.iter().filter(|view| !view.tags.is_empty()).count();
     let fit_rms_m = parts.fit.rms_m(at).unwrap_or(f64::NAN);
     let predicted = parts.task.as_ref().map(|task| task.error_m);
@@ -173,7 +207,7 @@ pub(super) fn assemble(parts: &Parts<'_>) -> Calibration {
         held_out_rms_m: held_out.rms_m,
         held_out_nominal_rms_m: held_out.nominal_rms_m,
         fit_rms_m,
-        n_parameters: parts.n_fitted,
+        n_parameters: parts.n_wanted,
         fit_views: views,
         predicted_tool_error_m: predicted.map(|p| p.p95),
         tolerance_m: parts.data.task.as_ref().map(|task| task.tolerance_m),
@@ -184,7 +218,7 @@ pub(super) fn assemble(parts: &Parts<'_>) -> Calibration {
         method: parts.method,
         status: if refusal.is_some() { Status::Refused } else { Status::Accepted },
         refusal,
-        messages_hash: hash_of_used(parts),
+        messages_hash: parts.messages_hash.clone(),
         unobservable: grouped_names(parts.robot, parts.unobservable),
         fit: FitFigures {
             outcome: parts.solution.outcome.name().to_owned(),
@@ -196,31 +230,52 @@ pub(super) fn assemble(parts: &Parts<'_>) -> Calibration {
             rejected: parts.data.rejected.values().sum(),
             rejected_by_reason: parts.data.rejected_by_reason(),
             rms_m: fit_rms_m,
-            rms_px: parts.fit.reprojection_rms_px(at).unwrap_or(f64::NAN),
+            rms_px: parts.fit.reprojection_rms_px(at),
             linearity_scale: parts.linearity_scale,
         },
         held_out,
         predicted_tool_error_m: predicted,
         valid: ValidRange::of(parts.data),
+        reference: ReferenceTable::of(at, parts.covariance),
         camera_mount: CameraMount::of(parts.robot, parts.mount),
         map: parts.map.clone(),
+        observability: None,
+        verdict: None,
+        model: None,
+        outliers: Vec::new(),
         joint: joint_results(parts),
+        failed_joint: Vec::new(),
+        prior: None,
         covariance: CovarianceTable {
             parameters: parts.covariance.parameters.iter().map(|p| p.name(parts.robot)).collect(),
-            rows: parts.covariance.matrix.row_iter().map(|row| row.iter().copied().collect()).collect(),
+            rows: covariance_rows(parts.covariance),
         },
     }
 }
 
-fn hash_of_used(parts: &Parts<'_>) -> String {
-    let messages = &parts.recording.messages;
-    let used = parts.data.used.iter().map(|&idx| (messages[idx].0, &messages[idx].1));
-    hash_messages(used, &parts.recording.joint_names).expect("what was read from a recording can be written to one")
+/// Larger tables are written with fewer digits.
+const FULL_DIGITS_ROWS: usize = 24;
+
+/// With seven significant digits where they are many: the file, and whoever holds the result in memory, have the same numbers.
+pub(super) fn covariance_rows(covariance: &ParameterCovariance) -> Vec<Vec<f64>> {
+    shortened_rows(&covariance.matrix)
+}
+
+pub(super) fn shortened_rows(matrix: &DMatrix<f64>) -> Vec<Vec<f64>> {
+    let is_large = matrix.nrows() > FULL_DIGITS_ROWS;
+    let shortened = |value: &f64| {
+        let short = || format!("{value:.6e}").parse().unwrap_or(*value);
+        if is_large && value.is_finite() { short() } else { *value }
+    };
+    matrix.row_iter().map(|row| row.iter().map(shortened).collect()).collect()
 }
 
 fn held_out_figures(parts: &Parts<'_>) -> HeldOutFigures {
     let at = &parts.solution.parameters;
     HeldOutFigures {
+        in_turn: false,
+        mean_m: None,
+        camera_mean_m: None,
         views: parts.data.held_out.iter().filter(|view| !view.tags.is_empty()).count(),
         rms_m: parts.held_out.rms_m(at),
         rms_px: parts.held_out.reprojection_rms_px(at),
@@ -240,9 +295,12 @@ fn joint_results(parts: &Parts<'_>) -> Vec<JointResult> {
             let offset = Parameter { joint, kind: ParameterKind::Offset };
             let (gain_std, offset_std) = (parts.covariance.std(gain), parts.covariance.std(offset));
             let travel = parts.data.fit.iter().filter(|v| !v.tags.is_empty()).map(|view| view.travel_rad[joint]);
-            let (low, high) =
-                travel.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), t| (low.min(t), high.max(t)));
-            let angle = |t: f64| spec.center_rad + model.correction.gain * t + model.correction.offset_rad;
+            let at_stop = |(_, stop): &&(_, StopReading)| parts.method == Method::JointLimits && stop.joint == joint;
+            let stops = parts.data.stops.iter().filter(at_stop).map(|(_, stop)| stop.travel_rad);
+            let (low, high) = travel
+                .chain(stops)
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), t| (low.min(t), high.max(t)));
+            let angle = |t: f64| model.correction.angle_rad(spec, t, &Departure::default(), 0.0);
             // What the new views did not determine is as sure as it was before.
             let before = parts.prior.map(|prior| &prior.joint[joint]);
             let gain_std_before =
@@ -259,6 +317,8 @@ fn joint_results(parts: &Parts<'_>) -> Vec<JointResult> {
                 covered_rad: if low <= high { [angle(low), angle(high)] } else { [spec.center_rad; 2] },
                 gain_over_datasheet: Some(model.correction.gain / ratio_of(parts, joint)),
                 identified_ratio: parts.identified.iter().find(|scale| scale.joint == joint).map(|scale| scale.ratio),
+                residual_std_rad: parts.covariance.residual_std_rad.map(|std_rad| std_rad[joint]),
+                terms: TermsTable::of(joint, model, parts.covariance),
             }
         })
         .collect()
@@ -267,113 +327,4 @@ fn joint_results(parts: &Parts<'_>) -> Vec<JointResult> {
 /// Counts per radian that the fit was made with, over the datasheet's.
 fn ratio_of(parts: &Parts<'_>, joint: usize) -> f64 {
     parts.identified.iter().find(|scale| scale.joint == joint).map_or(1.0, |scale| scale.ratio)
-}
-
-impl Calibration {
-    /// The sensors of `robot` under this calibration.
-    ///
-    /// # Errors
-    /// [`CalibrationFileError::OtherRobot`] when it was made for another arm.
-    pub fn sensors(&self, robot: &Robot) -> Result<ArmSensors, CalibrationFileError> {
-        let names: Vec<String> = self.joint.iter().map(|joint| joint.name.clone()).collect();
-        if self.robot != robot.name || names != robot.joint_names() {
-            return Err(CalibrationFileError::OtherRobot {
-                file: "calibration.toml".to_owned(),
-                found: self.robot.clone(),
-                found_joints: names,
-                expected: robot.name.clone(),
-            });
-        }
-        let mut sensors = ArmSensors::nominal(robot);
-        for (model, joint) in sensors.models.iter_mut().zip(&self.joint) {
-            model.correction =
-                Correction { gain: joint.gain_rad_per_count * model.spec.counts_per_rad, offset_rad: joint.offset_rad };
-        }
-        Ok(sensors)
-    }
-
-    /// `robot` with the sensor scales that were measured on the way, which the covariance's gains are relative to, and with
-    /// sensors as far from straight as the residuals say.
-    #[must_use]
-    pub fn scaled_robot(&self, robot: &Robot) -> Robot {
-        let mut scaled = robot.clone().with_linearity(self.fit.linearity_scale);
-        for (spec, joint) in scaled.sensors.iter_mut().zip(&self.joint) {
-            if let Some(ratio) = joint.identified_ratio {
-                *spec = spec.with_scale(ratio);
-            }
-        }
-        scaled
-    }
-
-    /// The parameters relative to the sensors of `robot`, whose joints must be this calibration's.
-    pub(super) fn parameters(&self, robot: &Robot) -> JointParameters {
-        let mut parameters = JointParameters::default();
-        for (joint, (result, spec)) in self.joint.iter().zip(&robot.sensors).enumerate() {
-            parameters.gain[joint] = result.gain_rad_per_count * spec.counts_per_rad;
-            parameters.offset_rad[joint] = result.offset_rad;
-        }
-        parameters
-    }
-
-    /// The covariance of the estimated parameters for `robot`'s joints; rows that name no joint of it are left out.
-    #[must_use]
-    pub fn parameter_covariance(&self, robot: &Robot) -> ParameterCovariance {
-        let all = (0..robot.n_joints())
-            .flat_map(|joint| [ParameterKind::Gain, ParameterKind::Offset].map(|kind| Parameter { joint, kind }));
-        let rows: Vec<(usize, Parameter)> = all
-            .filter_map(|p| Some((self.covariance.parameters.iter().position(|name| *name == p.name(robot))?, p)))
-            .collect();
-        let at = |row: usize, column: usize| self.covariance.rows[row].get(column).copied().unwrap_or(f64::NAN);
-        ParameterCovariance {
-            parameters: rows.iter().map(|(_, p)| *p).collect(),
-            matrix: nalgebra::DMatrix::from_fn(rows.len(), rows.len(), |i, j| at(rows[i].0, rows[j].0)),
-        }
-    }
-
-    /// The file's text.
-    ///
-    /// # Panics
-    /// Never: every value here has a TOML form.
-    #[must_use]
-    pub fn to_toml(&self) -> String {
-        let head = "# Joint sensors as calibrated. angle = center_rad + offset_rad + gain_rad_per_count * travel,\n\
-                    # travel = reading - the datasheet's reading at center_rad, in counts, wrapped to half a word.\n";
-        let body = toml::to_string(self).expect("plain tables and finite numbers have a TOML form");
-        format!("{head}{body}")
-    }
-
-    /// Reads a calibration file.
-    ///
-    /// # Errors
-    /// [`CalibrationFileError`] naming file, key and allowed range.
-    pub fn read(file: &Path) -> Result<Self, CalibrationFileError> {
-        Self::parse(file, &read_text(file)?)
-    }
-
-    /// Reads the text of a calibration file; `file` is for messages.
-    ///
-    /// # Errors
-    /// As [`Self::read`].
-    pub fn parse(file: &Path, text: &str) -> Result<Self, CalibrationFileError> {
-        let calibration: Self = parse_toml(file, text)?;
-        calibration.check(file).map_err(RobotError::from)?;
-        Ok(calibration)
-    }
-
-    fn check(&self, file: &Path) -> Result<(), FileIssue> {
-        FileIssue::check_range(file, "version", f64::from(self.version), 1.0..=1.0)?;
-        for joint in &self.joint {
-            let check = |key: &str, value: f64, range| {
-                FileIssue::check_range(file, &format!("joint `{}`: {key}", joint.name), value, range)
-            };
-            check("gain_rad_per_count (size)", joint.gain_rad_per_count.abs(), 1e-12..=1e3)?;
-            check("offset_rad", joint.offset_rad, -10.0..=10.0)?;
-            check("center_rad", joint.center_rad, -100.0..=100.0)?;
-        }
-        let n = self.covariance.parameters.len();
-        if self.covariance.rows.len() != n || self.covariance.rows.iter().any(|row| row.len() != n) {
-            return Err(FileIssue::new(file, "covariance.rows", format!("needs {n} rows of {n} numbers")));
-        }
-        Ok(())
-    }
 }

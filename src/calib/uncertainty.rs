@@ -11,18 +11,19 @@ use nalgebra::{Const, DMatrix, DVector, Dyn, Matrix3, Matrix6, OMatrix, Vector3,
 
 use super::associate::TagView;
 use super::gripper_tag::MountEstimate;
-use super::problem::{JointParameters, Parameter, ParameterKind, PositionProblem};
+use super::problem::{JointParameters, Parameter, PositionProblem};
 use crate::kinematics::{IkGoal, IkSettings, JointLimits, solve_position};
-use crate::robot::Robot;
-use crate::sensor::ArmSensors;
+use crate::robot::{FailedJoint, FailedKind, Robot};
 use crate::stats::Summary;
-use crate::streams::{JointAngles, ReachTask};
+use crate::streams::{JointAngles, MAX_JOINTS, ReachTask};
 
 /// Covariance of the free parameters, in their own units (gain: 1, offset: rad).
 #[derive(Clone, Debug)]
 pub struct ParameterCovariance {
     pub parameters: Vec<Parameter>,
     pub matrix: DMatrix<f64>,
+    /// One sigma of what the parameters leave of each sensor's error at a new pose; `None` takes the datasheet's linearity.
+    pub residual_std_rad: Option<[f64; MAX_JOINTS]>,
 }
 
 /// What the tool's position error is expected to be at the task's targets.
@@ -110,7 +111,7 @@ impl ParameterCovariance {
                 (matrix, -common.columns(0, 6))
             }
         };
-        (Self { parameters: free.to_vec(), matrix }, by_mount)
+        (Self { parameters: free.to_vec(), matrix, residual_std_rad: None }, by_mount)
     }
 
     /// The same with the joints that the tag on the gripper determined; `by_mount` as [`Self::estimate`] gives it.
@@ -129,7 +130,19 @@ impl ParameterCovariance {
             matrix.view_mut((0, n + i), (n, 1)).copy_from(&shared);
             matrix.view_mut((n + i, 0), (1, n)).copy_from(&shared.transpose());
         }
-        Self { parameters: self.parameters.into_iter().chain(determined.iter().copied()).collect(), matrix }
+        let parameters = self.parameters.into_iter().chain(determined.iter().copied()).collect();
+        Self { parameters, matrix, ..self }
+    }
+
+    /// Nothing known of the parameters of `joint`.
+    #[must_use]
+    pub fn without_joint(&self, joint: usize) -> Self {
+        let kept: Vec<usize> = (0..self.parameters.len()).filter(|&k| self.parameters[k].joint != joint).collect();
+        Self {
+            parameters: kept.iter().map(|&k| self.parameters[k]).collect(),
+            matrix: DMatrix::from_fn(kept.len(), kept.len(), |i, k| self.matrix[(kept[i], kept[k])]),
+            residual_std_rad: self.residual_std_rad,
+        }
     }
 
     /// One sigma of a parameter; `None` if it is not among the estimated ones.
@@ -137,34 +150,6 @@ impl ParameterCovariance {
     pub fn std(&self, parameter: Parameter) -> Option<f64> {
         let row = self.parameters.iter().position(|p| *p == parameter)?;
         Some(self.matrix[(row, row)].max(0.0).sqrt())
-    }
-
-    /// Covariance of the tool's position (base frame, m^2) for an arm at `angles`.
-    ///
-    /// Estimated parameters enter with their covariance, the others with the datasheet's sigma, and every sensor with
-    /// its linearity.
-    #[must_use]
-    pub fn tool_position_m2(&self, robot: &Robot, sensors: &ArmSensors, angles: &JointAngles) -> Matrix3<f64> {
-        let poses = robot.chain.link_poses(angles);
-        let tool = poses.frame(&robot.tool.mount).translation.vector;
-        let mut estimated = DMatrix::zeros(3, self.parameters.len());
-        let mut covariance = Matrix3::zeros();
-        for joint in 0..robot.tool.mount.n_joints {
-            let by_angle = poses.point_jacobian(joint, &tool);
-            let correction = sensors.models[joint].correction;
-            let spec = &robot.sensors[joint];
-            let travel = (angles[joint] - spec.center_rad - correction.offset_rad) / correction.gain;
-            for (kind, by_parameter) in [(ParameterKind::Gain, by_angle * travel), (ParameterKind::Offset, by_angle)] {
-                let parameter = Parameter { joint, kind };
-                match self.parameters.iter().position(|p| *p == parameter) {
-                    Some(column) => estimated.fixed_view_mut::<3, 1>(0, column).copy_from(&by_parameter),
-                    None => covariance += outer(&(by_parameter * parameter.prior_std(robot))),
-                }
-            }
-            covariance += outer(&(by_angle * spec.linearity_std_rad));
-        }
-        let full = &estimated * &self.matrix * estimated.transpose();
-        covariance + full.fixed_view::<3, 3>(0, 0)
     }
 }
 
@@ -180,6 +165,11 @@ pub fn linearity_scale(
     n: usize,
 ) -> f64 {
     let [mut found_m2, mut from_drawing_m2, mut from_sensors_m2] = [0.0; 3];
+    let mut views = fit.views.iter().chain(held_out.views).flat_map(|view| &view.tags);
+    if views.any(|tag| tag.corners().is_none()) {
+        // How good positions are nobody says; their scatter shall not count as the sensors'.
+        return 1.0;
+    }
     for (problem, n_fitted) in [(fit, n), (held_out, 0)] {
         let views = problem.views.iter().filter(|view| !view.tags.is_empty()).count();
         let free_share = (1.0 - n_fitted as f64 / (3 * views).max(1) as f64).max(0.1);
@@ -207,16 +197,33 @@ fn drawing_variance_m2(robot: &Robot, tag: &TagView) -> f64 {
     let across_m = range_m * bearing_rad;
     3.0 * (camera.mount_std_m.powi(2) + survey.position_std_m.powi(2))
         + 2.0 * (range_m * camera.mount_std_rad).powi(2)
-        + (along_m.powi(2) + 2.0 * across_m.powi(2)) / tag.n_frames.max(1) as f64
-}
-
-fn outer(v: &Vector3<f64>) -> Matrix3<f64> {
-    v * v.transpose()
+        + (along_m.powi(2) + 2.0 * across_m.powi(2)) / tag.corners().map_or(1, |seen| seen.n_frames.max(1)) as f64
 }
 
 fn add_columns(matrix: &mut DMatrix<f64>, column: usize, block: &OMatrix<f64, Dyn, Const<3>>) {
     let mut view = matrix.fixed_columns_mut::<3>(column);
     view += block;
+}
+
+fn is_locked(robot: &Robot, joint: usize) -> bool {
+    robot.failed.contains(&FailedJoint { joint, kind: FailedKind::Locked })
+}
+
+/// The arm's angles at each target of `task` that inverse kinematics reaches.
+#[must_use]
+pub fn task_angles(robot: &Robot, task: &ReachTask) -> Vec<JointAngles> {
+    let open = JointLimits { lower_rad: -std::f64::consts::TAU, upper_rad: std::f64::consts::TAU };
+    let settings = IkSettings {
+        limits: robot.chain.joints().iter().map(|joint| joint.limits.unwrap_or(open)).collect(),
+        locked: (0..robot.n_joints()).map(|j| j >= robot.tool.mount.n_joints || is_locked(robot, j)).collect(),
+        tolerance_m: 1e-4,
+        max_iterations: 200,
+    };
+    let reached = task.targets_m.iter().filter_map(|target| {
+        let goal = IkGoal { position_m: Vector3::from(*target) };
+        solve_position(&robot.chain, &robot.tool.mount, &goal, &robot.stowed, &settings).ok()
+    });
+    reached.collect()
 }
 
 /// Expected size of the tool's position error at each target of `task`: `sqrt(trace(covariance))`, summarized.
@@ -228,20 +235,7 @@ pub fn predict_tool_error(
     task: Option<&ReachTask>,
 ) -> Option<ToolErrorPrediction> {
     let sensors = at.sensors(robot);
-    let open = JointLimits { lower_rad: -std::f64::consts::TAU, upper_rad: std::f64::consts::TAU };
-    let settings = IkSettings {
-        limits: robot.chain.joints().iter().map(|joint| joint.limits.unwrap_or(open)).collect(),
-        locked: (0..robot.n_joints()).map(|j| j >= robot.tool.mount.n_joints).collect(),
-        tolerance_m: 1e-4,
-        max_iterations: 200,
-    };
-    let mut errors = Vec::new();
-    for target in &task?.targets_m {
-        let goal = IkGoal { position_m: Vector3::from(*target) };
-        let Ok(angles) = solve_position(&robot.chain, &robot.tool.mount, &goal, &robot.stowed, &settings) else {
-            continue;
-        };
-        errors.push(covariance.tool_position_m2(robot, &sensors, &angles).trace().max(0.0).sqrt());
-    }
+    let error_m = |angles: &JointAngles| covariance.tool_position_m2(robot, &sensors, angles).trace().max(0.0).sqrt();
+    let errors: Vec<f64> = task_angles(robot, task?).iter().map(error_m).collect();
     Some(ToolErrorPrediction { error_m: Summary::of(&errors)? })
 }

@@ -1,6 +1,6 @@
 //! Accept or refuse: the held-out views decide, never the fit's own residuals.
 
-use super::minimum_distance::SolveOutcome;
+use super::methods::SolveOutcome;
 
 /// What the verdict rests on.
 #[derive(Clone, Copy, Debug)]
@@ -11,6 +11,7 @@ pub struct Evidence {
     /// The same views with the datasheet's sensors.
     pub held_out_nominal_rms_m: Option<f64>,
     pub fit_rms_m: f64,
+    /// Wanted of the sensors that move the camera, whether these views determine them or not.
     pub n_parameters: usize,
     pub fit_views: usize,
     /// 95th percentile over the task's targets; `None` without a task.
@@ -28,11 +29,12 @@ pub const MIN_VIEWS_PER_PARAMETER: f64 = 1.0;
 /// `None` to accept, else the reason to refuse, with the figures.
 #[must_use]
 pub fn refusal(e: &Evidence) -> Option<String> {
+    if (e.fit_views as f64) < MIN_VIEWS_PER_PARAMETER * e.n_parameters as f64 {
+        let (views, n) = (e.fit_views, e.n_parameters);
+        return Some(format!("{views} views to fit are too few for {n} parameters, however many tags each shows"));
+    }
     if e.outcome != SolveOutcome::Converged {
         return Some(format!("the solver {}", e.outcome.name()));
-    }
-    if (e.fit_views as f64) < MIN_VIEWS_PER_PARAMETER * e.n_parameters as f64 {
-        return Some(format!("{} views are too few for {} parameters", e.fit_views, e.n_parameters));
     }
     if e.held_out_views < MIN_HELD_OUT_VIEWS {
         let seen = e.held_out_views;

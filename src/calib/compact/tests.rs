@@ -45,6 +45,8 @@ fn calibration(robot: &str, joints: &[Joint], refusal: Option<String>) -> Calibr
             covered_rad: [-1.0, 1.0],
             identified_ratio: None,
             gain_over_datasheet: None,
+            residual_std_rad: None,
+            terms: None,
         }
     };
     let joint = joints.iter().map(one).collect();
@@ -58,6 +60,8 @@ fn calibration(robot: &str, joints: &[Joint], refusal: Option<String>) -> Calibr
         refusal,
         messages_hash: "24a1c0689a592055e463ff1910220527f15c7d657fa0e8a41a4710f107b1b963".to_owned(),
         unobservable: Vec::new(),
+        outliers: Vec::new(),
+        model: None,
         fit: FitFigures {
             outcome: "converged".to_owned(),
             evaluations: 540,
@@ -68,15 +72,28 @@ fn calibration(robot: &str, joints: &[Joint], refusal: Option<String>) -> Calibr
             rejected: 0,
             rejected_by_reason: Default::default(),
             rms_m: 0.01,
-            rms_px: 2.3,
+            rms_px: Some(2.3),
             linearity_scale: 1.0,
         },
-        held_out: HeldOutFigures { views: 4, rms_m: Some(0.01), rms_px: Some(2.6), nominal_rms_m: Some(0.2) },
+        held_out: HeldOutFigures {
+            views: 4,
+            in_turn: false,
+            mean_m: None,
+            camera_mean_m: None,
+            rms_m: Some(0.01),
+            rms_px: Some(2.6),
+            nominal_rms_m: Some(0.2),
+        },
         predicted_tool_error_m: Some(Summary { n: 4, median: 0.005_879_45, p95: 0.006_070_3, max: 0.006_085 }),
         valid: ValidRange { time_nanos: 1_767_225_749_230_000_000, oil_c: None, water_c: None, pressure_pa: None },
+        reference: None,
         camera_mount: None,
         map: None,
+        observability: None,
+        verdict: None,
         joint,
+        failed_joint: Vec::new(),
+        prior: None,
         covariance: CovarianceTable { parameters, rows },
     }
 }
@@ -140,7 +157,7 @@ fn what_is_not_finite_is_unknown_or_refused() {
 /// Each reason that the verdict can give has a code of its own.
 #[test]
 fn every_refusal_has_a_code() {
-    use super::super::minimum_distance::SolveOutcome;
+    use super::super::methods::SolveOutcome;
     use super::super::verdict::{Evidence, refusal};
     let good = Evidence {
         outcome: SolveOutcome::Converged,

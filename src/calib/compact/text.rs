@@ -3,12 +3,14 @@
 use std::fmt::Write as _;
 
 use super::{
-    CompactCalibration, CompactError, CompactJoint, HASH_DIGITS, MAX_STEPS, PredictedToolError, STEPS, Status, UM_PER_M,
+    CompactCalibration, CompactError, CompactJoint, CompactReference, CompactTerms, HASH_DIGITS, MAX_STEPS,
+    PredictedToolError, STEPS, STEPS_WITH_TERMS, Status, UM_PER_M,
 };
 use crate::routine::Method;
 use crate::streams::MAX_JOINTS;
 
 pub(super) const FORMAT: &str = "armcal1";
+pub(super) const FORMAT_WITH_TERMS: &str = "armcal2";
 /// Robot names longer than this are shortened, bytes after escaping.
 const MAX_NAME_BYTES: usize = 40;
 const SUM_DIGITS: usize = 8;
@@ -22,23 +24,30 @@ pub(super) fn write(c: &CompactCalibration) -> String {
         || "e-".to_owned(),
         |error| format!("e{}/{}", (error.median * UM_PER_M).round(), (error.p95 * UM_PER_M).round()),
     );
-    let mut body = format!("{FORMAT} {} {} {verdict} t{} {error}", c.robot, c.method, c.time_s);
+    let mut body = format!("{} {} {} {verdict} t{} {error}", c.format, c.robot, c.method, c.time_s);
     let _ = write!(body, " h{} r{}", c.messages_hash_start, c.joints_hash);
+    if let Some(reference) = &c.reference {
+        let _ = write!(body, " {}", reference.to_text());
+    }
+    let per_unit = if c.reference.is_some() { STEPS_WITH_TERMS } else { STEPS };
     for joint in &c.joint {
-        let gain = parameter(joint.gain_correction, joint.gain_std, joint.gain_estimated);
-        let offset = parameter(joint.offset_rad, joint.offset_std_rad, joint.offset_estimated);
+        let gain = parameter(joint.gain_correction, joint.gain_std, joint.gain_estimated, per_unit);
+        let offset = parameter(joint.offset_rad, joint.offset_std_rad, joint.offset_estimated, per_unit);
         let _ = write!(body, " {gain},{offset}");
+        if let (Some(terms), Some(reference)) = (&joint.terms, &c.reference) {
+            let _ = write!(body, ",{}", terms.to_text(reference.shape_step_rad));
+        }
     }
     let sum = checksum(&body);
     format!("{body} #{sum}")
 }
 
 /// `+242479~12078` if estimated, `=0~300000` if the datasheet's.
-fn parameter(value: f64, std: Option<f64>, is_estimated: bool) -> String {
-    let steps = (value * STEPS).round() as i64;
+fn parameter(value: f64, std: Option<f64>, is_estimated: bool, per_unit: f64) -> String {
+    let steps = (value * per_unit).round() as i64;
     let value = if is_estimated { format!("{steps:+}") } else { format!("={steps}") };
     match std {
-        Some(std) => format!("{value}~{}", (std * STEPS).round()),
+        Some(std) => format!("{value}~{}", (std * per_unit).round()),
         None => format!("{value}~x"),
     }
 }
@@ -68,7 +77,7 @@ pub(super) fn short_name(name: &str) -> String {
 pub(super) fn read(text: &str) -> Result<CompactCalibration, CompactError> {
     let words: Vec<&str> = text.split_ascii_whitespace().collect();
     match words.first() {
-        Some(&FORMAT) => {}
+        Some(&(FORMAT | FORMAT_WITH_TERMS)) => {}
         Some(word) if word.starts_with("armcal") && word.len() < 12 => {
             return Err(CompactError::Version { found: printable(word) });
         }
@@ -87,7 +96,7 @@ fn printable(word: &str) -> String {
     word.chars().take(40).flat_map(char::escape_default).collect()
 }
 
-fn bad(field: impl Into<String>, found: &str, expected: &'static str) -> CompactError {
+pub(super) fn bad(field: impl Into<String>, found: &str, expected: &'static str) -> CompactError {
     CompactError::Field { field: field.into(), found: printable(found), expected }
 }
 
@@ -110,13 +119,16 @@ fn fields(words: &[&str]) -> Result<CompactCalibration, CompactError> {
     let predicted_tool_error_m = predicted(tagged(5, "predicted tool error", 'e')?)?;
     let messages_hash_start = hex(tagged(6, "messages hash", 'h')?, "messages hash", HASH_DIGITS)?;
     let joints_hash = hex(tagged(7, "joints hash", 'r')?, "joints hash", 8)?;
-    let joints = words.get(8..).unwrap_or_default();
+    let has_terms = words[0] == FORMAT_WITH_TERMS;
+    let reference = has_terms.then(|| word(8, "reference").and_then(CompactReference::from_text)).transpose()?;
+    let joints = words.get(if has_terms { 9.. } else { 8.. }).unwrap_or_default();
     if !(1..=MAX_JOINTS).contains(&joints.len()) {
         return Err(CompactError::Joints { joints: joints.len() });
     }
-    let joint = joints.iter().enumerate().map(|(n, word)| joint(n, word)).collect::<Result<_, _>>()?;
+    let joint =
+        joints.iter().enumerate().map(|(n, word)| joint(n, word, reference.as_ref())).collect::<Result<_, _>>()?;
     Ok(CompactCalibration {
-        format: FORMAT,
+        format: if has_terms { FORMAT_WITH_TERMS } else { FORMAT },
         robot: robot.to_owned(),
         method,
         status,
@@ -125,6 +137,7 @@ fn fields(words: &[&str]) -> Result<CompactCalibration, CompactError> {
         predicted_tool_error_m,
         messages_hash_start,
         joints_hash,
+        reference,
         joint,
     })
 }
@@ -156,21 +169,30 @@ fn hex(word: &str, field: &str, digits: usize) -> Result<String, CompactError> {
 }
 
 /// Digits alone, within the range.
-fn whole(word: &str) -> Option<i64> {
+pub(super) fn whole(word: &str) -> Option<i64> {
     let is_number = !word.is_empty() && word.bytes().all(|byte| byte.is_ascii_digit());
     is_number.then(|| word.parse().ok()).flatten().filter(|steps| *steps <= MAX_STEPS)
 }
 
-fn joint(n: usize, word: &str) -> Result<CompactJoint, CompactError> {
+fn joint(n: usize, word: &str, reference: Option<&CompactReference>) -> Result<CompactJoint, CompactError> {
     let wrong = || bad(format!("joint {n}"), word, "gain~std,offset~std");
-    let (gain, offset) = word.split_once(',').ok_or_else(wrong)?;
-    let (gain_correction, gain_std, gain_estimated) = read_parameter(gain).ok_or_else(wrong)?;
-    let (offset_rad, offset_std_rad, offset_estimated) = read_parameter(offset).ok_or_else(wrong)?;
-    Ok(CompactJoint { gain_correction, gain_std, gain_estimated, offset_rad, offset_std_rad, offset_estimated })
+    let (gain, rest) = word.split_once(',').ok_or_else(wrong)?;
+    // Whatever stands in the terms, commas among it, is behind the second one.
+    let (offset, terms) = match (rest.split_once(','), reference) {
+        (Some((offset, terms)), Some(reference)) => {
+            let wrong = || bad(format!("joint {n}: terms"), terms, "numbers in base 45");
+            (offset, Some(CompactTerms::from_text(terms, reference.shape_step_rad).ok_or_else(wrong)?))
+        }
+        _ => (rest, None),
+    };
+    let per_unit = if reference.is_some() { STEPS_WITH_TERMS } else { STEPS };
+    let (gain_correction, gain_std, gain_estimated) = read_parameter(gain, per_unit).ok_or_else(wrong)?;
+    let (offset_rad, offset_std_rad, offset_estimated) = read_parameter(offset, per_unit).ok_or_else(wrong)?;
+    Ok(CompactJoint { gain_correction, gain_std, gain_estimated, offset_rad, offset_std_rad, offset_estimated, terms })
 }
 
 /// The other way of [`parameter`].
-fn read_parameter(word: &str) -> Option<(f64, Option<f64>, bool)> {
+fn read_parameter(word: &str, per_unit: f64) -> Option<(f64, Option<f64>, bool)> {
     let (value, std) = word.split_once('~')?;
     let (is_estimated, value) = match value.strip_prefix('=') {
         Some(value) => (false, value),
@@ -180,6 +202,6 @@ fn read_parameter(word: &str) -> Option<(f64, Option<f64>, bool)> {
         Some(size) => -whole(size)?,
         None => whole(value)?,
     };
-    let std = if std == "x" { None } else { Some(whole(std)? as f64 / STEPS) };
-    Some((steps as f64 / STEPS, std, is_estimated))
+    let std = if std == "x" { None } else { Some(whole(std)? as f64 / per_unit) };
+    Some((steps as f64 / per_unit, std, is_estimated))
 }
