@@ -53,7 +53,7 @@ const FIGURES: &[Figure] = &[
     count("views", |f| Some(f.summary.capture.views as f64)),
     count("detections", |f| Some(f.summary.capture.detections as f64)),
     count("rejected", |f| Some(f.summary.capture.rejected as f64)),
-    real("residual_rms_px", |f| Some(f.summary.calibration.residual_rms_px)),
+    real("residual_rms_px", |f| f.summary.calibration.residual_rms_px),
     real("corner_scatter_px", |f| f.corner_scatter_px),
     count("held_out_views", |f| Some(f.summary.held_out.views as f64)),
     real("held_out_rms_px", |f| f.summary.held_out.rms_px),

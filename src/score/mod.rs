@@ -158,7 +158,8 @@ fn nees(input: &ScoreInput<'_>, after: &[&Compared<'_>]) -> Option<f64> {
     let sensors = calibration.sensors(&robot).ok()?;
     let mut sum = 0.0;
     for compared in after {
-        let predicted = covariance.tool_position_m2(&robot, &sensors, &compared.rest.believed);
+        let rest = compared.rest;
+        let predicted = covariance.tool_position_under_m2(&robot, &sensors, &rest.believed, &rest.conditions);
         let inverse = predicted.try_inverse().filter(|p| p.iter().all(|v| v.is_finite()))?;
         sum += compared.tool_error_m.dot(&(inverse * compared.tool_error_m));
     }

@@ -1,7 +1,7 @@
 //! BELIEF: the closed loop, a routine's script carried out on any [`Arm`].
 //!
 //! It knows the arm only through its messages. `script` goes through the steps, `reach` and `capture` plan and move for
-//! them, `grip` moves the jaws, `identify` measures a sensor's unknown scale, `motion` drives and waits until `stillness` says that the arm stands, `recorder` keeps every message,
+//! them, `grip` moves the jaws, `identify` measures a sensor's unknown scale, `stops` presses joints against their end stops, `motion` drives and waits until `stillness` says that the arm stands, `recorder` keeps every message,
 //! `outcome` is what is left when it is over; `Progress` tells whoever watches.
 
 mod capture;
@@ -13,6 +13,7 @@ mod reach;
 mod recorder;
 mod script;
 mod stillness;
+mod stops;
 
 pub use outcome::{AssertResult, Epoch, Outcome, ReachStep};
 pub use recorder::Recorder;

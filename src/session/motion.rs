@@ -3,9 +3,9 @@
 use super::stillness::Stillness;
 use super::{Progress, Recorder, SessionError};
 use crate::plan::Path;
-use crate::robot::{Robot, Vehicle};
+use crate::robot::{FailedJoint, Robot, Vehicle};
 use crate::routine::TaskSettings;
-use crate::sensor::ArmSensors;
+use crate::sensor::{ArmSensors, Conditions};
 use crate::streams::{
     Arm, ArmError, JointAngles, JointCommand, JointCounts, JointStateBelief, LogLevel, LogLine, Mark, MarkKind,
     Message, Phase, ReachTask, RecordedSurvey, Sink,
@@ -51,6 +51,7 @@ impl<'b> Driver<'b> {
         // One period, to learn where the arm is.
         arm.step(recorder)?;
         let counts = recorder.latest_counts.ok_or(SessionError::NoReadings)?;
+        // Sensors that begin are the datasheet's, the same under all conditions.
         let set_point = sensors.angles(&counts);
         let mut driver =
             Self { robot, arm, recorder, sensors, progress, start, set_point, ticks: 0, motion_s: 0.0, waited_s: 0.0 };
@@ -72,7 +73,18 @@ impl<'b> Driver<'b> {
 
     /// Where the arm believes to be by its latest readings.
     pub fn believed_angles(&self) -> Result<JointAngles, SessionError> {
-        Ok(self.sensors.angles(&self.counts()?))
+        Ok(self.sensors.angles_under(&self.counts()?, &self.conditions()))
+    }
+
+    /// What the arm last heard of its surroundings.
+    pub fn conditions(&self) -> Conditions {
+        let Recorder { oil_c, pressure_pa, .. } = *self.recorder;
+        Conditions { oil_c, pressure_pa, stamp: Some(self.arm.now()) }
+    }
+
+    /// The readings that the set-point stands for under the sensors of now.
+    fn set_point_counts(&self) -> JointCounts {
+        self.sensors.counts_under(&self.set_point, &self.conditions())
     }
 
     /// The latest raw readings.
@@ -100,7 +112,7 @@ impl<'b> Driver<'b> {
 
     /// Takes over other sensors; the arm stays where it is, only what that is called changes.
     pub fn believe(&mut self, sensors: ArmSensors) {
-        self.set_point = sensors.angles(&self.sensors.counts(&self.set_point));
+        self.set_point = sensors.angles_under(&self.set_point_counts(), &self.conditions());
         self.sensors = sensors;
     }
 
@@ -122,6 +134,14 @@ impl<'b> Driver<'b> {
         self.record(&Message::Survey(RecordedSurvey::new(self.arm.now(), survey)))
     }
 
+    /// What the operator says of the arm goes the way of all that the estimator knows.
+    pub fn record_failed(&mut self, failed: &[FailedJoint]) -> Result<(), SessionError> {
+        let now = self.arm.now();
+        failed.iter().try_for_each(|failed| {
+            self.record(&Message::Mark(Mark { start: now, end: now, kind: MarkKind::Failed(*failed) }))
+        })
+    }
+
     pub fn phase(&mut self, phase: Phase) -> Result<(), SessionError> {
         let now = self.arm.now();
         self.record(&Message::Mark(Mark { start: now, end: now, kind: MarkKind::Phase(phase) }))
@@ -133,7 +153,7 @@ impl<'b> Driver<'b> {
     }
 
     fn command(&mut self) -> Result<(), SessionError> {
-        let counts = self.sensors.counts(&self.set_point);
+        let counts = self.set_point_counts();
         self.arm.command(&counts)?;
         Ok(())
     }
@@ -148,7 +168,7 @@ impl<'b> Driver<'b> {
             let stamp = self.arm.now();
             let angles = self.believed_angles()?;
             self.record(&Message::JointStates(JointStateBelief { stamp, angles }))?;
-            let counts = self.sensors.counts(&self.set_point);
+            let counts = self.set_point_counts();
             self.record(&Message::JointCommand(JointCommand { stamp, counts }))?;
         }
         Ok(())
@@ -158,7 +178,7 @@ impl<'b> Driver<'b> {
     fn interrupt(&mut self) -> Result<SessionError, SessionError> {
         self.command()?;
         let (stamp, at_s) = (self.arm.now(), self.elapsed_s());
-        let counts = self.sensors.counts(&self.set_point);
+        let counts = self.set_point_counts();
         self.record(&Message::JointCommand(JointCommand { stamp, counts }))?;
         self.log(LogLevel::Warn, "stopped on request; the arm holds its last set-point")?;
         Ok(SessionError::Interrupted { at_s })
@@ -200,6 +220,23 @@ impl<'b> Driver<'b> {
         Ok(false)
     }
 
+    /// Waits until the arm stands while `joint` is pressed against something; `false` when it does not within the limit.
+    pub fn press(&mut self, joint: usize) -> Result<bool, SessionError> {
+        let mut stillness = Stillness::new(self.believed_angles()?);
+        let mut waited_s = 0.0;
+        while waited_s < SETTLE_LIMIT_S {
+            self.step()?;
+            waited_s += self.arm.period_s();
+            let now = self.believed_angles()?;
+            // The pressed joint stands where it stands, not where it was sent.
+            let there = JointAngles::from_fn(now.len(), |j| if j == joint { now[j] } else { self.set_point[j] });
+            if stillness.update(&now, &there, self.arm.period_s()) >= REST_S {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
     /// Stands for `seconds` and marks the span; gives how many tags were seen in it.
     pub fn dwell(&mut self, seconds: f64, kind: MarkKind) -> Result<usize, SessionError> {
         let start = self.arm.now();
@@ -215,3 +252,6 @@ impl<'b> Driver<'b> {
         Ok(self.recorder.tags_seen)
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -18,6 +18,7 @@ impl Run<'_, '_> {
         }
         let attempt = self.attempt();
         let postures = self.postures(targets, attempt)?;
+        self.warn_beyond(&postures)?;
         self.driver.phase(Phase::Reach)?;
         for (n, (&target, angles)) in targets.iter().zip(&postures).enumerate() {
             self.progress_at(Phase::Reach, n, targets.len());
@@ -39,6 +40,25 @@ impl Run<'_, '_> {
             self.rest_jaws(step)?;
         }
         Ok(())
+    }
+
+    /// Says once what the targets ask beyond what the calibration in use saw, if that is more than straight lines: a fitted shape
+    /// is worth nothing where there were no views.
+    fn warn_beyond(&mut self, postures: &[Option<JointAngles>]) -> Result<(), SessionError> {
+        let calibration = self.epochs.last().and_then(|epoch| epoch.calibration.as_ref());
+        let Some(calibration) = calibration.filter(|c| c.reference.is_some()) else { return Ok(()) };
+        let conditions = self.driver.conditions();
+        let mut words: Vec<String> = Vec::new();
+        for word in postures.iter().flatten().flat_map(|angles| calibration.beyond(angles, &conditions)) {
+            if !words.contains(&word) {
+                words.push(word);
+            }
+        }
+        if words.is_empty() {
+            return Ok(());
+        }
+        let text = format!("beyond what the calibration is valid for: {}", words.join("; "));
+        self.driver.log(LogLevel::Warn, &text)
     }
 
     /// Believed angles at each target. A target that a calibration puts out of reach is no reason to lose the rest: it is

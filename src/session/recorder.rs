@@ -10,6 +10,8 @@ pub struct Recorder {
     pub(super) latest_counts: Option<JointCounts>,
     /// Latest of the oil's thermometer.
     pub(super) oil_c: Option<f64>,
+    /// Latest of the depth gauge.
+    pub(super) pressure_pa: Option<f64>,
     /// Latest measured gap between the jaws.
     pub(super) opening_m: Option<f64>,
     /// Tags seen since it was last set to zero.
@@ -19,7 +21,7 @@ pub struct Recorder {
 impl Recorder {
     #[must_use]
     pub fn new(writer: RecordingWriter) -> Self {
-        Self { writer, latest_counts: None, oil_c: None, opening_m: None, tags_seen: 0 }
+        Self { writer, latest_counts: None, oil_c: None, pressure_pa: None, opening_m: None, tags_seen: 0 }
     }
 
     /// The recording so far, read from its bytes on disk.
@@ -44,6 +46,7 @@ impl Sink for Recorder {
             Message::Temperature(sample) if sample.thermometer == Thermometer::Oil => {
                 self.oil_c = Some(sample.temperature_c)
             }
+            Message::Pressure(sample) => self.pressure_pa = Some(sample.pressure_pa),
             Message::Gripper(sample) => self.opening_m = Some(sample.opening_m),
             Message::Detections(detections) => self.tags_seen += detections.tags.len(),
             _ => {}

@@ -5,7 +5,7 @@ use rand_chacha::ChaCha8Rng;
 use super::motion::Driver;
 use super::outcome::{AssertResult, Epoch, Outcome, ReachStep};
 use super::{Progress, Recorder, SessionError, Setup};
-use crate::calib::{Calibration, Status, calibrate};
+use crate::calib::{Calibration, CalibrationFileError, Status, calibrate};
 use crate::plan::{
     Age, ClearanceModel, JointErrorBounds, PathPlanner, PlanError, PosePlan, TargetRequest, plan_targets,
 };
@@ -161,6 +161,7 @@ impl Run<'_, '_> {
             self.planned = self.planned.take().map(|planned| Planned { first_capture: Some(plan), ..planned });
         }
         self.driver.record_task(&routine.task)?;
+        self.driver.record_failed(&self.setup.robot.failed)?;
         self.progress_at(Phase::Plan, 2, 2);
         Ok(())
     }
@@ -182,6 +183,7 @@ impl Run<'_, '_> {
                 Step::Identify(settings) => {
                     self.identify(number, settings).map_err(|error| after_motion(number, error))?;
                 }
+                Step::Stops(settings) => self.stops(number, settings)?,
                 Step::Calibrate(settings) => {
                     let refusal = self.calibrate(settings)?;
                     if let (Some(why), OnRefusal::Stop) = (refusal, settings.on_refusal) {
@@ -304,7 +306,7 @@ impl Run<'_, '_> {
         self.views_since = end;
         self.driver.log(LogLevel::Info, &verdict_line(&calibration))?;
         if calibration.status == Status::Accepted {
-            self.believe(&calibration);
+            self.believe(&calibration)?;
         }
         let refusal = calibration.refusal.clone();
         self.calibration = Some(calibration);
@@ -319,14 +321,16 @@ impl Run<'_, '_> {
         self.bounds = fresh.bounds.aged(&self.robot, age);
     }
 
-    fn believe(&mut self, calibration: &Calibration) {
-        let sensors = calibration.sensors(self.setup.robot).expect("made for this robot a moment ago");
+    fn believe(&mut self, calibration: &Calibration) -> Result<(), SessionError> {
+        let wrong = |error: CalibrationFileError| SessionError::Step { step: 0, problem: error.to_string() };
+        let sensors = calibration.sensors(self.setup.robot).map_err(wrong)?;
         self.bounds = JointErrorBounds::calibrated(&self.robot, &estimated(calibration, &self.robot));
         let (bounds, at, oil_c) = (self.bounds.clone(), self.driver.now(), self.driver.recorder.oil_c);
         self.fresh = Some(FreshBounds { bounds, at, oil_c });
         self.driver.believe(sensors.clone());
         let from = self.driver.now();
         self.epochs.push(Epoch { from, sensors, calibration: Some(calibration.clone()) });
+        Ok(())
     }
 
     fn assert(&mut self, step: usize, limits: &AssertLimits) {

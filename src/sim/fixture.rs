@@ -12,6 +12,7 @@ impl JointSensorSpec {
             counts_per_rad,
             wrap_counts: 65536.0,
             center_rad: 0.0,
+            half_range_rad: 2.0,
             gain_std: 0.0,
             offset_std_rad: 0.0,
             gain_bound: 0.0,

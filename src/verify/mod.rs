@@ -5,9 +5,10 @@
 
 use nalgebra::Vector3;
 
+use crate::calib::Surroundings;
 use crate::log::Recording;
 use crate::robot::Robot;
-use crate::sensor::ArmSensors;
+use crate::sensor::{ArmSensors, Conditions};
 use crate::streams::{JointAngles, MarkKind, Message, ReachAttempt};
 use crate::time::Stamp;
 
@@ -19,7 +20,9 @@ pub struct ReachRest {
     pub target_m: [f64; 3],
     pub start: Stamp,
     pub end: Stamp,
-    /// Joint angles as believed under the sensors of that moment.
+    /// Over the mark, as far as the recording tells.
+    pub conditions: Conditions,
+    /// Joint angles as believed under the sensors of that moment and these conditions.
     pub believed: JointAngles,
     /// The tool as believed, base frame, m.
     pub believed_tool_m: Vector3<f64>,
@@ -50,6 +53,7 @@ pub fn reaches(recording: &Recording, robot: &Robot, beliefs: &Beliefs<'_>) -> V
             _ => None,
         })
         .collect();
+    let surroundings = Surroundings::of(recording);
     let marks = recording.messages.iter().filter_map(|(_, message)| match message {
         Message::Mark(mark) => Some(mark),
         _ => None,
@@ -62,10 +66,11 @@ pub fn reaches(recording: &Recording, robot: &Robot, beliefs: &Beliefs<'_>) -> V
             let from = readings.partition_point(|sample| sample.stamp < mark.start);
             let to = readings.partition_point(|sample| sample.stamp <= mark.end);
             let span = readings.get(from..to).filter(|span| !span.is_empty())?;
+            let conditions = surroundings.over(mark.start, mark.end);
             // Angles, not raw words, are averaged: the words wrap.
             let mut believed = JointAngles::zeros(robot.n_joints());
             for sample in span {
-                for (sum, angle) in believed.iter_mut().zip(sensors.angles(&sample.counts).iter()) {
+                for (sum, angle) in believed.iter_mut().zip(sensors.angles_under(&sample.counts, &conditions).iter()) {
                     *sum += angle / span.len() as f64;
                 }
             }
@@ -76,9 +81,64 @@ pub fn reaches(recording: &Recording, robot: &Robot, beliefs: &Beliefs<'_>) -> V
                 target_m,
                 start: mark.start,
                 end: mark.end,
+                conditions,
                 believed,
                 believed_tool_m: tool,
             })
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::calib::JointParameters;
+    use crate::log::Completeness;
+    use crate::streams::{JointSensorSample, Mark, ReachTask, TemperatureSample, Thermometer};
+    use crate::time::SIMULATION_EPOCH;
+
+    /// Two rests with the same readings; in between the oil has warmed by 10 K.
+    #[test]
+    fn a_rest_is_believed_under_its_own_conditions() {
+        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/titan4");
+        let robot = crate::robot::load(&folder).expect("the robot reads");
+        let at = |seconds: f64| SIMULATION_EPOCH.plus_s(seconds);
+        let counts = ArmSensors::nominal(&robot).counts(&robot.stowed);
+        let targets_m = vec![[1.0, 0.0, 0.0]];
+        let mut messages = vec![Message::Task(ReachTask { stamp: at(0.0), targets_m, tolerance_m: 0.01 })];
+        for (start_s, temperature_c) in [(10.0, 20.0), (500.0, 30.0)] {
+            let thermometer = Thermometer::Oil;
+            let stamp = at(start_s - 5.0);
+            messages.push(Message::Temperature(TemperatureSample {
+                stamp,
+                thermometer,
+                temperature_c,
+                variance_c2: 0.1,
+            }));
+            let stamp = at(start_s + 0.2);
+            messages.push(Message::JointSensors(JointSensorSample { stamp, counts }));
+            let kind = MarkKind::Reach { attempt: ReachAttempt::After, target_idx: 0 };
+            messages.push(Message::Mark(Mark { start: at(start_s), end: at(start_s + 0.6), kind }));
+        }
+        let recording = Recording {
+            path: "synthetic.mcap".into(),
+            messages: messages.into_iter().map(|message| (SIMULATION_EPOCH, message)).collect(),
+            joint_names: robot.joint_names(),
+            completeness: Completeness::Whole,
+            raw: Vec::new(),
+            unknown_topics: Default::default(),
+            rejected: Default::default(),
+            non_monotonic: 0,
+            disorder: Default::default(),
+        };
+        let reference = Conditions { oil_c: Some(20.0), ..Conditions::default() };
+        let mut parameters = JointParameters { reference, ..JointParameters::default() };
+        parameters.terms[1].offset_rad_per_k = 1e-3;
+        let sensors = parameters.sensors(&robot);
+        let rests = reaches(&recording, &robot, &[(at(0.0), &sensors)]);
+        let believed: Vec<f64> = rests.iter().map(|rest| rest.believed[1] - robot.stowed[1]).collect();
+        assert!(believed[0].abs() < 1e-9 && (believed[1] - 1e-2).abs() < 1e-9, "{believed:?}");
+        assert_eq!(rests[1].conditions.oil_c, Some(30.0));
+        assert_ne!(rests[0].believed_tool_m, rests[1].believed_tool_m);
+    }
 }
