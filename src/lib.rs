@@ -1,7 +1,7 @@
 //! Calibrates the joint sensors of hydraulic arms in place, with the wrist camera and a few AprilTags.
 //!
 //! Layers, imports go down only: `cli` > `campaign` > `run` > `score`, `report`, `replay` > belief (`calib`, `plan`,
-//! `verify`, `session`) and truth (`sim`), which do not know each other > `streams`, `log`, `routine` > `robot`, `sensor`,
+//! `verify`, `session`) and truth (`sim`), which do not know each other > `streams`, `log`, `routine`, `input` > `robot`, `sensor`,
 //! `kinematics`, `optics` > `joints`, `spatial`, `stats`, `time`. docs/architecture.md has the map and the invariants.
 #![forbid(unsafe_code)]
 
@@ -11,6 +11,7 @@ pub mod campaign;
 pub mod cli;
 #[cfg(feature = "detect")]
 pub mod detect;
+pub mod input;
 pub mod joints;
 pub mod kinematics;
 pub mod log;

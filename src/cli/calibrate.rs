@@ -5,30 +5,40 @@ use std::time::Instant;
 
 use anyhow::{Context, Result};
 use clap::Args;
-use nalgebra::Isometry3;
 
-use super::exit::Exit;
+use super::exit::{Exit, UsageError};
 use super::files;
+use super::given::Given;
 use super::stdout::say;
-use crate::calib::{CompactCalibration, MapResult, Status, calibrate as estimate, calibrate_among};
-use crate::log::{Completeness, Recording, read_recording};
+use crate::calib::{CompactCalibration, MapResult, Status};
+use crate::log::{Completeness, Recording};
 use crate::report::{RunSummary, table};
-use crate::robot::{self, FileIssue, Robot, SurveyedTag, TagSurvey};
+use crate::robot::{self, FailedJoint, Robot};
 use crate::routine::Method;
-use crate::spatial::Pose;
-use crate::tagmap::TagPrior;
-use crate::tagmap::files::read_tags;
 
 #[derive(Debug, Args)]
 pub(super) struct CalibrateArgs {
-    /// The recording (.mcap)
-    recording: PathBuf,
+    /// The recording or recordings (.mcap); the views of several count as those of one
+    #[arg(required = true)]
+    recordings: Vec<PathBuf>,
     /// Folder of the robot (robot.toml and its URDF)
     #[arg(long)]
     robot: PathBuf,
+    /// For recordings that armcal did not make: an input map (.toml), which names topics and frames
+    #[arg(long)]
+    input: Option<PathBuf>,
     /// Where the tags are: a tag map (.toml) in the frame of the arm's base, instead of what recording and robot say
     #[arg(long)]
     tag_map: Option<PathBuf>,
+    /// An accepted calibration.toml of this arm to start from, instead of the datasheet
+    #[arg(long)]
+    prior: Option<PathBuf>,
+    /// Tolerance and targets or poses (.toml) that the tool error is predicted for, where no recording names any
+    #[arg(long)]
+    task: Option<PathBuf>,
+    /// A joint that has failed: JOINT=locked, dead, stuck or jumps; may be given several times (method bundle)
+    #[arg(long, value_name = "JOINT=KIND")]
+    failed: Vec<String>,
     /// Calibration method
     #[arg(long, default_value_t)]
     method: Method,
@@ -40,18 +50,28 @@ pub(super) struct CalibrateArgs {
     compact: bool,
 }
 
+/// `wrist_pitch=dead`.
+fn failed_joint(text: &str, robot: &Robot) -> Result<FailedJoint, UsageError> {
+    let (joint, kind) = text.split_once('=').unwrap_or((text, ""));
+    FailedJoint::of_names(joint, kind, robot).map_err(|problem| UsageError(format!("--failed {text}: {problem}")))
+}
+
 pub(super) fn calibrate(args: &CalibrateArgs) -> Result<Exit> {
     let robot = robot::load(&args.robot)?;
-    let recording = read_recording(&args.recording)?;
-    let lost = warn_of_losses(&recording);
-    let started = Instant::now();
-    let calibration = match &args.tag_map {
-        Some(file) => {
-            let survey = survey_of(file, &robot)?;
-            calibrate_among(&recording, &robot.clone().with_survey(survey), args.method)?
-        }
-        None => estimate(&recording, &robot, args.method)?,
+    let failed: Vec<FailedJoint> =
+        args.failed.iter().map(|text| failed_joint(text, &robot)).collect::<Result<_, _>>()?;
+    let robot = robot.with_failed(&failed);
+    let given = Given {
+        recordings: &args.recordings,
+        robot: &robot,
+        method: args.method,
+        input: args.input.as_deref(),
+        tag_map: args.tag_map.as_deref(),
+        prior: args.prior.as_deref(),
+        task: args.task.as_deref(),
     };
+    let started = Instant::now();
+    let (calibration, lost) = given.calibrate()?;
     let summary = RunSummary::of_calibration(&calibration, started.elapsed().as_secs_f64());
     // Before anything is written: what has no compact form shall leave no half of the answer.
     let shown =
@@ -73,35 +93,7 @@ pub(super) fn calibrate(args: &CalibrateArgs) -> Result<Exit> {
     })
 }
 
-/// The tags of a map file as if they had been surveyed; those without a place are mapped from the views.
-fn survey_of(file: &Path, robot: &Robot) -> Result<TagSurvey> {
-    let map = read_tags(file)?;
-    let refuse = |key: &str, problem: String| FileIssue::new(file, key, problem);
-    if map.frame != robot.base_link {
-        let problem = format!("is `{}`; the arm's base is `{}`", map.frame, robot.base_link);
-        return Err(refuse("frame", problem).into());
-    }
-    let known = |tag: &&TagPrior| tag.body == 0;
-    let tags: Vec<SurveyedTag> = map.tags.iter().filter(known).map(surveyed_tag).collect();
-    let ids: Vec<u32> = tags.iter().map(|tag| tag.id).collect();
-    let base_tag = map.base_tag.or(Some(robot.base_tag)).filter(|id| ids.contains(id)).or(ids.first().copied());
-    let base_tag = base_tag.ok_or_else(|| refuse("tag", "holds no tag in that frame".to_owned()))?;
-    Ok(TagSurvey { base_tag, tags })
-}
-
-fn surveyed_tag(tag: &TagPrior) -> SurveyedTag {
-    let unknown = || ([f64::INFINITY; 6], Isometry3::identity());
-    let (std, pose) = tag.pose.map_or_else(unknown, |pose| (tag.std.unwrap_or([0.0; 6]), pose));
-    SurveyedTag {
-        id: tag.id,
-        size_m: tag.size_m,
-        base_from_tag: Pose::from_isometry(pose),
-        position_std_m: std[0],
-        rotation_std_rad: std[3..].iter().copied().fold(0.0, f64::max),
-    }
-}
-
-fn describe(completeness: &Completeness) -> String {
+pub(super) fn describe(completeness: &Completeness) -> String {
     match completeness {
         Completeness::Whole => "whole".to_owned(),
         Completeness::Cut { reason, readable_messages } => format!("cut: {reason}; {readable_messages} messages read"),

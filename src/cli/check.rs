@@ -10,12 +10,14 @@ use super::overrides::OverrideArgs;
 use crate::calib::Calibration;
 #[cfg(feature = "sim")]
 use crate::campaign::Request;
+use crate::input::{InputMap, TagUse, read_input_map, read_task};
 use crate::robot::{self, Robot};
 use crate::routine::{self, Overrides, Step};
+use crate::tagmap::files::read_landmarks;
 
 #[derive(Debug, Args)]
 pub(super) struct CheckArgs {
-    /// Robot folders or robot.toml files, routines, vehicles, calibrations
+    /// Robot folders or robot.toml files, routines, vehicles, calibrations, input maps, tag maps, tasks
     #[arg(required = true)]
     files: Vec<PathBuf>,
     /// For the routines among them
@@ -55,11 +57,40 @@ fn check_one(file: &Path, overrides: &Overrides) -> Result<String> {
         let tags = vehicle.survey.as_ref().map_or_else(String::new, |survey| format!(", {} tags", survey.tags.len()));
         return Ok(format!("vehicle `{}`, {} parts{tags}", vehicle.name, vehicle.parts.len()));
     }
+    if table.contains_key("joint_sensors") && table.contains_key("tags") {
+        return Ok(describe_input(&read_input_map(file)?));
+    }
+    if table.contains_key("frame") && table.contains_key("tag") {
+        let map = read_landmarks(file)?;
+        return Ok(format!("tag map in the frame `{}`, {} landmarks", map.frame, map.landmarks.len()));
+    }
+    if table.contains_key("tolerance_m") {
+        let task = read_task(file)?;
+        let (targets, poses) = (task.targets_m.len(), task.poses_rad.len());
+        return Ok(format!("task, {targets} targets and {poses} poses, tolerance {} mm", task.tolerance_m * 1e3));
+    }
     if table.contains_key("messages_hash") {
         let calibration = Calibration::read(file)?;
-        return Ok(format!("calibration of `{}`, {} joints", calibration.robot, calibration.joint.len()));
+        let (joints, valid) = (calibration.joint.len(), calibration.valid_for().join(", "));
+        return Ok(format!("calibration of `{}`, {joints} joints; valid for {valid}", calibration.robot));
     }
-    Err(UsageError(format!("{}: is none of robot, routine, vehicle, calibration", file.display())).into())
+    Err(UsageError(format!(
+        "{}: is none of robot, routine, vehicle, calibration, input map, tag map, task",
+        file.display()
+    ))
+    .into())
+}
+
+fn describe_input(map: &InputMap) -> String {
+    let tags = match (map.tag_use, &map.child_frame, &map.camera_frame) {
+        (TagUse::Corners, ..) => format!("corners on {}", map.tag_topic),
+        (tag_use, Some(child), Some(camera)) => {
+            let what = if tag_use == TagUse::Pose { "poses" } else { "positions" };
+            format!("{what} of `{}` in `{camera}` on {}", child.text(), map.tag_topic)
+        }
+        _ => map.tag_topic.clone(),
+    };
+    format!("input map: joint readings on {}, {tags}", map.joint_topic)
 }
 
 fn describe_robot(robot: &Robot) -> String {

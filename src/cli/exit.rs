@@ -3,9 +3,10 @@
 use std::process::ExitCode;
 
 use crate::calib::{CalibError, CalibrationFileError, CompactError};
+use crate::input::InputError;
 use crate::log::LogError;
 use crate::plan::PlanError;
-use crate::robot::RobotError;
+use crate::robot::{FileIssue, RobotError};
 use crate::routine::RoutineError;
 use crate::session::SessionError;
 use crate::tagmap::TagMapError;
@@ -65,6 +66,8 @@ pub(super) fn of_cause(error: &(dyn std::error::Error + 'static)) -> Exit {
     let invalid = std::iter::successors(Some(error), |error| error.source()).any(|cause| {
         cause.is::<UsageError>()
             || cause.is::<RobotError>()
+            || cause.is::<FileIssue>()
+            || cause.is::<InputError>()
             || cause.is::<RoutineError>()
             || cause.is::<CalibrationFileError>()
             || cause.is::<CalibError>()

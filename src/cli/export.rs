@@ -9,8 +9,9 @@ use serde::Serialize;
 
 use super::exit::{Exit, UsageError};
 use super::stdout::say;
-use crate::calib::{Calibration, CompactCalibration};
+use crate::calib::{Calibration, CompactCalibration, LookupTable};
 use crate::robot::{self, Robot};
+use crate::sensor::{ArmSensors, SensorModel};
 
 #[derive(Debug, Args)]
 pub(super) struct ExportArgs {
@@ -39,7 +40,7 @@ const MAX_INPUT_BYTES: u64 = 16 << 20;
 
 enum Input {
     Full(Box<Calibration>),
-    Compact(CompactCalibration),
+    Compact(Box<CompactCalibration>),
 }
 
 pub(super) fn export(args: &ExportArgs) -> Result<Exit> {
@@ -59,6 +60,9 @@ pub(super) fn export(args: &ExportArgs) -> Result<Exit> {
 
 fn of_full(calibration: &Calibration, form: Form) -> Result<String> {
     Ok(match form {
+        Form::Yaml if calibration.reference.is_some() => {
+            to_yaml(&FullView { calibration, lookup: calibration.lookup() })?
+        }
         Form::Yaml => to_yaml(calibration)?,
         Form::Toml => calibration.to_toml(),
         Form::Compact => CompactCalibration::of(calibration)?.to_text()?,
@@ -66,8 +70,9 @@ fn of_full(calibration: &Calibration, form: Form) -> Result<String> {
 }
 
 fn of_compact(compact: &CompactCalibration, robot: Option<&Robot>, form: Form) -> Result<String> {
-    let joints = robot.map(|robot| joints_of(compact, robot)).transpose()?;
-    let view = CompactView { compact, joint_of_robot: joints };
+    let sensors = robot.map(|robot| compact.sensors(robot)).transpose()?;
+    let lookup = sensors.iter().flat_map(|sensors| &sensors.models).filter_map(LookupTable::of).collect();
+    let view = CompactView { compact, joint_of_robot: sensors.map(joints_of), lookup };
     Ok(match form {
         Form::Yaml => to_yaml(&view)?,
         Form::Toml => toml::to_string(&view).context("the compact calibration has no TOML form")?,
@@ -79,6 +84,14 @@ fn to_yaml<T: Serialize>(value: &T) -> Result<String> {
     serde_saphyr::to_string(value).context("the calibration has no YAML form")
 }
 
+/// A calibration with terms, and the same as tables.
+#[derive(Serialize)]
+struct FullView<'a> {
+    #[serde(flatten)]
+    calibration: &'a Calibration,
+    lookup: Vec<LookupTable>,
+}
+
 /// A compact calibration, and with its robot at hand the same corrections under the keys of calibration.toml.
 #[derive(Serialize)]
 struct CompactView<'a> {
@@ -86,6 +99,9 @@ struct CompactView<'a> {
     compact: &'a CompactCalibration,
     #[serde(skip_serializing_if = "Option::is_none")]
     joint_of_robot: Option<Vec<JointOfRobot>>,
+    /// Of the joints with terms.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    lookup: Vec<LookupTable>,
 }
 
 /// As in calibration.toml.
@@ -97,14 +113,14 @@ struct JointOfRobot {
     offset_rad: f64,
 }
 
-fn joints_of(compact: &CompactCalibration, robot: &Robot) -> Result<Vec<JointOfRobot>> {
-    let one = |model: crate::sensor::SensorModel| JointOfRobot {
+fn joints_of(sensors: ArmSensors) -> Vec<JointOfRobot> {
+    let one = |model: SensorModel| JointOfRobot {
         gain_rad_per_count: model.correction.gain / model.spec.counts_per_rad,
         offset_rad: model.correction.offset_rad,
         center_rad: model.spec.center_rad,
         name: model.spec.joint,
     };
-    Ok(compact.sensors(robot)?.models.into_iter().map(one).collect())
+    sensors.models.into_iter().map(one).collect()
 }
 
 fn read_input(file: &Path) -> Result<Input> {
@@ -123,10 +139,11 @@ fn read_input(file: &Path) -> Result<Input> {
     let not_text = |_| UsageError(format!("{name}: is no text: neither a calibration.toml nor a compact calibration"));
     let text = std::str::from_utf8(&bytes).map_err(not_text)?;
     if text.trim_start().starts_with("armcal") {
-        return Ok(Input::Compact(CompactCalibration::from_text(text).with_context(|| name)?));
+        let compact = CompactCalibration::from_text(text).with_context(|| name)?;
+        return Ok(Input::Compact(Box::new(compact)));
     }
     if !text.contains("[[joint]]") {
-        let what = "neither a calibration.toml nor a compact calibration (which begins with `armcal1`)";
+        let what = "neither a calibration.toml nor a compact calibration (which begins with `armcal1` or `armcal2`)";
         return Err(UsageError(format!("{name}: is {what}")).into());
     }
     Ok(Input::Full(Box::new(Calibration::parse(Path::new(&name), text)?)))

@@ -6,6 +6,7 @@ mod campaign;
 mod check;
 mod exit;
 mod export;
+mod given;
 mod inspect;
 #[cfg(feature = "sim")]
 mod interrupt;
@@ -20,9 +21,13 @@ mod regress;
 mod replay;
 #[cfg(feature = "sim")]
 mod run;
+#[cfg(feature = "sim")]
+mod sensitivity;
 mod stdout;
 #[cfg(feature = "sim")]
 mod study;
+#[cfg(feature = "sim")]
+mod study_paper;
 mod tagmap;
 
 use std::process::ExitCode;
@@ -55,7 +60,10 @@ enum Command {
     /// Measure a part on its own against known truth
     #[cfg(feature = "sim")]
     Study(study::StudyArgs),
-    /// Calibrate from a recording, simulated or of a real arm
+    /// Show what one wrong joint offset does to the paper's two objectives and to the tool
+    #[cfg(feature = "sim")]
+    Sensitivity(sensitivity::SensitivityArgs),
+    /// Calibrate from recordings, simulated or of a real arm
     Calibrate(calibrate::CalibrateArgs),
     /// Find where the tags are, from camera views alone
     Tagmap(tagmap::TagmapArgs),
@@ -66,7 +74,7 @@ enum Command {
     /// Open a recording in the Rerun viewer, or write it as .rrd
     #[cfg(feature = "viewer")]
     Replay(replay::ReplayArgs),
-    /// Read robot folders, routines, vehicles and calibrations, and say what is wrong with them
+    /// Read robot folders, routines, vehicles, calibrations, input maps, tag maps and tasks, and say what is wrong with them
     Check(check::CheckArgs),
 }
 
@@ -89,6 +97,8 @@ pub fn main() -> ExitCode {
         Command::Regress(args) => regress::regress(&args),
         #[cfg(feature = "sim")]
         Command::Study(args) => study::study(&args),
+        #[cfg(feature = "sim")]
+        Command::Sensitivity(args) => sensitivity::sensitivity(&args),
         Command::Calibrate(args) => calibrate::calibrate(&args),
         Command::Tagmap(args) => tagmap::tagmap(&args),
         Command::Inspect(args) => inspect::inspect(&args),

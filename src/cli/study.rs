@@ -9,6 +9,7 @@ use clap::{Args, Subcommand};
 
 use super::exit::Exit;
 use super::files;
+use super::study_paper::{PaperArgs, paper};
 use crate::detect::{DetectorSettings, GreyImage};
 use crate::optics::Fisheye;
 use crate::sim::WaterKind;
@@ -27,6 +28,8 @@ pub(super) struct StudyArgs {
 enum Study {
     /// Render tags at set ranges and incidences in three kinds of water, detect them, and compare with the truth
     Detection(DetectionArgs),
+    /// Compare the paper's methods with least squares and with the bound, on landmark positions with noise
+    Paper(PaperArgs),
 }
 
 #[derive(Debug, Args)]
@@ -57,6 +60,7 @@ struct DetectionArgs {
 pub(super) fn study(args: &StudyArgs) -> Result<Exit> {
     match &args.study {
         Study::Detection(args) => detection(args),
+        Study::Paper(args) => paper(args),
     }
 }
 

@@ -4,7 +4,10 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use crate::calib::{Calibration, CameraMount, MapResult, Status};
+use crate::calib::{
+    Calibration, CameraMount, FailedJointTable, JointResult, MapResult, ObservabilityTable, PriorTable, Status,
+    VerdictTable,
+};
 use crate::stats::Summary;
 
 /// The figures of a run or of a calibration, for programs.
@@ -63,24 +66,74 @@ pub struct CalibrationSummary {
     pub outcome: String,
     pub evaluations: usize,
     pub wall_s: f64,
-    pub residual_rms_px: f64,
+    /// Absent where the recording has positions or poses of the tags and no corners.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub residual_rms_px: Option<f64>,
+    /// Distance between seen and surveyed landmarks over the fitted views, m.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub residual_rms_m: Option<f64>,
     pub cost_initial: f64,
     pub cost_final: f64,
     pub unobservable: Vec<String>,
+    /// The joint whose gain changed most, of those that were estimated.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub largest_gain_change: Option<GainChange>,
     pub predicted_tool_error_m: Option<Summary>,
     /// By the tag on the gripper, where the robot has one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera_mount: Option<CameraMount>,
+    /// Joints that failed, or whose sensors did.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub failed_joint: Vec<FailedJointTable>,
+    /// What a warm calibration started from.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub prior: Option<PriorTable>,
     /// Where no survey says where the tags are.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub map: Option<MapResult>,
+    /// Of `bundle`: what the data determine, before solving.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub observability: Option<ObservabilityTable>,
+    /// Of `bundle`: what the verdict rests on.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub verdict: Option<VerdictTable>,
+}
+
+/// A gain against its datasheet, both relative.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct GainChange {
+    pub joint: String,
+    /// Of either sign.
+    pub change: f64,
+    pub std: f64,
+}
+
+impl GainChange {
+    fn largest(joints: &[JointResult]) -> Option<Self> {
+        let estimated = joints.iter().filter(|joint| joint.gain_estimated);
+        let changes = estimated.filter_map(|joint| {
+            let gain = joint.gain_over_datasheet?;
+            let std = joint.gain_std_rad_per_count * (gain / joint.gain_rad_per_count).abs();
+            Some(Self { joint: joint.name.clone(), change: gain - 1.0, std })
+        });
+        changes.max_by(|a, b| a.change.abs().total_cmp(&b.change.abs()))
+    }
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct HeldOutSummary {
     pub views: usize,
+    /// Every view was held out in turn, and the answer is fitted to all of them.
+    #[serde(default)]
+    pub in_turn: bool,
     pub rms_px: Option<f64>,
     pub rms_m: Option<f64>,
+    /// The mean of the same distances, where views were held out in turn.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mean_m: Option<f64>,
+    /// Mean distance of the camera from where the landmarks' measured poses have it, where the recording has poses.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub camera_mean_m: Option<f64>,
     /// The same views with the datasheet's sensors.
     pub nominal_rms_m: Option<f64>,
 }
@@ -175,7 +228,8 @@ impl RunSummary {
             stopped: None,
             wall_s: calibration_wall_s,
             capture: CaptureSummary {
-                poses: calibration.fit.views + calibration.held_out.views,
+                poses: calibration.fit.views
+                    + if calibration.held_out.in_turn { 0 } else { calibration.held_out.views },
                 poses_skipped: 0,
                 targets_skipped: 0,
                 views: calibration.fit.views,
@@ -190,17 +244,26 @@ impl RunSummary {
                 evaluations: calibration.fit.evaluations,
                 wall_s: calibration_wall_s,
                 residual_rms_px: calibration.fit.rms_px,
+                residual_rms_m: calibration.fit.rms_m.is_finite().then_some(calibration.fit.rms_m),
                 cost_initial: calibration.fit.cost_initial,
                 cost_final: calibration.fit.cost_final,
                 unobservable: calibration.unobservable.clone(),
+                largest_gain_change: GainChange::largest(&calibration.joint),
                 predicted_tool_error_m: calibration.predicted_tool_error_m,
                 camera_mount: calibration.camera_mount.clone(),
+                failed_joint: calibration.failed_joint.clone(),
+                prior: calibration.prior.clone(),
                 map: calibration.map.clone(),
+                observability: calibration.observability.clone(),
+                verdict: calibration.verdict.clone(),
             },
             held_out: HeldOutSummary {
                 views: calibration.held_out.views,
+                in_turn: calibration.held_out.in_turn,
                 rms_px: calibration.held_out.rms_px,
                 rms_m: calibration.held_out.rms_m,
+                mean_m: calibration.held_out.mean_m,
+                camera_mean_m: calibration.held_out.camera_mean_m,
                 nominal_rms_m: calibration.held_out.nominal_rms_m,
             },
             score: None,

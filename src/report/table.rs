@@ -3,8 +3,8 @@
 use comfy_table::presets::UTF8_FULL_CONDENSED;
 use comfy_table::{CellAlignment, Table};
 
-use super::summary::{AssertSummary, ReachScore, RunSummary, ScoreSide};
-use crate::calib::{CameraMount, Known, MapResult, Status};
+use super::summary::{AssertSummary, GainChange, ReachScore, RunSummary, ScoreSide};
+use crate::calib::{CameraMount, FailedJointTable, Known, MapResult, PriorTable, Status};
 use crate::stats::Summary;
 
 /// Lays a summary out for a terminal.
@@ -120,8 +120,9 @@ pub(super) fn check_lines(summary: &RunSummary) -> Vec<String> {
     }];
     let held_out = &summary.held_out;
     lines.push(format!(
-        "held out     {} views the fit did not use: tags off by {} rms (datasheet sensors: {}), {} in the image",
+        "held out     {} views {}: tags off by {} rms (datasheet sensors: {}), {} in the image",
         held_out.views,
+        if held_out.in_turn { "by what the others told" } else { "the fit did not use" },
         mm(held_out.rms_m),
         mm(held_out.nominal_rms_m),
         held_out.rms_px.map_or_else(|| "-".to_owned(), |v| format!("{v:.1} px")),
@@ -147,13 +148,20 @@ pub(super) fn check_lines(summary: &RunSummary) -> Vec<String> {
         let reasons = capture.rejected_by_reason.iter().map(|(why, n)| format!("{n} {}", why.replace('_', " ")));
         lines.push(format!("rejected     {}", reasons.collect::<Vec<_>>().join(", ")));
     }
+    lines.extend(summary.calibration.largest_gain_change.as_ref().map(gain_line));
     lines.extend(summary.calibration.camera_mount.as_ref().map(mount_line));
+    lines.extend(summary.calibration.failed_joint.iter().map(failed_line));
+    lines.extend(summary.calibration.prior.as_ref().map(prior_line));
     lines.extend(summary.calibration.map.iter().flat_map(map_lines));
     if let (Some(collisions), clearance) = (capture.collisions, capture.min_clearance_m) {
         lines.push(format!(
             "contacts     {collisions}; nearest the arm came to vehicle, obstacles or seafloor: {}",
             mm(clearance)
         ));
+    }
+    if let Some(verdict) = &summary.calibration.verdict {
+        lines.extend(verdict.warnings.iter().map(|line| format!("warning      {line}")));
+        lines.extend(verdict.not_covered.iter().map(|line| format!("not covered  {line}")));
     }
     for line in &summary.calibration.unobservable {
         lines.push(format!("not known    {line}"));
@@ -173,18 +181,47 @@ pub(super) fn check_lines(summary: &RunSummary) -> Vec<String> {
     lines
 }
 
+/// Below this, relative, a gain is that of an encoder: its scale is its line count.
+const LITTLE: f64 = 0.005;
+
+fn gain_line(largest: &GainChange) -> String {
+    let GainChange { joint, change, std } = largest;
+    let how = if change.abs() < LITTLE { "changed little, at most by" } else { "changed by up to" };
+    format!("gains        {how} {:+.2} % ({joint}), known to {:.2} %", 100.0 * change, 100.0 * std)
+}
+
 fn mount_line(mount: &CameraMount) -> String {
     match &mount.left_out {
         Some(why) => format!("camera mount by the drawing: {why}"),
         None => {
             let rms = |v: [f64; 3]| (v.iter().map(|v| v * v).sum::<f64>() / 3.0).sqrt();
             let (std_mm, std_deg) = (rms(mount.position_std_m) * 1e3, rms(mount.rotation_std_rad).to_degrees());
-            let (views, rms_px) = (mount.views, mount.rms_px.unwrap_or(f64::NAN));
-            format!(
-                "camera mount by the tag on the gripper in {views} views ({rms_px:.2} px): known to {std_mm:.1} mm, {std_deg:.2} deg"
-            )
+            let by_tag = match (mount.views, mount.rms_px) {
+                (0, _) => "by the tags around the arm".to_owned(),
+                (views, Some(rms_px)) => format!("by the tag on the gripper in {views} views ({rms_px:.2} px)"),
+                (views, None) => format!("by the tags around the arm and the one on the gripper in {views} views"),
+            };
+            format!("camera mount {by_tag}: known to {std_mm:.1} mm, {std_deg:.2} deg")
         }
     }
+}
+
+fn failed_line(failed: &FailedJointTable) -> String {
+    let FailedJointTable { joint, kind, found, evidence, .. } = failed;
+    let colon = if evidence.is_empty() { "" } else { ": " };
+    format!("failed       {joint} {} ({found}){colon}{evidence}", kind.name())
+}
+
+fn prior_line(prior: &PriorTable) -> String {
+    let says = match (prior.agrees, prior.used) {
+        (true, _) => "agrees with the views",
+        (false, true) => "CONTRADICTS the views",
+        (false, false) => "contradicted the views and was dropped",
+    };
+    format!(
+        "prior        {:.1} h old, {says}: chi-square {:.1} of {} (0.999 below {:.1})",
+        prior.elapsed_h, prior.chi_square, prior.degrees_of_freedom, prior.chi_square_limit
+    )
 }
 
 fn map_lines(map: &MapResult) -> Vec<String> {

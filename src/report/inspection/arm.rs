@@ -81,7 +81,12 @@ impl Collector {
                 MarkKind::Capture { set: CaptureSet::HeldOut, .. } => self.captures[1] += 1,
                 MarkKind::Reach { attempt: ReachAttempt::Before, .. } => self.reaches[0] += 1,
                 MarkKind::Reach { attempt: ReachAttempt::After, .. } => self.reaches[1] += 1,
-                MarkKind::Phase(_) | MarkKind::Identify { .. } | MarkKind::Calibrate(_) | MarkKind::Touch { .. } => {}
+                MarkKind::Phase(_)
+                | MarkKind::Stop { .. }
+                | MarkKind::Identify { .. }
+                | MarkKind::Failed(_)
+                | MarkKind::Calibrate(_)
+                | MarkKind::Touch { .. } => {}
             },
             Message::Temperature(sample) => match sample.thermometer {
                 Thermometer::Oil => widen(&mut self.oil_c, sample.temperature_c),

@@ -6,8 +6,8 @@ use serde::Serialize;
 
 use super::is_capture;
 use crate::calib::{
-    JointParameters, MIN_HELD_OUT_VIEWS, MIN_VIEWS, MIN_VIEWS_PER_PARAMETER, Parameter, PositionProblem, View,
-    associate, free_parameters, identify_scales, mount_by_gripper_tag, surveyed,
+    JointParameters, MIN_VIEWS, MIN_VIEWS_PER_PARAMETER, Parameter, PositionProblem, View, associate, free_parameters,
+    identify_scales, mount_by_gripper_tag, surveyed,
 };
 use crate::log::{LogError, Recording, TopicMap, scan_recording};
 use crate::robot::Robot;
@@ -94,14 +94,11 @@ fn missing(determined: &Determined) -> Vec<String> {
     let mut missing = Vec::new();
     let parameters = determined.parameters.len();
     let wanted = MIN_VIEWS.max((MIN_VIEWS_PER_PARAMETER * parameters as f64).ceil() as usize);
-    if determined.views < wanted {
-        let views = determined.views;
+    // The default method fits all views, and leaves them out in turn for its verdict.
+    let views = determined.views + determined.held_out_views;
+    if views < wanted {
         let of = if views == 0 { String::new() } else { format!(" for {parameters} parameters") };
         missing.push(format!("views: {views} captured ones show a surveyed tag, at least {wanted} are needed{of}"));
-    }
-    if determined.held_out_views < MIN_HELD_OUT_VIEWS {
-        let views = determined.held_out_views;
-        missing.push(format!("held-out views: {views} show a surveyed tag, a verdict needs {MIN_HELD_OUT_VIEWS}"));
     }
     if determined.views > 0 && parameters == 0 {
         missing.push("a sensor that the views determine".to_owned());

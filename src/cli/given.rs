@@ -1,0 +1,170 @@
+//! What `armcal calibrate` is given: recordings, and the files beside them, as the estimator takes them.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Result;
+
+use super::calibrate::warn_of_losses;
+use super::exit::UsageError;
+use crate::calib::{
+    Calibration, CalibrationFileError, ForeignContext, Status, calibrate, calibrate_among, calibrate_data,
+    prepare_foreign, prepare_pooled,
+};
+use crate::input::{ChildFrame, ForeignRecording, InputMap, TagUse, read_foreign, read_input_map, read_task};
+use crate::log::{Completeness, read_recording};
+use crate::robot::{FileIssue, Robot};
+use crate::routine::Method;
+use crate::streams::{Message, ReachTask};
+use crate::tagmap::files::{LandmarkFile, NamedSurvey, read_landmarks};
+
+/// All that a calibration from files is made of.
+pub(super) struct Given<'a> {
+    pub recordings: &'a [PathBuf],
+    pub robot: &'a Robot,
+    pub method: Method,
+    pub input: Option<&'a Path>,
+    pub tag_map: Option<&'a Path>,
+    pub prior: Option<&'a Path>,
+    pub task: Option<&'a Path>,
+}
+
+impl Given<'_> {
+    /// The calibration, and whether a recording had lost something.
+    pub fn calibrate(&self) -> Result<(Calibration, bool)> {
+        let prior = self.prior.map(|file| read_prior(file, self.robot)).transpose()?;
+        let task =
+            self.task.map(|file| Ok::<_, anyhow::Error>(read_task(file)?.for_robot(file, self.robot)?)).transpose()?;
+        let landmarks = self.tag_map.map(|file| Ok::<_, anyhow::Error>((file, read_landmarks(file)?))).transpose()?;
+        match self.input {
+            Some(file) => self.of_foreign(file, landmarks, task, prior.as_ref()),
+            None => self.of_own(landmarks, task, prior.as_ref()),
+        }
+    }
+
+    /// Recordings that armcal made: they mark their views.
+    fn of_own(
+        &self,
+        landmarks: Option<(&Path, LandmarkFile)>,
+        task: Option<ReachTask>,
+        prior: Option<&Calibration>,
+    ) -> Result<(Calibration, bool)> {
+        let survey = landmarks.map(|(file, map)| map.survey(file, self.robot, TagUse::Corners)).transpose()?;
+        let survey = survey.map(|named| named.survey);
+        let mut recordings = Vec::new();
+        let mut lost = false;
+        for path in self.recordings {
+            let recording = read_recording(path)?;
+            lost |= warn_of_losses(&recording);
+            recordings.push(recording);
+        }
+        if let ([recording], None) = (&mut recordings[..], prior) {
+            // Its own marks say which views are for what.
+            let names_task = recording.messages.iter().any(|(_, message)| matches!(message, Message::Task(_)));
+            if let Some(task) = task.filter(|_| !names_task) {
+                recording.messages.push((task.stamp, Message::Task(task)));
+            }
+            return Ok((
+                match survey {
+                    Some(survey) => calibrate_among(recording, &self.robot.clone().with_survey(survey), self.method)?,
+                    None => calibrate(recording, self.robot, self.method)?,
+                },
+                lost,
+            ));
+        }
+        let prepared = prepare_pooled(&recordings, self.robot, survey.as_ref(), task.as_ref(), self.method)?;
+        Ok((calibrate_data(prepared, self.method, prior)?, lost))
+    }
+
+    /// Recordings of a real arm, by an input map.
+    fn of_foreign(
+        &self,
+        file: &Path,
+        landmarks: Option<(&Path, LandmarkFile)>,
+        task: Option<ReachTask>,
+        prior: Option<&Calibration>,
+    ) -> Result<(Calibration, bool)> {
+        let map = read_input_map(file)?;
+        map.check_robot(file, &self.robot.joint_names())?;
+        let named = match &landmarks {
+            Some((file, landmarks)) => landmarks.survey(file, self.robot, map.tag_use)?,
+            None => NamedSurvey { survey: self.robot.survey(), names: Default::default() },
+        };
+        let plain_landmark = plain_landmark(file, &map, &named)?;
+        let robot = self.robot.clone().with_survey(named.survey);
+        if robot.tags.is_empty() {
+            return Err(
+                UsageError("name the landmarks with --tag-map: the robot has no tags of its own".to_owned()).into()
+            );
+        }
+        let mut recordings = Vec::new();
+        let mut lost = false;
+        for path in self.recordings {
+            let recording = read_foreign(path, &map, &robot)?;
+            lost |= warn_of_foreign(&recording, &robot);
+            recordings.push(recording);
+        }
+        if task.is_none() {
+            eprintln!("note: no task is named (--task), so that no tool error is predicted");
+        }
+        let context = ForeignContext { task, landmark_names: named.names, plain_landmark };
+        let prepared = prepare_foreign(&recordings, &map, &robot, context)?;
+        Ok((calibrate_data(prepared, self.method, prior)?, lost))
+    }
+}
+
+/// The landmark that a plain `child_frame` means: the one of that name, or the only one there is where it has none.
+fn plain_landmark(file: &Path, map: &InputMap, named: &NamedSurvey) -> Result<Option<u32>, FileIssue> {
+    let Some(ChildFrame::Plain(name)) = &map.child_frame else { return Ok(None) };
+    if let Some((id, _)) = named.names.iter().find(|(_, known)| *known == name) {
+        return Ok(Some(*id));
+    }
+    match &named.survey.tags[..] {
+        [only] if named.names.is_empty() => Ok(Some(only.id)),
+        tags => {
+            let ids = tags.iter().map(|tag| named.names.get(&tag.id).cloned().unwrap_or_else(|| tag.id.to_string()));
+            let problem = format!("no landmark `{name}` in the tag map; it has {:?}", ids.collect::<Vec<_>>());
+            Err(FileIssue::new(file, "tags.child_frame", problem))
+        }
+    }
+}
+
+/// An accepted calibration of this robot.
+fn read_prior(file: &Path, robot: &Robot) -> Result<Calibration> {
+    let prior = Calibration::read(file)?;
+    if prior.status == Status::Refused {
+        let why = prior.refusal.unwrap_or_default();
+        return Err(UsageError(format!("{}: was refused itself ({why}); it is no prior", file.display())).into());
+    }
+    prior.sensors(robot).map_err(|error| match error {
+        CalibrationFileError::OtherRobot { found, found_joints, expected, .. } => {
+            CalibrationFileError::OtherRobot { file: file.display().to_string(), found, found_joints, expected }
+        }
+        other => other,
+    })?;
+    Ok(prior)
+}
+
+/// Says on stderr what of a real arm's recording is not used; `true` if something was lost.
+fn warn_of_foreign(recording: &ForeignRecording, robot: &Robot) -> bool {
+    let file = recording.path.display();
+    let is_whole = recording.completeness == Completeness::Whole;
+    if !is_whole {
+        eprintln!(
+            "warning: {file}: {}; what could be read is used",
+            super::calibrate::describe(&recording.completeness)
+        );
+    }
+    for (what, n) in &recording.left_out {
+        eprintln!("warning: {file}: {n} {what} left out");
+    }
+    if !recording.extra_joints.is_empty() {
+        eprintln!("note: {file}: joints that the robot lacks are ignored: {}", recording.extra_joints.join(", "));
+    }
+    for &joint in &recording.absent_joints {
+        let name = &robot.sensors[joint].joint;
+        eprintln!(
+            "note: {file}: has no readings of {name}; the camera hangs before it, its angle is taken as the middle"
+        );
+    }
+    !is_whole || !recording.left_out.is_empty()
+}
