@@ -1,0 +1,191 @@
+//! Small line and point charts as SVG text.
+
+use plotters::coord::Shift;
+use plotters::prelude::*;
+
+/// How a series looks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Style {
+    Line,
+    Dots,
+    /// Broken, for what is no measurement.
+    Dashes,
+}
+
+/// Points of one color.
+#[derive(Clone, Debug)]
+pub struct Series {
+    pub name: String,
+    pub style: Style,
+    pub points: Vec<[f64; 2]>,
+}
+
+/// How an axis is divided.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Axis {
+    Linear,
+    /// Points that are not positive are left out.
+    Log,
+}
+
+/// One chart of a row.
+#[derive(Clone, Debug)]
+pub struct Panel {
+    pub title: String,
+    pub x: (String, Axis),
+    pub y: (String, Axis),
+    /// Whether a unit is as long on both axes.
+    pub is_map: bool,
+    pub series: Vec<Series>,
+}
+
+const COLORS: [RGBColor; 7] = [
+    RGBColor(0x1f, 0x77, 0xb4),
+    RGBColor(0xd6, 0x27, 0x28),
+    RGBColor(0x2c, 0xa0, 0x2c),
+    RGBColor(0x94, 0x67, 0xbd),
+    RGBColor(0xff, 0x7f, 0x0e),
+    RGBColor(0x55, 0x55, 0x55),
+    RGBColor(0x17, 0xbe, 0xcf),
+];
+/// Of one panel, px.
+const PANEL: (u32, u32) = (480, 360);
+
+/// Draws panels side by side.
+///
+/// # Errors
+/// What the drawing library says.
+pub fn svg(panels: &[Panel]) -> Result<String, String> {
+    let mut text = String::new();
+    {
+        let size = (PANEL.0 * panels.len().max(1) as u32, PANEL.1);
+        let root = SVGBackend::with_string(&mut text, size).into_drawing_area();
+        root.fill(&WHITE).map_err(|error| error.to_string())?;
+        for (area, panel) in root.split_evenly((1, panels.len().max(1))).iter().zip(panels) {
+            draw(area, panel).map_err(|error| error.to_string())?;
+        }
+        root.present().map_err(|error| error.to_string())?;
+    }
+    Ok(text)
+}
+
+type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+type DrawError = Box<dyn std::error::Error + Send + Sync>;
+
+fn draw(area: &Area<'_>, panel: &Panel) -> Result<(), DrawError> {
+    let shown: Vec<Series> = panel.series.iter().map(|series| positive(panel, series)).collect();
+    let (x, y) = ranges(panel, &shown);
+    let mut builder = ChartBuilder::on(area);
+    builder.caption(&panel.title, ("sans-serif", 15)).margin(8).x_label_area_size(36).y_label_area_size(56);
+    // One type of chart for each pair of axes.
+    macro_rules! chart {
+        ($x:expr, $y:expr) => {{
+            let mut chart = builder.build_cartesian_2d($x, $y).map_err(boxed)?;
+            let mut mesh = chart.configure_mesh();
+            mesh.x_desc(&panel.x.0).y_desc(&panel.y.0).max_light_lines(0).x_labels(8).y_labels(8);
+            mesh.x_label_formatter(&|v| number(*v)).y_label_formatter(&|v| number(*v)).draw().map_err(boxed)?;
+            for (series, color) in shown.iter().zip(COLORS.iter().cycle()) {
+                let points = series.points.iter().map(|p| (p[0], p[1]));
+                let drawn = match series.style {
+                    Style::Dots => chart.draw_series(points.map(|p| Circle::new(p, 2, color.filled()))),
+                    Style::Line => chart.draw_series(LineSeries::new(points, color.stroke_width(2))),
+                    Style::Dashes => chart.draw_series(DashedLineSeries::new(points, 6, 4, color.stroke_width(2))),
+                };
+                let color = *color;
+                drawn
+                    .map_err(boxed)?
+                    .label(&series.name)
+                    .legend(move |(x, y)| Rectangle::new([(x, y - 3), (x + 12, y + 3)], color.filled()));
+            }
+            let mut labels = chart.configure_series_labels();
+            labels
+                .position(SeriesLabelPosition::UpperLeft)
+                .background_style(WHITE.mix(0.8))
+                .label_font(("sans-serif", 11));
+            labels.draw().map_err(boxed)?;
+        }};
+    }
+    match (panel.x.1, panel.y.1) {
+        (Axis::Linear, Axis::Linear) => chart!(x.0..x.1, y.0..y.1),
+        (Axis::Log, Axis::Linear) => chart!((x.0..x.1).log_scale(), y.0..y.1),
+        (Axis::Linear, Axis::Log) => chart!(x.0..x.1, (y.0..y.1).log_scale()),
+        (Axis::Log, Axis::Log) => chart!((x.0..x.1).log_scale(), (y.0..y.1).log_scale()),
+    }
+    Ok(())
+}
+
+fn boxed<E: std::error::Error + Send + Sync>(error: DrawingAreaErrorKind<E>) -> DrawError {
+    error.to_string().into()
+}
+
+/// Short: 0.001, 1e-7, 250.
+fn number(value: f64) -> String {
+    let size = value.abs();
+    if size != 0.0 && !(1e-3..1e5).contains(&size) {
+        format!("{value:.0e}")
+    } else {
+        format!("{}", (value * 1e6).round() / 1e6)
+    }
+}
+
+fn positive(panel: &Panel, series: &Series) -> Series {
+    let axes = [panel.x.1, panel.y.1];
+    let is_shown = |p: &&[f64; 2]| {
+        p.iter().zip(axes).all(|(value, axis)| value.is_finite() && (axis == Axis::Linear || *value > 0.0))
+    };
+    Series { points: series.points.iter().filter(is_shown).copied().collect(), ..series.clone() }
+}
+
+type Range = (f64, f64);
+
+/// Of both axes, around all points.
+fn ranges(panel: &Panel, series: &[Series]) -> (Range, Range) {
+    let of = |axis: usize| {
+        let values = series.iter().flat_map(|series| &series.points).map(|p| p[axis]);
+        values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)))
+    };
+    let (x, y) = (of(0), of(1));
+    if !panel.is_map {
+        return (widened(x, panel.x.1), widened(y, panel.y.1));
+    }
+    // Of the panel, what labels and margins leave.
+    let aspect = f64::from(PANEL.0 - 72) / f64::from(PANEL.1 - 72);
+    let half = (0.5 * (x.1 - x.0)).max(0.5 * (y.1 - y.0) * aspect) * 1.05 + 1e-9;
+    let around = |(low, high): Range, half: f64| (0.5 * (low + high) - half, 0.5 * (low + high) + half);
+    (around(x, half), around(y, half / aspect))
+}
+
+fn widened((low, high): Range, axis: Axis) -> Range {
+    match axis {
+        _ if low > high => (1.0, 2.0),
+        Axis::Log => (low / 1.2, high * 1.2),
+        Axis::Linear => {
+            let margin = (0.03 * (high - low)).max(1e-9);
+            (low - margin, high + margin)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn charts_hold_their_series_and_leave_out_what_an_axis_cannot_show() {
+        let line =
+            Series { name: "a line".to_owned(), style: Style::Line, points: vec![[1.0, 2.0], [2.0, -1.0], [3.0, 4.0]] };
+        for (axis, shown) in [(Axis::Linear, 3), (Axis::Log, 2)] {
+            let label = |axis| ("m".to_owned(), axis);
+            let panel = Panel {
+                title: "Title".to_owned(),
+                x: label(Axis::Linear),
+                y: label(axis),
+                is_map: false,
+                series: vec![line.clone()],
+            };
+            assert_eq!(positive(&panel, &line).points.len(), shown);
+            let text = svg(&[panel.clone(), panel]).expect("a chart");
+            assert!(text.starts_with("<svg") && text.contains("a line") && text.contains("Title"), "{text}");
+        }
+    }
+}

@@ -1,0 +1,125 @@
+//! What is compared, and what the paper says of it.
+
+use super::contender::{Contender, Solver};
+use super::scene::{Guess, Readings, Setting, Sight};
+use crate::calib::{Gauge, PositionMethod, SearchOptions};
+
+/// How many draws.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Tier {
+    /// As published: minutes.
+    Full,
+    /// The same questions with few draws: seconds.
+    Small,
+}
+
+/// Settings and contenders that belong into one table.
+#[derive(Clone, Debug)]
+pub struct Experiment {
+    pub name: &'static str,
+    pub title: &'static str,
+    pub settings: Vec<Setting>,
+    pub contenders: Vec<Contender>,
+    pub draws: usize,
+}
+
+impl Experiment {
+    /// The paper's own figure for the tool's error, where it has one for this.
+    #[must_use]
+    pub fn paper_says(&self, setting: &Setting, contender: &Contender) -> &'static str {
+        let is_standard = setting.gain_error <= 0.05 && setting.guess == Guess::Datasheet;
+        if self.name == "preconditioning" || !is_standard {
+            return "";
+        }
+        match contender.solver {
+            Solver::Position(PositionMethod::MinimumVariance) if setting.noise_m == 0.0 => "< 1 mm",
+            Solver::Position(PositionMethod::MinimumVariance) if setting.noise_m == 0.01 => "50-150 mm",
+            Solver::Position(PositionMethod::MinimumDistance) => "< 1 mm",
+            Solver::Position(_) | Solver::Bundle => "",
+        }
+    }
+}
+
+const NOISES_M: [f64; 4] = [0.001, 0.003, 0.01, 0.03];
+const SIZES: [(usize, usize); 7] = [(8, 1), (10, 6), (20, 6), (40, 3), (40, 6), (80, 8), (200, 10)];
+/// Gain error, offset error in deg.
+const INITIAL_ERRORS: [(f64, f64); 4] = [(0.01, 1.0), (0.025, 2.5), (0.05, 5.0), (0.10, 10.0)];
+
+/// All tables of the study.
+#[must_use]
+pub fn experiments(tier: Tier) -> Vec<Experiment> {
+    let n = |full: usize, small: usize| if tier == Tier::Full { full } else { small };
+    let standard = Setting::default();
+    let at_1_cm = Setting { noise_m: 0.01, ..standard };
+    let [free, fixed] = [Gauge::Free, Gauge::Fixed].map(Contender::minimum_variance);
+    let (distance, squares) = (Contender::minimum_distance(), Contender::least_squares());
+    let bundle = Contender::bundle();
+    let with_map = vec![distance, fixed, squares, bundle];
+    let all = vec![distance, free, fixed, squares, bundle];
+    let sizes = SIZES.iter().filter(|(poses, _)| tier == Tier::Full || *poses < 200);
+    let initial = INITIAL_ERRORS.iter().flat_map(|(gain_error, deg)| {
+        let of = Setting { gain_error: *gain_error, offset_error_rad: deg.to_radians(), ..standard };
+        [of, Setting { noise_m: 0.01, ..of }]
+    });
+    let paper = SearchOptions::of_the_paper();
+    let starts = SearchOptions { n_starts: 4, ..SearchOptions::default() };
+    vec![
+        Experiment {
+            name: "no noise",
+            title: "Without noise",
+            settings: vec![standard, Setting { readings: Readings::WholeCounts, ..standard }],
+            contenders: all.clone(),
+            draws: n(100, 8),
+        },
+        Experiment {
+            name: "noise",
+            title: "Noise of the positions",
+            settings: NOISES_M.iter().map(|&noise_m| Setting { noise_m, ..standard }).collect(),
+            contenders: all.clone(),
+            draws: n(200, 12),
+        },
+        Experiment {
+            name: "size",
+            title: "Numbers of poses and landmarks, noise 1 cm",
+            settings: sizes.map(|&(poses, tags)| Setting { poses, tags, ..at_1_cm }).collect(),
+            contenders: with_map.clone(),
+            draws: n(200, 8),
+        },
+        Experiment {
+            name: "sight",
+            title: "The same from poses that have every landmark in the image, noise 1 cm",
+            settings: vec![Setting { sight: Sight::InImage, ..at_1_cm }],
+            contenders: with_map.clone(),
+            draws: n(200, 8),
+        },
+        Experiment {
+            name: "initial error",
+            title: "Error of the first guess",
+            settings: initial.collect(),
+            contenders: with_map,
+            draws: n(60, 6),
+        },
+        Experiment {
+            name: "preconditioning",
+            title: "Preconditioning, settings and starts of the search",
+            settings: vec![standard, at_1_cm],
+            contenders: vec![
+                distance,
+                distance.raw("minimum distance, raw units"),
+                distance.named("minimum distance, the paper's settings", paper),
+                fixed,
+                fixed.raw("minimum variance, gauge fixed, raw units"),
+                fixed.named("minimum variance, gauge fixed, the paper's settings", paper),
+                free.named("minimum variance, gauge free, 4 starts", starts),
+            ],
+            draws: n(24, 4),
+        },
+        Experiment {
+            name: "from the truth",
+            title: "The search begins at the true sensors (Figure 3, right), noise 1 cm",
+            settings: vec![Setting { guess: Guess::Truth, ..at_1_cm }],
+            contenders: all,
+            draws: n(60, 6),
+        },
+    ]
+}

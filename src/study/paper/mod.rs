@@ -1,0 +1,30 @@
+//! The paper's study again: gains and offsets from landmark positions with isotropic noise, on its own arm.
+//!
+//! `scene` draws an arm, landmarks, poses and readings; `contender` is a method with its settings; `trials` runs contenders on
+//! the same draws and measures the tool; `experiments` lists what is compared, with the paper's own figures; `tables` and
+//! `figures` show it. Draws run in parallel and are gathered in order, so that threads do not show.
+
+mod contender;
+mod experiments;
+mod figures;
+mod scene;
+mod tables;
+#[cfg(test)]
+mod tests;
+mod trials;
+
+pub use contender::{Contender, Solver};
+pub use experiments::{Experiment, Tier, experiments};
+pub use figures::paper_figures;
+pub use scene::{Draw, Guess, Readings, Setting, Sight};
+pub use tables::{paper_csv, paper_markdown};
+pub use trials::{PaperRow, run_experiment};
+
+/// Why the study cannot be made.
+#[derive(Debug, thiserror::Error)]
+pub enum PaperStudyError {
+    #[error("robot `{robot}`: {problem}")]
+    Scene { robot: String, problem: String },
+    #[error("a plot cannot be drawn: {0}")]
+    Plot(String),
+}
