@@ -2,21 +2,24 @@
 //!
 //! `oracle` compares with tools that share no code with ours, `golden` with figures that others published; `property` holds
 //! for any input; `recovery` puts known errors in and gets them back, `gripper_tag` with a tag that ties tool to camera,
-//! `map` with tags that nobody surveyed, `detections` with some that are wrong; `wall` proves what belief does not know;
+//! `map` with tags that nobody surveyed, `methods` by the paper's other methods, `detections` with some that are wrong, `failed` with sensors that fail; `wall` proves what belief does not know;
 //! `vehicles` puts every arm on every vehicle;
 //! `determinism`, `closed_loop`, `script` and `cli` run the program, `kill` ends it badly; `sim` looks at the simulated
-//! world from outside; `tagmap` maps tags in recordings that the test writes.
+//! world from outside; `real` reads recordings of real arms; `tagmap` maps tags in recordings that the test writes.
 
 mod cli;
 mod closed_loop;
 mod detections;
 mod determinism;
+mod failed;
 mod golden;
 mod gripper_tag;
 mod kill;
 mod map;
+mod methods;
 mod oracle;
 mod property;
+mod real;
 mod recovery;
 mod script;
 mod sim;

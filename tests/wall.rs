@@ -232,9 +232,20 @@ fn belief_never_names_the_simulator_and_truth_never_names_belief() {
 /// Where streams and files of both sides meet, neither side is named.
 #[test]
 fn the_meeting_place_names_neither_side() {
-    for folder in
-        ["streams", "log", "routine", "robot", "sensor", "kinematics", "optics", "detect", "spatial", "stats", "time"]
-    {
+    for folder in [
+        "streams",
+        "log",
+        "routine",
+        "input",
+        "robot",
+        "sensor",
+        "kinematics",
+        "optics",
+        "detect",
+        "spatial",
+        "stats",
+        "time",
+    ] {
         for file in sources(&root().join("src").join(folder)) {
             for name in modules_named(&read(&file)) {
                 let is_above = ["calib", "plan", "verify", "session", "tagmap", "sim", "score", "report", "cli"]

@@ -59,7 +59,7 @@ fn threads_interrupts_and_kills_leave_the_same_files() {
     answer(&mut campaign(&routine, &whole.join("c.csv"), &["--threads", "2"])).expect("two threads", 1, &words);
     let rows = read(&whole.join("c.csv"));
     assert_eq!(rows.lines().count(), 7, "{rows}");
-    assert_eq!(rows.matches(",refused,4,,3 views are too few").count(), 3, "{rows}");
+    assert_eq!(rows.matches(",refused,4,,\"6 views to fit are too few").count(), 3, "{rows}");
     assert_eq!(rows.matches(",failed,2,plan,").count(), 3, "{rows}");
 
     let broken = folder.path().join("broken");

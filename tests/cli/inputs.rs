@@ -49,7 +49,7 @@ const ROUTINE: &[Spoilt] = &[
     ("poses = 12", "poses = 12\nposess = 3", &["short.toml", "posess"]),
     ("poses = 12", "poses = 2", &["short.toml", "capture.poses", "3 .. 1000"]),
     ("poses = 12", "poses = -1", &["short.toml", "poses"]),
-    ("held_out = 4", "held_out = 1", &["short.toml", "capture.held_out"]),
+    ("held_out = 4", "held_out = 2000", &["short.toml", "capture.held_out"]),
     ("min_tags = 3", "min_tags = 0", &["short.toml", "capture.min_tags"]),
     ("dwell_s = 0.6", "dwell_s = nan", &["short.toml", "capture.dwell_s", "NaN"]),
     ("dwell_s = 0.6", "dwell_s = inf", &["short.toml", "capture.dwell_s", "inf"]),

@@ -3,7 +3,7 @@
 use std::io::Write;
 use std::process::Stdio;
 
-use armcal::calib::{Calibration, CompactCalibration};
+use armcal::calib::{Calibration, CompactCalibration, ReferenceTable, TermsTable};
 use armcal::stats::stream_rng;
 use armcal::streams::JointAngles;
 use rand::RngExt;
@@ -46,7 +46,7 @@ fn the_compact_line_is_short_and_moves_the_tool_no_less_than_the_full_calibratio
             .arg(robot_folder())
             .arg("--out")
             .arg(folder.path())
-            .arg("--compact"),
+            .args(["--method", "minimum_distance", "--compact"]),
     );
     told.expect("compact", 0, &["armcal1 titan4 minimum_distance ok "]);
     assert!(told.stdout.len() < 512 && told.stdout.lines().count() == 1, "{} bytes", told.stdout.len());
@@ -84,7 +84,7 @@ fn a_refused_calibration_says_so_in_the_compact_line() {
                 .arg(robot_folder())
                 .arg("--out")
                 .arg(folder.path())
-                .arg("--compact"),
+                .args(["--method", "minimum_distance", "--compact"]),
         );
         if told.code == 4 {
             refused += 1;
@@ -175,4 +175,56 @@ fn stdout_that_takes_nothing_is_an_error_without_a_panic() {
         program().arg("export").arg(sample()).args(["--as", "yaml"]).stdout(full).output().expect("the program starts");
     let stderr = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.code() == Some(1) && stderr.contains("stdout"), "{output:?}");
+}
+
+/// The sample's calibration with a bent, warm sensor.
+fn with_terms(folder: &std::path::Path) -> std::path::PathBuf {
+    let mut calibration = Calibration::read(&sample()).expect("it reads");
+    let mut shape_rad = vec![0.0; armcal::sensor::N_SHAPE];
+    (shape_rad[1], shape_rad[4]) = (3e-3, -1e-3);
+    calibration.joint[2].terms = Some(TermsTable {
+        half_range_rad: titan().sensors[2].half_range_rad,
+        shape_rad: Some(shape_rad),
+        offset_rad_per_k: Some(2e-4),
+        ..TermsTable::default()
+    });
+    calibration.reference = Some(ReferenceTable { oil_c: Some(20.0), pressure_pa: None, time_nanos: None });
+    let file = folder.join("bent.toml");
+    write(&file, &calibration.to_toml());
+    file
+}
+
+/// A sensor that is no straight line is exported as a table, in YAML and from the compact line alike.
+#[test]
+fn terms_are_exported_as_tables_and_never_dropped() {
+    let folder = temp();
+    let file = with_terms(folder.path());
+    let file = file.to_str().expect("UTF-8");
+    let yaml = export(file, &["--as", "yaml"]);
+    yaml.expect("yaml", 0, &["lookup:", "joint: forearm_pitch", "travel_counts:", "correction_rad:", "oil_c: 20"]);
+    let robot = robot_folder();
+    let robot = robot.to_str().expect("UTF-8");
+    export(file, &["--as", "toml", "--robot", robot]).expect("toml", 0, &["[joint.terms]", "[reference]"]);
+    let line = export(file, &["--as", "compact"]);
+    line.expect("compact", 0, &["armcal2 titan4 "]);
+    assert!(line.stdout.len() < 512 && line.stdout.lines().count() == 1, "{}", line.stdout);
+    let (code, told, _) = export_stdin(&line.stdout, &["--as", "yaml", "--robot", robot]);
+    assert_eq!(code, 0);
+    for key in ["format: armcal2", "shape_rad:", "offset_rad_per_k: 0.0002", "lookup:", "joint: forearm_pitch"] {
+        assert!(told.contains(key), "no `{key}` in {told}");
+    }
+    let (code, toml, _) = export_stdin(&line.stdout, &["--as", "toml", "--robot", robot]);
+    let table: toml::Table = toml::from_str(&toml).expect("TOML");
+    assert_eq!((code, table["lookup"].as_array().map(Vec::len)), (0, Some(1)));
+    // Without terms there is no table.
+    let sample = sample();
+    let straight = export(sample.to_str().expect("UTF-8"), &["--as", "yaml"]).stdout;
+    assert!(!straight.contains("lookup"), "{straight}");
+}
+
+#[test]
+fn check_says_what_a_calibration_is_valid_for() {
+    let told = answer(program().arg("check").arg(sample()));
+    told.expect("check", 0, &["calibration of `titan4`, 6 joints; valid for shoulder_yaw ", " rad, ", "since 1970"]);
+    assert!(!told.stdout.contains("wrist_rotate"), "nothing was estimated of it: {}", told.stdout);
 }
