@@ -5,7 +5,10 @@
 use std::hint::black_box;
 use std::path::Path;
 
-use armcal::calib::{JointParameters, Parameter, ParameterKind, PositionProblem, TagView, View, minimum_distance};
+use armcal::calib::{
+    JointParameters, Measured, Parameter, ParameterKind, PositionMethod, PositionProblem, SearchOptions, TagView, View,
+    minimum_distance,
+};
 use armcal::plan::{ClearanceModel, JointErrorBounds};
 use armcal::robot::{Robot, Vehicle, load, load_vehicle};
 use armcal::routine::Scene;
@@ -48,14 +51,13 @@ fn views(robot: &Robot) -> Vec<View> {
                     id: robot.tags[tag_idx].id,
                     tag_idx,
                     center_in_camera_m: center.coords + nalgebra::Vector3::from(noise_m),
-                    corners_px: [[0.0; 2]; 4],
-                    n_frames: 1,
+                    measured: Measured::Position,
                 }
             };
             let tags = (0..TAGS_A_VIEW).map(|t| tag(t, [0; 3].map(|_| rng.random_range(-0.003..0.003)))).collect();
             let travel_rad =
                 JointAngles::from_fn(robot.n_joints(), |j| (angles[j] - robot.sensors[j].center_rad - 0.035) / 1.02);
-            View { pose_idx, end: SIMULATION_EPOCH, travel_rad, tags, gripper_tag: None }
+            View { tags, ..View::of_reading(pose_idx, SIMULATION_EPOCH, travel_rad) }
         })
         .collect()
 }
@@ -75,6 +77,18 @@ fn calibration(c: &mut Criterion) {
     c.bench_function("minimum distance by BOBYQA, 40 x 6", |b| {
         b.iter(|| minimum_distance(black_box(&problem), &free, &JointParameters::default()))
     });
+    // To 1e-6 of a prior sigma, and the other methods on the same data.
+    let options = SearchOptions { rho_end: 1e-6, ..SearchOptions::default() };
+    let without_gauge = &free[..1].iter().chain(&free[2..]).copied().collect::<Vec<_>>();
+    for (name, method, free) in [
+        ("minimum distance by BOBYQA to 1e-6, 40 x 6", PositionMethod::MinimumDistance, &free),
+        ("minimum variance by BOBYQA to 1e-6, 40 x 6", PositionMethod::MinimumVariance, without_gauge),
+        ("least squares, 40 x 6", PositionMethod::LeastSquares, &free),
+    ] {
+        c.bench_function(name, |b| {
+            b.iter(|| method.solve(black_box(&problem), free, &JointParameters::default(), &options));
+        });
+    }
 }
 
 fn planning(c: &mut Criterion) {

@@ -1,0 +1,197 @@
+//! What the benchmarks solve: views of a Titan 4 drawn from a fixed seed.
+
+use std::path::Path;
+
+use armcal::calib::bundle::{BundleInput, Evidence, Model, Scales};
+use armcal::calib::{JointParameters, Measured, Parameter, ParameterKind, SeenCorners, TagView, View};
+use armcal::joints::{JointAngles, MAX_JOINTS};
+use armcal::optics::square_corners;
+use armcal::robot::{Robot, load};
+use armcal::sensor::Departure;
+use armcal::spatial::exp;
+use armcal::stats::stream_rng;
+use armcal::time::SIMULATION_EPOCH;
+use nalgebra::{Isometry3, Vector6};
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+/// Terms of the nonlinearity of each joint, beside gain and offset.
+pub const N_TERMS: u8 = 4;
+const CORNER_STD_PX: f64 = 0.3;
+const POSITION_STD_M: f64 = 0.01;
+/// No corner is seen farther from the optical axis, so that a first guess that is 0.1 rad off still sees it.
+const MAX_VIEW_ANGLE_RAD: f64 = 1.25;
+const MIN_RANGE_M: f64 = 0.25;
+
+/// An arm, views of it and what is estimated.
+pub struct Problem {
+    pub robot: Robot,
+    pub views: Vec<View>,
+    pub model: Model,
+    pub scales: Scales,
+}
+
+impl Problem {
+    pub fn input(&self, evidence: Evidence) -> BundleInput<'_> {
+        BundleInput {
+            robot: &self.robot,
+            views: &self.views,
+            model: self.model.clone(),
+            scales: self.scales.clone(),
+            guess: JointParameters::default(),
+            joint_prior: None,
+            evidence,
+        }
+    }
+
+    /// Parameters of the joints in the order of their columns.
+    pub fn parameters(&self) -> Vec<Parameter> {
+        let of_joint = |(joint, kinds): (usize, &Vec<ParameterKind>)| {
+            kinds.iter().map(move |&kind| Parameter { joint, kind }).collect::<Vec<_>>()
+        };
+        self.model.joints.iter().enumerate().flat_map(of_joint).collect()
+    }
+
+    /// Gains and offsets of the joints before the camera.
+    pub fn straight(&self) -> Vec<Parameter> {
+        let straight = |p: &Parameter| matches!(p.kind, ParameterKind::Gain | ParameterKind::Offset);
+        self.parameters().into_iter().filter(straight).collect()
+    }
+}
+
+fn normal(rng: &mut ChaCha8Rng) -> f64 {
+    StandardNormal.sample(rng)
+}
+
+/// A robot whose readings have no noise of their own: a view then has no parameters of its own.
+fn robot() -> Robot {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/titan4");
+    let mut robot = load(&folder).expect("the robot is part of the repository");
+    for sensor in &mut robot.sensors {
+        sensor.noise_std_counts = 0.0;
+    }
+    robot
+}
+
+fn model(robot: &Robot) -> Model {
+    let kinds = |joint: usize| {
+        if joint >= robot.camera.mount.n_joints {
+            return Vec::new();
+        }
+        let terms = (0..N_TERMS).map(ParameterKind::Shape);
+        [ParameterKind::Gain, ParameterKind::Offset].into_iter().chain(terms).collect()
+    };
+    Model {
+        joints: (0..robot.n_joints()).map(kinds).collect(),
+        mount: true,
+        lens: false,
+        tags: true,
+        gripper_tag: false,
+        time_offset: false,
+    }
+}
+
+/// The arm as it is: drawn from the priors.
+struct Truth {
+    parameters: JointParameters,
+    mount: Isometry3<f64>,
+    tags: Vec<Isometry3<f64>>,
+}
+
+fn moved(pose: &Isometry3<f64>, std_m: f64, std_rad: f64, rng: &mut ChaCha8Rng) -> Isometry3<f64> {
+    pose * exp(&Vector6::from_fn(|k, _| normal(rng) * if k < 3 { std_m } else { std_rad }))
+}
+
+/// `n_views` views that see all tags, by their corners.
+pub fn corners(n_views: u32, joint_std_rad: f64) -> Problem {
+    let robot = robot();
+    let model = model(&robot);
+    let mut scales = Scales::datasheet(&robot);
+    scales.joint_std_rad = [joint_std_rad; MAX_JOINTS];
+    let mut rng = stream_rng(1, "bench of bundle");
+    let mut problem = Problem { robot, views: Vec::new(), model, scales };
+    let truth = draw(&problem, &mut rng);
+    while (problem.views.len() as u32) < n_views {
+        let idx = problem.views.len() as u32;
+        if let Some(view) = view(&problem.robot, &truth, joint_std_rad, idx, &mut rng) {
+            problem.views.push(view);
+        }
+    }
+    problem
+}
+
+fn draw(problem: &Problem, rng: &mut ChaCha8Rng) -> Truth {
+    let robot = &problem.robot;
+    let mut parameters = JointParameters::default();
+    for p in problem.parameters() {
+        let std = problem.scales.prior_std(&robot.sensors[p.joint], p.joint, p.kind);
+        parameters.set(p, parameters.get(p) + std * normal(rng));
+    }
+    let camera = &robot.camera;
+    let mount = moved(&camera.mount.link_from_frame, camera.mount_std_m, camera.mount_std_rad, rng);
+    let tags = robot.tags.iter();
+    let tags = tags.map(|t| moved(t.base_from_tag.isometry(), t.position_std_m, t.rotation_std_rad, rng)).collect();
+    Truth { parameters, mount, tags }
+}
+
+/// A view at a random pose; `None` where it does not see all tags.
+fn view(robot: &Robot, truth: &Truth, joint_std_rad: f64, idx: u32, rng: &mut ChaCha8Rng) -> Option<View> {
+    let travel_rad =
+        JointAngles::from_fn(robot.n_joints(), |j| rng.random_range(-0.9..0.9) * robot.sensors[j].half_range_rad);
+    let angles = JointAngles::from_fn(robot.n_joints(), |j| {
+        let spec = &robot.sensors[j];
+        let angle_rad = truth.parameters.correction(j).angle_rad(spec, travel_rad[j], &Departure::default(), 0.0);
+        angle_rad + joint_std_rad * normal(rng)
+    });
+    let camera_from_base = (robot.chain.link_poses(&angles).link(robot.camera.mount.n_joints) * truth.mount).inverse();
+    let mut view = View::of_reading(idx, SIMULATION_EPOCH.plus_s(20.0 * f64::from(idx)), travel_rad);
+    for (tag_idx, tag) in robot.tags.iter().enumerate() {
+        let camera_from_tag = camera_from_base * truth.tags[tag_idx];
+        let center = camera_from_tag.translation.vector;
+        let mut corners_px = [[0.0; 2]; 4];
+        for (pixel, corner) in corners_px.iter_mut().zip(square_corners(tag.size_m)) {
+            let point = (camera_from_tag * corner).coords;
+            let angle_rad = point.x.hypot(point.y).atan2(point.z);
+            if angle_rad > MAX_VIEW_ANGLE_RAD || center.norm() < MIN_RANGE_M {
+                return None;
+            }
+            let seen = robot.camera.lens.project(&point)?;
+            *pixel = [seen.x + CORNER_STD_PX * normal(rng), seen.y + CORNER_STD_PX * normal(rng)];
+        }
+        let measured = Measured::Corners(SeenCorners { corners_px, n_frames: 1, scatter_px2: 0.0 });
+        view.tags.push(TagView { id: tag.id, tag_idx, center_in_camera_m: center, measured });
+    }
+    Some(view)
+}
+
+/// `n_views` views of the positions of `n_tags` tags, 1 cm of noise on each coordinate; sensors are straight.
+pub fn positions(n_views: u32, n_tags: usize) -> Problem {
+    let robot = robot();
+    let model = model(&robot);
+    let scales = Scales::datasheet(&robot);
+    let mut rng = stream_rng(1, "bench of minimum distance");
+    let mut problem = Problem { robot, views: Vec::new(), model, scales };
+    let mut truth = JointParameters::default();
+    for p in problem.straight() {
+        truth.set(p, truth.get(p) + p.prior_std(&problem.robot) * normal(&mut rng));
+    }
+    let robot = &problem.robot;
+    for idx in 0..n_views {
+        let travel_rad =
+            JointAngles::from_fn(robot.n_joints(), |j| rng.random_range(-0.9..0.9) * robot.sensors[j].half_range_rad);
+        let angles = JointAngles::from_fn(robot.n_joints(), |j| {
+            let center_rad = robot.sensors[j].center_rad;
+            center_rad + truth.gain[j] * travel_rad[j] + truth.offset_rad[j]
+        });
+        let camera_from_base = robot.chain.link_poses(&angles).frame(&robot.camera.mount).inverse();
+        let mut view = View::of_reading(idx, SIMULATION_EPOCH, travel_rad);
+        for (tag_idx, tag) in robot.tags.iter().enumerate().take(n_tags) {
+            let mut center = (camera_from_base * tag.base_from_tag.isometry()).translation.vector;
+            center.iter_mut().for_each(|x| *x += POSITION_STD_M * normal(&mut rng));
+            view.tags.push(TagView { id: tag.id, tag_idx, center_in_camera_m: center, measured: Measured::Position });
+        }
+        problem.views.push(view);
+    }
+    problem
+}
