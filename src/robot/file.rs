@@ -6,10 +6,12 @@ use nalgebra::{Isometry3, Matrix6};
 use serde::Deserialize;
 
 use super::camera::{CameraFile, check_camera};
+use super::drive::{DriveSpec, HydraulicsFile, MotionSpec, check_displacements};
 use super::error::{FileIssue, RobotError, parse_toml, read_text};
 use super::failed::FailedJoint;
 use super::gripper::{GripperFile, GripperSpec};
 use super::gripper_tag::{GripperTag, GripperTagFile};
+use super::self_collision::{self, SelfPairs};
 use super::survey::{SurveyedTag, TagFile, TagSurvey, check_tags};
 use super::urdf::{LinkBody, UrdfModel};
 use super::vehicle::Vehicle;
@@ -29,7 +31,10 @@ pub struct Robot {
     pub chain: Chain,
     /// Bodies 0..=n_joints: base first.
     pub bodies: Vec<LinkBody>,
+    /// Links that can come near each other, where the folder says so.
+    pub self_pairs: Option<SelfPairs>,
     pub sensors: Vec<JointSensorSpec>,
+    pub drive: DriveSpec,
     pub tool: ToolSpec,
     /// Where the tool is a gripper that opens and closes.
     pub gripper: Option<GripperSpec>,
@@ -206,6 +211,9 @@ struct RobotFile {
     gripper: Option<GripperFile>,
     gripper_tag: Option<GripperTagFile>,
     joint_sensor: Vec<SensorFile>,
+    hydraulics: Option<HydraulicsFile>,
+    #[serde(default)]
+    motion: MotionSpec,
     camera: CameraFile,
     #[serde(default)]
     tag: Vec<TagFile>,
@@ -238,6 +246,8 @@ struct SensorFile {
     #[serde(default = "usual_change")]
     drift_std_rad_per_sqrt_h: f64,
     max_rate_rad_s: f64,
+    /// By the URDF's effort where the file says nothing.
+    displacement_l_per_rad: Option<f64>,
 }
 
 /// 0.02 deg a kelvin and 0.02 deg in an hour, for datasheets that say nothing.
@@ -254,6 +264,16 @@ fn usual_buoyancy() -> f64 {
 /// # Errors
 /// [`RobotError`] naming file, key and allowed range.
 pub fn load(folder: &Path) -> Result<Robot, RobotError> {
+    let robot = load_without_pairs(folder)?;
+    let self_pairs = self_collision::read(folder, &robot.urdf_text, &robot.bodies)?;
+    Ok(Robot { self_pairs, ..robot })
+}
+
+/// The same without its self_collision.toml, which may be of another URDF.
+///
+/// # Errors
+/// [`RobotError`] naming file, key and allowed range.
+pub fn load_without_pairs(folder: &Path) -> Result<Robot, RobotError> {
     let file = folder.join("robot.toml");
     let raw: RobotFile = parse_toml(&file, &read_text(&file)?)?;
     FileIssue::check_range(&file, "version", f64::from(raw.version), 1.0..=1.0)?;
@@ -262,6 +282,15 @@ pub fn load(folder: &Path) -> Result<Robot, RobotError> {
     let jaws = raw.gripper.as_ref().map(GripperFile::jaws).unwrap_or_default();
     let bodies = urdf.bodies(&raw.base_link, &chain, jaws)?;
     let sensors = check_sensors(&file, &raw.joint_sensor, &chain)?;
+    let drive = DriveSpec {
+        pump_l_per_min: raw.hydraulics.map(|hydraulics| hydraulics.check(&file)).transpose()?,
+        displacement_l_per_rad: check_displacements(
+            &file,
+            raw.joint_sensor.iter().map(|sensor| (sensor.joint.as_str(), sensor.displacement_l_per_rad)),
+            &urdf,
+        )?,
+        motion: raw.motion.check(&file)?,
+    };
     let stowed = check_stowed(&file, "stowed_rad", &raw.stowed_rad, chain.n_joints())?;
     let mut tool = urdf.attachment(&raw.base_link, &raw.tool.link, &chain)?;
     for value in raw.tool.point_m {
@@ -292,7 +321,9 @@ pub fn load(folder: &Path) -> Result<Robot, RobotError> {
         base_tag: raw.base_tag,
         chain,
         bodies,
+        self_pairs: None,
         sensors,
+        drive,
         camera,
         tags,
     })

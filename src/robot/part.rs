@@ -31,7 +31,7 @@ pub(crate) enum Convex {
 }
 
 /// A part or obstacle as files write it.
-#[derive(Clone, Debug, Deserialize, Serialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct PartFile {
     name: String,

@@ -45,6 +45,11 @@ fn isometry(origin: &urdf_rs::Pose) -> Isometry3<f64> {
 }
 
 impl UrdfModel {
+    /// Largest torque of a joint, N m; 0 where the file gives none.
+    pub(super) fn effort_n_m(&self, joint: &str) -> f64 {
+        self.robot.joints.iter().find(|other| other.name == joint).map_or(0.0, |joint| joint.limit.effort)
+    }
+
     /// Reads `file` and checks that it is a tree of known links with finite numbers.
     ///
     /// # Errors

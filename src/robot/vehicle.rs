@@ -26,8 +26,32 @@ pub struct Vehicle {
     pub stowed_rad: BTreeMap<String, Vec<f64>>,
     /// What a vehicle needs that floats free; `None` where the file has none.
     pub dynamics: Option<VehicleDynamics>,
+    pub station_keeping: StationKeeping,
     /// The file's text, to travel with a recording; with meshes, the same as hulls, point by point.
     pub text: String,
+}
+
+/// How well it keeps its station, one sigma: of its centre of mass along each axis, and of roll, pitch and yaw.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct StationKeeping {
+    pub position_std_m: f64,
+    pub attitude_std_rad: f64,
+}
+
+/// Assumed where the file says nothing: 3 cm and half a degree.
+impl Default for StationKeeping {
+    fn default() -> Self {
+        Self { position_std_m: 0.03, attitude_std_rad: 0.0087 }
+    }
+}
+
+impl StationKeeping {
+    fn check(self, file: &Path) -> Result<Self, FileIssue> {
+        FileIssue::check_range(file, "station_keeping.position_std_m", self.position_std_m, 0.0..=10.0)?;
+        FileIssue::check_range(file, "station_keeping.attitude_std_rad", self.attitude_std_rad, 0.0..=1.0)?;
+        Ok(self)
+    }
 }
 
 /// The vehicle as a body in water: about its origin, the centre of mass, in its own axes. Sixes are x, y, z, then about
@@ -80,6 +104,8 @@ struct VehicleFile {
     mount: PlaceFile,
     #[serde(skip_serializing_if = "Option::is_none")]
     dynamics: Option<VehicleDynamics>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    station_keeping: Option<StationKeeping>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     tag: Vec<TagFile>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -111,6 +137,7 @@ pub fn load_vehicle(file: &Path) -> Result<Vehicle, RobotError> {
     if let Some(dynamics) = &raw.dynamics {
         dynamics.check(file)?;
     }
+    let station_keeping = raw.station_keeping.unwrap_or_default().check(file)?;
     let survey = check_survey(file, &raw, &mount)?;
     let lights = raw.light.iter().enumerate().map(|(n, light)| light.check(file, n)).collect::<Result<_, _>>()?;
     let (parts, plain) = check_parts(&raw.part, file, "part")?;
@@ -129,6 +156,7 @@ pub fn load_vehicle(file: &Path) -> Result<Vehicle, RobotError> {
         lights,
         stowed_rad: raw.stowed_rad,
         dynamics: raw.dynamics,
+        station_keeping,
         text,
     })
 }
