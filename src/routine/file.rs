@@ -188,6 +188,49 @@ pub struct CaptureSettings {
     /// How long the settled arm is watched.
     #[serde(default = "CaptureSettings::default_dwell_s")]
     pub dwell_s: f64,
+    /// What the views are chosen for.
+    #[serde(default)]
+    pub choose: PoseCriterion,
+    /// After so many views, the running estimate renews margins and remaining poses; 0: planned once.
+    #[serde(default)]
+    pub replan_every: u32,
+    /// No more views once the predicted tool error at the task (root mean square) is below this.
+    #[serde(default)]
+    pub stop_at_tool_error_m: Option<f64>,
+    /// No more views after so long, by the arm's clock.
+    #[serde(default)]
+    pub max_time_s: Option<f64>,
+    /// What is kept clear beyond `clearance_m`.
+    #[serde(default)]
+    pub margins: Margins,
+}
+
+/// What makes one view better than another.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PoseCriterion {
+    /// Least predicted tool error at the task (the test-pose criterion of Klimchik et al. 2014).
+    #[default]
+    ToolError,
+    /// Least volume of the parameters' uncertainty.
+    DOptimal,
+    /// Least sum of the parameters' variances, in units of their priors.
+    AOptimal,
+    /// Least of the largest variance, in units of their priors.
+    EOptimal,
+    /// Any that see enough tags and keep clear; to compare with.
+    Random,
+}
+
+/// For which arms the clearance is kept.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Margins {
+    /// Every arm that the present belief allows.
+    #[default]
+    Belief,
+    /// The believed arm alone; to compare with, never on a real arm.
+    Off,
 }
 
 impl CaptureSettings {
@@ -218,6 +261,13 @@ impl CaptureSettings {
         check("min_tags", f64::from(self.min_tags), 1.0..=100.0)?;
         check("clearance_m", self.clearance_m, 0.0..=1.0)?;
         check("dwell_s", self.dwell_s, 0.2..=60.0)?;
+        check("replan_every", f64::from(self.replan_every), 0.0..=1000.0)?;
+        if let Some(tool_error_m) = self.stop_at_tool_error_m {
+            check("stop_at_tool_error_m", tool_error_m, 1e-5..=1.0)?;
+        }
+        if let Some(seconds) = self.max_time_s {
+            check("max_time_s", seconds, 1.0..=1e6)?;
+        }
         Ok(())
     }
 }
@@ -230,6 +280,11 @@ impl Default for CaptureSettings {
             min_tags: Self::default_min_tags(),
             clearance_m: Self::default_clearance_m(),
             dwell_s: Self::default_dwell_s(),
+            choose: PoseCriterion::default(),
+            replan_every: 0,
+            stop_at_tool_error_m: None,
+            max_time_s: None,
+            margins: Margins::default(),
         }
     }
 }

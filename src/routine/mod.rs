@@ -15,7 +15,8 @@ mod step;
 
 pub use campaign::{CampaignSettings, RegressSettings, SeedRange};
 pub use file::{
-    CaptureSettings, FailedJointEntry, Method, Routine, RoutineError, TaskSettings, load, load_scene, load_with,
+    CaptureSettings, FailedJointEntry, Margins, Method, PoseCriterion, Routine, RoutineError, TaskSettings, load,
+    load_scene, load_with,
 };
 pub use overrides::{Override, Overrides, effective_table};
 pub use scene::Scene;

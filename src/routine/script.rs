@@ -5,7 +5,7 @@ use std::path::Path;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
-use super::file::{CaptureSettings, RoutineError, TaskSettings};
+use super::file::{CaptureSettings, Margins, PoseCriterion, RoutineError, TaskSettings};
 use super::step::{
     AssertLimits, CalibrateSettings, CalibrateViews, IdentifySettings, MoveGoal, OnRefusal, ReachSettings, Step,
     StopsSettings,
@@ -158,6 +158,11 @@ impl StepReader<'_> {
             min_tags: Option<u32>,
             clearance_m: Option<f64>,
             dwell_s: Option<f64>,
+            choose: Option<PoseCriterion>,
+            replan_every: Option<u32>,
+            stop_at_tool_error_m: Option<f64>,
+            max_time_s: Option<f64>,
+            margins: Option<Margins>,
         }
         let raw: Raw = self.parse()?;
         let settings = CaptureSettings {
@@ -166,6 +171,11 @@ impl StepReader<'_> {
             min_tags: raw.min_tags.unwrap_or(general.min_tags),
             clearance_m: raw.clearance_m.unwrap_or(general.clearance_m),
             dwell_s: raw.dwell_s.unwrap_or(general.dwell_s),
+            choose: raw.choose.unwrap_or(general.choose),
+            replan_every: raw.replan_every.unwrap_or(general.replan_every),
+            stop_at_tool_error_m: raw.stop_at_tool_error_m.or(general.stop_at_tool_error_m),
+            max_time_s: raw.max_time_s.or(general.max_time_s),
+            margins: raw.margins.unwrap_or(general.margins),
         };
         settings.check(self.file, &self.key(""))?;
         Ok(Step::Capture(settings))
