@@ -2,7 +2,7 @@
 
 use super::CalibError;
 use super::associate::{CaptureData, Rejection, View};
-use super::bundle::{BundleInput, Estimate, Evidence, Innovations, Outlier, estimate};
+use super::bundle::{BundleInput, Estimate, Evidence, Innovations, Outlier, Selection, estimate};
 use super::bundle_setup::{Setup, declared};
 use super::bundle_verdict::Judged;
 use super::camera_mount::CameraMount;
@@ -28,7 +28,20 @@ pub(super) struct BundleRound<'a> {
     pub identified: &'a [IdentifiedScale],
     pub prior: Option<&'a Calibration>,
     pub map: Option<MapResult>,
+    pub effort: Effort,
 }
+
+/// How much is done beside the estimate.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Effort {
+    /// All that a verdict needs.
+    Judged,
+    /// The estimate and its covariance, to go on by while views are still being captured.
+    Running,
+}
+
+/// Fewer views do not tell how large noise and nonlinearity are: the datasheet's figures stand.
+const MIN_VIEWS_FOR_EVIDENCE: usize = 12;
 
 impl BundleRound<'_> {
     pub(super) fn calibrate(self, mut data: CaptureData) -> Result<Calibration, CalibError> {
@@ -41,8 +54,11 @@ impl BundleRound<'_> {
         if first.input().model.joints.iter().take(seen).all(Vec::is_empty) && declared.is_empty() {
             return Err(CalibError::NothingObservable { recording: name() });
         }
-        let found = first.estimate();
-        let failures = first.failures(robot, &data.fit, found.as_ref().map(|(found, _)| found));
+        let found = self.first_estimate(&first, data.fit.len());
+        let failures = match self.effort {
+            Effort::Judged => first.failures(robot, &data.fit, found.as_ref().map(|(found, _)| found)),
+            Effort::Running => declared.clone(),
+        };
         let second;
         let (setup, found) = if failures == declared {
             (&first, found)
@@ -56,7 +72,10 @@ impl BundleRound<'_> {
         data.fit = setup.settled(&found, &sound);
         // Left-out views of a freed joint are linearized where the camera saw it.
         let input = BundleInput { views: &data.fit, ..setup.input() };
-        let (held_out, innovations) = cross_validated(&input, &found);
+        let (held_out, innovations) = match self.effort {
+            Effort::Judged => cross_validated(&input, &found),
+            Effort::Running => (HeldOutSum::default().figures(), Vec::new()),
+        };
         let as_found = found.as_found(&setup.applied.robot);
         let parameters_found = found.joint_parameters().to_vec();
         let residual_std_rad = std::array::from_fn(|joint| match robot.sensors.get(joint) {
@@ -127,9 +146,24 @@ impl BundleRound<'_> {
             ..calibration
         };
         setup.complete(&mut calibration, &with, self.prior, agreement);
+        if self.effort == Effort::Running {
+            if found.is_consistent() {
+                return Ok(calibration);
+            }
+            let problem = "the views contradict each other or the prior".to_owned();
+            return Err(CalibError::NoRunningEstimate { recording: self.recording, problem });
+        }
         let (input, task) = (BundleInput { views: &data.fit, ..setup.input() }, data.task.as_ref());
         Judged { input: &input, found: &found, innovations: &innovations, task }.complete(&mut calibration);
         Ok(calibration)
+    }
+
+    fn first_estimate<'b>(&self, setup: &'b Setup, n_views: usize) -> Option<(Estimate<'b>, Vec<Selection>)> {
+        if self.effort == Effort::Judged {
+            return setup.estimate();
+        }
+        let evidence = if n_views < MIN_VIEWS_FOR_EVIDENCE { Evidence::Given } else { Evidence::Fitted };
+        estimate(&BundleInput { evidence, ..setup.input() }).map(|found| (found, Vec::new()))
     }
 }
 

@@ -4,7 +4,7 @@
 //! `problem` is the geometry shared by all methods; one file per method solves it; `observability` names what the data
 //! cannot determine before solving; `uncertainty` says how good the answer is and `verdict` whether to use it; `result` is
 //! calibration.toml, `compact` its short form. `foreign` makes views of recordings that mark none, `pooled` of several; `bad_data`
-//! refuses what nobody can make sense of. Nothing here knows of a simulator.
+//! refuses what nobody can make sense of; `running` estimates between views. Nothing here knows of a simulator.
 
 mod associate;
 mod bad_data;
@@ -18,7 +18,7 @@ mod compact;
 mod failed_joint;
 mod file;
 #[cfg(test)]
-mod fixture;
+pub(crate) mod fixture;
 mod foreign;
 mod frames;
 mod gripper_tag;
@@ -32,6 +32,7 @@ mod observability;
 mod pooled;
 mod problem;
 mod result;
+mod running;
 mod surroundings;
 mod terms_table;
 mod tool_error;
@@ -61,11 +62,12 @@ pub use observability::{Unobservable, free_parameters};
 pub use pooled::prepare_pooled;
 pub use problem::{JointParameters, Parameter, ParameterKind, PositionProblem};
 pub use result::{Calibration, FitFigures, HeldOutFigures, JointResult, Status};
+pub use running::running_estimate;
 pub use surroundings::Surroundings;
 pub use terms_table::{ReferenceTable, TermsTable};
 pub use uncertainty::{CommonErrors, ParameterCovariance, ToolErrorPrediction};
 pub use valid_range::ValidRange;
-pub use verdict::{MIN_HELD_OUT_VIEWS, MIN_VIEWS_PER_PARAMETER};
+pub use verdict::{MIN_HELD_OUT_VIEWS, MIN_VIEWS_PER_PARAMETER, fewest_views};
 pub use verdict_tables::{Check, ObservabilityTable, VerdictTable};
 
 use crate::log::{Disorder, Recording, hash_messages};
@@ -75,7 +77,7 @@ use crate::streams::{Mark, MarkKind, Message, Start};
 use crate::time::Stamp;
 use associate::declared_failed;
 use bad_data::{check_joints, check_order, refuse_one_pose};
-use bundle_round::BundleRound;
+use bundle_round::{BundleRound, Effort};
 
 /// Why no calibration came out at all; a poor one comes out refused instead.
 #[derive(Debug, thiserror::Error)]
@@ -105,6 +107,8 @@ pub enum CalibError {
          (the most: `{joint}`, {moved_deg:.3} deg), so nothing can be told of any"
     )]
     OnePose { recording: String, views: usize, joint: String, moved_deg: f64 },
+    #[error("{recording}: no running estimate: {problem}")]
+    NoRunningEstimate { recording: String, problem: String },
     #[error("{recording}: was given twice, or holds the messages of another one")]
     Twice { recording: String },
     #[error("{one} and {other} say different things of the tags; give a tag map that holds for both")]
@@ -304,7 +308,8 @@ pub fn calibrate_data(
     }
     if method == Method::Bundle {
         let (recording, robot) = (name(), &robot);
-        let round = BundleRound { recording, messages_hash, robot, identified: &identified, prior, map };
+        let effort = Effort::Judged;
+        let round = BundleRound { recording, messages_hash, robot, identified: &identified, prior, map, effort };
         return round.calibrate(data);
     }
     let mut guess = prior.map_or_else(JointParameters::default, |prior| prior.parameters(&robot));

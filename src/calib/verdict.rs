@@ -1,6 +1,7 @@
 //! Accept or refuse: the held-out views decide, never the fit's own residuals.
 
 use super::methods::SolveOutcome;
+use crate::robot::Robot;
 
 /// What the verdict rests on.
 #[derive(Clone, Copy, Debug)]
@@ -25,6 +26,12 @@ pub const MIN_HELD_OUT_VIEWS: usize = 3;
 const MAX_HELD_OUT_OVER_FIT: f64 = 2.5;
 /// Each view adds about three numbers that do not share its camera-pose error; fewer views than parameters overfit.
 pub const MIN_VIEWS_PER_PARAMETER: f64 = 1.0;
+
+/// The fewest fitted views that a calibration of all joints before the camera, from the datasheet, is accepted with.
+#[must_use]
+pub fn fewest_views(robot: &Robot) -> usize {
+    (MIN_VIEWS_PER_PARAMETER * 2.0 * robot.camera.mount.n_joints as f64).ceil() as usize
+}
 
 /// `None` to accept, else the reason to refuse, with the figures.
 #[must_use]

@@ -66,6 +66,8 @@ const CORNER_WIDTH: f64 = 3.0;
 /// A sighting whose chi-square is this many times its number of coordinates belongs elsewhere; one below `READMIT` belongs here.
 const REJECT: f64 = 7.5;
 const READMIT: f64 = 5.0;
+/// Cost per used measurement above which something does not hold. Good views have about one (corner noise is not quite normal).
+const CONSISTENT_COST: f64 = 3.0;
 const MAX_ROUNDS: usize = 40;
 const CONVERGED_CHANGE: f64 = 0.01;
 
@@ -358,6 +360,15 @@ fn outliers(problem: &Problem<'_>, views: &[View], solved: &Solved) -> Vec<Outli
 }
 
 impl Estimate<'_> {
+    /// Whether the sightings that are used and the priors fit together about as well as their standard deviations say: the cost, a
+    /// sum of squares in standard deviations, is not many times the number of measurements.
+    #[must_use]
+    pub fn is_consistent(&self) -> bool {
+        let used = self.problem.sightings.iter().filter(|sighting| sighting.is_used);
+        let n: usize = used.map(|sighting| sighting.data.n_coordinates()).sum();
+        n > 0 && self.cost_final < CONSISTENT_COST * n as f64
+    }
+
     /// Whether any sighting of a view is used.
     #[must_use]
     pub fn uses(&self, view_idx: usize) -> bool {
