@@ -1,15 +1,36 @@
 //! How far each joint may truly be from where it is believed to be.
 
 use crate::kinematics::JointLimits;
-use crate::robot::Robot;
+use crate::robot::{JointSensorSpec, Robot};
 use crate::streams::JointAngles;
 
-/// Per joint, the worst gain error about the middle of the range and the worst offset.
-#[derive(Clone, Debug)]
+/// Per joint, how far it may be off: least at one angle, and more by a slope on either side of it.
+///
+/// Convex in the angle, so that the largest error of a stretch is at one of its ends.
+#[derive(Clone, Debug, PartialEq)]
 pub struct JointErrorBounds {
-    gain: Vec<f64>,
-    offset_rad: Vec<f64>,
-    center_rad: Vec<f64>,
+    pub(super) joints: Vec<JointBound>,
+}
+
+/// `at_pivot_rad + slope |angle - pivot_rad|`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct JointBound {
+    pub pivot_rad: f64,
+    pub at_pivot_rad: f64,
+    pub slope: f64,
+}
+
+impl JointBound {
+    /// A sensor that reads `r = m + (1 + g)(theta - m) + o` is at `theta - m = (r - m - o) / (1 + g)`, so
+    /// `|theta - r| <= (G |r - m| + O) / (1 - G)` for `|g| <= G`, `|o| <= O`.
+    fn datasheet(spec: &JointSensorSpec) -> Self {
+        let rest = 1.0 - spec.gain_bound;
+        Self { pivot_rad: spec.center_rad, at_pivot_rad: spec.offset_bound_rad / rest, slope: spec.gain_bound / rest }
+    }
+
+    pub fn error_rad(&self, believed_rad: f64) -> f64 {
+        self.at_pivot_rad + self.slope * (believed_rad - self.pivot_rad).abs()
+    }
 }
 
 /// What has passed since some bounds held.
@@ -30,10 +51,6 @@ pub struct UnknownScale {
     pub gain_max: f64,
 }
 
-/// What no calibrated linear model explains: nonlinearity, temperature and rest error of the controller, rad.
-const UNMODELLED_RAD: f64 = 0.01;
-/// Multiple of one sigma that a calibrated parameter is kept clear for.
-const SIGMAS: f64 = 4.0;
 /// The same for what temperature and time do to it afterwards.
 const AGE_SIGMAS: f64 = 3.0;
 
@@ -41,28 +58,21 @@ impl JointErrorBounds {
     /// The datasheet's worst case.
     #[must_use]
     pub fn prior(robot: &Robot) -> Self {
-        Self {
-            gain: robot.sensors.iter().map(|s| s.gain_bound).collect(),
-            offset_rad: robot.sensors.iter().map(|s| s.offset_bound_rad).collect(),
-            center_rad: robot.sensors.iter().map(|s| s.center_rad).collect(),
-        }
+        Self { joints: robot.sensors.iter().map(JointBound::datasheet).collect() }
     }
 
-    /// After calibration: four sigma and a floor where a parameter was estimated, the datasheet's where not.
-    ///
-    /// `estimated` gives (gain sigma, offset sigma in rad) of each joint, `None` where it kept its datasheet value.
+    /// The believed arm and no other: what a plan without any margin for wrong sensors keeps clear for.
     #[must_use]
-    pub fn calibrated(robot: &Robot, estimated: &[(Option<f64>, Option<f64>)]) -> Self {
-        let mut bounds = Self::prior(robot);
-        for (joint, (gain_std, offset_std)) in estimated.iter().enumerate() {
-            if let Some(std) = gain_std {
-                bounds.gain[joint] = bounds.gain[joint].min(SIGMAS * std);
-            }
-            if let Some(std) = offset_std {
-                bounds.offset_rad[joint] = bounds.offset_rad[joint].min(SIGMAS * std + UNMODELLED_RAD);
-            }
-        }
-        bounds
+    pub fn none(robot: &Robot) -> Self {
+        let nothing = |spec: &JointSensorSpec| JointBound { pivot_rad: spec.center_rad, at_pivot_rad: 0.0, slope: 0.0 };
+        Self { joints: robot.sensors.iter().map(nothing).collect() }
+    }
+
+    /// The same for all joints, about the middles of their ranges.
+    #[cfg(test)]
+    pub(super) fn alike(robot: &Robot, at_pivot_rad: f64, slope: f64) -> Self {
+        let bound = |spec: &JointSensorSpec| JointBound { pivot_rad: spec.center_rad, at_pivot_rad, slope };
+        Self { joints: robot.sensors.iter().map(bound).collect() }
     }
 
     /// The datasheet's bounds, but for one joint that is believed to rest where it does and moves no one knows how far.
@@ -72,11 +82,11 @@ impl JointErrorBounds {
     #[must_use]
     pub fn with_unknown_scale(robot: &Robot, unknown: &UnknownScale) -> Self {
         let mut bounds = Self::prior(robot);
-        // error_rad divides by 1 - gain: g / (1 - g) = s for g = s / (1 + s).
-        let slope = unknown.gain_max + 1.0;
-        bounds.gain[unknown.joint] = slope / (1.0 + slope);
-        bounds.offset_rad[unknown.joint] *= 1.0 - bounds.gain[unknown.joint];
-        bounds.center_rad[unknown.joint] = unknown.rest_rad;
+        bounds.joints[unknown.joint] = JointBound {
+            pivot_rad: unknown.rest_rad,
+            at_pivot_rad: robot.sensors[unknown.joint].offset_bound_rad,
+            slope: unknown.gain_max + 1.0,
+        };
         bounds
     }
 
@@ -84,31 +94,20 @@ impl JointErrorBounds {
     #[must_use]
     pub fn aged(&self, robot: &Robot, age: Age) -> Self {
         let mut bounds = self.clone();
-        let datasheet = Self::prior(robot);
-        for (joint, spec) in robot.sensors.iter().enumerate() {
+        for (bound, spec) in bounds.joints.iter_mut().zip(&robot.sensors) {
             let by_temperature_rad = spec.temperature_std_rad_per_k * age.warmed_k;
             let by_time_rad = spec.drift_std_rad_per_sqrt_h * (age.seconds.max(0.0) / 3600.0).sqrt();
-            let aged_rad = bounds.offset_rad[joint] + AGE_SIGMAS * by_temperature_rad.hypot(by_time_rad);
+            let aged_rad = bound.at_pivot_rad + AGE_SIGMAS * by_temperature_rad.hypot(by_time_rad);
             // The datasheet's worst case has all of it, unless these bounds were beyond it already.
-            bounds.offset_rad[joint] = aged_rad.min(datasheet.offset_rad[joint].max(bounds.offset_rad[joint]));
+            bound.at_pivot_rad = aged_rad.min(JointBound::datasheet(spec).at_pivot_rad.max(bound.at_pivot_rad));
         }
         bounds
     }
 
     /// Largest distance of the true angle of `joint` from `believed_rad`, rad.
-    ///
-    /// A sensor that reads `r = m + (1 + g)(theta - m) + o` is at `theta - m = (r - m - o) / (1 + g)`, so
-    /// `|theta - r| <= (g |r - m| + o) / (1 - g)`.
     #[must_use]
     pub fn error_rad(&self, joint: usize, believed_rad: f64) -> f64 {
-        let (gain, offset_rad) = (self.gain[joint], self.offset_rad[joint]);
-        (gain * (believed_rad - self.center_rad[joint]).abs() + offset_rad) / (1.0 - gain)
-    }
-
-    /// The most that a true step may exceed a believed one: `1 / (1 - g)` of the worst gain.
-    #[must_use]
-    pub fn step_factor(&self) -> f64 {
-        1.0 / (1.0 - self.gain.iter().copied().fold(0.0, f64::max))
+        self.joints[joint].error_rad(believed_rad)
     }
 
     /// The drawing's limits less the error there: believed angles that no arm within the bounds drives into a stop.
@@ -154,18 +153,19 @@ mod tests {
     #[test]
     fn bounds_grow_with_temperature_and_time_up_to_the_datasheets() {
         let robot = titan();
-        let fresh = JointErrorBounds::calibrated(&robot, &[(Some(1e-3), Some(1e-3)); 6]);
-        let at = |age: Age| fresh.aged(&robot, age).error_rad(0, robot.sensors[0].center_rad);
+        let pivot_rad = robot.sensors[0].center_rad;
+        let mut fresh = JointErrorBounds::prior(&robot);
+        fresh.joints[0] = JointBound { pivot_rad, at_pivot_rad: 0.01, slope: 0.004 };
+        let at = |age: Age| fresh.aged(&robot, age).error_rad(0, pivot_rad);
         let (now, cold, late) = (
             at(Age::default()),
             at(Age { seconds: 0.0, warmed_k: -20.0 }),
             at(Age { seconds: 4.0 * 3600.0, warmed_k: 0.0 }),
         );
-        let gain = 1.0 / (1.0 - 4e-3);
-        assert!((cold - now - 3.0 * 20.0 * 0.00035 * gain).abs() < 1e-9, "{now} {cold}");
-        assert!((late - now - 3.0 * 2.0 * 0.00035 * gain).abs() < 1e-9, "{now} {late}");
+        assert!((cold - now - 3.0 * 20.0 * 0.00035).abs() < 1e-9, "{now} {cold}");
+        assert!((late - now - 3.0 * 2.0 * 0.00035).abs() < 1e-9, "{now} {late}");
         let worst = at(Age { seconds: 1e9, warmed_k: 1e3 });
-        assert!((worst - robot.sensors[0].offset_bound_rad * gain).abs() < 1e-9, "{worst}");
+        assert!((worst - robot.sensors[0].offset_bound_rad / 0.95).abs() < 1e-9, "{worst}");
     }
 
     /// Every true scale up to the largest, either way round, keeps the joint within the bound.
