@@ -1,10 +1,8 @@
 //! Free water between the arm and everything else, for one arm or for every arm within the joint errors.
 //!
 //! Moving shapes are the links' collision primitives; standing ones the vehicle's parts (fixed in the base frame),
-//! obstacles and the seafloor (fixed in the world; the vehicle's motion about its station is added to the margin).
+//! obstacles and the seafloor (fixed in the world; what the vehicle's motion about its station may do is added to the margin).
 //! Links closer than two joints apart cannot be told from a joint and are not tested against each other.
-
-use std::ops::Range;
 
 use nalgebra::Vector3;
 use parry3d::math::{Pose3, Vec3};
@@ -13,12 +11,16 @@ use parry3d::shape::SharedShape;
 
 use super::bounds::JointErrorBounds;
 use super::certify::{Pair, Sweep};
-use super::separation::{Placed, Shapes, gap_m, separate};
-use super::shapes::{Moving, Standing, VEHICLE_MOTION_M, pairs, vec3};
+use super::separation::{Placed, gap_m, separate};
+use super::shapes::{Moving, Standing, pairs, vec3};
+use super::stray::Stray;
+use super::timing::Timing;
 use crate::kinematics::LinkPoses;
-use crate::robot::{MAX_COLLISION_SHAPES, Robot, Vehicle, parry_pose};
+use crate::robot::{MAX_COLLISION_SHAPES, Robot, StationKeeping, Vehicle, parry_pose};
 use crate::routine::Scene;
 use crate::streams::JointAngles;
+
+mod proof;
 
 /// The closest pair and their distance.
 #[derive(Clone, Debug, PartialEq)]
@@ -43,8 +45,34 @@ pub struct ClearanceModel<'a> {
     /// Joints whose error moves a collision shape in a way that matters.
     n_error_joints: usize,
     pairs: Vec<Pair>,
+    /// Of each pair: whether it is of links that the robot's folder does not list as ever near each other.
+    is_unlisted: Vec<bool>,
     /// By how much the gripper stands out beyond its shapes, m.
     gripper_growth_m: f64,
+    sway: Sway,
+    timing: Timing,
+}
+
+/// How far the vehicle's motion about its station may move what it carries.
+struct Sway {
+    /// Of its centre of mass.
+    position_m: f64,
+    /// A metre from there.
+    attitude_rad: f64,
+    /// Base frame.
+    center_of_mass: Vec3,
+}
+
+impl Sway {
+    fn new(vehicle: &Vehicle) -> Self {
+        let StationKeeping { position_std_m, attitude_std_rad } = vehicle.station_keeping;
+        Self {
+            position_m: SWAY_SIGMAS * position_std_m,
+            attitude_rad: SWAY_SIGMAS * attitude_std_rad,
+            // The origin of the vehicle's frame.
+            center_of_mass: vec3(&vehicle.vehicle_from_base.inverse().isometry().translation.vector),
+        }
+    }
 }
 
 /// Distances beyond this are all the same to planning, m.
@@ -52,31 +80,45 @@ const FAR_M: f64 = 0.4;
 /// Shapes that touch are never clear, whatever is asked for, m.
 const TOUCHING_M: f64 = 1e-6;
 /// Links of one arm neither sway against each other nor are surveyed: they need less water than the vehicle does.
-const SELF_EASE_M: f64 = 0.03;
+pub const SELF_EASE_M: f64 = 0.03;
+/// Of the vehicle's position and attitude.
+const SWAY_SIGMAS: f64 = 3.0;
 
 impl<'a> ClearanceModel<'a> {
     #[must_use]
     pub fn new(robot: &'a Robot, vehicle: &Vehicle, scene: &Scene) -> Self {
-        let mut moving = Vec::new();
-        for (body, link) in robot.bodies.iter().enumerate() {
-            for placed in &link.collisions {
-                moving.push(Moving::new(robot, body, &link.name, placed));
-            }
-        }
+        let moving = moving(robot);
         let base_from_vehicle = *vehicle.vehicle_from_base.inverse().isometry();
         let mut standing: Vec<Standing> =
-            vehicle.parts.iter().map(|part| Standing::new(&part.name, &part.placed, &base_from_vehicle, 0.0)).collect();
+            vehicle.parts.iter().map(|part| Standing::new(&part.name, &part.placed, &base_from_vehicle)).collect();
         // The vehicle's mean pose is the world's origin, so world = vehicle here; its motion is in the margin.
         for obstacle in &scene.obstacles {
-            standing.push(Standing::new(&obstacle.name, &obstacle.placed, &base_from_vehicle, VEHICLE_MOTION_M));
+            standing.push(Standing::new(&obstacle.name, &obstacle.placed, &base_from_vehicle).of_world());
         }
         if let Some(z_m) = scene.seafloor_z_m {
             standing.push(Standing::seafloor(z_m, &base_from_vehicle));
         }
+        Self::of(robot, moving, standing, Sway::new(vehicle))
+    }
+
+    /// Nothing around the arm but itself.
+    #[must_use]
+    pub(super) fn of_arm_alone(robot: &'a Robot) -> Self {
+        let sway = Sway { position_m: 0.0, attitude_rad: 0.0, center_of_mass: Vec3::ZERO };
+        Self::of(robot, moving(robot), Vec::new(), sway)
+    }
+
+    fn of(robot: &'a Robot, moving: Vec<Moving>, standing: Vec<Standing>, sway: Sway) -> Self {
         // The last joint turns a nearly round gripper about its own axis: its error moves no outline.
         let n_error_joints = robot.chain.joints().iter().filter(|joint| joint.limits.is_some()).count();
         let pairs = pairs(&moving, &standing);
-        Self { robot, moving, standing, n_error_joints, pairs, gripper_growth_m: 0.0 }
+        let is_listed = |inner: usize, outer: usize| {
+            robot.self_pairs.as_ref().is_none_or(|stored| stored.has(moving[inner].body, moving[outer].body))
+        };
+        let is_unlisted = |pair: &Pair| matches!(*pair, Pair::Links { outer, inner } if !is_listed(inner, outer));
+        let is_unlisted = pairs.iter().map(is_unlisted).collect();
+        let timing = Timing::new(robot);
+        Self { robot, moving, standing, n_error_joints, pairs, is_unlisted, gripper_growth_m: 0.0, sway, timing }
     }
 
     /// The same with a gripper that stands out by `growth_m` more than its shapes: its jaws are open.
@@ -105,7 +147,14 @@ impl<'a> ClearanceModel<'a> {
         self.too_near_between(believed, believed, bounds, margin_m)
     }
 
-    /// The same for every arm along the straight edge between two believed poses.
+    /// A pair that the believed arm alone, without any error, brings nearer than `margin_m` on the straight edge.
+    #[must_use]
+    pub fn too_near_exactly(&self, from: &JointAngles, to: &JointAngles, margin_m: f64) -> Option<Nearest> {
+        Sweep { model: self, from: *from, to: *to, bounds: None, stray: Stray::default(), margin_m }.first_too_near()
+    }
+
+    /// The same for every arm along the straight edge between two believed poses, driven from rest to rest as [`Timing`] has
+    /// it: with what the joints stray on the way.
     #[must_use]
     pub fn too_near_between(
         &self,
@@ -114,7 +163,18 @@ impl<'a> ClearanceModel<'a> {
         bounds: &JointErrorBounds,
         margin_m: f64,
     ) -> Option<Nearest> {
-        Sweep { model: self, from: *from, to: *to, bounds, margin_m }.first_too_near()
+        self.sweep(from, to, bounds, margin_m).first_too_near()
+    }
+
+    pub(super) fn sweep<'b>(
+        &'b self,
+        from: &JointAngles,
+        to: &JointAngles,
+        bounds: &'b JointErrorBounds,
+        margin_m: f64,
+    ) -> Sweep<'b> {
+        let stray = Stray::new(self.robot, &self.timing, from, to);
+        Sweep { model: self, from: *from, to: *to, bounds: Some(bounds), stray, margin_m }
     }
 
     /// The closest pair over every arm within `bounds` whose sensors read `believed`, as far as the answer matters: its
@@ -127,21 +187,37 @@ impl<'a> ClearanceModel<'a> {
         })
     }
 
+    /// Calls `found` with the bodies (inner first) and the distance of any two links nearer than `near_m`.
+    pub(super) fn each_near_pair(&self, angles: &JointAngles, near_m: f64, mut found: impl FnMut([usize; 2], f64)) {
+        let placed = self.placed(&self.link_poses(angles));
+        for &pair in &self.pairs {
+            let Pair::Links { outer, inner } = pair else { continue };
+            let at = [&placed[outer], &placed[inner]];
+            if gap_m(&at[0].bounds, &at[1].bounds) < near_m {
+                let distance_m = separate(&self.shapes(pair), at, at[0].rough_direction(at[1])).distance_m;
+                if distance_m < near_m {
+                    found([self.moving[inner].body, self.moving[outer].body], distance_m);
+                }
+            }
+        }
+    }
+
     fn nearest_below(&self, poses: &LinkPoses, limit_m: f64) -> Nearest {
         let placed = self.placed(poses);
         let mut best_m = limit_m;
         let mut nearest = None;
-        for &pair in &self.pairs {
-            let at = [placed[pair.outer()], *self.other_placed(pair, &placed)];
-            let enough_m = self.needed_m(pair, best_m);
-            if gap_m(&at[0].bounds, &at[1].bounds) >= enough_m {
+        for (number, &pair) in self.pairs.iter().enumerate() {
+            let (outer, other) = (&placed[pair.outer()], self.other_at(pair, &placed));
+            let sway_m = if self.sways(pair) { self.sway_m(outer) } else { 0.0 };
+            let enough_m = self.needed_m(pair, best_m) + sway_m;
+            if self.never_within(number, enough_m) || gap_m(&outer.bounds, &other.bounds) >= enough_m {
                 continue;
             }
-            let (shapes, guess) = (self.shapes(pair), at[0].bounds_direction(&at[1]));
-            if guess != Vec3::ZERO && shapes.gap_along_m(&at, guess).is_some_and(|gap| gap >= enough_m) {
+            let (shapes, guess) = (self.shapes(pair), outer.rough_direction(other));
+            if guess != Vec3::ZERO && shapes.gap_along_m(outer, other, guess) >= enough_m {
                 continue;
             }
-            let distance_m = self.in_margin_m(pair, separate(&shapes, &at, guess).distance_m);
+            let distance_m = self.in_margin_m(pair, separate(&shapes, [outer, other], guess).distance_m, sway_m);
             if distance_m < best_m {
                 best_m = distance_m;
                 nearest = Some(pair);
@@ -151,7 +227,7 @@ impl<'a> ClearanceModel<'a> {
         Nearest { distance_m: best_m, first, second }
     }
 
-    pub(super) fn placed(&self, poses: &LinkPoses) -> [Placed; MAX_COLLISION_SHAPES] {
+    fn placed(&self, poses: &LinkPoses) -> [Placed; MAX_COLLISION_SHAPES] {
         let mut placed = [Placed::NOWHERE; MAX_COLLISION_SHAPES];
         for (slot, moving) in placed.iter_mut().zip(&self.moving) {
             *slot = moving.placed(poses);
@@ -186,101 +262,9 @@ impl<'a> ClearanceModel<'a> {
     }
 }
 
-/// What the proof of clearance asks of the model.
-impl ClearanceModel<'_> {
-    pub(super) fn link_poses(&self, angles: &JointAngles) -> LinkPoses {
-        self.robot.chain.link_poses(angles)
-    }
-
-    pub(super) fn pairs(&self) -> &[Pair] {
-        &self.pairs
-    }
-
-    pub(super) fn n_error_joints(&self) -> usize {
-        self.n_error_joints
-    }
-
-    /// Joints that move the pair's shapes against each other.
-    pub(super) fn joints_between(&self, pair: Pair) -> Range<usize> {
-        match pair {
-            Pair::Standing { moving, .. } => 0..self.moving[moving].body,
-            Pair::Links { outer, inner } => self.moving[inner].body..self.moving[outer].body,
-        }
-    }
-
-    /// An upper bound on the distance of a moving shape from the axis of a joint before it, m.
-    pub(super) fn lever_m(&self, shape: usize, joint: usize) -> f64 {
-        self.moving[shape].levers_m[joint]
-    }
-
-    pub(super) fn shapes(&self, pair: Pair) -> Shapes<'_> {
-        match pair {
-            Pair::Standing { moving, standing } => {
-                Shapes { outer: &self.moving[moving].shape, other: &self.standing[standing].shape }
-            }
-            Pair::Links { outer, inner } => {
-                Shapes { outer: &self.moving[outer].shape, other: &self.moving[inner].shape }
-            }
-        }
-    }
-
-    /// The pair's second shape where it is.
-    pub(super) fn other_placed<'b>(&'b self, pair: Pair, placed: &'b [Placed]) -> &'b Placed {
-        match pair {
-            Pair::Standing { standing, .. } => &self.standing[standing].placed,
-            Pair::Links { inner, .. } => &placed[inner],
-        }
-    }
-
-    pub(super) fn placed_pair(&self, pair: Pair, poses: &LinkPoses) -> [Placed; 2] {
-        match pair {
-            Pair::Standing { moving, standing } => [self.moving[moving].placed(poses), self.standing[standing].placed],
-            Pair::Links { outer, inner } => [self.moving[outer].placed(poses), self.moving[inner].placed(poses)],
-        }
-    }
-
-    /// The true distance at which a pair keeps `margin_m`.
-    pub(super) fn needed_m(&self, pair: Pair, margin_m: f64) -> f64 {
-        let needed_m = match pair {
-            Pair::Standing { standing, .. } => margin_m + self.standing[standing].motion_m,
-            Pair::Links { .. } => margin_m - SELF_EASE_M,
-        };
-        needed_m.max(TOUCHING_M) + self.growth_m(pair)
-    }
-
-    /// What open jaws take from the distance of a pair.
-    fn growth_m(&self, pair: Pair) -> f64 {
-        let is_gripper = |moving: usize| self.moving[moving].body == self.robot.tool.mount.n_joints;
-        let grows = match pair {
-            Pair::Standing { moving, .. } => is_gripper(moving),
-            Pair::Links { outer, inner } => is_gripper(outer) || is_gripper(inner),
-        };
-        if grows { self.gripper_growth_m } else { 0.0 }
-    }
-
-    /// A true distance in the terms of the margin; shapes that touch stay at zero.
-    pub(super) fn in_margin_m(&self, pair: Pair, distance_m: f64) -> f64 {
-        let distance_m = (distance_m - self.growth_m(pair)).max(0.0);
-        match pair {
-            // An obstacle inside the margin for the vehicle's motion is as near as touching.
-            Pair::Standing { standing, .. } => (distance_m - self.standing[standing].motion_m).max(0.0),
-            Pair::Links { .. } if distance_m > 0.0 => distance_m + SELF_EASE_M,
-            Pair::Links { .. } => 0.0,
-        }
-    }
-
-    fn names(&self, pair: Pair) -> (String, String) {
-        match pair {
-            Pair::Standing { moving, standing } => {
-                (self.moving[moving].name.clone(), self.standing[standing].name.clone())
-            }
-            Pair::Links { outer, inner } => (self.moving[inner].name.clone(), self.moving[outer].name.clone()),
-        }
-    }
-
-    /// The pair at a true distance.
-    pub(super) fn named(&self, pair: Pair, distance_m: f64) -> Nearest {
-        let (first, second) = self.names(pair);
-        Nearest { distance_m: self.in_margin_m(pair, distance_m), first, second }
-    }
+fn moving(robot: &Robot) -> Vec<Moving> {
+    let of_body = |(body, link): (usize, &'_ crate::robot::LinkBody)| -> Vec<Moving> {
+        link.collisions.iter().map(|placed| Moving::new(robot, body, &link.name, placed)).collect()
+    };
+    robot.bodies.iter().enumerate().flat_map(of_body).collect()
 }

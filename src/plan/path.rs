@@ -1,14 +1,14 @@
 //! Paths between poses that keep clear for every arm within the joint errors.
 //!
-//! An edge is certified, not sampled: it is free where the clearance at its middle exceeds what any point of the arm can
-//! move over half of it, else it is halved (Schwarzer, Saha and Latombe 2005). Where the straight edge is blocked, an
-//! RRT-Connect (Kuffner and LaValle 2000) looks for a way round.
+//! An edge is certified, not sampled (`certify`). The straight edge is tried first; where it is blocked, an RRT-Connect
+//! (`connect`) looks for a way round, and shortcuts make it quick. What cannot be done is said by name, with the nearest
+//! that can.
 
-use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 use super::bounds::JointErrorBounds;
-use super::clearance::ClearanceModel;
+use super::clearance::{ClearanceModel, Nearest};
+use super::connect::Connect;
 use crate::kinematics::JointLimits;
 use crate::streams::JointAngles;
 
@@ -18,10 +18,41 @@ pub struct Path {
     pub waypoints: Vec<JointAngles>,
 }
 
+/// Why there is no path.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PathError {
-    #[error("no way round was found after {tried} attempts; what blocks the straight way is {nearest}")]
-    Blocked { tried: usize, nearest: String },
+    #[error(
+        "no way round was found after {tried} attempts; what blocks the straight way is {nearest} ({distance_m:.3} m), and \
+         {free:.0} % of it are free",
+        free = 100.0 * free_share
+    )]
+    Blocked {
+        tried: usize,
+        nearest: String,
+        /// Zero: some arm within the bounds touches.
+        distance_m: f64,
+        /// How far of the straight way an edge from the start is certified, 0 to 1.
+        free_share: f64,
+    },
+    #[error("the start is too near: {distance_m:.3} m between {nearest}; {needed_m:.3} m are needed (0: in collision)")]
+    StartTooNear { nearest: String, distance_m: f64, needed_m: f64 },
+    #[error(
+        "the goal is too near: {distance_m:.3} m between {nearest}; {needed_m:.3} m are needed (0: in collision); free is the \
+         straight way up to {free:.3?} rad",
+        free = nearest_free.to_vec()
+    )]
+    GoalTooNear {
+        nearest: String,
+        distance_m: f64,
+        needed_m: f64,
+        /// On the straight line from the start, found by halving it: free itself, the way there not looked at.
+        nearest_free: JointAngles,
+    },
+    #[error(
+        "the goal turns joint {joint} to {angle_rad:.3} rad; for every arm within the sensors' error to stay off its stops, \
+         {lower_rad:.3} to {upper_rad:.3} rad are left"
+    )]
+    GoalBeyondLimits { joint: usize, angle_rad: f64, lower_rad: f64, upper_rad: f64 },
 }
 
 /// Plans paths under one belief.
@@ -35,8 +66,12 @@ pub struct PathPlanner<'a> {
     pub max_samples: usize,
 }
 
-/// Longest step by which a tree grows, rad.
-const STEP_RAD: f64 = 0.35;
+/// Halvings of the straight way when an error names the nearest that works.
+const HALVINGS: u32 = 8;
+/// Places on the straight way where an error looks for what is nearest.
+const PLACES: u32 = 20;
+/// Angles this near a limit are within it, rad.
+const ROUNDING_RAD: f64 = 1e-9;
 
 impl PathPlanner<'_> {
     /// Whether every arm within the bounds keeps the margin at `angles`.
@@ -48,115 +83,88 @@ impl PathPlanner<'_> {
     /// Whether every arm within the bounds keeps the margin along the straight edge.
     #[must_use]
     pub fn is_edge_free(&self, from: &JointAngles, to: &JointAngles) -> bool {
-        self.clearance.too_near_between(from, to, self.bounds, self.margin_m).is_none()
+        self.clearance.sweep(from, to, self.bounds, self.margin_m).verdict().too_near.is_none()
     }
 
-    /// A path from `from` to `to`, both of which must be free.
+    /// A path from `from` to `to`.
     ///
     /// # Errors
-    /// [`PathError::Blocked`] when none was found within the budget of samples.
+    /// [`PathError`]: start or goal are too near or out of range, or no path was found within the budget.
     pub fn plan(&self, from: &JointAngles, to: &JointAngles, rng: &mut ChaCha8Rng) -> Result<Path, PathError> {
+        self.check_limits(from, to)?;
         if self.is_edge_free(from, to) {
             return Ok(Path { waypoints: vec![*from, *to] });
         }
-        let mut trees = [Tree::rooted(*from), Tree::rooted(*to)];
-        for attempt in 0..self.max_samples {
-            let sample = JointAngles::from_fn(from.len(), |j| {
-                let limits = self.limits[j];
-                if from[j] == to[j] { from[j] } else { rng.random_range(limits.lower_rad..=limits.upper_rad) }
-            });
-            let grow = attempt % 2;
-            let Some(new) = self.extend(&mut trees[grow], &sample) else { continue };
-            let target = trees[grow].nodes[new].0;
-            if let Some(other) = self.connect(&mut trees[1 - grow], &target) {
-                let (first, second) = if grow == 0 { (new, other) } else { (other, new) };
-                let mut waypoints = trees[0].branch(first);
-                waypoints.reverse();
-                waypoints.extend(trees[1].branch(second));
-                return Ok(Path { waypoints: self.shortened(waypoints) });
-            }
-        }
-        let nearest = self.first_block(from, to);
-        Err(PathError::Blocked { tried: self.max_samples, nearest })
-    }
-
-    fn extend(&self, tree: &mut Tree, target: &JointAngles) -> Option<usize> {
-        let near = tree.nearest(target);
-        let from = tree.nodes[near].0;
-        let scale = (STEP_RAD / from.max_abs_difference(target).max(1e-9)).min(1.0);
-        let to = JointAngles::from_fn(from.len(), |j| from[j] + scale * (target[j] - from[j]));
-        (self.is_free(&to) && self.is_edge_free(&from, &to)).then(|| tree.add(to, near))
-    }
-
-    /// Grows `tree` straight towards `target` until it gets there (its node) or is stopped (`None`).
-    fn connect(&self, tree: &mut Tree, target: &JointAngles) -> Option<usize> {
-        loop {
-            let new = self.extend(tree, target)?;
-            if tree.nodes[new].0.max_abs_difference(target) < 1e-9 {
-                return Some(new);
-            }
+        self.check_ends(from, to)?;
+        let mut connect = Connect::new(self, from, to);
+        match connect.search(rng) {
+            Some(waypoints) => Ok(Path { waypoints: connect.shortened(waypoints, rng) }),
+            None => Err(self.blocked(from, to, connect.n_tried())),
         }
     }
 
-    /// Leaves out waypoints while the straight edge across stays certified.
-    fn shortened(&self, waypoints: Vec<JointAngles>) -> Vec<JointAngles> {
-        let mut short = vec![waypoints[0]];
-        let mut at = 0;
-        while at + 1 < waypoints.len() {
-            let mut next = at + 1;
-            for far in (at + 2..waypoints.len()).rev() {
-                if self.is_edge_free(&waypoints[at], &waypoints[far]) {
-                    next = far;
-                    break;
-                }
+    /// A goal may be beyond what is safe only where the start is farther beyond.
+    fn check_limits(&self, from: &JointAngles, to: &JointAngles) -> Result<(), PathError> {
+        for (joint, limits) in self.limits.iter().enumerate().take(self.clearance.n_error_joints()) {
+            let JointLimits { lower_rad, upper_rad } = *limits;
+            let beyond_rad = |angle: f64| (lower_rad - angle).max(angle - upper_rad);
+            if beyond_rad(to[joint]) > beyond_rad(from[joint]).max(0.0) + ROUNDING_RAD {
+                return Err(PathError::GoalBeyondLimits { joint, angle_rad: to[joint], lower_rad, upper_rad });
             }
-            short.push(waypoints[next]);
-            at = next;
         }
-        short
+        Ok(())
     }
 
-    fn first_block(&self, from: &JointAngles, to: &JointAngles) -> String {
-        let steps = 40;
-        (0..=steps)
-            .map(|k| {
-                JointAngles::from_fn(from.len(), |j| from[j] + (to[j] - from[j]) * f64::from(k) / f64::from(steps))
-            })
+    fn check_ends(&self, from: &JointAngles, to: &JointAngles) -> Result<(), PathError> {
+        let too_near = |at: &JointAngles| self.clearance.too_near(at, self.bounds, self.margin_m);
+        if let Some(found) = too_near(from) {
+            let (nearest, distance_m) = (found.to_string(), found.distance_m);
+            return Err(PathError::StartTooNear { nearest, distance_m, needed_m: self.margin_m });
+        }
+        let Some(found) = too_near(to) else { return Ok(()) };
+        let free_share = halved(|share| too_near(&between(from, to, share)).is_none());
+        Err(PathError::GoalTooNear {
+            nearest: found.to_string(),
+            distance_m: found.distance_m,
+            needed_m: self.margin_m,
+            nearest_free: between(from, to, free_share),
+        })
+    }
+
+    fn blocked(&self, from: &JointAngles, to: &JointAngles, tried: usize) -> PathError {
+        let places = (0..=PLACES).map(|k| between(from, to, f64::from(k) / f64::from(PLACES)));
+        let nearest: Option<Nearest> = places
             .filter_map(|angles| self.clearance.too_near(&angles, self.bounds, self.margin_m))
             .min_by(|a, b| a.distance_m.total_cmp(&b.distance_m))
-            .map_or_else(String::new, |nearest| nearest.to_string())
-    }
-}
-
-struct Tree {
-    /// Angles and parent.
-    nodes: Vec<(JointAngles, usize)>,
-}
-
-impl Tree {
-    fn rooted(root: JointAngles) -> Self {
-        Self { nodes: vec![(root, 0)] }
-    }
-
-    fn add(&mut self, angles: JointAngles, parent: usize) -> usize {
-        self.nodes.push((angles, parent));
-        self.nodes.len() - 1
-    }
-
-    fn nearest(&self, target: &JointAngles) -> usize {
-        let distance =
-            |angles: &JointAngles| angles.iter().zip(target.iter()).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
-        let by_distance = |a: &usize, b: &usize| distance(&self.nodes[*a].0).total_cmp(&distance(&self.nodes[*b].0));
-        (0..self.nodes.len()).min_by(by_distance).unwrap_or(0)
-    }
-
-    /// From a node to the root.
-    fn branch(&self, mut node: usize) -> Vec<JointAngles> {
-        let mut branch = vec![self.nodes[node].0];
-        while node != 0 {
-            node = self.nodes[node].1;
-            branch.push(self.nodes[node].0);
+            // Between the places, or by what the joints stray on the way.
+            .or_else(|| self.clearance.too_near_between(from, to, self.bounds, self.margin_m));
+        PathError::Blocked {
+            tried,
+            distance_m: nearest.as_ref().map_or(self.margin_m, |found| found.distance_m),
+            nearest: nearest.map_or_else(String::new, |found| found.to_string()),
+            free_share: halved(|share| self.is_edge_free(from, &between(from, to, share))),
         }
-        branch
     }
 }
+
+/// A place on the straight way.
+pub(super) fn between(from: &JointAngles, to: &JointAngles, share: f64) -> JointAngles {
+    JointAngles::from_fn(from.len(), |j| if from[j] == to[j] { from[j] } else { from[j] + share * (to[j] - from[j]) })
+}
+
+/// The largest share found for which `holds`, by halving between 0, where it does, and 1, where it does not.
+fn halved(holds: impl Fn(f64) -> bool) -> f64 {
+    let (mut low, mut high) = (0.0, 1.0);
+    for _ in 0..HALVINGS {
+        let middle = 0.5 * (low + high);
+        if holds(middle) {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    low
+}
+
+#[cfg(test)]
+mod tests;

@@ -38,14 +38,11 @@ fn random_angles(robot: &Robot, bounds: &JointErrorBounds, rng: &mut ChaCha8Rng)
 
 /// The datasheet's bounds, and those after three calibrations: none of the joints, all but one, all.
 fn several_bounds(robot: &Robot) -> Vec<JointErrorBounds> {
-    let good = (Some(1e-3), Some(1e-3));
-    let mut all_but_one = vec![good; robot.n_joints()];
-    all_but_one[1] = (None, None);
-    vec![
-        JointErrorBounds::prior(robot),
-        JointErrorBounds::calibrated(robot, &all_but_one),
-        JointErrorBounds::calibrated(robot, &vec![good; robot.n_joints()]),
-    ]
+    let prior = JointErrorBounds::prior(robot);
+    let all = JointErrorBounds::alike(robot, 0.014, 0.004);
+    let mut all_but_one = all.clone();
+    all_but_one.joints[1] = prior.joints[1];
+    vec![prior, all_but_one, all]
 }
 
 /// Any arm within the bounds.
