@@ -22,14 +22,17 @@ pub struct VisibilityModel {
 
 impl Default for VisibilityModel {
     fn default() -> Self {
-        // A 0.15 m tag 2 m away spans 29 px: below that corners suffer. Beyond 65 deg it is foreshortened to 0.4.
-        Self { max_range_m: 2.0, min_range_m: 0.25, max_incidence_rad: 1.13, edge_rad: 0.1, border_px: 12.0 }
+        Self::USUAL
     }
 }
 
 impl VisibilityModel {
+    /// A 0.15 m tag 2 m away spans 29 px: below that corners suffer. Beyond 65 deg it is foreshortened to 0.4.
+    pub const USUAL: Self =
+        Self { max_range_m: 2.0, min_range_m: 0.25, max_incidence_rad: 1.13, edge_rad: 0.1, border_px: 12.0 };
+
     /// Indices of the surveyed tags that `robot` at `angles` sees, occlusion not yet considered.
-    pub fn in_view<'a>(&'a self, robot: &'a Robot, poses: &LinkPoses) -> impl Iterator<Item = usize> + 'a {
+    pub fn in_view<'a>(&'a self, robot: &'a Robot, poses: &LinkPoses) -> impl Iterator<Item = usize> + use<'a> {
         let base_from_camera = poses.frame(&robot.camera.mount);
         let camera_from_base = base_from_camera.inverse();
         let eye = base_from_camera.translation.vector;
