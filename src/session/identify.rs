@@ -2,6 +2,7 @@
 //! scale, then a larger one that is safe for the scales that are left.
 
 use super::SessionError;
+use super::motion::Followed;
 use super::script::Run;
 use crate::calib::{IdentifiedScale, associate, identify_scales};
 use crate::plan::{JointErrorBounds, Path, UnknownScale};
@@ -94,11 +95,11 @@ impl Run<'_, '_> {
         for offset_rad in offsets_rad {
             let to = JointAngles::from_fn(rest.len(), |j| if j == joint { rest[j] + offset_rad } else { rest[j] });
             let from = self.driver.set_point();
-            self.driver.follow(&Path { waypoints: vec![from, to] })?;
-            if self.driver.settle()? {
+            let is_there = self.driver.follow(&Path { waypoints: vec![from, to] })? == Followed::Arrived;
+            if is_there && self.driver.settle()? {
                 self.driver.dwell(DWELL_S, MarkKind::Identify { joint_idx: joint as u32 })?;
             } else {
-                self.driver.log(LogLevel::Warn, "a view is left out: the arm did not settle")?;
+                self.driver.log(LogLevel::Warn, "a view is left out: the arm did not come there or did not settle")?;
             }
         }
         Ok(())

@@ -1,21 +1,28 @@
 //! BELIEF: the closed loop, a routine's script carried out on any [`Arm`].
 //!
-//! It knows the arm only through its messages. `script` goes through the steps, `reach` and `capture` plan and move for
-//! them, `grip` moves the jaws, `identify` measures a sensor's unknown scale, `stops` presses joints against their end stops, `motion` drives and waits until `stillness` says that the arm stands, `recorder` keeps every message,
+//! It knows the arm only through its messages. `script` goes through the steps after `prepare` planned what can be planned; `reach`
+//! and `capture` plan and move for them, `running` renews the belief between views, `grip` moves the jaws, `identify` measures a
+//! sensor's unknown scale, `stops` presses joints against their end stops. `motion` drives, waits until `stillness` says that the
+//! arm stands, and backs out when `bump` says that it has met something; `approval` asks an operator before a motion. `recorder`
+//! keeps every message,
 //! `outcome` is what is left when it is over; `Progress` tells whoever watches.
 
+mod approval;
+mod bump;
 mod capture;
 mod grip;
 mod identify;
 mod motion;
 mod outcome;
+mod prepare;
 mod reach;
 mod recorder;
+mod running;
 mod script;
 mod stillness;
 mod stops;
 
-pub use outcome::{AssertResult, Epoch, Outcome, ReachStep};
+pub use outcome::{AssertResult, Epoch, Outcome, ReachStep, Renewal, Visit};
 pub use recorder::Recorder;
 
 use crate::calib::CalibError;
@@ -23,7 +30,7 @@ use crate::log::LogError;
 use crate::plan::PlanError;
 use crate::robot::{Robot, Vehicle};
 use crate::routine::Routine;
-use crate::streams::{Arm, ArmError, Phase};
+use crate::streams::{Arm, ArmError, JointAngles, Phase};
 
 /// Why a run broke off.
 #[derive(Debug, thiserror::Error)]
@@ -64,6 +71,42 @@ pub trait Progress {
     fn stop_requested(&self) -> bool {
         false
     }
+
+    /// Whether [`Self::approve`] is to be asked before each motion.
+    fn wants_to_approve(&self) -> bool {
+        false
+    }
+
+    /// What the operator says to the motion that comes next; asked again after each [`Approval::Hold`].
+    fn approve(&mut self, ahead: &MotionAhead) -> Approval {
+        let _ = ahead;
+        Approval::Approve
+    }
+}
+
+/// A motion that is planned and not begun.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MotionAhead {
+    pub joints: Vec<String>,
+    /// Believed.
+    pub from: JointAngles,
+    pub to: JointAngles,
+    /// Straight edges on the way.
+    pub edges: usize,
+    pub duration_s: f64,
+    /// Of every arm within the error bounds, proven, beyond what the vehicle's motion takes; `None` where it was proven in
+    /// another way (a sensor's scale is measured, a stop is driven to).
+    pub clearance_m: Option<f64>,
+}
+
+/// What an operator says to a motion.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Approval {
+    Approve,
+    /// The arm waits where it is, and asks again.
+    Hold,
+    /// The session ends here, with its recording kept; the text says why.
+    Abort(String),
 }
 
 /// All that a run needs to know beforehand.

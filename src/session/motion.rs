@@ -1,8 +1,9 @@
-//! Drives an arm along believed angles and waits until its own sensors say that it stands.
+//! Drives an arm along believed angles and waits until its own sensors say that it stands, or that it has met something.
 
+use super::bump::{Bump, BumpWatch};
 use super::stillness::Stillness;
-use super::{Progress, Recorder, SessionError};
-use crate::plan::Path;
+use super::{MotionAhead, Progress, Recorder, SessionError};
+use crate::plan::{Path, Timing};
 use crate::robot::{FailedJoint, Robot, Vehicle};
 use crate::routine::TaskSettings;
 use crate::sensor::{ArmSensors, Conditions};
@@ -25,12 +26,27 @@ pub(super) struct Driver<'b> {
     ticks: u64,
     pub motion_s: f64,
     pub waited_s: f64,
+    timing: Timing,
+    bumps: BumpWatch,
+    /// The last motion's waypoints, for the way back.
+    came: Vec<JointAngles>,
 }
 
-/// Share of a joint's rate that set-points use; the rest is left to the controller.
-const RATE_SHARE: f64 = 0.7;
-/// Set-points follow a cubic from rest to rest, whose peak rate is 1.5 times its mean.
-const CUBIC_PEAK: f64 = 1.5;
+/// How a motion ended.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[must_use]
+pub enum Followed {
+    Arrived,
+    /// The joint was held up or pushed off; the arm has gone back the way it came.
+    Bumped {
+        joint: usize,
+        /// Where the arm believed to be when it stopped.
+        at: JointAngles,
+    },
+}
+
+/// Backing out takes so many times as long as coming did.
+const BACK_OUT_SLOWNESS: f64 = 2.5;
 /// The arm counts as settled when it has stood for this long, s.
 const REST_S: f64 = 0.4;
 /// A long wait is asked at this distance whether it shall go on, s.
@@ -38,6 +54,19 @@ const WAIT_STRIDE_S: f64 = 600.0;
 const SETTLE_LIMIT_S: f64 = 12.0;
 /// Believed angles and commands are recorded each so many control periods.
 const BELIEF_EVERY: u64 = 4;
+
+/// What is looked out for on the way.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Heed {
+    Bumps,
+    Nothing,
+}
+
+/// How waiting for rest ended.
+enum Stood {
+    Still,
+    PushedOff(Bump),
+}
 
 impl<'b> Driver<'b> {
     pub fn new(
@@ -53,8 +82,22 @@ impl<'b> Driver<'b> {
         let counts = recorder.latest_counts.ok_or(SessionError::NoReadings)?;
         // Sensors that begin are the datasheet's, the same under all conditions.
         let set_point = sensors.angles(&counts);
-        let mut driver =
-            Self { robot, arm, recorder, sensors, progress, start, set_point, ticks: 0, motion_s: 0.0, waited_s: 0.0 };
+        let (timing, bumps) = (Timing::new(robot), BumpWatch::new(robot, arm.period_s()));
+        let mut driver = Self {
+            robot,
+            arm,
+            recorder,
+            sensors,
+            progress,
+            start,
+            set_point,
+            ticks: 0,
+            motion_s: 0.0,
+            waited_s: 0.0,
+            timing,
+            bumps,
+            came: vec![set_point],
+        };
         driver.command()?;
         Ok(driver)
     }
@@ -175,7 +218,7 @@ impl<'b> Driver<'b> {
     }
 
     /// Tells the arm to stay where it was last sent, and the recording why it ends here.
-    fn interrupt(&mut self) -> Result<SessionError, SessionError> {
+    pub(super) fn interrupt(&mut self) -> Result<SessionError, SessionError> {
         self.command()?;
         let (stamp, at_s) = (self.arm.now(), self.elapsed_s());
         let counts = self.set_point_counts();
@@ -184,40 +227,136 @@ impl<'b> Driver<'b> {
         Ok(SessionError::Interrupted { at_s })
     }
 
-    /// Moves along the path, from rest to rest on each edge.
-    pub fn follow(&mut self, path: &Path) -> Result<(), SessionError> {
-        for pair in path.waypoints.windows(2) {
-            let (from, to) = (pair[0], pair[1]);
-            let slowest = |(joint, (a, b)): (usize, (&f64, &f64))| {
-                (b - a).abs() / (RATE_SHARE * self.robot.sensors[joint].max_rate_rad_s)
-            };
-            let duration_s = CUBIC_PEAK * from.iter().zip(to.iter()).enumerate().map(slowest).fold(0.0, f64::max);
-            let steps = (duration_s / self.arm.period_s()).ceil().max(1.0);
-            for k in 1..=steps as u64 {
-                let u = k as f64 / steps;
-                let share = u * u * (3.0 - 2.0 * u);
-                self.set_point = JointAngles::from_fn(from.len(), |j| from[j] + share * (to[j] - from[j]));
-                self.command()?;
-                self.step()?;
-            }
-            self.motion_s += steps * self.arm.period_s();
+    /// What [`Self::follow`] would do.
+    pub(super) fn ahead(&self, path: &Path, clearance_m: Option<f64>) -> MotionAhead {
+        MotionAhead {
+            joints: self.robot.joint_names(),
+            from: self.set_point,
+            to: path.waypoints.last().copied().unwrap_or(self.set_point),
+            edges: path.waypoints.len().saturating_sub(1),
+            duration_s: self.timing.path_duration_s(path),
+            clearance_m,
+        }
+    }
+
+    /// Stays for a while.
+    pub(super) fn hold(&mut self, seconds: f64) -> Result<(), SessionError> {
+        let until = self.arm.now().plus_s(seconds);
+        while self.arm.now() < until {
+            self.step()?;
         }
         Ok(())
     }
 
-    /// Waits until the arm stands at its set-point; `false` when it does not within the limit.
+    /// Moves along the path, from rest to rest on each edge, unless it meets something: then it stops, and backs out.
+    pub fn follow(&mut self, path: &Path) -> Result<Followed, SessionError> {
+        self.follow_told(path, None)
+    }
+
+    /// The same, with the path's clearance for an operator who is asked.
+    pub fn follow_told(&mut self, path: &Path, clearance_m: Option<f64>) -> Result<Followed, SessionError> {
+        self.ask(path, clearance_m)?;
+        for (n, edge) in path.waypoints.windows(2).enumerate() {
+            if let Some(bump) = self.follow_edge(edge[0], edge[1], 1.0, Heed::Bumps)? {
+                self.came = path.waypoints[..=n].to_vec();
+                return self.retreat(bump);
+            }
+            self.bumps.learn();
+        }
+        self.came.clone_from(&path.waypoints);
+        Ok(Followed::Arrived)
+    }
+
+    /// The same where a joint is meant to be held up: it is driven against its stop, or comes from there.
+    pub fn follow_unheeding(&mut self, path: &Path) -> Result<(), SessionError> {
+        self.ask(path, None)?;
+        for edge in path.waypoints.windows(2) {
+            self.follow_edge(edge[0], edge[1], 1.0, Heed::Nothing)?;
+        }
+        self.bumps.forget();
+        self.came.clone_from(&path.waypoints);
+        Ok(())
+    }
+
+    fn follow_edge(
+        &mut self,
+        from: JointAngles,
+        to: JointAngles,
+        slowness: f64,
+        heed: Heed,
+    ) -> Result<Option<Bump>, SessionError> {
+        let duration_s = slowness * self.timing.edge_duration_s(&from, &to);
+        let steps = (duration_s / self.arm.period_s()).ceil().max(1.0);
+        for k in 1..=steps as u64 {
+            self.set_point = Timing::set_point(&from, &to, k as f64 / steps);
+            self.command()?;
+            self.step()?;
+            if heed == Heed::Bumps
+                && let Some(bump) = self.bumps.update(&self.set_point, &self.believed_angles()?)
+            {
+                self.motion_s += k as f64 * self.arm.period_s();
+                return Ok(Some(bump));
+            }
+        }
+        self.motion_s += steps * self.arm.period_s();
+        Ok(None)
+    }
+
+    /// Stops where the arm is and goes back the way it came, slowly.
+    fn retreat(&mut self, bump: Bump) -> Result<Followed, SessionError> {
+        let Bump { joint, behind_rad, allowed_rad } = bump;
+        let at = self.believed_angles()?;
+        self.set_point = at;
+        self.command()?;
+        let text = format!(
+            "bump: {} is {behind_rad:.3} rad from its set-point, {allowed_rad:.3} rad would still be usual; the arm stops and \
+             backs out along the path it came",
+            self.robot.sensors[joint].joint
+        );
+        self.log(LogLevel::Warn, &text)?;
+        let mut from = at;
+        for to in std::mem::take(&mut self.came).into_iter().rev() {
+            self.follow_edge(from, to, BACK_OUT_SLOWNESS, Heed::Nothing)?;
+            from = to;
+        }
+        self.came = vec![from];
+        self.bumps.forget();
+        if self.stand()?.is_none() {
+            self.log(LogLevel::Warn, "the arm did not settle after it had backed out")?;
+        }
+        Ok(Followed::Bumped { joint, at })
+    }
+
+    /// Waits until the arm stands at its set-point; `false` when it does not within the limit, or is pushed off: then it goes
+    /// back the way it came.
     pub fn settle(&mut self) -> Result<bool, SessionError> {
+        match self.stand()? {
+            Some(Stood::Still) => Ok(true),
+            Some(Stood::PushedOff(bump)) => {
+                let _ = self.retreat(bump)?;
+                Ok(false)
+            }
+            None => Ok(false),
+        }
+    }
+
+    /// Waits until the arm stands at its set-point, or is pushed off it; `None` when neither comes within the limit.
+    fn stand(&mut self) -> Result<Option<Stood>, SessionError> {
         let mut stillness = Stillness::new(self.believed_angles()?);
         let mut waited_s = 0.0;
         while waited_s < SETTLE_LIMIT_S {
             self.step()?;
             waited_s += self.arm.period_s();
             let now = self.believed_angles()?;
+            if let Some(bump) = self.bumps.update(&self.set_point, &now) {
+                return Ok(Some(Stood::PushedOff(bump)));
+            }
             if stillness.update(&now, &self.set_point, self.arm.period_s()) >= REST_S {
-                return Ok(true);
+                self.bumps.learn();
+                return Ok(Some(Stood::Still));
             }
         }
-        Ok(false)
+        Ok(None)
     }
 
     /// Waits until the arm stands while `joint` is pressed against something; `false` when it does not within the limit.
@@ -241,6 +380,7 @@ impl<'b> Driver<'b> {
     pub fn dwell(&mut self, seconds: f64, kind: MarkKind) -> Result<usize, SessionError> {
         let start = self.arm.now();
         self.recorder.tags_seen = 0;
+        self.recorder.ids_seen.clear();
         let steps = (seconds / self.arm.period_s()).ceil() as u64;
         self.arm.look(true);
         for _ in 0..steps {

@@ -2,7 +2,7 @@
 
 use crate::calib::Calibration;
 use crate::sensor::ArmSensors;
-use crate::streams::ReachAttempt;
+use crate::streams::{JointAngles, ReachAttempt};
 use crate::time::Stamp;
 
 /// What came out.
@@ -25,6 +25,11 @@ pub struct Outcome {
     pub calibration_wall_s: f64,
     /// What the arm believed, since when.
     pub epochs: Vec<Epoch>,
+    /// Captured views, in their order.
+    pub visits: Vec<Visit>,
+    pub renewals: Vec<Renewal>,
+    /// Why the last capture took no more views.
+    pub capture_ended: Option<String>,
     pub reaches: Vec<ReachStep>,
     pub asserts: Vec<AssertResult>,
     /// Why the script ended before its last step.
@@ -38,6 +43,31 @@ pub struct Epoch {
     pub sensors: ArmSensors,
     /// Where they come from; `None` for the datasheet.
     pub calibration: Option<Calibration>,
+}
+
+/// A captured view, and what was believed just before it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Visit {
+    pub at: Stamp,
+    pub believed: JointAngles,
+    /// Views that this belief rests on.
+    pub belief_views: usize,
+    /// Of the end of each link, from the first joint's on: the distance from where it is believed to be that is exceeded with a
+    /// probability of 1 %, m.
+    pub link_q99_m: Vec<f64>,
+    /// Root mean square over the task, m.
+    pub expected_tool_error_m: Option<f64>,
+    pub tags_expected: f64,
+}
+
+/// A renewal of the belief while views were captured.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Renewal {
+    pub views: usize,
+    /// Since the capture began.
+    pub elapsed_s: f64,
+    /// Root mean square over the task, m.
+    pub expected_tool_error_m: f64,
 }
 
 /// One `reach` step.

@@ -1,5 +1,7 @@
 //! Keeps every message and remembers the latest of those that the loop steers by.
 
+use std::collections::BTreeSet;
+
 use crate::log::{LogError, Recording, RecordingWriter, read_recording};
 use crate::streams::{JointCounts, MarkKind, Message, Sink, SinkError, Thermometer};
 use crate::time::Stamp;
@@ -16,12 +18,22 @@ pub struct Recorder {
     pub(super) opening_m: Option<f64>,
     /// Tags seen since it was last set to zero.
     pub(super) tags_seen: usize,
+    /// Which they were.
+    pub(super) ids_seen: BTreeSet<u32>,
 }
 
 impl Recorder {
     #[must_use]
     pub fn new(writer: RecordingWriter) -> Self {
-        Self { writer, latest_counts: None, oil_c: None, pressure_pa: None, opening_m: None, tags_seen: 0 }
+        Self {
+            writer,
+            latest_counts: None,
+            oil_c: None,
+            pressure_pa: None,
+            opening_m: None,
+            tags_seen: 0,
+            ids_seen: BTreeSet::new(),
+        }
     }
 
     /// The recording so far, read from its bytes on disk.
@@ -48,7 +60,10 @@ impl Sink for Recorder {
             }
             Message::Pressure(sample) => self.pressure_pa = Some(sample.pressure_pa),
             Message::Gripper(sample) => self.opening_m = Some(sample.opening_m),
-            Message::Detections(detections) => self.tags_seen += detections.tags.len(),
+            Message::Detections(detections) => {
+                self.tags_seen += detections.tags.len();
+                self.ids_seen.extend(detections.tags.iter().map(|tag| tag.id));
+            }
             _ => {}
         }
         self.writer.record(log_time, message)?;

@@ -2,15 +2,15 @@
 
 use rand_chacha::ChaCha8Rng;
 
-use super::motion::Driver;
-use super::outcome::{AssertResult, Epoch, Outcome, ReachStep};
+use super::motion::{Driver, Followed};
+use super::outcome::{AssertResult, Epoch, Outcome, ReachStep, Renewal, Visit};
+use super::prepare::Planned;
+use super::running::Before;
 use super::{Progress, Recorder, SessionError, Setup};
 use crate::calib::{Calibration, CalibrationFileError, Status, calibrate};
-use crate::plan::{
-    Age, ClearanceModel, JointErrorBounds, PathPlanner, PlanError, PosePlan, TargetRequest, plan_targets,
-};
+use crate::plan::{Age, ClearanceModel, JointErrorBounds, LeastClearance, PathPlanner};
 use crate::robot::Robot;
-use crate::routine::{AssertLimits, CalibrateSettings, CalibrateViews, CaptureSettings, MoveGoal, OnRefusal, Step};
+use crate::routine::{AssertLimits, CalibrateSettings, CalibrateViews, MoveGoal, OnRefusal, Step};
 use crate::sensor::ArmSensors;
 use crate::stats::stream_rng;
 use crate::streams::{Arm, JointAngles, LogLevel, Mark, MarkKind, Message, Phase, ReachAttempt, Start};
@@ -41,6 +41,7 @@ pub(super) fn run(
         robot: setup.robot.clone(),
         bounds: JointErrorBounds::prior(setup.robot),
         fresh: None,
+        before_running: None,
         rng: stream_rng(setup.seed, "plan"),
         clearance: &clearance,
         jaws: Jaws { at_rest: &clearance, open: &open_clearance },
@@ -49,12 +50,17 @@ pub(super) fn run(
         views_since: began,
         poses_marked: 0,
         calibration: None,
+        accepted: None,
+        visits: Vec::new(),
+        renewals: Vec::new(),
+        capture_ended: None,
         tally: Tally::default(),
         epochs: vec![Epoch { from: began, sensors, calibration: None }],
         reaches: Vec::new(),
         asserts: Vec::new(),
         driver,
     };
+    run.bounds = run.kept_clear(JointErrorBounds::prior(setup.robot));
     // A script that begins by measuring a sensor cannot plan before it has.
     if !setup.routine.steps.iter().any(|step| matches!(step, Step::Identify(_))) {
         run.prepare()?;
@@ -74,18 +80,10 @@ pub(super) struct Tally {
 }
 
 /// Bounds of a calibration, and when and how warm it was.
-struct FreshBounds {
-    bounds: JointErrorBounds,
-    at: Stamp,
-    oil_c: Option<f64>,
-}
-
-/// What was planned before anything moved.
-pub(super) struct Planned {
-    /// Believed angles at each of the task's targets.
-    pub targets: Vec<JointAngles>,
-    /// For the first capture, if the sensors are still believed to be the datasheet's by then.
-    pub first_capture: Option<PosePlan>,
+pub(super) struct FreshBounds {
+    pub bounds: JointErrorBounds,
+    pub at: Stamp,
+    pub oil_c: Option<f64>,
 }
 
 /// The arm among what surrounds it, by its jaws.
@@ -101,7 +99,9 @@ pub(super) struct Run<'a, 'b> {
     /// How wrong the sensors believed in may be by now.
     pub bounds: JointErrorBounds,
     /// And how wrong they were when they were new: none for a datasheet's, which hold for good.
-    fresh: Option<FreshBounds>,
+    pub fresh: Option<FreshBounds>,
+    /// While views are being captured: what was believed before.
+    pub before_running: Option<Before>,
     pub rng: ChaCha8Rng,
     /// With the jaws as they are now.
     pub clearance: &'a ClearanceModel<'a>,
@@ -110,10 +110,16 @@ pub(super) struct Run<'a, 'b> {
     pub planned: Option<Planned>,
     began: Stamp,
     /// Views captured from here on have been in no calibration.
-    views_since: Stamp,
+    pub views_since: Stamp,
     /// Views marked so far; numbers them.
     pub poses_marked: u32,
     calibration: Option<Calibration>,
+    /// The last one that was accepted.
+    pub accepted: Option<Calibration>,
+    /// Captured views and what was believed there.
+    pub visits: Vec<Visit>,
+    pub renewals: Vec<Renewal>,
+    pub capture_ended: Option<String>,
     pub tally: Tally,
     pub epochs: Vec<Epoch>,
     reaches: Vec<ReachStep>,
@@ -136,34 +142,6 @@ impl Run<'_, '_> {
             None => ReachAttempt::Before,
             Some(_) => ReachAttempt::After,
         }
-    }
-
-    /// Plans all that can be planned, so that a task that cannot be done is refused before anything moves.
-    pub fn prepare(&mut self) -> Result<(), SessionError> {
-        let routine = self.setup.routine;
-        let margin_m = self.margin_m();
-        let start = self.driver.believed_angles()?;
-        self.progress_at(Phase::Plan, 0, 2);
-        let nearest = self.clearance.nearest_under(&start, &self.bounds, margin_m);
-        if nearest.distance_m < margin_m {
-            let clearance_m = nearest.distance_m;
-            return Err(
-                PlanError::StartTooClose { clearance_m, nearest: nearest.to_string(), needed_m: margin_m }.into()
-            );
-        }
-        let request = TargetRequest { targets_m: &routine.task.targets_m, preferred: None, margin_m };
-        let planned = plan_targets(&self.robot, self.clearance_at_targets(), &self.bounds, &request, &mut self.rng);
-        let targets = planned.into_iter().collect::<Result<Vec<_>, _>>()?;
-        self.planned = Some(Planned { targets, first_capture: None });
-        self.progress_at(Phase::Plan, 1, 2);
-        if let Some(capture) = first_capture(&routine.steps) {
-            let plan = self.plan_views(capture)?;
-            self.planned = self.planned.take().map(|planned| Planned { first_capture: Some(plan), ..planned });
-        }
-        self.driver.record_task(&routine.task)?;
-        self.driver.record_failed(&self.setup.robot.failed)?;
-        self.progress_at(Phase::Plan, 2, 2);
-        Ok(())
     }
 
     /// Carries out the steps; gives why it stopped before the last, if it did.
@@ -218,6 +196,9 @@ impl Run<'_, '_> {
             waited_s: self.driver.waited_s,
             calibration_wall_s: self.tally.calibration_wall_s,
             epochs: self.epochs,
+            visits: self.visits,
+            renewals: self.renewals,
+            capture_ended: self.capture_ended,
             reaches: self.reaches,
             asserts: self.asserts,
             stopped,
@@ -248,8 +229,10 @@ impl Run<'_, '_> {
         }
         match planner.plan(&from, to, &mut self.rng) {
             Ok(path) => {
-                self.driver.follow(&path)?;
-                Ok(true)
+                let asks = self.driver.progress.wants_to_approve();
+                let least = || LeastClearance::along(self.clearance, &self.bounds, &path, planner.margin_m);
+                let clearance_m = asks.then(|| least().proven_m);
+                Ok(self.driver.follow_told(&path, clearance_m)? == Followed::Arrived)
             }
             Err(blocked) => {
                 self.driver.log(LogLevel::Warn, &format!("a pose is left out: {blocked}"))?;
@@ -279,7 +262,7 @@ impl Run<'_, '_> {
             )));
         }
         if !self.go(&to)? {
-            return Err(wrong("no path leads there".to_owned()));
+            return Err(wrong("no path leads there, or the arm met something on its way".to_owned()));
         }
         self.driver.phase(Phase::Settle)?;
         if !self.driver.settle()? {
@@ -307,6 +290,10 @@ impl Run<'_, '_> {
         self.driver.log(LogLevel::Info, &verdict_line(&calibration))?;
         if calibration.status == Status::Accepted {
             self.believe(&calibration)?;
+            self.before_running = None;
+            self.accepted = Some(calibration.clone());
+        } else {
+            self.forget_running();
         }
         let refusal = calibration.refusal.clone();
         self.calibration = Some(calibration);
@@ -324,7 +311,7 @@ impl Run<'_, '_> {
     fn believe(&mut self, calibration: &Calibration) -> Result<(), SessionError> {
         let wrong = |error: CalibrationFileError| SessionError::Step { step: 0, problem: error.to_string() };
         let sensors = calibration.sensors(self.setup.robot).map_err(wrong)?;
-        self.bounds = JointErrorBounds::calibrated(&self.robot, &estimated(calibration, &self.robot));
+        self.bounds = self.kept_clear(self.bounds_of(calibration, &sensors));
         let (bounds, at, oil_c) = (self.bounds.clone(), self.driver.now(), self.driver.recorder.oil_c);
         self.fresh = Some(FreshBounds { bounds, at, oil_c });
         self.driver.believe(sensors.clone());
@@ -374,26 +361,9 @@ fn after_motion(step: usize, error: SessionError) -> SessionError {
     }
 }
 
-/// The first capture; no calibration can come before it.
-fn first_capture(steps: &[Step]) -> Option<&CaptureSettings> {
-    steps.iter().find_map(|step| match step {
-        Step::Capture(capture) => Some(capture),
-        _ => None,
-    })
-}
-
 fn verdict_line(calibration: &Calibration) -> String {
     match &calibration.refusal {
         None => "calibration accepted".to_owned(),
         Some(why) => format!("calibration refused: {why}"),
     }
-}
-
-/// (gain sigma, offset sigma) of each joint, where estimated.
-fn estimated(calibration: &Calibration, robot: &Robot) -> Vec<(Option<f64>, Option<f64>)> {
-    let one = |(joint, spec): (&crate::calib::JointResult, &crate::robot::JointSensorSpec)| {
-        let gain_std = joint.gain_std_rad_per_count * spec.counts_per_rad.abs();
-        (joint.gain_estimated.then_some(gain_std), joint.offset_estimated.then_some(joint.offset_std_rad))
-    };
-    calibration.joint.iter().zip(&robot.sensors).map(one).collect()
 }

@@ -5,7 +5,7 @@ use crate::streams::JointAngles;
 /// No sensor, smoothed, has moved by more than this, rad, and by what its own noise leaves of it ...
 const STILL_RAD: f64 = 0.0008;
 /// ... while it was this near to its set-point (a controller may leave a steady error), rad.
-const NEAR_RAD: f64 = 0.02;
+pub(super) const NEAR_RAD: f64 = 0.02;
 /// Share of a new reading in the smoothed one: a tenth of a second at 100 Hz.
 const SMOOTHING: f64 = 0.1;
 /// Multiple of a smoothed reading's own deviation that is no motion.

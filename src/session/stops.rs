@@ -45,7 +45,7 @@ impl Run<'_, '_> {
             return self.driver.log(LogLevel::Warn, &format!("{stop} is not driven to: {nearest} may come too near"));
         }
         self.driver.phase(Phase::Move)?;
-        self.driver.follow(&Path { waypoints: vec![from, to] })?;
+        self.driver.follow_unheeding(&Path { waypoints: vec![from, to] })?;
         self.driver.phase(Phase::Settle)?;
         if self.driver.press(joint)? {
             self.driver.phase(Phase::Capture)?;
@@ -54,7 +54,7 @@ impl Run<'_, '_> {
             self.driver.log(LogLevel::Warn, &format!("{stop} is left out: the arm did not come to rest"))?;
         }
         self.driver.phase(Phase::Move)?;
-        self.driver.follow(&Path { waypoints: vec![to, from] })?;
+        self.driver.follow_unheeding(&Path { waypoints: vec![to, from] })?;
         if !self.driver.settle()? {
             self.driver.log(LogLevel::Warn, &format!("the arm did not settle after {stop}"))?;
         }

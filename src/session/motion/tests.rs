@@ -109,7 +109,7 @@ fn sensors_with_terms_are_used_under_what_was_heard_last() {
         assert!((warm[joint] - at_rest[joint] - expected).abs() < 1e-9, "{joint}: {}", warm[joint] - at_rest[joint]);
     }
     // The same angles ask for other words, and the arm believes to be where it was sent.
-    driver.follow(&ends).expect("it moves");
+    assert_eq!(driver.follow(&ends).expect("it moves"), Followed::Arrived);
     for _ in 0..3 {
         driver.step().expect("it steps");
     }
@@ -128,4 +128,70 @@ fn sensors_with_terms_are_used_under_what_was_heard_last() {
         .filter_map(|(_, m)| if let Message::JointStates(state) = m { Some(state.angles) } else { None })
         .collect();
     assert!(states.last().expect("states").max_abs_difference(&at_rest) < 1e-5);
+}
+
+/// Answers in turn; what it was asked stays.
+struct Operator {
+    answers: Vec<crate::session::Approval>,
+    asked: Vec<crate::session::MotionAhead>,
+}
+
+impl Progress for Operator {
+    fn update(&mut self, _: Phase, _: usize, _: usize, _: f64) {}
+
+    fn wall_s(&self) -> f64 {
+        0.0
+    }
+
+    fn wants_to_approve(&self) -> bool {
+        true
+    }
+
+    fn approve(&mut self, ahead: &crate::session::MotionAhead) -> crate::session::Approval {
+        self.asked.push(ahead.clone());
+        self.answers.remove(0)
+    }
+}
+
+#[test]
+fn an_operator_is_asked_before_a_motion_and_obeyed() {
+    use crate::session::Approval;
+    let robot = titan();
+    let nominal = ArmSensors::nominal(&robot);
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("run.mcap");
+    let writer = RecordingWriter::create(&file, RecordingHeader::new(robot.joint_names())).expect("a file");
+    let mut recorder = Recorder::new(writer);
+    let counts = nominal.counts(&robot.stowed);
+    let mut arm = WarmingArm { now: SIMULATION_EPOCH, counts, oil_c: 20.0, pressure_pa: 1e6 };
+    let abort = || Approval::Abort("enough".to_owned());
+    let mut operator =
+        Operator { answers: vec![Approval::Hold, Approval::Hold, Approval::Approve, abort()], asked: Vec::new() };
+    let mut driver = Driver::new(&robot, &mut arm, &mut recorder, nominal, &mut operator).expect("it steps");
+    let from = driver.set_point();
+    let to = JointAngles::from_fn(6, |j| if j == 0 { from[0] + 0.3 } else { from[j] });
+    let path = Path { waypoints: vec![from, to] };
+    let duration_s = Timing::new(&robot).path_duration_s(&path);
+    assert_eq!(driver.follow_told(&path, Some(0.07)).expect("it moves"), Followed::Arrived);
+    // Twice 5 s, then the motion.
+    assert!((driver.elapsed_s() - 0.01 - 10.0 - duration_s).abs() < 0.05, "{}", driver.elapsed_s());
+    let back = Path { waypoints: vec![to, from] };
+    assert!(matches!(driver.follow(&back), Err(SessionError::Interrupted { .. })));
+    assert!(driver.set_point().max_abs_difference(&to) < 1e-12, "it stays");
+    drop(driver);
+    let clearances: Vec<Option<f64>> = operator.asked.iter().map(|ahead| ahead.clearance_m).collect();
+    assert_eq!(clearances, [Some(0.07), Some(0.07), Some(0.07), None]);
+    assert!(operator.asked.iter().all(|ahead| (ahead.duration_s - duration_s).abs() < 1e-9 && ahead.edges == 1));
+    recorder.writer.flush().expect("written");
+    let recording = read_recording(&file).expect("it reads");
+    let lines: Vec<String> = recording
+        .messages
+        .into_iter()
+        .filter_map(|(_, m)| if let Message::Log(line) = m { Some(line.text) } else { None })
+        .collect();
+    let starts = ["held by the operator: shoulder_yaw", "held by", "approved: ", "aborted before a motion (enough)"];
+    for (line, start) in lines.iter().zip(starts) {
+        assert!(line.starts_with(start), "{lines:?}");
+    }
+    assert!(lines[2].contains("at least 0.070 m clear"), "{lines:?}");
 }
