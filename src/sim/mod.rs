@@ -37,6 +37,6 @@ pub use fault::{Fault, ScheduledFault};
 pub use recorded::{RecordedMotion, VehicleJet};
 pub use spec::{
     CameraMode, CameraWorldSpec, ClockSpec, HydraulicsSpec, ImageSpec, JointSensorsSpec, MotionKind, PhysicsSpec,
-    Points, PortKind, TagsSpec, TemperatureSpec, VehicleMotionSpec, WaterKind, WaterSpec, WorldSpec,
+    Points, PortKind, TagsSpec, TemperatureSpec, Undrawn, VehicleMotionSpec, WaterKind, WaterSpec, WorldSpec,
 };
 pub use world::{World, WorldInput};

@@ -56,7 +56,8 @@ pub struct PlainPose {
 
 impl AsBuilt {
     /// Draws every value from a stream of its own, so that one more effect does not move the others.
-    pub(super) fn draw(robot: &Robot, spec: &WorldSpec, seed: u64) -> Self {
+    #[must_use]
+    pub fn draw(robot: &Robot, spec: &WorldSpec, seed: u64) -> Self {
         let joints = (0..robot.n_joints()).map(|joint| JointAsBuilt::draw(robot, joint, spec, seed)).collect();
         let mount_error =
             normal_twist(seed, "as_built/camera_mount", spec.camera.mount_std_m, spec.camera.mount_std_rad);

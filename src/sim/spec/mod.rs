@@ -21,7 +21,8 @@ use serde::de::DeserializeOwned;
 use super::error::SimError;
 use super::fault::{self, ScheduledFault};
 use super::recorded::RecordedMotion;
-use crate::robot::{FileIssue, Robot};
+use crate::robot::{FileIssue, PartFile, Robot, check_parts};
+use crate::routine::Scene;
 pub use camera::{CameraWorldSpec, ClockSpec, CornerNoiseKind, PortKind, TagsSpec};
 pub use hydraulics::HydraulicsSpec;
 pub use image::{CameraMode, ImageSpec, WaterKind};
@@ -96,9 +97,23 @@ pub struct WorldSpec {
     /// The motion that `vehicle.motion_file` names, read with the routine.
     #[serde(skip)]
     pub recorded: Option<Arc<RecordedMotion>>,
+    /// What stands in the water and nobody has drawn: `[[world.obstacle]]`, as `[[obstacle]]`.
+    #[serde(skip_serializing_if = "Undrawn::is_none")]
+    pub obstacle: Undrawn,
     /// What breaks: in the order of the routine's `fault` steps, then what has a time.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub fault: Vec<ScheduledFault>,
+}
+
+/// What stands in the water and is in no drawing: shapes in the world frame.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[serde(transparent)]
+pub struct Undrawn(Vec<PartFile>);
+
+impl Undrawn {
+    fn is_none(&self) -> bool {
+        self.0.is_empty()
+    }
 }
 
 impl WorldSpec {
@@ -107,7 +122,7 @@ impl WorldSpec {
     /// # Errors
     /// [`SimError::Spec`] naming file, key and the allowed range; NaN is in no range.
     pub fn from_table(table: &toml::Table, file: &Path) -> Result<Self, SimError> {
-        const TABLES: [&str; 12] = [
+        const TABLES: [&str; 13] = [
             "physics",
             "joint_sensors",
             "temperature",
@@ -119,6 +134,7 @@ impl WorldSpec {
             "hydraulics",
             "water",
             "gear_ratio",
+            "obstacle",
             "fault",
         ];
         if let Some(key) = table.keys().find(|key| !TABLES.contains(&key.as_str())) {
@@ -139,6 +155,7 @@ impl WorldSpec {
             water: reader.read("water")?,
             gear_ratio: reader.parse("gear_ratio")?,
             recorded: None,
+            obstacle: Undrawn(check_parts(&reader.parse::<Vec<PartFile>>("obstacle")?, file, "world.obstacle")?.1),
             fault: fault::read_list(table, file)?,
         };
         for (joint, ratio) in &spec.gear_ratio {
@@ -170,6 +187,16 @@ impl WorldSpec {
             text = format!("{text}\n[image]\n{}", toml::to_string(&self.image)?);
         }
         Ok(text)
+    }
+
+    /// The scene as it truly is: as drawn, and what nobody has drawn.
+    ///
+    /// # Errors
+    /// None for a checked spec.
+    pub(in crate::sim) fn true_scene(&self, drawn: &Scene) -> Result<Scene, SimError> {
+        let (undrawn, _) = check_parts(&self.obstacle.0, Path::new("[world]"), "obstacle")?;
+        let obstacles = drawn.obstacles.iter().cloned().chain(undrawn).collect();
+        Ok(Scene { obstacles, ..*drawn })
     }
 
     /// With what only the robot says filled in.

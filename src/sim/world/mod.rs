@@ -97,6 +97,7 @@ impl World {
         input.spec = input.spec.completed(input.robot);
         let WorldInput { robot, vehicle, scene, seed, .. } = input;
         let spec = input.spec.clone();
+        let scene = &spec.true_scene(scene)?;
         robot.require_masses()?;
         let built = AsBuilt::draw(robot, &spec, seed);
         let gear_ratios: Vec<f64> = built.joints.iter().map(|joint| joint.gear_ratio).collect();
