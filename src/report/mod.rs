@@ -13,7 +13,7 @@ mod table;
 pub use html::html;
 pub use markdown::markdown;
 pub use summary::{
-    AssertSummary, CalibrationSummary, CaptureSummary, HeldOutSummary, JointScore, ReachScore, RunSummary, Score,
-    ScoreSide, TouchScore,
+    AssertSummary, CalibrationSummary, CaptureSummary, HeldOutSummary, JointScore, MarginSummary, ReachScore,
+    RenewalSummary, RunSummary, Score, ScoreSide, TouchScore,
 };
 pub use table::table;

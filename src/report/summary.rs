@@ -59,6 +59,41 @@ pub struct CaptureSummary {
     pub collisions: Option<usize>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub min_clearance_m: Option<f64>,
+    /// From truth: the links at the captured views, against the belief of that moment.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub margins: Option<MarginSummary>,
+    /// Views after which belief and poses were renewed, with what was predicted then.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub renewals: Vec<RenewalSummary>,
+    /// Why there were no more views.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ended: Option<String>,
+}
+
+/// Displacement of the links' ends from where they are believed to be.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct MarginSummary {
+    /// Links times views.
+    pub links: usize,
+    /// Of them, those beyond the 99 % quantile that was predicted.
+    pub exceeded_q99: usize,
+    pub largest_m: f64,
+    /// At the first view.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub first_largest_m: Option<f64>,
+    /// By how many views the belief rested on: those views, links, and those of them beyond their quantile.
+    #[serde(default)]
+    pub by_views: Vec<[usize; 3]>,
+}
+
+/// One renewal of the belief while views were captured.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RenewalSummary {
+    pub views: usize,
+    /// Since the capture began.
+    pub elapsed_s: f64,
+    /// Root mean square over the task.
+    pub predicted_tool_error_m: f64,
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -238,6 +273,9 @@ impl RunSummary {
                 rejected_by_reason: calibration.fit.rejected_by_reason.clone(),
                 collisions: None,
                 min_clearance_m: None,
+                margins: None,
+                renewals: Vec::new(),
+                ended: None,
             },
             calibration: CalibrationSummary {
                 outcome: calibration.fit.outcome.clone(),

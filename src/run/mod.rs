@@ -20,11 +20,11 @@ use crate::log::{Recording, RecordingHeader, RecordingWriter, read_recording};
 use crate::output::{OutputError, OutputFolder};
 #[cfg(feature = "viewer")]
 use crate::report::markdown;
-use crate::report::{AssertSummary, RunSummary, html};
+use crate::report::{AssertSummary, RenewalSummary, RunSummary, html};
 use crate::robot::{Robot, Vehicle};
 use crate::routine::{self, Overrides, Routine};
 use crate::score::{ScoreInput, score};
-use crate::session::{self, AssertResult, Outcome, Progress, Recorder, Setup};
+use crate::session::{self, AssertResult, Outcome, Progress, Recorder, Renewal, Setup};
 use crate::sim::truth::TruthRecorder;
 use crate::sim::{World, WorldInput, WorldSpec};
 use crate::streams::Arm;
@@ -206,6 +206,9 @@ impl Run<'_> {
         summary.capture.targets_skipped = outcome.targets_skipped;
         summary.capture.collisions = Some(scored.collisions);
         summary.capture.min_clearance_m = scored.min_clearance_m;
+        summary.capture.margins = scored.margins;
+        summary.capture.renewals = outcome.renewals.iter().map(renewal_summary).collect();
+        summary.capture.ended.clone_from(&outcome.capture_ended);
         summary.score = Some(scored.score);
         Ok(summary)
     }
@@ -237,6 +240,11 @@ impl Run<'_> {
         )?;
         Ok(())
     }
+}
+
+fn renewal_summary(renewal: &Renewal) -> RenewalSummary {
+    let Renewal { views, elapsed_s, expected_tool_error_m, .. } = *renewal;
+    RenewalSummary { views, elapsed_s, predicted_tool_error_m: expected_tool_error_m }
 }
 
 /// A limit without a figure does not hold: nobody saw that it does.

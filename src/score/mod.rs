@@ -3,6 +3,7 @@
 //! At each reach mark the tool as believed (from the recording, under the sensors of that moment) is compared with
 //! the tool as it was, and the target with where the tool came to rest.
 
+mod margins;
 mod touch;
 
 use std::path::Path;
@@ -10,7 +11,7 @@ use std::path::Path;
 use nalgebra::Vector3;
 
 use crate::log::Recording;
-use crate::report::{JointScore, ReachScore, Score, ScoreSide};
+use crate::report::{JointScore, MarginSummary, ReachScore, Score, ScoreSide};
 use crate::robot::Robot;
 use crate::session::{AssertResult, Outcome, ReachStep};
 use crate::sim::SimError;
@@ -26,6 +27,7 @@ pub struct Scored {
     pub score: Score,
     pub collisions: usize,
     pub min_clearance_m: Option<f64>,
+    pub margins: Option<MarginSummary>,
     /// The script's limits, with the figures that only the truth knows.
     pub asserts: Vec<AssertResult>,
 }
@@ -73,7 +75,8 @@ pub fn score(input: &ScoreInput<'_>) -> Result<Scored, SimError> {
         reaches,
     };
     let asserts = outcome.asserts.iter().map(|limit| completed(limit, &score, &truth)).collect();
-    Ok(Scored { score, collisions: truth.contacts.len(), min_clearance_m: truth.min_clearance_m(), asserts })
+    let margins = margins::margins(&outcome.visits, input.robot, &truth);
+    Ok(Scored { score, collisions: truth.contacts.len(), min_clearance_m: truth.min_clearance_m(), margins, asserts })
 }
 
 /// The limit with its figure, if the truth has it.
