@@ -18,6 +18,7 @@ use super::camera::CAMERA;
 use super::colors;
 use super::eye;
 use super::phases::{LOG, STATE};
+use super::plan::{CLEARANCE, PREDICTED};
 use super::plots::{COUNTS, JOINT_ANGLE, JOINT_ERROR, TEMPERATURE, TOOL_ERROR};
 use super::rrd::TIMELINE;
 use super::scenery::WORLD;
@@ -60,12 +61,38 @@ pub(super) fn build(run: &Run) -> Vec<Entry> {
     b.finish(&root, run)
 }
 
+/// The layout of a plan.
+pub(super) fn build_plan(run: &Run) -> Vec<Entry> {
+    let mut b = Builder::default();
+    let scene = titled_scene(&mut b, run, "Plan: solid = believed arm, amber = arms that the errors allow");
+    let camera = titled_camera(&mut b, run, "Wrist camera: tags where the believed arm expects them");
+    let summary = b.view("TextDocument", "Plan", SUMMARY);
+    let log = b.view("TextLog", "Poses", LOG);
+    let columns = [TextLogColumn { kind: TextLogColumnKind::Body, visible: true.into() }];
+    b.property(&log, "TextLogColumns", TextLogColumns::new().with_text_log_columns(columns));
+    let texts = b.tabs(&[log, summary]);
+    let below = b.container(ContainerKind::Horizontal, &[(camera, 5.0), (texts, 6.0)]);
+    let left = b.container(ContainerKind::Vertical, &[(scene, 5.0), (below, 4.0)]);
+    let clearance = b.plot("Clearance [mm]", CLEARANCE, legend(Corner2D::RightTop), run);
+    let predicted = b.plot("Predicted tool error [mm]", PREDICTED, legend(Corner2D::RightTop), run);
+    let angles = b.plot("Joint angles as believed [deg]", JOINT_ANGLE, legend(Corner2D::RightTop), run);
+    let right = b.container(ContainerKind::Vertical, &[(clearance, 3.0), (predicted, 2.4), (angles, 2.2)]);
+    let main = b.container(ContainerKind::Horizontal, &[(left, 3.0), (right, 2.0)]);
+    let phases = b.view("StateTimeline", "What the arm would do", STATE);
+    let root = b.container(ContainerKind::Vertical, &[(main, 4.3), (phases, 1.0)]);
+    b.finish(&root, run)
+}
+
 fn scene_view(b: &mut Builder, run: &Run) -> Part {
     let title = if run.has_true_joints() {
         "Scene: solid arm = true, pink ghost = believed"
     } else {
         "Scene: the arm as believed"
     };
+    titled_scene(b, run, title)
+}
+
+fn titled_scene(b: &mut Builder, run: &Run, title: &str) -> Part {
     let view = b.view("3D", title, WORLD);
     let eye = eye::frame(run);
     b.property(&view, "EyeControls3D", EyeControls3D::new().with_position(eye.position).with_look_target(eye.target));
@@ -81,6 +108,10 @@ fn camera_view(b: &mut Builder, run: &Run) -> Part {
     } else {
         "Wrist camera: green seen, orange rejected, pink expected"
     };
+    titled_camera(b, run, title)
+}
+
+fn titled_camera(b: &mut Builder, run: &Run, title: &str) -> Part {
     let view = b.view("2D", title, CAMERA);
     let [width, height] = run.robot.camera.lens.resolution_px.map(f64::from);
     let bounds = VisualBounds2D::new(Range2D { x_range: [0.0, width].into(), y_range: [0.0, height].into() });

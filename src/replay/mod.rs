@@ -1,7 +1,7 @@
 //! Mirrors a run into a file for the Rerun viewer, after the fact and from recorded streams alone.
 //!
 //! [`write_rrd`] draws what the arm believed, what it saw and, where the simulator's truth file is at hand, what was true;
-//! [`open_viewer`] hands the file to an installed viewer. The viewer itself is not linked. Everything lies on one timeline,
+//! [`write_plan_rrd`] draws what an arm would do; [`open_viewer`] hands the file to an installed viewer. The viewer itself is not linked. Everything lies on one timeline,
 //! `sim_time`: seconds since the recording's first log time. The same input gives the same bytes.
 //!
 //! Entities: `/world/vehicle/base` has the scene in the frames World, Vehicle and Base, `/camera` the image plane of the
@@ -14,6 +14,7 @@ mod error;
 mod eye;
 mod layout;
 mod phases;
+mod plan;
 mod plots;
 mod rrd;
 mod scenery;
@@ -33,6 +34,7 @@ use crate::robot::{Robot, Vehicle};
 use crate::routine::Scene;
 
 pub use error::ReplayError;
+pub use plan::{PlanInput, write_plan_rrd};
 pub use viewer::{ViewerError, open_viewer};
 
 use rrd::Stream;

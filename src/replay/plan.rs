@@ -1,0 +1,302 @@
+//! A plan as a file for the viewer: the arm goes along its paths as it would, with all that it may be off by around it.
+//!
+//! What a session would record of its motions is made up from the plan and drawn as a recording is; the margins, the tags'
+//! chances and the plots over the poses come on top.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use rerun::components::MarkerShape;
+use rerun::{Boxes3D, FillMode, LineStrips3D, Points3D, Scalars, SeriesLines, SeriesPoints};
+
+use super::colors::{self, Rgba};
+use super::error::ReplayError;
+use super::rrd::Stream;
+use super::scenery::{BASE, Mover};
+use super::shapes::{Look, fix_shapes, path_part, quaternion, vector};
+use super::tracks::Tracks;
+use super::{ReplayInput, Run, arms, camera, layout, phases, plots, rrd, scenery, summary, targets};
+use crate::log::{Completeness, Recording};
+use crate::plan::{PlanFile, PoseTable, SetName, Timing};
+use crate::robot::{Robot, Vehicle};
+use crate::routine::{Scene, TaskSettings};
+use crate::streams::{
+    CaptureSet, JointAngles, JointStateBelief, LogLevel, LogLine, Mark, MarkKind, Message, Phase, ReachTask,
+};
+use crate::time::{SIMULATION_EPOCH, Stamp};
+
+pub(super) const CLEARANCE: &str = "/plots/clearance";
+pub(super) const PREDICTED: &str = "/plots/predicted";
+
+/// Steps of what moves.
+const FRAME_HZ: f64 = 12.5;
+/// The arms that are drawn for all within the errors: every joint off to the same side, and every other one.
+const CORNERS: [u32; 4] = [0b0000_0000, 0b1111_1111, 0b0101_0101, 0b1010_1010];
+
+/// A plan and what it was made for.
+pub struct PlanInput<'a> {
+    pub plan: &'a PlanFile,
+    pub robot: &'a Robot,
+    pub vehicle: &'a Vehicle,
+    pub scene: &'a Scene,
+    pub task: &'a TaskSettings,
+    /// Shown as it is.
+    pub markdown: &'a str,
+}
+
+/// Writes `out`, an .rrd file with its layout, replacing one of that name.
+///
+/// # Errors
+/// [`ReplayError`] when it cannot be written, or the plan is another arm's.
+pub fn write_plan_rrd(input: &PlanInput<'_>, out: &Path) -> Result<(), ReplayError> {
+    let recording = as_recorded(input);
+    let shown = ReplayInput {
+        recording: &recording,
+        truth: None,
+        robot: input.robot,
+        vehicle: Some(input.vehicle),
+        scene: Some(input.scene),
+        summary_markdown: Some(input.markdown),
+    };
+    let tracks = Tracks::new(&recording, input.robot)?;
+    let run = Run { tracks, truth: None, robot: input.robot, vehicle: shown.vehicle, scene: shown.scene };
+    let mut stream = Stream::default();
+    scenery::draw(&run, &mut stream);
+    arms::draw(&run, &mut stream);
+    targets::draw(&run, &mut stream);
+    camera::draw(&run, &mut stream);
+    plots::draw(&run, &mut stream);
+    phases::draw(&run, &mut stream);
+    summary::draw(&run, &shown, &mut stream);
+    draw_tool_path(&run, &mut stream);
+    draw_margins(input, &run, &mut stream);
+    draw_sights(input, &mut stream);
+    draw_plots(input, &mut stream);
+    rrd::write(out, &rrd::Identity::of(&shown)?, &layout::build_plan(&run), stream)
+}
+
+/// The plan's motions as messages.
+struct Imagined<'a> {
+    input: &'a PlanInput<'a>,
+    timing: Timing,
+    messages: Vec<(Stamp, Message)>,
+    time_s: f64,
+}
+
+fn as_recorded(input: &PlanInput<'_>) -> Recording {
+    let mut imagined = Imagined { input, timing: Timing::new(input.robot), messages: Vec::new(), time_s: 0.0 };
+    imagined.go();
+    Recording {
+        path: PathBuf::from("plan.toml"),
+        messages: imagined.messages,
+        joint_names: input.plan.joints.clone(),
+        completeness: Completeness::Whole,
+        raw: Vec::new(),
+        unknown_topics: BTreeMap::new(),
+        rejected: BTreeMap::new(),
+        non_monotonic: 0,
+        disorder: BTreeMap::new(),
+    }
+}
+
+impl Imagined<'_> {
+    fn go(&mut self) {
+        let PlanInput { plan, task, .. } = *self.input;
+        let (targets_m, tolerance_m) = (task.targets_m.clone(), task.tolerance_m);
+        let stamp = self.stamp();
+        self.tell(Message::Task(ReachTask { stamp, targets_m, tolerance_m }));
+        self.stand(&JointAngles::from_slice(&plan.start_rad));
+        let dwell_s = plan.totals.arm_time_s - plan.pose.last().map_or(0.0, |pose| pose.arm_time_s);
+        for (pose, path) in plan.pose.iter().zip(&plan.path) {
+            self.phase(Phase::Move);
+            for edge in path.waypoints_rad.windows(2) {
+                self.edge(&JointAngles::from_slice(&edge[0]), &JointAngles::from_slice(&edge[1]));
+            }
+            self.phase(Phase::Settle);
+            let angles = JointAngles::from_slice(&pose.angles_rad);
+            self.rest_until(&angles, pose.arm_time_s);
+            self.look(pose, &angles, dwell_s);
+        }
+        self.phase(Phase::Done);
+    }
+
+    fn stamp(&self) -> Stamp {
+        SIMULATION_EPOCH.plus_s(self.time_s)
+    }
+
+    fn tell(&mut self, message: Message) {
+        self.messages.push((self.stamp(), message));
+    }
+
+    fn stand(&mut self, angles: &JointAngles) {
+        let stamp = self.stamp();
+        self.tell(Message::JointStates(JointStateBelief { stamp, angles: *angles }));
+    }
+
+    fn phase(&mut self, phase: Phase) {
+        let stamp = self.stamp();
+        self.tell(Message::Mark(Mark { start: stamp, end: stamp, kind: MarkKind::Phase(phase) }));
+    }
+
+    fn edge(&mut self, from: &JointAngles, to: &JointAngles) {
+        let (began_s, duration_s) = (self.time_s, self.timing.edge_duration_s(from, to));
+        let steps = (duration_s * FRAME_HZ).ceil().max(1.0) as u32;
+        for k in 1..=steps {
+            let share = f64::from(k) / f64::from(steps);
+            self.time_s = began_s + share * duration_s;
+            self.stand(&Timing::set_point(from, to, share));
+        }
+    }
+
+    fn rest_until(&mut self, angles: &JointAngles, time_s: f64) {
+        self.time_s = self.time_s.max(time_s);
+        self.stand(angles);
+    }
+
+    fn look(&mut self, pose: &PoseTable, angles: &JointAngles, dwell_s: f64) {
+        self.phase(Phase::Capture);
+        let stamp = self.stamp();
+        self.tell(Message::Log(LogLine { stamp, level: LogLevel::Info, name: "plan".to_owned(), text: words(pose) }));
+        self.rest_until(angles, self.time_s + dwell_s);
+        let set = match pose.set {
+            SetName::Fit => CaptureSet::Fit,
+            SetName::HeldOut => CaptureSet::HeldOut,
+        };
+        let kind = MarkKind::Capture { set, pose_idx: pose.number as u32 - 1 };
+        let end = self.stamp();
+        self.tell(Message::Mark(Mark { start: stamp, end, kind }));
+    }
+}
+
+fn words(pose: &PoseTable) -> String {
+    let tags: Vec<String> =
+        pose.tags.iter().map(|tag| format!("{} ({:.0} %)", tag.id, 100.0 * tag.probability)).collect();
+    let error = pose.predicted_tool_error_m.map_or_else(String::new, |m| format!(", {:.2} mm predicted", 1e3 * m));
+    format!(
+        "pose {}: {:.0} mm clear for every arm, {:.0} for the believed one{error}; tags {}",
+        pose.number,
+        1e3 * pose.proven_clearance_m,
+        1e3 * pose.clearance_m,
+        tags.join(", ")
+    )
+}
+
+/// The whole way of the tool.
+fn draw_tool_path(run: &Run, stream: &mut Stream) {
+    let tool = |angles: &JointAngles| run.robot.chain.link_poses(angles).frame(&run.robot.tool.mount);
+    let way: Vec<[f32; 3]> =
+        run.tracks.believed.iter().map(|(_, angles)| vector(&tool(angles).translation.vector)).collect();
+    let strip = LineStrips3D::new([way]).with_radii([0.003]).with_colors([colors::PLANNED_WAY]);
+    stream.fix(&format!("{BASE}/planned_way"), &strip);
+}
+
+/// Arms at corners of the error box, see-through, and where the tool may be for all of its corners.
+fn draw_margins(input: &PlanInput<'_>, run: &Run, stream: &mut Stream) {
+    let robot = input.robot;
+    let mut ghosts: Vec<Vec<Mover>> = Vec::new();
+    for (n, _) in CORNERS.iter().enumerate() {
+        let bodies = robot.bodies.iter().enumerate().skip(1).map(|(body, link)| {
+            let entity = format!("{BASE}/margins/arm_{n}/{body}_{}", path_part(&link.name));
+            fix_shapes(stream, &entity, &link.collisions, Look::Ghost(colors::MARGIN));
+            Mover::new(entity)
+        });
+        ghosts.push(bodies.collect());
+    }
+    let n_joints = robot.chain.joints().iter().filter(|joint| joint.limits.is_some()).count();
+    let cloud = format!("{BASE}/margins/tool");
+    stream.fix(&cloud, &Points3D::update_fields().with_radii([0.012]).with_colors([colors::MARGIN_TOOL]));
+    for time_s in run.tracks.ticks(FRAME_HZ) {
+        let Some(angles) = run.tracks.believed.at(time_s) else { continue };
+        let error_rad = error_at(input.plan, time_s);
+        let corner = |bits: u32| {
+            JointAngles::from_fn(angles.len(), |j| match j {
+                _ if j >= n_joints => angles[j],
+                _ if bits >> j & 1 == 1 => angles[j] + error_rad[j],
+                _ => angles[j] - error_rad[j],
+            })
+        };
+        for (bodies, &bits) in ghosts.iter_mut().zip(&CORNERS) {
+            let poses = robot.chain.link_poses(&corner(bits));
+            for (n, body) in bodies.iter_mut().enumerate() {
+                body.place(stream, time_s, poses.link(n + 1));
+            }
+        }
+        let tools = (0..1u32 << n_joints)
+            .map(|bits| robot.chain.link_poses(&corner(bits)).frame(&robot.tool.mount).translation.vector);
+        stream.draw(&cloud, time_s, &Points3D::update_fields().with_positions(tools.map(|tool| vector(&tool))));
+    }
+}
+
+/// The error bounds between those of the poses before and after.
+fn error_at(plan: &PlanFile, time_s: f64) -> JointAngles {
+    let after = plan.pose.partition_point(|pose| pose.arm_time_s < time_s).min(plan.pose.len().saturating_sub(1));
+    let (Some(next), Some(last)) = (plan.pose.get(after), plan.pose.get(after.saturating_sub(1))) else {
+        return JointAngles::zeros(plan.joints.len());
+    };
+    let span_s = next.arm_time_s - last.arm_time_s;
+    let share = if span_s > 0.0 { ((time_s - last.arm_time_s) / span_s).clamp(0.0, 1.0) } else { 1.0 };
+    let [a, b] = [&last.error_bound_rad, &next.error_bound_rad];
+    JointAngles::from_fn(plan.joints.len(), |j| a[j] + share * (b[j] - a[j]))
+}
+
+/// Frames around the tags that the next pose is to see, coloured by how likely that is.
+fn draw_sights(input: &PlanInput<'_>, stream: &mut Stream) {
+    let entity = format!("{BASE}/sights");
+    let mut since_s = 0.0;
+    for pose in &input.plan.pose {
+        let (mut centers, mut sizes, mut turns, mut shades) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        for expected in &pose.tags {
+            let Some(tag) = input.robot.tag(expected.id) else { continue };
+            let place = tag.base_from_tag.isometry();
+            centers.push(vector(&place.translation.vector));
+            turns.push(quaternion(&place.rotation));
+            let half_m = (0.75 * tag.size_m) as f32;
+            sizes.push([half_m, half_m, 0.012]);
+            shades.push(chance_color(expected.probability));
+        }
+        let frames = Boxes3D::from_centers_and_half_sizes(centers, sizes).with_quaternions(turns).with_colors(shades);
+        stream.draw(&entity, since_s, &frames.with_fill_mode(FillMode::MajorWireframe).with_radii([0.008]));
+        since_s = pose.arm_time_s + 0.01;
+    }
+}
+
+/// Red: never, green: always.
+fn chance_color(probability: f64) -> Rgba {
+    let [from, to] = [colors::MISS, colors::SEEN];
+    std::array::from_fn(|k| {
+        (f64::from(from[k]) + probability.clamp(0.0, 1.0) * (f64::from(to[k]) - f64::from(from[k]))).round() as u8
+    })
+}
+
+fn draw_plots(input: &PlanInput<'_>, stream: &mut Stream) {
+    let plan = input.plan;
+    let entity = |name: &str| format!("{CLEARANCE}/{name}");
+    let lines = [
+        ("believed", "believed arm, at the pose", colors::CAMERA),
+        ("proven", "every arm, at the pose", colors::SEEN),
+        ("on_the_way", "every arm, on the way there", colors::TARGET),
+    ];
+    for (name, label, shade) in lines {
+        let style = SeriesPoints::new().with_names([label]).with_colors([shade]).with_markers([MarkerShape::Circle]);
+        stream.fix(&entity(name), &style.with_marker_sizes([4.0]));
+    }
+    let margin = SeriesLines::new().with_names(["kept clear"]).with_colors([colors::MISS]).with_widths([1.0]);
+    stream.fix(&entity("margin"), &margin);
+    for time_s in [0.0, plan.totals.arm_time_s] {
+        stream.draw(&entity("margin"), time_s, &Scalars::single(1e3 * plan.margin_m));
+    }
+    for (pose, path) in plan.pose.iter().zip(&plan.path) {
+        let values = [pose.clearance_m, pose.proven_clearance_m, path.proven_clearance_m];
+        for ((name, ..), value_m) in lines.iter().zip(values) {
+            stream.draw(&entity(name), pose.arm_time_s, &Scalars::single(1e3 * value_m));
+        }
+    }
+    let predicted = format!("{PREDICTED}/tool_error");
+    let style = SeriesLines::new().with_names(["predicted after this view"]).with_colors([colors::BELIEVED]);
+    stream.fix(&predicted, &style.with_widths([1.8]));
+    for pose in &plan.pose {
+        if let Some(error_m) = pose.predicted_tool_error_m {
+            stream.draw(&predicted, pose.arm_time_s, &Scalars::single(1e3 * error_m));
+        }
+    }
+}
