@@ -110,6 +110,50 @@ fn planning(c: &mut Criterion) {
             poses.windows(2).filter(is_clear).count()
         });
     });
+    choice(c, &robot, &clearance, &bounds);
+}
+
+/// 30 of 5,000 candidates: what each of them tells, greedy choice, exchange, order and forecast.
+fn choice(c: &mut Criterion, robot: &Robot, clearance: &ClearanceModel<'_>, bounds: &JointErrorBounds) {
+    use armcal::plan::{PosePool, PoseRequest, VisibilityModel};
+
+    let capture: armcal::routine::CaptureSettings = toml::from_str("poses = 30\nheld_out = 0").expect("settings");
+    let mut rng = stream_rng(1, "bench choice");
+    let task: Vec<JointAngles> = (0..14)
+        .map(|_| {
+            let angle = |j: usize, rng: &mut rand_chacha::ChaCha8Rng| {
+                let spec = &robot.sensors[j];
+                spec.center_rad + rng.random_range(-0.6..0.6) * spec.half_range_rad
+            };
+            JointAngles::from_fn(robot.n_joints(), |j| angle(j, &mut rng))
+        })
+        .collect();
+    let visibility = VisibilityModel::default();
+    let request = PoseRequest {
+        robot,
+        clearance,
+        bounds,
+        visibility: &visibility,
+        capture: &capture,
+        n_fit: 30,
+        n_held_out: 0,
+        belief: None,
+        taken: &[],
+        prior: None,
+        tag_trust: &[],
+        failed: &[],
+        task: &task,
+        targets_m: &[],
+        start: &robot.stowed,
+    };
+    let pool = PosePool::gather(&request, 5000, &mut rng).expect("candidates");
+    assert_eq!(pool.len(), 5000);
+    c.bench_function("choice of 30 poses out of 5000", |b| {
+        b.iter(|| pool.choose(black_box(&request), &mut stream_rng(1, "choice")).expect("a plan").arm_time_s);
+    });
+    c.bench_function("100 candidates: drawn, seen, clear", |b| {
+        b.iter(|| PosePool::gather(black_box(&request), 100, &mut stream_rng(1, "pool")).expect("candidates").len());
+    });
 }
 
 /// 300 images of up to 8 tags through the wrist camera, 0.3 px of noise; from pixels to map with covariances.

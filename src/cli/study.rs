@@ -10,6 +10,8 @@ use clap::{Args, Subcommand};
 use super::exit::Exit;
 use super::files;
 use super::study_paper::{PaperArgs, paper};
+use super::study_plan::{EdgesArgs, PairsArgs, PathsArgs, StrayArgs, edges, pairs, paths, stray};
+use super::study_poses::{PosesArgs, poses};
 use crate::detect::{DetectorSettings, GreyImage};
 use crate::optics::Fisheye;
 use crate::sim::WaterKind;
@@ -30,6 +32,16 @@ enum Study {
     Detection(DetectionArgs),
     /// Compare the paper's methods with least squares and with the bound, on landmark positions with noise
     Paper(PaperArgs),
+    /// Certify random edges of an arm and scan each by brute force
+    Edges(EdgesArgs),
+    /// Plan between random poses at several sites, under wide and narrow bounds
+    Paths(PathsArgs),
+    /// Find which links of an arm can come near each other, and store it in the robot's folder
+    Pairs(PairsArgs),
+    /// Measure how far the joints of a recording left the straight lines of their set-points
+    Stray(StrayArgs),
+    /// Choose poses by each criterion and at random, and compare the tool error that they leave
+    Poses(PosesArgs),
 }
 
 #[derive(Debug, Args)]
@@ -61,6 +73,11 @@ pub(super) fn study(args: &StudyArgs) -> Result<Exit> {
     match &args.study {
         Study::Detection(args) => detection(args),
         Study::Paper(args) => paper(args),
+        Study::Edges(args) => edges(args),
+        Study::Paths(args) => paths(args),
+        Study::Pairs(args) => pairs(args),
+        Study::Stray(args) => stray(args),
+        Study::Poses(args) => poses(args),
     }
 }
 

@@ -4,18 +4,27 @@
 //! detected and compared with the projection (`trials`). From that: rates and errors by condition (`tables`), and the model
 //! of corner noise and detection that the geometric camera may draw from (`noise_fit`). tests/oracle/compare_detectors.py
 //! runs other detectors on the same images. `paper`: the paper's comparison of methods, and `sensitivity` its Figures 4 and 7;
-//! `charts` draws both.
+//! `poses`: error over poses and the arm's time, by how the poses are chosen; `charts` draws them. `edges`: certified edges against
+//! brute force; `paths`: planning between random poses.
 
 mod charts;
+mod edges;
 mod noise_fit;
 pub mod paper;
+mod paths;
+mod poses;
 mod scenes;
 mod sensitivity;
+mod stray;
 mod tables;
 mod trials;
 
+pub use edges::{Edge, EdgeRow, EdgeStudy, edge_study, edges_csv, edges_json, mean_time_under_s, random_edges};
 pub use noise_fit::{FittedNoise, fit_noise};
+pub use paths::{Belief, PathRow, PathSite, PathStudy, path_study, paths_csv, problem_json, queries_json};
+pub use poses::{PoseRow, PoseStudyError, pose_study, poses_csv, poses_figure, poses_table};
 pub use scenes::{Condition, TAG_SIZE_M, conditions, water_name};
 pub use sensitivity::{Sensitivity, SensitivityPoint, sensitivity};
+pub use stray::{JointStray, StrayStudy, stray_study};
 pub use tables::{conditions_csv, report, trials_csv, truth_csv};
 pub use trials::{DetectionStudy, Outcome, StudyError, TagTrial, Watcher, detection_study};
