@@ -11,13 +11,14 @@ use crate::calib::Calibration;
 #[cfg(feature = "sim")]
 use crate::campaign::Request;
 use crate::input::{InputMap, TagUse, read_input_map, read_task};
+use crate::plan::PlanFile;
 use crate::robot::{self, Robot};
 use crate::routine::{self, Overrides, Step};
 use crate::tagmap::files::read_landmarks;
 
 #[derive(Debug, Args)]
 pub(super) struct CheckArgs {
-    /// Robot folders or robot.toml files, routines, vehicles, calibrations, input maps, tag maps, tasks
+    /// Robot folders or robot.toml files, routines, vehicles, calibrations, input maps, tag maps, tasks, plans
     #[arg(required = true)]
     files: Vec<PathBuf>,
     /// For the routines among them
@@ -49,6 +50,15 @@ fn check_one(file: &Path, overrides: &Overrides) -> Result<String> {
     }
     let text = std::fs::read_to_string(file).with_context(|| format!("{}: cannot be read", file.display()))?;
     let table: toml::Table = toml::from_str(&text).with_context(|| format!("{}: is no TOML", file.display()))?;
+    if table.contains_key("inputs_hash") {
+        let plan = PlanFile::read(file)?;
+        let (poses, least_m) = (plan.pose.len(), plan.totals.least_clearance_m);
+        let arm_min = plan.totals.arm_time_s / 60.0;
+        return Ok(format!(
+            "plan for `{}`, {poses} poses in {arm_min:.1} min, at least {least_m:.3} m clear",
+            plan.robot
+        ));
+    }
     if table.contains_key("robot") && table.contains_key("vehicle") {
         return check_routine(file, overrides);
     }
@@ -75,7 +85,7 @@ fn check_one(file: &Path, overrides: &Overrides) -> Result<String> {
         return Ok(format!("calibration of `{}`, {joints} joints; valid for {valid}", calibration.robot));
     }
     Err(UsageError(format!(
-        "{}: is none of robot, routine, vehicle, calibration, input map, tag map, task",
+        "{}: is none of robot, routine, vehicle, calibration, input map, tag map, task, plan",
         file.display()
     ))
     .into())

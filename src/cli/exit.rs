@@ -5,7 +5,7 @@ use std::process::ExitCode;
 use crate::calib::{CalibError, CalibrationFileError, CompactError};
 use crate::input::InputError;
 use crate::log::LogError;
-use crate::plan::PlanError;
+use crate::plan::{ItineraryError, PlanError};
 use crate::robot::{FileIssue, RobotError};
 use crate::routine::RoutineError;
 use crate::session::SessionError;
@@ -73,6 +73,7 @@ pub(super) fn of_cause(error: &(dyn std::error::Error + 'static)) -> Exit {
             || cause.is::<CalibError>()
             || cause.is::<CompactError>()
             || cause.is::<PlanError>()
+            || cause.is::<ItineraryError>()
             || cause.is::<TagMapError>()
             || cause.is::<ViewsError>()
             || cause.downcast_ref::<LogError>().is_some_and(|e| !is_write_failure(e))

@@ -129,7 +129,7 @@ fn plain_landmark(file: &Path, map: &InputMap, named: &NamedSurvey) -> Result<Op
 }
 
 /// An accepted calibration of this robot.
-fn read_prior(file: &Path, robot: &Robot) -> Result<Calibration> {
+pub(super) fn read_prior(file: &Path, robot: &Robot) -> Result<Calibration> {
     let prior = Calibration::read(file)?;
     if prior.status == Status::Refused {
         let why = prior.refusal.unwrap_or_default();

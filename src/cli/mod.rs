@@ -4,6 +4,8 @@ mod calibrate;
 #[cfg(feature = "sim")]
 mod campaign;
 mod check;
+#[cfg(feature = "sim")]
+mod confirm;
 mod exit;
 mod export;
 mod given;
@@ -13,6 +15,7 @@ mod interrupt;
 #[cfg(feature = "sim")]
 mod many;
 mod overrides;
+mod plan;
 #[cfg(feature = "sim")]
 mod progress;
 #[cfg(feature = "sim")]
@@ -28,6 +31,10 @@ mod stdout;
 mod study;
 #[cfg(feature = "sim")]
 mod study_paper;
+#[cfg(feature = "sim")]
+mod study_plan;
+#[cfg(feature = "sim")]
+mod study_poses;
 mod tagmap;
 
 use std::process::ExitCode;
@@ -63,6 +70,8 @@ enum Command {
     /// Show what one wrong joint offset does to the paper's two objectives and to the tool
     #[cfg(feature = "sim")]
     Sensitivity(sensitivity::SensitivityArgs),
+    /// Choose poses and paths for a routine's first capture without moving: plan.toml for an operator, plan.rrd to look at
+    Plan(plan::PlanArgs),
     /// Calibrate from recordings, simulated or of a real arm
     Calibrate(calibrate::CalibrateArgs),
     /// Find where the tags are, from camera views alone
@@ -74,7 +83,7 @@ enum Command {
     /// Open a recording in the Rerun viewer, or write it as .rrd
     #[cfg(feature = "viewer")]
     Replay(replay::ReplayArgs),
-    /// Read robot folders, routines, vehicles, calibrations, input maps, tag maps and tasks, and say what is wrong with them
+    /// Read robot folders, routines, vehicles, calibrations, input maps, tag maps, tasks and plans, and say what is wrong with them
     Check(check::CheckArgs),
 }
 
@@ -99,6 +108,7 @@ pub fn main() -> ExitCode {
         Command::Study(args) => study::study(&args),
         #[cfg(feature = "sim")]
         Command::Sensitivity(args) => sensitivity::sensitivity(&args),
+        Command::Plan(args) => plan::plan(&args),
         Command::Calibrate(args) => calibrate::calibrate(&args),
         Command::Tagmap(args) => tagmap::tagmap(&args),
         Command::Inspect(args) => inspect::inspect(&args),

@@ -26,6 +26,11 @@ impl Bar {
         Self { bar, started, interrupt }
     }
 
+    /// A line above the bar, on stderr, whether that is a terminal or not.
+    pub fn say(&self, line: &str) {
+        self.bar.suspend(|| eprintln!("{line}"));
+    }
+
     pub fn finish(&self) {
         self.bar.finish_and_clear();
     }

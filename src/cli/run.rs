@@ -6,6 +6,7 @@ use std::time::Instant;
 use anyhow::Result;
 use clap::Args;
 
+use super::confirm::Confirm;
 use super::exit::{Exit, of_good};
 use super::interrupt::Interrupt;
 use super::overrides::OverrideArgs;
@@ -25,6 +26,9 @@ pub(super) struct RunArgs {
     /// Output folder; recordings/ROUTINE-NAME if not given
     #[arg(long)]
     out: Option<PathBuf>,
+    /// Ask on stdin before each motion: y or nothing goes on, h holds, a aborts
+    #[arg(long)]
+    confirm: bool,
     #[command(flatten)]
     overrides: OverrideArgs,
 }
@@ -39,7 +43,11 @@ pub(super) fn run(args: &RunArgs) -> Result<Exit> {
         eprintln!("warning: an earlier run into this folder did not end; its recording is now {}", kept.display());
     }
     let mut bar = Bar::new(started, Interrupt::install()?);
-    let result = execute(&inputs, seed, &output, Keep::Everything, &mut bar);
+    let result = if args.confirm {
+        execute(&inputs, seed, &output, Keep::Everything, &mut Confirm::new(&mut bar, std::io::stdin().lock()))
+    } else {
+        execute(&inputs, seed, &output, Keep::Everything, &mut bar)
+    };
     bar.finish();
     let finished = result.map_err(explained)?;
     say(&format!("{}\nwritten      {}", table(&finished.summary), out.display()))?;

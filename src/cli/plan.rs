@@ -1,0 +1,215 @@
+//! `armcal plan`: poses and paths of a routine's first capture, without moving.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result};
+use clap::Args;
+use comfy_table::presets::{ASCII_MARKDOWN, UTF8_FULL_CONDENSED};
+use comfy_table::{CellAlignment, Table};
+
+use super::exit::Exit;
+use super::files;
+use super::given::read_prior;
+use super::overrides::OverrideArgs;
+use super::stdout::say;
+use crate::plan::{
+    ArmBelief, ClearanceModel, ItineraryRequest, PlanFile, PlanHeader, PlanStop, PoseTable, SetName, plan_itinerary,
+};
+use crate::robot::{Robot, Vehicle};
+use crate::routine::{self, Overrides, Routine, Step, effective_table};
+use crate::stats::stream_rng;
+
+#[derive(Debug, Args)]
+pub(super) struct PlanArgs {
+    /// The routine (.toml)
+    routine: PathBuf,
+    /// An accepted calibration.toml of this arm to plan under, instead of the datasheet
+    #[arg(long, value_name = "CALIBRATION.toml")]
+    prior: Option<PathBuf>,
+    /// Seed of the choice of poses and paths; the routine's own if not given
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+    /// Output folder for plan.toml, plan.md and plan.rrd; recordings/ROUTINE-NAME-plan if not given
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    #[command(flatten)]
+    overrides: OverrideArgs,
+}
+
+/// A new meaning of the file gets a new version.
+const DOMAIN: &[u8] = b"armcal plan 1";
+
+pub(super) fn plan(args: &PlanArgs) -> Result<Exit> {
+    let overrides = args.overrides.overrides();
+    let routine = routine::load_with(&args.routine, &overrides)?;
+    let (robot, vehicle) = routine.load_arm()?;
+    let belief = match &args.prior {
+        None => ArmBelief::datasheet(&robot),
+        Some(file) => ArmBelief::of(&robot, read_prior(file, &robot)?)?,
+    };
+    let seed = args.seed.unwrap_or(routine.seed);
+    let header = PlanHeader {
+        routine: routine.name.clone(),
+        vehicle: vehicle.name.clone(),
+        seed,
+        inputs_hash: inputs_hash(&args.routine, &overrides, (&robot, &vehicle), args.prior.as_deref(), seed)?,
+        margin_m: routine.capture.clearance_m,
+    };
+    let file = planned(&routine, (&robot, &vehicle), &belief, header)?;
+    for warning in &file.warnings {
+        eprintln!("warning: {warning}");
+    }
+    for left in &file.left_out {
+        eprintln!("warning: a pose is left out: {}", left.reason);
+    }
+    let out = args.out.clone().unwrap_or_else(|| Path::new("recordings").join(format!("{}-plan", routine.name)));
+    files::make_folder(&out)?;
+    let (toml, markdown) = (file.to_toml(), markdown(&file));
+    let (toml_path, markdown_path) = (out.join("plan.toml"), out.join("plan.md"));
+    #[cfg(feature = "viewer")]
+    let rrd = (out.join("plan.rrd"), picture(&routine, (&robot, &vehicle), &file, &markdown)?);
+    files::write_together(&[
+        #[cfg(feature = "viewer")]
+        (&rrd.0, &rrd.1),
+        (&markdown_path, markdown.as_bytes()),
+        (&toml_path, toml.as_bytes()),
+    ])?;
+    say(&format!("{}\n{}\nwritten      {}", table(&file, UTF8_FULL_CONDENSED), totals(&file), out.display()))?;
+    Ok(Exit::Ok)
+}
+
+fn planned(
+    routine: &Routine,
+    (robot, vehicle): (&Robot, &Vehicle),
+    belief: &ArmBelief,
+    header: PlanHeader,
+) -> Result<PlanFile> {
+    let model = || ClearanceModel::new(robot, vehicle, &routine.scene);
+    let clearance = model();
+    let growth_m = robot.gripper.as_ref().map_or(0.0, |gripper| gripper.outline_growth_m(gripper.opening_max_m));
+    let open = model().with_grown_gripper(growth_m);
+    let is_touched = routine.steps.iter().any(|step| matches!(step, Step::Reach(reach) if reach.touch));
+    let clearance_at_targets = if is_touched { &open } else { &clearance };
+    let request = ItineraryRequest { robot, routine, clearance: &clearance, clearance_at_targets, belief };
+    let itinerary = plan_itinerary(&request, &mut stream_rng(header.seed, "plan"))?;
+    Ok(PlanFile::new(header, &itinerary, belief, robot))
+}
+
+/// The plan's .rrd, to be put in place with the rest.
+#[cfg(feature = "viewer")]
+fn picture(
+    routine: &Routine,
+    (robot, vehicle): (&Robot, &Vehicle),
+    plan: &PlanFile,
+    markdown: &str,
+) -> Result<Vec<u8>> {
+    let folder = tempfile::tempdir().context("no temporary folder can be made")?;
+    let path = folder.path().join("plan.rrd");
+    let (scene, task) = (&routine.scene, &routine.task);
+    crate::replay::write_plan_rrd(&crate::replay::PlanInput { plan, robot, vehicle, scene, task, markdown }, &path)?;
+    std::fs::read(&path).context("plan.rrd cannot be read back")
+}
+
+/// BLAKE3 over all that the plan depends on; 64 hexadecimal digits. Comments and the places of files are left out.
+fn inputs_hash(
+    routine: &Path,
+    overrides: &Overrides,
+    (robot, vehicle): (&Robot, &Vehicle),
+    prior: Option<&Path>,
+    seed: u64,
+) -> Result<String> {
+    let mut hasher = blake3::Hasher::new();
+    let mut add = |bytes: &[u8]| {
+        hasher.update(&(bytes.len() as u64).to_le_bytes());
+        hasher.update(bytes);
+    };
+    let read = |path: &Path| std::fs::read(path).with_context(|| format!("{}: cannot be read", path.display()));
+    let mut table = effective_table(routine, &overrides.set)?;
+    for key in ["seed", "robot", "vehicle", "world", "campaign", "regress"] {
+        table.remove(key);
+    }
+    add(DOMAIN);
+    add(env!("CARGO_PKG_VERSION").as_bytes());
+    add(&seed.to_le_bytes());
+    add(table.to_string().as_bytes());
+    add(&read(&robot.folder.join("robot.toml"))?);
+    add(robot.urdf_text.as_bytes());
+    add(vehicle.text.as_bytes());
+    add(&prior.map(read).transpose()?.unwrap_or_default());
+    Ok(hasher.finalize().to_hex().to_string())
+}
+
+/// Degrees, millimetres: people read it.
+fn table(file: &PlanFile, preset: &str) -> String {
+    let mut table = Table::new();
+    table.load_preset(preset);
+    table.set_header(["pose", "for", "joints, deg", "raw counts", "tags", "clear, mm", "tool error, mm", "at, s"]);
+    for pose in &file.pose {
+        table.add_row(row(pose));
+    }
+    for column in [0, 5, 6, 7] {
+        if let Some(column) = table.column_mut(column) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+    }
+    table.to_string()
+}
+
+fn row(pose: &PoseTable) -> [String; 8] {
+    let list = |values: &[f64], digits: usize| {
+        values.iter().map(|value| format!("{value:.digits$}")).collect::<Vec<_>>().join(" ")
+    };
+    let degrees: Vec<f64> = pose.angles_rad.iter().map(|angle| angle.to_degrees()).collect();
+    let tags = pose.tags.iter().map(|tag| match tag.probability {
+        certain if certain > 0.995 => tag.id.to_string(),
+        share => format!("{} ({:.0} %)", tag.id, 100.0 * share),
+    });
+    [
+        pose.number.to_string(),
+        match pose.set {
+            SetName::Fit => "fit".to_owned(),
+            SetName::HeldOut => "check".to_owned(),
+        },
+        list(&degrees, 1),
+        list(&pose.raw_counts, 0),
+        tags.collect::<Vec<_>>().join(" "),
+        format!("{:.0} of {:.0}", 1e3 * pose.proven_clearance_m, 1e3 * pose.clearance_m),
+        pose.predicted_tool_error_m.map_or_else(|| "-".to_owned(), |m| format!("{:.2}", 1e3 * m)),
+        format!("{:.0}", pose.arm_time_s),
+    ]
+}
+
+fn totals(file: &PlanFile) -> String {
+    let totals = &file.totals;
+    let why = match totals.stop_reason {
+        PlanStop::Poses => "as many as asked for",
+        PlanStop::ToolError => "the tool error asked for is predicted",
+        PlanStop::Time => "the time is spent",
+        PlanStop::NoPoseLeft => "no other one sees enough tags and keeps clear",
+    };
+    let error = totals.predicted_tool_error_m.map_or_else(|| "-".to_owned(), |m| format!("{:.2} mm", 1e3 * m));
+    format!(
+        "planned      {} poses ({why}), {} left out, {:.0} s of the arm's time, {:.0} s of it moving\n\
+         tool error   {error} predicted after the last one\n\
+         clearance    proven {:.0} mm or more for every arm within {}, at the poses the least of the believed arm's beside it\n\
+         joints       {}",
+        totals.poses,
+        totals.left_out,
+        totals.arm_time_s,
+        totals.motion_s,
+        1e3 * totals.least_clearance_m,
+        if file.prior == "datasheet" { "the datasheet's bounds" } else { "the prior's bounds" },
+        file.joints.join(", ")
+    )
+}
+
+fn markdown(file: &PlanFile) -> String {
+    let lines: Vec<String> = totals(file).lines().map(|line| format!("- {line}")).collect();
+    format!(
+        "# Plan of `{}` for `{}`\n\n{}\n\n{}\n",
+        file.routine,
+        file.robot,
+        table(file, ASCII_MARKDOWN),
+        lines.join("\n")
+    )
+}
