@@ -4,9 +4,12 @@
 //! for any input; `recovery` puts known errors in and gets them back, `gripper_tag` with a tag that ties tool to camera,
 //! `map` with tags that nobody surveyed, `methods` by the paper's other methods, `detections` with some that are wrong, `failed` with sensors that fail; `wall` proves what belief does not know;
 //! `vehicles` puts every arm on every vehicle;
+//! `bumps` runs into things that nobody has drawn;
+//! `planning` reads plans and holds random arms against them;
 //! `determinism`, `closed_loop`, `script` and `cli` run the program, `kill` ends it badly; `sim` looks at the simulated
-//! world from outside; `real` reads recordings of real arms; `tagmap` maps tags in recordings that the test writes.
+//! world from outside; `uncalibrated` calibrates arms of which little is known; `real` reads recordings of real arms; `tagmap` maps tags in recordings that the test writes.
 
+mod bumps;
 mod cli;
 mod closed_loop;
 mod detections;
@@ -18,6 +21,7 @@ mod kill;
 mod map;
 mod methods;
 mod oracle;
+mod planning;
 mod property;
 mod real;
 mod recovery;
@@ -25,5 +29,6 @@ mod script;
 mod sim;
 mod support;
 mod tagmap;
+mod uncalibrated;
 mod vehicles;
 mod wall;

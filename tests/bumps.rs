@@ -1,0 +1,148 @@
+//! What nobody has drawn: the arm runs into it, notices, and goes back; and it never thinks so where there is nothing.
+
+use std::fs::File;
+use std::path::Path;
+use std::process::Stdio;
+
+use armcal::calib::Calibration;
+use armcal::log::read_recording;
+use armcal::sim::truth::{Truth, read_truth};
+use armcal::streams::{LogLevel, Message};
+use armcal::time::Stamp;
+
+use crate::support::{Answer, ShortRoutine, answer, finished, program, root, temp, write};
+
+/// A touch that is older than this when it is noticed has been noticed late, s.
+const NOTICED_S: f64 = 1.0;
+/// From noticing until the arm is back where it came from, at most, s.
+const BACK_S: f64 = 40.0;
+
+/// At the fourth target of the short routine, by the vehicle's frame: the base stands at (1.7, -0.6, 0.1).
+const ROCK: &str = "[[world.obstacle]]\nname = \"undrawn\"\nshape = \"sphere\"\nradius_m = 0.2\n\
+                    position_m = [3.306, -0.735, 0.585]\n";
+
+fn logged(recording: &Path, word: &str) -> Vec<(Stamp, LogLevel, String)> {
+    let recording = read_recording(recording).expect("the recording reads");
+    let lines = recording.messages.into_iter().filter_map(|(_, message)| match message {
+        Message::Log(line) if line.text.contains(word) => Some((line.stamp, line.level, line.text)),
+        _ => None,
+    });
+    lines.collect()
+}
+
+/// How long before `stamp` a touch of the arm began, s; `None` where there was none lately.
+fn touched_before_s(truth: &Truth, stamp: Stamp) -> Option<f64> {
+    let ages = truth.contacts.iter().map(|contact| stamp.since_s(contact.stamp)).filter(|age_s| *age_s >= -0.02);
+    ages.min_by(f64::total_cmp)
+}
+
+#[test]
+fn an_undrawn_rock_is_noticed_left_alone_and_calibrated_around() {
+    let folder = temp();
+    let run = finished(&ShortRoutine { tail: ROCK.to_owned(), ..ShortRoutine::default() }, folder.path());
+    let summary = run.summary();
+    let truth = read_truth(run.file("truth.mcap")).expect("the truth reads");
+    let bumps = logged(&run.file("run.mcap"), "bump: ");
+    eprintln!("{} contacts, bumps {bumps:?}", truth.contacts.len());
+    assert!(summary.capture.collisions.is_some_and(|n| n > 0), "the rock is there");
+    assert!(truth.contacts.iter().any(|c| c.part_a == "undrawn" || c.part_b == "undrawn"), "{:?}", truth.contacts);
+    assert!(!bumps.is_empty());
+    assert!(summary.capture.targets_skipped >= 1, "the rock lies in the target");
+    for (stamp, level, text) in &bumps {
+        assert_eq!(*level, LogLevel::Warn);
+        let age_s = touched_before_s(&truth, *stamp).expect("something was touched");
+        assert!(age_s < 5.0, "{text}: {age_s} s after the last touch began");
+        // It ends: some time later nothing is near.
+        let after = |seconds: f64| stamp.plus_s(seconds);
+        let freed =
+            truth.clearances.iter().any(|c| c.stamp > after(0.5) && c.stamp < after(BACK_S) && c.distance_m > 0.02);
+        assert!(freed, "{text}");
+    }
+    // A touch after some time without one is noticed at once.
+    let mut last: Option<Stamp> = None;
+    for contact in &truth.contacts {
+        let is_first = last.is_none_or(|last| contact.stamp.since_s(last) > BACK_S);
+        last = Some(contact.stamp);
+        let noticed = bumps.iter().any(|(stamp, ..)| (-0.02..NOTICED_S).contains(&stamp.since_s(contact.stamp)));
+        assert!(!is_first || noticed, "{contact:?} in {bumps:?}");
+    }
+    // Belief knows nothing of the rock: not in what it was given, only in what it felt.
+    let bytes = String::from_utf8_lossy(&run.bytes("run.mcap")).into_owned();
+    assert!(!bytes.contains("undrawn"));
+}
+
+/// Ten ordinary runs, among them rough water, worn sensors, a vehicle that floats and a joint that is declared locked.
+#[test]
+fn nothing_is_bumped_into_where_there_is_nothing() {
+    let folder = temp();
+    let locked = "[[failed_joint]]\njoint = \"wrist_yaw\"\nkind = \"locked\"\n\
+                  [[world.fault]]\nat_s = 0.5\nkind = \"joint_locked\"\njoint = \"wrist_yaw\"\n";
+    let mut routines: Vec<_> = [
+        "titan4-quickstart",
+        "rough-sea",
+        "worn-sensors",
+        "free-vehicle",
+        "tight-basket",
+        "kraft-open-frame",
+        "under-ice",
+        "all-effects",
+        "recorded-motion",
+        "slipped-sensor",
+    ]
+    .map(|name| root().join(format!("routines/{name}.toml")))
+    .to_vec();
+    routines.push(ShortRoutine { tail: locked.to_owned(), ..ShortRoutine::default() }.write(folder.path()));
+    for (n, routine) in routines.iter().enumerate() {
+        let out = folder.path().join(n.to_string());
+        let mut command = program();
+        command.arg("run").arg(routine).arg("--out").arg(&out).args(["--seed", &(n + 1).to_string()]);
+        let answer = answer(&mut command);
+        // With a joint that does not move no view may come about; that is no bump either, and what was recorded stays.
+        let is_cut = out.join("run-cut-1.mcap").is_file();
+        assert!([0, 4].contains(&answer.code) || is_cut, "{}: {answer:?}", routine.display());
+        let [run, truth] = if is_cut { ["run-cut-1.mcap", "truth-cut-1.mcap"] } else { ["run.mcap", "truth.mcap"] };
+        let truth = read_truth(out.join(truth)).expect("the truth reads");
+        for (stamp, _, text) in logged(&out.join(run), "bump: ") {
+            let touched_s = touched_before_s(&truth, stamp);
+            assert!(touched_s.is_some_and(|age_s| age_s < 5.0), "{}: {text}: {touched_s:?}", routine.display());
+        }
+    }
+}
+
+fn confirmed(routine: &Path, out: &Path, answers: &str, folder: &Path) -> Answer {
+    let file = folder.join("answers");
+    write(&file, answers);
+    let stdin = Stdio::from(File::open(&file).expect("opened"));
+    answer(program().arg("run").arg(routine).arg("--confirm").arg("--out").arg(out).stdin(stdin))
+}
+
+#[test]
+fn an_operator_approves_holds_and_aborts() {
+    let folder = temp();
+    let routine = ShortRoutine::default().write(folder.path());
+    let out = |name: &str| folder.path().join(name);
+    // Nobody there: nothing moves.
+    let none = confirmed(&routine, &out("none"), "", folder.path());
+    none.expect("no answer", 1, &["next: ", "nobody answers on stdin", "recording"]);
+    let kept = out("none").join("run-cut-1.mcap");
+    assert_eq!(logged(&kept, "approved: ").len(), 0);
+    assert_eq!(logged(&kept, "aborted before a motion (nobody answers on stdin)").len(), 1);
+    // Two motions, a hold before the second, nonsense before the third, and an end.
+    let some = confirmed(&routine, &out("some"), "y\nh\n\nmaybe\na\n", folder.path());
+    some.expect("aborted", 1, &["`maybe` is none of y, h, a", "stopped on request"]);
+    let kept = out("some").join("run-cut-1.mcap");
+    let approved = logged(&kept, "approved: ");
+    assert_eq!(approved.len(), 2, "{approved:?}");
+    assert!(approved[0].2.contains("m clear") && approved[0].2.contains("deg"), "{approved:?}");
+    let held = logged(&kept, "held by the operator");
+    assert_eq!(held.len(), 1);
+    assert!(approved[1].0.since_s(held[0].0) >= 5.0, "it waits");
+    assert_eq!(logged(&kept, "aborted before a motion (the operator said so)").len(), 1);
+    // Approved all the way it is the run that it would have been without.
+    let all = confirmed(&routine, &out("all"), &"y\n".repeat(2000), folder.path());
+    all.expect("approved", 0, &["ACCEPTED"]);
+    answer(program().arg("run").arg(&routine).arg("--out").arg(out("free"))).expect("free", 0, &["ACCEPTED"]);
+    let [confirmed, free] =
+        ["all", "free"].map(|name| Calibration::read(&out(name).join("calibration.toml")).expect("it reads"));
+    assert_eq!(confirmed.joint, free.joint);
+}

@@ -1,0 +1,199 @@
+//! `armcal plan`: what it promises, held against random arms; what it refuses.
+
+use std::path::{Path, PathBuf};
+
+use armcal::plan::{ClearanceModel, JointErrorBounds, PlanFile, PlanStop};
+use armcal::robot::Robot;
+use armcal::routine;
+use armcal::sensor::ArmSensors;
+use armcal::stats::stream_rng;
+use armcal::streams::JointAngles;
+use rand::RngExt;
+
+use crate::support::{Answer, ShortRoutine, answer, edit, program, read, shared_run, temp, write};
+
+fn plan(routine: &Path, out: &Path, more: &[&str]) -> Answer {
+    answer(program().arg("plan").arg(routine).arg("--out").arg(out).args(more))
+}
+
+/// Plans and reads what was written.
+#[track_caller]
+fn planned(routine: &Path, out: &Path, more: &[&str]) -> PlanFile {
+    plan(routine, out, more).expect("a plan", 0, &["predicted after the last one", "plan"]);
+    PlanFile::read(&out.join("plan.toml")).expect("the plan reads")
+}
+
+fn short(folder: &Path, tail: &str) -> PathBuf {
+    ShortRoutine { tail: tail.to_owned(), ..ShortRoutine::default() }.write(folder)
+}
+
+#[test]
+fn the_same_input_gives_the_same_bytes_and_check_reads_them() {
+    let folder = temp();
+    let routine = short(folder.path(), "");
+    let outs = ["a", "b", "c"].map(|name| folder.path().join(name));
+    planned(&routine, &outs[0], &[]);
+    planned(&routine, &outs[1], &[]);
+    let other = planned(&routine, &outs[2], &["--seed", "2"]);
+    for name in ["plan.toml", "plan.md"] {
+        assert_eq!(read(&outs[0].join(name)), read(&outs[1].join(name)), "{name}");
+    }
+    let first = PlanFile::read(&outs[0].join("plan.toml")).expect("reads");
+    assert_ne!(first.pose[0].angles_rad, other.pose[0].angles_rad, "another seed, other poses");
+    assert_ne!(first.inputs_hash, other.inputs_hash);
+    assert_eq!((first.totals.poses, first.totals.stop_reason), (first.pose.len(), PlanStop::Poses));
+    assert_eq!(first.totals.poses + first.totals.left_out, 16);
+    let file = outs[0].join("plan.toml");
+    answer(program().arg("check").arg(&file)).expect("check", 0, &["plan for `titan4`", "clear"]);
+    for (from, to, word) in [
+        ("version = 1", "version = 2", "version"),
+        ("number = 2", "number = 7", "pose 2: number"),
+        ("margin_m = 0.05", "margin_m = nan", "margin_m"),
+        ("joints = [", "joints = [\"extra\", ", "start_rad"),
+    ] {
+        let spoilt = folder.path().join("spoilt.toml");
+        std::fs::copy(&file, &spoilt).expect("copied");
+        edit(&spoilt, from, to);
+        answer(program().arg("check").arg(&spoilt)).expect(word, 2, &["spoilt.toml", word]);
+    }
+}
+
+/// What an operator would command is what the sensors as believed in read at the planned angles.
+#[test]
+fn counts_belong_to_their_angles() {
+    let folder = temp();
+    let file = planned(&short(folder.path(), ""), folder.path(), &[]);
+    let robot = crate::support::titan();
+    let sensors = ArmSensors::nominal(&robot);
+    for pose in &file.pose {
+        let counts = sensors.counts(&JointAngles::from_slice(&pose.angles_rad));
+        for (joint, spec) in robot.sensors.iter().enumerate() {
+            let apart = (pose.raw_counts[joint] - counts[joint]).abs();
+            let apart = apart.min(spec.wrap_counts - apart);
+            // Digits of the file: 1e-6 rad and 1e-3 counts.
+            assert!(apart <= 1e-6 * spec.counts_per_rad.abs() + 1e-3, "pose {}: {joint}: {apart}", pose.number);
+        }
+    }
+    for (n, path) in file.path.iter().enumerate() {
+        assert_eq!(path.waypoints_rad.last(), Some(&file.pose[n].angles_rad), "a path ends where its pose is");
+        assert_eq!(path.waypoints_counts.last(), Some(&file.pose[n].raw_counts));
+        let before = if n == 0 { &file.start_rad } else { &file.pose[n - 1].angles_rad };
+        assert_eq!(path.waypoints_rad.first(), Some(before), "and begins at the one before");
+    }
+}
+
+#[test]
+fn a_prior_narrows_the_bounds_and_renames_the_angles() {
+    let folder = temp();
+    let routine = short(folder.path(), "");
+    let datasheet = planned(&routine, &folder.path().join("datasheet"), &[]);
+    let calibration = shared_run().file("calibration.toml");
+    let prior = planned(&routine, &folder.path().join("prior"), &["--prior", calibration.to_str().expect("UTF-8")]);
+    assert_eq!(datasheet.prior, "datasheet");
+    assert_eq!(prior.prior.len(), 64);
+    let mean = |file: &PlanFile, joint: usize| {
+        file.pose.iter().map(|pose| pose.error_bound_rad[joint]).sum::<f64>() / file.pose.len() as f64
+    };
+    for joint in 0..5 {
+        let (before, after) = (mean(&datasheet, joint), mean(&prior, joint));
+        assert!(after < 0.6 * before, "joint {joint}: {before} {after}");
+    }
+    // The start is the same believed pose, but not the same readings: the sensors are believed to be off.
+    assert_eq!(prior.start_rad, datasheet.start_rad);
+    let robot = crate::support::titan();
+    let moved = (0..5).filter(|&j| (prior.start_counts[j] - datasheet.start_counts[j]).abs() > 10.0).count();
+    assert!(moved >= 4, "{:?} {:?}", prior.start_counts, datasheet.start_counts);
+    // What the errors take from the believed arm's clearance is less.
+    let lost = |file: &PlanFile| {
+        file.pose.iter().map(|pose| pose.clearance_m - pose.proven_clearance_m).sum::<f64>() / file.pose.len() as f64
+    };
+    assert!(lost(&prior) < lost(&datasheet), "{} {}", lost(&prior), lost(&datasheet));
+    let other = folder.path().join("other.toml");
+    write(&other, &read(&calibration).replace(&robot.name, "other"));
+    plan(&routine, folder.path(), &["--prior", other.to_str().expect("UTF-8")]).expect("other arm", 2, &["other.toml"]);
+}
+
+/// A true arm within the error box about a believed one, each end of each joint as likely as all between.
+fn random_arm(robot: &Robot, bounds: &JointErrorBounds, believed: &JointAngles, rng: &mut impl RngExt) -> JointAngles {
+    JointAngles::from_fn(believed.len(), |joint| {
+        // The last joint turns a nearly round gripper: its error moves no outline.
+        if robot.chain.joints()[joint].limits.is_none() {
+            return believed[joint];
+        }
+        let error_rad = bounds.error_rad(joint, believed[joint]);
+        believed[joint] + error_rad * rng.random_range(-2.0..=2.0_f64).clamp(-1.0, 1.0)
+    })
+}
+
+/// Every arm within the datasheet's bounds keeps what the plan proves, at the poses and on the way.
+#[test]
+fn every_edge_keeps_its_proven_clearance_for_random_arms() {
+    let folder = temp();
+    let box_beside =
+        "[[obstacle]]\nname = \"rock\"\nshape = \"sphere\"\nradius_m = 0.3\nposition_m = [3.3, -1.6, -0.2]\n";
+    let file = short(folder.path(), box_beside);
+    let plan = planned(&file, folder.path(), &[]);
+    let routine = routine::load(&file).expect("the routine reads");
+    let (robot, vehicle) = routine.load_arm().expect("the arm reads");
+    let model = ClearanceModel::new(&robot, &vehicle, &routine.scene);
+    let bounds = JointErrorBounds::prior(&robot);
+    let mut rng = stream_rng(3, "arms");
+    let (mut least_m, mut spare_m) = (f64::INFINITY, f64::INFINITY);
+    for path in &plan.path {
+        for edge in path.waypoints_rad.windows(2) {
+            for _ in 0..400 {
+                let share = rng.random_range(0.0..=1.0);
+                let believed =
+                    JointAngles::from_fn(robot.n_joints(), |j| edge[0][j] + share * (edge[1][j] - edge[0][j]));
+                let found_m = model.nearest(&random_arm(&robot, &bounds, &believed, &mut rng)).distance_m;
+                (least_m, spare_m) = (least_m.min(found_m), spare_m.min(found_m - path.proven_clearance_m));
+            }
+        }
+    }
+    // To the digits of the file: 1e-6 rad over 2 m.
+    assert!(least_m >= plan.margin_m - 1e-5, "{least_m}");
+    assert!(spare_m >= -1e-5, "{spare_m}");
+    // Random arms do come near to what was proven: the promise is no empty one.
+    assert!(spare_m < 0.02, "{spare_m}");
+}
+
+#[test]
+fn what_cannot_be_planned_is_named() {
+    let folder = temp();
+    let out = folder.path().join("out");
+    let far = ShortRoutine { targets_m: vec![[4.0, 0.0, 0.0], [0.0, 0.0, 5.0]], ..ShortRoutine::default() };
+    let refused = |routine: &Path, more: &[&str], words: &[&str]| {
+        plan(routine, &out, more).expect("refused", 2, words);
+        assert!(!out.join("plan.toml").exists(), "{words:?}");
+    };
+    refused(&far.write(folder.path()), &[], &["none of the 2 targets", "target 0", "4.000"]);
+    let rock = "[[obstacle]]\nname = \"rock\"\nshape = \"sphere\"\nradius_m = 0.5\nposition_m = [2.6, -0.6, 0.2]\n";
+    refused(&short(folder.path(), rock), &[], &["the arm starts too close", "rock"]);
+    let script = "[[step]]\ndo = \"move\"\nto_rad = [-2.4, -0.3, 0.0, 0.0, 0.0, 0.0]\n\
+                  [[step]]\ndo = \"capture\"\n[[step]]\ndo = \"calibrate\"\n";
+    let file = short(folder.path(), script);
+    plan(&file, &folder.path().join("moved"), &[]).expect("a free goal", 0, &[]);
+    let robot = crate::support::titan();
+    let goal = JointAngles::from_slice(&[-2.4, -0.3, 0.0, 0.0, 0.0, 0.0]);
+    let tool = robot.chain.link_poses(&goal).frame(&robot.tool.mount).translation.vector;
+    // The base stands at (1.7, -0.6, 0.1) of the vehicle, turned by nothing.
+    let [x, y, z] = [tool.x + 1.7, tool.y - 0.6, tool.z + 0.1];
+    let rock =
+        format!("[[obstacle]]\nname = \"rock\"\nshape = \"sphere\"\nradius_m = 0.1\nposition_m = [{x}, {y}, {z}]\n");
+    refused(&short(folder.path(), &format!("{script}{rock}")), &[], &["step 1", "the goal is inside", "rock"]);
+    refused(&short(folder.path(), &script.replace("-0.3", "1.5")), &[], &["step 1", "shoulder_pitch", "stop"]);
+    refused(&short(folder.path(), ""), &["--set", "capture.min_tags=60"], &["60", "tags"]);
+    refused(&short(folder.path(), ""), &["--prior", "nowhere.toml"], &["nowhere.toml"]);
+}
+
+/// One target of five beyond the arm's reach before calibration: a warning, and a plan for the others.
+#[test]
+fn a_single_target_out_of_reach_is_a_warning() {
+    let folder = temp();
+    let mut routine = ShortRoutine::default();
+    routine.targets_m[2] = [3.5, 0.0, 0.0];
+    let file = planned(&routine.write(folder.path()), folder.path(), &[]);
+    assert_eq!(file.warnings.len(), 1, "{:?}", file.warnings);
+    assert!(file.warnings[0].contains("target 2"), "{:?}", file.warnings);
+    assert_eq!(file.totals.poses + file.totals.left_out, 16);
+}
