@@ -190,6 +190,9 @@ impl Run<'_, '_> {
                     }
                 }
             };
+            if chosen.poses.is_empty() {
+                break Stop::NoPoseLeft.to_string();
+            }
             self.log_plan(&chosen)?;
             views.enough_at = chosen.needed.map(|needed| (views.n_fit + needed).max(views.n_for_verdict));
             self.visit_some(&chosen, &mut views, replans)?;
