@@ -166,7 +166,7 @@ pub enum ItineraryError {
 
 /// Samples that a path planner may try before it gives a pose up; as a session's.
 const MAX_PATH_SAMPLES: usize = 400;
-/// How long an arm takes to come to rest after a path, s. Median of a session in the standard world.
+/// How long an arm takes to come to rest after a path, s. Assumed.
 const SETTLE_S: f64 = 1.0;
 /// Joint step between the samples of a believed arm's path, rad: a link's end 2 m away moves 2 cm.
 const SAMPLE_RAD: f64 = 0.01;
