@@ -11,12 +11,14 @@ mod fisheye;
 mod radtan;
 mod square;
 pub mod tag36h11;
+mod twist;
 
 pub use camera::{CameraModel, Lens};
 pub use corner_noise::{CornerNoise, DetectionChance};
 pub use fisheye::Fisheye;
 pub use radtan::Radtan;
 pub use square::{SquareError, SquarePose, solve_square, solve_square_both, square_corners};
+pub use twist::pixel_by_twist;
 
 /// The wrist camera's lens, for tests.
 #[cfg(test)]

@@ -77,14 +77,20 @@ pub fn write_rrd(input: &ReplayInput, out: &Path) -> Result<(), ReplayError> {
         None => None,
     };
     let run = Run { tracks, truth, robot: input.robot, vehicle: input.vehicle, scene: input.scene };
-    let mut stream = Stream::default();
-    scenery::draw(&run, &mut stream);
-    arms::draw(&run, &mut stream);
-    targets::draw(&run, &mut stream);
-    camera::draw(&run, &mut stream);
-    plots::draw(&run, &mut stream);
-    phases::draw(&run, &mut stream);
-    summary::draw(&run, input, &mut stream);
+    let stream = draw(&run, input);
     let identity = rrd::Identity::of(input)?;
     rrd::write(out, &identity, &layout::build(&run), stream)
+}
+
+/// All that a recording shows, whoever made it.
+fn draw(run: &Run<'_>, input: &ReplayInput<'_>) -> Stream {
+    let mut stream = Stream::default();
+    scenery::draw(run, &mut stream);
+    arms::draw(run, &mut stream);
+    targets::draw(run, &mut stream);
+    camera::draw(run, &mut stream);
+    plots::draw(run, &mut stream);
+    phases::draw(run, &mut stream);
+    summary::draw(run, input, &mut stream);
+    stream
 }

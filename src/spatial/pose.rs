@@ -3,7 +3,7 @@
 use std::marker::PhantomData;
 use std::ops::Mul;
 
-use nalgebra::{Isometry3, Matrix3, Point3, Quaternion, Translation3, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Quaternion, Translation3, UnitQuaternion, Vector3, Vector6};
 
 use super::frames::Frame;
 
@@ -146,6 +146,18 @@ impl<A: Frame, B: Frame> Mul<Point<B>> for Pose<A, B> {
     fn mul(self, rhs: Point<B>) -> Point<A> {
         Point { coords: self.isometry * rhs.coords, frame: PhantomData }
     }
+}
+
+/// The adjoint of a pose: maps a twist (translation, rotation) of frame B to frame A, `exp(Ad xi) = X exp(xi) X^-1` (Barfoot, eq. 7.46
+/// with the halves exchanged).
+#[must_use]
+pub fn adjoint(a_from_b: &Isometry3<f64>) -> Matrix6<f64> {
+    let rotation = *a_from_b.rotation.to_rotation_matrix().matrix();
+    let mut out = Matrix6::zeros();
+    out.fixed_view_mut::<3, 3>(0, 0).copy_from(&rotation);
+    out.fixed_view_mut::<3, 3>(3, 3).copy_from(&rotation);
+    out.fixed_view_mut::<3, 3>(0, 3).copy_from(&(skew(&a_from_b.translation.vector) * rotation));
+    out
 }
 
 /// The cross-product matrix: `skew(a) * b = a x b`.

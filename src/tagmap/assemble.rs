@@ -6,12 +6,13 @@ use nalgebra::{Isometry3, Matrix6};
 
 use super::adjust::degrees_of_freedom;
 use super::groups::Group;
-use super::linearize::{Loss, Normal, adjoint, cost};
+use super::linearize::{Loss, Normal, cost};
 use super::problem::Problem;
 use super::result::{MapGroup, MappedTag, RelativeBodyPose, TagMap};
 use super::screen::Screened;
 use super::sparse::Factor;
 use super::types::{MapInput, MapRejection, RejectedDetection};
+use crate::spatial::adjoint;
 use crate::spatial::log;
 use crate::stats::quantile;
 

@@ -6,13 +6,13 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Matrix2x3, Matrix2x6, Matrix3, Matrix6, Vector2, Vector6};
+use nalgebra::{Isometry3, Matrix2x3, Matrix2x6, Matrix6, Vector2, Vector6};
 
 use super::attitude;
 use super::problem::{Block, Observation, Problem, TagState};
 use super::sparse::{Pattern, System};
 use crate::optics::CameraModel;
-use crate::spatial::{log, skew};
+use crate::spatial::{adjoint, log, skew};
 
 /// What far residuals cost.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -283,15 +283,5 @@ fn beside(left: &Matrix2x3<f64>, right: &Matrix2x3<f64>) -> Matrix2x6<f64> {
     let mut out = Matrix2x6::zeros();
     out.fixed_view_mut::<2, 3>(0, 0).copy_from(left);
     out.fixed_view_mut::<2, 3>(0, 3).copy_from(right);
-    out
-}
-
-/// exp(Ad xi) = pose exp(xi) pose^-1, for xi = (translation, rotation). Barfoot eq. 7.46 with the halves exchanged.
-pub(super) fn adjoint(pose: &Isometry3<f64>) -> Matrix6<f64> {
-    let rotation: Matrix3<f64> = *pose.rotation.to_rotation_matrix().matrix();
-    let mut out = Matrix6::zeros();
-    out.fixed_view_mut::<3, 3>(0, 0).copy_from(&rotation);
-    out.fixed_view_mut::<3, 3>(3, 3).copy_from(&rotation);
-    out.fixed_view_mut::<3, 3>(0, 3).copy_from(&(skew(&pose.translation.vector) * rotation));
     out
 }

@@ -6,9 +6,9 @@
 
 use nalgebra::{Isometry3, Matrix6, Vector6};
 
-use super::linearize::adjoint;
 use super::problem::Observation;
 use crate::optics::SquarePose;
+use crate::spatial::adjoint;
 use crate::spatial::{exp, log};
 
 /// Images that vote; more change nothing but the time. Assumed.

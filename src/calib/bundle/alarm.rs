@@ -10,9 +10,10 @@ use nalgebra::{DMatrix, DVector, Matrix6, SMatrix, Vector3, Vector6};
 use super::eliminated::{Eliminated, N_OWN};
 use super::estimate::Estimate;
 use super::problem::Seen;
-use super::sighting::{Info, adjoint};
+use super::sighting::Info;
 use crate::joints::{JointAngles, MAX_JOINTS};
 use crate::kinematics::LinkPoses;
+use crate::spatial::adjoint;
 use crate::stats::chi_square_above;
 
 /// Size of an error of geometry that is worth a look: what the data cannot tell to that is not tested.

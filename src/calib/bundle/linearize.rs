@@ -11,9 +11,10 @@ use nalgebra::{DMatrix, DVector, Isometry3, Matrix6, SMatrix, SVector, Vector6};
 use super::eliminated::{Columns, Directions, Eliminated, Group, MOUNT, N_DIRECTIONS, N_OWN, Own, TIME};
 use super::problem::{Problem, State};
 use super::robust::Loss;
-use super::sighting::{Info, LensInfo, adjoint, right_jacobian_inverse};
+use super::sighting::{Info, LensInfo, right_jacobian_inverse};
 use crate::joints::MAX_JOINTS;
 use crate::kinematics::LinkPoses;
+use crate::spatial::adjoint;
 use crate::spatial::log;
 
 /// The normal equations at one state.

@@ -7,8 +7,8 @@
 use nalgebra::{Isometry3, Matrix2x3, Matrix6, SMatrix, SVector, Vector2, Vector3, Vector6};
 
 use super::problem::Seen;
-use crate::optics::Fisheye;
-use crate::spatial::{log, skew};
+use crate::optics::{Fisheye, pixel_by_twist};
+use crate::spatial::{adjoint, log, skew};
 
 /// A sighting linearized, in the camera's frame.
 #[derive(Clone, Debug)]
@@ -47,16 +47,6 @@ const UNSEEN_SIGMAS: f64 = 1e3;
 /// What it costs that the lens cannot have seen `seen`.
 pub(super) fn unseen_chi2(seen: &Seen) -> f64 {
     seen.n_coordinates() as f64 * UNSEEN_SIGMAS * UNSEEN_SIGMAS
-}
-
-/// Adjoint of a pose: maps a twist (translation, rotation) of frame B to frame A.
-pub(super) fn adjoint(a_from_b: &Isometry3<f64>) -> Matrix6<f64> {
-    let rotation = *a_from_b.rotation.to_rotation_matrix().matrix();
-    let mut out = Matrix6::zeros();
-    out.fixed_view_mut::<3, 3>(0, 0).copy_from(&rotation);
-    out.fixed_view_mut::<3, 3>(3, 3).copy_from(&rotation);
-    out.fixed_view_mut::<3, 3>(0, 3).copy_from(&(skew(&a_from_b.translation.vector) * rotation));
-    out
 }
 
 /// Inverse of the right Jacobian of SE(3), to the second order: `log(exp(d) exp(x)) = d + J x`. For deviations from a prior,
@@ -125,12 +115,8 @@ fn of_corners(
     }
     for ((p, measured), (pixel, by_point)) in points.iter().zip(corners_px).zip(projected) {
         let residual = [measured[0] - pixel.x, measured[1] - pixel.y];
-        let mut rows = [[0.0; 6]; 2];
-        for (axis, row) in rows.iter_mut().enumerate() {
-            let a = [by_point[(axis, 0)], by_point[(axis, 1)], by_point[(axis, 2)]];
-            // a . (-rho - omega x p): -a, and a x p for omega.
-            *row = [-a[0], -a[1], -a[2], a[1] * p.z - a[2] * p.y, a[2] * p.x - a[0] * p.z, a[0] * p.y - a[1] * p.x];
-            let r = residual[axis];
+        let rows = pixel_by_twist(&by_point, p);
+        for (row, &r) in rows.iter().zip(&residual) {
             chi2 += r * r;
             for i in 0..6 {
                 g[i] += row[i] * r;

@@ -8,9 +8,9 @@
 use nalgebra::{Cholesky, Isometry3, Matrix6, SMatrix, Vector3};
 
 use super::unknowns::{Basis, N_DIRECTIONS, Unknowns, WIDTH, basis};
-use crate::optics::{CornerNoise, square_corners};
+use crate::optics::{CornerNoise, pixel_by_twist, square_corners};
 use crate::robot::Robot;
-use crate::spatial::skew;
+use crate::spatial::adjoint;
 use crate::streams::{JointAngles, MAX_JOINTS};
 
 /// Columns: each joint's angle, mount, survey.
@@ -77,8 +77,8 @@ impl Optics {
         for ((pixel_px, row), point) in corners_px.iter_mut().zip(&mut rows).zip(&points) {
             let (pixel, by_point) = lens.project_with_jacobian(point)?;
             *pixel_px = [pixel.x, pixel.y];
-            row.fixed_view_mut::<2, 3>(0, 0).copy_from(&-by_point);
-            row.fixed_view_mut::<2, 3>(0, 3).copy_from(&(by_point * skew(point)));
+            let [x, y] = pixel_by_twist(&by_point, point);
+            *row = SMatrix::from_rows(&[x.into(), y.into()]);
         }
         let weights = self.weights(robot, &corners_px, camera_from_tag.translation.vector.norm(), size_m);
         Some(rows.iter().zip(weights).map(|(row, weight)| row.tr_mul(row) * weight).sum())
@@ -179,14 +179,4 @@ fn with_own_survey_error(robot: &Robot, sight: &Sight) -> Option<Matrix6<f64>> {
     let own = Matrix6::from_diagonal(&nalgebra::Vector6::from_fn(|k, _| std(k).powi(2)));
     let noise = Cholesky::new(sight.info)?.inverse() + sight.adjoint * own * sight.adjoint.transpose();
     Some(Cholesky::new(noise)?.inverse())
-}
-
-/// Adjoint of a pose: maps a twist (translation, rotation) of frame B to frame A.
-pub(super) fn adjoint(a_from_b: &Isometry3<f64>) -> Matrix6<f64> {
-    let rotation = *a_from_b.rotation.to_rotation_matrix().matrix();
-    let mut out = Matrix6::zeros();
-    out.fixed_view_mut::<3, 3>(0, 0).copy_from(&rotation);
-    out.fixed_view_mut::<3, 3>(3, 3).copy_from(&rotation);
-    out.fixed_view_mut::<3, 3>(0, 3).copy_from(&(skew(&a_from_b.translation.vector) * rotation));
-    out
 }

@@ -7,11 +7,11 @@
 use nalgebra::{DMatrix, Matrix6, Vector6};
 
 use super::PoseRequest;
-use super::look::adjoint;
 use crate::calib::bundle::{MOUNT_ROWS, Scales};
 use crate::calib::{Calibration, Parameter, ParameterKind};
 use crate::robot::{FailedKind, Robot};
 use crate::sensor::{N_SHAPE, shape_basis};
+use crate::spatial::adjoint;
 use crate::streams::MAX_JOINTS;
 
 /// Parameters of one joint: gain, offset, nonlinearity.
