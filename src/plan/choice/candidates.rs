@@ -31,7 +31,7 @@ pub(super) struct Candidate {
 pub(super) struct Refused {
     pub tried: usize,
     /// How many draws have 0, 1, .. tags in view; the last counts all beyond.
-    by_tags: [usize; 9],
+    by_tags: [usize; MOST_TAGS + 1],
     /// The tag in view of a pose that came nearest to being clear, and by how much it lacks.
     nearest: Option<(u32, f64)>,
     /// See enough tags with the believed arm, but not with most that the belief allows.
@@ -40,6 +40,8 @@ pub(super) struct Refused {
     blocked: usize,
 }
 
+/// More tags in view are counted as so many.
+const MOST_TAGS: usize = 31;
 const MAX_DRAWS: usize = 200_000;
 /// Poses that see enough and are not clear; then it is not for want of tags.
 const MAX_BLOCKED: usize = 20_000;
@@ -171,7 +173,7 @@ impl<'a> Search<'a> {
         }
         let poses = robot.chain.link_poses(&angles);
         let in_view = request.visibility.in_view(robot, &poses).count();
-        self.refused.by_tags[in_view.min(8)] += 1;
+        self.refused.by_tags[in_view.min(MOST_TAGS)] += 1;
         if in_view < min_tags.max(1) {
             return None;
         }
@@ -195,7 +197,7 @@ impl<'a> Search<'a> {
             self.refused.unsure += 1;
             return None;
         }
-        if let Some(nearest) = request.clearance.too_near(&angles, request.bounds, margin_m) {
+        if let Some(nearest) = request.clearance.too_near_arriving(&angles, request.bounds, margin_m) {
             self.refused.blocked += 1;
             let tag = request.visibility.in_view(robot, &poses).next().map(|idx| robot.tags[idx].id);
             if let Some(tag) = tag.filter(|_| self.refused.nearest.is_none_or(|(_, most)| nearest.distance_m > most)) {
@@ -280,9 +282,9 @@ impl Refused {
         if request.robot.tags.is_empty() {
             return "there is no tag to see".to_owned();
         }
-        let enough: usize = self.by_tags[min_tags.clamp(1, 8)..].iter().sum();
+        let enough: usize = self.by_tags[min_tags.clamp(1, MOST_TAGS)..].iter().sum();
         if enough == 0 {
-            let most = (1..min_tags.min(9)).rev().find(|&n| self.by_tags[n] > 0);
+            let most = (1..min_tags.min(MOST_TAGS + 1)).rev().find(|&n| self.by_tags[n] > 0);
             return match most {
                 Some(n) => {
                     let poses: usize = self.by_tags[n..].iter().sum();

@@ -109,7 +109,7 @@ const MIN_CANDIDATES: usize = 300;
 /// Chooses `n_fit` views for the fit and `n_held_out` for the verdict.
 ///
 /// # Errors
-/// [`PlanError::NoUsefulPose`], [`PlanError::TooFewPoses`].
+/// [`PlanError::NoUsefulPose`], [`PlanError::TooFewPoses`], [`PlanError::TooFewTags`].
 pub fn choose_poses(request: &PoseRequest<'_>, rng: &mut ChaCha8Rng) -> Result<PosePlan, PlanError> {
     let wanted = request.n_fit + request.n_held_out;
     PosePool::gather(request, (wanted * CANDIDATES_PER_POSE).max(MIN_CANDIDATES), rng)?.choose(request, rng)

@@ -13,7 +13,7 @@ use super::unknowns::Unknowns;
 use crate::streams::JointAngles;
 
 /// What the arm's time counts beside the measure.
-const TIME_POWER: f64 = 0.5;
+const TIME_POWER: f64 = 0.7;
 const MAX_ROUNDS: usize = 3;
 /// An exchange that gains less than this is not made.
 const LEAST_GAIN: f64 = 1e-3;
@@ -258,7 +258,7 @@ impl<'a> Picker<'a> {
         let (mut first, mut at): (Vec<usize>, JointAngles) = (Vec::new(), self.tour.start);
         for _ in 0..n.min(chosen.len()) {
             let worth = |k: usize, scratch: &mut Scratch| {
-                let way_s = self.tour.timing.edge_duration_s(&at, &self.candidates[k].angles);
+                let way_s = self.tour.timing.least_duration_s(&at, &self.candidates[k].angles);
                 standing.gain(&self.tellings[k], scratch) / (self.view_s + way_s)
             };
             let mut best: Option<(f64, usize)> = None;

@@ -3,13 +3,13 @@
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-use super::super::timing::Timing;
+use super::super::timing::{SETTLE_S, Timing};
 use super::candidates::{Candidate, Refused, Search};
 use super::criterion::Measure;
 use super::forecast::{Forecast, Task};
 use super::look::{Look, Optics, Telling};
 use super::pick::Picker;
-use super::tour::{SETTLE_S, Tour};
+use super::tour::Tour;
 use super::unknowns::Unknowns;
 use super::{PlanError, PlannedPose, PosePlan, PoseRequest};
 use crate::routine::PoseCriterion;
@@ -54,8 +54,12 @@ impl PosePool {
     /// Draws until there are `enough`, or no more are found.
     ///
     /// # Errors
-    /// [`PlanError::NoUsefulPose`] where there is none.
+    /// [`PlanError::NoUsefulPose`] where there is none, [`PlanError::TooFewTags`] where there can be none.
     pub fn gather(request: &PoseRequest<'_>, enough: usize, rng: &mut ChaCha8Rng) -> Result<Self, PlanError> {
+        let (min_tags, n_tags) = (request.capture.min_tags, request.robot.tags.len());
+        if n_tags > 0 && min_tags as usize > n_tags {
+            return Err(PlanError::TooFewTags { min_tags, n_tags });
+        }
         let mut search = Search::new(request);
         let candidates = search.gather(enough, rng);
         let refused = std::mem::take(&mut search.refused);

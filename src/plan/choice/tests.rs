@@ -17,7 +17,7 @@ use crate::optics::square_corners;
 use crate::plan::PlanError;
 use crate::robot::Robot;
 use crate::routine::PoseCriterion;
-use crate::spatial::exp;
+use crate::spatial::{Pose, exp};
 use crate::stats::stream_rng;
 use crate::streams::{JointAngles, MAX_JOINTS};
 
@@ -295,10 +295,15 @@ fn the_first_visits_tell_most_where_the_choice_is_renewed() {
 #[test]
 fn what_cannot_be_seen_is_said_with_what_could() {
     let mut site = Site::titan();
+    site.robot.tags.truncate(3);
+    site.tag_trust.truncate(3);
+    site.robot.tags[2].base_from_tag = Pose::from_position_rpy([0.0, 0.0, 200.0], [0.0; 3]);
+    let error = site.plan(1, PoseCriterion::ToolError, 50).expect_err("one of the three is far away");
+    assert!(matches!(error, PlanError::NoUsefulPose { .. }) && error.to_string().contains("min_tags = 2"), "{error}");
     site.robot.tags.truncate(2);
     site.tag_trust.truncate(2);
     let error = site.plan(1, PoseCriterion::ToolError, 50).expect_err("two tags are not three");
-    assert!(error.to_string().contains("min_tags = 2"), "{error}");
+    assert!(matches!(error, PlanError::TooFewTags { min_tags: 3, n_tags: 2 }), "{error}");
     site.robot.tags.clear();
     let error = site.plan(1, PoseCriterion::ToolError, 50).expect_err("no tags");
     assert!(

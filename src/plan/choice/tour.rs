@@ -6,8 +6,6 @@
 use super::super::timing::Timing;
 use crate::streams::JointAngles;
 
-/// What a view takes besides the way to it, s: settling. Assumed; the dwell comes on top.
-pub(super) const SETTLE_S: f64 = 2.0;
 const MAX_SWEEPS: usize = 30;
 /// Gains below this are rounding, s.
 const LEAST_GAIN_S: f64 = 1e-9;
@@ -24,7 +22,7 @@ impl Tour<'_> {
         let mut at = &self.start;
         let mut sum_s = 0.0;
         for next in order {
-            sum_s += self.timing.edge_duration_s(at, next);
+            sum_s += self.timing.least_duration_s(at, next);
             at = next;
         }
         sum_s
@@ -32,15 +30,15 @@ impl Tour<'_> {
 
     /// Where in `order` a new pose costs least, and how much, s.
     pub(super) fn insertion(&self, order: &[JointAngles], new: &JointAngles) -> (usize, f64) {
-        let mut before = self.timing.edge_duration_s(&self.start, new);
+        let mut before = self.timing.least_duration_s(&self.start, new);
         let mut best = (0, f64::INFINITY);
         for k in 0..=order.len() {
             let from = if k == 0 { &self.start } else { &order[k - 1] };
             let (cost_s, after) = match order.get(k) {
                 None => (before, 0.0),
                 Some(to) => {
-                    let after = self.timing.edge_duration_s(new, to);
-                    (before + after - self.timing.edge_duration_s(from, to), after)
+                    let after = self.timing.least_duration_s(new, to);
+                    (before + after - self.timing.least_duration_s(from, to), after)
                 }
             };
             if cost_s < best.1 {
@@ -79,7 +77,7 @@ impl Tour<'_> {
         for i in 1..=n {
             for k in i + 1..=n {
                 let edge = |a: usize, b: usize, order: &[usize]| {
-                    self.timing.edge_duration_s(self.pose(order, poses, a), self.pose(order, poses, b))
+                    self.timing.least_duration_s(self.pose(order, poses, a), self.pose(order, poses, b))
                 };
                 let mut gain_s = edge(i - 1, i, order) - edge(i - 1, k, order);
                 if k < n {
