@@ -9,7 +9,7 @@ use armcal::calib::{
     JointParameters, Measured, Parameter, ParameterKind, PositionMethod, PositionProblem, SearchOptions, TagView, View,
     minimum_distance,
 };
-use armcal::plan::{ClearanceModel, JointErrorBounds};
+use armcal::plan::{ClearanceModel, Edge, JointErrorBounds};
 use armcal::robot::{Robot, Vehicle, load, load_vehicle};
 use armcal::routine::Scene;
 use armcal::stats::stream_rng;
@@ -105,7 +105,7 @@ fn planning(c: &mut Criterion) {
     c.bench_function("256 edges, clear for every arm within the bounds?", |b| {
         b.iter(|| {
             let is_clear = |edge: &&[JointAngles]| {
-                clearance.too_near_between(&edge[0], &edge[1], black_box(&bounds), 0.05).is_none()
+                clearance.too_near_along(&Edge::at_full_speed(edge[0], edge[1]), black_box(&bounds), 0.05).is_none()
             };
             poses.windows(2).filter(is_clear).count()
         });

@@ -1,5 +1,6 @@
 //! How far each joint may truly be from where it is believed to be.
 
+use super::stray::Stray;
 use crate::kinematics::JointLimits;
 use crate::robot::{JointSensorSpec, Robot};
 use crate::streams::JointAngles;
@@ -110,9 +111,16 @@ impl JointErrorBounds {
         self.joints[joint].error_rad(believed_rad)
     }
 
-    /// The drawing's limits less the error there: believed angles that no arm within the bounds drives into a stop.
+    /// How much that changes with the believed angle at most, rad/rad.
+    pub(super) fn slope(&self, joint: usize) -> f64 {
+        self.joints[joint].slope
+    }
+
+    /// The drawing's limits less the error there and what an arm overshoots that comes slowly: believed angles that no arm
+    /// within the bounds drives into a stop.
     #[must_use]
     pub fn safe_limits(&self, robot: &Robot) -> Vec<JointLimits> {
+        let arriving = Stray::arriving(robot);
         robot
             .chain
             .joints()
@@ -121,8 +129,8 @@ impl JointErrorBounds {
             .map(|(joint, spec)| match spec.limits {
                 None => JointLimits { lower_rad: -std::f64::consts::PI, upper_rad: std::f64::consts::PI },
                 Some(limits) => JointLimits {
-                    lower_rad: limits.lower_rad + self.error_rad(joint, limits.lower_rad),
-                    upper_rad: limits.upper_rad - self.error_rad(joint, limits.upper_rad),
+                    lower_rad: limits.lower_rad + self.error_rad(joint, limits.lower_rad) + arriving.end_rad(joint),
+                    upper_rad: limits.upper_rad - self.error_rad(joint, limits.upper_rad) - arriving.end_rad(joint),
                 },
             })
             .collect()

@@ -156,7 +156,8 @@ impl Sweep<'_> {
     fn error_rad(&self, joint: usize, along: [f64; 2]) -> f64 {
         let Some(bounds) = self.bounds else { return 0.0 };
         let [begin, end] = along.map(|share| bounds.error_rad(joint, self.believed(joint, share)));
-        f64::max(begin, end) + self.stray.most_rad(joint, along)
+        // Where the joint strays to, its sensor may err by more.
+        f64::max(begin, end) + (1.0 + bounds.slope(joint)) * self.stray.most_rad(joint, along)
     }
 
     /// The middle of a stretch with all errors on it.

@@ -11,6 +11,7 @@ use parry3d::shape::SharedShape;
 
 use super::bounds::JointErrorBounds;
 use super::certify::{Pair, Sweep};
+use super::edge::Edge;
 use super::separation::{Placed, gap_m, separate};
 use super::shapes::{Moving, Standing, pairs, vec3};
 use super::stray::Stray;
@@ -144,7 +145,7 @@ impl<'a> ClearanceModel<'a> {
     /// `None` proves that there is none.
     #[must_use]
     pub fn too_near(&self, believed: &JointAngles, bounds: &JointErrorBounds, margin_m: f64) -> Option<Nearest> {
-        self.too_near_between(believed, believed, bounds, margin_m)
+        self.too_near_along(&Edge::at_full_speed(*believed, *believed), bounds, margin_m)
     }
 
     /// A pair that the believed arm alone, without any error, brings nearer than `margin_m` on the straight edge.
@@ -153,28 +154,24 @@ impl<'a> ClearanceModel<'a> {
         Sweep { model: self, from: *from, to: *to, bounds: None, stray: Stray::default(), margin_m }.first_too_near()
     }
 
-    /// The same for every arm along the straight edge between two believed poses, driven from rest to rest as [`Timing`] has
-    /// it: with what the joints stray on the way.
+    /// As [`Self::too_near`] where the arm comes to rest after a slow edge: with what its joints overshoot.
     #[must_use]
-    pub fn too_near_between(
-        &self,
-        from: &JointAngles,
-        to: &JointAngles,
-        bounds: &JointErrorBounds,
-        margin_m: f64,
-    ) -> Option<Nearest> {
-        self.sweep(from, to, bounds, margin_m).first_too_near()
+    pub fn too_near_arriving(&self, at: &JointAngles, bounds: &JointErrorBounds, margin_m: f64) -> Option<Nearest> {
+        let stray = Stray::arriving(self.robot);
+        Sweep { model: self, from: *at, to: *at, bounds: Some(bounds), stray, margin_m }.first_too_near()
     }
 
-    pub(super) fn sweep<'b>(
-        &'b self,
-        from: &JointAngles,
-        to: &JointAngles,
-        bounds: &'b JointErrorBounds,
-        margin_m: f64,
-    ) -> Sweep<'b> {
-        let stray = Stray::new(self.robot, &self.timing, from, to);
-        Sweep { model: self, from: *from, to: *to, bounds: Some(bounds), stray, margin_m }
+    /// The same for every arm along an edge, driven as [`Timing`] has it: with what the joints stray on the way.
+    #[must_use]
+    pub fn too_near_along(&self, edge: &Edge, bounds: &JointErrorBounds, margin_m: f64) -> Option<Nearest> {
+        self.sweep(edge, bounds, margin_m).first_too_near()
+    }
+
+    pub(super) fn sweep<'b>(&'b self, edge: &Edge, bounds: &'b JointErrorBounds, margin_m: f64) -> Sweep<'b> {
+        let stray = Stray::new(self.robot, &self.timing, edge);
+        // The line to the middle of where the joints may come to rest.
+        let to = JointAngles::from_fn(edge.to.len(), |joint| edge.to[joint] + stray.middle_rad(joint));
+        Sweep { model: self, from: edge.from, to, bounds: Some(bounds), stray, margin_m }
     }
 
     /// The closest pair over every arm within `bounds` whose sensors read `believed`, as far as the answer matters: its

@@ -8,6 +8,7 @@
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
+use super::edge::{Edge, Path, SLOWEST};
 use super::path::{PathPlanner, between};
 use crate::streams::{JointAngles, MAX_JOINTS};
 
@@ -19,6 +20,8 @@ const LEAST_WEIGHT: f64 = 0.25;
 const ABOUT_RAD: f64 = 0.8;
 /// Regions that a search may look at, and shortcuts after it: about 2 us each.
 const MAX_REGIONS: usize = 120_000;
+/// Samples that a search may try: each costs at least one region, and trees are searched one node after the other.
+const MAX_SAMPLES: usize = 4_000;
 const SHORTCUT_REGIONS: usize = 4_000;
 const MAX_SHORTCUTS: usize = 40;
 /// A shortcut that saves less than this share of the path's time is not worth looking at.
@@ -55,7 +58,7 @@ impl<'a, 'b> Connect<'a, 'b> {
 
     /// Waypoints from start to goal; `None` when none were found within the budget.
     pub fn search(&mut self, rng: &mut ChaCha8Rng) -> Option<Vec<JointAngles>> {
-        while self.n_tried < self.planner.max_samples && self.n_regions < MAX_REGIONS {
+        while self.n_regions < MAX_REGIONS && self.n_tried < MAX_SAMPLES {
             let sample = self.sample(rng);
             let grow = self.n_tried % 2;
             self.n_tried += 1;
@@ -95,11 +98,9 @@ impl<'a, 'b> Connect<'a, 'b> {
         })
     }
 
+    /// If it is driven slowly enough.
     fn is_edge_free(&mut self, from: &JointAngles, to: &JointAngles) -> bool {
-        let PathPlanner { clearance, bounds, margin_m, .. } = *self.planner;
-        let verdict = clearance.sweep(from, to, bounds, margin_m).verdict();
-        self.n_regions += verdict.n_regions;
-        verdict.too_near.is_none()
+        self.planner.keeps_clear(&Edge { from: *from, to: *to, slowness: SLOWEST }, &mut self.n_regions)
     }
 
     /// Grows a tree by a step towards `target`.
@@ -139,15 +140,20 @@ impl<'a, 'b> Connect<'a, 'b> {
         nearest.1
     }
 
-    /// The same path made quicker.
-    pub fn shortened(&mut self, waypoints: Vec<JointAngles>, rng: &mut ChaCha8Rng) -> Vec<JointAngles> {
+    /// The same way made quicker, each edge at the highest speed that it allows.
+    pub fn shortened(&mut self, waypoints: &[JointAngles], rng: &mut ChaCha8Rng) -> Path {
         self.n_regions = 0;
-        let mut path = self.thinned(waypoints);
+        let mut path = Path::at(waypoints[0]);
+        for edge in waypoints.windows(2) {
+            // The search has certified the slowest.
+            path.push(edge[1], self.slowness(&edge[0], &edge[1], SLOWEST).unwrap_or(SLOWEST));
+        }
+        path = self.thinned(path);
         for _ in 0..MAX_SHORTCUTS {
-            if path.len() < 3 || self.n_regions > SHORTCUT_REGIONS {
+            if path.n_edges() < 2 || self.n_regions > SHORTCUT_REGIONS {
                 break;
             }
-            let [a, b] = [0, 1].map(|_| rng.random_range(0.0..(path.len() - 1) as f64));
+            let [a, b] = [0, 1].map(|_| rng.random_range(0.0..path.n_edges() as f64));
             if let Some(shorter) = self.shortcut(&path, a.min(b), a.max(b)) {
                 path = shorter;
             }
@@ -155,40 +161,69 @@ impl<'a, 'b> Connect<'a, 'b> {
         self.thinned(path)
     }
 
-    /// Leaves out waypoints while the straight edge across stays certified.
-    fn thinned(&mut self, waypoints: Vec<JointAngles>) -> Vec<JointAngles> {
-        let mut short = vec![waypoints[0]];
+    fn slowness(&mut self, from: &JointAngles, to: &JointAngles, at_most: f64) -> Option<f64> {
+        self.planner.slowness(from, to, at_most, &mut self.n_regions)
+    }
+
+    fn duration_s(&self, path: &Path) -> f64 {
+        self.planner.clearance.timing().path_duration_s(path)
+    }
+
+    /// Leaves out waypoints where a straight edge across them is certified and takes no longer.
+    fn thinned(&mut self, path: Path) -> Path {
+        let mut short = Path::at(path.waypoints[0]);
         let mut at = 0;
-        while at + 1 < waypoints.len() {
-            let farther = (at + 2..waypoints.len()).rev();
-            let next = farther.into_iter().find(|far| self.is_edge_free(&waypoints[at], &waypoints[*far]));
-            at = next.unwrap_or(at + 1);
-            short.push(waypoints[at]);
+        while at < path.n_edges() {
+            let farther = (at + 2..path.waypoints.len()).rev();
+            let across = farther.into_iter().find_map(|far| Some((far, self.across(&path, at, far)?)));
+            let (next, slowness) = across.unwrap_or((at + 1, path.edge(at).slowness));
+            short.push(path.waypoints[next], slowness);
+            at = next;
         }
         short
     }
 
+    /// The slowness of the edge from one waypoint to a later one, where it is certified and saves time.
+    fn across(&mut self, path: &Path, at: usize, far: usize) -> Option<f64> {
+        let timing = self.planner.clearance.timing();
+        let (from, to) = (&path.waypoints[at], &path.waypoints[far]);
+        let along_s: f64 = (at..far).map(|k| timing.edge_duration_s(&path.edge(k))).sum();
+        self.slowness(from, to, along_s / timing.least_duration_s(from, to))
+    }
+
     /// The path with a straight edge from place `a` to place `b` on it (waypoint and share of the edge behind it), where that
     /// saves time and its three new edges are certified: a part of an edge is driven at other rates than the whole.
-    fn shortcut(&mut self, path: &[JointAngles], a: f64, b: f64) -> Option<Vec<JointAngles>> {
+    fn shortcut(&mut self, path: &Path, a: f64, b: f64) -> Option<Path> {
         let (before, after) = (a.floor() as usize, b.floor() as usize);
         if before == after {
             return None;
         }
-        let place = |k: usize, at: f64| between(&path[k], &path[k + 1], at - at.floor());
+        let place = |k: usize, at: f64| between(&path.waypoints[k], &path.waypoints[k + 1], at - at.floor());
         let (from, to) = (place(before, a), place(after, b));
-        let mut shorter: Vec<JointAngles> = path[..=before].to_vec();
-        shorter.extend([from, to]);
-        shorter.extend(&path[after + 1..]);
-        let timing = self.planner.clearance.timing();
-        let time_s =
-            |way: &[JointAngles]| -> f64 { way.windows(2).map(|e| timing.edge_duration_s(&e[0], &e[1])).sum() };
-        let is_worth_it = time_s(&shorter) < (1.0 - LEAST_GAIN) * time_s(path);
-        let is_free = is_worth_it
-            && self.is_edge_free(&from, &to)
-            && self.is_edge_free(&path[before], &from)
-            && self.is_edge_free(&to, &path[after + 1]);
-        is_free.then_some(shorter)
+        let enough_s = (1.0 - LEAST_GAIN) * self.duration_s(path);
+        let shorter = |slowness: [f64; 3]| {
+            let mut shorter = Path::at(path.waypoints[0]);
+            (0..before).for_each(|k| shorter.push(path.edge(k).to, path.edge(k).slowness));
+            shorter.push(from, slowness[0]);
+            shorter.push(to, slowness[1]);
+            shorter.push(path.edge(after).to, slowness[2]);
+            (after + 1..path.n_edges()).for_each(|k| shorter.push(path.edge(k).to, path.edge(k).slowness));
+            shorter
+        };
+        // What the other two edges leave at the highest speed is what each may take.
+        let spare_s = enough_s - self.duration_s(&shorter([1.0; 3]));
+        if spare_s <= 0.0 {
+            return None;
+        }
+        let ends = [(from, to), (path.waypoints[before], from), (to, path.waypoints[after + 1])];
+        let mut slowness = [0.0; 3];
+        for (slowness, (from, to)) in slowness.iter_mut().zip(&ends) {
+            let least_s = self.planner.clearance.timing().least_duration_s(from, to);
+            *slowness = self.slowness(from, to, 1.0 + spare_s / least_s)?;
+        }
+        let [across, first, last] = slowness;
+        let shorter = shorter([first, across, last]);
+        (self.duration_s(&shorter) < enough_s).then_some(shorter)
     }
 }
 

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::clearance::Nearest;
 use super::itinerary::{ArmBelief, Itinerary, LeastClearance, PlanStop, Visit};
+use super::timing::Timing;
 use crate::robot::{FileIssue, Robot, RobotError, parse_toml, read_text};
 use crate::streams::{CaptureSet, JointAngles, MAX_JOINTS};
 
@@ -108,6 +109,8 @@ pub struct PathTable {
     /// Both ends included; straight lines in joint space between, each from rest to rest.
     pub waypoints_rad: Vec<Vec<f64>>,
     pub waypoints_counts: Vec<Vec<f64>>,
+    /// Of the edge behind each waypoint but the last; those that must be driven slowly take longer than their joints need.
+    pub edge_durations_s: Vec<f64>,
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -132,7 +135,7 @@ impl PlanFile {
     /// The itinerary with what it was planned for. `header` gives names and hashes; the rest of it is replaced.
     #[must_use]
     pub fn new(header: PlanHeader, itinerary: &Itinerary, belief: &ArmBelief, robot: &Robot) -> Self {
-        let writer = Writer { belief, robot };
+        let writer = Writer { belief, robot, timing: Timing::new(robot) };
         let visits = &itinerary.visits;
         let least_m = visits.iter().map(|visit| visit.path_clearance.proven_m).fold(f64::INFINITY, f64::min);
         Self {
@@ -233,6 +236,9 @@ impl PlanFile {
                 n_counts,
                 path.waypoints_rad.len() as f64..=path.waypoints_rad.len() as f64,
             )?;
+            let n_edges = path.waypoints_rad.len() as f64 - 1.0;
+            range(&key("edge_durations_s (number)"), path.edge_durations_s.len() as f64, n_edges..=n_edges)?;
+            path.edge_durations_s.iter().try_for_each(|&s| range(&key("edge_durations_s"), s, 0.0..=1e9))?;
             path.waypoints_rad.iter().try_for_each(|waypoint| numbers(key("waypoints_rad"), waypoint))?;
             path.waypoints_counts.iter().try_for_each(|waypoint| numbers(key("waypoints_counts"), waypoint))?;
         }
@@ -254,6 +260,7 @@ pub struct PlanHeader {
 struct Writer<'a> {
     belief: &'a ArmBelief,
     robot: &'a Robot,
+    timing: Timing,
 }
 
 impl Writer<'_> {
@@ -290,6 +297,7 @@ impl Writer<'_> {
     }
 
     fn path(&self, from: usize, visit: &Visit) -> PathTable {
+        let edges_s = visit.path.edges().map(|edge| self.timing.edge_duration_s(&edge));
         PathTable {
             from,
             to: from + 1,
@@ -298,6 +306,7 @@ impl Writer<'_> {
             proven_clearance_m: floored(visit.path_clearance.proven_m, LENGTH_DIGITS),
             waypoints_rad: visit.path.waypoints.iter().map(radians).collect(),
             waypoints_counts: visit.path.waypoints.iter().map(|waypoint| self.counts(waypoint)).collect(),
+            edge_durations_s: edges_s.map(|duration_s| rounded(duration_s, TIME_DIGITS)).collect(),
         }
     }
 }

@@ -8,9 +8,10 @@ use rand_chacha::ChaCha8Rng;
 use super::bounds::JointErrorBounds;
 use super::choice::{PlannedPose, PoseRequest, choose_poses};
 use super::clearance::{ClearanceModel, Nearest};
-use super::path::{Path, PathPlanner};
+use super::edge::{Edge, Path};
+use super::path::PathPlanner;
 use super::targets::{TargetRequest, plan_targets};
-use super::timing::Timing;
+use super::timing::{SETTLE_S, Timing};
 use super::visibility::VisibilityModel;
 use super::{PathError, PlanError};
 use crate::calib::{Calibration, CalibrationFileError};
@@ -99,21 +100,16 @@ impl LeastClearance {
     /// Along a path that is known to keep `margin_m`.
     #[must_use]
     pub fn along(clearance: &ClearanceModel<'_>, bounds: &JointErrorBounds, path: &Path, margin_m: f64) -> Self {
-        let edges = path.waypoints.windows(2);
-        let all = edges.map(|edge| Self::between(clearance, bounds, [&edge[0], &edge[1]], margin_m));
+        let all = path.edges().map(|edge| Self::on(clearance, bounds, &edge, margin_m));
         all.fold(Self { believed_m: f64::INFINITY, proven_m: f64::INFINITY }, |a, b| Self {
             believed_m: a.believed_m.min(b.believed_m),
             proven_m: a.proven_m.min(b.proven_m),
         })
     }
 
-    /// The same for one edge, from the first pose to the second.
-    fn between(
-        clearance: &ClearanceModel<'_>,
-        bounds: &JointErrorBounds,
-        [from, to]: [&JointAngles; 2],
-        margin_m: f64,
-    ) -> Self {
+    /// The same for one edge.
+    fn on(clearance: &ClearanceModel<'_>, bounds: &JointErrorBounds, edge: &Edge, margin_m: f64) -> Self {
+        let Edge { from, to, .. } = edge;
         let samples = (from.max_abs_difference(to) / SAMPLE_RAD).ceil().max(1.0) as usize;
         let at = |k: usize| {
             let share = k as f64 / samples as f64;
@@ -123,7 +119,7 @@ impl LeastClearance {
         let (mut proven_m, mut beyond_m) = (margin_m.min(believed_m), believed_m);
         while beyond_m - proven_m > PROVEN_TO_M {
             let middle_m = 0.5 * (proven_m + beyond_m);
-            let keeps = clearance.too_near_between(from, to, bounds, middle_m).is_none();
+            let keeps = clearance.too_near_along(edge, bounds, middle_m).is_none();
             if keeps { proven_m = middle_m } else { beyond_m = middle_m }
         }
         Self { believed_m, proven_m }
@@ -164,10 +160,6 @@ pub enum ItineraryError {
     NoPath { n: usize, first: PathError },
 }
 
-/// Samples that a path planner may try before it gives a pose up; as a session's.
-const MAX_PATH_SAMPLES: usize = 400;
-/// How long an arm takes to come to rest after a path, s. Assumed.
-const SETTLE_S: f64 = 1.0;
 /// Joint step between the samples of a believed arm's path, rad: a link's end 2 m away moves 2 cm.
 const SAMPLE_RAD: f64 = 0.01;
 /// Proven clearances are known to this, m.
@@ -261,7 +253,7 @@ impl Planner<'_> {
         if believed.distance_m <= 0.0 {
             return Some(format!("the goal is inside something: {believed} touch or overlap there"));
         }
-        let nearest = self.request.clearance.too_near(angles, self.bounds(), self.margin_m())?;
+        let nearest = self.request.clearance.too_near_arriving(angles, self.bounds(), self.margin_m())?;
         Some(format!(
             "the pose comes within {:.3} m of clearance between {nearest} for an arm within the sensors' error; {:.3} m are needed",
             nearest.distance_m,
@@ -316,7 +308,6 @@ impl Planner<'_> {
             bounds: self.bounds(),
             limits: &self.limits,
             margin_m: self.margin_m(),
-            max_samples: MAX_PATH_SAMPLES,
         };
         let n = poses.len();
         let (mut visits, mut left_out) = (Vec::<Visit>::new(), Vec::new());
@@ -362,7 +353,7 @@ impl Planner<'_> {
             path,
             duration_s,
             path_clearance,
-            clearance: LeastClearance::between(clearance, bounds, [&angles, &angles], margin_m),
+            clearance: LeastClearance::on(clearance, bounds, &Edge::at_full_speed(angles, angles), margin_m),
             nearest,
             error_bound_rad: JointAngles::from_fn(angles.len(), |j| self.request.belief.bounds.error_rad(j, angles[j])),
             arm_time_s: since_s + duration_s + SETTLE_S,

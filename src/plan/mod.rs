@@ -11,6 +11,7 @@ mod certify;
 mod choice;
 mod clearance;
 mod connect;
+mod edge;
 mod ensemble;
 mod file;
 mod itinerary;
@@ -26,13 +27,14 @@ mod visibility;
 pub use bounds::{Age, JointErrorBounds, UnknownScale};
 pub use choice::{CaptureState, PlannedPose, PosePlan, PosePool, PoseRequest, Stop, TakenView, choose_poses};
 pub use clearance::{ClearanceModel, Nearest, SELF_EASE_M};
+pub use edge::{Edge, Path};
 pub use ensemble::{ArmEnsemble, link_ends};
 pub use file::{LeftOutTable, PathTable, PlanFile, PlanHeader, PlanTotals, PoseTable, SetName, TagTable};
 pub use itinerary::{
     ArmBelief, Itinerary, ItineraryError, ItineraryRequest, LeastClearance, LeftOut, PlanStop, Visit, plan_itinerary,
 };
 pub use pairs::sample_self_pairs;
-pub use path::{Path, PathError, PathPlanner};
+pub use path::{PathError, PathPlanner};
 pub use stray::Stray;
 pub use targets::{TargetRequest, plan_targets};
 pub use timing::Timing;
@@ -59,6 +61,8 @@ pub enum PlanError {
         "no pose was found that sees {min_tags} of the {n_tags} surveyed tags and keeps {clearance_m:.3} m clear ({tried} tried): {hint}"
     )]
     NoUsefulPose { min_tags: u32, n_tags: usize, clearance_m: f64, tried: usize, hint: String },
+    #[error("no pose was found that sees {min_tags} of the {n_tags} surveyed tags: min_tags may be 1 to {n_tags}")]
+    TooFewTags { min_tags: u32, n_tags: usize },
     #[error("only {found} of {wanted} poses were found that see {min_tags} tags and keep clear: {hint}")]
     TooFewPoses { found: usize, wanted: usize, min_tags: u32, hint: String },
     #[error(transparent)]

@@ -9,14 +9,10 @@ use rand_chacha::ChaCha8Rng;
 use super::bounds::JointErrorBounds;
 use super::clearance::{ClearanceModel, Nearest};
 use super::connect::Connect;
+use super::edge::{Edge, Path, SLOWEST, SLOWNESS};
+use super::stray::Stray;
 use crate::kinematics::JointLimits;
 use crate::streams::JointAngles;
-
-/// Believed joint angles to pass, start and goal included; straight lines in joint space between.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Path {
-    pub waypoints: Vec<JointAngles>,
-}
 
 /// Why there is no path.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -63,7 +59,6 @@ pub struct PathPlanner<'a> {
     pub limits: &'a [JointLimits],
     /// Free water to keep, m.
     pub margin_m: f64,
-    pub max_samples: usize,
 }
 
 /// Halvings of the straight way when an error names the nearest that works.
@@ -74,16 +69,74 @@ const PLACES: u32 = 20;
 const ROUNDING_RAD: f64 = 1e-9;
 
 impl PathPlanner<'_> {
-    /// Whether every arm within the bounds keeps the margin at `angles`.
+    /// Whether every arm within the bounds keeps the margin at rest at `angles`.
     #[must_use]
     pub fn is_free(&self, angles: &JointAngles) -> bool {
         self.clearance.too_near(angles, self.bounds, self.margin_m).is_none()
     }
 
-    /// Whether every arm within the bounds keeps the margin along the straight edge.
+    /// Whether every arm within the bounds keeps the margin when it comes to `angles` slowly.
+    #[must_use]
+    pub fn is_free_to_arrive(&self, angles: &JointAngles) -> bool {
+        self.clearance.too_near_arriving(angles, self.bounds, self.margin_m).is_none()
+    }
+
+    /// Whether every arm within the bounds keeps the margin along the straight edge, if it goes slowly enough.
     #[must_use]
     pub fn is_edge_free(&self, from: &JointAngles, to: &JointAngles) -> bool {
-        self.clearance.sweep(from, to, self.bounds, self.margin_m).verdict().too_near.is_none()
+        self.keeps_clear(&Edge { from: *from, to: *to, slowness: SLOWEST }, &mut 0)
+    }
+
+    /// How slow the straight edge must be driven for that, as little as will do; `None` where no slowness up to `at_most` does.
+    /// `n_regions` grows by what it cost.
+    pub(super) fn slowness(
+        &self,
+        from: &JointAngles,
+        to: &JointAngles,
+        at_most: f64,
+        n_regions: &mut usize,
+    ) -> Option<f64> {
+        let mut holds = |slowness| {
+            let edge = Edge { from: *from, to: *to, slowness };
+            self.stays_off_the_stops(&edge) && self.keeps_clear(&edge, n_regions)
+        };
+        let levels = &SLOWNESS[..SLOWNESS.iter().take_while(|&&slowness| slowness <= at_most).count()];
+        let [quickest, .., slowest] = *levels else {
+            return levels.first().copied().filter(|&only| holds(only));
+        };
+        // Most are clear at full speed; of the others, the slowest tells whether to go on.
+        if holds(quickest) {
+            return Some(quickest);
+        }
+        if !holds(slowest) {
+            return None;
+        }
+        let (mut too_quick, mut slow) = (0, levels.len() - 1);
+        while slow - too_quick > 1 {
+            let middle = (too_quick + slow) / 2;
+            if holds(levels[middle]) { slow = middle } else { too_quick = middle }
+        }
+        Some(levels[slow])
+    }
+
+    /// Whether every arm within the bounds keeps the margin along the edge at its speed.
+    pub(super) fn keeps_clear(&self, edge: &Edge, n_regions: &mut usize) -> bool {
+        let verdict = self.clearance.sweep(edge, self.bounds, self.margin_m).verdict();
+        *n_regions += verdict.n_regions;
+        verdict.too_near.is_none()
+    }
+
+    /// Whether no joint overshoots its limits at the end of the edge by more than they leave room for.
+    fn stays_off_the_stops(&self, edge: &Edge) -> bool {
+        let stray = Stray::new(self.clearance.robot(), self.clearance.timing(), edge);
+        let arriving = Stray::arriving(self.clearance.robot());
+        (0..self.clearance.n_error_joints()).all(|j| {
+            let JointLimits { lower_rad, upper_rad } = self.limits[j];
+            let way_rad = edge.to[j] - edge.from[j];
+            let left_rad = if way_rad > 0.0 { upper_rad - edge.to[j] } else { edge.to[j] - lower_rad };
+            // What is beyond its limits already comes back.
+            way_rad == 0.0 || stray.end_rad(j) <= left_rad.max(0.0) + arriving.end_rad(j)
+        })
     }
 
     /// A path from `from` to `to`.
@@ -92,13 +145,15 @@ impl PathPlanner<'_> {
     /// [`PathError`]: start or goal are too near or out of range, or no path was found within the budget.
     pub fn plan(&self, from: &JointAngles, to: &JointAngles, rng: &mut ChaCha8Rng) -> Result<Path, PathError> {
         self.check_limits(from, to)?;
-        if self.is_edge_free(from, to) {
-            return Ok(Path { waypoints: vec![*from, *to] });
+        if let Some(slowness) = self.slowness(from, to, SLOWEST, &mut 0) {
+            let mut path = Path::at(*from);
+            path.push(*to, slowness);
+            return Ok(path);
         }
         self.check_ends(from, to)?;
         let mut connect = Connect::new(self, from, to);
         match connect.search(rng) {
-            Some(waypoints) => Ok(Path { waypoints: connect.shortened(waypoints, rng) }),
+            Some(waypoints) => Ok(connect.shortened(&waypoints, rng)),
             None => Err(self.blocked(from, to, connect.n_tried())),
         }
     }
@@ -116,11 +171,11 @@ impl PathPlanner<'_> {
     }
 
     fn check_ends(&self, from: &JointAngles, to: &JointAngles) -> Result<(), PathError> {
-        let too_near = |at: &JointAngles| self.clearance.too_near(at, self.bounds, self.margin_m);
-        if let Some(found) = too_near(from) {
+        if let Some(found) = self.clearance.too_near(from, self.bounds, self.margin_m) {
             let (nearest, distance_m) = (found.to_string(), found.distance_m);
             return Err(PathError::StartTooNear { nearest, distance_m, needed_m: self.margin_m });
         }
+        let too_near = |at: &JointAngles| self.clearance.too_near_arriving(at, self.bounds, self.margin_m);
         let Some(found) = too_near(to) else { return Ok(()) };
         let free_share = halved(|share| too_near(&between(from, to, share)).is_none());
         Err(PathError::GoalTooNear {
@@ -137,7 +192,10 @@ impl PathPlanner<'_> {
             .filter_map(|angles| self.clearance.too_near(&angles, self.bounds, self.margin_m))
             .min_by(|a, b| a.distance_m.total_cmp(&b.distance_m))
             // Between the places, or by what the joints stray on the way.
-            .or_else(|| self.clearance.too_near_between(from, to, self.bounds, self.margin_m));
+            .or_else(|| {
+                let edge = Edge { from: *from, to: *to, slowness: SLOWEST };
+                self.clearance.too_near_along(&edge, self.bounds, self.margin_m)
+            });
         PathError::Blocked {
             tried,
             distance_m: nearest.as_ref().map_or(self.margin_m, |found| found.distance_m),

@@ -1,44 +1,79 @@
 //! How far the arm leaves the straight line of an edge while it moves: its joints lag, droop and overshoot, each its own way.
 //!
 //! Set-points go rest to rest by a cubic (`timing`), whose rate at the share `u` of time is `4 u (1 - u)` of its largest. A
-//! joint that lags by up to `lag_spread_s` more or less than the others is off the line by that times its rate, and by a
-//! droop in proportion to the rate; an overshoot comes at the end of the edge. What does not move does not stray.
+//! joint that lags by up to `lag_spread_s` more or less than the others is off the line by that times its rate, though never by more
+//! than it was to move so far, and by a droop in proportion to the rate; an overshoot comes at the end of the edge, ahead for the
+//! most part. What does not move does not stray.
 
-use super::timing::Timing;
+use super::edge::{Edge, SLOWEST};
+use super::timing::{RATE_SHARE, Timing};
 use crate::robot::Robot;
-use crate::streams::{JointAngles, MAX_JOINTS};
+use crate::streams::MAX_JOINTS;
+
+/// Of the overshoot, the share by which a joint may be behind instead where its edge ends.
+const BEHIND: f64 = 0.25;
 
 /// Bounds on the straying along one edge.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Stray {
     /// Where the joint is fastest, rad.
-    moving_rad: [f64; MAX_JOINTS],
-    /// At the end of the edge, rad.
-    beyond_rad: [f64; MAX_JOINTS],
+    lag_rad: [f64; MAX_JOINTS],
+    droop_rad: [f64; MAX_JOINTS],
+    /// How far it is to move, rad.
+    way_rad: [f64; MAX_JOINTS],
+    /// The least and the most at the end of the edge, rad.
+    end_rad: [[f64; 2]; MAX_JOINTS],
 }
 
 impl Stray {
-    /// On the edge between two poses, driven as `timing` says.
+    /// On an edge, driven as `timing` says.
     #[must_use]
-    pub fn new(robot: &Robot, timing: &Timing, from: &JointAngles, to: &JointAngles) -> Self {
+    pub fn new(robot: &Robot, timing: &Timing, edge: &Edge) -> Self {
         let mut stray = Self::default();
-        if from == to {
+        if edge.from == edge.to {
             return stray;
         }
         let motion = robot.drive.motion;
-        let rates_rad_s = timing.peak_rates_rad_s(from, to);
+        let rates_rad_s = timing.peak_rates_rad_s(edge);
         for (joint, (&rate_rad_s, sensor)) in rates_rad_s.iter().zip(&robot.sensors).enumerate() {
             let share = rate_rad_s / sensor.max_rate_rad_s;
-            stray.moving_rad[joint] = motion.lag_spread_s * rate_rad_s + motion.droop_rad * share;
-            stray.beyond_rad[joint] = motion.overshoot_rad * share;
+            let way_rad = edge.to[joint] - edge.from[joint];
+            let (ahead_rad, behind_rad) = (motion.overshoot_rad * share, -BEHIND * motion.overshoot_rad * share);
+            stray.lag_rad[joint] = motion.lag_spread_s * rate_rad_s;
+            stray.droop_rad[joint] = motion.droop_rad * share;
+            stray.way_rad[joint] = way_rad.abs();
+            stray.end_rad[joint] = if way_rad < 0.0 { [-ahead_rad, -behind_rad] } else { [behind_rad, ahead_rad] };
         }
         stray
     }
 
-    /// The most by which a joint is off the line between two shares of the way, rad.
+    /// Where an edge ends that was driven as slowly as any, whichever it was: what its joints overshoot at most.
+    #[must_use]
+    pub fn arriving(robot: &Robot) -> Self {
+        let beyond_rad = robot.drive.motion.overshoot_rad * RATE_SHARE / SLOWEST;
+        Self { end_rad: [[-beyond_rad, beyond_rad]; MAX_JOINTS], ..Self::default() }
+    }
+
+    /// How far a joint is off the edge's end at most, rad.
+    #[must_use]
+    pub fn end_rad(&self, joint: usize) -> f64 {
+        let [least_rad, most_rad] = self.end_rad[joint];
+        most_rad.max(-least_rad)
+    }
+
+    /// The middle of where the joint may come to rest, off the edge's end, rad; on the way in proportion to the share of it.
+    #[must_use]
+    pub fn middle_rad(&self, joint: usize) -> f64 {
+        let [least_rad, most_rad] = self.end_rad[joint];
+        0.5 * (least_rad + most_rad)
+    }
+
+    /// The most by which a joint is off that middle between two shares of the way, rad.
     #[must_use]
     pub fn most_rad(&self, joint: usize, along: [f64; 2]) -> f64 {
-        self.moving_rad[joint] * most_rate(along) + self.beyond_rad[joint] * along[1].max(along[0])
+        let ([least_rad, most_rad], rate, far) = (self.end_rad[joint], most_rate(along), along[1].max(along[0]));
+        let lag_rad = f64::min(self.lag_rad[joint] * rate, self.way_rad[joint] * far);
+        lag_rad + self.droop_rad[joint] * rate + 0.5 * (most_rad - least_rad) * far
     }
 }
 
@@ -84,8 +119,9 @@ mod tests {
         let from = robot.stowed;
         let mut to = from;
         (to[0], to[1], to[4]) = (from[0] + 0.9, from[1] - 0.3, from[4] + 0.5);
-        let stray = Stray::new(&robot, &timing, &from, &to);
-        let duration_s = timing.edge_duration_s(&from, &to);
+        let edge = Edge::at_full_speed(from, to);
+        let stray = Stray::new(&robot, &timing, &edge);
+        let duration_s = timing.edge_duration_s(&edge);
         let mut closest = f64::INFINITY;
         for step in 0..=500 {
             let u = f64::from(step) / 500.0;
@@ -104,6 +140,18 @@ mod tests {
             }
         }
         assert!(closest < 0.02, "the bound is that of the lag, not a large number: {closest}");
-        assert_eq!(Stray::new(&robot, &timing, &from, &from), Stray::default());
+        let nowhere = Edge::at_full_speed(from, from);
+        assert_eq!(Stray::new(&robot, &timing, &nowhere), Stray::default());
+        for slowness in [1.0, 2.0, SLOWEST] {
+            let slow = Stray::new(&robot, &timing, &Edge { slowness, ..edge });
+            for along in [[0.0, 1.0], [0.2, 0.3], [1.0, 1.0]] {
+                for joint in 0..from.len() {
+                    let quicker_rad = slowness * slow.most_rad(joint, along);
+                    assert!((quicker_rad - stray.most_rad(joint, along)).abs() < 1e-12, "it goes with the rate");
+                }
+            }
+            let arriving = Stray::arriving(&robot);
+            assert!(slowness != SLOWEST || (0..from.len()).all(|j| slow.end_rad(j) <= arriving.end_rad(j) + 1e-12));
+        }
     }
 }

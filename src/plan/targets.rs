@@ -76,9 +76,8 @@ impl TargetSolver<'_> {
             match solve_position(&self.robot.chain, &self.robot.tool.mount, &goal, &seed, &self.settings) {
                 Err(error) => unreached = Some(unreached.map_or(error, |before| nearer(before, error))),
                 Ok(angles) => {
-                    let nearest = self.clearance.nearest_under(&angles, self.bounds, self.margin_m);
                     let travel_rad = angles.max_abs_difference(&home);
-                    if nearest.distance_m < self.margin_m {
+                    if let Some(nearest) = self.clearance.too_near_arriving(&angles, self.bounds, self.margin_m) {
                         if closest.as_ref().is_none_or(|c| nearest.distance_m > c.distance_m) {
                             closest = Some(nearest);
                         }

@@ -15,7 +15,7 @@ use super::rrd::Stream;
 use super::scenery::{BASE, Mover};
 use super::shapes::{Look, fix_shapes, path_part, quaternion, vector};
 use super::tracks::Tracks;
-use super::{ReplayInput, Run, arms, camera, layout, phases, plots, rrd, scenery, summary, targets};
+use super::{ReplayInput, Run, layout, rrd};
 use crate::log::{Completeness, Recording};
 use crate::plan::{PlanFile, PoseTable, SetName, Timing};
 use crate::robot::{Robot, Vehicle};
@@ -60,14 +60,7 @@ pub fn write_plan_rrd(input: &PlanInput<'_>, out: &Path) -> Result<(), ReplayErr
     };
     let tracks = Tracks::new(&recording, input.robot)?;
     let run = Run { tracks, truth: None, robot: input.robot, vehicle: shown.vehicle, scene: shown.scene };
-    let mut stream = Stream::default();
-    scenery::draw(&run, &mut stream);
-    arms::draw(&run, &mut stream);
-    targets::draw(&run, &mut stream);
-    camera::draw(&run, &mut stream);
-    plots::draw(&run, &mut stream);
-    phases::draw(&run, &mut stream);
-    summary::draw(&run, &shown, &mut stream);
+    let mut stream = super::draw(&run, &shown);
     draw_tool_path(&run, &mut stream);
     draw_margins(input, &run, &mut stream);
     draw_sights(input, &mut stream);
@@ -78,13 +71,12 @@ pub fn write_plan_rrd(input: &PlanInput<'_>, out: &Path) -> Result<(), ReplayErr
 /// The plan's motions as messages.
 struct Imagined<'a> {
     input: &'a PlanInput<'a>,
-    timing: Timing,
     messages: Vec<(Stamp, Message)>,
     time_s: f64,
 }
 
 fn as_recorded(input: &PlanInput<'_>) -> Recording {
-    let mut imagined = Imagined { input, timing: Timing::new(input.robot), messages: Vec::new(), time_s: 0.0 };
+    let mut imagined = Imagined { input, messages: Vec::new(), time_s: 0.0 };
     imagined.go();
     Recording {
         path: PathBuf::from("plan.toml"),
@@ -109,8 +101,8 @@ impl Imagined<'_> {
         let dwell_s = plan.totals.arm_time_s - plan.pose.last().map_or(0.0, |pose| pose.arm_time_s);
         for (pose, path) in plan.pose.iter().zip(&plan.path) {
             self.phase(Phase::Move);
-            for edge in path.waypoints_rad.windows(2) {
-                self.edge(&JointAngles::from_slice(&edge[0]), &JointAngles::from_slice(&edge[1]));
+            for (edge, &duration_s) in path.waypoints_rad.windows(2).zip(&path.edge_durations_s) {
+                self.edge(&JointAngles::from_slice(&edge[0]), &JointAngles::from_slice(&edge[1]), duration_s);
             }
             self.phase(Phase::Settle);
             let angles = JointAngles::from_slice(&pose.angles_rad);
@@ -138,8 +130,8 @@ impl Imagined<'_> {
         self.tell(Message::Mark(Mark { start: stamp, end: stamp, kind: MarkKind::Phase(phase) }));
     }
 
-    fn edge(&mut self, from: &JointAngles, to: &JointAngles) {
-        let (began_s, duration_s) = (self.time_s, self.timing.edge_duration_s(from, to));
+    fn edge(&mut self, from: &JointAngles, to: &JointAngles, duration_s: f64) {
+        let began_s = self.time_s;
         let steps = (duration_s * FRAME_HZ).ceil().max(1.0) as u32;
         for k in 1..=steps {
             let share = f64::from(k) / f64::from(steps);

@@ -66,9 +66,6 @@ pub struct PathStudy {
     pub rows: Vec<PathRow>,
 }
 
-/// More samples than the planner's own count of work lets through.
-const MAX_SAMPLES: usize = 1_000_000;
-
 impl PathSite {
     /// The same as one belief has it, with the bounds on the joints.
     #[must_use]
@@ -109,8 +106,7 @@ pub fn path_study(
     let (believed, bounds) = site.believed(belief);
     let clearance = ClearanceModel::new(&believed.robot, &believed.vehicle, &believed.scene);
     let limits = bounds.safe_limits(&believed.robot);
-    let planner =
-        PathPlanner { clearance: &clearance, bounds: &bounds, limits: &limits, margin_m, max_samples: MAX_SAMPLES };
+    let planner = PathPlanner { clearance: &clearance, bounds: &bounds, limits: &limits, margin_m };
     let timing = Timing::new(&believed.robot);
     let query = |k: usize| {
         let mut rng = stream_rng(seed, &format!("{} {} {k}", site.name, belief.name()));
@@ -118,7 +114,7 @@ pub fn path_study(
             use rand::RngExt;
             let at =
                 JointAngles::from_fn(limits.len(), |j| rng.random_range(limits[j].lower_rad..=limits[j].upper_rad));
-            if planner.is_free(&at) {
+            if planner.is_free_to_arrive(&at) {
                 return at;
             }
         };

@@ -4,7 +4,7 @@
 //! joint: what is left over is what the joints lag, droop and overshoot each in its own way, which planning bounds by
 //! robot.toml's `[motion]` (`plan::Stray`).
 
-use crate::plan::{Stray, Timing};
+use crate::plan::{Edge as Motion, Stray, Timing};
 use crate::robot::Robot;
 use crate::sensor::ArmSensors;
 use crate::streams::{JointAngles, Message};
@@ -16,6 +16,10 @@ const ON_LINE_RAD: f64 = 1e-3;
 const SHORTEST_RAD: f64 = 0.05;
 /// Readings are looked at for so long after the last set-point of an edge, s.
 const AFTER_S: f64 = 0.5;
+/// Readings this far along an edge are at its end.
+const AT_END: f64 = 0.999;
+/// Joints that are slower than this share of their full rate are left out where overshoot is told by the rate.
+const LEAST_RATE_SHARE: f64 = 0.1;
 /// Multiple of the sensor's noise that a reading may be off beside, and the controller's rest, rad.
 const NOISE_SIGMAS: f64 = 4.0;
 
@@ -24,8 +28,8 @@ const NOISE_SIGMAS: f64 = 4.0;
 pub struct StrayStudy {
     pub n_edges: usize,
     pub n_readings: usize,
-    /// Readings of which some joint is off the line by more than the bound and its noise.
-    pub n_beyond: usize,
+    /// Readings of which some joint is off the line by more than the bound and its noise, on the way and where the edge ends.
+    pub n_beyond: [usize; 2],
     pub joints: Vec<JointStray>,
 }
 
@@ -39,6 +43,8 @@ pub struct JointStray {
     pub most_lag_s: f64,
     /// Largest distance while the edge ends, rad.
     pub most_at_end_rad: f64,
+    /// The least `overshoot_rad` of `[motion]` that covers the ends of all edges on which it has a tenth of its rate or more.
+    pub most_overshoot_rad: f64,
     /// Largest share of the bound.
     pub most_of_bound: f64,
 }
@@ -66,7 +72,7 @@ pub fn stray_study(robot: &Robot, messages: &[Message]) -> StrayStudy {
     commands.sort_by_key(|(stamp, _)| *stamp);
     readings.sort_by_key(|(stamp, _)| *stamp);
     let joints = robot.joint_names().into_iter().map(|name| JointStray { name, ..JointStray::default() });
-    let mut study = StrayStudy { n_edges: 0, n_readings: 0, n_beyond: 0, joints: joints.collect() };
+    let mut study = StrayStudy { n_edges: 0, n_readings: 0, n_beyond: [0; 2], joints: joints.collect() };
     let edges = edges(&commands);
     for (k, edge) in edges.iter().enumerate() {
         study.n_edges += 1;
@@ -133,44 +139,62 @@ fn nearest(from: &JointAngles, to: &JointAngles, at: &JointAngles) -> (f64, Join
 impl StrayStudy {
     fn add(&mut self, robot: &Robot, edge: &Edge, stamp: Stamp, reading: &JointAngles) {
         let (share, on_line) = nearest(&edge.from, &edge.to, reading);
-        let stray = Stray::new(robot, &Timing::new(robot), &edge.from, &edge.to);
+        let timing = Timing::new(robot);
         let duration_s = edge.end.since_s(edge.start);
+        // Set-points begin and end with a rest of a period or so, by which the edge seems quicker than it was.
+        let slowness = f64::max(duration_s / timing.least_duration_s(&edge.from, &edge.to), 1.0);
+        let stray = Stray::new(robot, &timing, &Motion { from: edge.from, to: edge.to, slowness });
         let u = (stamp.since_s(edge.start) / duration_s).clamp(0.0, 1.0);
         let mut is_beyond = false;
         for (joint, found) in self.joints.iter_mut().enumerate() {
             let sensor = &robot.sensors[joint];
             let noise_rad = NOISE_SIGMAS * sensor.noise_std_counts / sensor.counts_per_rad.abs();
-            let off_rad = ((reading[joint] - on_line[joint]).abs() - noise_rad).max(0.0);
+            let signed_rad = reading[joint] - on_line[joint];
+            let off_rad = (signed_rad.abs() - noise_rad).max(0.0);
+            let off_middle_rad =
+                |stray: &Stray| ((signed_rad - share * stray.middle_rad(joint)).abs() - noise_rad).max(0.0);
             let rate_rad_s = 6.0 * u * (1.0 - u) * (edge.to[joint] - edge.from[joint]).abs() / duration_s;
             let peak_rad_s = 1.5 * (edge.to[joint] - edge.from[joint]).abs() / duration_s;
             found.most_rad = found.most_rad.max(off_rad);
             if rate_rad_s > 0.33 * peak_rad_s && rate_rad_s > 0.02 {
                 found.most_lag_s = found.most_lag_s.max(off_rad / rate_rad_s);
             }
-            if share >= 0.999 {
+            if share >= AT_END {
                 found.most_at_end_rad = found.most_at_end_rad.max(off_rad);
+                // What does not move by itself tells nothing of how far a moving joint overshoots.
+                if stray.end_rad(joint) > LEAST_RATE_SHARE * robot.drive.motion.overshoot_rad {
+                    let full_rad = off_rad * robot.drive.motion.overshoot_rad / stray.end_rad(joint);
+                    found.most_overshoot_rad = found.most_overshoot_rad.max(full_rad);
+                }
             }
-            let bound_rad = stray.most_rad(joint, [share; 2]);
+            let (bound_rad, off_rad) = (stray.most_rad(joint, [share; 2]), off_middle_rad(&stray));
             is_beyond |= off_rad > bound_rad;
             if bound_rad > 1e-4 {
                 found.most_of_bound = found.most_of_bound.max(off_rad / bound_rad);
             }
         }
         self.n_readings += 1;
-        self.n_beyond += usize::from(is_beyond);
+        self.n_beyond[usize::from(share >= AT_END)] += usize::from(is_beyond);
     }
 
     /// As a table.
     #[must_use]
     pub fn summary(&self) -> String {
+        let [moving, at_end] = self.n_beyond;
         let mut text = format!(
-            "{} edges, {} readings, {} beyond the bound\n{:<18} {:>9} {:>9} {:>11} {:>9}\n",
-            self.n_edges, self.n_readings, self.n_beyond, "joint", "most rad", "lag s", "at end rad", "of bound"
+            "{} edges, {} readings, beyond the bound of [motion] {moving} on the way and {at_end} at the end\n\
+             {:<18} {:>9} {:>9} {:>11} {:>14} {:>9}\n",
+            self.n_edges, self.n_readings, "joint", "most rad", "lag s", "at end rad", "overshoot_rad", "of bound"
         );
         for joint in &self.joints {
             text += &format!(
-                "{:<18} {:>9.4} {:>9.3} {:>11.4} {:>9.2}\n",
-                joint.name, joint.most_rad, joint.most_lag_s, joint.most_at_end_rad, joint.most_of_bound
+                "{:<18} {:>9.4} {:>9.3} {:>11.4} {:>14.4} {:>9.2}\n",
+                joint.name,
+                joint.most_rad,
+                joint.most_lag_s,
+                joint.most_at_end_rad,
+                joint.most_overshoot_rad,
+                joint.most_of_bound
             );
         }
         text
@@ -202,7 +226,7 @@ mod tests {
         let mut messages = Vec::new();
         let mut began_s = 0.0;
         for edge in waypoints.windows(2) {
-            let duration_s = timing.edge_duration_s(&edge[0], &edge[1]);
+            let duration_s = timing.least_duration_s(&edge[0], &edge[1]);
             let n = (duration_s / 0.01).ceil() as u32;
             let at = |k: f64| Timing::set_point(&edge[0], &edge[1], (k / f64::from(n)).clamp(0.0, 1.0));
             for k in 0..=n + 60 {

@@ -5,7 +5,7 @@ use std::path::Path;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-use crate::plan::{ClearanceModel, JointErrorBounds};
+use crate::plan::{ClearanceModel, Edge, JointErrorBounds};
 use crate::robot::{PlacedShape, Robot, Shape, Vehicle, load, load_vehicle};
 use crate::routine::Scene;
 use crate::stats::stream_rng;
@@ -105,7 +105,7 @@ fn a_certified_edge_is_clear_for_every_arm_on_it() {
             let other = random_angles(&robot, &bounds, &mut rng);
             let length = rng.random_range(0.02..0.7);
             let to = JointAngles::from_fn(from.len(), |j| from[j] + length * (other[j] - from[j]));
-            let found = clearance.too_near_between(&from, &to, &bounds, MARGIN_M);
+            let found = clearance.too_near_along(&Edge::at_full_speed(from, to), &bounds, MARGIN_M);
             let mut least_m = f64::INFINITY;
             for step in 0..=12 {
                 let share = f64::from(step) / 12.0;

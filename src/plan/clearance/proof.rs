@@ -8,6 +8,7 @@ use crate::plan::certify::{Between, Moved, Pair};
 use crate::plan::pairs::UNSEEN_M;
 use crate::plan::separation::{Placed, Shapes, separate};
 use crate::plan::timing::Timing;
+use crate::robot::Robot;
 use crate::streams::{JointAngles, MAX_JOINTS};
 
 impl ClearanceModel<'_> {
@@ -25,6 +26,10 @@ impl ClearanceModel<'_> {
 
     pub(in crate::plan) fn stowed(&self) -> &JointAngles {
         &self.robot.stowed
+    }
+
+    pub(in crate::plan) fn robot(&self) -> &Robot {
+        self.robot
     }
 
     pub(in crate::plan) fn timing(&self) -> &Timing {

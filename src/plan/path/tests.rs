@@ -47,8 +47,13 @@ fn random_too_near(clearance: &ClearanceModel<'_>, planner: &PathPlanner<'_>, rn
     }
 }
 
+/// The waypoints' time with each edge at the highest speed that it allows.
 fn duration_s(planner: &PathPlanner<'_>, waypoints: &[JointAngles]) -> f64 {
-    planner.clearance.timing().path_duration_s(&Path { waypoints: waypoints.to_vec() })
+    let mut path = Path::at(waypoints[0]);
+    for edge in waypoints.windows(2) {
+        path.push(edge[1], planner.slowness(&edge[0], &edge[1], SLOWEST, &mut 0).expect("certified"));
+    }
+    planner.clearance.timing().path_duration_s(&path)
 }
 
 /// In all three sites, under wide and narrow bounds: paths are found, keep clear wherever one looks, and are the same again.
@@ -74,15 +79,23 @@ fn paths_are_found_and_keep_clear_and_are_the_same_again() {
                 found += 1;
                 bent += i32::from(path.waypoints.len() > 2);
                 assert_eq!((path.waypoints[0], path.waypoints[path.waypoints.len() - 1]), (from, to));
-                for edge in path.waypoints.windows(2) {
+                for edge in path.edges() {
+                    let stray = Stray::new(&site.robot, clearance.timing(), &edge);
                     for step in 0..=10 {
-                        let at = between(&edge[0], &edge[1], f64::from(step) / 10.0);
+                        let share = f64::from(step) / 10.0;
+                        let on_line = between(&edge.from, &edge.to, share);
                         for _ in 0..20 {
-                            let arm = JointAngles::from_fn(at.len(), |j| {
-                                let share = f64::from(rng.random_range(-1..=1));
-                                if j < 5 { at[j] + share * bounds.error_rad(j, at[j]) } else { at[j] }
+                            // Off the line first, then off what the sensors say.
+                            let sign = |rng: &mut ChaCha8Rng| f64::from(rng.random_range(-1..=1));
+                            let arm = JointAngles::from_fn(on_line.len(), |j| {
+                                if j >= 5 {
+                                    return on_line[j];
+                                }
+                                let off_rad = sign(&mut rng) * stray.most_rad(j, [share; 2]);
+                                let at_rad = on_line[j] + share * stray.middle_rad(j) + off_rad;
+                                at_rad + sign(&mut rng) * bounds.error_rad(j, at_rad)
                             });
-                            assert!(!clearance.is_nearer_than(&arm, MARGIN_M - 1e-9), "{name} {belief}: {at:?}");
+                            assert!(!clearance.is_nearer_than(&arm, MARGIN_M - 1e-9), "{name} {belief}: {on_line:?}");
                         }
                     }
                 }
@@ -109,14 +122,51 @@ fn shortcuts_make_paths_quicker_and_never_slower() {
         }
         let mut connect = Connect::new(&planner, &from, &to);
         let Some(waypoints) = connect.search(&mut rng) else { continue };
-        let short = connect.shortened(waypoints.clone(), &mut rng);
-        assert!(short.windows(2).all(|edge| planner.is_edge_free(&edge[0], &edge[1])));
-        let (long_s, short_s) = (duration_s(&planner, &waypoints), duration_s(&planner, &short));
+        let short = connect.shortened(&waypoints, &mut rng);
+        assert!(short.edges().all(|edge| planner.keeps_clear(&edge, &mut 0)));
+        let long_s = duration_s(&planner, &waypoints);
+        let short_s = clearance.timing().path_duration_s(&short);
         assert!(short_s <= long_s + 1e-9, "{long_s} {short_s}");
         (before_s, after_s, n) = (before_s + long_s, after_s + short_s, n + 1);
     }
     eprintln!("{before_s:.0} s before, {after_s:.0} s after");
     assert!(after_s < 0.75 * before_s, "{before_s} {after_s}");
+}
+
+/// An edge is driven as quickly as it may be: at the next higher speed some arm that overshoots comes too near.
+#[test]
+fn edges_near_things_are_driven_slowly_and_the_others_are_not() {
+    let site = site("tight-basket");
+    let clearance = ClearanceModel::new(&site.robot, &site.vehicle, &site.scene);
+    let bounds = JointErrorBounds::alike(&site.robot, 0.014, 0.004);
+    let limits = bounds.safe_limits(&site.robot);
+    let planner = planner(&clearance, &bounds, &limits);
+    let mut rng = stream_rng(11, "slow edges");
+    let mut counts = [0; SLOWNESS.len()];
+    for _ in 0..300 {
+        let (from, to) = (random_free(&planner, &mut rng), random_free(&planner, &mut rng));
+        let Some(slowness) = planner.slowness(&from, &to, SLOWEST, &mut 0) else {
+            assert!(!planner.is_edge_free(&from, &to));
+            continue;
+        };
+        let level = SLOWNESS.iter().position(|&level| level == slowness).expect("one of the levels");
+        counts[level] += 1;
+        let edge = Edge { from, to, slowness };
+        assert!(planner.keeps_clear(&edge, &mut 0) && planner.stays_off_the_stops(&edge));
+        let stray = Stray::new(&site.robot, clearance.timing(), &edge);
+        for joint in 0..5 {
+            let at_end_rad = to[joint] + (to[joint] - from[joint]).signum() * stray.end_rad(joint);
+            let arriving_rad = Stray::arriving(&site.robot).end_rad(joint);
+            assert!(at_end_rad <= limits[joint].upper_rad + arriving_rad + 1e-9, "{joint}: {at_end_rad}");
+            assert!(at_end_rad >= limits[joint].lower_rad - arriving_rad - 1e-9, "{joint}: {at_end_rad}");
+        }
+        if level > 0 {
+            let quicker = Edge { from, to, slowness: SLOWNESS[level - 1] };
+            assert!(!planner.keeps_clear(&quicker, &mut 0) || !planner.stays_off_the_stops(&quicker));
+        }
+    }
+    eprintln!("{counts:?} at each speed");
+    assert!(counts[0] > 60 && counts[1..].iter().sum::<i32>() > 5, "{counts:?}");
 }
 
 #[test]
@@ -142,10 +192,10 @@ fn ends_that_cannot_be_are_named_with_the_nearest_that_can() {
                 of_vehicle += i32::from(parts(&nearest));
                 assert!(distance_m < needed_m, "{nearest}");
                 // It is free, and a 256th of the way on it is not.
-                assert!(planner.is_free(&nearest_free));
+                assert!(planner.is_free_to_arrive(&nearest_free));
                 let way_rad = free.max_abs_difference(&inside);
                 let share = free.max_abs_difference(&nearest_free) / way_rad;
-                assert!(!planner.is_free(&between(&free, &inside, share + 1.01 / 256.0)), "{share}");
+                assert!(!planner.is_free_to_arrive(&between(&free, &inside, share + 1.01 / 256.0)), "{share}");
             }
             other => panic!("{other:?}"),
         }
@@ -184,15 +234,18 @@ fn a_blocked_way_says_what_blocks_it_and_how_far_it_is_free() {
     let clearance = ClearanceModel::new(&site.robot, &site.vehicle, &site.scene);
     let bounds = JointErrorBounds::alike(&site.robot, 0.014, 0.004);
     let limits = bounds.safe_limits(&site.robot);
-    let planner = PathPlanner { max_samples: 1, ..planner(&clearance, &bounds, &limits) };
+    let planner = planner(&clearance, &bounds, &limits);
     let mut rng = stream_rng(1, "blocked");
     let mut blocked = 0;
     while blocked < 20 {
         let (from, to) = (random_free(&planner, &mut rng), random_free(&planner, &mut rng));
-        let Err(error) = planner.plan(&from, &to, &mut rng) else { continue };
-        let PathError::Blocked { tried, nearest, distance_m, free_share } = &error else { panic!("{error:?}") };
+        if planner.slowness(&from, &to, SLOWEST, &mut 0).is_some() {
+            continue;
+        }
+        // As a search says that has found no way round.
+        let error = planner.blocked(&from, &to, 7);
+        let PathError::Blocked { tried: 7, nearest, distance_m, free_share } = &error else { panic!("{error:?}") };
         blocked += 1;
-        assert_eq!(*tried, 1);
         assert!(*distance_m < MARGIN_M && nearest.contains(" and "), "{error}");
         assert!(planner.is_edge_free(&from, &between(&from, &to, *free_share)));
         assert!(!planner.is_edge_free(&from, &between(&from, &to, free_share + 1.0 / 256.0)));
@@ -204,7 +257,7 @@ fn planner<'a>(
     bounds: &'a JointErrorBounds,
     limits: &'a [JointLimits],
 ) -> PathPlanner<'a> {
-    PathPlanner { clearance, bounds, limits, margin_m: MARGIN_M, max_samples: 4000 }
+    PathPlanner { clearance, bounds, limits, margin_m: MARGIN_M }
 }
 
 fn random(planner: &PathPlanner<'_>, rng: &mut ChaCha8Rng) -> JointAngles {
@@ -216,7 +269,7 @@ fn random(planner: &PathPlanner<'_>, rng: &mut ChaCha8Rng) -> JointAngles {
 fn random_free(planner: &PathPlanner<'_>, rng: &mut ChaCha8Rng) -> JointAngles {
     loop {
         let at = random(planner, rng);
-        if planner.is_free(&at) {
+        if planner.is_free_to_arrive(&at) {
             return at;
         }
     }
