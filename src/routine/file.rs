@@ -192,7 +192,7 @@ pub struct CaptureSettings {
     #[serde(default)]
     pub choose: PoseCriterion,
     /// After so many views, the running estimate renews margins and remaining poses; 0: planned once.
-    #[serde(default)]
+    #[serde(default = "CaptureSettings::default_replan_every")]
     pub replan_every: u32,
     /// No more views once the predicted tool error at the task (root mean square) is below this.
     #[serde(default)]
@@ -237,6 +237,10 @@ impl CaptureSettings {
     fn default_poses() -> u32 {
         30
     }
+    fn default_replan_every() -> u32 {
+        6
+    }
+
     fn default_held_out() -> u32 {
         8
     }
@@ -281,7 +285,7 @@ impl Default for CaptureSettings {
             clearance_m: Self::default_clearance_m(),
             dwell_s: Self::default_dwell_s(),
             choose: PoseCriterion::default(),
-            replan_every: 0,
+            replan_every: Self::default_replan_every(),
             stop_at_tool_error_m: None,
             max_time_s: None,
             margins: Margins::default(),
