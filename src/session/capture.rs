@@ -21,6 +21,9 @@ const SPARE_TRIES: usize = 10;
 /// Sightings as predicted that a tag is given in advance.
 const TRUST_IN_ADVANCE: f64 = 2.0;
 
+/// With fewer views no calibration begins: then it is the reason why there are no more that matters.
+const LEAST_VIEWS: usize = 3;
+
 /// A capture under way.
 struct Views<'a> {
     settings: &'a CaptureSettings,
@@ -185,7 +188,7 @@ impl Run<'_, '_> {
                     self.driver.phase(Phase::Plan)?;
                     match self.choose(&views) {
                         Ok(plan) => plan,
-                        Err(why) if views.captured() > 0 && replans => break why.to_string(),
+                        Err(why) if views.n_fit >= LEAST_VIEWS && replans => break why.to_string(),
                         Err(why) => return Err(why.into()),
                     }
                 }

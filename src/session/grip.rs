@@ -22,7 +22,7 @@ impl Run<'_, '_> {
         let opening_m = opening * gripper.opening_max_m;
         let is_wide = opening_m > gripper.rest_opening_m + AS_AT_REST_M;
         let crowded = |run: &Self| run.jaws.open.too_near(&run.driver.set_point(), &run.bounds, 0.0);
-        if is_wide && crowded(self).is_some() {
+        if is_wide && (crowded(self).is_some() || !self.can_leave(self.jaws.open)) {
             // Folded up for a view the arm may be in its own jaws' way; where it is stowed there is room on any vehicle so far.
             let stowed = self.robot.stowed;
             self.go(&stowed)?;

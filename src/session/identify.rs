@@ -76,10 +76,9 @@ impl Run<'_, '_> {
             let end = JointAngles::from_fn(at.len(), |j| {
                 if j == unknown.joint { unknown.rest_rad + excursion_rad } else { at[j] }
             });
-            let found = self.clearance.nearest_under(&end, &bounds, self.margin_m());
-            if found.distance_m >= self.margin_m() {
+            let Some(found) = self.clearance.too_near_arriving(&end, &bounds, self.margin_m()) else {
                 return Ok(excursion_rad);
-            }
+            };
             nearest = found.to_string();
             excursion_rad *= SHRINK;
         }
@@ -95,7 +94,7 @@ impl Run<'_, '_> {
         for offset_rad in offsets_rad {
             let to = JointAngles::from_fn(rest.len(), |j| if j == joint { rest[j] + offset_rad } else { rest[j] });
             let from = self.driver.set_point();
-            let is_there = self.driver.follow(&Path { waypoints: vec![from, to] })? == Followed::Arrived;
+            let is_there = self.driver.follow(&Path::slowly(vec![from, to]))? == Followed::Arrived;
             if is_there && self.driver.settle()? {
                 self.driver.dwell(DWELL_S, MarkKind::Identify { joint_idx: joint as u32 })?;
             } else {

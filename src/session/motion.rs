@@ -3,7 +3,7 @@
 use super::bump::{Bump, BumpWatch};
 use super::stillness::Stillness;
 use super::{MotionAhead, Progress, Recorder, SessionError};
-use crate::plan::{Path, Timing};
+use crate::plan::{Edge, Path, Timing};
 use crate::robot::{FailedJoint, Robot, Vehicle};
 use crate::routine::TaskSettings;
 use crate::sensor::{ArmSensors, Conditions};
@@ -233,7 +233,7 @@ impl<'b> Driver<'b> {
             joints: self.robot.joint_names(),
             from: self.set_point,
             to: path.waypoints.last().copied().unwrap_or(self.set_point),
-            edges: path.waypoints.len().saturating_sub(1),
+            edges: path.n_edges(),
             duration_s: self.timing.path_duration_s(path),
             clearance_m,
         }
@@ -256,8 +256,8 @@ impl<'b> Driver<'b> {
     /// The same, with the path's clearance for an operator who is asked.
     pub fn follow_told(&mut self, path: &Path, clearance_m: Option<f64>) -> Result<Followed, SessionError> {
         self.ask(path, clearance_m)?;
-        for (n, edge) in path.waypoints.windows(2).enumerate() {
-            if let Some(bump) = self.follow_edge(edge[0], edge[1], 1.0, Heed::Bumps)? {
+        for (n, edge) in path.edges().enumerate() {
+            if let Some(bump) = self.follow_edge(&edge, Heed::Bumps)? {
                 self.came = path.waypoints[..=n].to_vec();
                 return self.retreat(bump);
             }
@@ -270,25 +270,18 @@ impl<'b> Driver<'b> {
     /// The same where a joint is meant to be held up: it is driven against its stop, or comes from there.
     pub fn follow_unheeding(&mut self, path: &Path) -> Result<(), SessionError> {
         self.ask(path, None)?;
-        for edge in path.waypoints.windows(2) {
-            self.follow_edge(edge[0], edge[1], 1.0, Heed::Nothing)?;
+        for edge in path.edges() {
+            self.follow_edge(&edge, Heed::Nothing)?;
         }
         self.bumps.forget();
         self.came.clone_from(&path.waypoints);
         Ok(())
     }
 
-    fn follow_edge(
-        &mut self,
-        from: JointAngles,
-        to: JointAngles,
-        slowness: f64,
-        heed: Heed,
-    ) -> Result<Option<Bump>, SessionError> {
-        let duration_s = slowness * self.timing.edge_duration_s(&from, &to);
-        let steps = (duration_s / self.arm.period_s()).ceil().max(1.0);
+    fn follow_edge(&mut self, edge: &Edge, heed: Heed) -> Result<Option<Bump>, SessionError> {
+        let steps = (self.timing.edge_duration_s(edge) / self.arm.period_s()).ceil().max(1.0);
         for k in 1..=steps as u64 {
-            self.set_point = Timing::set_point(&from, &to, k as f64 / steps);
+            self.set_point = Timing::set_point(&edge.from, &edge.to, k as f64 / steps);
             self.command()?;
             self.step()?;
             if heed == Heed::Bumps
@@ -316,7 +309,7 @@ impl<'b> Driver<'b> {
         self.log(LogLevel::Warn, &text)?;
         let mut from = at;
         for to in std::mem::take(&mut self.came).into_iter().rev() {
-            self.follow_edge(from, to, BACK_OUT_SLOWNESS, Heed::Nothing)?;
+            self.follow_edge(&Edge { from, to, slowness: BACK_OUT_SLOWNESS }, Heed::Nothing)?;
             from = to;
         }
         self.came = vec![from];

@@ -41,8 +41,11 @@ impl Run<'_, '_> {
                 Ok(plan) => {
                     self.planned = self.planned.take().map(|planned| Planned { first_capture: Some(plan), ..planned });
                 }
-                Err(_) if looks_first => {}
-                Err(why) => return Err(why),
+                // No look finds more tags than there are.
+                Err(why) if !looks_first || matches!(why, SessionError::Plan(PlanError::TooFewTags { .. })) => {
+                    return Err(why);
+                }
+                Err(_) => {}
             }
         }
         self.driver.record_task(&routine.task)?;

@@ -8,7 +8,7 @@ use super::prepare::Planned;
 use super::running::Before;
 use super::{Progress, Recorder, SessionError, Setup};
 use crate::calib::{Calibration, CalibrationFileError, Status, calibrate};
-use crate::plan::{Age, ClearanceModel, JointErrorBounds, LeastClearance, PathPlanner};
+use crate::plan::{Age, ClearanceModel, JointErrorBounds, LeastClearance, PathError, PathPlanner};
 use crate::robot::Robot;
 use crate::routine::{AssertLimits, CalibrateSettings, CalibrateViews, MoveGoal, OnRefusal, Step};
 use crate::sensor::ArmSensors;
@@ -16,10 +16,8 @@ use crate::stats::stream_rng;
 use crate::streams::{Arm, JointAngles, LogLevel, Mark, MarkKind, Message, Phase, ReachAttempt, Start};
 use crate::time::Stamp;
 
-/// Samples that a path planner may try before it gives a pose up.
-const MAX_PATH_SAMPLES: usize = 400;
-/// Shares of the clearance that are tried for a path from where the arm is, in this order.
-const START_SHARES: [f64; 4] = [1.0, 0.5, 0.2, 0.05];
+/// Shares of the clearance that are tried in this order for a path from a place that the whole of it does not let the arm leave.
+const START_SHARES: [f64; 3] = [0.5, 0.2, 0.05];
 
 pub(super) fn run(
     setup: &Setup<'_>,
@@ -209,25 +207,28 @@ impl Run<'_, '_> {
     pub fn go(&mut self, to: &JointAngles) -> Result<bool, SessionError> {
         let limits = self.bounds.safe_limits(&self.robot);
         let from = self.driver.set_point();
-        let mut planner = PathPlanner {
-            clearance: self.clearance,
-            bounds: &self.bounds,
-            limits: &limits,
-            margin_m: self.margin_m(),
-            max_samples: MAX_PATH_SAMPLES,
-        };
-        // A new calibration may find the arm nearer to something than it believed to be: it must get away from there.
-        let margins_m = START_SHARES.map(|share| share * self.margin_m());
-        if let Some(margin_m) =
-            margins_m.into_iter().find(|&margin_m| PathPlanner { margin_m, ..planner }.is_free(&from))
-        {
-            planner.margin_m = margin_m;
+        let (clearance, bounds, margin_m) = (self.clearance, &self.bounds, self.margin_m());
+        let mut planner = PathPlanner { clearance, bounds, limits: &limits, margin_m };
+        let mut outcome = planner.plan(&from, to, &mut self.rng);
+        for share in START_SHARES {
+            // A new calibration, or open jaws, may find the arm nearer to something than it believed to be: it must get away.
+            let is_stuck = match &outcome {
+                Err(PathError::StartTooNear { .. }) => true,
+                // Clear where it stands, and not for what a joint strays by as soon as it moves.
+                Err(PathError::Blocked { .. }) => !planner.is_free_to_arrive(&from),
+                _ => false,
+            };
+            if !is_stuck {
+                break;
+            }
+            planner.margin_m = share * self.margin_m();
+            outcome = planner.plan(&from, to, &mut self.rng);
         }
-        if planner.margin_m < self.margin_m() {
+        if planner.margin_m < self.margin_m() && outcome.is_ok() {
             let text = format!("starts with {:.3} m of clearance only, and keeps as much on the way", planner.margin_m);
             self.driver.log(LogLevel::Warn, &text)?;
         }
-        match planner.plan(&from, to, &mut self.rng) {
+        match outcome {
             Ok(path) => {
                 let asks = self.driver.progress.wants_to_approve();
                 let least = || LeastClearance::along(self.clearance, &self.bounds, &path, planner.margin_m);
@@ -239,6 +240,13 @@ impl Run<'_, '_> {
                 Ok(false)
             }
         }
+    }
+
+    /// Whether a path leads from here to where the arm is stowed, with what `clearance` keeps clear.
+    pub fn can_leave(&mut self, clearance: &ClearanceModel<'_>) -> bool {
+        let limits = self.bounds.safe_limits(&self.robot);
+        let planner = PathPlanner { clearance, bounds: &self.bounds, limits: &limits, margin_m: self.margin_m() };
+        planner.plan(&self.driver.set_point(), &self.robot.stowed, &mut self.rng).is_ok()
     }
 
     fn move_to(&mut self, step: usize, goal: &MoveGoal) -> Result<(), SessionError> {
@@ -253,8 +261,7 @@ impl Run<'_, '_> {
         };
         self.driver.phase(Phase::Move)?;
         self.progress_at(Phase::Move, 0, 1);
-        let nearest = self.clearance.nearest_under(&to, &self.bounds, self.margin_m());
-        if nearest.distance_m < self.margin_m() {
+        if let Some(nearest) = self.clearance.too_near_arriving(&to, &self.bounds, self.margin_m()) {
             return Err(wrong(format!(
                 "the pose comes within {:.3} m of clearance between {nearest} for an arm within the sensors' error; {:.3} m are needed",
                 nearest.distance_m,

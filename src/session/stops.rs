@@ -6,7 +6,7 @@
 
 use super::SessionError;
 use super::script::Run;
-use crate::plan::Path;
+use crate::plan::{Edge, Path};
 use crate::routine::StopsSettings;
 use crate::streams::{JointAngles, LogLevel, MarkKind, Phase};
 
@@ -41,11 +41,13 @@ impl Run<'_, '_> {
         let beyond_rad = angle_rad + way * self.bounds.error_rad(joint, angle_rad);
         let to = JointAngles::from_fn(from.len(), |j| if j == joint { beyond_rad } else { from[j] });
         let stop = format!("the stop of {} at {angle_rad:.4} rad", self.robot.sensors[joint].joint);
-        if let Some(nearest) = self.clearance.too_near_between(&from, &to, &self.bounds, self.margin_m()) {
+        if let Some(nearest) =
+            self.clearance.too_near_along(&Edge::at_full_speed(from, to), &self.bounds, self.margin_m())
+        {
             return self.driver.log(LogLevel::Warn, &format!("{stop} is not driven to: {nearest} may come too near"));
         }
         self.driver.phase(Phase::Move)?;
-        self.driver.follow_unheeding(&Path { waypoints: vec![from, to] })?;
+        self.driver.follow_unheeding(&Path::at_full_speed(vec![from, to]))?;
         self.driver.phase(Phase::Settle)?;
         if self.driver.press(joint)? {
             self.driver.phase(Phase::Capture)?;
@@ -54,7 +56,7 @@ impl Run<'_, '_> {
             self.driver.log(LogLevel::Warn, &format!("{stop} is left out: the arm did not come to rest"))?;
         }
         self.driver.phase(Phase::Move)?;
-        self.driver.follow_unheeding(&Path { waypoints: vec![to, from] })?;
+        self.driver.follow_unheeding(&Path::at_full_speed(vec![to, from]))?;
         if !self.driver.settle()? {
             self.driver.log(LogLevel::Warn, &format!("the arm did not settle after {stop}"))?;
         }

@@ -135,10 +135,11 @@ fn an_arm_that_never_settles_leaves_nothing_to_calibrate() {
     routine.targets_m.truncate(1);
     let answer = run_short(&routine, folder.path());
     assert_eq!(answer.code, 1, "{answer:#?}");
-    assert!(answer.stderr.contains("6 planned poses"), "{answer:#?}");
+    // Six are wanted, and ten more may be tried in their place.
+    assert!(answer.stderr.contains("16 planned poses"), "{answer:#?}");
     assert!(!folder.path().join("out/calibration.toml").exists());
     let kept = read_recording(folder.path().join("out/run-cut-1.mcap")).expect("the kept recording reads");
     let said =
         kept.messages.iter().filter(|(_, m)| matches!(m, Message::Log(line) if line.text.contains("did not settle")));
-    assert_eq!(said.count(), 6, "each pose is given up aloud");
+    assert_eq!(said.count(), 16, "each pose is given up aloud");
 }

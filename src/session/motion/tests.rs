@@ -95,7 +95,7 @@ fn sensors_with_terms_are_used_under_what_was_heard_last() {
     assert!(driver.set_point().max_abs_difference(&at_rest) < 1e-9);
 
     // The same words mean other angles when the oil is warmer, the arm deeper and the time later.
-    let ends = Path { waypoints: vec![at_rest, at_rest] };
+    let ends = Path::at_full_speed(vec![at_rest, at_rest]);
     driver.arm.command(&counts).expect("taken");
     drop(driver);
     (arm.oil_c, arm.pressure_pa) = (35.0, 4e6);
@@ -170,12 +170,12 @@ fn an_operator_is_asked_before_a_motion_and_obeyed() {
     let mut driver = Driver::new(&robot, &mut arm, &mut recorder, nominal, &mut operator).expect("it steps");
     let from = driver.set_point();
     let to = JointAngles::from_fn(6, |j| if j == 0 { from[0] + 0.3 } else { from[j] });
-    let path = Path { waypoints: vec![from, to] };
+    let path = Path::at_full_speed(vec![from, to]);
     let duration_s = Timing::new(&robot).path_duration_s(&path);
     assert_eq!(driver.follow_told(&path, Some(0.07)).expect("it moves"), Followed::Arrived);
     // Twice 5 s, then the motion.
     assert!((driver.elapsed_s() - 0.01 - 10.0 - duration_s).abs() < 0.05, "{}", driver.elapsed_s());
-    let back = Path { waypoints: vec![to, from] };
+    let back = Path::at_full_speed(vec![to, from]);
     assert!(matches!(driver.follow(&back), Err(SessionError::Interrupted { .. })));
     assert!(driver.set_point().max_abs_difference(&to) < 1e-12, "it stays");
     drop(driver);
