@@ -3,7 +3,7 @@
 use comfy_table::presets::UTF8_FULL_CONDENSED;
 use comfy_table::{CellAlignment, Table};
 
-use super::summary::{AssertSummary, GainChange, ReachScore, RunSummary, ScoreSide};
+use super::summary::{AssertSummary, GainChange, ReachScore, RenewalSummary, RunSummary, ScoreSide};
 use crate::calib::{CameraMount, FailedJointTable, Known, MapResult, PriorTable, Status};
 use crate::stats::Summary;
 
@@ -148,6 +148,7 @@ pub(super) fn check_lines(summary: &RunSummary) -> Vec<String> {
         let reasons = capture.rejected_by_reason.iter().map(|(why, n)| format!("{n} {}", why.replace('_', " ")));
         lines.push(format!("rejected     {}", reasons.collect::<Vec<_>>().join(", ")));
     }
+    lines.extend(capture.ended.as_ref().map(|why| enough_line(why, &capture.renewals)));
     lines.extend(summary.calibration.largest_gain_change.as_ref().map(gain_line));
     lines.extend(summary.calibration.camera_mount.as_ref().map(mount_line));
     lines.extend(summary.calibration.failed_joint.iter().map(failed_line));
@@ -179,6 +180,20 @@ pub(super) fn check_lines(summary: &RunSummary) -> Vec<String> {
         ));
     }
     lines
+}
+
+/// Why the last capture ended, and what was predicted on its way.
+fn enough_line(why: &str, renewals: &[RenewalSummary]) -> String {
+    let last = renewals.chunk_by(|before, after| before.views < after.views).last().unwrap_or_default();
+    if last.is_empty() {
+        return format!("enough       {why}");
+    }
+    let joined = |of: fn(&RenewalSummary) -> String| last.iter().map(of).collect::<Vec<_>>().join(", ");
+    format!(
+        "enough       {why}; predicted after {} views: {} mm",
+        joined(|renewal| renewal.views.to_string()),
+        joined(|renewal| format!("{:.1}", 1e3 * renewal.predicted_tool_error_m))
+    )
 }
 
 /// Below this, relative, a gain is that of an encoder: its scale is its line count.
@@ -269,4 +284,22 @@ fn assert_line(limit: &AssertSummary) -> String {
         |value| format!("{:.2}{unit}", value * scale),
     );
     format!("assert       {verdict}: step {}, {} {}{unit} against {value}", limit.step, limit.key, limit.limit * scale)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_the_last_capture_says_how_it_went() {
+        let renewal = |(views, mm): &(usize, f64)| RenewalSummary {
+            views: *views,
+            elapsed_s: 1.0,
+            predicted_tool_error_m: mm / 1e3,
+        };
+        let both: Vec<_> = [(1, 50.0), (3, 6.0), (1, 3.04), (7, 1.96)].iter().map(renewal).collect();
+        assert_eq!(enough_line("so", &both), "enough       so; predicted after 1, 7 views: 3.0, 2.0 mm");
+        assert_eq!(enough_line("so", &both[..2]), "enough       so; predicted after 1, 3 views: 50.0, 6.0 mm");
+        assert_eq!(enough_line("30 poses were visited", &[]), "enough       30 poses were visited");
+    }
 }
