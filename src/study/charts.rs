@@ -75,6 +75,7 @@ type DrawError = Box<dyn std::error::Error + Send + Sync>;
 fn draw(area: &Area<'_>, panel: &Panel) -> Result<(), DrawError> {
     let shown: Vec<Series> = panel.series.iter().map(|series| positive(panel, series)).collect();
     let (x, y) = ranges(panel, &shown);
+    let legend = free_corner(&shown, x, y);
     let mut builder = ChartBuilder::on(area);
     builder.caption(&panel.title, ("sans-serif", 15)).margin(8).x_label_area_size(36).y_label_area_size(56);
     // One type of chart for each pair of axes.
@@ -98,20 +99,41 @@ fn draw(area: &Area<'_>, panel: &Panel) -> Result<(), DrawError> {
                     .legend(move |(x, y)| Rectangle::new([(x, y - 3), (x + 12, y + 3)], color.filled()));
             }
             let mut labels = chart.configure_series_labels();
-            labels
-                .position(SeriesLabelPosition::UpperLeft)
-                .background_style(WHITE.mix(0.8))
-                .label_font(("sans-serif", 11));
+            labels.position(legend).background_style(WHITE.mix(0.8)).label_font(("sans-serif", 11));
             labels.draw().map_err(boxed)?;
         }};
     }
-    match (panel.x.1, panel.y.1) {
+    match (drawn(panel.x.1, x), drawn(panel.y.1, y)) {
         (Axis::Linear, Axis::Linear) => chart!(x.0..x.1, y.0..y.1),
         (Axis::Log, Axis::Linear) => chart!((x.0..x.1).log_scale(), y.0..y.1),
         (Axis::Linear, Axis::Log) => chart!(x.0..x.1, (y.0..y.1).log_scale()),
         (Axis::Log, Axis::Log) => chart!((x.0..x.1).log_scale(), (y.0..y.1).log_scale()),
     }
     Ok(())
+}
+
+/// Decades are all that a logarithmic axis has labels for: a range of less than two is better off without.
+fn drawn(axis: Axis, (low, high): Range) -> Axis {
+    if high < 100.0 * low { Axis::Linear } else { axis }
+}
+
+/// Of the four corners the one about which there are the fewest points.
+fn free_corner(series: &[Series], x: Range, y: Range) -> SeriesLabelPosition {
+    let share = |value: f64, (low, high): Range| (value - low) / (high - low);
+    let n_in = |is_right: bool, is_upper: bool| {
+        let is_in = |p: &&[f64; 2]| {
+            let (x, y) = (share(p[0], x), share(p[1], y));
+            (if is_right { 1.0 - x } else { x }) < 0.3 && (if is_upper { 1.0 - y } else { y }) < 0.4
+        };
+        series.iter().flat_map(|series| &series.points).filter(is_in).count()
+    };
+    let corners = [
+        (n_in(false, true), SeriesLabelPosition::UpperLeft),
+        (n_in(true, true), SeriesLabelPosition::UpperRight),
+        (n_in(true, false), SeriesLabelPosition::LowerRight),
+        (n_in(false, false), SeriesLabelPosition::LowerLeft),
+    ];
+    corners.into_iter().min_by_key(|(n, _)| *n).map_or(SeriesLabelPosition::UpperLeft, |(_, corner)| corner)
 }
 
 fn boxed<E: std::error::Error + Send + Sync>(error: DrawingAreaErrorKind<E>) -> DrawError {
@@ -169,6 +191,18 @@ fn widened((low, high): Range, axis: Axis) -> Range {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_legend_goes_where_there_are_no_points() {
+        let falling: Vec<[f64; 2]> = (0..20).map(|k| [f64::from(k), 20.0 - f64::from(k)]).collect();
+        let rising: Vec<[f64; 2]> = falling.iter().map(|p| [p[0], 20.0 - p[1]]).collect();
+        let corner = |points: &Vec<[f64; 2]>| {
+            let line = Series { name: "line".to_owned(), style: Style::Line, points: points.clone() };
+            free_corner(&[line], (0.0, 20.0), (0.0, 20.0))
+        };
+        assert!(matches!(corner(&falling), SeriesLabelPosition::UpperRight));
+        assert!(matches!(corner(&rising), SeriesLabelPosition::UpperLeft));
+    }
 
     #[test]
     fn charts_hold_their_series_and_leave_out_what_an_axis_cannot_show() {
