@@ -108,6 +108,35 @@ mod tests {
         }
     }
 
+    /// Where an edge ends a joint may be ahead by its overshoot, and behind by a quarter of it, whichever way it came.
+    #[test]
+    fn an_edge_ends_ahead_for_the_most_part() {
+        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/titan4");
+        let mut robot = crate::robot::load(&folder).expect("the robot reads");
+        robot.drive.motion = crate::robot::MotionSpec { lag_spread_s: 0.0, overshoot_rad: 0.05, droop_rad: 0.0 };
+        let timing = Timing::new(&robot);
+        let from = robot.stowed;
+        let mut to = from;
+        (to[0], to[1]) = (from[0] + 0.6, from[1] - 0.4);
+        for slowness in [1.0, 4.0] {
+            let edge = Edge { from, to, slowness };
+            let (stray, rates_rad_s) = (Stray::new(&robot, &timing, &edge), timing.peak_rates_rad_s(&edge));
+            for joint in 0..2 {
+                let full_rad = 0.05 * rates_rad_s[joint] / robot.sensors[joint].max_rate_rad_s;
+                let way = (to[joint] - from[joint]).signum();
+                for share in [0.5, 1.0] {
+                    let (middle_rad, most_rad) =
+                        (way * share * stray.middle_rad(joint), stray.most_rad(joint, [share; 2]));
+                    assert!((middle_rad + most_rad - share * full_rad).abs() < 1e-12, "{joint}: ahead");
+                    assert!((middle_rad - most_rad + 0.25 * share * full_rad).abs() < 1e-12, "{joint}: behind");
+                }
+                assert!((stray.end_rad(joint) - full_rad).abs() < 1e-12);
+            }
+            let fastest = (0..2).map(|j| rates_rad_s[j] / robot.sensors[j].max_rate_rad_s).fold(0.0, f64::max);
+            assert!((fastest - RATE_SHARE / slowness).abs() < 1e-9, "{fastest}");
+        }
+    }
+
     /// Each joint lags by a time of its own: none is farther off the line than the bound says.
     #[test]
     fn joints_that_lag_differently_stay_within_the_bound() {
