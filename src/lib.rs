@@ -5,37 +5,23 @@
 //! `kinematics`, `optics` > `joints`, `spatial`, `stats`, `time`. docs/architecture.md has the map and the invariants.
 #![forbid(unsafe_code)]
 
-pub mod calib;
+pub use armcal_belief::{calib, plan, session, tagmap, verify};
+pub use armcal_core::{input, joints, kinematics, log, optics, robot, routine, sensor, spatial, stats, streams, time};
+#[cfg(feature = "sim")]
+pub use armcal_detect as detect;
+#[cfg(feature = "viewer")]
+pub use armcal_replay as replay;
+#[cfg(feature = "sim")]
+pub use armcal_sim as sim;
+#[cfg(feature = "sim")]
+pub use armcal_study as study;
+
 #[cfg(feature = "sim")]
 pub mod campaign;
 pub mod cli;
-#[cfg(feature = "detect")]
-pub mod detect;
-pub mod input;
-pub mod joints;
-pub mod kinematics;
-pub mod log;
-pub mod optics;
 pub mod output;
-pub mod plan;
-#[cfg(feature = "viewer")]
-pub mod replay;
 pub mod report;
-pub mod robot;
-pub mod routine;
 #[cfg(feature = "sim")]
 pub mod run;
 #[cfg(feature = "sim")]
 pub mod score;
-pub mod sensor;
-pub mod session;
-#[cfg(feature = "sim")]
-pub mod sim;
-pub mod spatial;
-pub mod stats;
-pub mod streams;
-#[cfg(feature = "sim")]
-pub mod study;
-pub mod tagmap;
-pub mod time;
-pub mod verify;

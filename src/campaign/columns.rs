@@ -2,7 +2,7 @@
 
 use crate::report::{RunSummary, ScoreSide};
 use crate::run::Finished;
-use crate::stats::Summary;
+use armcal_core::stats::Summary;
 
 /// What a figure's values are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

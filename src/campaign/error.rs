@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use crate::output::OutputError;
-use crate::routine::RoutineError;
 use crate::run::RunError;
+use armcal_core::routine::RoutineError;
 
 /// Why a campaign did not start, or could not keep its rows.
 #[derive(Debug, thiserror::Error)]

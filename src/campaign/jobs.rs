@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use super::matrix::{Setting, settings};
 use super::{CampaignError, Columns, Shard, fingerprint};
-use crate::routine::{self, Overrides, Routine, SeedRange, effective_table};
 use crate::run::RunInputs;
+use armcal_core::routine::{self, Overrides, Routine, SeedRange, effective_table};
 
 /// A routine and its overrides, as given.
 #[derive(Clone, Debug)]

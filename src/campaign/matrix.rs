@@ -3,7 +3,7 @@
 use toml::Value;
 
 use super::CampaignError;
-use crate::routine::Override;
+use armcal_core::routine::Override;
 
 /// One point of the matrix.
 #[derive(Clone, Debug, PartialEq)]

@@ -9,8 +9,8 @@ use comfy_table::Table as Grid;
 use comfy_table::presets::UTF8_FULL_CONDENSED;
 
 use super::{Row, RunStatus, Table};
-use crate::routine::RegressSettings;
-use crate::stats::{median_interval, quantile};
+use armcal_core::routine::RegressSettings;
+use armcal_core::stats::{median_interval, quantile};
 
 /// What came out of a comparison.
 #[derive(Clone, Debug, PartialEq)]
@@ -225,7 +225,7 @@ pub fn regress_table(comparison: &Comparison) -> String {
 mod tests {
     use super::super::table_file::tests::row;
     use super::*;
-    use crate::stats::stream_rng;
+    use armcal_core::stats::stream_rng;
     use rand_distr::{Distribution, LogNormal};
 
     fn table(errors_m: impl IntoIterator<Item = f64>) -> Table {

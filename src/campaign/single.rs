@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 
 use super::row::one_line;
 use super::{Job, Prepared, Row, RunStatus};
-use crate::calib::Status;
 use crate::output::OutputFolder;
 use crate::run::{Failure, Finished, Keep, RunError, RunInputs, execute};
-use crate::session::Progress;
+use armcal_belief::calib::Status;
+use armcal_belief::session::Progress;
 
 /// What the runs of a campaign share.
 pub struct SingleRun<'a> {

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use super::{Row, RunStatus, Table};
-use crate::stats::{median_interval, quantile};
+use armcal_core::stats::{median_interval, quantile};
 
 /// The summary beside a campaign's table.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -10,11 +10,11 @@ use super::exit::{Exit, UsageError};
 use super::files;
 use super::given::Given;
 use super::stdout::say;
-use crate::calib::{CompactCalibration, MapResult, Status};
-use crate::log::{Completeness, Recording};
 use crate::report::{RunSummary, table};
-use crate::robot::{self, FailedJoint, Robot};
-use crate::routine::Method;
+use armcal_belief::calib::{CompactCalibration, MapResult, Status};
+use armcal_core::log::{Completeness, Recording};
+use armcal_core::robot::{self, FailedJoint, Robot};
+use armcal_core::routine::Method;
 
 #[derive(Debug, Args)]
 pub(super) struct CalibrateArgs {

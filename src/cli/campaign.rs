@@ -11,7 +11,7 @@ use super::files;
 use super::many::{CampaignBar, Many, check_name, exit_of, interrupts, range_of, run_many};
 use super::overrides::OverrideArgs;
 use crate::campaign::{CampaignSummary, Prepared, Request, Shard, Store, jobs, merge, table, write_results};
-use crate::routine::SeedRange;
+use armcal_core::routine::SeedRange;
 
 #[derive(Debug, Args)]
 pub(super) struct CampaignArgs {

@@ -7,14 +7,14 @@ use clap::Args;
 
 use super::exit::{Exit, UsageError};
 use super::overrides::OverrideArgs;
-use crate::calib::Calibration;
 #[cfg(feature = "sim")]
 use crate::campaign::Request;
-use crate::input::{InputMap, TagUse, read_input_map, read_task};
-use crate::plan::PlanFile;
-use crate::robot::{self, Robot};
-use crate::routine::{self, Overrides, Step};
-use crate::tagmap::files::read_landmarks;
+use armcal_belief::calib::Calibration;
+use armcal_belief::plan::PlanFile;
+use armcal_belief::tagmap::files::read_landmarks;
+use armcal_core::input::{InputMap, TagUse, read_input_map, read_task};
+use armcal_core::robot::{self, Robot};
+use armcal_core::routine::{self, Overrides, Step};
 
 #[derive(Debug, Args)]
 pub(super) struct CheckArgs {
@@ -118,7 +118,7 @@ fn check_routine(file: &Path, overrides: &Overrides) -> Result<String> {
     let routine = &routine::load_with(file, overrides)?;
     let (robot, vehicle) = routine.load_arm()?;
     #[cfg(feature = "sim")]
-    crate::sim::WorldSpec::from_routine(routine, &robot)?;
+    armcal_sim::WorldSpec::from_routine(routine, &robot)?;
     #[cfg(feature = "sim")]
     if !routine.campaign.matrix.is_empty() {
         // Every point of the matrix is a routine of its own.

@@ -3,8 +3,8 @@
 use std::io::BufRead;
 
 use super::progress::Bar;
-use crate::session::{Approval, MotionAhead, Progress};
-use crate::streams::Phase;
+use armcal_belief::session::{Approval, MotionAhead, Progress};
+use armcal_core::streams::Phase;
 
 /// A progress bar that asks.
 pub(super) struct Confirm<'a, R> {

@@ -2,15 +2,15 @@
 
 use std::process::ExitCode;
 
-use crate::calib::{CalibError, CalibrationFileError, CompactError};
-use crate::input::InputError;
-use crate::log::LogError;
-use crate::plan::{ItineraryError, PlanError};
-use crate::robot::{FileIssue, RobotError};
-use crate::routine::RoutineError;
-use crate::session::SessionError;
-use crate::tagmap::TagMapError;
-use crate::tagmap::recording::ViewsError;
+use armcal_belief::calib::{CalibError, CalibrationFileError, CompactError};
+use armcal_belief::plan::{ItineraryError, PlanError};
+use armcal_belief::session::SessionError;
+use armcal_belief::tagmap::TagMapError;
+use armcal_belief::tagmap::recording::ViewsError;
+use armcal_core::input::InputError;
+use armcal_core::log::LogError;
+use armcal_core::robot::{FileIssue, RobotError};
+use armcal_core::routine::RoutineError;
 
 /// How a command ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -86,7 +86,7 @@ pub(super) fn of_cause(error: &(dyn std::error::Error + 'static)) -> Exit {
 
 #[cfg(feature = "sim")]
 fn is_invalid_world(cause: &(dyn std::error::Error + 'static)) -> bool {
-    use crate::sim::SimError;
+    use armcal_sim::SimError;
     cause.downcast_ref::<SimError>().is_some_and(|e| !matches!(e, SimError::Truth(_)))
 }
 

@@ -9,9 +9,9 @@ use serde::Serialize;
 
 use super::exit::{Exit, UsageError};
 use super::stdout::say;
-use crate::calib::{Calibration, CompactCalibration, LookupTable};
-use crate::robot::{self, Robot};
-use crate::sensor::{ArmSensors, SensorModel};
+use armcal_belief::calib::{Calibration, CompactCalibration, LookupTable};
+use armcal_core::robot::{self, Robot};
+use armcal_core::sensor::{ArmSensors, SensorModel};
 
 #[derive(Debug, Args)]
 pub(super) struct ExportArgs {

@@ -6,16 +6,16 @@ use anyhow::Result;
 
 use super::calibrate::warn_of_losses;
 use super::exit::UsageError;
-use crate::calib::{
+use armcal_belief::calib::{
     Calibration, CalibrationFileError, ForeignContext, Status, calibrate, calibrate_among, calibrate_data,
     prepare_foreign, prepare_pooled,
 };
-use crate::input::{ChildFrame, ForeignRecording, InputMap, TagUse, read_foreign, read_input_map, read_task};
-use crate::log::{Completeness, read_recording};
-use crate::robot::{FileIssue, Robot};
-use crate::routine::Method;
-use crate::streams::{Message, ReachTask};
-use crate::tagmap::files::{LandmarkFile, NamedSurvey, read_landmarks};
+use armcal_belief::tagmap::files::{LandmarkFile, NamedSurvey, read_landmarks};
+use armcal_core::input::{ChildFrame, ForeignRecording, InputMap, TagUse, read_foreign, read_input_map, read_task};
+use armcal_core::log::{Completeness, read_recording};
+use armcal_core::robot::{FileIssue, Robot};
+use armcal_core::routine::Method;
+use armcal_core::streams::{Message, ReachTask};
 
 /// All that a calibration from files is made of.
 pub(super) struct Given<'a> {

@@ -7,9 +7,9 @@ use clap::Args;
 
 use super::exit::Exit;
 use super::stdout::say;
-use crate::log::{LogError, read_attachments};
 use crate::report::inspection::{State, inspect as look, to_text};
-use crate::robot::{self, Robot};
+use armcal_core::log::{LogError, read_attachments};
+use armcal_core::robot::{self, Robot};
 
 /// Exits with 0 for a whole recording, 3 for one that is cut or damaged, 2 for what is no recording.
 #[derive(Debug, Args)]

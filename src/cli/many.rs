@@ -13,11 +13,11 @@ use super::files;
 use crate::campaign::{
     CampaignError, CampaignSummary, Engine, Job, Prepared, Row, RunStatus, SingleRun, Table, run_job, run_jobs,
 };
-use crate::routine::SeedRange;
 use crate::run::RunError;
-use crate::session::Progress;
-use crate::stats::quantile;
-use crate::streams::Phase;
+use armcal_belief::session::Progress;
+use armcal_core::routine::SeedRange;
+use armcal_core::stats::quantile;
+use armcal_core::streams::Phase;
 
 /// How the runs are made.
 pub(super) struct Many<'a> {

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use crate::routine::{Override, Overrides};
+use armcal_core::routine::{Override, Overrides};
 
 #[derive(Clone, Debug, Default, Args)]
 pub(super) struct OverrideArgs {

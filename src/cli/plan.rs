@@ -12,12 +12,12 @@ use super::files;
 use super::given::read_prior;
 use super::overrides::OverrideArgs;
 use super::stdout::say;
-use crate::plan::{
+use armcal_belief::plan::{
     ArmBelief, ClearanceModel, ItineraryRequest, PlanFile, PlanHeader, PlanStop, PoseTable, SetName, plan_itinerary,
 };
-use crate::robot::{Robot, Vehicle};
-use crate::routine::{self, Overrides, Routine, Step, effective_table};
-use crate::stats::stream_rng;
+use armcal_core::robot::{Robot, Vehicle};
+use armcal_core::routine::{self, Overrides, Routine, Step, effective_table};
+use armcal_core::stats::stream_rng;
 
 #[derive(Debug, Args)]
 pub(super) struct PlanArgs {
@@ -106,7 +106,7 @@ fn picture(
     let folder = tempfile::tempdir().context("no temporary folder can be made")?;
     let path = folder.path().join("plan.rrd");
     let (scene, task) = (&routine.scene, &routine.task);
-    crate::replay::write_plan_rrd(&crate::replay::PlanInput { plan, robot, vehicle, scene, task, markdown }, &path)?;
+    armcal_replay::write_plan_rrd(&armcal_replay::PlanInput { plan, robot, vehicle, scene, task, markdown }, &path)?;
     std::fs::read(&path).context("plan.rrd cannot be read back")
 }
 

@@ -5,8 +5,8 @@ use std::time::Instant;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::interrupt::Interrupt;
-use crate::session::Progress;
-use crate::streams::Phase;
+use armcal_belief::session::Progress;
+use armcal_core::streams::Phase;
 
 /// One line that says what the arm is doing.
 pub(super) struct Bar {

@@ -12,7 +12,7 @@ use super::overrides::OverrideArgs;
 use crate::campaign::{
     Job, Prepared, Request, Row, Table, compare, jobs, read_table, regress_table, statistics, table, table_text,
 };
-use crate::routine::SeedRange;
+use armcal_core::routine::SeedRange;
 
 #[derive(Debug, Args)]
 #[command(group(clap::ArgGroup::new("side").required(true).args(["baseline", "write_baseline"])))]

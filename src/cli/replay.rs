@@ -8,11 +8,11 @@ use clap::Args;
 use super::calibrate::warn_of_losses;
 use super::exit::{Exit, UsageError};
 use super::files;
-use crate::calib::surveyed;
-use crate::log::{Recording, read_attachments, read_recording};
-use crate::replay::{ReplayInput, open_viewer, write_rrd};
-use crate::robot::{self, Robot, Vehicle};
-use crate::routine::{self, Scene};
+use armcal_belief::calib::surveyed;
+use armcal_core::log::{Recording, read_attachments, read_recording};
+use armcal_core::robot::{self, Robot, Vehicle};
+use armcal_core::routine::{self, Scene};
+use armcal_replay::{ReplayInput, open_viewer, write_rrd};
 
 #[derive(Debug, Args)]
 pub(super) struct ReplayArgs {

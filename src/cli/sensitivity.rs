@@ -10,8 +10,9 @@ use super::exit::{Exit, UsageError};
 use super::files;
 use super::overrides::OverrideArgs;
 use super::stdout::say;
-use crate::plan::ClearanceModel;
-use crate::{routine, study};
+use armcal_belief::plan::ClearanceModel;
+use armcal_core::routine;
+use armcal_study as study;
 
 #[derive(Debug, Args)]
 pub(super) struct SensitivityArgs {

@@ -12,11 +12,11 @@ use super::files;
 use super::study_paper::{PaperArgs, paper};
 use super::study_plan::{EdgesArgs, PairsArgs, PathsArgs, StrayArgs, edges, pairs, paths, stray};
 use super::study_poses::{PosesArgs, poses};
-use crate::detect::{DetectorSettings, GreyImage};
-use crate::optics::Fisheye;
-use crate::sim::WaterKind;
-use crate::stats::quantile;
-use crate::study::{
+use armcal_core::optics::Fisheye;
+use armcal_core::stats::quantile;
+use armcal_detect::{DetectorSettings, GreyImage};
+use armcal_sim::WaterKind;
+use armcal_study::{
     StudyError, Watcher, conditions, conditions_csv, detection_study, fit_noise, report, trials_csv, truth_csv,
 };
 
@@ -82,7 +82,7 @@ pub(super) fn study(args: &StudyArgs) -> Result<Exit> {
 }
 
 fn detection(args: &DetectionArgs) -> Result<Exit> {
-    let lens: Fisheye = crate::robot::load(&args.robot)?.camera.lens;
+    let lens: Fisheye = armcal_core::robot::load(&args.robot)?.camera.lens;
     let settings = DetectorSettings {
         decimation: args.decimation,
         second_decimation: args.second_decimation,

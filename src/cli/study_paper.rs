@@ -9,7 +9,7 @@ use clap::Args;
 use super::exit::Exit;
 use super::files;
 use super::stdout::say;
-use crate::study::paper::{Tier, experiments, paper_csv, paper_figures, paper_markdown, run_experiment};
+use armcal_study::paper::{Tier, experiments, paper_csv, paper_figures, paper_markdown, run_experiment};
 
 #[derive(Debug, Args)]
 pub(super) struct PaperArgs {
@@ -28,7 +28,7 @@ pub(super) struct PaperArgs {
 }
 
 pub(super) fn paper(args: &PaperArgs) -> Result<Exit> {
-    let robot = crate::robot::load(&args.robot)?;
+    let robot = armcal_core::robot::load(&args.robot)?;
     files::make_folder(&args.out)?;
     let experiments = experiments(if args.quick { Tier::Small } else { Tier::Full });
     let mut rows = Vec::new();

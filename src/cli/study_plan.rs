@@ -10,12 +10,12 @@ use clap::Args;
 use super::exit::Exit;
 use super::files;
 use super::stdout::say;
-use crate::log::read_recording;
-use crate::plan::{ClearanceModel, sample_self_pairs};
-use crate::robot::{SELF_COLLISION_FILE, load, load_vehicle, load_without_pairs};
-use crate::routine::{self, Scene};
-use crate::streams::Message;
-use crate::study::{
+use armcal_belief::plan::{ClearanceModel, sample_self_pairs};
+use armcal_core::log::read_recording;
+use armcal_core::robot::{SELF_COLLISION_FILE, load, load_vehicle, load_without_pairs};
+use armcal_core::routine::{self, Scene};
+use armcal_core::streams::Message;
+use armcal_study::{
     Belief, EdgeStudy, PathSite, PathStudy, edge_study, edges_csv, edges_json, mean_time_under_s, path_study,
     paths_csv, problem_json, queries_json, random_edges, stray_study,
 };

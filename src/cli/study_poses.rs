@@ -9,8 +9,8 @@ use clap::Args;
 use super::exit::Exit;
 use super::files;
 use super::stdout::say;
-use crate::sim::WorldSpec;
-use crate::study::{pose_study, poses_csv, poses_figure, poses_table};
+use armcal_sim::WorldSpec;
+use armcal_study::{pose_study, poses_csv, poses_figure, poses_table};
 
 #[derive(Debug, Args)]
 pub(super) struct PosesArgs {
@@ -26,7 +26,7 @@ pub(super) struct PosesArgs {
 }
 
 pub(super) fn poses(args: &PosesArgs) -> Result<Exit> {
-    let routine = crate::routine::load(&args.routine)?;
+    let routine = armcal_core::routine::load(&args.routine)?;
     let (robot, vehicle) = routine.load_arm()?;
     files::make_folder(&args.out)?;
     let rows = pose_study(&routine, (&robot, &vehicle), &WorldSpec::default(), 0..args.seeds)?;

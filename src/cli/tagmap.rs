@@ -10,12 +10,12 @@ use comfy_table::{CellAlignment, Table};
 use super::exit::Exit;
 use super::files;
 use super::stdout::say;
-use crate::calib::surveyed;
-use crate::log::{Completeness, read_recording, topics};
-use crate::robot::{self, Robot};
-use crate::tagmap::files::{NamedCamera, TagFile, map_to_text, read_cameras, read_tags};
-use crate::tagmap::recording::{RecordedViews, read_views};
-use crate::tagmap::{Body, GroupFrame, MapInput, MapMode, MapSettings, TagMap, TagPrior, solve};
+use armcal_belief::calib::surveyed;
+use armcal_belief::tagmap::files::{NamedCamera, TagFile, map_to_text, read_cameras, read_tags};
+use armcal_belief::tagmap::recording::{RecordedViews, read_views};
+use armcal_belief::tagmap::{Body, GroupFrame, MapInput, MapMode, MapSettings, TagMap, TagPrior, solve};
+use armcal_core::log::{Completeness, read_recording, topics};
+use armcal_core::robot::{self, Robot};
 
 #[derive(Debug, Args)]
 pub(super) struct TagmapArgs {
@@ -96,7 +96,7 @@ fn of_robot(recording: &Path, robot: &Robot) -> Result<Known> {
         image_topic: None,
         tag_topic: Some(topics::DETECTIONS.to_owned()),
     };
-    let prior = |tag: &crate::robot::SurveyedTag| {
+    let prior = |tag: &armcal_core::robot::SurveyedTag| {
         let (p, r) = (tag.position_std_m, tag.rotation_std_rad);
         let std = (p + r > 0.0).then_some([p, p, p, r, r, r]);
         let pose = tag.is_known().then(|| *tag.base_from_tag.isometry());

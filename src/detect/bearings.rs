@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix2, Rotation3, Vector2, Vector3};
 
-use crate::optics::Fisheye;
+use armcal_core::optics::Fisheye;
 
 const N_NODES: usize = 4096;
 /// A tag's pixels lie within this of its middle: cosine of 80 deg.
@@ -86,7 +86,7 @@ impl<'a> TagView<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::optics::fixture::lens;
+    use armcal_core::optics::fixture::lens;
 
     #[test]
     fn the_table_is_the_lens() {

@@ -8,8 +8,8 @@ use super::judge::{Candidate, DetectorSettings, are_nested, judge_candidate, jud
 use super::look::Looker;
 use super::pattern::Cells;
 use super::{Detected, DetectedTag, GreyImage};
-use crate::optics::{Fisheye, tag36h11};
-use crate::streams::{DetectionReject, RejectReason, TagDetection};
+use armcal_core::optics::{Fisheye, tag36h11};
+use armcal_core::streams::{DetectionReject, RejectReason, TagDetection};
 
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum DetectError {

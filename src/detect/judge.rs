@@ -3,8 +3,8 @@
 use nalgebra::Matrix2;
 
 use super::fit::Fit;
-use crate::optics::Fisheye;
-use crate::streams::RejectReason;
+use armcal_core::optics::Fisheye;
+use armcal_core::streams::RejectReason;
 
 /// What a detector looks for, and what it believes. The defaults are those that `study detection` measures.
 #[derive(Clone, Debug, PartialEq)]

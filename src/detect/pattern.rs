@@ -6,7 +6,7 @@
 
 use super::normal::{NormalTable, REACH};
 
-pub(super) use crate::optics::tag36h11::TAG_CELLS as N_CELLS;
+pub(super) use armcal_core::optics::tag36h11::TAG_CELLS as N_CELLS;
 
 const MAX_CELLS: usize = N_CELLS + 2;
 

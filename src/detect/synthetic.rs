@@ -6,7 +6,7 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector2, Vector3};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::optics::{Fisheye, square_corners, tag36h11};
+use armcal_core::optics::{Fisheye, square_corners, tag36h11};
 
 /// A tag in the camera frame.
 #[derive(Clone, Copy, Debug)]

@@ -7,10 +7,10 @@ use rand::RngExt;
 
 use super::synthetic::{CLEAN, Look, Placed, render};
 use super::*;
-use crate::optics::Fisheye;
-use crate::optics::fixture::lens;
-use crate::stats::{quantile, stream_rng};
-use crate::streams::RejectReason;
+use armcal_core::optics::Fisheye;
+use armcal_core::optics::fixture::lens;
+use armcal_core::stats::{quantile, stream_rng};
+use armcal_core::streams::RejectReason;
 
 fn detector(lens: &Fisheye, settings: DetectorSettings) -> TagDetector {
     TagDetector::new(lens, settings).expect("it starts")
@@ -154,7 +154,7 @@ fn wrong_bits_are_counted() {
     let lens = lens();
     let tag = ahead(3, 0.02, 0.5);
     let clean = drawn(&lens, &CLEAN, &[tag]);
-    let cells = crate::optics::tag36h11::cells(3).expect("in the family");
+    let cells = armcal_core::optics::tag36h11::cells(3).expect("in the family");
     let inverse = tag.camera_from_tag.inverse();
     // The first cells of the second row within the border, in the colour that they do not have.
     let painted = |n_wrong: usize| {

@@ -9,7 +9,7 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use super::{OutputError, check_replaceable, complete, make_folder, partial};
-use crate::log::{LogError, for_each_raw, topics};
+use armcal_core::log::{LogError, for_each_raw, topics};
 
 /// What a run leaves, in the order in which it is put in place.
 const RESULTS: [&str; 7] =
@@ -199,9 +199,9 @@ fn is_at(_: &File, path: &Path) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::log::{RecordingHeader, RecordingWriter};
-    use crate::streams::{JointCounts, JointSensorSample, Message, Sink};
-    use crate::time::SIMULATION_EPOCH;
+    use armcal_core::log::{RecordingHeader, RecordingWriter};
+    use armcal_core::streams::{JointCounts, JointSensorSample, Message, Sink};
+    use armcal_core::time::SIMULATION_EPOCH;
 
     fn names(folder: &Path) -> Vec<String> {
         let mut names: Vec<String> =

@@ -8,8 +8,8 @@ use super::colors;
 use super::rrd::Stream;
 use super::scenery::{BASE, Mover};
 use super::shapes::{Look, fix_shapes, path_part, transform, vector};
-use crate::spatial::{Base, Pose, Tool};
-use crate::streams::{CaptureSet, JointAngles, MarkKind};
+use armcal_core::spatial::{Base, Pose, Tool};
+use armcal_core::streams::{CaptureSet, JointAngles, MarkKind};
 
 /// The tool's path is drawn this far back, s, with so many points a second.
 const TRAIL_S: f64 = 12.0;

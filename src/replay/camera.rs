@@ -6,9 +6,9 @@ use rerun::{Clear, EncodedImage, Image, LineStrips2D, Radius};
 use super::Run;
 use super::colors;
 use super::rrd::Stream;
-use crate::optics::Fisheye;
-use crate::robot::SurveyedTag;
-use crate::streams::{DetectionReject, TagDetection};
+use armcal_core::optics::Fisheye;
+use armcal_core::robot::SurveyedTag;
+use armcal_core::streams::{DetectionReject, TagDetection};
 
 /// The image plane's entity; raw pixels.
 pub(super) const CAMERA: &str = "/camera";
@@ -165,7 +165,7 @@ fn expected_outline(run: &Run, base_from_camera: &Isometry3<f64>, tag: &Surveyed
         return None;
     }
     let mut outline = [[0.0; 2]; 4];
-    for (pixel, point) in outline.iter_mut().zip(crate::optics::square_corners(tag.size_m)) {
+    for (pixel, point) in outline.iter_mut().zip(armcal_core::optics::square_corners(tag.size_m)) {
         let in_camera: Point3<f64> = camera_from_tag * point;
         let projected = lens.project(&in_camera.coords)?;
         if !lens.contains(&projected) {

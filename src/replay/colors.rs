@@ -34,7 +34,7 @@ pub(super) const MARGIN: Rgba = [255, 190, 70, 26];
 pub(super) const MARGIN_TOOL: Rgba = [255, 190, 70, 255];
 
 /// One colour a joint, base first.
-pub(super) const JOINTS: [Rgba; crate::streams::MAX_JOINTS] = [
+pub(super) const JOINTS: [Rgba; armcal_core::streams::MAX_JOINTS] = [
     [240, 90, 80, 255],
     [255, 175, 60, 255],
     [240, 230, 90, 255],

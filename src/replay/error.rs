@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use rerun::external::re_log_encoding::EncodeError;
 
-use crate::log::{CdrError, LogError};
+use armcal_core::log::{CdrError, LogError};
 
 /// Why no .rrd was written.
 #[derive(Debug, thiserror::Error)]

@@ -9,7 +9,7 @@ use super::colors::{self, Rgba};
 use super::rrd::Stream;
 use super::shapes::path_part;
 use super::tracks::Span;
-use crate::streams::{CaptureSet, LogLevel, MarkKind, Phase, ReachAttempt};
+use armcal_core::streams::{CaptureSet, LogLevel, MarkKind, Phase, ReachAttempt};
 
 pub(super) const STATE: &str = "/state";
 pub(super) const LOG: &str = "/log";

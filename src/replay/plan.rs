@@ -16,14 +16,14 @@ use super::scenery::{BASE, Mover};
 use super::shapes::{Look, fix_shapes, path_part, quaternion, vector};
 use super::tracks::Tracks;
 use super::{ReplayInput, Run, layout, rrd};
-use crate::log::{Completeness, Recording};
-use crate::plan::{PlanFile, PoseTable, SetName, Timing};
-use crate::robot::{Robot, Vehicle};
-use crate::routine::{Scene, TaskSettings};
-use crate::streams::{
+use armcal_belief::plan::{PlanFile, PoseTable, SetName, Timing};
+use armcal_core::log::{Completeness, Recording};
+use armcal_core::robot::{Robot, Vehicle};
+use armcal_core::routine::{Scene, TaskSettings};
+use armcal_core::streams::{
     CaptureSet, JointAngles, JointStateBelief, LogLevel, LogLine, Mark, MarkKind, Message, Phase, ReachTask,
 };
-use crate::time::{SIMULATION_EPOCH, Stamp};
+use armcal_core::time::{SIMULATION_EPOCH, Stamp};
 
 pub(super) const CLEARANCE: &str = "/plots/clearance";
 pub(super) const PREDICTED: &str = "/plots/predicted";

@@ -6,7 +6,7 @@ use rerun::{Scalars, SeriesLines, SeriesPoints};
 use super::Run;
 use super::colors::{self, Rgba};
 use super::rrd::Stream;
-use crate::streams::{JointAngles, ReachAttempt};
+use armcal_core::streams::{JointAngles, ReachAttempt};
 
 pub(super) const JOINT_ERROR: &str = "/plots/joint_error";
 pub(super) const JOINT_ANGLE: &str = "/plots/joint_angle";

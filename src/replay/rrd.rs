@@ -18,8 +18,8 @@ use rerun::{EntityPath, SerializedComponentBatch, StoreId, StoreKind};
 
 use super::error::ReplayError;
 use super::{ReplayInput, layout};
-use crate::log::MessageHasher;
-use crate::robot::Robot;
+use armcal_core::log::MessageHasher;
+use armcal_core::robot::Robot;
 
 /// The one timeline of a recording: seconds since its first log time.
 pub(super) const TIMELINE: &str = "sim_time";
@@ -97,7 +97,7 @@ impl Identity {
         hasher.update(messages.hex().as_bytes());
         if let Some(path) = input.truth {
             let read = File::open(path).and_then(|file| hasher.update_reader(file).map(|_| ()));
-            read.map_err(|source| crate::log::LogError::Read { path: path.to_owned(), source })?;
+            read.map_err(|source| armcal_core::log::LogError::Read { path: path.to_owned(), source })?;
         }
         // Where the robot's drawings lie does not matter.
         let robot = Robot { folder: PathBuf::new(), ..input.robot.clone() };

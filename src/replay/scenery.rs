@@ -7,8 +7,8 @@ use super::Run;
 use super::colors;
 use super::rrd::Stream;
 use super::shapes::{Look, fix_shapes, quaternion, transform, vector};
-use crate::robot::SurveyedTag;
-use crate::spatial::{Pose, Vehicle, World};
+use armcal_core::robot::SurveyedTag;
+use armcal_core::spatial::{Pose, Vehicle, World};
 
 /// Entities that carry the frames.
 pub(super) const WORLD: &str = "/world";

@@ -5,7 +5,7 @@ use rerun::{Boxes3D, Capsules3D, Cylinders3D, Ellipsoids3D, FillMode, Mesh3D, Tr
 
 use super::colors::Rgba;
 use super::rrd::Stream;
-use crate::robot::{Hull, PlacedShape, Shape};
+use armcal_core::robot::{Hull, PlacedShape, Shape};
 
 /// How a body looks.
 #[derive(Clone, Copy)]

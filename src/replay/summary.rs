@@ -6,8 +6,8 @@ use rerun::TextDocument;
 
 use super::rrd::Stream;
 use super::{ReplayInput, Run};
-use crate::log::Completeness;
-use crate::streams::ReachAttempt;
+use armcal_core::log::Completeness;
+use armcal_core::streams::ReachAttempt;
 
 pub(super) const SUMMARY: &str = "/summary";
 

@@ -9,7 +9,7 @@ use super::rrd::Stream;
 use super::scenery::BASE;
 use super::shapes::vector;
 use super::tracks::Span;
-use crate::streams::{MarkKind, ReachAttempt, ReachTask};
+use armcal_core::streams::{MarkKind, ReachAttempt, ReachTask};
 
 /// Small tolerances are drawn larger than they are, to be seen at all, m.
 const SMALLEST_M: f64 = 0.02;

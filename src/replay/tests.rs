@@ -5,24 +5,24 @@ use std::path::{Path, PathBuf};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use super::*;
-use crate::kinematics::{IkGoal, IkSettings, JointLimits, solve_position};
-use crate::log::{RecordingHeader, RecordingWriter, RosMessage, read_recording, ros};
-use crate::robot::{Hull, Part, PlacedShape, Shape};
-use crate::routine::Scene;
-use crate::sensor::ArmSensors;
-use crate::streams::{
+use armcal_core::kinematics::{IkGoal, IkSettings, JointLimits, solve_position};
+use armcal_core::log::{RecordingHeader, RecordingWriter, RosMessage, read_recording, ros};
+use armcal_core::robot::{Hull, Part, PlacedShape, Shape};
+use armcal_core::routine::Scene;
+use armcal_core::sensor::ArmSensors;
+use armcal_core::streams::{
     CameraImage, CaptureSet, DetectionReject, DetectionRejects, GripperSample, JointAngles, JointSensorSample,
     JointStateBelief, LogLevel, LogLine, Mark, MarkKind, Message, Phase, ReachAttempt, ReachTask, RejectReason, Sink,
     TagDetection, TagDetections, TemperatureSample, Thermometer,
 };
-use crate::time::SIMULATION_EPOCH;
+use armcal_core::time::SIMULATION_EPOCH;
 
 /// Errors of the joint sensors before and after the made-up calibration, rad.
 const ERROR_BEFORE_RAD: [f64; 6] = [0.03, -0.035, 0.05, -0.02, 0.04, 0.03];
 const ERROR_AFTER_RAD: [f64; 6] = [0.0006, -0.0005, 0.0008, 0.0004, -0.0006, 0.03];
 
 fn robots() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("robots")
+    Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("robots")
 }
 
 /// One leg: to `goal` as believed, then a rest in which something is marked.
@@ -129,7 +129,7 @@ impl Fabric {
         for tag in &self.robot.tags {
             let camera_from_tag = base_from_camera.inv_mul(tag.base_from_tag.isometry());
             let normal = camera_from_tag.rotation * Vector3::z();
-            let corners = crate::optics::square_corners(tag.size_m)
+            let corners = armcal_core::optics::square_corners(tag.size_m)
                 .map(|corner| camera.lens.project(&(camera_from_tag * corner).coords));
             if let [Some(a), Some(b), Some(c), Some(d)] = corners
                 && normal.dot(&camera_from_tag.translation.vector) < 0.0
@@ -169,7 +169,7 @@ fn reaching(robot: &Robot, target_m: [f64; 3]) -> JointAngles {
 
 /// Files of a run with `n_views` views, in `dir`: reach, look about, calibrate, reach again.
 fn fabricate(dir: &Path, n_views: u32) -> (PathBuf, PathBuf) {
-    let robot = crate::robot::load(&robots().join("titan4")).unwrap();
+    let robot = armcal_core::robot::load(&robots().join("titan4")).unwrap();
     let (run_path, truth_path) = (dir.join("run.mcap"), dir.join("truth.mcap"));
     let header = || RecordingHeader::new(robot.joint_names());
     let mut fabric = Fabric {
@@ -221,7 +221,7 @@ fn small() -> (tempfile::TempDir, Recording, PathBuf, Robot) {
     let dir = tempfile::tempdir().unwrap();
     let (run, truth) = fabricate(dir.path(), 1);
     let recording = read_recording(&run).unwrap();
-    let robot = crate::robot::load(&robots().join("titan4")).unwrap();
+    let robot = armcal_core::robot::load(&robots().join("titan4")).unwrap();
     (dir, recording, truth, robot)
 }
 
@@ -250,7 +250,7 @@ fn entities(rrd: &Path) -> std::collections::BTreeMap<String, usize> {
 fn images_and_rejects_are_shown_where_there_are_any() {
     let dir = tempfile::tempdir().unwrap();
     let (run, out) = (dir.path().join("run.mcap"), dir.path().join("run.rrd"));
-    let robot = crate::robot::load(&robots().join("titan4")).unwrap();
+    let robot = armcal_core::robot::load(&robots().join("titan4")).unwrap();
     let mut writer = RecordingWriter::create(&run, RecordingHeader::new(robot.joint_names())).unwrap();
     // No more than its mark at both ends: nobody decodes it on the way.
     let jpeg = [&[0xff, 0xd8][..], b"not decoded by anybody", &[0xff, 0xd9]].concat();
@@ -337,7 +337,7 @@ fn what_broke_stands_in_the_log() {
     let (dir, recording, _, robot) = small();
     let truth = dir.path().join("faults.mcap");
     let mut writer = RecordingWriter::create(&truth, RecordingHeader::new(Vec::new())).unwrap();
-    let schema = crate::log::RosSchema { name: "armcal_msgs/msg/Fault", text: "" };
+    let schema = armcal_core::log::RosSchema { name: "armcal_msgs/msg/Fault", text: "" };
     let stamp = SIMULATION_EPOCH.plus_s(2.0);
     let header = ros::Header { stamp: stamp.try_into().unwrap(), frame_id: String::new() };
     let fault = Fault { header, kind: "tag_lost", details: "id = 3" };

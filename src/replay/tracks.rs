@@ -5,14 +5,14 @@ use std::path::Path;
 use nalgebra::{Isometry3, UnitQuaternion};
 
 use super::error::ReplayError;
-use crate::log::{LogError, Recording, for_each_image};
-use crate::robot::Robot;
-use crate::spatial::{Pose, Vehicle, World};
-use crate::streams::{
+use armcal_core::log::{LogError, Recording, for_each_image};
+use armcal_core::robot::Robot;
+use armcal_core::spatial::{Pose, Vehicle, World};
+use armcal_core::streams::{
     CameraImage, DetectionRejects, JointAngles, JointCounts, LogLine, Mark, MarkKind, Message, ReachTask,
     TagDetections, Thermometer,
 };
-use crate::time::Stamp;
+use armcal_core::time::Stamp;
 
 /// A message's own stamp places it if it is this near to its log time; else its clock is not the recorder's.
 const CLOCKS_AGREE_S: f64 = 1.0;

@@ -7,11 +7,11 @@ use serde::Deserialize;
 
 use super::error::ReplayError;
 use super::tracks::{Track, Tracks, blend_angles, blend_poses};
-use crate::log::{CdrError, RawMessage, decode, for_each_raw, ros};
-use crate::robot::Robot;
-use crate::spatial::{Base, Frame, Pose, Tool, Vehicle, World};
-use crate::streams::JointAngles;
-use crate::time::Stamp;
+use armcal_core::log::{CdrError, RawMessage, decode, for_each_raw, ros};
+use armcal_core::robot::Robot;
+use armcal_core::spatial::{Base, Frame, Pose, Tool, Vehicle, World};
+use armcal_core::streams::JointAngles;
+use armcal_core::time::Stamp;
 
 const JOINT_STATES: &str = "/truth/joint_states";
 const VEHICLE_POSE: &str = "/truth/vehicle_pose";

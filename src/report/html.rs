@@ -4,7 +4,7 @@ use maud::{DOCTYPE, Markup, html as markup};
 
 use super::summary::{RunSummary, Score};
 use super::table::{check_lines, labelled, score_rows};
-use crate::calib::{Calibration, Status};
+use armcal_belief::calib::{Calibration, Status};
 
 const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;max-width:60em;margin:2em auto;padding:0 1em;color:#1b2733}\
 table{border-collapse:collapse;margin:1em 0}td,th{padding:.3em .9em;border-bottom:1px solid #d5dce3;text-align:right}\

@@ -4,11 +4,11 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use crate::calib::{
+use armcal_belief::calib::{
     Calibration, CameraMount, FailedJointTable, JointResult, MapResult, ObservabilityTable, PriorTable, Status,
     VerdictTable,
 };
-use crate::stats::Summary;
+use armcal_core::stats::Summary;
 
 /// The figures of a run or of a calibration, for programs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -4,8 +4,8 @@ use comfy_table::presets::UTF8_FULL_CONDENSED;
 use comfy_table::{CellAlignment, Table};
 
 use super::summary::{AssertSummary, GainChange, ReachScore, RenewalSummary, RunSummary, ScoreSide};
-use crate::calib::{CameraMount, FailedJointTable, Known, MapResult, PriorTable, Status};
-use crate::stats::Summary;
+use armcal_belief::calib::{CameraMount, FailedJointTable, Known, MapResult, PriorTable, Status};
+use armcal_core::stats::Summary;
 
 /// Lays a summary out for a terminal.
 #[must_use]

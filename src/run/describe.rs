@@ -1,10 +1,10 @@
 //! What viewers need to show the arm: its URDF, the camera's lens, and where the base is bolted on.
 
 use super::RunInputs;
-use crate::log::ros::{CameraInfo, Header, Quaternion, StringMessage, TfMessage, Transform, TransformStamped};
-use crate::log::{LogError, RecordingWriter, RosMessage, topics};
-use crate::robot::Robot;
-use crate::time::Stamp;
+use armcal_core::log::ros::{CameraInfo, Header, Quaternion, StringMessage, TfMessage, Transform, TransformStamped};
+use armcal_core::log::{LogError, RecordingWriter, RosMessage, topics};
+use armcal_core::robot::Robot;
+use armcal_core::time::Stamp;
 
 /// Writes the descriptions at `now`.
 pub(super) fn describe(writer: &mut RecordingWriter, inputs: &RunInputs, now: Stamp) -> Result<(), LogError> {

@@ -2,12 +2,12 @@
 
 use std::path::PathBuf;
 
-use crate::log::LogError;
 use crate::output::OutputError;
-use crate::robot::RobotError;
-use crate::routine::RoutineError;
-use crate::session::SessionError;
-use crate::sim::SimError;
+use armcal_belief::session::SessionError;
+use armcal_core::log::LogError;
+use armcal_core::robot::RobotError;
+use armcal_core::routine::RoutineError;
+use armcal_sim::SimError;
 
 /// How far a run came.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -57,7 +57,7 @@ pub enum RunError {
     Json(#[from] serde_json::Error),
     #[cfg(feature = "viewer")]
     #[error("{0}")]
-    Replay(#[from] crate::replay::ReplayError),
+    Replay(#[from] armcal_replay::ReplayError),
 }
 
 /// A run that failed.

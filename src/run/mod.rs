@@ -15,19 +15,19 @@ use std::path::{Path, PathBuf};
 
 use describe::describe;
 
-use crate::calib::Calibration;
-use crate::log::{Recording, RecordingHeader, RecordingWriter, read_recording};
 use crate::output::{OutputError, OutputFolder};
 #[cfg(feature = "viewer")]
 use crate::report::markdown;
 use crate::report::{AssertSummary, RenewalSummary, RunSummary, html};
-use crate::robot::{Robot, Vehicle};
-use crate::routine::{self, Overrides, Routine};
 use crate::score::{ScoreInput, score};
-use crate::session::{self, AssertResult, Outcome, Progress, Recorder, Renewal, Setup};
-use crate::sim::truth::TruthRecorder;
-use crate::sim::{World, WorldInput, WorldSpec};
-use crate::streams::Arm;
+use armcal_belief::calib::Calibration;
+use armcal_belief::session::{self, AssertResult, Outcome, Progress, Recorder, Renewal, Setup};
+use armcal_core::log::{Recording, RecordingHeader, RecordingWriter, read_recording};
+use armcal_core::robot::{Robot, Vehicle};
+use armcal_core::routine::{self, Overrides, Routine};
+use armcal_core::streams::Arm;
+use armcal_sim::truth::TruthRecorder;
+use armcal_sim::{World, WorldInput, WorldSpec};
 
 /// Everything read and checked before anything moves.
 #[derive(Clone, Debug)]
@@ -227,8 +227,8 @@ impl Run<'_> {
     fn mirror(&self, recording: &Recording, summary: &RunSummary) -> Result<(), RunError> {
         let markdown = markdown(summary);
         let truth = self.partial("truth.mcap");
-        crate::replay::write_rrd(
-            &crate::replay::ReplayInput {
+        armcal_replay::write_rrd(
+            &armcal_replay::ReplayInput {
                 recording,
                 truth: Some(&truth),
                 robot: &self.inputs.robot,

@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use crate::log::Recording;
-use crate::streams::{MarkKind, Message};
-use crate::time::Stamp;
+use armcal_core::log::Recording;
+use armcal_core::streams::{MarkKind, Message};
+use armcal_core::time::Stamp;
 
 /// Sums over the images of one tag in one span.
 #[derive(Clone, Copy, Default)]
@@ -58,8 +58,8 @@ pub fn corner_scatter_px(recording: &Recording) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::log::Completeness;
-    use crate::streams::{CaptureSet, Mark, TagDetection, TagDetections};
+    use armcal_core::log::Completeness;
+    use armcal_core::streams::{CaptureSet, Mark, TagDetection, TagDetections};
 
     fn at(seconds: i64) -> Stamp {
         Stamp { nanos: seconds * 1_000_000_000 }

@@ -2,11 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use crate::plan::link_ends;
 use crate::report::MarginSummary;
-use crate::robot::Robot;
-use crate::session::Visit;
-use crate::sim::truth::Truth;
+use armcal_belief::plan::link_ends;
+use armcal_belief::session::Visit;
+use armcal_core::robot::Robot;
+use armcal_sim::truth::Truth;
 
 /// Over all captured views and links; `None` without any.
 pub(super) fn margins(visits: &[Visit], robot: &Robot, truth: &Truth) -> Option<MarginSummary> {

@@ -10,16 +10,16 @@ use std::path::Path;
 
 use nalgebra::Vector3;
 
-use crate::log::Recording;
 use crate::report::{JointScore, MarginSummary, ReachScore, Score, ScoreSide};
-use crate::robot::Robot;
-use crate::session::{AssertResult, Outcome, ReachStep};
-use crate::sim::SimError;
-use crate::sim::truth::{Truth, read_truth};
-use crate::spatial::{Base, Pose, Tool};
-use crate::stats::Summary;
-use crate::streams::ReachAttempt;
-use crate::verify::{ReachRest, reaches};
+use armcal_belief::session::{AssertResult, Outcome, ReachStep};
+use armcal_belief::verify::{ReachRest, reaches};
+use armcal_core::log::Recording;
+use armcal_core::robot::Robot;
+use armcal_core::spatial::{Base, Pose, Tool};
+use armcal_core::stats::Summary;
+use armcal_core::streams::ReachAttempt;
+use armcal_sim::SimError;
+use armcal_sim::truth::{Truth, read_truth};
 
 /// What truth adds to a run's figures.
 #[derive(Clone, Debug)]
@@ -115,7 +115,7 @@ fn compare<'a>(rest: &'a ReachRest, robot: &Robot, truth: &Truth) -> Option<Comp
     Some(Compared {
         rest,
         tool_error_m: rest.believed_tool_m - true_tool.origin().vector(),
-        tool_error_rad: crate::spatial::rotation_angle_between(&believed_tool, &true_tool),
+        tool_error_rad: armcal_core::spatial::rotation_angle_between(&believed_tool, &true_tool),
         reach_error_m: (Vector3::from(rest.target_m) - true_tool.origin().vector()).norm(),
         joint_error_rad: rest.believed.iter().zip(state.angles.iter()).map(|(b, t)| wrapped(b - t)).collect(),
     })
@@ -142,7 +142,7 @@ fn joint_scores(input: &ScoreInput<'_>, before: &[&Compared<'_>], after: &[&Comp
         let mean_square = side.iter().map(|c| c.joint_error_rad[joint].powi(2)).sum::<f64>() / side.len() as f64;
         (!side.is_empty()).then(|| mean_square.sqrt())
     };
-    let joint_score = |(joint, result): (usize, &crate::calib::JointResult)| JointScore {
+    let joint_score = |(joint, result): (usize, &armcal_belief::calib::JointResult)| JointScore {
         name: result.name.clone(),
         angle_error_before_rad: rms(before, joint),
         angle_error_after_rad: rms(after, joint),

@@ -2,12 +2,12 @@
 
 use nalgebra::Vector3;
 
-use crate::log::Recording;
 use crate::report::TouchScore;
-use crate::robot::Robot;
-use crate::session::ReachStep;
-use crate::sim::truth::Truth;
-use crate::streams::{Mark, MarkKind, Message};
+use armcal_belief::session::ReachStep;
+use armcal_core::log::Recording;
+use armcal_core::robot::Robot;
+use armcal_core::streams::{Mark, MarkKind, Message};
+use armcal_sim::truth::Truth;
 
 /// The touches of one `reach` step; `None` where none was asked for.
 ///

@@ -7,8 +7,8 @@
 //! is honoured: the short way round counts.
 
 use super::spec::{CONTROL_PERIOD_S, HydraulicsSpec};
-use crate::robot::JointSensorSpec;
-use crate::streams::{JointCounts, MAX_JOINTS};
+use armcal_core::robot::JointSensorSpec;
+use armcal_core::streams::{JointCounts, MAX_JOINTS};
 
 /// Set-points that come no farther apart than this make a path with a rate, periods.
 const PATH_PERIODS: u32 = 10;
@@ -236,7 +236,7 @@ mod tests {
 
     fn biased_controller(set: f64, controller_bias_rad: f64) -> Controller {
         let spec = HydraulicsSpec { controller_filter_s: 0.0, controller_bias_rad, ..HydraulicsSpec::default() };
-        let sensor = JointSensorSpec::exact(2600.0, 0.5);
+        let sensor = crate::fixture::exact_sensor(2600.0, 0.5);
         Controller::new(&spec, &[sensor], &[1.0], &JointCounts::from_slice(&[set]))
     }
 

@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
-use crate::robot::{FileIssue, RobotError};
-use crate::streams::SinkError;
+use armcal_core::robot::{FileIssue, RobotError};
+use armcal_core::streams::SinkError;
 
 /// Why there is no simulated world.
 #[derive(Debug, thiserror::Error)]

@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 
 use super::error::SimError;
 use super::spec::WorldSpec;
-use crate::robot::{FileIssue, Robot};
-use crate::routine::{Routine, Step};
+use armcal_core::robot::{FileIssue, Robot};
+use armcal_core::routine::{Routine, Step};
 
 /// One thing that breaks, and stays broken unless it says otherwise.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -3,7 +3,7 @@
 //! `v` is the rate of the gap, `w = clamp((told - gap)/(4 lag), +-rate)` the rate wanted: `dv/dt = (w - v)/lag`. With that gain
 //! the loop is critically damped, so that the jaws do not swing past what they were told.
 
-use crate::robot::GripperSpec;
+use armcal_core::robot::GripperSpec;
 
 /// The gap between the jaws and how it changes.
 #[derive(Clone, Copy, Debug)]
@@ -58,7 +58,7 @@ mod tests {
     use nalgebra::Vector3;
 
     use super::*;
-    use crate::robot::Jaw;
+    use armcal_core::robot::Jaw;
 
     const STEP_S: f64 = 0.001;
     const LAG_S: f64 = 0.05;

@@ -2,8 +2,8 @@
 
 use nalgebra::Isometry3;
 
-use crate::kinematics::{Attachment, LinkPoses};
-use crate::streams::MAX_JOINTS;
+use armcal_core::kinematics::{Attachment, LinkPoses};
+use armcal_core::streams::MAX_JOINTS;
 
 /// `base_from_link` of the base (0) and of each link, in base axes.
 #[derive(Clone, Copy, Debug)]

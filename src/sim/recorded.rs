@@ -15,7 +15,7 @@ use std::path::Path;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use super::error::SimError;
-use crate::robot::{FileIssue, read_text};
+use armcal_core::robot::{FileIssue, read_text};
 use spline::{Spline, Value};
 use table::{Header, Sample};
 

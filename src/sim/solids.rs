@@ -7,8 +7,8 @@ use parry3d::shape::SharedShape;
 
 use super::convert::to_rapier;
 use super::places::BodyPoses;
-use crate::robot::{PlacedShape, Robot, Shape, Vehicle, parry_pose};
-use crate::routine::Scene;
+use armcal_core::robot::{PlacedShape, Robot, Shape, Vehicle, parry_pose};
+use armcal_core::routine::Scene;
 
 /// Solid shapes with their places in the base frame, and which pairs of parts may touch.
 #[derive(Clone)]
@@ -276,7 +276,7 @@ mod tests {
     use std::path::Path;
 
     use super::*;
-    use crate::robot::{load, load_vehicle};
+    use armcal_core::robot::{load, load_vehicle};
 
     #[test]
     fn of_any_arm_on_any_vehicle_only_neighbours_go_unwatched() {
@@ -288,7 +288,7 @@ mod tests {
     }
 
     fn only_neighbours_go_unwatched(arm: &str, vehicle: &str) {
-        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots");
+        let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("robots");
         let vehicle = load_vehicle(&root.join(format!("vehicles/{vehicle}.toml"))).expect("the vehicle reads");
         let robot = load(&root.join(arm)).and_then(|robot| robot.mounted_on(&vehicle)).expect("the robot reads");
         let scene = Scene { seafloor_z_m: Some(-1.1), obstacles: Vec::new() };

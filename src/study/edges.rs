@@ -9,10 +9,10 @@ use rand::RngExt;
 use rayon::prelude::*;
 use serde_json::{Value, json};
 
-use crate::plan::{ClearanceModel, JointErrorBounds};
-use crate::robot::Robot;
-use crate::stats::{quantile, stream_rng};
-use crate::streams::JointAngles;
+use armcal_belief::plan::{ClearanceModel, JointErrorBounds};
+use armcal_core::robot::Robot;
+use armcal_core::stats::{quantile, stream_rng};
+use armcal_core::streams::JointAngles;
 
 /// Largest joint step between two arms of a scan, rad.
 pub const SCAN_RAD: f64 = 0.0005;
@@ -93,7 +93,7 @@ pub fn mean_time_under_s(
     clock: &dyn Fn() -> f64,
 ) -> f64 {
     let keeps_clear = |&[from, to]: &Edge| {
-        clearance.too_near_along(&crate::plan::Edge::at_full_speed(from, to), bounds, margin_m).is_none()
+        clearance.too_near_along(&armcal_belief::plan::Edge::at_full_speed(from, to), bounds, margin_m).is_none()
     };
     let start_s = clock();
     let n_free = edges.iter().filter(|edge| keeps_clear(edge)).count();
@@ -192,12 +192,12 @@ pub fn edges_json(edges: &[Edge], study: &EdgeStudy) -> Vec<Value> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::robot::{load, load_vehicle};
-    use crate::routine::Scene;
+    use armcal_core::robot::{load, load_vehicle};
+    use armcal_core::routine::Scene;
 
     #[test]
     fn no_certified_edge_is_blocked_and_few_free_ones_are_refused() {
-        let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("robots");
+        let root = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("robots");
         let vehicle = load_vehicle(&root.join("vehicles/work-class-front.toml")).expect("the vehicle reads");
         for name in ["titan4", "kraft-predator"] {
             let robot = load(&root.join(name)).expect("the robot reads");

@@ -3,8 +3,8 @@
 use nalgebra::Vector2;
 
 use super::trials::{DetectionStudy, Outcome, TagTrial};
-use crate::optics::{CornerNoise, DetectionChance};
-use crate::sim::WaterKind;
+use armcal_core::optics::{CornerNoise, DetectionChance};
+use armcal_sim::WaterKind;
 
 /// Squared normalised errors beyond this pull no stronger: chi-square of 2 degrees, one in 300 000.
 const CLIP: f64 = 25.0;

@@ -7,11 +7,11 @@
 use nalgebra::Isometry3;
 use serde_json::{Value, json};
 
-use crate::plan::{ClearanceModel, JointErrorBounds, Path, PathPlanner, Timing};
-use crate::robot::{MotionSpec, PlacedShape, Robot, Shape, StationKeeping, Vehicle};
-use crate::routine::Scene;
-use crate::stats::{quantile, stream_rng};
-use crate::streams::JointAngles;
+use armcal_belief::plan::{ClearanceModel, JointErrorBounds, Path, PathPlanner, Timing};
+use armcal_core::robot::{MotionSpec, PlacedShape, Robot, Shape, StationKeeping, Vehicle};
+use armcal_core::routine::Scene;
+use armcal_core::stats::{quantile, stream_rng};
+use armcal_core::streams::JointAngles;
 
 /// What the planner believes of the joints.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -199,7 +199,7 @@ pub fn problem_json(site: &PathSite, queries: &[Value], margin_m: f64) -> Value 
     json!({
         "site": site.name, "arm": robot.name, "margin_m": margin_m,
         // Links against links need less: they neither sway nor are surveyed. Neighbours are not tested.
-        "self_margin_m": margin_m - crate::plan::SELF_EASE_M,
+        "self_margin_m": margin_m - armcal_belief::plan::SELF_EASE_M,
         "seafloor_z_m": site.scene.seafloor_z_m, "base_from_world": place(&base_from_vehicle),
         "joints": joints.collect::<Vec<_>>(), "bodies": bodies.collect::<Vec<_>>(),
         "standing": standing.map(|part| shape(&part.placed, &base_from_vehicle)).collect::<Vec<_>>(),
@@ -240,11 +240,11 @@ fn shape(placed: &PlacedShape, frame_from_owner: &Isometry3<f64>) -> Value {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::robot::{load, load_vehicle};
+    use armcal_core::robot::{load, load_vehicle};
 
     #[test]
     fn queries_are_planned_and_written_with_the_scene() {
-        let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("robots");
+        let root = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("robots");
         let vehicle = load_vehicle(&root.join("vehicles/tight-basket.toml")).expect("the vehicle reads");
         let robot = load(&root.join("titan4")).expect("the robot reads").mounted_on(&vehicle).expect("it fits");
         let scene = Scene { seafloor_z_m: Some(-2.2), obstacles: vec![] };

@@ -4,11 +4,11 @@ use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-use crate::optics::{Fisheye, square_corners};
-use crate::robot::Shape;
-use crate::sim::imaging::{Light, SolidShape, TagPlane};
-use crate::sim::{ImageSpec, WaterKind};
-use crate::stats::stream_rng;
+use armcal_core::optics::{Fisheye, square_corners};
+use armcal_core::robot::Shape;
+use armcal_core::stats::stream_rng;
+use armcal_sim::imaging::{Light, SolidShape, TagPlane};
+use armcal_sim::{ImageSpec, WaterKind};
 
 /// Side of a tag's black square, m.
 pub const TAG_SIZE_M: f64 = 0.15;

@@ -9,12 +9,12 @@ use nalgebra::Point3;
 use rand::RngExt;
 
 use super::charts::{Axis, Panel, Series, Style, svg};
-use crate::calib::{JointParameters, Measured, PositionMethod, PositionProblem, TagView, View};
-use crate::joints::JointAngles;
-use crate::plan::{ClearanceModel, VisibilityModel};
-use crate::robot::Robot;
-use crate::stats::stream_rng;
-use crate::time::SIMULATION_EPOCH;
+use armcal_belief::calib::{JointParameters, Measured, PositionMethod, PositionProblem, TagView, View};
+use armcal_belief::plan::{ClearanceModel, VisibilityModel};
+use armcal_core::joints::JointAngles;
+use armcal_core::robot::Robot;
+use armcal_core::stats::stream_rng;
+use armcal_core::time::SIMULATION_EPOCH;
 
 /// One offset of one joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -241,11 +241,11 @@ mod tests {
     use std::path::Path;
 
     use super::*;
-    use crate::robot::{load, load_vehicle};
-    use crate::routine::Scene;
+    use armcal_core::robot::{load, load_vehicle};
+    use armcal_core::routine::Scene;
 
     fn swept(seed: u64) -> Sensitivity {
-        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots");
+        let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("robots");
         let vehicle = load_vehicle(&root.join("vehicles/work-class-front.toml")).expect("a vehicle");
         let robot = load(&root.join("titan4")).expect("a robot").mounted_on(&vehicle).expect("mounted");
         let clearance = ClearanceModel::new(&robot, &vehicle, &Scene { seafloor_z_m: None, obstacles: Vec::new() });

@@ -4,11 +4,11 @@
 //! joint: what is left over is what the joints lag, droop and overshoot each in its own way, which planning bounds by
 //! robot.toml's `[motion]` (`plan::Stray`).
 
-use crate::plan::{Edge as Motion, Stray, Timing};
-use crate::robot::Robot;
-use crate::sensor::ArmSensors;
-use crate::streams::{JointAngles, Message};
-use crate::time::Stamp;
+use armcal_belief::plan::{Edge as Motion, Stray, Timing};
+use armcal_core::robot::Robot;
+use armcal_core::sensor::ArmSensors;
+use armcal_core::streams::{JointAngles, Message};
+use armcal_core::time::Stamp;
 
 /// Set-points within this of a line are on it, rad.
 const ON_LINE_RAD: f64 = 1e-3;
@@ -204,14 +204,14 @@ impl StrayStudy {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::streams::{JointCommand, JointSensorSample};
-    use crate::time::SIMULATION_EPOCH;
+    use armcal_core::streams::{JointCommand, JointSensorSample};
+    use armcal_core::time::SIMULATION_EPOCH;
 
     /// Two edges, driven without noise; joint 0 is late by 0.15 s, the others follow at once.
     #[test]
     fn a_known_lag_is_found() {
-        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/titan4");
-        let mut robot = crate::robot::load(&folder).expect("the robot reads");
+        let folder = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("robots/titan4");
+        let mut robot = armcal_core::robot::load(&folder).expect("the robot reads");
         for sensor in &mut robot.sensors {
             sensor.noise_std_counts = 0.0;
         }

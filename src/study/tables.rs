@@ -8,7 +8,7 @@ use nalgebra::Vector2;
 use super::noise_fit::FittedNoise;
 use super::scenes::water_name;
 use super::trials::{DetectionStudy, Outcome, TagTrial};
-use crate::stats::quantile;
+use armcal_core::stats::quantile;
 
 /// Error of each corner, px, with its squared size in units of the detector's own covariance.
 fn errors(trial: &TagTrial) -> Vec<(Vector2<f64>, f64, f64)> {

@@ -3,11 +3,11 @@
 use nalgebra::{Isometry3, Matrix2, Unit, Vector3};
 
 use super::scenes::{Condition, Scene, image_spec, lights, wall, wall_place};
-use crate::detect::{DetectError, Detected, DetectorSettings, GreyImage, TagDetector};
-use crate::optics::Fisheye;
-use crate::sim::WaterKind;
-use crate::sim::imaging::{Imager, Shot};
-use crate::streams::RejectReason;
+use armcal_core::optics::Fisheye;
+use armcal_core::streams::RejectReason;
+use armcal_detect::{DetectError, Detected, DetectorSettings, GreyImage, TagDetector};
+use armcal_sim::WaterKind;
+use armcal_sim::imaging::{Imager, Shot};
 
 /// A detection further from the truth than this share of the shortest side, at any corner, is of something else.
 const MATCH_SHARE: f64 = 0.3;

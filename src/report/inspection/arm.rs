@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use crate::log::Recording;
-use crate::streams::{CaptureSet, MarkKind, Message, ReachAttempt, Thermometer};
+use armcal_core::log::Recording;
+use armcal_core::streams::{CaptureSet, MarkKind, Message, ReachAttempt, Thermometer};
 
 /// Joints, views, tags, task and ranges.
 #[derive(Clone, Debug, PartialEq, Serialize)]

@@ -5,14 +5,14 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::is_capture;
-use crate::calib::{
+use armcal_belief::calib::{
     JointParameters, MIN_VIEWS, MIN_VIEWS_PER_PARAMETER, Parameter, PositionProblem, View, associate, free_parameters,
     identify_scales, mount_by_gripper_tag, surveyed,
 };
-use crate::log::{LogError, Recording, TopicMap, scan_recording};
-use crate::robot::Robot;
-use crate::streams::{Mark, Message};
-use crate::time::Stamp;
+use armcal_core::log::{LogError, Recording, TopicMap, scan_recording};
+use armcal_core::robot::Robot;
+use armcal_core::streams::{Mark, Message};
+use armcal_core::time::Stamp;
 
 /// Views and parameters, in words.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -73,7 +73,7 @@ pub(super) fn determined(path: &Path, robot: &Robot, marked: &Recording) -> Resu
         let by_gripper_tag = behind_the_camera(robot, &data.fit);
         unobservable.retain(|left_out| !by_gripper_tag.contains(&left_out.parameter));
         determined.parameters = free.iter().chain(&by_gripper_tag).map(|parameter| parameter.name(robot)).collect();
-        let line = |u: &crate::calib::Unobservable| format!("{}: {}", u.parameter.name(robot), u.reason);
+        let line = |u: &armcal_belief::calib::Unobservable| format!("{}: {}", u.parameter.name(robot), u.reason);
         determined.undetermined = unobservable.iter().map(line).collect();
     }
     determined.missing = missing(&determined);

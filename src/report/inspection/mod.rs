@@ -16,10 +16,10 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use crate::log::topics as log_topics;
-use crate::log::{Completeness, FileContents, LogError, RawSummary, TopicMap, scan_recording};
-use crate::robot::Robot;
-use crate::streams::{Mark, MarkKind, Message};
+use armcal_core::log::topics as log_topics;
+use armcal_core::log::{Completeness, FileContents, LogError, RawSummary, TopicMap, scan_recording};
+use armcal_core::robot::Robot;
+use armcal_core::streams::{Mark, MarkKind, Message};
 
 pub use arm::{ArmContents, TagSeen, TaskSeen};
 pub use determined::Determined;
@@ -172,7 +172,7 @@ fn completeness(summary: &RawSummary) -> CompletenessReport {
 }
 
 fn compression(contents: &FileContents) -> Vec<Compression> {
-    let one = |(name, totals): (&&str, &crate::log::ChunkTotals)| Compression {
+    let one = |(name, totals): (&&str, &armcal_core::log::ChunkTotals)| Compression {
         name: if name.is_empty() { "none".to_owned() } else { (*name).to_owned() },
         chunks: totals.chunks,
         compressed_bytes: totals.compressed_bytes,
@@ -182,7 +182,7 @@ fn compression(contents: &FileContents) -> Vec<Compression> {
 }
 
 fn attachments(contents: &FileContents) -> Vec<Attachment> {
-    let one = |info: &crate::log::AttachmentInfo| Attachment {
+    let one = |info: &armcal_core::log::AttachmentInfo| Attachment {
         name: info.name.clone(),
         media_type: info.media_type.clone(),
         bytes: info.bytes,

@@ -4,9 +4,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde::Serialize;
 
-use crate::log::ros::{AprilTagDetectionArray, JointState, TfMessage};
-use crate::log::topics::{self, Stream};
-use crate::log::{RawMessage, decode};
+use armcal_core::log::ros::{AprilTagDetectionArray, JointState, TfMessage};
+use armcal_core::log::topics::{self, Stream};
+use armcal_core::log::{RawMessage, decode};
 
 /// One topic.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -117,7 +117,7 @@ impl Seen {
             }
             "tf2_msgs/TFMessage" => {
                 if let Ok(message) = decode::<TfMessage>(data) {
-                    let name = |t: &crate::log::ros::TransformStamped| {
+                    let name = |t: &armcal_core::log::ros::TransformStamped| {
                         format!("{} to {}", t.header.frame_id, t.child_frame_id)
                     };
                     self.names.extend(message.transforms.iter().map(name));

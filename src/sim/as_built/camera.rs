@@ -4,9 +4,9 @@ use nalgebra::Vector3;
 use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
 
-use crate::optics::Fisheye;
-use crate::sim::spec::{CameraWorldSpec, PortKind};
-use crate::stats::stream_rng;
+use crate::spec::{CameraWorldSpec, PortKind};
+use armcal_core::optics::Fisheye;
+use armcal_core::stats::stream_rng;
 
 /// A lens as built; its resolution and field of view are the drawing's.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -46,7 +46,7 @@ impl LensAsBuilt {
         Some(built)
     }
 
-    pub(in crate::sim) fn applied(&self, nominal: &Fisheye) -> Fisheye {
+    pub(crate) fn applied(&self, nominal: &Fisheye) -> Fisheye {
         Fisheye { focal_px: self.focal_px, center_px: self.center_px, distortion: self.distortion, ..*nominal }
     }
 }
@@ -65,8 +65,8 @@ pub(super) fn draw_dome_center(spec: &CameraWorldSpec, seed: u64) -> Option<[f64
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::optics::fixture::lens;
-    use crate::stats::Summary;
+    use armcal_core::optics::fixture::lens;
+    use armcal_core::stats::Summary;
 
     fn assert_normal(what: &str, samples: &[f64], std: f64) {
         let n = samples.len() as f64;

@@ -4,8 +4,8 @@ use nalgebra::Vector3;
 use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
 
-use crate::sim::spec::WorldSpec;
-use crate::stats::stream_rng;
+use crate::spec::WorldSpec;
+use armcal_core::stats::stream_rng;
 
 /// Constant errors of thermometers and depth gauge.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]

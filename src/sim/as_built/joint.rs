@@ -8,9 +8,9 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
 
-use crate::robot::{Robot, SensorKind};
-use crate::sim::spec::{JointSensorsSpec, WorldSpec};
-use crate::stats::stream_rng;
+use crate::spec::{JointSensorsSpec, WorldSpec};
+use armcal_core::robot::{Robot, SensorKind};
+use armcal_core::stats::stream_rng;
 
 /// A joint sensor as built; `sensors::joint` has the equations.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -9,10 +9,10 @@ use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
 
 use super::spec::WorldSpec;
-use crate::kinematics::Attachment;
-use crate::robot::Robot;
-use crate::spatial::{Base, Camera, Frame, Link, Pose, Tag};
-use crate::stats::stream_rng;
+use armcal_core::kinematics::Attachment;
+use armcal_core::robot::Robot;
+use armcal_core::spatial::{Base, Camera, Frame, Link, Pose, Tag};
+use armcal_core::stats::stream_rng;
 pub use camera::LensAsBuilt;
 pub use gauges::{AttitudeAsBuilt, GaugesAsBuilt};
 pub use joint::{Harmonic, JointAsBuilt, ResolverAsBuilt, WornSpot};

@@ -3,10 +3,10 @@
 use std::path::Path;
 
 use super::*;
-use crate::robot::{SensorKind, load, load_vehicle};
+use armcal_core::robot::{SensorKind, load, load_vehicle};
 
 fn robot() -> Robot {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots");
+    let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("robots");
     let vehicle = load_vehicle(&root.join("vehicles/work-class-front.toml")).expect("it reads");
     load(&root.join("titan4")).expect("it reads").mounted_on(&vehicle).expect("it fits")
 }
@@ -36,7 +36,7 @@ fn a_rich_world_reads_back() {
     spec.temperature.thermometer_bias_std_k = 0.2;
     spec.vehicle.gyro_bias_std_rad_s = 1e-4;
     spec.camera.focal_std = 1e-3;
-    spec.camera.port = crate::sim::spec::PortKind::Dome;
+    spec.camera.port = crate::spec::PortKind::Dome;
     spec.camera.dome_decentre_std_m = 1e-3;
     let mut robot = robot();
     robot.sensors[1].kind = SensorKind::Encoder;

@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Matrix3, Vector3};
 
 use super::spatial::{Force, Inertia, Motion};
-use crate::robot::{LinkBody, PlacedShape};
+use armcal_core::robot::{LinkBody, PlacedShape};
 
 /// A body in its own link's frame.
 #[derive(Clone, Debug)]
@@ -43,7 +43,7 @@ pub struct Surface {
 
 /// The water about an arm.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::sim) struct WaterProperties {
+pub(crate) struct WaterProperties {
     pub density_kg_m3: f64,
     pub drag_coefficient: f64,
     /// Scale of the theoretical added mass; 0 for none.
@@ -53,7 +53,7 @@ pub(in crate::sim) struct WaterProperties {
 }
 
 impl WaterProperties {
-    pub(in crate::sim) fn of(spec: &crate::sim::spec::WaterSpec) -> Self {
+    pub(crate) fn of(spec: &crate::spec::WaterSpec) -> Self {
         Self {
             density_kg_m3: spec.density_kg_m3,
             drag_coefficient: spec.drag_coefficient,
@@ -65,7 +65,7 @@ impl WaterProperties {
 
 impl Body {
     /// A link of the drawing in water.
-    pub(in crate::sim) fn link(link: &LinkBody, water: &WaterProperties) -> Self {
+    pub(crate) fn link(link: &LinkBody, water: &WaterProperties) -> Self {
         let is_wet = water.density_kg_m3 > 0.0;
         let added =
             link.collisions.iter().map(|placed| added_inertia(placed, water)).fold(Inertia::zero(), |a, b| a + b);
@@ -84,7 +84,7 @@ impl Body {
     /// A link of the drawing in sea water as the standard world has it, `buoyancy_fraction` of its weight carried.
     #[must_use]
     pub fn in_sea_water(link: &LinkBody, buoyancy_fraction: f64) -> Self {
-        let spec = crate::sim::spec::WaterSpec { buoyancy_fraction: Some(buoyancy_fraction), ..Default::default() };
+        let spec = crate::spec::WaterSpec { buoyancy_fraction: Some(buoyancy_fraction), ..Default::default() };
         Self::link(link, &WaterProperties::of(&spec))
     }
 
@@ -203,7 +203,7 @@ fn volume_centroid(shapes: &[PlacedShape]) -> Option<Vector3<f64>> {
 fn added_inertia(placed: &PlacedShape, water: &WaterProperties) -> Inertia {
     let size = Vector3::from(placed.shape.box_m());
     let scale = water.density_kg_m3 * water.added_mass_coefficient;
-    let is_ball = matches!(placed.shape, crate::robot::Shape::Sphere { .. });
+    let is_ball = matches!(placed.shape, armcal_core::robot::Shape::Sphere { .. });
     let mass = if is_ball {
         // 1/2 rho 4/3 pi r3 of each direction.
         Vector3::repeat(scale * std::f64::consts::PI / 12.0 * size.x.powi(3))
@@ -234,7 +234,7 @@ fn face_added_volume_m3(a: f64, b: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::robot::Shape;
+    use armcal_core::robot::Shape;
 
     pub(super) const SEA: WaterProperties = WaterProperties {
         density_kg_m3: 1025.0,

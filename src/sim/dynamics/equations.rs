@@ -5,8 +5,8 @@ use nalgebra::{Isometry3, Vector3};
 use super::body::Body;
 use super::spatial::{Force, Inertia, Motion};
 use super::system::{Coordinates, Symmetric};
-use crate::kinematics::{Chain, LinkPoses};
-use crate::streams::{JointAngles, MAX_JOINTS};
+use armcal_core::kinematics::{Chain, LinkPoses};
+use armcal_core::streams::{JointAngles, MAX_JOINTS};
 
 /// The arm on its base. Body 0 is what the base carries; body `j + 1` hangs on joint `j`.
 #[derive(Clone, Debug)]

@@ -11,9 +11,9 @@ use nalgebra::{Isometry3, Vector6};
 use super::equations::{BaseCoupling, Equations, Multibody, Surroundings};
 use super::spatial::{Force, Motion};
 use super::system::{Coordinates, MAX_DOF, Symmetric};
-use crate::sim::joint_load::JointLoad;
-use crate::spatial::exp;
-use crate::streams::{JointAngles, MAX_JOINTS};
+use crate::joint_load::JointLoad;
+use armcal_core::spatial::exp;
+use armcal_core::streams::{JointAngles, MAX_JOINTS};
 
 /// Where the system is and how it moves.
 #[derive(Clone, Copy, Debug)]

@@ -12,7 +12,7 @@ mod spatial;
 mod system;
 
 pub use super::joint_load::JointLoad;
-pub(in crate::sim) use body::WaterProperties;
+pub(crate) use body::WaterProperties;
 pub use body::{Body, HullDrag, Surface};
 pub use equations::{BaseCoupling, Equations, Multibody, Surroundings};
 pub use integrate::{ContactRow, Stage, StepInput, SystemState};

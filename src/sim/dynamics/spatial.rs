@@ -4,7 +4,7 @@
 
 use nalgebra::{Isometry3, Matrix3, Vector3};
 
-use crate::spatial::skew;
+use armcal_core::spatial::skew;
 
 /// Velocity or acceleration of a body: its angular part and that of the body's point at the origin.
 #[derive(Clone, Copy, Debug, PartialEq)]

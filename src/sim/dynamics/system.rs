@@ -1,6 +1,6 @@
 //! A small dense symmetric system: the joint-space inertia and its factor.
 
-use crate::streams::MAX_JOINTS;
+use armcal_core::streams::MAX_JOINTS;
 
 /// Six coordinates of a free base, then the joints.
 pub const MAX_DOF: usize = 6 + MAX_JOINTS;

@@ -3,10 +3,10 @@
 use nalgebra::{Isometry3, Matrix3, UnitQuaternion, Vector3};
 
 use super::*;
-use crate::kinematics::{Chain, ChainJoint};
-use crate::robot::{PlacedShape, Robot, Shape, load};
-use crate::sim::joint_load::JointLoad;
-use crate::streams::{JointAngles, MAX_JOINTS};
+use crate::joint_load::JointLoad;
+use armcal_core::kinematics::{Chain, ChainJoint};
+use armcal_core::robot::{PlacedShape, Robot, Shape, load};
+use armcal_core::streams::{JointAngles, MAX_JOINTS};
 
 const SEA: WaterProperties = WaterProperties {
     density_kg_m3: 1025.0,
@@ -17,7 +17,7 @@ const SEA: WaterProperties = WaterProperties {
 const G: f64 = 9.806_65;
 
 fn titan() -> Robot {
-    load(std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/robots/titan4"))).expect("the robot reads")
+    load(std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../robots/titan4"))).expect("the robot reads")
 }
 
 fn at_rest(angles: JointAngles) -> SystemState {
@@ -237,7 +237,7 @@ fn a_neutrally_buoyant_link_hangs_still() {
         axis: Vector3::y_axis(),
         limits: None,
     };
-    let link = crate::robot::LinkBody {
+    let link = armcal_core::robot::LinkBody {
         name: "link".into(),
         mass_kg: 13.0,
         com_m: Vector3::new(0.42, 0.0, 0.0),
@@ -276,7 +276,7 @@ fn ball(mass_kg: f64, radius_m: f64, drag_coefficient: f64) -> Multibody {
     let shape = Shape::Sphere { radius_m };
     let displaced = 1025.0 * 4.0 / 3.0 * std::f64::consts::PI * radius_m.powi(3);
     let water = WaterProperties { buoyancy_fraction: displaced / mass_kg, drag_coefficient, ..SEA };
-    let link = crate::robot::LinkBody {
+    let link = armcal_core::robot::LinkBody {
         name: "ball".into(),
         mass_kg,
         com_m: Vector3::zeros(),

@@ -4,9 +4,9 @@ use super::ActuatorInput;
 use super::end_stop::EndStop;
 use super::friction::Friction;
 use super::valve::Valve;
-use crate::kinematics::JointLimits;
-use crate::sim::joint_load::JointLoad;
-use crate::sim::spec::HydraulicsSpec;
+use crate::joint_load::JointLoad;
+use crate::spec::HydraulicsSpec;
+use armcal_core::kinematics::JointLimits;
 
 /// The drive of one joint.
 #[derive(Clone, Copy, Debug)]

@@ -1,8 +1,8 @@
 //! Stops at the ends of a joint's range: stiff, one-sided, without bounce.
 
-use crate::kinematics::JointLimits;
-use crate::sim::joint_load::JointLoad;
-use crate::sim::spec::HydraulicsSpec;
+use crate::joint_load::JointLoad;
+use crate::spec::HydraulicsSpec;
+use armcal_core::kinematics::JointLimits;
 
 /// Spring and damper beyond the limits. The damping over the stiffness, [`CUSHION_S`], is long against the bounce
 /// (`2 sqrt(I/k)`, 14 ms for 50 kg m2 on 1e6 N m/rad), so that the joint comes back no faster than the cushion fills;

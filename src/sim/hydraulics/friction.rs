@@ -5,8 +5,8 @@
 //! the sliding torque after that. Below breakaway it is a spring and nothing else, so that nothing can creep: neither
 //! under a steady load nor under one that shakes.
 
-use crate::sim::joint_load::JointLoad;
-use crate::sim::spec::HydraulicsSpec;
+use crate::joint_load::JointLoad;
+use crate::spec::HydraulicsSpec;
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Friction {

@@ -11,9 +11,9 @@ mod valve;
 
 use super::joint_load::JointLoad;
 use super::spec::HydraulicsSpec;
-use crate::kinematics::JointLimits;
-use crate::streams::{JointAngles, MAX_JOINTS};
 use actuator::Actuator;
+use armcal_core::kinematics::JointLimits;
+use armcal_core::streams::{JointAngles, MAX_JOINTS};
 
 /// All drives and the pump.
 #[derive(Clone, Debug)]

@@ -1,6 +1,6 @@
 //! The spool of one valve: from the controller's command to the share of the full flow.
 
-use crate::sim::spec::HydraulicsSpec;
+use crate::spec::HydraulicsSpec;
 
 /// First-order lag behind the command, then play of the spool, then the deadband.
 #[derive(Clone, Copy, Debug)]

@@ -14,10 +14,10 @@ use super::snow::{self, Flake};
 use super::tag::Board;
 use super::texture::Texture;
 use super::trace::{Canvas, Tracer};
-use crate::optics::Fisheye;
-use crate::robot::Shape;
-use crate::sim::spec::ImageSpec;
-use crate::stats::stream_rng;
+use crate::spec::ImageSpec;
+use armcal_core::optics::Fisheye;
+use armcal_core::robot::Shape;
+use armcal_core::stats::stream_rng;
 
 /// A printed tag: its frame has x right and y up as printed, z out of the print; `size_m` is the outer side of its black border.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::Vec3;
-use crate::optics::Fisheye;
+use armcal_core::optics::Fisheye;
 
 /// Unit vectors in the camera's frame, pixel by pixel, rows from the top. Beyond the lens's field of view they are zero.
 #[derive(Clone, Debug)]

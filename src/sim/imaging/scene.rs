@@ -5,7 +5,7 @@ use nalgebra::{Isometry3, Point3};
 use super::rays::Rays;
 use super::shape::{Form, Lanes, Place};
 use super::{Rgb, Vec3};
-use crate::spatial::{exp, log};
+use armcal_core::spatial::{exp, log};
 
 /// Samples of place and time on a pixel that an edge crosses.
 pub(super) const SAMPLES: usize = 32;

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::math::{hash, max};
 use super::rays::Rays;
-use crate::sim::spec::ImageSpec;
+use crate::spec::ImageSpec;
 
 /// Bright pixels: so large a share of those that see is at or above the level that is set.
 const BRIGHT_SHARE: f64 = 0.002;

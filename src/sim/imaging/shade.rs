@@ -13,7 +13,7 @@ use super::math::exp;
 use super::rays::Rays;
 use super::water::Water;
 use super::{Rgb, Vec3};
-use crate::sim::spec::ImageSpec;
+use crate::spec::ImageSpec;
 
 /// Distance of the veil's nodes, px.
 const NODE_PX: usize = 16;

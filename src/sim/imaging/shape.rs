@@ -3,7 +3,7 @@
 use super::Vec3;
 use super::math::{max, min};
 use super::tag::Board;
-use crate::robot::Shape;
+use armcal_core::robot::Shape;
 
 /// What an object is to a ray, in its own frame; lengths in m.
 #[derive(Clone, Debug)]

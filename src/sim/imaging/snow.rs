@@ -9,8 +9,8 @@ use super::Vec3;
 use super::math::{exp, hash, unit};
 use super::rays::Rays;
 use super::shade::Shader;
-use crate::optics::Fisheye;
-use crate::sim::spec::ImageSpec;
+use crate::spec::ImageSpec;
+use armcal_core::optics::Fisheye;
 
 /// Particles farther away are too faint to tell, m.
 const FAR_M: f32 = 2.0;

@@ -1,7 +1,7 @@
 //! Tags: boards without thickness, one side printed.
 
 use super::Rgb;
-use crate::optics::tag36h11::{BOARD_CELLS, TAG_CELLS, cells};
+use armcal_core::optics::tag36h11::{BOARD_CELLS, TAG_CELLS, cells};
 
 /// Diffuse reflectance of the white and the black of a board. Assumed: matt laminate.
 pub(super) const WHITE: f32 = 0.85;

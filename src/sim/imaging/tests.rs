@@ -8,9 +8,9 @@ use rand::RngExt;
 use super::light::Lamp;
 use super::shape::{Form, Place};
 use super::*;
-use crate::optics::{fixture::lens, square_corners};
-use crate::robot::{Hull, Shape, parry_pose};
-use crate::stats::stream_rng;
+use armcal_core::optics::{fixture::lens, square_corners};
+use armcal_core::robot::{Hull, Shape, parry_pose};
+use armcal_core::stats::stream_rng;
 
 /// An id that the family does not have: a blank white board.
 const BLANK: u32 = 9999;

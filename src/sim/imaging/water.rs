@@ -5,7 +5,7 @@
 //! is what lamps and sun send back from far away (`shade`).
 
 use super::Rgb;
-use crate::sim::spec::{ImageSpec, WaterKind};
+use crate::spec::{ImageSpec, WaterKind};
 
 /// Coefficients for red, green and blue, 1/m.
 #[derive(Clone, Copy, Debug)]

@@ -9,14 +9,14 @@ use rapier3d::pipeline::{ActiveHooks, PairFilterContext, PhysicsHooks, PhysicsWo
 use rapier3d::prelude::SolverFlags;
 
 use super::guard::ContactGuard;
-use crate::kinematics::{Chain, LinkPoses};
-use crate::robot::parry_pose;
-use crate::sim::convert::from_rapier;
-use crate::sim::dynamics::{ContactRow, Coordinates, Force, MAX_DOF, Motion};
-use crate::sim::places::BodyPoses;
-use crate::sim::solids::{Carrier, PairTable, Solid, Solids};
-use crate::sim::spec::PhysicsSpec;
-use crate::streams::{JointAngles, MAX_JOINTS};
+use crate::convert::from_rapier;
+use crate::dynamics::{ContactRow, Coordinates, Force, MAX_DOF, Motion};
+use crate::places::BodyPoses;
+use crate::solids::{Carrier, PairTable, Solid, Solids};
+use crate::spec::PhysicsSpec;
+use armcal_core::kinematics::{Chain, LinkPoses};
+use armcal_core::robot::parry_pose;
+use armcal_core::streams::{JointAngles, MAX_JOINTS};
 
 /// Below this slip rate friction is viscous, m/s.
 const SLIP_M_S: f64 = 1e-3;

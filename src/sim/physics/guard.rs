@@ -6,10 +6,10 @@
 
 use nalgebra::Isometry3;
 
-use crate::kinematics::Chain;
-use crate::sim::places::BodyPoses;
-use crate::sim::solids::{Carrier, Solids};
-use crate::streams::{JointAngles, MAX_JOINTS};
+use crate::places::BodyPoses;
+use crate::solids::{Carrier, Solids};
+use armcal_core::kinematics::Chain;
+use armcal_core::streams::{JointAngles, MAX_JOINTS};
 
 /// The engine makes contacts of pairs nearer than 20 mm, its prediction distance, m.
 const CONTACT_M: f64 = 0.022;
@@ -155,9 +155,9 @@ mod tests {
     use rand::RngExt;
 
     use super::*;
-    use crate::robot::{load, load_vehicle};
-    use crate::routine::Scene;
-    use crate::stats::stream_rng;
+    use armcal_core::robot::{load, load_vehicle};
+    use armcal_core::routine::Scene;
+    use armcal_core::stats::stream_rng;
 
     /// The engine's prediction distance.
     const PREDICTED_M: f64 = 0.02;
@@ -166,7 +166,7 @@ mod tests {
     /// pair is farther apart than the engine would make a contact for.
     #[test]
     fn what_it_excludes_is_far_apart() {
-        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots");
+        let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("robots");
         let robot = load(&root.join("titan4")).expect("the robot reads");
         let vehicle = load_vehicle(&root.join("vehicles/work-class-front.toml")).expect("the vehicle reads");
         let scene = Scene { seafloor_z_m: Some(-1.0), obstacles: Vec::new() };

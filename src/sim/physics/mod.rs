@@ -18,10 +18,10 @@ use super::places::BodyPoses;
 use super::solids::Solids;
 use super::spec::{PhysicsSpec, WaterSpec};
 use super::vehicle::{BaseState, GRAVITY_M_S2, WaterMotion};
-use crate::kinematics::{Chain, LinkPoses};
-use crate::robot::LinkBody;
-use crate::spatial::{Base, Pose, Vehicle};
-use crate::streams::{JointAngles, MAX_JOINTS};
+use armcal_core::kinematics::{Chain, LinkPoses};
+use armcal_core::robot::LinkBody;
+use armcal_core::spatial::{Base, Pose, Vehicle};
+use armcal_core::streams::{JointAngles, MAX_JOINTS};
 
 /// The arm, the vehicle if it is free, and what they may collide with.
 pub(super) struct ArmPhysics {

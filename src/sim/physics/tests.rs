@@ -3,10 +3,10 @@
 use nalgebra::{Matrix3, Unit};
 
 use super::*;
-use crate::kinematics::ChainJoint;
-use crate::robot::{Robot, load};
-use crate::sim::spec::VehicleMotionSpec;
-use crate::sim::vehicle::VehicleMotion;
+use crate::spec::VehicleMotionSpec;
+use crate::vehicle::VehicleMotion;
+use armcal_core::kinematics::ChainJoint;
+use armcal_core::robot::{Robot, load};
 
 const DRY: WaterSpec = WaterSpec {
     density_kg_m3: 0.0,
@@ -25,7 +25,7 @@ const DRY: WaterSpec = WaterSpec {
 };
 
 fn titan() -> Robot {
-    load(std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/robots/titan4"))).expect("the robot reads")
+    load(std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../robots/titan4"))).expect("the robot reads")
 }
 
 /// An arm that collides with nothing.
@@ -229,7 +229,7 @@ fn no_torque_is_missing_on_a_moving_base() {
     };
     let mut torques = [Vector3::zeros(); 6];
     for body in 1..=6 {
-        let com = |p: &(Isometry3<f64>, crate::kinematics::LinkPoses)| {
+        let com = |p: &(Isometry3<f64>, armcal_core::kinematics::LinkPoses)| {
             ((p.0 * p.1.link(body)) * nalgebra::Point3::from(robot.bodies[body].com_m)).coords
         };
         let acceleration = (com(&next) - com(&now) * 2.0 + com(&past)) / (h * h);

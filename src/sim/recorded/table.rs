@@ -5,7 +5,7 @@ use std::path::Path;
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
-use crate::robot::FileIssue;
+use armcal_core::robot::FileIssue;
 
 /// One line of the file.
 pub(super) struct Sample {

@@ -217,7 +217,7 @@ fn bad_files_are_refused_with_line_column_and_range() {
 /// The sample of routines/motion is what its maker says.
 #[test]
 fn the_hover_is_as_rough_as_it_says() {
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("routines/motion/hover.csv");
+    let file = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("routines/motion/hover.csv");
     let motion = RecordedMotion::read(&file).expect("the sample reads");
     assert!((motion.duration_s() - 600.0).abs() < 1e-9);
     let n = 6000;

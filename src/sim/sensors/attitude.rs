@@ -7,15 +7,15 @@ use nalgebra::{UnitQuaternion, Vector3};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::sim::as_built::AttitudeAsBuilt;
-use crate::sim::spec::VehicleMotionSpec;
-use crate::sim::vehicle::BaseState;
-use crate::stats::stream_rng;
-use crate::streams::Attitude;
-use crate::time::Stamp;
+use crate::as_built::AttitudeAsBuilt;
+use crate::spec::VehicleMotionSpec;
+use crate::vehicle::BaseState;
+use armcal_core::stats::stream_rng;
+use armcal_core::streams::Attitude;
+use armcal_core::time::Stamp;
 
 #[derive(Clone, Debug)]
-pub(in crate::sim) struct AttitudeSensor {
+pub(crate) struct AttitudeSensor {
     attitude_noise_rad: f64,
     gyro_noise_rad_s: f64,
     accelerometer_noise_m_s2: f64,
@@ -30,7 +30,7 @@ pub(in crate::sim) struct AttitudeSensor {
 }
 
 impl AttitudeSensor {
-    pub(in crate::sim) fn new(spec: &VehicleMotionSpec, built: &AttitudeAsBuilt, seed: u64) -> Self {
+    pub(crate) fn new(spec: &VehicleMotionSpec, built: &AttitudeAsBuilt, seed: u64) -> Self {
         Self {
             attitude_noise_rad: spec.attitude_noise_rad,
             gyro_noise_rad_s: spec.gyro_noise_rad_s,
@@ -45,7 +45,7 @@ impl AttitudeSensor {
         }
     }
 
-    pub(in crate::sim) fn sample(&mut self, state: &BaseState, stamp: Stamp) -> Attitude {
+    pub(crate) fn sample(&mut self, state: &BaseState, stamp: Stamp) -> Attitude {
         self.drift_until(stamp);
         let turn = UnitQuaternion::from_scaled_axis(normal(&mut self.rng, self.attitude_noise_rad));
         let q = state.world_from_vehicle.rotation() * self.vehicle_from_sensor * turn;
@@ -77,9 +77,9 @@ fn normal(rng: &mut ChaCha8Rng, std: f64) -> Vector3<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sim::vehicle::VehicleMotion;
-    use crate::spatial::Pose;
-    use crate::time::SIMULATION_EPOCH;
+    use crate::vehicle::VehicleMotion;
+    use armcal_core::spatial::Pose;
+    use armcal_core::time::SIMULATION_EPOCH;
 
     fn silent() -> VehicleMotionSpec {
         VehicleMotionSpec {

@@ -4,11 +4,11 @@
 //! warming with time constant b, and the water's change (time constant a) behind the same lag. Oil that warms with work:
 //! `dT/dt = power / capacity - (T - water) / b`, in steps that are exact for constant power and water.
 
-use crate::sim::spec::TemperatureSpec;
+use crate::spec::TemperatureSpec;
 
 /// True temperatures over time.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::sim) struct Temperatures {
+pub(crate) struct Temperatures {
     spec: TemperatureSpec,
     /// Of the vehicle.
     depth_m: f64,
@@ -17,7 +17,7 @@ pub(in crate::sim) struct Temperatures {
 }
 
 impl Temperatures {
-    pub(in crate::sim) fn new(spec: &TemperatureSpec, depth_m: f64) -> Self {
+    pub(crate) fn new(spec: &TemperatureSpec, depth_m: f64) -> Self {
         let bath = OilBath {
             heat_capacity_j_per_k: spec.oil_heat_capacity_j_per_k,
             time_constant_s: spec.oil_time_constant_s,
@@ -27,7 +27,7 @@ impl Temperatures {
     }
 
     /// Time passes until `t_s`, at a depth, while the hydraulics lose power to the oil.
-    pub(in crate::sim) fn advance(&mut self, t_s: f64, elapsed_s: f64, lost_power_w: f64, depth_m: f64) {
+    pub(crate) fn advance(&mut self, t_s: f64, elapsed_s: f64, lost_power_w: f64, depth_m: f64) {
         self.depth_m = depth_m;
         let water_c = self.water_c(t_s);
         if let Some(bath) = &mut self.bath {
@@ -36,7 +36,7 @@ impl Temperatures {
     }
 
     /// Celsius; where the oil warms with work, that of the last [`Self::advance`].
-    pub(in crate::sim) fn oil_c(&self, t_s: f64) -> f64 {
+    pub(crate) fn oil_c(&self, t_s: f64) -> f64 {
         if let Some(bath) = self.bath {
             return bath.oil_c;
         }
@@ -53,7 +53,7 @@ impl Temperatures {
     }
 
     /// `water + change (1 - exp(-t / a))` at the vehicle's depth, Celsius.
-    pub(in crate::sim) fn water_c(&self, t_s: f64) -> f64 {
+    pub(crate) fn water_c(&self, t_s: f64) -> f64 {
         let spec = &self.spec;
         spec.water_at_c(self.depth_m) + spec.water_change_k * (1.0 - (-t_s / spec.water_time_constant_s).exp())
     }

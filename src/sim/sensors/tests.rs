@@ -2,13 +2,13 @@
 
 use std::path::Path;
 
-use crate::robot::{SensorKind, load, load_vehicle};
-use crate::routine::Scene;
-use crate::sensor::ArmSensors;
-use crate::sim::spec::WorldSpec;
-use crate::sim::world::{World, WorldInput};
-use crate::streams::{Arm, JointAngles, Message, Sink, SinkError, Thermometer};
-use crate::time::Stamp;
+use crate::spec::WorldSpec;
+use crate::world::{World, WorldInput};
+use armcal_core::robot::{SensorKind, load, load_vehicle};
+use armcal_core::routine::Scene;
+use armcal_core::sensor::ArmSensors;
+use armcal_core::streams::{Arm, JointAngles, Message, Sink, SinkError, Thermometer};
+use armcal_core::time::Stamp;
 
 #[derive(Default)]
 struct Tape(Vec<Message>);
@@ -22,7 +22,7 @@ impl Sink for Tape {
 
 /// Ten seconds of an arm that swings or stands, in the world of a text; the kinds of its first sensors.
 fn run(world: &str, kinds: &[SensorKind], swing_rad: f64) -> Vec<Message> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots");
+    let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("robots");
     let vehicle = load_vehicle(&root.join("vehicles/work-class-front.toml")).expect("it reads");
     let mut robot = load(&root.join("titan4")).expect("it reads").mounted_on(&vehicle).expect("it fits");
     for (sensor, kind) in robot.sensors.iter_mut().zip(kinds) {

@@ -6,19 +6,19 @@
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::sim::as_built::GaugesAsBuilt;
-use crate::sim::spec::{TemperatureSpec, WaterSpec};
-use crate::sim::vehicle::GRAVITY_M_S2;
-use crate::stats::stream_rng;
-use crate::streams::{PressureSample, TemperatureSample, Thermometer};
-use crate::time::Stamp;
+use crate::as_built::GaugesAsBuilt;
+use crate::spec::{TemperatureSpec, WaterSpec};
+use crate::vehicle::GRAVITY_M_S2;
+use armcal_core::stats::stream_rng;
+use armcal_core::streams::{PressureSample, TemperatureSample, Thermometer};
+use armcal_core::time::Stamp;
 
 /// Of the air at the surface.
 const ATMOSPHERE_PA: f64 = 101_325.0;
 
 /// The slow sensors.
 #[derive(Clone, Debug)]
-pub(in crate::sim) struct SlowSensors {
+pub(crate) struct SlowSensors {
     spec: TemperatureSpec,
     water: WaterSpec,
     built: GaugesAsBuilt,
@@ -43,12 +43,7 @@ struct Followed {
 }
 
 impl SlowSensors {
-    pub(in crate::sim) fn new(
-        temperature: &TemperatureSpec,
-        water: &WaterSpec,
-        built: &GaugesAsBuilt,
-        seed: u64,
-    ) -> Self {
+    pub(crate) fn new(temperature: &TemperatureSpec, water: &WaterSpec, built: &GaugesAsBuilt, seed: u64) -> Self {
         let probe = |name: &str| Probe { rng: stream_rng(seed, name), last: None };
         Self {
             spec: *temperature,
@@ -60,7 +55,7 @@ impl SlowSensors {
         }
     }
 
-    pub(in crate::sim) fn temperature(&mut self, which: Thermometer, true_c: f64, stamp: Stamp) -> TemperatureSample {
+    pub(crate) fn temperature(&mut self, which: Thermometer, true_c: f64, stamp: Stamp) -> TemperatureSample {
         let (probe, bias_k) = match which {
             Thermometer::Oil => (&mut self.oil, self.built.oil_bias_k),
             Thermometer::Water => (&mut self.sea, self.built.water_bias_k),
@@ -78,7 +73,7 @@ impl SlowSensors {
     }
 
     /// Pressure at the vehicle, `heave_m` above its station.
-    pub(in crate::sim) fn pressure(&mut self, heave_m: f64, stamp: Stamp) -> PressureSample {
+    pub(crate) fn pressure(&mut self, heave_m: f64, stamp: Stamp) -> PressureSample {
         let noise: f64 = StandardNormal.sample(&mut self.gauge);
         let depth_m = self.water.depth_m - heave_m;
         let true_pa = ATMOSPHERE_PA + gauge_pressure_pa(&self.water, depth_m);
@@ -107,14 +102,14 @@ impl Probe {
 }
 
 /// Of the water at a depth, above the surface's, Pa.
-pub(in crate::sim) fn gauge_pressure_pa(water: &WaterSpec, depth_m: f64) -> f64 {
+pub(crate) fn gauge_pressure_pa(water: &WaterSpec, depth_m: f64) -> f64 {
     water.density_kg_m3 * GRAVITY_M_S2 * depth_m
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::time::SIMULATION_EPOCH;
+    use armcal_core::time::SIMULATION_EPOCH;
 
     fn sensors(temperature: &TemperatureSpec, built: &GaugesAsBuilt) -> SlowSensors {
         let silent = TemperatureSpec { thermometer_noise_k: 0.0, ..*temperature };

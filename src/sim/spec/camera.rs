@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::image::CameraMode;
 use super::{CheckedTable, DEG, table};
-use crate::robot::FileIssue;
+use armcal_core::robot::FileIssue;
 
 /// The window between lens and water.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -123,13 +123,13 @@ table!(
 
 impl TagsSpec {
     /// How well one tag was surveyed, (m, rad) per axis.
-    pub(in crate::sim) fn survey_std(&self, is_base_tag: bool) -> (f64, f64) {
+    pub(crate) fn survey_std(&self, is_base_tag: bool) -> (f64, f64) {
         let own = |own: Option<f64>, common: f64| own.filter(|_| is_base_tag).unwrap_or(common);
         (own(self.base_std_m, self.survey_std_m), own(self.base_std_rad, self.survey_std_rad))
     }
 
     /// How well the tag on the gripper was, (m, rad) per axis.
-    pub(in crate::sim) fn gripper_std(&self) -> (f64, f64) {
+    pub(crate) fn gripper_std(&self) -> (f64, f64) {
         (self.gripper_std_m.unwrap_or(0.0003), self.gripper_std_rad.unwrap_or(0.1 * DEG))
     }
 

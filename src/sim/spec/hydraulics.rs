@@ -6,7 +6,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::{CheckedTable, DEG, table};
-use crate::robot::FileIssue;
+use armcal_core::robot::FileIssue;
 
 table!(
     /// Valves, oil, pump, friction, end stops, and the arm's own controller. Torque limits come from the URDF's effort.

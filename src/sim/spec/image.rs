@@ -6,7 +6,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::{CheckedTable, table};
-use crate::robot::FileIssue;
+use armcal_core::robot::FileIssue;
 
 /// Whether the wrist camera's detections come from pixels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

@@ -7,7 +7,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::{CheckedTable, DEG, table};
-use crate::robot::FileIssue;
+use armcal_core::robot::FileIssue;
 
 table!(
     /// Errors of the joint sensors; see `sensors::joint` for the equations. robot.toml says which joint has which kind.
@@ -82,7 +82,7 @@ impl JointSensorsSpec {
     }
 
     /// Whether the joints' tracks have a worn spot at all.
-    pub(in crate::sim) fn wears(&self) -> bool {
+    pub(crate) fn wears(&self) -> bool {
         self.worn_spot_peak_rad > 0.0 || self.worn_dropout_per_s > 0.0
     }
 }

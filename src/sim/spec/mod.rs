@@ -21,8 +21,8 @@ use serde::de::DeserializeOwned;
 use super::error::SimError;
 use super::fault::{self, ScheduledFault};
 use super::recorded::RecordedMotion;
-use crate::robot::{FileIssue, PartFile, Robot, check_parts};
-use crate::routine::Scene;
+use armcal_core::robot::{FileIssue, PartFile, Robot, check_parts};
+use armcal_core::routine::Scene;
 pub use camera::{CameraWorldSpec, ClockSpec, CornerNoiseKind, PortKind, TagsSpec};
 pub use hydraulics::HydraulicsSpec;
 pub use image::{CameraMode, ImageSpec, WaterKind};
@@ -33,7 +33,7 @@ pub use vehicle::{MotionKind, VehicleMotionSpec};
 pub use water::WaterSpec;
 
 /// Length of a control period, s: the arm's own controller runs at 100 Hz.
-pub(in crate::sim) const CONTROL_PERIOD_S: f64 = 0.01;
+pub(crate) const CONTROL_PERIOD_S: f64 = 0.01;
 
 /// Defines one table of `[world]`: figures with defaults and allowed ranges (inclusive), then fields of other types.
 macro_rules! table {
@@ -170,7 +170,7 @@ impl WorldSpec {
     ///
     /// # Errors
     /// [`SimError`] naming that file, line and column.
-    pub(in crate::sim) fn read_motion(&mut self, folder: &Path) -> Result<(), SimError> {
+    pub(crate) fn read_motion(&mut self, folder: &Path) -> Result<(), SimError> {
         if let Some(file) = &self.vehicle.motion_file {
             self.recorded = Some(Arc::new(RecordedMotion::read(&folder.join(file))?));
         }
@@ -193,7 +193,7 @@ impl WorldSpec {
     ///
     /// # Errors
     /// None for a checked spec.
-    pub(in crate::sim) fn true_scene(&self, drawn: &Scene) -> Result<Scene, SimError> {
+    pub(crate) fn true_scene(&self, drawn: &Scene) -> Result<Scene, SimError> {
         let (undrawn, _) = check_parts(&self.obstacle.0, Path::new("[world]"), "obstacle")?;
         let obstacles = drawn.obstacles.iter().cloned().chain(undrawn).collect();
         Ok(Scene { obstacles, ..*drawn })
@@ -310,8 +310,8 @@ mod tests {
     #[test]
     fn what_the_water_carries_is_the_arms_own_figure_unless_the_world_has_one() {
         for (arm, fraction) in [("titan4", 0.22), ("kraft-predator", 0.3625)] {
-            let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots").join(arm);
-            let robot = crate::robot::load(&folder).expect("the robot reads");
+            let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("robots").join(arm);
+            let robot = armcal_core::robot::load(&folder).expect("the robot reads");
             let spec = |text: &str| read(text).expect("valid").completed(&robot);
             assert_eq!(spec("").water.buoyancy(), fraction);
             assert_eq!(spec("[water]\nbuoyancy_fraction = 0.5").water.buoyancy(), 0.5);

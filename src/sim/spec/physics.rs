@@ -6,7 +6,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::{CheckedTable, table};
-use crate::robot::FileIssue;
+use armcal_core::robot::FileIssue;
 
 table!(
     /// The integrator and the rate of the truth's record.

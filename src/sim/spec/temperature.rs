@@ -6,7 +6,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::{CheckedTable, table};
-use crate::robot::FileIssue;
+use armcal_core::robot::FileIssue;
 
 /// The longest profile of the water.
 const MAX_POINTS: usize = 16;
@@ -98,7 +98,7 @@ impl TemperatureSpec {
     }
 
     /// The water at the start, at a depth.
-    pub(in crate::sim) fn water_at_c(&self, depth_m: f64) -> f64 {
+    pub(crate) fn water_at_c(&self, depth_m: f64) -> f64 {
         let (depths, temperatures) = (self.profile_depth_m.as_slice(), self.profile_c.as_slice());
         let deeper = depths.partition_point(|depth| *depth <= depth_m);
         match (deeper, temperatures.last()) {

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::{CheckedTable, DEG, table};
-use crate::robot::FileIssue;
+use armcal_core::robot::FileIssue;
 
 /// Where the vehicle's motion comes from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

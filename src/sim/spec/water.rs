@@ -5,7 +5,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::CheckedTable;
-use crate::robot::FileIssue;
+use armcal_core::robot::FileIssue;
 
 /// Sea water about the arm.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -59,7 +59,7 @@ impl Default for WaterSpec {
 
 impl WaterSpec {
     /// Weight of the displaced water over the arm's own: as set here, else none at all.
-    pub(in crate::sim) fn buoyancy(&self) -> f64 {
+    pub(crate) fn buoyancy(&self) -> f64 {
         self.buoyancy_fraction.unwrap_or(0.0)
     }
 }

@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::log::ros::Header;
-use crate::log::{RosMessage, RosSchema};
+use armcal_core::log::ros::Header;
+use armcal_core::log::{RosMessage, RosSchema};
 
 /// The header as TOML (robot, vehicle, seed, as-built values, `[world]`), once at the start.
 pub const WORLD: &str = "/truth/world";

@@ -14,9 +14,9 @@ pub use read::{Truth, read_truth};
 pub use record::TruthRecorder;
 
 use super::as_built::AsBuilt;
-use crate::spatial::{Base, Camera, Pose, Tool, Vehicle, World};
-use crate::streams::{JointAngles, SinkError};
-use crate::time::Stamp;
+use armcal_core::spatial::{Base, Camera, Pose, Tool, Vehicle, World};
+use armcal_core::streams::{JointAngles, SinkError};
+use armcal_core::time::Stamp;
 
 /// What holds for the whole run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

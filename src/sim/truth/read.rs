@@ -4,12 +4,12 @@ use std::path::Path;
 
 use super::messages::{self, Clearance, Contact, FaultMessage};
 use super::{TruthClearance, TruthContact, TruthFault, TruthHeader, TruthState};
-use crate::log::ros::{self, JointState, PoseStamped, StringMessage, Temperature};
-use crate::log::{Completeness, RawMessage, decode, for_each_raw};
-use crate::sim::error::SimError;
-use crate::spatial::{Base, Camera, Frame, Pose, Tool, Vehicle, World};
-use crate::streams::{JointAngles, MAX_JOINTS};
-use crate::time::Stamp;
+use crate::error::SimError;
+use armcal_core::log::ros::{self, JointState, PoseStamped, StringMessage, Temperature};
+use armcal_core::log::{Completeness, RawMessage, decode, for_each_raw};
+use armcal_core::spatial::{Base, Camera, Frame, Pose, Tool, Vehicle, World};
+use armcal_core::streams::{JointAngles, MAX_JOINTS};
+use armcal_core::time::Stamp;
 
 /// What truth.mcap holds.
 #[derive(Clone, Debug)]

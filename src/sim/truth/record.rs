@@ -5,11 +5,13 @@ use std::path::Path;
 
 use super::messages::{self, Clearance, Contact, FaultMessage};
 use super::{TruthClearance, TruthContact, TruthFault, TruthHeader, TruthSink, TruthState};
-use crate::log::ros::{Header, JointState, Pose as RosPose, PoseStamped, Quaternion, StringMessage, Temperature, Time};
-use crate::log::{LogError, RecordingHeader, RecordingWriter, RosMessage};
-use crate::spatial::{Frame, Pose};
-use crate::streams::SinkError;
-use crate::time::{SIMULATION_EPOCH, Stamp};
+use armcal_core::log::ros::{
+    Header, JointState, Pose as RosPose, PoseStamped, Quaternion, StringMessage, Temperature, Time,
+};
+use armcal_core::log::{LogError, RecordingHeader, RecordingWriter, RosMessage};
+use armcal_core::spatial::{Frame, Pose};
+use armcal_core::streams::SinkError;
+use armcal_core::time::{SIMULATION_EPOCH, Stamp};
 
 const BASE: &str = "base_link";
 

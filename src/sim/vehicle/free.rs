@@ -4,19 +4,19 @@ use nalgebra::{Isometry3, Matrix3, Vector3};
 
 use super::BaseState;
 use super::swell::{Axis, draw_axis, sum};
-use crate::robot::{FileIssue, Vehicle, VehicleDynamics};
-use crate::sim::dynamics::{Body, Force, HullDrag, Inertia, Motion, Multibody};
-use crate::sim::error::SimError;
-use crate::sim::fault::Knock;
-use crate::sim::spec::{VehicleMotionSpec, WaterSpec};
-use crate::streams::JointAngles;
+use crate::dynamics::{Body, Force, HullDrag, Inertia, Motion, Multibody};
+use crate::error::SimError;
+use crate::fault::Knock;
+use crate::spec::{VehicleMotionSpec, WaterSpec};
+use armcal_core::robot::{FileIssue, Vehicle, VehicleDynamics};
+use armcal_core::streams::JointAngles;
 
 /// How long a knock lasts, s: short against the vehicle's motion, long against a step.
 const KNOCK_S: f64 = 0.1;
 
 /// Thrusters, and what pushes the vehicle besides the water that it moves through.
 #[derive(Clone, Debug)]
-pub(in crate::sim) struct FreeVehicle {
+pub(crate) struct FreeVehicle {
     spec: VehicleMotionSpec,
     dynamics: VehicleDynamics,
     base_from_vehicle: Isometry3<f64>,
@@ -33,7 +33,7 @@ pub(in crate::sim) struct FreeVehicle {
 impl FreeVehicle {
     /// # Errors
     /// [`SimError::Spec`] for a vehicle without `[dynamics]`.
-    pub(in crate::sim) fn new(vehicle: &Vehicle, spec: &VehicleMotionSpec, seed: u64) -> Result<Self, SimError> {
+    pub(crate) fn new(vehicle: &Vehicle, spec: &VehicleMotionSpec, seed: u64) -> Result<Self, SimError> {
         let Some(dynamics) = vehicle.dynamics else {
             let problem = "is needed for a vehicle that floats free ([world.vehicle] motion = \"free\")";
             return Err(FileIssue::new(&vehicle.file, "dynamics", problem).into());
@@ -57,13 +57,7 @@ impl FreeVehicle {
 
     /// The vehicle as body 0 of the system, ballasted so that it floats level with the arm as it is now: its displacement
     /// carries vehicle and arm, and the centre of buoyancy lies above the common centre of weight.
-    pub(in crate::sim) fn body(
-        &self,
-        vehicle: &Vehicle,
-        water: &WaterSpec,
-        arm: &Multibody,
-        angles: &JointAngles,
-    ) -> Body {
+    pub(crate) fn body(&self, vehicle: &Vehicle, water: &WaterSpec, arm: &Multibody, angles: &JointAngles) -> Body {
         let d = &self.dynamics;
         let to_base = &self.base_from_vehicle;
         let diagonal = |v: &[f64; 3]| Matrix3::from_diagonal(&Vector3::from(*v));
@@ -93,12 +87,12 @@ impl FreeVehicle {
     }
 
     /// Something hits the vehicle.
-    pub(in crate::sim) fn knock(&mut self, t_s: f64, knock: &Knock) {
+    pub(crate) fn knock(&mut self, t_s: f64, knock: &Knock) {
         self.knock = Some((t_s, *knock));
     }
 
     /// What acts on the vehicle in the step from `t_s`, about the base's origin in base axes.
-    pub(in crate::sim) fn force(&mut self, t_s: f64, step_s: f64, base: &BaseState) -> Force {
+    pub(crate) fn force(&mut self, t_s: f64, step_s: f64, base: &BaseState) -> Force {
         self.keep_station(step_s, base);
         let mut total = self.thrust;
         for (slot, axis) in total.iter_mut().zip(&self.wobble) {

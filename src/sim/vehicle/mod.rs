@@ -20,7 +20,7 @@ use super::dynamics::Motion;
 use super::fault::Knock;
 use super::recorded::RecordedMotion;
 use super::spec::VehicleMotionSpec;
-use crate::spatial::{Base, Pose, Vehicle, World};
+use armcal_core::spatial::{Base, Pose, Vehicle, World};
 
 /// Standard gravity, m/s2.
 pub(super) const GRAVITY_M_S2: f64 = 9.806_65;

@@ -8,14 +8,14 @@ use nalgebra::Vector3;
 use rand::RngExt;
 
 use super::GRAVITY_M_S2;
-use crate::sim::spec::WaterSpec;
-use crate::stats::stream_rng;
+use crate::spec::WaterSpec;
+use armcal_core::stats::stream_rng;
 
 const N_WAVES: usize = 16;
 
 /// Current and waves.
 #[derive(Clone, Debug)]
-pub(in crate::sim) struct Sea {
+pub(crate) struct Sea {
     current: Vector3<f64>,
     /// Horizontal direction in which the waves run, unit.
     heading: Vector3<f64>,
@@ -32,7 +32,7 @@ struct Wave {
 
 /// The water's motion against the world, in world axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(in crate::sim) struct WaterMotion {
+pub(crate) struct WaterMotion {
     /// m/s.
     pub velocity: Vector3<f64>,
     /// m/s2.
@@ -40,14 +40,14 @@ pub(in crate::sim) struct WaterMotion {
 }
 
 impl Sea {
-    pub(in crate::sim) fn new(spec: &WaterSpec, seed: u64) -> Self {
+    pub(crate) fn new(spec: &WaterSpec, seed: u64) -> Self {
         let (sin, cos) = spec.wave_direction_rad.sin_cos();
         let waves = if spec.wave_height_m > 0.0 { draw_waves(spec, seed) } else { Vec::new() };
         Self { current: Vector3::from(spec.current_m_s), heading: Vector3::new(cos, sin, 0.0), waves }
     }
 
     /// The water at `t_s`; z is up.
-    pub(in crate::sim) fn at(&self, t_s: f64) -> WaterMotion {
+    pub(crate) fn at(&self, t_s: f64) -> WaterMotion {
         let mut motion = WaterMotion { velocity: self.current, acceleration: Vector3::zeros() };
         for wave in &self.waves {
             let (sin, cos) = (wave.rate_rad_s * t_s + wave.phase_rad).sin_cos();

@@ -8,8 +8,8 @@ use nalgebra::{UnitQuaternion, Vector3};
 use rand::RngExt;
 
 use super::VehicleJet;
-use crate::sim::spec::VehicleMotionSpec;
-use crate::stats::stream_rng;
+use crate::spec::VehicleMotionSpec;
+use armcal_core::stats::stream_rng;
 
 const N_SINUSOIDS: usize = 6;
 const AXES: [&str; 6] = ["x", "y", "z", "roll", "pitch", "yaw"];

@@ -3,9 +3,9 @@
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use super::World;
-use crate::sim::fault::{Fault, Knock, ScheduledFault};
-use crate::sim::truth::TruthFault;
-use crate::streams::ArmError;
+use crate::fault::{Fault, Knock, ScheduledFault};
+use crate::truth::TruthFault;
+use armcal_core::streams::ArmError;
 
 /// Times are met to this, s: whole periods are not exact in binary.
 const SAME_TIME_S: f64 = 1e-9;

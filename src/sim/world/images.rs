@@ -3,9 +3,9 @@
 use nalgebra::Isometry3;
 
 use super::World;
-use crate::sim::sensors::camera::{ArmMotion, Exposed, Moment, Places};
-use crate::streams::{ArmError, CameraImage, DetectionRejects, Message};
-use crate::time::Stamp;
+use crate::sensors::camera::{ArmMotion, Exposed, Moment, Places};
+use armcal_core::streams::{ArmError, CameraImage, DetectionRejects, Message};
+use armcal_core::time::Stamp;
 
 impl World {
     /// The shutter closes now.

@@ -1,8 +1,8 @@
 //! The gripper in step with the world: it moves once in a control period and tells its gap when that changes.
 
 use super::{SLOW_PERIODS, World};
-use crate::sim::spec::CONTROL_PERIOD_S;
-use crate::streams::{ArmError, GripperSample, Message};
+use crate::spec::CONTROL_PERIOD_S;
+use armcal_core::streams::{ArmError, GripperSample, Message};
 
 /// While the jaws move, their gap is told each so many periods: 25 Hz.
 const TOLD_EVERY: u64 = 4;

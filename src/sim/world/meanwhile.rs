@@ -1,8 +1,8 @@
 //! What happens to a world besides being driven: time passes at rest.
 
 use super::{AWAKE_S, SLOW_PERIODS, World, sample_pots, surroundings};
-use crate::sim::spec::CONTROL_PERIOD_S;
-use crate::streams::{Arm, ArmError, JointSensorSample, Message, Sink};
+use crate::spec::CONTROL_PERIOD_S;
+use armcal_core::streams::{Arm, ArmError, JointSensorSample, Message, Sink};
 
 /// Length of a skipped stride, s.
 const STRIDE_S: f64 = SLOW_PERIODS as f64 * CONTROL_PERIOD_S;

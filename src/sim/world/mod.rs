@@ -31,11 +31,11 @@ use super::solids::Solids;
 use super::spec::{CONTROL_PERIOD_S, MotionKind, WorldSpec};
 use super::truth::{TruthClearance, TruthContact, TruthHeader, TruthSink, TruthState};
 use super::vehicle::{BaseState, FreeVehicle, Sea, VehicleMotion, WaterMotion};
-use crate::robot::{Robot, Vehicle};
-use crate::routine::Scene;
-use crate::spatial::Pose;
-use crate::streams::{Arm, ArmError, JointCounts, JointSensorSample, MAX_JOINTS, Message, Sink, Thermometer};
-use crate::time::{SIMULATION_EPOCH, Stamp};
+use armcal_core::robot::{Robot, Vehicle};
+use armcal_core::routine::Scene;
+use armcal_core::spatial::Pose;
+use armcal_core::streams::{Arm, ArmError, JointCounts, JointSensorSample, MAX_JOINTS, Message, Sink, Thermometer};
+use armcal_core::time::{SIMULATION_EPOCH, Stamp};
 
 const ATTITUDE_PERIODS: u64 = 5;
 const SLOW_PERIODS: u64 = 100;

@@ -3,17 +3,17 @@
 use std::path::Path;
 
 use super::WorldInput;
-use crate::robot::{FileIssue, Robot};
-use crate::sim::as_built::AsBuilt;
-use crate::sim::error::SimError;
-use crate::sim::hydraulics::{ActuatorInput, Hydraulics};
-use crate::sim::sensors::Surroundings;
-use crate::sim::sensors::joint::{JointInput, JointSensor};
-use crate::sim::sensors::temperatures::Temperatures;
-use crate::sim::sensors::thermometer::gauge_pressure_pa;
-use crate::sim::spec::WorldSpec;
-use crate::sim::truth::TruthHeader;
-use crate::streams::{JointAngles, JointCounts};
+use crate::as_built::AsBuilt;
+use crate::error::SimError;
+use crate::hydraulics::{ActuatorInput, Hydraulics};
+use crate::sensors::Surroundings;
+use crate::sensors::joint::{JointInput, JointSensor};
+use crate::sensors::temperatures::Temperatures;
+use crate::sensors::thermometer::gauge_pressure_pa;
+use crate::spec::WorldSpec;
+use crate::truth::TruthHeader;
+use armcal_core::robot::{FileIssue, Robot};
+use armcal_core::streams::{JointAngles, JointCounts};
 
 /// An arm that starts nearer to an end stop than this starts at this distance, rad.
 const END_STOP_MARGIN_RAD: f64 = 1e-3;
@@ -49,7 +49,7 @@ pub(super) fn surroundings(spec: &WorldSpec, temperatures: &Temperatures, t_s: f
 ///
 /// # Errors
 /// [`SimError::Spec`] with the longest step; what [`actuators`] says.
-pub(in crate::sim) fn check_step(spec: &WorldSpec, robot: &Robot, file: &Path) -> Result<(), SimError> {
+pub(crate) fn check_step(spec: &WorldSpec, robot: &Robot, file: &Path) -> Result<(), SimError> {
     let longest_s = Hydraulics::new(&spec.hydraulics, &actuators(robot)?, spec.physics.step_s).longest_step_s();
     if spec.physics.step_s <= longest_s {
         return Ok(());

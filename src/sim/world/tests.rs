@@ -3,10 +3,10 @@
 use std::path::Path;
 
 use super::*;
-use crate::robot::{load, load_vehicle};
-use crate::streams::JointAngles;
+use armcal_core::robot::{load, load_vehicle};
+use armcal_core::streams::JointAngles;
 
-const ROOT: &str = env!("CARGO_MANIFEST_DIR");
+const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
 
 fn world(spec: WorldSpec, seed: u64) -> World {
     let robot = load(&Path::new(ROOT).join("robots/titan4")).expect("the robot reads");
@@ -44,7 +44,7 @@ fn a_locked_valve_does_not_creep() {
 
 fn floating(change: impl Fn(&mut WorldSpec)) -> World {
     let mut spec = WorldSpec::default();
-    spec.vehicle.motion = crate::sim::spec::MotionKind::Free;
+    spec.vehicle.motion = crate::spec::MotionKind::Free;
     change(&mut spec);
     world(spec, 3)
 }
@@ -81,7 +81,7 @@ fn a_free_vehicle_floats_level_and_keeps_its_station() {
 fn a_free_vehicle_takes_the_impulse_of_a_knock() {
     let mut world = floating(|spec| spec.vehicle.station_keeping_rad_s = 0.0);
     let added_kg = world.vehicle.dynamics.expect("figures of the vehicle").added_mass_kg[0];
-    let knock = crate::sim::fault::Knock { impulse_n_s: [800.0, 0.0, 0.0], angular_impulse_n_m_s: [0.0; 3] };
+    let knock = crate::fault::Knock { impulse_n_s: [800.0, 0.0, 0.0], angular_impulse_n_m_s: [0.0; 3] };
     world.free.as_mut().expect("it floats").knock(0.0, &knock);
     for _ in 0..60 {
         world.physics_step(&[0.0; MAX_JOINTS]).expect("it steps");
@@ -110,7 +110,7 @@ fn the_arm_rocks_the_vehicle_that_carries_it() {
         }
         largest
     };
-    let (free, held) = (rocked(crate::sim::spec::MotionKind::Free), rocked(crate::sim::spec::MotionKind::Swell));
+    let (free, held) = (rocked(crate::spec::MotionKind::Free), rocked(crate::spec::MotionKind::Swell));
     eprintln!("the arm turns the vehicle at up to {:.3} deg/s", free.to_degrees());
     assert_eq!(held, 0.0);
     assert!((0.05_f64..10.0).contains(&free.to_degrees()), "{free}");
@@ -133,7 +133,7 @@ fn it_starts_in_equilibrium() {
 #[test]
 fn the_sensors_start_stowed() {
     let world = world(WorldSpec::default(), 3);
-    let nominal = crate::sensor::ArmSensors::nominal(&world.robot).angles(&world.measured);
+    let nominal = armcal_core::sensor::ArmSensors::nominal(&world.robot).angles(&world.measured);
     // Noise of 1.5 counts at 46 counts per degree, four sigma.
     assert!(nominal.max_abs_difference(&world.robot.stowed) < 6.5_f64.to_radians() / 46.0);
     assert!(world.physics.angles().max_abs_difference(&world.robot.stowed) > 0.01, "the arm itself is elsewhere");
@@ -155,7 +155,7 @@ type Place = (JointAngles, nalgebra::Vector3<f64>);
 fn driven(step_s: f64, seed: u64) -> (Vec<Place>, Vec<Place>) {
     struct Nothing;
     impl Sink for Nothing {
-        fn record(&mut self, _: Stamp, _: &Message) -> Result<(), crate::streams::SinkError> {
+        fn record(&mut self, _: Stamp, _: &Message) -> Result<(), armcal_core::streams::SinkError> {
             Ok(())
         }
     }
@@ -164,7 +164,7 @@ fn driven(step_s: f64, seed: u64) -> (Vec<Place>, Vec<Place>) {
     let mut spec = WorldSpec::default();
     spec.physics.step_s = step_s;
     let mut world = world(spec, seed);
-    let sensors = crate::sensor::ArmSensors::nominal(&world.robot);
+    let sensors = armcal_core::sensor::ArmSensors::nominal(&world.robot);
     let stowed = world.robot.stowed;
     let (mut on_the_way, mut at_rest, mut from) = (Vec::new(), Vec::new(), stowed);
     for shift in MOVES {

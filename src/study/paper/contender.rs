@@ -1,8 +1,8 @@
 //! A method with its settings.
 
 use super::scene::{Draw, Guess, Setting};
-use crate::calib::bundle::{BundleInput, Evidence, Model, Scales, estimate};
-use crate::calib::{
+use armcal_belief::calib::bundle::{BundleInput, Evidence, Model, Scales, estimate};
+use armcal_belief::calib::{
     Gauge, JointParameters, Parameter, ParameterKind, PositionMethod, PositionProblem, Scaling, SearchOptions,
     Solution, SolveOutcome,
 };

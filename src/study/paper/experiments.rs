@@ -2,7 +2,7 @@
 
 use super::contender::{Contender, Solver};
 use super::scene::{Guess, Readings, Setting, Sight};
-use crate::calib::{Gauge, PositionMethod, SearchOptions};
+use armcal_belief::calib::{Gauge, PositionMethod, SearchOptions};
 
 /// How many draws.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -6,9 +6,9 @@ use super::PaperStudyError;
 use super::contender::Contender;
 use super::scene::{Draw, Setting};
 use super::trials::PaperRow;
-use crate::calib::{Gauge, JointParameters};
-use crate::robot::Robot;
-use crate::study::charts::{Axis, Panel, Series, Style, svg};
+use crate::charts::{Axis, Panel, Series, Style, svg};
+use armcal_belief::calib::{Gauge, JointParameters};
+use armcal_core::robot::Robot;
 
 /// Views in the picture of the clouds.
 const CLOUD_VIEWS: usize = 20;
@@ -102,7 +102,7 @@ fn tool_positions(draw: &Draw, setting: &Setting) -> [Panel; 2] {
     [Contender::minimum_variance(Gauge::Free), Contender::minimum_distance()].map(|contender| {
         let solution = contender.solve(draw, setting, &mut |_| {});
         let series = |name: &str, believed: Option<&JointParameters>| {
-            let place = |angles: &crate::joints::JointAngles| {
+            let place = |angles: &armcal_core::joints::JointAngles| {
                 let tool = draw.tool_m(&believed.map_or(*angles, |believed| draw.taken_for(angles, believed)));
                 [tool.x, tool.y]
             };
@@ -128,7 +128,7 @@ fn clouds(draw: &Draw, setting: &Setting) -> [Panel; 2] {
     let solution = Contender::minimum_variance(Gauge::Free).solve(draw, setting, &mut |_| {});
     let series = |name: &str, believed: &JointParameters| {
         let seen = draw.views.iter().take(CLOUD_VIEWS).flat_map(|view| {
-            let angles = crate::joints::JointAngles::from_fn(view.travel_rad.len(), |joint| {
+            let angles = armcal_core::joints::JointAngles::from_fn(view.travel_rad.len(), |joint| {
                 let center_rad = draw.robot.sensors[joint].center_rad;
                 center_rad + believed.gain[joint] * view.travel_rad[joint] + believed.offset_rad[joint]
             });

@@ -6,12 +6,12 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::PaperStudyError;
-use crate::calib::{JointParameters, Measured, Parameter, ParameterKind, TagView, View};
-use crate::joints::JointAngles;
-use crate::robot::{Robot, SurveyedTag, TagSurvey};
-use crate::spatial::Pose;
-use crate::stats::stream_rng;
-use crate::time::SIMULATION_EPOCH;
+use armcal_belief::calib::{JointParameters, Measured, Parameter, ParameterKind, TagView, View};
+use armcal_core::joints::JointAngles;
+use armcal_core::robot::{Robot, SurveyedTag, TagSurvey};
+use armcal_core::spatial::Pose;
+use armcal_core::stats::stream_rng;
+use armcal_core::time::SIMULATION_EPOCH;
 
 /// What a reading is made of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -3,11 +3,11 @@
 use std::path::Path;
 
 use super::*;
-use crate::calib::Gauge;
-use crate::robot::{Robot, load};
+use armcal_belief::calib::Gauge;
+use armcal_core::robot::{Robot, load};
 
 fn titan() -> Robot {
-    load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/titan4")).expect("the robot reads")
+    load(&Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("robots/titan4")).expect("the robot reads")
 }
 
 fn rows_of(name: &str) -> Vec<PaperRow> {

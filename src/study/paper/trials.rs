@@ -7,9 +7,9 @@ use super::PaperStudyError;
 use super::contender::Contender;
 use super::experiments::Experiment;
 use super::scene::{Draw, Setting};
-use crate::calib::{PositionProblem, SolveOutcome, fisher_information};
-use crate::robot::Robot;
-use crate::stats::quantile;
+use armcal_belief::calib::{PositionProblem, SolveOutcome, fisher_information};
+use armcal_core::robot::Robot;
+use armcal_core::stats::quantile;
 
 /// One contender over all draws of a setting.
 #[derive(Clone, Debug, PartialEq)]
@@ -89,7 +89,7 @@ fn pair(
     Ok(Paired {
         trials: contenders.iter().map(trial).collect(),
         bound_m2: (setting.noise_m > 0.0).then(|| bound_m2(&draw, setting.noise_m)).flatten(),
-        before_m: draw.tool_rms_m(&crate::calib::JointParameters::default()),
+        before_m: draw.tool_rms_m(&armcal_belief::calib::JointParameters::default()),
     })
 }
 

@@ -8,16 +8,16 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 use super::normal;
-use crate::calib::{Measured, SeenCorners, TagView, View};
-use crate::joints::MAX_JOINTS;
-use crate::optics::square_corners;
-use crate::plan::{ClearanceModel, PosePlan, VisibilityModel};
-use crate::robot::Robot;
-use crate::sensor::{ArmSensors, Conditions};
-use crate::sim::{AsBuilt, WorldSpec};
-use crate::spatial::{Camera, Link, Pose};
-use crate::streams::JointAngles;
-use crate::time::SIMULATION_EPOCH;
+use armcal_belief::calib::{Measured, SeenCorners, TagView, View};
+use armcal_belief::plan::{ClearanceModel, PosePlan, VisibilityModel};
+use armcal_core::joints::MAX_JOINTS;
+use armcal_core::optics::square_corners;
+use armcal_core::robot::Robot;
+use armcal_core::sensor::{ArmSensors, Conditions};
+use armcal_core::spatial::{Camera, Link, Pose};
+use armcal_core::streams::JointAngles;
+use armcal_core::time::SIMULATION_EPOCH;
+use armcal_sim::{AsBuilt, WorldSpec};
 
 /// Where the controller leaves a joint, one sigma. Assumed: of the world's 0.05 deg.
 const REST_STD_RAD: f64 = 0.0005;

@@ -11,17 +11,17 @@ mod report;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
-use crate::calib::bundle::{BundleInput, Estimate, Evidence, Scales, estimate, model_for, reference};
-use crate::calib::{JointParameters, ParameterCovariance, View};
-use crate::plan::{
+use arm::TrueArm;
+use armcal_belief::calib::bundle::{BundleInput, Estimate, Evidence, Scales, estimate, model_for, reference};
+use armcal_belief::calib::{JointParameters, ParameterCovariance, View};
+use armcal_belief::plan::{
     ClearanceModel, JointErrorBounds, PlanError, PosePool, PoseRequest, TargetRequest, VisibilityModel, plan_targets,
 };
-use crate::robot::{Robot, Vehicle};
-use crate::routine::{CaptureSettings, PoseCriterion, Routine, Step};
-use crate::sim::WorldSpec;
-use crate::stats::stream_rng;
-use crate::streams::{JointAngles, MAX_JOINTS};
-use arm::TrueArm;
+use armcal_core::robot::{Robot, Vehicle};
+use armcal_core::routine::{CaptureSettings, PoseCriterion, Routine, Step};
+use armcal_core::stats::stream_rng;
+use armcal_core::streams::{JointAngles, MAX_JOINTS};
+use armcal_sim::WorldSpec;
 
 pub use report::{poses_csv, poses_figure, poses_table};
 

@@ -3,9 +3,9 @@
 use std::fmt::Write as _;
 
 use super::{CRITERIA, POSES, PoseRow};
-use crate::routine::PoseCriterion;
-use crate::stats::quantile;
-use crate::study::charts::{Axis, Panel, Series, Style, svg};
+use crate::charts::{Axis, Panel, Series, Style, svg};
+use armcal_core::routine::PoseCriterion;
+use armcal_core::stats::quantile;
 
 /// Tool errors whose cost in poses and time the table gives, m.
 const TOLERANCES_M: [f64; 4] = [0.004, 0.003, 0.0025, 0.002];

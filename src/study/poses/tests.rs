@@ -5,8 +5,8 @@ use std::path::Path;
 use super::*;
 
 fn rows(seeds: std::ops::Range<u64>) -> Vec<PoseRow> {
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("routines/titan4-quickstart.toml");
-    let routine = crate::routine::load(&file).expect("the routine reads");
+    let file = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("routines/titan4-quickstart.toml");
+    let routine = armcal_core::routine::load(&file).expect("the routine reads");
     let (robot, vehicle) = routine.load_arm().expect("the robot reads");
     pose_study(&routine, (&robot, &vehicle), &WorldSpec::default(), seeds).expect("a study")
 }
@@ -17,7 +17,7 @@ fn chosen_poses_need_fewer_views_and_less_time_than_random_ones() {
     assert_eq!(rows.len(), 6 * CRITERIA.len() * POSES.len());
     let median = |criterion: PoseCriterion, poses: usize, f: fn(&PoseRow) -> f64| {
         let of: Vec<f64> = rows.iter().filter(|r| r.criterion == criterion && r.poses == poses).map(f).collect();
-        crate::stats::quantile(&of, 0.5).expect("rows")
+        armcal_core::stats::quantile(&of, 0.5).expect("rows")
     };
     // 0.6 of the poses leave no more error, and take less time.
     let (chosen, random) = (PoseCriterion::ToolError, PoseCriterion::Random);

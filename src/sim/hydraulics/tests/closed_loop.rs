@@ -6,11 +6,11 @@ use rand::RngExt;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::*;
-use crate::robot::JointSensorSpec;
-use crate::sim::controller::Controller;
-use crate::sim::spec::CONTROL_PERIOD_S;
-use crate::stats::stream_rng;
-use crate::streams::JointCounts;
+use crate::controller::Controller;
+use crate::spec::CONTROL_PERIOD_S;
+use armcal_core::robot::JointSensorSpec;
+use armcal_core::stats::stream_rng;
+use armcal_core::streams::JointCounts;
 
 const COUNTS_PER_RAD: f64 = 46.0 * 180.0 / std::f64::consts::PI;
 const WRAP_COUNTS: f64 = 65_536.0;
@@ -21,7 +21,7 @@ const LIMIT_RAD: f64 = 0.05 * std::f64::consts::PI / 180.0;
 const WRIST: ActuatorInput = ActuatorInput { limits: None, torque_max_n_m: 170.0, rate_limit_rad_s: 1.5 };
 
 fn sensor(max_rate_rad_s: f64) -> JointSensorSpec {
-    JointSensorSpec { noise_std_counts: 2.0, ..JointSensorSpec::exact(COUNTS_PER_RAD, max_rate_rad_s) }
+    JointSensorSpec { noise_std_counts: 2.0, ..crate::fixture::exact_sensor(COUNTS_PER_RAD, max_rate_rad_s) }
 }
 
 /// One joint under a load of `load_ratio` of its torque, which the vehicle rocks by a hundredth.

@@ -6,9 +6,9 @@
 use nalgebra::{Vector2, Vector3};
 
 use super::port::{Port, WATER_INDEX};
-use crate::optics::Fisheye;
-use crate::sim::as_built::AsBuilt;
-use crate::sim::spec::{CameraWorldSpec, PortKind};
+use crate::as_built::AsBuilt;
+use crate::spec::{CameraWorldSpec, PortKind};
+use armcal_core::optics::Fisheye;
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Eye {

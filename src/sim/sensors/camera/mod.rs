@@ -18,26 +18,26 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::kinematics::{Attachment, Chain};
-use crate::optics::CornerNoise;
-use crate::robot::Robot;
-use crate::sim::as_built::AsBuilt;
-use crate::sim::error::SimError;
-use crate::sim::imaging::TagPlane;
-use crate::sim::places::BodyPoses;
-use crate::sim::solids::Solids;
-use crate::sim::spec::{CameraMode, CameraWorldSpec, ClockSpec, CornerNoiseKind, WaterKind, WorldSpec};
-use crate::stats::stream_rng;
-use crate::streams::{DetectionReject, JointAngles, TagDetection, TagDetections};
-use crate::time::{SIMULATION_EPOCH, Stamp};
+use crate::as_built::AsBuilt;
+use crate::error::SimError;
+use crate::imaging::TagPlane;
+use crate::places::BodyPoses;
+use crate::solids::Solids;
+use crate::spec::{CameraMode, CameraWorldSpec, ClockSpec, CornerNoiseKind, WaterKind, WorldSpec};
+use armcal_core::kinematics::{Attachment, Chain};
+use armcal_core::optics::CornerNoise;
+use armcal_core::robot::Robot;
+use armcal_core::stats::stream_rng;
+use armcal_core::streams::{DetectionReject, JointAngles, TagDetection, TagDetections};
+use armcal_core::time::{SIMULATION_EPOCH, Stamp};
 use eye::Eye;
-pub(in crate::sim) use rendered::RenderInput;
+pub(crate) use rendered::RenderInput;
 use rendered::{Read, Rendered, Scenario};
-pub(in crate::sim) use scenery::Places;
+pub(crate) use scenery::Places;
 use view::{Sight, TagInBase, TagOnLink};
 
 #[derive(Debug)]
-pub(in crate::sim) struct WristCamera {
+pub(crate) struct WristCamera {
     spec: CameraWorldSpec,
     clock: ClockSpec,
     eye: Eye,
@@ -83,7 +83,7 @@ impl TagDraws {
 
 /// What the camera is made from.
 #[derive(Clone, Copy)]
-pub(in crate::sim) struct CameraInput<'a> {
+pub(crate) struct CameraInput<'a> {
     pub robot: &'a Robot,
     pub built: &'a AsBuilt,
     pub solids: &'a Solids,
@@ -93,7 +93,7 @@ pub(in crate::sim) struct CameraInput<'a> {
 
 /// How the joints move while the shutter is open.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::sim) struct ArmMotion<'a> {
+pub(crate) struct ArmMotion<'a> {
     pub chain: &'a Chain,
     pub angles: JointAngles,
     /// rad/s.
@@ -102,7 +102,7 @@ pub(in crate::sim) struct ArmMotion<'a> {
 
 /// When the shutter closes.
 #[derive(Clone, Copy)]
-pub(in crate::sim) struct Moment<'a> {
+pub(crate) struct Moment<'a> {
     pub places: Places<'a>,
     /// Placed for it.
     pub solids: &'a Solids,
@@ -114,7 +114,7 @@ pub(in crate::sim) struct Moment<'a> {
 
 /// An image as it arrives.
 #[derive(Clone, Debug)]
-pub(in crate::sim) struct Exposed {
+pub(crate) struct Exposed {
     pub arrival: Stamp,
     pub detections: TagDetections,
     pub rejects: Vec<DetectionReject>,
@@ -122,7 +122,7 @@ pub(in crate::sim) struct Exposed {
 }
 
 impl WristCamera {
-    pub(in crate::sim) fn new(input: &CameraInput) -> Self {
+    pub(crate) fn new(input: &CameraInput) -> Self {
         let CameraInput { robot, built, solids, spec, seed } = *input;
         let mut tags: Vec<TagInBase> = built
             .tags
@@ -164,7 +164,7 @@ impl WristCamera {
     ///
     /// # Errors
     /// [`SimError`] where there is no light, or no detector.
-    pub(in crate::sim) fn render(&mut self, input: &RenderInput) -> Result<(), SimError> {
+    pub(crate) fn render(&mut self, input: &RenderInput) -> Result<(), SimError> {
         if input.spec.camera.mode == CameraMode::Rendered {
             self.rendered = Some(Box::new(Rendered::new(input, &self.eye)?));
         }
@@ -172,29 +172,29 @@ impl WristCamera {
     }
 
     /// Where the camera truly is.
-    pub(in crate::sim) fn base_from_camera(&self, links: &BodyPoses) -> Isometry3<f64> {
+    pub(crate) fn base_from_camera(&self, links: &BodyPoses) -> Isometry3<f64> {
         links.frame(&self.mount)
     }
 
     /// A tag falls off.
-    pub(in crate::sim) fn lose(&mut self, id: u32) {
+    pub(crate) fn lose(&mut self, id: u32) {
         self.lost.insert(id);
     }
 
     /// A tag is knocked out of its place; `motion` in its own axes.
-    pub(in crate::sim) fn move_tag(&mut self, id: u32, motion: Isometry3<f64>) {
+    pub(crate) fn move_tag(&mut self, id: u32, motion: Isometry3<f64>) {
         for tag in self.tags.iter_mut().filter(|tag| tag.id == id) {
             tag.base_from_tag *= motion;
         }
     }
 
     /// The detector takes a tag for another one from now on.
-    pub(in crate::sim) fn misread(&mut self, id: u32, as_id: u32) {
+    pub(crate) fn misread(&mut self, id: u32, as_id: u32) {
         self.misread.insert(id, as_id);
     }
 
     /// Silt hides everything until then.
-    pub(in crate::sim) fn blind(&mut self, until: Stamp) {
+    pub(crate) fn blind(&mut self, until: Stamp) {
         self.blind_until = Some(until);
     }
 
@@ -202,7 +202,7 @@ impl WristCamera {
     ///
     /// # Errors
     /// [`SimError`] when the detector or the compression fails.
-    pub(in crate::sim) fn take(&mut self, moment: &Moment) -> Result<Option<Exposed>, SimError> {
+    pub(crate) fn take(&mut self, moment: &Moment) -> Result<Option<Exposed>, SimError> {
         let Moment { places, solids, motion, closed, is_wanted } = *moment;
         let Some(mut rendered) = self.rendered.take() else {
             let (arrival, detections) = self.expose(places.links, solids, &motion, closed);
@@ -250,7 +250,7 @@ impl WristCamera {
 
     /// Takes an image whose shutter closes at `closed`; `solids` must be placed for `links`. Gives the time of its arrival,
     /// late with jitter, and the image, whose stamp is that by the camera's own clock.
-    pub(in crate::sim) fn expose(
+    pub(crate) fn expose(
         &mut self,
         links: &BodyPoses,
         solids: &Solids,

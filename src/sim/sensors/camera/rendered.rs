@@ -6,18 +6,18 @@ use nalgebra::{Isometry3, Unit, Vector3};
 
 use super::eye::Eye;
 use super::scenery::{Places, Scenery};
-use crate::detect::{DetectorSettings, GreyImage, TagDetector};
-use crate::robot::{FileIssue, Robot, Vehicle};
-use crate::routine::Scene;
-use crate::sim::error::SimError;
-use crate::sim::imaging::{Frame, Imager, Light, Shot, TagPlane};
-use crate::sim::spec::{ImageSpec, WorldSpec};
-use crate::streams::{DetectionReject, TagDetection};
-use crate::time::Stamp;
+use crate::error::SimError;
+use crate::imaging::{Frame, Imager, Light, Shot, TagPlane};
+use crate::spec::{ImageSpec, WorldSpec};
+use armcal_core::robot::{FileIssue, Robot, Vehicle};
+use armcal_core::routine::Scene;
+use armcal_core::streams::{DetectionReject, TagDetection};
+use armcal_core::time::Stamp;
+use armcal_detect::{DetectorSettings, GreyImage, TagDetector};
 
 /// What a rendered camera is made from, besides the camera's own.
 #[derive(Clone, Copy)]
-pub(in crate::sim) struct RenderInput<'a> {
+pub(crate) struct RenderInput<'a> {
     pub robot: &'a Robot,
     pub vehicle: &'a Vehicle,
     pub scene: &'a Scene,
@@ -71,7 +71,7 @@ impl Rendered {
             return Err(FileIssue::new(&vehicle.file, "light", problem).into());
         }
         let base_from_vehicle = *vehicle.vehicle_from_base.inverse().isometry();
-        let light = |light: &crate::robot::VehicleLight| Light {
+        let light = |light: &armcal_core::robot::VehicleLight| Light {
             position_m: base_from_vehicle * light.position_m,
             direction: Unit::new_normalize(base_from_vehicle * light.direction.into_inner()),
             flux_lm: light.flux_lm,

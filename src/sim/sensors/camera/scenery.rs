@@ -2,12 +2,12 @@
 
 use nalgebra::{Isometry3, Point3};
 
-use crate::robot::{PlacedShape, Robot, Vehicle, parry_pose};
-use crate::routine::Scene;
-use crate::sim::convert::to_rapier;
-use crate::sim::imaging::SolidShape;
-use crate::sim::places::BodyPoses;
-use crate::sim::solids::{Carrier, HOUSING_M, seafloor};
+use crate::convert::to_rapier;
+use crate::imaging::SolidShape;
+use crate::places::BodyPoses;
+use crate::solids::{Carrier, HOUSING_M, seafloor};
+use armcal_core::robot::{PlacedShape, Robot, Vehicle, parry_pose};
+use armcal_core::routine::Scene;
 
 /// Solid shapes, and what each is fixed to.
 #[derive(Clone, Debug, Default)]
@@ -26,7 +26,7 @@ struct Fixed {
 
 /// Where everything is that moves.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::sim) struct Places<'a> {
+pub(crate) struct Places<'a> {
     pub links: &'a BodyPoses,
     pub base_from_world: Isometry3<f64>,
     /// Shifts of the jaws from where they are drawn, on their link.

@@ -5,10 +5,10 @@ use std::path::Path;
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 
 use super::*;
-use crate::optics::{Fisheye, square_corners};
-use crate::robot::{load, load_vehicle};
-use crate::routine::Scene;
-use crate::sim::spec::PortKind;
+use crate::spec::PortKind;
+use armcal_core::optics::{Fisheye, square_corners};
+use armcal_core::robot::{load, load_vehicle};
+use armcal_core::routine::Scene;
 
 mod rendered;
 
@@ -22,7 +22,7 @@ struct Site {
 
 /// The stowed arm with exact sensors and a detector without noise, and what `change` makes of it.
 fn site(change: impl FnOnce(&mut WorldSpec)) -> Site {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots");
+    let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("robots");
     let vehicle = load_vehicle(&root.join("vehicles/work-class-front.toml")).expect("it reads");
     let robot = load(&root.join("titan4")).expect("it reads").mounted_on(&vehicle).expect("it fits");
     let mut spec = WorldSpec::default();
@@ -84,7 +84,7 @@ fn an_instant_shows_where_the_corners_are() {
 fn the_tag_on_the_gripper_turns_with_the_last_joint_until_the_wrist_hides_it() {
     let mut with = site(|spec| spec.camera.corner_noise_px = 0.3);
     let without = with.image(&mut with.camera(), 0.0, 1.0).1;
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots");
+    let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("robots");
     with.robot.gripper_tag = load(&root.join("titan4-gripper-tag")).expect("it reads").gripper_tag;
     with.built = AsBuilt::draw(&with.robot, &with.spec, 4);
     let tag = with.robot.gripper_tag.expect("a tag");

@@ -3,11 +3,11 @@
 use nalgebra::{Isometry3, Point3, Vector2, Vector3};
 
 use super::eye::Eye;
-use crate::kinematics::Attachment;
-use crate::optics::{CornerNoise, square_corners};
-use crate::sim::places::BodyPoses;
-use crate::sim::solids::Solids;
-use crate::sim::spec::CameraWorldSpec;
+use crate::places::BodyPoses;
+use crate::solids::Solids;
+use crate::spec::CameraWorldSpec;
+use armcal_core::kinematics::Attachment;
+use armcal_core::optics::{CornerNoise, square_corners};
 
 /// Sight lines end this far before the tag: it is glued to something, and its place is not exact.
 const CLEAR_OF_BACKING_M: f64 = 0.006;

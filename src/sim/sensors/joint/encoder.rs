@@ -5,8 +5,8 @@
 
 use std::f64::consts::TAU;
 
-use crate::sim::as_built::{Harmonic, JointAsBuilt};
-use crate::sim::spec::JointSensorsSpec;
+use crate::as_built::{Harmonic, JointAsBuilt};
+use crate::spec::JointSensorsSpec;
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Encoder {

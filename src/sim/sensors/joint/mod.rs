@@ -10,9 +10,9 @@ mod resolver;
 mod word;
 
 use super::Surroundings;
-use crate::robot::{JointSensorSpec, SensorKind};
-use crate::sim::as_built::JointAsBuilt;
-use crate::sim::spec::JointSensorsSpec;
+use crate::as_built::JointAsBuilt;
+use crate::spec::JointSensorsSpec;
+use armcal_core::robot::{JointSensorSpec, SensorKind};
 use encoder::Encoder;
 use pot::Pot;
 use resolver::Resolver;
@@ -20,7 +20,7 @@ use word::Word;
 
 /// One joint sensor as built.
 #[derive(Clone, Debug)]
-pub(in crate::sim) struct JointSensor {
+pub(crate) struct JointSensor {
     center_rad: f64,
     gear_ratio: f64,
     /// Of the reading by the shaft's angle, nearly.
@@ -43,7 +43,7 @@ enum Element {
 
 /// What a sample depends on besides the sensor itself.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::sim) struct JointInput {
+pub(crate) struct JointInput {
     pub angle_rad: f64,
     pub around: Surroundings,
     /// Since the last sample, s.
@@ -51,12 +51,7 @@ pub(in crate::sim) struct JointInput {
 }
 
 impl JointSensor {
-    pub(in crate::sim) fn new(
-        nominal: &JointSensorSpec,
-        built: &JointAsBuilt,
-        spec: &JointSensorsSpec,
-        seed: u64,
-    ) -> Self {
+    pub(crate) fn new(nominal: &JointSensorSpec, built: &JointAsBuilt, spec: &JointSensorsSpec, seed: u64) -> Self {
         let element = match nominal.kind {
             SensorKind::Potentiometer => Element::Potentiometer(Box::new(Pot::new(built, spec, seed))),
             SensorKind::Encoder => Element::Encoder(Encoder::new(built, spec)),
@@ -75,7 +70,7 @@ impl JointSensor {
     }
 
     /// Centres play and hysteresis at `angle_rad`.
-    pub(in crate::sim) fn settle(&mut self, angle_rad: f64) {
+    pub(crate) fn settle(&mut self, angle_rad: f64) {
         self.shaft_rad = angle_rad;
         if let Element::Potentiometer(pot) = &mut self.element {
             pot.settle(angle_rad);
@@ -93,22 +88,22 @@ impl JointSensor {
     }
 
     /// It slips: reads `by_rad` more from now on.
-    pub(in crate::sim) fn jump(&mut self, by_rad: f64) {
+    pub(crate) fn jump(&mut self, by_rad: f64) {
         self.jump_rad += by_rad;
     }
 
     /// It keeps its last word from now on.
-    pub(in crate::sim) fn stick(&mut self) {
+    pub(crate) fn stick(&mut self) {
         self.word.stick();
     }
 
     /// Its line breaks: from now on it reads an open input, 0 counts and the converter's noise.
-    pub(in crate::sim) fn die(&mut self) {
+    pub(crate) fn die(&mut self) {
         self.word.die();
     }
 
     /// The shaft angle at which it reads `reading_rad`: fixed-point iteration, for what bends the scale is slight.
-    pub(in crate::sim) fn angle_for_reading(&self, reading_rad: f64, around: &Surroundings) -> f64 {
+    pub(crate) fn angle_for_reading(&self, reading_rad: f64, around: &Surroundings) -> f64 {
         let mut angle = reading_rad;
         for _ in 0..200 {
             angle += (reading_rad - self.reading_rad(angle, around)) / self.slope;
@@ -117,7 +112,7 @@ impl JointSensor {
     }
 
     /// Takes a sample, raw counts 0..wrap.
-    pub(in crate::sim) fn sample(&mut self, input: &JointInput) -> f64 {
+    pub(crate) fn sample(&mut self, input: &JointInput) -> f64 {
         let half_play = self.half_play_rad;
         self.shaft_rad = self.shaft_rad.clamp(input.angle_rad - half_play, input.angle_rad + half_play);
         let (place_rad, is_open) = match &mut self.element {

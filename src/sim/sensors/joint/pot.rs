@@ -11,10 +11,10 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::sim::as_built::JointAsBuilt;
-use crate::sim::sensors::Surroundings;
-use crate::sim::spec::JointSensorsSpec;
-use crate::stats::stream_rng;
+use crate::as_built::JointAsBuilt;
+use crate::sensors::Surroundings;
+use crate::spec::JointSensorsSpec;
+use armcal_core::stats::stream_rng;
 
 #[derive(Clone, Debug)]
 pub(super) struct Pot {

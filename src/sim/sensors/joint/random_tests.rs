@@ -2,7 +2,7 @@
 
 use super::tests::{COUNTS_PER_RAD, at, perfect, pot, reading_of, silent};
 use super::*;
-use crate::sim::as_built::WornSpot;
+use crate::as_built::WornSpot;
 
 /// The normal distribution: a series without cancellation, exact to rounding within 6 sigma.
 fn normal_cdf(x: f64) -> f64 {

@@ -5,9 +5,9 @@
 
 use std::f64::consts::TAU;
 
-use crate::sim::as_built::{JointAsBuilt, ResolverAsBuilt};
-use crate::sim::sensors::Surroundings;
-use crate::sim::spec::JointSensorsSpec;
+use crate::as_built::{JointAsBuilt, ResolverAsBuilt};
+use crate::sensors::Surroundings;
+use crate::spec::JointSensorsSpec;
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Resolver {

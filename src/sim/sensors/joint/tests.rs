@@ -3,7 +3,7 @@
 use std::num::NonZeroU8;
 
 use super::*;
-use crate::sim::as_built::{Harmonic, ResolverAsBuilt, WornSpot};
+use crate::as_built::{Harmonic, ResolverAsBuilt, WornSpot};
 
 pub(super) const COUNTS_PER_RAD: f64 = 46.0 * 180.0 / std::f64::consts::PI;
 const OFFSET_COUNTS: f64 = 65322.0;
@@ -47,7 +47,7 @@ fn sensor_of(kind: SensorKind, built: &JointAsBuilt, spec: &JointSensorsSpec, se
         offset_counts: OFFSET_COUNTS,
         wrap_counts: WRAP_COUNTS,
         center_rad: built.center_rad,
-        ..JointSensorSpec::exact(COUNTS_PER_RAD, 1.0)
+        ..crate::fixture::exact_sensor(COUNTS_PER_RAD, 1.0)
     };
     JointSensor::new(&nominal, built, spec, seed)
 }

@@ -5,9 +5,9 @@
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::robot::{JointSensorSpec, SensorKind};
-use crate::sim::spec::JointSensorsSpec;
-use crate::stats::stream_rng;
+use crate::spec::JointSensorsSpec;
+use armcal_core::robot::{JointSensorSpec, SensorKind};
+use armcal_core::stats::stream_rng;
 
 #[derive(Clone, Debug)]
 pub(super) struct Word {

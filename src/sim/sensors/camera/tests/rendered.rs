@@ -5,7 +5,8 @@ use super::*;
 impl Site {
     /// Moments of a rendered camera: the images that it gives, one a second.
     fn rendered(&self, rates_rad_s: f64, seconds: u32, change: impl Fn(&mut WristCamera, u32)) -> Vec<Exposed> {
-        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/vehicles/work-class-front.toml");
+        let root =
+            Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("robots/vehicles/work-class-front.toml");
         let vehicle = load_vehicle(&root).expect("it reads");
         let Self { robot, solids, spec, links, .. } = self;
         let mut camera = self.camera();

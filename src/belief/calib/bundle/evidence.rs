@@ -1,0 +1,244 @@
+//! Noise and prior sizes from the data: MacKay's fixed point of the evidence.
+//!
+//! For a group of parameters x with prior variance s^2 and posterior variances v, `gamma = sum (1 - v / s^2)` of them are told by
+//! the data, and `s^2 = (sum x^2 + nu s0^2) / (gamma + nu)` (MacKay 1992, eq. 4.9), with nu pseudo-observations of the datasheet's
+//! s0. The noise: `(sum chi^2 + nu) / (N - gamma_all + nu)`.
+
+use nalgebra::{Cholesky, DMatrix, DVector};
+
+use super::eliminated::N_OWN;
+use super::linearize::Normal;
+use super::model::{SHAPE_LENGTH, Scales};
+use super::problem::{Problem, State};
+use crate::calib::problem::ParameterKind;
+use armcal_core::joints::MAX_JOINTS;
+use armcal_core::sensor::shape_prior;
+use armcal_core::spatial::log;
+
+/// The posterior at the scales of the problem.
+#[derive(Clone, Debug)]
+pub(super) struct Posterior {
+    /// Of the common parameters.
+    pub covariance: DMatrix<f64>,
+    /// Variances of each view's own parameters.
+    pub own: Vec<[f64; N_OWN]>,
+}
+
+/// Pseudo-observations that the first guess of each scale counts for.
+const NU_JOINT: f64 = 3.0;
+const NU_SHAPE: f64 = 2.0;
+const NU_TERM: f64 = 2.0;
+const NU_NOISE: f64 = 20.0;
+const NU_CAMERA: f64 = 6.0;
+/// Bounds of the noise's factor, and of every other scale over its first guess.
+const NOISE_BOUNDS: [f64; 2] = [0.1, 30.0];
+const SCALE_BOUNDS: [f64; 2] = [0.02, 50.0];
+
+impl Posterior {
+    /// `None` where the normal equations have no inverse.
+    pub(super) fn of(problem: &Problem<'_>, normal: &Normal) -> Option<Self> {
+        let factor = Cholesky::new(normal.matrix.clone())?;
+        let mut own = vec![[0.0; N_OWN]; problem.views.len()];
+        let mut groups = normal.eliminated.iter();
+        for (view_idx, view) in problem.views.iter().enumerate() {
+            for group in groups.by_ref().take(1 + usize::from(view.gripper.is_some())) {
+                let by_columns = group.inverse * group.own_by_columns(problem, normal, view_idx);
+                let used: Vec<usize> =
+                    (0..N_OWN).filter(|&row| group.twists.column(row).iter().any(|v| *v != 0.0)).collect();
+                let mut right = DMatrix::from_fn(problem.layout.n, used.len(), |k, row| by_columns[(used[row], k)]);
+                factor.l_dirty().solve_lower_triangular_mut(&mut right);
+                for (k, &row) in used.iter().enumerate() {
+                    own[view_idx][row] = group.inverse[(row, row)] + right.column(k).norm_squared();
+                }
+            }
+        }
+        Some(Self { covariance: factor.inverse(), own })
+    }
+}
+
+/// Sums over one group of parameters with a common prior size.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sums {
+    squares: f64,
+    gamma: f64,
+}
+
+impl Sums {
+    /// `std`: the prior's; `value` and `variance` of the posterior.
+    fn add(&mut self, value: f64, variance: f64, std: f64) {
+        self.squares += value * value;
+        self.gamma += (1.0 - variance / (std * std)).clamp(0.0, 1.0);
+    }
+
+    fn std(&self, nu: f64, first: f64) -> f64 {
+        let std = ((self.squares + nu * first * first) / (self.gamma + nu)).sqrt();
+        std.clamp(first * SCALE_BOUNDS[0], first * SCALE_BOUNDS[1])
+    }
+}
+
+/// The scales that `posterior` asks for; `first` are those that it all began with.
+pub(super) fn updated(
+    problem: &Problem<'_>,
+    state: &State,
+    normal: &Normal,
+    posterior: &Posterior,
+    first: &Scales,
+) -> Scales {
+    let mut next = problem.scales.clone();
+    update_joints(problem, state, posterior, first, &mut next);
+    update_terms(problem, state, posterior, first, &mut next);
+    update_camera_error(problem, state, posterior, first, &mut next);
+    let n_coordinates: usize = problem.sightings.iter().filter(|s| s.is_used).map(|s| s.data.n_coordinates()).sum();
+    let chi2: f64 = problem.sightings.iter().zip(&normal.chi2).filter(|(s, _)| s.is_used).map(|(_, chi2)| chi2).sum();
+    let free = (n_coordinates as f64 - determined(problem, posterior)).max(1.0);
+    let factor = ((chi2 + NU_NOISE) / (free + NU_NOISE)).sqrt();
+    next.noise = (problem.scales.noise * factor).clamp(NOISE_BOUNDS[0], NOISE_BOUNDS[1]);
+    next
+}
+
+/// How many parameters, the views' own among them, the data determine.
+pub(super) fn determined(problem: &Problem<'_>, posterior: &Posterior) -> f64 {
+    let layout = &problem.layout;
+    let n = problem.prior.joint_info.nrows();
+    let mount = layout.mount.filter(|_| n == layout.n_joint());
+    let prior_share = |at: usize, std: f64| {
+        if std.is_finite() { posterior.covariance[(at, at)] / Problem::at_least(std).powi(2) } else { 0.0 }
+    };
+    let mut gamma = layout.n as f64;
+    gamma -= posterior.covariance.view((0, 0), (n, n)).component_mul(&problem.prior.joint_info).sum();
+    let mut poses = vec![(mount, problem.prior.mount_std), (layout.gripper_tag, problem.prior.gripper_tag_std)];
+    poses.extend(layout.tags.iter().copied().zip(problem.prior.tags_std.iter().copied()));
+    for (at, std) in poses.into_iter().filter_map(|(at, std)| Some((at?, std))) {
+        gamma -= (0..6).map(|k| prior_share(at + k, std[k])).sum::<f64>();
+    }
+    if let Some(at) = layout.lens {
+        gamma -= (0..8).map(|k| prior_share(at + k, problem.prior.lens_std[k])).sum::<f64>();
+    }
+    gamma -= layout.time.map_or(0.0, |at| prior_share(at, problem.prior.time_std_s));
+    for (view, own) in problem.views.iter().zip(&posterior.own) {
+        for (joint, variance) in own.iter().take(MAX_JOINTS).enumerate().filter(|(_, v)| **v > 0.0) {
+            gamma += (1.0 - variance / problem.joint_error_var(view, joint)).clamp(0.0, 1.0);
+        }
+        if let Some(std) = problem.scales.camera_error_std {
+            let camera = own[MAX_JOINTS..].iter().enumerate().filter(|(_, v)| **v > 0.0);
+            gamma += camera.map(|(k, v)| (1.0 - v / std[k / 3].powi(2)).clamp(0.0, 1.0)).sum::<f64>();
+        }
+    }
+    gamma
+}
+
+fn update_joints(problem: &Problem<'_>, state: &State, posterior: &Posterior, first: &Scales, next: &mut Scales) {
+    for joint in 0..problem.robot.n_joints() {
+        let (mut sums, mut reading_var, mut n) = (Sums::default(), 0.0, 0.0);
+        for (view_idx, view) in problem.views.iter().enumerate() {
+            let variance = posterior.own[view_idx][joint];
+            if view.is_free[joint] || variance <= 0.0 {
+                continue;
+            }
+            sums.add(state.joint_error[view_idx][joint], variance, problem.joint_error_var(view, joint).sqrt());
+            reading_var += view.reading_var[joint];
+            n += 1.0;
+        }
+        if n > 0.0 {
+            let reading_var = reading_var / n;
+            let total = sums.std(NU_JOINT, first.joint_std_rad[joint].hypot(reading_var.sqrt()));
+            let least = first.joint_std_rad[joint] * SCALE_BOUNDS[0];
+            next.joint_std_rad[joint] = (total * total - reading_var).max(least * least).sqrt();
+        }
+    }
+}
+
+fn update_terms(problem: &Problem<'_>, state: &State, posterior: &Posterior, first: &Scales, next: &mut Scales) {
+    let layout = &problem.layout;
+    let basis = shape_prior(SHAPE_LENGTH);
+    let of_kinds = |wanted: &dyn Fn(ParameterKind) -> Option<f64>, columns: std::ops::Range<usize>, std: f64| {
+        let mut sums = Sums::default();
+        for column in columns {
+            let Some(unit) = wanted(layout.parameters[column].kind) else { continue };
+            let variance = posterior.covariance[(column, column)] / (unit * unit);
+            sums.add((state.joint[column] - problem.prior.joint_mean[column]) / unit, variance, std);
+        }
+        sums
+    };
+    let shape = |kind: ParameterKind| match kind {
+        ParameterKind::Shape(h) => Some(basis[usize::from(h)]),
+        _ => None,
+    };
+    for (joint, columns) in layout.of_joint.iter().enumerate() {
+        let sums = of_kinds(&shape, columns.clone(), problem.scales.shape_std_rad[joint]);
+        if sums != Sums::default() {
+            next.shape_std_rad[joint] = sums.std(NU_SHAPE, first.shape_std_rad[joint]);
+        }
+    }
+    let all = 0..layout.n_joint();
+    let is = |kind: ParameterKind| move |other: ParameterKind| (other == kind).then_some(1.0);
+    let now = &problem.scales;
+    for (kind, std, first, next) in [
+        (
+            ParameterKind::OffsetPerK,
+            now.offset_std_rad_per_k,
+            first.offset_std_rad_per_k,
+            &mut next.offset_std_rad_per_k,
+        ),
+        (ParameterKind::GainPerK, now.gain_std_per_k, first.gain_std_per_k, &mut next.gain_std_per_k),
+        (
+            ParameterKind::OffsetPerMpa,
+            now.offset_std_rad_per_mpa,
+            first.offset_std_rad_per_mpa,
+            &mut next.offset_std_rad_per_mpa,
+        ),
+        (ParameterKind::DriftPerH, now.drift_std_rad_per_h, first.drift_std_rad_per_h, &mut next.drift_std_rad_per_h),
+        (ParameterKind::HalfPlay, now.half_play_std_rad, first.half_play_std_rad, &mut next.half_play_std_rad),
+    ] {
+        let sums = of_kinds(&is(kind), all.clone(), std);
+        if sums != Sums::default() {
+            *next = sums.std(NU_TERM, first);
+        }
+    }
+}
+
+impl PartialEq for Sums {
+    fn eq(&self, other: &Self) -> bool {
+        self.squares == other.squares && self.gamma == other.gamma
+    }
+}
+
+fn update_camera_error(problem: &Problem<'_>, state: &State, posterior: &Posterior, first: &Scales, next: &mut Scales) {
+    let (Some(now), Some(first)) = (problem.scales.camera_error_std, first.camera_error_std) else { return };
+    let mut sums = [Sums::default(); 2];
+    for (error, own) in state.camera_error.iter().zip(&posterior.own) {
+        let d = log(error);
+        for k in (0..6).filter(|k| own[MAX_JOINTS + k] > 0.0) {
+            sums[k / 3].add(d[k], own[MAX_JOINTS + k], now[k / 3]);
+        }
+    }
+    next.camera_error_std = Some([0, 1].map(|k| sums[k].std(NU_CAMERA, first[k])));
+}
+
+/// The prior's information on the joints' parameters under `scales`.
+pub(super) fn joint_info(problem: &Problem<'_>, scales: &Scales) -> DMatrix<f64> {
+    let info = problem.layout.parameters.iter().map(|p| {
+        let std = scales.prior_std(&problem.robot.sensors[p.joint], p.joint, p.kind);
+        Problem::at_least(std).powi(-2)
+    });
+    DMatrix::from_diagonal(&DVector::from_iterator(problem.layout.n_joint(), info))
+}
+
+/// The largest relative change of any scale.
+pub(super) fn change(a: &Scales, b: &Scales) -> f64 {
+    let numbers = |s: &Scales| {
+        let mut all = vec![
+            s.noise,
+            s.offset_std_rad_per_k,
+            s.gain_std_per_k,
+            s.offset_std_rad_per_mpa,
+            s.drift_std_rad_per_h,
+            s.half_play_std_rad,
+        ];
+        all.extend(s.joint_std_rad);
+        all.extend(s.shape_std_rad);
+        all.extend(s.camera_error_std.into_iter().flatten());
+        all
+    };
+    numbers(a).iter().zip(numbers(b)).map(|(a, b)| (a / b).ln().abs()).fold(0.0, f64::max)
+}

@@ -1,0 +1,217 @@
+//! Joints whose sensor says nothing, in all views or in some: how they look to the estimator.
+//!
+//! A reading that says nothing is replaced by the angle that the tags show (found by search, so that the solver starts near), and
+//! the joint's error in that view gets a standard deviation that leaves it open ([`View::is_free`]). A locked joint is a sensor
+//! that always reads the same and whose offset nobody knows: one column for all views.
+
+use super::detect::MIN_VIEWS;
+use super::estimate::{BundleInput, Estimate, Evidence, estimate, model_for, reference};
+use super::model::{Model, Scales};
+use crate::calib::associate::View;
+use crate::calib::problem::{JointParameters, ParameterKind};
+use armcal_core::joints::JointAngles;
+use armcal_core::robot::{FailedJoint, FailedKind, Robot};
+use armcal_core::stats::quantile;
+
+/// Who says that a joint failed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Found {
+    Declared,
+    Detected,
+}
+
+/// What the sensor of a locked joint is worth.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reading {
+    /// It reads where the joint stands, or it is used in the views that are not named.
+    Used,
+    /// It is not looked at.
+    Ignored,
+}
+
+/// One failed joint, and what is not used of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Failure {
+    pub joint: usize,
+    pub kind: FailedKind,
+    pub found: Found,
+    pub reading: Reading,
+    /// Views whose reading says nothing, ascending.
+    pub views: Vec<usize>,
+    /// Of a slip that lasts: the first view after it in the order of time; the readings before it are not used.
+    pub since: Option<usize>,
+    /// What shows it, in words.
+    pub evidence: String,
+}
+
+impl Failure {
+    /// Nothing that the sensor says in any of `n_views` is used.
+    pub fn without_sensor(joint: usize, kind: FailedKind, found: Found, n_views: usize) -> Self {
+        let views = (0..n_views).collect();
+        Self { joint, kind, found, reading: Reading::Ignored, views, since: None, evidence: String::new() }
+    }
+
+    /// What somebody declared; when a sensor jumped is still to be found.
+    pub fn declared(declared: FailedJoint, n_views: usize) -> Self {
+        let FailedJoint { joint, kind } = declared;
+        let all = Self::without_sensor(joint, kind, Found::Declared, n_views);
+        match kind {
+            FailedKind::Jumps => Self { reading: Reading::Used, views: Vec::new(), ..all },
+            FailedKind::Locked | FailedKind::Dead | FailedKind::Stuck => all,
+        }
+    }
+
+    /// A slip so late that the sensor as it is now shows in hardly any view.
+    pub fn has_too_few_views_since(&self, n_views: usize) -> bool {
+        self.since.is_some() && n_views - self.views.len() < MIN_VIEWS
+    }
+
+    /// Whether the joint's parameters have no data at all.
+    pub fn leaves_no_sensor(&self) -> bool {
+        self.reading == Reading::Ignored
+    }
+}
+
+/// An arm and its views with the failed joints taken care of.
+pub struct Applied {
+    pub robot: Robot,
+    pub views: Vec<View>,
+    pub failures: Vec<Failure>,
+}
+
+/// Tags farther than this from the survey hardly pull while an angle is searched for, m.
+const SEARCH_WIDTH_M: f64 = 0.1;
+/// Candidates of one joint over its range, by how many joints are searched for in one view.
+const CANDIDATES: [usize; 3] = [90, 40, 16];
+const FINEST_STEP_RAD: f64 = 1e-4;
+
+impl Applied {
+    /// `at`: what is believed of the other joints' sensors.
+    pub fn new(robot: &Robot, views: &[View], failures: &[Failure], at: &JointParameters) -> Self {
+        let mut applied = Self { robot: robot.clone(), views: views.to_vec(), failures: failures.to_vec() };
+        for failure in failures {
+            for &view_idx in &failure.views {
+                let view = &mut applied.views[view_idx];
+                view.is_free[failure.joint] = true;
+                view.rate_rad_s[failure.joint] = 0.0;
+                view.approach[failure.joint] = 0.0;
+            }
+        }
+        for view in &mut applied.views {
+            set_by_camera(robot, view, at);
+        }
+        for failure in failures.iter().filter(|f| f.kind == FailedKind::Locked && f.leaves_no_sensor()) {
+            applied.lock(failure.joint);
+        }
+        applied
+    }
+
+    /// One angle in all views, which starts at the middle one of those that the camera showed.
+    fn lock(&mut self, joint: usize) {
+        let seen: Vec<f64> =
+            self.views.iter().filter(|view| !view.tags.is_empty()).map(|view| view.travel_rad[joint]).collect();
+        let travel_rad = quantile(&seen, 0.5).unwrap_or(0.0);
+        for view in &mut self.views {
+            view.travel_rad[joint] = travel_rad;
+            view.is_free[joint] = false;
+        }
+        let spec = &mut self.robot.sensors[joint];
+        // It gives and swings as it did; only its sensor is gone.
+        (spec.offset_std_rad, spec.gain_std, spec.noise_std_counts) = (spec.half_range_rad, 0.0, 0.0);
+    }
+
+    /// What these views tell, without columns for sensors that say nothing.
+    pub fn model(&self) -> Model {
+        let mut model = model_for(&self.robot, &self.views);
+        self.restrict(&mut model);
+        model
+    }
+
+    pub fn restrict(&self, model: &mut Model) {
+        for failure in self.failures.iter().filter(|failure| failure.leaves_no_sensor()) {
+            let is_locked = failure.kind == FailedKind::Locked;
+            model.joints[failure.joint] = if is_locked { vec![ParameterKind::Offset] } else { Vec::new() };
+        }
+    }
+
+    /// From the datasheet.
+    pub fn input(&self, evidence: Evidence) -> BundleInput<'_> {
+        BundleInput {
+            robot: &self.robot,
+            views: &self.views,
+            model: self.model(),
+            scales: Scales::datasheet(&self.robot),
+            guess: JointParameters { reference: reference(&self.views), ..JointParameters::default() },
+            joint_prior: None,
+            evidence,
+        }
+    }
+
+    pub fn estimate(&self, evidence: Evidence) -> Option<Estimate<'_>> {
+        estimate(&self.input(evidence))
+    }
+}
+
+/// Sets the travel of the view's free joints to what its tags show under `at`; leaves it where the view shows none.
+pub fn set_by_camera(robot: &Robot, view: &mut View, at: &JointParameters) {
+    let joints: Vec<usize> = (0..robot.camera.mount.n_joints).filter(|&joint| view.is_free[joint]).collect();
+    if joints.is_empty() {
+        return;
+    }
+    let angles = seen_angles(robot, view, &joints, at);
+    for &joint in &joints {
+        let center_rad = robot.sensors[joint].center_rad;
+        view.travel_rad[joint] = if view.tags.is_empty() { 0.0 } else { angles[joint] - center_rad };
+    }
+}
+
+/// All angles of a view, those of `joints` where the tags lie closest to their survey (sum of Cauchy losses): a grid over the
+/// joints' ranges, then smaller and smaller steps.
+fn seen_angles(robot: &Robot, view: &View, joints: &[usize], at: &JointParameters) -> JointAngles {
+    let departure = view.conditions.departure_from(&at.reference);
+    let mut best = JointAngles::from_fn(robot.n_joints(), |j| {
+        at.correction(j).angle_rad(&robot.sensors[j], view.travel_rad[j], &departure, view.approach[j])
+    });
+    let n = CANDIDATES[joints.len().min(CANDIDATES.len()) - 1];
+    let step_rad = |joint: usize| 2.0 * robot.sensors[joint].half_range_rad / n as f64;
+    let mut least = f64::INFINITY;
+    let on_grid = joints.len().min(CANDIDATES.len());
+    let mut trial = best;
+    for mut index in 0..n.pow(on_grid as u32) {
+        for &joint in &joints[..on_grid] {
+            let spec = &robot.sensors[joint];
+            trial[joint] = spec.center_rad - spec.half_range_rad + ((index % n) as f64 + 0.5) * step_rad(joint);
+            index /= n;
+        }
+        let cost = distance_cost(robot, view, &trial);
+        if cost < least {
+            (least, best) = (cost, trial);
+        }
+    }
+    let mut share = 0.5;
+    while joints.iter().any(|&joint| share * step_rad(joint) > FINEST_STEP_RAD) {
+        let mut improved = false;
+        for (&joint, sign) in joints.iter().flat_map(|joint| [(joint, -1.0), (joint, 1.0)]) {
+            let mut trial = best;
+            trial[joint] += sign * share * step_rad(joint);
+            let cost = distance_cost(robot, view, &trial);
+            if cost < least {
+                (least, best, improved) = (cost, trial, true);
+            }
+        }
+        if !improved {
+            share *= 0.5;
+        }
+    }
+    best
+}
+
+fn distance_cost(robot: &Robot, view: &View, angles: &JointAngles) -> f64 {
+    let base_from_camera = robot.chain.link_poses(angles).frame(&robot.camera.mount);
+    let of_tag = |tag: &crate::calib::associate::TagView| {
+        let predicted_m = base_from_camera * nalgebra::Point3::from(tag.center_in_camera_m);
+        let off_m = predicted_m.coords - robot.tags[tag.tag_idx].base_from_tag.origin().vector();
+        (off_m.norm_squared() / SEARCH_WIDTH_M.powi(2)).ln_1p()
+    };
+    view.tags.iter().map(of_tag).sum()
+}

@@ -1,0 +1,389 @@
+//! Normal equations of one state, the views' own parameters eliminated (Schur complement).
+//!
+//! In a view all acts through the twist u of the camera (right, camera frame) that each sighting i sees:
+//! `u_i = S l + T y - Ad_i tau_i`: l the view's own parameters (joint errors, camera error) with prior `L^-1`, y the common ones
+//! along the directions T (joints, mount, time offset), tau_i the tag's pose. With `H_i` of each sighting and `G = sum H_i`,
+//! elimination of l leaves, for the blocks a and b, `sum A_a^T H_i A_b - (sum A_a^T H_i) M (sum H_i A_b)`,
+//! `M = S (S^T G S + L)^-1 S^T`: all of it 6x6 algebra, whatever the number of corners.
+
+use nalgebra::{DMatrix, DVector, Isometry3, Matrix6, SMatrix, SVector, Vector6};
+
+use super::eliminated::{Columns, Directions, Eliminated, Group, MOUNT, N_DIRECTIONS, N_OWN, Own, TIME};
+use super::problem::{Problem, State};
+use super::robust::Loss;
+use super::sighting::{Info, LensInfo, right_jacobian_inverse};
+use armcal_core::joints::MAX_JOINTS;
+use armcal_core::kinematics::LinkPoses;
+use armcal_core::spatial::adjoint;
+use armcal_core::spatial::log;
+
+/// The normal equations at one state.
+#[derive(Clone, Debug)]
+pub(super) struct Normal {
+    /// Lower triangle.
+    pub matrix: DMatrix<f64>,
+    pub right: DVector<f64>,
+    pub cost: f64,
+    /// Of each view, then those of the gripper's tag.
+    pub eliminated: Vec<Eliminated>,
+    /// `H_i Ad_i` and column of the tag of each sighting.
+    pub by_tag: Vec<(Matrix6<f64>, Option<usize>)>,
+    /// Sum of squares of each sighting's whitened residuals.
+    pub chi2: Vec<f64>,
+    /// Of the group at hand; kept, so that the loop does not allocate.
+    infos: Vec<Info>,
+    /// As many, where the lens has columns.
+    lens_infos: Vec<LensInfo>,
+}
+
+impl Normal {
+    pub(super) fn new(problem: &Problem<'_>) -> Self {
+        let n = problem.layout.n;
+        let n_groups = problem.views.len() + problem.views.iter().filter(|view| view.gripper.is_some()).count();
+        Self {
+            matrix: DMatrix::zeros(n, n),
+            right: DVector::zeros(n),
+            cost: 0.0,
+            eliminated: Vec::with_capacity(n_groups),
+            by_tag: vec![(Matrix6::zeros(), None); problem.sightings.len()],
+            chi2: vec![0.0; problem.sightings.len()],
+            infos: Vec::new(),
+            lens_infos: Vec::new(),
+        }
+    }
+
+    /// Linearizes `problem` at `state`.
+    pub(super) fn update(&mut self, problem: &Problem<'_>, state: &State, loss: Loss) {
+        self.matrix.fill(0.0);
+        self.right.fill(0.0);
+        self.eliminated.clear();
+        self.cost = 0.0;
+        for view_idx in 0..problem.views.len() {
+            self.add_view(problem, state, view_idx, loss);
+        }
+        self.add_priors(problem, state);
+    }
+
+    fn add_view(&mut self, problem: &Problem<'_>, state: &State, view_idx: usize, loss: Loss) {
+        let view = &problem.views[view_idx];
+        let poses = problem.robot.chain.link_poses(&problem.angles(view_idx, state));
+        let before = poses.link(problem.n_before) * state.mount;
+        let camera = before * state.camera_error[view_idx];
+        let group = Group {
+            view_idx,
+            joints: 0..problem.n_before,
+            sign: 1.0,
+            by_mount: adjoint(&state.camera_error[view_idx].inverse()),
+            camera_error: problem.scales.camera_error_std.is_some().then_some(&state.camera_error[view_idx]),
+            sightings: view.sightings.clone(),
+        };
+        self.add_group(problem, state, &group, &poses, &camera, loss);
+        if let (Some(at), Some(tag)) = (view.gripper, &problem.robot.gripper_tag) {
+            let group = Group {
+                view_idx,
+                joints: problem.n_before..tag.mount.n_joints,
+                // Joints behind the camera move the tag, not the camera.
+                sign: -1.0,
+                by_mount: Matrix6::identity(),
+                camera_error: None,
+                sightings: at..at + 1,
+            };
+            self.add_group(problem, state, &group, &poses, &before, loss);
+        }
+    }
+
+    fn add_group(
+        &mut self,
+        problem: &Problem<'_>,
+        state: &State,
+        group: &Group<'_>,
+        poses: &LinkPoses,
+        base_from_camera: &Isometry3<f64>,
+        loss: Loss,
+    ) {
+        let directions = directions(problem, group, poses, base_from_camera);
+        self.linearize_sightings(problem, state, group, poses, base_from_camera, loss);
+        let infos = std::mem::take(&mut self.infos);
+        let lens_infos = std::mem::take(&mut self.lens_infos);
+        let (mut g_sum, mut h_sum) = (Vector6::zeros(), Matrix6::zeros());
+        let mut by_lens = SMatrix::<f64, 6, 8>::zeros();
+        for info in &infos {
+            h_sum += info.h;
+            g_sum += info.g;
+        }
+        for lens in &lens_infos {
+            by_lens += lens.cross;
+        }
+        let mut own = self.eliminate(problem, state, group, &directions, &h_sum, &g_sum);
+        let (m, shift) = own.reach();
+        let m_h_sum = m * h_sum;
+        let q = h_sum - h_sum * m_h_sum;
+        let columns = Columns::new(problem, group);
+        let along = directions.transpose();
+        self.add_common(problem, &columns, &(along * (q * directions)));
+        self.add_common_right(problem, &columns, &(along * (g_sum - h_sum * shift)));
+        for (k, info) in infos.iter().enumerate() {
+            let u = info.h * info.adjoint;
+            self.by_tag[group.sightings.start + k].0 = u;
+            let Some(column) = self.by_tag[group.sightings.start + k].1 else { continue };
+            let mut own_right = self.right.fixed_rows_mut::<6>(column);
+            own_right -= info.adjoint.tr_mul(&(info.g - info.h * shift));
+            self.add_block(column, column, &(info.adjoint.tr_mul(&u)));
+            // Common by tag: T^T (H_i - G M H_i)(-Ad_i).
+            let cross = if own.has_any { u - m_h_sum.tr_mul(&u) } else { u };
+            self.subtract_cross(problem, &columns, column, &cross.transpose(), &directions);
+            // Only what is eliminated ties a view's tags to one another.
+            if !own.has_any {
+                continue;
+            }
+            let m_u = m * u;
+            for other in 0..=k {
+                let (before, Some(at)) = &self.by_tag[group.sightings.start + other] else { continue };
+                let (before, at) = (*before, *at);
+                let block = -(before.tr_mul(&m_u));
+                // Rows: the other's tag.
+                if other == k {
+                    self.add_block(column, column, &block);
+                } else if at >= column {
+                    self.add_block(at, column, &block);
+                } else {
+                    self.add_block(column, at, &block.transpose());
+                }
+            }
+        }
+        if let Some(at) = problem.layout.lens {
+            self.add_lens(
+                problem,
+                &columns,
+                &LensSums {
+                    at,
+                    infos: &infos,
+                    lens_infos: &lens_infos,
+                    group,
+                    directions: &directions,
+                    m,
+                    shift,
+                    h_sum,
+                    by_lens,
+                },
+            );
+        }
+        self.infos = infos;
+        self.lens_infos = lens_infos;
+        own.by_common = h_sum * directions;
+        own.by_lens = by_lens;
+        self.eliminated.push(own);
+    }
+
+    /// Linearized sightings, weighted by the loss, their cost added.
+    fn linearize_sightings(
+        &mut self,
+        problem: &Problem<'_>,
+        state: &State,
+        group: &Group<'_>,
+        poses: &LinkPoses,
+        base_from_camera: &Isometry3<f64>,
+        loss: Loss,
+    ) {
+        self.infos.clear();
+        self.lens_infos.clear();
+        for at in group.sightings.clone() {
+            let sighting = &problem.sightings[at];
+            let (pose, column) = match &problem.robot.gripper_tag {
+                Some(tag) if sighting.tag == problem.robot.tags.len() => {
+                    (poses.link(tag.mount.n_joints) * state.gripper_tag, problem.layout.gripper_tag)
+                }
+                _ => (state.tags[sighting.tag], problem.layout.tags[sighting.tag]),
+            };
+            let camera_from_tag = base_from_camera.inv_mul(&pose);
+            if problem.layout.lens.is_some() {
+                self.lens_infos.push(LensInfo::zeros());
+            }
+            let by_lens = self.lens_infos.last_mut();
+            let mut info = Info::of(&sighting.data, &camera_from_tag, &state.lens, problem.scales.noise, by_lens)
+                .unwrap_or_else(|| Info::unseen(&sighting.data));
+            self.chi2[at] = info.chi2;
+            self.by_tag[at].1 = column;
+            let (cost, weight) =
+                if sighting.is_used { loss.of(info.chi2, sighting.data.n_coordinates()) } else { (0.0, 0.0) };
+            self.cost += cost;
+            if weight != 1.0 {
+                info.weighted(weight);
+                if let Some(lens) = self.lens_infos.last_mut() {
+                    lens.weighted(weight);
+                }
+            }
+            self.infos.push(info);
+        }
+    }
+
+    fn eliminate(
+        &mut self,
+        problem: &Problem<'_>,
+        state: &State,
+        group: &Group<'_>,
+        directions: &Directions,
+        h_sum: &Matrix6<f64>,
+        g_sum: &Vector6<f64>,
+    ) -> Eliminated {
+        let view = &problem.views[group.view_idx];
+        let mut twists = SMatrix::<f64, 6, N_OWN>::zeros();
+        let mut info = SVector::<f64, N_OWN>::repeat(1.0);
+        let mut own = SVector::<f64, N_OWN>::zeros();
+        for joint in group.joints.clone() {
+            let variance = problem.joint_error_var(view, joint);
+            // An exact sensor has no error to eliminate.
+            if variance <= 0.0 {
+                continue;
+            }
+            twists.set_column(joint, &directions.column(joint));
+            info[joint] = 1.0 / variance;
+            own[joint] = state.joint_error[group.view_idx][joint];
+        }
+        if group.camera_error.is_none() && twists.iter().all(|v| *v == 0.0) {
+            return Eliminated::none(group.sightings.clone());
+        }
+        let mut prior_gradient = -own.component_mul(&info);
+        if let (Some(error), Some([std_m, std_rad])) = (group.camera_error, problem.scales.camera_error_std) {
+            twists.fixed_view_mut::<6, 6>(0, MAX_JOINTS).fill_diagonal(1.0);
+            let d = log(error);
+            let weight = Vector6::from_fn(|k, _| if k < 3 { std_m } else { std_rad }.max(1e-9).powi(-2));
+            info.fixed_rows_mut::<6>(MAX_JOINTS).copy_from(&weight);
+            own.fixed_rows_mut::<6>(MAX_JOINTS).copy_from(&d);
+            let gradient = right_jacobian_inverse(&d).tr_mul(&d.component_mul(&weight));
+            prior_gradient.fixed_rows_mut::<6>(MAX_JOINTS).copy_from(&-gradient);
+        }
+        self.cost += own.component_mul(&own).dot(&info);
+        let mut normal: Own = twists.tr_mul(&(h_sum * twists));
+        for k in 0..N_OWN {
+            normal[(k, k)] += info[k];
+        }
+        let gradient = twists.tr_mul(g_sum) + prior_gradient;
+        // Positive definite: its diagonal has the priors. Only overflow makes it fail.
+        let factor = normal.cholesky();
+        let log_det = factor.as_ref().map_or(0.0, |f| 2.0 * f.l_dirty().diagonal().map(f64::ln).sum());
+        let inverse = factor.map_or_else(Own::zeros, |factor| factor.inverse());
+        Eliminated {
+            twists,
+            inverse,
+            gradient,
+            by_common: SMatrix::zeros(),
+            log_ratio: info.map(f64::ln).sum() - log_det,
+            range: group.sightings.clone(),
+            by_lens: SMatrix::zeros(),
+            has_any: true,
+        }
+    }
+
+    /// Adds at rows `row`, columns `column`, row >= column; on the diagonal the lower triangle matters.
+    pub(super) fn add_block(&mut self, row: usize, column: usize, block: &Matrix6<f64>) {
+        let mut view = self.matrix.fixed_view_mut::<6, 6>(row, column);
+        view += block;
+    }
+
+    fn add_common(
+        &mut self,
+        problem: &Problem<'_>,
+        columns: &Columns<'_>,
+        block: &SMatrix<f64, N_DIRECTIONS, N_DIRECTIONS>,
+    ) {
+        for b in columns.directions(problem) {
+            // Directions come in the order of their columns; what falls above the diagonal is not read.
+            for a in columns.directions(problem).skip_while(|a| *a < b) {
+                let value = block[(a, b)];
+                columns.each(problem, b, |column, by_column| {
+                    let mut cells = self.matrix.column_mut(column);
+                    columns.each(problem, a, |row, by_row| cells[row] += value * by_column * by_row);
+                });
+            }
+        }
+    }
+
+    fn add_common_right(&mut self, problem: &Problem<'_>, columns: &Columns<'_>, right: &SVector<f64, N_DIRECTIONS>) {
+        for a in columns.directions(problem) {
+            columns.each(problem, a, |row, by_row| self.right[row] += right[a] * by_row);
+        }
+    }
+
+    /// `by_twist`: tag by twist of the camera. Common parameters come before the tags, so that these are the rows.
+    fn subtract_cross(
+        &mut self,
+        problem: &Problem<'_>,
+        columns: &Columns<'_>,
+        tag: usize,
+        by_twist: &Matrix6<f64>,
+        directions: &Directions,
+    ) {
+        for a in columns.directions(problem) {
+            let by_direction = by_twist * directions.column(a);
+            columns.each(problem, a, |column, by_column| {
+                let mut cells = self.matrix.fixed_view_mut::<6, 1>(tag, column);
+                cells -= by_direction * by_column;
+            });
+        }
+    }
+
+    fn add_lens(&mut self, problem: &Problem<'_>, columns: &Columns<'_>, sums: &LensSums<'_>) {
+        let at = sums.at;
+        let mut h = -(sums.by_lens.transpose() * sums.m * sums.by_lens);
+        let mut g = -(sums.by_lens.transpose() * sums.shift);
+        let m_lens = sums.m * sums.by_lens;
+        for (k, (info, lens)) in sums.infos.iter().zip(sums.lens_infos).enumerate() {
+            h += lens.h;
+            g += lens.g;
+            let Some(column) = self.by_tag[sums.group.sightings.start + k].1 else { continue };
+            // Rows: the tag; columns: the lens, which comes before.
+            let block: SMatrix<f64, 6, 8> = -(info.adjoint.transpose() * (lens.cross - info.h * m_lens));
+            let mut view = self.matrix.fixed_view_mut::<6, 8>(column, at);
+            view += block;
+        }
+        let mut view = self.matrix.fixed_view_mut::<8, 8>(at, at);
+        view += h;
+        let mut right = self.right.fixed_rows_mut::<8>(at);
+        right += g;
+        let cross: SMatrix<f64, N_DIRECTIONS, 8> = sums.directions.transpose() * (sums.by_lens - sums.h_sum * m_lens);
+        for a in columns.directions(problem) {
+            columns.each(problem, a, |column, by_column| {
+                for k in 0..8 {
+                    self.matrix[(at + k, column)] += cross[(a, k)] * by_column;
+                }
+            });
+        }
+    }
+}
+
+struct LensSums<'a> {
+    at: usize,
+    infos: &'a [Info],
+    lens_infos: &'a [LensInfo],
+    group: &'a Group<'a>,
+    directions: &'a Directions,
+    m: Matrix6<f64>,
+    shift: Vector6<f64>,
+    h_sum: Matrix6<f64>,
+    by_lens: SMatrix<f64, 6, 8>,
+}
+
+/// Twists of the camera (right, camera frame) by each common direction.
+fn directions(
+    problem: &Problem<'_>,
+    group: &Group<'_>,
+    poses: &LinkPoses,
+    base_from_camera: &Isometry3<f64>,
+) -> Directions {
+    let view = &problem.views[group.view_idx];
+    let mut directions = Directions::zeros();
+    let center = base_from_camera.translation.vector;
+    let mut by_time = Vector6::zeros();
+    for joint in group.joints.clone() {
+        let rotation = base_from_camera.rotation.inverse();
+        let moved = rotation * poses.point_jacobian(joint, &center) * group.sign;
+        let turned = rotation * poses.axis(joint) * group.sign;
+        let twist = Vector6::new(moved.x, moved.y, moved.z, turned.x, turned.y, turned.z);
+        directions.set_column(joint, &twist);
+        by_time += twist * view.rate_rad_s[joint];
+    }
+    directions.fixed_view_mut::<6, 6>(0, MOUNT).copy_from(&group.by_mount);
+    directions.set_column(TIME, &by_time);
+    directions
+}

@@ -1,0 +1,70 @@
+//! What is known before: the priors' part of the normal equations.
+
+use nalgebra::{Isometry3, Matrix6, Vector6};
+
+use super::linearize::Normal;
+use super::problem::{Problem, State};
+use super::sighting::right_jacobian_inverse;
+use armcal_core::spatial::log;
+
+impl Normal {
+    pub(super) fn add_priors(&mut self, problem: &Problem<'_>, state: &State) {
+        let (layout, prior) = (&problem.layout, &problem.prior);
+        let n = prior.joint_info.nrows();
+        let has_mount = n > layout.n_joint();
+        let mut off = (&state.joint - &prior.joint_mean).resize_vertically(n, 0.0);
+        if has_mount {
+            // Small: its derivative by the mount's column is taken as one.
+            off.fixed_rows_mut::<6>(layout.n_joint()).copy_from(&log(&prior.mount.inv_mul(&state.mount)));
+        }
+        let pull = &prior.joint_info * &off;
+        self.cost += off.dot(&pull);
+        let mut block = self.matrix.view_mut((0, 0), (n, n));
+        block += &prior.joint_info;
+        let mut right = self.right.rows_mut(0, n);
+        right -= pull;
+        if let Some(at) = layout.mount.filter(|_| !has_mount) {
+            self.add_pose_prior(at, &prior.mount, &state.mount, &prior.mount_std);
+        }
+        if let Some(at) = layout.gripper_tag {
+            self.add_pose_prior(at, &prior.gripper_tag, &state.gripper_tag, &prior.gripper_tag_std);
+        }
+        for (tag, column) in layout.tags.iter().enumerate() {
+            if let Some(at) = column {
+                self.add_pose_prior(*at, &prior.tags[tag], &state.tags[tag], &prior.tags_std[tag]);
+            }
+        }
+        if let Some(at) = layout.time {
+            self.add_number_prior(at, state.time_s, prior.time_std_s);
+        }
+        if let Some(at) = layout.lens {
+            for (k, (value, mean)) in lens_values(&state.lens).iter().zip(lens_values(&prior.lens)).enumerate() {
+                self.add_number_prior(at + k, value - mean, prior.lens_std[k]);
+            }
+        }
+    }
+
+    fn add_number_prior(&mut self, at: usize, off: f64, std: f64) {
+        let info = Problem::at_least(std).powi(-2);
+        self.matrix[(at, at)] += info;
+        self.right[at] -= info * off;
+        self.cost += info * off * off;
+    }
+
+    fn add_pose_prior(&mut self, at: usize, mean: &Isometry3<f64>, pose: &Isometry3<f64>, std: &[f64; 6]) {
+        let d = log(&mean.inv_mul(pose));
+        let info = Vector6::from_fn(|k, _| if std[k].is_finite() { Problem::at_least(std[k]).powi(-2) } else { 0.0 });
+        let jacobian = right_jacobian_inverse(&d);
+        let weighted = jacobian.tr_mul(&Matrix6::from_diagonal(&info));
+        self.add_block(at, at, &(weighted * jacobian));
+        let mut right = self.right.fixed_rows_mut::<6>(at);
+        right -= weighted * d;
+        self.cost += d.component_mul(&d).dot(&info);
+    }
+}
+
+/// fx, fy, cx, cy, k1..k4.
+fn lens_values(lens: &armcal_core::optics::Fisheye) -> [f64; 8] {
+    let ([fx, fy], [cx, cy], [k1, k2, k3, k4]) = (lens.focal_px, lens.center_px, lens.distortion);
+    [fx, fy, cx, cy, k1, k2, k3, k4]
+}

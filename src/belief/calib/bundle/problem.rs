@@ -1,0 +1,288 @@
+//! What is solved: columns, priors, views and sightings in the form that the loops want.
+
+use std::ops::Range;
+
+use nalgebra::{DMatrix, DVector, Isometry3, Vector3};
+
+use super::model::{Model, Scales};
+use crate::calib::associate::{Measured, SeenCorners, View};
+use crate::calib::problem::{JointParameters, Parameter};
+use armcal_core::joints::{JointAngles, MAX_JOINTS};
+use armcal_core::optics::Fisheye;
+use armcal_core::robot::Robot;
+
+/// Where each parameter's column is.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Layout {
+    /// Columns 0.. : the joints' parameters, joint by joint.
+    pub parameters: Vec<Parameter>,
+    pub of_joint: Vec<Range<usize>>,
+    pub mount: Option<usize>,
+    pub time: Option<usize>,
+    pub lens: Option<usize>,
+    /// By the robot's tags.
+    pub tags: Vec<Option<usize>>,
+    pub gripper_tag: Option<usize>,
+    pub n: usize,
+}
+
+/// One tag in one view.
+#[derive(Clone, Debug)]
+pub(super) struct Sighting {
+    /// Index into the robot's tags; the gripper's comes after them.
+    pub tag: usize,
+    pub data: Seen,
+    /// Sightings that are out of the estimate keep their place.
+    pub is_used: bool,
+}
+
+/// Measurements with the inverse of their variance.
+#[derive(Clone, Debug)]
+pub(super) enum Seen {
+    Corners { corners_px: [[f64; 2]; 4], half_size_m: f64, info: f64 },
+    Position { in_camera_m: Vector3<f64>, info: f64 },
+    Pose { tag_from_camera: Isometry3<f64>, info_position: f64, info_rotation: f64 },
+}
+
+impl Seen {
+    pub(super) fn n_coordinates(&self) -> usize {
+        match self {
+            Self::Corners { .. } => 8,
+            Self::Position { .. } => 3,
+            Self::Pose { .. } => 6,
+        }
+    }
+}
+
+/// A view as the loops want it.
+#[derive(Clone, Debug)]
+pub(super) struct ViewData {
+    /// Angles without the estimated parameters, rad.
+    pub fixed_rad: [f64; MAX_JOINTS],
+    /// d(angle)/d(parameter) of each column.
+    pub basis: Vec<f64>,
+    pub rate_rad_s: [f64; MAX_JOINTS],
+    /// Variance of the mean reading by its noise alone, rad^2.
+    pub reading_var: [f64; MAX_JOINTS],
+    pub sightings: Range<usize>,
+    pub gripper: Option<usize>,
+    /// Joints whose sensor says nothing in this view.
+    pub is_free: [bool; MAX_JOINTS],
+}
+
+/// Priors of all but the views' own parameters.
+#[derive(Clone, Debug)]
+pub(super) struct Prior {
+    pub joint_mean: DVector<f64>,
+    /// Six rows more than the mean: the mount's prior is in it, and `mount_std` is not looked at.
+    pub joint_info: DMatrix<f64>,
+    pub mount: Isometry3<f64>,
+    pub mount_std: [f64; 6],
+    pub time_std_s: f64,
+    pub lens: Fisheye,
+    pub lens_std: [f64; 8],
+    pub tags: Vec<Isometry3<f64>>,
+    /// Infinite where nothing is known.
+    pub tags_std: Vec<[f64; 6]>,
+    pub gripper_tag: Isometry3<f64>,
+    pub gripper_tag_std: [f64; 6],
+}
+
+#[derive(Clone, Debug)]
+pub(super) struct Problem<'a> {
+    pub robot: &'a Robot,
+    pub layout: Layout,
+    pub views: Vec<ViewData>,
+    pub sightings: Vec<Sighting>,
+    pub prior: Prior,
+    pub scales: Scales,
+    /// Joints before the camera.
+    pub n_before: usize,
+}
+
+/// Everything that is estimated.
+#[derive(Clone, Debug)]
+pub(super) struct State {
+    pub joint: DVector<f64>,
+    pub mount: Isometry3<f64>,
+    pub time_s: f64,
+    pub lens: Fisheye,
+    pub tags: Vec<Isometry3<f64>>,
+    pub gripper_tag: Isometry3<f64>,
+    /// Of each view: what each joint is off beyond the sensor's model, rad.
+    pub joint_error: Vec<[f64; MAX_JOINTS]>,
+    /// Of each view: the camera's pose error.
+    pub camera_error: Vec<Isometry3<f64>>,
+}
+
+impl State {
+    /// Becomes `other` in its own memory; both are of one problem.
+    pub(super) fn copy_from(&mut self, other: &Self) {
+        self.joint.copy_from(&other.joint);
+        self.mount = other.mount;
+        self.time_s = other.time_s;
+        self.lens = other.lens;
+        self.tags.copy_from_slice(&other.tags);
+        self.gripper_tag = other.gripper_tag;
+        self.joint_error.copy_from_slice(&other.joint_error);
+        self.camera_error.copy_from_slice(&other.camera_error);
+    }
+}
+
+/// Least standard deviation of a prior: what is said to be exact stays where it is.
+const MIN_STD: f64 = 1e-9;
+/// Degrees of freedom that the corner noise by robot.toml counts for, beside the scatter between a view's frames.
+const CORNER_PRIOR_DOF: f64 = 16.0;
+
+impl Layout {
+    pub(super) fn new(robot: &Robot, model: &Model, views: &[View]) -> Self {
+        let mut layout = Self { tags: vec![None; robot.tags.len()], ..Self::default() };
+        for (joint, kinds) in model.joints.iter().enumerate() {
+            let start = layout.parameters.len();
+            layout.parameters.extend(kinds.iter().map(|&kind| Parameter { joint, kind }));
+            layout.of_joint.push(start..layout.parameters.len());
+        }
+        layout.n = layout.parameters.len();
+        let mut take = |wanted: bool, n: usize| {
+            let at = layout.n;
+            wanted.then(|| {
+                layout.n += n;
+                at
+            })
+        };
+        layout.mount = take(model.mount, 6);
+        layout.time = take(model.time_offset, 1);
+        layout.lens = take(model.lens, 8);
+        let seen = |tag_idx: usize| views.iter().flat_map(|v| &v.tags).any(|tag| tag.tag_idx == tag_idx);
+        for tag_idx in 0..robot.tags.len() {
+            layout.tags[tag_idx] = take(model.tags && seen(tag_idx), 6);
+        }
+        layout.gripper_tag = take(model.gripper_tag, 6);
+        layout
+    }
+
+    pub(super) fn n_joint(&self) -> usize {
+        self.parameters.len()
+    }
+}
+
+impl<'a> Problem<'a> {
+    pub(super) fn new(
+        robot: &'a Robot,
+        views: &[View],
+        model: &Model,
+        guess: &JointParameters,
+        prior: Prior,
+        scales: Scales,
+    ) -> Self {
+        let layout = Layout::new(robot, model, views);
+        let mut sightings = Vec::new();
+        let mut data = Vec::with_capacity(views.len());
+        for view in views {
+            let from = sightings.len();
+            for tag in &view.tags {
+                let size_m = robot.tags[tag.tag_idx].size_m;
+                let data = match &tag.measured {
+                    Measured::Corners(seen) => corners(robot, seen, size_m),
+                    Measured::Position => {
+                        Seen::Position { in_camera_m: tag.center_in_camera_m, info: scales.position_std_m.powi(-2) }
+                    }
+                    Measured::Pose(camera_from_tag) => Seen::Pose {
+                        tag_from_camera: camera_from_tag.inverse(),
+                        info_position: scales.position_std_m.powi(-2),
+                        info_rotation: scales.rotation_std_rad.powi(-2),
+                    },
+                };
+                sightings.push(Sighting { tag: tag.tag_idx, data, is_used: true });
+            }
+            let to = sightings.len();
+            let gripper_size_m = robot.gripper_tag.filter(|_| model.gripper_tag).map(|tag| tag.size_m);
+            let gripper = view.gripper_tag.as_ref().zip(gripper_size_m).map(|(seen, size_m)| {
+                sightings.push(Sighting { tag: robot.tags.len(), data: corners(robot, seen, size_m), is_used: true });
+                to
+            });
+            data.push(view_data(robot, view, &layout, guess, from..to, gripper));
+        }
+        Self { robot, layout, views: data, sightings, prior, scales, n_before: robot.camera.mount.n_joints }
+    }
+
+    /// The state where nothing is off its prior, but for the joints' parameters, which are `guess`'s.
+    pub(super) fn start(&self, guess: &JointParameters) -> State {
+        let parameters = &self.layout.parameters;
+        State {
+            joint: DVector::from_iterator(parameters.len(), parameters.iter().map(|p| guess.get(*p))),
+            mount: self.prior.mount,
+            time_s: 0.0,
+            lens: self.prior.lens,
+            tags: self.prior.tags.clone(),
+            gripper_tag: self.prior.gripper_tag,
+            joint_error: vec![[0.0; MAX_JOINTS]; self.views.len()],
+            camera_error: vec![Isometry3::identity(); self.views.len()],
+        }
+    }
+
+    /// Variance of what a joint is off in a view beyond the sensor's model, rad^2.
+    pub(super) fn joint_error_var(&self, view: &ViewData, joint: usize) -> f64 {
+        if view.is_free[joint] {
+            return self.scales.free_joint_std_rad.powi(2);
+        }
+        self.scales.joint_std_rad[joint].powi(2) + view.reading_var[joint]
+    }
+
+    pub(super) fn angles(&self, view_idx: usize, state: &State) -> JointAngles {
+        let view = &self.views[view_idx];
+        JointAngles::from_fn(self.robot.n_joints(), |j| {
+            let columns = self.layout.of_joint[j].clone();
+            let estimated: f64 = columns.map(|column| view.basis[column] * state.joint[column]).sum();
+            view.fixed_rad[j] + estimated + state.joint_error[view_idx][j] + view.rate_rad_s[j] * state.time_s
+        })
+    }
+
+    /// One sigma of a standard deviation that is in use: never zero.
+    pub(super) fn at_least(std: f64) -> f64 {
+        std.max(MIN_STD)
+    }
+}
+
+/// Corners with the variance of their mean: the scatter between frames, with robot.toml's figure for a few frames more.
+fn corners(robot: &Robot, seen: &SeenCorners, size_m: f64) -> Seen {
+    let dof = 8.0 * seen.n_frames.saturating_sub(1) as f64;
+    let known_px2 = robot.camera.corner_std_px.powi(2);
+    let one_frame_px2 = (CORNER_PRIOR_DOF * known_px2 + seen.scatter_px2) / (CORNER_PRIOR_DOF + dof);
+    let info = seen.n_frames.max(1) as f64 / one_frame_px2;
+    Seen::Corners { corners_px: seen.corners_px, half_size_m: 0.5 * size_m, info }
+}
+
+fn view_data(
+    robot: &Robot,
+    view: &View,
+    layout: &Layout,
+    guess: &JointParameters,
+    sightings: Range<usize>,
+    gripper: Option<usize>,
+) -> ViewData {
+    let departure = view.conditions.departure_from(&guess.reference);
+    let mut data = ViewData {
+        fixed_rad: [0.0; MAX_JOINTS],
+        basis: Vec::with_capacity(layout.n_joint()),
+        rate_rad_s: [0.0; MAX_JOINTS],
+        reading_var: [0.0; MAX_JOINTS],
+        sightings,
+        gripper,
+        is_free: view.is_free,
+    };
+    for (joint, spec) in robot.sensors.iter().enumerate() {
+        let travel_rad = view.travel_rad[joint];
+        let mut fixed = guess.correction(joint).angle_rad(spec, travel_rad, &departure, view.approach[joint]);
+        for parameter in &layout.parameters[layout.of_joint[joint].clone()] {
+            let by = parameter.kind.angle_derivative(spec, travel_rad, &departure, view.approach[joint]);
+            fixed -= by * guess.get(*parameter);
+            data.basis.push(by);
+        }
+        data.fixed_rad[joint] = fixed;
+        data.rate_rad_s[joint] = view.rate_rad_s[joint];
+        let reading_std_rad = spec.noise_std_counts / spec.counts_per_rad.abs();
+        data.reading_var[joint] = reading_std_rad.powi(2) / view.n_readings.max(1) as f64;
+    }
+    data
+}

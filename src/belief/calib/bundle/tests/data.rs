@@ -1,0 +1,169 @@
+//! Views of an arm drawn from the estimator's own model.
+
+use std::path::Path;
+
+use nalgebra::{Isometry3, Vector6};
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+use crate::calib::associate::{Measured, SeenCorners, TagView, View};
+use crate::calib::bundle::model::{Model, Scales};
+use crate::calib::problem::{JointParameters, Parameter};
+use armcal_core::joints::{JointAngles, MAX_JOINTS};
+use armcal_core::optics::square_corners;
+use armcal_core::robot::{Robot, load};
+use armcal_core::sensor::Conditions;
+use armcal_core::spatial::exp;
+use armcal_core::stats::stream_rng;
+use armcal_core::time::SIMULATION_EPOCH;
+
+pub fn titan() -> Robot {
+    load(&Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("robots/titan4")).expect("the robot reads")
+}
+
+pub fn titan_with_gripper_tag() -> Robot {
+    load(&Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("robots/titan4-gripper-tag"))
+        .expect("the robot reads")
+}
+
+pub fn normal(rng: &mut ChaCha8Rng) -> f64 {
+    StandardNormal.sample(rng)
+}
+
+/// An arm as it really is.
+#[derive(Clone, Debug)]
+pub struct Truth {
+    pub parameters: JointParameters,
+    pub mount: Isometry3<f64>,
+    pub tags: Vec<Isometry3<f64>>,
+    pub gripper_tag: Option<Isometry3<f64>>,
+}
+
+fn moved(pose: &Isometry3<f64>, std_m: f64, std_rad: f64, rng: &mut ChaCha8Rng) -> Isometry3<f64> {
+    pose * exp(&Vector6::from_fn(|k, _| normal(rng) * if k < 3 { std_m } else { std_rad }))
+}
+
+impl Truth {
+    /// Drawn from the priors of `model` under `scales`.
+    pub fn draw(robot: &Robot, model: &Model, scales: &Scales, rng: &mut ChaCha8Rng) -> Self {
+        let mut parameters = JointParameters { reference: reference(), ..JointParameters::default() };
+        for (joint, kinds) in model.joints.iter().enumerate() {
+            for &kind in kinds {
+                let parameter = Parameter { joint, kind };
+                let std = scales.prior_std(&robot.sensors[joint], joint, kind);
+                parameters.set(parameter, parameters.get(parameter) + std * normal(rng));
+            }
+        }
+        let camera = &robot.camera;
+        let mount = &camera.mount.link_from_frame;
+        let mount = if model.mount { moved(mount, camera.mount_std_m, camera.mount_std_rad, rng) } else { *mount };
+        let tags = robot.tags.iter().map(|tag| {
+            let pose = tag.base_from_tag.isometry();
+            if model.tags { moved(pose, tag.position_std_m, tag.rotation_std_rad, rng) } else { *pose }
+        });
+        let tags = tags.collect();
+        let gripper_tag = robot
+            .gripper_tag
+            .filter(|_| model.gripper_tag)
+            .map(|tag| moved(&tag.mount.link_from_frame, tag.position_std_m, tag.rotation_std_rad, rng));
+        Self { parameters, mount, tags, gripper_tag }
+    }
+
+    pub fn angles(&self, robot: &Robot, view: &View) -> JointAngles {
+        let departure = view.conditions.departure_from(&self.parameters.reference);
+        JointAngles::from_fn(robot.n_joints(), |j| {
+            let correction = self.parameters.correction(j);
+            correction.angle_rad(&robot.sensors[j], view.travel_rad[j], &departure, view.approach[j])
+        })
+    }
+}
+
+pub fn reference() -> Conditions {
+    Conditions { oil_c: Some(13.0), pressure_pa: Some(2e7), stamp: Some(SIMULATION_EPOCH) }
+}
+
+/// What is measured of each tag.
+#[derive(Clone, Copy, Debug)]
+pub struct Noise {
+    pub corner_px: f64,
+    pub n_frames: usize,
+    /// Of each joint in each view, rad.
+    pub joint_rad: [f64; MAX_JOINTS],
+}
+
+/// `n` views at random poses that see three tags or more.
+pub fn views(robot: &Robot, truth: &Truth, noise: &Noise, n: usize, rng: &mut ChaCha8Rng) -> Vec<View> {
+    let mut out: Vec<View> = Vec::new();
+    while out.len() < n {
+        let travel_rad = JointAngles::from_fn(robot.n_joints(), |j| {
+            let half = robot.sensors[j].half_range_rad.min(1.3);
+            rng.random_range(-0.85..0.85) * half
+        });
+        let idx = out.len() as u32;
+        let mut view = View::of_reading(idx, SIMULATION_EPOCH.plus_s(20.0 * f64::from(idx)), travel_rad);
+        view.conditions = Conditions {
+            oil_c: Some(10.0 + 6.0 * out.len() as f64 / n as f64),
+            pressure_pa: Some(2e7),
+            stamp: Some(view.end),
+        };
+        for (joint, approach) in view.approach.iter_mut().enumerate().take(robot.n_joints()) {
+            *approach = if (out.len() + joint).is_multiple_of(2) { 1.0 } else { -1.0 };
+        }
+        look(robot, truth, noise, &mut view, rng);
+        if view.tags.len() >= 3 {
+            out.push(view);
+        }
+    }
+    out
+}
+
+fn look(robot: &Robot, truth: &Truth, noise: &Noise, view: &mut View, rng: &mut ChaCha8Rng) {
+    let mut angles = truth.angles(robot, view);
+    for (angle, std) in angles.iter_mut().zip(noise.joint_rad) {
+        *angle += std * normal(rng);
+    }
+    let poses = robot.chain.link_poses(&angles);
+    let base_from_camera = poses.link(robot.camera.mount.n_joints) * truth.mount;
+    for (tag_idx, tag) in robot.tags.iter().enumerate() {
+        let camera_from_tag = base_from_camera.inv_mul(&truth.tags[tag_idx]);
+        let center = camera_from_tag.translation.vector;
+        let facing = -(camera_from_tag.rotation * nalgebra::Vector3::z()).dot(&center) / center.norm();
+        if !(0.25..2.0).contains(&center.norm()) || facing < 0.45 {
+            continue;
+        }
+        if let Some(seen) = seen_corners(robot, &camera_from_tag, tag.size_m, noise, rng) {
+            let measured = Measured::Corners(seen);
+            view.tags.push(TagView { id: tag.id, tag_idx, center_in_camera_m: center, measured });
+        }
+    }
+    if let (Some(tag), Some(link_from_tag)) = (&robot.gripper_tag, &truth.gripper_tag) {
+        let camera_from_tag = base_from_camera.inv_mul(&(poses.link(tag.mount.n_joints) * link_from_tag));
+        view.gripper_tag = seen_corners(robot, &camera_from_tag, tag.size_m, noise, rng);
+    }
+}
+
+fn seen_corners(
+    robot: &Robot,
+    camera_from_tag: &Isometry3<f64>,
+    size_m: f64,
+    noise: &Noise,
+    rng: &mut ChaCha8Rng,
+) -> Option<SeenCorners> {
+    let std_px = noise.corner_px / (noise.n_frames as f64).sqrt();
+    let mut corners_px = [[0.0; 2]; 4];
+    for (pixel, corner) in corners_px.iter_mut().zip(square_corners(size_m)) {
+        let seen = robot.camera.lens.project(&(camera_from_tag * corner).coords)?;
+        if !robot.camera.lens.contains(&seen) {
+            return None;
+        }
+        *pixel = [seen.x + std_px * normal(rng), seen.y + std_px * normal(rng)];
+    }
+    let dof = 8 * (noise.n_frames - 1);
+    let scatter_px2 = (0..dof).map(|_| (noise.corner_px * normal(rng)).powi(2)).sum();
+    Some(SeenCorners { corners_px, n_frames: noise.n_frames, scatter_px2 })
+}
+
+pub fn rng(seed: u64, name: &str) -> ChaCha8Rng {
+    stream_rng(seed, name)
+}

@@ -1,0 +1,164 @@
+//! Gradient and curvature against differences of the cost.
+
+use nalgebra::DVector;
+use rand::RngExt;
+
+use super::data::{Noise, Truth, normal, reference, rng, titan_with_gripper_tag, views};
+use crate::calib::associate::{Measured, View};
+use crate::calib::bundle::estimate::{BundleInput, Evidence, model_for, prior};
+use crate::calib::bundle::linearize::Normal;
+use crate::calib::bundle::model::{Model, Scales};
+use crate::calib::bundle::problem::{Problem, State};
+use crate::calib::bundle::robust::Loss;
+use crate::calib::bundle::solve::{LOOSE, StopRule, solve, stepped};
+use crate::calib::problem::JointParameters;
+use armcal_core::joints::MAX_JOINTS;
+use armcal_core::robot::Robot;
+
+struct Case {
+    robot: Robot,
+    views: Vec<View>,
+    model: Model,
+    scales: Scales,
+}
+
+/// A little of everything: corners, positions, poses, gripper tag, lens, clock.
+fn case(seed: u64) -> Case {
+    let robot = titan_with_gripper_tag();
+    let mut rng = rng(seed, "equations");
+    let mut scales = Scales::datasheet(&robot);
+    scales.camera_error_std = Some([0.003, 0.004]);
+    let mut model = Model {
+        joints: vec![Vec::new(); robot.n_joints()],
+        mount: true,
+        lens: true,
+        tags: true,
+        gripper_tag: true,
+        time_offset: true,
+    };
+    let truth = Truth::draw(&robot, &model, &scales, &mut rng);
+    let noise = Noise { corner_px: 0.3, n_frames: 5, joint_rad: [1e-3; MAX_JOINTS] };
+    let mut views = views(&robot, &truth, &noise, 10, &mut rng);
+    model.joints = model_for(&robot, &views).joints;
+    for (k, view) in views.iter_mut().enumerate() {
+        for rate in view.rate_rad_s.iter_mut() {
+            *rate = rng.random_range(-0.05..0.05);
+        }
+        for tag in &mut view.tags {
+            let base_from_camera = robot
+                .chain
+                .link_poses(&truth.angles(
+                    &robot,
+                    &View {
+                        conditions: reference(),
+                        ..View::of_reading(0, armcal_core::time::SIMULATION_EPOCH, view.travel_rad)
+                    },
+                ))
+                .frame(&robot.camera.mount);
+            match k % 3 {
+                1 => tag.measured = Measured::Position,
+                2 => tag.measured = Measured::Pose(base_from_camera.inv_mul(&truth.tags[tag.tag_idx])),
+                _ => {}
+            }
+        }
+    }
+    Case { robot, views, model, scales }
+}
+
+fn problem(case: &Case) -> Problem<'_> {
+    let guess = JointParameters { reference: reference(), ..JointParameters::default() };
+    let input = BundleInput {
+        robot: &case.robot,
+        views: &case.views,
+        model: case.model.clone(),
+        scales: case.scales.clone(),
+        guess,
+        joint_prior: None,
+        evidence: Evidence::Given,
+    };
+    Problem::new(&case.robot, &case.views, &case.model, &guess, prior(&input, &case.scales), case.scales.clone())
+}
+
+/// A state a little off the prior's means, the views' own parameters settled.
+fn settled(problem: &Problem<'_>, seed: u64) -> State {
+    let mut rng = rng(seed, "state");
+    let guess = JointParameters { reference: reference(), ..JointParameters::default() };
+    let solved = solve(problem, problem.start(&guess), Loss::Square, LOOSE);
+    let off = DVector::from_fn(problem.layout.n, |k, _| 0.3 * normal(&mut rng) / solved.normal.matrix[(k, k)].sqrt());
+    let mut state = stepped(problem, &solved.state, &solved.normal, &off);
+    let still = DVector::zeros(problem.layout.n);
+    let mut normal = Normal::new(problem);
+    for _ in 0..30 {
+        normal.update(problem, &state, Loss::Square);
+        state = stepped(problem, &state, &normal, &still);
+    }
+    state
+}
+
+fn cost(problem: &Problem<'_>, state: &State) -> f64 {
+    let mut normal = Normal::new(problem);
+    normal.update(problem, state, Loss::Square);
+    normal.cost
+}
+
+#[test]
+fn the_gradient_is_that_of_the_cost_for_each_column() {
+    /// In units of a column's sigma with all others held; the difference quotient's own error is far below.
+    const STEP: f64 = 1e-3;
+    const TOLERANCE: f64 = 2e-3;
+    for seed in 0..3 {
+        let case = case(seed);
+        let problem = problem(&case);
+        let state = settled(&problem, seed);
+        let mut normal = Normal::new(&problem);
+        normal.update(&problem, &state, Loss::Square);
+        let mut largest = 0.0_f64;
+        for column in 0..problem.layout.n {
+            let sigma = normal.matrix[(column, column)].sqrt().recip();
+            let at = |sign: f64| {
+                let step =
+                    DVector::from_fn(problem.layout.n, |k, _| if k == column { sign * STEP * sigma } else { 0.0 });
+                cost(&problem, &stepped(&problem, &state, &normal, &step))
+            };
+            let numeric = (at(1.0) - at(-1.0)) / (2.0 * STEP);
+            let analytic = -2.0 * normal.right[column] * sigma;
+            largest = largest.max(analytic.abs());
+            assert!(
+                (numeric - analytic).abs() < TOLERANCE * (1.0 + analytic.abs()),
+                "seed {seed}, column {column} of {}: {numeric} by differences, {analytic}",
+                problem.layout.n
+            );
+        }
+        assert!(largest > 0.1, "nothing pulls: the test would pass with any gradient");
+    }
+}
+
+#[test]
+fn the_curvature_is_that_of_the_cost_where_nothing_is_off() {
+    /// Residuals at the minimum bend the cost a little beside Gauss and Newton's matrix.
+    const TOLERANCE: f64 = 0.03;
+    let case = case(7);
+    let problem = problem(&case);
+    let guess = JointParameters { reference: reference(), ..JointParameters::default() };
+    let stop = StopRule { max_iterations: 200, relative_gain: 1e-16 };
+    let solved = solve(&problem, problem.start(&guess), Loss::Square, stop);
+    let n = problem.layout.n;
+    let full = nalgebra::DMatrix::from_fn(n, n, |i, k| solved.normal.matrix[(i.max(k), i.min(k))]);
+    let mut rng = rng(7, "directions");
+    for _ in 0..60 {
+        // A few columns at a time, so that each block matters somewhere.
+        let columns: Vec<usize> = (0..3).map(|_| rng.random_range(0..n)).collect();
+        let step =
+            DVector::from_fn(
+                n,
+                |k, _| {
+                    if columns.contains(&k) { 0.3 * normal(&mut rng) / full[(k, k)].sqrt() } else { 0.0 }
+                },
+            );
+        let expected = step.dot(&(&full * &step));
+        let sum = cost(&problem, &stepped(&problem, &solved.state, &solved.normal, &step))
+            + cost(&problem, &stepped(&problem, &solved.state, &solved.normal, &-&step));
+        let found = 0.5 * (sum - 2.0 * solved.normal.cost);
+        assert!((found - expected).abs() < TOLERANCE * expected, "{columns:?}: {found} for {expected}");
+    }
+}

@@ -1,0 +1,101 @@
+//! Held-out figures without views of their own: k-fold cross-validation (Stone 1974), by views, for all tags of one view share errors.
+
+use super::associate::View;
+use super::bundle::set_by_camera;
+use super::problem::{JointParameters, PositionProblem};
+use super::result::HeldOutFigures;
+use armcal_core::robot::Robot;
+
+/// Views are left out in this many turns, every fifth in the order of time.
+pub(super) const FOLDS: usize = 5;
+
+/// The views that a fold is fitted to, and those that it leaves out.
+pub(super) fn fold_of(views: &[View], fold: usize) -> (Vec<View>, Vec<View>) {
+    let of = |wanted: bool| -> Vec<View> {
+        let views = views.iter().enumerate();
+        views.filter(|(k, _)| (k % FOLDS == fold) == wanted).map(|(_, view)| view.clone()).collect()
+    };
+    (of(false), of(true))
+}
+
+/// Each view by the parameters that `fit` finds from the views of the other folds; those of a fold that has no answer do not count.
+pub(super) fn held_out_figures(
+    robot: &Robot,
+    views: &[View],
+    fit: impl Fn(&[View]) -> Option<JointParameters>,
+) -> HeldOutFigures {
+    let mut sum = HeldOutSum::default();
+    for fold in 0..FOLDS {
+        let (fitted, left_out) = fold_of(views, fold);
+        if fitted.is_empty() || left_out.is_empty() {
+            continue;
+        }
+        if let Some(at) = fit(&fitted) {
+            sum.add(&left_out, robot, &at, robot);
+        }
+    }
+    sum.figures()
+}
+
+/// Sums over the folds.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct HeldOutSum {
+    n_views: usize,
+    /// Landmarks seen, and squares and sizes of their distances.
+    n: usize,
+    sum_m2: f64,
+    sum_m: f64,
+    nominal_m2: f64,
+    /// Of those, the ones with corners.
+    n_corners: usize,
+    sum_px2: f64,
+    /// And the ones with poses.
+    n_poses: usize,
+    camera_sum_m: f64,
+}
+
+/// The views with the angles that their tags show where a sensor says nothing.
+fn by_camera(views: &[View], robot: &Robot, at: &JointParameters) -> Vec<View> {
+    let mut views = views.to_vec();
+    for view in &mut views {
+        set_by_camera(robot, view, at);
+    }
+    views
+}
+
+impl HeldOutSum {
+    /// Adds views left out, by what was found without them: the arm as found, and its parameters; `nominal` is the drawing.
+    pub fn add(&mut self, left_out: &[View], as_found: &Robot, at: &JointParameters, nominal: &Robot) {
+        let (by_found, by_drawing) =
+            (by_camera(left_out, as_found, at), by_camera(left_out, nominal, &JointParameters::default()));
+        let problem = PositionProblem::new(as_found, &by_found);
+        problem.each(at, |o| {
+            self.n += 1;
+            self.sum_m2 += o.residual_m.norm_squared();
+            self.sum_m += o.residual_m.norm();
+            self.n_corners += usize::from(o.tag.corners().is_some());
+            if let Some(off_m) = problem.camera_off_m(o) {
+                self.n_poses += 1;
+                self.camera_sum_m += off_m;
+            }
+        });
+        let seen = left_out.iter().flat_map(|view| &view.tags).filter(|tag| tag.corners().is_some()).count() as f64;
+        self.sum_px2 += problem.reprojection_rms_px(at).map_or(0.0, |rms_px| rms_px * rms_px * seen);
+        PositionProblem::new(nominal, &by_drawing)
+            .each(&JointParameters::default(), |o| self.nominal_m2 += o.residual_m.norm_squared());
+        self.n_views += left_out.iter().filter(|view| !view.tags.is_empty()).count();
+    }
+
+    pub fn figures(&self) -> HeldOutFigures {
+        let mean = |sum: f64, n: usize| (n > 0).then(|| sum / n as f64);
+        HeldOutFigures {
+            views: self.n_views,
+            in_turn: true,
+            rms_m: mean(self.sum_m2, self.n).map(f64::sqrt),
+            mean_m: mean(self.sum_m, self.n),
+            camera_mean_m: mean(self.camera_sum_m, self.n_poses),
+            rms_px: mean(self.sum_px2, self.n_corners).map(f64::sqrt),
+            nominal_rms_m: mean(self.nominal_m2, self.n).map(f64::sqrt),
+        }
+    }
+}

@@ -1,0 +1,51 @@
+//! `[model]` of calibration.toml: what was estimated, and the sizes that the data gave the unknown errors.
+
+use serde::{Deserialize, Serialize};
+
+use super::bundle::{Doubtful, Estimate, Selection};
+use armcal_core::robot::Robot;
+
+/// What `bundle` took for its model.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ModelTable {
+    /// Measurement noise over what was stated for it.
+    pub noise_scale: f64,
+    /// Positions or poses that a recording gave in place of corners: their noise.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub position_std_m: Option<f64>,
+    /// The error of the camera's pose that all tags of a view share: translation m, rotation rad.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub camera_error_std: Option<[f64; 2]>,
+    /// How much later the joint sensors' stamps are than the camera's, and one sigma.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub time_offset_s: Option<[f64; 2]>,
+    /// One sigma of each joint's nonlinearity, rad; joints that are not estimated have none.
+    pub nonlinearity_std_rad: Vec<f64>,
+    /// Terms that the evidence decided on: `drift: in, 12.3 nats`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub decided: Vec<String>,
+}
+
+impl ModelTable {
+    pub(super) fn of(robot: &Robot, found: &Estimate<'_>, selections: &[Selection]) -> Self {
+        let scales = found.scales();
+        let n_estimated = found.joint_parameters().last().map_or(0, |p| p.joint + 1);
+        let name = |term| match term {
+            Doubtful::CameraError => "camera error shared by a view",
+            Doubtful::TimeOffset => "time offset",
+            Doubtful::Drift => "drift",
+        };
+        let decided = |s: &Selection| {
+            format!("{}: {}, {:+.1} nats", name(s.term), if s.is_in { "in" } else { "out" }, s.gain_nats)
+        };
+        Self {
+            noise_scale: scales.noise,
+            position_std_m: found.has_positions().then_some(scales.noise * scales.position_std_m),
+            camera_error_std: scales.camera_error_std,
+            time_offset_s: found.time_offset_s(),
+            nonlinearity_std_rad: scales.shape_std_rad[..n_estimated.min(robot.n_joints())].to_vec(),
+            decided: selections.iter().map(decided).collect(),
+        }
+    }
+}

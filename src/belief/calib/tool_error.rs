@@ -1,0 +1,130 @@
+//! How sure the tool's position and orientation are, by the covariance of the sensors' parameters.
+//!
+//! `J P J^T + sum_j (dx/dtheta_j) (dx/dtheta_j)^T s_j^2`: P the covariance of the estimated parameters, J the tool's derivative by
+//! them, and s_j^2 what each joint has besides: the datasheet's variance of what was not estimated, and of what no parameter
+//! describes.
+
+use nalgebra::{DMatrix, Matrix3, Matrix6, SMatrix, SVector, Vector3, Vector6};
+
+use super::problem::{Parameter, ParameterKind};
+use super::uncertainty::ParameterCovariance;
+use armcal_core::kinematics::LinkPoses;
+use armcal_core::robot::Robot;
+use armcal_core::sensor::{ArmSensors, Conditions, Departure};
+use armcal_core::streams::JointAngles;
+
+impl ParameterCovariance {
+    /// Covariance of the tool's position (base frame, m^2) for an arm at `angles` under the sensors' reference conditions.
+    #[must_use]
+    pub fn tool_position_m2(&self, robot: &Robot, sensors: &ArmSensors, angles: &JointAngles) -> Matrix3<f64> {
+        self.tool_position_under_m2(robot, sensors, angles, &sensors.reference)
+    }
+
+    /// Covariance of the tool's position (base frame, m^2) for an arm at `angles` under `conditions`.
+    ///
+    /// Estimated parameters enter with their covariance, the others with the datasheet's sigma, and every sensor with
+    /// what its parameters leave ([`Self::residual_std_rad`]) and its play.
+    #[must_use]
+    pub fn tool_position_under_m2(
+        &self,
+        robot: &Robot,
+        sensors: &ArmSensors,
+        angles: &JointAngles,
+        conditions: &Conditions,
+    ) -> Matrix3<f64> {
+        let at = Posture::new(robot, sensors, angles, conditions);
+        self.carried(&at, |joint| at.poses.point_jacobian(joint, &at.tool_m))
+    }
+
+    /// Covariance of the tool's pose: position (m) in the first three rows, then orientation (rad, a small turn about the axes of the
+    /// base frame), both in the base frame.
+    #[must_use]
+    pub fn tool_pose(
+        &self,
+        robot: &Robot,
+        sensors: &ArmSensors,
+        angles: &JointAngles,
+        conditions: &Conditions,
+    ) -> Matrix6<f64> {
+        let at = Posture::new(robot, sensors, angles, conditions);
+        self.carried(&at, |joint| {
+            let (by_angle, axis) = (at.poses.point_jacobian(joint, &at.tool_m), at.poses.axis(joint));
+            Vector6::new(by_angle.x, by_angle.y, by_angle.z, axis.x, axis.y, axis.z)
+        })
+    }
+
+    /// To what has the derivative `by_angle` by each joint's angle.
+    fn carried<const R: usize>(
+        &self,
+        at: &Posture<'_>,
+        by_angle: impl Fn(usize) -> SVector<f64, R>,
+    ) -> SMatrix<f64, R, R> {
+        let mut estimated = DMatrix::zeros(R, self.parameters.len());
+        let mut covariance = SMatrix::<f64, R, R>::zeros();
+        for joint in 0..at.robot.tool.mount.n_joints {
+            let by_angle = by_angle(joint);
+            let model = &at.sensors.models[joint];
+            let travel_rad = model.travel_under_rad(at.angles[joint], &at.departure);
+            for kind in ParameterKind::all() {
+                let parameter = Parameter { joint, kind };
+                let row = self.parameters.iter().position(|p| *p == parameter);
+                let prior_std = parameter.prior_std(at.robot);
+                if row.is_none() && prior_std == 0.0 {
+                    continue;
+                }
+                let by_parameter = by_angle * kind.angle_derivative(&model.spec, travel_rad, &at.departure, 0.0);
+                match row {
+                    Some(column) => estimated.fixed_view_mut::<R, 1>(0, column).copy_from(&by_parameter),
+                    None => covariance += outer(&(by_parameter * prior_std)),
+                }
+            }
+            covariance += outer(&(by_angle * self.residual_std_rad(at.robot, joint)));
+            let wandered_rad2 = self.wandered_rad2(at, joint) + model.correction.terms.half_play_rad.powi(2);
+            if wandered_rad2 > 0.0 {
+                covariance += outer(&by_angle) * wandered_rad2;
+            }
+        }
+        let full = &estimated * &self.matrix * estimated.transpose();
+        covariance + full.fixed_view::<R, R>(0, 0)
+    }
+
+    /// One sigma of what the parameters leave of the error of `joint`'s sensor.
+    fn residual_std_rad(&self, robot: &Robot, joint: usize) -> f64 {
+        self.residual_std_rad.map_or(robot.sensors[joint].linearity_std_rad, |std_rad| std_rad[joint])
+    }
+
+    /// Variance of the datasheet's random walk since the reference, where no drift was estimated.
+    fn wandered_rad2(&self, at: &Posture<'_>, joint: usize) -> f64 {
+        let drift = Parameter { joint, kind: ParameterKind::DriftPerH };
+        if self.parameters.contains(&drift) {
+            return 0.0;
+        }
+        at.robot.sensors[joint].drift_std_rad_per_sqrt_h.powi(2) * at.departure.elapsed_h.abs()
+    }
+}
+
+/// An arm at angles under conditions.
+struct Posture<'a> {
+    robot: &'a Robot,
+    sensors: &'a ArmSensors,
+    angles: &'a JointAngles,
+    departure: Departure,
+    poses: LinkPoses,
+    /// Base frame.
+    tool_m: Vector3<f64>,
+}
+
+impl<'a> Posture<'a> {
+    fn new(robot: &'a Robot, sensors: &'a ArmSensors, angles: &'a JointAngles, conditions: &Conditions) -> Self {
+        let poses = robot.chain.link_poses(angles);
+        let tool_m = poses.frame(&robot.tool.mount).translation.vector;
+        Self { robot, sensors, angles, departure: conditions.departure_from(&sensors.reference), poses, tool_m }
+    }
+}
+
+fn outer<const R: usize>(v: &SVector<f64, R>) -> SMatrix<f64, R, R> {
+    v * v.transpose()
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,86 @@
+//! When enough views are taken.
+
+use armcal_core::routine::CaptureSettings;
+
+/// Why no more views are taken.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Stop {
+    /// The running estimate predicts less than `capture.stop_at_tool_error_m` at the task (root mean square).
+    ToolError { predicted_tool_error_m: f64 },
+    /// `capture.poses` are taken.
+    Poses,
+    /// `capture.max_time_s` has passed.
+    Time,
+    /// There is no pose left that sees enough and keeps clear.
+    NoPoseLeft,
+}
+
+/// Where a capture stands.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CaptureState {
+    /// Fitted views taken.
+    pub taken: usize,
+    /// Poses that may still be taken.
+    pub left: usize,
+    /// Since its start, by the arm's clock.
+    pub elapsed_s: f64,
+    /// Root mean square at the task's targets; `None` where nothing has been estimated.
+    pub predicted_tool_error_m: Option<f64>,
+}
+
+impl Stop {
+    /// What ends a capture at `state`, the good reason first; `None`: go on.
+    #[must_use]
+    pub fn decide(capture: &CaptureSettings, state: &CaptureState) -> Option<Self> {
+        if let (Some(limit_m), Some(predicted_tool_error_m)) =
+            (capture.stop_at_tool_error_m, state.predicted_tool_error_m)
+            && predicted_tool_error_m <= limit_m
+        {
+            return Some(Self::ToolError { predicted_tool_error_m });
+        }
+        if state.taken >= capture.poses as usize {
+            return Some(Self::Poses);
+        }
+        if capture.max_time_s.is_some_and(|limit_s| state.elapsed_s >= limit_s) {
+            return Some(Self::Time);
+        }
+        (state.left == 0).then_some(Self::NoPoseLeft)
+    }
+}
+
+impl std::fmt::Display for Stop {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::ToolError { predicted_tool_error_m } => {
+                write!(f, "the predicted tool error is {:.2} mm", predicted_tool_error_m * 1e3)
+            }
+            Self::Poses => write!(f, "all views are taken"),
+            Self::Time => write!(f, "the time is spent"),
+            Self::NoPoseLeft => write!(f, "no pose is left that sees enough tags and keeps clear"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn settings(more: &str) -> CaptureSettings {
+        toml::from_str(&format!("poses = 10\n{more}")).expect("settings")
+    }
+
+    #[test]
+    fn the_first_reason_that_holds_is_given() {
+        let going = CaptureState { taken: 4, left: 20, elapsed_s: 100.0, predicted_tool_error_m: Some(0.003) };
+        let both = settings("stop_at_tool_error_m = 0.002\nmax_time_s = 200.0");
+        assert_eq!(Stop::decide(&both, &going), None);
+        let good = CaptureState { predicted_tool_error_m: Some(0.0019), taken: 10, left: 0, elapsed_s: 1e3 };
+        assert_eq!(Stop::decide(&both, &good), Some(Stop::ToolError { predicted_tool_error_m: 0.0019 }));
+        assert_eq!(Stop::decide(&settings(""), &good), Some(Stop::Poses));
+        assert_eq!(Stop::decide(&settings(""), &CaptureState { taken: 9, left: 1, ..good }), None);
+        assert_eq!(Stop::decide(&both, &CaptureState { elapsed_s: 200.0, ..going }), Some(Stop::Time));
+        assert_eq!(Stop::decide(&both, &CaptureState { left: 0, ..going }), Some(Stop::NoPoseLeft));
+        let unknown = CaptureState { predicted_tool_error_m: None, ..going };
+        assert_eq!(Stop::decide(&both, &unknown), None);
+    }
+}

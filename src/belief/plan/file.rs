@@ -1,0 +1,331 @@
+//! plan.toml: a plan as operators, checks and pictures read it.
+
+use std::path::Path as FilePath;
+
+use serde::{Deserialize, Serialize};
+
+use super::clearance::Nearest;
+use super::itinerary::{ArmBelief, Itinerary, LeastClearance, PlanStop, Visit};
+use super::timing::Timing;
+use armcal_core::robot::{FileIssue, Robot, RobotError, parse_toml, read_text};
+use armcal_core::streams::{CaptureSet, JointAngles, MAX_JOINTS};
+
+/// One plan, as its file has it. Angles are believed ones, in rad; counts are what the arm's controller is sent for them.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PlanFile {
+    pub version: u32,
+    pub routine: String,
+    pub robot: String,
+    pub vehicle: String,
+    pub seed: u64,
+    /// Of the routine with what was replaced in it, the robot's and the vehicle's files, the prior and the program's version.
+    pub inputs_hash: String,
+    /// `datasheet`, or the hash of the messages that the calibration given as a prior rests on.
+    pub prior: String,
+    /// Joints in the order of all lists, base first.
+    pub joints: Vec<String>,
+    /// Free water kept beyond what the sensors may hide, m.
+    pub margin_m: f64,
+    pub start_rad: Vec<f64>,
+    pub start_counts: Vec<f64>,
+    /// What of the task cannot be reached under this belief.
+    pub warnings: Vec<String>,
+    pub totals: PlanTotals,
+    pub pose: Vec<PoseTable>,
+    /// `path[n]` leads to `pose[n]`.
+    pub path: Vec<PathTable>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub left_out: Vec<LeftOutTable>,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PlanTotals {
+    pub poses: usize,
+    /// Poses chosen that no path leads to.
+    pub left_out: usize,
+    /// Paths, coming to rest and looking.
+    pub arm_time_s: f64,
+    /// Paths alone.
+    pub motion_s: f64,
+    /// Least over all paths, for every arm within the error bounds.
+    pub least_clearance_m: f64,
+    /// Root mean square over the task's targets after the last view; absent where nothing predicts it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub predicted_tool_error_m: Option<f64>,
+    pub stop_reason: PlanStop,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PoseTable {
+    /// From 1, in the order of visits.
+    pub number: usize,
+    pub set: SetName,
+    pub angles_rad: Vec<f64>,
+    pub raw_counts: Vec<f64>,
+    /// Largest distance of each joint's true angle from the believed one.
+    pub error_bound_rad: Vec<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub predicted_tool_error_m: Option<f64>,
+    /// Of an arm that is where it is believed to be, beyond what the vehicle's motion takes; 0.4 stands for all above.
+    pub clearance_m: f64,
+    /// Of every arm within the error bounds.
+    pub proven_clearance_m: f64,
+    /// The two that are nearest; absent where nothing is within 0.4 m.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub clearance_between: Vec<String>,
+    /// By the arm's clock since the start, when the view is taken.
+    pub arm_time_s: f64,
+    pub tags: Vec<TagTable>,
+}
+
+/// What a view is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SetName {
+    Fit,
+    HeldOut,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TagTable {
+    pub id: u32,
+    /// That the camera sees it, under the belief.
+    pub probability: f64,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PathTable {
+    /// 0 is the start.
+    pub from: usize,
+    pub to: usize,
+    pub duration_s: f64,
+    pub clearance_m: f64,
+    pub proven_clearance_m: f64,
+    /// Both ends included; straight lines in joint space between, each from rest to rest.
+    pub waypoints_rad: Vec<Vec<f64>>,
+    pub waypoints_counts: Vec<Vec<f64>>,
+    /// Of the edge behind each waypoint but the last; those that must be driven slowly take longer than their joints need.
+    pub edge_durations_s: Vec<f64>,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LeftOutTable {
+    pub angles_rad: Vec<f64>,
+    pub reason: String,
+}
+
+/// Digits of the file: a millionth of a radian is a few micrometres at the tool.
+const RAD_DIGITS: f64 = 1e6;
+const COUNT_DIGITS: f64 = 1e3;
+const LENGTH_DIGITS: f64 = 1e5;
+const TIME_DIGITS: f64 = 1e3;
+
+const HEAD: &str = "\
+# Poses to look from and the paths between them, planned before anything moves. Angles (rad) are believed ones; raw counts are the
+# set-points that an operator commands for them. Every arm within error_bound_rad keeps proven_clearance_m.
+";
+
+impl PlanFile {
+    /// The itinerary with what it was planned for. `header` gives names and hashes; the rest of it is replaced.
+    #[must_use]
+    pub fn new(header: PlanHeader, itinerary: &Itinerary, belief: &ArmBelief, robot: &Robot) -> Self {
+        let writer = Writer { belief, robot, timing: Timing::new(robot) };
+        let visits = &itinerary.visits;
+        let least_m = visits.iter().map(|visit| visit.path_clearance.proven_m).fold(f64::INFINITY, f64::min);
+        Self {
+            version: 1,
+            routine: header.routine,
+            robot: robot.name.clone(),
+            vehicle: header.vehicle,
+            seed: header.seed,
+            inputs_hash: header.inputs_hash,
+            prior: belief.calibration.as_ref().map_or_else(|| "datasheet".to_owned(), |c| c.messages_hash.clone()),
+            joints: robot.joint_names(),
+            margin_m: header.margin_m,
+            start_rad: radians(&itinerary.start),
+            start_counts: writer.counts(&itinerary.start),
+            warnings: itinerary.warnings.clone(),
+            totals: PlanTotals {
+                poses: visits.len(),
+                left_out: itinerary.left_out.len(),
+                arm_time_s: rounded(itinerary.arm_time_s, TIME_DIGITS),
+                motion_s: rounded(visits.iter().map(|visit| visit.duration_s).sum(), TIME_DIGITS),
+                least_clearance_m: floored(least_m.min(1.0), LENGTH_DIGITS),
+                predicted_tool_error_m: visits.last().and_then(predicted),
+                stop_reason: itinerary.stop,
+            },
+            pose: visits.iter().enumerate().map(|(n, visit)| writer.pose(n + 1, visit)).collect(),
+            path: visits.iter().enumerate().map(|(n, visit)| writer.path(n, visit)).collect(),
+            left_out: itinerary
+                .left_out
+                .iter()
+                .map(|left| LeftOutTable { angles_rad: radians(&left.angles), reason: left.why.to_string() })
+                .collect(),
+        }
+    }
+
+    /// The file's text.
+    ///
+    /// # Panics
+    /// Never: every value here has a TOML form.
+    #[must_use]
+    pub fn to_toml(&self) -> String {
+        let body = toml::to_string(self).expect("plain tables and finite numbers have a TOML form");
+        format!("{HEAD}{body}")
+    }
+
+    /// Reads a plan.
+    ///
+    /// # Errors
+    /// [`RobotError`] naming file, key and allowed range.
+    pub fn read(file: &FilePath) -> Result<Self, RobotError> {
+        let plan: Self = parse_toml(file, &read_text(file)?)?;
+        plan.check(file)?;
+        Ok(plan)
+    }
+
+    fn check(&self, file: &FilePath) -> Result<(), FileIssue> {
+        let range = |key: &str, value: f64, range| FileIssue::check_range(file, key, value, range).map(|_| ());
+        range("version", f64::from(self.version), 1.0..=1.0)?;
+        range("joints (number)", self.joints.len() as f64, 1.0..=MAX_JOINTS as f64)?;
+        range("margin_m", self.margin_m, 0.0..=1.0)?;
+        let numbers = |key: String, list: &[f64]| {
+            if list.len() != self.joints.len() {
+                let problem = format!("has {} numbers, there are {} joints", list.len(), self.joints.len());
+                return Err(FileIssue::new(file, key, problem));
+            }
+            list.iter().try_for_each(|&value| range(&key, value, -1e9..=1e9))
+        };
+        numbers("start_rad".to_owned(), &self.start_rad)?;
+        numbers("start_counts".to_owned(), &self.start_counts)?;
+        if self.path.len() != self.pose.len() {
+            let problem = format!(
+                "{} paths for {} poses; each pose has the one that leads to it",
+                self.path.len(),
+                self.pose.len()
+            );
+            return Err(FileIssue::new(file, "path", problem));
+        }
+        for (n, pose) in self.pose.iter().enumerate() {
+            let key = |name: &str| format!("pose {}: {name}", n + 1);
+            range(&key("number"), pose.number as f64, (n + 1) as f64..=(n + 1) as f64)?;
+            numbers(key("angles_rad"), &pose.angles_rad)?;
+            numbers(key("raw_counts"), &pose.raw_counts)?;
+            numbers(key("error_bound_rad"), &pose.error_bound_rad)?;
+            range(&key("clearance_m"), pose.clearance_m, 0.0..=1e3)?;
+            range(&key("proven_clearance_m"), pose.proven_clearance_m, 0.0..=1e3)?;
+            range(&key("arm_time_s"), pose.arm_time_s, 0.0..=1e9)?;
+            pose.predicted_tool_error_m.map_or(Ok(()), |m| range(&key("predicted_tool_error_m"), m, 0.0..=1e3))?;
+            pose.tags.iter().try_for_each(|tag| range(&key("tags.probability"), tag.probability, 0.0..=1.0))?;
+        }
+        for (n, path) in self.path.iter().enumerate() {
+            let key = |name: &str| format!("path {}: {name}", n + 1);
+            range(&key("from"), path.from as f64, n as f64..=n as f64)?;
+            range(&key("to"), path.to as f64, (n + 1) as f64..=(n + 1) as f64)?;
+            range(&key("duration_s"), path.duration_s, 0.0..=1e9)?;
+            range(&key("waypoints_rad (number)"), path.waypoints_rad.len() as f64, 2.0..=1e6)?;
+            let n_counts = path.waypoints_counts.len() as f64;
+            range(
+                &key("waypoints_counts (number)"),
+                n_counts,
+                path.waypoints_rad.len() as f64..=path.waypoints_rad.len() as f64,
+            )?;
+            let n_edges = path.waypoints_rad.len() as f64 - 1.0;
+            range(&key("edge_durations_s (number)"), path.edge_durations_s.len() as f64, n_edges..=n_edges)?;
+            path.edge_durations_s.iter().try_for_each(|&s| range(&key("edge_durations_s"), s, 0.0..=1e9))?;
+            path.waypoints_rad.iter().try_for_each(|waypoint| numbers(key("waypoints_rad"), waypoint))?;
+            path.waypoints_counts.iter().try_for_each(|waypoint| numbers(key("waypoints_counts"), waypoint))?;
+        }
+        Ok(())
+    }
+}
+
+/// Names and hashes of what was planned for.
+#[derive(Clone, Debug)]
+pub struct PlanHeader {
+    pub routine: String,
+    pub vehicle: String,
+    pub seed: u64,
+    pub inputs_hash: String,
+    pub margin_m: f64,
+}
+
+/// Turns visits into tables.
+struct Writer<'a> {
+    belief: &'a ArmBelief,
+    robot: &'a Robot,
+    timing: Timing,
+}
+
+impl Writer<'_> {
+    fn counts(&self, angles: &JointAngles) -> Vec<f64> {
+        self.belief.sensors.counts(angles).iter().map(|&counts| rounded(counts, COUNT_DIGITS)).collect()
+    }
+
+    fn pose(&self, number: usize, visit: &Visit) -> PoseTable {
+        let (pose, LeastClearance { believed_m, proven_m }) = (&visit.pose, visit.clearance);
+        let Nearest { first, second, .. } = &visit.nearest;
+        PoseTable {
+            number,
+            set: match pose.set {
+                CaptureSet::Fit => SetName::Fit,
+                CaptureSet::HeldOut => SetName::HeldOut,
+            },
+            angles_rad: radians(&pose.angles),
+            raw_counts: self.counts(&pose.angles),
+            error_bound_rad: radians(&visit.error_bound_rad),
+            predicted_tool_error_m: predicted(visit),
+            clearance_m: floored(believed_m, LENGTH_DIGITS),
+            proven_clearance_m: floored(proven_m, LENGTH_DIGITS),
+            clearance_between: [first, second].into_iter().filter(|name| !name.is_empty()).cloned().collect(),
+            arm_time_s: rounded(visit.arm_time_s, TIME_DIGITS),
+            tags: pose
+                .tags
+                .iter()
+                .filter_map(|&(idx, probability)| {
+                    let id = self.robot.tags.get(idx)?.id;
+                    Some(TagTable { id, probability: rounded(probability, 1e3) })
+                })
+                .collect(),
+        }
+    }
+
+    fn path(&self, from: usize, visit: &Visit) -> PathTable {
+        let edges_s = visit.path.edges().map(|edge| self.timing.edge_duration_s(&edge));
+        PathTable {
+            from,
+            to: from + 1,
+            duration_s: rounded(visit.duration_s, TIME_DIGITS),
+            clearance_m: floored(visit.path_clearance.believed_m, LENGTH_DIGITS),
+            proven_clearance_m: floored(visit.path_clearance.proven_m, LENGTH_DIGITS),
+            waypoints_rad: visit.path.waypoints.iter().map(radians).collect(),
+            waypoints_counts: visit.path.waypoints.iter().map(|waypoint| self.counts(waypoint)).collect(),
+            edge_durations_s: edges_s.map(|duration_s| rounded(duration_s, TIME_DIGITS)).collect(),
+        }
+    }
+}
+
+fn predicted(visit: &Visit) -> Option<f64> {
+    let predicted_m = visit.pose.predicted_tool_error_m;
+    predicted_m.is_finite().then(|| rounded(predicted_m, 1e6))
+}
+
+fn radians(angles: &JointAngles) -> Vec<f64> {
+    angles.iter().map(|&angle| rounded(angle, RAD_DIGITS)).collect()
+}
+
+fn rounded(value: f64, digits: f64) -> f64 {
+    // Adding zero turns -0 into 0.
+    (value * digits).round() / digits + 0.0
+}
+
+/// Clearances are promises: never more than was found.
+fn floored(value: f64, digits: f64) -> f64 {
+    (value * digits).floor() / digits
+}

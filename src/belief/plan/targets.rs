@@ -1,0 +1,126 @@
+//! Joint angles for the reach task's targets, clear for every arm within the joint errors.
+
+use nalgebra::Vector3;
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+
+use super::PlanError;
+use super::bounds::JointErrorBounds;
+use super::clearance::{ClearanceModel, Nearest};
+use armcal_core::kinematics::{IkError, IkGoal, IkSettings, solve_position};
+use armcal_core::robot::Robot;
+use armcal_core::streams::JointAngles;
+
+/// Starts of the inverse kinematics beside the preferred ones.
+const RANDOM_SEEDS: usize = 24;
+const IK_TOLERANCE_M: f64 = 1e-6;
+
+/// Solves every target under one belief, near `preferred` postures where given.
+///
+/// For each target the believed joint angles, or [`PlanError::TargetOutOfReach`] with the distance that remains, or
+/// [`PlanError::TargetTooClose`] with what is near.
+pub fn plan_targets(
+    robot: &Robot,
+    clearance: &ClearanceModel<'_>,
+    bounds: &JointErrorBounds,
+    request: &TargetRequest<'_>,
+    rng: &mut ChaCha8Rng,
+) -> Vec<Result<JointAngles, PlanError>> {
+    let settings = IkSettings {
+        limits: bounds.safe_limits(robot),
+        locked: (0..robot.n_joints()).map(|j| j + 1 == robot.tool.mount.n_joints && on_tool_axis(robot)).collect(),
+        tolerance_m: IK_TOLERANCE_M,
+        max_iterations: 200,
+    };
+    let solver = TargetSolver { robot, clearance, bounds, settings, margin_m: request.margin_m };
+    (0..request.targets_m.len())
+        .map(|target| {
+            let preferred = request.preferred.and_then(|postures| postures.get(target)).copied();
+            solver.solve(target, request.targets_m[target], preferred, rng)
+        })
+        .collect()
+}
+
+/// What to reach and how.
+pub struct TargetRequest<'a> {
+    pub targets_m: &'a [[f64; 3]],
+    /// Postures to stay near, one a target.
+    pub preferred: Option<&'a [JointAngles]>,
+    pub margin_m: f64,
+}
+
+struct TargetSolver<'a> {
+    robot: &'a Robot,
+    clearance: &'a ClearanceModel<'a>,
+    bounds: &'a JointErrorBounds,
+    settings: IkSettings,
+    margin_m: f64,
+}
+
+impl TargetSolver<'_> {
+    /// The clear solution that is nearest to the preferred posture, or to the stowed one.
+    fn solve(
+        &self,
+        target: usize,
+        at_m: [f64; 3],
+        preferred: Option<JointAngles>,
+        rng: &mut ChaCha8Rng,
+    ) -> Result<JointAngles, PlanError> {
+        let goal = IkGoal { position_m: Vector3::from(at_m) };
+        let home = preferred.unwrap_or(self.robot.stowed);
+        let mut unreached: Option<IkError> = None;
+        let mut closest: Option<Nearest> = None;
+        let mut best: Option<(f64, JointAngles)> = None;
+        for attempt in 0..=RANDOM_SEEDS {
+            let seed = if attempt == 0 { home } else { random_seed(self.robot, &self.settings, rng) };
+            match solve_position(&self.robot.chain, &self.robot.tool.mount, &goal, &seed, &self.settings) {
+                Err(error) => unreached = Some(unreached.map_or(error, |before| nearer(before, error))),
+                Ok(angles) => {
+                    let travel_rad = angles.max_abs_difference(&home);
+                    if let Some(nearest) = self.clearance.too_near_arriving(&angles, self.bounds, self.margin_m) {
+                        if closest.as_ref().is_none_or(|c| nearest.distance_m > c.distance_m) {
+                            closest = Some(nearest);
+                        }
+                    } else if best.as_ref().is_none_or(|(least, _)| travel_rad < *least) {
+                        best = Some((travel_rad, angles));
+                    }
+                }
+            }
+            // A solution next to the preferred posture is what was asked for.
+            if attempt == 0 && preferred.is_some() && best.is_some() {
+                break;
+            }
+        }
+        match (best, closest, unreached) {
+            (Some((_, angles)), _, _) => Ok(angles),
+            (None, Some(nearest), _) => Err(PlanError::TargetTooClose {
+                target,
+                at_m,
+                clearance_m: nearest.distance_m,
+                nearest: nearest.to_string(),
+                needed_m: self.margin_m,
+            }),
+            (None, None, Some(source)) => Err(PlanError::TargetOutOfReach { target, at_m, source }),
+            (None, None, None) => unreachable!("an attempt either fails or gives angles"),
+        }
+    }
+}
+
+fn nearer(a: IkError, b: IkError) -> IkError {
+    let (IkError::OutOfReach { error_m: a_m }, IkError::OutOfReach { error_m: b_m }) = (a, b);
+    if a_m < b_m { a } else { b }
+}
+
+fn random_seed(robot: &Robot, settings: &IkSettings, rng: &mut ChaCha8Rng) -> JointAngles {
+    JointAngles::from_fn(robot.n_joints(), |j| {
+        let limits = settings.limits[j];
+        if settings.locked[j] { robot.stowed[j] } else { rng.random_range(limits.lower_rad..=limits.upper_rad) }
+    })
+}
+
+/// Whether the tool point lies on the last joint's axis, so that this joint cannot move it.
+fn on_tool_axis(robot: &Robot) -> bool {
+    let last = &robot.chain.joints()[robot.tool.mount.n_joints - 1];
+    let point = robot.tool.mount.link_from_frame.translation.vector;
+    last.axis.cross(&point).norm() < 1e-6
+}

@@ -1,0 +1,110 @@
+//! Which tags a pose is expected to see.
+
+use nalgebra::{Point3, Vector3};
+
+use super::clearance::ClearanceModel;
+use armcal_core::kinematics::LinkPoses;
+use armcal_core::robot::{GripperTag, Robot};
+use armcal_core::streams::JointAngles;
+
+/// Conditions under which a detector reads a tag reliably.
+#[derive(Clone, Copy, Debug)]
+pub struct VisibilityModel {
+    pub max_range_m: f64,
+    pub min_range_m: f64,
+    /// Between the tag's normal and the line to the camera.
+    pub max_incidence_rad: f64,
+    /// Kept free at the edge of the lens's field of view.
+    pub edge_rad: f64,
+    /// Kept free at the border of the image.
+    pub border_px: f64,
+}
+
+impl Default for VisibilityModel {
+    fn default() -> Self {
+        Self::USUAL
+    }
+}
+
+impl VisibilityModel {
+    /// A 0.15 m tag 2 m away spans 29 px: below that corners suffer. Beyond 65 deg it is foreshortened to 0.4.
+    pub const USUAL: Self =
+        Self { max_range_m: 2.0, min_range_m: 0.25, max_incidence_rad: 1.13, edge_rad: 0.1, border_px: 12.0 };
+
+    /// Indices of the surveyed tags that `robot` at `angles` sees, occlusion not yet considered.
+    pub fn in_view<'a>(&'a self, robot: &'a Robot, poses: &LinkPoses) -> impl Iterator<Item = usize> + use<'a> {
+        let base_from_camera = poses.frame(&robot.camera.mount);
+        let camera_from_base = base_from_camera.inverse();
+        let eye = base_from_camera.translation.vector;
+        robot
+            .tags
+            .iter()
+            .enumerate()
+            .filter(move |(_, tag)| {
+                let center = tag.base_from_tag.origin().vector();
+                let sight = eye - center;
+                let range_m = sight.norm();
+                let normal = tag.base_from_tag.rotation() * Vector3::z();
+                let incidence_ok = normal.dot(&sight) > range_m * self.max_incidence_rad.cos();
+                (self.min_range_m..=self.max_range_m).contains(&range_m) && incidence_ok && {
+                    armcal_core::optics::square_corners(tag.size_m).iter().all(|corner| {
+                        let in_camera = camera_from_base * (tag.base_from_tag.isometry() * corner);
+                        self.in_image(robot, &in_camera)
+                    })
+                }
+            })
+            .map(|(idx, _)| idx)
+    }
+
+    /// Whether the camera sees the tag on the gripper, whose links hide it at some angles. It is meant to be near: only the
+    /// incidence, the image and what lies between count.
+    #[must_use]
+    pub fn sees_gripper_tag(
+        &self,
+        robot: &Robot,
+        tag: &GripperTag,
+        clearance: &ClearanceModel<'_>,
+        poses: &LinkPoses,
+    ) -> bool {
+        let base_from_camera = poses.frame(&robot.camera.mount);
+        let base_from_tag = poses.frame(&tag.mount);
+        let camera_from_base = base_from_camera.inverse();
+        let eye = base_from_camera.translation.vector;
+        let sight = eye - base_from_tag.translation.vector;
+        let normal = base_from_tag.rotation * Vector3::z();
+        normal.dot(&sight) > sight.norm() * self.max_incidence_rad.cos()
+            && armcal_core::optics::square_corners(tag.size_m).iter().all(|corner| {
+                let in_base = base_from_tag * corner;
+                self.in_image(robot, &(camera_from_base * in_base))
+                    && !clearance.blocks_sight(poses, &eye, &in_base.coords, 0.01)
+            })
+    }
+
+    fn in_image(&self, robot: &Robot, in_camera: &Point3<f64>) -> bool {
+        let lens = &robot.camera.lens;
+        let angle = in_camera.x.hypot(in_camera.y).atan2(in_camera.z);
+        let [width, height] = lens.resolution_px.map(f64::from);
+        angle < lens.max_view_angle_rad - self.edge_rad
+            && lens.project(&in_camera.coords).is_some_and(|pixel| {
+                (self.border_px..=width - self.border_px).contains(&pixel.x)
+                    && (self.border_px..=height - self.border_px).contains(&pixel.y)
+            })
+    }
+
+    /// Indices of the tags in view that nothing hides.
+    #[must_use]
+    pub fn visible(&self, robot: &Robot, clearance: &ClearanceModel<'_>, angles: &JointAngles) -> Vec<usize> {
+        let poses = robot.chain.link_poses(angles);
+        let eye = poses.frame(&robot.camera.mount).translation.vector;
+        self.in_view(robot, &poses)
+            .filter(|&idx| {
+                let tag = &robot.tags[idx];
+                let corners = armcal_core::optics::square_corners(tag.size_m);
+                corners.iter().all(|corner| {
+                    let target = tag.base_from_tag.isometry() * corner;
+                    !clearance.blocks_sight(&poses, &eye, &target.coords, 0.01)
+                })
+            })
+            .collect()
+    }
+}

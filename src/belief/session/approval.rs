@@ -1,0 +1,54 @@
+//! An operator's word before each motion.
+
+use super::motion::Driver;
+use super::{Approval, MotionAhead, SessionError};
+use crate::plan::Path;
+use armcal_core::streams::LogLevel;
+
+/// How long a held arm waits before it asks again, s.
+const HOLD_S: f64 = 5.0;
+
+impl Driver<'_> {
+    /// Comes back when the motion may begin.
+    ///
+    /// # Errors
+    /// [`SessionError::Interrupted`] when it may not.
+    pub(super) fn ask(&mut self, path: &Path, clearance_m: Option<f64>) -> Result<(), SessionError> {
+        if !self.progress.wants_to_approve() {
+            return Ok(());
+        }
+        let ahead = self.ahead(path, clearance_m);
+        loop {
+            match self.progress.approve(&ahead) {
+                Approval::Approve => return self.log(LogLevel::Info, &format!("approved: {ahead}")),
+                Approval::Hold => {
+                    self.log(LogLevel::Info, &format!("held by the operator: {ahead}"))?;
+                    self.hold(HOLD_S)?;
+                }
+                Approval::Abort(why) => {
+                    self.log(LogLevel::Warn, &format!("aborted before a motion ({why}): {ahead}"))?;
+                    return Err(self.interrupt()?);
+                }
+            }
+        }
+    }
+}
+
+impl std::fmt::Display for MotionAhead {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let moved = self.joints.iter().zip(self.from.iter().zip(self.to.iter()));
+        let moved = moved.filter(|(_, (from, to))| (*to - *from).abs() > 5e-4);
+        let words: Vec<String> = moved
+            .map(|(joint, (from, to))| format!("{joint} {:.1} to {:.1} deg", from.to_degrees(), to.to_degrees()))
+            .collect();
+        let what = if words.is_empty() { "nowhere".to_owned() } else { words.join(", ") };
+        write!(f, "{what}; {:.1} s", self.duration_s)?;
+        if self.edges > 1 {
+            write!(f, " on {} edges", self.edges)?;
+        }
+        match self.clearance_m {
+            Some(clearance_m) => write!(f, "; at least {clearance_m:.3} m clear"),
+            None => Ok(()),
+        }
+    }
+}

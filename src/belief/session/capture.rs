@@ -1,0 +1,359 @@
+//! Plans views and visits them, and plans anew as they come in.
+
+use super::SessionError;
+use super::outcome::{Renewal, Visit};
+use super::script::Run;
+use crate::calib::{Calibration, fewest_views};
+use crate::plan::{
+    ArmEnsemble, CaptureState, PlanError, PlannedPose, PosePlan, PoseRequest, Stop, TakenView, VisibilityModel,
+    choose_poses,
+};
+use armcal_core::robot::Robot;
+use armcal_core::routine::CaptureSettings;
+use armcal_core::stats::stream_rng;
+use armcal_core::streams::{CaptureSet, JointAngles, JointCounts, LogLevel, MarkKind, Phase};
+use armcal_core::time::Stamp;
+
+/// A second look at the margins comes early: the first few views tell most.
+const FIRST_RENEWAL: usize = 3;
+/// Tries at poses, beside those wanted, after which a capture goes no further.
+const SPARE_TRIES: usize = 10;
+/// Sightings as predicted that a tag is given in advance.
+const TRUST_IN_ADVANCE: f64 = 2.0;
+
+/// With fewer views no calibration begins: then it is the reason why there are no more that matters.
+const LEAST_VIEWS: usize = 3;
+
+/// A capture under way.
+struct Views<'a> {
+    settings: &'a CaptureSettings,
+    began: Stamp,
+    n_fit: usize,
+    n_held_out: usize,
+    /// A calibration from fewer fitted views is refused, however good it is.
+    n_for_verdict: usize,
+    tried: usize,
+    blocked: usize,
+    /// Readings at the captured views, and the tags (index) that were seen.
+    taken: Vec<(JointCounts, Vec<usize>)>,
+    /// Poses that were tried in vain.
+    failed: Vec<JointAngles>,
+    /// Of each tag, sightings that were predicted and those that came true.
+    expected: Vec<f64>,
+    seen: Vec<f64>,
+    /// The running estimate, and how many views it has seen.
+    belief: Option<Calibration>,
+    renewed_at: usize,
+    /// Fitted views after which the plan predicts that the tool error is small enough.
+    enough_at: Option<usize>,
+    expected_tool_error_m: Option<f64>,
+    /// Drawn from the present belief.
+    ensemble: Option<ArmEnsemble>,
+}
+
+impl<'a> Views<'a> {
+    fn new(settings: &'a CaptureSettings, robot: &Robot, began: Stamp) -> Self {
+        let none = vec![0.0; robot.tags.len()];
+        Self {
+            settings,
+            began,
+            n_fit: 0,
+            n_held_out: 0,
+            n_for_verdict: fewest_views(robot),
+            tried: 0,
+            blocked: 0,
+            taken: Vec::new(),
+            failed: Vec::new(),
+            expected: none.clone(),
+            seen: none,
+            belief: None,
+            renewed_at: 0,
+            enough_at: None,
+            expected_tool_error_m: None,
+            ensemble: None,
+        }
+    }
+
+    fn captured(&self) -> usize {
+        self.n_fit + self.n_held_out
+    }
+
+    fn wanted(&self) -> [usize; 2] {
+        let CaptureSettings { poses, held_out, .. } = self.settings;
+        [(*poses as usize).saturating_sub(self.n_fit), (*held_out as usize).saturating_sub(self.n_held_out)]
+    }
+
+    fn trust(&self) -> Vec<f64> {
+        let share = |(expected, seen): (&f64, &f64)| {
+            ((TRUST_IN_ADVANCE + seen) / (TRUST_IN_ADVANCE + expected)).clamp(0.0, 1.0)
+        };
+        self.expected.iter().zip(&self.seen).map(share).collect()
+    }
+
+    fn is_renewal_due(&self) -> bool {
+        let every = self.settings.replan_every as usize;
+        every > 0
+            && (self.captured() - self.renewed_at >= every
+                || (self.captured() >= FIRST_RENEWAL && self.renewed_at < FIRST_RENEWAL)
+                || (self.captured() > 0 && self.renewed_at == 0)
+                || (self.captured() > self.renewed_at && self.enough_at.is_some_and(|n| self.n_fit >= n)))
+    }
+
+    /// Why no more views are wanted.
+    fn enough(&self, now: Stamp) -> Option<String> {
+        let CaptureSettings { poses, held_out, .. } = self.settings;
+        let most = (poses + held_out) as usize + SPARE_TRIES;
+        let state = CaptureState {
+            taken: self.n_fit,
+            left: most.saturating_sub(self.tried),
+            elapsed_s: now.since_s(self.began),
+            predicted_tool_error_m: self.expected_tool_error_m.filter(|_| self.n_fit >= self.n_for_verdict),
+        };
+        let stop = Stop::decide(self.settings, &state)?;
+        // Views for the verdict are wanted whatever the fit says.
+        (stop != Stop::Poses || self.wanted() == [0, 0]).then(|| stop.to_string())
+    }
+}
+
+/// How a visit came out.
+enum Visited {
+    Captured,
+    InVain,
+}
+
+impl Run<'_, '_> {
+    /// Chooses views under the present belief.
+    pub(super) fn plan_views(&mut self, capture: &CaptureSettings) -> Result<PosePlan, SessionError> {
+        let views = Views::new(capture, &self.robot, self.driver.now());
+        Ok(self.choose(&views)?)
+    }
+
+    /// The views captured so far, as they are believed to be now.
+    fn taken(&self, views: &Views<'_>) -> Vec<TakenView> {
+        let conditions = self.driver.conditions();
+        let view = |(counts, tags): &(JointCounts, Vec<usize>)| TakenView {
+            angles: self.driver.sensors.angles_under(counts, &conditions),
+            tags: tags.clone(),
+        };
+        views.taken.iter().map(view).collect()
+    }
+
+    fn choose(&mut self, views: &Views<'_>) -> Result<PosePlan, PlanError> {
+        let targets = self.planned.as_ref().map(|planned| planned.targets.as_slice()).unwrap_or_default();
+        let [n_fit, n_held_out] = views.wanted();
+        choose_poses(
+            &PoseRequest {
+                robot: &self.robot,
+                clearance: self.clearance,
+                bounds: &self.bounds,
+                visibility: &VisibilityModel::default(),
+                capture: views.settings,
+                n_fit,
+                n_held_out,
+                belief: views.belief.as_ref(),
+                taken: &self.taken(views),
+                prior: self.accepted.as_ref(),
+                tag_trust: &views.trust(),
+                failed: &views.failed,
+                task: targets,
+                targets_m: &self.setup.routine.task.targets_m,
+                start: &self.driver.set_point(),
+            },
+            &mut self.rng,
+        )
+    }
+
+    /// Visits views and records what is seen, until there are enough.
+    pub(super) fn capture(&mut self, capture: &CaptureSettings) -> Result<(), SessionError> {
+        let mut views = Views::new(capture, &self.robot, self.driver.now());
+        let replans = self.replans(capture);
+        let ready = self.planned.as_mut().and_then(|planned| planned.first_capture.take());
+        // Planned before anything moved; the belief is still the same unless a calibration came in between.
+        let mut plan = ready.filter(|_| self.epochs.len() == 1);
+        if replans {
+            self.look_from_here(&mut views)?;
+        }
+        let why = loop {
+            if let Some(why) = views.enough(self.driver.now()) {
+                break why;
+            }
+            let renewed = replans && views.is_renewal_due() && self.renew_views(&mut views)?;
+            if renewed {
+                plan = None;
+                continue;
+            }
+            let chosen = match plan.take() {
+                Some(plan) => plan,
+                None => {
+                    self.driver.phase(Phase::Plan)?;
+                    match self.choose(&views) {
+                        Ok(plan) => plan,
+                        Err(why) if views.n_fit >= LEAST_VIEWS && replans => break why.to_string(),
+                        Err(why) => return Err(why.into()),
+                    }
+                }
+            };
+            if chosen.poses.is_empty() {
+                break Stop::NoPoseLeft.to_string();
+            }
+            self.log_plan(&chosen)?;
+            views.enough_at = chosen.needed.map(|needed| (views.n_fit + needed).max(views.n_for_verdict));
+            self.visit_some(&chosen, &mut views, replans)?;
+            if !replans {
+                break format!("{} poses were visited", views.tried);
+            }
+        };
+        self.driver.log(LogLevel::Info, &format!("no more views: {why}"))?;
+        self.capture_ended = Some(why);
+        self.tally.poses += views.captured();
+        if views.captured() == 0 {
+            let (planned, blocked) = (views.tried, views.blocked);
+            return Err(SessionError::NothingCaptured { planned, blocked, restless: planned - blocked });
+        }
+        Ok(())
+    }
+
+    fn log_plan(&mut self, plan: &PosePlan) -> Result<(), SessionError> {
+        let text = format!(
+            "planned {} poses out of {} that see enough tags and keep clear ({} drawn); predicted tool error {:.1} mm",
+            plan.poses.len(),
+            plan.candidates,
+            plan.tried,
+            plan.predicted_tool_error_m * 1e3
+        );
+        self.driver.log(LogLevel::Info, &text)
+    }
+
+    /// Renews belief and margins; whether anything changed.
+    fn renew_views(&mut self, views: &mut Views<'_>) -> Result<bool, SessionError> {
+        views.renewed_at = views.captured();
+        self.driver.phase(Phase::Plan)?;
+        let Some(calibration) = self.renew()? else { return Ok(false) };
+        views.expected_tool_error_m = self.expected_tool_error_m(&calibration);
+        if let Some(expected_m) = views.expected_tool_error_m {
+            let text = format!("after {} views: predicted tool error {:.2} mm", views.captured(), expected_m * 1e3);
+            self.driver.log(LogLevel::Info, &text)?;
+            let elapsed_s = self.driver.now().since_s(views.began);
+            self.renewals.push(Renewal { views: views.captured(), elapsed_s, expected_tool_error_m: expected_m });
+        }
+        views.belief = Some(calibration);
+        views.ensemble = None;
+        Ok(true)
+    }
+
+    /// Where the arm stands nothing can be hit: what tags can be seen from there tell where it is.
+    fn look_from_here(&mut self, views: &mut Views<'_>) -> Result<(), SessionError> {
+        let here = self.driver.set_point();
+        let tags = VisibilityModel::default().visible(&self.robot, self.clearance, &here);
+        if tags.is_empty() {
+            return Ok(());
+        }
+        let pose = PlannedPose {
+            set: CaptureSet::Fit,
+            angles: here,
+            tags: tags.into_iter().map(|tag| (tag, 1.0)).collect(),
+            predicted_tool_error_m: f64::NAN,
+        };
+        if let Visited::InVain = self.stand_and_look(&pose, views)? {
+            self.driver.log(LogLevel::Warn, "nothing was seen from where the arm started")?;
+        }
+        Ok(())
+    }
+
+    /// Visits the poses of a plan in their order, as far as the next renewal.
+    fn visit_some(&mut self, plan: &PosePlan, views: &mut Views<'_>, replans: bool) -> Result<(), SessionError> {
+        for pose in &plan.poses {
+            if replans && (views.is_renewal_due() || views.enough(self.driver.now()).is_some()) {
+                return Ok(());
+            }
+            self.progress_at(Phase::Capture, views.captured(), views.captured() + views.wanted().iter().sum::<usize>());
+            self.driver.phase(Phase::Move)?;
+            if !self.go(&pose.angles)? {
+                views.tried += 1;
+                views.blocked += 1;
+                views.failed.push(pose.angles);
+                self.tally.poses_skipped += 1;
+                continue;
+            }
+            if let Visited::InVain = self.stand_and_look(pose, views)?
+                && replans
+            {
+                // What was wrong there is worth a thought before the next pose.
+                return Ok(());
+            }
+        }
+        Ok(())
+    }
+
+    fn stand_and_look(&mut self, pose: &PlannedPose, views: &mut Views<'_>) -> Result<Visited, SessionError> {
+        views.tried += 1;
+        self.driver.phase(Phase::Settle)?;
+        let number = self.poses_marked;
+        if !self.driver.settle()? {
+            self.driver.log(LogLevel::Warn, &format!("pose {number} is left out: the arm did not settle"))?;
+            self.tally.poses_skipped += 1;
+            views.failed.push(pose.angles);
+            return Ok(Visited::InVain);
+        }
+        self.driver.phase(Phase::Capture)?;
+        self.note_visit(pose, views)?;
+        let kind = MarkKind::Capture { set: pose.set, pose_idx: number };
+        self.poses_marked += 1;
+        let tags = self.driver.dwell(views.settings.dwell_s, kind)?;
+        self.learn(pose, views)?;
+        if tags == 0 {
+            self.driver.log(LogLevel::Warn, &format!("pose {number} saw no tag"))?;
+            views.failed.push(pose.angles);
+            if self.replans(views.settings) {
+                return Ok(Visited::InVain);
+            }
+        }
+        match pose.set {
+            CaptureSet::Fit => views.n_fit += 1,
+            CaptureSet::HeldOut => views.n_held_out += 1,
+        }
+        Ok(Visited::Captured)
+    }
+
+    /// Holds the tags that were seen against those that should have been.
+    fn learn(&mut self, pose: &PlannedPose, views: &mut Views<'_>) -> Result<(), SessionError> {
+        let ids_seen = &self.driver.recorder.ids_seen;
+        let seen = |&tag: &usize| ids_seen.contains(&self.robot.tags[tag].id);
+        views.taken.push((self.driver.counts()?, (0..self.robot.tags.len()).filter(seen).collect()));
+        for &(tag, probability) in &pose.tags {
+            let was_seen = seen(&tag);
+            views.expected[tag] += probability;
+            views.seen[tag] += if was_seen { probability } else { 0.0 };
+        }
+        Ok(())
+    }
+
+    /// Notes how far each link may be from where it is believed to be, to be held against the truth where there is one.
+    fn note_visit(&mut self, pose: &PlannedPose, views: &mut Views<'_>) -> Result<(), SessionError> {
+        let believed = self.driver.believed_angles()?;
+        let ensemble = match views.ensemble.take() {
+            Some(ensemble) => ensemble,
+            None => self.ensemble(views),
+        };
+        self.visits.push(Visit {
+            at: self.driver.now(),
+            believed,
+            belief_views: if views.belief.is_some() { views.renewed_at } else { 0 },
+            link_q99_m: ensemble.link_displacement_quantiles_m(&self.robot, &believed, 0.99),
+            expected_tool_error_m: views.expected_tool_error_m,
+            tags_expected: pose.tags.iter().map(|(_, probability)| probability).sum(),
+        });
+        views.ensemble = Some(ensemble);
+        Ok(())
+    }
+
+    fn ensemble(&self, views: &Views<'_>) -> ArmEnsemble {
+        let mut rng = stream_rng(self.setup.seed, "ensemble");
+        match views.belief.as_ref().or(self.accepted.as_ref()) {
+            Some(calibration) => {
+                ArmEnsemble::believed(self.setup.robot, calibration, &self.driver.conditions(), &mut rng)
+            }
+            None => ArmEnsemble::datasheet(self.setup.robot, &mut rng),
+        }
+    }
+}

@@ -1,0 +1,87 @@
+//! Opens and closes the gripper, and keeps room for open jaws.
+
+use super::SessionError;
+use super::script::Run;
+use crate::plan::ClearanceModel;
+use armcal_core::routine::Step;
+use armcal_core::streams::{GripperCommand, LogLevel, Mark, MarkKind, Message};
+
+/// The jaws are where they were told within this, m.
+const ARRIVED_M: f64 = 1e-3;
+/// Waited beyond twice the closing time, s.
+const PATIENCE_S: f64 = 2.0;
+/// Jaws that are told less than this beyond rest are at rest, m.
+const AS_AT_REST_M: f64 = 1e-6;
+
+impl Run<'_, '_> {
+    /// Drives the jaws to `opening`, 0 (closed) .. 1 (open), and waits until they are there. From then on the arm keeps their
+    /// width clear, until they are no wider than at rest.
+    pub(super) fn grip(&mut self, step: usize, opening: f64) -> Result<(), SessionError> {
+        let wrong = |problem: String| SessionError::Step { step, problem };
+        let gripper = self.robot.gripper.clone().ok_or_else(|| wrong("the arm has no gripper".to_owned()))?;
+        let opening_m = opening * gripper.opening_max_m;
+        let is_wide = opening_m > gripper.rest_opening_m + AS_AT_REST_M;
+        let crowded = |run: &Self| run.jaws.open.too_near(&run.driver.set_point(), &run.bounds, 0.0);
+        if is_wide && (crowded(self).is_some() || !self.can_leave(self.jaws.open)) {
+            // Folded up for a view the arm may be in its own jaws' way; where it is stowed there is room on any vehicle so far.
+            let stowed = self.robot.stowed;
+            self.go(&stowed)?;
+            self.driver.settle()?;
+        }
+        if is_wide && let Some(nearest) = crowded(self) {
+            return Err(wrong(format!("there is no room to open the jaws: {nearest} would come too close")));
+        }
+        // Opening jaws need their room at once, closing ones until they are closed.
+        if is_wide {
+            self.clearance = self.jaws.open;
+        }
+        if !self.driver.grip(opening, opening_m, 2.0 * gripper.closing_time_s + PATIENCE_S)? {
+            self.driver.log(LogLevel::Warn, &format!("the jaws did not come to {opening_m:.3} m"))?;
+        } else if !is_wide {
+            self.clearance = self.jaws.at_rest;
+        }
+        Ok(())
+    }
+
+    /// Closes the jaws on target number `target` from wide open, and opens them again.
+    pub(super) fn touch(&mut self, step: usize, target: usize) -> Result<(), SessionError> {
+        let start = self.driver.now();
+        self.grip(step, 0.0)?;
+        let kind = MarkKind::Touch { target_idx: target as u32 };
+        self.driver.record(&Message::Mark(Mark { start, end: self.driver.now(), kind }))?;
+        self.grip(step, 1.0)
+    }
+
+    /// The jaws as the arm carries them.
+    pub(super) fn rest_jaws(&mut self, step: usize) -> Result<(), SessionError> {
+        let rest = self.robot.gripper.as_ref().map(|gripper| gripper.rest_opening_m / gripper.opening_max_m);
+        rest.map_or(Ok(()), |opening| self.grip(step, opening))
+    }
+}
+
+impl<'a> Run<'a, '_> {
+    /// For the targets that are planned before anything moves: with open jaws if one is touched before a calibration, after
+    /// which they are planned anew.
+    pub(super) fn clearance_at_targets(&self) -> &'a ClearanceModel<'a> {
+        let mut uncalibrated = self.setup.routine.steps.iter().take_while(|step| !matches!(step, Step::Calibrate(_)));
+        let is_touched = uncalibrated.any(|step| matches!(step, Step::Reach(reach) if reach.touch));
+        if is_touched { self.jaws.open } else { self.clearance }
+    }
+}
+
+impl super::motion::Driver<'_> {
+    /// Tells the jaws and waits until they are there; `false` when they are not within `limit_s`.
+    fn grip(&mut self, opening: f64, opening_m: f64, limit_s: f64) -> Result<bool, SessionError> {
+        self.arm.grip(opening)?;
+        let stamp = self.now();
+        self.record(&Message::GripperCommand(GripperCommand { stamp, opening_m }))?;
+        let until = stamp.plus_s(limit_s);
+        while self.now() < until {
+            self.step()?;
+            if self.recorder.opening_m.is_some_and(|measured_m| (measured_m - opening_m).abs() <= ARRIVED_M) {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+}

@@ -1,0 +1,390 @@
+//! Drives an arm along believed angles and waits until its own sensors say that it stands, or that it has met something.
+
+use super::bump::{Bump, BumpWatch};
+use super::stillness::Stillness;
+use super::{MotionAhead, Progress, Recorder, SessionError};
+use crate::plan::{Edge, Path, Timing};
+use armcal_core::robot::{FailedJoint, Robot, Vehicle};
+use armcal_core::routine::TaskSettings;
+use armcal_core::sensor::{ArmSensors, Conditions};
+use armcal_core::streams::{
+    Arm, ArmError, JointAngles, JointCommand, JointCounts, JointStateBelief, LogLevel, LogLine, Mark, MarkKind,
+    Message, Phase, ReachTask, RecordedSurvey, Sink,
+};
+use armcal_core::time::Stamp;
+
+/// The arm, what is recorded of it, and the sensors as believed at the moment.
+pub(super) struct Driver<'b> {
+    robot: &'b Robot,
+    pub(super) arm: &'b mut dyn Arm,
+    pub recorder: &'b mut Recorder,
+    pub sensors: ArmSensors,
+    pub progress: &'b mut dyn Progress,
+    start: Stamp,
+    /// Where the arm was last told to be, believed angles.
+    set_point: JointAngles,
+    ticks: u64,
+    pub motion_s: f64,
+    pub waited_s: f64,
+    timing: Timing,
+    bumps: BumpWatch,
+    /// The last motion's waypoints, for the way back.
+    came: Vec<JointAngles>,
+}
+
+/// How a motion ended.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[must_use]
+pub enum Followed {
+    Arrived,
+    /// The joint was held up or pushed off; the arm has gone back the way it came.
+    Bumped {
+        joint: usize,
+        /// Where the arm believed to be when it stopped.
+        at: JointAngles,
+    },
+}
+
+/// Backing out takes so many times as long as coming did.
+const BACK_OUT_SLOWNESS: f64 = 2.5;
+/// The arm counts as settled when it has stood for this long, s.
+const REST_S: f64 = 0.4;
+/// A long wait is asked at this distance whether it shall go on, s.
+const WAIT_STRIDE_S: f64 = 600.0;
+const SETTLE_LIMIT_S: f64 = 12.0;
+/// Believed angles and commands are recorded each so many control periods.
+const BELIEF_EVERY: u64 = 4;
+
+/// What is looked out for on the way.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Heed {
+    Bumps,
+    Nothing,
+}
+
+/// How waiting for rest ended.
+enum Stood {
+    Still,
+    PushedOff(Bump),
+}
+
+impl<'b> Driver<'b> {
+    pub fn new(
+        robot: &'b Robot,
+        arm: &'b mut dyn Arm,
+        recorder: &'b mut Recorder,
+        sensors: ArmSensors,
+        progress: &'b mut dyn Progress,
+    ) -> Result<Self, SessionError> {
+        let start = arm.now();
+        // One period, to learn where the arm is.
+        arm.step(recorder)?;
+        let counts = recorder.latest_counts.ok_or(SessionError::NoReadings)?;
+        // Sensors that begin are the datasheet's, the same under all conditions.
+        let set_point = sensors.angles(&counts);
+        let (timing, bumps) = (Timing::new(robot), BumpWatch::new(robot, arm.period_s()));
+        let mut driver = Self {
+            robot,
+            arm,
+            recorder,
+            sensors,
+            progress,
+            start,
+            set_point,
+            ticks: 0,
+            motion_s: 0.0,
+            waited_s: 0.0,
+            timing,
+            bumps,
+            came: vec![set_point],
+        };
+        driver.command()?;
+        Ok(driver)
+    }
+
+    pub fn elapsed_s(&self) -> f64 {
+        self.arm.now().since_s(self.start)
+    }
+
+    pub fn now(&self) -> Stamp {
+        self.arm.now()
+    }
+
+    pub fn set_point(&self) -> JointAngles {
+        self.set_point
+    }
+
+    /// Where the arm believes to be by its latest readings.
+    pub fn believed_angles(&self) -> Result<JointAngles, SessionError> {
+        Ok(self.sensors.angles_under(&self.counts()?, &self.conditions()))
+    }
+
+    /// What the arm last heard of its surroundings.
+    pub fn conditions(&self) -> Conditions {
+        let Recorder { oil_c, pressure_pa, .. } = *self.recorder;
+        Conditions { oil_c, pressure_pa, stamp: Some(self.arm.now()) }
+    }
+
+    /// The readings that the set-point stands for under the sensors of now.
+    fn set_point_counts(&self) -> JointCounts {
+        self.sensors.counts_under(&self.set_point, &self.conditions())
+    }
+
+    /// The latest raw readings.
+    pub fn counts(&self) -> Result<JointCounts, SessionError> {
+        self.recorder.latest_counts.ok_or(SessionError::NoReadings)
+    }
+
+    /// Lets time pass with the arm at rest.
+    pub fn wait(&mut self, seconds: f64) -> Result<(), SessionError> {
+        let before = self.arm.now();
+        let until = before.plus_s(seconds);
+        while self.arm.now() < until {
+            if self.progress.stop_requested() {
+                return Err(self.interrupt()?);
+            }
+            self.arm.idle(until.since_s(self.arm.now()).min(WAIT_STRIDE_S), self.recorder)?;
+        }
+        self.waited_s += self.arm.now().since_s(before);
+        Ok(())
+    }
+
+    pub fn fault(&mut self, number: usize) -> Result<(), SessionError> {
+        Ok(self.arm.fault(number)?)
+    }
+
+    /// Takes over other sensors; the arm stays where it is, only what that is called changes.
+    pub fn believe(&mut self, sensors: ArmSensors) {
+        self.set_point = sensors.angles_under(&self.set_point_counts(), &self.conditions());
+        self.sensors = sensors;
+    }
+
+    pub fn record(&mut self, message: &Message) -> Result<(), SessionError> {
+        let now = self.arm.now();
+        self.recorder.record(now, message).map_err(ArmError::Sink)?;
+        Ok(())
+    }
+
+    pub fn record_task(&mut self, task: &TaskSettings) -> Result<(), SessionError> {
+        let stamp = self.arm.now();
+        let (targets_m, tolerance_m) = (task.targets_m.clone(), task.tolerance_m);
+        self.record(&Message::Task(ReachTask { stamp, targets_m, tolerance_m }))
+    }
+
+    /// The tags, where the vehicle brings its own: the estimator has nothing but the recording and the robot's file.
+    pub fn record_survey(&mut self, vehicle: &Vehicle) -> Result<(), SessionError> {
+        let Some(survey) = &vehicle.survey else { return Ok(()) };
+        self.record(&Message::Survey(RecordedSurvey::new(self.arm.now(), survey)))
+    }
+
+    /// What the operator says of the arm goes the way of all that the estimator knows.
+    pub fn record_failed(&mut self, failed: &[FailedJoint]) -> Result<(), SessionError> {
+        let now = self.arm.now();
+        failed.iter().try_for_each(|failed| {
+            self.record(&Message::Mark(Mark { start: now, end: now, kind: MarkKind::Failed(*failed) }))
+        })
+    }
+
+    pub fn phase(&mut self, phase: Phase) -> Result<(), SessionError> {
+        let now = self.arm.now();
+        self.record(&Message::Mark(Mark { start: now, end: now, kind: MarkKind::Phase(phase) }))
+    }
+
+    pub fn log(&mut self, level: LogLevel, text: &str) -> Result<(), SessionError> {
+        let stamp = self.arm.now();
+        self.record(&Message::Log(LogLine { stamp, level, name: "session".to_owned(), text: text.to_owned() }))
+    }
+
+    fn command(&mut self) -> Result<(), SessionError> {
+        let counts = self.set_point_counts();
+        self.arm.command(&counts)?;
+        Ok(())
+    }
+
+    pub(super) fn step(&mut self) -> Result<(), SessionError> {
+        if self.progress.stop_requested() {
+            return Err(self.interrupt()?);
+        }
+        self.arm.step(self.recorder)?;
+        self.ticks += 1;
+        if self.ticks.is_multiple_of(BELIEF_EVERY) {
+            let stamp = self.arm.now();
+            let angles = self.believed_angles()?;
+            self.record(&Message::JointStates(JointStateBelief { stamp, angles }))?;
+            let counts = self.set_point_counts();
+            self.record(&Message::JointCommand(JointCommand { stamp, counts }))?;
+        }
+        Ok(())
+    }
+
+    /// Tells the arm to stay where it was last sent, and the recording why it ends here.
+    pub(super) fn interrupt(&mut self) -> Result<SessionError, SessionError> {
+        self.command()?;
+        let (stamp, at_s) = (self.arm.now(), self.elapsed_s());
+        let counts = self.set_point_counts();
+        self.record(&Message::JointCommand(JointCommand { stamp, counts }))?;
+        self.log(LogLevel::Warn, "stopped on request; the arm holds its last set-point")?;
+        Ok(SessionError::Interrupted { at_s })
+    }
+
+    /// What [`Self::follow`] would do.
+    pub(super) fn ahead(&self, path: &Path, clearance_m: Option<f64>) -> MotionAhead {
+        MotionAhead {
+            joints: self.robot.joint_names(),
+            from: self.set_point,
+            to: path.waypoints.last().copied().unwrap_or(self.set_point),
+            edges: path.n_edges(),
+            duration_s: self.timing.path_duration_s(path),
+            clearance_m,
+        }
+    }
+
+    /// Stays for a while.
+    pub(super) fn hold(&mut self, seconds: f64) -> Result<(), SessionError> {
+        let until = self.arm.now().plus_s(seconds);
+        while self.arm.now() < until {
+            self.step()?;
+        }
+        Ok(())
+    }
+
+    /// Moves along the path, from rest to rest on each edge, unless it meets something: then it stops, and backs out.
+    pub fn follow(&mut self, path: &Path) -> Result<Followed, SessionError> {
+        self.follow_told(path, None)
+    }
+
+    /// The same, with the path's clearance for an operator who is asked.
+    pub fn follow_told(&mut self, path: &Path, clearance_m: Option<f64>) -> Result<Followed, SessionError> {
+        self.ask(path, clearance_m)?;
+        for (n, edge) in path.edges().enumerate() {
+            if let Some(bump) = self.follow_edge(&edge, Heed::Bumps)? {
+                self.came = path.waypoints[..=n].to_vec();
+                return self.retreat(bump);
+            }
+            self.bumps.learn();
+        }
+        self.came.clone_from(&path.waypoints);
+        Ok(Followed::Arrived)
+    }
+
+    /// The same where a joint is meant to be held up: it is driven against its stop, or comes from there.
+    pub fn follow_unheeding(&mut self, path: &Path) -> Result<(), SessionError> {
+        self.ask(path, None)?;
+        for edge in path.edges() {
+            self.follow_edge(&edge, Heed::Nothing)?;
+        }
+        self.bumps.forget();
+        self.came.clone_from(&path.waypoints);
+        Ok(())
+    }
+
+    fn follow_edge(&mut self, edge: &Edge, heed: Heed) -> Result<Option<Bump>, SessionError> {
+        let steps = (self.timing.edge_duration_s(edge) / self.arm.period_s()).ceil().max(1.0);
+        for k in 1..=steps as u64 {
+            self.set_point = Timing::set_point(&edge.from, &edge.to, k as f64 / steps);
+            self.command()?;
+            self.step()?;
+            if heed == Heed::Bumps
+                && let Some(bump) = self.bumps.update(&self.set_point, &self.believed_angles()?)
+            {
+                self.motion_s += k as f64 * self.arm.period_s();
+                return Ok(Some(bump));
+            }
+        }
+        self.motion_s += steps * self.arm.period_s();
+        Ok(None)
+    }
+
+    /// Stops where the arm is and goes back the way it came, slowly.
+    fn retreat(&mut self, bump: Bump) -> Result<Followed, SessionError> {
+        let Bump { joint, behind_rad, allowed_rad } = bump;
+        let at = self.believed_angles()?;
+        self.set_point = at;
+        self.command()?;
+        let text = format!(
+            "bump: {} is {behind_rad:.3} rad from its set-point, {allowed_rad:.3} rad would still be usual; the arm stops and \
+             backs out along the path it came",
+            self.robot.sensors[joint].joint
+        );
+        self.log(LogLevel::Warn, &text)?;
+        let mut from = at;
+        for to in std::mem::take(&mut self.came).into_iter().rev() {
+            self.follow_edge(&Edge { from, to, slowness: BACK_OUT_SLOWNESS }, Heed::Nothing)?;
+            from = to;
+        }
+        self.came = vec![from];
+        self.bumps.forget();
+        if self.stand()?.is_none() {
+            self.log(LogLevel::Warn, "the arm did not settle after it had backed out")?;
+        }
+        Ok(Followed::Bumped { joint, at })
+    }
+
+    /// Waits until the arm stands at its set-point; `false` when it does not within the limit, or is pushed off: then it goes
+    /// back the way it came.
+    pub fn settle(&mut self) -> Result<bool, SessionError> {
+        match self.stand()? {
+            Some(Stood::Still) => Ok(true),
+            Some(Stood::PushedOff(bump)) => {
+                let _ = self.retreat(bump)?;
+                Ok(false)
+            }
+            None => Ok(false),
+        }
+    }
+
+    /// Waits until the arm stands at its set-point, or is pushed off it; `None` when neither comes within the limit.
+    fn stand(&mut self) -> Result<Option<Stood>, SessionError> {
+        let mut stillness = Stillness::new(self.believed_angles()?);
+        let mut waited_s = 0.0;
+        while waited_s < SETTLE_LIMIT_S {
+            self.step()?;
+            waited_s += self.arm.period_s();
+            let now = self.believed_angles()?;
+            if let Some(bump) = self.bumps.update(&self.set_point, &now) {
+                return Ok(Some(Stood::PushedOff(bump)));
+            }
+            if stillness.update(&now, &self.set_point, self.arm.period_s()) >= REST_S {
+                self.bumps.learn();
+                return Ok(Some(Stood::Still));
+            }
+        }
+        Ok(None)
+    }
+
+    /// Waits until the arm stands while `joint` is pressed against something; `false` when it does not within the limit.
+    pub fn press(&mut self, joint: usize) -> Result<bool, SessionError> {
+        let mut stillness = Stillness::new(self.believed_angles()?);
+        let mut waited_s = 0.0;
+        while waited_s < SETTLE_LIMIT_S {
+            self.step()?;
+            waited_s += self.arm.period_s();
+            let now = self.believed_angles()?;
+            // The pressed joint stands where it stands, not where it was sent.
+            let there = JointAngles::from_fn(now.len(), |j| if j == joint { now[j] } else { self.set_point[j] });
+            if stillness.update(&now, &there, self.arm.period_s()) >= REST_S {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
+    /// Stands for `seconds` and marks the span; gives how many tags were seen in it.
+    pub fn dwell(&mut self, seconds: f64, kind: MarkKind) -> Result<usize, SessionError> {
+        let start = self.arm.now();
+        self.recorder.tags_seen = 0;
+        self.recorder.ids_seen.clear();
+        let steps = (seconds / self.arm.period_s()).ceil() as u64;
+        self.arm.look(true);
+        for _ in 0..steps {
+            self.step()?;
+        }
+        self.arm.look(false);
+        let end = self.arm.now();
+        self.record(&Message::Mark(Mark { start, end, kind }))?;
+        Ok(self.recorder.tags_seen)
+    }
+}
+
+#[cfg(test)]
+mod tests;

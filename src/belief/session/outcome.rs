@@ -1,0 +1,105 @@
+//! What a run leaves, as far as the arm itself can tell.
+
+use crate::calib::Calibration;
+use armcal_core::sensor::ArmSensors;
+use armcal_core::streams::{JointAngles, ReachAttempt};
+use armcal_core::time::Stamp;
+
+/// What came out.
+#[derive(Debug)]
+pub struct Outcome {
+    /// The last one, accepted or refused.
+    pub calibration: Calibration,
+    /// Poses at which the arm settled and was recorded.
+    pub poses: usize,
+    /// Poses given up: no path, or the arm did not settle.
+    pub poses_skipped: usize,
+    /// Targets given up, over all attempts.
+    pub targets_skipped: usize,
+    pub duration_s: f64,
+    /// Time for which the arm was moving, not standing, s.
+    pub motion_s: f64,
+    /// Time spent in the script's `wait` steps, s.
+    pub waited_s: f64,
+    /// Time that the estimator itself took, by the watcher's clock.
+    pub calibration_wall_s: f64,
+    /// What the arm believed, since when.
+    pub epochs: Vec<Epoch>,
+    /// Captured views, in their order.
+    pub visits: Vec<Visit>,
+    pub renewals: Vec<Renewal>,
+    /// Why the last capture took no more views.
+    pub capture_ended: Option<String>,
+    pub reaches: Vec<ReachStep>,
+    pub asserts: Vec<AssertResult>,
+    /// Why the script ended before its last step.
+    pub stopped: Option<String>,
+}
+
+/// The sensors that the arm believed in from a moment on.
+#[derive(Clone, Debug)]
+pub struct Epoch {
+    pub from: Stamp,
+    pub sensors: ArmSensors,
+    /// Where they come from; `None` for the datasheet.
+    pub calibration: Option<Calibration>,
+}
+
+/// A captured view, and what was believed just before it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Visit {
+    pub at: Stamp,
+    pub believed: JointAngles,
+    /// Views that this belief rests on.
+    pub belief_views: usize,
+    /// Of the end of each link, from the first joint's on: the distance from where it is believed to be that is exceeded with a
+    /// probability of 1 %, m.
+    pub link_q99_m: Vec<f64>,
+    /// Root mean square over the task, m.
+    pub expected_tool_error_m: Option<f64>,
+    pub tags_expected: f64,
+}
+
+/// A renewal of the belief while views were captured.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Renewal {
+    pub views: usize,
+    /// Since the capture began.
+    pub elapsed_s: f64,
+    /// Root mean square over the task, m.
+    pub expected_tool_error_m: f64,
+}
+
+/// One `reach` step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ReachStep {
+    /// Number of the step in the script, from 1.
+    pub step: usize,
+    pub attempt: ReachAttempt,
+    pub start: Stamp,
+    pub end: Stamp,
+}
+
+/// One limit of an `assert` step, and how it came out.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AssertResult {
+    /// Number of the step in the script, from 1.
+    pub step: usize,
+    pub key: &'static str,
+    pub limit: f64,
+    /// `None`: the arm itself cannot know it, or there is no such figure.
+    pub value: Option<f64>,
+    /// When it was asked; `None` if the script did not come to it.
+    pub at: Option<Stamp>,
+    /// The last reach before it, an index into [`Outcome::reaches`].
+    pub last_reach: Option<usize>,
+}
+
+impl AssertResult {
+    /// Whether the limit holds; `None` where the figure is not known.
+    #[must_use]
+    pub fn holds(&self) -> Option<bool> {
+        let value = self.value?;
+        Some(if self.key == "clearance_m" { value >= self.limit } else { value <= self.limit })
+    }
+}

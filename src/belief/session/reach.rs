@@ -1,0 +1,87 @@
+//! Reaches for the task's targets under the sensors believed in.
+
+use super::SessionError;
+use super::script::Run;
+use crate::plan::{PlanError, TargetRequest, plan_targets};
+use armcal_core::routine::ReachSettings;
+use armcal_core::streams::{JointAngles, LogLevel, MarkKind, Phase, ReachAttempt};
+
+/// How long the arm is watched at a target, s.
+const REACH_DWELL_S: f64 = 0.6;
+
+impl Run<'_, '_> {
+    /// Goes to each target and rests there for a moment; if it is to be touched, with open jaws, which then close on it.
+    pub(super) fn reach(&mut self, step: usize, settings: &ReachSettings) -> Result<(), SessionError> {
+        let ReachSettings { targets, touch } = settings;
+        if *touch {
+            self.grip(step, 1.0)?;
+        }
+        let attempt = self.attempt();
+        let postures = self.postures(targets, attempt)?;
+        self.warn_beyond(&postures)?;
+        self.driver.phase(Phase::Reach)?;
+        for (n, (&target, angles)) in targets.iter().zip(&postures).enumerate() {
+            self.progress_at(Phase::Reach, n, targets.len());
+            let arrived = match angles {
+                Some(angles) => self.go(angles)? && self.driver.settle()?,
+                None => false,
+            };
+            if !arrived {
+                self.tally.targets_skipped += 1;
+                continue;
+            }
+            let kind = MarkKind::Reach { attempt, target_idx: target as u32 };
+            self.driver.dwell(REACH_DWELL_S, kind)?;
+            if *touch {
+                self.touch(step, target)?;
+            }
+        }
+        if *touch {
+            self.rest_jaws(step)?;
+        }
+        Ok(())
+    }
+
+    /// Says once what the targets ask beyond what the calibration in use saw, if that is more than straight lines: a fitted shape
+    /// is worth nothing where there were no views.
+    fn warn_beyond(&mut self, postures: &[Option<JointAngles>]) -> Result<(), SessionError> {
+        let calibration = self.epochs.last().and_then(|epoch| epoch.calibration.as_ref());
+        let Some(calibration) = calibration.filter(|c| c.reference.is_some()) else { return Ok(()) };
+        let conditions = self.driver.conditions();
+        let mut words: Vec<String> = Vec::new();
+        for word in postures.iter().flatten().flat_map(|angles| calibration.beyond(angles, &conditions)) {
+            if !words.contains(&word) {
+                words.push(word);
+            }
+        }
+        if words.is_empty() {
+            return Ok(());
+        }
+        let text = format!("beyond what the calibration is valid for: {}", words.join("; "));
+        self.driver.log(LogLevel::Warn, &text)
+    }
+
+    /// Believed angles at each target. A target that a calibration puts out of reach is no reason to lose the rest: it is
+    /// named and left out.
+    fn postures(&mut self, targets: &[usize], attempt: ReachAttempt) -> Result<Vec<Option<JointAngles>>, SessionError> {
+        let planned = self.planned.as_ref().map(|planned| planned.targets.clone()).unwrap_or_default();
+        let preferred: Vec<JointAngles> = targets.iter().filter_map(|&target| planned.get(target)).copied().collect();
+        if attempt == ReachAttempt::Before && preferred.len() == targets.len() {
+            return Ok(preferred.into_iter().map(Some).collect());
+        }
+        let targets_m: Vec<[f64; 3]> = targets.iter().map(|&t| self.setup.routine.task.targets_m[t]).collect();
+        let request = TargetRequest { targets_m: &targets_m, preferred: Some(&preferred), margin_m: self.margin_m() };
+        let solved = plan_targets(&self.robot, self.clearance, &self.bounds, &request, &mut self.rng);
+        solved.into_iter().map(|planned| self.or_skipped(planned)).collect()
+    }
+
+    fn or_skipped(&mut self, planned: Result<JointAngles, PlanError>) -> Result<Option<JointAngles>, SessionError> {
+        match planned {
+            Ok(angles) => Ok(Some(angles)),
+            Err(why) => {
+                self.driver.log(LogLevel::Warn, &format!("a target is left out: {why}"))?;
+                Ok(None)
+            }
+        }
+    }
+}

@@ -1,0 +1,76 @@
+//! Keeps every message and remembers the latest of those that the loop steers by.
+
+use std::collections::BTreeSet;
+
+use armcal_core::log::{LogError, Recording, RecordingWriter, read_recording};
+use armcal_core::streams::{JointCounts, MarkKind, Message, Sink, SinkError, Thermometer};
+use armcal_core::time::Stamp;
+
+/// A recording being written, and the latest readings.
+pub struct Recorder {
+    pub(super) writer: RecordingWriter,
+    pub(super) latest_counts: Option<JointCounts>,
+    /// Latest of the oil's thermometer.
+    pub(super) oil_c: Option<f64>,
+    /// Latest of the depth gauge.
+    pub(super) pressure_pa: Option<f64>,
+    /// Latest measured gap between the jaws.
+    pub(super) opening_m: Option<f64>,
+    /// Tags seen since it was last set to zero.
+    pub(super) tags_seen: usize,
+    /// Which they were.
+    pub(super) ids_seen: BTreeSet<u32>,
+}
+
+impl Recorder {
+    #[must_use]
+    pub fn new(writer: RecordingWriter) -> Self {
+        Self {
+            writer,
+            latest_counts: None,
+            oil_c: None,
+            pressure_pa: None,
+            opening_m: None,
+            tags_seen: 0,
+            ids_seen: BTreeSet::new(),
+        }
+    }
+
+    /// The recording so far, read from its bytes on disk.
+    ///
+    /// # Errors
+    /// [`LogError`] when it cannot be flushed or read.
+    pub fn read_back(&mut self) -> Result<Recording, LogError> {
+        self.writer.flush()?;
+        read_recording(self.writer.path())
+    }
+
+    #[must_use]
+    pub fn into_writer(self) -> RecordingWriter {
+        self.writer
+    }
+}
+
+impl Sink for Recorder {
+    fn record(&mut self, log_time: Stamp, message: &Message) -> Result<(), SinkError> {
+        match message {
+            Message::JointSensors(sample) => self.latest_counts = Some(sample.counts),
+            Message::Temperature(sample) if sample.thermometer == Thermometer::Oil => {
+                self.oil_c = Some(sample.temperature_c)
+            }
+            Message::Pressure(sample) => self.pressure_pa = Some(sample.pressure_pa),
+            Message::Gripper(sample) => self.opening_m = Some(sample.opening_m),
+            Message::Detections(detections) => {
+                self.tags_seen += detections.tags.len();
+                self.ids_seen.extend(detections.tags.iter().map(|tag| tag.id));
+            }
+            _ => {}
+        }
+        self.writer.record(log_time, message)?;
+        // A view that was captured is on disk before the arm moves on.
+        if matches!(message, Message::Mark(mark) if !matches!(mark.kind, MarkKind::Phase(_))) {
+            self.writer.flush()?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,376 @@
+//! Goes through a routine's steps.
+
+use rand_chacha::ChaCha8Rng;
+
+use super::motion::{Driver, Followed};
+use super::outcome::{AssertResult, Epoch, Outcome, ReachStep, Renewal, Visit};
+use super::prepare::Planned;
+use super::running::Before;
+use super::{Progress, Recorder, SessionError, Setup};
+use crate::calib::{Calibration, CalibrationFileError, Status, calibrate};
+use crate::plan::{Age, ClearanceModel, JointErrorBounds, LeastClearance, PathError, PathPlanner};
+use armcal_core::robot::Robot;
+use armcal_core::routine::{AssertLimits, CalibrateSettings, CalibrateViews, MoveGoal, OnRefusal, Step};
+use armcal_core::sensor::ArmSensors;
+use armcal_core::stats::stream_rng;
+use armcal_core::streams::{Arm, JointAngles, LogLevel, Mark, MarkKind, Message, Phase, ReachAttempt, Start};
+use armcal_core::time::Stamp;
+
+/// Shares of the clearance that are tried in this order for a path from a place that the whole of it does not let the arm leave.
+const START_SHARES: [f64; 3] = [0.5, 0.2, 0.05];
+
+pub(super) fn run(
+    setup: &Setup<'_>,
+    arm: &mut dyn Arm,
+    recorder: &mut Recorder,
+    progress: &mut dyn Progress,
+) -> Result<Outcome, SessionError> {
+    let model = || ClearanceModel::new(setup.robot, setup.vehicle, &setup.routine.scene);
+    let clearance = model();
+    let growth_m = setup.robot.gripper.as_ref().map_or(0.0, |gripper| gripper.outline_growth_m(gripper.opening_max_m));
+    let open_clearance = model().with_grown_gripper(growth_m);
+    let sensors = ArmSensors::nominal(setup.robot);
+    let mut driver = Driver::new(setup.robot, arm, recorder, sensors.clone(), progress)?;
+    driver.record_survey(setup.vehicle)?;
+    driver.phase(Phase::Plan)?;
+    let began = driver.now();
+    let mut run = Run {
+        setup,
+        robot: setup.robot.clone(),
+        bounds: JointErrorBounds::prior(setup.robot),
+        fresh: None,
+        before_running: None,
+        rng: stream_rng(setup.seed, "plan"),
+        clearance: &clearance,
+        jaws: Jaws { at_rest: &clearance, open: &open_clearance },
+        planned: None,
+        began,
+        views_since: began,
+        poses_marked: 0,
+        calibration: None,
+        accepted: None,
+        visits: Vec::new(),
+        renewals: Vec::new(),
+        capture_ended: None,
+        tally: Tally::default(),
+        epochs: vec![Epoch { from: began, sensors, calibration: None }],
+        reaches: Vec::new(),
+        asserts: Vec::new(),
+        driver,
+    };
+    run.bounds = run.kept_clear(JointErrorBounds::prior(setup.robot));
+    // A script that begins by measuring a sensor cannot plan before it has.
+    if !setup.routine.steps.iter().any(|step| matches!(step, Step::Identify(_))) {
+        run.prepare()?;
+    }
+    let stopped = run.steps()?;
+    run.driver.phase(Phase::Done)?;
+    run.finish(stopped)
+}
+
+/// Counts of a run.
+#[derive(Default)]
+pub(super) struct Tally {
+    pub poses: usize,
+    pub poses_skipped: usize,
+    pub targets_skipped: usize,
+    pub calibration_wall_s: f64,
+}
+
+/// Bounds of a calibration, and when and how warm it was.
+pub(super) struct FreshBounds {
+    pub bounds: JointErrorBounds,
+    pub at: Stamp,
+    pub oil_c: Option<f64>,
+}
+
+/// The arm among what surrounds it, by its jaws.
+pub(super) struct Jaws<'a> {
+    pub at_rest: &'a ClearanceModel<'a>,
+    pub open: &'a ClearanceModel<'a>,
+}
+
+pub(super) struct Run<'a, 'b> {
+    pub setup: &'a Setup<'a>,
+    /// With the sensor scales that were measured on the way.
+    pub robot: Robot,
+    /// How wrong the sensors believed in may be by now.
+    pub bounds: JointErrorBounds,
+    /// And how wrong they were when they were new: none for a datasheet's, which hold for good.
+    pub fresh: Option<FreshBounds>,
+    /// While views are being captured: what was believed before.
+    pub before_running: Option<Before>,
+    pub rng: ChaCha8Rng,
+    /// With the jaws as they are now.
+    pub clearance: &'a ClearanceModel<'a>,
+    pub jaws: Jaws<'a>,
+    pub driver: Driver<'b>,
+    pub planned: Option<Planned>,
+    began: Stamp,
+    /// Views captured from here on have been in no calibration.
+    pub views_since: Stamp,
+    /// Views marked so far; numbers them.
+    pub poses_marked: u32,
+    calibration: Option<Calibration>,
+    /// The last one that was accepted.
+    pub accepted: Option<Calibration>,
+    /// Captured views and what was believed there.
+    pub visits: Vec<Visit>,
+    pub renewals: Vec<Renewal>,
+    pub capture_ended: Option<String>,
+    pub tally: Tally,
+    pub epochs: Vec<Epoch>,
+    reaches: Vec<ReachStep>,
+    asserts: Vec<AssertResult>,
+}
+
+impl Run<'_, '_> {
+    pub fn progress_at(&mut self, phase: Phase, done: usize, total: usize) {
+        let elapsed_s = self.driver.elapsed_s();
+        self.driver.progress.update(phase, done, total, elapsed_s);
+    }
+
+    pub fn margin_m(&self) -> f64 {
+        self.setup.routine.capture.clearance_m
+    }
+
+    /// Whether the arm believes in a calibration.
+    pub fn attempt(&self) -> ReachAttempt {
+        match self.epochs.last().and_then(|epoch| epoch.calibration.as_ref()) {
+            None => ReachAttempt::Before,
+            Some(_) => ReachAttempt::After,
+        }
+    }
+
+    /// Carries out the steps; gives why it stopped before the last, if it did.
+    fn steps(&mut self) -> Result<Option<String>, SessionError> {
+        let routine = self.setup.routine;
+        for (index, step) in routine.steps.iter().enumerate() {
+            let number = index + 1;
+            self.age();
+            match step {
+                Step::Move(goal) => self.move_to(number, goal)?,
+                Step::Reach(reach) => {
+                    let (start, attempt) = (self.driver.now(), self.attempt());
+                    self.reach(number, reach)?;
+                    self.reaches.push(ReachStep { step: number, attempt, start, end: self.driver.now() });
+                }
+                Step::Capture(capture) => self.capture(capture).map_err(|error| after_motion(number, error))?,
+                Step::Identify(settings) => {
+                    self.identify(number, settings).map_err(|error| after_motion(number, error))?;
+                }
+                Step::Stops(settings) => self.stops(number, settings)?,
+                Step::Calibrate(settings) => {
+                    let refusal = self.calibrate(settings)?;
+                    if let (Some(why), OnRefusal::Stop) = (refusal, settings.on_refusal) {
+                        self.pass_over(&routine.steps[index + 1..], number);
+                        return Ok(Some(format!("step {number}: the calibration was refused: {why}")));
+                    }
+                }
+                Step::Grip { opening } => self.grip(number, *opening)?,
+                Step::Wait { seconds } => {
+                    self.driver.phase(Phase::Wait)?;
+                    self.progress_at(Phase::Wait, 0, 1);
+                    self.driver.wait(*seconds)?;
+                }
+                Step::Fault { number } => self.driver.fault(*number)?,
+                Step::Assert(limits) => self.assert(number, limits),
+            }
+        }
+        Ok(None)
+    }
+
+    fn finish(self, stopped: Option<String>) -> Result<Outcome, SessionError> {
+        let calibration = self
+            .calibration
+            .ok_or_else(|| SessionError::Step { step: 0, problem: "the script calibrated nothing".to_owned() })?;
+        Ok(Outcome {
+            calibration,
+            poses: self.tally.poses,
+            poses_skipped: self.tally.poses_skipped,
+            targets_skipped: self.tally.targets_skipped,
+            duration_s: self.driver.elapsed_s(),
+            motion_s: self.driver.motion_s,
+            waited_s: self.driver.waited_s,
+            calibration_wall_s: self.tally.calibration_wall_s,
+            epochs: self.epochs,
+            visits: self.visits,
+            renewals: self.renewals,
+            capture_ended: self.capture_ended,
+            reaches: self.reaches,
+            asserts: self.asserts,
+            stopped,
+        })
+    }
+
+    /// Goes to believed angles by a certified path; `false` when there is none.
+    pub fn go(&mut self, to: &JointAngles) -> Result<bool, SessionError> {
+        let limits = self.bounds.safe_limits(&self.robot);
+        let from = self.driver.set_point();
+        let (clearance, bounds, margin_m) = (self.clearance, &self.bounds, self.margin_m());
+        let mut planner = PathPlanner { clearance, bounds, limits: &limits, margin_m };
+        let mut outcome = planner.plan(&from, to, &mut self.rng);
+        for share in START_SHARES {
+            // A new calibration, or open jaws, may find the arm nearer to something than it believed to be: it must get away.
+            let is_stuck = match &outcome {
+                Err(PathError::StartTooNear { .. }) => true,
+                // Clear where it stands, and not for what a joint strays by as soon as it moves.
+                Err(PathError::Blocked { .. }) => !planner.is_free_to_arrive(&from),
+                _ => false,
+            };
+            if !is_stuck {
+                break;
+            }
+            planner.margin_m = share * self.margin_m();
+            outcome = planner.plan(&from, to, &mut self.rng);
+        }
+        if planner.margin_m < self.margin_m() && outcome.is_ok() {
+            let text = format!("starts with {:.3} m of clearance only, and keeps as much on the way", planner.margin_m);
+            self.driver.log(LogLevel::Warn, &text)?;
+        }
+        match outcome {
+            Ok(path) => {
+                let asks = self.driver.progress.wants_to_approve();
+                let least = || LeastClearance::along(self.clearance, &self.bounds, &path, planner.margin_m);
+                let clearance_m = asks.then(|| least().proven_m);
+                Ok(self.driver.follow_told(&path, clearance_m)? == Followed::Arrived)
+            }
+            Err(blocked) => {
+                self.driver.log(LogLevel::Warn, &format!("a pose is left out: {blocked}"))?;
+                Ok(false)
+            }
+        }
+    }
+
+    /// Whether a path leads from here to where the arm is stowed, with what `clearance` keeps clear.
+    pub fn can_leave(&mut self, clearance: &ClearanceModel<'_>) -> bool {
+        let limits = self.bounds.safe_limits(&self.robot);
+        let planner = PathPlanner { clearance, bounds: &self.bounds, limits: &limits, margin_m: self.margin_m() };
+        planner.plan(&self.driver.set_point(), &self.robot.stowed, &mut self.rng).is_ok()
+    }
+
+    fn move_to(&mut self, step: usize, goal: &MoveGoal) -> Result<(), SessionError> {
+        let wrong = |problem: String| SessionError::Step { step, problem };
+        let to = match goal {
+            MoveGoal::Stowed => self.robot.stowed,
+            MoveGoal::Angles(angles) if angles.len() == self.robot.n_joints() => JointAngles::from_slice(angles),
+            MoveGoal::Angles(angles) => {
+                let problem = format!("to_rad has {} angles, the arm {} joints", angles.len(), self.robot.n_joints());
+                return Err(wrong(problem));
+            }
+        };
+        self.driver.phase(Phase::Move)?;
+        self.progress_at(Phase::Move, 0, 1);
+        if let Some(nearest) = self.clearance.too_near_arriving(&to, &self.bounds, self.margin_m()) {
+            return Err(wrong(format!(
+                "the pose comes within {:.3} m of clearance between {nearest} for an arm within the sensors' error; {:.3} m are needed",
+                nearest.distance_m,
+                self.margin_m()
+            )));
+        }
+        if !self.go(&to)? {
+            return Err(wrong("no path leads there, or the arm met something on its way".to_owned()));
+        }
+        self.driver.phase(Phase::Settle)?;
+        if !self.driver.settle()? {
+            self.driver.log(LogLevel::Warn, "the arm did not settle after a move")?;
+        }
+        Ok(())
+    }
+
+    /// Calibrates from the recording's bytes; gives the reason if it was refused.
+    fn calibrate(&mut self, settings: &CalibrateSettings) -> Result<Option<String>, SessionError> {
+        self.driver.phase(Phase::Calibrate)?;
+        self.progress_at(Phase::Calibrate, 0, 1);
+        let end = self.driver.now();
+        let start = match settings.views {
+            CalibrateViews::New => self.views_since,
+            CalibrateViews::All => self.began,
+        };
+        let kind = MarkKind::Calibrate(if settings.warm { Start::Warm } else { Start::Fresh });
+        self.driver.record(&Message::Mark(Mark { start, end, kind }))?;
+        let recording = self.driver.recorder.read_back()?;
+        let began_s = self.driver.progress.wall_s();
+        let calibration = calibrate(&recording, self.setup.robot, self.setup.routine.method)?;
+        self.tally.calibration_wall_s += self.driver.progress.wall_s() - began_s;
+        self.views_since = end;
+        self.driver.log(LogLevel::Info, &verdict_line(&calibration))?;
+        if calibration.status == Status::Accepted {
+            self.believe(&calibration)?;
+            self.before_running = None;
+            self.accepted = Some(calibration.clone());
+        } else {
+            self.forget_running();
+        }
+        let refusal = calibration.refusal.clone();
+        self.calibration = Some(calibration);
+        Ok(refusal)
+    }
+
+    /// Widens the bounds by what time and temperature have done to the sensors since the calibration.
+    fn age(&mut self) {
+        let Some(fresh) = &self.fresh else { return };
+        let warmed_k = self.driver.recorder.oil_c.zip(fresh.oil_c).map_or(0.0, |(now, then)| now - then);
+        let age = Age { seconds: self.driver.now().since_s(fresh.at), warmed_k };
+        self.bounds = fresh.bounds.aged(&self.robot, age);
+    }
+
+    fn believe(&mut self, calibration: &Calibration) -> Result<(), SessionError> {
+        let wrong = |error: CalibrationFileError| SessionError::Step { step: 0, problem: error.to_string() };
+        let sensors = calibration.sensors(self.setup.robot).map_err(wrong)?;
+        self.bounds = self.kept_clear(self.bounds_of(calibration, &sensors));
+        let (bounds, at, oil_c) = (self.bounds.clone(), self.driver.now(), self.driver.recorder.oil_c);
+        self.fresh = Some(FreshBounds { bounds, at, oil_c });
+        self.driver.believe(sensors.clone());
+        let from = self.driver.now();
+        self.epochs.push(Epoch { from, sensors, calibration: Some(calibration.clone()) });
+        Ok(())
+    }
+
+    fn assert(&mut self, step: usize, limits: &AssertLimits) {
+        let at = Some(self.driver.now());
+        let last_reach = self.reaches.len().checked_sub(1);
+        for (key, limit) in limits.each() {
+            let value = self.known(key);
+            self.asserts.push(AssertResult { step, key, limit, value, at, last_reach });
+        }
+    }
+
+    /// A figure that the arm itself can tell.
+    fn known(&self, key: &str) -> Option<f64> {
+        let calibration = self.calibration.as_ref();
+        match key {
+            "held_out_rms_m" => calibration?.held_out.rms_m,
+            "held_out_rms_px" => calibration?.held_out.rms_px,
+            "predicted_tool_error_m" => calibration?.predicted_tool_error_m.map(|summary| summary.p95),
+            "simulated_s" => Some(self.driver.elapsed_s()),
+            _ => None,
+        }
+    }
+
+    /// Limits that the script did not come to.
+    fn pass_over(&mut self, rest: &[Step], before: usize) {
+        for (offset, step) in rest.iter().enumerate() {
+            if let Step::Assert(limits) = step {
+                let step = before + 1 + offset;
+                let never = |(key, limit)| AssertResult { step, key, limit, value: None, at: None, last_reach: None };
+                self.asserts.extend(limits.each().map(never));
+            }
+        }
+    }
+}
+
+/// A plan that fails in the middle of a script is no wrong input any more: there is a recording to be kept.
+fn after_motion(step: usize, error: SessionError) -> SessionError {
+    match error {
+        SessionError::Plan(plan) => SessionError::Step { step, problem: plan.to_string() },
+        error => error,
+    }
+}
+
+fn verdict_line(calibration: &Calibration) -> String {
+    match &calibration.refusal {
+        None => "calibration accepted".to_owned(),
+        Some(why) => format!("calibration refused: {why}"),
+    }
+}

@@ -1,0 +1,177 @@
+//! Levenberg-Marquardt on cameras and tags, and which detections it believes.
+//!
+//! First with a loss under which outliers lose their pull (Cauchy, its width from the median of the residuals), then
+//! without those that stay far off, with a loss that is quadratic for all but the rarest of honest residuals, so that
+//! the answer is as good as least squares.
+
+use nalgebra::{Isometry3, Vector6};
+
+use super::linearize::{Loss, Normal, Reduced, cost, squares};
+use super::problem::{Block, Problem};
+use armcal_core::spatial::exp;
+
+/// Width of the Cauchy loss, in standard deviations found (Zhang 1997: 2.385 costs 5 % of efficiency; it is the start alone).
+const CAUCHY_WIDTH: f64 = 2.385;
+/// The very first loss, whose pull does not fade.
+const FIRST_WIDTH: f64 = 1.345;
+/// Corners to here count fully in the end; one in 3000 honest ones lies beyond.
+const HUBER_WIDTH: f64 = 4.0;
+/// Bounds of the scale that is taken from the residuals, over the corners' standard deviation given: a detector's noise lies well
+/// within; what lies beyond is a wrong model. Assumed.
+const SCALE_BOUNDS: (f64, f64) = (0.02, 50.0);
+/// The median of the length of a two-dimensional unit normal vector is sqrt(2 ln 2).
+const MEDIAN_OF_LENGTH: f64 = 1.177_41;
+const MAX_ITERATIONS: usize = 50;
+/// Steps that change the cost by less than this share of it end an adjustment.
+const CONVERGED: f64 = 1e-14;
+/// A chi-square that still falls by less than this a step moves nothing by a noticeable share of its standard deviation. A loss that
+/// is not quadratic converges no faster than this where a few detections lie beyond its width.
+const AT_REST: f64 = 1e-3;
+/// Where only a start is wanted.
+const ROUGHLY: f64 = 1e-3;
+
+/// Lowers the cost from the state of `problem` on; whether it came to rest.
+pub(super) fn minimize(problem: &mut Problem<'_>, loss: Loss, converged: f64) -> bool {
+    let mut normal = Normal::new(problem);
+    normal.update(problem, loss);
+    let mut damping = 1e-6;
+    let mut last_share = 1.0;
+    for _ in 0..MAX_ITERATIONS {
+        let before = normal.cost;
+        let state = State::of(problem);
+        let after = if step(problem, &normal, damping) { cost(problem, loss) } else { f64::INFINITY };
+        if after <= before {
+            damping = (damping * 0.1).max(1e-12);
+            last_share = (before - after) / before;
+            if before - after <= converged * before {
+                return true;
+            }
+            normal.update(problem, loss);
+            continue;
+        }
+        state.restore(problem);
+        // Rounding, not the model, is what stands in the way.
+        if after - before <= 1e-12 * before {
+            return true;
+        }
+        damping = (damping * 10.0).max(1e-6);
+        if damping > 1e12 {
+            return after.is_finite();
+        }
+    }
+    last_share * degrees_of_freedom(problem).max(1) as f64 <= AT_REST
+}
+
+/// What an adjustment changes.
+struct State {
+    tags: Vec<Isometry3<f64>>,
+    extras: Vec<Isometry3<f64>>,
+    blocks: Vec<Isometry3<f64>>,
+}
+
+impl State {
+    fn of(problem: &Problem<'_>) -> Self {
+        Self {
+            tags: problem.tags.iter().map(|tag| tag.pose).collect(),
+            extras: problem.extras.iter().map(|extra| extra.pose).collect(),
+            blocks: problem.blocks.iter().map(|block| block.pose).collect(),
+        }
+    }
+
+    fn restore(self, problem: &mut Problem<'_>) {
+        problem.tags.iter_mut().zip(self.tags).for_each(|(tag, pose)| tag.pose = pose);
+        problem.extras.iter_mut().zip(self.extras).for_each(|(extra, pose)| extra.pose = pose);
+        problem.blocks.iter_mut().zip(self.blocks).for_each(|(block, pose)| block.pose = pose);
+    }
+}
+
+/// Takes one damped step; `false` where the system is singular.
+fn step(problem: &mut Problem<'_>, normal: &Normal, damping: f64) -> bool {
+    let Some(Reduced { system, right, inverses }) = normal.reduce(problem, damping) else { return false };
+    let Some(factor) = system.factorize() else { return false };
+    let nodes = factor.solve(&right);
+    let of_block = |(idx, block): (usize, &Block)| match block.node {
+        Some(node) => nodes[node],
+        None => normal.back_substitute(problem, idx, &inverses[idx], &nodes),
+    };
+    let steps: Vec<Vector6<f64>> = problem.blocks.iter().enumerate().map(of_block).collect();
+    let turn = |pose: &mut Isometry3<f64>, step: &Vector6<f64>| {
+        *pose *= exp(step);
+        pose.rotation.renormalize();
+    };
+    for tag in &mut problem.tags {
+        if let Some(node) = tag.node {
+            turn(&mut tag.pose, &nodes[node]);
+        }
+    }
+    problem.extras.iter_mut().for_each(|extra| turn(&mut extra.pose, &nodes[extra.node]));
+    problem.blocks.iter_mut().zip(&steps).for_each(|(block, step)| turn(&mut block.pose, step));
+    true
+}
+
+/// The corners' standard deviation over the one given, from the median length of the residuals of what is used.
+pub(super) fn scale(problem: &Problem<'_>) -> f64 {
+    let mut lengths = Vec::new();
+    for block in &problem.blocks {
+        for seen in problem.observations[block.range.clone()].iter().filter(|seen| seen.is_used) {
+            let camera_from_tag = block.pose.inv_mul(&problem.tags[seen.tag].pose);
+            lengths.extend(squares(&problem.cameras[seen.camera], &camera_from_tag, seen));
+        }
+    }
+    if lengths.is_empty() {
+        return 1.0;
+    }
+    // Where the poses take up much of what is measured, residuals are smaller than the noise.
+    let freedom = degrees_of_freedom(problem) as f64 / (2 * lengths.len()) as f64;
+    let middle = lengths.len() / 2;
+    let (_, median, _) = lengths.select_nth_unstable_by(middle, f64::total_cmp);
+    (median.sqrt() / MEDIAN_OF_LENGTH / freedom.max(0.05).sqrt()).clamp(SCALE_BOUNDS.0, SCALE_BOUNDS.1)
+}
+
+/// Residual coordinates less unknowns; views of one tag alone take part on both sides.
+pub(super) fn degrees_of_freedom(problem: &Problem<'_>) -> usize {
+    let used = problem.observations.iter().filter(|seen| seen.is_used).count();
+    let blocks = problem
+        .blocks
+        .iter()
+        .filter(|block| problem.observations[block.range.clone()].iter().any(|s| s.is_used))
+        .count();
+    let priors = problem.tags.iter().filter(|tag| tag.prior.is_some()).count();
+    let unknowns = 6 * blocks + 6 * problem.tags.iter().filter(|tag| tag.node.is_some()).count();
+    (8 * used + 6 * priors).saturating_sub(unknowns)
+}
+
+/// From a rough start to near the answer.
+pub(super) fn approach(problem: &mut Problem<'_>) {
+    // Loops that do not close yet must not count as outliers.
+    let loss = Loss::Huber { k: FIRST_WIDTH * scale(problem) };
+    minimize(problem, loss, ROUGHLY);
+    for _ in 0..4 {
+        let loss = Loss::Cauchy { c: CAUCHY_WIDTH * scale(problem) };
+        minimize(problem, loss, ROUGHLY);
+    }
+}
+
+/// Uses exactly the detections that agree to within `beyond` standard deviations (root mean square over their corners, of
+/// the scale found); whether that changed anything.
+pub(super) fn select(problem: &mut Problem<'_>, beyond: f64) -> bool {
+    let limit = 4.0 * 2.0 * (beyond * scale(problem)).powi(2);
+    let mut changed = false;
+    for block in &problem.blocks {
+        for at in block.range.clone() {
+            let seen = &problem.observations[at];
+            let camera_from_tag = block.pose.inv_mul(&problem.tags[seen.tag].pose);
+            let squares = squares(&problem.cameras[seen.camera], &camera_from_tag, seen);
+            let agrees = squares.into_iter().sum::<f64>() <= limit;
+            changed |= agrees != seen.is_used;
+            problem.observations[at].is_used = agrees;
+        }
+    }
+    changed
+}
+
+/// To the answer.
+pub(super) fn finish(problem: &mut Problem<'_>) -> bool {
+    let loss = Loss::Huber { k: HUBER_WIDTH * scale(problem) };
+    minimize(problem, loss, CONVERGED)
+}

@@ -1,0 +1,239 @@
+//! From the solved problem to the map.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use nalgebra::{Isometry3, Matrix6};
+
+use super::adjust::degrees_of_freedom;
+use super::groups::Group;
+use super::linearize::{Loss, Normal, cost};
+use super::problem::Problem;
+use super::result::{MapGroup, MappedTag, RelativeBodyPose, TagMap};
+use super::screen::Screened;
+use super::sparse::Factor;
+use super::types::{MapInput, MapRejection, RejectedDetection};
+use armcal_core::spatial::adjoint;
+use armcal_core::spatial::log;
+use armcal_core::stats::quantile;
+
+pub(super) fn assemble(
+    input: &MapInput<'_>,
+    screened: &Screened,
+    problem: &Problem<'_>,
+    groups: &[Group],
+    noise_scale: f64,
+) -> TagMap {
+    let quadratic = Loss::Huber { k: f64::INFINITY };
+    let mut normal = Normal::new(problem);
+    normal.update(problem, quadratic);
+    let (factor, inverses) = match normal.reduce(problem, 0.0) {
+        Some(reduced) => (reduced.system.factorize(), reduced.inverses),
+        None => (None, vec![Matrix6::zeros(); problem.blocks.len()]),
+    };
+    let mut warnings = Vec::new();
+    if factor.is_none() {
+        warnings.push("the views do not determine every tag: no covariances".to_owned());
+    }
+    warnings.extend(doubts(problem));
+    let pixels = Pixels::of(problem);
+    let mut views = vec![BTreeMap::new(); input.views.len()];
+    for block in problem.blocks.iter().filter(|block| is_used(problem, block.range.clone())) {
+        views[screened.views[block.view].input].insert(block.group, block.pose);
+    }
+    let mut rejected = screened.rejected.clone();
+    let unused = problem.observations.iter().filter(|seen| !seen.is_used);
+    rejected.extend(unused.map(|seen| RejectedDetection {
+        view: screened.views[seen.view].input,
+        id: problem.tags[seen.tag].id,
+        reason: MapRejection::Inconsistent,
+    }));
+    rejected.sort_by_key(|rejected| (rejected.view, rejected.id, rejected.reason));
+    TagMap {
+        groups: groups.iter().enumerate().map(|(idx, group)| map_group(problem, idx, group)).collect(),
+        tags: mapped(problem, &pixels, factor.as_ref()),
+        relative: relative(problem, screened, &normal, &inverses, factor.as_ref()),
+        views,
+        n_detections: screened.n_detections,
+        n_used: problem.observations.iter().filter(|seen| seen.is_used).count(),
+        rms_px: rms(pixels.used.iter().flatten().copied()),
+        rms_all_px: rms(pixels.used.iter().flatten().chain(&pixels.unused).copied()),
+        median_px: quantile(&pixels.used.iter().flatten().copied().collect::<Vec<_>>(), 0.5).unwrap_or(0.0),
+        chi_square: cost(problem, quadratic),
+        degrees_of_freedom: degrees_of_freedom(problem),
+        noise_scale,
+        rejected,
+        scale_warnings: Vec::new(),
+        warnings,
+        has_converged: false,
+        factor,
+    }
+}
+
+/// Tags whose known place disagrees with the views, and tags most of whose detections were rejected.
+fn doubts(problem: &Problem<'_>) -> Vec<String> {
+    let mut out = Vec::new();
+    for (idx, tag) in problem.tags.iter().enumerate() {
+        let id = tag.id;
+        if let (Some(prior), Some(_)) = (&tag.prior, tag.node) {
+            let owner = prior.owner.map_or_else(Isometry3::identity, |owner| problem.extras[owner].pose);
+            let off = log(&tag.pose.inv_mul(&(owner * prior.pose)));
+            if off.component_mul(&prior.information).dot(&off) > FAR_FROM_KNOWN {
+                let (mm, deg) = (off.fixed_rows::<3>(0).norm() * 1e3, off.fixed_rows::<3>(3).norm().to_degrees());
+                out.push(format!(
+                    "tag {id}: its known place disagrees with the views by {mm:.1} mm and {deg:.2} deg, beyond its standard deviations"
+                ));
+            }
+        }
+        let of_tag = || problem.observations.iter().filter(|seen| seen.tag == idx);
+        let (n, used) = (of_tag().count(), of_tag().filter(|seen| seen.is_used).count());
+        if 2 * used < n {
+            out.push(format!(
+                "tag {id}: {} of {n} detections disagree with the map; is it where and what it was said to be?",
+                n - used
+            ));
+        }
+    }
+    out
+}
+
+/// Chi-square of 6 degrees of freedom, 99.99 %.
+const FAR_FROM_KNOWN: f64 = 27.86;
+
+fn is_used(problem: &Problem<'_>, range: std::ops::Range<usize>) -> bool {
+    problem.observations[range].iter().any(|seen| seen.is_used)
+}
+
+/// Distances between measured and predicted corners, px.
+struct Pixels {
+    /// By tag.
+    used: Vec<Vec<f64>>,
+    unused: Vec<f64>,
+}
+
+impl Pixels {
+    fn of(problem: &Problem<'_>) -> Self {
+        let mut out = Self { used: vec![Vec::new(); problem.tags.len()], unused: Vec::new() };
+        for block in &problem.blocks {
+            for seen in &problem.observations[block.range.clone()] {
+                let camera_from_tag = block.pose.inv_mul(&problem.tags[seen.tag].pose);
+                for (corner, measured) in seen.corners_m.iter().zip(&seen.corners_px) {
+                    let point = camera_from_tag * nalgebra::Point3::from(*corner);
+                    let Some(pixel) = problem.cameras[seen.camera].project(&point.coords) else { continue };
+                    let distance = (measured - pixel).norm();
+                    if seen.is_used { out.used[seen.tag].push(distance) } else { out.unused.push(distance) }
+                }
+            }
+        }
+        out
+    }
+}
+
+fn rms(values: impl Iterator<Item = f64>) -> f64 {
+    let (sum, n) = values.fold((0.0, 0_usize), |(sum, n), value| (sum + value * value, n + 1));
+    if n == 0 { 0.0 } else { (sum / n as f64).sqrt() }
+}
+
+fn map_group(problem: &Problem<'_>, idx: usize, group: &Group) -> MapGroup {
+    let bodies: BTreeSet<usize> = group.tags.iter().map(|tag| problem.tags[*tag].body).collect();
+    let of_group = problem.blocks.iter().filter(|block| block.group == idx);
+    MapGroup {
+        frame: group.frame.clone(),
+        bodies: bodies.into_iter().collect(),
+        tags: group.tags.iter().map(|tag| problem.tags[*tag].id).collect(),
+        n_views: of_group.filter(|block| is_used(problem, block.range.clone())).count(),
+    }
+}
+
+fn mapped(problem: &Problem<'_>, pixels: &Pixels, factor: Option<&Factor>) -> Vec<MappedTag> {
+    let with_group = problem.tags.iter().enumerate().filter(|(_, tag)| tag.group != usize::MAX);
+    with_group
+        .map(|(idx, tag)| {
+            let covariance = match (factor, tag.node) {
+                (Some(factor), Some(node)) => factor.inverse_column(node)[node],
+                _ => Matrix6::zeros(),
+            };
+            MappedTag {
+                id: tag.id,
+                size_m: tag.size_m,
+                group: tag.group,
+                frame_from_tag: tag.pose,
+                covariance: 0.5 * (covariance + covariance.transpose()),
+                n_views: pixels.used[idx].len() / 4,
+                rms_px: rms(pixels.used[idx].iter().copied()),
+                is_fixed: tag.node.is_none(),
+                node: tag.node,
+            }
+        })
+        .collect()
+}
+
+/// Where each further group was, from the first, in each view of two or more.
+fn relative(
+    problem: &Problem<'_>,
+    screened: &Screened,
+    normal: &Normal,
+    inverses: &[Matrix6<f64>],
+    factor: Option<&Factor>,
+) -> Vec<RelativeBodyPose> {
+    let mut out = Vec::new();
+    let Some(factor) = factor else { return out };
+    let mut columns = BTreeMap::new();
+    let used: Vec<usize> =
+        (0..problem.blocks.len()).filter(|idx| is_used(problem, problem.blocks[*idx].range.clone())).collect();
+    for of_view in used.chunk_by(|a, b| problem.blocks[*a].view == problem.blocks[*b].view) {
+        let Some((&first, others)) = of_view.split_first() else { continue };
+        for &second in others {
+            let (a, b) = (&problem.blocks[first], &problem.blocks[second]);
+            let difference = match (a.node, b.node) {
+                (Some(a), Some(b)) => {
+                    let (of_a, of_b) = (factor.inverse_column(a), factor.inverse_column(b));
+                    of_a[a] + of_b[b] - of_a[b] - of_a[b].transpose()
+                }
+                _ => [first, second]
+                    .map(|idx| block_covariance(problem, normal, &inverses[idx], idx, factor, &mut columns))
+                    .into_iter()
+                    .sum(),
+            };
+            let carry = adjoint(&b.pose);
+            out.push(RelativeBodyPose {
+                view: screened.views[a.view].input,
+                first: a.group,
+                second: b.group,
+                first_from_second: a.pose * b.pose.inverse(),
+                covariance: carry * difference * carry.transpose(),
+            });
+        }
+    }
+    out.sort_by_key(|relative| (relative.view, relative.first, relative.second));
+    out
+}
+
+/// Covariance of a camera's pose: its own, and what its tags add.
+fn block_covariance(
+    problem: &Problem<'_>,
+    normal: &Normal,
+    inverse: &Matrix6<f64>,
+    idx: usize,
+    factor: &Factor,
+    columns: &mut BTreeMap<usize, Vec<Matrix6<f64>>>,
+) -> Matrix6<f64> {
+    let block = &problem.blocks[idx];
+    if let Some(node) = block.node {
+        return factor.inverse_column(node)[node];
+    }
+    let nodes: Vec<(usize, usize)> = block
+        .range
+        .clone()
+        .filter(|at| problem.observations[*at].is_used)
+        .filter_map(|at| problem.tags[problem.observations[at].tag].node.map(|node| (at, node)))
+        .collect();
+    let mut covariance = *inverse;
+    for (at, node) in &nodes {
+        let column = columns.entry(*node).or_insert_with(|| factor.inverse_column(*node));
+        let right = normal.cross[*at].transpose() * inverse;
+        for (other, other_node) in &nodes {
+            covariance += inverse * normal.cross[*other] * column[*other_node] * right;
+        }
+    }
+    covariance
+}

@@ -1,0 +1,140 @@
+//! cameras.yaml of TagSLAM and camchain.yaml of Kalibr.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::path::Path;
+
+use serde::Deserialize;
+
+use super::yaml;
+use armcal_core::optics::{CameraModel, Fisheye, Radtan};
+use armcal_core::robot::{FileIssue, RobotError, read_text};
+
+/// A camera as files name it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NamedCamera {
+    pub name: String,
+    pub model: CameraModel,
+    /// Topic of its images.
+    pub image_topic: Option<String>,
+    /// Topic of the tags detected in them.
+    pub tag_topic: Option<String>,
+}
+
+#[derive(Debug, Deserialize)]
+struct CameraYaml {
+    camera_model: String,
+    intrinsics: Vec<f64>,
+    distortion_model: String,
+    #[serde(default)]
+    distortion_coeffs: Vec<f64>,
+    resolution: Vec<u32>,
+    rostopic: Option<String>,
+    tagtopic: Option<String>,
+}
+
+const SUPPORTED: &str = "equidistant (fisheye), radtan (plumb_bob), none";
+
+/// Reads all cameras of a file, in the order of their names.
+///
+/// # Errors
+/// [`RobotError`] with file, key and what is supported or allowed.
+pub fn read_cameras(file: &Path) -> Result<Vec<NamedCamera>, RobotError> {
+    parse_cameras(file, &read_text(file)?)
+}
+
+/// The same from a text; `file` names it in errors.
+///
+/// # Errors
+/// As [`read_cameras`].
+pub fn parse_cameras(file: &Path, text: &str) -> Result<Vec<NamedCamera>, RobotError> {
+    let raw: BTreeMap<String, CameraYaml> = yaml::parse(file, text)?;
+    if raw.is_empty() {
+        return Err(FileIssue::new(file, "cam0", "the file names no camera").into());
+    }
+    let mut cameras: Vec<NamedCamera> =
+        raw.iter().map(|(name, raw)| camera(file, name, raw)).collect::<Result<_, _>>()?;
+    // cam10 after cam9.
+    cameras.sort_by_key(|camera| (camera.name.len(), camera.name.clone()));
+    Ok(cameras)
+}
+
+fn camera(file: &Path, name: &str, raw: &CameraYaml) -> Result<NamedCamera, RobotError> {
+    let key = |of: &str| format!("{name}.{of}");
+    let issue = |of: &str, problem: String| RobotError::from(FileIssue::new(file, key(of), problem));
+    if raw.camera_model != "pinhole" {
+        let problem =
+            format!("`{}` is not supported; use pinhole, with distortion_model: {SUPPORTED}", raw.camera_model);
+        return Err(issue("camera_model", problem));
+    }
+    let [fx, fy, cx, cy] = raw.intrinsics[..] else {
+        return Err(issue("intrinsics", format!("has {} numbers, needs 4: fx, fy, cx, cy (px)", raw.intrinsics.len())));
+    };
+    let [width, height] = raw.resolution[..] else {
+        return Err(issue("resolution", format!("has {} numbers, needs 2: width, height", raw.resolution.len())));
+    };
+    let check = |of: &str, value: f64, range| FileIssue::check_range(file, &key(of), value, range);
+    for f in [fx, fy] {
+        check("intrinsics", f, 1.0..=1e6)?;
+    }
+    for c in [cx, cy] {
+        check("intrinsics", c, -1e6..=1e6)?;
+    }
+    for n in [width, height] {
+        check("resolution", f64::from(n), 16.0..=65536.0)?;
+    }
+    for k in &raw.distortion_coeffs {
+        check("distortion_coeffs", *k, -100.0..=100.0)?;
+    }
+    let (focal, center, resolution) = ([fx, fy], [cx, cy], [width, height]);
+    let model = match (raw.distortion_model.as_str(), &raw.distortion_coeffs[..]) {
+        ("equidistant" | "fisheye", &[k1, k2, k3, k4]) => {
+            CameraModel::Equidistant(Fisheye::with_widest_view(focal, center, [k1, k2, k3, k4], resolution))
+        }
+        ("radtan" | "plumb_bob", &[k1, k2, p1, p2]) => {
+            CameraModel::Radtan(Radtan::new(focal, center, [k1, k2, p1, p2, 0.0], resolution))
+        }
+        ("radtan" | "plumb_bob", &[k1, k2, p1, p2, k3]) => {
+            CameraModel::Radtan(Radtan::new(focal, center, [k1, k2, p1, p2, k3], resolution))
+        }
+        ("none", coefficients) if coefficients.iter().all(|k| *k == 0.0) => {
+            CameraModel::Radtan(Radtan::new(focal, center, [0.0; 5], resolution))
+        }
+        ("none", _) => {
+            return Err(issue("distortion_coeffs", "must be empty or zero where the model is none".to_owned()));
+        }
+        ("equidistant" | "fisheye" | "radtan" | "plumb_bob", coefficients) => {
+            let needs = if raw.distortion_model.starts_with('r') || raw.distortion_model.starts_with('p') {
+                "4 or 5: k1, k2, p1, p2 and k3"
+            } else {
+                "4: k1 to k4"
+            };
+            return Err(issue("distortion_coeffs", format!("has {} numbers, needs {needs}", coefficients.len())));
+        }
+        (other, _) => return Err(issue("distortion_model", format!("`{other}` is not supported; use {SUPPORTED}"))),
+    };
+    Ok(NamedCamera { name: name.to_owned(), model, image_topic: raw.rostopic.clone(), tag_topic: raw.tagtopic.clone() })
+}
+
+/// The cameras as cameras.yaml; Kalibr reads it too.
+#[must_use]
+pub fn cameras_to_yaml(cameras: &[NamedCamera]) -> String {
+    let mut out = String::new();
+    for camera in cameras {
+        let (model, coefficients) = match camera.model {
+            CameraModel::Equidistant(lens) => ("equidistant", lens.distortion.to_vec()),
+            CameraModel::Radtan(lens) => ("radtan", lens.distortion.to_vec()),
+        };
+        let ([fx, fy], [cx, cy]) = (camera.model.focal_px(), camera.model.center_px());
+        let _ = writeln!(out, "{}:\n  camera_model: pinhole", camera.name);
+        let _ = writeln!(out, "  intrinsics: {:?}", [fx, fy, cx, cy]);
+        let _ = writeln!(out, "  distortion_model: {model}\n  distortion_coeffs: {coefficients:?}");
+        let _ = writeln!(out, "  resolution: {:?}", camera.model.resolution_px());
+        for (key, topic) in [("rostopic", &camera.image_topic), ("tagtopic", &camera.tag_topic)] {
+            if let Some(topic) = topic {
+                let _ = writeln!(out, "  {key}: {topic}");
+            }
+        }
+    }
+    out
+}

@@ -1,0 +1,68 @@
+//! Kalibr's target: an aprilgrid is a board of tags of known places.
+
+use std::path::Path;
+
+use nalgebra::{Isometry3, Translation3};
+use serde::Deserialize;
+
+use super::{TagFile, yaml};
+use crate::tagmap::check::SIZE_RANGE_M;
+use crate::tagmap::types::{Body, TagPrior};
+use armcal_core::robot::{FileIssue, RobotError};
+
+/// As Kalibr documents it: `tagSpacing` is the gap between tags over their size.
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "camelCase")]
+struct TargetYaml {
+    #[serde(rename = "target_type")]
+    target_type: String,
+    tag_cols: Option<u32>,
+    tag_rows: Option<u32>,
+    tag_size: Option<f64>,
+    tag_spacing: Option<f64>,
+}
+
+pub(super) fn is_target(text: &str) -> bool {
+    text.lines().any(|line| line.trim_start().starts_with("target_type"))
+}
+
+/// Tags are numbered from the lower left by rows; the board's frame has its origin at the first tag's lower left corner, x right,
+/// y up, z out of it.
+pub(super) fn parse(file: &Path, text: &str) -> Result<TagFile, RobotError> {
+    let raw: TargetYaml = yaml::parse(file, text)?;
+    if raw.target_type != "aprilgrid" {
+        let problem = format!("`{}` is not supported; use aprilgrid", raw.target_type);
+        return Err(FileIssue::new(file, "target_type", problem).into());
+    }
+    let missing = |key: &str| FileIssue::new(file, key, "is missing");
+    let size_m = raw.tag_size.ok_or_else(|| missing("tagSize"))?;
+    FileIssue::check_range(file, "tagSize", size_m, SIZE_RANGE_M)?;
+    let spacing = raw.tag_spacing.ok_or_else(|| missing("tagSpacing"))?;
+    FileIssue::check_range(file, "tagSpacing", spacing, 0.0..=100.0)?;
+    let count = |key: &str, value: Option<u32>| -> Result<u32, RobotError> {
+        let value = value.ok_or_else(|| missing(key))?;
+        FileIssue::check_range(file, key, f64::from(value), 1.0..=100.0)?;
+        Ok(value)
+    };
+    let (columns, rows) = (count("tagCols", raw.tag_cols)?, count("tagRows", raw.tag_rows)?);
+    let step_m = size_m * (1.0 + spacing);
+    let place = |row: u32, column: u32| {
+        let along = |k: u32| f64::from(k) * step_m + 0.5 * size_m;
+        Isometry3::from_parts(Translation3::new(along(column), along(row), 0.0), nalgebra::UnitQuaternion::identity())
+    };
+    let tags = (0..rows).flat_map(|row| {
+        (0..columns).map(move |column| TagPrior {
+            id: row * columns + column,
+            size_m,
+            body: 0,
+            pose: Some(place(row, column)),
+            std: None,
+        })
+    });
+    Ok(TagFile {
+        frame: "target".to_owned(),
+        bodies: vec![Body { name: "target".to_owned(), is_static: true, pose: None }],
+        tags: tags.collect(),
+        ..TagFile::default()
+    })
+}

@@ -1,0 +1,182 @@
+//! Our tag map file.
+//!
+//! `version = 1`, `frame`, and one `[[tag]]` each with `id` (or `name`, for a landmark that is no AprilTag), `size_m`, `position_m`,
+//! `quaternion_wxyz`, `position_std_m`; all but the first may be absent where nobody knows them. Further keys, all optional: `base_tag` and `default_size_m` (of tags that are not named) at the top; `rotation_std_rad` and `frame`
+//! of a tag that is in another frame than the file's, such as a group that nothing ties to the first; `[[body]]` with `name`
+//! and `moving`, for frames that move.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use nalgebra::Isometry3;
+use serde::Deserialize;
+
+use super::landmarks::{FIRST_NAMED_ID, Landmark, LandmarkFile};
+use super::{TagFile, WrittenGroup};
+use crate::tagmap::check::SIZE_RANGE_M;
+use crate::tagmap::types::{Body, TagPrior};
+use armcal_core::robot::{FileIssue, RobotError, parse_toml};
+use armcal_core::spatial::{Base, Pose, Tag};
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct MapToml {
+    version: u32,
+    frame: String,
+    base_tag: Option<u32>,
+    default_size_m: Option<f64>,
+    #[serde(default)]
+    body: Vec<BodyToml>,
+    #[serde(default)]
+    tag: Vec<TagToml>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct BodyToml {
+    name: String,
+    moving: bool,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct TagToml {
+    id: Option<u32>,
+    name: Option<String>,
+    size_m: Option<f64>,
+    frame: Option<String>,
+    position_m: Option<[f64; 3]>,
+    quaternion_wxyz: Option<[f64; 4]>,
+    position_std_m: Option<[f64; 3]>,
+    rotation_std_rad: Option<[f64; 3]>,
+}
+
+fn raw(file: &Path, text: &str) -> Result<MapToml, RobotError> {
+    let raw: MapToml = parse_toml(file, text)?;
+    if raw.version != 1 {
+        return Err(FileIssue::new(file, "version", format!("{} is not supported; use 1", raw.version)).into());
+    }
+    Ok(raw)
+}
+
+/// The landmarks in the file's frame; those of other frames are left out.
+pub(super) fn parse_landmarks(file: &Path, text: &str) -> Result<LandmarkFile, RobotError> {
+    let raw = raw(file, text)?;
+    let mut landmarks = Vec::new();
+    for (k, tag) in raw.tag.iter().enumerate() {
+        let label = match (tag.id, &tag.name) {
+            (Some(id), _) => format!("tag {id}"),
+            (None, Some(name)) => format!("tag `{name}`"),
+            (None, None) => {
+                return Err(FileIssue::new(file, format!("tag number {}", k + 1), "has neither id nor name").into());
+            }
+        };
+        let key = |of: &str| format!("{label}: {of}");
+        let size_m = tag.size_m.or(raw.default_size_m.filter(|_| tag.id.is_some()));
+        if let Some(size_m) = size_m {
+            FileIssue::check_range(file, &key("size_m"), size_m, SIZE_RANGE_M)?;
+        }
+        if let (position, Some(wxyz)) = (tag.position_m, tag.quaternion_wxyz) {
+            pose(file, &key("position_m, quaternion_wxyz"), position.unwrap_or_default(), wxyz)?;
+        }
+        for value in tag.position_m.iter().flatten() {
+            FileIssue::check_range(file, &key("position_m"), *value, -1e4..=1e4)?;
+        }
+        let std = std(file, tag, &key)?.unwrap_or_default();
+        if tag.frame.as_ref().is_some_and(|frame| *frame != raw.frame) {
+            continue;
+        }
+        landmarks.push(Landmark {
+            id: tag.id.unwrap_or(FIRST_NAMED_ID + k as u32),
+            name: tag.name.clone(),
+            size_m,
+            position_m: tag.position_m,
+            quaternion_wxyz: tag.quaternion_wxyz,
+            position_std_m: std[0],
+            rotation_std_rad: std[3..].iter().copied().fold(0.0, f64::max),
+        });
+    }
+    Ok(LandmarkFile { frame: raw.frame, base_tag: raw.base_tag, landmarks })
+}
+
+pub(super) fn parse(file: &Path, text: &str) -> Result<TagFile, RobotError> {
+    let raw = raw(file, text)?;
+    let mut out = TagFile { frame: raw.frame.clone(), base_tag: raw.base_tag, ..TagFile::default() };
+    body_of(&mut out, &raw.body, &raw.frame);
+    for tag in &raw.tag {
+        let Some(id) = tag.id else {
+            // A landmark that is no tag has no corners.
+            out.ignored_keys.push(format!("tag {}", tag.name.as_deref().unwrap_or("without id")));
+            continue;
+        };
+        let key = |of: &str| format!("tag {id}: {of}");
+        let Some(size_m) = tag.size_m.or(raw.default_size_m) else {
+            return Err(FileIssue::new(file, key("size_m"), "is missing; a tag's corners need its size").into());
+        };
+        FileIssue::check_range(file, &key("size_m"), size_m, SIZE_RANGE_M)?;
+        let body = body_of(&mut out, &raw.body, tag.frame.as_ref().unwrap_or(&raw.frame));
+        let pose = match (tag.position_m, tag.quaternion_wxyz) {
+            (Some(position), Some(wxyz)) => Some(pose(file, &key("position_m, quaternion_wxyz"), position, wxyz)?),
+            _ => None,
+        };
+        out.tags.push(TagPrior { id, size_m, body, pose, std: std(file, tag, &key)? });
+    }
+    if let Some(size_m) = raw.default_size_m {
+        FileIssue::check_range(file, "default_size_m", size_m, SIZE_RANGE_M)?;
+        out.default_tag = Some((size_m, 0));
+    }
+    Ok(out)
+}
+
+fn pose(file: &Path, key: &str, position: [f64; 3], wxyz: [f64; 4]) -> Result<Isometry3<f64>, RobotError> {
+    let pose: Option<Pose<Base, Tag>> = Pose::from_position_quaternion_wxyz(position, wxyz);
+    Ok(*pose.ok_or_else(|| FileIssue::new(file, key, "must be finite, the quaternion not zero"))?.isometry())
+}
+
+/// Exact where all are zero or absent. The position's are along the frame's axes, so the largest counts for all of them.
+fn std(file: &Path, tag: &TagToml, key: &impl Fn(&str) -> String) -> Result<Option<[f64; 6]>, RobotError> {
+    let (position, rotation) = (tag.position_std_m.unwrap_or_default(), tag.rotation_std_rad.unwrap_or_default());
+    for (name, values) in [("position_std_m", position), ("rotation_std_rad", rotation)] {
+        for value in values {
+            FileIssue::check_range(file, &key(name), value, 0.0..=100.0)?;
+        }
+    }
+    let p = position.into_iter().fold(0.0, f64::max);
+    let [a, b, c] = rotation;
+    Ok((p > 0.0 || a + b + c > 0.0).then_some([p, p, p, a, b, c]))
+}
+
+fn body_of(out: &mut TagFile, bodies: &[BodyToml], frame: &str) -> usize {
+    if let Some(known) = out.bodies.iter().position(|body| body.name == frame) {
+        return known;
+    }
+    let is_static = !bodies.iter().any(|body| body.name == frame && body.moving);
+    out.bodies.push(Body { name: frame.to_owned(), is_static, pose: None });
+    out.bodies.len() - 1
+}
+
+pub(super) fn to_text(groups: &[WrittenGroup]) -> String {
+    let main = groups.first().map_or("base_link", |group| group.frame.as_str());
+    let mut out = format!("version = 1\nframe = {}\n", quoted(main));
+    for group in groups.iter().filter(|group| !group.is_static) {
+        let _ = writeln!(out, "\n[[body]]\nname = {}\nmoving = true", quoted(&group.frame));
+    }
+    for group in groups {
+        for tag in &group.tags {
+            let _ = writeln!(out, "\n[[tag]]\nid = {}\nsize_m = {:?}", tag.id, tag.size_m);
+            if group.frame != main {
+                let _ = writeln!(out, "frame = {}", quoted(&group.frame));
+            }
+            let position: [f64; 3] = tag.pose.translation.vector.into();
+            let q = tag.pose.rotation;
+            let _ = writeln!(out, "position_m = {position:?}\nquaternion_wxyz = {:?}", [q.w, q.i, q.j, q.k]);
+            let rotation = [3, 4, 5].map(|k| tag.covariance[(k, k)].max(0.0).sqrt());
+            let _ = writeln!(out, "position_std_m = {:?}\nrotation_std_rad = {rotation:?}", tag.position_std_m);
+        }
+    }
+    out
+}
+
+fn quoted(text: &str) -> String {
+    toml::Value::String(text.to_owned()).to_string()
+}

@@ -1,0 +1,287 @@
+//! Residuals, Jacobians and normal equations.
+//!
+//! A corner c (tag frame) of a tag at T (frame_from_tag) is seen by a camera at V (frame_from_camera) at
+//! `pixel = project(V^-1 T c)`. Both poses are perturbed on the right; with p = V^-1 T c and R the rotation of V^-1 T,
+//! `dp = [-I, [p]x] xi_V + R [I, -[c]x] xi_T`. Residual = whitened (measured - predicted).
+
+use std::sync::Arc;
+
+use nalgebra::{Isometry3, Matrix2x3, Matrix2x6, Matrix6, Vector2, Vector6};
+
+use super::attitude;
+use super::problem::{Block, Observation, Problem, TagState};
+use super::sparse::{Pattern, System};
+use armcal_core::optics::CameraModel;
+use armcal_core::spatial::{adjoint, log, skew};
+
+/// What far residuals cost.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Loss {
+    /// c^2 ln(1 + n^2/c^2): outliers lose their pull. `c` in standard deviations.
+    Cauchy { c: f64 },
+    /// Quadratic to `k` standard deviations, linear beyond.
+    Huber { k: f64 },
+}
+
+impl Loss {
+    /// Cost and weight of a corner whose whitened residual has the squared length `n2`.
+    pub(super) fn of(self, n2: f64) -> (f64, f64) {
+        match self {
+            Self::Cauchy { c } => {
+                let c2 = c * c;
+                (c2 * (n2 / c2).ln_1p(), 1.0 / (1.0 + n2 / c2))
+            }
+            Self::Huber { k } if n2 > k * k => {
+                let n = n2.sqrt();
+                (2.0 * k * n - k * k, k / n)
+            }
+            Self::Huber { .. } => (n2, 1.0),
+        }
+    }
+}
+
+/// A corner that the lens does not see counts as one that is this many standard deviations off.
+const UNSEEN_SIGMAS: f64 = 1e4;
+
+/// Whitened residuals of the four corners; `None` for one that the lens does not see.
+pub(super) fn residuals(
+    camera: &CameraModel,
+    camera_from_tag: &Isometry3<f64>,
+    seen: &Observation,
+) -> [Option<Vector2<f64>>; 4] {
+    let rotation = camera_from_tag.rotation.to_rotation_matrix();
+    std::array::from_fn(|k| {
+        let point = rotation * seen.corners_m[k] + camera_from_tag.translation.vector;
+        camera.project(&point).map(|pixel| seen.whiten[k] * (seen.corners_px[k] - pixel))
+    })
+}
+
+/// Squared lengths of the whitened residuals.
+pub(super) fn squares(camera: &CameraModel, camera_from_tag: &Isometry3<f64>, seen: &Observation) -> [f64; 4] {
+    residuals(camera, camera_from_tag, seen).map(|r| r.map_or(UNSEEN_SIGMAS * UNSEEN_SIGMAS, |r| r.norm_squared()))
+}
+
+/// The equations of the nodes alone.
+pub(super) struct Reduced {
+    pub(super) system: System,
+    pub(super) right: Vec<Vector6<f64>>,
+    /// Of each block that was eliminated.
+    pub(super) inverses: Vec<Matrix6<f64>>,
+}
+
+/// The normal equations at one state, before damping.
+#[derive(Clone, Debug)]
+pub(super) struct Normal {
+    pub(super) pattern: Arc<Pattern>,
+    /// Of each block: its own part and right side.
+    pub(super) own: Vec<Matrix6<f64>>,
+    pub(super) own_right: Vec<Vector6<f64>>,
+    /// Of each observation: block by tag.
+    pub(super) cross: Vec<Matrix6<f64>>,
+    /// Of the nodes: diagonal, right side, and blocks off the diagonal that come from priors and attitudes.
+    pub(super) nodes: Vec<Matrix6<f64>>,
+    pub(super) nodes_right: Vec<Vector6<f64>>,
+    pub(super) off_diagonal: Vec<(usize, usize, Matrix6<f64>)>,
+    pub(super) cost: f64,
+}
+
+impl Normal {
+    pub(super) fn new(problem: &Problem<'_>) -> Self {
+        Self {
+            pattern: Arc::new(Pattern::new(problem.n_nodes, edges(problem))),
+            own: vec![Matrix6::zeros(); problem.blocks.len()],
+            own_right: vec![Vector6::zeros(); problem.blocks.len()],
+            cross: vec![Matrix6::zeros(); problem.observations.len()],
+            nodes: vec![Matrix6::zeros(); problem.n_nodes],
+            nodes_right: vec![Vector6::zeros(); problem.n_nodes],
+            off_diagonal: Vec::new(),
+            cost: 0.0,
+        }
+    }
+
+    /// Linearizes at the problem's state.
+    pub(super) fn update(&mut self, problem: &Problem<'_>, loss: Loss) {
+        self.cost = 0.0;
+        self.nodes.fill(Matrix6::zeros());
+        self.nodes_right.fill(Vector6::zeros());
+        self.off_diagonal.clear();
+        for (idx, block) in problem.blocks.iter().enumerate() {
+            self.own[idx] = Matrix6::zeros();
+            self.own_right[idx] = Vector6::zeros();
+            for at in block.range.clone() {
+                self.cross[at] = Matrix6::zeros();
+                if problem.observations[at].is_used {
+                    self.add_observation(problem, idx, block, at, loss);
+                }
+            }
+        }
+        for tag in &problem.tags {
+            self.add_prior(problem, tag);
+        }
+        attitude::add(self, problem);
+    }
+
+    fn add_observation(&mut self, problem: &Problem<'_>, idx: usize, block: &Block, at: usize, loss: Loss) {
+        let seen = &problem.observations[at];
+        let tag = &problem.tags[seen.tag];
+        let camera = &problem.cameras[seen.camera];
+        let camera_from_tag = block.pose.inv_mul(&tag.pose);
+        let rotation = *camera_from_tag.rotation.to_rotation_matrix().matrix();
+        for k in 0..4 {
+            let point = rotation * seen.corners_m[k] + camera_from_tag.translation.vector;
+            let Some((pixel, jacobian)) = camera.project_with_jacobian(&point) else {
+                self.cost += loss.of(UNSEEN_SIGMAS * UNSEEN_SIGMAS).0;
+                continue;
+            };
+            let residual = seen.whiten[k] * (seen.corners_px[k] - pixel);
+            let (cost, weight) = loss.of(residual.norm_squared());
+            self.cost += cost;
+            let whitened: Matrix2x3<f64> = seen.whiten[k] * jacobian;
+            let turned = whitened * rotation;
+            let of_block = beside(&-whitened, &(whitened * skew(&point)));
+            let of_tag = beside(&turned, &(-turned * skew(&seen.corners_m[k])));
+            let weighted = of_block.transpose() * weight;
+            self.own[idx] += weighted * of_block;
+            self.own_right[idx] += weighted * residual;
+            if let Some(node) = tag.node {
+                self.cross[at] += weighted * of_tag;
+                let weighted = of_tag.transpose() * weight;
+                self.nodes[node] += weighted * of_tag;
+                self.nodes_right[node] += weighted * residual;
+            }
+        }
+    }
+
+    /// residual = log(T^-1 B P) for a tag at T whose place on a body at B is P; B is the identity for the group's own body.
+    fn add_prior(&mut self, problem: &Problem<'_>, tag: &TagState) {
+        let (Some(prior), Some(node)) = (&tag.prior, tag.node) else { return };
+        let owner = prior.owner.map(|owner| &problem.extras[owner]);
+        let expected = owner.map_or(prior.pose, |owner| owner.pose * prior.pose);
+        let residual = log(&tag.pose.inv_mul(&expected));
+        let information = Matrix6::from_diagonal(&prior.information);
+        let pulled = information * residual;
+        self.cost += residual.dot(&pulled);
+        self.nodes[node] += information;
+        self.nodes_right[node] += pulled;
+        if let Some(owner) = owner {
+            let jacobian = -adjoint(&prior.pose.inverse());
+            self.nodes[owner.node] += jacobian.transpose() * information * jacobian;
+            self.nodes_right[owner.node] += jacobian.transpose() * pulled;
+            self.off_diagonal.push((node, owner.node, information * jacobian));
+        }
+    }
+
+    /// The reduced system with `damping` added to each diagonal, relative to it; and the inverses of the eliminated blocks.
+    pub(super) fn reduce(&self, problem: &Problem<'_>, damping: f64) -> Option<Reduced> {
+        let mut system = System::zeros(&self.pattern);
+        let mut right = self.nodes_right.clone();
+        let mut inverses = vec![Matrix6::zeros(); problem.blocks.len()];
+        for (node, block) in self.nodes.iter().enumerate() {
+            system.add(node, node, &damped(block, damping));
+        }
+        for (a, b, block) in &self.off_diagonal {
+            system.add(*a, *b, block);
+        }
+        for (idx, block) in problem.blocks.iter().enumerate() {
+            let nodes = block.range.clone().filter_map(|at| {
+                let seen = &problem.observations[at];
+                problem.tags[seen.tag].node.filter(|_| seen.is_used).map(|node| (at, node))
+            });
+            if let Some(own) = block.node {
+                system.add(own, own, &damped(&self.own[idx], damping));
+                right[own] += self.own_right[idx];
+                for (at, node) in nodes {
+                    system.add(own, node, &self.cross[at]);
+                }
+                continue;
+            }
+            if block.range.clone().all(|at| !problem.observations[at].is_used) {
+                continue;
+            }
+            let inverse = damped(&self.own[idx], damping).cholesky()?.inverse();
+            inverses[idx] = inverse;
+            for (at, node) in nodes.clone() {
+                let weighted = self.cross[at].transpose() * inverse;
+                right[node] -= weighted * self.own_right[idx];
+                for (other, other_node) in nodes.clone().take_while(|(other, _)| *other <= at) {
+                    system.add(node, other_node, &-(weighted * self.cross[other]));
+                }
+            }
+        }
+        Some(Reduced { system, right, inverses })
+    }
+
+    /// The step of an eliminated block, from the steps of the nodes.
+    pub(super) fn back_substitute(
+        &self,
+        problem: &Problem<'_>,
+        idx: usize,
+        inverse: &Matrix6<f64>,
+        nodes: &[Vector6<f64>],
+    ) -> Vector6<f64> {
+        let mut right = self.own_right[idx];
+        for at in problem.blocks[idx].range.clone() {
+            if let Some(node) = problem.tags[problem.observations[at].tag].node {
+                right -= self.cross[at] * nodes[node];
+            }
+        }
+        inverse * right
+    }
+}
+
+/// The cost alone.
+pub(super) fn cost(problem: &Problem<'_>, loss: Loss) -> f64 {
+    let mut cost = attitude::cost(problem);
+    for block in &problem.blocks {
+        for seen in problem.observations[block.range.clone()].iter().filter(|seen| seen.is_used) {
+            let camera_from_tag = block.pose.inv_mul(&problem.tags[seen.tag].pose);
+            let squares = squares(&problem.cameras[seen.camera], &camera_from_tag, seen);
+            cost += squares.into_iter().map(|n2| loss.of(n2).0).sum::<f64>();
+        }
+    }
+    for tag in &problem.tags {
+        let (Some(prior), Some(_)) = (&tag.prior, tag.node) else { continue };
+        let owner = prior.owner.map_or_else(Isometry3::identity, |owner| problem.extras[owner].pose);
+        let residual = log(&tag.pose.inv_mul(&(owner * prior.pose)));
+        cost += residual.component_mul(&prior.information).dot(&residual);
+    }
+    cost
+}
+
+/// Pairs of nodes that share a block of the reduced system.
+fn edges(problem: &Problem<'_>) -> std::collections::BTreeSet<(usize, usize)> {
+    let mut edges = std::collections::BTreeSet::new();
+    for block in &problem.blocks {
+        let mut nodes: Vec<usize> =
+            block.range.clone().filter_map(|at| problem.tags[problem.observations[at].tag].node).collect();
+        nodes.extend(block.node);
+        for (i, a) in nodes.iter().enumerate() {
+            edges.extend(nodes[..i].iter().map(|b| (*a.max(b), *a.min(b))));
+        }
+    }
+    for tag in &problem.tags {
+        if let (Some(node), Some(owner)) = (tag.node, tag.prior.as_ref().and_then(|prior| prior.owner)) {
+            edges.insert((node, problem.extras[owner].node));
+        }
+    }
+    edges.extend(attitude::edges(problem));
+    edges
+}
+
+/// Keeps a step possible while some camera or tag sees nothing at all: what is determined has 1e4 and more (1/m^2, 1/rad^2).
+const UNDETERMINED: f64 = 1e-6;
+
+fn damped(block: &Matrix6<f64>, damping: f64) -> Matrix6<f64> {
+    let mut out = *block;
+    for k in 0..6 {
+        out[(k, k)] = out[(k, k)] * (1.0 + damping) + if damping > 0.0 { UNDETERMINED } else { 0.0 };
+    }
+    out
+}
+
+fn beside(left: &Matrix2x3<f64>, right: &Matrix2x3<f64>) -> Matrix2x6<f64> {
+    let mut out = Matrix2x6::zeros();
+    out.fixed_view_mut::<2, 3>(0, 0).copy_from(left);
+    out.fixed_view_mut::<2, 3>(0, 3).copy_from(right);
+    out
+}

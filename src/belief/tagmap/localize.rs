@@ -1,0 +1,170 @@
+//! Where the camera was, by the tags of one image whose places are known; and the same for a tag by its images.
+
+use nalgebra::{Isometry3, Matrix2x3, Matrix2x6, Matrix6, Vector6};
+
+use super::linearize::{Loss, squares};
+use super::problem::Observation;
+use armcal_core::optics::CameraModel;
+use armcal_core::spatial::{exp, skew};
+
+/// Width of the Cauchy loss by which starts are compared, px: a start is a few pixels off, a wrong one tens.
+const COMPARE_PX: f64 = 5.0;
+
+/// How badly poses fit: the Cauchy loss over all corners, in squared pixels.
+fn misfit(camera: &CameraModel, camera_from_tag: &Isometry3<f64>, seen: &Observation) -> f64 {
+    let loss = Loss::Cauchy { c: COMPARE_PX };
+    // Corners have about the same noise; the loss's width is in pixels.
+    let px = seen.whiten[0].try_inverse().map_or(1.0, |inverse| inverse.norm() / std::f64::consts::SQRT_2);
+    squares(camera, camera_from_tag, seen).into_iter().map(|n2| loss.of(n2 * px * px).0).sum()
+}
+
+/// frame_from_camera for which the tags fit best, out of each tag's own two solutions, refined on all corners; and its misfit.
+pub(super) fn localize(
+    cameras: &[CameraModel],
+    seen: &[(&Observation, Isometry3<f64>)],
+) -> Option<(Isometry3<f64>, f64)> {
+    let total = |frame_from_camera: &Isometry3<f64>| -> f64 {
+        seen.iter().map(|(s, tag)| misfit(&cameras[s.camera], &frame_from_camera.inv_mul(tag), s)).sum()
+    };
+    let mut best: Option<(Isometry3<f64>, f64)> = None;
+    for (observation, frame_from_tag) in seen {
+        for solution in observation.solutions() {
+            let frame_from_camera = frame_from_tag * solution.camera_from_tag.isometry().inverse();
+            let misfit = total(&frame_from_camera);
+            if best.as_ref().is_none_or(|(_, least)| misfit < *least) {
+                best = Some((frame_from_camera, misfit));
+            }
+        }
+    }
+    let (mut at, mut least) = best?;
+    if seen.len() == 1 {
+        return Some((at, least));
+    }
+    for _ in 0..8 {
+        let Some(step) = step(cameras, seen, &at) else { break };
+        let trial = at * exp(&step);
+        let misfit = total(&trial);
+        // Not a number is no improvement either.
+        if misfit.partial_cmp(&least) != Some(std::cmp::Ordering::Less) {
+            break;
+        }
+        (at, least) = (trial, misfit);
+    }
+    Some((at, least))
+}
+
+/// Gauss-Newton under the comparing loss.
+fn step(
+    cameras: &[CameraModel],
+    seen: &[(&Observation, Isometry3<f64>)],
+    frame_from_camera: &Isometry3<f64>,
+) -> Option<Vector6<f64>> {
+    let loss = Loss::Cauchy { c: COMPARE_PX };
+    let mut normal = Matrix6::zeros();
+    let mut right = Vector6::zeros();
+    for (observation, frame_from_tag) in seen {
+        let camera_from_tag = frame_from_camera.inv_mul(frame_from_tag);
+        for (corner, measured) in observation.corners_m.iter().zip(&observation.corners_px) {
+            let point = camera_from_tag * nalgebra::Point3::from(*corner);
+            let camera = &cameras[observation.camera];
+            let Some((pixel, of_point)) = camera.project_with_jacobian(&point.coords) else { continue };
+            let residual = measured - pixel;
+            let (_, weight) = loss.of(residual.norm_squared());
+            let mut jacobian = Matrix2x6::zeros();
+            jacobian.fixed_view_mut::<2, 3>(0, 0).copy_from(&-of_point);
+            let of_turn: Matrix2x3<f64> = of_point * skew(&point.coords);
+            jacobian.fixed_view_mut::<2, 3>(0, 3).copy_from(&of_turn);
+            normal += jacobian.transpose() * jacobian * weight;
+            right += jacobian.transpose() * residual * weight;
+        }
+    }
+    normal.cholesky().map(|normal| normal.solve(&right))
+}
+
+/// A tag's pose for which its images fit best, out of the solutions of each, and its misfit; `images` with frame_from_camera.
+pub(super) fn place_tag(
+    cameras: &[CameraModel],
+    images: &[(&Observation, Isometry3<f64>)],
+) -> Option<(Isometry3<f64>, f64)> {
+    const MAX_IMAGES: usize = 40;
+    let some: Vec<_> =
+        (0..images.len().min(MAX_IMAGES)).map(|k| &images[k * images.len() / images.len().min(MAX_IMAGES)]).collect();
+    let mut best: Option<(Isometry3<f64>, f64)> = None;
+    for (observation, frame_from_camera) in &some {
+        for solution in observation.solutions() {
+            let frame_from_tag = frame_from_camera * solution.camera_from_tag.isometry();
+            let misfit = tag_misfit(cameras, images, &frame_from_tag);
+            if best.as_ref().is_none_or(|(_, least)| misfit < *least) {
+                best = Some((frame_from_tag, misfit));
+            }
+        }
+    }
+    best
+}
+
+/// A tag's pose by a few Gauss-Newton steps under the comparing loss, cameras held.
+pub(super) fn refine_tag(
+    cameras: &[CameraModel],
+    images: &[(&Observation, Isometry3<f64>)],
+    start: &Isometry3<f64>,
+) -> Isometry3<f64> {
+    let (mut at, mut least) = (*start, tag_misfit(cameras, images, start));
+    for _ in 0..6 {
+        let Some(step) = tag_step(cameras, images, &at) else { break };
+        let trial = at * exp(&step);
+        let misfit = tag_misfit(cameras, images, &trial);
+        // Not a number is no improvement either.
+        if misfit.partial_cmp(&least) != Some(std::cmp::Ordering::Less) {
+            break;
+        }
+        (at, least) = (trial, misfit);
+    }
+    at
+}
+
+fn tag_step(
+    cameras: &[CameraModel],
+    images: &[(&Observation, Isometry3<f64>)],
+    frame_from_tag: &Isometry3<f64>,
+) -> Option<Vector6<f64>> {
+    let loss = Loss::Cauchy { c: COMPARE_PX };
+    let mut normal = Matrix6::zeros();
+    let mut right = Vector6::zeros();
+    for (observation, frame_from_camera) in images {
+        let camera_from_tag = frame_from_camera.inv_mul(frame_from_tag);
+        let turn = camera_from_tag.rotation.to_rotation_matrix();
+        for (corner, measured) in observation.corners_m.iter().zip(&observation.corners_px) {
+            let point = camera_from_tag * nalgebra::Point3::from(*corner);
+            let camera = &cameras[observation.camera];
+            let Some((pixel, of_point)) = camera.project_with_jacobian(&point.coords) else { continue };
+            let residual = measured - pixel;
+            let (_, weight) = loss.of(residual.norm_squared());
+            let turned = of_point * turn.matrix();
+            let mut jacobian = Matrix2x6::zeros();
+            jacobian.fixed_view_mut::<2, 3>(0, 0).copy_from(&turned);
+            jacobian.fixed_view_mut::<2, 3>(0, 3).copy_from(&(-turned * skew(corner)));
+            normal += jacobian.transpose() * jacobian * weight;
+            right += jacobian.transpose() * residual * weight;
+        }
+    }
+    normal.cholesky().map(|normal| normal.solve(&right))
+}
+
+pub(super) fn tag_misfit(
+    cameras: &[CameraModel],
+    images: &[(&Observation, Isometry3<f64>)],
+    frame_from_tag: &Isometry3<f64>,
+) -> f64 {
+    images
+        .iter()
+        .map(|(s, frame_from_camera)| misfit(&cameras[s.camera], &frame_from_camera.inv_mul(frame_from_tag), s))
+        .sum()
+}
+
+pub(super) fn view_misfit(
+    cameras: &[CameraModel],
+    seen: &[(&Observation, Isometry3<f64>)],
+    frame_from_camera: &Isometry3<f64>,
+) -> f64 {
+    seen.iter().map(|(s, tag)| misfit(&cameras[s.camera], &frame_from_camera.inv_mul(tag), s)).sum()
+}

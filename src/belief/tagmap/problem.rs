@@ -1,0 +1,102 @@
+//! What the bundle adjustment works on.
+
+use std::ops::Range;
+
+use nalgebra::{Isometry3, Matrix2, Vector2, Vector3};
+
+use armcal_core::optics::{CameraModel, SquarePose};
+
+/// One tag in one image, checked and solved by itself.
+#[derive(Clone, Debug)]
+pub(super) struct Observation {
+    /// Index into the sorted views.
+    pub(super) view: usize,
+    /// Index into the sorted tags.
+    pub(super) tag: usize,
+    pub(super) camera: usize,
+    pub(super) corners_px: [Vector2<f64>; 4],
+    /// Makes a pixel difference a unit-variance vector.
+    pub(super) whiten: [Matrix2<f64>; 4],
+    /// Corners in the tag's frame, m.
+    pub(super) corners_m: [Vector3<f64>; 4],
+    pub(super) best: SquarePose,
+    pub(super) other: Option<SquarePose>,
+    pub(super) is_used: bool,
+}
+
+impl Observation {
+    /// camera_from_tag of the square by itself, both ways.
+    pub(super) fn solutions(&self) -> impl Iterator<Item = &SquarePose> {
+        std::iter::once(&self.best).chain(&self.other)
+    }
+}
+
+/// A pose that is known to within a standard deviation.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PosePrior {
+    /// owner_from_tag.
+    pub(super) pose: Isometry3<f64>,
+    /// 1/std^2 along the tag's axes.
+    pub(super) information: nalgebra::Vector6<f64>,
+    /// Node of the owner where its place is estimated; `None`: the owner's frame is the group's.
+    pub(super) owner: Option<usize>,
+}
+
+/// A tag in the adjustment.
+#[derive(Clone, Debug)]
+pub(super) struct TagState {
+    pub(super) id: u32,
+    pub(super) size_m: f64,
+    pub(super) body: usize,
+    /// As given: body_from_tag and its standard deviations, exact where `None`.
+    pub(super) given: Option<(Isometry3<f64>, Option<[f64; 6]>)>,
+    pub(super) group: usize,
+    /// Place in the reduced system; `None` is held.
+    pub(super) node: Option<usize>,
+    pub(super) prior: Option<PosePrior>,
+    pub(super) pose: Isometry3<f64>,
+}
+
+/// One image's view of one group: six unknowns.
+#[derive(Clone, Debug)]
+pub(super) struct Block {
+    pub(super) view: usize,
+    pub(super) group: usize,
+    /// Its observations.
+    pub(super) range: Range<usize>,
+    /// Place in the reduced system where another block depends on it (attitude); `None` is eliminated.
+    pub(super) node: Option<usize>,
+    /// frame_from_camera.
+    pub(super) pose: Isometry3<f64>,
+}
+
+/// A pose in the reduced system that is no tag's: a body's place in its group, or the turn of the world.
+#[derive(Clone, Debug)]
+pub(super) struct Extra {
+    pub(super) node: usize,
+    pub(super) pose: Isometry3<f64>,
+}
+
+/// The attitude sensor ties the rotations of two blocks of one view:
+/// world_from_moving * moving_from_camera = world_from_fixed * fixed_from_camera.
+#[derive(Clone, Debug)]
+pub(super) struct AttitudeLink {
+    pub(super) moving: usize,
+    pub(super) fixed: usize,
+    /// Index into the extras: world_from_fixed, of which only the rotation counts.
+    pub(super) world: usize,
+    pub(super) world_from_moving: nalgebra::UnitQuaternion<f64>,
+    pub(super) information: f64,
+}
+
+#[derive(Clone, Debug)]
+pub(super) struct Problem<'a> {
+    pub(super) cameras: &'a [CameraModel],
+    /// Sorted by block and tag.
+    pub(super) observations: Vec<Observation>,
+    pub(super) tags: Vec<TagState>,
+    pub(super) blocks: Vec<Block>,
+    pub(super) extras: Vec<Extra>,
+    pub(super) links: Vec<AttitudeLink>,
+    pub(super) n_nodes: usize,
+}

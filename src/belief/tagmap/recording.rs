@@ -1,0 +1,185 @@
+//! Views from recordings, ours and others'.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+use nalgebra::{Quaternion, UnitQuaternion};
+
+use super::files::{NamedCamera, TagFile};
+use super::types::{MapView, SeenTag};
+use armcal_core::log::{Completeness, LogError, RawMessage, decode, for_each_raw, ros, topics};
+use armcal_core::time::Stamp;
+
+/// Views of a recording, and what was left out.
+#[derive(Clone, Debug)]
+pub struct RecordedViews {
+    pub views: Vec<MapView>,
+    /// Topic of each camera that has one in the recording: (index of the camera, topic).
+    pub topics: Vec<(usize, String)>,
+    pub completeness: Completeness,
+    /// Messages and detections that were left out, by reason.
+    pub left_out: BTreeMap<&'static str, usize>,
+    /// Of those, the ones that could not be read; the rest was asked for.
+    pub n_unreadable: usize,
+}
+
+/// Why a recording has no views.
+#[derive(Debug, thiserror::Error)]
+pub enum ViewsError {
+    #[error(transparent)]
+    Log(#[from] LogError),
+    #[error(
+        "{}: no topic with detections (apriltag_msgs/msg/AprilTagDetectionArray) of the cameras; \
+         wanted: {wanted:?}, in the recording: {found:?}; name one with --topic", path.display()
+    )]
+    NoTopic { path: PathBuf, wanted: Vec<String>, found: Vec<String> },
+}
+
+/// What a recording holds for a map.
+#[derive(Default)]
+struct Contents {
+    arrays: BTreeMap<String, Vec<(Stamp, Option<ros::AprilTagDetectionArray>)>>,
+    attitudes: Vec<(Stamp, UnitQuaternion<f64>)>,
+}
+
+/// Reads the detections of `cameras`: of each the topic that its file names, if the recording has it; failing that `topic`, or
+/// the only one that there is, for the first camera. `rules` says which detections are left out or stand for others.
+///
+/// # Errors
+/// [`ViewsError`].
+pub fn read_views(
+    path: &Path,
+    cameras: &[NamedCamera],
+    topic: Option<&str>,
+    rules: &TagFile,
+) -> Result<RecordedViews, ViewsError> {
+    let mut contents = Contents::default();
+    let summary = for_each_raw(path, |message| contents.take(message))?;
+    let topics = choose_topics(path, cameras, topic, &contents)?;
+    contents.attitudes.sort_by_key(|(stamp, _)| *stamp);
+    let mut out = RecordedViews {
+        views: Vec::new(),
+        topics,
+        completeness: summary.completeness,
+        left_out: BTreeMap::new(),
+        n_unreadable: 0,
+    };
+    for (camera, topic) in out.topics.clone() {
+        for (log_time, array) in contents.arrays.remove(&topic).unwrap_or_default() {
+            let Some(array) = array else {
+                out.n_unreadable += 1;
+                *out.left_out.entry("messages that cannot be decoded").or_default() += 1;
+                continue;
+            };
+            let stamp = Stamp::try_from(array.header.stamp).ok().filter(|stamp| stamp.nanos != 0).unwrap_or(log_time);
+            let tags = array.detections.iter().filter_map(|d| seen(d, stamp, &cameras[camera].name, rules, &mut out));
+            let tags: Vec<SeenTag> = tags.collect();
+            let attitude = attitude_at(&contents.attitudes, stamp);
+            out.views.push(MapView { camera, stamp, tags, attitude });
+        }
+    }
+    Ok(out)
+}
+
+impl Contents {
+    fn take(&mut self, message: &RawMessage<'_>) {
+        if message.schema_name().ends_with("/AprilTagDetectionArray") {
+            let array = decode(message.data).ok();
+            self.arrays.entry(message.topic().to_owned()).or_default().push((message.log_time(), array));
+        } else if message.topic() == topics::VEHICLE_IMU
+            && let Ok(imu) = decode::<ros::Imu>(message.data)
+            && let Ok(stamp) = Stamp::try_from(imu.header.stamp)
+            && imu.orientation_covariance[0] >= 0.0
+        {
+            let [w, x, y, z] = imu.orientation.wxyz();
+            let quaternion = Quaternion::new(w, x, y, z);
+            if (quaternion.norm() - 1.0).abs() < 0.01 {
+                self.attitudes.push((stamp, UnitQuaternion::from_quaternion(quaternion)));
+            }
+        }
+    }
+}
+
+fn choose_topics(
+    path: &Path,
+    cameras: &[NamedCamera],
+    topic: Option<&str>,
+    contents: &Contents,
+) -> Result<Vec<(usize, String)>, ViewsError> {
+    let found: BTreeSet<&String> = contents.arrays.keys().collect();
+    let named = |camera: &NamedCamera| camera.tag_topic.clone().filter(|topic| found.contains(topic));
+    if let Some(wanted) = topic.map(str::to_owned) {
+        if !found.contains(&wanted) {
+            return Err(no_topic(path, vec![wanted], &found));
+        }
+        let camera = cameras.iter().position(|camera| camera.tag_topic.as_ref() == Some(&wanted)).unwrap_or(0);
+        return Ok(vec![(camera, wanted)]);
+    }
+    let by_name: Vec<(usize, String)> =
+        cameras.iter().enumerate().filter_map(|(idx, camera)| named(camera).map(|topic| (idx, topic))).collect();
+    match (by_name.is_empty(), found.iter().next()) {
+        (false, _) => Ok(by_name),
+        (true, Some(only)) if found.len() == 1 => Ok(vec![(0, (*only).clone())]),
+        _ => Err(no_topic(path, cameras.iter().filter_map(|camera| camera.tag_topic.clone()).collect(), &found)),
+    }
+}
+
+fn no_topic(path: &Path, wanted: Vec<String>, found: &BTreeSet<&String>) -> ViewsError {
+    ViewsError::NoTopic { path: path.to_owned(), wanted, found: found.iter().map(|topic| (*topic).clone()).collect() }
+}
+
+fn seen(
+    detection: &ros::AprilTagDetection,
+    stamp: Stamp,
+    camera: &str,
+    rules: &TagFile,
+    out: &mut RecordedViews,
+) -> Option<SeenTag> {
+    let corners_px = detection.corners.map(|corner| [corner.x, corner.y]);
+    let mut left_out = |reason: &'static str| *out.left_out.entry(reason).or_default() += 1;
+    let Ok(mut id) = u32::try_from(detection.id) else {
+        left_out("detections with a negative id");
+        out.n_unreadable += 1;
+        return None;
+    };
+    if corners_px.iter().flatten().any(|value| !value.is_finite()) {
+        left_out("detections with corners that are no numbers");
+        out.n_unreadable += 1;
+        return None;
+    }
+    if rules.max_hamming.is_some_and(|most| detection.hamming > most) {
+        left_out("detections above max_hamming_distance");
+        return None;
+    }
+    let remap = rules.remaps.iter().find(|remap| {
+        remap.id == id
+            && remap.camera.as_ref().is_none_or(|name| name == camera)
+            && (remap.from..=remap.to).contains(&stamp)
+    });
+    if let Some(remap) = remap {
+        id = remap.as_id;
+    }
+    if rules.ignored.contains(&id) {
+        left_out("detections of ignore_tags");
+        return None;
+    }
+    if rules.squashed.iter().any(|(at, ids)| *at == stamp && ids.contains(&id)) {
+        left_out("detections squashed");
+        return None;
+    }
+    Some(SeenTag { id, corners_px, covariance_px2: None })
+}
+
+/// Longest gap between attitudes that is bridged, s.
+const MAX_GAP_S: f64 = 0.2;
+
+/// Between the two neighbours in time.
+fn attitude_at(attitudes: &[(Stamp, UnitQuaternion<f64>)], stamp: Stamp) -> Option<UnitQuaternion<f64>> {
+    let after = attitudes.partition_point(|(at, _)| *at < stamp);
+    let (later, later_turn) = attitudes.get(after)?;
+    let Some((earlier, turn)) = after.checked_sub(1).map(|idx| &attitudes[idx]) else {
+        return (*later == stamp).then_some(*later_turn);
+    };
+    let span_s = later.since_s(*earlier);
+    (span_s <= MAX_GAP_S).then(|| turn.slerp(later_turn, stamp.since_s(*earlier) / span_s.max(1e-9)))
+}

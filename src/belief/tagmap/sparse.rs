@@ -1,0 +1,246 @@
+//! Sparse symmetric systems of 6x6 blocks, by Cholesky.
+//!
+//! The reduced camera-free system of the tags has a block where two tags were seen together (Triggs et al. 2000, sec. 6.1): few
+//! of all pairs. Blocks are eliminated in the order of least degree (ties by number, so that the order is always the same), with
+//! the fill found once and used for every iteration.
+
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+use nalgebra::{Matrix6, Vector6};
+
+/// Which blocks there are, in the order of elimination.
+#[derive(Debug)]
+pub(super) struct Pattern {
+    /// Place in the order of elimination of each node.
+    place: Vec<usize>,
+    /// Rows below the diagonal of each column, ascending places.
+    rows: Vec<Vec<usize>>,
+    /// Where each column's blocks begin.
+    start: Vec<usize>,
+}
+
+impl Pattern {
+    /// The pattern of `n` nodes where the pairs of `edges` share a block.
+    pub(super) fn new(n: usize, edges: impl IntoIterator<Item = (usize, usize)>) -> Self {
+        let mut neighbours = vec![BTreeSet::new(); n];
+        for (a, b) in edges {
+            if a != b {
+                neighbours[a].insert(b);
+                neighbours[b].insert(a);
+            }
+        }
+        let mut by_degree: BTreeSet<(usize, usize)> = (0..n).map(|node| (neighbours[node].len(), node)).collect();
+        let mut place = vec![0; n];
+        let mut columns = Vec::with_capacity(n);
+        while let Some((_, node)) = by_degree.pop_first() {
+            place[node] = columns.len();
+            let around: Vec<usize> = std::mem::take(&mut neighbours[node]).into_iter().collect();
+            for a in &around {
+                by_degree.remove(&(neighbours[*a].len(), *a));
+                neighbours[*a].remove(&node);
+                neighbours[*a].extend(around.iter().filter(|b| *b != a));
+                by_degree.insert((neighbours[*a].len(), *a));
+            }
+            columns.push(around);
+        }
+        let mut rows: Vec<Vec<usize>> = Vec::with_capacity(n);
+        let mut start = Vec::with_capacity(n);
+        let mut n_blocks = 0;
+        for column in columns {
+            let mut places: Vec<usize> = column.into_iter().map(|node| place[node]).collect();
+            places.sort_unstable();
+            start.push(n_blocks);
+            n_blocks += places.len();
+            rows.push(places);
+        }
+        start.push(n_blocks);
+        Self { place, rows, start }
+    }
+
+    fn slot(&self, row: usize, column: usize) -> usize {
+        match self.rows[column].binary_search(&row) {
+            Ok(at) => self.start[column] + at,
+            Err(_) => unreachable!("every block of the pattern was announced"),
+        }
+    }
+}
+
+/// A symmetric matrix on a [`Pattern`].
+#[derive(Clone, Debug)]
+pub(super) struct System {
+    pattern: Arc<Pattern>,
+    diagonal: Vec<Matrix6<f64>>,
+    lower: Vec<Matrix6<f64>>,
+}
+
+impl System {
+    pub(super) fn zeros(pattern: &Arc<Pattern>) -> Self {
+        let n_blocks = pattern.start.last().copied().unwrap_or(0);
+        Self {
+            pattern: Arc::clone(pattern),
+            diagonal: vec![Matrix6::zeros(); pattern.place.len()],
+            lower: vec![Matrix6::zeros(); n_blocks],
+        }
+    }
+
+    /// Adds `block` at (a, b), and its transpose at (b, a) where they differ.
+    pub(super) fn add(&mut self, a: usize, b: usize, block: &Matrix6<f64>) {
+        let (row, column) = (self.pattern.place[a], self.pattern.place[b]);
+        match row.cmp(&column) {
+            std::cmp::Ordering::Equal => self.diagonal[row] += block,
+            std::cmp::Ordering::Greater => self.lower[self.pattern.slot(row, column)] += block,
+            std::cmp::Ordering::Less => self.lower[self.pattern.slot(column, row)] += block.transpose(),
+        }
+    }
+
+    /// L of L L^T; `None` if the matrix is not positive definite.
+    pub(super) fn factorize(mut self) -> Option<Factor> {
+        let pattern = Arc::clone(&self.pattern);
+        for column in 0..pattern.rows.len() {
+            let pivot = self.diagonal[column].cholesky()?.l();
+            self.diagonal[column] = pivot;
+            let (from, to) = (pattern.start[column], pattern.start[column + 1]);
+            for block in &mut self.lower[from..to] {
+                // X L^T = A: solve L X^T = A^T.
+                let mut transposed = block.transpose();
+                if !pivot.solve_lower_triangular_mut(&mut transposed) {
+                    return None;
+                }
+                *block = transposed.transpose();
+            }
+            let rows = &pattern.rows[column];
+            for (i, &row) in rows.iter().enumerate() {
+                let left = self.lower[from + i];
+                self.diagonal[row] -= left * left.transpose();
+                for (k, &other) in rows[..i].iter().enumerate() {
+                    let product = left * self.lower[from + k].transpose();
+                    self.lower[pattern.slot(row, other)] -= product;
+                }
+            }
+        }
+        Some(Factor { pattern, diagonal: self.diagonal, lower: self.lower })
+    }
+}
+
+/// A factorized [`System`].
+#[derive(Clone, Debug)]
+pub(super) struct Factor {
+    pattern: Arc<Pattern>,
+    diagonal: Vec<Matrix6<f64>>,
+    lower: Vec<Matrix6<f64>>,
+}
+
+impl Factor {
+    /// Solves for a right side given by nodes.
+    pub(super) fn solve(&self, right: &[Vector6<f64>]) -> Vec<Vector6<f64>> {
+        let pattern = &*self.pattern;
+        let n = pattern.rows.len();
+        let mut x = vec![Vector6::zeros(); n];
+        for (node, value) in right.iter().enumerate() {
+            x[pattern.place[node]] = *value;
+        }
+        for column in 0..n {
+            self.diagonal[column].solve_lower_triangular_mut(&mut x[column]);
+            let value = x[column];
+            for (i, &row) in pattern.rows[column].iter().enumerate() {
+                x[row] -= self.lower[pattern.start[column] + i] * value;
+            }
+        }
+        for column in (0..n).rev() {
+            let mut value = x[column];
+            for (i, &row) in pattern.rows[column].iter().enumerate() {
+                value -= self.lower[pattern.start[column] + i].tr_mul(&x[row]);
+            }
+            self.diagonal[column].tr_solve_lower_triangular_mut(&mut value);
+            x[column] = value;
+        }
+        pattern.place.iter().map(|&place| x[place]).collect()
+    }
+
+    /// The six columns of the inverse that belong to `node`, by nodes.
+    pub(super) fn inverse_column(&self, node: usize) -> Vec<Matrix6<f64>> {
+        let pattern = &*self.pattern;
+        let n = pattern.rows.len();
+        let first = pattern.place[node];
+        let mut x = vec![Matrix6::zeros(); n];
+        x[first] = Matrix6::identity();
+        for column in first..n {
+            self.diagonal[column].solve_lower_triangular_mut(&mut x[column]);
+            let value = x[column];
+            for (i, &row) in pattern.rows[column].iter().enumerate() {
+                x[row] -= self.lower[pattern.start[column] + i] * value;
+            }
+        }
+        for column in (0..n).rev() {
+            let mut value = x[column];
+            for (i, &row) in pattern.rows[column].iter().enumerate() {
+                value -= self.lower[pattern.start[column] + i].tr_mul(&x[row]);
+            }
+            self.diagonal[column].tr_solve_lower_triangular_mut(&mut value);
+            x[column] = value;
+        }
+        pattern.place.iter().map(|&place| x[place]).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use armcal_core::stats::stream_rng;
+    use nalgebra::{DMatrix, DVector};
+    use rand::RngExt;
+
+    /// A random sparse positive definite matrix, both ways.
+    fn random(n: usize, seed: u64) -> (System, DMatrix<f64>) {
+        let mut rng = stream_rng(seed, "blocks");
+        let edges: Vec<(usize, usize)> =
+            (0..2 * n).map(|_| (rng.random_range(0..n), rng.random_range(0..n))).filter(|(a, b)| a != b).collect();
+        let mut system = System::zeros(&Arc::new(Pattern::new(n, edges.iter().copied())));
+        let mut dense = DMatrix::zeros(6 * n, 6 * n);
+        let mut add = |a: usize, b: usize, block: &Matrix6<f64>| {
+            system.add(a, b, block);
+            let mut at = dense.fixed_view_mut::<6, 6>(6 * a, 6 * b);
+            at += block;
+            if a != b {
+                let mut at = dense.fixed_view_mut::<6, 6>(6 * b, 6 * a);
+                at += block.transpose();
+            }
+        };
+        for (a, b) in edges {
+            let block = Matrix6::from_fn(|_, _| rng.random_range(-1.0..1.0));
+            add(a, b, &block);
+        }
+        for a in 0..n {
+            add(a, a, &(Matrix6::identity() * 80.0));
+        }
+        (system, dense)
+    }
+
+    #[test]
+    fn solutions_and_inverses_are_those_of_the_dense_matrix() {
+        for (n, seed) in [(1, 1), (2, 2), (7, 3), (30, 4)] {
+            let (system, dense) = random(n, seed);
+            let factor = system.factorize().expect("diagonally dominant");
+            let right: Vec<Vector6<f64>> = (0..n).map(|k| Vector6::repeat(1.0 + k as f64)).collect();
+            let solved = factor.solve(&right);
+            let dense_right = DVector::from_iterator(6 * n, right.iter().flat_map(|v| v.iter().copied()));
+            let expected = dense.clone().cholesky().expect("positive definite").solve(&dense_right);
+            let inverse = dense.try_inverse().expect("regular");
+            for (a, solved) in solved.iter().enumerate() {
+                assert!((solved - expected.fixed_rows::<6>(6 * a)).norm() < 1e-12);
+                let column = factor.inverse_column(a);
+                for (b, block) in column.iter().enumerate() {
+                    assert!((block - inverse.fixed_view::<6, 6>(6 * b, 6 * a)).norm() < 1e-12);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_not_positive_definite_has_no_factor() {
+        let mut system = System::zeros(&Arc::new(Pattern::new(1, [])));
+        system.add(0, 0, &-Matrix6::identity());
+        assert!(system.factorize().is_none());
+    }
+}

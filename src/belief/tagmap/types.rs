@@ -1,0 +1,186 @@
+//! What a tag map is made from.
+
+use nalgebra::{Isometry3, Matrix2, UnitQuaternion};
+
+use armcal_core::optics::CameraModel;
+use armcal_core::time::Stamp;
+
+/// One tag in one image.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SeenTag {
+    pub id: u32,
+    /// Raw pixels in the order of `optics::square_corners`.
+    pub corners_px: [[f64; 2]; 4],
+    /// Of each corner; `None` takes [`MapSettings::corner_std_px`] in both directions.
+    pub covariance_px2: Option<[Matrix2<f64>; 4]>,
+}
+
+/// What one camera saw in one image.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MapView {
+    /// Index into [`MapInput::cameras`].
+    pub camera: usize,
+    pub stamp: Stamp,
+    pub tags: Vec<SeenTag>,
+    /// world_from_body of the moving body that carries an attitude sensor ([`MapSettings::attitude_body`]), at the stamp.
+    pub attitude: Option<UnitQuaternion<f64>>,
+}
+
+/// Something rigid that carries tags.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Body {
+    pub name: String,
+    /// Static bodies do not move relative to each other, so that their tags make one map; a moving one has its own.
+    pub is_static: bool,
+    /// frame_from_body for static bodies that know their places relative to each other; `None` is estimated from the tags.
+    pub pose: Option<Isometry3<f64>>,
+}
+
+/// What is known of a tag before.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TagPrior {
+    pub id: u32,
+    pub size_m: f64,
+    /// Index into [`MapInput::bodies`].
+    pub body: usize,
+    /// body_from_tag, where it is known.
+    pub pose: Option<Isometry3<f64>>,
+    /// Standard deviations of that pose: translation (m) and rotation (rad) along the tag's axes. `None` is exact.
+    pub std: Option<[f64; 6]>,
+}
+
+/// How much of the tags' poses is believed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum MapMode {
+    /// Every pose given is exact: cameras are located, and what disagrees shows.
+    Known,
+    /// Poses given hold to within their standard deviations.
+    #[default]
+    PartlyKnown,
+    /// Only the base tag's pose is used, as exact.
+    Unknown,
+}
+
+/// Where the scale of the covariances comes from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum NoiseScale {
+    /// The corners' covariances are as given.
+    Given,
+    /// They are scaled by what the residuals show.
+    #[default]
+    Estimated,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub struct MapSettings {
+    pub mode: MapMode,
+    /// The tag that anchors the map; without it the tags with poses do, and failing that the first of each group.
+    pub base_tag: Option<u32>,
+    /// Of a corner, each direction; where the detections bring no covariances.
+    pub corner_std_px: f64,
+    pub noise: NoiseScale,
+    /// Size and body of tags that no prior names; `None` rejects them.
+    pub default_tag: Option<(f64, usize)>,
+    /// Detections that fit no square to within this are none, px rms. Assumed; three pixels is far beyond any detector.
+    pub max_square_rms_px: f64,
+    /// Detections whose corners are farther off than this many standard deviations (rms) are rejected. Assumed.
+    pub reject_beyond_sigmas: f64,
+    /// Images in which two groups of tags must be seen together to become one.
+    pub min_link_views: usize,
+    /// The body with the attitude sensor.
+    pub attitude_body: Option<usize>,
+    /// Standard deviation of the attitude, rad.
+    pub attitude_std_rad: f64,
+}
+
+impl Default for MapSettings {
+    fn default() -> Self {
+        Self {
+            mode: MapMode::default(),
+            base_tag: None,
+            corner_std_px: 0.3,
+            noise: NoiseScale::default(),
+            default_tag: None,
+            max_square_rms_px: 3.0,
+            reject_beyond_sigmas: 5.0,
+            min_link_views: 2,
+            attitude_body: None,
+            attitude_std_rad: 0.01,
+        }
+    }
+}
+
+/// All that [`super::solve`] works on.
+#[derive(Clone, Copy, Debug)]
+pub struct MapInput<'a> {
+    pub cameras: &'a [CameraModel],
+    pub views: &'a [MapView],
+    pub bodies: &'a [Body],
+    pub tags: &'a [TagPrior],
+}
+
+/// Why a detection is not in the map.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum MapRejection {
+    /// No prior names the tag, and there is no default size.
+    UnknownTag,
+    /// The same id stands twice in the image; which one is right cannot be told.
+    SeenTwice,
+    /// A corner has no bearing in the lens model.
+    OutOfView,
+    /// The corners are not those of a square seen from its front.
+    NotASquare,
+    /// The corners disagree with all else that is known of camera and tag: a wrong id, or badly blurred.
+    Inconsistent,
+}
+
+impl MapRejection {
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::UnknownTag => "unknown_tag",
+            Self::SeenTwice => "seen_twice",
+            Self::OutOfView => "out_of_view",
+            Self::NotASquare => "not_a_square",
+            Self::Inconsistent => "inconsistent",
+        }
+    }
+
+    /// Whether it speaks against the data; a tag that nobody named does not.
+    #[must_use]
+    pub fn is_fault(self) -> bool {
+        self != Self::UnknownTag
+    }
+}
+
+/// A detection that was not used.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RejectedDetection {
+    /// Index into [`MapInput::views`].
+    pub view: usize,
+    pub id: u32,
+    pub reason: MapRejection,
+}
+
+/// Why no map came out.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum TagMapError {
+    #[error("no view shows a tag, so there is nothing to map")]
+    NoDetections,
+    #[error("the base tag {base_tag} was not seen in any view; tags seen: {seen:?}")]
+    NoBaseTag { base_tag: u32, seen: Vec<u32> },
+    #[error("none of the tags whose places are known ({known:?}) was seen in any view; tags seen: {seen:?}")]
+    NoKnownTag { known: Vec<u32>, seen: Vec<u32> },
+    #[error("tag {id}: size_m {size_m} is outside 0.001 .. 10")]
+    TagSize { id: u32, size_m: f64 },
+    #[error("tag {id}: stands twice among the known tags")]
+    TagTwice { id: u32 },
+    #[error("tag {id}: names body {body}, of {n_bodies}")]
+    NoSuchBody { id: u32, body: usize, n_bodies: usize },
+    #[error("view {view}: names camera {camera}, of {n_cameras}")]
+    NoSuchCamera { view: usize, camera: usize, n_cameras: usize },
+    #[error("{what} is {value}; it must be a number above 0")]
+    Setting { what: &'static str, value: f64 },
+    #[error("every one of {rejected} detections was rejected: {reasons}")]
+    NothingLeft { rejected: usize, reasons: String },
+}

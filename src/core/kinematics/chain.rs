@@ -1,0 +1,154 @@
+//! The chain and its forward kinematics.
+
+use nalgebra::{Isometry3, Unit, UnitQuaternion, Vector3};
+
+use crate::joints::{JointAngles, MAX_JOINTS};
+
+/// Joint range, rad.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JointLimits {
+    pub lower_rad: f64,
+    pub upper_rad: f64,
+}
+
+/// One moving joint: fixed transform from the parent joint's link frame, then a rotation about `axis`.
+#[derive(Clone, Debug)]
+pub struct ChainJoint {
+    pub name: String,
+    pub child_link: String,
+    pub parent_from_joint: Isometry3<f64>,
+    pub axis: Unit<Vector3<f64>>,
+    /// `None` for a continuous joint.
+    pub limits: Option<JointLimits>,
+}
+
+/// A frame fixed to the link behind the first `n_joints` joints (0: the base).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Attachment {
+    pub n_joints: usize,
+    pub link_from_frame: Isometry3<f64>,
+}
+
+/// A serial chain of revolute joints, base first.
+#[derive(Clone, Debug)]
+pub struct Chain {
+    joints: Vec<ChainJoint>,
+}
+
+/// `base_from_link` for the base (index 0) and each joint's child link.
+#[derive(Clone, Copy, Debug)]
+pub struct LinkPoses {
+    n_joints: usize,
+    base_from_link: [Isometry3<f64>; MAX_JOINTS + 1],
+    /// Unit axes of the joints in the base frame.
+    axes: [Vector3<f64>; MAX_JOINTS],
+}
+
+impl Chain {
+    pub fn new(joints: Vec<ChainJoint>) -> Self {
+        assert!(joints.len() <= MAX_JOINTS, "readers of files check the number of joints");
+        Self { joints }
+    }
+
+    #[must_use]
+    pub fn joints(&self) -> &[ChainJoint] {
+        &self.joints
+    }
+
+    #[must_use]
+    pub fn n_joints(&self) -> usize {
+        self.joints.len()
+    }
+
+    /// Poses of all links at `angles` (rad).
+    #[must_use]
+    pub fn link_poses(&self, angles: &JointAngles) -> LinkPoses {
+        debug_assert_eq!(angles.len(), self.joints.len());
+        let mut poses = LinkPoses {
+            n_joints: self.joints.len(),
+            base_from_link: [Isometry3::identity(); MAX_JOINTS + 1],
+            axes: [Vector3::zeros(); MAX_JOINTS],
+        };
+        for (i, (joint, &angle_rad)) in self.joints.iter().zip(angles.iter()).enumerate() {
+            let base_from_joint = poses.base_from_link[i] * joint.parent_from_joint;
+            poses.axes[i] = base_from_joint.rotation * joint.axis.into_inner();
+            // The frames change inside the recursion, so it runs on raw isometries; callers name the frames.
+            poses.base_from_link[i + 1] = base_from_joint * UnitQuaternion::from_axis_angle(&joint.axis, angle_rad);
+        }
+        poses
+    }
+
+    /// The pose of one attached frame in the base frame at `angles` (rad), to the bit that of [`Self::link_poses`].
+    #[must_use]
+    pub fn frame(&self, angles: &JointAngles, attachment: &Attachment) -> Isometry3<f64> {
+        let mut base_from_link = Isometry3::identity();
+        for (joint, &angle_rad) in self.joints[..attachment.n_joints].iter().zip(angles.iter()) {
+            let turn = UnitQuaternion::from_axis_angle(&joint.axis, angle_rad);
+            base_from_link = base_from_link * joint.parent_from_joint * turn;
+        }
+        base_from_link * attachment.link_from_frame
+    }
+}
+
+impl LinkPoses {
+    /// `base_from_link` of the base (0) or of the child link of joint `body - 1`.
+    #[must_use]
+    pub fn link(&self, body: usize) -> &Isometry3<f64> {
+        &self.base_from_link[..=self.n_joints][body]
+    }
+
+    /// The pose of an attached frame in the base frame; the caller names it.
+    #[must_use]
+    pub fn frame(&self, attachment: &Attachment) -> Isometry3<f64> {
+        self.link(attachment.n_joints) * attachment.link_from_frame
+    }
+
+    /// Axis of joint `joint` in the base frame, unit.
+    #[must_use]
+    pub fn axis(&self, joint: usize) -> &Vector3<f64> {
+        &self.axes[..self.n_joints][joint]
+    }
+
+    /// Origin of joint `joint` in the base frame, m.
+    #[must_use]
+    pub fn joint_origin(&self, joint: usize) -> &Vector3<f64> {
+        // A joint's rotation leaves its own origin where it is, so the child link's origin serves.
+        &self.base_from_link[joint + 1].translation.vector
+    }
+
+    /// d(point)/d(angle of `joint`), m/rad, for a point (base frame) carried by that joint: `axis x (point - origin)`.
+    #[must_use]
+    pub fn point_jacobian(&self, joint: usize, point_m: &Vector3<f64>) -> Vector3<f64> {
+        self.axis(joint).cross(&(point_m - self.joint_origin(joint)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Translation3;
+    use rand::RngExt;
+
+    #[test]
+    fn a_frame_alone_is_to_the_bit_that_of_all_links() {
+        let mut rng = crate::stats::stream_rng(1, "chain");
+        let mut draw = || std::array::from_fn::<f64, 3, _>(|_| rng.random_range(-1.0..1.0));
+        let mut pose = || {
+            let (place, turn) = (draw(), draw());
+            Isometry3::from_parts(Translation3::from(place), UnitQuaternion::from_scaled_axis(Vector3::from(turn)))
+        };
+        let joint = |k: usize, parent_from_joint: Isometry3<f64>| ChainJoint {
+            name: format!("joint {k}"),
+            child_link: format!("link {k}"),
+            parent_from_joint,
+            axis: Unit::new_normalize(parent_from_joint.translation.vector),
+            limits: None,
+        };
+        let chain = Chain::new((0..6).map(|k| joint(k, pose())).collect());
+        for n_joints in 0..=6 {
+            let attachment = Attachment { n_joints, link_from_frame: pose() };
+            let angles = JointAngles::from_fn(6, |j| pose().translation.vector[j % 3]);
+            assert_eq!(chain.frame(&angles, &attachment), chain.link_poses(&angles).frame(&attachment));
+        }
+    }
+}

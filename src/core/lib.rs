@@ -1,0 +1,15 @@
+//! What truth and belief share: arm, sensors, optics, messages, recordings, routines.
+#![forbid(unsafe_code)]
+
+pub mod input;
+pub mod joints;
+pub mod kinematics;
+pub mod log;
+pub mod optics;
+pub mod robot;
+pub mod routine;
+pub mod sensor;
+pub mod spatial;
+pub mod stats;
+pub mod streams;
+pub mod time;

@@ -1,0 +1,38 @@
+//! Cameras: points to pixels and back.
+//!
+//! `Fisheye` is the equidistant model of Kannala and Brandt (2006, eq. 6 to the fourth odd term), as OpenCV's
+//! `cv::fisheye` and Kalibr's `equidistant` use it; `Radtan` is Brown's pinhole, `CameraModel` either of them; `square` finds a
+//! tag's pose from its four corners through any [`Lens`].
+//! Oracle: OpenCV (tests/oracle).
+
+mod camera;
+mod corner_noise;
+mod fisheye;
+mod radtan;
+mod square;
+pub mod tag36h11;
+mod twist;
+
+pub use camera::{CameraModel, Lens};
+pub use corner_noise::{CornerNoise, DetectionChance};
+pub use fisheye::Fisheye;
+pub use radtan::Radtan;
+pub use square::{SquareError, SquarePose, solve_square, solve_square_both, square_corners};
+pub use twist::pixel_by_twist;
+
+/// The wrist camera's lens, for tests.
+#[doc(hidden)]
+pub mod fixture {
+    use super::Fisheye;
+
+    #[must_use]
+    pub fn lens() -> Fisheye {
+        Fisheye {
+            focal_px: [387.33, 387.06],
+            center_px: [633.6, 510.9],
+            distortion: [0.02268, -0.01345, 0.01296, -0.00418],
+            resolution_px: [1224, 1024],
+            max_view_angle_rad: 1.45,
+        }
+    }
+}

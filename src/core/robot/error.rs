@@ -1,0 +1,64 @@
+//! What can be wrong with a robot folder or a vehicle file.
+
+use std::path::{Path, PathBuf};
+
+/// A wrong value in a file: which file, which key, and what would be right.
+#[derive(Clone, Debug, thiserror::Error, PartialEq)]
+#[error("{}: {key}: {problem}", file.display())]
+pub struct FileIssue {
+    pub file: PathBuf,
+    pub key: String,
+    pub problem: String,
+}
+
+/// Why a robot folder or vehicle file was refused.
+#[derive(Debug, thiserror::Error)]
+pub enum RobotError {
+    #[error("{}: cannot be read: {source}", file.display())]
+    Unreadable { file: PathBuf, source: std::io::Error },
+    #[error("{}: {message}", file.display())]
+    Syntax { file: PathBuf, message: String },
+    #[error(transparent)]
+    Value(#[from] FileIssue),
+    #[error("{}: links and joints form a loop at link `{link}`; an arm must be a tree", file.display())]
+    Loop { file: PathBuf, link: String },
+    #[error("{}: joint `{joint}` names the link `{link}`, which the file does not define", file.display())]
+    MissingLink { file: PathBuf, joint: String, link: String },
+    #[error("{}: link `{link}` has mass {mass_kg} kg; a simulated link needs a mass above 0", file.display())]
+    ZeroMass { file: PathBuf, link: String, mass_kg: f64 },
+    #[error("{}: no chain of joints leads from `{from}` to `{to}`", file.display())]
+    NoChain { file: PathBuf, from: String, to: String },
+    #[error("{}: joint `{joint}` is {kind}; only revolute, continuous and fixed joints are supported", file.display())]
+    JointKind { file: PathBuf, joint: String, kind: String },
+}
+
+impl FileIssue {
+    /// `value` at `key` is outside of what is allowed.
+    #[must_use]
+    pub fn new(file: &Path, key: impl Into<String>, problem: impl Into<String>) -> Self {
+        Self { file: file.to_owned(), key: key.into(), problem: problem.into() }
+    }
+
+    /// Checks that `value` is finite and within `low..=high`.
+    ///
+    /// # Errors
+    /// The issue, with the value and the allowed range.
+    pub fn check_range(file: &Path, key: &str, value: f64, range: std::ops::RangeInclusive<f64>) -> Result<f64, Self> {
+        if value.is_finite() && range.contains(&value) {
+            Ok(value)
+        } else {
+            Err(Self::new(file, key, format!("{value} is outside {} .. {}", range.start(), range.end())))
+        }
+    }
+}
+
+/// Reads a text file, naming it when that fails.
+pub fn read_text(file: &Path) -> Result<String, RobotError> {
+    std::fs::read_to_string(file).map_err(|source| RobotError::Unreadable { file: file.to_owned(), source })
+}
+
+/// Parses TOML, naming the file, the place and the key when that fails.
+pub fn parse_toml<T: serde::de::DeserializeOwned>(file: &Path, text: &str) -> Result<T, RobotError> {
+    toml::from_str(text)
+        .map_err(|error| RobotError::Syntax { file: file.to_owned(), message: error.to_string().trim_end().to_owned() })
+}

@@ -1,0 +1,336 @@
+//! Parts of a vehicle and obstacles, as files write them: primitives, hulls and meshes.
+
+use std::path::{Path, PathBuf};
+
+use parry3d::math::Vec3;
+use parry3d::transformation::vhacd::{VHACD, VHACDParameters};
+use serde::{Deserialize, Serialize};
+
+use super::error::{FileIssue, RobotError};
+use super::hull::{CenteredHull, Hull, HullError};
+use super::mesh::{self, Mesh};
+use super::shape::{PlacedShape, Shape};
+use crate::spatial::{Pose, Vehicle as VehicleFrame};
+
+/// One convex part, placed in its owner's frame.
+#[derive(Clone, Debug)]
+pub struct Part {
+    pub name: String,
+    pub placed: PlacedShape,
+}
+
+/// How a mesh becomes convex.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Convex {
+    /// One hull around all of it.
+    #[default]
+    Hull,
+    /// Several hulls that follow its hollows.
+    Decomposed,
+}
+
+/// A part or obstacle as files write it.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct PartFile {
+    name: String,
+    shape: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    size_m: Option<[f64; 3]>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    radius_m: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    length_m: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    points_m: Option<Vec<[f64; 3]>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    file: Option<PathBuf>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    scale_m: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    convex: Option<Convex>,
+    position_m: [f64; 3],
+    #[serde(default = "no_rotation")]
+    quaternion_wxyz: [f64; 4],
+    #[serde(default = "grey")]
+    color_rgb: [u8; 3],
+}
+
+/// The most shapes that one list may come to.
+pub const MAX_PARTS: usize = 256;
+/// The most hulls that one mesh is taken apart into.
+const MAX_HULLS: u32 = 32;
+
+fn no_rotation() -> [f64; 4] {
+    [1.0, 0.0, 0.0, 0.0]
+}
+
+fn grey() -> [u8; 3] {
+    [140, 140, 140]
+}
+
+/// Farther away than any site is wide is a slip of the pen.
+pub(super) fn check_place(file: &Path, key: &str, position_m: &[f64; 3]) -> Result<(), FileIssue> {
+    position_m.iter().try_for_each(|&value| FileIssue::check_range(file, key, value, -1e4..=1e4).map(|_| ()))
+}
+
+/// The parts that `raw`, a list `table` of `file`, stands for, and the same list without files: meshes as hulls, point by
+/// point, so that it can travel with a recording.
+///
+/// # Errors
+/// [`RobotError`] naming file and key; for meshes, both files.
+pub fn check_parts(raw: &[PartFile], file: &Path, table: &str) -> Result<(Vec<Part>, Vec<PartFile>), RobotError> {
+    let mut plain = Vec::new();
+    for part in raw {
+        plain.extend(part.without_files(file, table)?);
+    }
+    if plain.len() > MAX_PARTS {
+        let problem = format!("{} shapes, 0 .. {MAX_PARTS} allowed", plain.len());
+        return Err(FileIssue::new(file, table, problem).into());
+    }
+    let parts = plain.iter().map(|part| part.check(file, table)).collect::<Result<_, _>>()?;
+    Ok((parts, plain))
+}
+
+impl PartFile {
+    pub(super) fn is_mesh(&self) -> bool {
+        self.shape == "mesh"
+    }
+
+    fn key(&self, table: &str, key: &str) -> String {
+        format!("{table} `{}`: {key}", self.name)
+    }
+
+    fn check(&self, file: &Path, table: &str) -> Result<Part, RobotError> {
+        let at = |key: &str| self.key(table, key);
+        let missing = |key: &str| FileIssue::new(file, at(key), format!("is needed by shape `{}`", self.shape));
+        let size = || self.size_m.ok_or_else(|| missing("size_m"));
+        let radius = || self.radius_m.ok_or_else(|| missing("radius_m"));
+        let length = || self.length_m.ok_or_else(|| missing("length_m"));
+        let shape = match self.shape.as_str() {
+            "box" => Shape::Box { size_m: size()? },
+            "cylinder" => Shape::Cylinder { radius_m: radius()?, length_m: length()? },
+            "capsule" => Shape::Capsule { radius_m: radius()?, length_m: length()? },
+            "sphere" => Shape::Sphere { radius_m: radius()? },
+            "hull" => self.hull(file, table, self.points_m.as_deref().ok_or_else(|| missing("points_m"))?)?,
+            other => {
+                let problem = format!("`{other}` is none of box, cylinder, capsule, sphere, hull, mesh");
+                return Err(FileIssue::new(file, at("shape"), problem).into());
+            }
+        };
+        for (key, given) in [
+            ("points_m", self.points_m.is_some() && self.shape != "hull"),
+            ("file", self.file.is_some()),
+            ("scale_m", self.scale_m.is_some()),
+            ("convex", self.convex.is_some()),
+        ] {
+            if given {
+                return Err(FileIssue::new(file, at(key), format!("is no key of shape `{}`", self.shape)).into());
+            }
+        }
+        for (key, value) in shape.lengths() {
+            FileIssue::check_range(file, &at(key), value, 1e-4..=1e4)?;
+        }
+        let place: Pose<VehicleFrame, VehicleFrame> =
+            Pose::from_position_quaternion_wxyz(self.position_m, self.quaternion_wxyz)
+                .ok_or_else(|| FileIssue::new(file, at("position_m, quaternion_wxyz"), "must be finite, not zero"))?;
+        check_place(file, &at("position_m"), &self.position_m)?;
+        let placed = PlacedShape { owner_from_shape: *place.isometry(), shape, color_rgb: self.color_rgb };
+        Ok(Part { name: self.name.clone(), placed })
+    }
+
+    fn hull(&self, file: &Path, table: &str, points_m: &[[f64; 3]]) -> Result<Shape, RobotError> {
+        let key = self.key(table, "points_m");
+        points_m.iter().try_for_each(|point| check_place(file, &key, point))?;
+        Ok(Shape::Hull(Hull::new(points_m).map_err(|error| FileIssue::new(file, key, error.to_string()))?))
+    }
+
+    /// Itself, or the hulls of its mesh.
+    fn without_files(&self, file: &Path, table: &str) -> Result<Vec<Self>, RobotError> {
+        if !self.is_mesh() {
+            return Ok(vec![self.clone()]);
+        }
+        let at = |key: &str| self.key(table, key);
+        let missing = |key: &str| FileIssue::new(file, at(key), "is needed by shape `mesh`");
+        let named = self.file.as_ref().ok_or_else(|| missing("file"))?;
+        let mesh_file = file.parent().unwrap_or(Path::new(".")).join(named);
+        let issue =
+            |key: &str, problem: String| FileIssue::new(file, at(key), format!("{}: {problem}", mesh_file.display()));
+        let scale_m = FileIssue::check_range(file, &at("scale_m"), self.scale_m.unwrap_or(1.0), 1e-6..=1e4)?;
+        let place: Pose<VehicleFrame, VehicleFrame> =
+            Pose::from_position_quaternion_wxyz(self.position_m, self.quaternion_wxyz)
+                .ok_or_else(|| FileIssue::new(file, at("position_m, quaternion_wxyz"), "must be finite, not zero"))?;
+        let mut mesh = mesh::read(&mesh_file).map_err(|error| issue("file", error.to_string()))?;
+        mesh.vertices.as_flattened_mut().iter_mut().for_each(|v| *v *= scale_m);
+        mesh.vertices
+            .iter()
+            .try_for_each(|vertex| check_place(file, &at("scale_m"), vertex))
+            .map_err(|error| issue("scale_m", error.problem))?;
+        let hulls = match self.convex.unwrap_or_default() {
+            Convex::Hull => vec![Hull::centered(&mesh.vertices).map_err(|error| issue("file", error.to_string()))?],
+            Convex::Decomposed => decomposed(&mesh).map_err(|error| issue("convex", error.to_string()))?,
+        };
+        let several = hulls.len() > 1;
+        let part = |(n, hull): (usize, CenteredHull)| Self {
+            name: if several { format!("{} {}", self.name, n + 1) } else { self.name.clone() },
+            shape: "hull".to_owned(),
+            points_m: Some(hull.points_m),
+            file: None,
+            scale_m: None,
+            convex: None,
+            position_m: (place.isometry() * nalgebra::Point3::from(hull.center_m)).coords.into(),
+            ..self.clone()
+        };
+        Ok(hulls.into_iter().enumerate().map(part).collect())
+    }
+}
+
+/// Hulls that follow the mesh's hollows.
+fn decomposed(mesh: &Mesh) -> Result<Vec<CenteredHull>, HullError> {
+    // A flat mesh has no voxels to take apart.
+    Hull::centered(&mesh.vertices)?;
+    let vertices: Vec<Vec3> = mesh.vertices.iter().map(|p| Vec3::from_array(*p)).collect();
+    let parameters = VHACDParameters { max_convex_hulls: MAX_HULLS, ..VHACDParameters::default() };
+    let parts = VHACD::decompose(&parameters, &vertices, &mesh.triangles, true);
+    let mut hulls = Vec::new();
+    for points in parts.compute_primitive_intersections(&vertices, &mesh.triangles) {
+        let points: Vec<[f64; 3]> = points.iter().map(|p| p.to_array()).collect();
+        match Hull::centered(&points) {
+            Ok(hull) => hulls.push(hull),
+            // A sliver of one face at the border of two parts; the part beside it has the same face.
+            Err(HullError::Flat { .. }) => {}
+            Err(error) => return Err(error),
+        }
+    }
+    if hulls.is_empty() {
+        return Err(HullError::Degenerate("nothing of it is thick enough".to_owned()));
+    }
+    Ok(hulls)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An L of two bars 1 m long and 0.2 m thick, in mm, as OBJ.
+    const ANGLE_MM: &str = "v 0 0 0\nv 1000 0 0\nv 1000 200 0\nv 200 200 0\nv 200 1000 0\nv 0 1000 0\n\
+        v 0 0 200\nv 1000 0 200\nv 1000 200 200\nv 200 200 200\nv 200 1000 200\nv 0 1000 200\n\
+        f 4 3 2 1\nf 6 5 4 1\nf 7 8 9 10\nf 7 10 11 12\n\
+        f 1 2 8 7\nf 2 3 9 8\nf 3 4 10 9\nf 4 5 11 10\nf 5 6 12 11\nf 6 1 7 12\n";
+
+    fn parts(text: &str) -> Result<(Vec<Part>, Vec<PartFile>), RobotError> {
+        #[derive(Deserialize)]
+        struct List {
+            obstacle: Vec<PartFile>,
+        }
+        let folder = tempfile::tempdir().expect("a folder");
+        std::fs::write(folder.path().join("angle.obj"), ANGLE_MM).expect("written");
+        std::fs::write(folder.path().join("flat.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").expect("written");
+        std::fs::write(folder.path().join("text.stl"), "no mesh").expect("written");
+        let list: List = toml::from_str(&format!("[[obstacle]]\nname = \"rock\"\n{text}")).expect("TOML");
+        check_parts(&list.obstacle, &folder.path().join("r.toml"), "obstacle")
+    }
+
+    fn mesh(keys: &str) -> String {
+        format!(
+            "shape = \"mesh\"\nposition_m = [1, 2, 3]\nquaternion_wxyz = [0.7071067811865476, 0, 0, 0.7071067811865476]\n{keys}"
+        )
+    }
+
+    /// Distance of a point (owner's frame) from the nearest part, m.
+    fn distance_m(parts: &[Part], point: [f64; 3]) -> f64 {
+        let at = parry3d::math::Pose3::from_translation(Vec3::from_array(point));
+        let ball = parry3d::shape::SharedShape::ball(1e-6);
+        let distance = |part: &Part| {
+            let pose = crate::robot::parry_pose(&part.placed.owner_from_shape);
+            parry3d::query::distance(&pose, part.placed.shape.to_parry().as_ref(), &at, ball.as_ref())
+                .expect("known")
+                .distance
+        };
+        parts.iter().map(distance).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Of the mesh's frame, in the owner's.
+    fn placed([x, y, z]: [f64; 3]) -> [f64; 3] {
+        [1.0 - y, 2.0 + x, 3.0 + z]
+    }
+
+    #[test]
+    fn a_mesh_is_its_hull_at_its_place() {
+        let (found, _) = parts(&mesh("file = \"angle.obj\"\nscale_m = 0.001\n")).expect("a mesh");
+        assert_eq!(found.len(), 1);
+        assert_eq!(found[0].name, "rock");
+        assert!(distance_m(&found, placed([1.1, 0.1, 0.1])) - 0.1 < 1e-5);
+        assert!((distance_m(&found, placed([1.1, 0.1, 0.1])) - 0.1).abs() < 1e-5);
+        assert!(distance_m(&found, placed([0.5, 0.5, 0.1])) < 1e-9, "the hollow is filled");
+        assert!((found[0].placed.shape.bounding_radius_m() - (0.5_f64.hypot(0.5)).hypot(0.1)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_decomposed_mesh_leaves_its_hollow_free() {
+        let (found, _) =
+            parts(&mesh("file = \"angle.obj\"\nscale_m = 0.001\nconvex = \"decomposed\"\n")).expect("a mesh");
+        assert!((2..=8).contains(&found.len()), "{}", found.len());
+        assert_eq!(found[1].name, "rock 2");
+        let hollow_m = distance_m(&found, placed([0.6, 0.6, 0.1]));
+        assert!((0.3..0.41).contains(&hollow_m), "{hollow_m}");
+        for corner in
+            [[0.0, 0.0, 0.0], [1.0, 0.0, 0.2], [1.0, 0.2, 0.0], [0.2, 1.0, 0.2], [0.0, 1.0, 0.0], [0.2, 0.2, 0.1]]
+        {
+            assert!(distance_m(&found, placed(corner)) < 0.01, "{corner:?}");
+        }
+    }
+
+    /// What travels with a recording is the same body, to the last bit, and needs no file.
+    #[test]
+    fn the_list_without_files_stands_for_the_same_parts() {
+        for convex in ["hull", "decomposed"] {
+            let keys = format!("file = \"angle.obj\"\nscale_m = 0.001\nconvex = \"{convex}\"\n");
+            let (found, plain) = parts(&mesh(&keys)).expect("a mesh");
+            #[derive(Serialize, Deserialize)]
+            struct List {
+                obstacle: Vec<PartFile>,
+            }
+            let text = toml::to_string(&List { obstacle: plain }).expect("TOML");
+            assert!(!text.contains("angle.obj"), "{text}");
+            let again: List = toml::from_str(&text).expect("TOML");
+            let (again, _) =
+                check_parts(&again.obstacle, Path::new("elsewhere/scene.toml"), "obstacle").expect("hulls");
+            assert_eq!(again.len(), found.len());
+            for (a, b) in again.iter().zip(&found) {
+                assert_eq!((&a.name, &a.placed), (&b.name, &b.placed));
+                let (Shape::Hull(a), Shape::Hull(b)) = (&a.placed.shape, &b.placed.shape) else { panic!("hulls") };
+                assert_eq!((a.corners_m(), a.triangles()), (b.corners_m(), b.triangles()));
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_wrong_with_a_mesh_is_named() {
+        let at = "position_m = [0, 0, 0]\n";
+        let box_at = format!("shape = \"box\"\nsize_m = [1, 1, 1]\n{at}");
+        for (text, words) in [
+            (mesh(""), &["file", "is needed"][..]),
+            (mesh("file = \"none.stl\"\n"), &["obstacle `rock`: file", "none.stl", "cannot be read"]),
+            (mesh("file = \"text.stl\"\n"), &["text.stl", "is no mesh"]),
+            (mesh("file = \"flat.obj\"\n"), &["obstacle `rock`: file", "flat.obj", "is flat"]),
+            (mesh("file = \"flat.obj\"\nconvex = \"decomposed\"\n"), &["convex", "flat.obj", "is flat"]),
+            (mesh("file = \"angle.obj\"\nscale_m = 0.0\n"), &["scale_m", "outside"]),
+            (mesh("file = \"angle.obj\"\nscale_m = 1000\n"), &["scale_m", "outside"]),
+            (format!("{box_at}file = \"angle.obj\"\n"), &["obstacle `rock`: file", "is no key of shape `box`"]),
+            (format!("{box_at}points_m = []\n"), &["points_m", "is no key"]),
+            (format!("shape = \"hull\"\n{at}"), &["points_m", "is needed by shape `hull`"]),
+            (format!("shape = \"hull\"\npoints_m = [[0, 0, nan]]\n{at}"), &["points_m", "outside"]),
+            (format!("shape = \"torus\"\n{at}"), &["shape", "hull, mesh"]),
+        ] {
+            let message = parts(&text).expect_err("refused").to_string();
+            for word in words.iter().chain(&["r.toml"]) {
+                assert!(message.contains(word), "{text}\n{message}\nno `{word}`");
+            }
+        }
+        let many = format!("{box_at}[[obstacle]]\nname = \"b\"\n").repeat(MAX_PARTS) + &box_at;
+        let message = parts(&many).expect_err("refused").to_string();
+        assert!(message.contains("obstacle: 257 shapes"), "{message}");
+    }
+}

@@ -1,0 +1,153 @@
+//! self_collision.toml of a robot folder: which links of the arm can ever come near each other.
+//!
+//! Found by sampling (`plan::sample_self_pairs`, `armcal study pairs`) and stored, so that planning need not look at the others.
+//! The file names the URDF by hash: for another drawing it says nothing.
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use super::error::{FileIssue, RobotError, parse_toml, read_text};
+use super::urdf::LinkBody;
+
+/// Its name in a robot folder.
+pub const SELF_COLLISION_FILE: &str = "self_collision.toml";
+
+/// Links that come near each other, over all angles that planning may think of.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SelfPairs {
+    /// Seed and number of the random configurations.
+    pub seed: u64,
+    pub n: u64,
+    /// Links that are not among `pairs` were never nearer than this, m.
+    pub near_m: f64,
+    pub pairs: Vec<SelfPair>,
+}
+
+/// Two links that do.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SelfPair {
+    /// Numbers of the bodies, inner first.
+    pub bodies: [usize; 2],
+    /// The nearest seen, m; 0: they touch.
+    pub nearest_m: f64,
+}
+
+#[derive(Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+struct SelfCollisionFile {
+    version: u32,
+    /// BLAKE3 of the URDF's text.
+    urdf_blake3: String,
+    seed: u64,
+    n: u64,
+    near_m: f64,
+    #[serde(default)]
+    pair: Vec<PairFile>,
+}
+
+#[derive(Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+struct PairFile {
+    links: [String; 2],
+    nearest_m: f64,
+}
+
+impl SelfPairs {
+    /// Whether two bodies can come nearer than `SelfPairs::near_m`.
+    #[must_use]
+    pub fn has(&self, inner: usize, outer: usize) -> bool {
+        self.pairs.iter().any(|pair| pair.bodies == [inner, outer])
+    }
+
+    /// As a file for this robot.
+    ///
+    /// # Errors
+    /// [`FileIssue`] where it has no TOML form.
+    pub fn to_toml(&self, file: &Path, robot: &super::Robot) -> Result<String, FileIssue> {
+        let name = |body: usize| robot.bodies[body].name.clone();
+        let raw = SelfCollisionFile {
+            version: 1,
+            urdf_blake3: hash(&robot.urdf_text),
+            seed: self.seed,
+            n: self.n,
+            near_m: self.near_m,
+            pair: self
+                .pairs
+                .iter()
+                .map(|pair| PairFile { links: pair.bodies.map(name), nearest_m: (pair.nearest_m * 1e4).floor() / 1e4 })
+                .collect(),
+        };
+        let text = toml::to_string(&raw)
+            .map_err(|error| FileIssue::new(file, "pair", format!("has no TOML form: {error}")))?;
+        Ok(format!(
+            "# Links of this arm that can come nearer to each other than near_m, among n random configurations within the joint\n\
+             # limits and the datasheet's errors beyond them. Neighbours along the chain are left out. Made by\n\
+             # `armcal study pairs {}`; make it anew when the URDF changes.\n{text}",
+            robot.folder.display()
+        ))
+    }
+}
+
+/// Reads the file of a robot folder where there is one.
+pub(super) fn read(folder: &Path, urdf_text: &str, bodies: &[LinkBody]) -> Result<Option<SelfPairs>, RobotError> {
+    let file = folder.join(SELF_COLLISION_FILE);
+    if !file.is_file() {
+        return Ok(None);
+    }
+    let raw: SelfCollisionFile = parse_toml(&file, &read_text(&file)?)?;
+    FileIssue::check_range(&file, "version", f64::from(raw.version), 1.0..=1.0)?;
+    FileIssue::check_range(&file, "near_m", raw.near_m, 0.0..=10.0)?;
+    if raw.urdf_blake3 != hash(urdf_text) {
+        let problem = format!(
+            "the URDF is another one now; make the file anew with `armcal study pairs {}`, or remove it",
+            folder.display()
+        );
+        return Err(FileIssue::new(&file, "urdf_blake3", problem).into());
+    }
+    let mut pairs = Vec::new();
+    for (k, pair) in raw.pair.iter().enumerate() {
+        let body = |name: &String| {
+            let problem = || {
+                FileIssue::new(&file, format!("pair[{k}].links"), format!("`{name}` is no link that moves or the base"))
+            };
+            bodies.iter().position(|body| body.name == *name).ok_or_else(problem)
+        };
+        let (a, b) = (body(&pair.links[0])?, body(&pair.links[1])?);
+        FileIssue::check_range(&file, &format!("pair[{k}].nearest_m"), pair.nearest_m, 0.0..=10.0)?;
+        pairs.push(SelfPair { bodies: [a.min(b), a.max(b)], nearest_m: pair.nearest_m });
+    }
+    Ok(Some(SelfPairs { seed: raw.seed, n: raw.n, near_m: raw.near_m, pairs }))
+}
+
+fn hash(urdf_text: &str) -> String {
+    blake3::hash(urdf_text.as_bytes()).to_hex().to_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stored_list_is_read_again_and_refused_for_another_drawing() {
+        let source = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("robots/titan4");
+        let folder = tempfile::tempdir().expect("a folder");
+        for name in ["robot.toml", "titan4.urdf"] {
+            std::fs::copy(source.join(name), folder.path().join(name)).expect("copied");
+        }
+        let robot = super::super::load(folder.path()).expect("it reads without a list");
+        assert_eq!(robot.self_pairs, None);
+        let pair = |bodies, nearest_m| SelfPair { bodies, nearest_m };
+        let pairs = SelfPairs { seed: 3, n: 10, near_m: 0.2, pairs: vec![pair([0, 3], 0.0), pair([1, 6], 0.125)] };
+        let file = folder.path().join(SELF_COLLISION_FILE);
+        std::fs::write(&file, pairs.to_toml(&file, &robot).expect("TOML")).expect("written");
+        let read = super::super::load(folder.path()).expect("it reads").self_pairs.expect("a list");
+        assert_eq!(read, pairs);
+        assert!(read.has(1, 6) && !read.has(0, 4));
+        let urdf = folder.path().join("titan4.urdf");
+        std::fs::write(&urdf, robot.urdf_text.replace("0.83228", "0.83229")).expect("written");
+        let error = super::super::load(folder.path()).expect_err("another drawing").to_string();
+        assert!(error.contains("self_collision.toml") && error.contains("armcal study pairs"), "{error}");
+        assert!(super::super::load_without_pairs(folder.path()).is_ok());
+    }
+}

@@ -1,0 +1,108 @@
+//! Convex shapes with a place, for drawing, clearance and contact.
+
+use std::sync::Arc;
+
+use nalgebra::Isometry3;
+use parry3d::math::{Pose3, Rot3, Vec3};
+use parry3d::shape::SharedShape;
+
+use super::hull::Hull;
+
+/// A convex shape about its own centre; lengths in m. Cylinders and capsules lie along z, as in URDF.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Shape {
+    Box {
+        size_m: [f64; 3],
+    },
+    Cylinder {
+        radius_m: f64,
+        length_m: f64,
+    },
+    /// `length_m` between the centres of the caps.
+    Capsule {
+        radius_m: f64,
+        length_m: f64,
+    },
+    Sphere {
+        radius_m: f64,
+    },
+    /// Of a mesh.
+    Hull(Arc<Hull>),
+}
+
+/// A shape at a place in its owner's frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PlacedShape {
+    pub owner_from_shape: Isometry3<f64>,
+    pub shape: Shape,
+    pub color_rgb: [u8; 3],
+}
+
+impl Shape {
+    /// The same shape for parry and rapier, with its axis turned to where URDF has it by [`Shape::axis_fix`].
+    #[must_use]
+    pub fn to_parry(&self) -> SharedShape {
+        match *self {
+            Self::Box { size_m: [x, y, z] } => SharedShape::cuboid(0.5 * x, 0.5 * y, 0.5 * z),
+            Self::Cylinder { radius_m, length_m } => SharedShape::cylinder(0.5 * length_m, radius_m),
+            Self::Capsule { radius_m, length_m } => SharedShape::capsule_z(0.5 * length_m, radius_m),
+            Self::Sphere { radius_m } => SharedShape::ball(radius_m),
+            Self::Hull(ref hull) => hull.shape(),
+        }
+    }
+
+    /// Parry's cylinder lies along y, URDF's along z: the rotation to apply on the right of the shape's pose.
+    #[must_use]
+    pub fn axis_fix(&self) -> Isometry3<f64> {
+        match self {
+            Self::Cylinder { .. } => Isometry3::rotation(nalgebra::Vector3::x() * std::f64::consts::FRAC_PI_2),
+            _ => Isometry3::identity(),
+        }
+    }
+
+    /// The smallest sphere about the shape's centre that holds it, m.
+    #[must_use]
+    pub fn bounding_radius_m(&self) -> f64 {
+        match *self {
+            Self::Box { size_m } => 0.5 * nalgebra::Vector3::from(size_m).norm(),
+            Self::Cylinder { radius_m, length_m } => radius_m.hypot(0.5 * length_m),
+            Self::Capsule { radius_m, length_m } => radius_m + 0.5 * length_m,
+            Self::Sphere { radius_m } => radius_m,
+            Self::Hull(ref hull) => hull.radius_m(),
+        }
+    }
+
+    /// Sides of the box along the shape's axes, m.
+    #[must_use]
+    pub fn box_m(&self) -> [f64; 3] {
+        match *self {
+            Self::Box { size_m } => size_m,
+            Self::Cylinder { radius_m, length_m } => [2.0 * radius_m, 2.0 * radius_m, length_m],
+            Self::Capsule { radius_m, length_m } => [2.0 * radius_m, 2.0 * radius_m, length_m + 2.0 * radius_m],
+            Self::Sphere { radius_m } => [2.0 * radius_m; 3],
+            Self::Hull(ref hull) => hull.box_m(),
+        }
+    }
+
+    /// Every length that must be above zero, with its name.
+    #[must_use]
+    pub fn lengths(&self) -> Vec<(&'static str, f64)> {
+        match *self {
+            Self::Box { size_m: [x, y, z] } => vec![("size_m[0]", x), ("size_m[1]", y), ("size_m[2]", z)],
+            Self::Cylinder { radius_m, length_m } | Self::Capsule { radius_m, length_m } => {
+                vec![("radius_m", radius_m), ("length_m", length_m)]
+            }
+            Self::Sphere { radius_m } => vec![("radius_m", radius_m)],
+            // Its points are checked where it is made.
+            Self::Hull(_) => Vec::new(),
+        }
+    }
+}
+
+/// The same pose in parry's and rapier's types.
+#[must_use]
+pub fn parry_pose(isometry: &Isometry3<f64>) -> Pose3 {
+    let t = isometry.translation.vector;
+    let q = isometry.rotation;
+    Pose3::from_parts(Vec3::new(t.x, t.y, t.z), Rot3::from_xyzw(q.i, q.j, q.k, q.w))
+}

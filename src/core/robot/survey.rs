@@ -1,0 +1,144 @@
+//! Tags whose places are known: those of robot.toml, or of the vehicle that carries them.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use super::error::{FileIssue, RobotError};
+use super::part::check_place;
+use crate::spatial::{Base, Frame, Pose, Tag};
+
+/// A tag whose place is known by survey, or of which it is known only that it is there.
+#[derive(Clone, Debug)]
+pub struct SurveyedTag {
+    pub id: u32,
+    /// Side of the black square; NaN of a landmark that is used by its position or pose alone, where nobody knows it.
+    pub size_m: f64,
+    /// Where nothing is known of it, at best where a drawing has it.
+    pub base_from_tag: Pose<Base, Tag>,
+    /// One sigma per axis; infinite where nothing is known of the tag's place.
+    pub position_std_m: f64,
+    pub rotation_std_rad: f64,
+}
+
+impl SurveyedTag {
+    /// Whether anything is known of its place.
+    #[must_use]
+    pub fn is_known(&self) -> bool {
+        self.position_std_m.is_finite() && self.rotation_std_rad.is_finite()
+    }
+}
+
+/// How much of a survey the arm may use.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum MapKnowledge {
+    /// Where every tag is.
+    #[default]
+    Known,
+    /// Where these and the base tag are; of the others that they are there, and how large.
+    Partly(Vec<u32>),
+    /// Where the base tag is.
+    Unknown,
+}
+
+/// How well the base tag's place is known, where that differs from its file.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct BaseTagStd {
+    pub position_std_m: Option<f64>,
+    pub rotation_std_rad: Option<f64>,
+}
+
+/// All tags around an arm.
+#[derive(Clone, Debug)]
+pub struct TagSurvey {
+    /// The tag beside the base; shown in the replay.
+    pub base_tag: u32,
+    pub tags: Vec<SurveyedTag>,
+}
+
+impl TagSurvey {
+    /// The tags of these numbers alone. The base tag is the first of them if it is not among them itself.
+    pub fn only(&self, ids: &[u32]) -> Result<Self, String> {
+        let known: Vec<u32> = self.tags.iter().map(|tag| tag.id).collect();
+        match ids.iter().find(|id| !known.contains(id)) {
+            Some(id) => return Err(format!("tag {id} is none of {known:?}")),
+            None if ids.is_empty() => return Err("needs one tag or more".to_owned()),
+            None => {}
+        }
+        let base_tag = if ids.contains(&self.base_tag) { self.base_tag } else { ids[0] };
+        let tags = self.tags.iter().filter(|tag| ids.contains(&tag.id)).cloned().collect();
+        Ok(Self { base_tag, tags })
+    }
+}
+
+impl TagSurvey {
+    /// The survey as far as `knowledge` goes: all else of the tags' places is forgotten but the drawing.
+    pub fn knowing(mut self, knowledge: &MapKnowledge, base: BaseTagStd) -> Result<Self, String> {
+        let known: &[u32] = match knowledge {
+            MapKnowledge::Partly(known) => known,
+            MapKnowledge::Known | MapKnowledge::Unknown => &[],
+        };
+        if let Some(id) = known.iter().find(|id| self.tags.iter().all(|tag| tag.id != **id)) {
+            let ids: Vec<u32> = self.tags.iter().map(|tag| tag.id).collect();
+            return Err(format!("tag {id} is none of {ids:?}"));
+        }
+        for tag in &mut self.tags {
+            if tag.id == self.base_tag {
+                tag.position_std_m = base.position_std_m.unwrap_or(tag.position_std_m);
+                tag.rotation_std_rad = base.rotation_std_rad.unwrap_or(tag.rotation_std_rad);
+            } else if *knowledge != MapKnowledge::Known && !known.contains(&tag.id) {
+                (tag.position_std_m, tag.rotation_std_rad) = (f64::INFINITY, f64::INFINITY);
+            }
+        }
+        Ok(self)
+    }
+}
+
+/// A `[[tag]]` as files write it, placed in the owner's frame.
+#[derive(Clone, Debug, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct TagFile {
+    id: u32,
+    family: String,
+    size_m: f64,
+    position_m: [f64; 3],
+    quaternion_wxyz: [f64; 4],
+    position_std_m: f64,
+    rotation_std_rad: f64,
+}
+
+/// Checks the tags of `file`, which places them in the frame `Owner`.
+pub(super) fn check_tags<Owner: Frame>(
+    file: &Path,
+    raw: &[TagFile],
+    base_tag: u32,
+    base_from_owner: &Pose<Base, Owner>,
+) -> Result<Vec<SurveyedTag>, RobotError> {
+    let mut seen = BTreeSet::new();
+    let mut tags = Vec::new();
+    for tag in raw {
+        let key = |name: &str| format!("tag {}: {name}", tag.id);
+        if !seen.insert(tag.id) {
+            return Err(FileIssue::new(file, key("id"), "stands twice").into());
+        }
+        if tag.family != "36h11" {
+            let problem = format!("`{}` is not supported; use \"36h11\"", tag.family);
+            return Err(FileIssue::new(file, key("family"), problem).into());
+        }
+        check_place(file, &key("position_m"), &tag.position_m)?;
+        let owner_from_tag: Pose<Owner, Tag> = Pose::from_position_quaternion_wxyz(tag.position_m, tag.quaternion_wxyz)
+            .ok_or_else(|| FileIssue::new(file, key("position_m, quaternion_wxyz"), "must be finite, not zero"))?;
+        tags.push(SurveyedTag {
+            id: tag.id,
+            size_m: FileIssue::check_range(file, &key("size_m"), tag.size_m, 1e-3..=10.0)?,
+            base_from_tag: *base_from_owner * owner_from_tag,
+            position_std_m: FileIssue::check_range(file, &key("position_std_m"), tag.position_std_m, 0.0..=1.0)?,
+            rotation_std_rad: FileIssue::check_range(file, &key("rotation_std_rad"), tag.rotation_std_rad, 0.0..=1.0)?,
+        });
+    }
+    if !tags.is_empty() && !seen.contains(&base_tag) {
+        return Err(FileIssue::new(file, "base_tag", format!("tag {base_tag} is not among the [[tag]]s")).into());
+    }
+    Ok(tags)
+}

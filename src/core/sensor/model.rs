@@ -1,0 +1,276 @@
+//! One sensor, and all sensors of an arm.
+
+use crate::joints::{JointAngles, JointCounts};
+use crate::robot::{JointSensorSpec, Robot};
+use crate::time::Stamp;
+
+/// Terms of the smooth nonlinearity of each sensor.
+pub const N_SHAPE: usize = 12;
+
+/// What calibration adds to the datasheet: with the travel t from the middle of the range,
+/// `angle = center + (gain + gain_per_k T) t + offset + sum_h shape_h phi_h(t / half_range)
+///  + offset_per_k T + offset_per_mpa P + drift h + half_play a`,
+/// T (K), P (MPa) and h (hours) the [`Departure`] from the calibration's reference, a the side that the joint came from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Correction {
+    /// Factor on the nominal travel; 1 is the datasheet.
+    pub gain: f64,
+    /// Added to the angle, rad.
+    pub offset_rad: f64,
+    pub terms: Terms,
+}
+
+/// All beyond gain and offset; zero is a straight sensor that nothing disturbs.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Terms {
+    /// Coefficients of [`shape_basis`].
+    pub shape_rad: [f64; N_SHAPE],
+    pub offset_rad_per_k: f64,
+    /// 1/K.
+    pub gain_per_k: f64,
+    pub offset_rad_per_mpa: f64,
+    pub drift_rad_per_h: f64,
+    /// Half of the play between joint and sensor shaft.
+    pub half_play_rad: f64,
+}
+
+impl Terms {
+    /// Whether there are none.
+    #[must_use]
+    pub fn are_zero(&self) -> bool {
+        *self == Self::default()
+    }
+}
+
+impl Default for Correction {
+    fn default() -> Self {
+        Self { gain: 1.0, offset_rad: 0.0, terms: Terms::default() }
+    }
+}
+
+/// Half-width of the interval that [`shape_basis`] lives on, in half ranges: beyond the joint's own, for the functions vanish at
+/// its ends.
+const SHAPE_DOMAIN: f64 = 1.25;
+
+/// Smooth functions over the joint's range: `phi_h(x) = sin(pi h (x + L) / 2 L) / sqrt(L)`, h = 1.., L = 1.25, x in -1..1; with
+/// the prior variances of [`shape_prior`] a Gaussian process by its eigenfunctions (Solin and Sarkka 2020, eq. 6). Constant outside.
+#[must_use]
+pub fn shape_basis(x: f64) -> [f64; N_SHAPE] {
+    let turn = std::f64::consts::PI * (x.clamp(-1.0, 1.0) + SHAPE_DOMAIN) / (2.0 * SHAPE_DOMAIN);
+    let (sin, cos) = turn.sin_cos();
+    // sin((h + 1) a) = 2 cos(a) sin(h a) - sin((h - 1) a).
+    let (mut before, mut now) = (0.0, sin);
+    std::array::from_fn(|_| {
+        let value = now / SHAPE_DOMAIN.sqrt();
+        (before, now) = (now, 2.0 * cos * now - before);
+        value
+    })
+}
+
+/// Prior standard deviations of the coefficients of [`shape_basis`] for a process of unit standard deviation with a squared
+/// exponential covariance of length `length` half ranges: `S(w)^(1/2)` at `w = pi h / 2 L` (Solin and Sarkka 2020, eq. 8).
+#[must_use]
+pub fn shape_prior(length: f64) -> [f64; N_SHAPE] {
+    std::array::from_fn(|n| {
+        let w = std::f64::consts::PI * (n + 1) as f64 / (2.0 * SHAPE_DOMAIN);
+        ((std::f64::consts::TAU).sqrt() * length * (-0.5 * (length * w).powi(2)).exp()).sqrt()
+    })
+}
+
+/// How far things are from a calibration's reference.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Departure {
+    pub oil_k: f64,
+    pub pressure_mpa: f64,
+    pub elapsed_h: f64,
+}
+
+/// What a reading depends on besides the angle; `None` is unknown and counts as the reference's.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Conditions {
+    pub oil_c: Option<f64>,
+    pub pressure_pa: Option<f64>,
+    pub stamp: Option<Stamp>,
+}
+
+impl Conditions {
+    /// From `reference` to here.
+    #[must_use]
+    pub fn departure_from(&self, reference: &Self) -> Departure {
+        let difference = |a: Option<f64>, b: Option<f64>| a.zip(b).map_or(0.0, |(a, b)| a - b);
+        Departure {
+            oil_k: difference(self.oil_c, reference.oil_c),
+            pressure_mpa: difference(self.pressure_pa, reference.pressure_pa) * 1e-6,
+            elapsed_h: self.stamp.zip(reference.stamp).map_or(0.0, |(a, b)| a.since_s(b) / 3600.0),
+        }
+    }
+}
+
+impl Correction {
+    /// The angle at `travel_rad` from the middle of the range; `approach` is -1, 0 (unknown) or 1: the way that the joint moved.
+    #[must_use]
+    pub fn angle_rad(&self, spec: &JointSensorSpec, travel_rad: f64, departure: &Departure, approach: f64) -> f64 {
+        let terms = &self.terms;
+        if terms.are_zero() {
+            return spec.center_rad + self.gain * travel_rad + self.offset_rad;
+        }
+        let basis = shape_basis(travel_rad / spec.half_range_rad);
+        let shape: f64 = basis.iter().zip(&terms.shape_rad).map(|(b, a)| a * b).sum();
+        spec.center_rad
+            + (self.gain + terms.gain_per_k * departure.oil_k) * travel_rad
+            + self.offset_rad
+            + shape
+            + terms.offset_rad_per_k * departure.oil_k
+            + terms.offset_rad_per_mpa * departure.pressure_mpa
+            + terms.drift_rad_per_h * departure.elapsed_h
+            + terms.half_play_rad * approach
+    }
+}
+
+/// A joint sensor as believed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SensorModel {
+    pub spec: JointSensorSpec,
+    pub correction: Correction,
+}
+
+impl SensorModel {
+    #[must_use]
+    pub fn nominal(spec: &JointSensorSpec) -> Self {
+        Self { spec: spec.clone(), correction: Correction::default() }
+    }
+
+    /// Travel from the middle of the range by the datasheet, rad; the word wraps about that middle.
+    #[must_use]
+    pub fn nominal_travel_rad(&self, counts: f64) -> f64 {
+        let spec = &self.spec;
+        let center_counts = spec.offset_counts + spec.counts_per_rad * spec.center_rad;
+        wrap_symmetric(counts - center_counts, spec.wrap_counts) / spec.counts_per_rad
+    }
+
+    /// The angle that `counts` mean, rad.
+    #[must_use]
+    pub fn angle_rad(&self, counts: f64) -> f64 {
+        self.angle_under_rad(counts, &Departure::default())
+    }
+
+    /// The angle that `counts` mean away from the reference, rad.
+    #[must_use]
+    pub fn angle_under_rad(&self, counts: f64, departure: &Departure) -> f64 {
+        self.correction.angle_rad(&self.spec, self.nominal_travel_rad(counts), departure, 0.0)
+    }
+
+    /// The reading at `angle_rad`, 0..wrap, not rounded: the inverse of [`Self::angle_rad`].
+    #[must_use]
+    pub fn counts(&self, angle_rad: f64) -> f64 {
+        self.counts_under(angle_rad, &Departure::default())
+    }
+
+    /// The inverse of [`Self::angle_under_rad`].
+    #[must_use]
+    pub fn counts_under(&self, angle_rad: f64, departure: &Departure) -> f64 {
+        let spec = &self.spec;
+        let travel = self.travel_under_rad(angle_rad, departure);
+        let counts = spec.offset_counts + spec.counts_per_rad * (spec.center_rad + travel);
+        counts.rem_euclid(spec.wrap_counts)
+    }
+
+    /// The datasheet's travel at `angle_rad`, rad: the inverse of [`Correction::angle_rad`] with the approach unknown.
+    #[must_use]
+    pub fn travel_under_rad(&self, angle_rad: f64, departure: &Departure) -> f64 {
+        /// The nonlinearity's slope is a few hundredths of the gain, so that each step gains a digit or two.
+        const STEPS: usize = 16;
+        let spec = &self.spec;
+        let mut travel = (angle_rad - spec.center_rad - self.correction.offset_rad) / self.correction.gain;
+        if !self.correction.terms.are_zero() {
+            for _ in 0..STEPS {
+                let error = angle_rad - self.correction.angle_rad(spec, travel, departure, 0.0);
+                travel += error / self.correction.gain;
+            }
+        }
+        travel
+    }
+
+    /// Least and greatest slope of the angle over the range, relative to the gain; 1 and 1 for a straight sensor. Readings have one
+    /// angle, and [`Self::counts`] finds it, where both lie well within 0 .. 2.
+    #[must_use]
+    pub fn slope_over_gain(&self) -> (f64, f64) {
+        if self.correction.terms.are_zero() {
+            return (1.0, 1.0);
+        }
+        /// Chords of the range; the fastest of the functions has five periods in it.
+        const CHORDS: usize = 64;
+        let end_rad = self.spec.half_range_rad;
+        let angle = |n: usize| {
+            let travel_rad = end_rad * (2.0 * n as f64 / CHORDS as f64 - 1.0);
+            self.correction.angle_rad(&self.spec, travel_rad, &Departure::default(), 0.0)
+        };
+        let gain_rad = self.correction.gain * 2.0 * end_rad / CHORDS as f64;
+        let slopes = (0..CHORDS).map(|n| (angle(n + 1) - angle(n)) / gain_rad);
+        slopes.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), slope| (low.min(slope), high.max(slope)))
+    }
+}
+
+/// `value` modulo `period`, in -period/2 .. period/2.
+#[must_use]
+pub fn wrap_symmetric(value: f64, period: f64) -> f64 {
+    let half = 0.5 * period;
+    (value + half).rem_euclid(period) - half
+}
+
+/// The sensors of an arm, base first.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ArmSensors {
+    pub models: Vec<SensorModel>,
+    /// What the corrections' terms are counted from.
+    pub reference: Conditions,
+}
+
+impl ArmSensors {
+    /// The datasheet's model of every joint.
+    #[must_use]
+    pub fn nominal(robot: &Robot) -> Self {
+        Self { models: robot.sensors.iter().map(SensorModel::nominal).collect(), reference: Conditions::default() }
+    }
+
+    /// The datasheet's travel of every joint, rad.
+    #[must_use]
+    pub fn travel_rad(&self, counts: &JointCounts) -> JointAngles {
+        JointAngles::from_fn(self.models.len(), |j| self.models[j].nominal_travel_rad(counts[j]))
+    }
+
+    /// Whether any sensor is more than a straight line.
+    #[must_use]
+    pub fn have_terms(&self) -> bool {
+        self.models.iter().any(|model| !model.correction.terms.are_zero())
+    }
+
+    /// Angles by readings that were taken under `conditions`.
+    #[must_use]
+    pub fn angles_under(&self, counts: &JointCounts, conditions: &Conditions) -> JointAngles {
+        let departure = conditions.departure_from(&self.reference);
+        JointAngles::from_fn(self.models.len(), |j| self.models[j].angle_under_rad(counts[j], &departure))
+    }
+
+    /// Readings at `angles` under `conditions`.
+    #[must_use]
+    pub fn counts_under(&self, angles: &JointAngles, conditions: &Conditions) -> JointCounts {
+        let departure = conditions.departure_from(&self.reference);
+        JointCounts::from_fn(self.models.len(), |j| self.models[j].counts_under(angles[j], &departure))
+    }
+
+    /// Angles under the reference's conditions.
+    #[must_use]
+    pub fn angles(&self, counts: &JointCounts) -> JointAngles {
+        JointAngles::from_fn(self.models.len(), |j| self.models[j].angle_rad(counts[j]))
+    }
+
+    /// Readings under the reference's conditions.
+    #[must_use]
+    pub fn counts(&self, angles: &JointAngles) -> JointCounts {
+        JointCounts::from_fn(self.models.len(), |j| self.models[j].counts(angles[j]))
+    }
+}
+
+#[cfg(test)]
+mod tests;
