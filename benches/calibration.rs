@@ -6,18 +6,18 @@ mod problems;
 
 use std::hint::black_box;
 
-use armcal::calib::bundle::{Evidence, estimate, least_squares};
+use armcal::calib::bundle::{HyperparameterMode, estimate, least_squares};
 use armcal::calib::{JointParameters, PositionMethod, PositionProblem, SearchOptions, determined_by_variance};
 use criterion::{Criterion, criterion_group, criterion_main};
 
 fn bundle(c: &mut Criterion) {
     let exact = problems::corners(40, 0.0);
     c.bench_function("bundle: least squares, 40 views x 8 tags, 84 parameters", |b| {
-        b.iter(|| least_squares(black_box(&exact.input(Evidence::Given)), 1e-10));
+        b.iter(|| least_squares(black_box(&exact.input(HyperparameterMode::Given)), 1e-10));
     });
     let noisy = problems::corners(30, 2e-4);
     c.bench_function("bundle: estimate, sizes fitted, 30 views x 8 tags", |b| {
-        b.iter(|| estimate(black_box(&noisy.input(Evidence::Fitted))));
+        b.iter(|| estimate(black_box(&noisy.input(HyperparameterMode::Fitted))));
     });
 }
 

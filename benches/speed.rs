@@ -6,8 +6,8 @@ use std::hint::black_box;
 use std::path::Path;
 
 use armcal::calib::{
-    JointParameters, Measured, Parameter, ParameterKind, PositionMethod, PositionProblem, SearchOptions, TagView, View,
-    minimum_distance,
+    JointParameters, Parameter, ParameterKind, PositionMethod, PositionProblem, SearchOptions, TagMeasurement,
+    TagObservation, View, minimum_distance,
 };
 use armcal::plan::{ClearanceModel, Edge, JointErrorBounds};
 use armcal::robot::{Robot, Vehicle, load, load_vehicle};
@@ -47,11 +47,11 @@ fn views(robot: &Robot) -> Vec<View> {
             let tag = |tag_idx: usize, noise_m: [f64; 3]| {
                 let center =
                     camera_from_base * nalgebra::Point3::from(robot.tags[tag_idx].base_from_tag.origin().vector());
-                TagView {
+                TagObservation {
                     id: robot.tags[tag_idx].id,
                     tag_idx,
                     center_in_camera_m: center.coords + nalgebra::Vector3::from(noise_m),
-                    measured: Measured::Position,
+                    measured: TagMeasurement::Position,
                 }
             };
             let tags = (0..TAGS_A_VIEW).map(|t| tag(t, [0; 3].map(|_| rng.random_range(-0.003..0.003)))).collect();
@@ -95,17 +95,19 @@ fn planning(c: &mut Criterion) {
     let (robot, vehicle) = (robot(), vehicle());
     let scene = Scene { seafloor_z_m: Some(-2.2), obstacles: Vec::new() };
     let clearance = ClearanceModel::new(&robot, &vehicle, &scene);
-    let bounds = JointErrorBounds::prior(&robot);
+    let bounds = JointErrorBounds::datasheet(&robot);
     c.bench_function("clearance of one arm", |b| b.iter(|| clearance.nearest(black_box(&robot.stowed))));
     let mut rng = stream_rng(1, "bench poses");
     let poses: Vec<JointAngles> = (0..256).map(|_| random_angles(&robot, &mut rng)).collect();
     c.bench_function("256 poses, clear for every arm within the bounds?", |b| {
-        b.iter(|| poses.iter().filter(|at| clearance.too_near(at, black_box(&bounds), 0.05).is_none()).count());
+        b.iter(|| poses.iter().filter(|at| clearance.find_violation(at, black_box(&bounds), 0.05).is_none()).count());
     });
     c.bench_function("256 edges, clear for every arm within the bounds?", |b| {
         b.iter(|| {
             let is_clear = |edge: &&[JointAngles]| {
-                clearance.too_near_along(&Edge::at_full_speed(edge[0], edge[1]), black_box(&bounds), 0.05).is_none()
+                clearance
+                    .find_violation_along(&Edge::at_full_speed(edge[0], edge[1]), black_box(&bounds), 0.05)
+                    .is_none()
             };
             poses.windows(2).filter(is_clear).count()
         });
@@ -140,7 +142,7 @@ fn choice(c: &mut Criterion, robot: &Robot, clearance: &ClearanceModel<'_>, boun
         belief: None,
         taken: &[],
         prior: None,
-        tag_trust: &[],
+        detection_rate: &[],
         failed: &[],
         task: &task,
         targets_m: &[],
@@ -158,7 +160,7 @@ fn choice(c: &mut Criterion, robot: &Robot, clearance: &ClearanceModel<'_>, boun
 
 /// 300 images of up to 8 tags through the wrist camera, 0.3 px of noise; from pixels to map with covariances.
 fn tag_map(c: &mut Criterion) {
-    use armcal::tagmap::{Body, MapInput, MapSettings, MapView, SeenTag, TagPrior, solve};
+    use armcal::tagmap::{Body, MapDetection, MapInput, MapSettings, MapView, TagPrior, solve};
     use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
     let lens = robot().camera.lens;
@@ -182,7 +184,7 @@ fn tag_map(c: &mut Criterion) {
                 let exact = lens.project(&(camera * tag * corner).coords).filter(|pixel| lens.contains(pixel))?;
                 *pixel = [exact.x + draw(0.5), exact.y + draw(0.5)];
             }
-            Some(SeenTag { id, corners_px, covariance_px2: None })
+            Some(MapDetection { id, corners_px, covariance_px2: None })
         });
         let stamp = armcal::time::Stamp { nanos: k };
         MapView { camera: 0, stamp, tags: seen.collect(), attitude: None }
@@ -310,7 +312,7 @@ fn images(c: &mut Criterion, robot: &Robot, vehicle: &Vehicle, scene: &Scene) {
 #[cfg(feature = "sim")]
 fn one_step(c: &mut Criterion, robot: &Robot) {
     use armcal::sim::dynamics::{
-        BaseCoupling, Body, Force, JointLoad, Motion, Multibody, Stage, StepInput, Surroundings, SystemState,
+        BaseCoupling, Body, Environment, Force, JointLoad, Motion, Multibody, Stage, StepInput, SystemState,
     };
     use armcal::streams::MAX_JOINTS;
 
@@ -325,7 +327,7 @@ fn one_step(c: &mut Criterion, robot: &Robot) {
     let loads = std::array::from_fn(|j| {
         JointLoad::spring(5e4, 500.0, if j < robot.n_joints() { robot.stowed[j] } else { 0.0 }, 0.0)
     });
-    let around = |_: Stage, _: &SystemState| (Surroundings::still(9.806_65), BaseCoupling::Prescribed(Motion::zero()));
+    let around = |_: Stage, _: &SystemState| (Environment::still(9.806_65), BaseCoupling::Prescribed(Motion::zero()));
     c.bench_function("dynamics: one step", |b| {
         b.iter(|| {
             let input = StepInput {

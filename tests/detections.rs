@@ -1,6 +1,6 @@
 //! Detections that are wrong: they are named, counted, and change nothing.
 
-use armcal::calib::{Rejection, associate, calibrate};
+use armcal::calib::{ObservationRejection, associate, calibrate};
 use armcal::log::Recording;
 use armcal::robot::Robot;
 use armcal::routine::Method;
@@ -90,7 +90,7 @@ fn what_the_detector_rejected_in_captured_views_is_counted_by_reason() {
         recording.messages.push((log_time, Message::Rejects(DetectionRejects { stamp, rejects })));
     }
     let rejected = associate(&recording, &robot).rejected;
-    assert_eq!(rejected.get(&Rejection::Detector(RejectReason::WrongBits)), Some(&120));
-    assert_eq!(rejected.get(&Rejection::Detector(RejectReason::TooSmall)), Some(&60));
+    assert_eq!(rejected.get(&ObservationRejection::Detector(RejectReason::WrongBits)), Some(&120));
+    assert_eq!(rejected.get(&ObservationRejection::Detector(RejectReason::TooSmall)), Some(&60));
     assert_eq!(rejected.len(), 2, "{rejected:?}");
 }

@@ -118,7 +118,7 @@ fn look_at_leftover(out: &Path, earlier: &[(&str, Vec<u8>)], whole: &[u8], tally
     inspect(&partial).expect("a leftover", code, &[state]);
     tally.readable += 1;
     let found = look(&partial, Some(&crate::support::titan())).expect("it reads");
-    if found.determined.expect("a robot").missing.is_empty() {
+    if found.observable.expect("a robot").missing.is_empty() {
         calibrate(&partial, &robot_folder(), &out.join("calibrated")).expect(
             "a leftover with views",
             code,

@@ -1,6 +1,6 @@
 //! Tags that nobody has surveyed: the views themselves say where they are.
 
-use armcal::calib::{Calibration, Known, Status, calibrate};
+use armcal::calib::{Calibration, Status, SurveyCoverage, calibrate};
 use armcal::robot::Robot;
 use armcal::routine::Method;
 use armcal::spatial::{Base, Pose, Tag};
@@ -123,7 +123,7 @@ fn tags_are_found_where_they_are_and_those_that_cannot_be_are_left_out() {
     let calibration = solve(&arm, &shots, &knowing(&truth, &[0]));
     assert_eq!(calibration.status, Status::Accepted, "{:?}", calibration.refusal);
     let map = calibration.map.expect("a map");
-    assert_eq!(map.known, Known::BaseTagAlone);
+    assert_eq!(map.known, SurveyCoverage::BaseTagAlone);
     assert!(matches!(&map.left_out[..], [line] if line.starts_with("tag 7: ")), "{:?}", map.left_out);
     assert_eq!(map.tag.iter().map(|tag| tag.id).collect::<Vec<_>>(), [0, 1, 2, 3, 4, 5, 6]);
     for tag in &map.tag {

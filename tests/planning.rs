@@ -136,7 +136,7 @@ fn every_edge_keeps_its_proven_clearance_for_random_arms() {
     let routine = routine::load(&file).expect("the routine reads");
     let (robot, vehicle) = routine.load_arm().expect("the arm reads");
     let model = ClearanceModel::new(&robot, &vehicle, &routine.scene);
-    let bounds = JointErrorBounds::prior(&robot);
+    let bounds = JointErrorBounds::datasheet(&robot);
     let mut rng = stream_rng(3, "arms");
     let (mut least_m, mut spare_m) = (f64::INFINITY, f64::INFINITY);
     for path in &plan.path {

@@ -2,7 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use armcal::calib::{Calibration, ForeignContext, Measured, Prepared, Status, calibrate_data, prepare_foreign};
+use armcal::calib::{
+    Calibration, CalibrationData, ForeignContext, Status, TagMeasurement, calibrate_data, prepare_foreign,
+};
 use armcal::input::{ForeignRecording, InputMap, parse_input_map, parse_task, read_foreign};
 use armcal::log::{RecordingHeader, RecordingWriter, RosMessage, ros};
 use armcal::robot::{Robot, TagSurvey};
@@ -103,13 +105,13 @@ fn a_real_titans_recording_gives_all_figures_and_the_papers_objective() {
     assert!(given.calibration().unobservable.iter().any(|line| line.contains("wrist_rotate")));
 }
 
-fn prepared(robot: &Robot, path: &Path, map: &InputMap) -> Prepared {
+fn prepared(robot: &Robot, path: &Path, map: &InputMap) -> CalibrationData {
     let recording: ForeignRecording = read_foreign(path, map, robot).expect("it reads");
     prepare_foreign(&[recording], map, robot, ForeignContext::default()).expect("views")
 }
 
 /// The robot with the landmarks, and the views.
-fn prepared_titan(titan: &RealTitan) -> Prepared {
+fn prepared_titan(titan: &RealTitan) -> CalibrationData {
     let folder = temp();
     let (path, tags) = (folder.path().join("arm.mcap"), folder.path().join("tags.toml"));
     write_poses(&path, &titan.poses);
@@ -388,7 +390,7 @@ fn streams_become_one_view_for_each_rest_of_the_arm() {
             assert!(off.abs() < 3.0, "joint {j}: {off} counts");
             assert!(view.rate_rad_s[j].abs() < 0.02, "joint {j}: {} rad/s", view.rate_rad_s[j]);
         }
-        assert!(view.tags.iter().all(|tag| matches!(tag.measured, Measured::Position)));
+        assert!(view.tags.iter().all(|tag| matches!(tag.measured, TagMeasurement::Position)));
     }
     assert_eq!(calibrate_data(prepared, Method::MinimumDistance, None).expect("calibrated").status, Status::Accepted);
 }
@@ -465,7 +467,7 @@ fn poses_are_averaged_as_rotations() {
     let map = parse_input_map(Path::new("map.toml"), &INPUT_MAP.replace("position", "pose")).expect("good");
     let only = robot.tags[..1].to_vec();
     let prepared = prepared(&robot.with_survey(TagSurvey { base_tag: 0, tags: only }), &path, &map);
-    let Measured::Pose(first) = prepared.data.fit[0].tags[0].measured else { panic!("a pose") };
+    let TagMeasurement::Pose(first) = prepared.data.fit[0].tags[0].measured else { panic!("a pose") };
     assert_eq!(prepared.data.fit.len(), 3);
     assert!(first.rotation.angle_to(&turn(std::f64::consts::PI)) < 1e-9, "{first}");
 }

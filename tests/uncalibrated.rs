@@ -77,7 +77,7 @@ fn a_capture_that_plans_as_it_goes_gives_the_same_bytes_again() {
 fn a_capture_says_why_it_ended() {
     let folder = temp();
     let ended = |name: &str, more: &[&str]| {
-        run(ROUTINES[2], ARMS[0], 2, more, &folder.path().join(name)).capture.ended.expect("a reason")
+        run(ROUTINES[2], ARMS[0], 2, more, &folder.path().join(name)).capture.stop_reason.expect("a reason")
     };
     let by_error = ended("error", &[]);
     assert!(by_error.contains("predicted tool error"), "{by_error}");

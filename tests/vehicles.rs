@@ -43,7 +43,7 @@ fn every_arm_starts_clear_of_every_vehicle_with_tags_in_view() {
         for arm in ARMS {
             let robot = mounted(arm, &vehicle);
             let clearance = ClearanceModel::new(&robot, &vehicle, &Scene::default());
-            let prior = JointErrorBounds::prior(&robot);
+            let prior = JointErrorBounds::datasheet(&robot);
             let nearest = clearance.nearest_under(&robot.stowed, &prior, 0.0);
             let seen = VisibilityModel::default().visible(&robot, &clearance, &robot.stowed);
             eprintln!("{arm} on {name}: {:.3} m, {nearest}, {} tags", nearest.distance_m, seen.len());
@@ -136,7 +136,7 @@ fn a_mesh_stands_in_the_way_like_the_box_that_it_is() {
     let scenes = box_and_mesh(folder.path(), [2.7, -0.3, -0.3]);
     let models = scenes.each_ref().map(|scene| ClearanceModel::new(&robot, &vehicle, scene));
     let free = ClearanceModel::new(&robot, &vehicle, &Scene::default());
-    let prior = JointErrorBounds::prior(&robot).safe_limits(&robot);
+    let prior = JointErrorBounds::datasheet(&robot).safe_limits(&robot);
     let (mut rng, mut near, mut hidden) = (stream_rng(1, "poses"), 0, 0);
     for _ in 0..600 {
         let angles = JointAngles::from_fn(6, |j| rng.random_range(prior[j].lower_rad..prior[j].upper_rad));

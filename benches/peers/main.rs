@@ -9,7 +9,7 @@ mod text;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use armcal::calib::bundle::{Evidence, least_squares};
+use armcal::calib::bundle::{HyperparameterMode, least_squares};
 use armcal::calib::{JointParameters, PositionMethod, PositionProblem, SearchOptions};
 use comfy_table::Table;
 
@@ -114,7 +114,7 @@ fn main() {
     let (mut of_bundle, mut of_distance) = (Contest::default(), Contest::default());
     for _ in 0..N_ROUNDS {
         for _ in 0..RUNS_A_ROUND {
-            let (ms, solved) = timed(|| least_squares(&bundle.input(Evidence::Given), RELATIVE_GAIN));
+            let (ms, solved) = timed(|| least_squares(&bundle.input(HyperparameterMode::Given), RELATIVE_GAIN));
             of_bundle.add("bundle (ours)", ms, solved.iterations, solved.cost_final);
             let guess = JointParameters::default();
             let (ms, solved) = timed(|| PositionMethod::MinimumDistance.solve(&views, &straight, &guess, &options));

@@ -2,8 +2,8 @@
 
 use std::fmt::Write;
 
-use armcal::calib::{JointParameters, Measured};
-use armcal::sensor::Departure;
+use armcal::calib::{JointParameters, TagMeasurement};
+use armcal::sensor::ConditionChange;
 use nalgebra::Isometry3;
 
 use crate::problems::Problem;
@@ -59,12 +59,12 @@ pub fn bundle(problem: &Problem, relative_gain: f64) -> String {
     for view in &problem.views {
         let by = |p: &armcal::calib::Parameter| {
             let travel_rad = view.travel_rad[p.joint];
-            p.kind.angle_derivative(&robot.sensors[p.joint], travel_rad, &Departure::default(), 0.0)
+            p.kind.angle_derivative(&robot.sensors[p.joint], travel_rad, &ConditionChange::default(), 0.0)
         };
         numbers(&mut out, parameters.iter().map(by));
         let _ = writeln!(out, "{}", view.tags.len());
         for tag in &view.tags {
-            if let Measured::Corners(seen) = &tag.measured {
+            if let TagMeasurement::Corners(seen) = &tag.measured {
                 numbers(&mut out, [tag.tag_idx as f64, info].into_iter().chain(seen.corners_px.into_iter().flatten()));
             }
         }

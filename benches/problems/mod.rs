@@ -2,12 +2,12 @@
 
 use std::path::Path;
 
-use armcal::calib::bundle::{BundleInput, Evidence, Model, Scales};
-use armcal::calib::{JointParameters, Measured, Parameter, ParameterKind, SeenCorners, TagView, View};
+use armcal::calib::bundle::{BundleInput, HyperparameterMode, Hyperparameters, Model};
+use armcal::calib::{JointParameters, MeanCorners, Parameter, ParameterKind, TagMeasurement, TagObservation, View};
 use armcal::joints::{JointAngles, MAX_JOINTS};
 use armcal::optics::square_corners;
 use armcal::robot::{Robot, load};
-use armcal::sensor::Departure;
+use armcal::sensor::ConditionChange;
 use armcal::spatial::exp;
 use armcal::stats::stream_rng;
 use armcal::time::SIMULATION_EPOCH;
@@ -29,11 +29,11 @@ pub struct Problem {
     pub robot: Robot,
     pub views: Vec<View>,
     pub model: Model,
-    pub scales: Scales,
+    pub scales: Hyperparameters,
 }
 
 impl Problem {
-    pub fn input(&self, evidence: Evidence) -> BundleInput<'_> {
+    pub fn input(&self, evidence: HyperparameterMode) -> BundleInput<'_> {
         BundleInput {
             robot: &self.robot,
             views: &self.views,
@@ -107,7 +107,7 @@ fn moved(pose: &Isometry3<f64>, std_m: f64, std_rad: f64, rng: &mut ChaCha8Rng) 
 pub fn corners(n_views: u32, joint_std_rad: f64) -> Problem {
     let robot = robot();
     let model = model(&robot);
-    let mut scales = Scales::datasheet(&robot);
+    let mut scales = Hyperparameters::datasheet(&robot);
     scales.joint_std_rad = [joint_std_rad; MAX_JOINTS];
     let mut rng = stream_rng(1, "bench of bundle");
     let mut problem = Problem { robot, views: Vec::new(), model, scales };
@@ -141,7 +141,7 @@ fn view(robot: &Robot, truth: &Truth, joint_std_rad: f64, idx: u32, rng: &mut Ch
         JointAngles::from_fn(robot.n_joints(), |j| rng.random_range(-0.9..0.9) * robot.sensors[j].half_range_rad);
     let angles = JointAngles::from_fn(robot.n_joints(), |j| {
         let spec = &robot.sensors[j];
-        let angle_rad = truth.parameters.correction(j).angle_rad(spec, travel_rad[j], &Departure::default(), 0.0);
+        let angle_rad = truth.parameters.correction(j).angle_rad(spec, travel_rad[j], &ConditionChange::default(), 0.0);
         angle_rad + joint_std_rad * normal(rng)
     });
     let camera_from_base = (robot.chain.link_poses(&angles).link(robot.camera.mount.n_joints) * truth.mount).inverse();
@@ -159,8 +159,8 @@ fn view(robot: &Robot, truth: &Truth, joint_std_rad: f64, idx: u32, rng: &mut Ch
             let seen = robot.camera.lens.project(&point)?;
             *pixel = [seen.x + CORNER_STD_PX * normal(rng), seen.y + CORNER_STD_PX * normal(rng)];
         }
-        let measured = Measured::Corners(SeenCorners { corners_px, n_frames: 1, scatter_px2: 0.0 });
-        view.tags.push(TagView { id: tag.id, tag_idx, center_in_camera_m: center, measured });
+        let measured = TagMeasurement::Corners(MeanCorners { corners_px, n_frames: 1, scatter_px2: 0.0 });
+        view.tags.push(TagObservation { id: tag.id, tag_idx, center_in_camera_m: center, measured });
     }
     Some(view)
 }
@@ -169,7 +169,7 @@ fn view(robot: &Robot, truth: &Truth, joint_std_rad: f64, idx: u32, rng: &mut Ch
 pub fn positions(n_views: u32, n_tags: usize) -> Problem {
     let robot = robot();
     let model = model(&robot);
-    let scales = Scales::datasheet(&robot);
+    let scales = Hyperparameters::datasheet(&robot);
     let mut rng = stream_rng(1, "bench of minimum distance");
     let mut problem = Problem { robot, views: Vec::new(), model, scales };
     let mut truth = JointParameters::default();
@@ -189,7 +189,12 @@ pub fn positions(n_views: u32, n_tags: usize) -> Problem {
         for (tag_idx, tag) in robot.tags.iter().enumerate().take(n_tags) {
             let mut center = (camera_from_base * tag.base_from_tag.isometry()).translation.vector;
             center.iter_mut().for_each(|x| *x += POSITION_STD_M * normal(&mut rng));
-            view.tags.push(TagView { id: tag.id, tag_idx, center_in_camera_m: center, measured: Measured::Position });
+            view.tags.push(TagObservation {
+                id: tag.id,
+                tag_idx,
+                center_in_camera_m: center,
+                measured: TagMeasurement::Position,
+            });
         }
         problem.views.push(view);
     }

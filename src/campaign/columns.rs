@@ -6,27 +6,27 @@ use armcal_core::stats::Summary;
 
 /// What a figure's values are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
+pub enum MetricKind {
     /// Whole, from 0.
     Count,
     Real,
 }
 
-struct Figure {
+struct Metric {
     name: &'static str,
-    kind: Kind,
+    kind: MetricKind,
     of: fn(&Finished) -> Option<f64>,
 }
 
-const fn real(name: &'static str, of: fn(&Finished) -> Option<f64>) -> Figure {
-    Figure { name, kind: Kind::Real, of }
+const fn real(name: &'static str, of: fn(&Finished) -> Option<f64>) -> Metric {
+    Metric { name, kind: MetricKind::Real, of }
 }
 
-const fn count(name: &'static str, of: fn(&Finished) -> Option<f64>) -> Figure {
-    Figure { name, kind: Kind::Count, of }
+const fn count(name: &'static str, of: fn(&Finished) -> Option<f64>) -> Metric {
+    Metric { name, kind: MetricKind::Count, of }
 }
 
-const FIGURES: &[Figure] = &[
+const FIGURES: &[Metric] = &[
     real("simulated_s", |f| f.summary.simulated_s),
     real("motion_s", |f| f.summary.motion_s),
     real("tool_error_before_median_m", |f| Some(tool(before(f)?)?.median)),
@@ -107,8 +107,8 @@ impl Columns {
 
     /// What a column holds, by its name.
     #[must_use]
-    pub fn kind(name: &str) -> Kind {
-        FIGURES.iter().find(|figure| figure.name == name).map_or(Kind::Real, |figure| figure.kind)
+    pub fn kind(name: &str) -> MetricKind {
+        FIGURES.iter().find(|figure| figure.name == name).map_or(MetricKind::Real, |figure| figure.kind)
     }
 
     /// The figures of a run, in the order of [`Self::names`].

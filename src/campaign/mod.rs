@@ -22,7 +22,7 @@ mod store;
 mod table_file;
 mod tables;
 
-pub use columns::{Columns, Kind};
+pub use columns::{Columns, MetricKind};
 pub use engine::{Engine, run_jobs};
 pub use error::CampaignError;
 pub use fingerprint::fingerprint;

@@ -9,7 +9,7 @@ use parquet::basic::Compression;
 use parquet::errors::ParquetError;
 use parquet::file::properties::WriterProperties;
 
-use super::columns::{Columns, Kind};
+use super::columns::{Columns, MetricKind};
 use super::{Row, Table};
 
 /// The file's bytes; the same rows give the same bytes.
@@ -42,8 +42,8 @@ fn batch(table: &Table) -> Result<RecordBatch, arrow::error::ArrowError> {
     for (index, name) in table.names.iter().enumerate() {
         let values = rows.iter().map(|row| row.figures.get(index).copied().flatten());
         let array: ArrayRef = match Columns::kind(name) {
-            Kind::Count => Arc::new(values.map(|v| v.map(|v| v as u64)).collect::<UInt64Array>()),
-            Kind::Real => Arc::new(values.collect::<Float64Array>()),
+            MetricKind::Count => Arc::new(values.map(|v| v.map(|v| v as u64)).collect::<UInt64Array>()),
+            MetricKind::Real => Arc::new(values.collect::<Float64Array>()),
         };
         columns.push((name, array, true));
     }

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::CampaignError;
-use super::columns::{Columns, Kind};
+use super::columns::{Columns, MetricKind};
 use super::row::{Row, RunStatus};
 
 /// In front of the figures.
@@ -44,8 +44,8 @@ pub(super) fn row_line(row: &Row, names: &[String]) -> String {
     // Rust's shortest text of a number reads back as the same number.
     let figures = row.figures.iter().zip(names).map(|(value, name)| match (value, Columns::kind(name)) {
         (None, _) => String::new(),
-        (Some(value), Kind::Count) => format!("{}", *value as u64),
-        (Some(value), Kind::Real) => format!("{value}"),
+        (Some(value), MetricKind::Count) => format!("{}", *value as u64),
+        (Some(value), MetricKind::Real) => format!("{value}"),
     });
     line(fixed.into_iter().chain(figures))
 }

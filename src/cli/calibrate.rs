@@ -8,7 +8,7 @@ use clap::Args;
 
 use super::exit::{Exit, UsageError};
 use super::files;
-use super::given::Given;
+use super::given::CalibrationInputs;
 use super::stdout::say;
 use crate::report::{RunSummary, table};
 use armcal_belief::calib::{CompactCalibration, MapResult, Status};
@@ -61,7 +61,7 @@ pub(super) fn calibrate(args: &CalibrateArgs) -> Result<Exit> {
     let failed: Vec<FailedJoint> =
         args.failed.iter().map(|text| failed_joint(text, &robot)).collect::<Result<_, _>>()?;
     let robot = robot.with_failed(&failed);
-    let given = Given {
+    let given = CalibrationInputs {
         recordings: &args.recordings,
         robot: &robot,
         method: args.method,

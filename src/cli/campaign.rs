@@ -8,7 +8,7 @@ use clap::Args;
 
 use super::exit::{Exit, UsageError};
 use super::files;
-use super::many::{CampaignBar, Many, check_name, exit_of, interrupts, range_of, run_many};
+use super::many::{BatchRun, CampaignBar, check_name, exit_of, interrupts, range_of, run_many};
 use super::overrides::OverrideArgs;
 use crate::campaign::{CampaignSummary, Prepared, Request, Shard, Store, jobs, merge, table, write_results};
 use armcal_core::routine::SeedRange;
@@ -77,7 +77,7 @@ fn run(args: &CampaignArgs, routine: &Path) -> Result<Exit> {
         eprintln!("{n_before} rows are there already; {} runs are left", jobs.len());
     }
     let folder = files::with_suffix(&out, if args.keep { ".runs" } else { ".work" });
-    let many = Many { prepared: &prepared, folder: &folder, keep: args.keep, threads: args.threads, stop: &stop };
+    let many = BatchRun { prepared: &prepared, folder: &folder, keep: args.keep, threads: args.threads, stop: &stop };
     let mut bar = CampaignBar::new(&prepared, store.table(), jobs.len());
     let whole = run_many(&many, &jobs, &mut |row| {
         bar.add(&row);

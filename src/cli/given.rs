@@ -7,7 +7,7 @@ use anyhow::Result;
 use super::calibrate::warn_of_losses;
 use super::exit::UsageError;
 use armcal_belief::calib::{
-    Calibration, CalibrationFileError, ForeignContext, Status, calibrate, calibrate_among, calibrate_data,
+    Calibration, CalibrationFileError, ForeignContext, Status, calibrate, calibrate_data, calibrate_with_survey,
     prepare_foreign, prepare_pooled,
 };
 use armcal_belief::tagmap::files::{LandmarkFile, NamedSurvey, read_landmarks};
@@ -18,7 +18,7 @@ use armcal_core::routine::Method;
 use armcal_core::streams::{Message, ReachTask};
 
 /// All that a calibration from files is made of.
-pub(super) struct Given<'a> {
+pub(super) struct CalibrationInputs<'a> {
     pub recordings: &'a [PathBuf],
     pub robot: &'a Robot,
     pub method: Method,
@@ -28,7 +28,7 @@ pub(super) struct Given<'a> {
     pub task: Option<&'a Path>,
 }
 
-impl Given<'_> {
+impl CalibrationInputs<'_> {
     /// The calibration, and whether a recording had lost something.
     pub fn calibrate(&self) -> Result<(Calibration, bool)> {
         let prior = self.prior.map(|file| read_prior(file, self.robot)).transpose()?;
@@ -65,7 +65,9 @@ impl Given<'_> {
             }
             return Ok((
                 match survey {
-                    Some(survey) => calibrate_among(recording, &self.robot.clone().with_survey(survey), self.method)?,
+                    Some(survey) => {
+                        calibrate_with_survey(recording, &self.robot.clone().with_survey(survey), self.method)?
+                    }
                     None => calibrate(recording, self.robot, self.method)?,
                 },
                 lost,

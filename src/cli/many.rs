@@ -20,7 +20,7 @@ use armcal_core::stats::quantile;
 use armcal_core::streams::Phase;
 
 /// How the runs are made.
-pub(super) struct Many<'a> {
+pub(super) struct BatchRun<'a> {
     pub prepared: &'a Prepared,
     /// Runs have their folders in here.
     pub folder: &'a Path,
@@ -31,7 +31,7 @@ pub(super) struct Many<'a> {
 
 /// Runs the jobs; `false` when it was stopped before the last one.
 pub(super) fn run_many(
-    many: &Many<'_>,
+    many: &BatchRun<'_>,
     jobs: &[Job],
     on_row: &mut (dyn FnMut(Row) -> Result<(), CampaignError> + Send),
 ) -> Result<bool> {

@@ -7,7 +7,7 @@ use clap::Args;
 
 use super::exit::{Exit, UsageError};
 use super::files;
-use super::many::{CampaignBar, Many, check_name, interrupts, range_of, run_many};
+use super::many::{BatchRun, CampaignBar, check_name, interrupts, range_of, run_many};
 use super::overrides::OverrideArgs;
 use crate::campaign::{
     Job, Prepared, Request, Row, Table, compare, jobs, read_table, regress_table, statistics, table, table_text,
@@ -94,7 +94,7 @@ fn jobs_of(baseline: &Table, args: &RegressArgs, prepared: &Prepared) -> Result<
 fn run(args: &RegressArgs, prepared: &Prepared, jobs: &[Job]) -> Result<Option<Table>> {
     let stop = interrupts()?;
     let folder = tempfile::tempdir().context("no temporary folder can be made")?;
-    let many = Many { prepared, folder: folder.path(), keep: false, threads: args.threads, stop: &stop };
+    let many = BatchRun { prepared, folder: folder.path(), keep: false, threads: args.threads, stop: &stop };
     let mut now = Table { names: prepared.columns.names(), rows: Vec::new() };
     let mut bar = CampaignBar::new(prepared, &now, jobs.len());
     let whole = run_many(&many, jobs, &mut |row| {

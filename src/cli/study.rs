@@ -10,7 +10,7 @@ use clap::{Args, Subcommand};
 use super::exit::Exit;
 use super::files;
 use super::study_paper::{PaperArgs, paper};
-use super::study_plan::{EdgesArgs, PairsArgs, PathsArgs, StrayArgs, edges, pairs, paths, stray};
+use super::study_plan::{EdgesArgs, PairsArgs, PathsArgs, StrayArgs, edges, paths, self_collision, tracking_error};
 use super::study_poses::{PosesArgs, poses};
 use armcal_core::optics::Fisheye;
 use armcal_core::stats::quantile;
@@ -75,8 +75,8 @@ pub(super) fn study(args: &StudyArgs) -> Result<Exit> {
         Study::Paper(args) => paper(args),
         Study::Edges(args) => edges(args),
         Study::Paths(args) => paths(args),
-        Study::Pairs(args) => pairs(args),
-        Study::Stray(args) => stray(args),
+        Study::Pairs(args) => self_collision(args),
+        Study::Stray(args) => tracking_error(args),
         Study::Poses(args) => poses(args),
     }
 }

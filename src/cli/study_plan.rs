@@ -90,7 +90,7 @@ pub(super) struct StrayArgs {
 }
 
 /// How far the arm left the lines that it was sent along.
-pub(super) fn stray(args: &StrayArgs) -> Result<Exit> {
+pub(super) fn tracking_error(args: &StrayArgs) -> Result<Exit> {
     let robot = load(&args.robot)?;
     let recording = read_recording(&args.recording)?;
     let messages: Vec<Message> = recording.messages.into_iter().map(|(_, message)| message).collect();
@@ -156,7 +156,7 @@ pub(super) fn paths(args: &PathsArgs) -> Result<Exit> {
     Ok(Exit::Ok)
 }
 
-pub(super) fn pairs(args: &PairsArgs) -> Result<Exit> {
+pub(super) fn self_collision(args: &PairsArgs) -> Result<Exit> {
     let robot = load_without_pairs(&args.robot)?;
     let found = sample_self_pairs(&robot, args.n, args.seed);
     let file = args.robot.join(SELF_COLLISION_FILE);

@@ -49,12 +49,12 @@ impl BearingTable {
 
 /// A pinhole camera of focal length 1 at the same place that looks at a tag: in its image a tag's sides are straight.
 #[derive(Clone, Debug)]
-pub(super) struct TagView<'a> {
+pub(super) struct RectifiedView<'a> {
     table: &'a BearingTable,
     turn: Rotation3<f64>,
 }
 
-impl<'a> TagView<'a> {
+impl<'a> RectifiedView<'a> {
     pub(super) fn new(table: &'a BearingTable, corners_px: &[[f64; 2]; 4]) -> Option<Self> {
         let mut sum = Vector3::zeros();
         for corner in corners_px {

@@ -14,13 +14,13 @@ const SIDE: f32 = 0.107;
 
 /// Buffers, reused.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Evener {
+pub(super) struct ContrastNormalizer {
     /// Of each column over the rows of the window: sum and sum of squares.
     sums: Vec<[u32; 2]>,
     smooth: Vec<f32>,
 }
 
-impl Evener {
+impl ContrastNormalizer {
     /// Writes the evened image into rows of `stride` bytes; both images have `width` columns.
     pub(super) fn even(&mut self, data: &[u8], width: usize, out: &mut [u8], stride: usize) {
         let height = data.len() / width.max(1);
@@ -109,7 +109,7 @@ mod tests {
         let (width, height, stride) = (90_usize, 70_usize, 96_usize);
         let data: Vec<u8> = (0..width * height).map(|i| (i * i / 7 % 97 + i % 50) as u8).collect();
         let mut out = vec![0; stride * height];
-        Evener::default().even(&data, width, &mut out, stride);
+        ContrastNormalizer::default().even(&data, width, &mut out, stride);
         let at = |x: isize, y: isize| {
             f64::from(data[y.clamp(0, height as isize - 1) as usize * width + x.clamp(0, width as isize - 1) as usize])
         };

@@ -4,8 +4,8 @@ use nalgebra::Matrix2;
 
 use super::bearings::BearingTable;
 use super::fit::{Fit, Fitter};
-use super::judge::{Candidate, DetectorSettings, are_nested, judge_candidate, judge_fit};
-use super::look::Looker;
+use super::judge::{Candidate, DetectorSettings, are_nested, gate_fit, judge_candidate};
+use super::look::QuadDecoder;
 use super::pattern::Cells;
 use super::{Detected, DetectedTag, GreyImage};
 use armcal_core::optics::{Fisheye, tag36h11};
@@ -24,7 +24,7 @@ pub enum DetectError {
 /// Finds tags in images of one camera. The same image gives the same result.
 #[derive(Debug)]
 pub struct TagDetector {
-    looker: Looker,
+    looker: QuadDecoder,
     refiner: Refiner,
 }
 
@@ -46,7 +46,7 @@ impl TagDetector {
     /// # Errors
     /// [`DetectError::Library`] if the C library cannot start.
     pub fn new(lens: &Fisheye, settings: DetectorSettings) -> Result<Self, DetectError> {
-        let looker = Looker::new(lens.resolution_px.map(|n| n as usize))?;
+        let looker = QuadDecoder::new(lens.resolution_px.map(|n| n as usize))?;
         let refiner = Refiner { lens: *lens, settings, table: BearingTable::new(lens), fitter: Fitter::new() };
         Ok(Self { looker, refiner })
     }
@@ -104,7 +104,7 @@ impl Refiner {
         let cells =
             tag36h11::cells(candidate.id).map(|cells| Cells::new(&cells)).ok_or((RejectReason::UnknownId, start_px))?;
         let fit = self.fitter.fit(image, &self.table, &cells, &start_px).ok_or((RejectReason::PoorEdges, start_px))?;
-        judge_fit(&self.settings, &self.lens, &start_px, &fit).map_err(|reason| (reason, start_px))?;
+        gate_fit(&self.settings, &self.lens, &start_px, &fit).map_err(|reason| (reason, start_px))?;
         let detection =
             TagDetection { id: candidate.id, corners_px: fit.corners_px, decision_margin: candidate.decision_margin };
         Ok(DetectedTag { detection, covariances_px2: covariances_px2(&fit) })

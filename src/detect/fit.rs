@@ -9,7 +9,7 @@
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 
 use super::GreyImage;
-use super::bearings::{BearingTable, TagView};
+use super::bearings::{BearingTable, RectifiedView};
 use super::homography::Homography;
 use super::normal::NormalTable;
 use super::pattern::Cells;
@@ -76,7 +76,7 @@ struct Linearized {
 
 /// One tag's view and pattern.
 struct Scene<'a> {
-    view: TagView<'a>,
+    view: RectifiedView<'a>,
     cells: &'a Cells,
 }
 
@@ -93,7 +93,7 @@ impl Fitter {
         cells: &Cells,
         start_px: &[[f64; 2]; 4],
     ) -> Option<Fit> {
-        let scene = Scene { view: TagView::new(table, start_px)?, cells };
+        let scene = Scene { view: RectifiedView::new(table, start_px)?, cells };
         let (homography, _) = scene.homography(start_px)?;
         collect(&mut self.samples, image, &scene.view, &homography, cells, start_px, FINE_SAMPLES);
         let n_coarse = self.samples.len().min(COARSE_SAMPLES);
@@ -206,7 +206,7 @@ impl Fitter {
             }
         }
         let mut to_corners = Normal::identity();
-        to_corners.fixed_view_mut::<8, 8>(0, 0).copy_from(&homography.by_corners(&jacobians));
+        to_corners.fixed_view_mut::<8, 8>(0, 0).copy_from(&homography.corner_jacobian(&jacobians));
         let raw = Normal::from_fn(|i, j| sums[i.min(j)][i.max(j)]);
         out.matrix = to_corners.transpose() * raw * to_corners;
         out.gradient = to_corners.transpose() * out.gradient;

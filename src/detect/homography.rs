@@ -61,7 +61,7 @@ impl Homography {
     }
 
     /// d(g)/d(corner pixels), from d(plane)/d(pixel) at each corner: differentiating `A(corners) g = right`.
-    pub(super) fn by_corners(&self, jacobians: &[Matrix2<f64>; 4]) -> SMatrix<f64, 8, 8> {
+    pub(super) fn corner_jacobian(&self, jacobians: &[Matrix2<f64>; 4]) -> SMatrix<f64, 8, 8> {
         let mut right = SMatrix::<f64, 8, 8>::zeros();
         for (k, ([s, t], jacobian)) in CORNERS.into_iter().zip(jacobians).enumerate() {
             let slope = self.slope(&TagPlace { s, t, scale: 1.0 });
@@ -86,7 +86,7 @@ mod tests {
             let place = homography.place(corner);
             assert!((place.s - s).abs() < 1e-12 && (place.t - t).abs() < 1e-12);
         }
-        let analytic = homography.by_corners(&[Matrix2::identity(); 4]);
+        let analytic = homography.corner_jacobian(&[Matrix2::identity(); 4]);
         for k in 0..8 {
             let moved = |h: f64| {
                 let mut corners = corners();

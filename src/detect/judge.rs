@@ -49,7 +49,7 @@ impl Default for DetectorSettings {
 #[derive(Clone, Debug)]
 pub(super) struct Candidate {
     pub id: u32,
-    pub wrong_bits: usize,
+    pub hamming: usize,
     pub decision_margin: f64,
     pub corners_px: [[f64; 2]; 4],
 }
@@ -60,7 +60,7 @@ pub(super) fn judge_candidate(
     lens: &Fisheye,
     candidate: &Candidate,
 ) -> Result<(), RejectReason> {
-    if candidate.wrong_bits > settings.max_wrong_bits {
+    if candidate.hamming > settings.max_wrong_bits {
         return Err(RejectReason::WrongBits);
     }
     if settings.known_ids.as_ref().is_some_and(|ids| !ids.contains(&candidate.id)) {
@@ -70,7 +70,7 @@ pub(super) fn judge_candidate(
 }
 
 /// After the fit. `start_px`: where the corners were before.
-pub(super) fn judge_fit(
+pub(super) fn gate_fit(
     settings: &DetectorSettings,
     lens: &Fisheye,
     start_px: &[[f64; 2]; 4],

@@ -3,7 +3,7 @@
 use apriltag::{Detector, Family, Image};
 
 use super::GreyImage;
-use super::contrast::Evener;
+use super::contrast::ContrastNormalizer;
 use super::detector::DetectError;
 use super::judge::Candidate;
 
@@ -18,14 +18,14 @@ const ALIGNMENT: usize = 96;
 
 /// The library with its two images.
 #[derive(Debug)]
-pub(super) struct Looker {
+pub(super) struct QuadDecoder {
     library: Detector,
     image: Image,
     evened: Image,
-    evener: Evener,
+    evener: ContrastNormalizer,
 }
 
-impl Looker {
+impl QuadDecoder {
     pub(super) fn new([width, height]: [usize; 2]) -> Result<Self, DetectError> {
         let library_error = |error: apriltag::Error| DetectError::Library(error.to_string());
         let mut library = Detector::builder()
@@ -35,7 +35,7 @@ impl Looker {
         library.set_thread_number(LIBRARY_THREADS);
         library.set_refine_edges(true);
         let blank = || Image::zeros_with_alignment(width, height, ALIGNMENT).map_err(library_error);
-        Ok(Self { library, image: blank()?, evened: blank()?, evener: Evener::default() })
+        Ok(Self { library, image: blank()?, evened: blank()?, evener: ContrastNormalizer::default() })
     }
 
     /// At the image as it is. Where a second look follows, the contrast is evened meanwhile.
@@ -71,7 +71,7 @@ fn decode(library: &mut Detector, image: &Image, decimation: f32) -> Vec<Candida
         .filter_map(|found| {
             Some(Candidate {
                 id: u32::try_from(found.id()).ok()?,
-                wrong_bits: found.hamming(),
+                hamming: found.hamming(),
                 decision_margin: f64::from(found.decision_margin()),
                 corners_px: found.corners().map(|corner| corner.map(|x| x - CENTER_SHIFT_PX)),
             })

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix2, Vector2};
 
 use super::GreyImage;
-use super::bearings::TagView;
+use super::bearings::RectifiedView;
 use super::homography::Homography;
 use super::pattern::{Cells, N_CELLS};
 
@@ -31,7 +31,7 @@ pub(super) struct Sample {
 pub(super) fn collect(
     samples: &mut Vec<Sample>,
     image: &GreyImage,
-    view: &TagView,
+    view: &RectifiedView,
     start: &Homography,
     cells: &Cells,
     corners_px: &[[f64; 2]; 4],

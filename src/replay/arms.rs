@@ -3,9 +3,9 @@
 use nalgebra::Vector3;
 use rerun::{LineStrips3D, Points3D};
 
-use super::Run;
+use super::ReplayScene;
 use super::colors;
-use super::rrd::Stream;
+use super::rrd::EntityLog;
 use super::scenery::{BASE, Mover};
 use super::shapes::{Look, fix_shapes, path_part, transform, vector};
 use armcal_core::spatial::{Base, Pose, Tool};
@@ -17,7 +17,7 @@ const TRAIL_HZ: f64 = 5.0;
 /// How far the lines of sight at the image's corners are drawn, m.
 const SIGHT_M: f64 = 0.22;
 
-impl Run<'_> {
+impl ReplayScene<'_> {
     /// The best known joint angles: true, else believed.
     pub(super) fn shown_angles(&self, time_s: f64) -> Option<JointAngles> {
         let truth = self.truth.as_ref().and_then(|truth| truth.angles(time_s));
@@ -53,7 +53,7 @@ impl Run<'_> {
 }
 
 /// Draws the arms and what belongs to them.
-pub(super) fn draw(run: &Run, stream: &mut Stream) {
+pub(super) fn draw(run: &ReplayScene, stream: &mut EntityLog) {
     let mut shown = Arm::new(run, stream, "arm", Look::Drawn);
     fix_camera(run, stream, &shown);
     for time_s in run.tracks.frames() {
@@ -80,7 +80,7 @@ struct Arm {
 }
 
 impl Arm {
-    fn new(run: &Run, stream: &mut Stream, name: &str, look: Look) -> Self {
+    fn new(run: &ReplayScene, stream: &mut EntityLog, name: &str, look: Look) -> Self {
         let mut bodies = Vec::new();
         for (n, body) in run.robot.bodies.iter().enumerate() {
             let entity = format!("{BASE}/{name}/{n}_{}", path_part(&body.name));
@@ -99,7 +99,7 @@ impl Arm {
         Self { bodies, jaws }
     }
 
-    fn place(&mut self, run: &Run, stream: &mut Stream, time_s: f64, angles: &JointAngles) {
+    fn place(&mut self, run: &ReplayScene, stream: &mut EntityLog, time_s: f64, angles: &JointAngles) {
         let poses = run.robot.chain.link_poses(angles);
         for (n, body) in self.bodies.iter_mut().enumerate() {
             body.place(stream, time_s, poses.link(n));
@@ -113,11 +113,11 @@ impl Arm {
 }
 
 /// The camera's lines of sight towards the corners of its image.
-fn fix_camera(run: &Run, stream: &mut Stream, arm: &Arm) {
+fn fix_camera(run: &ReplayScene, stream: &mut EntityLog, arm: &Arm) {
     let camera = &run.robot.camera;
     let Some(carrier) = arm.bodies.get(camera.mount.n_joints) else { return };
     let entity = format!("{}/camera", carrier.entity());
-    stream.fix(&entity, &transform(&camera.mount.link_from_frame));
+    stream.log_static(&entity, &transform(&camera.mount.link_from_frame));
     // The image's corners may lie beyond the field of view: a cone of a narrower angle shows the direction as well.
     let half_angle_rad = camera.lens.max_view_angle_rad.min(0.6);
     let rays = [[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]].map(|[x, y]: [f64; 2]| {
@@ -127,15 +127,15 @@ fn fix_camera(run: &Run, stream: &mut Stream, arm: &Arm) {
     let mut strips: Vec<Vec<[f32; 3]>> = rays.iter().map(|ray| vec![[0.0; 3], *ray]).collect();
     strips.push(vec![rays[0], rays[1], rays[2], rays[3], rays[0]]);
     let cone = LineStrips3D::new(strips).with_radii([0.003]).with_colors([colors::CAMERA]);
-    stream.fix(&format!("{entity}/view"), &cone);
+    stream.log_static(&format!("{entity}/view"), &cone);
 }
 
 /// The last seconds of the tool's path.
-fn draw_trail(run: &Run, stream: &mut Stream) {
+fn draw_trail(run: &ReplayScene, stream: &mut EntityLog) {
     let mut points: Vec<[f32; 3]> = Vec::new();
     let kept = (TRAIL_S * TRAIL_HZ) as usize;
     let entity = format!("{BASE}/tool_path");
-    stream.fix(&entity, &LineStrips3D::update_fields().with_radii([0.004]).with_colors([colors::TRAIL]));
+    stream.log_static(&entity, &LineStrips3D::update_fields().with_radii([0.004]).with_colors([colors::TRAIL]));
     let mut drawn: Vec<[f32; 3]> = Vec::new();
     for time_s in run.tracks.ticks(TRAIL_HZ) {
         let Some(tool) = run.shown_tool(time_s) else { continue };
@@ -152,7 +152,7 @@ fn draw_trail(run: &Run, stream: &mut Stream) {
 }
 
 /// Where the camera stood for each view that was taken: one colour for views that are fitted, one for those held out.
-fn draw_captures(run: &Run, stream: &mut Stream) {
+fn draw_captures(run: &ReplayScene, stream: &mut EntityLog) {
     let (mut places, mut shades) = (Vec::new(), Vec::new());
     let mut marks: Vec<_> = run.tracks.marks.iter().collect();
     marks.sort_by(|a, b| a.end_s.total_cmp(&b.end_s));

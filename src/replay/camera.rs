@@ -3,9 +3,9 @@
 use nalgebra::{Isometry3, Point3, Vector2, Vector3};
 use rerun::{Clear, EncodedImage, Image, LineStrips2D, Radius};
 
-use super::Run;
+use super::ReplayScene;
 use super::colors;
-use super::rrd::Stream;
+use super::rrd::EntityLog;
 use armcal_core::optics::Fisheye;
 use armcal_core::robot::SurveyedTag;
 use armcal_core::streams::{DetectionReject, TagDetection};
@@ -25,23 +25,23 @@ const PIXEL_CENTER: f32 = 0.5;
 const RINGS_RAD: [f64; 2] = [std::f64::consts::FRAC_PI_6, std::f64::consts::FRAC_PI_3];
 
 /// Draws the image plane.
-pub(super) fn draw(run: &Run, stream: &mut Stream) {
+pub(super) fn draw(run: &ReplayScene, stream: &mut EntityLog) {
     let lens = &run.robot.camera.lens;
     let [width, height] = lens.resolution_px;
     if run.tracks.images.is_empty() {
-        stream.fix(&format!("{CAMERA}/background"), &Image::from_rgb24(background(lens), [width, height]));
+        stream.log_static(&format!("{CAMERA}/background"), &Image::from_rgb24(background(lens), [width, height]));
     } else {
         draw_images(run, stream);
     }
     let rings = LineStrips2D::new(RINGS_RAD.iter().map(|&angle_rad| ring(lens, angle_rad)));
-    stream.fix(&format!("{CAMERA}/rings"), &rings.with_radii([0.7]).with_colors([[52, 76, 96, 255]]));
+    stream.log_static(&format!("{CAMERA}/rings"), &rings.with_radii([0.7]).with_colors([[52, 76, 96, 255]]));
     draw_expected(run, stream);
     draw_seen(run, stream);
     draw_rejected(run, stream);
 }
 
 /// The camera's images as they were compressed, each until the next or until there has been none for a while.
-fn draw_images(run: &Run, stream: &mut Stream) {
+fn draw_images(run: &ReplayScene, stream: &mut EntityLog) {
     let entity = format!("{CAMERA}/image");
     for (n, (time_s, image)) in run.tracks.images.iter().enumerate() {
         let picture = EncodedImage::new(image.jpeg.clone()).with_media_type("image/jpeg");
@@ -78,29 +78,29 @@ fn corner([x, y]: [f64; 2]) -> [f32; 2] {
 }
 
 /// The tags that were seen, until frames stop coming.
-fn draw_seen(run: &Run, stream: &mut Stream) {
+fn draw_seen(run: &ReplayScene, stream: &mut EntityLog) {
     let entity = format!("{CAMERA}/seen");
     let style = LineStrips2D::update_fields().with_radii([Radius::new_ui_points(1.5)]).with_colors([colors::SEEN]);
-    stream.fix(&entity, &style.with_show_labels(true).with_draw_order(30.0));
+    stream.log_static(&entity, &style.with_show_labels(true).with_draw_order(30.0));
     let views = run.tracks.views.iter().map(|(time_s, view)| (*time_s, view.tags.iter().map(seen_quad).collect()));
     draw_quads(run, stream, &entity, views.collect());
 }
 
 /// What the detector did not believe, and why.
-fn draw_rejected(run: &Run, stream: &mut Stream) {
+fn draw_rejected(run: &ReplayScene, stream: &mut EntityLog) {
     if run.tracks.rejects.is_empty() {
         return;
     }
     let entity = format!("{CAMERA}/rejected");
     let style = LineStrips2D::update_fields().with_radii([Radius::new_ui_points(1.0)]).with_colors([colors::REJECTED]);
-    stream.fix(&entity, &style.with_show_labels(true).with_draw_order(25.0));
+    stream.log_static(&entity, &style.with_show_labels(true).with_draw_order(25.0));
     let views =
         run.tracks.rejects.iter().map(|(time_s, view)| (*time_s, view.rejects.iter().map(rejected_quad).collect()));
     draw_quads(run, stream, &entity, views.collect());
 }
 
 /// Outlines by time, each until the next or until there has been none for a while.
-fn draw_quads(run: &Run, stream: &mut Stream, entity: &str, mut views: Vec<(f64, Vec<Quad>)>) {
+fn draw_quads(run: &ReplayScene, stream: &mut EntityLog, entity: &str, mut views: Vec<(f64, Vec<Quad>)>) {
     views.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut drawn: Option<f64> = None;
     for (n, (time_s, view)) in views.iter().enumerate() {
@@ -139,10 +139,10 @@ fn quads(quads: impl Iterator<Item = Quad>) -> LineStrips2D {
 }
 
 /// Where the believed arm expects the surveyed tags.
-fn draw_expected(run: &Run, stream: &mut Stream) {
+fn draw_expected(run: &ReplayScene, stream: &mut EntityLog) {
     let entity = format!("{CAMERA}/expected");
     let style = LineStrips2D::update_fields().with_radii([Radius::new_ui_points(1.0)]).with_colors([colors::BELIEVED]);
-    stream.fix(&entity, &style.with_draw_order(20.0));
+    stream.log_static(&entity, &style.with_draw_order(20.0));
     let mut drawn: Option<Vec<Vec<[f32; 2]>>> = None;
     for time_s in run.tracks.ticks(VIEWS_HZ) {
         let Some(angles) = run.tracks.believed.at(time_s) else { continue };
@@ -157,7 +157,7 @@ fn draw_expected(run: &Run, stream: &mut Stream) {
 }
 
 /// The outline of a tag in the image, rounded to a tenth of a pixel; `None` if the camera cannot see it.
-fn expected_outline(run: &Run, base_from_camera: &Isometry3<f64>, tag: &SurveyedTag) -> Option<Vec<[f32; 2]>> {
+fn expected_outline(run: &ReplayScene, base_from_camera: &Isometry3<f64>, tag: &SurveyedTag) -> Option<Vec<[f32; 2]>> {
     let lens = &run.robot.camera.lens;
     let camera_from_tag = base_from_camera.inv_mul(tag.base_from_tag.isometry());
     let normal = camera_from_tag.rotation * Vector3::z();

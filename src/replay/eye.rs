@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
-use super::Run;
+use super::ReplayScene;
 use super::shapes::vector;
 
 /// Tangents of half the viewer's field of view, upwards (55 degrees in all) and sideways (the view is about twice as wide).
@@ -17,13 +17,13 @@ const AZIMUTH_RAD: f64 = -0.95;
 const ELEVATION_RAD: f64 = 0.36;
 
 /// An eye and what it looks at, world frame, m.
-pub(super) struct Eye {
+pub(super) struct Viewpoint {
     pub position: [f32; 3],
     pub target: [f32; 3],
 }
 
 /// Frames the arm's links over the run, the tags and the targets.
-pub(super) fn frame(run: &Run) -> Eye {
+pub(super) fn frame(run: &ReplayScene) -> Viewpoint {
     let mut points = Vec::new();
     for n in 0..=SAMPLES {
         let time_s = run.tracks.duration_s * f64::from(n) / f64::from(SAMPLES);
@@ -54,5 +54,5 @@ pub(super) fn frame(run: &Run) -> Eye {
     let world_from_base = *run.world_from_vehicle(0.0).isometry()
         * run.vehicle.map_or_else(nalgebra::Isometry3::identity, |vehicle| *vehicle.vehicle_from_base.isometry());
     let to_world = |p: Vector3<f64>| vector(&(world_from_base * nalgebra::Point3::from(p)).coords);
-    Eye { position: to_world(position), target: to_world(center) }
+    Viewpoint { position: to_world(position), target: to_world(center) }
 }

@@ -13,7 +13,7 @@ use rerun::external::re_sdk_types::blueprint::datatypes::{TextLogColumn, TextLog
 use rerun::external::re_sdk_types::datatypes::{Range2D, TimeInt, TimeRange, TimeRangeBoundary};
 use rerun::external::uuid::Uuid;
 
-use super::Run;
+use super::ReplayScene;
 use super::camera::CAMERA;
 use super::colors;
 use super::eye;
@@ -43,7 +43,7 @@ struct Builder {
 }
 
 /// The layout for what `run` has to show.
-pub(super) fn build(run: &Run) -> Vec<Entry> {
+pub(super) fn build(run: &ReplayScene) -> Vec<Entry> {
     let mut b = Builder::default();
     let scene = scene_view(&mut b, run);
     let camera = camera_view(&mut b, run);
@@ -62,7 +62,7 @@ pub(super) fn build(run: &Run) -> Vec<Entry> {
 }
 
 /// The layout of a plan.
-pub(super) fn build_plan(run: &Run) -> Vec<Entry> {
+pub(super) fn build_plan(run: &ReplayScene) -> Vec<Entry> {
     let mut b = Builder::default();
     let scene = titled_scene(&mut b, run, "Plan: solid = believed arm, amber = arms that the errors allow");
     let camera = titled_camera(&mut b, run, "Wrist camera: tags where the believed arm expects them");
@@ -83,7 +83,7 @@ pub(super) fn build_plan(run: &Run) -> Vec<Entry> {
     b.finish(&root, run)
 }
 
-fn scene_view(b: &mut Builder, run: &Run) -> Part {
+fn scene_view(b: &mut Builder, run: &ReplayScene) -> Part {
     let title = if run.has_true_joints() {
         "Scene: solid arm = true, pink ghost = believed"
     } else {
@@ -92,7 +92,7 @@ fn scene_view(b: &mut Builder, run: &Run) -> Part {
     titled_scene(b, run, title)
 }
 
-fn titled_scene(b: &mut Builder, run: &Run, title: &str) -> Part {
+fn titled_scene(b: &mut Builder, run: &ReplayScene, title: &str) -> Part {
     let view = b.view("3D", title, WORLD);
     let eye = eye::frame(run);
     b.property(&view, "EyeControls3D", EyeControls3D::new().with_position(eye.position).with_look_target(eye.target));
@@ -102,7 +102,7 @@ fn titled_scene(b: &mut Builder, run: &Run, title: &str) -> Part {
     view
 }
 
-fn camera_view(b: &mut Builder, run: &Run) -> Part {
+fn camera_view(b: &mut Builder, run: &ReplayScene) -> Part {
     let title = if run.tracks.rejects.is_empty() {
         "Wrist camera: green = tags seen, pink = expected"
     } else {
@@ -111,7 +111,7 @@ fn camera_view(b: &mut Builder, run: &Run) -> Part {
     titled_camera(b, run, title)
 }
 
-fn titled_camera(b: &mut Builder, run: &Run, title: &str) -> Part {
+fn titled_camera(b: &mut Builder, run: &ReplayScene, title: &str) -> Part {
     let view = b.view("2D", title, CAMERA);
     let [width, height] = run.robot.camera.lens.resolution_px.map(f64::from);
     let bounds = VisualBounds2D::new(Range2D { x_range: [0.0, width].into(), y_range: [0.0, height].into() });
@@ -121,7 +121,7 @@ fn titled_camera(b: &mut Builder, run: &Run, title: &str) -> Part {
     view
 }
 
-fn right_column(b: &mut Builder, run: &Run) -> Part {
+fn right_column(b: &mut Builder, run: &ReplayScene) -> Part {
     let mut rows = Vec::new();
     if run.has_true_joints() {
         rows.push((b.plot("Joint error: believed - true [deg]", JOINT_ERROR, legend(Corner2D::RightTop), run), 3.0));
@@ -147,7 +147,7 @@ fn legend(corner: Corner2D) -> PlotLegend {
     PlotLegend::new().with_corner(corner)
 }
 
-fn text_tabs(b: &mut Builder, run: &Run) -> Part {
+fn text_tabs(b: &mut Builder, run: &ReplayScene) -> Part {
     let summary = b.view("TextDocument", "Summary", SUMMARY);
     let log = b.view("TextLog", "Log", LOG);
     let kinds = [TextLogColumnKind::LogLevel, TextLogColumnKind::Body];
@@ -177,7 +177,7 @@ impl Builder {
     }
 
     /// A plot over the whole recording; by itself the viewer shows what is near the time cursor.
-    fn plot(&mut self, title: &str, origin: &str, legend: PlotLegend, run: &Run) -> Part {
+    fn plot(&mut self, title: &str, origin: &str, legend: PlotLegend, run: &ReplayScene) -> Part {
         let view = self.view("TimeSeries", title, origin);
         self.property(&view, "PlotLegend", legend);
         let [start, end] =
@@ -215,7 +215,7 @@ impl Builder {
         Part(path)
     }
 
-    fn finish(mut self, root: &Part, run: &Run) -> Vec<Entry> {
+    fn finish(mut self, root: &Part, run: &ReplayScene) -> Vec<Entry> {
         let id = root.0.rsplit('/').next().and_then(|id| Uuid::parse_str(id).ok()).unwrap_or_default();
         let viewport = ViewportBlueprint::new().with_root_container(RootContainer(id.into()));
         self.add("viewport".to_owned(), viewport.with_auto_layout(false).with_auto_views(false));

@@ -37,7 +37,7 @@ pub use error::ReplayError;
 pub use plan::{PlanInput, write_plan_rrd};
 pub use viewer::{ViewerError, open_viewer};
 
-use rrd::Stream;
+use rrd::EntityLog;
 use tracks::Tracks;
 use truth::Truth;
 
@@ -54,7 +54,7 @@ pub struct ReplayInput<'a> {
 }
 
 /// Everything that the drawing modules share.
-struct Run<'a> {
+struct ReplayScene<'a> {
     tracks: Tracks<'a>,
     truth: Option<Truth>,
     robot: &'a Robot,
@@ -76,15 +76,15 @@ pub fn write_rrd(input: &ReplayInput, out: &Path) -> Result<(), ReplayError> {
         Some(path) => Some(Truth::read(path, input.robot, &tracks)?),
         None => None,
     };
-    let run = Run { tracks, truth, robot: input.robot, vehicle: input.vehicle, scene: input.scene };
+    let run = ReplayScene { tracks, truth, robot: input.robot, vehicle: input.vehicle, scene: input.scene };
     let stream = draw(&run, input);
     let identity = rrd::Identity::of(input)?;
     rrd::write(out, &identity, &layout::build(&run), stream)
 }
 
 /// All that a recording shows, whoever made it.
-fn draw(run: &Run<'_>, input: &ReplayInput<'_>) -> Stream {
-    let mut stream = Stream::default();
+fn draw(run: &ReplayScene<'_>, input: &ReplayInput<'_>) -> EntityLog {
+    let mut stream = EntityLog::default();
     scenery::draw(run, &mut stream);
     arms::draw(run, &mut stream);
     targets::draw(run, &mut stream);

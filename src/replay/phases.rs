@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use rerun::{StateChange, StateConfiguration, TextLog, TextLogLevel};
 
-use super::Run;
+use super::ReplayScene;
 use super::colors::{self, Rgba};
-use super::rrd::Stream;
+use super::rrd::EntityLog;
 use super::shapes::path_part;
 use super::tracks::Span;
 use armcal_core::streams::{CaptureSet, LogLevel, MarkKind, Phase, ReachAttempt};
@@ -15,14 +15,14 @@ pub(super) const STATE: &str = "/state";
 pub(super) const LOG: &str = "/log";
 
 /// Draws the lanes and the log.
-pub(super) fn draw(run: &Run, stream: &mut Stream) {
+pub(super) fn draw(run: &ReplayScene, stream: &mut EntityLog) {
     draw_phases(run, stream);
     draw_lane(run, stream, "views", view_state);
     draw_lane(run, stream, "reach", reach_state);
     draw_log(run, stream);
 }
 
-fn draw_phases(run: &Run, stream: &mut Stream) {
+fn draw_phases(run: &ReplayScene, stream: &mut EntityLog) {
     const PHASES: [(Phase, &str, Rgba); 8] = [
         (Phase::Plan, "plan", [130, 130, 150, 255]),
         (Phase::Move, "move", [80, 120, 200, 255]),
@@ -35,7 +35,7 @@ fn draw_phases(run: &Run, stream: &mut Stream) {
     ];
     let entity = format!("{STATE}/phase");
     let look = StateConfiguration::new().with_values(PHASES.map(|(_, name, _)| name));
-    stream.fix(&entity, &look.with_colors(PHASES.map(|(_, _, color)| color)));
+    stream.log_static(&entity, &look.with_colors(PHASES.map(|(_, _, color)| color)));
     let mut shown = None;
     for mark in &run.tracks.marks {
         let MarkKind::Phase(phase) = mark.kind else { continue };
@@ -56,7 +56,7 @@ struct State {
     color: Rgba,
 }
 
-fn view_state(_: &Run, mark: &Span) -> Option<State> {
+fn view_state(_: &ReplayScene, mark: &Span) -> Option<State> {
     let MarkKind::Capture { set, pose_idx } = mark.kind else { return None };
     let (set, color) = match set {
         CaptureSet::Fit => ("to fit", colors::FIT_VIEW),
@@ -66,7 +66,7 @@ fn view_state(_: &Run, mark: &Span) -> Option<State> {
     Some(State { name: format!("view {n}, {set}"), label: n.to_string(), color: colors::dimmed(color) })
 }
 
-fn reach_state(run: &Run, mark: &Span) -> Option<State> {
+fn reach_state(run: &ReplayScene, mark: &Span) -> Option<State> {
     let MarkKind::Reach { attempt, target_idx } = mark.kind else { return None };
     let when = match attempt {
         ReachAttempt::Before => "before",
@@ -83,7 +83,7 @@ fn reach_state(run: &Run, mark: &Span) -> Option<State> {
 }
 
 /// A lane with a state for each mark that `state` knows, and gaps between them.
-fn draw_lane(run: &Run, stream: &mut Stream, name: &str, state: fn(&Run, &Span) -> Option<State>) {
+fn draw_lane(run: &ReplayScene, stream: &mut EntityLog, name: &str, state: fn(&ReplayScene, &Span) -> Option<State>) {
     let spans: Vec<_> =
         run.tracks.marks.iter().filter_map(|mark| Some((mark.start_s, mark.end_s, state(run, mark)?))).collect();
     if spans.is_empty() {
@@ -93,7 +93,7 @@ fn draw_lane(run: &Run, stream: &mut Stream, name: &str, state: fn(&Run, &Span) 
     let looks: BTreeMap<&str, &State> = spans.iter().map(|(_, _, state)| (state.name.as_str(), state)).collect();
     let look = StateConfiguration::new().with_values(looks.keys().copied());
     let look = look.with_labels(looks.values().map(|state| state.label.as_str()));
-    stream.fix(&entity, &look.with_colors(looks.values().map(|state| state.color)));
+    stream.log_static(&entity, &look.with_colors(looks.values().map(|state| state.color)));
     for (n, (start_s, end_s, state)) in spans.iter().enumerate() {
         stream.draw(&entity, *start_s, &StateChange::single(state.name.as_str()));
         let next_s = spans.get(n + 1).map_or(f64::INFINITY, |(next_s, ..)| *next_s);
@@ -105,7 +105,7 @@ fn draw_lane(run: &Run, stream: &mut Stream, name: &str, state: fn(&Run, &Span) 
 }
 
 /// The log's lines by their senders, and a line for each arrival.
-fn draw_log(run: &Run, stream: &mut Stream) {
+fn draw_log(run: &ReplayScene, stream: &mut EntityLog) {
     let mut lines: Vec<(f64, String, TextLog)> = Vec::new();
     for (time_s, line) in &run.tracks.log {
         let level = match line.level {

@@ -11,11 +11,11 @@ use rerun::{Boxes3D, FillMode, LineStrips3D, Points3D, Scalars, SeriesLines, Ser
 
 use super::colors::{self, Rgba};
 use super::error::ReplayError;
-use super::rrd::Stream;
+use super::rrd::EntityLog;
 use super::scenery::{BASE, Mover};
 use super::shapes::{Look, fix_shapes, path_part, quaternion, vector};
 use super::tracks::Tracks;
-use super::{ReplayInput, Run, layout, rrd};
+use super::{ReplayInput, ReplayScene, layout, rrd};
 use armcal_belief::plan::{PlanFile, PoseTable, SetName, Timing};
 use armcal_core::log::{Completeness, Recording};
 use armcal_core::robot::{Robot, Vehicle};
@@ -59,7 +59,7 @@ pub fn write_plan_rrd(input: &PlanInput<'_>, out: &Path) -> Result<(), ReplayErr
         summary_markdown: Some(input.markdown),
     };
     let tracks = Tracks::new(&recording, input.robot)?;
-    let run = Run { tracks, truth: None, robot: input.robot, vehicle: shown.vehicle, scene: shown.scene };
+    let run = ReplayScene { tracks, truth: None, robot: input.robot, vehicle: shown.vehicle, scene: shown.scene };
     let mut stream = super::draw(&run, &shown);
     draw_tool_path(&run, &mut stream);
     draw_margins(input, &run, &mut stream);
@@ -69,14 +69,14 @@ pub fn write_plan_rrd(input: &PlanInput<'_>, out: &Path) -> Result<(), ReplayErr
 }
 
 /// The plan's motions as messages.
-struct Imagined<'a> {
+struct PlanMessages<'a> {
     input: &'a PlanInput<'a>,
     messages: Vec<(Stamp, Message)>,
     time_s: f64,
 }
 
 fn as_recorded(input: &PlanInput<'_>) -> Recording {
-    let mut imagined = Imagined { input, messages: Vec::new(), time_s: 0.0 };
+    let mut imagined = PlanMessages { input, messages: Vec::new(), time_s: 0.0 };
     imagined.go();
     Recording {
         path: PathBuf::from("plan.toml"),
@@ -91,7 +91,7 @@ fn as_recorded(input: &PlanInput<'_>) -> Recording {
     }
 }
 
-impl Imagined<'_> {
+impl PlanMessages<'_> {
     fn go(&mut self) {
         let PlanInput { plan, task, .. } = *self.input;
         let (targets_m, tolerance_m) = (task.targets_m.clone(), task.tolerance_m);
@@ -174,16 +174,16 @@ fn words(pose: &PoseTable) -> String {
 }
 
 /// The whole way of the tool.
-fn draw_tool_path(run: &Run, stream: &mut Stream) {
+fn draw_tool_path(run: &ReplayScene, stream: &mut EntityLog) {
     let tool = |angles: &JointAngles| run.robot.chain.link_poses(angles).frame(&run.robot.tool.mount);
     let way: Vec<[f32; 3]> =
         run.tracks.believed.iter().map(|(_, angles)| vector(&tool(angles).translation.vector)).collect();
     let strip = LineStrips3D::new([way]).with_radii([0.003]).with_colors([colors::PLANNED_WAY]);
-    stream.fix(&format!("{BASE}/planned_way"), &strip);
+    stream.log_static(&format!("{BASE}/planned_way"), &strip);
 }
 
 /// Arms at corners of the error box, see-through, and where the tool may be for all of its corners.
-fn draw_margins(input: &PlanInput<'_>, run: &Run, stream: &mut Stream) {
+fn draw_margins(input: &PlanInput<'_>, run: &ReplayScene, stream: &mut EntityLog) {
     let robot = input.robot;
     let mut ghosts: Vec<Vec<Mover>> = Vec::new();
     for (n, _) in CORNERS.iter().enumerate() {
@@ -196,7 +196,7 @@ fn draw_margins(input: &PlanInput<'_>, run: &Run, stream: &mut Stream) {
     }
     let n_joints = robot.chain.joints().iter().filter(|joint| joint.limits.is_some()).count();
     let cloud = format!("{BASE}/margins/tool");
-    stream.fix(&cloud, &Points3D::update_fields().with_radii([0.012]).with_colors([colors::MARGIN_TOOL]));
+    stream.log_static(&cloud, &Points3D::update_fields().with_radii([0.012]).with_colors([colors::MARGIN_TOOL]));
     for time_s in run.tracks.ticks(FRAME_HZ) {
         let Some(angles) = run.tracks.believed.at(time_s) else { continue };
         let error_rad = error_at(input.plan, time_s);
@@ -232,7 +232,7 @@ fn error_at(plan: &PlanFile, time_s: f64) -> JointAngles {
 }
 
 /// Frames around the tags that the next pose is to see, coloured by how likely that is.
-fn draw_sights(input: &PlanInput<'_>, stream: &mut Stream) {
+fn draw_sights(input: &PlanInput<'_>, stream: &mut EntityLog) {
     let entity = format!("{BASE}/sights");
     let mut since_s = 0.0;
     for pose in &input.plan.pose {
@@ -260,7 +260,7 @@ fn chance_color(probability: f64) -> Rgba {
     })
 }
 
-fn draw_plots(input: &PlanInput<'_>, stream: &mut Stream) {
+fn draw_plots(input: &PlanInput<'_>, stream: &mut EntityLog) {
     let plan = input.plan;
     let entity = |name: &str| format!("{CLEARANCE}/{name}");
     let lines = [
@@ -270,10 +270,10 @@ fn draw_plots(input: &PlanInput<'_>, stream: &mut Stream) {
     ];
     for (name, label, shade) in lines {
         let style = SeriesPoints::new().with_names([label]).with_colors([shade]).with_markers([MarkerShape::Circle]);
-        stream.fix(&entity(name), &style.with_marker_sizes([4.0]));
+        stream.log_static(&entity(name), &style.with_marker_sizes([4.0]));
     }
     let margin = SeriesLines::new().with_names(["kept clear"]).with_colors([colors::MISS]).with_widths([1.0]);
-    stream.fix(&entity("margin"), &margin);
+    stream.log_static(&entity("margin"), &margin);
     for time_s in [0.0, plan.totals.arm_time_s] {
         stream.draw(&entity("margin"), time_s, &Scalars::single(1e3 * plan.margin_m));
     }
@@ -285,7 +285,7 @@ fn draw_plots(input: &PlanInput<'_>, stream: &mut Stream) {
     }
     let predicted = format!("{PREDICTED}/tool_error");
     let style = SeriesLines::new().with_names(["predicted after this view"]).with_colors([colors::BELIEVED]);
-    stream.fix(&predicted, &style.with_widths([1.8]));
+    stream.log_static(&predicted, &style.with_widths([1.8]));
     for pose in &plan.pose {
         if let Some(error_m) = pose.predicted_tool_error_m {
             stream.draw(&predicted, pose.arm_time_s, &Scalars::single(1e3 * error_m));

@@ -3,9 +3,9 @@
 use rerun::components::MarkerShape;
 use rerun::{Scalars, SeriesLines, SeriesPoints};
 
-use super::Run;
+use super::ReplayScene;
 use super::colors::{self, Rgba};
-use super::rrd::Stream;
+use super::rrd::EntityLog;
 use armcal_core::streams::{JointAngles, ReachAttempt};
 
 pub(super) const JOINT_ERROR: &str = "/plots/joint_error";
@@ -19,7 +19,7 @@ const FAST_HZ: f64 = 12.5;
 const SLOW_HZ: f64 = 2.0;
 
 /// Draws all plots.
-pub(super) fn draw(run: &Run, stream: &mut Stream) {
+pub(super) fn draw(run: &ReplayScene, stream: &mut EntityLog) {
     draw_angles(run, stream);
     draw_joint_error(run, stream);
     draw_tool_error(run, stream);
@@ -33,14 +33,14 @@ pub(super) fn draw(run: &Run, stream: &mut Stream) {
     }
 }
 
-fn style(stream: &mut Stream, entity: &str, names: &[String], shades: &[Rgba], width: f32) {
+fn style(stream: &mut EntityLog, entity: &str, names: &[String], shades: &[Rgba], width: f32) {
     let shades = shades.iter().copied().take(names.len());
     let lines = SeriesLines::new().with_names(names.iter().map(String::as_str)).with_colors(shades);
-    stream.fix(entity, &lines.with_widths(names.iter().map(|_| width)));
+    stream.log_static(entity, &lines.with_widths(names.iter().map(|_| width)));
 }
 
 /// What is believed as bright lines, what is true as dark ones of the same colours.
-fn draw_angles(run: &Run, stream: &mut Stream) {
+fn draw_angles(run: &ReplayScene, stream: &mut EntityLog) {
     let names = run.robot.joint_names();
     let (believed, truth) = (format!("{JOINT_ANGLE}/believed"), format!("{JOINT_ANGLE}/true"));
     if run.has_true_joints() {
@@ -63,7 +63,7 @@ fn degrees(angles: &JointAngles) -> Scalars {
 }
 
 /// Believed - true, by the shorter way round, at the moments of the belief so that motion adds nothing.
-fn draw_joint_error(run: &Run, stream: &mut Stream) {
+fn draw_joint_error(run: &ReplayScene, stream: &mut EntityLog) {
     let Some(truth) = run.truth.as_ref().filter(|_| run.has_true_joints()) else { return };
     style(stream, JOINT_ERROR, &run.robot.joint_names(), &colors::JOINTS, 1.5);
     let mut next_s = 0.0;
@@ -81,7 +81,7 @@ fn draw_joint_error(run: &Run, stream: &mut Stream) {
 }
 
 /// How far the believed tool is from the true one, and what each arrival missed its target by, mm.
-fn draw_tool_error(run: &Run, stream: &mut Stream) {
+fn draw_tool_error(run: &ReplayScene, stream: &mut EntityLog) {
     if !run.has_true_tool() {
         return;
     }
@@ -115,14 +115,14 @@ fn draw_tool_error(run: &Run, stream: &mut Stream) {
         }
         let entity = format!("{TOOL_ERROR}/{name}");
         let points = SeriesPoints::new().with_names([format!("miss at target, {name}")]).with_colors([shade]);
-        stream.fix(&entity, &points.with_markers([marker]).with_marker_sizes([5.0]));
+        stream.log_static(&entity, &points.with_markers([marker]).with_marker_sizes([5.0]));
         for arrival in arrivals {
             stream.draw(&entity, arrival.time_s, &Scalars::single(1000.0 * arrival.miss_m));
         }
     }
 }
 
-fn draw_temperatures(run: &Run, stream: &mut Stream) {
+fn draw_temperatures(run: &ReplayScene, stream: &mut EntityLog) {
     let tracks = [("oil", &run.tracks.oil_c, colors::OIL), ("water", &run.tracks.water_c, colors::COLD)];
     for (name, track, shade) in tracks.into_iter().filter(|(_, track, _)| !track.is_empty()) {
         let entity = format!("{TEMPERATURE}/{name}");

@@ -36,14 +36,14 @@ type Row = (i64, Vec<SerializedComponentBatch>);
 
 /// What is drawn, by entity; entities are written in the order of their names.
 #[derive(Default)]
-pub(super) struct Stream {
+pub(super) struct EntityLog {
     fixed: BTreeMap<String, Vec<SerializedComponentBatch>>,
     rows: BTreeMap<String, Vec<Row>>,
 }
 
-impl Stream {
+impl EntityLog {
     /// Draws something that holds at all times.
-    pub fn fix(&mut self, entity: &str, what: &dyn AsComponents) {
+    pub fn log_static(&mut self, entity: &str, what: &dyn AsComponents) {
         self.fixed.entry(entity.to_owned()).or_default().extend(what.as_serialized_batches());
     }
 
@@ -114,14 +114,19 @@ pub(super) fn write(
     out: &Path,
     identity: &Identity,
     layout: &[layout::Entry],
-    drawn: Stream,
+    drawn: EntityLog,
 ) -> Result<(), ReplayError> {
     let file = File::create(out).map_err(|source| ReplayError::Create { path: out.to_owned(), source })?;
     encode(BufWriter::new(file), identity, layout, drawn)
         .map_err(|source| ReplayError::Encode { path: out.to_owned(), source })
 }
 
-fn encode(file: impl Write, identity: &Identity, layout: &[layout::Entry], drawn: Stream) -> Result<(), EncodeError> {
+fn encode(
+    file: impl Write,
+    identity: &Identity,
+    layout: &[layout::Entry],
+    drawn: EntityLog,
+) -> Result<(), EncodeError> {
     let recording = StoreId::new(StoreKind::Recording, APPLICATION, identity.recording_id.clone());
     let blueprint = StoreId::new(StoreKind::Blueprint, APPLICATION, format!("layout-{}", identity.recording_id));
     let version = rerun::build_info().version;
@@ -130,7 +135,7 @@ fn encode(file: impl Write, identity: &Identity, layout: &[layout::Entry], drawn
     encoder.do_not_emit_footer();
     encoder.append(&store_info(&recording))?;
     encoder.append(&store_info(&blueprint))?;
-    let mut layout_stream = Stream::default();
+    let mut layout_stream = EntityLog::default();
     for entry in layout {
         layout_stream.draw(&entry.path, 0.0, entry.what.as_ref());
     }

@@ -3,9 +3,9 @@
 use nalgebra::{Isometry3, Translation3};
 use rerun::{Boxes3D, FillMode, Points3D, ViewCoordinates};
 
-use super::Run;
+use super::ReplayScene;
 use super::colors;
-use super::rrd::Stream;
+use super::rrd::EntityLog;
 use super::shapes::{Look, fix_shapes, quaternion, transform, vector};
 use armcal_core::robot::SurveyedTag;
 use armcal_core::spatial::{Pose, Vehicle, World};
@@ -21,7 +21,7 @@ const SEAFLOOR_HALF_M: f64 = 8.0;
 const SAME_M: f64 = 2e-5;
 const SAME_RAD: f64 = 2e-5;
 
-impl Run<'_> {
+impl ReplayScene<'_> {
     /// Where the vehicle was: by truth, else turned as its attitude sensor says, else at rest.
     pub(super) fn world_from_vehicle(&self, time_s: f64) -> Pose<World, Vehicle> {
         let measured = || {
@@ -49,7 +49,7 @@ impl Mover {
     }
 
     /// Draws the pose that the entity has in its parent from `time_s` on.
-    pub fn place(&mut self, stream: &mut Stream, time_s: f64, pose: &Isometry3<f64>) {
+    pub fn place(&mut self, stream: &mut EntityLog, time_s: f64, pose: &Isometry3<f64>) {
         let same = self.last.is_some_and(|last| {
             (last.translation.vector - pose.translation.vector).norm() < SAME_M
                 && last.rotation.angle_to(&pose.rotation) < SAME_RAD
@@ -62,8 +62,8 @@ impl Mover {
 }
 
 /// Draws the scenery.
-pub(super) fn draw(run: &Run, stream: &mut Stream) {
-    stream.fix(WORLD, &ViewCoordinates::RIGHT_HAND_Z_UP());
+pub(super) fn draw(run: &ReplayScene, stream: &mut EntityLog) {
+    stream.log_static(WORLD, &ViewCoordinates::RIGHT_HAND_Z_UP());
     draw_site(run, stream);
     let mut mover = Mover::new(VEHICLE.to_owned());
     for time_s in run.tracks.frames() {
@@ -72,25 +72,25 @@ pub(super) fn draw(run: &Run, stream: &mut Stream) {
     if let Some(vehicle) = run.vehicle {
         let parts = vehicle.parts.iter().map(|part| &part.placed);
         fix_shapes(stream, &format!("{VEHICLE}/body"), parts, Look::Drawn);
-        stream.fix(BASE, &transform(vehicle.vehicle_from_base.isometry()));
+        stream.log_static(BASE, &transform(vehicle.vehicle_from_base.isometry()));
     }
     draw_tags(run, stream);
 }
 
-fn draw_site(run: &Run, stream: &mut Stream) {
+fn draw_site(run: &ReplayScene, stream: &mut EntityLog) {
     let Some(scene) = run.scene else { return };
     if let Some(z_m) = scene.seafloor_z_m {
         let half_m = [SEAFLOOR_HALF_M as f32, SEAFLOOR_HALF_M as f32, 0.02];
         let floor = Boxes3D::from_centers_and_half_sizes([[0.0, 0.0, z_m as f32 - half_m[2]]], [half_m]);
         let floor = floor.with_colors([colors::SEAFLOOR]).with_fill_mode(FillMode::Solid);
-        stream.fix(&format!("{WORLD}/seafloor"), &floor);
+        stream.log_static(&format!("{WORLD}/seafloor"), &floor);
     }
     let obstacles = scene.obstacles.iter().map(|part| &part.placed);
     fix_shapes(stream, &format!("{WORLD}/obstacles"), obstacles, Look::Drawn);
 }
 
 /// Each tag as a white plate with a black square and a white middle; the base tag's plate is blue.
-fn draw_tags(run: &Run, stream: &mut Stream) {
+fn draw_tags(run: &ReplayScene, stream: &mut EntityLog) {
     let tags = &run.robot.tags;
     if tags.is_empty() {
         return;
@@ -110,11 +110,11 @@ fn draw_tags(run: &Run, stream: &mut Stream) {
         }
     }
     let plates = Boxes3D::from_centers_and_half_sizes(centers, sizes).with_quaternions(turns);
-    stream.fix(&format!("{BASE}/tags"), &plates.with_colors(shades).with_fill_mode(FillMode::Solid));
+    stream.log_static(&format!("{BASE}/tags"), &plates.with_colors(shades).with_fill_mode(FillMode::Solid));
     let label = |tag: &SurveyedTag| {
         if tag.id == run.robot.base_tag { format!("base tag {}", tag.id) } else { format!("tag {}", tag.id) }
     };
     let anchors = tags.iter().map(|tag| vector(&tag.base_from_tag.origin().vector()));
     let anchors = Points3D::new(anchors).with_radii([0.004]).with_labels(tags.iter().map(label));
-    stream.fix(&format!("{BASE}/tags/ids"), &anchors.with_show_labels(true).with_colors([[225, 225, 225, 255]]));
+    stream.log_static(&format!("{BASE}/tags/ids"), &anchors.with_show_labels(true).with_colors([[225, 225, 225, 255]]));
 }

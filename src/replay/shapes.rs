@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use rerun::{Boxes3D, Capsules3D, Cylinders3D, Ellipsoids3D, FillMode, Mesh3D, Transform3D};
 
 use super::colors::Rgba;
-use super::rrd::Stream;
+use super::rrd::EntityLog;
 use armcal_core::robot::{Hull, PlacedShape, Shape};
 
 /// How a body looks.
@@ -50,7 +50,7 @@ impl Batch {
 
 /// Draws shapes, fixed in the frame of `entity`, under it.
 pub(super) fn fix_shapes<'a>(
-    stream: &mut Stream,
+    stream: &mut EntityLog,
     entity: &str,
     shapes: impl IntoIterator<Item = &'a PlacedShape>,
     look: Look,
@@ -66,7 +66,7 @@ pub(super) fn fix_shapes<'a>(
         let place = placed.owner_from_shape;
         match placed.shape {
             Shape::Hull(ref hull) => {
-                stream.fix(&format!("{entity}/hulls/{n_hulls}"), &mesh(hull, &place, color));
+                stream.log_static(&format!("{entity}/hulls/{n_hulls}"), &mesh(hull, &place, color));
                 n_hulls += 1;
             }
             Shape::Box { size_m } => boxes.push(size_m.map(|v| 0.5 * v), place, color),
@@ -86,21 +86,21 @@ pub(super) fn fix_shapes<'a>(
     if !boxes.sizes.is_empty() {
         let shown = Boxes3D::from_centers_and_half_sizes(boxes.centers(), boxes.sizes.iter().copied());
         let shown = shown.with_quaternions(boxes.turns()).with_colors(boxes.colors).with_fill_mode(fill);
-        stream.fix(&format!("{entity}/boxes"), &shown);
+        stream.log_static(&format!("{entity}/boxes"), &shown);
     }
     if !cylinders.sizes.is_empty() {
         let shown = Cylinders3D::from_lengths_and_radii(cylinders.lengths(), cylinders.radii());
         let shown = shown.with_centers(cylinders.centers()).with_quaternions(cylinders.turns());
-        stream.fix(&format!("{entity}/cylinders"), &shown.with_colors(cylinders.colors).with_fill_mode(fill));
+        stream.log_static(&format!("{entity}/cylinders"), &shown.with_colors(cylinders.colors).with_fill_mode(fill));
     }
     if !capsules.sizes.is_empty() {
         let shown = Capsules3D::from_lengths_and_radii(capsules.lengths(), capsules.radii());
         let shown = shown.with_translations(capsules.centers()).with_quaternions(capsules.turns());
-        stream.fix(&format!("{entity}/capsules"), &shown.with_colors(capsules.colors).with_fill_mode(fill));
+        stream.log_static(&format!("{entity}/capsules"), &shown.with_colors(capsules.colors).with_fill_mode(fill));
     }
     if !balls.sizes.is_empty() {
         let shown = Ellipsoids3D::from_centers_and_radii(balls.centers(), balls.radii());
-        stream.fix(&format!("{entity}/balls"), &shown.with_colors(balls.colors).with_fill_mode(fill));
+        stream.log_static(&format!("{entity}/balls"), &shown.with_colors(balls.colors).with_fill_mode(fill));
     }
 }
 

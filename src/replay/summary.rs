@@ -4,23 +4,23 @@ use std::fmt::Write;
 
 use rerun::TextDocument;
 
-use super::rrd::Stream;
-use super::{ReplayInput, Run};
+use super::rrd::EntityLog;
+use super::{ReplayInput, ReplayScene};
 use armcal_core::log::Completeness;
 use armcal_core::streams::ReachAttempt;
 
 pub(super) const SUMMARY: &str = "/summary";
 
 /// Draws the page.
-pub(super) fn draw(run: &Run, input: &ReplayInput, stream: &mut Stream) {
+pub(super) fn draw(run: &ReplayScene, input: &ReplayInput, stream: &mut EntityLog) {
     let text = match input.summary_markdown {
         Some(text) => format!("{}\n\n{}", text.trim_end(), legend(run)),
         None => format!("{}\n{}", contents(run, input), legend(run)),
     };
-    stream.fix(SUMMARY, &TextDocument::from_markdown(text));
+    stream.log_static(SUMMARY, &TextDocument::from_markdown(text));
 }
 
-fn contents(run: &Run, input: &ReplayInput) -> String {
+fn contents(run: &ReplayScene, input: &ReplayInput) -> String {
     let recording = input.recording;
     let mut text = format!("# {}\n\n", run.robot.name);
     // Writing to a String cannot fail.
@@ -47,7 +47,7 @@ fn contents(run: &Run, input: &ReplayInput) -> String {
     text
 }
 
-fn legend(run: &Run) -> String {
+fn legend(run: &ReplayScene) -> String {
     let arms = if run.has_true_joints() {
         "- solid arm: where it truly is; **pink ghost**: where it believes to be\n"
     } else {

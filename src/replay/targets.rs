@@ -3,9 +3,9 @@
 use nalgebra::Vector3;
 use rerun::{LineStrips3D, Points3D};
 
-use super::Run;
+use super::ReplayScene;
 use super::colors::{self, Rgba};
-use super::rrd::Stream;
+use super::rrd::EntityLog;
 use super::scenery::BASE;
 use super::shapes::vector;
 use super::tracks::Span;
@@ -26,7 +26,7 @@ pub(super) struct Arrival {
     pub hit: bool,
 }
 
-impl Run<'_> {
+impl ReplayScene<'_> {
     /// The arrivals in the order of time; none without truth.
     pub(super) fn arrivals(&self) -> Vec<Arrival> {
         let mut arrivals: Vec<Arrival> = self.tracks.marks.iter().filter_map(|mark| self.arrival(mark)).collect();
@@ -48,9 +48,9 @@ impl Run<'_> {
 }
 
 /// Draws the targets and what became of them.
-pub(super) fn draw(run: &Run, stream: &mut Stream) {
+pub(super) fn draw(run: &ReplayScene, stream: &mut EntityLog) {
     let Some((since_s, task)) = run.tracks.task else { return };
-    let mut board = Board::new(task);
+    let mut board = TargetMarkers::new(task);
     board.draw_targets(stream, since_s);
     for arrival in run.arrivals() {
         board.note(arrival);
@@ -62,13 +62,13 @@ pub(super) fn draw(run: &Run, stream: &mut Stream) {
 }
 
 /// What is known of each target so far.
-struct Board<'a> {
+struct TargetMarkers<'a> {
     task: &'a ReachTask,
     latest: Vec<Option<Arrival>>,
     all: Vec<Arrival>,
 }
 
-impl<'a> Board<'a> {
+impl<'a> TargetMarkers<'a> {
     fn new(task: &'a ReachTask) -> Self {
         Self { task, latest: vec![None; task.targets_m.len()], all: Vec::new() }
     }
@@ -78,7 +78,7 @@ impl<'a> Board<'a> {
         self.all.push(arrival);
     }
 
-    fn draw_targets(&self, stream: &mut Stream, time_s: f64) {
+    fn draw_targets(&self, stream: &mut EntityLog, time_s: f64) {
         let positions = self.task.targets_m.iter().map(|target| target.map(|v| v as f32));
         let shades = self.latest.iter().map(|latest| latest.map_or(colors::TARGET, verdict_color));
         let labels = self.latest.iter().enumerate().map(|(n, latest)| match latest {
@@ -103,7 +103,7 @@ impl<'a> Board<'a> {
     }
 
     /// Lines from the targets to where the tool came to rest, with a ball there.
-    fn draw_rests(&self, stream: &mut Stream, time_s: f64, attempt: ReachAttempt) {
+    fn draw_rests(&self, stream: &mut EntityLog, time_s: f64, attempt: ReachAttempt) {
         let shown: Vec<&Arrival> = self.all.iter().filter(|arrival| arrival.attempt == attempt).collect();
         if shown.is_empty() {
             return;

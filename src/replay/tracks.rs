@@ -27,17 +27,17 @@ const FRAME_HZ: f64 = 25.0;
 
 /// Values over time, s, ascending.
 #[derive(Clone, Debug)]
-pub(super) struct Track<T> {
+pub(super) struct TimeSeries<T> {
     samples: Vec<(f64, T)>,
 }
 
-impl<T> Default for Track<T> {
+impl<T> Default for TimeSeries<T> {
     fn default() -> Self {
         Self { samples: Vec::new() }
     }
 }
 
-impl<T> Track<T> {
+impl<T> TimeSeries<T> {
     /// Keeps a sample unless it follows the last one too closely or comes before it.
     pub fn push(&mut self, time_s: f64, value: T) {
         if self.samples.last().is_none_or(|(last_s, _)| time_s - last_s >= MIN_SPACING_S) {
@@ -91,13 +91,13 @@ pub(super) struct Span {
 pub(super) struct Tracks<'a> {
     start: Stamp,
     pub duration_s: f64,
-    pub believed: Track<JointAngles>,
-    pub counts: Track<JointCounts>,
-    pub attitude: Track<UnitQuaternion<f64>>,
-    pub oil_c: Track<f64>,
-    pub water_c: Track<f64>,
+    pub believed: TimeSeries<JointAngles>,
+    pub counts: TimeSeries<JointCounts>,
+    pub attitude: TimeSeries<UnitQuaternion<f64>>,
+    pub oil_c: TimeSeries<f64>,
+    pub water_c: TimeSeries<f64>,
     /// Between the jaws, m.
-    pub gripper: Track<f64>,
+    pub gripper: TimeSeries<f64>,
     pub views: Vec<(f64, &'a TagDetections)>,
     /// What the detector saw and did not believe.
     pub rejects: Vec<(f64, &'a DetectionRejects)>,
@@ -122,12 +122,12 @@ impl<'a> Tracks<'a> {
         let mut tracks = Self {
             start: *start,
             duration_s,
-            believed: Track::default(),
-            counts: Track::default(),
-            attitude: Track::default(),
-            oil_c: Track::default(),
-            water_c: Track::default(),
-            gripper: Track::default(),
+            believed: TimeSeries::default(),
+            counts: TimeSeries::default(),
+            attitude: TimeSeries::default(),
+            oil_c: TimeSeries::default(),
+            water_c: TimeSeries::default(),
+            gripper: TimeSeries::default(),
             views: Vec::new(),
             rejects: Vec::new(),
             images: Vec::new(),

@@ -6,7 +6,7 @@ use nalgebra::Isometry3;
 use serde::Deserialize;
 
 use super::error::ReplayError;
-use super::tracks::{Track, Tracks, blend_angles, blend_poses};
+use super::tracks::{TimeSeries, Tracks, blend_angles, blend_poses};
 use armcal_core::log::{CdrError, RawMessage, decode, for_each_raw, ros};
 use armcal_core::robot::Robot;
 use armcal_core::spatial::{Base, Frame, Pose, Tool, Vehicle, World};
@@ -21,9 +21,9 @@ const FAULTS: &str = "/truth/faults";
 /// What was true; any track may be empty.
 #[derive(Default)]
 pub(super) struct Truth {
-    joints: Track<JointAngles>,
-    world_from_vehicle: Track<Isometry3<f64>>,
-    base_from_tool: Track<Isometry3<f64>>,
+    joints: TimeSeries<JointAngles>,
+    world_from_vehicle: TimeSeries<Isometry3<f64>>,
+    base_from_tool: TimeSeries<Isometry3<f64>>,
     /// What broke, each with its time, s.
     pub faults: Vec<(f64, String)>,
 }

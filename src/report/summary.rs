@@ -66,8 +66,8 @@ pub struct CaptureSummary {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub renewals: Vec<RenewalSummary>,
     /// Why there were no more views.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub ended: Option<String>,
+    #[serde(default, alias = "ended", skip_serializing_if = "Option::is_none")]
+    pub stop_reason: Option<String>,
 }
 
 /// Displacement of the links' ends from where they are believed to be.
@@ -275,7 +275,7 @@ impl RunSummary {
                 min_clearance_m: None,
                 margins: None,
                 renewals: Vec::new(),
-                ended: None,
+                stop_reason: None,
             },
             calibration: CalibrationSummary {
                 outcome: calibration.fit.outcome.clone(),

@@ -4,7 +4,7 @@ use comfy_table::presets::UTF8_FULL_CONDENSED;
 use comfy_table::{CellAlignment, Table};
 
 use super::summary::{AssertSummary, GainChange, ReachScore, RenewalSummary, RunSummary, ScoreSide};
-use armcal_belief::calib::{CameraMount, FailedJointTable, Known, MapResult, PriorTable, Status};
+use armcal_belief::calib::{CameraMount, FailedJointTable, MapResult, PriorTable, Status, SurveyCoverage};
 use armcal_core::stats::Summary;
 
 /// Lays a summary out for a terminal.
@@ -148,7 +148,7 @@ pub(super) fn check_lines(summary: &RunSummary) -> Vec<String> {
         let reasons = capture.rejected_by_reason.iter().map(|(why, n)| format!("{n} {}", why.replace('_', " ")));
         lines.push(format!("rejected     {}", reasons.collect::<Vec<_>>().join(", ")));
     }
-    lines.extend(capture.ended.as_ref().map(|why| enough_line(why, &capture.renewals)));
+    lines.extend(capture.stop_reason.as_ref().map(|why| enough_line(why, &capture.renewals)));
     lines.extend(summary.calibration.largest_gain_change.as_ref().map(gain_line));
     lines.extend(summary.calibration.camera_mount.as_ref().map(mount_line));
     lines.extend(summary.calibration.failed_joint.iter().map(failed_line));
@@ -241,8 +241,8 @@ fn prior_line(prior: &PriorTable) -> String {
 
 fn map_lines(map: &MapResult) -> Vec<String> {
     let known = match map.known {
-        Known::Partly => "some of it surveyed",
-        Known::BaseTagAlone => "nothing surveyed but the base tag",
+        SurveyCoverage::Partly => "some of it surveyed",
+        SurveyCoverage::BaseTagAlone => "nothing surveyed but the base tag",
     };
     let worst_m = map.tag.iter().flat_map(|tag| tag.position_std_m).fold(0.0, f64::max);
     let mut lines = vec![format!(

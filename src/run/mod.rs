@@ -21,7 +21,7 @@ use crate::report::markdown;
 use crate::report::{AssertSummary, RenewalSummary, RunSummary, html};
 use crate::score::{ScoreInput, score};
 use armcal_belief::calib::Calibration;
-use armcal_belief::session::{self, AssertResult, Outcome, Progress, Recorder, Renewal, Setup};
+use armcal_belief::session::{self, AssertResult, EstimateUpdate, Outcome, Progress, Recorder, SessionInputs};
 use armcal_core::log::{Recording, RecordingHeader, RecordingWriter, read_recording};
 use armcal_core::robot::{Robot, Vehicle};
 use armcal_core::routine::{self, Overrides, Routine};
@@ -111,7 +111,8 @@ impl Run<'_> {
     fn drive(&self, progress: &mut dyn Progress) -> Result<(Outcome, Recorder), Failure> {
         let inputs = self.inputs;
         let (mut world, mut recorder) = self.open().map_err(Failure::at(Stage::World))?;
-        let setup = Setup { robot: &inputs.robot, vehicle: &inputs.vehicle, routine: &inputs.routine, seed: self.seed };
+        let setup =
+            SessionInputs { robot: &inputs.robot, vehicle: &inputs.vehicle, routine: &inputs.routine, seed: self.seed };
         let result = session::run(&setup, &mut world, &mut recorder, progress);
         let finished = world.finish_truth();
         match result {
@@ -208,7 +209,7 @@ impl Run<'_> {
         summary.capture.min_clearance_m = scored.min_clearance_m;
         summary.capture.margins = scored.margins;
         summary.capture.renewals = outcome.renewals.iter().map(renewal_summary).collect();
-        summary.capture.ended.clone_from(&outcome.capture_ended);
+        summary.capture.stop_reason.clone_from(&outcome.capture_ended);
         summary.score = Some(scored.score);
         Ok(summary)
     }
@@ -242,8 +243,8 @@ impl Run<'_> {
     }
 }
 
-fn renewal_summary(renewal: &Renewal) -> RenewalSummary {
-    let Renewal { views, elapsed_s, expected_tool_error_m, .. } = *renewal;
+fn renewal_summary(renewal: &EstimateUpdate) -> RenewalSummary {
+    let EstimateUpdate { views, elapsed_s, expected_tool_error_m, .. } = *renewal;
     RenewalSummary { views, elapsed_s, predicted_tool_error_m: expected_tool_error_m }
 }
 

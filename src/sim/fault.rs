@@ -76,12 +76,12 @@ impl From<Fault> for ScheduledFault {
 
 /// A blow to the vehicle, in vehicle axes about the vehicle's origin.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Knock {
+pub(super) struct Impulse {
     pub impulse_n_s: [f64; 3],
     pub angular_impulse_n_m_s: [f64; 3],
 }
 
-impl Knock {
+impl Impulse {
     /// Of a force at a point; short against the vehicle's motion, so that only its impulse counts.
     pub(super) fn new(force_n: [f64; 3], duration_s: f64, at_m: [f64; 3]) -> Self {
         let impulse_n_s = force_n.map(|force| force * duration_s);
@@ -298,7 +298,7 @@ mod tests {
 
     #[test]
     fn a_blow_beside_the_origin_turns_the_vehicle() {
-        let knock = Knock::new([0.0, 100.0, 0.0], 0.5, [2.0, 0.0, 0.0]);
+        let knock = Impulse::new([0.0, 100.0, 0.0], 0.5, [2.0, 0.0, 0.0]);
         assert_eq!(knock.impulse_n_s, [0.0, 50.0, 0.0]);
         assert_eq!(knock.angular_impulse_n_m_s, [0.0, 0.0, 100.0]);
     }

@@ -34,9 +34,10 @@ pub use as_built::{
 };
 pub use error::SimError;
 pub use fault::{Fault, ScheduledFault};
-pub use recorded::{RecordedMotion, VehicleJet};
+pub use recorded::{RecordedMotion, VehicleKinematics};
 pub use spec::{
     CameraMode, CameraWorldSpec, ClockSpec, HydraulicsSpec, ImageSpec, JointSensorsSpec, MotionKind, PhysicsSpec,
-    Points, PortKind, TagsSpec, TemperatureSpec, Undrawn, VehicleMotionSpec, WaterKind, WaterSpec, WorldSpec,
+    Points, PortKind, TagsSpec, TemperatureSpec, UnmodelledObstacles, VehicleMotionSpec, WaterKind, WaterSpec,
+    WorldSpec,
 };
 pub use world::{World, WorldInput};

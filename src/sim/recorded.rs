@@ -21,7 +21,7 @@ use table::{Header, Sample};
 
 /// Where a vehicle is and how it moves at one instant.
 #[derive(Clone, Copy, Debug)]
-pub struct VehicleJet {
+pub struct VehicleKinematics {
     /// Of the vehicle's origin in the world, m.
     pub position: Vector3<f64>,
     /// World axes, m/s.
@@ -108,7 +108,7 @@ impl RecordedMotion {
 
     /// The state `t_s` seconds after the first sample. Before it the vehicle is where the first sample has it.
     #[must_use]
-    pub fn at(&self, t_s: f64) -> VehicleJet {
+    pub fn at(&self, t_s: f64) -> VehicleKinematics {
         self.jet(&self.played(t_s))
     }
 
@@ -137,7 +137,7 @@ impl RecordedMotion {
         ]
     }
 
-    fn jet(&self, &[at_s, speed, change]: &[f64; 3]) -> VehicleJet {
+    fn jet(&self, &[at_s, speed, change]: &[f64; 3]) -> VehicleKinematics {
         let [value, first, second] = self.spline.at(at_s);
         // The chain rule: the recording plays at `speed`.
         let first_in_run = first.map(|v| v * speed);
@@ -150,7 +150,7 @@ impl RecordedMotion {
         let n2 = q.norm_squared();
         let rate = (q.conjugate() * dq).imag() * (2.0 / n2);
         let angular_acceleration = ((q.conjugate() * ddq).imag() - rate * q.dot(&dq)) * (2.0 / n2);
-        VehicleJet {
+        VehicleKinematics {
             position: part(&value),
             velocity: part(&first_in_run),
             acceleration: part(&second_in_run),

@@ -30,7 +30,7 @@ pub struct EdgeRow {
     pub longest_step_rad: f64,
     pub is_certified: bool,
     /// Share of the way of an arm that is too near; `None`: the scan found none.
-    pub too_near_at: Option<f64>,
+    pub violation_at: Option<f64>,
 }
 
 /// Rows in the order of the edges, and the time of each certificate by the caller's clock, s.
@@ -72,13 +72,13 @@ pub fn edge_study(
     let mut certified = Vec::with_capacity(edges.len());
     for [from, to] in edges {
         let start_s = clock();
-        certified.push(clearance.too_near_exactly(from, to, margin_m).is_none());
+        certified.push(clearance.find_violation_exact(from, to, margin_m).is_none());
         certify_s.push(clock() - start_s);
     }
     let judged = edges.par_iter().zip(&certified).map(|(edge, &is_certified)| EdgeRow {
         longest_step_rad: edge[0].max_abs_difference(&edge[1]),
         is_certified,
-        too_near_at: scan(clearance, edge, margin_m, is_certified),
+        violation_at: scan(clearance, edge, margin_m, is_certified),
     });
     EdgeStudy { arm: robot.name.clone(), rows: judged.collect(), certify_s }
 }
@@ -93,7 +93,7 @@ pub fn mean_time_under_s(
     clock: &dyn Fn() -> f64,
 ) -> f64 {
     let keeps_clear = |&[from, to]: &Edge| {
-        clearance.too_near_along(&armcal_belief::plan::Edge::at_full_speed(from, to), bounds, margin_m).is_none()
+        clearance.find_violation_along(&armcal_belief::plan::Edge::at_full_speed(from, to), bounds, margin_m).is_none()
     };
     let start_s = clock();
     let n_free = edges.iter().filter(|edge| keeps_clear(edge)).count();
@@ -122,13 +122,13 @@ impl EdgeStudy {
     /// Edges called free on which an arm is too near.
     #[must_use]
     pub fn n_missed(&self) -> usize {
-        self.count(|row| row.is_certified && row.too_near_at.is_some())
+        self.count(|row| row.is_certified && row.violation_at.is_some())
     }
 
     /// Edges called blocked on which the scan finds no arm too near.
     #[must_use]
     pub fn n_refused_though_free(&self) -> usize {
-        self.count(|row| !row.is_certified && row.too_near_at.is_none())
+        self.count(|row| !row.is_certified && row.violation_at.is_none())
     }
 
     #[must_use]
@@ -171,8 +171,8 @@ pub fn edges_csv(studies: &[EdgeStudy]) -> String {
     let word = |is_free: bool| if is_free { "free" } else { "blocked" };
     for study in studies {
         for (k, row) in study.rows.iter().enumerate() {
-            let at = row.too_near_at.map_or_else(String::new, |share| format!("{share:.6}"));
-            let (certified, scanned) = (word(row.is_certified), word(row.too_near_at.is_none()));
+            let at = row.violation_at.map_or_else(String::new, |share| format!("{share:.6}"));
+            let (certified, scanned) = (word(row.is_certified), word(row.violation_at.is_none()));
             text += &format!("{},{k},{:.6},{certified},{scanned},{at}\n", study.arm, row.longest_step_rad);
         }
     }
@@ -184,7 +184,7 @@ pub fn edges_csv(studies: &[EdgeStudy]) -> String {
 pub fn edges_json(edges: &[Edge], study: &EdgeStudy) -> Vec<Value> {
     let edge = |(([from, to], row), certify_s): ((&Edge, &EdgeRow), &f64)| {
         json!({ "from_rad": from.to_vec(), "to_rad": to.to_vec(), "certified_free": row.is_certified,
-                "scanned_free": row.too_near_at.is_none(), "certify_us": 1e6 * certify_s })
+                "scanned_free": row.violation_at.is_none(), "certify_us": 1e6 * certify_s })
     };
     edges.iter().zip(&study.rows).zip(&study.certify_s).map(edge).collect()
 }

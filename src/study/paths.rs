@@ -83,10 +83,10 @@ impl PathSite {
                 for sensor in &mut calibrated.sensors {
                     (sensor.gain_bound, sensor.offset_bound_rad) = (0.004, 0.014);
                 }
-                (site, JointErrorBounds::prior(&calibrated))
+                (site, JointErrorBounds::datasheet(&calibrated))
             }
             Belief::Datasheet => {
-                let bounds = JointErrorBounds::prior(&site.robot);
+                let bounds = JointErrorBounds::datasheet(&site.robot);
                 (site, bounds)
             }
         }
@@ -199,7 +199,7 @@ pub fn problem_json(site: &PathSite, queries: &[Value], margin_m: f64) -> Value 
     json!({
         "site": site.name, "arm": robot.name, "margin_m": margin_m,
         // Links against links need less: they neither sway nor are surveyed. Neighbours are not tested.
-        "self_margin_m": margin_m - armcal_belief::plan::SELF_EASE_M,
+        "self_margin_m": margin_m - armcal_belief::plan::SELF_MARGIN_REDUCTION_M,
         "seafloor_z_m": site.scene.seafloor_z_m, "base_from_world": place(&base_from_vehicle),
         "joints": joints.collect::<Vec<_>>(), "bodies": bodies.collect::<Vec<_>>(),
         "standing": standing.map(|part| shape(&part.placed, &base_from_vehicle)).collect::<Vec<_>>(),

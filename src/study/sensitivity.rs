@@ -9,7 +9,7 @@ use nalgebra::Point3;
 use rand::RngExt;
 
 use super::charts::{Axis, Panel, Series, Style, svg};
-use armcal_belief::calib::{JointParameters, Measured, PositionMethod, PositionProblem, TagView, View};
+use armcal_belief::calib::{JointParameters, PositionMethod, PositionProblem, TagMeasurement, TagObservation, View};
 use armcal_belief::plan::{ClearanceModel, VisibilityModel};
 use armcal_core::joints::JointAngles;
 use armcal_core::robot::Robot;
@@ -114,7 +114,7 @@ fn views(
         let tag = |&tag_idx: &usize| {
             let tag = &robot.tags[tag_idx];
             let place = camera_from_base * Point3::from(tag.base_from_tag.origin().vector());
-            TagView { id: tag.id, tag_idx, center_in_camera_m: place.coords, measured: Measured::Position }
+            TagObservation { id: tag.id, tag_idx, center_in_camera_m: place.coords, measured: TagMeasurement::Position }
         };
         let travel_rad = JointAngles::from_fn(robot.n_joints(), |j| angles[j] - robot.sensors[j].center_rad);
         let tags = seen.iter().map(tag).collect();

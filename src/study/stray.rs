@@ -4,7 +4,7 @@
 //! joint: what is left over is what the joints lag, droop and overshoot each in its own way, which planning bounds by
 //! robot.toml's `[motion]` (`plan::Stray`).
 
-use armcal_belief::plan::{Edge as Motion, Stray, Timing};
+use armcal_belief::plan::{Edge as Motion, Timing, TrackingErrorBound};
 use armcal_core::robot::Robot;
 use armcal_core::sensor::ArmSensors;
 use armcal_core::streams::{JointAngles, Message};
@@ -143,7 +143,8 @@ impl StrayStudy {
         let duration_s = edge.end.since_s(edge.start);
         // Set-points begin and end with a rest of a period or so, by which the edge seems quicker than it was.
         let slowness = f64::max(duration_s / timing.least_duration_s(&edge.from, &edge.to), 1.0);
-        let stray = Stray::new(robot, &timing, &Motion { from: edge.from, to: edge.to, slowness });
+        let stray =
+            TrackingErrorBound::new(robot, &timing, &Motion { from: edge.from, to: edge.to, time_scale: slowness });
         let u = (stamp.since_s(edge.start) / duration_s).clamp(0.0, 1.0);
         let mut is_beyond = false;
         for (joint, found) in self.joints.iter_mut().enumerate() {
@@ -151,8 +152,9 @@ impl StrayStudy {
             let noise_rad = NOISE_SIGMAS * sensor.noise_std_counts / sensor.counts_per_rad.abs();
             let signed_rad = reading[joint] - on_line[joint];
             let off_rad = (signed_rad.abs() - noise_rad).max(0.0);
-            let off_middle_rad =
-                |stray: &Stray| ((signed_rad - share * stray.middle_rad(joint)).abs() - noise_rad).max(0.0);
+            let off_middle_rad = |stray: &TrackingErrorBound| {
+                ((signed_rad - share * stray.middle_rad(joint)).abs() - noise_rad).max(0.0)
+            };
             let rate_rad_s = 6.0 * u * (1.0 - u) * (edge.to[joint] - edge.from[joint]).abs() / duration_s;
             let peak_rad_s = 1.5 * (edge.to[joint] - edge.from[joint]).abs() / duration_s;
             found.most_rad = found.most_rad.max(off_rad);

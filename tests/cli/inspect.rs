@@ -63,7 +63,7 @@ fn the_parameters_named_are_those_that_calibrate_estimates() {
     let inspection = look(&sample(), Some(&titan())).expect("it reads");
     let file = root().join("recordings/sample/calibration.toml");
     let calibration = armcal::calib::Calibration::read(&file).expect("it reads");
-    assert_eq!(inspection.determined.expect("a robot").parameters, calibration.covariance.parameters);
+    assert_eq!(inspection.observable.expect("a robot").parameters, calibration.covariance.parameters);
 }
 
 #[test]
@@ -310,7 +310,7 @@ fn inspect_says_beforehand_whether_calibrate_will_work() {
     let mut both = [0, 0];
     for percent in [20, 45, 60, 75, 90] {
         fs::write(&path, &bytes[..bytes.len() * percent / 100]).expect("written");
-        let determined = look(&path, Some(&titan())).expect("it reads").determined.expect("a robot");
+        let determined = look(&path, Some(&titan())).expect("it reads").observable.expect("a robot");
         let code = calibrate(&path, &robot_folder(), &folder.path().join("out")).code;
         let is_enough = determined.missing.is_empty();
         both[usize::from(is_enough)] += 1;

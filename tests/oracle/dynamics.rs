@@ -2,7 +2,7 @@
 
 use armcal::robot::Robot;
 use armcal::sim::dynamics::{
-    BaseCoupling, Body, Coordinates, Equations, Force, Inertia, MAX_DOF, Motion, Multibody, Surroundings,
+    BaseCoupling, Body, Coordinates, Environment, Equations, Force, Inertia, MAX_DOF, Motion, Multibody,
 };
 use armcal::streams::{JointAngles, MAX_JOINTS};
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
@@ -142,10 +142,10 @@ impl BaseState {
         Motion::new(self.base_angular_velocity.into(), self.base_linear_velocity.into())
     }
 
-    fn surroundings(&self, gravity_m_s2: f64) -> Surroundings {
-        let still = Surroundings::still(gravity_m_s2);
+    fn surroundings(&self, gravity_m_s2: f64) -> Environment {
+        let still = Environment::still(gravity_m_s2);
         let gravity = self.rotation().inverse() * still.gravity;
-        Surroundings { gravity, base_velocity: self.velocity(), ..still }
+        Environment { gravity, base_velocity: self.velocity(), ..still }
     }
 }
 
@@ -209,7 +209,7 @@ pub(super) fn equations(
     arm: &Multibody,
     q: &[f64],
     qd: &[f64],
-    around: &Surroundings,
+    around: &Environment,
     base: &BaseCoupling,
 ) -> Equations {
     arm.equations(&of(q), &of(qd), around, base, &[Force::zero(); MAX_JOINTS + 1])
@@ -274,7 +274,7 @@ pub(super) fn report(robot: &Robot, what: &str, differences: impl Iterator<Item 
 fn accelerations_are_those_of_pinocchio_and_mujoco() {
     for (robot, file) in arms::<Dynamics>() {
         let arm = Multibody::new(robot.chain.clone(), dry(&robot, None));
-        let around = Surroundings::still(file.gravity_m_s2);
+        let around = Environment::still(file.gravity_m_s2);
         assert_eq!(file.accelerations.cases.len(), 100);
         let found =
             |case: &AccelerationCase| accelerations(&equations(&arm, &case.q, &case.qd, &around, &AT_REST), &case.tau);
@@ -293,7 +293,7 @@ fn accelerations_are_those_of_pinocchio_and_mujoco() {
 fn the_joint_space_inertia_is_that_of_pinocchio() {
     for (robot, file) in arms::<Dynamics>() {
         let arm = Multibody::new(robot.chain.clone(), dry(&robot, None));
-        let around = Surroundings::still(file.gravity_m_s2);
+        let around = Environment::still(file.gravity_m_s2);
         let worst = file.mass_matrices.cases.iter().map(|case| {
             let n = case.q.len();
             let found = equations(&arm, &case.q, &vec![0.0; n], &around, &AT_REST).inertia;
@@ -329,7 +329,7 @@ fn torques_on_a_moving_base_are_those_of_pinocchios_free_flyer() {
     }
 }
 
-fn flying_difference(arm: &Multibody, case: &FlyingCase, around: &Surroundings) -> f64 {
+fn flying_difference(arm: &Multibody, case: &FlyingCase, around: &Environment) -> f64 {
     let found = accelerations(&equations(arm, &case.q, &case.qd, around, &BaseCoupling::Free), &case.tau);
     off(&found, &joined(&case.acceleration.spatial(), &case.qdd))
 }
@@ -351,7 +351,7 @@ fn added_mass_moves_as_kirchhoffs_equations_on_pinocchios_jacobians_say() {
         let wet = &file.added_mass;
         let fixed = in_water(&robot, wet, None);
         let free = in_water(&robot, wet, Some(&wet.vehicle));
-        let still = Surroundings::still(file.gravity_m_s2);
+        let still = Environment::still(file.gravity_m_s2);
         assert!(wet.cases.len() >= 20);
         let on_fixed = wet.cases.iter().map(|case| {
             let found =
@@ -375,12 +375,12 @@ fn moving_water_carries_added_mass_as_a_frame_that_moves_with_it_says() {
         let (mut held, mut free) = (Vec::new(), Vec::new());
         for case in &wet.cases {
             let to_base = case.free.base.rotation().inverse();
-            let around = Surroundings {
+            let around = Environment {
                 water_velocity: to_base * Vector3::from(case.water_velocity_m_s),
                 water_acceleration: to_base * Vector3::from(case.water_acceleration_m_s2),
                 ..case.free.base.surroundings(file.gravity_m_s2)
             };
-            let at_rest = Surroundings { base_velocity: Motion::zero(), ..around };
+            let at_rest = Environment { base_velocity: Motion::zero(), ..around };
             let found = equations(&arm, &case.free.q, &case.free.qd, &at_rest, &AT_REST);
             held.push(off(&accelerations(&found, &case.free.tau), &case.qdd_held_base));
             free.push(flying_difference(&arm, &case.free, &around));

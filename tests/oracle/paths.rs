@@ -2,7 +2,7 @@
 //!
 //! The equations of motion are integrated here by Runge-Kutta 4, so that no step of the world's own can be to blame.
 
-use armcal::sim::dynamics::{BaseCoupling, Motion, Multibody, Surroundings};
+use armcal::sim::dynamics::{BaseCoupling, Environment, Motion, Multibody};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use serde::Deserialize;
 
@@ -107,7 +107,7 @@ fn joint_path(samples: &[JointSample], forward: impl Fn(f64, &[f64], &[f64]) -> 
 fn an_arm_falls_as_pinocchio_and_dop853_have_it() {
     for (robot, file) in arms::<Paths>() {
         let arm = Multibody::new(robot.chain.clone(), dry(&robot, None));
-        let around = Surroundings::still(file.gravity_m_s2);
+        let around = Environment::still(file.gravity_m_s2);
         let damping = file.falling.damping_n_m_s_rad;
         let forward = |_: f64, q: &[f64], qd: &[f64]| {
             let tau: Vec<f64> = qd.iter().map(|rate| -damping * rate).collect();
@@ -125,8 +125,8 @@ fn jet(axis: &[[f64; 3]], t: f64) -> [f64; 3] {
     })
 }
 
-/// Surroundings and acceleration of the base that moves as the file says.
-pub(super) fn shaken_base(motion: &[Vec<[f64; 3]>], t: f64, gravity_m_s2: f64) -> (Surroundings, BaseCoupling) {
+/// Environment and acceleration of the base that moves as the file says.
+pub(super) fn shaken_base(motion: &[Vec<[f64; 3]>], t: f64, gravity_m_s2: f64) -> (Environment, BaseCoupling) {
     let jets: Vec<[f64; 3]> = motion.iter().map(|axis| jet(axis, t)).collect();
     let part = |order: usize| Vector3::new(jets[0][order], jets[1][order], jets[2][order]);
     let ([r, dr, ddr], [p, dp, ddp], [y, dy, ddy]) = (jets[3], jets[4], jets[5]);
@@ -139,8 +139,8 @@ pub(super) fn shaken_base(motion: &[Vec<[f64; 3]>], t: f64, gravity_m_s2: f64) -
         -ddp * sr - dp * dr * cr + ddy * cr * cp - dy * (dr * sr * cp + dp * cr * sp),
     );
     let velocity = Motion::new(rate, to_base * part(1));
-    let still = Surroundings::still(gravity_m_s2);
-    let around = Surroundings { gravity: to_base * still.gravity, base_velocity: velocity, ..still };
+    let still = Environment::still(gravity_m_s2);
+    let around = Environment { gravity: to_base * still.gravity, base_velocity: velocity, ..still };
     (around, BaseCoupling::Prescribed(Motion::new(slope, to_base * part(2) - rate.cross(&velocity.linear))))
 }
 
@@ -185,7 +185,7 @@ fn flown(state: &[f64]) -> Flown {
 
 fn flight_slope(arm: &Multibody, rocking: &Rocking, t: f64, state: &[f64]) -> Vec<f64> {
     let at = flown(state);
-    let around = Surroundings { base_velocity: at.velocity, ..Surroundings::still(0.0) };
+    let around = Environment { base_velocity: at.velocity, ..Environment::still(0.0) };
     let drive = |j: usize| {
         rocking.tau_amplitude_n_m[j] * (rocking.tau_rate_rad_s[j] * t).sin() - rocking.damping_n_m_s_rad * at.qd[j]
     };

@@ -1,7 +1,7 @@
 //! The world's own steps against the motions of `paths`: how far off they are, and that a shorter step is better by its square.
 
 use armcal::sim::dynamics::{
-    BaseCoupling, Force, JointLoad, Motion, Multibody, Stage, StepInput, Surroundings, SystemState,
+    BaseCoupling, Environment, Force, JointLoad, Motion, Multibody, Stage, StepInput, SystemState,
 };
 use armcal::streams::MAX_JOINTS;
 use nalgebra::{Isometry3, Translation3, Vector3};
@@ -19,7 +19,7 @@ struct Run<'a> {
     /// By time and joint.
     torque_n_m: &'a dyn Fn(f64, usize) -> f64,
     is_free: bool,
-    around: &'a dyn Fn(f64, &SystemState) -> (Surroundings, BaseCoupling),
+    around: &'a dyn Fn(f64, &SystemState) -> (Environment, BaseCoupling),
 }
 
 impl Run<'_> {
@@ -90,7 +90,7 @@ fn converges(what: &str, off: &[f64; 4], limit: f64) {
 fn a_fall_converges_to_pinocchios_with_the_square_of_the_step() {
     for (robot, file) in arms::<Paths>() {
         let arm = Multibody::new(robot.chain.clone(), dry(&robot, None));
-        let still = Surroundings::still(file.gravity_m_s2);
+        let still = Environment::still(file.gravity_m_s2);
         let run = Run {
             arm: &arm,
             damping_n_m_s_rad: file.falling.damping_n_m_s_rad,
@@ -130,7 +130,7 @@ fn flight_off(name: &str, arm: &Multibody, rocking: &Rocking, samples: &[FlightS
         },
         is_free: true,
         around: &|_, at| {
-            let around = Surroundings { base_velocity: at.base_velocity, ..Surroundings::still(0.0) };
+            let around = Environment { base_velocity: at.base_velocity, ..Environment::still(0.0) };
             (around, BaseCoupling::Free)
         },
     };

@@ -1,7 +1,7 @@
 //! Single bodies in water against closed forms, DOP853 and gz-sim's integration tests: `tests/oracle/make_water_golden.py`.
 
 use armcal::sim::dynamics::{
-    BaseCoupling, Body, Force, Inertia, JointLoad, Motion, Multibody, Stage, StepInput, Surface, Surroundings,
+    BaseCoupling, Body, Environment, Force, Inertia, JointLoad, Motion, Multibody, Stage, StepInput, Surface,
     SystemState,
 };
 use armcal::streams::{JointAngles, MAX_JOINTS};
@@ -143,7 +143,7 @@ impl Swim<'_> {
                     (self.flow)(if stage == Stage::Start { start_s } else { start_s + h }).map(|v| to_body * v);
                 let gravity = to_body * Vector3::new(0.0, 0.0, -self.gravity_m_s2);
                 let around =
-                    Surroundings { gravity, base_velocity: at.base_velocity, water_velocity, water_acceleration };
+                    Environment { gravity, base_velocity: at.base_velocity, water_velocity, water_acceleration };
                 (around, BaseCoupling::Free)
             };
             let loads = [JointLoad { damping_n_m_s_rad: 1.0, ..JointLoad::default() }; MAX_JOINTS];

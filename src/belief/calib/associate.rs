@@ -10,8 +10,8 @@ use std::collections::BTreeMap;
 use nalgebra::{Isometry3, Vector3};
 
 use super::frames::agreeing_mean;
-use super::methods::StopReading;
-use super::surroundings::{Slope, Surroundings};
+use super::methods::EndStopReading;
+use super::surroundings::{ConditionHistory, TravelRate};
 use armcal_core::log::Recording;
 use armcal_core::optics::{SquareError, SquarePose, solve_square};
 use armcal_core::robot::{FailedJoint, Robot};
@@ -39,9 +39,9 @@ pub struct View {
     pub is_free: [bool; MAX_JOINTS],
     /// Under which the readings were taken.
     pub conditions: Conditions,
-    pub tags: Vec<TagView>,
+    pub tags: Vec<TagObservation>,
     /// The tag on the gripper, where the robot has one and it was seen.
-    pub gripper_tag: Option<SeenCorners>,
+    pub gripper_tag: Option<MeanCorners>,
 }
 
 impl View {
@@ -65,7 +65,7 @@ impl View {
 
 /// Corners of one tag, averaged over the frames of a view.
 #[derive(Clone, Copy, Debug)]
-pub struct SeenCorners {
+pub struct MeanCorners {
     pub corners_px: [[f64; 2]; 4],
     pub n_frames: usize,
     /// Sum over frames and the eight coordinates of the squared deviation from the mean; it has `8 (n_frames - 1)` degrees of freedom.
@@ -74,9 +74,9 @@ pub struct SeenCorners {
 
 /// What a view tells of a tag or landmark.
 #[derive(Clone, Copy, Debug)]
-pub enum Measured {
+pub enum TagMeasurement {
     /// Its corners in the image.
-    Corners(SeenCorners),
+    Corners(MeanCorners),
     /// Its position in the camera frame, and no more.
     Position,
     /// `camera_from_tag`.
@@ -85,29 +85,29 @@ pub enum Measured {
 
 /// One tag in one view.
 #[derive(Clone, Copy, Debug)]
-pub struct TagView {
+pub struct TagObservation {
     pub id: u32,
     /// Index into the robot's surveyed tags.
     pub tag_idx: usize,
     /// The tag's centre in the camera frame, m.
     pub center_in_camera_m: Vector3<f64>,
-    pub measured: Measured,
+    pub measured: TagMeasurement,
 }
 
-impl TagView {
+impl TagObservation {
     /// Its corners, where the recording has them.
     #[must_use]
-    pub fn corners(&self) -> Option<&SeenCorners> {
+    pub fn corners(&self) -> Option<&MeanCorners> {
         match &self.measured {
-            Measured::Corners(seen) => Some(seen),
-            Measured::Position | Measured::Pose(_) => None,
+            TagMeasurement::Corners(seen) => Some(seen),
+            TagMeasurement::Position | TagMeasurement::Pose(_) => None,
         }
     }
 }
 
 /// Why a detection was not used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Rejection {
+pub enum ObservationRejection {
     /// The robot's survey does not know this id.
     UnknownTag,
     /// The corners are not those of a square seen from its front.
@@ -126,7 +126,7 @@ pub enum Rejection {
     Detector(RejectReason),
 }
 
-impl Rejection {
+impl ObservationRejection {
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -150,10 +150,10 @@ pub struct CaptureData {
     /// Views in which only one joint moved, by that joint; in the order of time.
     pub identify: BTreeMap<u32, Vec<View>>,
     /// Readings at nominal end stops, in the order of time.
-    pub stops: Vec<(Stamp, StopReading)>,
+    pub stops: Vec<(Stamp, EndStopReading)>,
     pub task: Option<ReachTask>,
     pub n_marks: usize,
-    pub rejected: BTreeMap<Rejection, usize>,
+    pub rejected: BTreeMap<ObservationRejection, usize>,
     pub ids_seen: Vec<u32>,
     /// Names of landmarks that are no numbered tags, by the number that stands for them.
     pub landmark_names: BTreeMap<u32, String>,
@@ -230,7 +230,7 @@ pub fn associate_within(recording: &Recording, robot: &Robot, span: Option<(Stam
     let sensors = ArmSensors::nominal(robot);
     let index = Index::new(recording);
     let (from, to) = span.unwrap_or((Stamp { nanos: i64::MIN }, Stamp { nanos: i64::MAX }));
-    let surroundings = Surroundings::heard_until(recording, to);
+    let surroundings = ConditionHistory::heard_until(recording, to);
     let recorded = recorded_survey(recording);
     for (idx, message) in recording.messages.iter().map(|(_, m)| m).enumerate() {
         match message {
@@ -264,7 +264,7 @@ pub fn associate_within(recording: &Recording, robot: &Robot, span: Option<(Stam
                     if let Some(view) = index.view(mark, 0, robot, &sensors, &mut data)
                         && let Some(&travel_rad) = view.travel_rad.get(joint)
                     {
-                        data.stops.push((mark.end, StopReading { joint, angle_rad, travel_rad }));
+                        data.stops.push((mark.end, EndStopReading { joint, angle_rad, travel_rad }));
                     }
                 }
                 _ => {}
@@ -333,7 +333,7 @@ impl<'a> Index<'a> {
     ) -> Option<View> {
         let mut travel_sum = JointAngles::zeros(robot.n_joints());
         let mut n_readings = 0usize;
-        let mut slope = Slope::over(mark);
+        let mut slope = TravelRate::over(mark);
         let mut frames: BTreeMap<u32, Vec<[[f64; 2]; 4]>> = BTreeMap::new();
         for &(_, idx) in self.span(mark) {
             match &self.messages[idx].1 {
@@ -348,7 +348,7 @@ impl<'a> Index<'a> {
                 Message::Detections(detections) => add_corners(detections, &mut frames),
                 Message::Rejects(rejects) => {
                     for reject in &rejects.rejects {
-                        *data.rejected.entry(Rejection::Detector(reject.reason)).or_default() += 1;
+                        *data.rejected.entry(ObservationRejection::Detector(reject.reason)).or_default() += 1;
                     }
                 }
                 Message::Temperature(sample) => {
@@ -364,7 +364,7 @@ impl<'a> Index<'a> {
             data.used.push(idx);
         }
         if n_readings == 0 {
-            *data.rejected.entry(Rejection::NoReadings).or_default() += frames.len().max(1);
+            *data.rejected.entry(ObservationRejection::NoReadings).or_default() += frames.len().max(1);
             return None;
         }
         let travel_rad = JointAngles::from_fn(robot.n_joints(), |j| travel_sum[j] / n_readings as f64);
@@ -374,7 +374,7 @@ impl<'a> Index<'a> {
             data.ids_seen.push(id);
             let (seen, n_apart) = agreeing_mean(&frames, robot.camera.corner_std_px);
             if n_apart > 0 {
-                *data.rejected.entry(Rejection::InconsistentFrame).or_default() += n_apart;
+                *data.rejected.entry(ObservationRejection::InconsistentFrame).or_default() += n_apart;
             }
             let Some(seen) = seen else { continue };
             let taken = match &robot.gripper_tag {
@@ -397,20 +397,20 @@ fn add_corners(detections: &TagDetections, frames: &mut BTreeMap<u32, Vec<[[f64;
     }
 }
 
-fn tag_view(robot: &Robot, id: u32, seen: &SeenCorners) -> Result<TagView, Rejection> {
-    let tag_idx = robot.tags.iter().position(|tag| tag.id == id).ok_or(Rejection::UnknownTag)?;
+fn tag_view(robot: &Robot, id: u32, seen: &MeanCorners) -> Result<TagObservation, ObservationRejection> {
+    let tag_idx = robot.tags.iter().position(|tag| tag.id == id).ok_or(ObservationRejection::UnknownTag)?;
     let solved = check_square(robot, robot.tags[tag_idx].size_m, seen)?;
     let center_in_camera_m = solved.camera_from_tag.origin().vector();
-    Ok(TagView { id, tag_idx, center_in_camera_m, measured: Measured::Corners(*seen) })
+    Ok(TagObservation { id, tag_idx, center_in_camera_m, measured: TagMeasurement::Corners(*seen) })
 }
 
 /// The tag's pose by its corners, if they are those of a square of that size.
-pub(super) fn check_square(robot: &Robot, size_m: f64, seen: &SeenCorners) -> Result<SquarePose, Rejection> {
+pub(super) fn check_square(robot: &Robot, size_m: f64, seen: &MeanCorners) -> Result<SquarePose, ObservationRejection> {
     let solved = solve_square(&robot.camera.lens, size_m, &seen.corners_px).map_err(|e| match e {
-        SquareError::OutOfView => Rejection::OutOfView,
-        SquareError::Degenerate => Rejection::NotASquare,
+        SquareError::OutOfView => ObservationRejection::OutOfView,
+        SquareError::Degenerate => ObservationRejection::NotASquare,
     })?;
-    if solved.rms_px > MAX_SQUARE_RMS_PX { Err(Rejection::NotASquare) } else { Ok(solved) }
+    if solved.rms_px > MAX_SQUARE_RMS_PX { Err(ObservationRejection::NotASquare) } else { Ok(solved) }
 }
 
 fn widen(range: &mut Option<(f64, f64)>, value: f64) {

@@ -46,7 +46,7 @@ pub(super) fn check_order(recording: &Recording) -> Result<(), CalibError> {
 const MOVED_SIGMAS: f64 = 6.0;
 
 /// The arm must have moved for its sensors to show anything.
-pub(super) fn refuse_one_pose(name: &str, data: &CaptureData, robot: &Robot) -> Result<(), CalibError> {
+pub(super) fn check_pose_variation(name: &str, data: &CaptureData, robot: &Robot) -> Result<(), CalibError> {
     let views = || data.fit.iter().chain(&data.held_out).filter(|view| !view.tags.is_empty());
     let mut most: Option<(usize, f64)> = None;
     for (joint, spec) in robot.sensors.iter().enumerate().take(robot.camera.mount.n_joints) {

@@ -1,26 +1,26 @@
 //! One calibration by `bundle`: all views fitted, the verdict by views left out in turn.
 
 use super::CalibError;
-use super::associate::{CaptureData, Rejection, View};
-use super::bundle::{BundleInput, Estimate, Evidence, Innovations, Outlier, Selection, estimate};
-use super::bundle_setup::{Setup, declared};
-use super::bundle_verdict::Judged;
+use super::associate::{CaptureData, ObservationRejection, View};
+use super::bundle::{BundleInput, Estimate, HyperparameterMode, Innovations, Outlier, Selection, estimate};
+use super::bundle_setup::{BundleSetup, declared};
+use super::bundle_verdict::VerdictInput;
 use super::camera_mount::CameraMount;
-use super::failed_joint::WithFailures;
+use super::failed_joint::FailureImpact;
 use super::identify::IdentifiedScale;
-use super::in_turn::{FOLDS, HeldOutSum, fold_of};
+use super::in_turn::{FOLDS, FoldSums, fold_of};
 use super::map::MapResult;
 use super::methods::Solution;
 use super::model_table::ModelTable;
 use super::observability::Unobservable;
 use super::problem::{Parameter, ParameterKind, PositionProblem};
-use super::result::{Calibration, HeldOutFigures, Parts, assemble};
+use super::result::{Calibration, HeldOutMetrics, Parts, assemble};
 use super::uncertainty::{ParameterCovariance, ToolErrorPrediction};
 use armcal_core::robot::{JointSensorSpec, Robot};
 use armcal_core::routine::Method;
 
 /// What a round of the script hands over.
-pub(super) struct BundleRound<'a> {
+pub(super) struct BundleCalibration<'a> {
     /// The recording's name, for messages.
     pub recording: String,
     pub messages_hash: String,
@@ -28,12 +28,12 @@ pub(super) struct BundleRound<'a> {
     pub identified: &'a [IdentifiedScale],
     pub prior: Option<&'a Calibration>,
     pub map: Option<MapResult>,
-    pub effort: Effort,
+    pub effort: EstimatePurpose,
 }
 
 /// How much is done beside the estimate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Effort {
+pub(super) enum EstimatePurpose {
     /// All that a verdict needs.
     Judged,
     /// The estimate and its covariance, to go on by while views are still being captured.
@@ -43,38 +43,38 @@ pub(super) enum Effort {
 /// Fewer views do not tell how large noise and nonlinearity are: the datasheet's figures stand.
 const MIN_VIEWS_FOR_EVIDENCE: usize = 12;
 
-impl BundleRound<'_> {
+impl BundleCalibration<'_> {
     pub(super) fn calibrate(self, mut data: CaptureData) -> Result<Calibration, CalibError> {
         let robot = self.robot;
         let name = || self.recording.clone();
         data.fit.append(&mut data.held_out);
         let declared = declared(robot, &data.fit);
-        let first = Setup::new(robot, &data.fit, &declared, self.prior);
+        let first = BundleSetup::new(robot, &data.fit, &declared, self.prior);
         let seen = robot.camera.mount.n_joints;
         if first.input().model.joints.iter().take(seen).all(Vec::is_empty) && declared.is_empty() {
             return Err(CalibError::NothingObservable { recording: name() });
         }
         let found = self.first_estimate(&first, data.fit.len());
         let failures = match self.effort {
-            Effort::Judged => first.failures(robot, &data.fit, found.as_ref().map(|(found, _)| found)),
-            Effort::Running => declared.clone(),
+            EstimatePurpose::Judged => first.failures(robot, &data.fit, found.as_ref().map(|(found, _)| found)),
+            EstimatePurpose::Running => declared.clone(),
         };
         let second;
         let (setup, found) = if failures == declared {
             (&first, found)
         } else {
-            second = Setup::new(robot, &data.fit, &failures, self.prior);
+            second = BundleSetup::new(robot, &data.fit, &failures, self.prior);
             (&second, second.estimate())
         };
         let (found, selections) = found.ok_or_else(|| CalibError::NothingObservable { recording: name() })?;
         let parameters = found.parameters();
-        let sound = setup.sound(&parameters);
-        data.fit = setup.settled(&found, &sound);
+        let sound = setup.without_failed(&parameters);
+        data.fit = setup.with_estimated_angles(&found, &sound);
         // Left-out views of a freed joint are linearized where the camera saw it.
         let input = BundleInput { views: &data.fit, ..setup.input() };
         let (held_out, innovations) = match self.effort {
-            Effort::Judged => cross_validated(&input, &found),
-            Effort::Running => (HeldOutSum::default().figures(), Vec::new()),
+            EstimatePurpose::Judged => cross_validated(&input, &found),
+            EstimatePurpose::Running => (FoldSums::default().figures(), Vec::new()),
         };
         let as_found = found.as_found(&setup.applied.robot);
         let parameters_found = found.joint_parameters().to_vec();
@@ -89,7 +89,7 @@ impl BundleRound<'_> {
             residual_std_rad: Some(residual_std_rad),
         };
         let agreement = setup.agreement(robot);
-        let with = WithFailures {
+        let with = FailureImpact {
             datasheet: robot,
             robot: &as_found,
             views: &data.fit,
@@ -115,7 +115,7 @@ impl BundleRound<'_> {
         unobservable.retain(|left_out| !setup.has_no_sensor(left_out.parameter.joint));
         unobservable.extend(setup.unobservable());
         for outlier in &found.outliers {
-            *data.rejected.entry(Rejection::Outlier).or_default() += 1;
+            *data.rejected.entry(ObservationRejection::Outlier).or_default() += 1;
             tracing::debug!("view {}: tag {} left out", outlier.view_idx, outlier.tag_id);
         }
         let outliers = found.outliers.iter().map(|outlier| named(outlier, &data)).collect();
@@ -146,7 +146,7 @@ impl BundleRound<'_> {
             ..calibration
         };
         setup.complete(&mut calibration, &with, self.prior, agreement);
-        if self.effort == Effort::Running {
+        if self.effort == EstimatePurpose::Running {
             if found.is_consistent() {
                 return Ok(calibration);
             }
@@ -154,21 +154,22 @@ impl BundleRound<'_> {
             return Err(CalibError::NoRunningEstimate { recording: self.recording, problem });
         }
         let (input, task) = (BundleInput { views: &data.fit, ..setup.input() }, data.task.as_ref());
-        Judged { input: &input, found: &found, innovations: &innovations, task }.complete(&mut calibration);
+        VerdictInput { input: &input, found: &found, innovations: &innovations, task }.complete(&mut calibration);
         Ok(calibration)
     }
 
-    fn first_estimate<'b>(&self, setup: &'b Setup, n_views: usize) -> Option<(Estimate<'b>, Vec<Selection>)> {
-        if self.effort == Effort::Judged {
+    fn first_estimate<'b>(&self, setup: &'b BundleSetup, n_views: usize) -> Option<(Estimate<'b>, Vec<Selection>)> {
+        if self.effort == EstimatePurpose::Judged {
             return setup.estimate();
         }
-        let evidence = if n_views < MIN_VIEWS_FOR_EVIDENCE { Evidence::Given } else { Evidence::Fitted };
+        let evidence =
+            if n_views < MIN_VIEWS_FOR_EVIDENCE { HyperparameterMode::Given } else { HyperparameterMode::Fitted };
         estimate(&BundleInput { evidence, ..setup.input() }).map(|found| (found, Vec::new()))
     }
 }
 
 /// The sensors as found, those of joints without one as their datasheets say.
-fn with_datasheets(found: &Robot, datasheet: &Robot, setup: &Setup) -> Vec<JointSensorSpec> {
+fn with_datasheets(found: &Robot, datasheet: &Robot, setup: &BundleSetup) -> Vec<JointSensorSpec> {
     let pairs = found.sensors.iter().zip(&datasheet.sensors).enumerate();
     pairs.map(|(joint, (found, drawn))| if setup.has_no_sensor(joint) { drawn } else { found }.clone()).collect()
 }
@@ -188,8 +189,8 @@ fn behind_the_camera(robot: &Robot, found: &Estimate<'_>) -> Vec<Unobservable> {
 }
 
 /// Views by what was learnt from the others, with the scales of all.
-fn cross_validated(input: &BundleInput<'_>, all: &Estimate<'_>) -> (HeldOutFigures, Vec<Innovations>) {
-    let mut sum = HeldOutSum::default();
+fn cross_validated(input: &BundleInput<'_>, all: &Estimate<'_>) -> (HeldOutMetrics, Vec<Innovations>) {
+    let mut sum = FoldSums::default();
     let mut innovations = Vec::new();
     for fold in 0..FOLDS {
         let (fitted, left_out) = fold_of(input.views, fold);
@@ -197,7 +198,7 @@ fn cross_validated(input: &BundleInput<'_>, all: &Estimate<'_>) -> (HeldOutFigur
             views: &fitted,
             model: all.model.clone(),
             scales: all.scales().clone(),
-            evidence: Evidence::Given,
+            evidence: HyperparameterMode::Given,
             ..input.clone()
         };
         let Some(found) = estimate(&part) else { continue };

@@ -2,10 +2,10 @@
 
 use super::associate::View;
 use super::bundle::{
-    Agreement, Applied, BundleInput, Estimate, Evidence, Failure, Reading, Selection, WarmStart, estimate_selecting,
-    failures,
+    BundleInput, CalibrationPrior, Estimate, Failure, FailureAdjusted, HyperparameterMode, PriorConsistency, Selection,
+    SensorUse, failures, select_model,
 };
-use super::failed_joint::{PriorTable, WithFailures};
+use super::failed_joint::{FailureImpact, PriorTable};
 use super::observability::Unobservable;
 use super::problem::{JointParameters, Parameter, ParameterKind};
 use super::result::{Calibration, CovarianceTable, Status, shortened_rows};
@@ -13,9 +13,9 @@ use super::uncertainty::ParameterCovariance;
 use armcal_core::robot::{FailedKind, Robot};
 
 /// One way to see the views.
-pub(super) struct Setup {
-    pub applied: Applied,
-    warm: Option<Result<WarmStart, String>>,
+pub(super) struct BundleSetup {
+    pub applied: FailureAdjusted,
+    warm: Option<Result<CalibrationPrior, String>>,
 }
 
 /// The declared failures of `robot`.
@@ -24,28 +24,28 @@ pub(super) fn declared(robot: &Robot, views: &[View]) -> Vec<Failure> {
     before_camera.map(|&failed| Failure::declared(failed, views.len())).collect()
 }
 
-impl Setup {
+impl BundleSetup {
     pub(super) fn new(robot: &Robot, views: &[View], failed: &[Failure], prior: Option<&Calibration>) -> Self {
         let at = prior.map_or_else(JointParameters::default, |prior| prior.parameters(robot));
-        let applied = Applied::new(robot, views, failed, &at);
+        let applied = FailureAdjusted::new(robot, views, failed, &at);
         let warm = prior.map(|prior| {
-            WarmStart::new(prior, &applied)
+            CalibrationPrior::new(prior, &applied)
                 .ok_or_else(|| "the prior's covariance is none: it has no inverse".to_owned())
         });
         Self { applied, warm }
     }
 
-    fn warm(&self) -> Option<&WarmStart> {
+    fn warm(&self) -> Option<&CalibrationPrior> {
         self.warm.as_ref().and_then(|warm| warm.as_ref().ok())
     }
 
     pub(super) fn input(&self) -> BundleInput<'_> {
-        let warm = self.warm().and_then(|warm| warm.input(&self.applied.views, Evidence::Fitted));
-        warm.unwrap_or_else(|| self.applied.input(Evidence::Fitted))
+        let warm = self.warm().and_then(|warm| warm.input(&self.applied.views, HyperparameterMode::Fitted));
+        warm.unwrap_or_else(|| self.applied.input(HyperparameterMode::Fitted))
     }
 
     pub(super) fn estimate(&self) -> Option<(Estimate<'_>, Vec<Selection>)> {
-        estimate_selecting(&self.input())
+        select_model(&self.input())
     }
 
     /// This setup's failures, and those that the views show beside them.
@@ -67,7 +67,7 @@ impl Setup {
     }
 
     /// Whether the views agree with the prior, and why the result must be refused if they do not.
-    pub(super) fn agreement(&self, robot: &Robot) -> (Option<Agreement>, Option<String>) {
+    pub(super) fn agreement(&self, robot: &Robot) -> (Option<PriorConsistency>, Option<String>) {
         match &self.warm {
             None => (None, None),
             Some(Err(problem)) => (None, Some(problem.clone())),
@@ -86,7 +86,7 @@ impl Setup {
     }
 
     /// The views with the angles that were found where no sensor tells them; `parameters` without those of joints that have none.
-    pub(super) fn settled(&self, found: &Estimate<'_>, parameters: &JointParameters) -> Vec<View> {
+    pub(super) fn with_estimated_angles(&self, found: &Estimate<'_>, parameters: &JointParameters) -> Vec<View> {
         let sensors = parameters.sensors(&self.applied.robot);
         let mut views = self.applied.views.clone();
         for (view_idx, view) in views.iter_mut().enumerate() {
@@ -106,7 +106,7 @@ impl Setup {
     }
 
     /// `parameters` with the datasheet's for joints without a sensor.
-    pub(super) fn sound(&self, parameters: &JointParameters) -> JointParameters {
+    pub(super) fn without_failed(&self, parameters: &JointParameters) -> JointParameters {
         let mut sound = *parameters;
         for joint in (0..self.applied.robot.n_joints()).filter(|&joint| self.has_no_sensor(joint)) {
             for kind in ParameterKind::all() {
@@ -134,7 +134,7 @@ impl Setup {
                 reason: reason.to_owned(),
             })
         };
-        self.applied.failures.iter().filter(|failure| failure.reading == Reading::Ignored).flat_map(of).collect()
+        self.applied.failures.iter().filter(|failure| failure.reading == SensorUse::Ignored).flat_map(of).collect()
     }
 
     /// What was never estimated, or only before the sensor failed, is the datasheet's.
@@ -151,9 +151,9 @@ impl Setup {
     pub(super) fn complete(
         &self,
         calibration: &mut Calibration,
-        with: &WithFailures<'_>,
+        with: &FailureImpact<'_>,
         prior: Option<&Calibration>,
-        agreement: (Option<Agreement>, Option<String>),
+        agreement: (Option<PriorConsistency>, Option<String>),
     ) {
         let (agreement, contradiction) = agreement;
         calibration.failed_joint = with.tables();
@@ -176,7 +176,7 @@ impl Setup {
 }
 
 /// The camera's mount with its covariance, so that a warm start knows it together with the joints.
-fn add_mount(calibration: &mut Calibration, with: &WithFailures<'_>) {
+fn add_mount(calibration: &mut Calibration, with: &FailureImpact<'_>) {
     let Some(full) = super::bundle::with_mount_rows(with.found) else { return };
     let all = with.found.joint_parameters();
     let kept: Vec<usize> = (0..full.nrows())

@@ -2,7 +2,8 @@
 //! explain, by how large the sensors' errors would have to be.
 
 use super::bundle::{
-    BundleInput, Change, Estimate, Innovations, JointInnovation, Observability, Piece, Suspect, observability,
+    BundleInput, ErrorKind, Estimate, GeometryElement, Innovations, JointInnovation, Observability, ScoreTestResult,
+    observability,
 };
 use super::problem::ParameterKind;
 use super::result::{Calibration, Status};
@@ -15,7 +16,7 @@ use armcal_core::stats::chi_square_quantile;
 use armcal_core::streams::ReachTask;
 
 /// What a fit by `bundle` leaves to judge.
-pub(super) struct Judged<'a> {
+pub(super) struct VerdictInput<'a> {
     pub input: &'a BundleInput<'a>,
     pub found: &'a Estimate<'a>,
     /// Of each fold.
@@ -43,7 +44,7 @@ const HELD: f64 = 0.7;
 /// A reason to refuse, in words.
 type Reason = String;
 
-impl Judged<'_> {
+impl VerdictInput<'_> {
     /// Writes the tables into `calibration`, and refuses it where something does not hold.
     pub(super) fn complete(&self, calibration: &mut Calibration) {
         let robot = self.input.robot;
@@ -93,7 +94,7 @@ impl Judged<'_> {
         let mut suspects = self.found.suspects(postures);
         if calibration.map.is_some() {
             // These views made the map: there is no survey that the base could disagree with.
-            suspects.retain(|suspect| suspect.piece != Piece::Joint(0));
+            suspects.retain(|suspect| suspect.piece != GeometryElement::Joint(0));
         }
         let limit = FALSE_ALARM / suspects.len().max(1) as f64;
         let worth_m = calibration.predicted_tool_error_m.map_or(WORTH_M, |p| p.median.min(WORTH_M));
@@ -103,7 +104,7 @@ impl Judged<'_> {
             let what =
                 format!("{}: chi-square of its {}", piece_name(robot, suspect.piece), change_name(suspect.change));
             let check = Check::at_most(what, suspect.chi2, most);
-            let matters = suspect.tool_m > worth_m || suspect.piece == Piece::Mount;
+            let matters = suspect.tool_m > worth_m || suspect.piece == GeometryElement::Mount;
             if !check.holds && matters && reason.is_none() {
                 reason = Some(in_words(robot, suspect, most));
             } else if !check.holds && reason.is_none() {
@@ -265,38 +266,38 @@ impl Judged<'_> {
     }
 }
 
-fn piece_name(robot: &Robot, piece: Piece) -> String {
+fn piece_name(robot: &Robot, piece: GeometryElement) -> String {
     match piece {
-        Piece::Joint(0) => "base (or all tags)".to_owned(),
-        Piece::Joint(joint) => robot.chain.joints()[joint - 1].child_link.clone(),
-        Piece::Mount => "camera mount".to_owned(),
+        GeometryElement::Joint(0) => "base (or all tags)".to_owned(),
+        GeometryElement::Joint(joint) => robot.chain.joints()[joint - 1].child_link.clone(),
+        GeometryElement::Mount => "camera mount".to_owned(),
     }
 }
 
-fn change_name(change: Change) -> &'static str {
+fn change_name(change: ErrorKind) -> &'static str {
     match change {
-        Change::Shift => "length",
-        Change::Turn => "twist",
+        ErrorKind::Shift => "length",
+        ErrorKind::Turn => "twist",
     }
 }
 
-fn in_words(robot: &Robot, suspect: &Suspect, limit: f64) -> Reason {
+fn in_words(robot: &Robot, suspect: &ScoreTestResult, limit: f64) -> Reason {
     let name = piece_name(robot, suspect.piece);
     let v = suspect.size
         * match suspect.change {
-            Change::Shift => 1e3,
-            Change::Turn => 1f64.to_degrees(),
+            ErrorKind::Shift => 1e3,
+            ErrorKind::Turn => 1f64.to_degrees(),
         };
     let (chi2, tool_mm) = (suspect.chi2, suspect.tool_m * 1e3);
     let next = match suspect.piece {
-        Piece::Joint(joint) => format!("{} sits", robot.chain.joints()[joint].name),
-        Piece::Mount => "the camera hangs".to_owned(),
+        GeometryElement::Joint(joint) => format!("{} sits", robot.chain.joints()[joint].name),
+        GeometryElement::Mount => "the camera hangs".to_owned(),
     };
     let how = match suspect.change {
-        Change::Shift => {
+        ErrorKind::Shift => {
             format!("{next} {:.1} mm from where the drawing has it, ({:.1}, {:.1}, {:.1}) mm", v.norm(), v.x, v.y, v.z)
         }
-        Change::Turn => {
+        ErrorKind::Turn => {
             format!("{next} turned by {:.2} deg from the drawing, ({:.2}, {:.2}, {:.2}) deg", v.norm(), v.x, v.y, v.z)
         }
     };

@@ -2,7 +2,7 @@
 
 use super::associate::{CaptureData, View};
 use super::identify::IdentifiedScale;
-use super::methods::{StopReading, fit_stops};
+use super::methods::{EndStopReading, fit_stops};
 use super::problem::{JointParameters, PositionProblem};
 use super::result::{Parts, assemble};
 use super::{CalibError, Calibration, uncertainty};
@@ -18,7 +18,7 @@ pub(super) fn calibrate(
     identified: &[IdentifiedScale],
 ) -> Result<Calibration, CalibError> {
     let guess = prior.map_or_else(JointParameters::default, |prior| prior.parameters(robot));
-    let readings: Vec<StopReading> = data.stops.iter().map(|(_, reading)| *reading).collect();
+    let readings: Vec<EndStopReading> = data.stops.iter().map(|(_, reading)| *reading).collect();
     let fitted = fit_stops(robot, &readings, &guess).map_err(|problem| CalibError::NoStops { recording, problem })?;
     // Only a tag whose place is known can bear witness.
     let of_known_tags = |view: &mut View| view.tags.retain(|tag| robot.tags[tag.tag_idx].is_known());

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::associate::View;
-use super::bundle::{Agreement, Estimate, Failure, Found};
+use super::bundle::{Estimate, Failure, FailureSource, PriorConsistency};
 use super::problem::JointParameters;
 use super::uncertainty::{ParameterCovariance, predict_tool_error};
 use armcal_core::robot::{FailedJoint, FailedKind, Robot};
@@ -72,7 +72,7 @@ impl PriorTable {
         Self { used: false, ..self }
     }
 
-    pub(super) fn of(messages_hash: &str, elapsed_h: f64, agreement: &Agreement, robot: &Robot) -> Self {
+    pub(super) fn of(messages_hash: &str, elapsed_h: f64, agreement: &PriorConsistency, robot: &Robot) -> Self {
         Self {
             agrees: !agreement.is_beyond_chance(),
             used: true,
@@ -89,7 +89,7 @@ impl PriorTable {
 }
 
 /// An estimate with failed joints, on the way to the tool.
-pub(super) struct WithFailures<'a> {
+pub(super) struct FailureImpact<'a> {
     pub datasheet: &'a Robot,
     /// As the estimate has it, camera and tags where they were found.
     pub robot: &'a Robot,
@@ -104,16 +104,16 @@ pub(super) struct WithFailures<'a> {
 
 /// How a failed joint's angle is known.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Known {
+enum AngleSource {
     AsItIs,
     ByCamera,
     ByDatasheet,
 }
 
-impl WithFailures<'_> {
+impl FailureImpact<'_> {
     /// The tool error that is to be expected as things are.
     pub(super) fn tool_error_m(&self) -> Option<Summary> {
-        self.tool_error_where(usize::MAX, Known::AsItIs)
+        self.tool_error_where(usize::MAX, AngleSource::AsItIs)
     }
 
     pub(super) fn tables(&self) -> Vec<FailedJointTable> {
@@ -130,8 +130,8 @@ impl WithFailures<'_> {
             joint: self.robot.sensors[joint].joint.clone(),
             kind: failure.kind,
             found: match failure.found {
-                Found::Declared => "declared",
-                Found::Detected => "detected",
+                FailureSource::Declared => "declared",
+                FailureSource::Detected => "detected",
             }
             .to_owned(),
             evidence: failure.evidence.clone(),
@@ -142,10 +142,10 @@ impl WithFailures<'_> {
             camera_std_rad: self.camera_std_rad(failure),
             tool_error_m: self.tool_error_m(),
             tool_error_by_camera_m: (has_no_sensor && !is_locked)
-                .then(|| self.tool_error_where(joint, Known::ByCamera))
+                .then(|| self.tool_error_where(joint, AngleSource::ByCamera))
                 .flatten(),
             tool_error_by_datasheet_m: has_no_sensor
-                .then(|| self.tool_error_where(joint, Known::ByDatasheet))
+                .then(|| self.tool_error_where(joint, AngleSource::ByDatasheet))
                 .flatten(),
         }
     }
@@ -175,33 +175,33 @@ impl WithFailures<'_> {
     }
 
     /// With the angle of `joint` known in that way, those of the other failed joints as they are.
-    fn tool_error_where(&self, joint: usize, known: Known) -> Option<Summary> {
+    fn tool_error_where(&self, joint: usize, known: AngleSource) -> Option<Summary> {
         let mut robot = self.robot.clone();
         let mut covariance = self.covariance.clone();
         let mut residual_std_rad = covariance.residual_std_rad?;
         for failure in self.failures {
             let j = failure.joint;
-            let known = if j == joint { known } else { Known::AsItIs };
+            let known = if j == joint { known } else { AngleSource::AsItIs };
             let spec = &mut robot.sensors[j];
             match known {
-                Known::AsItIs if failure.kind == FailedKind::Locked => {
+                AngleSource::AsItIs if failure.kind == FailedKind::Locked => {
                     let declared = FailedJoint { joint: j, kind: FailedKind::Locked };
                     if let Some((angle_rad, _)) = self.locked_angle(failure) {
                         robot.stowed[j] = angle_rad;
                     }
                     robot = robot.with_failed(&[declared]);
                 }
-                Known::AsItIs if failure.leaves_no_sensor() => {
+                AngleSource::AsItIs if failure.leaves_no_sensor() => {
                     // Uniform over the range.
                     (spec.offset_std_rad, spec.gain_std) = (0.0, 0.0);
                     residual_std_rad[j] = spec.half_range_rad / 3.0_f64.sqrt();
                 }
-                Known::AsItIs => {}
-                Known::ByCamera => {
+                AngleSource::AsItIs => {}
+                AngleSource::ByCamera => {
                     (spec.offset_std_rad, spec.gain_std) = (0.0, 0.0);
                     residual_std_rad[j] = self.camera_std_rad(failure)?;
                 }
-                Known::ByDatasheet => {
+                AngleSource::ByDatasheet => {
                     *spec = self.datasheet.sensors[j].clone();
                     residual_std_rad[j] = spec.linearity_std_rad;
                     covariance = covariance.without_joint(j);

@@ -3,7 +3,7 @@
 //! The arm stands still, so a tag's corners stay where they are but for noise. A detector that reads one id wrongly in one frame
 //! puts another tag's corners under this id: the mean of all frames would be off by a share of the distance between the two tags.
 
-use super::associate::SeenCorners;
+use super::associate::MeanCorners;
 
 /// Corners of one tag in one frame, px.
 type Corners = [[f64; 2]; 4];
@@ -19,7 +19,7 @@ const ELSEWHERE_SIGMAS: f64 = 100.0;
 ///
 /// Frames agree that lie within a gate of one of them, in every coordinate; the largest such set counts. Where all frames lie
 /// within ten sigma (`corner_std_px`, per coordinate) of each other nothing is left out.
-pub(super) fn agreeing_mean(frames: &[Corners], corner_std_px: f64) -> (Option<SeenCorners>, usize) {
+pub(super) fn agreeing_mean(frames: &[Corners], corner_std_px: f64) -> (Option<MeanCorners>, usize) {
     if spread_px(frames) <= CLOSE_SIGMAS * corner_std_px {
         return (mean(frames.iter()), 0);
     }
@@ -67,7 +67,7 @@ fn spread_px(frames: &[Corners]) -> f64 {
     (0..4).flat_map(|corner| [range(corner, 0), range(corner, 1)]).fold(0.0, f64::max)
 }
 
-fn mean<'a>(frames: impl Iterator<Item = &'a Corners> + Clone) -> Option<SeenCorners> {
+fn mean<'a>(frames: impl Iterator<Item = &'a Corners> + Clone) -> Option<MeanCorners> {
     let (mut sums, mut n_frames) = ([[0.0; 2]; 4], 0);
     for frame in frames.clone() {
         for (sum, value) in sums.iter_mut().flatten().zip(frame.iter().flatten()) {
@@ -81,7 +81,7 @@ fn mean<'a>(frames: impl Iterator<Item = &'a Corners> + Clone) -> Option<SeenCor
         pairs.map(|(value, mean)| (value - mean).powi(2)).sum::<f64>()
     });
     let scatter_px2 = squares.sum();
-    (n_frames > 0).then_some(SeenCorners { corners_px, n_frames, scatter_px2 })
+    (n_frames > 0).then_some(MeanCorners { corners_px, n_frames, scatter_px2 })
 }
 
 #[cfg(test)]

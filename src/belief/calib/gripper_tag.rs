@@ -12,7 +12,7 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, Matrix6, SMatrix, SVector, Vector2, Vector6};
 
-use super::associate::{SeenCorners, View};
+use super::associate::{MeanCorners, View};
 use super::problem::{JointParameters, Parameter, ParameterKind};
 use armcal_core::optics::square_corners;
 use armcal_core::robot::{GripperTag, Robot};
@@ -56,7 +56,7 @@ pub fn mount_by_gripper_tag(
     views: &[View],
     guess: &JointParameters,
 ) -> Result<MountEstimate, String> {
-    let seen: Vec<(&JointAngles, &SeenCorners)> =
+    let seen: Vec<(&JointAngles, &MeanCorners)> =
         views.iter().filter_map(|view| Some((&view.travel_rad, view.gripper_tag.as_ref()?))).collect();
     if seen.len() < MIN_VIEWS {
         return Err(format!("the tag on the gripper was seen in {} views; {MIN_VIEWS} are needed", seen.len()));
@@ -118,7 +118,7 @@ struct Problem<'a> {
     robot: &'a Robot,
     tag: &'a GripperTag,
     joints: Range<usize>,
-    seen: Vec<(&'a JointAngles, &'a SeenCorners)>,
+    seen: Vec<(&'a JointAngles, &'a MeanCorners)>,
 }
 
 /// One view's eight coordinates: measured less predicted, their Jacobian, and by each joint's angle (last `joints` columns).
@@ -245,7 +245,7 @@ impl Problem<'_> {
         Some(covariance.cholesky()?.inverse())
     }
 
-    fn linearized(&self, state: &State, travel_rad: &JointAngles, seen: &SeenCorners) -> Option<Linearized> {
+    fn linearized(&self, state: &State, travel_rad: &JointAngles, seen: &MeanCorners) -> Option<Linearized> {
         let (robot, parameters) = (self.robot, &state.parameters);
         // What lies before the camera moves both alike; the middle of the range will do.
         let angles = JointAngles::from_fn(robot.n_joints(), |j| {

@@ -3,7 +3,7 @@
 use super::associate::View;
 use super::bundle::set_by_camera;
 use super::problem::{JointParameters, PositionProblem};
-use super::result::HeldOutFigures;
+use super::result::HeldOutMetrics;
 use armcal_core::robot::Robot;
 
 /// Views are left out in this many turns, every fifth in the order of time.
@@ -23,8 +23,8 @@ pub(super) fn held_out_figures(
     robot: &Robot,
     views: &[View],
     fit: impl Fn(&[View]) -> Option<JointParameters>,
-) -> HeldOutFigures {
-    let mut sum = HeldOutSum::default();
+) -> HeldOutMetrics {
+    let mut sum = FoldSums::default();
     for fold in 0..FOLDS {
         let (fitted, left_out) = fold_of(views, fold);
         if fitted.is_empty() || left_out.is_empty() {
@@ -39,7 +39,7 @@ pub(super) fn held_out_figures(
 
 /// Sums over the folds.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct HeldOutSum {
+pub(super) struct FoldSums {
     n_views: usize,
     /// Landmarks seen, and squares and sizes of their distances.
     n: usize,
@@ -63,7 +63,7 @@ fn by_camera(views: &[View], robot: &Robot, at: &JointParameters) -> Vec<View> {
     views
 }
 
-impl HeldOutSum {
+impl FoldSums {
     /// Adds views left out, by what was found without them: the arm as found, and its parameters; `nominal` is the drawing.
     pub fn add(&mut self, left_out: &[View], as_found: &Robot, at: &JointParameters, nominal: &Robot) {
         let (by_found, by_drawing) =
@@ -86,9 +86,9 @@ impl HeldOutSum {
         self.n_views += left_out.iter().filter(|view| !view.tags.is_empty()).count();
     }
 
-    pub fn figures(&self) -> HeldOutFigures {
+    pub fn figures(&self) -> HeldOutMetrics {
         let mean = |sum: f64, n: usize| (n > 0).then(|| sum / n as f64);
-        HeldOutFigures {
+        HeldOutMetrics {
             views: self.n_views,
             in_turn: true,
             rms_m: mean(self.sum_m2, self.n).map(f64::sqrt),

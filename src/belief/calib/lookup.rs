@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::result::{Calibration, JointResult};
-use armcal_core::sensor::{SensorModel, shape_basis};
+use armcal_core::sensor::{SensorModel, nonlinearity_basis};
 
 /// Points of a table; between them a straight line is off by some 1 % of the nonlinearity.
 const POINTS: usize = 65;
@@ -34,7 +34,8 @@ struct Sensor<'a> {
 impl Sensor<'_> {
     fn table(&self) -> LookupTable {
         let share = |n: usize| 2.0 * n as f64 / (POINTS - 1) as f64 - 1.0;
-        let correction = |n: usize| shape_basis(share(n)).iter().zip(self.shape_rad).map(|(phi, a)| phi * a).sum();
+        let correction =
+            |n: usize| nonlinearity_basis(share(n)).iter().zip(self.shape_rad).map(|(phi, a)| phi * a).sum();
         let correction_rad: Vec<f64> = (0..POINTS).map(correction).collect();
         let counts_per_rad = self.gain / self.gain_rad_per_count;
         let travel_rad = |n: usize| share(n) * self.half_range_rad;

@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use super::associate::{CaptureData, View};
 use super::bundle::Estimate;
 use super::uncertainty::CommonErrors;
-use crate::tagmap::{Body, MapInput, MapMode, MapSettings, MapView, NoiseScale, SeenTag, TagMap, TagPrior, solve};
+use crate::tagmap::{Body, MapDetection, MapInput, MapMode, MapSettings, MapView, NoiseScale, TagMap, TagPrior, solve};
 use armcal_core::optics::CameraModel;
 use armcal_core::robot::{Robot, SurveyedTag, TagSurvey};
 use armcal_core::spatial::{Base, Pose, Tag, skew};
@@ -23,7 +23,7 @@ use armcal_core::spatial::{Base, Pose, Tag, skew};
 #[serde(deny_unknown_fields)]
 pub struct MapResult {
     /// What was known before.
-    pub known: Known,
+    pub known: SurveyCoverage,
     /// The arm's base link, whose frame the tags' places are in.
     pub frame: String,
     pub base_tag: u32,
@@ -41,7 +41,7 @@ pub struct MapResult {
 /// How much of the map was known before.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Known {
+pub enum SurveyCoverage {
     /// Where some tags are.
     Partly,
     /// Where the base tag is.
@@ -180,7 +180,7 @@ fn map_view(view: &View, robot: &Robot) -> MapView {
     let tags = corners.map(|(id, seen)| {
         let variance_px2 = robot.camera.corner_std_px.powi(2) / seen.n_frames.max(1) as f64;
         let covariance_px2 = Some([Matrix2::from_diagonal_element(variance_px2); 4]);
-        SeenTag { id, corners_px: seen.corners_px, covariance_px2 }
+        MapDetection { id, corners_px: seen.corners_px, covariance_px2 }
     });
     MapView { camera: 0, stamp: view.end, tags: tags.collect(), attitude: None }
 }
@@ -281,7 +281,7 @@ fn mapped(map: &TagMap, robot: &Robot, anchor: &Anchor, left_out: &BTreeMap<u32,
     let result = MapResult {
         frame: robot.base_link.clone(),
         base_tag: robot.base_tag,
-        known: if n_known > 1 { Known::Partly } else { Known::BaseTagAlone },
+        known: if n_known > 1 { SurveyCoverage::Partly } else { SurveyCoverage::BaseTagAlone },
         views,
         rms_px: map.rms_px,
         rejected: map.rejected.len(),

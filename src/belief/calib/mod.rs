@@ -42,7 +42,8 @@ mod verdict;
 mod verdict_tables;
 
 pub use associate::{
-    CaptureData, Measured, Rejection, SeenCorners, TagView, View, associate, associate_within, surveyed,
+    CaptureData, MeanCorners, ObservationRejection, TagMeasurement, TagObservation, View, associate, associate_within,
+    surveyed,
 };
 pub use camera_mount::CameraMount;
 pub use compact::{CompactCalibration, CompactError, CompactJoint, MAX_COMPACT_BYTES, PredictedToolError};
@@ -52,32 +53,32 @@ pub use foreign::{ForeignContext, prepare_foreign};
 pub use gripper_tag::{MountEstimate, mount_by_gripper_tag};
 pub use identify::{IdentifiedScale, identify_scales};
 pub use lookup::LookupTable;
-pub use map::{Known, MapResult, MapTag};
+pub use map::{MapResult, MapTag, SurveyCoverage};
 pub use methods::{
-    Gauge, Interpolation, PositionMethod, Scaling, SearchOptions, Solution, SolveOutcome, StopFit, StopReading,
+    EndStopFit, EndStopReading, Gauge, Interpolation, PositionMethod, Scaling, SearchOptions, Solution, SolveOutcome,
     VarianceObjective, determined_by_variance, fisher_information, fit_stops, least_squares, minimum_distance,
 };
 pub use model_table::ModelTable;
 pub use observability::{Unobservable, free_parameters};
 pub use pooled::prepare_pooled;
 pub use problem::{JointParameters, Parameter, ParameterKind, PositionProblem};
-pub use result::{Calibration, FitFigures, HeldOutFigures, JointResult, Status};
-pub use running::running_estimate;
-pub use surroundings::Surroundings;
+pub use result::{Calibration, FitMetrics, HeldOutMetrics, JointResult, Status};
+pub use running::interim_estimate;
+pub use surroundings::ConditionHistory;
 pub use terms_table::{ReferenceTable, TermsTable};
 pub use uncertainty::{CommonErrors, ParameterCovariance, ToolErrorPrediction};
 pub use valid_range::ValidRange;
 pub use verdict::{MIN_HELD_OUT_VIEWS, MIN_VIEWS_PER_PARAMETER, fewest_views};
 pub use verdict_tables::{Check, ObservabilityTable, VerdictTable};
 
-use armcal_core::log::{Disorder, Recording, hash_messages};
+use armcal_core::log::{Recording, StampRegression, hash_messages};
 use armcal_core::robot::Robot;
 use armcal_core::routine::Method;
-use armcal_core::streams::{Mark, MarkKind, Message, Start};
+use armcal_core::streams::{Mark, MarkKind, Message, PriorSource};
 use armcal_core::time::Stamp;
 use associate::declared_failed;
-use bad_data::{check_joints, check_order, refuse_one_pose};
-use bundle_round::{BundleRound, Effort};
+use bad_data::{check_joints, check_order, check_pose_variation};
+use bundle_round::{BundleCalibration, EstimatePurpose};
 
 /// Why no calibration came out at all; a poor one comes out refused instead.
 #[derive(Debug, thiserror::Error)]
@@ -118,7 +119,7 @@ pub enum CalibError {
     #[error("{recording}: no view is left: {reasons}")]
     AllRejected { recording: String, reasons: String },
     #[error("{recording}: topic {topic}: {disorder}")]
-    Disorder { recording: String, topic: String, disorder: Disorder },
+    Disorder { recording: String, topic: String, disorder: StampRegression },
 }
 
 /// The fewest views that may be fitted at all.
@@ -133,14 +134,14 @@ pub const MIN_VIEWS: usize = 3;
 /// # Errors
 /// [`CalibError`] when the recording holds nothing to fit. A doubtful fit is returned with [`Status::Refused`].
 pub fn calibrate(recording: &Recording, robot: &Robot, method: Method) -> Result<Calibration, CalibError> {
-    calibrate_among(recording, &surveyed(recording, robot), method)
+    calibrate_with_survey(recording, &surveyed(recording, robot), method)
 }
 
 /// The same, by the tags of `robot` whatever the recording says of them: a survey or a map that was made elsewhere.
 ///
 /// # Errors
 /// As [`calibrate`].
-pub fn calibrate_among(recording: &Recording, robot: &Robot, method: Method) -> Result<Calibration, CalibError> {
+pub fn calibrate_with_survey(recording: &Recording, robot: &Robot, method: Method) -> Result<Calibration, CalibError> {
     check_joints(recording, robot)?;
     check_order(recording)?;
     let robot = &declared_failed(recording, robot);
@@ -149,13 +150,13 @@ pub fn calibrate_among(recording: &Recording, robot: &Robot, method: Method) -> 
     let (last, earlier) = rounds(recording).split_last().map(|(last, rest)| (*last, rest.to_vec())).unwrap_or_default();
     for round in earlier {
         // One that came to nothing is in the way of nothing: the arm went on with what it believed in before.
-        if let Ok(calibration) = one_round(recording, robot, method, &round, accepted.as_ref(), &mut used)
+        if let Ok(calibration) = run_marked(recording, robot, method, &round, accepted.as_ref(), &mut used)
             && calibration.status == Status::Accepted
         {
             accepted = Some(calibration);
         }
     }
-    one_round(recording, robot, method, &last, accepted.as_ref(), &mut used)
+    run_marked(recording, robot, method, &last, accepted.as_ref(), &mut used)
 }
 
 /// What `method` has used of a recording, ascending.
@@ -176,18 +177,18 @@ fn hash_of(recording: &Recording, used: &[usize]) -> String {
 
 /// One marked calibration; the default is the whole recording from the datasheet.
 #[derive(Clone, Copy, Default)]
-struct Round {
+struct MarkedCalibration {
     message_idx: Option<usize>,
     span: Option<(Stamp, Stamp)>,
     is_warm: bool,
 }
 
-fn rounds(recording: &Recording) -> Vec<Round> {
-    let mut rounds: Vec<(Stamp, Round)> = Vec::new();
+fn rounds(recording: &Recording) -> Vec<MarkedCalibration> {
+    let mut rounds: Vec<(Stamp, MarkedCalibration)> = Vec::new();
     for (idx, (_, message)) in recording.messages.iter().enumerate() {
         let Message::Mark(Mark { start, end, kind: MarkKind::Calibrate(from) }) = message else { continue };
-        let is_warm = *from == Start::Warm;
-        rounds.push((*end, Round { message_idx: Some(idx), span: Some((*start, *end)), is_warm }));
+        let is_warm = *from == PriorSource::Warm;
+        rounds.push((*end, MarkedCalibration { message_idx: Some(idx), span: Some((*start, *end)), is_warm }));
     }
     rounds.sort_by_key(|(end, _)| *end);
     rounds.into_iter().map(|(_, round)| round).collect()
@@ -195,16 +196,16 @@ fn rounds(recording: &Recording) -> Vec<Round> {
 
 /// The views that tell of the camera's mount where these are more than the round's own: what the tag on the gripper said before
 /// stays true for a warm start; a fresh one forgets it.
-fn gripper_views(recording: &Recording, robot: &Robot, round: &Round) -> Option<CaptureData> {
+fn gripper_views(recording: &Recording, robot: &Robot, round: &MarkedCalibration) -> Option<CaptureData> {
     let (_, to) = round.span.filter(|_| round.is_warm && robot.gripper_tag.is_some())?;
     Some(associate_within(recording, robot, Some((Stamp { nanos: i64::MIN }, to))))
 }
 
-fn one_round(
+fn run_marked(
     recording: &Recording,
     robot: &Robot,
     method: Method,
-    round: &Round,
+    round: &MarkedCalibration,
     accepted: Option<&Calibration>,
     used: &mut Vec<usize>,
 ) -> Result<Calibration, CalibError> {
@@ -226,7 +227,8 @@ fn one_round(
     let messages_hash = hash_of(recording, &used_by(method, used, &data));
     let prior = accepted.filter(|prior| round.is_warm && !(method == Method::Bundle && rests_on(prior, &data)));
     let held_out = HeldOut::AsMarked;
-    let prepared = Prepared { name: name(), messages_hash, data, watched, held_out, robot, identified };
+    let prepared =
+        CalibrationData { name: name(), messages_hash, data, gripper_tag_data: watched, held_out, robot, identified };
     if method != Method::Bundle || prior.is_none() {
         return calibrate_data(prepared, method, prior);
     }
@@ -251,19 +253,19 @@ pub enum HeldOut {
     /// Those that the recording marks; the fit never sees them.
     AsMarked,
     /// All, each by what was learnt from the views of other folds; the answer is fitted to all.
-    InTurn,
+    CrossValidation,
 }
 
 /// Views that are ready to be fitted, wherever they come from.
 #[derive(Clone)]
-pub struct Prepared {
+pub struct CalibrationData {
     /// The recording or recordings, for messages.
     pub name: String,
     /// Of the messages that the views come from.
     pub messages_hash: String,
     pub data: CaptureData,
     /// The views that tell of the camera's mount, where they are others than `data`'s.
-    pub watched: Option<CaptureData>,
+    pub gripper_tag_data: Option<CaptureData>,
     pub held_out: HeldOut,
     /// With the tags that were around it, and the scales of `identified`.
     pub robot: Robot,
@@ -275,11 +277,19 @@ pub struct Prepared {
 /// # Errors
 /// As [`calibrate`].
 pub fn calibrate_data(
-    prepared: Prepared,
+    prepared: CalibrationData,
     method: Method,
     prior: Option<&Calibration>,
 ) -> Result<Calibration, CalibError> {
-    let Prepared { name, messages_hash, mut data, watched, held_out: which_held_out, robot, identified } = prepared;
+    let CalibrationData {
+        name,
+        messages_hash,
+        mut data,
+        gripper_tag_data: watched,
+        held_out: which_held_out,
+        robot,
+        identified,
+    } = prepared;
     let name = || name.clone();
     if method == Method::JointLimits {
         return by_stops::calibrate(name(), messages_hash, &robot, data, prior, &identified);
@@ -295,7 +305,7 @@ pub fn calibrate_data(
     if views < MIN_VIEWS {
         return Err(CalibError::TooFewViews { recording: name(), views, needed: MIN_VIEWS });
     }
-    refuse_one_pose(&name(), &data, &robot)?;
+    check_pose_variation(&name(), &data, &robot)?;
     let mut robot = robot;
     let mut errors = CommonErrors::priors(&robot);
     let mut map = None;
@@ -308,8 +318,8 @@ pub fn calibrate_data(
     }
     if method == Method::Bundle {
         let (recording, robot) = (name(), &robot);
-        let effort = Effort::Judged;
-        let round = BundleRound { recording, messages_hash, robot, identified: &identified, prior, map, effort };
+        let effort = EstimatePurpose::Judged;
+        let round = BundleCalibration { recording, messages_hash, robot, identified: &identified, prior, map, effort };
         return round.calibrate(data);
     }
     let mut guess = prior.map_or_else(JointParameters::default, |prior| prior.parameters(&robot));
@@ -340,7 +350,7 @@ pub fn calibrate_data(
     }
     let held_out = PositionProblem::new(&robot, &data.held_out);
     let linearity_scale = uncertainty::linearity_scale(&fit, &held_out, &solution.parameters, free.len());
-    let cross_validated = (which_held_out == HeldOut::InTurn).then(|| {
+    let cross_validated = (which_held_out == HeldOut::CrossValidation).then(|| {
         in_turn::held_out_figures(&robot, &data.fit, |views| {
             let (mut free, mut left_out) = (free.clone(), Vec::new());
             let part = PositionProblem::new(&robot, views);

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::bundle::{Doubtful, Estimate, Selection};
+use super::bundle::{Estimate, OptionalTerm, Selection};
 use armcal_core::robot::Robot;
 
 /// What `bundle` took for its model.
@@ -32,9 +32,9 @@ impl ModelTable {
         let scales = found.scales();
         let n_estimated = found.joint_parameters().last().map_or(0, |p| p.joint + 1);
         let name = |term| match term {
-            Doubtful::CameraError => "camera error shared by a view",
-            Doubtful::TimeOffset => "time offset",
-            Doubtful::Drift => "drift",
+            OptionalTerm::CameraError => "camera error shared by a view",
+            OptionalTerm::TimeOffset => "time offset",
+            OptionalTerm::Drift => "drift",
         };
         let decided = |s: &Selection| {
             format!("{}: {}, {:+.1} nats", name(s.term), if s.is_in { "in" } else { "out" }, s.gain_nats)

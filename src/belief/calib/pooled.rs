@@ -3,7 +3,7 @@
 use super::associate::{CaptureData, View, associate_within, declared_failed, surveyed};
 use super::bad_data::{check_joints, check_order};
 use super::identify::identify_scales;
-use super::{CalibError, HeldOut, Prepared, hash_of, used_by};
+use super::{CalibError, CalibrationData, HeldOut, hash_of, used_by};
 use armcal_core::log::Recording;
 use armcal_core::robot::{Robot, TagSurvey};
 use armcal_core::routine::Method;
@@ -24,7 +24,7 @@ pub fn prepare_pooled(
     survey: Option<&TagSurvey>,
     task: Option<&ReachTask>,
     method: Method,
-) -> Result<Prepared, CalibError> {
+) -> Result<CalibrationData, CalibError> {
     for recording in recordings {
         check_joints(recording, robot)?;
         check_order(recording)?;
@@ -45,7 +45,15 @@ pub fn prepare_pooled(
         return Err(CalibError::NoCaptures { recording: name });
     }
     data.task = data.task.or_else(|| task.cloned());
-    Ok(Prepared { name, messages_hash, data, watched: None, held_out: HeldOut::AsMarked, robot, identified })
+    Ok(CalibrationData {
+        name,
+        messages_hash,
+        data,
+        gripper_tag_data: None,
+        held_out: HeldOut::AsMarked,
+        robot,
+        identified,
+    })
 }
 
 /// The recordings must agree about the tags: they stand where they stood.

@@ -5,10 +5,10 @@
 
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, Point3, Vector2, Vector3};
 
-use super::associate::{Measured, View};
+use super::associate::{TagMeasurement, View};
 use armcal_core::kinematics::LinkPoses;
 use armcal_core::robot::{JointSensorSpec, Robot, SurveyedTag};
-use armcal_core::sensor::{ArmSensors, Conditions, Correction, Departure, N_SHAPE, Terms, shape_basis};
+use armcal_core::sensor::{ArmSensors, ConditionChange, Conditions, Correction, N_SHAPE, Terms, nonlinearity_basis};
 use armcal_core::spatial::skew;
 use armcal_core::streams::{JointAngles, MAX_JOINTS};
 
@@ -45,7 +45,7 @@ impl JointParameters {
             ParameterKind::GainPerK => self.terms[parameter.joint].gain_per_k,
             ParameterKind::OffsetPerMpa => self.terms[parameter.joint].offset_rad_per_mpa,
             ParameterKind::DriftPerH => self.terms[parameter.joint].drift_rad_per_h,
-            ParameterKind::HalfPlay => self.terms[parameter.joint].half_play_rad,
+            ParameterKind::HalfBacklash => self.terms[parameter.joint].half_play_rad,
         }
     }
 
@@ -58,7 +58,7 @@ impl JointParameters {
             ParameterKind::GainPerK => self.terms[parameter.joint].gain_per_k = value,
             ParameterKind::OffsetPerMpa => self.terms[parameter.joint].offset_rad_per_mpa = value,
             ParameterKind::DriftPerH => self.terms[parameter.joint].drift_rad_per_h = value,
-            ParameterKind::HalfPlay => self.terms[parameter.joint].half_play_rad = value,
+            ParameterKind::HalfBacklash => self.terms[parameter.joint].half_play_rad = value,
         }
     }
 
@@ -69,7 +69,7 @@ impl JointParameters {
 
     /// Whether there is nothing but gains and offsets.
     #[must_use]
-    pub fn are_straight(&self) -> bool {
+    pub fn are_linear(&self) -> bool {
         self.terms.iter().all(Terms::are_zero)
     }
 
@@ -95,14 +95,14 @@ pub enum ParameterKind {
     GainPerK,
     OffsetPerMpa,
     DriftPerH,
-    HalfPlay,
+    HalfBacklash,
 }
 
 impl ParameterKind {
     /// All of them, in their order.
     pub fn all() -> impl Iterator<Item = Self> {
         let shape = (0..N_SHAPE as u8).map(Self::Shape);
-        let rest = [Self::OffsetPerK, Self::GainPerK, Self::OffsetPerMpa, Self::DriftPerH, Self::HalfPlay];
+        let rest = [Self::OffsetPerK, Self::GainPerK, Self::OffsetPerMpa, Self::DriftPerH, Self::HalfBacklash];
         [Self::Gain, Self::Offset].into_iter().chain(shape).chain(rest)
     }
 
@@ -112,18 +112,18 @@ impl ParameterKind {
         self,
         spec: &JointSensorSpec,
         travel_rad: f64,
-        departure: &Departure,
+        departure: &ConditionChange,
         approach: f64,
     ) -> f64 {
         match self {
             Self::Gain => travel_rad,
             Self::Offset => 1.0,
-            Self::Shape(h) => shape_basis(travel_rad / spec.half_range_rad)[usize::from(h)],
+            Self::Shape(h) => nonlinearity_basis(travel_rad / spec.half_range_rad)[usize::from(h)],
             Self::OffsetPerK => departure.oil_k,
             Self::GainPerK => departure.oil_k * travel_rad,
             Self::OffsetPerMpa => departure.pressure_mpa,
             Self::DriftPerH => departure.elapsed_h,
-            Self::HalfPlay => approach,
+            Self::HalfBacklash => approach,
         }
     }
 }
@@ -159,7 +159,7 @@ impl Parameter {
             ParameterKind::GainPerK => "gain per K",
             ParameterKind::OffsetPerMpa => "offset per MPa",
             ParameterKind::DriftPerH => "drift per h",
-            ParameterKind::HalfPlay => "half play",
+            ParameterKind::HalfBacklash => "half play",
         };
         format!("{} {kind}", robot.sensors[self.joint].joint)
     }
@@ -173,12 +173,12 @@ pub struct PositionProblem<'a> {
 }
 
 /// One observation's residual, with all that Jacobians need.
-pub(crate) struct Observation<'a> {
+pub(crate) struct TagResidual<'a> {
     pub view_idx: usize,
-    pub tag: &'a super::associate::TagView,
+    pub tag: &'a super::associate::TagObservation,
     pub view: &'a View,
     /// Of the view from the parameters' reference.
-    pub departure: Departure,
+    pub departure: ConditionChange,
     pub poses: &'a LinkPoses,
     pub base_from_camera: &'a Isometry3<f64>,
     /// The tag's centre in the base frame as predicted.
@@ -194,8 +194,8 @@ impl<'a> PositionProblem<'a> {
     }
 
     /// Calls `f` for every tag of every view.
-    pub(crate) fn each(&self, parameters: &JointParameters, mut f: impl FnMut(&Observation<'_>)) {
-        let are_straight = parameters.are_straight();
+    pub(crate) fn each(&self, parameters: &JointParameters, mut f: impl FnMut(&TagResidual<'_>)) {
+        let are_straight = parameters.are_linear();
         for (view_idx, view) in self.views.iter().enumerate() {
             if view.tags.is_empty() {
                 continue;
@@ -211,7 +211,7 @@ impl<'a> PositionProblem<'a> {
             for tag in &view.tags {
                 let predicted_m = (base_from_camera * Point3::from(tag.center_in_camera_m)).coords;
                 let surveyed = self.robot.tags[tag.tag_idx].base_from_tag.origin().vector();
-                f(&Observation {
+                f(&TagResidual {
                     view_idx,
                     tag,
                     view,
@@ -233,7 +233,7 @@ impl<'a> PositionProblem<'a> {
         })
     }
 
-    fn angles(&self, view: &View, departure: &Departure, parameters: &JointParameters) -> JointAngles {
+    fn angles(&self, view: &View, departure: &ConditionChange, parameters: &JointParameters) -> JointAngles {
         JointAngles::from_fn(self.robot.n_joints(), |j| {
             let spec = &self.robot.sensors[j];
             parameters.correction(j).angle_rad(spec, view.travel_rad[j], departure, view.approach[j])
@@ -249,7 +249,7 @@ impl<'a> PositionProblem<'a> {
     #[must_use]
     pub fn sum_of_distances_m(&self, parameters: &JointParameters) -> f64 {
         // What `each` gives, without what only Jacobians need.
-        let are_straight = parameters.are_straight();
+        let are_straight = parameters.are_linear();
         let mut sum = 0.0;
         for view in self.views {
             let angles = if are_straight {
@@ -278,8 +278,8 @@ impl<'a> PositionProblem<'a> {
     }
 
     /// How far the camera is from where a landmark's measured pose has it, m; `None` where its pose was not measured.
-    pub(crate) fn camera_off_m(&self, o: &Observation<'_>) -> Option<f64> {
-        let Measured::Pose(camera_from_tag) = o.tag.measured else { return None };
+    pub(crate) fn camera_off_m(&self, o: &TagResidual<'_>) -> Option<f64> {
+        let TagMeasurement::Pose(camera_from_tag) = o.tag.measured else { return None };
         let measured = self.robot.tags[o.tag.tag_idx].base_from_tag.isometry() * camera_from_tag.inverse();
         Some((o.base_from_camera.translation.vector - measured.translation.vector).norm())
     }
@@ -321,7 +321,7 @@ impl<'a> PositionProblem<'a> {
     }
 
     /// d(residual)/d(parameter): a joint turns everything behind it, `axis x (point - origin)` times d(angle)/d(parameter).
-    pub(crate) fn derivative(&self, o: &Observation<'_>, parameter: Parameter) -> Vector3<f64> {
+    pub(crate) fn derivative(&self, o: &TagResidual<'_>, parameter: Parameter) -> Vector3<f64> {
         if parameter.joint >= self.robot.camera.mount.n_joints {
             return Vector3::zeros();
         }
@@ -332,7 +332,7 @@ impl<'a> PositionProblem<'a> {
     }
 
     /// d(residual)/d(camera mount), perturbed on the right of `link_from_camera`: (translation m, rotation rad).
-    pub(crate) fn mount_derivative(o: &Observation<'_>) -> (Matrix3<f64>, Matrix3<f64>) {
+    pub(crate) fn mount_derivative(o: &TagResidual<'_>) -> (Matrix3<f64>, Matrix3<f64>) {
         let rotation = *o.base_from_camera.rotation.to_rotation_matrix().matrix();
         (rotation, -rotation * skew(&o.tag.center_in_camera_m))
     }

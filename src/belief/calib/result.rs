@@ -11,18 +11,18 @@ use super::failed_joint::{FailedJointTable, PriorTable};
 use super::gripper_tag::MountEstimate;
 use super::identify::IdentifiedScale;
 use super::map::MapResult;
-use super::methods::{Solution, StopReading};
+use super::methods::{EndStopReading, Solution};
 use super::model_table::ModelTable;
 use super::observability::{Unobservable, grouped_names};
 use super::problem::{JointParameters, Parameter, ParameterKind, PositionProblem};
 use super::terms_table::{ReferenceTable, TermsTable};
 use super::uncertainty::{ParameterCovariance, ToolErrorPrediction};
 use super::valid_range::ValidRange;
-use super::verdict::{Evidence, refusal};
+use super::verdict::{AcceptanceData, refusal};
 use super::verdict_tables::{ObservabilityTable, VerdictTable};
 use armcal_core::robot::Robot;
 use armcal_core::routine::Method;
-use armcal_core::sensor::Departure;
+use armcal_core::sensor::ConditionChange;
 use armcal_core::stats::Summary;
 
 /// Whether the answer may be used.
@@ -53,8 +53,8 @@ pub struct Calibration {
     /// Sightings that were left out because they do not agree with the rest: `pose 12: tag 3: 45 sigma`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub outliers: Vec<String>,
-    pub fit: FitFigures,
-    pub held_out: HeldOutFigures,
+    pub fit: FitMetrics,
+    pub held_out: HeldOutMetrics,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub predicted_tool_error_m: Option<Summary>,
     pub valid: ValidRange,
@@ -89,7 +89,7 @@ pub struct Calibration {
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct FitFigures {
+pub struct FitMetrics {
     pub outcome: String,
     pub evaluations: usize,
     pub cost_initial: f64,
@@ -115,7 +115,7 @@ fn as_the_datasheet_says() -> f64 {
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct HeldOutFigures {
+pub struct HeldOutMetrics {
     pub views: usize,
     /// Every view was held out in turn and fitted in the end; else the fit never saw these.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
@@ -192,7 +192,7 @@ pub(super) struct Parts<'a> {
     pub linearity_scale: f64,
     pub task: Option<ToolErrorPrediction>,
     /// Of views that were left out in turn, where the method does that; else the recording's own held-out views count.
-    pub cross_validated: Option<HeldOutFigures>,
+    pub cross_validated: Option<HeldOutMetrics>,
 }
 
 pub(super) fn assemble(parts: &Parts<'_>) -> Calibration {
@@ -201,7 +201,7 @@ pub(super) fn assemble(parts: &Parts<'_>) -> Calibration {
     let views = parts.data.fit.iter().filter(|view| !view.tags.is_empty()).count();
     let fit_rms_m = parts.fit.rms_m(at).unwrap_or(f64::NAN);
     let predicted = parts.task.as_ref().map(|task| task.error_m);
-    let refusal = refusal(&Evidence {
+    let refusal = refusal(&AcceptanceData {
         outcome: parts.solution.outcome,
         held_out_views: held_out.views,
         held_out_rms_m: held_out.rms_m,
@@ -220,7 +220,7 @@ pub(super) fn assemble(parts: &Parts<'_>) -> Calibration {
         refusal,
         messages_hash: parts.messages_hash.clone(),
         unobservable: grouped_names(parts.robot, parts.unobservable),
-        fit: FitFigures {
+        fit: FitMetrics {
             outcome: parts.solution.outcome.name().to_owned(),
             evaluations: parts.solution.evaluations,
             cost_initial: parts.solution.cost_initial,
@@ -270,9 +270,9 @@ pub(super) fn shortened_rows(matrix: &DMatrix<f64>) -> Vec<Vec<f64>> {
     matrix.row_iter().map(|row| row.iter().map(shortened).collect()).collect()
 }
 
-fn held_out_figures(parts: &Parts<'_>) -> HeldOutFigures {
+fn held_out_figures(parts: &Parts<'_>) -> HeldOutMetrics {
     let at = &parts.solution.parameters;
-    HeldOutFigures {
+    HeldOutMetrics {
         in_turn: false,
         mean_m: None,
         camera_mean_m: None,
@@ -295,12 +295,12 @@ fn joint_results(parts: &Parts<'_>) -> Vec<JointResult> {
             let offset = Parameter { joint, kind: ParameterKind::Offset };
             let (gain_std, offset_std) = (parts.covariance.std(gain), parts.covariance.std(offset));
             let travel = parts.data.fit.iter().filter(|v| !v.tags.is_empty()).map(|view| view.travel_rad[joint]);
-            let at_stop = |(_, stop): &&(_, StopReading)| parts.method == Method::JointLimits && stop.joint == joint;
+            let at_stop = |(_, stop): &&(_, EndStopReading)| parts.method == Method::JointLimits && stop.joint == joint;
             let stops = parts.data.stops.iter().filter(at_stop).map(|(_, stop)| stop.travel_rad);
             let (low, high) = travel
                 .chain(stops)
                 .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), t| (low.min(t), high.max(t)));
-            let angle = |t: f64| model.correction.angle_rad(spec, t, &Departure::default(), 0.0);
+            let angle = |t: f64| model.correction.angle_rad(spec, t, &ConditionChange::default(), 0.0);
             // What the new views did not determine is as sure as it was before.
             let before = parts.prior.map(|prior| &prior.joint[joint]);
             let gain_std_before =

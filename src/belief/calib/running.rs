@@ -1,7 +1,7 @@
 //! What the views captured so far say, for whoever must go on by it: margins and poses to come.
 
 use super::bad_data::{check_joints, check_order};
-use super::bundle_round::{BundleRound, Effort};
+use super::bundle_round::{BundleCalibration, EstimatePurpose};
 use super::{CalibError, Calibration, associate_within, declared_failed, identify_scales, map, surveyed};
 use armcal_core::log::Recording;
 use armcal_core::robot::Robot;
@@ -14,7 +14,7 @@ use armcal_core::time::Stamp;
 ///
 /// # Errors
 /// [`CalibError`] where the views tell nothing yet, or contradict each other or the prior.
-pub fn running_estimate(
+pub fn interim_estimate(
     recording: &Recording,
     robot: &Robot,
     from: Stamp,
@@ -42,7 +42,7 @@ pub fn running_estimate(
             map::map_tags(&mut data, &robot).map_err(|problem| CalibError::Map { recording: name(), problem })?;
         (robot, found_map) = (mapped.start(&robot), Some(mapped.result));
     }
-    BundleRound {
+    BundleCalibration {
         recording: name(),
         // Nothing is written of it.
         messages_hash: String::new(),
@@ -50,7 +50,7 @@ pub fn running_estimate(
         identified: &identified,
         prior,
         map: found_map,
-        effort: Effort::Running,
+        effort: EstimatePurpose::Running,
     }
     .calibrate(data)
 }

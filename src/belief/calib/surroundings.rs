@@ -32,12 +32,12 @@ struct Sample {
 
 /// The slow sensors of a recording, by time.
 #[derive(Clone, Debug, Default)]
-pub struct Surroundings {
+pub struct ConditionHistory {
     oil_c: Vec<Sample>,
     pressure_pa: Vec<Sample>,
 }
 
-impl Surroundings {
+impl ConditionHistory {
     #[must_use]
     pub fn of(recording: &Recording) -> Self {
         Self::heard_until(recording, Stamp { nanos: i64::MAX })
@@ -114,7 +114,7 @@ fn value_over(samples: &[Sample], start: Stamp, end: Stamp, used: &mut Vec<usize
 
 /// How fast each joint's travel changed over a span: the slope of the least-squares line.
 #[derive(Clone, Debug)]
-pub(super) struct Slope {
+pub(super) struct TravelRate {
     middle: Stamp,
     first: Option<JointAngles>,
     n: usize,
@@ -124,7 +124,7 @@ pub(super) struct Slope {
     sum_s_rad: [f64; MAX_JOINTS],
 }
 
-impl Slope {
+impl TravelRate {
     pub fn over(mark: &Mark) -> Self {
         let middle = middle(mark.start, mark.end);
         let zero = [0.0; MAX_JOINTS];

@@ -63,7 +63,7 @@ impl ReferenceTable {
         let Conditions { oil_c, pressure_pa, stamp } = parameters.reference;
         let table = Self { oil_c, pressure_pa, time_nanos: stamp.map(|stamp| stamp.nanos) };
         let is_term = |p: &Parameter| !matches!(p.kind, ParameterKind::Gain | ParameterKind::Offset);
-        (!parameters.are_straight() || covariance.parameters.iter().any(is_term)).then_some(table)
+        (!parameters.are_linear() || covariance.parameters.iter().any(is_term)).then_some(table)
     }
 
     #[must_use]
@@ -99,7 +99,7 @@ impl TermsTable {
         let (offset_rad_per_mpa, offset_rad_per_mpa_std) =
             scalar(terms.offset_rad_per_mpa, ParameterKind::OffsetPerMpa);
         let (drift_rad_per_h, drift_rad_per_h_std) = scalar(terms.drift_rad_per_h, ParameterKind::DriftPerH);
-        let (half_play_rad, half_play_rad_std) = scalar(terms.half_play_rad, ParameterKind::HalfPlay);
+        let (half_play_rad, half_play_rad_std) = scalar(terms.half_play_rad, ParameterKind::HalfBacklash);
         let table = Self {
             half_range_rad: model.spec.half_range_rad,
             shape_rad: has_shape.then(|| terms.shape_rad.to_vec()),

@@ -10,7 +10,7 @@ use super::problem::{Parameter, ParameterKind};
 use super::uncertainty::ParameterCovariance;
 use armcal_core::kinematics::LinkPoses;
 use armcal_core::robot::Robot;
-use armcal_core::sensor::{ArmSensors, Conditions, Departure};
+use armcal_core::sensor::{ArmSensors, ConditionChange, Conditions};
 use armcal_core::streams::JointAngles;
 
 impl ParameterCovariance {
@@ -33,7 +33,7 @@ impl ParameterCovariance {
         conditions: &Conditions,
     ) -> Matrix3<f64> {
         let at = Posture::new(robot, sensors, angles, conditions);
-        self.carried(&at, |joint| at.poses.point_jacobian(joint, &at.tool_m))
+        self.propagated(&at, |joint| at.poses.point_jacobian(joint, &at.tool_m))
     }
 
     /// Covariance of the tool's pose: position (m) in the first three rows, then orientation (rad, a small turn about the axes of the
@@ -47,14 +47,14 @@ impl ParameterCovariance {
         conditions: &Conditions,
     ) -> Matrix6<f64> {
         let at = Posture::new(robot, sensors, angles, conditions);
-        self.carried(&at, |joint| {
+        self.propagated(&at, |joint| {
             let (by_angle, axis) = (at.poses.point_jacobian(joint, &at.tool_m), at.poses.axis(joint));
             Vector6::new(by_angle.x, by_angle.y, by_angle.z, axis.x, axis.y, axis.z)
         })
     }
 
     /// To what has the derivative `by_angle` by each joint's angle.
-    fn carried<const R: usize>(
+    fn propagated<const R: usize>(
         &self,
         at: &Posture<'_>,
         by_angle: impl Fn(usize) -> SVector<f64, R>,
@@ -108,7 +108,7 @@ struct Posture<'a> {
     robot: &'a Robot,
     sensors: &'a ArmSensors,
     angles: &'a JointAngles,
-    departure: Departure,
+    departure: ConditionChange,
     poses: LinkPoses,
     /// Base frame.
     tool_m: Vector3<f64>,

@@ -9,7 +9,7 @@
 
 use nalgebra::{Const, DMatrix, DVector, Dyn, Matrix3, Matrix6, OMatrix, Vector3, Vector6};
 
-use super::associate::TagView;
+use super::associate::TagObservation;
 use super::gripper_tag::MountEstimate;
 use super::problem::{JointParameters, Parameter, PositionProblem};
 use armcal_core::kinematics::{IkGoal, IkSettings, JointLimits, solve_position};
@@ -188,7 +188,7 @@ pub fn linearity_scale(
 }
 
 /// Expected square of a tag's distance from its survey with perfect sensors: mount, survey and corner noise, m^2.
-fn drawing_variance_m2(robot: &Robot, tag: &TagView) -> f64 {
+fn drawing_variance_m2(robot: &Robot, tag: &TagObservation) -> f64 {
     let (camera, survey) = (&robot.camera, &robot.tags[tag.tag_idx]);
     let range_m = tag.center_in_camera_m.norm();
     let bearing_rad = camera.corner_std_px / camera.lens.focal_px[0];

@@ -5,7 +5,7 @@ use armcal_core::robot::Robot;
 
 /// What the verdict rests on.
 #[derive(Clone, Copy, Debug)]
-pub struct Evidence {
+pub struct AcceptanceData {
     pub outcome: SolveOutcome,
     pub held_out_views: usize,
     pub held_out_rms_m: Option<f64>,
@@ -35,7 +35,7 @@ pub fn fewest_views(robot: &Robot) -> usize {
 
 /// `None` to accept, else the reason to refuse, with the figures.
 #[must_use]
-pub fn refusal(e: &Evidence) -> Option<String> {
+pub fn refusal(e: &AcceptanceData) -> Option<String> {
     if (e.fit_views as f64) < MIN_VIEWS_PER_PARAMETER * e.n_parameters as f64 {
         let (views, n) = (e.fit_views, e.n_parameters);
         return Some(format!("{views} views to fit are too few for {n} parameters, however many tags each shows"));
@@ -75,8 +75,8 @@ pub fn refusal(e: &Evidence) -> Option<String> {
 mod tests {
     use super::*;
 
-    fn good() -> Evidence {
-        Evidence {
+    fn good() -> AcceptanceData {
+        AcceptanceData {
             outcome: SolveOutcome::Converged,
             held_out_views: 8,
             held_out_rms_m: Some(0.004),
@@ -93,14 +93,14 @@ mod tests {
     fn each_single_fault_refuses_and_none_accepts() {
         assert_eq!(refusal(&good()), None);
         let faults = [
-            Evidence { outcome: SolveOutcome::Stalled, ..good() },
-            Evidence { fit_views: 8, ..good() },
-            Evidence { held_out_views: 2, ..good() },
-            Evidence { held_out_rms_m: None, ..good() },
-            Evidence { held_out_rms_m: Some(0.09), ..good() },
-            Evidence { held_out_rms_m: Some(0.011), ..good() },
-            Evidence { predicted_tool_error_m: Some(0.03), ..good() },
-            Evidence { predicted_tool_error_m: Some(f64::NAN), ..good() },
+            AcceptanceData { outcome: SolveOutcome::Stalled, ..good() },
+            AcceptanceData { fit_views: 8, ..good() },
+            AcceptanceData { held_out_views: 2, ..good() },
+            AcceptanceData { held_out_rms_m: None, ..good() },
+            AcceptanceData { held_out_rms_m: Some(0.09), ..good() },
+            AcceptanceData { held_out_rms_m: Some(0.011), ..good() },
+            AcceptanceData { predicted_tool_error_m: Some(0.03), ..good() },
+            AcceptanceData { predicted_tool_error_m: Some(f64::NAN), ..good() },
         ];
         for fault in faults {
             assert!(refusal(&fault).is_some(), "{fault:?} must be refused");

@@ -9,7 +9,7 @@
 use super::bounds::{JointBound, JointErrorBounds};
 use crate::calib::{Calibration, Parameter, ParameterCovariance, ParameterKind};
 use armcal_core::robot::Robot;
-use armcal_core::sensor::{ArmSensors, Departure, SensorModel};
+use armcal_core::sensor::{ArmSensors, ConditionChange, SensorModel};
 
 /// Multiple of one sigma that is kept clear for.
 const SIGMAS: f64 = 4.0;
@@ -25,10 +25,10 @@ impl JointErrorBounds {
     #[must_use]
     pub fn believed(robot: &Robot, calibration: &Calibration, sensors: &ArmSensors) -> Self {
         let covariance = calibration.parameter_covariance(robot);
-        let mut bounds = Self::prior(robot);
+        let mut bounds = Self::datasheet(robot);
         for (joint, bound) in bounds.joints.iter_mut().enumerate() {
             let Some(model) = sensors.models.get(joint) else { continue };
-            if let Some(found) = Believed::new(&covariance, robot, joint, model).and_then(|b| b.envelope()) {
+            if let Some(found) = AngleStd::new(&covariance, robot, joint, model).and_then(|b| b.envelope()) {
                 *bound = found;
             }
         }
@@ -37,7 +37,7 @@ impl JointErrorBounds {
 }
 
 /// One joint's sigma over its range.
-struct Believed<'a> {
+struct AngleStd<'a> {
     model: &'a SensorModel,
     /// The joint's own parameters and their rows.
     rows: Vec<(usize, ParameterKind)>,
@@ -48,7 +48,7 @@ struct Believed<'a> {
     linearity_std_rad: f64,
 }
 
-impl<'a> Believed<'a> {
+impl<'a> AngleStd<'a> {
     fn new(covariance: &'a ParameterCovariance, robot: &Robot, joint: usize, model: &'a SensorModel) -> Option<Self> {
         let own = |(row, p): (usize, &Parameter)| (p.joint == joint).then_some((row, p.kind));
         let rows: Vec<(usize, ParameterKind)> = covariance.parameters.iter().enumerate().filter_map(own).collect();
@@ -65,7 +65,8 @@ impl<'a> Believed<'a> {
     }
 
     fn std_rad(&self, travel_rad: f64) -> f64 {
-        let at = |kind: ParameterKind| kind.angle_derivative(&self.model.spec, travel_rad, &Departure::default(), 0.0);
+        let at =
+            |kind: ParameterKind| kind.angle_derivative(&self.model.spec, travel_rad, &ConditionChange::default(), 0.0);
         let by: Vec<(usize, f64)> = self.rows.iter().map(|&(row, kind)| (row, at(kind))).collect();
         let mut variance = self.residual_std_rad.powi(2);
         for &(i, by_i) in &by {
@@ -93,7 +94,8 @@ impl<'a> Believed<'a> {
         };
         let slope = (0..PLACES).filter(|&k| k != best).map(beyond).fold(0.0, f64::max);
         let gain = self.model.correction.gain;
-        let pivot_rad = self.model.correction.angle_rad(&self.model.spec, travel(best), &Departure::default(), 0.0);
+        let pivot_rad =
+            self.model.correction.angle_rad(&self.model.spec, travel(best), &ConditionChange::default(), 0.0);
         Some(JointBound { pivot_rad, at_pivot_rad, slope: slope / gain.abs().max(0.1) })
     }
 }

@@ -1,6 +1,6 @@
 //! How far each joint may truly be from where it is believed to be.
 
-use super::stray::Stray;
+use super::stray::TrackingErrorBound;
 use armcal_core::kinematics::JointLimits;
 use armcal_core::robot::{JointSensorSpec, Robot};
 use armcal_core::streams::JointAngles;
@@ -36,7 +36,7 @@ impl JointBound {
 
 /// What has passed since some bounds held.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Age {
+pub struct Elapsed {
     pub seconds: f64,
     /// Change of the oil's temperature, K.
     pub warmed_k: f64,
@@ -58,7 +58,7 @@ const AGE_SIGMAS: f64 = 3.0;
 impl JointErrorBounds {
     /// The datasheet's worst case.
     #[must_use]
-    pub fn prior(robot: &Robot) -> Self {
+    pub fn datasheet(robot: &Robot) -> Self {
         Self { joints: robot.sensors.iter().map(JointBound::datasheet).collect() }
     }
 
@@ -82,7 +82,7 @@ impl JointErrorBounds {
     /// `(gain_max + 1) |d|` and the rest's own.
     #[must_use]
     pub fn with_unknown_scale(robot: &Robot, unknown: &UnknownScale) -> Self {
-        let mut bounds = Self::prior(robot);
+        let mut bounds = Self::datasheet(robot);
         bounds.joints[unknown.joint] = JointBound {
             pivot_rad: unknown.rest_rad,
             at_pivot_rad: robot.sensors[unknown.joint].offset_bound_rad,
@@ -93,7 +93,7 @@ impl JointErrorBounds {
 
     /// These bounds some time after they held: offsets change with the oil's temperature and walk with time.
     #[must_use]
-    pub fn aged(&self, robot: &Robot, age: Age) -> Self {
+    pub fn widened(&self, robot: &Robot, age: Elapsed) -> Self {
         let mut bounds = self.clone();
         for (bound, spec) in bounds.joints.iter_mut().zip(&robot.sensors) {
             let by_temperature_rad = spec.temperature_std_rad_per_k * age.warmed_k;
@@ -120,7 +120,7 @@ impl JointErrorBounds {
     /// within the bounds drives into a stop.
     #[must_use]
     pub fn safe_limits(&self, robot: &Robot) -> Vec<JointLimits> {
-        let arriving = Stray::arriving(robot);
+        let arriving = TrackingErrorBound::arriving(robot);
         robot
             .chain
             .joints()
@@ -163,17 +163,17 @@ mod tests {
     fn bounds_grow_with_temperature_and_time_up_to_the_datasheets() {
         let robot = titan();
         let pivot_rad = robot.sensors[0].center_rad;
-        let mut fresh = JointErrorBounds::prior(&robot);
+        let mut fresh = JointErrorBounds::datasheet(&robot);
         fresh.joints[0] = JointBound { pivot_rad, at_pivot_rad: 0.01, slope: 0.004 };
-        let at = |age: Age| fresh.aged(&robot, age).error_rad(0, pivot_rad);
+        let at = |age: Elapsed| fresh.widened(&robot, age).error_rad(0, pivot_rad);
         let (now, cold, late) = (
-            at(Age::default()),
-            at(Age { seconds: 0.0, warmed_k: -20.0 }),
-            at(Age { seconds: 4.0 * 3600.0, warmed_k: 0.0 }),
+            at(Elapsed::default()),
+            at(Elapsed { seconds: 0.0, warmed_k: -20.0 }),
+            at(Elapsed { seconds: 4.0 * 3600.0, warmed_k: 0.0 }),
         );
         assert!((cold - now - 3.0 * 20.0 * 0.00035).abs() < 1e-9, "{now} {cold}");
         assert!((late - now - 3.0 * 2.0 * 0.00035).abs() < 1e-9, "{now} {late}");
-        let worst = at(Age { seconds: 1e9, warmed_k: 1e3 });
+        let worst = at(Elapsed { seconds: 1e9, warmed_k: 1e3 });
         assert!((worst - robot.sensors[0].offset_bound_rad / 0.95).abs() < 1e-9, "{worst}");
     }
 
@@ -191,6 +191,6 @@ mod tests {
                 assert!(error <= bounds.error_rad(2, -0.36 + step) + 1e-12);
             }
         }
-        assert_eq!(bounds.error_rad(0, 0.1), JointErrorBounds::prior(&robot).error_rad(0, 0.1));
+        assert_eq!(bounds.error_rad(0, 0.1), JointErrorBounds::datasheet(&robot).error_rad(0, 0.1));
     }
 }

@@ -7,17 +7,17 @@
 //! the coarse to the fine, over the whole edge, so that an arm that is too near ends the search early.
 
 use super::bounds::JointErrorBounds;
-use super::clearance::{ClearanceModel, Nearest};
+use super::clearance::{ClearanceModel, ClosestPair};
 use super::separation::{gap_m, separate};
-use super::stray::Stray;
+use super::stray::TrackingErrorBound;
 use armcal_core::streams::{JointAngles, MAX_JOINTS};
 
 mod errors;
 mod spot;
 
 use parry3d::math::Vec3;
-pub(super) use spot::{Between, Moved};
-use spot::{Drift, Split, Spot};
+use spot::{ArmRegion, MotionBound, Split};
+pub(super) use spot::{BodyPair, ShapeMotion};
 
 /// Where shapes can move less than this and are still not certified, they count as too near, m.
 const FINEST_M: f64 = 0.006;
@@ -47,16 +47,16 @@ pub(super) struct Sweep<'a> {
     /// `None`: the believed arm alone.
     pub bounds: Option<&'a JointErrorBounds>,
     /// How far the arm leaves the line on top of that.
-    pub stray: Stray,
+    pub tracking_error: TrackingErrorBound,
     /// Free water to keep, m.
     pub margin_m: f64,
 }
 
 /// What a sweep found.
-pub(super) struct Verdict {
+pub(super) struct Certificate {
     /// The pair that some arm brings, or may bring, too near; the distance is in the terms of the margin. `None` proves
     /// that there is none.
-    pub too_near: Option<(Pair, f64)>,
+    pub violation: Option<(Pair, f64)>,
     /// Regions that were looked at: what it cost.
     pub n_regions: usize,
 }
@@ -68,14 +68,14 @@ struct OpenPair {
     /// That served the larger region best, or zero.
     direction: Vec3,
     lacking_m: f64,
-    drift: Drift,
+    drift: MotionBound,
     /// Whether the direction is that of the closest points.
     is_exact: bool,
 }
 
 /// A stretch of the edge, by shares of the way, and which open pairs it has to look at.
 #[derive(Clone, Copy)]
-struct Stretch {
+struct EdgeInterval {
     along: [f64; 2],
     open: [usize; 2],
 }
@@ -91,9 +91,9 @@ enum Finding {
 /// All that a search remembers.
 struct Search<'a> {
     sweep: &'a Sweep<'a>,
-    moved: Vec<Moved>,
+    moved: Vec<ShapeMotion>,
     open: Vec<OpenPair>,
-    stretches: Vec<Stretch>,
+    stretches: Vec<EdgeInterval>,
     n_regions: usize,
 }
 
@@ -117,7 +117,7 @@ impl Pair {
 
 impl OpenPair {
     /// The same with what the joints can take from its distance; `None` where that leaves enough.
-    fn drifting(self, drift: Drift) -> Option<Self> {
+    fn drifting(self, drift: MotionBound) -> Option<Self> {
         let lacking_m = self.lacking_m + drift.total_m;
         (lacking_m > 0.0).then_some(Self { lacking_m, drift, ..self })
     }
@@ -130,21 +130,21 @@ impl OpenPair {
 
 impl Sweep<'_> {
     /// Looks for an arm that is too near.
-    pub(super) fn verdict(&self) -> Verdict {
+    pub(super) fn verdict(&self) -> Certificate {
         let mut search = Search {
             sweep: self,
-            moved: vec![Moved::NOWHERE; self.model.n_moving()],
+            moved: vec![ShapeMotion::NOWHERE; self.model.n_moving()],
             open: Vec::with_capacity(2 * self.model.pairs().len()),
             stretches: Vec::with_capacity(64),
             n_regions: 0,
         };
         let too_near = search.run();
-        Verdict { too_near, n_regions: search.n_regions }
+        Certificate { violation: too_near, n_regions: search.n_regions }
     }
 
     /// The same, named.
-    pub(super) fn first_too_near(&self) -> Option<Nearest> {
-        self.verdict().too_near.map(|(pair, distance_m)| self.model.named(pair, distance_m))
+    pub(super) fn first_too_near(&self) -> Option<ClosestPair> {
+        self.verdict().violation.map(|(pair, distance_m)| self.model.named(pair, distance_m))
     }
 
     fn believed(&self, joint: usize, share: f64) -> f64 {
@@ -157,11 +157,11 @@ impl Sweep<'_> {
         let Some(bounds) = self.bounds else { return 0.0 };
         let [begin, end] = along.map(|share| bounds.error_rad(joint, self.believed(joint, share)));
         // Where the joint strays to, its sensor may err by more.
-        f64::max(begin, end) + (1.0 + bounds.slope(joint)) * self.stray.most_rad(joint, along)
+        f64::max(begin, end) + (1.0 + bounds.slope(joint)) * self.tracking_error.most_rad(joint, along)
     }
 
     /// The middle of a stretch with all errors on it.
-    fn stretch_spot(&self, along: [f64; 2]) -> Spot {
+    fn stretch_spot(&self, along: [f64; 2]) -> ArmRegion {
         let (middle, half) = (0.5 * (along[0] + along[1]), 0.5 * (along[1] - along[0]));
         let [mut step_rad, mut error_half_rad] = [[0.0; MAX_JOINTS]; 2];
         let mut angles = self.from;
@@ -174,11 +174,11 @@ impl Sweep<'_> {
                 *error = self.error_rad(joint, along);
             }
         }
-        Spot::new(&self.model.link_poses(&angles), angles.len(), step_rad, error_half_rad, true)
+        ArmRegion::new(&self.model.link_poses(&angles), angles.len(), step_rad, error_half_rad, true)
     }
 
     /// What is known of one pair where the shapes are placed for a region.
-    fn look(&self, open: &OpenPair, spot: &Spot, moved: &[Moved]) -> Finding {
+    fn test_pair(&self, open: &OpenPair, spot: &ArmRegion, moved: &[ShapeMotion]) -> Finding {
         let pair = self.model.pair(open.pair);
         let outer = &moved[pair.outer()];
         let other = self.model.other_placed(pair, moved);
@@ -192,7 +192,7 @@ impl Sweep<'_> {
         if apart_m >= here_m && outer.stretch_m > LONG_STRETCH_M {
             // It will be halved whatever the first order says.
             let drift_m = outer.coarse_m(between.first_joint);
-            let drift = Drift { total_m: drift_m, first_m: 0.0 };
+            let drift = MotionBound { total_m: drift_m, first_m: 0.0 };
             return Finding::Open(OpenPair { lacking_m: needed_m - apart_m + drift_m, drift, is_exact: true, ..*open });
         }
         let shapes = self.model.shapes(pair);
@@ -205,19 +205,20 @@ impl Sweep<'_> {
         if gap_m < here_m {
             let found = separate(&shapes, [&outer.placed, other], direction);
             if found.distance_m < here_m && spot.is_within {
-                return Finding::TooNear(self.model.in_margin_m(pair, found.distance_m, outer.sway_m));
+                return Finding::TooNear(self.model.in_margin_m(pair, found.distance_m, outer.station_bound_m));
             }
             (direction, gap_m, is_exact) = (found.direction, found.gap_m, true);
         }
         if gap_m - outer.coarse_m(between.first_joint) >= needed_m {
             return Finding::Clear;
         }
-        let open = OpenPair { pair: open.pair, direction, lacking_m: needed_m - gap_m, drift: Drift::NONE, is_exact };
+        let open =
+            OpenPair { pair: open.pair, direction, lacking_m: needed_m - gap_m, drift: MotionBound::NONE, is_exact };
         open.drifting(spot.drift(between, outer, direction)).map_or(Finding::Clear, Finding::Open)
     }
 
     /// The same of a pair that is open and not too near, along the direction of its closest points; `None`: it is clear.
-    fn look_exactly(&self, open: &OpenPair, spot: &Spot, moved: &[Moved]) -> Option<OpenPair> {
+    fn test_pair_exact(&self, open: &OpenPair, spot: &ArmRegion, moved: &[ShapeMotion]) -> Option<OpenPair> {
         let pair = self.model.pair(open.pair);
         let (outer, other) = (&moved[pair.outer()], self.model.other_placed(pair, moved));
         let found = separate(&self.model.shapes(pair), [&outer.placed, other], open.direction);
@@ -227,17 +228,17 @@ impl Sweep<'_> {
     }
 
     /// The true distance that keeps the margin: at the middle of a region, and anywhere in it.
-    fn needed_m(&self, pair: Pair, outer: &Moved) -> (f64, f64) {
+    fn needed_m(&self, pair: Pair, outer: &ShapeMotion) -> (f64, f64) {
         let needed_m = self.model.needed_m(pair, self.margin_m);
         if self.model.sways(pair) {
-            (needed_m + outer.sway_m, needed_m + outer.most_sway_m)
+            (needed_m + outer.station_bound_m, needed_m + outer.most_sway_m)
         } else {
             (needed_m, needed_m)
         }
     }
 
     /// What is left of a pair's distance in the region at least, in the terms of the margin.
-    fn least_m(&self, open: &OpenPair, outer: &Moved) -> (Pair, f64) {
+    fn least_m(&self, open: &OpenPair, outer: &ShapeMotion) -> (Pair, f64) {
         let pair = self.model.pair(open.pair);
         let (_, needed_m) = self.needed_m(pair, outer);
         let least_m = self.model.in_margin_m(pair, needed_m - open.lacking_m, outer.most_sway_m);
@@ -252,10 +253,12 @@ impl Search<'_> {
         if is_edge && let Some(found) = [1.0, 0.0].into_iter().find_map(|share| self.probe(share)) {
             return Some(found);
         }
-        let all = |pair| OpenPair { pair, direction: Vec3::ZERO, lacking_m: 0.0, drift: Drift::NONE, is_exact: false };
+        let all =
+            |pair| OpenPair { pair, direction: Vec3::ZERO, lacking_m: 0.0, drift: MotionBound::NONE, is_exact: false };
         let may_be = |pair: &usize| !model.never_within(*pair, model.needed_m(model.pair(*pair), sweep.margin_m));
         self.open.extend((0..model.pairs().len()).filter(may_be).map(all));
-        self.stretches.push(Stretch { along: if is_edge { [0.0, 1.0] } else { [0.0; 2] }, open: [0, self.open.len()] });
+        self.stretches
+            .push(EdgeInterval { along: if is_edge { [0.0, 1.0] } else { [0.0; 2] }, open: [0, self.open.len()] });
         // Pairs whose errors have to be split, with their stretch.
         let mut with_errors: Vec<([f64; 2], OpenPair)> = Vec::new();
         let mut next = 0;
@@ -283,8 +286,8 @@ impl Search<'_> {
                 }
                 let middle = 0.5 * (stretch.along[0] + stretch.along[1]);
                 let open = [kept, self.open.len()];
-                self.stretches.push(Stretch { along: [stretch.along[0], middle], open });
-                self.stretches.push(Stretch { along: [middle, stretch.along[1]], open });
+                self.stretches.push(EdgeInterval { along: [stretch.along[0], middle], open });
+                self.stretches.push(EdgeInterval { along: [middle, stretch.along[1]], open });
             } else {
                 with_errors.extend(self.open[kept..].iter().map(|open| (stretch.along, *open)));
                 self.open.truncate(kept);
@@ -295,7 +298,7 @@ impl Search<'_> {
         with_errors.into_iter().find_map(|(along, open)| self.search_pair(&open, along))
     }
 
-    fn next_stretch(&mut self, next: &mut usize) -> Option<Stretch> {
+    fn next_stretch(&mut self, next: &mut usize) -> Option<EdgeInterval> {
         if *next >= BREADTH {
             return if self.stretches.len() > *next { self.stretches.pop() } else { None };
         }
@@ -309,7 +312,7 @@ impl Search<'_> {
         let model = self.sweep.model;
         let angles = JointAngles::from_fn(self.sweep.from.len(), |joint| self.sweep.believed(joint, share));
         let zero = [0.0; MAX_JOINTS];
-        let spot = Spot::new(&model.link_poses(&angles), angles.len(), zero, zero, true);
+        let spot = ArmRegion::new(&model.link_poses(&angles), angles.len(), zero, zero, true);
         self.n_regions += 1;
         for (shape, moved) in self.moved.iter_mut().enumerate() {
             spot.place(model, shape, moved);
@@ -326,12 +329,13 @@ impl Search<'_> {
                 return None;
             }
             let found = separate(&shapes, [&outer.placed, other], direction);
-            (found.distance_m < needed_m).then(|| (pair, model.in_margin_m(pair, found.distance_m, outer.sway_m)))
+            (found.distance_m < needed_m)
+                .then(|| (pair, model.in_margin_m(pair, found.distance_m, outer.station_bound_m)))
         })
     }
 
     /// Puts the shapes that a stretch has to look at where they are at its middle.
-    fn place(&mut self, along: [f64; 2], stretch: &Stretch) -> Spot {
+    fn place(&mut self, along: [f64; 2], stretch: &EdgeInterval) -> ArmRegion {
         let spot = self.sweep.stretch_spot(along);
         let model = self.sweep.model;
         let pairs = self.open[stretch.open[0]..stretch.open[1]].iter();
@@ -346,14 +350,14 @@ impl Search<'_> {
     }
 
     /// The open pair that lacks most, if any is open still along its own best direction.
-    fn worst(&mut self, kept: usize, spot: &Spot) -> Option<OpenPair> {
+    fn worst(&mut self, kept: usize, spot: &ArmRegion) -> Option<OpenPair> {
         loop {
             let lacking = |k: &usize| self.open[*k].lacking_m;
             let k = (kept..self.open.len()).max_by(|a, b| lacking(a).total_cmp(&lacking(b)))?;
             if self.open[k].is_exact {
                 return Some(self.open[k]);
             }
-            match self.sweep.look_exactly(&self.open[k], spot, &self.moved) {
+            match self.sweep.test_pair_exact(&self.open[k], spot, &self.moved) {
                 Some(open) => {
                     self.open[k] = open;
                     return Some(open);
@@ -366,11 +370,11 @@ impl Search<'_> {
     }
 
     /// Looks at the pairs of a stretch; those that stay open are put behind all others, from where it says.
-    fn sift(&mut self, stretch: &Stretch, spot: &Spot) -> Result<usize, (Pair, f64)> {
+    fn sift(&mut self, stretch: &EdgeInterval, spot: &ArmRegion) -> Result<usize, (Pair, f64)> {
         let kept = self.open.len();
         for k in stretch.open[0]..stretch.open[1] {
             let open = self.open[k];
-            match self.sweep.look(&open, spot, &self.moved) {
+            match self.sweep.test_pair(&open, spot, &self.moved) {
                 Finding::Clear => {}
                 Finding::TooNear(distance_m) => return Err((self.sweep.model.pair(open.pair), distance_m)),
                 Finding::Open(open) => self.open.push(open),

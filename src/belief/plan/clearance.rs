@@ -13,8 +13,8 @@ use super::bounds::JointErrorBounds;
 use super::certify::{Pair, Sweep};
 use super::edge::Edge;
 use super::separation::{Placed, gap_m, separate};
-use super::shapes::{Moving, Standing, pairs, vec3};
-use super::stray::Stray;
+use super::shapes::{LinkShape, StaticShape, pairs, vec3};
+use super::stray::TrackingErrorBound;
 use super::timing::Timing;
 use armcal_core::kinematics::LinkPoses;
 use armcal_core::robot::{MAX_COLLISION_SHAPES, Robot, StationKeeping, Vehicle, parry_pose};
@@ -25,14 +25,14 @@ mod proof;
 
 /// The closest pair and their distance.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Nearest {
+pub struct ClosestPair {
     /// Zero: touching or inside each other.
     pub distance_m: f64,
     pub first: String,
     pub second: String,
 }
 
-impl std::fmt::Display for Nearest {
+impl std::fmt::Display for ClosestPair {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "`{}` and `{}`", self.first, self.second)
     }
@@ -41,8 +41,8 @@ impl std::fmt::Display for Nearest {
 /// The arm, what is around it, and which pairs may touch.
 pub struct ClearanceModel<'a> {
     robot: &'a Robot,
-    moving: Vec<Moving>,
-    standing: Vec<Standing>,
+    moving: Vec<LinkShape>,
+    standing: Vec<StaticShape>,
     /// Joints whose error moves a collision shape in a way that matters.
     n_error_joints: usize,
     pairs: Vec<Pair>,
@@ -50,12 +50,12 @@ pub struct ClearanceModel<'a> {
     is_unlisted: Vec<bool>,
     /// By how much the gripper stands out beyond its shapes, m.
     gripper_growth_m: f64,
-    sway: Sway,
+    sway: StationBound,
     timing: Timing,
 }
 
 /// How far the vehicle's motion about its station may move what it carries.
-struct Sway {
+struct StationBound {
     /// Of its centre of mass.
     position_m: f64,
     /// A metre from there.
@@ -64,7 +64,7 @@ struct Sway {
     center_of_mass: Vec3,
 }
 
-impl Sway {
+impl StationBound {
     fn new(vehicle: &Vehicle) -> Self {
         let StationKeeping { position_std_m, attitude_std_rad } = vehicle.station_keeping;
         Self {
@@ -81,7 +81,7 @@ const FAR_M: f64 = 0.4;
 /// Shapes that touch are never clear, whatever is asked for, m.
 const TOUCHING_M: f64 = 1e-6;
 /// Links of one arm neither sway against each other nor are surveyed: they need less water than the vehicle does.
-pub const SELF_EASE_M: f64 = 0.03;
+pub const SELF_MARGIN_REDUCTION_M: f64 = 0.03;
 /// Of the vehicle's position and attitude.
 const SWAY_SIGMAS: f64 = 3.0;
 
@@ -90,26 +90,26 @@ impl<'a> ClearanceModel<'a> {
     pub fn new(robot: &'a Robot, vehicle: &Vehicle, scene: &Scene) -> Self {
         let moving = moving(robot);
         let base_from_vehicle = *vehicle.vehicle_from_base.inverse().isometry();
-        let mut standing: Vec<Standing> =
-            vehicle.parts.iter().map(|part| Standing::new(&part.name, &part.placed, &base_from_vehicle)).collect();
+        let mut standing: Vec<StaticShape> =
+            vehicle.parts.iter().map(|part| StaticShape::new(&part.name, &part.placed, &base_from_vehicle)).collect();
         // The vehicle's mean pose is the world's origin, so world = vehicle here; its motion is in the margin.
         for obstacle in &scene.obstacles {
-            standing.push(Standing::new(&obstacle.name, &obstacle.placed, &base_from_vehicle).of_world());
+            standing.push(StaticShape::new(&obstacle.name, &obstacle.placed, &base_from_vehicle).of_world());
         }
         if let Some(z_m) = scene.seafloor_z_m {
-            standing.push(Standing::seafloor(z_m, &base_from_vehicle));
+            standing.push(StaticShape::seafloor(z_m, &base_from_vehicle));
         }
-        Self::of(robot, moving, standing, Sway::new(vehicle))
+        Self::of(robot, moving, standing, StationBound::new(vehicle))
     }
 
     /// Nothing around the arm but itself.
     #[must_use]
     pub(super) fn of_arm_alone(robot: &'a Robot) -> Self {
-        let sway = Sway { position_m: 0.0, attitude_rad: 0.0, center_of_mass: Vec3::ZERO };
+        let sway = StationBound { position_m: 0.0, attitude_rad: 0.0, center_of_mass: Vec3::ZERO };
         Self::of(robot, moving(robot), Vec::new(), sway)
     }
 
-    fn of(robot: &'a Robot, moving: Vec<Moving>, standing: Vec<Standing>, sway: Sway) -> Self {
+    fn of(robot: &'a Robot, moving: Vec<LinkShape>, standing: Vec<StaticShape>, sway: StationBound) -> Self {
         // The last joint turns a nearly round gripper about its own axis: its error moves no outline.
         let n_error_joints = robot.chain.joints().iter().filter(|joint| joint.limits.is_some()).count();
         let pairs = pairs(&moving, &standing);
@@ -130,7 +130,7 @@ impl<'a> ClearanceModel<'a> {
 
     /// The closest pair for one arm exactly at `angles`; distances are cut off at 0.4 m.
     #[must_use]
-    pub fn nearest(&self, angles: &JointAngles) -> Nearest {
+    pub fn nearest(&self, angles: &JointAngles) -> ClosestPair {
         let poses = self.robot.chain.link_poses(angles);
         self.nearest_below(&poses, FAR_M)
     }
@@ -144,43 +144,62 @@ impl<'a> ClearanceModel<'a> {
     /// A pair that some arm within `bounds` whose sensors read `believed` brings, or may bring, nearer than `margin_m`;
     /// `None` proves that there is none.
     #[must_use]
-    pub fn too_near(&self, believed: &JointAngles, bounds: &JointErrorBounds, margin_m: f64) -> Option<Nearest> {
-        self.too_near_along(&Edge::at_full_speed(*believed, *believed), bounds, margin_m)
+    pub fn find_violation(
+        &self,
+        believed: &JointAngles,
+        bounds: &JointErrorBounds,
+        margin_m: f64,
+    ) -> Option<ClosestPair> {
+        self.find_violation_along(&Edge::at_full_speed(*believed, *believed), bounds, margin_m)
     }
 
     /// A pair that the believed arm alone, without any error, brings nearer than `margin_m` on the straight edge.
     #[must_use]
-    pub fn too_near_exactly(&self, from: &JointAngles, to: &JointAngles, margin_m: f64) -> Option<Nearest> {
-        Sweep { model: self, from: *from, to: *to, bounds: None, stray: Stray::default(), margin_m }.first_too_near()
+    pub fn find_violation_exact(&self, from: &JointAngles, to: &JointAngles, margin_m: f64) -> Option<ClosestPair> {
+        Sweep {
+            model: self,
+            from: *from,
+            to: *to,
+            bounds: None,
+            tracking_error: TrackingErrorBound::default(),
+            margin_m,
+        }
+        .first_too_near()
     }
 
     /// As [`Self::too_near`] where the arm comes to rest after a slow edge: with what its joints overshoot.
     #[must_use]
-    pub fn too_near_arriving(&self, at: &JointAngles, bounds: &JointErrorBounds, margin_m: f64) -> Option<Nearest> {
-        let stray = Stray::arriving(self.robot);
-        Sweep { model: self, from: *at, to: *at, bounds: Some(bounds), stray, margin_m }.first_too_near()
+    pub fn find_violation_arriving(
+        &self,
+        at: &JointAngles,
+        bounds: &JointErrorBounds,
+        margin_m: f64,
+    ) -> Option<ClosestPair> {
+        let stray = TrackingErrorBound::arriving(self.robot);
+        Sweep { model: self, from: *at, to: *at, bounds: Some(bounds), tracking_error: stray, margin_m }
+            .first_too_near()
     }
 
     /// The same for every arm along an edge, driven as [`Timing`] has it: with what the joints stray on the way.
     #[must_use]
-    pub fn too_near_along(&self, edge: &Edge, bounds: &JointErrorBounds, margin_m: f64) -> Option<Nearest> {
+    pub fn find_violation_along(&self, edge: &Edge, bounds: &JointErrorBounds, margin_m: f64) -> Option<ClosestPair> {
         self.sweep(edge, bounds, margin_m).first_too_near()
     }
 
     pub(super) fn sweep<'b>(&'b self, edge: &Edge, bounds: &'b JointErrorBounds, margin_m: f64) -> Sweep<'b> {
-        let stray = Stray::new(self.robot, &self.timing, edge);
+        let stray = TrackingErrorBound::new(self.robot, &self.timing, edge);
         // The line to the middle of where the joints may come to rest.
         let to = JointAngles::from_fn(edge.to.len(), |joint| edge.to[joint] + stray.middle_rad(joint));
-        Sweep { model: self, from: edge.from, to, bounds: Some(bounds), stray, margin_m }
+        Sweep { model: self, from: edge.from, to, bounds: Some(bounds), tracking_error: stray, margin_m }
     }
 
     /// The closest pair over every arm within `bounds` whose sensors read `believed`, as far as the answer matters: its
     /// distance is at least `enough_m` where all of them are proven to keep that, else it is that of one which does not.
     #[must_use]
-    pub fn nearest_under(&self, believed: &JointAngles, bounds: &JointErrorBounds, enough_m: f64) -> Nearest {
-        self.too_near(believed, bounds, enough_m).unwrap_or_else(|| {
+    pub fn nearest_under(&self, believed: &JointAngles, bounds: &JointErrorBounds, enough_m: f64) -> ClosestPair {
+        self.find_violation(believed, bounds, enough_m).unwrap_or_else(|| {
             let nearest = self.nearest(believed);
-            Nearest { distance_m: nearest.distance_m.max(enough_m), ..nearest }
+            ClosestPair { distance_m: nearest.distance_m.max(enough_m), ..nearest }
         })
     }
 
@@ -199,13 +218,13 @@ impl<'a> ClearanceModel<'a> {
         }
     }
 
-    fn nearest_below(&self, poses: &LinkPoses, limit_m: f64) -> Nearest {
+    fn nearest_below(&self, poses: &LinkPoses, limit_m: f64) -> ClosestPair {
         let placed = self.placed(poses);
         let mut best_m = limit_m;
         let mut nearest = None;
         for (number, &pair) in self.pairs.iter().enumerate() {
             let (outer, other) = (&placed[pair.outer()], self.other_at(pair, &placed));
-            let sway_m = if self.sways(pair) { self.sway_m(outer) } else { 0.0 };
+            let sway_m = if self.sways(pair) { self.station_bound_m(outer) } else { 0.0 };
             let enough_m = self.needed_m(pair, best_m) + sway_m;
             if self.never_within(number, enough_m) || gap_m(&outer.bounds, &other.bounds) >= enough_m {
                 continue;
@@ -221,7 +240,7 @@ impl<'a> ClearanceModel<'a> {
             }
         }
         let (first, second) = nearest.map_or_else(Default::default, |pair| self.names(pair));
-        Nearest { distance_m: best_m, first, second }
+        ClosestPair { distance_m: best_m, first, second }
     }
 
     fn placed(&self, poses: &LinkPoses) -> [Placed; MAX_COLLISION_SHAPES] {
@@ -259,9 +278,9 @@ impl<'a> ClearanceModel<'a> {
     }
 }
 
-fn moving(robot: &Robot) -> Vec<Moving> {
-    let of_body = |(body, link): (usize, &'_ armcal_core::robot::LinkBody)| -> Vec<Moving> {
-        link.collisions.iter().map(|placed| Moving::new(robot, body, &link.name, placed)).collect()
+fn moving(robot: &Robot) -> Vec<LinkShape> {
+    let of_body = |(body, link): (usize, &'_ armcal_core::robot::LinkBody)| -> Vec<LinkShape> {
+        link.collisions.iter().map(|placed| LinkShape::new(robot, body, &link.name, placed)).collect()
     };
     robot.bodies.iter().enumerate().flat_map(of_body).collect()
 }

@@ -28,7 +28,7 @@ const MAX_SHORTCUTS: usize = 40;
 const LEAST_GAIN: f64 = 0.02;
 
 /// A search between two poses.
-pub(super) struct Connect<'a, 'b> {
+pub(super) struct RrtConnect<'a, 'b> {
     planner: &'b PathPlanner<'a>,
     trees: [Tree; 2],
     weights: [f64; MAX_JOINTS],
@@ -41,7 +41,7 @@ struct Tree {
     nodes: Vec<(JointAngles, usize)>,
 }
 
-impl<'a, 'b> Connect<'a, 'b> {
+impl<'a, 'b> RrtConnect<'a, 'b> {
     pub fn new(planner: &'b PathPlanner<'a>, from: &JointAngles, to: &JointAngles) -> Self {
         let mut weights = [LEAST_WEIGHT; MAX_JOINTS];
         let levers_m = planner.clearance.levers_m();
@@ -100,7 +100,7 @@ impl<'a, 'b> Connect<'a, 'b> {
 
     /// If it is driven slowly enough.
     fn is_edge_free(&mut self, from: &JointAngles, to: &JointAngles) -> bool {
-        self.planner.keeps_clear(&Edge { from: *from, to: *to, slowness: SLOWEST }, &mut self.n_regions)
+        self.planner.keeps_clear(&Edge { from: *from, to: *to, time_scale: SLOWEST }, &mut self.n_regions)
     }
 
     /// Grows a tree by a step towards `target`.
@@ -146,7 +146,7 @@ impl<'a, 'b> Connect<'a, 'b> {
         let mut path = Path::at(waypoints[0]);
         for edge in waypoints.windows(2) {
             // The search has certified the slowest.
-            path.push(edge[1], self.slowness(&edge[0], &edge[1], SLOWEST).unwrap_or(SLOWEST));
+            path.push(edge[1], self.time_scale(&edge[0], &edge[1], SLOWEST).unwrap_or(SLOWEST));
         }
         path = self.thinned(path);
         for _ in 0..MAX_SHORTCUTS {
@@ -161,8 +161,8 @@ impl<'a, 'b> Connect<'a, 'b> {
         self.thinned(path)
     }
 
-    fn slowness(&mut self, from: &JointAngles, to: &JointAngles, at_most: f64) -> Option<f64> {
-        self.planner.slowness(from, to, at_most, &mut self.n_regions)
+    fn time_scale(&mut self, from: &JointAngles, to: &JointAngles, at_most: f64) -> Option<f64> {
+        self.planner.time_scale(from, to, at_most, &mut self.n_regions)
     }
 
     fn duration_s(&self, path: &Path) -> f64 {
@@ -176,7 +176,7 @@ impl<'a, 'b> Connect<'a, 'b> {
         while at < path.n_edges() {
             let farther = (at + 2..path.waypoints.len()).rev();
             let across = farther.into_iter().find_map(|far| Some((far, self.across(&path, at, far)?)));
-            let (next, slowness) = across.unwrap_or((at + 1, path.edge(at).slowness));
+            let (next, slowness) = across.unwrap_or((at + 1, path.edge(at).time_scale));
             short.push(path.waypoints[next], slowness);
             at = next;
         }
@@ -188,7 +188,7 @@ impl<'a, 'b> Connect<'a, 'b> {
         let timing = self.planner.clearance.timing();
         let (from, to) = (&path.waypoints[at], &path.waypoints[far]);
         let along_s: f64 = (at..far).map(|k| timing.edge_duration_s(&path.edge(k))).sum();
-        self.slowness(from, to, along_s / timing.least_duration_s(from, to))
+        self.time_scale(from, to, along_s / timing.least_duration_s(from, to))
     }
 
     /// The path with a straight edge from place `a` to place `b` on it (waypoint and share of the edge behind it), where that
@@ -203,11 +203,11 @@ impl<'a, 'b> Connect<'a, 'b> {
         let enough_s = (1.0 - LEAST_GAIN) * self.duration_s(path);
         let shorter = |slowness: [f64; 3]| {
             let mut shorter = Path::at(path.waypoints[0]);
-            (0..before).for_each(|k| shorter.push(path.edge(k).to, path.edge(k).slowness));
+            (0..before).for_each(|k| shorter.push(path.edge(k).to, path.edge(k).time_scale));
             shorter.push(from, slowness[0]);
             shorter.push(to, slowness[1]);
             shorter.push(path.edge(after).to, slowness[2]);
-            (after + 1..path.n_edges()).for_each(|k| shorter.push(path.edge(k).to, path.edge(k).slowness));
+            (after + 1..path.n_edges()).for_each(|k| shorter.push(path.edge(k).to, path.edge(k).time_scale));
             shorter
         };
         // What the other two edges leave at the highest speed is what each may take.
@@ -219,7 +219,7 @@ impl<'a, 'b> Connect<'a, 'b> {
         let mut slowness = [0.0; 3];
         for (slowness, (from, to)) in slowness.iter_mut().zip(&ends) {
             let least_s = self.planner.clearance.timing().least_duration_s(from, to);
-            *slowness = self.slowness(from, to, 1.0 + spare_s / least_s)?;
+            *slowness = self.time_scale(from, to, 1.0 + spare_s / least_s)?;
         }
         let [across, first, last] = slowness;
         let shorter = shorter([first, across, last]);

@@ -13,7 +13,7 @@ pub struct Edge {
     pub from: JointAngles,
     pub to: JointAngles,
     /// Its duration over the shortest that rates and flow allow, at least 1.
-    pub slowness: f64,
+    pub time_scale: f64,
 }
 
 /// Believed joint angles to pass, start and goal included.
@@ -27,7 +27,7 @@ pub struct Path {
 impl Edge {
     #[must_use]
     pub fn at_full_speed(from: JointAngles, to: JointAngles) -> Self {
-        Self { from, to, slowness: 1.0 }
+        Self { from, to, time_scale: 1.0 }
     }
 }
 
@@ -64,7 +64,7 @@ impl Path {
 
     #[must_use]
     pub fn edge(&self, k: usize) -> Edge {
-        Edge { from: self.waypoints[k], to: self.waypoints[k + 1], slowness: self.slowness[k] }
+        Edge { from: self.waypoints[k], to: self.waypoints[k + 1], time_scale: self.slowness[k] }
     }
 
     pub fn edges(&self) -> impl DoubleEndedIterator<Item = Edge> + '_ {

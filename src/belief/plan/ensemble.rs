@@ -11,7 +11,7 @@ use rand_distr::{Distribution, StandardNormal};
 use crate::calib::{Calibration, Parameter, ParameterKind};
 use armcal_core::kinematics::LinkPoses;
 use armcal_core::robot::{JointSensorSpec, Robot};
-use armcal_core::sensor::{ArmSensors, Conditions, Departure};
+use armcal_core::sensor::{ArmSensors, ConditionChange, Conditions};
 use armcal_core::streams::{JointAngles, MAX_JOINTS};
 
 /// Arms drawn: the 99 % quantile is the tenth largest, exceeded with a probability of 1 % give or take 0.3 %.
@@ -29,7 +29,7 @@ pub struct ArmEnsemble {
     /// What a row of `Arm::deviation` is.
     parameters: Vec<Parameter>,
     n_joints: usize,
-    departure: Departure,
+    departure: ConditionChange,
 }
 
 /// One arm's deviation from the believed one.
@@ -64,7 +64,7 @@ impl ArmEnsemble {
                 Arm { deviation, residual_rad: residual(rng, std_rad, robot) }
             })
             .collect();
-        let (sensors, departure) = (ArmSensors::nominal(robot), Departure::default());
+        let (sensors, departure) = (ArmSensors::nominal(robot), ConditionChange::default());
         Self { sensors, arms, parameters, n_joints: robot.n_joints(), departure }
     }
 
@@ -269,7 +269,7 @@ mod tests {
     const ESTIMATES: usize = 12;
 
     fn posture(robot: &Robot, rng: &mut ChaCha8Rng) -> JointAngles {
-        let limits = JointErrorBounds::prior(robot).safe_limits(robot);
+        let limits = JointErrorBounds::datasheet(robot).safe_limits(robot);
         JointAngles::from_fn(robot.n_joints(), |j| rng.random_range(limits[j].lower_rad..=limits[j].upper_rad))
     }
 
@@ -333,7 +333,7 @@ mod tests {
                     let error_rad = bounds.error_rad(joint, believed[joint]);
                     joints += 1;
                     beyond += usize::from((arm[joint] - believed[joint]).abs() > error_rad);
-                    let datasheet_rad = JointErrorBounds::prior(&robot).error_rad(joint, believed[joint]);
+                    let datasheet_rad = JointErrorBounds::datasheet(&robot).error_rad(joint, believed[joint]);
                     assert!(error_rad < 0.5 * datasheet_rad, "an estimate of a millirad leaves little: {error_rad}");
                 }
             }

@@ -4,8 +4,8 @@ use std::path::Path as FilePath;
 
 use serde::{Deserialize, Serialize};
 
-use super::clearance::Nearest;
-use super::itinerary::{ArmBelief, Itinerary, LeastClearance, PlanStop, Visit};
+use super::clearance::ClosestPair;
+use super::itinerary::{ArmBelief, CapturePlan, LeastClearance, PlanStop, PlannedVisit};
 use super::timing::Timing;
 use armcal_core::robot::{FileIssue, Robot, RobotError, parse_toml, read_text};
 use armcal_core::streams::{CaptureSet, JointAngles, MAX_JOINTS};
@@ -134,7 +134,7 @@ const HEAD: &str = "\
 impl PlanFile {
     /// The itinerary with what it was planned for. `header` gives names and hashes; the rest of it is replaced.
     #[must_use]
-    pub fn new(header: PlanHeader, itinerary: &Itinerary, belief: &ArmBelief, robot: &Robot) -> Self {
+    pub fn new(header: PlanHeader, itinerary: &CapturePlan, belief: &ArmBelief, robot: &Robot) -> Self {
         let writer = Writer { belief, robot, timing: Timing::new(robot) };
         let visits = &itinerary.visits;
         let least_m = visits.iter().map(|visit| visit.path_clearance.proven_m).fold(f64::INFINITY, f64::min);
@@ -268,9 +268,9 @@ impl Writer<'_> {
         self.belief.sensors.counts(angles).iter().map(|&counts| rounded(counts, COUNT_DIGITS)).collect()
     }
 
-    fn pose(&self, number: usize, visit: &Visit) -> PoseTable {
+    fn pose(&self, number: usize, visit: &PlannedVisit) -> PoseTable {
         let (pose, LeastClearance { believed_m, proven_m }) = (&visit.pose, visit.clearance);
-        let Nearest { first, second, .. } = &visit.nearest;
+        let ClosestPair { first, second, .. } = &visit.nearest;
         PoseTable {
             number,
             set: match pose.set {
@@ -296,7 +296,7 @@ impl Writer<'_> {
         }
     }
 
-    fn path(&self, from: usize, visit: &Visit) -> PathTable {
+    fn path(&self, from: usize, visit: &PlannedVisit) -> PathTable {
         let edges_s = visit.path.edges().map(|edge| self.timing.edge_duration_s(&edge));
         PathTable {
             from,
@@ -311,7 +311,7 @@ impl Writer<'_> {
     }
 }
 
-fn predicted(visit: &Visit) -> Option<f64> {
+fn predicted(visit: &PlannedVisit) -> Option<f64> {
     let predicted_m = visit.pose.predicted_tool_error_m;
     predicted_m.is_finite().then(|| rounded(predicted_m, 1e6))
 }

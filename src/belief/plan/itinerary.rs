@@ -7,7 +7,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::bounds::JointErrorBounds;
 use super::choice::{PlannedPose, PoseRequest, choose_poses};
-use super::clearance::{ClearanceModel, Nearest};
+use super::clearance::{ClearanceModel, ClosestPair};
 use super::edge::{Edge, Path};
 use super::path::PathPlanner;
 use super::targets::{TargetRequest, plan_targets};
@@ -33,7 +33,7 @@ pub struct ArmBelief {
 impl ArmBelief {
     #[must_use]
     pub fn datasheet(robot: &Robot) -> Self {
-        Self { sensors: ArmSensors::nominal(robot), bounds: JointErrorBounds::prior(robot), calibration: None }
+        Self { sensors: ArmSensors::nominal(robot), bounds: JointErrorBounds::datasheet(robot), calibration: None }
     }
 
     /// An earlier calibration, as if it had been made just now.
@@ -60,10 +60,10 @@ pub struct ItineraryRequest<'a> {
 
 /// Poses in the order of their visit, each with the way there.
 #[derive(Clone, Debug)]
-pub struct Itinerary {
+pub struct CapturePlan {
     pub start: JointAngles,
-    pub visits: Vec<Visit>,
-    pub left_out: Vec<LeftOut>,
+    pub visits: Vec<PlannedVisit>,
+    pub left_out: Vec<UnreachablePose>,
     /// Targets of the task that no pose reaches under this belief.
     pub warnings: Vec<String>,
     pub stop: PlanStop,
@@ -73,14 +73,14 @@ pub struct Itinerary {
 
 /// One view and the way there.
 #[derive(Clone, Debug)]
-pub struct Visit {
+pub struct PlannedVisit {
     pub pose: PlannedPose,
     pub path: Path,
     pub duration_s: f64,
     pub path_clearance: LeastClearance,
     pub clearance: LeastClearance,
     /// What is nearest to the believed arm at the pose.
-    pub nearest: Nearest,
+    pub nearest: ClosestPair,
     /// Largest distance of each joint's true angle from the believed one.
     pub error_bound_rad: JointAngles,
     /// By the arm's clock since the start, when the view is taken.
@@ -119,7 +119,7 @@ impl LeastClearance {
         let (mut proven_m, mut beyond_m) = (margin_m.min(believed_m), believed_m);
         while beyond_m - proven_m > PROVEN_TO_M {
             let middle_m = 0.5 * (proven_m + beyond_m);
-            let keeps = clearance.too_near_along(edge, bounds, middle_m).is_none();
+            let keeps = clearance.find_violation_along(edge, bounds, middle_m).is_none();
             if keeps { proven_m = middle_m } else { beyond_m = middle_m }
         }
         Self { believed_m, proven_m }
@@ -128,7 +128,7 @@ impl LeastClearance {
 
 /// A pose that no path leads to.
 #[derive(Clone, Debug)]
-pub struct LeftOut {
+pub struct UnreachablePose {
     pub angles: JointAngles,
     pub why: PathError,
 }
@@ -169,7 +169,7 @@ const PROVEN_TO_M: f64 = 0.002;
 ///
 /// # Errors
 /// [`ItineraryError`] where nothing can be planned; single targets and poses that cannot be reached are named instead.
-pub fn plan_itinerary(request: &ItineraryRequest<'_>, rng: &mut ChaCha8Rng) -> Result<Itinerary, ItineraryError> {
+pub fn plan_itinerary(request: &ItineraryRequest<'_>, rng: &mut ChaCha8Rng) -> Result<CapturePlan, ItineraryError> {
     let capture = first_capture(request.routine);
     let bounds = match request.routine.capture.margins {
         Margins::Belief => request.belief.bounds.clone(),
@@ -181,7 +181,7 @@ pub fn plan_itinerary(request: &ItineraryRequest<'_>, rng: &mut ChaCha8Rng) -> R
     let (targets, warnings) = planner.targets(rng)?;
     let poses = planner.poses(&targets, rng)?;
     let itinerary = planner.visit(poses, rng)?;
-    Ok(Itinerary { warnings, ..itinerary })
+    Ok(CapturePlan { warnings, ..itinerary })
 }
 
 /// The first capture of the script: no calibration can come before it.
@@ -216,7 +216,7 @@ impl Planner<'_> {
 
     fn check_start(&self) -> Result<(), PlanError> {
         let needed_m = self.margin_m();
-        match self.request.clearance.too_near(&self.start(), self.bounds(), needed_m) {
+        match self.request.clearance.find_violation(&self.start(), self.bounds(), needed_m) {
             None => Ok(()),
             Some(nearest) => Err(PlanError::StartTooClose {
                 clearance_m: nearest.distance_m,
@@ -253,7 +253,7 @@ impl Planner<'_> {
         if believed.distance_m <= 0.0 {
             return Some(format!("the goal is inside something: {believed} touch or overlap there"));
         }
-        let nearest = self.request.clearance.too_near_arriving(angles, self.bounds(), self.margin_m())?;
+        let nearest = self.request.clearance.find_violation_arriving(angles, self.bounds(), self.margin_m())?;
         Some(format!(
             "the pose comes within {:.3} m of clearance between {nearest} for an arm within the sensors' error; {:.3} m are needed",
             nearest.distance_m,
@@ -292,7 +292,7 @@ impl Planner<'_> {
             belief: self.request.belief.calibration.as_ref(),
             taken: &[],
             prior: None,
-            tag_trust: &vec![1.0; robot.tags.len()],
+            detection_rate: &vec![1.0; robot.tags.len()],
             failed: &[],
             task: targets,
             targets_m: &self.request.routine.task.targets_m,
@@ -302,7 +302,7 @@ impl Planner<'_> {
     }
 
     /// Goes from pose to pose in the order of visits, past those that no path leads to.
-    fn visit(&self, poses: Vec<PlannedPose>, rng: &mut ChaCha8Rng) -> Result<Itinerary, ItineraryError> {
+    fn visit(&self, poses: Vec<PlannedPose>, rng: &mut ChaCha8Rng) -> Result<CapturePlan, ItineraryError> {
         let path_planner = PathPlanner {
             clearance: self.request.clearance,
             bounds: self.bounds(),
@@ -310,7 +310,7 @@ impl Planner<'_> {
             margin_m: self.margin_m(),
         };
         let n = poses.len();
-        let (mut visits, mut left_out) = (Vec::<Visit>::new(), Vec::new());
+        let (mut visits, mut left_out) = (Vec::<PlannedVisit>::new(), Vec::new());
         let wanted = (self.capture.poses + self.capture.held_out) as usize;
         let (mut at, mut arm_time_s) = (self.start(), 0.0);
         let mut stop = if n < wanted { PlanStop::NoPoseLeft } else { PlanStop::Poses };
@@ -326,16 +326,16 @@ impl Planner<'_> {
                     arm_time_s = visit.arm_time_s + self.capture.dwell_s;
                     visits.push(visit);
                 }
-                Err(why) => left_out.push(LeftOut { angles: pose.angles, why }),
+                Err(why) => left_out.push(UnreachablePose { angles: pose.angles, why }),
             }
         }
         if visits.is_empty() && !left_out.is_empty() {
             return Err(ItineraryError::NoPath { n, first: left_out.swap_remove(0).why });
         }
-        Ok(Itinerary { start: self.start(), visits, left_out, warnings: Vec::new(), stop, arm_time_s })
+        Ok(CapturePlan { start: self.start(), visits, left_out, warnings: Vec::new(), stop, arm_time_s })
     }
 
-    fn enough(&self, last: Option<&Visit>, arm_time_s: f64) -> Option<PlanStop> {
+    fn enough(&self, last: Option<&PlannedVisit>, arm_time_s: f64) -> Option<PlanStop> {
         let predicted_m = last.map(|visit| visit.pose.predicted_tool_error_m)?;
         if self.capture.stop_at_tool_error_m.is_some_and(|limit_m| predicted_m <= limit_m) {
             return Some(PlanStop::ToolError);
@@ -343,13 +343,13 @@ impl Planner<'_> {
         self.capture.max_time_s.is_some_and(|limit_s| arm_time_s >= limit_s).then_some(PlanStop::Time)
     }
 
-    fn arrive(&self, pose: PlannedPose, path: Path, since_s: f64) -> Visit {
+    fn arrive(&self, pose: PlannedPose, path: Path, since_s: f64) -> PlannedVisit {
         let nearest = self.request.clearance.nearest(&pose.angles);
         let angles = pose.angles;
         let (clearance, bounds, margin_m) = (self.request.clearance, self.bounds(), self.margin_m());
         let path_clearance = LeastClearance::along(clearance, bounds, &path, margin_m);
         let duration_s = Timing::new(self.request.robot).path_duration_s(&path);
-        Visit {
+        PlannedVisit {
             path,
             duration_s,
             path_clearance,

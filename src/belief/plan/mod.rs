@@ -24,18 +24,19 @@ mod targets;
 mod timing;
 mod visibility;
 
-pub use bounds::{Age, JointErrorBounds, UnknownScale};
-pub use choice::{CaptureState, PlannedPose, PosePlan, PosePool, PoseRequest, Stop, TakenView, choose_poses};
-pub use clearance::{ClearanceModel, Nearest, SELF_EASE_M};
+pub use bounds::{Elapsed, JointErrorBounds, UnknownScale};
+pub use choice::{CaptureState, CapturedView, PlannedPose, PosePlan, PosePool, PoseRequest, StopReason, choose_poses};
+pub use clearance::{ClearanceModel, ClosestPair, SELF_MARGIN_REDUCTION_M};
 pub use edge::{Edge, Path};
 pub use ensemble::{ArmEnsemble, link_ends};
 pub use file::{LeftOutTable, PathTable, PlanFile, PlanHeader, PlanTotals, PoseTable, SetName, TagTable};
 pub use itinerary::{
-    ArmBelief, Itinerary, ItineraryError, ItineraryRequest, LeastClearance, LeftOut, PlanStop, Visit, plan_itinerary,
+    ArmBelief, CapturePlan, ItineraryError, ItineraryRequest, LeastClearance, PlanStop, PlannedVisit, UnreachablePose,
+    plan_itinerary,
 };
 pub use pairs::sample_self_pairs;
 pub use path::{PathError, PathPlanner};
-pub use stray::Stray;
+pub use stray::TrackingErrorBound;
 pub use targets::{TargetRequest, plan_targets};
 pub use timing::Timing;
 pub use visibility::VisibilityModel;

@@ -37,7 +37,7 @@ pub fn sample_self_pairs(robot: &Robot, n: u64, seed: u64) -> SelfPairs {
 }
 
 fn wide_limits(robot: &Robot) -> Vec<JointLimits> {
-    let bounds = JointErrorBounds::prior(robot);
+    let bounds = JointErrorBounds::datasheet(robot);
     let wide = |(joint, limits): (usize, Option<JointLimits>)| match limits {
         None => JointLimits { lower_rad: -std::f64::consts::PI, upper_rad: std::f64::consts::PI },
         Some(JointLimits { lower_rad, upper_rad }) => JointLimits {

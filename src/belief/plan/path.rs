@@ -7,10 +7,10 @@
 use rand_chacha::ChaCha8Rng;
 
 use super::bounds::JointErrorBounds;
-use super::clearance::{ClearanceModel, Nearest};
-use super::connect::Connect;
+use super::clearance::{ClearanceModel, ClosestPair};
+use super::connect::RrtConnect;
 use super::edge::{Edge, Path, SLOWEST, SLOWNESS};
-use super::stray::Stray;
+use super::stray::TrackingErrorBound;
 use armcal_core::kinematics::JointLimits;
 use armcal_core::streams::JointAngles;
 
@@ -72,24 +72,24 @@ impl PathPlanner<'_> {
     /// Whether every arm within the bounds keeps the margin at rest at `angles`.
     #[must_use]
     pub fn is_free(&self, angles: &JointAngles) -> bool {
-        self.clearance.too_near(angles, self.bounds, self.margin_m).is_none()
+        self.clearance.find_violation(angles, self.bounds, self.margin_m).is_none()
     }
 
     /// Whether every arm within the bounds keeps the margin when it comes to `angles` slowly.
     #[must_use]
     pub fn is_free_to_arrive(&self, angles: &JointAngles) -> bool {
-        self.clearance.too_near_arriving(angles, self.bounds, self.margin_m).is_none()
+        self.clearance.find_violation_arriving(angles, self.bounds, self.margin_m).is_none()
     }
 
     /// Whether every arm within the bounds keeps the margin along the straight edge, if it goes slowly enough.
     #[must_use]
     pub fn is_edge_free(&self, from: &JointAngles, to: &JointAngles) -> bool {
-        self.keeps_clear(&Edge { from: *from, to: *to, slowness: SLOWEST }, &mut 0)
+        self.keeps_clear(&Edge { from: *from, to: *to, time_scale: SLOWEST }, &mut 0)
     }
 
     /// How slow the straight edge must be driven for that, as little as will do; `None` where no slowness up to `at_most` does.
     /// `n_regions` grows by what it cost.
-    pub(super) fn slowness(
+    pub(super) fn time_scale(
         &self,
         from: &JointAngles,
         to: &JointAngles,
@@ -97,8 +97,8 @@ impl PathPlanner<'_> {
         n_regions: &mut usize,
     ) -> Option<f64> {
         let mut holds = |slowness| {
-            let edge = Edge { from: *from, to: *to, slowness };
-            self.stays_off_the_stops(&edge) && self.keeps_clear(&edge, n_regions)
+            let edge = Edge { from: *from, to: *to, time_scale: slowness };
+            self.is_within_limits(&edge) && self.keeps_clear(&edge, n_regions)
         };
         let levels = &SLOWNESS[..SLOWNESS.iter().take_while(|&&slowness| slowness <= at_most).count()];
         let [quickest, .., slowest] = *levels else {
@@ -123,13 +123,13 @@ impl PathPlanner<'_> {
     pub(super) fn keeps_clear(&self, edge: &Edge, n_regions: &mut usize) -> bool {
         let verdict = self.clearance.sweep(edge, self.bounds, self.margin_m).verdict();
         *n_regions += verdict.n_regions;
-        verdict.too_near.is_none()
+        verdict.violation.is_none()
     }
 
     /// Whether no joint overshoots its limits at the end of the edge by more than they leave room for.
-    fn stays_off_the_stops(&self, edge: &Edge) -> bool {
-        let stray = Stray::new(self.clearance.robot(), self.clearance.timing(), edge);
-        let arriving = Stray::arriving(self.clearance.robot());
+    fn is_within_limits(&self, edge: &Edge) -> bool {
+        let stray = TrackingErrorBound::new(self.clearance.robot(), self.clearance.timing(), edge);
+        let arriving = TrackingErrorBound::arriving(self.clearance.robot());
         (0..self.clearance.n_error_joints()).all(|j| {
             let JointLimits { lower_rad, upper_rad } = self.limits[j];
             let way_rad = edge.to[j] - edge.from[j];
@@ -145,13 +145,13 @@ impl PathPlanner<'_> {
     /// [`PathError`]: start or goal are too near or out of range, or no path was found within the budget.
     pub fn plan(&self, from: &JointAngles, to: &JointAngles, rng: &mut ChaCha8Rng) -> Result<Path, PathError> {
         self.check_limits(from, to)?;
-        if let Some(slowness) = self.slowness(from, to, SLOWEST, &mut 0) {
+        if let Some(slowness) = self.time_scale(from, to, SLOWEST, &mut 0) {
             let mut path = Path::at(*from);
             path.push(*to, slowness);
             return Ok(path);
         }
         self.check_ends(from, to)?;
-        let mut connect = Connect::new(self, from, to);
+        let mut connect = RrtConnect::new(self, from, to);
         match connect.search(rng) {
             Some(waypoints) => Ok(connect.shortened(&waypoints, rng)),
             None => Err(self.blocked(from, to, connect.n_tried())),
@@ -171,11 +171,11 @@ impl PathPlanner<'_> {
     }
 
     fn check_ends(&self, from: &JointAngles, to: &JointAngles) -> Result<(), PathError> {
-        if let Some(found) = self.clearance.too_near(from, self.bounds, self.margin_m) {
+        if let Some(found) = self.clearance.find_violation(from, self.bounds, self.margin_m) {
             let (nearest, distance_m) = (found.to_string(), found.distance_m);
             return Err(PathError::StartTooNear { nearest, distance_m, needed_m: self.margin_m });
         }
-        let too_near = |at: &JointAngles| self.clearance.too_near_arriving(at, self.bounds, self.margin_m);
+        let too_near = |at: &JointAngles| self.clearance.find_violation_arriving(at, self.bounds, self.margin_m);
         let Some(found) = too_near(to) else { return Ok(()) };
         let free_share = halved(|share| too_near(&between(from, to, share)).is_none());
         Err(PathError::GoalTooNear {
@@ -188,13 +188,13 @@ impl PathPlanner<'_> {
 
     fn blocked(&self, from: &JointAngles, to: &JointAngles, tried: usize) -> PathError {
         let places = (0..=PLACES).map(|k| between(from, to, f64::from(k) / f64::from(PLACES)));
-        let nearest: Option<Nearest> = places
-            .filter_map(|angles| self.clearance.too_near(&angles, self.bounds, self.margin_m))
+        let nearest: Option<ClosestPair> = places
+            .filter_map(|angles| self.clearance.find_violation(&angles, self.bounds, self.margin_m))
             .min_by(|a, b| a.distance_m.total_cmp(&b.distance_m))
             // Between the places, or by what the joints stray on the way.
             .or_else(|| {
-                let edge = Edge { from: *from, to: *to, slowness: SLOWEST };
-                self.clearance.too_near_along(&edge, self.bounds, self.margin_m)
+                let edge = Edge { from: *from, to: *to, time_scale: SLOWEST };
+                self.clearance.find_violation_along(&edge, self.bounds, self.margin_m)
             });
         PathError::Blocked {
             tried,

@@ -9,7 +9,7 @@ use parry3d::shape::SharedShape;
 
 /// What is inside the box around a shape, so that its shadows need no virtual call.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Outline {
+pub(super) enum SupportShape {
     Box,
     /// Along the second axis of its box.
     Cylinder,
@@ -40,7 +40,7 @@ pub(super) struct Placed {
     pub half_axes: [Vec3; 3],
     /// About the centre.
     pub radius_m: f64,
-    pub outline: Outline,
+    pub outline: SupportShape,
 }
 
 /// Two shapes without their places.
@@ -66,24 +66,24 @@ impl Placed {
         center: Vec3::ZERO,
         half_axes: [Vec3::ZERO; 3],
         radius_m: 0.0,
-        outline: Outline::Box,
+        outline: SupportShape::Box,
     };
 
     /// The most that `|direction . (p - center)|` can be for a point p of the shape; `direction` of any length.
     pub(super) fn extent_m(&self, direction: Vec3) -> f64 {
         let [a, b, c] = self.half_axes.map(|half| direction.dot(half));
         match self.outline {
-            Outline::Cylinder => b.abs() + (a * a + c * c).sqrt(),
-            Outline::Capsule { core, radius_m } => core * c.abs() + radius_m * direction.length(),
-            Outline::Ball { radius_m } => radius_m * direction.length(),
-            Outline::Box | Outline::Hull | Outline::HalfSpace { .. } => a.abs() + b.abs() + c.abs(),
+            SupportShape::Cylinder => b.abs() + (a * a + c * c).sqrt(),
+            SupportShape::Capsule { core, radius_m } => core * c.abs() + radius_m * direction.length(),
+            SupportShape::Ball { radius_m } => radius_m * direction.length(),
+            SupportShape::Box | SupportShape::Hull | SupportShape::HalfSpace { .. } => a.abs() + b.abs() + c.abs(),
         }
     }
 
     /// The most that `direction . (p - center)` is.
     fn ahead_m(&self, shape: &SharedShape, direction: Vec3) -> f64 {
         match (self.outline, shape.as_support_map()) {
-            (Outline::Hull, Some(hull)) => {
+            (SupportShape::Hull, Some(hull)) => {
                 hull.support_point(&self.pose, direction).dot(direction) - self.center.dot(direction)
             }
             _ => self.extent_m(direction),
@@ -92,7 +92,7 @@ impl Placed {
 
     /// From the other's box to this one's, unit; from centre to centre where they overlap.
     pub(super) fn rough_direction(&self, other: &Self) -> Vec3 {
-        if let Outline::HalfSpace { normal } = other.outline {
+        if let SupportShape::HalfSpace { normal } = other.outline {
             return normal;
         }
         let ahead = (self.bounds.mins - other.bounds.maxs).max(Vec3::ZERO);
@@ -111,7 +111,7 @@ impl Shapes<'_> {
     /// The gap between the shapes' shadows on a unit direction, a lower bound on their distance.
     pub(super) fn gap_along_m(&self, outer: &Placed, other: &Placed, direction: Vec3) -> f64 {
         let lowest = direction.dot(outer.center) - outer.ahead_m(self.outer, -direction);
-        if let Outline::HalfSpace { normal } = other.outline {
+        if let SupportShape::HalfSpace { normal } = other.outline {
             let is_normal = normal == direction;
             return if is_normal { lowest - other.center.dot(direction) } else { f64::NEG_INFINITY };
         }
@@ -122,7 +122,7 @@ impl Shapes<'_> {
 /// The distance of two shapes; `guess` is a direction to begin with, or zero.
 pub(super) fn separate(shapes: &Shapes<'_>, placed: [&Placed; 2], guess: Vec3) -> Separation {
     let [outer_at, other_at] = placed;
-    if let Outline::HalfSpace { normal } = other_at.outline {
+    if let SupportShape::HalfSpace { normal } = other_at.outline {
         let gap_m = shapes.gap_along_m(outer_at, other_at, normal);
         return Separation { distance_m: gap_m.max(0.0), direction: normal, gap_m };
     }

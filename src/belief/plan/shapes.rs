@@ -6,7 +6,7 @@ use parry3d::math::{Mat3, Pose3, Vec3};
 use parry3d::shape::{HalfSpace, SharedShape};
 
 use super::certify::Pair;
-use super::separation::{Outline, Placed};
+use super::separation::{Placed, SupportShape};
 use armcal_core::kinematics::LinkPoses;
 use armcal_core::robot::{PlacedShape, Robot, Shape, parry_pose};
 use armcal_core::streams::MAX_JOINTS;
@@ -16,7 +16,7 @@ const MIN_BODY_GAP: usize = 2;
 /// Larger than any site, m.
 const EVERYWHERE_M: f64 = 1e6;
 /// A link's shape.
-pub(super) struct Moving {
+pub(super) struct LinkShape {
     pub body: usize,
     pub name: String,
     pub shape: SharedShape,
@@ -35,11 +35,11 @@ struct ShapeBox {
     half_extents_m: Vec3,
     /// Of a sphere about the centre that holds the shape.
     radius_m: f64,
-    outline: Outline,
+    outline: SupportShape,
 }
 
 /// A shape that stands where it is.
-pub(super) struct Standing {
+pub(super) struct StaticShape {
     pub name: String,
     pub shape: SharedShape,
     pub placed: Placed,
@@ -50,7 +50,7 @@ pub(super) struct Standing {
     pub is_of_world: bool,
 }
 
-impl Moving {
+impl LinkShape {
     pub fn new(robot: &Robot, body: usize, name: &str, placed: &PlacedShape) -> Self {
         let body_from_shape = placed.owner_from_shape * placed.shape.axis_fix();
         let box_m = ShapeBox::new(placed);
@@ -89,13 +89,13 @@ impl ShapeBox {
         let (center_m, half_extents_m) = (aabb.center(), aabb.half_extents());
         let radius_m = half_extents_m.length().min(placed.shape.bounding_radius_m() + center_m.length());
         let outline = match placed.shape {
-            Shape::Box { .. } => Outline::Box,
-            Shape::Cylinder { .. } => Outline::Cylinder,
+            Shape::Box { .. } => SupportShape::Box,
+            Shape::Cylinder { .. } => SupportShape::Cylinder,
             Shape::Capsule { radius_m, length_m } => {
-                Outline::Capsule { core: length_m / (length_m + 2.0 * radius_m), radius_m }
+                SupportShape::Capsule { core: length_m / (length_m + 2.0 * radius_m), radius_m }
             }
-            Shape::Sphere { radius_m } => Outline::Ball { radius_m },
-            Shape::Hull(_) => Outline::Hull,
+            Shape::Sphere { radius_m } => SupportShape::Ball { radius_m },
+            Shape::Hull(_) => SupportShape::Hull,
         };
         Self { center_m, half_extents_m, radius_m, outline }
     }
@@ -107,13 +107,13 @@ impl ShapeBox {
         let half_axes = [turn.x_axis * half.x, turn.y_axis * half.y, turn.z_axis * half.z];
         let [a, b, c] = half_axes.map(Vec3::abs);
         let around = match self.outline {
-            Outline::Cylinder => {
+            SupportShape::Cylinder => {
                 let round = a * a + c * c;
                 b + Vec3::new(round.x.sqrt(), round.y.sqrt(), round.z.sqrt())
             }
-            Outline::Capsule { core, radius_m } => core * c + Vec3::splat(radius_m),
-            Outline::Ball { radius_m } => Vec3::splat(radius_m),
-            Outline::Box | Outline::Hull | Outline::HalfSpace { .. } => a + b + c,
+            SupportShape::Capsule { core, radius_m } => core * c + Vec3::splat(radius_m),
+            SupportShape::Ball { radius_m } => Vec3::splat(radius_m),
+            SupportShape::Box | SupportShape::Hull | SupportShape::HalfSpace { .. } => a + b + c,
         };
         let center = *base_from_shape * self.center_m;
         Placed {
@@ -128,7 +128,7 @@ impl ShapeBox {
 }
 
 /// Every two shapes that may touch. What is fixed to the base stands where it is bolted on.
-pub(super) fn pairs(moving: &[Moving], standing: &[Standing]) -> Vec<Pair> {
+pub(super) fn pairs(moving: &[LinkShape], standing: &[StaticShape]) -> Vec<Pair> {
     let mut pairs = Vec::new();
     for (i, shape) in moving.iter().enumerate().filter(|(_, shape)| shape.body > 0) {
         pairs.extend((0..standing.len()).map(|k| Pair::Standing { moving: i, standing: k }));
@@ -138,7 +138,7 @@ pub(super) fn pairs(moving: &[Moving], standing: &[Standing]) -> Vec<Pair> {
     pairs
 }
 
-impl Standing {
+impl StaticShape {
     pub fn new(name: &str, placed: &PlacedShape, base_from_owner: &Isometry3<f64>) -> Self {
         let isometry = base_from_owner * placed.owner_from_shape * placed.shape.axis_fix();
         Self {
@@ -167,7 +167,7 @@ impl Standing {
                 pose: parry_pose(&isometry),
                 center: vec3(&isometry.translation.vector),
                 radius_m: f64::INFINITY,
-                outline: Outline::HalfSpace { normal: vec3(&(isometry.rotation * Vector3::z())) },
+                outline: SupportShape::HalfSpace { normal: vec3(&(isometry.rotation * Vector3::z())) },
                 ..Placed::NOWHERE
             },
             center_m: isometry.translation.vector,

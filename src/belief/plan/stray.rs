@@ -15,7 +15,7 @@ const BEHIND: f64 = 0.25;
 
 /// Bounds on the straying along one edge.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Stray {
+pub struct TrackingErrorBound {
     /// Where the joint is fastest, rad.
     lag_rad: [f64; MAX_JOINTS],
     droop_rad: [f64; MAX_JOINTS],
@@ -25,7 +25,7 @@ pub struct Stray {
     end_rad: [[f64; 2]; MAX_JOINTS],
 }
 
-impl Stray {
+impl TrackingErrorBound {
     /// On an edge, driven as `timing` says.
     #[must_use]
     pub fn new(robot: &Robot, timing: &Timing, edge: &Edge) -> Self {
@@ -119,8 +119,9 @@ mod tests {
         let mut to = from;
         (to[0], to[1]) = (from[0] + 0.6, from[1] - 0.4);
         for slowness in [1.0, 4.0] {
-            let edge = Edge { from, to, slowness };
-            let (stray, rates_rad_s) = (Stray::new(&robot, &timing, &edge), timing.peak_rates_rad_s(&edge));
+            let edge = Edge { from, to, time_scale: slowness };
+            let (stray, rates_rad_s) =
+                (TrackingErrorBound::new(&robot, &timing, &edge), timing.peak_rates_rad_s(&edge));
             for joint in 0..2 {
                 let full_rad = 0.05 * rates_rad_s[joint] / robot.sensors[joint].max_rate_rad_s;
                 let way = (to[joint] - from[joint]).signum();
@@ -149,7 +150,7 @@ mod tests {
         let mut to = from;
         (to[0], to[1], to[4]) = (from[0] + 0.9, from[1] - 0.3, from[4] + 0.5);
         let edge = Edge::at_full_speed(from, to);
-        let stray = Stray::new(&robot, &timing, &edge);
+        let stray = TrackingErrorBound::new(&robot, &timing, &edge);
         let duration_s = timing.edge_duration_s(&edge);
         let mut closest = f64::INFINITY;
         for step in 0..=500 {
@@ -170,16 +171,16 @@ mod tests {
         }
         assert!(closest < 0.02, "the bound is that of the lag, not a large number: {closest}");
         let nowhere = Edge::at_full_speed(from, from);
-        assert_eq!(Stray::new(&robot, &timing, &nowhere), Stray::default());
+        assert_eq!(TrackingErrorBound::new(&robot, &timing, &nowhere), TrackingErrorBound::default());
         for slowness in [1.0, 2.0, SLOWEST] {
-            let slow = Stray::new(&robot, &timing, &Edge { slowness, ..edge });
+            let slow = TrackingErrorBound::new(&robot, &timing, &Edge { time_scale: slowness, ..edge });
             for along in [[0.0, 1.0], [0.2, 0.3], [1.0, 1.0]] {
                 for joint in 0..from.len() {
                     let quicker_rad = slowness * slow.most_rad(joint, along);
                     assert!((quicker_rad - stray.most_rad(joint, along)).abs() < 1e-12, "it goes with the rate");
                 }
             }
-            let arriving = Stray::arriving(&robot);
+            let arriving = TrackingErrorBound::arriving(&robot);
             assert!(slowness != SLOWEST || (0..from.len()).all(|j| slow.end_rad(j) <= arriving.end_rad(j) + 1e-12));
         }
     }

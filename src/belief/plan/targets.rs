@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::PlanError;
 use super::bounds::JointErrorBounds;
-use super::clearance::{ClearanceModel, Nearest};
+use super::clearance::{ClearanceModel, ClosestPair};
 use armcal_core::kinematics::{IkError, IkGoal, IkSettings, solve_position};
 use armcal_core::robot::Robot;
 use armcal_core::streams::JointAngles;
@@ -69,7 +69,7 @@ impl TargetSolver<'_> {
         let goal = IkGoal { position_m: Vector3::from(at_m) };
         let home = preferred.unwrap_or(self.robot.stowed);
         let mut unreached: Option<IkError> = None;
-        let mut closest: Option<Nearest> = None;
+        let mut closest: Option<ClosestPair> = None;
         let mut best: Option<(f64, JointAngles)> = None;
         for attempt in 0..=RANDOM_SEEDS {
             let seed = if attempt == 0 { home } else { random_seed(self.robot, &self.settings, rng) };
@@ -77,7 +77,7 @@ impl TargetSolver<'_> {
                 Err(error) => unreached = Some(unreached.map_or(error, |before| nearer(before, error))),
                 Ok(angles) => {
                     let travel_rad = angles.max_abs_difference(&home);
-                    if let Some(nearest) = self.clearance.too_near_arriving(&angles, self.bounds, self.margin_m) {
+                    if let Some(nearest) = self.clearance.find_violation_arriving(&angles, self.bounds, self.margin_m) {
                         if closest.as_ref().is_none_or(|c| nearest.distance_m > c.distance_m) {
                             closest = Some(nearest);
                         }

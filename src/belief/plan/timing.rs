@@ -40,7 +40,7 @@ impl Timing {
     /// Of an edge at its speed, s; 0 where nothing moves.
     #[must_use]
     pub fn edge_duration_s(&self, edge: &Edge) -> f64 {
-        edge.slowness * self.least_duration_s(&edge.from, &edge.to)
+        edge.time_scale * self.least_duration_s(&edge.from, &edge.to)
     }
 
     /// Of the straight edge between two poses as quickly as rates and flow allow, s; 0 where nothing moves.

@@ -35,7 +35,7 @@ const NOISE_SIGMAS: f64 = 8.0;
 
 /// A joint that is where nothing but a touch explains it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Bump {
+pub(super) struct ContactEvent {
     pub joint: usize,
     /// From the reading to the set-point, rad.
     pub behind_rad: f64,
@@ -45,7 +45,7 @@ pub(super) struct Bump {
 
 /// Follows set-points and readings, one pair a control period.
 #[derive(Clone, Debug)]
-pub(super) struct BumpWatch {
+pub(super) struct ContactDetector {
     period_s: f64,
     joints: Vec<JointWatch>,
 }
@@ -64,22 +64,22 @@ struct JointWatch {
     rate_rad_s: f64,
     recent_rad: [f64; MAX_PERIODS],
     next: usize,
-    lag_s: Usual,
-    rest_rad: Usual,
+    lag_s: AdaptiveThreshold,
+    rest_rad: AdaptiveThreshold,
     /// Its reading has jumped, and not come back.
     has_jumped: bool,
 }
 
 /// A running largest value, edge by edge.
 #[derive(Clone, Copy, Debug)]
-struct Usual {
+struct AdaptiveThreshold {
     value: f64,
     /// Of this edge, where there is one.
     now: Option<f64>,
     edges: f64,
 }
 
-impl Usual {
+impl AdaptiveThreshold {
     fn guessed(value: f64) -> Self {
         Self { value, now: None, edges: 0.0 }
     }
@@ -97,7 +97,7 @@ impl Usual {
     }
 }
 
-impl BumpWatch {
+impl ContactDetector {
     pub fn new(robot: &Robot, period_s: f64) -> Self {
         let joints = robot.sensors.iter().enumerate().map(|(joint, spec)| JointWatch {
             is_watched: robot.failed.iter().all(|failed| failed.joint != joint),
@@ -109,23 +109,23 @@ impl BumpWatch {
             rate_rad_s: 0.0,
             recent_rad: [0.0; MAX_PERIODS],
             next: 0,
-            lag_s: Usual::guessed(FIRST_LAG_S),
-            rest_rad: Usual::guessed(FIRST_REST_RAD),
+            lag_s: AdaptiveThreshold::guessed(FIRST_LAG_S),
+            rest_rad: AdaptiveThreshold::guessed(FIRST_REST_RAD),
             has_jumped: false,
         });
         Self { period_s, joints: joints.collect() }
     }
 
     /// Takes one period; gives the joint that is farthest beyond what is allowed, if any is.
-    pub fn update(&mut self, set_point: &JointAngles, reading: &JointAngles) -> Option<Bump> {
-        let mut worst: Option<Bump> = None;
+    pub fn update(&mut self, set_point: &JointAngles, reading: &JointAngles) -> Option<ContactEvent> {
+        let mut worst: Option<ContactEvent> = None;
         for (joint, watch) in self.joints.iter_mut().enumerate().take(MAX_JOINTS) {
             let Some((behind_rad, allowed_rad)) = watch.update(set_point[joint], reading[joint], self.period_s) else {
                 continue;
             };
             let excess = behind_rad.abs() / allowed_rad;
             if worst.is_none_or(|worst| excess > worst.behind_rad.abs() / worst.allowed_rad) {
-                worst = Some(Bump { joint, behind_rad, allowed_rad });
+                worst = Some(ContactEvent { joint, behind_rad, allowed_rad });
             }
         }
         worst
@@ -223,7 +223,7 @@ mod tests {
 
     /// An arm whose joint 0 follows with a lag, by noisy readings, to and fro; what is done to it is asked each period.
     struct Bench {
-        watch: BumpWatch,
+        watch: ContactDetector,
         rng: rand_chacha::ChaCha8Rng,
         joint_rad: f64,
         noise_rad: f64,
@@ -232,7 +232,7 @@ mod tests {
     impl Bench {
         fn new(robot: &Robot, seed: u64) -> Self {
             let rng = stream_rng(seed, "bump");
-            Self { watch: BumpWatch::new(robot, PERIOD_S), rng, joint_rad: 0.0, noise_rad: 0.001 }
+            Self { watch: ContactDetector::new(robot, PERIOD_S), rng, joint_rad: 0.0, noise_rad: 0.001 }
         }
 
         /// One edge at `rate` and a rest; `act` changes the joint after each period, and the reading. Gives when a bump was told, s.

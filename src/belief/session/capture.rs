@@ -1,12 +1,12 @@
 //! Plans views and visits them, and plans anew as they come in.
 
 use super::SessionError;
-use super::outcome::{Renewal, Visit};
-use super::script::Run;
+use super::outcome::{EstimateUpdate, Visit};
+use super::script::ScriptRunner;
 use crate::calib::{Calibration, fewest_views};
 use crate::plan::{
-    ArmEnsemble, CaptureState, PlanError, PlannedPose, PosePlan, PoseRequest, Stop, TakenView, VisibilityModel,
-    choose_poses,
+    ArmEnsemble, CaptureState, CapturedView, PlanError, PlannedPose, PosePlan, PoseRequest, StopReason,
+    VisibilityModel, choose_poses,
 };
 use armcal_core::robot::Robot;
 use armcal_core::routine::CaptureSettings;
@@ -25,7 +25,7 @@ const TRUST_IN_ADVANCE: f64 = 2.0;
 const LEAST_VIEWS: usize = 3;
 
 /// A capture under way.
-struct Views<'a> {
+struct CaptureRun<'a> {
     settings: &'a CaptureSettings,
     began: Stamp,
     n_fit: usize,
@@ -51,7 +51,7 @@ struct Views<'a> {
     ensemble: Option<ArmEnsemble>,
 }
 
-impl<'a> Views<'a> {
+impl<'a> CaptureRun<'a> {
     fn new(settings: &'a CaptureSettings, robot: &Robot, began: Stamp) -> Self {
         let none = vec![0.0; robot.tags.len()];
         Self {
@@ -109,36 +109,36 @@ impl<'a> Views<'a> {
             elapsed_s: now.since_s(self.began),
             predicted_tool_error_m: self.expected_tool_error_m.filter(|_| self.n_fit >= self.n_for_verdict),
         };
-        let stop = Stop::decide(self.settings, &state)?;
+        let stop = StopReason::decide(self.settings, &state)?;
         // Views for the verdict are wanted whatever the fit says.
-        (stop != Stop::Poses || self.wanted() == [0, 0]).then(|| stop.to_string())
+        (stop != StopReason::Poses || self.wanted() == [0, 0]).then(|| stop.to_string())
     }
 }
 
 /// How a visit came out.
 enum Visited {
     Captured,
-    InVain,
+    Failed,
 }
 
-impl Run<'_, '_> {
+impl ScriptRunner<'_, '_> {
     /// Chooses views under the present belief.
     pub(super) fn plan_views(&mut self, capture: &CaptureSettings) -> Result<PosePlan, SessionError> {
-        let views = Views::new(capture, &self.robot, self.driver.now());
+        let views = CaptureRun::new(capture, &self.robot, self.driver.now());
         Ok(self.choose(&views)?)
     }
 
     /// The views captured so far, as they are believed to be now.
-    fn taken(&self, views: &Views<'_>) -> Vec<TakenView> {
+    fn taken(&self, views: &CaptureRun<'_>) -> Vec<CapturedView> {
         let conditions = self.driver.conditions();
-        let view = |(counts, tags): &(JointCounts, Vec<usize>)| TakenView {
+        let view = |(counts, tags): &(JointCounts, Vec<usize>)| CapturedView {
             angles: self.driver.sensors.angles_under(counts, &conditions),
             tags: tags.clone(),
         };
         views.taken.iter().map(view).collect()
     }
 
-    fn choose(&mut self, views: &Views<'_>) -> Result<PosePlan, PlanError> {
+    fn choose(&mut self, views: &CaptureRun<'_>) -> Result<PosePlan, PlanError> {
         let targets = self.planned.as_ref().map(|planned| planned.targets.as_slice()).unwrap_or_default();
         let [n_fit, n_held_out] = views.wanted();
         choose_poses(
@@ -153,7 +153,7 @@ impl Run<'_, '_> {
                 belief: views.belief.as_ref(),
                 taken: &self.taken(views),
                 prior: self.accepted.as_ref(),
-                tag_trust: &views.trust(),
+                detection_rate: &views.trust(),
                 failed: &views.failed,
                 task: targets,
                 targets_m: &self.setup.routine.task.targets_m,
@@ -165,13 +165,13 @@ impl Run<'_, '_> {
 
     /// Visits views and records what is seen, until there are enough.
     pub(super) fn capture(&mut self, capture: &CaptureSettings) -> Result<(), SessionError> {
-        let mut views = Views::new(capture, &self.robot, self.driver.now());
+        let mut views = CaptureRun::new(capture, &self.robot, self.driver.now());
         let replans = self.replans(capture);
         let ready = self.planned.as_mut().and_then(|planned| planned.first_capture.take());
         // Planned before anything moved; the belief is still the same unless a calibration came in between.
         let mut plan = ready.filter(|_| self.epochs.len() == 1);
         if replans {
-            self.look_from_here(&mut views)?;
+            self.capture_at_start(&mut views)?;
         }
         let why = loop {
             if let Some(why) = views.enough(self.driver.now()) {
@@ -194,7 +194,7 @@ impl Run<'_, '_> {
                 }
             };
             if chosen.poses.is_empty() {
-                break Stop::NoPoseLeft.to_string();
+                break StopReason::NoPoseLeft.to_string();
             }
             self.log_plan(&chosen)?;
             views.enough_at = chosen.needed.map(|needed| (views.n_fit + needed).max(views.n_for_verdict));
@@ -225,16 +225,20 @@ impl Run<'_, '_> {
     }
 
     /// Renews belief and margins; whether anything changed.
-    fn renew_views(&mut self, views: &mut Views<'_>) -> Result<bool, SessionError> {
+    fn renew_views(&mut self, views: &mut CaptureRun<'_>) -> Result<bool, SessionError> {
         views.renewed_at = views.captured();
         self.driver.phase(Phase::Plan)?;
-        let Some(calibration) = self.renew()? else { return Ok(false) };
+        let Some(calibration) = self.update_estimate()? else { return Ok(false) };
         views.expected_tool_error_m = self.expected_tool_error_m(&calibration);
         if let Some(expected_m) = views.expected_tool_error_m {
             let text = format!("after {} views: predicted tool error {:.2} mm", views.captured(), expected_m * 1e3);
             self.driver.log(LogLevel::Info, &text)?;
             let elapsed_s = self.driver.now().since_s(views.began);
-            self.renewals.push(Renewal { views: views.captured(), elapsed_s, expected_tool_error_m: expected_m });
+            self.renewals.push(EstimateUpdate {
+                views: views.captured(),
+                elapsed_s,
+                expected_tool_error_m: expected_m,
+            });
         }
         views.belief = Some(calibration);
         views.ensemble = None;
@@ -242,7 +246,7 @@ impl Run<'_, '_> {
     }
 
     /// Where the arm stands nothing can be hit: what tags can be seen from there tell where it is.
-    fn look_from_here(&mut self, views: &mut Views<'_>) -> Result<(), SessionError> {
+    fn capture_at_start(&mut self, views: &mut CaptureRun<'_>) -> Result<(), SessionError> {
         let here = self.driver.set_point();
         let tags = VisibilityModel::default().visible(&self.robot, self.clearance, &here);
         if tags.is_empty() {
@@ -254,14 +258,14 @@ impl Run<'_, '_> {
             tags: tags.into_iter().map(|tag| (tag, 1.0)).collect(),
             predicted_tool_error_m: f64::NAN,
         };
-        if let Visited::InVain = self.stand_and_look(&pose, views)? {
+        if let Visited::Failed = self.stand_and_look(&pose, views)? {
             self.driver.log(LogLevel::Warn, "nothing was seen from where the arm started")?;
         }
         Ok(())
     }
 
     /// Visits the poses of a plan in their order, as far as the next renewal.
-    fn visit_some(&mut self, plan: &PosePlan, views: &mut Views<'_>, replans: bool) -> Result<(), SessionError> {
+    fn visit_some(&mut self, plan: &PosePlan, views: &mut CaptureRun<'_>, replans: bool) -> Result<(), SessionError> {
         for pose in &plan.poses {
             if replans && (views.is_renewal_due() || views.enough(self.driver.now()).is_some()) {
                 return Ok(());
@@ -275,7 +279,7 @@ impl Run<'_, '_> {
                 self.tally.poses_skipped += 1;
                 continue;
             }
-            if let Visited::InVain = self.stand_and_look(pose, views)?
+            if let Visited::Failed = self.stand_and_look(pose, views)?
                 && replans
             {
                 // What was wrong there is worth a thought before the next pose.
@@ -285,7 +289,7 @@ impl Run<'_, '_> {
         Ok(())
     }
 
-    fn stand_and_look(&mut self, pose: &PlannedPose, views: &mut Views<'_>) -> Result<Visited, SessionError> {
+    fn stand_and_look(&mut self, pose: &PlannedPose, views: &mut CaptureRun<'_>) -> Result<Visited, SessionError> {
         views.tried += 1;
         self.driver.phase(Phase::Settle)?;
         let number = self.poses_marked;
@@ -293,7 +297,7 @@ impl Run<'_, '_> {
             self.driver.log(LogLevel::Warn, &format!("pose {number} is left out: the arm did not settle"))?;
             self.tally.poses_skipped += 1;
             views.failed.push(pose.angles);
-            return Ok(Visited::InVain);
+            return Ok(Visited::Failed);
         }
         self.driver.phase(Phase::Capture)?;
         self.note_visit(pose, views)?;
@@ -305,7 +309,7 @@ impl Run<'_, '_> {
             self.driver.log(LogLevel::Warn, &format!("pose {number} saw no tag"))?;
             views.failed.push(pose.angles);
             if self.replans(views.settings) {
-                return Ok(Visited::InVain);
+                return Ok(Visited::Failed);
             }
         }
         match pose.set {
@@ -316,7 +320,7 @@ impl Run<'_, '_> {
     }
 
     /// Holds the tags that were seen against those that should have been.
-    fn learn(&mut self, pose: &PlannedPose, views: &mut Views<'_>) -> Result<(), SessionError> {
+    fn learn(&mut self, pose: &PlannedPose, views: &mut CaptureRun<'_>) -> Result<(), SessionError> {
         let ids_seen = &self.driver.recorder.ids_seen;
         let seen = |&tag: &usize| ids_seen.contains(&self.robot.tags[tag].id);
         views.taken.push((self.driver.counts()?, (0..self.robot.tags.len()).filter(seen).collect()));
@@ -329,7 +333,7 @@ impl Run<'_, '_> {
     }
 
     /// Notes how far each link may be from where it is believed to be, to be held against the truth where there is one.
-    fn note_visit(&mut self, pose: &PlannedPose, views: &mut Views<'_>) -> Result<(), SessionError> {
+    fn note_visit(&mut self, pose: &PlannedPose, views: &mut CaptureRun<'_>) -> Result<(), SessionError> {
         let believed = self.driver.believed_angles()?;
         let ensemble = match views.ensemble.take() {
             Some(ensemble) => ensemble,
@@ -347,7 +351,7 @@ impl Run<'_, '_> {
         Ok(())
     }
 
-    fn ensemble(&self, views: &Views<'_>) -> ArmEnsemble {
+    fn ensemble(&self, views: &CaptureRun<'_>) -> ArmEnsemble {
         let mut rng = stream_rng(self.setup.seed, "ensemble");
         match views.belief.as_ref().or(self.accepted.as_ref()) {
             Some(calibration) => {

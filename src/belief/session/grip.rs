@@ -1,7 +1,7 @@
 //! Opens and closes the gripper, and keeps room for open jaws.
 
 use super::SessionError;
-use super::script::Run;
+use super::script::ScriptRunner;
 use crate::plan::ClearanceModel;
 use armcal_core::routine::Step;
 use armcal_core::streams::{GripperCommand, LogLevel, Mark, MarkKind, Message};
@@ -13,7 +13,7 @@ const PATIENCE_S: f64 = 2.0;
 /// Jaws that are told less than this beyond rest are at rest, m.
 const AS_AT_REST_M: f64 = 1e-6;
 
-impl Run<'_, '_> {
+impl ScriptRunner<'_, '_> {
     /// Drives the jaws to `opening`, 0 (closed) .. 1 (open), and waits until they are there. From then on the arm keeps their
     /// width clear, until they are no wider than at rest.
     pub(super) fn grip(&mut self, step: usize, opening: f64) -> Result<(), SessionError> {
@@ -21,7 +21,7 @@ impl Run<'_, '_> {
         let gripper = self.robot.gripper.clone().ok_or_else(|| wrong("the arm has no gripper".to_owned()))?;
         let opening_m = opening * gripper.opening_max_m;
         let is_wide = opening_m > gripper.rest_opening_m + AS_AT_REST_M;
-        let crowded = |run: &Self| run.jaws.open.too_near(&run.driver.set_point(), &run.bounds, 0.0);
+        let crowded = |run: &Self| run.jaws.open.find_violation(&run.driver.set_point(), &run.bounds, 0.0);
         if is_wide && (crowded(self).is_some() || !self.can_leave(self.jaws.open)) {
             // Folded up for a view the arm may be in its own jaws' way; where it is stowed there is room on any vehicle so far.
             let stowed = self.robot.stowed;
@@ -59,7 +59,7 @@ impl Run<'_, '_> {
     }
 }
 
-impl<'a> Run<'a, '_> {
+impl<'a> ScriptRunner<'a, '_> {
     /// For the targets that are planned before anything moves: with open jaws if one is touched before a calibration, after
     /// which they are planned anew.
     pub(super) fn clearance_at_targets(&self) -> &'a ClearanceModel<'a> {

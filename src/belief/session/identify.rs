@@ -2,8 +2,8 @@
 //! scale, then a larger one that is safe for the scales that are left.
 
 use super::SessionError;
-use super::motion::Followed;
-use super::script::Run;
+use super::motion::MotionOutcome;
+use super::script::ScriptRunner;
 use crate::calib::{IdentifiedScale, associate, identify_scales};
 use crate::plan::{JointErrorBounds, Path, UnknownScale};
 use armcal_core::robot::Robot;
@@ -20,7 +20,7 @@ const SIGMAS: f64 = 3.0;
 /// An excursion that is not clear is tried again at this share of its size.
 const SHRINK: f64 = 0.75;
 
-impl Run<'_, '_> {
+impl ScriptRunner<'_, '_> {
     pub(super) fn identify(&mut self, step: usize, settings: &IdentifySettings) -> Result<(), SessionError> {
         let joints = self.robot.joint_names();
         let Some(joint) = joints.iter().position(|name| *name == settings.joint) else {
@@ -76,7 +76,7 @@ impl Run<'_, '_> {
             let end = JointAngles::from_fn(at.len(), |j| {
                 if j == unknown.joint { unknown.rest_rad + excursion_rad } else { at[j] }
             });
-            let Some(found) = self.clearance.too_near_arriving(&end, &bounds, self.margin_m()) else {
+            let Some(found) = self.clearance.find_violation_arriving(&end, &bounds, self.margin_m()) else {
                 return Ok(excursion_rad);
             };
             nearest = found.to_string();
@@ -94,7 +94,7 @@ impl Run<'_, '_> {
         for offset_rad in offsets_rad {
             let to = JointAngles::from_fn(rest.len(), |j| if j == joint { rest[j] + offset_rad } else { rest[j] });
             let from = self.driver.set_point();
-            let is_there = self.driver.follow(&Path::slowly(vec![from, to]))? == Followed::Arrived;
+            let is_there = self.driver.follow(&Path::slowly(vec![from, to]))? == MotionOutcome::Arrived;
             if is_there && self.driver.settle()? {
                 self.driver.dwell(DWELL_S, MarkKind::Identify { joint_idx: joint as u32 })?;
             } else {
@@ -115,7 +115,7 @@ impl Run<'_, '_> {
     /// From here on the sensor is an ordinary one with the measured scale.
     fn take_over(&mut self, robot: Robot) -> Result<(), SessionError> {
         let sensors = ArmSensors::nominal(&robot);
-        self.bounds = JointErrorBounds::prior(&robot);
+        self.bounds = JointErrorBounds::datasheet(&robot);
         self.robot = robot;
         self.driver.believe(sensors.clone());
         self.epochs[0].sensors = sensors;

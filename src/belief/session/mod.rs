@@ -22,7 +22,7 @@ mod script;
 mod stillness;
 mod stops;
 
-pub use outcome::{AssertResult, Epoch, Outcome, ReachStep, Renewal, Visit};
+pub use outcome::{AssertResult, Epoch, EstimateUpdate, Outcome, ReachStep, Visit};
 pub use recorder::Recorder;
 
 use crate::calib::CalibError;
@@ -110,7 +110,7 @@ pub enum Approval {
 }
 
 /// All that a run needs to know beforehand.
-pub struct Setup<'a> {
+pub struct SessionInputs<'a> {
     pub robot: &'a Robot,
     pub vehicle: &'a Vehicle,
     pub routine: &'a Routine,
@@ -123,7 +123,7 @@ pub struct Setup<'a> {
 /// # Errors
 /// [`SessionError`]; what was recorded until then stays readable.
 pub fn run(
-    setup: &Setup<'_>,
+    setup: &SessionInputs<'_>,
     arm: &mut dyn Arm,
     recorder: &mut Recorder,
     progress: &mut dyn Progress,

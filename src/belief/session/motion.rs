@@ -1,7 +1,7 @@
 //! Drives an arm along believed angles and waits until its own sensors say that it stands, or that it has met something.
 
-use super::bump::{Bump, BumpWatch};
-use super::stillness::Stillness;
+use super::bump::{ContactDetector, ContactEvent};
+use super::stillness::SettlingDetector;
 use super::{MotionAhead, Progress, Recorder, SessionError};
 use crate::plan::{Edge, Path, Timing};
 use armcal_core::robot::{FailedJoint, Robot, Vehicle};
@@ -27,7 +27,7 @@ pub(super) struct Driver<'b> {
     pub motion_s: f64,
     pub waited_s: f64,
     timing: Timing,
-    bumps: BumpWatch,
+    bumps: ContactDetector,
     /// The last motion's waypoints, for the way back.
     came: Vec<JointAngles>,
 }
@@ -35,7 +35,7 @@ pub(super) struct Driver<'b> {
 /// How a motion ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[must_use]
-pub enum Followed {
+pub enum MotionOutcome {
     Arrived,
     /// The joint was held up or pushed off; the arm has gone back the way it came.
     Bumped {
@@ -57,15 +57,15 @@ const BELIEF_EVERY: u64 = 4;
 
 /// What is looked out for on the way.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Heed {
+enum ContactMonitoring {
     Bumps,
     Nothing,
 }
 
 /// How waiting for rest ended.
-enum Stood {
+enum SettleOutcome {
     Still,
-    PushedOff(Bump),
+    PushedOff(ContactEvent),
 }
 
 impl<'b> Driver<'b> {
@@ -82,7 +82,7 @@ impl<'b> Driver<'b> {
         let counts = recorder.latest_counts.ok_or(SessionError::NoReadings)?;
         // Sensors that begin are the datasheet's, the same under all conditions.
         let set_point = sensors.angles(&counts);
-        let (timing, bumps) = (Timing::new(robot), BumpWatch::new(robot, arm.period_s()));
+        let (timing, bumps) = (Timing::new(robot), ContactDetector::new(robot, arm.period_s()));
         let mut driver = Self {
             robot,
             arm,
@@ -249,42 +249,42 @@ impl<'b> Driver<'b> {
     }
 
     /// Moves along the path, from rest to rest on each edge, unless it meets something: then it stops, and backs out.
-    pub fn follow(&mut self, path: &Path) -> Result<Followed, SessionError> {
+    pub fn follow(&mut self, path: &Path) -> Result<MotionOutcome, SessionError> {
         self.follow_told(path, None)
     }
 
     /// The same, with the path's clearance for an operator who is asked.
-    pub fn follow_told(&mut self, path: &Path, clearance_m: Option<f64>) -> Result<Followed, SessionError> {
+    pub fn follow_told(&mut self, path: &Path, clearance_m: Option<f64>) -> Result<MotionOutcome, SessionError> {
         self.ask(path, clearance_m)?;
         for (n, edge) in path.edges().enumerate() {
-            if let Some(bump) = self.follow_edge(&edge, Heed::Bumps)? {
+            if let Some(bump) = self.follow_edge(&edge, ContactMonitoring::Bumps)? {
                 self.came = path.waypoints[..=n].to_vec();
                 return self.retreat(bump);
             }
             self.bumps.learn();
         }
         self.came.clone_from(&path.waypoints);
-        Ok(Followed::Arrived)
+        Ok(MotionOutcome::Arrived)
     }
 
     /// The same where a joint is meant to be held up: it is driven against its stop, or comes from there.
-    pub fn follow_unheeding(&mut self, path: &Path) -> Result<(), SessionError> {
+    pub fn follow_unmonitored(&mut self, path: &Path) -> Result<(), SessionError> {
         self.ask(path, None)?;
         for edge in path.edges() {
-            self.follow_edge(&edge, Heed::Nothing)?;
+            self.follow_edge(&edge, ContactMonitoring::Nothing)?;
         }
         self.bumps.forget();
         self.came.clone_from(&path.waypoints);
         Ok(())
     }
 
-    fn follow_edge(&mut self, edge: &Edge, heed: Heed) -> Result<Option<Bump>, SessionError> {
+    fn follow_edge(&mut self, edge: &Edge, heed: ContactMonitoring) -> Result<Option<ContactEvent>, SessionError> {
         let steps = (self.timing.edge_duration_s(edge) / self.arm.period_s()).ceil().max(1.0);
         for k in 1..=steps as u64 {
             self.set_point = Timing::set_point(&edge.from, &edge.to, k as f64 / steps);
             self.command()?;
             self.step()?;
-            if heed == Heed::Bumps
+            if heed == ContactMonitoring::Bumps
                 && let Some(bump) = self.bumps.update(&self.set_point, &self.believed_angles()?)
             {
                 self.motion_s += k as f64 * self.arm.period_s();
@@ -296,8 +296,8 @@ impl<'b> Driver<'b> {
     }
 
     /// Stops where the arm is and goes back the way it came, slowly.
-    fn retreat(&mut self, bump: Bump) -> Result<Followed, SessionError> {
-        let Bump { joint, behind_rad, allowed_rad } = bump;
+    fn retreat(&mut self, bump: ContactEvent) -> Result<MotionOutcome, SessionError> {
+        let ContactEvent { joint, behind_rad, allowed_rad } = bump;
         let at = self.believed_angles()?;
         self.set_point = at;
         self.command()?;
@@ -309,7 +309,7 @@ impl<'b> Driver<'b> {
         self.log(LogLevel::Warn, &text)?;
         let mut from = at;
         for to in std::mem::take(&mut self.came).into_iter().rev() {
-            self.follow_edge(&Edge { from, to, slowness: BACK_OUT_SLOWNESS }, Heed::Nothing)?;
+            self.follow_edge(&Edge { from, to, time_scale: BACK_OUT_SLOWNESS }, ContactMonitoring::Nothing)?;
             from = to;
         }
         self.came = vec![from];
@@ -317,15 +317,15 @@ impl<'b> Driver<'b> {
         if self.stand()?.is_none() {
             self.log(LogLevel::Warn, "the arm did not settle after it had backed out")?;
         }
-        Ok(Followed::Bumped { joint, at })
+        Ok(MotionOutcome::Bumped { joint, at })
     }
 
     /// Waits until the arm stands at its set-point; `false` when it does not within the limit, or is pushed off: then it goes
     /// back the way it came.
     pub fn settle(&mut self) -> Result<bool, SessionError> {
         match self.stand()? {
-            Some(Stood::Still) => Ok(true),
-            Some(Stood::PushedOff(bump)) => {
+            Some(SettleOutcome::Still) => Ok(true),
+            Some(SettleOutcome::PushedOff(bump)) => {
                 let _ = self.retreat(bump)?;
                 Ok(false)
             }
@@ -334,19 +334,19 @@ impl<'b> Driver<'b> {
     }
 
     /// Waits until the arm stands at its set-point, or is pushed off it; `None` when neither comes within the limit.
-    fn stand(&mut self) -> Result<Option<Stood>, SessionError> {
-        let mut stillness = Stillness::new(self.believed_angles()?);
+    fn stand(&mut self) -> Result<Option<SettleOutcome>, SessionError> {
+        let mut stillness = SettlingDetector::new(self.believed_angles()?);
         let mut waited_s = 0.0;
         while waited_s < SETTLE_LIMIT_S {
             self.step()?;
             waited_s += self.arm.period_s();
             let now = self.believed_angles()?;
             if let Some(bump) = self.bumps.update(&self.set_point, &now) {
-                return Ok(Some(Stood::PushedOff(bump)));
+                return Ok(Some(SettleOutcome::PushedOff(bump)));
             }
             if stillness.update(&now, &self.set_point, self.arm.period_s()) >= REST_S {
                 self.bumps.learn();
-                return Ok(Some(Stood::Still));
+                return Ok(Some(SettleOutcome::Still));
             }
         }
         Ok(None)
@@ -354,7 +354,7 @@ impl<'b> Driver<'b> {
 
     /// Waits until the arm stands while `joint` is pressed against something; `false` when it does not within the limit.
     pub fn press(&mut self, joint: usize) -> Result<bool, SessionError> {
-        let mut stillness = Stillness::new(self.believed_angles()?);
+        let mut stillness = SettlingDetector::new(self.believed_angles()?);
         let mut waited_s = 0.0;
         while waited_s < SETTLE_LIMIT_S {
             self.step()?;

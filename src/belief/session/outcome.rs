@@ -27,7 +27,7 @@ pub struct Outcome {
     pub epochs: Vec<Epoch>,
     /// Captured views, in their order.
     pub visits: Vec<Visit>,
-    pub renewals: Vec<Renewal>,
+    pub renewals: Vec<EstimateUpdate>,
     /// Why the last capture took no more views.
     pub capture_ended: Option<String>,
     pub reaches: Vec<ReachStep>,
@@ -62,7 +62,7 @@ pub struct Visit {
 
 /// A renewal of the belief while views were captured.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Renewal {
+pub struct EstimateUpdate {
     pub views: usize,
     /// Since the capture began.
     pub elapsed_s: f64,

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::SessionError;
-use super::script::Run;
+use super::script::ScriptRunner;
 use crate::plan::{JointErrorBounds, PlanError, PosePlan, TargetRequest, VisibilityModel, plan_targets};
 use armcal_core::routine::{CaptureSettings, Step};
 use armcal_core::streams::{JointAngles, Phase};
@@ -16,7 +16,7 @@ pub(super) struct Planned {
     pub first_capture: Option<PosePlan>,
 }
 
-impl Run<'_, '_> {
+impl ScriptRunner<'_, '_> {
     /// Plans all that can be planned, so that a task that cannot be done is refused before anything moves.
     pub fn prepare(&mut self) -> Result<(), SessionError> {
         let routine = self.setup.routine;

@@ -1,7 +1,7 @@
 //! Reaches for the task's targets under the sensors believed in.
 
 use super::SessionError;
-use super::script::Run;
+use super::script::ScriptRunner;
 use crate::plan::{PlanError, TargetRequest, plan_targets};
 use armcal_core::routine::ReachSettings;
 use armcal_core::streams::{JointAngles, LogLevel, MarkKind, Phase, ReachAttempt};
@@ -9,7 +9,7 @@ use armcal_core::streams::{JointAngles, LogLevel, MarkKind, Phase, ReachAttempt}
 /// How long the arm is watched at a target, s.
 const REACH_DWELL_S: f64 = 0.6;
 
-impl Run<'_, '_> {
+impl ScriptRunner<'_, '_> {
     /// Goes to each target and rests there for a moment; if it is to be touched, with open jaws, which then close on it.
     pub(super) fn reach(&mut self, step: usize, settings: &ReachSettings) -> Result<(), SessionError> {
         let ReachSettings { targets, touch } = settings;

@@ -5,21 +5,21 @@
 
 use super::SessionError;
 use super::outcome::Epoch;
-use super::script::{FreshBounds, Run};
-use crate::calib::{Calibration, running_estimate};
+use super::script::{FreshBounds, ScriptRunner};
+use crate::calib::{Calibration, interim_estimate};
 use crate::plan::JointErrorBounds;
 use armcal_core::routine::{CaptureSettings, Margins, Method};
 use armcal_core::sensor::ArmSensors;
 use armcal_core::streams::{JointAngles, LogLevel};
 
 /// What was believed before the first running estimate of a capture.
-pub(super) struct Before {
+pub(super) struct SavedBelief {
     sensors: ArmSensors,
     bounds: JointErrorBounds,
     fresh: Option<FreshBounds>,
 }
 
-impl Run<'_, '_> {
+impl ScriptRunner<'_, '_> {
     /// Whether this capture estimates as it goes.
     pub(super) fn replans(&self, capture: &CaptureSettings) -> bool {
         capture.replan_every > 0 && self.setup.routine.method == Method::Bundle
@@ -35,14 +35,14 @@ impl Run<'_, '_> {
 
     /// Estimates from the views captured since the last calibration and goes on by that; where nothing can be told yet, by what
     /// was believed before.
-    pub(super) fn renew(&mut self) -> Result<Option<Calibration>, SessionError> {
+    pub(super) fn update_estimate(&mut self) -> Result<Option<Calibration>, SessionError> {
         let recording = self.driver.recorder.read_back()?;
         let began_s = self.driver.progress.wall_s();
         let accepted = self.accepted.as_ref();
-        let mut found = running_estimate(&recording, self.setup.robot, self.views_since, accepted);
+        let mut found = interim_estimate(&recording, self.setup.robot, self.views_since, accepted);
         if accepted.is_some() && found.is_err() {
             // Something happened to the arm since: the new views alone tell how it is now.
-            found = running_estimate(&recording, self.setup.robot, self.views_since, None);
+            found = interim_estimate(&recording, self.setup.robot, self.views_since, None);
         }
         self.tally.calibration_wall_s += self.driver.progress.wall_s() - began_s;
         let calibration = match found {
@@ -55,7 +55,7 @@ impl Run<'_, '_> {
         let Ok(sensors) = calibration.sensors(self.setup.robot) else { return Ok(None) };
         if self.before_running.is_none() {
             let (sensors, bounds) = (self.driver.sensors.clone(), self.bounds.clone());
-            self.before_running = Some(Before { sensors, bounds, fresh: self.fresh.take() });
+            self.before_running = Some(SavedBelief { sensors, bounds, fresh: self.fresh.take() });
         }
         self.bounds = self.kept_clear(self.bounds_of(&calibration, &sensors));
         self.driver.believe(sensors.clone());
@@ -66,7 +66,7 @@ impl Run<'_, '_> {
 
     /// Goes back to what was believed before the running estimates: the views came to nothing.
     pub(super) fn forget_running(&mut self) {
-        let Some(Before { sensors, bounds, fresh }) = self.before_running.take() else { return };
+        let Some(SavedBelief { sensors, bounds, fresh }) = self.before_running.take() else { return };
         (self.bounds, self.fresh) = (bounds, fresh);
         self.driver.believe(sensors.clone());
         let last = self.epochs.last().and_then(|epoch| epoch.calibration.clone());

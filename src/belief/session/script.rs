@@ -2,25 +2,25 @@
 
 use rand_chacha::ChaCha8Rng;
 
-use super::motion::{Driver, Followed};
-use super::outcome::{AssertResult, Epoch, Outcome, ReachStep, Renewal, Visit};
+use super::motion::{Driver, MotionOutcome};
+use super::outcome::{AssertResult, Epoch, EstimateUpdate, Outcome, ReachStep, Visit};
 use super::prepare::Planned;
-use super::running::Before;
-use super::{Progress, Recorder, SessionError, Setup};
+use super::running::SavedBelief;
+use super::{Progress, Recorder, SessionError, SessionInputs};
 use crate::calib::{Calibration, CalibrationFileError, Status, calibrate};
-use crate::plan::{Age, ClearanceModel, JointErrorBounds, LeastClearance, PathError, PathPlanner};
+use crate::plan::{ClearanceModel, Elapsed, JointErrorBounds, LeastClearance, PathError, PathPlanner};
 use armcal_core::robot::Robot;
 use armcal_core::routine::{AssertLimits, CalibrateSettings, CalibrateViews, MoveGoal, OnRefusal, Step};
 use armcal_core::sensor::ArmSensors;
 use armcal_core::stats::stream_rng;
-use armcal_core::streams::{Arm, JointAngles, LogLevel, Mark, MarkKind, Message, Phase, ReachAttempt, Start};
+use armcal_core::streams::{Arm, JointAngles, LogLevel, Mark, MarkKind, Message, Phase, PriorSource, ReachAttempt};
 use armcal_core::time::Stamp;
 
 /// Shares of the clearance that are tried in this order for a path from a place that the whole of it does not let the arm leave.
 const START_SHARES: [f64; 3] = [0.5, 0.2, 0.05];
 
 pub(super) fn run(
-    setup: &Setup<'_>,
+    setup: &SessionInputs<'_>,
     arm: &mut dyn Arm,
     recorder: &mut Recorder,
     progress: &mut dyn Progress,
@@ -34,10 +34,10 @@ pub(super) fn run(
     driver.record_survey(setup.vehicle)?;
     driver.phase(Phase::Plan)?;
     let began = driver.now();
-    let mut run = Run {
+    let mut run = ScriptRunner {
         setup,
         robot: setup.robot.clone(),
-        bounds: JointErrorBounds::prior(setup.robot),
+        bounds: JointErrorBounds::datasheet(setup.robot),
         fresh: None,
         before_running: None,
         rng: stream_rng(setup.seed, "plan"),
@@ -58,7 +58,7 @@ pub(super) fn run(
         asserts: Vec::new(),
         driver,
     };
-    run.bounds = run.kept_clear(JointErrorBounds::prior(setup.robot));
+    run.bounds = run.kept_clear(JointErrorBounds::datasheet(setup.robot));
     // A script that begins by measuring a sensor cannot plan before it has.
     if !setup.routine.steps.iter().any(|step| matches!(step, Step::Identify(_))) {
         run.prepare()?;
@@ -90,8 +90,8 @@ pub(super) struct Jaws<'a> {
     pub open: &'a ClearanceModel<'a>,
 }
 
-pub(super) struct Run<'a, 'b> {
-    pub setup: &'a Setup<'a>,
+pub(super) struct ScriptRunner<'a, 'b> {
+    pub setup: &'a SessionInputs<'a>,
     /// With the sensor scales that were measured on the way.
     pub robot: Robot,
     /// How wrong the sensors believed in may be by now.
@@ -99,7 +99,7 @@ pub(super) struct Run<'a, 'b> {
     /// And how wrong they were when they were new: none for a datasheet's, which hold for good.
     pub fresh: Option<FreshBounds>,
     /// While views are being captured: what was believed before.
-    pub before_running: Option<Before>,
+    pub before_running: Option<SavedBelief>,
     pub rng: ChaCha8Rng,
     /// With the jaws as they are now.
     pub clearance: &'a ClearanceModel<'a>,
@@ -116,7 +116,7 @@ pub(super) struct Run<'a, 'b> {
     pub accepted: Option<Calibration>,
     /// Captured views and what was believed there.
     pub visits: Vec<Visit>,
-    pub renewals: Vec<Renewal>,
+    pub renewals: Vec<EstimateUpdate>,
     pub capture_ended: Option<String>,
     pub tally: Tally,
     pub epochs: Vec<Epoch>,
@@ -124,7 +124,7 @@ pub(super) struct Run<'a, 'b> {
     asserts: Vec<AssertResult>,
 }
 
-impl Run<'_, '_> {
+impl ScriptRunner<'_, '_> {
     pub fn progress_at(&mut self, phase: Phase, done: usize, total: usize) {
         let elapsed_s = self.driver.elapsed_s();
         self.driver.progress.update(phase, done, total, elapsed_s);
@@ -233,7 +233,7 @@ impl Run<'_, '_> {
                 let asks = self.driver.progress.wants_to_approve();
                 let least = || LeastClearance::along(self.clearance, &self.bounds, &path, planner.margin_m);
                 let clearance_m = asks.then(|| least().proven_m);
-                Ok(self.driver.follow_told(&path, clearance_m)? == Followed::Arrived)
+                Ok(self.driver.follow_told(&path, clearance_m)? == MotionOutcome::Arrived)
             }
             Err(blocked) => {
                 self.driver.log(LogLevel::Warn, &format!("a pose is left out: {blocked}"))?;
@@ -261,7 +261,7 @@ impl Run<'_, '_> {
         };
         self.driver.phase(Phase::Move)?;
         self.progress_at(Phase::Move, 0, 1);
-        if let Some(nearest) = self.clearance.too_near_arriving(&to, &self.bounds, self.margin_m()) {
+        if let Some(nearest) = self.clearance.find_violation_arriving(&to, &self.bounds, self.margin_m()) {
             return Err(wrong(format!(
                 "the pose comes within {:.3} m of clearance between {nearest} for an arm within the sensors' error; {:.3} m are needed",
                 nearest.distance_m,
@@ -287,7 +287,7 @@ impl Run<'_, '_> {
             CalibrateViews::New => self.views_since,
             CalibrateViews::All => self.began,
         };
-        let kind = MarkKind::Calibrate(if settings.warm { Start::Warm } else { Start::Fresh });
+        let kind = MarkKind::Calibrate(if settings.warm { PriorSource::Warm } else { PriorSource::Fresh });
         self.driver.record(&Message::Mark(Mark { start, end, kind }))?;
         let recording = self.driver.recorder.read_back()?;
         let began_s = self.driver.progress.wall_s();
@@ -311,8 +311,8 @@ impl Run<'_, '_> {
     fn age(&mut self) {
         let Some(fresh) = &self.fresh else { return };
         let warmed_k = self.driver.recorder.oil_c.zip(fresh.oil_c).map_or(0.0, |(now, then)| now - then);
-        let age = Age { seconds: self.driver.now().since_s(fresh.at), warmed_k };
-        self.bounds = fresh.bounds.aged(&self.robot, age);
+        let age = Elapsed { seconds: self.driver.now().since_s(fresh.at), warmed_k };
+        self.bounds = fresh.bounds.widened(&self.robot, age);
     }
 
     fn believe(&mut self, calibration: &Calibration) -> Result<(), SessionError> {

@@ -12,7 +12,7 @@ const SMOOTHING: f64 = 0.1;
 const NOISE_SIGMAS: f64 = 4.0;
 
 /// Follows the readings since the arm was told to stop.
-pub(super) struct Stillness {
+pub(super) struct SettlingDetector {
     smooth: JointAngles,
     /// Mean square of a reading's distance from the smoothed one, rad^2: noise, and lag while it moves.
     scatter: JointAngles,
@@ -21,7 +21,7 @@ pub(super) struct Stillness {
     still_s: f64,
 }
 
-impl Stillness {
+impl SettlingDetector {
     pub fn new(angles: JointAngles) -> Self {
         Self { smooth: angles, scatter: JointAngles::zeros(angles.len()), anchor: angles, still_s: 0.0 }
     }
@@ -61,7 +61,7 @@ mod tests {
         let mut rng = stream_rng(seed, "stillness");
         let set_point = JointAngles::zeros(2);
         let start = JointAngles::from_fn(2, |_| 0.3);
-        let mut stillness = Stillness::new(start);
+        let mut stillness = SettlingDetector::new(start);
         for k in 0..1200 {
             let t_s = f64::from(k) * PERIOD_S;
             let angle = (0.3 - rate_rad_s * t_s).max(left_rad);

@@ -5,12 +5,12 @@
 //! stop is refused and named: this is what makes the method useless on many vehicles.
 
 use super::SessionError;
-use super::script::Run;
+use super::script::ScriptRunner;
 use crate::plan::{Edge, Path};
 use armcal_core::routine::StopsSettings;
 use armcal_core::streams::{JointAngles, LogLevel, MarkKind, Phase};
 
-impl Run<'_, '_> {
+impl ScriptRunner<'_, '_> {
     pub(super) fn stops(&mut self, step: usize, settings: &StopsSettings) -> Result<(), SessionError> {
         let joints = self.robot.joint_names();
         let wrong = |problem: &str| SessionError::Step { step, problem: problem.to_owned() };
@@ -42,12 +42,12 @@ impl Run<'_, '_> {
         let to = JointAngles::from_fn(from.len(), |j| if j == joint { beyond_rad } else { from[j] });
         let stop = format!("the stop of {} at {angle_rad:.4} rad", self.robot.sensors[joint].joint);
         if let Some(nearest) =
-            self.clearance.too_near_along(&Edge::at_full_speed(from, to), &self.bounds, self.margin_m())
+            self.clearance.find_violation_along(&Edge::at_full_speed(from, to), &self.bounds, self.margin_m())
         {
             return self.driver.log(LogLevel::Warn, &format!("{stop} is not driven to: {nearest} may come too near"));
         }
         self.driver.phase(Phase::Move)?;
-        self.driver.follow_unheeding(&Path::at_full_speed(vec![from, to]))?;
+        self.driver.follow_unmonitored(&Path::at_full_speed(vec![from, to]))?;
         self.driver.phase(Phase::Settle)?;
         if self.driver.press(joint)? {
             self.driver.phase(Phase::Capture)?;
@@ -56,7 +56,7 @@ impl Run<'_, '_> {
             self.driver.log(LogLevel::Warn, &format!("{stop} is left out: the arm did not come to rest"))?;
         }
         self.driver.phase(Phase::Move)?;
-        self.driver.follow_unheeding(&Path::at_full_speed(vec![to, from]))?;
+        self.driver.follow_unmonitored(&Path::at_full_speed(vec![to, from]))?;
         if !self.driver.settle()? {
             self.driver.log(LogLevel::Warn, &format!("the arm did not settle after {stop}"))?;
         }

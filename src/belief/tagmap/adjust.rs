@@ -7,7 +7,7 @@
 use nalgebra::{Isometry3, Vector6};
 
 use super::linearize::{Loss, Normal, Reduced, cost, squares};
-use super::problem::{Block, Problem};
+use super::problem::{Block, MapProblem};
 use armcal_core::spatial::exp;
 
 /// Width of the Cauchy loss, in standard deviations found (Zhang 1997: 2.385 costs 5 % of efficiency; it is the start alone).
@@ -31,7 +31,7 @@ const AT_REST: f64 = 1e-3;
 const ROUGHLY: f64 = 1e-3;
 
 /// Lowers the cost from the state of `problem` on; whether it came to rest.
-pub(super) fn minimize(problem: &mut Problem<'_>, loss: Loss, converged: f64) -> bool {
+pub(super) fn minimize(problem: &mut MapProblem<'_>, loss: Loss, converged: f64) -> bool {
     let mut normal = Normal::new(problem);
     normal.update(problem, loss);
     let mut damping = 1e-6;
@@ -70,7 +70,7 @@ struct State {
 }
 
 impl State {
-    fn of(problem: &Problem<'_>) -> Self {
+    fn of(problem: &MapProblem<'_>) -> Self {
         Self {
             tags: problem.tags.iter().map(|tag| tag.pose).collect(),
             extras: problem.extras.iter().map(|extra| extra.pose).collect(),
@@ -78,7 +78,7 @@ impl State {
         }
     }
 
-    fn restore(self, problem: &mut Problem<'_>) {
+    fn restore(self, problem: &mut MapProblem<'_>) {
         problem.tags.iter_mut().zip(self.tags).for_each(|(tag, pose)| tag.pose = pose);
         problem.extras.iter_mut().zip(self.extras).for_each(|(extra, pose)| extra.pose = pose);
         problem.blocks.iter_mut().zip(self.blocks).for_each(|(block, pose)| block.pose = pose);
@@ -86,7 +86,7 @@ impl State {
 }
 
 /// Takes one damped step; `false` where the system is singular.
-fn step(problem: &mut Problem<'_>, normal: &Normal, damping: f64) -> bool {
+fn step(problem: &mut MapProblem<'_>, normal: &Normal, damping: f64) -> bool {
     let Some(Reduced { system, right, inverses }) = normal.reduce(problem, damping) else { return false };
     let Some(factor) = system.factorize() else { return false };
     let nodes = factor.solve(&right);
@@ -110,7 +110,7 @@ fn step(problem: &mut Problem<'_>, normal: &Normal, damping: f64) -> bool {
 }
 
 /// The corners' standard deviation over the one given, from the median length of the residuals of what is used.
-pub(super) fn scale(problem: &Problem<'_>) -> f64 {
+pub(super) fn scale(problem: &MapProblem<'_>) -> f64 {
     let mut lengths = Vec::new();
     for block in &problem.blocks {
         for seen in problem.observations[block.range.clone()].iter().filter(|seen| seen.is_used) {
@@ -129,7 +129,7 @@ pub(super) fn scale(problem: &Problem<'_>) -> f64 {
 }
 
 /// Residual coordinates less unknowns; views of one tag alone take part on both sides.
-pub(super) fn degrees_of_freedom(problem: &Problem<'_>) -> usize {
+pub(super) fn degrees_of_freedom(problem: &MapProblem<'_>) -> usize {
     let used = problem.observations.iter().filter(|seen| seen.is_used).count();
     let blocks = problem
         .blocks
@@ -142,7 +142,7 @@ pub(super) fn degrees_of_freedom(problem: &Problem<'_>) -> usize {
 }
 
 /// From a rough start to near the answer.
-pub(super) fn approach(problem: &mut Problem<'_>) {
+pub(super) fn approach(problem: &mut MapProblem<'_>) {
     // Loops that do not close yet must not count as outliers.
     let loss = Loss::Huber { k: FIRST_WIDTH * scale(problem) };
     minimize(problem, loss, ROUGHLY);
@@ -154,7 +154,7 @@ pub(super) fn approach(problem: &mut Problem<'_>) {
 
 /// Uses exactly the detections that agree to within `beyond` standard deviations (root mean square over their corners, of
 /// the scale found); whether that changed anything.
-pub(super) fn select(problem: &mut Problem<'_>, beyond: f64) -> bool {
+pub(super) fn select(problem: &mut MapProblem<'_>, beyond: f64) -> bool {
     let limit = 4.0 * 2.0 * (beyond * scale(problem)).powi(2);
     let mut changed = false;
     for block in &problem.blocks {
@@ -171,7 +171,7 @@ pub(super) fn select(problem: &mut Problem<'_>, beyond: f64) -> bool {
 }
 
 /// To the answer.
-pub(super) fn finish(problem: &mut Problem<'_>) -> bool {
+pub(super) fn finish(problem: &mut MapProblem<'_>) -> bool {
     let loss = Loss::Huber { k: HUBER_WIDTH * scale(problem) };
     minimize(problem, loss, CONVERGED)
 }

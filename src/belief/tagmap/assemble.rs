@@ -7,7 +7,7 @@ use nalgebra::{Isometry3, Matrix6};
 use super::adjust::degrees_of_freedom;
 use super::groups::Group;
 use super::linearize::{Loss, Normal, cost};
-use super::problem::Problem;
+use super::problem::MapProblem;
 use super::result::{MapGroup, MappedTag, RelativeBodyPose, TagMap};
 use super::screen::Screened;
 use super::sparse::Factor;
@@ -19,7 +19,7 @@ use armcal_core::stats::quantile;
 pub(super) fn assemble(
     input: &MapInput<'_>,
     screened: &Screened,
-    problem: &Problem<'_>,
+    problem: &MapProblem<'_>,
     groups: &[Group],
     noise_scale: f64,
 ) -> TagMap {
@@ -70,7 +70,7 @@ pub(super) fn assemble(
 }
 
 /// Tags whose known place disagrees with the views, and tags most of whose detections were rejected.
-fn doubts(problem: &Problem<'_>) -> Vec<String> {
+fn doubts(problem: &MapProblem<'_>) -> Vec<String> {
     let mut out = Vec::new();
     for (idx, tag) in problem.tags.iter().enumerate() {
         let id = tag.id;
@@ -99,7 +99,7 @@ fn doubts(problem: &Problem<'_>) -> Vec<String> {
 /// Chi-square of 6 degrees of freedom, 99.99 %.
 const FAR_FROM_KNOWN: f64 = 27.86;
 
-fn is_used(problem: &Problem<'_>, range: std::ops::Range<usize>) -> bool {
+fn is_used(problem: &MapProblem<'_>, range: std::ops::Range<usize>) -> bool {
     problem.observations[range].iter().any(|seen| seen.is_used)
 }
 
@@ -111,7 +111,7 @@ struct Pixels {
 }
 
 impl Pixels {
-    fn of(problem: &Problem<'_>) -> Self {
+    fn of(problem: &MapProblem<'_>) -> Self {
         let mut out = Self { used: vec![Vec::new(); problem.tags.len()], unused: Vec::new() };
         for block in &problem.blocks {
             for seen in &problem.observations[block.range.clone()] {
@@ -133,7 +133,7 @@ fn rms(values: impl Iterator<Item = f64>) -> f64 {
     if n == 0 { 0.0 } else { (sum / n as f64).sqrt() }
 }
 
-fn map_group(problem: &Problem<'_>, idx: usize, group: &Group) -> MapGroup {
+fn map_group(problem: &MapProblem<'_>, idx: usize, group: &Group) -> MapGroup {
     let bodies: BTreeSet<usize> = group.tags.iter().map(|tag| problem.tags[*tag].body).collect();
     let of_group = problem.blocks.iter().filter(|block| block.group == idx);
     MapGroup {
@@ -144,7 +144,7 @@ fn map_group(problem: &Problem<'_>, idx: usize, group: &Group) -> MapGroup {
     }
 }
 
-fn mapped(problem: &Problem<'_>, pixels: &Pixels, factor: Option<&Factor>) -> Vec<MappedTag> {
+fn mapped(problem: &MapProblem<'_>, pixels: &Pixels, factor: Option<&Factor>) -> Vec<MappedTag> {
     let with_group = problem.tags.iter().enumerate().filter(|(_, tag)| tag.group != usize::MAX);
     with_group
         .map(|(idx, tag)| {
@@ -169,7 +169,7 @@ fn mapped(problem: &Problem<'_>, pixels: &Pixels, factor: Option<&Factor>) -> Ve
 
 /// Where each further group was, from the first, in each view of two or more.
 fn relative(
-    problem: &Problem<'_>,
+    problem: &MapProblem<'_>,
     screened: &Screened,
     normal: &Normal,
     inverses: &[Matrix6<f64>],
@@ -210,7 +210,7 @@ fn relative(
 
 /// Covariance of a camera's pose: its own, and what its tags add.
 fn block_covariance(
-    problem: &Problem<'_>,
+    problem: &MapProblem<'_>,
     normal: &Normal,
     inverse: &Matrix6<f64>,
     idx: usize,

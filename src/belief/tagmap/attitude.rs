@@ -7,19 +7,19 @@
 use nalgebra::{Isometry3, Matrix3, Matrix6, UnitQuaternion, Vector3};
 
 use super::linearize::Normal;
-use super::problem::{AttitudeLink, Block, Extra, Problem};
+use super::problem::{AttitudeLink, Block, Extra, MapProblem};
 
-fn error(problem: &Problem<'_>, link: &AttitudeLink) -> Vector3<f64> {
+fn error(problem: &MapProblem<'_>, link: &AttitudeLink) -> Vector3<f64> {
     let (moving, fixed) = (&problem.blocks[link.moving].pose.rotation, &problem.blocks[link.fixed].pose.rotation);
     let world = &problem.extras[link.world].pose.rotation;
     (fixed.inverse() * world.inverse() * link.world_from_moving * moving).scaled_axis()
 }
 
-pub(super) fn cost(problem: &Problem<'_>) -> f64 {
+pub(super) fn cost(problem: &MapProblem<'_>) -> f64 {
     problem.links.iter().map(|link| error(problem, link).norm_squared() * link.information).sum()
 }
 
-pub(super) fn edges(problem: &Problem<'_>) -> impl Iterator<Item = (usize, usize)> {
+pub(super) fn edges(problem: &MapProblem<'_>) -> impl Iterator<Item = (usize, usize)> {
     problem.links.iter().flat_map(|link| {
         let nodes = nodes(problem, link);
         [(nodes[0], nodes[1]), (nodes[0], nodes[2]), (nodes[1], nodes[2])]
@@ -27,12 +27,12 @@ pub(super) fn edges(problem: &Problem<'_>) -> impl Iterator<Item = (usize, usize
 }
 
 /// Nodes of moving, fixed, world. Linked blocks always have one.
-fn nodes(problem: &Problem<'_>, link: &AttitudeLink) -> [usize; 3] {
+fn nodes(problem: &MapProblem<'_>, link: &AttitudeLink) -> [usize; 3] {
     let of = |block: usize| problem.blocks[block].node.unwrap_or_default();
     [of(link.moving), of(link.fixed), problem.extras[link.world].node]
 }
 
-pub(super) fn add(normal: &mut Normal, problem: &Problem<'_>) {
+pub(super) fn add(normal: &mut Normal, problem: &MapProblem<'_>) {
     for link in &problem.links {
         let residual = -error(problem, link);
         let fixed = problem.blocks[link.fixed].pose.rotation.inverse().to_rotation_matrix();
@@ -72,7 +72,7 @@ pub(super) struct Wanted {
 }
 
 /// Ties the blocks; gives them and the world's turn their nodes.
-pub(super) fn link(problem: &mut Problem<'_>, attitudes: &[Option<UnitQuaternion<f64>>], wanted: &Wanted) {
+pub(super) fn link(problem: &mut MapProblem<'_>, attitudes: &[Option<UnitQuaternion<f64>>], wanted: &Wanted) {
     let find = |blocks: &[Block], view: usize, group: usize| {
         blocks.iter().position(|block| block.view == view && block.group == group)
     };

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::{Isometry3, Vector6};
 
 use super::localize::localize;
-use super::problem::{Block, Extra, Observation, PosePrior, Problem, TagState};
+use super::problem::{Block, Extra, MapProblem, Observation, PosePrior, TagState};
 use super::result::GroupFrame;
 use super::types::{Body, MapSettings};
 
@@ -25,7 +25,12 @@ pub(super) struct Group {
 
 /// Sets up groups, frames, priors, nodes and blocks anew for the observations in use. `problem.tags` hold provisional poses that
 /// are right relative to each other among those of one `label`.
-pub(super) fn build(problem: &mut Problem<'_>, label: &[usize], bodies: &[Body], settings: &MapSettings) -> Vec<Group> {
+pub(super) fn build(
+    problem: &mut MapProblem<'_>,
+    label: &[usize],
+    bodies: &[Body],
+    settings: &MapSettings,
+) -> Vec<Group> {
     let components = components(&problem.observations, label);
     let mut groups: Vec<Group> = components
         .into_iter()
@@ -93,7 +98,7 @@ fn placed(bodies: &[Body], frame: usize, body: usize) -> Option<Isometry3<f64>> 
 }
 
 /// Moves a group into its frame, holds what is exact, and gives the rest nodes and priors.
-fn anchor(problem: &mut Problem<'_>, idx: usize, group: &Group, bodies: &[Body], settings: &MapSettings) {
+fn anchor(problem: &mut MapProblem<'_>, idx: usize, group: &Group, bodies: &[Body], settings: &MapSettings) {
     let frame = frame_body(&problem.tags, &group.tags, bodies, settings);
     let place_of = |tag: &TagState| {
         let (pose, std) = tag.given?;
@@ -138,7 +143,7 @@ fn information(std: &[f64; 6]) -> Vector6<f64> {
 }
 
 /// Bodies whose place is not known, but those of two or more of their tags on them: the body's place is estimated too.
-fn place_bodies(problem: &mut Problem<'_>, group: &Group, places: &[Place]) {
+fn place_bodies(problem: &mut MapProblem<'_>, group: &Group, places: &[Place]) {
     let mut by_body: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
     for &at in &group.tags {
         let is_open = problem.tags[at].given.is_some() && places.iter().all(|place| place.0 != at);
@@ -162,7 +167,7 @@ fn place_bodies(problem: &mut Problem<'_>, group: &Group, places: &[Place]) {
 }
 
 /// One block for each image and group; cameras placed by the tags as they are.
-fn make_blocks(problem: &mut Problem<'_>) {
+fn make_blocks(problem: &mut MapProblem<'_>) {
     let tags = &problem.tags;
     problem.observations.sort_by_key(|seen| (seen.view, tags[seen.tag].group, seen.tag));
     let mut blocks = Vec::new();
@@ -182,7 +187,7 @@ fn make_blocks(problem: &mut Problem<'_>) {
 }
 
 /// The camera by what is used of a block, or by all of it where nothing is.
-fn locate(problem: &Problem<'_>, range: &std::ops::Range<usize>) -> Option<Isometry3<f64>> {
+fn locate(problem: &MapProblem<'_>, range: &std::ops::Range<usize>) -> Option<Isometry3<f64>> {
     let all = &problem.observations[range.clone()];
     let any_used = all.iter().any(|seen| seen.is_used);
     let seen: Vec<_> =

@@ -7,9 +7,9 @@
 
 use nalgebra::Isometry3;
 
-use super::localize::{localize, place_tag, refine_tag, tag_misfit};
+use super::localize::{localize, place_tag, refine_tag, tag_cost};
 use super::problem::Observation;
-use super::start::{Pairs, elected};
+use super::start::{Pairs, consensus};
 use super::vote::is_finite;
 use armcal_core::optics::CameraModel;
 
@@ -96,7 +96,7 @@ impl Growing<'_> {
         let refined = candidates.iter().map(|candidate| {
             let located = if most > 1 { located.clone() } else { self.locate(placed, &chosen, Some(candidate)) };
             let found = refine_tag(self.cameras, &located, candidate);
-            (tag_misfit(self.cameras, &located, &found), found)
+            (tag_cost(self.cameras, &located, &found), found)
         });
         let finite = refined.filter(|(misfit, found)| misfit.is_finite() && is_finite(found));
         finite.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, found)| found)
@@ -111,7 +111,7 @@ impl Growing<'_> {
         let around = self.pairs.around(tag);
         let around = around.filter(|((a, b), _)| self.is_known(placed, tag, if *a == tag { *b } else { *a }));
         let ((a, b), pair) = around.max_by(|x, y| x.1.weight.total_cmp(&y.1.weight).then(y.0.cmp(&x.0)))?;
-        let a_from_b = elected(self.observations, pair)?;
+        let a_from_b = consensus(self.observations, pair)?;
         Some(if b == tag { placed.pose[a] * a_from_b } else { placed.pose[b] * a_from_b.inverse() })
     }
 

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Matrix2x3, Matrix2x6, Matrix6, Vector2, Vector6};
 
 use super::attitude;
-use super::problem::{Block, Observation, Problem, TagState};
+use super::problem::{Block, MapProblem, Observation, TagState};
 use super::sparse::{Pattern, System};
 use armcal_core::optics::CameraModel;
 use armcal_core::spatial::{adjoint, log, skew};
@@ -86,7 +86,7 @@ pub(super) struct Normal {
 }
 
 impl Normal {
-    pub(super) fn new(problem: &Problem<'_>) -> Self {
+    pub(super) fn new(problem: &MapProblem<'_>) -> Self {
         Self {
             pattern: Arc::new(Pattern::new(problem.n_nodes, edges(problem))),
             own: vec![Matrix6::zeros(); problem.blocks.len()],
@@ -100,7 +100,7 @@ impl Normal {
     }
 
     /// Linearizes at the problem's state.
-    pub(super) fn update(&mut self, problem: &Problem<'_>, loss: Loss) {
+    pub(super) fn update(&mut self, problem: &MapProblem<'_>, loss: Loss) {
         self.cost = 0.0;
         self.nodes.fill(Matrix6::zeros());
         self.nodes_right.fill(Vector6::zeros());
@@ -121,7 +121,7 @@ impl Normal {
         attitude::add(self, problem);
     }
 
-    fn add_observation(&mut self, problem: &Problem<'_>, idx: usize, block: &Block, at: usize, loss: Loss) {
+    fn add_observation(&mut self, problem: &MapProblem<'_>, idx: usize, block: &Block, at: usize, loss: Loss) {
         let seen = &problem.observations[at];
         let tag = &problem.tags[seen.tag];
         let camera = &problem.cameras[seen.camera];
@@ -153,7 +153,7 @@ impl Normal {
     }
 
     /// residual = log(T^-1 B P) for a tag at T whose place on a body at B is P; B is the identity for the group's own body.
-    fn add_prior(&mut self, problem: &Problem<'_>, tag: &TagState) {
+    fn add_prior(&mut self, problem: &MapProblem<'_>, tag: &TagState) {
         let (Some(prior), Some(node)) = (&tag.prior, tag.node) else { return };
         let owner = prior.owner.map(|owner| &problem.extras[owner]);
         let expected = owner.map_or(prior.pose, |owner| owner.pose * prior.pose);
@@ -172,7 +172,7 @@ impl Normal {
     }
 
     /// The reduced system with `damping` added to each diagonal, relative to it; and the inverses of the eliminated blocks.
-    pub(super) fn reduce(&self, problem: &Problem<'_>, damping: f64) -> Option<Reduced> {
+    pub(super) fn reduce(&self, problem: &MapProblem<'_>, damping: f64) -> Option<Reduced> {
         let mut system = System::zeros(&self.pattern);
         let mut right = self.nodes_right.clone();
         let mut inverses = vec![Matrix6::zeros(); problem.blocks.len()];
@@ -214,7 +214,7 @@ impl Normal {
     /// The step of an eliminated block, from the steps of the nodes.
     pub(super) fn back_substitute(
         &self,
-        problem: &Problem<'_>,
+        problem: &MapProblem<'_>,
         idx: usize,
         inverse: &Matrix6<f64>,
         nodes: &[Vector6<f64>],
@@ -230,7 +230,7 @@ impl Normal {
 }
 
 /// The cost alone.
-pub(super) fn cost(problem: &Problem<'_>, loss: Loss) -> f64 {
+pub(super) fn cost(problem: &MapProblem<'_>, loss: Loss) -> f64 {
     let mut cost = attitude::cost(problem);
     for block in &problem.blocks {
         for seen in problem.observations[block.range.clone()].iter().filter(|seen| seen.is_used) {
@@ -249,7 +249,7 @@ pub(super) fn cost(problem: &Problem<'_>, loss: Loss) -> f64 {
 }
 
 /// Pairs of nodes that share a block of the reduced system.
-fn edges(problem: &Problem<'_>) -> std::collections::BTreeSet<(usize, usize)> {
+fn edges(problem: &MapProblem<'_>) -> std::collections::BTreeSet<(usize, usize)> {
     let mut edges = std::collections::BTreeSet::new();
     for block in &problem.blocks {
         let mut nodes: Vec<usize> =

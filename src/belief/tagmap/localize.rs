@@ -11,7 +11,7 @@ use armcal_core::spatial::{exp, skew};
 const COMPARE_PX: f64 = 5.0;
 
 /// How badly poses fit: the Cauchy loss over all corners, in squared pixels.
-fn misfit(camera: &CameraModel, camera_from_tag: &Isometry3<f64>, seen: &Observation) -> f64 {
+fn cost(camera: &CameraModel, camera_from_tag: &Isometry3<f64>, seen: &Observation) -> f64 {
     let loss = Loss::Cauchy { c: COMPARE_PX };
     // Corners have about the same noise; the loss's width is in pixels.
     let px = seen.whiten[0].try_inverse().map_or(1.0, |inverse| inverse.norm() / std::f64::consts::SQRT_2);
@@ -24,7 +24,7 @@ pub(super) fn localize(
     seen: &[(&Observation, Isometry3<f64>)],
 ) -> Option<(Isometry3<f64>, f64)> {
     let total = |frame_from_camera: &Isometry3<f64>| -> f64 {
-        seen.iter().map(|(s, tag)| misfit(&cameras[s.camera], &frame_from_camera.inv_mul(tag), s)).sum()
+        seen.iter().map(|(s, tag)| cost(&cameras[s.camera], &frame_from_camera.inv_mul(tag), s)).sum()
     };
     let mut best: Option<(Isometry3<f64>, f64)> = None;
     for (observation, frame_from_tag) in seen {
@@ -93,7 +93,7 @@ pub(super) fn place_tag(
     for (observation, frame_from_camera) in &some {
         for solution in observation.solutions() {
             let frame_from_tag = frame_from_camera * solution.camera_from_tag.isometry();
-            let misfit = tag_misfit(cameras, images, &frame_from_tag);
+            let misfit = tag_cost(cameras, images, &frame_from_tag);
             if best.as_ref().is_none_or(|(_, least)| misfit < *least) {
                 best = Some((frame_from_tag, misfit));
             }
@@ -108,11 +108,11 @@ pub(super) fn refine_tag(
     images: &[(&Observation, Isometry3<f64>)],
     start: &Isometry3<f64>,
 ) -> Isometry3<f64> {
-    let (mut at, mut least) = (*start, tag_misfit(cameras, images, start));
+    let (mut at, mut least) = (*start, tag_cost(cameras, images, start));
     for _ in 0..6 {
         let Some(step) = tag_step(cameras, images, &at) else { break };
         let trial = at * exp(&step);
-        let misfit = tag_misfit(cameras, images, &trial);
+        let misfit = tag_cost(cameras, images, &trial);
         // Not a number is no improvement either.
         if misfit.partial_cmp(&least) != Some(std::cmp::Ordering::Less) {
             break;
@@ -150,21 +150,21 @@ fn tag_step(
     normal.cholesky().map(|normal| normal.solve(&right))
 }
 
-pub(super) fn tag_misfit(
+pub(super) fn tag_cost(
     cameras: &[CameraModel],
     images: &[(&Observation, Isometry3<f64>)],
     frame_from_tag: &Isometry3<f64>,
 ) -> f64 {
     images
         .iter()
-        .map(|(s, frame_from_camera)| misfit(&cameras[s.camera], &frame_from_camera.inv_mul(frame_from_tag), s))
+        .map(|(s, frame_from_camera)| cost(&cameras[s.camera], &frame_from_camera.inv_mul(frame_from_tag), s))
         .sum()
 }
 
-pub(super) fn view_misfit(
+pub(super) fn view_cost(
     cameras: &[CameraModel],
     seen: &[(&Observation, Isometry3<f64>)],
     frame_from_camera: &Isometry3<f64>,
 ) -> f64 {
-    seen.iter().map(|(s, tag)| misfit(&cameras[s.camera], &frame_from_camera.inv_mul(tag), s)).sum()
+    seen.iter().map(|(s, tag)| cost(&cameras[s.camera], &frame_from_camera.inv_mul(tag), s)).sum()
 }

@@ -30,8 +30,8 @@ pub use result::{GroupFrame, MapGroup, MappedTag, RelativeBodyPose, TagMap};
 pub use scale::ScaleWarning;
 pub use solve::solve;
 pub use types::{
-    Body, MapInput, MapMode, MapRejection, MapSettings, MapView, NoiseScale, RejectedDetection, SeenTag, TagMapError,
-    TagPrior,
+    Body, MapDetection, MapInput, MapMode, MapRejection, MapSettings, MapView, NoiseScale, RejectedDetection,
+    TagMapError, TagPrior,
 };
 
 #[cfg(test)]

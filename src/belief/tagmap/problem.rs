@@ -90,7 +90,7 @@ pub(super) struct AttitudeLink {
 }
 
 #[derive(Clone, Debug)]
-pub(super) struct Problem<'a> {
+pub(super) struct MapProblem<'a> {
     pub(super) cameras: &'a [CameraModel],
     /// Sorted by block and tag.
     pub(super) observations: Vec<Observation>,

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use nalgebra::{Quaternion, UnitQuaternion};
 
 use super::files::{NamedCamera, TagFile};
-use super::types::{MapView, SeenTag};
+use super::types::{MapDetection, MapView};
 use armcal_core::log::{Completeness, LogError, RawMessage, decode, for_each_raw, ros, topics};
 use armcal_core::time::Stamp;
 
@@ -73,7 +73,7 @@ pub fn read_views(
             };
             let stamp = Stamp::try_from(array.header.stamp).ok().filter(|stamp| stamp.nanos != 0).unwrap_or(log_time);
             let tags = array.detections.iter().filter_map(|d| seen(d, stamp, &cameras[camera].name, rules, &mut out));
-            let tags: Vec<SeenTag> = tags.collect();
+            let tags: Vec<MapDetection> = tags.collect();
             let attitude = attitude_at(&contents.attitudes, stamp);
             out.views.push(MapView { camera, stamp, tags, attitude });
         }
@@ -134,7 +134,7 @@ fn seen(
     camera: &str,
     rules: &TagFile,
     out: &mut RecordedViews,
-) -> Option<SeenTag> {
+) -> Option<MapDetection> {
     let corners_px = detection.corners.map(|corner| [corner.x, corner.y]);
     let mut left_out = |reason: &'static str| *out.left_out.entry(reason).or_default() += 1;
     let Ok(mut id) = u32::try_from(detection.id) else {
@@ -167,7 +167,7 @@ fn seen(
         left_out("detections squashed");
         return None;
     }
-    Some(SeenTag { id, corners_px, covariance_px2: None })
+    Some(MapDetection { id, corners_px, covariance_px2: None })
 }
 
 /// Longest gap between attitudes that is bridged, s.

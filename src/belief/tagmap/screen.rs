@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::{Isometry3, Matrix2, UnitQuaternion, Vector2};
 
 use super::problem::{Observation, TagState};
-use super::types::{MapInput, MapMode, MapRejection, MapSettings, MapView, RejectedDetection, SeenTag};
+use super::types::{MapDetection, MapInput, MapMode, MapRejection, MapSettings, MapView, RejectedDetection};
 use super::vote::is_finite;
 use armcal_core::optics::{SquareError, solve_square_both, square_corners};
 
@@ -34,7 +34,7 @@ pub(super) fn screen(input: &MapInput<'_>, settings: &MapSettings) -> Screened {
     let mut found: Vec<(usize, u32, Observation)> = Vec::new();
     let mut n_detections = 0;
     for (at, &view) in order.iter().enumerate() {
-        let mut tags: Vec<&SeenTag> = input.views[view].tags.iter().collect();
+        let mut tags: Vec<&MapDetection> = input.views[view].tags.iter().collect();
         tags.sort_by_key(|tag| tag.id);
         n_detections += tags.len();
         for tag in &tags {
@@ -69,7 +69,7 @@ pub(super) fn screen(input: &MapInput<'_>, settings: &MapSettings) -> Screened {
 
 /// Everything about a view, so that equal keys are equal views.
 fn sort_key(view: &MapView) -> (i64, usize, Vec<(u32, [u64; 8])>) {
-    let bits = |tag: &SeenTag| {
+    let bits = |tag: &MapDetection| {
         let [[a, b], [c, d], [e, f], [g, h]] = tag.corners_px;
         (tag.id, [a, b, c, d, e, f, g, h].map(f64::to_bits))
     };
@@ -113,7 +113,7 @@ fn observe(
     settings: &MapSettings,
     at: usize,
     view: usize,
-    tag: &SeenTag,
+    tag: &MapDetection,
     size_m: f64,
 ) -> Result<Observation, MapRejection> {
     let camera = input.views[view].camera;

@@ -6,8 +6,8 @@ use super::attitude::{self, Wanted};
 use super::check::check;
 use super::groups::{Group, build};
 use super::linearize::Loss;
-use super::localize::{localize, place_tag, tag_misfit, view_misfit};
-use super::problem::{Observation, Problem};
+use super::localize::{localize, place_tag, tag_cost, view_cost};
+use super::problem::{MapProblem, Observation};
 use super::result::TagMap;
 use super::scale;
 use super::screen::{Screened, screen};
@@ -38,7 +38,7 @@ pub fn solve(input: &MapInput<'_>, settings: &MapSettings) -> Result<TagMap, Tag
     for (tag, pose) in screened.tags.iter_mut().zip(&layout.pose) {
         tag.pose = *pose;
     }
-    let mut problem = Problem {
+    let mut problem = MapProblem {
         cameras: input.cameras,
         observations: std::mem::take(&mut screened.observations),
         tags: std::mem::take(&mut screened.tags),
@@ -47,7 +47,7 @@ pub fn solve(input: &MapInput<'_>, settings: &MapSettings) -> Result<TagMap, Tag
         links: Vec::new(),
         n_nodes: 0,
     };
-    let setting_up = SettingUp { input, settings, screened: &screened, label: &layout.label };
+    let setting_up = ProblemBuilder { input, settings, screened: &screened, label: &layout.label };
     let mut groups = setting_up.build(&mut problem);
     approach(&mut problem);
     for _ in 0..3 {
@@ -93,16 +93,16 @@ fn nothing_left(screened: &Screened) -> TagMapError {
     TagMapError::NothingLeft { rejected: screened.n_detections, reasons: reasons.join(", ") }
 }
 
-struct SettingUp<'a, 'b> {
+struct ProblemBuilder<'a, 'b> {
     input: &'b MapInput<'a>,
     settings: &'b MapSettings,
     screened: &'b Screened,
     label: &'b [usize],
 }
 
-impl SettingUp<'_, '_> {
+impl ProblemBuilder<'_, '_> {
     /// Groups, unknowns and attitude links for the observations in use.
-    fn build(&self, problem: &mut Problem<'_>) -> Vec<Group> {
+    fn build(&self, problem: &mut MapProblem<'_>) -> Vec<Group> {
         let groups = build(problem, self.label, self.input.bodies, self.settings);
         let Some(moving) = self.settings.attitude_body else { return groups };
         let attitudes: Vec<_> = self.screened.views.iter().map(|view| view.attitude).collect();
@@ -122,13 +122,13 @@ impl SettingUp<'_, '_> {
 
 /// Finds cameras and tags that have come to rest in a wrong place (the mirror image of the right one, mostly), and puts them
 /// where their images fit better; whether there were any.
-fn repair(problem: &mut Problem<'_>) -> bool {
+fn repair(problem: &mut MapProblem<'_>) -> bool {
     let mut changed = false;
     for idx in 0..problem.blocks.len() {
         let block = &problem.blocks[idx];
         let seen: Vec<(&Observation, _)> =
             problem.observations[block.range.clone()].iter().map(|seen| (seen, problem.tags[seen.tag].pose)).collect();
-        let now = view_misfit(problem.cameras, &seen, &block.pose);
+        let now = view_cost(problem.cameras, &seen, &block.pose);
         if let Some((pose, misfit)) = localize(problem.cameras, &seen)
             && misfit * MUCH_WORSE < now
         {
@@ -144,7 +144,7 @@ fn repair(problem: &mut Problem<'_>) -> bool {
     }
     let mut moved = Vec::new();
     for (idx, tag) in problem.tags.iter().enumerate().filter(|(_, tag)| tag.node.is_some()) {
-        let now = tag_misfit(problem.cameras, &images[idx], &tag.pose);
+        let now = tag_cost(problem.cameras, &images[idx], &tag.pose);
         if let Some((pose, misfit)) = place_tag(problem.cameras, &images[idx])
             && misfit * MUCH_WORSE < now
         {
@@ -159,7 +159,7 @@ fn repair(problem: &mut Problem<'_>) -> bool {
 }
 
 /// Makes the corners' standard deviations what the residuals show; the factor.
-fn rescale(problem: &mut Problem<'_>) -> f64 {
+fn rescale(problem: &mut MapProblem<'_>) -> f64 {
     let freedom = adjust::degrees_of_freedom(problem);
     if freedom < 8 {
         return 1.0;

@@ -42,7 +42,7 @@ pub(super) fn lay_out(
         }
         if pair.seen.len() < settings.min_link_views {
             single.push((*a, *b, pair));
-        } else if let Some(relative) = elected(observations, pair) {
+        } else if let Some(relative) = consensus(observations, pair) {
             forest.join(*a, *b, &relative);
         }
     }
@@ -57,7 +57,7 @@ pub(super) fn lay_out(
             warnings.push(format!(
                 "the groups of tags {first} and {second} were seen together in {n} view only: not joined"
             ));
-        } else if let Some(relative) = elected(observations, pair) {
+        } else if let Some(relative) = consensus(observations, pair) {
             forest.join(a, b, &relative);
         }
     }
@@ -128,9 +128,9 @@ fn area_px2(seen: &Observation) -> f64 {
     0.5 * (c - a).perp(&(d - b)).abs()
 }
 
-pub(super) fn elected(observations: &[Observation], pair: &Pair) -> Option<Isometry3<f64>> {
+pub(super) fn consensus(observations: &[Observation], pair: &Pair) -> Option<Isometry3<f64>> {
     let seen: Vec<_> = pair.seen.iter().map(|(a, b)| (&observations[*a], &observations[*b])).collect();
-    let elected = vote::elect(&seen)?;
+    let elected = vote::vote(&seen)?;
     let needed = (MIN_SHARE * elected.n_voters as f64).ceil().max(if elected.n_voters > 1 { 2.0 } else { 1.0 });
     (elected.n_agreeing as f64 >= needed).then_some(elected.first_from_second)
 }

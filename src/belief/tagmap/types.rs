@@ -7,7 +7,7 @@ use armcal_core::time::Stamp;
 
 /// One tag in one image.
 #[derive(Clone, Debug, PartialEq)]
-pub struct SeenTag {
+pub struct MapDetection {
     pub id: u32,
     /// Raw pixels in the order of `optics::square_corners`.
     pub corners_px: [[f64; 2]; 4],
@@ -21,7 +21,7 @@ pub struct MapView {
     /// Index into [`MapInput::cameras`].
     pub camera: usize,
     pub stamp: Stamp,
-    pub tags: Vec<SeenTag>,
+    pub tags: Vec<MapDetection>,
     /// world_from_body of the moving body that carries an attitude sensor ([`MapSettings::attitude_body`]), at the stamp.
     pub attitude: Option<UnitQuaternion<f64>>,
 }

@@ -24,14 +24,14 @@ struct Hypothesis {
 }
 
 /// What a vote gave.
-pub(super) struct Elected {
+pub(super) struct Consensus {
     pub(super) first_from_second: Isometry3<f64>,
     pub(super) n_agreeing: usize,
     pub(super) n_voters: usize,
 }
 
 /// The relative pose that most of `pairs` agree on; the pairs are of one image each.
-pub(super) fn elect(pairs: &[(&Observation, &Observation)]) -> Option<Elected> {
+pub(super) fn vote(pairs: &[(&Observation, &Observation)]) -> Option<Consensus> {
     let mut voters: Vec<Vec<Hypothesis>> = chosen(pairs).into_iter().map(|(a, b)| hypotheses(a, b)).collect();
     voters.retain(|voter| !voter.is_empty());
     let mut best: Option<(f64, Isometry3<f64>)> = None;
@@ -56,7 +56,7 @@ pub(super) fn elect(pairs: &[(&Observation, &Observation)]) -> Option<Elected> {
     if !is_finite(&first_from_second) {
         return None;
     }
-    Some(Elected { first_from_second, n_agreeing, n_voters: voters.len() })
+    Some(Consensus { first_from_second, n_agreeing, n_voters: voters.len() })
 }
 
 /// The images in which the relative pose is best determined, spread over them in their order.

@@ -5,7 +5,7 @@
 
 use nalgebra::Vector3;
 
-use crate::calib::Surroundings;
+use crate::calib::ConditionHistory;
 use armcal_core::log::Recording;
 use armcal_core::robot::Robot;
 use armcal_core::sensor::{ArmSensors, Conditions};
@@ -53,7 +53,7 @@ pub fn reaches(recording: &Recording, robot: &Robot, beliefs: &Beliefs<'_>) -> V
             _ => None,
         })
         .collect();
-    let surroundings = Surroundings::of(recording);
+    let surroundings = ConditionHistory::of(recording);
     let marks = recording.messages.iter().filter_map(|(_, message)| match message {
         Message::Mark(mark) => Some(mark),
         _ => None,

@@ -1,6 +1,6 @@
 //! Why a recording of a real arm cannot be used.
 
-use crate::log::{CdrError, Disorder, LogError};
+use crate::log::{CdrError, LogError, StampRegression};
 
 /// A message by its topic and its number there, from 1, in the order of the file.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -33,7 +33,7 @@ pub enum InputError {
     #[error("{file}: {place}: {field} of `{of}` is {value}, not a finite number")]
     NotFinite { file: String, place: BadPlace, field: &'static str, of: String, value: f64 },
     #[error("{file}: topic {topic}: {disorder}")]
-    Disorder { file: String, topic: String, disorder: Disorder },
+    Disorder { file: String, topic: String, disorder: StampRegression },
     #[error(
         "{file}: topic {topic}: the joints {recorded:?} lack {missing:?} of the robot's {expected:?}; names that differ go into \
          `joint_sensors.names` of the input map"

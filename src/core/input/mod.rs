@@ -15,5 +15,5 @@ pub use error::{BadPlace, InputError};
 pub use foreign::{ForeignRecording, read_foreign};
 pub use joints::Reading;
 pub use map::{ChildFrame, InputMap, NotFinite, TagUse, WhileMoving, parse_input_map, read_input_map};
-pub use tags::{Seen, Sighting, TagFrame};
+pub use tags::{ExternalDetection, RawMeasurement, TagFrame};
 pub use task::{TaskFile, parse_task, read_task};

@@ -13,15 +13,15 @@ use crate::time::Stamp;
 
 /// One landmark in one image.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Sighting {
+pub struct ExternalDetection {
     /// Its number; `None` is the one landmark of a plain `child_frame`.
     pub id: Option<u32>,
-    pub seen: Seen,
+    pub seen: RawMeasurement,
 }
 
 /// How it was seen.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Seen {
+pub enum RawMeasurement {
     /// Raw pixels: bottom left, bottom right, top right, top left as printed.
     Corners([[f64; 2]; 4]),
     /// Its position in the camera frame, m.
@@ -34,7 +34,7 @@ pub enum Seen {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TagFrame {
     pub stamp: Stamp,
-    pub tags: Vec<Sighting>,
+    pub tags: Vec<ExternalDetection>,
     /// Hashes of the messages that it comes from.
     pub digests: Vec<[u8; 32]>,
 }
@@ -131,8 +131,8 @@ impl<'a> TagReader<'a> {
         let given = Isometry3::from_parts(Translation3::from(position), rotation);
         let camera_from_tag = if is_inverse { given.inverse() } else { given };
         let seen = match self.map.tag_use {
-            TagUse::Pose => Seen::Pose(camera_from_tag),
-            _ => Seen::Position(camera_from_tag.translation.vector),
+            TagUse::Pose => RawMeasurement::Pose(camera_from_tag),
+            _ => RawMeasurement::Position(camera_from_tag.translation.vector),
         };
         self.add(stamp, digest, Some(id), seen);
         Ok(())
@@ -162,7 +162,7 @@ impl<'a> TagReader<'a> {
                 self.not_finite(place, "corners", &format!("tag {id}"), *value)?;
                 continue;
             }
-            self.add(stamp, digest, Some(id), Seen::Corners(corners_px));
+            self.add(stamp, digest, Some(id), RawMeasurement::Corners(corners_px));
         }
         Ok(())
     }
@@ -176,14 +176,14 @@ impl<'a> TagReader<'a> {
         Err(InputError::NotFinite { file, place: place.clone(), field, of, value })
     }
 
-    fn add(&mut self, stamp: Stamp, digest: [u8; 32], id: Option<u32>, seen: Seen) {
+    fn add(&mut self, stamp: Stamp, digest: [u8; 32], id: Option<u32>, seen: RawMeasurement) {
         let id = match self.map.child_frame {
-            Some(super::map::ChildFrame::Plain(_)) if !matches!(seen, Seen::Corners(_)) => None,
+            Some(super::map::ChildFrame::Plain(_)) if !matches!(seen, RawMeasurement::Corners(_)) => None,
             _ => id,
         };
         let frame = self.frames.entry(stamp).or_default();
         frame.stamp = stamp;
-        frame.tags.push(Sighting { id, seen });
+        frame.tags.push(ExternalDetection { id, seen });
         if frame.digests.last() != Some(&digest) {
             frame.digests.push(digest);
         }
@@ -197,7 +197,7 @@ impl<'a> TagReader<'a> {
     pub fn finish(mut self) -> (Vec<TagFrame>, BTreeMap<String, u64>) {
         let mut frames: Vec<TagFrame> = std::mem::take(&mut self.frames).into_values().collect();
         for frame in &mut frames {
-            let mut once: Vec<Sighting> = Vec::new();
+            let mut once: Vec<ExternalDetection> = Vec::new();
             let mut twice = BTreeSet::new();
             for sighting in std::mem::take(&mut frame.tags) {
                 match once.iter().find(|other| other.id == sighting.id) {

@@ -5,14 +5,14 @@ use std::collections::BTreeSet;
 use serde::Deserialize;
 
 use super::cdr;
-use super::error::Rejection;
+use super::error::DecodeRejection;
 use super::ros::{self, Time};
 use super::topics::Stream;
 use crate::robot::{FailedJoint, FailedKind};
 use crate::streams::{
     Attitude, CameraImage, CaptureSet, DetectionReject, DetectionRejects, GripperCommand, GripperSample, JointAngles,
     JointCommand, JointCounts, JointSensorSample, JointStateBelief, LogLevel, LogLine, MAX_JOINTS, Mark, MarkKind,
-    Message, Phase, PressureSample, ReachAttempt, ReachTask, RecordedSurvey, RecordedTag, RejectReason, Start,
+    Message, Phase, PressureSample, PriorSource, ReachAttempt, ReachTask, RecordedSurvey, RecordedTag, RejectReason,
     TagDetection, TagDetections, TemperatureSample, Thermometer,
 };
 use crate::time::Stamp;
@@ -40,7 +40,7 @@ struct JointStateView<'a> {
 ///
 /// # Errors
 /// [`Rejection`], whatever the bytes are.
-pub(super) fn decode_message(stream: Stream, bytes: &[u8], names: &mut FirstNames) -> Result<Message, Rejection> {
+pub(super) fn decode_message(stream: Stream, bytes: &[u8], names: &mut FirstNames) -> Result<Message, DecodeRejection> {
     Ok(match stream {
         Stream::JointSensors => {
             let joints = joints(bytes, names)?;
@@ -79,73 +79,73 @@ pub(super) fn decode_message(stream: Stream, bytes: &[u8], names: &mut FirstName
     })
 }
 
-fn finite(field: &'static str, values: impl IntoIterator<Item = f64>) -> Result<(), Rejection> {
-    if values.into_iter().all(f64::is_finite) { Ok(()) } else { Err(Rejection::NotFinite { field }) }
+fn finite(field: &'static str, values: impl IntoIterator<Item = f64>) -> Result<(), DecodeRejection> {
+    if values.into_iter().all(f64::is_finite) { Ok(()) } else { Err(DecodeRejection::NotFinite { field }) }
 }
 
-fn joints<'a>(bytes: &'a [u8], names: &mut FirstNames) -> Result<JointStateView<'a>, Rejection> {
+fn joints<'a>(bytes: &'a [u8], names: &mut FirstNames) -> Result<JointStateView<'a>, DecodeRejection> {
     let joints: JointStateView<'a> = cdr::decode(bytes)?;
     let n = joints.position.len();
     if n > MAX_JOINTS {
-        return Err(Rejection::TooManyJoints { got: n });
+        return Err(DecodeRejection::TooManyJoints { got: n });
     }
     if n == 0 {
-        return Err(Rejection::NoJoints);
+        return Err(DecodeRejection::NoJoints);
     }
     if let Some(first) = names.as_ref().filter(|first| first.len() != n) {
-        return Err(Rejection::JointCount { got: n, expected: first.len() });
+        return Err(DecodeRejection::JointCount { got: n, expected: first.len() });
     }
     if joints.name.len() != n {
-        return Err(Rejection::NameCount { names: joints.name.len(), positions: n });
+        return Err(DecodeRejection::NameCount { names: joints.name.len(), positions: n });
     }
     if names.as_ref().is_some_and(|first| *first != joints.name) {
-        return Err(Rejection::NamesChanged);
+        return Err(DecodeRejection::NamesChanged);
     }
     finite("position", joints.position.iter().copied())?;
     names.get_or_insert_with(|| joints.name.iter().map(|name| (*name).to_owned()).collect());
     Ok(joints)
 }
 
-fn detections(m: &ros::AprilTagDetectionArray) -> Result<TagDetections, Rejection> {
+fn detections(m: &ros::AprilTagDetectionArray) -> Result<TagDetections, DecodeRejection> {
     let tags = m.detections.iter().map(detection).collect::<Result<_, _>>()?;
     Ok(TagDetections { stamp: m.header.stamp.try_into()?, tags })
 }
 
-fn detection(tag: &ros::AprilTagDetection) -> Result<TagDetection, Rejection> {
+fn detection(tag: &ros::AprilTagDetection) -> Result<TagDetection, DecodeRejection> {
     let corners_px = tag.corners.map(|corner| [corner.x, corner.y]);
     finite("corners", corners_px.into_iter().flatten())?;
     finite("decision_margin", [f64::from(tag.decision_margin)])?;
     Ok(TagDetection {
-        id: u32::try_from(tag.id).map_err(|_| Rejection::NegativeTagId)?,
+        id: u32::try_from(tag.id).map_err(|_| DecodeRejection::NegativeTagId)?,
         corners_px,
         decision_margin: f64::from(tag.decision_margin),
     })
 }
 
-fn rejects(m: &ros::DetectionRejects) -> Result<DetectionRejects, Rejection> {
-    let reject = |r: &ros::DetectionReject| -> Result<DetectionReject, Rejection> {
+fn rejects(m: &ros::DetectionRejects) -> Result<DetectionRejects, DecodeRejection> {
+    let reject = |r: &ros::DetectionReject| -> Result<DetectionReject, DecodeRejection> {
         let corners_px = r.corners.map(|corner| [corner.x, corner.y]);
         finite("corners", corners_px.into_iter().flatten())?;
         let reason = RejectReason::ALL.into_iter().find(|reason| reason.name() == r.reason);
-        Ok(DetectionReject { id: r.id, corners_px, reason: reason.ok_or(Rejection::UnknownReason)? })
+        Ok(DetectionReject { id: r.id, corners_px, reason: reason.ok_or(DecodeRejection::UnknownReason)? })
     };
     let rejects = m.rejects.iter().map(reject).collect::<Result<_, _>>()?;
     Ok(DetectionRejects { stamp: m.header.stamp.try_into()?, rejects })
 }
 
-fn image(m: ros::CompressedImage) -> Result<CameraImage, Rejection> {
+fn image(m: ros::CompressedImage) -> Result<CameraImage, DecodeRejection> {
     if m.format != "jpeg" && !m.format.contains("jpeg") {
-        return Err(Rejection::ImageFormat);
+        return Err(DecodeRejection::ImageFormat);
     }
     Ok(CameraImage { stamp: m.header.stamp.try_into()?, jpeg: m.data })
 }
 
-fn variance(value: f64) -> Result<f64, Rejection> {
+fn variance(value: f64) -> Result<f64, DecodeRejection> {
     finite("variance", [value])?;
-    if value < 0.0 { Err(Rejection::NegativeVariance) } else { Ok(value) }
+    if value < 0.0 { Err(DecodeRejection::NegativeVariance) } else { Ok(value) }
 }
 
-fn temperature(m: &ros::Temperature, thermometer: Thermometer) -> Result<TemperatureSample, Rejection> {
+fn temperature(m: &ros::Temperature, thermometer: Thermometer) -> Result<TemperatureSample, DecodeRejection> {
     finite("temperature", [m.temperature])?;
     Ok(TemperatureSample {
         stamp: m.header.stamp.try_into()?,
@@ -155,7 +155,7 @@ fn temperature(m: &ros::Temperature, thermometer: Thermometer) -> Result<Tempera
     })
 }
 
-fn pressure(m: &ros::FluidPressure) -> Result<PressureSample, Rejection> {
+fn pressure(m: &ros::FluidPressure) -> Result<PressureSample, DecodeRejection> {
     finite("fluid_pressure", [m.fluid_pressure])?;
     Ok(PressureSample {
         stamp: m.header.stamp.try_into()?,
@@ -164,19 +164,19 @@ fn pressure(m: &ros::FluidPressure) -> Result<PressureSample, Rejection> {
     })
 }
 
-fn orientation(quaternion: &ros::Quaternion) -> Result<[f64; 4], Rejection> {
+fn orientation(quaternion: &ros::Quaternion) -> Result<[f64; 4], DecodeRejection> {
     let wxyz = quaternion.wxyz();
     finite("orientation", wxyz)?;
     let length = wxyz.iter().map(|c| c * c).sum::<f64>().sqrt();
     if (length - 1.0).abs() > QUATERNION_LENGTH_TOLERANCE {
-        return Err(Rejection::QuaternionLength);
+        return Err(DecodeRejection::QuaternionLength);
     }
     Ok(wxyz)
 }
 
-fn attitude(m: &ros::Imu) -> Result<Attitude, Rejection> {
+fn attitude(m: &ros::Imu) -> Result<Attitude, DecodeRejection> {
     if m.orientation_covariance[0] < 0.0 {
-        return Err(Rejection::NoOrientation);
+        return Err(DecodeRejection::NoOrientation);
     }
     let quaternion_wxyz = orientation(&m.orientation)?;
     let angular_velocity_rad_s = m.angular_velocity.into();
@@ -188,38 +188,38 @@ fn attitude(m: &ros::Imu) -> Result<Attitude, Rejection> {
 }
 
 /// One joint by any name: its position is the gap between the jaws, m.
-fn gripper(m: &ros::JointState) -> Result<(Stamp, f64), Rejection> {
+fn gripper(m: &ros::JointState) -> Result<(Stamp, f64), DecodeRejection> {
     let [opening_m] = m.position[..] else {
-        return Err(Rejection::JointCount { got: m.position.len(), expected: 1 });
+        return Err(DecodeRejection::JointCount { got: m.position.len(), expected: 1 });
     };
     finite("position", [opening_m])?;
     Ok((m.header.stamp.try_into()?, opening_m))
 }
 
-fn task(m: &ros::ReachTask) -> Result<ReachTask, Rejection> {
+fn task(m: &ros::ReachTask) -> Result<ReachTask, DecodeRejection> {
     let targets_m: Vec<[f64; 3]> = m.targets.iter().copied().map(Into::into).collect();
     finite("targets", targets_m.iter().flatten().copied())?;
     finite("tolerance_m", [m.tolerance_m])?;
     if m.tolerance_m <= 0.0 {
-        return Err(Rejection::Tolerance);
+        return Err(DecodeRejection::Tolerance);
     }
     Ok(ReachTask { stamp: m.header.stamp.try_into()?, targets_m, tolerance_m: m.tolerance_m })
 }
 
 /// A survey is used whole or not at all: one tag at a wrong place would spoil the rest.
-fn survey(m: &ros::TagSurvey) -> Result<RecordedSurvey, Rejection> {
+fn survey(m: &ros::TagSurvey) -> Result<RecordedSurvey, DecodeRejection> {
     let tags = m.tags.iter().map(surveyed_tag).collect::<Result<Vec<_>, _>>()?;
     let ids: BTreeSet<u32> = tags.iter().map(|tag| tag.id).collect();
     if ids.len() != tags.len() {
-        return Err(Rejection::TagTwice);
+        return Err(DecodeRejection::TagTwice);
     }
     if !ids.contains(&m.base_tag) {
-        return Err(Rejection::NoBaseTag);
+        return Err(DecodeRejection::NoBaseTag);
     }
     Ok(RecordedSurvey { stamp: m.header.stamp.try_into()?, base_tag: m.base_tag, tags })
 }
 
-fn surveyed_tag(tag: &ros::SurveyedTag) -> Result<RecordedTag, Rejection> {
+fn surveyed_tag(tag: &ros::SurveyedTag) -> Result<RecordedTag, DecodeRejection> {
     let position_m = tag.pose.position.into();
     finite("position", position_m)?;
     finite("size_m", [tag.size_m])?;
@@ -229,10 +229,10 @@ fn surveyed_tag(tag: &ros::SurveyedTag) -> Result<RecordedTag, Rejection> {
         finite("standard deviation", [tag.position_std_m, tag.rotation_std_rad])?;
     }
     if tag.size_m <= 0.0 {
-        return Err(Rejection::TagSize);
+        return Err(DecodeRejection::TagSize);
     }
     if tag.position_std_m < 0.0 || tag.rotation_std_rad < 0.0 {
-        return Err(Rejection::NegativeVariance);
+        return Err(DecodeRejection::NegativeVariance);
     }
     Ok(RecordedTag {
         id: tag.id,
@@ -244,13 +244,13 @@ fn surveyed_tag(tag: &ros::SurveyedTag) -> Result<RecordedTag, Rejection> {
     })
 }
 
-fn mark(m: &ros::Mark) -> Result<Mark, Rejection> {
+fn mark(m: &ros::Mark) -> Result<Mark, DecodeRejection> {
     let kind = match m.kind.as_str() {
         "capture_fit" => MarkKind::Capture { set: CaptureSet::Fit, pose_idx: m.index },
         "capture_held_out" => MarkKind::Capture { set: CaptureSet::HeldOut, pose_idx: m.index },
         "identify" => MarkKind::Identify { joint_idx: m.index },
-        "calibrate" => MarkKind::Calibrate(Start::Fresh),
-        "recalibrate" => MarkKind::Calibrate(Start::Warm),
+        "calibrate" => MarkKind::Calibrate(PriorSource::Fresh),
+        "recalibrate" => MarkKind::Calibrate(PriorSource::Warm),
         "reach_before" => MarkKind::Reach { attempt: ReachAttempt::Before, target_idx: m.index },
         "reach_after" => MarkKind::Reach { attempt: ReachAttempt::After, target_idx: m.index },
         "touch" => MarkKind::Touch { target_idx: m.index },
@@ -266,23 +266,23 @@ fn mark(m: &ros::Mark) -> Result<Mark, Rejection> {
         other => MarkKind::Stop { joint_idx: m.index, angle_rad: stop_angle_rad(other)? },
     };
     let mark = Mark { start: m.start.try_into()?, end: m.end.try_into()?, kind };
-    if mark.end < mark.start { Err(Rejection::MarkSpan) } else { Ok(mark) }
+    if mark.end < mark.start { Err(DecodeRejection::MarkSpan) } else { Ok(mark) }
 }
 
 /// `failed_KIND`.
-fn failed_joint(kind: &str, index: u32) -> Result<FailedJoint, Rejection> {
-    let kind = kind.strip_prefix("failed_").and_then(FailedKind::of_name).ok_or(Rejection::MarkKind)?;
+fn failed_joint(kind: &str, index: u32) -> Result<FailedJoint, DecodeRejection> {
+    let kind = kind.strip_prefix("failed_").and_then(FailedKind::of_name).ok_or(DecodeRejection::MarkKind)?;
     Ok(FailedJoint { joint: index as usize, kind })
 }
 
 /// `stop ANGLE`.
-fn stop_angle_rad(kind: &str) -> Result<f64, Rejection> {
+fn stop_angle_rad(kind: &str) -> Result<f64, DecodeRejection> {
     let angle = kind.strip_prefix("stop ").and_then(|angle| angle.parse::<f64>().ok());
-    angle.filter(|angle| angle.is_finite()).ok_or(Rejection::MarkKind)
+    angle.filter(|angle| angle.is_finite()).ok_or(DecodeRejection::MarkKind)
 }
 
 /// Levels between the named ones fall to the lower name.
-fn log_line(m: ros::Log) -> Result<LogLine, Rejection> {
+fn log_line(m: ros::Log) -> Result<LogLine, DecodeRejection> {
     let level = match m.level {
         0..=19 => LogLevel::Debug,
         20..=29 => LogLevel::Info,
@@ -327,31 +327,31 @@ mod tests {
     fn joint_names_and_count_are_fixed_by_the_first_message() {
         let mut names = None;
         let mut decode = |n: &[&str], p: &[f64]| decode_message(Stream::JointSensors, &joint_state(n, p), &mut names);
-        assert_eq!(decode(&["a", "b"], &[1.0, f64::NAN]), Err(Rejection::NotFinite { field: "position" }));
+        assert_eq!(decode(&["a", "b"], &[1.0, f64::NAN]), Err(DecodeRejection::NotFinite { field: "position" }));
         assert!(decode(&["a", "b"], &[1.0, 2.0]).is_ok());
-        assert_eq!(decode(&["a"], &[1.0]), Err(Rejection::JointCount { got: 1, expected: 2 }));
-        assert_eq!(decode(&["a", "c"], &[1.0, 2.0]), Err(Rejection::NamesChanged));
-        assert_eq!(decode(&[], &[1.0, 2.0]), Err(Rejection::NameCount { names: 0, positions: 2 }));
-        assert_eq!(decode(&["a"; 9], &[0.0; 9]), Err(Rejection::TooManyJoints { got: 9 }));
-        assert_eq!(decode(&[], &[]), Err(Rejection::NoJoints));
+        assert_eq!(decode(&["a"], &[1.0]), Err(DecodeRejection::JointCount { got: 1, expected: 2 }));
+        assert_eq!(decode(&["a", "c"], &[1.0, 2.0]), Err(DecodeRejection::NamesChanged));
+        assert_eq!(decode(&[], &[1.0, 2.0]), Err(DecodeRejection::NameCount { names: 0, positions: 2 }));
+        assert_eq!(decode(&["a"; 9], &[0.0; 9]), Err(DecodeRejection::TooManyJoints { got: 9 }));
+        assert_eq!(decode(&[], &[]), Err(DecodeRejection::NoJoints));
         assert!(decode(&["a", "b"], &[3.0, 4.0]).is_ok());
     }
 
     #[test]
     fn values_that_no_sensor_gives_are_rejected() {
         let mut imu = ros::Imu::default();
-        assert_eq!(attitude(&imu), Err(Rejection::QuaternionLength));
+        assert_eq!(attitude(&imu), Err(DecodeRejection::QuaternionLength));
         imu.orientation.w = 1.0;
         assert!(attitude(&imu).is_ok());
         imu.linear_acceleration.z = f64::INFINITY;
-        assert_eq!(attitude(&imu), Err(Rejection::NotFinite { field: "linear_acceleration" }));
+        assert_eq!(attitude(&imu), Err(DecodeRejection::NotFinite { field: "linear_acceleration" }));
         imu.orientation_covariance[0] = -1.0;
-        assert_eq!(attitude(&imu), Err(Rejection::NoOrientation));
+        assert_eq!(attitude(&imu), Err(DecodeRejection::NoOrientation));
 
         let hot = ros::Temperature { temperature: f64::NAN, ..Default::default() };
-        assert_eq!(temperature(&hot, Thermometer::Oil), Err(Rejection::NotFinite { field: "temperature" }));
+        assert_eq!(temperature(&hot, Thermometer::Oil), Err(DecodeRejection::NotFinite { field: "temperature" }));
         let tag = ros::AprilTagDetection { id: -1, ..Default::default() };
-        assert_eq!(detection(&tag), Err(Rejection::NegativeTagId));
+        assert_eq!(detection(&tag), Err(DecodeRejection::NegativeTagId));
         let survey_of = |edit: fn(&mut ros::TagSurvey)| {
             let mut tag = ros::SurveyedTag { id: 3, size_m: 0.1, ..Default::default() };
             tag.pose.orientation.w = 1.0;
@@ -364,21 +364,21 @@ mod tests {
             survey(&m).map(|m| m.tags.len())
         };
         assert_eq!(survey_of(|_| ()), Ok(2));
-        assert_eq!(survey_of(|m| m.base_tag = 5), Err(Rejection::NoBaseTag));
-        assert_eq!(survey_of(|m| m.tags[1].id = 3), Err(Rejection::TagTwice));
-        assert_eq!(survey_of(|m| m.tags[1].size_m = 0.0), Err(Rejection::TagSize));
-        assert_eq!(survey_of(|m| m.tags[0].position_std_m = -1.0), Err(Rejection::NegativeVariance));
+        assert_eq!(survey_of(|m| m.base_tag = 5), Err(DecodeRejection::NoBaseTag));
+        assert_eq!(survey_of(|m| m.tags[1].id = 3), Err(DecodeRejection::TagTwice));
+        assert_eq!(survey_of(|m| m.tags[1].size_m = 0.0), Err(DecodeRejection::TagSize));
+        assert_eq!(survey_of(|m| m.tags[0].position_std_m = -1.0), Err(DecodeRejection::NegativeVariance));
         assert_eq!(survey_of(|m| m.tags.iter_mut().for_each(unknown_place)), Ok(2));
         assert!(survey_of(|m| m.tags[0].position_std_m = f64::INFINITY).is_err(), "half of a pose");
         assert!(survey_of(|m| m.tags[0].rotation_std_rad = f64::NAN).is_err());
-        assert_eq!(survey_of(|m| m.tags[0].pose.orientation.w = 0.0), Err(Rejection::QuaternionLength));
+        assert_eq!(survey_of(|m| m.tags[0].pose.orientation.w = 0.0), Err(DecodeRejection::QuaternionLength));
         assert_eq!(
             survey_of(|m| m.tags[0].pose.position.x = f64::NAN),
-            Err(Rejection::NotFinite { field: "position" })
+            Err(DecodeRejection::NotFinite { field: "position" })
         );
         for kind in ["nap", "stop", "stop ", "stop inf", "stop 1.0 rad"] {
             let kind = ros::Mark { kind: kind.into(), ..Default::default() };
-            assert_eq!(mark(&kind), Err(Rejection::MarkKind));
+            assert_eq!(mark(&kind), Err(DecodeRejection::MarkKind));
         }
         let kind = ros::Mark { kind: "stop -3.6296".into(), index: 4, ..Default::default() };
         assert_eq!(mark(&kind).map(|m| m.kind), Ok(MarkKind::Stop { joint_idx: 4, angle_rad: -3.6296 }));

@@ -11,7 +11,7 @@ use super::writer::RecordingHeader;
 use crate::robot::FailedJoint;
 use crate::streams::{
     Attitude, CameraImage, CaptureSet, DetectionRejects, LogLevel, LogLine, Mark, MarkKind, Message, Phase,
-    PressureSample, ReachAttempt, ReachTask, RecordedSurvey, RecordedTag, Start, TagDetection, TagDetections,
+    PressureSample, PriorSource, ReachAttempt, ReachTask, RecordedSurvey, RecordedTag, TagDetection, TagDetections,
     TemperatureSample,
 };
 use crate::time::Stamp;
@@ -181,8 +181,8 @@ fn mark_kind(kind: MarkKind) -> (Cow<'static, str>, u32) {
         MarkKind::Failed(FailedJoint { joint, kind }) => {
             return (format!("failed_{}", kind.name()).into(), joint as u32);
         }
-        MarkKind::Calibrate(Start::Fresh) => ("calibrate", 0),
-        MarkKind::Calibrate(Start::Warm) => ("recalibrate", 0),
+        MarkKind::Calibrate(PriorSource::Fresh) => ("calibrate", 0),
+        MarkKind::Calibrate(PriorSource::Warm) => ("recalibrate", 0),
         MarkKind::Reach { attempt: ReachAttempt::Before, target_idx } => ("reach_before", target_idx),
         MarkKind::Reach { attempt: ReachAttempt::After, target_idx } => ("reach_after", target_idx),
         MarkKind::Touch { target_idx } => ("touch", target_idx),

@@ -45,7 +45,7 @@ pub enum EncodeError {
 
 /// Why a message of a recording is not used; counted by topic, never silent.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum Rejection {
+pub enum DecodeRejection {
     #[error("message encoding is {found:?}, not \"cdr\"")]
     MessageEncoding { found: String },
     #[error("type is {found:?}, not {expected:?}")]

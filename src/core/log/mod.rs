@@ -26,10 +26,10 @@ mod samples;
 
 pub use attachments::read_attachments;
 pub use cdr::{CdrError, decode, encode};
-pub use error::{EncodeError, LogError, Rejection};
+pub use error::{DecodeRejection, EncodeError, LogError};
 pub use hash::{MessageHasher, hash_messages};
 pub use images::for_each_image;
-pub use order::{Disorder, StampOrder};
+pub use order::{StampOrder, StampRegression};
 pub use raw::{
     AttachmentInfo, Channel, ChunkTotals, Completeness, FileContents, RawMessage, RawSummary, Schema, file_contents,
     for_each_raw,

@@ -12,7 +12,7 @@ const JITTER_S: f64 = 0.1;
     "time stamps go backwards at message {message}: {:.3} s before the latest one before it ({} ns against {} ns)",
     latest.since_s(*stamp), stamp.nanos, latest.nanos
 )]
-pub struct Disorder {
+pub struct StampRegression {
     /// Number of the message within its topic, from 1, in the order of the file.
     pub message: u64,
     pub stamp: Stamp,
@@ -25,7 +25,7 @@ pub struct Disorder {
 pub struct StampOrder {
     messages: u64,
     latest: Option<Stamp>,
-    first: Option<Disorder>,
+    first: Option<StampRegression>,
 }
 
 impl StampOrder {
@@ -39,13 +39,13 @@ impl StampOrder {
         self.messages = message;
         let latest = self.latest.unwrap_or(stamp);
         if self.first.is_none() && latest.since_s(stamp) > JITTER_S {
-            self.first = Some(Disorder { message: self.messages, stamp, latest });
+            self.first = Some(StampRegression { message: self.messages, stamp, latest });
         }
         self.latest = Some(latest.max(stamp));
     }
 
     #[must_use]
-    pub fn first_disorder(&self) -> Option<Disorder> {
+    pub fn first_disorder(&self) -> Option<StampRegression> {
         self.first
     }
 }

@@ -4,8 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use super::decode::{FirstNames, decode_message};
-use super::error::{LogError, Rejection};
-use super::order::{Disorder, StampOrder};
+use super::error::{DecodeRejection, LogError};
+use super::order::{StampOrder, StampRegression};
 use super::raw::{Completeness, RawMessage, RawSummary, for_each_raw};
 use super::topics::{Stream, VIEWER_TOPICS};
 use crate::streams::Message;
@@ -51,7 +51,7 @@ pub struct Recording {
     /// How often, in the order of the file, log time went backwards.
     pub non_monotonic: u64,
     /// The first disorder among the stamps of joint sensors and detections, by topic.
-    pub disorder: BTreeMap<String, Disorder>,
+    pub disorder: BTreeMap<String, StampRegression>,
 }
 
 /// Reads a recording with our own topic names, see [`read_recording_with`]; camera images stay in the file, where
@@ -174,7 +174,7 @@ impl<'a, F: FnMut(Stamp, &Message) -> bool> Collector<'a, F> {
         self.latest = log_time;
     }
 
-    fn reject(&mut self, topic: &str, rejection: &Rejection, count: u64) {
+    fn reject(&mut self, topic: &str, rejection: &DecodeRejection, count: u64) {
         *self.rejected.entry(format!("{topic}: {rejection}")).or_default() += count;
     }
 
@@ -217,7 +217,7 @@ impl<'a, F: FnMut(Stamp, &Message) -> bool> Collector<'a, F> {
         for (stream, topic, _) in named.iter().filter(|(_, _, names)| *names != joint_names) {
             let before = self.messages.len();
             self.messages.retain(|(_, message)| Stream::of(message) != *stream);
-            self.reject(topic, &Rejection::OtherJoints, (before - self.messages.len()) as u64);
+            self.reject(topic, &DecodeRejection::OtherJoints, (before - self.messages.len()) as u64);
         }
         joint_names
     }
@@ -233,17 +233,17 @@ fn ordered_stamp(message: &Message) -> Option<Stamp> {
 }
 
 /// What the file says of a message, before its bytes are looked at.
-fn check(stream: Stream, raw: &RawMessage<'_>) -> Result<(), Rejection> {
+fn check(stream: Stream, raw: &RawMessage<'_>) -> Result<(), DecodeRejection> {
     if raw.channel.message_encoding != "cdr" {
-        return Err(Rejection::MessageEncoding { found: raw.channel.message_encoding.clone() });
+        return Err(DecodeRejection::MessageEncoding { found: raw.channel.message_encoding.clone() });
     }
     let expected = stream.schema().name;
     // ROS writes package/msg/Type; some converters leave out the middle.
     if raw.schema_name() != expected && raw.schema_name() != expected.replace("/msg/", "/") {
-        return Err(Rejection::Type { found: raw.schema_name().to_owned(), expected });
+        return Err(DecodeRejection::Type { found: raw.schema_name().to_owned(), expected });
     }
     if i64::try_from(raw.log_time_nanos).is_err() {
-        return Err(Rejection::LogTimeRange);
+        return Err(DecodeRejection::LogTimeRange);
     }
     Ok(())
 }

@@ -4,7 +4,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::error::{EncodeError, Rejection};
+use super::error::{DecodeRejection, EncodeError};
 use crate::time::Stamp;
 
 const NANOS_PER_S: i64 = 1_000_000_000;
@@ -26,11 +26,11 @@ impl TryFrom<Stamp> for Time {
 }
 
 impl TryFrom<Time> for Stamp {
-    type Error = Rejection;
+    type Error = DecodeRejection;
 
-    fn try_from(time: Time) -> Result<Self, Rejection> {
+    fn try_from(time: Time) -> Result<Self, DecodeRejection> {
         if i64::from(time.nanosec) >= NANOS_PER_S {
-            return Err(Rejection::StampNanos { nanosec: time.nanosec });
+            return Err(DecodeRejection::StampNanos { nanosec: time.nanosec });
         }
         Ok(Self { nanos: i64::from(time.sec) * NANOS_PER_S + i64::from(time.nanosec) })
     }

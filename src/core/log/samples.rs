@@ -5,8 +5,8 @@ use crate::robot::{FailedJoint, FailedKind};
 use crate::streams::{
     Attitude, CameraImage, CaptureSet, DetectionReject, DetectionRejects, GripperCommand, GripperSample, JointAngles,
     JointCommand, JointCounts, JointSensorSample, JointStateBelief, LogLevel, LogLine, Mark, MarkKind, Message, Phase,
-    PressureSample, ReachAttempt, ReachTask, RecordedSurvey, RecordedTag, RejectReason, Sink, Start, TagDetection,
-    TagDetections, TemperatureSample, Thermometer,
+    PressureSample, PriorSource, ReachAttempt, ReachTask, RecordedSurvey, RecordedTag, RejectReason, Sink,
+    TagDetection, TagDetections, TemperatureSample, Thermometer,
 };
 use crate::time::{SIMULATION_EPOCH, Stamp};
 use std::path::Path;
@@ -22,8 +22,8 @@ fn marks(stamp: Stamp) -> Vec<Message> {
         MarkKind::Identify { joint_idx: 2 },
         MarkKind::Stop { joint_idx: 1, angle_rad: -2.064_400_000_000_1 },
         MarkKind::Failed(FailedJoint { joint: 2, kind: FailedKind::Dead }),
-        MarkKind::Calibrate(Start::Fresh),
-        MarkKind::Calibrate(Start::Warm),
+        MarkKind::Calibrate(PriorSource::Fresh),
+        MarkKind::Calibrate(PriorSource::Warm),
         MarkKind::Reach { attempt: ReachAttempt::Before, target_idx: 5 },
         MarkKind::Reach { attempt: ReachAttempt::After, target_idx: 6 },
         MarkKind::Touch { target_idx: 6 },

@@ -18,7 +18,7 @@ pub use corner_noise::{CornerNoise, DetectionChance};
 pub use fisheye::Fisheye;
 pub use radtan::Radtan;
 pub use square::{SquareError, SquarePose, solve_square, solve_square_both, square_corners};
-pub use twist::pixel_by_twist;
+pub use twist::image_jacobian;
 
 /// The wrist camera's lens, for tests.
 #[doc(hidden)]

@@ -5,7 +5,7 @@ use nalgebra::{Matrix2x3, Vector3};
 /// Rows of d(pixel)/d(xi), pixels by metres and radians: the camera's pose perturbed on the right by `xi = (rho, omega)` moves a
 /// point p of its frame by `-rho - omega x p`. `by_point`: d(pixel)/d(point) of the lens at `point`.
 #[must_use]
-pub fn pixel_by_twist(by_point: &Matrix2x3<f64>, point: &Vector3<f64>) -> [[f64; 6]; 2] {
+pub fn image_jacobian(by_point: &Matrix2x3<f64>, point: &Vector3<f64>) -> [[f64; 6]; 2] {
     let p = point;
     std::array::from_fn(|axis| {
         let a = [by_point[(axis, 0)], by_point[(axis, 1)], by_point[(axis, 2)]];
@@ -28,7 +28,7 @@ mod tests {
         let step = 1e-6;
         for point in [Vector3::new(0.1, -0.2, 0.9), Vector3::new(-0.5, 0.3, 0.4), Vector3::new(0.0, 0.0, 1.3)] {
             let (_, by_point) = lens.project_with_jacobian(&point).expect("it is in view");
-            let rows = pixel_by_twist(&by_point, &point);
+            let rows = image_jacobian(&by_point, &point);
             for k in 0..6 {
                 let pixel = |step: f64| {
                     let mut xi = Vector6::zeros();

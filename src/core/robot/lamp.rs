@@ -21,7 +21,7 @@ pub struct VehicleLight {
 
 #[derive(Clone, Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct LampFile {
+pub(super) struct LightFile {
     name: String,
     position_m: [f64; 3],
     direction: [f64; 3],
@@ -29,7 +29,7 @@ pub(super) struct LampFile {
     half_angle_rad: f64,
 }
 
-impl LampFile {
+impl LightFile {
     /// The `n`th of the list, checked.
     ///
     /// # Errors

@@ -74,7 +74,7 @@ impl TagSurvey {
 
 impl TagSurvey {
     /// The survey as far as `knowledge` goes: all else of the tags' places is forgotten but the drawing.
-    pub fn knowing(mut self, knowledge: &MapKnowledge, base: BaseTagStd) -> Result<Self, String> {
+    pub fn with_knowledge(mut self, knowledge: &MapKnowledge, base: BaseTagStd) -> Result<Self, String> {
         let known: &[u32] = match knowledge {
             MapKnowledge::Partly(known) => known,
             MapKnowledge::Known | MapKnowledge::Unknown => &[],

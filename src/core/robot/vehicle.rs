@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::error::{FileIssue, RobotError, parse_toml, read_text};
-use super::lamp::{LampFile, VehicleLight};
+use super::lamp::{LightFile, VehicleLight};
 use super::part::{Part, PartFile, check_parts, check_place};
 use super::survey::{TagFile, TagSurvey, check_tags};
 use crate::spatial::{Base, Pose, Vehicle as VehicleFrame};
@@ -109,7 +109,7 @@ struct VehicleFile {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     tag: Vec<TagFile>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    light: Vec<LampFile>,
+    light: Vec<LightFile>,
     part: Vec<PartFile>,
 }
 

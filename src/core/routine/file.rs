@@ -103,7 +103,7 @@ impl Routine {
             vehicle.survey = Some(survey);
         }
         if self.map != MapKnowledge::Known || self.base_tag_std != BaseTagStd::default() {
-            let survey = robot.survey().knowing(&self.map, self.base_tag_std);
+            let survey = robot.survey().with_knowledge(&self.map, self.base_tag_std);
             let survey = survey.map_err(|problem| FileIssue::new(&self.file, "site.known_tags", problem))?;
             robot = robot.with_survey(survey.clone());
             vehicle.survey = Some(survey);
@@ -189,8 +189,8 @@ pub struct CaptureSettings {
     #[serde(default = "CaptureSettings::default_dwell_s")]
     pub dwell_s: f64,
     /// What the views are chosen for.
-    #[serde(default)]
-    pub choose: PoseCriterion,
+    #[serde(default, alias = "choose")]
+    pub criterion: PoseCriterion,
     /// After so many views, the running estimate renews margins and remaining poses; 0: planned once.
     #[serde(default = "CaptureSettings::default_replan_every")]
     pub replan_every: u32,
@@ -284,7 +284,7 @@ impl Default for CaptureSettings {
             min_tags: Self::default_min_tags(),
             clearance_m: Self::default_clearance_m(),
             dwell_s: Self::default_dwell_s(),
-            choose: PoseCriterion::default(),
+            criterion: PoseCriterion::default(),
             replan_every: Self::default_replan_every(),
             stop_at_tool_error_m: None,
             max_time_s: None,

@@ -171,7 +171,7 @@ impl StepReader<'_> {
             min_tags: raw.min_tags.unwrap_or(general.min_tags),
             clearance_m: raw.clearance_m.unwrap_or(general.clearance_m),
             dwell_s: raw.dwell_s.unwrap_or(general.dwell_s),
-            choose: raw.choose.unwrap_or(general.choose),
+            criterion: raw.choose.unwrap_or(general.criterion),
             replan_every: raw.replan_every.unwrap_or(general.replan_every),
             stop_at_tool_error_m: raw.stop_at_tool_error_m.or(general.stop_at_tool_error_m),
             max_time_s: raw.max_time_s.or(general.max_time_s),

@@ -8,4 +8,6 @@
 mod model;
 
 pub use model::wrap_symmetric;
-pub use model::{ArmSensors, Conditions, Correction, Departure, N_SHAPE, SensorModel, Terms, shape_basis, shape_prior};
+pub use model::{
+    ArmSensors, ConditionChange, Conditions, Correction, N_SHAPE, SensorModel, Terms, nonlinearity_basis, shape_prior,
+};

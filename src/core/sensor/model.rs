@@ -55,7 +55,7 @@ const SHAPE_DOMAIN: f64 = 1.25;
 /// Smooth functions over the joint's range: `phi_h(x) = sin(pi h (x + L) / 2 L) / sqrt(L)`, h = 1.., L = 1.25, x in -1..1; with
 /// the prior variances of [`shape_prior`] a Gaussian process by its eigenfunctions (Solin and Sarkka 2020, eq. 6). Constant outside.
 #[must_use]
-pub fn shape_basis(x: f64) -> [f64; N_SHAPE] {
+pub fn nonlinearity_basis(x: f64) -> [f64; N_SHAPE] {
     let turn = std::f64::consts::PI * (x.clamp(-1.0, 1.0) + SHAPE_DOMAIN) / (2.0 * SHAPE_DOMAIN);
     let (sin, cos) = turn.sin_cos();
     // sin((h + 1) a) = 2 cos(a) sin(h a) - sin((h - 1) a).
@@ -79,7 +79,7 @@ pub fn shape_prior(length: f64) -> [f64; N_SHAPE] {
 
 /// How far things are from a calibration's reference.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Departure {
+pub struct ConditionChange {
     pub oil_k: f64,
     pub pressure_mpa: f64,
     pub elapsed_h: f64,
@@ -96,9 +96,9 @@ pub struct Conditions {
 impl Conditions {
     /// From `reference` to here.
     #[must_use]
-    pub fn departure_from(&self, reference: &Self) -> Departure {
+    pub fn departure_from(&self, reference: &Self) -> ConditionChange {
         let difference = |a: Option<f64>, b: Option<f64>| a.zip(b).map_or(0.0, |(a, b)| a - b);
-        Departure {
+        ConditionChange {
             oil_k: difference(self.oil_c, reference.oil_c),
             pressure_mpa: difference(self.pressure_pa, reference.pressure_pa) * 1e-6,
             elapsed_h: self.stamp.zip(reference.stamp).map_or(0.0, |(a, b)| a.since_s(b) / 3600.0),
@@ -109,12 +109,18 @@ impl Conditions {
 impl Correction {
     /// The angle at `travel_rad` from the middle of the range; `approach` is -1, 0 (unknown) or 1: the way that the joint moved.
     #[must_use]
-    pub fn angle_rad(&self, spec: &JointSensorSpec, travel_rad: f64, departure: &Departure, approach: f64) -> f64 {
+    pub fn angle_rad(
+        &self,
+        spec: &JointSensorSpec,
+        travel_rad: f64,
+        departure: &ConditionChange,
+        approach: f64,
+    ) -> f64 {
         let terms = &self.terms;
         if terms.are_zero() {
             return spec.center_rad + self.gain * travel_rad + self.offset_rad;
         }
-        let basis = shape_basis(travel_rad / spec.half_range_rad);
+        let basis = nonlinearity_basis(travel_rad / spec.half_range_rad);
         let shape: f64 = basis.iter().zip(&terms.shape_rad).map(|(b, a)| a * b).sum();
         spec.center_rad
             + (self.gain + terms.gain_per_k * departure.oil_k) * travel_rad
@@ -151,24 +157,24 @@ impl SensorModel {
     /// The angle that `counts` mean, rad.
     #[must_use]
     pub fn angle_rad(&self, counts: f64) -> f64 {
-        self.angle_under_rad(counts, &Departure::default())
+        self.angle_under_rad(counts, &ConditionChange::default())
     }
 
     /// The angle that `counts` mean away from the reference, rad.
     #[must_use]
-    pub fn angle_under_rad(&self, counts: f64, departure: &Departure) -> f64 {
+    pub fn angle_under_rad(&self, counts: f64, departure: &ConditionChange) -> f64 {
         self.correction.angle_rad(&self.spec, self.nominal_travel_rad(counts), departure, 0.0)
     }
 
     /// The reading at `angle_rad`, 0..wrap, not rounded: the inverse of [`Self::angle_rad`].
     #[must_use]
     pub fn counts(&self, angle_rad: f64) -> f64 {
-        self.counts_under(angle_rad, &Departure::default())
+        self.counts_under(angle_rad, &ConditionChange::default())
     }
 
     /// The inverse of [`Self::angle_under_rad`].
     #[must_use]
-    pub fn counts_under(&self, angle_rad: f64, departure: &Departure) -> f64 {
+    pub fn counts_under(&self, angle_rad: f64, departure: &ConditionChange) -> f64 {
         let spec = &self.spec;
         let travel = self.travel_under_rad(angle_rad, departure);
         let counts = spec.offset_counts + spec.counts_per_rad * (spec.center_rad + travel);
@@ -177,7 +183,7 @@ impl SensorModel {
 
     /// The datasheet's travel at `angle_rad`, rad: the inverse of [`Correction::angle_rad`] with the approach unknown.
     #[must_use]
-    pub fn travel_under_rad(&self, angle_rad: f64, departure: &Departure) -> f64 {
+    pub fn travel_under_rad(&self, angle_rad: f64, departure: &ConditionChange) -> f64 {
         /// The nonlinearity's slope is a few hundredths of the gain, so that each step gains a digit or two.
         const STEPS: usize = 16;
         let spec = &self.spec;
@@ -203,7 +209,7 @@ impl SensorModel {
         let end_rad = self.spec.half_range_rad;
         let angle = |n: usize| {
             let travel_rad = end_rad * (2.0 * n as f64 / CHORDS as f64 - 1.0);
-            self.correction.angle_rad(&self.spec, travel_rad, &Departure::default(), 0.0)
+            self.correction.angle_rad(&self.spec, travel_rad, &ConditionChange::default(), 0.0)
         };
         let gain_rad = self.correction.gain * 2.0 * end_rad / CHORDS as f64;
         let slopes = (0..CHORDS).map(|n| (angle(n + 1) - angle(n)) / gain_rad);

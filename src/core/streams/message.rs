@@ -223,7 +223,7 @@ pub enum CaptureSet {
 
 /// What a calibration starts from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Start {
+pub enum PriorSource {
     /// The datasheet.
     Fresh,
     /// The last accepted calibration of the same recording; what the new views do not determine keeps its value.
@@ -265,7 +265,7 @@ pub enum MarkKind {
     /// Somebody declared that this joint, or its sensor, has failed; it holds for the whole recording.
     Failed(FailedJoint),
     /// A calibration from the views captured within the span.
-    Calibrate(Start),
+    Calibrate(PriorSource),
     /// The arm came to rest for a target.
     Reach { attempt: ReachAttempt, target_idx: u32 },
     /// The jaws closed on a target, from wide open.

@@ -12,6 +12,6 @@ pub use arm::{Arm, ArmError, Sink, SinkError};
 pub use message::{
     Attitude, CameraImage, CaptureSet, DetectionReject, DetectionRejects, GripperCommand, GripperSample, JointCommand,
     JointSensorSample, JointStateBelief, LogLevel, LogLine, Mark, MarkKind, Message, Phase, PressureSample,
-    ReachAttempt, ReachTask, RecordedSurvey, RecordedTag, RejectReason, Start, TagDetection, TagDetections,
+    PriorSource, ReachAttempt, ReachTask, RecordedSurvey, RecordedTag, RejectReason, TagDetection, TagDetections,
     TemperatureSample, Thermometer,
 };

@@ -16,7 +16,7 @@ use armcal_core::time::Stamp;
 
 /// Views and parameters, in words.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Determined {
+pub struct ObservableParameters {
     pub robot: String,
     /// Captured views that show a tag of the survey, for the fit and for the verdict.
     pub views: usize,
@@ -34,8 +34,12 @@ pub struct Determined {
 }
 
 /// `marked` holds the marks of the recording at `path`.
-pub(super) fn determined(path: &Path, robot: &Robot, marked: &Recording) -> Result<Determined, LogError> {
-    let mut determined = Determined {
+pub(super) fn observable_parameters(
+    path: &Path,
+    robot: &Robot,
+    marked: &Recording,
+) -> Result<ObservableParameters, LogError> {
+    let mut determined = ObservableParameters {
         robot: robot.name.clone(),
         views: 0,
         held_out_views: 0,
@@ -90,7 +94,7 @@ fn behind_the_camera(robot: &Robot, views: &[View]) -> Vec<Parameter> {
     found.and_then(Result::ok).map(|mount| mount.determined(robot)).unwrap_or_default()
 }
 
-fn missing(determined: &Determined) -> Vec<String> {
+fn missing(determined: &ObservableParameters) -> Vec<String> {
     let mut missing = Vec::new();
     let parameters = determined.parameters.len();
     let wanted = MIN_VIEWS.max((MIN_VIEWS_PER_PARAMETER * parameters as f64).ceil() as usize);

@@ -22,7 +22,7 @@ use armcal_core::robot::Robot;
 use armcal_core::streams::{Mark, MarkKind, Message};
 
 pub use arm::{ArmContents, TagSeen, TaskSeen};
-pub use determined::Determined;
+pub use determined::ObservableParameters;
 pub use text::to_text;
 pub use topics::TopicContents;
 
@@ -53,7 +53,7 @@ pub struct Inspection {
     pub arm: ArmContents,
     /// What a robot's calibration could take from it; `None` where no robot was named.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub determined: Option<Determined>,
+    pub observable: Option<ObservableParameters>,
     /// What a user may want to know or do.
     pub hints: Vec<String>,
 }
@@ -116,7 +116,7 @@ pub fn inspect(path: &Path, robot: Option<&Robot>) -> Result<Inspection, LogErro
             matches!(message, Message::Task(_)) || is_capture(message)
         },
     )?;
-    let determined = robot.map(|robot| determined::determined(path, robot, &recording)).transpose()?;
+    let determined = robot.map(|robot| determined::observable_parameters(path, robot, &recording)).transpose()?;
     let time_nanos = topics.time_nanos();
     let arm = arm.finish(&recording);
     let mut topics = topics.finish();
@@ -141,7 +141,7 @@ pub fn inspect(path: &Path, robot: Option<&Robot>) -> Result<Inspection, LogErro
         attachments: attachments(&summary.contents),
         metadata: metadata(&summary.contents),
         arm,
-        determined,
+        observable: determined,
         hints: Vec::new(),
     };
     inspection.hints = hints(&inspection);

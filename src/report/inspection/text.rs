@@ -3,7 +3,7 @@
 use comfy_table::presets::NOTHING;
 use comfy_table::{CellAlignment, Table};
 
-use super::determined::Determined;
+use super::determined::ObservableParameters;
 use super::{Inspection, State};
 
 /// Of sea water, and at its surface.
@@ -20,7 +20,7 @@ pub fn to_text(inspection: &Inspection) -> String {
     }
     lines.push(String::new());
     lines.extend(arm_lines(inspection));
-    if let Some(determined) = &inspection.determined {
+    if let Some(determined) = &inspection.observable {
         lines.push(String::new());
         lines.extend(determined_lines(determined));
     }
@@ -148,7 +148,7 @@ fn arm_lines(inspection: &Inspection) -> Vec<String> {
     lines
 }
 
-fn determined_lines(d: &Determined) -> Vec<String> {
+fn determined_lines(d: &ObservableParameters) -> Vec<String> {
     let mut lines = vec![format!(
         "robot        {}: {} views and {} held-out ones show its tags, {} tags to fit",
         d.robot, d.views, d.held_out_views, d.tags_used

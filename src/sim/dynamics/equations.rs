@@ -17,7 +17,7 @@ pub struct Multibody {
 
 /// What surrounds the arm at one instant, in base axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Surroundings {
+pub struct Environment {
     /// m/s2.
     pub gravity: Vector3<f64>,
     /// Of the base against the world, at its origin.
@@ -28,7 +28,7 @@ pub struct Surroundings {
     pub water_acceleration: Vector3<f64>,
 }
 
-impl Surroundings {
+impl Environment {
     /// At rest in still water, z up.
     #[must_use]
     pub fn still(gravity_m_s2: f64) -> Self {
@@ -94,7 +94,7 @@ impl Multibody {
         &self,
         angles: &JointAngles,
         rates: &JointAngles,
-        around: &Surroundings,
+        around: &Environment,
         base: &BaseCoupling,
         extra: &[Force; MAX_JOINTS + 1],
     ) -> Equations {
@@ -136,7 +136,7 @@ impl Multibody {
     /// Torques of gravity and buoyancy about each joint at rest, N m.
     #[must_use]
     pub fn static_torques(&self, angles: &JointAngles, gravity: &Vector3<f64>) -> JointAngles {
-        let still = Surroundings { gravity: *gravity, ..Surroundings::still(0.0) };
+        let still = Environment { gravity: *gravity, ..Environment::still(0.0) };
         let rates = JointAngles::from_fn(angles.len(), |_| 0.0);
         let base = BaseCoupling::Prescribed(Motion::zero());
         let equations = self.equations(angles, &rates, &still, &base, &[Force::zero(); MAX_JOINTS + 1]);
@@ -170,7 +170,7 @@ impl Body {
         place: &Isometry3<f64>,
         velocity: &Motion,
         acceleration: &Motion,
-        around: &Surroundings,
+        around: &Environment,
         water_moves: bool,
     ) -> (Inertia, Force) {
         let against_water = Motion::new(velocity.angular, velocity.linear - around.water_velocity);

@@ -8,7 +8,7 @@
 
 use nalgebra::{Isometry3, Vector6};
 
-use super::equations::{BaseCoupling, Equations, Multibody, Surroundings};
+use super::equations::{BaseCoupling, Environment, Equations, Multibody};
 use super::spatial::{Force, Motion};
 use super::system::{Coordinates, MAX_DOF, Symmetric};
 use crate::joint_load::JointLoad;
@@ -44,7 +44,7 @@ pub struct StepInput<'a> {
     /// Whether the base is free.
     pub is_free: bool,
     /// Surroundings at the start and at the end, of a base placed and moving as given.
-    pub around: &'a dyn Fn(Stage, &SystemState) -> (Surroundings, BaseCoupling),
+    pub around: &'a dyn Fn(Stage, &SystemState) -> (Environment, BaseCoupling),
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

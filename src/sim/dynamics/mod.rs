@@ -14,7 +14,7 @@ mod system;
 pub use super::joint_load::JointLoad;
 pub(crate) use body::WaterProperties;
 pub use body::{Body, HullDrag, Surface};
-pub use equations::{BaseCoupling, Equations, Multibody, Surroundings};
+pub use equations::{BaseCoupling, Environment, Equations, Multibody};
 pub use integrate::{ContactRow, Stage, StepInput, SystemState};
 pub use spatial::{Force, Inertia, Motion};
 pub use system::{Coordinates, MAX_DOF, Symmetric};

@@ -62,7 +62,7 @@ impl Float<'_> {
             let around = |_: Stage, at: &SystemState| {
                 let down = at.world_from_base.rotation.inverse() * Vector3::new(0.0, 0.0, -self.gravity_m_s2);
                 let surroundings =
-                    Surroundings { gravity: down, base_velocity: at.base_velocity, ..Surroundings::still(0.0) };
+                    Environment { gravity: down, base_velocity: at.base_velocity, ..Environment::still(0.0) };
                 (surroundings, BaseCoupling::Free)
             };
             let extra = [Force::zero(); MAX_JOINTS + 1];
@@ -186,7 +186,7 @@ fn an_undamped_swing_keeps_its_energy() {
     let bodies: Vec<Body> =
         robot.bodies.iter().map(|link| Body::dry(link.mass_kg, link.com_m, &link.inertia_kg_m2)).collect();
     let system = Multibody::new(robot.chain.clone(), bodies);
-    let around = Surroundings::still(G);
+    let around = Environment::still(G);
     let energy = |state: &SystemState| {
         let base = BaseCoupling::Prescribed(Motion::zero());
         let e = system.equations(&state.angles, &state.rates, &around, &base, &[Force::zero(); MAX_JOINTS + 1]);
@@ -254,7 +254,7 @@ fn a_neutrally_buoyant_link_hangs_still() {
         let system = Multibody::new(Chain::new(vec![joint.clone()]), vec![Body::none(), Body::link(&link, &water)]);
         let mut state = at_rest(JointAngles::from_slice(&[0.3]));
         for _ in 0..5000 {
-            let fixed = |_: Stage, _: &SystemState| (Surroundings::still(G), BaseCoupling::Prescribed(Motion::zero()));
+            let fixed = |_: Stage, _: &SystemState| (Environment::still(G), BaseCoupling::Prescribed(Motion::zero()));
             let input = StepInput {
                 step_s: 2e-3,
                 loads: &[JointLoad::default(); MAX_JOINTS],
@@ -324,7 +324,7 @@ fn accelerating_water_takes_a_ball_along() {
         Isometry3::from_parts(nalgebra::Translation3::identity(), UnitQuaternion::from_euler_angles(0.3, -0.8, 1.9));
     let acceleration = Vector3::new(0.5, -0.2, 0.1);
     let to_base = turned.rotation.inverse();
-    let around = Surroundings { water_acceleration: to_base * acceleration, ..Surroundings::still(0.0) };
+    let around = Environment { water_acceleration: to_base * acceleration, ..Environment::still(0.0) };
     let none = JointAngles::from_slice(&[]);
     let e = system.equations(&none, &none, &around, &BaseCoupling::Free, &[Force::zero(); MAX_JOINTS + 1]);
     let a = Motion::from_slice(&e.inertia.solve(&std::array::from_fn(|i| -e.bias[i]))).linear;
@@ -342,10 +342,10 @@ fn a_current_carries_everything_along() {
     let velocity = Motion::new(Vector3::new(0.2, -0.3, 0.5), Vector3::new(0.4, 0.1, -0.2));
     let current = Vector3::new(0.7, -0.4, 0.3);
     let accelerate = |water: Vector3<f64>| {
-        let around = Surroundings {
+        let around = Environment {
             base_velocity: Motion::new(velocity.angular, velocity.linear + water),
             water_velocity: water,
-            ..Surroundings::still(G)
+            ..Environment::still(G)
         };
         let e = system.equations(&robot.stowed, &rates, &around, &BaseCoupling::Free, &[Force::zero(); MAX_JOINTS + 1]);
         let a = e.inertia.solve(&std::array::from_fn(|i| -e.bias[i]));

@@ -3,7 +3,7 @@
 //! A block of pixels that see one face is shaded at its corners and linear in between. A pixel with another face in its
 //! neighbourhood, or swept by one while the shutter is open, is the mean of `SAMPLES` rays.
 
-use super::scene::{FACE_BITS, Look, Object, TILE_PX};
+use super::scene::{Appearance, FACE_BITS, Object, TILE_PX};
 use super::shade::Shade;
 use super::tag;
 use super::trace::{Candidates, Tracer, has_other_face, object_of};
@@ -24,12 +24,12 @@ pub(super) struct Band<'a> {
 
 /// Shades of flat faces that a smallest block has already seen: a few pixels make no difference to them.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Known {
+pub(super) struct ShadeCache {
     shades: [(u16, Shade); 4],
     n: usize,
 }
 
-impl Known {
+impl ShadeCache {
     #[inline]
     pub(super) fn shade(&mut self, key: u16, object: &Object, make: impl FnOnce() -> Shade) -> Shade {
         if !object.form.is_flat() {
@@ -60,9 +60,9 @@ impl Tracer<'_> {
 
     pub(super) fn albedo(&self, object: &Object, face: u16, ray: &Vec3, range_m: f32, normal: &Vec3) -> Rgb {
         match object.look {
-            Look::Tag => tag::albedo(face & ((1 << FACE_BITS) - 1)),
-            Look::Plain(albedo) => albedo,
-            Look::Ground => {
+            Appearance::Tag => tag::albedo(face & ((1 << FACE_BITS) - 1)),
+            Appearance::Plain(albedo) => albedo,
+            Appearance::Ground => {
                 let place = object.place.point(ray, range_m);
                 self.texture.albedo(place.x, place.y, self.ground_level(ray, range_m, normal))
             }
@@ -105,7 +105,7 @@ impl Band<'_> {
             }
             return;
         }
-        let mut known = Known::default();
+        let mut known = ShadeCache::default();
         for y in top..bottom {
             for x in left..right {
                 let rgb = self.pixel(x, self.top + y, found, &mut known);
@@ -114,7 +114,7 @@ impl Band<'_> {
         }
     }
 
-    fn pixel(&self, x: usize, row: usize, found: &[(f32, u16)], known: &mut Known) -> Rgb {
+    fn pixel(&self, x: usize, row: usize, found: &[(f32, u16)], known: &mut ShadeCache) -> Rgb {
         let Tracer { rays, objects, .. } = self.tracer;
         if !rays.sees(x, row) {
             return [0.0; 3];
@@ -132,7 +132,7 @@ impl Band<'_> {
         let Some(object) = object_of(self.faces[i]).map(|n| &objects[n]) else {
             return self.tracer.shader.open(x, row).veil;
         };
-        if object.look == Look::Tag {
+        if object.look == Appearance::Tag {
             let tracer = self.tracer;
             let key = self.faces[i] & !((1 << FACE_BITS) - 1);
             let shade = known.shade(key, object, || tracer.surface(self.faces[i], self.ranges[i], [x, row]).0);
@@ -186,7 +186,7 @@ impl Band<'_> {
         let corners =
             [corner(left, top), corner(right - 1, top), corner(left, bottom - 1), corner(right - 1, bottom - 1)];
         let object = object_of(face).map(|n| &self.tracer.objects[n]);
-        if let Some(object) = object.filter(|object| object.look == Look::Ground) {
+        if let Some(object) = object.filter(|object| object.look == Appearance::Ground) {
             return self.fill_ground(block, object, &corners.map(|(shade, _)| shade));
         }
         let radiance = corners.map(|(shade, albedo)| shade.radiance(&albedo));

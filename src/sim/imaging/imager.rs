@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::frame::Frame;
 use super::light::Light;
 use super::rays::Rays;
-use super::scene::{Look, Object};
+use super::scene::{Appearance, Object};
 use super::sensor::{BAND_ROWS, Sensor};
 use super::shade::Shader;
 use super::shape::Form;
@@ -77,7 +77,7 @@ pub struct Imager {
     lens: Fisheye,
     spec: ImageSpec,
     lights: Vec<Light>,
-    solids: Vec<(Form, Look)>,
+    solids: Vec<(Form, Appearance)>,
     rays: Rays,
     texture: Texture,
     canvas: Canvas,
@@ -117,7 +117,7 @@ impl Imager {
     pub fn set_solids(&mut self, solids: &[SolidShape]) {
         let look = |solid: &SolidShape| {
             let linear = |value: u8| (f32::from(value) / 255.0).powf(2.2);
-            if solid.is_ground { Look::Ground } else { Look::Plain(solid.color_rgb.map(linear)) }
+            if solid.is_ground { Appearance::Ground } else { Appearance::Plain(solid.color_rgb.map(linear)) }
         };
         self.solids = solids.iter().map(|solid| (Form::of_shape(&solid.shape), look(solid))).collect();
     }
@@ -141,10 +141,9 @@ impl Imager {
     fn draw(&mut self, shot: &Shot, shader: &Shader) {
         let focal_px = self.rays.focal_px;
         let boards: Vec<Form> = shot.tags.iter().map(|tag| Form::Tag(Board::new(tag.id, tag.size_m))).collect();
-        let tags = boards
-            .iter()
-            .zip(shot.tags)
-            .map(|(board, tag)| Object::new(board, Look::Tag, &tag.base_from_tag, &shot.base_from_camera, focal_px));
+        let tags = boards.iter().zip(shot.tags).map(|(board, tag)| {
+            Object::new(board, Appearance::Tag, &tag.base_from_tag, &shot.base_from_camera, focal_px)
+        });
         let solids = self.solids.iter().zip(shot.solids).map(|((form, look), base_from_solid)| {
             Object::new(form, *look, base_from_solid, &shot.base_from_camera, focal_px)
         });

@@ -1,7 +1,7 @@
 //! A pixel that an edge crosses, or crossed while the shutter was open: the mean over samples of place and time.
 
-use super::band::Known;
-use super::scene::{FACE_BITS, Look, Object, SAMPLES, first_met, offset};
+use super::band::ShadeCache;
+use super::scene::{Appearance, FACE_BITS, Object, SAMPLES, first_met, offset};
 use super::shade::Shade;
 use super::shape::{Form, Lanes};
 use super::tag;
@@ -51,7 +51,7 @@ impl Samples {
 
 impl Tracer<'_> {
     /// The mean over a pixel and the exposure.
-    pub(super) fn sampled(&self, found: &[(f32, u16)], column: usize, row: usize, known: &mut Known) -> Rgb {
+    pub(super) fn sampled(&self, found: &[(f32, u16)], column: usize, row: usize, known: &mut ShadeCache) -> Rgb {
         let samples = Samples::new(self, found, column, row);
         let mut sum = [0.0; 3];
         let mut left = u32::MAX;
@@ -70,11 +70,11 @@ impl Tracer<'_> {
     }
 
     /// The mean over the samples in `mine`, which all meet object `n`.
-    fn sampled_object(&self, n: u16, mine: u32, samples: &Samples, at: [usize; 2], known: &mut Known) -> Rgb {
+    fn sampled_object(&self, n: u16, mine: u32, samples: &Samples, at: [usize; 2], known: &mut ShadeCache) -> Rgb {
         /// Shading is smooth but for creases: so many samples stand for all.
         const SHADED: u32 = 4;
         let object = &self.objects[usize::from(n)];
-        let is_tag = object.look == Look::Tag;
+        let is_tag = object.look == Appearance::Tag;
         let every = if is_tag { mine.count_ones() } else { mine.count_ones().div_ceil(SHADED) };
         let mut sum = [0.0; 3];
         let mut n_shaded = 0.0;

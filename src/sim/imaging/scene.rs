@@ -20,7 +20,7 @@ const FINE_CELL_PX: f32 = 2.5;
 
 /// What a surface looks like.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Look {
+pub(super) enum Appearance {
     Tag,
     Plain(Rgb),
     /// The seafloor's texture.
@@ -31,7 +31,7 @@ pub(super) enum Look {
 #[derive(Clone, Debug)]
 pub(super) struct Object<'a> {
     pub form: &'a Form,
-    pub look: Look,
+    pub look: Appearance,
     /// Halfway through the exposure.
     pub place: Place,
     /// At each sample's time, where it moves against the camera.
@@ -51,7 +51,7 @@ impl<'a> Object<'a> {
     /// `base_from_object` and `base_from_camera` when the shutter opens, halfway and when it closes.
     pub(super) fn new(
         form: &'a Form,
-        look: Look,
+        look: Appearance,
         base_from_object: &Instants,
         base_from_camera: &Instants,
         focal_px: f32,

@@ -11,7 +11,7 @@ use nalgebra::{Isometry3, Vector3};
 use contacts::{ContactState, ContactWorld};
 
 use super::dynamics::{
-    BaseCoupling, Body, Force, MAX_DOF, Motion, Multibody, Stage, StepInput, Surroundings, SystemState, WaterProperties,
+    BaseCoupling, Body, Environment, Force, MAX_DOF, Motion, Multibody, Stage, StepInput, SystemState, WaterProperties,
 };
 use super::joint_load::JointLoad;
 use super::places::BodyPoses;
@@ -178,12 +178,12 @@ impl ArmPhysics {
     }
 }
 
-fn surroundings(drive: &Drive, is_free: bool, stage: Stage, at: &SystemState) -> (Surroundings, BaseCoupling) {
+fn surroundings(drive: &Drive, is_free: bool, stage: Stage, at: &SystemState) -> (Environment, BaseCoupling) {
     let end = usize::from(stage == Stage::End);
     let water = &drive.water[end];
     if is_free {
         let to_base = at.world_from_base.rotation.inverse();
-        let around = Surroundings {
+        let around = Environment {
             gravity: to_base * Vector3::new(0.0, 0.0, -GRAVITY_M_S2),
             base_velocity: at.base_velocity,
             water_velocity: to_base * water.velocity,
@@ -193,7 +193,7 @@ fn surroundings(drive: &Drive, is_free: bool, stage: Stage, at: &SystemState) ->
     }
     let base = drive.base[end];
     let to_base = base.world_from_base.rotation().inverse();
-    let around = Surroundings {
+    let around = Environment {
         gravity: base.gravity,
         base_velocity: base.motion(),
         water_velocity: to_base * water.velocity,

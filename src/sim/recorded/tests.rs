@@ -3,7 +3,7 @@ use std::path::Path;
 
 use nalgebra::{UnitQuaternion, Vector3};
 
-use super::{RecordedMotion, VehicleJet};
+use super::{RecordedMotion, VehicleKinematics};
 
 const HEADER: &str = "time_s,x_m,y_m,z_m,roll_rad,pitch_rad,yaw_rad\n";
 
@@ -106,7 +106,7 @@ fn body_rate(w: &[[f64; 3]; 6]) -> Vector3<f64> {
     Vector3::new(droll - dyaw * sp, dpitch * cr + dyaw * sr * cp, -dpitch * sr + dyaw * cr * cp)
 }
 
-fn largest_difference(a: &VehicleJet, b: &VehicleJet) -> f64 {
+fn largest_difference(a: &VehicleKinematics, b: &VehicleKinematics) -> f64 {
     let vectors = [
         a.position - b.position,
         a.velocity - b.velocity,

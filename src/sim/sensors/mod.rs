@@ -8,7 +8,7 @@ pub(super) mod thermometer;
 
 /// What lies about the joint sensors, in their oil.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Surroundings {
+pub(super) struct OilState {
     pub oil_c: f64,
     /// Above the surface's.
     pub pressure_pa: f64,

@@ -98,8 +98,8 @@ pub struct WorldSpec {
     #[serde(skip)]
     pub recorded: Option<Arc<RecordedMotion>>,
     /// What stands in the water and nobody has drawn: `[[world.obstacle]]`, as `[[obstacle]]`.
-    #[serde(skip_serializing_if = "Undrawn::is_none")]
-    pub obstacle: Undrawn,
+    #[serde(skip_serializing_if = "UnmodelledObstacles::is_none")]
+    pub obstacle: UnmodelledObstacles,
     /// What breaks: in the order of the routine's `fault` steps, then what has a time.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub fault: Vec<ScheduledFault>,
@@ -108,9 +108,9 @@ pub struct WorldSpec {
 /// What stands in the water and is in no drawing: shapes in the world frame.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 #[serde(transparent)]
-pub struct Undrawn(Vec<PartFile>);
+pub struct UnmodelledObstacles(Vec<PartFile>);
 
-impl Undrawn {
+impl UnmodelledObstacles {
     fn is_none(&self) -> bool {
         self.0.is_empty()
     }
@@ -155,7 +155,9 @@ impl WorldSpec {
             water: reader.read("water")?,
             gear_ratio: reader.parse("gear_ratio")?,
             recorded: None,
-            obstacle: Undrawn(check_parts(&reader.parse::<Vec<PartFile>>("obstacle")?, file, "world.obstacle")?.1),
+            obstacle: UnmodelledObstacles(
+                check_parts(&reader.parse::<Vec<PartFile>>("obstacle")?, file, "world.obstacle")?.1,
+            ),
             fault: fault::read_list(table, file)?,
         };
         for (joint, ratio) in &spec.gear_ratio {

@@ -6,7 +6,7 @@ use super::BaseState;
 use super::swell::{Axis, draw_axis, sum};
 use crate::dynamics::{Body, Force, HullDrag, Inertia, Motion, Multibody};
 use crate::error::SimError;
-use crate::fault::Knock;
+use crate::fault::Impulse;
 use crate::spec::{VehicleMotionSpec, WaterSpec};
 use armcal_core::robot::{FileIssue, Vehicle, VehicleDynamics};
 use armcal_core::streams::JointAngles;
@@ -27,7 +27,7 @@ pub(crate) struct FreeVehicle {
     thrust: [f64; 6],
     /// Random forces and moments, in the band of the motion's periods.
     wobble: [Axis; 6],
-    knock: Option<(f64, Knock)>,
+    knock: Option<(f64, Impulse)>,
 }
 
 impl FreeVehicle {
@@ -87,7 +87,7 @@ impl FreeVehicle {
     }
 
     /// Something hits the vehicle.
-    pub(crate) fn knock(&mut self, t_s: f64, knock: &Knock) {
+    pub(crate) fn knock(&mut self, t_s: f64, knock: &Impulse) {
         self.knock = Some((t_s, *knock));
     }
 

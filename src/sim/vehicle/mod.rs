@@ -12,12 +12,12 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
-pub(super) use super::recorded::VehicleJet;
+pub(super) use super::recorded::VehicleKinematics;
 pub(super) use free::FreeVehicle;
 pub(super) use sea::{Sea, WaterMotion};
 
 use super::dynamics::Motion;
-use super::fault::Knock;
+use super::fault::Impulse;
 use super::recorded::RecordedMotion;
 use super::spec::VehicleMotionSpec;
 use armcal_core::spatial::{Base, Pose, Vehicle, World};
@@ -76,7 +76,7 @@ impl VehicleMotion {
     }
 
     /// Something hits the vehicle at `t_s`: it swings out and its pilot brings it back.
-    pub(super) fn knock(&mut self, t_s: f64, knock: &Knock, mass_kg: f64, inertia_kg_m2: &Vector3<f64>) {
+    pub(super) fn knock(&mut self, t_s: f64, knock: &Impulse, mass_kg: f64, inertia_kg_m2: &Vector3<f64>) {
         let world_from_vehicle = self.at(t_s).world_from_vehicle.rotation();
         self.knocks.push(KnockResponse::new(t_s, knock, mass_kg, inertia_kg_m2, &world_from_vehicle));
     }
@@ -96,7 +96,7 @@ impl VehicleMotion {
 
 impl BaseState {
     /// Rigid body: `a_base = a + alpha x r + w x (w x r)`, `v_base = v + w x r`, all in vehicle axes, then in base axes.
-    pub(super) fn of(jet: &VehicleJet, vehicle_from_base: &Pose<Vehicle, Base>) -> Self {
+    pub(super) fn of(jet: &VehicleKinematics, vehicle_from_base: &Pose<Vehicle, Base>) -> Self {
         let mount = vehicle_from_base.isometry();
         let lever = mount.translation.vector;
         let to_vehicle = jet.rotation.inverse();
@@ -134,7 +134,7 @@ impl BaseState {
         let classical = rate_of_velocity.linear + w.cross(&velocity.linear);
         let to_world = world_from_base.rotation;
         let world_from_vehicle = world_from_base * mount.inverse();
-        let jet = VehicleJet {
+        let jet = VehicleKinematics {
             position: world_from_vehicle.translation.vector,
             velocity: to_world * velocity.at(&origin),
             acceleration: to_world * (classical + turn.cross(&origin) + w.cross(&w.cross(&origin))),
@@ -174,7 +174,7 @@ const KNOCK_TIME_S: f64 = 1.5;
 impl KnockResponse {
     fn new(
         start_s: f64,
-        knock: &Knock,
+        knock: &Impulse,
         mass_kg: f64,
         inertia_kg_m2: &Vector3<f64>,
         world_from_vehicle: &UnitQuaternion<f64>,
@@ -189,7 +189,7 @@ impl KnockResponse {
         }
     }
 
-    fn add_to(&self, jet: &mut VehicleJet, t_s: f64) {
+    fn add_to(&self, jet: &mut VehicleKinematics, t_s: f64) {
         let t = t_s - self.start_s;
         if t <= 0.0 {
             return;
@@ -218,7 +218,7 @@ mod tests {
         let mount = Pose::from_position_rpy([1.7, -0.6, 0.1], [0.1, 0.2, -0.4]);
         let mut motion = VehicleMotion::new(&spec, None, mount, 3);
         if knock {
-            let knock = Knock { impulse_n_s: [900.0, -400.0, 100.0], angular_impulse_n_m_s: [200.0, 300.0, -500.0] };
+            let knock = Impulse { impulse_n_s: [900.0, -400.0, 100.0], angular_impulse_n_m_s: [200.0, 300.0, -500.0] };
             motion.knock(16.0, &knock, 4000.0, &Vector3::new(2000.0, 3000.0, 3500.0));
         }
         motion
@@ -258,7 +258,7 @@ mod tests {
     fn a_knock_moves_the_vehicle_as_its_impulse_says() {
         let spec = VehicleMotionSpec { rotation_rms_rad: 0.0, translation_rms_m: 0.0, ..VehicleMotionSpec::default() };
         let mut motion = VehicleMotion::new(&spec, None, Pose::identity(), 1);
-        let knock = Knock { impulse_n_s: [800.0, 0.0, 0.0], angular_impulse_n_m_s: [0.0, 0.0, 100.0] };
+        let knock = Impulse { impulse_n_s: [800.0, 0.0, 0.0], angular_impulse_n_m_s: [0.0, 0.0, 100.0] };
         motion.knock(2.0, &knock, 4000.0, &Vector3::new(2000.0, 3000.0, 4000.0));
         let (mut fastest, mut spin): (f64, f64) = (0.0, 0.0);
         for i in 0..20_000 {

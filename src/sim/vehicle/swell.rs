@@ -7,7 +7,7 @@
 use nalgebra::{UnitQuaternion, Vector3};
 use rand::RngExt;
 
-use super::VehicleJet;
+use super::VehicleKinematics;
 use crate::spec::VehicleMotionSpec;
 use armcal_core::stats::stream_rng;
 
@@ -45,7 +45,7 @@ impl Swell {
     }
 
     /// The motion at `t_s` seconds after the start.
-    pub(super) fn at(&self, t_s: f64) -> VehicleJet {
+    pub(super) fn at(&self, t_s: f64) -> VehicleKinematics {
         let ramp = smooth_ramp(t_s, self.ramp_s);
         let mut jets = [[0.0; 3]; 6];
         for (jet, axis) in jets.iter_mut().zip(&self.axes) {
@@ -53,7 +53,7 @@ impl Swell {
         }
         let vector = |order: usize| Vector3::new(jets[0][order], jets[1][order], jets[2][order]);
         let (rate, angular_acceleration) = body_rates(&jets[3], &jets[4], &jets[5]);
-        VehicleJet {
+        VehicleKinematics {
             position: vector(0),
             velocity: vector(1),
             acceleration: vector(2),

@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use super::World;
-use crate::fault::{Fault, Knock, ScheduledFault};
+use crate::fault::{Fault, Impulse, ScheduledFault};
 use crate::truth::TruthFault;
 use armcal_core::streams::ArmError;
 
@@ -90,7 +90,7 @@ impl World {
             Fault::TagMisread { id, as_id } => self.camera.misread(id, as_id),
             Fault::Silt { seconds } => self.camera.blind(stamp.plus_s(seconds)),
             Fault::VehicleKnocked { force_n, duration_s, at_m } => {
-                self.knock(&Knock::new(force_n, duration_s, at_m));
+                self.knock(&Impulse::new(force_n, duration_s, at_m));
             }
             Fault::ArmBumped { link, force_n, duration_s } => self.bump(&link, force_n, duration_s),
         }
@@ -108,7 +108,7 @@ impl World {
     }
 
     /// A blow to the vehicle: a free one takes the impulse, one on a prescribed path swings out as its impulse says and comes back.
-    fn knock(&mut self, knock: &Knock) {
+    fn knock(&mut self, knock: &Impulse) {
         let t_s = self.time_s();
         match &mut self.free {
             Some(free) => free.knock(t_s, knock),

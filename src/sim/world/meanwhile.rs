@@ -1,6 +1,6 @@
 //! What happens to a world besides being driven: time passes at rest.
 
-use super::{AWAKE_S, SLOW_PERIODS, World, sample_pots, surroundings};
+use super::{AWAKE_S, SLOW_PERIODS, World, sample_joint_sensors, surroundings};
 use crate::spec::CONTROL_PERIOD_S;
 use armcal_core::streams::{Arm, ArmError, JointSensorSample, Message, Sink};
 
@@ -55,7 +55,7 @@ impl World {
         }
         self.warm(t_s, STRIDE_S);
         let around = surroundings(&self.spec, &self.temperatures, t_s, self.depth_m());
-        self.measured = sample_pots(&mut self.pots, &self.physics.angles(), &around, STRIDE_S);
+        self.measured = sample_joint_sensors(&mut self.pots, &self.physics.angles(), &around, STRIDE_S);
         self.outbox.push((now, Message::JointSensors(JointSensorSample { stamp: now, counts: self.measured })));
         self.sample_slow_sensors(now, t_s);
     }

@@ -10,7 +10,7 @@ use std::collections::VecDeque;
 
 use faults::Timeline;
 pub(super) use setup::check_step;
-use setup::{actuators, header, sample_pots, stowed_angles, surroundings};
+use setup::{actuators, header, sample_joint_sensors, stowed_angles, surroundings};
 
 use super::as_built::AsBuilt;
 use super::contact::ContactWatch;
@@ -130,7 +130,7 @@ impl World {
         }
         hydraulics.balance(&angles, &physics.static_torques(&base.gravity, &angles));
         let sea = Sea::new(&spec.water, seed);
-        let measured = sample_pots(&mut pots, &angles, &around, 0.0);
+        let measured = sample_joint_sensors(&mut pots, &angles, &around, 0.0);
         let mut camera = WristCamera::new(&CameraInput { robot, built: &built, solids: &solids, spec: &spec, seed });
         camera.render(&RenderInput { robot, vehicle, scene, spec: &spec, seed })?;
         Ok(Self {
@@ -253,7 +253,7 @@ impl World {
         }
         self.warm(t_s, CONTROL_PERIOD_S);
         let around = surroundings(&self.spec, &self.temperatures, t_s, self.depth_m());
-        self.measured = sample_pots(&mut self.pots, &self.physics.angles(), &around, CONTROL_PERIOD_S);
+        self.measured = sample_joint_sensors(&mut self.pots, &self.physics.angles(), &around, CONTROL_PERIOD_S);
         let sample = JointSensorSample { stamp: now, counts: self.measured };
         self.outbox.push((now, Message::JointSensors(sample)));
         self.move_jaws(period);

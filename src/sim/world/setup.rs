@@ -6,7 +6,7 @@ use super::WorldInput;
 use crate::as_built::AsBuilt;
 use crate::error::SimError;
 use crate::hydraulics::{ActuatorInput, Hydraulics};
-use crate::sensors::Surroundings;
+use crate::sensors::OilState;
 use crate::sensors::joint::{JointInput, JointSensor};
 use crate::sensors::temperatures::Temperatures;
 use crate::sensors::thermometer::gauge_pressure_pa;
@@ -19,7 +19,7 @@ use armcal_core::streams::{JointAngles, JointCounts};
 const END_STOP_MARGIN_RAD: f64 = 1e-3;
 
 /// The true angles at which every sensor reads `stowed` by the datasheet, kept within the end stops.
-pub(super) fn stowed_angles(robot: &Robot, pots: &mut [JointSensor], around: &Surroundings) -> JointAngles {
+pub(super) fn stowed_angles(robot: &Robot, pots: &mut [JointSensor], around: &OilState) -> JointAngles {
     JointAngles::from_fn(robot.n_joints(), |j| {
         let wanted = pots[j].angle_for_reading(robot.stowed[j], around);
         let angle = robot.chain.joints()[j].limits.map_or(wanted, |limits| {
@@ -30,10 +30,10 @@ pub(super) fn stowed_angles(robot: &Robot, pots: &mut [JointSensor], around: &Su
     })
 }
 
-pub(super) fn sample_pots(
+pub(super) fn sample_joint_sensors(
     pots: &mut [JointSensor],
     angles: &JointAngles,
-    around: &Surroundings,
+    around: &OilState,
     elapsed_s: f64,
 ) -> JointCounts {
     let around = *around;
@@ -41,8 +41,8 @@ pub(super) fn sample_pots(
 }
 
 /// At a depth below the surface.
-pub(super) fn surroundings(spec: &WorldSpec, temperatures: &Temperatures, t_s: f64, depth_m: f64) -> Surroundings {
-    Surroundings { oil_c: temperatures.oil_c(t_s), pressure_pa: gauge_pressure_pa(&spec.water, depth_m) }
+pub(super) fn surroundings(spec: &WorldSpec, temperatures: &Temperatures, t_s: f64, depth_m: f64) -> OilState {
+    OilState { oil_c: temperatures.oil_c(t_s), pressure_pa: gauge_pressure_pa(&spec.water, depth_m) }
 }
 
 /// Whether the step is short enough for the oil's stiffness.

@@ -1,7 +1,7 @@
 //! A method with its settings.
 
 use super::scene::{Draw, Guess, Setting};
-use armcal_belief::calib::bundle::{BundleInput, Evidence, Model, Scales, estimate};
+use armcal_belief::calib::bundle::{BundleInput, HyperparameterMode, Hyperparameters, Model, estimate};
 use armcal_belief::calib::{
     Gauge, JointParameters, Parameter, ParameterKind, PositionMethod, PositionProblem, Scaling, SearchOptions,
     Solution, SolveOutcome,
@@ -17,14 +17,14 @@ pub enum Solver {
 
 /// One line of a table.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Contender {
+pub struct MethodVariant {
     pub name: &'static str,
     pub solver: Solver,
     pub gauge: Gauge,
     pub options: SearchOptions,
 }
 
-impl Contender {
+impl MethodVariant {
     fn of(name: &'static str, method: PositionMethod, gauge: Gauge) -> Self {
         Self { name, solver: Solver::Position(method), gauge, options: SearchOptions::default() }
     }
@@ -100,10 +100,10 @@ fn bundle(draw: &Draw, guess: &JointParameters) -> Solution {
         robot: &draw.robot,
         views: &draw.views,
         model,
-        scales: Scales::datasheet(&draw.robot),
+        scales: Hyperparameters::datasheet(&draw.robot),
         guess: *guess,
         joint_prior: None,
-        evidence: Evidence::Fitted,
+        evidence: HyperparameterMode::Fitted,
     };
     match estimate(&input) {
         Some(found) => Solution {

@@ -1,7 +1,7 @@
 //! What is compared, and what the paper says of it.
 
-use super::contender::{Contender, Solver};
-use super::scene::{Guess, Readings, Setting, Sight};
+use super::contender::{MethodVariant, Solver};
+use super::scene::{Guess, PoseSampling, Readings, Setting};
 use armcal_belief::calib::{Gauge, PositionMethod, SearchOptions};
 
 /// How many draws.
@@ -19,14 +19,14 @@ pub struct Experiment {
     pub name: &'static str,
     pub title: &'static str,
     pub settings: Vec<Setting>,
-    pub contenders: Vec<Contender>,
+    pub contenders: Vec<MethodVariant>,
     pub draws: usize,
 }
 
 impl Experiment {
     /// The paper's own figure for the tool's error, where it has one for this.
     #[must_use]
-    pub fn paper_says(&self, setting: &Setting, contender: &Contender) -> &'static str {
+    pub fn paper_says(&self, setting: &Setting, contender: &MethodVariant) -> &'static str {
         let is_standard = setting.gain_error <= 0.05 && setting.guess == Guess::Datasheet;
         if self.name == "preconditioning" || !is_standard {
             return "";
@@ -51,9 +51,9 @@ pub fn experiments(tier: Tier) -> Vec<Experiment> {
     let n = |full: usize, small: usize| if tier == Tier::Full { full } else { small };
     let standard = Setting::default();
     let at_1_cm = Setting { noise_m: 0.01, ..standard };
-    let [free, fixed] = [Gauge::Free, Gauge::Fixed].map(Contender::minimum_variance);
-    let (distance, squares) = (Contender::minimum_distance(), Contender::least_squares());
-    let bundle = Contender::bundle();
+    let [free, fixed] = [Gauge::Free, Gauge::Fixed].map(MethodVariant::minimum_variance);
+    let (distance, squares) = (MethodVariant::minimum_distance(), MethodVariant::least_squares());
+    let bundle = MethodVariant::bundle();
     let with_map = vec![distance, fixed, squares, bundle];
     let all = vec![distance, free, fixed, squares, bundle];
     let sizes = SIZES.iter().filter(|(poses, _)| tier == Tier::Full || *poses < 200);
@@ -88,7 +88,7 @@ pub fn experiments(tier: Tier) -> Vec<Experiment> {
         Experiment {
             name: "sight",
             title: "The same from poses that have every landmark in the image, noise 1 cm",
-            settings: vec![Setting { sight: Sight::InImage, ..at_1_cm }],
+            settings: vec![Setting { sight: PoseSampling::InImage, ..at_1_cm }],
             contenders: with_map.clone(),
             draws: n(200, 8),
         },

@@ -3,7 +3,7 @@
 use nalgebra::Point3;
 
 use super::PaperStudyError;
-use super::contender::Contender;
+use super::contender::MethodVariant;
 use super::scene::{Draw, Setting};
 use super::trials::PaperRow;
 use crate::charts::{Axis, Panel, Series, Style, svg};
@@ -38,8 +38,8 @@ fn label(text: &str, axis: Axis) -> (String, Axis) {
 
 /// Figure 2: what the search has reached after so many evaluations, with preconditioning and without.
 fn convergence(draw: &Draw) -> [Panel; 2] {
-    let panel = |contender: Contender, unit: &str| {
-        let curve = |name: &str, contender: &Contender| {
+    let panel = |contender: MethodVariant, unit: &str| {
+        let curve = |name: &str, contender: &MethodVariant| {
             let mut best = f64::INFINITY;
             let mut points: Vec<[f64; 2]> = Vec::new();
             let mut n = 0.0;
@@ -66,8 +66,8 @@ fn convergence(draw: &Draw) -> [Panel; 2] {
         }
     };
     [
-        panel(Contender::minimum_distance(), "sum of distances, m"),
-        panel(Contender::minimum_variance(Gauge::Fixed), "sum of variances, m^2"),
+        panel(MethodVariant::minimum_distance(), "sum of distances, m"),
+        panel(MethodVariant::minimum_variance(Gauge::Fixed), "sum of variances, m^2"),
     ]
 }
 
@@ -99,7 +99,7 @@ fn over_noise(rows: &[PaperRow]) -> Panel {
 
 /// Figure 3, left: where the tool is, was believed to be, and is believed to be.
 fn tool_positions(draw: &Draw, setting: &Setting) -> [Panel; 2] {
-    [Contender::minimum_variance(Gauge::Free), Contender::minimum_distance()].map(|contender| {
+    [MethodVariant::minimum_variance(Gauge::Free), MethodVariant::minimum_distance()].map(|contender| {
         let solution = contender.solve(draw, setting, &mut |_| {});
         let series = |name: &str, believed: Option<&JointParameters>| {
             let place = |angles: &armcal_core::joints::JointAngles| {
@@ -125,7 +125,7 @@ fn tool_positions(draw: &Draw, setting: &Setting) -> [Panel; 2] {
 
 /// Figure 3, right: the landmarks as every view puts them, by the datasheet, by the answer and by the true sensors.
 fn clouds(draw: &Draw, setting: &Setting) -> [Panel; 2] {
-    let solution = Contender::minimum_variance(Gauge::Free).solve(draw, setting, &mut |_| {});
+    let solution = MethodVariant::minimum_variance(Gauge::Free).solve(draw, setting, &mut |_| {});
     let series = |name: &str, believed: &JointParameters| {
         let seen = draw.views.iter().take(CLOUD_VIEWS).flat_map(|view| {
             let angles = armcal_core::joints::JointAngles::from_fn(view.travel_rad.len(), |joint| {

@@ -13,10 +13,10 @@ mod tables;
 mod tests;
 mod trials;
 
-pub use contender::{Contender, Solver};
+pub use contender::{MethodVariant, Solver};
 pub use experiments::{Experiment, Tier, experiments};
 pub use figures::paper_figures;
-pub use scene::{Draw, Guess, Readings, Setting, Sight};
+pub use scene::{Draw, Guess, PoseSampling, Readings, Setting};
 pub use tables::{paper_csv, paper_markdown};
 pub use trials::{PaperRow, run_experiment};
 

@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::PaperStudyError;
-use armcal_belief::calib::{JointParameters, Measured, Parameter, ParameterKind, TagView, View};
+use armcal_belief::calib::{JointParameters, Parameter, ParameterKind, TagMeasurement, TagObservation, View};
 use armcal_core::joints::JointAngles;
 use armcal_core::robot::{Robot, SurveyedTag, TagSurvey};
 use armcal_core::spatial::Pose;
@@ -32,7 +32,7 @@ pub enum Guess {
 
 /// Which poses are drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Sight {
+pub enum PoseSampling {
     /// Uniform over the joints' ranges; every landmark is seen from each, as the paper counts m measurements of all n.
     Everywhere,
     /// Of those, the ones that have every landmark in the camera's image, at least 0.25 m away; nothing hides anything.
@@ -51,7 +51,7 @@ pub struct Setting {
     pub gain_error: f64,
     pub offset_error_rad: f64,
     pub readings: Readings,
-    pub sight: Sight,
+    pub sight: PoseSampling,
     pub guess: Guess,
 }
 
@@ -65,7 +65,7 @@ impl Default for Setting {
             gain_error: 0.05,
             offset_error_rad: 5.0_f64.to_radians(),
             readings: Readings::Exact,
-            sight: Sight::Everywhere,
+            sight: PoseSampling::Everywhere,
             guess: Guess::Datasheet,
         }
     }
@@ -188,7 +188,7 @@ fn drawn_angles(robot: &Robot, rng: &mut ChaCha8Rng) -> JointAngles {
     })
 }
 
-fn seeing_pose(robot: &Robot, sight: Sight, rng: &mut ChaCha8Rng) -> Result<JointAngles, PaperStudyError> {
+fn seeing_pose(robot: &Robot, sight: PoseSampling, rng: &mut ChaCha8Rng) -> Result<JointAngles, PaperStudyError> {
     let lens = &robot.camera.lens;
     for _ in 0..MAX_TRIES {
         let angles = drawn_angles(robot, rng);
@@ -197,7 +197,7 @@ fn seeing_pose(robot: &Robot, sight: Sight, rng: &mut ChaCha8Rng) -> Result<Join
             let place = camera_from_base * Point3::from(tag.base_from_tag.origin().vector());
             place.coords.norm() > MIN_RANGE_M && lens.project(&place.coords).is_some_and(|pixel| lens.contains(&pixel))
         };
-        if sight == Sight::Everywhere || robot.tags.iter().all(is_seen) {
+        if sight == PoseSampling::Everywhere || robot.tags.iter().all(is_seen) {
             return Ok(angles);
         }
     }
@@ -230,7 +230,12 @@ fn view(
     let tag_view = |(tag_idx, tag): (usize, &SurveyedTag)| {
         let exact = camera_from_base * Point3::from(tag.base_from_tag.origin().vector());
         let noise = Vector3::from_fn(|_, _| setting.noise_m * Distribution::<f64>::sample(&StandardNormal, rng));
-        TagView { id: tag.id, tag_idx, center_in_camera_m: exact.coords + noise, measured: Measured::Position }
+        TagObservation {
+            id: tag.id,
+            tag_idx,
+            center_in_camera_m: exact.coords + noise,
+            measured: TagMeasurement::Position,
+        }
     };
     let tags = robot.tags.iter().enumerate().map(tag_view).collect();
     View { tags, ..View::of_reading(pose_idx, SIMULATION_EPOCH, read_rad) }

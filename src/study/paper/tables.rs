@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::experiments::Experiment;
-use super::scene::{Guess, Readings, Sight};
+use super::scene::{Guess, PoseSampling, Readings};
 use super::trials::PaperRow;
 
 fn mm(metres: f64) -> String {
@@ -26,7 +26,7 @@ fn data(row: &PaperRow) -> String {
     if s.readings == Readings::WholeCounts {
         text.push_str(", whole counts");
     }
-    if s.sight == Sight::InImage {
+    if s.sight == PoseSampling::InImage {
         text.push_str(", in the image");
     }
     if s.guess == Guess::Truth {
@@ -97,7 +97,7 @@ pub fn paper_csv(rows: &[PaperRow]) -> String {
             s.gain_error,
             s.offset_error_rad,
             s.readings == Readings::WholeCounts,
-            s.sight == Sight::InImage,
+            s.sight == PoseSampling::InImage,
             s.guess == Guess::Truth,
             row.draws,
             row.tool_rms_m,

@@ -23,15 +23,15 @@ fn row<'a>(rows: &'a [PaperRow], contender: &str, is_it: impl Fn(&Setting) -> bo
 fn without_noise_all_find_the_tool_but_minimum_variance_with_its_gauge_free() {
     let rows = rows_of("no noise");
     let exact = |setting: &Setting| setting.readings == Readings::Exact;
-    let [free, fixed] = [Gauge::Free, Gauge::Fixed].map(|gauge| Contender::minimum_variance(gauge).name);
-    for name in [Contender::minimum_distance().name, Contender::least_squares().name, fixed] {
+    let [free, fixed] = [Gauge::Free, Gauge::Fixed].map(|gauge| MethodVariant::minimum_variance(gauge).name);
+    for name in [MethodVariant::minimum_distance().name, MethodVariant::least_squares().name, fixed] {
         let found = row(&rows, name, exact);
         assert!(found.tool_p95_m < 1e-5 && found.converged == found.draws, "{found:?}");
     }
     let free = row(&rows, free, exact);
     assert!((0.02..0.11).contains(&free.tool_median_m), "{free:?}");
     // Half a count is 0.2 mrad.
-    let counts = row(&rows, Contender::minimum_distance().name, |s| s.readings == Readings::WholeCounts);
+    let counts = row(&rows, MethodVariant::minimum_distance().name, |s| s.readings == Readings::WholeCounts);
     assert!((1e-5..1e-3).contains(&counts.tool_rms_m), "{counts:?}");
 }
 
@@ -39,17 +39,17 @@ fn without_noise_all_find_the_tool_but_minimum_variance_with_its_gauge_free() {
 fn at_one_centimetre_minimum_distance_is_near_least_squares_and_that_at_the_bound() {
     let rows = rows_of("noise");
     let at_1_cm = |setting: &Setting| setting.noise_m == 0.01;
-    let squares = row(&rows, Contender::least_squares().name, at_1_cm);
-    let distance = row(&rows, Contender::minimum_distance().name, at_1_cm);
+    let squares = row(&rows, MethodVariant::least_squares().name, at_1_cm);
+    let distance = row(&rows, MethodVariant::minimum_distance().name, at_1_cm);
     let bound_m = squares.bound_rms_m.expect("noise");
     assert!((0.7..1.35).contains(&(squares.tool_rms_m / bound_m)), "{squares:?}");
     assert!(distance.over_least_squares.expect("paired") < 1.25, "{distance:?}");
     assert!(distance.tool_rms_m < 0.003, "{distance:?}");
-    let bundle = row(&rows, Contender::bundle().name, at_1_cm);
+    let bundle = row(&rows, MethodVariant::bundle().name, at_1_cm);
     assert!((0.8..1.2).contains(&bundle.over_least_squares.expect("paired")), "{bundle:?}");
-    let free = row(&rows, Contender::minimum_variance(Gauge::Free).name, at_1_cm);
+    let free = row(&rows, MethodVariant::minimum_variance(Gauge::Free).name, at_1_cm);
     assert!(free.tool_rms_m > 10.0 * distance.tool_rms_m, "{free:?}");
-    let fixed = row(&rows, Contender::minimum_variance(Gauge::Fixed).name, at_1_cm);
+    let fixed = row(&rows, MethodVariant::minimum_variance(Gauge::Fixed).name, at_1_cm);
     assert!(fixed.tool_rms_m < 3.0 * distance.tool_rms_m, "{fixed:?}");
     // Errors grow with the noise.
     let [low, high] = [0.001, 0.03].map(|noise| row(&rows, distance.contender, |s| s.noise_m == noise).tool_rms_m);
@@ -61,7 +61,7 @@ fn at_one_centimetre_minimum_distance_is_near_least_squares_and_that_at_the_boun
 fn from_the_truth_minimum_variance_finds_less_spread_and_a_worse_tool() {
     let rows = rows_of("from the truth");
     for gauge in [Gauge::Free, Gauge::Fixed] {
-        let found = row(&rows, Contender::minimum_variance(gauge).name, |_| true);
+        let found = row(&rows, MethodVariant::minimum_variance(gauge).name, |_| true);
         assert!(found.cost_final_median < found.cost_initial_median && found.tool_median_m > 5e-4, "{found:?}");
     }
 }
@@ -70,7 +70,7 @@ fn from_the_truth_minimum_variance_finds_less_spread_and_a_worse_tool() {
 fn raw_units_end_far_from_the_minimum() {
     let rows = rows_of("preconditioning");
     let exact = |setting: &Setting| setting.noise_m == 0.0;
-    let scaled = row(&rows, Contender::minimum_distance().name, exact);
+    let scaled = row(&rows, MethodVariant::minimum_distance().name, exact);
     let raw = row(&rows, "minimum distance, raw units", exact);
     assert!(raw.evaluations_median > 5.0 * scaled.evaluations_median, "{raw:?}");
     assert!(raw.tool_median_m > 1e3 * scaled.tool_median_m, "{raw:?}");

@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::PaperStudyError;
-use super::contender::Contender;
+use super::contender::MethodVariant;
 use super::experiments::Experiment;
 use super::scene::{Draw, Setting};
 use armcal_belief::calib::{PositionProblem, SolveOutcome, fisher_information};
@@ -71,12 +71,12 @@ pub fn run_experiment(robot: &Robot, experiment: &Experiment, seed: u64) -> Resu
 fn pair(
     robot: &Robot,
     setting: &Setting,
-    contenders: &[Contender],
+    contenders: &[MethodVariant],
     seed: u64,
     number: u64,
 ) -> Result<Paired, PaperStudyError> {
     let draw = Draw::new(robot, setting, seed, number)?;
-    let trial = |contender: &Contender| {
+    let trial = |contender: &MethodVariant| {
         let solution = contender.solve(&draw, setting, &mut |_| {});
         Trial {
             tool_rms_m: draw.tool_rms_m(&solution.parameters),
@@ -130,9 +130,9 @@ fn summed_up(experiment: &Experiment, setting: &Setting, paired: &[Paired]) -> V
         let values: Vec<f64> = paired.iter().map(|p| of(&p.trials[k])).collect();
         quantile(&values, 0.5).unwrap_or(f64::NAN)
     };
-    let reference = experiment.contenders.iter().position(|c| c.name == Contender::least_squares().name);
+    let reference = experiment.contenders.iter().position(|c| c.name == MethodVariant::least_squares().name);
     let bounds: Option<Vec<f64>> = paired.iter().map(|p| p.bound_m2).collect();
-    let row = |(k, contender): (usize, &Contender)| {
+    let row = |(k, contender): (usize, &MethodVariant)| {
         let errors = tool(k);
         let tool_rms_m = rms(errors.iter().copied());
         PaperRow {

@@ -8,7 +8,7 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 use super::normal;
-use armcal_belief::calib::{Measured, SeenCorners, TagView, View};
+use armcal_belief::calib::{MeanCorners, TagMeasurement, TagObservation, View};
 use armcal_belief::plan::{ClearanceModel, PosePlan, VisibilityModel};
 use armcal_core::joints::MAX_JOINTS;
 use armcal_core::optics::square_corners;
@@ -127,12 +127,17 @@ impl<'a> TrueArm<'a> {
             let camera_from_tag = base_from_camera.inv_mul(self.built.tags[tag_idx].base_from_tag().isometry());
             let Some(seen) = self.corners(&camera_from_tag, tag.size_m, rng) else { continue };
             let center_in_camera_m = camera_from_tag.translation.vector;
-            view.tags.push(TagView { id: tag.id, tag_idx, center_in_camera_m, measured: Measured::Corners(seen) });
+            view.tags.push(TagObservation {
+                id: tag.id,
+                tag_idx,
+                center_in_camera_m,
+                measured: TagMeasurement::Corners(seen),
+            });
         }
     }
 
     /// Mean and scatter over the images that show the tag.
-    fn corners(&self, camera_from_tag: &Isometry3<f64>, size_m: f64, rng: &mut ChaCha8Rng) -> Option<SeenCorners> {
+    fn corners(&self, camera_from_tag: &Isometry3<f64>, size_m: f64, rng: &mut ChaCha8Rng) -> Option<MeanCorners> {
         let camera = &self.world.camera;
         let lens = &self.robot.camera.lens;
         let center = camera_from_tag.translation.vector;
@@ -151,7 +156,7 @@ impl<'a> TrueArm<'a> {
                 *value = exact + mean;
             }
         }
-        (n_frames > 0).then_some(SeenCorners { corners_px, n_frames, scatter_px2 })
+        (n_frames > 0).then_some(MeanCorners { corners_px, n_frames, scatter_px2 })
     }
 
     /// Distance of the tool from where it is sent, by an arm whose controller is told counts by `sensors`, at their reference.

@@ -12,7 +12,9 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use arm::TrueArm;
-use armcal_belief::calib::bundle::{BundleInput, Estimate, Evidence, Scales, estimate, model_for, reference};
+use armcal_belief::calib::bundle::{
+    BundleInput, Estimate, HyperparameterMode, Hyperparameters, estimate, model_for, reference,
+};
 use armcal_belief::calib::{JointParameters, ParameterCovariance, View};
 use armcal_belief::plan::{
     ClearanceModel, JointErrorBounds, PlanError, PosePool, PoseRequest, TargetRequest, VisibilityModel, plan_targets,
@@ -92,7 +94,7 @@ pub fn pose_study(
     });
     let capture = capture.ok_or_else(|| PoseStudyError::Scene("the routine captures nothing".to_owned()))?;
     let clearance = ClearanceModel::new(robot, vehicle, &routine.scene);
-    let bounds = JointErrorBounds::prior(robot);
+    let bounds = JointErrorBounds::datasheet(robot);
     let targets_m = &routine.task.targets_m;
     let request = TargetRequest { targets_m, preferred: None, margin_m: capture.clearance_m };
     let mut rng = stream_rng(routine.seed, "targets of the study of poses");
@@ -116,7 +118,7 @@ impl Scene<'_> {
         let arm = TrueArm::draw(self.robot, self.clearance, self.world, seed);
         let mut rows = Vec::with_capacity(CRITERIA.len() * POSES.len());
         for criterion in CRITERIA {
-            let capture = CaptureSettings { choose: criterion, held_out: 0, ..self.capture };
+            let capture = CaptureSettings { criterion, held_out: 0, ..self.capture };
             for poses in POSES {
                 let name = format!("{criterion:?} {poses}");
                 let request = self.request(&visibility, &capture, poses);
@@ -149,7 +151,7 @@ impl Scene<'_> {
             belief: None,
             taken: &[],
             prior: None,
-            tag_trust: &[],
+            detection_rate: &[],
             failed: &[],
             task: &self.task,
             targets_m: self.targets_m,
@@ -159,7 +161,7 @@ impl Scene<'_> {
 
     /// The tool's error, true and as `bundle` predicts it: root mean squares over the targets, m.
     fn fitted(&self, arm: &TrueArm<'_>, views: &[View]) -> Option<(f64, f64)> {
-        let scales = Scales::datasheet(self.robot);
+        let scales = Hyperparameters::datasheet(self.robot);
         let input = BundleInput {
             robot: self.robot,
             views,
@@ -167,7 +169,7 @@ impl Scene<'_> {
             scales,
             guess: JointParameters { reference: reference(views), ..JointParameters::default() },
             joint_prior: None,
-            evidence: Evidence::Fitted,
+            evidence: HyperparameterMode::Fitted,
         };
         let found = estimate(&input)?;
         let sensors = found.parameters().sensors(self.robot);

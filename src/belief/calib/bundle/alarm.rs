@@ -7,10 +7,10 @@
 
 use nalgebra::{DMatrix, DVector, Matrix6, SMatrix, Vector3, Vector6};
 
-use super::eliminated::{Eliminated, N_OWN};
+use super::eliminated::{N_VIEW_PARAMETERS, SchurBlock};
 use super::estimate::Estimate;
-use super::problem::Seen;
-use super::sighting::Info;
+use super::problem::WeightedMeasurement;
+use super::sighting::PoseInformation;
 use armcal_core::joints::{JointAngles, MAX_JOINTS};
 use armcal_core::kinematics::LinkPoses;
 use armcal_core::spatial::adjoint;
@@ -25,7 +25,7 @@ const MOUNT: usize = 6 * MAX_JOINTS;
 
 /// A piece of the geometry that is tested.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Piece {
+pub enum GeometryElement {
     /// Where the joint sits on its parent link.
     Joint(usize),
     /// Where the camera hangs, beyond its prior.
@@ -33,16 +33,16 @@ pub enum Piece {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Change {
+pub enum ErrorKind {
     Shift,
     Turn,
 }
 
 /// What one change of the geometry would explain.
 #[derive(Clone, Debug)]
-pub struct Suspect {
-    pub piece: Piece,
-    pub change: Change,
+pub struct ScoreTestResult {
+    pub piece: GeometryElement,
+    pub change: ErrorKind,
     /// What the data ask for, in the parent link's frame (the camera's for the mount): m or rad.
     pub size: Vector3<f64>,
     pub chi2: f64,
@@ -60,24 +60,24 @@ struct Score {
     score: DVector<f64>,
     information: DMatrix<f64>,
     /// d(common)/d(trial).
-    followed: DMatrix<f64>,
+    sensitivity: DMatrix<f64>,
 }
 
 impl Estimate<'_> {
     /// All that can be tested, the least likely by chance first; `task`: the arm's angles at the task's targets.
     #[must_use]
-    pub fn suspects(&self, task: &[JointAngles]) -> Vec<Suspect> {
+    pub fn suspects(&self, task: &[JointAngles]) -> Vec<ScoreTestResult> {
         let robot = self.problem.robot;
         let score = self.score();
         let has_gripper = self.problem.layout.gripper_tag.is_some();
         let n_seen = match &robot.gripper_tag {
             Some(tag) if has_gripper => tag.mount.n_joints,
-            _ => self.problem.n_before,
+            _ => self.problem.n_camera_joints,
         };
-        let mut pieces: Vec<Piece> = (0..n_seen).map(Piece::Joint).collect();
-        pieces.extend(self.problem.layout.mount.map(|_| Piece::Mount));
-        let both = pieces.iter().flat_map(|&piece| [(piece, Change::Shift), (piece, Change::Turn)]);
-        let mut out: Vec<Suspect> =
+        let mut pieces: Vec<GeometryElement> = (0..n_seen).map(GeometryElement::Joint).collect();
+        pieces.extend(self.problem.layout.mount.map(|_| GeometryElement::Mount));
+        let both = pieces.iter().flat_map(|&piece| [(piece, ErrorKind::Shift), (piece, ErrorKind::Turn)]);
+        let mut out: Vec<ScoreTestResult> =
             both.filter_map(|(piece, change)| self.suspect(&score, piece, change, task)).collect();
         out.sort_by(|a, b| a.probability.total_cmp(&b.probability).then(b.chi2.total_cmp(&a.chi2)));
         out
@@ -89,7 +89,13 @@ impl Estimate<'_> {
         (0..self.problem.views.len()).map(|view_idx| self.problem.angles(view_idx, &self.solved.state)).collect()
     }
 
-    fn suspect(&self, score: &Score, piece: Piece, change: Change, task: &[JointAngles]) -> Option<Suspect> {
+    fn suspect(
+        &self,
+        score: &Score,
+        piece: GeometryElement,
+        change: ErrorKind,
+        task: &[JointAngles],
+    ) -> Option<ScoreTestResult> {
         let (first, unit) = columns(piece, change);
         let information = score.information.fixed_view::<3, 3>(first, first).into_owned() * (unit * unit);
         let pull = score.score.fixed_rows::<3>(first).into_owned() * unit;
@@ -108,14 +114,14 @@ impl Estimate<'_> {
         }
         let probability = chi_square_above(chi2, dof);
         let tool_m = self.tool_shift_m(score, first, &size, task);
-        Some(Suspect { piece, change, size, chi2, dof, probability, tool_m })
+        Some(ScoreTestResult { piece, change, size, chi2, dof, probability, tool_m })
     }
 
     /// How far the tool is elsewhere over `task` with the trial at `first` of `size`, the joints' parameters following.
     fn tool_shift_m(&self, score: &Score, first: usize, size: &Vector3<f64>, task: &[JointAngles]) -> f64 {
         let robot = self.problem.robot;
         let layout = &self.problem.layout;
-        let step = score.followed.columns(first, 3) * size;
+        let step = score.sensitivity.columns(first, 3) * size;
         let sensors = self.parameters().sensors(robot);
         let mut sum = 0.0;
         for angles in task {
@@ -131,7 +137,7 @@ impl Estimate<'_> {
                 let joint = parameter.joint;
                 if joint < robot.tool.mount.n_joints {
                     let model = &sensors.models[joint];
-                    let still = armcal_core::sensor::Departure::default();
+                    let still = armcal_core::sensor::ConditionChange::default();
                     let travel_rad = model.travel_under_rad(angles[joint], &still);
                     let by = parameter.kind.angle_derivative(&model.spec, travel_rad, &still, 0.0);
                     moved += poses.point_jacobian(joint, &tool_m) * (by * step[column]);
@@ -154,7 +160,7 @@ impl Estimate<'_> {
             for own in groups.by_ref().take(1 + usize::from(view.gripper.is_some())) {
                 let base_from_camera = self.base_from_camera(view_idx, own, &poses);
                 let trials = self.trials(view_idx, own, &poses, &base_from_camera);
-                let (h, g) = self.pull(own, &poses, &base_from_camera);
+                let (h, g) = self.gradient(own, &poses, &base_from_camera);
                 let m = own.twists * own.inverse * own.twists.transpose();
                 let left = trials.transpose() * (Matrix6::identity() - h * m);
                 score += left_times(&trials, &(g - h * (own.twists * (own.inverse * own.gradient))));
@@ -166,23 +172,23 @@ impl Estimate<'_> {
         let followed = -(&self.posterior.covariance * cross.transpose());
         score += followed.tr_mul(&self.solved.normal.right);
         information += &cross * &followed;
-        Score { score, information, followed }
+        Score { score, information, sensitivity: followed }
     }
 
-    fn is_gripper(&self, view_idx: usize, own: &Eliminated) -> bool {
+    fn is_gripper(&self, view_idx: usize, own: &SchurBlock) -> bool {
         self.problem.views[view_idx].gripper == Some(own.range.start)
     }
 
-    fn base_from_camera(&self, view_idx: usize, own: &Eliminated, poses: &LinkPoses) -> nalgebra::Isometry3<f64> {
+    fn base_from_camera(&self, view_idx: usize, own: &SchurBlock, poses: &LinkPoses) -> nalgebra::Isometry3<f64> {
         let state = &self.solved.state;
-        let before = poses.link(self.problem.n_before) * state.mount;
+        let before = poses.link(self.problem.n_camera_joints) * state.mount;
         if self.is_gripper(view_idx, own) { before } else { before * state.camera_error[view_idx] }
     }
 
     /// Curvature and pull of a group's sightings on the camera's twist.
-    fn pull(
+    fn gradient(
         &self,
-        own: &Eliminated,
+        own: &SchurBlock,
         poses: &LinkPoses,
         base_from_camera: &nalgebra::Isometry3<f64>,
     ) -> (Matrix6<f64>, Vector6<f64>) {
@@ -196,8 +202,8 @@ impl Estimate<'_> {
                 _ => state.tags[sighting.tag],
             };
             let camera_from_tag = base_from_camera.inv_mul(&pose);
-            let data: &Seen = &sighting.data;
-            if let Some(info) = Info::of(data, &camera_from_tag, &state.lens, problem.scales.noise, None) {
+            let data: &WeightedMeasurement = &sighting.data;
+            if let Some(info) = PoseInformation::of(data, &camera_from_tag, &state.lens, problem.scales.noise, None) {
                 h += info.h;
                 g += info.g;
             }
@@ -209,7 +215,7 @@ impl Estimate<'_> {
     fn trials(
         &self,
         view_idx: usize,
-        own: &Eliminated,
+        own: &SchurBlock,
         poses: &LinkPoses,
         base_from_camera: &nalgebra::Isometry3<f64>,
     ) -> Trials {
@@ -217,8 +223,8 @@ impl Estimate<'_> {
         let is_gripper = self.is_gripper(view_idx, own);
         // Links behind the camera move the tag, not the camera.
         let (joints, sign) = match &problem.robot.gripper_tag {
-            Some(tag) if is_gripper => (problem.n_before..tag.mount.n_joints, -1.0),
-            _ => (0..problem.n_before, 1.0),
+            Some(tag) if is_gripper => (problem.n_camera_joints..tag.mount.n_joints, -1.0),
+            _ => (0..problem.n_camera_joints, 1.0),
         };
         let mut trials = Trials::zeros();
         let to_camera = base_from_camera.rotation.inverse();
@@ -241,14 +247,14 @@ impl Estimate<'_> {
 }
 
 /// First trial column, and the size in whose units it is looked at.
-fn columns(piece: Piece, change: Change) -> (usize, f64) {
+fn columns(piece: GeometryElement, change: ErrorKind) -> (usize, f64) {
     let first = match piece {
-        Piece::Joint(joint) => 6 * joint,
-        Piece::Mount => MOUNT,
+        GeometryElement::Joint(joint) => 6 * joint,
+        GeometryElement::Mount => MOUNT,
     };
     match change {
-        Change::Shift => (first, SIZE_M),
-        Change::Turn => (first + 3, SIZE_RAD),
+        ErrorKind::Shift => (first, SIZE_M),
+        ErrorKind::Turn => (first + 3, SIZE_RAD),
     }
 }
 
@@ -256,4 +262,4 @@ fn left_times(trials: &Trials, pull: &Vector6<f64>) -> DVector<f64> {
     DVector::from_iterator(N_TRIALS, trials.column_iter().map(|column| column.dot(pull)))
 }
 
-const _: () = assert!(N_OWN == MAX_JOINTS + 6, "a view's own parameters are joints and camera");
+const _: () = assert!(N_VIEW_PARAMETERS == MAX_JOINTS + 6, "a view's own parameters are joints and camera");

@@ -5,9 +5,9 @@
 //! chi-squares (each cut where a sighting would be rejected), plus the joints' own and their parameters' prior, plus `2 ln(prior std / posterior std)` for
 //! each reading that is given up (Laplace's approximation of the evidence, MacKay 1992, with a round figure), must fall by `MARGIN`.
 
-use super::estimate::{Estimate, Evidence};
-use super::failed::{Applied, Failure, Found, Reading};
-use super::readings::{Pattern, Readings};
+use super::estimate::{Estimate, HyperparameterMode};
+use super::failed::{Failure, FailureAdjusted, FailureSource, SensorUse};
+use super::readings::{FailurePattern, Readings};
 use crate::calib::associate::View;
 use crate::calib::problem::{JointParameters, ParameterKind};
 use armcal_core::robot::{FailedKind, Robot};
@@ -57,7 +57,7 @@ pub fn failures(robot: &Robot, views: &[View], declared: &[Failure], found: Opti
         let without = search.score(&known);
         let candidates = (0..n_before).filter(|&joint| !is_failed(&known, joint));
         let mut best: Option<(f64, Failure)> = None;
-        for failure in candidates.filter_map(|joint| search.hypothesis(&known, joint, Found::Detected)) {
+        for failure in candidates.filter_map(|joint| search.hypothesis(&known, joint, FailureSource::Detected)) {
             let with: Vec<Failure> = known.iter().cloned().chain([failure.clone()]).collect();
             let score = search.score(&with);
             if best.as_ref().is_none_or(|(least, _)| score < *least) {
@@ -78,8 +78,8 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    fn applied(&self, failures: &[Failure]) -> Applied {
-        Applied::new(self.robot, self.views, failures, &JointParameters::default())
+    fn applied(&self, failures: &[Failure]) -> FailureAdjusted {
+        FailureAdjusted::new(self.robot, self.views, failures, &JointParameters::default())
     }
 
     /// Whether the reading stands still over all views.
@@ -93,35 +93,35 @@ impl Search<'_> {
     /// Angles of a joint by the camera, with its readings, under the `known` failures and this joint's sensor ignored.
     fn readings(&self, known: &[Failure], joint: usize) -> Option<Readings> {
         let mut freed: Vec<Failure> = known.iter().filter(|failure| failure.joint != joint).cloned().collect();
-        freed.push(Failure::without_sensor(joint, FailedKind::Dead, Found::Detected, self.views.len()));
+        freed.push(Failure::without_sensor(joint, FailedKind::Dead, FailureSource::Detected, self.views.len()));
         let applied = self.applied(&freed);
-        let found = applied.estimate(Evidence::Given)?;
+        let found = applied.estimate(HyperparameterMode::Given)?;
         Some(Readings::new(self.robot, self.views, joint, &found)).filter(|readings| readings.len() >= MIN_VIEWS)
     }
 
-    fn hypothesis(&self, known: &[Failure], joint: usize, found: Found) -> Option<Failure> {
+    fn hypothesis(&self, known: &[Failure], joint: usize, found: FailureSource) -> Option<Failure> {
         let readings = self.readings(known, joint)?;
         let pattern = readings.pattern(self.robot)?;
         Some(self.failure(joint, &pattern, found, &readings))
     }
 
-    fn failure(&self, joint: usize, pattern: &Pattern, found: Found, readings: &Readings) -> Failure {
+    fn failure(&self, joint: usize, pattern: &FailurePattern, found: FailureSource, readings: &Readings) -> Failure {
         let all = Failure::without_sensor(joint, FailedKind::Dead, found, self.views.len());
         let evidence = readings.in_words(pattern, self.views);
         match pattern {
-            Pattern::Locked(Reading::Used) => {
-                let (kind, reading) = (FailedKind::Locked, Reading::Used);
+            FailurePattern::Locked(SensorUse::Used) => {
+                let (kind, reading) = (FailedKind::Locked, SensorUse::Used);
                 Failure { kind, reading, views: Vec::new(), evidence, ..all }
             }
-            Pattern::Locked(Reading::Ignored) => Failure { kind: FailedKind::Locked, evidence, ..all },
-            Pattern::Stuck => Failure { kind: FailedKind::Stuck, evidence, ..all },
-            Pattern::Dead => Failure { evidence, ..all },
-            Pattern::Single(views) => {
-                let (kind, reading, views) = (FailedKind::Jumps, Reading::Used, views.clone());
+            FailurePattern::Locked(SensorUse::Ignored) => Failure { kind: FailedKind::Locked, evidence, ..all },
+            FailurePattern::Stuck => Failure { kind: FailedKind::Stuck, evidence, ..all },
+            FailurePattern::Dead => Failure { evidence, ..all },
+            FailurePattern::Single(views) => {
+                let (kind, reading, views) = (FailedKind::Jumps, SensorUse::Used, views.clone());
                 Failure { kind, reading, views, evidence, ..all }
             }
-            Pattern::Lasting { before, since } => {
-                let (kind, reading, views, since) = (FailedKind::Jumps, Reading::Used, before.clone(), Some(*since));
+            FailurePattern::Lasting { before, since } => {
+                let (kind, reading, views, since) = (FailedKind::Jumps, SensorUse::Used, before.clone(), Some(*since));
                 Failure { kind, reading, views, since, evidence, ..all }
             }
         }
@@ -130,7 +130,7 @@ impl Search<'_> {
     /// Declared jumps: when they were, where the views show it.
     fn look_into_jumps(&self, known: &mut [Failure], joints: &[usize]) {
         for &joint in joints {
-            let found = self.hypothesis(known, joint, Found::Declared);
+            let found = self.hypothesis(known, joint, FailureSource::Declared);
             let Some(failure) = known.iter_mut().find(|failure| failure.joint == joint) else { continue };
             match found {
                 Some(found) if found.kind == FailedKind::Jumps => *failure = found,
@@ -141,12 +141,13 @@ impl Search<'_> {
 
     /// Joints whose readings stand still: all sensors ignored first, then each by what the camera shows.
     fn classify_still(&self, known: &mut Vec<Failure>, joints: &[usize]) {
-        let ignored =
-            |&joint: &usize| Failure::without_sensor(joint, FailedKind::Dead, Found::Detected, self.views.len());
+        let ignored = |&joint: &usize| {
+            Failure::without_sensor(joint, FailedKind::Dead, FailureSource::Detected, self.views.len())
+        };
         let mut all = known.clone();
         all.extend(joints.iter().map(ignored));
         for &joint in joints {
-            if let Some(failure) = self.hypothesis(&all, joint, Found::Detected) {
+            if let Some(failure) = self.hypothesis(&all, joint, FailureSource::Detected) {
                 known.push(failure);
             }
         }
@@ -154,7 +155,7 @@ impl Search<'_> {
 
     fn score(&self, failures: &[Failure]) -> f64 {
         let applied = self.applied(failures);
-        applied.estimate(Evidence::Given).map_or(f64::MAX, |found| score(&found))
+        applied.estimate(HyperparameterMode::Given).map_or(f64::MAX, |found| score(&found))
     }
 }
 
@@ -167,7 +168,7 @@ fn score(found: &Estimate<'_>) -> f64 {
     let off = &found.solved.state.joint - &problem.prior.joint_mean;
     sum += (&problem.prior.joint_info * &off).dot(&off);
     for (view, errors) in problem.views.iter().zip(&found.solved.state.joint_error) {
-        for (joint, error) in errors.iter().enumerate().take(problem.n_before) {
+        for (joint, error) in errors.iter().enumerate().take(problem.n_camera_joints) {
             let by_sensor = error.powi(2) / problem.joint_error_var(view, joint);
             sum += if view.is_free[joint] { PER_READING } else { by_sensor };
         }
@@ -202,7 +203,7 @@ fn is_suspicious(robot: &Robot, found: &Estimate<'_>) -> bool {
         return true;
     }
     is_beyond_datasheet(robot, found)
-        || (0..problem.n_before).any(|joint| {
+        || (0..problem.n_camera_joints).any(|joint| {
             let large = LARGE_STD_RAD.max(2.0 * robot.sensors[joint].linearity_std_rad);
             if found.scales().joint_std_rad[joint] > large {
                 return true;

@@ -4,27 +4,27 @@ use std::ops::Range;
 
 use nalgebra::{Const, DMatrix, DVector, Isometry3, Matrix6, SMatrix, SVector, Vector6};
 
-use super::linearize::Normal;
-use super::problem::{Problem, ViewData};
+use super::linearize::NormalEquations;
+use super::problem::{BundleProblem, ViewData};
 use armcal_core::joints::MAX_JOINTS;
 
 /// A view's own parameters: an error of each joint, then the camera's six.
-pub(super) const N_OWN: usize = MAX_JOINTS + 6;
+pub(super) const N_VIEW_PARAMETERS: usize = MAX_JOINTS + 6;
 /// Directions of the common parameters: each joint, mount, time offset.
 pub(super) const N_DIRECTIONS: usize = MAX_JOINTS + 7;
 pub(super) const MOUNT: usize = MAX_JOINTS;
 pub(super) const TIME: usize = MAX_JOINTS + 6;
 
-pub(super) type Own = SMatrix<f64, N_OWN, N_OWN>;
+pub(super) type Own = SMatrix<f64, N_VIEW_PARAMETERS, N_VIEW_PARAMETERS>;
 pub(super) type Directions = SMatrix<f64, 6, N_DIRECTIONS>;
 
 /// What is needed to get a view's own parameters back, and their covariance.
 #[derive(Clone, Debug)]
-pub(super) struct Eliminated {
+pub(super) struct SchurBlock {
     /// `S`, and the inverse of `S^T G S + L`.
-    pub twists: SMatrix<f64, 6, N_OWN>,
+    pub twists: SMatrix<f64, 6, N_VIEW_PARAMETERS>,
     pub inverse: Own,
-    pub gradient: SVector<f64, N_OWN>,
+    pub gradient: SVector<f64, N_VIEW_PARAMETERS>,
     /// Rows of own parameters by common columns: `S^T sum H_i A`; filled where it is asked for.
     pub by_common: SMatrix<f64, 6, N_DIRECTIONS>,
     /// Of each sighting: its place among `infos`.
@@ -56,12 +56,12 @@ pub(super) struct Columns<'a> {
 }
 
 impl<'a> Columns<'a> {
-    pub(super) fn new(problem: &'a Problem<'_>, group: &Group<'_>) -> Self {
+    pub(super) fn new(problem: &'a BundleProblem<'_>, group: &Group<'_>) -> Self {
         Self { view: &problem.views[group.view_idx], joints: group.joints.clone() }
     }
 
     /// The directions that have columns.
-    pub(super) fn directions(&self, problem: &Problem<'_>) -> impl Iterator<Item = usize> + use<> {
+    pub(super) fn directions(&self, problem: &BundleProblem<'_>) -> impl Iterator<Item = usize> + use<> {
         let mount = if problem.layout.mount.is_some() { MOUNT..MOUNT + 6 } else { 0..0 };
         let time = if problem.layout.time.is_some() { TIME..TIME + 1 } else { 0..0 };
         self.joints.clone().chain(mount).chain(time)
@@ -69,7 +69,7 @@ impl<'a> Columns<'a> {
 
     /// Calls `f` with each column of a direction and the direction's derivative by it.
     #[inline]
-    pub(super) fn each(&self, problem: &Problem<'_>, direction: usize, mut f: impl FnMut(usize, f64)) {
+    pub(super) fn each(&self, problem: &BundleProblem<'_>, direction: usize, mut f: impl FnMut(usize, f64)) {
         let layout = &problem.layout;
         match direction {
             TIME => layout.time.into_iter().for_each(|at| f(at, 1.0)),
@@ -79,7 +79,7 @@ impl<'a> Columns<'a> {
     }
 }
 
-impl Eliminated {
+impl SchurBlock {
     /// Of a group without parameters of its own.
     pub(super) fn none(range: Range<usize>) -> Self {
         Self {
@@ -106,8 +106,8 @@ impl Eliminated {
     /// `sum H_i A step`: what a step of the common parameters adds to the sightings' pull on the camera's twist.
     pub(super) fn push(
         &self,
-        problem: &Problem<'_>,
-        normal: &Normal,
+        problem: &BundleProblem<'_>,
+        normal: &NormalEquations,
         view_idx: usize,
         step: &DVector<f64>,
     ) -> Vector6<f64> {
@@ -128,17 +128,22 @@ impl Eliminated {
         pushed
     }
 
-    fn columns<'a>(&self, problem: &'a Problem<'_>, view_idx: usize) -> Columns<'a> {
+    fn columns<'a>(&self, problem: &'a BundleProblem<'_>, view_idx: usize) -> Columns<'a> {
         let view = &problem.views[view_idx];
         let joints = match &problem.robot.gripper_tag {
-            Some(tag) if view.gripper == Some(self.range.start) => problem.n_before..tag.mount.n_joints,
-            _ => 0..problem.n_before,
+            Some(tag) if view.gripper == Some(self.range.start) => problem.n_camera_joints..tag.mount.n_joints,
+            _ => 0..problem.n_camera_joints,
         };
         Columns { view, joints }
     }
 
     /// `sum H_i A`: the sightings' pull on the camera's twist by the common columns.
-    pub(super) fn twist_by_columns(&self, problem: &Problem<'_>, normal: &Normal, view_idx: usize) -> DMatrix<f64> {
+    pub(super) fn twist_by_columns(
+        &self,
+        problem: &BundleProblem<'_>,
+        normal: &NormalEquations,
+        view_idx: usize,
+    ) -> DMatrix<f64> {
         let layout = &problem.layout;
         let mut out = DMatrix::zeros(6, layout.n);
         let columns = self.columns(problem, view_idx);
@@ -162,26 +167,31 @@ impl Eliminated {
     }
 
     /// `S^T sum H_i A`: own parameters by the common columns; multiplied by a step it is what the step adds to the gradient.
-    pub(super) fn own_by_columns(&self, problem: &Problem<'_>, normal: &Normal, view_idx: usize) -> DMatrix<f64> {
+    pub(super) fn own_by_columns(
+        &self,
+        problem: &BundleProblem<'_>,
+        normal: &NormalEquations,
+        view_idx: usize,
+    ) -> DMatrix<f64> {
         let layout = &problem.layout;
-        let mut out = DMatrix::zeros(N_OWN, layout.n);
+        let mut out = DMatrix::zeros(N_VIEW_PARAMETERS, layout.n);
         let columns = self.columns(problem, view_idx);
         let by_directions = self.twists.transpose() * self.by_common;
         for a in columns.directions(problem) {
             columns.each(problem, a, |column, by| {
-                for row in 0..N_OWN {
+                for row in 0..N_VIEW_PARAMETERS {
                     out[(row, column)] += by_directions[(row, a)] * by;
                 }
             });
         }
         for at in self.range.clone() {
             if let (u, Some(column)) = &normal.by_tag[at] {
-                let mut view = out.fixed_view_mut::<N_OWN, 6>(0, *column);
+                let mut view = out.fixed_view_mut::<N_VIEW_PARAMETERS, 6>(0, *column);
                 view -= self.twists.transpose() * u;
             }
         }
         if let Some(at) = layout.lens {
-            let mut view = out.generic_view_mut((0, at), (Const::<N_OWN>, Const::<8>));
+            let mut view = out.generic_view_mut((0, at), (Const::<N_VIEW_PARAMETERS>, Const::<8>));
             view += self.twists.transpose() * self.by_lens;
         }
         out

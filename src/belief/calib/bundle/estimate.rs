@@ -3,11 +3,11 @@
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix6, Vector6};
 
 use super::evidence::{Posterior, change, joint_info, updated};
-use super::model::{Model, Scales, shape_kinds};
-use super::problem::{Layout, Prior, Problem, Seen, State};
+use super::model::{Hyperparameters, Model, shape_kinds};
+use super::problem::{BundleProblem, Layout, Prior, State, WeightedMeasurement};
 use super::robust::Loss;
 use super::solve::{LOOSE, Solved, StopRule, TIGHT, solve};
-use crate::calib::associate::{Measured, View};
+use crate::calib::associate::{TagMeasurement, View};
 use crate::calib::methods::SolveOutcome;
 use crate::calib::problem::{JointParameters, Parameter, ParameterKind};
 use armcal_core::robot::Robot;
@@ -20,18 +20,18 @@ pub struct BundleInput<'a> {
     pub robot: &'a Robot,
     pub views: &'a [View],
     pub model: Model,
-    pub scales: Scales,
+    pub scales: Hyperparameters,
     /// Where the search begins, and the reference of the terms.
     pub guess: JointParameters,
     /// Of the joints' parameters, where there is more than the datasheet: mean and information (inverse covariance). Six rows more are
     /// the camera mount's, about where `robot` has it.
     pub joint_prior: Option<(DVector<f64>, DMatrix<f64>)>,
-    pub evidence: Evidence,
+    pub evidence: HyperparameterMode,
 }
 
 /// Whether the scales are fitted or taken as given.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Evidence {
+pub enum HyperparameterMode {
     Fitted,
     Given,
 }
@@ -47,7 +47,7 @@ pub struct Outlier {
 
 /// The answer.
 pub struct Estimate<'a> {
-    pub(super) problem: Problem<'a>,
+    pub(super) problem: BundleProblem<'a>,
     pub(super) solved: Solved,
     pub(super) posterior: Posterior,
     pub model: Model,
@@ -101,7 +101,7 @@ pub fn model_for(robot: &Robot, views: &[View]) -> Model {
             (warmed, ParameterKind::OffsetPerK),
             (warmed, ParameterKind::GainPerK),
             (dived, ParameterKind::OffsetPerMpa),
-            (from_both_sides, ParameterKind::HalfPlay),
+            (from_both_sides, ParameterKind::HalfBacklash),
         ] {
             if wanted {
                 kinds.push(kind);
@@ -139,9 +139,15 @@ pub fn reference(views: &[View]) -> Conditions {
 #[must_use]
 pub fn estimate<'a>(input: &BundleInput<'a>) -> Option<Estimate<'a>> {
     let (start, mut iterations) = robust_start(input);
-    let prior = |scales: &Scales| prior(input, scales);
-    let mut problem =
-        Problem::new(input.robot, input.views, &input.model, &input.guess, prior(&input.scales), input.scales.clone());
+    let prior = |scales: &Hyperparameters| prior(input, scales);
+    let mut problem = BundleProblem::new(
+        input.robot,
+        input.views,
+        &input.model,
+        &input.guess,
+        prior(&input.scales),
+        input.scales.clone(),
+    );
     let first_state = problem.start(&input.guess);
     let mut state = problem.start(&start);
     state.tags.clone_from(&first_state.tags);
@@ -150,7 +156,7 @@ pub fn estimate<'a>(input: &BundleInput<'a>) -> Option<Estimate<'a>> {
     let mut solved = solve(&problem, state, Loss::Cauchy { width: CORNER_WIDTH }, LOOSE);
     iterations += solved.iterations;
     reject(&mut problem, &solved);
-    if input.evidence == Evidence::Given {
+    if input.evidence == HyperparameterMode::Given {
         problem.scales.clone_from(&input.scales);
     }
     let first = input.scales.clone();
@@ -161,7 +167,7 @@ pub fn estimate<'a>(input: &BundleInput<'a>) -> Option<Estimate<'a>> {
         iterations += solved.iterations;
         posterior = Posterior::of(&problem, &solved.normal)?;
         let mut settled = !reject(&mut problem, &solved);
-        if input.evidence == Evidence::Fitted && round < MAX_ROUNDS {
+        if input.evidence == HyperparameterMode::Fitted && round < MAX_ROUNDS {
             let next = updated(&problem, &solved.state, &solved.normal, &posterior, &first);
             settled &= change(&next, &problem.scales) < CONVERGED_CHANGE;
             if !settled {
@@ -207,7 +213,7 @@ pub struct LeastSquares {
 #[must_use]
 pub fn least_squares(input: &BundleInput<'_>, relative_gain: f64) -> LeastSquares {
     let prior = prior(input, &input.scales);
-    let problem = Problem::new(input.robot, input.views, &input.model, &input.guess, prior, input.scales.clone());
+    let problem = BundleProblem::new(input.robot, input.views, &input.model, &input.guess, prior, input.scales.clone());
     let start = problem.start(&input.guess);
     let solved = solve(&problem, start, Loss::Square, StopRule { relative_gain, ..TIGHT });
     LeastSquares {
@@ -219,8 +225,8 @@ pub fn least_squares(input: &BundleInput<'_>, relative_gain: f64) -> LeastSquare
     }
 }
 
-fn cost_at(problem: &Problem<'_>, state: &State) -> f64 {
-    let mut normal = super::linearize::Normal::new(problem);
+fn cost_at(problem: &BundleProblem<'_>, state: &State) -> f64 {
+    let mut normal = super::linearize::NormalEquations::new(problem);
     normal.update(problem, state, Loss::Square);
     normal.cost
 }
@@ -239,7 +245,7 @@ pub(super) fn robust_start(input: &BundleInput<'_>) -> (JointParameters, usize) 
     for view in &mut views {
         view.gripper_tag = None;
         for tag in &mut view.tags {
-            tag.measured = Measured::Position;
+            tag.measured = TagMeasurement::Position;
         }
     }
     let linear = |kind: &ParameterKind| matches!(kind, ParameterKind::Gain | ParameterKind::Offset);
@@ -258,10 +264,13 @@ pub(super) fn robust_start(input: &BundleInput<'_>) -> (JointParameters, usize) 
     let mut parameters = input.guess;
     let mut iterations = 0;
     for std_m in START_STD_M {
-        let scales =
-            Scales { position_std_m: std_m, joint_std_rad: straight_sensor_std(input), ..input.scales.clone() };
+        let scales = Hyperparameters {
+            position_std_m: std_m,
+            joint_std_rad: straight_sensor_std(input),
+            ..input.scales.clone()
+        };
         let straight = BundleInput { model: model.clone(), joint_prior: None, scales: scales.clone(), ..input.clone() };
-        let problem = Problem::new(input.robot, &views, &model, &input.guess, prior(&straight, &scales), scales);
+        let problem = BundleProblem::new(input.robot, &views, &model, &input.guess, prior(&straight, &scales), scales);
         let solved = solve(&problem, problem.start(&parameters), Loss::Cauchy { width: START_WIDTH }, LOOSE);
         iterations += solved.iterations;
         parameters = parameters_of(&problem, &solved.state, &parameters);
@@ -270,7 +279,7 @@ pub(super) fn robust_start(input: &BundleInput<'_>) -> (JointParameters, usize) 
 }
 
 /// `base` with the estimated parameters of `state`.
-pub(super) fn parameters_of(problem: &Problem<'_>, state: &State, base: &JointParameters) -> JointParameters {
+pub(super) fn parameters_of(problem: &BundleProblem<'_>, state: &State, base: &JointParameters) -> JointParameters {
     let mut parameters = *base;
     for (parameter, value) in problem.layout.parameters.iter().zip(state.joint.iter()) {
         parameters.set(*parameter, *value);
@@ -279,12 +288,12 @@ pub(super) fn parameters_of(problem: &Problem<'_>, state: &State, base: &JointPa
 }
 
 /// The datasheet's and the survey's priors.
-pub(super) fn prior(input: &BundleInput<'_>, scales: &Scales) -> Prior {
+pub(super) fn prior(input: &BundleInput<'_>, scales: &Hyperparameters) -> Prior {
     let robot = input.robot;
     let layout = Layout::new(robot, &input.model, input.views);
     let nominal = JointParameters::default();
     let mean = layout.parameters.iter().map(|p| nominal.get(*p));
-    let variance = |p: &Parameter| Problem::at_least(scales.prior_std(&robot.sensors[p.joint], p.joint, p.kind));
+    let variance = |p: &Parameter| BundleProblem::at_least(scales.prior_std(&robot.sensors[p.joint], p.joint, p.kind));
     let info = layout.parameters.iter().map(|p| variance(p).powi(-2));
     let n = layout.n_joint();
     let (mut joint_mean, joint_info) = input.joint_prior.clone().unwrap_or_else(|| {
@@ -316,13 +325,13 @@ pub(super) fn prior(input: &BundleInput<'_>, scales: &Scales) -> Prior {
 fn tag_std(input: &BundleInput<'_>, tag_idx: usize) -> [f64; 6] {
     let tag = &input.robot.tags[tag_idx];
     let mut sightings = input.views.iter().flat_map(|view| &view.tags).filter(|seen| seen.tag_idx == tag_idx);
-    let is_point = sightings.all(|seen| matches!(seen.measured, Measured::Position));
+    let is_point = sightings.all(|seen| matches!(seen.measured, TagMeasurement::Position));
     let (position, rotation) = (tag.position_std_m, if is_point { 1.0 } else { tag.rotation_std_rad });
     [position, position, position, rotation, rotation, rotation]
 }
 
 /// Marks what does not belong; whether anything changed.
-fn reject(problem: &mut Problem<'_>, solved: &Solved) -> bool {
+fn reject(problem: &mut BundleProblem<'_>, solved: &Solved) -> bool {
     let mut changed = false;
     for (sighting, chi2) in problem.sightings.iter_mut().zip(&solved.normal.chi2) {
         let n = sighting.data.n_coordinates() as f64;
@@ -335,14 +344,14 @@ fn reject(problem: &mut Problem<'_>, solved: &Solved) -> bool {
 }
 
 /// Positions and poses come with a standard deviation that is a guess until the scales are fitted.
-fn noise_excess(seen: &Seen) -> f64 {
+fn noise_excess(seen: &WeightedMeasurement) -> f64 {
     match seen {
-        Seen::Corners { .. } => 1.0,
-        Seen::Position { .. } | Seen::Pose { .. } => 4.0,
+        WeightedMeasurement::Corners { .. } => 1.0,
+        WeightedMeasurement::Position { .. } | WeightedMeasurement::Pose { .. } => 4.0,
     }
 }
 
-fn outliers(problem: &Problem<'_>, views: &[View], solved: &Solved) -> Vec<Outlier> {
+fn outliers(problem: &BundleProblem<'_>, views: &[View], solved: &Solved) -> Vec<Outlier> {
     let mut out = Vec::new();
     for (view_idx, view) in problem.views.iter().enumerate() {
         for at in view.sightings.clone().chain(view.gripper) {
@@ -409,14 +418,14 @@ impl Estimate<'_> {
 
     /// The scales at the end.
     #[must_use]
-    pub fn scales(&self) -> &Scales {
+    pub fn scales(&self) -> &Hyperparameters {
         &self.problem.scales
     }
 
     /// Whether positions or poses were measured in place of corners.
     #[must_use]
     pub fn has_positions(&self) -> bool {
-        self.problem.sightings.iter().any(|sighting| !matches!(sighting.data, Seen::Corners { .. }))
+        self.problem.sightings.iter().any(|sighting| !matches!(sighting.data, WeightedMeasurement::Corners { .. }))
     }
 
     /// How much later the joint sensors' stamps are than the camera's, and one sigma; `None` where it is not estimated.

@@ -6,10 +6,10 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
-use super::eliminated::N_OWN;
-use super::linearize::Normal;
-use super::model::{SHAPE_LENGTH, Scales};
-use super::problem::{Problem, State};
+use super::eliminated::N_VIEW_PARAMETERS;
+use super::linearize::NormalEquations;
+use super::model::{Hyperparameters, SHAPE_LENGTH};
+use super::problem::{BundleProblem, State};
 use crate::calib::problem::ParameterKind;
 use armcal_core::joints::MAX_JOINTS;
 use armcal_core::sensor::shape_prior;
@@ -21,7 +21,7 @@ pub(super) struct Posterior {
     /// Of the common parameters.
     pub covariance: DMatrix<f64>,
     /// Variances of each view's own parameters.
-    pub own: Vec<[f64; N_OWN]>,
+    pub own: Vec<[f64; N_VIEW_PARAMETERS]>,
 }
 
 /// Pseudo-observations that the first guess of each scale counts for.
@@ -36,15 +36,15 @@ const SCALE_BOUNDS: [f64; 2] = [0.02, 50.0];
 
 impl Posterior {
     /// `None` where the normal equations have no inverse.
-    pub(super) fn of(problem: &Problem<'_>, normal: &Normal) -> Option<Self> {
+    pub(super) fn of(problem: &BundleProblem<'_>, normal: &NormalEquations) -> Option<Self> {
         let factor = Cholesky::new(normal.matrix.clone())?;
-        let mut own = vec![[0.0; N_OWN]; problem.views.len()];
+        let mut own = vec![[0.0; N_VIEW_PARAMETERS]; problem.views.len()];
         let mut groups = normal.eliminated.iter();
         for (view_idx, view) in problem.views.iter().enumerate() {
             for group in groups.by_ref().take(1 + usize::from(view.gripper.is_some())) {
                 let by_columns = group.inverse * group.own_by_columns(problem, normal, view_idx);
                 let used: Vec<usize> =
-                    (0..N_OWN).filter(|&row| group.twists.column(row).iter().any(|v| *v != 0.0)).collect();
+                    (0..N_VIEW_PARAMETERS).filter(|&row| group.twists.column(row).iter().any(|v| *v != 0.0)).collect();
                 let mut right = DMatrix::from_fn(problem.layout.n, used.len(), |k, row| by_columns[(used[row], k)]);
                 factor.l_dirty().solve_lower_triangular_mut(&mut right);
                 for (k, &row) in used.iter().enumerate() {
@@ -78,12 +78,12 @@ impl Sums {
 
 /// The scales that `posterior` asks for; `first` are those that it all began with.
 pub(super) fn updated(
-    problem: &Problem<'_>,
+    problem: &BundleProblem<'_>,
     state: &State,
-    normal: &Normal,
+    normal: &NormalEquations,
     posterior: &Posterior,
-    first: &Scales,
-) -> Scales {
+    first: &Hyperparameters,
+) -> Hyperparameters {
     let mut next = problem.scales.clone();
     update_joints(problem, state, posterior, first, &mut next);
     update_terms(problem, state, posterior, first, &mut next);
@@ -97,12 +97,12 @@ pub(super) fn updated(
 }
 
 /// How many parameters, the views' own among them, the data determine.
-pub(super) fn determined(problem: &Problem<'_>, posterior: &Posterior) -> f64 {
+pub(super) fn determined(problem: &BundleProblem<'_>, posterior: &Posterior) -> f64 {
     let layout = &problem.layout;
     let n = problem.prior.joint_info.nrows();
     let mount = layout.mount.filter(|_| n == layout.n_joint());
     let prior_share = |at: usize, std: f64| {
-        if std.is_finite() { posterior.covariance[(at, at)] / Problem::at_least(std).powi(2) } else { 0.0 }
+        if std.is_finite() { posterior.covariance[(at, at)] / BundleProblem::at_least(std).powi(2) } else { 0.0 }
     };
     let mut gamma = layout.n as f64;
     gamma -= posterior.covariance.view((0, 0), (n, n)).component_mul(&problem.prior.joint_info).sum();
@@ -127,7 +127,13 @@ pub(super) fn determined(problem: &Problem<'_>, posterior: &Posterior) -> f64 {
     gamma
 }
 
-fn update_joints(problem: &Problem<'_>, state: &State, posterior: &Posterior, first: &Scales, next: &mut Scales) {
+fn update_joints(
+    problem: &BundleProblem<'_>,
+    state: &State,
+    posterior: &Posterior,
+    first: &Hyperparameters,
+    next: &mut Hyperparameters,
+) {
     for joint in 0..problem.robot.n_joints() {
         let (mut sums, mut reading_var, mut n) = (Sums::default(), 0.0, 0.0);
         for (view_idx, view) in problem.views.iter().enumerate() {
@@ -148,7 +154,13 @@ fn update_joints(problem: &Problem<'_>, state: &State, posterior: &Posterior, fi
     }
 }
 
-fn update_terms(problem: &Problem<'_>, state: &State, posterior: &Posterior, first: &Scales, next: &mut Scales) {
+fn update_terms(
+    problem: &BundleProblem<'_>,
+    state: &State,
+    posterior: &Posterior,
+    first: &Hyperparameters,
+    next: &mut Hyperparameters,
+) {
     let layout = &problem.layout;
     let basis = shape_prior(SHAPE_LENGTH);
     let of_kinds = |wanted: &dyn Fn(ParameterKind) -> Option<f64>, columns: std::ops::Range<usize>, std: f64| {
@@ -188,7 +200,7 @@ fn update_terms(problem: &Problem<'_>, state: &State, posterior: &Posterior, fir
             &mut next.offset_std_rad_per_mpa,
         ),
         (ParameterKind::DriftPerH, now.drift_std_rad_per_h, first.drift_std_rad_per_h, &mut next.drift_std_rad_per_h),
-        (ParameterKind::HalfPlay, now.half_play_std_rad, first.half_play_std_rad, &mut next.half_play_std_rad),
+        (ParameterKind::HalfBacklash, now.half_play_std_rad, first.half_play_std_rad, &mut next.half_play_std_rad),
     ] {
         let sums = of_kinds(&is(kind), all.clone(), std);
         if sums != Sums::default() {
@@ -203,7 +215,13 @@ impl PartialEq for Sums {
     }
 }
 
-fn update_camera_error(problem: &Problem<'_>, state: &State, posterior: &Posterior, first: &Scales, next: &mut Scales) {
+fn update_camera_error(
+    problem: &BundleProblem<'_>,
+    state: &State,
+    posterior: &Posterior,
+    first: &Hyperparameters,
+    next: &mut Hyperparameters,
+) {
     let (Some(now), Some(first)) = (problem.scales.camera_error_std, first.camera_error_std) else { return };
     let mut sums = [Sums::default(); 2];
     for (error, own) in state.camera_error.iter().zip(&posterior.own) {
@@ -216,17 +234,17 @@ fn update_camera_error(problem: &Problem<'_>, state: &State, posterior: &Posteri
 }
 
 /// The prior's information on the joints' parameters under `scales`.
-pub(super) fn joint_info(problem: &Problem<'_>, scales: &Scales) -> DMatrix<f64> {
+pub(super) fn joint_info(problem: &BundleProblem<'_>, scales: &Hyperparameters) -> DMatrix<f64> {
     let info = problem.layout.parameters.iter().map(|p| {
         let std = scales.prior_std(&problem.robot.sensors[p.joint], p.joint, p.kind);
-        Problem::at_least(std).powi(-2)
+        BundleProblem::at_least(std).powi(-2)
     });
     DMatrix::from_diagonal(&DVector::from_iterator(problem.layout.n_joint(), info))
 }
 
 /// The largest relative change of any scale.
-pub(super) fn change(a: &Scales, b: &Scales) -> f64 {
-    let numbers = |s: &Scales| {
+pub(super) fn change(a: &Hyperparameters, b: &Hyperparameters) -> f64 {
+    let numbers = |s: &Hyperparameters| {
         let mut all = vec![
             s.noise,
             s.offset_std_rad_per_k,

@@ -5,8 +5,8 @@
 //! that always reads the same and whose offset nobody knows: one column for all views.
 
 use super::detect::MIN_VIEWS;
-use super::estimate::{BundleInput, Estimate, Evidence, estimate, model_for, reference};
-use super::model::{Model, Scales};
+use super::estimate::{BundleInput, Estimate, HyperparameterMode, estimate, model_for, reference};
+use super::model::{Hyperparameters, Model};
 use crate::calib::associate::View;
 use crate::calib::problem::{JointParameters, ParameterKind};
 use armcal_core::joints::JointAngles;
@@ -15,14 +15,14 @@ use armcal_core::stats::quantile;
 
 /// Who says that a joint failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Found {
+pub enum FailureSource {
     Declared,
     Detected,
 }
 
 /// What the sensor of a locked joint is worth.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Reading {
+pub enum SensorUse {
     /// It reads where the joint stands, or it is used in the views that are not named.
     Used,
     /// It is not looked at.
@@ -34,8 +34,8 @@ pub enum Reading {
 pub struct Failure {
     pub joint: usize,
     pub kind: FailedKind,
-    pub found: Found,
-    pub reading: Reading,
+    pub found: FailureSource,
+    pub reading: SensorUse,
     /// Views whose reading says nothing, ascending.
     pub views: Vec<usize>,
     /// Of a slip that lasts: the first view after it in the order of time; the readings before it are not used.
@@ -46,17 +46,17 @@ pub struct Failure {
 
 impl Failure {
     /// Nothing that the sensor says in any of `n_views` is used.
-    pub fn without_sensor(joint: usize, kind: FailedKind, found: Found, n_views: usize) -> Self {
+    pub fn without_sensor(joint: usize, kind: FailedKind, found: FailureSource, n_views: usize) -> Self {
         let views = (0..n_views).collect();
-        Self { joint, kind, found, reading: Reading::Ignored, views, since: None, evidence: String::new() }
+        Self { joint, kind, found, reading: SensorUse::Ignored, views, since: None, evidence: String::new() }
     }
 
     /// What somebody declared; when a sensor jumped is still to be found.
     pub fn declared(declared: FailedJoint, n_views: usize) -> Self {
         let FailedJoint { joint, kind } = declared;
-        let all = Self::without_sensor(joint, kind, Found::Declared, n_views);
+        let all = Self::without_sensor(joint, kind, FailureSource::Declared, n_views);
         match kind {
-            FailedKind::Jumps => Self { reading: Reading::Used, views: Vec::new(), ..all },
+            FailedKind::Jumps => Self { reading: SensorUse::Used, views: Vec::new(), ..all },
             FailedKind::Locked | FailedKind::Dead | FailedKind::Stuck => all,
         }
     }
@@ -68,12 +68,12 @@ impl Failure {
 
     /// Whether the joint's parameters have no data at all.
     pub fn leaves_no_sensor(&self) -> bool {
-        self.reading == Reading::Ignored
+        self.reading == SensorUse::Ignored
     }
 }
 
 /// An arm and its views with the failed joints taken care of.
-pub struct Applied {
+pub struct FailureAdjusted {
     pub robot: Robot,
     pub views: Vec<View>,
     pub failures: Vec<Failure>,
@@ -85,7 +85,7 @@ const SEARCH_WIDTH_M: f64 = 0.1;
 const CANDIDATES: [usize; 3] = [90, 40, 16];
 const FINEST_STEP_RAD: f64 = 1e-4;
 
-impl Applied {
+impl FailureAdjusted {
     /// `at`: what is believed of the other joints' sensors.
     pub fn new(robot: &Robot, views: &[View], failures: &[Failure], at: &JointParameters) -> Self {
         let mut applied = Self { robot: robot.clone(), views: views.to_vec(), failures: failures.to_vec() };
@@ -135,19 +135,19 @@ impl Applied {
     }
 
     /// From the datasheet.
-    pub fn input(&self, evidence: Evidence) -> BundleInput<'_> {
+    pub fn input(&self, evidence: HyperparameterMode) -> BundleInput<'_> {
         BundleInput {
             robot: &self.robot,
             views: &self.views,
             model: self.model(),
-            scales: Scales::datasheet(&self.robot),
+            scales: Hyperparameters::datasheet(&self.robot),
             guess: JointParameters { reference: reference(&self.views), ..JointParameters::default() },
             joint_prior: None,
             evidence,
         }
     }
 
-    pub fn estimate(&self, evidence: Evidence) -> Option<Estimate<'_>> {
+    pub fn estimate(&self, evidence: HyperparameterMode) -> Option<Estimate<'_>> {
         estimate(&self.input(evidence))
     }
 }
@@ -208,7 +208,7 @@ fn seen_angles(robot: &Robot, view: &View, joints: &[usize], at: &JointParameter
 
 fn distance_cost(robot: &Robot, view: &View, angles: &JointAngles) -> f64 {
     let base_from_camera = robot.chain.link_poses(angles).frame(&robot.camera.mount);
-    let of_tag = |tag: &crate::calib::associate::TagView| {
+    let of_tag = |tag: &crate::calib::associate::TagObservation| {
         let predicted_m = base_from_camera * nalgebra::Point3::from(tag.center_in_camera_m);
         let off_m = predicted_m.coords - robot.tags[tag.tag_idx].base_from_tag.origin().vector();
         (off_m.norm_squared() / SEARCH_WIDTH_M.powi(2)).ln_1p()

@@ -8,8 +8,8 @@
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Isometry3};
 
 use super::estimate::{BundleInput, Estimate, Outlier};
-use super::linearize::Normal;
-use super::problem::{Problem, Seen, State};
+use super::linearize::NormalEquations;
+use super::problem::{BundleProblem, State, WeightedMeasurement};
 use super::robust::Loss;
 use super::sighting::unseen_chi2;
 use crate::calib::associate::View;
@@ -69,7 +69,7 @@ impl Estimate<'_> {
             ..self.solved.state.clone()
         };
         // A tag at the border may be foretold to lie beyond it.
-        let mut normal = Normal::new(&problem);
+        let mut normal = NormalEquations::new(&problem);
         normal.update(&problem, &state, Loss::Square);
         for (sighting, chi2) in problem.sightings.iter_mut().zip(&normal.chi2) {
             sighting.is_used &= *chi2 < unseen_chi2(&sighting.data);
@@ -84,21 +84,21 @@ impl Estimate<'_> {
     }
 
     /// `views` in this estimate's columns, without any prior but the views' own.
-    fn data_only<'a>(&self, input: &BundleInput<'a>, views: &[View]) -> Problem<'a> {
+    fn data_only<'a>(&self, input: &BundleInput<'a>, views: &[View]) -> BundleProblem<'a> {
         let mut prior = self.problem.prior.clone();
         prior.joint_info.fill(0.0);
         (prior.mount_std, prior.gripper_tag_std) = ([f64::INFINITY; 6], [f64::INFINITY; 6]);
         (prior.time_std_s, prior.lens_std) = (f64::INFINITY, [f64::INFINITY; 8]);
         prior.tags_std.fill([f64::INFINITY; 6]);
         let scales = self.problem.scales.clone();
-        let mut problem = Problem::new(input.robot, views, &input.model, &input.guess, prior, scales);
+        let mut problem = BundleProblem::new(input.robot, views, &input.model, &input.guess, prior, scales);
         problem.layout = self.problem.layout.clone();
         problem
     }
 
     /// The data of `problem` linearized at `state` and joined to this estimate; and chi-square of their innovations.
-    fn with_data(&self, problem: &Problem<'_>, state: &State) -> Option<(Joined, f64)> {
-        let mut normal = Normal::new(problem);
+    fn with_data(&self, problem: &BundleProblem<'_>, state: &State) -> Option<(Joined, f64)> {
+        let mut normal = NormalEquations::new(problem);
         normal.update(problem, state, Loss::Square);
         let factor = Cholesky::new(&self.solved.normal.matrix + &normal.matrix)?;
         let step = factor.solve(&normal.right);
@@ -110,14 +110,14 @@ impl Estimate<'_> {
 
 /// Left-out data joined to an estimate.
 struct Joined {
-    normal: Normal,
+    normal: NormalEquations,
     factor: Cholesky<f64, Dyn>,
     /// Of the common parameters.
     step: DVector<f64>,
 }
 
 impl Joined {
-    fn joints(&self, problem: &Problem<'_>, left_out: &[(usize, View)]) -> Vec<JointInnovation> {
+    fn joints(&self, problem: &BundleProblem<'_>, left_out: &[(usize, View)]) -> Vec<JointInnovation> {
         let mut out = Vec::new();
         let mut groups = self.normal.eliminated.iter();
         for (at, view) in problem.views.iter().enumerate() {
@@ -146,13 +146,13 @@ impl Joined {
 }
 
 /// How many numbers of the camera's pose a view tells.
-fn camera_numbers(problem: &Problem<'_>, view_idx: usize) -> usize {
+fn camera_numbers(problem: &BundleProblem<'_>, view_idx: usize) -> usize {
     let used = problem.sightings[problem.views[view_idx].sightings.clone()].iter().filter(|s| s.is_used);
     let (mut points, mut poses) = (0, 0);
     for sighting in used {
         match sighting.data {
-            Seen::Position { .. } => points += 1,
-            Seen::Corners { .. } | Seen::Pose { .. } => poses += 1,
+            WeightedMeasurement::Position { .. } => points += 1,
+            WeightedMeasurement::Corners { .. } | WeightedMeasurement::Pose { .. } => poses += 1,
         }
     }
     match (poses, points) {

@@ -8,10 +8,10 @@
 
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix6, SMatrix, SVector, Vector6};
 
-use super::eliminated::{Columns, Directions, Eliminated, Group, MOUNT, N_DIRECTIONS, N_OWN, Own, TIME};
-use super::problem::{Problem, State};
+use super::eliminated::{Columns, Directions, Group, MOUNT, N_DIRECTIONS, N_VIEW_PARAMETERS, Own, SchurBlock, TIME};
+use super::problem::{BundleProblem, State};
 use super::robust::Loss;
-use super::sighting::{Info, LensInfo, right_jacobian_inverse};
+use super::sighting::{LensInformation, PoseInformation, right_jacobian_inverse};
 use armcal_core::joints::MAX_JOINTS;
 use armcal_core::kinematics::LinkPoses;
 use armcal_core::spatial::adjoint;
@@ -19,25 +19,25 @@ use armcal_core::spatial::log;
 
 /// The normal equations at one state.
 #[derive(Clone, Debug)]
-pub(super) struct Normal {
+pub(super) struct NormalEquations {
     /// Lower triangle.
     pub matrix: DMatrix<f64>,
     pub right: DVector<f64>,
     pub cost: f64,
     /// Of each view, then those of the gripper's tag.
-    pub eliminated: Vec<Eliminated>,
+    pub eliminated: Vec<SchurBlock>,
     /// `H_i Ad_i` and column of the tag of each sighting.
     pub by_tag: Vec<(Matrix6<f64>, Option<usize>)>,
     /// Sum of squares of each sighting's whitened residuals.
     pub chi2: Vec<f64>,
     /// Of the group at hand; kept, so that the loop does not allocate.
-    infos: Vec<Info>,
+    infos: Vec<PoseInformation>,
     /// As many, where the lens has columns.
-    lens_infos: Vec<LensInfo>,
+    lens_infos: Vec<LensInformation>,
 }
 
-impl Normal {
-    pub(super) fn new(problem: &Problem<'_>) -> Self {
+impl NormalEquations {
+    pub(super) fn new(problem: &BundleProblem<'_>) -> Self {
         let n = problem.layout.n;
         let n_groups = problem.views.len() + problem.views.iter().filter(|view| view.gripper.is_some()).count();
         Self {
@@ -53,7 +53,7 @@ impl Normal {
     }
 
     /// Linearizes `problem` at `state`.
-    pub(super) fn update(&mut self, problem: &Problem<'_>, state: &State, loss: Loss) {
+    pub(super) fn update(&mut self, problem: &BundleProblem<'_>, state: &State, loss: Loss) {
         self.matrix.fill(0.0);
         self.right.fill(0.0);
         self.eliminated.clear();
@@ -64,14 +64,14 @@ impl Normal {
         self.add_priors(problem, state);
     }
 
-    fn add_view(&mut self, problem: &Problem<'_>, state: &State, view_idx: usize, loss: Loss) {
+    fn add_view(&mut self, problem: &BundleProblem<'_>, state: &State, view_idx: usize, loss: Loss) {
         let view = &problem.views[view_idx];
         let poses = problem.robot.chain.link_poses(&problem.angles(view_idx, state));
-        let before = poses.link(problem.n_before) * state.mount;
+        let before = poses.link(problem.n_camera_joints) * state.mount;
         let camera = before * state.camera_error[view_idx];
         let group = Group {
             view_idx,
-            joints: 0..problem.n_before,
+            joints: 0..problem.n_camera_joints,
             sign: 1.0,
             by_mount: adjoint(&state.camera_error[view_idx].inverse()),
             camera_error: problem.scales.camera_error_std.is_some().then_some(&state.camera_error[view_idx]),
@@ -81,7 +81,7 @@ impl Normal {
         if let (Some(at), Some(tag)) = (view.gripper, &problem.robot.gripper_tag) {
             let group = Group {
                 view_idx,
-                joints: problem.n_before..tag.mount.n_joints,
+                joints: problem.n_camera_joints..tag.mount.n_joints,
                 // Joints behind the camera move the tag, not the camera.
                 sign: -1.0,
                 by_mount: Matrix6::identity(),
@@ -94,7 +94,7 @@ impl Normal {
 
     fn add_group(
         &mut self,
-        problem: &Problem<'_>,
+        problem: &BundleProblem<'_>,
         state: &State,
         group: &Group<'_>,
         poses: &LinkPoses,
@@ -178,7 +178,7 @@ impl Normal {
     /// Linearized sightings, weighted by the loss, their cost added.
     fn linearize_sightings(
         &mut self,
-        problem: &Problem<'_>,
+        problem: &BundleProblem<'_>,
         state: &State,
         group: &Group<'_>,
         poses: &LinkPoses,
@@ -197,11 +197,12 @@ impl Normal {
             };
             let camera_from_tag = base_from_camera.inv_mul(&pose);
             if problem.layout.lens.is_some() {
-                self.lens_infos.push(LensInfo::zeros());
+                self.lens_infos.push(LensInformation::zeros());
             }
             let by_lens = self.lens_infos.last_mut();
-            let mut info = Info::of(&sighting.data, &camera_from_tag, &state.lens, problem.scales.noise, by_lens)
-                .unwrap_or_else(|| Info::unseen(&sighting.data));
+            let mut info =
+                PoseInformation::of(&sighting.data, &camera_from_tag, &state.lens, problem.scales.noise, by_lens)
+                    .unwrap_or_else(|| PoseInformation::unseen(&sighting.data));
             self.chi2[at] = info.chi2;
             self.by_tag[at].1 = column;
             let (cost, weight) =
@@ -219,17 +220,17 @@ impl Normal {
 
     fn eliminate(
         &mut self,
-        problem: &Problem<'_>,
+        problem: &BundleProblem<'_>,
         state: &State,
         group: &Group<'_>,
         directions: &Directions,
         h_sum: &Matrix6<f64>,
         g_sum: &Vector6<f64>,
-    ) -> Eliminated {
+    ) -> SchurBlock {
         let view = &problem.views[group.view_idx];
-        let mut twists = SMatrix::<f64, 6, N_OWN>::zeros();
-        let mut info = SVector::<f64, N_OWN>::repeat(1.0);
-        let mut own = SVector::<f64, N_OWN>::zeros();
+        let mut twists = SMatrix::<f64, 6, N_VIEW_PARAMETERS>::zeros();
+        let mut info = SVector::<f64, N_VIEW_PARAMETERS>::repeat(1.0);
+        let mut own = SVector::<f64, N_VIEW_PARAMETERS>::zeros();
         for joint in group.joints.clone() {
             let variance = problem.joint_error_var(view, joint);
             // An exact sensor has no error to eliminate.
@@ -241,7 +242,7 @@ impl Normal {
             own[joint] = state.joint_error[group.view_idx][joint];
         }
         if group.camera_error.is_none() && twists.iter().all(|v| *v == 0.0) {
-            return Eliminated::none(group.sightings.clone());
+            return SchurBlock::none(group.sightings.clone());
         }
         let mut prior_gradient = -own.component_mul(&info);
         if let (Some(error), Some([std_m, std_rad])) = (group.camera_error, problem.scales.camera_error_std) {
@@ -255,7 +256,7 @@ impl Normal {
         }
         self.cost += own.component_mul(&own).dot(&info);
         let mut normal: Own = twists.tr_mul(&(h_sum * twists));
-        for k in 0..N_OWN {
+        for k in 0..N_VIEW_PARAMETERS {
             normal[(k, k)] += info[k];
         }
         let gradient = twists.tr_mul(g_sum) + prior_gradient;
@@ -263,7 +264,7 @@ impl Normal {
         let factor = normal.cholesky();
         let log_det = factor.as_ref().map_or(0.0, |f| 2.0 * f.l_dirty().diagonal().map(f64::ln).sum());
         let inverse = factor.map_or_else(Own::zeros, |factor| factor.inverse());
-        Eliminated {
+        SchurBlock {
             twists,
             inverse,
             gradient,
@@ -283,7 +284,7 @@ impl Normal {
 
     fn add_common(
         &mut self,
-        problem: &Problem<'_>,
+        problem: &BundleProblem<'_>,
         columns: &Columns<'_>,
         block: &SMatrix<f64, N_DIRECTIONS, N_DIRECTIONS>,
     ) {
@@ -299,7 +300,12 @@ impl Normal {
         }
     }
 
-    fn add_common_right(&mut self, problem: &Problem<'_>, columns: &Columns<'_>, right: &SVector<f64, N_DIRECTIONS>) {
+    fn add_common_right(
+        &mut self,
+        problem: &BundleProblem<'_>,
+        columns: &Columns<'_>,
+        right: &SVector<f64, N_DIRECTIONS>,
+    ) {
         for a in columns.directions(problem) {
             columns.each(problem, a, |row, by_row| self.right[row] += right[a] * by_row);
         }
@@ -308,7 +314,7 @@ impl Normal {
     /// `by_twist`: tag by twist of the camera. Common parameters come before the tags, so that these are the rows.
     fn subtract_cross(
         &mut self,
-        problem: &Problem<'_>,
+        problem: &BundleProblem<'_>,
         columns: &Columns<'_>,
         tag: usize,
         by_twist: &Matrix6<f64>,
@@ -323,7 +329,7 @@ impl Normal {
         }
     }
 
-    fn add_lens(&mut self, problem: &Problem<'_>, columns: &Columns<'_>, sums: &LensSums<'_>) {
+    fn add_lens(&mut self, problem: &BundleProblem<'_>, columns: &Columns<'_>, sums: &LensSums<'_>) {
         let at = sums.at;
         let mut h = -(sums.by_lens.transpose() * sums.m * sums.by_lens);
         let mut g = -(sums.by_lens.transpose() * sums.shift);
@@ -354,8 +360,8 @@ impl Normal {
 
 struct LensSums<'a> {
     at: usize,
-    infos: &'a [Info],
-    lens_infos: &'a [LensInfo],
+    infos: &'a [PoseInformation],
+    lens_infos: &'a [LensInformation],
     group: &'a Group<'a>,
     directions: &'a Directions,
     m: Matrix6<f64>,
@@ -366,7 +372,7 @@ struct LensSums<'a> {
 
 /// Twists of the camera (right, camera frame) by each common direction.
 fn directions(
-    problem: &Problem<'_>,
+    problem: &BundleProblem<'_>,
     group: &Group<'_>,
     poses: &LinkPoses,
     base_from_camera: &Isometry3<f64>,

@@ -23,18 +23,18 @@ mod select;
 mod sighting;
 mod solve;
 
-pub use alarm::{Change, Piece, Suspect};
+pub use alarm::{ErrorKind, GeometryElement, ScoreTestResult};
 pub use detect::failures;
 pub use estimate::{
-    BundleInput, Estimate, Evidence, LeastSquares, MIN_GRIPPER_VIEWS, Outlier, estimate, least_squares, model_for,
-    reference,
+    BundleInput, Estimate, HyperparameterMode, LeastSquares, MIN_GRIPPER_VIEWS, Outlier, estimate, least_squares,
+    model_for, reference,
 };
-pub use failed::{Applied, Failure, Found, Reading, set_by_camera};
+pub use failed::{Failure, FailureAdjusted, FailureSource, SensorUse, set_by_camera};
 pub use held_out::{Innovations, JointInnovation};
-pub use model::{Model, SHAPE_LENGTH, Scales};
+pub use model::{Hyperparameters, Model, SHAPE_LENGTH};
 pub use observability::{Observability, observability};
-pub use prior::{Agreement, MOUNT_ROWS, WarmStart, with_mount_rows};
-pub use select::{Doubtful, Selection, estimate_selecting};
+pub use prior::{CalibrationPrior, MOUNT_ROWS, PriorConsistency, with_mount_rows};
+pub use select::{OptionalTerm, Selection, select_model};
 
 #[cfg(test)]
 mod tests;

@@ -23,7 +23,7 @@ pub struct Model {
 
 /// Standard deviations that the data themselves may tell.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Scales {
+pub struct Hyperparameters {
     /// What each joint is off in each view anew, rad: what the sensor's model leaves.
     pub joint_std_rad: [f64; MAX_JOINTS],
     /// Of a joint whose sensor says nothing.
@@ -48,7 +48,7 @@ pub struct Scales {
 /// as one.
 pub const SHAPE_LENGTH: f64 = 0.16;
 
-impl Scales {
+impl Hyperparameters {
     /// What robot.toml says, and where it is silent what is usual (assumed; the data correct it).
     #[must_use]
     pub fn datasheet(robot: &Robot) -> Self {
@@ -87,7 +87,7 @@ impl Scales {
             ParameterKind::GainPerK => self.gain_std_per_k,
             ParameterKind::OffsetPerMpa => self.offset_std_rad_per_mpa,
             ParameterKind::DriftPerH => self.drift_std_rad_per_h,
-            ParameterKind::HalfPlay => self.half_play_std_rad,
+            ParameterKind::HalfBacklash => self.half_play_std_rad,
         }
     }
 }

@@ -11,8 +11,8 @@
 use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
 
 use super::estimate::{BundleInput, prior, robust_start};
-use super::linearize::Normal;
-use super::problem::{Layout, Problem};
+use super::linearize::NormalEquations;
+use super::problem::{BundleProblem, Layout};
 use super::robust::Loss;
 use crate::calib::problem::ParameterKind;
 use armcal_core::robot::Robot;
@@ -80,8 +80,9 @@ pub fn observability(input: &BundleInput<'_>) -> Option<Observability> {
     }
     (priors.mount_std, priors.gripper_tag_std) = ([f64::INFINITY; 6], [f64::INFINITY; 6]);
     (priors.time_std_s, priors.lens_std) = (f64::INFINITY, [f64::INFINITY; 8]);
-    let problem = Problem::new(input.robot, input.views, &input.model, &input.guess, priors, input.scales.clone());
-    let mut normal = Normal::new(&problem);
+    let problem =
+        BundleProblem::new(input.robot, input.views, &input.model, &input.guess, priors, input.scales.clone());
+    let mut normal = NormalEquations::new(&problem);
     normal.update(&problem, &problem.start(&start), Loss::Square);
     let information = information(&problem, &normal, &wanted, &sigma)?;
     let is_term = |column: usize| {
@@ -120,13 +121,18 @@ fn sigmas(layout: &Layout, input: &BundleInput<'_>, priors: &super::problem::Pri
         sigma[at..at + 8].copy_from_slice(&priors.lens_std);
     }
     for std in &mut sigma {
-        *std = if std.is_finite() { Problem::at_least(*std) } else { UNKNOWN };
+        *std = if std.is_finite() { BundleProblem::at_least(*std) } else { UNKNOWN };
     }
     sigma
 }
 
 /// Of the wanted columns in units of `sigma`, the others eliminated.
-fn information(problem: &Problem<'_>, normal: &Normal, wanted: &[usize], sigma: &[f64]) -> Option<DMatrix<f64>> {
+fn information(
+    problem: &BundleProblem<'_>,
+    normal: &NormalEquations,
+    wanted: &[usize],
+    sigma: &[f64],
+) -> Option<DMatrix<f64>> {
     let n = problem.layout.n;
     let at = |i: usize, k: usize| normal.matrix[(i.max(k), i.min(k))] * sigma[i] * sigma[k];
     let others: Vec<usize> = (0..n).filter(|column| !wanted.contains(column)).collect();

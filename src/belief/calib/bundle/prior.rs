@@ -10,9 +10,9 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen, Vector6};
 
-use super::estimate::{BundleInput, Estimate, Evidence, estimate, reference};
-use super::failed::Applied;
-use super::model::{Model, Scales};
+use super::estimate::{BundleInput, Estimate, HyperparameterMode, estimate, reference};
+use super::failed::FailureAdjusted;
+use super::model::{Hyperparameters, Model};
 use crate::calib::associate::View;
 use crate::calib::problem::{JointParameters, Parameter, ParameterKind};
 use crate::calib::result::Calibration;
@@ -39,24 +39,24 @@ const Z_OF_JOINTS: f64 = 3.9;
 const LEAST_USED: f64 = 0.6;
 
 /// An earlier calibration as the estimator takes it.
-pub struct WarmStart {
+pub struct CalibrationPrior {
     /// With the camera where the prior found it.
     pub robot: Robot,
     pub model: Model,
-    pub scales: Scales,
+    pub scales: Hyperparameters,
     /// The prior's values and reference.
     pub guess: JointParameters,
     /// Hours between the prior's last view and these.
     pub elapsed_h: f64,
     mean: DVector<f64>,
     /// Joints' parameters in the model's order, then the camera mount where the prior knows it together with them.
-    claimed: DMatrix<f64>,
-    loose: DMatrix<f64>,
+    covariance: DMatrix<f64>,
+    widened: DMatrix<f64>,
 }
 
 /// Whether prior and views can both be right.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Agreement {
+pub struct PriorConsistency {
     pub chi2: f64,
     pub degrees_of_freedom: usize,
     /// The 0.999 quantile.
@@ -68,7 +68,7 @@ pub struct Agreement {
     pub used_share: f64,
 }
 
-impl Agreement {
+impl PriorConsistency {
     pub fn is_beyond_chance(&self) -> bool {
         // Not a number is no agreement.
         !(self.chi2 <= self.limit
@@ -93,16 +93,16 @@ impl Agreement {
     }
 }
 
-impl WarmStart {
+impl CalibrationPrior {
     /// `None` where the prior's covariance is no covariance.
-    pub fn new(prior: &Calibration, applied: &Applied) -> Option<Self> {
+    pub fn new(prior: &Calibration, applied: &FailureAdjusted) -> Option<Self> {
         let views = &applied.views;
         let mut robot = applied.robot.clone();
         let mut guess = prior.parameters(&robot);
         if guess.reference == Conditions::default() {
             guess.reference = reference(views);
         }
-        let mut scales = Scales::datasheet(&robot);
+        let mut scales = Hyperparameters::datasheet(&robot);
         let known = prior.parameter_covariance(&robot);
         if let Some(std_rad) = known.residual_std_rad {
             for parameter in known.parameters.iter().filter(|p| p.kind == ParameterKind::Offset) {
@@ -129,19 +129,19 @@ impl WarmStart {
         let n = claimed.nrows();
         let mean = DVector::from_fn(n, |k, _| parameters.get(k).map_or(0.0, |p| guess.get(*p)));
         let (claimed, loose) = (regular(claimed)?, regular(loose)?);
-        Some(Self { robot, model, scales, guess, elapsed_h, mean, claimed, loose })
+        Some(Self { robot, model, scales, guess, elapsed_h, mean, covariance: claimed, widened: loose })
     }
 
     /// What to estimate under the prior.
-    pub fn input<'a>(&'a self, views: &'a [View], evidence: Evidence) -> Option<BundleInput<'a>> {
-        self.under(&self.claimed, views, evidence)
+    pub fn input<'a>(&'a self, views: &'a [View], evidence: HyperparameterMode) -> Option<BundleInput<'a>> {
+        self.under(&self.covariance, views, evidence)
     }
 
     fn under<'a>(
         &'a self,
         covariance: &DMatrix<f64>,
         views: &'a [View],
-        evidence: Evidence,
+        evidence: HyperparameterMode,
     ) -> Option<BundleInput<'a>> {
         Some(BundleInput {
             robot: &self.robot,
@@ -164,19 +164,19 @@ impl WarmStart {
             .flat_map(|(joint, kinds)| kinds.iter().map(move |&kind| Parameter { joint, kind }));
         let is_unknown = |(k, p): &(usize, Parameter)| {
             matches!(p.kind, ParameterKind::Gain | ParameterKind::Offset)
-                && self.claimed[(*k, *k)].sqrt() > 0.5 * p.prior_std(datasheet)
+                && self.covariance[(*k, *k)].sqrt() > 0.5 * p.prior_std(datasheet)
         };
         parameters.enumerate().filter(is_unknown).count()
     }
 
     /// Whether `views` agree with the prior; `None` where they determine nothing.
-    pub fn agreement(&self, views: &[View]) -> Option<Agreement> {
-        let found = estimate(&self.under(&self.loose, views, Evidence::Given)?)?;
+    pub fn agreement(&self, views: &[View]) -> Option<PriorConsistency> {
+        let found = estimate(&self.under(&self.widened, views, HyperparameterMode::Given)?)?;
         let n = self.mean.len();
         let posterior = found.posterior.covariance.view((0, 0), (n, n)).into_owned();
-        let loose_info = Cholesky::new(self.loose.clone())?.inverse();
+        let loose_info = Cholesky::new(self.widened.clone())?.inverse();
         let gain = DMatrix::identity(n, n) - &posterior * loose_info;
-        let moved_by = &gain * &self.claimed * gain.transpose() + &gain * &posterior;
+        let moved_by = &gain * &self.covariance * gain.transpose() + &gain * &posterior;
         let moved_by = 0.5 * (&moved_by + moved_by.transpose());
         let moved = self.moved(&found);
         let (chi2, degrees_of_freedom) = self.chi_square(&moved, &moved_by)?;
@@ -184,7 +184,7 @@ impl WarmStart {
         let sightings = &found.problem.sightings;
         let used_share = sightings.iter().filter(|s| s.is_used).count() as f64 / sightings.len().max(1) as f64;
         let limit = chi_square_999(degrees_of_freedom);
-        Some(Agreement { chi2, degrees_of_freedom, limit, joint, off_rad, off_std_rad, used_share })
+        Some(PriorConsistency { chi2, degrees_of_freedom, limit, joint, off_rad, off_std_rad, used_share })
     }
 
     fn moved(&self, found: &Estimate<'_>) -> DVector<f64> {
@@ -200,7 +200,7 @@ impl WarmStart {
     }
 
     fn chi_square(&self, moved: &DVector<f64>, moved_by: &DMatrix<f64>) -> Option<(f64, usize)> {
-        let lower = Cholesky::new(self.claimed.clone())?.l();
+        let lower = Cholesky::new(self.covariance.clone())?.l();
         let whitened = lower.solve_lower_triangular(moved)?;
         let half = lower.solve_lower_triangular(moved_by)?;
         let inner = lower.solve_lower_triangular(&half.transpose())?;
@@ -235,7 +235,7 @@ fn worst_joint(found: &Estimate<'_>, moved: &DVector<f64>, moved_by: &DMatrix<f6
 }
 
 /// What the views can tell, and all that the prior knows.
-fn model(applied: &Applied, reference: &Conditions, known: &[Parameter]) -> Model {
+fn model(applied: &FailureAdjusted, reference: &Conditions, known: &[Parameter]) -> Model {
     let mut views = applied.views.clone();
     // Terms act from the prior's reference on: oil as warm in all views, yet warmer than then, has columns.
     if let Some(first) = applied.views.first() {
@@ -267,7 +267,7 @@ fn elapsed_h(prior: &Calibration, views: &[View]) -> f64 {
 fn covariances(
     prior: &Calibration,
     robot: &Robot,
-    scales: &Scales,
+    scales: &Hyperparameters,
     parameters: &[Parameter],
     mount: Option<[usize; 6]>,
     elapsed_h: f64,

@@ -2,13 +2,13 @@
 
 use nalgebra::{Isometry3, Matrix6, Vector6};
 
-use super::linearize::Normal;
-use super::problem::{Problem, State};
+use super::linearize::NormalEquations;
+use super::problem::{BundleProblem, State};
 use super::sighting::right_jacobian_inverse;
 use armcal_core::spatial::log;
 
-impl Normal {
-    pub(super) fn add_priors(&mut self, problem: &Problem<'_>, state: &State) {
+impl NormalEquations {
+    pub(super) fn add_priors(&mut self, problem: &BundleProblem<'_>, state: &State) {
         let (layout, prior) = (&problem.layout, &problem.prior);
         let n = prior.joint_info.nrows();
         let has_mount = n > layout.n_joint();
@@ -45,7 +45,7 @@ impl Normal {
     }
 
     fn add_number_prior(&mut self, at: usize, off: f64, std: f64) {
-        let info = Problem::at_least(std).powi(-2);
+        let info = BundleProblem::at_least(std).powi(-2);
         self.matrix[(at, at)] += info;
         self.right[at] -= info * off;
         self.cost += info * off * off;
@@ -53,7 +53,8 @@ impl Normal {
 
     fn add_pose_prior(&mut self, at: usize, mean: &Isometry3<f64>, pose: &Isometry3<f64>, std: &[f64; 6]) {
         let d = log(&mean.inv_mul(pose));
-        let info = Vector6::from_fn(|k, _| if std[k].is_finite() { Problem::at_least(std[k]).powi(-2) } else { 0.0 });
+        let info =
+            Vector6::from_fn(|k, _| if std[k].is_finite() { BundleProblem::at_least(std[k]).powi(-2) } else { 0.0 });
         let jacobian = right_jacobian_inverse(&d);
         let weighted = jacobian.tr_mul(&Matrix6::from_diagonal(&info));
         self.add_block(at, at, &(weighted * jacobian));

@@ -4,8 +4,8 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector, Isometry3, Vector3};
 
-use super::model::{Model, Scales};
-use crate::calib::associate::{Measured, SeenCorners, View};
+use super::model::{Hyperparameters, Model};
+use crate::calib::associate::{MeanCorners, TagMeasurement, View};
 use crate::calib::problem::{JointParameters, Parameter};
 use armcal_core::joints::{JointAngles, MAX_JOINTS};
 use armcal_core::optics::Fisheye;
@@ -28,23 +28,23 @@ pub(super) struct Layout {
 
 /// One tag in one view.
 #[derive(Clone, Debug)]
-pub(super) struct Sighting {
+pub(super) struct ObservationTerm {
     /// Index into the robot's tags; the gripper's comes after them.
     pub tag: usize,
-    pub data: Seen,
+    pub data: WeightedMeasurement,
     /// Sightings that are out of the estimate keep their place.
     pub is_used: bool,
 }
 
 /// Measurements with the inverse of their variance.
 #[derive(Clone, Debug)]
-pub(super) enum Seen {
+pub(super) enum WeightedMeasurement {
     Corners { corners_px: [[f64; 2]; 4], half_size_m: f64, info: f64 },
     Position { in_camera_m: Vector3<f64>, info: f64 },
     Pose { tag_from_camera: Isometry3<f64>, info_position: f64, info_rotation: f64 },
 }
 
-impl Seen {
+impl WeightedMeasurement {
     pub(super) fn n_coordinates(&self) -> usize {
         match self {
             Self::Corners { .. } => 8,
@@ -89,15 +89,15 @@ pub(super) struct Prior {
 }
 
 #[derive(Clone, Debug)]
-pub(super) struct Problem<'a> {
+pub(super) struct BundleProblem<'a> {
     pub robot: &'a Robot,
     pub layout: Layout,
     pub views: Vec<ViewData>,
-    pub sightings: Vec<Sighting>,
+    pub sightings: Vec<ObservationTerm>,
     pub prior: Prior,
-    pub scales: Scales,
+    pub scales: Hyperparameters,
     /// Joints before the camera.
-    pub n_before: usize,
+    pub n_camera_joints: usize,
 }
 
 /// Everything that is estimated.
@@ -166,14 +166,14 @@ impl Layout {
     }
 }
 
-impl<'a> Problem<'a> {
+impl<'a> BundleProblem<'a> {
     pub(super) fn new(
         robot: &'a Robot,
         views: &[View],
         model: &Model,
         guess: &JointParameters,
         prior: Prior,
-        scales: Scales,
+        scales: Hyperparameters,
     ) -> Self {
         let layout = Layout::new(robot, model, views);
         let mut sightings = Vec::new();
@@ -183,27 +183,32 @@ impl<'a> Problem<'a> {
             for tag in &view.tags {
                 let size_m = robot.tags[tag.tag_idx].size_m;
                 let data = match &tag.measured {
-                    Measured::Corners(seen) => corners(robot, seen, size_m),
-                    Measured::Position => {
-                        Seen::Position { in_camera_m: tag.center_in_camera_m, info: scales.position_std_m.powi(-2) }
-                    }
-                    Measured::Pose(camera_from_tag) => Seen::Pose {
+                    TagMeasurement::Corners(seen) => corners(robot, seen, size_m),
+                    TagMeasurement::Position => WeightedMeasurement::Position {
+                        in_camera_m: tag.center_in_camera_m,
+                        info: scales.position_std_m.powi(-2),
+                    },
+                    TagMeasurement::Pose(camera_from_tag) => WeightedMeasurement::Pose {
                         tag_from_camera: camera_from_tag.inverse(),
                         info_position: scales.position_std_m.powi(-2),
                         info_rotation: scales.rotation_std_rad.powi(-2),
                     },
                 };
-                sightings.push(Sighting { tag: tag.tag_idx, data, is_used: true });
+                sightings.push(ObservationTerm { tag: tag.tag_idx, data, is_used: true });
             }
             let to = sightings.len();
             let gripper_size_m = robot.gripper_tag.filter(|_| model.gripper_tag).map(|tag| tag.size_m);
             let gripper = view.gripper_tag.as_ref().zip(gripper_size_m).map(|(seen, size_m)| {
-                sightings.push(Sighting { tag: robot.tags.len(), data: corners(robot, seen, size_m), is_used: true });
+                sightings.push(ObservationTerm {
+                    tag: robot.tags.len(),
+                    data: corners(robot, seen, size_m),
+                    is_used: true,
+                });
                 to
             });
             data.push(view_data(robot, view, &layout, guess, from..to, gripper));
         }
-        Self { robot, layout, views: data, sightings, prior, scales, n_before: robot.camera.mount.n_joints }
+        Self { robot, layout, views: data, sightings, prior, scales, n_camera_joints: robot.camera.mount.n_joints }
     }
 
     /// The state where nothing is off its prior, but for the joints' parameters, which are `guess`'s.
@@ -245,12 +250,12 @@ impl<'a> Problem<'a> {
 }
 
 /// Corners with the variance of their mean: the scatter between frames, with robot.toml's figure for a few frames more.
-fn corners(robot: &Robot, seen: &SeenCorners, size_m: f64) -> Seen {
+fn corners(robot: &Robot, seen: &MeanCorners, size_m: f64) -> WeightedMeasurement {
     let dof = 8.0 * seen.n_frames.saturating_sub(1) as f64;
     let known_px2 = robot.camera.corner_std_px.powi(2);
     let one_frame_px2 = (CORNER_PRIOR_DOF * known_px2 + seen.scatter_px2) / (CORNER_PRIOR_DOF + dof);
     let info = seen.n_frames.max(1) as f64 / one_frame_px2;
-    Seen::Corners { corners_px: seen.corners_px, half_size_m: 0.5 * size_m, info }
+    WeightedMeasurement::Corners { corners_px: seen.corners_px, half_size_m: 0.5 * size_m, info }
 }
 
 fn view_data(

@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::detect::{FAR_RAD, FAR_SIGMAS};
 use super::estimate::Estimate;
-use super::failed::Reading;
+use super::failed::SensorUse;
 use crate::calib::associate::View;
 use armcal_core::robot::Robot;
 use armcal_core::stats::quantile;
@@ -21,9 +21,9 @@ pub(super) struct Readings {
 
 /// How the readings go with the angles.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum Pattern {
+pub(super) enum FailurePattern {
     /// The angle is always the same.
-    Locked(Reading),
+    Locked(SensorUse),
     /// The reading is always the same, the angle is not.
     Stuck,
     /// They have nothing to do with each other.
@@ -68,13 +68,13 @@ impl Readings {
     }
 
     /// `None` where the readings follow the angles as they should.
-    pub(super) fn pattern(&self, robot: &Robot) -> Option<Pattern> {
+    pub(super) fn pattern(&self, robot: &Robot) -> Option<FailurePattern> {
         let spec = &robot.sensors[self.joint];
         let noise_rad = FAR_SIGMAS * spec.noise_std_counts / spec.counts_per_rad.abs();
         let spread_rad = deviation(&self.angle_rad);
         let own_rad = rms(&self.std_rad);
         if spread_rad < LOCKED_RAD.max(LOCKED_SIGMAS * own_rad) {
-            return Some(Pattern::Locked(self.sensor_of_locked(robot, noise_rad)));
+            return Some(FailurePattern::Locked(self.sensor_of_locked(robot, noise_rad)));
         }
         if deviation(&self.travel_rad) < noise_rad {
             let counts = (spec.offset_counts
@@ -82,7 +82,7 @@ impl Readings {
             .rem_euclid(spec.wrap_counts);
             // A broken wire reads nothing but noise about zero.
             let near_zero = counts.min(spec.wrap_counts - counts) < FAR_SIGMAS * spec.noise_std_counts.max(1.0);
-            return Some(if near_zero { Pattern::Dead } else { Pattern::Stuck });
+            return Some(if near_zero { FailurePattern::Dead } else { FailurePattern::Stuck });
         }
         if let Some(step) = self.step() {
             return Some(step);
@@ -91,28 +91,28 @@ impl Readings {
         let sizes: Vec<f64> = off_rad.iter().map(|off| off.abs()).collect();
         let sigma_rad = (1.4826 * quantile(&sizes, 0.5)?).max(own_rad);
         if 1.4826 * quantile(&sizes, 0.5)? > FOLLOWS * spread_rad || !(0.7..1.3).contains(&slope) {
-            return Some(Pattern::Dead);
+            return Some(FailurePattern::Dead);
         }
         let far = |(_, off): &(&usize, &f64)| off.abs() > FAR_RAD.max(FAR_SIGMAS * sigma_rad);
         let single: Vec<usize> = self.view_idx.iter().zip(&off_rad).filter(far).map(|(k, _)| *k).collect();
         let n = single.len();
         let mut single = single;
         single.sort_unstable();
-        (n > 0 && n as f64 <= MAX_SINGLE * self.len() as f64).then_some(Pattern::Single(single))
+        (n > 0 && n as f64 <= MAX_SINGLE * self.len() as f64).then_some(FailurePattern::Single(single))
     }
 
     /// A locked joint's sensor may well be sound: it then stands still where the datasheet allows it.
-    fn sensor_of_locked(&self, robot: &Robot, noise_rad: f64) -> Reading {
+    fn sensor_of_locked(&self, robot: &Robot, noise_rad: f64) -> SensorUse {
         let spec = &robot.sensors[self.joint];
         let travel_rad = quantile(&self.travel_rad, 0.5).unwrap_or(0.0);
         let off_rad = quantile(&self.angle_rad, 0.5).unwrap_or(0.0) - spec.center_rad - travel_rad;
         let allowed_rad = RIGHT_SIGMAS * spec.offset_std_rad.hypot(spec.gain_std * travel_rad);
         let moves = deviation(&self.travel_rad) > noise_rad;
-        if !moves && off_rad.abs() < allowed_rad { Reading::Used } else { Reading::Ignored }
+        if !moves && off_rad.abs() < allowed_rad { SensorUse::Used } else { SensorUse::Ignored }
     }
 
     /// The slip that explains the most, if it explains nearly all (least squares of 1, reading and a step).
-    fn step(&self) -> Option<Pattern> {
+    fn step(&self) -> Option<FailurePattern> {
         let n = self.len();
         let without = self.squares_with_step(n)?.0;
         let best = (MIN_SIDE..=n.checked_sub(MIN_SIDE)?)
@@ -126,7 +126,7 @@ impl Readings {
         is_clear.then(|| {
             let mut before = self.view_idx[..at].to_vec();
             before.sort_unstable();
-            Pattern::Lasting { before, since: self.view_idx[at] }
+            FailurePattern::Lasting { before, since: self.view_idx[at] }
         })
     }
 
@@ -168,7 +168,7 @@ impl Readings {
     }
 
     /// What shows the pattern.
-    pub(super) fn in_words(&self, pattern: &Pattern, views: &[View]) -> String {
+    pub(super) fn in_words(&self, pattern: &FailurePattern, views: &[View]) -> String {
         let range_deg = |values: &[f64]| {
             let (low, high) =
                 values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
@@ -178,25 +178,25 @@ impl Readings {
         let n = self.len();
         let pose = |k: usize| views[k].pose_idx;
         match pattern {
-            Pattern::Locked(Reading::Used) => {
+            FailurePattern::Locked(SensorUse::Used) => {
                 format!("the camera shows one angle in {n} views (within {shown:.2} deg), as the sensor says")
             }
-            Pattern::Locked(Reading::Ignored) => {
+            FailurePattern::Locked(SensorUse::Ignored) => {
                 format!(
                     "the camera shows one angle in {n} views (within {shown:.2} deg); the sensor reads {read:.2} deg apart, or elsewhere"
                 )
             }
-            Pattern::Stuck => {
+            FailurePattern::Stuck => {
                 format!("the reading stands still over {n} views while the camera shows {shown:.1} deg of motion")
             }
-            Pattern::Dead => {
+            FailurePattern::Dead => {
                 format!("the reading spans {read:.1} deg and does not follow the {shown:.1} deg that the camera shows")
             }
-            Pattern::Single(of) => {
+            FailurePattern::Single(of) => {
                 let poses: Vec<u32> = of.iter().map(|&k| pose(k)).collect();
                 format!("the reading is off in {} of {n} views (poses {poses:?})", of.len())
             }
-            Pattern::Lasting { before, since } => {
+            FailurePattern::Lasting { before, since } => {
                 let step = self.squares_with_step(before.len()).map_or(0.0, |(_, step_rad)| step_rad.to_degrees());
                 let after = n - before.len();
                 format!(

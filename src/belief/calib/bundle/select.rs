@@ -8,12 +8,12 @@
 use nalgebra::Cholesky;
 
 use super::estimate::{BundleInput, Estimate, estimate};
-use crate::calib::associate::Measured;
+use crate::calib::associate::TagMeasurement;
 use crate::calib::problem::ParameterKind;
 
 /// A term that not every recording has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Doubtful {
+pub enum OptionalTerm {
     /// An error of the camera's pose that all tags of a view share.
     CameraError,
     TimeOffset,
@@ -23,7 +23,7 @@ pub enum Doubtful {
 /// Whether a doubtful term came in, and what it brought.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Selection {
-    pub term: Doubtful,
+    pub term: OptionalTerm,
     pub is_in: bool,
     /// Natural logarithm of the evidence with it over that without.
     pub gain_nats: f64,
@@ -39,7 +39,7 @@ const MIN_RATE_RAD_S: f64 = 0.01;
 
 /// Estimates, and again with each doubtful term that the data may ask for; the best model stays.
 #[must_use]
-pub fn estimate_selecting<'a>(input: &BundleInput<'a>) -> Option<(Estimate<'a>, Vec<Selection>)> {
+pub fn select_model<'a>(input: &BundleInput<'a>) -> Option<(Estimate<'a>, Vec<Selection>)> {
     let mut best = estimate(input)?;
     let mut best_input = input.clone();
     let mut selections = Vec::new();
@@ -56,9 +56,9 @@ pub fn estimate_selecting<'a>(input: &BundleInput<'a>) -> Option<(Estimate<'a>, 
     Some((best, selections))
 }
 
-fn candidates(input: &BundleInput<'_>) -> Vec<Doubtful> {
+fn candidates(input: &BundleInput<'_>) -> Vec<OptionalTerm> {
     let positions = |view: &crate::calib::View| {
-        let other = |tag: &&crate::calib::TagView| !matches!(tag.measured, Measured::Corners(_));
+        let other = |tag: &&crate::calib::TagObservation| !matches!(tag.measured, TagMeasurement::Corners(_));
         view.tags.iter().filter(other).count() >= 2
     };
     let moves = input.views.iter().any(|view| view.rate_rad_s.iter().any(|rate| rate.abs() > MIN_RATE_RAD_S));
@@ -66,24 +66,24 @@ fn candidates(input: &BundleInput<'_>) -> Vec<Doubtful> {
     let lasts_h = stamps().min().zip(stamps().max()).map_or(0.0, |(a, b)| b.since_s(a) / 3600.0);
     let mut out = Vec::new();
     if input.scales.camera_error_std.is_none() && input.views.iter().any(positions) {
-        out.push(Doubtful::CameraError);
+        out.push(OptionalTerm::CameraError);
     }
     if moves && !input.model.time_offset {
-        out.push(Doubtful::TimeOffset);
+        out.push(OptionalTerm::TimeOffset);
     }
     // A prior has its own columns.
     if lasts_h > MIN_SESSION_H && input.joint_prior.is_none() {
-        out.push(Doubtful::Drift);
+        out.push(OptionalTerm::Drift);
     }
     out
 }
 
-fn with<'a>(input: &BundleInput<'a>, term: Doubtful) -> BundleInput<'a> {
+fn with<'a>(input: &BundleInput<'a>, term: OptionalTerm) -> BundleInput<'a> {
     let mut wider = input.clone();
     match term {
-        Doubtful::CameraError => wider.scales.camera_error_std = Some(CAMERA_ERROR_STD),
-        Doubtful::TimeOffset => wider.model.time_offset = true,
-        Doubtful::Drift => {
+        OptionalTerm::CameraError => wider.scales.camera_error_std = Some(CAMERA_ERROR_STD),
+        OptionalTerm::TimeOffset => wider.model.time_offset = true,
+        OptionalTerm::Drift => {
             for kinds in wider.model.joints.iter_mut().filter(|kinds| !kinds.is_empty()) {
                 if !kinds.contains(&ParameterKind::DriftPerH) {
                     kinds.push(ParameterKind::DriftPerH);

@@ -6,13 +6,13 @@
 
 use nalgebra::{Isometry3, Matrix2x3, Matrix6, SMatrix, SVector, Vector2, Vector3, Vector6};
 
-use super::problem::Seen;
-use armcal_core::optics::{Fisheye, pixel_by_twist};
+use super::problem::WeightedMeasurement;
+use armcal_core::optics::{Fisheye, image_jacobian};
 use armcal_core::spatial::{adjoint, log, skew};
 
 /// A sighting linearized, in the camera's frame.
 #[derive(Clone, Debug)]
-pub(super) struct Info {
+pub(super) struct PoseInformation {
     pub h: Matrix6<f64>,
     pub g: Vector6<f64>,
     /// Ad(camera_from_tag).
@@ -23,13 +23,13 @@ pub(super) struct Info {
 
 /// The lens's part: columns fx, fy, cx, cy, k1..k4.
 #[derive(Clone, Debug)]
-pub(super) struct LensInfo {
+pub(super) struct LensInformation {
     pub cross: SMatrix<f64, 6, 8>,
     pub h: SMatrix<f64, 8, 8>,
     pub g: SVector<f64, 8>,
 }
 
-impl LensInfo {
+impl LensInformation {
     pub(super) fn zeros() -> Self {
         Self { cross: SMatrix::zeros(), h: SMatrix::zeros(), g: SVector::zeros() }
     }
@@ -45,7 +45,7 @@ impl LensInfo {
 const UNSEEN_SIGMAS: f64 = 1e3;
 
 /// What it costs that the lens cannot have seen `seen`.
-pub(super) fn unseen_chi2(seen: &Seen) -> f64 {
+pub(super) fn unseen_chi2(seen: &WeightedMeasurement) -> f64 {
     seen.n_coordinates() as f64 * UNSEEN_SIGMAS * UNSEEN_SIGMAS
 }
 
@@ -61,30 +61,32 @@ pub(super) fn right_jacobian_inverse(d: &Vector6<f64>) -> Matrix6<f64> {
     Matrix6::identity() + 0.5 * ad + ad * ad / 12.0
 }
 
-impl Info {
+impl PoseInformation {
     /// Linearizes; `noise` multiplies all standard deviations. Adds the lens's part to `by_lens` where that is wanted. `None`
     /// where a corner is beyond the lens's view.
     pub(super) fn of(
-        seen: &Seen,
+        seen: &WeightedMeasurement,
         camera_from_tag: &Isometry3<f64>,
         lens: &Fisheye,
         noise: f64,
-        by_lens: Option<&mut LensInfo>,
+        by_lens: Option<&mut LensInformation>,
     ) -> Option<Self> {
         let scale = noise.powi(-2);
         match seen {
-            Seen::Corners { corners_px, half_size_m, info } => {
+            WeightedMeasurement::Corners { corners_px, half_size_m, info } => {
                 of_corners(corners_px, *half_size_m, info * scale, camera_from_tag, lens, by_lens)
             }
-            Seen::Position { in_camera_m, info } => Some(of_position(in_camera_m, info * scale, camera_from_tag)),
-            Seen::Pose { tag_from_camera, info_position, info_rotation } => {
+            WeightedMeasurement::Position { in_camera_m, info } => {
+                Some(of_position(in_camera_m, info * scale, camera_from_tag))
+            }
+            WeightedMeasurement::Pose { tag_from_camera, info_position, info_rotation } => {
                 Some(of_pose(tag_from_camera, info_position * scale, info_rotation * scale, camera_from_tag))
             }
         }
     }
 
     /// A sighting that is not possible: it pulls nowhere and costs much.
-    pub(super) fn unseen(seen: &Seen) -> Self {
+    pub(super) fn unseen(seen: &WeightedMeasurement) -> Self {
         Self { h: Matrix6::zeros(), g: Vector6::zeros(), adjoint: Matrix6::identity(), chi2: unseen_chi2(seen) }
     }
 
@@ -100,8 +102,8 @@ fn of_corners(
     info: f64,
     camera_from_tag: &Isometry3<f64>,
     lens: &Fisheye,
-    mut by_lens: Option<&mut LensInfo>,
-) -> Option<Info> {
+    mut by_lens: Option<&mut LensInformation>,
+) -> Option<PoseInformation> {
     let rotation = *camera_from_tag.rotation.to_rotation_matrix().matrix();
     let center = camera_from_tag.translation.vector;
     let (x, y) = (rotation.column(0) * half_size_m, rotation.column(1) * half_size_m);
@@ -115,7 +117,7 @@ fn of_corners(
     }
     for ((p, measured), (pixel, by_point)) in points.iter().zip(corners_px).zip(projected) {
         let residual = [measured[0] - pixel.x, measured[1] - pixel.y];
-        let rows = pixel_by_twist(&by_point, p);
+        let rows = image_jacobian(&by_point, p);
         for (row, &r) in rows.iter().zip(&residual) {
             chi2 += r * r;
             for i in 0..6 {
@@ -141,7 +143,7 @@ fn of_corners(
     }
     let h = Matrix6::from_fn(|i, k| info * if i >= k { h[i][k] } else { h[k][i] });
     let g = Vector6::from(g) * info;
-    Some(Info { h, g, adjoint: adjoint(camera_from_tag), chi2: chi2 * info })
+    Some(PoseInformation { h, g, adjoint: adjoint(camera_from_tag), chi2: chi2 * info })
 }
 
 /// d(pixel)/d(fx, fy, cx, cy, k1..k4), x row and y row.
@@ -164,14 +166,14 @@ fn lens_columns(lens: &Fisheye, p: &Vector3<f64>) -> [SVector<f64, 8>; 2] {
     [row(ux, 0), row(uy, 1)]
 }
 
-fn of_position(in_camera_m: &Vector3<f64>, info: f64, camera_from_tag: &Isometry3<f64>) -> Info {
+fn of_position(in_camera_m: &Vector3<f64>, info: f64, camera_from_tag: &Isometry3<f64>) -> PoseInformation {
     let p = camera_from_tag.translation.vector;
     let residual = in_camera_m - p;
     let mut jacobian = SMatrix::<f64, 3, 6>::zeros();
     jacobian.fixed_view_mut::<3, 3>(0, 0).fill_diagonal(-1.0);
     jacobian.fixed_view_mut::<3, 3>(0, 3).copy_from(&skew(&p));
     let transposed = jacobian.transpose() * info;
-    Info {
+    PoseInformation {
         h: transposed * jacobian,
         g: transposed * residual,
         adjoint: adjoint(camera_from_tag),
@@ -185,12 +187,12 @@ fn of_pose(
     info_position: f64,
     info_rotation: f64,
     camera_from_tag: &Isometry3<f64>,
-) -> Info {
+) -> PoseInformation {
     let off = log(&(tag_from_camera * camera_from_tag));
     let jacobian = -right_jacobian_inverse(&off) * adjoint(&camera_from_tag.inverse());
     let info = Vector6::from_fn(|k, _| if k < 3 { info_position } else { info_rotation });
     let weighted = jacobian.transpose() * Matrix6::from_diagonal(&info);
-    Info {
+    PoseInformation {
         h: weighted * jacobian,
         g: weighted * -off,
         adjoint: adjoint(camera_from_tag),

@@ -2,9 +2,9 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Vector6};
 
-use super::eliminated::Eliminated;
-use super::linearize::Normal;
-use super::problem::{Problem, State};
+use super::eliminated::SchurBlock;
+use super::linearize::NormalEquations;
+use super::problem::{BundleProblem, State};
 use super::robust::Loss;
 use crate::calib::methods::SolveOutcome;
 use armcal_core::joints::MAX_JOINTS;
@@ -25,7 +25,7 @@ pub(super) const LOOSE: StopRule = StopRule { max_iterations: 20, relative_gain:
 /// The state at the end, its normal equations, and how it went.
 pub(super) struct Solved {
     pub state: State,
-    pub normal: Normal,
+    pub normal: NormalEquations,
     pub iterations: usize,
     pub outcome: SolveOutcome,
     /// Of the start.
@@ -38,12 +38,12 @@ const FIRST_DAMPING: f64 = 1e-6;
 const MAX_DAMPING: f64 = 1e12;
 
 /// Minimizes the problem's cost from `state`.
-pub(super) fn solve(problem: &Problem<'_>, state: State, loss: Loss, stop: StopRule) -> Solved {
+pub(super) fn solve(problem: &BundleProblem<'_>, state: State, loss: Loss, stop: StopRule) -> Solved {
     let mut state = state;
-    let mut normal = Normal::new(problem);
+    let mut normal = NormalEquations::new(problem);
     normal.update(problem, &state, loss);
     let cost_initial = normal.cost;
-    let mut trial_normal = Normal::new(problem);
+    let mut trial_normal = NormalEquations::new(problem);
     let mut trial = state.clone();
     let mut room = DMatrix::zeros(problem.layout.n, problem.layout.n);
     let mut step = DVector::zeros(problem.layout.n);
@@ -88,7 +88,12 @@ pub(super) fn solve(problem: &Problem<'_>, state: State, loss: Loss, stop: StopR
 }
 
 /// The step by the matrix with its diagonal raised, factored in `room`; `None` where it has no Cholesky factor.
-fn solve_damped(normal: &Normal, damping: f64, room: &mut DMatrix<f64>, step: &mut DVector<f64>) -> Option<()> {
+fn solve_damped(
+    normal: &NormalEquations,
+    damping: f64,
+    room: &mut DMatrix<f64>,
+    step: &mut DVector<f64>,
+) -> Option<()> {
     let mut raised = std::mem::replace(room, DMatrix::zeros(0, 0));
     if raised.shape() == normal.matrix.shape() {
         raised.copy_from(&normal.matrix);
@@ -107,19 +112,30 @@ fn solve_damped(normal: &Normal, damping: f64, room: &mut DMatrix<f64>, step: &m
 }
 
 /// What the views' own parameters would save if the common ones stayed.
-fn own_gain(normal: &Normal) -> f64 {
+fn own_gain(normal: &NormalEquations) -> f64 {
     normal.eliminated.iter().filter(|own| own.has_any).map(|own| own.gradient.dot(&(own.inverse * own.gradient))).sum()
 }
 
 #[cfg(test)]
-pub(super) fn stepped(problem: &Problem<'_>, state: &State, normal: &Normal, step: &DVector<f64>) -> State {
+pub(super) fn stepped(
+    problem: &BundleProblem<'_>,
+    state: &State,
+    normal: &NormalEquations,
+    step: &DVector<f64>,
+) -> State {
     let mut next = state.clone();
     take_step(problem, state, normal, step, &mut next);
     next
 }
 
 /// Makes `next` of `state` by a step of the common parameters, the views' own following.
-fn take_step(problem: &Problem<'_>, state: &State, normal: &Normal, step: &DVector<f64>, next: &mut State) {
+fn take_step(
+    problem: &BundleProblem<'_>,
+    state: &State,
+    normal: &NormalEquations,
+    step: &DVector<f64>,
+    next: &mut State,
+) {
     let layout = &problem.layout;
     let twist = |at: usize| Vector6::from_fn(|k, _| step[at + k]);
     next.copy_from(state);
@@ -157,9 +173,9 @@ fn take_step(problem: &Problem<'_>, state: &State, normal: &Normal, step: &DVect
 }
 
 fn add_own(
-    problem: &Problem<'_>,
-    normal: &Normal,
-    own: &Eliminated,
+    problem: &BundleProblem<'_>,
+    normal: &NormalEquations,
+    own: &SchurBlock,
     view_idx: usize,
     step: &DVector<f64>,
     next: &mut State,

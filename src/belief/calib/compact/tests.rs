@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 
-use super::super::result::{CovarianceTable, FitFigures, HeldOutFigures};
+use super::super::result::{CovarianceTable, FitMetrics, HeldOutMetrics};
 use super::super::valid_range::ValidRange;
 use super::*;
 use armcal_core::stats::Summary;
@@ -62,7 +62,7 @@ fn calibration(robot: &str, joints: &[Joint], refusal: Option<String>) -> Calibr
         unobservable: Vec::new(),
         outliers: Vec::new(),
         model: None,
-        fit: FitFigures {
+        fit: FitMetrics {
             outcome: "converged".to_owned(),
             evaluations: 540,
             cost_initial: 17.5,
@@ -75,7 +75,7 @@ fn calibration(robot: &str, joints: &[Joint], refusal: Option<String>) -> Calibr
             rms_px: Some(2.3),
             linearity_scale: 1.0,
         },
-        held_out: HeldOutFigures {
+        held_out: HeldOutMetrics {
             views: 4,
             in_turn: false,
             mean_m: None,
@@ -158,8 +158,8 @@ fn what_is_not_finite_is_unknown_or_refused() {
 #[test]
 fn every_refusal_has_a_code() {
     use super::super::methods::SolveOutcome;
-    use super::super::verdict::{Evidence, refusal};
-    let good = Evidence {
+    use super::super::verdict::{AcceptanceData, refusal};
+    let good = AcceptanceData {
         outcome: SolveOutcome::Converged,
         held_out_views: 8,
         held_out_rms_m: Some(0.004),
@@ -171,13 +171,13 @@ fn every_refusal_has_a_code() {
         tolerance_m: Some(0.02),
     };
     let faults = [
-        (Evidence { outcome: SolveOutcome::Stalled, ..good }, "solver"),
-        (Evidence { fit_views: 8, ..good }, "few_views"),
-        (Evidence { held_out_views: 2, ..good }, "few_held_out"),
-        (Evidence { held_out_rms_m: None, ..good }, "no_held_out"),
-        (Evidence { held_out_rms_m: Some(0.09), ..good }, "no_better"),
-        (Evidence { held_out_rms_m: Some(0.011), ..good }, "overfitted"),
-        (Evidence { predicted_tool_error_m: Some(0.03), ..good }, "tool_error"),
+        (AcceptanceData { outcome: SolveOutcome::Stalled, ..good }, "solver"),
+        (AcceptanceData { fit_views: 8, ..good }, "few_views"),
+        (AcceptanceData { held_out_views: 2, ..good }, "few_held_out"),
+        (AcceptanceData { held_out_rms_m: None, ..good }, "no_held_out"),
+        (AcceptanceData { held_out_rms_m: Some(0.09), ..good }, "no_better"),
+        (AcceptanceData { held_out_rms_m: Some(0.011), ..good }, "overfitted"),
+        (AcceptanceData { predicted_tool_error_m: Some(0.03), ..good }, "tool_error"),
     ];
     for (fault, code) in faults {
         let full = calibration("titan4", &six(), refusal(&fault));

@@ -10,8 +10,8 @@ mod views;
 
 use std::collections::BTreeMap;
 
-use super::associate::{CaptureData, Rejection, View};
-use super::{CalibError, HeldOut, Prepared};
+use super::associate::{CaptureData, ObservationRejection, View};
+use super::{CalibError, CalibrationData, HeldOut};
 use armcal_core::input::{ForeignRecording, InputMap};
 use armcal_core::robot::Robot;
 use armcal_core::streams::ReachTask;
@@ -36,7 +36,7 @@ pub fn prepare_foreign(
     map: &InputMap,
     robot: &Robot,
     context: ForeignContext,
-) -> Result<Prepared, CalibError> {
+) -> Result<CalibrationData, CalibError> {
     let name = names_of(recordings);
     let mut data = CaptureData { task: context.task, landmark_names: context.landmark_names, ..CaptureData::default() };
     let mut views: Vec<(View, [u8; 32])> = Vec::new();
@@ -64,12 +64,12 @@ pub fn prepare_foreign(
         return Err(no_views(name, robot, &data));
     }
     let messages_hash = hash(&mut digests);
-    Ok(Prepared {
+    Ok(CalibrationData {
         name,
         messages_hash,
         data,
-        watched: None,
-        held_out: HeldOut::InTurn,
+        gripper_tag_data: None,
+        held_out: HeldOut::CrossValidation,
         robot: robot.clone(),
         identified: Vec::new(),
     })
@@ -82,7 +82,7 @@ fn names_of(recordings: &[ForeignRecording]) -> String {
 }
 
 fn no_views(recording: String, robot: &Robot, data: &CaptureData) -> CalibError {
-    if data.rejected.keys().any(|why| *why != Rejection::UnknownTag) {
+    if data.rejected.keys().any(|why| *why != ObservationRejection::UnknownTag) {
         let reasons = data.rejected_by_reason();
         let reasons: Vec<String> = reasons.iter().map(|(why, n)| format!("{n} {}", why.replace('_', " "))).collect();
         return CalibError::AllRejected { recording, reasons: reasons.join(", ") };

@@ -16,7 +16,7 @@ pub(super) const RATE_WINDOW_S: f64 = 0.1;
 
 /// The travel at a stamp.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Paired {
+pub(super) struct TravelSample {
     pub travel_rad: JointAngles,
     /// Whether it lies within a continuous stream.
     pub is_continuous: bool,
@@ -27,7 +27,7 @@ pub(super) struct Paired {
 }
 
 /// The readings of a recording as travel from the middle of each joint's range.
-pub(super) struct Travels<'a> {
+pub(super) struct TravelSeries<'a> {
     pub readings: &'a [Reading],
     pub travel_rad: Vec<JointAngles>,
     /// Travel after which a reading repeats, by joint.
@@ -35,7 +35,7 @@ pub(super) struct Travels<'a> {
     max_gap_s: f64,
 }
 
-impl<'a> Travels<'a> {
+impl<'a> TravelSeries<'a> {
     pub fn new(recording: &'a ForeignRecording, robot: &Robot, max_gap_s: f64) -> Self {
         let sensors = ArmSensors::nominal(robot);
         let travel = |reading: &Reading| {
@@ -60,15 +60,20 @@ impl<'a> Travels<'a> {
     }
 
     /// `None` where no reading is near enough.
-    pub fn at(&self, stamp: Stamp) -> Option<Paired> {
+    pub fn at(&self, stamp: Stamp) -> Option<TravelSample> {
         if let Some((travel_rad, readings)) = self.between(stamp) {
-            return Some(Paired { travel_rad, is_continuous: true, rate_rad_s: self.rate(stamp), readings });
+            return Some(TravelSample { travel_rad, is_continuous: true, rate_rad_s: self.rate(stamp), readings });
         }
         let after = self.readings.partition_point(|reading| reading.stamp < stamp);
         let near = |idx: &usize| self.readings.get(*idx).map(|reading| (reading.stamp.since_s(stamp).abs(), *idx));
         let nearest = [after.wrapping_sub(1), after].iter().filter_map(near).min_by(|a, b| a.0.total_cmp(&b.0));
         let (_, idx) = nearest.filter(|(gap_s, _)| *gap_s <= self.max_gap_s)?;
-        Some(Paired { travel_rad: self.travel_rad[idx], is_continuous: false, rate_rad_s: None, readings: (idx, idx) })
+        Some(TravelSample {
+            travel_rad: self.travel_rad[idx],
+            is_continuous: false,
+            rate_rad_s: None,
+            readings: (idx, idx),
+        })
     }
 
     /// Interpolated within a continuous stream, and the two readings that it is between.

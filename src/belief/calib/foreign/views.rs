@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use super::super::associate::{Rejection, TagView, View};
+use super::super::associate::{ObservationRejection, TagObservation, View};
 use super::landmarks::{Averaged, average};
-use super::pairing::{Paired, RATE_WINDOW_S, Travels};
-use armcal_core::input::{ForeignRecording, InputMap, Seen, TagFrame, WhileMoving};
+use super::pairing::{RATE_WINDOW_S, TravelSample, TravelSeries};
+use armcal_core::input::{ForeignRecording, InputMap, RawMeasurement, TagFrame, WhileMoving};
 use armcal_core::robot::Robot;
 use armcal_core::streams::JointAngles;
 
@@ -23,19 +23,19 @@ pub(super) struct RecordingViews {
     /// Hashes of all messages that they come from.
     pub digests: Vec<[u8; 32]>,
     pub ids_seen: Vec<u32>,
-    pub rejected: BTreeMap<Rejection, usize>,
+    pub rejected: BTreeMap<ObservationRejection, usize>,
 }
 
 /// One tag message with its reading.
 struct PairedFrame<'a> {
     frame: &'a TagFrame,
-    paired: Paired,
+    paired: TravelSample,
 }
 
 struct Maker<'a> {
     robot: &'a Robot,
     plain_landmark: Option<u32>,
-    travels: Travels<'a>,
+    travels: TravelSeries<'a>,
     /// One sigma of a reading, rad, of the joints that move the camera.
     noise_rad: Vec<f64>,
     out: RecordingViews,
@@ -47,18 +47,18 @@ impl RecordingViews {
         let mut maker = Maker {
             robot,
             plain_landmark,
-            travels: Travels::new(recording, robot, map.max_gap_s),
+            travels: TravelSeries::new(recording, robot, map.max_gap_s),
             noise_rad: moving.iter().map(|spec| spec.noise_std_counts / spec.counts_per_rad.abs()).collect(),
             out: Self { views: Vec::new(), digests: Vec::new(), ids_seen: Vec::new(), rejected: BTreeMap::new() },
         };
         let mut group: Vec<PairedFrame<'_>> = Vec::new();
         for frame in &recording.frames {
             let Some(paired) = maker.travels.at(frame.stamp) else {
-                maker.reject(Rejection::NoReadings, frame.tags.len());
+                maker.reject(ObservationRejection::NoReadings, frame.tags.len());
                 continue;
             };
             if map.while_moving == WhileMoving::LeaveOut && maker.is_moving(&paired) {
-                maker.reject(Rejection::ArmMoving, frame.tags.len());
+                maker.reject(ObservationRejection::ArmMoving, frame.tags.len());
                 maker.close(&mut group);
                 continue;
             }
@@ -74,12 +74,12 @@ impl RecordingViews {
 }
 
 impl Maker<'_> {
-    fn reject(&mut self, why: Rejection, n: usize) {
+    fn reject(&mut self, why: ObservationRejection, n: usize) {
         *self.out.rejected.entry(why).or_default() += n;
     }
 
     /// Only a continuous stream of readings can tell.
-    fn is_moving(&self, paired: &Paired) -> bool {
+    fn is_moving(&self, paired: &TravelSample) -> bool {
         let Some(rate) = paired.rate_rad_s else { return false };
         // Two readings' noise over twice the window.
         let of_noise = |noise_rad: f64| noise_rad * std::f64::consts::FRAC_1_SQRT_2 / RATE_WINDOW_S;
@@ -152,7 +152,7 @@ impl Maker<'_> {
     }
 
     fn add_tags(&mut self, view: &mut View, frames: &[PairedFrame<'_>]) {
-        let mut by_id: BTreeMap<u32, Vec<Seen>> = BTreeMap::new();
+        let mut by_id: BTreeMap<u32, Vec<RawMeasurement>> = BTreeMap::new();
         for sighting in frames.iter().flat_map(|frame| &frame.frame.tags) {
             if let Some(id) = sighting.id.or(self.plain_landmark) {
                 by_id.entry(id).or_default().push(sighting.seen);
@@ -161,16 +161,16 @@ impl Maker<'_> {
         for (id, seen) in by_id {
             self.out.ids_seen.push(id);
             let Some(tag_idx) = self.robot.tags.iter().position(|tag| tag.id == id) else {
-                self.reject(Rejection::UnknownTag, seen.len());
+                self.reject(ObservationRejection::UnknownTag, seen.len());
                 continue;
             };
             let (averaged, n_apart) = average(&seen, self.robot, tag_idx);
             if n_apart > 0 {
-                self.reject(Rejection::InconsistentFrame, n_apart);
+                self.reject(ObservationRejection::InconsistentFrame, n_apart);
             }
             match averaged {
                 Ok(Some(Averaged { center_in_camera_m, measured })) => {
-                    view.tags.push(TagView { id, tag_idx, center_in_camera_m, measured });
+                    view.tags.push(TagObservation { id, tag_idx, center_in_camera_m, measured });
                 }
                 Ok(None) => {}
                 Err(why) => self.reject(why, 1),

@@ -27,7 +27,7 @@ fn views(robot: &Robot, travels_rad: &[f64]) -> Vec<View> {
             robot.camera.lens.project(&(camera_from_tag * corner).coords).expect("in view").into()
         };
         let corners_px = square_corners(tag.size_m).map(|corner| project(&corner));
-        let gripper_tag = Some(SeenCorners { corners_px, n_frames: 5, scatter_px2: 0.0 });
+        let gripper_tag = Some(MeanCorners { corners_px, n_frames: 5, scatter_px2: 0.0 });
         View { gripper_tag, ..View::of_reading(0, SIMULATION_EPOCH, travel_rad) }
     };
     travels_rad.iter().map(view).collect()

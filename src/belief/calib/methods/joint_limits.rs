@@ -14,7 +14,7 @@ use armcal_core::robot::Robot;
 
 /// Readings of one joint that stood at a nominal stop.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StopReading {
+pub struct EndStopReading {
     pub joint: usize,
     /// Where the drawing has the stop.
     pub angle_rad: f64,
@@ -24,7 +24,7 @@ pub struct StopReading {
 
 /// Sensors by their stops.
 #[derive(Clone, Debug)]
-pub struct StopFit {
+pub struct EndStopFit {
     pub solution: Solution,
     pub covariance: ParameterCovariance,
     /// Joints without two stops, and why.
@@ -42,7 +42,7 @@ const LEAST_TRAVEL_SHARE: f64 = 0.1;
 ///
 /// # Errors
 /// Why no joint at all can be fitted.
-pub fn fit_stops(robot: &Robot, readings: &[StopReading], guess: &JointParameters) -> Result<StopFit, String> {
+pub fn fit_stops(robot: &Robot, readings: &[EndStopReading], guess: &JointParameters) -> Result<EndStopFit, String> {
     if readings.is_empty() {
         return Err("it holds no readings at end stops (marks `stop ANGLE_RAD` on /marks)".to_owned());
     }
@@ -50,7 +50,7 @@ pub fn fit_stops(robot: &Robot, readings: &[StopReading], guess: &JointParameter
     let mut fitted: Vec<(usize, Matrix2<f64>)> = Vec::new();
     let mut left_out = Vec::new();
     for joint in 0..robot.n_joints() {
-        let own: Vec<StopReading> = readings.iter().copied().filter(|reading| reading.joint == joint).collect();
+        let own: Vec<EndStopReading> = readings.iter().copied().filter(|reading| reading.joint == joint).collect();
         match line(robot.sensors[joint].center_rad, &own) {
             Ok(Line { gain, offset_rad, covariance }) => {
                 (parameters.gain[joint], parameters.offset_rad[joint]) = (gain, offset_rad);
@@ -68,7 +68,7 @@ pub fn fit_stops(robot: &Robot, readings: &[StopReading], guess: &JointParameter
             names.map(|u| format!("{}: {}", robot.sensors[u.parameter.joint].joint, u.reason)).collect();
         return Err(format!("no joint stood at two of its stops: {}", reasons.join("; ")));
     }
-    let is_fitted = |reading: &&StopReading| fitted.iter().any(|(joint, _)| *joint == reading.joint);
+    let is_fitted = |reading: &&EndStopReading| fitted.iter().any(|(joint, _)| *joint == reading.joint);
     let cost = |at: &JointParameters| -> f64 {
         readings.iter().filter(is_fitted).map(|r| difference_rad(robot, at, r).powi(2)).sum()
     };
@@ -79,7 +79,7 @@ pub fn fit_stops(robot: &Robot, readings: &[StopReading], guess: &JointParameter
         cost_initial: cost(guess),
         cost_final: cost(&parameters),
     };
-    Ok(StopFit { solution, covariance: joined(&fitted), left_out })
+    Ok(EndStopFit { solution, covariance: joined(&fitted), left_out })
 }
 
 fn of_joint(joint: usize) -> [Parameter; 2] {
@@ -87,7 +87,7 @@ fn of_joint(joint: usize) -> [Parameter; 2] {
 }
 
 /// Fitted less nominal angle.
-fn difference_rad(robot: &Robot, at: &JointParameters, reading: &StopReading) -> f64 {
+fn difference_rad(robot: &Robot, at: &JointParameters, reading: &EndStopReading) -> f64 {
     let joint = reading.joint;
     let center_rad = robot.sensors[joint].center_rad;
     center_rad + at.gain[joint] * reading.travel_rad + at.offset_rad[joint] - reading.angle_rad
@@ -109,9 +109,9 @@ struct Line {
     covariance: Matrix2<f64>,
 }
 
-fn line(center_rad: f64, readings: &[StopReading]) -> Result<Line, String> {
+fn line(center_rad: f64, readings: &[EndStopReading]) -> Result<Line, String> {
     let Some(first) = readings.first() else { return Err("it never stood at an end stop".to_owned()) };
-    let apart = |r: &&StopReading| (r.angle_rad - first.angle_rad).abs() > SAME_STOP_RAD;
+    let apart = |r: &&EndStopReading| (r.angle_rad - first.angle_rad).abs() > SAME_STOP_RAD;
     let Some(other) = readings.iter().find(apart) else {
         return Err(format!(
             "it stood at one end stop only, {:.4} rad; two different ones are needed",
@@ -126,12 +126,12 @@ fn line(center_rad: f64, readings: &[StopReading]) -> Result<Line, String> {
         );
         return Err(problem);
     }
-    let row = |r: &StopReading| Vector2::new(r.travel_rad, 1.0);
+    let row = |r: &EndStopReading| Vector2::new(r.travel_rad, 1.0);
     let normal: Matrix2<f64> = readings.iter().map(|r| row(r) * row(r).transpose()).sum();
     let right: Vector2<f64> = readings.iter().map(|r| row(r) * (r.angle_rad - center_rad)).sum();
     let inverse = normal.try_inverse().ok_or("its readings at the end stops are all the same")?;
     let solved = inverse * right;
-    let left_rad = |r: &StopReading| (row(r).dot(&solved) - (r.angle_rad - center_rad)).powi(2);
+    let left_rad = |r: &EndStopReading| (row(r).dot(&solved) - (r.angle_rad - center_rad)).powi(2);
     let (n, sum_rad2) = (readings.len(), readings.iter().map(left_rad).sum::<f64>());
     let scatter_rad2 = if n > 2 { sum_rad2 / (n - 2) as f64 } else { 0.0 };
     // All readings at one stop share the stop's own error.
@@ -146,9 +146,9 @@ fn line(center_rad: f64, readings: &[StopReading]) -> Result<Line, String> {
 }
 
 /// Readings by stop.
-fn stops(readings: &[StopReading]) -> Vec<Vec<StopReading>> {
+fn stops(readings: &[EndStopReading]) -> Vec<Vec<EndStopReading>> {
     let mut sorted = readings.to_vec();
     sorted.sort_by(|a, b| a.angle_rad.total_cmp(&b.angle_rad));
-    let near = |a: &StopReading, b: &StopReading| b.angle_rad - a.angle_rad <= SAME_STOP_RAD;
-    sorted.chunk_by(near).map(<[StopReading]>::to_vec).collect()
+    let near = |a: &EndStopReading, b: &EndStopReading| b.angle_rad - a.angle_rad <= SAME_STOP_RAD;
+    sorted.chunk_by(near).map(<[EndStopReading]>::to_vec).collect()
 }

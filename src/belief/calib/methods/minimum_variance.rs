@@ -9,7 +9,7 @@
 use nalgebra::{Const, DMatrix, DVector, Dyn, OMatrix, Vector3};
 
 use crate::calib::observability::Unobservable;
-use crate::calib::problem::{JointParameters, Observation, Parameter, ParameterKind, PositionProblem};
+use crate::calib::problem::{JointParameters, Parameter, ParameterKind, PositionProblem, TagResidual};
 use crate::calib::uncertainty::{CommonErrors, ParameterCovariance};
 
 /// What becomes of the first joint's offset under minimum variance.
@@ -107,7 +107,7 @@ impl Centered {
     }
 }
 
-fn fill(problem: &PositionProblem<'_>, columns: &[Parameter], o: &Observation<'_>, all: &mut DMatrix<f64>, row: usize) {
+fn fill(problem: &PositionProblem<'_>, columns: &[Parameter], o: &TagResidual<'_>, all: &mut DMatrix<f64>, row: usize) {
     let n = columns.len();
     all.fixed_view_mut::<3, 1>(row, 0).copy_from(&o.predicted_m);
     for (column, &parameter) in columns.iter().enumerate() {

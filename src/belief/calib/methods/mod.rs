@@ -12,7 +12,7 @@ mod search;
 #[cfg(test)]
 mod tests;
 
-pub use joint_limits::{StopFit, StopReading, fit_stops};
+pub use joint_limits::{EndStopFit, EndStopReading, fit_stops};
 pub use least_squares::{fisher_information, least_squares};
 pub use minimum_distance::minimum_distance;
 pub use minimum_variance::{Gauge, VarianceObjective, determined_by_variance, variance_covariance};

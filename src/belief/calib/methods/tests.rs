@@ -9,7 +9,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 use super::*;
 use crate::calib::uncertainty::CommonErrors;
-use crate::calib::{Measured, ParameterKind, TagView, View};
+use crate::calib::{ParameterKind, TagMeasurement, TagObservation, View};
 use armcal_core::robot::{Robot, load};
 use armcal_core::stats::{quantile, stream_rng};
 use armcal_core::streams::JointAngles;
@@ -58,7 +58,12 @@ fn views(robot: &Robot, truth: &JointParameters, n: u32, noise_m: f64, rng: &mut
         let mut seen = |(tag_idx, tag): (usize, &armcal_core::robot::SurveyedTag)| {
             let exact = camera_from_base * Point3::from(tag.base_from_tag.origin().vector());
             let noise = Vector3::from_fn(|_, _| noise_m * Distribution::<f64>::sample(&StandardNormal, rng));
-            TagView { id: tag.id, tag_idx, center_in_camera_m: exact.coords + noise, measured: Measured::Position }
+            TagObservation {
+                id: tag.id,
+                tag_idx,
+                center_in_camera_m: exact.coords + noise,
+                measured: TagMeasurement::Position,
+            }
         };
         let tags = robot.tags.iter().enumerate().map(&mut seen).collect();
         View { tags, ..View::of_reading(pose_idx, SIMULATION_EPOCH, travel_rad) }
@@ -271,12 +276,12 @@ fn raw_units_reach_less_in_more_evaluations() {
 
 mod stops {
     use super::*;
-    use crate::calib::{StopReading, fit_stops};
+    use crate::calib::{EndStopReading, fit_stops};
 
-    fn reading(robot: &Robot, truth: &JointParameters, joint: usize, angle_rad: f64, off_rad: f64) -> StopReading {
+    fn reading(robot: &Robot, truth: &JointParameters, joint: usize, angle_rad: f64, off_rad: f64) -> EndStopReading {
         let center = robot.sensors[joint].center_rad;
         let travel_rad = (angle_rad + off_rad - center - truth.offset_rad[joint]) / truth.gain[joint];
-        StopReading { joint, angle_rad, travel_rad }
+        EndStopReading { joint, angle_rad, travel_rad }
     }
 
     fn stops_rad(robot: &Robot, joint: usize) -> [f64; 2] {
@@ -356,7 +361,7 @@ mod stops {
         assert_eq!(found.covariance.parameters.len(), 2);
         assert_eq!(found.solution.parameters.gain[2], 1.0);
         assert!(found.left_out.iter().any(|u| u.parameter.joint == 2 && u.reason.contains("one end stop only")));
-        let dead = StopReading { travel_rad: at(3, 0).travel_rad, ..at(3, 1) };
+        let dead = EndStopReading { travel_rad: at(3, 0).travel_rad, ..at(3, 1) };
         let dead = fit_stops(&robot, &[at(3, 0), dead], &guess).expect_err("a dead sensor");
         assert!(dead.contains("its reading changed by 0.0000 rad only"), "{dead}");
     }

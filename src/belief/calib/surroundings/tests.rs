@@ -73,7 +73,7 @@ fn samples_within_a_span_are_averaged_and_others_joined_by_a_line() {
         pressure(0.0, 1e6),
         oil(200.0, 30.0),
     ];
-    let surroundings = Surroundings::of(&recording(&robot, messages));
+    let surroundings = ConditionHistory::of(&recording(&robot, messages));
     let mut used = Vec::new();
     let inside = surroundings.over_noting(at(9.9), at(10.6), &mut used);
     assert_eq!((inside.oil_c, inside.stamp), (Some(12.5), Some(at(10.25))));

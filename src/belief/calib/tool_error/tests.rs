@@ -46,7 +46,7 @@ fn std_of(kind: ParameterKind) -> f64 {
         ParameterKind::GainPerK => 3e-5,
         ParameterKind::OffsetPerMpa => 2e-4,
         ParameterKind::DriftPerH => 3e-4,
-        ParameterKind::HalfPlay => 1e-3,
+        ParameterKind::HalfBacklash => 1e-3,
     }
 }
 

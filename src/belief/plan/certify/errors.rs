@@ -1,6 +1,6 @@
 //! Halves the joint errors where halving the edge does not help: one pair at a time, depth first.
 
-use super::spot::{Split, Spot, Trend};
+use super::spot::{ArmRegion, Split, Trend};
 use super::{FINEST_M, Finding, OpenPair, Pair, Search, Sweep};
 use armcal_core::streams::{JointAngles, MAX_JOINTS};
 
@@ -24,11 +24,11 @@ impl Search<'_> {
             let (region, direction) = stack.pop()?;
             let spot = sweep.spot(&region);
             self.place_pair(pair, &spot);
-            match sweep.look(&OpenPair { direction, ..*open }, &spot, &self.moved) {
+            match sweep.test_pair(&OpenPair { direction, ..*open }, &spot, &self.moved) {
                 Finding::Clear => {}
                 Finding::TooNear(distance_m) => return Some((pair, distance_m)),
                 Finding::Open(found) => {
-                    let Some(open) = sweep.look_exactly(&found, &spot, &self.moved) else { continue };
+                    let Some(open) = sweep.test_pair_exact(&found, &spot, &self.moved) else { continue };
                     let outer = &self.moved[pair.outer()];
                     if open.drift.total_m < FINEST_M {
                         return Some(sweep.least_m(&open, outer));
@@ -47,7 +47,7 @@ impl Search<'_> {
         Some((pair, 0.0))
     }
 
-    fn place_pair(&mut self, pair: Pair, spot: &Spot) {
+    fn place_pair(&mut self, pair: Pair, spot: &ArmRegion) {
         self.n_regions += 1;
         spot.place(self.sweep.model, pair.outer(), &mut self.moved[pair.outer()]);
         if let Pair::Links { inner, .. } = pair {
@@ -72,7 +72,7 @@ impl Sweep<'_> {
         Region { along, error_rad }
     }
 
-    fn spot(&self, region: &Region) -> Spot {
+    fn spot(&self, region: &Region) -> ArmRegion {
         let [begin, end] = region.along;
         let (middle, half) = (0.5 * (begin + end), 0.5 * (end - begin));
         let [mut step_rad, mut error_half_rad] = [[0.0; MAX_JOINTS]; 2];
@@ -85,7 +85,7 @@ impl Sweep<'_> {
             error_half_rad[joint] = 0.5 * (high - low);
             is_within &= offset == 0.0 || offset.abs() <= self.error_rad(joint, [middle; 2]);
         }
-        Spot::new(&self.model.link_poses(&angles), angles.len(), step_rad, error_half_rad, is_within)
+        ArmRegion::new(&self.model.link_poses(&angles), angles.len(), step_rad, error_half_rad, is_within)
     }
 
     fn halves(&self, region: &Region, split: Split) -> [Region; 2] {

@@ -10,7 +10,7 @@ use armcal_core::robot::parry_pose;
 use armcal_core::streams::MAX_JOINTS;
 
 /// The middle of a region and how far it reaches to either side.
-pub(super) struct Spot {
+pub(super) struct ArmRegion {
     base_from_body: [Pose3; MAX_JOINTS + 1],
     axes: [Vec3; MAX_JOINTS],
     origins: [Vec3; MAX_JOINTS],
@@ -29,7 +29,7 @@ pub(super) struct Spot {
 
 /// A moving shape at the middle of a region, and what bounds its motion within.
 #[derive(Clone, Copy)]
-pub(in crate::plan) struct Moved {
+pub(in crate::plan) struct ShapeMotion {
     pub placed: Placed,
     /// For each joint that moves it, a bound on its distance from that joint's axis over the region, m.
     levers_m: [f64; MAX_JOINTS],
@@ -40,7 +40,7 @@ pub(in crate::plan) struct Moved {
     /// Of the stretch alone: no point of the shape goes farther from where it is in the middle.
     pub stretch_m: f64,
     /// What the vehicle's motion may take from its distance to what the world holds: at the middle, and at most.
-    pub sway_m: f64,
+    pub station_bound_m: f64,
     pub most_sway_m: f64,
 }
 
@@ -53,7 +53,7 @@ pub(super) enum Split {
 
 /// The most that the joints move one shape against another within a region.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::plan) struct Drift {
+pub(in crate::plan) struct MotionBound {
     pub total_m: f64,
     /// To first order alone.
     pub first_m: f64,
@@ -70,23 +70,23 @@ pub(super) struct Trend {
 
 /// The bodies of a pair: a joint moves the outer one against the other if it is one of `first_joint..outer_body`.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::plan) struct Between {
+pub(in crate::plan) struct BodyPair {
     pub first_joint: usize,
     pub outer_body: usize,
 }
 
-impl Drift {
+impl MotionBound {
     pub(in crate::plan) const NONE: Self = Self { total_m: 0.0, first_m: 0.0 };
 }
 
-impl Moved {
+impl ShapeMotion {
     pub(in crate::plan) const NOWHERE: Self = Self {
         placed: Placed::NOWHERE,
         levers_m: [0.0; MAX_JOINTS],
         coarse_m: [0.0; MAX_JOINTS + 1],
         bent_m: [0.0; MAX_JOINTS + 1],
         stretch_m: 0.0,
-        sway_m: 0.0,
+        station_bound_m: 0.0,
         most_sway_m: 0.0,
     };
 
@@ -96,7 +96,7 @@ impl Moved {
     }
 }
 
-impl Spot {
+impl ArmRegion {
     /// `step_rad`: half of the stretch; `error_half_rad`: half of the errors' width.
     pub(in crate::plan) fn new(
         poses: &LinkPoses,
@@ -130,7 +130,7 @@ impl Spot {
     }
 
     /// Puts a moving shape where it is and bounds its motion.
-    pub(in crate::plan) fn place(&self, model: &ClearanceModel<'_>, shape: usize, moved: &mut Moved) {
+    pub(in crate::plan) fn place(&self, model: &ClearanceModel<'_>, shape: usize, moved: &mut ShapeMotion) {
         let body = model.body(shape);
         moved.placed = model.placed_on(shape, &self.base_from_body[body]);
         let (mut beyond_m, mut bent_m, mut stretch_m) = (0.0, 0.0, 0.0);
@@ -149,17 +149,17 @@ impl Spot {
             moved.bent_m[joint] = bent_m;
         }
         moved.stretch_m = stretch_m;
-        moved.sway_m = model.sway_m(&moved.placed);
-        moved.most_sway_m = moved.sway_m + model.sway_growth(beyond_m);
+        moved.station_bound_m = model.station_bound_m(&moved.placed);
+        moved.most_sway_m = moved.station_bound_m + model.sway_growth(beyond_m);
     }
 
     /// The most that the outer shape moves against `direction` within the region.
-    pub(in crate::plan) fn drift(&self, between: Between, moved: &Moved, direction: Vec3) -> Drift {
-        let Between { first_joint, outer_body } = between;
+    pub(in crate::plan) fn drift(&self, between: BodyPair, moved: &ShapeMotion, direction: Vec3) -> MotionBound {
+        let BodyPair { first_joint, outer_body } = between;
         let coarse_m = moved.coarse_m[first_joint];
         // Without a direction there is no first order.
         if direction == Vec3::ZERO {
-            return Drift { total_m: coarse_m, first_m: coarse_m };
+            return MotionBound { total_m: coarse_m, first_m: coarse_m };
         }
         let placed = &moved.placed;
         let turn = self.turn[outer_body] - self.turn[first_joint];
@@ -177,11 +177,11 @@ impl Spot {
         }
         // No second derivative of a point's place by joints i <= j is longer than its distance from axis j.
         let second_m = moved.bent_m[first_joint] - self.reach_before_rad[first_joint] * coarse_m;
-        Drift { total_m: f64::min(coarse_m, first_m + second_m), first_m }
+        MotionBound { total_m: f64::min(coarse_m, first_m + second_m), first_m }
     }
 
     /// Where the region brings the pair nearest, and how to halve it.
-    pub(in crate::plan) fn trend(&self, between: Between, moved: &Moved, direction: Vec3) -> Trend {
+    pub(in crate::plan) fn trend(&self, between: BodyPair, moved: &ShapeMotion, direction: Vec3) -> Trend {
         let placed = &moved.placed;
         let mut trend = Trend { along_m: 0.0, error_m: [0.0; MAX_JOINTS], split: Split::Along };
         let joints = between.first_joint..between.outer_body;

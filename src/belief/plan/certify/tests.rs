@@ -38,7 +38,7 @@ fn random_angles(robot: &Robot, bounds: &JointErrorBounds, rng: &mut ChaCha8Rng)
 
 /// The datasheet's bounds, and those after three calibrations: none of the joints, all but one, all.
 fn several_bounds(robot: &Robot) -> Vec<JointErrorBounds> {
-    let prior = JointErrorBounds::prior(robot);
+    let prior = JointErrorBounds::datasheet(robot);
     let all = JointErrorBounds::alike(robot, 0.014, 0.004);
     let mut all_but_one = all.clone();
     all_but_one.joints[1] = prior.joints[1];
@@ -79,7 +79,7 @@ fn a_certified_pose_is_clear_for_every_arm_and_few_clear_ones_are_refused() {
         for _ in 0..500 {
             let at = random_angles(&robot, &bounds, &mut rng);
             let least_m = brute_m(&clearance, &at, &bounds, &mut rng);
-            let found = clearance.too_near(&at, &bounds, MARGIN_M);
+            let found = clearance.find_violation(&at, &bounds, MARGIN_M);
             clear += i32::from(least_m >= MARGIN_M);
             certified += i32::from(found.is_none());
             if found.is_none() {
@@ -105,7 +105,7 @@ fn a_certified_edge_is_clear_for_every_arm_on_it() {
             let other = random_angles(&robot, &bounds, &mut rng);
             let length = rng.random_range(0.02..0.7);
             let to = JointAngles::from_fn(from.len(), |j| from[j] + length * (other[j] - from[j]));
-            let found = clearance.too_near_along(&Edge::at_full_speed(from, to), &bounds, MARGIN_M);
+            let found = clearance.find_violation_along(&Edge::at_full_speed(from, to), &bounds, MARGIN_M);
             let mut least_m = f64::INFINITY;
             for step in 0..=12 {
                 let share = f64::from(step) / 12.0;
@@ -131,13 +131,13 @@ fn a_certified_edge_is_clear_for_every_arm_on_it() {
 fn what_is_refused_has_a_name_and_a_distance_below_the_margin() {
     let Site { robot, vehicle, scene } = site();
     let clearance = ClearanceModel::new(&robot, &vehicle, &scene);
-    let bounds = JointErrorBounds::prior(&robot);
+    let bounds = JointErrorBounds::datasheet(&robot);
     let mut rng = stream_rng(1, "refused poses");
     for margin_m in [0.0, MARGIN_M, 0.3] {
         for _ in 0..300 {
             let at = random_angles(&robot, &bounds, &mut rng);
             let nearest = clearance.nearest_under(&at, &bounds, margin_m);
-            match clearance.too_near(&at, &bounds, margin_m) {
+            match clearance.find_violation(&at, &bounds, margin_m) {
                 Some(found) => {
                     assert!(found.distance_m < margin_m.max(1e-5), "{found:?}");
                     assert!(!found.first.is_empty() && !found.second.is_empty());
@@ -156,13 +156,13 @@ fn a_grown_gripper_is_nearer_and_nothing_else_is() {
     let site = site();
     let model = || ClearanceModel::new(&site.robot, &site.vehicle, &site.scene);
     let (at_rest, open) = (model(), model().with_grown_gripper(GROWTH_M));
-    let bounds = JointErrorBounds::prior(&site.robot);
+    let bounds = JointErrorBounds::datasheet(&site.robot);
     let mut rng = stream_rng(5, "grown gripper");
     let (mut of_gripper, mut of_others) = (0, 0);
     for _ in 0..8000 {
         let angles = random_angles(&site.robot, &bounds, &mut rng);
         let (before, after) = (at_rest.nearest(&angles), open.nearest(&angles));
-        let is_gripper = |nearest: &crate::plan::Nearest| {
+        let is_gripper = |nearest: &crate::plan::ClosestPair| {
             [&nearest.first, &nearest.second].contains(&&"manipulator_link".to_owned())
         };
         if is_gripper(&before) {

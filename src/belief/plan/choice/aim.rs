@@ -14,7 +14,7 @@ use armcal_core::streams::{JointAngles, MAX_JOINTS};
 
 /// Where the camera shall be and what it shall look at, base frame.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Aim {
+pub(super) struct CameraGoal {
     pub eye_m: Vector3<f64>,
     /// Unit.
     pub axis: Vector3<f64>,
@@ -28,7 +28,7 @@ const RANGES_M: [f64; 2] = [0.35, 1.5];
 /// How far the optical axis may point beside the tag, rad.
 const BESIDE_RAD: f64 = 0.6;
 
-impl Aim {
+impl CameraGoal {
     /// From a good range and incidence at a tag that is drawn evenly.
     pub(super) fn draw(robot: &Robot, visibility: &VisibilityModel, rng: &mut ChaCha8Rng) -> Option<Self> {
         if robot.tags.is_empty() {
@@ -122,7 +122,7 @@ mod tests {
             let goal =
                 JointAngles::from_fn(robot.n_joints(), |j| rng.random_range(limits[j].lower_rad..limits[j].upper_rad));
             let frame = robot.chain.frame(&goal, &robot.camera.mount);
-            let aim = Aim { eye_m: frame.translation.vector, axis: frame.rotation * Vector3::z() };
+            let aim = CameraGoal { eye_m: frame.translation.vector, axis: frame.rotation * Vector3::z() };
             let seed = JointAngles::from_fn(robot.n_joints(), |j| {
                 (goal[j] + rng.random_range(-0.5..0.5)).clamp(limits[j].lower_rad, limits[j].upper_rad)
             });

@@ -8,7 +8,7 @@ use nalgebra::Vector3;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-use super::aim::Aim;
+use super::aim::CameraGoal;
 use super::{PlanError, PoseRequest};
 use armcal_core::kinematics::JointLimits;
 use armcal_core::robot::Robot;
@@ -28,7 +28,7 @@ pub(super) struct Candidate {
 
 /// What became of the draws that were refused.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Refused {
+pub(super) struct InfeasibleCounts {
     pub tried: usize,
     /// How many draws have 0, 1, .. tags in view; the last counts all beyond.
     by_tags: [usize; MOST_TAGS + 1],
@@ -59,19 +59,19 @@ const R8: f64 = 1.085_070_245_491_45;
 /// Where a draw comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Source {
-    Even,
-    Near,
-    Aimed,
+    Uniform,
+    Local,
+    CameraIk,
 }
 
 impl Source {
-    const ALL: [Self; 3] = [Self::Even, Self::Near, Self::Aimed];
+    const ALL: [Self; 3] = [Self::Uniform, Self::Local, Self::CameraIk];
 
     /// What a draw that comes to nothing counts, in candidates: sources have equal shares as long as they give any.
     fn draw_cost(self) -> f64 {
         match self {
-            Self::Even | Self::Near => 0.02,
-            Self::Aimed => 0.1,
+            Self::Uniform | Self::Local => 0.02,
+            Self::CameraIk => 0.1,
         }
     }
 }
@@ -82,7 +82,7 @@ pub(super) struct Search<'a> {
     limits: Vec<JointLimits>,
     /// Joint errors in units of the bounds, -1..1.
     arms: [[f64; MAX_JOINTS]; N_ARMS],
-    pub refused: Refused,
+    pub refused: InfeasibleCounts,
 }
 
 /// Joints from this one on do not move the camera; they stay where they are, but for those that turn a tag on the gripper.
@@ -98,7 +98,7 @@ fn shows_gripper_tag(robot: &Robot, joint: usize) -> bool {
 impl<'a> Search<'a> {
     pub(super) fn new(request: &'a PoseRequest<'a>) -> Self {
         let limits = request.bounds.safe_limits(request.robot);
-        Self { request, limits, arms: arms(), refused: Refused::default() }
+        Self { request, limits, arms: arms(), refused: InfeasibleCounts::default() }
     }
 
     /// Up to `enough` candidates.
@@ -107,13 +107,13 @@ impl<'a> Search<'a> {
         let mut spent = [0.0_f64; Source::ALL.len()];
         while found.len() < enough && self.refused.tried < MAX_DRAWS && self.refused.blocked < MAX_BLOCKED {
             let source = Source::ALL.into_iter().min_by(|a, b| spent[*a as usize].total_cmp(&spent[*b as usize]));
-            let source = source.unwrap_or(Source::Even);
+            let source = source.unwrap_or(Source::Uniform);
             let angles = self.draw(source, &found, rng);
             self.refused.tried += 1;
             spent[source as usize] += source.draw_cost();
             if let Some(candidate) = self.assess(angles) {
                 spent[source as usize] += 1.0;
-                found.push(Candidate { is_even: source == Source::Even, ..candidate });
+                found.push(Candidate { is_even: source == Source::Uniform, ..candidate });
             }
         }
         found
@@ -121,19 +121,19 @@ impl<'a> Search<'a> {
 
     fn draw(&self, source: Source, found: &[Candidate], rng: &mut ChaCha8Rng) -> JointAngles {
         match source {
-            Source::Even => self.draw_in(None, rng),
-            Source::Near => {
+            Source::Uniform => self.draw_in(None, rng),
+            Source::Local => {
                 let [least, most] = BOX_SHARES;
                 let share = least * (most / least).powf(rng.random_range(0.0..1.0));
                 self.draw_in(Some(share), rng)
             }
-            Source::Aimed => {
+            Source::CameraIk => {
                 let even = self.draw_in(None, rng);
                 // From a pose that is known to be good, or from anywhere.
                 let seed = if found.is_empty() { even } else { found[rng.random_range(0..found.len())].angles };
                 let n = n_seen(self.request.robot);
                 let seed = JointAngles::from_fn(seed.len(), |j| if j < n { seed[j] } else { even[j] });
-                let aim = Aim::draw(self.request.robot, self.request.visibility, rng);
+                let aim = CameraGoal::draw(self.request.robot, self.request.visibility, rng);
                 aim.map_or(even, |aim| aim.solve(self.request.robot, &self.limits, &seed))
             }
         }
@@ -197,7 +197,7 @@ impl<'a> Search<'a> {
             self.refused.unsure += 1;
             return None;
         }
-        if let Some(nearest) = request.clearance.too_near_arriving(&angles, request.bounds, margin_m) {
+        if let Some(nearest) = request.clearance.find_violation_arriving(&angles, request.bounds, margin_m) {
             self.refused.blocked += 1;
             let tag = request.visibility.in_view(robot, &poses).next().map(|idx| robot.tags[idx].id);
             if let Some(tag) = tag.filter(|_| self.refused.nearest.is_none_or(|(_, most)| nearest.distance_m > most)) {
@@ -222,7 +222,7 @@ impl<'a> Search<'a> {
     }
 
     fn trust(&self, tag: usize) -> f64 {
-        self.request.tag_trust.get(tag).copied().unwrap_or(1.0).clamp(0.0, 1.0)
+        self.request.detection_rate.get(tag).copied().unwrap_or(1.0).clamp(0.0, 1.0)
     }
 
     /// Expected number of tags in view, were there nothing to hide them.
@@ -264,7 +264,7 @@ fn arms() -> [[f64; MAX_JOINTS]; N_ARMS] {
     })
 }
 
-impl Refused {
+impl InfeasibleCounts {
     /// Why there is none, with the nearest thing that would work.
     pub(super) fn no_pose(&self, request: &PoseRequest<'_>) -> PlanError {
         PlanError::NoUsefulPose {

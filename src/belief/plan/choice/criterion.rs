@@ -7,8 +7,8 @@
 
 use nalgebra::{Cholesky, DMatrix, Matrix6, SMatrix, SymmetricEigen};
 
-use super::look::Telling;
-use super::unknowns::{N_COMMON, N_DIRECTIONS, Unknowns, WIDTH, columns};
+use super::look::WhitenedView;
+use super::unknowns::{N_COMMON, N_DIRECTIONS, ParameterPrior, WIDTH, columns};
 use crate::calib::ParameterKind;
 use armcal_core::routine::PoseCriterion;
 use armcal_core::streams::MAX_JOINTS;
@@ -19,7 +19,7 @@ type Linear = SMatrix<f64, MAX_LINEAR, MAX_LINEAR>;
 
 /// What is to become small.
 #[derive(Clone, Debug)]
-pub(super) struct Measure {
+pub(super) struct DesignObjective {
     criterion: PoseCriterion,
     /// L: of the tool's position at the targets over the root of their number, or of gains and offsets in units of their priors.
     rows: DMatrix<f64>,
@@ -29,8 +29,8 @@ pub(super) struct Measure {
 
 /// The covariance after the views taken so far.
 #[derive(Clone, Debug)]
-pub(super) struct Standing {
-    measure: Measure,
+pub(super) struct DesignState {
+    measure: DesignObjective,
     n_joints: usize,
     covariance: DMatrix<f64>,
     /// `L P`; for the volume `C^-1 L P`, where `C C^T = L P L^T`.
@@ -52,13 +52,13 @@ pub(super) struct Scratch {
     told: DMatrix<f64>,
 }
 
-impl Measure {
+impl DesignObjective {
     pub(super) fn of_tool(rows: DMatrix<f64>, floor: f64) -> Self {
         Self { criterion: PoseCriterion::ToolError, rows, floor }
     }
 
     /// Of the sensors' gains and offsets, in units of their priors.
-    pub(super) fn of_sensors(criterion: PoseCriterion, unknowns: &Unknowns) -> Self {
+    pub(super) fn of_sensors(criterion: PoseCriterion, unknowns: &ParameterPrior) -> Self {
         let is_linear = |kind: ParameterKind| matches!(kind, ParameterKind::Gain | ParameterKind::Offset);
         let linear: Vec<usize> = columns(unknowns.n_joints)
             .enumerate()
@@ -73,8 +73,8 @@ impl Measure {
     }
 }
 
-impl Standing {
-    pub(super) fn new(measure: Measure, unknowns: &Unknowns) -> Self {
+impl DesignState {
+    pub(super) fn new(measure: DesignObjective, unknowns: &ParameterPrior) -> Self {
         let mut standing = Self {
             measure,
             n_joints: unknowns.n_joints,
@@ -97,7 +97,7 @@ impl Standing {
     }
 
     /// Logarithm of the measure now less that after `view`: not negative.
-    pub(super) fn gain(&self, view: &Telling, scratch: &mut Scratch) -> f64 {
+    pub(super) fn gain(&self, view: &WhitenedView, scratch: &mut Scratch) -> f64 {
         let Some(half) = self.whitened(view, &mut scratch.by_joint) else { return 0.0 };
         self.reach_along(view, &mut scratch.reached);
         let (n_rows, _) = self.reach.shape();
@@ -141,7 +141,7 @@ impl Standing {
     }
 
     /// Takes `view`: its rank-6 update of the covariance.
-    pub(super) fn take(&mut self, view: &Telling, scratch: &mut Scratch) {
+    pub(super) fn take(&mut self, view: &WhitenedView, scratch: &mut Scratch) {
         let Some(half) = self.whitened(view, &mut scratch.by_joint) else { return };
         let n = self.covariance.nrows();
         let mut moved = DMatrix::zeros(n, 6);
@@ -188,7 +188,7 @@ impl Standing {
     }
 
     /// `S^(-1/2) twists`, with `P E^T` of the joints in `by_joint`; `None` where S overflows.
-    fn whitened(&self, view: &Telling, by_joint: &mut DMatrix<f64>) -> Option<super::look::Twists> {
+    fn whitened(&self, view: &WhitenedView, by_joint: &mut DMatrix<f64>) -> Option<super::look::Twists> {
         let n = self.covariance.nrows();
         let at = self.n_joints * WIDTH;
         let mut along = SMatrix::<f64, N_DIRECTIONS, N_DIRECTIONS>::zeros();
@@ -216,7 +216,7 @@ impl Standing {
     }
 
     /// `L P E^T`, a column for each direction.
-    fn reach_along(&self, view: &Telling, reached: &mut DMatrix<f64>) {
+    fn reach_along(&self, view: &WhitenedView, reached: &mut DMatrix<f64>) {
         let n_rows = self.reach.nrows();
         let at = self.n_joints * WIDTH;
         let reach = self.reach.as_slice();

@@ -9,13 +9,13 @@ use rand_distr::{Distribution, StandardNormal};
 
 use super::unknowns::columns;
 use super::{PosePlan, PosePool, PoseRequest};
-use crate::calib::bundle::Scales;
-use crate::calib::{JointParameters, Measured, SeenCorners, TagView, View};
+use crate::calib::bundle::Hyperparameters;
+use crate::calib::{JointParameters, MeanCorners, TagMeasurement, TagObservation, View};
 use crate::plan::{ClearanceModel, JointErrorBounds, PlanError, VisibilityModel};
 use armcal_core::optics::square_corners;
 use armcal_core::robot::{Robot, Vehicle, load, load_vehicle};
 use armcal_core::routine::{CaptureSettings, PoseCriterion, Scene};
-use armcal_core::sensor::Departure;
+use armcal_core::sensor::ConditionChange;
 use armcal_core::spatial::exp;
 use armcal_core::stats::stream_rng;
 use armcal_core::streams::JointAngles;
@@ -45,12 +45,12 @@ pub(super) struct Site {
     pub bounds: JointErrorBounds,
     pub task: Vec<JointAngles>,
     pub failed: Vec<JointAngles>,
-    pub tag_trust: Vec<f64>,
+    pub detection_rate: Vec<f64>,
 }
 
 impl Site {
     pub(super) fn of(robot: Robot) -> Self {
-        let bounds = JointErrorBounds::prior(&robot);
+        let bounds = JointErrorBounds::datasheet(&robot);
         let capture: CaptureSettings =
             toml::from_str("poses = 30\nheld_out = 0\nmin_tags = 3\nclearance_m = 0.05").expect("settings");
         let mut rng = stream_rng(7, "task");
@@ -62,7 +62,7 @@ impl Site {
             })
             .collect();
         let tag_trust = vec![1.0; robot.tags.len()];
-        Self { robot, vehicle: vehicle(), capture, bounds, task, failed: Vec::new(), tag_trust }
+        Self { robot, vehicle: vehicle(), capture, bounds, task, failed: Vec::new(), detection_rate: tag_trust }
     }
 
     pub(super) fn titan() -> Self {
@@ -86,7 +86,7 @@ impl Site {
             belief: None,
             taken: &[],
             prior: None,
-            tag_trust: &self.tag_trust,
+            detection_rate: &self.detection_rate,
             failed: &self.failed,
             task: &self.task,
             targets_m: &[],
@@ -96,7 +96,7 @@ impl Site {
 
     /// The plan of a seed by a criterion, of `enough` candidates.
     pub(super) fn plan(&mut self, seed: u64, choose: PoseCriterion, enough: usize) -> Result<PosePlan, PlanError> {
-        self.capture.choose = choose;
+        self.capture.criterion = choose;
         let clearance = self.clearance();
         let request = self.request(&clearance);
         let mut rng = stream_rng(seed, "plan");
@@ -123,7 +123,7 @@ fn moved(pose: &Isometry3<f64>, std_m: f64, std_rad: f64, rng: &mut ChaCha8Rng) 
 }
 
 impl Truth {
-    pub(super) fn draw(robot: &Robot, scales: &Scales, rng: &mut ChaCha8Rng) -> Self {
+    pub(super) fn draw(robot: &Robot, scales: &Hyperparameters, rng: &mut ChaCha8Rng) -> Self {
         let mut parameters = JointParameters::default();
         for p in columns(robot.camera.mount.n_joints) {
             let std = scales.prior_std(&robot.sensors[p.joint], p.joint, p.kind);
@@ -142,7 +142,7 @@ impl Truth {
         JointAngles::from_fn(robot.n_joints(), |j| {
             let spec = &robot.sensors[j];
             let travel_rad = believed[j] - spec.center_rad;
-            self.parameters.correction(j).angle_rad(spec, travel_rad, &Departure::default(), 0.0)
+            self.parameters.correction(j).angle_rad(spec, travel_rad, &ConditionChange::default(), 0.0)
         })
     }
 
@@ -152,7 +152,7 @@ impl Truth {
         robot: &Robot,
         clearance: &ClearanceModel<'_>,
         plan: &PosePlan,
-        scales: &Scales,
+        scales: &Hyperparameters,
         rng: &mut ChaCha8Rng,
     ) -> Vec<View> {
         let of = |(idx, pose): (usize, &super::PlannedPose)| {
@@ -169,7 +169,12 @@ impl Truth {
                 let id = robot.tags[tag_idx].id;
                 let Some(seen) = corners(robot, &camera_from_tag, robot.tags[tag_idx].size_m, rng) else { continue };
                 let center_in_camera_m = camera_from_tag.translation.vector;
-                view.tags.push(TagView { id, tag_idx, center_in_camera_m, measured: Measured::Corners(seen) });
+                view.tags.push(TagObservation {
+                    id,
+                    tag_idx,
+                    center_in_camera_m,
+                    measured: TagMeasurement::Corners(seen),
+                });
             }
             view
         };
@@ -186,7 +191,7 @@ impl Truth {
     }
 }
 
-fn corners(robot: &Robot, camera_from_tag: &Isometry3<f64>, size_m: f64, rng: &mut ChaCha8Rng) -> Option<SeenCorners> {
+fn corners(robot: &Robot, camera_from_tag: &Isometry3<f64>, size_m: f64, rng: &mut ChaCha8Rng) -> Option<MeanCorners> {
     let std_px = robot.camera.corner_std_px;
     let mut corners_px = [[0.0; 2]; 4];
     for (pixel, corner) in corners_px.iter_mut().zip(square_corners(size_m)) {
@@ -195,5 +200,5 @@ fn corners(robot: &Robot, camera_from_tag: &Isometry3<f64>, size_m: f64, rng: &m
         *pixel = [noisy(seen.x), noisy(seen.y)];
     }
     let scatter_px2 = (0..8 * (N_FRAMES - 1)).map(|_| (std_px * normal(rng)).powi(2)).sum();
-    Some(SeenCorners { corners_px, n_frames: N_FRAMES, scatter_px2 })
+    Some(MeanCorners { corners_px, n_frames: N_FRAMES, scatter_px2 })
 }

@@ -7,8 +7,8 @@
 use nalgebra::{Cholesky, DMatrix, Matrix6, Vector3};
 
 use super::PoseRequest;
-use super::look::Look;
-use super::unknowns::{Unknowns, WIDTH, basis};
+use super::look::ViewJacobian;
+use super::unknowns::{ParameterPrior, WIDTH, basis};
 use armcal_core::robot::Robot;
 use armcal_core::stats::quantile;
 use armcal_core::streams::{JointAngles, MAX_JOINTS};
@@ -41,7 +41,7 @@ const EDGES: [f64; 2] = [0.01, 0.99];
 const MIN_STD: f64 = 1e-6;
 
 impl Task {
-    pub(super) fn new(request: &PoseRequest<'_>, unknowns: &Unknowns) -> Self {
+    pub(super) fn new(request: &PoseRequest<'_>, unknowns: &ParameterPrior) -> Self {
         let robot = request.robot;
         // Without a task any posture may be one: the present stands for it.
         let here = [*request.start];
@@ -100,7 +100,7 @@ fn unseen_rad2(request: &PoseRequest<'_>, joint: usize, angle_rad: f64) -> f64 {
 }
 
 impl Forecast {
-    pub(super) fn new(robot: &Robot, unknowns: &Unknowns, task: Task) -> Option<Self> {
+    pub(super) fn new(robot: &Robot, unknowns: &ParameterPrior, task: Task) -> Option<Self> {
         // Without the survey's common error: here each tag has its own.
         let n = unknowns.n() - 6;
         let kept: Vec<usize> = (0..n).filter(|&k| unknowns.covariance[(k, k)] > 0.0).collect();
@@ -120,7 +120,7 @@ impl Forecast {
         Some(Self { information, kept, n_joints: unknowns.n_joints, joint_info, task })
     }
 
-    pub(super) fn add(&mut self, view: &Look) {
+    pub(super) fn add(&mut self, view: &ViewJacobian) {
         let n_common = self.kept.len();
         let n_rows = 6 * view.sights.len();
         let n = self.information.nrows();
@@ -150,7 +150,7 @@ impl Forecast {
     }
 
     /// Twists of the camera by each of the kept parameters.
-    fn by_parameter(&self, view: &Look) -> SMatrixX {
+    fn by_parameter(&self, view: &ViewJacobian) -> SMatrixX {
         let at = self.n_joints * WIDTH;
         let mut out = SMatrixX::zeros(self.kept.len());
         for (to, &column) in self.kept.iter().enumerate() {

@@ -7,8 +7,8 @@
 
 use nalgebra::{Cholesky, Isometry3, Matrix6, SMatrix, Vector3};
 
-use super::unknowns::{Basis, N_DIRECTIONS, Unknowns, WIDTH, basis};
-use armcal_core::optics::{CornerNoise, pixel_by_twist, square_corners};
+use super::unknowns::{Basis, N_DIRECTIONS, ParameterPrior, WIDTH, basis};
+use armcal_core::optics::{CornerNoise, image_jacobian, square_corners};
 use armcal_core::robot::Robot;
 use armcal_core::spatial::adjoint;
 use armcal_core::streams::{JointAngles, MAX_JOINTS};
@@ -18,7 +18,7 @@ pub(super) type Twists = SMatrix<f64, 6, N_DIRECTIONS>;
 
 /// One tag of a view.
 #[derive(Clone, Debug)]
-pub(super) struct Sight {
+pub(super) struct TagInformation {
     pub tag: usize,
     /// On the camera's pose, right.
     pub info: Matrix6<f64>,
@@ -28,22 +28,22 @@ pub(super) struct Sight {
 
 /// A view linearized.
 #[derive(Clone, Debug)]
-pub(super) struct Look {
+pub(super) struct ViewJacobian {
     pub basis: Basis,
     pub twists: Twists,
-    pub sights: Vec<Sight>,
+    pub sights: Vec<TagInformation>,
 }
 
 /// What a view tells, its noise made one: `z = twists (basis p, common) + unit noise`.
 #[derive(Clone, Debug)]
-pub(super) struct Telling {
+pub(super) struct WhitenedView {
     pub basis: Basis,
     pub twists: Twists,
 }
 
 /// What looks at the tags.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Optics {
+pub(super) struct CornerModel {
     /// Images that a view's corners are the mean of.
     pub n_frames: f64,
     /// Corner noise over the datasheet's.
@@ -58,7 +58,7 @@ const REFERENCE_RANGE_M: f64 = 1.0;
 /// have tied the tags together. Assumed; the forecast has each tag by itself.
 const OWN_SURVEY_SHARE: f64 = 0.35;
 
-impl Optics {
+impl CornerModel {
     pub(super) fn new(dwell_s: f64, noise: f64) -> Self {
         Self { n_frames: (FRAMES_PER_S * dwell_s).floor().max(1.0), noise }
     }
@@ -77,7 +77,7 @@ impl Optics {
         for ((pixel_px, row), point) in corners_px.iter_mut().zip(&mut rows).zip(&points) {
             let (pixel, by_point) = lens.project_with_jacobian(point)?;
             *pixel_px = [pixel.x, pixel.y];
-            let [x, y] = pixel_by_twist(&by_point, point);
+            let [x, y] = image_jacobian(&by_point, point);
             *row = SMatrix::from_rows(&[x.into(), y.into()]);
         }
         let weights = self.weights(robot, &corners_px, camera_from_tag.translation.vector.norm(), size_m);
@@ -116,16 +116,16 @@ fn reference_px2(focal_px: f64, size_m: f64) -> f64 {
     0.5 * CornerNoise::COASTAL.covariances_px2(&square, REFERENCE_RANGE_M, 0.0)[0].trace()
 }
 
-impl Telling {
+impl WhitenedView {
     /// Nothing.
     pub(super) fn nothing() -> Self {
         Self { basis: [[0.0; WIDTH]; MAX_JOINTS], twists: Twists::zeros() }
     }
 }
 
-impl Look {
+impl ViewJacobian {
     /// `tags`: (index, probability that it is seen).
-    pub(super) fn new(robot: &Robot, optics: Optics, angles: &JointAngles, tags: &[(usize, f64)]) -> Self {
+    pub(super) fn new(robot: &Robot, optics: CornerModel, angles: &JointAngles, tags: &[(usize, f64)]) -> Self {
         let poses = robot.chain.link_poses(angles);
         let base_from_camera = poses.frame(&robot.camera.mount);
         let camera_from_base = base_from_camera.inverse();
@@ -146,13 +146,13 @@ impl Look {
             let surveyed = &robot.tags[tag];
             let camera_from_tag = camera_from_base * surveyed.base_from_tag.isometry();
             let info = optics.information(robot, &camera_from_tag, surveyed.size_m)? * probability;
-            Some(Sight { tag, info, adjoint: adjoint(&camera_from_tag) })
+            Some(TagInformation { tag, info, adjoint: adjoint(&camera_from_tag) })
         };
         Self { basis: by_joint, twists, sights: tags.iter().filter_map(sight).collect() }
     }
 
     /// With the noise made one; `None` where the tags tell nothing of the camera's pose.
-    pub(super) fn telling(&self, robot: &Robot, unknowns: &Unknowns) -> Option<Telling> {
+    pub(super) fn telling(&self, robot: &Robot, unknowns: &ParameterPrior) -> Option<WhitenedView> {
         let mut info = Matrix6::zeros();
         for sight in &self.sights {
             info += with_own_survey_error(robot, sight)?;
@@ -164,12 +164,12 @@ impl Look {
         }
         let lower = Cholesky::new(noise)?.unpack();
         let twists = lower.solve_lower_triangular(&self.twists)?;
-        Some(Telling { basis: self.basis, twists })
+        Some(WhitenedView { basis: self.basis, twists })
     }
 }
 
 /// The information left when the tag's own survey error is noise: `(H^-1 + A P A^T)^-1`.
-fn with_own_survey_error(robot: &Robot, sight: &Sight) -> Option<Matrix6<f64>> {
+fn with_own_survey_error(robot: &Robot, sight: &TagInformation) -> Option<Matrix6<f64>> {
     let tag = &robot.tags[sight.tag];
     if !tag.is_known() {
         // Mapped by the views themselves.

@@ -33,7 +33,7 @@ use armcal_core::routine::CaptureSettings;
 use armcal_core::streams::{CaptureSet, JointAngles};
 
 pub use pool::PosePool;
-pub use stop::{CaptureState, Stop};
+pub use stop::{CaptureState, StopReason};
 
 /// Poses in the order of their visit.
 #[derive(Clone, Debug)]
@@ -66,7 +66,7 @@ pub struct PlannedPose {
 
 /// A view that the belief rests on already.
 #[derive(Clone, Debug, PartialEq)]
-pub struct TakenView {
+pub struct CapturedView {
     /// Believed.
     pub angles: JointAngles,
     /// Tags of the survey (index) that were seen.
@@ -88,11 +88,11 @@ pub struct PoseRequest<'a> {
     /// Fitted views that the running estimate rests on. The survey's error in them is the one in those to come, so they are
     /// counted anew from what came before them; the running estimate then gives sizes of noise only. Empty: its covariance is
     /// taken as it is.
-    pub taken: &'a [TakenView],
+    pub taken: &'a [CapturedView],
     /// What the estimate started from before the first of `taken`; `None`: the datasheets.
     pub prior: Option<&'a Calibration>,
     /// Of each tag of the robot, by what share fewer of its predicted sightings came true than should have: 1 is as predicted.
-    pub tag_trust: &'a [f64],
+    pub detection_rate: &'a [f64],
     /// Poses that were tried in vain: nothing near them is chosen again.
     pub failed: &'a [JointAngles],
     /// Joint angles of the arm at the task's targets.

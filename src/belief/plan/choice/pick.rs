@@ -6,10 +6,10 @@
 //! puts one candidate in place of one pick as long as `ln measure + TIME_POWER ln time` falls.
 
 use super::candidates::Candidate;
-use super::criterion::{Measure, Scratch, Standing};
-use super::look::Telling;
+use super::criterion::{DesignObjective, DesignState, Scratch};
+use super::look::WhitenedView;
 use super::tour::Tour;
-use super::unknowns::Unknowns;
+use super::unknowns::ParameterPrior;
 use armcal_core::streams::JointAngles;
 
 /// What the arm's time counts beside the measure.
@@ -23,17 +23,17 @@ const SHORTLIST: usize = 120;
 const ROUNDING: f64 = 1e-12;
 
 /// What is picked from, and for what.
-pub(super) struct Picker<'a> {
+pub(super) struct ViewSelector<'a> {
     pub candidates: &'a [Candidate],
     /// What each of them tells.
-    pub tellings: Vec<Telling>,
+    pub whitened_views: Vec<WhitenedView>,
     pub tour: Tour<'a>,
     /// Time of a view at rest, s.
     pub view_s: f64,
     /// The first of so many in a row shows a known tag, as long as there are such candidates.
     pub anchored_every: usize,
     /// Before the picks; the views taken already are in it.
-    pub standing: Standing,
+    pub standing: DesignState,
 }
 
 /// What a candidate's gain is worth.
@@ -62,19 +62,19 @@ impl Picks {
     }
 }
 
-impl<'a> Picker<'a> {
+impl<'a> ViewSelector<'a> {
     pub(super) fn new(
-        (candidates, tellings): (&'a [Candidate], Vec<Telling>),
+        (candidates, tellings): (&'a [Candidate], Vec<WhitenedView>),
         tour: Tour<'a>,
         view_s: f64,
         anchored_every: usize,
-        (measure, unknowns): (Measure, &Unknowns),
-        taken: &[Telling],
+        (measure, unknowns): (DesignObjective, &ParameterPrior),
+        taken: &[WhitenedView],
     ) -> Self {
-        let mut standing = Standing::new(measure, unknowns);
+        let mut standing = DesignState::new(measure, unknowns);
         let mut scratch = standing.scratch();
         taken.iter().for_each(|view| standing.take(view, &mut scratch));
-        Self { candidates, tellings, tour, view_s, anchored_every, standing }
+        Self { candidates, whitened_views: tellings, tour, view_s, anchored_every, standing }
     }
 
     /// `n` of them, or all; indices.
@@ -104,7 +104,7 @@ impl<'a> Picker<'a> {
                 if must_anchor { continue } else { break }
             };
             let candidate = &self.candidates[best];
-            standing.take(&self.tellings[best], &mut scratch);
+            standing.take(&self.whitened_views[best], &mut scratch);
             picks.insert(places[best].0, best, candidate.angles);
             // Taken.
             gains[best] = -1.0;
@@ -115,7 +115,7 @@ impl<'a> Picker<'a> {
     /// The candidate of the highest score; stale gains are renewed from the highest bound on.
     fn best(
         &self,
-        standing: &Standing,
+        standing: &DesignState,
         scratch: &mut Scratch,
         gains: &mut [f64],
         is_fresh: &mut [bool],
@@ -134,7 +134,7 @@ impl<'a> Picker<'a> {
                 break;
             }
             if !is_fresh[k] {
-                gains[k] = standing.gain(&self.tellings[k], scratch);
+                gains[k] = standing.gain(&self.whitened_views[k], scratch);
                 is_fresh[k] = true;
             }
             let now = score(k, gains[k]);
@@ -150,15 +150,15 @@ impl<'a> Picker<'a> {
         self.after(order).ln_value
     }
 
-    fn after(&self, order: &[usize]) -> Standing {
+    fn after(&self, order: &[usize]) -> DesignState {
         let mut standing = self.standing.clone();
         let mut scratch = standing.scratch();
-        order.iter().for_each(|&k| standing.take(&self.tellings[k], &mut scratch));
+        order.iter().for_each(|&k| standing.take(&self.whitened_views[k], &mut scratch));
         standing
     }
 
     fn time_s(&self, picks: &Picks) -> f64 {
-        self.tour.way_s(&picks.placed) + picks.order.len() as f64 * self.view_s
+        self.tour.travel_time_s(&picks.placed) + picks.order.len() as f64 * self.view_s
     }
 
     pub(super) fn exchanged(&self, mut picks: Picks) -> Picks {
@@ -182,7 +182,8 @@ impl<'a> Picker<'a> {
         let standing = self.after(&picks.order);
         let mut scratch = standing.scratch();
         let left = (0..self.candidates.len()).filter(|k| !picks.order.contains(k));
-        let mut gains: Vec<(f64, usize)> = left.map(|k| (standing.gain(&self.tellings[k], &mut scratch), k)).collect();
+        let mut gains: Vec<(f64, usize)> =
+            left.map(|k| (standing.gain(&self.whitened_views[k], &mut scratch), k)).collect();
         gains.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
         gains.into_iter().take(SHORTLIST).map(|(_, k)| k).collect()
     }
@@ -196,7 +197,7 @@ impl<'a> Picker<'a> {
         let way_s = self.time_s(&rest) + self.view_s;
         let mut worth = |k: usize| {
             let (at, cost_s) = self.tour.insertion(&rest.placed, &self.candidates[k].angles);
-            let gain = standing.gain(&self.tellings[k], &mut scratch);
+            let gain = standing.gain(&self.whitened_views[k], &mut scratch);
             (gain - TIME_POWER * (way_s + cost_s).max(1e-9).ln(), at)
         };
         let (now, _) = worth(out);
@@ -228,7 +229,7 @@ impl<'a> Picker<'a> {
         for _ in 0..n {
             let worth = |k: usize, scratch: &mut Scratch| {
                 let (at, cost_s) = self.tour.insertion(&picks.placed, &self.candidates[k].angles);
-                let gain = standing.gain(&self.tellings[k], scratch);
+                let gain = standing.gain(&self.whitened_views[k], scratch);
                 (gain / (self.view_s + cost_s).powf(TIME_POWER), at)
             };
             let left = (0..self.candidates.len()).filter(|k| !picks.order.contains(k));
@@ -239,7 +240,7 @@ impl<'a> Picker<'a> {
                 })
                 .collect();
             let Some(&(_, k, at)) = all.iter().max_by(|a, b| a.0.total_cmp(&b.0)) else { break };
-            standing.take(&self.tellings[k], &mut scratch);
+            standing.take(&self.whitened_views[k], &mut scratch);
             picks.insert(at, k, self.candidates[k].angles);
         }
         picks.order
@@ -252,14 +253,14 @@ impl<'a> Picker<'a> {
     }
 
     /// The first `n` of `chosen` to visit: each time that of the highest gain for its time from where the arm then is.
-    pub(super) fn tell_first(&self, chosen: &[usize], n: usize) -> Vec<usize> {
+    pub(super) fn most_informative_first(&self, chosen: &[usize], n: usize) -> Vec<usize> {
         let mut standing = self.standing.clone();
         let mut scratch = standing.scratch();
         let (mut first, mut at): (Vec<usize>, JointAngles) = (Vec::new(), self.tour.start);
         for _ in 0..n.min(chosen.len()) {
             let worth = |k: usize, scratch: &mut Scratch| {
                 let way_s = self.tour.timing.least_duration_s(&at, &self.candidates[k].angles);
-                standing.gain(&self.tellings[k], scratch) / (self.view_s + way_s)
+                standing.gain(&self.whitened_views[k], scratch) / (self.view_s + way_s)
             };
             let mut best: Option<(f64, usize)> = None;
             for &k in chosen.iter().filter(|k| !first.contains(*k)) {
@@ -269,7 +270,7 @@ impl<'a> Picker<'a> {
                 }
             }
             let Some((_, k)) = best else { break };
-            standing.take(&self.tellings[k], &mut scratch);
+            standing.take(&self.whitened_views[k], &mut scratch);
             at = self.candidates[k].angles;
             first.push(k);
         }

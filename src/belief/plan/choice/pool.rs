@@ -4,13 +4,13 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 use super::super::timing::{SETTLE_S, Timing};
-use super::candidates::{Candidate, Refused, Search};
-use super::criterion::Measure;
+use super::candidates::{Candidate, InfeasibleCounts, Search};
+use super::criterion::DesignObjective;
 use super::forecast::{Forecast, Task};
-use super::look::{Look, Optics, Telling};
-use super::pick::Picker;
+use super::look::{CornerModel, ViewJacobian, WhitenedView};
+use super::pick::ViewSelector;
 use super::tour::Tour;
-use super::unknowns::Unknowns;
+use super::unknowns::ParameterPrior;
 use super::{PlanError, PlannedPose, PosePlan, PoseRequest};
 use armcal_core::routine::PoseCriterion;
 use armcal_core::streams::{CaptureSet, JointAngles};
@@ -19,28 +19,28 @@ use armcal_core::streams::{CaptureSet, JointAngles};
 #[derive(Clone, Debug)]
 pub struct PosePool {
     candidates: Vec<Candidate>,
-    refused: Refused,
+    refused: InfeasibleCounts,
 }
 
 /// What the worth of poses rests on.
-pub(super) struct Setup {
-    unknowns: Unknowns,
-    optics: Optics,
+pub(super) struct DesignInputs {
+    unknowns: ParameterPrior,
+    optics: CornerModel,
     timing: Timing,
 }
 
-impl Setup {
+impl DesignInputs {
     pub(super) fn new(request: &PoseRequest<'_>) -> Self {
-        let unknowns = Unknowns::of(request);
-        let optics = Optics::new(request.capture.dwell_s, unknowns.noise);
+        let unknowns = ParameterPrior::of(request);
+        let optics = CornerModel::new(request.capture.dwell_s, unknowns.noise);
         Self { unknowns, optics, timing: Timing::new(request.robot) }
     }
 
     /// The views that are taken already, linearized.
-    fn taken(&self, request: &PoseRequest<'_>) -> Vec<Look> {
-        let look = |view: &super::TakenView| {
+    fn taken(&self, request: &PoseRequest<'_>) -> Vec<ViewJacobian> {
+        let look = |view: &super::CapturedView| {
             let tags: Vec<(usize, f64)> = view.tags.iter().map(|&tag| (tag, 1.0)).collect();
-            Look::new(request.robot, self.optics, &view.angles, &tags)
+            ViewJacobian::new(request.robot, self.optics, &view.angles, &tags)
         };
         request.taken.iter().map(look).collect()
     }
@@ -90,9 +90,9 @@ impl PosePool {
             let (min_tags, hint) = (request.capture.min_tags, self.refused.hint(request));
             return Err(PlanError::TooFewPoses { found, wanted, min_tags, hint });
         }
-        let setup = Setup::new(request);
+        let setup = DesignInputs::new(request);
         let tour = Tour { timing: &setup.timing, start: *request.start };
-        if request.capture.choose == PoseCriterion::Random {
+        if request.capture.criterion == PoseCriterion::Random {
             let chosen = self.drawn_evenly(request.n_fit, rng);
             let order = self.ordered(&tour, &chosen, &self.drawn(request.n_held_out, &chosen, rng), Vec::new());
             return Ok(self.plan(request, &setup, order));
@@ -100,7 +100,7 @@ impl PosePool {
         let picker = self.picker(request, &setup);
         let chosen = picker.pick(request.n_fit);
         // Where the choice is renewed soon, the most telling for their time come first; the rest is a short tour.
-        let first = picker.tell_first(&chosen, request.capture.replan_every as usize);
+        let first = picker.most_informative_first(&chosen, request.capture.replan_every as usize);
         let order = self.ordered(&tour, &chosen, &self.drawn(request.n_held_out, &chosen, rng), first);
         Ok(self.plan(request, &setup, order))
     }
@@ -111,29 +111,31 @@ impl PosePool {
     }
 
     /// What each candidate tells.
-    pub(super) fn tellings(&self, request: &PoseRequest<'_>, setup: &Setup) -> Vec<Telling> {
+    pub(super) fn whitened_views(&self, request: &PoseRequest<'_>, setup: &DesignInputs) -> Vec<WhitenedView> {
         let (robot, unknowns) = (request.robot, &setup.unknowns);
         let telling = |Candidate { angles, tags, .. }: &Candidate| {
-            Look::new(robot, setup.optics, angles, tags).telling(robot, unknowns).unwrap_or_else(Telling::nothing)
+            ViewJacobian::new(robot, setup.optics, angles, tags)
+                .telling(robot, unknowns)
+                .unwrap_or_else(WhitenedView::nothing)
         };
         self.candidates.iter().map(telling).collect()
     }
 
-    pub(super) fn picker<'a>(&'a self, request: &PoseRequest<'_>, setup: &'a Setup) -> Picker<'a> {
+    pub(super) fn picker<'a>(&'a self, request: &PoseRequest<'_>, setup: &'a DesignInputs) -> ViewSelector<'a> {
         let (robot, unknowns) = (request.robot, &setup.unknowns);
         let anchored_every = if robot.tags.iter().all(|tag| tag.is_known()) { 1 } else { ANCHORED_EVERY };
-        let measure = match request.capture.choose {
+        let measure = match request.capture.criterion {
             PoseCriterion::ToolError | PoseCriterion::Random => {
                 let task = Task::new(request, unknowns);
                 let angles: Vec<JointAngles> = self.candidates.iter().map(|candidate| candidate.angles).collect();
-                Measure::of_tool(task.with_edges(robot, unknowns.n_joints, &angles), task.floor_m2)
+                DesignObjective::of_tool(task.with_edges(robot, unknowns.n_joints, &angles), task.floor_m2)
             }
-            criterion => Measure::of_sensors(criterion, unknowns),
+            criterion => DesignObjective::of_sensors(criterion, unknowns),
         };
         let tour = Tour { timing: &setup.timing, start: *request.start };
         let taken: Vec<_> = setup.taken(request).iter().filter_map(|view| view.telling(robot, unknowns)).collect();
-        let candidates = (self.candidates.as_slice(), self.tellings(request, setup));
-        Picker::new(candidates, tour, view_s(request), anchored_every, (measure, unknowns), &taken)
+        let candidates = (self.candidates.as_slice(), self.whitened_views(request, setup));
+        ViewSelector::new(candidates, tour, view_s(request), anchored_every, (measure, unknowns), &taken)
     }
 
     /// `n` of those that were drawn evenly over the joint ranges; of all where these are too few.
@@ -165,7 +167,7 @@ impl PosePool {
         first.into_iter().chain(by_way.into_iter().map(|k| rest[k])).map(|k| (set_of(k), k)).collect()
     }
 
-    fn plan(&self, request: &PoseRequest<'_>, setup: &Setup, order: Vec<(CaptureSet, usize)>) -> PosePlan {
+    fn plan(&self, request: &PoseRequest<'_>, setup: &DesignInputs, order: Vec<(CaptureSet, usize)>) -> PosePlan {
         let robot = request.robot;
         let mut forecast = Forecast::new(robot, &setup.unknowns, Task::new(request, &setup.unknowns));
         if let Some(forecast) = &mut forecast {
@@ -185,7 +187,7 @@ impl PosePool {
             let Candidate { angles, tags, .. } = &self.candidates[k];
             if set == CaptureSet::Fit {
                 if let Some(forecast) = &mut forecast {
-                    forecast.add(&Look::new(robot, setup.optics, angles, tags));
+                    forecast.add(&ViewJacobian::new(robot, setup.optics, angles, tags));
                 }
                 predicted_tool_error_m = error_m(&forecast);
                 n_fitted += 1;
@@ -197,7 +199,7 @@ impl PosePool {
         }
         let angles: Vec<JointAngles> = poses.iter().map(|pose| pose.angles).collect();
         let tour = Tour { timing: &setup.timing, start: *request.start };
-        let arm_time_s = tour.way_s(&angles) + angles.len() as f64 * view_s(request);
+        let arm_time_s = tour.travel_time_s(&angles) + angles.len() as f64 * view_s(request);
         let (candidates, tried) = (self.candidates.len(), self.refused.tried);
         PosePlan { poses, predicted_tool_error_m, tool_error_before_m, needed, arm_time_s, candidates, tried }
     }

@@ -4,7 +4,7 @@ use armcal_core::routine::CaptureSettings;
 
 /// Why no more views are taken.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Stop {
+pub enum StopReason {
     /// The running estimate predicts less than `capture.stop_at_tool_error_m` at the task (root mean square).
     ToolError { predicted_tool_error_m: f64 },
     /// `capture.poses` are taken.
@@ -28,7 +28,7 @@ pub struct CaptureState {
     pub predicted_tool_error_m: Option<f64>,
 }
 
-impl Stop {
+impl StopReason {
     /// What ends a capture at `state`, the good reason first; `None`: go on.
     #[must_use]
     pub fn decide(capture: &CaptureSettings, state: &CaptureState) -> Option<Self> {
@@ -48,7 +48,7 @@ impl Stop {
     }
 }
 
-impl std::fmt::Display for Stop {
+impl std::fmt::Display for StopReason {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::ToolError { predicted_tool_error_m } => {
@@ -73,14 +73,14 @@ mod tests {
     fn the_first_reason_that_holds_is_given() {
         let going = CaptureState { taken: 4, left: 20, elapsed_s: 100.0, predicted_tool_error_m: Some(0.003) };
         let both = settings("stop_at_tool_error_m = 0.002\nmax_time_s = 200.0");
-        assert_eq!(Stop::decide(&both, &going), None);
+        assert_eq!(StopReason::decide(&both, &going), None);
         let good = CaptureState { predicted_tool_error_m: Some(0.0019), taken: 10, left: 0, elapsed_s: 1e3 };
-        assert_eq!(Stop::decide(&both, &good), Some(Stop::ToolError { predicted_tool_error_m: 0.0019 }));
-        assert_eq!(Stop::decide(&settings(""), &good), Some(Stop::Poses));
-        assert_eq!(Stop::decide(&settings(""), &CaptureState { taken: 9, left: 1, ..good }), None);
-        assert_eq!(Stop::decide(&both, &CaptureState { elapsed_s: 200.0, ..going }), Some(Stop::Time));
-        assert_eq!(Stop::decide(&both, &CaptureState { left: 0, ..going }), Some(Stop::NoPoseLeft));
+        assert_eq!(StopReason::decide(&both, &good), Some(StopReason::ToolError { predicted_tool_error_m: 0.0019 }));
+        assert_eq!(StopReason::decide(&settings(""), &good), Some(StopReason::Poses));
+        assert_eq!(StopReason::decide(&settings(""), &CaptureState { taken: 9, left: 1, ..good }), None);
+        assert_eq!(StopReason::decide(&both, &CaptureState { elapsed_s: 200.0, ..going }), Some(StopReason::Time));
+        assert_eq!(StopReason::decide(&both, &CaptureState { left: 0, ..going }), Some(StopReason::NoPoseLeft));
         let unknown = CaptureState { predicted_tool_error_m: None, ..going };
-        assert_eq!(Stop::decide(&both, &unknown), None);
+        assert_eq!(StopReason::decide(&both, &unknown), None);
     }
 }

@@ -4,14 +4,14 @@ use nalgebra::{Cholesky, DMatrix, Vector6};
 use rand_chacha::ChaCha8Rng;
 
 use super::candidates::Candidate;
-use super::criterion::{Measure, Standing};
+use super::criterion::{DesignObjective, DesignState};
 use super::fixture::{Site, Truth, titan};
 use super::forecast::Task;
-use super::look::{Look, Optics};
-use super::pool::{PosePool, Setup};
-use super::unknowns::{N_COMMON, Unknowns, WIDTH, basis, columns};
-use super::{PlannedPose, PosePlan, TakenView};
-use crate::calib::bundle::{BundleInput, Evidence, Scales, estimate, model_for};
+use super::look::{CornerModel, ViewJacobian};
+use super::pool::{DesignInputs, PosePool};
+use super::unknowns::{N_COMMON, ParameterPrior, WIDTH, basis, columns};
+use super::{CapturedView, PlannedPose, PosePlan};
+use crate::calib::bundle::{BundleInput, HyperparameterMode, Hyperparameters, estimate, model_for};
 use crate::calib::{JointParameters, ParameterCovariance, ParameterKind};
 use crate::plan::PlanError;
 use armcal_core::optics::square_corners;
@@ -60,11 +60,11 @@ fn information_is_that_of_corners_moved_by_hand() {
     let robot = titan();
     let site = Site::titan();
     let n = robot.camera.mount.n_joints * WIDTH + N_COMMON;
-    let optics = Optics::new(1.0, 1.0);
+    let optics = CornerModel::new(1.0, 1.0);
     for candidate in pool(&site, 12, 3).candidates() {
         let Candidate { angles, tags, .. } = candidate;
         let tag = tags[0].0;
-        let look = Look::new(&robot, optics, angles, &[(tag, 1.0)]);
+        let look = ViewJacobian::new(&robot, optics, angles, &[(tag, 1.0)]);
         let by_parameter = DMatrix::from_fn(6, n, |row, column| {
             let at = robot.camera.mount.n_joints * WIDTH;
             if column < at {
@@ -108,20 +108,20 @@ fn updates_of_rank_six_are_the_dense_posterior() {
     let clearance = site.clearance();
     let request = site.request(&clearance);
     let pool = pool(&site, 40, 4);
-    let unknowns = Unknowns::of(&request);
+    let unknowns = ParameterPrior::of(&request);
     let n = unknowns.n();
     let Task { rows, floor_m2 } = Task::new(&request, &unknowns);
     let measures = [
-        Measure::of_tool(rows, floor_m2),
-        Measure::of_sensors(PoseCriterion::AOptimal, &unknowns),
-        Measure::of_sensors(PoseCriterion::DOptimal, &unknowns),
-        Measure::of_sensors(PoseCriterion::EOptimal, &unknowns),
+        DesignObjective::of_tool(rows, floor_m2),
+        DesignObjective::of_sensors(PoseCriterion::AOptimal, &unknowns),
+        DesignObjective::of_sensors(PoseCriterion::DOptimal, &unknowns),
+        DesignObjective::of_sensors(PoseCriterion::EOptimal, &unknowns),
     ];
     for measure in measures {
-        let mut standing = Standing::new(measure, &unknowns);
+        let mut standing = DesignState::new(measure, &unknowns);
         let mut scratch = standing.scratch();
         let mut information = Cholesky::new(unknowns.covariance.clone()).expect("regular").inverse();
-        for view in &pool.tellings(&request, &Setup::new(&request))[..10] {
+        for view in &pool.whitened_views(&request, &DesignInputs::new(&request))[..10] {
             let gain = standing.gain(view, &mut scratch);
             let before = standing.ln_value;
             standing.take(view, &mut scratch);
@@ -152,12 +152,12 @@ fn exchange_never_makes_it_worse_and_greedy_beats_any_order() {
     let mut site = Site::titan();
     for choose in [PoseCriterion::ToolError, PoseCriterion::DOptimal, PoseCriterion::AOptimal, PoseCriterion::EOptimal]
     {
-        site.capture.choose = choose;
+        site.capture.criterion = choose;
         let clearance = site.clearance();
         let request = site.request(&clearance);
         for seed in 0..4 {
             let pool = pool(&site, 200, seed);
-            let setup = Setup::new(&request);
+            let setup = DesignInputs::new(&request);
             let picker = pool.picker(&request, &setup);
             let greedy = picker.greedy(10);
             let before = picker.objective(&greedy);
@@ -179,7 +179,7 @@ fn the_lazy_choice_is_worth_what_the_eager_one_is() {
     let request = site.request(&clearance);
     for seed in 0..5 {
         let pool = pool(&site, 150, seed);
-        let setup = Setup::new(&request);
+        let setup = DesignInputs::new(&request);
         let picker = pool.picker(&request, &setup);
         let lazy = picker.ln_value(&picker.greedy(12).order);
         let eager = picker.ln_value(&picker.eager(12));
@@ -249,7 +249,7 @@ fn nothing_near_a_failed_pose_is_chosen_and_distrusted_tags_do_not_count() {
     let second = site.plan(1, PoseCriterion::ToolError, 200).expect("a plan");
     let near = |a: &PlannedPose, b: &PlannedPose| (0..5).all(|j| (a.angles[j] - b.angles[j]).abs() < 0.1);
     assert!(second.poses.iter().all(|b| first.poses.iter().all(|a| !near(a, b))));
-    site.tag_trust[2] = 0.0;
+    site.detection_rate[2] = 0.0;
     let without = site.plan(1, PoseCriterion::ToolError, 200).expect("a plan");
     assert!(first.poses.iter().any(|pose| pose.tags.iter().any(|(tag, _)| *tag == 2)));
     assert!(without.poses.iter().all(|pose| pose.tags.iter().all(|(tag, _)| *tag != 2)));
@@ -296,12 +296,12 @@ fn the_first_visits_tell_most_where_the_choice_is_renewed() {
 fn what_cannot_be_seen_is_said_with_what_could() {
     let mut site = Site::titan();
     site.robot.tags.truncate(3);
-    site.tag_trust.truncate(3);
+    site.detection_rate.truncate(3);
     site.robot.tags[2].base_from_tag = Pose::from_position_rpy([0.0, 0.0, 200.0], [0.0; 3]);
     let error = site.plan(1, PoseCriterion::ToolError, 50).expect_err("one of the three is far away");
     assert!(matches!(error, PlanError::NoUsefulPose { .. }) && error.to_string().contains("min_tags = 2"), "{error}");
     site.robot.tags.truncate(2);
-    site.tag_trust.truncate(2);
+    site.detection_rate.truncate(2);
     let error = site.plan(1, PoseCriterion::ToolError, 50).expect_err("two tags are not three");
     assert!(matches!(error, PlanError::TooFewTags { min_tags: 3, n_tags: 2 }), "{error}");
     site.robot.tags.clear();
@@ -320,10 +320,10 @@ fn views_taken_count_as_they_were_planned() {
     let mut request = site.request(&clearance);
     request.n_fit = 8;
     let plan = super::choose_poses(&request, &mut rng(1)).expect("a plan");
-    let taken: Vec<TakenView> = plan
+    let taken: Vec<CapturedView> = plan
         .poses
         .iter()
-        .map(|pose| TakenView { angles: pose.angles, tags: pose.tags.iter().map(|(tag, _)| *tag).collect() })
+        .map(|pose| CapturedView { angles: pose.angles, tags: pose.tags.iter().map(|(tag, _)| *tag).collect() })
         .collect();
     request.taken = &taken;
     request.n_fit = 2;
@@ -338,7 +338,7 @@ fn views_taken_count_as_they_were_planned() {
 fn the_predicted_tool_error_is_what_bundle_finds() {
     let robot = titan();
     let mut site = Site::titan();
-    let scales = Scales::datasheet(&robot);
+    let scales = Hyperparameters::datasheet(&robot);
     let clearance = super::fixture::clearance_of(&robot, &site.vehicle);
     for n_views in [6, 25] {
         site.capture.poses = n_views;
@@ -356,7 +356,7 @@ fn the_predicted_tool_error_is_what_bundle_finds() {
                 scales: scales.clone(),
                 guess: JointParameters::default(),
                 joint_prior: None,
-                evidence: Evidence::Given,
+                evidence: HyperparameterMode::Given,
             };
             let found = estimate(&input).expect("solved");
             let covariance = ParameterCovariance {
@@ -387,7 +387,7 @@ fn the_predicted_tool_error_is_what_bundle_finds() {
 #[test]
 fn truths_are_drawn_from_the_priors() {
     let robot = titan();
-    let scales = Scales::datasheet(&robot);
+    let scales = Hyperparameters::datasheet(&robot);
     let mut rng = rng(1);
     let (mut sum, mut n) = ([0.0; 2], 0.0);
     for _ in 0..300 {

@@ -18,7 +18,7 @@ pub(super) struct Tour<'a> {
 
 impl Tour<'_> {
     /// Time on the way, s.
-    pub(super) fn way_s(&self, order: &[JointAngles]) -> f64 {
+    pub(super) fn travel_time_s(&self, order: &[JointAngles]) -> f64 {
         let mut at = &self.start;
         let mut sum_s = 0.0;
         for next in order {
@@ -95,7 +95,7 @@ impl Tour<'_> {
     /// Moves stretches of up to three poses elsewhere.
     fn or_opt(&self, order: &mut Vec<usize>, poses: &[JointAngles]) -> bool {
         let at = |order: &[usize]| order.iter().map(|&k| poses[k]).collect::<Vec<_>>();
-        let mut best_s = self.way_s(&at(order));
+        let mut best_s = self.travel_time_s(&at(order));
         let mut helped = false;
         for length in 1..=3.min(order.len()) {
             for from in 0..=order.len() - length {
@@ -106,7 +106,7 @@ impl Tour<'_> {
                 for to in 0..=rest.len() {
                     let mut trial = rest.clone();
                     trial.splice(to..to, stretch.iter().copied());
-                    let trial_s = self.way_s(&at(&trial));
+                    let trial_s = self.travel_time_s(&at(&trial));
                     if trial_s < best_s - LEAST_GAIN_S {
                         (best_s, best) = (trial_s, Some(trial));
                     }
@@ -142,7 +142,7 @@ mod tests {
             let mut seen = order.clone();
             seen.sort_unstable();
             assert_eq!(seen, (0..6).collect::<Vec<_>>());
-            let of = |order: &[usize]| tour.way_s(&order.iter().map(|&k| poses[k]).collect::<Vec<_>>());
+            let of = |order: &[usize]| tour.travel_time_s(&order.iter().map(|&k| poses[k]).collect::<Vec<_>>());
             let mut best = f64::INFINITY;
             permute(&mut (0..6).collect::<Vec<_>>(), 0, &mut |order| best = best.min(of(order)));
             ratios.push(of(&order) / best);

@@ -7,10 +7,10 @@
 use nalgebra::{DMatrix, Matrix6, Vector6};
 
 use super::PoseRequest;
-use crate::calib::bundle::{MOUNT_ROWS, Scales};
+use crate::calib::bundle::{Hyperparameters, MOUNT_ROWS};
 use crate::calib::{Calibration, Parameter, ParameterKind};
 use armcal_core::robot::{FailedKind, Robot};
-use armcal_core::sensor::{N_SHAPE, shape_basis};
+use armcal_core::sensor::{N_SHAPE, nonlinearity_basis};
 use armcal_core::spatial::adjoint;
 use armcal_core::streams::MAX_JOINTS;
 
@@ -29,7 +29,7 @@ const UNKNOWN_STD: f64 = 3.0;
 
 /// What is not known before the views to come.
 #[derive(Clone, Debug)]
-pub(super) struct Unknowns {
+pub(super) struct ParameterPrior {
     /// Joints before the camera.
     pub n_joints: usize,
     pub covariance: DMatrix<f64>,
@@ -39,7 +39,7 @@ pub(super) struct Unknowns {
     pub noise: f64,
 }
 
-impl Unknowns {
+impl ParameterPrior {
     pub(super) fn of(request: &PoseRequest<'_>) -> Self {
         let robot = request.robot;
         let scales = scales(robot, request.belief);
@@ -85,7 +85,7 @@ pub(super) fn columns(n_joints: usize) -> impl Iterator<Item = Parameter> {
 pub(super) fn basis(robot: &Robot, joint: usize, angle_rad: f64) -> [f64; WIDTH] {
     let spec = &robot.sensors[joint];
     let travel_rad = angle_rad - spec.center_rad;
-    let shape = shape_basis(travel_rad / spec.half_range_rad);
+    let shape = nonlinearity_basis(travel_rad / spec.half_range_rad);
     std::array::from_fn(|k| match k {
         0 => travel_rad,
         1 => 1.0,
@@ -94,8 +94,8 @@ pub(super) fn basis(robot: &Robot, joint: usize, angle_rad: f64) -> [f64; WIDTH]
 }
 
 /// The datasheet's sizes, or those that the data of the running estimate gave.
-fn scales(robot: &Robot, belief: Option<&Calibration>) -> Scales {
-    let mut scales = Scales::datasheet(robot);
+fn scales(robot: &Robot, belief: Option<&Calibration>) -> Hyperparameters {
+    let mut scales = Hyperparameters::datasheet(robot);
     let Some(belief) = belief else { return scales };
     for (joint, result) in belief.joint.iter().enumerate().take(robot.n_joints()) {
         if let Some(std_rad) = result.residual_std_rad {

@@ -2,8 +2,8 @@
 
 use parry3d::math::{Pose3, Vec3};
 
-use super::{ClearanceModel, Nearest, SELF_EASE_M, TOUCHING_M};
-use crate::plan::certify::{Between, Moved, Pair};
+use super::{ClearanceModel, ClosestPair, SELF_MARGIN_REDUCTION_M, TOUCHING_M};
+use crate::plan::certify::{BodyPair, Pair, ShapeMotion};
 use crate::plan::pairs::UNSEEN_M;
 use crate::plan::separation::{Placed, Shapes, separate};
 use crate::plan::timing::Timing;
@@ -59,11 +59,11 @@ impl ClearanceModel<'_> {
         self.moving[shape].placed_on(base_from_body)
     }
 
-    pub(in crate::plan) fn between(&self, pair: Pair) -> Between {
+    pub(in crate::plan) fn between(&self, pair: Pair) -> BodyPair {
         match pair {
-            Pair::Standing { moving, .. } => Between { first_joint: 0, outer_body: self.moving[moving].body },
+            Pair::Standing { moving, .. } => BodyPair { first_joint: 0, outer_body: self.moving[moving].body },
             Pair::Links { outer, inner } => {
-                Between { first_joint: self.moving[inner].body, outer_body: self.moving[outer].body }
+                BodyPair { first_joint: self.moving[inner].body, outer_body: self.moving[outer].body }
             }
         }
     }
@@ -75,7 +75,7 @@ impl ClearanceModel<'_> {
 
     /// How far the vehicle's motion may move a shape in the world, m: three sigma of its position, and of its attitude
     /// times the distance from its centre of mass.
-    pub(in crate::plan) fn sway_m(&self, placed: &Placed) -> f64 {
+    pub(in crate::plan) fn station_bound_m(&self, placed: &Placed) -> f64 {
         let arm_m = (placed.center - self.sway.center_of_mass).length() + placed.radius_m;
         self.sway.position_m + self.sway_growth(arm_m)
     }
@@ -102,7 +102,7 @@ impl ClearanceModel<'_> {
     }
 
     /// The pair's second shape where it is.
-    pub(in crate::plan) fn other_placed<'b>(&'b self, pair: Pair, moved: &'b [Moved]) -> &'b Placed {
+    pub(in crate::plan) fn other_placed<'b>(&'b self, pair: Pair, moved: &'b [ShapeMotion]) -> &'b Placed {
         match pair {
             Pair::Standing { standing, .. } => &self.standing[standing].placed,
             Pair::Links { inner, .. } => &moved[inner].placed,
@@ -130,7 +130,7 @@ impl ClearanceModel<'_> {
             Pair::Standing { standing, .. } => self.standing[standing].placed,
             Pair::Links { inner, .. } => self.moving[inner].placed(&poses),
         };
-        let sway_m = if self.sways(pair) { self.sway_m(&outer) } else { 0.0 };
+        let sway_m = if self.sways(pair) { self.station_bound_m(&outer) } else { 0.0 };
         let found = separate(&self.shapes(pair), [&outer, &other], guess);
         let is_below = found.distance_m < self.needed_m(pair, margin_m) + sway_m;
         is_below.then(|| self.in_margin_m(pair, found.distance_m, sway_m))
@@ -140,7 +140,7 @@ impl ClearanceModel<'_> {
     pub(in crate::plan) fn needed_m(&self, pair: Pair, margin_m: f64) -> f64 {
         let needed_m = match pair {
             Pair::Standing { .. } => margin_m,
-            Pair::Links { .. } => margin_m - SELF_EASE_M,
+            Pair::Links { .. } => margin_m - SELF_MARGIN_REDUCTION_M,
         };
         needed_m.max(TOUCHING_M) + self.growth_m(pair)
     }
@@ -169,7 +169,7 @@ impl ClearanceModel<'_> {
             // An obstacle inside the margin for the vehicle's motion is as near as touching.
             Pair::Standing { .. } if self.sways(pair) => (distance_m - sway_m).max(0.0),
             Pair::Standing { .. } => distance_m,
-            Pair::Links { .. } if distance_m > 0.0 => distance_m + SELF_EASE_M,
+            Pair::Links { .. } if distance_m > 0.0 => distance_m + SELF_MARGIN_REDUCTION_M,
             Pair::Links { .. } => 0.0,
         }
     }
@@ -184,8 +184,8 @@ impl ClearanceModel<'_> {
     }
 
     /// The pair at a distance in the terms of the margin.
-    pub(in crate::plan) fn named(&self, pair: Pair, distance_m: f64) -> Nearest {
+    pub(in crate::plan) fn named(&self, pair: Pair, distance_m: f64) -> ClosestPair {
         let (first, second) = self.names(pair);
-        Nearest { distance_m, first, second }
+        ClosestPair { distance_m, first, second }
     }
 }

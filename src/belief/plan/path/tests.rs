@@ -51,7 +51,7 @@ fn random_too_near(clearance: &ClearanceModel<'_>, planner: &PathPlanner<'_>, rn
 fn duration_s(planner: &PathPlanner<'_>, waypoints: &[JointAngles]) -> f64 {
     let mut path = Path::at(waypoints[0]);
     for edge in waypoints.windows(2) {
-        path.push(edge[1], planner.slowness(&edge[0], &edge[1], SLOWEST, &mut 0).expect("certified"));
+        path.push(edge[1], planner.time_scale(&edge[0], &edge[1], SLOWEST, &mut 0).expect("certified"));
     }
     planner.clearance.timing().path_duration_s(&path)
 }
@@ -64,7 +64,7 @@ fn paths_are_found_and_keep_clear_and_are_the_same_again() {
         let clearance = ClearanceModel::new(&site.robot, &site.vehicle, &site.scene);
         for (belief, bounds) in [
             ("narrow", JointErrorBounds::alike(&site.robot, 0.014, 0.004)),
-            ("wide", JointErrorBounds::prior(&site.robot)),
+            ("wide", JointErrorBounds::datasheet(&site.robot)),
         ] {
             let limits = bounds.safe_limits(&site.robot);
             let planner = planner(&clearance, &bounds, &limits);
@@ -80,7 +80,7 @@ fn paths_are_found_and_keep_clear_and_are_the_same_again() {
                 bent += i32::from(path.waypoints.len() > 2);
                 assert_eq!((path.waypoints[0], path.waypoints[path.waypoints.len() - 1]), (from, to));
                 for edge in path.edges() {
-                    let stray = Stray::new(&site.robot, clearance.timing(), &edge);
+                    let stray = TrackingErrorBound::new(&site.robot, clearance.timing(), &edge);
                     for step in 0..=10 {
                         let share = f64::from(step) / 10.0;
                         let on_line = between(&edge.from, &edge.to, share);
@@ -120,7 +120,7 @@ fn shortcuts_make_paths_quicker_and_never_slower() {
         if planner.is_edge_free(&from, &to) {
             continue;
         }
-        let mut connect = Connect::new(&planner, &from, &to);
+        let mut connect = RrtConnect::new(&planner, &from, &to);
         let Some(waypoints) = connect.search(&mut rng) else { continue };
         let short = connect.shortened(&waypoints, &mut rng);
         assert!(short.edges().all(|edge| planner.keeps_clear(&edge, &mut 0)));
@@ -145,24 +145,24 @@ fn edges_near_things_are_driven_slowly_and_the_others_are_not() {
     let mut counts = [0; SLOWNESS.len()];
     for _ in 0..300 {
         let (from, to) = (random_free(&planner, &mut rng), random_free(&planner, &mut rng));
-        let Some(slowness) = planner.slowness(&from, &to, SLOWEST, &mut 0) else {
+        let Some(slowness) = planner.time_scale(&from, &to, SLOWEST, &mut 0) else {
             assert!(!planner.is_edge_free(&from, &to));
             continue;
         };
         let level = SLOWNESS.iter().position(|&level| level == slowness).expect("one of the levels");
         counts[level] += 1;
-        let edge = Edge { from, to, slowness };
-        assert!(planner.keeps_clear(&edge, &mut 0) && planner.stays_off_the_stops(&edge));
-        let stray = Stray::new(&site.robot, clearance.timing(), &edge);
+        let edge = Edge { from, to, time_scale: slowness };
+        assert!(planner.keeps_clear(&edge, &mut 0) && planner.is_within_limits(&edge));
+        let stray = TrackingErrorBound::new(&site.robot, clearance.timing(), &edge);
         for joint in 0..5 {
             let at_end_rad = to[joint] + (to[joint] - from[joint]).signum() * stray.end_rad(joint);
-            let arriving_rad = Stray::arriving(&site.robot).end_rad(joint);
+            let arriving_rad = TrackingErrorBound::arriving(&site.robot).end_rad(joint);
             assert!(at_end_rad <= limits[joint].upper_rad + arriving_rad + 1e-9, "{joint}: {at_end_rad}");
             assert!(at_end_rad >= limits[joint].lower_rad - arriving_rad - 1e-9, "{joint}: {at_end_rad}");
         }
         if level > 0 {
-            let quicker = Edge { from, to, slowness: SLOWNESS[level - 1] };
-            assert!(!planner.keeps_clear(&quicker, &mut 0) || !planner.stays_off_the_stops(&quicker));
+            let quicker = Edge { from, to, time_scale: SLOWNESS[level - 1] };
+            assert!(!planner.keeps_clear(&quicker, &mut 0) || !planner.is_within_limits(&quicker));
         }
     }
     eprintln!("{counts:?} at each speed");
@@ -173,7 +173,7 @@ fn edges_near_things_are_driven_slowly_and_the_others_are_not() {
 fn ends_that_cannot_be_are_named_with_the_nearest_that_can() {
     let site = site("open-frame");
     let clearance = ClearanceModel::new(&site.robot, &site.vehicle, &site.scene);
-    let bounds = JointErrorBounds::prior(&site.robot);
+    let bounds = JointErrorBounds::datasheet(&site.robot);
     let limits = bounds.safe_limits(&site.robot);
     let planner = planner(&clearance, &bounds, &limits);
     let mut rng = stream_rng(1, "named errors");
@@ -207,7 +207,7 @@ fn ends_that_cannot_be_are_named_with_the_nearest_that_can() {
 fn a_goal_beyond_the_safe_limits_is_named_unless_it_leads_back() {
     let site = site("open-frame");
     let clearance = ClearanceModel::new(&site.robot, &site.vehicle, &site.scene);
-    let bounds = JointErrorBounds::prior(&site.robot);
+    let bounds = JointErrorBounds::datasheet(&site.robot);
     let limits = bounds.safe_limits(&site.robot);
     let planner = planner(&clearance, &bounds, &limits);
     let mut rng = stream_rng(1, "limits");
@@ -239,7 +239,7 @@ fn a_blocked_way_says_what_blocks_it_and_how_far_it_is_free() {
     let mut blocked = 0;
     while blocked < 20 {
         let (from, to) = (random_free(&planner, &mut rng), random_free(&planner, &mut rng));
-        if planner.slowness(&from, &to, SLOWEST, &mut 0).is_some() {
+        if planner.time_scale(&from, &to, SLOWEST, &mut 0).is_some() {
             continue;
         }
         // As a search says that has found no way round.

@@ -109,7 +109,7 @@ fn sensors_with_terms_are_used_under_what_was_heard_last() {
         assert!((warm[joint] - at_rest[joint] - expected).abs() < 1e-9, "{joint}: {}", warm[joint] - at_rest[joint]);
     }
     // The same angles ask for other words, and the arm believes to be where it was sent.
-    assert_eq!(driver.follow(&ends).expect("it moves"), Followed::Arrived);
+    assert_eq!(driver.follow(&ends).expect("it moves"), MotionOutcome::Arrived);
     for _ in 0..3 {
         driver.step().expect("it steps");
     }
@@ -172,7 +172,7 @@ fn an_operator_is_asked_before_a_motion_and_obeyed() {
     let to = JointAngles::from_fn(6, |j| if j == 0 { from[0] + 0.3 } else { from[j] });
     let path = Path::at_full_speed(vec![from, to]);
     let duration_s = Timing::new(&robot).path_duration_s(&path);
-    assert_eq!(driver.follow_told(&path, Some(0.07)).expect("it moves"), Followed::Arrived);
+    assert_eq!(driver.follow_told(&path, Some(0.07)).expect("it moves"), MotionOutcome::Arrived);
     // Twice 5 s, then the motion.
     assert!((driver.elapsed_s() - 0.01 - 10.0 - duration_s).abs() < 0.05, "{}", driver.elapsed_s());
     let back = Path::at_full_speed(vec![to, from]);

@@ -5,7 +5,7 @@ use rand::RngExt;
 
 use super::fixture::{Scene, fisheye, look, looking, pinhole, settings, size_of, wall};
 use super::{distances, position_errors};
-use crate::tagmap::{GroupFrame, MapMode, MapRejection, MapSettings, MapView, SeenTag, TagPrior, solve};
+use crate::tagmap::{GroupFrame, MapDetection, MapMode, MapRejection, MapSettings, MapView, TagPrior, solve};
 use armcal_core::stats::stream_rng;
 use armcal_core::time::Stamp;
 
@@ -73,8 +73,9 @@ fn an_image_full_of_noise_is_rejected() {
     let mut scene = wall(fisheye(), 6, 14, 0.3, 2);
     let mut rng = stream_rng(1, "noise image");
     let mut corner = || [rng.random_range(0.0..1223.0), rng.random_range(0.0..1023.0)];
-    let tags: Vec<SeenTag> =
-        (0..6).map(|id| SeenTag { id, corners_px: std::array::from_fn(|_| corner()), covariance_px2: None }).collect();
+    let tags: Vec<MapDetection> = (0..6)
+        .map(|id| MapDetection { id, corners_px: std::array::from_fn(|_| corner()), covariance_px2: None })
+        .collect();
     scene.views.push(MapView { camera: 0, stamp: Stamp { nanos: i64::MAX }, tags, attitude: None });
     let map = solve(&scene.input(), &settings()).unwrap();
     let of_noise = map.rejected.iter().filter(|rejected| rejected.view == 14).count();

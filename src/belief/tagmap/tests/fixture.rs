@@ -5,7 +5,7 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use super::super::{Body, MapInput, MapSettings, MapView, NoiseScale, SeenTag, TagPrior};
+use super::super::{Body, MapDetection, MapInput, MapSettings, MapView, NoiseScale, TagPrior};
 use armcal_core::optics::{CameraModel, square_corners};
 use armcal_core::stats::stream_rng;
 use armcal_core::time::Stamp;
@@ -51,7 +51,7 @@ pub(super) fn look(
     tags: &[(u32, f64, Isometry3<f64>)],
     noise_px: f64,
     rng: &mut ChaCha8Rng,
-) -> Vec<SeenTag> {
+) -> Vec<MapDetection> {
     let mut seen = Vec::new();
     for (id, size_m, base_from_tag) in tags {
         let camera_from_tag = base_from_camera.inv_mul(base_from_tag);
@@ -72,7 +72,7 @@ pub(super) fn look(
             }
         }
         if is_whole {
-            seen.push(SeenTag { id: *id, corners_px, covariance_px2: None });
+            seen.push(MapDetection { id: *id, corners_px, covariance_px2: None });
         }
     }
     seen

@@ -57,7 +57,7 @@ proptest! {
         oil_k in -30.0f64..30.0, pressure_mpa in -10.0f64..30.0, elapsed_h in -5.0f64..5.0,
     ) {
         let model = SensorModel { spec: spec(), correction: Correction { gain, offset_rad, terms } };
-        let departure = Departure { oil_k, pressure_mpa, elapsed_h };
+        let departure = ConditionChange { oil_k, pressure_mpa, elapsed_h };
         let angle = model.spec.center_rad + share * model.spec.half_range_rad;
         let counts = model.counts_under(angle, &departure);
         prop_assert!((model.angle_under_rad(counts, &departure) - angle).abs() < 1e-9);
@@ -71,7 +71,7 @@ proptest! {
         counts in 0.0f64..65536.0, gain in 0.95f64..1.05, offset_rad in -0.1f64..0.1, oil_k in -30.0f64..30.0
     ) {
         let model = SensorModel { spec: spec(), correction: Correction { gain, offset_rad, ..Correction::default() } };
-        let departure = Departure { oil_k, pressure_mpa: 3.0, elapsed_h: 1.0 };
+        let departure = ConditionChange { oil_k, pressure_mpa: 3.0, elapsed_h: 1.0 };
         let angle = model.angle_under_rad(counts, &departure);
         let travel = model.nominal_travel_rad(counts);
         prop_assert_eq!(angle.to_bits(), (spec().center_rad + gain * travel + offset_rad).to_bits());
@@ -85,7 +85,7 @@ proptest! {
 
 #[test]
 fn each_term_moves_the_angle_by_what_its_name_says() {
-    let departure = Departure { oil_k: 10.0, pressure_mpa: 2.0, elapsed_h: 0.5 };
+    let departure = ConditionChange { oil_k: 10.0, pressure_mpa: 2.0, elapsed_h: 0.5 };
     let moved = |terms: Terms, approach: f64| {
         let with = Correction { terms, ..Correction::default() };
         let at = |correction: &Correction| correction.angle_rad(&spec(), 0.7, &departure, approach);
@@ -114,7 +114,7 @@ fn the_shape_prior_is_a_squared_exponential_process() {
         let std = shape_prior(length);
         // Not at the very ends: the functions vanish a quarter of a half range beyond.
         for (x, y) in [(0.0, 0.0), (-0.6, -0.6), (0.3, -0.2), (0.6, 0.4)] {
-            let terms = shape_basis(x).into_iter().zip(shape_basis(y)).zip(std);
+            let terms = nonlinearity_basis(x).into_iter().zip(nonlinearity_basis(y)).zip(std);
             let found: f64 = terms.map(|((a, b), s)| a * b * s * s).sum();
             let expected = (-0.5 * ((x - y) / length).powi(2)).exp();
             assert!((found - expected).abs() < 0.06, "{length} {x} {y}: {found} {expected}");

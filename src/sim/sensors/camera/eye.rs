@@ -11,13 +11,13 @@ use crate::spec::{CameraWorldSpec, PortKind};
 use armcal_core::optics::Fisheye;
 
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Eye {
+pub(super) struct PortedLens {
     /// In air.
     pub lens: Fisheye,
     pub port: Port,
 }
 
-impl Eye {
+impl PortedLens {
     pub(super) fn new(nominal: &Fisheye, built: &AsBuilt, spec: &CameraWorldSpec) -> Self {
         let lens = built.lens.map_or(*nominal, |lens| lens.applied(nominal));
         let thickness_m = spec.port_thickness_m;

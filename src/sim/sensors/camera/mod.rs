@@ -30,17 +30,17 @@ use armcal_core::robot::Robot;
 use armcal_core::stats::stream_rng;
 use armcal_core::streams::{DetectionReject, JointAngles, TagDetection, TagDetections};
 use armcal_core::time::{SIMULATION_EPOCH, Stamp};
-use eye::Eye;
+use eye::PortedLens;
 pub(crate) use rendered::RenderInput;
 use rendered::{Read, Rendered, Scenario};
 pub(crate) use scenery::Places;
-use view::{Sight, TagInBase, TagOnLink};
+use view::{TagInBase, TagOnLink, TagProjector};
 
 #[derive(Debug)]
 pub(crate) struct WristCamera {
     spec: CameraWorldSpec,
     clock: ClockSpec,
-    eye: Eye,
+    eye: PortedLens,
     /// As built.
     mount: Attachment,
     /// As built, by id.
@@ -133,7 +133,7 @@ impl WristCamera {
         Self {
             spec: spec.camera,
             clock: spec.clock,
-            eye: Eye::new(&robot.camera.lens, built, &spec.camera),
+            eye: PortedLens::new(&robot.camera.lens, built, &spec.camera),
             mount: built.camera_attachment(robot),
             tags,
             gripper_tag: robot.gripper_tag.zip(built.gripper_tag_attachment(robot)).map(|(tag, mount)| TagOnLink {
@@ -276,7 +276,7 @@ impl WristCamera {
                 continue;
             }
             let fitted = self.fitted.as_ref();
-            let sight = Sight { spec: &self.spec, eye: &self.eye, solids, housing: &self.housing, fitted };
+            let sight = TagProjector { spec: &self.spec, eye: &self.eye, solids, housing: &self.housing, fitted };
             let seen = sight.view(&tag, &base_from_camera);
             let Some(view) = seen.and_then(|view| sight.smeared(view, &tag, before.as_ref())) else { continue };
             let Some(noisy) = view.detected(&sight, luck, &noise) else { continue };

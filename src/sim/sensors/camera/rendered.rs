@@ -4,7 +4,7 @@ use std::fmt;
 
 use nalgebra::{Isometry3, Unit, Vector3};
 
-use super::eye::Eye;
+use super::eye::PortedLens;
 use super::scenery::{Places, Scenery};
 use crate::error::SimError;
 use crate::imaging::{Frame, Imager, Light, Shot, TagPlane};
@@ -63,7 +63,7 @@ impl fmt::Debug for Rendered {
 impl Rendered {
     /// # Errors
     /// [`SimError`] where there is no light, or no detector.
-    pub(super) fn new(input: &RenderInput, eye: &Eye) -> Result<Self, SimError> {
+    pub(super) fn new(input: &RenderInput, eye: &PortedLens) -> Result<Self, SimError> {
         let RenderInput { robot, vehicle, scene, spec, seed } = *input;
         let image = spec.image;
         if vehicle.lights.is_empty() && image.ambient_lux <= 0.0 {

@@ -279,7 +279,7 @@ fn corners_go_through_the_lens_as_built() {
 fn ports_keep_the_focal_length_near_the_axis() {
     let shift = |change: &dyn Fn(&mut CameraWorldSpec), angle_rad: f64, range_m: f64| {
         let site = site(|spec| change(&mut spec.camera));
-        let eye = Eye::new(&site.robot.camera.lens, &site.built, &site.spec.camera);
+        let eye = PortedLens::new(&site.robot.camera.lens, &site.built, &site.spec.camera);
         let point = Vector3::new(angle_rad.sin(), 0.0, angle_rad.cos()) * range_m;
         (eye.project(&point).expect("in view") - site.robot.camera.lens.project(&point).expect("in view")).norm()
     };

@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Point3, Vector2, Vector3};
 
-use super::eye::Eye;
+use super::eye::PortedLens;
 use crate::places::BodyPoses;
 use crate::solids::Solids;
 use crate::spec::CameraWorldSpec;
@@ -36,7 +36,7 @@ impl TagOnLink {
 
 /// How a tag is seen.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct View {
+pub(super) struct TagProjection {
     pub corners_px: [Vector2<f64>; 4],
     range_m: f64,
     cos_incidence: f64,
@@ -47,9 +47,9 @@ pub(super) struct View {
 
 /// What it takes to see.
 #[derive(Clone, Copy)]
-pub(super) struct Sight<'a> {
+pub(super) struct TagProjector<'a> {
     pub spec: &'a CameraWorldSpec,
-    pub eye: &'a Eye,
+    pub eye: &'a PortedLens,
     pub solids: &'a Solids,
     pub housing: &'a [usize],
     /// In place of the standard noise and limits.
@@ -59,8 +59,8 @@ pub(super) struct Sight<'a> {
 /// With fitted noise the chance of a detection takes care of range, incidence and size; beyond this nothing shows, cosine.
 const MIN_COS_INCIDENCE: f64 = 0.05;
 
-impl Sight<'_> {
-    pub(super) fn view(&self, tag: &TagInBase, base_from_camera: &Isometry3<f64>) -> Option<View> {
+impl TagProjector<'_> {
+    pub(super) fn view(&self, tag: &TagInBase, base_from_camera: &Isometry3<f64>) -> Option<TagProjection> {
         let camera_from_tag = base_from_camera.inverse() * tag.base_from_tag;
         let center = camera_from_tag.translation.vector;
         let range_m = center.norm();
@@ -83,19 +83,24 @@ impl Sight<'_> {
         if is_too_small || hidden(&Point3::origin()) || corners.iter().any(hidden) {
             return None;
         }
-        Some(View { corners_px, range_m, cos_incidence, side_px, blur_px: 0.0 })
+        Some(TagProjection { corners_px, range_m, cos_incidence, side_px, blur_px: 0.0 })
     }
 
     /// The mean over the time that the shutter was open, from where the camera was at its start and halfway; `None` for a tag
     /// that was not in the image all the time.
-    pub(super) fn smeared(&self, view: View, tag: &TagInBase, before: Option<&[Isometry3<f64>; 2]>) -> Option<View> {
+    pub(super) fn smeared(
+        &self,
+        view: TagProjection,
+        tag: &TagInBase,
+        before: Option<&[Isometry3<f64>; 2]>,
+    ) -> Option<TagProjection> {
         let Some([start, middle]) = before else { return Some(view) };
         let start = self.corners_px(tag, &(start.inverse() * tag.base_from_tag))?;
         let middle = self.corners_px(tag, &(middle.inverse() * tag.base_from_tag))?;
         let end = view.corners_px;
         let corners_px = std::array::from_fn(|k| (start[k] + middle[k] * 4.0 + end[k]) / 6.0);
         let blur_px = (0..4).map(|k| (end[k] - start[k]).norm()).fold(0.0, f64::max);
-        Some(View { corners_px, blur_px, ..view })
+        Some(TagProjection { corners_px, blur_px, ..view })
     }
 
     fn corners_px(&self, tag: &TagInBase, camera_from_tag: &Isometry3<f64>) -> Option<[Vector2<f64>; 4]> {
@@ -107,9 +112,14 @@ impl Sight<'_> {
     }
 }
 
-impl View {
+impl TagProjection {
     /// Corners with noise, from normal numbers of unit variance; `None` for a tag that goes undetected. `luck` is uniform in 0..1.
-    pub(super) fn detected(&self, sight: &Sight, luck: f64, noise: &[Vector2<f64>; 4]) -> Option<[Vector2<f64>; 4]> {
+    pub(super) fn detected(
+        &self,
+        sight: &TagProjector,
+        luck: f64,
+        noise: &[Vector2<f64>; 4],
+    ) -> Option<[Vector2<f64>; 4]> {
         let Some(fitted) = sight.fitted else {
             let std_px = self.corner_std_px(sight.spec);
             return Some(std::array::from_fn(|k| self.corners_px[k] + std_px * noise[k]));

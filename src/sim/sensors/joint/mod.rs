@@ -9,14 +9,14 @@ mod pot;
 mod resolver;
 mod word;
 
-use super::Surroundings;
+use super::OilState;
 use crate::as_built::JointAsBuilt;
 use crate::spec::JointSensorsSpec;
 use armcal_core::robot::{JointSensorSpec, SensorKind};
 use encoder::Encoder;
 use pot::Pot;
 use resolver::Resolver;
-use word::Word;
+use word::Quantizer;
 
 /// One joint sensor as built.
 #[derive(Clone, Debug)]
@@ -30,7 +30,7 @@ pub(crate) struct JointSensor {
     element: Element,
     /// What slips on the shaft added.
     jump_rad: f64,
-    word: Word,
+    word: Quantizer,
 }
 
 /// What turns the shaft's angle into a reading.
@@ -45,7 +45,7 @@ enum Element {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct JointInput {
     pub angle_rad: f64,
-    pub around: Surroundings,
+    pub around: OilState,
     /// Since the last sample, s.
     pub elapsed_s: f64,
 }
@@ -65,7 +65,7 @@ impl JointSensor {
             shaft_rad: built.center_rad,
             element,
             jump_rad: 0.0,
-            word: Word::new(nominal, spec, seed),
+            word: Quantizer::new(nominal, spec, seed),
         }
     }
 
@@ -78,7 +78,7 @@ impl JointSensor {
     }
 
     /// The reading without noise and steps at a settled shaft angle, rad.
-    fn reading_rad(&self, shaft_rad: f64, around: &Surroundings) -> f64 {
+    fn reading_rad(&self, shaft_rad: f64, around: &OilState) -> f64 {
         let read = match &self.element {
             Element::Potentiometer(pot) => pot.reading_rad(shaft_rad, around),
             Element::Encoder(encoder) => encoder.reading_rad(shaft_rad),
@@ -103,7 +103,7 @@ impl JointSensor {
     }
 
     /// The shaft angle at which it reads `reading_rad`: fixed-point iteration, for what bends the scale is slight.
-    pub(crate) fn angle_for_reading(&self, reading_rad: f64, around: &Surroundings) -> f64 {
+    pub(crate) fn angle_for_reading(&self, reading_rad: f64, around: &OilState) -> f64 {
         let mut angle = reading_rad;
         for _ in 0..200 {
             angle += (reading_rad - self.reading_rad(angle, around)) / self.slope;

@@ -12,7 +12,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use crate::as_built::JointAsBuilt;
-use crate::sensors::Surroundings;
+use crate::sensors::OilState;
 use crate::spec::JointSensorsSpec;
 use armcal_core::stats::stream_rng;
 
@@ -64,7 +64,7 @@ impl Pot {
         (contact_rad, self.is_open)
     }
 
-    pub(super) fn reading_rad(&self, contact_rad: f64, around: &Surroundings) -> f64 {
+    pub(super) fn reading_rad(&self, contact_rad: f64, around: &OilState) -> f64 {
         let built = &self.built;
         let warm_k = around.oil_c - self.spec.reference_c;
         let pressure_mpa = around.pressure_pa * 1e-6;

@@ -6,7 +6,7 @@
 use std::f64::consts::TAU;
 
 use crate::as_built::{JointAsBuilt, ResolverAsBuilt};
-use crate::sensors::Surroundings;
+use crate::sensors::OilState;
 use crate::spec::JointSensorsSpec;
 
 #[derive(Clone, Copy, Debug)]
@@ -21,7 +21,7 @@ impl Resolver {
         Self { offset_rad: built.offset_error_rad, reference_c: spec.reference_c, built: built.resolver }
     }
 
-    pub(super) fn reading_rad(&self, shaft_rad: f64, around: &Surroundings) -> f64 {
+    pub(super) fn reading_rad(&self, shaft_rad: f64, around: &OilState) -> f64 {
         let Some(built) = self.built else { return shaft_rad + self.offset_rad };
         let pole_pairs = f64::from(built.pole_pairs.get());
         let electrical_rad = pole_pairs * shaft_rad + built.phase_rad;

@@ -63,7 +63,7 @@ pub(super) fn at(angle_rad: f64) -> JointInput {
 }
 
 fn within(angle_rad: f64, oil_c: f64, pressure_pa: f64) -> JointInput {
-    JointInput { angle_rad, around: Surroundings { oil_c, pressure_pa }, elapsed_s: 0.01 }
+    JointInput { angle_rad, around: OilState { oil_c, pressure_pa }, elapsed_s: 0.01 }
 }
 
 fn word_of(reading_rad: f64) -> f64 {
@@ -341,7 +341,7 @@ fn the_angle_for_a_reading_is_the_inverse() {
     let spot = WornSpot { center_rad: -0.45, peak_rad: -0.05, width_rad: 0.05 };
     let bent = JointAsBuilt { harmonics: vec![harmonic], gain_error: -0.05, offset_error_rad: 0.08, ..perfect() };
     let worn = JointAsBuilt { worn_spot: Some(spot), ..bent.clone() };
-    let around = Surroundings { oil_c: 12.0, pressure_pa: 5.0 * MPA };
+    let around = OilState { oil_c: 12.0, pressure_pa: 5.0 * MPA };
     for built in [bent, worn] {
         let sensor = pot(&built, &silent(), 1);
         let angle = sensor.angle_for_reading(-0.4, &around);

@@ -10,7 +10,7 @@ use armcal_core::robot::{JointSensorSpec, SensorKind};
 use armcal_core::stats::stream_rng;
 
 #[derive(Clone, Debug)]
-pub(super) struct Word {
+pub(super) struct Quantizer {
     offset_counts: f64,
     counts_per_rad: f64,
     wrap_counts: f64,
@@ -30,7 +30,7 @@ enum State {
     Dead,
 }
 
-impl Word {
+impl Quantizer {
     pub(super) fn new(nominal: &JointSensorSpec, spec: &JointSensorsSpec, seed: u64) -> Self {
         Self {
             offset_counts: nominal.offset_counts,

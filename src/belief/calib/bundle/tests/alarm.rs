@@ -4,10 +4,10 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 use super::data::{Noise, Truth, reference, rng, titan, views};
 use crate::calib::associate::View;
-use crate::calib::bundle::estimate::{BundleInput, Estimate, Evidence, estimate, model_for};
-use crate::calib::bundle::model::{Model, Scales};
+use crate::calib::bundle::estimate::{BundleInput, Estimate, HyperparameterMode, estimate, model_for};
+use crate::calib::bundle::model::{Hyperparameters, Model};
 use crate::calib::bundle::observability::{Observability, observability};
-use crate::calib::bundle::{Change, Piece, Suspect};
+use crate::calib::bundle::{ErrorKind, GeometryElement, ScoreTestResult};
 use crate::calib::in_turn::{FOLDS, fold_of};
 use crate::calib::problem::JointParameters;
 use armcal_core::kinematics::Chain;
@@ -31,7 +31,7 @@ fn with_link(robot: &Robot, joint: usize, longer_m: f64, twist: Vector3<f64>) ->
 /// Views of the arm `real` with sensors drawn from what is believed of `robot`.
 fn views_of(robot: &Robot, real: &Robot, seed: u64) -> (Vec<View>, Model) {
     let mut rng = rng(seed, "alarm");
-    let scales = Scales::datasheet(robot);
+    let scales = Hyperparameters::datasheet(robot);
     let mut model = Model {
         joints: vec![Vec::new(); robot.n_joints()],
         mount: true,
@@ -54,18 +54,18 @@ fn input<'a>(robot: &'a Robot, views: &'a [View], model: &Model) -> BundleInput<
         robot,
         views,
         model: model.clone(),
-        scales: Scales::datasheet(robot),
+        scales: Hyperparameters::datasheet(robot),
         guess: JointParameters { reference: reference(), ..JointParameters::default() },
         joint_prior: None,
-        evidence: Evidence::Fitted,
+        evidence: HyperparameterMode::Fitted,
     }
 }
 
-fn suspects(found: &Estimate<'_>) -> Vec<Suspect> {
+fn suspects(found: &Estimate<'_>) -> Vec<ScoreTestResult> {
     found.suspects(&found.view_angles())
 }
 
-fn is_alarm(suspect: &Suspect, of: usize) -> bool {
+fn is_alarm(suspect: &ScoreTestResult, of: usize) -> bool {
     suspect.probability < ALPHA / of as f64
 }
 
@@ -103,8 +103,9 @@ fn a_link_one_centimetre_longer_is_found_named_and_measured() {
             let suspects = suspects(&found);
             let first = &suspects[0];
             assert!(is_alarm(first, suspects.len()), "joint {joint}, seed {seed}: {first:?}");
-            named += u64::from(first.piece == Piece::Joint(joint) && first.change == Change::Shift);
-            let of_link = suspects.iter().find(|s| s.piece == Piece::Joint(joint) && s.change == Change::Shift);
+            named += u64::from(first.piece == GeometryElement::Joint(joint) && first.change == ErrorKind::Shift);
+            let of_link =
+                suspects.iter().find(|s| s.piece == GeometryElement::Joint(joint) && s.change == ErrorKind::Shift);
             sizes.push(of_link.expect("tested").size.dot(&change) / change.norm_squared());
         }
         sizes.sort_by(f64::total_cmp);
@@ -146,7 +147,7 @@ fn views_that_were_left_out_are_as_far_off_as_foretold() {
             let (fitted, left_out) = fold_of(&views, fold);
             let part = BundleInput {
                 scales: all.scales().clone(),
-                evidence: Evidence::Given,
+                evidence: HyperparameterMode::Given,
                 ..input(&robot, &fitted, &model)
             };
             let found = estimate(&part).expect("solved");

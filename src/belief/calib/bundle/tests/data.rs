@@ -7,8 +7,8 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::calib::associate::{Measured, SeenCorners, TagView, View};
-use crate::calib::bundle::model::{Model, Scales};
+use crate::calib::associate::{MeanCorners, TagMeasurement, TagObservation, View};
+use crate::calib::bundle::model::{Hyperparameters, Model};
 use crate::calib::problem::{JointParameters, Parameter};
 use armcal_core::joints::{JointAngles, MAX_JOINTS};
 use armcal_core::optics::square_corners;
@@ -46,7 +46,7 @@ fn moved(pose: &Isometry3<f64>, std_m: f64, std_rad: f64, rng: &mut ChaCha8Rng) 
 
 impl Truth {
     /// Drawn from the priors of `model` under `scales`.
-    pub fn draw(robot: &Robot, model: &Model, scales: &Scales, rng: &mut ChaCha8Rng) -> Self {
+    pub fn draw(robot: &Robot, model: &Model, scales: &Hyperparameters, rng: &mut ChaCha8Rng) -> Self {
         let mut parameters = JointParameters { reference: reference(), ..JointParameters::default() };
         for (joint, kinds) in model.joints.iter().enumerate() {
             for &kind in kinds {
@@ -133,8 +133,8 @@ fn look(robot: &Robot, truth: &Truth, noise: &Noise, view: &mut View, rng: &mut 
             continue;
         }
         if let Some(seen) = seen_corners(robot, &camera_from_tag, tag.size_m, noise, rng) {
-            let measured = Measured::Corners(seen);
-            view.tags.push(TagView { id: tag.id, tag_idx, center_in_camera_m: center, measured });
+            let measured = TagMeasurement::Corners(seen);
+            view.tags.push(TagObservation { id: tag.id, tag_idx, center_in_camera_m: center, measured });
         }
     }
     if let (Some(tag), Some(link_from_tag)) = (&robot.gripper_tag, &truth.gripper_tag) {
@@ -149,7 +149,7 @@ fn seen_corners(
     size_m: f64,
     noise: &Noise,
     rng: &mut ChaCha8Rng,
-) -> Option<SeenCorners> {
+) -> Option<MeanCorners> {
     let std_px = noise.corner_px / (noise.n_frames as f64).sqrt();
     let mut corners_px = [[0.0; 2]; 4];
     for (pixel, corner) in corners_px.iter_mut().zip(square_corners(size_m)) {
@@ -161,7 +161,7 @@ fn seen_corners(
     }
     let dof = 8 * (noise.n_frames - 1);
     let scatter_px2 = (0..dof).map(|_| (noise.corner_px * normal(rng)).powi(2)).sum();
-    Some(SeenCorners { corners_px, n_frames: noise.n_frames, scatter_px2 })
+    Some(MeanCorners { corners_px, n_frames: noise.n_frames, scatter_px2 })
 }
 
 pub fn rng(seed: u64, name: &str) -> ChaCha8Rng {

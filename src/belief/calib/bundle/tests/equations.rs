@@ -4,11 +4,11 @@ use nalgebra::DVector;
 use rand::RngExt;
 
 use super::data::{Noise, Truth, normal, reference, rng, titan_with_gripper_tag, views};
-use crate::calib::associate::{Measured, View};
-use crate::calib::bundle::estimate::{BundleInput, Evidence, model_for, prior};
-use crate::calib::bundle::linearize::Normal;
-use crate::calib::bundle::model::{Model, Scales};
-use crate::calib::bundle::problem::{Problem, State};
+use crate::calib::associate::{TagMeasurement, View};
+use crate::calib::bundle::estimate::{BundleInput, HyperparameterMode, model_for, prior};
+use crate::calib::bundle::linearize::NormalEquations;
+use crate::calib::bundle::model::{Hyperparameters, Model};
+use crate::calib::bundle::problem::{BundleProblem, State};
 use crate::calib::bundle::robust::Loss;
 use crate::calib::bundle::solve::{LOOSE, StopRule, solve, stepped};
 use crate::calib::problem::JointParameters;
@@ -19,14 +19,14 @@ struct Case {
     robot: Robot,
     views: Vec<View>,
     model: Model,
-    scales: Scales,
+    scales: Hyperparameters,
 }
 
 /// A little of everything: corners, positions, poses, gripper tag, lens, clock.
 fn case(seed: u64) -> Case {
     let robot = titan_with_gripper_tag();
     let mut rng = rng(seed, "equations");
-    let mut scales = Scales::datasheet(&robot);
+    let mut scales = Hyperparameters::datasheet(&robot);
     scales.camera_error_std = Some([0.003, 0.004]);
     let mut model = Model {
         joints: vec![Vec::new(); robot.n_joints()],
@@ -56,8 +56,8 @@ fn case(seed: u64) -> Case {
                 ))
                 .frame(&robot.camera.mount);
             match k % 3 {
-                1 => tag.measured = Measured::Position,
-                2 => tag.measured = Measured::Pose(base_from_camera.inv_mul(&truth.tags[tag.tag_idx])),
+                1 => tag.measured = TagMeasurement::Position,
+                2 => tag.measured = TagMeasurement::Pose(base_from_camera.inv_mul(&truth.tags[tag.tag_idx])),
                 _ => {}
             }
         }
@@ -65,7 +65,7 @@ fn case(seed: u64) -> Case {
     Case { robot, views, model, scales }
 }
 
-fn problem(case: &Case) -> Problem<'_> {
+fn problem(case: &Case) -> BundleProblem<'_> {
     let guess = JointParameters { reference: reference(), ..JointParameters::default() };
     let input = BundleInput {
         robot: &case.robot,
@@ -74,20 +74,20 @@ fn problem(case: &Case) -> Problem<'_> {
         scales: case.scales.clone(),
         guess,
         joint_prior: None,
-        evidence: Evidence::Given,
+        evidence: HyperparameterMode::Given,
     };
-    Problem::new(&case.robot, &case.views, &case.model, &guess, prior(&input, &case.scales), case.scales.clone())
+    BundleProblem::new(&case.robot, &case.views, &case.model, &guess, prior(&input, &case.scales), case.scales.clone())
 }
 
 /// A state a little off the prior's means, the views' own parameters settled.
-fn settled(problem: &Problem<'_>, seed: u64) -> State {
+fn settled(problem: &BundleProblem<'_>, seed: u64) -> State {
     let mut rng = rng(seed, "state");
     let guess = JointParameters { reference: reference(), ..JointParameters::default() };
     let solved = solve(problem, problem.start(&guess), Loss::Square, LOOSE);
     let off = DVector::from_fn(problem.layout.n, |k, _| 0.3 * normal(&mut rng) / solved.normal.matrix[(k, k)].sqrt());
     let mut state = stepped(problem, &solved.state, &solved.normal, &off);
     let still = DVector::zeros(problem.layout.n);
-    let mut normal = Normal::new(problem);
+    let mut normal = NormalEquations::new(problem);
     for _ in 0..30 {
         normal.update(problem, &state, Loss::Square);
         state = stepped(problem, &state, &normal, &still);
@@ -95,8 +95,8 @@ fn settled(problem: &Problem<'_>, seed: u64) -> State {
     state
 }
 
-fn cost(problem: &Problem<'_>, state: &State) -> f64 {
-    let mut normal = Normal::new(problem);
+fn cost(problem: &BundleProblem<'_>, state: &State) -> f64 {
+    let mut normal = NormalEquations::new(problem);
     normal.update(problem, state, Loss::Square);
     normal.cost
 }
@@ -110,7 +110,7 @@ fn the_gradient_is_that_of_the_cost_for_each_column() {
         let case = case(seed);
         let problem = problem(&case);
         let state = settled(&problem, seed);
-        let mut normal = Normal::new(&problem);
+        let mut normal = NormalEquations::new(&problem);
         normal.update(&problem, &state, Loss::Square);
         let mut largest = 0.0_f64;
         for column in 0..problem.layout.n {

@@ -4,9 +4,9 @@ use rand::RngExt;
 
 use super::data::{Noise, Truth, rng, titan, views};
 use crate::calib::associate::View;
-use crate::calib::bundle::estimate::{Estimate, Evidence, model_for};
-use crate::calib::bundle::failed::{Applied, Failure, Found, Reading};
-use crate::calib::bundle::{detect, model::Scales};
+use crate::calib::bundle::estimate::{Estimate, HyperparameterMode, model_for};
+use crate::calib::bundle::failed::{Failure, FailureAdjusted, FailureSource, SensorUse};
+use crate::calib::bundle::{detect, model::Hyperparameters};
 use crate::calib::problem::JointParameters;
 use armcal_core::robot::{FailedKind, Robot};
 
@@ -22,7 +22,7 @@ struct Case {
 fn case(seed: u64, locked: Option<usize>) -> Case {
     let robot = titan();
     let mut rng = rng(seed, "failed joints");
-    let scales = Scales::datasheet(&robot);
+    let scales = Hyperparameters::datasheet(&robot);
     let noise = Noise { corner_px: 0.3, n_frames: 5, joint_rad: scales.joint_std_rad };
     let mut model = model_for(&robot, &[]);
     let drawn = Truth::draw(&robot, &model, &scales, &mut rng);
@@ -39,8 +39,8 @@ fn case(seed: u64, locked: Option<usize>) -> Case {
 }
 
 fn found_failures(case: &Case, declared: &[Failure]) -> Vec<Failure> {
-    let applied = Applied::new(&case.robot, &case.views, declared, &JointParameters::default());
-    let found = applied.estimate(Evidence::Fitted);
+    let applied = FailureAdjusted::new(&case.robot, &case.views, declared, &JointParameters::default());
+    let found = applied.estimate(HyperparameterMode::Fitted);
     detect::failures(&case.robot, &case.views, declared, found.as_ref())
 }
 
@@ -101,10 +101,10 @@ fn check(kind: FailedKind, seeds: std::ops::Range<u64>, break_it: impl Fn(&mut C
         }
         let named: Vec<(usize, FailedKind)> = failures.iter().map(|f| (f.joint, f.kind)).collect();
         assert_eq!(named, [(joint, kind)], "seed {seed}: {failures:?}");
-        assert_eq!(failures[0].found, Found::Detected);
+        assert_eq!(failures[0].found, FailureSource::Detected);
         assert_eq!(failures[0].views, expected, "seed {seed}: {failures:?}");
-        let applied = Applied::new(&case.robot, &case.views, &failures, &JointParameters::default());
-        let found = applied.estimate(Evidence::Fitted).expect("the rest is determined");
+        let applied = FailureAdjusted::new(&case.robot, &case.views, &failures, &JointParameters::default());
+        let found = applied.estimate(HyperparameterMode::Fitted).expect("the rest is determined");
         assert!(found.outliers.len() <= 2, "seed {seed}: {:?}", found.outliers);
         sigmas.extend(off_sigmas(&case, &found, joint));
     }
@@ -167,7 +167,7 @@ fn a_locked_joint_with_a_sound_sensor_keeps_it() {
         let failures = found_failures(&case, &[]);
         assert_eq!(failures.len(), 1, "seed {seed}: {failures:?}");
         let Failure { kind, reading, views, .. } = &failures[0];
-        assert_eq!((*kind, *reading, views.len()), (FailedKind::Locked, Reading::Used, 0), "seed {seed}");
+        assert_eq!((*kind, *reading, views.len()), (FailedKind::Locked, SensorUse::Used, 0), "seed {seed}");
     }
 }
 
@@ -199,6 +199,6 @@ fn what_is_declared_is_believed_and_not_looked_for() {
     for view in &mut case.views {
         view.travel_rad[2] = rng.random_range(-2.0..2.0);
     }
-    let declared = [Failure::without_sensor(2, FailedKind::Dead, Found::Declared, N_VIEWS)];
+    let declared = [Failure::without_sensor(2, FailedKind::Dead, FailureSource::Declared, N_VIEWS)];
     assert_eq!(found_failures(&case, &declared), declared);
 }

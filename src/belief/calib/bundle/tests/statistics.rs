@@ -6,17 +6,17 @@ use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 
 use super::data::{Noise, Truth, reference, rng, titan, titan_with_gripper_tag, views};
-use crate::calib::associate::{Measured, View};
-use crate::calib::bundle::estimate::{BundleInput, Estimate, Evidence, estimate, model_for};
+use crate::calib::associate::{TagMeasurement, View};
+use crate::calib::bundle::estimate::{BundleInput, Estimate, HyperparameterMode, estimate, model_for};
 use crate::calib::bundle::evidence::Posterior;
-use crate::calib::bundle::linearize::Normal;
-use crate::calib::bundle::model::{Model, Scales};
+use crate::calib::bundle::linearize::NormalEquations;
+use crate::calib::bundle::model::{Hyperparameters, Model};
 use crate::calib::bundle::problem::State;
 use crate::calib::bundle::robust::Loss;
 use crate::calib::problem::{JointParameters, Parameter};
 use armcal_core::joints::{JointAngles, MAX_JOINTS};
 use armcal_core::robot::Robot;
-use armcal_core::sensor::Departure;
+use armcal_core::sensor::ConditionChange;
 use armcal_core::spatial::log;
 
 const N_FRAMES: usize = 8;
@@ -26,12 +26,12 @@ struct Case<'a> {
     robot: &'a Robot,
     truth: Truth,
     views: Vec<View>,
-    scales: Scales,
+    scales: Hyperparameters,
     model: Model,
 }
 
-fn scales(robot: &Robot) -> Scales {
-    Scales::datasheet(robot)
+fn scales(robot: &Robot) -> Hyperparameters {
+    Hyperparameters::datasheet(robot)
 }
 
 fn case(robot: &Robot, seed: u64, n_views: usize) -> Case<'_> {
@@ -57,7 +57,7 @@ fn case(robot: &Robot, seed: u64, n_views: usize) -> Case<'_> {
     Case { robot, truth, views, scales, model }
 }
 
-fn input<'a>(case: &'a Case<'_>, views: &'a [View], evidence: Evidence) -> BundleInput<'a> {
+fn input<'a>(case: &'a Case<'_>, views: &'a [View], evidence: HyperparameterMode) -> BundleInput<'a> {
     BundleInput {
         robot: case.robot,
         views,
@@ -77,7 +77,7 @@ fn task(robot: &Robot, rng: &mut ChaCha8Rng) -> Vec<JointAngles> {
 }
 
 fn tool(robot: &Robot, parameters: &JointParameters, travel: &JointAngles) -> nalgebra::Vector3<f64> {
-    let still = Departure::default();
+    let still = ConditionChange::default();
     let angles = JointAngles::from_fn(robot.n_joints(), |j| {
         parameters.correction(j).angle_rad(&robot.sensors[j], travel[j], &still, 0.0)
     });
@@ -86,7 +86,7 @@ fn tool(robot: &Robot, parameters: &JointParameters, travel: &JointAngles) -> na
 
 /// d(tool)/d(joint parameter), at the truth.
 fn tool_jacobian(case: &Case<'_>, parameters: &[Parameter], travel: &JointAngles) -> DMatrix<f64> {
-    let still = Departure::default();
+    let still = ConditionChange::default();
     let angles = JointAngles::from_fn(case.robot.n_joints(), |j| {
         case.truth.parameters.correction(j).angle_rad(&case.robot.sensors[j], travel[j], &still, 0.0)
     });
@@ -113,8 +113,8 @@ fn state_of(case: &Case<'_>, found: &Estimate<'_>) -> State {
 
 /// The Bayesian Cramer-Rao bound (van Trees): the inverse information at the truth, under the true scales.
 fn bound(case: &Case<'_>, found: &Estimate<'_>) -> DMatrix<f64> {
-    let given = estimate(&input(case, &case.views, Evidence::Given)).expect("solved");
-    let mut normal = Normal::new(&given.problem);
+    let given = estimate(&input(case, &case.views, HyperparameterMode::Given)).expect("solved");
+    let mut normal = NormalEquations::new(&given.problem);
     normal.update(&given.problem, &state_of(case, found), Loss::Square);
     let n = given.problem.layout.n_joint();
     let posterior = Posterior::of(&given.problem, &normal).expect("regular");
@@ -135,7 +135,7 @@ fn tally(robot: &Robot, seeds: std::ops::Range<u64>, n_views: usize) -> Tally {
     let mut tally = Tally::default();
     for seed in seeds {
         let case = case(robot, seed, n_views);
-        let found = estimate(&input(&case, &case.views, Evidence::Fitted)).expect("solved");
+        let found = estimate(&input(&case, &case.views, HyperparameterMode::Fitted)).expect("solved");
         let bound = bound(&case, &found);
         let (at, covariance) = (found.parameters(), found.joint_covariance());
         let parameters = found.joint_parameters();
@@ -210,7 +210,8 @@ fn two_calibrations_from_disjoint_views_agree() {
     for seed in 1000..1100 {
         let case = case(&robot, seed, 50);
         let (first, second) = case.views.split_at(25);
-        let [a, b] = [first, second].map(|half| estimate(&input(&case, half, Evidence::Given)).expect("solved"));
+        let [a, b] =
+            [first, second].map(|half| estimate(&input(&case, half, HyperparameterMode::Given)).expect("solved"));
         if a.problem.layout.tags != b.problem.layout.tags {
             continue;
         }
@@ -267,10 +268,10 @@ fn gross_errors_are_named_and_cost_little() {
     let [mut wrong, mut named, mut falsely] = [0usize; 3];
     for seed in 2000..2040 {
         let mut case = case(&robot, seed, 30);
-        let found = estimate(&input(&case, &case.views, Evidence::Fitted)).expect("solved");
+        let found = estimate(&input(&case, &case.views, HyperparameterMode::Fitted)).expect("solved");
         clean += rms_error(&case, &found, seed).powi(2);
         let soiled_at = soil(&mut case.views, robot.tags.len(), &mut rng(seed, "soil"));
-        let found = estimate(&input(&case, &case.views, Evidence::Fitted)).expect("solved");
+        let found = estimate(&input(&case, &case.views, HyperparameterMode::Fitted)).expect("solved");
         soiled += rms_error(&case, &found, seed).powi(2);
         let out: Vec<(usize, u32)> = found.outliers.iter().map(|o| (o.view_idx, o.tag_id)).collect();
         wrong += soiled_at.len();
@@ -298,7 +299,7 @@ fn soil(views: &mut [View], n_tags: usize, rng: &mut ChaCha8Rng) -> Vec<(usize, 
             if rng.random_range(0.0..1.0) < 0.5 && !others.is_empty() {
                 tag.tag_idx = others[rng.random_range(0..others.len())];
                 tag.id = tag.tag_idx as u32;
-            } else if let Measured::Corners(seen) = &mut tag.measured {
+            } else if let TagMeasurement::Corners(seen) = &mut tag.measured {
                 let sign = if rng.random_range(0.0..1.0) < 0.5 { -1.0 } else { 1.0 };
                 seen.corners_px[rng.random_range(0..4)][rng.random_range(0..2)] += sign * rng.random_range(4.0..40.0);
             }
@@ -314,12 +315,12 @@ fn the_order_of_views_and_tags_does_not_matter() {
     let robot = titan();
     for seed in 0..5 {
         let case = case(&robot, seed, 20);
-        let one = estimate(&input(&case, &case.views, Evidence::Fitted)).expect("solved");
+        let one = estimate(&input(&case, &case.views, HyperparameterMode::Fitted)).expect("solved");
         let mut shuffled = case.views.clone();
         let mut rng = rng(seed, "order");
         shuffled.shuffle(&mut rng);
         shuffled.iter_mut().for_each(|view| view.tags.shuffle(&mut rng));
-        let other = estimate(&input(&case, &shuffled, Evidence::Fitted)).expect("solved");
+        let other = estimate(&input(&case, &shuffled, HyperparameterMode::Fitted)).expect("solved");
         let scale = one.joint_covariance().diagonal().map(f64::sqrt);
         for (k, p) in one.joint_parameters().iter().enumerate() {
             let (a, b) = (one.parameters().get(*p), other.parameters().get(*p));
@@ -335,7 +336,7 @@ fn the_order_of_views_and_tags_does_not_matter() {
 fn joint_errors_stay_at_zero_where_sensors_are_exact() {
     let robot = titan();
     let case = case(&robot, 3, 25);
-    let found = estimate(&input(&case, &case.views, Evidence::Fitted)).expect("solved");
+    let found = estimate(&input(&case, &case.views, HyperparameterMode::Fitted)).expect("solved");
     let largest = found.solved.state.joint_error.iter().flatten().map(|e| e.abs()).fold(0.0, f64::max);
     let std = case.scales.joint_std_rad[..MAX_JOINTS].iter().copied().fold(0.0, f64::max);
     assert!(largest < 6.0 * std, "{largest} {std}");

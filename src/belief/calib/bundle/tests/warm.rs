@@ -4,20 +4,20 @@ use nalgebra::Vector3;
 
 use super::data::{Noise, Truth, normal, rng, titan, views};
 use crate::calib::associate::View;
-use crate::calib::bundle::estimate::{Estimate, Evidence, estimate, model_for, reference};
-use crate::calib::bundle::failed::Applied;
-use crate::calib::bundle::model::Scales;
-use crate::calib::bundle::prior::{Agreement, MOUNT_ROWS, WarmStart, with_mount_rows};
+use crate::calib::bundle::estimate::{Estimate, HyperparameterMode, estimate, model_for, reference};
+use crate::calib::bundle::failed::FailureAdjusted;
+use crate::calib::bundle::model::Hyperparameters;
+use crate::calib::bundle::prior::{CalibrationPrior, MOUNT_ROWS, PriorConsistency, with_mount_rows};
 use crate::calib::camera_mount::CameraMount;
 use crate::calib::problem::JointParameters;
 use crate::calib::result::{
-    Calibration, CovarianceTable, FitFigures, HeldOutFigures, JointResult, Status, shortened_rows,
+    Calibration, CovarianceTable, FitMetrics, HeldOutMetrics, JointResult, Status, shortened_rows,
 };
 use crate::calib::uncertainty::ParameterCovariance;
 use crate::calib::{ReferenceTable, TermsTable, ValidRange};
 use armcal_core::robot::Robot;
 use armcal_core::routine::Method;
-use armcal_core::sensor::Departure;
+use armcal_core::sensor::ConditionChange;
 use armcal_core::stats::quantile;
 
 const FULL_VIEWS: usize = 30;
@@ -38,15 +38,15 @@ struct Case {
 fn case(seed: u64, slip: Option<(usize, f64)>, n_later: usize) -> Case {
     let robot = titan();
     let mut rng = rng(seed, "warm");
-    let scales = Scales::datasheet(&robot);
+    let scales = Hyperparameters::datasheet(&robot);
     let noise = Noise { corner_px: 0.3, n_frames: 5, joint_rad: scales.joint_std_rad };
     let mut model = model_for(&robot, &[]);
     let drawn = Truth::draw(&robot, &model, &scales, &mut rng);
     model.joints = model_for(&robot, &views(&robot, &drawn, &noise, 6, &mut rng)).joints;
     let mut truth = Truth::draw(&robot, &model, &scales, &mut rng);
     let first = still_readings(views(&robot, &truth, &noise, FULL_VIEWS, &mut rng));
-    let applied = Applied::new(&robot, &first, &[], &JointParameters::default());
-    let found = estimate(&applied.input(Evidence::Given)).expect("solved");
+    let applied = FailureAdjusted::new(&robot, &first, &[], &JointParameters::default());
+    let found = estimate(&applied.input(HyperparameterMode::Given)).expect("solved");
     let prior = calibration(&robot, &found, &first);
     for joint in 0..robot.camera.mount.n_joints {
         truth.parameters.offset_rad[joint] += DRIFT_RAD_PER_SQRT_H * HOURS.sqrt() * normal(&mut rng);
@@ -117,7 +117,7 @@ fn calibration(robot: &Robot, found: &Estimate<'_>, views: &[View]) -> Calibrati
         unobservable: Vec::new(),
         observability: None,
         verdict: None,
-        fit: FitFigures {
+        fit: FitMetrics {
             outcome: "converged".to_owned(),
             evaluations: 1,
             cost_initial: 1.0,
@@ -130,7 +130,7 @@ fn calibration(robot: &Robot, found: &Estimate<'_>, views: &[View]) -> Calibrati
             rms_px: Some(0.0),
             linearity_scale: 1.0,
         },
-        held_out: HeldOutFigures {
+        held_out: HeldOutMetrics {
             views: 0,
             in_turn: true,
             rms_m: None,
@@ -153,9 +153,9 @@ fn calibration(robot: &Robot, found: &Estimate<'_>, views: &[View]) -> Calibrati
     }
 }
 
-fn agreement(case: &Case) -> Agreement {
-    let applied = Applied::new(&case.robot, &case.later, &[], &JointParameters::default());
-    WarmStart::new(&case.prior, &applied).expect("a covariance").agreement(&case.later).expect("solved")
+fn agreement(case: &Case) -> PriorConsistency {
+    let applied = FailureAdjusted::new(&case.robot, &case.later, &[], &JointParameters::default());
+    CalibrationPrior::new(&case.prior, &applied).expect("a covariance").agreement(&case.later).expect("solved")
 }
 
 #[test]
@@ -194,7 +194,7 @@ fn a_slip_of_one_degree_is_refused_and_named() {
 /// Tool errors of an answer over the middle of the range, under the later views' conditions, rms, m.
 fn tool_error_m(case: &Case, parameters: &JointParameters) -> f64 {
     let at = |p: &JointParameters, view: &View| -> Vector3<f64> {
-        let departure: Departure = view.conditions.departure_from(&p.reference);
+        let departure: ConditionChange = view.conditions.departure_from(&p.reference);
         let angles = armcal_core::joints::JointAngles::from_fn(case.robot.n_joints(), |j| {
             p.correction(j).angle_rad(&case.robot.sensors[j], view.travel_rad[j], &departure, 0.0)
         });
@@ -212,12 +212,12 @@ fn five_warm_views_are_as_good_as_a_full_calibration() {
         // Errors are looked at in all later views; the warm start has the first five of them.
         let case = case(seed, None, FULL_VIEWS);
         let few: Vec<View> = case.later[..WARM_VIEWS].to_vec();
-        let applied = Applied::new(&case.robot, &few, &[], &JointParameters::default());
-        let start = WarmStart::new(&case.prior, &applied).expect("a covariance");
-        let warm = estimate(&start.input(&few, Evidence::Fitted).expect("regular")).expect("solved");
-        let cold = estimate(&applied.input(Evidence::Fitted)).expect("solved");
-        let all = Applied::new(&case.robot, &case.later, &[], &JointParameters::default());
-        let full = estimate(&all.input(Evidence::Fitted)).expect("solved");
+        let applied = FailureAdjusted::new(&case.robot, &few, &[], &JointParameters::default());
+        let start = CalibrationPrior::new(&case.prior, &applied).expect("a covariance");
+        let warm = estimate(&start.input(&few, HyperparameterMode::Fitted).expect("regular")).expect("solved");
+        let cold = estimate(&applied.input(HyperparameterMode::Fitted)).expect("solved");
+        let all = FailureAdjusted::new(&case.robot, &case.later, &[], &JointParameters::default());
+        let full = estimate(&all.input(HyperparameterMode::Fitted)).expect("solved");
         for (errors, found) in [(&mut warm_m, &warm), (&mut cold_m, &cold), (&mut full_m, &full)] {
             errors.push(tool_error_m(&case, &found.parameters()));
         }
