@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use armcal::plan::{ClearanceModel, JointErrorBounds, PlanFile, PlanStop};
+use armcal::plan::{ClearanceModel, JointErrorBounds, PlanFile, StopReason};
 use armcal::robot::Robot;
 use armcal::routine;
 use armcal::sensor::ArmSensors;
@@ -41,7 +41,7 @@ fn the_same_input_gives_the_same_bytes_and_check_reads_them() {
     let first = PlanFile::read(&outs[0].join("plan.toml")).expect("reads");
     assert_ne!(first.pose[0].angles_rad, other.pose[0].angles_rad, "another seed, other poses");
     assert_ne!(first.inputs_hash, other.inputs_hash);
-    assert_eq!((first.totals.poses, first.totals.stop_reason), (first.pose.len(), PlanStop::Poses));
+    assert_eq!((first.totals.poses, first.totals.stop_reason), (first.pose.len(), StopReason::Poses));
     assert_eq!(first.totals.poses + first.totals.left_out, 16);
     let file = outs[0].join("plan.toml");
     answer(program().arg("check").arg(&file)).expect("check", 0, &["plan for `titan4`", "clear"]);

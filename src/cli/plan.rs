@@ -13,7 +13,7 @@ use super::given::read_prior;
 use super::overrides::OverrideArgs;
 use super::stdout::say;
 use armcal_belief::plan::{
-    ArmBelief, ClearanceModel, ItineraryRequest, PlanFile, PlanHeader, PlanStop, PoseTable, SetName, plan_itinerary,
+    ArmBelief, ClearanceModel, ItineraryRequest, PlanFile, PlanHeader, PoseTable, SetName, plan_itinerary,
 };
 use armcal_core::robot::{Robot, Vehicle};
 use armcal_core::routine::{self, Overrides, Routine, Step, effective_table};
@@ -181,19 +181,14 @@ fn row(pose: &PoseTable) -> [String; 8] {
 
 fn totals(file: &PlanFile) -> String {
     let totals = &file.totals;
-    let why = match totals.stop_reason {
-        PlanStop::Poses => "as many as asked for",
-        PlanStop::ToolError => "the tool error asked for is predicted",
-        PlanStop::Time => "the time is spent",
-        PlanStop::NoPoseLeft => "no other one sees enough tags and keeps clear",
-    };
     let error = totals.predicted_tool_error_m.map_or_else(|| "-".to_owned(), |m| format!("{:.2} mm", 1e3 * m));
     format!(
-        "planned      {} poses ({why}), {} left out, {:.0} s of the arm's time, {:.0} s of it moving\n\
-         tool error   {error} predicted after the last one\n\
-         clearance    proven {:.0} mm or more for every arm within {}, at the poses the least of the believed arm's beside it\n\
+        "planned      {} poses ({}), {} infeasible, {:.0} s of arm time, {:.0} s of it moving\n\
+         tool error   {error} predicted after the last pose\n\
+         clearance    certified {:.0} mm or more for any joint error within {}\n\
          joints       {}",
         totals.poses,
+        totals.stop_reason,
         totals.left_out,
         totals.arm_time_s,
         totals.motion_s,

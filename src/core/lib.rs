@@ -5,6 +5,7 @@ pub mod input;
 pub mod joints;
 pub mod kinematics;
 pub mod log;
+pub mod numeric;
 pub mod optics;
 pub mod robot;
 pub mod routine;

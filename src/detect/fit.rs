@@ -2,10 +2,11 @@
 //!
 //! `I = a.(1, s, t) + P(s, t; blur) g.(1, s, t)`: black level and contrast with a linear gradient each, P the tag's cells
 //! convolved with a Gaussian of any shape (defocus, motion, the pixel itself). Unknown are the eight corner coordinates (a
-//! homography of the bearings, so that the lens's curves are in it), three of the blur and six of the light. Gauss-Newton
-//! with damping; Huber's weights from the second pass on, for snow and whatever lies in front. The inverse normal matrix
+//! homography of the bearings, so that the lens's curves are in it), three of the blur and six of the light. Levenberg-
+//! Marquardt; Huber's weights from the second pass on, for snow and whatever lies in front. The inverse normal matrix
 //! times the residual variance is the corners' covariance.
 
+use armcal_core::numeric::{Damping, LeastSquares, Loss, Outcome, Proposal, StopRule, minimize};
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 
 use super::GreyImage;
@@ -80,6 +81,55 @@ struct Scene<'a> {
     cells: &'a Cells,
 }
 
+/// One pass of the fit.
+#[derive(Clone, Copy)]
+struct Stage {
+    n_samples: usize,
+    loss: Loss,
+    n_iterations: usize,
+}
+
+const DAMPING: Damping = Damping { first: 1e-3, min: 1e-9, max: 1e4, down: 0.1, up: 10.0, min_after_rejection: 0.0 };
+
+struct Search<'a, 'b> {
+    fitter: &'a Fitter,
+    scene: &'a Scene<'b>,
+    stage: Stage,
+    x: Parameters,
+    here: Linearized,
+    trial: Parameters,
+    there: Option<Linearized>,
+}
+
+impl LeastSquares for Search<'_, '_> {
+    fn cost(&self) -> f64 {
+        self.here.cost
+    }
+
+    fn propose(&mut self, damping: f64) -> Option<Proposal> {
+        let mut damped = self.here.matrix;
+        for k in 0..N {
+            damped[(k, k)] *= 1.0 + damping;
+        }
+        let step = damped.cholesky()?.solve(&self.here.gradient);
+        self.trial = self.x + step;
+        keep_blur(&mut self.trial);
+        // How far the corners go, px.
+        Some(Proposal { length: step.fixed_rows::<8>(0).amax(), predicted_gain: f64::INFINITY })
+    }
+
+    fn trial_cost(&mut self) -> Option<f64> {
+        self.there = self.fitter.linearize(self.scene, &self.trial, self.stage.n_samples, self.stage.loss);
+        self.there.as_ref().map(|there| there.cost)
+    }
+
+    fn accept(&mut self) {
+        if let Some(there) = self.there.take() {
+            (self.x, self.here) = (self.trial, there);
+        }
+    }
+}
+
 impl Fitter {
     pub(super) fn new() -> Self {
         Self { normal: NormalTable::new(), samples: Vec::new(), sizes: Vec::new() }
@@ -101,10 +151,12 @@ impl Fitter {
             return None;
         }
         let mut x = self.start(&scene, start_px, n_coarse)?;
-        self.iterate(&scene, &mut x, n_coarse, f64::INFINITY, COARSE_ITERATIONS)?;
+        let coarse = Stage { n_samples: n_coarse, loss: Loss::Square, n_iterations: COARSE_ITERATIONS };
+        self.iterate(&scene, &mut x, coarse)?;
         let scale = self.residual_std(&scene, &x, n_coarse)?;
-        let n = self.samples.len();
-        let end = self.iterate(&scene, &mut x, n, HUBER * scale, FINE_ITERATIONS)?;
+        let loss = Loss::Huber { k: HUBER * scale };
+        let fine = Stage { n_samples: self.samples.len(), loss, n_iterations: FINE_ITERATIONS };
+        let end = self.iterate(&scene, &mut x, fine)?;
         self.finish(&x, &end)
     }
 
@@ -139,47 +191,19 @@ impl Fitter {
         Some(x)
     }
 
-    fn iterate(
-        &self,
-        scene: &Scene,
-        x: &mut Parameters,
-        n: usize,
-        bend: f64,
-        n_iterations: usize,
-    ) -> Option<Linearized> {
-        let mut here = self.linearize(scene, x, n, bend)?;
-        let mut damping = 1e-3;
-        for _ in 0..n_iterations {
-            let mut damped = here.matrix;
-            for k in 0..N {
-                damped[(k, k)] *= 1.0 + damping;
-            }
-            let step = damped.cholesky()?.solve(&here.gradient);
-            let mut trial = *x + step;
-            keep_blur(&mut trial);
-            match self.linearize(scene, &trial, n, bend).filter(|there| there.cost <= here.cost) {
-                Some(there) => {
-                    let largest = step.fixed_rows::<8>(0).amax();
-                    *x = trial;
-                    here = there;
-                    damping = (damping * 0.1).max(1e-9);
-                    if largest < DONE_PX {
-                        break;
-                    }
-                }
-                None => {
-                    damping *= 10.0;
-                    if damping > 1e4 {
-                        break;
-                    }
-                }
-            }
+    fn iterate(&self, scene: &Scene, x: &mut Parameters, stage: Stage) -> Option<Linearized> {
+        let here = self.linearize(scene, x, stage.n_samples, stage.loss)?;
+        let mut search = Search { fitter: self, scene, stage, x: *x, here, trial: *x, there: None };
+        let stop = StopRule { step_length: DONE_PX, ..StopRule::after(stage.n_iterations) };
+        if minimize(&mut search, &DAMPING, &stop).outcome() == Outcome::Degenerate {
+            return None;
         }
-        Some(here)
+        *x = search.x;
+        Some(search.here)
     }
 
-    /// Cost with Huber's bend at `bend` grey levels, and its quadratic model; priors in units of the residual variance.
-    fn linearize(&self, scene: &Scene, x: &Parameters, n: usize, bend: f64) -> Option<Linearized> {
+    /// Cost under a loss in grey levels, and its quadratic model; priors in units of the residual variance.
+    fn linearize(&self, scene: &Scene, x: &Parameters, n: usize, loss: Loss) -> Option<Linearized> {
         let corners = corners_of(x);
         let (homography, jacobians) = scene.homography(&corners)?;
         let mut out =
@@ -192,9 +216,8 @@ impl Fitter {
             if !(0.0..=255.0).contains(&value) && residual == 0.0 {
                 continue;
             }
-            let size = residual.abs();
-            let weight = if size > bend { bend / size } else { 1.0 };
-            out.cost += if size > bend { bend * (2.0 * size - bend) } else { residual * residual };
+            let (cost, weight) = loss.of(residual * residual);
+            out.cost += cost;
             out.weight += weight;
             out.squares += weight * residual * residual;
             for i in 0..N {

@@ -5,9 +5,10 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use armcal_belief::calib::{
-    Calibration, CameraMount, FailedJointTable, JointResult, MapResult, ObservabilityTable, PriorTable, Status,
-    VerdictTable,
+    Calibration, CameraMount, FailedJointTable, Finding, JointResult, MapResult, ObservabilityTable, PriorTable,
+    Refusal, Status, VerdictTable,
 };
+use armcal_core::numeric::Outcome;
 use armcal_core::stats::Summary;
 
 /// The figures of a run or of a calibration, for programs.
@@ -20,7 +21,11 @@ pub struct RunSummary {
     pub seed: Option<u64>,
     pub method: String,
     pub status: Status,
+    /// All reasons in words.
     pub refusal: Option<String>,
+    /// The same as data, the most telling first.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub refusals: Vec<Refusal>,
     /// By the arm's clock, first to last step.
     pub simulated_s: Option<f64>,
     /// Of that, the time in which the arm was on its way.
@@ -98,7 +103,7 @@ pub struct RenewalSummary {
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CalibrationSummary {
-    pub outcome: String,
+    pub outcome: Outcome,
     pub evaluations: usize,
     pub wall_s: f64,
     /// Absent where the recording has positions or poses of the tags and no corners.
@@ -117,6 +122,9 @@ pub struct CalibrationSummary {
     /// By the tag on the gripper, where the robot has one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera_mount: Option<CameraMount>,
+    /// What is other than robot.toml, survey and drawing say, the most telling first.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub findings: Vec<Finding>,
     /// Joints that failed, or whose sensors did.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub failed_joint: Vec<FailedJointTable>,
@@ -158,12 +166,12 @@ impl GainChange {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct HeldOutSummary {
     pub views: usize,
-    /// Every view was held out in turn, and the answer is fitted to all of them.
-    #[serde(default)]
-    pub in_turn: bool,
+    /// By cross-validation: each view was held out of one fold, and the answer is fitted to all of them.
+    #[serde(default, alias = "in_turn")]
+    pub cross_validated: bool,
     pub rms_px: Option<f64>,
     pub rms_m: Option<f64>,
-    /// The mean of the same distances, where views were held out in turn.
+    /// The mean of the same distances, where views were cross-validated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mean_m: Option<f64>,
     /// Mean distance of the camera from where the landmarks' measured poses have it, where the recording has poses.
@@ -257,6 +265,7 @@ impl RunSummary {
             method: calibration.method.to_string(),
             status: calibration.status,
             refusal: calibration.refusal.clone(),
+            refusals: calibration.refusals.clone(),
             simulated_s: None,
             motion_s: None,
             waited_s: None,
@@ -264,7 +273,7 @@ impl RunSummary {
             wall_s: calibration_wall_s,
             capture: CaptureSummary {
                 poses: calibration.fit.views
-                    + if calibration.held_out.in_turn { 0 } else { calibration.held_out.views },
+                    + if calibration.held_out.cross_validated { 0 } else { calibration.held_out.views },
                 poses_skipped: 0,
                 targets_skipped: 0,
                 views: calibration.fit.views,
@@ -278,7 +287,7 @@ impl RunSummary {
                 stop_reason: None,
             },
             calibration: CalibrationSummary {
-                outcome: calibration.fit.outcome.clone(),
+                outcome: calibration.fit.outcome,
                 evaluations: calibration.fit.evaluations,
                 wall_s: calibration_wall_s,
                 residual_rms_px: calibration.fit.rms_px,
@@ -289,6 +298,7 @@ impl RunSummary {
                 largest_gain_change: GainChange::largest(&calibration.joint),
                 predicted_tool_error_m: calibration.predicted_tool_error_m,
                 camera_mount: calibration.camera_mount.clone(),
+                findings: calibration.findings.clone(),
                 failed_joint: calibration.failed_joint.clone(),
                 prior: calibration.prior.clone(),
                 map: calibration.map.clone(),
@@ -297,7 +307,7 @@ impl RunSummary {
             },
             held_out: HeldOutSummary {
                 views: calibration.held_out.views,
-                in_turn: calibration.held_out.in_turn,
+                cross_validated: calibration.held_out.cross_validated,
                 rms_px: calibration.held_out.rms_px,
                 rms_m: calibration.held_out.rms_m,
                 mean_m: calibration.held_out.mean_m,

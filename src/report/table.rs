@@ -120,9 +120,9 @@ pub(super) fn check_lines(summary: &RunSummary) -> Vec<String> {
     }];
     let held_out = &summary.held_out;
     lines.push(format!(
-        "held out     {} views {}: tags off by {} rms (datasheet sensors: {}), {} in the image",
+        "held out     {} views, {}: tag position error {} rms (datasheet sensors: {}), reprojection error {}",
         held_out.views,
-        if held_out.in_turn { "by what the others told" } else { "the fit did not use" },
+        if held_out.cross_validated { "5-fold cross-validation" } else { "not fitted" },
         mm(held_out.rms_m),
         mm(held_out.nominal_rms_m),
         held_out.rms_px.map_or_else(|| "-".to_owned(), |v| format!("{v:.1} px")),
@@ -136,7 +136,7 @@ pub(super) fn check_lines(summary: &RunSummary) -> Vec<String> {
     }
     let capture = &summary.capture;
     lines.push(format!(
-        "captured     {} poses, {} skipped; {} tags in {} fitted views, {} rejected; {} targets skipped",
+        "captured     {} poses, {} skipped; {} tag observations in {} fitted views, {} rejected; {} targets skipped",
         capture.poses,
         capture.poses_skipped,
         capture.detections,
@@ -148,7 +148,7 @@ pub(super) fn check_lines(summary: &RunSummary) -> Vec<String> {
         let reasons = capture.rejected_by_reason.iter().map(|(why, n)| format!("{n} {}", why.replace('_', " ")));
         lines.push(format!("rejected     {}", reasons.collect::<Vec<_>>().join(", ")));
     }
-    lines.extend(capture.stop_reason.as_ref().map(|why| enough_line(why, &capture.renewals)));
+    lines.extend(capture.stop_reason.as_ref().map(|why| stop_reason_line(why, &capture.renewals)));
     lines.extend(summary.calibration.largest_gain_change.as_ref().map(gain_line));
     lines.extend(summary.calibration.camera_mount.as_ref().map(mount_line));
     lines.extend(summary.calibration.failed_joint.iter().map(failed_line));
@@ -156,7 +156,7 @@ pub(super) fn check_lines(summary: &RunSummary) -> Vec<String> {
     lines.extend(summary.calibration.map.iter().flat_map(map_lines));
     if let (Some(collisions), clearance) = (capture.collisions, capture.min_clearance_m) {
         lines.push(format!(
-            "contacts     {collisions}; nearest the arm came to vehicle, obstacles or seafloor: {}",
+            "contacts     {collisions}; minimum clearance to vehicle, obstacles, seafloor: {}",
             mm(clearance)
         ));
     }
@@ -165,7 +165,7 @@ pub(super) fn check_lines(summary: &RunSummary) -> Vec<String> {
         lines.extend(verdict.not_covered.iter().map(|line| format!("not covered  {line}")));
     }
     for line in &summary.calibration.unobservable {
-        lines.push(format!("not known    {line}"));
+        lines.push(format!("unobservable {line}"));
     }
     lines.extend(reach_lines(summary));
     lines.extend(summary.asserts.iter().map(assert_line));
@@ -183,14 +183,14 @@ pub(super) fn check_lines(summary: &RunSummary) -> Vec<String> {
 }
 
 /// Why the last capture ended, and what was predicted on its way.
-fn enough_line(why: &str, renewals: &[RenewalSummary]) -> String {
+fn stop_reason_line(why: &str, renewals: &[RenewalSummary]) -> String {
     let last = renewals.chunk_by(|before, after| before.views < after.views).last().unwrap_or_default();
     if last.is_empty() {
-        return format!("enough       {why}");
+        return format!("stop reason  {why}");
     }
     let joined = |of: fn(&RenewalSummary) -> String| last.iter().map(of).collect::<Vec<_>>().join(", ");
     format!(
-        "enough       {why}; predicted after {} views: {} mm",
+        "stop reason  {why}; predicted tool error after {} views: {} mm",
         joined(|renewal| renewal.views.to_string()),
         joined(|renewal| format!("{:.1}", 1e3 * renewal.predicted_tool_error_m))
     )
@@ -240,19 +240,19 @@ fn prior_line(prior: &PriorTable) -> String {
 }
 
 fn map_lines(map: &MapResult) -> Vec<String> {
-    let known = match map.known {
+    let surveyed = match map.known {
         SurveyCoverage::Partly => "some of it surveyed",
         SurveyCoverage::BaseTagAlone => "nothing surveyed but the base tag",
     };
     let worst_m = map.tag.iter().flat_map(|tag| tag.position_std_m).fold(0.0, f64::max);
     let mut lines = vec![format!(
-        "tag map      {} tags from {} views, {known}: {:.2} px rms, known to {:.1} mm or better",
+        "tag map      {} tags from {} views, {surveyed}: {:.2} px rms, known to {:.1} mm or better",
         map.tag.len(),
         map.views,
         map.rms_px,
         worst_m * 1e3
     )];
-    lines.extend(map.left_out.iter().map(|why| format!("left out     {why}")));
+    lines.extend(map.left_out.iter().map(|why| format!("rejected     {why}")));
     lines
 }
 
@@ -298,8 +298,14 @@ mod tests {
             predicted_tool_error_m: mm / 1e3,
         };
         let both: Vec<_> = [(1, 50.0), (3, 6.0), (1, 3.04), (7, 1.96)].iter().map(renewal).collect();
-        assert_eq!(enough_line("so", &both), "enough       so; predicted after 1, 7 views: 3.0, 2.0 mm");
-        assert_eq!(enough_line("so", &both[..2]), "enough       so; predicted after 1, 3 views: 50.0, 6.0 mm");
-        assert_eq!(enough_line("30 poses were visited", &[]), "enough       30 poses were visited");
+        assert_eq!(
+            stop_reason_line("so", &both),
+            "stop reason  so; predicted tool error after 1, 7 views: 3.0, 2.0 mm"
+        );
+        assert_eq!(
+            stop_reason_line("so", &both[..2]),
+            "stop reason  so; predicted tool error after 1, 3 views: 50.0, 6.0 mm"
+        );
+        assert_eq!(stop_reason_line("30 poses were visited", &[]), "stop reason  30 poses were visited");
     }
 }

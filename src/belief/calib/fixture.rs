@@ -5,8 +5,9 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use super::result::{Calibration, CovarianceTable, covariance_rows};
-use super::{JointParameters, Parameter, ParameterCovariance, ParameterKind, ReferenceTable, TermsTable};
+use crate::calib::result::assemble::shortened_rows;
+use crate::calib::result::calibration::{Calibration, CovarianceTable};
+use crate::calib::{JointParameters, Parameter, ParameterCovariance, ParameterKind, ReferenceTable, TermsTable};
 use armcal_core::robot::Robot;
 use armcal_core::sensor::{Conditions, Terms, shape_prior};
 use armcal_core::time::SIMULATION_EPOCH;
@@ -67,6 +68,6 @@ pub fn with_terms(robot: &Robot, parameters: &JointParameters, covariance: &Para
         joint.terms = TermsTable::of(j, model, covariance);
     }
     let names = covariance.parameters.iter().map(|p| p.name(robot)).collect();
-    calibration.covariance = CovarianceTable { parameters: names, rows: covariance_rows(covariance) };
+    calibration.covariance = CovarianceTable { parameters: names, rows: shortened_rows(&covariance.matrix) };
     calibration
 }

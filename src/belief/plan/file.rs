@@ -4,9 +4,10 @@ use std::path::Path as FilePath;
 
 use serde::{Deserialize, Serialize};
 
-use super::clearance::ClosestPair;
-use super::itinerary::{ArmBelief, CapturePlan, LeastClearance, PlanStop, PlannedVisit};
-use super::timing::Timing;
+use crate::plan::capture_plan::{ArmBelief, CapturePlan, LeastClearance, PlannedVisit};
+use crate::plan::clearance::ClosestPair;
+use crate::plan::motion::timing::Timing;
+use crate::plan::view_planning::StopReason;
 use armcal_core::robot::{FileIssue, Robot, RobotError, parse_toml, read_text};
 use armcal_core::streams::{CaptureSet, JointAngles, MAX_JOINTS};
 
@@ -54,7 +55,7 @@ pub struct PlanTotals {
     /// Root mean square over the task's targets after the last view; absent where nothing predicts it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub predicted_tool_error_m: Option<f64>,
-    pub stop_reason: PlanStop,
+    pub stop_reason: StopReason,
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -4,9 +4,9 @@ use nalgebra::Vector3;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-use super::PlanError;
-use super::bounds::JointErrorBounds;
-use super::clearance::{ClearanceModel, ClosestPair};
+use crate::plan::PlanError;
+use crate::plan::bounds::joint_bounds::JointErrorBounds;
+use crate::plan::clearance::{ClearanceModel, ClosestPair};
 use armcal_core::kinematics::{IkError, IkGoal, IkSettings, solve_position};
 use armcal_core::robot::Robot;
 use armcal_core::streams::JointAngles;

@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::clearance::ClearanceModel;
+use crate::plan::clearance::ClearanceModel;
 use armcal_core::kinematics::LinkPoses;
 use armcal_core::robot::{GripperTag, Robot};
 use armcal_core::streams::JointAngles;

@@ -1,8 +1,8 @@
 //! An operator's word before each motion.
 
-use super::motion::Driver;
-use super::{Approval, MotionAhead, SessionError};
 use crate::plan::Path;
+use crate::session::motion::Driver;
+use crate::session::{Approval, MotionAhead, SessionError};
 use armcal_core::streams::LogLevel;
 
 /// How long a held arm waits before it asks again, s.
@@ -13,7 +13,7 @@ impl Driver<'_> {
     ///
     /// # Errors
     /// [`SessionError::Interrupted`] when it may not.
-    pub(super) fn ask(&mut self, path: &Path, clearance_m: Option<f64>) -> Result<(), SessionError> {
+    pub(crate) fn ask(&mut self, path: &Path, clearance_m: Option<f64>) -> Result<(), SessionError> {
         if !self.progress.wants_to_approve() {
             return Ok(());
         }

@@ -1,13 +1,13 @@
 //! Plans views and visits them, and plans anew as they come in.
 
-use super::SessionError;
-use super::outcome::{EstimateUpdate, Visit};
-use super::script::ScriptRunner;
 use crate::calib::{Calibration, fewest_views};
 use crate::plan::{
     ArmEnsemble, CaptureState, CapturedView, PlanError, PlannedPose, PosePlan, PoseRequest, StopReason,
     VisibilityModel, choose_poses,
 };
+use crate::session::SessionError;
+use crate::session::outcome::{EstimateUpdate, Visit};
+use crate::session::script::ScriptRunner;
 use armcal_core::robot::Robot;
 use armcal_core::routine::CaptureSettings;
 use armcal_core::stats::stream_rng;
@@ -104,7 +104,7 @@ impl<'a> CaptureRun<'a> {
         let CaptureSettings { poses, held_out, .. } = self.settings;
         let most = (poses + held_out) as usize + SPARE_TRIES;
         let state = CaptureState {
-            taken: self.n_fit,
+            captured: self.n_fit,
             left: most.saturating_sub(self.tried),
             elapsed_s: now.since_s(self.began),
             predicted_tool_error_m: self.expected_tool_error_m.filter(|_| self.n_fit >= self.n_for_verdict),
@@ -123,7 +123,7 @@ enum Visited {
 
 impl ScriptRunner<'_, '_> {
     /// Chooses views under the present belief.
-    pub(super) fn plan_views(&mut self, capture: &CaptureSettings) -> Result<PosePlan, SessionError> {
+    pub(crate) fn plan_views(&mut self, capture: &CaptureSettings) -> Result<PosePlan, SessionError> {
         let views = CaptureRun::new(capture, &self.robot, self.driver.now());
         Ok(self.choose(&views)?)
     }
@@ -164,7 +164,7 @@ impl ScriptRunner<'_, '_> {
     }
 
     /// Visits views and records what is seen, until there are enough.
-    pub(super) fn capture(&mut self, capture: &CaptureSettings) -> Result<(), SessionError> {
+    pub(crate) fn capture(&mut self, capture: &CaptureSettings) -> Result<(), SessionError> {
         let mut views = CaptureRun::new(capture, &self.robot, self.driver.now());
         let replans = self.replans(capture);
         let ready = self.planned.as_mut().and_then(|planned| planned.first_capture.take());

@@ -1,8 +1,8 @@
 //! Opens and closes the gripper, and keeps room for open jaws.
 
-use super::SessionError;
-use super::script::ScriptRunner;
 use crate::plan::ClearanceModel;
+use crate::session::SessionError;
+use crate::session::script::ScriptRunner;
 use armcal_core::routine::Step;
 use armcal_core::streams::{GripperCommand, LogLevel, Mark, MarkKind, Message};
 
@@ -16,7 +16,7 @@ const AS_AT_REST_M: f64 = 1e-6;
 impl ScriptRunner<'_, '_> {
     /// Drives the jaws to `opening`, 0 (closed) .. 1 (open), and waits until they are there. From then on the arm keeps their
     /// width clear, until they are no wider than at rest.
-    pub(super) fn grip(&mut self, step: usize, opening: f64) -> Result<(), SessionError> {
+    pub(crate) fn grip(&mut self, step: usize, opening: f64) -> Result<(), SessionError> {
         let wrong = |problem: String| SessionError::Step { step, problem };
         let gripper = self.robot.gripper.clone().ok_or_else(|| wrong("the arm has no gripper".to_owned()))?;
         let opening_m = opening * gripper.opening_max_m;
@@ -44,7 +44,7 @@ impl ScriptRunner<'_, '_> {
     }
 
     /// Closes the jaws on target number `target` from wide open, and opens them again.
-    pub(super) fn touch(&mut self, step: usize, target: usize) -> Result<(), SessionError> {
+    pub(crate) fn touch(&mut self, step: usize, target: usize) -> Result<(), SessionError> {
         let start = self.driver.now();
         self.grip(step, 0.0)?;
         let kind = MarkKind::Touch { target_idx: target as u32 };
@@ -53,7 +53,7 @@ impl ScriptRunner<'_, '_> {
     }
 
     /// The jaws as the arm carries them.
-    pub(super) fn rest_jaws(&mut self, step: usize) -> Result<(), SessionError> {
+    pub(crate) fn rest_jaws(&mut self, step: usize) -> Result<(), SessionError> {
         let rest = self.robot.gripper.as_ref().map(|gripper| gripper.rest_opening_m / gripper.opening_max_m);
         rest.map_or(Ok(()), |opening| self.grip(step, opening))
     }
@@ -62,14 +62,14 @@ impl ScriptRunner<'_, '_> {
 impl<'a> ScriptRunner<'a, '_> {
     /// For the targets that are planned before anything moves: with open jaws if one is touched before a calibration, after
     /// which they are planned anew.
-    pub(super) fn clearance_at_targets(&self) -> &'a ClearanceModel<'a> {
+    pub(crate) fn clearance_at_targets(&self) -> &'a ClearanceModel<'a> {
         let mut uncalibrated = self.setup.routine.steps.iter().take_while(|step| !matches!(step, Step::Calibrate(_)));
         let is_touched = uncalibrated.any(|step| matches!(step, Step::Reach(reach) if reach.touch));
         if is_touched { self.jaws.open } else { self.clearance }
     }
 }
 
-impl super::motion::Driver<'_> {
+impl crate::session::motion::Driver<'_> {
     /// Tells the jaws and waits until they are there; `false` when they are not within `limit_s`.
     fn grip(&mut self, opening: f64, opening_m: f64, limit_s: f64) -> Result<bool, SessionError> {
         self.arm.grip(opening)?;

@@ -8,19 +8,19 @@
 //! `outcome` is what is left when it is over; `Progress` tells whoever watches.
 
 mod approval;
-mod bump;
+mod belief_update;
 mod capture;
+mod contact;
+mod end_stops;
 mod grip;
-mod identify;
 mod motion;
 mod outcome;
 mod prepare;
 mod reach;
 mod recorder;
-mod running;
+mod scale_identification;
 mod script;
-mod stillness;
-mod stops;
+mod settling;
 
 pub use outcome::{AssertResult, Epoch, EstimateUpdate, Outcome, ReachStep, Visit};
 pub use recorder::Recorder;

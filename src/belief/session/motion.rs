@@ -1,9 +1,9 @@
 //! Drives an arm along believed angles and waits until its own sensors say that it stands, or that it has met something.
 
-use super::bump::{ContactDetector, ContactEvent};
-use super::stillness::SettlingDetector;
-use super::{MotionAhead, Progress, Recorder, SessionError};
 use crate::plan::{Edge, Path, Timing};
+use crate::session::contact::{ContactDetector, ContactEvent};
+use crate::session::settling::SettlingDetector;
+use crate::session::{MotionAhead, Progress, Recorder, SessionError};
 use armcal_core::robot::{FailedJoint, Robot, Vehicle};
 use armcal_core::routine::TaskSettings;
 use armcal_core::sensor::{ArmSensors, Conditions};
@@ -14,9 +14,9 @@ use armcal_core::streams::{
 use armcal_core::time::Stamp;
 
 /// The arm, what is recorded of it, and the sensors as believed at the moment.
-pub(super) struct Driver<'b> {
+pub(crate) struct Driver<'b> {
     robot: &'b Robot,
-    pub(super) arm: &'b mut dyn Arm,
+    pub(crate) arm: &'b mut dyn Arm,
     pub recorder: &'b mut Recorder,
     pub sensors: ArmSensors,
     pub progress: &'b mut dyn Progress,
@@ -201,7 +201,7 @@ impl<'b> Driver<'b> {
         Ok(())
     }
 
-    pub(super) fn step(&mut self) -> Result<(), SessionError> {
+    pub(crate) fn step(&mut self) -> Result<(), SessionError> {
         if self.progress.stop_requested() {
             return Err(self.interrupt()?);
         }
@@ -218,7 +218,7 @@ impl<'b> Driver<'b> {
     }
 
     /// Tells the arm to stay where it was last sent, and the recording why it ends here.
-    pub(super) fn interrupt(&mut self) -> Result<SessionError, SessionError> {
+    pub(crate) fn interrupt(&mut self) -> Result<SessionError, SessionError> {
         self.command()?;
         let (stamp, at_s) = (self.arm.now(), self.elapsed_s());
         let counts = self.set_point_counts();
@@ -228,7 +228,7 @@ impl<'b> Driver<'b> {
     }
 
     /// What [`Self::follow`] would do.
-    pub(super) fn ahead(&self, path: &Path, clearance_m: Option<f64>) -> MotionAhead {
+    pub(crate) fn ahead(&self, path: &Path, clearance_m: Option<f64>) -> MotionAhead {
         MotionAhead {
             joints: self.robot.joint_names(),
             from: self.set_point,
@@ -240,7 +240,7 @@ impl<'b> Driver<'b> {
     }
 
     /// Stays for a while.
-    pub(super) fn hold(&mut self, seconds: f64) -> Result<(), SessionError> {
+    pub(crate) fn hold(&mut self, seconds: f64) -> Result<(), SessionError> {
         let until = self.arm.now().plus_s(seconds);
         while self.arm.now() < until {
             self.step()?;

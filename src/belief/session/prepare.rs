@@ -2,14 +2,14 @@
 
 use std::collections::BTreeSet;
 
-use super::SessionError;
-use super::script::ScriptRunner;
 use crate::plan::{JointErrorBounds, PlanError, PosePlan, TargetRequest, VisibilityModel, plan_targets};
+use crate::session::SessionError;
+use crate::session::script::ScriptRunner;
 use armcal_core::routine::{CaptureSettings, Step};
 use armcal_core::streams::{JointAngles, Phase};
 
 /// What was planned before anything moved.
-pub(super) struct Planned {
+pub(crate) struct Planned {
     /// Believed angles at each of the task's targets.
     pub targets: Vec<JointAngles>,
     /// For the first capture, if the sensors are still believed to be the datasheet's by then.

@@ -1,8 +1,8 @@
 //! Reaches for the task's targets under the sensors believed in.
 
-use super::SessionError;
-use super::script::ScriptRunner;
 use crate::plan::{PlanError, TargetRequest, plan_targets};
+use crate::session::SessionError;
+use crate::session::script::ScriptRunner;
 use armcal_core::routine::ReachSettings;
 use armcal_core::streams::{JointAngles, LogLevel, MarkKind, Phase, ReachAttempt};
 
@@ -11,7 +11,7 @@ const REACH_DWELL_S: f64 = 0.6;
 
 impl ScriptRunner<'_, '_> {
     /// Goes to each target and rests there for a moment; if it is to be touched, with open jaws, which then close on it.
-    pub(super) fn reach(&mut self, step: usize, settings: &ReachSettings) -> Result<(), SessionError> {
+    pub(crate) fn reach(&mut self, step: usize, settings: &ReachSettings) -> Result<(), SessionError> {
         let ReachSettings { targets, touch } = settings;
         if *touch {
             self.grip(step, 1.0)?;

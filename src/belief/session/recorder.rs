@@ -8,18 +8,18 @@ use armcal_core::time::Stamp;
 
 /// A recording being written, and the latest readings.
 pub struct Recorder {
-    pub(super) writer: RecordingWriter,
-    pub(super) latest_counts: Option<JointCounts>,
+    pub(crate) writer: RecordingWriter,
+    pub(crate) latest_counts: Option<JointCounts>,
     /// Latest of the oil's thermometer.
-    pub(super) oil_c: Option<f64>,
+    pub(crate) oil_c: Option<f64>,
     /// Latest of the depth gauge.
-    pub(super) pressure_pa: Option<f64>,
+    pub(crate) pressure_pa: Option<f64>,
     /// Latest measured gap between the jaws.
-    pub(super) opening_m: Option<f64>,
+    pub(crate) opening_m: Option<f64>,
     /// Tags seen since it was last set to zero.
-    pub(super) tags_seen: usize,
+    pub(crate) tags_seen: usize,
     /// Which they were.
-    pub(super) ids_seen: BTreeSet<u32>,
+    pub(crate) ids_seen: BTreeSet<u32>,
 }
 
 impl Recorder {

@@ -2,13 +2,13 @@
 
 use rand_chacha::ChaCha8Rng;
 
-use super::motion::{Driver, MotionOutcome};
-use super::outcome::{AssertResult, Epoch, EstimateUpdate, Outcome, ReachStep, Visit};
-use super::prepare::Planned;
-use super::running::SavedBelief;
-use super::{Progress, Recorder, SessionError, SessionInputs};
 use crate::calib::{Calibration, CalibrationFileError, Status, calibrate};
 use crate::plan::{ClearanceModel, Elapsed, JointErrorBounds, LeastClearance, PathError, PathPlanner};
+use crate::session::belief_update::SavedBelief;
+use crate::session::motion::{Driver, MotionOutcome};
+use crate::session::outcome::{AssertResult, Epoch, EstimateUpdate, Outcome, ReachStep, Visit};
+use crate::session::prepare::Planned;
+use crate::session::{Progress, Recorder, SessionError, SessionInputs};
 use armcal_core::robot::Robot;
 use armcal_core::routine::{AssertLimits, CalibrateSettings, CalibrateViews, MoveGoal, OnRefusal, Step};
 use armcal_core::sensor::ArmSensors;
@@ -19,7 +19,7 @@ use armcal_core::time::Stamp;
 /// Shares of the clearance that are tried in this order for a path from a place that the whole of it does not let the arm leave.
 const START_SHARES: [f64; 3] = [0.5, 0.2, 0.05];
 
-pub(super) fn run(
+pub(crate) fn run(
     setup: &SessionInputs<'_>,
     arm: &mut dyn Arm,
     recorder: &mut Recorder,
@@ -70,7 +70,7 @@ pub(super) fn run(
 
 /// Counts of a run.
 #[derive(Default)]
-pub(super) struct Tally {
+pub(crate) struct Tally {
     pub poses: usize,
     pub poses_skipped: usize,
     pub targets_skipped: usize,
@@ -78,19 +78,19 @@ pub(super) struct Tally {
 }
 
 /// Bounds of a calibration, and when and how warm it was.
-pub(super) struct FreshBounds {
+pub(crate) struct FreshBounds {
     pub bounds: JointErrorBounds,
     pub at: Stamp,
     pub oil_c: Option<f64>,
 }
 
 /// The arm among what surrounds it, by its jaws.
-pub(super) struct Jaws<'a> {
+pub(crate) struct Jaws<'a> {
     pub at_rest: &'a ClearanceModel<'a>,
     pub open: &'a ClearanceModel<'a>,
 }
 
-pub(super) struct ScriptRunner<'a, 'b> {
+pub(crate) struct ScriptRunner<'a, 'b> {
     pub setup: &'a SessionInputs<'a>,
     /// With the sensor scales that were measured on the way.
     pub robot: Robot,

@@ -6,8 +6,9 @@
 
 use nalgebra::{Isometry3, Vector6};
 
-use super::linearize::{Loss, Normal, Reduced, cost, squares};
-use super::problem::{Block, MapProblem};
+use crate::tagmap::linearize::{Normal, Reduced, cost, squares};
+use crate::tagmap::problem::{Block, MapProblem};
+use armcal_core::numeric::{self, Damping, LeastSquares, Loss, Outcome, Proposal, Stop, StopRule};
 use armcal_core::spatial::exp;
 
 /// Width of the Cauchy loss, in standard deviations found (Zhang 1997: 2.385 costs 5 % of efficiency; it is the start alone).
@@ -30,36 +31,68 @@ const AT_REST: f64 = 1e-3;
 /// Where only a start is wanted.
 const ROUGHLY: f64 = 1e-3;
 
+const DAMPING: Damping = Damping { first: 1e-6, min: 1e-12, max: 1e12, down: 0.1, up: 10.0, min_after_rejection: 1e-6 };
+/// Below this share of the cost it is rounding, not the model, that stands in the way.
+const ROUNDING: f64 = 1e-12;
+
 /// Lowers the cost from the state of `problem` on; whether it came to rest.
 pub(super) fn minimize(problem: &mut MapProblem<'_>, loss: Loss, converged: f64) -> bool {
     let mut normal = Normal::new(problem);
     normal.update(problem, loss);
-    let mut damping = 1e-6;
-    let mut last_share = 1.0;
-    for _ in 0..MAX_ITERATIONS {
-        let before = normal.cost;
-        let state = State::of(problem);
-        let after = if step(problem, &normal, damping) { cost(problem, loss) } else { f64::INFINITY };
-        if after <= before {
-            damping = (damping * 0.1).max(1e-12);
-            last_share = (before - after) / before;
-            if before - after <= converged * before {
-                return true;
-            }
-            normal.update(problem, loss);
-            continue;
-        }
-        state.restore(problem);
-        // Rounding, not the model, is what stands in the way.
-        if after - before <= 1e-12 * before {
-            return true;
-        }
-        damping = (damping * 10.0).max(1e-6);
-        if damping > 1e12 {
-            return after.is_finite();
+    let state = State::of(problem);
+    let mut search = Search { problem, loss, normal, state, has_trial: false };
+    let stop = StopRule { gain: converged, rounding: ROUNDING, ..StopRule::after(MAX_ITERATIONS) };
+    let report = numeric::minimize(&mut search, &DAMPING, &stop);
+    search.restore();
+    match report.stop {
+        Stop::Iterations => report.last_gain * degrees_of_freedom(problem).max(1) as f64 <= AT_REST,
+        Stop::Damping => true,
+        _ => report.outcome() == Outcome::Converged,
+    }
+}
+
+/// The map's poses, the trial state in the problem itself.
+struct Search<'a, 'b> {
+    problem: &'a mut MapProblem<'b>,
+    loss: Loss,
+    normal: Normal,
+    /// What was accepted last.
+    state: State,
+    has_trial: bool,
+}
+
+impl Search<'_, '_> {
+    fn restore(&mut self) {
+        if self.has_trial {
+            self.state.restore(self.problem);
+            self.has_trial = false;
         }
     }
-    last_share * degrees_of_freedom(problem).max(1) as f64 <= AT_REST
+}
+
+impl LeastSquares for Search<'_, '_> {
+    fn cost(&self) -> f64 {
+        self.normal.cost
+    }
+
+    fn propose(&mut self, damping: f64) -> Option<Proposal> {
+        self.restore();
+        if !step(self.problem, &self.normal, damping) {
+            return None;
+        }
+        self.has_trial = true;
+        Some(Proposal { length: f64::INFINITY, predicted_gain: f64::INFINITY })
+    }
+
+    fn trial_cost(&mut self) -> Option<f64> {
+        Some(cost(self.problem, self.loss))
+    }
+
+    fn accept(&mut self) {
+        self.has_trial = false;
+        self.state = State::of(self.problem);
+        self.normal.update(self.problem, self.loss);
+    }
 }
 
 /// What an adjustment changes.
@@ -78,10 +111,10 @@ impl State {
         }
     }
 
-    fn restore(self, problem: &mut MapProblem<'_>) {
-        problem.tags.iter_mut().zip(self.tags).for_each(|(tag, pose)| tag.pose = pose);
-        problem.extras.iter_mut().zip(self.extras).for_each(|(extra, pose)| extra.pose = pose);
-        problem.blocks.iter_mut().zip(self.blocks).for_each(|(block, pose)| block.pose = pose);
+    fn restore(&self, problem: &mut MapProblem<'_>) {
+        problem.tags.iter_mut().zip(&self.tags).for_each(|(tag, pose)| tag.pose = *pose);
+        problem.extras.iter_mut().zip(&self.extras).for_each(|(extra, pose)| extra.pose = *pose);
+        problem.blocks.iter_mut().zip(&self.blocks).for_each(|(block, pose)| block.pose = *pose);
     }
 }
 

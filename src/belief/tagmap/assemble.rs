@@ -4,14 +4,15 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Isometry3, Matrix6};
 
-use super::adjust::degrees_of_freedom;
-use super::groups::Group;
-use super::linearize::{Loss, Normal, cost};
-use super::problem::MapProblem;
-use super::result::{MapGroup, MappedTag, RelativeBodyPose, TagMap};
-use super::screen::Screened;
-use super::sparse::Factor;
-use super::types::{MapInput, MapRejection, RejectedDetection};
+use crate::tagmap::adjust::degrees_of_freedom;
+use crate::tagmap::groups::Group;
+use crate::tagmap::linearize::{Normal, cost};
+use crate::tagmap::problem::MapProblem;
+use crate::tagmap::result::{MapGroup, MappedTag, RelativeBodyPose, TagMap};
+use crate::tagmap::screen::Screened;
+use crate::tagmap::sparse::Factor;
+use crate::tagmap::types::{MapInput, MapRejection, RejectedDetection};
+use armcal_core::numeric::Loss;
 use armcal_core::spatial::adjoint;
 use armcal_core::spatial::log;
 use armcal_core::stats::quantile;
@@ -23,7 +24,7 @@ pub(super) fn assemble(
     groups: &[Group],
     noise_scale: f64,
 ) -> TagMap {
-    let quadratic = Loss::Huber { k: f64::INFINITY };
+    let quadratic = Loss::Square;
     let mut normal = Normal::new(problem);
     normal.update(problem, quadratic);
     let (factor, inverses) = match normal.reduce(problem, 0.0) {

@@ -6,8 +6,8 @@
 
 use nalgebra::{Isometry3, Matrix3, Matrix6, UnitQuaternion, Vector3};
 
-use super::linearize::Normal;
-use super::problem::{AttitudeLink, Block, Extra, MapProblem};
+use crate::tagmap::linearize::Normal;
+use crate::tagmap::problem::{AttitudeLink, Block, Extra, MapProblem};
 
 fn error(problem: &MapProblem<'_>, link: &AttitudeLink) -> Vector3<f64> {
     let (moving, fixed) = (&problem.blocks[link.moving].pose.rotation, &problem.blocks[link.fixed].pose.rotation);

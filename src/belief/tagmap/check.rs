@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::types::{MapInput, MapSettings, TagMapError};
+use crate::tagmap::types::{MapInput, MapSettings, TagMapError};
 
 /// Sizes of tags, m.
 pub(super) const SIZE_RANGE_M: std::ops::RangeInclusive<f64> = 1e-3..=10.0;

@@ -4,10 +4,10 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Isometry3, Vector6};
 
-use super::localize::localize;
-use super::problem::{Block, Extra, MapProblem, Observation, PosePrior, TagState};
-use super::result::GroupFrame;
-use super::types::{Body, MapSettings};
+use crate::tagmap::localize::localize;
+use crate::tagmap::problem::{Block, Extra, MapProblem, Observation, PosePrior, TagState};
+use crate::tagmap::result::GroupFrame;
+use crate::tagmap::types::{Body, MapSettings};
 
 /// Tighter than this a place on a body cannot be known: m and rad.
 const LEAST_STD: f64 = 1e-7;

@@ -8,37 +8,12 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Matrix2x3, Matrix2x6, Matrix6, Vector2, Vector6};
 
-use super::attitude;
-use super::problem::{Block, MapProblem, Observation, TagState};
-use super::sparse::{Pattern, System};
+use crate::tagmap::attitude;
+use crate::tagmap::problem::{Block, MapProblem, Observation, TagState};
+use crate::tagmap::sparse::{Pattern, System};
+use armcal_core::numeric::Loss;
 use armcal_core::optics::CameraModel;
 use armcal_core::spatial::{adjoint, log, skew};
-
-/// What far residuals cost.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Loss {
-    /// c^2 ln(1 + n^2/c^2): outliers lose their pull. `c` in standard deviations.
-    Cauchy { c: f64 },
-    /// Quadratic to `k` standard deviations, linear beyond.
-    Huber { k: f64 },
-}
-
-impl Loss {
-    /// Cost and weight of a corner whose whitened residual has the squared length `n2`.
-    pub(super) fn of(self, n2: f64) -> (f64, f64) {
-        match self {
-            Self::Cauchy { c } => {
-                let c2 = c * c;
-                (c2 * (n2 / c2).ln_1p(), 1.0 / (1.0 + n2 / c2))
-            }
-            Self::Huber { k } if n2 > k * k => {
-                let n = n2.sqrt();
-                (2.0 * k * n - k * k, k / n)
-            }
-            Self::Huber { .. } => (n2, 1.0),
-        }
-    }
-}
 
 /// A corner that the lens does not see counts as one that is this many standard deviations off.
 const UNSEEN_SIGMAS: f64 = 1e4;

@@ -2,8 +2,9 @@
 
 use nalgebra::{Isometry3, Matrix2x3, Matrix2x6, Matrix6, Vector6};
 
-use super::linearize::{Loss, squares};
-use super::problem::Observation;
+use crate::tagmap::linearize::squares;
+use crate::tagmap::problem::Observation;
+use armcal_core::numeric::{Damping, LeastSquares, Loss, Proposal, StopRule, minimize};
 use armcal_core::optics::CameraModel;
 use armcal_core::spatial::{exp, skew};
 
@@ -36,21 +37,57 @@ pub(super) fn localize(
             }
         }
     }
-    let (mut at, mut least) = best?;
+    let (at, least) = best?;
     if seen.len() == 1 {
         return Some((at, least));
     }
-    for _ in 0..8 {
-        let Some(step) = step(cameras, seen, &at) else { break };
-        let trial = at * exp(&step);
-        let misfit = total(&trial);
-        // Not a number is no improvement either.
-        if misfit.partial_cmp(&least) != Some(std::cmp::Ordering::Less) {
-            break;
-        }
-        (at, least) = (trial, misfit);
+    Some(refined(at, least, 8, total, |pose| step(cameras, seen, pose)))
+}
+
+/// Undamped: a few steps make a start for the adjustment, and one that does not help ends them.
+const UNDAMPED: Damping = Damping { first: 0.0, min: 0.0, max: 0.0, down: 0.0, up: 0.0, min_after_rejection: 1.0 };
+
+/// A pose under a cost with its Gauss-Newton step, perturbed on the right.
+struct PoseSearch<C, S> {
+    at: Isometry3<f64>,
+    least: f64,
+    trial: Isometry3<f64>,
+    trial_cost: f64,
+    cost: C,
+    step: S,
+}
+
+impl<C: Fn(&Isometry3<f64>) -> f64, S: Fn(&Isometry3<f64>) -> Option<Vector6<f64>>> LeastSquares for PoseSearch<C, S> {
+    fn cost(&self) -> f64 {
+        self.least
     }
-    Some((at, least))
+
+    fn propose(&mut self, _: f64) -> Option<Proposal> {
+        self.trial = self.at * exp(&(self.step)(&self.at)?);
+        Some(Proposal { length: f64::INFINITY, predicted_gain: f64::INFINITY })
+    }
+
+    fn trial_cost(&mut self) -> Option<f64> {
+        self.trial_cost = (self.cost)(&self.trial);
+        Some(self.trial_cost).filter(|trial| *trial < self.least)
+    }
+
+    fn accept(&mut self) {
+        (self.at, self.least) = (self.trial, self.trial_cost);
+    }
+}
+
+/// The pose and its cost after at most `n` steps.
+fn refined(
+    at: Isometry3<f64>,
+    least: f64,
+    n: usize,
+    cost: impl Fn(&Isometry3<f64>) -> f64,
+    step: impl Fn(&Isometry3<f64>) -> Option<Vector6<f64>>,
+) -> (Isometry3<f64>, f64) {
+    let mut search = PoseSearch { at, least, trial: at, trial_cost: least, cost, step };
+    minimize(&mut search, &UNDAMPED, &StopRule::after(n));
+    (search.at, search.least)
 }
 
 /// Gauss-Newton under the comparing loss.
@@ -108,18 +145,8 @@ pub(super) fn refine_tag(
     images: &[(&Observation, Isometry3<f64>)],
     start: &Isometry3<f64>,
 ) -> Isometry3<f64> {
-    let (mut at, mut least) = (*start, tag_cost(cameras, images, start));
-    for _ in 0..6 {
-        let Some(step) = tag_step(cameras, images, &at) else { break };
-        let trial = at * exp(&step);
-        let misfit = tag_cost(cameras, images, &trial);
-        // Not a number is no improvement either.
-        if misfit.partial_cmp(&least) != Some(std::cmp::Ordering::Less) {
-            break;
-        }
-        (at, least) = (trial, misfit);
-    }
-    at
+    let least = tag_cost(cameras, images, start);
+    refined(*start, least, 6, |pose| tag_cost(cameras, images, pose), |pose| tag_step(cameras, images, pose)).0
 }
 
 fn tag_step(

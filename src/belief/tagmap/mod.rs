@@ -10,7 +10,8 @@ mod assemble;
 mod attitude;
 mod check;
 mod groups;
-mod grow;
+mod incremental_layout;
+mod initial_guess;
 mod linearize;
 mod localize;
 mod problem;
@@ -19,7 +20,6 @@ mod scale;
 mod screen;
 mod solve;
 mod sparse;
-mod start;
 mod types;
 mod vote;
 

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::{Quaternion, UnitQuaternion};
 
-use super::files::{NamedCamera, TagFile};
-use super::types::{MapDetection, MapView};
+use crate::tagmap::files::{NamedCamera, TagFile};
+use crate::tagmap::types::{MapDetection, MapView};
 use armcal_core::log::{Completeness, LogError, RawMessage, decode, for_each_raw, ros, topics};
 use armcal_core::time::Stamp;
 

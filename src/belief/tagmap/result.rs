@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use nalgebra::{DMatrix, Isometry3, Matrix3, Matrix6};
 
-use super::scale::ScaleWarning;
-use super::sparse::Factor;
-use super::types::{MapRejection, RejectedDetection};
+use crate::tagmap::scale::ScaleWarning;
+use crate::tagmap::sparse::Factor;
+use crate::tagmap::types::{MapRejection, RejectedDetection};
 
 /// A tag's estimate.
 #[derive(Clone, Debug)]

@@ -6,9 +6,9 @@
 
 use nalgebra::Vector3;
 
-use super::screen::Screened;
-use super::start::is_rigid;
-use super::types::MapInput;
+use crate::tagmap::initial_guess::is_rigid;
+use crate::tagmap::screen::Screened;
+use crate::tagmap::types::MapInput;
 
 /// A size that cannot be right.
 #[derive(Clone, Debug, PartialEq)]
@@ -146,8 +146,9 @@ fn samples(input: &MapInput<'_>, screened: &Screened) -> Vec<Sample> {
                     }
                     _ => continue,
                 };
-                let center =
-                    |seen: &super::problem::Observation| seen.best.camera_from_tag.isometry().translation.vector;
+                let center = |seen: &crate::tagmap::problem::Observation| {
+                    seen.best.camera_from_tag.isometry().translation.vector
+                };
                 let (a, b, at_a, at_b) = (screened.tags[a.tag].id, screened.tags[b.tag].id, center(a), center(b));
                 let distance_m = between.norm();
                 if distance_m > 1e-6 {

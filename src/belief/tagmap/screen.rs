@@ -4,9 +4,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Isometry3, Matrix2, UnitQuaternion, Vector2};
 
-use super::problem::{Observation, TagState};
-use super::types::{MapDetection, MapInput, MapMode, MapRejection, MapSettings, MapView, RejectedDetection};
-use super::vote::is_finite;
+use crate::tagmap::problem::{Observation, TagState};
+use crate::tagmap::types::{MapDetection, MapInput, MapMode, MapRejection, MapSettings, MapView, RejectedDetection};
+use crate::tagmap::vote::is_finite;
 use armcal_core::optics::{SquareError, solve_square_both, square_corners};
 
 /// A view in the solver's order.
@@ -83,7 +83,7 @@ fn known_tags(input: &MapInput<'_>, settings: &MapSettings) -> BTreeMap<u32, Tag
     let with_pose = || input.tags.iter().filter(|tag| tag.pose.is_some()).map(|tag| tag.id);
     let seen: BTreeSet<u32> = input.views.iter().flat_map(|view| view.tags.iter().map(|tag| tag.id)).collect();
     let base = settings.base_tag.or_else(|| with_pose().filter(|id| seen.contains(id)).min());
-    let state = |tag: &super::TagPrior| {
+    let state = |tag: &crate::tagmap::TagPrior| {
         let is_base = base == Some(tag.id);
         let given = match (tag.pose, settings.mode) {
             (Some(pose), MapMode::Known) => Some((pose, None)),

@@ -1,19 +1,19 @@
 //! From views to a map, step by step.
 
-use super::adjust::{approach, finish, select};
-use super::assemble::assemble;
-use super::attitude::{self, Wanted};
-use super::check::check;
-use super::groups::{Group, build};
-use super::linearize::Loss;
-use super::localize::{localize, place_tag, tag_cost, view_cost};
-use super::problem::{MapProblem, Observation};
-use super::result::TagMap;
-use super::scale;
-use super::screen::{Screened, screen};
-use super::start::lay_out;
-use super::types::{MapInput, MapSettings, NoiseScale, TagMapError};
-use super::{adjust, linearize};
+use crate::tagmap::adjust::{approach, finish, select};
+use crate::tagmap::assemble::assemble;
+use crate::tagmap::attitude::{self, Wanted};
+use crate::tagmap::check::check;
+use crate::tagmap::groups::{Group, build};
+use crate::tagmap::initial_guess::lay_out;
+use crate::tagmap::localize::{localize, place_tag, tag_cost, view_cost};
+use crate::tagmap::problem::{MapProblem, Observation};
+use crate::tagmap::result::TagMap;
+use crate::tagmap::scale;
+use crate::tagmap::screen::{Screened, screen};
+use crate::tagmap::types::{MapInput, MapSettings, NoiseScale, TagMapError};
+use crate::tagmap::{adjust, linearize};
+use armcal_core::numeric::Loss;
 
 /// Rounds of choosing detections and fitting again.
 const MAX_ROUNDS: usize = 8;
@@ -164,7 +164,7 @@ fn rescale(problem: &mut MapProblem<'_>) -> f64 {
     if freedom < 8 {
         return 1.0;
     }
-    let chi_square = linearize::cost(problem, Loss::Huber { k: f64::INFINITY });
+    let chi_square = linearize::cost(problem, Loss::Square);
     let scale = (chi_square / freedom as f64).sqrt().max(1e-6);
     for seen in &mut problem.observations {
         for whiten in &mut seen.whiten {

@@ -6,7 +6,7 @@
 
 use nalgebra::{Isometry3, Matrix6, Vector6};
 
-use super::problem::Observation;
+use crate::tagmap::problem::Observation;
 use armcal_core::optics::SquarePose;
 use armcal_core::spatial::adjoint;
 use armcal_core::spatial::{exp, log};

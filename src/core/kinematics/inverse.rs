@@ -3,10 +3,11 @@
 //! Levenberg-Marquardt on the position error with a weak pull to the seed posture in the null space
 //! (Nakamura and Hanafusa 1986); joints at a limit are held for the step.
 
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::{DMatrix, Vector3};
 
 use super::chain::{Attachment, Chain, JointLimits};
 use crate::joints::{JointAngles, MAX_JOINTS};
+use crate::numeric::{Damping, LeastSquares, Proposal, Stop, StopRule, minimize};
 
 /// Where to bring a frame's origin, base frame, m.
 #[derive(Clone, Copy, Debug)]
@@ -43,61 +44,71 @@ pub fn solve_position(
     seed: &JointAngles,
     settings: &IkSettings,
 ) -> Result<JointAngles, IkError> {
-    let mut angles = clamp(seed, settings);
-    let mut error = position_error(chain, tip, goal, &angles);
-    let mut damping = 1e-3;
-    for _ in 0..settings.max_iterations {
-        if error.norm() < settings.tolerance_m {
-            return Ok(angles);
-        }
-        let trial = clamp(&step(chain, tip, &angles, &error, damping, settings), settings);
-        let trial_error = position_error(chain, tip, goal, &trial);
-        if trial_error.norm() < error.norm() {
-            (angles, error) = (trial, trial_error);
-            damping = (damping * 0.3).max(1e-9);
-        } else {
-            damping *= 8.0;
-            if damping > 1e6 {
-                break;
-            }
-        }
+    let angles = clamp(seed, settings);
+    let error = position_error(chain, tip, goal, &angles);
+    let mut search = Search { chain, tip, goal, settings, angles, error, trial: angles, trial_error: error };
+    let stop = StopRule { cost: settings.tolerance_m, ..StopRule::after(settings.max_iterations) };
+    let report = minimize(&mut search, &DAMPING, &stop);
+    match report.stop {
+        Stop::Cost => Ok(search.angles),
+        _ => Err(IkError::OutOfReach { error_m: search.error.norm() }),
     }
-    if error.norm() < settings.tolerance_m {
-        return Ok(angles);
+}
+
+/// Added to the normal matrix, m^2/rad^2.
+const DAMPING: Damping = Damping { first: 1e-3, min: 1e-9, max: 1e6, down: 0.3, up: 8.0, min_after_rejection: 0.0 };
+/// Longest step of a joint, rad.
+const MAX_STEP_RAD: f64 = 0.3;
+
+struct Search<'a> {
+    chain: &'a Chain,
+    tip: &'a Attachment,
+    goal: &'a IkGoal,
+    settings: &'a IkSettings,
+    angles: JointAngles,
+    error: Vector3<f64>,
+    trial: JointAngles,
+    trial_error: Vector3<f64>,
+}
+
+/// Its cost is the distance, m.
+impl LeastSquares for Search<'_> {
+    fn cost(&self) -> f64 {
+        self.error.norm()
     }
-    Err(IkError::OutOfReach { error_m: error.norm() })
+
+    fn propose(&mut self, damping: f64) -> Option<Proposal> {
+        let poses = self.chain.link_poses(&self.angles);
+        let point = poses.frame(self.tip).translation.vector;
+        let free: Vec<usize> = (0..self.tip.n_joints.min(MAX_JOINTS)).filter(|&j| !self.settings.locked[j]).collect();
+        let mut jacobian = DMatrix::zeros(3, free.len());
+        for (column, &joint) in free.iter().enumerate() {
+            jacobian.set_column(column, &poses.point_jacobian(joint, &point));
+        }
+        let normal = jacobian.transpose() * &jacobian + DMatrix::identity(free.len(), free.len()) * damping;
+        let delta = normal.cholesky()?.solve(&(jacobian.transpose() * self.error));
+        let scale = (MAX_STEP_RAD / delta.amax().max(1e-12)).min(1.0);
+        let mut next = self.angles;
+        for (column, &joint) in free.iter().enumerate() {
+            next[joint] += scale * delta[column];
+        }
+        self.trial = clamp(&next, self.settings);
+        Some(Proposal { length: f64::INFINITY, predicted_gain: f64::INFINITY })
+    }
+
+    fn trial_cost(&mut self) -> Option<f64> {
+        self.trial_error = position_error(self.chain, self.tip, self.goal, &self.trial);
+        // Against its limits the arm goes nowhere: that is no step that helps.
+        Some(self.trial_error.norm()).filter(|trial| *trial < self.error.norm())
+    }
+
+    fn accept(&mut self) {
+        (self.angles, self.error) = (self.trial, self.trial_error);
+    }
 }
 
 fn position_error(chain: &Chain, tip: &Attachment, goal: &IkGoal, angles: &JointAngles) -> Vector3<f64> {
     goal.position_m - chain.link_poses(angles).frame(tip).translation.vector
-}
-
-fn step(
-    chain: &Chain,
-    tip: &Attachment,
-    angles: &JointAngles,
-    error: &Vector3<f64>,
-    damping: f64,
-    settings: &IkSettings,
-) -> JointAngles {
-    let poses = chain.link_poses(angles);
-    let point = poses.frame(tip).translation.vector;
-    let free: Vec<usize> = (0..tip.n_joints.min(MAX_JOINTS)).filter(|&j| !settings.locked[j]).collect();
-    let mut jacobian = DMatrix::zeros(3, free.len());
-    for (column, &joint) in free.iter().enumerate() {
-        jacobian.set_column(column, &poses.point_jacobian(joint, &point));
-    }
-    let normal = jacobian.transpose() * &jacobian + DMatrix::identity(free.len(), free.len()) * damping;
-    let gradient = jacobian.transpose() * DVector::from_column_slice(error.as_slice());
-    let mut next = *angles;
-    if let Some(cholesky) = normal.cholesky() {
-        let delta = cholesky.solve(&gradient);
-        let scale = (0.3 / delta.amax().max(1e-12)).min(1.0);
-        for (column, &joint) in free.iter().enumerate() {
-            next[joint] += scale * delta[column];
-        }
-    }
-    next
 }
 
 fn clamp(angles: &JointAngles, settings: &IkSettings) -> JointAngles {

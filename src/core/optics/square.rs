@@ -1,7 +1,7 @@
 //! The pose of a square tag from its four corner pixels.
 //!
 //! A homography between the tag's plane and the bearings (turned so that the tag lies ahead, which keeps fisheye
-//! angles beyond 90 deg regular) gives the start; Gauss-Newton on the pixels refines it. A square seen nearly head-on
+//! angles beyond 90 deg regular) gives the start; Levenberg-Marquardt on the pixels refines it. A square seen nearly head-on
 //! has two poses that fit almost equally well (Collins and Bartoli 2014): both are refined, the better one is taken,
 //! and the ratio of their costs is reported. The tag's centre hardly depends on which one it is.
 
@@ -9,6 +9,7 @@ use nalgebra::{Isometry3, Matrix2x6, Matrix3, Matrix6, Point3, Rotation3, SMatri
 use nalgebra::{UnitQuaternion, Vector2, Vector3, Vector6};
 
 use super::camera::Lens;
+use crate::numeric::{Damping, LeastSquares, Outcome, Proposal, StopRule, minimize};
 use crate::spatial::{Camera, Pose, Tag, skew};
 
 /// A tag's pose in the camera frame, and how well it fits.
@@ -156,38 +157,58 @@ impl Refined {
     }
 }
 
+const DAMPING: Damping = Damping { first: 1e-4, min: 1e-12, max: 1e8, down: 0.1, up: 10.0, min_after_rejection: 0.0 };
+/// A twist of this length (m, rad) moves no corner.
+const STOP: StopRule = StopRule { step_length: 1e-12, ..StopRule::after(30) };
+
+struct Refinement<'a, L> {
+    lens: &'a L,
+    corners_tag: &'a [Point3<f64>; 4],
+    corners_px: &'a [[f64; 2]; 4],
+    here: Linearized,
+    trial_pose: Isometry3<f64>,
+    trial: Option<Linearized>,
+}
+
+impl<L: Lens> LeastSquares for Refinement<'_, L> {
+    fn cost(&self) -> f64 {
+        self.here.cost
+    }
+
+    fn propose(&mut self, damping: f64) -> Option<Proposal> {
+        let mut normal = self.here.normal;
+        for k in 0..6 {
+            normal[(k, k)] *= 1.0 + damping;
+        }
+        let step = normal.cholesky()?.solve(&self.here.gradient);
+        self.trial_pose = self.here.pose * crate::spatial::exp(&step);
+        Some(Proposal { length: step.norm(), predicted_gain: f64::INFINITY })
+    }
+
+    fn trial_cost(&mut self) -> Option<f64> {
+        self.trial = linearize(self.lens, &self.trial_pose, self.corners_tag, self.corners_px);
+        self.trial.as_ref().map(|trial| trial.cost)
+    }
+
+    fn accept(&mut self) {
+        if let Some(trial) = self.trial.take() {
+            self.here = trial;
+        }
+    }
+}
+
 fn refine(
     lens: &impl Lens,
     start: Isometry3<f64>,
     corners_tag: &[Point3<f64>; 4],
     corners_px: &[[f64; 2]; 4],
 ) -> Option<Refined> {
-    let mut best = linearize(lens, &start, corners_tag, corners_px)?;
-    let mut damping = 1e-4;
-    for _ in 0..30 {
-        let mut normal = best.normal;
-        for k in 0..6 {
-            normal[(k, k)] *= 1.0 + damping;
-        }
-        let step = normal.cholesky()?.solve(&best.gradient);
-        let trial = best.pose * crate::spatial::exp(&step);
-        match linearize(lens, &trial, corners_tag, corners_px) {
-            Some(next) if next.cost <= best.cost => {
-                let done = step.norm() < 1e-12;
-                best = next;
-                damping = (damping * 0.1).max(1e-12);
-                if done {
-                    break;
-                }
-            }
-            _ => {
-                damping *= 10.0;
-                if damping > 1e8 {
-                    break;
-                }
-            }
-        }
+    let here = linearize(lens, &start, corners_tag, corners_px)?;
+    let mut refinement = Refinement { lens, corners_tag, corners_px, here, trial_pose: start, trial: None };
+    if minimize(&mut refinement, &DAMPING, &STOP).outcome() == Outcome::Degenerate {
+        return None;
     }
+    let best = refinement.here;
     // A tag is printed on one side: its z axis must point towards the camera.
     let faces_camera = (best.pose.rotation * Vector3::z()).dot(&best.pose.translation.vector) < 0.0;
     faces_camera.then_some(Refined { pose: best.pose, cost: best.cost, normal: best.normal })

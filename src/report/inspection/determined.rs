@@ -5,8 +5,9 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::is_capture;
+use armcal_belief::calib::associate;
 use armcal_belief::calib::{
-    JointParameters, MIN_VIEWS, MIN_VIEWS_PER_PARAMETER, Parameter, PositionProblem, View, associate, free_parameters,
+    JointParameters, MIN_VIEWS, MIN_VIEWS_PER_PARAMETER, Parameter, PositionProblem, View, free_parameters,
     identify_scales, mount_by_gripper_tag, surveyed,
 };
 use armcal_core::log::{LogError, Recording, TopicMap, scan_recording};

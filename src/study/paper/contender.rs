@@ -3,9 +3,9 @@
 use super::scene::{Draw, Guess, Setting};
 use armcal_belief::calib::bundle::{BundleInput, HyperparameterMode, Hyperparameters, Model, estimate};
 use armcal_belief::calib::{
-    Gauge, JointParameters, Parameter, ParameterKind, PositionMethod, PositionProblem, Scaling, SearchOptions,
-    Solution, SolveOutcome,
+    Gauge, JointParameters, Parameter, ParameterKind, PositionMethod, PositionProblem, Scaling, SearchOptions, Solution,
 };
+use armcal_core::numeric::Outcome;
 
 /// What solves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -115,7 +115,7 @@ fn bundle(draw: &Draw, guess: &JointParameters) -> Solution {
         },
         None => Solution {
             parameters: *guess,
-            outcome: SolveOutcome::Degenerate,
+            outcome: Outcome::Degenerate,
             evaluations: 0,
             cost_initial: f64::NAN,
             cost_final: f64::NAN,

@@ -7,7 +7,8 @@ use super::PaperStudyError;
 use super::contender::MethodVariant;
 use super::experiments::Experiment;
 use super::scene::{Draw, Setting};
-use armcal_belief::calib::{PositionProblem, SolveOutcome, fisher_information};
+use armcal_belief::calib::{PositionProblem, fisher_information};
+use armcal_core::numeric::Outcome;
 use armcal_core::robot::Robot;
 use armcal_core::stats::quantile;
 
@@ -83,7 +84,7 @@ fn pair(
             evaluations: solution.evaluations as f64,
             cost_initial: solution.cost_initial,
             cost_final: solution.cost_final,
-            is_converged: solution.outcome == SolveOutcome::Converged,
+            is_converged: solution.outcome == Outcome::Converged,
         }
     };
     Ok(Paired {

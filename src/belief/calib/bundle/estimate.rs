@@ -2,14 +2,13 @@
 
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix6, Vector6};
 
-use super::evidence::{Posterior, change, joint_info, updated};
-use super::model::{Hyperparameters, Model, shape_kinds};
-use super::problem::{BundleProblem, Layout, Prior, State, WeightedMeasurement};
-use super::robust::Loss;
-use super::solve::{LOOSE, Solved, StopRule, TIGHT, solve};
-use crate::calib::associate::{TagMeasurement, View};
-use crate::calib::methods::SolveOutcome;
-use crate::calib::problem::{JointParameters, Parameter, ParameterKind};
+use crate::calib::bundle::evidence::{Posterior, change, joint_info, updated};
+use crate::calib::bundle::model::{Hyperparameters, Model, shape_kinds};
+use crate::calib::bundle::problem::{BundleProblem, Layout, Prior, State, WeightedMeasurement};
+use crate::calib::bundle::solve::{LOOSE, Solved, TIGHT, solve, until};
+use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
+use crate::calib::views::association::{TagMeasurement, View};
+use armcal_core::numeric::{Loss, Outcome};
 use armcal_core::robot::Robot;
 use armcal_core::sensor::Conditions;
 use armcal_core::spatial::Pose;
@@ -47,9 +46,9 @@ pub struct Outlier {
 
 /// The answer.
 pub struct Estimate<'a> {
-    pub(super) problem: BundleProblem<'a>,
-    pub(super) solved: Solved,
-    pub(super) posterior: Posterior,
+    pub(crate) problem: BundleProblem<'a>,
+    pub(crate) solved: Solved,
+    pub(crate) posterior: Posterior,
     pub model: Model,
     pub guess: JointParameters,
     pub outliers: Vec<Outlier>,
@@ -153,7 +152,7 @@ pub fn estimate<'a>(input: &BundleInput<'a>) -> Option<Estimate<'a>> {
     state.tags.clone_from(&first_state.tags);
     // Robustly on the corners; straight sensors leave what the datasheet says.
     problem.scales.joint_std_rad = straight_sensor_std(input);
-    let mut solved = solve(&problem, state, Loss::Cauchy { width: CORNER_WIDTH }, LOOSE);
+    let mut solved = solve(&problem, state, Loss::Cauchy { c: CORNER_WIDTH }, LOOSE);
     iterations += solved.iterations;
     reject(&mut problem, &solved);
     if input.evidence == HyperparameterMode::Given {
@@ -203,7 +202,7 @@ pub fn estimate<'a>(input: &BundleInput<'a>) -> Option<Estimate<'a>> {
 #[derive(Clone, Debug)]
 pub struct LeastSquares {
     pub parameters: JointParameters,
-    pub outcome: SolveOutcome,
+    pub outcome: Outcome,
     pub iterations: usize,
     pub cost_initial: f64,
     pub cost_final: f64,
@@ -215,7 +214,7 @@ pub fn least_squares(input: &BundleInput<'_>, relative_gain: f64) -> LeastSquare
     let prior = prior(input, &input.scales);
     let problem = BundleProblem::new(input.robot, input.views, &input.model, &input.guess, prior, input.scales.clone());
     let start = problem.start(&input.guess);
-    let solved = solve(&problem, start, Loss::Square, StopRule { relative_gain, ..TIGHT });
+    let solved = solve(&problem, start, Loss::Square, until(TIGHT.max_iterations, relative_gain));
     LeastSquares {
         parameters: parameters_of(&problem, &solved.state, &input.guess),
         outcome: solved.outcome,
@@ -226,7 +225,7 @@ pub fn least_squares(input: &BundleInput<'_>, relative_gain: f64) -> LeastSquare
 }
 
 fn cost_at(problem: &BundleProblem<'_>, state: &State) -> f64 {
-    let mut normal = super::linearize::NormalEquations::new(problem);
+    let mut normal = crate::calib::bundle::linearize::NormalEquations::new(problem);
     normal.update(problem, state, Loss::Square);
     normal.cost
 }
@@ -240,7 +239,7 @@ fn straight_sensor_std(input: &BundleInput<'_>) -> [f64; armcal_core::joints::MA
 }
 
 /// Gain and offset from the tags' positions in the camera frame; what is far counts little.
-pub(super) fn robust_start(input: &BundleInput<'_>) -> (JointParameters, usize) {
+pub(crate) fn robust_start(input: &BundleInput<'_>) -> (JointParameters, usize) {
     let mut views = input.views.to_vec();
     for view in &mut views {
         view.gripper_tag = None;
@@ -271,7 +270,7 @@ pub(super) fn robust_start(input: &BundleInput<'_>) -> (JointParameters, usize) 
         };
         let straight = BundleInput { model: model.clone(), joint_prior: None, scales: scales.clone(), ..input.clone() };
         let problem = BundleProblem::new(input.robot, &views, &model, &input.guess, prior(&straight, &scales), scales);
-        let solved = solve(&problem, problem.start(&parameters), Loss::Cauchy { width: START_WIDTH }, LOOSE);
+        let solved = solve(&problem, problem.start(&parameters), Loss::Cauchy { c: START_WIDTH }, LOOSE);
         iterations += solved.iterations;
         parameters = parameters_of(&problem, &solved.state, &parameters);
     }
@@ -279,7 +278,7 @@ pub(super) fn robust_start(input: &BundleInput<'_>) -> (JointParameters, usize) 
 }
 
 /// `base` with the estimated parameters of `state`.
-pub(super) fn parameters_of(problem: &BundleProblem<'_>, state: &State, base: &JointParameters) -> JointParameters {
+pub(crate) fn parameters_of(problem: &BundleProblem<'_>, state: &State, base: &JointParameters) -> JointParameters {
     let mut parameters = *base;
     for (parameter, value) in problem.layout.parameters.iter().zip(state.joint.iter()) {
         parameters.set(*parameter, *value);
@@ -288,7 +287,7 @@ pub(super) fn parameters_of(problem: &BundleProblem<'_>, state: &State, base: &J
 }
 
 /// The datasheet's and the survey's priors.
-pub(super) fn prior(input: &BundleInput<'_>, scales: &Hyperparameters) -> Prior {
+pub(crate) fn prior(input: &BundleInput<'_>, scales: &Hyperparameters) -> Prior {
     let robot = input.robot;
     let layout = Layout::new(robot, &input.model, input.views);
     let nominal = JointParameters::default();
@@ -412,7 +411,7 @@ impl Estimate<'_> {
     }
 
     #[must_use]
-    pub fn outcome(&self) -> SolveOutcome {
+    pub fn outcome(&self) -> Outcome {
         self.solved.outcome
     }
 

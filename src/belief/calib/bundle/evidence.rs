@@ -6,18 +6,18 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
-use super::eliminated::N_VIEW_PARAMETERS;
-use super::linearize::NormalEquations;
-use super::model::{Hyperparameters, SHAPE_LENGTH};
-use super::problem::{BundleProblem, State};
-use crate::calib::problem::ParameterKind;
+use crate::calib::bundle::linearize::NormalEquations;
+use crate::calib::bundle::model::{Hyperparameters, SHAPE_LENGTH};
+use crate::calib::bundle::problem::{BundleProblem, State};
+use crate::calib::bundle::schur::N_VIEW_PARAMETERS;
+use crate::calib::parameters::ParameterKind;
 use armcal_core::joints::MAX_JOINTS;
 use armcal_core::sensor::shape_prior;
 use armcal_core::spatial::log;
 
 /// The posterior at the scales of the problem.
 #[derive(Clone, Debug)]
-pub(super) struct Posterior {
+pub(crate) struct Posterior {
     /// Of the common parameters.
     pub covariance: DMatrix<f64>,
     /// Variances of each view's own parameters.
@@ -36,7 +36,7 @@ const SCALE_BOUNDS: [f64; 2] = [0.02, 50.0];
 
 impl Posterior {
     /// `None` where the normal equations have no inverse.
-    pub(super) fn of(problem: &BundleProblem<'_>, normal: &NormalEquations) -> Option<Self> {
+    pub(crate) fn of(problem: &BundleProblem<'_>, normal: &NormalEquations) -> Option<Self> {
         let factor = Cholesky::new(normal.matrix.clone())?;
         let mut own = vec![[0.0; N_VIEW_PARAMETERS]; problem.views.len()];
         let mut groups = normal.eliminated.iter();
@@ -77,7 +77,7 @@ impl Sums {
 }
 
 /// The scales that `posterior` asks for; `first` are those that it all began with.
-pub(super) fn updated(
+pub(crate) fn updated(
     problem: &BundleProblem<'_>,
     state: &State,
     normal: &NormalEquations,
@@ -97,7 +97,7 @@ pub(super) fn updated(
 }
 
 /// How many parameters, the views' own among them, the data determine.
-pub(super) fn determined(problem: &BundleProblem<'_>, posterior: &Posterior) -> f64 {
+pub(crate) fn determined(problem: &BundleProblem<'_>, posterior: &Posterior) -> f64 {
     let layout = &problem.layout;
     let n = problem.prior.joint_info.nrows();
     let mount = layout.mount.filter(|_| n == layout.n_joint());
@@ -234,7 +234,7 @@ fn update_camera_error(
 }
 
 /// The prior's information on the joints' parameters under `scales`.
-pub(super) fn joint_info(problem: &BundleProblem<'_>, scales: &Hyperparameters) -> DMatrix<f64> {
+pub(crate) fn joint_info(problem: &BundleProblem<'_>, scales: &Hyperparameters) -> DMatrix<f64> {
     let info = problem.layout.parameters.iter().map(|p| {
         let std = scales.prior_std(&problem.robot.sensors[p.joint], p.joint, p.kind);
         BundleProblem::at_least(std).powi(-2)
@@ -243,7 +243,7 @@ pub(super) fn joint_info(problem: &BundleProblem<'_>, scales: &Hyperparameters) 
 }
 
 /// The largest relative change of any scale.
-pub(super) fn change(a: &Hyperparameters, b: &Hyperparameters) -> f64 {
+pub(crate) fn change(a: &Hyperparameters, b: &Hyperparameters) -> f64 {
     let numbers = |s: &Hyperparameters| {
         let mut all = vec![
             s.noise,

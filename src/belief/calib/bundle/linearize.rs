@@ -8,18 +8,20 @@
 
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix6, SMatrix, SVector, Vector6};
 
-use super::eliminated::{Columns, Directions, Group, MOUNT, N_DIRECTIONS, N_VIEW_PARAMETERS, Own, SchurBlock, TIME};
-use super::problem::{BundleProblem, State};
-use super::robust::Loss;
-use super::sighting::{LensInformation, PoseInformation, right_jacobian_inverse};
+use crate::calib::bundle::observation_term::{LensInformation, PoseInformation, right_jacobian_inverse};
+use crate::calib::bundle::problem::{BundleProblem, State};
+use crate::calib::bundle::schur::{
+    Columns, Directions, Group, MOUNT, N_DIRECTIONS, N_VIEW_PARAMETERS, Own, SchurBlock, TIME,
+};
 use armcal_core::joints::MAX_JOINTS;
 use armcal_core::kinematics::LinkPoses;
+use armcal_core::numeric::Loss;
 use armcal_core::spatial::adjoint;
 use armcal_core::spatial::log;
 
 /// The normal equations at one state.
 #[derive(Clone, Debug)]
-pub(super) struct NormalEquations {
+pub(crate) struct NormalEquations {
     /// Lower triangle.
     pub matrix: DMatrix<f64>,
     pub right: DVector<f64>,
@@ -37,7 +39,7 @@ pub(super) struct NormalEquations {
 }
 
 impl NormalEquations {
-    pub(super) fn new(problem: &BundleProblem<'_>) -> Self {
+    pub(crate) fn new(problem: &BundleProblem<'_>) -> Self {
         let n = problem.layout.n;
         let n_groups = problem.views.len() + problem.views.iter().filter(|view| view.gripper.is_some()).count();
         Self {
@@ -53,7 +55,7 @@ impl NormalEquations {
     }
 
     /// Linearizes `problem` at `state`.
-    pub(super) fn update(&mut self, problem: &BundleProblem<'_>, state: &State, loss: Loss) {
+    pub(crate) fn update(&mut self, problem: &BundleProblem<'_>, state: &State, loss: Loss) {
         self.matrix.fill(0.0);
         self.right.fill(0.0);
         self.eliminated.clear();
@@ -205,8 +207,11 @@ impl NormalEquations {
                     .unwrap_or_else(|| PoseInformation::unseen(&sighting.data));
             self.chi2[at] = info.chi2;
             self.by_tag[at].1 = column;
-            let (cost, weight) =
-                if sighting.is_used { loss.of(info.chi2, sighting.data.n_coordinates()) } else { (0.0, 0.0) };
+            let (cost, weight) = if sighting.is_used {
+                loss.of_coordinates(info.chi2, sighting.data.n_coordinates())
+            } else {
+                (0.0, 0.0)
+            };
             self.cost += cost;
             if weight != 1.0 {
                 info.weighted(weight);
@@ -277,7 +282,7 @@ impl NormalEquations {
     }
 
     /// Adds at rows `row`, columns `column`, row >= column; on the diagonal the lower triangle matters.
-    pub(super) fn add_block(&mut self, row: usize, column: usize, block: &Matrix6<f64>) {
+    pub(crate) fn add_block(&mut self, row: usize, column: usize, block: &Matrix6<f64>) {
         let mut view = self.matrix.fixed_view_mut::<6, 6>(row, column);
         view += block;
     }

@@ -4,37 +4,41 @@
 //! tag in one view, `linearize` sums the normal equations with the views' own parameters eliminated, `solve` is
 //! Levenberg-Marquardt; `evidence` fits noise and prior sizes, `select` decides on doubtful terms; `estimate` is the way from a robust start to the answer.
 
-mod alarm;
-mod detect;
-mod eliminated;
+pub(crate) mod calibration;
+mod calibration_prior;
 mod estimate;
 mod evidence;
-mod failed;
-mod held_out;
+mod failure_detection;
+mod failure_impact;
+mod failure_pattern;
+mod failures;
+mod innovations;
 mod linearize;
 mod model;
+mod model_selection;
 mod observability;
-mod prior;
+mod observation_term;
 mod prior_terms;
 mod problem;
-mod readings;
-mod robust;
-mod select;
-mod sighting;
+mod schur;
+mod score_test;
+mod setup;
 mod solve;
+mod tables;
+mod verdict;
 
-pub use alarm::{ErrorKind, GeometryElement, ScoreTestResult};
-pub use detect::failures;
+pub use calibration_prior::{CalibrationPrior, MOUNT_ROWS, PriorConsistency, with_mount_rows};
 pub use estimate::{
     BundleInput, Estimate, HyperparameterMode, LeastSquares, MIN_GRIPPER_VIEWS, Outlier, estimate, least_squares,
     model_for, reference,
 };
-pub use failed::{Failure, FailureAdjusted, FailureSource, SensorUse, set_by_camera};
-pub use held_out::{Innovations, JointInnovation};
+pub use failure_detection::failures;
+pub use failures::{Failure, FailureAdjusted, FailureSource, SensorUse};
+pub use innovations::{Innovations, JointInnovation};
 pub use model::{Hyperparameters, Model, SHAPE_LENGTH};
+pub use model_selection::{OptionalTerm, Selection, select_model};
 pub use observability::{Observability, observability};
-pub use prior::{CalibrationPrior, MOUNT_ROWS, PriorConsistency, with_mount_rows};
-pub use select::{OptionalTerm, Selection, select_model};
+pub use score_test::{GeometryElement, ScoreTestResult};
 
 #[cfg(test)]
 mod tests;

@@ -1,6 +1,6 @@
 //! What is estimated, and how large the things are that are not known exactly.
 
-use crate::calib::problem::ParameterKind;
+use crate::calib::parameters::ParameterKind;
 use armcal_core::joints::MAX_JOINTS;
 use armcal_core::robot::{JointSensorSpec, Robot};
 use armcal_core::sensor::{N_SHAPE, shape_prior};
@@ -98,6 +98,6 @@ fn usual_joint_std_rad(spec: &JointSensorSpec) -> f64 {
 }
 
 /// All coefficients of the nonlinearity.
-pub(super) fn shape_kinds() -> impl Iterator<Item = ParameterKind> {
+pub(crate) fn shape_kinds() -> impl Iterator<Item = ParameterKind> {
     (0..N_SHAPE).map(|h| ParameterKind::Shape(h as u8))
 }

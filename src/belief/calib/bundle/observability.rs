@@ -10,11 +10,11 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
 
-use super::estimate::{BundleInput, prior, robust_start};
-use super::linearize::NormalEquations;
-use super::problem::{BundleProblem, Layout};
-use super::robust::Loss;
-use crate::calib::problem::ParameterKind;
+use crate::calib::bundle::estimate::{BundleInput, prior, robust_start};
+use crate::calib::bundle::linearize::NormalEquations;
+use crate::calib::bundle::problem::{BundleProblem, Layout};
+use crate::calib::parameters::ParameterKind;
+use armcal_core::numeric::Loss;
 use armcal_core::robot::Robot;
 
 /// Before solving.
@@ -22,12 +22,12 @@ use armcal_core::robot::Robot;
 pub struct Observability {
     /// Directions that the data tell more of than the prior, of as many as there are parameters.
     pub rank: usize,
-    pub of: usize,
+    pub n_parameters: usize,
     /// Largest over smallest singular value, of the directions that the data tell more of; so are the indices.
     pub condition_number: f64,
     pub o: [f64; 5],
     /// Directions that are held by the prior, in words.
-    pub null: Vec<NullDirection>,
+    pub null_space: Vec<NullDirection>,
 }
 
 /// A direction that the data tell less of than the prior.
@@ -104,7 +104,7 @@ pub fn observability(input: &BundleInput<'_>) -> Option<Observability> {
 }
 
 /// One prior sigma of each column.
-fn sigmas(layout: &Layout, input: &BundleInput<'_>, priors: &super::problem::Prior) -> Vec<f64> {
+fn sigmas(layout: &Layout, input: &BundleInput<'_>, priors: &crate::calib::bundle::problem::Prior) -> Vec<f64> {
     let mut sigma = vec![1.0; layout.n];
     for (column, p) in layout.parameters.iter().enumerate() {
         sigma[column] = input.scales.prior_std(&input.robot.sensors[p.joint], p.joint, p.kind);
@@ -158,10 +158,10 @@ fn summarized(information: DMatrix<f64>, names: &[Name], n_views: usize) -> Obse
     let o = [product / (n_views.max(1) as f64).sqrt(), least / most, least, least * least / most, o5];
     Observability {
         rank: told.len(),
-        of: n,
+        n_parameters: n,
         condition_number: most / least,
         o: if told.is_empty() { [0.0; 5] } else { o },
-        null: in_words(&mut space, names),
+        null_space: in_words(&mut space, names),
     }
 }
 

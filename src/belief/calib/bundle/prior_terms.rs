@@ -2,13 +2,13 @@
 
 use nalgebra::{Isometry3, Matrix6, Vector6};
 
-use super::linearize::NormalEquations;
-use super::problem::{BundleProblem, State};
-use super::sighting::right_jacobian_inverse;
+use crate::calib::bundle::linearize::NormalEquations;
+use crate::calib::bundle::observation_term::right_jacobian_inverse;
+use crate::calib::bundle::problem::{BundleProblem, State};
 use armcal_core::spatial::log;
 
 impl NormalEquations {
-    pub(super) fn add_priors(&mut self, problem: &BundleProblem<'_>, state: &State) {
+    pub(crate) fn add_priors(&mut self, problem: &BundleProblem<'_>, state: &State) {
         let (layout, prior) = (&problem.layout, &problem.prior);
         let n = prior.joint_info.nrows();
         let has_mount = n > layout.n_joint();

@@ -4,16 +4,16 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector, Isometry3, Vector3};
 
-use super::model::{Hyperparameters, Model};
-use crate::calib::associate::{MeanCorners, TagMeasurement, View};
-use crate::calib::problem::{JointParameters, Parameter};
+use crate::calib::bundle::model::{Hyperparameters, Model};
+use crate::calib::parameters::{JointParameters, Parameter};
+use crate::calib::views::association::{MeanCorners, TagMeasurement, View};
 use armcal_core::joints::{JointAngles, MAX_JOINTS};
 use armcal_core::optics::Fisheye;
 use armcal_core::robot::Robot;
 
 /// Where each parameter's column is.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Layout {
+pub(crate) struct Layout {
     /// Columns 0.. : the joints' parameters, joint by joint.
     pub parameters: Vec<Parameter>,
     pub of_joint: Vec<Range<usize>>,
@@ -28,7 +28,7 @@ pub(super) struct Layout {
 
 /// One tag in one view.
 #[derive(Clone, Debug)]
-pub(super) struct ObservationTerm {
+pub(crate) struct ObservationTerm {
     /// Index into the robot's tags; the gripper's comes after them.
     pub tag: usize,
     pub data: WeightedMeasurement,
@@ -38,14 +38,14 @@ pub(super) struct ObservationTerm {
 
 /// Measurements with the inverse of their variance.
 #[derive(Clone, Debug)]
-pub(super) enum WeightedMeasurement {
+pub(crate) enum WeightedMeasurement {
     Corners { corners_px: [[f64; 2]; 4], half_size_m: f64, info: f64 },
     Position { in_camera_m: Vector3<f64>, info: f64 },
     Pose { tag_from_camera: Isometry3<f64>, info_position: f64, info_rotation: f64 },
 }
 
 impl WeightedMeasurement {
-    pub(super) fn n_coordinates(&self) -> usize {
+    pub(crate) fn n_coordinates(&self) -> usize {
         match self {
             Self::Corners { .. } => 8,
             Self::Position { .. } => 3,
@@ -56,7 +56,7 @@ impl WeightedMeasurement {
 
 /// A view as the loops want it.
 #[derive(Clone, Debug)]
-pub(super) struct ViewData {
+pub(crate) struct ViewData {
     /// Angles without the estimated parameters, rad.
     pub fixed_rad: [f64; MAX_JOINTS],
     /// d(angle)/d(parameter) of each column.
@@ -72,7 +72,7 @@ pub(super) struct ViewData {
 
 /// Priors of all but the views' own parameters.
 #[derive(Clone, Debug)]
-pub(super) struct Prior {
+pub(crate) struct Prior {
     pub joint_mean: DVector<f64>,
     /// Six rows more than the mean: the mount's prior is in it, and `mount_std` is not looked at.
     pub joint_info: DMatrix<f64>,
@@ -89,7 +89,7 @@ pub(super) struct Prior {
 }
 
 #[derive(Clone, Debug)]
-pub(super) struct BundleProblem<'a> {
+pub(crate) struct BundleProblem<'a> {
     pub robot: &'a Robot,
     pub layout: Layout,
     pub views: Vec<ViewData>,
@@ -102,7 +102,7 @@ pub(super) struct BundleProblem<'a> {
 
 /// Everything that is estimated.
 #[derive(Clone, Debug)]
-pub(super) struct State {
+pub(crate) struct State {
     pub joint: DVector<f64>,
     pub mount: Isometry3<f64>,
     pub time_s: f64,
@@ -117,7 +117,7 @@ pub(super) struct State {
 
 impl State {
     /// Becomes `other` in its own memory; both are of one problem.
-    pub(super) fn copy_from(&mut self, other: &Self) {
+    pub(crate) fn copy_from(&mut self, other: &Self) {
         self.joint.copy_from(&other.joint);
         self.mount = other.mount;
         self.time_s = other.time_s;
@@ -135,7 +135,7 @@ const MIN_STD: f64 = 1e-9;
 const CORNER_PRIOR_DOF: f64 = 16.0;
 
 impl Layout {
-    pub(super) fn new(robot: &Robot, model: &Model, views: &[View]) -> Self {
+    pub(crate) fn new(robot: &Robot, model: &Model, views: &[View]) -> Self {
         let mut layout = Self { tags: vec![None; robot.tags.len()], ..Self::default() };
         for (joint, kinds) in model.joints.iter().enumerate() {
             let start = layout.parameters.len();
@@ -161,13 +161,13 @@ impl Layout {
         layout
     }
 
-    pub(super) fn n_joint(&self) -> usize {
+    pub(crate) fn n_joint(&self) -> usize {
         self.parameters.len()
     }
 }
 
 impl<'a> BundleProblem<'a> {
-    pub(super) fn new(
+    pub(crate) fn new(
         robot: &'a Robot,
         views: &[View],
         model: &Model,
@@ -212,7 +212,7 @@ impl<'a> BundleProblem<'a> {
     }
 
     /// The state where nothing is off its prior, but for the joints' parameters, which are `guess`'s.
-    pub(super) fn start(&self, guess: &JointParameters) -> State {
+    pub(crate) fn start(&self, guess: &JointParameters) -> State {
         let parameters = &self.layout.parameters;
         State {
             joint: DVector::from_iterator(parameters.len(), parameters.iter().map(|p| guess.get(*p))),
@@ -227,14 +227,14 @@ impl<'a> BundleProblem<'a> {
     }
 
     /// Variance of what a joint is off in a view beyond the sensor's model, rad^2.
-    pub(super) fn joint_error_var(&self, view: &ViewData, joint: usize) -> f64 {
+    pub(crate) fn joint_error_var(&self, view: &ViewData, joint: usize) -> f64 {
         if view.is_free[joint] {
             return self.scales.free_joint_std_rad.powi(2);
         }
         self.scales.joint_std_rad[joint].powi(2) + view.reading_var[joint]
     }
 
-    pub(super) fn angles(&self, view_idx: usize, state: &State) -> JointAngles {
+    pub(crate) fn angles(&self, view_idx: usize, state: &State) -> JointAngles {
         let view = &self.views[view_idx];
         JointAngles::from_fn(self.robot.n_joints(), |j| {
             let columns = self.layout.of_joint[j].clone();
@@ -244,7 +244,7 @@ impl<'a> BundleProblem<'a> {
     }
 
     /// One sigma of a standard deviation that is in use: never zero.
-    pub(super) fn at_least(std: f64) -> f64 {
+    pub(crate) fn at_least(std: f64) -> f64 {
         std.max(MIN_STD)
     }
 }

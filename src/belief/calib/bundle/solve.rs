@@ -2,89 +2,91 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Vector6};
 
-use super::eliminated::SchurBlock;
-use super::linearize::NormalEquations;
-use super::problem::{BundleProblem, State};
-use super::robust::Loss;
-use crate::calib::methods::SolveOutcome;
+use crate::calib::bundle::linearize::NormalEquations;
+use crate::calib::bundle::problem::{BundleProblem, State};
+use crate::calib::bundle::schur::SchurBlock;
 use armcal_core::joints::MAX_JOINTS;
+use armcal_core::numeric::{Damping, LeastSquares, Loss, Outcome, Proposal, StopRule, minimize};
 use armcal_core::spatial::exp;
 
-/// When to stop.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct StopRule {
-    pub max_iterations: usize,
-    /// The cost that one more step would save, over the cost.
-    pub relative_gain: f64,
+const DAMPING: Damping = Damping { first: 1e-6, min: 1e-14, max: 1e12, down: 0.1, up: 10.0, min_after_rejection: 0.0 };
+/// Near the end a step may cost a few last digits; relative error of a sum of thousands of squares.
+const SLACK: f64 = 1e-13;
+const ROUNDING: f64 = 1e-11;
+
+pub(crate) const TIGHT: StopRule = until(100, 1e-15);
+/// While scales or weights still change.
+pub(crate) const LOOSE: StopRule = until(20, 1e-6);
+
+/// Until one more step would save less than `predicted_gain` of the cost.
+pub(crate) const fn until(max_iterations: usize, predicted_gain: f64) -> StopRule {
+    StopRule { predicted_gain, slack: SLACK, rounding: ROUNDING, ..StopRule::after(max_iterations) }
 }
 
-pub(super) const TIGHT: StopRule = StopRule { max_iterations: 100, relative_gain: 1e-15 };
-/// While scales or weights still change.
-pub(super) const LOOSE: StopRule = StopRule { max_iterations: 20, relative_gain: 1e-6 };
-
 /// The state at the end, its normal equations, and how it went.
-pub(super) struct Solved {
+pub(crate) struct Solved {
     pub state: State,
     pub normal: NormalEquations,
     pub iterations: usize,
-    pub outcome: SolveOutcome,
+    pub outcome: Outcome,
     /// Of the start.
     pub cost_initial: f64,
 }
 
-/// Relative error of a sum of thousands of squares.
-const ROUNDING: f64 = 1e-11;
-const FIRST_DAMPING: f64 = 1e-6;
-const MAX_DAMPING: f64 = 1e12;
+/// The problem as the loop sees it, with the memory of one step.
+struct Solver<'a, 'b> {
+    problem: &'a BundleProblem<'b>,
+    loss: Loss,
+    state: State,
+    normal: NormalEquations,
+    trial: State,
+    trial_normal: NormalEquations,
+    room: DMatrix<f64>,
+    step: DVector<f64>,
+}
+
+impl LeastSquares for Solver<'_, '_> {
+    fn cost(&self) -> f64 {
+        self.normal.cost
+    }
+
+    fn propose(&mut self, damping: f64) -> Option<Proposal> {
+        solve_damped(&self.normal, damping, &mut self.room, &mut self.step)?;
+        let predicted_gain = self.step.dot(&self.normal.right) + own_gain(&self.normal);
+        Some(Proposal { length: f64::INFINITY, predicted_gain })
+    }
+
+    fn trial_cost(&mut self) -> Option<f64> {
+        take_step(self.problem, &self.state, &self.normal, &self.step, &mut self.trial);
+        self.trial_normal.update(self.problem, &self.trial, self.loss);
+        Some(self.trial_normal.cost)
+    }
+
+    fn accept(&mut self) {
+        std::mem::swap(&mut self.state, &mut self.trial);
+        std::mem::swap(&mut self.normal, &mut self.trial_normal);
+    }
+}
 
 /// Minimizes the problem's cost from `state`.
-pub(super) fn solve(problem: &BundleProblem<'_>, state: State, loss: Loss, stop: StopRule) -> Solved {
-    let mut state = state;
+pub(crate) fn solve(problem: &BundleProblem<'_>, state: State, loss: Loss, stop: StopRule) -> Solved {
     let mut normal = NormalEquations::new(problem);
     normal.update(problem, &state, loss);
     let cost_initial = normal.cost;
-    let mut trial_normal = NormalEquations::new(problem);
-    let mut trial = state.clone();
-    let mut room = DMatrix::zeros(problem.layout.n, problem.layout.n);
-    let mut step = DVector::zeros(problem.layout.n);
-    let mut damping = FIRST_DAMPING;
-    let mut iterations = 0;
-    let outcome = loop {
-        if iterations >= stop.max_iterations {
-            break SolveOutcome::Stalled;
-        }
-        if solve_damped(&normal, damping, &mut room, &mut step).is_none() {
-            damping = (damping * 10.0).max(FIRST_DAMPING);
-            if damping > MAX_DAMPING {
-                break SolveOutcome::Degenerate;
-            }
-            iterations += 1;
-            continue;
-        }
-        let gain = step.dot(&normal.right) + own_gain(&normal);
-        if gain.abs() <= stop.relative_gain * normal.cost.max(1e-300) {
-            break if normal.cost.is_finite() { SolveOutcome::Converged } else { SolveOutcome::Degenerate };
-        }
-        iterations += 1;
-        take_step(problem, &state, &normal, &step, &mut trial);
-        trial_normal.update(problem, &trial, loss);
-        // Rounding: near the end a step may cost a few last digits.
-        if trial_normal.cost <= normal.cost * (1.0 + 1e-13) {
-            std::mem::swap(&mut state, &mut trial);
-            std::mem::swap(&mut normal, &mut trial_normal);
-            damping = (damping * 0.1).max(1e-14);
-        } else {
-            // Where the step would save no more than the sum's last digits, the minimum is found as well as numbers go.
-            if gain.abs() <= ROUNDING * normal.cost {
-                break SolveOutcome::Converged;
-            }
-            damping *= 10.0;
-            if damping > MAX_DAMPING {
-                break SolveOutcome::Stalled;
-            }
-        }
+    let n = problem.layout.n;
+    let mut solver = Solver {
+        problem,
+        loss,
+        trial: state.clone(),
+        state,
+        normal,
+        trial_normal: NormalEquations::new(problem),
+        room: DMatrix::zeros(n, n),
+        step: DVector::zeros(n),
     };
-    Solved { state, normal, iterations, outcome, cost_initial }
+    let report = minimize(&mut solver, &DAMPING, &stop);
+    let Solver { state, normal, .. } = solver;
+    Solved { state, normal, iterations: report.iterations, outcome: report.outcome(), cost_initial }
 }
 
 /// The step by the matrix with its diagonal raised, factored in `room`; `None` where it has no Cholesky factor.
@@ -117,7 +119,7 @@ fn own_gain(normal: &NormalEquations) -> f64 {
 }
 
 #[cfg(test)]
-pub(super) fn stepped(
+pub(crate) fn stepped(
     problem: &BundleProblem<'_>,
     state: &State,
     normal: &NormalEquations,

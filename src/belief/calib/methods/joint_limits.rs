@@ -6,10 +6,10 @@
 
 use nalgebra::{DMatrix, Matrix2, Vector2};
 
-use super::{Solution, SolveOutcome};
-use crate::calib::observability::Unobservable;
-use crate::calib::problem::{JointParameters, Parameter, ParameterKind};
-use crate::calib::uncertainty::ParameterCovariance;
+use crate::calib::covariance::ParameterCovariance;
+use crate::calib::methods::observability::Unobservable;
+use crate::calib::methods::{Outcome, Solution};
+use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
 use armcal_core::robot::Robot;
 
 /// Readings of one joint that stood at a nominal stop.
@@ -74,7 +74,7 @@ pub fn fit_stops(robot: &Robot, readings: &[EndStopReading], guess: &JointParame
     };
     let solution = Solution {
         parameters,
-        outcome: SolveOutcome::Converged,
+        outcome: Outcome::Converged,
         evaluations: 1,
         cost_initial: cost(guess),
         cost_final: cost(&parameters),

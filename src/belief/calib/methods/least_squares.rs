@@ -4,18 +4,17 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::{Solution, SolveOutcome};
-use crate::calib::problem::{JointParameters, Parameter, PositionProblem};
+use crate::calib::methods::Solution;
+use crate::calib::methods::position_problem::PositionProblem;
+use crate::calib::parameters::{JointParameters, Parameter};
+use armcal_core::numeric::{Damping, LeastSquares, Proposal, StopRule, minimize};
 
-const MAX_ITERATIONS: usize = 100;
+const DAMPING: Damping = Damping { first: 1e-6, min: 1e-15, max: 1e12, down: 0.1, up: 10.0, min_after_rejection: 0.0 };
 /// A step of this length in prior sigma is the end.
-const STEP_END: f64 = 1e-9;
-const DAMPING_BEGIN: f64 = 1e-6;
-const DAMPING_MIN: f64 = 1e-15;
-const DAMPING_MAX: f64 = 1e12;
+const STOP: StopRule = StopRule { step_length: 1e-9, ..StopRule::after(200) };
 
 /// Sum of squared distances between seen and surveyed landmarks, m^2.
-pub(super) fn sum_of_squares_m2(problem: &PositionProblem<'_>, at: &JointParameters) -> f64 {
+pub(crate) fn sum_of_squares_m2(problem: &PositionProblem<'_>, at: &JointParameters) -> f64 {
     let mut sum = 0.0;
     problem.each(at, |o| sum += o.residual_m.norm_squared());
     sum
@@ -24,11 +23,10 @@ pub(super) fn sum_of_squares_m2(problem: &PositionProblem<'_>, at: &JointParamet
 /// Minimizes the sum of squared distances over `free` from `guess`, m^2.
 #[must_use]
 pub fn least_squares(problem: &PositionProblem<'_>, free: &[Parameter], guess: &JointParameters) -> Solution {
-    let cost_initial = sum_of_squares_m2(problem, guess);
     let scale = DVector::from_iterator(free.len(), free.iter().map(|p| p.prior_std(problem.robot)));
-    let mut descent =
-        Descent { problem, free, scale, at: *guess, cost_m2: cost_initial, damping: DAMPING_BEGIN, evaluations: 1 };
-    let outcome = descent.run();
+    let mut descent = Descent::new(problem, free, scale, *guess);
+    let cost_initial = descent.cost_m2;
+    let outcome = minimize(&mut descent, &DAMPING, &STOP).outcome();
     let Descent { at: parameters, cost_m2: cost_final, evaluations, .. } = descent;
     Solution { parameters, outcome, evaluations, cost_initial, cost_final }
 }
@@ -40,53 +38,69 @@ struct Descent<'a> {
     scale: DVector<f64>,
     at: JointParameters,
     cost_m2: f64,
-    damping: f64,
+    normal: DMatrix<f64>,
+    gradient: DVector<f64>,
+    trial: JointParameters,
+    trial_cost_m2: f64,
     evaluations: usize,
 }
 
-impl Descent<'_> {
-    fn run(&mut self) -> SolveOutcome {
-        for _ in 0..MAX_ITERATIONS {
-            let (residuals, mut jacobian) = self.problem.linearize(&self.at, self.free);
-            for (column, scale) in self.scale.iter().enumerate() {
-                jacobian.column_mut(column).scale_mut(*scale);
-            }
-            let normal = jacobian.transpose() * &jacobian;
-            match self.descend(&normal, &(jacobian.transpose() * residuals)) {
-                Some(length) if length < STEP_END => return SolveOutcome::Converged,
-                Some(_) => {}
-                None => return SolveOutcome::Degenerate,
-            }
-        }
-        SolveOutcome::Stalled
+impl<'a> Descent<'a> {
+    fn new(problem: &'a PositionProblem<'a>, free: &'a [Parameter], scale: DVector<f64>, at: JointParameters) -> Self {
+        let cost_m2 = sum_of_squares_m2(problem, &at);
+        let (normal, gradient) = (DMatrix::zeros(0, 0), DVector::zeros(0));
+        let mut descent = Self {
+            problem,
+            free,
+            scale,
+            at,
+            cost_m2,
+            normal,
+            gradient,
+            trial: at,
+            trial_cost_m2: cost_m2,
+            evaluations: 1,
+        };
+        descent.linearize();
+        descent
     }
 
-    /// Takes the first damped step that does not go up, and gives its length in prior sigma; `None` if there is none.
-    fn descend(&mut self, normal: &DMatrix<f64>, gradient: &DVector<f64>) -> Option<f64> {
-        while self.damping < DAMPING_MAX {
-            let mut damped = normal.clone();
-            for k in 0..damped.nrows() {
-                damped[(k, k)] *= 1.0 + self.damping;
-            }
-            let step = -damped.cholesky()?.solve(gradient);
-            let mut next = self.at;
-            for ((parameter, step), scale) in self.free.iter().zip(step.iter()).zip(self.scale.iter()) {
-                next.set(*parameter, self.at.get(*parameter) + step * scale);
-            }
-            let cost_m2 = sum_of_squares_m2(self.problem, &next);
-            self.evaluations += 1;
-            if cost_m2 <= self.cost_m2 {
-                (self.at, self.cost_m2) = (next, cost_m2);
-                self.damping = (self.damping * 0.1).max(DAMPING_MIN);
-                return Some(step.norm());
-            }
-            if step.norm() < STEP_END {
-                // At the bottom, rounding alone goes up.
-                return Some(0.0);
-            }
-            self.damping *= 10.0;
+    fn linearize(&mut self) {
+        let (residuals, mut jacobian) = self.problem.linearize(&self.at, self.free);
+        for (column, scale) in self.scale.iter().enumerate() {
+            jacobian.column_mut(column).scale_mut(*scale);
         }
-        None
+        (self.normal, self.gradient) = (jacobian.transpose() * &jacobian, jacobian.transpose() * residuals);
+    }
+}
+
+impl LeastSquares for Descent<'_> {
+    fn cost(&self) -> f64 {
+        self.cost_m2
+    }
+
+    fn propose(&mut self, damping: f64) -> Option<Proposal> {
+        let mut damped = self.normal.clone();
+        for k in 0..damped.nrows() {
+            damped[(k, k)] *= 1.0 + damping;
+        }
+        let step = -damped.cholesky()?.solve(&self.gradient);
+        self.trial = self.at;
+        for ((parameter, step), scale) in self.free.iter().zip(step.iter()).zip(self.scale.iter()) {
+            self.trial.set(*parameter, self.at.get(*parameter) + step * scale);
+        }
+        Some(Proposal { length: step.norm(), predicted_gain: f64::INFINITY })
+    }
+
+    fn trial_cost(&mut self) -> Option<f64> {
+        self.trial_cost_m2 = sum_of_squares_m2(self.problem, &self.trial);
+        self.evaluations += 1;
+        Some(self.trial_cost_m2)
+    }
+
+    fn accept(&mut self) {
+        (self.at, self.cost_m2) = (self.trial, self.trial_cost_m2);
+        self.linearize();
     }
 }
 

@@ -1,7 +1,8 @@
 //! The paper's proposed method: least sum of distances between seen and surveyed landmarks, over all landmarks, by BOBYQA.
 
-use super::{PositionMethod, SearchOptions, Solution};
-use crate::calib::problem::{JointParameters, Parameter, PositionProblem};
+use crate::calib::methods::position_problem::PositionProblem;
+use crate::calib::methods::{PositionMethod, SearchOptions, Solution};
+use crate::calib::parameters::{JointParameters, Parameter};
 
 /// Minimizes [`PositionProblem::sum_of_distances_m`] over `free`, from `guess`; the other parameters stay there.
 #[must_use]

@@ -8,9 +8,10 @@
 
 use nalgebra::{Const, DMatrix, DVector, Dyn, OMatrix, Vector3};
 
-use crate::calib::observability::Unobservable;
-use crate::calib::problem::{JointParameters, Parameter, ParameterKind, PositionProblem, TagResidual};
-use crate::calib::uncertainty::{CommonErrors, ParameterCovariance};
+use crate::calib::covariance::{CommonErrors, ParameterCovariance};
+use crate::calib::methods::observability::Unobservable;
+use crate::calib::methods::position_problem::{PositionProblem, TagResidual};
+use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
 
 /// What becomes of the first joint's offset under minimum variance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

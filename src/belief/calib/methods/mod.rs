@@ -4,48 +4,36 @@
 //! one start or several. `least_squares` is the reference that Gaussian noise asks for. `joint_limits` needs no camera: the
 //! nominal end stops of each joint against its readings there. The interface is [`PositionMethod::solve`].
 
+pub(crate) mod calibration;
+pub(crate) mod end_stops;
+pub(crate) mod gripper_tag;
 mod joint_limits;
 mod least_squares;
 mod minimum_distance;
 mod minimum_variance;
+pub(crate) mod observability;
+pub(crate) mod position_problem;
 mod search;
 #[cfg(test)]
 mod tests;
 
+pub use gripper_tag::{MountEstimate, mount_by_gripper_tag};
 pub use joint_limits::{EndStopFit, EndStopReading, fit_stops};
 pub use least_squares::{fisher_information, least_squares};
 pub use minimum_distance::minimum_distance;
-pub use minimum_variance::{Gauge, VarianceObjective, determined_by_variance, variance_covariance};
+pub use minimum_variance::{Gauge, VarianceObjective, determined_by_variance};
+pub use observability::{Unobservable, free_parameters};
+pub use position_problem::PositionProblem;
 pub use search::{Interpolation, Scaling, SearchOptions};
 
-use super::problem::{JointParameters, Parameter, PositionProblem};
-
-/// How a solver ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SolveOutcome {
-    Converged,
-    /// The budget of evaluations ran out, or a parameter came to rest on its bound.
-    Stalled,
-    /// The data leave the problem without a minimum.
-    Degenerate,
-}
-
-impl SolveOutcome {
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Converged => "converged",
-            Self::Stalled => "stalled",
-            Self::Degenerate => "degenerate",
-        }
-    }
-}
+use crate::calib::parameters::{JointParameters, Parameter};
+use armcal_core::numeric::Outcome;
 
 /// A method's answer.
 #[derive(Clone, Debug)]
 pub struct Solution {
     pub parameters: JointParameters,
-    pub outcome: SolveOutcome,
+    pub outcome: Outcome,
     pub evaluations: usize,
     /// The method's objective at the first guess and at the end, in its own unit: m for minimum distance, m^2 for minimum
     /// variance and least squares, rad^2 for joint limits.

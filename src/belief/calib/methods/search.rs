@@ -7,8 +7,8 @@
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use super::{Solution, SolveOutcome};
-use crate::calib::problem::{JointParameters, Parameter, ParameterKind};
+use crate::calib::methods::{Outcome, Solution};
+use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
 use armcal_core::robot::Robot;
 use armcal_core::sensor::wrap_symmetric;
 use armcal_core::stats::stream_rng;
@@ -77,7 +77,7 @@ impl SearchOptions {
 }
 
 /// Minimizes `objective` over `free`. `watch` hears the objective of every evaluation.
-pub(super) fn minimize(
+pub(crate) fn minimize(
     robot: &Robot,
     mut objective: impl FnMut(&JointParameters) -> f64,
     free: &[Parameter],
@@ -100,9 +100,9 @@ pub(super) fn minimize(
         let result = bobyqa::bobyqa(&mut cost, &mut x, &space.lower, &space.upper, space.config(options));
         evaluations += result.n_eval;
         let outcome = match result.status {
-            bobyqa::Status::Converged if !space.on_bound(&x) && result.found_finite() => SolveOutcome::Converged,
-            bobyqa::Status::Converged | bobyqa::Status::MaxFunReached if result.found_finite() => SolveOutcome::Stalled,
-            _ => SolveOutcome::Degenerate,
+            bobyqa::Status::Converged if !space.on_bound(&x) && result.found_finite() => Outcome::Converged,
+            bobyqa::Status::Converged | bobyqa::Status::MaxFunReached if result.found_finite() => Outcome::Stalled,
+            _ => Outcome::Degenerate,
         };
         if best.as_ref().is_none_or(|best| result.f < best.cost_final) {
             let parameters = space.at(&x);
@@ -111,7 +111,7 @@ pub(super) fn minimize(
     }
     let nothing = Solution {
         parameters: *guess,
-        outcome: SolveOutcome::Degenerate,
+        outcome: Outcome::Degenerate,
         evaluations: 0,
         cost_initial,
         cost_final: cost_initial,

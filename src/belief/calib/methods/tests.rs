@@ -7,8 +7,9 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use super::*;
-use crate::calib::uncertainty::CommonErrors;
+use crate::calib::covariance::CommonErrors;
+use crate::calib::methods::minimum_variance::variance_covariance;
+use crate::calib::methods::*;
 use crate::calib::{ParameterKind, TagMeasurement, TagObservation, View};
 use armcal_core::robot::{Robot, load};
 use armcal_core::stats::{quantile, stream_rng};
@@ -111,7 +112,7 @@ fn without_noise_every_method_finds_the_sensors() {
             PositionMethod::MinimumVariance.solve(&problem, &without_gauge, &anchored(&truth), &options),
         ];
         for (worst, solution) in worst_m.iter_mut().zip(&solved) {
-            assert_eq!(solution.outcome, SolveOutcome::Converged, "seed {seed}");
+            assert_eq!(solution.outcome, Outcome::Converged, "seed {seed}");
             *worst = worst.max(tool_error_m(&robot, &truth, &solution.parameters, seed));
         }
     }

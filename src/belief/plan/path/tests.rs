@@ -3,7 +3,14 @@
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-use super::*;
+use crate::plan::bounds::JointErrorBounds;
+use crate::plan::clearance::ClearanceModel;
+use crate::plan::motion::edge::{SLOWEST, SLOWNESS};
+use crate::plan::motion::{Edge, Path, TrackingErrorBound};
+use crate::plan::path::planner::*;
+use crate::plan::path::rrt_connect::RrtConnect;
+use armcal_core::joints::JointAngles;
+use armcal_core::kinematics::JointLimits;
 use armcal_core::robot::{PlacedShape, Robot, Shape, Vehicle, load, load_vehicle};
 use armcal_core::routine::Scene;
 use armcal_core::stats::stream_rng;

@@ -1,7 +1,7 @@
 //! An arm that goes where its controller is told at once, whose oil warms while it does.
 
-use super::*;
 use crate::calib::JointParameters;
+use crate::session::motion::*;
 use armcal_core::log::{RecordingHeader, RecordingWriter, read_recording};
 use armcal_core::sensor::Terms;
 use armcal_core::streams::{JointSensorSample, PressureSample, TemperatureSample, Thermometer};

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use serde::Deserialize;
 
-use super::yaml;
+use crate::tagmap::files::yaml;
 use armcal_core::optics::{CameraModel, Fisheye, Radtan};
 use armcal_core::robot::{FileIssue, RobotError, read_text};
 

@@ -5,8 +5,8 @@ use std::path::Path;
 use nalgebra::{Isometry3, Translation3};
 use serde::Deserialize;
 
-use super::{TagFile, yaml};
 use crate::tagmap::check::SIZE_RANGE_M;
+use crate::tagmap::files::{TagFile, yaml};
 use crate::tagmap::types::{Body, TagPrior};
 use armcal_core::robot::{FileIssue, RobotError};
 

@@ -8,7 +8,7 @@ use std::path::Path;
 
 use nalgebra::Isometry3;
 
-use super::{TagFile, extension, own, read_tags};
+use crate::tagmap::files::{TagFile, extension, own, read_tags};
 use armcal_core::input::TagUse;
 use armcal_core::robot::{FileIssue, Robot, RobotError, SurveyedTag, TagSurvey, read_text};
 use armcal_core::spatial::{Base, Pose, Tag};

@@ -19,9 +19,9 @@ use nalgebra::{Isometry3, Matrix6};
 pub use cameras::{NamedCamera, cameras_to_yaml, parse_cameras, read_cameras};
 pub use landmarks::{FIRST_NAMED_ID, Landmark, LandmarkFile, NamedSurvey, UNKNOWN_ROTATION_STD_RAD, read_landmarks};
 
-use super::check::SIZE_RANGE_M;
-use super::result::{GroupFrame, TagMap};
-use super::types::{Body, MapInput, TagPrior};
+use crate::tagmap::check::SIZE_RANGE_M;
+use crate::tagmap::result::{GroupFrame, TagMap};
+use crate::tagmap::types::{Body, MapInput, TagPrior};
 use armcal_core::robot::{FileIssue, RobotError, read_text};
 use armcal_core::time::Stamp;
 

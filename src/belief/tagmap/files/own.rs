@@ -11,9 +11,9 @@ use std::path::Path;
 use nalgebra::Isometry3;
 use serde::Deserialize;
 
-use super::landmarks::{FIRST_NAMED_ID, Landmark, LandmarkFile};
-use super::{TagFile, WrittenGroup};
 use crate::tagmap::check::SIZE_RANGE_M;
+use crate::tagmap::files::landmarks::{FIRST_NAMED_ID, Landmark, LandmarkFile};
+use crate::tagmap::files::{TagFile, WrittenGroup};
 use crate::tagmap::types::{Body, TagPrior};
 use armcal_core::robot::{FileIssue, RobotError, parse_toml};
 use armcal_core::spatial::{Base, Pose, Tag};

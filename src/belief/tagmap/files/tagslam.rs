@@ -7,9 +7,9 @@ use std::path::Path;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 use serde::Deserialize;
 
-use super::yaml::{self, PoseYaml};
-use super::{Remap, TagFile, WrittenGroup};
 use crate::tagmap::check::SIZE_RANGE_M;
+use crate::tagmap::files::yaml::{self, PoseYaml};
+use crate::tagmap::files::{Remap, TagFile, WrittenGroup};
 use crate::tagmap::types::{Body, TagPrior};
 use armcal_core::robot::{FileIssue, RobotError};
 use armcal_core::time::Stamp;

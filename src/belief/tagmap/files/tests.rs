@@ -4,7 +4,9 @@ use std::path::Path;
 
 use nalgebra::{Isometry3, Matrix6, Translation3, UnitQuaternion, Vector3};
 
-use super::{NamedCamera, TagFile, Written, WrittenGroup, cameras_to_yaml, own, parse_cameras, parse_tags, tagslam};
+use crate::tagmap::files::{
+    NamedCamera, TagFile, Written, WrittenGroup, cameras_to_yaml, own, parse_cameras, parse_tags, tagslam,
+};
 use armcal_core::optics::{CameraModel, Fisheye, Radtan};
 use armcal_core::time::Stamp;
 

@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use rand::RngExt;
 
-use super::fixture::{Scene, body, fisheye, look, looking, normal, settings};
+use crate::tagmap::tests::fixture::{Scene, body, fisheye, look, looking, normal, settings};
 use crate::tagmap::{Body, GroupFrame, MapSettings, MapView, TagMap, TagPrior, solve};
 use armcal_core::spatial::log;
 use armcal_core::stats::stream_rng;

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, Isometry3, Matrix3, Vector6};
 
-use super::fixture::{Scene, size_of};
+use crate::tagmap::tests::fixture::{Scene, size_of};
 use armcal_core::optics::square_corners;
 use armcal_core::spatial::exp;
 

@@ -3,8 +3,8 @@
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use rand::RngExt;
 
-use super::fixture::{Scene, fisheye, look, looking, pinhole, settings, size_of, wall};
-use super::{distances, position_errors};
+use crate::tagmap::tests::fixture::{Scene, fisheye, look, looking, pinhole, settings, size_of, wall};
+use crate::tagmap::tests::{distances, position_errors};
 use crate::tagmap::{GroupFrame, MapDetection, MapMode, MapRejection, MapSettings, MapView, TagPrior, solve};
 use armcal_core::stats::stream_rng;
 use armcal_core::time::Stamp;

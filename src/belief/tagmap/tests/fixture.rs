@@ -5,7 +5,7 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use super::super::{Body, MapDetection, MapInput, MapSettings, MapView, NoiseScale, TagPrior};
+use crate::tagmap::{Body, MapDetection, MapInput, MapSettings, MapView, NoiseScale, TagPrior};
 use armcal_core::optics::{CameraModel, square_corners};
 use armcal_core::stats::stream_rng;
 use armcal_core::time::Stamp;

@@ -9,7 +9,7 @@ mod statistics;
 use fixture::{fisheye, pinhole, settings, wall};
 use nalgebra::Vector3;
 
-use super::{MapInput, TagMap, TagMapError, solve};
+use crate::tagmap::{MapInput, TagMap, TagMapError, solve};
 use fixture::Scene;
 
 fn position_errors(scene: &Scene, map: &TagMap) -> Vec<(u32, Vector3<f64>)> {
@@ -73,7 +73,7 @@ fn input_that_cannot_be_meant_is_refused() {
     assert_eq!(with(&|s| s.views[3].camera = 2), TagMapError::NoSuchCamera { view: 3, camera: 2, n_cameras: 1 });
     assert_eq!(with(&|s| s.views.clear()), TagMapError::NoDetections);
     let nothing = MapInput { tags: &[], ..scene.input() };
-    let error = solve(&nothing, &super::MapSettings { base_tag: None, ..settings() }).unwrap_err();
+    let error = solve(&nothing, &crate::tagmap::MapSettings { base_tag: None, ..settings() }).unwrap_err();
     let n = scene.views.iter().map(|view| view.tags.len()).sum();
     assert_eq!(error, TagMapError::NothingLeft { rejected: n, reasons: format!("unknown_tag {n}") });
 }

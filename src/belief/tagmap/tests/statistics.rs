@@ -1,8 +1,8 @@
 //! Over many seeds: as good as possible, and as sure as said.
 
-use super::bound::cramer_rao;
-use super::fixture::{Scene, body, fisheye, look, looking, pinhole, settings, wall};
-use super::{distances, position_errors};
+use crate::tagmap::tests::bound::cramer_rao;
+use crate::tagmap::tests::fixture::{Scene, body, fisheye, look, looking, pinhole, settings, wall};
+use crate::tagmap::tests::{distances, position_errors};
 use crate::tagmap::{MapInput, MapSettings, MapView, NoiseScale, TagPrior, solve};
 use armcal_core::optics::{CameraModel, SquarePose, solve_square_both};
 use armcal_core::stats::stream_rng;
@@ -138,7 +138,7 @@ fn known_places_help_and_are_not_believed_too_much() {
         let mut rng = stream_rng(seed, "survey");
         let std = [2e-3, 2e-3, 2e-3, 5e-3, 5e-3, 5e-3];
         for (prior, truth) in scene.priors.iter_mut().zip(&scene.truth).skip(1) {
-            let mut draw = |std: f64| std * super::fixture::normal(&mut rng);
+            let mut draw = |std: f64| std * crate::tagmap::tests::fixture::normal(&mut rng);
             let xi = nalgebra::Vector6::from(std.map(&mut draw));
             prior.pose = Some(truth * armcal_core::spatial::exp(&xi));
             prior.std = Some(std);

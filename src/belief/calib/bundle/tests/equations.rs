@@ -3,16 +3,16 @@
 use nalgebra::DVector;
 use rand::RngExt;
 
-use super::data::{Noise, Truth, normal, reference, rng, titan_with_gripper_tag, views};
-use crate::calib::associate::{TagMeasurement, View};
 use crate::calib::bundle::estimate::{BundleInput, HyperparameterMode, model_for, prior};
 use crate::calib::bundle::linearize::NormalEquations;
 use crate::calib::bundle::model::{Hyperparameters, Model};
 use crate::calib::bundle::problem::{BundleProblem, State};
-use crate::calib::bundle::robust::Loss;
-use crate::calib::bundle::solve::{LOOSE, StopRule, solve, stepped};
-use crate::calib::problem::JointParameters;
+use crate::calib::bundle::solve::{LOOSE, solve, stepped, until};
+use crate::calib::bundle::tests::data::{Noise, Truth, normal, reference, rng, titan_with_gripper_tag, views};
+use crate::calib::parameters::JointParameters;
+use crate::calib::views::association::{TagMeasurement, View};
 use armcal_core::joints::MAX_JOINTS;
+use armcal_core::numeric::Loss;
 use armcal_core::robot::Robot;
 
 struct Case {
@@ -140,7 +140,7 @@ fn the_curvature_is_that_of_the_cost_where_nothing_is_off() {
     let case = case(7);
     let problem = problem(&case);
     let guess = JointParameters { reference: reference(), ..JointParameters::default() };
-    let stop = StopRule { max_iterations: 200, relative_gain: 1e-16 };
+    let stop = until(200, 1e-16);
     let solved = solve(&problem, problem.start(&guess), Loss::Square, stop);
     let n = problem.layout.n;
     let full = nalgebra::DMatrix::from_fn(n, n, |i, k| solved.normal.matrix[(i.max(k), i.min(k))]);

@@ -1,8 +1,8 @@
 //! On data of the estimator's own model: the equations against differences, the estimate against its bound.
 
-mod alarm;
+mod calibration_prior;
 mod data;
 mod equations;
-mod failed;
+mod failures;
+mod score_test;
 mod statistics;
-mod warm;

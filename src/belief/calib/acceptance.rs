@@ -1,0 +1,101 @@
+//! Accept or refuse: the held-out views decide, never the fit's own residuals.
+
+use crate::calib::refusal::Refusal;
+use armcal_core::numeric::Outcome;
+use armcal_core::robot::Robot;
+
+/// What the verdict rests on.
+#[derive(Clone, Copy, Debug)]
+pub struct AcceptanceData {
+    pub outcome: Outcome,
+    pub held_out_views: usize,
+    pub held_out_rms_m: Option<f64>,
+    /// The same views with the datasheet's sensors.
+    pub held_out_nominal_rms_m: Option<f64>,
+    pub fit_rms_m: f64,
+    /// Wanted of the sensors that move the camera, whether these views determine them or not.
+    pub n_parameters: usize,
+    pub fit_views: usize,
+    /// 95th percentile over the task's targets; `None` without a task.
+    pub predicted_tool_error_m: Option<f64>,
+    pub tolerance_m: Option<f64>,
+}
+
+/// Fewer views say nothing about views not seen.
+pub const MIN_HELD_OUT_VIEWS: usize = 3;
+/// Held-out views this much worse than fitted ones mean that the fit learnt its own noise.
+const MAX_HELD_OUT_OVER_FIT: f64 = 2.5;
+/// Each view adds about three numbers that do not share its camera-pose error; fewer views than parameters overfit.
+pub const MIN_VIEWS_PER_PARAMETER: f64 = 1.0;
+
+/// The fewest fitted views that a calibration of all joints before the camera, from the datasheet, is accepted with.
+#[must_use]
+pub fn fewest_views(robot: &Robot) -> usize {
+    (MIN_VIEWS_PER_PARAMETER * 2.0 * robot.camera.mount.n_joints as f64).ceil() as usize
+}
+
+/// `None` to accept, else the first reason to refuse.
+#[must_use]
+pub fn refusal(e: &AcceptanceData) -> Option<Refusal> {
+    if (e.fit_views as f64) < MIN_VIEWS_PER_PARAMETER * e.n_parameters as f64 {
+        return Some(Refusal::TooFewViews { views: e.fit_views, parameters: e.n_parameters });
+    }
+    if e.outcome != Outcome::Converged {
+        return Some(Refusal::NotSolved { outcome: e.outcome });
+    }
+    if e.held_out_views < MIN_HELD_OUT_VIEWS {
+        return Some(Refusal::TooFewHeldOutViews { views: e.held_out_views, needed: MIN_HELD_OUT_VIEWS });
+    }
+    let (Some(held_out_m), Some(datasheet_m)) = (e.held_out_rms_m, e.held_out_nominal_rms_m) else {
+        return Some(Refusal::NoHeldOutTag);
+    };
+    if held_out_m >= datasheet_m {
+        return Some(Refusal::NoBetterThanDatasheet { held_out_m, datasheet_m });
+    }
+    if held_out_m > MAX_HELD_OUT_OVER_FIT * e.fit_rms_m {
+        return Some(Refusal::Overfitted { held_out_m, fit_m: e.fit_rms_m });
+    }
+    if let (Some(predicted_m), Some(tolerance_m)) = (e.predicted_tool_error_m, e.tolerance_m)
+        && (predicted_m > tolerance_m || predicted_m.is_nan())
+    {
+        return Some(Refusal::BeyondTolerance { predicted_m, tolerance_m });
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn good() -> AcceptanceData {
+        AcceptanceData {
+            outcome: Outcome::Converged,
+            held_out_views: 8,
+            held_out_rms_m: Some(0.004),
+            held_out_nominal_rms_m: Some(0.08),
+            fit_rms_m: 0.004,
+            n_parameters: 10,
+            fit_views: 30,
+            predicted_tool_error_m: Some(0.003),
+            tolerance_m: Some(0.02),
+        }
+    }
+
+    #[test]
+    fn each_single_fault_refuses_and_none_accepts() {
+        assert_eq!(refusal(&good()), None);
+        let faults = [
+            AcceptanceData { outcome: Outcome::Stalled, ..good() },
+            AcceptanceData { fit_views: 8, ..good() },
+            AcceptanceData { held_out_views: 2, ..good() },
+            AcceptanceData { held_out_rms_m: None, ..good() },
+            AcceptanceData { held_out_rms_m: Some(0.09), ..good() },
+            AcceptanceData { held_out_rms_m: Some(0.011), ..good() },
+            AcceptanceData { predicted_tool_error_m: Some(0.03), ..good() },
+            AcceptanceData { predicted_tool_error_m: Some(f64::NAN), ..good() },
+        ];
+        for fault in faults {
+            assert!(refusal(&fault).is_some(), "{fault:?} must be refused");
+        }
+    }
+}

@@ -1,0 +1,331 @@
+//! One calibration by `bundle`, step by step: estimate, diagnose, report, judge.
+
+use crate::calib::bundle::calibration_prior::PriorConsistency;
+use crate::calib::bundle::estimate::{BundleInput, Estimate, HyperparameterMode, Outlier, estimate};
+use crate::calib::bundle::failure_impact::FailureImpact;
+use crate::calib::bundle::failures::Failure;
+use crate::calib::bundle::innovations::Innovations;
+use crate::calib::bundle::model_selection::Selection;
+use crate::calib::bundle::setup::{BundleSetup, declared};
+use crate::calib::bundle::tables::{camera_mount_table, covariance_with_mount, map_table, model_table, prior_table};
+use crate::calib::bundle::verdict::VerdictInput;
+use crate::calib::covariance::ParameterCovariance;
+use crate::calib::cross_validation::{FOLDS, FoldSums, fold_of};
+use crate::calib::error::CalibError;
+use crate::calib::methods::Solution;
+use crate::calib::methods::observability::{Unobservable, grouped_names};
+use crate::calib::methods::position_problem::PositionProblem;
+use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
+use crate::calib::refusal::Refusal;
+use crate::calib::result::assemble::{Evidence, Fit, Provenance, assemble};
+use crate::calib::result::calibration::Calibration;
+use crate::calib::result::map_table::MapResult;
+use crate::calib::result::metrics::HeldOutMetrics;
+use crate::calib::tag_mapping::map_unknown_tags;
+use crate::calib::views::association::{ObservationRejection, View};
+use crate::calib::views::calibration_data::CalibrationData;
+use armcal_core::robot::{JointSensorSpec, Robot};
+use armcal_core::routine::Method;
+
+/// What an estimate is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum EstimatePurpose {
+    /// With all that a verdict needs.
+    Final,
+    /// The estimate and its covariance, to go on by while views are still being captured.
+    Interim,
+}
+
+/// A calibration by `bundle` before it is made.
+pub(crate) struct BundleCalibration<'a> {
+    /// All views are fitted; the held-out ones, too.
+    data: CalibrationData,
+    prior: Option<&'a Calibration>,
+    map: Option<MapResult>,
+    purpose: EstimatePurpose,
+}
+
+/// Fewer views do not determine how large noise and nonlinearity are: the datasheet's figures stand.
+const MIN_VIEWS_FOR_EVIDENCE: usize = 12;
+
+/// An estimate, and the setup and failures that it was made under.
+struct Estimated<'a> {
+    setup: &'a BundleSetup,
+    failures: &'a [Failure],
+    estimate: Estimate<'a>,
+    selections: Vec<Selection>,
+}
+
+/// What an estimate means, before it is judged.
+struct Diagnosis {
+    /// With the estimated angles where no sensor tells them.
+    views: Vec<View>,
+    held_out: HeldOutMetrics,
+    innovations: Vec<Innovations>,
+    /// The arm with camera, tags and sensors as estimated.
+    robot: Robot,
+    covariance: ParameterCovariance,
+}
+
+impl<'a> BundleCalibration<'a> {
+    /// Maps the tags whose place nobody surveyed.
+    ///
+    /// # Errors
+    /// [`CalibError::Map`] where the views make no map.
+    pub(crate) fn new(
+        mut data: CalibrationData,
+        prior: Option<&'a Calibration>,
+        purpose: EstimatePurpose,
+    ) -> Result<Self, CalibError> {
+        // `bundle` moves the tags itself: the map is where it starts.
+        let mapped = map_unknown_tags(&data.name, &mut data.data, &data.robot)?;
+        let map = mapped.map(|mapped| {
+            data.robot = mapped.start(&data.robot);
+            mapped.result
+        });
+        let held_out = std::mem::take(&mut data.data.held_out);
+        data.data.fit.extend(held_out);
+        Ok(Self { data, prior, map, purpose })
+    }
+
+    /// # Errors
+    /// [`CalibError`] where the views determine nothing, or an interim estimate contradicts itself.
+    pub(crate) fn calibrate(mut self) -> Result<Calibration, CalibError> {
+        let views = std::mem::take(&mut self.data.data.fit);
+        let declared = declared(&self.data.robot, &views);
+        let first = BundleSetup::new(&self.data.robot, &views, &declared, self.prior);
+        self.check_observable(&first, &declared)?;
+        let estimated = self.first_estimate(&first);
+        let failures = match self.purpose {
+            EstimatePurpose::Final => first.failures(&self.data.robot, &views, estimated.as_ref().map(|(e, _)| e)),
+            EstimatePurpose::Interim => declared.clone(),
+        };
+        let second;
+        let (setup, estimated) = if failures == declared {
+            (&first, estimated)
+        } else {
+            second = BundleSetup::new(&self.data.robot, &views, &failures, self.prior);
+            (&second, second.estimate())
+        };
+        let (estimate, selections) = estimated.ok_or_else(|| self.nothing_observable())?;
+        self.finish(&Estimated { setup, failures: &failures, estimate, selections })
+    }
+
+    fn finish(mut self, estimated: &Estimated<'_>) -> Result<Calibration, CalibError> {
+        let diagnosis = self.diagnose(estimated);
+        self.data.data.fit.clone_from(&diagnosis.views);
+        let mut calibration = self.report(estimated, &diagnosis);
+        self.judge_failures_and_prior(estimated, &diagnosis, &mut calibration);
+        match self.purpose {
+            EstimatePurpose::Interim if !estimated.estimate.is_consistent() => {
+                let problem = "the views contradict each other or the prior".to_owned();
+                return Err(CalibError::NoInterimEstimate { recording: self.data.name, problem });
+            }
+            EstimatePurpose::Interim => {}
+            EstimatePurpose::Final => {
+                let input = &BundleInput { views: &diagnosis.views, ..estimated.setup.input() };
+                let (found, innovations) = (&estimated.estimate, &diagnosis.innovations[..]);
+                let task = self.data.data.task.as_ref();
+                VerdictInput { input, found, innovations, task }.judge(&mut calibration);
+            }
+        }
+        Ok(calibration)
+    }
+
+    fn nothing_observable(&self) -> CalibError {
+        CalibError::NothingObservable { recording: self.data.name.clone() }
+    }
+
+    fn check_observable(&self, setup: &BundleSetup, declared: &[Failure]) -> Result<(), CalibError> {
+        let n = self.data.robot.camera.mount.n_joints;
+        let has_columns = setup.input().model.joints.iter().take(n).any(|kinds| !kinds.is_empty());
+        if has_columns || !declared.is_empty() { Ok(()) } else { Err(self.nothing_observable()) }
+    }
+
+    fn first_estimate<'b>(&self, setup: &'b BundleSetup) -> Option<(Estimate<'b>, Vec<Selection>)> {
+        if self.purpose == EstimatePurpose::Final {
+            return setup.estimate();
+        }
+        let has_evidence = setup.applied.views.len() >= MIN_VIEWS_FOR_EVIDENCE;
+        let evidence = if has_evidence { HyperparameterMode::Fitted } else { HyperparameterMode::Given };
+        estimate(&BundleInput { evidence, ..setup.input() }).map(|estimate| (estimate, Vec::new()))
+    }
+
+    /// Held-out figures, the arm as estimated, and the covariance of its sensors.
+    fn diagnose(&self, estimated: &Estimated<'_>) -> Diagnosis {
+        let Estimated { setup, estimate, .. } = estimated;
+        let robot = &self.data.robot;
+        let without_failed = setup.without_failed(&estimate.parameters());
+        let views = setup.with_estimated_angles(estimate, &without_failed);
+        // Held-out views of a freed joint are linearized where the camera saw it.
+        let input = BundleInput { views: &views, ..setup.input() };
+        let (held_out, innovations) = match self.purpose {
+            EstimatePurpose::Final => cross_validated(&input, estimate),
+            EstimatePurpose::Interim => (FoldSums::default().metrics(), Vec::new()),
+        };
+        let parameters = estimate.joint_parameters().to_vec();
+        let residual_std_rad = std::array::from_fn(|joint| match robot.sensors.get(joint) {
+            // Nothing is known of a joint distal to the camera but its datasheet.
+            Some(spec) if parameters.iter().all(|p| p.joint != joint) => spec.linearity_std_rad,
+            _ => estimate.scales().joint_std_rad[joint],
+        });
+        let matrix = estimate.joint_covariance();
+        let covariance = ParameterCovariance { parameters, matrix, residual_std_rad: Some(residual_std_rad) };
+        Diagnosis { robot: estimate.as_found(&setup.applied.robot), views, held_out, innovations, covariance }
+    }
+
+    /// The result's tables, and the verdict by what all methods have.
+    fn report(&mut self, estimated: &Estimated<'_>, diagnosis: &Diagnosis) -> Calibration {
+        let Estimated { setup, estimate, selections, .. } = estimated;
+        for outlier in &estimate.outliers {
+            *self.data.data.rejected.entry(ObservationRejection::Outlier).or_default() += 1;
+            tracing::debug!("view {}: tag {} rejected", outlier.view_idx, outlier.tag_id);
+        }
+        let datasheet = &self.data.robot;
+        let robot = Robot { sensors: with_datasheets(&diagnosis.robot, datasheet, setup), ..diagnosis.robot.clone() };
+        let solution = Solution {
+            parameters: setup.without_failed(&estimate.parameters()),
+            outcome: estimate.outcome(),
+            evaluations: estimate.iterations,
+            cost_initial: estimate.cost_initial,
+            cost_final: estimate.cost_final,
+        };
+        let covariance = setup.without_failed_rows(&diagnosis.covariance);
+        let problem = PositionProblem::new(&robot, &diagnosis.views);
+        let source = self.provenance(&robot);
+        let fit = Fit { problem: &problem, solution: &solution, covariance: &covariance, linearity_scale: 1.0 };
+        let parameters = estimate.parameters();
+        let evidence = Evidence {
+            held_out: diagnosis.held_out.clone(),
+            predicted_tool_error_m: self.impact(estimated, diagnosis, &parameters).tool_error_m(),
+            n_parameters: setup.n_wanted(datasheet),
+        };
+        let calibration = assemble(&source, &fit, evidence);
+        let kept = &calibration.covariance.parameters;
+        let with_mount = covariance_with_mount(&robot, estimate, kept);
+        Calibration {
+            unobservable: grouped_names(&robot, &unobservable(datasheet, setup, estimate)),
+            camera_mount: Some(camera_mount_table(datasheet, estimate, &diagnosis.views)),
+            model: Some(model_table(datasheet, estimate, selections)),
+            map: self.map.clone().map(|map| map_table(map, datasheet, estimate)),
+            outliers: estimate.outliers.iter().map(|outlier| named(outlier, &diagnosis.views)).collect(),
+            covariance: with_mount.unwrap_or_else(|| calibration.covariance.clone()),
+            ..calibration
+        }
+    }
+
+    fn provenance<'b>(&'b self, robot: &'b Robot) -> Provenance<'b> {
+        Provenance {
+            messages_hash: &self.data.messages_hash,
+            robot,
+            method: Method::Bundle,
+            data: &self.data.data,
+            prior: self.prior,
+            identified: &self.data.identified,
+        }
+    }
+
+    fn impact<'b>(
+        &'b self,
+        estimated: &'b Estimated<'_>,
+        diagnosis: &'b Diagnosis,
+        parameters: &'b JointParameters,
+    ) -> FailureImpact<'b> {
+        FailureImpact {
+            datasheet: &self.data.robot,
+            robot: &diagnosis.robot,
+            views: &diagnosis.views,
+            failures: estimated.failures,
+            found: &estimated.estimate,
+            parameters,
+            covariance: &diagnosis.covariance,
+            task: self.data.data.task.as_ref(),
+        }
+    }
+
+    /// Writes failed joints and prior to the result, and refuses it where they ask for it.
+    fn judge_failures_and_prior(
+        &self,
+        estimated: &Estimated<'_>,
+        diagnosis: &Diagnosis,
+        calibration: &mut Calibration,
+    ) {
+        let parameters = estimated.estimate.parameters();
+        let impact = self.impact(estimated, diagnosis, &parameters);
+        calibration.failed_joint = impact.tables();
+        calibration.findings.extend(impact.findings());
+        estimated.setup.forget_failed(calibration, &self.data.robot);
+        let (consistency, mut refusals) = self.prior_consistency(estimated.setup);
+        calibration.prior = self.prior.zip(consistency).map(|(prior, consistency)| {
+            prior_table(prior, estimated.setup.elapsed_h(), &consistency, &self.data.robot)
+        });
+        refusals.extend(impact.refusals(&calibration.failed_joint));
+        calibration.refuse_first_for(refusals);
+    }
+
+    /// Whether the views agree with the prior, and what that refuses for.
+    fn prior_consistency(&self, setup: &BundleSetup) -> (Option<PriorConsistency>, Vec<Refusal>) {
+        let is_reused = self.prior.is_some_and(|prior| prior.messages_hash == self.data.messages_hash);
+        let mut refusals: Vec<Refusal> = is_reused.then_some(Refusal::PriorReused).into_iter().collect();
+        let consistency = match setup.prior() {
+            None => None,
+            Some(Err(refusal)) => {
+                refusals.push(refusal.clone());
+                None
+            }
+            Some(Ok(prior)) => {
+                let consistency = prior.consistency(&setup.applied.views);
+                match &consistency {
+                    None => refusals.push(Refusal::PriorUntested),
+                    Some(consistency) => refusals.extend(consistency.refusal(&self.data.robot)),
+                }
+                consistency
+            }
+        };
+        (consistency, refusals)
+    }
+}
+
+/// The sensors as estimated, those of joints without one as their datasheets say.
+fn with_datasheets(estimated: &Robot, datasheet: &Robot, setup: &BundleSetup) -> Vec<JointSensorSpec> {
+    let pairs = estimated.sensors.iter().zip(&datasheet.sensors).enumerate();
+    pairs.map(|(joint, (own, nominal))| if setup.has_no_sensor(joint) { nominal } else { own }.clone()).collect()
+}
+
+/// `pose 12: tag 3: 45 sigma`.
+fn named(outlier: &Outlier, views: &[View]) -> String {
+    let pose_idx = views.get(outlier.view_idx).map_or(0, |view| view.pose_idx);
+    format!("pose {pose_idx}: tag {}: {:.0} sigma", outlier.tag_id, outlier.sigmas)
+}
+
+/// Gains and offsets that keep the datasheet's value: of joints distal to the camera, and of failed ones.
+fn unobservable(robot: &Robot, setup: &BundleSetup, estimate: &Estimate<'_>) -> Vec<Unobservable> {
+    let all = (0..robot.n_joints())
+        .flat_map(|joint| [ParameterKind::Gain, ParameterKind::Offset].map(|kind| Parameter { joint, kind }));
+    let missing = all.filter(|p| {
+        p.prior_std(robot) > 0.0 && !estimate.joint_parameters().contains(p) && !setup.has_no_sensor(p.joint)
+    });
+    missing.map(Unobservable::distal).chain(setup.unobservable()).collect()
+}
+
+/// Held-out views by what was estimated from the other folds, with the hyperparameters of all.
+fn cross_validated(input: &BundleInput<'_>, all: &Estimate<'_>) -> (HeldOutMetrics, Vec<Innovations>) {
+    let mut sums = FoldSums::default();
+    let mut innovations = Vec::new();
+    for fold in 0..FOLDS {
+        let (fitted, held_out) = fold_of(input.views, fold);
+        let part = BundleInput {
+            views: &fitted,
+            model: all.model.clone(),
+            scales: all.scales().clone(),
+            evidence: HyperparameterMode::Given,
+            ..input.clone()
+        };
+        let Some(found) = estimate(&part) else { continue };
+        let with_places: Vec<(usize, View)> =
+            held_out.iter().enumerate().map(|(n, view)| (n * FOLDS + fold, view.clone())).collect();
+        innovations.extend(found.innovations(&part, &with_places, &all.outliers));
+        sums.add(&held_out, &found.as_found(input.robot), &found.parameters(), input.robot);
+    }
+    (sums.metrics(), innovations)
+}

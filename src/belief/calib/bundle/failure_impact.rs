@@ -1,0 +1,183 @@
+//! What failed joints cost at the tool, and whether the task can do with them.
+
+use crate::calib::bundle::estimate::Estimate;
+use crate::calib::bundle::failures::{Failure, FailureSource};
+use crate::calib::covariance::{ParameterCovariance, predict_tool_error};
+use crate::calib::finding::{Finding, FindingKind, FindingUnit};
+use crate::calib::parameters::JointParameters;
+use crate::calib::refusal::Refusal;
+use crate::calib::result::failed_joint::FailedJointTable;
+use crate::calib::views::association::View;
+use armcal_core::robot::{FailedJoint, FailedKind, Robot};
+use armcal_core::stats::Summary;
+use armcal_core::streams::ReachTask;
+
+/// An estimate with failed joints, on the way to the tool.
+pub(crate) struct FailureImpact<'a> {
+    pub datasheet: &'a Robot,
+    /// As the estimate has it, camera and tags where they were found.
+    pub robot: &'a Robot,
+    pub views: &'a [View],
+    pub failures: &'a [Failure],
+    pub found: &'a Estimate<'a>,
+    pub parameters: &'a JointParameters,
+    /// With the locked joints' rows.
+    pub covariance: &'a ParameterCovariance,
+    pub task: Option<&'a ReachTask>,
+}
+
+/// How a failed joint's angle is known.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum AngleSource {
+    AsItIs,
+    ByCamera,
+    ByDatasheet,
+}
+
+impl FailureImpact<'_> {
+    /// The tool error that is to be expected as things are.
+    pub(crate) fn tool_error_m(&self) -> Option<Summary> {
+        self.tool_error_where(usize::MAX, AngleSource::AsItIs)
+    }
+
+    pub(crate) fn tables(&self) -> Vec<FailedJointTable> {
+        self.failures.iter().map(|failure| self.table(failure)).collect()
+    }
+
+    fn table(&self, failure: &Failure) -> FailedJointTable {
+        let joint = failure.joint;
+        let pose = |&view_idx: &usize| self.views[view_idx].pose_idx;
+        let is_locked = failure.kind == FailedKind::Locked;
+        let has_no_sensor = failure.leaves_no_sensor();
+        let angle = self.locked_angle(failure);
+        FailedJointTable {
+            joint: self.robot.sensors[joint].joint.clone(),
+            kind: failure.kind,
+            found: match failure.found {
+                FailureSource::Declared => "declared",
+                FailureSource::Detected => "detected",
+            }
+            .to_owned(),
+            evidence: failure.evidence.clone(),
+            poses: failure.views.iter().map(pose).collect(),
+            since_pose: failure.since.as_ref().map(pose),
+            angle_rad: angle.map(|(angle_rad, _)| angle_rad),
+            angle_std_rad: angle.map(|(_, std_rad)| std_rad),
+            camera_std_rad: self.camera_std_rad(failure),
+            tool_error_m: self.tool_error_m(),
+            tool_error_by_camera_m: (has_no_sensor && !is_locked)
+                .then(|| self.tool_error_where(joint, AngleSource::ByCamera))
+                .flatten(),
+            tool_error_by_datasheet_m: has_no_sensor
+                .then(|| self.tool_error_where(joint, AngleSource::ByDatasheet))
+                .flatten(),
+        }
+    }
+
+    /// Where a locked joint stands and one sigma, rad: the mean over the views, which all show one angle.
+    fn locked_angle(&self, failure: &Failure) -> Option<(f64, f64)> {
+        if failure.kind != FailedKind::Locked {
+            return None;
+        }
+        let joint = failure.joint;
+        let seen: Vec<usize> = (0..self.views.len()).filter(|&k| self.found.uses(k)).collect();
+        let n = seen.len().max(1) as f64;
+        let angle_rad = seen.iter().map(|&k| self.found.angle(k, joint).0).sum::<f64>() / n;
+        let std_rad = self.found.mean_angle_std_rad(joint);
+        Some((angle_rad, std_rad))
+    }
+
+    /// Root mean square over the views in which the camera alone told the angle.
+    fn camera_std_rad(&self, failure: &Failure) -> Option<f64> {
+        let freed: Vec<f64> = failure
+            .views
+            .iter()
+            .filter(|&&k| failure.kind != FailedKind::Locked && self.found.uses(k))
+            .map(|&k| self.found.angle(k, failure.joint).1.powi(2))
+            .collect();
+        (!freed.is_empty()).then(|| (freed.iter().sum::<f64>() / freed.len() as f64).sqrt())
+    }
+
+    /// With the angle of `joint` known in that way, those of the other failed joints as they are.
+    fn tool_error_where(&self, joint: usize, known: AngleSource) -> Option<Summary> {
+        let mut robot = self.robot.clone();
+        let mut covariance = self.covariance.clone();
+        let mut residual_std_rad = covariance.residual_std_rad?;
+        for failure in self.failures {
+            let j = failure.joint;
+            let known = if j == joint { known } else { AngleSource::AsItIs };
+            let spec = &mut robot.sensors[j];
+            match known {
+                AngleSource::AsItIs if failure.kind == FailedKind::Locked => {
+                    let declared = FailedJoint { joint: j, kind: FailedKind::Locked };
+                    if let Some((angle_rad, _)) = self.locked_angle(failure) {
+                        robot.stowed[j] = angle_rad;
+                    }
+                    robot = robot.with_failed(&[declared]);
+                }
+                AngleSource::AsItIs if failure.leaves_no_sensor() => {
+                    // Uniform over the range.
+                    (spec.offset_std_rad, spec.gain_std) = (0.0, 0.0);
+                    residual_std_rad[j] = spec.half_range_rad / 3.0_f64.sqrt();
+                }
+                AngleSource::AsItIs => {}
+                AngleSource::ByCamera => {
+                    (spec.offset_std_rad, spec.gain_std) = (0.0, 0.0);
+                    residual_std_rad[j] = self.camera_std_rad(failure)?;
+                }
+                AngleSource::ByDatasheet => {
+                    *spec = self.datasheet.sensors[j].clone();
+                    residual_std_rad[j] = spec.linearity_std_rad;
+                    covariance = covariance.without_joint(j);
+                    robot.failed.retain(|declared| declared.joint != j);
+                }
+            }
+        }
+        covariance.residual_std_rad = Some(residual_std_rad);
+        predict_tool_error(&robot, self.parameters, &covariance, self.task).map(|predicted| predicted.error_m)
+    }
+
+    /// Each failed joint as a finding: the estimate takes account of it.
+    pub(crate) fn findings(&self) -> Vec<Finding> {
+        let of = |failure: &Failure| Finding {
+            kind: if failure.since.is_some() { FindingKind::SensorSlip } else { FindingKind::SensorFailed },
+            name: self.robot.sensors[failure.joint].joint.clone(),
+            size: failure.step_rad,
+            unit: failure.step_rad.map(|_| FindingUnit::Radian),
+            tool_error_m: None,
+            time_s: failure.since.and_then(|view_idx| self.since_first_view_s(view_idx)),
+            repaired: true,
+        };
+        self.failures.iter().map(of).collect()
+    }
+
+    fn since_first_view_s(&self, view_idx: usize) -> Option<f64> {
+        let first = self.views.iter().map(|view| view.end).min()?;
+        Some(self.views[view_idx].end.since_s(first))
+    }
+
+    /// Why the calibration cannot be used for its task, or at all.
+    pub(crate) fn refusals(&self, tables: &[FailedJointTable]) -> Vec<Refusal> {
+        self.failures.iter().zip(tables).filter_map(|(failure, table)| self.refusal(failure, table)).collect()
+    }
+
+    fn refusal(&self, failure: &Failure, table: &FailedJointTable) -> Option<Refusal> {
+        let joint = table.joint.clone();
+        if failure.has_too_few_views_since(self.views.len()) {
+            let views = self.views.len() - failure.views.len();
+            return Some(Refusal::TooFewViewsSinceSlip { joint, evidence: table.evidence.clone(), views });
+        }
+        let task = self.task?;
+        let is_needed = failure.joint < self.robot.tool.mount.n_joints;
+        if !failure.leaves_no_sensor() || failure.kind == FailedKind::Locked || !is_needed {
+            return None;
+        }
+        Some(Refusal::SensorFailed {
+            joint,
+            kind: failure.kind,
+            tool_error_m: table.tool_error_m.map(|s| s.p95),
+            tool_error_by_camera_m: table.tool_error_by_camera_m.map(|s| s.p95),
+            tolerance_m: task.tolerance_m,
+        })
+    }
+}

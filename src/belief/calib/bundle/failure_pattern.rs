@@ -1,0 +1,225 @@
+//! A joint's readings against the angles that the camera shows.
+
+use nalgebra::{Matrix3, Vector3};
+
+use crate::calib::bundle::estimate::Estimate;
+use crate::calib::bundle::failure_detection::{FAR_RAD, FAR_SIGMAS};
+use crate::calib::bundle::failures::SensorUse;
+use crate::calib::views::association::View;
+use armcal_core::robot::Robot;
+use armcal_core::stats::quantile;
+
+/// One joint over the views that show tags, in the order of time.
+pub(crate) struct Readings {
+    joint: usize,
+    view_idx: Vec<usize>,
+    travel_rad: Vec<f64>,
+    /// By the camera, with one sigma.
+    angle_rad: Vec<f64>,
+    std_rad: Vec<f64>,
+}
+
+/// How the readings go with the angles.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum FailurePattern {
+    /// The angle is always the same.
+    Locked(SensorUse),
+    /// The reading is always the same, the angle is not.
+    Stuck,
+    /// They have nothing to do with each other.
+    Dead,
+    /// The readings of these views are off.
+    Single(Vec<usize>),
+    /// The readings are off against each other before and since a view.
+    Lasting { before: Vec<usize>, since: usize },
+}
+
+/// An angle that is spread by less than this many of its own sigma, or than `LOCKED_RAD`, does not change.
+const LOCKED_SIGMAS: f64 = 3.0;
+const LOCKED_RAD: f64 = 0.2 * std::f64::consts::PI / 180.0;
+/// A sensor that says something follows the angle to this share of the angle's spread, with about the datasheet's slope.
+const FOLLOWS: f64 = 0.3;
+/// A step that lasts leaves this share of the squares that a straight line leaves.
+const STEP_LEAVES: f64 = 1.0 / 6.0;
+const MIN_SIDE: usize = 2;
+/// More single jumps than this share of the views are no exceptions.
+const MAX_SINGLE: f64 = 0.4;
+/// A locked joint's sensor is right if it is off by less than this many of the datasheet's sigma.
+const RIGHT_SIGMAS: f64 = 4.0;
+
+impl Readings {
+    /// Of an estimate in which the joint is free in all views.
+    pub(crate) fn new(robot: &Robot, views: &[View], joint: usize, found: &Estimate<'_>) -> Self {
+        let mut seen: Vec<usize> = (0..views.len()).filter(|&k| found.uses(k)).collect();
+        seen.sort_by_key(|&k| (views[k].end, k));
+        let angles: Vec<(f64, f64)> = seen.iter().map(|&k| found.angle(k, joint)).collect();
+        debug_assert!(joint < robot.n_joints());
+        Self {
+            joint,
+            travel_rad: seen.iter().map(|&k| views[k].travel_rad[joint]).collect(),
+            angle_rad: angles.iter().map(|(angle, _)| *angle).collect(),
+            std_rad: angles.iter().map(|(_, std)| *std).collect(),
+            view_idx: seen,
+        }
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        self.view_idx.len()
+    }
+
+    /// `None` where the readings follow the angles as they should.
+    pub(crate) fn pattern(&self, robot: &Robot) -> Option<FailurePattern> {
+        let spec = &robot.sensors[self.joint];
+        let noise_rad = FAR_SIGMAS * spec.noise_std_counts / spec.counts_per_rad.abs();
+        let spread_rad = deviation(&self.angle_rad);
+        let own_rad = rms(&self.std_rad);
+        if spread_rad < LOCKED_RAD.max(LOCKED_SIGMAS * own_rad) {
+            return Some(FailurePattern::Locked(self.sensor_of_locked(robot, noise_rad)));
+        }
+        if deviation(&self.travel_rad) < noise_rad {
+            let counts = (spec.offset_counts
+                + spec.counts_per_rad * (spec.center_rad + quantile(&self.travel_rad, 0.5)?))
+            .rem_euclid(spec.wrap_counts);
+            // A broken wire reads nothing but noise about zero.
+            let near_zero = counts.min(spec.wrap_counts - counts) < FAR_SIGMAS * spec.noise_std_counts.max(1.0);
+            return Some(if near_zero { FailurePattern::Dead } else { FailurePattern::Stuck });
+        }
+        if let Some(step) = self.step() {
+            return Some(step);
+        }
+        let (off_rad, slope) = self.off_line();
+        let sizes: Vec<f64> = off_rad.iter().map(|off| off.abs()).collect();
+        let sigma_rad = (1.4826 * quantile(&sizes, 0.5)?).max(own_rad);
+        if 1.4826 * quantile(&sizes, 0.5)? > FOLLOWS * spread_rad || !(0.7..1.3).contains(&slope) {
+            return Some(FailurePattern::Dead);
+        }
+        let far = |(_, off): &(&usize, &f64)| off.abs() > FAR_RAD.max(FAR_SIGMAS * sigma_rad);
+        let single: Vec<usize> = self.view_idx.iter().zip(&off_rad).filter(far).map(|(k, _)| *k).collect();
+        let n = single.len();
+        let mut single = single;
+        single.sort_unstable();
+        (n > 0 && n as f64 <= MAX_SINGLE * self.len() as f64).then_some(FailurePattern::Single(single))
+    }
+
+    /// A locked joint's sensor may well be sound: it then stands still where the datasheet allows it.
+    fn sensor_of_locked(&self, robot: &Robot, noise_rad: f64) -> SensorUse {
+        let spec = &robot.sensors[self.joint];
+        let travel_rad = quantile(&self.travel_rad, 0.5).unwrap_or(0.0);
+        let off_rad = quantile(&self.angle_rad, 0.5).unwrap_or(0.0) - spec.center_rad - travel_rad;
+        let allowed_rad = RIGHT_SIGMAS * spec.offset_std_rad.hypot(spec.gain_std * travel_rad);
+        let moves = deviation(&self.travel_rad) > noise_rad;
+        if !moves && off_rad.abs() < allowed_rad { SensorUse::Used } else { SensorUse::Ignored }
+    }
+
+    /// The slip that explains the most, if it explains nearly all (least squares of 1, reading and a step).
+    fn step(&self) -> Option<FailurePattern> {
+        let n = self.len();
+        let without = self.squares_with_step(n)?.0;
+        let best = (MIN_SIDE..=n.checked_sub(MIN_SIDE)?)
+            .filter_map(|at| Some((at, self.squares_with_step(at)?)))
+            .min_by(|(_, a), (_, b)| a.0.total_cmp(&b.0))?;
+        let (at, (squares, step_rad)) = best;
+        let sigma_rad = (squares / n.saturating_sub(3).max(1) as f64).sqrt();
+        let is_clear = squares < STEP_LEAVES * without
+            && step_rad.abs() > FAR_RAD.max(3.0 * sigma_rad)
+            && sigma_rad < FOLLOWS * deviation(&self.angle_rad);
+        is_clear.then(|| {
+            let mut before = self.view_idx[..at].to_vec();
+            before.sort_unstable();
+            FailurePattern::Lasting { before, since: self.view_idx[at] }
+        })
+    }
+
+    /// Sum of squares about a straight line with a step at the `at`-th view, and the step; at the end there is none.
+    fn squares_with_step(&self, at: usize) -> Option<(f64, f64)> {
+        let row = |k: usize| Vector3::new(1.0, self.travel_rad[k], if k >= at { 1.0 } else { 0.0 });
+        let (mut matrix, mut right) = (Matrix3::<f64>::identity() * 1e-9, Vector3::zeros());
+        for k in 0..self.len() {
+            matrix += row(k) * row(k).transpose();
+            right += row(k) * self.angle_rad[k];
+        }
+        let x = matrix.cholesky()?.solve(&right);
+        // Which way the reading went off: against the angle.
+        Some(((0..self.len()).map(|k| (self.angle_rad[k] - row(k).dot(&x)).powi(2)).sum(), -x[2]))
+    }
+
+    /// By how much the readings stepped at the `at`-th view.
+    pub(crate) fn step_rad(&self, at: usize) -> Option<f64> {
+        self.squares_with_step(at).map(|(_, step_rad)| step_rad)
+    }
+
+    /// Distances from the line of least absolute deviations, and its slope (iteratively reweighted least squares).
+    fn off_line(&self) -> (Vec<f64>, f64) {
+        const ROUNDS: usize = 60;
+        const FLOOR_RAD: f64 = 1e-5;
+        let differences: Vec<f64> = self.angle_rad.iter().zip(&self.travel_rad).map(|(a, t)| a - t).collect();
+        let (mut offset, mut slope) = (quantile(&differences, 0.5).unwrap_or(0.0), 1.0);
+        let off = |offset: f64, slope: f64| -> Vec<f64> {
+            self.angle_rad.iter().zip(&self.travel_rad).map(|(a, t)| a - offset - slope * t).collect()
+        };
+        for _ in 0..ROUNDS {
+            let weights: Vec<f64> = off(offset, slope).iter().map(|r| 1.0 / r.abs().max(FLOOR_RAD)).collect();
+            let sum = |f: &dyn Fn(usize) -> f64| (0..self.len()).map(|k| weights[k] * f(k)).sum::<f64>();
+            let (w, t, tt) = (sum(&|_| 1.0), sum(&|k| self.travel_rad[k]), sum(&|k| self.travel_rad[k].powi(2)));
+            let (a, at) = (sum(&|k| self.angle_rad[k]), sum(&|k| self.angle_rad[k] * self.travel_rad[k]));
+            let determinant = w * tt - t * t;
+            if determinant <= 1e-12 * w * tt {
+                break;
+            }
+            slope = (w * at - t * a) / determinant;
+            offset = (a - slope * t) / w;
+        }
+        (off(offset, slope), slope)
+    }
+
+    /// What shows the pattern.
+    pub(crate) fn in_words(&self, pattern: &FailurePattern, views: &[View]) -> String {
+        let range_deg = |values: &[f64]| {
+            let (low, high) =
+                values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
+            (high - low).to_degrees()
+        };
+        let (read, shown) = (range_deg(&self.travel_rad), range_deg(&self.angle_rad));
+        let n = self.len();
+        let pose = |k: usize| views[k].pose_idx;
+        match pattern {
+            FailurePattern::Locked(SensorUse::Used) => {
+                format!("the camera shows one angle in {n} views (within {shown:.2} deg), as the sensor says")
+            }
+            FailurePattern::Locked(SensorUse::Ignored) => {
+                format!(
+                    "the camera shows one angle in {n} views (within {shown:.2} deg); the sensor reads {read:.2} deg apart, or elsewhere"
+                )
+            }
+            FailurePattern::Stuck => {
+                format!("the reading stands still over {n} views while the camera shows {shown:.1} deg of motion")
+            }
+            FailurePattern::Dead => {
+                format!("the reading spans {read:.1} deg and does not follow the {shown:.1} deg that the camera shows")
+            }
+            FailurePattern::Single(of) => {
+                let poses: Vec<u32> = of.iter().map(|&k| pose(k)).collect();
+                format!("the reading is off in {} of {n} views (poses {poses:?})", of.len())
+            }
+            FailurePattern::Lasting { before, since } => {
+                let step = self.step_rad(before.len()).unwrap_or(0.0).to_degrees();
+                let after = n - before.len();
+                format!(
+                    "the sensor slipped by {step:.2} deg between {before} views and {after} views, the first of them pose {}",
+                    pose(*since),
+                    before = before.len()
+                )
+            }
+        }
+    }
+}
+
+fn rms(values: &[f64]) -> f64 {
+    (values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64).sqrt()
+}
+
+/// Root mean square about the mean.
+fn deviation(values: &[f64]) -> f64 {
+    let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
+    (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / values.len().max(1) as f64).sqrt()
+}

@@ -1,0 +1,158 @@
+//! Joints whose sensor says nothing, in all views or in some: how they look to the estimator.
+//!
+//! A reading that says nothing is replaced by the angle that the tags show (found by search, so that the solver starts near), and
+//! the joint's error in that view gets a standard deviation that leaves it open ([`View::is_free`]). A locked joint is a sensor
+//! that always reads the same and whose offset nobody knows: one column for all views.
+
+use crate::calib::angles_by_camera::set_by_camera;
+use crate::calib::bundle::estimate::{BundleInput, Estimate, HyperparameterMode, estimate, model_for, reference};
+use crate::calib::bundle::failure_detection::MIN_VIEWS;
+use crate::calib::bundle::model::{Hyperparameters, Model};
+use crate::calib::parameters::{JointParameters, ParameterKind};
+use crate::calib::views::association::View;
+use armcal_core::robot::{FailedJoint, FailedKind, Robot};
+use armcal_core::stats::quantile;
+
+/// Who says that a joint failed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FailureSource {
+    Declared,
+    Detected,
+}
+
+/// What the sensor of a locked joint is worth.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SensorUse {
+    /// It reads where the joint stands, or it is used in the views that are not named.
+    Used,
+    /// It is not looked at.
+    Ignored,
+}
+
+/// One failed joint, and what is not used of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Failure {
+    pub joint: usize,
+    pub kind: FailedKind,
+    pub found: FailureSource,
+    pub reading: SensorUse,
+    /// Views whose reading says nothing, ascending.
+    pub views: Vec<usize>,
+    /// Of a slip that lasts: the first view after it in the order of time; the readings before it are not used.
+    pub since: Option<usize>,
+    /// By how much the readings are off against each other before and since, rad.
+    pub step_rad: Option<f64>,
+    /// What shows it, in words.
+    pub evidence: String,
+}
+
+impl Failure {
+    /// Nothing that the sensor says in any of `n_views` is used.
+    pub fn without_sensor(joint: usize, kind: FailedKind, found: FailureSource, n_views: usize) -> Self {
+        let views = (0..n_views).collect();
+        Self {
+            joint,
+            kind,
+            found,
+            reading: SensorUse::Ignored,
+            views,
+            since: None,
+            step_rad: None,
+            evidence: String::new(),
+        }
+    }
+
+    /// What somebody declared; when a sensor jumped is still to be found.
+    pub fn declared(declared: FailedJoint, n_views: usize) -> Self {
+        let FailedJoint { joint, kind } = declared;
+        let all = Self::without_sensor(joint, kind, FailureSource::Declared, n_views);
+        match kind {
+            FailedKind::Jumps => Self { reading: SensorUse::Used, views: Vec::new(), ..all },
+            FailedKind::Locked | FailedKind::Dead | FailedKind::Stuck => all,
+        }
+    }
+
+    /// A slip so late that the sensor as it is now shows in hardly any view.
+    pub fn has_too_few_views_since(&self, n_views: usize) -> bool {
+        self.since.is_some() && n_views - self.views.len() < MIN_VIEWS
+    }
+
+    /// Whether the joint's parameters have no data at all.
+    pub fn leaves_no_sensor(&self) -> bool {
+        self.reading == SensorUse::Ignored
+    }
+}
+
+/// An arm and its views with the failed joints taken care of.
+pub struct FailureAdjusted {
+    pub robot: Robot,
+    pub views: Vec<View>,
+    pub failures: Vec<Failure>,
+}
+
+impl FailureAdjusted {
+    /// `at`: what is believed of the other joints' sensors.
+    pub fn new(robot: &Robot, views: &[View], failures: &[Failure], at: &JointParameters) -> Self {
+        let mut applied = Self { robot: robot.clone(), views: views.to_vec(), failures: failures.to_vec() };
+        for failure in failures {
+            for &view_idx in &failure.views {
+                let view = &mut applied.views[view_idx];
+                view.is_free[failure.joint] = true;
+                view.rate_rad_s[failure.joint] = 0.0;
+                view.approach[failure.joint] = 0.0;
+            }
+        }
+        for view in &mut applied.views {
+            set_by_camera(robot, view, at);
+        }
+        for failure in failures.iter().filter(|f| f.kind == FailedKind::Locked && f.leaves_no_sensor()) {
+            applied.lock(failure.joint);
+        }
+        applied
+    }
+
+    /// One angle in all views, which starts at the middle one of those that the camera showed.
+    fn lock(&mut self, joint: usize) {
+        let seen: Vec<f64> =
+            self.views.iter().filter(|view| !view.tags.is_empty()).map(|view| view.travel_rad[joint]).collect();
+        let travel_rad = quantile(&seen, 0.5).unwrap_or(0.0);
+        for view in &mut self.views {
+            view.travel_rad[joint] = travel_rad;
+            view.is_free[joint] = false;
+        }
+        let spec = &mut self.robot.sensors[joint];
+        // It gives and swings as it did; only its sensor is gone.
+        (spec.offset_std_rad, spec.gain_std, spec.noise_std_counts) = (spec.half_range_rad, 0.0, 0.0);
+    }
+
+    /// What these views tell, without columns for sensors that say nothing.
+    pub fn model(&self) -> Model {
+        let mut model = model_for(&self.robot, &self.views);
+        self.restrict(&mut model);
+        model
+    }
+
+    pub fn restrict(&self, model: &mut Model) {
+        for failure in self.failures.iter().filter(|failure| failure.leaves_no_sensor()) {
+            let is_locked = failure.kind == FailedKind::Locked;
+            model.joints[failure.joint] = if is_locked { vec![ParameterKind::Offset] } else { Vec::new() };
+        }
+    }
+
+    /// From the datasheet.
+    pub fn input(&self, evidence: HyperparameterMode) -> BundleInput<'_> {
+        BundleInput {
+            robot: &self.robot,
+            views: &self.views,
+            model: self.model(),
+            scales: Hyperparameters::datasheet(&self.robot),
+            guess: JointParameters { reference: reference(&self.views), ..JointParameters::default() },
+            joint_prior: None,
+            evidence,
+        }
+    }
+
+    pub fn estimate(&self, evidence: HyperparameterMode) -> Option<Estimate<'_>> {
+        estimate(&self.input(evidence))
+    }
+}

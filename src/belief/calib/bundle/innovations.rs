@@ -1,0 +1,164 @@
+//! Views that were left out, by what was learnt from the others: the innovations, with the covariance that they should have.
+//!
+//! All left-out views of a fold at once: with the fold's normal equations `N` (its priors among them) and those of the left-out views
+//! `N_o y = r_o`, their own parameters eliminated, `chi2 = sum |r|^2 - own - r_o^T (N + N_o)^-1 r_o`: the innovations' squares under
+//! measurement noise, joint errors and the parameters' covariance together. With the camera of each view free, what is left is the
+//! noise within the views; the difference is chi-square with six numbers a view: how well cameras are foretold.
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Isometry3};
+
+use crate::calib::bundle::estimate::{BundleInput, Estimate, Outlier};
+use crate::calib::bundle::linearize::NormalEquations;
+use crate::calib::bundle::observation_term::unseen_chi2;
+use crate::calib::bundle::problem::{BundleProblem, State, WeightedMeasurement};
+use crate::calib::views::association::View;
+use armcal_core::joints::MAX_JOINTS;
+use armcal_core::numeric::Loss;
+
+/// Innovations of one fold's left-out views.
+#[derive(Clone, Debug)]
+pub struct Innovations {
+    /// Of all coordinates.
+    pub chi2: f64,
+    pub dof: usize,
+    /// Of the cameras' poses alone.
+    pub camera_chi2: f64,
+    pub camera_dof: usize,
+    pub joints: Vec<JointInnovation>,
+}
+
+/// What a joint was off in a view that was left out.
+#[derive(Clone, Copy, Debug)]
+pub struct JointInnovation {
+    pub joint: usize,
+    /// Among all views.
+    pub view_idx: usize,
+    pub travel_rad: f64,
+    /// Over the standard deviation that it should have: of unit variance under the model.
+    pub normalised: f64,
+}
+
+/// Size of a camera's error that says nothing of its pose, m and rad.
+const FREE_CAMERA: f64 = 100.0;
+/// The share of its prior variance that a view must tell of a joint's error, for it to be looked at.
+const TOLD: f64 = 0.3;
+
+impl Estimate<'_> {
+    /// Of `left_out`, views with their places among all; `outliers` of all views do not count. `None` if there is no factor.
+    #[must_use]
+    pub fn innovations(
+        &self,
+        input: &BundleInput<'_>,
+        left_out: &[(usize, View)],
+        outliers: &[Outlier],
+    ) -> Option<Innovations> {
+        let views: Vec<View> = left_out.iter().map(|(_, view)| view.clone()).collect();
+        let mut problem = self.data_only(input, &views);
+        for (at, (view_idx, view)) in left_out.iter().enumerate() {
+            let sightings = problem.views[at].sightings.clone();
+            for (sighting, tag) in problem.sightings[sightings].iter_mut().zip(&view.tags) {
+                let is_known =
+                    problem.layout.tags.iter().all(Option::is_none) || problem.layout.tags[sighting.tag].is_some();
+                let is_out = outliers.iter().any(|out| out.view_idx == *view_idx && out.tag_id == tag.id);
+                sighting.is_used = is_known && !is_out;
+            }
+        }
+        let state = State {
+            joint_error: vec![[0.0; MAX_JOINTS]; views.len()],
+            camera_error: vec![Isometry3::identity(); views.len()],
+            ..self.solved.state.clone()
+        };
+        // A tag at the border may be foretold to lie beyond it.
+        let mut normal = NormalEquations::new(&problem);
+        normal.update(&problem, &state, Loss::Square);
+        for (sighting, chi2) in problem.sightings.iter_mut().zip(&normal.chi2) {
+            sighting.is_used &= *chi2 < unseen_chi2(&sighting.data);
+        }
+        let (foretold, chi2) = self.with_data(&problem, &state)?;
+        let joints = foretold.joints(&problem, left_out);
+        let dof = problem.sightings.iter().filter(|s| s.is_used).map(|s| s.data.n_coordinates()).sum();
+        let camera_dof = (0..views.len()).map(|view_idx| camera_numbers(&problem, view_idx)).sum();
+        problem.scales.camera_error_std = Some([FREE_CAMERA; 2]);
+        let (_, free_chi2) = self.with_data(&problem, &state)?;
+        Some(Innovations { chi2, dof, camera_chi2: (chi2 - free_chi2).max(0.0), camera_dof, joints })
+    }
+
+    /// `views` in this estimate's columns, without any prior but the views' own.
+    fn data_only<'a>(&self, input: &BundleInput<'a>, views: &[View]) -> BundleProblem<'a> {
+        let mut prior = self.problem.prior.clone();
+        prior.joint_info.fill(0.0);
+        (prior.mount_std, prior.gripper_tag_std) = ([f64::INFINITY; 6], [f64::INFINITY; 6]);
+        (prior.time_std_s, prior.lens_std) = (f64::INFINITY, [f64::INFINITY; 8]);
+        prior.tags_std.fill([f64::INFINITY; 6]);
+        let scales = self.problem.scales.clone();
+        let mut problem = BundleProblem::new(input.robot, views, &input.model, &input.guess, prior, scales);
+        problem.layout = self.problem.layout.clone();
+        problem
+    }
+
+    /// The data of `problem` linearized at `state` and joined to this estimate; and chi-square of their innovations.
+    fn with_data(&self, problem: &BundleProblem<'_>, state: &State) -> Option<(Joined, f64)> {
+        let mut normal = NormalEquations::new(problem);
+        normal.update(problem, state, Loss::Square);
+        let factor = Cholesky::new(&self.solved.normal.matrix + &normal.matrix)?;
+        let step = factor.solve(&normal.right);
+        let own: f64 = normal.eliminated.iter().map(|own| own.gradient.dot(&(own.inverse * own.gradient))).sum();
+        let chi2 = normal.cost - own - step.dot(&normal.right);
+        Some((Joined { normal, factor, step }, chi2))
+    }
+}
+
+/// Left-out data joined to an estimate.
+struct Joined {
+    normal: NormalEquations,
+    factor: Cholesky<f64, Dyn>,
+    /// Of the common parameters.
+    step: DVector<f64>,
+}
+
+impl Joined {
+    fn joints(&self, problem: &BundleProblem<'_>, left_out: &[(usize, View)]) -> Vec<JointInnovation> {
+        let mut out = Vec::new();
+        let mut groups = self.normal.eliminated.iter();
+        for (at, view) in problem.views.iter().enumerate() {
+            for own in groups.by_ref().take(1 + usize::from(view.gripper.is_some())) {
+                let by_columns = own.own_by_columns(problem, &self.normal, at);
+                let value = own.inverse * (own.gradient - &by_columns * &self.step);
+                let followed = own.inverse * by_columns;
+                for joint in (0..MAX_JOINTS).filter(|&j| !view.is_free[j] && own.twists.column(j).norm() > 0.0) {
+                    let mut row = DMatrix::from_fn(problem.layout.n, 1, |k, _| followed[(joint, k)]);
+                    self.factor.l_dirty().solve_lower_triangular_mut(&mut row);
+                    let prior_var = problem.joint_error_var(view, joint);
+                    let told_var = prior_var - own.inverse[(joint, joint)] - row.norm_squared();
+                    if told_var > TOLD * prior_var {
+                        out.push(JointInnovation {
+                            joint,
+                            view_idx: left_out[at].0,
+                            travel_rad: left_out[at].1.travel_rad[joint],
+                            normalised: value[joint] / told_var.sqrt(),
+                        });
+                    }
+                }
+            }
+        }
+        out
+    }
+}
+
+/// How many numbers of the camera's pose a view tells.
+fn camera_numbers(problem: &BundleProblem<'_>, view_idx: usize) -> usize {
+    let used = problem.sightings[problem.views[view_idx].sightings.clone()].iter().filter(|s| s.is_used);
+    let (mut points, mut poses) = (0, 0);
+    for sighting in used {
+        match sighting.data {
+            WeightedMeasurement::Position { .. } => points += 1,
+            WeightedMeasurement::Corners { .. } | WeightedMeasurement::Pose { .. } => poses += 1,
+        }
+    }
+    match (poses, points) {
+        (0, 0) => 0,
+        (0, 1) => 3,
+        (0, 2) => 5,
+        _ => 6,
+    }
+}

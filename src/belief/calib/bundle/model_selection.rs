@@ -1,0 +1,109 @@
+//! Which of the doubtful terms the data ask for, by Laplace's approximation of the evidence.
+//!
+//! `ln Z = -cost/2 + (ln|P| - ln|N|)/2 + sum over views (ln|L| - ln|S^T G S + L|)/2 - n ln(noise)` at the fitted scales: N the reduced
+//! normal matrix, P the common parameters' prior, L the views' own (MacKay 1992, eq. 4.4). A term comes in when it brings three
+//! nats or more (Kass and Raftery 1995: strong evidence). What a sensor of its kind is known to have (nonlinearity, temperature,
+//! play) is in from the start: its prior size is fitted, so that it costs nothing where there is none.
+
+use nalgebra::Cholesky;
+
+use crate::calib::bundle::estimate::{BundleInput, Estimate, estimate};
+use crate::calib::parameters::ParameterKind;
+use crate::calib::views::association::TagMeasurement;
+
+/// A term that not every recording has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum OptionalTerm {
+    /// An error of the camera's pose that all tags of a view share.
+    CameraError,
+    TimeOffset,
+    Drift,
+}
+
+/// Whether a doubtful term came in, and what it brought.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Selection {
+    pub term: OptionalTerm,
+    pub is_in: bool,
+    /// Natural logarithm of the evidence with it over that without.
+    pub gain_nats: f64,
+}
+
+const MIN_GAIN_NATS: f64 = 3.0;
+/// First guess of the error of positions by SLAM: translation m, rotation rad (assumed; the evidence fits both).
+const CAMERA_ERROR_STD: [f64; 2] = [0.005, 0.01];
+/// Sessions shorter than this do not drift, h.
+const MIN_SESSION_H: f64 = 0.2;
+/// Slower joints have no clock to tell, rad/s.
+const MIN_RATE_RAD_S: f64 = 0.01;
+
+/// Estimates, and again with each doubtful term that the data may ask for; the best model stays.
+#[must_use]
+pub fn select_model<'a>(input: &BundleInput<'a>) -> Option<(Estimate<'a>, Vec<Selection>)> {
+    let mut best = estimate(input)?;
+    let mut best_input = input.clone();
+    let mut selections = Vec::new();
+    for term in candidates(input) {
+        let wider = with(&best_input, term);
+        let Some(found) = estimate(&wider) else { continue };
+        let gain_nats = log_evidence(&found) - log_evidence(&best);
+        let is_in = gain_nats > MIN_GAIN_NATS;
+        selections.push(Selection { term, is_in, gain_nats });
+        if is_in {
+            (best, best_input) = (found, wider);
+        }
+    }
+    Some((best, selections))
+}
+
+fn candidates(input: &BundleInput<'_>) -> Vec<OptionalTerm> {
+    let positions = |view: &crate::calib::View| {
+        let other = |tag: &&crate::calib::TagObservation| !matches!(tag.measured, TagMeasurement::Corners(_));
+        view.tags.iter().filter(other).count() >= 2
+    };
+    let moves = input.views.iter().any(|view| view.rate_rad_s.iter().any(|rate| rate.abs() > MIN_RATE_RAD_S));
+    let stamps = || input.views.iter().filter_map(|view| view.conditions.stamp);
+    let lasts_h = stamps().min().zip(stamps().max()).map_or(0.0, |(a, b)| b.since_s(a) / 3600.0);
+    let mut out = Vec::new();
+    if input.scales.camera_error_std.is_none() && input.views.iter().any(positions) {
+        out.push(OptionalTerm::CameraError);
+    }
+    if moves && !input.model.time_offset {
+        out.push(OptionalTerm::TimeOffset);
+    }
+    // A prior has its own columns.
+    if lasts_h > MIN_SESSION_H && input.joint_prior.is_none() {
+        out.push(OptionalTerm::Drift);
+    }
+    out
+}
+
+fn with<'a>(input: &BundleInput<'a>, term: OptionalTerm) -> BundleInput<'a> {
+    let mut wider = input.clone();
+    match term {
+        OptionalTerm::CameraError => wider.scales.camera_error_std = Some(CAMERA_ERROR_STD),
+        OptionalTerm::TimeOffset => wider.model.time_offset = true,
+        OptionalTerm::Drift => {
+            for kinds in wider.model.joints.iter_mut().filter(|kinds| !kinds.is_empty()) {
+                if !kinds.contains(&ParameterKind::DriftPerH) {
+                    kinds.push(ParameterKind::DriftPerH);
+                }
+            }
+        }
+    }
+    wider
+}
+
+/// Up to what all models of the same data share.
+fn log_evidence(found: &Estimate<'_>) -> f64 {
+    let (problem, normal) = (&found.problem, &found.solved.normal);
+    let log_det = |matrix: &nalgebra::DMatrix<f64>| {
+        Cholesky::new(matrix.clone()).map(|f| 2.0 * f.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>())
+    };
+    let Some(of_normal) = log_det(&normal.matrix) else { return f64::NEG_INFINITY };
+    let of_prior = log_det(&problem.prior.joint_info).unwrap_or(f64::NEG_INFINITY)
+        - 2.0 * problem.layout.time.map_or(0.0, |_| problem.prior.time_std_s.ln());
+    let of_views: f64 = normal.eliminated.iter().map(|own| own.log_ratio).sum();
+    let n: usize = problem.sightings.iter().filter(|s| s.is_used).map(|s| s.data.n_coordinates()).sum();
+    0.5 * (of_prior - of_normal + of_views - normal.cost) - n as f64 * problem.scales.noise.ln()
+}

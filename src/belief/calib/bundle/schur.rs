@@ -1,0 +1,199 @@
+//! What is left of a view once its own parameters are eliminated, and the way from directions to columns.
+
+use std::ops::Range;
+
+use nalgebra::{Const, DMatrix, DVector, Isometry3, Matrix6, SMatrix, SVector, Vector6};
+
+use crate::calib::bundle::linearize::NormalEquations;
+use crate::calib::bundle::problem::{BundleProblem, ViewData};
+use armcal_core::joints::MAX_JOINTS;
+
+/// A view's own parameters: an error of each joint, then the camera's six.
+pub(crate) const N_VIEW_PARAMETERS: usize = MAX_JOINTS + 6;
+/// Directions of the common parameters: each joint, mount, time offset.
+pub(crate) const N_DIRECTIONS: usize = MAX_JOINTS + 7;
+pub(crate) const MOUNT: usize = MAX_JOINTS;
+pub(crate) const TIME: usize = MAX_JOINTS + 6;
+
+pub(crate) type Own = SMatrix<f64, N_VIEW_PARAMETERS, N_VIEW_PARAMETERS>;
+pub(crate) type Directions = SMatrix<f64, 6, N_DIRECTIONS>;
+
+/// What is needed to get a view's own parameters back, and their covariance.
+#[derive(Clone, Debug)]
+pub(crate) struct SchurBlock {
+    /// `S`, and the inverse of `S^T G S + L`.
+    pub twists: SMatrix<f64, 6, N_VIEW_PARAMETERS>,
+    pub inverse: Own,
+    pub gradient: SVector<f64, N_VIEW_PARAMETERS>,
+    /// Rows of own parameters by common columns: `S^T sum H_i A`; filled where it is asked for.
+    pub by_common: SMatrix<f64, 6, N_DIRECTIONS>,
+    /// Of each sighting: its place among `infos`.
+    pub range: Range<usize>,
+    /// `ln|L| - ln|S^T G S + L|`: how much the prior's volume shrank.
+    pub log_ratio: f64,
+    /// The lens's part, `sum H_ic`.
+    pub by_lens: SMatrix<f64, 6, 8>,
+    /// Whether the group has any parameters of its own.
+    pub has_any: bool,
+}
+
+/// What carries a group of sightings.
+pub(crate) struct Group<'a> {
+    pub view_idx: usize,
+    /// The joints whose motion the sightings see, and how.
+    pub joints: Range<usize>,
+    pub sign: f64,
+    /// Twist of the camera by that of the mount.
+    pub by_mount: Matrix6<f64>,
+    pub camera_error: Option<&'a Isometry3<f64>>,
+    pub sightings: Range<usize>,
+}
+
+/// From directions to columns.
+pub(crate) struct Columns<'a> {
+    view: &'a ViewData,
+    joints: Range<usize>,
+}
+
+impl<'a> Columns<'a> {
+    pub(crate) fn new(problem: &'a BundleProblem<'_>, group: &Group<'_>) -> Self {
+        Self { view: &problem.views[group.view_idx], joints: group.joints.clone() }
+    }
+
+    /// The directions that have columns.
+    pub(crate) fn directions(&self, problem: &BundleProblem<'_>) -> impl Iterator<Item = usize> + use<> {
+        let mount = if problem.layout.mount.is_some() { MOUNT..MOUNT + 6 } else { 0..0 };
+        let time = if problem.layout.time.is_some() { TIME..TIME + 1 } else { 0..0 };
+        self.joints.clone().chain(mount).chain(time)
+    }
+
+    /// Calls `f` with each column of a direction and the direction's derivative by it.
+    #[inline]
+    pub(crate) fn each(&self, problem: &BundleProblem<'_>, direction: usize, mut f: impl FnMut(usize, f64)) {
+        let layout = &problem.layout;
+        match direction {
+            TIME => layout.time.into_iter().for_each(|at| f(at, 1.0)),
+            MOUNT..TIME => layout.mount.into_iter().for_each(|at| f(at + direction - MOUNT, 1.0)),
+            joint => layout.of_joint[joint].clone().for_each(|column| f(column, self.view.basis[column])),
+        }
+    }
+}
+
+impl SchurBlock {
+    /// Of a group without parameters of its own.
+    pub(crate) fn none(range: Range<usize>) -> Self {
+        Self {
+            twists: SMatrix::zeros(),
+            inverse: Own::identity(),
+            gradient: SVector::zeros(),
+            by_common: SMatrix::zeros(),
+            range,
+            log_ratio: 0.0,
+            by_lens: SMatrix::zeros(),
+            has_any: false,
+        }
+    }
+
+    /// `M`, and how far the own parameters alone would move the camera.
+    pub(crate) fn reach(&self) -> (Matrix6<f64>, Vector6<f64>) {
+        if !self.has_any {
+            return (Matrix6::zeros(), Vector6::zeros());
+        }
+        let weighted = self.twists * self.inverse;
+        (weighted * self.twists.transpose(), weighted * self.gradient)
+    }
+
+    /// `sum H_i A step`: what a step of the common parameters adds to the sightings' pull on the camera's twist.
+    pub(crate) fn push(
+        &self,
+        problem: &BundleProblem<'_>,
+        normal: &NormalEquations,
+        view_idx: usize,
+        step: &DVector<f64>,
+    ) -> Vector6<f64> {
+        let columns = self.columns(problem, view_idx);
+        let mut along = SVector::<f64, N_DIRECTIONS>::zeros();
+        for a in columns.directions(problem) {
+            columns.each(problem, a, |column, by| along[a] += by * step[column]);
+        }
+        let mut pushed = self.by_common * along;
+        for at in self.range.clone() {
+            if let (u, Some(column)) = &normal.by_tag[at] {
+                pushed -= u * step.fixed_rows::<6>(*column);
+            }
+        }
+        if let Some(at) = problem.layout.lens {
+            pushed += self.by_lens * step.fixed_rows::<8>(at);
+        }
+        pushed
+    }
+
+    fn columns<'a>(&self, problem: &'a BundleProblem<'_>, view_idx: usize) -> Columns<'a> {
+        let view = &problem.views[view_idx];
+        let joints = match &problem.robot.gripper_tag {
+            Some(tag) if view.gripper == Some(self.range.start) => problem.n_camera_joints..tag.mount.n_joints,
+            _ => 0..problem.n_camera_joints,
+        };
+        Columns { view, joints }
+    }
+
+    /// `sum H_i A`: the sightings' pull on the camera's twist by the common columns.
+    pub(crate) fn twist_by_columns(
+        &self,
+        problem: &BundleProblem<'_>,
+        normal: &NormalEquations,
+        view_idx: usize,
+    ) -> DMatrix<f64> {
+        let layout = &problem.layout;
+        let mut out = DMatrix::zeros(6, layout.n);
+        let columns = self.columns(problem, view_idx);
+        for a in columns.directions(problem) {
+            columns.each(problem, a, |column, by| {
+                let mut view = out.fixed_view_mut::<6, 1>(0, column);
+                view += self.by_common.column(a) * by;
+            });
+        }
+        for at in self.range.clone() {
+            if let (u, Some(column)) = &normal.by_tag[at] {
+                let mut view = out.fixed_view_mut::<6, 6>(0, *column);
+                view -= u;
+            }
+        }
+        if let Some(at) = layout.lens {
+            let mut view = out.fixed_view_mut::<6, 8>(0, at);
+            view += self.by_lens;
+        }
+        out
+    }
+
+    /// `S^T sum H_i A`: own parameters by the common columns; multiplied by a step it is what the step adds to the gradient.
+    pub(crate) fn own_by_columns(
+        &self,
+        problem: &BundleProblem<'_>,
+        normal: &NormalEquations,
+        view_idx: usize,
+    ) -> DMatrix<f64> {
+        let layout = &problem.layout;
+        let mut out = DMatrix::zeros(N_VIEW_PARAMETERS, layout.n);
+        let columns = self.columns(problem, view_idx);
+        let by_directions = self.twists.transpose() * self.by_common;
+        for a in columns.directions(problem) {
+            columns.each(problem, a, |column, by| {
+                for row in 0..N_VIEW_PARAMETERS {
+                    out[(row, column)] += by_directions[(row, a)] * by;
+                }
+            });
+        }
+        for at in self.range.clone() {
+            if let (u, Some(column)) = &normal.by_tag[at] {
+                let mut view = out.fixed_view_mut::<N_VIEW_PARAMETERS, 6>(0, *column);
+                view -= self.twists.transpose() * u;
+            }
+        }
+        if let Some(at) = layout.lens {
+            let mut view = out.generic_view_mut((0, at), (Const::<N_VIEW_PARAMETERS>, Const::<8>));
+            view += self.twists.transpose() * self.by_lens;
+        }
+        out
+    }
+}

@@ -1,0 +1,260 @@
+//! Would another geometry explain the data better than joint sensors can?
+//!
+//! The score test (Rao 1948; the Lagrange multiplier test): each link's place and turn is a trial parameter z, zero in the model. With
+//! everything else at its optimum, `s = d(-cost/2)/dz` and z's information `I`, all other parameters eliminated under their priors,
+//! follow from the normal equations without another fit: `z = I^-1 s` is what the data ask for, `s^T I^-1 s` is chi-square under
+//! the model. Directions that the data tell less of than [`SIZE_M`] or [`SIZE_RAD`] do not count.
+
+use nalgebra::{DMatrix, DVector, Matrix6, SMatrix, Vector3, Vector6};
+
+use crate::calib::bundle::estimate::Estimate;
+use crate::calib::bundle::observation_term::PoseInformation;
+use crate::calib::bundle::problem::WeightedMeasurement;
+use crate::calib::bundle::schur::{N_VIEW_PARAMETERS, SchurBlock};
+use crate::calib::geometry_error::ErrorKind;
+use armcal_core::joints::{JointAngles, MAX_JOINTS};
+use armcal_core::kinematics::LinkPoses;
+use armcal_core::spatial::adjoint;
+use armcal_core::stats::chi_square_above;
+
+/// Size of an error of geometry that is worth a look: what the data cannot tell to that is not tested.
+const SIZE_M: f64 = 0.01;
+const SIZE_RAD: f64 = 0.0175;
+/// Trial columns: of each joint's place in its parent link three of translation, then three of rotation; then the mount's six.
+const N_TRIALS: usize = 6 * MAX_JOINTS + 6;
+const MOUNT: usize = 6 * MAX_JOINTS;
+
+/// A element of the geometry that is tested.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum GeometryElement {
+    /// Where the joint sits on its parent link.
+    Joint(usize),
+    /// Where the camera hangs, beyond its prior.
+    Mount,
+}
+
+/// What one change of the geometry would explain.
+#[derive(Clone, Debug)]
+pub struct ScoreTestResult {
+    pub element: GeometryElement,
+    pub error: ErrorKind,
+    /// What the data ask for, in the parent link's frame (the camera's for the mount): m or rad.
+    pub size: Vector3<f64>,
+    pub chi2: f64,
+    pub dof: usize,
+    /// That chance alone makes chi2 as large.
+    pub probability: f64,
+    /// Root mean square over the task of how far the tool would be elsewhere, m.
+    pub tool_m: f64,
+}
+
+type Trials = SMatrix<f64, 6, N_TRIALS>;
+
+/// Score and information of all trials, and how the common parameters follow them.
+struct Score {
+    score: DVector<f64>,
+    information: DMatrix<f64>,
+    /// d(common)/d(trial).
+    sensitivity: DMatrix<f64>,
+}
+
+impl Estimate<'_> {
+    /// All that can be tested, the least likely by chance first; `task`: the arm's angles at the task's targets.
+    #[must_use]
+    pub fn score_tests(&self, task: &[JointAngles]) -> Vec<ScoreTestResult> {
+        let robot = self.problem.robot;
+        let score = self.score();
+        let has_gripper = self.problem.layout.gripper_tag.is_some();
+        let n_seen = match &robot.gripper_tag {
+            Some(tag) if has_gripper => tag.mount.n_joints,
+            _ => self.problem.n_camera_joints,
+        };
+        let mut elements: Vec<GeometryElement> = (0..n_seen).map(GeometryElement::Joint).collect();
+        elements.extend(self.problem.layout.mount.map(|_| GeometryElement::Mount));
+        let both = elements.iter().flat_map(|&element| [(element, ErrorKind::Shift), (element, ErrorKind::Turn)]);
+        let mut out: Vec<ScoreTestResult> =
+            both.filter_map(|(element, error)| self.score_test(&score, element, error, task)).collect();
+        out.sort_by(|a, b| a.probability.total_cmp(&b.probability).then(b.chi2.total_cmp(&a.chi2)));
+        out
+    }
+
+    /// The arm's angles in each view.
+    #[must_use]
+    pub fn view_angles(&self) -> Vec<JointAngles> {
+        (0..self.problem.views.len()).map(|view_idx| self.problem.angles(view_idx, &self.solved.state)).collect()
+    }
+
+    fn score_test(
+        &self,
+        score: &Score,
+        element: GeometryElement,
+        error: ErrorKind,
+        task: &[JointAngles],
+    ) -> Option<ScoreTestResult> {
+        let (first, unit) = columns(element, error);
+        let information = score.information.fixed_view::<3, 3>(first, first).into_owned() * (unit * unit);
+        let pull = score.score.fixed_rows::<3>(first).into_owned() * unit;
+        let eigen = information.symmetric_eigen();
+        let (mut size, mut chi2, mut dof) = (Vector3::zeros(), 0.0, 0);
+        for (value, direction) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
+            if *value > 1.0 {
+                let along = direction.dot(&pull);
+                size += direction * (along / value * unit);
+                chi2 += along * along / value;
+                dof += 1;
+            }
+        }
+        if dof == 0 {
+            return None;
+        }
+        let probability = chi_square_above(chi2, dof);
+        let tool_m = self.tool_shift_m(score, first, &size, task);
+        Some(ScoreTestResult { element, error, size, chi2, dof, probability, tool_m })
+    }
+
+    /// How far the tool is elsewhere over `task` with the trial at `first` of `size`, the joints' parameters following.
+    fn tool_shift_m(&self, score: &Score, first: usize, size: &Vector3<f64>, task: &[JointAngles]) -> f64 {
+        let robot = self.problem.robot;
+        let layout = &self.problem.layout;
+        let step = score.sensitivity.columns(first, 3) * size;
+        let sensors = self.parameters().sensors(robot);
+        let mut sum = 0.0;
+        for angles in task {
+            let poses = robot.chain.link_poses(angles);
+            let tool_m = poses.frame(&robot.tool.mount).translation.vector;
+            let mut moved = Vector3::zeros();
+            if first < MOUNT && first / 6 < robot.tool.mount.n_joints {
+                let turned = poses.link(first / 6).rotation * size;
+                let origin = poses.joint_origin(first / 6);
+                moved += if first.is_multiple_of(6) { turned } else { turned.cross(&(tool_m - origin)) };
+            }
+            for (column, parameter) in layout.parameters.iter().enumerate() {
+                let joint = parameter.joint;
+                if joint < robot.tool.mount.n_joints {
+                    let model = &sensors.models[joint];
+                    let still = armcal_core::sensor::ConditionChange::default();
+                    let travel_rad = model.travel_under_rad(angles[joint], &still);
+                    let by = parameter.kind.angle_derivative(&model.spec, travel_rad, &still, 0.0);
+                    moved += poses.point_jacobian(joint, &tool_m) * (by * step[column]);
+                }
+            }
+            sum += moved.norm_squared();
+        }
+        (sum / task.len().max(1) as f64).sqrt()
+    }
+
+    fn score(&self) -> Score {
+        let problem = &self.problem;
+        let n = problem.layout.n;
+        let mut score = DVector::zeros(N_TRIALS);
+        let mut information = DMatrix::zeros(N_TRIALS, N_TRIALS);
+        let mut cross = DMatrix::zeros(N_TRIALS, n);
+        let mut groups = self.solved.normal.eliminated.iter();
+        for (view_idx, view) in problem.views.iter().enumerate() {
+            let poses = problem.robot.chain.link_poses(&problem.angles(view_idx, &self.solved.state));
+            for own in groups.by_ref().take(1 + usize::from(view.gripper.is_some())) {
+                let base_from_camera = self.base_from_camera(view_idx, own, &poses);
+                let trials = self.trials(view_idx, own, &poses, &base_from_camera);
+                let (h, g) = self.gradient(own, &poses, &base_from_camera);
+                let m = own.twists * own.inverse * own.twists.transpose();
+                let left = trials.transpose() * (Matrix6::identity() - h * m);
+                score += left_times(&trials, &(g - h * (own.twists * (own.inverse * own.gradient))));
+                information +=
+                    DMatrix::from_fn(N_TRIALS, N_TRIALS, |i, k| (left.row(i) * h).dot(&trials.column(k).transpose()));
+                cross += left * own.twist_by_columns(problem, &self.solved.normal, view_idx);
+            }
+        }
+        let followed = -(&self.posterior.covariance * cross.transpose());
+        score += followed.tr_mul(&self.solved.normal.right);
+        information += &cross * &followed;
+        Score { score, information, sensitivity: followed }
+    }
+
+    fn is_gripper(&self, view_idx: usize, own: &SchurBlock) -> bool {
+        self.problem.views[view_idx].gripper == Some(own.range.start)
+    }
+
+    fn base_from_camera(&self, view_idx: usize, own: &SchurBlock, poses: &LinkPoses) -> nalgebra::Isometry3<f64> {
+        let state = &self.solved.state;
+        let before = poses.link(self.problem.n_camera_joints) * state.mount;
+        if self.is_gripper(view_idx, own) { before } else { before * state.camera_error[view_idx] }
+    }
+
+    /// Curvature and pull of a group's sightings on the camera's twist.
+    fn gradient(
+        &self,
+        own: &SchurBlock,
+        poses: &LinkPoses,
+        base_from_camera: &nalgebra::Isometry3<f64>,
+    ) -> (Matrix6<f64>, Vector6<f64>) {
+        let (problem, state) = (&self.problem, &self.solved.state);
+        let (mut h, mut g) = (Matrix6::zeros(), Vector6::zeros());
+        for sighting in problem.sightings[own.range.clone()].iter().filter(|sighting| sighting.is_used) {
+            let pose = match &problem.robot.gripper_tag {
+                Some(tag) if sighting.tag == problem.robot.tags.len() => {
+                    poses.link(tag.mount.n_joints) * state.gripper_tag
+                }
+                _ => state.tags[sighting.tag],
+            };
+            let camera_from_tag = base_from_camera.inv_mul(&pose);
+            let data: &WeightedMeasurement = &sighting.data;
+            if let Some(info) = PoseInformation::of(data, &camera_from_tag, &state.lens, problem.scales.noise, None) {
+                h += info.h;
+                g += info.g;
+            }
+        }
+        (h, g)
+    }
+
+    /// Twists of the camera (right, camera frame) by each trial parameter.
+    fn trials(
+        &self,
+        view_idx: usize,
+        own: &SchurBlock,
+        poses: &LinkPoses,
+        base_from_camera: &nalgebra::Isometry3<f64>,
+    ) -> Trials {
+        let problem = &self.problem;
+        let is_gripper = self.is_gripper(view_idx, own);
+        // Links behind the camera move the tag, not the camera.
+        let (joints, sign) = match &problem.robot.gripper_tag {
+            Some(tag) if is_gripper => (problem.n_camera_joints..tag.mount.n_joints, -1.0),
+            _ => (0..problem.n_camera_joints, 1.0),
+        };
+        let mut trials = Trials::zeros();
+        let to_camera = base_from_camera.rotation.inverse();
+        let center = base_from_camera.translation.vector;
+        for joint in joints {
+            let lever = center - poses.joint_origin(joint);
+            for axis in 0..3 {
+                let direction = poses.link(joint).rotation * Vector3::ith(axis, sign);
+                let shift = to_camera * direction;
+                trials.fixed_view_mut::<3, 1>(0, 6 * joint + axis).copy_from(&shift);
+                let swept = to_camera * direction.cross(&lever);
+                trials.fixed_view_mut::<3, 1>(0, 6 * joint + 3 + axis).copy_from(&swept);
+                trials.fixed_view_mut::<3, 1>(3, 6 * joint + 3 + axis).copy_from(&shift);
+            }
+        }
+        let error = if is_gripper { nalgebra::Isometry3::identity() } else { self.solved.state.camera_error[view_idx] };
+        trials.fixed_view_mut::<6, 6>(0, MOUNT).copy_from(&adjoint(&error.inverse()));
+        trials
+    }
+}
+
+/// First trial column, and the size in whose units it is looked at.
+fn columns(element: GeometryElement, error: ErrorKind) -> (usize, f64) {
+    let first = match element {
+        GeometryElement::Joint(joint) => 6 * joint,
+        GeometryElement::Mount => MOUNT,
+    };
+    match error {
+        ErrorKind::Shift => (first, SIZE_M),
+        ErrorKind::Turn => (first + 3, SIZE_RAD),
+    }
+}
+
+fn left_times(trials: &Trials, pull: &Vector6<f64>) -> DVector<f64> {
+    DVector::from_iterator(N_TRIALS, trials.column_iter().map(|column| column.dot(pull)))
+}
+
+const _: () = assert!(N_VIEW_PARAMETERS == MAX_JOINTS + 6, "a view's own parameters are joints and camera");

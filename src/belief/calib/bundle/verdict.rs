@@ -1,0 +1,336 @@
+//! Whether joint sensors explain the data of a calibration by `bundle`: score test of the link geometry, size of the sensors' errors,
+//! outliers, and innovations of held-out views.
+
+use crate::calib::bundle::estimate::{BundleInput, Estimate};
+use crate::calib::bundle::innovations::{Innovations, JointInnovation};
+use crate::calib::bundle::observability::{Observability, observability};
+use crate::calib::bundle::score_test::{GeometryElement, ScoreTestResult};
+use crate::calib::covariance::task_angles;
+use crate::calib::finding::{Finding, FindingKind, FindingUnit};
+use crate::calib::geometry_error::{ErrorKind, GeometryError};
+use crate::calib::parameters::ParameterKind;
+use crate::calib::refusal::{InnovationQuantity, Refusal};
+use crate::calib::result::calibration::Calibration;
+use crate::calib::result::valid_range::not_covered;
+use crate::calib::result::verdict_tables::{Check, ObservabilityTable, VerdictTable};
+use armcal_core::joints::JointAngles;
+use armcal_core::robot::Robot;
+use armcal_core::stats::chi_square_quantile;
+use armcal_core::streams::ReachTask;
+
+/// What a verdict on an estimate rests on.
+pub(crate) struct VerdictInput<'a> {
+    pub input: &'a BundleInput<'a>,
+    pub found: &'a Estimate<'a>,
+    /// Of each fold.
+    pub innovations: &'a [Innovations],
+    pub task: Option<&'a ReachTask>,
+}
+
+/// Probability that a good arm fails any one check by chance.
+const FALSE_ALARM: f64 = 1e-4;
+/// Geometry that would move the tool by less than this, and by less than the predicted error, is no reason to refuse, m.
+const WORTH_M: f64 = 0.004;
+/// A joint's error from view to view over its datasheet's linearity: sensors do not have more, after what is smooth is taken off.
+const MAX_OVER_LINEARITY: f64 = 3.0;
+/// Gains and offsets farther from the datasheet than this are no calibration any more; the paper's methods stop there, too.
+const MAX_SIGMAS_OFF: f64 = 6.0;
+/// Share of the tag observations that may be outliers.
+const MAX_OUTLIERS: f64 = 0.25;
+/// Over chi-square's quantile, for pixel noise has longer tails than a normal one and the tags' corners common errors. Measured.
+const TAILS: f64 = 1.5;
+/// So many times that limit is refused: innovations then are about three times as large as they should be.
+const FAR_BEYOND: f64 = 4.0;
+/// Standard deviation over the prior's above which the prior holds a parameter.
+const HELD: f64 = 0.7;
+
+impl VerdictInput<'_> {
+    /// Writes tables and findings into `calibration`, and refuses it where something does not hold.
+    pub(crate) fn judge(&self, calibration: &mut Calibration) {
+        let robot = self.input.robot;
+        let targets = self.task.map(|task| task_angles(robot, task)).unwrap_or_default();
+        // Without a task the views' own configurations stand for it.
+        let configurations = if targets.is_empty() { self.found.view_angles() } else { targets.clone() };
+        let mut table = VerdictTable { warnings: Vec::new(), not_covered: Vec::new(), checks: Vec::new() };
+        let refusals = [
+            self.geometry(&configurations, calibration, &mut table),
+            self.sensors(calibration, &mut table),
+            self.beyond_datasheet(&mut table),
+            self.outliers(calibration, &mut table),
+            self.innovations(&mut table),
+        ];
+        self.whiteness(&mut table);
+        table.not_covered = not_covered(calibration, &targets);
+        if self.has_unseen_links() {
+            let words = "links distal to the camera: errors are unobservable without a gripper tag";
+            table.warnings.push(words.to_owned());
+        }
+        calibration.verdict = Some(table);
+        if let Some(found) = observability(self.input) {
+            let wanted = found.null_space.iter().filter(|direction| !direction.is_of_terms);
+            calibration.unobservable.extend(wanted.map(|direction| direction.words.clone()));
+            calibration.observability = Some(self.table(&found));
+        }
+        calibration.refuse_first_for(refusals.into_iter().flatten().take(1));
+    }
+
+    /// Whether other links would explain the data better.
+    fn geometry(
+        &self,
+        configurations: &[JointAngles],
+        calibration: &mut Calibration,
+        table: &mut VerdictTable,
+    ) -> Option<Refusal> {
+        let mut results = self.found.score_tests(configurations);
+        if calibration.map.is_some() {
+            // These views made the map: there is no survey that the base could disagree with.
+            results.retain(|result| result.element != GeometryElement::Joint(0));
+        }
+        let false_alarm = FALSE_ALARM / results.len().max(1) as f64;
+        let worth_m = calibration.predicted_tool_error_m.map_or(WORTH_M, |p| p.median.min(WORTH_M));
+        let mut refusal = None;
+        for result in &results {
+            let limit = chi_square_quantile(1.0 - false_alarm, result.dof);
+            let geometry = geometry_error(self.input.robot, result, limit);
+            let what = format!("{}: chi-square of its {}", geometry.element, error_name(result.error));
+            let check = Check::at_most(what, result.chi2, limit);
+            let matters = result.tool_m > worth_m || result.element == GeometryElement::Mount;
+            if !check.holds && refusal.is_none() {
+                calibration.findings.push(geometry_finding(result, &geometry));
+                if matters {
+                    refusal = Some(Refusal::Geometry(geometry));
+                } else {
+                    table.warnings.push(geometry.to_string());
+                }
+            }
+            table.checks.push(check);
+        }
+        refusal
+    }
+
+    /// Whether the joints' errors are those of such sensors.
+    fn sensors(&self, calibration: &mut Calibration, table: &mut VerdictTable) -> Option<Refusal> {
+        let robot = self.input.robot;
+        let mut refusal = None;
+        for (joint, spec) in robot.sensors.iter().enumerate().take(robot.camera.mount.n_joints) {
+            let std_rad = self.found.scales().joint_std_rad[joint];
+            let limit_rad = MAX_OVER_LINEARITY * spec.linearity_std_rad.max(self.input.scales.joint_std_rad[joint]);
+            let check = Check::at_most(format!("{}: error from view to view, rad", spec.joint), std_rad, limit_rad);
+            if !check.holds && self.found.has_positions() {
+                // Their noise has no datasheet, and one landmark a view cannot part it from the joints' errors.
+                let (found, name) = (std_rad.to_degrees(), &spec.joint);
+                table.warnings.push(format!(
+                    "{name} has a random error of {found:.2} deg from view to view, or the positions have as much"
+                ));
+            } else if !check.holds && refusal.is_none() {
+                let (joint, datasheet_std_rad) = (spec.joint.clone(), spec.linearity_std_rad);
+                calibration.findings.push(worn(&joint, std_rad));
+                refusal = Some(Refusal::SensorError { joint, std_rad, datasheet_std_rad });
+            }
+            table.checks.push(check);
+        }
+        refusal
+    }
+
+    /// Gains and offsets beyond what a sensor of that datasheet can have: a joint that does not move, or another sensor.
+    fn beyond_datasheet(&self, table: &mut VerdictTable) -> Option<Refusal> {
+        let (robot, at) = (self.input.robot, self.found.parameters());
+        let linear = self.found.joint_parameters().iter().filter(|p| p.prior_std(robot) > 0.0);
+        let of_sensor = linear.filter(|p| matches!(p.kind, ParameterKind::Gain | ParameterKind::Offset));
+        let sigmas = of_sensor.map(|p| {
+            let nominal = if p.kind == ParameterKind::Gain { 1.0 } else { 0.0 };
+            (*p, (at.get(*p) - nominal).abs() / p.prior_std(robot))
+        });
+        let (worst, sigmas) = sigmas.max_by(|a, b| a.1.total_cmp(&b.1))?;
+        let parameter = worst.name(robot);
+        let check = Check::at_most(format!("{parameter}: sigma from its datasheet"), sigmas, MAX_SIGMAS_OFF);
+        let refusal = (!check.holds).then_some(Refusal::BeyondDatasheet { parameter, sigmas });
+        table.checks.push(check);
+        refusal
+    }
+
+    fn outliers(&self, calibration: &mut Calibration, table: &mut VerdictTable) -> Option<Refusal> {
+        let (outliers, observations) = (self.found.outliers.len(), calibration.fit.tags_seen);
+        let share = outliers as f64 / observations.max(1) as f64;
+        if outliers > 0 {
+            calibration.findings.push(Finding {
+                kind: FindingKind::Outliers,
+                name: "tag observations".to_owned(),
+                size: Some(outliers as f64),
+                unit: Some(FindingUnit::One),
+                tool_error_m: None,
+                time_s: None,
+                repaired: share <= MAX_OUTLIERS,
+            });
+        }
+        let check = Check::at_most("share of outliers among the tag observations", share, MAX_OUTLIERS);
+        let refusal = (!check.holds).then_some(Refusal::Outliers { outliers, observations });
+        table.checks.push(check);
+        refusal
+    }
+
+    /// Whether held-out views are predicted as well as they should be: refused far beyond, else a warning.
+    fn innovations(&self, table: &mut VerdictTable) -> Option<Refusal> {
+        let sum = |f: fn(&Innovations) -> (f64, usize)| {
+            self.innovations.iter().map(f).fold((0.0, 0), |(chi2, dof), (c, d)| (chi2 + c, dof + d))
+        };
+        let mut refusal = None;
+        for (quantity, (chi2, dof)) in [
+            (InnovationQuantity::CameraPoses, sum(|i| (i.camera_chi2, i.camera_dof))),
+            (InnovationQuantity::Coordinates, sum(|i| (i.chi2, i.dof))),
+        ] {
+            if dof == 0 {
+                continue;
+            }
+            let quantile = |p: f64| chi_square_quantile(p, dof) / dof as f64;
+            let (per_dof, limit) = (chi2 / dof as f64, TAILS * quantile(1.0 - FALSE_ALARM));
+            let what = format!("{}: chi-square per degree of freedom", quantity.name());
+            let check = Check::at_most(what, per_dof, limit);
+            if !check.holds {
+                let expected = [quantile(0.025), quantile(0.975)];
+                let found = Refusal::Innovations { quantity, per_dof, limit, expected };
+                if per_dof <= FAR_BEYOND * limit {
+                    table.warnings.push(found.to_string());
+                } else if refusal.is_none() {
+                    refusal = Some(found);
+                }
+            }
+            table.checks.push(check);
+        }
+        refusal
+    }
+
+    /// Whether what is left of each joint's error has a pattern; a warning.
+    fn whiteness(&self, table: &mut VerdictTable) {
+        let robot = self.input.robot;
+        let all: Vec<JointInnovation> = self.innovations.iter().flat_map(|fold| fold.joints.iter().copied()).collect();
+        let limit = -normal_quantile(FALSE_ALARM / 10.0);
+        for (joint, spec) in robot.sensors.iter().enumerate() {
+            for (along, key) in [
+                ("in time", (|i: &JointInnovation| i.view_idx as f64) as fn(&JointInnovation) -> f64),
+                ("along its travel", |i| i.travel_rad),
+            ] {
+                let mut of_joint: Vec<&JointInnovation> = all.iter().filter(|i| i.joint == joint).collect();
+                of_joint.sort_by(|a, b| key(a).total_cmp(&key(b)).then(a.view_idx.cmp(&b.view_idx)));
+                let values: Vec<f64> = of_joint.iter().map(|i| i.normalised).collect();
+                let Some(sigmas) = serial_sigmas(&values) else { continue };
+                let check =
+                    Check::at_most(format!("{}: serial correlation {along}, sigmas", spec.joint), sigmas, limit);
+                if !check.holds {
+                    let name = &spec.joint;
+                    table.warnings.push(format!(
+                        "{name}: errors of neighbouring views {along} are correlated ({sigmas:.1} sigmas): the model lacks a smooth effect"
+                    ));
+                }
+                table.checks.push(check);
+            }
+        }
+    }
+
+    /// Links between camera and tool that no tag shows.
+    fn has_unseen_links(&self) -> bool {
+        let robot = self.input.robot;
+        robot.tool.mount.n_joints > robot.camera.mount.n_joints && !self.input.model.gripper_tag
+    }
+
+    fn table(&self, found: &Observability) -> ObservabilityTable {
+        let covariance = self.found.joint_covariance();
+        let robot = self.input.robot;
+        let held = self.found.joint_parameters().iter().enumerate().filter_map(|(k, p)| {
+            let prior_std = self.found.scales().prior_std(&robot.sensors[p.joint], p.joint, p.kind);
+            let share = covariance[(k, k)].max(0.0).sqrt() / prior_std;
+            let is_named = !matches!(p.kind, ParameterKind::Shape(_));
+            (is_named && share > HELD)
+                .then(|| format!("{}: {:.0} % of its prior's standard deviation remain", p.name(robot), 100.0 * share))
+        });
+        let [o1, o2, o3, o4, o5] = found.o;
+        ObservabilityTable {
+            rank: found.rank,
+            n_parameters: found.n_parameters,
+            condition_number: Some(found.condition_number).filter(|c| c.is_finite()),
+            o1,
+            o2,
+            o3,
+            o4,
+            o5,
+            null_space: found.null_space.iter().map(|direction| direction.words.clone()).collect(),
+            held_by_prior: held.collect(),
+        }
+    }
+}
+
+fn error_name(error: ErrorKind) -> &'static str {
+    match error {
+        ErrorKind::Shift => "length",
+        ErrorKind::Turn => "twist",
+    }
+}
+
+fn geometry_error(robot: &Robot, result: &ScoreTestResult, limit: f64) -> GeometryError {
+    let (element, joint) = match result.element {
+        GeometryElement::Joint(0) => ("base (or all tags)".to_owned(), Some(0)),
+        GeometryElement::Joint(joint) => (robot.chain.joints()[joint - 1].child_link.clone(), Some(joint)),
+        GeometryElement::Mount => ("camera mount".to_owned(), None),
+    };
+    GeometryError {
+        element,
+        joint: joint.map(|joint| robot.chain.joints()[joint].name.clone()),
+        error: result.error,
+        size: result.size.into(),
+        chi2: result.chi2,
+        limit,
+        tool_error_m: result.tool_m,
+    }
+}
+
+fn geometry_finding(result: &ScoreTestResult, geometry: &GeometryError) -> Finding {
+    Finding {
+        kind: match result.element {
+            GeometryElement::Joint(0) => FindingKind::Base,
+            GeometryElement::Joint(_) => FindingKind::Link,
+            GeometryElement::Mount => FindingKind::CameraMount,
+        },
+        name: geometry.element.clone(),
+        size: Some(result.size.norm()),
+        unit: Some(match result.error {
+            ErrorKind::Shift => FindingUnit::Metre,
+            ErrorKind::Turn => FindingUnit::Radian,
+        }),
+        tool_error_m: Some(result.tool_m),
+        time_s: None,
+        repaired: false,
+    }
+}
+
+fn worn(joint: &str, std_rad: f64) -> Finding {
+    Finding {
+        kind: FindingKind::SensorWorn,
+        name: joint.to_owned(),
+        size: Some(std_rad),
+        unit: Some(FindingUnit::Radian),
+        tool_error_m: None,
+        time_s: None,
+        repaired: false,
+    }
+}
+
+/// How many of its own standard deviations von Neumann's ratio lies below 2 (von Neumann 1941): positive where neighbours are alike.
+/// `None` below eight values.
+fn serial_sigmas(values: &[f64]) -> Option<f64> {
+    const LEAST: usize = 8;
+    let n = values.len() as f64;
+    if values.len() < LEAST {
+        return None;
+    }
+    let squares: f64 = values.iter().map(|v| v * v).sum();
+    let steps: f64 = values.windows(2).map(|pair| (pair[1] - pair[0]).powi(2)).sum();
+    // About zero, not the mean: the model says that it is zero. E = 2 (n - 1) / n, var = 4 (n - 2) / n^2 for unit normal values, nearly.
+    let ratio = steps / squares;
+    (squares > 0.0).then(|| (2.0 * (n - 1.0) / n - ratio) / (2.0 * (n - 2.0).sqrt() / n))
+}
+
+/// The standard normal's, by chi-square with one degree of freedom.
+fn normal_quantile(p: f64) -> f64 {
+    let side = chi_square_quantile((1.0 - 2.0 * p).abs(), 1).sqrt();
+    if p < 0.5 { -side } else { side }
+}

@@ -1,0 +1,45 @@
+//! Why no calibration came out at all.
+
+use armcal_core::log::StampRegression;
+
+/// Why no calibration came out at all; a poor one comes out refused instead.
+#[derive(Debug, thiserror::Error)]
+pub enum CalibError {
+    #[error("{recording}: the joints {recorded:?} are not those of robot `{robot}`: {expected:?}")]
+    JointNames { recording: String, robot: String, recorded: Vec<String>, expected: Vec<String> },
+    #[error("{recording}: holds no captured views (no marks `capture_fit` on /marks), so there is nothing to fit")]
+    NoCaptures { recording: String },
+    #[error("{recording}: holds no view to fit; the arm came to rest for held-out views alone ({held_out})")]
+    NoFitViews { recording: String, held_out: usize },
+    #[error(
+        "{recording}: no surveyed tag was seen in any view to fit; tags of robot `{robot}`: {known:?}, seen: {seen:?}"
+    )]
+    NoTags { recording: String, robot: String, known: Vec<u32>, seen: Vec<u32> },
+    #[error("{recording}: only {views} captured views show a surveyed tag; at least {needed} are needed")]
+    TooFewViews { recording: String, views: usize, needed: usize },
+    #[error("{recording}: no joint lies between the base and the camera with a sensor that the views determine")]
+    NothingObservable { recording: String },
+    #[error("{recording}: no joint can be calibrated by its end stops: {problem}")]
+    NoStops { recording: String, problem: String },
+    #[error("{recording}: no map of the tags can be made from its views: {problem}")]
+    Map { recording: String, problem: String },
+    #[error("the scale of joint `{joint}` cannot be measured: {problem}")]
+    Identify { joint: String, problem: String },
+    #[error(
+        "{recording}: all {views} views are of one pose: no joint between base and camera moved by more than its noise \
+         (the most: `{joint}`, {moved_deg:.3} deg), so nothing can be told of any"
+    )]
+    OnePose { recording: String, views: usize, joint: String, moved_deg: f64 },
+    #[error("{recording}: no interim estimate: {problem}")]
+    NoInterimEstimate { recording: String, problem: String },
+    #[error("{recording}: duplicate recording: give each recording once")]
+    Twice { recording: String },
+    #[error("{one} and {other} say different things of the tags; give a tag map that holds for both")]
+    Surveys { one: String, other: String },
+    #[error("{recording}: {n} of {of} messages rejected on {what}: too many to go on")]
+    NotFinite { recording: String, what: String, n: u64, of: u64 },
+    #[error("{recording}: no view is left: {reasons}")]
+    AllRejected { recording: String, reasons: String },
+    #[error("{recording}: topic {topic}: {disorder}")]
+    Disorder { recording: String, topic: String, disorder: StampRegression },
+}

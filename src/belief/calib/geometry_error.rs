@@ -1,0 +1,66 @@
+//! An error of the link geometry: which element, in which way, how large, and what it means at the tool.
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ErrorKind {
+    /// Of the element's place, m.
+    Shift,
+    /// Of its attitude, rad.
+    Turn,
+}
+
+impl ErrorKind {
+    /// Factor from SI to the unit that people read, and that unit.
+    #[must_use]
+    pub fn display_unit(self) -> (f64, &'static str) {
+        match self {
+            Self::Shift => (1e3, "mm"),
+            Self::Turn => (1f64.to_degrees(), "deg"),
+        }
+    }
+}
+
+/// What the score test of link geometry found.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct GeometryError {
+    /// The link, `camera mount` or `base (or all tags)`.
+    pub element: String,
+    /// The joint that sits on it; none for the camera.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub joint: Option<String>,
+    pub error: ErrorKind,
+    /// In the element's own axes, m or rad.
+    pub size: [f64; 3],
+    pub chi2: f64,
+    pub limit: f64,
+    /// Root mean square over the task, m.
+    pub tool_error_m: f64,
+}
+
+impl fmt::Display for GeometryError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { element, joint, error, size, chi2, limit, tool_error_m } = self;
+        let what = joint.as_ref().map_or_else(|| "the camera".to_owned(), |joint| joint.clone());
+        let (scale, unit) = error.display_unit();
+        let [x, y, z] = size.map(|v| v * scale);
+        let norm = (x * x + y * y + z * z).sqrt();
+        write!(f, "joint sensors do not explain the data, {element} does: {what} ")?;
+        match error {
+            ErrorKind::Shift => {
+                write!(f, "is {norm:.1} {unit} from its place in the drawing, ({x:.1}, {y:.1}, {z:.1}) {unit}")?
+            }
+            ErrorKind::Turn => {
+                write!(f, "is turned by {norm:.2} {unit} from the drawing, ({x:.2}, {y:.2}, {z:.2}) {unit}")?;
+            }
+        }
+        write!(
+            f,
+            " in its own axes (chi-square {chi2:.0}, by chance up to {limit:.0}; {:.1} mm at the tool)",
+            tool_error_m * 1e3
+        )
+    }
+}

@@ -1,0 +1,142 @@
+//! One calibration by a method on tag positions: the paper's minimum distance and minimum variance.
+
+use nalgebra::DMatrix;
+
+use crate::calib::covariance::{CommonErrors, ParameterCovariance, linearity_scale, predict_tool_error};
+use crate::calib::cross_validation::cross_validate;
+use crate::calib::error::CalibError;
+use crate::calib::methods::gripper_tag::{MountEstimate, mount_by_gripper_tag};
+use crate::calib::methods::minimum_distance::minimum_distance;
+use crate::calib::methods::minimum_variance::{determined_by_variance, variance_covariance};
+use crate::calib::methods::observability::{Unobservable, free_parameters, grouped_names};
+use crate::calib::methods::position_problem::PositionProblem;
+use crate::calib::methods::{PositionMethod, SearchOptions, Solution};
+use crate::calib::parameters::{JointParameters, Parameter};
+use crate::calib::result::assemble::{Evidence, Fit, Provenance, assemble, held_out_metrics};
+use crate::calib::result::calibration::Calibration;
+use crate::calib::result::camera_mount::CameraMount;
+use crate::calib::result::map_table::MapResult;
+use crate::calib::tag_mapping::map_unknown_tags;
+use crate::calib::views::calibration_data::{CalibrationData, HeldOut};
+use armcal_core::robot::Robot;
+use armcal_core::routine::Method;
+
+/// Where the search starts, and what is known before it.
+struct Start {
+    /// With the map's tags, and the camera where the tag on the gripper has it.
+    robot: Robot,
+    guess: JointParameters,
+    errors: CommonErrors,
+    map: Option<MapResult>,
+    /// By the tag on the gripper, or why not; none where the robot has none.
+    mount: Result<Option<MountEstimate>, String>,
+    /// What that tag determines.
+    determined: Vec<Parameter>,
+}
+
+/// # Errors
+/// [`CalibError`] where the views make no map or determine no parameter.
+pub(crate) fn calibrate_positions(
+    mut data: CalibrationData,
+    method: Method,
+    prior: Option<&Calibration>,
+) -> Result<Calibration, CalibError> {
+    let start = start(&mut data, prior)?;
+    let problem = PositionProblem::new(&start.robot, &data.data.fit);
+    let (mut free, mut unobservable) = free_parameters(&problem, &start.guess);
+    let n_camera_joints = start.robot.camera.mount.n_joints;
+    let n_parameters = free.len() + unobservable.iter().filter(|u| u.parameter.joint < n_camera_joints).count();
+    unobservable.retain(|u| !start.determined.contains(&u.parameter));
+    let nothing = || CalibError::NothingObservable { recording: data.name.clone() };
+    if free.is_empty() {
+        return Err(nothing());
+    }
+    let solved = solve(method, &problem, &mut free, &start).ok_or_else(nothing)?;
+    unobservable.extend(solved.unobservable);
+    unobservable.sort_by_key(|u| u.parameter);
+    let Solved { solution, covariance, .. } = solved;
+    let held_out_problem = PositionProblem::new(&start.robot, &data.data.held_out);
+    let linearity_scale = linearity_scale(&problem, &held_out_problem, &solution.parameters, free.len());
+    let held_out = match data.held_out {
+        HeldOut::AsMarked => held_out_metrics(&held_out_problem, &solution.parameters),
+        HeldOut::CrossValidation => cross_validate(&start.robot, &data.data.fit, |views| {
+            let mut free = free.clone();
+            let part = PositionProblem::new(&start.robot, views);
+            solve(method, &part, &mut free, &start).map(|solved| solved.solution.parameters)
+        }),
+    };
+    let as_found = start.robot.clone().with_linearity(linearity_scale);
+    let predicted = predict_tool_error(&as_found, &solution.parameters, &covariance, data.data.task.as_ref());
+    let source = Provenance {
+        messages_hash: &data.messages_hash,
+        robot: &start.robot,
+        method,
+        data: &data.data,
+        prior,
+        identified: &data.identified,
+    };
+    let fit = Fit { problem: &problem, solution: &solution, covariance: &covariance, linearity_scale };
+    let predicted_tool_error_m = predicted.map(|predicted| predicted.error_m);
+    let calibration = assemble(&source, &fit, Evidence { held_out, predicted_tool_error_m, n_parameters });
+    Ok(Calibration {
+        unobservable: grouped_names(&start.robot, &unobservable),
+        camera_mount: CameraMount::of(&start.robot, &start.mount),
+        map: start.map,
+        ..calibration
+    })
+}
+
+fn start(data: &mut CalibrationData, prior: Option<&Calibration>) -> Result<Start, CalibError> {
+    let mut robot = data.robot.clone();
+    let mut errors = CommonErrors::priors(&robot);
+    let mapped = map_unknown_tags(&data.name, &mut data.data, &robot)?;
+    let map = mapped.map(|mapped| {
+        (robot, errors) = (mapped.robot, mapped.errors);
+        mapped.result
+    });
+    let mut guess = prior.map_or_else(JointParameters::default, |prior| prior.parameters(&robot));
+    let mount = robot.gripper_tag.map(|tag| {
+        let views = data.gripper_tag_data.as_ref().map_or(&data.data.fit, |data| &data.fit);
+        mount_by_gripper_tag(&robot, &tag, views, &guess)
+    });
+    let mount = mount.transpose();
+    let mut determined = Vec::new();
+    if let Ok(Some(mount)) = &mount {
+        determined = mount.determined(&robot);
+        errors.mount = mount.mount_covariance();
+        guess = mount.parameters;
+        robot = robot.with_camera_at(mount.link_from_camera, &errors.mount);
+    }
+    Ok(Start { robot, guess, errors, map, mount, determined })
+}
+
+struct Solved {
+    solution: Solution,
+    covariance: ParameterCovariance,
+    /// What the method itself cannot determine.
+    unobservable: Vec<Unobservable>,
+}
+
+/// The answer of a method on positions and its covariance. Takes out of `free` what the method cannot determine; `None` if nothing
+/// is left.
+fn solve(method: Method, problem: &PositionProblem<'_>, free: &mut Vec<Parameter>, start: &Start) -> Option<Solved> {
+    let (guess, errors) = (&start.guess, &start.errors);
+    let mut unobservable = Vec::new();
+    let (solution, covariance, by_mount): (Solution, ParameterCovariance, DMatrix<f64>);
+    if method == Method::MinimumVariance {
+        (*free, unobservable) = determined_by_variance(problem, free, guess);
+        if free.is_empty() {
+            return None;
+        }
+        solution = PositionMethod::MinimumVariance.solve(problem, free, guess, &SearchOptions::default());
+        (covariance, by_mount) = variance_covariance(problem, free, &solution.parameters, errors);
+    } else {
+        solution = minimum_distance(problem, free, guess);
+        (covariance, by_mount) = ParameterCovariance::estimate(problem, free, &solution.parameters, errors);
+    }
+    let covariance = match &start.mount {
+        Ok(Some(mount)) => covariance.with_gripper_tag(mount, &start.determined, &by_mount),
+        _ => covariance,
+    };
+    Some(Solved { solution, covariance, unobservable })
+}

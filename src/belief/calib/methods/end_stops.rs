@@ -1,0 +1,47 @@
+//! One calibration by end stops alone: no view is fitted, so that every view that shows a tag is evidence.
+
+use crate::calib::covariance::{linearity_scale, predict_tool_error};
+use crate::calib::error::CalibError;
+use crate::calib::methods::joint_limits::{EndStopReading, fit_stops};
+use crate::calib::methods::observability::grouped_names;
+use crate::calib::methods::position_problem::PositionProblem;
+use crate::calib::parameters::JointParameters;
+use crate::calib::result::assemble::{Evidence, Fit, Provenance, assemble, held_out_metrics};
+use crate::calib::result::calibration::Calibration;
+use crate::calib::views::association::View;
+use crate::calib::views::calibration_data::CalibrationData;
+use armcal_core::routine::Method;
+
+/// # Errors
+/// [`CalibError::NoStops`] where no joint can be calibrated by its end stops.
+pub(crate) fn calibrate(data: CalibrationData, prior: Option<&Calibration>) -> Result<Calibration, CalibError> {
+    let CalibrationData { name, messages_hash, mut data, robot, identified, .. } = data;
+    let guess = prior.map_or_else(JointParameters::default, |prior| prior.parameters(&robot));
+    let readings: Vec<EndStopReading> = data.stops.iter().map(|(_, reading)| *reading).collect();
+    let fitted = fit_stops(&robot, &readings, &guess)
+        .map_err(|problem| CalibError::NoStops { recording: name.clone(), problem })?;
+    // Only a tag whose place is known can bear witness.
+    let of_known_tags = |view: &mut View| view.tags.retain(|tag| robot.tags[tag.tag_idx].is_known());
+    data.fit.iter_mut().chain(&mut data.held_out).for_each(of_known_tags);
+    let (at, covariance) = (&fitted.solution.parameters, &fitted.covariance);
+    let (problem, held_out) = (PositionProblem::new(&robot, &data.fit), PositionProblem::new(&robot, &data.held_out));
+    let linearity_scale = linearity_scale(&problem, &held_out, at, 0);
+    let as_found = robot.clone().with_linearity(linearity_scale);
+    let predicted = predict_tool_error(&as_found, at, covariance, data.task.as_ref());
+    let source = Provenance {
+        messages_hash: &messages_hash,
+        robot: &robot,
+        method: Method::JointLimits,
+        data: &data,
+        prior,
+        identified: &identified,
+    };
+    let fit = Fit { problem: &problem, solution: &fitted.solution, covariance, linearity_scale };
+    let evidence = Evidence {
+        held_out: held_out_metrics(&held_out, at),
+        predicted_tool_error_m: predicted.map(|predicted| predicted.error_m),
+        n_parameters: 0,
+    };
+    let unobservable = grouped_names(&robot, &fitted.left_out);
+    Ok(Calibration { unobservable, ..assemble(&source, &fit, evidence) })
+}

@@ -1,0 +1,317 @@
+//! Why a calibration is refused: cause, evidence and remedy as data. The words are made here and nowhere else.
+
+use std::fmt;
+
+use armcal_core::numeric::Outcome;
+use armcal_core::robot::FailedKind;
+use serde::{Deserialize, Serialize};
+
+use crate::calib::geometry_error::GeometryError;
+
+/// One reason to refuse. Angles in rad, lengths in m.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "cause", rename_all = "snake_case")]
+pub enum Refusal {
+    /// Fewer fitted views than gains and offsets to estimate.
+    TooFewViews {
+        views: usize,
+        parameters: usize,
+    },
+    /// The solver did not converge.
+    NotSolved {
+        outcome: Outcome,
+    },
+    TooFewHeldOutViews {
+        views: usize,
+        needed: usize,
+    },
+    NoHeldOutTag,
+    /// Held-out views fit no better than with the datasheet's sensors.
+    NoBetterThanDatasheet {
+        held_out_m: f64,
+        datasheet_m: f64,
+    },
+    /// Held-out views fit much worse than fitted ones.
+    Overfitted {
+        held_out_m: f64,
+        fit_m: f64,
+    },
+    /// The predicted tool error (95 % of the targets) exceeds the task's tolerance.
+    BeyondTolerance {
+        predicted_m: f64,
+        tolerance_m: f64,
+    },
+    /// Another link geometry explains the data, and joint sensors do not.
+    Geometry(GeometryError),
+    /// A joint's error from view to view is beyond what such a sensor can have.
+    SensorError {
+        joint: String,
+        std_rad: f64,
+        datasheet_std_rad: f64,
+    },
+    /// A gain or offset that no sensor of this datasheet has.
+    BeyondDatasheet {
+        parameter: String,
+        sigmas: f64,
+    },
+    /// Too many tag observations do not fit.
+    Outliers {
+        outliers: usize,
+        observations: usize,
+    },
+    /// Held-out views are predicted worse than the estimate says.
+    Innovations {
+        quantity: InnovationQuantity,
+        per_dof: f64,
+        limit: f64,
+        expected: [f64; 2],
+    },
+    /// The prior rests on the same messages.
+    PriorReused,
+    /// The prior's covariance has no inverse.
+    PriorSingular,
+    /// The views determine too little to be tested against the prior.
+    PriorUntested,
+    /// Prior and views cannot both be right.
+    PriorContradicted {
+        joint: String,
+        off_rad: f64,
+        off_std_rad: f64,
+        chi2: f64,
+        degrees_of_freedom: usize,
+        limit: f64,
+        used_share: f64,
+    },
+    /// A sensor slipped, and too few views show it as it is now.
+    TooFewViewsSinceSlip {
+        joint: String,
+        evidence: String,
+        views: usize,
+    },
+    /// A sensor failed whose joint the task needs.
+    SensorFailed {
+        joint: String,
+        kind: FailedKind,
+        tool_error_m: Option<f64>,
+        tool_error_by_camera_m: Option<f64>,
+        tolerance_m: f64,
+    },
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum InnovationQuantity {
+    CameraPoses,
+    Coordinates,
+}
+
+impl InnovationQuantity {
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::CameraPoses => "held-out camera poses",
+            Self::Coordinates => "held-out coordinates",
+        }
+    }
+}
+
+/// A smaller share of used observations means that the views fit nothing near the prior.
+pub(crate) const MIN_USED_SHARE: f64 = 0.6;
+
+impl Refusal {
+    /// Whether it is about the data themselves, so that it comes before what a fit of them shows.
+    #[must_use]
+    pub fn is_about_data(&self) -> bool {
+        matches!(self, Self::TooFewViews { .. } | Self::NotSolved { .. } | Self::TooFewViewsSinceSlip { .. })
+    }
+
+    /// A short code, for narrow links.
+    #[must_use]
+    pub fn code(&self) -> &'static str {
+        match self {
+            Self::TooFewViews { .. } => "few_views",
+            Self::NotSolved { .. } => "solver",
+            Self::TooFewHeldOutViews { .. } => "few_held_out",
+            Self::NoHeldOutTag => "no_held_out",
+            Self::NoBetterThanDatasheet { .. } => "no_better",
+            Self::Overfitted { .. } => "overfitted",
+            Self::BeyondTolerance { .. } => "tool_error",
+            _ => "other",
+        }
+    }
+
+    /// What to do about it.
+    #[must_use]
+    pub fn remedy(&self) -> &'static str {
+        match self {
+            Self::TooFewViews { .. } | Self::TooFewViewsSinceSlip { .. } | Self::PriorUntested => "capture more views",
+            Self::NotSolved { .. } => "capture views that move each joint over more of its range",
+            Self::TooFewHeldOutViews { .. } | Self::NoHeldOutTag => "hold out more views that show tags",
+            Self::NoBetterThanDatasheet { .. } => {
+                "keep the datasheet's sensors, or check tag map, camera mount and time stamps"
+            }
+            Self::Overfitted { .. } => "capture more views, or more different ones",
+            Self::BeyondTolerance { .. } => "capture more views, or put a tag on the gripper",
+            Self::Geometry(_) => "check the drawing against the arm",
+            Self::SensorError { .. } | Self::SensorFailed { .. } => "check that joint's sensor",
+            Self::BeyondDatasheet { .. } => "check joint and sensor, and robot.toml against the sensor that is there",
+            Self::Outliers { .. } => "check tag map, tag ids and the drawing",
+            Self::Innovations { .. } => "look for what moved or warmed up during the capture",
+            Self::PriorReused => "give a prior that was made from other views",
+            Self::PriorSingular => "make the prior anew",
+            Self::PriorContradicted { .. } => "calibrate without the prior",
+        }
+    }
+}
+
+/// Cause and evidence in one sentence.
+impl fmt::Display for Refusal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mm = |m: f64| m * 1e3;
+        match self {
+            Self::TooFewViews { views, parameters } => {
+                write!(f, "{views} views to fit are too few for {parameters} parameters, however many tags each shows")
+            }
+            Self::NotSolved { outcome } => write!(f, "the solver {}", outcome.name()),
+            Self::TooFewHeldOutViews { views, needed } => {
+                write!(f, "only {views} held-out views show a tag; {needed} are needed for a verdict")
+            }
+            Self::NoHeldOutTag => write!(f, "the held-out views hold no usable tag"),
+            Self::NoBetterThanDatasheet { held_out_m, datasheet_m } => write!(
+                f,
+                "held-out views are no better than with the datasheet: {:.1} mm against {:.1} mm",
+                mm(*held_out_m),
+                mm(*datasheet_m)
+            ),
+            Self::Overfitted { held_out_m, fit_m } => write!(
+                f,
+                "held-out views are off by {:.1} mm, fitted ones by {:.1} mm: overfitted",
+                mm(*held_out_m),
+                mm(*fit_m)
+            ),
+            Self::BeyondTolerance { predicted_m, tolerance_m } => write!(
+                f,
+                "the predicted tool error of {:.1} mm exceeds the task's tolerance of {:.1} mm",
+                mm(*predicted_m),
+                mm(*tolerance_m)
+            ),
+            Self::Geometry(geometry) => write!(f, "{geometry}"),
+            Self::SensorError { joint, std_rad, datasheet_std_rad } => write!(
+                f,
+                "joint sensors do not explain the data: {joint} needs a random error of {:.2} deg from view to view, its \
+                 datasheet has {:.2} deg; a joint that slips, or links that are not as in the drawing",
+                std_rad.to_degrees(),
+                datasheet_std_rad.to_degrees()
+            ),
+            Self::BeyondDatasheet { parameter, sigmas } => write!(
+                f,
+                "{parameter} is estimated {sigmas:.0} sigma from its datasheet: the joint or its sensor has failed, or it is \
+                 another sensor"
+            ),
+            Self::Outliers { outliers, observations } => write!(
+                f,
+                "{outliers} of {observations} tag observations fit no arm of this drawing: other tags, or links that are not \
+                 as in the drawing"
+            ),
+            Self::Innovations { quantity, per_dof, limit, expected: [low, high] } => write!(
+                f,
+                "{}: chi-square per degree of freedom is {per_dof:.2}, above {limit:.2} (expected in 95 % of cases: \
+                 {low:.2} .. {high:.2}): views that the fit did not use are worse than it predicts",
+                quantity.name()
+            ),
+            Self::PriorReused => write!(f, "the prior rests on these very messages, which must not count twice"),
+            Self::PriorSingular => write!(f, "the prior's covariance has no inverse"),
+            Self::PriorUntested => write!(f, "the views determine too little to be tested against the prior"),
+            Self::PriorContradicted { .. } | Self::SensorFailed { .. } => self.fmt_long(f),
+            Self::TooFewViewsSinceSlip { joint, evidence, views } => {
+                write!(f, "{joint}: {evidence}; {views} views are too few to calibrate it as it is now")
+            }
+        }
+    }
+}
+
+impl Refusal {
+    fn fmt_long(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::PriorContradicted { joint, off_rad, off_std_rad, chi2, degrees_of_freedom, limit, used_share } => {
+                write!(
+                    f,
+                    "the new views contradict the prior: chi-square {chi2:.1} of {degrees_of_freedom}, expected below \
+                     {limit:.1} in 99.9 % of cases; {joint} is off by {:.2} deg ({:.3} deg allowed, one sigma)",
+                    off_rad.to_degrees(),
+                    off_std_rad.to_degrees()
+                )?;
+                if *used_share < MIN_USED_SHARE {
+                    write!(f, "; only {:.0} % of the tag observations fit anything near it", 100.0 * used_share)?;
+                }
+                Ok(())
+            }
+            Self::SensorFailed { joint, kind, tool_error_m, tool_error_by_camera_m, tolerance_m } => {
+                let mm = |m: Option<f64>| m.unwrap_or(f64::INFINITY) * 1e3;
+                write!(
+                    f,
+                    "the sensor of {joint} is {}, and the task needs that joint: without it the tool error is {:.0} mm for a \
+                     tolerance of {:.1} mm; while the camera sees tags and tells the joint's angle it is {:.1} mm",
+                    kind.name(),
+                    mm(*tool_error_m),
+                    tolerance_m * 1e3,
+                    mm(*tool_error_by_camera_m)
+                )
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// All reasons in one line, the first one first; `None` where there is none.
+#[must_use]
+pub fn in_words(refusals: &[Refusal]) -> Option<String> {
+    let words: Vec<String> = refusals.iter().map(ToString::to_string).collect();
+    (!words.is_empty()).then(|| words.join("; besides, "))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::calib::geometry_error::ErrorKind;
+
+    #[test]
+    fn words_say_cause_and_figure_and_each_reason_has_a_remedy() {
+        let first = Refusal::TooFewViews { views: 8, parameters: 10 };
+        let second = Refusal::Overfitted { held_out_m: 0.011, fit_m: 0.004 };
+        let words = in_words(&[first.clone(), second]).expect("two reasons");
+        assert!(words.contains("8 views to fit are too few for 10 parameters"), "{words}");
+        assert!(words.contains("besides, held-out views are off by 11.0 mm, fitted ones by 4.0 mm"), "{words}");
+        assert_eq!((first.remedy(), first.code()), ("capture more views", "few_views"));
+        assert_eq!(in_words(&[]), None);
+    }
+
+    #[test]
+    fn a_reason_survives_the_file() {
+        let geometry = Refusal::Geometry(GeometryError {
+            element: "upperarm_link".to_owned(),
+            joint: Some("forearm_pitch".to_owned()),
+            error: ErrorKind::Shift,
+            size: [0.01, 0.0, 0.0],
+            chi2: 300.0,
+            limit: 30.0,
+            tool_error_m: 0.009,
+        });
+        #[derive(Debug, PartialEq, Serialize, Deserialize)]
+        struct File {
+            refusals: Vec<Refusal>,
+        }
+        let contradicted = Refusal::PriorContradicted {
+            joint: "wrist_yaw".to_owned(),
+            off_rad: 0.1,
+            off_std_rad: 0.01,
+            chi2: 90.0,
+            degrees_of_freedom: 6,
+            limit: 22.0,
+            used_share: 0.4,
+        };
+        let file = File { refusals: vec![geometry, Refusal::NotSolved { outcome: Outcome::Stalled }, contradicted] };
+        let text = toml::to_string(&file).expect("it has a TOML form");
+        assert_eq!(toml::from_str::<File>(&text).expect("it reads"), file, "{text}");
+    }
+}

@@ -1,0 +1,187 @@
+//! What every method's calibration.toml holds; each method adds its own tables.
+
+use nalgebra::DMatrix;
+
+use crate::calib::acceptance::{AcceptanceData, refusal};
+use crate::calib::covariance::ParameterCovariance;
+use crate::calib::methods::position_problem::PositionProblem;
+use crate::calib::methods::{EndStopReading, Solution};
+use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
+use crate::calib::result::calibration::{Calibration, CovarianceTable, JointResult, Status};
+use crate::calib::result::metrics::{FitMetrics, HeldOutMetrics};
+use crate::calib::result::terms_table::{ReferenceTable, TermsTable};
+use crate::calib::result::valid_range::ValidRange;
+use crate::calib::views::association::CaptureData;
+use crate::calib::views::scale_identification::IdentifiedScale;
+use armcal_core::robot::Robot;
+use armcal_core::routine::Method;
+use armcal_core::sensor::{ConditionChange, SensorModel};
+use armcal_core::stats::Summary;
+
+/// What a calibration was made from.
+pub(crate) struct Provenance<'a> {
+    pub messages_hash: &'a str,
+    pub robot: &'a Robot,
+    pub method: Method,
+    pub data: &'a CaptureData,
+    /// What a warm calibration started from.
+    pub prior: Option<&'a Calibration>,
+    pub identified: &'a [IdentifiedScale],
+}
+
+/// What a method made of it.
+pub(crate) struct Fit<'a> {
+    /// The fitted views.
+    pub problem: &'a PositionProblem<'a>,
+    pub solution: &'a Solution,
+    pub covariance: &'a ParameterCovariance,
+    pub linearity_scale: f64,
+}
+
+/// What it is accepted or refused by.
+pub(crate) struct Evidence {
+    pub held_out: HeldOutMetrics,
+    /// Over the task's targets; `None` without a task.
+    pub predicted_tool_error_m: Option<Summary>,
+    /// Parameters of sensors that move the camera, determined or not.
+    pub n_parameters: usize,
+}
+
+/// The tables that all methods fill, and the verdict by what all methods have.
+pub(crate) fn assemble(source: &Provenance<'_>, fit: &Fit<'_>, evidence: Evidence) -> Calibration {
+    let at = &fit.solution.parameters;
+    let metrics = fit_metrics(source, fit);
+    let Evidence { held_out, predicted_tool_error_m, n_parameters } = evidence;
+    let refusals: Vec<_> = refusal(&AcceptanceData {
+        outcome: fit.solution.outcome,
+        held_out_views: held_out.views,
+        held_out_rms_m: held_out.rms_m,
+        held_out_nominal_rms_m: held_out.nominal_rms_m,
+        fit_rms_m: metrics.rms_m,
+        n_parameters,
+        fit_views: metrics.views,
+        predicted_tool_error_m: predicted_tool_error_m.map(|p| p.p95),
+        tolerance_m: source.data.task.as_ref().map(|task| task.tolerance_m),
+    })
+    .into_iter()
+    .collect();
+    let mut calibration = Calibration {
+        version: 1,
+        robot: source.robot.name.clone(),
+        method: source.method,
+        status: Status::Accepted,
+        refusal: None,
+        refusals: Vec::new(),
+        findings: Vec::new(),
+        messages_hash: source.messages_hash.to_owned(),
+        unobservable: Vec::new(),
+        fit: metrics,
+        held_out,
+        predicted_tool_error_m,
+        valid: ValidRange::of(source.data),
+        reference: ReferenceTable::of(at, fit.covariance),
+        camera_mount: None,
+        map: None,
+        observability: None,
+        verdict: None,
+        model: None,
+        outliers: Vec::new(),
+        joint: joint_results(source, fit),
+        failed_joint: Vec::new(),
+        prior: None,
+        covariance: CovarianceTable {
+            parameters: fit.covariance.parameters.iter().map(|p| p.name(source.robot)).collect(),
+            rows: shortened_rows(&fit.covariance.matrix),
+        },
+    };
+    calibration.refuse_for(refusals);
+    calibration
+}
+
+fn fit_metrics(source: &Provenance<'_>, fit: &Fit<'_>) -> FitMetrics {
+    let at = &fit.solution.parameters;
+    FitMetrics {
+        outcome: fit.solution.outcome,
+        evaluations: fit.solution.evaluations,
+        cost_initial: fit.solution.cost_initial,
+        cost_final: fit.solution.cost_final,
+        views: source.data.fit.iter().filter(|view| !view.tags.is_empty()).count(),
+        tags_seen: fit.problem.n_observations(),
+        rejected: source.data.rejected.values().sum(),
+        rejected_by_reason: source.data.rejected_by_reason(),
+        rms_m: fit.problem.rms_m(at).unwrap_or(f64::NAN),
+        rms_px: fit.problem.reprojection_rms_px(at),
+        linearity_scale: fit.linearity_scale,
+    }
+}
+
+/// Of views that the fit never saw.
+pub(crate) fn held_out_metrics(problem: &PositionProblem<'_>, at: &JointParameters) -> HeldOutMetrics {
+    HeldOutMetrics {
+        cross_validated: false,
+        mean_m: None,
+        camera_mean_m: None,
+        views: problem.views.iter().filter(|view| !view.tags.is_empty()).count(),
+        rms_m: problem.rms_m(at),
+        rms_px: problem.reprojection_rms_px(at),
+        nominal_rms_m: problem.rms_m(&JointParameters::default()),
+    }
+}
+
+/// Larger tables are written with fewer digits.
+const FULL_DIGITS_ROWS: usize = 24;
+
+/// With seven significant digits where they are many: the file, and whoever holds the result in memory, have the same numbers.
+pub(crate) fn shortened_rows(matrix: &DMatrix<f64>) -> Vec<Vec<f64>> {
+    let is_large = matrix.nrows() > FULL_DIGITS_ROWS;
+    let shortened = |value: &f64| {
+        let short = || format!("{value:.6e}").parse().unwrap_or(*value);
+        if is_large && value.is_finite() { short() } else { *value }
+    };
+    matrix.row_iter().map(|row| row.iter().map(shortened).collect()).collect()
+}
+
+fn joint_results(source: &Provenance<'_>, fit: &Fit<'_>) -> Vec<JointResult> {
+    let sensors = fit.solution.parameters.sensors(source.robot);
+    sensors.models.iter().enumerate().map(|(joint, model)| joint_result(source, fit, joint, model)).collect()
+}
+
+fn joint_result(source: &Provenance<'_>, fit: &Fit<'_>, joint: usize, model: &SensorModel) -> JointResult {
+    let spec = &model.spec;
+    let std = |kind| fit.covariance.std(Parameter { joint, kind });
+    let (gain_std, offset_std) = (std(ParameterKind::Gain), std(ParameterKind::Offset));
+    // What the new views did not determine is as sure as it was before.
+    let before = source.prior.map(|prior| &prior.joint[joint]);
+    let gain_std_before = before.map_or(spec.gain_std / spec.counts_per_rad.abs(), |j| j.gain_std_rad_per_count);
+    JointResult {
+        name: spec.joint.clone(),
+        center_rad: spec.center_rad,
+        gain_rad_per_count: model.correction.gain / spec.counts_per_rad,
+        offset_rad: model.correction.offset_rad,
+        gain_std_rad_per_count: gain_std.map_or(gain_std_before, |std| std / spec.counts_per_rad.abs()),
+        offset_std_rad: offset_std.unwrap_or(before.map_or(spec.offset_std_rad, |j| j.offset_std_rad)),
+        gain_estimated: gain_std.is_some() || before.is_some_and(|j| j.gain_estimated),
+        offset_estimated: offset_std.is_some() || before.is_some_and(|j| j.offset_estimated),
+        covered_rad: covered_rad(source, joint, model),
+        gain_over_datasheet: Some(model.correction.gain / ratio_of(source, joint)),
+        identified_ratio: source.identified.iter().find(|scale| scale.joint == joint).map(|scale| scale.ratio),
+        residual_std_rad: fit.covariance.residual_std_rad.map(|std_rad| std_rad[joint]),
+        terms: TermsTable::of(joint, model, fit.covariance),
+    }
+}
+
+/// Angles that the views covered; the middle of the range where there are none.
+fn covered_rad(source: &Provenance<'_>, joint: usize, model: &SensorModel) -> [f64; 2] {
+    let travel = source.data.fit.iter().filter(|v| !v.tags.is_empty()).map(|view| view.travel_rad[joint]);
+    let at_stop = |(_, stop): &&(_, EndStopReading)| source.method == Method::JointLimits && stop.joint == joint;
+    let stops = source.data.stops.iter().filter(at_stop).map(|(_, stop)| stop.travel_rad);
+    let (low, high) =
+        travel.chain(stops).fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), t| (low.min(t), high.max(t)));
+    let angle = |t: f64| model.correction.angle_rad(&model.spec, t, &ConditionChange::default(), 0.0);
+    if low <= high { [angle(low), angle(high)] } else { [model.spec.center_rad; 2] }
+}
+
+/// Counts per radian that the fit was made with, over the datasheet's.
+fn ratio_of(source: &Provenance<'_>, joint: usize) -> f64 {
+    source.identified.iter().find(|scale| scale.joint == joint).map_or(1.0, |scale| scale.ratio)
+}

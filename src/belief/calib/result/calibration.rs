@@ -1,0 +1,141 @@
+//! calibration.toml: the answer, how sure it is, what it rests on and where it holds.
+
+use armcal_core::routine::Method;
+use armcal_core::stats::Summary;
+use serde::{Deserialize, Serialize};
+
+use crate::calib::finding::Finding;
+use crate::calib::refusal::{Refusal, in_words};
+use crate::calib::result::camera_mount::CameraMount;
+use crate::calib::result::failed_joint::{FailedJointTable, PriorTable};
+use crate::calib::result::map_table::MapResult;
+use crate::calib::result::metrics::{FitMetrics, HeldOutMetrics};
+use crate::calib::result::model_table::ModelTable;
+use crate::calib::result::terms_table::{ReferenceTable, TermsTable};
+use crate::calib::result::valid_range::ValidRange;
+use crate::calib::result::verdict_tables::{ObservabilityTable, VerdictTable};
+
+/// Whether the answer may be used.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Status {
+    Accepted,
+    Refused,
+}
+
+/// One calibration, as its file has it.
+///
+/// `angle_rad = center_rad + offset_rad + gain_rad_per_count * travel_counts`, where `travel_counts` is the reading less
+/// the datasheet's reading at `center_rad`, wrapped to half a word either way.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Calibration {
+    pub version: u32,
+    pub robot: String,
+    pub method: Method,
+    pub status: Status,
+    /// All reasons to refuse in words.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub refusal: Option<String>,
+    /// Hash of the recorded messages that this rests on (blake3).
+    pub messages_hash: String,
+    /// What the data did not determine, and why; these keep the datasheet's values.
+    pub unobservable: Vec<String>,
+    /// Tag observations that the fit rejected: `pose 12: tag 3: 45 sigma`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub outliers: Vec<String>,
+    pub fit: FitMetrics,
+    pub held_out: HeldOutMetrics,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub predicted_tool_error_m: Option<Summary>,
+    pub valid: ValidRange,
+    /// What the joints' terms are counted from, where there are any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reference: Option<ReferenceTable>,
+    /// Where the robot has a tag on the gripper.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub camera_mount: Option<CameraMount>,
+    /// Where the tags were found to be, where no survey said it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub map: Option<MapResult>,
+    /// Of `bundle`: what the data determine, before solving.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub observability: Option<ObservabilityTable>,
+    /// Of `bundle`: what the verdict rests on beside `held_out`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub verdict: Option<VerdictTable>,
+    /// What `bundle` took for its model.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub model: Option<ModelTable>,
+    pub joint: Vec<JointResult>,
+    /// Joints that failed, or whose sensors did.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub failed_joint: Vec<FailedJointTable>,
+    /// What a warm calibration by `bundle` started from.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub prior: Option<PriorTable>,
+    /// The reasons to refuse as data, the most telling first.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub refusals: Vec<Refusal>,
+    /// What is other than robot.toml, survey and drawing say, the most telling first.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub findings: Vec<Finding>,
+    pub covariance: CovarianceTable,
+}
+
+impl Calibration {
+    /// Refuses for `reasons`, if there are any, behind those that it was refused for before.
+    pub(crate) fn refuse_for(&mut self, reasons: impl IntoIterator<Item = Refusal>) {
+        self.refusals.extend(reasons);
+        self.state_refusals();
+    }
+
+    /// The same, before those that it was refused for before, unless those are about the data themselves.
+    pub(crate) fn refuse_first_for(&mut self, reasons: impl IntoIterator<Item = Refusal>) {
+        let at = if self.refusals.first().is_some_and(Refusal::is_about_data) { self.refusals.len() } else { 0 };
+        self.refusals.splice(at..at, reasons);
+        self.state_refusals();
+    }
+
+    fn state_refusals(&mut self) {
+        self.refusal = in_words(&self.refusals);
+        self.status = if self.refusals.is_empty() { Status::Accepted } else { Status::Refused };
+    }
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct JointResult {
+    pub name: String,
+    pub center_rad: f64,
+    pub gain_rad_per_count: f64,
+    pub offset_rad: f64,
+    /// One sigma; the datasheet's where the joint was not determined.
+    pub gain_std_rad_per_count: f64,
+    pub offset_std_rad: f64,
+    pub gain_estimated: bool,
+    pub offset_estimated: bool,
+    /// Angles that the captured views covered.
+    pub covered_rad: [f64; 2],
+    /// The gain over the datasheet's; negative where the counts run the other way.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gain_over_datasheet: Option<f64>,
+    /// Counts per radian over the datasheet's, where they were measured first because nobody knew them; the gain's relative
+    /// standard deviation in `covariance` is about that scale.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub identified_ratio: Option<f64>,
+    /// One sigma of what the parameters leave of the sensor's error; absent where that is the datasheet's linearity.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub residual_std_rad: Option<f64>,
+    /// What the sensor is beyond a straight line.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub terms: Option<TermsTable>,
+}
+
+/// Estimated parameters by [`Parameter::name`](crate::calib::Parameter::name): gains relative, offsets in rad, ... and their covariance.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CovarianceTable {
+    pub parameters: Vec<String>,
+    pub rows: Vec<Vec<f64>>,
+}

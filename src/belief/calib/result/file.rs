@@ -1,0 +1,187 @@
+//! calibration.toml as a file: written, read, checked, and turned into sensors again.
+
+use std::path::Path;
+
+use crate::calib::covariance::ParameterCovariance;
+use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
+use crate::calib::result::calibration::{Calibration, JointResult};
+use crate::calib::result::terms_table::TermsTable;
+use armcal_core::robot::{FileIssue, JointSensorSpec, Robot, RobotError, parse_toml, read_text};
+use armcal_core::sensor::{ArmSensors, Correction};
+
+/// Why a calibration file was refused.
+#[derive(Debug, thiserror::Error)]
+pub enum CalibrationFileError {
+    #[error(transparent)]
+    File(#[from] RobotError),
+    #[error("{file}: is for robot `{found}` with joints {found_joints:?}, not for `{expected}`")]
+    OtherRobot { file: String, found: String, found_joints: Vec<String>, expected: String },
+    #[error(
+        "{file}: joint `{joint}`: terms.shape_rad bends the sensor to {least:.2} .. {most:.2} times its gain, so that readings have no \
+         certain angle; allowed is 0.2 .. 1.8"
+    )]
+    Bent { file: String, joint: String, least: f64, most: f64 },
+}
+
+impl JointResult {
+    /// Counts per radian that the gain is relative to, over those of `spec`, where the scale was measured on the way.
+    fn ratio_to(&self, spec: &JointSensorSpec) -> Option<f64> {
+        /// `spec` has the scale already, but for rounding.
+        const SAME: f64 = 1e-9;
+        let gain = self.gain_over_datasheet? * self.identified_ratio?;
+        let ratio = gain / self.gain_rad_per_count / spec.counts_per_rad;
+        Some(ratio).filter(|ratio| (ratio - 1.0).abs() > SAME)
+    }
+}
+
+/// The least slope that a sensor may have anywhere, over its gain.
+const LEAST_SLOPE: f64 = 0.2;
+
+const TERMS_HEAD: &str = "\
+# With [joint.terms], in rad, x = travel / (counts per rad) / half_range_rad held to -1 .. 1, L = 1.25, T K, P MPa and t hours from
+# [reference], a = -1 or 1 the way that the joint moved last (0: not known), the angle has beyond that
+# sum_h shape_rad[h] phi_h(x) + offset_rad_per_k T + gain_per_k T travel / (counts per rad) + offset_rad_per_mpa P + drift_rad_per_h t
+# + half_play_rad a, with phi_h(x) = sin(pi h (x + L) / 2 L) / sqrt(L), h = 1, 2, ..
+";
+
+impl Calibration {
+    /// The sensors of `robot` under this calibration.
+    ///
+    /// # Errors
+    /// [`CalibrationFileError::OtherRobot`] when it was made for another arm.
+    pub fn sensors(&self, robot: &Robot) -> Result<ArmSensors, CalibrationFileError> {
+        let names: Vec<String> = self.joint.iter().map(|joint| joint.name.clone()).collect();
+        if self.robot != robot.name || names != robot.joint_names() {
+            return Err(CalibrationFileError::OtherRobot {
+                file: "calibration.toml".to_owned(),
+                found: self.robot.clone(),
+                found_joints: names,
+                expected: robot.name.clone(),
+            });
+        }
+        let mut sensors = ArmSensors::nominal(robot);
+        sensors.reference = self.reference.map(|table| table.conditions()).unwrap_or_default();
+        for (model, joint) in sensors.models.iter_mut().zip(&self.joint) {
+            if let Some(table) = &joint.terms {
+                model.spec.half_range_rad = table.half_range_rad;
+                if let Some(ratio) = joint.ratio_to(&model.spec) {
+                    model.spec = model.spec.with_scale(ratio);
+                }
+            }
+            let gain = joint.gain_rad_per_count * model.spec.counts_per_rad;
+            let terms = joint.terms.as_ref().map(TermsTable::terms).unwrap_or_default();
+            model.correction = Correction { gain, offset_rad: joint.offset_rad, terms };
+            let (least, most) = model.slope_over_gain();
+            if !(LEAST_SLOPE..=2.0 - LEAST_SLOPE).contains(&least) || most > 2.0 - LEAST_SLOPE {
+                let (file, joint) = ("calibration.toml".to_owned(), joint.name.clone());
+                return Err(CalibrationFileError::Bent { file, joint, least, most });
+            }
+        }
+        Ok(sensors)
+    }
+
+    /// `robot` with the sensor scales that were measured on the way, which the covariance's gains are relative to, and with
+    /// sensors as far from straight as the residuals say.
+    #[must_use]
+    pub fn scaled_robot(&self, robot: &Robot) -> Robot {
+        let mut scaled = robot.clone().with_linearity(self.fit.linearity_scale);
+        for (spec, joint) in scaled.sensors.iter_mut().zip(&self.joint) {
+            if let Some(ratio) = joint.identified_ratio {
+                *spec = spec.with_scale(ratio);
+            }
+        }
+        scaled
+    }
+
+    /// The parameters relative to the sensors of `robot`, whose joints must be this calibration's.
+    pub(crate) fn parameters(&self, robot: &Robot) -> JointParameters {
+        let mut parameters = JointParameters::default();
+        for (joint, (result, spec)) in self.joint.iter().zip(&robot.sensors).enumerate() {
+            parameters.gain[joint] = result.gain_rad_per_count * spec.counts_per_rad;
+            parameters.offset_rad[joint] = result.offset_rad;
+            parameters.terms[joint] = result.terms.as_ref().map(TermsTable::terms).unwrap_or_default();
+        }
+        parameters.reference = self.reference.map(|table| table.conditions()).unwrap_or_default();
+        parameters
+    }
+
+    /// The covariance of the estimated parameters for `robot`'s joints; rows that name no joint of it are left out.
+    #[must_use]
+    pub fn parameter_covariance(&self, robot: &Robot) -> ParameterCovariance {
+        let all =
+            (0..robot.n_joints()).flat_map(|joint| ParameterKind::all().map(move |kind| Parameter { joint, kind }));
+        let rows: Vec<(usize, Parameter)> = all
+            .filter_map(|p| Some((self.covariance.parameters.iter().position(|name| *name == p.name(robot))?, p)))
+            .collect();
+        let at = |row: usize, column: usize| self.covariance.rows[row].get(column).copied().unwrap_or(f64::NAN);
+        let is_known = self.joint.iter().any(|joint| joint.residual_std_rad.is_some());
+        let residual_std_rad = |j: usize| {
+            let (result, spec) = (self.joint.get(j), robot.sensors.get(j));
+            result.and_then(|result| result.residual_std_rad).or(spec.map(|spec| spec.linearity_std_rad)).unwrap_or(0.0)
+        };
+        ParameterCovariance {
+            residual_std_rad: is_known.then(|| std::array::from_fn(residual_std_rad)),
+            parameters: rows.iter().map(|(_, p)| *p).collect(),
+            matrix: nalgebra::DMatrix::from_fn(rows.len(), rows.len(), |i, j| at(rows[i].0, rows[j].0)),
+        }
+    }
+
+    /// The file's text.
+    ///
+    /// # Panics
+    /// Never: every value here has a TOML form.
+    #[must_use]
+    pub fn to_toml(&self) -> String {
+        let head = "# Joint sensors as calibrated. angle = center_rad + offset_rad + gain_rad_per_count * travel,\n\
+                    # travel = reading - the datasheet's reading at center_rad, in counts, wrapped to half a word.\n";
+        let more = if self.reference.is_some() { TERMS_HEAD } else { "" };
+        let body = toml::to_string(self).expect("plain tables and finite numbers have a TOML form");
+        format!("{head}{more}{body}")
+    }
+
+    /// Reads a calibration file.
+    ///
+    /// # Errors
+    /// [`CalibrationFileError`] naming file, key and allowed range.
+    pub fn read(file: &Path) -> Result<Self, CalibrationFileError> {
+        Self::parse(file, &read_text(file)?)
+    }
+
+    /// Reads the text of a calibration file; `file` is for messages.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn parse(file: &Path, text: &str) -> Result<Self, CalibrationFileError> {
+        let calibration: Self = parse_toml(file, text)?;
+        calibration.check(file).map_err(RobotError::from)?;
+        Ok(calibration)
+    }
+
+    fn check(&self, file: &Path) -> Result<(), FileIssue> {
+        FileIssue::check_range(file, "version", f64::from(self.version), 1.0..=1.0)?;
+        for joint in &self.joint {
+            let check = |key: &str, value: f64, range| {
+                FileIssue::check_range(file, &format!("joint `{}`: {key}", joint.name), value, range)
+            };
+            check("gain_rad_per_count (size)", joint.gain_rad_per_count.abs(), 1e-12..=1e3)?;
+            check("offset_rad", joint.offset_rad, -10.0..=10.0)?;
+            check("center_rad", joint.center_rad, -100.0..=100.0)?;
+            joint.residual_std_rad.map_or(Ok(0.0), |std_rad| check("residual_std_rad", std_rad, 0.0..=10.0))?;
+            let Some(terms) = &joint.terms else { continue };
+            terms.check(file, &joint.name)?;
+            if self.reference.is_none() {
+                let problem = format!("is missing; the terms of joint `{}` are counted from it", joint.name);
+                return Err(FileIssue::new(file, "reference", problem));
+            }
+        }
+        self.reference.map_or(Ok(()), |reference| reference.check(file))?;
+        let n = self.covariance.parameters.len();
+        if self.covariance.rows.len() != n || self.covariance.rows.iter().any(|row| row.len() != n) {
+            return Err(FileIssue::new(file, "covariance.rows", format!("needs {n} rows of {n} numbers")));
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,56 @@
+//! `[fit]` and `[held_out]` of calibration.toml.
+
+use std::collections::BTreeMap;
+
+use armcal_core::numeric::Outcome;
+use serde::{Deserialize, Serialize};
+
+/// How the fitted views fit.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FitMetrics {
+    pub outcome: Outcome,
+    pub evaluations: usize,
+    pub cost_initial: f64,
+    pub cost_final: f64,
+    pub views: usize,
+    pub tags_seen: usize,
+    pub rejected: usize,
+    /// The same by reason; not in the file.
+    #[serde(default, skip_serializing)]
+    pub rejected_by_reason: BTreeMap<String, usize>,
+    pub rms_m: f64,
+    /// Absent where the recording has positions or poses and no corners.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rms_px: Option<f64>,
+    /// How many times the datasheets' linearity the sensors deviate from a straight line, by the residuals; at least 1.
+    #[serde(default = "as_the_datasheet_says")]
+    pub linearity_scale: f64,
+}
+
+fn as_the_datasheet_says() -> f64 {
+    1.0
+}
+
+/// How views fit that the fit did not use.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct HeldOutMetrics {
+    pub views: usize,
+    /// By cross-validation: each view was held out of one fold, and fitted in the end; else the fit never saw these.
+    #[serde(default, alias = "in_turn", skip_serializing_if = "std::ops::Not::not")]
+    pub cross_validated: bool,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rms_m: Option<f64>,
+    /// The mean of the same distances, where views were cross-validated.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mean_m: Option<f64>,
+    /// Mean distance of the camera from where the landmarks' measured poses have it, m; where the recording has poses.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub camera_mean_m: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rms_px: Option<f64>,
+    /// The same views with the datasheet's sensors.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub nominal_rms_m: Option<f64>,
+}

@@ -1,0 +1,31 @@
+//! The answer: calibration.toml, its tables and its short form.
+//!
+//! `calibration` is the file's content, `assemble` fills it; the other files are its tables. `file` reads and writes it, `compact` is
+//! one line of less than 512 bytes, `lookup` a table from counts to radians.
+
+pub(crate) mod assemble;
+pub(crate) mod calibration;
+pub(crate) mod camera_mount;
+mod compact;
+pub(crate) mod failed_joint;
+mod file;
+mod lookup;
+pub(crate) mod map_table;
+pub(crate) mod metrics;
+pub(crate) mod model_table;
+pub(crate) mod terms_table;
+pub(crate) mod valid_range;
+pub(crate) mod verdict_tables;
+
+pub use calibration::{Calibration, JointResult, Status};
+pub use camera_mount::CameraMount;
+pub use compact::{CompactCalibration, CompactError, CompactJoint, MAX_COMPACT_BYTES, PredictedToolError};
+pub use failed_joint::{FailedJointTable, PriorTable};
+pub use file::CalibrationFileError;
+pub use lookup::LookupTable;
+pub use map_table::{MapResult, MapTag, SurveyCoverage};
+pub use metrics::{FitMetrics, HeldOutMetrics};
+pub use model_table::ModelTable;
+pub use terms_table::{ReferenceTable, TermsTable};
+pub use valid_range::ValidRange;
+pub use verdict_tables::{Check, ObservabilityTable, VerdictTable};

@@ -1,0 +1,70 @@
+//! Recordings that no method can make sense of, refused by name before anything is fitted.
+
+use crate::calib::CalibError;
+use crate::calib::views::association::CaptureData;
+use armcal_core::log::{Recording, topics};
+use armcal_core::robot::Robot;
+
+pub(crate) fn check_joints(recording: &Recording, robot: &Robot) -> Result<(), CalibError> {
+    if recording.joint_names != robot.joint_names() {
+        return Err(CalibError::JointNames {
+            recording: recording.path.display().to_string(),
+            robot: robot.name.clone(),
+            recorded: recording.joint_names.clone(),
+            expected: robot.joint_names(),
+        });
+    }
+    Ok(())
+}
+
+/// The largest share of messages with numbers that are not finite. Assumed: a sensor that fails now and then still serves.
+const MAX_NOT_FINITE_SHARE: f64 = 0.01;
+
+/// Stamps that go backwards leave open which reading belongs to which view, and numbers that are none which sensor works.
+pub(crate) fn check_order(recording: &Recording) -> Result<(), CalibError> {
+    let streams = [topics::Stream::JointSensors, topics::Stream::Detections];
+    for stream in streams {
+        let n_read = recording.messages.iter().filter(|(_, m)| topics::Stream::of(m) == stream).count() as u64;
+        let start = format!("{}: ", stream.topic());
+        for (what, &n) in &recording.rejected {
+            if what.starts_with(&start)
+                && what.ends_with("is not finite")
+                && n as f64 > MAX_NOT_FINITE_SHARE * (n_read + n) as f64
+            {
+                let recording = recording.path.display().to_string();
+                return Err(CalibError::NotFinite { recording, what: what.clone(), n, of: n_read + n });
+            }
+        }
+    }
+    recording.disorder.iter().next().map_or(Ok(()), |(topic, disorder)| {
+        let (recording, topic) = (recording.path.display().to_string(), topic.clone());
+        Err(CalibError::Disorder { recording, topic, disorder: *disorder })
+    })
+}
+
+/// Views count as of one pose where no joint moved by more than this many sigma of its noise. Assumed.
+const MOVED_SIGMAS: f64 = 6.0;
+
+/// The arm must have moved for its sensors to show anything.
+pub(crate) fn check_pose_variation(name: &str, data: &CaptureData, robot: &Robot) -> Result<(), CalibError> {
+    let views = || data.fit.iter().chain(&data.held_out).filter(|view| !view.tags.is_empty());
+    let mut most: Option<(usize, f64)> = None;
+    for (joint, spec) in robot.sensors.iter().enumerate().take(robot.camera.mount.n_joints) {
+        let travel = views().map(|view| view.travel_rad[joint]);
+        let (low, high) = travel.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), t| (l.min(t), h.max(t)));
+        let noise_rad = spec.noise_std_counts / spec.counts_per_rad.abs();
+        if high - low > MOVED_SIGMAS * noise_rad {
+            return Ok(());
+        }
+        if most.is_none_or(|(_, moved)| high - low > moved) {
+            most = Some((joint, high - low));
+        }
+    }
+    let Some((joint, moved_rad)) = most else { return Ok(()) };
+    Err(CalibError::OnePose {
+        recording: name.to_owned(),
+        views: views().count(),
+        joint: robot.sensors[joint].joint.clone(),
+        moved_deg: moved_rad.to_degrees(),
+    })
+}

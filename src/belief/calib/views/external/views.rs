@@ -1,0 +1,180 @@
+//! From tag messages to views: what was seen while the arm stood still is one view.
+
+use std::collections::BTreeMap;
+
+use crate::calib::views::association::{ObservationRejection, TagObservation, View};
+use crate::calib::views::external::landmarks::{Averaged, average};
+use crate::calib::views::external::pairing::{RATE_WINDOW_S, TravelSample, TravelSeries};
+use armcal_core::input::{ForeignRecording, InputMap, RawMeasurement, TagFrame, WhileMoving};
+use armcal_core::robot::Robot;
+use armcal_core::streams::JointAngles;
+
+/// Readings within this many sigma of each other are of one pose. Assumed.
+const SAME_POSE_SIGMAS: f64 = 5.0;
+/// Faster than this, beyond what noise makes of it, is on the way, rad/s: at a reach of 2 m and a camera clock 50 ms late, 1 mm.
+const REST_RATE_RAD_S: f64 = 0.01;
+/// Noise of a rate that counts as none, sigma.
+const RATE_SIGMAS: f64 = 5.0;
+
+/// The views of one recording.
+pub(crate) struct RecordingViews {
+    /// Each with the hash of its first message.
+    pub views: Vec<(View, [u8; 32])>,
+    /// Hashes of all messages that they come from.
+    pub digests: Vec<[u8; 32]>,
+    pub ids_seen: Vec<u32>,
+    pub rejected: BTreeMap<ObservationRejection, usize>,
+}
+
+/// One tag message with its reading.
+struct PairedFrame<'a> {
+    frame: &'a TagFrame,
+    paired: TravelSample,
+}
+
+struct Maker<'a> {
+    robot: &'a Robot,
+    plain_landmark: Option<u32>,
+    travels: TravelSeries<'a>,
+    /// One sigma of a reading, rad, of the joints that move the camera.
+    noise_rad: Vec<f64>,
+    out: RecordingViews,
+}
+
+impl RecordingViews {
+    pub fn of(recording: &ForeignRecording, map: &InputMap, robot: &Robot, plain_landmark: Option<u32>) -> Self {
+        let moving = &robot.sensors[..robot.camera.mount.n_joints];
+        let mut maker = Maker {
+            robot,
+            plain_landmark,
+            travels: TravelSeries::new(recording, robot, map.max_gap_s),
+            noise_rad: moving.iter().map(|spec| spec.noise_std_counts / spec.counts_per_rad.abs()).collect(),
+            out: Self { views: Vec::new(), digests: Vec::new(), ids_seen: Vec::new(), rejected: BTreeMap::new() },
+        };
+        let mut group: Vec<PairedFrame<'_>> = Vec::new();
+        for frame in &recording.frames {
+            let Some(paired) = maker.travels.at(frame.stamp) else {
+                maker.reject(ObservationRejection::NoReadings, frame.tags.len());
+                continue;
+            };
+            if map.while_moving == WhileMoving::LeaveOut && maker.is_moving(&paired) {
+                maker.reject(ObservationRejection::ArmMoving, frame.tags.len());
+                maker.close(&mut group);
+                continue;
+            }
+            let next = PairedFrame { frame, paired };
+            if !maker.belongs(&group, &next) {
+                maker.close(&mut group);
+            }
+            group.push(next);
+        }
+        maker.close(&mut group);
+        maker.out
+    }
+}
+
+impl Maker<'_> {
+    fn reject(&mut self, why: ObservationRejection, n: usize) {
+        *self.out.rejected.entry(why).or_default() += n;
+    }
+
+    /// Only a continuous stream of readings can tell.
+    fn is_moving(&self, paired: &TravelSample) -> bool {
+        let Some(rate) = paired.rate_rad_s else { return false };
+        // Two readings' noise over twice the window.
+        let of_noise = |noise_rad: f64| noise_rad * std::f64::consts::FRAC_1_SQRT_2 / RATE_WINDOW_S;
+        self.noise_rad
+            .iter()
+            .zip(rate.iter())
+            .any(|(noise, rate)| rate.abs() > REST_RATE_RAD_S + RATE_SIGMAS * of_noise(*noise))
+    }
+
+    fn is_same_pose(&self, a: &JointAngles, b: &JointAngles) -> bool {
+        let close = |joint: usize, noise: f64| self.travels.difference(a, b, joint).abs() <= SAME_POSE_SIGMAS * noise;
+        self.noise_rad.iter().enumerate().all(|(joint, noise)| close(joint, *noise))
+    }
+
+    /// Whether the arm has stood still since the group began. Only a continuous stream can tell; of the others each reading is a pose
+    /// that somebody recorded, and what was seen about it is of that pose.
+    fn belongs(&self, group: &[PairedFrame<'_>], next: &PairedFrame<'_>) -> bool {
+        let (Some(first), Some(last)) = (group.first(), group.last()) else { return true };
+        if !(last.paired.is_continuous && next.paired.is_continuous) {
+            return last.paired.readings == next.paired.readings;
+        }
+        let pose = &first.paired.travel_rad;
+        let between = last.paired.readings.1..next.paired.readings.0.max(last.paired.readings.1);
+        self.is_same_pose(&next.paired.travel_rad, pose)
+            && self.travels.travel_rad[between].iter().all(|travel| self.is_same_pose(travel, pose))
+    }
+
+    /// Makes a view of the group, which is empty afterwards.
+    fn close(&mut self, group: &mut Vec<PairedFrame<'_>>) {
+        let frames = std::mem::take(group);
+        let (Some(first), Some(last)) = (frames.first(), frames.last()) else { return };
+        let (travel_rad, n_readings) = self.mean_travel(&frames);
+        let mut view = View::of_reading(0, last.frame.stamp, travel_rad);
+        view.n_readings = n_readings;
+        view.conditions.stamp = Some(last.frame.stamp);
+        let rates: Vec<JointAngles> = frames.iter().filter_map(|frame| frame.paired.rate_rad_s).collect();
+        if !rates.is_empty() {
+            let mean = |j: usize| rates.iter().map(|rate| rate[j]).sum::<f64>() / rates.len() as f64;
+            view.rate_rad_s = JointAngles::from_fn(travel_rad.len(), mean);
+        }
+        self.add_tags(&mut view, &frames);
+        if view.tags.is_empty() {
+            return;
+        }
+        for frame in &frames {
+            let (from, to) = frame.paired.readings;
+            self.out.digests.extend(&frame.frame.digests);
+            self.out.digests.extend(self.travels.readings[from..=to].iter().map(|reading| reading.digest));
+        }
+        let (from, to) = (first.paired.readings.0, last.paired.readings.1);
+        self.out.digests.extend(self.travels.readings[from..=to].iter().map(|reading| reading.digest));
+        self.out.views.push((view, first.frame.digests[0]));
+    }
+
+    /// Over the readings while the group was seen; of one frame between two readings what lies between them.
+    fn mean_travel(&self, frames: &[PairedFrame<'_>]) -> (JointAngles, usize) {
+        let first = &frames[0].paired.travel_rad;
+        let (start, end) = (frames[0].frame.stamp, frames[frames.len() - 1].frame.stamp);
+        let (from, to) = (frames[0].paired.readings.0, frames[frames.len() - 1].paired.readings.1);
+        let is_within = |idx: &usize| (start..=end).contains(&self.travels.readings[*idx].stamp);
+        let within: Vec<&JointAngles> =
+            (from..=to).filter(is_within).map(|idx| &self.travels.travel_rad[idx]).collect();
+        let paired = || frames.iter().map(|frame| &frame.paired.travel_rad).collect::<Vec<_>>();
+        let (all, n_readings) = match within.len() {
+            0 => (paired(), 1),
+            n => (within, n),
+        };
+        let mean = |j: usize| all.iter().map(|t| self.travels.difference(t, first, j)).sum::<f64>() / all.len() as f64;
+        (JointAngles::from_fn(first.len(), |j| first[j] + mean(j)), n_readings)
+    }
+
+    fn add_tags(&mut self, view: &mut View, frames: &[PairedFrame<'_>]) {
+        let mut by_id: BTreeMap<u32, Vec<RawMeasurement>> = BTreeMap::new();
+        for sighting in frames.iter().flat_map(|frame| &frame.frame.tags) {
+            if let Some(id) = sighting.id.or(self.plain_landmark) {
+                by_id.entry(id).or_default().push(sighting.seen);
+            }
+        }
+        for (id, seen) in by_id {
+            self.out.ids_seen.push(id);
+            let Some(tag_idx) = self.robot.tags.iter().position(|tag| tag.id == id) else {
+                self.reject(ObservationRejection::UnknownTag, seen.len());
+                continue;
+            };
+            let (averaged, n_apart) = average(&seen, self.robot, tag_idx);
+            if n_apart > 0 {
+                self.reject(ObservationRejection::InconsistentFrame, n_apart);
+            }
+            match averaged {
+                Ok(Some(Averaged { center_in_camera_m, measured })) => {
+                    view.tags.push(TagObservation { id, tag_idx, center_in_camera_m, measured });
+                }
+                Ok(None) => {}
+                Err(why) => self.reject(why, 1),
+            }
+        }
+    }
+}

@@ -1,0 +1,24 @@
+//! From messages to views of an arm at rest.
+//!
+//! `association` finds the readings and corners of each captured view, `frame_consensus` the frames of it that agree, `conditions` the
+//! temperatures and the pressure under which it was captured. `external` does the same for recordings that mark no views, `pooling` for
+//! several recordings. `scale_identification` measures the scale of an unknown sensor; `data_checks` refuses unusable recordings.
+
+pub(crate) mod association;
+pub(crate) mod calibration_data;
+pub(crate) mod conditions;
+pub(crate) mod data_checks;
+mod external;
+mod frame_consensus;
+mod pooling;
+pub(crate) mod scale_identification;
+
+pub use association::{
+    CaptureData, MeanCorners, ObservationRejection, TagMeasurement, TagObservation, View, associate, associate_within,
+    surveyed,
+};
+pub use calibration_data::{CalibrationData, HeldOut};
+pub use conditions::ConditionHistory;
+pub use external::{ForeignContext, prepare_foreign};
+pub use pooling::prepare_pooled;
+pub use scale_identification::{IdentifiedScale, identify_scales};

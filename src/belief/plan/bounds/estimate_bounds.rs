@@ -1,0 +1,101 @@
+//! Error bounds from an estimate: how far its covariance lets each joint be off, as an envelope that is convex in the angle.
+//!
+//! Over the whole range the sigma `s(t)` of the joint's angle at travel t comes from the covariance of all of the joint's
+//! parameters (`s^2 = b(t)^T P b(t)`, b the derivative of the angle by them). Where a few views have told where the joint is at
+//! one angle and little of its gain, four sigma of a normal prior are far more than the datasheet's worst gain allows; there the
+//! bound is what the worst gain makes of the way from the angle that is known. The least `a + k |angle - pivot|` above the lesser
+//! of the two is the bound.
+
+use crate::calib::{Calibration, Parameter, ParameterCovariance, ParameterKind};
+use crate::plan::bounds::joint_bounds::{JointBound, JointErrorBounds};
+use armcal_core::robot::Robot;
+use armcal_core::sensor::{ArmSensors, ConditionChange, SensorModel};
+
+/// Multiple of one sigma that is kept clear for.
+const SIGMAS: f64 = 4.0;
+/// Places over the range at which the envelope is fitted.
+const PLACES: usize = 41;
+/// A settled arm stands within this of its set-point by its own readings, rad.
+const AT_REST_RAD: f64 = 0.0016;
+
+impl JointErrorBounds {
+    /// Of the sensors that `calibration` found, accepted or not; joints that it did not determine keep the datasheet's bounds.
+    ///
+    /// `sensors` are the calibration's own.
+    #[must_use]
+    pub fn believed(robot: &Robot, calibration: &Calibration, sensors: &ArmSensors) -> Self {
+        let covariance = calibration.parameter_covariance(robot);
+        let mut bounds = Self::datasheet(robot);
+        for (joint, bound) in bounds.joints.iter_mut().enumerate() {
+            let Some(model) = sensors.models.get(joint) else { continue };
+            if let Some(found) = AngleStd::new(&covariance, robot, joint, model).and_then(|b| b.envelope()) {
+                *bound = found;
+            }
+        }
+        bounds
+    }
+}
+
+/// One joint's sigma over its range.
+struct AngleStd<'a> {
+    model: &'a SensorModel,
+    /// The joint's own parameters and their rows.
+    rows: Vec<(usize, ParameterKind)>,
+    covariance: &'a ParameterCovariance,
+    residual_std_rad: f64,
+    /// The farthest that the true gain may be from the estimated one, by the datasheet.
+    gain_reach: f64,
+    linearity_std_rad: f64,
+}
+
+impl<'a> AngleStd<'a> {
+    fn new(covariance: &'a ParameterCovariance, robot: &Robot, joint: usize, model: &'a SensorModel) -> Option<Self> {
+        let own = |(row, p): (usize, &Parameter)| (p.joint == joint).then_some((row, p.kind));
+        let rows: Vec<(usize, ParameterKind)> = covariance.parameters.iter().enumerate().filter_map(own).collect();
+        rows.iter().find(|(_, kind)| *kind == ParameterKind::Offset)?;
+        let spec = &robot.sensors[joint];
+        let has_shape = rows.iter().any(|(_, kind)| matches!(kind, ParameterKind::Shape(_)));
+        let own_residual_rad = covariance.residual_std_rad.map_or(spec.linearity_std_rad, |std_rad| std_rad[joint]);
+        let residual_std_rad = if has_shape { own_residual_rad } else { own_residual_rad.max(spec.linearity_std_rad) };
+        // The reading's gain is 1 + g, the estimated one that of its inverse.
+        let (gain, g) = (model.correction.gain, spec.gain_bound);
+        let gain_reach = (gain - 1.0 / (1.0 + g)).abs().max((1.0 / (1.0 - g) - gain).abs());
+        let linearity_std_rad = spec.linearity_std_rad;
+        Some(Self { model, rows, covariance, residual_std_rad, gain_reach, linearity_std_rad })
+    }
+
+    fn std_rad(&self, travel_rad: f64) -> f64 {
+        let at =
+            |kind: ParameterKind| kind.angle_derivative(&self.model.spec, travel_rad, &ConditionChange::default(), 0.0);
+        let by: Vec<(usize, f64)> = self.rows.iter().map(|&(row, kind)| (row, at(kind))).collect();
+        let mut variance = self.residual_std_rad.powi(2);
+        for &(i, by_i) in &by {
+            for &(k, by_k) in &by {
+                variance += by_i * self.covariance.matrix[(i, k)] * by_k;
+            }
+        }
+        variance.max(0.0).sqrt()
+    }
+
+    /// `None` where the covariance is none.
+    fn envelope(&self) -> Option<JointBound> {
+        let half_range_rad = self.model.spec.half_range_rad;
+        let travel = |k: usize| half_range_rad * (2.0 * k as f64 / (PLACES - 1) as f64 - 1.0);
+        let stds: Vec<f64> = (0..PLACES).map(|k| self.std_rad(travel(k))).collect();
+        if stds.iter().any(|std| !std.is_finite()) {
+            return None;
+        }
+        let best = (0..PLACES).min_by(|&a, &b| stds[a].total_cmp(&stds[b]))?;
+        let at_pivot_rad = SIGMAS * stds[best] + AT_REST_RAD;
+        let beyond = |k: usize| {
+            let way_rad = (travel(k) - travel(best)).abs();
+            let by_gain_rad = self.gain_reach * way_rad + SIGMAS * self.linearity_std_rad;
+            (SIGMAS * stds[k] + AT_REST_RAD - at_pivot_rad).min(by_gain_rad) / way_rad
+        };
+        let slope = (0..PLACES).filter(|&k| k != best).map(beyond).fold(0.0, f64::max);
+        let gain = self.model.correction.gain;
+        let pivot_rad =
+            self.model.correction.angle_rad(&self.model.spec, travel(best), &ConditionChange::default(), 0.0);
+        Some(JointBound { pivot_rad, at_pivot_rad, slope: slope / gain.abs().max(0.1) })
+    }
+}

@@ -1,0 +1,72 @@
+//! The questions that planning asks of the proof: which pair of some arm within the bounds comes too near.
+
+use crate::plan::bounds::JointErrorBounds;
+use crate::plan::certify::sweep::Sweep;
+use crate::plan::clearance::{ClearanceModel, ClosestPair};
+use crate::plan::motion::TrackingErrorBound;
+use crate::plan::motion::edge::Edge;
+use armcal_core::streams::JointAngles;
+
+impl ClearanceModel<'_> {
+    /// A pair that some arm within `bounds` whose sensors read `believed` brings, or may bring, nearer than `margin_m`;
+    /// `None` proves that there is none.
+    #[must_use]
+    pub fn find_violation(
+        &self,
+        believed: &JointAngles,
+        bounds: &JointErrorBounds,
+        margin_m: f64,
+    ) -> Option<ClosestPair> {
+        self.find_violation_along(&Edge::at_full_speed(*believed, *believed), bounds, margin_m)
+    }
+
+    /// A pair that the believed arm alone, without any error, brings nearer than `margin_m` on the straight edge.
+    #[must_use]
+    pub fn find_violation_exact(&self, from: &JointAngles, to: &JointAngles, margin_m: f64) -> Option<ClosestPair> {
+        Sweep {
+            model: self,
+            from: *from,
+            to: *to,
+            bounds: None,
+            tracking_error: TrackingErrorBound::default(),
+            margin_m,
+        }
+        .first_too_near()
+    }
+
+    /// As [`Self::too_near`] where the arm comes to rest after a slow edge: with what its joints overshoot.
+    #[must_use]
+    pub fn find_violation_arriving(
+        &self,
+        at: &JointAngles,
+        bounds: &JointErrorBounds,
+        margin_m: f64,
+    ) -> Option<ClosestPair> {
+        let stray = TrackingErrorBound::arriving(self.robot);
+        Sweep { model: self, from: *at, to: *at, bounds: Some(bounds), tracking_error: stray, margin_m }
+            .first_too_near()
+    }
+
+    /// The same for every arm along an edge, driven as [`Timing`] has it: with what the joints stray on the way.
+    #[must_use]
+    pub fn find_violation_along(&self, edge: &Edge, bounds: &JointErrorBounds, margin_m: f64) -> Option<ClosestPair> {
+        self.sweep(edge, bounds, margin_m).first_too_near()
+    }
+
+    pub(crate) fn sweep<'b>(&'b self, edge: &Edge, bounds: &'b JointErrorBounds, margin_m: f64) -> Sweep<'b> {
+        let stray = TrackingErrorBound::new(self.robot, &self.timing, edge);
+        // The line to the middle of where the joints may come to rest.
+        let to = JointAngles::from_fn(edge.to.len(), |joint| edge.to[joint] + stray.middle_rad(joint));
+        Sweep { model: self, from: edge.from, to, bounds: Some(bounds), tracking_error: stray, margin_m }
+    }
+
+    /// The closest pair over every arm within `bounds` whose sensors read `believed`, as far as the answer matters: its
+    /// distance is at least `enough_m` where all of them are proven to keep that, else it is that of one which does not.
+    #[must_use]
+    pub fn nearest_under(&self, believed: &JointAngles, bounds: &JointErrorBounds, enough_m: f64) -> ClosestPair {
+        self.find_violation(believed, bounds, enough_m).unwrap_or_else(|| {
+            let nearest = self.nearest(believed);
+            ClosestPair { distance_m: nearest.distance_m.max(enough_m), ..nearest }
+        })
+    }
+}

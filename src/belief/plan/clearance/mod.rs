@@ -1,0 +1,14 @@
+//! Clearance between the arm and everything else, for one configuration.
+//!
+//! `model` is the arm and what is around it, `shapes` their collision shapes, `separation` the distance of two of them, `pair` which of
+//! them are tested, `pair_distance` how much distance each pair needs; `self_collision` finds the pairs of links that can come near each other.
+
+pub(crate) mod model;
+pub(crate) mod pair;
+pub(crate) mod pair_distance;
+mod self_collision;
+pub(crate) mod separation;
+pub(crate) mod shapes;
+
+pub use model::{ClearanceModel, ClosestPair, SELF_MARGIN_REDUCTION_M};
+pub use self_collision::sample_self_pairs;

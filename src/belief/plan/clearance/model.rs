@@ -1,0 +1,219 @@
+//! Free water between the arm and everything else, for one arm or for every arm within the joint errors.
+//!
+//! Moving shapes are the links' collision primitives; standing ones the vehicle's parts (fixed in the base frame),
+//! obstacles and the seafloor (fixed in the world; what the vehicle's motion about its station may do is added to the margin).
+//! Links closer than two joints apart cannot be told from a joint and are not tested against each other.
+
+use nalgebra::Vector3;
+use parry3d::math::{Pose3, Vec3};
+use parry3d::query;
+use parry3d::shape::SharedShape;
+
+use crate::plan::clearance::pair::Pair;
+use crate::plan::clearance::separation::{Placed, gap_m, separate};
+use crate::plan::clearance::shapes::{LinkShape, StaticShape, pairs, vec3};
+use crate::plan::motion::timing::Timing;
+use armcal_core::kinematics::LinkPoses;
+use armcal_core::robot::{MAX_COLLISION_SHAPES, Robot, StationKeeping, Vehicle, parry_pose};
+use armcal_core::routine::Scene;
+use armcal_core::streams::JointAngles;
+
+/// The closest pair and their distance.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ClosestPair {
+    /// Zero: touching or inside each other.
+    pub distance_m: f64,
+    pub first: String,
+    pub second: String,
+}
+
+impl std::fmt::Display for ClosestPair {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "`{}` and `{}`", self.first, self.second)
+    }
+}
+
+/// The arm, what is around it, and which pairs may touch.
+pub struct ClearanceModel<'a> {
+    pub(crate) robot: &'a Robot,
+    pub(crate) moving: Vec<LinkShape>,
+    pub(crate) standing: Vec<StaticShape>,
+    /// Joints whose error moves a collision shape in a way that matters.
+    pub(crate) n_error_joints: usize,
+    pub(crate) pairs: Vec<Pair>,
+    /// Of each pair: whether it is of links that the robot's folder does not list as ever near each other.
+    pub(crate) is_unlisted: Vec<bool>,
+    /// By how much the gripper stands out beyond its shapes, m.
+    pub(crate) gripper_growth_m: f64,
+    pub(crate) sway: StationBound,
+    pub(crate) timing: Timing,
+}
+
+/// How far the vehicle's motion about its station may move what it carries.
+pub(crate) struct StationBound {
+    /// Of its centre of mass.
+    pub(crate) position_m: f64,
+    /// A metre from there.
+    pub(crate) attitude_rad: f64,
+    /// Base frame.
+    pub(crate) center_of_mass: Vec3,
+}
+
+impl StationBound {
+    fn new(vehicle: &Vehicle) -> Self {
+        let StationKeeping { position_std_m, attitude_std_rad } = vehicle.station_keeping;
+        Self {
+            position_m: SWAY_SIGMAS * position_std_m,
+            attitude_rad: SWAY_SIGMAS * attitude_std_rad,
+            // The origin of the vehicle's frame.
+            center_of_mass: vec3(&vehicle.vehicle_from_base.inverse().isometry().translation.vector),
+        }
+    }
+}
+
+/// Distances beyond this are all the same to planning, m.
+const FAR_M: f64 = 0.4;
+/// Shapes that touch are never clear, whatever is asked for, m.
+pub(crate) const TOUCHING_M: f64 = 1e-6;
+/// Links of one arm neither sway against each other nor are surveyed: they need less water than the vehicle does.
+pub const SELF_MARGIN_REDUCTION_M: f64 = 0.03;
+/// Of the vehicle's position and attitude.
+const SWAY_SIGMAS: f64 = 3.0;
+
+impl<'a> ClearanceModel<'a> {
+    #[must_use]
+    pub fn new(robot: &'a Robot, vehicle: &Vehicle, scene: &Scene) -> Self {
+        let moving = moving(robot);
+        let base_from_vehicle = *vehicle.vehicle_from_base.inverse().isometry();
+        let mut standing: Vec<StaticShape> =
+            vehicle.parts.iter().map(|part| StaticShape::new(&part.name, &part.placed, &base_from_vehicle)).collect();
+        // The vehicle's mean pose is the world's origin, so world = vehicle here; its motion is in the margin.
+        for obstacle in &scene.obstacles {
+            standing.push(StaticShape::new(&obstacle.name, &obstacle.placed, &base_from_vehicle).of_world());
+        }
+        if let Some(z_m) = scene.seafloor_z_m {
+            standing.push(StaticShape::seafloor(z_m, &base_from_vehicle));
+        }
+        Self::of(robot, moving, standing, StationBound::new(vehicle))
+    }
+
+    /// Nothing around the arm but itself.
+    #[must_use]
+    pub(crate) fn of_arm_alone(robot: &'a Robot) -> Self {
+        let sway = StationBound { position_m: 0.0, attitude_rad: 0.0, center_of_mass: Vec3::ZERO };
+        Self::of(robot, moving(robot), Vec::new(), sway)
+    }
+
+    fn of(robot: &'a Robot, moving: Vec<LinkShape>, standing: Vec<StaticShape>, sway: StationBound) -> Self {
+        // The last joint turns a nearly round gripper about its own axis: its error moves no outline.
+        let n_error_joints = robot.chain.joints().iter().filter(|joint| joint.limits.is_some()).count();
+        let pairs = pairs(&moving, &standing);
+        let is_listed = |inner: usize, outer: usize| {
+            robot.self_pairs.as_ref().is_none_or(|stored| stored.has(moving[inner].body, moving[outer].body))
+        };
+        let is_unlisted = |pair: &Pair| matches!(*pair, Pair::Links { outer, inner } if !is_listed(inner, outer));
+        let is_unlisted = pairs.iter().map(is_unlisted).collect();
+        let timing = Timing::new(robot);
+        Self { robot, moving, standing, n_error_joints, pairs, is_unlisted, gripper_growth_m: 0.0, sway, timing }
+    }
+
+    /// The same with a gripper that stands out by `growth_m` more than its shapes: its jaws are open.
+    #[must_use]
+    pub fn with_grown_gripper(self, growth_m: f64) -> Self {
+        Self { gripper_growth_m: growth_m, ..self }
+    }
+
+    /// The closest pair for one arm exactly at `angles`; distances are cut off at 0.4 m.
+    #[must_use]
+    pub fn nearest(&self, angles: &JointAngles) -> ClosestPair {
+        let poses = self.robot.chain.link_poses(angles);
+        self.nearest_below(&poses, FAR_M)
+    }
+
+    /// Whether one arm exactly at `angles` has anything nearer than `margin_m`.
+    #[must_use]
+    pub fn is_nearer_than(&self, angles: &JointAngles, margin_m: f64) -> bool {
+        self.nearest_below(&self.link_poses(angles), margin_m).distance_m < margin_m
+    }
+
+    /// Calls `found` with the bodies (inner first) and the distance of any two links nearer than `near_m`.
+    pub(crate) fn each_near_pair(&self, angles: &JointAngles, near_m: f64, mut found: impl FnMut([usize; 2], f64)) {
+        let placed = self.placed(&self.link_poses(angles));
+        for &pair in &self.pairs {
+            let Pair::Links { outer, inner } = pair else { continue };
+            let at = [&placed[outer], &placed[inner]];
+            if gap_m(&at[0].bounds, &at[1].bounds) < near_m {
+                let distance_m = separate(&self.shapes(pair), at, at[0].rough_direction(at[1])).distance_m;
+                if distance_m < near_m {
+                    found([self.moving[inner].body, self.moving[outer].body], distance_m);
+                }
+            }
+        }
+    }
+
+    fn nearest_below(&self, poses: &LinkPoses, limit_m: f64) -> ClosestPair {
+        let placed = self.placed(poses);
+        let mut best_m = limit_m;
+        let mut nearest = None;
+        for (number, &pair) in self.pairs.iter().enumerate() {
+            let (outer, other) = (&placed[pair.outer()], self.other_at(pair, |inner| &placed[inner]));
+            let sway_m = if self.sways(pair) { self.station_bound_m(outer) } else { 0.0 };
+            let enough_m = self.needed_m(pair, best_m) + sway_m;
+            if self.never_within(number, enough_m) || gap_m(&outer.bounds, &other.bounds) >= enough_m {
+                continue;
+            }
+            let (shapes, guess) = (self.shapes(pair), outer.rough_direction(other));
+            if guess != Vec3::ZERO && shapes.gap_along_m(outer, other, guess) >= enough_m {
+                continue;
+            }
+            let distance_m = self.in_margin_m(pair, separate(&shapes, [outer, other], guess).distance_m, sway_m);
+            if distance_m < best_m {
+                best_m = distance_m;
+                nearest = Some(pair);
+            }
+        }
+        let (first, second) = nearest.map_or_else(Default::default, |pair| self.names(pair));
+        ClosestPair { distance_m: best_m, first, second }
+    }
+
+    fn placed(&self, poses: &LinkPoses) -> [Placed; MAX_COLLISION_SHAPES] {
+        let mut placed = [Placed::NOWHERE; MAX_COLLISION_SHAPES];
+        for (slot, moving) in placed.iter_mut().zip(&self.moving) {
+            *slot = moving.placed(poses);
+        }
+        placed
+    }
+
+    /// Whether something stands on the line between two points of the base frame; `skip_m` is left out at its far end.
+    #[must_use]
+    pub fn blocks_sight(&self, poses: &LinkPoses, from_m: &Vector3<f64>, to_m: &Vector3<f64>, skip_m: f64) -> bool {
+        let sight = to_m - from_m;
+        let length = sight.norm();
+        let direction = sight / length.max(1e-9);
+        // The camera's own housing surrounds the start of the ray.
+        let near_m = 0.08;
+        let start = from_m + direction * near_m;
+        let ray = query::Ray::new(vec3(&start), vec3(&direction));
+        let reach = length - near_m - skip_m;
+        if reach <= 0.0 {
+            return false;
+        }
+        let hit = |pose: &Pose3, shape: &SharedShape| shape.cast_ray(pose, &ray, reach, true).is_some();
+        let beside = |center: &Vector3<f64>, radius_m: f64| {
+            let along = (center - start).dot(&direction).clamp(0.0, reach);
+            (center - (start + direction * along)).norm() > radius_m
+        };
+        self.standing.iter().any(|s| !beside(&s.center_m, s.radius_m) && hit(&s.placed.pose, &s.shape))
+            || self.moving.iter().any(|m| {
+                let isometry = poses.link(m.body) * m.body_from_shape;
+                !beside(&isometry.translation.vector, m.radius_m) && hit(&parry_pose(&isometry), &m.shape)
+            })
+    }
+}
+
+fn moving(robot: &Robot) -> Vec<LinkShape> {
+    let of_body = |(body, link): (usize, &'_ armcal_core::robot::LinkBody)| -> Vec<LinkShape> {
+        link.collisions.iter().map(|placed| LinkShape::new(robot, body, &link.name, placed)).collect()
+    };
+    robot.bodies.iter().enumerate().flat_map(of_body).collect()
+}

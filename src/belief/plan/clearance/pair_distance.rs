@@ -1,0 +1,178 @@
+//! What the proof of clearance asks of the model: shapes, places and how much distance a pair needs.
+
+use parry3d::math::{Pose3, Vec3};
+
+use crate::plan::clearance::model::{ClearanceModel, ClosestPair, SELF_MARGIN_REDUCTION_M, TOUCHING_M};
+use crate::plan::clearance::pair::{BodyPair, Pair};
+use crate::plan::clearance::self_collision::UNSEEN_M;
+use crate::plan::clearance::separation::{Placed, Shapes, separate};
+use crate::plan::motion::timing::Timing;
+use armcal_core::kinematics::LinkPoses;
+use armcal_core::robot::Robot;
+use armcal_core::streams::{JointAngles, MAX_JOINTS};
+
+impl ClearanceModel<'_> {
+    pub(crate) fn link_poses(&self, angles: &JointAngles) -> LinkPoses {
+        self.robot.chain.link_poses(angles)
+    }
+
+    pub(crate) fn pairs(&self) -> &[Pair] {
+        &self.pairs
+    }
+
+    pub(crate) fn n_error_joints(&self) -> usize {
+        self.n_error_joints
+    }
+
+    pub(crate) fn stowed(&self) -> &JointAngles {
+        &self.robot.stowed
+    }
+
+    pub(crate) fn robot(&self) -> &Robot {
+        self.robot
+    }
+
+    pub(crate) fn timing(&self) -> &Timing {
+        &self.timing
+    }
+
+    /// How far each joint may move the arm's farthest point at most, m/rad.
+    pub(crate) fn levers_m(&self) -> [f64; MAX_JOINTS] {
+        let longest = |joint: usize| self.moving.iter().map(|shape| shape.levers_m[joint]).fold(0.0, f64::max);
+        std::array::from_fn(longest)
+    }
+
+    pub(crate) fn pair(&self, number: usize) -> Pair {
+        self.pairs[number]
+    }
+
+    pub(crate) fn n_moving(&self) -> usize {
+        self.moving.len()
+    }
+
+    /// Which body carries a moving shape.
+    pub(crate) fn body(&self, shape: usize) -> usize {
+        self.moving[shape].body
+    }
+
+    pub(crate) fn placed_on(&self, shape: usize, base_from_body: &Pose3) -> Placed {
+        self.moving[shape].placed_on(base_from_body)
+    }
+
+    pub(crate) fn between(&self, pair: Pair) -> BodyPair {
+        match pair {
+            Pair::Standing { moving, .. } => BodyPair { first_joint: 0, outer_body: self.moving[moving].body },
+            Pair::Links { outer, inner } => {
+                BodyPair { first_joint: self.moving[inner].body, outer_body: self.moving[outer].body }
+            }
+        }
+    }
+
+    /// Whether the vehicle's motion changes the pair's distance.
+    pub(crate) fn sways(&self, pair: Pair) -> bool {
+        matches!(pair, Pair::Standing { standing, .. } if self.standing[standing].is_of_world)
+    }
+
+    /// How far the vehicle's motion may move a shape in the world, m: three sigma of its position, and of its attitude
+    /// times the distance from its centre of mass.
+    pub(crate) fn station_bound_m(&self, placed: &Placed) -> f64 {
+        let arm_m = (placed.center - self.sway.center_of_mass).length() + placed.radius_m;
+        self.sway.position_m + self.sway_growth(arm_m)
+    }
+
+    /// By how much more for a shape that much farther out, m.
+    pub(crate) fn sway_growth(&self, farther_m: f64) -> f64 {
+        self.sway.attitude_rad * farther_m
+    }
+
+    /// An upper bound on the distance of a moving shape from the axis of a joint before it, m.
+    pub(crate) fn lever_m(&self, shape: usize, joint: usize) -> f64 {
+        self.moving[shape].levers_m[joint]
+    }
+
+    pub(crate) fn shapes(&self, pair: Pair) -> Shapes<'_> {
+        match pair {
+            Pair::Standing { moving, standing } => {
+                Shapes { outer: &self.moving[moving].shape, other: &self.standing[standing].shape }
+            }
+            Pair::Links { outer, inner } => {
+                Shapes { outer: &self.moving[outer].shape, other: &self.moving[inner].shape }
+            }
+        }
+    }
+
+    /// The pair's second shape where it is; `placed` gives that of a link.
+    pub(crate) fn other_at<'b>(&'b self, pair: Pair, placed: impl Fn(usize) -> &'b Placed) -> &'b Placed {
+        match pair {
+            Pair::Standing { standing, .. } => &self.standing[standing].placed,
+            Pair::Links { inner, .. } => placed(inner),
+        }
+    }
+
+    /// The distance of one pair at `angles`, in the terms of the margin, if it is below `margin_m`.
+    pub(crate) fn distance_below(&self, pair: usize, angles: &JointAngles, margin_m: f64, guess: Vec3) -> Option<f64> {
+        let (pair, poses) = (self.pairs[pair], self.link_poses(angles));
+        let outer = self.moving[pair.outer()].placed(&poses);
+        let other = match pair {
+            Pair::Standing { standing, .. } => self.standing[standing].placed,
+            Pair::Links { inner, .. } => self.moving[inner].placed(&poses),
+        };
+        let sway_m = if self.sways(pair) { self.station_bound_m(&outer) } else { 0.0 };
+        let found = separate(&self.shapes(pair), [&outer, &other], guess);
+        let is_below = found.distance_m < self.needed_m(pair, margin_m) + sway_m;
+        is_below.then(|| self.in_margin_m(pair, found.distance_m, sway_m))
+    }
+
+    /// The true distance at which a pair keeps `margin_m`, the vehicle's motion aside.
+    pub(crate) fn needed_m(&self, pair: Pair, margin_m: f64) -> f64 {
+        let needed_m = match pair {
+            Pair::Standing { .. } => margin_m,
+            Pair::Links { .. } => margin_m - SELF_MARGIN_REDUCTION_M,
+        };
+        needed_m.max(TOUCHING_M) + self.growth_m(pair)
+    }
+
+    /// Whether a pair (by its number) is known to be never so near.
+    pub(crate) fn never_within(&self, pair: usize, distance_m: f64) -> bool {
+        self.is_unlisted[pair]
+            && self.robot.self_pairs.as_ref().is_some_and(|stored| distance_m <= stored.near_m - UNSEEN_M)
+    }
+
+    /// What open jaws take from the distance of a pair.
+    fn growth_m(&self, pair: Pair) -> f64 {
+        let is_gripper = |moving: usize| self.moving[moving].body == self.robot.tool.mount.n_joints;
+        let grows = match pair {
+            Pair::Standing { moving, .. } => is_gripper(moving),
+            Pair::Links { outer, inner } => is_gripper(outer) || is_gripper(inner),
+        };
+        if grows { self.gripper_growth_m } else { 0.0 }
+    }
+
+    /// A true distance in the terms of the margin; shapes that touch stay at zero. `sway_m`: what the vehicle's motion may
+    /// take from it.
+    pub(crate) fn in_margin_m(&self, pair: Pair, distance_m: f64, sway_m: f64) -> f64 {
+        let distance_m = (distance_m - self.growth_m(pair)).max(0.0);
+        match pair {
+            // An obstacle inside the margin for the vehicle's motion is as near as touching.
+            Pair::Standing { .. } if self.sways(pair) => (distance_m - sway_m).max(0.0),
+            Pair::Standing { .. } => distance_m,
+            Pair::Links { .. } if distance_m > 0.0 => distance_m + SELF_MARGIN_REDUCTION_M,
+            Pair::Links { .. } => 0.0,
+        }
+    }
+
+    pub(crate) fn names(&self, pair: Pair) -> (String, String) {
+        match pair {
+            Pair::Standing { moving, standing } => {
+                (self.moving[moving].name.clone(), self.standing[standing].name.clone())
+            }
+            Pair::Links { outer, inner } => (self.moving[inner].name.clone(), self.moving[outer].name.clone()),
+        }
+    }
+
+    /// The pair at a distance in the terms of the margin.
+    pub(crate) fn named(&self, pair: Pair, distance_m: f64) -> ClosestPair {
+        let (first, second) = self.names(pair);
+        ClosestPair { distance_m, first, second }
+    }
+}

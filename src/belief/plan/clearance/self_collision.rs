@@ -1,0 +1,104 @@
+//! Which links of an arm can ever come near each other, by sampling.
+
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+
+use crate::plan::bounds::joint_bounds::JointErrorBounds;
+use crate::plan::clearance::ClearanceModel;
+use armcal_core::kinematics::JointLimits;
+use armcal_core::robot::{Robot, SelfPair, SelfPairs};
+use armcal_core::stats::stream_rng;
+use armcal_core::streams::JointAngles;
+
+/// Links that were never nearer than this are left out of the list, m: more than a margin asks for, and [`UNSEEN_M`].
+const NEAR_M: f64 = 0.2;
+/// What random configurations may have missed, m: links that were never nearer than a distance are taken to keep it less this.
+pub(crate) const UNSEEN_M: f64 = 0.05;
+
+/// The nearest that each two links of the arm come to each other in `n` random configurations: within the joint limits, and
+/// beyond them by what the datasheet lets the sensors hide.
+#[must_use]
+pub fn sample_self_pairs(robot: &Robot, n: u64, seed: u64) -> SelfPairs {
+    let clearance = ClearanceModel::of_arm_alone(robot);
+    let mut rng = stream_rng(seed, "self-collision pairs");
+    let limits = wide_limits(robot);
+    let mut pairs: Vec<SelfPair> = Vec::new();
+    for _ in 0..n {
+        let angles = random_angles(&limits, &mut rng);
+        clearance.each_near_pair(&angles, NEAR_M, |bodies, distance_m| {
+            match pairs.iter_mut().find(|pair| pair.bodies == bodies) {
+                Some(pair) => pair.nearest_m = pair.nearest_m.min(distance_m),
+                None => pairs.push(SelfPair { bodies, nearest_m: distance_m }),
+            }
+        });
+    }
+    pairs.sort_by_key(|pair| pair.bodies);
+    SelfPairs { seed, n, near_m: NEAR_M, pairs }
+}
+
+fn wide_limits(robot: &Robot) -> Vec<JointLimits> {
+    let bounds = JointErrorBounds::datasheet(robot);
+    let wide = |(joint, limits): (usize, Option<JointLimits>)| match limits {
+        None => JointLimits { lower_rad: -std::f64::consts::PI, upper_rad: std::f64::consts::PI },
+        Some(JointLimits { lower_rad, upper_rad }) => JointLimits {
+            lower_rad: lower_rad - bounds.error_rad(joint, lower_rad),
+            upper_rad: upper_rad + bounds.error_rad(joint, upper_rad),
+        },
+    };
+    robot.chain.joints().iter().map(|joint| joint.limits).enumerate().map(wide).collect()
+}
+
+fn random_angles(limits: &[JointLimits], rng: &mut ChaCha8Rng) -> JointAngles {
+    JointAngles::from_fn(limits.len(), |j| rng.random_range(limits[j].lower_rad..=limits[j].upper_rad))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn robot(name: &str) -> Robot {
+        let folder = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("robots").join(name);
+        armcal_core::robot::load(&folder).expect("the robot reads")
+    }
+
+    /// The stored lists are those of the drawings: other samples bring no other links near.
+    #[test]
+    fn no_links_outside_the_stored_list_come_near_in_other_samples() {
+        for name in ["titan4", "titan4-gripper-tag", "kraft-predator"] {
+            let robot = robot(name);
+            let stored = robot.self_pairs.clone().expect("the folder has a list");
+            let other = sample_self_pairs(&robot, 20_000, 99);
+            for pair in &other.pairs {
+                let known = stored.pairs.iter().find(|known| known.bodies == pair.bodies);
+                let least_m = known.map_or(stored.near_m, |known| known.nearest_m);
+                assert!(pair.nearest_m >= least_m - UNSEEN_M, "{name}: {pair:?}, but {known:?} is stored");
+            }
+            let n_bodies = robot.bodies.len();
+            let possible = (n_bodies - 1) * (n_bodies - 2) / 2;
+            eprintln!("{name}: {} of {possible} pairs", stored.pairs.len());
+            assert!(!stored.pairs.is_empty());
+        }
+    }
+
+    /// A list that leaves a pair out changes what planning tests, and a true one changes no answer.
+    #[test]
+    fn planning_tests_the_pairs_of_the_list() {
+        let all = Robot { self_pairs: None, ..robot("titan4") };
+        let listed = robot("titan4");
+        let mut none = listed.clone();
+        if let Some(stored) = &mut none.self_pairs {
+            stored.pairs.clear();
+        }
+        let limits = wide_limits(&all);
+        let models = [&all, &listed, &none].map(ClearanceModel::of_arm_alone);
+        let mut rng = stream_rng(5, "pairs of the list");
+        let mut missed = 0;
+        for _ in 0..3000 {
+            let at = random_angles(&limits, &mut rng);
+            let near = models.each_ref().map(|model| model.is_nearer_than(&at, 0.05));
+            assert_eq!(near[0], near[1], "{at:?}");
+            missed += i32::from(near[0] && !near[2]);
+        }
+        assert!(missed > 20, "without its pairs the arm may pass through itself: {missed}");
+    }
+}

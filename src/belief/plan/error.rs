@@ -1,0 +1,32 @@
+//! Why there is no plan.
+
+use armcal_core::kinematics::IkError;
+
+use crate::plan::path::PathError;
+
+/// Why there is no plan.
+#[derive(Debug, thiserror::Error)]
+pub enum PlanError {
+    #[error("target {target} at ({x:.3}, {y:.3}, {z:.3}) m: {source}", x = at_m[0], y = at_m[1], z = at_m[2])]
+    TargetOutOfReach { target: usize, at_m: [f64; 3], source: IkError },
+    #[error(
+        "target {target} at ({x:.3}, {y:.3}, {z:.3}) m: reached only with {clearance_m:.3} m of clearance between \
+         {nearest}; {needed_m:.3} m are needed for every arm within the sensors' error",
+        x = at_m[0], y = at_m[1], z = at_m[2]
+    )]
+    TargetTooClose { target: usize, at_m: [f64; 3], clearance_m: f64, nearest: String, needed_m: f64 },
+    #[error(
+        "the arm starts too close: {clearance_m:.3} m between {nearest}; {needed_m:.3} m are needed (0: in collision)"
+    )]
+    StartTooClose { clearance_m: f64, nearest: String, needed_m: f64 },
+    #[error(
+        "no pose was found that sees {min_tags} of the {n_tags} surveyed tags and keeps {clearance_m:.3} m clear ({tried} tried): {hint}"
+    )]
+    NoUsefulPose { min_tags: u32, n_tags: usize, clearance_m: f64, tried: usize, hint: String },
+    #[error("no pose was found that sees {min_tags} of the {n_tags} surveyed tags: min_tags may be 1 to {n_tags}")]
+    TooFewTags { min_tags: u32, n_tags: usize },
+    #[error("only {found} of {wanted} poses were found that see {min_tags} tags and keep clear: {hint}")]
+    TooFewPoses { found: usize, wanted: usize, min_tags: u32, hint: String },
+    #[error(transparent)]
+    Path(#[from] PathError),
+}

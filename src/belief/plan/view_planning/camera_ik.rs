@@ -1,0 +1,162 @@
+//! Inverse kinematics of the camera: its eye to a place, its optical axis along a direction.
+//!
+//! Levenberg's damped least squares on five numbers: the eye's distance (m) and the axis's turn `a x a*` (rad, weighted by the
+//! range, so that both count as displacements at the tag). The arm need not get there: what it comes to is tested like any other pose.
+
+use nalgebra::{SMatrix, SVector, Vector3};
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+
+use crate::plan::visibility::VisibilityModel;
+use armcal_core::kinematics::JointLimits;
+use armcal_core::numeric::{Damping, LeastSquares, Proposal, StopRule, minimize};
+use armcal_core::robot::Robot;
+use armcal_core::streams::{JointAngles, MAX_JOINTS};
+
+/// Where the camera shall be and what it shall look at, base frame.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct CameraGoal {
+    pub eye_m: Vector3<f64>,
+    /// Unit.
+    pub axis: Vector3<f64>,
+}
+
+const STEPS: usize = 12;
+/// Longest step of a joint, rad.
+const MAX_STEP_RAD: f64 = 0.4;
+/// Nearer and farther from a tag than this there is little to gain: corners leave the image, or are coarse. Assumed.
+const RANGES_M: [f64; 2] = [0.35, 1.5];
+/// How far the optical axis may point beside the tag, rad.
+const BESIDE_RAD: f64 = 0.6;
+
+impl CameraGoal {
+    /// From a good range and incidence at a tag that is drawn evenly.
+    pub(crate) fn draw(robot: &Robot, visibility: &VisibilityModel, rng: &mut ChaCha8Rng) -> Option<Self> {
+        if robot.tags.is_empty() {
+            return None;
+        }
+        let tag = &robot.tags[rng.random_range(0..robot.tags.len())];
+        let rotation = tag.base_from_tag.rotation();
+        let highest_m = RANGES_M[1].min(visibility.max_range_m);
+        let range_m = rng.random_range(RANGES_M[0].max(visibility.min_range_m).min(highest_m - 1e-3)..highest_m);
+        // Evenly over the cone about the tag's normal.
+        let cos = 1.0 - rng.random_range(0.0..1.0) * (1.0 - visibility.max_incidence_rad.cos());
+        let sin = (1.0_f64 - cos * cos).max(0.0).sqrt();
+        let around = rng.random_range(0.0..std::f64::consts::TAU);
+        let out = rotation * Vector3::new(sin * around.cos(), sin * around.sin(), cos);
+        let eye_m = tag.base_from_tag.origin().vector() + out * range_m;
+        let beside = Vector3::from_fn(|_, _| rng.random_range(-1.0..1.0)) * BESIDE_RAD;
+        Some(Self { eye_m, axis: (beside - out).normalize() })
+    }
+
+    /// The joints before the camera, from `seed`; the others stay.
+    pub(crate) fn solve(&self, robot: &Robot, limits: &[JointLimits], seed: &JointAngles) -> JointAngles {
+        let error = self.error(robot, seed);
+        let mut search = Search { goal: self, robot, limits, angles: *seed, error, trial: *seed, trial_error: error };
+        minimize(&mut search, &DAMPING, &StopRule::after(STEPS));
+        search.angles
+    }
+
+    /// Place (m), then direction.
+    fn error(&self, robot: &Robot, angles: &JointAngles) -> SVector<f64, 6> {
+        let base_from_camera = robot.chain.frame(angles, &robot.camera.mount);
+        let off_m = self.eye_m - base_from_camera.translation.vector;
+        let turn = (base_from_camera.rotation * Vector3::z()).cross(&self.axis);
+        SVector::<f64, 6>::new(off_m.x, off_m.y, off_m.z, turn.x, turn.y, turn.z)
+    }
+
+    fn jacobian(&self, robot: &Robot, angles: &JointAngles, n: usize) -> SMatrix<f64, 6, MAX_JOINTS> {
+        let poses = robot.chain.link_poses(angles);
+        let base_from_camera = poses.frame(&robot.camera.mount);
+        let axis = base_from_camera.rotation * Vector3::z();
+        let mut out = SMatrix::<f64, 6, MAX_JOINTS>::zeros();
+        for joint in 0..n {
+            let moved = poses.point_jacobian(joint, &base_from_camera.translation.vector);
+            // The axis turns by omega x a; of `a x a*` that is the part of omega across the axis.
+            let omega = poses.axis(joint);
+            let turned = omega - axis * axis.dot(omega);
+            out.fixed_view_mut::<3, 1>(0, joint).copy_from(&moved);
+            out.fixed_view_mut::<3, 1>(3, joint).copy_from(&turned);
+        }
+        out
+    }
+}
+
+/// Added to the normal matrix, m^2/rad^2.
+const DAMPING: Damping =
+    Damping { first: 1e-2, min: 1e-6, max: f64::INFINITY, down: 0.3, up: 8.0, min_after_rejection: 0.0 };
+
+struct Search<'a> {
+    goal: &'a CameraGoal,
+    robot: &'a Robot,
+    limits: &'a [JointLimits],
+    angles: JointAngles,
+    error: SVector<f64, 6>,
+    trial: JointAngles,
+    trial_error: SVector<f64, 6>,
+}
+
+impl LeastSquares for Search<'_> {
+    fn cost(&self) -> f64 {
+        self.error.norm()
+    }
+
+    fn propose(&mut self, damping: f64) -> Option<Proposal> {
+        let n = self.robot.camera.mount.n_joints;
+        let jacobian = self.goal.jacobian(self.robot, &self.angles, n);
+        let mut normal = jacobian.tr_mul(&jacobian);
+        for k in 0..MAX_JOINTS {
+            normal[(k, k)] += damping;
+        }
+        let step = normal.cholesky()?.solve(&jacobian.tr_mul(&self.error));
+        let scale = (MAX_STEP_RAD / step.amax().max(1e-12)).min(1.0);
+        self.trial = self.angles;
+        for joint in 0..n {
+            let JointLimits { lower_rad, upper_rad } = self.limits[joint];
+            self.trial[joint] = (self.angles[joint] + scale * step[joint]).clamp(lower_rad.min(upper_rad), upper_rad);
+        }
+        Some(Proposal { length: f64::INFINITY, predicted_gain: f64::INFINITY })
+    }
+
+    fn trial_cost(&mut self) -> Option<f64> {
+        self.trial_error = self.goal.error(self.robot, &self.trial);
+        // Against its limits the arm goes nowhere: that is no step that helps.
+        Some(self.trial_error.norm()).filter(|trial| *trial < self.error.norm())
+    }
+
+    fn accept(&mut self) {
+        (self.angles, self.error) = (self.trial, self.trial_error);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The camera of a random pose is found again from another: place and direction within the tolerance of a look.
+    #[test]
+    fn the_camera_gets_where_another_pose_has_it() {
+        let robot = crate::plan::view_planning::fixture::titan();
+        let limits: Vec<JointLimits> = robot
+            .chain
+            .joints()
+            .iter()
+            .map(|joint| joint.limits.unwrap_or(JointLimits { lower_rad: -3.0, upper_rad: 3.0 }))
+            .collect();
+        let mut rng = armcal_core::stats::stream_rng(3, "aim");
+        let (mut n, mut there) = (0, 0);
+        for _ in 0..200 {
+            let goal =
+                JointAngles::from_fn(robot.n_joints(), |j| rng.random_range(limits[j].lower_rad..limits[j].upper_rad));
+            let frame = robot.chain.frame(&goal, &robot.camera.mount);
+            let aim = CameraGoal { eye_m: frame.translation.vector, axis: frame.rotation * Vector3::z() };
+            let seed = JointAngles::from_fn(robot.n_joints(), |j| {
+                (goal[j] + rng.random_range(-0.5..0.5)).clamp(limits[j].lower_rad, limits[j].upper_rad)
+            });
+            let error = aim.error(&robot, &aim.solve(&robot, &limits, &seed));
+            n += 1;
+            there += usize::from(error.norm() < 0.05);
+        }
+        assert!(there * 10 > n * 9, "{there} of {n}");
+    }
+}

@@ -1,0 +1,326 @@
+//! Poses that may be taken: they see enough tags for most arms that the belief allows, and keep clear for every one.
+//!
+//! Drawn in turn evenly over the narrowed joint ranges, from boxes of growing size around where the arm is (under a wide belief only
+//! poses near the present one are certain to be clear), and by the camera's inverse kinematics at the tags. Cheap tests come
+//! first: field of view, clearance of the believed arm, probability of the tags, the certificate, what hides them.
+
+use nalgebra::Vector3;
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+
+use crate::plan::view_planning::camera_ik::CameraGoal;
+use crate::plan::view_planning::{PlanError, PoseRequest};
+use armcal_core::kinematics::JointLimits;
+use armcal_core::robot::Robot;
+use armcal_core::streams::{JointAngles, MAX_JOINTS};
+
+/// A pose that may be taken.
+#[derive(Clone, Debug)]
+pub(crate) struct Candidate {
+    pub angles: JointAngles,
+    /// (tag, probability that it is seen).
+    pub tags: Vec<(usize, f64)>,
+    /// Whether it shows a tag whose place is known, to most arms within the bounds.
+    pub shows_known_tag: bool,
+    /// Whether it was drawn evenly over the joint ranges.
+    pub is_even: bool,
+}
+
+/// What became of the draws that were refused.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct InfeasibleCounts {
+    pub tried: usize,
+    /// How many draws have 0, 1, .. tags in view; the last counts all beyond.
+    by_tags: [usize; MOST_TAGS + 1],
+    /// The tag in view of a pose that came nearest to being clear, and by how much it lacks.
+    nearest: Option<(u32, f64)>,
+    /// See enough tags with the believed arm, but not with most that the belief allows.
+    unsure: usize,
+    /// See enough tags, and some arm within the bounds comes too near.
+    blocked: usize,
+}
+
+/// More tags in view are counted as so many.
+const MOST_TAGS: usize = 31;
+const MAX_DRAWS: usize = 200_000;
+/// Poses that see enough and are not clear; then it is not for want of tags.
+const MAX_BLOCKED: usize = 20_000;
+/// Capture poses keep their tool this far from every target, m.
+const TARGET_DISTANCE_M: f64 = 0.15;
+/// Nothing this near (largest joint difference) to a pose that failed is tried again, rad.
+const FAILED_RADIUS_RAD: f64 = 0.1;
+/// Smallest and largest of the boxes around the start, shares of the joint ranges.
+const BOX_SHARES: [f64; 2] = [0.03, 0.6];
+/// Arms that stand for the belief.
+const N_ARMS: usize = 16;
+/// Square root of 2 and its like for 8 dimensions: the positive root of x^9 = x + 1 (Roberts 2018, the R sequence).
+const R8: f64 = 1.085_070_245_491_45;
+
+/// Where a draw comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Source {
+    Uniform,
+    Local,
+    CameraIk,
+}
+
+impl Source {
+    const ALL: [Self; 3] = [Self::Uniform, Self::Local, Self::CameraIk];
+
+    /// What a draw that comes to nothing counts, in candidates: sources have equal shares as long as they give any.
+    fn draw_cost(self) -> f64 {
+        match self {
+            Self::Uniform | Self::Local => 0.02,
+            Self::CameraIk => 0.1,
+        }
+    }
+}
+
+/// Draws and tests.
+pub(crate) struct Search<'a> {
+    request: &'a PoseRequest<'a>,
+    limits: Vec<JointLimits>,
+    /// Joint errors in units of the bounds, -1..1.
+    arms: [[f64; MAX_JOINTS]; N_ARMS],
+    pub refused: InfeasibleCounts,
+}
+
+/// Joints from this one on do not move the camera; they stay where they are, but for those that turn a tag on the gripper.
+fn n_seen(robot: &Robot) -> usize {
+    robot.camera.mount.n_joints
+}
+
+/// Whether a joint turns the tag on the gripper in the camera's view: then the views need many of its angles.
+fn shows_gripper_tag(robot: &Robot, joint: usize) -> bool {
+    robot.gripper_tag.is_some_and(|tag| tag.joints(&robot.camera.mount).contains(&joint))
+}
+
+impl<'a> Search<'a> {
+    pub(crate) fn new(request: &'a PoseRequest<'a>) -> Self {
+        let limits = request.bounds.safe_limits(request.robot);
+        Self { request, limits, arms: arms(), refused: InfeasibleCounts::default() }
+    }
+
+    /// Up to `enough` candidates.
+    pub(crate) fn gather(&mut self, enough: usize, rng: &mut ChaCha8Rng) -> Vec<Candidate> {
+        let mut found: Vec<Candidate> = Vec::with_capacity(enough);
+        let mut spent = [0.0_f64; Source::ALL.len()];
+        while found.len() < enough && self.refused.tried < MAX_DRAWS && self.refused.blocked < MAX_BLOCKED {
+            let source = Source::ALL.into_iter().min_by(|a, b| spent[*a as usize].total_cmp(&spent[*b as usize]));
+            let source = source.unwrap_or(Source::Uniform);
+            let angles = self.draw(source, &found, rng);
+            self.refused.tried += 1;
+            spent[source as usize] += source.draw_cost();
+            if let Some(candidate) = self.assess(angles) {
+                spent[source as usize] += 1.0;
+                found.push(Candidate { is_even: source == Source::Uniform, ..candidate });
+            }
+        }
+        found
+    }
+
+    fn draw(&self, source: Source, found: &[Candidate], rng: &mut ChaCha8Rng) -> JointAngles {
+        match source {
+            Source::Uniform => self.draw_in(None, rng),
+            Source::Local => {
+                let [least, most] = BOX_SHARES;
+                let share = least * (most / least).powf(rng.random_range(0.0..1.0));
+                self.draw_in(Some(share), rng)
+            }
+            Source::CameraIk => {
+                let even = self.draw_in(None, rng);
+                // From a pose that is known to be good, or from anywhere.
+                let seed = if found.is_empty() { even } else { found[rng.random_range(0..found.len())].angles };
+                let n = n_seen(self.request.robot);
+                let seed = JointAngles::from_fn(seed.len(), |j| if j < n { seed[j] } else { even[j] });
+                let aim = CameraGoal::draw(self.request.robot, self.request.visibility, rng);
+                aim.map_or(even, |aim| aim.solve(self.request.robot, &self.limits, &seed))
+            }
+        }
+    }
+
+    /// Evenly over the ranges, or over a box around the start that is `share` of them to either side.
+    fn draw_in(&self, share: Option<f64>, rng: &mut ChaCha8Rng) -> JointAngles {
+        let robot = self.request.robot;
+        let start = self.request.start;
+        JointAngles::from_fn(robot.n_joints(), |j| {
+            let part: f64 = rng.random_range(0.0..1.0);
+            if j >= n_seen(robot) && !shows_gripper_tag(robot, j) {
+                return start[j];
+            }
+            let JointLimits { lower_rad, upper_rad } = self.limits[j];
+            let range_rad = (upper_rad - lower_rad).max(0.0);
+            let (from, to) = match share {
+                Some(share) if j < n_seen(robot) => {
+                    let half_rad = share * range_rad;
+                    ((start[j] - half_rad).max(lower_rad), (start[j] + half_rad).min(lower_rad + range_rad))
+                }
+                _ => (lower_rad, lower_rad + range_rad),
+            };
+            from + part * (to - from).max(0.0)
+        })
+    }
+
+    /// Cheap tests first; most draws fail at the first.
+    fn assess(&mut self, angles: JointAngles) -> Option<Candidate> {
+        let request = self.request;
+        let robot = request.robot;
+        let min_tags = request.capture.min_tags as usize;
+        let is_failed =
+            |failed: &JointAngles| (0..n_seen(robot)).all(|j| (failed[j] - angles[j]).abs() < FAILED_RADIUS_RAD);
+        if request.failed.iter().any(is_failed) {
+            return None;
+        }
+        let poses = robot.chain.link_poses(&angles);
+        let in_view = request.visibility.in_view(robot, &poses).count();
+        self.refused.by_tags[in_view.min(MOST_TAGS)] += 1;
+        if in_view < min_tags.max(1) {
+            return None;
+        }
+        if robot
+            .gripper_tag
+            .is_some_and(|tag| !request.visibility.sees_gripper_tag(robot, &tag, request.clearance, &poses))
+        {
+            return None;
+        }
+        let tool = poses.frame(&robot.tool.mount).translation.vector;
+        let near_target = |target: &[f64; 3]| (tool - Vector3::from(*target)).norm() < TARGET_DISTANCE_M;
+        if request.targets_m.iter().any(near_target) {
+            return None;
+        }
+        let margin_m = request.capture.clearance_m;
+        if request.clearance.is_nearer_than(&angles, margin_m) {
+            self.refused.blocked += 1;
+            return None;
+        }
+        if self.expected_in_view(&angles) < min_tags as f64 {
+            self.refused.unsure += 1;
+            return None;
+        }
+        if let Some(nearest) = request.clearance.find_violation_arriving(&angles, request.bounds, margin_m) {
+            self.refused.blocked += 1;
+            let tag = request.visibility.in_view(robot, &poses).next().map(|idx| robot.tags[idx].id);
+            if let Some(tag) = tag.filter(|_| self.refused.nearest.is_none_or(|(_, most)| nearest.distance_m > most)) {
+                self.refused.nearest = Some((tag, nearest.distance_m));
+            }
+            return None;
+        }
+        let tags = self.expected_tags(&angles);
+        if tags.iter().map(|(_, share)| share).sum::<f64>() < min_tags as f64 {
+            self.refused.unsure += 1;
+            return None;
+        }
+        let shows_known_tag = tags.iter().any(|&(idx, share)| share > 0.5 && robot.tags[idx].is_known());
+        Some(Candidate { angles, tags, shows_known_tag, is_even: false })
+    }
+
+    fn arm(&self, angles: &JointAngles, errors: &[f64; MAX_JOINTS]) -> JointAngles {
+        let n = n_seen(self.request.robot);
+        JointAngles::from_fn(angles.len(), |j| {
+            if j < n { angles[j] + errors[j] * self.request.bounds.error_rad(j, angles[j]) } else { angles[j] }
+        })
+    }
+
+    fn trust(&self, tag: usize) -> f64 {
+        self.request.detection_rate.get(tag).copied().unwrap_or(1.0).clamp(0.0, 1.0)
+    }
+
+    /// Expected number of tags in view, were there nothing to hide them.
+    fn expected_in_view(&self, angles: &JointAngles) -> f64 {
+        let (robot, visibility) = (self.request.robot, self.request.visibility);
+        let sum = self.arms.iter().flat_map(|errors| {
+            let arm = self.arm(angles, errors);
+            visibility.in_view(robot, &robot.chain.link_poses(&arm))
+        });
+        sum.map(|tag| self.trust(tag)).sum::<f64>() / N_ARMS as f64
+    }
+
+    /// Tags with the share of arms within the belief that see them there, times how far that can be trusted.
+    fn expected_tags(&self, angles: &JointAngles) -> Vec<(usize, f64)> {
+        let robot = self.request.robot;
+        let mut count = vec![0usize; robot.tags.len()];
+        for errors in &self.arms {
+            for tag in self.request.visibility.visible(robot, self.request.clearance, &self.arm(angles, errors)) {
+                count[tag] += 1;
+            }
+        }
+        let share = |(tag, n): (usize, usize)| (tag, self.trust(tag) * n as f64 / N_ARMS as f64);
+        count.into_iter().enumerate().filter(|(_, n)| *n > 0).map(share).filter(|(_, share)| *share > 0.0).collect()
+    }
+}
+
+/// Errors between the bounds by the distribution that the sum of a gain's and an offset's uniform error has: a triangle.
+fn arms() -> [[f64; MAX_JOINTS]; N_ARMS] {
+    let mut step = 1.0;
+    let steps: [f64; MAX_JOINTS] = std::array::from_fn(|_| {
+        step /= R8;
+        step
+    });
+    std::array::from_fn(|n| {
+        std::array::from_fn(|joint| {
+            let u = (0.5 + steps[joint] * (n + 1) as f64).fract();
+            if u < 0.5 { (2.0 * u).sqrt() - 1.0 } else { 1.0 - (2.0 * (1.0 - u)).sqrt() }
+        })
+    })
+}
+
+impl InfeasibleCounts {
+    /// Why there is none, with the nearest thing that would work.
+    pub(crate) fn no_pose(&self, request: &PoseRequest<'_>) -> PlanError {
+        PlanError::NoUsefulPose {
+            min_tags: request.capture.min_tags,
+            n_tags: request.robot.tags.len(),
+            clearance_m: request.capture.clearance_m,
+            tried: self.tried,
+            hint: self.hint(request),
+        }
+    }
+
+    /// The nearest thing that would work, in words.
+    pub(crate) fn hint(&self, request: &PoseRequest<'_>) -> String {
+        let min_tags = request.capture.min_tags as usize;
+        if request.robot.tags.is_empty() {
+            return "there is no tag to see".to_owned();
+        }
+        let enough: usize = self.by_tags[min_tags.clamp(1, MOST_TAGS)..].iter().sum();
+        if enough == 0 {
+            let most = (1..min_tags.min(MOST_TAGS + 1)).rev().find(|&n| self.by_tags[n] > 0);
+            return match most {
+                Some(n) => {
+                    let poses: usize = self.by_tags[n..].iter().sum();
+                    format!("{n} tags are in view from {poses} of the poses tried: min_tags = {n}")
+                }
+                None => "no tag comes into view of the camera from any pose tried".to_owned(),
+            };
+        }
+        if let Some((tag, distance_m)) = self.nearest {
+            return format!(
+                "tag {tag} comes into view at best with {distance_m:.3} m of clearance for every arm within the bounds"
+            );
+        }
+        if self.unsure > 0 {
+            let unsure = self.unsure;
+            return format!("{unsure} poses see enough tags only if the joints are where they are believed to be");
+        }
+        format!(
+            "{enough} poses have enough tags in view, but the believed arm touches something there, or its tool is at a target"
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_arms_that_stand_for_the_belief_are_spread_as_a_triangle() {
+        let arms = arms();
+        for joint in 0..6 {
+            let values: Vec<f64> = arms.iter().map(|errors| errors[joint]).collect();
+            let mean = values.iter().sum::<f64>() / N_ARMS as f64;
+            let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / N_ARMS as f64;
+            assert!(mean.abs() < 0.1 && (variance * 6.0 - 1.0).abs() < 0.35, "joint {joint}: {mean} {variance}");
+            assert!(values.iter().all(|v| v.abs() < 1.0));
+        }
+    }
+}

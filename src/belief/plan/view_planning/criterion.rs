@@ -1,0 +1,261 @@
+//! What a view is worth: by how much it lowers the logarithm of the measure that views are chosen by.
+//!
+//! A view with `G = twists basis` and unit noise takes `P G^T S^-1 G P` off the covariance P, `S = I + G P G^T` (6 x 6). With
+//! the measure's rows L and `Y = L P G^T S^(-T/2)` (6 columns) the tool's variance, and the sum of variances, fall by `|Y|^2`, the
+//! volume by the factor `det(I - Y^T Y)`, and the largest variance becomes that of `L P L^T - Y Y^T`. G is never written out: P is
+//! taken to the few directions first.
+
+use nalgebra::{Cholesky, DMatrix, Matrix6, SMatrix, SymmetricEigen};
+
+use crate::calib::ParameterKind;
+use crate::plan::view_planning::parameter_prior::{N_COMMON, N_DIRECTIONS, ParameterPrior, WIDTH, columns};
+use crate::plan::view_planning::view_information::WhitenedView;
+use armcal_core::routine::PoseCriterion;
+use armcal_core::streams::MAX_JOINTS;
+
+/// Gains and offsets of the joints before the camera.
+const MAX_LINEAR: usize = 2 * MAX_JOINTS;
+type Linear = SMatrix<f64, MAX_LINEAR, MAX_LINEAR>;
+
+/// What is to become small.
+#[derive(Clone, Debug)]
+pub(crate) struct DesignObjective {
+    criterion: PoseCriterion,
+    /// L: of the tool's position at the targets over the root of their number, or of gains and offsets in units of their priors.
+    rows: DMatrix<f64>,
+    /// What no view lowers.
+    floor: f64,
+}
+
+/// The covariance after the views taken so far.
+#[derive(Clone, Debug)]
+pub(crate) struct DesignState {
+    measure: DesignObjective,
+    n_joints: usize,
+    covariance: DMatrix<f64>,
+    /// `L P`; for the volume `C^-1 L P`, where `C C^T = L P L^T`.
+    reach: DMatrix<f64>,
+    /// `L P L^T` of gains and offsets; beyond them zero.
+    linear: Linear,
+    /// Logarithm of the measure, a variance.
+    pub ln_value: f64,
+}
+
+/// Memory for [`Standing::gain`].
+#[derive(Clone, Debug)]
+pub(crate) struct Scratch {
+    /// `P E^T`, one column for each joint.
+    by_joint: DMatrix<f64>,
+    /// `L P E^T`.
+    reached: DMatrix<f64>,
+    /// Y.
+    told: DMatrix<f64>,
+}
+
+impl DesignObjective {
+    pub(crate) fn of_tool(rows: DMatrix<f64>, floor: f64) -> Self {
+        Self { criterion: PoseCriterion::ToolError, rows, floor }
+    }
+
+    /// Of the sensors' gains and offsets, in units of their priors.
+    pub(crate) fn of_sensors(criterion: PoseCriterion, unknowns: &ParameterPrior) -> Self {
+        let is_linear = |kind: ParameterKind| matches!(kind, ParameterKind::Gain | ParameterKind::Offset);
+        let linear: Vec<usize> = columns(unknowns.n_joints)
+            .enumerate()
+            .filter(|(column, p)| is_linear(p.kind) && unknowns.covariance[(*column, *column)] > 0.0)
+            .map(|(column, _)| column)
+            .collect();
+        let mut rows = DMatrix::zeros(linear.len(), unknowns.n());
+        for (row, &column) in linear.iter().enumerate() {
+            rows[(row, column)] = unknowns.covariance[(column, column)].sqrt().recip();
+        }
+        Self { criterion, rows, floor: 0.0 }
+    }
+}
+
+impl DesignState {
+    pub(crate) fn new(measure: DesignObjective, unknowns: &ParameterPrior) -> Self {
+        let mut standing = Self {
+            measure,
+            n_joints: unknowns.n_joints,
+            covariance: unknowns.covariance.clone(),
+            reach: DMatrix::zeros(0, 0),
+            linear: Linear::zeros(),
+            ln_value: 0.0,
+        };
+        standing.renew();
+        standing
+    }
+
+    pub(crate) fn scratch(&self) -> Scratch {
+        let (n_rows, n) = self.reach.shape();
+        Scratch {
+            by_joint: DMatrix::zeros(n, MAX_JOINTS),
+            reached: DMatrix::zeros(n_rows, N_DIRECTIONS),
+            told: DMatrix::zeros(n_rows, 6),
+        }
+    }
+
+    /// Logarithm of the measure now less that after `view`: not negative.
+    pub(crate) fn gain(&self, view: &WhitenedView, scratch: &mut Scratch) -> f64 {
+        let Some(half) = self.whitened(view, &mut scratch.by_joint) else { return 0.0 };
+        self.reach_along(view, &mut scratch.reached);
+        let (n_rows, _) = self.reach.shape();
+        let told = &mut scratch.told;
+        told.fill(0.0);
+        for direction in self.directions() {
+            let from = &scratch.reached.as_slice()[direction * n_rows..][..n_rows];
+            for k in 0..6 {
+                add_scaled(&mut told.as_mut_slice()[k * n_rows..][..n_rows], from, half[(k, direction)]);
+            }
+        }
+        let after = self.ln_after(told);
+        (self.ln_value - after).max(0.0)
+    }
+
+    fn ln_after(&self, told: &DMatrix<f64>) -> f64 {
+        let n_rows = told.nrows().max(1) as f64;
+        match self.measure.criterion {
+            PoseCriterion::ToolError | PoseCriterion::Random | PoseCriterion::AOptimal => {
+                let lowered: f64 = told.iter().map(|y| y * y).sum();
+                // The rest of what was subtracted from is rounding.
+                (self.ln_value.exp() - lowered).max(1e-24).ln()
+            }
+            PoseCriterion::DOptimal => {
+                let inner = Matrix6::identity() - Matrix6::from_fn(|i, k| told.column(i).dot(&told.column(k)));
+                self.ln_value + inner.determinant().max(1e-300).ln() / n_rows
+            }
+            PoseCriterion::EOptimal => {
+                let mut linear = self.linear;
+                for k in 0..6 {
+                    for column in 0..told.nrows() {
+                        let by = told[(column, k)];
+                        for row in 0..told.nrows() {
+                            linear[(row, column)] -= by * told[(row, k)];
+                        }
+                    }
+                }
+                largest(&linear)
+            }
+        }
+    }
+
+    /// Takes `view`: its rank-6 update of the covariance.
+    pub(crate) fn take(&mut self, view: &WhitenedView, scratch: &mut Scratch) {
+        let Some(half) = self.whitened(view, &mut scratch.by_joint) else { return };
+        let n = self.covariance.nrows();
+        let mut moved = DMatrix::zeros(n, 6);
+        let at = self.n_joints * WIDTH;
+        for direction in self.directions() {
+            let from = if direction < MAX_JOINTS {
+                scratch.by_joint.column(direction)
+            } else {
+                self.covariance.column(at + direction - MAX_JOINTS)
+            };
+            for k in 0..6 {
+                moved.column_mut(k).axpy(half[(k, direction)], &from, 1.0);
+            }
+        }
+        self.covariance.gemm(-1.0, &moved, &moved.transpose(), 1.0);
+        self.renew();
+    }
+
+    fn renew(&mut self) {
+        self.reach = &self.measure.rows * &self.covariance;
+        let linear = &self.reach * self.measure.rows.transpose();
+        let n_rows = linear.nrows().max(1) as f64;
+        self.ln_value = match self.measure.criterion {
+            PoseCriterion::ToolError | PoseCriterion::Random | PoseCriterion::AOptimal => {
+                (linear.trace() + self.measure.floor).max(1e-24).ln()
+            }
+            PoseCriterion::DOptimal => match Cholesky::new(linear) {
+                Some(factor) => {
+                    factor.l_dirty().solve_lower_triangular_mut(&mut self.reach);
+                    2.0 * factor.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>() / n_rows
+                }
+                None => f64::NEG_INFINITY,
+            },
+            PoseCriterion::EOptimal => {
+                let n = linear.nrows().min(MAX_LINEAR);
+                self.linear.view_mut((0, 0), (n, n)).copy_from(&linear.view((0, 0), (n, n)));
+                largest(&self.linear)
+            }
+        };
+    }
+
+    fn directions(&self) -> impl Iterator<Item = usize> + use<> {
+        (0..self.n_joints).chain(MAX_JOINTS..N_DIRECTIONS)
+    }
+
+    /// `S^(-1/2) twists`, with `P E^T` of the joints in `by_joint`; `None` where S overflows.
+    fn whitened(
+        &self,
+        view: &WhitenedView,
+        by_joint: &mut DMatrix<f64>,
+    ) -> Option<crate::plan::view_planning::view_information::Twists> {
+        let n = self.covariance.nrows();
+        let at = self.n_joints * WIDTH;
+        let mut along = SMatrix::<f64, N_DIRECTIONS, N_DIRECTIONS>::zeros();
+        let p = self.covariance.as_slice();
+        for joint in 0..self.n_joints {
+            let out = &mut by_joint.as_mut_slice()[joint * n..][..n];
+            out.fill(0.0);
+            for (k, by) in view.basis[joint].iter().enumerate() {
+                add_scaled(out, &p[(joint * WIDTH + k) * n..][..n], *by);
+            }
+            for other in 0..=joint {
+                let dot = dot(&view.basis[other], &out[other * WIDTH..][..WIDTH]);
+                along[(joint, other)] = dot;
+                along[(other, joint)] = dot;
+            }
+            for common in 0..N_COMMON {
+                along[(joint, MAX_JOINTS + common)] = out[at + common];
+                along[(MAX_JOINTS + common, joint)] = out[at + common];
+            }
+        }
+        let common = self.covariance.fixed_view::<N_COMMON, N_COMMON>(at, at);
+        along.fixed_view_mut::<N_COMMON, N_COMMON>(MAX_JOINTS, MAX_JOINTS).copy_from(&common);
+        let spread = Matrix6::identity() + view.twists * along * view.twists.transpose();
+        Cholesky::new(spread)?.l().solve_lower_triangular(&view.twists)
+    }
+
+    /// `L P E^T`, a column for each direction.
+    fn reach_along(&self, view: &WhitenedView, reached: &mut DMatrix<f64>) {
+        let n_rows = self.reach.nrows();
+        let at = self.n_joints * WIDTH;
+        let reach = self.reach.as_slice();
+        for direction in self.directions() {
+            let out = &mut reached.as_mut_slice()[direction * n_rows..][..n_rows];
+            if direction >= MAX_JOINTS {
+                let column = at + direction - MAX_JOINTS;
+                out.copy_from_slice(&reach[column * n_rows..][..n_rows]);
+                continue;
+            }
+            out.fill(0.0);
+            for (k, by) in view.basis[direction].iter().enumerate() {
+                add_scaled(out, &reach[(direction * WIDTH + k) * n_rows..][..n_rows], *by);
+            }
+        }
+    }
+
+    #[cfg(test)]
+    pub(crate) fn covariance(&self) -> &DMatrix<f64> {
+        &self.covariance
+    }
+}
+
+/// Logarithm of the largest eigenvalue.
+fn largest(matrix: &Linear) -> f64 {
+    let values = SymmetricEigen::new(*matrix).eigenvalues;
+    values.max().max(1e-24).ln()
+}
+
+fn add_scaled(out: &mut [f64], from: &[f64], by: f64) {
+    for (out, from) in out.iter_mut().zip(from) {
+        *out += by * from;
+    }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}

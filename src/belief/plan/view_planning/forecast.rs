@@ -1,0 +1,200 @@
+//! The tool error to be expected once views are fitted, every tag with a survey error of its own.
+//!
+//! The information of joints, mount and tags together: a view with the camera's twists by parameters B, by tags `-Ad_i`, and by its own
+//! joint errors D (variance s^2) adds `sum G_i^T H_i G_i` with `G_i = [B, -Ad_i]`, less what its own errors take:
+//! `V (diag(1/s^2) + D^T H D)^-1 V^T`, `V = sum G_i^T H_i D`. These are the normal equations of `bundle` at what is believed.
+
+use nalgebra::{Cholesky, DMatrix, Matrix6, Vector3};
+
+use crate::plan::view_planning::PoseRequest;
+use crate::plan::view_planning::parameter_prior::{ParameterPrior, WIDTH, basis};
+use crate::plan::view_planning::view_information::ViewJacobian;
+use armcal_core::robot::Robot;
+use armcal_core::stats::quantile;
+use armcal_core::streams::{JointAngles, MAX_JOINTS};
+
+/// What is known of joints, mount and tags.
+#[derive(Clone, Debug)]
+pub(crate) struct Forecast {
+    information: DMatrix<f64>,
+    /// Columns of the unknowns that are not known exactly.
+    kept: Vec<usize>,
+    n_joints: usize,
+    joint_info: [f64; MAX_JOINTS],
+    task: Task,
+}
+
+/// The tool at the targets.
+#[derive(Clone, Debug)]
+pub(crate) struct Task {
+    /// Tool position by parameters, three rows a target, over the root of the number of targets.
+    pub rows: DMatrix<f64>,
+    /// Variance that no view of the camera lowers, m^2: what parameters leave of each sensor, and joints behind the camera.
+    pub floor_m2: f64,
+}
+
+/// What the joints at the edges of their reachable ranges count beside the task. Assumed: little, so that the task decides.
+const EDGE_SHARE: f64 = 0.3;
+/// Quantiles of the reachable angles that count as edges.
+const EDGES: [f64; 2] = [0.01, 0.99];
+/// Least standard deviation of what is said to be exact.
+const MIN_STD: f64 = 1e-6;
+
+impl Task {
+    pub(crate) fn new(request: &PoseRequest<'_>, unknowns: &ParameterPrior) -> Self {
+        let robot = request.robot;
+        // Without a task any posture may be one: the present stands for it.
+        let here = [*request.start];
+        let postures = if request.task.is_empty() { &here[..] } else { request.task };
+        let share = (postures.len() as f64).sqrt().recip();
+        let mut rows = DMatrix::zeros(3 * postures.len(), unknowns.n());
+        let mut floor_m2 = 0.0;
+        for (target, angles) in postures.iter().enumerate() {
+            let poses = robot.chain.link_poses(angles);
+            let tool_m = poses.frame(&robot.tool.mount).translation.vector;
+            for joint in 0..robot.tool.mount.n_joints {
+                let by_angle: Vector3<f64> = poses.point_jacobian(joint, &tool_m) * share;
+                if joint >= unknowns.n_joints {
+                    floor_m2 += by_angle.norm_squared() * unseen_rad2(request, joint, angles[joint]);
+                    continue;
+                }
+                floor_m2 += by_angle.norm_squared() * unknowns.joint_std_rad[joint].powi(2);
+                for (k, by) in basis(robot, joint, angles[joint]).iter().enumerate() {
+                    rows.fixed_view_mut::<3, 1>(3 * target, joint * WIDTH + k).copy_from(&(by_angle * *by));
+                }
+            }
+        }
+        Self { rows, floor_m2 }
+    }
+}
+
+impl Task {
+    /// The rows, and ten more for what lies beyond the task: each joint at both edges of what `angles` reach, as far as it moves the tool
+    /// at the targets, with the share [`EDGE_SHARE`] of the whole. Margins shrink where joints are known, and there are tasks after this one.
+    pub(crate) fn with_edges(&self, robot: &Robot, n_joints: usize, angles: &[JointAngles]) -> DMatrix<f64> {
+        let n_rows = self.rows.nrows();
+        let mut rows = self.rows.clone().resize_vertically(n_rows + 2 * n_joints, 0.0);
+        let share = EDGE_SHARE / (2 * n_joints).max(1) as f64;
+        for joint in 0..n_joints {
+            // The column of the offset is the tool's motion by the angle itself.
+            let lever_m = self.rows.column(joint * WIDTH + 1).norm();
+            let of_joint: Vec<f64> = angles.iter().map(|angles| angles[joint]).collect();
+            for (k, q) in EDGES.into_iter().enumerate() {
+                let Some(angle_rad) = quantile(&of_joint, q) else { continue };
+                for (column, by) in basis(robot, joint, angle_rad).iter().enumerate() {
+                    rows[(n_rows + 2 * joint + k, joint * WIDTH + column)] = share.sqrt() * lever_m * by;
+                }
+            }
+        }
+        rows
+    }
+}
+
+/// Variance of the angle of a joint that the camera does not see move, rad^2.
+fn unseen_rad2(request: &PoseRequest<'_>, joint: usize, angle_rad: f64) -> f64 {
+    let spec = &request.robot.sensors[joint];
+    let found = request.belief.and_then(|belief| belief.joint.get(joint));
+    let gain_std = found.map_or(spec.gain_std, |joint| joint.gain_std_rad_per_count * spec.counts_per_rad.abs());
+    let offset_std_rad = found.map_or(spec.offset_std_rad, |joint| joint.offset_std_rad);
+    (gain_std * (angle_rad - spec.center_rad)).powi(2) + offset_std_rad.powi(2) + spec.linearity_std_rad.powi(2)
+}
+
+impl Forecast {
+    pub(crate) fn new(robot: &Robot, unknowns: &ParameterPrior, task: Task) -> Option<Self> {
+        // Without the survey's common error: here each tag has its own.
+        let n = unknowns.n() - 6;
+        let kept: Vec<usize> = (0..n).filter(|&k| unknowns.covariance[(k, k)] > 0.0).collect();
+        let prior = DMatrix::from_fn(kept.len(), kept.len(), |i, k| unknowns.covariance[(kept[i], kept[k])]);
+        let size = kept.len() + 6 * robot.tags.len();
+        let mut information = DMatrix::zeros(size, size);
+        information.view_mut((0, 0), prior.shape()).copy_from(&regular(prior)?.inverse());
+        for (tag, surveyed) in robot.tags.iter().enumerate() {
+            for k in 0..6 {
+                let std = if k < 3 { surveyed.position_std_m } else { surveyed.rotation_std_rad };
+                let at = kept.len() + 6 * tag + k;
+                // Nothing known is a little: the equations stay regular.
+                information[(at, at)] = if std.is_finite() { std.max(MIN_STD).powi(-2) } else { 1e-4 };
+            }
+        }
+        let joint_info = unknowns.joint_std_rad.map(|std_rad| std_rad.powi(-2));
+        Some(Self { information, kept, n_joints: unknowns.n_joints, joint_info, task })
+    }
+
+    pub(crate) fn add(&mut self, view: &ViewJacobian) {
+        let n_common = self.kept.len();
+        let n_rows = 6 * view.sights.len();
+        let n = self.information.nrows();
+        // Rows of each tag whitened by the root of its information.
+        let mut rows = DMatrix::zeros(n_rows, n);
+        let mut own = DMatrix::zeros(n_rows, self.n_joints);
+        let by_parameter = self.by_parameter(view);
+        for (k, sight) in view.sights.iter().enumerate() {
+            let Some(factor) = Cholesky::new(sight.info) else { continue };
+            let root: Matrix6<f64> = factor.l().transpose();
+            rows.view_mut((6 * k, 0), (6, n_common)).copy_from(&(root * &by_parameter));
+            let of_tag = -(root * sight.adjoint);
+            rows.fixed_view_mut::<6, 6>(6 * k, n_common + 6 * sight.tag).copy_from(&of_tag);
+            let twists = view.twists.columns(0, self.n_joints);
+            own.view_mut((6 * k, 0), (6, self.n_joints)).copy_from(&(root * twists));
+        }
+        self.information.gemm_tr(1.0, &rows, &rows, 1.0);
+        let mut inner = own.tr_mul(&own);
+        for joint in 0..self.n_joints {
+            inner[(joint, joint)] += self.joint_info[joint];
+        }
+        let Some(factor) = Cholesky::new(inner) else { return };
+        let across = own.tr_mul(&rows);
+        let mut half = across;
+        factor.l_dirty().solve_lower_triangular_mut(&mut half);
+        self.information.gemm_tr(-1.0, &half, &half, 1.0);
+    }
+
+    /// Twists of the camera by each of the kept parameters.
+    fn by_parameter(&self, view: &ViewJacobian) -> SMatrixX {
+        let at = self.n_joints * WIDTH;
+        let mut out = SMatrixX::zeros(self.kept.len());
+        for (to, &column) in self.kept.iter().enumerate() {
+            let twist = if column < at {
+                let (joint, k) = (column / WIDTH, column % WIDTH);
+                view.twists.column(joint) * view.basis[joint][k]
+            } else {
+                view.twists.column(MAX_JOINTS + column - at).into_owned()
+            };
+            out.set_column(to, &twist);
+        }
+        out
+    }
+
+    /// Mean over the targets of the tool's variance, m^2; infinite where the equations have no inverse.
+    pub(crate) fn tool_variance_m2(&self) -> f64 {
+        let Some(factor) = Cholesky::new(self.information.clone()) else { return f64::INFINITY };
+        let rows = &self.task.rows;
+        let mut right = DMatrix::zeros(self.information.nrows(), rows.nrows());
+        for (to, &column) in self.kept.iter().enumerate() {
+            for row in 0..rows.nrows() {
+                right[(to, row)] = rows[(row, column)];
+            }
+        }
+        factor.l_dirty().solve_lower_triangular_mut(&mut right);
+        right.iter().map(|x| x * x).sum::<f64>() + self.task.floor_m2
+    }
+}
+
+/// Six rows, as many columns as there are parameters.
+type SMatrixX = nalgebra::OMatrix<f64, nalgebra::Const<6>, nalgebra::Dyn>;
+
+/// With an inverse in spite of the rounding of a calibration's file.
+fn regular(matrix: DMatrix<f64>) -> Option<Cholesky<f64, nalgebra::Dyn>> {
+    let mut share = 0.0;
+    while share < 0.1 {
+        let raised = DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, k| {
+            let value = 0.5 * (matrix[(i, k)] + matrix[(k, i)]);
+            if i == k { value * (1.0 + share) } else { value }
+        });
+        if let Some(factor) = Cholesky::new(raised) {
+            return Some(factor);
+        }
+        share = if share == 0.0 { 1e-6 } else { 10.0 * share };
+    }
+    None
+}

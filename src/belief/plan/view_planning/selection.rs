@@ -1,0 +1,279 @@
+//! Which of the candidates: greedily the most telling for the arm's time, then by exchange.
+//!
+//! A pick is worth its gain (the fall of the measure's logarithm) over the root of the time that it adds to the tour: cost-benefit
+//! greedy (Leskovec et al. 2007) with the exponent [`TIME_POWER`]. Gains fall as views come in, so a gain computed earlier
+//! is taken for an upper bound, and most candidates need not be looked at again (lazy greedy, Minoux 1978). Exchange then
+//! puts one candidate in place of one pick as long as `ln measure + TIME_POWER ln time` falls.
+
+use crate::plan::view_planning::candidates::Candidate;
+use crate::plan::view_planning::criterion::{DesignObjective, DesignState, Scratch};
+use crate::plan::view_planning::parameter_prior::ParameterPrior;
+use crate::plan::view_planning::view_information::WhitenedView;
+use crate::plan::view_planning::visit_order::Tour;
+use armcal_core::streams::JointAngles;
+
+/// What the arm's time counts beside the measure.
+const TIME_POWER: f64 = 0.7;
+const MAX_ROUNDS: usize = 3;
+/// An exchange that gains less than this is not made.
+const LEAST_GAIN: f64 = 1e-3;
+/// Candidates that an exchange looks at: those that would gain most on top of all that is picked.
+const SHORTLIST: usize = 120;
+/// Of two stale gains the one that is larger by rounding is not larger.
+const ROUNDING: f64 = 1e-12;
+
+/// What is picked from, and for what.
+pub(crate) struct ViewSelector<'a> {
+    pub candidates: &'a [Candidate],
+    /// What each of them tells.
+    pub whitened_views: Vec<WhitenedView>,
+    pub tour: Tour<'a>,
+    /// Time of a view at rest, s.
+    pub view_s: f64,
+    /// The first of so many in a row shows a known tag, as long as there are such candidates.
+    pub anchored_every: usize,
+    /// Before the picks; the views taken already are in it.
+    pub standing: DesignState,
+}
+
+/// What a candidate's gain is worth.
+type Score<'a> = dyn Fn(usize, f64) -> f64 + 'a;
+/// Whether a candidate may be taken.
+type May<'a> = dyn Fn(usize) -> bool + 'a;
+
+/// Picks in the order of their tour.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Picks {
+    pub order: Vec<usize>,
+    placed: Vec<JointAngles>,
+}
+
+impl Picks {
+    fn insert(&mut self, at: usize, k: usize, angles: JointAngles) {
+        self.order.insert(at, k);
+        self.placed.insert(at, angles);
+    }
+
+    fn without(&self, place: usize) -> Self {
+        let mut rest = self.clone();
+        rest.order.remove(place);
+        rest.placed.remove(place);
+        rest
+    }
+}
+
+impl<'a> ViewSelector<'a> {
+    pub(crate) fn new(
+        (candidates, tellings): (&'a [Candidate], Vec<WhitenedView>),
+        tour: Tour<'a>,
+        view_s: f64,
+        anchored_every: usize,
+        (measure, unknowns): (DesignObjective, &ParameterPrior),
+        taken: &[WhitenedView],
+    ) -> Self {
+        let mut standing = DesignState::new(measure, unknowns);
+        let mut scratch = standing.scratch();
+        taken.iter().for_each(|view| standing.take(view, &mut scratch));
+        Self { candidates, whitened_views: tellings, tour, view_s, anchored_every, standing }
+    }
+
+    /// `n` of them, or all; indices.
+    pub(crate) fn pick(&self, n: usize) -> Vec<usize> {
+        let picks = self.exchanged(self.greedy(n));
+        picks.order
+    }
+
+    pub(crate) fn greedy(&self, n: usize) -> Picks {
+        let mut standing = self.standing.clone();
+        let mut scratch = standing.scratch();
+        let mut picks = Picks::default();
+        let mut gains = vec![f64::INFINITY; self.candidates.len()];
+        let mut is_fresh = vec![false; self.candidates.len()];
+        let mut places = vec![(0, 0.0); self.candidates.len()];
+        let has_anchor = self.candidates.iter().any(|candidate| candidate.shows_known_tag);
+        for turn in 0..n.min(self.candidates.len()) {
+            is_fresh.fill(false);
+            let must_anchor = self.anchored_every > 1 && turn.is_multiple_of(self.anchored_every) && has_anchor;
+            let may = |k: usize| !must_anchor || self.candidates[k].shows_known_tag;
+            for (k, place) in places.iter_mut().enumerate().filter(|(k, _)| gains[*k] >= 0.0 && may(*k)) {
+                *place = self.tour.insertion(&picks.placed, &self.candidates[k].angles);
+            }
+            let score = |k: usize, gain: f64| gain / (self.view_s + places[k].1).powf(TIME_POWER);
+            let Some(best) = self.best(&standing, &mut scratch, &mut gains, &mut is_fresh, (&score, &may)) else {
+                // Of those that may be taken none is left.
+                if must_anchor { continue } else { break }
+            };
+            let candidate = &self.candidates[best];
+            standing.take(&self.whitened_views[best], &mut scratch);
+            picks.insert(places[best].0, best, candidate.angles);
+            // Taken.
+            gains[best] = -1.0;
+        }
+        picks
+    }
+
+    /// The candidate of the highest score; stale gains are renewed from the highest bound on.
+    fn best(
+        &self,
+        standing: &DesignState,
+        scratch: &mut Scratch,
+        gains: &mut [f64],
+        is_fresh: &mut [bool],
+        (score, may): (&Score<'_>, &May<'_>),
+    ) -> Option<usize> {
+        let mut order: Vec<(f64, usize)> = gains
+            .iter()
+            .enumerate()
+            .filter(|(k, gain)| **gain >= 0.0 && may(*k))
+            .map(|(k, gain)| (score(k, *gain), k))
+            .collect();
+        order.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        let mut best: Option<(f64, usize)> = None;
+        for (bound, k) in order {
+            if best.is_some_and(|(most, _)| bound <= most * (1.0 + ROUNDING)) {
+                break;
+            }
+            if !is_fresh[k] {
+                gains[k] = standing.gain(&self.whitened_views[k], scratch);
+                is_fresh[k] = true;
+            }
+            let now = score(k, gains[k]);
+            if best.is_none_or(|(most, _)| now > most) {
+                best = Some((now, k));
+            }
+        }
+        best.map(|(_, k)| k)
+    }
+
+    #[cfg(test)]
+    pub(crate) fn ln_value(&self, order: &[usize]) -> f64 {
+        self.after(order).ln_value
+    }
+
+    fn after(&self, order: &[usize]) -> DesignState {
+        let mut standing = self.standing.clone();
+        let mut scratch = standing.scratch();
+        order.iter().for_each(|&k| standing.take(&self.whitened_views[k], &mut scratch));
+        standing
+    }
+
+    fn time_s(&self, picks: &Picks) -> f64 {
+        self.tour.travel_time_s(&picks.placed) + picks.order.len() as f64 * self.view_s
+    }
+
+    pub(crate) fn exchanged(&self, mut picks: Picks) -> Picks {
+        for _ in 0..MAX_ROUNDS {
+            let shortlist = self.shortlist(&picks);
+            let mut helped = false;
+            for place in 0..picks.order.len() {
+                if let Some(better) = self.exchange(&picks, place, &shortlist) {
+                    picks = better;
+                    helped = true;
+                }
+            }
+            if !helped {
+                break;
+            }
+        }
+        picks
+    }
+
+    fn shortlist(&self, picks: &Picks) -> Vec<usize> {
+        let standing = self.after(&picks.order);
+        let mut scratch = standing.scratch();
+        let left = (0..self.candidates.len()).filter(|k| !picks.order.contains(k));
+        let mut gains: Vec<(f64, usize)> =
+            left.map(|k| (standing.gain(&self.whitened_views[k], &mut scratch), k)).collect();
+        gains.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        gains.into_iter().take(SHORTLIST).map(|(_, k)| k).collect()
+    }
+
+    /// The picks with one other in place of the one at `place`, if that is better.
+    fn exchange(&self, picks: &Picks, place: usize, shortlist: &[usize]) -> Option<Picks> {
+        let out = picks.order[place];
+        let rest = picks.without(place);
+        let standing = self.after(&rest.order);
+        let mut scratch = standing.scratch();
+        let way_s = self.time_s(&rest) + self.view_s;
+        let mut worth = |k: usize| {
+            let (at, cost_s) = self.tour.insertion(&rest.placed, &self.candidates[k].angles);
+            let gain = standing.gain(&self.whitened_views[k], &mut scratch);
+            (gain - TIME_POWER * (way_s + cost_s).max(1e-9).ln(), at)
+        };
+        let (now, _) = worth(out);
+        let may = |k: usize| {
+            !picks.order.contains(&k)
+                && (self.anchored_every <= 1
+                    || self.candidates[k].shows_known_tag
+                    || !self.candidates[out].shows_known_tag)
+        };
+        let mut best: Option<(f64, usize, usize)> = None;
+        for &k in shortlist.iter().filter(|&&k| may(k)) {
+            let (value, at) = worth(k);
+            if value > now + LEAST_GAIN && best.is_none_or(|(most, ..)| value > most) {
+                best = Some((value, k, at));
+            }
+        }
+        let (_, k, at) = best?;
+        let mut better = rest;
+        better.insert(at, k, self.candidates[k].angles);
+        Some(better)
+    }
+
+    /// The same as [`Self::greedy`] with every gain renewed in every turn.
+    #[cfg(test)]
+    pub(crate) fn eager(&self, n: usize) -> Vec<usize> {
+        let mut standing = self.standing.clone();
+        let mut scratch = standing.scratch();
+        let mut picks = Picks::default();
+        for _ in 0..n {
+            let worth = |k: usize, scratch: &mut Scratch| {
+                let (at, cost_s) = self.tour.insertion(&picks.placed, &self.candidates[k].angles);
+                let gain = standing.gain(&self.whitened_views[k], scratch);
+                (gain / (self.view_s + cost_s).powf(TIME_POWER), at)
+            };
+            let left = (0..self.candidates.len()).filter(|k| !picks.order.contains(k));
+            let all: Vec<(f64, usize, usize)> = left
+                .map(|k| {
+                    let (value, at) = worth(k, &mut scratch);
+                    (value, k, at)
+                })
+                .collect();
+            let Some(&(_, k, at)) = all.iter().max_by(|a, b| a.0.total_cmp(&b.0)) else { break };
+            standing.take(&self.whitened_views[k], &mut scratch);
+            picks.insert(at, k, self.candidates[k].angles);
+        }
+        picks.order
+    }
+
+    /// `ln measure + TIME_POWER ln time`: what an exchange lowers.
+    #[cfg(test)]
+    pub(crate) fn objective(&self, picks: &Picks) -> f64 {
+        self.ln_value(&picks.order) + TIME_POWER * self.time_s(picks).max(1e-9).ln()
+    }
+
+    /// The first `n` of `chosen` to visit: each time that of the highest gain for its time from where the arm then is.
+    pub(crate) fn most_informative_first(&self, chosen: &[usize], n: usize) -> Vec<usize> {
+        let mut standing = self.standing.clone();
+        let mut scratch = standing.scratch();
+        let (mut first, mut at): (Vec<usize>, JointAngles) = (Vec::new(), self.tour.start);
+        for _ in 0..n.min(chosen.len()) {
+            let worth = |k: usize, scratch: &mut Scratch| {
+                let way_s = self.tour.timing.least_duration_s(&at, &self.candidates[k].angles);
+                standing.gain(&self.whitened_views[k], scratch) / (self.view_s + way_s)
+            };
+            let mut best: Option<(f64, usize)> = None;
+            for &k in chosen.iter().filter(|k| !first.contains(*k)) {
+                let value = worth(k, &mut scratch);
+                if best.is_none_or(|(most, _)| value > most) {
+                    best = Some((value, k));
+                }
+            }
+            let Some((_, k)) = best else { break };
+            standing.take(&self.whitened_views[k], &mut scratch);
+            at = self.candidates[k].angles;
+            first.push(k);
+        }
+        first
+    }
+}

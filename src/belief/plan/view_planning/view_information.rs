@@ -1,0 +1,182 @@
+//! A view to come, linearized: what its tags' corners will tell of the camera's pose.
+//!
+//! The camera's pose perturbed on the right by `xi` (translation, rotation) moves a point p of its frame by `-rho - omega x p`,
+//! so that one tag has the information `H = sum over corners J^T W J`, J = d(pixel)/d(xi), W the inverse of the corner noise.
+//! Parameters move the camera by `xi = sum_j d_j (b_j . p_j) + mount - Ad(camera from base) survey`, d_j the twist that joint j
+//! gives it. The joints' own errors of a view add `sum_j d_j d_j^T s_j^2` to the noise `H^-1`.
+
+use nalgebra::{Cholesky, Isometry3, Matrix6, SMatrix, Vector3};
+
+use crate::plan::view_planning::parameter_prior::{Basis, N_DIRECTIONS, ParameterPrior, WIDTH, basis};
+use armcal_core::optics::{CornerNoise, image_jacobian, square_corners};
+use armcal_core::robot::Robot;
+use armcal_core::spatial::adjoint;
+use armcal_core::streams::{JointAngles, MAX_JOINTS};
+
+/// Columns: each joint's angle, mount, survey.
+pub(crate) type Twists = SMatrix<f64, 6, N_DIRECTIONS>;
+
+/// One tag of a view.
+#[derive(Clone, Debug)]
+pub(crate) struct TagInformation {
+    pub tag: usize,
+    /// On the camera's pose, right.
+    pub info: Matrix6<f64>,
+    /// Ad(camera from tag).
+    pub adjoint: Matrix6<f64>,
+}
+
+/// A view linearized.
+#[derive(Clone, Debug)]
+pub(crate) struct ViewJacobian {
+    pub basis: Basis,
+    pub twists: Twists,
+    pub sights: Vec<TagInformation>,
+}
+
+/// What a view tells, its noise made one: `z = twists (basis p, common) + unit noise`.
+#[derive(Clone, Debug)]
+pub(crate) struct WhitenedView {
+    pub basis: Basis,
+    pub twists: Twists,
+}
+
+/// What looks at the tags.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct CornerModel {
+    /// Images that a view's corners are the mean of.
+    pub n_frames: f64,
+    /// Corner noise over the datasheet's.
+    pub noise: f64,
+}
+
+/// Images a second of a detector. Assumed: slow ones read as many.
+const FRAMES_PER_S: f64 = 5.0;
+/// Range at which robot.toml's corner noise is meant, facing the tag, m.
+const REFERENCE_RANGE_M: f64 = 1.0;
+/// Of each tag's own survey error, the share that counts as noise of a view when views are ranked: the rest is known as soon as a few views
+/// have tied the tags together. Assumed; the forecast has each tag by itself.
+const OWN_SURVEY_SHARE: f64 = 0.35;
+
+impl CornerModel {
+    pub(crate) fn new(dwell_s: f64, noise: f64) -> Self {
+        Self { n_frames: (FRAMES_PER_S * dwell_s).floor().max(1.0), noise }
+    }
+
+    /// Information of one tag on the camera's pose; `None` where the lens does not see all its corners.
+    pub(crate) fn information(
+        &self,
+        robot: &Robot,
+        camera_from_tag: &Isometry3<f64>,
+        size_m: f64,
+    ) -> Option<Matrix6<f64>> {
+        let lens = &robot.camera.lens;
+        let points = square_corners(size_m).map(|corner| (camera_from_tag * corner).coords);
+        let mut corners_px = [[0.0; 2]; 4];
+        let mut rows = [SMatrix::<f64, 2, 6>::zeros(); 4];
+        for ((pixel_px, row), point) in corners_px.iter_mut().zip(&mut rows).zip(&points) {
+            let (pixel, by_point) = lens.project_with_jacobian(point)?;
+            *pixel_px = [pixel.x, pixel.y];
+            let [x, y] = image_jacobian(&by_point, point);
+            *row = SMatrix::from_rows(&[x.into(), y.into()]);
+        }
+        let weights = self.weights(robot, &corners_px, camera_from_tag.translation.vector.norm(), size_m);
+        Some(rows.iter().zip(weights).map(|(row, weight)| row.tr_mul(row) * weight).sum())
+    }
+
+    /// Inverse variance of each corner's coordinates, px^-2: robot.toml's at the reference range, and by the model of corner
+    /// noise at others.
+    fn weights(&self, robot: &Robot, corners_px: &[[f64; 2]; 4], range_m: f64, size_m: f64) -> [f64; 4] {
+        let usual_px2 = reference_px2(robot.camera.lens.focal_px[0], size_m);
+        let stated_px2 = (robot.camera.corner_std_px * self.noise).powi(2) / self.n_frames;
+        let variances = CornerNoise::COASTAL.covariances_px2(corners_px, range_m, 0.0);
+        variances.map(|variance| usual_px2 / (0.5 * variance.trace() * stated_px2))
+    }
+
+    #[cfg(test)]
+    pub(crate) fn corner_weights(
+        &self,
+        robot: &Robot,
+        camera_from_tag: &Isometry3<f64>,
+        size_m: f64,
+    ) -> Option<[f64; 4]> {
+        let mut corners_px = [[0.0; 2]; 4];
+        for (pixel_px, corner) in corners_px.iter_mut().zip(square_corners(size_m)) {
+            let pixel = robot.camera.lens.project(&(camera_from_tag * corner).coords)?;
+            *pixel_px = [pixel.x, pixel.y];
+        }
+        Some(self.weights(robot, &corners_px, camera_from_tag.translation.vector.norm(), size_m))
+    }
+}
+
+/// A coordinate's variance by the same model at the reference range, px^2.
+fn reference_px2(focal_px: f64, size_m: f64) -> f64 {
+    let half_px = 0.5 * focal_px * size_m / REFERENCE_RANGE_M;
+    let square = [[-half_px, -half_px], [half_px, -half_px], [half_px, half_px], [-half_px, half_px]];
+    0.5 * CornerNoise::COASTAL.covariances_px2(&square, REFERENCE_RANGE_M, 0.0)[0].trace()
+}
+
+impl WhitenedView {
+    /// Nothing.
+    pub(crate) fn nothing() -> Self {
+        Self { basis: [[0.0; WIDTH]; MAX_JOINTS], twists: Twists::zeros() }
+    }
+}
+
+impl ViewJacobian {
+    /// `tags`: (index, probability that it is seen).
+    pub(crate) fn new(robot: &Robot, optics: CornerModel, angles: &JointAngles, tags: &[(usize, f64)]) -> Self {
+        let poses = robot.chain.link_poses(angles);
+        let base_from_camera = poses.frame(&robot.camera.mount);
+        let camera_from_base = base_from_camera.inverse();
+        let (eye_m, turn) = (base_from_camera.translation.vector, camera_from_base.rotation);
+        let n_joints = robot.camera.mount.n_joints;
+        let mut twists = Twists::zeros();
+        let mut by_joint: Basis = [[0.0; WIDTH]; MAX_JOINTS];
+        for (joint, by_parameter) in by_joint.iter_mut().enumerate().take(n_joints) {
+            *by_parameter = basis(robot, joint, angles[joint]);
+            let moved: Vector3<f64> = turn * poses.point_jacobian(joint, &eye_m);
+            let turned: Vector3<f64> = turn * poses.axis(joint);
+            twists.fixed_view_mut::<3, 1>(0, joint).copy_from(&moved);
+            twists.fixed_view_mut::<3, 1>(3, joint).copy_from(&turned);
+        }
+        twists.fixed_view_mut::<6, 6>(0, MAX_JOINTS).fill_diagonal(1.0);
+        twists.fixed_view_mut::<6, 6>(0, MAX_JOINTS + 6).copy_from(&-adjoint(&camera_from_base));
+        let sight = |&(tag, probability): &(usize, f64)| {
+            let surveyed = &robot.tags[tag];
+            let camera_from_tag = camera_from_base * surveyed.base_from_tag.isometry();
+            let info = optics.information(robot, &camera_from_tag, surveyed.size_m)? * probability;
+            Some(TagInformation { tag, info, adjoint: adjoint(&camera_from_tag) })
+        };
+        Self { basis: by_joint, twists, sights: tags.iter().filter_map(sight).collect() }
+    }
+
+    /// With the noise made one; `None` where the tags tell nothing of the camera's pose.
+    pub(crate) fn telling(&self, robot: &Robot, unknowns: &ParameterPrior) -> Option<WhitenedView> {
+        let mut info = Matrix6::zeros();
+        for sight in &self.sights {
+            info += with_own_survey_error(robot, sight)?;
+        }
+        let mut noise = Cholesky::new(info)?.inverse();
+        for joint in 0..unknowns.n_joints {
+            let twist = self.twists.column(joint);
+            noise += twist * twist.transpose() * unknowns.joint_std_rad[joint].powi(2);
+        }
+        let lower = Cholesky::new(noise)?.unpack();
+        let twists = lower.solve_lower_triangular(&self.twists)?;
+        Some(WhitenedView { basis: self.basis, twists })
+    }
+}
+
+/// The information left when the tag's own survey error is noise: `(H^-1 + A P A^T)^-1`.
+fn with_own_survey_error(robot: &Robot, sight: &TagInformation) -> Option<Matrix6<f64>> {
+    let tag = &robot.tags[sight.tag];
+    if !tag.is_known() {
+        // Mapped by the views themselves.
+        return Some(sight.info);
+    }
+    let std = |k: usize| OWN_SURVEY_SHARE * if k < 3 { tag.position_std_m } else { tag.rotation_std_rad };
+    let own = Matrix6::from_diagonal(&nalgebra::Vector6::from_fn(|k, _| std(k).powi(2)));
+    let noise = Cholesky::new(sight.info)?.inverse() + sight.adjoint * own * sight.adjoint.transpose();
+    Some(Cholesky::new(noise)?.inverse())
+}

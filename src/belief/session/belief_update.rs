@@ -1,0 +1,90 @@
+//! What the arm believes while views are still being captured.
+//!
+//! After every few views the recording so far is estimated, and the arm goes on by that: its set-points, its margins, the poses
+//! that it still wants. A calibration that is accepted in the end takes its place; one that is refused, and it is forgotten.
+
+use crate::calib::{Calibration, interim_estimate};
+use crate::plan::JointErrorBounds;
+use crate::session::SessionError;
+use crate::session::outcome::Epoch;
+use crate::session::script::{FreshBounds, ScriptRunner};
+use armcal_core::routine::{CaptureSettings, Margins, Method};
+use armcal_core::sensor::ArmSensors;
+use armcal_core::streams::{JointAngles, LogLevel};
+
+/// What was believed before the first running estimate of a capture.
+pub(crate) struct SavedBelief {
+    sensors: ArmSensors,
+    bounds: JointErrorBounds,
+    fresh: Option<FreshBounds>,
+}
+
+impl ScriptRunner<'_, '_> {
+    /// Whether this capture estimates as it goes.
+    pub(crate) fn replans(&self, capture: &CaptureSettings) -> bool {
+        capture.replan_every > 0 && self.setup.routine.method == Method::Bundle
+    }
+
+    /// The bounds that clearance is kept for.
+    pub(crate) fn kept_clear(&self, bounds: JointErrorBounds) -> JointErrorBounds {
+        match self.setup.routine.capture.margins {
+            Margins::Belief => bounds,
+            Margins::Off => JointErrorBounds::none(&self.robot),
+        }
+    }
+
+    /// Estimates from the views captured since the last calibration and goes on by that; where nothing can be told yet, by what
+    /// was believed before.
+    pub(crate) fn update_estimate(&mut self) -> Result<Option<Calibration>, SessionError> {
+        let recording = self.driver.recorder.read_back()?;
+        let began_s = self.driver.progress.wall_s();
+        let accepted = self.accepted.as_ref();
+        let mut found = interim_estimate(&recording, self.setup.robot, self.views_since, accepted);
+        if accepted.is_some() && found.is_err() {
+            // Something happened to the arm since: the new views alone tell how it is now.
+            found = interim_estimate(&recording, self.setup.robot, self.views_since, None);
+        }
+        self.tally.calibration_wall_s += self.driver.progress.wall_s() - began_s;
+        let calibration = match found {
+            Ok(calibration) => calibration,
+            Err(why) => {
+                self.driver.log(LogLevel::Info, &format!("the views so far change nothing: {why}"))?;
+                return Ok(None);
+            }
+        };
+        let Ok(sensors) = calibration.sensors(self.setup.robot) else { return Ok(None) };
+        if self.before_running.is_none() {
+            let (sensors, bounds) = (self.driver.sensors.clone(), self.bounds.clone());
+            self.before_running = Some(SavedBelief { sensors, bounds, fresh: self.fresh.take() });
+        }
+        self.bounds = self.kept_clear(self.bounds_of(&calibration, &sensors));
+        self.driver.believe(sensors.clone());
+        let last = self.epochs.last().and_then(|epoch| epoch.calibration.clone());
+        self.epochs.push(Epoch { from: self.driver.now(), sensors, calibration: last });
+        Ok(Some(calibration))
+    }
+
+    /// Goes back to what was believed before the running estimates: the views came to nothing.
+    pub(crate) fn forget_running(&mut self) {
+        let Some(SavedBelief { sensors, bounds, fresh }) = self.before_running.take() else { return };
+        (self.bounds, self.fresh) = (bounds, fresh);
+        self.driver.believe(sensors.clone());
+        let last = self.epochs.last().and_then(|epoch| epoch.calibration.clone());
+        self.epochs.push(Epoch { from: self.driver.now(), sensors, calibration: last });
+    }
+
+    pub(crate) fn bounds_of(&self, calibration: &Calibration, sensors: &ArmSensors) -> JointErrorBounds {
+        JointErrorBounds::believed(&calibration.scaled_robot(self.setup.robot), calibration, sensors)
+    }
+
+    /// Root mean square of the tool's position error that `calibration` expects over the task, m; `None` without a task.
+    pub(crate) fn expected_tool_error_m(&self, calibration: &Calibration) -> Option<f64> {
+        let targets: &[JointAngles] = &self.planned.as_ref()?.targets;
+        let robot = calibration.scaled_robot(self.setup.robot);
+        let sensors = calibration.sensors(&robot).ok()?;
+        let covariance = calibration.parameter_covariance(&robot);
+        let sum: f64 = targets.iter().map(|at| covariance.tool_position_m2(&robot, &sensors, at).trace()).sum();
+        let mean = sum / targets.len() as f64;
+        (!targets.is_empty() && mean.is_finite()).then(|| mean.max(0.0).sqrt())
+    }
+}
