@@ -34,6 +34,6 @@ pub use row::{Row, RunStatus};
 pub use shard::Shard;
 pub use single::{SingleRun, run_job};
 pub use statistics::{CampaignSummary, FigureStatistics, SettingStatistics, statistics};
-pub use store::{Store, write_results};
+pub use store::{ExistingRows, Store, write_results};
 pub use table_file::{Table, read_table, table_text};
 pub use tables::{markdown, table};

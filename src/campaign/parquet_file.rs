@@ -9,8 +9,8 @@ use parquet::basic::Compression;
 use parquet::errors::ParquetError;
 use parquet::file::properties::WriterProperties;
 
-use super::columns::{Columns, MetricKind};
-use super::{Row, Table};
+use crate::campaign::columns::{Columns, MetricKind};
+use crate::campaign::{Row, Table};
 
 /// The file's bytes; the same rows give the same bytes.
 pub(super) fn parquet_bytes(table: &Table) -> Result<Vec<u8>, ParquetError> {
@@ -52,8 +52,8 @@ fn batch(table: &Table) -> Result<RecordBatch, arrow::error::ArrowError> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::table_file::tests::{names, row};
     use super::*;
+    use crate::campaign::table_file::tests::{names, row};
     use arrow::array::Array;
     use arrow::datatypes::DataType;
 

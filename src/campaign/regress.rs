@@ -8,7 +8,7 @@
 use comfy_table::Table as Grid;
 use comfy_table::presets::UTF8_FULL_CONDENSED;
 
-use super::{Row, RunStatus, Table};
+use crate::campaign::{Row, RunStatus, Table};
 use armcal_core::routine::RegressSettings;
 use armcal_core::stats::{median_interval, quantile};
 
@@ -223,8 +223,8 @@ pub fn regress_table(comparison: &Comparison) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::table_file::tests::row;
     use super::*;
+    use crate::campaign::table_file::tests::row;
     use armcal_core::stats::stream_rng;
     use rand_distr::{Distribution, LogNormal};
 

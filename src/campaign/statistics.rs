@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Row, RunStatus, Table};
+use crate::campaign::{Row, RunStatus, Table};
 use armcal_core::stats::{median_interval, quantile};
 
 /// The summary beside a campaign's table.
@@ -124,8 +124,8 @@ fn of_figure(name: &str, place: usize, rows: &[&Row]) -> Option<FigureStatistics
 
 #[cfg(test)]
 mod tests {
-    use super::super::table_file::tests::{names, row};
     use super::*;
+    use crate::campaign::table_file::tests::{names, row};
 
     #[test]
     fn rows_are_counted_by_setting_and_the_worst_seed_is_named() {

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use super::CampaignError;
-use super::columns::{Columns, MetricKind};
-use super::row::{Row, RunStatus};
+use crate::campaign::CampaignError;
+use crate::campaign::columns::{Columns, MetricKind};
+use crate::campaign::row::{Row, RunStatus};
 
 /// In front of the figures.
 const FIXED: [&str; 8] = ["setting", "settings", "seed", "status", "exit_code", "stage", "failure", "command"];

@@ -3,7 +3,7 @@
 use comfy_table::presets::UTF8_FULL_CONDENSED;
 use comfy_table::{CellAlignment, Table as Grid};
 
-use super::{CampaignSummary, FigureStatistics, SettingStatistics};
+use crate::campaign::{CampaignSummary, FigureStatistics, SettingStatistics};
 
 /// A figure that people look at first; the JSON has all of them.
 struct Shown {

@@ -8,7 +8,7 @@ use std::fs::{self, File, TryLockError};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-use super::{OutputError, check_replaceable, complete, make_folder, partial};
+use crate::output::{OutputError, check_replaceable, complete, make_folder, partial};
 use armcal_core::log::{LogError, for_each_raw, topics};
 
 /// What a run leaves, in the order in which it is put in place.

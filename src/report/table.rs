@@ -3,7 +3,7 @@
 use comfy_table::presets::UTF8_FULL_CONDENSED;
 use comfy_table::{CellAlignment, Table};
 
-use super::summary::{AssertSummary, GainChange, ReachScore, RenewalSummary, RunSummary, ScoreSide};
+use crate::report::summary::{AssertSummary, CalibrationSummary, CaptureSummary, GainChange, ReachScore, RenewalSummary, RunSummary, ScoreSide};
 use armcal_belief::calib::{CameraMount, FailedJointTable, MapResult, PriorTable, Status, SurveyCoverage};
 use armcal_core::stats::Summary;
 
@@ -113,7 +113,24 @@ pub(super) fn labelled(line: &str) -> (&str, &str) {
 
 /// What the arm itself knows, and what was lost on the way; shared with the HTML report.
 pub(super) fn check_lines(summary: &RunSummary) -> Vec<String> {
-    let mm = |v: Option<f64>| v.map_or_else(|| "-".to_owned(), |v| format!("{:.1} mm", v * 1e3));
+    let mut lines = accuracy_lines(summary);
+    lines.extend(capture_lines(&summary.capture));
+    lines.extend(calibration_lines(&summary.calibration));
+    lines.extend(contact_line(&summary.capture));
+    lines.extend(coverage_lines(&summary.calibration));
+    lines.extend(reach_lines(summary));
+    lines.extend(summary.asserts.iter().map(assert_line));
+    lines.extend(summary.stopped.iter().map(|why| format!("stopped      {why}")));
+    lines.extend(time_line(summary));
+    lines
+}
+
+fn millimetres(length_m: Option<f64>) -> String {
+    length_m.map_or_else(|| "-".to_owned(), |v| format!("{:.1} mm", v * 1e3))
+}
+
+/// The verdict and the errors that it rests on.
+fn accuracy_lines(summary: &RunSummary) -> Vec<String> {
     let mut lines = vec![match (summary.status, &summary.refusal) {
         (Status::Accepted, _) => "calibration  ACCEPTED".to_owned(),
         (Status::Refused, why) => format!("calibration  REFUSED: {}", why.as_deref().unwrap_or("no reason given")),
@@ -123,19 +140,23 @@ pub(super) fn check_lines(summary: &RunSummary) -> Vec<String> {
         "held out     {} views, {}: tag position error {} rms (datasheet sensors: {}), reprojection error {}",
         held_out.views,
         if held_out.cross_validated { "5-fold cross-validation" } else { "not fitted" },
-        mm(held_out.rms_m),
-        mm(held_out.nominal_rms_m),
+        millimetres(held_out.rms_m),
+        millimetres(held_out.nominal_rms_m),
         held_out.rms_px.map_or_else(|| "-".to_owned(), |v| format!("{v:.1} px")),
     ));
-    if let Some(predicted) = summary.calibration.predicted_tool_error_m {
-        lines.push(format!(
+    lines.extend(summary.calibration.predicted_tool_error_m.map(|predicted| {
+        format!(
             "predicted    tool error {} median, {} worst over the targets, from the recording and the datasheets",
-            mm(Some(predicted.median)),
-            mm(Some(predicted.max))
-        ));
-    }
-    let capture = &summary.capture;
-    lines.push(format!(
+            millimetres(Some(predicted.median)),
+            millimetres(Some(predicted.max))
+        )
+    }));
+    lines
+}
+
+/// How many views there were, what of them was left out, and why the capture ended.
+fn capture_lines(capture: &CaptureSummary) -> Vec<String> {
+    let mut lines = vec![format!(
         "captured     {} poses, {} skipped; {} tag observations in {} fitted views, {} rejected; {} targets skipped",
         capture.poses,
         capture.poses_skipped,
@@ -143,43 +164,52 @@ pub(super) fn check_lines(summary: &RunSummary) -> Vec<String> {
         capture.views,
         capture.rejected,
         capture.targets_skipped
-    ));
+    )];
     if !capture.rejected_by_reason.is_empty() {
         let reasons = capture.rejected_by_reason.iter().map(|(why, n)| format!("{n} {}", why.replace('_', " ")));
         lines.push(format!("rejected     {}", reasons.collect::<Vec<_>>().join(", ")));
     }
     lines.extend(capture.stop_reason.as_ref().map(|why| stop_reason_line(why, &capture.renewals)));
-    lines.extend(summary.calibration.largest_gain_change.as_ref().map(gain_line));
-    lines.extend(summary.calibration.camera_mount.as_ref().map(mount_line));
-    lines.extend(summary.calibration.failed_joint.iter().map(failed_line));
-    lines.extend(summary.calibration.prior.as_ref().map(prior_line));
-    lines.extend(summary.calibration.map.iter().flat_map(map_lines));
-    if let (Some(collisions), clearance) = (capture.collisions, capture.min_clearance_m) {
-        lines.push(format!(
-            "contacts     {collisions}; minimum clearance to vehicle, obstacles, seafloor: {}",
-            mm(clearance)
-        ));
-    }
-    if let Some(verdict) = &summary.calibration.verdict {
+    lines
+}
+
+/// What was found beside joint angles.
+fn calibration_lines(calibration: &CalibrationSummary) -> Vec<String> {
+    let mut lines: Vec<String> = calibration.largest_gain_change.as_ref().map(gain_line).into_iter().collect();
+    lines.extend(calibration.camera_mount.as_ref().map(mount_line));
+    lines.extend(calibration.failed_joint.iter().map(failed_line));
+    lines.extend(calibration.prior.as_ref().map(prior_line));
+    lines.extend(calibration.map.iter().flat_map(map_lines));
+    lines
+}
+
+/// Collisions, which only the truth knows.
+fn contact_line(capture: &CaptureSummary) -> Option<String> {
+    let clearance = millimetres(capture.min_clearance_m);
+    let collisions = capture.collisions?;
+    Some(format!("contacts     {collisions}; minimum clearance to vehicle, obstacles, seafloor: {clearance}"))
+}
+
+/// What the result does not hold for.
+fn coverage_lines(calibration: &CalibrationSummary) -> Vec<String> {
+    let mut lines = Vec::new();
+    if let Some(verdict) = &calibration.verdict {
         lines.extend(verdict.warnings.iter().map(|line| format!("warning      {line}")));
         lines.extend(verdict.not_covered.iter().map(|line| format!("not covered  {line}")));
     }
-    for line in &summary.calibration.unobservable {
-        lines.push(format!("unobservable {line}"));
-    }
-    lines.extend(reach_lines(summary));
-    lines.extend(summary.asserts.iter().map(assert_line));
-    lines.extend(summary.stopped.iter().map(|why| format!("stopped      {why}")));
-    if let (Some(simulated_s), Some(motion_s)) = (summary.simulated_s, summary.motion_s) {
-        let waited_s = summary.waited_s.unwrap_or(0.0);
-        let waited = if waited_s > 0.0 { format!(", {waited_s:.0} s waiting") } else { String::new() };
-        lines.push(format!(
-            "time         {simulated_s:.0} s simulated ({motion_s:.0} s of them moving{waited}) in {:.1} s: {:.0} times real time",
-            summary.wall_s,
-            (simulated_s - waited_s) / summary.wall_s.max(1e-9)
-        ));
-    }
+    lines.extend(calibration.unobservable.iter().map(|line| format!("unobservable {line}")));
     lines
+}
+
+fn time_line(summary: &RunSummary) -> Option<String> {
+    let (simulated_s, motion_s) = (summary.simulated_s?, summary.motion_s?);
+    let waited_s = summary.waited_s.unwrap_or(0.0);
+    let waited = if waited_s > 0.0 { format!(", {waited_s:.0} s waiting") } else { String::new() };
+    Some(format!(
+        "time         {simulated_s:.0} s simulated ({motion_s:.0} s of them moving{waited}) in {:.1} s: {:.0} times real time",
+        summary.wall_s,
+        (simulated_s - waited_s) / summary.wall_s.max(1e-9)
+    ))
 }
 
 /// Why the last capture ended, and what was predicted on its way.
