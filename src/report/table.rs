@@ -3,7 +3,9 @@
 use comfy_table::presets::UTF8_FULL_CONDENSED;
 use comfy_table::{CellAlignment, Table};
 
-use crate::report::summary::{AssertSummary, CalibrationSummary, CaptureSummary, GainChange, ReachScore, RenewalSummary, RunSummary, ScoreSide};
+use crate::report::summary::{
+    AssertSummary, CalibrationSummary, CaptureSummary, GainChange, ReachScore, RenewalSummary, RunSummary, ScoreSide,
+};
 use armcal_belief::calib::{CameraMount, FailedJointTable, MapResult, PriorTable, Status, SurveyCoverage};
 use armcal_core::stats::Summary;
 

@@ -5,8 +5,8 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use crate::report::inspection::observable_parameters::observable_parameters;
 use crate::report::inspection::arm::is_capture;
+use crate::report::inspection::observable_parameters::observable_parameters;
 use crate::report::inspection::{ArmContents, ObservableParameters, TopicContents, arm, topics};
 use armcal_core::log::topics as log_topics;
 use armcal_core::log::{Completeness, FileContents, LogError, RawSummary, TopicMap, scan_recording};
