@@ -217,5 +217,5 @@ fn renewal_summary(renewal: &EstimateUpdate) -> RenewalSummary {
 /// A limit without a figure does not hold: nobody saw that it does.
 fn assert_summary(limit: &AssertResult) -> AssertSummary {
     let holds = limit.holds().unwrap_or(false);
-    AssertSummary { step: limit.step, key: limit.key.to_owned(), limit: limit.limit, value: limit.value, holds }
+    AssertSummary { step: limit.step, key: limit.figure, limit: limit.limit, value: limit.value, holds }
 }

@@ -4,12 +4,12 @@ use std::path::Path;
 
 use nalgebra::Vector3;
 
-use crate::report::{JointScore, MarginSummary, ReachScore, Score, ScoreSide};
-use crate::score::{margins, touch};
+use crate::score::{JointScore, MarginSummary, ReachScore, Score, ScoreSide, margins, touch};
 use armcal_belief::session::{AssertResult, Outcome, ReachStep};
 use armcal_belief::verify::{ReachRest, reaches};
 use armcal_core::log::Recording;
 use armcal_core::robot::Robot;
+use armcal_core::routine::AssertFigure;
 use armcal_core::spatial::{Base, Pose, Tool};
 use armcal_core::stats::Summary;
 use armcal_core::streams::ReachAttempt;
@@ -77,16 +77,19 @@ pub fn score(input: &ScoreInput<'_>) -> Result<Scored, SimError> {
 /// The limit with its figure, if the truth has it.
 fn completed(limit: &AssertResult, score: &Score, truth: &Truth) -> AssertResult {
     let reach = limit.last_reach.and_then(|reach| score.reaches.get(reach)).map(|reach| &reach.side);
-    let value = limit.at.and_then(|at| match limit.key {
-        "tool_error_m" => Some(reach?.tool_error_m?.median),
-        "reach_error_m" => Some(reach?.reach_error_m?.median),
-        "reach_error_max_m" => Some(reach?.reach_error_m?.max),
-        "contacts" => Some(truth.contacts.iter().filter(|contact| contact.stamp <= at).count() as f64),
-        "clearance_m" => {
+    let value = limit.at.and_then(|at| match limit.figure {
+        AssertFigure::ToolError => Some(reach?.tool_error_m?.median),
+        AssertFigure::ReachError => Some(reach?.reach_error_m?.median),
+        AssertFigure::WorstReachError => Some(reach?.reach_error_m?.max),
+        AssertFigure::Contacts => Some(truth.contacts.iter().filter(|contact| contact.stamp <= at).count() as f64),
+        AssertFigure::Clearance => {
             let until = truth.clearances.iter().filter(|clearance| clearance.stamp <= at);
             until.map(|clearance| clearance.distance_m).min_by(f64::total_cmp)
         }
-        _ => limit.value,
+        AssertFigure::HeldOutRms
+        | AssertFigure::HeldOutReprojection
+        | AssertFigure::PredictedToolError
+        | AssertFigure::SimulatedTime => limit.value,
     });
     AssertResult { value, ..limit.clone() }
 }

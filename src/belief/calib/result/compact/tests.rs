@@ -8,6 +8,7 @@ use crate::calib::result::calibration::CovarianceTable;
 use crate::calib::result::compact::*;
 use crate::calib::result::metrics::HeldOutMetrics;
 use crate::calib::result::valid_range::ValidRange;
+use armcal_core::numeric::Outcome;
 use armcal_core::stats::Summary;
 
 /// Gain and offset corrections with deviations; `None` where the datasheet's stays.
