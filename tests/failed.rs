@@ -70,7 +70,10 @@ fn a_dead_sensor_is_found_the_rest_calibrated_and_the_task_refused() {
     let folder = temp();
     let file = folder.path().join("calibration.toml");
     std::fs::write(&file, calibration.to_toml()).expect("written");
-    assert_eq!(Calibration::read(&file).expect("it reads").failed_joint, calibration.failed_joint);
+    assert_eq!(
+        Calibration::parse(&file, &calibration.to_toml()).expect("it reads").failed_joint,
+        calibration.failed_joint
+    );
 }
 
 #[test]

@@ -85,6 +85,7 @@ fn counts_twice_as_fine_halve_the_gains_and_change_nothing_else() {
     let mut expected = Calibration::read(&run.file("calibration.toml")).expect("it reads");
     assert_ne!(doubled.messages_hash, expected.messages_hash);
     expected.messages_hash.clone_from(&doubled.messages_hash);
+    assert_eq!(doubled.covariance_hash, expected.covariance_hash);
     for joint in &mut expected.joint {
         joint.gain_rad_per_count *= 0.5;
         joint.gain_std_rad_per_count *= 0.5;

@@ -11,7 +11,7 @@ use crate::cli::exit::{Exit, UsageError};
 use crate::cli::stdout::say;
 use crate::output;
 use crate::report::{RunSummary, table};
-use armcal_belief::calib::{CompactCalibration, MapResult, Status};
+use armcal_belief::calib::{CompactCalibration, MapResult, Status, covariance_file};
 use armcal_core::robot::{self, FailedJoint, Robot};
 use armcal_core::routine::Method;
 
@@ -78,11 +78,16 @@ pub(super) fn calibrate(args: &CalibrateArgs) -> Result<Exit> {
     output::make_folder(&args.out)?;
     let json = serde_json::to_string_pretty(&summary).context("summary.json")?;
     let (map_file, calibration_file) = (args.out.join("tagmap.toml"), args.out.join("calibration.toml"));
-    let (map, text) = (calibration.map.as_ref().map(MapResult::to_toml), calibration.to_toml());
+    let covariance_file = covariance_file(&calibration_file);
+    let (map, texts) = (calibration.map.as_ref().map(MapResult::to_toml), calibration.to_files());
     let (summary_file, json) = (args.out.join("summary.json"), format!("{json}\n"));
     let mut written: Vec<(&Path, &[u8])> = Vec::new();
     written.extend(map.iter().map(|map| (map_file.as_path(), map.as_bytes())));
-    written.extend([(calibration_file.as_path(), text.as_bytes()), (summary_file.as_path(), json.as_bytes())]);
+    written.extend([
+        (covariance_file.as_path(), texts.covariance.as_bytes()),
+        (calibration_file.as_path(), texts.calibration.as_bytes()),
+        (summary_file.as_path(), json.as_bytes()),
+    ]);
     output::write_together(&written)?;
     say(&shown)?;
     Ok(match (calibration.status, lost) {

@@ -9,7 +9,7 @@ use clap::Args;
 use crate::campaign::Request;
 use crate::cli::exit::{Exit, UsageError, explain};
 use crate::cli::overrides::OverrideArgs;
-use armcal_belief::calib::Calibration;
+use armcal_belief::calib::{Calibration, CalibrationFileError};
 use armcal_belief::plan::PlanFile;
 use armcal_belief::tagmap::files::read_landmarks;
 use armcal_core::input::{InputMap, TagUse, read_input_map, read_task};
@@ -80,15 +80,27 @@ fn check_one(file: &Path, overrides: &Overrides) -> Result<String> {
         return Ok(format!("task, {targets} targets and {poses} poses, tolerance {} mm", task.tolerance_m * 1e3));
     }
     if table.contains_key("messages_hash") {
-        let calibration = Calibration::read(file)?;
-        let (joints, valid) = (calibration.joint.len(), calibration.valid_for().join(", "));
-        return Ok(format!("calibration of `{}`, {joints} joints; valid for {valid}", calibration.robot));
+        return describe_calibration(file, &text);
     }
     Err(UsageError(format!(
         "{}: is none of robot, routine, vehicle, calibration, input map, tag map, task, plan",
         file.display()
     ))
     .into())
+}
+
+/// One without its covariance still moves an arm; one beside another's is wrong.
+fn describe_calibration(file: &Path, text: &str) -> Result<String> {
+    let (calibration, without) = match Calibration::read(file) {
+        Ok(calibration) => (calibration, String::new()),
+        Err(CalibrationFileError::NoCovariance { file: covariance, .. }) => (
+            Calibration::parse(file, text)?,
+            format!("; no prior for another, for {} is missing", covariance.display()),
+        ),
+        Err(error) => return Err(error.into()),
+    };
+    let (joints, valid) = (calibration.joint.len(), calibration.valid_for().join(", "));
+    Ok(format!("calibration of `{}`, {joints} joints; valid for {valid}{without}", calibration.robot))
 }
 
 fn describe_input(map: &InputMap) -> String {

@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use crate::cli::exit::{Exit, UsageError};
 use crate::cli::stdout::say;
-use armcal_belief::calib::{Calibration, CompactCalibration, LookupTable};
+use armcal_belief::calib::{Calibration, CalibrationFileError, CompactCalibration, CovarianceTable, LookupTable};
 use armcal_core::robot::{self, Robot};
 use armcal_core::sensor::{ArmSensors, SensorModel};
 
@@ -60,10 +60,10 @@ pub(super) fn export(args: &ExportArgs) -> Result<Exit> {
 
 fn of_full(calibration: &Calibration, form: Form) -> Result<String> {
     Ok(match form {
-        Form::Yaml if calibration.reference.is_some() => {
-            to_yaml(&FullView { calibration, lookup: calibration.lookup() })?
+        Form::Yaml => {
+            let covariance = Some(&calibration.covariance).filter(|table| !table.parameters.is_empty());
+            to_yaml(&FullView { calibration, lookup: calibration.lookup(), covariance })?
         }
-        Form::Yaml => to_yaml(calibration)?,
         Form::Toml => calibration.to_toml(),
         Form::Compact => CompactCalibration::of(calibration)?.to_text()?,
     })
@@ -84,11 +84,14 @@ fn to_yaml<T: Serialize>(value: &T) -> Result<String> {
     serde_saphyr::to_string(value).context("the calibration has no YAML form")
 }
 
-/// A calibration with terms, and the same as tables.
+/// A calibration, its covariance where that is at hand, and its terms as tables.
 #[derive(Serialize)]
 struct FullView<'a> {
     #[serde(flatten)]
     calibration: &'a Calibration,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    covariance: Option<&'a CovarianceTable>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     lookup: Vec<LookupTable>,
 }
 
@@ -145,6 +148,12 @@ fn read_input(file: &Path) -> Result<Input> {
     if !text.contains("[[joint]]") {
         let what = "neither a calibration.toml nor a compact calibration (which begins with `armcal1` or `armcal2`)";
         return Err(UsageError(format!("{name}: is {what}")).into());
+    }
+    if !is_stdin {
+        match Calibration::read(file) {
+            Err(CalibrationFileError::NoCovariance { .. }) => {}
+            read => return Ok(Input::Full(Box::new(read?))),
+        }
     }
     Ok(Input::Full(Box::new(Calibration::parse(Path::new(&name), text)?)))
 }

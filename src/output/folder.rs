@@ -12,8 +12,16 @@ use crate::output::{OutputError, check_replaceable, complete, make_folder, parti
 use armcal_core::log::{LogError, for_each_raw, topics};
 
 /// What a run leaves, in the order in which it is put in place.
-const RESULTS: [&str; 7] =
-    ["truth.mcap", "run.rrd", "tagmap.toml", "calibration.toml", "report.html", "run.mcap", SUMMARY];
+const RESULTS: [&str; 8] = [
+    "truth.mcap",
+    "run.rrd",
+    "tagmap.toml",
+    "calibration.covariance.toml",
+    "calibration.toml",
+    "report.html",
+    "run.mcap",
+    SUMMARY,
+];
 /// Its presence says that the files beside it are those of one run.
 const SUMMARY: &str = "summary.json";
 const LOCK: &str = "armcal.lock";

@@ -181,7 +181,9 @@ impl Run<'_> {
     }
 
     fn write_texts(&self, calibration: &Calibration, summary: &RunSummary) -> Result<(), RunError> {
-        self.output.write("calibration.toml", calibration.to_toml().as_bytes())?;
+        let files = calibration.to_files();
+        self.output.write("calibration.covariance.toml", files.covariance.as_bytes())?;
+        self.output.write("calibration.toml", files.calibration.as_bytes())?;
         if let Some(map) = &calibration.map {
             self.output.write("tagmap.toml", map.to_toml().as_bytes())?;
         }

@@ -180,11 +180,11 @@ fn stdout_that_takes_nothing_is_an_error_without_a_panic() {
 /// The sample's calibration with a bent, warm sensor.
 fn with_terms(folder: &std::path::Path) -> std::path::PathBuf {
     let mut calibration = Calibration::read(&sample()).expect("it reads");
-    let mut shape_rad = vec![0.0; armcal::sensor::N_SHAPE];
-    (shape_rad[1], shape_rad[4]) = (3e-3, -1e-3);
+    let mut nonlinearity_rad = vec![0.0; armcal::sensor::N_SHAPE];
+    (nonlinearity_rad[1], nonlinearity_rad[4]) = (3e-3, -1e-3);
     calibration.joint[2].terms = Some(TermsTable {
         half_range_rad: titan().sensors[2].half_range_rad,
-        shape_rad: Some(shape_rad),
+        nonlinearity_rad: Some(nonlinearity_rad),
         offset_rad_per_k: Some(2e-4),
         ..TermsTable::default()
     });
@@ -210,7 +210,7 @@ fn terms_are_exported_as_tables_and_never_dropped() {
     assert!(line.stdout.len() < 512 && line.stdout.lines().count() == 1, "{}", line.stdout);
     let (code, told, _) = export_stdin(&line.stdout, &["--as", "yaml", "--robot", robot]);
     assert_eq!(code, 0);
-    for key in ["format: armcal2", "shape_rad:", "offset_rad_per_k: 0.0002", "lookup:", "joint: forearm_pitch"] {
+    for key in ["format: armcal2", "nonlinearity_rad:", "offset_rad_per_k: 0.0002", "lookup:", "joint: forearm_pitch"] {
         assert!(told.contains(key), "no `{key}` in {told}");
     }
     let (code, toml, _) = export_stdin(&line.stdout, &["--as", "toml", "--robot", robot]);

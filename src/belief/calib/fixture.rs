@@ -5,8 +5,8 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::calib::result::assemble::shortened_rows;
-use crate::calib::result::calibration::{Calibration, CovarianceTable};
+use crate::calib::result::calibration::Calibration;
+use crate::calib::result::covariance_file::CovarianceTable;
 use crate::calib::{JointParameters, Parameter, ParameterCovariance, ParameterKind, ReferenceTable, TermsTable};
 use armcal_core::robot::Robot;
 use armcal_core::sensor::{Conditions, Terms, shape_prior};
@@ -39,12 +39,12 @@ pub fn estimate(
         parameters.gain[joint] = 1.0 + 0.02 * normal();
         parameters.offset_rad[joint] = 0.03 * normal();
         parameters.terms[joint] = Terms {
-            shape_rad: std.map(|std| nonlinearity * spec.half_range_rad * std * normal()),
+            nonlinearity_rad: std.map(|std| nonlinearity * spec.half_range_rad * std * normal()),
             offset_rad_per_k: 3.5e-4 * normal(),
             gain_per_k: 2e-5 * normal(),
             offset_rad_per_mpa: 3e-5 * normal(),
             drift_rad_per_h: 5e-4 * normal(),
-            half_play_rad: 2e-4 * normal(),
+            half_backlash_rad: 2e-4 * normal(),
         };
     }
     let all = (0..n).flat_map(|joint| ParameterKind::all().map(move |kind| Parameter { joint, kind }));
@@ -68,6 +68,7 @@ pub fn with_terms(robot: &Robot, parameters: &JointParameters, covariance: &Para
         joint.terms = TermsTable::of(j, model, covariance);
     }
     let names = covariance.parameters.iter().map(|p| p.name(robot)).collect();
-    calibration.covariance = CovarianceTable { parameters: names, rows: shortened_rows(&covariance.matrix) };
+    calibration.covariance_hash = None;
+    calibration.covariance = CovarianceTable::new(names, &covariance.matrix);
     calibration
 }

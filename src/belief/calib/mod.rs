@@ -39,10 +39,10 @@ pub use methods::{
 pub use parameters::{JointParameters, Parameter, ParameterKind};
 pub use refusal::{InnovationQuantity, Refusal};
 pub use result::{
-    Calibration, CalibrationFileError, CameraMount, Check, CompactCalibration, CompactError, CompactJoint,
-    FailedJointTable, FitMetrics, HeldOutMetrics, JointResult, LookupTable, MAX_COMPACT_BYTES, MapResult, MapTag,
-    ModelTable, ObservabilityTable, PredictedToolError, PriorTable, ReferenceTable, Status, SurveyCoverage, TermsTable,
-    ValidRange, VerdictTable,
+    Calibration, CalibrationFileError, CalibrationFiles, CameraMount, Check, CompactCalibration, CompactError,
+    CompactJoint, CovarianceTable, FailedJointTable, FitMetrics, HeldOutMetrics, JointResult, LookupTable,
+    MAX_COMPACT_BYTES, MapResult, MapTag, ModelTable, ObservabilityTable, PredictedToolError, PriorTable,
+    ReferenceTable, Status, SurveyCoverage, TermsTable, ValidRange, VerdictTable, covariance_file,
 };
 pub use views::{
     CalibrationData, CaptureData, ConditionHistory, EndStopReading, ForeignContext, HeldOut, IdentifiedScale,

@@ -34,12 +34,12 @@ impl JointParameters {
         match parameter.kind {
             ParameterKind::Gain => self.gain[parameter.joint],
             ParameterKind::Offset => self.offset_rad[parameter.joint],
-            ParameterKind::Shape(h) => self.terms[parameter.joint].shape_rad[usize::from(h)],
+            ParameterKind::Shape(h) => self.terms[parameter.joint].nonlinearity_rad[usize::from(h)],
             ParameterKind::OffsetPerK => self.terms[parameter.joint].offset_rad_per_k,
             ParameterKind::GainPerK => self.terms[parameter.joint].gain_per_k,
             ParameterKind::OffsetPerMpa => self.terms[parameter.joint].offset_rad_per_mpa,
             ParameterKind::DriftPerH => self.terms[parameter.joint].drift_rad_per_h,
-            ParameterKind::HalfBacklash => self.terms[parameter.joint].half_play_rad,
+            ParameterKind::HalfBacklash => self.terms[parameter.joint].half_backlash_rad,
         }
     }
 
@@ -47,12 +47,12 @@ impl JointParameters {
         match parameter.kind {
             ParameterKind::Gain => self.gain[parameter.joint] = value,
             ParameterKind::Offset => self.offset_rad[parameter.joint] = value,
-            ParameterKind::Shape(h) => self.terms[parameter.joint].shape_rad[usize::from(h)] = value,
+            ParameterKind::Shape(h) => self.terms[parameter.joint].nonlinearity_rad[usize::from(h)] = value,
             ParameterKind::OffsetPerK => self.terms[parameter.joint].offset_rad_per_k = value,
             ParameterKind::GainPerK => self.terms[parameter.joint].gain_per_k = value,
             ParameterKind::OffsetPerMpa => self.terms[parameter.joint].offset_rad_per_mpa = value,
             ParameterKind::DriftPerH => self.terms[parameter.joint].drift_rad_per_h = value,
-            ParameterKind::HalfBacklash => self.terms[parameter.joint].half_play_rad = value,
+            ParameterKind::HalfBacklash => self.terms[parameter.joint].half_backlash_rad = value,
         }
     }
 

@@ -79,7 +79,7 @@ impl ParameterCovariance {
                 }
             }
             covariance += outer(&(by_angle * self.residual_std_rad(at.robot, joint)));
-            let wandered_rad2 = self.wandered_rad2(at, joint) + model.correction.terms.half_play_rad.powi(2);
+            let wandered_rad2 = self.wandered_rad2(at, joint) + model.correction.terms.half_backlash_rad.powi(2);
             if wandered_rad2 > 0.0 {
                 covariance += outer(&by_angle) * wandered_rad2;
             }

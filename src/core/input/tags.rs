@@ -199,15 +199,15 @@ impl<'a> TagReader<'a> {
         for frame in &mut frames {
             let mut once: Vec<ExternalDetection> = Vec::new();
             let mut twice = BTreeSet::new();
-            for sighting in std::mem::take(&mut frame.tags) {
-                match once.iter().find(|other| other.id == sighting.id) {
-                    Some(other) if other.seen == sighting.seen => {}
-                    Some(_) => drop(twice.insert(sighting.id)),
-                    None => once.push(sighting),
+            for observation in std::mem::take(&mut frame.tags) {
+                match once.iter().find(|other| other.id == observation.id) {
+                    Some(other) if other.seen == observation.seen => {}
+                    Some(_) => drop(twice.insert(observation.id)),
+                    None => once.push(observation),
                 }
             }
-            once.retain(|sighting| !twice.contains(&sighting.id));
-            once.sort_by_key(|sighting| sighting.id);
+            once.retain(|observation| !twice.contains(&observation.id));
+            once.sort_by_key(|observation| observation.id);
             frame.tags = once;
             for _ in &twice {
                 self.count("tags seen at two places at one time");

@@ -23,15 +23,15 @@ pub struct Correction {
 /// All beyond gain and offset; zero is a straight sensor that nothing disturbs.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Terms {
-    /// Coefficients of [`shape_basis`].
-    pub shape_rad: [f64; N_SHAPE],
+    /// Coefficients of [`nonlinearity_basis`].
+    pub nonlinearity_rad: [f64; N_SHAPE],
     pub offset_rad_per_k: f64,
     /// 1/K.
     pub gain_per_k: f64,
     pub offset_rad_per_mpa: f64,
     pub drift_rad_per_h: f64,
     /// Half of the play between joint and sensor shaft.
-    pub half_play_rad: f64,
+    pub half_backlash_rad: f64,
 }
 
 impl Terms {
@@ -48,7 +48,7 @@ impl Default for Correction {
     }
 }
 
-/// Half-width of the interval that [`shape_basis`] lives on, in half ranges: beyond the joint's own, for the functions vanish at
+/// Half-width of the interval that [`nonlinearity_basis`] lives on, in half ranges: beyond the joint's own, for the functions vanish at
 /// its ends.
 const SHAPE_DOMAIN: f64 = 1.25;
 
@@ -67,7 +67,7 @@ pub fn nonlinearity_basis(x: f64) -> [f64; N_SHAPE] {
     })
 }
 
-/// Prior standard deviations of the coefficients of [`shape_basis`] for a process of unit standard deviation with a squared
+/// Prior standard deviations of the coefficients of [`nonlinearity_basis`] for a process of unit standard deviation with a squared
 /// exponential covariance of length `length` half ranges: `S(w)^(1/2)` at `w = pi h / 2 L` (Solin and Sarkka 2020, eq. 8).
 #[must_use]
 pub fn shape_prior(length: f64) -> [f64; N_SHAPE] {
@@ -121,7 +121,7 @@ impl Correction {
             return spec.center_rad + self.gain * travel_rad + self.offset_rad;
         }
         let basis = nonlinearity_basis(travel_rad / spec.half_range_rad);
-        let shape: f64 = basis.iter().zip(&terms.shape_rad).map(|(b, a)| a * b).sum();
+        let shape: f64 = basis.iter().zip(&terms.nonlinearity_rad).map(|(b, a)| a * b).sum();
         spec.center_rad
             + (self.gain + terms.gain_per_k * departure.oil_k) * travel_rad
             + self.offset_rad
@@ -129,7 +129,7 @@ impl Correction {
             + terms.offset_rad_per_k * departure.oil_k
             + terms.offset_rad_per_mpa * departure.pressure_mpa
             + terms.drift_rad_per_h * departure.elapsed_h
-            + terms.half_play_rad * approach
+            + terms.half_backlash_rad * approach
     }
 }
 

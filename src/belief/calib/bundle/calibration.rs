@@ -1,12 +1,13 @@
 //! One calibration by `bundle`, step by step: estimate, diagnose, report, judge.
 
 use crate::calib::bundle::calibration_prior::PriorConsistency;
-use crate::calib::bundle::estimate::{Estimate, Outlier, estimate};
+use crate::calib::bundle::estimate::{Estimate, estimate};
 use crate::calib::bundle::failure_impact::FailureImpact;
 use crate::calib::bundle::failures::Failure;
 use crate::calib::bundle::innovations::Innovations;
 use crate::calib::bundle::input::{BundleInput, HyperparameterMode};
 use crate::calib::bundle::model_selection::Selection;
+use crate::calib::bundle::outliers::Outlier;
 use crate::calib::bundle::setup::{BundleSetup, declared};
 use crate::calib::bundle::tables::{camera_mount_table, covariance_with_mount, map_table, model_table, prior_table};
 use crate::calib::bundle::verdict::VerdictInput;

@@ -10,9 +10,10 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen, Vector6};
 
-use crate::calib::bundle::estimate::{Estimate, estimate, reference};
+use crate::calib::bundle::estimate::{Estimate, estimate};
 use crate::calib::bundle::failures::FailureAdjusted;
 use crate::calib::bundle::input::{BundleInput, HyperparameterMode};
+use crate::calib::bundle::model::reference;
 use crate::calib::bundle::model::{Hyperparameters, Model};
 use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
 use crate::calib::refusal::{MIN_USED_SHARE, Refusal};
@@ -179,8 +180,8 @@ impl CalibrationPrior {
         let moved = self.moved(&found);
         let (chi2, degrees_of_freedom) = self.chi_square(&moved, &moved_by)?;
         let (joint, off_rad, off_std_rad) = worst_joint(&found, &moved, &moved_by)?;
-        let sightings = &found.problem.sightings;
-        let used_share = sightings.iter().filter(|s| s.is_used).count() as f64 / sightings.len().max(1) as f64;
+        let observations = &found.problem.observations;
+        let used_share = observations.iter().filter(|s| s.is_used).count() as f64 / observations.len().max(1) as f64;
         let limit = chi_square_999(degrees_of_freedom);
         Some(PriorConsistency { chi2, degrees_of_freedom, limit, joint, off_rad, off_std_rad, used_share })
     }
@@ -217,10 +218,10 @@ impl CalibrationPrior {
 /// (joint, mean change of its angle over the views, one sigma of that), rad.
 fn worst_joint(found: &Estimate<'_>, moved: &DVector<f64>, moved_by: &DMatrix<f64>) -> Option<(usize, f64, f64)> {
     let problem = &found.problem;
-    let seen = problem.views.iter().filter(|view| !view.sightings.is_empty()).count().max(1) as f64;
+    let seen = problem.views.iter().filter(|view| !view.observations.is_empty()).count().max(1) as f64;
     let of_joint = |joint: usize| {
         let mut by = DVector::zeros(moved.len());
-        for view in problem.views.iter().filter(|view| !view.sightings.is_empty()) {
+        for view in problem.views.iter().filter(|view| !view.observations.is_empty()) {
             for column in problem.layout.of_joint[joint].clone() {
                 by[column] += view.basis[column] / seen;
             }
@@ -239,7 +240,7 @@ fn model(applied: &FailureAdjusted, reference: &Conditions, known: &[Parameter])
     if let Some(first) = applied.views.first() {
         views.push(View { conditions: *reference, tags: Vec::new(), gripper_tag: None, ..first.clone() });
     }
-    let mut model = crate::calib::bundle::estimate::model_for(&applied.robot, &views);
+    let mut model = crate::calib::bundle::model::model_for(&applied.robot, &views);
     for (joint, kinds) in model.joints.iter_mut().enumerate() {
         let wanted = |kind: &ParameterKind| kinds.contains(kind) || known.contains(&Parameter { joint, kind: *kind });
         *kinds = ParameterKind::all().filter(wanted).collect();
@@ -250,8 +251,7 @@ fn model(applied: &FailureAdjusted, reference: &Conditions, known: &[Parameter])
 
 /// Rows of the camera mount in the prior's covariance.
 fn mount_rows(prior: &Calibration) -> Option<[usize; 6]> {
-    let row = |name: &str| prior.covariance.parameters.iter().position(|known| known == name);
-    let rows: Vec<usize> = MOUNT_ROWS.iter().filter_map(|name| row(name)).collect();
+    let rows: Vec<usize> = MOUNT_ROWS.iter().filter_map(|name| prior.covariance.row(name)).collect();
     rows.try_into().ok()
 }
 
@@ -273,7 +273,7 @@ struct PriorColumns<'a> {
 /// P0 and P1, see the module.
 fn covariances(prior: &Calibration, columns: &PriorColumns<'_>, elapsed_h: f64) -> (DMatrix<f64>, DMatrix<f64>) {
     let PriorColumns { robot, scales, parameters, mount } = columns;
-    let row = |p: &Parameter| prior.covariance.parameters.iter().position(|name| *name == p.name(robot));
+    let row = |p: &Parameter| prior.covariance.row(&p.name(robot));
     let mut rows: Vec<Option<usize>> = parameters.iter().map(row).collect();
     rows.extend(mount.iter().flatten().map(|row| Some(*row)));
     let n = rows.len();

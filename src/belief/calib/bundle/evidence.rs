@@ -88,8 +88,9 @@ pub(crate) fn updated(
     update_joints(problem, state, posterior, first, &mut next);
     update_terms(problem, state, posterior, first, &mut next);
     update_camera_error(problem, state, posterior, first, &mut next);
-    let n_coordinates: usize = problem.sightings.iter().filter(|s| s.is_used).map(|s| s.data.n_coordinates()).sum();
-    let chi2: f64 = problem.sightings.iter().zip(&normal.chi2).filter(|(s, _)| s.is_used).map(|(_, chi2)| chi2).sum();
+    let n_coordinates: usize = problem.observations.iter().filter(|s| s.is_used).map(|s| s.data.n_coordinates()).sum();
+    let chi2: f64 =
+        problem.observations.iter().zip(&normal.chi2).filter(|(s, _)| s.is_used).map(|(_, chi2)| chi2).sum();
     let free = (n_coordinates as f64 - determined(problem, posterior)).max(1.0);
     let factor = ((chi2 + NU_NOISE) / (free + NU_NOISE)).sqrt();
     next.noise = (problem.scales.noise * factor).clamp(NOISE_BOUNDS[0], NOISE_BOUNDS[1]);

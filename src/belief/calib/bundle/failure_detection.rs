@@ -1,8 +1,8 @@
 //! Which joint failed, and how: one joint at a time is freed in all views, and the angles that the camera then shows are held
 //! against its readings.
 //!
-//! A hypothesis must explain the data better than a sound arm by far: with the datasheet's scales, the sum of the sightings'
-//! chi-squares (each cut where a sighting would be rejected), plus the joints' own and their parameters' prior, plus `2 ln(prior std / posterior std)` for
+//! A hypothesis must explain the data better than a sound arm by far: with the datasheet's scales, the sum of the observations'
+//! chi-squares (each cut where a observation would be rejected), plus the joints' own and their parameters' prior, plus `2 ln(prior std / posterior std)` for
 //! each reading that is given up (Laplace's approximation of the evidence, MacKay 1992, with a round figure), must fall by `MARGIN`.
 
 use crate::calib::bundle::estimate::Estimate;
@@ -18,11 +18,11 @@ use armcal_core::stats::quantile;
 
 /// A joint whose errors over all views are larger than this and than twice the datasheet's linearity is looked at, rad.
 const LARGE_STD_RAD: f64 = 0.15 * std::f64::consts::PI / 180.0;
-/// A share of rejected sightings that wrong ids alone do not make.
+/// A share of rejected observations that wrong ids alone do not make.
 const MANY_REJECTED: f64 = 0.1;
 /// What giving up one reading costs: 2 ln(1 rad / 1 mrad).
 const PER_READING: f64 = 14.0;
-/// A sighting costs no more than this per coordinate: beyond it, it is rejected.
+/// A observation costs no more than this per coordinate: beyond it, it is rejected.
 const MAX_PER_COORDINATE: f64 = 7.5;
 /// The evidence that a failure needs: odds of e^15 to one.
 const MARGIN: f64 = 30.0;
@@ -160,9 +160,9 @@ impl Search<'_> {
 /// What the data cost under an estimate, see the module.
 fn score(found: &Estimate<'_>) -> f64 {
     let problem = &found.problem;
-    let sightings = problem.sightings.iter().zip(&found.solved.normal.chi2);
+    let observations = problem.observations.iter().zip(&found.solved.normal.chi2);
     let mut sum: f64 =
-        sightings.map(|(seen, chi2)| chi2.min(MAX_PER_COORDINATE * seen.data.n_coordinates() as f64)).sum();
+        observations.map(|(seen, chi2)| chi2.min(MAX_PER_COORDINATE * seen.data.n_coordinates() as f64)).sum();
     let off = &found.solved.state.joint - &problem.prior.joint_mean;
     sum += (&problem.prior.joint_info * &off).dot(&off);
     for (view, errors) in problem.views.iter().zip(&found.solved.state.joint_error) {
@@ -186,16 +186,16 @@ fn is_beyond_datasheet(robot: &Robot, found: &Estimate<'_>) -> bool {
 /// Whether an estimate looks as if some sensor did not belong.
 fn is_suspicious(robot: &Robot, found: &Estimate<'_>) -> bool {
     let problem = &found.problem;
-    let used = |sightings: &std::ops::Range<usize>| {
-        problem.sightings[sightings.clone()].iter().filter(|sighting| sighting.is_used).count()
+    let used = |observations: &std::ops::Range<usize>| {
+        problem.observations[observations.clone()].iter().filter(|observation| observation.is_used).count()
     };
     let (mut n, mut n_used) = (0, 0);
-    for view in problem.views.iter().filter(|view| !view.sightings.is_empty()) {
-        let n_here = used(&view.sightings);
+    for view in problem.views.iter().filter(|view| !view.observations.is_empty()) {
+        let n_here = used(&view.observations);
         if n_here == 0 {
             return true;
         }
-        (n, n_used) = (n + view.sightings.len(), n_used + n_here);
+        (n, n_used) = (n + view.observations.len(), n_used + n_here);
     }
     if (n - n_used) as f64 > MANY_REJECTED * n as f64 {
         return true;

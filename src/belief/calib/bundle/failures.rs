@@ -5,9 +5,10 @@
 //! that always reads the same and whose offset nobody knows: one column for all views.
 
 use crate::calib::angles_by_camera::set_by_camera;
-use crate::calib::bundle::estimate::{Estimate, estimate, model_for, reference};
+use crate::calib::bundle::estimate::{Estimate, estimate};
 use crate::calib::bundle::input::{BundleInput, HyperparameterMode};
 use crate::calib::bundle::model::{Hyperparameters, Model};
+use crate::calib::bundle::model::{model_for, reference};
 use crate::calib::parameters::{JointParameters, ParameterKind};
 use crate::calib::views::view::View;
 use armcal_core::robot::{FailedJoint, FailedKind, Robot};

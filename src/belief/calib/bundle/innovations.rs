@@ -7,10 +7,11 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Isometry3};
 
-use crate::calib::bundle::estimate::{Estimate, Outlier};
+use crate::calib::bundle::estimate::Estimate;
 use crate::calib::bundle::input::BundleInput;
 use crate::calib::bundle::linearize::NormalEquations;
 use crate::calib::bundle::observation_term::unseen_chi2;
+use crate::calib::bundle::outliers::Outlier;
 use crate::calib::bundle::problem::{BundleProblem, State, WeightedMeasurement};
 use crate::calib::views::view::View;
 use armcal_core::joints::MAX_JOINTS;
@@ -56,12 +57,12 @@ impl Estimate<'_> {
         let views: Vec<View> = left_out.iter().map(|(_, view)| view.clone()).collect();
         let mut problem = self.data_only(input, &views);
         for (at, (view_idx, view)) in left_out.iter().enumerate() {
-            let sightings = problem.views[at].sightings.clone();
-            for (sighting, tag) in problem.sightings[sightings].iter_mut().zip(&view.tags) {
+            let observations = problem.views[at].observations.clone();
+            for (observation, tag) in problem.observations[observations].iter_mut().zip(&view.tags) {
                 let is_known =
-                    problem.layout.tags.iter().all(Option::is_none) || problem.layout.tags[sighting.tag].is_some();
+                    problem.layout.tags.iter().all(Option::is_none) || problem.layout.tags[observation.tag].is_some();
                 let is_out = outliers.iter().any(|out| out.view_idx == *view_idx && out.tag_id == tag.id);
-                sighting.is_used = is_known && !is_out;
+                observation.is_used = is_known && !is_out;
             }
         }
         let state = State {
@@ -72,12 +73,12 @@ impl Estimate<'_> {
         // A tag at the border may be foretold to lie beyond it.
         let mut normal = NormalEquations::new(&problem);
         normal.update(&problem, &state, Loss::Square);
-        for (sighting, chi2) in problem.sightings.iter_mut().zip(&normal.chi2) {
-            sighting.is_used &= *chi2 < unseen_chi2(&sighting.data);
+        for (observation, chi2) in problem.observations.iter_mut().zip(&normal.chi2) {
+            observation.is_used &= *chi2 < unseen_chi2(&observation.data);
         }
         let (foretold, chi2) = self.with_data(&problem, &state)?;
         let joints = foretold.joints(&problem, left_out);
-        let dof = problem.sightings.iter().filter(|s| s.is_used).map(|s| s.data.n_coordinates()).sum();
+        let dof = problem.observations.iter().filter(|s| s.is_used).map(|s| s.data.n_coordinates()).sum();
         let camera_dof = (0..views.len()).map(|view_idx| camera_numbers(&problem, view_idx)).sum();
         problem.scales.camera_error_std = Some([FREE_CAMERA; 2]);
         let (_, free_chi2) = self.with_data(&problem, &state)?;
@@ -148,10 +149,10 @@ impl Joined {
 
 /// How many numbers of the camera's pose a view tells.
 fn camera_numbers(problem: &BundleProblem<'_>, view_idx: usize) -> usize {
-    let used = problem.sightings[problem.views[view_idx].sightings.clone()].iter().filter(|s| s.is_used);
+    let used = problem.observations[problem.views[view_idx].observations.clone()].iter().filter(|s| s.is_used);
     let (mut points, mut poses) = (0, 0);
-    for sighting in used {
-        match sighting.data {
+    for observation in used {
+        match observation.data {
             WeightedMeasurement::Position { .. } => points += 1,
             WeightedMeasurement::Corners { .. } | WeightedMeasurement::Pose { .. } => poses += 1,
         }

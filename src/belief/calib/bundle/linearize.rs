@@ -1,8 +1,8 @@
 //! Normal equations of one state, the views' own parameters eliminated (Schur complement).
 //!
-//! In a view all acts through the twist u of the camera (right, camera frame) that each sighting i sees:
+//! In a view all acts through the twist u of the camera (right, camera frame) that each observation i sees:
 //! `u_i = S l + T y - Ad_i tau_i`: l the view's own parameters (joint errors, camera error) with prior `L^-1`, y the common ones
-//! along the directions T (joints, mount, time offset), tau_i the tag's pose. With `H_i` of each sighting and `G = sum H_i`,
+//! along the directions T (joints, mount, time offset), tau_i the tag's pose. With `H_i` of each observation and `G = sum H_i`,
 //! elimination of l leaves, for the blocks a and b, `sum A_a^T H_i A_b - (sum A_a^T H_i) M (sum H_i A_b)`,
 //! `M = S (S^T G S + L)^-1 S^T`: all of it 6x6 algebra, whatever the number of corners.
 
@@ -55,9 +55,9 @@ pub(crate) struct NormalEquations {
     pub cost: f64,
     /// Of each view, then those of the gripper's tag.
     pub eliminated: Vec<SchurBlock>,
-    /// `H_i Ad_i` and column of the tag of each sighting.
+    /// `H_i Ad_i` and column of the tag of each observation.
     pub by_tag: Vec<(Matrix6<f64>, Option<usize>)>,
-    /// Sum of squares of each sighting's whitened residuals.
+    /// Sum of squares of each observation's whitened residuals.
     pub chi2: Vec<f64>,
     /// Of the group at hand; kept, so that the loop does not allocate.
     infos: Vec<PoseInformation>,
@@ -74,8 +74,8 @@ impl NormalEquations {
             right: DVector::zeros(n),
             cost: 0.0,
             eliminated: Vec::with_capacity(n_groups),
-            by_tag: vec![(Matrix6::zeros(), None); problem.sightings.len()],
-            chi2: vec![0.0; problem.sightings.len()],
+            by_tag: vec![(Matrix6::zeros(), None); problem.observations.len()],
+            chi2: vec![0.0; problem.observations.len()],
             infos: Vec::new(),
             lens_infos: Vec::new(),
         }
@@ -107,12 +107,12 @@ impl NormalEquations {
                 sign: 1.0,
                 by_mount: adjoint(&state.camera_error[view_idx].inverse()),
                 camera_error: problem.scales.camera_error_std.is_some().then_some(&state.camera_error[view_idx]),
-                sightings: view.sightings.clone(),
+                observations: view.observations.clone(),
                 poses: &poses,
                 base_from_camera: before * state.camera_error[view_idx],
             },
         );
-        if let (Some(sighting), Some(tag)) = (view.gripper, &problem.robot.gripper_tag) {
+        if let (Some(observation), Some(tag)) = (view.gripper, &problem.robot.gripper_tag) {
             let group = Group {
                 view_idx,
                 joints: problem.n_camera_joints..tag.mount.n_joints,
@@ -120,7 +120,7 @@ impl NormalEquations {
                 sign: -1.0,
                 by_mount: Matrix6::identity(),
                 camera_error: None,
-                sightings: sighting..sighting + 1,
+                observations: observation..observation + 1,
                 poses: &poses,
                 base_from_camera: before,
             };
@@ -150,7 +150,7 @@ impl NormalEquations {
                 at,
                 infos: &infos,
                 lens_infos: &lens_infos,
-                first: group.sightings.start,
+                first: group.observations.start,
                 directions: &directions,
                 m,
                 shift,
@@ -207,18 +207,18 @@ impl NormalEquations {
         }
     }
 
-    /// Linearized sightings, weighted by the loss, their cost added.
+    /// Linearized observations, weighted by the loss, their cost added.
     fn linearize_sightings(&mut self, point: &Point<'_, '_>, group: &Group<'_>) {
         let Point { problem, state, loss } = point;
         self.infos.clear();
         self.lens_infos.clear();
-        for at in group.sightings.clone() {
-            let sighting = &problem.sightings[at];
+        for at in group.observations.clone() {
+            let observation = &problem.observations[at];
             let (pose, column) = match &problem.robot.gripper_tag {
-                Some(tag) if sighting.tag == problem.robot.tags.len() => {
+                Some(tag) if observation.tag == problem.robot.tags.len() => {
                     (group.poses.link(tag.mount.n_joints) * state.gripper_tag, problem.layout.gripper_tag)
                 }
-                _ => (state.tags[sighting.tag], problem.layout.tags[sighting.tag]),
+                _ => (state.tags[observation.tag], problem.layout.tags[observation.tag]),
             };
             let camera_from_tag = group.base_from_camera.inv_mul(&pose);
             if problem.layout.lens.is_some() {
@@ -226,12 +226,12 @@ impl NormalEquations {
             }
             let by_lens = self.lens_infos.last_mut();
             let mut info =
-                PoseInformation::of(&sighting.data, &camera_from_tag, &state.lens, problem.scales.noise, by_lens)
-                    .unwrap_or_else(|| PoseInformation::unseen(&sighting.data));
+                PoseInformation::of(&observation.data, &camera_from_tag, &state.lens, problem.scales.noise, by_lens)
+                    .unwrap_or_else(|| PoseInformation::unseen(&observation.data));
             self.chi2[at] = info.chi2;
             self.by_tag[at].1 = column;
-            let (cost, weight) = if sighting.is_used {
-                loss.of_coordinates(info.chi2, sighting.data.n_coordinates())
+            let (cost, weight) = if observation.is_used {
+                loss.of_coordinates(info.chi2, observation.data.n_coordinates())
             } else {
                 (0.0, 0.0)
             };
@@ -263,7 +263,7 @@ impl NormalEquations {
             own[joint] = state.joint_error[group.view_idx][joint];
         }
         if group.camera_error.is_none() && twists.iter().all(|v| *v == 0.0) {
-            return SchurBlock::none(group.sightings.clone());
+            return SchurBlock::none(group.observations.clone());
         }
         let mut prior_gradient = -own.component_mul(&info);
         if let (Some(error), Some([std_m, std_rad])) = (group.camera_error, problem.scales.camera_error_std) {
@@ -291,7 +291,7 @@ impl NormalEquations {
             gradient,
             by_common: SMatrix::zeros(),
             log_ratio: info.map(f64::ln).sum() - log_det,
-            range: group.sightings.clone(),
+            range: group.observations.clone(),
             by_lens: SMatrix::zeros(),
             has_any: true,
         }

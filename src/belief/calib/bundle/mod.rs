@@ -1,6 +1,6 @@
 //! BUNDLE: maximum a posteriori over everything that the measurements depend on.
 //!
-//! `model` says what has a column and which sizes are not known; `problem` puts views and priors into form; `sighting` linearizes one
+//! `model` says what has a column and which sizes are not known; `problem` puts views and priors into form; `observation_term` linearizes one
 //! tag in one view, `linearize` sums the normal equations with the views' own parameters eliminated, `solve` is
 //! Levenberg-Marquardt; `evidence` fits noise and prior sizes, `select` decides on doubtful terms; `estimate` is the way from a robust start to the answer.
 
@@ -19,8 +19,11 @@ mod model;
 mod model_selection;
 mod observability;
 mod observation_term;
+mod outliers;
 mod prior_terms;
+mod priors;
 mod problem;
+mod robust_start;
 mod schur;
 mod score_test;
 mod setup;
@@ -29,14 +32,15 @@ mod tables;
 mod verdict;
 
 pub use calibration_prior::{CalibrationPrior, MOUNT_ROWS, PriorConsistency, with_mount_rows};
-pub use estimate::{Estimate, LeastSquares, MIN_GRIPPER_VIEWS, Outlier, estimate, least_squares, model_for, reference};
+pub use estimate::{Estimate, LeastSquares, estimate, least_squares};
 pub use failure_detection::failures;
 pub use failures::{Failure, FailureAdjusted, FailureSource, SensorUse};
 pub use innovations::{Innovations, JointInnovation};
 pub use input::{BundleInput, HyperparameterMode};
-pub use model::{Hyperparameters, Model, SHAPE_LENGTH};
+pub use model::{Hyperparameters, MIN_GRIPPER_VIEWS, Model, SHAPE_LENGTH, model_for, reference};
 pub use model_selection::{OptionalTerm, Selection, select_model};
 pub use observability::{Observability, observability};
+pub use outliers::Outlier;
 pub use score_test::{GeometryElement, ScoreTestResult};
 
 #[cfg(test)]

@@ -1,9 +1,10 @@
 //! What is estimated, and how large the things are that are not known exactly.
 
 use crate::calib::parameters::ParameterKind;
+use crate::calib::views::view::View;
 use armcal_core::joints::MAX_JOINTS;
 use armcal_core::robot::{JointSensorSpec, Robot};
-use armcal_core::sensor::{N_SHAPE, shape_prior};
+use armcal_core::sensor::{Conditions, N_SHAPE, shape_prior};
 
 /// Which parameters have a column.
 #[derive(Clone, Debug, PartialEq)]
@@ -100,4 +101,68 @@ fn usual_joint_std_rad(spec: &JointSensorSpec) -> f64 {
 /// All coefficients of the nonlinearity.
 pub(crate) fn shape_kinds() -> impl Iterator<Item = ParameterKind> {
     (0..N_SHAPE).map(|h| ParameterKind::Shape(h as u8))
+}
+
+/// Fewer views of the tag on the gripper are not used.
+pub const MIN_GRIPPER_VIEWS: usize = 4;
+
+/// Model by what the recording can tell: terms whose cause did not change have no column.
+#[must_use]
+pub fn model_for(robot: &Robot, views: &[View]) -> Model {
+    let spread = |f: &dyn Fn(&Conditions) -> Option<f64>| {
+        let values = views.iter().filter_map(|v| f(&v.conditions));
+        let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+        if high > low { high - low } else { 0.0 }
+    };
+    let warmed = spread(&|c| c.oil_c) > 0.5;
+    let dived = spread(&|c| c.pressure_pa) > 2e5;
+    let gripper_joints = robot.gripper_tag.map_or(0, |tag| tag.mount.n_joints);
+    let has_gripper = views.iter().filter(|view| view.gripper_tag.is_some()).count() >= MIN_GRIPPER_VIEWS;
+    let last = if has_gripper { gripper_joints } else { 0 }.max(robot.camera.mount.n_joints);
+    let joint = |joint: usize| {
+        let spec = &robot.sensors[joint];
+        let mut kinds = Vec::new();
+        // A datasheet that leaves nothing open leaves nothing to estimate.
+        if joint >= last || (spec.gain_std <= 0.0 && spec.offset_std_rad <= 0.0) {
+            return kinds;
+        }
+        let from_both_sides = [-1.0, 1.0].iter().all(|side| views.iter().any(|v| v.approach[joint] == *side));
+        for (wanted, kind) in [
+            (spec.gain_std > 0.0, ParameterKind::Gain),
+            (spec.offset_std_rad > 0.0, ParameterKind::Offset),
+            (warmed, ParameterKind::OffsetPerK),
+            (warmed, ParameterKind::GainPerK),
+            (dived, ParameterKind::OffsetPerMpa),
+            (from_both_sides, ParameterKind::HalfBacklash),
+        ] {
+            if wanted {
+                kinds.push(kind);
+            }
+        }
+        if spec.linearity_std_rad > 0.0 {
+            kinds.extend(shape_kinds());
+        }
+        kinds
+    };
+    Model {
+        joints: (0..robot.n_joints()).map(joint).collect(),
+        mount: robot.camera.mount_std_m > 0.0 || robot.camera.mount_std_rad > 0.0,
+        lens: false,
+        tags: true,
+        gripper_tag: has_gripper,
+        time_offset: false,
+    }
+}
+
+/// The middle of the views' conditions.
+#[must_use]
+pub fn reference(views: &[View]) -> Conditions {
+    let mean = |f: &dyn Fn(&Conditions) -> Option<f64>| {
+        let values: Vec<f64> = views.iter().filter_map(|v| f(&v.conditions)).collect();
+        (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+    };
+    let stamps = views.iter().filter_map(|v| v.conditions.stamp);
+    let (first, last) = (stamps.clone().min(), stamps.max());
+    let middle = first.zip(last).map(|(a, b)| a.plus_s(0.5 * b.since_s(a)));
+    Conditions { oil_c: mean(&|c| c.oil_c), pressure_pa: mean(&|c| c.pressure_pa), stamp: middle }
 }

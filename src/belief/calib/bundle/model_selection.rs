@@ -105,6 +105,6 @@ fn log_evidence(found: &Estimate<'_>) -> f64 {
     let of_prior = log_det(&problem.prior.joint_info).unwrap_or(f64::NEG_INFINITY)
         - 2.0 * problem.layout.time.map_or(0.0, |_| problem.prior.time_std_s.ln());
     let of_views: f64 = normal.eliminated.iter().map(|own| own.log_ratio).sum();
-    let n: usize = problem.sightings.iter().filter(|s| s.is_used).map(|s| s.data.n_coordinates()).sum();
+    let n: usize = problem.observations.iter().filter(|s| s.is_used).map(|s| s.data.n_coordinates()).sum();
     0.5 * (of_prior - of_normal + of_views - normal.cost) - n as f64 * problem.scales.noise.ln()
 }

@@ -10,10 +10,11 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
 
-use crate::calib::bundle::estimate::{prior, robust_start};
 use crate::calib::bundle::input::BundleInput;
 use crate::calib::bundle::linearize::NormalEquations;
+use crate::calib::bundle::priors::prior;
 use crate::calib::bundle::problem::{BundleProblem, Layout};
+use crate::calib::bundle::robust_start::robust_start;
 use crate::calib::parameters::ParameterKind;
 use armcal_core::numeric::Loss;
 use armcal_core::robot::Robot;

@@ -1,4 +1,4 @@
-//! What one sighting says of the camera's pose relative to the tag.
+//! What one observation says of the camera's pose relative to the tag.
 //!
 //! With X = camera_from_tag, a point c of the tag is at p = X c. The camera's pose perturbed on the right by xi = (rho, omega) moves
 //! it by `dp = -rho - omega x p`; the tag's by xi_T does the same with the opposite sign and `xi = Ad(X) xi_T`. So one 6x6 matrix
@@ -10,7 +10,7 @@ use crate::calib::bundle::problem::WeightedMeasurement;
 use armcal_core::optics::{Fisheye, image_jacobian};
 use armcal_core::spatial::{adjoint, log, skew};
 
-/// A sighting linearized, in the camera's frame.
+/// A observation linearized, in the camera's frame.
 #[derive(Clone, Debug)]
 pub(crate) struct PoseInformation {
     pub h: Matrix6<f64>,
@@ -41,7 +41,7 @@ impl LensInformation {
     }
 }
 
-/// A sighting that the lens cannot have seen counts as this many sigma off in each coordinate.
+/// A observation that the lens cannot have seen counts as this many sigma off in each coordinate.
 const UNSEEN_SIGMAS: f64 = 1e3;
 
 /// What it costs that the lens cannot have seen `seen`.
@@ -86,7 +86,7 @@ impl PoseInformation {
         }
     }
 
-    /// A sighting that is not possible: it pulls nowhere and costs much.
+    /// A observation that is not possible: it pulls nowhere and costs much.
     pub(crate) fn unseen(seen: &WeightedMeasurement) -> Self {
         Self { h: Matrix6::zeros(), g: Vector6::zeros(), adjoint: Matrix6::identity(), chi2: unseen_chi2(seen) }
     }

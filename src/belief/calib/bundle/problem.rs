@@ -1,4 +1,4 @@
-//! What is solved: columns, priors, views and sightings in the form that the loops want.
+//! What is solved: columns, priors, views and observations in the form that the loops want.
 
 use std::ops::Range;
 
@@ -65,7 +65,7 @@ pub(crate) struct ViewData {
     pub rate_rad_s: [f64; MAX_JOINTS],
     /// Variance of the mean reading by its noise alone, rad^2.
     pub reading_var: [f64; MAX_JOINTS],
-    pub sightings: Range<usize>,
+    pub observations: Range<usize>,
     pub gripper: Option<usize>,
     /// Joints whose sensor says nothing in this view.
     pub is_free: [bool; MAX_JOINTS],
@@ -94,7 +94,7 @@ pub(crate) struct BundleProblem<'a> {
     pub robot: &'a Robot,
     pub layout: Layout,
     pub views: Vec<ViewData>,
-    pub sightings: Vec<ObservationTerm>,
+    pub observations: Vec<ObservationTerm>,
     pub prior: Prior,
     pub scales: Hyperparameters,
     /// Joints before the camera.
@@ -172,10 +172,10 @@ impl<'a> BundleProblem<'a> {
         let BundleInput { robot, views, model, scales, .. } = input;
         let (robot, scales) = (*robot, scales.clone());
         let layout = Layout::new(robot, model, views);
-        let mut sightings = Vec::new();
+        let mut observations = Vec::new();
         let mut data = Vec::with_capacity(views.len());
         for view in *views {
-            let from = sightings.len();
+            let from = observations.len();
             for tag in &view.tags {
                 let size_m = robot.tags[tag.tag_idx].size_m;
                 let data = match &tag.measured {
@@ -190,12 +190,12 @@ impl<'a> BundleProblem<'a> {
                         info_rotation: scales.rotation_std_rad.powi(-2),
                     },
                 };
-                sightings.push(ObservationTerm { tag: tag.tag_idx, data, is_used: true });
+                observations.push(ObservationTerm { tag: tag.tag_idx, data, is_used: true });
             }
-            let to = sightings.len();
+            let to = observations.len();
             let gripper_size_m = robot.gripper_tag.filter(|_| model.gripper_tag).map(|tag| tag.size_m);
             let gripper = view.gripper_tag.as_ref().zip(gripper_size_m).map(|(seen, size_m)| {
-                sightings.push(ObservationTerm {
+                observations.push(ObservationTerm {
                     tag: robot.tags.len(),
                     data: corners(robot, seen, size_m),
                     is_used: true,
@@ -204,7 +204,7 @@ impl<'a> BundleProblem<'a> {
             });
             data.push(view_data(input, view, &layout, from..to, gripper));
         }
-        Self { robot, layout, views: data, sightings, prior, scales, n_camera_joints: robot.camera.mount.n_joints }
+        Self { robot, layout, views: data, observations, prior, scales, n_camera_joints: robot.camera.mount.n_joints }
     }
 
     /// The state where nothing is off its prior, but for the joints' parameters, which are `guess`'s.
@@ -258,7 +258,7 @@ fn view_data(
     input: &BundleInput<'_>,
     view: &View,
     layout: &Layout,
-    sightings: Range<usize>,
+    observations: Range<usize>,
     gripper: Option<usize>,
 ) -> ViewData {
     let (robot, guess) = (input.robot, &input.guess);
@@ -268,7 +268,7 @@ fn view_data(
         basis: Vec::with_capacity(layout.n_joint()),
         rate_rad_s: [0.0; MAX_JOINTS],
         reading_var: [0.0; MAX_JOINTS],
-        sightings,
+        observations,
         gripper,
         is_free: view.is_free,
     };
@@ -286,4 +286,13 @@ fn view_data(
         data.reading_var[joint] = reading_std_rad.powi(2) / view.n_readings.max(1) as f64;
     }
     data
+}
+
+/// `base` with the estimated parameters of `state`.
+pub(crate) fn parameters_of(problem: &BundleProblem<'_>, state: &State, base: &JointParameters) -> JointParameters {
+    let mut parameters = *base;
+    for (parameter, value) in problem.layout.parameters.iter().zip(state.joint.iter()) {
+        parameters.set(*parameter, *value);
+    }
+    parameters
 }

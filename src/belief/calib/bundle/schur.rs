@@ -27,7 +27,7 @@ pub(crate) struct SchurBlock {
     pub gradient: SVector<f64, N_VIEW_PARAMETERS>,
     /// Rows of own parameters by common columns: `S^T sum H_i A`; filled where it is asked for.
     pub by_common: SMatrix<f64, 6, N_DIRECTIONS>,
-    /// Of each sighting: its place among `infos`.
+    /// Of each observation: its place among `infos`.
     pub range: Range<usize>,
     /// `ln|L| - ln|S^T G S + L|`: how much the prior's volume shrank.
     pub log_ratio: f64,
@@ -37,16 +37,16 @@ pub(crate) struct SchurBlock {
     pub has_any: bool,
 }
 
-/// What carries a group of sightings.
+/// What carries a group of observations.
 pub(crate) struct Group<'a> {
     pub view_idx: usize,
-    /// The joints whose motion the sightings see, and how.
+    /// The joints whose motion the observations see, and how.
     pub joints: Range<usize>,
     pub sign: f64,
     /// Twist of the camera by that of the mount.
     pub by_mount: Matrix6<f64>,
     pub camera_error: Option<&'a Isometry3<f64>>,
-    pub sightings: Range<usize>,
+    pub observations: Range<usize>,
     pub poses: &'a LinkPoses,
     pub base_from_camera: Isometry3<f64>,
 }
@@ -109,7 +109,7 @@ impl SchurBlock {
         (weighted * self.twists.transpose(), weighted * self.gradient)
     }
 
-    /// `sum H_i A step`: what a step of the common parameters adds to the sightings' pull on the camera's twist.
+    /// `sum H_i A step`: what a step of the common parameters adds to the observations' pull on the camera's twist.
     pub(crate) fn push(
         &self,
         problem: &BundleProblem<'_>,
@@ -143,7 +143,7 @@ impl SchurBlock {
         Columns { layout: &problem.layout, view, joints }
     }
 
-    /// `sum H_i A`: the sightings' pull on the camera's twist by the common columns.
+    /// `sum H_i A`: the observations' pull on the camera's twist by the common columns.
     pub(crate) fn twist_by_columns(
         &self,
         problem: &BundleProblem<'_>,

@@ -180,7 +180,7 @@ impl Estimate<'_> {
         if self.is_gripper(view_idx, own) { before } else { before * state.camera_error[view_idx] }
     }
 
-    /// Curvature and pull of a group's sightings on the camera's twist.
+    /// Curvature and pull of a group's observations on the camera's twist.
     fn gradient(
         &self,
         own: &SchurBlock,
@@ -189,15 +189,15 @@ impl Estimate<'_> {
     ) -> (Matrix6<f64>, Vector6<f64>) {
         let (problem, state) = (&self.problem, &self.solved.state);
         let (mut h, mut g) = (Matrix6::zeros(), Vector6::zeros());
-        for sighting in problem.sightings[own.range.clone()].iter().filter(|sighting| sighting.is_used) {
+        for observation in problem.observations[own.range.clone()].iter().filter(|observation| observation.is_used) {
             let pose = match &problem.robot.gripper_tag {
-                Some(tag) if sighting.tag == problem.robot.tags.len() => {
+                Some(tag) if observation.tag == problem.robot.tags.len() => {
                     poses.link(tag.mount.n_joints) * state.gripper_tag
                 }
-                _ => state.tags[sighting.tag],
+                _ => state.tags[observation.tag],
             };
             let camera_from_tag = base_from_camera.inv_mul(&pose);
-            let data: &WeightedMeasurement = &sighting.data;
+            let data: &WeightedMeasurement = &observation.data;
             if let Some(info) = PoseInformation::of(data, &camera_from_tag, &state.lens, problem.scales.noise, None) {
                 h += info.h;
                 g += info.g;

@@ -1,11 +1,12 @@
 //! The tables of calibration.toml that only `bundle` fills.
 
 use crate::calib::bundle::calibration_prior::{MOUNT_ROWS, PriorConsistency, with_mount_rows};
-use crate::calib::bundle::estimate::{Estimate, MIN_GRIPPER_VIEWS};
+use crate::calib::bundle::estimate::Estimate;
+use crate::calib::bundle::model::MIN_GRIPPER_VIEWS;
 use crate::calib::bundle::model_selection::{OptionalTerm, Selection};
-use crate::calib::result::assemble::shortened_rows;
-use crate::calib::result::calibration::{Calibration, CovarianceTable};
+use crate::calib::result::calibration::Calibration;
 use crate::calib::result::camera_mount::CameraMount;
+use crate::calib::result::covariance_file::CovarianceTable;
 use crate::calib::result::failed_joint::PriorTable;
 use crate::calib::result::map_table::MapResult;
 use crate::calib::result::model_table::ModelTable;
@@ -103,5 +104,5 @@ pub(crate) fn covariance_with_mount(robot: &Robot, found: &Estimate<'_>, kept: &
         None => MOUNT_ROWS[k - all.len()].to_owned(),
     };
     let matrix = nalgebra::DMatrix::from_fn(rows.len(), rows.len(), |i, k| full[(rows[i], rows[k])]);
-    Some(CovarianceTable { parameters: rows.iter().map(name).collect(), rows: shortened_rows(&matrix) })
+    Some(CovarianceTable::new(rows.iter().map(name).collect(), &matrix))
 }

@@ -1,13 +1,12 @@
 //! What every method's calibration.toml holds; each method adds its own tables.
 
-use nalgebra::DMatrix;
-
 use crate::calib::acceptance::{AcceptanceData, refusal};
 use crate::calib::covariance::ParameterCovariance;
 use crate::calib::methods::Solution;
 use crate::calib::methods::position_problem::PositionProblem;
 use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
-use crate::calib::result::calibration::{Calibration, CovarianceTable, JointResult, Status};
+use crate::calib::result::calibration::{Calibration, JointResult, Status};
+use crate::calib::result::covariance_file::CovarianceTable;
 use crate::calib::result::metrics::{FitMetrics, HeldOutMetrics};
 use crate::calib::result::terms_table::{ReferenceTable, TermsTable};
 use crate::calib::result::valid_range::ValidRange;
@@ -90,10 +89,11 @@ pub(crate) fn assemble(source: &Provenance<'_>, fit: &Fit<'_>, evidence: Evidenc
         joint: joint_results(source, fit),
         failed_joint: Vec::new(),
         prior: None,
-        covariance: CovarianceTable {
-            parameters: fit.covariance.parameters.iter().map(|p| p.name(source.robot)).collect(),
-            rows: shortened_rows(&fit.covariance.matrix),
-        },
+        covariance_hash: None,
+        covariance: CovarianceTable::new(
+            fit.covariance.parameters.iter().map(|p| p.name(source.robot)).collect(),
+            &fit.covariance.matrix,
+        ),
     };
     calibration.refuse_for(refusals);
     calibration
@@ -127,19 +127,6 @@ pub(crate) fn held_out_metrics(problem: &PositionProblem<'_>, at: &JointParamete
         rms_px: problem.reprojection_rms_px(at),
         nominal_rms_m: problem.rms_m(&JointParameters::default()),
     }
-}
-
-/// Larger tables are written with fewer digits.
-const FULL_DIGITS_ROWS: usize = 24;
-
-/// With seven significant digits where they are many: the file, and whoever holds the result in memory, have the same numbers.
-pub(crate) fn shortened_rows(matrix: &DMatrix<f64>) -> Vec<Vec<f64>> {
-    let is_large = matrix.nrows() > FULL_DIGITS_ROWS;
-    let shortened = |value: &f64| {
-        let short = || format!("{value:.6e}").parse().unwrap_or(*value);
-        if is_large && value.is_finite() { short() } else { *value }
-    };
-    matrix.row_iter().map(|row| row.iter().map(shortened).collect()).collect()
 }
 
 fn joint_results(source: &Provenance<'_>, fit: &Fit<'_>) -> Vec<JointResult> {

@@ -1,6 +1,7 @@
 //! A calibration for tests, with nothing estimated yet.
 
-use crate::calib::result::calibration::{Calibration, CovarianceTable, Status};
+use crate::calib::result::calibration::{Calibration, Status};
+use crate::calib::result::covariance_file::CovarianceTable;
 use crate::calib::result::metrics::{FitMetrics, HeldOutMetrics};
 use crate::calib::result::valid_range::ValidRange;
 use armcal_core::numeric::Outcome;
@@ -40,7 +41,8 @@ pub(in crate::calib) fn bare(robot: &str, method: Method) -> Calibration {
         joint: Vec::new(),
         failed_joint: Vec::new(),
         prior: None,
-        covariance: CovarianceTable { parameters: Vec::new(), rows: Vec::new() },
+        covariance_hash: None,
+        covariance: CovarianceTable::default(),
     }
 }
 

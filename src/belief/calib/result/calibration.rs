@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::calib::finding::Finding;
 use crate::calib::refusal::{Refusal, in_words};
 use crate::calib::result::camera_mount::CameraMount;
+use crate::calib::result::covariance_file::CovarianceTable;
 use crate::calib::result::failed_joint::{FailedJointTable, PriorTable};
 use crate::calib::result::map_table::MapResult;
 use crate::calib::result::metrics::{FitMetrics, HeldOutMetrics};
@@ -39,6 +40,9 @@ pub struct Calibration {
     pub refusal: Option<String>,
     /// Hash of the recorded messages that this rests on (blake3).
     pub messages_hash: String,
+    /// Hash of the covariance in the file beside; absent before the calibration was written, and in files of before there was one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub covariance_hash: Option<String>,
     /// What the data did not determine, and why; these keep the datasheet's values.
     pub unobservable: Vec<String>,
     /// Tag observations that the fit rejected: `pose 12: tag 3: 45 sigma`.
@@ -80,6 +84,8 @@ pub struct Calibration {
     /// What is other than robot.toml, survey and drawing say, the most telling first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub findings: Vec<Finding>,
+    /// Not in calibration.toml, but in the file beside it; older files have it as a table.
+    #[serde(default, skip_serializing)]
     pub covariance: CovarianceTable,
 }
 
@@ -130,12 +136,4 @@ pub struct JointResult {
     /// What the sensor is beyond a straight line.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub terms: Option<TermsTable>,
-}
-
-/// Estimated parameters by [`Parameter::name`](crate::calib::Parameter::name): gains relative, offsets in rad, ... and their covariance.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct CovarianceTable {
-    pub parameters: Vec<String>,
-    pub rows: Vec<Vec<f64>>,
 }

@@ -5,22 +5,19 @@ use std::path::Path;
 use crate::calib::covariance::ParameterCovariance;
 use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
 use crate::calib::result::calibration::{Calibration, JointResult};
+use crate::calib::result::covariance_file::CovarianceTable;
+use crate::calib::result::file_error::CalibrationFileError;
 use crate::calib::result::terms_table::TermsTable;
 use armcal_core::robot::{FileIssue, JointSensorSpec, Robot, RobotError, parse_toml, read_text};
 use armcal_core::sensor::{ArmSensors, Correction};
 
-/// Why a calibration file was refused.
-#[derive(Debug, thiserror::Error)]
-pub enum CalibrationFileError {
-    #[error(transparent)]
-    File(#[from] RobotError),
-    #[error("{file}: is for robot `{found}` with joints {found_joints:?}, not for `{expected}`")]
-    OtherRobot { file: String, found: String, found_joints: Vec<String>, expected: String },
-    #[error(
-        "{file}: joint `{joint}`: terms.shape_rad bends the sensor to {least:.2} .. {most:.2} times its gain, so that readings have no \
-         certain angle; allowed is 0.2 .. 1.8"
-    )]
-    Bent { file: String, joint: String, least: f64, most: f64 },
+/// The texts of a calibration's two files, which hold each other's hashes: to be put in place together.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct CalibrationFiles {
+    /// calibration.toml.
+    pub calibration: String,
+    /// The covariance, for [`covariance_file`](crate::calib::covariance_file).
+    pub covariance: String,
 }
 
 impl JointResult {
@@ -40,8 +37,8 @@ const LEAST_SLOPE: f64 = 0.2;
 const TERMS_HEAD: &str = "\
 # With [joint.terms], in rad, x = travel / (counts per rad) / half_range_rad held to -1 .. 1, L = 1.25, T K, P MPa and t hours from
 # [reference], a = -1 or 1 the way that the joint moved last (0: not known), the angle has beyond that
-# sum_h shape_rad[h] phi_h(x) + offset_rad_per_k T + gain_per_k T travel / (counts per rad) + offset_rad_per_mpa P + drift_rad_per_h t
-# + half_play_rad a, with phi_h(x) = sin(pi h (x + L) / 2 L) / sqrt(L), h = 1, 2, ..
+# sum_h nonlinearity_rad[h] phi_h(x) + offset_rad_per_k T + gain_per_k T travel / (counts per rad) + offset_rad_per_mpa P + drift_rad_per_h t
+# + half_backlash_rad a, with phi_h(x) = sin(pi h (x + L) / 2 L) / sqrt(L), h = 1, 2, ..
 ";
 
 impl Calibration {
@@ -110,9 +107,8 @@ impl Calibration {
     pub fn parameter_covariance(&self, robot: &Robot) -> ParameterCovariance {
         let all =
             (0..robot.n_joints()).flat_map(|joint| ParameterKind::all().map(move |kind| Parameter { joint, kind }));
-        let rows: Vec<(usize, Parameter)> = all
-            .filter_map(|p| Some((self.covariance.parameters.iter().position(|name| *name == p.name(robot))?, p)))
-            .collect();
+        let rows: Vec<(usize, Parameter)> =
+            all.filter_map(|p| Some((self.covariance.row(&p.name(robot))?, p))).collect();
         let at = |row: usize, column: usize| self.covariance.rows[row].get(column).copied().unwrap_or(f64::NAN);
         let is_known = self.joint.iter().any(|joint| joint.residual_std_rad.is_some());
         let residual_std_rad = |j: usize| {
@@ -126,7 +122,15 @@ impl Calibration {
         }
     }
 
-    /// The file's text.
+    /// The texts of calibration.toml and of the covariance beside it.
+    #[must_use]
+    pub fn to_files(&self) -> CalibrationFiles {
+        let calibration = self.to_toml();
+        let covariance = self.covariance.to_file(&calibration);
+        CalibrationFiles { calibration, covariance }
+    }
+
+    /// The text of calibration.toml, without covariance but with its hash.
     ///
     /// # Panics
     /// Never: every value here has a TOML form.
@@ -135,22 +139,35 @@ impl Calibration {
         let head = "# Joint sensors as calibrated. angle = center_rad + offset_rad + gain_rad_per_count * travel,\n\
                     # travel = reading - the datasheet's reading at center_rad, in counts, wrapped to half a word.\n";
         let more = if self.reference.is_some() { TERMS_HEAD } else { "" };
-        let body = toml::to_string(self).expect("plain tables and finite numbers have a TOML form");
+        let hashed = Self { covariance_hash: self.hash_of_covariance(), ..self.clone() };
+        let body = toml::to_string(&hashed).expect("plain tables and finite numbers have a TOML form");
         format!("{head}{more}{body}")
     }
 
-    /// Reads a calibration file.
+    /// Of the covariance that it has, or was said to have by a file that was read without.
+    fn hash_of_covariance(&self) -> Option<String> {
+        let not_read = self.covariance.parameters.is_empty() && self.covariance_hash.is_some();
+        if not_read { self.covariance_hash.clone() } else { Some(self.covariance.hash()) }
+    }
+
+    /// Reads a calibration file and the covariance beside it.
+    ///
+    /// # Errors
+    /// [`CalibrationFileError`] naming file, key and allowed range; a covariance that is missing or another calibration's.
+    pub fn read(file: &Path) -> Result<Self, CalibrationFileError> {
+        let text = read_text(file)?;
+        let mut calibration = Self::parse(file, &text)?;
+        if let Some(hash) = &calibration.covariance_hash {
+            calibration.covariance = CovarianceTable::read_beside(file, &text, hash)?;
+        }
+        Ok(calibration)
+    }
+
+    /// Reads the text of a calibration file alone, for what needs no covariance: that of the result is empty, unless an older
+    /// file has it inside. `file` is for messages.
     ///
     /// # Errors
     /// [`CalibrationFileError`] naming file, key and allowed range.
-    pub fn read(file: &Path) -> Result<Self, CalibrationFileError> {
-        Self::parse(file, &read_text(file)?)
-    }
-
-    /// Reads the text of a calibration file; `file` is for messages.
-    ///
-    /// # Errors
-    /// As [`Self::read`].
     pub fn parse(file: &Path, text: &str) -> Result<Self, CalibrationFileError> {
         let calibration: Self = parse_toml(file, text)?;
         calibration.check(file).map_err(RobotError::from)?;

@@ -28,14 +28,14 @@ struct Sensor<'a> {
     gain: f64,
     gain_rad_per_count: f64,
     half_range_rad: f64,
-    shape_rad: &'a [f64],
+    nonlinearity_rad: &'a [f64],
 }
 
 impl Sensor<'_> {
     fn table(&self) -> LookupTable {
         let share = |n: usize| 2.0 * n as f64 / (POINTS - 1) as f64 - 1.0;
         let correction =
-            |n: usize| nonlinearity_basis(share(n)).iter().zip(self.shape_rad).map(|(phi, a)| phi * a).sum();
+            |n: usize| nonlinearity_basis(share(n)).iter().zip(self.nonlinearity_rad).map(|(phi, a)| phi * a).sum();
         let correction_rad: Vec<f64> = (0..POINTS).map(correction).collect();
         let counts_per_rad = self.gain / self.gain_rad_per_count;
         let travel_rad = |n: usize| share(n) * self.half_range_rad;
@@ -62,7 +62,7 @@ impl Calibration {
                 gain: joint.gain_over_datasheet? * joint.identified_ratio.unwrap_or(1.0),
                 gain_rad_per_count: joint.gain_rad_per_count,
                 half_range_rad: terms.half_range_rad,
-                shape_rad: terms.shape_rad.as_deref().unwrap_or_default(),
+                nonlinearity_rad: terms.nonlinearity_rad.as_deref().unwrap_or_default(),
             };
             Some(sensor.table())
         };
@@ -82,7 +82,7 @@ impl LookupTable {
             gain: correction.gain,
             gain_rad_per_count: correction.gain / spec.counts_per_rad,
             half_range_rad: spec.half_range_rad,
-            shape_rad: &correction.terms.shape_rad,
+            nonlinearity_rad: &correction.terms.nonlinearity_rad,
         };
         (!correction.terms.are_zero()).then(|| sensor.table())
     }

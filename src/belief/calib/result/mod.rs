@@ -1,6 +1,7 @@
 //! The answer: calibration.toml, its tables and its short form.
 //!
-//! `calibration` is the file's content, `assemble` fills it; the other files are its tables. `file` reads and writes it, `compact` is
+//! `calibration` is the file's content, `assemble` fills it; the other files are its tables. `file` reads and writes it, `covariance_file` the
+//! covariance beside it, `compact` is
 //! one line of less than 512 bytes, `lookup` a table from counts to radians.
 
 pub(crate) mod assemble;
@@ -9,8 +10,10 @@ pub(in crate::calib) mod bare;
 pub(crate) mod calibration;
 pub(crate) mod camera_mount;
 mod compact;
+pub(crate) mod covariance_file;
 pub(crate) mod failed_joint;
 mod file;
+mod file_error;
 mod lookup;
 pub(crate) mod map_table;
 pub(crate) mod metrics;
@@ -23,8 +26,10 @@ pub(crate) mod verdict_tables;
 pub use calibration::{Calibration, JointResult, Status};
 pub use camera_mount::CameraMount;
 pub use compact::{CompactCalibration, CompactError, CompactJoint, MAX_COMPACT_BYTES, PredictedToolError};
+pub use covariance_file::{CovarianceTable, covariance_file};
 pub use failed_joint::{FailedJointTable, PriorTable};
-pub use file::CalibrationFileError;
+pub use file::CalibrationFiles;
+pub use file_error::CalibrationFileError;
 pub use lookup::LookupTable;
 pub use map_table::{MapResult, MapTag, SurveyCoverage};
 pub use metrics::{FitMetrics, HeldOutMetrics};

@@ -29,11 +29,11 @@ pub struct ReferenceTable {
 pub struct TermsTable {
     /// What the travel is divided by for the shape's functions.
     pub half_range_rad: f64,
-    /// Coefficients of [`shape_basis`](armcal_core::sensor::shape_basis).
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub shape_rad: Option<Vec<f64>>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub shape_rad_std: Option<Vec<f64>>,
+    /// Coefficients of [`nonlinearity_basis`](armcal_core::sensor::nonlinearity_basis).
+    #[serde(skip_serializing_if = "Option::is_none", alias = "shape_rad")]
+    pub nonlinearity_rad: Option<Vec<f64>>,
+    #[serde(skip_serializing_if = "Option::is_none", alias = "shape_rad_std")]
+    pub nonlinearity_rad_std: Option<Vec<f64>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub offset_rad_per_k: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -51,10 +51,10 @@ pub struct TermsTable {
     pub drift_rad_per_h: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub drift_rad_per_h_std: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub half_play_rad: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub half_play_rad_std: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none", alias = "half_play_rad")]
+    pub half_backlash_rad: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none", alias = "half_play_rad_std")]
+    pub half_backlash_rad_std: Option<f64>,
 }
 
 impl ReferenceTable {
@@ -88,8 +88,8 @@ impl TermsTable {
         let terms = &model.correction.terms;
         let std = |kind| covariance.std(Parameter { joint, kind });
         let shape_std: Vec<Option<f64>> = (0..N_SHAPE as u8).map(|h| std(ParameterKind::Shape(h))).collect();
-        let has_shape = terms.shape_rad != [0.0; N_SHAPE] || shape_std.iter().any(Option::is_some);
-        let shape_rad_std = shape_std.iter().any(Option::is_some).then(|| {
+        let has_shape = terms.nonlinearity_rad != [0.0; N_SHAPE] || shape_std.iter().any(Option::is_some);
+        let nonlinearity_rad_std = shape_std.iter().any(Option::is_some).then(|| {
             // One that was held has no error of its own.
             shape_std.iter().map(|std| std.unwrap_or(0.0)).collect()
         });
@@ -99,11 +99,11 @@ impl TermsTable {
         let (offset_rad_per_mpa, offset_rad_per_mpa_std) =
             scalar(terms.offset_rad_per_mpa, ParameterKind::OffsetPerMpa);
         let (drift_rad_per_h, drift_rad_per_h_std) = scalar(terms.drift_rad_per_h, ParameterKind::DriftPerH);
-        let (half_play_rad, half_play_rad_std) = scalar(terms.half_play_rad, ParameterKind::HalfBacklash);
+        let (half_backlash_rad, half_backlash_rad_std) = scalar(terms.half_backlash_rad, ParameterKind::HalfBacklash);
         let table = Self {
             half_range_rad: model.spec.half_range_rad,
-            shape_rad: has_shape.then(|| terms.shape_rad.to_vec()),
-            shape_rad_std,
+            nonlinearity_rad: has_shape.then(|| terms.nonlinearity_rad.to_vec()),
+            nonlinearity_rad_std,
             offset_rad_per_k,
             offset_rad_per_k_std,
             gain_per_k,
@@ -112,8 +112,8 @@ impl TermsTable {
             offset_rad_per_mpa_std,
             drift_rad_per_h,
             drift_rad_per_h_std,
-            half_play_rad,
-            half_play_rad_std,
+            half_backlash_rad,
+            half_backlash_rad_std,
         };
         let empty = Self { half_range_rad: table.half_range_rad, ..Self::default() };
         (table != empty).then_some(table)
@@ -122,14 +122,14 @@ impl TermsTable {
     /// As the sensor model has them; what is absent is zero.
     #[must_use]
     pub fn terms(&self) -> Terms {
-        let shape = self.shape_rad.as_deref().unwrap_or_default();
+        let shape = self.nonlinearity_rad.as_deref().unwrap_or_default();
         Terms {
-            shape_rad: std::array::from_fn(|h| shape.get(h).copied().unwrap_or(0.0)),
+            nonlinearity_rad: std::array::from_fn(|h| shape.get(h).copied().unwrap_or(0.0)),
             offset_rad_per_k: self.offset_rad_per_k.unwrap_or(0.0),
             gain_per_k: self.gain_per_k.unwrap_or(0.0),
             offset_rad_per_mpa: self.offset_rad_per_mpa.unwrap_or(0.0),
             drift_rad_per_h: self.drift_rad_per_h.unwrap_or(0.0),
-            half_play_rad: self.half_play_rad.unwrap_or(0.0),
+            half_backlash_rad: self.half_backlash_rad.unwrap_or(0.0),
         }
     }
 
@@ -138,9 +138,10 @@ impl TermsTable {
         let key = |name: &str| format!("joint `{joint}`: terms.{name}");
         let check = |name: &str, value: f64, range| FileIssue::check_range(file, &key(name), value, range);
         check("half_range_rad", self.half_range_rad, 1e-3..=100.0)?;
-        for (name, values, range) in
-            [("shape_rad", &self.shape_rad, -1.0..=1.0), ("shape_rad_std", &self.shape_rad_std, 0.0..=1e3)]
-        {
+        for (name, values, range) in [
+            ("nonlinearity_rad", &self.nonlinearity_rad, -1.0..=1.0),
+            ("nonlinearity_rad_std", &self.nonlinearity_rad_std, 0.0..=1e3),
+        ] {
             let Some(values) = values else { continue };
             if values.len() != N_SHAPE {
                 let problem = format!("has {} numbers, needs {N_SHAPE}", values.len());
@@ -160,8 +161,8 @@ impl TermsTable {
             ("offset_rad_per_mpa_std", self.offset_rad_per_mpa_std, std()),
             ("drift_rad_per_h", self.drift_rad_per_h, -1.0..=1.0),
             ("drift_rad_per_h_std", self.drift_rad_per_h_std, std()),
-            ("half_play_rad", self.half_play_rad, -0.2..=0.2),
-            ("half_play_rad_std", self.half_play_rad_std, std()),
+            ("half_backlash_rad", self.half_backlash_rad, -0.2..=0.2),
+            ("half_backlash_rad_std", self.half_backlash_rad_std, std()),
         ] {
             value.map_or(Ok(0.0), |value| check(name, value, range))?;
         }

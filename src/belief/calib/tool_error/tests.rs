@@ -32,7 +32,7 @@ fn some_terms() -> JointParameters {
         at.gain[joint] = 1.0 + 0.01 * joint as f64;
         at.offset_rad[joint] = 0.02;
         at.terms[joint] = Terms { offset_rad_per_k: 3e-4, gain_per_k: 2e-5, ..Terms::default() };
-        at.terms[joint].shape_rad[1] = 3e-3;
+        at.terms[joint].nonlinearity_rad[1] = 3e-3;
     }
     at
 }
@@ -145,7 +145,7 @@ fn residuals_play_and_drift_add_what_they_are() {
     near(position(&empty(Some([0.0; MAX_JOINTS])), &sensors, &late) - none, drifted);
     // The play's side is not known where the tool is used.
     let mut with_play = at;
-    with_play.terms[1].half_play_rad = 2e-3;
+    with_play.terms[1].half_backlash_rad = 2e-3;
     let found = position(&empty(Some([0.0; MAX_JOINTS])), &with_play.sensors(&robot), &reference());
     near(found - none, by(1) * 4e-6);
     let axis = *poses.axis(1);

@@ -88,7 +88,7 @@ impl ArmEnsemble {
             let warmed_rad =
                 if has(ParameterKind::OffsetPerK) { 0.0 } else { spec.temperature_std_rad_per_k * departure.oil_k };
             let wandered_rad = spec.drift_std_rad_per_sqrt_h * departure.elapsed_h.abs().sqrt();
-            let play_rad = sensors.models[joint].correction.terms.half_play_rad;
+            let play_rad = sensors.models[joint].correction.terms.half_backlash_rad;
             [reading_std_rad(spec), warmed_rad, wandered_rad, play_rad].into_iter().fold(left_rad, f64::hypot)
         };
         let mut parameters = covariance.parameters.clone();

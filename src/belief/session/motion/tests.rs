@@ -84,7 +84,7 @@ fn sensors_with_terms_are_used_under_what_was_heard_last() {
     parameters.terms[0] = Terms { offset_rad_per_k: per_k, ..Terms::default() };
     parameters.terms[1] = Terms { offset_rad_per_mpa: per_mpa, ..Terms::default() };
     parameters.terms[2] = Terms { drift_rad_per_h: per_h, ..Terms::default() };
-    parameters.terms[3].shape_rad[2] = 5e-3;
+    parameters.terms[3].nonlinearity_rad[2] = 5e-3;
     driver.believe(parameters.sensors(&robot));
     // At the reference only the shape tells.
     let at_rest = driver.believed_angles().expect("readings");

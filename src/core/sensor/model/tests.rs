@@ -40,12 +40,12 @@ fn any_terms() -> impl Strategy<Value = Terms> {
     (shape, -5e-4f64..5e-4, -1e-4f64..1e-4, -1e-4f64..1e-4, -1e-3f64..1e-3).prop_map(
         |(shape, offset_rad_per_k, gain_per_k, offset_rad_per_mpa, drift_rad_per_h)| Terms {
             // Up to some 0.7 % of the range in the slow ones.
-            shape_rad: std::array::from_fn(|h| 0.02 * shape[h] / (1 + h * h) as f64),
+            nonlinearity_rad: std::array::from_fn(|h| 0.02 * shape[h] / (1 + h * h) as f64),
             offset_rad_per_k,
             gain_per_k,
             offset_rad_per_mpa,
             drift_rad_per_h,
-            half_play_rad: 0.0,
+            half_backlash_rad: 0.0,
         },
     )
 }
@@ -96,11 +96,11 @@ fn each_term_moves_the_angle_by_what_its_name_says() {
     near(moved(Terms { gain_per_k: 1e-4, ..Terms::default() }, 1.0), 7e-4);
     near(moved(Terms { offset_rad_per_mpa: 1e-3, ..Terms::default() }, 1.0), 2e-3);
     near(moved(Terms { drift_rad_per_h: 1e-3, ..Terms::default() }, 1.0), 5e-4);
-    near(moved(Terms { half_play_rad: 1e-3, ..Terms::default() }, -1.0), -1e-3);
-    near(moved(Terms { half_play_rad: 1e-3, ..Terms::default() }, 0.0), 0.0);
+    near(moved(Terms { half_backlash_rad: 1e-3, ..Terms::default() }, -1.0), -1e-3);
+    near(moved(Terms { half_backlash_rad: 1e-3, ..Terms::default() }, 0.0), 0.0);
     for h in 0..N_SHAPE {
         let mut terms = Terms::default();
-        terms.shape_rad[h] = 1e-3;
+        terms.nonlinearity_rad[h] = 1e-3;
         // phi_h(x) = sin(pi h (x + L) / 2 L) / sqrt(L), L = 1.25, h from 1.
         let turn = std::f64::consts::PI * (h + 1) as f64 * (0.7 / spec().half_range_rad + 1.25) / 2.5;
         near(moved(terms, 0.0), 1e-3 * turn.sin() / 1.25_f64.sqrt());

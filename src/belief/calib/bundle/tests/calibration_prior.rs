@@ -3,17 +3,18 @@
 use nalgebra::Vector3;
 
 use crate::calib::bundle::calibration_prior::{CalibrationPrior, MOUNT_ROWS, PriorConsistency, with_mount_rows};
-use crate::calib::bundle::estimate::{Estimate, estimate, model_for, reference};
+use crate::calib::bundle::estimate::{Estimate, estimate};
 use crate::calib::bundle::failures::FailureAdjusted;
 use crate::calib::bundle::input::HyperparameterMode;
 use crate::calib::bundle::model::Hyperparameters;
+use crate::calib::bundle::model::{model_for, reference};
 use crate::calib::bundle::tables::camera_mount_table;
 use crate::calib::bundle::tests::data::{Noise, Truth, normal, rng, titan, views};
 use crate::calib::covariance::ParameterCovariance;
 use crate::calib::parameters::JointParameters;
-use crate::calib::result::assemble::shortened_rows;
 use crate::calib::result::bare::bare;
-use crate::calib::result::calibration::{Calibration, CovarianceTable, JointResult};
+use crate::calib::result::calibration::{Calibration, JointResult};
+use crate::calib::result::covariance_file::CovarianceTable;
 use crate::calib::views::view::View;
 use crate::calib::{ReferenceTable, TermsTable, ValidRange};
 use armcal_core::robot::Robot;
@@ -113,7 +114,7 @@ fn calibration(robot: &Robot, found: &Estimate<'_>, views: &[View]) -> Calibrati
         reference: ReferenceTable::of(&parameters, &covariance),
         camera_mount: Some(camera_mount_table(robot, found, views)),
         joint: joint.collect(),
-        covariance: CovarianceTable { parameters: names.collect(), rows: shortened_rows(&full) },
+        covariance: CovarianceTable::new(names.collect(), &full),
         ..bare(&robot.name, Method::Bundle)
     }
 }

@@ -3,10 +3,11 @@
 use nalgebra::DVector;
 use rand::RngExt;
 
-use crate::calib::bundle::estimate::{model_for, prior};
 use crate::calib::bundle::input::{BundleInput, HyperparameterMode};
 use crate::calib::bundle::linearize::NormalEquations;
+use crate::calib::bundle::model::model_for;
 use crate::calib::bundle::model::{Hyperparameters, Model};
+use crate::calib::bundle::priors::prior;
 use crate::calib::bundle::problem::{BundleProblem, State};
 use crate::calib::bundle::solve::{LOOSE, solve, stepped, until};
 use crate::calib::bundle::tests::data::{Noise, Truth, normal, reference, rng, titan_with_gripper_tag, views};

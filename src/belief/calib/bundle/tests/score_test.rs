@@ -2,8 +2,9 @@
 
 use nalgebra::{UnitQuaternion, Vector3};
 
-use crate::calib::bundle::estimate::{Estimate, estimate, model_for};
+use crate::calib::bundle::estimate::{Estimate, estimate};
 use crate::calib::bundle::input::{BundleInput, HyperparameterMode};
+use crate::calib::bundle::model::model_for;
 use crate::calib::bundle::model::{Hyperparameters, Model};
 use crate::calib::bundle::observability::{Observability, observability};
 use crate::calib::bundle::tests::data::{Noise, Truth, reference, rng, titan, views};

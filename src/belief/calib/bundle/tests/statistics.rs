@@ -5,10 +5,11 @@ use rand::RngExt;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 
-use crate::calib::bundle::estimate::{Estimate, estimate, model_for};
+use crate::calib::bundle::estimate::{Estimate, estimate};
 use crate::calib::bundle::evidence::Posterior;
 use crate::calib::bundle::input::{BundleInput, HyperparameterMode};
 use crate::calib::bundle::linearize::NormalEquations;
+use crate::calib::bundle::model::model_for;
 use crate::calib::bundle::model::{Hyperparameters, Model};
 use crate::calib::bundle::problem::State;
 use crate::calib::bundle::tests::data::{Noise, Truth, reference, rng, titan, titan_with_gripper_tag, views};
@@ -261,7 +262,7 @@ fn rms_error(case: &Case<'_>, found: &Estimate<'_>, seed: u64) -> f64 {
     (errors.sum::<f64>() / travels.len() as f64).sqrt()
 }
 
-/// One in twenty sightings under another tag's id, or with a corner far off.
+/// One in twenty observations under another tag's id, or with a corner far off.
 #[test]
 fn gross_errors_are_named_and_cost_little() {
     let robot = titan();

@@ -251,7 +251,7 @@ fn relative_gain(calibration: &Calibration, joint: &JointResult) -> Result<f64, 
         return Ok(1.0);
     }
     let name = format!("{} gain", joint.name);
-    let row = calibration.covariance.parameters.iter().position(|parameter| *parameter == name);
+    let row = calibration.covariance.row(&name);
     let variance = row.and_then(|row| calibration.covariance.rows.get(row)?.get(row).copied());
     let relative =
         variance.map(|variance| joint.gain_rad_per_count.abs() * variance.sqrt() / joint.gain_std_rad_per_count);

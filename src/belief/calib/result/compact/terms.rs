@@ -46,12 +46,12 @@ pub struct CompactReference {
 /// As [`Terms`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct CompactTerms {
-    pub shape_rad: [f64; N_SHAPE],
+    pub nonlinearity_rad: [f64; N_SHAPE],
     pub offset_rad_per_k: f64,
     pub gain_per_k: f64,
     pub offset_rad_per_mpa: f64,
     pub drift_rad_per_h: f64,
-    pub half_play_rad: f64,
+    pub half_backlash_rad: f64,
 }
 
 impl CompactReference {
@@ -116,7 +116,7 @@ fn scalars(terms: &mut CompactTerms) -> [(&mut f64, f64); 5] {
         (&mut terms.gain_per_k, GAIN_STEPS),
         (&mut terms.offset_rad_per_mpa, OFFSET_STEPS),
         (&mut terms.drift_rad_per_h, DRIFT_STEPS),
-        (&mut terms.half_play_rad, PLAY_STEPS),
+        (&mut terms.half_backlash_rad, PLAY_STEPS),
     ]
 }
 
@@ -127,20 +127,32 @@ fn per_rad(step_rad: f64) -> f64 {
 
 impl CompactTerms {
     const ZERO: Self = Self {
-        shape_rad: [0.0; N_SHAPE],
+        nonlinearity_rad: [0.0; N_SHAPE],
         offset_rad_per_k: 0.0,
         gain_per_k: 0.0,
         offset_rad_per_mpa: 0.0,
         drift_rad_per_h: 0.0,
-        half_play_rad: 0.0,
+        half_backlash_rad: 0.0,
     };
 
     /// Rounded as the text will be.
     pub(crate) fn of(terms: &Terms, shape_step_rad: f64, joint: &str) -> Result<Self, CompactError> {
-        let Terms { shape_rad, offset_rad_per_k, gain_per_k, offset_rad_per_mpa, drift_rad_per_h, half_play_rad } =
-            *terms;
-        let mut rounded =
-            Self { shape_rad, offset_rad_per_k, gain_per_k, offset_rad_per_mpa, drift_rad_per_h, half_play_rad };
+        let Terms {
+            nonlinearity_rad,
+            offset_rad_per_k,
+            gain_per_k,
+            offset_rad_per_mpa,
+            drift_rad_per_h,
+            half_backlash_rad,
+        } = *terms;
+        let mut rounded = Self {
+            nonlinearity_rad,
+            offset_rad_per_k,
+            gain_per_k,
+            offset_rad_per_mpa,
+            drift_rad_per_h,
+            half_backlash_rad,
+        };
         let out_of_range = || CompactError::Range { joint: joint.to_owned(), what: "a term" };
         let round = |value: &mut f64, per_unit: f64| {
             let steps = (*value * per_unit).round();
@@ -148,15 +160,21 @@ impl CompactTerms {
             Ok(())
         };
         scalars(&mut rounded).into_iter().try_for_each(|(value, per_unit)| round(value, per_unit))?;
-        rounded.shape_rad.iter_mut().try_for_each(|value| round(value, per_rad(shape_step_rad)))?;
+        rounded.nonlinearity_rad.iter_mut().try_for_each(|value| round(value, per_rad(shape_step_rad)))?;
         Ok(rounded)
     }
 
     #[must_use]
     pub fn terms(&self) -> Terms {
-        let Self { shape_rad, offset_rad_per_k, gain_per_k, offset_rad_per_mpa, drift_rad_per_h, half_play_rad } =
-            *self;
-        Terms { shape_rad, offset_rad_per_k, gain_per_k, offset_rad_per_mpa, drift_rad_per_h, half_play_rad }
+        let Self {
+            nonlinearity_rad,
+            offset_rad_per_k,
+            gain_per_k,
+            offset_rad_per_mpa,
+            drift_rad_per_h,
+            half_backlash_rad,
+        } = *self;
+        Terms { nonlinearity_rad, offset_rad_per_k, gain_per_k, offset_rad_per_mpa, drift_rad_per_h, half_backlash_rad }
     }
 
     /// The five scalars, then the shape up to its last coefficient that is not zero.
@@ -166,8 +184,8 @@ impl CompactTerms {
         for (value, per_unit) in scalars(&mut self) {
             push(*value, per_unit);
         }
-        let n = N_SHAPE - self.shape_rad.iter().rev().take_while(|value| **value == 0.0).count();
-        for value in &self.shape_rad[..n] {
+        let n = N_SHAPE - self.nonlinearity_rad.iter().rev().take_while(|value| **value == 0.0).count();
+        for value in &self.nonlinearity_rad[..n] {
             push(*value, per_rad(shape_step_rad));
         }
         text
@@ -186,7 +204,7 @@ impl CompactTerms {
         for ((value, per_unit), steps) in scalars(&mut terms).into_iter().zip(scalar_steps) {
             *value = steps / per_unit;
         }
-        for (value, steps) in terms.shape_rad.get_mut(..shape_steps.len())?.iter_mut().zip(shape_steps) {
+        for (value, steps) in terms.nonlinearity_rad.get_mut(..shape_steps.len())?.iter_mut().zip(shape_steps) {
             *value = steps / per_rad(shape_step_rad);
         }
         Some(terms)

@@ -78,7 +78,7 @@ fn what_does_not_fit_is_refused_and_not_cut() {
     let mut many = full.clone();
     let (seventh, eighth) = (full.joint[0].clone(), full.joint[1].clone());
     for joint in &mut many.joint {
-        joint.terms.as_mut().expect("terms").shape_rad = Some(vec![0.2; 12]);
+        joint.terms.as_mut().expect("terms").nonlinearity_rad = Some(vec![0.2; 12]);
     }
     many.joint.extend([seventh, eighth]);
     let compact = CompactCalibration::of(&many).expect("within the range");

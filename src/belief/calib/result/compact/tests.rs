@@ -4,8 +4,8 @@ use proptest::prelude::*;
 
 use crate::calib::refusal::Refusal;
 use crate::calib::result::bare::bare;
-use crate::calib::result::calibration::CovarianceTable;
 use crate::calib::result::compact::*;
+use crate::calib::result::covariance_file::CovarianceTable;
 use crate::calib::result::metrics::HeldOutMetrics;
 use crate::calib::result::valid_range::ValidRange;
 use armcal_core::numeric::Outcome;

@@ -153,9 +153,9 @@ impl Maker<'_> {
 
     fn add_tags(&mut self, view: &mut View, frames: &[PairedFrame<'_>]) {
         let mut by_id: BTreeMap<u32, Vec<RawMeasurement>> = BTreeMap::new();
-        for sighting in frames.iter().flat_map(|frame| &frame.frame.tags) {
-            if let Some(id) = sighting.id.or(self.plain_landmark) {
-                by_id.entry(id).or_default().push(sighting.seen);
+        for observation in frames.iter().flat_map(|frame| &frame.frame.tags) {
+            if let Some(id) = observation.id.or(self.plain_landmark) {
+                by_id.entry(id).or_default().push(observation.seen);
             }
         }
         for (id, seen) in by_id {

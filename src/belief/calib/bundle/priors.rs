@@ -1,0 +1,52 @@
+//! The priors of an estimate: datasheet, drawing and survey, or an earlier calibration.
+
+use nalgebra::{DMatrix, DVector, Isometry3};
+
+use crate::calib::bundle::input::BundleInput;
+use crate::calib::bundle::model::Hyperparameters;
+use crate::calib::bundle::problem::{BundleProblem, Layout, Prior};
+use crate::calib::parameters::{JointParameters, Parameter};
+use crate::calib::views::view::TagMeasurement;
+
+/// The datasheet's and the survey's priors.
+pub(crate) fn prior(input: &BundleInput<'_>, scales: &Hyperparameters) -> Prior {
+    let robot = input.robot;
+    let layout = Layout::new(robot, &input.model, input.views);
+    let nominal = JointParameters::default();
+    let mean = layout.parameters.iter().map(|p| nominal.get(*p));
+    let variance = |p: &Parameter| BundleProblem::at_least(scales.prior_std(&robot.sensors[p.joint], p.joint, p.kind));
+    let info = layout.parameters.iter().map(|p| variance(p).powi(-2));
+    let n = layout.n_joint();
+    let (mut joint_mean, joint_info) = input.joint_prior.clone().unwrap_or_else(|| {
+        let info = DMatrix::from_diagonal(&DVector::from_iterator(n, info));
+        (DVector::from_iterator(n, mean), info)
+    });
+    if joint_mean.len() > n {
+        joint_mean = joint_mean.rows(0, n).into_owned();
+    }
+    let six = |position: f64, rotation: f64| [position, position, position, rotation, rotation, rotation];
+    let camera = &robot.camera;
+    let gripper = robot.gripper_tag;
+    Prior {
+        joint_mean,
+        joint_info,
+        mount: camera.mount.link_from_frame,
+        mount_std: six(camera.mount_std_m, camera.mount_std_rad),
+        time_std_s: 0.05,
+        lens: camera.lens,
+        lens_std: [1.0, 1.0, 1.0, 1.0, 1e-2, 1e-2, 1e-2, 1e-2],
+        tags: robot.tags.iter().map(|tag| *tag.base_from_tag.isometry()).collect(),
+        tags_std: (0..robot.tags.len()).map(|tag_idx| tag_std(input, tag_idx)).collect(),
+        gripper_tag: gripper.map_or_else(Isometry3::identity, |tag| tag.mount.link_from_frame),
+        gripper_tag_std: gripper.map_or([0.0; 6], |tag| six(tag.position_std_m, tag.rotation_std_rad)),
+    }
+}
+
+/// One sigma of a tag's place; a landmark that is seen as a position alone has no attitude to speak of.
+fn tag_std(input: &BundleInput<'_>, tag_idx: usize) -> [f64; 6] {
+    let tag = &input.robot.tags[tag_idx];
+    let mut observations = input.views.iter().flat_map(|view| &view.tags).filter(|seen| seen.tag_idx == tag_idx);
+    let is_point = observations.all(|seen| matches!(seen.measured, TagMeasurement::Position));
+    let (position, rotation) = (tag.position_std_m, if is_point { 1.0 } else { tag.rotation_std_rad });
+    [position, position, position, rotation, rotation, rotation]
+}
