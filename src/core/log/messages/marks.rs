@@ -26,8 +26,11 @@ message!(
     time!(),
 );
 
-/// Names of the kinds in a file. A kind is made from its index, that of a pose, joint or target; 0 where it has none.
-const NAMES: [(&str, fn(u32) -> MarkKind); 16] = [
+/// A kind from its index, that of a pose, joint or target; 0 where it has none.
+type KindOf = fn(u32) -> MarkKind;
+
+/// Names of the kinds in a file.
+const NAMES: [(&str, KindOf); 16] = [
     ("capture_fit", |pose_idx| MarkKind::Capture { set: CaptureSet::Fit, pose_idx }),
     ("capture_held_out", |pose_idx| MarkKind::Capture { set: CaptureSet::HeldOut, pose_idx }),
     ("identify", |joint_idx| MarkKind::Identify { joint_idx }),
