@@ -1,19 +1,21 @@
-//! A routine file to checked types.
+//! The file of a routine and its checks.
 
 use std::path::{Path, PathBuf};
 
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 
-use super::campaign::{CampaignFile, CampaignSettings, RegressSettings};
+use super::camera_mode::CameraFile;
+use super::campaign::{CampaignFile, RegressSettings};
+use super::definition::{FailedJointEntry, Routine};
+use super::error::RoutineError;
+use super::method::Method;
 use super::overrides::{Overrides, read_with};
-use super::scene::Scene;
+use super::scene::SceneFile;
 use super::script::{self, Script};
+use super::settings::{CaptureSettings, TaskSettings};
 use super::site::SiteFile;
-use super::step::{MoveGoal, ReachSettings, Step};
-use crate::robot::{
-    self, BaseTagStd, FailedJoint, FileIssue, MapKnowledge, PartFile, Robot, RobotError, Vehicle, check_parts,
-    parse_toml, read_text,
-};
+use super::step::Step;
+use crate::robot::{FileIssue, PartFile};
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -51,7 +53,7 @@ fn first_seed() -> u64 {
     1
 }
 
-/// A method that does not leave its own views out in turn needs others for its verdict.
+/// Refuses a capture without held-out views for a method that is not cross-validated.
 fn check_held_out(file: &Path, method: Method, steps: &[Step]) -> Result<(), FileIssue> {
     if matches!(method, Method::Bundle | Method::JointLimits) {
         return Ok(());

@@ -16,19 +16,19 @@ pub struct Scene {
     pub obstacles: Vec<Part>,
 }
 
-/// The part of a routine that says what surrounds the vehicle.
+/// The tables `[site]` and `[[obstacle]]` of a routine.
 #[derive(Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
-struct SceneFile {
+pub(super) struct SceneFile {
     #[serde(default)]
-    site: SiteFile,
+    pub(super) site: SiteFile,
     #[serde(default)]
-    obstacle: Vec<PartFile>,
+    pub(super) obstacle: Vec<PartFile>,
 }
 
 impl SceneFile {
     /// The scene, and itself without the files of meshes.
-    fn check(self, file: &Path) -> Result<(Scene, Self), RoutineError> {
+    pub(super) fn check(self, file: &Path) -> Result<(Scene, Self), RoutineError> {
         if let Some(z) = self.site.seafloor_z_m {
             FileIssue::check_range(file, "site.seafloor_z_m", z, -1e4..=0.0)?;
         }

@@ -6,7 +6,8 @@ use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
 use super::assert_figure::{AssertLimits, Needs};
-use super::file::{CaptureSettings, Margins, PoseCriterion, RoutineError, TaskSettings};
+use super::error::RoutineError;
+use super::settings::{CaptureSettings, Margins, PoseCriterion, TaskSettings};
 use super::step::{
     CalibrateSettings, CalibrateViews, IdentifySettings, MoveGoal, OnRefusal, ReachSettings, Step, StopsSettings,
 };

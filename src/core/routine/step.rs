@@ -3,7 +3,7 @@
 use serde::Deserialize;
 
 use super::assert_figure::AssertLimits;
-use super::file::CaptureSettings;
+use super::settings::CaptureSettings;
 
 /// One step of a routine's script.
 #[derive(Clone, Debug)]
