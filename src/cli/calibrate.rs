@@ -52,7 +52,8 @@ pub(super) struct CalibrateArgs {
 /// `wrist_pitch=dead`.
 fn failed_joint(text: &str, robot: &Robot) -> Result<FailedJoint, UsageError> {
     let (joint, kind) = text.split_once('=').unwrap_or((text, ""));
-    FailedJoint::of_names(joint, kind, robot).map_err(|problem| UsageError(format!("--failed {text}: {problem}")))
+    FailedJoint::of_names(joint, kind, &robot.joint_names())
+        .map_err(|problem| UsageError(format!("--failed {text}: {problem}")))
 }
 
 pub(super) fn calibrate(args: &CalibrateArgs) -> Result<Exit> {

@@ -87,7 +87,7 @@ fn as_recorded(input: &PlanInput<'_>) -> Recording {
         unknown_topics: BTreeMap::new(),
         rejected: BTreeMap::new(),
         non_monotonic: 0,
-        disorder: BTreeMap::new(),
+        stamp_regressions: BTreeMap::new(),
     }
 }
 

@@ -82,7 +82,7 @@ mod tests {
             unknown_topics: BTreeMap::new(),
             rejected: BTreeMap::new(),
             non_monotonic: 0,
-            disorder: Default::default(),
+            stamp_regressions: Default::default(),
         }
     }
 

@@ -170,7 +170,7 @@ impl<'a> TrueArm<'a> {
             unknown_topics: Default::default(),
             rejected: Default::default(),
             non_monotonic: 0,
-            disorder: Default::default(),
+            stamp_regressions: Default::default(),
         }
     }
 }

@@ -198,7 +198,7 @@ impl ScriptRunner<'_, '_> {
             }
             self.log_plan(&chosen)?;
             views.enough_at = chosen.needed.map(|needed| (views.n_fit + needed).max(views.n_for_verdict));
-            self.visit_some(&chosen, &mut views, replans)?;
+            self.visit_some(&chosen, &mut views)?;
             if !replans {
                 break format!("{} poses were visited", views.tried);
             }
@@ -265,7 +265,8 @@ impl ScriptRunner<'_, '_> {
     }
 
     /// Visits the poses of a plan in their order, as far as the next renewal.
-    fn visit_some(&mut self, plan: &PosePlan, views: &mut CaptureRun<'_>, replans: bool) -> Result<(), SessionError> {
+    fn visit_some(&mut self, plan: &PosePlan, views: &mut CaptureRun<'_>) -> Result<(), SessionError> {
+        let replans = self.replans(views.settings);
         for pose in &plan.poses {
             if replans && (views.is_renewal_due() || views.enough(self.driver.now()).is_some()) {
                 return Ok(());

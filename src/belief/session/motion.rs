@@ -8,8 +8,8 @@ use armcal_core::robot::{FailedJoint, Robot, Vehicle};
 use armcal_core::routine::TaskSettings;
 use armcal_core::sensor::{ArmSensors, Conditions};
 use armcal_core::streams::{
-    Arm, ArmError, JointAngles, JointCommand, JointCounts, JointStateBelief, LogLevel, LogLine, Mark, MarkKind,
-    Message, Phase, ReachTask, RecordedSurvey, Sink,
+    Arm, ArmError, ImageDemand, JointAngles, JointCommand, JointCounts, JointStateBelief, LogLevel, LogLine, Mark,
+    MarkKind, Message, Phase, ReachTask, RecordedSurvey, Sink,
 };
 use armcal_core::time::Stamp;
 
@@ -375,11 +375,11 @@ impl<'b> Driver<'b> {
         self.recorder.tags_seen = 0;
         self.recorder.ids_seen.clear();
         let steps = (seconds / self.arm.period_s()).ceil() as u64;
-        self.arm.look(true);
+        self.arm.request_images(ImageDemand::All);
         for _ in 0..steps {
             self.step()?;
         }
-        self.arm.look(false);
+        self.arm.request_images(ImageDemand::Few);
         let end = self.arm.now();
         self.record(&Message::Mark(Mark { start, end, kind }))?;
         Ok(self.recorder.tags_seen)

@@ -13,7 +13,7 @@ use armcal_core::robot::Robot;
 use armcal_core::routine::{AssertFigure, AssertLimits, CalibrateSettings, CalibrateViews, MoveGoal, OnRefusal, Step};
 use armcal_core::sensor::ArmSensors;
 use armcal_core::stats::stream_rng;
-use armcal_core::streams::{Arm, JointAngles, LogLevel, Mark, MarkKind, Message, Phase, PriorSource, ReachAttempt};
+use armcal_core::streams::{Arm, JointAngles, LogLevel, Mark, MarkKind, Message, Phase, ReachAttempt};
 use armcal_core::time::Stamp;
 
 /// Shares of the clearance that are tried in this order for a path from a place that the whole of it does not let the arm leave.
@@ -287,7 +287,7 @@ impl ScriptRunner<'_, '_> {
             CalibrateViews::New => self.views_since,
             CalibrateViews::All => self.began,
         };
-        let kind = MarkKind::Calibrate(if settings.warm { PriorSource::Warm } else { PriorSource::Fresh });
+        let kind = MarkKind::Calibrate(settings.prior);
         self.driver.record(&Message::Mark(Mark { start, end, kind }))?;
         let recording = self.driver.recorder.read_back()?;
         let began_s = self.driver.progress.wall_s();

@@ -178,7 +178,7 @@ fn relative(
 ) -> Vec<RelativeBodyPose> {
     let mut out = Vec::new();
     let Some(factor) = factor else { return out };
-    let mut columns = BTreeMap::new();
+    let mut columns = InverseColumns { factor, of_node: BTreeMap::new() };
     let used: Vec<usize> =
         (0..problem.blocks.len()).filter(|idx| is_used(problem, problem.blocks[*idx].range.clone())).collect();
     for of_view in used.chunk_by(|a, b| problem.blocks[*a].view == problem.blocks[*b].view) {
@@ -191,7 +191,7 @@ fn relative(
                     of_a[a] + of_b[b] - of_a[b] - of_a[b].transpose()
                 }
                 _ => [first, second]
-                    .map(|idx| block_covariance(problem, normal, &inverses[idx], idx, factor, &mut columns))
+                    .map(|idx| block_covariance(problem, normal, &inverses[idx], idx, &mut columns))
                     .into_iter()
                     .sum(),
             };
@@ -209,18 +209,29 @@ fn relative(
     out
 }
 
-/// Covariance of a camera's pose: its own, and what its tags add.
+/// Columns of the covariance, each computed once.
+struct InverseColumns<'a> {
+    factor: &'a Factor,
+    of_node: BTreeMap<usize, Vec<Matrix6<f64>>>,
+}
+
+impl InverseColumns<'_> {
+    fn of(&mut self, node: usize) -> &[Matrix6<f64>] {
+        self.of_node.entry(node).or_insert_with(|| self.factor.inverse_column(node))
+    }
+}
+
+/// Covariance of a camera's pose: its own part plus that of its tags.
 fn block_covariance(
     problem: &MapProblem<'_>,
     normal: &Normal,
     inverse: &Matrix6<f64>,
     idx: usize,
-    factor: &Factor,
-    columns: &mut BTreeMap<usize, Vec<Matrix6<f64>>>,
+    columns: &mut InverseColumns<'_>,
 ) -> Matrix6<f64> {
     let block = &problem.blocks[idx];
     if let Some(node) = block.node {
-        return factor.inverse_column(node)[node];
+        return columns.factor.inverse_column(node)[node];
     }
     let nodes: Vec<(usize, usize)> = block
         .range
@@ -230,7 +241,7 @@ fn block_covariance(
         .collect();
     let mut covariance = *inverse;
     for (at, node) in &nodes {
-        let column = columns.entry(*node).or_insert_with(|| factor.inverse_column(*node));
+        let column = columns.of(*node);
         let right = normal.cross[*at].transpose() * inverse;
         for (other, other_node) in &nodes {
             covariance += inverse * normal.cross[*other] * column[*other_node] * right;

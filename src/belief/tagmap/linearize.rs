@@ -9,7 +9,7 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Matrix2x3, Matrix2x6, Matrix6, Vector2, Vector6};
 
 use crate::tagmap::attitude;
-use crate::tagmap::problem::{Block, MapProblem, Observation, TagState};
+use crate::tagmap::problem::{MapProblem, Observation, TagState};
 use crate::tagmap::sparse::{Pattern, System};
 use armcal_core::numeric::Loss;
 use armcal_core::optics::CameraModel;
@@ -86,7 +86,7 @@ impl Normal {
             for at in block.range.clone() {
                 self.cross[at] = Matrix6::zeros();
                 if problem.observations[at].is_used {
-                    self.add_observation(problem, idx, block, at, loss);
+                    self.add_observation(problem, idx, at, loss);
                 }
             }
         }
@@ -96,7 +96,8 @@ impl Normal {
         attitude::add(self, problem);
     }
 
-    fn add_observation(&mut self, problem: &MapProblem<'_>, idx: usize, block: &Block, at: usize, loss: Loss) {
+    fn add_observation(&mut self, problem: &MapProblem<'_>, idx: usize, at: usize, loss: Loss) {
+        let block = &problem.blocks[idx];
         let seen = &problem.observations[at];
         let tag = &problem.tags[seen.tag];
         let camera = &problem.cameras[seen.camera];

@@ -43,7 +43,7 @@ pub(super) fn screen(input: &MapInput<'_>, settings: &MapSettings) -> Screened {
             let outcome = match size_m {
                 _ if twice => Err(MapRejection::SeenTwice),
                 None => Err(MapRejection::UnknownTag),
-                Some(size_m) => observe(input, settings, at, view, tag, size_m),
+                Some(size_m) => observe(input, settings, view, tag, size_m),
             };
             match outcome {
                 Ok(observation) => found.push((at, tag.id, observation)),
@@ -54,7 +54,8 @@ pub(super) fn screen(input: &MapInput<'_>, settings: &MapSettings) -> Screened {
     let ids: BTreeSet<u32> = found.iter().map(|(_, id, _)| *id).collect();
     let ids: Vec<u32> = ids.into_iter().collect();
     let tags = ids.iter().map(|id| known.get(id).cloned().unwrap_or_else(|| default_tag(*id, settings))).collect();
-    let observations = found.into_iter().map(|(_, id, mut observation)| {
+    let observations = found.into_iter().map(|(at, id, mut observation)| {
+        observation.view = at;
         observation.tag = ids.partition_point(|other| *other < id);
         observation
     });
@@ -111,7 +112,6 @@ fn blank(id: u32, size_m: f64, body: usize) -> TagState {
 fn observe(
     input: &MapInput<'_>,
     settings: &MapSettings,
-    at: usize,
     view: usize,
     tag: &MapDetection,
     size_m: f64,
@@ -138,7 +138,7 @@ fn observe(
         Some(covariances) => covariances.map(|c| c.cholesky().and_then(|c| c.l().try_inverse()).unwrap_or(plain)),
     };
     Ok(Observation {
-        view: at,
+        view: usize::MAX,
         tag: usize::MAX,
         camera,
         corners_px: tag.corners_px.map(Vector2::from),

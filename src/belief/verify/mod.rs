@@ -129,7 +129,7 @@ mod tests {
             unknown_topics: Default::default(),
             rejected: Default::default(),
             non_monotonic: 0,
-            disorder: Default::default(),
+            stamp_regressions: Default::default(),
         };
         let reference = Conditions { oil_c: Some(20.0), ..Conditions::default() };
         let mut parameters = JointParameters { reference, ..JointParameters::default() };

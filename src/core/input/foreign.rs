@@ -78,7 +78,7 @@ pub fn read_foreign(path: &Path, map: &InputMap, robot: &Robot) -> Result<Foreig
         return Err(readings.no_reading());
     }
     for (topic, order) in [(&map.joint_topic, &readings.order), (&map.tag_topic, &tags.order)] {
-        if let Some(disorder) = order.first_disorder() {
+        if let Some(disorder) = order.first_regression() {
             return Err(InputError::Disorder { file: file.clone(), topic: topic.clone(), disorder });
         }
     }

@@ -5,23 +5,23 @@ use serde::{Deserialize, Serialize};
 
 /// Encapsulation header of plain CDR, little endian.
 const LITTLE_ENDIAN_HEADER: [u8; 4] = [0, 1, 0, 0];
-/// Bytes that a sender may pad a message's end with, to the largest alignment of CDR.
+/// Most bytes of padding at a message's end, by the largest alignment of CDR.
 const MAX_PADDING_BYTES: usize = 7;
 
-/// Why bytes are not the message that they are taken for. Holds no values, so that equal causes count as one.
+/// Why bytes are not a message of the expected type. Without values, so that equal causes count as one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum CdrError {
     #[error("the bytes do not begin with a header of plain CDR")]
     Header,
-    #[error("the bytes end too soon")]
+    #[error("the bytes end before the message does")]
     TooShort,
-    #[error("bytes are left over, the message must be of another type")]
+    #[error("bytes are left over: the message is of another type")]
     LeftOver,
     #[error("a text is not valid UTF-8")]
     Utf8,
     #[error("a length, flag or tag is impossible")]
     Value,
-    #[error("the type has a field that CDR has no form for")]
+    #[error("the type has a field that CDR cannot express")]
     Type,
 }
 
@@ -61,7 +61,7 @@ pub fn decode<'de, T: Deserialize<'de>>(bytes: &'de [u8]) -> Result<T, CdrError>
 pub fn encode<T: Serialize + ?Sized>(value: &T, out: &mut Vec<u8>) -> Result<(), CdrError> {
     out.clear();
     out.extend_from_slice(&LITTLE_ENDIAN_HEADER);
-    // The serializer aligns to the place where it began, that is to the end of the header, as CDR wants.
+    // The serializer aligns relative to its start, the end of the header, as CDR requires.
     let mut serializer = re_cdr::CdrSerializer::<LittleEndian>::new(out);
     value.serialize(&mut serializer)?;
     Ok(())
@@ -69,7 +69,7 @@ pub fn encode<T: Serialize + ?Sized>(value: &T, out: &mut Vec<u8>) -> Result<(),
 
 #[cfg(test)]
 mod tests {
-    use super::super::ros::{Header, JointState, StringMessage, Time};
+    use super::super::messages::{Header, JointState, StringMessage, Time};
     use super::*;
 
     fn joint_state() -> JointState {

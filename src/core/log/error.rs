@@ -1,4 +1,4 @@
-//! What can go wrong with a recording, and why single messages are refused.
+//! Errors of recordings and reasons to reject single messages.
 
 use std::path::PathBuf;
 
@@ -24,16 +24,16 @@ pub enum LogError {
     Write { path: PathBuf, source: mcap::McapError },
     #[error("{}: topic {topic}: {source}", path.display())]
     Encode { path: PathBuf, topic: String, source: EncodeError },
-    #[error("{}: topic {topic} holds {first}, it cannot take {now} as well", path.display())]
+    #[error("{}: topic {topic} holds {first} and cannot hold {now} as well", path.display())]
     SchemaChanged { path: PathBuf, topic: String, first: String, now: String },
 }
 
-/// Why a message has no form in the file.
+/// Why a message cannot be encoded.
 #[derive(Debug, thiserror::Error)]
 pub enum EncodeError {
     #[error("the message has {got} joints, the recording names {expected}")]
     JointCount { got: usize, expected: usize },
-    #[error("the stamp {} ns is outside of what a ROS time holds, the years 1901 to 2038", stamp.nanos)]
+    #[error("the stamp {} ns is outside the range of a ROS time, the years 1901 to 2038", stamp.nanos)]
     StampRange { stamp: Stamp },
     #[error("the log time {} ns lies before 1970", log_time.nanos)]
     LogTimeRange { log_time: Stamp },
@@ -43,7 +43,7 @@ pub enum EncodeError {
     Cdr(#[from] CdrError),
 }
 
-/// Why a message of a recording is not used; counted by topic, never silent.
+/// Why a message of a recording is rejected. Rejections are counted by topic and reported.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum DecodeRejection {
     #[error("message encoding is {found:?}, not \"cdr\"")]

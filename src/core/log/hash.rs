@@ -1,17 +1,16 @@
-//! A name for a set of messages that no file format, file name or compression can change.
+//! Hash of a set of messages, independent of file format, file name and compression.
 
-use super::encode::encode_message;
 use super::error::EncodeError;
-use super::topics::Stream;
-use super::writer::RecordingHeader;
+use super::header::RecordingHeader;
+use super::topics::{Stream, encode_message};
 use crate::streams::Message;
 use crate::time::Stamp;
 
-/// In front of everything hashed; a new encoding gets a new version.
+/// Start of the hashed bytes; a new encoding gets a new version.
 const DOMAIN: &[u8] = b"armcal messages 1";
 
-/// BLAKE3 over the canonical encoding of messages: of each, its topic (as we name it), its log time and its CDR bytes, with
-/// lengths, all little endian. Frame names and tag family are left out.
+/// BLAKE3 over the canonical encoding of messages: topic (the name in our recordings), log time and CDR bytes of each,
+/// with lengths, all little endian. Frame names and tag family are excluded.
 pub struct MessageHasher {
     hasher: blake3::Hasher,
     header: RecordingHeader,
@@ -74,10 +73,18 @@ pub fn hash_messages<'a>(
 mod tests {
     use super::*;
     use crate::log::{read_recording, samples};
+    use crate::time::SIMULATION_EPOCH;
 
     fn hash(messages: &[(Stamp, Message)]) -> String {
         let names = samples::header().joint_names;
         hash_messages(messages.iter().map(|(log_time, message)| (*log_time, message)), &names).unwrap()
+    }
+
+    /// A changed byte of any message would make calibrations of old recordings differ.
+    #[test]
+    fn hash_of_known_messages_is_unchanged() {
+        let messages: Vec<_> = samples::one_of_each().into_iter().map(|m| (SIMULATION_EPOCH, m)).collect();
+        assert_eq!(hash(&messages), "ead77c6dbcc91e1cb3529dc86dbf8835242371c4826425d354d239f002ced0de");
     }
 
     #[test]

@@ -1,8 +1,7 @@
-//! Camera images, one at a time: they are most of a recording, and few who read it want them.
+//! Camera images of a recording, one at a time: they are most of its bytes, and few readers need them.
 
 use std::path::Path;
 
-use super::decode::decode_message;
 use super::error::LogError;
 use super::raw::for_each_raw;
 use super::topics::Stream;
@@ -16,7 +15,7 @@ use crate::time::Stamp;
 pub fn for_each_image(path: impl AsRef<Path>, mut take: impl FnMut(Stamp, CameraImage)) -> Result<(), LogError> {
     for_each_raw(path.as_ref(), |raw| {
         if raw.topic() == Stream::Images.topic()
-            && let Ok(Message::Image(image)) = decode_message(Stream::Images, raw.data, &mut None)
+            && let Ok(Message::Image(image)) = Stream::Images.decode(raw.data, &mut None)
         {
             take(raw.log_time(), image);
         }

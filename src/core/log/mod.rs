@@ -1,22 +1,23 @@
 //! Recordings: the streams of an arm as an MCAP file of ROS 2 messages.
 //!
-//! [`RecordingWriter`] is a sink of `streams` and writes bytes that depend on its input only. [`read_recording`] gives the
-//! messages back, from simulated and real arms alike, and says what a cut or damaged file has lost. Below it,
-//! [`for_each_raw`] and [`decode`] read any topic of any MCAP file with the same care. Belief hashes the messages that it
-//! used with [`hash_messages`], never a file, and [`strip`] proves that nothing else of the file matters.
+//! [`RecordingWriter`] is a sink of `streams`; its bytes depend on its input only. [`read_recording`] reads recordings of
+//! simulated and real arms and reports the losses of a cut or damaged file. [`for_each_raw`] and [`decode`] read any
+//! topic of any MCAP file. The table `topics::Stream` names topic, ROS type and codec of each stream; `messages` holds
+//! the codecs. [`hash_messages`] hashes messages, not files; [`strip`] copies the messages alone.
+
+#[macro_use]
+mod schema;
 
 mod attachments;
 mod cdr;
-mod decode;
-mod encode;
 mod error;
 mod hash;
+mod header;
 mod images;
+pub mod messages;
 mod order;
 mod raw;
 mod reader;
-pub mod ros;
-mod schema;
 mod strip;
 pub mod topics;
 mod writer;
@@ -28,7 +29,10 @@ pub use attachments::read_attachments;
 pub use cdr::{CdrError, decode, encode};
 pub use error::{DecodeRejection, EncodeError, LogError};
 pub use hash::{MessageHasher, hash_messages};
+pub use header::RecordingHeader;
 pub use images::for_each_image;
+/// The ROS types of the messages.
+pub use messages as ros;
 pub use order::{StampOrder, StampRegression};
 pub use raw::{
     AttachmentInfo, Channel, ChunkTotals, Completeness, FileContents, RawMessage, RawSummary, Schema, file_contents,
@@ -37,4 +41,4 @@ pub use raw::{
 pub use reader::{RawRecord, Recording, TopicMap, read_recording, read_recording_with, scan_recording};
 pub use schema::{RosMessage, RosSchema};
 pub use strip::strip;
-pub use writer::{RecordingHeader, RecordingWriter};
+pub use writer::RecordingWriter;

@@ -1,12 +1,12 @@
-//! Whether the stamps of a topic go forwards, in the order of the file.
+//! Order of the stamps of a topic, compared with the order of the file.
 
 use crate::time::Stamp;
 
-/// Threads of one sender overtake each other by some hundredths of a second; farther back is a clock that was set, or files that
-/// were put together. Assumed, s.
+/// Largest step back of one sender's stamps, whose threads overtake each other, s; assumed. A larger one means that a
+/// clock was set or that files were merged.
 const JITTER_S: f64 = 0.1;
 
-/// Where the stamps of a topic go backwards by more than its senders' jitter.
+/// Place where the stamps of a topic go backwards by more than its senders' jitter.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error(
     "time stamps go backwards at message {message}: {:.3} s before the latest one before it ({} ns against {} ns)",
@@ -20,7 +20,7 @@ pub struct StampRegression {
     pub latest: Stamp,
 }
 
-/// Watches the stamps of one topic.
+/// Checks the stamps of one topic in turn.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct StampOrder {
     messages: u64,
@@ -34,7 +34,7 @@ impl StampOrder {
         self.add_of(self.messages + 1, stamp);
     }
 
-    /// A stamp of the topic's message of that number, from 1; it may have several.
+    /// A stamp of the topic's message of that number, from 1. A message may have several.
     pub fn add_of(&mut self, message: u64, stamp: Stamp) {
         self.messages = message;
         let latest = self.latest.unwrap_or(stamp);
@@ -45,7 +45,7 @@ impl StampOrder {
     }
 
     #[must_use]
-    pub fn first_disorder(&self) -> Option<StampRegression> {
+    pub fn first_regression(&self) -> Option<StampRegression> {
         self.first
     }
 }
@@ -58,7 +58,7 @@ mod tests {
         let mut order = StampOrder::default();
         let start = Stamp { nanos: 0 };
         stamps_s.iter().for_each(|s| order.add(start.plus_s(*s)));
-        order.first_disorder().map(|d| (d.message, d.latest.since_s(d.stamp)))
+        order.first_regression().map(|r| (r.message, r.latest.since_s(r.stamp)))
     }
 
     #[test]

@@ -1,20 +1,20 @@
-//! Reads a recording of a simulated or real arm into messages.
+//! Reader of recordings of simulated and real arms.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use super::decode::{FirstNames, decode_message};
 use super::error::{DecodeRejection, LogError};
+use super::messages::joints::FirstNames;
 use super::order::{StampOrder, StampRegression};
 use super::raw::{Completeness, RawMessage, RawSummary, for_each_raw};
 use super::topics::{Stream, VIEWER_TOPICS};
 use crate::streams::Message;
 use crate::time::Stamp;
 
-/// Where a recording differs from ours, and what else to keep.
+/// Topics that differ from those of our recordings, and topics to keep undecoded.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct TopicMap {
-    /// The topic of the raw joint readings, instead of `/joint_sensors`. What our recordings have on it is then not read.
+    /// The topic of the raw joint readings, instead of `/joint_sensors`, which is then not read.
     pub joint_sensors: Option<String>,
     /// The topic of the detections, instead of `/camera/wrist/detections`.
     pub detections: Option<String>,
@@ -44,18 +44,18 @@ pub struct Recording {
     pub completeness: Completeness,
     /// Messages kept undecoded, in the same order.
     pub raw: Vec<RawRecord>,
-    /// Messages on topics that nobody knows or asked for, by topic.
+    /// Number of messages on unknown topics, by topic.
     pub unknown_topics: BTreeMap<String, u64>,
-    /// Messages that were refused, by "topic: reason".
+    /// Number of rejected messages, by "topic: reason".
     pub rejected: BTreeMap<String, u64>,
-    /// How often, in the order of the file, log time went backwards.
+    /// Number of times that log time goes backwards, in the order of the file.
     pub non_monotonic: u64,
-    /// The first disorder among the stamps of joint sensors and detections, by topic.
-    pub disorder: BTreeMap<String, StampRegression>,
+    /// The first step back of the stamps of joint sensors and detections, by topic.
+    pub stamp_regressions: BTreeMap<String, StampRegression>,
 }
 
-/// Reads a recording with our own topic names, see [`read_recording_with`]; camera images stay in the file, where
-/// `for_each_image` finds them.
+/// Reads a recording with our own topic names, see [`read_recording_with`]. Camera images are not kept;
+/// `for_each_image` reads them.
 ///
 /// # Errors
 /// As [`read_recording_with`].
@@ -64,7 +64,7 @@ pub fn read_recording(path: impl AsRef<Path>) -> Result<Recording, LogError> {
     scan_recording(path, &TopicMap::default(), |_| {}, is_kept).map(|(recording, _)| recording)
 }
 
-/// Reads a recording, images and all. Cuts, damage and unusable messages are no errors: the result counts them.
+/// Reads a recording with its images. Cuts, damage and unusable messages are no errors; the result counts them.
 ///
 /// # Errors
 /// [`LogError::Read`], [`LogError::Empty`], [`LogError::NotMcap`].
@@ -72,8 +72,8 @@ pub fn read_recording_with(path: impl AsRef<Path>, map: &TopicMap) -> Result<Rec
     scan_recording(path, map, |_| {}, |_, _| true).map(|(recording, _)| recording)
 }
 
-/// Reads a recording of any length: `on_raw` gets every message before it is decoded, and of those that are decoded only
-/// the ones stay in memory for which `keep` says so. The counts of the result are of all messages.
+/// Reads a recording of any length. `on_raw` gets every message before it is decoded; of the decoded messages, `keep`
+/// selects those that stay in memory. The counts of the result are of all messages.
 ///
 /// # Errors
 /// As [`read_recording_with`].
@@ -139,7 +139,7 @@ impl<'a, F: FnMut(Stamp, &Message) -> bool> Collector<'a, F> {
             return self.take_other(raw);
         };
         let (_, names) = self.names.entry(stream).or_insert_with(|| (topic.to_owned(), None));
-        match check(stream, raw).and_then(|()| decode_message(stream, raw.data, names)) {
+        match check(stream, raw).and_then(|()| stream.decode(raw.data, names)) {
             Ok(message) => {
                 self.count_order(raw.log_time());
                 if let Some(stamp) = ordered_stamp(&message) {
@@ -179,12 +179,12 @@ impl<'a, F: FnMut(Stamp, &Message) -> bool> Collector<'a, F> {
     }
 
     fn finish(mut self, path: &Path, completeness: Completeness) -> Recording {
-        let disorder = self
+        let stamp_regressions = self
             .order
             .iter()
             .filter_map(|(stream, order)| {
                 let named = self.streams.iter().find(|(_, of)| *of == stream);
-                Some((named?.0.to_string(), order.first_disorder()?))
+                Some((named?.0.to_string(), order.first_regression()?))
             })
             .collect();
         let joint_names = self.settle_joint_names();
@@ -199,12 +199,12 @@ impl<'a, F: FnMut(Stamp, &Message) -> bool> Collector<'a, F> {
             unknown_topics: self.unknown_topics,
             rejected: self.rejected,
             non_monotonic: self.non_monotonic,
-            disorder,
+            stamp_regressions,
         }
     }
 
-    /// The joint sensors say which joints the arm has, else the first other stream of joints that has names. Messages of
-    /// streams that name other joints go.
+    /// Names of the arm's joints: those of the joint sensors, else of the first other stream of joints. Messages of
+    /// streams with other names are rejected.
     fn settle_joint_names(&mut self) -> Vec<String> {
         // Stream orders the sensors first.
         let named: Vec<(Stream, String, Vec<String>)> = std::mem::take(&mut self.names)
@@ -223,7 +223,7 @@ impl<'a, F: FnMut(Stamp, &Message) -> bool> Collector<'a, F> {
     }
 }
 
-/// The stamp of a message whose stream is in the order of time.
+/// The stamp of a message whose stream must be in the order of time.
 fn ordered_stamp(message: &Message) -> Option<Stamp> {
     match message {
         Message::JointSensors(sample) => Some(sample.stamp),
@@ -232,13 +232,13 @@ fn ordered_stamp(message: &Message) -> Option<Stamp> {
     }
 }
 
-/// What the file says of a message, before its bytes are looked at.
+/// Checks encoding, type and log time of a message before it is decoded.
 fn check(stream: Stream, raw: &RawMessage<'_>) -> Result<(), DecodeRejection> {
     if raw.channel.message_encoding != "cdr" {
         return Err(DecodeRejection::MessageEncoding { found: raw.channel.message_encoding.clone() });
     }
     let expected = stream.schema().name;
-    // ROS writes package/msg/Type; some converters leave out the middle.
+    // ROS writes package/msg/Type; some converters omit the middle.
     if raw.schema_name() != expected && raw.schema_name() != expected.replace("/msg/", "/") {
         return Err(DecodeRejection::Type { found: raw.schema_name().to_owned(), expected });
     }
@@ -250,7 +250,7 @@ fn check(stream: Stream, raw: &RawMessage<'_>) -> Result<(), DecodeRejection> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::ros::{self, JointState, TfMessage};
+    use super::super::messages::{JointState, TfMessage, TransformStamped};
     use super::super::schema::RosMessage;
     use super::super::{RecordingWriter, decode, samples, topics};
     use super::*;
@@ -325,7 +325,7 @@ mod tests {
         let mut writer = RecordingWriter::create(&path, samples::header()).unwrap();
         let joints = joint_state(&["a"], &[5.0]);
         writer.write_ros("/joint_states", &JointState::SCHEMA, SIMULATION_EPOCH, &joints).unwrap();
-        let tf = TfMessage { transforms: vec![ros::TransformStamped::default()] };
+        let tf = TfMessage { transforms: vec![TransformStamped::default()] };
         writer.write_ros(topics::TF, &TfMessage::SCHEMA, SIMULATION_EPOCH, &tf).unwrap();
         writer.finish().unwrap();
 

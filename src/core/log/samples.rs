@@ -1,6 +1,7 @@
 //! Messages for the tests of this folder.
 
-use super::writer::{RecordingHeader, RecordingWriter};
+use super::header::RecordingHeader;
+use super::writer::RecordingWriter;
 use crate::robot::{FailedJoint, FailedKind};
 use crate::streams::{
     Attitude, CameraImage, CaptureSet, DetectionReject, DetectionRejects, GripperCommand, GripperSample, JointAngles,

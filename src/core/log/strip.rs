@@ -1,4 +1,4 @@
-//! Rewrites a recording with its messages alone.
+//! Copy of a recording with its messages alone.
 
 use std::fs;
 use std::path::Path;
@@ -11,7 +11,7 @@ use super::raw::{RawMessage, RawSummary, for_each_raw};
 use super::writer::{FileWriter, create_file};
 
 /// Copies every readable message of `src` to a new file `dst`, with times, types and order, and without attachments and
-/// metadata. What the result says of completeness is that of `src`; `dst` is whole.
+/// metadata. The result gives the completeness of `src`; `dst` is whole.
 ///
 /// # Errors
 /// As [`for_each_raw`] for `src`, as `RecordingWriter::create` for `dst`, [`LogError::SameFile`].
@@ -30,7 +30,7 @@ pub fn strip(src: impl AsRef<Path>, dst: impl AsRef<Path>) -> Result<RawSummary,
     let written = written.and_then(|()| copy.finish().map(|_| ()));
     drop(copy);
     if summary.is_err() {
-        // An unreadable source leaves no empty recording behind; the source's error is the one to tell.
+        // An unreadable source leaves no empty recording behind; its error is the one to return.
         let _ = fs::remove_file(dst);
     }
     let summary = summary?;

@@ -1,7 +1,7 @@
-//! Writes a recording, in place, so that a killed run leaves what it wrote.
+//! Writer of recordings. The file is written in place and kept when the run is killed.
 //!
-//! The file only ever grows: at any moment the bytes on disk are the beginning of the finished file, whole chunks and at
-//! most one cut record. A chunk ends, and is handed to the operating system, after 2 s of log time, 1 MiB or a flush. The
+//! The file only grows: at any moment the bytes on disk are the beginning of the finished file, whole chunks and at
+//! most one cut record. A chunk ends, and goes to the operating system, after 2 s of log time, 1 MiB or a flush. The
 //! bytes depend on the calls alone, not on clock, machine load or environment.
 
 use std::collections::BTreeMap;
@@ -15,49 +15,20 @@ use mcap::{Attachment, Compression, McapError, WriteOptions};
 use serde::Serialize;
 
 use super::cdr;
-use super::encode::encode_message;
 use super::error::{EncodeError, LogError};
+use super::header::RecordingHeader;
 use super::schema::RosSchema;
-use super::topics::Stream;
+use super::topics::{Stream, encode_message};
 use crate::streams::{Message, Sink, SinkError};
 use crate::time::Stamp;
 
 /// Uncompressed size at which a chunk ends, bytes.
 const CHUNK_BYTES: u64 = 1 << 20;
-/// Log time after which a chunk ends, ns: what a kill costs at most. Shorter chunks compress worse.
+/// Log time after which a chunk ends, ns: the most that a kill loses. Shorter chunks compress worse.
 const CHUNK_NANOS: u64 = 2_000_000_000;
 const ZSTD_LEVEL: u32 = 3;
 
 pub(super) type FileWriter = mcap::Writer<NoSeek<BufWriter<File>>>;
-
-/// What every message of a recording shares. It is written into the messages, not beside them.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct RecordingHeader {
-    /// In the order of the chain, base first.
-    pub joint_names: Vec<String>,
-    /// `frame_id` of the task.
-    pub base_frame: String,
-    /// `frame_id` of the detections.
-    pub camera_frame: String,
-    /// `frame_id` of temperatures, pressure and attitude.
-    pub vehicle_frame: String,
-    /// AprilTag family of the detections.
-    pub tag_family: String,
-}
-
-impl RecordingHeader {
-    /// The joints, with frames `base_link`, `camera_wrist`, `vehicle` and tags of tag36h11.
-    #[must_use]
-    pub fn new(joint_names: Vec<String>) -> Self {
-        Self {
-            joint_names,
-            base_frame: "base_link".into(),
-            camera_frame: "camera_wrist".into(),
-            vehicle_frame: "vehicle".into(),
-            tag_family: "tag36h11".into(),
-        }
-    }
-}
 
 struct OpenChannel {
     id: u16,
@@ -65,9 +36,9 @@ struct OpenChannel {
     next_sequence: u32,
 }
 
-/// A recording that is being written; see the module for what is on disk when.
+/// A recording in the making; the module tells what is on disk when.
 ///
-/// Dropping it finishes the file as far as that goes, without telling of errors; [`Self::finish`] tells.
+/// Dropping it finishes the file and ignores errors; [`Self::finish`] returns them.
 pub struct RecordingWriter {
     path: PathBuf,
     header: RecordingHeader,
@@ -96,18 +67,18 @@ impl RecordingWriter {
             unflushed_since_nanos: None,
             bytes: Vec::new(),
         };
-        // From its first moment the file can be told from an empty one.
+        // The file has its opening bytes from the start.
         writer.flush()?;
         Ok(writer)
     }
 
-    /// Where it writes to.
+    /// The file that it writes.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Writes any message as CDR to any topic; the first message of a topic declares its type. `log_time` is the recorder's.
+    /// Writes any message as CDR to any topic. The first message of a topic declares its type.
     ///
     /// # Errors
     /// [`LogError::Encode`], [`LogError::SchemaChanged`], [`LogError::Write`].
@@ -149,7 +120,7 @@ impl RecordingWriter {
         self.file.write_metadata(&record).map_err(|source| self.write_error(source))
     }
 
-    /// Ends the current chunk: all that was written so far can then be read from disk, and survives a kill.
+    /// Ends the current chunk: everything written so far can then be read from disk and survives a kill.
     ///
     /// # Errors
     /// [`LogError::Write`].
@@ -163,7 +134,7 @@ impl RecordingWriter {
     /// # Errors
     /// [`LogError::Write`].
     pub fn finish(mut self) -> Result<(), LogError> {
-        // mcap flushes down to the file at the end, so that a full disk is noticed here.
+        // mcap flushes down to the file at the end; a full disk is noticed here.
         self.file.finish().map(|_| ()).map_err(|source| self.write_error(source))
     }
 
@@ -238,7 +209,7 @@ pub(super) fn create_file(path: &Path) -> Result<FileWriter, LogError> {
         return Err(LogError::NoDirectory { path: path.to_owned(), directory: directory.to_owned() });
     }
     let file = File::create(path).map_err(|source| LogError::Create { path: path.to_owned(), source })?;
-    // Without seeking, a chunk is put together in memory and appended at once.
+    // Without seeking, a chunk is assembled in memory and appended at once.
     WriteOptions::new()
         .profile("ros2")
         .library(concat!("armcal ", env!("CARGO_PKG_VERSION")))
@@ -253,8 +224,8 @@ pub(super) fn create_file(path: &Path) -> Result<FileWriter, LogError> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::messages::{Log, StringMessage};
     use super::super::reader::read_recording;
-    use super::super::ros::{self, StringMessage};
     use super::super::schema::RosMessage;
     use super::super::{Completeness, samples, topics};
     use super::*;
@@ -322,7 +293,7 @@ mod tests {
         assert!(beginnings.iter().all(|beginning| whole.starts_with(beginning)));
     }
 
-    /// Nobody flushes: what a kill at any moment leaves lacks no more than the chunk in the making.
+    /// Without a flush, a kill loses no more than the chunk in the making.
     #[test]
     fn no_more_than_two_seconds_are_missing_on_disk_at_any_moment() {
         let dir = tempfile::tempdir().unwrap();
@@ -355,7 +326,7 @@ mod tests {
         let mut writer = RecordingWriter::create(dir.path().join("run.mcap"), samples::header()).unwrap();
         let (start, text) = (crate::time::SIMULATION_EPOCH, StringMessage::default());
         writer.write_ros("/x", &StringMessage::SCHEMA, start, &text).unwrap();
-        let error = writer.write_ros("/x", &ros::Log::SCHEMA, start, &ros::Log::default()).unwrap_err();
+        let error = writer.write_ros("/x", &Log::SCHEMA, start, &Log::default()).unwrap_err();
         assert!(matches!(error, LogError::SchemaChanged { .. }), "{error}");
     }
 }

@@ -5,9 +5,20 @@ use std::path::Path;
 use serde::Deserialize;
 
 use super::error::{FileIssue, RobotError};
-use super::file::CameraSpec;
 use crate::kinematics::Attachment;
 use crate::optics::Fisheye;
+
+/// The nominal camera.
+#[derive(Clone, Debug)]
+pub struct CameraSpec {
+    pub name: String,
+    pub mount: Attachment,
+    pub lens: Fisheye,
+    pub corner_std_px: f64,
+    /// One sigma per axis of the mount's error.
+    pub mount_std_m: f64,
+    pub mount_std_rad: f64,
+}
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]

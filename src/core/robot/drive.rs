@@ -1,6 +1,6 @@
-//! What belief expects of the arm's hydraulics: oil for the joints' motion, and how far they stray from their set-points.
+//! Expected oil consumption and tracking errors of the arm's drives.
 //!
-//! `[hydraulics]` and `[motion]` of robot.toml, both optional. The simulator reads neither.
+//! `[hydraulics]` and `[motion]` of robot.toml, both optional. Belief uses them; the simulator reads neither.
 
 use std::path::Path;
 
@@ -9,30 +9,30 @@ use serde::Deserialize;
 use super::error::FileIssue;
 use super::urdf::UrdfModel;
 
-/// The drives as the datasheets have them.
+/// The drives by their datasheets.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DriveSpec {
-    /// Oil that all joints share, L/min; `None`: no limit is known.
+    /// Oil flow shared by all joints, L/min; `None`: unlimited.
     pub pump_l_per_min: Option<f64>,
-    /// Oil that each joint takes a radian, L/rad.
+    /// Oil per radian of each joint, L/rad.
     pub displacement_l_per_rad: Vec<f64>,
     pub motion: MotionSpec,
 }
 
-/// How far a joint strays from its set-point while it moves, by its own sensor.
+/// Tracking error of a moving joint: its own sensor against its set-point.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct MotionSpec {
-    /// Largest time by which a joint is behind, or ahead of, its set-points, s.
+    /// Largest time by which a joint lags or leads its set-points, s.
     pub lag_spread_s: f64,
-    /// Beyond the end of a motion at the joint's full rate, rad; in proportion to the rate.
+    /// Overshoot at the end of a motion at the joint's full rate, rad; in proportion to the rate.
     pub overshoot_rad: f64,
-    /// What the load takes from a joint that moves at its full rate, rad; in proportion to the rate.
+    /// Error under load at the joint's full rate, rad; in proportion to the rate.
     pub droop_rad: f64,
 }
 
-/// For a loop with feed-forward of the rate through valves of 20 to 80 ms: assumed, and the overshoot measured on simulated arms
-/// (`armcal study stray`).
+/// Values of a loop with rate feed-forward through valves of 20 to 80 ms: assumed, except the overshoot, which was measured
+/// on simulated arms (`armcal study stray`).
 impl Default for MotionSpec {
     fn default() -> Self {
         Self { lag_spread_s: 0.05, overshoot_rad: 0.06, droop_rad: 0.005 }
@@ -45,11 +45,11 @@ pub(super) struct HydraulicsFile {
     pump_l_per_min: f64,
 }
 
-/// 3000 psi, the datasheets' upper end: at it a joint gives the URDF's effort.
+/// 3000 psi, the upper end of the datasheets: the pressure at which a joint gives the URDF's effort.
 const SUPPLY_PRESSURE_PA: f64 = 2.07e7;
 const L_PER_M3: f64 = 1e3;
 
-/// Of each sensor's joint, L/rad: as the file says, else its torque at the full supply pressure over that pressure.
+/// Oil per radian of each joint, L/rad: from the file, else its largest torque divided by the supply pressure.
 pub(super) fn check_displacements<'a>(
     file: &Path,
     joints: impl Iterator<Item = (&'a str, Option<f64>)>,

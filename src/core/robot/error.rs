@@ -1,8 +1,8 @@
-//! What can be wrong with a robot folder or a vehicle file.
+//! Errors in a robot folder or a vehicle file.
 
 use std::path::{Path, PathBuf};
 
-/// A wrong value in a file: which file, which key, and what would be right.
+/// A wrong value in a file, with file, key and allowed values.
 #[derive(Clone, Debug, thiserror::Error, PartialEq)]
 #[error("{}: {key}: {problem}", file.display())]
 pub struct FileIssue {
@@ -33,7 +33,7 @@ pub enum RobotError {
 }
 
 impl FileIssue {
-    /// `value` at `key` is outside of what is allowed.
+    /// The problem with the value at `key`.
     #[must_use]
     pub fn new(file: &Path, key: impl Into<String>, problem: impl Into<String>) -> Self {
         Self { file: file.to_owned(), key: key.into(), problem: problem.into() }
@@ -52,12 +52,12 @@ impl FileIssue {
     }
 }
 
-/// Reads a text file, naming it when that fails.
+/// Reads a text file; the error names it.
 pub fn read_text(file: &Path) -> Result<String, RobotError> {
     std::fs::read_to_string(file).map_err(|source| RobotError::Unreadable { file: file.to_owned(), source })
 }
 
-/// Parses TOML, naming the file, the place and the key when that fails.
+/// Parses TOML; the error names file, line and key.
 pub fn parse_toml<T: serde::de::DeserializeOwned>(file: &Path, text: &str) -> Result<T, RobotError> {
     toml::from_str(text)
         .map_err(|error| RobotError::Syntax { file: file.to_owned(), message: error.to_string().trim_end().to_owned() })

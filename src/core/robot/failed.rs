@@ -1,20 +1,18 @@
-//! Joints of which somebody knows that they are not as the datasheet says.
+//! Joints declared to have failed.
 
 use serde::{Deserialize, Serialize};
-
-use super::Robot;
 
 /// What is wrong with a joint or its sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum FailedKind {
-    /// The joint stands at one angle that nobody knows, whatever its sensor reads.
+    /// The joint is stuck at an unknown angle, whatever its sensor reads.
     Locked,
-    /// The sensor's word says nothing of the joint.
+    /// The sensor's output does not depend on the joint angle.
     Dead,
-    /// The sensor keeps one word while the joint moves.
+    /// The sensor's output stays constant while the joint moves.
     Stuck,
-    /// The sensor slips on its shaft now and then, or once.
+    /// The sensor slips on its shaft, once or several times.
     Jumps,
 }
 
@@ -45,12 +43,11 @@ pub struct FailedJoint {
 }
 
 impl FailedJoint {
-    /// By the joint's name.
+    /// By the names of joint and kind, for an arm with the joints `names`.
     ///
     /// # Errors
-    /// What is wrong with the names, and which there are.
-    pub fn of_names(joint: &str, kind: &str, robot: &Robot) -> Result<Self, String> {
-        let names = robot.joint_names();
+    /// The wrong name and the allowed ones.
+    pub fn of_names(joint: &str, kind: &str, names: &[String]) -> Result<Self, String> {
         let Some(index) = names.iter().position(|name| name == joint) else {
             return Err(format!("joint `{joint}` is none of {names:?}"));
         };
@@ -58,18 +55,5 @@ impl FailedJoint {
             return Err(format!("kind `{kind}` is none of {:?}", FailedKind::ALL.map(FailedKind::name)));
         };
         Ok(Self { joint: index, kind })
-    }
-}
-
-impl Robot {
-    /// The same arm of which these joints are declared to have failed; the last word on a joint counts.
-    #[must_use]
-    pub fn with_failed(mut self, failed: &[FailedJoint]) -> Self {
-        for declared in failed {
-            self.failed.retain(|known| known.joint != declared.joint);
-            self.failed.push(*declared);
-        }
-        self.failed.sort_unstable();
-        self
     }
 }

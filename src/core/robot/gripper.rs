@@ -1,7 +1,7 @@
 //! `[gripper]` of robot.toml: two parallel jaws that slide apart and together.
 //!
-//! The jaws are links of the URDF, fixed to the tool's link where they stand at rest, so that mass, collision and kinematics are
-//! the chain's alone; only what is drawn of them moves.
+//! The jaws are links of the URDF, fixed to the tool's link at their rest opening. Mass, collision shapes and kinematics
+//! are those of the chain; only the visual shapes of the jaws move.
 
 use std::path::Path;
 
@@ -10,42 +10,42 @@ use serde::Deserialize;
 
 use super::error::{FileIssue, RobotError};
 use super::shape::PlacedShape;
-use super::urdf::UrdfModel;
-use crate::kinematics::{Attachment, Chain};
+use super::urdf::UrdfChain;
+use crate::kinematics::Attachment;
 
-/// The jaws and how they move.
+/// The jaws and their motion.
 #[derive(Clone, Debug)]
 pub struct GripperSpec {
     pub jaws: [Jaw; 2],
-    /// Way of the first jaw when they open, axes of the link that carries them; the second goes the other way.
+    /// Direction in which the first jaw opens, axes of the link that carries them; the second moves the other way.
     pub opens_along: Unit<Vector3<f64>>,
-    /// The link that carries them, as a number of joints before it.
+    /// The link that carries them, as the number of joints before it.
     pub body: usize,
-    /// Between the jaws as the arm carries them, as the URDF has them drawn.
+    /// Opening in the URDF.
     pub rest_opening_m: f64,
-    /// Between the jaws at most.
+    /// Largest opening.
     pub opening_max_m: f64,
-    /// From open to closed at full rate.
+    /// Time from open to closed at full rate.
     pub closing_time_s: f64,
 }
 
-/// One jaw as drawn.
+/// The visual shapes of one jaw.
 #[derive(Clone, Debug)]
 pub struct Jaw {
     pub name: String,
-    /// In the frame of the link that carries it, at rest.
+    /// In the frame of the link that carries it, at the rest opening.
     pub visuals: Vec<PlacedShape>,
 }
 
 impl GripperSpec {
-    /// How far jaw 0 or 1 has gone from where it is drawn, in the frame of the link that carries it.
+    /// Displacement of jaw 0 or 1 from its pose in the URDF, in the frame of the link that carries it.
     #[must_use]
     pub fn shift(&self, jaw: usize, opening_m: f64) -> Isometry3<f64> {
-        let way_m = 0.5 * (opening_m - self.rest_opening_m) * if jaw == 0 { 1.0 } else { -1.0 };
-        Isometry3::from(self.opens_along.scale(way_m))
+        let shift_m = 0.5 * (opening_m - self.rest_opening_m) * if jaw == 0 { 1.0 } else { -1.0 };
+        Isometry3::from(self.opens_along.scale(shift_m))
     }
 
-    /// By how much the arm's outline grows beyond that of its collision shapes, which have the jaws at rest.
+    /// Reach of the open jaws beyond the arm's collision shapes, which have the jaws at rest.
     #[must_use]
     pub fn outline_growth_m(&self, opening_m: f64) -> f64 {
         (0.5 * (opening_m - self.rest_opening_m)).max(0.0)
@@ -68,18 +68,11 @@ impl GripperFile {
         &self.jaws
     }
 
-    /// Checks the table against the drawing.
+    /// Checks the table against the URDF.
     ///
     /// # Errors
     /// [`RobotError`] naming file, key and allowed range.
-    pub(super) fn check(
-        self,
-        file: &Path,
-        urdf: &UrdfModel,
-        base_link: &str,
-        chain: &Chain,
-        tool: &Attachment,
-    ) -> Result<GripperSpec, RobotError> {
+    pub(super) fn check(self, file: &Path, arm: &UrdfChain<'_>, tool: &Attachment) -> Result<GripperSpec, RobotError> {
         let issue = |key: &str, problem: String| FileIssue::new(file, format!("gripper.{key}"), problem);
         let check =
             |key: &str, value: f64, range| FileIssue::check_range(file, &format!("gripper.{key}"), value, range);
@@ -87,10 +80,10 @@ impl GripperFile {
             return Err(issue("jaws", format!("names `{}` twice", self.jaws[0])).into());
         }
         for link in &self.jaws {
-            if !urdf.has_link(link) {
-                return Err(issue("jaws", format!("`{link}` is no link of the URDF")).into());
+            if !arm.urdf.has_link(link) {
+                return Err(issue("jaws", format!("`{link}` is not a link of the URDF")).into());
             }
-            if urdf.attachment(base_link, link, chain).ok().is_none_or(|jaw| jaw.n_joints != tool.n_joints) {
+            if arm.attachment(link).ok().is_none_or(|jaw| jaw.n_joints != tool.n_joints) {
                 return Err(issue("jaws", format!("`{link}` is not fixed to the link of the tool")).into());
             }
         }
@@ -104,7 +97,7 @@ impl GripperFile {
         let closing_time_s = check("closing_time_s", self.closing_time_s, 0.05..=60.0)?;
         let [first, second] = self.jaws;
         let jaw = |name: String| -> Result<Jaw, RobotError> {
-            let visuals = urdf.visuals_of(base_link, &name, chain)?;
+            let visuals = arm.visuals_of(&name)?;
             Ok(Jaw { name, visuals })
         };
         let jaws = [jaw(first)?, jaw(second)?];

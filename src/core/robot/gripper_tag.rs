@@ -1,7 +1,6 @@
-//! `[gripper_tag]` of robot.toml: a tag behind the last joint before it, where the wrist camera sees it.
+//! `[gripper_tag]` of robot.toml: a tag distal to the camera, in view of it.
 //!
-//! It is none of the survey's tags: it says nothing of where the base is, but ties the tool to the camera, which hangs before the
-//! tool's last joint.
+//! It is not a tag of the survey and does not locate the base. It measures the joints between camera and tool.
 
 use std::path::Path;
 
@@ -10,35 +9,41 @@ use serde::Deserialize;
 use super::error::{FileIssue, RobotError};
 use super::part::check_place;
 use super::survey::SurveyedTag;
-use super::urdf::UrdfModel;
-use crate::kinematics::{Attachment, Chain};
+use super::urdf::UrdfChain;
+use crate::kinematics::Attachment;
 use crate::spatial::{Link, Pose, Tag};
 
-/// A tag on a link that the camera watches turn.
+/// A tag on a link distal to the camera.
 #[derive(Clone, Copy, Debug)]
 pub struct GripperTag {
     pub id: u32,
     /// Side of the black square, m.
     pub size_m: f64,
-    /// `link_from_tag` on the link that carries it, by the drawing.
+    /// Nominal `link_from_tag` on the link that carries it.
     pub mount: Attachment,
-    /// One sigma per axis of where it was glued.
+    /// One sigma per axis of the tag's pose.
     pub position_std_m: f64,
     pub rotation_std_rad: f64,
 }
 
 impl GripperTag {
-    /// The joints between the camera and this tag: those that turn it in the camera's view.
+    /// The joints between the camera and this tag.
     #[must_use]
     pub fn joints(&self, camera_mount: &Attachment) -> std::ops::Range<usize> {
         camera_mount.n_joints..self.mount.n_joints
     }
 
+    /// Checks that none of `tags` has the same id.
+    ///
     /// # Errors
-    /// [`FileIssue`] when one of `tags` has the same id.
+    /// [`FileIssue`] with the id.
     pub(super) fn check_id(&self, file: &Path, tags: &[SurveyedTag]) -> Result<(), FileIssue> {
         if tags.iter().any(|tag| tag.id == self.id) {
-            return Err(FileIssue::new(file, "gripper_tag.id", format!("{} is a surveyed tag's, too", self.id)));
+            return Err(FileIssue::new(
+                file,
+                "gripper_tag.id",
+                format!("{} is also the id of a surveyed tag", self.id),
+            ));
         }
         Ok(())
     }
@@ -50,7 +55,7 @@ pub(super) struct GripperTagFile {
     id: u32,
     family: String,
     size_m: f64,
-    /// A link of the URDF; the tag's place is in its frame.
+    /// A link of the URDF; the tag's pose is in its frame.
     link: String,
     position_m: [f64; 3],
     quaternion_wxyz: [f64; 4],
@@ -59,16 +64,14 @@ pub(super) struct GripperTagFile {
 }
 
 impl GripperTagFile {
-    /// Checks the table against the drawing.
+    /// Checks the table against the URDF.
     ///
     /// # Errors
     /// [`RobotError`] naming file, key and allowed range.
     pub(super) fn check(
         &self,
         file: &Path,
-        urdf: &UrdfModel,
-        base_link: &str,
-        chain: &Chain,
+        arm: &UrdfChain<'_>,
         camera_mount: &Attachment,
     ) -> Result<GripperTag, RobotError> {
         let issue = |key: &str, problem: String| FileIssue::new(file, format!("gripper_tag.{key}"), problem);
@@ -77,12 +80,13 @@ impl GripperTagFile {
         if self.family != "36h11" {
             return Err(issue("family", format!("`{}` is not supported; use \"36h11\"", self.family)).into());
         }
-        if !urdf.has_link(&self.link) {
-            return Err(issue("link", format!("`{}` is no link of the URDF", self.link)).into());
+        if !arm.urdf.has_link(&self.link) {
+            return Err(issue("link", format!("`{}` is not a link of the URDF", self.link)).into());
         }
-        let mut mount = urdf.attachment(base_link, &self.link, chain)?;
+        let mut mount = arm.attachment(&self.link)?;
         if mount.n_joints <= camera_mount.n_joints {
-            let problem = format!("`{}` is not behind the camera: no joint turns it in the camera's view", self.link);
+            let problem =
+                format!("`{}` is not distal to the camera: no joint moves it relative to the camera", self.link);
             return Err(issue("link", problem).into());
         }
         check_place(file, "gripper_tag.position_m", &self.position_m)?;

@@ -1,4 +1,4 @@
-//! Convex hulls of points: what a mesh is for clearance, contact and sight.
+//! Convex hulls of points: meshes for clearance, contact and visibility.
 
 use std::sync::Arc;
 
@@ -7,15 +7,15 @@ use parry3d::math::Vec3;
 use parry3d::shape::{ConvexPolyhedron, SharedShape};
 use parry3d::transformation::try_convex_hull;
 
-/// The most corners that one hull may have: each costs time in every distance.
+/// Limit of a hull's corners: each costs time in every distance.
 pub const MAX_HULL_POINTS: usize = 2000;
-/// Thinner bodies have no inside to keep out of, m.
+/// Smallest thickness of a body, m.
 const THINNEST_M: f64 = 1e-4;
 
-/// A convex body given by its corners, m.
+/// A convex body with its corners, m.
 #[derive(Clone, Debug)]
 pub struct Hull {
-    /// The points that it was made of; some may lie inside.
+    /// The points that it was made from; some may lie inside.
     points_m: Vec<[f64; 3]>,
     corners_m: Vec<[f64; 3]>,
     /// Corners of each outer triangle, counter-clockwise from outside.
@@ -24,7 +24,7 @@ pub struct Hull {
     radius_m: f64,
 }
 
-/// A hull's corners about the middle of the box around them, and where that lies, m.
+/// A hull's corners relative to the centre of their bounding box, and that centre, m.
 #[derive(Clone, Debug)]
 pub(super) struct CenteredHull {
     pub points_m: Vec<[f64; 3]>,
@@ -36,19 +36,19 @@ struct Outline {
     triangles: Vec<[u32; 3]>,
 }
 
-/// Why points make no body.
+/// Why points have no convex body.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum HullError {
-    #[error("has {got} points that make the hull, {MAX_HULL_POINTS} at most are allowed; simplify the mesh")]
+    #[error("has {got} points in its hull, at most {MAX_HULL_POINTS} are allowed; simplify the mesh")]
     TooManyPoints { got: usize },
-    #[error("is flat: {thickness_m:.1e} m thick, while a body needs at least {THINNEST_M:.0e} m")]
+    #[error("is flat: {thickness_m:.1e} m thick, at least {THINNEST_M:.0e} m are needed")]
     Flat { thickness_m: f64 },
-    #[error("makes no convex body: {0}")]
+    #[error("has no convex body: {0}")]
     Degenerate(String),
 }
 
 impl PartialEq for Hull {
-    /// The same points make the same hull.
+    /// Equal points have equal hulls.
     fn eq(&self, other: &Self) -> bool {
         self.points_m == other.points_m
     }
@@ -58,7 +58,7 @@ impl Hull {
     /// The hull of `points_m`, which must be finite.
     ///
     /// # Errors
-    /// [`HullError`] where they lie in one plane, are too many, or make no body.
+    /// [`HullError`] where they lie in one plane, are too many, or have no convex body.
     pub fn new(points_m: &[[f64; 3]]) -> Result<Arc<Self>, HullError> {
         let Outline { corners_m, triangles } = outline(points_m)?;
         if corners_m.len() > MAX_HULL_POINTS {
@@ -76,7 +76,7 @@ impl Hull {
         }))
     }
 
-    /// The hull's corners alone, moved to their own middle.
+    /// The hull's corners alone, relative to their centre.
     pub(super) fn centered(points_m: &[[f64; 3]]) -> Result<CenteredHull, HullError> {
         let Outline { corners_m, .. } = outline(points_m)?;
         let bound = |pick: fn(f64, f64) -> f64, start: f64| {
@@ -98,19 +98,19 @@ impl Hull {
         &self.triangles
     }
 
-    /// For parry and rapier.
+    /// The shape for parry and rapier.
     #[must_use]
     pub fn shape(&self) -> SharedShape {
         self.shape.clone()
     }
 
-    /// The smallest sphere about the origin that holds it, m.
+    /// Radius of the smallest sphere about the origin that contains it, m.
     #[must_use]
     pub fn radius_m(&self) -> f64 {
         self.radius_m
     }
 
-    /// Sides of the box along its axes, m.
+    /// Sides of its bounding box along the axes, m.
     #[must_use]
     pub fn box_m(&self) -> [f64; 3] {
         let half = self.shape.compute_local_aabb().half_extents();
@@ -118,7 +118,7 @@ impl Hull {
     }
 }
 
-/// Corners and triangles of the hull; checks what parry would panic on first.
+/// Corners and triangles of the hull. Checks first for points on which parry would panic.
 fn outline(points_m: &[[f64; 3]]) -> Result<Outline, HullError> {
     let thickness_m = thickness_m(points_m);
     if thickness_m < THINNEST_M {

@@ -1,4 +1,4 @@
-//! Reads triangle meshes: STL, binary and ASCII, and the vertices and faces of OBJ.
+//! Reader of triangle meshes: STL, binary and ASCII, and the vertices and faces of OBJ.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -10,25 +10,25 @@ pub(super) struct Mesh {
     pub triangles: Vec<[u32; 3]>,
 }
 
-/// Why a file is no mesh.
+/// Why a file is not a mesh.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum MeshError {
     #[error("cannot be read: {0}")]
     Unreadable(#[from] std::io::Error),
     #[error("is neither .stl nor .obj")]
     Extension,
-    #[error("is no mesh: {0}")]
+    #[error("is not a mesh: {0}")]
     Content(String),
 }
 
-/// Larger meshes are for looking at, not for keeping clear of.
+/// Limit of a mesh's triangles.
 const MAX_TRIANGLES: usize = 1_000_000;
 const MAX_BYTES: u64 = 200_000_000;
 /// Header and number of triangles of a binary STL.
 const STL_HEADER: usize = 84;
 const STL_TRIANGLE: usize = 50;
 
-/// Reads `file`, whose extension says what it is.
+/// Reads `file` by its extension.
 ///
 /// # Errors
 /// [`MeshError`], whatever the bytes are.
@@ -49,7 +49,7 @@ pub(super) fn read(file: &Path) -> Result<Mesh, MeshError> {
     Ok(mesh)
 }
 
-/// Gives equal corners one number.
+/// Mesh in the making; equal corners share one vertex.
 #[derive(Default)]
 struct Builder {
     mesh: Mesh,
@@ -66,14 +66,14 @@ impl Builder {
         }
         let Self { mesh, number } = self;
         let triangle = corners.map(|corner| {
-            // Adding zero makes one number of both zeros.
+            // Adding zero turns -0 into 0.
             *number.entry(corner.map(|v| (v + 0.0).to_bits())).or_insert_with(|| {
                 mesh.vertices.push(corner);
                 mesh.vertices.len() as u32 - 1
             })
         });
         let [a, b, c] = triangle;
-        // Slivers of one point or one line bound nothing.
+        // Degenerate triangles are skipped.
         if a != b && b != c && c != a {
             mesh.triangles.push(triangle);
         }
@@ -81,7 +81,7 @@ impl Builder {
     }
 }
 
-/// A binary file may begin with `solid` too; its length gives it away.
+/// A binary file may also begin with `solid`; its length distinguishes it.
 fn stl(bytes: &[u8]) -> Result<Mesh, String> {
     let declared = bytes.get(STL_HEADER - 4..STL_HEADER).map(|n| u32::from_le_bytes([n[0], n[1], n[2], n[3]]) as usize);
     let length = declared.and_then(|n| n.checked_mul(STL_TRIANGLE)?.checked_add(STL_HEADER));
@@ -100,7 +100,7 @@ fn stl(bytes: &[u8]) -> Result<Mesh, String> {
 fn stl_binary(triangles: &[u8]) -> Result<Mesh, String> {
     let mut builder = Builder::default();
     for record in triangles.chunks_exact(STL_TRIANGLE) {
-        // The normal comes first; the corners' order says the same.
+        // The normal comes first; the order of the corners implies it.
         let number = |k: usize| {
             let at = 12 + 4 * k;
             f64::from(f32::from_le_bytes([record[at], record[at + 1], record[at + 2], record[at + 3]]))
@@ -135,7 +135,7 @@ fn numbers<'a>(words: impl Iterator<Item = &'a str>, line: usize) -> Result<[f64
 }
 
 fn obj(bytes: &[u8]) -> Result<Mesh, String> {
-    let text = std::str::from_utf8(bytes).map_err(|_| "not a text, as an OBJ is".to_owned())?;
+    let text = std::str::from_utf8(bytes).map_err(|_| "not a text, as an OBJ must be".to_owned())?;
     let mut vertices: Vec<[f64; 3]> = Vec::new();
     let mut builder = Builder::default();
     for (n, line) in text.lines().enumerate() {

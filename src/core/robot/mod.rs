@@ -1,9 +1,9 @@
-//! The NOMINAL arm: what drawings, datasheets and surveys say, never what was built.
+//! The nominal arm and vehicle: values from drawings, datasheets and surveys.
 //!
-//! `load` reads a robot folder (robot.toml and its URDF) into checked types; `Vehicle` and `Shape` are the drawings of
-//! what stands around the arm, meshes as convex hulls. Everything here is known before the dive. As-built values live under `sim`, estimates
-//! under `calib`.
+//! `load` reads a robot folder (robot.toml and its URDF) into a checked `Robot`; `load_vehicle` reads a `Vehicle`. Shapes
+//! are convex, meshes are convex hulls. As-built values are in `sim`, estimates in `calib`.
 
+mod body;
 mod camera;
 mod drive;
 mod error;
@@ -12,28 +12,34 @@ mod file;
 mod gripper;
 mod gripper_tag;
 mod hull;
-mod lamp;
+mod joint_sensor;
+mod light;
 mod mesh;
+mod nominal;
 mod part;
 mod self_collision;
+mod self_pairs;
 mod shape;
 mod survey;
 mod urdf;
 mod vehicle;
 
+pub use body::LinkBody;
+pub use camera::CameraSpec;
 pub use drive::{DriveSpec, MotionSpec};
-pub use error::{FileIssue, RobotError};
-pub use error::{parse_toml, read_text};
+pub use error::{FileIssue, RobotError, parse_toml, read_text};
 pub use failed::{FailedJoint, FailedKind};
-pub use file::{CameraSpec, JointSensorSpec, Robot, SensorKind, ToolSpec, load, load_without_pairs};
+pub use file::{load, load_without_pairs};
 pub use gripper::{GripperSpec, Jaw};
 pub use gripper_tag::GripperTag;
 pub use hull::{Hull, HullError, MAX_HULL_POINTS};
-pub use lamp::VehicleLight;
-pub use part::{MAX_PARTS, Part};
-pub use part::{PartFile, check_parts};
-pub use self_collision::{SELF_COLLISION_FILE, SelfPair, SelfPairs};
+pub use joint_sensor::{JointSensorSpec, SensorKind};
+pub use light::VehicleLight;
+pub use nominal::{Robot, ToolSpec};
+pub use part::{MAX_PARTS, Part, PartFile, check_parts};
+pub use self_collision::SELF_COLLISION_FILE;
+pub use self_pairs::{SelfPair, SelfPairs};
 pub use shape::{PlacedShape, Shape, parry_pose};
 pub use survey::{BaseTagStd, MapKnowledge, SurveyedTag, TagSurvey};
-pub use urdf::{LinkBody, MAX_COLLISION_SHAPES, UrdfModel};
+pub use urdf::MAX_COLLISION_SHAPES;
 pub use vehicle::{StationKeeping, Vehicle, VehicleDynamics, load_vehicle};

@@ -1,4 +1,4 @@
-//! Parts of a vehicle and obstacles, as files write them: primitives, hulls and meshes.
+//! Parts of a vehicle and obstacles in files: primitives, hulls and meshes.
 
 use std::path::{Path, PathBuf};
 
@@ -19,18 +19,18 @@ pub struct Part {
     pub placed: PlacedShape,
 }
 
-/// How a mesh becomes convex.
+/// Conversion of a mesh to convex parts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Convex {
-    /// One hull around all of it.
+    /// One hull around the whole mesh.
     #[default]
     Hull,
-    /// Several hulls that follow its hollows.
+    /// Several hulls that leave concavities free.
     Decomposed,
 }
 
-/// A part or obstacle as files write it.
+/// A part or obstacle in a file.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct PartFile {
@@ -57,9 +57,9 @@ pub struct PartFile {
     color_rgb: [u8; 3],
 }
 
-/// The most shapes that one list may come to.
+/// Limit of the shapes of one list.
 pub const MAX_PARTS: usize = 256;
-/// The most hulls that one mesh is taken apart into.
+/// Limit of the hulls of one decomposed mesh.
 const MAX_HULLS: u32 = 32;
 
 fn no_rotation() -> [f64; 4] {
@@ -70,13 +70,13 @@ fn grey() -> [u8; 3] {
     [140, 140, 140]
 }
 
-/// Farther away than any site is wide is a slip of the pen.
+/// Checks that coordinates are within 10 km: farther away is a mistake.
 pub(super) fn check_place(file: &Path, key: &str, position_m: &[f64; 3]) -> Result<(), FileIssue> {
     position_m.iter().try_for_each(|&value| FileIssue::check_range(file, key, value, -1e4..=1e4).map(|_| ()))
 }
 
-/// The parts that `raw`, a list `table` of `file`, stands for, and the same list without files: meshes as hulls, point by
-/// point, so that it can travel with a recording.
+/// The parts of `raw`, a list `table` of `file`, and the same list without mesh files: meshes as hulls with their points,
+/// for a recording.
 ///
 /// # Errors
 /// [`RobotError`] naming file and key; for meshes, both files.
@@ -126,7 +126,7 @@ impl PartFile {
             ("convex", self.convex.is_some()),
         ] {
             if given {
-                return Err(FileIssue::new(file, at(key), format!("is no key of shape `{}`", self.shape)).into());
+                return Err(FileIssue::new(file, at(key), format!("is not a key of shape `{}`", self.shape)).into());
             }
         }
         for (key, value) in shape.lengths() {
@@ -146,7 +146,7 @@ impl PartFile {
         Ok(Shape::Hull(Hull::new(points_m).map_err(|error| FileIssue::new(file, key, error.to_string()))?))
     }
 
-    /// Itself, or the hulls of its mesh.
+    /// The part itself, or the hulls of its mesh.
     fn without_files(&self, file: &Path, table: &str) -> Result<Vec<Self>, RobotError> {
         if !self.is_mesh() {
             return Ok(vec![self.clone()]);
@@ -186,9 +186,9 @@ impl PartFile {
     }
 }
 
-/// Hulls that follow the mesh's hollows.
+/// Hulls of a convex decomposition of the mesh.
 fn decomposed(mesh: &Mesh) -> Result<Vec<CenteredHull>, HullError> {
-    // A flat mesh has no voxels to take apart.
+    // A flat mesh has no voxels to decompose.
     Hull::centered(&mesh.vertices)?;
     let vertices: Vec<Vec3> = mesh.vertices.iter().map(|p| Vec3::from_array(*p)).collect();
     let parameters = VHACDParameters { max_convex_hulls: MAX_HULLS, ..VHACDParameters::default() };
@@ -198,13 +198,13 @@ fn decomposed(mesh: &Mesh) -> Result<Vec<CenteredHull>, HullError> {
         let points: Vec<[f64; 3]> = points.iter().map(|p| p.to_array()).collect();
         match Hull::centered(&points) {
             Ok(hull) => hulls.push(hull),
-            // A sliver of one face at the border of two parts; the part beside it has the same face.
+            // A flat piece of a face at the border of two parts; the neighbouring part has the same face.
             Err(HullError::Flat { .. }) => {}
             Err(error) => return Err(error),
         }
     }
     if hulls.is_empty() {
-        return Err(HullError::Degenerate("nothing of it is thick enough".to_owned()));
+        return Err(HullError::Degenerate("no part of it is thick enough".to_owned()));
     }
     Ok(hulls)
 }
@@ -251,7 +251,7 @@ mod tests {
         parts.iter().map(distance).fold(f64::INFINITY, f64::min)
     }
 
-    /// Of the mesh's frame, in the owner's.
+    /// A point of the mesh's frame in the owner's frame.
     fn placed([x, y, z]: [f64; 3]) -> [f64; 3] {
         [1.0 - y, 2.0 + x, 3.0 + z]
     }
@@ -282,7 +282,7 @@ mod tests {
         }
     }
 
-    /// What travels with a recording is the same body, to the last bit, and needs no file.
+    /// The list in a recording has the same bodies, to the last bit, and needs no file.
     #[test]
     fn the_list_without_files_stands_for_the_same_parts() {
         for convex in ["hull", "decomposed"] {
@@ -313,13 +313,13 @@ mod tests {
         for (text, words) in [
             (mesh(""), &["file", "is needed"][..]),
             (mesh("file = \"none.stl\"\n"), &["obstacle `rock`: file", "none.stl", "cannot be read"]),
-            (mesh("file = \"text.stl\"\n"), &["text.stl", "is no mesh"]),
+            (mesh("file = \"text.stl\"\n"), &["text.stl", "is not a mesh"]),
             (mesh("file = \"flat.obj\"\n"), &["obstacle `rock`: file", "flat.obj", "is flat"]),
             (mesh("file = \"flat.obj\"\nconvex = \"decomposed\"\n"), &["convex", "flat.obj", "is flat"]),
             (mesh("file = \"angle.obj\"\nscale_m = 0.0\n"), &["scale_m", "outside"]),
             (mesh("file = \"angle.obj\"\nscale_m = 1000\n"), &["scale_m", "outside"]),
-            (format!("{box_at}file = \"angle.obj\"\n"), &["obstacle `rock`: file", "is no key of shape `box`"]),
-            (format!("{box_at}points_m = []\n"), &["points_m", "is no key"]),
+            (format!("{box_at}file = \"angle.obj\"\n"), &["obstacle `rock`: file", "is not a key of shape `box`"]),
+            (format!("{box_at}points_m = []\n"), &["points_m", "is not a key"]),
             (format!("shape = \"hull\"\n{at}"), &["points_m", "is needed by shape `hull`"]),
             (format!("shape = \"hull\"\npoints_m = [[0, 0, nan]]\n{at}"), &["points_m", "outside"]),
             (format!("shape = \"torus\"\n{at}"), &["shape", "hull, mesh"]),

@@ -1,37 +1,19 @@
-//! self_collision.toml of a robot folder: which links of the arm can ever come near each other.
+//! The file self_collision.toml of a robot folder: pairs of links that can come near each other.
 //!
-//! Found by sampling (`plan::sample_self_pairs`, `armcal study pairs`) and stored, so that planning need not look at the others.
-//! The file names the URDF by hash: for another drawing it says nothing.
+//! `plan::sample_self_pairs` (`armcal study pairs`) finds them by sampling; planning skips all other pairs. The file holds
+//! the hash of the URDF and is valid for that URDF only.
 
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+use super::body::LinkBody;
 use super::error::{FileIssue, RobotError, parse_toml, read_text};
-use super::urdf::LinkBody;
+use super::nominal::Robot;
+use super::self_pairs::{SelfPair, SelfPairs};
 
 /// Its name in a robot folder.
 pub const SELF_COLLISION_FILE: &str = "self_collision.toml";
-
-/// Links that come near each other, over all angles that planning may think of.
-#[derive(Clone, Debug, PartialEq)]
-pub struct SelfPairs {
-    /// Seed and number of the random configurations.
-    pub seed: u64,
-    pub n: u64,
-    /// Links that are not among `pairs` were never nearer than this, m.
-    pub near_m: f64,
-    pub pairs: Vec<SelfPair>,
-}
-
-/// Two links that do.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SelfPair {
-    /// Numbers of the bodies, inner first.
-    pub bodies: [usize; 2],
-    /// The nearest seen, m; 0: they touch.
-    pub nearest_m: f64,
-}
 
 #[derive(Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
@@ -54,17 +36,11 @@ struct PairFile {
 }
 
 impl SelfPairs {
-    /// Whether two bodies can come nearer than `SelfPairs::near_m`.
-    #[must_use]
-    pub fn has(&self, inner: usize, outer: usize) -> bool {
-        self.pairs.iter().any(|pair| pair.bodies == [inner, outer])
-    }
-
-    /// As a file for this robot.
+    /// The text of the file for this robot.
     ///
     /// # Errors
     /// [`FileIssue`] where it has no TOML form.
-    pub fn to_toml(&self, file: &Path, robot: &super::Robot) -> Result<String, FileIssue> {
+    pub fn to_toml(&self, file: &Path, robot: &Robot) -> Result<String, FileIssue> {
         let name = |body: usize| robot.bodies[body].name.clone();
         let raw = SelfCollisionFile {
             version: 1,
@@ -100,7 +76,7 @@ pub(super) fn read(folder: &Path, urdf_text: &str, bodies: &[LinkBody]) -> Resul
     FileIssue::check_range(&file, "near_m", raw.near_m, 0.0..=10.0)?;
     if raw.urdf_blake3 != hash(urdf_text) {
         let problem = format!(
-            "the URDF is another one now; make the file anew with `armcal study pairs {}`, or remove it",
+            "the URDF has changed; make the file again with `armcal study pairs {}`, or remove it",
             folder.display()
         );
         return Err(FileIssue::new(&file, "urdf_blake3", problem).into());
@@ -109,7 +85,11 @@ pub(super) fn read(folder: &Path, urdf_text: &str, bodies: &[LinkBody]) -> Resul
     for (k, pair) in raw.pair.iter().enumerate() {
         let body = |name: &String| {
             let problem = || {
-                FileIssue::new(&file, format!("pair[{k}].links"), format!("`{name}` is no link that moves or the base"))
+                FileIssue::new(
+                    &file,
+                    format!("pair[{k}].links"),
+                    format!("`{name}` is neither the base nor a moving link"),
+                )
             };
             bodies.iter().position(|body| body.name == *name).ok_or_else(problem)
         };

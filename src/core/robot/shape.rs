@@ -1,4 +1,4 @@
-//! Convex shapes with a place, for drawing, clearance and contact.
+//! Convex shapes with a pose, for display, clearance and contact.
 
 use std::sync::Arc;
 
@@ -8,7 +8,7 @@ use parry3d::shape::SharedShape;
 
 use super::hull::Hull;
 
-/// A convex shape about its own centre; lengths in m. Cylinders and capsules lie along z, as in URDF.
+/// A convex shape about its own centre, lengths in m. Cylinders and capsules lie along z, as in URDF.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Shape {
     Box {
@@ -18,7 +18,7 @@ pub enum Shape {
         radius_m: f64,
         length_m: f64,
     },
-    /// `length_m` between the centres of the caps.
+    /// `length_m` is the distance between the centres of the caps.
     Capsule {
         radius_m: f64,
         length_m: f64,
@@ -26,11 +26,11 @@ pub enum Shape {
     Sphere {
         radius_m: f64,
     },
-    /// Of a mesh.
+    /// Convex hull of a mesh.
     Hull(Arc<Hull>),
 }
 
-/// A shape at a place in its owner's frame.
+/// A shape with its pose in its owner's frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlacedShape {
     pub owner_from_shape: Isometry3<f64>,
@@ -39,7 +39,7 @@ pub struct PlacedShape {
 }
 
 impl Shape {
-    /// The same shape for parry and rapier, with its axis turned to where URDF has it by [`Shape::axis_fix`].
+    /// The same shape for parry and rapier; [`Shape::axis_fix`] turns its axis to that of URDF.
     #[must_use]
     pub fn to_parry(&self) -> SharedShape {
         match *self {
@@ -60,7 +60,7 @@ impl Shape {
         }
     }
 
-    /// The smallest sphere about the shape's centre that holds it, m.
+    /// Radius of the smallest sphere about the shape's centre that contains it, m.
     #[must_use]
     pub fn bounding_radius_m(&self) -> f64 {
         match *self {
@@ -72,7 +72,7 @@ impl Shape {
         }
     }
 
-    /// Sides of the box along the shape's axes, m.
+    /// Sides of its bounding box along the shape's axes, m.
     #[must_use]
     pub fn box_m(&self) -> [f64; 3] {
         match *self {
@@ -93,7 +93,7 @@ impl Shape {
                 vec![("radius_m", radius_m), ("length_m", length_m)]
             }
             Self::Sphere { radius_m } => vec![("radius_m", radius_m)],
-            // Its points are checked where it is made.
+            // A hull's points are checked where it is made.
             Self::Hull(_) => Vec::new(),
         }
     }

@@ -1,4 +1,4 @@
-//! Tags whose places are known: those of robot.toml, or of the vehicle that carries them.
+//! Surveyed tags of robot.toml or of the vehicle that carries them.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -9,40 +9,40 @@ use super::error::{FileIssue, RobotError};
 use super::part::check_place;
 use crate::spatial::{Base, Frame, Pose, Tag};
 
-/// A tag whose place is known by survey, or of which it is known only that it is there.
+/// A tag with a surveyed pose, or with an unknown one.
 #[derive(Clone, Debug)]
 pub struct SurveyedTag {
     pub id: u32,
-    /// Side of the black square; NaN of a landmark that is used by its position or pose alone, where nobody knows it.
+    /// Side of the black square. NaN where it is unknown, for a landmark used by its position or pose alone.
     pub size_m: f64,
-    /// Where nothing is known of it, at best where a drawing has it.
+    /// From a drawing at best where the pose is unknown.
     pub base_from_tag: Pose<Base, Tag>,
-    /// One sigma per axis; infinite where nothing is known of the tag's place.
+    /// One sigma per axis; infinite where the pose is unknown.
     pub position_std_m: f64,
     pub rotation_std_rad: f64,
 }
 
 impl SurveyedTag {
-    /// Whether anything is known of its place.
+    /// Whether its pose is known.
     #[must_use]
     pub fn is_known(&self) -> bool {
         self.position_std_m.is_finite() && self.rotation_std_rad.is_finite()
     }
 }
 
-/// How much of a survey the arm may use.
+/// The part of a survey that the arm may use.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum MapKnowledge {
-    /// Where every tag is.
+    /// The poses of all tags.
     #[default]
     Known,
-    /// Where these and the base tag are; of the others that they are there, and how large.
+    /// The poses of these tags and of the base tag; of the others only the size.
     Partly(Vec<u32>),
-    /// Where the base tag is.
+    /// The pose of the base tag; of the others only the size.
     Unknown,
 }
 
-/// How well the base tag's place is known, where that differs from its file.
+/// Standard deviations of the base tag's pose that replace those of its file.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BaseTagStd {
     pub position_std_m: Option<f64>,
@@ -52,13 +52,13 @@ pub struct BaseTagStd {
 /// All tags around an arm.
 #[derive(Clone, Debug)]
 pub struct TagSurvey {
-    /// The tag beside the base; shown in the replay.
+    /// The tag beside the base; the replay shows it.
     pub base_tag: u32,
     pub tags: Vec<SurveyedTag>,
 }
 
 impl TagSurvey {
-    /// The tags of these numbers alone. The base tag is the first of them if it is not among them itself.
+    /// The survey with these tags alone. Without the base tag, the first of them takes its role.
     pub fn only(&self, ids: &[u32]) -> Result<Self, String> {
         let known: Vec<u32> = self.tags.iter().map(|tag| tag.id).collect();
         match ids.iter().find(|id| !known.contains(id)) {
@@ -70,10 +70,8 @@ impl TagSurvey {
         let tags = self.tags.iter().filter(|tag| ids.contains(&tag.id)).cloned().collect();
         Ok(Self { base_tag, tags })
     }
-}
 
-impl TagSurvey {
-    /// The survey as far as `knowledge` goes: all else of the tags' places is forgotten but the drawing.
+    /// The survey limited to `knowledge`: the other tags get infinite standard deviations.
     pub fn with_knowledge(mut self, knowledge: &MapKnowledge, base: BaseTagStd) -> Result<Self, String> {
         let known: &[u32] = match knowledge {
             MapKnowledge::Partly(known) => known,
@@ -95,7 +93,7 @@ impl TagSurvey {
     }
 }
 
-/// A `[[tag]]` as files write it, placed in the owner's frame.
+/// `[[tag]]` of a file, with its pose in the owner's frame.
 #[derive(Clone, Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct TagFile {
@@ -108,7 +106,7 @@ pub(super) struct TagFile {
     rotation_std_rad: f64,
 }
 
-/// Checks the tags of `file`, which places them in the frame `Owner`.
+/// Checks the tags of `file`, whose poses are in the frame `Owner`.
 pub(super) fn check_tags<Owner: Frame>(
     file: &Path,
     raw: &[TagFile],
@@ -120,7 +118,7 @@ pub(super) fn check_tags<Owner: Frame>(
     for tag in raw {
         let key = |name: &str| format!("tag {}: {name}", tag.id);
         if !seen.insert(tag.id) {
-            return Err(FileIssue::new(file, key("id"), "stands twice").into());
+            return Err(FileIssue::new(file, key("id"), "is defined twice").into());
         }
         if tag.family != "36h11" {
             let problem = format!("`{}` is not supported; use \"36h11\"", tag.family);

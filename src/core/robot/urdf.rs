@@ -1,4 +1,4 @@
-//! URDF to a serial chain with bodies, or a named reason why not.
+//! Serial chain and bodies of a URDF file.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -6,34 +6,38 @@ use std::path::{Path, PathBuf};
 use nalgebra::{Isometry3, Matrix3, Translation3, Unit, UnitQuaternion, Vector3};
 use urdf_rs::{Geometry, JointType};
 
+use super::body::LinkBody;
 use super::error::{FileIssue, RobotError, read_text};
 use super::shape::{PlacedShape, Shape};
 use crate::joints::MAX_JOINTS;
 use crate::kinematics::{Attachment, Chain, ChainJoint, JointLimits};
 
-/// The most collision shapes that an arm may have, so that planning places them without allocating.
+/// Limit of an arm's collision shapes, so that planning places them without allocating.
 pub const MAX_COLLISION_SHAPES: usize = 64;
 
-/// Mass and shapes of everything that moves with one joint (fixed children included), in that joint's link frame.
+/// A checked URDF file: a tree of links.
 #[derive(Clone, Debug)]
-pub struct LinkBody {
-    pub name: String,
-    pub mass_kg: f64,
-    pub com_m: Vector3<f64>,
-    /// About the centre of mass, axes of the link.
-    pub inertia_kg_m2: Matrix3<f64>,
-    pub visuals: Vec<PlacedShape>,
-    pub collisions: Vec<PlacedShape>,
-}
-
-/// A URDF file read and checked: the tree, not yet a chain.
-#[derive(Clone, Debug)]
-pub struct UrdfModel {
+pub(super) struct UrdfModel {
     pub file: PathBuf,
     pub text: String,
     robot: urdf_rs::Robot,
     /// Child link -> joint index.
     joint_of_child: BTreeMap<String, usize>,
+}
+
+/// A URDF file and the chain of an arm in it.
+#[derive(Clone, Copy)]
+pub(super) struct UrdfChain<'a> {
+    pub urdf: &'a UrdfModel,
+    pub base_link: &'a str,
+    pub chain: &'a Chain,
+}
+
+/// One visual or collision element of a link.
+struct Element<'a> {
+    origin: &'a urdf_rs::Pose,
+    geometry: &'a Geometry,
+    color_rgb: [u8; 3],
 }
 
 fn isometry(origin: &urdf_rs::Pose) -> Isometry3<f64> {
@@ -63,7 +67,7 @@ impl UrdfModel {
         let mut joint_names = BTreeSet::new();
         for (idx, joint) in robot.joints.iter().enumerate() {
             if !joint_names.insert(joint.name.as_str()) {
-                return Err(FileIssue::new(file, format!("joint `{}`", joint.name), "stands twice").into());
+                return Err(FileIssue::new(file, format!("joint `{}`", joint.name), "is defined twice").into());
             }
             for link in [&joint.parent.link, &joint.child.link] {
                 if !links.contains(link.as_str()) {
@@ -117,7 +121,7 @@ impl UrdfModel {
     /// The chain of moving joints from `base` that carries every link named in `tips`.
     ///
     /// # Errors
-    /// [`RobotError::NoChain`] when the tips do not hang on one chain, [`RobotError::JointKind`] for other joints.
+    /// [`RobotError::NoChain`] when no single chain carries all tips, [`RobotError::JointKind`] for other joints.
     pub fn chain(&self, base: &str, tips: &[&str]) -> Result<Chain, RobotError> {
         let mut longest: Vec<usize> = Vec::new();
         for tip in tips {
@@ -164,68 +168,8 @@ impl UrdfModel {
         path.iter().copied().filter(|&idx| self.robot.joints[idx].joint_type != JointType::Fixed)
     }
 
-    /// Where the frame of `link` hangs on `chain`.
-    ///
-    /// # Errors
-    /// [`RobotError::NoChain`] when it hangs elsewhere.
-    pub fn attachment(&self, base: &str, link: &str, chain: &Chain) -> Result<Attachment, RobotError> {
-        let mut n_joints = 0;
-        let mut link_from_frame = Isometry3::identity();
-        for idx in self.path(base, link)? {
-            let joint = &self.robot.joints[idx];
-            if joint.joint_type == JointType::Fixed {
-                link_from_frame *= isometry(&joint.origin);
-            } else if chain.joints().get(n_joints).is_some_and(|j| j.name == joint.name) {
-                n_joints += 1;
-                link_from_frame = Isometry3::identity();
-            } else {
-                let (from, to) = (base.to_owned(), link.to_owned());
-                return Err(RobotError::NoChain { file: self.file.clone(), from, to });
-            }
-        }
-        Ok(Attachment { n_joints, link_from_frame })
-    }
-
     pub(super) fn has_link(&self, name: &str) -> bool {
         self.robot.links.iter().any(|link| link.name == name)
-    }
-
-    /// What is drawn of the link `name`, in the frame of the chain's link that carries it.
-    ///
-    /// # Errors
-    /// [`RobotError`] for a link that hangs elsewhere or shapes that no body can have.
-    pub(super) fn visuals_of(&self, base: &str, name: &str, chain: &Chain) -> Result<Vec<PlacedShape>, RobotError> {
-        let attachment = self.attachment(base, name, chain)?;
-        let mut body = LinkBody::empty(name.to_owned());
-        for link in self.robot.links.iter().filter(|link| link.name == name) {
-            self.add_visuals(&mut body, link, &attachment.link_from_frame)?;
-        }
-        Ok(body.visuals)
-    }
-
-    /// Bodies 0..=n: what is fixed to the base, then what moves with each joint of the chain. Of the links in `apart` nothing is
-    /// drawn: they move by themselves.
-    ///
-    /// # Errors
-    /// [`RobotError::Value`] for numbers or shapes that no body can have.
-    pub fn bodies(&self, base: &str, chain: &Chain, apart: &[String]) -> Result<Vec<LinkBody>, RobotError> {
-        let mut names = vec![base.to_owned()];
-        names.extend(chain.joints().iter().map(|j| j.child_link.clone()));
-        let mut bodies: Vec<LinkBody> = names.into_iter().map(LinkBody::empty).collect();
-        for link in &self.robot.links {
-            let Ok(attachment) = self.attachment(base, &link.name, chain) else { continue };
-            let body = &mut bodies[attachment.n_joints];
-            self.add_link(body, link, &attachment.link_from_frame)?;
-            if !apart.contains(&link.name) {
-                self.add_visuals(body, link, &attachment.link_from_frame)?;
-            }
-        }
-        let n_shapes: usize = bodies.iter().map(|body| body.collisions.len()).sum();
-        if n_shapes > MAX_COLLISION_SHAPES {
-            let problem = format!("{n_shapes} shapes on the chain, 0 .. {MAX_COLLISION_SHAPES} allowed");
-            return Err(FileIssue::new(&self.file, "collision", problem).into());
-        }
-        Ok(bodies)
     }
 
     fn add_link(
@@ -247,14 +191,14 @@ impl UrdfModel {
             FileIssue::check_range(&self.file, &mass_key, mass_kg, 1e-6..=1e6)?;
             if inertia.cholesky().is_none() {
                 let key = format!("link `{}`: inertia", link.name);
-                return Err(FileIssue::new(&self.file, key, "is not positive definite; no body turns like that").into());
+                return Err(FileIssue::new(&self.file, key, "is not positive definite").into());
             }
             let body_from_com = body_from_link * isometry(&inertial.origin);
             body.add_mass(mass_kg, &body_from_com, &inertia);
         }
         for collision in &link.collision {
-            let placed = self.placed(&link.name, &collision.origin, &collision.geometry, body_from_link, [0; 3])?;
-            body.collisions.push(placed);
+            let element = Element { origin: &collision.origin, geometry: &collision.geometry, color_rgb: [0; 3] };
+            body.collisions.push(self.placed(&link.name, &element, body_from_link)?);
         }
         Ok(())
     }
@@ -266,9 +210,9 @@ impl UrdfModel {
         body_from_link: &Isometry3<f64>,
     ) -> Result<(), RobotError> {
         for visual in &link.visual {
-            let color = visual.material.as_ref().and_then(|m| self.color(m)).unwrap_or([160, 160, 160]);
-            let placed = self.placed(&link.name, &visual.origin, &visual.geometry, body_from_link, color)?;
-            body.visuals.push(placed);
+            let color_rgb = visual.material.as_ref().and_then(|m| self.color(m)).unwrap_or([160, 160, 160]);
+            let element = Element { origin: &visual.origin, geometry: &visual.geometry, color_rgb };
+            body.visuals.push(self.placed(&link.name, &element, body_from_link)?);
         }
         Ok(())
     }
@@ -282,11 +226,10 @@ impl UrdfModel {
     fn placed(
         &self,
         link: &str,
-        origin: &urdf_rs::Pose,
-        geometry: &Geometry,
+        element: &Element<'_>,
         body_from_link: &Isometry3<f64>,
-        color_rgb: [u8; 3],
     ) -> Result<PlacedShape, RobotError> {
+        let Element { origin, geometry, color_rgb } = *element;
         let shape = match *geometry {
             Geometry::Box { size } => Shape::Box { size_m: size.0 },
             Geometry::Cylinder { radius, length } => Shape::Cylinder { radius_m: radius, length_m: length },
@@ -308,6 +251,68 @@ impl UrdfModel {
     }
 }
 
+impl UrdfChain<'_> {
+    /// Pose of the frame of `link` on the chain.
+    ///
+    /// # Errors
+    /// [`RobotError::NoChain`] when the chain does not carry the link.
+    pub fn attachment(&self, link: &str) -> Result<Attachment, RobotError> {
+        let mut n_joints = 0;
+        let mut link_from_frame = Isometry3::identity();
+        for idx in self.urdf.path(self.base_link, link)? {
+            let joint = &self.urdf.robot.joints[idx];
+            if joint.joint_type == JointType::Fixed {
+                link_from_frame *= isometry(&joint.origin);
+            } else if self.chain.joints().get(n_joints).is_some_and(|j| j.name == joint.name) {
+                n_joints += 1;
+                link_from_frame = Isometry3::identity();
+            } else {
+                let (from, to) = (self.base_link.to_owned(), link.to_owned());
+                return Err(RobotError::NoChain { file: self.urdf.file.clone(), from, to });
+            }
+        }
+        Ok(Attachment { n_joints, link_from_frame })
+    }
+
+    /// Visual shapes of the link `name`, in the frame of the chain's link that carries it.
+    ///
+    /// # Errors
+    /// [`RobotError`] for a link that the chain does not carry, or for invalid shapes.
+    pub fn visuals_of(&self, name: &str) -> Result<Vec<PlacedShape>, RobotError> {
+        let attachment = self.attachment(name)?;
+        let mut body = LinkBody::empty(name.to_owned());
+        for link in self.urdf.robot.links.iter().filter(|link| link.name == name) {
+            self.urdf.add_visuals(&mut body, link, &attachment.link_from_frame)?;
+        }
+        Ok(body.visuals)
+    }
+
+    /// Bodies 0..=n: the base with everything fixed to it, then one per joint of the chain. The links in `apart` move by
+    /// themselves; their visual shapes are omitted.
+    ///
+    /// # Errors
+    /// [`RobotError::Value`] for invalid numbers or shapes.
+    pub fn bodies(&self, apart: &[String]) -> Result<Vec<LinkBody>, RobotError> {
+        let mut names = vec![self.base_link.to_owned()];
+        names.extend(self.chain.joints().iter().map(|j| j.child_link.clone()));
+        let mut bodies: Vec<LinkBody> = names.into_iter().map(LinkBody::empty).collect();
+        for link in &self.urdf.robot.links {
+            let Ok(attachment) = self.attachment(&link.name) else { continue };
+            let body = &mut bodies[attachment.n_joints];
+            self.urdf.add_link(body, link, &attachment.link_from_frame)?;
+            if !apart.contains(&link.name) {
+                self.urdf.add_visuals(body, link, &attachment.link_from_frame)?;
+            }
+        }
+        let n_shapes: usize = bodies.iter().map(|body| body.collisions.len()).sum();
+        if n_shapes > MAX_COLLISION_SHAPES {
+            let problem = format!("{n_shapes} shapes on the chain, 0 .. {MAX_COLLISION_SHAPES} allowed");
+            return Err(FileIssue::new(&self.urdf.file, "collision", problem).into());
+        }
+        Ok(bodies)
+    }
+}
+
 fn check_joint_numbers(file: &Path, joint: &urdf_rs::Joint) -> Result<(), RobotError> {
     let numbers = joint.origin.xyz.0.iter().chain(&joint.origin.rpy.0).chain(&joint.axis.xyz.0);
     for value in numbers {
@@ -326,31 +331,4 @@ fn check_joint_numbers(file: &Path, joint: &urdf_rs::Joint) -> Result<(), RobotE
         return Err(FileIssue::new(file, key, format!("lower {lower} must lie below upper {upper}")).into());
     }
     Ok(())
-}
-
-impl LinkBody {
-    fn empty(name: String) -> Self {
-        Self {
-            name,
-            mass_kg: 0.0,
-            com_m: Vector3::zeros(),
-            inertia_kg_m2: Matrix3::zeros(),
-            visuals: Vec::new(),
-            collisions: Vec::new(),
-        }
-    }
-
-    /// Adds a rigid part; `inertia` about its centre of mass in the axes of `body_from_com` (parallel axis theorem).
-    fn add_mass(&mut self, mass_kg: f64, body_from_com: &Isometry3<f64>, inertia: &Matrix3<f64>) {
-        let rotation = body_from_com.rotation.to_rotation_matrix();
-        let part = rotation * inertia * rotation.transpose();
-        let com = body_from_com.translation.vector;
-        let total = self.mass_kg + mass_kg;
-        let new_com = (self.com_m * self.mass_kg + com * mass_kg) / total;
-        let shift = |d: Vector3<f64>, m: f64| (Matrix3::identity() * d.norm_squared() - d * d.transpose()) * m;
-        self.inertia_kg_m2 += shift(self.com_m - new_com, self.mass_kg);
-        self.inertia_kg_m2 += part + shift(com - new_com, mass_kg);
-        self.com_m = new_com;
-        self.mass_kg = total;
-    }
 }

@@ -1,4 +1,4 @@
-//! The drawing of the vehicle that carries the arm: convex parts, tags, and where the arm is bolted on.
+//! The nominal vehicle: convex parts, tags, lights, and the mount of the arm.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -6,12 +6,12 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::error::{FileIssue, RobotError, parse_toml, read_text};
-use super::lamp::{LightFile, VehicleLight};
+use super::light::{LightFile, VehicleLight};
 use super::part::{Part, PartFile, check_parts, check_place};
 use super::survey::{TagFile, TagSurvey, check_tags};
 use crate::spatial::{Base, Pose, Vehicle as VehicleFrame};
 
-/// A vehicle as drawn.
+/// The nominal vehicle.
 #[derive(Clone, Debug)]
 pub struct Vehicle {
     pub file: PathBuf,
@@ -19,19 +19,19 @@ pub struct Vehicle {
     pub mass_kg: f64,
     pub vehicle_from_base: Pose<VehicleFrame, Base>,
     pub parts: Vec<Part>,
-    /// The tags that it carries; `None` where those of the robot's own file hold.
+    /// The tags that it carries; `None`: those of robot.toml are valid.
     pub survey: Option<TagSurvey>,
     pub lights: Vec<VehicleLight>,
-    /// By the robot's name: the angles that it starts from on this vehicle, instead of its own.
+    /// Stowed configurations on this vehicle by the robot's name; they replace those of robot.toml.
     pub stowed_rad: BTreeMap<String, Vec<f64>>,
-    /// What a vehicle needs that floats free; `None` where the file has none.
+    /// Needed by a free vehicle; `None` where the file has none.
     pub dynamics: Option<VehicleDynamics>,
     pub station_keeping: StationKeeping,
-    /// The file's text, to travel with a recording; with meshes, the same as hulls, point by point.
+    /// The file's text for a recording, with meshes replaced by hulls.
     pub text: String,
 }
 
-/// How well it keeps its station, one sigma: of its centre of mass along each axis, and of roll, pitch and yaw.
+/// Station-keeping errors, one sigma: centre of mass along each axis, and roll, pitch and yaw.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct StationKeeping {
@@ -39,7 +39,7 @@ pub struct StationKeeping {
     pub attitude_std_rad: f64,
 }
 
-/// Assumed where the file says nothing: 3 cm and half a degree.
+/// 3 cm and half a degree, assumed.
 impl Default for StationKeeping {
     fn default() -> Self {
         Self { position_std_m: 0.03, attitude_std_rad: 0.0087 }
@@ -54,8 +54,8 @@ impl StationKeeping {
     }
 }
 
-/// The vehicle as a body in water: about its origin, the centre of mass, in its own axes. Sixes are x, y, z, then about
-/// x, y, z.
+/// The vehicle as a body in water, about its origin (the centre of mass) in its own axes. Arrays of six hold x, y, z, then
+/// about x, y, z.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct VehicleDynamics {
@@ -68,7 +68,7 @@ pub struct VehicleDynamics {
     pub drag_linear: [f64; 6],
     /// N s2/m2 and N m s2/rad2.
     pub drag_quadratic: [f64; 6],
-    /// Of the thrusters together; 0 where they have no authority.
+    /// Of all thrusters together; 0 on axes without authority.
     pub thrust_max_n: [f64; 3],
     pub moment_max_n_m: [f64; 3],
 }
@@ -168,7 +168,7 @@ fn check_survey(
 ) -> Result<Option<TagSurvey>, RobotError> {
     match (raw.base_tag, raw.tag.is_empty()) {
         (None, true) => Ok(None),
-        (None, false) => Err(FileIssue::new(file, "base_tag", "is needed where there are [[tag]]s").into()),
+        (None, false) => Err(FileIssue::new(file, "base_tag", "is missing; it is required with [[tag]]s").into()),
         (Some(_), true) => Err(FileIssue::new(file, "base_tag", "is not among the [[tag]]s: there are none").into()),
         (Some(base_tag), false) => {
             let tags = check_tags(file, &raw.tag, base_tag, &vehicle_from_base.inverse())?;

@@ -8,7 +8,8 @@ use std::str::FromStr;
 use serde::Deserialize;
 use toml::{Table, Value};
 
-use super::{Override, RoutineError};
+use super::error::RoutineError;
+use super::overrides::Override;
 use crate::robot::FileIssue;
 
 /// Seeds from the first to the last, both included.

@@ -1,27 +1,32 @@
-//! Routines: what to do with which arm, as users script it in TOML.
+//! Routines: scripts in TOML that say which arm does what.
 //!
-//! `load` reads and checks a routine; paths in it are relative to the routine's own file. Its `[world]` table belongs to
-//! the simulator and is handed on unread, and so are the tables of `fault` steps: belief must not learn from them.
-//! `step` has the script's steps, `script` reads them. `load_with` replaces keys on the way (`--set`); `[campaign]` and `[regress]` are for running a
-//! routine many times.
+//! `load` reads and checks a routine (`Routine`); paths in it are relative to the routine's own file. `load_with`
+//! replaces keys (`--set`). The tables `[world]` and those of `fault` steps stay unread: only the simulator may know them.
+//! `[campaign]` and `[regress]` are for many runs of one routine.
 
 mod assert_figure;
+mod camera_mode;
 mod campaign;
+mod definition;
+mod error;
 mod file;
+mod method;
 mod overrides;
 mod scene;
 mod script;
+mod settings;
 mod site;
 mod step;
 
 pub use assert_figure::{AssertFigure, AssertLimits};
 pub use campaign::{CampaignSettings, RegressSettings, SeedRange};
-pub use file::{
-    CaptureSettings, FailedJointEntry, Margins, Method, PoseCriterion, Routine, RoutineError, TaskSettings, load,
-    load_scene, load_with,
-};
+pub use definition::{FailedJointEntry, Routine};
+pub use error::RoutineError;
+pub use file::{load, load_with};
+pub use method::Method;
 pub use overrides::{Override, Overrides, effective_table};
-pub use scene::Scene;
+pub use scene::{Scene, load_scene};
+pub use settings::{CaptureSettings, Margins, PoseCriterion, TaskSettings};
 pub use step::{
     CalibrateSettings, CalibrateViews, IdentifySettings, MoveGoal, OnRefusal, ReachSettings, Step, StopsSettings,
 };

@@ -9,7 +9,7 @@ use std::str::FromStr;
 use serde::de::DeserializeOwned;
 use toml::{Table, Value};
 
-use super::RoutineError;
+use super::error::RoutineError;
 use crate::robot::{FileIssue, parse_toml, read_text};
 
 /// One key and its new value.

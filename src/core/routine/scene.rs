@@ -1,6 +1,12 @@
-//! What surrounds the vehicle, as the operator describes it.
+//! The scene: surroundings of the vehicle as the operator describes them.
 
-use crate::robot::Part;
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use super::error::RoutineError;
+use super::site::SiteFile;
+use crate::robot::{FileIssue, Part, PartFile, check_parts, parse_toml, read_text};
 
 /// The site: a flat seafloor and obstacles, placed in the world frame (z up, origin at the vehicle's station).
 #[derive(Clone, Debug, Default)]
@@ -8,4 +14,33 @@ pub struct Scene {
     /// Height of the seafloor in the world frame; `None` in open water.
     pub seafloor_z_m: Option<f64>,
     pub obstacles: Vec<Part>,
+}
+
+/// The tables `[site]` and `[[obstacle]]` of a routine.
+#[derive(Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct SceneFile {
+    #[serde(default)]
+    pub(super) site: SiteFile,
+    #[serde(default)]
+    pub(super) obstacle: Vec<PartFile>,
+}
+
+impl SceneFile {
+    /// The scene, and itself without the files of meshes.
+    pub(super) fn check(self, file: &Path) -> Result<(Scene, Self), RoutineError> {
+        if let Some(z) = self.site.seafloor_z_m {
+            FileIssue::check_range(file, "site.seafloor_z_m", z, -1e4..=0.0)?;
+        }
+        let (obstacles, plain) = check_parts(&self.obstacle, file, "obstacle")?;
+        Ok((Scene { seafloor_z_m: self.site.seafloor_z_m, obstacles }, Self { obstacle: plain, ..self }))
+    }
+}
+
+/// Reads the scene that travelled with a recording.
+///
+/// # Errors
+/// [`RoutineError`] naming file, key and allowed range.
+pub fn load_scene(file: &Path) -> Result<Scene, RoutineError> {
+    Ok(parse_toml::<SceneFile>(file, &read_text(file)?)?.check(file)?.0)
 }

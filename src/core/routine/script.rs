@@ -6,16 +6,19 @@ use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
 use super::assert_figure::{AssertLimits, Needs};
-use super::file::{CaptureSettings, Margins, PoseCriterion, RoutineError, TaskSettings};
+use super::error::RoutineError;
+use super::settings::{CaptureSettings, Margins, PoseCriterion, TaskSettings};
 use super::step::{
     CalibrateSettings, CalibrateViews, IdentifySettings, MoveGoal, OnRefusal, ReachSettings, Step, StopsSettings,
 };
 use crate::robot::FileIssue;
+use crate::streams::PriorSource;
 
 /// The script of a routine without `[[step]]`: the standard closed loop.
 pub(super) fn standard(capture: CaptureSettings, task: &TaskSettings) -> Vec<Step> {
     let reach = || Step::Reach(ReachSettings { targets: (0..task.targets_m.len()).collect(), touch: false });
-    let calibrate = CalibrateSettings { warm: false, views: CalibrateViews::New, on_refusal: OnRefusal::Stop };
+    let calibrate =
+        CalibrateSettings { prior: PriorSource::Fresh, views: CalibrateViews::New, on_refusal: OnRefusal::Stop };
     vec![reach(), Step::Capture(capture), Step::Calibrate(calibrate), reach()]
 }
 
@@ -56,8 +59,8 @@ pub(super) fn read(
             "capture" => reader.capture(capture)?,
             "identify" => reader.identify()?,
             "stops" => reader.stops()?,
-            "calibrate" => reader.calibrate(false)?,
-            "recalibrate" => reader.calibrate(true)?,
+            "calibrate" => reader.calibrate(PriorSource::Fresh)?,
+            "recalibrate" => reader.calibrate(PriorSource::Warm)?,
             "wait" => reader.wait()?,
             "assert" => reader.assert()?,
             "fault" => {
@@ -158,7 +161,8 @@ impl StepReader<'_> {
             min_tags: Option<u32>,
             clearance_m: Option<f64>,
             dwell_s: Option<f64>,
-            choose: Option<PoseCriterion>,
+            #[serde(alias = "choose")]
+            criterion: Option<PoseCriterion>,
             replan_every: Option<u32>,
             stop_at_tool_error_m: Option<f64>,
             max_time_s: Option<f64>,
@@ -171,7 +175,7 @@ impl StepReader<'_> {
             min_tags: raw.min_tags.unwrap_or(general.min_tags),
             clearance_m: raw.clearance_m.unwrap_or(general.clearance_m),
             dwell_s: raw.dwell_s.unwrap_or(general.dwell_s),
-            criterion: raw.choose.unwrap_or(general.criterion),
+            criterion: raw.criterion.unwrap_or(general.criterion),
             replan_every: raw.replan_every.unwrap_or(general.replan_every),
             stop_at_tool_error_m: raw.stop_at_tool_error_m.or(general.stop_at_tool_error_m),
             max_time_s: raw.max_time_s.or(general.max_time_s),
@@ -233,7 +237,7 @@ impl StepReader<'_> {
         Ok(Step::Stops(StopsSettings { joints, dwell_s: self.range("dwell_s", dwell_s, 0.2..=60.0)? }))
     }
 
-    fn calibrate(&self, warm: bool) -> Result<Step, FileIssue> {
+    fn calibrate(&self, prior: PriorSource) -> Result<Step, FileIssue> {
         #[derive(Deserialize)]
         #[serde(deny_unknown_fields)]
         struct Raw {
@@ -243,7 +247,7 @@ impl StepReader<'_> {
             on_refusal: OnRefusal,
         }
         let raw: Raw = self.parse()?;
-        Ok(Step::Calibrate(CalibrateSettings { warm, views: raw.views, on_refusal: raw.on_refusal }))
+        Ok(Step::Calibrate(CalibrateSettings { prior, views: raw.views, on_refusal: raw.on_refusal }))
     }
 
     fn wait(&self) -> Result<Step, FileIssue> {
@@ -287,7 +291,7 @@ fn check_order(file: &Path, steps: &[Step]) -> Result<(), FileIssue> {
                         "has no views: no `capture` comes before it (or between it and the last calibration)",
                     );
                 }
-                if settings.warm && calibrations == 0 {
+                if settings.prior == PriorSource::Warm && calibrations == 0 {
                     return wrong("has nothing to start from: no `calibrate` comes before it");
                 }
                 calibrations += 1;

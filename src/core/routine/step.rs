@@ -3,7 +3,8 @@
 use serde::Deserialize;
 
 use super::assert_figure::AssertLimits;
-use super::file::CaptureSettings;
+use super::settings::CaptureSettings;
+use crate::streams::PriorSource;
 
 /// One step of a routine's script.
 #[derive(Clone, Debug)]
@@ -45,8 +46,8 @@ impl Step {
             Self::Capture(_) => "capture",
             Self::Identify(_) => "identify",
             Self::Stops(_) => "stops",
-            Self::Calibrate(CalibrateSettings { warm: false, .. }) => "calibrate",
-            Self::Calibrate(CalibrateSettings { warm: true, .. }) => "recalibrate",
+            Self::Calibrate(CalibrateSettings { prior: PriorSource::Fresh, .. }) => "calibrate",
+            Self::Calibrate(CalibrateSettings { prior: PriorSource::Warm, .. }) => "recalibrate",
             Self::Wait { .. } => "wait",
             Self::Fault { .. } => "fault",
             Self::Assert(_) => "assert",
@@ -97,8 +98,7 @@ pub struct StopsSettings {
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CalibrateSettings {
-    /// Start from the last accepted calibration instead of the datasheet.
-    pub warm: bool,
+    pub prior: PriorSource,
     pub views: CalibrateViews,
     pub on_refusal: OnRefusal,
 }

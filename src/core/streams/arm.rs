@@ -1,10 +1,10 @@
-//! The two ends of the streams.
+//! Interfaces of the streams: the arm that sends messages, the sink that keeps them.
 
 use super::message::Message;
 use crate::joints::JointCounts;
 use crate::time::Stamp;
 
-/// Takes messages as they come; a recording, a viewer, or both.
+/// A receiver of messages: a recording, a viewer, or both.
 pub trait Sink {
     /// # Errors
     /// When the message cannot be kept (disk full, closed stream).
@@ -14,7 +14,7 @@ pub trait Sink {
 /// Why a sink did not keep a message, free of any file format.
 pub type SinkError = Box<dyn std::error::Error + Send + Sync>;
 
-/// Why an arm did not do as told.
+/// Why an arm did not carry out a command.
 #[derive(Debug, thiserror::Error)]
 pub enum ArmError {
     #[error("the arm's stream could not be recorded: {0}")]
@@ -35,12 +35,22 @@ pub enum ArmError {
     Opening { opening: f64 },
 }
 
-/// An arm that can be told where to go, simulated or real. It tells back only through messages.
+/// Images that the caller needs; an arm for which images are costly may omit some.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ImageDemand {
+    /// Every image of the camera.
+    All,
+    /// A few images, for a viewer.
+    #[default]
+    Few,
+}
+
+/// An arm that follows set-points, simulated or real. It answers only through messages.
 pub trait Arm {
     /// The arm's present time, by the joint sensors' clock.
     fn now(&self) -> Stamp;
 
-    /// Sets where the arm's own controller shall drive its own sensors, raw counts.
+    /// Commands a set-point in raw counts; the arm's controller drives its own sensors to it.
     ///
     /// # Errors
     /// [`ArmError::JointCount`], [`ArmError::SetPoint`].
@@ -67,8 +77,8 @@ pub trait Arm {
         Ok(())
     }
 
-    /// Tells the jaws where to go, from 0 (closed) to 1 (open); they take their time. An arm without jaws refuses: a script that
-    /// closed nothing on a target would else look like one that touched it.
+    /// Commands the opening of the jaws, from 0 (closed) to 1 (open). An arm without jaws returns an error, or else a script
+    /// could not tell a touch from nothing.
     ///
     /// # Errors
     /// [`ArmError::NoGripper`], [`ArmError::Opening`].
@@ -77,13 +87,12 @@ pub trait Arm {
         Err(ArmError::NoGripper)
     }
 
-    /// The camera is wanted from now on, or no longer. An arm whose camera is always on need not care; one that pays for every
-    /// image may take few of them while nobody looks.
-    fn look(&mut self, is_wanted: bool) {
-        let _ = is_wanted;
+    /// Sets how many images the caller needs from now on. An arm whose camera is always on ignores it.
+    fn request_images(&mut self, demand: ImageDemand) {
+        let _ = demand;
     }
 
-    /// Something breaks now: fault `number` of a list that only a simulated arm holds. Nobody tells the caller what it is.
+    /// Applies fault `number` of a list that only a simulated arm holds. The caller does not learn which fault it is.
     ///
     /// # Errors
     /// [`ArmError::NoSuchFault`]; always, for a real arm.

@@ -8,7 +8,7 @@ mod message;
 mod survey;
 
 pub use crate::joints::{JointAngles, JointCounts, MAX_JOINTS};
-pub use arm::{Arm, ArmError, Sink, SinkError};
+pub use arm::{Arm, ArmError, ImageDemand, Sink, SinkError};
 pub use message::{
     Attitude, CameraImage, CaptureSet, DetectionReject, DetectionRejects, GripperCommand, GripperSample, JointCommand,
     JointSensorSample, JointStateBelief, LogLevel, LogLine, Mark, MarkKind, Message, Phase, PressureSample,

@@ -4,7 +4,7 @@ use nalgebra::Isometry3;
 
 use super::World;
 use crate::sensors::camera::{ArmMotion, Exposed, Moment, Places};
-use armcal_core::streams::{ArmError, CameraImage, DetectionRejects, Message};
+use armcal_core::streams::{ArmError, CameraImage, DetectionRejects, ImageDemand, Message};
 use armcal_core::time::Stamp;
 
 impl World {
@@ -20,7 +20,7 @@ impl World {
             solids: &self.solids,
             motion: ArmMotion { chain: &self.robot.chain, angles: self.physics.angles(), rates: self.physics.rates() },
             closed: self.stamp(),
-            is_wanted: self.is_looked,
+            is_wanted: self.image_demand == ImageDemand::All,
         };
         let taken = self.camera.take(&moment).map_err(|error| ArmError::Camera(error.into()))?;
         let Some(mut image) = taken else { return Ok(()) };

@@ -34,7 +34,9 @@ use super::vehicle::{BaseState, FreeVehicle, Sea, VehicleMotion, WaterMotion};
 use armcal_core::robot::{Robot, Vehicle};
 use armcal_core::routine::Scene;
 use armcal_core::spatial::Pose;
-use armcal_core::streams::{Arm, ArmError, JointCounts, JointSensorSample, MAX_JOINTS, Message, Sink, Thermometer};
+use armcal_core::streams::{
+    Arm, ArmError, ImageDemand, JointCounts, JointSensorSample, MAX_JOINTS, Message, Sink, Thermometer,
+};
 use armcal_core::time::{SIMULATION_EPOCH, Stamp};
 
 const ATTITUDE_PERIODS: u64 = 5;
@@ -81,7 +83,7 @@ pub struct World {
     /// Images under way; the line keeps their order.
     images: VecDeque<Exposed>,
     /// Somebody waits for images.
-    is_looked: bool,
+    image_demand: ImageDemand,
     n_images: u64,
     outbox: Vec<(Stamp, Message)>,
     measured: JointCounts,
@@ -140,7 +142,7 @@ impl World {
             camera,
             contacts: ContactWatch::new(solids.pairs(), step_s),
             images: VecDeque::new(),
-            is_looked: false,
+            image_demand: ImageDemand::Few,
             n_images: 0,
             outbox: Vec::with_capacity(16),
             gripper: robot.gripper.as_ref().map(|gripper| Gripper::new(gripper, spec.hydraulics.valve_lag_s)),
@@ -373,8 +375,8 @@ impl Arm for World {
         self.rest(seconds, sink)
     }
 
-    fn look(&mut self, is_wanted: bool) {
-        self.is_looked = is_wanted;
+    fn request_images(&mut self, demand: ImageDemand) {
+        self.image_demand = demand;
     }
 
     fn grip(&mut self, opening: f64) -> Result<(), ArmError> {

@@ -36,7 +36,7 @@ pub(crate) fn check_order(recording: &Recording) -> Result<(), CalibError> {
             }
         }
     }
-    recording.disorder.iter().next().map_or(Ok(()), |(topic, disorder)| {
+    recording.stamp_regressions.iter().next().map_or(Ok(()), |(topic, disorder)| {
         let (recording, topic) = (recording.path.display().to_string(), topic.clone());
         Err(CalibError::Disorder { recording, topic, disorder: *disorder })
     })

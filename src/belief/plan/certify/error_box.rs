@@ -86,7 +86,10 @@ impl Sweep<'_> {
             error_half_rad[joint] = 0.5 * (high - low);
             is_within &= offset == 0.0 || offset.abs() <= self.error_rad(joint, [middle; 2]);
         }
-        ArmRegion::new(&self.model.link_poses(&angles), angles.len(), step_rad, error_half_rad, is_within)
+        let poses = self.model.link_poses(&angles);
+        let mut region = ArmRegion::new(&poses, angles.len(), step_rad, error_half_rad);
+        region.is_within = is_within;
+        region
     }
 
     fn halves(&self, region: &Region, split: Split) -> [Region; 2] {

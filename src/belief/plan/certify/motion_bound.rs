@@ -97,9 +97,8 @@ impl ArmRegion {
         n_joints: usize,
         step_rad: [f64; MAX_JOINTS],
         error_half_rad: [f64; MAX_JOINTS],
-        is_within: bool,
     ) -> Self {
-        let mut spot = Self {
+        let mut region = Self {
             base_from_body: [Pose3::IDENTITY; MAX_JOINTS + 1],
             axes: [Vec3::ZERO; MAX_JOINTS],
             origins: [Vec3::ZERO; MAX_JOINTS],
@@ -109,18 +108,18 @@ impl ArmRegion {
             turn: [Vec3::ZERO; MAX_JOINTS + 1],
             push: [Vec3::ZERO; MAX_JOINTS + 1],
             step_rad,
-            is_within,
+            is_within: true,
         };
         for j in 0..n_joints {
             let (axis, origin) = (vec3(poses.axis(j)), vec3(poses.joint_origin(j)));
-            spot.base_from_body[j + 1] = parry_pose(poses.link(j + 1));
-            (spot.axes[j], spot.origins[j]) = (axis, origin);
-            spot.reach_rad[j] = step_rad[j].abs() + error_half_rad[j];
-            spot.reach_before_rad[j + 1] = spot.reach_before_rad[j] + spot.reach_rad[j];
-            spot.turn[j + 1] = spot.turn[j] + step_rad[j] * axis;
-            spot.push[j + 1] = spot.push[j] + step_rad[j] * origin.cross(axis);
+            region.base_from_body[j + 1] = parry_pose(poses.link(j + 1));
+            (region.axes[j], region.origins[j]) = (axis, origin);
+            region.reach_rad[j] = step_rad[j].abs() + error_half_rad[j];
+            region.reach_before_rad[j + 1] = region.reach_before_rad[j] + region.reach_rad[j];
+            region.turn[j + 1] = region.turn[j] + step_rad[j] * axis;
+            region.push[j + 1] = region.push[j] + step_rad[j] * origin.cross(axis);
         }
-        spot
+        region
     }
 
     /// Puts a moving shape where it is and bounds its motion.

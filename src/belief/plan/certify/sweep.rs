@@ -144,7 +144,7 @@ impl Sweep<'_> {
                 *error = self.error_rad(joint, along);
             }
         }
-        ArmRegion::new(&self.model.link_poses(&angles), angles.len(), step_rad, error_half_rad, true)
+        ArmRegion::new(&self.model.link_poses(&angles), angles.len(), step_rad, error_half_rad)
     }
 
     /// What is known of one pair where the shapes are placed for a region.
@@ -282,7 +282,7 @@ impl Search<'_> {
         let model = self.sweep.model;
         let angles = JointAngles::from_fn(self.sweep.from.len(), |joint| self.sweep.believed(joint, share));
         let zero = [0.0; MAX_JOINTS];
-        let spot = ArmRegion::new(&model.link_poses(&angles), angles.len(), zero, zero, true);
+        let spot = ArmRegion::new(&model.link_poses(&angles), angles.len(), zero, zero);
         self.n_regions += 1;
         for (shape, moved) in self.moved.iter_mut().enumerate() {
             spot.place(model, shape, moved);

@@ -41,7 +41,7 @@ pub(crate) struct DesignState {
     pub ln_value: f64,
 }
 
-/// Memory for [`Standing::gain`].
+/// Memory for [`DesignState::gain`].
 #[derive(Clone, Debug)]
 pub(crate) struct Scratch {
     /// `P E^T`, one column for each joint.
@@ -75,7 +75,7 @@ impl DesignObjective {
 
 impl DesignState {
     pub(crate) fn new(measure: DesignObjective, unknowns: &ParameterPrior) -> Self {
-        let mut standing = Self {
+        let mut state = Self {
             measure,
             n_joints: unknowns.n_joints,
             covariance: unknowns.covariance.clone(),
@@ -83,8 +83,16 @@ impl DesignState {
             linear: Linear::zeros(),
             ln_value: 0.0,
         };
-        standing.renew();
-        standing
+        state.renew();
+        state
+    }
+
+    /// The state after `captured` views.
+    pub(crate) fn after(measure: DesignObjective, unknowns: &ParameterPrior, captured: &[WhitenedView]) -> Self {
+        let mut state = Self::new(measure, unknowns);
+        let mut scratch = state.scratch();
+        captured.iter().for_each(|view| state.take(view, &mut scratch));
+        state
     }
 
     pub(crate) fn scratch(&self) -> Scratch {

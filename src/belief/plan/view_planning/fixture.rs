@@ -149,12 +149,12 @@ impl Truth {
     /// What is seen from the poses of a plan.
     pub(crate) fn views(
         &self,
-        robot: &Robot,
         clearance: &ClearanceModel<'_>,
         plan: &PosePlan,
         scales: &Hyperparameters,
         rng: &mut ChaCha8Rng,
     ) -> Vec<View> {
+        let robot = clearance.robot;
         let of = |(idx, pose): (usize, &crate::plan::view_planning::PlannedPose)| {
             let travel_rad = JointAngles::from_fn(robot.n_joints(), |j| pose.angles[j] - robot.sensors[j].center_rad);
             let mut view = View::of_reading(idx as u32, SIMULATION_EPOCH, travel_rad);

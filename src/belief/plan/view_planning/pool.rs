@@ -5,7 +5,7 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::plan::motion::timing::{SETTLE_S, Timing};
 use crate::plan::view_planning::candidates::{Candidate, InfeasibleCounts, Search};
-use crate::plan::view_planning::criterion::DesignObjective;
+use crate::plan::view_planning::criterion::{DesignObjective, DesignState};
 use crate::plan::view_planning::forecast::{Forecast, Task};
 use crate::plan::view_planning::parameter_prior::ParameterPrior;
 use crate::plan::view_planning::selection::ViewSelector;
@@ -134,8 +134,14 @@ impl PosePool {
         };
         let tour = Tour { timing: &setup.timing, start: *request.start };
         let taken: Vec<_> = setup.taken(request).iter().filter_map(|view| view.telling(robot, unknowns)).collect();
-        let candidates = (self.candidates.as_slice(), self.whitened_views(request, setup));
-        ViewSelector::new(candidates, tour, view_s(request), anchored_every, (measure, unknowns), &taken)
+        ViewSelector {
+            candidates: &self.candidates,
+            whitened_views: self.whitened_views(request, setup),
+            tour,
+            view_s: view_s(request),
+            anchored_every,
+            design: DesignState::after(measure, unknowns, &taken),
+        }
     }
 
     /// `n` of those that were drawn evenly over the joint ranges; of all where these are too few.

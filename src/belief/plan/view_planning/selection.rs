@@ -6,8 +6,7 @@
 //! puts one candidate in place of one pick as long as `ln measure + TIME_POWER ln time` falls.
 
 use crate::plan::view_planning::candidates::Candidate;
-use crate::plan::view_planning::criterion::{DesignObjective, DesignState, Scratch};
-use crate::plan::view_planning::parameter_prior::ParameterPrior;
+use crate::plan::view_planning::criterion::{DesignState, Scratch};
 use crate::plan::view_planning::view_information::WhitenedView;
 use crate::plan::view_planning::visit_order::Tour;
 use armcal_core::streams::JointAngles;
@@ -33,13 +32,25 @@ pub(crate) struct ViewSelector<'a> {
     /// The first of so many in a row shows a known tag, as long as there are such candidates.
     pub anchored_every: usize,
     /// Before the picks; the views taken already are in it.
-    pub standing: DesignState,
+    pub design: DesignState,
 }
 
 /// What a candidate's gain is worth.
 type Score<'a> = dyn Fn(usize, f64) -> f64 + 'a;
 /// Whether a candidate may be taken.
 type May<'a> = dyn Fn(usize) -> bool + 'a;
+
+/// Upper bounds of the candidates' gains.
+struct LazyGains {
+    /// Negative for picked candidates.
+    bounds: Vec<f64>,
+    /// Whether the bound is the gain itself.
+    is_fresh: Vec<bool>,
+}
+
+impl LazyGains {
+    const PICKED: f64 = -1.0;
+}
 
 /// Picks in the order of their tour.
 #[derive(Clone, Debug, Default)]
@@ -62,21 +73,7 @@ impl Picks {
     }
 }
 
-impl<'a> ViewSelector<'a> {
-    pub(crate) fn new(
-        (candidates, tellings): (&'a [Candidate], Vec<WhitenedView>),
-        tour: Tour<'a>,
-        view_s: f64,
-        anchored_every: usize,
-        (measure, unknowns): (DesignObjective, &ParameterPrior),
-        taken: &[WhitenedView],
-    ) -> Self {
-        let mut standing = DesignState::new(measure, unknowns);
-        let mut scratch = standing.scratch();
-        taken.iter().for_each(|view| standing.take(view, &mut scratch));
-        Self { candidates, whitened_views: tellings, tour, view_s, anchored_every, standing }
-    }
-
+impl ViewSelector<'_> {
     /// `n` of them, or all; indices.
     pub(crate) fn pick(&self, n: usize) -> Vec<usize> {
         let picks = self.exchanged(self.greedy(n));
@@ -84,30 +81,29 @@ impl<'a> ViewSelector<'a> {
     }
 
     pub(crate) fn greedy(&self, n: usize) -> Picks {
-        let mut standing = self.standing.clone();
-        let mut scratch = standing.scratch();
+        let mut design = self.design.clone();
+        let mut scratch = design.scratch();
         let mut picks = Picks::default();
-        let mut gains = vec![f64::INFINITY; self.candidates.len()];
-        let mut is_fresh = vec![false; self.candidates.len()];
-        let mut places = vec![(0, 0.0); self.candidates.len()];
+        let n_candidates = self.candidates.len();
+        let mut gains = LazyGains { bounds: vec![f64::INFINITY; n_candidates], is_fresh: vec![false; n_candidates] };
+        let mut places = vec![(0, 0.0); n_candidates];
         let has_anchor = self.candidates.iter().any(|candidate| candidate.shows_known_tag);
-        for turn in 0..n.min(self.candidates.len()) {
-            is_fresh.fill(false);
+        for turn in 0..n.min(n_candidates) {
+            gains.is_fresh.fill(false);
             let must_anchor = self.anchored_every > 1 && turn.is_multiple_of(self.anchored_every) && has_anchor;
             let may = |k: usize| !must_anchor || self.candidates[k].shows_known_tag;
-            for (k, place) in places.iter_mut().enumerate().filter(|(k, _)| gains[*k] >= 0.0 && may(*k)) {
+            for (k, place) in places.iter_mut().enumerate().filter(|(k, _)| gains.bounds[*k] >= 0.0 && may(*k)) {
                 *place = self.tour.insertion(&picks.placed, &self.candidates[k].angles);
             }
             let score = |k: usize, gain: f64| gain / (self.view_s + places[k].1).powf(TIME_POWER);
-            let Some(best) = self.best(&standing, &mut scratch, &mut gains, &mut is_fresh, (&score, &may)) else {
+            let Some(best) = self.best(&design, &mut scratch, &mut gains, (&score, &may)) else {
                 // Of those that may be taken none is left.
                 if must_anchor { continue } else { break }
             };
             let candidate = &self.candidates[best];
-            standing.take(&self.whitened_views[best], &mut scratch);
+            design.take(&self.whitened_views[best], &mut scratch);
             picks.insert(places[best].0, best, candidate.angles);
-            // Taken.
-            gains[best] = -1.0;
+            gains.bounds[best] = LazyGains::PICKED;
         }
         picks
     }
@@ -115,13 +111,13 @@ impl<'a> ViewSelector<'a> {
     /// The candidate of the highest score; stale gains are renewed from the highest bound on.
     fn best(
         &self,
-        standing: &DesignState,
+        design: &DesignState,
         scratch: &mut Scratch,
-        gains: &mut [f64],
-        is_fresh: &mut [bool],
+        gains: &mut LazyGains,
         (score, may): (&Score<'_>, &May<'_>),
     ) -> Option<usize> {
         let mut order: Vec<(f64, usize)> = gains
+            .bounds
             .iter()
             .enumerate()
             .filter(|(k, gain)| **gain >= 0.0 && may(*k))
@@ -133,11 +129,11 @@ impl<'a> ViewSelector<'a> {
             if best.is_some_and(|(most, _)| bound <= most * (1.0 + ROUNDING)) {
                 break;
             }
-            if !is_fresh[k] {
-                gains[k] = standing.gain(&self.whitened_views[k], scratch);
-                is_fresh[k] = true;
+            if !gains.is_fresh[k] {
+                gains.bounds[k] = design.gain(&self.whitened_views[k], scratch);
+                gains.is_fresh[k] = true;
             }
-            let now = score(k, gains[k]);
+            let now = score(k, gains.bounds[k]);
             if best.is_none_or(|(most, _)| now > most) {
                 best = Some((now, k));
             }
@@ -151,10 +147,10 @@ impl<'a> ViewSelector<'a> {
     }
 
     fn after(&self, order: &[usize]) -> DesignState {
-        let mut standing = self.standing.clone();
-        let mut scratch = standing.scratch();
-        order.iter().for_each(|&k| standing.take(&self.whitened_views[k], &mut scratch));
-        standing
+        let mut design = self.design.clone();
+        let mut scratch = design.scratch();
+        order.iter().for_each(|&k| design.take(&self.whitened_views[k], &mut scratch));
+        design
     }
 
     fn time_s(&self, picks: &Picks) -> f64 {
@@ -179,11 +175,11 @@ impl<'a> ViewSelector<'a> {
     }
 
     fn shortlist(&self, picks: &Picks) -> Vec<usize> {
-        let standing = self.after(&picks.order);
-        let mut scratch = standing.scratch();
+        let design = self.after(&picks.order);
+        let mut scratch = design.scratch();
         let left = (0..self.candidates.len()).filter(|k| !picks.order.contains(k));
         let mut gains: Vec<(f64, usize)> =
-            left.map(|k| (standing.gain(&self.whitened_views[k], &mut scratch), k)).collect();
+            left.map(|k| (design.gain(&self.whitened_views[k], &mut scratch), k)).collect();
         gains.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
         gains.into_iter().take(SHORTLIST).map(|(_, k)| k).collect()
     }
@@ -192,12 +188,12 @@ impl<'a> ViewSelector<'a> {
     fn exchange(&self, picks: &Picks, place: usize, shortlist: &[usize]) -> Option<Picks> {
         let out = picks.order[place];
         let rest = picks.without(place);
-        let standing = self.after(&rest.order);
-        let mut scratch = standing.scratch();
+        let design = self.after(&rest.order);
+        let mut scratch = design.scratch();
         let way_s = self.time_s(&rest) + self.view_s;
         let mut worth = |k: usize| {
             let (at, cost_s) = self.tour.insertion(&rest.placed, &self.candidates[k].angles);
-            let gain = standing.gain(&self.whitened_views[k], &mut scratch);
+            let gain = design.gain(&self.whitened_views[k], &mut scratch);
             (gain - TIME_POWER * (way_s + cost_s).max(1e-9).ln(), at)
         };
         let (now, _) = worth(out);
@@ -223,13 +219,13 @@ impl<'a> ViewSelector<'a> {
     /// The same as [`Self::greedy`] with every gain renewed in every turn.
     #[cfg(test)]
     pub(crate) fn eager(&self, n: usize) -> Vec<usize> {
-        let mut standing = self.standing.clone();
-        let mut scratch = standing.scratch();
+        let mut design = self.design.clone();
+        let mut scratch = design.scratch();
         let mut picks = Picks::default();
         for _ in 0..n {
             let worth = |k: usize, scratch: &mut Scratch| {
                 let (at, cost_s) = self.tour.insertion(&picks.placed, &self.candidates[k].angles);
-                let gain = standing.gain(&self.whitened_views[k], scratch);
+                let gain = design.gain(&self.whitened_views[k], scratch);
                 (gain / (self.view_s + cost_s).powf(TIME_POWER), at)
             };
             let left = (0..self.candidates.len()).filter(|k| !picks.order.contains(k));
@@ -240,7 +236,7 @@ impl<'a> ViewSelector<'a> {
                 })
                 .collect();
             let Some(&(_, k, at)) = all.iter().max_by(|a, b| a.0.total_cmp(&b.0)) else { break };
-            standing.take(&self.whitened_views[k], &mut scratch);
+            design.take(&self.whitened_views[k], &mut scratch);
             picks.insert(at, k, self.candidates[k].angles);
         }
         picks.order
@@ -254,13 +250,13 @@ impl<'a> ViewSelector<'a> {
 
     /// The first `n` of `chosen` to visit: each time that of the highest gain for its time from where the arm then is.
     pub(crate) fn most_informative_first(&self, chosen: &[usize], n: usize) -> Vec<usize> {
-        let mut standing = self.standing.clone();
-        let mut scratch = standing.scratch();
+        let mut design = self.design.clone();
+        let mut scratch = design.scratch();
         let (mut first, mut at): (Vec<usize>, JointAngles) = (Vec::new(), self.tour.start);
         for _ in 0..n.min(chosen.len()) {
             let worth = |k: usize, scratch: &mut Scratch| {
                 let way_s = self.tour.timing.least_duration_s(&at, &self.candidates[k].angles);
-                standing.gain(&self.whitened_views[k], scratch) / (self.view_s + way_s)
+                design.gain(&self.whitened_views[k], scratch) / (self.view_s + way_s)
             };
             let mut best: Option<(f64, usize)> = None;
             for &k in chosen.iter().filter(|k| !first.contains(*k)) {
@@ -270,7 +266,7 @@ impl<'a> ViewSelector<'a> {
                 }
             }
             let Some((_, k)) = best else { break };
-            standing.take(&self.whitened_views[k], &mut scratch);
+            design.take(&self.whitened_views[k], &mut scratch);
             at = self.candidates[k].angles;
             first.push(k);
         }

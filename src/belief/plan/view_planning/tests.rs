@@ -348,7 +348,7 @@ fn the_predicted_tool_error_is_what_bundle_finds() {
             let plan = site.plan(seed, choose, 200).expect("a plan");
             let mut rng = stream_rng(seed, "truth");
             let truth = Truth::draw(&robot, &scales, &mut rng);
-            let views = truth.views(&robot, &clearance, &plan, &scales, &mut rng);
+            let views = truth.views(&clearance, &plan, &scales, &mut rng);
             let input = BundleInput {
                 robot: &robot,
                 views: &views,

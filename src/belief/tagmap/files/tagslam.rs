@@ -165,9 +165,13 @@ fn add_body(file: &Path, out: &mut TagFile, name: &str, raw: &BodyYaml, noise: (
     }
     match (raw.kind.as_deref().unwrap_or("simple"), &raw.board, &raw.staggered_board) {
         ("simple", ..) => Ok(()),
-        ("board", Some(board), _) => add_board(file, out, body, &key("board"), board, Rows::Full),
+        ("board", Some(board), _) => {
+            out.tags.extend(board_tags(file, body, &key("board"), board, Rows::Full)?);
+            Ok(())
+        }
         ("staggered_board", _, Some(board)) => {
-            add_board(file, out, body, &key("staggered_board"), board, Rows::Staggered)
+            out.tags.extend(board_tags(file, body, &key("staggered_board"), board, Rows::Staggered)?);
+            Ok(())
         }
         ("board" | "staggered_board", ..) => Err(FileIssue::new(file, key("board"), "is missing").into()),
         (other, ..) => {
@@ -185,14 +189,7 @@ enum Rows {
     Staggered,
 }
 
-fn add_board(
-    file: &Path,
-    out: &mut TagFile,
-    body: usize,
-    key: &str,
-    raw: &BoardYaml,
-    rows: Rows,
-) -> Result<(), RobotError> {
+fn board_tags(file: &Path, body: usize, key: &str, raw: &BoardYaml, rows: Rows) -> Result<Vec<TagPrior>, RobotError> {
     FileIssue::check_range(file, &format!("{key}.tag_size"), raw.tag_size, SIZE_RANGE_M)?;
     FileIssue::check_range(file, &format!("{key}.tag_spacing"), raw.tag_spacing, 0.0..=1000.0)?;
     for (name, n) in [("tag_rows", raw.tag_rows), ("tag_columns", raw.tag_columns)] {
@@ -206,6 +203,7 @@ fn add_board(
     let (position, rotation) = (raw.tag_position_noise, raw.tag_rotation_noise);
     let std = (position + rotation > 0.0).then_some([position, position, position, rotation, rotation, rotation]);
     let mut id = raw.tag_start_id;
+    let mut tags = Vec::new();
     for row in 0..raw.tag_rows {
         let (first, step, up) = match rows {
             Rows::Full => (0, 1, 1.0),
@@ -214,11 +212,11 @@ fn add_board(
         for column in (first..raw.tag_columns).step_by(step) {
             let center = Translation3::new(f64::from(column) * step_m, up * f64::from(row) * step_m, 0.0);
             let pose = board.inverse() * Isometry3::from_parts(center, UnitQuaternion::identity());
-            out.tags.push(TagPrior { id, size_m: raw.tag_size, body, pose: Some(pose), std });
+            tags.push(TagPrior { id, size_m: raw.tag_size, body, pose: Some(pose), std });
             id = id.saturating_add(1);
         }
     }
-    Ok(())
+    Ok(tags)
 }
 
 /// Seconds with a fraction, kept to the nanosecond.

@@ -210,7 +210,7 @@ fn what_is_wrong_with_a_camera_is_said_with_file_key_and_what_is_supported() {
     assert!(parse_cameras(Path::new("c.yaml"), "{}").unwrap_err().to_string().contains("no camera"));
 }
 
-fn group(frame: &str, is_static: bool, ids: [u32; 2]) -> WrittenGroup {
+fn group(frame: &str, ids: [u32; 2]) -> WrittenGroup {
     let tag = |id: u32| {
         let turn = UnitQuaternion::from_scaled_axis(Vector3::new(0.3, -1.2, 0.1 * f64::from(id)));
         let pose = Isometry3::from_parts(Translation3::new(0.1, -0.2, f64::from(id) / 3.0), turn);
@@ -218,12 +218,12 @@ fn group(frame: &str, is_static: bool, ids: [u32; 2]) -> WrittenGroup {
         let covariance = Matrix6::from_diagonal(&std.map(|s: f64| s * s).into());
         Written { id, size_m: 0.16, pose, position_std_m: [1e-3, 2e-3, 3e-3], covariance }
     };
-    WrittenGroup { frame: frame.to_owned(), is_static, tags: ids.map(tag).to_vec() }
+    WrittenGroup { frame: frame.to_owned(), is_static: true, tags: ids.map(tag).to_vec() }
 }
 
 #[test]
 fn maps_that_are_written_read_back_the_same() {
-    let groups = [group("base_link", true, [2, 5]), group("seafloor", false, [11, 12])];
+    let groups = [group("base_link", [2, 5]), WrittenGroup { is_static: false, ..group("seafloor", [11, 12]) }];
     for (name, text) in [("map.toml", own::to_text(&groups)), ("map.yaml", tagslam::to_text(&groups))] {
         let file = tags(name, &text);
         assert_eq!(file.frame, "base_link", "{name}");

@@ -62,7 +62,7 @@ fn dive(seed: u64) -> Dive {
         |id: u32, body: usize, pose: Option<Isometry3<f64>>| TagPrior { id, size_m: 0.15, body, pose, std: None };
     let mut priors: Vec<TagPrior> = (0..4).map(|id| prior(id, 0, (id == 0).then(Isometry3::identity))).collect();
     priors.extend((10..14).map(|id| prior(id, 1, None)));
-    let bodies = vec![body("vehicle", false), body("seafloor", true)];
+    let bodies = vec![Body { is_static: false, ..body("vehicle") }, body("seafloor")];
     let floor: Vec<_> = on_floor.iter().map(|pose| on_floor[0].inv_mul(pose)).collect();
     let relative = relative.iter().map(|pose| pose * on_floor[0]).collect();
     let scene = Scene { cameras: vec![camera], bodies, priors, truth: on_vehicle, views, cameras_at };

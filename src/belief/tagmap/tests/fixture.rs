@@ -32,8 +32,8 @@ pub(super) fn settings() -> MapSettings {
     MapSettings { base_tag: Some(0), noise: NoiseScale::Given, ..MapSettings::default() }
 }
 
-pub(super) fn body(name: &str, is_static: bool) -> Body {
-    Body { name: name.to_owned(), is_static, pose: None }
+pub(super) fn body(name: &str) -> Body {
+    Body { name: name.to_owned(), is_static: true, pose: None }
 }
 
 /// A pose whose z axis points from `at` to `target`, turned about it.
@@ -111,14 +111,7 @@ pub(super) fn wall(camera: CameraModel, n_tags: u32, n_views: usize, noise_px: f
         pose: (*id == 0).then_some(*pose),
         std: None,
     });
-    Scene {
-        cameras: vec![camera],
-        bodies: vec![body("base", true)],
-        priors: priors.collect(),
-        truth,
-        views,
-        cameras_at,
-    }
+    Scene { cameras: vec![camera], bodies: vec![body("base")], priors: priors.collect(), truth, views, cameras_at }
 }
 
 pub(super) fn size_of(id: u32) -> f64 {

@@ -114,7 +114,7 @@ fn tags_seen_head_on_do_not_end_up_mirrored() {
             std: None,
         };
         let priors = tags.iter().map(prior).collect();
-        let scene = Scene { cameras: vec![camera], bodies: vec![body("base", true)], priors, truth, views, cameras_at };
+        let scene = Scene { cameras: vec![camera], bodies: vec![body("base")], priors, truth, views, cameras_at };
         let map = solve(&scene.input(), &settings()).unwrap();
         assert_eq!(map.tags.len(), 6);
         let reduced = map.chi_square / map.degrees_of_freedom as f64;

@@ -1,4 +1,4 @@
-//! Unpacks chunks and the summary with mcap's decompressors and checksums.
+//! Chunks and summary, unpacked and verified by mcap's decompressors and checksums.
 
 use mcap::McapResult;
 use mcap::records::op;
@@ -6,17 +6,17 @@ use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
 use super::record::ChunkHead;
 
-/// Chunks unpack to no more than this, whatever they claim.
+/// Limit of a chunk's unpacked size, whatever the chunk states.
 const MAX_CHUNK_BYTES: u64 = 1 << 30;
-/// Every chunk may unpack to this much, zeros compress to almost nothing.
+/// Unpacked size that every chunk may have: zeros compress to almost nothing.
 const ALWAYS_ALLOWED_BYTES: u64 = 1 << 26;
-/// The largest compression ratio beyond that; recordings reach 10.
+/// Largest compression ratio beyond that; recordings reach 10.
 const MAX_RATIO: u64 = 256;
 /// The largest record within a cut chunk.
 const MAX_CUT_RECORD_BYTES: usize = 1 << 26;
 
-/// Hands the records of a whole chunk to `visit` after its checksum is verified (where it has one). `bytes` is the record
-/// from its opcode on, with a consistent `head`.
+/// Passes the records of a whole chunk to `visit` after its checksum is verified (where it has one). `bytes` is the
+/// record from its opcode on, with a consistent `head`.
 pub fn for_each_record(bytes: &[u8], head: &ChunkHead, visit: impl FnMut(u8, &[u8])) -> McapResult<()> {
     let limit = head.compressed_bytes.saturating_mul(MAX_RATIO).saturating_add(ALWAYS_ALLOWED_BYTES);
     let limit = limit.min(MAX_CHUNK_BYTES).max(head.compressed_bytes);
@@ -29,8 +29,8 @@ pub fn for_each_record(bytes: &[u8], head: &ChunkHead, visit: impl FnMut(u8, &[u
     drive(options, bytes, visit)
 }
 
-/// Hands the whole records of a chunk that is cut off to `visit`, unverified. `bytes` runs from the chunk's opcode to the
-/// end of the file.
+/// Passes the whole records of a cut chunk to `visit`, unverified. `bytes` runs from the chunk's opcode to the end of
+/// the file.
 pub fn for_each_record_of_cut(bytes: &[u8], head: &ChunkHead, visit: impl FnMut(u8, &[u8])) {
     let compressed = &bytes[head.head_bytes..];
     // A new head: lengths as found, the unpacked size open, no checksum.
@@ -44,7 +44,7 @@ pub fn for_each_record_of_cut(bytes: &[u8], head: &ChunkHead, visit: impl FnMut(
     chunk.extend_from_slice(head.compression.as_bytes());
     chunk.extend_from_slice(&(compressed.len() as u64).to_le_bytes());
     chunk.extend_from_slice(compressed);
-    // The error is where the cut is.
+    // The error comes from the cut.
     let _ = drive(options().with_record_length_limit(MAX_CUT_RECORD_BYTES), &chunk, visit);
 }
 

@@ -1,4 +1,4 @@
-//! What a file holds besides messages.
+//! Contents of a file other than messages.
 
 use std::collections::BTreeMap;
 
@@ -6,10 +6,10 @@ use mcap::records::op;
 
 use super::record::{ChunkHead, Fields};
 
-/// Bytes of a header, metadata or attachment record that are looked at.
+/// Bytes read of a header, metadata or attachment record.
 pub const MAX_HEAD_BYTES: u64 = 1 << 20;
 
-/// How many bytes lie in chunks of one compression.
+/// Number and bytes of the chunks of one compression.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ChunkTotals {
     pub chunks: u64,
@@ -23,11 +23,11 @@ pub struct AttachmentInfo {
     pub name: String,
     pub media_type: String,
     pub bytes: u64,
-    /// The record's fields: where they begin in the file, and their length.
+    /// Start in the file and length of the record's fields.
     pub(in crate::log) record: (u64, u64),
 }
 
-/// What a file holds besides messages, as far as it can be read.
+/// Contents of a file other than messages, as far as they can be read.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct FileContents {
     /// Length of the file, bytes.
@@ -50,8 +50,8 @@ impl FileContents {
         totals.uncompressed_bytes += head.uncompressed_bytes;
     }
 
-    /// Takes a header, metadata or attachment record, of whose `record` fields `body` is the beginning; `None` if it is
-    /// malformed.
+    /// Adds a header, metadata or attachment record. `body` is the beginning of its fields, `record` their place. `None`
+    /// if it is malformed.
     pub(super) fn take(&mut self, opcode: u8, body: &[u8], record: (u64, u64)) -> Option<()> {
         let mut fields = Fields(body);
         match opcode {

@@ -1,9 +1,9 @@
-//! The few MCAP records that messages need, parsed with a check on every length.
+//! MCAP records that messages need, with a check on every length.
 
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
-use super::{Channel, RawMessage, Schema};
+use super::message::{Channel, RawMessage, Schema};
 
 /// Bytes at both ends of the file.
 pub const MAGIC: &[u8] = mcap::MAGIC;
@@ -29,7 +29,7 @@ impl Prefix {
     }
 }
 
-/// Reads little-endian fields one after the other; `None` at the end of the bytes.
+/// Little-endian fields, read in turn; `None` at the end of the bytes.
 pub struct Fields<'a>(pub &'a [u8]);
 
 impl<'a> Fields<'a> {
@@ -61,7 +61,7 @@ impl<'a> Fields<'a> {
         self.array().map(u64::from_le_bytes)
     }
 
-    /// Bytes behind a length of four bytes.
+    /// Bytes after a length of four bytes.
     fn blob(&mut self) -> Option<&'a [u8]> {
         let len = self.u32()?;
         self.take(usize::try_from(len).ok()?)
@@ -71,7 +71,7 @@ impl<'a> Fields<'a> {
         self.blob().and_then(|bytes| std::str::from_utf8(bytes).ok()).map(str::to_owned)
     }
 
-    /// Pairs of texts behind a length of four bytes.
+    /// Pairs of texts after a length of four bytes.
     pub fn pairs(&mut self) -> Option<BTreeMap<String, String>> {
         let mut fields = Fields(self.blob()?);
         let mut pairs = BTreeMap::new();
@@ -95,12 +95,12 @@ pub struct ChunkHead {
 }
 
 impl ChunkHead {
-    /// From the chunk's opcode on; `None` where this is not the whole head of a chunk of a known compression.
+    /// Parses bytes from the chunk's opcode on; `None` unless they hold the whole head of a chunk of a known compression.
     pub fn parse(bytes: &[u8]) -> Option<Self> {
         Self::parse_body(bytes).filter(|_| bytes[0] == mcap::records::op::CHUNK)
     }
 
-    /// The same whatever the opcode.
+    /// The same with any opcode.
     pub fn parse_body(bytes: &[u8]) -> Option<Self> {
         let prefix = Prefix::parse(bytes)?;
         let mut fields = Fields(&bytes[PREFIX_BYTES..]);
@@ -118,8 +118,8 @@ impl ChunkHead {
         Some(Self { record_len: prefix.len, uncompressed_bytes, compression, compressed_bytes, head_bytes })
     }
 
-    /// Whether the record's two lengths agree and the record fits into the `available` bytes from its opcode on. By chance,
-    /// 1 of 2^64 places passes.
+    /// Whether the record's two lengths agree and the record fits into the `available` bytes from its opcode on. Random
+    /// bytes pass with probability 2^-64.
     pub fn is_consistent(&self, available: u64) -> bool {
         let body = (self.head_bytes - PREFIX_BYTES) as u64;
         self.compressed_bytes.checked_add(body) == Some(self.record_len)

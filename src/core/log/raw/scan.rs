@@ -1,24 +1,25 @@
-//! Walks through a file record by record, and finds its way again behind damage.
+//! Pass through a file, record by record. After damage it continues at the next chunk.
 
 use std::io::{self, Read, Seek};
 
 use mcap::records::op;
 
 use super::chunk;
+use super::completeness::{Completeness, RawSummary};
 use super::contents::{FileContents, MAX_HEAD_BYTES};
-use super::foreign;
+use super::file_type;
+use super::message::RawMessage;
 use super::record::{
     CHUNK_HEAD_BYTES, ChunkHead, DATA_END_BYTES, FOOTER_BYTES, Fields, MAGIC, PREFIX_BYTES, Prefix, Tables,
     is_message_index,
 };
 use super::window::Window;
-use super::{Completeness, RawMessage, RawSummary};
 
-/// Bytes looked through at once for the next chunk.
+/// Bytes searched at once for the next chunk.
 const SEARCH_BYTES: u64 = 1 << 18;
-/// A summary or a cut chunk longer than this is not looked at: memory for it is bounded by nothing else.
+/// Longest summary or cut chunk that is read; nothing else bounds the memory for it.
 const MAX_UNCHECKED_BYTES: u64 = 1 << 28;
-/// Prefix and fields of the last record, and the magic behind it.
+/// Prefix and fields of the last record, and the magic after it.
 const TAIL_BYTES: u64 = PREFIX_BYTES as u64 + FOOTER_BYTES + MAGIC.len() as u64;
 
 /// Why nothing of a file can be read.
@@ -35,16 +36,16 @@ impl From<io::Error> for ScanError {
     }
 }
 
-/// Where the walk goes on after a record.
+/// Place where the pass continues after a record.
 enum Next {
     At(u64),
     /// Nothing more can be read.
-    Over,
+    End,
 }
 
 #[derive(Default)]
 struct Damage {
-    /// The first of all.
+    /// Of the first damage.
     reason: Option<String>,
     chunks: u64,
     bytes: u64,
@@ -71,11 +72,11 @@ struct Scan<R, F> {
     contents: FileContents,
     /// Whether chunks are only counted.
     skips_chunks: bool,
-    /// Behind the last chunk, or the start: here the walk was surely at a record's begin.
+    /// End of the last chunk, or of the opening magic: surely the beginning of a record.
     verified_end: u64,
 }
 
-/// Hands every readable message of `source` to `visit`.
+/// Passes every readable message of `source` to `visit`.
 pub fn scan<R: Read + Seek>(source: R, visit: impl FnMut(&RawMessage<'_>)) -> Result<RawSummary, ScanError> {
     let mut scan = begin(source, visit)?;
     scan.read_summary()?;
@@ -84,7 +85,7 @@ pub fn scan<R: Read + Seek>(source: R, visit: impl FnMut(&RawMessage<'_>)) -> Re
     Ok(RawSummary { readable_messages: scan.readable, completeness: scan.completeness(), contents })
 }
 
-/// What `source` holds besides messages; its chunks are not read.
+/// Contents of `source` other than messages; its chunks are not read.
 pub fn scan_contents<R: Read + Seek>(source: R) -> Result<FileContents, ScanError> {
     let mut scan = begin(source, |_| {})?;
     scan.skips_chunks = true;
@@ -95,12 +96,12 @@ pub fn scan_contents<R: Read + Seek>(source: R) -> Result<FileContents, ScanErro
 fn begin<R: Read + Seek, F: FnMut(&RawMessage<'_>)>(source: R, visit: F) -> Result<Scan<R, F>, ScanError> {
     let mut window = Window::new(source)?;
     let bytes = window.len();
-    let start = window.bytes(0, bytes.min(foreign::START_BYTES as u64) as usize)?;
+    let start = window.bytes(0, bytes.min(file_type::START_BYTES as u64) as usize)?;
     if start.is_empty() {
         return Err(ScanError::Empty);
     }
     if !start.starts_with(MAGIC) {
-        return Err(ScanError::NotMcap { found: foreign::describe(start) });
+        return Err(ScanError::NotMcap { found: file_type::describe(start) });
     }
     Ok(Scan {
         window,
@@ -120,8 +121,8 @@ fn begin<R: Read + Seek, F: FnMut(&RawMessage<'_>)>(source: R, visit: F) -> Resu
 }
 
 impl<R: Read + Seek, F: FnMut(&RawMessage<'_>)> Scan<R, F> {
-    /// Takes channels and the count of messages from the end of a finished file, so that a damaged chunk that declared
-    /// channels does not take the messages of all others with it.
+    /// Reads channels and the count of messages from the end of a finished file. Thus a damaged chunk that declared
+    /// channels does not make the messages of other chunks unreadable.
     fn read_summary(&mut self) -> io::Result<()> {
         let len = self.window.len();
         if len < MAGIC.len() as u64 + TAIL_BYTES {
@@ -136,12 +137,12 @@ impl<R: Read + Seek, F: FnMut(&RawMessage<'_>)> Scan<R, F> {
         }
         let summary_start = Fields(&tail[PREFIX_BYTES..]).u64().unwrap_or(0);
         if summary_start == 0 {
-            return Ok(()); // A writer may leave the summary out.
+            return Ok(()); // A writer may omit the summary.
         }
         let end = len - MAGIC.len() as u64;
         let start = summary_start.checked_sub(PREFIX_BYTES as u64 + DATA_END_BYTES);
         let Some(start) = start.filter(|&start| start < end) else {
-            self.damage.note(len - TAIL_BYTES, "the footer points nowhere");
+            self.damage.note(len - TAIL_BYTES, "the footer points outside the file");
             return Ok(());
         };
         if end - start > MAX_UNCHECKED_BYTES {
@@ -206,7 +207,7 @@ impl<R: Read + Seek, F: FnMut(&RawMessage<'_>)> Scan<R, F> {
             op::HEADER | op::ATTACHMENT | op::METADATA => {
                 let (at, len) = (at + PREFIX_BYTES as u64, prefix.len);
                 let body = self.window.bytes(at, len.min(MAX_HEAD_BYTES) as usize)?;
-                // Malformed ones are left out: belief never reads them.
+                // Malformed ones are skipped: belief never reads them.
                 let _ = self.contents.take(prefix.opcode, body, (at, len));
             }
             _ => {}
@@ -214,8 +215,8 @@ impl<R: Read + Seek, F: FnMut(&RawMessage<'_>)> Scan<R, F> {
         Ok(Next::At(at + PREFIX_BYTES as u64 + prefix.len))
     }
 
-    /// Why a record cannot be what its opcode says: an opcode has no checksum, and a changed one must not hide a record
-    /// or make messages of something else.
+    /// Why a record contradicts its opcode. An opcode has no checksum; a changed one must neither hide a record nor turn
+    /// another record into a message.
     fn contradiction(&mut self, at: u64, prefix: Prefix) -> io::Result<Option<&'static str>> {
         let left = self.window.len() - at;
         let start = self.window.bytes(at, left.min(CHUNK_HEAD_BYTES as u64) as usize)?;
@@ -228,7 +229,7 @@ impl<R: Read + Seek, F: FnMut(&RawMessage<'_>)> Scan<R, F> {
             opcode if is_first && opcode != op::HEADER => Some("the first record is no header"),
             op::DATA_END if prefix.len != DATA_END_BYTES => Some("the data end has a wrong length"),
             op::MESSAGE_INDEX if !is_index => Some("a message index has a wrong length"),
-            op::MESSAGE if self.is_past_data => Some("a message lies behind the data"),
+            op::MESSAGE if self.is_past_data => Some("a message lies after the end of the data"),
             op::MESSAGE if self.has_chunks && is_index => Some("a message index has another opcode"),
             _ => None,
         })
@@ -252,9 +253,9 @@ impl<R: Read + Seek, F: FnMut(&RawMessage<'_>)> Scan<R, F> {
             return self.broken(at, Some(prefix.opcode), "the file ends within the closing bytes");
         }
         if !self.ends_with_magic {
-            self.damage.note(at, "the closing bytes behind the footer are wrong");
+            self.damage.note(at, "the closing bytes after the footer are wrong");
         }
-        Ok(Next::Over)
+        Ok(Next::End)
     }
 
     fn chunk(&mut self, at: u64, left: u64) -> io::Result<Next> {
@@ -290,10 +291,10 @@ impl<R: Read + Seek, F: FnMut(&RawMessage<'_>)> Scan<R, F> {
         Ok(Next::At(at + record_bytes))
     }
 
-    /// Goes on at the next chunk behind a record that cannot be; without one, this is the end.
+    /// Continues at the next chunk after an impossible record; without one, the pass ends.
     fn broken(&mut self, at: u64, opcode: Option<u8>, what: &str) -> io::Result<Next> {
         let is_chunk = opcode == Some(op::CHUNK);
-        // Not from here: a wrong length before may have led astray, past chunks. A broken chunk is no candidate.
+        // Not from `at`: a wrong length before it may have skipped chunks. A broken chunk is no candidate.
         if let Some(next) = self.find_chunk(self.verified_end)? {
             self.damage.note(at, what);
             self.damage.chunks += u64::from(is_chunk);
@@ -304,16 +305,16 @@ impl<R: Read + Seek, F: FnMut(&RawMessage<'_>)> Scan<R, F> {
             self.damage.note(at, what);
             self.damage.chunks += u64::from(is_chunk);
             self.damage.bytes += self.window.len() - at;
-            return Ok(Next::Over);
+            return Ok(Next::End);
         }
         self.cut = Some(format!("at byte {at} of {}: {what}", self.window.len()));
         if is_chunk {
             self.salvage(at)?;
         }
-        Ok(Next::Over)
+        Ok(Next::End)
     }
 
-    /// Takes the messages from the beginning of a cut chunk.
+    /// Reads the messages at the beginning of a cut chunk.
     fn salvage(&mut self, at: u64) -> io::Result<()> {
         if self.skips_chunks {
             return Ok(());
@@ -330,7 +331,7 @@ impl<R: Read + Seek, F: FnMut(&RawMessage<'_>)> Scan<R, F> {
         Ok(())
     }
 
-    /// The first place from `from` on where a whole chunk may begin.
+    /// The first place at or after `from` where a whole chunk may begin.
     fn find_chunk(&mut self, from: u64) -> io::Result<Option<u64>> {
         let overlap = CHUNK_HEAD_BYTES as u64 - 1;
         let mut at = from;
@@ -355,7 +356,7 @@ impl<R: Read + Seek, F: FnMut(&RawMessage<'_>)> Scan<R, F> {
         let missing = self.counted.map(|counted| counted.saturating_sub(self.readable));
         let miscounted = missing
             .filter(|&missing| missing > 0)
-            .map(|missing| format!("{missing} messages that the summary counts are missing"));
+            .map(|missing| format!("{missing} messages counted in the summary are missing"));
         let readable_messages = self.readable;
         match (self.damage.reason.or(miscounted), self.cut) {
             (Some(reason), cut) => Completeness::Damaged {
@@ -371,7 +372,7 @@ impl<R: Read + Seek, F: FnMut(&RawMessage<'_>)> Scan<R, F> {
     }
 }
 
-/// Takes one schema, channel or message record; `None` if it cannot be used. Others are passed over.
+/// Processes one schema, channel or message record; `None` if it cannot be used. Others are skipped.
 fn deliver(
     tables: &mut Tables,
     visit: &mut impl FnMut(&RawMessage<'_>),

@@ -1,11 +1,12 @@
-//! Cuts, flipped bits and foreign files.
+//! Cuts, flipped bits and files of other types.
 
+use std::collections::BTreeMap;
 use std::io::Cursor;
 use std::path::Path;
 
 use super::scan::{ScanError, scan};
 use super::*;
-use crate::log::samples;
+use crate::log::{LogError, samples};
 
 const PER_CHUNK: usize = 60;
 

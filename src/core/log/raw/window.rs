@@ -1,11 +1,11 @@
-//! Access to any range of a file through one buffer.
+//! Buffered access to any range of a file.
 
 use std::io::{Error, ErrorKind, Read, Result, Seek, SeekFrom};
 
 /// Bytes read at once when less is asked for.
 const READ_AHEAD_BYTES: usize = 1 << 18;
 
-/// A file of fixed length, of which one range is in memory. What is appended after opening is not seen.
+/// A file of fixed length with one range in memory. Bytes appended after opening are not seen.
 pub struct Window<R> {
     source: R,
     len: u64,
@@ -24,7 +24,7 @@ impl<R: Read + Seek> Window<R> {
         self.len
     }
 
-    /// `len` bytes from `at`, which must lie within the file: memory is taken for no more than the file has.
+    /// `len` bytes from `at`, which must lie within the file: no more memory is allocated than the file has bytes.
     pub fn bytes(&mut self, at: u64, len: usize) -> Result<&[u8]> {
         let end = at.checked_add(len as u64).filter(|&end| end <= self.len);
         let end = end.ok_or_else(|| Error::new(ErrorKind::UnexpectedEof, "range exceeds the file"))?;

@@ -27,7 +27,7 @@ fn recording(robot: &Robot, messages: Vec<Message>) -> Recording {
         unknown_topics: Default::default(),
         rejected: Default::default(),
         non_monotonic: 0,
-        disorder: Default::default(),
+        stamp_regressions: Default::default(),
     }
 }
 

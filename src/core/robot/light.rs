@@ -1,4 +1,4 @@
-//! `[[light]]` of a vehicle's file: lamps for the cameras.
+//! `[[light]]` of a vehicle's file.
 
 use std::path::Path;
 
@@ -8,14 +8,14 @@ use serde::{Deserialize, Serialize};
 use super::error::FileIssue;
 use super::part::check_place;
 
-/// A white lamp on a vehicle, in the vehicle's frame.
+/// A white light on a vehicle, in the vehicle's frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct VehicleLight {
     pub name: String,
     pub position_m: Point3<f64>,
     pub direction: Unit<Vector3<f64>>,
     pub flux_lm: f64,
-    /// From the beam's axis to where it has half its intensity.
+    /// Angle from the beam's axis to half of its intensity.
     pub half_angle_rad: f64,
 }
 
@@ -30,7 +30,7 @@ pub(super) struct LightFile {
 }
 
 impl LightFile {
-    /// The `n`th of the list, checked.
+    /// Checks the light, number `n` of the list.
     ///
     /// # Errors
     /// [`FileIssue`] naming file, key and allowed range.

@@ -1,15 +1,15 @@
-//! What a file is that is no MCAP recording, and what to do with it.
+//! Type of a file that is not an MCAP recording, with advice for the user.
 
 use super::record::MAGIC;
 
-/// Bytes of the file's beginning that tell.
+/// Bytes of the file's beginning that are compared.
 pub const START_BYTES: usize = 512;
 
 const UNPACK: &str = "unpack it first";
 const CONVERT: &str = "convert it, for example with `mcap convert IN OUT.mcap`";
 const NO_RECORDING: &str = "name the .mcap recording";
 
-/// First bytes, what begins with them, what to do.
+/// First bytes, type and advice.
 const KINDS: [(&[u8], &str, &str); 20] = [
     (b"#ROSBAG V", "a ROS 1 bag", CONVERT),
     (b"SQLite format 3\0", "an SQLite database, as ROS 2 bags in .db3 files are", CONVERT),
@@ -33,16 +33,16 @@ const KINDS: [(&[u8], &str, &str); 20] = [
     (b"version https://git-lfs", "a pointer of Git LFS, not the recording itself", "fetch it with `git lfs pull`"),
 ];
 
-/// What a file is that begins with `start`, which is not empty and not the beginning of a recording.
+/// Type of a file that begins with `start`, which is not empty and not the beginning of a recording.
 pub fn describe(start: &[u8]) -> String {
     if MAGIC.starts_with(start) {
-        return format!("it holds the first {} bytes of one and nothing else", start.len());
+        return format!("it holds only the first {} bytes of one", start.len());
     }
     if let Some((_, what, advice)) = KINDS.iter().find(|(magic, ..)| start.starts_with(magic)) {
         return format!("it is {what}; {advice}");
     }
     if start.iter().all(|byte| *byte == 0) {
-        return "it holds zeros: it was never written, or copied in part".to_owned();
+        return "it holds zeros: it was never written, or was copied in part".to_owned();
     }
     if let Some(what) = text_kind(start) {
         return format!("it is {what}; {NO_RECORDING}");
@@ -51,7 +51,7 @@ pub fn describe(start: &[u8]) -> String {
     format!("it begins with the bytes {}, not with {}", hex(&start[..start.len().min(MAGIC.len())]), hex(MAGIC))
 }
 
-/// Which text it is; `None` if it is none.
+/// Type of a text file; `None` if it is not text.
 fn text_kind(start: &[u8]) -> Option<&'static str> {
     let text = match std::str::from_utf8(start) {
         Ok(text) => text,

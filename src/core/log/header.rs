@@ -1,0 +1,30 @@
+//! Joint and frame names of a recording.
+
+/// What every message of a recording shares. It is written into the messages, not beside them.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RecordingHeader {
+    /// In the order of the chain, base first.
+    pub joint_names: Vec<String>,
+    /// `frame_id` of the task.
+    pub base_frame: String,
+    /// `frame_id` of the detections.
+    pub camera_frame: String,
+    /// `frame_id` of temperatures, pressure and attitude.
+    pub vehicle_frame: String,
+    /// AprilTag family of the detections.
+    pub tag_family: String,
+}
+
+impl RecordingHeader {
+    /// The joints, with frames `base_link`, `camera_wrist`, `vehicle` and tags of tag36h11.
+    #[must_use]
+    pub fn new(joint_names: Vec<String>) -> Self {
+        Self {
+            joint_names,
+            base_frame: "base_link".into(),
+            camera_frame: "camera_wrist".into(),
+            vehicle_frame: "vehicle".into(),
+            tag_family: "tag36h11".into(),
+        }
+    }
+}

@@ -1,0 +1,33 @@
+//! The messages of a recording: one file per kind with its ROS types, their schema, encoder and decoder.
+//!
+//! A field stands where the ROS definition has it. `to_ros` and `from_ros` convert between these types and `streams`;
+//! every number that `from_ros` gives back is finite. The table `topics::Stream` names them for each topic.
+
+pub(super) mod attitude;
+mod basic;
+mod checks;
+pub(super) mod detections;
+pub(super) mod images;
+pub(super) mod joints;
+pub(super) mod log_line;
+pub(super) mod marks;
+pub(super) mod pressure;
+pub(super) mod rejects;
+pub(super) mod survey;
+pub(super) mod task;
+pub(super) mod temperatures;
+mod viewers;
+
+pub use attitude::Imu;
+pub use basic::{Header, PixelPoint, Point, Pose, Quaternion, Time, Transform, Vector3};
+pub use detections::{AprilTagDetection, AprilTagDetectionArray};
+pub use images::CompressedImage;
+pub use joints::JointState;
+pub use log_line::Log;
+pub use marks::Mark;
+pub use pressure::FluidPressure;
+pub use rejects::{DetectionReject, DetectionRejects};
+pub use survey::{SurveyedTag, TagSurvey};
+pub use task::ReachTask;
+pub use temperatures::Temperature;
+pub use viewers::{CameraInfo, PoseStamped, RegionOfInterest, StringMessage, TfMessage, TransformStamped};

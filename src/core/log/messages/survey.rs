@@ -1,0 +1,131 @@
+//! Surveyed tags.
+
+use std::collections::BTreeSet;
+
+use serde::{Deserialize, Serialize};
+
+use super::basic::{Header, Pose, Quaternion};
+use super::checks::{finite, unit_quaternion_wxyz};
+use crate::log::error::{DecodeRejection, EncodeError};
+use crate::log::header::RecordingHeader;
+use crate::log::schema::{RosMessage, RosSchema};
+use crate::streams::{RecordedSurvey, RecordedTag};
+
+/// armcal_msgs/msg/SurveyedTag: `pose` in the frame of the survey's header, m; one sigma per axis.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct SurveyedTag {
+    pub id: u32,
+    pub size_m: f64,
+    pub pose: Pose,
+    pub position_std_m: f64,
+    pub rotation_std_rad: f64,
+}
+
+/// armcal_msgs/msg/TagSurvey: where the tags are.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct TagSurvey {
+    pub header: Header,
+    pub base_tag: u32,
+    pub tags: Vec<SurveyedTag>,
+}
+
+message!(
+    TagSurvey,
+    "armcal_msgs/msg/TagSurvey",
+    "std_msgs/Header header\nuint32 base_tag\narmcal_msgs/SurveyedTag[] tags\n",
+    header!(),
+    dependency!(
+        "armcal_msgs/SurveyedTag",
+        "uint32 id\nfloat64 size_m\ngeometry_msgs/Pose pose\nfloat64 position_std_m\nfloat64 rotation_std_rad\n"
+    ),
+    dependency!("geometry_msgs/Pose", "geometry_msgs/Point position\ngeometry_msgs/Quaternion orientation\n"),
+    point!(),
+    quaternion!(),
+);
+
+pub(in crate::log) fn to_ros(m: &RecordedSurvey, header: &RecordingHeader) -> Result<TagSurvey, EncodeError> {
+    let tag = |tag: &RecordedTag| SurveyedTag {
+        id: tag.id,
+        size_m: tag.size_m,
+        pose: Pose { position: tag.position_m.into(), orientation: Quaternion::from_wxyz(tag.quaternion_wxyz) },
+        position_std_m: tag.position_std_m,
+        rotation_std_rad: tag.rotation_std_rad,
+    };
+    Ok(TagSurvey {
+        header: Header::new(m.stamp, &header.base_frame)?,
+        base_tag: m.base_tag,
+        tags: m.tags.iter().map(tag).collect(),
+    })
+}
+
+/// One unusable tag rejects the whole survey: a wrong pose would bias the others.
+pub(in crate::log) fn from_ros(m: &TagSurvey) -> Result<RecordedSurvey, DecodeRejection> {
+    let tags = m.tags.iter().map(tag_from_ros).collect::<Result<Vec<_>, _>>()?;
+    let ids: BTreeSet<u32> = tags.iter().map(|tag| tag.id).collect();
+    if ids.len() != tags.len() {
+        return Err(DecodeRejection::TagTwice);
+    }
+    if !ids.contains(&m.base_tag) {
+        return Err(DecodeRejection::NoBaseTag);
+    }
+    Ok(RecordedSurvey { stamp: m.header.stamp.try_into()?, base_tag: m.base_tag, tags })
+}
+
+fn tag_from_ros(tag: &SurveyedTag) -> Result<RecordedTag, DecodeRejection> {
+    let position_m = tag.pose.position.into();
+    finite("position", position_m)?;
+    finite("size_m", [tag.size_m])?;
+    // Both are infinite where only the tag's size is known.
+    let is_unknown = tag.position_std_m == f64::INFINITY && tag.rotation_std_rad == f64::INFINITY;
+    if !is_unknown {
+        finite("standard deviation", [tag.position_std_m, tag.rotation_std_rad])?;
+    }
+    if tag.size_m <= 0.0 {
+        return Err(DecodeRejection::TagSize);
+    }
+    if tag.position_std_m < 0.0 || tag.rotation_std_rad < 0.0 {
+        return Err(DecodeRejection::NegativeVariance);
+    }
+    Ok(RecordedTag {
+        id: tag.id,
+        size_m: tag.size_m,
+        position_m,
+        quaternion_wxyz: unit_quaternion_wxyz(&tag.pose.orientation)?,
+        position_std_m: tag.position_std_m,
+        rotation_std_rad: tag.rotation_std_rad,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// As of a tag of which only the size is known.
+    fn forget_pose(tag: &mut SurveyedTag) {
+        (tag.position_std_m, tag.rotation_std_rad) = (f64::INFINITY, f64::INFINITY);
+    }
+
+    fn n_tags(edit: fn(&mut TagSurvey)) -> Result<usize, DecodeRejection> {
+        let mut tag = SurveyedTag { id: 3, size_m: 0.1, ..Default::default() };
+        tag.pose.orientation.w = 1.0;
+        let tags = vec![tag.clone(), SurveyedTag { id: 4, ..tag }];
+        let mut survey = TagSurvey { base_tag: 3, tags, ..Default::default() };
+        edit(&mut survey);
+        from_ros(&survey).map(|m| m.tags.len())
+    }
+
+    #[test]
+    fn survey_with_an_unusable_tag_is_rejected() {
+        assert_eq!(n_tags(|_| ()), Ok(2));
+        assert_eq!(n_tags(|m| m.base_tag = 5), Err(DecodeRejection::NoBaseTag));
+        assert_eq!(n_tags(|m| m.tags[1].id = 3), Err(DecodeRejection::TagTwice));
+        assert_eq!(n_tags(|m| m.tags[1].size_m = 0.0), Err(DecodeRejection::TagSize));
+        assert_eq!(n_tags(|m| m.tags[0].position_std_m = -1.0), Err(DecodeRejection::NegativeVariance));
+        assert_eq!(n_tags(|m| m.tags.iter_mut().for_each(forget_pose)), Ok(2));
+        assert!(n_tags(|m| m.tags[0].position_std_m = f64::INFINITY).is_err(), "half of a pose");
+        assert!(n_tags(|m| m.tags[0].rotation_std_rad = f64::NAN).is_err());
+        assert_eq!(n_tags(|m| m.tags[0].pose.orientation.w = 0.0), Err(DecodeRejection::QuaternionLength));
+        let no_position = n_tags(|m| m.tags[0].pose.position.x = f64::NAN);
+        assert_eq!(no_position, Err(DecodeRejection::NotFinite { field: "position" }));
+    }
+}

@@ -1,0 +1,29 @@
+//! Pairs of links that can come near each other.
+
+/// Pairs of links that come near each other, over all configurations that planning considers.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SelfPairs {
+    /// Seed and number of the random configurations.
+    pub seed: u64,
+    pub n: u64,
+    /// Smallest distance of all other pairs, m.
+    pub near_m: f64,
+    pub pairs: Vec<SelfPair>,
+}
+
+/// Two links that come near each other.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SelfPair {
+    /// Numbers of the bodies, proximal first.
+    pub bodies: [usize; 2],
+    /// Smallest distance found, m; 0: contact.
+    pub nearest_m: f64,
+}
+
+impl SelfPairs {
+    /// Whether two bodies can come nearer than `SelfPairs::near_m`.
+    #[must_use]
+    pub fn has(&self, inner: usize, outer: usize) -> bool {
+        self.pairs.iter().any(|pair| pair.bodies == [inner, outer])
+    }
+}

@@ -1,0 +1,37 @@
+//! `[camera]` of a routine: the origin of the images.
+
+use std::path::Path;
+
+use serde::Deserialize;
+
+use crate::robot::FileIssue;
+
+/// The table `[camera]` of a routine.
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct CameraFile {
+    mode: Option<String>,
+}
+
+impl CameraFile {
+    /// The table `[world]` with the mode in `[world.camera]`: only the simulator reads it.
+    pub(super) fn into_world(self, file: &Path, mut world: toml::Table) -> Result<toml::Table, FileIssue> {
+        const MODES: [&str; 2] = ["geometric", "rendered"];
+        let Some(mode) = self.mode else { return Ok(world) };
+        if !MODES.contains(&mode.as_str()) {
+            return Err(FileIssue::new(file, "camera.mode", format!("`{mode}` is none of {}", MODES.join(", "))));
+        }
+        let camera = world.entry("camera").or_insert_with(|| toml::Table::new().into());
+        // The simulator refuses a `world.camera` that is not a table.
+        if let Some(camera) = camera.as_table_mut() {
+            match camera.get("mode").map(|other| other.as_str().unwrap_or_default()) {
+                Some(other) if other != mode => {
+                    let problem = format!("`{mode}`, but world.camera.mode is `{other}`: leave one of them out");
+                    return Err(FileIssue::new(file, "camera.mode", problem));
+                }
+                _ => drop(camera.insert("mode".to_owned(), mode.into())),
+            }
+        }
+        Ok(world)
+    }
+}

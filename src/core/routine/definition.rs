@@ -1,0 +1,127 @@
+//! A checked routine and the arm that it is for.
+
+use std::path::PathBuf;
+
+use serde::Deserialize;
+
+use super::campaign::{CampaignSettings, RegressSettings};
+use super::error::RoutineError;
+use super::method::Method;
+use super::scene::Scene;
+use super::settings::{CaptureSettings, TaskSettings};
+use super::step::{MoveGoal, ReachSettings, Step};
+use crate::robot::{self, BaseTagStd, FailedJoint, FileIssue, MapKnowledge, Robot, Vehicle};
+
+/// A checked routine.
+#[derive(Clone, Debug)]
+pub struct Routine {
+    pub file: PathBuf,
+    pub name: String,
+    pub robot_folder: PathBuf,
+    pub vehicle_file: PathBuf,
+    pub seed: u64,
+    pub method: Method,
+    pub scene: Scene,
+    /// The only tags that are there; all of the vehicle's or the robot's where it says nothing.
+    pub tags: Option<Vec<u32>>,
+    /// How much of the tags' places is known.
+    pub map: MapKnowledge,
+    pub base_tag_std: BaseTagStd,
+    /// Joints that are declared to have failed, by name and kind.
+    pub failed_joints: Vec<FailedJointEntry>,
+    /// The scene alone, as TOML, to travel with a recording.
+    pub scene_toml: String,
+    pub capture: CaptureSettings,
+    pub task: TaskSettings,
+    /// What to do, in order.
+    pub steps: Vec<Step>,
+    /// The truth's settings, unread.
+    pub world: toml::Table,
+    /// What breaks at the script's `fault` steps, unread.
+    pub faults: Vec<toml::Table>,
+    /// What `armcal campaign` runs; a single run does not look at it.
+    pub campaign: CampaignSettings,
+    /// What `armcal regress` lets pass.
+    pub regress: RegressSettings,
+}
+
+impl Routine {
+    /// Reads the robot and its vehicle, with the tags that the routine says are there.
+    ///
+    /// # Errors
+    /// [`RoutineError`] naming file, key and allowed range.
+    pub fn load_arm(&self) -> Result<(Robot, Vehicle), RoutineError> {
+        let mut vehicle = robot::load_vehicle(&self.vehicle_file)?;
+        let mut robot = robot::load(&self.robot_folder)?.mounted_on(&vehicle)?;
+        if let Some(ids) = &self.tags {
+            let survey =
+                robot.survey().only(ids).map_err(|problem| FileIssue::new(&self.file, "site.tags", problem))?;
+            robot = robot.with_survey(survey.clone());
+            vehicle.survey = Some(survey);
+        }
+        if self.map != MapKnowledge::Known || self.base_tag_std != BaseTagStd::default() {
+            let survey = robot.survey().with_knowledge(&self.map, self.base_tag_std);
+            let survey = survey.map_err(|problem| FileIssue::new(&self.file, "site.known_tags", problem))?;
+            robot = robot.with_survey(survey.clone());
+            vehicle.survey = Some(survey);
+        }
+        self.check_against(&robot)?;
+        let failed = self.failed_of(&robot)?;
+        let robot = robot.with_failed(&failed);
+        Ok((robot, vehicle))
+    }
+
+    fn failed_of(&self, robot: &Robot) -> Result<Vec<FailedJoint>, RoutineError> {
+        let of = |(index, entry): (usize, &FailedJointEntry)| {
+            FailedJoint::of_names(&entry.joint, &entry.kind, &robot.joint_names())
+                .map_err(|problem| FileIssue::new(&self.file, format!("failed_joint.{index}"), problem).into())
+        };
+        self.failed_joints.iter().enumerate().map(of).collect()
+    }
+
+    /// What only the robot can tell: whether the steps fit its joints.
+    ///
+    /// # Errors
+    /// [`RoutineError`] naming the step.
+    fn check_against(&self, robot: &Robot) -> Result<(), RoutineError> {
+        let joints = robot.joint_names();
+        for (index, step) in self.steps.iter().enumerate() {
+            let key = format!("step {} ({})", index + 1, step.name());
+            let problem = match step {
+                Step::Identify(_) if self.map != MapKnowledge::Known => {
+                    "needs a survey: a scale is measured before there are views to map the tags from (site.map)"
+                        .to_owned()
+                }
+                Step::Identify(settings) => match joints.iter().position(|name| *name == settings.joint) {
+                    None => format!("joint `{}` is none of {joints:?}", settings.joint),
+                    Some(joint) if joint >= robot.camera.mount.n_joints => {
+                        format!("joint `{}` does not move the camera, so no view can tell its scale", settings.joint)
+                    }
+                    Some(_) => continue,
+                },
+                Step::Stops(settings) => match settings.joints.iter().find(|name| !joints.contains(name)) {
+                    None => continue,
+                    Some(name) => format!("joint `{name}` is none of {joints:?}"),
+                },
+                Step::Move(MoveGoal::Angles(angles)) if angles.len() != joints.len() => {
+                    format!("to_rad has {} angles, robot `{}` has {} joints", angles.len(), robot.name, joints.len())
+                }
+                Step::Grip { .. } | Step::Reach(ReachSettings { touch: true, .. }) if robot.gripper.is_none() => {
+                    format!("robot `{}` has no [gripper] in its robot.toml", robot.name)
+                }
+                _ => continue,
+            };
+            return Err(FileIssue::new(&self.file, key, problem).into());
+        }
+        Ok(())
+    }
+}
+
+/// `[[failed_joint]]`.
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FailedJointEntry {
+    pub joint: String,
+    /// `locked`, `dead`, `stuck` or `jumps`.
+    pub kind: String,
+}

@@ -1,0 +1,141 @@
+//! Settings of the capture and the task.
+
+use std::path::Path;
+
+use serde::Deserialize;
+
+use crate::robot::FileIssue;
+
+/// How views are captured.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CaptureSettings {
+    /// Views that the fit uses.
+    #[serde(default = "CaptureSettings::default_poses")]
+    pub poses: u32,
+    /// Views that only the verdict uses.
+    #[serde(default = "CaptureSettings::default_held_out")]
+    pub held_out: u32,
+    /// Tags that a planned view must be expected to see.
+    #[serde(default = "CaptureSettings::default_min_tags")]
+    pub min_tags: u32,
+    /// Free water kept between the arm and everything else, beyond the sensors' error.
+    #[serde(default = "CaptureSettings::default_clearance_m")]
+    pub clearance_m: f64,
+    /// How long the settled arm is watched.
+    #[serde(default = "CaptureSettings::default_dwell_s")]
+    pub dwell_s: f64,
+    /// What the views are chosen for.
+    #[serde(default, alias = "choose")]
+    pub criterion: PoseCriterion,
+    /// After so many views, the running estimate renews margins and remaining poses; 0: planned once.
+    #[serde(default = "CaptureSettings::default_replan_every")]
+    pub replan_every: u32,
+    /// No more views once the predicted tool error at the task (root mean square) is below this.
+    #[serde(default)]
+    pub stop_at_tool_error_m: Option<f64>,
+    /// No more views after so long, by the arm's clock.
+    #[serde(default)]
+    pub max_time_s: Option<f64>,
+    /// What is kept clear beyond `clearance_m`.
+    #[serde(default)]
+    pub margins: Margins,
+}
+
+/// What makes one view better than another.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PoseCriterion {
+    /// Least predicted tool error at the task (the test-pose criterion of Klimchik et al. 2014).
+    #[default]
+    ToolError,
+    /// Least volume of the parameters' uncertainty.
+    DOptimal,
+    /// Least sum of the parameters' variances, in units of their priors.
+    AOptimal,
+    /// Least of the largest variance, in units of their priors.
+    EOptimal,
+    /// Any that see enough tags and keep clear; to compare with.
+    Random,
+}
+
+/// For which arms the clearance is kept.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Margins {
+    /// Every arm that the present belief allows.
+    #[default]
+    Belief,
+    /// The believed arm alone; to compare with, never on a real arm.
+    Off,
+}
+
+impl CaptureSettings {
+    fn default_poses() -> u32 {
+        30
+    }
+    fn default_replan_every() -> u32 {
+        6
+    }
+
+    fn default_held_out() -> u32 {
+        8
+    }
+    fn default_min_tags() -> u32 {
+        3
+    }
+    fn default_clearance_m() -> f64 {
+        0.05
+    }
+    fn default_dwell_s() -> f64 {
+        1.0
+    }
+}
+
+impl CaptureSettings {
+    /// `prefix` goes before the keys in messages.
+    pub(super) fn check(&self, file: &Path, prefix: &str) -> Result<(), FileIssue> {
+        let check =
+            |key: &str, value: f64, range| FileIssue::check_range(file, &format!("{prefix}{key}"), value, range);
+        check("poses", f64::from(self.poses), 3.0..=1000.0)?;
+        check("held_out", f64::from(self.held_out), 0.0..=1000.0)?;
+        check("min_tags", f64::from(self.min_tags), 1.0..=100.0)?;
+        check("clearance_m", self.clearance_m, 0.0..=1.0)?;
+        check("dwell_s", self.dwell_s, 0.2..=60.0)?;
+        check("replan_every", f64::from(self.replan_every), 0.0..=1000.0)?;
+        if let Some(tool_error_m) = self.stop_at_tool_error_m {
+            check("stop_at_tool_error_m", tool_error_m, 1e-5..=1.0)?;
+        }
+        if let Some(seconds) = self.max_time_s {
+            check("max_time_s", seconds, 1.0..=1e6)?;
+        }
+        Ok(())
+    }
+}
+
+impl Default for CaptureSettings {
+    fn default() -> Self {
+        Self {
+            poses: Self::default_poses(),
+            held_out: Self::default_held_out(),
+            min_tags: Self::default_min_tags(),
+            clearance_m: Self::default_clearance_m(),
+            dwell_s: Self::default_dwell_s(),
+            criterion: PoseCriterion::default(),
+            replan_every: Self::default_replan_every(),
+            stop_at_tool_error_m: None,
+            max_time_s: None,
+            margins: Margins::default(),
+        }
+    }
+}
+
+/// What the arm is calibrated for.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TaskSettings {
+    /// How near the tool must come to count as a hit.
+    pub tolerance_m: f64,
+    /// Tool positions in the base frame.
+    pub targets_m: Vec<[f64; 3]>,
+}
