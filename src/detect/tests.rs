@@ -1,4 +1,4 @@
-//! Corners errors against corners projected, and what is not taken for a tag, on images with known truth.
+//! Detected against projected corners, and rejected candidates, on images with known truth.
 
 use std::f64::consts::TAU;
 
@@ -116,7 +116,8 @@ fn noisy_corners_err_as_their_covariance_says() {
         let mean = errors.mean_normalised();
         let [middle, high] = [0.5, 0.95].map(|q| quantile(&errors.normalised, q).expect("some"));
         eprintln!(
-            "contrast {contrast}, blur {blur_px}: {} of {}, rms {:.4} px, squares mean {mean:.2}, 50 % {middle:.2}, 95 % {high:.2}",
+            "contrast {contrast}, blur {blur_px}: {} of {}, rms {:.4} px, \
+             squares mean {mean:.2}, 50 % {middle:.2}, 95 % {high:.2}",
             errors.n_found,
             errors.n_drawn,
             errors.rms_px()
