@@ -3,11 +3,11 @@
 use nalgebra::Vector3;
 use rerun::{LineStrips3D, Points3D};
 
-use super::ReplayScene;
-use super::colors;
-use super::rrd::EntityLog;
-use super::scenery::{BASE, Mover};
-use super::shapes::{Look, fix_shapes, path_part, transform, vector};
+use crate::ReplayScene;
+use crate::colors;
+use crate::rrd::EntityLog;
+use crate::scenery::{BASE, Mover};
+use crate::shapes::{Look, fix_shapes, path_part, transform, vector};
 use armcal_core::spatial::{Base, Pose, Tool};
 use armcal_core::streams::{CaptureSet, JointAngles, MarkKind};
 

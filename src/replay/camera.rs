@@ -3,9 +3,9 @@
 use nalgebra::{Isometry3, Point3, Vector2, Vector3};
 use rerun::{Clear, EncodedImage, Image, LineStrips2D, Radius};
 
-use super::ReplayScene;
-use super::colors;
-use super::rrd::EntityLog;
+use crate::ReplayScene;
+use crate::colors;
+use crate::rrd::EntityLog;
 use armcal_core::optics::Fisheye;
 use armcal_core::robot::SurveyedTag;
 use armcal_core::streams::{DetectionReject, TagDetection};

@@ -13,16 +13,16 @@ use rerun::external::re_sdk_types::blueprint::datatypes::{TextLogColumn, TextLog
 use rerun::external::re_sdk_types::datatypes::{Range2D, TimeInt, TimeRange, TimeRangeBoundary};
 use rerun::external::uuid::Uuid;
 
-use super::ReplayScene;
-use super::camera::CAMERA;
-use super::colors;
-use super::eye;
-use super::phases::{LOG, STATE};
-use super::plan::{CLEARANCE, PREDICTED};
-use super::plots::{COUNTS, JOINT_ANGLE, JOINT_ERROR, TEMPERATURE, TOOL_ERROR};
-use super::rrd::TIMELINE;
-use super::scenery::WORLD;
-use super::summary::SUMMARY;
+use crate::ReplayScene;
+use crate::camera::CAMERA;
+use crate::colors;
+use crate::eye;
+use crate::phases::{LOG, STATE};
+use crate::plan::{CLEARANCE, PREDICTED};
+use crate::plots::{COUNTS, JOINT_ANGLE, JOINT_ERROR, TEMPERATURE, TOOL_ERROR};
+use crate::rrd::TIMELINE;
+use crate::scenery::WORLD;
+use crate::summary::SUMMARY;
 
 /// One entity of the layout.
 pub(super) struct Entry {

@@ -4,11 +4,11 @@ use std::collections::BTreeMap;
 
 use rerun::{StateChange, StateConfiguration, TextLog, TextLogLevel};
 
-use super::ReplayScene;
-use super::colors::{self, Rgba};
-use super::rrd::EntityLog;
-use super::shapes::path_part;
-use super::tracks::Span;
+use crate::ReplayScene;
+use crate::colors::{self, Rgba};
+use crate::rrd::EntityLog;
+use crate::shapes::path_part;
+use crate::tracks::Span;
 use armcal_core::streams::{CaptureSet, LogLevel, MarkKind, Phase, ReachAttempt};
 
 pub(super) const STATE: &str = "/state";

@@ -3,9 +3,9 @@
 use rerun::components::MarkerShape;
 use rerun::{Scalars, SeriesLines, SeriesPoints};
 
-use super::ReplayScene;
-use super::colors::{self, Rgba};
-use super::rrd::EntityLog;
+use crate::ReplayScene;
+use crate::colors::{self, Rgba};
+use crate::rrd::EntityLog;
 use armcal_core::streams::{JointAngles, ReachAttempt};
 
 pub(super) const JOINT_ERROR: &str = "/plots/joint_error";

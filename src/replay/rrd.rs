@@ -16,8 +16,8 @@ use rerun::log::{Chunk, ChunkId, LogMsg, RowId};
 use rerun::time::{TimeCell, TimePoint};
 use rerun::{EntityPath, SerializedComponentBatch, StoreId, StoreKind};
 
-use super::error::ReplayError;
-use super::{ReplayInput, layout};
+use crate::error::ReplayError;
+use crate::{ReplayInput, layout};
 use armcal_core::log::MessageHasher;
 use armcal_core::robot::Robot;
 

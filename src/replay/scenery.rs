@@ -3,10 +3,10 @@
 use nalgebra::{Isometry3, Translation3};
 use rerun::{Boxes3D, FillMode, Points3D, ViewCoordinates};
 
-use super::ReplayScene;
-use super::colors;
-use super::rrd::EntityLog;
-use super::shapes::{Look, fix_shapes, quaternion, transform, vector};
+use crate::ReplayScene;
+use crate::colors;
+use crate::rrd::EntityLog;
+use crate::shapes::{Look, fix_shapes, quaternion, transform, vector};
 use armcal_core::robot::SurveyedTag;
 use armcal_core::spatial::{Pose, Vehicle, World};
 

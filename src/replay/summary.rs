@@ -4,8 +4,8 @@ use std::fmt::Write;
 
 use rerun::TextDocument;
 
-use super::rrd::EntityLog;
-use super::{ReplayInput, ReplayScene};
+use crate::rrd::EntityLog;
+use crate::{ReplayInput, ReplayScene};
 use armcal_core::log::Completeness;
 use armcal_core::streams::ReachAttempt;
 

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
-use super::*;
+use crate::*;
 use armcal_core::kinematics::{IkGoal, IkSettings, JointLimits, solve_position};
 use armcal_core::log::{RecordingHeader, RecordingWriter, RosMessage, read_recording, ros};
 use armcal_core::robot::{Hull, Part, PlacedShape, Shape};

@@ -6,7 +6,7 @@
 //! become angles by the datasheet's scale only, for the controller knows neither gain nor offset errors. The word's wrap
 //! is honoured: the short way round counts.
 
-use super::spec::{CONTROL_PERIOD_S, HydraulicsSpec};
+use crate::spec::{CONTROL_PERIOD_S, HydraulicsSpec};
 use armcal_core::robot::JointSensorSpec;
 use armcal_core::streams::{JointCounts, MAX_JOINTS};
 

@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Matrix2, Unit, Vector3};
 
-use super::scenes::{Condition, Scene, image_spec, lights, wall, wall_place};
+use crate::scenes::{Condition, Scene, image_spec, lights, wall, wall_place};
 use armcal_core::optics::Fisheye;
 use armcal_core::streams::RejectReason;
 use armcal_detect::{DetectError, DetectorSettings, GreyImage, ImageDetections, TagDetector};

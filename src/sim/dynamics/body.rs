@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Matrix3, Vector3};
 
-use super::spatial::{Force, Inertia, Motion};
+use crate::dynamics::spatial::{Force, Inertia, Motion};
 use armcal_core::robot::{LinkBody, PlacedShape};
 
 /// A body in its own link's frame.

@@ -2,9 +2,9 @@
 
 use nalgebra::{Isometry3, Vector3};
 
-use super::body::Body;
-use super::spatial::{Force, Inertia, Motion};
-use super::system::{Coordinates, Symmetric};
+use crate::dynamics::body::Body;
+use crate::dynamics::spatial::{Force, Inertia, Motion};
+use crate::dynamics::system::{Coordinates, Symmetric};
 use armcal_core::kinematics::{Chain, LinkPoses};
 use armcal_core::streams::{JointAngles, MAX_JOINTS};
 
@@ -210,7 +210,7 @@ fn assemble(
 ) -> Equations {
     let first = if matches!(base, BaseCoupling::Free) { 6 } else { 0 };
     let mut inertia = Symmetric::zeros(first + n);
-    let mut bias = [0.0; super::MAX_DOF];
+    let mut bias = [0.0; crate::dynamics::MAX_DOF];
     for j in 0..n {
         let carried = composite[j + 1].momentum(&axes[j]);
         for (i, axis) in axes.iter().enumerate().take(j + 1) {

@@ -11,7 +11,7 @@ mod integrate;
 mod spatial;
 mod system;
 
-pub use super::joint_load::JointLoad;
+pub use crate::dynamics::JointLoad;
 pub(crate) use body::WaterProperties;
 pub use body::{Body, HullDrag, Surface};
 pub use equations::{BaseCoupling, Environment, Equations, Multibody};

@@ -5,7 +5,7 @@
 //! the sliding torque after that. Below breakaway it is a spring and nothing else, so that nothing can creep: neither
 //! under a steady load nor under one that shakes.
 
-use crate::joint_load::JointLoad;
+use crate::dynamics::JointLoad;
 use crate::spec::HydraulicsSpec;
 
 #[derive(Clone, Copy, Debug)]

@@ -3,17 +3,17 @@
 use nalgebra::{Isometry3, Unit, Vector3};
 use rayon::prelude::*;
 
-use super::frame::Frame;
-use super::light::Light;
-use super::rays::Rays;
-use super::scene::{Appearance, Object};
-use super::sensor::{BAND_ROWS, Sensor};
-use super::shade::Shader;
-use super::shape::Form;
-use super::snow::{self, Flake};
-use super::tag::Board;
-use super::texture::Texture;
-use super::trace::{Canvas, Tracer};
+use crate::imaging::frame::Frame;
+use crate::imaging::light::Light;
+use crate::imaging::rays::Rays;
+use crate::imaging::scene::{Appearance, Object};
+use crate::imaging::sensor::{BAND_ROWS, Sensor};
+use crate::imaging::shader::Shader;
+use crate::imaging::shape::Form;
+use crate::imaging::marine_snow::{self, Flake};
+use crate::imaging::tag_board::Board;
+use crate::imaging::seafloor_texture::Texture;
+use crate::imaging::{canvas::Canvas, tracer::Tracer};
 use crate::spec::ImageSpec;
 use armcal_core::optics::Fisheye;
 use armcal_core::robot::Shape;

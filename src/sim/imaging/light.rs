@@ -2,8 +2,8 @@
 
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 
-use super::math::{exp, exp2, max};
-use super::{Rgb, Vec3};
+use crate::imaging::math::{exp, exp2, max};
+use crate::imaging::{Rgb, Vec3};
 
 /// A white lamp in the base frame.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -25,7 +25,7 @@ pub use frame::Frame;
 pub use imager::{Imager, Shot, SolidShape, TagPlane};
 pub use light::Light;
 
-pub use super::spec::{CameraMode, ImageSpec, WaterKind};
+pub use crate::spec::{CameraMode, ImageSpec, WaterKind};
 
 /// A vector in the camera's frame or an object's, single precision.
 type Vec3 = nalgebra::Vector3<f32>;

@@ -1,8 +1,8 @@
 //! Rays against convex shapes, several at a time. Rays start outside: what holds the eye is not seen.
 
-use super::Vec3;
-use super::math::{max, min};
-use super::tag::Board;
+use crate::imaging::Vec3;
+use crate::imaging::math::{max, min};
+use crate::imaging::tag_board::Board;
 use armcal_core::robot::Shape;
 
 /// What an object is to a ray, in its own frame; lengths in m.
@@ -127,7 +127,7 @@ impl Form {
                 let [x, y] = place.on_plane([ray.x, ray.y, ray.z]);
                 board.face(x, y)
             }
-            Self::Tag(_) => super::tag::FACE_BACK,
+            Self::Tag(_) => crate::imaging::tag_board::FACE_BACK,
             Self::Capsule { .. } | Self::Sphere { .. } => 0,
             _ => self.normal(&place.point(ray, range_m)).0,
         }
@@ -152,7 +152,7 @@ impl Form {
             let range_m = self.true_range(place, ray, range_m);
             let point = place.point(ray, range_m);
             let is_front = place.eye[2] > 0.0;
-            let face = if is_front { board.face(point.x, point.y) } else { super::tag::FACE_BACK };
+            let face = if is_front { board.face(point.x, point.y) } else { crate::imaging::tag_board::FACE_BACK };
             let normal = Vec3::from(place.rows[2]) * if is_front { 1.0 } else { -1.0 };
             return (range_m, face, normal);
         }
@@ -201,7 +201,7 @@ impl Form {
 
 #[inline]
 fn enter_board<const N: usize>(half: f32, e: &[f32; 3], d: &Lanes<N>) -> [f32; N] {
-    let lift = if e[2] > 0.0 { super::tag::CLEAR_OF_BACKING_M } else { 0.0 };
+    let lift = if e[2] > 0.0 { crate::imaging::tag_board::CLEAR_OF_BACKING_M } else { 0.0 };
     std::array::from_fn(|k| {
         let inverse = 1.0 / d[2][k];
         let range = -e[2] * inverse;

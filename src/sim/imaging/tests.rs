@@ -5,9 +5,9 @@ use std::f64::consts::{PI, TAU};
 use nalgebra::{Isometry3, Point3, Translation3, Unit, UnitQuaternion, Vector2, Vector3};
 use rand::RngExt;
 
-use super::light::Lamp;
-use super::shape::{Form, Place};
-use super::*;
+use crate::imaging::light::Lamp;
+use crate::imaging::shape::{Form, Place};
+use crate::imaging::*;
 use armcal_core::optics::{fixture::lens, square_corners};
 use armcal_core::robot::{Hull, Shape, parry_pose};
 use armcal_core::stats::stream_rng;

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Unit};
 
-use super::*;
+use crate::physics::*;
 use crate::spec::VehicleMotionSpec;
 use crate::vehicle::VehicleMotion;
 use armcal_core::kinematics::ChainJoint;

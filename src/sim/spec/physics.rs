@@ -5,8 +5,11 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::{CheckedTable, table};
+use crate::spec::table::{CheckedTable, table};
 use armcal_core::robot::FileIssue;
+
+/// Length of a control period, s: the arm's own controller runs at 100 Hz.
+pub(crate) const CONTROL_PERIOD_S: f64 = 0.01;
 
 table!(
     /// The integrator and the rate of the truth's record.

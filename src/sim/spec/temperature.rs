@@ -5,7 +5,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::{CheckedTable, table};
+use crate::spec::table::{CheckedTable, table};
 use armcal_core::robot::FileIssue;
 
 /// The longest profile of the water.

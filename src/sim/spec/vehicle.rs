@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::{CheckedTable, DEG, table};
+use crate::spec::table::{CheckedTable, DEG, table};
 use armcal_core::robot::FileIssue;
 
 /// Where the vehicle's motion comes from.

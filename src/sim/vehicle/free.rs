@@ -2,17 +2,17 @@
 
 use nalgebra::{Isometry3, Matrix3, Vector3};
 
-use super::BaseState;
-use super::swell::{Axis, draw_axis, sum};
 use crate::dynamics::{Body, Force, HullDrag, Inertia, Motion, Multibody};
 use crate::error::SimError;
 use crate::fault::Impulse;
 use crate::spec::{VehicleMotionSpec, WaterSpec};
+use crate::vehicle::base_state::BaseState;
+use crate::vehicle::sinusoids::{SinusoidSum, draw_sinusoids, evaluate};
 use armcal_core::robot::{FileIssue, Vehicle, VehicleDynamics};
 use armcal_core::streams::JointAngles;
 
-/// How long a knock lasts, s: short against the vehicle's motion, long against a step.
-const KNOCK_S: f64 = 0.1;
+/// How long a impulse lasts, s: short against the vehicle's motion, long against a step.
+const IMPULSE_DURATION_S: f64 = 0.1;
 
 /// Thrusters, and what pushes the vehicle besides the water that it moves through.
 #[derive(Clone, Debug)]
@@ -26,8 +26,8 @@ pub(crate) struct FreeVehicle {
     /// Thrust and moment as they are, behind the thrusters' lag, vehicle axes.
     thrust: [f64; 6],
     /// Random forces and moments, in the band of the motion's periods.
-    wobble: [Axis; 6],
-    knock: Option<(f64, Impulse)>,
+    wobble: [SinusoidSum; 6],
+    impulse: Option<(f64, Impulse)>,
 }
 
 impl FreeVehicle {
@@ -49,9 +49,9 @@ impl FreeVehicle {
             thrust: [0.0; 6],
             wobble: std::array::from_fn(|axis| {
                 let rms = if axis < 3 { spec.wobble_force_rms_n } else { spec.wobble_moment_rms_n_m };
-                draw_axis(spec, rms, seed, &format!("wobble/{axis}"))
+                draw_sinusoids(spec, rms, seed, &format!("wobble/{axis}"))
             }),
-            knock: None,
+            impulse: None,
         })
     }
 
@@ -87,8 +87,8 @@ impl FreeVehicle {
     }
 
     /// Something hits the vehicle.
-    pub(crate) fn knock(&mut self, t_s: f64, knock: &Impulse) {
-        self.knock = Some((t_s, *knock));
+    pub(crate) fn impulse(&mut self, t_s: f64, impulse: &Impulse) {
+        self.impulse = Some((t_s, *impulse));
     }
 
     /// What acts on the vehicle in the step from `t_s`, about the base's origin in base axes.
@@ -96,16 +96,16 @@ impl FreeVehicle {
         self.keep_station(step_s, base);
         let mut total = self.thrust;
         for (slot, axis) in total.iter_mut().zip(&self.wobble) {
-            *slot += sum(axis, t_s)[0];
+            *slot += evaluate(axis, t_s)[0];
         }
-        if let Some((start_s, knock)) = &self.knock {
+        if let Some((start_s, impulse)) = &self.impulse {
             let since = t_s - start_s;
-            if (0.0..KNOCK_S).contains(&since) {
+            if (0.0..IMPULSE_DURATION_S).contains(&since) {
                 // Half a sine: its mean is 2/pi of its height.
-                let shape = (std::f64::consts::PI * since / KNOCK_S).sin() * std::f64::consts::FRAC_PI_2 / KNOCK_S;
+                let shape = (std::f64::consts::PI * since / IMPULSE_DURATION_S).sin() * std::f64::consts::FRAC_PI_2 / IMPULSE_DURATION_S;
                 for i in 0..3 {
-                    total[i] += shape * knock.impulse_n_s[i];
-                    total[3 + i] += shape * knock.angular_impulse_n_m_s[i];
+                    total[i] += shape * impulse.impulse_n_s[i];
+                    total[3 + i] += shape * impulse.angular_impulse_n_m_s[i];
                 }
             }
         }

@@ -2,8 +2,8 @@
 
 use nalgebra::Isometry3;
 
-use super::World;
 use crate::sensors::camera::{ArmMotion, Exposed, Moment, Places};
+use crate::world::World;
 use armcal_core::streams::{ArmError, CameraImage, DetectionRejects, Message};
 use armcal_core::time::Stamp;
 

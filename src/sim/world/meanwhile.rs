@@ -1,7 +1,7 @@
 //! What happens to a world besides being driven: time passes at rest.
 
-use super::{AWAKE_S, SLOW_PERIODS, World, sample_joint_sensors, surroundings};
 use crate::spec::CONTROL_PERIOD_S;
+use crate::world::{AWAKE_S, SLOW_PERIODS, World, sample_joint_sensors, surroundings};
 use armcal_core::streams::{Arm, ArmError, JointSensorSample, Message, Sink};
 
 /// Length of a skipped stride, s.

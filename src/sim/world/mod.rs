@@ -12,25 +12,25 @@ use faults::Timeline;
 pub(super) use setup::check_step;
 use setup::{actuators, header, sample_joint_sensors, stowed_angles, surroundings};
 
-use super::as_built::AsBuilt;
-use super::contact::ContactWatch;
-use super::controller::Controller;
-use super::dynamics::Force;
-use super::error::SimError;
-use super::gripper::Gripper;
-use super::hydraulics::Hydraulics;
-use super::joint_load::JointLoad;
-use super::physics::{ArmPhysics, Drive, PhysicsInput};
-use super::places::BodyPoses;
-use super::sensors::attitude::AttitudeSensor;
-use super::sensors::camera::{CameraInput, Exposed, RenderInput, WristCamera};
-use super::sensors::joint::JointSensor;
-use super::sensors::temperatures::Temperatures;
-use super::sensors::thermometer::SlowSensors;
-use super::solids::Solids;
-use super::spec::{CONTROL_PERIOD_S, MotionKind, WorldSpec};
-use super::truth::{TruthClearance, TruthContact, TruthHeader, TruthSink, TruthState};
-use super::vehicle::{BaseState, FreeVehicle, Sea, VehicleMotion, WaterMotion};
+use crate::as_built::AsBuilt;
+use crate::contact_onset::ContactOnsets;
+use crate::controller::Controller;
+use crate::dynamics::Force;
+use crate::error::SimError;
+use crate::gripper::Gripper;
+use crate::hydraulics::Hydraulics;
+use crate::dynamics::JointLoad;
+use crate::physics::{ArmPhysics, Drive, PhysicsInput};
+use crate::body_poses::BodyPoses;
+use crate::sensors::attitude::AttitudeSensor;
+use crate::sensors::camera::{CameraInput, Exposed, RenderInput, WristCamera};
+use crate::sensors::joint::JointSensor;
+use crate::temperatures::Temperatures;
+use crate::sensors::thermometer::SlowSensors;
+use crate::solids::Solids;
+use crate::spec::{CONTROL_PERIOD_S, MotionKind, WorldSpec};
+use crate::truth::{TruthClearance, TruthContact, TruthHeader, TruthSink, TruthState};
+use crate::vehicle::{BaseState, FreeVehicle, Sea, VehicleMotion, WaterMotion};
 use armcal_core::robot::{Robot, Vehicle};
 use armcal_core::routine::Scene;
 use armcal_core::spatial::Pose;
@@ -77,7 +77,7 @@ pub struct World {
     slow: SlowSensors,
     attitude: AttitudeSensor,
     camera: WristCamera,
-    contacts: ContactWatch,
+    contacts: ContactOnsets,
     /// Images under way; the line keeps their order.
     images: VecDeque<Exposed>,
     /// Somebody waits for images.
@@ -138,7 +138,7 @@ impl World {
             slow: SlowSensors::new(&spec.temperature, &spec.water, &built.gauges, seed),
             attitude: AttitudeSensor::new(&spec.vehicle, &built.attitude, seed),
             camera,
-            contacts: ContactWatch::new(solids.pairs(), step_s),
+            contacts: ContactOnsets::new(solids.pairs(), step_s),
             images: VecDeque::new(),
             is_looked: false,
             n_images: 0,

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::*;
+use crate::world::*;
 use armcal_core::robot::{load, load_vehicle};
 use armcal_core::streams::JointAngles;
 
@@ -81,8 +81,8 @@ fn a_free_vehicle_floats_level_and_keeps_its_station() {
 fn a_free_vehicle_takes_the_impulse_of_a_knock() {
     let mut world = floating(|spec| spec.vehicle.station_keeping_rad_s = 0.0);
     let added_kg = world.vehicle.dynamics.expect("figures of the vehicle").added_mass_kg[0];
-    let knock = crate::fault::Impulse { impulse_n_s: [800.0, 0.0, 0.0], angular_impulse_n_m_s: [0.0; 3] };
-    world.free.as_mut().expect("it floats").knock(0.0, &knock);
+    let impulse = crate::fault::Impulse { impulse_n_s: [800.0, 0.0, 0.0], angular_impulse_n_m_s: [0.0; 3] };
+    world.free.as_mut().expect("it floats").impulse(0.0, &impulse);
     for _ in 0..60 {
         world.physics_step(&[0.0; MAX_JOINTS]).expect("it steps");
     }

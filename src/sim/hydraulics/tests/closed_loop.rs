@@ -5,8 +5,8 @@ use std::f64::consts::TAU;
 use rand::RngExt;
 use rand_distr::{Distribution, StandardNormal};
 
-use super::*;
 use crate::controller::Controller;
+use crate::hydraulics::tests::*;
 use crate::spec::CONTROL_PERIOD_S;
 use armcal_core::robot::JointSensorSpec;
 use armcal_core::stats::stream_rng;

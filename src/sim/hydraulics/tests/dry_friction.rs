@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use super::*;
+use crate::hydraulics::tests::*;
 
 const INERTIA: f64 = 50.0;
 /// Of the shoulder, N m.

@@ -5,7 +5,7 @@ mod dry_friction;
 mod faults;
 mod oil;
 
-use super::*;
+use crate::hydraulics::*;
 
 /// Joints without a body: each is an inertia under its drive and an outer torque. Linearly implicit, of second order (ROS2
 /// of Verwer, Spee, Blom and Hundsdorfer, SIAM J. Sci. Comput. 20, 1999).

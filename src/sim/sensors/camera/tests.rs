@@ -1,14 +1,21 @@
 //! The camera against what its lens, its motion and its clock give in closed form.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
-use nalgebra::{Point3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector2, Vector3};
 
-use super::*;
-use crate::spec::PortKind;
-use armcal_core::optics::{Fisheye, square_corners};
-use armcal_core::robot::{load, load_vehicle};
+use crate::as_built::AsBuilt;
+use crate::body_poses::BodyPoses;
+use crate::sensors::camera::ported_lens::PortedLens;
+use crate::sensors::camera::*;
+use crate::solids::Solids;
+use crate::spec::{CameraMode, CameraWorldSpec, CornerNoiseKind, PortKind, WorldSpec};
+use armcal_core::optics::{CornerNoise, Fisheye, square_corners};
+use armcal_core::robot::{Robot, load, load_vehicle};
 use armcal_core::routine::Scene;
+use armcal_core::streams::{JointAngles, TagDetections};
+use armcal_core::time::{SIMULATION_EPOCH, Stamp};
 
 mod rendered;
 
@@ -46,7 +53,11 @@ impl Site {
     fn image(&self, camera: &mut WristCamera, rates_rad_s: f64, at_s: f64) -> (Stamp, TagDetections) {
         let rates = JointAngles::from_fn(self.robot.n_joints(), |_| rates_rad_s);
         let motion = ArmMotion { chain: &self.robot.chain, angles: self.robot.stowed, rates };
-        camera.expose(&self.links, &self.solids, &motion, SIMULATION_EPOCH.plus_s(at_s))
+        let poses =
+            ScenePoses { links: &self.links, base_from_world: Isometry3::identity(), jaws: [Isometry3::identity(); 2] };
+        let closed = SIMULATION_EPOCH.plus_s(at_s);
+        let (solids, demand) = (&self.solids, ImageDemand::Every);
+        camera.project_tags(&ShutterState { poses, solids, motion, closed, demand })
     }
 
     /// Corners by the drawing's lens, with the joints where they were `earlier_s` before.
@@ -279,9 +290,9 @@ fn corners_go_through_the_lens_as_built() {
 fn ports_keep_the_focal_length_near_the_axis() {
     let shift = |change: &dyn Fn(&mut CameraWorldSpec), angle_rad: f64, range_m: f64| {
         let site = site(|spec| change(&mut spec.camera));
-        let eye = PortedLens::new(&site.robot.camera.lens, &site.built, &site.spec.camera);
+        let lens = PortedLens::new(&site.robot.camera.lens, &site.built, &site.spec.camera);
         let point = Vector3::new(angle_rad.sin(), 0.0, angle_rad.cos()) * range_m;
-        (eye.project(&point).expect("in view") - site.robot.camera.lens.project(&point).expect("in view")).norm()
+        (lens.project(&point).expect("in view") - site.robot.camera.lens.project(&point).expect("in view")).norm()
     };
     let flat = |spec: &mut CameraWorldSpec| spec.port = PortKind::Flat;
     let dome = |spec: &mut CameraWorldSpec| {

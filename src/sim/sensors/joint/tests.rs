@@ -2,8 +2,8 @@
 
 use std::num::NonZeroU8;
 
-use super::*;
 use crate::as_built::{Harmonic, ResolverAsBuilt, WornSpot};
+use crate::sensors::joint::*;
 
 pub(super) const COUNTS_PER_RAD: f64 = 46.0 * 180.0 / std::f64::consts::PI;
 const OFFSET_COUNTS: f64 = 65322.0;
