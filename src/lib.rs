@@ -23,5 +23,4 @@ pub mod output;
 pub mod report;
 #[cfg(feature = "sim")]
 pub mod run;
-#[cfg(feature = "sim")]
 pub mod score;

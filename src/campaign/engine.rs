@@ -5,8 +5,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-use super::row::one_line;
-use super::{CampaignError, Job, Row, RunStatus};
+use crate::campaign::row::one_line;
+use crate::campaign::{CampaignError, Job, Row, RunStatus};
 
 /// How jobs are run.
 #[derive(Clone, Copy, Debug)]

@@ -2,7 +2,7 @@
 
 use toml::Table;
 
-use super::CampaignError;
+use crate::campaign::CampaignError;
 use crate::run::RunInputs;
 
 /// A new meaning of rows gets a new version.

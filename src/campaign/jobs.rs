@@ -3,8 +3,8 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use super::matrix::{Setting, settings};
-use super::{CampaignError, Columns, Shard, fingerprint};
+use crate::campaign::matrix::{Setting, settings};
+use crate::campaign::{CampaignError, Columns, Shard, fingerprint};
 use crate::run::RunInputs;
 use armcal_core::routine::{self, Overrides, Routine, SeedRange, effective_table};
 

@@ -2,7 +2,7 @@
 
 use toml::Value;
 
-use super::CampaignError;
+use crate::campaign::CampaignError;
 use armcal_core::routine::Override;
 
 /// One point of the matrix.

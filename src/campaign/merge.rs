@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use super::store::read_summary;
-use super::{CampaignError, CampaignSummary, Row, Table, read_table, statistics};
+use crate::campaign::store::read_summary;
+use crate::campaign::{CampaignError, CampaignSummary, Row, Table, read_table, statistics};
 
 /// Puts tables of one campaign together. A row that is in several must be the same in all.
 ///
@@ -42,16 +42,16 @@ pub fn merge(paths: &[PathBuf]) -> Result<(Table, CampaignSummary), CampaignErro
 
 #[cfg(test)]
 mod tests {
-    use super::super::table_file::tests::{names, row};
-    use super::super::{Store, table_text};
     use super::*;
+    use crate::campaign::table_file::tests::{names, row};
+    use crate::campaign::{ExistingRows, Store, table_text};
 
     #[test]
     fn shards_together_are_the_whole() {
         let folder = tempfile::tempdir().expect("a folder");
         let campaign = |name: &str, fingerprint: &str, keys: &[(u32, u64)]| {
             let out = folder.path().join(name);
-            let mut store = Store::open(&out, fingerprint, names(), false).expect("opened");
+            let mut store = Store::open(&out, fingerprint, names(), ExistingRows::Keep).expect("opened");
             for (setting, seed) in keys {
                 store.append(row(*setting, *seed)).expect("kept");
             }
@@ -63,7 +63,7 @@ mod tests {
         assert_eq!(merge(&[second.clone(), first.clone()]).expect("merged"), whole);
         let (_, other) = campaign("other.csv", "g", &[(0, 9)]);
         assert!(matches!(merge(&[first.clone(), other]), Err(CampaignError::Table { .. })));
-        let changed = super::super::Row { exit_code: 4, ..row(0, 1) };
+        let changed = crate::campaign::Row { exit_code: 4, ..row(0, 1) };
         let liar = folder.path().join("liar.csv");
         std::fs::write(&liar, table_text(&Table { names: names(), rows: vec![changed] })).expect("written");
         assert!(matches!(merge(&[first, liar]), Err(CampaignError::Conflict { setting: 0, seed: 1, .. })));

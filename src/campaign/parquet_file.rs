@@ -9,8 +9,9 @@ use parquet::basic::Compression;
 use parquet::errors::ParquetError;
 use parquet::file::properties::WriterProperties;
 
-use super::columns::{Columns, MetricKind};
-use super::{Row, Table};
+use crate::campaign::columns::Columns;
+use crate::campaign::{Row, Table};
+use armcal_core::units::Unit;
 
 /// The file's bytes; the same rows give the same bytes.
 pub(super) fn parquet_bytes(table: &Table) -> Result<Vec<u8>, ParquetError> {
@@ -41,9 +42,9 @@ fn batch(table: &Table) -> Result<RecordBatch, arrow::error::ArrowError> {
     ];
     for (index, name) in table.names.iter().enumerate() {
         let values = rows.iter().map(|row| row.figures.get(index).copied().flatten());
-        let array: ArrayRef = match Columns::kind(name) {
-            MetricKind::Count => Arc::new(values.map(|v| v.map(|v| v as u64)).collect::<UInt64Array>()),
-            MetricKind::Real => Arc::new(values.collect::<Float64Array>()),
+        let array: ArrayRef = match Columns::unit(name) {
+            Unit::Count => Arc::new(values.map(|v| v.map(|v| v as u64)).collect::<UInt64Array>()),
+            _ => Arc::new(values.collect::<Float64Array>()),
         };
         columns.push((name, array, true));
     }
@@ -52,8 +53,8 @@ fn batch(table: &Table) -> Result<RecordBatch, arrow::error::ArrowError> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::table_file::tests::{names, row};
     use super::*;
+    use crate::campaign::table_file::tests::{names, row};
     use arrow::array::Array;
     use arrow::datatypes::DataType;
 

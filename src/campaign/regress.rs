@@ -8,7 +8,7 @@
 use comfy_table::Table as Grid;
 use comfy_table::presets::UTF8_FULL_CONDENSED;
 
-use super::{Row, RunStatus, Table};
+use crate::campaign::{Metric, Row, RunStatus, Table};
 use armcal_core::routine::RegressSettings;
 use armcal_core::stats::{median_interval, quantile};
 
@@ -73,14 +73,14 @@ pub fn compare(baseline: &Table, now: &Table, budgets: &RegressSettings) -> Comp
     let mut judge = Judge { baseline, now, pairs: &pairs, checks: Vec::new(), worst: Vec::new() };
     judge.endings();
     judge.contacts();
-    judge.ratio("tool error", "tool_error_after_median_m", budgets.tool_error_ratio);
-    judge.ratio("miss at the target", "reach_error_after_median_m", budgets.reach_error_ratio);
-    judge.ratio("residual", "residual_rms_px", budgets.residual_ratio);
-    judge.ratio("held-out tags", "held_out_rms_m", budgets.held_out_ratio);
-    judge.ratio("corner scatter", "corner_scatter_px", budgets.corner_scatter_ratio);
-    judge.ratio("simulated time", "simulated_s", budgets.time_ratio);
-    judge.limit("tool error, itself", "tool_error_after_median_m", budgets.tool_error_m);
-    judge.limit("miss, itself", "reach_error_after_median_m", budgets.reach_error_m);
+    judge.ratio("tool error", Metric::ToolErrorAfterMedian, budgets.tool_error_ratio);
+    judge.ratio("miss at the target", Metric::ReachErrorAfterMedian, budgets.reach_error_ratio);
+    judge.ratio("residual", Metric::ResidualRmsPx, budgets.residual_ratio);
+    judge.ratio("held-out tags", Metric::HeldOutRms, budgets.held_out_ratio);
+    judge.ratio("corner scatter", Metric::CornerScatterPx, budgets.corner_scatter_ratio);
+    judge.ratio("simulated time", Metric::SimulatedTime, budgets.time_ratio);
+    judge.limit("tool error, itself", Metric::ToolErrorAfterMedian, budgets.tool_error_m);
+    judge.limit("miss, itself", Metric::ReachErrorAfterMedian, budgets.reach_error_m);
     let identical = baseline.names == now.names && pairs.iter().all(|p| p.baseline.figures == p.now.figures);
     Comparison { pairs: pairs.len(), checks: judge.checks, worst: judge.worst, identical }
 }
@@ -113,8 +113,8 @@ impl Judge<'_> {
     /// Any contact in a run that had none.
     fn contacts(&mut self) {
         let touched = |pair: &Pair<'_>| {
-            let was = figure(self.baseline, pair.baseline, "contacts");
-            let is = figure(self.now, pair.now, "contacts").filter(|n| *n > 0.0)?;
+            let was = figure(self.baseline, pair.baseline, Metric::Contacts);
+            let is = figure(self.now, pair.now, Metric::Contacts).filter(|n| *n > 0.0)?;
             was.is_none_or(|n| n == 0.0).then(|| format!("{is:.0} contacts, had none"))
         };
         let found: Vec<_> = self.pairs.iter().filter_map(|pair| Some((pair, touched(pair)?))).collect();
@@ -138,12 +138,12 @@ impl Judge<'_> {
     }
 
     /// New over baseline.
-    fn ratio(&mut self, what: &'static str, name: &str, budget: f64) {
+    fn ratio(&mut self, what: &'static str, metric: Metric, budget: f64) {
         let mut ratios: Vec<(&Pair<'_>, f64)> = self
             .pairs
             .iter()
             .filter_map(|pair| {
-                Some((pair, ratio(figure(self.baseline, pair.baseline, name)?, figure(self.now, pair.now, name)?)))
+                Some((pair, ratio(figure(self.baseline, pair.baseline, metric)?, figure(self.now, pair.now, metric)?)))
             })
             .collect();
         let values: Vec<f64> = ratios.iter().map(|(_, ratio)| *ratio).collect();
@@ -165,30 +165,32 @@ impl Judge<'_> {
     }
 
     /// The new figure itself.
-    fn limit(&mut self, what: &'static str, name: &str, budget_m: Option<f64>) {
-        let Some(budget_m) = budget_m else { return };
+    fn limit(&mut self, what: &'static str, metric: Metric, budget: Option<f64>) {
+        let Some(budget) = budget else { return };
+        let unit = metric.unit();
         let mut found: Vec<(&Pair<'_>, f64)> =
-            self.pairs.iter().filter_map(|pair| Some((pair, figure(self.now, pair.now, name)?))).collect();
+            self.pairs.iter().filter_map(|pair| Some((pair, figure(self.now, pair.now, metric)?))).collect();
         let values: Vec<f64> = found.iter().map(|(_, value)| *value).collect();
         let (median, interval) = (quantile(&values, 0.5), median_interval(&values, COVERAGE));
-        let worse = median.is_some_and(|median| median > budget_m);
+        let worse = median.is_some_and(|median| median > budget);
         self.checks.push(Check {
             what,
             n: values.len(),
-            value: median.map_or_else(|| "-".to_owned(), |median| format!("{:.2} mm", median * 1e3)),
-            certainty: interval.map_or_else(String::new, |i| format!("{:.2} .. {:.2}", i.low * 1e3, i.high * 1e3)),
-            budget: format!("{:.2} mm", budget_m * 1e3),
+            value: unit.shown_if(median, 2),
+            certainty: interval
+                .map_or_else(String::new, |i| format!("{} .. {}", unit.number(i.low, 2), unit.number(i.high, 2))),
+            budget: unit.shown(budget, 2),
             worse,
         });
         if worse {
             found.sort_by(|a, b| b.1.total_cmp(&a.1));
-            self.name_worst(what, found.into_iter().map(|(pair, m)| (pair, format!("{:.2} mm", m * 1e3))).collect());
+            self.name_worst(what, found.into_iter().map(|(pair, value)| (pair, unit.shown(value, 2))).collect());
         }
     }
 }
 
-fn figure(table: &Table, row: &Row, name: &str) -> Option<f64> {
-    table.figure(name).and_then(|place| row.figures.get(place).copied().flatten())
+fn figure(table: &Table, row: &Row, metric: Metric) -> Option<f64> {
+    table.place(metric).and_then(|place| row.figures.get(place).copied().flatten())
 }
 
 /// Nothing over nothing is no change.
@@ -223,13 +225,13 @@ pub fn regress_table(comparison: &Comparison) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::table_file::tests::row;
     use super::*;
+    use crate::campaign::table_file::tests::row;
     use armcal_core::stats::stream_rng;
     use rand_distr::{Distribution, LogNormal};
 
     fn table(errors_m: impl IntoIterator<Item = f64>) -> Table {
-        let names = ["tool_error_after_median_m", "contacts"].map(str::to_owned).to_vec();
+        let names = [Metric::ToolErrorAfterMedian, Metric::Contacts].map(|metric| metric.name().to_owned()).to_vec();
         let row = |(seed, error_m): (u64, f64)| Row { figures: vec![Some(error_m), Some(0.0)], ..row(0, seed) };
         Table { names, rows: (1..).zip(errors_m).map(row).collect() }
     }

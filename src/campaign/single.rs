@@ -2,9 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use super::row::one_line;
-use super::{Job, Prepared, Row, RunStatus};
+use crate::campaign::row::one_line;
+use crate::campaign::{Job, Prepared, Row, RunStatus};
 use crate::output::OutputFolder;
+use crate::report::RunSummary;
 use crate::run::{Failure, Finished, Keep, RunError, RunInputs, execute};
 use armcal_belief::calib::Status;
 use armcal_belief::session::Progress;
@@ -15,9 +16,9 @@ pub struct SingleRun<'a> {
     /// Runs have their folders in here, `SETTING-SEED`.
     pub folder: &'a Path,
     /// Whether a run's folder stays, as `armcal run` leaves it.
-    pub keep: bool,
+    pub keep: Keep,
     /// What the command line exits with, for a run that came to its end (whether it is good) or one that failed.
-    pub exit_code: &'a (dyn Fn(Result<bool, &RunError>) -> u8 + Sync),
+    pub exit_code: &'a (dyn Fn(Result<&RunSummary, &RunError>) -> u8 + Sync),
 }
 
 /// Runs a job. Whatever happens is in the row.
@@ -28,14 +29,12 @@ pub fn run_job(run: &SingleRun<'_>, job: &Job, progress: &mut dyn Progress) -> R
         return job.failed("input", format!("there is no setting {}", job.setting), n_figures);
     };
     let result = in_folder(inputs, job, &folder, run.keep, progress);
-    if !run.keep {
+    if run.keep == Keep::StreamsAlone {
         // A folder that cannot be removed does no harm to the figures, and goes with the folder about it.
         let _ = std::fs::remove_dir_all(&folder);
     }
     match result {
-        Ok(finished) => {
-            Row { exit_code: (run.exit_code)(Ok(finished.summary.is_good())), ..of_finished(run, job, &finished) }
-        }
+        Ok(finished) => Row { exit_code: (run.exit_code)(Ok(&finished.summary)), ..of_finished(run, job, &finished) },
         Err(failure) => Row {
             exit_code: (run.exit_code)(Err(&failure.error)),
             ..job.failed(failure.stage.name(), failure_text(&failure.error, &folder), n_figures)
@@ -47,7 +46,7 @@ fn in_folder(
     inputs: &RunInputs,
     job: &Job,
     folder: &PathBuf,
-    keep: bool,
+    keep: Keep,
     progress: &mut dyn Progress,
 ) -> Result<Finished, Failure> {
     // Left behind by a campaign that was killed.
@@ -55,7 +54,7 @@ fn in_folder(
         let _ = std::fs::remove_dir_all(folder);
     }
     let (output, _) = OutputFolder::open(folder).map_err(Failure::of_output)?;
-    execute(inputs, job.seed, &output, if keep { Keep::Everything } else { Keep::StreamsAlone }, progress)
+    execute(inputs, job.seed, &output, keep, progress)
 }
 
 fn of_finished(run: &SingleRun<'_>, job: &Job, finished: &Finished) -> Row {

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Row, RunStatus, Table};
+use crate::campaign::{Metric, Row, RunStatus, Table, Worsening};
 use armcal_core::stats::{median_interval, quantile};
 
 /// The summary beside a campaign's table.
@@ -60,9 +60,6 @@ pub struct FailureLine {
 /// Failures that a summary names; the table has them all.
 const MAX_FAILURES: usize = 10;
 const COVERAGE: f64 = 0.95;
-/// Figures of which less is worse.
-const LESS_IS_WORSE: [&str; 6] =
-    ["tool_error_improvement", "hits_before", "hits_after", "min_clearance_m", "views", "detections"];
 
 /// Sums a table up.
 #[must_use]
@@ -78,7 +75,7 @@ pub fn statistics(table: &Table, routine: &str, fingerprint: &str) -> CampaignSu
 /// `rows`: one or more.
 fn of_setting(table: &Table, rows: &[&Row]) -> SettingStatistics {
     let count = |status| rows.iter().filter(|row| row.status == status).count();
-    let contacts = table.figure("contacts");
+    let contacts = table.place(Metric::Contacts);
     let touched = |row: &&&Row| contacts.and_then(|k| row.figures[k]).is_some_and(|n| n > 0.0);
     let failures = rows.iter().filter(|row| row.status != RunStatus::Accepted).take(MAX_FAILURES);
     SettingStatistics {
@@ -106,7 +103,10 @@ fn of_figure(name: &str, place: usize, rows: &[&Row]) -> Option<FigureStatistics
     let value = |row: &&Row| row.figures[place].filter(|value| value.is_finite()).map(|value| (value, row.seed));
     let pairs: Vec<(f64, u64)> = rows.iter().filter_map(value).collect();
     let values: Vec<f64> = pairs.iter().map(|(value, _)| *value).collect();
-    let sign = if LESS_IS_WORSE.contains(&name) { -1.0 } else { 1.0 };
+    let sign = match Metric::of_name(name).map(Metric::worsening) {
+        Some(Worsening::LessIsWorse) => -1.0,
+        Some(Worsening::MoreIsWorse) | None => 1.0,
+    };
     // Of equals the first seed.
     let &(worst, worst_seed) = pairs.iter().min_by(|a, b| (sign * b.0).total_cmp(&(sign * a.0)).then(a.1.cmp(&b.1)))?;
     let interval = median_interval(&values, COVERAGE)?;
@@ -124,8 +124,8 @@ fn of_figure(name: &str, place: usize, rows: &[&Row]) -> Option<FigureStatistics
 
 #[cfg(test)]
 mod tests {
-    use super::super::table_file::tests::{names, row};
     use super::*;
+    use crate::campaign::table_file::tests::{names, row};
 
     #[test]
     fn rows_are_counted_by_setting_and_the_worst_seed_is_named() {

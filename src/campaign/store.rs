@@ -9,11 +9,11 @@ use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-use super::parquet_file::parquet_bytes;
-use super::statistics::{CampaignSummary, statistics};
-use super::table_file::{Table, parse_table, read_table, row_line, table_text};
-use super::tables::markdown;
-use super::{CampaignError, Row};
+use crate::campaign::parquet_file::parquet_bytes;
+use crate::campaign::statistics::{CampaignSummary, statistics};
+use crate::campaign::table_file::{Table, parse_table, read_table, row_line, table_text};
+use crate::campaign::tables::markdown;
+use crate::campaign::{CampaignError, Row};
 use crate::output::{self, OutputError};
 
 /// The rows of one campaign; no other process writes to them meanwhile.
@@ -27,16 +27,29 @@ pub struct Store {
     in_place: bool,
 }
 
+/// What to do with rows that are there already.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ExistingRows {
+    /// Go on from them.
+    Keep,
+    Discard,
+}
+
 /// Begins the first line of a partial file.
 const MARK: &str = "# armcal campaign ";
 
 impl Store {
-    /// Opens the rows at `out` (a .csv), with all that earlier calls have left there. `fresh` throws them away.
+    /// Opens the rows at `out` (a .csv), with those that earlier calls have left there.
     ///
     /// # Errors
     /// [`CampaignError::OtherCampaign`] when they are of another fingerprint, [`CampaignError::Busy`], or what cannot be
     /// read or written.
-    pub fn open(out: &Path, fingerprint: &str, names: Vec<String>, fresh: bool) -> Result<Self, CampaignError> {
+    pub fn open(
+        out: &Path,
+        fingerprint: &str,
+        names: Vec<String>,
+        existing: ExistingRows,
+    ) -> Result<Self, CampaignError> {
         output::make_folder(output::parent(out))?;
         let partial = output::partial(out);
         let file = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(&partial);
@@ -49,15 +62,15 @@ impl Store {
         }
         let table = Table { names, rows: Vec::new() };
         let mut store = Self { out: out.to_owned(), file, fingerprint: fingerprint.to_owned(), table, in_place: false };
-        let loaded = store.load(&partial, fresh);
+        let loaded = store.load(&partial, existing);
         if loaded.is_err() && std::fs::metadata(&partial).is_ok_and(|found| found.len() == 0) {
             let _ = std::fs::remove_file(&partial);
         }
         loaded.map(|()| store)
     }
 
-    fn load(&mut self, partial: &Path, fresh: bool) -> Result<(), CampaignError> {
-        if fresh {
+    fn load(&mut self, partial: &Path, existing: ExistingRows) -> Result<(), CampaignError> {
+        if existing == ExistingRows::Discard {
             for path in results(&self.out) {
                 remove(&path)?;
             }
@@ -222,11 +235,11 @@ pub fn write_results(out: &Path, table: &Table, summary: &CampaignSummary) -> Re
 
 #[cfg(test)]
 mod tests {
-    use super::super::table_file::tests::{names, row};
     use super::*;
+    use crate::campaign::table_file::tests::{names, row};
 
     fn open(out: &Path, fingerprint: &str) -> Result<Store, CampaignError> {
-        Store::open(out, fingerprint, names(), false)
+        Store::open(out, fingerprint, names(), ExistingRows::Keep)
     }
 
     fn started(out: &Path, seeds: &[u64]) {
@@ -317,7 +330,7 @@ mod tests {
         let error = open(&out, "g").expect_err("refused").to_string();
         assert!(error.contains("c.csv") && error.contains("--fresh"), "{error}");
         assert!(!output::partial(&out).exists(), "a refusal leaves nothing");
-        let fresh = Store::open(&out, "g", names(), true).expect("opened");
+        let fresh = Store::open(&out, "g", names(), ExistingRows::Discard).expect("opened");
         assert!(fresh.done().is_empty() && !out.exists());
         assert!(matches!(open(&out, "g"), Err(CampaignError::Busy { .. })));
     }

@@ -2,9 +2,11 @@
 
 use std::path::Path;
 
-use super::CampaignError;
-use super::columns::{Columns, MetricKind};
-use super::row::{Row, RunStatus};
+use crate::campaign::CampaignError;
+use crate::campaign::columns::Columns;
+use crate::campaign::metric::Metric;
+use crate::campaign::row::{Row, RunStatus};
+use armcal_core::units::Unit;
 
 /// In front of the figures.
 const FIXED: [&str; 8] = ["setting", "settings", "seed", "status", "exit_code", "stage", "failure", "command"];
@@ -17,10 +19,10 @@ pub struct Table {
 }
 
 impl Table {
-    /// The place of a figure; `None` where the table lacks it.
+    /// The column of a metric; `None` where the table lacks it.
     #[must_use]
-    pub fn figure(&self, name: &str) -> Option<usize> {
-        self.names.iter().position(|n| n == name)
+    pub fn place(&self, metric: Metric) -> Option<usize> {
+        self.names.iter().position(|name| name == metric.name())
     }
 }
 
@@ -42,10 +44,10 @@ pub(super) fn row_line(row: &Row, names: &[String]) -> String {
         row.command.clone(),
     ];
     // Rust's shortest text of a number reads back as the same number.
-    let figures = row.figures.iter().zip(names).map(|(value, name)| match (value, Columns::kind(name)) {
+    let figures = row.figures.iter().zip(names).map(|(value, name)| match (value, Columns::unit(name)) {
         (None, _) => String::new(),
-        (Some(value), MetricKind::Count) => format!("{}", *value as u64),
-        (Some(value), MetricKind::Real) => format!("{value}"),
+        (Some(value), Unit::Count) => format!("{}", *value as u64),
+        (Some(value), _) => format!("{value}"),
     });
     line(fixed.into_iter().chain(figures))
 }

@@ -3,56 +3,41 @@
 use comfy_table::presets::UTF8_FULL_CONDENSED;
 use comfy_table::{CellAlignment, Table as Grid};
 
-use super::{CampaignSummary, FigureStatistics, SettingStatistics};
+use crate::campaign::{CampaignSummary, FigureStatistics, Metric, SettingStatistics};
 
-/// A figure that people look at first; the JSON has all of them.
-struct Shown {
-    name: &'static str,
-    what: &'static str,
-    scale: f64,
-    unit: &'static str,
-}
-
-const fn mm(name: &'static str, what: &'static str) -> Shown {
-    Shown { name, what, scale: 1e3, unit: "mm" }
-}
-
-const fn plain(name: &'static str, what: &'static str, unit: &'static str) -> Shown {
-    Shown { name, what, scale: 1.0, unit }
-}
-
-const SHOWN: [Shown; 14] = [
-    mm("tool_error_before_median_m", "tool error before, median over the targets"),
-    mm("tool_error_after_median_m", "tool error after, median over the targets"),
-    mm("tool_error_after_p95_m", "tool error after, 95 % of the targets"),
-    mm("tool_error_after_max_m", "tool error after, worst target"),
-    plain("tool_error_improvement", "tool error, before over after", "x"),
-    mm("reach_error_after_median_m", "miss after, median over the targets"),
-    mm("reach_error_after_max_m", "miss after, worst target"),
-    mm("min_clearance_m", "nearest to anything"),
-    plain("residual_rms_px", "residual of the fit", "px"),
-    plain("corner_scatter_px", "scatter of a tag's corners", "px"),
-    mm("held_out_rms_m", "held-out tags off by"),
-    mm("predicted_tool_error_p95_m", "tool error predicted, 95 %"),
-    plain("nees", "NEES (3 is right)", ""),
-    plain("simulated_s", "simulated time", "s"),
+/// What people look at first, and what it is to them; the JSON has all of them.
+const SHOWN: [(Metric, &str); 14] = [
+    (Metric::ToolErrorBeforeMedian, "tool error before, median over the targets"),
+    (Metric::ToolErrorAfterMedian, "tool error after, median over the targets"),
+    (Metric::ToolErrorAfterP95, "tool error after, 95 % of the targets"),
+    (Metric::ToolErrorAfterMax, "tool error after, worst target"),
+    (Metric::ToolErrorImprovement, "tool error, before over after"),
+    (Metric::ReachErrorAfterMedian, "miss after, median over the targets"),
+    (Metric::ReachErrorAfterMax, "miss after, worst target"),
+    (Metric::MinClearance, "nearest to anything"),
+    (Metric::ResidualRmsPx, "residual of the fit"),
+    (Metric::CornerScatterPx, "scatter of a tag's corners"),
+    (Metric::HeldOutRms, "held-out tags off by"),
+    (Metric::PredictedToolErrorP95, "tool error predicted, 95 %"),
+    (Metric::Nees, "NEES (3 is right)"),
+    (Metric::SimulatedTime, "simulated time"),
 ];
 
 const HEADER: [&str; 6] =
     ["figure over the seeds", "n", "median", "its 95 % interval", "95 % of seeds", "worst (seed)"];
 
 fn rows(setting: &SettingStatistics) -> Vec<[String; 6]> {
-    let row = |shown: &Shown| {
-        let figure = setting.figures.iter().find(|figure| figure.name == shown.name)?;
-        let show = |value: f64| format!("{:.2} {}", value * shown.scale, shown.unit).trim_end().to_owned();
+    let row = |&(metric, what): &(Metric, &str)| {
+        let figure = setting.figures.iter().find(|figure| figure.name == metric.name())?;
+        let unit = metric.unit();
         let FigureStatistics { n, median, median_low, median_high, p95, worst, worst_seed, .. } = figure;
         Some([
-            shown.what.to_owned(),
+            what.to_owned(),
             n.to_string(),
-            show(*median),
-            format!("{:.2} .. {:.2}", median_low * shown.scale, median_high * shown.scale),
-            show(*p95),
-            format!("{} ({worst_seed})", show(*worst)),
+            unit.shown(*median, 2),
+            format!("{} .. {}", unit.number(*median_low, 2), unit.number(*median_high, 2)),
+            unit.shown(*p95, 2),
+            format!("{} ({worst_seed})", unit.shown(*worst, 2)),
         ])
     };
     SHOWN.iter().filter_map(row).collect()

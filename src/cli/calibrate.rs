@@ -6,13 +6,12 @@ use std::time::Instant;
 use anyhow::{Context, Result};
 use clap::Args;
 
-use super::exit::{Exit, UsageError};
-use super::files;
-use super::given::CalibrationInputs;
-use super::stdout::say;
+use crate::cli::calibration_inputs::CalibrationInputs;
+use crate::cli::exit::{Exit, UsageError};
+use crate::cli::stdout::say;
+use crate::output;
 use crate::report::{RunSummary, table};
 use armcal_belief::calib::{CompactCalibration, MapResult, Status};
-use armcal_core::log::{Completeness, Recording};
 use armcal_core::robot::{self, FailedJoint, Robot};
 use armcal_core::routine::Method;
 
@@ -76,7 +75,7 @@ pub(super) fn calibrate(args: &CalibrateArgs) -> Result<Exit> {
     // Before anything is written: what has no compact form shall leave no half of the answer.
     let shown =
         if args.compact { CompactCalibration::of(&calibration)?.to_text()? } else { table(&summary).to_string() };
-    files::make_folder(&args.out)?;
+    output::make_folder(&args.out)?;
     let json = serde_json::to_string_pretty(&summary).context("summary.json")?;
     let (map_file, calibration_file) = (args.out.join("tagmap.toml"), args.out.join("calibration.toml"));
     let (map, text) = (calibration.map.as_ref().map(MapResult::to_toml), calibration.to_toml());
@@ -84,37 +83,11 @@ pub(super) fn calibrate(args: &CalibrateArgs) -> Result<Exit> {
     let mut written: Vec<(&Path, &[u8])> = Vec::new();
     written.extend(map.iter().map(|map| (map_file.as_path(), map.as_bytes())));
     written.extend([(calibration_file.as_path(), text.as_bytes()), (summary_file.as_path(), json.as_bytes())]);
-    files::write_together(&written)?;
+    output::write_together(&written)?;
     say(&shown)?;
     Ok(match (calibration.status, lost) {
         (Status::Refused, _) => Exit::Refused,
         (Status::Accepted, true) => Exit::DataLost,
         (Status::Accepted, false) => Exit::Ok,
     })
-}
-
-pub(super) fn describe(completeness: &Completeness) -> String {
-    match completeness {
-        Completeness::Whole => "whole".to_owned(),
-        Completeness::Cut { reason, readable_messages } => format!("cut: {reason}; {readable_messages} messages read"),
-        Completeness::Damaged { reason, lost_bytes, readable_messages, .. } => {
-            format!("damaged: {reason}; {lost_bytes} bytes lost, {readable_messages} messages read")
-        }
-    }
-}
-
-/// Says on stderr what a recording has lost; `true` if it has lost anything.
-pub(super) fn warn_of_losses(recording: &Recording) -> bool {
-    let file = recording.path.display();
-    let whole = recording.completeness == Completeness::Whole;
-    if !whole {
-        eprintln!("warning: {file}: {}; what could be read is used", describe(&recording.completeness));
-    }
-    for (what, n) in &recording.rejected {
-        eprintln!("warning: {file}: {n} messages rejected on {what}");
-    }
-    if recording.non_monotonic > 0 {
-        eprintln!("warning: {file}: log time went backwards {} times", recording.non_monotonic);
-    }
-    !whole || !recording.rejected.is_empty()
 }

@@ -6,11 +6,13 @@ use std::time::Instant;
 use anyhow::Result;
 use clap::Args;
 
-use super::exit::{Exit, UsageError};
-use super::files;
-use super::many::{BatchRun, CampaignBar, check_name, exit_of, interrupts, range_of, run_many};
-use super::overrides::OverrideArgs;
+use crate::campaign::ExistingRows;
 use crate::campaign::{CampaignSummary, Prepared, Request, Shard, Store, jobs, merge, table, write_results};
+use crate::cli::batch::{BatchRun, CampaignBar, check_name, exit_of, interrupts, range_of, run_many};
+use crate::cli::exit::{Exit, UsageError};
+use crate::cli::overrides::OverrideArgs;
+use crate::output;
+use crate::run::Keep;
 use armcal_core::routine::SeedRange;
 
 #[derive(Debug, Args)]
@@ -56,7 +58,7 @@ pub(super) fn campaign(args: &CampaignArgs) -> Result<Exit> {
 fn merged(paths: &[PathBuf], out: &Path) -> Result<Exit> {
     check_name(out)?;
     let (rows, summary) = merge(paths)?;
-    files::make_folder(files::parent(out))?;
+    output::make_folder(output::parent(out))?;
     write_results(out, &rows, &summary)?;
     Ok(show(&summary, out))
 }
@@ -70,14 +72,16 @@ fn run(args: &CampaignArgs, routine: &Path) -> Result<Exit> {
         args.out.clone().unwrap_or_else(|| Path::new("recordings").join(&prepared.routine.name).join("campaign.csv"));
     check_name(&out)?;
     let range = range_of(args.seeds, &prepared)?;
-    let mut store = Store::open(&out, &prepared.fingerprint, prepared.columns.names(), args.fresh)?;
+    let existing = if args.fresh { ExistingRows::Discard } else { ExistingRows::Keep };
+    let mut store = Store::open(&out, &prepared.fingerprint, prepared.columns.names(), existing)?;
     let n_before = store.table().rows.len();
     let jobs = jobs(&prepared, range, args.shard, &store.done());
     if n_before > 0 {
         eprintln!("{n_before} rows are there already; {} runs are left", jobs.len());
     }
-    let folder = files::with_suffix(&out, if args.keep { ".runs" } else { ".work" });
-    let many = BatchRun { prepared: &prepared, folder: &folder, keep: args.keep, threads: args.threads, stop: &stop };
+    let folder = output::with_suffix(&out, if args.keep { ".runs" } else { ".work" });
+    let keep = if args.keep { Keep::Everything } else { Keep::StreamsAlone };
+    let many = BatchRun { prepared: &prepared, folder: &folder, keep, threads: args.threads, stop: &stop };
     let mut bar = CampaignBar::new(&prepared, store.table(), jobs.len());
     let whole = run_many(&many, &jobs, &mut |row| {
         bar.add(&row);

@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result};
 use clap::Args;
 
-use super::exit::{Exit, UsageError};
-use super::overrides::OverrideArgs;
 #[cfg(feature = "sim")]
 use crate::campaign::Request;
+use crate::cli::exit::{Exit, UsageError, explain};
+use crate::cli::overrides::OverrideArgs;
 use armcal_belief::calib::Calibration;
 use armcal_belief::plan::PlanFile;
 use armcal_belief::tagmap::files::read_landmarks;
@@ -34,7 +34,7 @@ pub(super) fn check(args: &CheckArgs) -> Result<Exit> {
             Ok(found) => println!("ok: {}: {found}", file.display()),
             Err(error) => {
                 all_good = false;
-                println!("error: {}", super::explain(&error));
+                println!("error: {}", explain(&error));
             }
         }
     }

@@ -2,7 +2,7 @@
 
 use std::io::BufRead;
 
-use super::progress::Bar;
+use crate::cli::progress::Bar;
 use armcal_belief::session::{Approval, MotionAhead, Progress};
 use armcal_core::streams::Phase;
 

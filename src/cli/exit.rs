@@ -2,6 +2,8 @@
 
 use std::process::ExitCode;
 
+#[cfg(feature = "sim")]
+use crate::report::RunSummary;
 use armcal_belief::calib::{CalibError, CalibrationFileError, CompactError};
 use armcal_belief::plan::{ItineraryError, PlanError};
 use armcal_belief::session::SessionError;
@@ -47,8 +49,8 @@ impl From<Exit> for ExitCode {
 
 /// A run that came to its end: accepted and every limit held, or not.
 #[cfg(feature = "sim")]
-pub(super) fn of_good(is_good: bool) -> Exit {
-    if is_good { Exit::Ok } else { Exit::Refused }
+pub(super) fn of_summary(summary: &RunSummary) -> Exit {
+    if summary.is_good() { Exit::Ok } else { Exit::Refused }
 }
 
 /// Something is missing on the command line.
@@ -108,4 +110,17 @@ fn is_invalid_campaign(_: &(dyn std::error::Error + 'static)) -> bool {
 
 fn is_write_failure(error: &LogError) -> bool {
     matches!(error, LogError::Write { .. } | LogError::Create { .. })
+}
+
+/// The chain of causes, each said once: many messages already hold that of their source.
+pub(super) fn explain(error: &anyhow::Error) -> String {
+    let mut text = error.to_string();
+    for cause in error.chain().skip(1) {
+        let cause = cause.to_string();
+        if !text.contains(&cause) {
+            text.push_str(": ");
+            text.push_str(&cause);
+        }
+    }
+    text
 }

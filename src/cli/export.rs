@@ -7,8 +7,8 @@ use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 
-use super::exit::{Exit, UsageError};
-use super::stdout::say;
+use crate::cli::exit::{Exit, UsageError};
+use crate::cli::stdout::say;
 use armcal_belief::calib::{Calibration, CompactCalibration, LookupTable};
 use armcal_core::robot::{self, Robot};
 use armcal_core::sensor::{ArmSensors, SensorModel};

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result};
 use clap::Args;
 
-use super::exit::Exit;
-use super::stdout::say;
+use crate::cli::exit::Exit;
+use crate::cli::stdout::say;
 use crate::report::inspection::{State, inspect as look, to_text};
 use armcal_core::log::{LogError, read_attachments};
 use armcal_core::robot::{self, Robot};

@@ -7,11 +7,11 @@ use clap::Args;
 use comfy_table::presets::{ASCII_MARKDOWN, UTF8_FULL_CONDENSED};
 use comfy_table::{CellAlignment, Table};
 
-use super::exit::Exit;
-use super::files;
-use super::given::read_prior;
-use super::overrides::OverrideArgs;
-use super::stdout::say;
+use crate::cli::calibration_inputs::read_prior;
+use crate::cli::exit::Exit;
+use crate::cli::overrides::OverrideArgs;
+use crate::cli::stdout::say;
+use crate::output;
 use armcal_belief::plan::{
     ArmBelief, ClearanceModel, ItineraryRequest, PlanFile, PlanHeader, PoseTable, SetName, plan_itinerary,
 };
@@ -63,12 +63,12 @@ pub(super) fn plan(args: &PlanArgs) -> Result<Exit> {
         eprintln!("warning: a pose is left out: {}", left.reason);
     }
     let out = args.out.clone().unwrap_or_else(|| Path::new("recordings").join(format!("{}-plan", routine.name)));
-    files::make_folder(&out)?;
+    output::make_folder(&out)?;
     let (toml, markdown) = (file.to_toml(), markdown(&file));
     let (toml_path, markdown_path) = (out.join("plan.toml"), out.join("plan.md"));
     #[cfg(feature = "viewer")]
     let rrd = (out.join("plan.rrd"), picture(&routine, (&robot, &vehicle), &file, &markdown)?);
-    files::write_together(&[
+    output::write_together(&[
         #[cfg(feature = "viewer")]
         (&rrd.0, &rrd.1),
         (&markdown_path, markdown.as_bytes()),

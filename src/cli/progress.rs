@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use indicatif::{ProgressBar, ProgressStyle};
 
-use super::interrupt::Interrupt;
+use crate::cli::interrupt::Interrupt;
 use armcal_belief::session::Progress;
 use armcal_core::streams::Phase;
 

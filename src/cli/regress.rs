@@ -5,13 +5,14 @@ use std::path::PathBuf;
 use anyhow::{Context, Result};
 use clap::Args;
 
-use super::exit::{Exit, UsageError};
-use super::files;
-use super::many::{BatchRun, CampaignBar, check_name, interrupts, range_of, run_many};
-use super::overrides::OverrideArgs;
 use crate::campaign::{
     Job, Prepared, Request, Row, Table, compare, jobs, read_table, regress_table, statistics, table, table_text,
 };
+use crate::cli::batch::{BatchRun, CampaignBar, check_name, interrupts, range_of, run_many};
+use crate::cli::exit::{Exit, UsageError};
+use crate::cli::overrides::OverrideArgs;
+use crate::output;
+use crate::run::Keep;
 use armcal_core::routine::SeedRange;
 
 #[derive(Debug, Args)]
@@ -54,13 +55,13 @@ pub(super) fn regress(args: &RegressArgs) -> Result<Exit> {
         return Ok(Exit::Failure);
     };
     if let Some(out) = args.write_baseline.as_ref().or(args.out.as_ref()) {
-        files::write_whole(out, table_text(&now).as_bytes())?;
+        output::write_whole(out, table_text(&now).as_bytes())?;
     }
     let Some(baseline) = baseline else {
         let summary = statistics(&now, &prepared.routine.name, &prepared.fingerprint);
         print!("{}", table(&summary));
         println!("written      {}", args.write_baseline.as_deref().unwrap_or(&args.routine).display());
-        return Ok(super::many::exit_of(&summary));
+        return Ok(crate::cli::batch::exit_of(&summary));
     };
     let comparison = compare(&baseline, &now, &prepared.routine.regress);
     println!("{}", regress_table(&comparison));
@@ -94,7 +95,8 @@ fn jobs_of(baseline: &Table, args: &RegressArgs, prepared: &Prepared) -> Result<
 fn run(args: &RegressArgs, prepared: &Prepared, jobs: &[Job]) -> Result<Option<Table>> {
     let stop = interrupts()?;
     let folder = tempfile::tempdir().context("no temporary folder can be made")?;
-    let many = BatchRun { prepared, folder: folder.path(), keep: false, threads: args.threads, stop: &stop };
+    let many =
+        BatchRun { prepared, folder: folder.path(), keep: Keep::StreamsAlone, threads: args.threads, stop: &stop };
     let mut now = Table { names: prepared.columns.names(), rows: Vec::new() };
     let mut bar = CampaignBar::new(prepared, &now, jobs.len());
     let whole = run_many(&many, jobs, &mut |row| {

@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result};
 use clap::Args;
 
-use super::calibrate::warn_of_losses;
-use super::exit::{Exit, UsageError};
-use super::files;
+use crate::cli::exit::{Exit, UsageError};
+use crate::cli::losses::warn_of_losses;
+use crate::output;
 use armcal_belief::calib::surveyed;
 use armcal_core::log::{Recording, read_attachments, read_recording};
 use armcal_core::robot::{self, Robot, Vehicle};
@@ -42,9 +42,9 @@ pub(super) fn replay(args: &ReplayArgs) -> Result<Exit> {
     };
     match &args.save {
         Some(out) => {
-            files::check_replaceable(out)?;
-            write_rrd(&input, &files::partial(out))?;
-            files::complete(out)?;
+            output::check_replaceable(out)?;
+            write_rrd(&input, &output::partial(out))?;
+            output::complete(out)?;
             println!("written      {}", out.display());
         }
         None => {

@@ -6,12 +6,12 @@ use std::time::Instant;
 use anyhow::Result;
 use clap::Args;
 
-use super::confirm::Confirm;
-use super::exit::{Exit, of_good};
-use super::interrupt::Interrupt;
-use super::overrides::OverrideArgs;
-use super::progress::Bar;
-use super::stdout::say;
+use crate::cli::confirm::Confirm;
+use crate::cli::exit::{Exit, of_summary};
+use crate::cli::interrupt::Interrupt;
+use crate::cli::overrides::OverrideArgs;
+use crate::cli::progress::Bar;
+use crate::cli::stdout::say;
 use crate::output::OutputFolder;
 use crate::report::table;
 use crate::run::{Failure, Keep, RunInputs, execute};
@@ -51,7 +51,7 @@ pub(super) fn run(args: &RunArgs) -> Result<Exit> {
     bar.finish();
     let finished = result.map_err(explained)?;
     say(&format!("{}\nwritten      {}", table(&finished.summary), out.display()))?;
-    Ok(of_good(finished.summary.is_good()))
+    Ok(of_summary(&finished.summary))
 }
 
 /// Names the recording that a broken run leaves.

@@ -6,10 +6,10 @@ use std::path::PathBuf;
 use anyhow::{Context, Result};
 use clap::Args;
 
-use super::exit::{Exit, UsageError};
-use super::files;
-use super::overrides::OverrideArgs;
-use super::stdout::say;
+use crate::cli::exit::{Exit, UsageError};
+use crate::cli::overrides::OverrideArgs;
+use crate::cli::stdout::say;
+use crate::output;
 use armcal_belief::plan::ClearanceModel;
 use armcal_core::routine;
 use armcal_study as study;
@@ -42,7 +42,7 @@ pub(super) fn sensitivity(args: &SensitivityArgs) -> Result<Exit> {
     let found = study::sensitivity(&robot, &clearance, poses, min_tags, args.seed.unwrap_or(routine.seed))
         .map_err(|problem| UsageError(format!("{}: {problem}", args.routine.display())))?;
     let statement = found.statement();
-    files::make_folder(&args.out)?;
+    output::make_folder(&args.out)?;
     let figures = found.figures().map_err(anyhow::Error::msg)?;
     let mut written = vec![("sensitivity.csv", found.csv()), ("statement.md", statement.clone())];
     written.extend(figures);

@@ -7,11 +7,13 @@ use std::time::Instant;
 use anyhow::{Context, Result};
 use clap::{Args, Subcommand};
 
-use super::exit::Exit;
-use super::files;
-use super::study_paper::{PaperArgs, paper};
-use super::study_plan::{EdgesArgs, PairsArgs, PathsArgs, StrayArgs, edges, paths, self_collision, tracking_error};
-use super::study_poses::{PosesArgs, poses};
+use crate::cli::exit::Exit;
+use crate::cli::study_paper::{PaperArgs, paper};
+use crate::cli::study_plan::{
+    EdgesArgs, PairsArgs, PathsArgs, StrayArgs, edges, paths, self_collision, tracking_error,
+};
+use crate::cli::study_poses::{PosesArgs, poses};
+use crate::output;
 use armcal_core::optics::Fisheye;
 use armcal_core::stats::quantile;
 use armcal_detect::{DetectorSettings, GreyImage};
@@ -88,9 +90,9 @@ fn detection(args: &DetectionArgs) -> Result<Exit> {
         second_decimation: args.second_decimation,
         ..DetectorSettings::default()
     };
-    files::make_folder(&args.out)?;
+    output::make_folder(&args.out)?;
     if let Some(folder) = &args.images {
-        files::make_folder(folder)?;
+        output::make_folder(folder)?;
     }
     let mut clock = Clock { start: Instant::now(), images: args.images.as_deref() };
     let study = detection_study(&lens, &settings, &conditions(args.repeats), args.seed, &mut clock)?;

@@ -6,9 +6,9 @@ use std::path::PathBuf;
 use anyhow::{Context, Result};
 use clap::Args;
 
-use super::exit::Exit;
-use super::files;
-use super::stdout::say;
+use crate::cli::exit::Exit;
+use crate::cli::stdout::say;
+use crate::output;
 use armcal_study::paper::{Tier, experiments, paper_csv, paper_figures, paper_markdown, run_experiment};
 
 #[derive(Debug, Args)]
@@ -29,7 +29,7 @@ pub(super) struct PaperArgs {
 
 pub(super) fn paper(args: &PaperArgs) -> Result<Exit> {
     let robot = armcal_core::robot::load(&args.robot)?;
-    files::make_folder(&args.out)?;
+    output::make_folder(&args.out)?;
     let experiments = experiments(if args.quick { Tier::Small } else { Tier::Full });
     let mut rows = Vec::new();
     for experiment in &experiments {

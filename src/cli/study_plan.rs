@@ -7,9 +7,9 @@ use std::time::Instant;
 use anyhow::{Context, Result};
 use clap::Args;
 
-use super::exit::Exit;
-use super::files;
-use super::stdout::say;
+use crate::cli::exit::Exit;
+use crate::cli::stdout::say;
+use crate::output;
 use armcal_belief::plan::{ClearanceModel, sample_self_pairs};
 use armcal_core::log::read_recording;
 use armcal_core::robot::{SELF_COLLISION_FILE, load, load_vehicle, load_without_pairs};
@@ -177,7 +177,7 @@ fn clock() -> impl Fn() -> f64 {
 }
 
 fn write(folder: &Path, files: &[(String, String)]) -> Result<()> {
-    files::make_folder(folder)?;
+    output::make_folder(folder)?;
     for (name, text) in files {
         let path = folder.join(name);
         fs::write(&path, text).with_context(|| format!("{}: cannot be written", path.display()))?;

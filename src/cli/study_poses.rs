@@ -6,9 +6,9 @@ use std::path::PathBuf;
 use anyhow::{Context, Result};
 use clap::Args;
 
-use super::exit::Exit;
-use super::files;
-use super::stdout::say;
+use crate::cli::exit::Exit;
+use crate::cli::stdout::say;
+use crate::output;
 use armcal_sim::WorldSpec;
 use armcal_study::{pose_study, poses_csv, poses_figure, poses_table};
 
@@ -28,7 +28,7 @@ pub(super) struct PosesArgs {
 pub(super) fn poses(args: &PosesArgs) -> Result<Exit> {
     let routine = armcal_core::routine::load(&args.routine)?;
     let (robot, vehicle) = routine.load_arm()?;
-    files::make_folder(&args.out)?;
+    output::make_folder(&args.out)?;
     let rows = pose_study(&routine, (&robot, &vehicle), &WorldSpec::default(), 0..args.seeds)?;
     let report = poses_table(&rows);
     let figure = poses_figure(&rows).map_err(anyhow::Error::msg)?;

@@ -7,9 +7,9 @@ use clap::{Args, ValueEnum};
 use comfy_table::presets::UTF8_FULL_CONDENSED;
 use comfy_table::{CellAlignment, Table};
 
-use super::exit::Exit;
-use super::files;
-use super::stdout::say;
+use crate::cli::exit::Exit;
+use crate::cli::stdout::say;
+use crate::output;
 use armcal_belief::calib::surveyed;
 use armcal_belief::tagmap::files::{NamedCamera, TagFile, map_to_text, read_cameras, read_tags};
 use armcal_belief::tagmap::recording::{RecordedViews, read_views};
@@ -68,7 +68,7 @@ pub(super) fn tagmap(args: &TagmapArgs) -> Result<Exit> {
     let (cameras, tags, settings) = match (&args.robot, &args.camera, &args.tags) {
         (Some(folder), ..) => of_robot(&args.recording, &robot::load(folder)?)?,
         (None, Some(camera), Some(tags)) => of_files(camera, tags)?,
-        _ => return Err(super::exit::UsageError("name --robot, or --camera and --tags".to_owned()).into()),
+        _ => return Err(crate::cli::exit::UsageError("name --robot, or --camera and --tags".to_owned()).into()),
     };
     let settings = MapSettings { mode: args.mode.map_or(settings.mode, MapMode::from), ..settings };
     let read = read_views(&args.recording, &cameras, args.topic.as_deref(), &tags)?;
@@ -78,7 +78,7 @@ pub(super) fn tagmap(args: &TagmapArgs) -> Result<Exit> {
     let map = solve(&input, &settings).map_err(|error| anyhow::Error::from(error).context(format!("{file}")))?;
     if let Some(out) = &args.out {
         let text = map_to_text(out, &map, &input).map_err(robot::RobotError::from)?;
-        files::write_together(&[(out, text.as_bytes())])?;
+        output::write_together(&[(out, text.as_bytes())])?;
     }
     say(&describe(&map, &read, &cameras))?;
     Ok(warn(&file.to_string(), &map, &read, &tags))

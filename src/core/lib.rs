@@ -14,3 +14,4 @@ pub mod spatial;
 pub mod stats;
 pub mod streams;
 pub mod time;
+pub mod units;

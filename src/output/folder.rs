@@ -8,7 +8,7 @@ use std::fs::{self, File, TryLockError};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-use super::{OutputError, check_replaceable, complete, make_folder, partial};
+use crate::output::{OutputError, check_replaceable, complete, make_folder, partial};
 use armcal_core::log::{LogError, for_each_raw, topics};
 
 /// What a run leaves, in the order in which it is put in place.
@@ -256,14 +256,19 @@ mod tests {
     #[test]
     fn locks_hold_while_many_come_and_go() {
         let dir = tempfile::tempdir().unwrap();
+        use std::sync::atomic::Ordering::SeqCst;
+        const ENTRIES: usize = 300;
         let inside = std::sync::atomic::AtomicUsize::new(0);
         let entered = std::sync::atomic::AtomicUsize::new(0);
         std::thread::scope(|scope| {
             for _ in 0..4 {
                 scope.spawn(|| {
-                    for _ in 0..300 {
+                    // A lock that stays behind would keep everyone out.
+                    for _ in 0..1_000_000 {
+                        if entered.load(SeqCst) >= ENTRIES {
+                            break;
+                        }
                         let Ok((output, _)) = OutputFolder::open(dir.path()) else { continue };
-                        use std::sync::atomic::Ordering::SeqCst;
                         assert_eq!(inside.fetch_add(1, SeqCst), 0, "two runs in one folder");
                         entered.fetch_add(1, SeqCst);
                         std::thread::yield_now();
@@ -273,7 +278,7 @@ mod tests {
                 });
             }
         });
-        assert!(entered.into_inner() >= 300);
+        assert!(entered.into_inner() >= ENTRIES);
     }
 
     #[test]

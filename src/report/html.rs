@@ -2,8 +2,9 @@
 
 use maud::{DOCTYPE, Markup, html as markup};
 
-use super::summary::{RunSummary, Score};
-use super::table::{check_lines, labelled, score_rows};
+use crate::report::summary::RunSummary;
+use crate::report::table::{check_lines, labelled, score_rows};
+use crate::score::Score;
 use armcal_belief::calib::{Calibration, Status};
 
 const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;max-width:60em;margin:2em auto;padding:0 1em;color:#1b2733}\

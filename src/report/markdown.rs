@@ -1,7 +1,7 @@
 //! The same figures as Markdown, for the replay's summary panel, which is narrow.
 
-use super::summary::RunSummary;
-use super::table::{check_lines, labelled, score_rows};
+use crate::report::summary::RunSummary;
+use crate::report::table::{check_lines, labelled, score_rows};
 
 /// Lays a summary out as Markdown.
 #[must_use]

@@ -12,8 +12,5 @@ mod table;
 
 pub use html::html;
 pub use markdown::markdown;
-pub use summary::{
-    AssertSummary, CalibrationSummary, CaptureSummary, HeldOutSummary, JointScore, MarginSummary, ReachScore,
-    RenewalSummary, RunSummary, Score, ScoreSide, TouchScore,
-};
+pub use summary::{AssertSummary, CalibrationSummary, CaptureSummary, HeldOutSummary, RenewalSummary, RunSummary};
 pub use table::table;

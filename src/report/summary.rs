@@ -4,11 +4,13 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+use crate::score::{MarginSummary, Score};
 use armcal_belief::calib::{
     Calibration, CameraMount, FailedJointTable, Finding, JointResult, MapResult, ObservabilityTable, PriorTable,
     Refusal, Status, VerdictTable,
 };
 use armcal_core::numeric::Outcome;
+use armcal_core::routine::AssertFigure;
 use armcal_core::stats::Summary;
 
 /// The figures of a run or of a calibration, for programs.
@@ -73,22 +75,6 @@ pub struct CaptureSummary {
     /// Why there were no more views.
     #[serde(default, alias = "ended", skip_serializing_if = "Option::is_none")]
     pub stop_reason: Option<String>,
-}
-
-/// Displacement of the links' ends from where they are believed to be.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct MarginSummary {
-    /// Links times views.
-    pub links: usize,
-    /// Of them, those beyond the 99 % quantile that was predicted.
-    pub exceeded_q99: usize,
-    pub largest_m: f64,
-    /// At the first view.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub first_largest_m: Option<f64>,
-    /// By how many views the belief rested on: those views, links, and those of them beyond their quantile.
-    #[serde(default)]
-    pub by_views: Vec<[usize; 3]>,
 }
 
 /// One renewal of the belief while views were captured.
@@ -181,76 +167,16 @@ pub struct HeldOutSummary {
     pub nominal_rms_m: Option<f64>,
 }
 
-/// Truth against belief.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Score {
-    pub before: ScoreSide,
-    /// Absent when the calibration was refused: the arm then kept its old belief.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub after: Option<ScoreSide>,
-    /// Mean normalized squared error of the tool's position at the task, 3 when the prediction is right.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub nees: Option<f64>,
-    pub joints: Vec<JointScore>,
-    /// Every `reach` step of the script. `before` is the first of them under the datasheet's sensors, `after` the last under
-    /// calibrated ones.
-    pub reaches: Vec<ReachScore>,
-}
-
-/// One `reach` step.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct ReachScore {
-    /// Number of the step in the script, from 1.
-    pub step: usize,
-    /// Whether the arm believed in a calibration by then.
-    pub calibrated: bool,
-    #[serde(flatten)]
-    pub side: ScoreSide,
-    /// Where the jaws closed on the targets.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub touches: Option<TouchScore>,
-}
-
-/// Targets on which the jaws closed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct TouchScore {
-    pub tried: usize,
-    /// Of those, the ones that lay between the jaws.
-    pub touched: usize,
-}
-
 /// One limit of an `assert` step.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AssertSummary {
     /// Number of the step in the script, from 1.
     pub step: usize,
-    pub key: String,
+    pub key: AssertFigure,
     pub limit: f64,
     /// `None` when the script did not come to it, or there is no such figure.
     pub value: Option<f64>,
     pub holds: bool,
-}
-
-/// Errors over the task's targets.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct ScoreSide {
-    /// Where the arm believes its tool is, against where it is.
-    pub tool_error_m: Option<Summary>,
-    pub tool_error_rad: Option<Summary>,
-    /// Target against where the tool came to rest.
-    pub reach_error_m: Option<Summary>,
-    /// Targets reached within the task's tolerance.
-    pub hits: usize,
-}
-
-/// Error of one joint's believed angle, estimate less truth.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct JointScore {
-    pub name: String,
-    /// Root mean square over the task's resting poses, before and after.
-    pub angle_error_before_rad: Option<f64>,
-    pub angle_error_after_rad: Option<f64>,
-    pub estimated: bool,
 }
 
 impl RunSummary {

@@ -3,9 +3,13 @@
 use comfy_table::presets::UTF8_FULL_CONDENSED;
 use comfy_table::{CellAlignment, Table};
 
-use super::summary::{AssertSummary, GainChange, ReachScore, RenewalSummary, RunSummary, ScoreSide};
+use crate::report::summary::{
+    AssertSummary, CalibrationSummary, CaptureSummary, GainChange, RenewalSummary, RunSummary,
+};
+use crate::score::{ReachScore, ScoreSide};
 use armcal_belief::calib::{CameraMount, FailedJointTable, MapResult, PriorTable, Status, SurveyCoverage};
 use armcal_core::stats::Summary;
+use armcal_core::units::Unit;
 
 /// Lays a summary out for a terminal.
 #[must_use]
@@ -25,35 +29,30 @@ struct Figure {
     name: &'static str,
     pick: fn(&ScoreSide) -> Option<Summary>,
     of: fn(&Summary) -> f64,
-    scale: f64,
-    unit: &'static str,
+    unit: Unit,
 }
 
-const RAD_TO_DEG: f64 = 180.0 / std::f64::consts::PI;
-
 const FIGURES: [Figure; 6] = [
-    Figure { name: "tool position error, median", pick: |s| s.tool_error_m, of: |s| s.median, scale: 1e3, unit: "mm" },
-    Figure { name: "tool position error, 95 %", pick: |s| s.tool_error_m, of: |s| s.p95, scale: 1e3, unit: "mm" },
-    Figure { name: "tool position error, worst", pick: |s| s.tool_error_m, of: |s| s.max, scale: 1e3, unit: "mm" },
+    Figure { name: "tool position error, median", pick: |s| s.tool_error_m, of: |s| s.median, unit: Unit::Metres },
+    Figure { name: "tool position error, 95 %", pick: |s| s.tool_error_m, of: |s| s.p95, unit: Unit::Metres },
+    Figure { name: "tool position error, worst", pick: |s| s.tool_error_m, of: |s| s.max, unit: Unit::Metres },
     Figure {
         name: "tool orientation error, median",
         pick: |s| s.tool_error_rad,
         of: |s| s.median,
-        scale: RAD_TO_DEG,
-        unit: "deg",
+        unit: Unit::Radians,
     },
-    Figure { name: "miss at the target, median", pick: |s| s.reach_error_m, of: |s| s.median, scale: 1e3, unit: "mm" },
-    Figure { name: "miss at the target, worst", pick: |s| s.reach_error_m, of: |s| s.max, scale: 1e3, unit: "mm" },
+    Figure { name: "miss at the target, median", pick: |s| s.reach_error_m, of: |s| s.median, unit: Unit::Metres },
+    Figure { name: "miss at the target, worst", pick: |s| s.reach_error_m, of: |s| s.max, unit: Unit::Metres },
 ];
 
 /// Rows of (what, before, after, ratio); shared with the HTML report.
 pub(super) fn score_rows(before: &ScoreSide, after: Option<&ScoreSide>) -> Vec<[String; 4]> {
     let mut rows = Vec::new();
     for figure in &FIGURES {
-        let value = |side: &ScoreSide| (figure.pick)(side).map(|s| (figure.of)(&s) * figure.scale);
-        let unit = figure.unit;
+        let value = |side: &ScoreSide| (figure.pick)(side).map(|s| (figure.of)(&s));
         let (b, a) = (value(before), after.and_then(value));
-        let show = |v: Option<f64>| v.map_or_else(|| "-".to_owned(), |v| format!("{v:.2} {unit}"));
+        let show = |v: Option<f64>| figure.unit.shown_if(v, 2);
         let ratio = match (b, a) {
             (Some(b), Some(a)) if a > 0.0 => format!("{:.1} x better", b / a),
             _ => "-".to_owned(),
@@ -85,7 +84,7 @@ fn joint_table(summary: &RunSummary) -> Option<Table> {
     let mut table = Table::new();
     table.load_preset(UTF8_FULL_CONDENSED).set_header(["joint angle error, rms", "before", "after", ""]);
     for joint in &score.joints {
-        let show = |v: Option<f64>| v.map_or_else(|| "-".to_owned(), |v| format!("{:.3} deg", v.to_degrees()));
+        let show = |v: Option<f64>| Unit::Radians.shown_if(v, 3);
         let note = if joint.estimated { "" } else { "not calibrated" };
         let (before, after) = (show(joint.angle_error_before_rad), show(joint.angle_error_after_rad));
         table.add_row([joint.name.as_str(), &before, &after, note]);
@@ -113,7 +112,20 @@ pub(super) fn labelled(line: &str) -> (&str, &str) {
 
 /// What the arm itself knows, and what was lost on the way; shared with the HTML report.
 pub(super) fn check_lines(summary: &RunSummary) -> Vec<String> {
-    let mm = |v: Option<f64>| v.map_or_else(|| "-".to_owned(), |v| format!("{:.1} mm", v * 1e3));
+    let mut lines = accuracy_lines(summary);
+    lines.extend(capture_lines(&summary.capture));
+    lines.extend(calibration_lines(&summary.calibration));
+    lines.extend(contact_line(&summary.capture));
+    lines.extend(coverage_lines(&summary.calibration));
+    lines.extend(reach_lines(summary));
+    lines.extend(summary.asserts.iter().map(assert_line));
+    lines.extend(summary.stopped.iter().map(|why| format!("stopped      {why}")));
+    lines.extend(time_line(summary));
+    lines
+}
+
+/// The verdict and the errors that it rests on.
+fn accuracy_lines(summary: &RunSummary) -> Vec<String> {
     let mut lines = vec![match (summary.status, &summary.refusal) {
         (Status::Accepted, _) => "calibration  ACCEPTED".to_owned(),
         (Status::Refused, why) => format!("calibration  REFUSED: {}", why.as_deref().unwrap_or("no reason given")),
@@ -123,19 +135,23 @@ pub(super) fn check_lines(summary: &RunSummary) -> Vec<String> {
         "held out     {} views, {}: tag position error {} rms (datasheet sensors: {}), reprojection error {}",
         held_out.views,
         if held_out.cross_validated { "5-fold cross-validation" } else { "not fitted" },
-        mm(held_out.rms_m),
-        mm(held_out.nominal_rms_m),
-        held_out.rms_px.map_or_else(|| "-".to_owned(), |v| format!("{v:.1} px")),
+        Unit::Metres.shown_if(held_out.rms_m, 1),
+        Unit::Metres.shown_if(held_out.nominal_rms_m, 1),
+        Unit::Pixels.shown_if(held_out.rms_px, 1),
     ));
-    if let Some(predicted) = summary.calibration.predicted_tool_error_m {
-        lines.push(format!(
+    lines.extend(summary.calibration.predicted_tool_error_m.map(|predicted| {
+        format!(
             "predicted    tool error {} median, {} worst over the targets, from the recording and the datasheets",
-            mm(Some(predicted.median)),
-            mm(Some(predicted.max))
-        ));
-    }
-    let capture = &summary.capture;
-    lines.push(format!(
+            Unit::Metres.shown(predicted.median, 1),
+            Unit::Metres.shown(predicted.max, 1)
+        )
+    }));
+    lines
+}
+
+/// How many views there were, what of them was left out, and why the capture ended.
+fn capture_lines(capture: &CaptureSummary) -> Vec<String> {
+    let mut lines = vec![format!(
         "captured     {} poses, {} skipped; {} tag observations in {} fitted views, {} rejected; {} targets skipped",
         capture.poses,
         capture.poses_skipped,
@@ -143,43 +159,52 @@ pub(super) fn check_lines(summary: &RunSummary) -> Vec<String> {
         capture.views,
         capture.rejected,
         capture.targets_skipped
-    ));
+    )];
     if !capture.rejected_by_reason.is_empty() {
         let reasons = capture.rejected_by_reason.iter().map(|(why, n)| format!("{n} {}", why.replace('_', " ")));
         lines.push(format!("rejected     {}", reasons.collect::<Vec<_>>().join(", ")));
     }
     lines.extend(capture.stop_reason.as_ref().map(|why| stop_reason_line(why, &capture.renewals)));
-    lines.extend(summary.calibration.largest_gain_change.as_ref().map(gain_line));
-    lines.extend(summary.calibration.camera_mount.as_ref().map(mount_line));
-    lines.extend(summary.calibration.failed_joint.iter().map(failed_line));
-    lines.extend(summary.calibration.prior.as_ref().map(prior_line));
-    lines.extend(summary.calibration.map.iter().flat_map(map_lines));
-    if let (Some(collisions), clearance) = (capture.collisions, capture.min_clearance_m) {
-        lines.push(format!(
-            "contacts     {collisions}; minimum clearance to vehicle, obstacles, seafloor: {}",
-            mm(clearance)
-        ));
-    }
-    if let Some(verdict) = &summary.calibration.verdict {
+    lines
+}
+
+/// What was found beside joint angles.
+fn calibration_lines(calibration: &CalibrationSummary) -> Vec<String> {
+    let mut lines: Vec<String> = calibration.largest_gain_change.as_ref().map(gain_line).into_iter().collect();
+    lines.extend(calibration.camera_mount.as_ref().map(mount_line));
+    lines.extend(calibration.failed_joint.iter().map(failed_line));
+    lines.extend(calibration.prior.as_ref().map(prior_line));
+    lines.extend(calibration.map.iter().flat_map(map_lines));
+    lines
+}
+
+/// Collisions, which only the truth knows.
+fn contact_line(capture: &CaptureSummary) -> Option<String> {
+    let clearance = Unit::Metres.shown_if(capture.min_clearance_m, 1);
+    let collisions = capture.collisions?;
+    Some(format!("contacts     {collisions}; minimum clearance to vehicle, obstacles, seafloor: {clearance}"))
+}
+
+/// What the result does not hold for.
+fn coverage_lines(calibration: &CalibrationSummary) -> Vec<String> {
+    let mut lines = Vec::new();
+    if let Some(verdict) = &calibration.verdict {
         lines.extend(verdict.warnings.iter().map(|line| format!("warning      {line}")));
         lines.extend(verdict.not_covered.iter().map(|line| format!("not covered  {line}")));
     }
-    for line in &summary.calibration.unobservable {
-        lines.push(format!("unobservable {line}"));
-    }
-    lines.extend(reach_lines(summary));
-    lines.extend(summary.asserts.iter().map(assert_line));
-    lines.extend(summary.stopped.iter().map(|why| format!("stopped      {why}")));
-    if let (Some(simulated_s), Some(motion_s)) = (summary.simulated_s, summary.motion_s) {
-        let waited_s = summary.waited_s.unwrap_or(0.0);
-        let waited = if waited_s > 0.0 { format!(", {waited_s:.0} s waiting") } else { String::new() };
-        lines.push(format!(
-            "time         {simulated_s:.0} s simulated ({motion_s:.0} s of them moving{waited}) in {:.1} s: {:.0} times real time",
-            summary.wall_s,
-            (simulated_s - waited_s) / summary.wall_s.max(1e-9)
-        ));
-    }
+    lines.extend(calibration.unobservable.iter().map(|line| format!("unobservable {line}")));
     lines
+}
+
+fn time_line(summary: &RunSummary) -> Option<String> {
+    let (simulated_s, motion_s) = (summary.simulated_s?, summary.motion_s?);
+    let waited_s = summary.waited_s.unwrap_or(0.0);
+    let waited = if waited_s > 0.0 { format!(", {waited_s:.0} s waiting") } else { String::new() };
+    Some(format!(
+        "time         {simulated_s:.0} s simulated ({motion_s:.0} s of them moving{waited}) in {:.1} s: {:.0} times real time",
+        summary.wall_s,
+        (simulated_s - waited_s) / summary.wall_s.max(1e-9)
+    ))
 }
 
 /// Why the last capture ended, and what was predicted on its way.
@@ -192,7 +217,7 @@ fn stop_reason_line(why: &str, renewals: &[RenewalSummary]) -> String {
     format!(
         "stop reason  {why}; predicted tool error after {} views: {} mm",
         joined(|renewal| renewal.views.to_string()),
-        joined(|renewal| format!("{:.1}", 1e3 * renewal.predicted_tool_error_m))
+        joined(|renewal| Unit::Metres.number(renewal.predicted_tool_error_m, 1))
     )
 }
 
@@ -262,7 +287,7 @@ fn reach_lines(summary: &RunSummary) -> Vec<String> {
     if reaches.len() <= 2 && reaches.iter().all(|reach| reach.touches.is_none()) {
         return Vec::new();
     }
-    let mm = |v: Option<Summary>| v.map_or_else(|| "-".to_owned(), |v| format!("{:.2} mm", v.median * 1e3));
+    let mm = |v: Option<Summary>| Unit::Metres.shown_if(v.map(|v| v.median), 2);
     let line = |reach: &ReachScore| {
         let belief = if reach.calibrated { "calibrated" } else { "datasheet" };
         let (tool, miss) = (mm(reach.side.tool_error_m), mm(reach.side.reach_error_m));
@@ -277,13 +302,12 @@ fn reach_lines(summary: &RunSummary) -> Vec<String> {
 
 fn assert_line(limit: &AssertSummary) -> String {
     let verdict = if limit.holds { "holds" } else { "FAILS" };
-    // Limits stand in the routine in metres; people read millimetres.
-    let (scale, unit) = if limit.key.ends_with("_m") { (1e3, " mm") } else { (1.0, "") };
+    let unit = limit.key.unit();
     let value = limit.value.map_or_else(
         || "there is no such figure (the script did not come to it, or nothing was measured)".to_owned(),
-        |value| format!("{:.2}{unit}", value * scale),
+        |value| unit.shown(value, 2),
     );
-    format!("assert       {verdict}: step {}, {} {}{unit} against {value}", limit.step, limit.key, limit.limit * scale)
+    format!("assert       {verdict}: step {}, {} {} against {value}", limit.step, limit.key, unit.shown(limit.limit, 2))
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! What viewers need to show the arm: its URDF, the camera's lens, and where the base is bolted on.
 
-use super::RunInputs;
+use crate::run::RunInputs;
 use armcal_core::log::ros::{CameraInfo, Header, Quaternion, StringMessage, TfMessage, Transform, TransformStamped};
 use armcal_core::log::{LogError, RecordingWriter, RosMessage, topics};
 use armcal_core::robot::Robot;

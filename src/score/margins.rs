@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::report::MarginSummary;
+use crate::score::MarginSummary;
 use armcal_belief::plan::link_ends;
 use armcal_belief::session::Visit;
 use armcal_core::robot::Robot;

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use crate::report::TouchScore;
+use crate::score::TouchScore;
 use armcal_belief::session::ReachStep;
 use armcal_core::log::Recording;
 use armcal_core::robot::Robot;

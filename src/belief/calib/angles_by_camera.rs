@@ -4,7 +4,7 @@ use armcal_core::joints::JointAngles;
 use armcal_core::robot::Robot;
 
 use crate::calib::parameters::JointParameters;
-use crate::calib::views::association::{TagObservation, View};
+use crate::calib::views::view::{TagObservation, View};
 
 /// Tags farther than this from the survey hardly pull while an angle is searched for, m.
 const SEARCH_WIDTH_M: f64 = 0.1;

@@ -11,10 +11,11 @@ use crate::calib::error::CalibError;
 use crate::calib::methods::calibration::calibrate_positions;
 use crate::calib::methods::end_stops;
 use crate::calib::result::calibration::{Calibration, Status};
-use crate::calib::views::association::{CaptureData, associate_within, declared_failed, surveyed};
+use crate::calib::views::association::{associate_within, declared_failed, surveyed};
 use crate::calib::views::calibration_data::{CalibrationData, HeldOut, hash_of, used_by};
 use crate::calib::views::data_checks::{check_joints, check_order, check_pose_variation};
 use crate::calib::views::scale_identification::identify_scales;
+use crate::calib::views::view::CaptureData;
 
 /// The fewest views that may be fitted at all.
 pub const MIN_VIEWS: usize = 3;

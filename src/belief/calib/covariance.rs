@@ -12,7 +12,7 @@ use nalgebra::{Const, DMatrix, DVector, Dyn, Matrix3, Matrix6, OMatrix, Vector3,
 use crate::calib::methods::gripper_tag::MountEstimate;
 use crate::calib::methods::position_problem::PositionProblem;
 use crate::calib::parameters::{JointParameters, Parameter};
-use crate::calib::views::association::TagObservation;
+use crate::calib::views::view::TagObservation;
 use armcal_core::kinematics::{IkGoal, IkSettings, JointLimits, solve_position};
 use armcal_core::robot::{FailedJoint, FailedKind, Robot};
 use armcal_core::stats::Summary;

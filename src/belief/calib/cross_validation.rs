@@ -4,7 +4,7 @@ use crate::calib::angles_by_camera::set_by_camera;
 use crate::calib::methods::position_problem::PositionProblem;
 use crate::calib::parameters::JointParameters;
 use crate::calib::result::metrics::HeldOutMetrics;
-use crate::calib::views::association::View;
+use crate::calib::views::view::View;
 use armcal_core::robot::Robot;
 
 /// Every fifth view in the order of time is one fold.

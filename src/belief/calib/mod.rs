@@ -32,7 +32,7 @@ pub use finding::{Finding, FindingKind, FindingUnit};
 pub use geometry_error::{ErrorKind, GeometryError};
 pub use interim::interim_estimate;
 pub use methods::{
-    EndStopFit, EndStopReading, Gauge, Interpolation, MountEstimate, PositionMethod, PositionProblem, Scaling,
+    EndStopFit, Gauge, Interpolation, MountEstimate, PositionMethod, PositionProblem, PositionSearch, Scaling,
     SearchOptions, Solution, Unobservable, VarianceObjective, determined_by_variance, fisher_information, fit_stops,
     free_parameters, least_squares, minimum_distance, mount_by_gripper_tag,
 };
@@ -45,7 +45,7 @@ pub use result::{
     ValidRange, VerdictTable,
 };
 pub use views::{
-    CalibrationData, CaptureData, ConditionHistory, ForeignContext, HeldOut, IdentifiedScale, MeanCorners,
-    ObservationRejection, TagMeasurement, TagObservation, View, associate, associate_within, identify_scales,
-    prepare_foreign, prepare_pooled, surveyed,
+    CalibrationData, CaptureData, ConditionHistory, EndStopReading, ForeignContext, HeldOut, IdentifiedScale,
+    MeanCorners, ObservationRejection, TagMeasurement, TagObservation, View, associate, associate_within,
+    identify_scales, prepare_foreign, prepare_pooled, surveyed,
 };

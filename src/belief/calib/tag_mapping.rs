@@ -12,7 +12,7 @@ use nalgebra::{DMatrix, Isometry3, Matrix2, Matrix3};
 use crate::calib::covariance::CommonErrors;
 use crate::calib::error::CalibError;
 use crate::calib::result::map_table::{MapResult, MapTag, SurveyCoverage};
-use crate::calib::views::association::{CaptureData, View};
+use crate::calib::views::view::{CaptureData, View};
 use crate::tagmap::{Body, MapDetection, MapInput, MapMode, MapSettings, MapView, NoiseScale, TagMap, TagPrior, solve};
 use armcal_core::optics::CameraModel;
 use armcal_core::robot::{Robot, SurveyedTag, TagSurvey};

@@ -1,6 +1,7 @@
 //! What a run leaves, as far as the arm itself can tell.
 
 use crate::calib::Calibration;
+use armcal_core::routine::AssertFigure;
 use armcal_core::sensor::ArmSensors;
 use armcal_core::streams::{JointAngles, ReachAttempt};
 use armcal_core::time::Stamp;
@@ -85,7 +86,7 @@ pub struct ReachStep {
 pub struct AssertResult {
     /// Number of the step in the script, from 1.
     pub step: usize,
-    pub key: &'static str,
+    pub figure: AssertFigure,
     pub limit: f64,
     /// `None`: the arm itself cannot know it, or there is no such figure.
     pub value: Option<f64>,
@@ -99,7 +100,6 @@ impl AssertResult {
     /// Whether the limit holds; `None` where the figure is not known.
     #[must_use]
     pub fn holds(&self) -> Option<bool> {
-        let value = self.value?;
-        Some(if self.key == "clearance_m" { value >= self.limit } else { value <= self.limit })
+        Some(self.figure.holds(self.value?, self.limit))
     }
 }

@@ -10,7 +10,7 @@ use crate::session::outcome::{AssertResult, Epoch, EstimateUpdate, Outcome, Reac
 use crate::session::prepare::Planned;
 use crate::session::{Progress, Recorder, SessionError, SessionInputs};
 use armcal_core::robot::Robot;
-use armcal_core::routine::{AssertLimits, CalibrateSettings, CalibrateViews, MoveGoal, OnRefusal, Step};
+use armcal_core::routine::{AssertFigure, AssertLimits, CalibrateSettings, CalibrateViews, MoveGoal, OnRefusal, Step};
 use armcal_core::sensor::ArmSensors;
 use armcal_core::stats::stream_rng;
 use armcal_core::streams::{Arm, JointAngles, LogLevel, Mark, MarkKind, Message, Phase, PriorSource, ReachAttempt};
@@ -330,21 +330,25 @@ impl ScriptRunner<'_, '_> {
     fn assert(&mut self, step: usize, limits: &AssertLimits) {
         let at = Some(self.driver.now());
         let last_reach = self.reaches.len().checked_sub(1);
-        for (key, limit) in limits.each() {
-            let value = self.known(key);
-            self.asserts.push(AssertResult { step, key, limit, value, at, last_reach });
+        for (figure, limit) in limits.each() {
+            let value = self.known(figure);
+            self.asserts.push(AssertResult { step, figure, limit, value, at, last_reach });
         }
     }
 
     /// A figure that the arm itself can tell.
-    fn known(&self, key: &str) -> Option<f64> {
+    fn known(&self, figure: AssertFigure) -> Option<f64> {
         let calibration = self.calibration.as_ref();
-        match key {
-            "held_out_rms_m" => calibration?.held_out.rms_m,
-            "held_out_rms_px" => calibration?.held_out.rms_px,
-            "predicted_tool_error_m" => calibration?.predicted_tool_error_m.map(|summary| summary.p95),
-            "simulated_s" => Some(self.driver.elapsed_s()),
-            _ => None,
+        match figure {
+            AssertFigure::HeldOutRms => calibration?.held_out.rms_m,
+            AssertFigure::HeldOutReprojection => calibration?.held_out.rms_px,
+            AssertFigure::PredictedToolError => calibration?.predicted_tool_error_m.map(|summary| summary.p95),
+            AssertFigure::SimulatedTime => Some(self.driver.elapsed_s()),
+            AssertFigure::ToolError
+            | AssertFigure::ReachError
+            | AssertFigure::WorstReachError
+            | AssertFigure::Clearance
+            | AssertFigure::Contacts => None,
         }
     }
 
@@ -353,7 +357,8 @@ impl ScriptRunner<'_, '_> {
         for (offset, step) in rest.iter().enumerate() {
             if let Step::Assert(limits) = step {
                 let step = before + 1 + offset;
-                let never = |(key, limit)| AssertResult { step, key, limit, value: None, at: None, last_reach: None };
+                let never =
+                    |(figure, limit)| AssertResult { step, figure, limit, value: None, at: None, last_reach: None };
                 self.asserts.extend(limits.each().map(never));
             }
         }

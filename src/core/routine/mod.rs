@@ -5,6 +5,7 @@
 //! `step` has the script's steps, `script` reads them. `load_with` replaces keys on the way (`--set`); `[campaign]` and `[regress]` are for running a
 //! routine many times.
 
+mod assert_figure;
 mod campaign;
 mod file;
 mod overrides;
@@ -13,6 +14,7 @@ mod script;
 mod site;
 mod step;
 
+pub use assert_figure::{AssertFigure, AssertLimits};
 pub use campaign::{CampaignSettings, RegressSettings, SeedRange};
 pub use file::{
     CaptureSettings, FailedJointEntry, Margins, Method, PoseCriterion, Routine, RoutineError, TaskSettings, load,
@@ -21,6 +23,5 @@ pub use file::{
 pub use overrides::{Override, Overrides, effective_table};
 pub use scene::Scene;
 pub use step::{
-    AssertLimits, CalibrateSettings, CalibrateViews, IdentifySettings, MoveGoal, OnRefusal, ReachSettings, Step,
-    StopsSettings,
+    CalibrateSettings, CalibrateViews, IdentifySettings, MoveGoal, OnRefusal, ReachSettings, Step, StopsSettings,
 };

@@ -5,10 +5,10 @@ use std::path::Path;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
+use super::assert_figure::{AssertLimits, Needs};
 use super::file::{CaptureSettings, Margins, PoseCriterion, RoutineError, TaskSettings};
 use super::step::{
-    AssertLimits, CalibrateSettings, CalibrateViews, IdentifySettings, MoveGoal, OnRefusal, ReachSettings, Step,
-    StopsSettings,
+    CalibrateSettings, CalibrateViews, IdentifySettings, MoveGoal, OnRefusal, ReachSettings, Step, StopsSettings,
 };
 use crate::robot::FileIssue;
 
@@ -257,11 +257,11 @@ impl StepReader<'_> {
 
     fn assert(&self) -> Result<Step, FileIssue> {
         let limits: AssertLimits = self.parse()?;
-        if limits.each().next().is_none() {
+        if limits.is_empty() {
             return Err(FileIssue::new(self.file, &self.key, "holds the run against nothing: name one limit or more"));
         }
-        for (key, limit) in limits.each() {
-            self.range(key, limit, 0.0..=1e9)?;
+        for (figure, limit) in limits.each() {
+            self.range(figure.key(), limit, 0.0..=1e9)?;
         }
         Ok(Step::Assert(limits))
     }
@@ -294,12 +294,10 @@ fn check_order(file: &Path, steps: &[Step]) -> Result<(), FileIssue> {
                 captures = if settings.views == CalibrateViews::All { captures } else { 0 };
             }
             Step::Assert(limits) => {
-                let of_calibration = limits.held_out_rms_m.or(limits.held_out_rms_px).or(limits.predicted_tool_error_m);
-                let of_reach = limits.tool_error_m.or(limits.reach_error_m).or(limits.reach_error_max_m);
-                if of_calibration.is_some() && calibrations == 0 {
+                if limits.need(Needs::Calibration) && calibrations == 0 {
                     return wrong("speaks of a calibration, but no `calibrate` comes before it");
                 }
-                if of_reach.is_some() && reaches == 0 {
+                if limits.need(Needs::Reach) && reaches == 0 {
                     return wrong("speaks of a reach, but no `reach` comes before it");
                 }
             }
@@ -371,7 +369,7 @@ mod tests {
             ("[[step]]\ndo = \"assert\"\ntool_error_m = 0.01", "no `reach` comes before it"),
             ("[[step]]\ndo = \"assert\"\nheld_out_rms_m = 0.01", "no `calibrate` comes before it"),
             ("[[step]]\ndo = \"assert\"", "name one limit or more"),
-            ("[[step]]\ndo = \"assert\"\ntool_eror_m = 0.01", "unknown field `tool_eror_m`"),
+            ("[[step]]\ndo = \"assert\"\ntool_eror_m = 0.01", "unknown variant `tool_eror_m`"),
             (
                 "[[step]]\ndo = \"move\"\nto = \"stowed\"\n[[step]]\ndo = \"identify\"\njoint = \"j\"",
                 "must come before",

@@ -2,6 +2,7 @@
 
 use serde::Deserialize;
 
+use super::assert_figure::AssertLimits;
 use super::file::CaptureSettings;
 
 /// One step of a routine's script.
@@ -121,48 +122,4 @@ pub enum OnRefusal {
     #[default]
     Stop,
     Continue,
-}
-
-/// Limits that an `assert` holds the run against; absent ones are not looked at.
-///
-/// The first four are known to the arm itself, the rest to the truth of a simulated arm only.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct AssertLimits {
-    /// Held-out views of the last calibration, root mean square, at most.
-    pub held_out_rms_m: Option<f64>,
-    pub held_out_rms_px: Option<f64>,
-    /// 95th percentile over the task's targets, by the last calibration itself, at most.
-    pub predicted_tool_error_m: Option<f64>,
-    /// Since the start, at most.
-    pub simulated_s: Option<f64>,
-    /// Median over the targets of the last reach, at most.
-    pub tool_error_m: Option<f64>,
-    /// Median distance between target and tool in the last reach, at most.
-    pub reach_error_m: Option<f64>,
-    /// The worst of the last reach, at most.
-    pub reach_error_max_m: Option<f64>,
-    /// Between the arm and anything else, since the start, at least.
-    pub clearance_m: Option<f64>,
-    /// Since the start, at most.
-    pub contacts: Option<f64>,
-}
-
-impl AssertLimits {
-    /// Every limit with its key; in the order of the fields.
-    pub fn each(&self) -> impl Iterator<Item = (&'static str, f64)> {
-        [
-            ("held_out_rms_m", self.held_out_rms_m),
-            ("held_out_rms_px", self.held_out_rms_px),
-            ("predicted_tool_error_m", self.predicted_tool_error_m),
-            ("simulated_s", self.simulated_s),
-            ("tool_error_m", self.tool_error_m),
-            ("reach_error_m", self.reach_error_m),
-            ("reach_error_max_m", self.reach_error_max_m),
-            ("clearance_m", self.clearance_m),
-            ("contacts", self.contacts),
-        ]
-        .into_iter()
-        .filter_map(|(key, limit)| Some((key, limit?)))
-    }
 }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use armcal_core::log::Recording;
-use armcal_core::streams::{CaptureSet, MarkKind, Message, ReachAttempt, Thermometer};
+use armcal_core::streams::{CaptureSet, Mark, MarkKind, Message, ReachAttempt, Thermometer};
 
 /// Joints, views, tags, task and ranges.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -124,4 +124,9 @@ impl Collector {
 fn widen(range: &mut Option<[f64; 2]>, value: f64) {
     let [low, high] = range.unwrap_or([value, value]);
     *range = Some([low.min(value), high.max(value)]);
+}
+
+/// The mark of a captured view, also of one in which a single joint moved.
+pub(crate) fn is_capture(message: &Message) -> bool {
+    matches!(message, Message::Mark(Mark { kind: MarkKind::Capture { .. } | MarkKind::Identify { .. }, .. }))
 }

@@ -1,6 +1,6 @@
 //! Times as text; the rest is tested on real files from outside.
 
-use super::text::utc;
+use crate::report::inspection::text::utc;
 
 #[test]
 fn times_are_those_of_the_calendar() {

@@ -3,8 +3,8 @@
 use comfy_table::presets::NOTHING;
 use comfy_table::{CellAlignment, Table};
 
-use super::determined::ObservableParameters;
-use super::{Inspection, State};
+use crate::report::inspection::observable_parameters::ObservableParameters;
+use crate::report::inspection::{Inspection, State};
 
 /// Of sea water, and at its surface.
 const PA_PER_M: f64 = 10_055.0;

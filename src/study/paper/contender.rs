@@ -3,7 +3,8 @@
 use crate::paper::scene::{Draw, Guess, Setting};
 use armcal_belief::calib::bundle::{BundleInput, HyperparameterMode, Hyperparameters, Model, estimate};
 use armcal_belief::calib::{
-    Gauge, JointParameters, Parameter, ParameterKind, PositionMethod, PositionProblem, Scaling, SearchOptions, Solution,
+    Gauge, JointParameters, Parameter, ParameterKind, PositionMethod, PositionProblem, PositionSearch, Scaling,
+    SearchOptions, Solution,
 };
 use armcal_core::numeric::Outcome;
 
@@ -79,7 +80,10 @@ impl MethodVariant {
             guess.set(first, draw.truth.get(first));
         }
         match self.solver {
-            Solver::Position(method) => method.solve_watched(&problem, &free, &guess, &self.options, watch),
+            Solver::Position(method) => {
+                let (problem, free, guess, options) = (&problem, &free[..], &guess, &self.options);
+                method.solve_watched(&PositionSearch { problem, free, guess, options }, watch)
+            }
             Solver::Bundle => bundle(draw, &guess),
         }
     }

@@ -1,10 +1,11 @@
 //! One calibration by `bundle`, step by step: estimate, diagnose, report, judge.
 
 use crate::calib::bundle::calibration_prior::PriorConsistency;
-use crate::calib::bundle::estimate::{BundleInput, Estimate, HyperparameterMode, Outlier, estimate};
+use crate::calib::bundle::estimate::{Estimate, Outlier, estimate};
 use crate::calib::bundle::failure_impact::FailureImpact;
 use crate::calib::bundle::failures::Failure;
 use crate::calib::bundle::innovations::Innovations;
+use crate::calib::bundle::input::{BundleInput, HyperparameterMode};
 use crate::calib::bundle::model_selection::Selection;
 use crate::calib::bundle::setup::{BundleSetup, declared};
 use crate::calib::bundle::tables::{camera_mount_table, covariance_with_mount, map_table, model_table, prior_table};
@@ -22,8 +23,8 @@ use crate::calib::result::calibration::Calibration;
 use crate::calib::result::map_table::MapResult;
 use crate::calib::result::metrics::HeldOutMetrics;
 use crate::calib::tag_mapping::map_unknown_tags;
-use crate::calib::views::association::{ObservationRejection, View};
 use crate::calib::views::calibration_data::CalibrationData;
+use crate::calib::views::view::{ObservationRejection, View};
 use armcal_core::robot::{JointSensorSpec, Robot};
 use armcal_core::routine::Method;
 

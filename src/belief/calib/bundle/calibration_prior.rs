@@ -10,13 +10,14 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen, Vector6};
 
-use crate::calib::bundle::estimate::{BundleInput, Estimate, HyperparameterMode, estimate, reference};
+use crate::calib::bundle::estimate::{Estimate, estimate, reference};
 use crate::calib::bundle::failures::FailureAdjusted;
+use crate::calib::bundle::input::{BundleInput, HyperparameterMode};
 use crate::calib::bundle::model::{Hyperparameters, Model};
 use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
 use crate::calib::refusal::{MIN_USED_SHARE, Refusal};
 use crate::calib::result::calibration::Calibration;
-use crate::calib::views::association::View;
+use crate::calib::views::view::View;
 use armcal_core::robot::Robot;
 use armcal_core::sensor::Conditions;
 use armcal_core::time::Stamp;
@@ -120,12 +121,13 @@ impl CalibrationPrior {
             .flat_map(|joint| model.joints[joint].iter().map(move |&kind| Parameter { joint, kind }))
             .collect();
         let elapsed_h = elapsed_h(prior, views);
-        let rows = mount.map(|(_, rows)| rows);
-        let (claimed, loose) = covariances(prior, &robot, &scales, &parameters, rows, elapsed_h);
-        let n = claimed.nrows();
+        let mount = mount.map(|(_, rows)| rows);
+        let columns = PriorColumns { robot: &robot, scales: &scales, parameters: &parameters, mount };
+        let (covariance, widened) = covariances(prior, &columns, elapsed_h);
+        let n = covariance.nrows();
         let mean = DVector::from_fn(n, |k, _| parameters.get(k).map_or(0.0, |p| guess.get(*p)));
-        let (claimed, loose) = (regular(claimed)?, regular(loose)?);
-        Some(Self { robot, model, scales, guess, elapsed_h, mean, covariance: claimed, widened: loose })
+        let (covariance, widened) = (regular(covariance)?, regular(widened)?);
+        Some(Self { robot, model, scales, guess, elapsed_h, mean, covariance, widened })
     }
 
     /// What to estimate under the prior.
@@ -170,8 +172,8 @@ impl CalibrationPrior {
         let found = estimate(&self.under(&self.widened, views, HyperparameterMode::Given)?)?;
         let n = self.mean.len();
         let posterior = found.posterior.covariance.view((0, 0), (n, n)).into_owned();
-        let loose_info = Cholesky::new(self.widened.clone())?.inverse();
-        let gain = DMatrix::identity(n, n) - &posterior * loose_info;
+        let widened_info = Cholesky::new(self.widened.clone())?.inverse();
+        let gain = DMatrix::identity(n, n) - &posterior * widened_info;
         let moved_by = &gain * &self.covariance * gain.transpose() + &gain * &posterior;
         let moved_by = 0.5 * (&moved_by + moved_by.transpose());
         let moved = self.moved(&found);
@@ -259,38 +261,41 @@ fn elapsed_h(prior: &Calibration, views: &[View]) -> f64 {
     hours.iter().sum::<f64>() / hours.len().max(1) as f64
 }
 
-/// P0 and P1, see the module.
-fn covariances(
-    prior: &Calibration,
-    robot: &Robot,
-    scales: &Hyperparameters,
-    parameters: &[Parameter],
+/// What the prior's covariance is to have rows of.
+struct PriorColumns<'a> {
+    robot: &'a Robot,
+    scales: &'a Hyperparameters,
+    parameters: &'a [Parameter],
+    /// The mount's rows in the prior's covariance.
     mount: Option<[usize; 6]>,
-    elapsed_h: f64,
-) -> (DMatrix<f64>, DMatrix<f64>) {
+}
+
+/// P0 and P1, see the module.
+fn covariances(prior: &Calibration, columns: &PriorColumns<'_>, elapsed_h: f64) -> (DMatrix<f64>, DMatrix<f64>) {
+    let PriorColumns { robot, scales, parameters, mount } = columns;
     let row = |p: &Parameter| prior.covariance.parameters.iter().position(|name| *name == p.name(robot));
     let mut rows: Vec<Option<usize>> = parameters.iter().map(row).collect();
-    rows.extend(mount.into_iter().flatten().map(Some));
+    rows.extend(mount.iter().flatten().map(|row| Some(*row)));
     let n = rows.len();
-    let mut claimed = DMatrix::from_fn(n, n, |i, k| match (rows[i], rows[k]) {
+    let mut covariance = DMatrix::from_fn(n, n, |i, k| match (rows[i], rows[k]) {
         (Some(row), Some(column)) => prior.covariance.rows[row][column],
         _ => 0.0,
     });
     for (k, p) in parameters.iter().enumerate() {
         let spec = &robot.sensors[p.joint];
         if rows[k].is_none() {
-            claimed[(k, k)] = scales.prior_std(spec, p.joint, p.kind).max(1e-9).powi(2);
+            covariance[(k, k)] = scales.prior_std(spec, p.joint, p.kind).max(1e-9).powi(2);
         } else if p.kind == ParameterKind::Offset {
             let silent = spec.drift_std_rad_per_sqrt_h == 0.0;
             let drift = if silent { USUAL_DRIFT_STD_RAD_PER_SQRT_H } else { spec.drift_std_rad_per_sqrt_h };
-            claimed[(k, k)] += drift * drift * elapsed_h;
+            covariance[(k, k)] += drift * drift * elapsed_h;
         }
     }
-    let mut loose = claimed.clone();
+    let mut widened = covariance.clone();
     for (k, p) in parameters.iter().enumerate().filter(|(_, p)| p.kind == ParameterKind::Offset) {
-        loose[(k, k)] += robot.sensors[p.joint].offset_std_rad.max(LEAST_SLIP_STD_RAD).powi(2);
+        widened[(k, k)] += robot.sensors[p.joint].offset_std_rad.max(LEAST_SLIP_STD_RAD).powi(2);
     }
-    (claimed, loose)
+    (covariance, widened)
 }
 
 /// Symmetric, and with an inverse in spite of the file's rounding.

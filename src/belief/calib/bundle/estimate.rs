@@ -3,39 +3,18 @@
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix6, Vector6};
 
 use crate::calib::bundle::evidence::{Posterior, change, joint_info, updated};
+use crate::calib::bundle::input::{BundleInput, HyperparameterMode};
 use crate::calib::bundle::model::{Hyperparameters, Model, shape_kinds};
 use crate::calib::bundle::problem::{BundleProblem, Layout, Prior, State, WeightedMeasurement};
 use crate::calib::bundle::solve::{LOOSE, Solved, TIGHT, solve, until};
 use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
-use crate::calib::views::association::{TagMeasurement, View};
+use crate::calib::views::view::{TagMeasurement, View};
 use armcal_core::numeric::{Loss, Outcome};
 use armcal_core::robot::Robot;
 use armcal_core::sensor::Conditions;
 use armcal_core::spatial::Pose;
 
-/// What to estimate from.
-#[derive(Clone)]
-pub struct BundleInput<'a> {
-    pub robot: &'a Robot,
-    pub views: &'a [View],
-    pub model: Model,
-    pub scales: Hyperparameters,
-    /// Where the search begins, and the reference of the terms.
-    pub guess: JointParameters,
-    /// Of the joints' parameters, where there is more than the datasheet: mean and information (inverse covariance). Six rows more are
-    /// the camera mount's, about where `robot` has it.
-    pub joint_prior: Option<(DVector<f64>, DMatrix<f64>)>,
-    pub evidence: HyperparameterMode,
-}
-
-/// Whether the scales are fitted or taken as given.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum HyperparameterMode {
-    Fitted,
-    Given,
-}
-
-/// A sighting that does not belong to the rest.
+/// A tag observation that does not fit the rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Outlier {
     pub view_idx: usize,
@@ -139,14 +118,7 @@ pub fn reference(views: &[View]) -> Conditions {
 pub fn estimate<'a>(input: &BundleInput<'a>) -> Option<Estimate<'a>> {
     let (start, mut iterations) = robust_start(input);
     let prior = |scales: &Hyperparameters| prior(input, scales);
-    let mut problem = BundleProblem::new(
-        input.robot,
-        input.views,
-        &input.model,
-        &input.guess,
-        prior(&input.scales),
-        input.scales.clone(),
-    );
+    let mut problem = BundleProblem::new(input, prior(&input.scales));
     let first_state = problem.start(&input.guess);
     let mut state = problem.start(&start);
     state.tags.clone_from(&first_state.tags);
@@ -212,7 +184,7 @@ pub struct LeastSquares {
 #[must_use]
 pub fn least_squares(input: &BundleInput<'_>, relative_gain: f64) -> LeastSquares {
     let prior = prior(input, &input.scales);
-    let problem = BundleProblem::new(input.robot, input.views, &input.model, &input.guess, prior, input.scales.clone());
+    let problem = BundleProblem::new(input, prior);
     let start = problem.start(&input.guess);
     let solved = solve(&problem, start, Loss::Square, until(TIGHT.max_iterations, relative_gain));
     LeastSquares {
@@ -268,8 +240,8 @@ pub(crate) fn robust_start(input: &BundleInput<'_>) -> (JointParameters, usize) 
             joint_std_rad: straight_sensor_std(input),
             ..input.scales.clone()
         };
-        let straight = BundleInput { model: model.clone(), joint_prior: None, scales: scales.clone(), ..input.clone() };
-        let problem = BundleProblem::new(input.robot, &views, &model, &input.guess, prior(&straight, &scales), scales);
+        let linear = BundleInput { views: &views, model: model.clone(), joint_prior: None, scales, ..input.clone() };
+        let problem = BundleProblem::new(&linear, prior(&linear, &linear.scales));
         let solved = solve(&problem, problem.start(&parameters), Loss::Cauchy { c: START_WIDTH }, LOOSE);
         iterations += solved.iterations;
         parameters = parameters_of(&problem, &solved.state, &parameters);

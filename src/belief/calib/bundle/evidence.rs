@@ -42,7 +42,7 @@ impl Posterior {
         let mut groups = normal.eliminated.iter();
         for (view_idx, view) in problem.views.iter().enumerate() {
             for group in groups.by_ref().take(1 + usize::from(view.gripper.is_some())) {
-                let by_columns = group.inverse * group.own_by_columns(problem, normal, view_idx);
+                let by_columns = group.inverse * group.own_by_columns(problem, &normal.by_tag, view_idx);
                 let used: Vec<usize> =
                     (0..N_VIEW_PARAMETERS).filter(|&row| group.twists.column(row).iter().any(|v| *v != 0.0)).collect();
                 let mut right = DMatrix::from_fn(problem.layout.n, used.len(), |k, row| by_columns[(used[row], k)]);

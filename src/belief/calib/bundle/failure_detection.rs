@@ -5,17 +5,17 @@
 //! chi-squares (each cut where a sighting would be rejected), plus the joints' own and their parameters' prior, plus `2 ln(prior std / posterior std)` for
 //! each reading that is given up (Laplace's approximation of the evidence, MacKay 1992, with a round figure), must fall by `MARGIN`.
 
-use crate::calib::bundle::estimate::{Estimate, HyperparameterMode};
+use crate::calib::bundle::estimate::Estimate;
 use crate::calib::bundle::failure_pattern::{FailurePattern, Readings};
-use crate::calib::bundle::failures::{Failure, FailureAdjusted, FailureSource, SensorUse};
+use crate::calib::bundle::failures::{
+    FAR_RAD, FAR_SIGMAS, Failure, FailureAdjusted, FailureSource, MIN_VIEWS, SensorUse,
+};
+use crate::calib::bundle::input::HyperparameterMode;
 use crate::calib::parameters::{JointParameters, ParameterKind};
-use crate::calib::views::association::View;
+use crate::calib::views::view::View;
 use armcal_core::robot::{FailedKind, Robot};
 use armcal_core::stats::quantile;
 
-/// A joint's error in one view that stands out: times the spread of the others (a robust sigma), and at all, rad.
-pub(crate) const FAR_SIGMAS: f64 = 6.0;
-pub(crate) const FAR_RAD: f64 = 0.3 * std::f64::consts::PI / 180.0;
 /// A joint whose errors over all views are larger than this and than twice the datasheet's linearity is looked at, rad.
 const LARGE_STD_RAD: f64 = 0.15 * std::f64::consts::PI / 180.0;
 /// A share of rejected sightings that wrong ids alone do not make.
@@ -28,8 +28,6 @@ const MAX_PER_COORDINATE: f64 = 7.5;
 const MARGIN: f64 = 30.0;
 /// A reading moved if it spans more sigma of its noise than this.
 const STILL_SIGMAS: f64 = 8.0;
-/// Fewer views show nothing of a joint's history.
-pub(crate) const MIN_VIEWS: usize = 5;
 /// At most this many failures are looked for beyond those that the readings alone show.
 const MAX_FOUND: usize = 2;
 

@@ -7,7 +7,7 @@ use crate::calib::finding::{Finding, FindingKind, FindingUnit};
 use crate::calib::parameters::JointParameters;
 use crate::calib::refusal::Refusal;
 use crate::calib::result::failed_joint::FailedJointTable;
-use crate::calib::views::association::View;
+use crate::calib::views::view::View;
 use armcal_core::robot::{FailedJoint, FailedKind, Robot};
 use armcal_core::stats::Summary;
 use armcal_core::streams::ReachTask;

@@ -3,9 +3,8 @@
 use nalgebra::{Matrix3, Vector3};
 
 use crate::calib::bundle::estimate::Estimate;
-use crate::calib::bundle::failure_detection::{FAR_RAD, FAR_SIGMAS};
-use crate::calib::bundle::failures::SensorUse;
-use crate::calib::views::association::View;
+use crate::calib::bundle::failures::{FAR_RAD, FAR_SIGMAS, SensorUse};
+use crate::calib::views::view::View;
 use armcal_core::robot::Robot;
 use armcal_core::stats::quantile;
 

@@ -5,13 +5,19 @@
 //! that always reads the same and whose offset nobody knows: one column for all views.
 
 use crate::calib::angles_by_camera::set_by_camera;
-use crate::calib::bundle::estimate::{BundleInput, Estimate, HyperparameterMode, estimate, model_for, reference};
-use crate::calib::bundle::failure_detection::MIN_VIEWS;
+use crate::calib::bundle::estimate::{Estimate, estimate, model_for, reference};
+use crate::calib::bundle::input::{BundleInput, HyperparameterMode};
 use crate::calib::bundle::model::{Hyperparameters, Model};
 use crate::calib::parameters::{JointParameters, ParameterKind};
-use crate::calib::views::association::View;
+use crate::calib::views::view::View;
 use armcal_core::robot::{FailedJoint, FailedKind, Robot};
 use armcal_core::stats::quantile;
+
+/// A joint's error in one view that stands out: times the spread of the others (a robust sigma), and at all, rad.
+pub(crate) const FAR_SIGMAS: f64 = 6.0;
+pub(crate) const FAR_RAD: f64 = 0.3 * std::f64::consts::PI / 180.0;
+/// Fewer views show nothing of a joint's history.
+pub(crate) const MIN_VIEWS: usize = 5;
 
 /// Who says that a joint failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -7,11 +7,12 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Isometry3};
 
-use crate::calib::bundle::estimate::{BundleInput, Estimate, Outlier};
+use crate::calib::bundle::estimate::{Estimate, Outlier};
+use crate::calib::bundle::input::BundleInput;
 use crate::calib::bundle::linearize::NormalEquations;
 use crate::calib::bundle::observation_term::unseen_chi2;
 use crate::calib::bundle::problem::{BundleProblem, State, WeightedMeasurement};
-use crate::calib::views::association::View;
+use crate::calib::views::view::View;
 use armcal_core::joints::MAX_JOINTS;
 use armcal_core::numeric::Loss;
 
@@ -84,14 +85,14 @@ impl Estimate<'_> {
     }
 
     /// `views` in this estimate's columns, without any prior but the views' own.
-    fn data_only<'a>(&self, input: &BundleInput<'a>, views: &[View]) -> BundleProblem<'a> {
+    fn data_only<'a>(&self, input: &BundleInput<'a>, views: &'a [View]) -> BundleProblem<'a> {
         let mut prior = self.problem.prior.clone();
         prior.joint_info.fill(0.0);
         (prior.mount_std, prior.gripper_tag_std) = ([f64::INFINITY; 6], [f64::INFINITY; 6]);
         (prior.time_std_s, prior.lens_std) = (f64::INFINITY, [f64::INFINITY; 8]);
         prior.tags_std.fill([f64::INFINITY; 6]);
         let scales = self.problem.scales.clone();
-        let mut problem = BundleProblem::new(input.robot, views, &input.model, &input.guess, prior, scales);
+        let mut problem = BundleProblem::new(&BundleInput { views, scales, ..input.clone() }, prior);
         problem.layout = self.problem.layout.clone();
         problem
     }
@@ -122,7 +123,7 @@ impl Joined {
         let mut groups = self.normal.eliminated.iter();
         for (at, view) in problem.views.iter().enumerate() {
             for own in groups.by_ref().take(1 + usize::from(view.gripper.is_some())) {
-                let by_columns = own.own_by_columns(problem, &self.normal, at);
+                let by_columns = own.own_by_columns(problem, &self.normal.by_tag, at);
                 let value = own.inverse * (own.gradient - &by_columns * &self.step);
                 let followed = own.inverse * by_columns;
                 for joint in (0..MAX_JOINTS).filter(|&j| !view.is_free[j] && own.twists.column(j).norm() > 0.0) {

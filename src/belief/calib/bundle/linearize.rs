@@ -6,7 +6,7 @@
 //! elimination of l leaves, for the blocks a and b, `sum A_a^T H_i A_b - (sum A_a^T H_i) M (sum H_i A_b)`,
 //! `M = S (S^T G S + L)^-1 S^T`: all of it 6x6 algebra, whatever the number of corners.
 
-use nalgebra::{DMatrix, DVector, Isometry3, Matrix6, SMatrix, SVector, Vector6};
+use nalgebra::{DMatrix, DVector, Matrix6, SMatrix, SVector, Vector6};
 
 use crate::calib::bundle::observation_term::{LensInformation, PoseInformation, right_jacobian_inverse};
 use crate::calib::bundle::problem::{BundleProblem, State};
@@ -14,10 +14,37 @@ use crate::calib::bundle::schur::{
     Columns, Directions, Group, MOUNT, N_DIRECTIONS, N_VIEW_PARAMETERS, Own, SchurBlock, TIME,
 };
 use armcal_core::joints::MAX_JOINTS;
-use armcal_core::kinematics::LinkPoses;
 use armcal_core::numeric::Loss;
 use armcal_core::spatial::adjoint;
 use armcal_core::spatial::log;
+
+/// Where to linearize, and under which loss.
+struct Point<'a, 'b> {
+    problem: &'a BundleProblem<'b>,
+    state: &'a State,
+    loss: Loss,
+}
+
+/// Over the observations of a group.
+struct Sums {
+    h: Matrix6<f64>,
+    g: Vector6<f64>,
+    by_lens: SMatrix<f64, 6, 8>,
+}
+
+impl Sums {
+    fn of(infos: &[PoseInformation], lens_infos: &[LensInformation]) -> Self {
+        let mut sums = Self { h: Matrix6::zeros(), g: Vector6::zeros(), by_lens: SMatrix::zeros() };
+        for info in infos {
+            sums.h += info.h;
+            sums.g += info.g;
+        }
+        for lens in lens_infos {
+            sums.by_lens += lens.cross;
+        }
+        sums
+    }
+}
 
 /// The normal equations at one state.
 #[derive(Clone, Debug)]
@@ -60,87 +87,112 @@ impl NormalEquations {
         self.right.fill(0.0);
         self.eliminated.clear();
         self.cost = 0.0;
+        let at = Point { problem, state, loss };
         for view_idx in 0..problem.views.len() {
-            self.add_view(problem, state, view_idx, loss);
+            self.add_view(&at, view_idx);
         }
         self.add_priors(problem, state);
     }
 
-    fn add_view(&mut self, problem: &BundleProblem<'_>, state: &State, view_idx: usize, loss: Loss) {
+    fn add_view(&mut self, at: &Point<'_, '_>, view_idx: usize) {
+        let Point { problem, state, .. } = at;
         let view = &problem.views[view_idx];
         let poses = problem.robot.chain.link_poses(&problem.angles(view_idx, state));
         let before = poses.link(problem.n_camera_joints) * state.mount;
-        let camera = before * state.camera_error[view_idx];
-        let group = Group {
-            view_idx,
-            joints: 0..problem.n_camera_joints,
-            sign: 1.0,
-            by_mount: adjoint(&state.camera_error[view_idx].inverse()),
-            camera_error: problem.scales.camera_error_std.is_some().then_some(&state.camera_error[view_idx]),
-            sightings: view.sightings.clone(),
-        };
-        self.add_group(problem, state, &group, &poses, &camera, loss);
-        if let (Some(at), Some(tag)) = (view.gripper, &problem.robot.gripper_tag) {
+        self.add_group(
+            at,
+            &Group {
+                view_idx,
+                joints: 0..problem.n_camera_joints,
+                sign: 1.0,
+                by_mount: adjoint(&state.camera_error[view_idx].inverse()),
+                camera_error: problem.scales.camera_error_std.is_some().then_some(&state.camera_error[view_idx]),
+                sightings: view.sightings.clone(),
+                poses: &poses,
+                base_from_camera: before * state.camera_error[view_idx],
+            },
+        );
+        if let (Some(sighting), Some(tag)) = (view.gripper, &problem.robot.gripper_tag) {
             let group = Group {
                 view_idx,
                 joints: problem.n_camera_joints..tag.mount.n_joints,
-                // Joints behind the camera move the tag, not the camera.
+                // Joints distal to the camera move the tag, not the camera.
                 sign: -1.0,
                 by_mount: Matrix6::identity(),
                 camera_error: None,
-                sightings: at..at + 1,
+                sightings: sighting..sighting + 1,
+                poses: &poses,
+                base_from_camera: before,
             };
-            self.add_group(problem, state, &group, &poses, &before, loss);
+            self.add_group(at, &group);
         }
     }
 
-    fn add_group(
-        &mut self,
-        problem: &BundleProblem<'_>,
-        state: &State,
-        group: &Group<'_>,
-        poses: &LinkPoses,
-        base_from_camera: &Isometry3<f64>,
-        loss: Loss,
-    ) {
-        let directions = directions(problem, group, poses, base_from_camera);
-        self.linearize_sightings(problem, state, group, poses, base_from_camera, loss);
+    fn add_group(&mut self, at: &Point<'_, '_>, group: &Group<'_>) {
+        let problem = at.problem;
+        let directions = directions(problem, group);
+        self.linearize_sightings(at, group);
         let infos = std::mem::take(&mut self.infos);
         let lens_infos = std::mem::take(&mut self.lens_infos);
-        let (mut g_sum, mut h_sum) = (Vector6::zeros(), Matrix6::zeros());
-        let mut by_lens = SMatrix::<f64, 6, 8>::zeros();
-        for info in &infos {
-            h_sum += info.h;
-            g_sum += info.g;
-        }
-        for lens in &lens_infos {
-            by_lens += lens.cross;
-        }
-        let mut own = self.eliminate(problem, state, group, &directions, &h_sum, &g_sum);
+        let sums = Sums::of(&infos, &lens_infos);
+        let (h_sum, g_sum) = (sums.h, sums.g);
+        let mut own = self.eliminate(at, group, &directions, &sums);
         let (m, shift) = own.reach();
         let m_h_sum = m * h_sum;
         let q = h_sum - h_sum * m_h_sum;
         let columns = Columns::new(problem, group);
         let along = directions.transpose();
-        self.add_common(problem, &columns, &(along * (q * directions)));
-        self.add_common_right(problem, &columns, &(along * (g_sum - h_sum * shift)));
+        self.add_common(&columns, &(along * (q * directions)));
+        self.add_common_right(&columns, &(along * (g_sum - h_sum * shift)));
+        self.add_tags(&columns, &infos, &directions, &Eliminated { block: &own, m, shift, m_h_sum });
+        if let Some(at) = problem.layout.lens {
+            let lens = LensSums {
+                at,
+                infos: &infos,
+                lens_infos: &lens_infos,
+                first: group.sightings.start,
+                directions: &directions,
+                m,
+                shift,
+                h_sum,
+                by_lens: sums.by_lens,
+            };
+            self.add_lens(&columns, &lens);
+        }
+        self.infos = infos;
+        self.lens_infos = lens_infos;
+        own.by_common = h_sum * directions;
+        own.by_lens = sums.by_lens;
+        self.eliminated.push(own);
+    }
+
+    /// The tags' own blocks, and what ties them to the common parameters and to one another.
+    fn add_tags(
+        &mut self,
+        columns: &Columns<'_>,
+        infos: &[PoseInformation],
+        directions: &Directions,
+        own: &Eliminated<'_>,
+    ) {
+        let Eliminated { block, m, shift, m_h_sum } = own;
+        let first = block.range.start;
         for (k, info) in infos.iter().enumerate() {
             let u = info.h * info.adjoint;
-            self.by_tag[group.sightings.start + k].0 = u;
-            let Some(column) = self.by_tag[group.sightings.start + k].1 else { continue };
+            self.by_tag[first + k].0 = u;
+            let Some(column) = self.by_tag[first + k].1 else { continue };
             let mut own_right = self.right.fixed_rows_mut::<6>(column);
-            own_right -= info.adjoint.tr_mul(&(info.g - info.h * shift));
+            own_right -= info.adjoint.tr_mul(&(info.g - info.h * *shift));
             self.add_block(column, column, &(info.adjoint.tr_mul(&u)));
             // Common by tag: T^T (H_i - G M H_i)(-Ad_i).
-            let cross = if own.has_any { u - m_h_sum.tr_mul(&u) } else { u };
-            self.subtract_cross(problem, &columns, column, &cross.transpose(), &directions);
+            let cross = if block.has_any { u - m_h_sum.tr_mul(&u) } else { u };
+            self.subtract_cross(columns, column, &cross.transpose(), directions);
             // Only what is eliminated ties a view's tags to one another.
-            if !own.has_any {
+            if !block.has_any {
                 continue;
             }
-            let m_u = m * u;
+            let m_u = *m * u;
             for other in 0..=k {
-                let (before, Some(at)) = &self.by_tag[group.sightings.start + other] else { continue };
+                let (before, Some(at)) = &self.by_tag[first + other] else { continue };
                 let (before, at) = (*before, *at);
                 let block = -(before.tr_mul(&m_u));
                 // Rows: the other's tag.
@@ -153,51 +205,22 @@ impl NormalEquations {
                 }
             }
         }
-        if let Some(at) = problem.layout.lens {
-            self.add_lens(
-                problem,
-                &columns,
-                &LensSums {
-                    at,
-                    infos: &infos,
-                    lens_infos: &lens_infos,
-                    group,
-                    directions: &directions,
-                    m,
-                    shift,
-                    h_sum,
-                    by_lens,
-                },
-            );
-        }
-        self.infos = infos;
-        self.lens_infos = lens_infos;
-        own.by_common = h_sum * directions;
-        own.by_lens = by_lens;
-        self.eliminated.push(own);
     }
 
     /// Linearized sightings, weighted by the loss, their cost added.
-    fn linearize_sightings(
-        &mut self,
-        problem: &BundleProblem<'_>,
-        state: &State,
-        group: &Group<'_>,
-        poses: &LinkPoses,
-        base_from_camera: &Isometry3<f64>,
-        loss: Loss,
-    ) {
+    fn linearize_sightings(&mut self, point: &Point<'_, '_>, group: &Group<'_>) {
+        let Point { problem, state, loss } = point;
         self.infos.clear();
         self.lens_infos.clear();
         for at in group.sightings.clone() {
             let sighting = &problem.sightings[at];
             let (pose, column) = match &problem.robot.gripper_tag {
                 Some(tag) if sighting.tag == problem.robot.tags.len() => {
-                    (poses.link(tag.mount.n_joints) * state.gripper_tag, problem.layout.gripper_tag)
+                    (group.poses.link(tag.mount.n_joints) * state.gripper_tag, problem.layout.gripper_tag)
                 }
                 _ => (state.tags[sighting.tag], problem.layout.tags[sighting.tag]),
             };
-            let camera_from_tag = base_from_camera.inv_mul(&pose);
+            let camera_from_tag = group.base_from_camera.inv_mul(&pose);
             if problem.layout.lens.is_some() {
                 self.lens_infos.push(LensInformation::zeros());
             }
@@ -223,15 +246,8 @@ impl NormalEquations {
         }
     }
 
-    fn eliminate(
-        &mut self,
-        problem: &BundleProblem<'_>,
-        state: &State,
-        group: &Group<'_>,
-        directions: &Directions,
-        h_sum: &Matrix6<f64>,
-        g_sum: &Vector6<f64>,
-    ) -> SchurBlock {
+    fn eliminate(&mut self, at: &Point<'_, '_>, group: &Group<'_>, directions: &Directions, sums: &Sums) -> SchurBlock {
+        let Point { problem, state, .. } = at;
         let view = &problem.views[group.view_idx];
         let mut twists = SMatrix::<f64, 6, N_VIEW_PARAMETERS>::zeros();
         let mut info = SVector::<f64, N_VIEW_PARAMETERS>::repeat(1.0);
@@ -260,11 +276,11 @@ impl NormalEquations {
             prior_gradient.fixed_rows_mut::<6>(MAX_JOINTS).copy_from(&-gradient);
         }
         self.cost += own.component_mul(&own).dot(&info);
-        let mut normal: Own = twists.tr_mul(&(h_sum * twists));
+        let mut normal: Own = twists.tr_mul(&(sums.h * twists));
         for k in 0..N_VIEW_PARAMETERS {
             normal[(k, k)] += info[k];
         }
-        let gradient = twists.tr_mul(g_sum) + prior_gradient;
+        let gradient = twists.tr_mul(&sums.g) + prior_gradient;
         // Positive definite: its diagonal has the priors. Only overflow makes it fail.
         let factor = normal.cholesky();
         let log_det = factor.as_ref().map_or(0.0, |f| 2.0 * f.l_dirty().diagonal().map(f64::ln).sum());
@@ -287,54 +303,37 @@ impl NormalEquations {
         view += block;
     }
 
-    fn add_common(
-        &mut self,
-        problem: &BundleProblem<'_>,
-        columns: &Columns<'_>,
-        block: &SMatrix<f64, N_DIRECTIONS, N_DIRECTIONS>,
-    ) {
-        for b in columns.directions(problem) {
+    fn add_common(&mut self, columns: &Columns<'_>, block: &SMatrix<f64, N_DIRECTIONS, N_DIRECTIONS>) {
+        for b in columns.directions() {
             // Directions come in the order of their columns; what falls above the diagonal is not read.
-            for a in columns.directions(problem).skip_while(|a| *a < b) {
+            for a in columns.directions().skip_while(|a| *a < b) {
                 let value = block[(a, b)];
-                columns.each(problem, b, |column, by_column| {
+                columns.each(b, |column, by_column| {
                     let mut cells = self.matrix.column_mut(column);
-                    columns.each(problem, a, |row, by_row| cells[row] += value * by_column * by_row);
+                    columns.each(a, |row, by_row| cells[row] += value * by_column * by_row);
                 });
             }
         }
     }
 
-    fn add_common_right(
-        &mut self,
-        problem: &BundleProblem<'_>,
-        columns: &Columns<'_>,
-        right: &SVector<f64, N_DIRECTIONS>,
-    ) {
-        for a in columns.directions(problem) {
-            columns.each(problem, a, |row, by_row| self.right[row] += right[a] * by_row);
+    fn add_common_right(&mut self, columns: &Columns<'_>, right: &SVector<f64, N_DIRECTIONS>) {
+        for a in columns.directions() {
+            columns.each(a, |row, by_row| self.right[row] += right[a] * by_row);
         }
     }
 
     /// `by_twist`: tag by twist of the camera. Common parameters come before the tags, so that these are the rows.
-    fn subtract_cross(
-        &mut self,
-        problem: &BundleProblem<'_>,
-        columns: &Columns<'_>,
-        tag: usize,
-        by_twist: &Matrix6<f64>,
-        directions: &Directions,
-    ) {
-        for a in columns.directions(problem) {
+    fn subtract_cross(&mut self, columns: &Columns<'_>, tag: usize, by_twist: &Matrix6<f64>, directions: &Directions) {
+        for a in columns.directions() {
             let by_direction = by_twist * directions.column(a);
-            columns.each(problem, a, |column, by_column| {
+            columns.each(a, |column, by_column| {
                 let mut cells = self.matrix.fixed_view_mut::<6, 1>(tag, column);
                 cells -= by_direction * by_column;
             });
         }
     }
 
-    fn add_lens(&mut self, problem: &BundleProblem<'_>, columns: &Columns<'_>, sums: &LensSums<'_>) {
+    fn add_lens(&mut self, columns: &Columns<'_>, sums: &LensSums<'_>) {
         let at = sums.at;
         let mut h = -(sums.by_lens.transpose() * sums.m * sums.by_lens);
         let mut g = -(sums.by_lens.transpose() * sums.shift);
@@ -342,7 +341,7 @@ impl NormalEquations {
         for (k, (info, lens)) in sums.infos.iter().zip(sums.lens_infos).enumerate() {
             h += lens.h;
             g += lens.g;
-            let Some(column) = self.by_tag[sums.group.sightings.start + k].1 else { continue };
+            let Some(column) = self.by_tag[sums.first + k].1 else { continue };
             // Rows: the tag; columns: the lens, which comes before.
             let block: SMatrix<f64, 6, 8> = -(info.adjoint.transpose() * (lens.cross - info.h * m_lens));
             let mut view = self.matrix.fixed_view_mut::<6, 8>(column, at);
@@ -353,8 +352,8 @@ impl NormalEquations {
         let mut right = self.right.fixed_rows_mut::<8>(at);
         right += g;
         let cross: SMatrix<f64, N_DIRECTIONS, 8> = sums.directions.transpose() * (sums.by_lens - sums.h_sum * m_lens);
-        for a in columns.directions(problem) {
-            columns.each(problem, a, |column, by_column| {
+        for a in columns.directions() {
+            columns.each(a, |column, by_column| {
                 for k in 0..8 {
                     self.matrix[(at + k, column)] += cross[(a, k)] * by_column;
                 }
@@ -363,11 +362,20 @@ impl NormalEquations {
     }
 }
 
+/// A group whose own parameters are eliminated, with `M`, their own motion, and `M sum H_i`.
+struct Eliminated<'a> {
+    block: &'a SchurBlock,
+    m: Matrix6<f64>,
+    shift: Vector6<f64>,
+    m_h_sum: Matrix6<f64>,
+}
+
 struct LensSums<'a> {
     at: usize,
     infos: &'a [PoseInformation],
     lens_infos: &'a [LensInformation],
-    group: &'a Group<'a>,
+    /// Place of the group's first observation.
+    first: usize,
     directions: &'a Directions,
     m: Matrix6<f64>,
     shift: Vector6<f64>,
@@ -376,12 +384,8 @@ struct LensSums<'a> {
 }
 
 /// Twists of the camera (right, camera frame) by each common direction.
-fn directions(
-    problem: &BundleProblem<'_>,
-    group: &Group<'_>,
-    poses: &LinkPoses,
-    base_from_camera: &Isometry3<f64>,
-) -> Directions {
+fn directions(problem: &BundleProblem<'_>, group: &Group<'_>) -> Directions {
+    let Group { poses, base_from_camera, .. } = group;
     let view = &problem.views[group.view_idx];
     let mut directions = Directions::zeros();
     let center = base_from_camera.translation.vector;

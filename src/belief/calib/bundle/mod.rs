@@ -13,6 +13,7 @@ mod failure_impact;
 mod failure_pattern;
 mod failures;
 mod innovations;
+mod input;
 mod linearize;
 mod model;
 mod model_selection;
@@ -28,13 +29,11 @@ mod tables;
 mod verdict;
 
 pub use calibration_prior::{CalibrationPrior, MOUNT_ROWS, PriorConsistency, with_mount_rows};
-pub use estimate::{
-    BundleInput, Estimate, HyperparameterMode, LeastSquares, MIN_GRIPPER_VIEWS, Outlier, estimate, least_squares,
-    model_for, reference,
-};
+pub use estimate::{Estimate, LeastSquares, MIN_GRIPPER_VIEWS, Outlier, estimate, least_squares, model_for, reference};
 pub use failure_detection::failures;
 pub use failures::{Failure, FailureAdjusted, FailureSource, SensorUse};
 pub use innovations::{Innovations, JointInnovation};
+pub use input::{BundleInput, HyperparameterMode};
 pub use model::{Hyperparameters, Model, SHAPE_LENGTH};
 pub use model_selection::{OptionalTerm, Selection, select_model};
 pub use observability::{Observability, observability};

@@ -7,9 +7,10 @@
 
 use nalgebra::Cholesky;
 
-use crate::calib::bundle::estimate::{BundleInput, Estimate, estimate};
+use crate::calib::bundle::estimate::{Estimate, estimate};
+use crate::calib::bundle::input::BundleInput;
 use crate::calib::parameters::ParameterKind;
-use crate::calib::views::association::TagMeasurement;
+use crate::calib::views::view::TagMeasurement;
 
 /// A term that not every recording has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

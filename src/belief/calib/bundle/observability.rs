@@ -10,7 +10,8 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
 
-use crate::calib::bundle::estimate::{BundleInput, prior, robust_start};
+use crate::calib::bundle::estimate::{prior, robust_start};
+use crate::calib::bundle::input::BundleInput;
 use crate::calib::bundle::linearize::NormalEquations;
 use crate::calib::bundle::problem::{BundleProblem, Layout};
 use crate::calib::parameters::ParameterKind;
@@ -80,8 +81,7 @@ pub fn observability(input: &BundleInput<'_>) -> Option<Observability> {
     }
     (priors.mount_std, priors.gripper_tag_std) = ([f64::INFINITY; 6], [f64::INFINITY; 6]);
     (priors.time_std_s, priors.lens_std) = (f64::INFINITY, [f64::INFINITY; 8]);
-    let problem =
-        BundleProblem::new(input.robot, input.views, &input.model, &input.guess, priors, input.scales.clone());
+    let problem = BundleProblem::new(input, priors);
     let mut normal = NormalEquations::new(&problem);
     normal.update(&problem, &problem.start(&start), Loss::Square);
     let information = information(&problem, &normal, &wanted, &sigma)?;

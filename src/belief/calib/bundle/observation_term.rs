@@ -74,7 +74,8 @@ impl PoseInformation {
         let scale = noise.powi(-2);
         match seen {
             WeightedMeasurement::Corners { corners_px, half_size_m, info } => {
-                of_corners(corners_px, *half_size_m, info * scale, camera_from_tag, lens, by_lens)
+                let corners = Corners { corners_px, half_size_m: *half_size_m, info: info * scale };
+                of_corners(&corners, camera_from_tag, lens, by_lens)
             }
             WeightedMeasurement::Position { in_camera_m, info } => {
                 Some(of_position(in_camera_m, info * scale, camera_from_tag))
@@ -96,14 +97,20 @@ impl PoseInformation {
     }
 }
 
-fn of_corners(
-    corners_px: &[[f64; 2]; 4],
+/// Corner pixels of a tag and the inverse of their variance.
+struct Corners<'a> {
+    corners_px: &'a [[f64; 2]; 4],
     half_size_m: f64,
     info: f64,
+}
+
+fn of_corners(
+    corners: &Corners<'_>,
     camera_from_tag: &Isometry3<f64>,
     lens: &Fisheye,
     mut by_lens: Option<&mut LensInformation>,
 ) -> Option<PoseInformation> {
+    let Corners { corners_px, half_size_m, info } = *corners;
     let rotation = *camera_from_tag.rotation.to_rotation_matrix().matrix();
     let center = camera_from_tag.translation.vector;
     let (x, y) = (rotation.column(0) * half_size_m, rotation.column(1) * half_size_m);

@@ -4,9 +4,10 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector, Isometry3, Vector3};
 
+use crate::calib::bundle::input::BundleInput;
 use crate::calib::bundle::model::{Hyperparameters, Model};
 use crate::calib::parameters::{JointParameters, Parameter};
-use crate::calib::views::association::{MeanCorners, TagMeasurement, View};
+use crate::calib::views::view::{MeanCorners, TagMeasurement, View};
 use armcal_core::joints::{JointAngles, MAX_JOINTS};
 use armcal_core::optics::Fisheye;
 use armcal_core::robot::Robot;
@@ -167,18 +168,13 @@ impl Layout {
 }
 
 impl<'a> BundleProblem<'a> {
-    pub(crate) fn new(
-        robot: &'a Robot,
-        views: &[View],
-        model: &Model,
-        guess: &JointParameters,
-        prior: Prior,
-        scales: Hyperparameters,
-    ) -> Self {
+    pub(crate) fn new(input: &BundleInput<'a>, prior: Prior) -> Self {
+        let BundleInput { robot, views, model, scales, .. } = input;
+        let (robot, scales) = (*robot, scales.clone());
         let layout = Layout::new(robot, model, views);
         let mut sightings = Vec::new();
         let mut data = Vec::with_capacity(views.len());
-        for view in views {
+        for view in *views {
             let from = sightings.len();
             for tag in &view.tags {
                 let size_m = robot.tags[tag.tag_idx].size_m;
@@ -206,7 +202,7 @@ impl<'a> BundleProblem<'a> {
                 });
                 to
             });
-            data.push(view_data(robot, view, &layout, guess, from..to, gripper));
+            data.push(view_data(input, view, &layout, from..to, gripper));
         }
         Self { robot, layout, views: data, sightings, prior, scales, n_camera_joints: robot.camera.mount.n_joints }
     }
@@ -259,13 +255,13 @@ fn corners(robot: &Robot, seen: &MeanCorners, size_m: f64) -> WeightedMeasuremen
 }
 
 fn view_data(
-    robot: &Robot,
+    input: &BundleInput<'_>,
     view: &View,
     layout: &Layout,
-    guess: &JointParameters,
     sightings: Range<usize>,
     gripper: Option<usize>,
 ) -> ViewData {
+    let (robot, guess) = (input.robot, &input.guess);
     let departure = view.conditions.departure_from(&guess.reference);
     let mut data = ViewData {
         fixed_rad: [0.0; MAX_JOINTS],

@@ -4,9 +4,9 @@ use std::ops::Range;
 
 use nalgebra::{Const, DMatrix, DVector, Isometry3, Matrix6, SMatrix, SVector, Vector6};
 
-use crate::calib::bundle::linearize::NormalEquations;
-use crate::calib::bundle::problem::{BundleProblem, ViewData};
+use crate::calib::bundle::problem::{BundleProblem, Layout, ViewData};
 use armcal_core::joints::MAX_JOINTS;
+use armcal_core::kinematics::LinkPoses;
 
 /// A view's own parameters: an error of each joint, then the camera's six.
 pub(crate) const N_VIEW_PARAMETERS: usize = MAX_JOINTS + 6;
@@ -47,30 +47,36 @@ pub(crate) struct Group<'a> {
     pub by_mount: Matrix6<f64>,
     pub camera_error: Option<&'a Isometry3<f64>>,
     pub sightings: Range<usize>,
+    pub poses: &'a LinkPoses,
+    pub base_from_camera: Isometry3<f64>,
 }
+
+/// `H_i Ad_i` and column of the tag of each observation.
+pub(crate) type ByTag = [(Matrix6<f64>, Option<usize>)];
 
 /// From directions to columns.
 pub(crate) struct Columns<'a> {
+    layout: &'a Layout,
     view: &'a ViewData,
     joints: Range<usize>,
 }
 
 impl<'a> Columns<'a> {
     pub(crate) fn new(problem: &'a BundleProblem<'_>, group: &Group<'_>) -> Self {
-        Self { view: &problem.views[group.view_idx], joints: group.joints.clone() }
+        Self { layout: &problem.layout, view: &problem.views[group.view_idx], joints: group.joints.clone() }
     }
 
     /// The directions that have columns.
-    pub(crate) fn directions(&self, problem: &BundleProblem<'_>) -> impl Iterator<Item = usize> + use<> {
-        let mount = if problem.layout.mount.is_some() { MOUNT..MOUNT + 6 } else { 0..0 };
-        let time = if problem.layout.time.is_some() { TIME..TIME + 1 } else { 0..0 };
+    pub(crate) fn directions(&self) -> impl Iterator<Item = usize> + use<> {
+        let mount = if self.layout.mount.is_some() { MOUNT..MOUNT + 6 } else { 0..0 };
+        let time = if self.layout.time.is_some() { TIME..TIME + 1 } else { 0..0 };
         self.joints.clone().chain(mount).chain(time)
     }
 
     /// Calls `f` with each column of a direction and the direction's derivative by it.
     #[inline]
-    pub(crate) fn each(&self, problem: &BundleProblem<'_>, direction: usize, mut f: impl FnMut(usize, f64)) {
-        let layout = &problem.layout;
+    pub(crate) fn each(&self, direction: usize, mut f: impl FnMut(usize, f64)) {
+        let layout = self.layout;
         match direction {
             TIME => layout.time.into_iter().for_each(|at| f(at, 1.0)),
             MOUNT..TIME => layout.mount.into_iter().for_each(|at| f(at + direction - MOUNT, 1.0)),
@@ -107,18 +113,18 @@ impl SchurBlock {
     pub(crate) fn push(
         &self,
         problem: &BundleProblem<'_>,
-        normal: &NormalEquations,
+        by_tag: &ByTag,
         view_idx: usize,
         step: &DVector<f64>,
     ) -> Vector6<f64> {
         let columns = self.columns(problem, view_idx);
         let mut along = SVector::<f64, N_DIRECTIONS>::zeros();
-        for a in columns.directions(problem) {
-            columns.each(problem, a, |column, by| along[a] += by * step[column]);
+        for a in columns.directions() {
+            columns.each(a, |column, by| along[a] += by * step[column]);
         }
         let mut pushed = self.by_common * along;
         for at in self.range.clone() {
-            if let (u, Some(column)) = &normal.by_tag[at] {
+            if let (u, Some(column)) = &by_tag[at] {
                 pushed -= u * step.fixed_rows::<6>(*column);
             }
         }
@@ -134,27 +140,27 @@ impl SchurBlock {
             Some(tag) if view.gripper == Some(self.range.start) => problem.n_camera_joints..tag.mount.n_joints,
             _ => 0..problem.n_camera_joints,
         };
-        Columns { view, joints }
+        Columns { layout: &problem.layout, view, joints }
     }
 
     /// `sum H_i A`: the sightings' pull on the camera's twist by the common columns.
     pub(crate) fn twist_by_columns(
         &self,
         problem: &BundleProblem<'_>,
-        normal: &NormalEquations,
+        by_tag: &ByTag,
         view_idx: usize,
     ) -> DMatrix<f64> {
         let layout = &problem.layout;
         let mut out = DMatrix::zeros(6, layout.n);
         let columns = self.columns(problem, view_idx);
-        for a in columns.directions(problem) {
-            columns.each(problem, a, |column, by| {
+        for a in columns.directions() {
+            columns.each(a, |column, by| {
                 let mut view = out.fixed_view_mut::<6, 1>(0, column);
                 view += self.by_common.column(a) * by;
             });
         }
         for at in self.range.clone() {
-            if let (u, Some(column)) = &normal.by_tag[at] {
+            if let (u, Some(column)) = &by_tag[at] {
                 let mut view = out.fixed_view_mut::<6, 6>(0, *column);
                 view -= u;
             }
@@ -167,25 +173,20 @@ impl SchurBlock {
     }
 
     /// `S^T sum H_i A`: own parameters by the common columns; multiplied by a step it is what the step adds to the gradient.
-    pub(crate) fn own_by_columns(
-        &self,
-        problem: &BundleProblem<'_>,
-        normal: &NormalEquations,
-        view_idx: usize,
-    ) -> DMatrix<f64> {
+    pub(crate) fn own_by_columns(&self, problem: &BundleProblem<'_>, by_tag: &ByTag, view_idx: usize) -> DMatrix<f64> {
         let layout = &problem.layout;
         let mut out = DMatrix::zeros(N_VIEW_PARAMETERS, layout.n);
         let columns = self.columns(problem, view_idx);
         let by_directions = self.twists.transpose() * self.by_common;
-        for a in columns.directions(problem) {
-            columns.each(problem, a, |column, by| {
+        for a in columns.directions() {
+            columns.each(a, |column, by| {
                 for row in 0..N_VIEW_PARAMETERS {
                     out[(row, column)] += by_directions[(row, a)] * by;
                 }
             });
         }
         for at in self.range.clone() {
-            if let (u, Some(column)) = &normal.by_tag[at] {
+            if let (u, Some(column)) = &by_tag[at] {
                 let mut view = out.fixed_view_mut::<N_VIEW_PARAMETERS, 6>(0, *column);
                 view -= self.twists.transpose() * u;
             }

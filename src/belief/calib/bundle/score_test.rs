@@ -161,7 +161,7 @@ impl Estimate<'_> {
                 score += left_times(&trials, &(g - h * (own.twists * (own.inverse * own.gradient))));
                 information +=
                     DMatrix::from_fn(N_TRIALS, N_TRIALS, |i, k| (left.row(i) * h).dot(&trials.column(k).transpose()));
-                cross += left * own.twist_by_columns(problem, &self.solved.normal, view_idx);
+                cross += left * own.twist_by_columns(problem, &self.solved.normal.by_tag, view_idx);
             }
         }
         let followed = -(&self.posterior.covariance * cross.transpose());

@@ -1,16 +1,17 @@
 //! What `bundle` is started from: failed joints taken care of, a prior taken up.
 
 use crate::calib::bundle::calibration_prior::CalibrationPrior;
-use crate::calib::bundle::estimate::{BundleInput, Estimate, HyperparameterMode};
+use crate::calib::bundle::estimate::Estimate;
 use crate::calib::bundle::failure_detection::failures;
 use crate::calib::bundle::failures::{Failure, FailureAdjusted, SensorUse};
+use crate::calib::bundle::input::{BundleInput, HyperparameterMode};
 use crate::calib::bundle::model_selection::{Selection, select_model};
 use crate::calib::covariance::ParameterCovariance;
 use crate::calib::methods::observability::Unobservable;
 use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
 use crate::calib::refusal::Refusal;
 use crate::calib::result::calibration::Calibration;
-use crate::calib::views::association::View;
+use crate::calib::views::view::View;
 use armcal_core::robot::{FailedKind, Robot};
 
 /// The views under one hypothesis of failed joints.

@@ -169,21 +169,15 @@ fn take_step(
     for (view_idx, view) in problem.views.iter().enumerate() {
         let n_groups = 1 + usize::from(view.gripper.is_some());
         for own in groups.by_ref().take(n_groups).filter(|own| own.has_any) {
-            add_own(problem, normal, own, view_idx, step, next);
+            let pushed = own.push(problem, &normal.by_tag, view_idx, step);
+            add_own(problem, own, view_idx, &pushed, next);
         }
     }
 }
 
-fn add_own(
-    problem: &BundleProblem<'_>,
-    normal: &NormalEquations,
-    own: &SchurBlock,
-    view_idx: usize,
-    step: &DVector<f64>,
-    next: &mut State,
-) {
-    let pushed = own.push(problem, normal, view_idx, step);
-    let own_step = own.inverse * (own.gradient - own.twists.tr_mul(&pushed));
+/// The step of a view's own parameters, where the common ones push the camera's twist by `pushed`.
+fn add_own(problem: &BundleProblem<'_>, own: &SchurBlock, view_idx: usize, pushed: &Vector6<f64>, next: &mut State) {
+    let own_step = own.inverse * (own.gradient - own.twists.tr_mul(pushed));
     for joint in 0..MAX_JOINTS {
         next.joint_error[view_idx][joint] += own_step[joint];
     }

@@ -9,7 +9,7 @@ use crate::calib::result::camera_mount::CameraMount;
 use crate::calib::result::failed_joint::PriorTable;
 use crate::calib::result::map_table::MapResult;
 use crate::calib::result::model_table::ModelTable;
-use crate::calib::views::association::View;
+use crate::calib::views::view::View;
 use armcal_core::robot::Robot;
 use armcal_core::spatial::{Base, Camera, Link, Pose, Tag};
 

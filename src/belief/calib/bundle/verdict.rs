@@ -1,8 +1,9 @@
 //! Whether joint sensors explain the data of a calibration by `bundle`: score test of the link geometry, size of the sensors' errors,
 //! outliers, and innovations of held-out views.
 
-use crate::calib::bundle::estimate::{BundleInput, Estimate};
+use crate::calib::bundle::estimate::Estimate;
 use crate::calib::bundle::innovations::{Innovations, JointInnovation};
+use crate::calib::bundle::input::BundleInput;
 use crate::calib::bundle::observability::{Observability, observability};
 use crate::calib::bundle::score_test::{GeometryElement, ScoreTestResult};
 use crate::calib::covariance::task_angles;
@@ -11,7 +12,7 @@ use crate::calib::geometry_error::{ErrorKind, GeometryError};
 use crate::calib::parameters::ParameterKind;
 use crate::calib::refusal::{InnovationQuantity, Refusal};
 use crate::calib::result::calibration::Calibration;
-use crate::calib::result::valid_range::not_covered;
+use crate::calib::result::validity::not_covered;
 use crate::calib::result::verdict_tables::{Check, ObservabilityTable, VerdictTable};
 use armcal_core::joints::JointAngles;
 use armcal_core::robot::Robot;

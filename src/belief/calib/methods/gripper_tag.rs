@@ -13,7 +13,7 @@ use std::ops::Range;
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, Matrix6, SMatrix, SVector, Vector2, Vector6};
 
 use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
-use crate::calib::views::association::{MeanCorners, View};
+use crate::calib::views::view::{MeanCorners, View};
 use armcal_core::numeric::{Damping, LeastSquares, Outcome, Proposal, StopRule, minimize};
 use armcal_core::optics::square_corners;
 use armcal_core::robot::{GripperTag, Robot};

@@ -10,17 +10,8 @@ use crate::calib::covariance::ParameterCovariance;
 use crate::calib::methods::observability::Unobservable;
 use crate::calib::methods::{Outcome, Solution};
 use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
+use crate::calib::views::view::EndStopReading;
 use armcal_core::robot::Robot;
-
-/// Readings of one joint that stood at a nominal stop.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct EndStopReading {
-    pub joint: usize,
-    /// Where the drawing has the stop.
-    pub angle_rad: f64,
-    /// Mean travel of the joint from the middle of its range by the datasheet.
-    pub travel_rad: f64,
-}
 
 /// Sensors by their stops.
 #[derive(Clone, Debug)]

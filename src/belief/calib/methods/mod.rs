@@ -18,13 +18,13 @@ mod search;
 mod tests;
 
 pub use gripper_tag::{MountEstimate, mount_by_gripper_tag};
-pub use joint_limits::{EndStopFit, EndStopReading, fit_stops};
+pub use joint_limits::{EndStopFit, fit_stops};
 pub use least_squares::{fisher_information, least_squares};
 pub use minimum_distance::minimum_distance;
 pub use minimum_variance::{Gauge, VarianceObjective, determined_by_variance};
 pub use observability::{Unobservable, free_parameters};
 pub use position_problem::PositionProblem;
-pub use search::{Interpolation, Scaling, SearchOptions};
+pub use search::{Interpolation, PositionSearch, Scaling, SearchOptions};
 
 use crate::calib::parameters::{JointParameters, Parameter};
 use armcal_core::numeric::Outcome;
@@ -62,27 +62,21 @@ impl PositionMethod {
         guess: &JointParameters,
         options: &SearchOptions,
     ) -> Solution {
-        self.solve_watched(problem, free, guess, options, &mut |_| {})
+        self.solve_watched(&PositionSearch { problem, free, guess, options }, &mut |_| {})
     }
 
     /// The same, telling `watch` the objective of every evaluation in order.
     #[must_use]
-    pub fn solve_watched(
-        self,
-        problem: &PositionProblem<'_>,
-        free: &[Parameter],
-        guess: &JointParameters,
-        options: &SearchOptions,
-        watch: &mut dyn FnMut(f64),
-    ) -> Solution {
+    pub fn solve_watched(self, search: &PositionSearch<'_>, watch: &mut dyn FnMut(f64)) -> Solution {
+        let PositionSearch { problem, free, guess, .. } = *search;
         match self {
             Self::MinimumDistance => {
                 let objective = |at: &JointParameters| problem.sum_of_distances_m(at);
-                search::minimize(problem.robot, objective, free, guess, options, watch)
+                search::minimize(search, objective, watch)
             }
             Self::MinimumVariance => {
                 let mut variance = VarianceObjective::new(problem);
-                search::minimize(problem.robot, |at| variance.trace_m2(at), free, guess, options, watch)
+                search::minimize(search, |at| variance.trace_m2(at), watch)
             }
             Self::LeastSquares => {
                 let solution = least_squares(problem, free, guess);

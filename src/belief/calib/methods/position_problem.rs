@@ -6,7 +6,7 @@
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, Point3, Vector2, Vector3};
 
 use crate::calib::parameters::{JointParameters, Parameter};
-use crate::calib::views::association::{TagMeasurement, View};
+use crate::calib::views::view::{TagMeasurement, View};
 use armcal_core::kinematics::LinkPoses;
 use armcal_core::robot::{Robot, SurveyedTag};
 use armcal_core::sensor::ConditionChange;
@@ -23,7 +23,7 @@ pub struct PositionProblem<'a> {
 /// One observation's residual, with all that Jacobians need.
 pub(crate) struct TagResidual<'a> {
     pub view_idx: usize,
-    pub tag: &'a crate::calib::views::association::TagObservation,
+    pub tag: &'a crate::calib::views::view::TagObservation,
     pub view: &'a View,
     /// Of the view from the parameters' reference.
     pub departure: ConditionChange,

@@ -7,6 +7,7 @@
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
+use crate::calib::methods::position_problem::PositionProblem;
 use crate::calib::methods::{Outcome, Solution};
 use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
 use armcal_core::robot::Robot;
@@ -76,15 +77,24 @@ impl SearchOptions {
     }
 }
 
+/// What to search, and how.
+#[derive(Clone, Copy, Debug)]
+pub struct PositionSearch<'a> {
+    pub problem: &'a PositionProblem<'a>,
+    /// Gains and offsets that are searched for; all else stays at `guess`.
+    pub free: &'a [Parameter],
+    pub guess: &'a JointParameters,
+    pub options: &'a SearchOptions,
+}
+
 /// Minimizes `objective` over `free`. `watch` hears the objective of every evaluation.
 pub(crate) fn minimize(
-    robot: &Robot,
+    search: &PositionSearch<'_>,
     mut objective: impl FnMut(&JointParameters) -> f64,
-    free: &[Parameter],
-    guess: &JointParameters,
-    options: &SearchOptions,
     watch: &mut dyn FnMut(f64),
 ) -> Solution {
+    let PositionSearch { problem, free, guess, options } = search;
+    let robot = problem.robot;
     let space = Space::new(robot, free, guess, options.scaling);
     let cost_initial = objective(guess);
     let mut rng = stream_rng(options.seed, "starts of the search");
@@ -110,7 +120,7 @@ pub(crate) fn minimize(
         }
     }
     let nothing = Solution {
-        parameters: *guess,
+        parameters: **guess,
         outcome: Outcome::Degenerate,
         evaluations: 0,
         cost_initial,

@@ -4,15 +4,16 @@ use nalgebra::DMatrix;
 
 use crate::calib::acceptance::{AcceptanceData, refusal};
 use crate::calib::covariance::ParameterCovariance;
+use crate::calib::methods::Solution;
 use crate::calib::methods::position_problem::PositionProblem;
-use crate::calib::methods::{EndStopReading, Solution};
 use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
 use crate::calib::result::calibration::{Calibration, CovarianceTable, JointResult, Status};
 use crate::calib::result::metrics::{FitMetrics, HeldOutMetrics};
 use crate::calib::result::terms_table::{ReferenceTable, TermsTable};
 use crate::calib::result::valid_range::ValidRange;
-use crate::calib::views::association::CaptureData;
 use crate::calib::views::scale_identification::IdentifiedScale;
+use crate::calib::views::view::CaptureData;
+use crate::calib::views::view::EndStopReading;
 use armcal_core::robot::Robot;
 use armcal_core::routine::Method;
 use armcal_core::sensor::{ConditionChange, SensorModel};

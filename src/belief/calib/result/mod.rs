@@ -4,6 +4,8 @@
 //! one line of less than 512 bytes, `lookup` a table from counts to radians.
 
 pub(crate) mod assemble;
+#[cfg(test)]
+pub(in crate::calib) mod bare;
 pub(crate) mod calibration;
 pub(crate) mod camera_mount;
 mod compact;
@@ -15,6 +17,7 @@ pub(crate) mod metrics;
 pub(crate) mod model_table;
 pub(crate) mod terms_table;
 pub(crate) mod valid_range;
+pub(crate) mod validity;
 pub(crate) mod verdict_tables;
 
 pub use calibration::{Calibration, JointResult, Status};

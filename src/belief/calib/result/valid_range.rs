@@ -2,14 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::calib::result::calibration::Calibration;
-use crate::calib::views::association::CaptureData;
+use crate::calib::views::view::CaptureData;
 use armcal_core::sensor::Conditions;
-use armcal_core::streams::JointAngles;
 use armcal_core::time::Stamp;
 
-/// What may lie beyond without a word: angles (rad), oil (K), pressure (Pa), age (h). Assumed.
-const MARGIN_RAD: f64 = 0.05;
+/// Excess that is not reported: oil (K), pressure (Pa), age (h). Assumed.
 const MARGIN_K: f64 = 2.0;
 const MARGIN_PA: f64 = 0.5e6;
 const MARGIN_H: f64 = 6.0;
@@ -41,52 +38,8 @@ impl ValidRange {
     }
 }
 
-impl Calibration {
-    /// In words, what `angles` (of as many joints as there are, base first) under `conditions` have beyond what the calibration saw;
-    /// nothing where all is within it. Joints of which nothing was estimated have no range, and what is unknown is not beyond.
-    #[must_use]
-    pub fn beyond(&self, angles: &JointAngles, conditions: &Conditions) -> Vec<String> {
-        let joints = self.joint.iter().zip(angles.iter()).filter(|(j, _)| j.gain_estimated || j.offset_estimated);
-        let of_joint = |(joint, angle_rad): (&crate::calib::result::calibration::JointResult, &f64)| {
-            let [low, high] = ordered(joint.covered_rad);
-            let by_rad = past(*angle_rad, [low, high]);
-            (by_rad > MARGIN_RAD).then(|| {
-                format!("{} at {angle_rad:.2} rad is {by_rad:.2} rad beyond {low:.2} .. {high:.2}", joint.name)
-            })
-        };
-        let mut beyond: Vec<String> = joints.filter_map(of_joint).collect();
-        beyond.extend(self.valid.beyond(conditions));
-        beyond
-    }
-
-    /// In words, what it is valid for.
-    #[must_use]
-    pub fn valid_for(&self) -> Vec<String> {
-        let joints = self.joint.iter().filter(|joint| joint.gain_estimated || joint.offset_estimated);
-        let one = |joint: &crate::calib::result::calibration::JointResult| {
-            let [low, high] = ordered(joint.covered_rad);
-            format!("{} {low:.2} .. {high:.2} rad", joint.name)
-        };
-        joints.map(one).chain(self.valid.in_words()).collect()
-    }
-}
-
-/// Joint by joint, how many of a task's postures go how far beyond what the views covered; nothing where all are within it.
-pub(crate) fn not_covered(calibration: &Calibration, postures: &[JointAngles]) -> Vec<String> {
-    let joints = calibration.joint.iter().enumerate().filter(|(_, j)| j.gain_estimated || j.offset_estimated);
-    let of_joint = |(joint, result): (usize, &crate::calib::result::calibration::JointResult)| {
-        let [low, high] = ordered(result.covered_rad);
-        let beyond = postures.iter().map(|angles| past(angles[joint], [low, high])).filter(|by| *by > MARGIN_RAD);
-        let (n, most) = beyond.fold((0usize, 0.0_f64), |(n, most), by| (n + 1, most.max(by)));
-        let (name, all) = (&result.name, postures.len());
-        let words = || format!("{name}: {n} of {all} targets lie up to {most:.2} rad beyond {low:.2} .. {high:.2} rad");
-        (n > 0).then(words)
-    };
-    joints.filter_map(of_joint).collect()
-}
-
 impl ValidRange {
-    fn beyond(&self, conditions: &Conditions) -> Vec<String> {
+    pub(crate) fn beyond(&self, conditions: &Conditions) -> Vec<String> {
         let mut beyond = Vec::new();
         if let (Some(range), Some(oil_c)) = (self.oil_c, conditions.oil_c)
             && past(oil_c, range) > MARGIN_K
@@ -110,7 +63,7 @@ impl ValidRange {
         beyond
     }
 
-    fn in_words(&self) -> Vec<String> {
+    pub(crate) fn in_words(&self) -> Vec<String> {
         let range = |what: &str, range: Option<[f64; 2]>, unit: &str, scale: f64| {
             range.map(|[low, high]| format!("{what} {:.1} .. {:.1} {unit}", low * scale, high * scale))
         };
@@ -122,11 +75,11 @@ impl ValidRange {
 }
 
 /// A sensor whose counts run the other way has its range the other way round.
-fn ordered([a, b]: [f64; 2]) -> [f64; 2] {
+pub(crate) fn ordered([a, b]: [f64; 2]) -> [f64; 2] {
     [a.min(b), a.max(b)]
 }
 
 /// How far `value` is outside of the range; zero or less inside.
-fn past(value: f64, [low, high]: [f64; 2]) -> f64 {
+pub(crate) fn past(value: f64, [low, high]: [f64; 2]) -> f64 {
     (low - value).max(value - high)
 }

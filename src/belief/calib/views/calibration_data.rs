@@ -4,8 +4,8 @@ use armcal_core::log::{Recording, hash_messages};
 use armcal_core::robot::Robot;
 use armcal_core::routine::Method;
 
-use crate::calib::views::association::CaptureData;
 use crate::calib::views::scale_identification::IdentifiedScale;
+use crate::calib::views::view::CaptureData;
 
 /// Which views the verdict rests on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -3,7 +3,7 @@
 //! Thermometers and the depth gauge speak once in a while; a reading inside of a span counts as the span's, else the line
 //! between the nearest before and after it. All is found by the messages' own stamps.
 
-use crate::calib::views::association::Index;
+use crate::calib::views::message_index::MessageIndex;
 use armcal_core::log::Recording;
 use armcal_core::robot::JointSensorSpec;
 use armcal_core::sensor::{ArmSensors, Conditions, wrap_symmetric};
@@ -160,7 +160,7 @@ fn apart_rad(spec: &JointSensorSpec, a: f64, b: f64) -> f64 {
     wrap_symmetric(a - b, (spec.wrap_counts / spec.counts_per_rad).abs())
 }
 
-impl Index<'_> {
+impl MessageIndex<'_> {
     /// The way that each joint came to where it rests over `mark`, at the mean travel `rest_rad`: by the last readings before the
     /// mark that are clearly elsewhere. -1 or 1, 0 where it has not moved for long. Appends the messages that decided it.
     pub(crate) fn approach(

@@ -1,7 +1,7 @@
 //! Recordings that no method can make sense of, refused by name before anything is fitted.
 
 use crate::calib::CalibError;
-use crate::calib::views::association::CaptureData;
+use crate::calib::views::view::CaptureData;
 use armcal_core::log::{Recording, topics};
 use armcal_core::robot::Robot;
 

@@ -3,7 +3,7 @@
 //! The arm stands still, so a tag's corners stay where they are but for noise. A detector that reads one id wrongly in one frame
 //! puts another tag's corners under this id: the mean of all frames would be off by a share of the distance between the two tags.
 
-use crate::calib::views::association::MeanCorners;
+use crate::calib::views::view::MeanCorners;
 
 /// Corners of one tag in one frame, px.
 type Corners = [[f64; 2]; 4];

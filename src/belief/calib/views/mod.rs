@@ -10,15 +10,15 @@ pub(crate) mod conditions;
 pub(crate) mod data_checks;
 mod external;
 mod frame_consensus;
+mod message_index;
 mod pooling;
 pub(crate) mod scale_identification;
+pub(crate) mod view;
 
-pub use association::{
-    CaptureData, MeanCorners, ObservationRejection, TagMeasurement, TagObservation, View, associate, associate_within,
-    surveyed,
-};
+pub use association::{associate, associate_within, surveyed};
 pub use calibration_data::{CalibrationData, HeldOut};
 pub use conditions::ConditionHistory;
 pub use external::{ForeignContext, prepare_foreign};
 pub use pooling::prepare_pooled;
 pub use scale_identification::{IdentifiedScale, identify_scales};
+pub use view::{CaptureData, EndStopReading, MeanCorners, ObservationRejection, TagMeasurement, TagObservation, View};

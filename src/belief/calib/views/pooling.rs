@@ -1,9 +1,10 @@
 //! Several recordings of one arm as one: the captured views of all.
 
-use crate::calib::views::association::{CaptureData, View, associate_within, declared_failed, surveyed};
+use crate::calib::views::association::{associate_within, declared_failed, surveyed};
 use crate::calib::views::calibration_data::{hash_of, used_by};
 use crate::calib::views::data_checks::{check_joints, check_order};
 use crate::calib::views::scale_identification::identify_scales;
+use crate::calib::views::view::{CaptureData, View};
 use crate::calib::{CalibError, CalibrationData, HeldOut};
 use armcal_core::log::Recording;
 use armcal_core::robot::{Robot, TagSurvey};

@@ -8,7 +8,7 @@
 use nalgebra::{DVector, Isometry3, Matrix3, Matrix6, SMatrix, Vector2, Vector3, Vector6};
 
 use crate::calib::CalibError;
-use crate::calib::views::association::{CaptureData, View};
+use crate::calib::views::view::{CaptureData, View};
 use armcal_core::numeric::{Damping, LeastSquares, Outcome, Proposal, StopRule, minimize};
 use armcal_core::optics::{solve_square, square_corners};
 use armcal_core::robot::Robot;

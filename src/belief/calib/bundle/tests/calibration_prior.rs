@@ -3,19 +3,19 @@
 use nalgebra::Vector3;
 
 use crate::calib::bundle::calibration_prior::{CalibrationPrior, MOUNT_ROWS, PriorConsistency, with_mount_rows};
-use crate::calib::bundle::estimate::{Estimate, HyperparameterMode, estimate, model_for, reference};
+use crate::calib::bundle::estimate::{Estimate, estimate, model_for, reference};
 use crate::calib::bundle::failures::FailureAdjusted;
+use crate::calib::bundle::input::HyperparameterMode;
 use crate::calib::bundle::model::Hyperparameters;
 use crate::calib::bundle::tables::camera_mount_table;
 use crate::calib::bundle::tests::data::{Noise, Truth, normal, rng, titan, views};
 use crate::calib::covariance::ParameterCovariance;
 use crate::calib::parameters::JointParameters;
 use crate::calib::result::assemble::shortened_rows;
-use crate::calib::result::calibration::{Calibration, CovarianceTable, JointResult, Status};
-use crate::calib::result::metrics::{FitMetrics, HeldOutMetrics};
-use crate::calib::views::association::View;
+use crate::calib::result::bare::bare;
+use crate::calib::result::calibration::{Calibration, CovarianceTable, JointResult};
+use crate::calib::views::view::View;
 use crate::calib::{ReferenceTable, TermsTable, ValidRange};
-use armcal_core::numeric::Outcome;
 use armcal_core::robot::Robot;
 use armcal_core::routine::Method;
 use armcal_core::sensor::ConditionChange;
@@ -109,50 +109,12 @@ fn calibration(robot: &Robot, found: &Estimate<'_>, views: &[View]) -> Calibrati
     });
     let last = views.iter().map(|view| view.end).max().expect("views");
     Calibration {
-        version: 1,
-        robot: robot.name.clone(),
-        method: Method::Bundle,
-        status: Status::Accepted,
-        refusal: None,
-        refusals: Vec::new(),
-        findings: Vec::new(),
-        messages_hash: String::new(),
-        unobservable: Vec::new(),
-        observability: None,
-        verdict: None,
-        fit: FitMetrics {
-            outcome: Outcome::Converged,
-            evaluations: 1,
-            cost_initial: 1.0,
-            cost_final: 1.0,
-            views: views.len(),
-            tags_seen: 0,
-            rejected: 0,
-            rejected_by_reason: Default::default(),
-            rms_m: 0.0,
-            rms_px: Some(0.0),
-            linearity_scale: 1.0,
-        },
-        held_out: HeldOutMetrics {
-            views: 0,
-            cross_validated: true,
-            rms_m: None,
-            mean_m: None,
-            camera_mean_m: None,
-            rms_px: None,
-            nominal_rms_m: None,
-        },
-        predicted_tool_error_m: None,
         valid: ValidRange { time_nanos: last.nanos, oil_c: None, water_c: None, pressure_pa: None },
         reference: ReferenceTable::of(&parameters, &covariance),
         camera_mount: Some(camera_mount_table(robot, found, views)),
-        map: None,
-        model: None,
-        outliers: Vec::new(),
         joint: joint.collect(),
-        failed_joint: Vec::new(),
-        prior: None,
         covariance: CovarianceTable { parameters: names.collect(), rows: shortened_rows(&full) },
+        ..bare(&robot.name, Method::Bundle)
     }
 }
 

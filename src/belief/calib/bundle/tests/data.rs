@@ -9,7 +9,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 use crate::calib::bundle::model::{Hyperparameters, Model};
 use crate::calib::parameters::{JointParameters, Parameter};
-use crate::calib::views::association::{MeanCorners, TagMeasurement, TagObservation, View};
+use crate::calib::views::view::{MeanCorners, TagMeasurement, TagObservation, View};
 use armcal_core::joints::{JointAngles, MAX_JOINTS};
 use armcal_core::optics::square_corners;
 use armcal_core::robot::{Robot, load};

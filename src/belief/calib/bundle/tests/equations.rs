@@ -3,14 +3,15 @@
 use nalgebra::DVector;
 use rand::RngExt;
 
-use crate::calib::bundle::estimate::{BundleInput, HyperparameterMode, model_for, prior};
+use crate::calib::bundle::estimate::{model_for, prior};
+use crate::calib::bundle::input::{BundleInput, HyperparameterMode};
 use crate::calib::bundle::linearize::NormalEquations;
 use crate::calib::bundle::model::{Hyperparameters, Model};
 use crate::calib::bundle::problem::{BundleProblem, State};
 use crate::calib::bundle::solve::{LOOSE, solve, stepped, until};
 use crate::calib::bundle::tests::data::{Noise, Truth, normal, reference, rng, titan_with_gripper_tag, views};
 use crate::calib::parameters::JointParameters;
-use crate::calib::views::association::{TagMeasurement, View};
+use crate::calib::views::view::{TagMeasurement, View};
 use armcal_core::joints::MAX_JOINTS;
 use armcal_core::numeric::Loss;
 use armcal_core::robot::Robot;
@@ -76,7 +77,7 @@ fn problem(case: &Case) -> BundleProblem<'_> {
         joint_prior: None,
         evidence: HyperparameterMode::Given,
     };
-    BundleProblem::new(&case.robot, &case.views, &case.model, &guess, prior(&input, &case.scales), case.scales.clone())
+    BundleProblem::new(&input, prior(&input, &case.scales))
 }
 
 /// A state a little off the prior's means, the views' own parameters settled.

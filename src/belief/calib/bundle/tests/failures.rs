@@ -2,13 +2,14 @@
 
 use rand::RngExt;
 
-use crate::calib::bundle::estimate::{Estimate, HyperparameterMode, model_for};
+use crate::calib::bundle::estimate::{Estimate, model_for};
 use crate::calib::bundle::failure_detection::failures;
 use crate::calib::bundle::failures::{Failure, FailureAdjusted, FailureSource, SensorUse};
+use crate::calib::bundle::input::HyperparameterMode;
 use crate::calib::bundle::model::Hyperparameters;
 use crate::calib::bundle::tests::data::{Noise, Truth, rng, titan, views};
 use crate::calib::parameters::JointParameters;
-use crate::calib::views::association::View;
+use crate::calib::views::view::View;
 use armcal_core::robot::{FailedKind, Robot};
 
 const N_VIEWS: usize = 20;

@@ -2,7 +2,8 @@
 
 use nalgebra::{UnitQuaternion, Vector3};
 
-use crate::calib::bundle::estimate::{BundleInput, Estimate, HyperparameterMode, estimate, model_for};
+use crate::calib::bundle::estimate::{Estimate, estimate, model_for};
+use crate::calib::bundle::input::{BundleInput, HyperparameterMode};
 use crate::calib::bundle::model::{Hyperparameters, Model};
 use crate::calib::bundle::observability::{Observability, observability};
 use crate::calib::bundle::tests::data::{Noise, Truth, reference, rng, titan, views};
@@ -10,7 +11,7 @@ use crate::calib::bundle::{GeometryElement, ScoreTestResult};
 use crate::calib::cross_validation::{FOLDS, fold_of};
 use crate::calib::geometry_error::ErrorKind;
 use crate::calib::parameters::JointParameters;
-use crate::calib::views::association::View;
+use crate::calib::views::view::View;
 use armcal_core::kinematics::Chain;
 use armcal_core::robot::Robot;
 use armcal_core::stats::chi_square_quantile;

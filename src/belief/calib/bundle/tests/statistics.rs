@@ -5,14 +5,15 @@ use rand::RngExt;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 
-use crate::calib::bundle::estimate::{BundleInput, Estimate, HyperparameterMode, estimate, model_for};
+use crate::calib::bundle::estimate::{Estimate, estimate, model_for};
 use crate::calib::bundle::evidence::Posterior;
+use crate::calib::bundle::input::{BundleInput, HyperparameterMode};
 use crate::calib::bundle::linearize::NormalEquations;
 use crate::calib::bundle::model::{Hyperparameters, Model};
 use crate::calib::bundle::problem::State;
 use crate::calib::bundle::tests::data::{Noise, Truth, reference, rng, titan, titan_with_gripper_tag, views};
 use crate::calib::parameters::{JointParameters, Parameter};
-use crate::calib::views::association::{TagMeasurement, View};
+use crate::calib::views::view::{TagMeasurement, View};
 use armcal_core::joints::{JointAngles, MAX_JOINTS};
 use armcal_core::numeric::Loss;
 use armcal_core::robot::Robot;

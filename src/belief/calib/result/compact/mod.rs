@@ -5,6 +5,7 @@
 //! tells whether the folder at the other end has the same joints. Sensors with terms make an `armcal2`, which has a reference
 //! and, behind each joint's gain and offset, its `terms` in whole steps.
 
+mod fields;
 mod terms;
 #[cfg(test)]
 mod terms_tests;

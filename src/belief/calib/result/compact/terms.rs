@@ -6,7 +6,7 @@
 use serde::Serialize;
 
 use crate::calib::ReferenceTable;
-use crate::calib::result::compact::text::{bad, whole};
+use crate::calib::result::compact::fields::{bad, whole};
 use crate::calib::result::compact::{CompactError, MAX_STEPS};
 use armcal_core::sensor::{Conditions, N_SHAPE, Terms};
 use armcal_core::time::Stamp;

@@ -3,9 +3,10 @@
 use proptest::prelude::*;
 
 use crate::calib::refusal::Refusal;
+use crate::calib::result::bare::bare;
 use crate::calib::result::calibration::CovarianceTable;
 use crate::calib::result::compact::*;
-use crate::calib::result::metrics::{FitMetrics, HeldOutMetrics};
+use crate::calib::result::metrics::HeldOutMetrics;
 use crate::calib::result::valid_range::ValidRange;
 use armcal_core::numeric::Outcome;
 use armcal_core::stats::Summary;
@@ -56,30 +57,10 @@ fn calibration(robot: &str, joints: &[Joint], refusal: Option<Refusal>) -> Calib
     let n = variances.len();
     let rows = (0..n).map(|i| (0..n).map(|j| if i == j { variances[i] } else { 0.0 }).collect()).collect();
     Calibration {
-        version: 1,
-        robot: robot.to_owned(),
-        method: Method::MinimumDistance,
         status: if refusal.is_some() { Status::Refused } else { Status::Accepted },
         refusal: refusal.as_ref().map(ToString::to_string),
         refusals: refusal.into_iter().collect(),
-        findings: Vec::new(),
         messages_hash: "24a1c0689a592055e463ff1910220527f15c7d657fa0e8a41a4710f107b1b963".to_owned(),
-        unobservable: Vec::new(),
-        outliers: Vec::new(),
-        model: None,
-        fit: FitMetrics {
-            outcome: Outcome::Converged,
-            evaluations: 540,
-            cost_initial: 17.5,
-            cost_final: 0.7,
-            views: 14,
-            tags_seen: 81,
-            rejected: 0,
-            rejected_by_reason: Default::default(),
-            rms_m: 0.01,
-            rms_px: Some(2.3),
-            linearity_scale: 1.0,
-        },
         held_out: HeldOutMetrics {
             views: 4,
             cross_validated: false,
@@ -91,15 +72,9 @@ fn calibration(robot: &str, joints: &[Joint], refusal: Option<Refusal>) -> Calib
         },
         predicted_tool_error_m: Some(Summary { n: 4, median: 0.005_879_45, p95: 0.006_070_3, max: 0.006_085 }),
         valid: ValidRange { time_nanos: 1_767_225_749_230_000_000, oil_c: None, water_c: None, pressure_pa: None },
-        reference: None,
-        camera_mount: None,
-        map: None,
-        observability: None,
-        verdict: None,
         joint,
-        failed_joint: Vec::new(),
-        prior: None,
         covariance: CovarianceTable { parameters, rows },
+        ..bare(robot, Method::MinimumDistance)
     }
 }
 

@@ -2,9 +2,10 @@
 
 use std::fmt::Write as _;
 
+use crate::calib::result::compact::fields::{bad, printable, whole};
 use crate::calib::result::compact::{
-    CompactCalibration, CompactError, CompactJoint, CompactReference, CompactTerms, HASH_DIGITS, MAX_STEPS,
-    PredictedToolError, STEPS, STEPS_WITH_TERMS, Status, UM_PER_M,
+    CompactCalibration, CompactError, CompactJoint, CompactReference, CompactTerms, HASH_DIGITS, PredictedToolError,
+    STEPS, STEPS_WITH_TERMS, Status, UM_PER_M,
 };
 use armcal_core::routine::Method;
 use armcal_core::streams::MAX_JOINTS;
@@ -31,8 +32,10 @@ pub(crate) fn write(c: &CompactCalibration) -> String {
     }
     let per_unit = if c.reference.is_some() { STEPS_WITH_TERMS } else { STEPS };
     for joint in &c.joint {
-        let gain = parameter(joint.gain_correction, joint.gain_std, joint.gain_estimated, per_unit);
-        let offset = parameter(joint.offset_rad, joint.offset_std_rad, joint.offset_estimated, per_unit);
+        let gain = &estimated_or_datasheet(joint.gain_correction, per_unit)[usize::from(!joint.gain_estimated)];
+        let offset = &estimated_or_datasheet(joint.offset_rad, per_unit)[usize::from(!joint.offset_estimated)];
+        let gain = with_std(gain, joint.gain_std, per_unit);
+        let offset = with_std(offset, joint.offset_std_rad, per_unit);
         let _ = write!(body, " {gain},{offset}");
         if let (Some(terms), Some(reference)) = (&joint.terms, &c.reference) {
             let _ = write!(body, ",{}", terms.to_text(reference.shape_step_rad));
@@ -43,9 +46,12 @@ pub(crate) fn write(c: &CompactCalibration) -> String {
 }
 
 /// `+242479~12078` if estimated, `=0~300000` if the datasheet's.
-fn parameter(value: f64, std: Option<f64>, is_estimated: bool, per_unit: f64) -> String {
+fn estimated_or_datasheet(value: f64, per_unit: f64) -> [String; 2] {
     let steps = (value * per_unit).round() as i64;
-    let value = if is_estimated { format!("{steps:+}") } else { format!("={steps}") };
+    [format!("{steps:+}"), format!("={steps}")]
+}
+
+fn with_std(value: &str, std: Option<f64>, per_unit: f64) -> String {
     match std {
         Some(std) => format!("{value}~{}", (std * per_unit).round()),
         None => format!("{value}~x"),
@@ -89,15 +95,6 @@ pub(crate) fn read(text: &str) -> Result<CompactCalibration, CompactError> {
         return Err(CompactError::Checksum { expected, found: printable(sum) });
     }
     fields(words)
-}
-
-/// What stands in a message must not garble the terminal.
-fn printable(word: &str) -> String {
-    word.chars().take(40).flat_map(char::escape_default).collect()
-}
-
-pub(crate) fn bad(field: impl Into<String>, found: &str, expected: &'static str) -> CompactError {
-    CompactError::Field { field: field.into(), found: printable(found), expected }
 }
 
 /// The words between format and checksum; the checksum holds, so an error here is of another writer's making.
@@ -166,12 +163,6 @@ fn predicted(word: &str) -> Result<Option<PredictedToolError>, CompactError> {
 fn hex(word: &str, field: &str, digits: usize) -> Result<String, CompactError> {
     let is_hex = word.len() <= digits && word.bytes().all(|byte| byte.is_ascii_hexdigit());
     if is_hex { Ok(word.to_owned()) } else { Err(bad(field, word, "hexadecimal digits")) }
-}
-
-/// Digits alone, within the range.
-pub(crate) fn whole(word: &str) -> Option<i64> {
-    let is_number = !word.is_empty() && word.bytes().all(|byte| byte.is_ascii_digit());
-    is_number.then(|| word.parse().ok()).flatten().filter(|steps| *steps <= MAX_STEPS)
 }
 
 fn joint(n: usize, word: &str, reference: Option<&CompactReference>) -> Result<CompactJoint, CompactError> {

@@ -2,8 +2,9 @@
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
-use crate::calib::views::association::{ObservationRejection, TagMeasurement, check_square};
+use crate::calib::views::association::check_square;
 use crate::calib::views::frame_consensus::agreeing_mean;
+use crate::calib::views::view::{ObservationRejection, TagMeasurement};
 use armcal_core::input::RawMeasurement;
 use armcal_core::robot::Robot;
 

@@ -9,7 +9,7 @@ mod pairing;
 mod views;
 use std::collections::BTreeMap;
 
-use crate::calib::views::association::{CaptureData, ObservationRejection, View};
+use crate::calib::views::view::{CaptureData, ObservationRejection, View};
 use crate::calib::{CalibError, CalibrationData, HeldOut};
 use armcal_core::input::{ForeignRecording, InputMap};
 use armcal_core::robot::Robot;

@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use crate::calib::views::association::{ObservationRejection, TagObservation, View};
 use crate::calib::views::external::landmarks::{Averaged, average};
 use crate::calib::views::external::pairing::{RATE_WINDOW_S, TravelSample, TravelSeries};
+use crate::calib::views::view::{ObservationRejection, TagObservation, View};
 use armcal_core::input::{ForeignRecording, InputMap, RawMeasurement, TagFrame, WhileMoving};
 use armcal_core::robot::Robot;
 use armcal_core::streams::JointAngles;

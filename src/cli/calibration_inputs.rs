@@ -4,15 +4,15 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 
-use super::calibrate::warn_of_losses;
-use super::exit::UsageError;
+use crate::cli::exit::UsageError;
+use crate::cli::losses::{warn_of_foreign, warn_of_losses};
 use armcal_belief::calib::{
     Calibration, CalibrationFileError, ForeignContext, Status, calibrate, calibrate_data, calibrate_with_survey,
     prepare_foreign, prepare_pooled,
 };
 use armcal_belief::tagmap::files::{LandmarkFile, NamedSurvey, read_landmarks};
-use armcal_core::input::{ChildFrame, ForeignRecording, InputMap, TagUse, read_foreign, read_input_map, read_task};
-use armcal_core::log::{Completeness, read_recording};
+use armcal_core::input::{ChildFrame, InputMap, TagUse, read_foreign, read_input_map, read_task};
+use armcal_core::log::read_recording;
 use armcal_core::robot::{FileIssue, Robot};
 use armcal_core::routine::Method;
 use armcal_core::streams::{Message, ReachTask};
@@ -144,29 +144,4 @@ pub(super) fn read_prior(file: &Path, robot: &Robot) -> Result<Calibration> {
         other => other,
     })?;
     Ok(prior)
-}
-
-/// Says on stderr what of a real arm's recording is not used; `true` if something was lost.
-fn warn_of_foreign(recording: &ForeignRecording, robot: &Robot) -> bool {
-    let file = recording.path.display();
-    let is_whole = recording.completeness == Completeness::Whole;
-    if !is_whole {
-        eprintln!(
-            "warning: {file}: {}; what could be read is used",
-            super::calibrate::describe(&recording.completeness)
-        );
-    }
-    for (what, n) in &recording.left_out {
-        eprintln!("warning: {file}: {n} {what} left out");
-    }
-    if !recording.extra_joints.is_empty() {
-        eprintln!("note: {file}: joints that the robot lacks are ignored: {}", recording.extra_joints.join(", "));
-    }
-    for &joint in &recording.absent_joints {
-        let name = &robot.sensors[joint].joint;
-        eprintln!(
-            "note: {file}: has no readings of {name}; the camera hangs before it, its angle is taken as the middle"
-        );
-    }
-    !is_whole || !recording.left_out.is_empty()
 }

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::is_capture;
+use crate::report::inspection::arm::is_capture;
 use armcal_belief::calib::associate;
 use armcal_belief::calib::{
     JointParameters, MIN_VIEWS, MIN_VIEWS_PER_PARAMETER, Parameter, PositionProblem, View, free_parameters,

@@ -8,11 +8,13 @@ use std::time::Instant;
 use anyhow::{Context, Result};
 use indicatif::{ProgressBar, ProgressStyle};
 
-use super::exit::{Exit, UsageError, of_cause, of_good};
-use super::files;
 use crate::campaign::{
     CampaignError, CampaignSummary, Engine, Job, Prepared, Row, RunStatus, SingleRun, Table, run_job, run_jobs,
 };
+use crate::cli::exit::{Exit, UsageError, of_cause, of_summary};
+use crate::output;
+use crate::report::RunSummary;
+use crate::run::Keep;
 use crate::run::RunError;
 use armcal_belief::session::Progress;
 use armcal_core::routine::SeedRange;
@@ -24,7 +26,7 @@ pub(super) struct BatchRun<'a> {
     pub prepared: &'a Prepared,
     /// Runs have their folders in here.
     pub folder: &'a Path,
-    pub keep: bool,
+    pub keep: Keep,
     pub threads: Option<u16>,
     pub stop: &'a AtomicBool,
 }
@@ -43,7 +45,7 @@ pub(super) fn run_many(
         panic_exit_code: Exit::Failure.code(),
     };
     let result = run_jobs(&engine, jobs, &|job| run_job(&single, job, &mut Unwatched(Instant::now())), on_row);
-    if !many.keep {
+    if many.keep == Keep::StreamsAlone {
         // Empty but for what a killed campaign left; it does no harm where it cannot be removed.
         let _ = std::fs::remove_dir_all(many.folder);
     }
@@ -51,8 +53,8 @@ pub(super) fn run_many(
 }
 
 /// What `armcal run` exits with.
-fn exit_code(result: Result<bool, &RunError>) -> u8 {
-    result.map_or_else(|error| of_cause(error), of_good).code()
+fn exit_code(result: Result<&RunSummary, &RunError>) -> u8 {
+    result.map_or_else(|error| of_cause(error), of_summary).code()
 }
 
 /// The worst that happened to any row.
@@ -79,7 +81,7 @@ pub(super) fn range_of(asked: Option<SeedRange>, prepared: &Prepared) -> Result<
 /// Tables are .csv: the other files' names come from it.
 pub(super) fn check_name(out: &Path) -> Result<()> {
     if out.extension().is_some_and(|extension| extension == "csv") {
-        return files::make_folder(files::parent(out)).map_err(Into::into);
+        return output::make_folder(output::parent(out)).map_err(Into::into);
     }
     Err(UsageError(format!("{}: the name of a table must end in .csv", out.display())).into())
 }

@@ -1,0 +1,61 @@
+//! A calibration for tests, with nothing estimated yet.
+
+use crate::calib::result::calibration::{Calibration, CovarianceTable, Status};
+use crate::calib::result::metrics::{FitMetrics, HeldOutMetrics};
+use crate::calib::result::valid_range::ValidRange;
+use armcal_core::numeric::Outcome;
+use armcal_core::routine::Method;
+
+/// Accepted, without joints or covariance.
+pub(in crate::calib) fn bare(robot: &str, method: Method) -> Calibration {
+    Calibration {
+        version: 1,
+        robot: robot.to_owned(),
+        method,
+        status: Status::Accepted,
+        refusal: None,
+        refusals: Vec::new(),
+        findings: Vec::new(),
+        messages_hash: String::new(),
+        unobservable: Vec::new(),
+        observability: None,
+        verdict: None,
+        fit: fit(),
+        held_out: HeldOutMetrics {
+            views: 0,
+            cross_validated: true,
+            rms_m: None,
+            mean_m: None,
+            camera_mean_m: None,
+            rms_px: None,
+            nominal_rms_m: None,
+        },
+        predicted_tool_error_m: None,
+        valid: ValidRange { time_nanos: 0, oil_c: None, water_c: None, pressure_pa: None },
+        reference: None,
+        camera_mount: None,
+        map: None,
+        model: None,
+        outliers: Vec::new(),
+        joint: Vec::new(),
+        failed_joint: Vec::new(),
+        prior: None,
+        covariance: CovarianceTable { parameters: Vec::new(), rows: Vec::new() },
+    }
+}
+
+fn fit() -> FitMetrics {
+    FitMetrics {
+        outcome: Outcome::Converged,
+        evaluations: 1,
+        cost_initial: 1.0,
+        cost_final: 1.0,
+        views: 14,
+        tags_seen: 0,
+        rejected: 0,
+        rejected_by_reason: Default::default(),
+        rms_m: 0.0,
+        rms_px: Some(0.0),
+        linearity_scale: 1.0,
+    }
+}

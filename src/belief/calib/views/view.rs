@@ -1,0 +1,197 @@
+//! A view: averaged data of an arm at rest, and all views of a recording.
+
+use std::collections::BTreeMap;
+
+use nalgebra::{Isometry3, Vector3};
+
+use armcal_core::sensor::Conditions;
+use armcal_core::streams::{JointAngles, MAX_JOINTS, ReachTask, RejectReason};
+use armcal_core::time::Stamp;
+
+/// Averaged data of an arm at rest that looks at tags.
+#[derive(Clone, Debug)]
+pub struct View {
+    pub pose_idx: u32,
+    pub end: Stamp,
+    /// Mean travel of each joint from the middle of its range by the datasheet, rad.
+    pub travel_rad: JointAngles,
+    /// How many readings that mean has.
+    pub n_readings: usize,
+    /// How fast the travel changed over the view, rad/s.
+    pub rate_rad_s: JointAngles,
+    /// The way that each joint moved last before the view: -1, 1, or 0 where that is not known.
+    pub approach: [f64; MAX_JOINTS],
+    /// Joints whose reading says nothing in this view: `travel_rad` is then but a guess.
+    pub is_free: [bool; MAX_JOINTS],
+    /// Oil temperature, pressure and time of the readings.
+    pub conditions: Conditions,
+    pub tags: Vec<TagObservation>,
+    /// The tag on the gripper, where the robot has one and it was seen.
+    pub gripper_tag: Option<MeanCorners>,
+}
+
+impl View {
+    /// One reading of an arm at rest under unknown conditions, no tags yet.
+    #[must_use]
+    pub fn of_reading(pose_idx: u32, end: Stamp, travel_rad: JointAngles) -> Self {
+        Self {
+            pose_idx,
+            end,
+            travel_rad,
+            n_readings: 1,
+            rate_rad_s: JointAngles::zeros(travel_rad.len()),
+            approach: [0.0; MAX_JOINTS],
+            is_free: [false; MAX_JOINTS],
+            conditions: Conditions::default(),
+            tags: Vec::new(),
+            gripper_tag: None,
+        }
+    }
+}
+
+/// Corners of one tag, averaged over the frames of a view.
+#[derive(Clone, Copy, Debug)]
+pub struct MeanCorners {
+    pub corners_px: [[f64; 2]; 4],
+    pub n_frames: usize,
+    /// Sum over frames and the eight coordinates of the squared deviation from the mean; it has `8 (n_frames - 1)` degrees of freedom.
+    pub scatter_px2: f64,
+}
+
+/// What was measured of a tag or landmark in a view.
+#[derive(Clone, Copy, Debug)]
+pub enum TagMeasurement {
+    /// Its corners in the image.
+    Corners(MeanCorners),
+    /// Its position in the camera frame, and no more.
+    Position,
+    /// `camera_from_tag`.
+    Pose(Isometry3<f64>),
+}
+
+/// One tag in one view.
+#[derive(Clone, Copy, Debug)]
+pub struct TagObservation {
+    pub id: u32,
+    /// Index into the robot's surveyed tags.
+    pub tag_idx: usize,
+    /// The tag's centre in the camera frame, m.
+    pub center_in_camera_m: Vector3<f64>,
+    pub measured: TagMeasurement,
+}
+
+impl TagObservation {
+    /// Its corners, where the recording has them.
+    #[must_use]
+    pub fn corners(&self) -> Option<&MeanCorners> {
+        match &self.measured {
+            TagMeasurement::Corners(seen) => Some(seen),
+            TagMeasurement::Position | TagMeasurement::Pose(_) => None,
+        }
+    }
+}
+
+/// Why a detection was not used.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum ObservationRejection {
+    /// The robot's survey does not know this id.
+    UnknownTag,
+    /// The corners are not those of a square seen from its front.
+    NotASquare,
+    /// A corner has no bearing in the lens model.
+    OutOfView,
+    /// The mark's span holds no joint readings.
+    NoReadings,
+    /// In some frame of a view a tag lies elsewhere than in most: one of them is another tag, misread.
+    InconsistentFrame,
+    /// The arm was on its way.
+    ArmMoving,
+    /// It does not fit the other observations.
+    Outlier,
+    /// The detector itself did not believe it.
+    Detector(RejectReason),
+}
+
+impl ObservationRejection {
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::UnknownTag => "unknown_tag",
+            Self::NotASquare => "not_a_square",
+            Self::OutOfView => "out_of_view",
+            Self::NoReadings => "no_joint_readings",
+            Self::InconsistentFrame => "inconsistent_frame",
+            Self::Outlier => "outlier",
+            Self::ArmMoving => "arm_moving",
+            Self::Detector(reason) => reason.name(),
+        }
+    }
+}
+
+/// The views of a recording, and what else a calibration takes from it.
+#[derive(Clone, Debug, Default)]
+pub struct CaptureData {
+    pub fit: Vec<View>,
+    pub held_out: Vec<View>,
+    /// Views in which only one joint moved, by that joint; in the order of time.
+    pub identify: BTreeMap<u32, Vec<View>>,
+    /// Readings at nominal end stops, in the order of time.
+    pub stops: Vec<(Stamp, EndStopReading)>,
+    pub task: Option<ReachTask>,
+    pub n_marks: usize,
+    pub rejected: BTreeMap<ObservationRejection, usize>,
+    pub ids_seen: Vec<u32>,
+    /// Names of landmarks that are no numbered tags, by the number that stands for them.
+    pub landmark_names: BTreeMap<u32, String>,
+    /// Lowest and highest reading over the captured spans, C.
+    pub oil_c: Option<(f64, f64)>,
+    pub water_c: Option<(f64, f64)>,
+    pub pressure_pa: Option<(f64, f64)>,
+    /// Indices of the recording's messages that were used, ascending.
+    pub used: Vec<usize>,
+    /// Those beyond them that only sensors with terms rest on: thermometers near the views, readings before them. Ascending.
+    pub used_for_terms: Vec<usize>,
+}
+
+impl CaptureData {
+    pub(crate) fn reject(&mut self, why: ObservationRejection, n: usize) {
+        *self.rejected.entry(why).or_default() += n;
+    }
+
+    /// Puts everything in an order that does not depend on when it was marked.
+    pub(crate) fn sort(&mut self) {
+        self.stops.sort_by_key(|(end, _)| *end);
+        self.fit.sort_by_key(|view| view.pose_idx);
+        self.held_out.sort_by_key(|view| view.pose_idx);
+        for views in self.identify.values_mut() {
+            views.sort_by_key(|view| view.end);
+        }
+        self.used.sort_unstable();
+        self.used.dedup();
+        self.used_for_terms.sort_unstable();
+        self.used_for_terms.dedup();
+        self.used_for_terms.retain(|idx| self.used.binary_search(idx).is_err());
+        self.ids_seen.sort_unstable();
+        self.ids_seen.dedup();
+    }
+
+    /// How many were rejected under each name; what the detector and the estimator reject alike has one.
+    #[must_use]
+    pub fn rejected_by_reason(&self) -> BTreeMap<String, usize> {
+        let mut counts = BTreeMap::new();
+        for (why, n) in &self.rejected {
+            *counts.entry(why.name().to_owned()).or_default() += n;
+        }
+        counts
+    }
+}
+
+/// Readings of one joint that stood at a nominal stop.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EndStopReading {
+    pub joint: usize,
+    /// Where the drawing has the stop.
+    pub angle_rad: f64,
+    /// Mean travel of the joint from the middle of its range by the datasheet.
+    pub travel_rad: f64,
+}

@@ -1,0 +1,92 @@
+//! The commands: parse, dispatch, exit code.
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+#[cfg(feature = "viewer")]
+use crate::cli::replay;
+use crate::cli::{calibrate, check, exit, export, inspect, plan, tagmap};
+#[cfg(feature = "sim")]
+use crate::cli::{campaign, regress, run, sensitivity, study};
+
+/// Calibrates the joint sensors of arms that nobody can walk up to.
+#[derive(Debug, Parser)]
+#[command(name = "armcal", version, about, max_term_width = 100)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Run a routine in simulation: reach, plan, capture, calibrate, reach again
+    #[cfg(feature = "sim")]
+    Run(run::RunArgs),
+    /// Run a routine for many seeds and settings, and sum the figures up
+    #[cfg(feature = "sim")]
+    Campaign(Box<campaign::CampaignArgs>),
+    /// Run a routine for the seeds of a baseline, and say whether it has become worse
+    #[cfg(feature = "sim")]
+    Regress(Box<regress::RegressArgs>),
+    /// Measure a part on its own against known truth
+    #[cfg(feature = "sim")]
+    Study(study::StudyArgs),
+    /// Show what one wrong joint offset does to the paper's two objectives and to the tool
+    #[cfg(feature = "sim")]
+    Sensitivity(sensitivity::SensitivityArgs),
+    /// Choose poses and paths for a routine's first capture without moving: plan.toml for an operator, plan.rrd to look at
+    Plan(plan::PlanArgs),
+    /// Calibrate from recordings, simulated or of a real arm
+    Calibrate(calibrate::CalibrateArgs),
+    /// Find where the tags are, from camera views alone
+    Tagmap(tagmap::TagmapArgs),
+    /// Say what is in a recording, whether it is whole, and what could be calibrated from it
+    Inspect(inspect::InspectArgs),
+    /// Write a calibration as YAML, TOML or one compact line to stdout
+    Export(export::ExportArgs),
+    /// Open a recording in the Rerun viewer, or write it as .rrd
+    #[cfg(feature = "viewer")]
+    Replay(replay::ReplayArgs),
+    /// Read robot folders, routines, vehicles, calibrations, input maps, tag maps, tasks and plans, and say what is wrong with them
+    Check(check::CheckArgs),
+}
+
+/// Parses the command line, does what it says and gives the exit code; errors go to stderr once, here.
+#[must_use]
+pub fn main() -> ExitCode {
+    let cli = Cli::parse();
+    tracing_subscriber::fmt()
+        .with_writer(std::io::stderr)
+        .with_max_level(tracing::Level::WARN)
+        .without_time()
+        .with_target(false)
+        .init();
+    let result = match cli.command {
+        #[cfg(feature = "sim")]
+        Command::Run(args) => run::run(&args),
+        #[cfg(feature = "sim")]
+        Command::Campaign(args) => campaign::campaign(&args),
+        #[cfg(feature = "sim")]
+        Command::Regress(args) => regress::regress(&args),
+        #[cfg(feature = "sim")]
+        Command::Study(args) => study::study(&args),
+        #[cfg(feature = "sim")]
+        Command::Sensitivity(args) => sensitivity::sensitivity(&args),
+        Command::Plan(args) => plan::plan(&args),
+        Command::Calibrate(args) => calibrate::calibrate(&args),
+        Command::Tagmap(args) => tagmap::tagmap(&args),
+        Command::Inspect(args) => inspect::inspect(&args),
+        Command::Export(args) => export::export(&args),
+        #[cfg(feature = "viewer")]
+        Command::Replay(args) => replay::replay(&args),
+        Command::Check(args) => check::check(&args),
+    };
+    match result {
+        Ok(exit) => exit.into(),
+        Err(error) => {
+            eprintln!("error: {}", exit::explain(&error));
+            exit::of_error(&error).into()
+        }
+    }
+}

@@ -1,0 +1,53 @@
+//! What of a recording could not be used, said on stderr.
+
+use armcal_core::input::ForeignRecording;
+use armcal_core::log::{Completeness, Recording};
+use armcal_core::robot::Robot;
+
+pub(super) fn describe(completeness: &Completeness) -> String {
+    match completeness {
+        Completeness::Whole => "whole".to_owned(),
+        Completeness::Cut { reason, readable_messages } => format!("cut: {reason}; {readable_messages} messages read"),
+        Completeness::Damaged { reason, lost_bytes, readable_messages, .. } => {
+            format!("damaged: {reason}; {lost_bytes} bytes lost, {readable_messages} messages read")
+        }
+    }
+}
+
+/// Says on stderr what a recording has lost; `true` if it has lost anything.
+pub(super) fn warn_of_losses(recording: &Recording) -> bool {
+    let file = recording.path.display();
+    let whole = recording.completeness == Completeness::Whole;
+    if !whole {
+        eprintln!("warning: {file}: {}; what could be read is used", describe(&recording.completeness));
+    }
+    for (what, n) in &recording.rejected {
+        eprintln!("warning: {file}: {n} messages rejected on {what}");
+    }
+    if recording.non_monotonic > 0 {
+        eprintln!("warning: {file}: log time went backwards {} times", recording.non_monotonic);
+    }
+    !whole || !recording.rejected.is_empty()
+}
+
+/// Says on stderr what of a real arm's recording is not used; `true` if something was lost.
+pub(super) fn warn_of_foreign(recording: &ForeignRecording, robot: &Robot) -> bool {
+    let file = recording.path.display();
+    let is_whole = recording.completeness == Completeness::Whole;
+    if !is_whole {
+        eprintln!("warning: {file}: {}; what could be read is used", describe(&recording.completeness));
+    }
+    for (what, n) in &recording.left_out {
+        eprintln!("warning: {file}: {n} {what} left out");
+    }
+    if !recording.extra_joints.is_empty() {
+        eprintln!("note: {file}: joints that the robot lacks are ignored: {}", recording.extra_joints.join(", "));
+    }
+    for &joint in &recording.absent_joints {
+        let name = &robot.sensors[joint].joint;
+        eprintln!(
+            "note: {file}: has no readings of {name}; the camera hangs before it, its angle is taken as the middle"
+        );
+    }
+    !is_whole || !recording.left_out.is_empty()
+}

@@ -1,0 +1,141 @@
+//! The figures that an `assert` step may hold a run against.
+
+use std::collections::BTreeMap;
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+use crate::units::Unit;
+
+/// A figure of a run, as routines and summary.json name it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub enum AssertFigure {
+    /// Held-out views of the last calibration, root mean square.
+    #[serde(rename = "held_out_rms_m")]
+    HeldOutRms,
+    /// The same in the image.
+    #[serde(rename = "held_out_rms_px")]
+    HeldOutReprojection,
+    /// 95th percentile over the task's targets, by the last calibration itself.
+    #[serde(rename = "predicted_tool_error_m")]
+    PredictedToolError,
+    /// Since the start.
+    #[serde(rename = "simulated_s")]
+    SimulatedTime,
+    /// Median over the targets of the last reach.
+    #[serde(rename = "tool_error_m")]
+    ToolError,
+    /// Median distance between target and tool in the last reach.
+    #[serde(rename = "reach_error_m")]
+    ReachError,
+    /// The worst of the last reach.
+    #[serde(rename = "reach_error_max_m")]
+    WorstReachError,
+    /// Between the arm and anything else, since the start.
+    #[serde(rename = "clearance_m")]
+    Clearance,
+    /// Since the start.
+    #[serde(rename = "contacts")]
+    Contacts,
+}
+
+/// What must have happened before there is a figure.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Needs {
+    Nothing,
+    Calibration,
+    Reach,
+}
+
+impl AssertFigure {
+    /// As routines name it.
+    #[must_use]
+    pub const fn key(self) -> &'static str {
+        match self {
+            Self::HeldOutRms => "held_out_rms_m",
+            Self::HeldOutReprojection => "held_out_rms_px",
+            Self::PredictedToolError => "predicted_tool_error_m",
+            Self::SimulatedTime => "simulated_s",
+            Self::ToolError => "tool_error_m",
+            Self::ReachError => "reach_error_m",
+            Self::WorstReachError => "reach_error_max_m",
+            Self::Clearance => "clearance_m",
+            Self::Contacts => "contacts",
+        }
+    }
+
+    #[must_use]
+    pub const fn unit(self) -> Unit {
+        match self {
+            Self::HeldOutReprojection => Unit::Pixels,
+            Self::SimulatedTime => Unit::Seconds,
+            Self::Contacts => Unit::Count,
+            Self::HeldOutRms
+            | Self::PredictedToolError
+            | Self::ToolError
+            | Self::ReachError
+            | Self::WorstReachError
+            | Self::Clearance => Unit::Metres,
+        }
+    }
+
+    #[must_use]
+    pub const fn needs(self) -> Needs {
+        match self {
+            Self::HeldOutRms | Self::HeldOutReprojection | Self::PredictedToolError => Needs::Calibration,
+            Self::ToolError | Self::ReachError | Self::WorstReachError => Needs::Reach,
+            Self::SimulatedTime | Self::Clearance | Self::Contacts => Needs::Nothing,
+        }
+    }
+
+    /// Clearance is to be at least its limit, all else at most.
+    #[must_use]
+    pub fn holds(self, value: f64, limit: f64) -> bool {
+        if self == Self::Clearance { value >= limit } else { value <= limit }
+    }
+}
+
+impl fmt::Display for AssertFigure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.key())
+    }
+}
+
+/// What an `assert` step holds the run against: figures with their limits, in the order of [`AssertFigure`].
+#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
+#[serde(transparent)]
+pub struct AssertLimits(BTreeMap<AssertFigure, f64>);
+
+impl AssertLimits {
+    /// Every limit with its figure.
+    pub fn each(&self) -> impl Iterator<Item = (AssertFigure, f64)> {
+        self.0.iter().map(|(figure, limit)| (*figure, *limit))
+    }
+
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// Whether any of its figures needs `what` to have happened.
+    #[must_use]
+    pub fn need(&self, what: Needs) -> bool {
+        self.0.keys().any(|figure| figure.needs() == what)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_key_in_code_is_the_key_in_files() {
+        let text = "contacts = 0.0\nclearance_m = 0.1\nheld_out_rms_m = 0.01\nsimulated_s = 9.0\nreach_error_m = 1.0\n\
+                    reach_error_max_m = 1.0\ntool_error_m = 1.0\npredicted_tool_error_m = 1.0\nheld_out_rms_px = 2.0";
+        let limits: AssertLimits = toml::from_str(text).expect("all keys");
+        assert_eq!(limits.each().count(), 9);
+        for (figure, _) in limits.each() {
+            assert_eq!(toml::Value::try_from(figure).expect("a name").as_str(), Some(figure.key()));
+        }
+    }
+}

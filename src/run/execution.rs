@@ -1,0 +1,221 @@
+//! One run from start to end: world, loop, streams, score, what is kept.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use crate::output::{OutputError, OutputFolder};
+#[cfg(feature = "viewer")]
+use crate::report::markdown;
+use crate::report::{AssertSummary, RenewalSummary, RunSummary, html};
+use crate::run::describe::describe;
+use crate::run::{Failure, RunError, RunInputs, Stage, corner_scatter_px};
+use crate::score::{ScoreInput, score};
+use armcal_belief::calib::Calibration;
+use armcal_belief::session::{self, AssertResult, EstimateUpdate, Outcome, Progress, Recorder, SessionInputs};
+use armcal_core::log::{Recording, RecordingHeader, RecordingWriter, read_recording};
+use armcal_core::streams::Arm;
+use armcal_sim::truth::TruthRecorder;
+use armcal_sim::{World, WorldInput};
+
+/// What a run leaves in its folder.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Keep {
+    /// Recording, truth, replay, calibration, summary, report.
+    Everything,
+    /// Recording and truth, which the score needs; the caller removes them.
+    StreamsAlone,
+}
+
+/// What a run gave.
+#[derive(Debug)]
+pub struct Finished {
+    pub summary: RunSummary,
+    pub calibration: Calibration,
+    /// See [`corner_scatter_px`].
+    pub corner_scatter_px: Option<f64>,
+}
+
+/// Runs the closed loop with `seed` and scores it. The watcher's clock is taken to have started with the command: its
+/// reading at the end is the summary's `wall_s`. Results come into place all at once at the end, if they are kept.
+///
+/// # Errors
+/// [`Failure`] with the stage, and where the recording is now. It stays readable if the loop breaks off.
+pub fn execute(
+    inputs: &RunInputs,
+    seed: u64,
+    output: &OutputFolder,
+    keep: Keep,
+    progress: &mut dyn Progress,
+) -> Result<Finished, Failure> {
+    let run = Run { inputs, seed, output, keep };
+    run.to_the_end(progress).map_err(|failure| run.broken_off(failure))
+}
+
+struct Run<'a> {
+    inputs: &'a RunInputs,
+    seed: u64,
+    output: &'a OutputFolder,
+    keep: Keep,
+}
+
+impl Run<'_> {
+    fn to_the_end(&self, progress: &mut dyn Progress) -> Result<Finished, Failure> {
+        let (outcome, recorder) = self.drive(progress)?;
+        self.finish_recording(recorder).map_err(Failure::at(Stage::Results))?;
+        let finished = self.write_results(outcome, progress).map_err(Failure::at(Stage::Results))?;
+        if self.keep == Keep::Everything {
+            self.output.commit().map_err(Failure::at(Stage::Results))?;
+        }
+        Ok(finished)
+    }
+
+    /// Where the result `name` grows.
+    fn partial(&self, name: &str) -> PathBuf {
+        self.output.partial(name)
+    }
+
+    fn drive(&self, progress: &mut dyn Progress) -> Result<(Outcome, Recorder), Failure> {
+        let inputs = self.inputs;
+        let (mut world, mut recorder) = self.open().map_err(Failure::at(Stage::World))?;
+        let setup =
+            SessionInputs { robot: &inputs.robot, vehicle: &inputs.vehicle, routine: &inputs.routine, seed: self.seed };
+        let result = session::run(&setup, &mut world, &mut recorder, progress);
+        let finished = world.finish_truth();
+        match result {
+            Ok(outcome) => {
+                finished.map_err(Failure::at(Stage::Motion))?;
+                Ok((outcome, recorder))
+            }
+            Err(error) => {
+                // Whole up to here: what happened before the failure can be looked at. If the recording itself failed, this
+                // fails too, and `error` says why.
+                let _ = recorder.into_writer().finish();
+                Err(Failure::of_session(error))
+            }
+        }
+    }
+
+    fn open(&self) -> Result<(World, Recorder), RunError> {
+        let inputs = self.inputs;
+        let mut world = World::new(WorldInput {
+            robot: &inputs.robot,
+            vehicle: &inputs.vehicle,
+            scene: &inputs.routine.scene,
+            spec: inputs.spec.clone(),
+            seed: self.seed,
+        })?;
+        let truth = TruthRecorder::create(self.partial("truth.mcap"))?;
+        world.set_truth_sink(Box::new(truth))?;
+        let header = RecordingHeader::new(inputs.robot.joint_names());
+        let mut writer = RecordingWriter::create(self.partial("run.mcap"), header)?;
+        describe(&mut writer, inputs, world.now())?;
+        Ok((world, Recorder::new(writer)))
+    }
+
+    /// Keeps and names the recording that a broken run leaves; one in which nothing moved yet is removed.
+    fn broken_off(&self, failure: Failure) -> Failure {
+        if matches!(failure.stage, Stage::Input | Stage::World | Stage::Plan) {
+            self.output.discard();
+            return failure;
+        }
+        // If it cannot be renamed it stays where it was, which the next run into this folder will say.
+        Failure { kept: self.output.set_aside().unwrap_or_default(), ..failure }
+    }
+
+    /// Attaches the drawings (never the world or the seed) and closes the recording.
+    fn finish_recording(&self, recorder: Recorder) -> Result<(), RunError> {
+        let mut writer = recorder.into_writer();
+        let (robot, routine) = (&self.inputs.robot, &self.inputs.routine);
+        let path = robot.folder.join("robot.toml");
+        let bytes = std::fs::read(&path).map_err(OutputError::of(&path, "cannot be read"))?;
+        writer.attach("robot.toml", "application/toml", &bytes)?;
+        writer.attach("vehicle.toml", "application/toml", self.inputs.vehicle.text.as_bytes())?;
+        writer.attach(&robot.urdf_name, "application/xml", robot.urdf_text.as_bytes())?;
+        writer.attach("scene.toml", "application/toml", routine.scene_toml.as_bytes())?;
+        let versions = BTreeMap::from([("armcal".to_owned(), env!("CARGO_PKG_VERSION").to_owned())]);
+        writer.metadata("run", versions)?;
+        Ok(writer.finish()?)
+    }
+
+    fn write_results(&self, outcome: Outcome, progress: &mut dyn Progress) -> Result<Finished, RunError> {
+        let recording = read_recording(self.partial("run.mcap"))?;
+        let mut summary = self.summary(&outcome, &recording)?;
+        if self.keep == Keep::Everything {
+            #[cfg(feature = "viewer")]
+            self.mirror(&recording, &summary)?;
+            // Taken last: the replay is part of what a user waits for.
+            summary.wall_s = progress.wall_s();
+            self.write_texts(&outcome.calibration, &summary)?;
+        }
+        let corner_scatter_px = corner_scatter_px(&recording);
+        Ok(Finished { summary, calibration: outcome.calibration, corner_scatter_px })
+    }
+
+    fn summary(&self, outcome: &Outcome, recording: &Recording) -> Result<RunSummary, RunError> {
+        let truth = self.partial("truth.mcap");
+        let scored = score(&ScoreInput {
+            recording,
+            truth: &truth,
+            robot: &self.inputs.robot,
+            outcome,
+            tolerance_m: self.inputs.routine.task.tolerance_m,
+        })?;
+        let mut summary = RunSummary::of_calibration(&outcome.calibration, outcome.calibration_wall_s);
+        summary.routine = Some(self.inputs.routine.name.clone());
+        summary.seed = Some(self.seed);
+        summary.simulated_s = Some(outcome.duration_s);
+        summary.motion_s = Some(outcome.motion_s);
+        summary.waited_s = Some(outcome.waited_s);
+        summary.stopped.clone_from(&outcome.stopped);
+        summary.asserts = scored.asserts.iter().map(assert_summary).collect();
+        summary.capture.poses = outcome.poses;
+        summary.capture.poses_skipped = outcome.poses_skipped;
+        summary.capture.targets_skipped = outcome.targets_skipped;
+        summary.capture.collisions = Some(scored.collisions);
+        summary.capture.min_clearance_m = scored.min_clearance_m;
+        summary.capture.margins = scored.margins;
+        summary.capture.renewals = outcome.renewals.iter().map(renewal_summary).collect();
+        summary.capture.stop_reason.clone_from(&outcome.capture_ended);
+        summary.score = Some(scored.score);
+        Ok(summary)
+    }
+
+    fn write_texts(&self, calibration: &Calibration, summary: &RunSummary) -> Result<(), RunError> {
+        self.output.write("calibration.toml", calibration.to_toml().as_bytes())?;
+        if let Some(map) = &calibration.map {
+            self.output.write("tagmap.toml", map.to_toml().as_bytes())?;
+        }
+        let json = serde_json::to_string_pretty(summary)?;
+        self.output.write("summary.json", format!("{json}\n").as_bytes())?;
+        Ok(self.output.write("report.html", html(summary, calibration).as_bytes())?)
+    }
+
+    #[cfg(feature = "viewer")]
+    fn mirror(&self, recording: &Recording, summary: &RunSummary) -> Result<(), RunError> {
+        let markdown = markdown(summary);
+        let truth = self.partial("truth.mcap");
+        armcal_replay::write_rrd(
+            &armcal_replay::ReplayInput {
+                recording,
+                truth: Some(&truth),
+                robot: &self.inputs.robot,
+                vehicle: Some(&self.inputs.vehicle),
+                scene: Some(&self.inputs.routine.scene),
+                summary_markdown: Some(&markdown),
+            },
+            &self.partial("run.rrd"),
+        )?;
+        Ok(())
+    }
+}
+
+fn renewal_summary(renewal: &EstimateUpdate) -> RenewalSummary {
+    let EstimateUpdate { views, elapsed_s, expected_tool_error_m, .. } = *renewal;
+    RenewalSummary { views, elapsed_s, predicted_tool_error_m: expected_tool_error_m }
+}
+
+/// A limit without a figure does not hold: nobody saw that it does.
+fn assert_summary(limit: &AssertResult) -> AssertSummary {
+    let holds = limit.holds().unwrap_or(false);
+    AssertSummary { step: limit.step, key: limit.figure, limit: limit.limit, value: limit.value, holds }
+}

@@ -1,0 +1,30 @@
+//! What a run starts from, read and checked before anything moves.
+
+use std::path::Path;
+
+use crate::run::RunError;
+use armcal_core::robot::{Robot, Vehicle};
+use armcal_core::routine::{self, Overrides, Routine};
+use armcal_sim::WorldSpec;
+
+/// Everything read and checked before anything moves.
+#[derive(Clone, Debug)]
+pub struct RunInputs {
+    pub routine: Routine,
+    pub robot: Robot,
+    pub vehicle: Vehicle,
+    pub spec: WorldSpec,
+}
+
+impl RunInputs {
+    /// Reads a routine and all that it names.
+    ///
+    /// # Errors
+    /// [`RunError`] naming file, key and allowed range.
+    pub fn load(file: &Path, overrides: &Overrides) -> Result<Self, RunError> {
+        let routine = routine::load_with(file, overrides)?;
+        let (robot, vehicle) = routine.load_arm()?;
+        let spec = WorldSpec::from_routine(&routine, &robot)?;
+        Ok(Self { routine, robot, vehicle, spec })
+    }
+}

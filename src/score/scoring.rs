@@ -1,0 +1,168 @@
+//! The figures of a run: truth against belief.
+
+use std::path::Path;
+
+use nalgebra::Vector3;
+
+use crate::score::{JointScore, MarginSummary, ReachScore, Score, ScoreSide, margins, touch};
+use armcal_belief::session::{AssertResult, Outcome, ReachStep};
+use armcal_belief::verify::{ReachRest, reaches};
+use armcal_core::log::Recording;
+use armcal_core::robot::Robot;
+use armcal_core::routine::AssertFigure;
+use armcal_core::spatial::{Base, Pose, Tool};
+use armcal_core::stats::Summary;
+use armcal_core::streams::ReachAttempt;
+use armcal_sim::SimError;
+use armcal_sim::truth::{Truth, read_truth};
+
+/// What truth adds to a run's figures.
+#[derive(Clone, Debug)]
+pub struct Scored {
+    pub score: Score,
+    pub collisions: usize,
+    pub min_clearance_m: Option<f64>,
+    pub margins: Option<MarginSummary>,
+    /// The script's limits, with the figures that only the truth knows.
+    pub asserts: Vec<AssertResult>,
+}
+
+/// What is compared.
+pub struct ScoreInput<'a> {
+    pub recording: &'a Recording,
+    pub truth: &'a Path,
+    pub robot: &'a Robot,
+    pub outcome: &'a Outcome,
+    pub tolerance_m: f64,
+}
+
+/// Scores a run.
+///
+/// # Errors
+/// [`SimError::TruthFile`] when the truth cannot be read.
+pub fn score(input: &ScoreInput<'_>) -> Result<Scored, SimError> {
+    let truth = read_truth(input.truth)?;
+    let outcome = input.outcome;
+    let beliefs: Vec<_> = outcome.epochs.iter().map(|epoch| (epoch.from, &epoch.sensors)).collect();
+    let rests = reaches(input.recording, input.robot, &beliefs);
+    let compared: Vec<Compared> = rests.iter().filter_map(|rest| compare(rest, input.robot, &truth)).collect();
+    let of_step = |step: &ReachStep| -> Vec<&Compared> {
+        compared.iter().filter(|c| (step.start..=step.end).contains(&c.rest.start)).collect()
+    };
+    let reaches: Vec<ReachScore> = outcome
+        .reaches
+        .iter()
+        .map(|step| ReachScore {
+            step: step.step,
+            calibrated: step.attempt == ReachAttempt::After,
+            side: side_figures(&of_step(step), input.tolerance_m),
+            touches: touch::touches(input.recording, &truth, input.robot, step, input.tolerance_m),
+        })
+        .collect();
+    let first = outcome.reaches.iter().find(|step| step.attempt == ReachAttempt::Before).map(of_step);
+    let last = outcome.reaches.iter().rev().find(|step| step.attempt == ReachAttempt::After).map(of_step);
+    let (before, after) = (first.unwrap_or_default(), last.unwrap_or_default());
+    let score = Score {
+        before: side_figures(&before, input.tolerance_m),
+        after: (!after.is_empty()).then(|| side_figures(&after, input.tolerance_m)),
+        nees: nees(input, &after),
+        joints: joint_scores(input, &before, &after),
+        reaches,
+    };
+    let asserts = outcome.asserts.iter().map(|limit| completed(limit, &score, &truth)).collect();
+    let margins = margins::margins(&outcome.visits, input.robot, &truth);
+    Ok(Scored { score, collisions: truth.contacts.len(), min_clearance_m: truth.min_clearance_m(), margins, asserts })
+}
+
+/// The limit with its figure, if the truth has it.
+fn completed(limit: &AssertResult, score: &Score, truth: &Truth) -> AssertResult {
+    let reach = limit.last_reach.and_then(|reach| score.reaches.get(reach)).map(|reach| &reach.side);
+    let value = limit.at.and_then(|at| match limit.figure {
+        AssertFigure::ToolError => Some(reach?.tool_error_m?.median),
+        AssertFigure::ReachError => Some(reach?.reach_error_m?.median),
+        AssertFigure::WorstReachError => Some(reach?.reach_error_m?.max),
+        AssertFigure::Contacts => Some(truth.contacts.iter().filter(|contact| contact.stamp <= at).count() as f64),
+        AssertFigure::Clearance => {
+            let until = truth.clearances.iter().filter(|clearance| clearance.stamp <= at);
+            until.map(|clearance| clearance.distance_m).min_by(f64::total_cmp)
+        }
+        AssertFigure::HeldOutRms
+        | AssertFigure::HeldOutReprojection
+        | AssertFigure::PredictedToolError
+        | AssertFigure::SimulatedTime => limit.value,
+    });
+    AssertResult { value, ..limit.clone() }
+}
+
+/// One rest, believed and true.
+struct Compared<'a> {
+    rest: &'a ReachRest,
+    tool_error_m: Vector3<f64>,
+    tool_error_rad: f64,
+    reach_error_m: f64,
+    joint_error_rad: Vec<f64>,
+}
+
+fn compare<'a>(rest: &'a ReachRest, robot: &Robot, truth: &Truth) -> Option<Compared<'a>> {
+    // The middle of the mark: the arm stands over all of it.
+    let stamp = rest.start.plus_s(0.5 * rest.end.since_s(rest.start));
+    let state = truth.state_at(stamp)?;
+    let true_tool = state.base_from_tool;
+    let believed_tool: Pose<Base, Tool> =
+        Pose::from_isometry(robot.chain.link_poses(&rest.believed).frame(&robot.tool.mount));
+    Some(Compared {
+        rest,
+        tool_error_m: rest.believed_tool_m - true_tool.origin().vector(),
+        tool_error_rad: armcal_core::spatial::rotation_angle_between(&believed_tool, &true_tool),
+        reach_error_m: (Vector3::from(rest.target_m) - true_tool.origin().vector()).norm(),
+        joint_error_rad: rest.believed.iter().zip(state.angles.iter()).map(|(b, t)| wrapped(b - t)).collect(),
+    })
+}
+
+/// To -pi .. pi: a continuous joint may have turned once more.
+fn wrapped(angle_rad: f64) -> f64 {
+    use std::f64::consts::{PI, TAU};
+    (angle_rad + PI).rem_euclid(TAU) - PI
+}
+
+fn side_figures(compared: &[&Compared<'_>], tolerance_m: f64) -> ScoreSide {
+    let summary = |f: fn(&Compared<'_>) -> f64| Summary::of(&compared.iter().map(|c| f(c)).collect::<Vec<_>>());
+    ScoreSide {
+        tool_error_m: summary(|c| c.tool_error_m.norm()),
+        tool_error_rad: summary(|c| c.tool_error_rad),
+        reach_error_m: summary(|c| c.reach_error_m),
+        hits: compared.iter().filter(|c| c.reach_error_m <= tolerance_m).count(),
+    }
+}
+
+fn joint_scores(input: &ScoreInput<'_>, before: &[&Compared<'_>], after: &[&Compared<'_>]) -> Vec<JointScore> {
+    let rms = |side: &[&Compared<'_>], joint: usize| {
+        let mean_square = side.iter().map(|c| c.joint_error_rad[joint].powi(2)).sum::<f64>() / side.len() as f64;
+        (!side.is_empty()).then(|| mean_square.sqrt())
+    };
+    let joint_score = |(joint, result): (usize, &armcal_belief::calib::JointResult)| JointScore {
+        name: result.name.clone(),
+        angle_error_before_rad: rms(before, joint),
+        angle_error_after_rad: rms(after, joint),
+        estimated: result.gain_estimated || result.offset_estimated,
+    };
+    input.outcome.calibration.joint.iter().enumerate().map(joint_score).collect()
+}
+
+/// Mean of `e^T P^-1 e` over the targets; `None` when the prediction has no inverse.
+fn nees(input: &ScoreInput<'_>, after: &[&Compared<'_>]) -> Option<f64> {
+    let first = after.first()?;
+    let epoch = input.outcome.epochs.iter().rev().find(|epoch| epoch.from <= first.rest.start)?;
+    let calibration = epoch.calibration.as_ref()?;
+    let robot = calibration.scaled_robot(input.robot);
+    let covariance = calibration.parameter_covariance(&robot);
+    let sensors = calibration.sensors(&robot).ok()?;
+    let mut sum = 0.0;
+    for compared in after {
+        let rest = compared.rest;
+        let predicted = covariance.tool_position_under_m2(&robot, &sensors, &rest.believed, &rest.conditions);
+        let inverse = predicted.try_inverse().filter(|p| p.iter().all(|v| v.is_finite()))?;
+        sum += compared.tool_error_m.dot(&(inverse * compared.tool_error_m));
+    }
+    Some(sum / after.len() as f64)
+}
