@@ -5,8 +5,8 @@ use parry3d::math::{Pose3, Vec3};
 use parry3d::query::{self, Ray};
 use parry3d::shape::SharedShape;
 
-use crate::convert::to_rapier;
 use crate::body_poses::BodyPoses;
+use crate::convert::to_rapier;
 use armcal_core::robot::{PlacedShape, Robot, Shape, Vehicle, parry_pose};
 use armcal_core::routine::Scene;
 

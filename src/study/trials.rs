@@ -119,7 +119,7 @@ fn shoot(imager: &mut Imager, scene: &Scene, condition: &Condition, number: u64,
         is_silty: false,
         number,
     };
-    imager.shoot(&shot).grey(grey);
+    imager.take_image(&shot).grey(grey);
 }
 
 fn compare(

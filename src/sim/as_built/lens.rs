@@ -88,6 +88,4 @@ mod tests {
                 .all(|seed| { LensAsBuilt::draw(&wide, &spec, seed).expect("a lens").applied(&wide).is_monotonic() })
         );
     }
-
-
 }

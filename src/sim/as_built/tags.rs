@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::as_built::pose::{PlainPose, normal_twist};
 use crate::spec::TagsSpec;
-use armcal_core::robot::Robot;
+use armcal_core::robot::{Robot, SurveyedTag};
 use armcal_core::spatial::{Base, Link, Pose, Tag};
 
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

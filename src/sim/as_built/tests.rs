@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use crate::as_built::*;
+use crate::spec::WorldSpec;
 use armcal_core::robot::{Robot, SensorKind, load, load_vehicle};
 
 fn robot() -> Robot {

@@ -8,10 +8,10 @@
 
 use nalgebra::{Isometry3, Vector6};
 
+use crate::dynamics::JointLoad;
 use crate::dynamics::equations::{BaseCoupling, Environment, Equations, Multibody};
 use crate::dynamics::spatial::{Force, Motion};
 use crate::dynamics::system::{Coordinates, MAX_DOF, Symmetric};
-use crate::dynamics::JointLoad;
 use armcal_core::spatial::exp;
 use armcal_core::streams::{JointAngles, MAX_JOINTS};
 

@@ -8,14 +8,15 @@
 mod body;
 mod equations;
 mod integrate;
+mod joint_load;
 mod spatial;
 mod system;
 
-pub use crate::dynamics::JointLoad;
 pub(crate) use body::WaterProperties;
 pub use body::{Body, HullDrag, Surface};
 pub use equations::{BaseCoupling, Environment, Equations, Multibody};
 pub use integrate::{ContactRow, Stage, StepInput, SystemState};
+pub use joint_load::JointLoad;
 pub use spatial::{Force, Inertia, Motion};
 pub use system::{Coordinates, MAX_DOF, Symmetric};
 

@@ -2,8 +2,8 @@
 
 use nalgebra::{Isometry3, Matrix3, UnitQuaternion, Vector3};
 
-use crate::dynamics::*;
 use crate::dynamics::JointLoad;
+use crate::dynamics::*;
 use armcal_core::kinematics::{Chain, ChainJoint};
 use armcal_core::robot::{PlacedShape, Robot, Shape, load};
 use armcal_core::streams::{JointAngles, MAX_JOINTS};

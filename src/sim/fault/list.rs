@@ -27,7 +27,11 @@ pub(crate) fn list_key(index: usize) -> String {
     format!("world.fault.{index}")
 }
 
-pub(crate) fn read_one<T: serde::de::DeserializeOwned>(entry: toml::Value, file: &Path, key: &str) -> Result<T, FileIssue> {
+pub(crate) fn read_one<T: serde::de::DeserializeOwned>(
+    entry: toml::Value,
+    file: &Path,
+    key: &str,
+) -> Result<T, FileIssue> {
     entry.try_into().map_err(|error: toml::de::Error| {
         FileIssue::new(file, key, format!("{}; kinds: {KINDS}", error.message().trim_end()))
     })

@@ -1,6 +1,9 @@
 //! Fault tables and impulses.
 
-use super::*;
+use std::path::Path;
+
+use crate::fault::*;
+use crate::spec::WorldSpec;
 
 #[test]
 fn a_fault_of_the_list_reads_back_and_misspelt_keys_are_refused() {

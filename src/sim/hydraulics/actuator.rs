@@ -1,10 +1,10 @@
 //! One joint's actuator: piston, oil column, relief valve, friction and end stops.
 
+use crate::dynamics::JointLoad;
 use crate::hydraulics::actuator_input::ActuatorInput;
 use crate::hydraulics::end_stop::EndStop;
 use crate::hydraulics::friction::Friction;
 use crate::hydraulics::valve::Valve;
-use crate::dynamics::JointLoad;
 use crate::spec::HydraulicsSpec;
 use armcal_core::kinematics::JointLimits;
 

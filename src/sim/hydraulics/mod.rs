@@ -11,7 +11,7 @@ mod friction;
 mod system;
 mod valve;
 
-pub(crate) use actuator_input::{ActuatorInput, actuator_inputs};
+pub(crate) use actuator_input::actuator_inputs;
 pub(crate) use system::Hydraulics;
 
 #[cfg(test)]

@@ -12,9 +12,9 @@ pub(crate) struct Hydraulics {
     pump_flow_m3_s: f64,
     /// Of the pump's pressure and flow, over the nominal ones.
     pump_ratio: f64,
-    actuators: Vec<Actuator>,
+    pub(super) actuators: Vec<Actuator>,
     heat_w: f64,
-    step_s: f64,
+    pub(super) step_s: f64,
 }
 
 impl Hydraulics {

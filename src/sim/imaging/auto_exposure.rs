@@ -13,6 +13,7 @@ const LOOK_PX: usize = 3;
 /// Bits of a float below the buckets' width: 64 in each octave.
 const BUCKET_SHIFT: u32 = 17;
 const BUCKETS: usize = 1 << (31 - BUCKET_SHIFT);
+
 /// What the camera set for an image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Exposure {

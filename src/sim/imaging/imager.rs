@@ -3,17 +3,19 @@
 use nalgebra::{Isometry3, Unit, Vector3};
 use rayon::prelude::*;
 
+use crate::imaging::auto_exposure::AutoExposure;
+use crate::imaging::canvas::Canvas;
 use crate::imaging::frame::Frame;
 use crate::imaging::light::Light;
+use crate::imaging::marine_snow::{self, Flake};
 use crate::imaging::rays::Rays;
 use crate::imaging::scene::{Appearance, Object};
+use crate::imaging::seafloor_texture::Texture;
 use crate::imaging::sensor::{BAND_ROWS, Sensor};
 use crate::imaging::shader::Shader;
 use crate::imaging::shape::Form;
-use crate::imaging::marine_snow::{self, Flake};
 use crate::imaging::tag_board::Board;
-use crate::imaging::seafloor_texture::Texture;
-use crate::imaging::{canvas::Canvas, tracer::Tracer};
+use crate::imaging::tracer::Tracer;
 use crate::spec::ImageSpec;
 use armcal_core::optics::Fisheye;
 use armcal_core::robot::Shape;
@@ -82,6 +84,7 @@ pub struct Imager {
     texture: Texture,
     canvas: Canvas,
     flakes: Vec<Flake>,
+    auto_exposure: AutoExposure,
     sensor: Sensor,
     seed: u64,
     frame: Frame,
@@ -106,6 +109,7 @@ impl Imager {
             texture: Texture::new(),
             canvas: Canvas::new(n_pixels),
             flakes: Vec::new(),
+            auto_exposure: AutoExposure::new(),
             sensor: Sensor::new(spec, key("image/noise")),
             seed: key("image/snow"),
             frame: Frame { width: rays.width, height: rays.height, rgb: vec![0; 3 * n_pixels] },
@@ -123,7 +127,7 @@ impl Imager {
     }
 
     /// Takes an image.
-    pub fn shoot(&mut self, shot: &Shot) -> &Frame {
+    pub fn take_image(&mut self, shot: &Shot) -> &Frame {
         let camera_from_base = shot.base_from_camera[1].inverse();
         let shader = Shader::new(&self.spec, &self.lights, &camera_from_base, &shot.up, &self.rays);
         if shot.is_silty {
@@ -133,7 +137,7 @@ impl Imager {
         }
         let planes = &mut self.canvas.planes;
         self.sensor.blur(planes, self.rays.width);
-        let exposure = self.sensor.expose(&self.spec, planes, &self.rays);
+        let exposure = self.auto_exposure.choose(&self.spec, planes, &self.rays);
         self.sensor.read(&self.spec, exposure, planes, &self.rays, shot.number, &mut self.frame.rgb);
         &self.frame
     }
@@ -151,14 +155,14 @@ impl Imager {
         let (rays, texture) = (&self.rays, &self.texture);
         self.canvas.trace(&Tracer { rays, objects: &objects, shader, texture });
         if self.spec.snow_per_m3 > 0.0 {
-            snow::fall(&self.spec, &self.lens, shader, self.seed, shot.number, &mut self.flakes);
+            marine_snow::fall(&self.spec, &self.lens, shader, self.seed, shot.number, &mut self.flakes);
             let flakes = &self.flakes;
             let Canvas { ranges, planes: [red, green, blue], .. } = &mut self.canvas;
             let ranges = &*ranges;
             let band = rays.width * BAND_ROWS;
             let bands = red.par_chunks_mut(band).zip(green.par_chunks_mut(band)).zip(blue.par_chunks_mut(band));
             bands.enumerate().for_each(|(n, ((red, green), blue))| {
-                snow::draw(flakes, rays, ranges, n * BAND_ROWS, &mut [red, green, blue]);
+                marine_snow::draw(flakes, rays, ranges, n * BAND_ROWS, &mut [red, green, blue]);
             });
         }
     }

@@ -4,21 +4,24 @@
 //! (`band`, `shade`, `light`, `water`), pixels on edges are averaged over 32 samples of place and time (`sampled`). Marine snow
 //! (`snow`), the lens's blur and the sensor (`sensor`) follow. All arithmetic is in an order that no thread changes.
 
-mod band;
+mod auto_exposure;
+mod canvas;
+mod edges;
 mod frame;
 mod imager;
 mod light;
+mod marine_snow;
 mod math;
 mod rays;
-mod sampled;
 mod scene;
+mod seafloor_texture;
 mod sensor;
-mod shade;
+mod shader;
+mod shading;
 mod shape;
-mod snow;
-mod tag;
-mod texture;
-mod trace;
+mod supersampling;
+mod tag_board;
+mod tracer;
 mod water;
 
 pub use frame::Frame;

@@ -3,10 +3,11 @@
 //! A block of pixels that see one face is shaded at its corners and linear in between. A pixel with another face in its
 //! neighbourhood, or swept by one while the shutter is open, is the mean of `SAMPLES` rays.
 
+use crate::imaging::edges::has_other_face;
 use crate::imaging::scene::{Appearance, FACE_BITS, Object, TILE_PX};
 use crate::imaging::shader::Shade;
 use crate::imaging::tag_board;
-use crate::imaging::tracer::{Candidates, Tracer, has_other_face, object_of};
+use crate::imaging::tracer::{Candidates, Tracer, object_of};
 use crate::imaging::{Rgb, Vec3};
 
 /// Sides of blocks that share their shading, px.
@@ -60,7 +61,7 @@ impl Tracer<'_> {
 
     pub(super) fn albedo(&self, object: &Object, face: u16, ray: &Vec3, range_m: f32, normal: &Vec3) -> Rgb {
         match object.look {
-            Appearance::Tag => tag::albedo(face & ((1 << FACE_BITS) - 1)),
+            Appearance::Tag => tag_board::albedo(face & ((1 << FACE_BITS) - 1)),
             Appearance::Plain(albedo) => albedo,
             Appearance::Ground => {
                 let place = object.place.point(ray, range_m);
@@ -136,7 +137,7 @@ impl Band<'_> {
             let tracer = self.tracer;
             let key = self.faces[i] & !((1 << FACE_BITS) - 1);
             let shade = known.shade(key, object, || tracer.surface(self.faces[i], self.ranges[i], [x, row]).0);
-            return shade.radiance(&tag::albedo(self.faces[i] & ((1 << FACE_BITS) - 1)));
+            return shade.radiance(&tag_board::albedo(self.faces[i] & ((1 << FACE_BITS) - 1)));
         }
         let (shade, albedo) = self.tracer.surface(self.faces[i], self.ranges[i], [x, row]);
         shade.radiance(&albedo)

@@ -1,8 +1,8 @@
 //! A pixel that an edge crosses, or crossed while the shutter was open: the mean over samples of place and time.
 
-use crate::imaging::shading::ShadeCache;
 use crate::imaging::scene::{Appearance, FACE_BITS, Object, SAMPLES, first_met, offset};
 use crate::imaging::shader::Shade;
+use crate::imaging::shading::ShadeCache;
 use crate::imaging::shape::{Form, Lanes};
 use crate::imaging::tag_board;
 use crate::imaging::tracer::Tracer;
@@ -98,17 +98,17 @@ impl Tracer<'_> {
 
 /// The mean over the samples in `mine` of a tag whose shade is `shade`.
 fn printed(object: &Object, mine: u32, samples: &Samples, shade: &Shade, face: u16) -> Rgb {
-    let Form::Tag(board) = object.form else { return shade.radiance(&tag::albedo(face)) };
-    if face == tag::FACE_BACK {
-        return shade.radiance(&tag::albedo(face));
+    let Form::Tag(board) = object.form else { return shade.radiance(&tag_board::albedo(face)) };
+    if face == tag_board::FACE_BACK {
+        return shade.radiance(&tag_board::albedo(face));
     }
     let is_black = |k: &usize| {
         let lanes = &samples.lanes;
         let [x, y] = object.place_at(*k).on_plane([lanes[0][*k], lanes[1][*k], lanes[2][*k]]);
-        board.face(x, y) == tag::FACE_BLACK
+        board.face(x, y) == tag_board::FACE_BLACK
     };
     let share = ones(mine).filter(is_black).count() as f32 / mine.count_ones() as f32;
-    shade.radiance(&[tag::WHITE + share * (tag::BLACK - tag::WHITE); 3])
+    shade.radiance(&[tag_board::WHITE + share * (tag_board::BLACK - tag_board::WHITE); 3])
 }
 
 /// As `first_met`, each sample at its own time.

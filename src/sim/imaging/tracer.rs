@@ -1,18 +1,15 @@
-//! From rays to what they meet, and in which order an image comes about.
-
-use rayon::prelude::*;
+//! Intersection of rays with objects, in tiles of the image.
 
 use crate::imaging::Vec3;
-use crate::imaging::shading::Band;
-use crate::imaging::math::max;
 use crate::imaging::rays::Rays;
 use crate::imaging::scene::{FACE_BITS, Object, TILE_PX, candidates, first_met};
+use crate::imaging::seafloor_texture::Texture;
 use crate::imaging::shader::Shader;
 use crate::imaging::shape::Lanes;
-use crate::imaging::seafloor_texture::Texture;
 
 /// Rays traced together.
 const LANES: usize = 8;
+
 /// All that pixels are made from.
 #[derive(Clone, Copy)]
 pub(super) struct Tracer<'a> {
@@ -32,7 +29,7 @@ pub(super) fn object_of(face: u16) -> Option<usize> {
 }
 
 impl Tracer<'_> {
-    fn meet_band(&self, top: usize, faces: &mut [u16], ranges: &mut [f32]) -> Vec<Candidates> {
+    pub(super) fn meet_band(&self, top: usize, faces: &mut [u16], ranges: &mut [f32]) -> Vec<Candidates> {
         let rays = self.rays;
         let tile = |column: usize| {
             let found = candidates(self.objects, rays, column, top);
@@ -78,5 +75,4 @@ impl Tracer<'_> {
             }
         }
     }
-
 }

@@ -4,7 +4,8 @@ use nalgebra::{Isometry3, Vector3};
 
 use crate::body_poses::BodyPoses;
 use crate::dynamics::{
-    BaseCoupling, Body, Environment, Force, JointLoad, MAX_DOF, Motion, Multibody, Stage, StepInput, SystemState, WaterProperties,
+    BaseCoupling, Body, Environment, Force, JointLoad, MAX_DOF, Motion, Multibody, Stage, StepInput, SystemState,
+    WaterProperties,
 };
 use crate::physics::contacts::{ContactState, ContactWorld};
 use crate::solids::Solids;

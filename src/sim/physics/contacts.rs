@@ -8,10 +8,10 @@ use rapier3d::geometry::{ActiveCollisionTypes, ColliderBuilder, ColliderHandle};
 use rapier3d::pipeline::{ActiveHooks, PairFilterContext, PhysicsHooks, PhysicsWorld};
 use rapier3d::prelude::SolverFlags;
 
+use crate::body_poses::BodyPoses;
 use crate::convert::from_rapier;
 use crate::dynamics::{ContactRow, Coordinates, Force, MAX_DOF, Motion};
 use crate::physics::contact_guard::ContactGuard;
-use crate::body_poses::BodyPoses;
 use crate::solids::{Carrier, PairTable, Solid, Solids};
 use crate::spec::PhysicsSpec;
 use armcal_core::kinematics::{Chain, LinkPoses};

@@ -5,10 +5,10 @@ use std::path::Path;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use crate::error::SimError;
-use armcal_core::robot::{FileIssue, read_text};
 use crate::recorded_motion::kinematics::VehicleKinematics;
 use crate::recorded_motion::spline::{Spline, Value};
 use crate::recorded_motion::table::{self, Header, Sample};
+use armcal_core::robot::{FileIssue, read_text};
 
 /// A recorded motion, checked and ready to be followed.
 ///

@@ -3,16 +3,10 @@
 pub(super) mod attitude;
 pub(super) mod camera;
 pub(super) mod joint;
-pub(super) mod temperatures;
+mod oil_state;
 pub(super) mod thermometer;
 
-/// What lies about the joint sensors, in their oil.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct OilState {
-    pub oil_c: f64,
-    /// Above the surface's.
-    pub pressure_pa: f64,
-}
+pub(super) use oil_state::OilState;
 
 #[cfg(test)]
 mod tests;

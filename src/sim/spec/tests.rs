@@ -22,10 +22,7 @@ fn an_empty_world_is_the_standard_one() {
 #[test]
 fn errors_name_file_key_and_range() {
     let text = problem("[camera]\nrate_hz = 1000.0");
-    assert!(
-        text.contains("r.toml") && text.contains("world.camera.rate_hz") && text.contains("0.1 .. 100"),
-        "{text}"
-    );
+    assert!(text.contains("r.toml") && text.contains("world.camera.rate_hz") && text.contains("0.1 .. 100"), "{text}");
     assert!(problem("[clock]\ncamera_jitter_s = nan").contains("camera_jitter_s"));
     assert!(problem("[clock]\ncamera_jiter_s = 0.1").contains("camera_jiter_s"));
     assert!(problem("[clocks]").contains("world.clocks"));
@@ -50,8 +47,7 @@ fn what_the_water_carries_is_the_arms_own_figure_unless_the_world_has_one() {
 
 #[test]
 fn images_have_their_keys_and_limits() {
-    let spec =
-        read("[camera]\nmode = \"rendered\"\n[image]\nwater = \"coastal\"\nsnow_per_m3 = 10.0").expect("valid");
+    let spec = read("[camera]\nmode = \"rendered\"\n[image]\nwater = \"coastal\"\nsnow_per_m3 = 10.0").expect("valid");
     assert_eq!((spec.camera.mode, spec.image.water), (CameraMode::Rendered, WaterKind::Coastal));
     assert!(problem("[image]\nblur_px = 11.0").contains("world.image.blur_px"));
     assert!(problem("[image]\nwater = \"muddy\"").contains("world.image"));

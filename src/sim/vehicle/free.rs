@@ -11,7 +11,7 @@ use crate::vehicle::sinusoids::{SinusoidSum, draw_sinusoids, evaluate};
 use armcal_core::robot::{FileIssue, Vehicle, VehicleDynamics};
 use armcal_core::streams::JointAngles;
 
-/// How long a impulse lasts, s: short against the vehicle's motion, long against a step.
+/// How long an impulse lasts, s: short against the vehicle's motion, long against a step.
 const IMPULSE_DURATION_S: f64 = 0.1;
 
 /// Thrusters, and what pushes the vehicle besides the water that it moves through.
@@ -102,7 +102,8 @@ impl FreeVehicle {
             let since = t_s - start_s;
             if (0.0..IMPULSE_DURATION_S).contains(&since) {
                 // Half a sine: its mean is 2/pi of its height.
-                let shape = (std::f64::consts::PI * since / IMPULSE_DURATION_S).sin() * std::f64::consts::FRAC_PI_2 / IMPULSE_DURATION_S;
+                let shape = (std::f64::consts::PI * since / IMPULSE_DURATION_S).sin() * std::f64::consts::FRAC_PI_2
+                    / IMPULSE_DURATION_S;
                 for i in 0..3 {
                     total[i] += shape * impulse.impulse_n_s[i];
                     total[3 + i] += shape * impulse.angular_impulse_n_m_s[i];

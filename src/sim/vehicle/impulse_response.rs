@@ -5,10 +5,10 @@ use nalgebra::{UnitQuaternion, Vector3};
 use crate::fault::Impulse;
 use crate::recorded_motion::VehicleKinematics;
 
-/// How a vehicle with prescribed motion answers a impulse: `x = c t2 exp(-t/T)`, whose fastest moment has the velocity that
+/// How a vehicle with prescribed motion answers an impulse: `x = c t2 exp(-t/T)`, whose fastest moment has the velocity that
 /// the impulse gives to the vehicle alone. Assumed; a free vehicle answers by itself.
 #[derive(Clone, Copy, Debug)]
-struct ImpulseResponse {
+pub(super) struct ImpulseResponse {
     start_s: f64,
     /// World axes, m/s2.
     linear: Vector3<f64>,
@@ -20,7 +20,7 @@ struct ImpulseResponse {
 const RESPONSE_TIME_S: f64 = 1.5;
 
 impl ImpulseResponse {
-    fn new(
+    pub(super) fn new(
         start_s: f64,
         impulse: &Impulse,
         mass_kg: f64,
@@ -37,7 +37,7 @@ impl ImpulseResponse {
         }
     }
 
-    fn add_to(&self, jet: &mut VehicleKinematics, t_s: f64) {
+    pub(super) fn add_to(&self, jet: &mut VehicleKinematics, t_s: f64) {
         let t = t_s - self.start_s;
         if t <= 0.0 {
             return;

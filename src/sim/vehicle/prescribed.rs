@@ -22,7 +22,7 @@ pub(crate) struct VehicleMotion {
 
 #[derive(Clone, Debug)]
 enum Path {
-    Swell(Box<swell::Swell>),
+    Swell(Box<Swell>),
     Recorded(Arc<RecordedMotion>),
 }
 
@@ -36,7 +36,7 @@ impl VehicleMotion {
     ) -> Self {
         let path = match recorded {
             Some(motion) => Path::Recorded(Arc::clone(motion)),
-            None => Path::Swell(Box::new(swell::Swell::new(spec, seed))),
+            None => Path::Swell(Box::new(Swell::new(spec, seed))),
         };
         Self { vehicle_from_base, path, impulse_responses: Vec::new() }
     }
@@ -69,13 +69,14 @@ mod tests {
         let mount = Pose::from_position_rpy([1.7, -0.6, 0.1], [0.1, 0.2, -0.4]);
         let mut motion = VehicleMotion::new(&spec, None, mount, 3);
         if impulse {
-            let impulse = Impulse { impulse_n_s: [900.0, -400.0, 100.0], angular_impulse_n_m_s: [200.0, 300.0, -500.0] };
+            let impulse =
+                Impulse { impulse_n_s: [900.0, -400.0, 100.0], angular_impulse_n_m_s: [200.0, 300.0, -500.0] };
             motion.impulse(16.0, &impulse, 4000.0, &Vector3::new(2000.0, 3000.0, 3500.0));
         }
         motion
     }
 
-    /// Central differences of the pose against the closed forms, during the swell and after it, and through a impulse.
+    /// Central differences of the pose against the closed forms, during the swell and after it, and through an impulse.
     #[test]
     fn derivatives_agree_with_central_differences() {
         // Truncation of second differences at h = 1e-3 s for periods of 5 s, and rounding 1e-16/h^2.
@@ -106,7 +107,7 @@ mod tests {
 
     /// The fastest moment has the velocity of impulse over mass.
     #[test]
-    fn a_knock_moves_the_vehicle_as_its_impulse_says() {
+    fn an_impulse_moves_the_vehicle_as_its_impulse_says() {
         let spec = VehicleMotionSpec { rotation_rms_rad: 0.0, translation_rms_m: 0.0, ..VehicleMotionSpec::default() };
         let mut motion = VehicleMotion::new(&spec, None, Pose::identity(), 1);
         let impulse = Impulse { impulse_n_s: [800.0, 0.0, 0.0], angular_impulse_n_m_s: [0.0, 0.0, 100.0] };

@@ -6,9 +6,9 @@
 
 use nalgebra::{UnitQuaternion, Vector3};
 
+use crate::recorded_motion::VehicleKinematics;
 use crate::spec::VehicleMotionSpec;
 use crate::vehicle::sinusoids::{Derivatives, SinusoidSum, draw_sinusoids, evaluate};
-use crate::recorded_motion::VehicleKinematics;
 
 const AXES: [&str; 6] = ["x", "y", "z", "roll", "pitch", "yaw"];
 
@@ -21,11 +21,10 @@ pub(super) struct Swell {
 
 impl Swell {
     pub(super) fn new(spec: &VehicleMotionSpec, seed: u64) -> Self {
-        let mut axes = [[Sinusoid::default(); N_SINUSOIDS]; 6];
-        for (k, axis) in axes.iter_mut().enumerate() {
+        let axes = std::array::from_fn(|k| {
             let rms = if k < 3 { spec.translation_rms_m } else { spec.rotation_rms_rad };
-            *axis = draw_sinusoids(spec, rms, seed, AXES[k]);
-        }
+            draw_sinusoids(spec, rms, seed, AXES[k])
+        });
         Self { axes, ramp_s: spec.ramp_s }
     }
 

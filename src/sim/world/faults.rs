@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
-use crate::fault::{Fault, Impulse, ScheduledFault};
+use crate::fault::{Fault, Impulse};
 use crate::truth::TruthFault;
 use crate::world::World;
 use armcal_core::streams::ArmError;

@@ -2,7 +2,7 @@
 
 use nalgebra::Isometry3;
 
-use crate::sensors::camera::{ArmMotion, Exposed, Moment, Places};
+use crate::sensors::camera::{ArmMotion, CameraShot, ScenePoses, ShutterState};
 use crate::world::World;
 use armcal_core::streams::{ArmError, CameraImage, DetectionRejects, Message};
 use armcal_core::time::Stamp;
@@ -11,8 +11,8 @@ impl World {
     /// The shutter closes now.
     pub(super) fn expose(&mut self) -> Result<(), ArmError> {
         let links = self.place_solids();
-        let moment = Moment {
-            places: Places {
+        let shutter = ShutterState {
+            poses: ScenePoses {
                 links: &links,
                 base_from_world: *self.base.world_from_base.inverse().isometry(),
                 jaws: self.jaw_shifts(),
@@ -20,9 +20,9 @@ impl World {
             solids: &self.solids,
             motion: ArmMotion { chain: &self.robot.chain, angles: self.physics.angles(), rates: self.physics.rates() },
             closed: self.stamp(),
-            is_wanted: self.is_looked,
+            demand: self.image_demand,
         };
-        let taken = self.camera.take(&moment).map_err(|error| ArmError::Camera(error.into()))?;
+        let taken = self.camera.take_image(&shutter).map_err(|error| ArmError::Camera(error.into()))?;
         let Some(mut image) = taken else { return Ok(()) };
         // It never arrives before the image ahead of it.
         if let Some(ahead) = self.images.back() {
@@ -39,7 +39,7 @@ impl World {
     }
 
     /// What an image becomes for those who listen.
-    pub(super) fn deliver(&mut self, at: Stamp, image: Exposed) {
+    pub(super) fn deliver(&mut self, at: Stamp, image: CameraShot) {
         let stamp = image.detections.stamp;
         self.outbox.push((at, Message::Detections(image.detections)));
         if !image.rejects.is_empty() {

@@ -1,6 +1,7 @@
 //! The world: arm, vehicle, water and sensors in step.
 
 mod faults;
+mod from_routine;
 mod images;
 mod jaws;
 mod meanwhile;
@@ -8,27 +9,26 @@ mod setup;
 
 use std::collections::VecDeque;
 
-use faults::Timeline;
-pub(super) use setup::check_step;
-use setup::{actuators, header, sample_joint_sensors, stowed_angles, surroundings};
+use setup::{header, sample_joint_sensors, stowed_angles, surroundings};
 
 use crate::as_built::AsBuilt;
+use crate::body_poses::BodyPoses;
 use crate::contact_onset::ContactOnsets;
 use crate::controller::Controller;
 use crate::dynamics::Force;
-use crate::error::SimError;
-use crate::gripper::Gripper;
-use crate::hydraulics::Hydraulics;
 use crate::dynamics::JointLoad;
+use crate::error::SimError;
+use crate::fault::Timeline;
+use crate::gripper::Gripper;
+use crate::hydraulics::{Hydraulics, actuator_inputs};
 use crate::physics::{ArmPhysics, Drive, PhysicsInput};
-use crate::body_poses::BodyPoses;
 use crate::sensors::attitude::AttitudeSensor;
-use crate::sensors::camera::{CameraInput, Exposed, RenderInput, WristCamera};
+use crate::sensors::camera::{CameraInput, CameraShot, ImageDemand, RenderInput, WristCamera};
 use crate::sensors::joint::JointSensor;
-use crate::temperatures::Temperatures;
 use crate::sensors::thermometer::SlowSensors;
 use crate::solids::Solids;
 use crate::spec::{CONTROL_PERIOD_S, MotionKind, WorldSpec};
+use crate::temperatures::Temperatures;
 use crate::truth::{TruthClearance, TruthContact, TruthHeader, TruthSink, TruthState};
 use crate::vehicle::{BaseState, FreeVehicle, Sea, VehicleMotion, WaterMotion};
 use armcal_core::robot::{Robot, Vehicle};
@@ -79,9 +79,8 @@ pub struct World {
     camera: WristCamera,
     contacts: ContactOnsets,
     /// Images under way; the line keeps their order.
-    images: VecDeque<Exposed>,
-    /// Somebody waits for images.
-    is_looked: bool,
+    images: VecDeque<CameraShot>,
+    image_demand: ImageDemand,
     n_images: u64,
     outbox: Vec<(Stamp, Message)>,
     measured: JointCounts,
@@ -111,7 +110,7 @@ impl World {
         let solids = Solids::new(robot, vehicle, scene);
         let motion = VehicleMotion::new(&spec.vehicle, spec.recorded.as_ref(), vehicle.vehicle_from_base, seed);
         let base = motion.at(0.0);
-        let mut hydraulics = Hydraulics::new(&spec.hydraulics, &actuators(robot)?, step_s);
+        let mut hydraulics = Hydraulics::new(&spec.hydraulics, &actuator_inputs(robot)?, step_s);
         let mut physics = ArmPhysics::new(&PhysicsInput {
             chain: &robot.chain,
             bodies: &robot.bodies,
@@ -132,7 +131,7 @@ impl World {
         let sea = Sea::new(&spec.water, seed);
         let measured = sample_joint_sensors(&mut pots, &angles, &around, 0.0);
         let mut camera = WristCamera::new(&CameraInput { robot, built: &built, solids: &solids, spec: &spec, seed });
-        camera.render(&RenderInput { robot, vehicle, scene, spec: &spec, seed })?;
+        camera.enable_rendering(&RenderInput { robot, vehicle, scene, spec: &spec, seed })?;
         Ok(Self {
             controller: Controller::new(&spec.hydraulics, &robot.sensors, &gear_ratios, &measured),
             slow: SlowSensors::new(&spec.temperature, &spec.water, &built.gauges, seed),
@@ -140,7 +139,7 @@ impl World {
             camera,
             contacts: ContactOnsets::new(solids.pairs(), step_s),
             images: VecDeque::new(),
-            is_looked: false,
+            image_demand: ImageDemand::Preview,
             n_images: 0,
             outbox: Vec::with_capacity(16),
             gripper: robot.gripper.as_ref().map(|gripper| Gripper::new(gripper, spec.hydraulics.valve_lag_s)),
@@ -374,7 +373,7 @@ impl Arm for World {
     }
 
     fn look(&mut self, is_wanted: bool) {
-        self.is_looked = is_wanted;
+        self.image_demand = if is_wanted { ImageDemand::Every } else { ImageDemand::Preview };
     }
 
     fn grip(&mut self, opening: f64) -> Result<(), ArmError> {

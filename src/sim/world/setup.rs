@@ -1,18 +1,15 @@
 //! What a world is put together from, and held against before it starts.
 
-use std::path::Path;
-
 use crate::as_built::AsBuilt;
 use crate::error::SimError;
-use crate::hydraulics::{ActuatorInput, Hydraulics};
 use crate::sensors::OilState;
 use crate::sensors::joint::{JointInput, JointSensor};
-use crate::temperatures::Temperatures;
 use crate::sensors::thermometer::gauge_pressure_pa;
 use crate::spec::WorldSpec;
+use crate::temperatures::Temperatures;
 use crate::truth::TruthHeader;
 use crate::world::WorldInput;
-use armcal_core::robot::{FileIssue, Robot};
+use armcal_core::robot::Robot;
 use armcal_core::streams::{JointAngles, JointCounts};
 
 /// An arm that starts nearer to an end stop than this starts at this distance, rad.

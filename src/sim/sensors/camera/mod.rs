@@ -16,9 +16,9 @@ mod tag_reading;
 mod wrist_camera;
 
 pub(crate) use exposure::ArmMotion;
-pub(crate) use rendered_camera::RenderInput;
+pub(crate) use rendered_camera::{ImageDemand, RenderInput};
 pub(crate) use scenery::ScenePoses;
-pub(crate) use wrist_camera::{CameraInput, CameraShot, ImageDemand, Shutter, WristCamera};
+pub(crate) use wrist_camera::{CameraInput, CameraShot, ShutterState, WristCamera};
 
 #[cfg(test)]
 mod tests;

@@ -2,9 +2,9 @@
 
 use nalgebra::{Isometry3, Point3};
 
+use crate::body_poses::BodyPoses;
 use crate::convert::to_rapier;
 use crate::imaging::SolidShape;
-use crate::body_poses::BodyPoses;
 use crate::solids::{Carrier, HOUSING_M, seafloor};
 use armcal_core::robot::{PlacedShape, Robot, Vehicle, parry_pose};
 use armcal_core::routine::Scene;

@@ -218,9 +218,8 @@ impl WristCamera {
         let ShutterState { poses, solids, motion, closed, .. } = shutter;
         let base_from_camera = self.base_from_camera(poses.links);
         let earlier = self.exposure.earlier_poses(&base_from_camera, motion, 0);
-        let earlier_by_gripper = self
-            .gripper_tag
-            .and_then(|tag| self.exposure.earlier_poses(&base_from_camera, motion, tag.mount.n_joints));
+        let earlier_by_gripper =
+            self.gripper_tag.and_then(|tag| self.exposure.earlier_poses(&base_from_camera, motion, tag.mount.n_joints));
         let mut tags = Vec::new();
         let is_blind = self.blind_until.is_some_and(|until| *closed < until);
         let n_fixed = self.tags.len();
@@ -238,7 +237,8 @@ impl WristCamera {
             let fitted = self.fitted.as_ref();
             let projector = TagProjector { spec: &self.spec, lens: &self.lens, solids, housing: &self.housing, fitted };
             let at_end = projector.project(&tag, &base_from_camera);
-            let Some(projection) = at_end.and_then(|p| projector.average_over_exposure(p, &tag, earlier.as_ref())) else {
+            let Some(projection) = at_end.and_then(|p| projector.average_over_exposure(p, &tag, earlier.as_ref()))
+            else {
                 continue;
             };
             let Some(noisy) = projection.detected(&projector, uniform, &noise) else { continue };

@@ -69,7 +69,7 @@ impl JointSensor {
     }
 
     /// The reading without noise and steps at a settled shaft angle, rad.
-    fn reading_rad(&self, shaft_rad: f64, around: &OilState) -> f64 {
+    pub(super) fn reading_rad(&self, shaft_rad: f64, around: &OilState) -> f64 {
         let read = match &self.element {
             Element::Potentiometer(pot) => pot.reading_rad(shaft_rad, around),
             Element::Encoder(encoder) => encoder.reading_rad(shaft_rad),

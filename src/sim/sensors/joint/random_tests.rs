@@ -1,8 +1,9 @@
 //! What a potentiometer's chance does: histogram, walks, drop-outs. Seeds are fixed; limits are about 4 sigma.
 
-use crate::as_built::WornSpot;
+use crate::as_built::{JointAsBuilt, WornSpot};
 use crate::sensors::joint::tests::{COUNTS_PER_RAD, at, perfect, pot, reading_of, silent};
 use crate::sensors::joint::*;
+use crate::spec::JointSensorsSpec;
 
 /// The normal distribution: a series without cancellation, exact to rounding within 6 sigma.
 fn normal_cdf(x: f64) -> f64 {

@@ -2,8 +2,11 @@
 
 use std::num::NonZeroU8;
 
-use crate::as_built::{Harmonic, ResolverAsBuilt, WornSpot};
+use crate::as_built::{Harmonic, JointAsBuilt, ResolverAsBuilt, WornSpot};
+use crate::sensors::OilState;
 use crate::sensors::joint::*;
+use crate::spec::JointSensorsSpec;
+use armcal_core::robot::{JointSensorSpec, SensorKind};
 
 pub(super) const COUNTS_PER_RAD: f64 = 46.0 * 180.0 / std::f64::consts::PI;
 const OFFSET_COUNTS: f64 = 65322.0;

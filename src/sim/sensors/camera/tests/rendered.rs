@@ -11,7 +11,9 @@ impl Site {
         let Self { robot, solids, spec, links, .. } = self;
         let mut camera = self.camera();
         let scene = Scene { seafloor_z_m: Some(-2.2), obstacles: Vec::new() };
-        camera.enable_rendering(&RenderInput { robot, vehicle: &vehicle, scene: &scene, spec, seed: 4 }).expect("a camera");
+        camera
+            .enable_rendering(&RenderInput { robot, vehicle: &vehicle, scene: &scene, spec, seed: 4 })
+            .expect("a camera");
         let rates = JointAngles::from_fn(robot.n_joints(), |_| rates_rad_s);
         let take = |second: u32| {
             change(&mut camera, second);
@@ -22,7 +24,9 @@ impl Site {
             };
             let motion = ArmMotion { chain: &robot.chain, angles: robot.stowed, rates };
             let closed = SIMULATION_EPOCH.plus_s(f64::from(second));
-            camera.take_image(&ShutterState { poses, solids, motion, closed, demand: ImageDemand::Every }).expect("an image")
+            camera
+                .take_image(&ShutterState { poses, solids, motion, closed, demand: ImageDemand::Every })
+                .expect("an image")
         };
         (0..seconds).filter_map(take).collect()
     }
