@@ -40,6 +40,7 @@ impl Environment {
         }
     }
 
+    #[inline]
     fn water_moves(&self) -> bool {
         self.water_velocity != Vector3::zeros() || self.water_acceleration != Vector3::zeros()
     }
@@ -52,6 +53,17 @@ pub enum BaseCoupling {
     Prescribed(Motion),
     /// It is free: its six coordinates (angular, then linear, base axes) come before the joints'.
     Free,
+}
+
+/// One state of the system, and the forces besides those of gravity and water.
+#[derive(Clone, Copy, Debug)]
+pub struct EquationInput<'a> {
+    pub angles: &'a JointAngles,
+    pub rates: &'a JointAngles,
+    pub around: &'a Environment,
+    pub base: &'a BaseCoupling,
+    /// On each body about the base's origin in base axes, e.g. of contacts.
+    pub extra: &'a [Force; MAX_JOINTS + 1],
 }
 
 /// Inertia and bias of one state.
@@ -87,21 +99,13 @@ impl Multibody {
         &self.bodies
     }
 
-    /// Inertia and bias at `angles` and `rates`. `extra` are forces on each body about the base's origin in base axes, e.g. of
-    /// contacts.
+    /// Inertia and bias of one state.
     #[must_use]
-    pub fn equations(
-        &self,
-        angles: &JointAngles,
-        rates: &JointAngles,
-        around: &Environment,
-        base: &BaseCoupling,
-        extra: &[Force; MAX_JOINTS + 1],
-    ) -> Equations {
+    pub fn equations(&self, input: &EquationInput) -> Equations {
+        let EquationInput { angles, rates, around, base, extra } = *input;
         let n = self.chain.n_joints();
         let poses = self.chain.link_poses(angles);
         let axes = joint_axes(&poses, n);
-        let water_moves = around.water_moves();
         let mut composite = [Inertia::zero(); MAX_JOINTS + 1];
         let mut force = [Force::zero(); MAX_JOINTS + 1];
         let mut velocity = around.base_velocity;
@@ -120,8 +124,7 @@ impl Multibody {
                 continue;
             }
             let place = poses.link(body);
-            let (inertia, wanted) =
-                self.bodies[body].newton_euler(place, &velocity, &acceleration, around, water_moves);
+            let (inertia, wanted) = self.bodies[body].newton_euler(place, &velocity, &acceleration, around);
             composite[body] = inertia;
             force[body] = wanted - extra[body];
         }
@@ -138,8 +141,13 @@ impl Multibody {
     pub fn static_torques(&self, angles: &JointAngles, gravity: &Vector3<f64>) -> JointAngles {
         let still = Environment { gravity: *gravity, ..Environment::still(0.0) };
         let rates = JointAngles::from_fn(angles.len(), |_| 0.0);
-        let base = BaseCoupling::Prescribed(Motion::zero());
-        let equations = self.equations(angles, &rates, &still, &base, &[Force::zero(); MAX_JOINTS + 1]);
+        let equations = self.equations(&EquationInput {
+            angles,
+            rates: &rates,
+            around: &still,
+            base: &BaseCoupling::Prescribed(Motion::zero()),
+            extra: &[Force::zero(); MAX_JOINTS + 1],
+        });
         JointAngles::from_fn(angles.len(), |j| -equations.bias[j])
     }
 
@@ -171,10 +179,9 @@ impl Body {
         velocity: &Motion,
         acceleration: &Motion,
         around: &Environment,
-        water_moves: bool,
     ) -> (Inertia, Force) {
         let against_water = Motion::new(velocity.angular, velocity.linear - around.water_velocity);
-        let (inertia, inertial) = if water_moves {
+        let (inertia, inertial) = if around.water_moves() {
             let (rigid, added) = (self.rigid.placed(place), self.added.placed(place));
             let seen = velocity.angular.cross(&around.water_velocity) - around.water_acceleration;
             let in_water = Motion::new(acceleration.angular, acceleration.linear + seen);

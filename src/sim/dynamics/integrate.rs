@@ -9,7 +9,7 @@
 use nalgebra::{Isometry3, Vector6};
 
 use crate::dynamics::JointLoad;
-use crate::dynamics::equations::{BaseCoupling, Environment, Equations, Multibody};
+use crate::dynamics::equations::{BaseCoupling, Environment, EquationInput, Equations, Multibody};
 use crate::dynamics::spatial::{Force, Motion};
 use crate::dynamics::system::{Coordinates, MAX_DOF, Symmetric};
 use armcal_core::spatial::exp;
@@ -81,8 +81,13 @@ impl Multibody {
     fn slope(&self, input: &StepInput, stage: Stage, at: &SystemState, first: Option<&Slope>) -> Slope {
         let gh = GAMMA * input.step_s;
         let (around, base) = (input.around)(stage, at);
-        let Equations { mut inertia, bias, first_joint } =
-            self.equations(&at.angles, &at.rates, &around, &base, input.extra);
+        let Equations { mut inertia, bias, first_joint } = self.equations(&EquationInput {
+            angles: &at.angles,
+            rates: &at.rates,
+            around: &around,
+            base: &base,
+            extra: input.extra,
+        });
         let n = first_joint + self.chain().n_joints();
         let mut velocity = coordinates(at, first_joint);
         let mut forces: Coordinates = std::array::from_fn(|i| -bias[i]);
@@ -103,15 +108,9 @@ impl Multibody {
         if !input.contacts.is_empty() {
             let now = coordinates(at, first_joint);
             let travel: Coordinates = first.map_or([0.0; MAX_DOF], |f| f.position.map(|rate| rate * input.step_s));
+            let state = RowState { n, gh, now: &now, travel: &travel, velocity: &velocity, first };
             for row in input.contacts {
-                add_row(
-                    row,
-                    gh,
-                    n,
-                    &mut inertia,
-                    &mut forces,
-                    &RowState { now: &now, travel: &travel, velocity: &velocity, first },
-                );
+                add_row(row, &state, &mut inertia, &mut forces);
             }
         }
         let acceleration = inertia.solve(&forces);
@@ -121,6 +120,10 @@ impl Multibody {
 
 /// What a contact's force in a stage depends on.
 struct RowState<'a> {
+    /// Coordinates of the system.
+    n: usize,
+    /// Step length times gamma, s.
+    gh: f64,
     now: &'a Coordinates,
     /// Since the step's start.
     travel: &'a Coordinates,
@@ -129,8 +132,9 @@ struct RowState<'a> {
     first: Option<&'a Slope>,
 }
 
-fn add_row(row: &ContactRow, gh: f64, n: usize, inertia: &mut Symmetric, forces: &mut Coordinates, state: &RowState) {
-    let along = |v: &Coordinates| (0..n).map(|i| row.direction[i] * v[i]).sum::<f64>();
+fn add_row(row: &ContactRow, state: &RowState, inertia: &mut Symmetric, forces: &mut Coordinates) {
+    let gh = state.gh;
+    let along = |v: &Coordinates| (0..state.n).map(|i| row.direction[i] * v[i]).sum::<f64>();
     let (k, c) = (row.stiffness_n_m, row.damping_n_s_m);
     let mut force = row.start_n - k * along(state.travel) - c * along(state.now) - gh * k * along(state.velocity);
     if let Some(first) = state.first {

@@ -14,7 +14,7 @@ mod system;
 
 pub(crate) use body::WaterProperties;
 pub use body::{Body, HullDrag, Surface};
-pub use equations::{BaseCoupling, Environment, Equations, Multibody};
+pub use equations::{BaseCoupling, Environment, EquationInput, Equations, Multibody};
 pub use integrate::{ContactRow, Stage, StepInput, SystemState};
 pub use joint_load::JointLoad;
 pub use spatial::{Force, Inertia, Motion};

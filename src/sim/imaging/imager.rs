@@ -8,6 +8,7 @@ use crate::imaging::canvas::Canvas;
 use crate::imaging::frame::Frame;
 use crate::imaging::light::Light;
 use crate::imaging::marine_snow::{self, Flake};
+use crate::imaging::math::image_key;
 use crate::imaging::rays::Rays;
 use crate::imaging::scene::{Appearance, Object};
 use crate::imaging::seafloor_texture::Texture;
@@ -138,7 +139,8 @@ impl Imager {
         let planes = &mut self.canvas.planes;
         self.sensor.blur(planes, self.rays.width);
         let exposure = self.auto_exposure.choose(&self.spec, planes, &self.rays);
-        self.sensor.read(&self.spec, exposure, planes, &self.rays, shot.number, &mut self.frame.rgb);
+        let readout = self.sensor.readout(&self.spec, exposure, &self.rays, shot.number);
+        readout.write(planes, self.rays.width, &mut self.frame.rgb);
         &self.frame
     }
 
@@ -155,7 +157,7 @@ impl Imager {
         let (rays, texture) = (&self.rays, &self.texture);
         self.canvas.trace(&Tracer { rays, objects: &objects, shader, texture });
         if self.spec.snow_per_m3 > 0.0 {
-            marine_snow::fall(&self.spec, &self.lens, shader, self.seed, shot.number, &mut self.flakes);
+            marine_snow::fall(&self.spec, &self.lens, shader, image_key(self.seed, shot.number), &mut self.flakes);
             let flakes = &self.flakes;
             let Canvas { ranges, planes: [red, green, blue], .. } = &mut self.canvas;
             let ranges = &*ranges;

@@ -30,13 +30,12 @@ pub(super) struct Flake {
     peak: [f32; 3],
 }
 
-/// The particles of image `number` into `out`.
-pub(super) fn fall(spec: &ImageSpec, lens: &Fisheye, shader: &Shader, seed: u64, number: u64, out: &mut Vec<Flake>) {
+/// The particles of one image into `out`; `key` selects their random numbers.
+pub(super) fn fall(spec: &ImageSpec, lens: &Fisheye, shader: &Shader, key: u64, out: &mut Vec<Flake>) {
     out.clear();
     let cos_least = lens.max_view_angle_rad.cos() as f32;
     let volume_m3 = TAU / 3.0 * (1.0 - cos_least) * FAR_M.powi(3);
     let n = (spec.snow_per_m3 as f32 * volume_m3).round() as u64;
-    let key = hash(seed ^ hash(number));
     for k in 0..n {
         let draw = |what: u64| unit(hash(key ^ (8 * k + what)));
         let range_m = FAR_M * draw(0).cbrt();

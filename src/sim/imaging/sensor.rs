@@ -7,7 +7,7 @@
 use rayon::prelude::*;
 
 use crate::imaging::auto_exposure::Exposure;
-use crate::imaging::math::{hash, max};
+use crate::imaging::math::{hash, image_key, max};
 use crate::imaging::rays::Rays;
 use crate::spec::ImageSpec;
 
@@ -54,30 +54,14 @@ impl Sensor {
         }
     }
 
-    /// The bytes of image `number`.
-    pub(super) fn read(
-        &self,
-        spec: &ImageSpec,
-        exposure: Exposure,
-        planes: &[Vec<f32>; 3],
-        rays: &Rays,
-        number: u64,
-        rgb: &mut [u8],
-    ) {
-        let width = rays.width;
-        let readout = Readout::new(spec, exposure, rays, hash(self.seed ^ hash(number)), &self.normals);
-        rgb.par_chunks_mut(3 * width * BAND_ROWS).enumerate().for_each(|(band, out)| {
-            for (k, line) in out.chunks_mut(3 * width).enumerate() {
-                let row = band * BAND_ROWS + k;
-                let at = row * width..(row + 1) * width;
-                readout.line(row, [&planes[0][at.clone()], &planes[1][at.clone()], &planes[2][at]], line);
-            }
-        });
+    /// The readout of image `number`.
+    pub(super) fn readout(&self, spec: &ImageSpec, exposure: Exposure, rays: &Rays, number: u64) -> Readout<'_> {
+        Readout::new(spec, exposure, rays, image_key(self.seed, number), &self.normals)
     }
 }
 
 /// All that is the same for each pixel of an image.
-struct Readout<'a> {
+pub(super) struct Readout<'a> {
     electrons_per_cd_m2: f32,
     counts_per_electron: f32,
     read_variance: f32,
@@ -104,6 +88,17 @@ impl<'a> Readout<'a> {
             key,
             normals,
         }
+    }
+
+    /// The bytes of an image.
+    pub(super) fn write(&self, planes: &[Vec<f32>; 3], width: usize, rgb: &mut [u8]) {
+        rgb.par_chunks_mut(3 * width * BAND_ROWS).enumerate().for_each(|(band, out)| {
+            for (k, line) in out.chunks_mut(3 * width).enumerate() {
+                let row = band * BAND_ROWS + k;
+                let at = row * width..(row + 1) * width;
+                self.line(row, [&planes[0][at.clone()], &planes[1][at.clone()], &planes[2][at]], line);
+            }
+        });
     }
 
     fn line(&self, row: usize, planes: [&[f32]; 3], out: &mut [u8]) {

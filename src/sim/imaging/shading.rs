@@ -23,6 +23,15 @@ pub(super) struct Band<'a> {
     pub planes: [&'a mut [f32]; 3],
 }
 
+/// Where a ray meets an object.
+pub(super) struct Intersection {
+    pub ray: Vec3,
+    pub range_m: f32,
+    pub face: u16,
+    /// In the camera's frame.
+    pub normal: Vec3,
+}
+
 /// Shades of flat faces that a smallest block has already seen: a few pixels make no difference to them.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct ShadeCache {
@@ -56,16 +65,17 @@ impl Tracer<'_> {
         let ray = self.rays.at(column, row);
         let (_, _, normal) = object.form.meet(&object.place, &ray, range_m);
         let shade = self.shader.shade(&(ray * range_m), &normal, column, row);
-        (shade, self.albedo(object, face, &ray, range_m, &normal))
+        (shade, self.albedo(object, &Intersection { ray, range_m, face, normal }))
     }
 
-    pub(super) fn albedo(&self, object: &Object, face: u16, ray: &Vec3, range_m: f32, normal: &Vec3) -> Rgb {
+    #[inline]
+    pub(super) fn albedo(&self, object: &Object, at: &Intersection) -> Rgb {
         match object.look {
-            Appearance::Tag => tag_board::albedo(face & ((1 << FACE_BITS) - 1)),
+            Appearance::Tag => tag_board::albedo(at.face & ((1 << FACE_BITS) - 1)),
             Appearance::Plain(albedo) => albedo,
             Appearance::Ground => {
-                let place = object.place.point(ray, range_m);
-                self.texture.albedo(place.x, place.y, self.ground_level(ray, range_m, normal))
+                let place = object.place.point(&at.ray, at.range_m);
+                self.texture.albedo(place.x, place.y, self.ground_level(&at.ray, at.range_m, &at.normal))
             }
         }
     }

@@ -2,7 +2,7 @@
 
 use crate::imaging::scene::{Appearance, FACE_BITS, Object, SAMPLES, first_met, offset};
 use crate::imaging::shader::Shade;
-use crate::imaging::shading::ShadeCache;
+use crate::imaging::shading::{Intersection, ShadeCache};
 use crate::imaging::shape::{Form, Lanes};
 use crate::imaging::tag_board;
 use crate::imaging::tracer::Tracer;
@@ -10,6 +10,8 @@ use crate::imaging::{Rgb, Vec3};
 
 /// The rays of one pixel's samples, and what they meet.
 struct Samples {
+    /// Column and row.
+    pixel: [usize; 2],
     lanes: Lanes<SAMPLES>,
     range: [f32; SAMPLES],
     /// Object plus one; 0 is open water.
@@ -41,7 +43,7 @@ impl Samples {
         } else {
             first_met(tracer.objects, candidates, &lanes)
         };
-        Self { lanes, range, number }
+        Self { pixel: [column, row], lanes, range, number }
     }
 
     fn ray(&self, k: usize) -> Vec3 {
@@ -61,7 +63,7 @@ impl Tracer<'_> {
             left &= !mine;
             let mean = match number.checked_sub(1) {
                 None => self.shader.open(column, row).veil,
-                Some(n) => self.sampled_object(n, mine, &samples, [column, row], known),
+                Some(n) => self.sampled_object(n, mine, &samples, known),
             };
             let share = mine.count_ones() as f32 / SAMPLES as f32;
             (0..3).for_each(|c| sum[c] += share * mean[c]);
@@ -70,9 +72,10 @@ impl Tracer<'_> {
     }
 
     /// The mean over the samples in `mine`, which all meet object `n`.
-    fn sampled_object(&self, n: u16, mine: u32, samples: &Samples, at: [usize; 2], known: &mut ShadeCache) -> Rgb {
+    fn sampled_object(&self, n: u16, mine: u32, samples: &Samples, known: &mut ShadeCache) -> Rgb {
         /// Shading is smooth but for creases: so many samples stand for all.
         const SHADED: u32 = 4;
+        let [column, row] = samples.pixel;
         let object = &self.objects[usize::from(n)];
         let is_tag = object.look == Appearance::Tag;
         let every = if is_tag { mine.count_ones() } else { mine.count_ones().div_ceil(SHADED) };
@@ -83,11 +86,11 @@ impl Tracer<'_> {
             let (range_m, face, normal) = object.form.meet(object.place_at(k), &ray, samples.range[k]);
             // All of a tag's front is one plane.
             let key = (n + 1) << FACE_BITS | if is_tag { 0 } else { face };
-            let shade = known.shade(key, object, || self.shader.shade(&(ray * range_m), &normal, at[0], at[1]));
+            let shade = known.shade(key, object, || self.shader.shade(&(ray * range_m), &normal, column, row));
             let radiance = if is_tag {
                 printed(object, mine, samples, &shade, face)
             } else {
-                shade.radiance(&self.albedo(object, face, &ray, range_m, &normal))
+                shade.radiance(&self.albedo(object, &Intersection { ray, range_m, face, normal }))
             };
             (0..3).for_each(|c| sum[c] += radiance[c]);
             n_shaded += 1.0;

@@ -127,12 +127,15 @@ impl ArmPhysics {
         let before = self.state.base_velocity;
         let mut state = self.state;
         let Self { multibody, contacts, poses, is_free, step_s, .. } = self;
+        let is_free = *is_free;
+        let first_joint = if is_free { 6 } else { 0 };
         let rows = match contacts {
-            Some((world, solids)) => world.update(solids.shapes(), &contact_state(&state, poses, *is_free, drive)),
+            Some((world, solids)) => world.update(solids.shapes(), &contact_state(&state, poses, first_joint, drive)),
             None => &[],
         };
-        let is_free = *is_free;
-        let around = |stage: Stage, at: &SystemState| surroundings(drive, is_free, stage, at);
+        let around = |stage: Stage, at: &SystemState| {
+            if is_free { free_environment(drive, stage, at) } else { prescribed_environment(drive, stage) }
+        };
         multibody.step(
             &mut state,
             &StepInput { step_s: *step_s, loads: drive.loads, extra: &extra, contacts: rows, is_free, around: &around },
@@ -171,20 +174,23 @@ impl ArmPhysics {
     }
 }
 
-fn surroundings(drive: &Drive, is_free: bool, stage: Stage, at: &SystemState) -> (Environment, BaseCoupling) {
+/// Environment of a free base, by its own state.
+fn free_environment(drive: &Drive, stage: Stage, at: &SystemState) -> (Environment, BaseCoupling) {
+    let water = &drive.water[usize::from(stage == Stage::End)];
+    let to_base = at.world_from_base.rotation.inverse();
+    let around = Environment {
+        gravity: to_base * Vector3::new(0.0, 0.0, -GRAVITY_M_S2),
+        base_velocity: at.base_velocity,
+        water_velocity: to_base * water.velocity,
+        water_acceleration: to_base * water.acceleration,
+    };
+    (around, BaseCoupling::Free)
+}
+
+/// Environment of a base that moves as prescribed.
+fn prescribed_environment(drive: &Drive, stage: Stage) -> (Environment, BaseCoupling) {
     let end = usize::from(stage == Stage::End);
-    let water = &drive.water[end];
-    if is_free {
-        let to_base = at.world_from_base.rotation.inverse();
-        let around = Environment {
-            gravity: to_base * Vector3::new(0.0, 0.0, -GRAVITY_M_S2),
-            base_velocity: at.base_velocity,
-            water_velocity: to_base * water.velocity,
-            water_acceleration: to_base * water.acceleration,
-        };
-        return (around, BaseCoupling::Free);
-    }
-    let base = drive.base[end];
+    let (base, water) = (drive.base[end], &drive.water[end]);
     let to_base = base.world_from_base.rotation().inverse();
     let around = Environment {
         gravity: base.gravity,
@@ -195,10 +201,14 @@ fn surroundings(drive: &Drive, is_free: bool, stage: Stage, at: &SystemState) ->
     (around, BaseCoupling::Prescribed(base.spatial_acceleration()))
 }
 
-fn contact_state<'a>(state: &'a SystemState, poses: &'a LinkPoses, is_free: bool, drive: &Drive) -> ContactState<'a> {
-    let first_joint = if is_free { 6 } else { 0 };
+fn contact_state<'a>(
+    state: &'a SystemState,
+    poses: &'a LinkPoses,
+    first_joint: usize,
+    drive: &Drive,
+) -> ContactState<'a> {
     let mut velocity = [0.0; MAX_DOF];
-    let (base_velocity, base_from_ground) = if is_free {
+    let (base_velocity, base_from_ground) = if first_joint > 0 {
         velocity[..6].copy_from_slice(&state.base_velocity.to_array());
         (state.base_velocity, state.world_from_base.inverse())
     } else {

@@ -64,15 +64,16 @@ impl VehicleMotion {
 mod tests {
     use super::*;
 
-    fn motion(impulse: bool) -> VehicleMotion {
+    fn swell() -> VehicleMotion {
         let spec = VehicleMotionSpec { rotation_rms_rad: 0.1, translation_rms_m: 0.3, ..VehicleMotionSpec::default() };
         let mount = Pose::from_position_rpy([1.7, -0.6, 0.1], [0.1, 0.2, -0.4]);
-        let mut motion = VehicleMotion::new(&spec, None, mount, 3);
-        if impulse {
-            let impulse =
-                Impulse { impulse_n_s: [900.0, -400.0, 100.0], angular_impulse_n_m_s: [200.0, 300.0, -500.0] };
-            motion.impulse(16.0, &impulse, 4000.0, &Vector3::new(2000.0, 3000.0, 3500.0));
-        }
+        VehicleMotion::new(&spec, None, mount, 3)
+    }
+
+    fn swell_with_impulse() -> VehicleMotion {
+        let mut motion = swell();
+        let impulse = Impulse { impulse_n_s: [900.0, -400.0, 100.0], angular_impulse_n_m_s: [200.0, 300.0, -500.0] };
+        motion.impulse(16.0, &impulse, 4000.0, &Vector3::new(2000.0, 3000.0, 3500.0));
         motion
     }
 
@@ -82,7 +83,7 @@ mod tests {
         // Truncation of second differences at h = 1e-3 s for periods of 5 s, and rounding 1e-16/h^2.
         const TOLERANCE: f64 = 2e-6;
         let h = 1e-3;
-        for motion in [motion(false), motion(true)] {
+        for motion in [swell(), swell_with_impulse()] {
             for t in [1.3, 4.0, 17.0, 321.0] {
                 let [before, now, after] = [t - h, t, t + h].map(|t| motion.at(t));
                 let to_base = now.world_from_base.rotation().inverse();
@@ -100,7 +101,7 @@ mod tests {
 
     #[test]
     fn it_starts_at_rest_on_station() {
-        let state = motion(false).at(0.0);
+        let state = swell().at(0.0);
         assert!(state.velocity.norm() < 1e-12 && state.acceleration.norm() < 1e-12);
         assert!(state.world_from_vehicle.origin().vector().norm() < 1e-12);
     }

@@ -3,8 +3,9 @@
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use crate::fault::{Fault, Impulse};
+use crate::sensors::joint::JointSensor;
 use crate::truth::TruthFault;
-use crate::world::World;
+use crate::world::simulation::World;
 use armcal_core::streams::ArmError;
 
 impl World {
@@ -35,8 +36,8 @@ impl World {
         }
         match fault {
             Fault::SensorJump { joint, by_rad } => self.at_sensor(&joint, |pot| pot.jump(by_rad)),
-            Fault::SensorStuck { joint } => self.at_sensor(&joint, crate::world::JointSensor::stick),
-            Fault::SensorDead { joint } => self.at_sensor(&joint, crate::world::JointSensor::die),
+            Fault::SensorStuck { joint } => self.at_sensor(&joint, JointSensor::stick),
+            Fault::SensorDead { joint } => self.at_sensor(&joint, JointSensor::die),
             Fault::JointLocked { joint } => {
                 if let Some(joint) = self.joint(&joint) {
                     self.hydraulics.lock(joint);
@@ -67,7 +68,7 @@ impl World {
         self.robot.sensors.iter().position(|sensor| sensor.joint == name)
     }
 
-    fn at_sensor(&mut self, joint: &str, act: impl FnOnce(&mut crate::world::JointSensor)) {
+    fn at_sensor(&mut self, joint: &str, act: impl FnOnce(&mut JointSensor)) {
         if let Some(pot) = self.joint(joint).and_then(|joint| self.pots.get_mut(joint)) {
             act(pot);
         }

@@ -3,7 +3,7 @@
 use nalgebra::Isometry3;
 
 use crate::sensors::camera::{ArmMotion, CameraShot, ScenePoses, ShutterState};
-use crate::world::World;
+use crate::world::simulation::World;
 use armcal_core::streams::{ArmError, CameraImage, DetectionRejects, Message};
 use armcal_core::time::Stamp;
 

@@ -1,7 +1,8 @@
 //! The gripper in step with the world: it moves once in a control period and tells its gap when that changes.
 
 use crate::spec::CONTROL_PERIOD_S;
-use crate::world::{SLOW_PERIODS, World};
+use crate::world::readings::SLOW_PERIODS;
+use crate::world::simulation::World;
 use armcal_core::streams::{ArmError, GripperSample, Message};
 
 /// While the jaws move, their gap is told each so many periods: 25 Hz.

@@ -1,19 +1,36 @@
-//! What a world is put together from, and held against before it starts.
+//! Input of a world, and the initial values of its parts.
 
 use crate::as_built::AsBuilt;
 use crate::error::SimError;
+use crate::physics::ArmPhysics;
 use crate::sensors::OilState;
 use crate::sensors::joint::{JointInput, JointSensor};
 use crate::sensors::thermometer::gauge_pressure_pa;
-use crate::spec::WorldSpec;
+use crate::spec::{JointSensorsSpec, MotionKind, WorldSpec};
 use crate::temperatures::Temperatures;
 use crate::truth::TruthHeader;
-use crate::world::WorldInput;
-use armcal_core::robot::Robot;
+use crate::vehicle::{BaseState, FreeVehicle};
+use armcal_core::robot::{Robot, Vehicle};
+use armcal_core::routine::Scene;
 use armcal_core::streams::{JointAngles, JointCounts};
+
+/// What a world is made of.
+#[derive(Clone, Debug)]
+pub struct WorldInput<'a> {
+    pub robot: &'a Robot,
+    pub vehicle: &'a Vehicle,
+    pub scene: &'a Scene,
+    pub spec: WorldSpec,
+    pub seed: u64,
+}
 
 /// An arm that starts nearer to an end stop than this starts at this distance, rad.
 const END_STOP_MARGIN_RAD: f64 = 1e-3;
+
+pub(super) fn joint_sensors(robot: &Robot, built: &AsBuilt, spec: &JointSensorsSpec, seed: u64) -> Vec<JointSensor> {
+    let sensors = robot.sensors.iter().zip(&built.joints);
+    sensors.map(|(nominal, joint)| JointSensor::new(nominal, joint, spec, seed)).collect()
+}
 
 /// The true angles at which every sensor reads `stowed` by the datasheet, kept within the end stops.
 pub(super) fn stowed_angles(robot: &Robot, pots: &mut [JointSensor], around: &OilState) -> JointAngles {
@@ -40,6 +57,22 @@ pub(super) fn sample_joint_sensors(
 /// At a depth below the surface.
 pub(super) fn surroundings(spec: &WorldSpec, temperatures: &Temperatures, t_s: f64, depth_m: f64) -> OilState {
     OilState { oil_c: temperatures.oil_c(t_s), pressure_pa: gauge_pressure_pa(&spec.water, depth_m) }
+}
+
+/// The free vehicle that the world asks for, set on the physics at its start; `None` for a prescribed motion.
+pub(super) fn free_vehicle(
+    input: &WorldInput,
+    physics: &mut ArmPhysics,
+    base: &BaseState,
+) -> Result<Option<FreeVehicle>, SimError> {
+    let WorldInput { vehicle, spec, seed, .. } = input;
+    if spec.vehicle.motion != MotionKind::Free {
+        return Ok(None);
+    }
+    let free = FreeVehicle::new(vehicle, &spec.vehicle, *seed)?;
+    let body = free.body(vehicle, &spec.water, physics.multibody(), &physics.angles());
+    physics.set_free(body, base.world_from_base.isometry());
+    Ok(Some(free))
 }
 
 pub(super) fn header(input: &WorldInput, as_built: AsBuilt) -> Result<TruthHeader, SimError> {

@@ -2,9 +2,12 @@
 
 use std::path::Path;
 
+use crate::spec::WorldSpec;
 use crate::world::*;
 use armcal_core::robot::{load, load_vehicle};
-use armcal_core::streams::JointAngles;
+use armcal_core::routine::Scene;
+use armcal_core::streams::{Arm, JointAngles, MAX_JOINTS, Message, Sink};
+use armcal_core::time::Stamp;
 
 const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
 

@@ -1,9 +1,13 @@
-//! What happens to a world besides being driven: time passes at rest.
+//! Waiting: time that passes at rest, in strides of a second.
 
 use crate::spec::CONTROL_PERIOD_S;
-use crate::world::{AWAKE_S, SLOW_PERIODS, World, sample_joint_sensors, surroundings};
+use crate::world::readings::SLOW_PERIODS;
+use crate::world::setup::{sample_joint_sensors, surroundings};
+use crate::world::simulation::World;
 use armcal_core::streams::{Arm, ArmError, JointSensorSample, Message, Sink};
 
+/// The end of a wait that passes step by step, s.
+const AWAKE_S: f64 = 2.0;
 /// Length of a skipped stride, s.
 const STRIDE_S: f64 = SLOW_PERIODS as f64 * CONTROL_PERIOD_S;
 /// After something broke the arm's dynamics go on for this long, s: it may sag, or drive off by a wrong sensor.
