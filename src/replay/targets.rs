@@ -3,10 +3,10 @@
 use nalgebra::Vector3;
 use rerun::{LineStrips3D, Points3D};
 
-use crate::ReplayScene;
 use crate::colors::{self, Rgba};
-use crate::rrd::EntityLog;
-use crate::scenery::BASE;
+use crate::entities::BASE;
+use crate::entity_log::EntityLog;
+use crate::scene::ReplayScene;
 use crate::shapes::vector;
 use crate::tracks::Span;
 use armcal_core::streams::{MarkKind, ReachAttempt, ReachTask};

@@ -13,16 +13,13 @@ use rerun::external::re_sdk_types::blueprint::datatypes::{TextLogColumn, TextLog
 use rerun::external::re_sdk_types::datatypes::{Range2D, TimeInt, TimeRange, TimeRangeBoundary};
 use rerun::external::uuid::Uuid;
 
-use crate::ReplayScene;
-use crate::camera::CAMERA;
 use crate::colors;
-use crate::eye;
-use crate::phases::{LOG, STATE};
-use crate::plan::{CLEARANCE, PREDICTED};
-use crate::plots::{COUNTS, JOINT_ANGLE, JOINT_ERROR, TEMPERATURE, TOOL_ERROR};
-use crate::rrd::TIMELINE;
-use crate::scenery::WORLD;
-use crate::summary::SUMMARY;
+use crate::entities::{
+    CAMERA, CLEARANCE, COUNTS, JOINT_ANGLE, JOINT_ERROR, LOG, PREDICTED, STATE, SUMMARY, TEMPERATURE, TOOL_ERROR, WORLD,
+};
+use crate::entity_log::TIMELINE;
+use crate::scene::ReplayScene;
+use crate::viewpoint;
 
 /// One entity of the layout.
 pub(super) struct Entry {
@@ -94,8 +91,12 @@ fn scene_view(b: &mut Builder, run: &ReplayScene) -> Part {
 
 fn titled_scene(b: &mut Builder, run: &ReplayScene, title: &str) -> Part {
     let view = b.view("3D", title, WORLD);
-    let eye = eye::frame(run);
-    b.property(&view, "EyeControls3D", EyeControls3D::new().with_position(eye.position).with_look_target(eye.target));
+    let viewpoint = viewpoint::frame(run);
+    b.property(
+        &view,
+        "EyeControls3D",
+        EyeControls3D::new().with_position(viewpoint.position).with_look_target(viewpoint.target),
+    );
     let water = Background::new(BackgroundKind::SolidColor).with_color(colors::WATER);
     b.property(&view, "Background", water);
     b.property(&view, "LineGrid3D", LineGrid3D::new().with_visible(false));
