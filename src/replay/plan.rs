@@ -1,7 +1,7 @@
 //! A plan as a file for the viewer: the arm goes along its paths as it would, with all that it may be off by around it.
 //!
-//! What a session would record of its motions is made up from the plan and drawn as a recording is; the margins, the tags'
-//! chances and the plots over the poses come on top.
+//! What a session would record of its motions is made up from the plan and drawn as a recording is; the margins, the
+//! tags' chances and the plots over the poses come on top.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

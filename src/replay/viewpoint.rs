@@ -5,7 +5,8 @@ use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use crate::scene::ReplayScene;
 use crate::shapes::vector;
 
-/// Tangents of half the viewer's field of view, upwards (55 degrees in all) and sideways (the view is about twice as wide).
+/// Tangents of half the viewer's field of view, upwards (55 degrees in all) and sideways (the view is about twice as
+/// wide).
 const HALF_UP: f64 = 0.52;
 const HALF_ACROSS: f64 = 1.7 * HALF_UP;
 /// How much of the picture the scene may take.

@@ -1,4 +1,4 @@
-//! Where the arm's bodies truly are.
+//! True poses of the arm's bodies.
 
 use nalgebra::Isometry3;
 

@@ -1,4 +1,4 @@
-//! Which parts began to touch.
+//! Onset of contacts between parts.
 
 use crate::physics::ArmPhysics;
 use crate::solids::PairTable;

@@ -1,9 +1,9 @@
 //! TRUTH: a simulated arm on a vehicle at sea, with the errors that real ones have.
 //!
-//! [`World`] is an `Arm` like any other: it takes set-points in raw counts and answers with messages. What it knows
-//! beyond them (as-built sensors, true poses, contacts) goes into a truth stream of its own, which only the score
-//! reads. Arm and vehicle are one multibody in water, on compliant oil columns; the vehicle moves as prescribed or floats free; every error of
-//! [`WorldSpec`] is drawn from a random stream named after it, so that one seed gives one world, byte for byte.
+//! [`World`] is an `Arm`: it takes set-points in raw counts and returns messages. Its truth (as-built sensors, true
+//! poses, contacts) goes into a stream of its own, which only the score reads. Arm and vehicle are one multibody in
+//! water, on compliant oil columns; the vehicle moves as prescribed or floats free. Each error of [`WorldSpec`] has a
+//! random stream of its own, so that one seed gives one world, byte for byte.
 
 mod as_built;
 mod body_poses;

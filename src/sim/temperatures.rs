@@ -1,8 +1,8 @@
 //! True temperatures: water over depth and time, oil that warms and follows it.
 //!
 //! Prescribed oil: `start + rise (1 - exp(-t / b)) + change (1 - (a exp(-t / a) - b exp(-t / b)) / (a - b))`: its own
-//! warming with time constant b, and the water's change (time constant a) behind the same lag. Oil that warms with work:
-//! `dT/dt = power / capacity - (T - water) / b`, in steps that are exact for constant power and water.
+//! warming with time constant b, and the water's change (time constant a) behind the same lag. Oil that warms with
+//! work: `dT/dt = power / capacity - (T - water) / b`, in steps that are exact for constant power and water.
 
 use crate::spec::TemperatureSpec;
 
@@ -12,7 +12,7 @@ pub(crate) struct Temperatures {
     spec: TemperatureSpec,
     /// Of the vehicle.
     depth_m: f64,
-    /// Where the oil warms with work.
+    /// For oil that warms with work.
     bath: Option<OilBath>,
 }
 
@@ -136,7 +136,8 @@ mod tests {
     #[test]
     fn water_and_the_oil_in_it_follow_the_depth() {
         let spec: TemperatureSpec = toml::from_str(
-            "profile_depth_m = [0.0, 1000.0]\nprofile_c = [24.0, 4.0]\noil_heat_capacity_j_per_k = 1e4\noil_start_c = 24.0",
+            "profile_depth_m = [0.0, 1000.0]\nprofile_c = [24.0, 4.0]\noil_heat_capacity_j_per_k = 1e4\n\
+             oil_start_c = 24.0",
         )
         .expect("valid");
         let mut temperatures = Temperatures::new(&spec, 0.0);

@@ -42,7 +42,7 @@ pub struct Harmonic {
     pub phase_rad: f64,
 }
 
-/// Where a potentiometer's track is worn: `peak * wear`, `wear = exp(-((theta - center) / width)^2 / 2)`.
+/// Worn spot of a potentiometer's track: `peak * wear`, `wear = exp(-((theta - center) / width)^2 / 2)`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct WornSpot {
     pub center_rad: f64,
@@ -58,14 +58,14 @@ impl WornSpot {
         (-0.5 * ((angle_rad - self.center_rad) / self.width_rad).powi(2)).exp()
     }
 
-    /// What it adds to the reading, rad.
+    /// Largest addition to the reading, rad.
     #[must_use]
     pub fn bump_rad(&self, angle_rad: f64) -> f64 {
         self.peak_rad * self.wear(angle_rad)
     }
 }
 
-/// What is wrong with a resolver's windings.
+/// Errors of a resolver's windings.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ResolverAsBuilt {
     pub pole_pairs: NonZeroU8,

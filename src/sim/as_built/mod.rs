@@ -1,7 +1,8 @@
 //! The arm, its sensors and its tags as built: random errors drawn once per seed.
 //!
-//! One file has one part, e.g. `potentiometer` the errors of a potentiometer, `lens` those of the lens. `values` joins them.
-//! Each effect has a random stream of its own, so that one more effect does not change the others. Only the score reads them.
+//! Each file draws the errors of one part, e.g. `potentiometer` or `lens`; `values` joins them.
+//! Each effect has a random stream of its own: an added effect does not change the others. Only the score reads the
+//! values.
 
 mod attitude;
 mod camera_mount;

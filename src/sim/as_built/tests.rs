@@ -1,4 +1,4 @@
-//! What is drawn, and what of it the truth writes down.
+//! As-built values: distributions, and their record in the truth.
 
 use std::path::Path;
 

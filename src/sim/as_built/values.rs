@@ -30,7 +30,7 @@ pub struct AsBuilt {
     pub gauges: GaugesAsBuilt,
     #[serde(default, skip_serializing_if = "AttitudeAsBuilt::is_exact")]
     pub attitude: AttitudeAsBuilt,
-    /// Where it differs from the drawing.
+    /// Where it differs from the nominal scene.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub lens: Option<LensAsBuilt>,
     /// Of a dome port that is not about the lens's pupil; camera frame.
@@ -55,13 +55,13 @@ impl AsBuilt {
         }
     }
 
-    /// Where the camera truly hangs.
+    /// True pose of the camera on its link.
     pub(crate) fn camera_attachment(&self, robot: &Robot) -> Attachment {
         let link_from_camera: Pose<Link, Camera> = self.camera_mount.to_pose();
         Attachment { n_joints: robot.camera.mount.n_joints, link_from_frame: *link_from_camera.isometry() }
     }
 
-    /// Where the tag on the gripper truly is, on the link that carries it.
+    /// True pose of the gripper tag on its link.
     pub(crate) fn gripper_tag_attachment(&self, robot: &Robot) -> Option<Attachment> {
         let link_from_tag: Pose<Link, Tag> = self.gripper_tag?.to_pose();
         let n_joints = robot.gripper_tag?.mount.n_joints;

@@ -8,14 +8,14 @@ use crate::dynamics::system::{Coordinates, Symmetric};
 use armcal_core::kinematics::{Chain, LinkPoses};
 use armcal_core::streams::{JointAngles, MAX_JOINTS};
 
-/// The arm on its base. Body 0 is what the base carries; body `j + 1` hangs on joint `j`.
+/// The arm on its base. Body 0 is the base's own; body `j + 1` is moved by joint `j`.
 #[derive(Clone, Debug)]
 pub struct Multibody {
     chain: Chain,
     bodies: Vec<Body>,
 }
 
-/// What surrounds the arm at one instant, in base axes.
+/// Gravity, base velocity and water about the arm at one instant, in base axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Environment {
     /// m/s2.
@@ -46,7 +46,7 @@ impl Environment {
     }
 }
 
-/// How the base takes part.
+/// Coupling of the base to the arm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum BaseCoupling {
     /// It accelerates as prescribed: spatial acceleration about its origin, base axes.
@@ -84,7 +84,7 @@ impl Multibody {
         Self { chain, bodies }
     }
 
-    /// Replaces what the base carries.
+    /// Replaces the base's own body.
     pub fn set_base(&mut self, body: Body) {
         self.bodies[0] = body;
     }
@@ -171,8 +171,8 @@ impl Multibody {
 impl Body {
     /// Inertia of the body, and the force that it needs to move so, both about the base's origin.
     ///
-    /// The water's part, with `u` its velocity and `r` the body's velocity against it (Kirchhoff; in the frame that moves with
-    /// the water the spatial acceleration has `w x u` more): `Ia (a + w x u - du/dt) + r x* Ia r`.
+    /// The water's part, with `u` its velocity and `r` the body's velocity against it (Kirchhoff; in the frame that
+    /// moves with the water the spatial acceleration has `w x u` more): `Ia (a + w x u - du/dt) + r x* Ia r`.
     fn newton_euler(
         &self,
         place: &Isometry3<f64>,

@@ -1,10 +1,11 @@
-//! One step: ROS2, a linearly implicit Runge-Kutta method of second order (Verwer, Spee, Blom, Hundsdorfer, SIAM J. Sci.
-//! Comput. 20, 1999), `gamma = 1 - 1/sqrt 2`, L-stable.
+//! One step: ROS2, a linearly implicit Runge-Kutta method of second order (Verwer, Spee, Blom, Hundsdorfer, SIAM J.
+//! Sci. Comput. 20, 1999), `gamma = 1 - 1/sqrt 2`, L-stable.
 //!
-//! For `y' = f(y)` and any matrix `A` near its Jacobian: `(1 - g h A) k1 = f(y)`, `(1 - g h A) w = f(y + h k1) - 2 g h A k1`,
-//! `y += h/2 (k1 + w)`. The order does not depend on `A`, stability does: here it holds the springs and dampers about the
-//! joints and those of contacts. Their blocks put `g h C + g2 h2 K` on top of the inertia, so that a step costs two
-//! factorisations of it. A free base moves on its group, by the exponential of its twist.
+//! For `y' = f(y)` and any matrix `A` near its Jacobian: `(1 - g h A) k1 = f(y)`,
+//! `(1 - g h A) w = f(y + h k1) - 2 g h A k1`, `y += h/2 (k1 + w)`. The order does not depend on `A`, stability does:
+//! here it holds the springs and dampers about the joints and those of contacts. Their blocks put `g h C + g2 h2 K` on
+//! top of the inertia, so that a step costs two factorisations of it. A free base moves on its group, by the
+//! exponential of its twist.
 
 use nalgebra::{Isometry3, Vector6};
 
@@ -15,17 +16,18 @@ use crate::dynamics::system::{Coordinates, MAX_DOF, Symmetric};
 use armcal_core::spatial::exp;
 use armcal_core::streams::{JointAngles, MAX_JOINTS};
 
-/// Where the system is and how it moves.
+/// Positions and velocities of the system.
 #[derive(Clone, Copy, Debug)]
 pub struct SystemState {
     pub angles: JointAngles,
     pub rates: JointAngles,
-    /// Of a free base; of one that moves as prescribed the caller knows.
+    /// Of a free base; the caller has that of a prescribed base.
     pub world_from_base: Isometry3<f64>,
     pub base_velocity: Motion,
 }
 
-/// A spring and a damper along one direction of the generalised coordinates: `force = start - stiffness travel - damping rate`.
+/// A spring and a damper along one direction of the generalised coordinates:
+/// `force = start - stiffness travel - damping rate`.
 #[derive(Clone, Copy, Debug)]
 pub struct ContactRow {
     pub direction: Coordinates,
@@ -34,7 +36,7 @@ pub struct ContactRow {
     pub damping_n_s_m: f64,
 }
 
-/// What acts during one step.
+/// Loads during one step.
 pub struct StepInput<'a> {
     pub step_s: f64,
     pub loads: &'a [JointLoad; MAX_JOINTS],
@@ -118,7 +120,7 @@ impl Multibody {
     }
 }
 
-/// What a contact's force in a stage depends on.
+/// State that a contact's force in a stage depends on.
 struct RowState<'a> {
     /// Coordinates of the system.
     n: usize,

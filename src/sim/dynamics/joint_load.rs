@@ -1,7 +1,7 @@
-//! What acts about one joint during a step: a torque, linear in the joint's angle and rate.
+//! Load about one joint during a step: a torque, linear in the joint's angle and rate.
 
-/// `torque = constant - stiffness angle - damping rate`. The integrator takes the linear part implicitly, so that it may be
-/// as stiff as oil is.
+/// `torque = constant - stiffness angle - damping rate`. The integrator takes the linear part implicitly, so that it
+/// may be as stiff as oil is.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct JointLoad {
     pub constant_n_m: f64,

@@ -29,7 +29,7 @@ fn at_rest(angles: JointAngles) -> SystemState {
     }
 }
 
-/// What acts on a system that floats free in water at rest.
+/// Loads on a free-floating system in water at rest.
 struct Float<'a> {
     step_s: f64,
     gravity_m_s2: f64,
@@ -126,8 +126,8 @@ fn push_about(t: f64, j: usize) -> f64 {
     [200.0, 300.0, 150.0, 40.0, 30.0, 10.0][j.min(5)] * ((1.0 + 0.3 * j as f64) * t).sin()
 }
 
-/// An arm that swings about on a free vehicle in still water without drag cannot change the momentum of the whole: that of the
-/// water which moves with the bodies is part of it.
+/// An arm that swings about on a free vehicle in still water without drag cannot change the momentum of the whole: that
+/// of the water which moves with the bodies is part of it.
 #[test]
 fn arm_and_free_vehicle_keep_their_momentum() {
     let robot = titan();
@@ -296,7 +296,8 @@ fn ball(mass_kg: f64, radius_m: f64, drag_coefficient: f64) -> Multibody {
     Multibody::new(Chain::new(Vec::new()), vec![Body::link(&link, &water)])
 }
 
-/// A sinking ball: `v = vt tanh(t a / vt)` with `a = (m - md) g / (m + md/2)`, `vt` where drag balances the weight in water.
+/// A sinking ball: `v = vt tanh(t a / vt)` with `a = (m - md) g / (m + md/2)`, `vt` where drag balances the weight in
+/// water.
 #[test]
 fn a_ball_sinks_at_its_terminal_velocity() {
     let (mass, radius, cd) = (60.0, 0.2, 0.5);
@@ -341,8 +342,8 @@ fn accelerating_water_takes_a_ball_along() {
     assert!((a - expected).norm() < 1e-12, "{a} {expected}");
 }
 
-/// Seen from water that moves steadily nothing changes: a spinning, sliding hull of uneven added mass accelerates alike in still
-/// water and carried along by a current (Galilei).
+/// Seen from water that moves steadily nothing changes: a spinning, sliding hull of uneven added mass accelerates alike
+/// in still water and carried along by a current (Galilei).
 #[test]
 fn a_current_carries_everything_along() {
     let robot = titan();

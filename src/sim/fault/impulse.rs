@@ -1,6 +1,6 @@
 //! Impulse of a short force on the vehicle.
 
-/// A blow to the vehicle, in vehicle axes about the vehicle's origin.
+/// Impulse on the vehicle, in vehicle axes about the vehicle's origin.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Impulse {
     pub impulse_n_s: [f64; 3],

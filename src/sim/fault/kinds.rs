@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// One thing that breaks, and stays broken unless it says otherwise.
+/// One fault; it is permanent unless it has a duration.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Fault {
@@ -23,7 +23,7 @@ pub enum Fault {
     },
     /// The tag falls off.
     TagLost { id: u32 },
-    /// The tag is knocked out of its place, by a shift and a turn (rotation vector) in its own axes.
+    /// The tag is displaced by a translation and a rotation vector in its own axes.
     TagMoved {
         id: u32,
         #[serde(default)]
@@ -84,7 +84,7 @@ impl Fault {
         }
     }
 
-    /// What routines say of it beside its kind: `by_rad = 0.05, joint = "wrist_yaw"`.
+    /// Its values in a routine besides the kind: `by_rad = 0.05, joint = "wrist_yaw"`.
     #[must_use]
     pub fn details(&self) -> String {
         let mut table = toml::Table::try_from(self).unwrap_or_default();

@@ -6,8 +6,8 @@ use crate::fault::kinds::ScheduledFault;
 use armcal_core::robot::FileIssue;
 
 const KINDS: &str = "sensor_jump (joint, by_rad), sensor_stuck (joint), sensor_dead (joint), joint_locked (joint), \
-     pressure_lost (ratio; joint), tag_lost (id), tag_moved (id; by_m, by_rad), tag_misread (id, as_id), silt (seconds), \
-     vehicle_knocked (force_n, duration_s; at_m), arm_bumped (link, force_n, duration_s)";
+     pressure_lost (ratio; joint), tag_lost (id), tag_moved (id; by_m, by_rad), tag_misread (id, as_id), \
+     silt (seconds), vehicle_knocked (force_n, duration_s; at_m), arm_bumped (link, force_n, duration_s)";
 
 /// The list `[[world.fault]]`, its values not yet held against a robot.
 ///

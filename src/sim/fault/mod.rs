@@ -1,7 +1,7 @@
 //! Faults of the simulated arm: their kinds, when they happen, and how a routine states them.
 //!
-//! `kinds` are the faults, `list` reads their tables, `robot_check` holds them against a robot. `timeline` orders those with a time.
-//! `world::faults` carries them out.
+//! `kinds` has the faults, `list` reads their tables, `robot_check` checks them against a robot, `timeline` orders the
+//! timed ones. `world::faults` carries them out.
 
 mod impulse;
 mod kinds;

@@ -4,7 +4,7 @@ use crate::fault::kinds::Fault;
 use armcal_core::robot::{FileIssue, Robot};
 use armcal_core::routine::Routine;
 
-/// What faults are held against.
+/// The routine and the robot that faults are checked against.
 pub(crate) struct RobotCheck<'a> {
     pub routine: &'a Routine,
     pub robot: &'a Robot,

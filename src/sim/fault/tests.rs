@@ -7,7 +7,8 @@ use crate::spec::WorldSpec;
 
 #[test]
 fn a_fault_of_the_list_reads_back_and_misspelt_keys_are_refused() {
-    let text = "[[fault]]\nat_s = 120\nkind = \"tag_moved\"\nid = 3\nby_m = [0.01, 0, 0]\n[[fault]]\nkind = \"silt\"\nseconds = 2.5\n";
+    let text = "[[fault]]\nat_s = 120\nkind = \"tag_moved\"\nid = 3\nby_m = [0.01, 0, 0]\n\
+                [[fault]]\nkind = \"silt\"\nseconds = 2.5\n";
     let read = |text: &str| read_list(&text.parse().expect("TOML"), Path::new("r.toml"));
     let faults = read(text).expect("valid");
     let moved = Fault::TagMoved { id: 3, by_m: [0.01, 0.0, 0.0], by_rad: [0.0; 3] };

@@ -4,7 +4,7 @@ use crate::error::SimError;
 use armcal_core::kinematics::JointLimits;
 use armcal_core::robot::Robot;
 
-/// What a drive is built from.
+/// Data that an actuator is built from.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ActuatorInput {
     pub limits: Option<JointLimits>,

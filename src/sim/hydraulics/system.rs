@@ -28,8 +28,9 @@ impl Hydraulics {
         }
     }
 
-    /// The longest step in which the valves' flow can follow the torque that it makes: the load changes the rate of a fully open
-    /// valve, `rate_max/(2 tau_max)` per N m, and the piston's way the load, K per rad, and that is not taken implicitly.
+    /// The longest step in which the valves' flow can follow the torque that it makes: the load changes the rate of a
+    /// fully open valve, `rate_max/(2 tau_max)` per N m, and the piston's way the load, K per rad, and that is not
+    /// taken implicitly.
     pub(crate) fn longest_step_s(&self) -> f64 {
         let relaxation = |a: &Actuator| 2.0 * a.torque_max_n_m / (a.stiffness_n_m_rad * a.rate_max_rad_s);
         0.5 * self.actuators.iter().map(relaxation).fold(f64::INFINITY, f64::min)
@@ -58,7 +59,7 @@ impl Hydraulics {
         }
     }
 
-    /// What acts about joint `joint` during the coming step: oil column, friction and end stop.
+    /// Load about joint `joint` during the coming step: oil column, friction and end stop.
     pub(crate) fn load(&self, joint: usize) -> JointLoad {
         self.actuators[joint].load
     }
@@ -68,9 +69,9 @@ impl Hydraulics {
         JointAngles::from_fn(self.actuators.len(), |j| self.actuators[j].column_torque_n_m(angles[j], rates[j]))
     }
 
-    /// Power that warmed the oil during the last step, W: what the pump's oil brought, supply pressure times the flow over
-    /// the valves, less what the pistons did. It is lost in the valves, in leaks and over the relief valves; a load that
-    /// sinks adds its own. The pump is taken to give no more oil than is asked for.
+    /// Power that warmed the oil during the last step, W: what the pump's oil brought, supply pressure times the flow
+    /// over the valves, less what the pistons did. It is lost in the valves, in leaks and over the relief valves; a
+    /// load that sinks adds its own. The pump is taken to give no more oil than is asked for.
     pub(crate) fn power_w(&self) -> f64 {
         self.heat_w
     }
@@ -80,8 +81,8 @@ impl Hydraulics {
         self.actuators[joint].is_locked = true;
     }
 
-    /// The hose of joint `joint` holds no more than `ratio` (0..1) of its pressure: the valve's head falls, and so does what
-    /// the closed column carries. At 0 both ports are open: only friction and end stops act about the joint.
+    /// The hose of joint `joint` holds no more than `ratio` (0..1) of its pressure: the valve's head falls, and so does
+    /// what the closed column carries. At 0 both ports are open: only friction and end stops act about the joint.
     pub(crate) fn lose_pressure(&mut self, joint: usize, ratio: f64) {
         self.actuators[joint].hose_ratio = ratio.clamp(0.0, 1.0);
     }

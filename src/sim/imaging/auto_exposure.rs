@@ -4,17 +4,17 @@ use crate::imaging::math::max;
 use crate::imaging::rays::Rays;
 use crate::spec::ImageSpec;
 
-/// Bright pixels: so large a share of those that see is at or above the level that is set.
+/// Share of the pixels in the field of view that are at or above the set level.
 const BRIGHT_SHARE: f64 = 0.002;
-/// What they come to, of full scale.
+/// The level of these pixels, of full scale.
 const BRIGHT_LEVEL: f32 = 0.85;
-/// Every so many pixels across and down are looked at for it.
+/// Sampling distance of the histogram across and down, px.
 const LOOK_PX: usize = 3;
 /// Bits of a float below the buckets' width: 64 in each octave.
 const BUCKET_SHIFT: u32 = 17;
 const BUCKETS: usize = 1 << (31 - BUCKET_SHIFT);
 
-/// What the camera set for an image.
+/// Exposure share and gain of one image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Exposure {
     pub share: f32,
@@ -32,7 +32,7 @@ impl AutoExposure {
         Self { buckets: vec![0; BUCKETS] }
     }
 
-    /// What the camera sets by itself, or was told.
+    /// The exposure by the image's brightness, or the spec's fixed gain.
     pub(super) fn choose(&mut self, spec: &ImageSpec, planes: &[Vec<f32>; 3], rays: &Rays) -> Exposure {
         if spec.gain > 0.0 {
             return Exposure { share: 1.0, gain: spec.gain as f32 };

@@ -7,7 +7,7 @@ use crate::imaging::scene::TILE_PX;
 use crate::imaging::shading::Band;
 use crate::imaging::tracer::{Candidates, Tracer};
 
-/// What each pixel sees, and how bright, cd/m2.
+/// Face, range and radiance (cd/m2) of each pixel.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Canvas {
     /// Object and face of the ray through each pixel's centre.

@@ -7,10 +7,10 @@ use crate::imaging::rays::Rays;
 use crate::imaging::scene::Object;
 use crate::imaging::tracer::object_of;
 
-/// How far moving edges are looked for, px.
+/// Largest sweep of a moving edge that is searched, px.
 const FARTHEST_SWEEP_PX: usize = 48;
 
-/// How far edges move in the image, px; 0 where nothing does.
+/// Sweep of the edges in the image, px; 0 if nothing moves.
 pub(super) fn sweep_px(objects: &[Object], faces: &[u16]) -> usize {
     if objects.iter().all(|object| object.moving.is_none()) {
         return 0;

@@ -1,4 +1,4 @@
-//! The camera of a scene: made once, shot often.
+//! The imager: lens, lights and solids of a scene, and one image at a time.
 
 use nalgebra::{Isometry3, Unit, Vector3};
 use rayon::prelude::*;
@@ -22,7 +22,8 @@ use armcal_core::optics::Fisheye;
 use armcal_core::robot::Shape;
 use armcal_core::stats::stream_rng;
 
-/// A printed tag: its frame has x right and y up as printed, z out of the print; `size_m` is the outer side of its black border.
+/// A printed tag: its frame has x right and y up as printed, z out of the print; `size_m` is the outer side of its
+/// black border.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TagPlane {
     pub id: u32,
@@ -32,7 +33,7 @@ pub struct TagPlane {
 }
 
 impl TagPlane {
-    /// One that does not move against the base.
+    /// A tag at rest relative to the base.
     #[must_use]
     pub fn fixed(id: u32, size_m: f64, base_from_tag: Isometry3<f64>) -> Self {
         Self { id, size_m, base_from_tag: [base_from_tag; 3] }
@@ -45,11 +46,11 @@ pub struct SolidShape {
     pub shape: Shape,
     /// As a screen shows it.
     pub color_rgb: [u8; 3],
-    /// It bears the seafloor's texture in place of its colour.
+    /// Whether it has the seafloor's texture in place of its colour.
     pub is_ground: bool,
 }
 
-/// What one image is taken of.
+/// Camera and scene of one image.
 #[derive(Clone, Copy, Debug)]
 pub struct Shot<'a> {
     /// When the shutter opens, halfway, and when it closes; the camera's frame has x right, y down, z along its axis.
@@ -91,7 +92,7 @@ pub struct Imager {
     frame: Frame,
 }
 
-/// What silt sends back, cd/m2: grey brown. Assumed.
+/// Radiance of silt, cd/m2: grey brown. Assumed.
 const SILT_CD_M2: [f32; 3] = [9.0, 8.0, 6.0];
 
 impl Imager {
@@ -118,7 +119,7 @@ impl Imager {
         }
     }
 
-    /// What is there besides tags.
+    /// Sets the solids of the scene.
     pub fn set_solids(&mut self, solids: &[SolidShape]) {
         let look = |solid: &SolidShape| {
             let linear = |value: u8| (f32::from(value) / 255.0).powf(2.2);

@@ -15,8 +15,8 @@ pub struct Light {
     pub half_angle_rad: f64,
 }
 
-/// A lamp in the camera's frame. At angle `a` from its axis it has `I0 2^(-(1 - cos a)/(1 - cos half))` cd (assumed); `I0`
-/// follows from the flux over the whole sphere.
+/// A lamp in the camera's frame. At angle `a` from its axis it has `I0 2^(-(1 - cos a)/(1 - cos half))` cd (assumed);
+/// `I0` follows from the flux over the whole sphere.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Lamp {
     position: Vec3,
@@ -39,8 +39,8 @@ impl Lamp {
         }
     }
 
-    /// Light through a unit area across the ray at `point`, lx, without the water's losses, the way's length, and the unit vector
-    /// towards the lamp.
+    /// Light through a unit area across the ray at `point`, lx, without the water's losses, the way's length, and the
+    /// unit vector towards the lamp.
     #[inline]
     fn arriving(&self, point: &Vec3) -> (f32, f32, Vec3) {
         /// Nearer than this a lamp is no point.

@@ -1,4 +1,5 @@
-//! Marine snow: particles in the water before the camera, anew in each image, drawn as soft discs over what lies behind them.
+//! Marine snow: particles in the water before the camera, anew in each image, drawn as soft discs over what lies behind
+//! them.
 //!
 //! A particle of radius a at range r, white by half (assumed), sends as much light as a disc of its size: `E / pi` from
 //! `pi (f a / r)^2` px, spread as a Gaussian.

@@ -1,8 +1,10 @@
-//! Images of the wrist camera, rendered on the CPU: tags, solids and seafloor through the lens, in water, on a noisy sensor.
+//! Images of the wrist camera, rendered on the CPU: tags, solids and seafloor through the lens, in water, on a noisy
+//! sensor.
 //!
-//! Each pixel's ray (`rays`) finds what it meets (`scene`, `shape`, `tag`); blocks of pixels that see one face share its shading
-//! (`band`, `shade`, `light`, `water`), pixels on edges are averaged over 32 samples of place and time (`sampled`). Marine snow
-//! (`snow`), the lens's blur and the sensor (`sensor`) follow. All arithmetic is in an order that no thread changes.
+//! Rays (`rays`) are intersected with objects (`tracer`, `scene`, `shape`, `tag_board`). Blocks of pixels on one face
+//! share its shading (`shading`, `shader`, `light`, `water`); pixels on `edges` are means over 32 samples
+//! (`supersampling`). `marine_snow`, `auto_exposure` and the `sensor` follow. No thread changes the order of the
+//! arithmetic.
 
 mod auto_exposure;
 mod canvas;

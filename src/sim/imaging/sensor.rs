@@ -1,8 +1,8 @@
 //! From radiance to bytes: the lens's blur and vignetting, exposure, shot and read noise, 8 bits.
 //!
-//! A pixel collects `N = q e V L` electrons, q electrons for 1 cd/m2, `V = 1 - v (r / r_max)^2`, and reads `N + sqrt(s^2 N + n^2)`
-//! times a normal number. The camera chooses the exposure share e <= 1 and the gain g >= 1 so that its bright pixels come to a
-//! set share of full scale. The response is linear, as machine vision cameras have it.
+//! A pixel collects `N = q e V L` electrons, q electrons for 1 cd/m2, `V = 1 - v (r / r_max)^2`, and reads
+//! `N + sqrt(s^2 N + n^2)` times a normal number. The camera chooses the exposure share e <= 1 and the gain g >= 1 so
+//! that its bright pixels come to a set share of full scale. The response is linear, as machine vision cameras have it.
 
 use rayon::prelude::*;
 
@@ -60,7 +60,7 @@ impl Sensor {
     }
 }
 
-/// All that is the same for each pixel of an image.
+/// Values common to all pixels of an image.
 pub(super) struct Readout<'a> {
     electrons_per_cd_m2: f32,
     counts_per_electron: f32,
@@ -157,8 +157,8 @@ fn gaussian(sigma_px: f64) -> Vec<f32> {
     (0..=reach).map(|k| (weight(k) / sum) as f32).collect()
 }
 
-/// The normal distribution's quantiles at the middles of even shares, by bisection of its distribution function (the series of
-/// Marsaglia 2004), scaled to a variance of one.
+/// The normal distribution's quantiles at the middles of even shares, by bisection of its distribution function (the
+/// series of Marsaglia 2004), scaled to a variance of one.
 fn normals() -> Vec<f32> {
     let below = |x: f64| {
         let (mut sum, mut term, mut n) = (x, x, 1.0);

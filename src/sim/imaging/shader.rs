@@ -1,8 +1,8 @@
-//! How bright a surface looks: `albedo * factor + veil`.
+//! Radiance of a surface: `albedo * factor + veil`.
 //!
-//! Lambert: `factor = E / pi exp(-bD z)` with the illuminance E of lamps and sun. The veil far away is what the water itself
-//! sends back, lit by the lamps: `Binf = integral of b p E(s) exp(-bD s) ds` along the ray (single scattering), on a coarse
-//! grid of rays; and the sun's, `E b / (4 pi bB)` (assumed: even in all directions). Lamps cast no shadows.
+//! Lambert: `factor = E / pi exp(-bD z)` with the illuminance E of lamps and sun. The veil far away is what the water
+//! itself sends back, lit by the lamps: `Binf = integral of b p E(s) exp(-bD s) ds` along the ray (single scattering),
+//! on a coarse grid of rays; and the sun's, `E b / (4 pi bB)` (assumed: even in all directions). Lamps cast no shadows.
 
 use std::f32::consts::{FRAC_1_PI, PI};
 
@@ -20,7 +20,7 @@ const NODE_PX: usize = 16;
 /// Ranges at which the veil's integral is sampled: even steps of the root, so that near ones are close.
 const STEPS: usize = 16;
 
-/// What surfaces of one image are shaded with.
+/// Lights and water of one image.
 #[derive(Clone, Debug)]
 pub(super) struct Shader {
     pub water: Water,

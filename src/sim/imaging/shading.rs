@@ -1,4 +1,4 @@
-//! From what pixels meet to how bright they are, on a band of rows.
+//! Radiance of the pixels in a band of rows.
 //!
 //! A block of pixels that see one face is shaded at its corners and linear in between. A pixel with another face in its
 //! neighbourhood, or swept by one while the shutter is open, is the mean of `SAMPLES` rays.
@@ -23,7 +23,7 @@ pub(super) struct Band<'a> {
     pub planes: [&'a mut [f32]; 3],
 }
 
-/// Where a ray meets an object.
+/// Intersection of a ray with an object.
 pub(super) struct Intersection {
     pub ray: Vec3,
     pub range_m: f32,

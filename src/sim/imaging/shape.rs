@@ -1,11 +1,11 @@
-//! Rays against convex shapes, several at a time. Rays start outside: what holds the eye is not seen.
+//! Intersection of rays with convex shapes, several at a time. A shape around the camera is invisible.
 
 use crate::imaging::Vec3;
 use crate::imaging::math::{max, min};
 use crate::imaging::tag_board::Board;
 use armcal_core::robot::Shape;
 
-/// What an object is to a ray, in its own frame; lengths in m.
+/// Form of an object in its own frame; lengths in m.
 #[derive(Clone, Debug)]
 pub(super) enum Form {
     Tag(Board),
@@ -31,7 +31,7 @@ pub(super) enum Form {
     },
 }
 
-/// Where an object stands to the camera.
+/// Pose of an object in the camera's frame.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Place {
     /// Rows of `object_from_camera`'s rotation.
@@ -67,7 +67,7 @@ impl Place {
         Vec3::from_fn(|i, _| self.eye[i] + range_m * turned[i][0])
     }
 
-    /// Where a ray meets the plane z = 0, x and y in the object's frame, m.
+    /// Intersection of a ray with the plane z = 0, x and y in the object's frame, m.
     #[inline]
     pub(super) fn on_plane(&self, ray: [f32; 3]) -> [f32; 2] {
         let d = self.turn(&ray.map(|v| [v]));
@@ -146,7 +146,7 @@ impl Form {
         if is_tag { -place.eye[2] / Vec3::from(place.rows[2]).dot(ray) } else { range_m }
     }
 
-    /// What a ray that enters at `range_m` meets: the true range, the face and the outer normal (camera frame).
+    /// Surface where a ray enters at `range_m`: true range, face and outer normal (camera frame).
     pub(super) fn meet(&self, place: &Place, ray: &Vec3, range_m: f32) -> (f32, u16, Vec3) {
         if let Self::Tag(board) = self {
             let range_m = self.true_range(place, ray, range_m);

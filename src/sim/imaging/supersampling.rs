@@ -1,4 +1,4 @@
-//! A pixel that an edge crosses, or crossed while the shutter was open: the mean over samples of place and time.
+//! Radiance of a pixel on an edge: the mean over samples of position and time.
 
 use crate::imaging::scene::{Appearance, FACE_BITS, Object, SAMPLES, first_met, offset};
 use crate::imaging::shader::Shade;

@@ -10,8 +10,8 @@ pub(super) const BLACK: f32 = 0.05;
 pub(super) const FACE_WHITE: u16 = 0;
 pub(super) const FACE_BLACK: u16 = 1;
 pub(super) const FACE_BACK: u16 = 2;
-/// A tag wins over what lies before it by less than this, along its normal: it is glued to something, and neither's place is
-/// exact. As for the geometric camera.
+/// A tag wins over what lies before it by less than this, along its normal: it is glued to something, and neither's
+/// place is exact. As for the geometric camera.
 pub(super) const CLEAR_OF_BACKING_M: f32 = 0.006;
 
 /// A tag's printed pattern and size.

@@ -18,7 +18,8 @@ const WHITE: f64 = 0.85;
 const BLACK: f64 = 0.05;
 const COUNTS_PER_CD_M2: f64 = 255.0 * PI / 1000.0;
 
-/// A tag `range_m` ahead of the camera in a direction by pixel, turned by `tilt` (rad, its own axes) from facing the camera.
+/// A tag `range_m` ahead of the camera in a direction by pixel, turned by `tilt` (rad, its own axes) from facing the
+/// camera.
 fn ahead(pixel: [f64; 2], range_m: f64, tilt: [f64; 3]) -> Isometry3<f64> {
     let ray = lens().unproject(&Vector2::from(pixel)).expect("in view");
     let facing = UnitQuaternion::rotation_between(&Vector3::z(), &-ray.into_inner())
@@ -53,8 +54,8 @@ fn between(image: &[f64], pixel: &Vector2<f64>) -> f64 {
     (1.0 - v) * row(i) + v * row(i + width)
 }
 
-/// The sides of the black border where the projection puts them: across each the brightness falls from white to black, and the
-/// area under the profile tells where, whatever the pixels' blur.
+/// The sides of the black border where the projection puts them: across each the brightness falls from white to black,
+/// and the area under the profile tells where, whatever the pixels' blur.
 #[test]
 fn edges_lie_where_the_projection_puts_them() {
     const REACH_PX: f64 = 2.5;
@@ -382,7 +383,7 @@ fn rays_meet_shapes_where_parry_says() {
     }
 }
 
-/// How near a ray comes to a shape, m.
+/// Smallest distance of a ray from a shape, m.
 fn nearest(solid: &dyn parry3d::shape::Shape, pose: &parry3d::math::Pose3, ray: &parry3d::query::Ray) -> f64 {
     let at = |k: i32| solid.distance_to_point(pose, ray.origin + ray.dir * (0.005 * f64::from(k)), true);
     (0..600).map(at).fold(f64::INFINITY, f64::min)

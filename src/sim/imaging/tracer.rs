@@ -10,7 +10,7 @@ use crate::imaging::shape::Lanes;
 /// Rays traced together.
 const LANES: usize = 8;
 
-/// All that pixels are made from.
+/// Rays, objects and shading of one image.
 #[derive(Clone, Copy)]
 pub(super) struct Tracer<'a> {
     pub rays: &'a Rays,

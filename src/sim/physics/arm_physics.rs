@@ -41,7 +41,8 @@ pub(crate) struct PhysicsInput<'a> {
     pub angles: JointAngles,
 }
 
-/// The base's motion at both ends of a step, where it is prescribed; the water's, in world axes; and what pushes a free vehicle.
+/// The base's motion at both ends of a step, where it is prescribed; the water's, in world axes; and what pushes a free
+/// vehicle.
 pub(crate) struct Drive<'a> {
     pub base: [&'a BaseState; 2],
     pub water: [WaterMotion; 2],

@@ -1,8 +1,8 @@
-//! Whether anything can touch: as long as not, the engine need not look for contacts.
+//! Lower bounds of clearances: while they are positive, the engine does not search for contacts.
 //!
 //! The distances of all watched pairs are measured now and then. Between two measurements the joints' and the ground's
-//! paths bound what a pair can have lost, so that a step in which nothing can touch is known without looking. The motion
-//! is the same to rounding: the engine adds up a link's inertia in another way when its shapes are switched off.
+//! paths bound what a pair can have lost, so that a step in which nothing can touch is known without looking. The
+//! motion is the same to rounding: the engine adds up a link's inertia in another way when its shapes are switched off.
 
 use nalgebra::Isometry3;
 
@@ -26,9 +26,9 @@ pub(super) struct ContactGuard {
     groups: Vec<Group>,
     angles: JointAngles,
     base_from_ground: Isometry3<f64>,
-    /// What each joint has moved since the start, rad.
+    /// Path of each joint since the start, rad.
     path_rad: [f64; MAX_JOINTS],
-    /// What the ground has moved at most anywhere in the arm's reach, m.
+    /// Bound of the ground's path within the arm's reach, m.
     ground_path_m: f64,
     reach_m: f64,
     step: u64,
@@ -162,8 +162,8 @@ mod tests {
     /// The engine's prediction distance.
     const PREDICTED_M: f64 = 0.02;
 
-    /// Arms that wander about, into things too, over a seafloor that heaves: whenever contact is excluded, every watched
-    /// pair is farther apart than the engine would make a contact for.
+    /// Arms that wander about, into things too, over a seafloor that heaves: whenever contact is excluded, every
+    /// watched pair is farther apart than the engine would make a contact for.
     #[test]
     fn what_it_excludes_is_far_apart() {
         let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("robots");

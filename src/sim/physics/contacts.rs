@@ -1,4 +1,4 @@
-//! What touches what, and how hard: contacts from the engine's collision pipeline, forces by a spring and a damper.
+//! Contacts from the engine's collision pipeline, with forces by a spring and a damper.
 //!
 //! The engine finds manifolds (broad phase, narrow phase, persistent points); the arm's own equations take the forces
 //! implicitly. Friction is viscous below a small slip rate and Coulomb's above.
@@ -200,8 +200,8 @@ impl Contact {
         }
     }
 
-    /// How each coordinate moves the pushed body's point along `axis` against the other's, and what the ground or a base that
-    /// moves as prescribed adds to that rate.
+    /// How each coordinate moves the pushed body's point along `axis` against the other's, and what the ground or a
+    /// base that moves as prescribed adds to that rate.
     fn direction(&self, axis: &Vector3<f64>, state: &ContactState) -> (Coordinates, f64) {
         let unit = Force::at(&self.point, axis);
         let mut direction = [0.0; MAX_DOF];

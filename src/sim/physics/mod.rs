@@ -1,7 +1,7 @@
-//! The arm on its vehicle, and what it touches: the multibody's state, moved step by step.
+//! The arm on its vehicle with its contacts: the multibody's state, moved step by step.
 //!
-//! The equations of motion and their integrator are ours (`dynamics`); rapier's collision pipeline finds the contacts. Each
-//! joint hangs on its oil column, which the hydraulics give as an implicit spring.
+//! `dynamics` has the equations of motion and their integrator; rapier's collision pipeline finds the contacts. Each
+//! joint is held by its oil column, an implicit spring of the hydraulics.
 
 mod arm_physics;
 mod contact_guard;

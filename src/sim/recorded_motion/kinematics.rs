@@ -2,7 +2,7 @@
 
 use nalgebra::{UnitQuaternion, Vector3};
 
-/// Where a vehicle is and how it moves at one instant.
+/// Pose, velocity and acceleration of a vehicle at one instant.
 #[derive(Clone, Copy, Debug)]
 pub struct VehicleKinematics {
     /// Of the vehicle's origin in the world, m.

@@ -1,9 +1,8 @@
-//! A vehicle's motion from a recording: poses over time, made twice differentiable.
+//! Motion of a vehicle from a recording: poses over time, twice differentiable.
 //!
-//! A cubic spline runs through every sample's position and quaternion; the quaternion is normalised where it is read, so that no
-//! attitude is special. Velocity and acceleration are the exact derivatives of what is read. The world starts at the first
-//! sample, as fast as the recording is there; towards the end the recording plays slower and slower, and the vehicle
-//! holds where the last sample has it.
+//! A cubic spline interpolates positions and quaternions; quaternions are normalised on evaluation, without a singular
+//! attitude. Velocity and acceleration are its exact derivatives. The world starts at the first sample with its
+//! velocity. Towards the end the recording slows down, and the vehicle stops at the last sample.
 
 mod kinematics;
 mod motion;

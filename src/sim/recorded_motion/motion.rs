@@ -13,8 +13,9 @@ use armcal_core::robot::{FileIssue, read_text};
 /// A recorded motion, checked and ready to be followed.
 ///
 /// The file is a CSV with the columns `time_s, x_m, y_m, z_m` and then either `roll_rad, pitch_rad, yaw_rad`
-/// (`R = Rz(yaw) Ry(pitch) Rx(roll)`) or `qw, qx, qy, qz` (Hamilton); a line that begins with `#` is a comment. Positions are those
-/// of the vehicle's origin against its station, which is the world's origin; z up. Time counts from the first sample.
+/// (`R = Rz(yaw) Ry(pitch) Rx(roll)`) or `qw, qx, qy, qz` (Hamilton); a line that begins with `#` is a comment.
+/// Positions are those of the vehicle's origin against its station, which is the world's origin; z up. Time counts from
+/// the first sample.
 #[derive(Clone, Debug)]
 pub struct RecordedMotion {
     spline: Spline,
@@ -23,7 +24,8 @@ pub struct RecordedMotion {
 
 /// The longest time between two samples, s: a longer one is a gap, and what happened there is anyone's guess.
 const MAX_GAP_S: f64 = 1.0;
-/// The most that a vehicle turns between two samples, rad: beyond, the shorter way round need not be the one that it took.
+/// The most that a vehicle turns between two samples, rad: beyond, the shorter way round need not be the one that it
+/// took.
 const MAX_TURN_RAD: f64 = 1.0;
 /// m/s2. No vehicle with an arm does that; a jump in the recording does.
 const MAX_ACCELERATION_M_S2: f64 = 50.0;
@@ -88,8 +90,8 @@ impl RecordedMotion {
 
     /// Place in the recording (s) at run time `t_s`, with its first and second derivative.
     ///
-    /// `1 - 3 s2 + 2 s3` of the last [`EASED_S`] stretched to twice their length: the recording's rate falls from one to zero, and its
-    /// derivative is zero at both ends, so that the whole stays twice differentiable.
+    /// `1 - 3 s2 + 2 s3` of the last [`EASED_S`] stretched to twice their length: the recording's rate falls from one
+    /// to zero, and its derivative is zero at both ends, so that the whole stays twice differentiable.
     fn played(&self, t_s: f64) -> [f64; 3] {
         let end_s = self.duration_s();
         let eased_s = EASED_S.min(0.5 * end_s);
@@ -171,7 +173,7 @@ fn check_times(file: &Path, samples: &[Sample]) -> Result<(), FileIssue> {
     Ok(())
 }
 
-/// What the spline runs through: of the two quaternions of each attitude the one nearer to the sample before.
+/// Values for the spline: of the two quaternions of each attitude the one nearer to the sample before.
 fn continuous(file: &Path, header: &Header, samples: &[Sample]) -> Result<Vec<Value>, FileIssue> {
     let mut values: Vec<Value> = Vec::with_capacity(samples.len());
     let mut before = samples[0].rotation.into_inner();

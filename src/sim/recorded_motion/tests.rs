@@ -40,9 +40,11 @@ fn worst(differences: &[Vector3<f64>]) -> f64 {
     differences.iter().map(Vector3::amax).fold(0.0, f64::max)
 }
 
-/// Largest differences of velocity, acceleration, rate and angular acceleration from central differences of the pose at `t`.
+/// Largest differences of velocity, acceleration, rate and angular acceleration from central differences of the pose at
+/// `t`.
 fn off_central_differences(motion: &RecordedMotion, t: f64) -> f64 {
-    // Within a cubic piece the third derivative is constant: 1e-4 s leaves 1e-8 of truncation, and 1e-16/h2 = 1e-8 of rounding.
+    // Within a cubic piece the third derivative is constant: 1e-4 s leaves 1e-8 of truncation, and 1e-16/h2 = 1e-8 of
+    // rounding.
     let h = 1e-4;
     let [before, now, after] = [t - h, t, t + h].map(|t| motion.at(t));
     let velocity = (after.position - before.position) / (2.0 * h);
@@ -73,7 +75,8 @@ fn derivatives_are_those_of_what_it_returns() {
     }
 }
 
-/// The poses of a known motion, sampled, give back its velocities and accelerations, better with the square of the step.
+/// The poses of a known motion, sampled, give back its velocities and accelerations, better with the square of the
+/// step.
 #[test]
 fn a_sampled_motion_comes_back_with_its_accelerations() {
     let worst = |step_s: f64| {

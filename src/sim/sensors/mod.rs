@@ -1,4 +1,4 @@
-//! What a real arm's sensors make of the truth: counts, pixels, temperatures, attitude, pressure.
+//! Simulated sensors: joint counts, tag detections, temperatures, attitude and pressure from the true state.
 
 pub(super) mod attitude;
 pub(super) mod camera;

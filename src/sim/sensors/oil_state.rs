@@ -1,6 +1,6 @@
 //! State of the oil about the joint sensors.
 
-/// What lies about the joint sensors, in their oil.
+/// Oil temperature and pressure at the joint sensors.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct OilState {
     pub oil_c: f64,

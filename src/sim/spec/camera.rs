@@ -113,7 +113,8 @@ table!(
         base_std_m: Option<f64> = None;
         #[serde(skip_serializing_if = "Option::is_none")]
         base_std_rad: Option<f64> = None;
-        /// Of the tag on the gripper, against its drawing; 0.3 mm and 0.1 deg where left out. Assumed: a measuring arm on the bench.
+        /// Of the tag on the gripper, against its drawing; 0.3 mm and 0.1 deg where left out. Assumed: a measuring arm
+        /// on the bench.
         #[serde(skip_serializing_if = "Option::is_none")]
         gripper_std_m: Option<f64> = None;
         #[serde(skip_serializing_if = "Option::is_none")]

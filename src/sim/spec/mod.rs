@@ -1,4 +1,4 @@
-//! The routine's `[world]`: how far the truth differs from the drawings.
+//! The routine's `[world]`: differences of the truth from the nominal arm and scene.
 //!
 //! One file has one table. Every key is optional; a missing one has the value of the standard world.
 //! Angles are rad, temperatures Celsius.

@@ -38,7 +38,8 @@ pub struct WorldSpec {
     pub vehicle: VehicleMotionSpec,
     pub hydraulics: HydraulicsSpec,
     pub water: WaterSpec,
-    /// By joint: counts per radian over the datasheet's. Negative: they run the other way. The arm's own controller knows.
+    /// By joint: counts per radian over the datasheet's. Negative: they run the other way. The arm's own controller
+    /// knows.
     pub gear_ratio: BTreeMap<String, f64>,
     /// The motion that `vehicle.motion_file` names, read with the routine.
     #[serde(skip)]

@@ -1,4 +1,4 @@
-//! The truth's own stream: what the score compares belief with, in a file that belief never opens.
+//! The truth stream: reference of the score, in a file that belief never opens.
 
 mod messages;
 mod reader;

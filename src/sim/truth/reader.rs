@@ -11,7 +11,7 @@ use armcal_core::spatial::{Base, Camera, Frame, Pose, Tool, Vehicle, World};
 use armcal_core::streams::{JointAngles, MAX_JOINTS};
 use armcal_core::time::Stamp;
 
-/// What truth.mcap holds.
+/// Contents of truth.mcap.
 #[derive(Clone, Debug)]
 pub struct Truth {
     pub header: TruthHeader,
@@ -19,9 +19,9 @@ pub struct Truth {
     pub states: Vec<TruthState>,
     pub contacts: Vec<TruthContact>,
     pub clearances: Vec<TruthClearance>,
-    /// What broke, in the order of time.
+    /// Faults in the order of time.
     pub faults: Vec<TruthFault>,
-    /// How much of the file could be read.
+    /// Completeness of the file.
     pub completeness: Completeness,
 }
 

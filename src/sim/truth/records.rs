@@ -7,7 +7,7 @@ use armcal_core::spatial::{Base, Camera, Pose, Tool, Vehicle, World};
 use armcal_core::streams::{JointAngles, SinkError};
 use armcal_core::time::Stamp;
 
-/// What holds for the whole run.
+/// Constants of a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TruthHeader {
     pub robot: String,
@@ -59,7 +59,7 @@ pub struct TruthFault {
     pub stamp: Stamp,
     /// As routines name it.
     pub kind: String,
-    /// What the routine says of it beside that: `joint = "wrist_yaw"`.
+    /// Its other values in the routine: `joint = "wrist_yaw"`.
     pub details: String,
 }
 

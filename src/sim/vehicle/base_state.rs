@@ -31,7 +31,8 @@ pub(crate) struct BaseState {
 }
 
 impl BaseState {
-    /// Rigid body: `a_base = a + alpha x r + w x (w x r)`, `v_base = v + w x r`, all in vehicle axes, then in base axes.
+    /// Rigid body: `a_base = a + alpha x r + w x (w x r)`, `v_base = v + w x r`, all in vehicle axes, then in base
+    /// axes.
     pub(crate) fn of(jet: &VehicleKinematics, vehicle_from_base: &Pose<Vehicle, Base>) -> Self {
         let mount = vehicle_from_base.isometry();
         let lever = mount.translation.vector;

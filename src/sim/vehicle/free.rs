@@ -11,7 +11,7 @@ use crate::vehicle::sinusoids::{SinusoidSum, draw_sinusoids, evaluate};
 use armcal_core::robot::{FileIssue, Vehicle, VehicleDynamics};
 use armcal_core::streams::JointAngles;
 
-/// How long an impulse lasts, s: short against the vehicle's motion, long against a step.
+/// Duration of an impulse, s: short against the vehicle's motion, long against a step.
 const IMPULSE_DURATION_S: f64 = 0.1;
 
 /// Thrusters, and what pushes the vehicle besides the water that it moves through.
@@ -55,8 +55,8 @@ impl FreeVehicle {
         })
     }
 
-    /// The vehicle as body 0 of the system, ballasted so that it floats level with the arm as it is now: its displacement
-    /// carries vehicle and arm, and the centre of buoyancy lies above the common centre of weight.
+    /// The vehicle as body 0 of the system, ballasted so that it floats level with the arm as it is now: its
+    /// displacement carries vehicle and arm, and the centre of buoyancy lies above the common centre of weight.
     pub(crate) fn body(&self, vehicle: &Vehicle, water: &WaterSpec, arm: &Multibody, angles: &JointAngles) -> Body {
         let d = &self.dynamics;
         let to_base = &self.base_from_vehicle;
@@ -78,7 +78,8 @@ impl FreeVehicle {
         let (weight, moment) = wet_weight(arm, angles);
         let down = to_base.rotation * -Vector3::z();
         body.displaced_kg = vehicle.mass_kg + weight;
-        // Level: the moments of all weights (the vehicle's own at its origin) and of the buoyancy balance about the base.
+        // Level: the moments of all weights (the vehicle's own at its origin) and of the buoyancy balance about the
+        // base.
         let weights = moment + vehicle.mass_kg * body.com_m;
         let above = to_base.rotation * Vector3::new(0.0, 0.0, d.center_of_buoyancy_m[2]);
         let center = weights / body.displaced_kg;
@@ -91,7 +92,7 @@ impl FreeVehicle {
         self.impulse = Some((t_s, *impulse));
     }
 
-    /// What acts on the vehicle in the step from `t_s`, about the base's origin in base axes.
+    /// Force on the vehicle in the step from `t_s`, about the base's origin in base axes.
     pub(crate) fn force(&mut self, t_s: f64, step_s: f64, base: &BaseState) -> Force {
         self.keep_station(step_s, base);
         let mut total = self.thrust;
@@ -116,7 +117,8 @@ impl FreeVehicle {
         Force::new(moment + to_base.translation.vector.cross(&force), force)
     }
 
-    /// PID on position and attitude, as dynamic positioning has it, with the thrusters' lag and limits. It knows where it is.
+    /// PID on position and attitude, as dynamic positioning has it, with the thrusters' lag and limits. It knows where
+    /// it is.
     fn keep_station(&mut self, step_s: f64, base: &BaseState) {
         let w = self.spec.station_keeping_rad_s;
         if w == 0.0 {

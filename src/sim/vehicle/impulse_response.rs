@@ -5,8 +5,8 @@ use nalgebra::{UnitQuaternion, Vector3};
 use crate::fault::Impulse;
 use crate::recorded_motion::VehicleKinematics;
 
-/// How a vehicle with prescribed motion answers an impulse: `x = c t2 exp(-t/T)`, whose fastest moment has the velocity that
-/// the impulse gives to the vehicle alone. Assumed; a free vehicle answers by itself.
+/// Response of a vehicle with prescribed motion to an impulse: `x = c t2 exp(-t/T)`, whose fastest moment has the
+/// velocity that the impulse gives to the vehicle alone. Assumed; a free vehicle answers by itself.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ImpulseResponse {
     start_s: f64,

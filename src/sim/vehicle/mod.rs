@@ -1,8 +1,8 @@
-//! How the vehicle moves that carries the arm.
+//! Motion of the vehicle that carries the arm.
 //!
-//! A `swell` of sinusoids or a recorded motion prescribe it: the arm feels it and does not push back. A `free` vehicle is a
-//! body of its own, with thrusters that keep station against current, waves and the arm. [`BaseState`] is what either gives
-//! to the arm's sensors; `sea` is how the water moves.
+//! A `swell` of sinusoids or a recorded motion prescribe it (`prescribed`); the arm does not push back. A `free`
+//! vehicle is a body of its own, with thrusters for station keeping. [`BaseState`] has the motion of the arm's base;
+//! `sea` has that of the water.
 
 mod base_state;
 mod free;

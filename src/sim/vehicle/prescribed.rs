@@ -27,7 +27,8 @@ enum Path {
 }
 
 impl VehicleMotion {
-    /// The prescribed motion that the world asks for: `recorded` where there is one. A free vehicle starts where this is at 0.
+    /// The prescribed motion that the world asks for: `recorded` where there is one. A free vehicle starts where this
+    /// is at 0.
     pub(crate) fn new(
         spec: &VehicleMotionSpec,
         recorded: Option<&Arc<RecordedMotion>>,

@@ -1,4 +1,4 @@
-//! The vehicle rocked by a swell: a prescribed motion about its station, in closed form.
+//! Motion of a vehicle in a swell: prescribed, about its station, in closed form.
 //!
 //! Each of x, y, z, roll, pitch, yaw is a sum of sinusoids with random periods and phases, scaled to its rms and
 //! swelling smoothly from rest, so that position, velocity and acceleration are exact and need no integration. The arm

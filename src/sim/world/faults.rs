@@ -1,4 +1,4 @@
-//! Things break: at steps of the script, or when their time has come, and the truth's stream says so.
+//! Execution of faults, at steps of the script or at their time, with a record in the truth.
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
@@ -74,7 +74,7 @@ impl World {
         }
     }
 
-    /// A blow to the vehicle: a free one takes the impulse, one on a prescribed path swings out as its impulse says and comes back.
+    /// Impulse on the vehicle: a force on a free one, a displacement and return of a prescribed one.
     fn impulse(&mut self, impulse: &Impulse) {
         let t_s = self.time_s();
         match &mut self.free {

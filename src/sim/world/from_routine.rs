@@ -10,8 +10,8 @@ use armcal_core::robot::{FileIssue, Robot};
 use armcal_core::routine::{Routine, Step};
 
 impl WorldSpec {
-    /// Reads a routine's `[world]` and the tables of its `fault` steps, and checks them against its robot. The steps' faults
-    /// come first in the list, then those with a time.
+    /// Reads a routine's `[world]` and the tables of its `fault` steps, and checks them against its robot. The steps'
+    /// faults come first in the list, then those with a time.
     ///
     /// # Errors
     /// [`SimError::Spec`] naming file, key and what is allowed.

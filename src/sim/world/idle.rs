@@ -19,9 +19,9 @@ impl World {
         self.spec.water.depth_m - self.base.world_from_vehicle.origin().vector().z
     }
 
-    /// Whole seconds at rest are skipped, with one reading of each slow stream and of the joints a second. The last ones
-    /// pass step by step, so that the controller answers to what drifted meanwhile; so do those in which and after which
-    /// something breaks, so that it breaks at its time and the arm answers to it.
+    /// Whole seconds at rest are skipped, with one reading of each slow stream and of the joints a second. The last
+    /// ones pass step by step, so that the controller answers to what drifted meanwhile; so do those in which and after
+    /// which something breaks, so that it breaks at its time and the arm answers to it.
     pub(super) fn rest(&mut self, seconds: f64, sink: &mut dyn Sink) -> Result<(), ArmError> {
         let until = self.now().plus_s(seconds);
         // To a whole second first, for slow streams keep their beat.

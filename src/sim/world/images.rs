@@ -1,4 +1,4 @@
-//! The camera in step with the world: what it sees and when its images arrive.
+//! The camera in step with the world: its images and their arrival.
 
 use nalgebra::Isometry3;
 
@@ -32,13 +32,13 @@ impl World {
         Ok(())
     }
 
-    /// How far each jaw has gone from where it is drawn.
+    /// Displacement of each jaw from the drawing.
     fn jaw_shifts(&self) -> [Isometry3<f64>; 2] {
         let jaws = self.robot.gripper.as_ref().zip(self.gripper.as_ref());
         std::array::from_fn(|n| jaws.map_or_else(Isometry3::identity, |(spec, jaws)| spec.shift(n, jaws.opening_m)))
     }
 
-    /// What an image becomes for those who listen.
+    /// Messages of an image.
     pub(super) fn deliver(&mut self, at: Stamp, image: CameraShot) {
         let stamp = image.detections.stamp;
         self.outbox.push((at, Message::Detections(image.detections)));

@@ -14,7 +14,7 @@ use armcal_core::robot::{Robot, Vehicle};
 use armcal_core::routine::Scene;
 use armcal_core::streams::{JointAngles, JointCounts};
 
-/// What a world is made of.
+/// Parts of a world.
 #[derive(Clone, Debug)]
 pub struct WorldInput<'a> {
     pub robot: &'a Robot,

@@ -1,4 +1,4 @@
-//! The parts of a world, and their step.
+//! Parts of a world, and their step.
 
 use std::collections::VecDeque;
 

@@ -145,8 +145,8 @@ fn the_sliding_torque_follows_stribecks_curve() {
     }
 }
 
-/// There and back at a steady rate, the bristle's torque without its damping: from one turn it unbends and bends the other way
-/// up to the stiction, then slides. The loop holds the energy of a cycle.
+/// There and back at a steady rate, the bristle's torque without its damping: from one turn it unbends and bends the
+/// other way up to the stiction, then slides. The loop holds the energy of a cycle.
 #[test]
 fn a_cycle_takes_the_energy_of_its_loop() {
     const AMPLITUDE: f64 = 4e-3;

@@ -1,4 +1,4 @@
-//! What breaks in a drive.
+//! Faults of an actuator.
 
 use crate::hydraulics::tests::*;
 

@@ -1,6 +1,7 @@
 //! The camera's motion during the exposure.
 //!
-//! The joints' rates are constant while the shutter is open. `tag_projection` and the renderer average over these poses.
+//! The joints' rates are constant while the shutter is open. `tag_projection` and the renderer average over these
+//! poses.
 
 use nalgebra::Isometry3;
 
@@ -25,8 +26,8 @@ pub(super) struct Exposure {
 }
 
 impl Exposure {
-    /// `base_from_camera` when the shutter opened and halfway, relative to a tag on `body` (0: the base) that stays where it is
-    /// when the shutter closes; `None` without exposure time.
+    /// `base_from_camera` when the shutter opened and halfway, relative to a tag on `body` (0: the base) that stays
+    /// where it is when the shutter closes; `None` without exposure time.
     pub(super) fn earlier_poses(
         &self,
         base_from_camera: &Isometry3<f64>,
@@ -47,7 +48,8 @@ impl Exposure {
         Some([from_end * body_from_camera(self.exposure_s), from_end * body_from_camera(0.5 * self.exposure_s)])
     }
 
-    /// The same with the pose when the shutter closes: `base_from_camera` at three instants, alike without exposure time.
+    /// The same with the pose when the shutter closes: `base_from_camera` at three instants, alike without exposure
+    /// time.
     pub(super) fn poses(
         &self,
         base_from_camera: &Isometry3<f64>,

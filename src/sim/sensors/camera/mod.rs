@@ -1,9 +1,10 @@
-//! The wrist camera with its tag detector: which tags it sees, and where their corners fall.
+//! The wrist camera with its tag detector: detected tags and their corner pixels.
 //!
-//! A tag is seen if its front faces the camera at less than a largest incidence and range, all corners lie in the image, its
-//! shortest side is long enough to decode, and neither its centre nor a corner is hidden (`view`). Lens and port as built
-//! make pixels of points (`eye`, `port`). With the shutter open for a while a corner is its mean over it (Simpson's rule
-//! along the joints' motion). Noise per coordinate: `s (0.8 + 0.2 range / 1 m) / sqrt(cos(incidence)) (1 + k blur)`.
+//! A tag is detected within a largest incidence and range, with all corners in the image, sides long enough to decode,
+//! and neither its centre nor a corner hidden (`tag_projection`). Lens and port as built project points (`ported_lens`,
+//! `port`). Corners are means over the exposure (Simpson's rule along the joints' motion, `exposure`). Noise per
+//! coordinate: `s (0.8 + 0.2 range / 1 m) / sqrt(cos(incidence)) (1 + k blur)`. `rendered_camera` detects tags in
+//! rendered images instead.
 
 mod clock;
 mod exposure;

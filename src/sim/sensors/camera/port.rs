@@ -1,10 +1,10 @@
 //! Refraction by the port between lens and water.
 //!
 //! Flat port: with `s = sin` of the angle in air, a ray reaches the radius
-//! `d tan(a) + t s / sqrt(ng^2 - s^2) + (z - d - t) s / sqrt(nw^2 - s^2)` at depth z. Dome: concentric spheres keep `n b` constant
-//! (b the ray's distance from their centre; Bouguer's formula). A ray leaves with `b / nw`, turned towards the centre's side by
-//! `asin(b / Ri) - asin(b / ng Ri) + asin(b / ng Ro) - asin(b / nw Ro)`. Both are solved for the ray that meets a point.
-//! Indices: air 1, acrylic 1.49, water 1.333 (sea water: up to 1.34).
+//! `d tan(a) + t s / sqrt(ng^2 - s^2) + (z - d - t) s / sqrt(nw^2 - s^2)` at depth z. Dome: concentric spheres keep
+//! `n b` constant (b the ray's distance from their centre; Bouguer's formula). A ray leaves with `b / nw`, turned
+//! towards the centre's side by `asin(b / Ri) - asin(b / ng Ri) + asin(b / ng Ro) - asin(b / nw Ro)`. Both are solved
+//! for the ray that meets a point. Indices: air 1, acrylic 1.49, water 1.333 (sea water: up to 1.34).
 
 use nalgebra::Vector3;
 
@@ -21,8 +21,8 @@ pub(super) enum Port {
 }
 
 impl Port {
-    /// Direction in air of the ray from a point in the water to the lens (camera frame, any length). `None` for a point that is
-    /// not in the water or that no ray reaches.
+    /// Direction in air of the ray from a point in the water to the lens (camera frame, any length). `None` for a point
+    /// that is not in the water or that no ray reaches.
     pub(super) fn direction_in_air(&self, point_m: &Vector3<f64>) -> Option<Vector3<f64>> {
         match *self {
             Self::None => Some(*point_m),
@@ -81,8 +81,8 @@ fn through_plane(point_m: &Vector3<f64>, distance_m: f64, thickness_m: f64) -> O
 }
 
 fn through_sphere(point_m: &Vector3<f64>, center_m: &Vector3<f64>, inner_m: f64, outer_m: f64) -> Option<Vector3<f64>> {
-    // Pupil and point relative to the sphere's centre. All normals pass through the centre, so the ray stays in the plane of the
-    // three, with axes along the line of sight and across it.
+    // Pupil and point relative to the sphere's centre. All normals pass through the centre, so the ray stays in the
+    // plane of the three, with axes along the line of sight and across it.
     let (pupil, point) = (-center_m, point_m - center_m);
     if point.norm() <= outer_m {
         return None;
@@ -115,7 +115,8 @@ fn through_sphere(point_m: &Vector3<f64>, center_m: &Vector3<f64>, inner_m: f64,
     angle.is_finite().then(|| along * angle.cos() + across * angle.sin())
 }
 
-/// Angle by which a dome turns a ray that starts `lever_m` from its centre, rad, and the derivative by the lever, rad/m.
+/// Angle by which a dome turns a ray that starts `lever_m` from its centre, rad, and the derivative by the lever,
+/// rad/m.
 fn turn_in_dome(lever_m: f64, inner_m: f64, outer_m: f64) -> (f64, f64) {
     let refractions =
         [(inner_m, 1.0), (GLASS_INDEX * inner_m, -1.0), (GLASS_INDEX * outer_m, 1.0), (WATER_INDEX * outer_m, -1.0)];

@@ -1,7 +1,8 @@
 //! Projection of points by the camera as built: its port, then its lens.
 //!
-//! The drawing's lens is calibrated in water behind a perfect dome. Behind a flat port the lens's own focal length is shorter by
-//! the water's index. Near the axis both together then have the drawing's focal length; farther out they differ.
+//! The drawing's lens is calibrated in water behind a perfect dome. Behind a flat port the lens's own focal length is
+//! shorter by the water's index. Near the axis both together then have the drawing's focal length; farther out they
+//! differ.
 
 use nalgebra::{Vector2, Vector3};
 

@@ -76,8 +76,8 @@ impl Scenery {
         self.shapes.push(SolidShape { shape: shape.clone(), color_rgb: *color_rgb, is_ground: false });
     }
 
-    /// `base_from_shape` of each shape at three instants, into `out`; `carried` has the motions of a body from the last instant to
-    /// each of them.
+    /// `base_from_shape` of each shape at three instants, into `out`; `carried` has the motions of a body from the last
+    /// instant to each of them.
     pub(super) fn place(
         &self,
         poses: &ScenePoses,

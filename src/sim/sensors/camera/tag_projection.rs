@@ -86,8 +86,8 @@ impl TagProjector<'_> {
         Some(TagProjection { corners_px, range_m, cos_incidence, side_px, blur_px: 0.0 })
     }
 
-    /// Corners averaged over the exposure (Simpson's rule) by `earlier` camera poses, at its start and halfway. `None` for a tag
-    /// that was not in the image all the time.
+    /// Corners averaged over the exposure (Simpson's rule) by `earlier` camera poses, at its start and halfway. `None`
+    /// for a tag that was not in the image all the time.
     pub(super) fn average_over_exposure(
         &self,
         at_end: TagProjection,

@@ -90,7 +90,8 @@ fn an_instant_shows_where_the_corners_are() {
     }
 }
 
-/// The tag on the gripper is where the last joint carries it, is hidden by the wrist behind it, and moves no other tag's noise.
+/// The tag on the gripper is where the last joint carries it, is hidden by the wrist behind it, and moves no other
+/// tag's noise.
 #[test]
 fn the_tag_on_the_gripper_turns_with_the_last_joint_until_the_wrist_hides_it() {
     let mut with = site(|spec| spec.camera.corner_noise_px = 0.3);
@@ -284,8 +285,8 @@ fn corners_go_through_the_lens_as_built() {
     }
 }
 
-/// Behind a thin flat port at the pupil an angle becomes `asin(n sin)`, through a lens shorter by n: the drawing's focal length
-/// on the axis, and another one outwards. A dome beside the pupil shifts corners by some pixels.
+/// Behind a thin flat port at the pupil an angle becomes `asin(n sin)`, through a lens shorter by n: the drawing's
+/// focal length on the axis, and another one outwards. A dome beside the pupil shifts corners by some pixels.
 #[test]
 fn ports_keep_the_focal_length_near_the_axis() {
     let shift = |change: &dyn Fn(&mut CameraWorldSpec), angle_rad: f64, range_m: f64| {
@@ -330,7 +331,8 @@ fn ports_keep_the_focal_length_near_the_axis() {
     assert_eq!(shift(&centred, 0.7, 1.0), 0.0);
 }
 
-/// Squared errors in units of the model's covariance are chi-square of 2 degrees, and tags are found as often as it says.
+/// Squared errors in units of the model's covariance are chi-square of 2 degrees, and tags are found as often as it
+/// says.
 #[test]
 fn fitted_noise_and_misses_are_those_of_the_model() {
     let site = site(|spec| spec.camera.noise = CornerNoiseKind::Fitted);

@@ -47,7 +47,7 @@ pub(crate) struct WristCamera {
     /// Streams of the gripper tag alone, so that it does not change the noise of other tags.
     gripper_random: TagRandom,
     clock: CameraClock,
-    /// Where detections come from pixels.
+    /// With rendered images.
     rendered: Option<Box<RenderedCamera>>,
 }
 
@@ -196,7 +196,8 @@ impl WristCamera {
         let ShutterState { poses, motion, closed, .. } = shutter;
         let at_end = self.base_from_camera(poses.links);
         let base_from_camera = self.exposure.poses(&at_end, motion, 0);
-        // At each instant a body's shapes stand to the camera as they would to a camera on the path relative to that body.
+        // At each instant a body's shapes stand to the camera as they would to a camera on the path relative to that
+        // body.
         let carried = |body: usize| {
             let seen_from = self.exposure.poses(&at_end, motion, body);
             std::array::from_fn(|k| base_from_camera[k] * seen_from[k].inverse())
@@ -213,7 +214,8 @@ impl WristCamera {
         rendered.take_image(&RenderScene { base_from_camera, tags: &tags, poses: *poses, is_silty }, &carried, *closed)
     }
 
-    /// Detections by projection: the arrival of the image, late with jitter, and its tags with the stamp of the camera's clock.
+    /// Detections by projection: the arrival of the image, late with jitter, and its tags with the stamp of the
+    /// camera's clock.
     pub(crate) fn project_tags(&mut self, shutter: &ShutterState) -> (Stamp, TagDetections) {
         let ShutterState { poses, solids, motion, closed, .. } = shutter;
         let base_from_camera = self.base_from_camera(poses.links);
@@ -224,7 +226,8 @@ impl WristCamera {
         let is_blind = self.blind_until.is_some_and(|until| *closed < until);
         let n_fixed = self.tags.len();
         for (i, tag) in self.tags_at(poses.links).into_iter().enumerate() {
-            // Every tag draws its random numbers, detected or not: one more tag in view does not change the noise of another.
+            // Every tag draws its random numbers, detected or not: one more tag in view does not change the noise of
+            // another.
             let is_fixed = i < n_fixed;
             let random = if is_fixed { &mut self.random } else { &mut self.gripper_random };
             let (uniform, noise) = random.draw();

@@ -19,12 +19,12 @@ pub(crate) struct JointSensor {
     half_play_rad: f64,
     shaft_rad: f64,
     element: Element,
-    /// What slips on the shaft added.
+    /// Sum of the slips on the shaft, rad.
     jump_rad: f64,
     word: Quantizer,
 }
 
-/// What turns the shaft's angle into a reading.
+/// Sensing element: shaft angle to reading.
 #[derive(Clone, Debug)]
 enum Element {
     Potentiometer(Box<Potentiometer>),
@@ -32,7 +32,7 @@ enum Element {
     Resolver(Resolver),
 }
 
-/// What a sample depends on besides the sensor itself.
+/// Inputs of one sample.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct JointInput {
     pub angle_rad: f64,
@@ -78,12 +78,12 @@ impl JointSensor {
         read + self.jump_rad
     }
 
-    /// It slips: reads `by_rad` more from now on.
+    /// Slip: the reading is `by_rad` larger from now on.
     pub(crate) fn jump(&mut self, by_rad: f64) {
         self.jump_rad += by_rad;
     }
 
-    /// It keeps its last word from now on.
+    /// Stuck: the last word stays from now on.
     pub(crate) fn stick(&mut self) {
         self.word.stick();
     }

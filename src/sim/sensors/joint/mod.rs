@@ -1,8 +1,8 @@
 //! A joint sensor: true angle to raw counts.
 //!
-//! In stages: the play between joint and shaft; what the element makes of the shaft's angle, by its kind (`pot`,
-//! `encoder`, `resolver`); a slip on the shaft; gears; and the word (`word`): the datasheet's scale, noise, the
-//! converter's step, the wrap, and words that say nothing.
+//! In stages: backlash between joint and shaft; the sensing element by its kind (`potentiometer`, `encoder`,
+//! `resolver`); a slip on the shaft; gears; and the `quantizer`: nominal scale, noise, resolution, wrap, and the words
+//! of a broken wire.
 
 mod encoder;
 mod joint_sensor;

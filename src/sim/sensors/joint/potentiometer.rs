@@ -1,11 +1,12 @@
 //! A potentiometer: a wiper on a resistive track.
 //!
-//! `reading = m + (1 + g + cg (T - T0) + pg p) (x - m) + nl(x) + o + co (T - T0) + po p + spot(x) + drift`: m the middle of
-//! the joint's range, T the oil's temperature, p the pressure above the surface's, `spot = peak exp(-((x - c) / width)^2 / 2)`.
-//! The wiper's contact x drags behind the shaft: `x = shaft + w (play(shaft) - shaft)`, the play `hysteresis / w` wide. Unlike
-//! the play between joint and shaft (w = 1, where a reversal first moves nothing) the contact moves on at once with slope
-//! 1 - w, for only part of the spring has to turn over. `drift` walks with time and with travel. A contact that is lost leaves
-//! the input open: a Markov chain in time with rates `anywhere + worn spot(x) / peak` and `1 / mean length`.
+//! `reading = m + (1 + g + cg (T - T0) + pg p) (x - m) + nl(x) + o + co (T - T0) + po p + spot(x) + drift`: m the
+//! middle of the joint's range, T the oil's temperature, p the pressure above the surface's,
+//! `spot = peak exp(-((x - c) / width)^2 / 2)`. The wiper's contact x drags behind the shaft:
+//! `x = shaft + w (play(shaft) - shaft)`, the play `hysteresis / w` wide. Unlike the play between joint and shaft (w =
+//! 1, where a reversal first moves nothing) the contact moves on at once with slope 1 - w, for only part of the spring
+//! has to turn over. `drift` walks with time and with travel. A contact that is lost leaves the input open: a Markov
+//! chain in time with rates `anywhere + worn spot(x) / peak` and `1 / mean length`.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -20,7 +21,7 @@ use armcal_core::stats::stream_rng;
 pub(super) struct Potentiometer {
     built: JointAsBuilt,
     spec: JointSensorsSpec,
-    /// Where the shaft was at the last sample.
+    /// Shaft angle at the last sample.
     shaft_rad: f64,
     /// The middle of the wiper's play.
     dragged_rad: f64,

@@ -1,4 +1,5 @@
-//! The word: `wrap(step round((offset + scale angle + noise) / step))`, by the datasheet's offset and scale.
+//! Quantizer of raw counts: `wrap(step round((offset + scale angle + noise) / step))`, by the datasheet's offset and
+//! scale.
 //!
 //! An input without a sensor is pulled to 0 counts and shows the converter's noise, which cannot go below 0 (assumed).
 

@@ -159,7 +159,8 @@ fn the_errors_over_the_range_are_their_closed_forms() {
     }
 }
 
-/// From rest: the contact lags by its share of the way up to half the width, and after each turn by as much the other way.
+/// From rest: the contact lags by its share of the way up to half the width, and after each turn by as much the other
+/// way.
 #[test]
 fn the_loops_of_play_and_hysteresis_are_their_closed_forms() {
     let (width, step) = (0.01_f64, 0.0005);
