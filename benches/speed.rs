@@ -294,12 +294,14 @@ fn images(c: &mut Criterion, robot: &Robot, vehicle: &Vehicle, scene: &Scene) {
     for (name, lens) in [("half", half), ("full", full)] {
         let mut imager = Imager::new(&lens, &spec, &lights, 1);
         imager.set_solids(&shapes);
-        c.bench_function(&format!("render: one image, {name} resolution"), |b| b.iter(|| imager.shoot(&shot).rgb[0]));
+        c.bench_function(&format!("render: one image, {name} resolution"), |b| {
+            b.iter(|| imager.take_image(&shot).rgb[0])
+        });
         let mut detector = TagDetector::new(&lens, DetectorSettings::default()).expect("a detector");
         let mut grey = Vec::new();
         c.bench_function(&format!("render and detect: one image, {name} resolution"), |b| {
             b.iter(|| {
-                let frame = imager.shoot(&shot);
+                let frame = imager.take_image(&shot);
                 frame.grey(&mut grey);
                 let image = GreyImage { width: frame.width, height: frame.height, data: &grey };
                 detector.detect(image).expect("an image").tags.len()
@@ -365,7 +367,7 @@ fn detect(c: &mut Criterion) {
     let light = Light { position_m: [0.0, -0.5, -0.3].into(), direction, flux_lm: 2e4, half_angle_rad: 1.0 };
     let mut grey = Vec::new();
     let shot = Shot::of_tags(Isometry3::identity(), &tags, 1);
-    Imager::new(&lens, &ImageSpec::default(), &[light], 1).shoot(&shot).grey(&mut grey);
+    Imager::new(&lens, &ImageSpec::default(), &[light], 1).take_image(&shot).grey(&mut grey);
     let [width, height] = lens.resolution_px.map(|n| n as usize);
     let mut detector = TagDetector::new(&lens, DetectorSettings::default()).expect("it starts");
     let image = GreyImage { width, height, data: &grey };

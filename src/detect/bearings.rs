@@ -1,14 +1,14 @@
-//! Pixels to a plane about a tag: the lens's inverse from a table, and a pinhole view that looks at the tag.
+//! Bearings of pixels from a table of the lens's inverse, and a rectified (pinhole) view that faces a tag.
 
 use nalgebra::{Matrix2, Rotation3, Vector2, Vector3};
 
 use armcal_core::optics::Fisheye;
 
 const N_NODES: usize = 4096;
-/// A tag's pixels lie within this of its middle: cosine of 80 deg.
+/// Smallest cosine between a pixel's bearing and that of the tag's centre: 80 deg.
 const MIN_DEPTH: f64 = 0.17;
 
-/// Bearings of pixels: linear in a table over the squared radius, to 1e-8 rad.
+/// Bearings of pixels, interpolated in a table over the squared radius; accurate to 1e-8 rad.
 #[derive(Clone, Debug)]
 pub(super) struct BearingTable {
     focal_px: [f64; 2],
@@ -33,25 +33,25 @@ impl BearingTable {
         Self { focal_px: lens.focal_px, center_px: lens.center_px, nodes_per_square, nodes }
     }
 
-    /// The direction (camera frame, of length 1 to 1e-8) that a pixel sees; `None` beyond the field of view.
+    /// Bearing of a pixel (camera frame, of length 1 to 1e-8); `None` beyond the field of view.
     #[inline]
     pub(super) fn bearing(&self, pixel_px: [f64; 2]) -> Option<Vector3<f64>> {
         let x = (pixel_px[0] - self.center_px[0]) / self.focal_px[0];
         let y = (pixel_px[1] - self.center_px[1]) / self.focal_px[1];
-        let place = (x * x + y * y) * self.nodes_per_square;
-        let k = place as usize;
+        let position = (x * x + y * y) * self.nodes_per_square;
+        let k = position as usize;
         let [a, b] = [self.nodes.get(k)?, self.nodes.get(k + 1)?];
-        let share = place - k as f64;
-        let scale = a[0] + share * (b[0] - a[0]);
-        Some(Vector3::new(x * scale, y * scale, a[1] + share * (b[1] - a[1])))
+        let fraction = position - k as f64;
+        let scale = a[0] + fraction * (b[0] - a[0]);
+        Some(Vector3::new(x * scale, y * scale, a[1] + fraction * (b[1] - a[1])))
     }
 }
 
-/// A pinhole camera of focal length 1 at the same place that looks at a tag: in its image a tag's sides are straight.
+/// Pinhole camera of focal length 1 at the camera's position that faces a tag: its image has straight tag sides.
 #[derive(Clone, Debug)]
 pub(super) struct RectifiedView<'a> {
     table: &'a BearingTable,
-    turn: Rotation3<f64>,
+    rotation: Rotation3<f64>,
 }
 
 impl<'a> RectifiedView<'a> {
@@ -60,18 +60,18 @@ impl<'a> RectifiedView<'a> {
         for corner in corners_px {
             sum += table.bearing(*corner)?;
         }
-        let turn = Rotation3::rotation_between(&sum, &Vector3::z())?;
-        Some(Self { table, turn })
+        let rotation = Rotation3::rotation_between(&sum, &Vector3::z())?;
+        Some(Self { table, rotation })
     }
 
-    /// Where a pixel's line of sight meets the plane z = 1.
+    /// Intersection of a pixel's line of sight with the plane z = 1.
     #[inline]
     pub(super) fn plane(&self, pixel_px: [f64; 2]) -> Option<Vector2<f64>> {
-        let ahead = self.turn * self.table.bearing(pixel_px)?;
-        (ahead.z > MIN_DEPTH).then(|| Vector2::new(ahead.x / ahead.z, ahead.y / ahead.z))
+        let rotated = self.rotation * self.table.bearing(pixel_px)?;
+        (rotated.z > MIN_DEPTH).then(|| Vector2::new(rotated.x / rotated.z, rotated.y / rotated.z))
     }
 
-    /// The same with its derivative by the pixel.
+    /// The same with d(plane)/d(pixel).
     #[inline]
     pub(super) fn plane_with_jacobian(&self, pixel_px: [f64; 2]) -> Option<(Vector2<f64>, Matrix2<f64>)> {
         const H: f64 = 0.5;

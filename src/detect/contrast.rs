@@ -1,28 +1,29 @@
-//! An image with its local contrast evened out: what a second look is taken at, for tags in haze.
+//! Local contrast normalization of an image, for tags in haze.
 //!
-//! Each pixel, slightly smoothed, less the mean about it, over the standard deviation about it (a window of 51 pixels). The
-//! search for quadrilaterals ignores differences of a few grey levels, and in haze a tag has no more.
+//! Each pixel is smoothed slightly; the mean about it is subtracted and the result divided by the standard deviation
+//! about it (a window of 51 pixels). The quad search ignores differences of a few grey levels, and a tag in haze has no
+//! more.
 
 /// Half of the window, px.
 const REACH: usize = 25;
-/// Standard deviation that the window gets, grey levels, and the least that it is taken to have had.
+/// Standard deviation after normalization, and the smallest one assumed before it, grey levels.
 const TARGET_STD: f32 = 50.0;
 const MIN_STD: f32 = 3.0;
 /// Weights of a pixel and of its neighbours, a Gaussian of 0.5 px.
-const MIDDLE: f32 = 0.786;
+const CENTER: f32 = 0.786;
 const SIDE: f32 = 0.107;
 
 /// Buffers, reused.
 #[derive(Clone, Debug, Default)]
 pub(super) struct ContrastNormalizer {
-    /// Of each column over the rows of the window: sum and sum of squares.
+    /// Sum and sum of squares of each column over the rows of the window.
     sums: Vec<[u32; 2]>,
     smooth: Vec<f32>,
 }
 
 impl ContrastNormalizer {
-    /// Writes the evened image into rows of `stride` bytes; both images have `width` columns.
-    pub(super) fn even(&mut self, data: &[u8], width: usize, out: &mut [u8], stride: usize) {
+    /// Writes the normalized image into rows of `stride` bytes; both images have `width` columns.
+    pub(super) fn normalize(&mut self, data: &[u8], width: usize, out: &mut [u8], stride: usize) {
         let height = data.len() / width.max(1);
         self.sums.clear();
         self.sums.resize(width, [0; 2]);
@@ -40,7 +41,7 @@ impl ContrastNormalizer {
             let n_rows = (y + REACH + 1).min(height) - y.saturating_sub(REACH);
             let [above, below] = [row_of(y.saturating_sub(1)), row_of((y + 1).min(height - 1))];
             smoothed(above, row_of(y), below, &mut self.smooth);
-            even_row(&self.sums, n_rows, &self.smooth, &mut out[..width]);
+            normalize_row(&self.sums, n_rows, &self.smooth, &mut out[..width]);
         }
     }
 }
@@ -61,20 +62,20 @@ fn remove(sums: &mut [[u32; 2]], row: &[u8]) {
     }
 }
 
-/// By [1 3 1]-like weights down, then across.
+/// Gaussian smoothing by three weights, down, then across.
 fn smoothed(above: &[u8], row: &[u8], below: &[u8], out: &mut Vec<f32>) {
-    let down = |x: usize| MIDDLE * f32::from(row[x]) + SIDE * (f32::from(above[x]) + f32::from(below[x]));
+    let down = |x: usize| CENTER * f32::from(row[x]) + SIDE * (f32::from(above[x]) + f32::from(below[x]));
     let last = row.len() - 1;
     out.clear();
     let (mut left, mut here) = (down(0), down(0));
     for x in 0..=last {
         let right = if x < last { down(x + 1) } else { here };
-        out.push(MIDDLE * here + SIDE * (left + right));
+        out.push(CENTER * here + SIDE * (left + right));
         (left, here) = (here, right);
     }
 }
 
-fn even_row(sums: &[[u32; 2]], n_rows: usize, smooth: &[f32], out: &mut [u8]) {
+fn normalize_row(sums: &[[u32; 2]], n_rows: usize, smooth: &[f32], out: &mut [u8]) {
     let width = out.len();
     let (mut sum, mut square) = (0_u32, 0_u32);
     for column in &sums[..REACH.min(width)] {
@@ -105,11 +106,11 @@ mod tests {
 
     /// Against the definition, sum by sum.
     #[test]
-    fn it_is_the_definition() {
+    fn normalization_agrees_with_its_definition() {
         let (width, height, stride) = (90_usize, 70_usize, 96_usize);
         let data: Vec<u8> = (0..width * height).map(|i| (i * i / 7 % 97 + i % 50) as u8).collect();
         let mut out = vec![0; stride * height];
-        ContrastNormalizer::default().even(&data, width, &mut out, stride);
+        ContrastNormalizer::default().normalize(&data, width, &mut out, stride);
         let at = |x: isize, y: isize| {
             f64::from(data[y.clamp(0, height as isize - 1) as usize * width + x.clamp(0, width as isize - 1) as usize])
         };
@@ -128,8 +129,8 @@ mod tests {
                 .map(|(i, j)| weight(i) * weight(j) * at(x + i, y + j))
                 .sum();
             let expected = (128.5 + 50.0 / std * (smooth - mean)).clamp(0.0, 255.0).floor();
-            let got = f64::from(out[y as usize * stride + x as usize]);
-            assert!((got - expected).abs() <= 1.0, "{x} {y}: {got} {expected}");
+            let actual = f64::from(out[y as usize * stride + x as usize]);
+            assert!((actual - expected).abs() <= 1.0, "{x} {y}: {actual} {expected}");
         }
     }
 }

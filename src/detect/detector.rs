@@ -1,34 +1,28 @@
-//! The detector: quadrilaterals from the C library, corners from the fit, and the two judged.
+//! The detector: candidates from the decoder, corners from the fit, gates on both, duplicates removed.
 
 use nalgebra::Matrix2;
 
-use super::bearings::BearingTable;
-use super::fit::{Fit, Fitter};
-use super::judge::{Candidate, DetectorSettings, are_nested, gate_fit, judge_candidate};
-use super::look::QuadDecoder;
-use super::pattern::Cells;
-use super::{Detected, DetectedTag, GreyImage};
+use crate::bearings::BearingTable;
+use crate::decoder::{Candidate, QuadDecoder};
+use crate::detection::{DetectedTag, ImageDetections};
+use crate::duplicates::{Refined, add_or_replace, is_same_tag, reject_duplicate_ids};
+use crate::error::DetectError;
+use crate::fit::{Fit, Fitter};
+use crate::gates::{gate_candidate, gate_fit};
+use crate::image::GreyImage;
+use crate::pattern::Cells;
+use crate::settings::DetectorSettings;
 use armcal_core::optics::{Fisheye, tag36h11};
-use armcal_core::streams::{DetectionReject, RejectReason, TagDetection};
-
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum DetectError {
-    #[error("the image holds {bytes} bytes, not {width} x {height}")]
-    Size { bytes: usize, width: usize, height: usize },
-    #[error("the image is {width} x {height} pixels, the lens's is {lens_width} x {lens_height}")]
-    Resolution { width: usize, height: usize, lens_width: usize, lens_height: usize },
-    #[error("the library that looks for tags: {0}")]
-    Library(String),
-}
+use armcal_core::streams::{RejectReason, TagDetection};
 
 /// Finds tags in images of one camera. The same image gives the same result.
 #[derive(Debug)]
 pub struct TagDetector {
-    looker: QuadDecoder,
+    decoder: QuadDecoder,
     refiner: Refiner,
 }
 
-/// Corners of what was decoded.
+/// Fits and gates candidates.
 #[derive(Debug)]
 struct Refiner {
     lens: Fisheye,
@@ -37,50 +31,54 @@ struct Refiner {
     fitter: Fitter,
 }
 
-/// A tag, or why not, and the corners that it was started from.
-type Refined = Result<DetectedTag, (RejectReason, [[f64; 2]; 4])>;
-
 impl TagDetector {
-    /// `lens` as belief knows it.
+    /// A detector for images of `lens`, as belief knows it.
     ///
     /// # Errors
     /// [`DetectError::Library`] if the C library cannot start.
     pub fn new(lens: &Fisheye, settings: DetectorSettings) -> Result<Self, DetectError> {
-        let looker = QuadDecoder::new(lens.resolution_px.map(|n| n as usize))?;
+        let decoder = QuadDecoder::new(lens.resolution_px.map(|n| n as usize))?;
         let refiner = Refiner { lens: *lens, settings, table: BearingTable::new(lens), fitter: Fitter::new() };
-        Ok(Self { looker, refiner })
+        Ok(Self { decoder, refiner })
     }
 
-    /// Looks for tags in an image. While the library takes its second look, what the first one found is fitted.
+    /// Tags and rejected candidates of an image. A second thread fits the first pass's candidates during the second
+    /// pass.
     ///
     /// # Errors
     /// [`DetectError`] for an image that is not of the lens's resolution.
-    pub fn detect(&mut self, image: GreyImage) -> Result<Detected, DetectError> {
+    pub fn detect(&mut self, image: GreyImage) -> Result<ImageDetections, DetectError> {
         self.check(&image)?;
-        let Self { looker, refiner } = self;
-        let (decimation, second) = (refiner.settings.decimation, refiner.settings.second_decimation);
-        let first = looker.first(&image, decimation, second > 0.0);
-        let mut refined: Vec<Refined> = Vec::with_capacity(first.len());
-        let second = if second > 0.0 {
+        let Self { decoder, refiner } = self;
+        let (decimation, second_decimation) = (refiner.settings.decimation, refiner.settings.second_decimation);
+        let has_second_pass = second_decimation > 0.0;
+        let candidates = if has_second_pass {
+            decoder.decode_and_normalize(&image, decimation)
+        } else {
+            decoder.decode(&image, decimation)
+        };
+        let mut refined: Vec<Refined> = Vec::with_capacity(candidates.len());
+        let mut refine = || refined.extend(candidates.iter().map(|candidate| refiner.refine(&image, candidate)));
+        let second_candidates = if has_second_pass {
             std::thread::scope(|scope| {
-                scope.spawn(|| refined.extend(first.iter().map(|candidate| refiner.refine(&image, candidate))));
-                looker.second(second)
+                scope.spawn(refine);
+                decoder.decode_normalized(second_decimation)
             })
         } else {
-            refined.extend(first.iter().map(|candidate| refiner.refine(&image, candidate)));
+            refine();
             Vec::new()
         };
-        let mut out = Detected::default();
-        for (candidate, result) in first.iter().zip(refined) {
-            take(&mut out, candidate, result);
+        let mut out = ImageDetections::default();
+        for (candidate, result) in candidates.iter().zip(refined) {
+            add_or_replace(&mut out, candidate, result);
         }
-        for candidate in &second {
-            // A second look sees most tags again.
-            if !out.tags.iter().any(|tag| is_same(candidate, tag.detection.id, &tag.detection.corners_px)) {
-                take(&mut out, candidate, refiner.refine(&image, candidate));
+        for candidate in &second_candidates {
+            // The second pass finds most tags again.
+            if !out.tags.iter().any(|tag| is_same_tag(candidate, tag.detection.id, &tag.detection.corners_px)) {
+                add_or_replace(&mut out, candidate, refiner.refine(&image, candidate));
             }
         }
-        reject_doubles(&mut out);
+        reject_duplicate_ids(&mut out);
         Ok(out)
     }
 
@@ -100,7 +98,7 @@ impl TagDetector {
 impl Refiner {
     fn refine(&mut self, image: &GreyImage, candidate: &Candidate) -> Refined {
         let start_px = candidate.corners_px;
-        judge_candidate(&self.settings, &self.lens, candidate).map_err(|reason| (reason, start_px))?;
+        gate_candidate(&self.settings, &self.lens, candidate).map_err(|reason| (reason, start_px))?;
         let cells =
             tag36h11::cells(candidate.id).map(|cells| Cells::new(&cells)).ok_or((RejectReason::UnknownId, start_px))?;
         let fit = self.fitter.fit(image, &self.table, &cells, &start_px).ok_or((RejectReason::PoorEdges, start_px))?;
@@ -111,69 +109,16 @@ impl Refiner {
     }
 }
 
-/// Whether a candidate is another reading of what stands at `corners_px`.
-fn is_same(candidate: &Candidate, id: u32, corners_px: &[[f64; 2]; 4]) -> bool {
-    id == candidate.id && are_nested(corners_px, &candidate.corners_px)
-}
-
-/// A reading that was believed replaces one that was not; of two that were not, the first is named.
-fn take(out: &mut Detected, candidate: &Candidate, refined: Refined) {
-    let rejected_before = out.rejects.iter().position(|r| is_same(candidate, r.id, &r.corners_px));
-    match (refined, rejected_before) {
-        (Ok(tag), before) => {
-            before.map(|k| out.rejects.remove(k));
-            out.tags.push(tag);
-        }
-        (Err((reason, corners_px)), None) => {
-            out.rejects.push(DetectionReject { id: candidate.id, corners_px, reason });
-        }
-        (Err(_), Some(_)) => {}
-    }
-}
-
-/// Residuals of snow, of light's shadows and of the model's own faults are alike in neighbouring pixels, which the normal matrix
-/// takes for independent. Measured by `study detection`.
+/// Factor on the fit's covariances. Marine snow, shadows and model errors correlate the residuals of neighbouring
+/// pixels, which the normal matrix assumes to be independent. Measured by `study detection`.
 const CORRELATION: f64 = 1.5;
-/// Variance of a corner that no image improves on, px2: what the pattern's model leaves out.
+/// Smallest variance of a corner, px2: errors of the pattern model.
 const FLOOR_PX2: f64 = 0.01 * 0.01;
-/// The same for each px2 by which the blur is longer than wide: motion is no Gaussian. Measured.
+/// The same for each px2 of motion blur: motion blur is not Gaussian. Measured.
 const MOTION_FLOOR: f64 = 7e-4;
 
-/// The fit's covariances with what it does not know of.
+/// Corner covariances of the fit, inflated for model errors.
 fn covariances_px2(fit: &Fit) -> [Matrix2<f64>; 4] {
     let floor = Matrix2::identity() * (FLOOR_PX2 + MOTION_FLOOR * fit.motion_px2);
     fit.covariances_px2.map(|c| c * CORRELATION + floor)
-}
-
-/// An id at two places: both go, unless one is a second reading of the same tag; then the surer one stays.
-fn reject_doubles(out: &mut Detected) {
-    let mut kept: Vec<DetectedTag> = Vec::with_capacity(out.tags.len());
-    let mut twice: Vec<u32> = Vec::new();
-    for tag in out.tags.drain(..) {
-        let corners_px = tag.detection.corners_px;
-        let other = kept.iter_mut().find(|other| other.detection.id == tag.detection.id);
-        match other {
-            None => kept.push(tag),
-            Some(other) if are_nested(&other.detection.corners_px, &corners_px) => {
-                if tag.detection.decision_margin > other.detection.decision_margin {
-                    *other = tag;
-                }
-            }
-            Some(_) => {
-                let id = tag.detection.id;
-                twice.push(id);
-                out.rejects.push(DetectionReject { id, corners_px, reason: RejectReason::SeenTwice });
-            }
-        }
-    }
-    for tag in kept {
-        let TagDetection { id, corners_px, .. } = tag.detection;
-        if twice.contains(&id) {
-            out.rejects.push(DetectionReject { id, corners_px, reason: RejectReason::SeenTwice });
-        } else {
-            out.tags.push(tag);
-        }
-    }
-    out.tags.sort_by_key(|tag| tag.detection.id);
-    out.rejects.sort_by(|a, b| a.id.cmp(&b.id).then(a.corners_px[0][0].total_cmp(&b.corners_px[0][0])));
 }

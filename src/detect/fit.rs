@@ -1,26 +1,26 @@
-//! Where a tag's corners are: the known pattern, seen through the lens and out of focus, fitted to the pixels.
+//! Corners of a tag with covariance: the tag's pattern, blurred and seen through the lens, fitted to the grey levels.
 //!
-//! `I = a.(1, s, t) + P(s, t; blur) g.(1, s, t)`: black level and contrast with a linear gradient each, P the tag's cells
-//! convolved with a Gaussian of any shape (defocus, motion, the pixel itself). Unknown are the eight corner coordinates (a
-//! homography of the bearings, so that the lens's curves are in it), three of the blur and six of the light. Levenberg-
-//! Marquardt; Huber's weights from the second pass on, for snow and whatever lies in front. The inverse normal matrix
-//! times the residual variance is the corners' covariance.
+//! Model: `I = a.(1, s, t) + P(s, t; blur) g.(1, s, t)`. Black level a and contrast g have a linear gradient each. P is
+//! the tag's cells convolved with a Gaussian of any shape (defocus, motion, pixel area). The 17 parameters are eight
+//! corner coordinates, three of the blur and six of the light. The corners give a homography of the bearings, which
+//! includes the lens distortion. Solver: Levenberg-Marquardt; the second pass has Huber weights against snow and
+//! occlusion. The corners' covariance is the inverse normal matrix times the residual variance.
 
 use armcal_core::numeric::{Damping, LeastSquares, Loss, Outcome, Proposal, StopRule, minimize};
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 
-use super::GreyImage;
-use super::bearings::{BearingTable, RectifiedView};
-use super::homography::Homography;
-use super::normal::NormalTable;
-use super::pattern::Cells;
-use super::samples::{HALF, Sample, collect};
+use crate::bearings::{BearingTable, RectifiedView};
+use crate::homography::Homography;
+use crate::image::GreyImage;
+use crate::normal::NormalTable;
+use crate::pattern::Cells;
+use crate::samples::{HALF, Sample, TagRegion};
 
 const N: usize = 17;
-type Normal = SMatrix<f64, N, N>;
+type NormalMatrix = SMatrix<f64, N, N>;
 type Parameters = SVector<f64, N>;
 
-/// First parameters of blur and light.
+/// Indices of the first parameters of blur, black level and contrast.
 const BLUR: usize = 8;
 const BLACK: usize = 11;
 const GAIN: usize = 14;
@@ -29,24 +29,24 @@ const COARSE_SAMPLES: usize = 500;
 const FINE_SAMPLES: usize = 2500;
 const COARSE_ITERATIONS: usize = 12;
 const FINE_ITERATIONS: usize = 6;
-/// Fitting ends when no corner moves further.
+/// Largest corner step of a converged fit.
 const DONE_PX: f64 = 2e-3;
-/// A pixel averages over itself: variance of a box.
+/// Variance of a pixel's area (a box of side 1).
 const PIXEL_VARIANCE_PX2: f64 = 1.0 / 12.0;
-/// Blur before anything is known: variance, and how far it may be off, px2.
+/// Prior of the blur's variance: mean and std, px2.
 const BLUR_PX2: [f64; 2] = [0.5, 2.0];
-/// Light's slopes over half a tag, as a share of the contrast: how large they may be.
+/// Prior std of the light's gradients over half a tag, as a share of the contrast.
 const SLOPE_STD: f64 = 0.3;
-/// Residuals beyond this many standard deviations pull no stronger.
+/// Huber threshold in standard deviations.
 const HUBER: f64 = 2.5;
-/// A camera's bytes are never better than this: rounding, grey levels.
+/// Smallest residual std, grey levels: rounding.
 const MIN_RESIDUAL_STD: f64 = 0.3;
 
-/// What a fit found.
+/// Result of a fit.
 #[derive(Clone, Debug)]
 pub(super) struct Fit {
     pub corners_px: [[f64; 2]; 4],
-    /// From residuals and normal matrix alone.
+    /// From residuals and normal matrix.
     pub covariances_px2: [Matrix2<f64>; 4],
     /// Difference of the blur's variances along and across its longest direction.
     pub motion_px2: f64,
@@ -63,7 +63,7 @@ pub(super) struct Fit {
 pub(super) struct Fitter {
     normal: NormalTable,
     samples: Vec<Sample>,
-    sizes: Vec<f64>,
+    magnitudes: Vec<f64>,
 }
 
 struct Linearized {
@@ -71,11 +71,11 @@ struct Linearized {
     /// Over the pixels: sums of weights, and of weighted squared residuals.
     weight: f64,
     squares: f64,
-    matrix: Normal,
+    matrix: NormalMatrix,
     gradient: Parameters,
 }
 
-/// One tag's view and pattern.
+/// Rectified view and pattern of one tag.
 struct Scene<'a> {
     view: RectifiedView<'a>,
     cells: &'a Cells,
@@ -96,46 +96,47 @@ struct Search<'a, 'b> {
     scene: &'a Scene<'b>,
     stage: Stage,
     x: Parameters,
-    here: Linearized,
+    model: Linearized,
     trial: Parameters,
-    there: Option<Linearized>,
+    trial_model: Option<Linearized>,
 }
 
 impl LeastSquares for Search<'_, '_> {
     fn cost(&self) -> f64 {
-        self.here.cost
+        self.model.cost
     }
 
     fn propose(&mut self, damping: f64) -> Option<Proposal> {
-        let mut damped = self.here.matrix;
+        let mut damped = self.model.matrix;
         for k in 0..N {
             damped[(k, k)] *= 1.0 + damping;
         }
-        let step = damped.cholesky()?.solve(&self.here.gradient);
+        let step = damped.cholesky()?.solve(&self.model.gradient);
         self.trial = self.x + step;
-        keep_blur(&mut self.trial);
-        // How far the corners go, px.
+        constrain_blur(&mut self.trial);
+        // Largest corner step, px.
         Some(Proposal { length: step.fixed_rows::<8>(0).amax(), predicted_gain: f64::INFINITY })
     }
 
     fn trial_cost(&mut self) -> Option<f64> {
-        self.there = self.fitter.linearize(self.scene, &self.trial, self.stage.n_samples, self.stage.loss);
-        self.there.as_ref().map(|there| there.cost)
+        self.trial_model = self.fitter.linearize(self.scene, &self.trial, self.stage.n_samples, self.stage.loss);
+        self.trial_model.as_ref().map(|trial_model| trial_model.cost)
     }
 
     fn accept(&mut self) {
-        if let Some(there) = self.there.take() {
-            (self.x, self.here) = (self.trial, there);
+        if let Some(trial_model) = self.trial_model.take() {
+            (self.x, self.model) = (self.trial, trial_model);
         }
     }
 }
 
 impl Fitter {
     pub(super) fn new() -> Self {
-        Self { normal: NormalTable::new(), samples: Vec::new(), sizes: Vec::new() }
+        Self { normal: NormalTable::new(), samples: Vec::new(), magnitudes: Vec::new() }
     }
 
-    /// Fits from corners that are off by some pixels; `None` where they have no bearing or nothing fits.
+    /// Fit from initial corners `start_px`, which may err by some pixels. `None` without bearings or without
+    /// convergence.
     pub(super) fn fit(
         &mut self,
         image: &GreyImage,
@@ -145,7 +146,8 @@ impl Fitter {
     ) -> Option<Fit> {
         let scene = Scene { view: RectifiedView::new(table, start_px)?, cells };
         let (homography, _) = scene.homography(start_px)?;
-        collect(&mut self.samples, image, &scene.view, &homography, cells, start_px, FINE_SAMPLES);
+        let region = TagRegion { image, view: &scene.view, homography: &homography, cells, corners_px: start_px };
+        region.sample(FINE_SAMPLES, &mut self.samples);
         let n_coarse = self.samples.len().min(COARSE_SAMPLES);
         if n_coarse < 4 * N {
             return None;
@@ -168,12 +170,12 @@ impl Fitter {
         }
         x[BLUR] = BLUR_PX2[0];
         x[BLUR + 2] = BLUR_PX2[0];
-        // Black and white by regression on the pattern where it stands now.
+        // Black and white by linear regression on the pattern at the initial corners.
         let (homography, _) = scene.homography(start_px)?;
         let (mut sp, mut spp, mut sy, mut spy) = (0.0, 0.0, 0.0, 0.0);
         for sample in &self.samples[..n] {
-            let place = homography.place(&sample.plane);
-            let at = [(place.s + 1.0) * HALF, (place.t + 1.0) * HALF];
+            let point = homography.map(&sample.plane);
+            let at = [(point.s + 1.0) * HALF, (point.t + 1.0) * HALF];
             let p = scene.cells.blurred(&self.normal, at, [0.1, 0.0, 0.1]).p;
             sp += p;
             spp += p * p;
@@ -192,26 +194,31 @@ impl Fitter {
     }
 
     fn iterate(&self, scene: &Scene, x: &mut Parameters, stage: Stage) -> Option<Linearized> {
-        let here = self.linearize(scene, x, stage.n_samples, stage.loss)?;
-        let mut search = Search { fitter: self, scene, stage, x: *x, here, trial: *x, there: None };
+        let model = self.linearize(scene, x, stage.n_samples, stage.loss)?;
+        let mut search = Search { fitter: self, scene, stage, x: *x, model, trial: *x, trial_model: None };
         let stop = StopRule { step_length: DONE_PX, ..StopRule::after(stage.n_iterations) };
         if minimize(&mut search, &DAMPING, &stop).outcome() == Outcome::Degenerate {
             return None;
         }
         *x = search.x;
-        Some(search.here)
+        Some(search.model)
     }
 
     /// Cost under a loss in grey levels, and its quadratic model; priors in units of the residual variance.
     fn linearize(&self, scene: &Scene, x: &Parameters, n: usize, loss: Loss) -> Option<Linearized> {
         let corners = corners_of(x);
-        let (homography, jacobians) = scene.homography(&corners)?;
-        let mut out =
-            Linearized { cost: 0.0, weight: 0.0, squares: 0.0, matrix: Normal::zeros(), gradient: Parameters::zeros() };
+        let (homography, plane_jacobians) = scene.homography(&corners)?;
+        let mut out = Linearized {
+            cost: 0.0,
+            weight: 0.0,
+            squares: 0.0,
+            matrix: NormalMatrix::zeros(),
+            gradient: Parameters::zeros(),
+        };
         let mut sums = [[0.0; N]; N];
         for sample in &self.samples[..n] {
             let (value, row) = self.predict(scene, &homography, x, sample);
-            // Beyond the sensor's range a pixel tells only that it is beyond.
+            // A saturated pixel has no residual where the model saturates, too.
             let residual = sample.value - value.clamp(0.0, 255.0);
             if !(0.0..=255.0).contains(&value) && residual == 0.0 {
                 continue;
@@ -228,11 +235,11 @@ impl Fitter {
                 out.gradient[i] += wi * residual;
             }
         }
-        let mut to_corners = Normal::identity();
-        to_corners.fixed_view_mut::<8, 8>(0, 0).copy_from(&homography.corner_jacobian(&jacobians));
-        let raw = Normal::from_fn(|i, j| sums[i.min(j)][i.max(j)]);
-        out.matrix = to_corners.transpose() * raw * to_corners;
-        out.gradient = to_corners.transpose() * out.gradient;
+        let mut corner_jacobian = NormalMatrix::identity();
+        corner_jacobian.fixed_view_mut::<8, 8>(0, 0).copy_from(&homography.corner_jacobian(&plane_jacobians));
+        let raw = NormalMatrix::from_fn(|i, j| sums[i.min(j)][i.max(j)]);
+        out.matrix = corner_jacobian.transpose() * raw * corner_jacobian;
+        out.gradient = corner_jacobian.transpose() * out.gradient;
         let variance = (out.squares / out.weight.max(1.0)).max(MIN_RESIDUAL_STD * MIN_RESIDUAL_STD);
         add_priors(&mut out, x, variance);
         out.cost.is_finite().then_some(out)
@@ -241,9 +248,9 @@ impl Fitter {
     /// Grey level at a sample and its derivatives by g (homography), blur and light.
     #[inline]
     fn predict(&self, scene: &Scene, homography: &Homography, x: &Parameters, sample: &Sample) -> (f64, [f64; N]) {
-        let place = homography.place(&sample.plane);
-        let (s, t) = (place.s, place.t);
-        let m = homography.slope(&place) * sample.jacobian * HALF;
+        let point = homography.map(&sample.plane);
+        let (s, t) = (point.s, point.t);
+        let m = homography.jacobian(&point) * sample.jacobian * HALF;
         let [xx, xy, yy] = [x[BLUR] + PIXEL_VARIANCE_PX2, x[BLUR + 1], x[BLUR + 2] + PIXEL_VARIANCE_PX2];
         let by_blur = |a: usize, b: usize| {
             let (ax, ay, bx, by) = (m[(a, 0)], m[(a, 1)], m[(b, 0)], m[(b, 1)]);
@@ -255,20 +262,20 @@ impl Fitter {
         let b = scene.cells.blurred(&self.normal, [(s + 1.0) * HALF, (t + 1.0) * HALF], covariance);
         let black = x[BLACK] + x[BLACK + 1] * s + x[BLACK + 2] * t;
         let gain = x[GAIN] + x[GAIN + 1] * s + x[GAIN + 2] * t;
-        let by_s = x[BLACK + 1] + x[GAIN + 1] * b.p + gain * HALF * b.u;
-        let by_t = x[BLACK + 2] + x[GAIN + 2] * b.p + gain * HALF * b.v;
-        let (px, py) = (sample.plane.x * place.scale, sample.plane.y * place.scale);
-        let both = by_s * s + by_t * t;
+        let d_s = x[BLACK + 1] + x[GAIN + 1] * b.p + gain * HALF * b.u;
+        let d_t = x[BLACK + 2] + x[GAIN + 2] * b.p + gain * HALF * b.v;
+        let (px, py) = (sample.plane.x * point.scale, sample.plane.y * point.scale);
+        let radial = d_s * s + d_t * t;
         let heat = |k: usize| gain * (0.5 * b.uu * uu[k] + b.uv * uv[k] + 0.5 * b.vv * vv[k]);
         let row = [
-            by_s * px,
-            by_s * py,
-            by_s * place.scale,
-            by_t * px,
-            by_t * py,
-            by_t * place.scale,
-            -both * px,
-            -both * py,
+            d_s * px,
+            d_s * py,
+            d_s * point.scale,
+            d_t * px,
+            d_t * py,
+            d_t * point.scale,
+            -radial * px,
+            -radial * py,
             heat(0),
             heat(1),
             heat(2),
@@ -282,17 +289,17 @@ impl Fitter {
         (black + gain * b.p, row)
     }
 
-    /// Robust: 1.48 times the median size.
+    /// Robust residual std: 1.4826 times the median absolute residual.
     fn residual_std(&mut self, scene: &Scene, x: &Parameters, n: usize) -> Option<f64> {
         let (homography, _) = scene.homography(&corners_of(x))?;
-        let mut sizes = std::mem::take(&mut self.sizes);
-        sizes.clear();
-        let size = |sample: &Sample| (sample.value - self.predict(scene, &homography, x, sample).0).abs();
-        sizes.extend(self.samples[..n].iter().map(size));
-        let middle = sizes.len() / 2;
-        let (_, median, _) = sizes.select_nth_unstable_by(middle, f64::total_cmp);
+        let mut magnitudes = std::mem::take(&mut self.magnitudes);
+        magnitudes.clear();
+        let magnitude = |sample: &Sample| (sample.value - self.predict(scene, &homography, x, sample).0).abs();
+        magnitudes.extend(self.samples[..n].iter().map(magnitude));
+        let middle = magnitudes.len() / 2;
+        let (_, median, _) = magnitudes.select_nth_unstable_by(middle, f64::total_cmp);
         let std = (1.4826 * *median).max(MIN_RESIDUAL_STD);
-        self.sizes = sizes;
+        self.magnitudes = magnitudes;
         Some(std)
     }
 
@@ -315,7 +322,7 @@ impl Fitter {
 }
 
 impl Scene<'_> {
-    /// The homography that these corners give, and d(plane)/d(pixel) at each.
+    /// Homography of these corners, and d(plane)/d(pixel) at each.
     fn homography(&self, corners_px: &[[f64; 2]; 4]) -> Option<(Homography, [Matrix2<f64>; 4])> {
         let mut planes = [Vector2::zeros(); 4];
         let mut jacobians = [Matrix2::zeros(); 4];
@@ -330,8 +337,8 @@ fn corners_of(x: &Parameters) -> [[f64; 2]; 4] {
     std::array::from_fn(|k| [x[2 * k], x[2 * k + 1]])
 }
 
-/// No blur is less than none.
-fn keep_blur(x: &mut Parameters) {
+/// Keeps the blur's covariance positive definite.
+fn constrain_blur(x: &mut Parameters) {
     for k in [BLUR, BLUR + 2] {
         x[k] = x[k].clamp(0.0, 100.0);
     }
@@ -339,7 +346,7 @@ fn keep_blur(x: &mut Parameters) {
     x[BLUR + 1] = x[BLUR + 1].clamp(-limit, limit);
 }
 
-/// Weak knowledge of blur and slopes, so that a tag of few pixels has a fit.
+/// Weak priors on blur and gradients: they regularize a tag of few pixels.
 fn add_priors(out: &mut Linearized, x: &Parameters, variance: f64) {
     let slope_std = SLOPE_STD * x[GAIN].abs().max(1.0);
     let priors = [

@@ -1,24 +1,25 @@
-//! The map from a tag's plane view to the tag itself, given by four corners, and how it moves with them.
+//! Homography from a tag's rectified view to the tag's own coordinates, by four corners, and its derivative by them.
 
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 
-/// Plane to tag: `s = (g0 x + g1 y + g2)/d`, `t = (g3 x + g4 y + g5)/d`, `d = g6 x + g7 y + 1`; s, t = +-1 at the corners.
+/// Plane to tag: `s = (g0 x + g1 y + g2)/d`, `t = (g3 x + g4 y + g5)/d`, `d = g6 x + g7 y + 1`; s, t = +-1 at the
+/// corners.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Homography {
     pub g: SVector<f64, 8>,
     inverse_system: SMatrix<f64, 8, 8>,
 }
 
-/// A point's place on the tag, and what it depends on.
+/// A point in tag coordinates.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct TagPlace {
+pub(super) struct TagPoint {
     pub s: f64,
     pub t: f64,
     /// 1/d.
     pub scale: f64,
 }
 
-/// The corners in order: bottom left, bottom right, top right, top left as printed.
+/// Tag coordinates of the corners in order: bottom left, bottom right, top right, top left as printed.
 pub(super) const CORNERS: [[f64; 2]; 4] = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
 
 impl Homography {
@@ -38,34 +39,34 @@ impl Homography {
     }
 
     #[inline]
-    pub(super) fn place(&self, point: &Vector2<f64>) -> TagPlace {
+    pub(super) fn map(&self, plane: &Vector2<f64>) -> TagPoint {
         let g = &self.g;
-        let scale = 1.0 / (g[6] * point.x + g[7] * point.y + 1.0);
-        TagPlace {
-            s: (g[0] * point.x + g[1] * point.y + g[2]) * scale,
-            t: (g[3] * point.x + g[4] * point.y + g[5]) * scale,
+        let scale = 1.0 / (g[6] * plane.x + g[7] * plane.y + 1.0);
+        TagPoint {
+            s: (g[0] * plane.x + g[1] * plane.y + g[2]) * scale,
+            t: (g[3] * plane.x + g[4] * plane.y + g[5]) * scale,
             scale,
         }
     }
 
-    /// d(s, t)/d(x, y).
+    /// Jacobian d(s, t)/d(x, y).
     #[inline]
-    pub(super) fn slope(&self, place: &TagPlace) -> Matrix2<f64> {
+    pub(super) fn jacobian(&self, point: &TagPoint) -> Matrix2<f64> {
         let g = &self.g;
         Matrix2::new(
-            (g[0] - place.s * g[6]) * place.scale,
-            (g[1] - place.s * g[7]) * place.scale,
-            (g[3] - place.t * g[6]) * place.scale,
-            (g[4] - place.t * g[7]) * place.scale,
+            (g[0] - point.s * g[6]) * point.scale,
+            (g[1] - point.s * g[7]) * point.scale,
+            (g[3] - point.t * g[6]) * point.scale,
+            (g[4] - point.t * g[7]) * point.scale,
         )
     }
 
-    /// d(g)/d(corner pixels), from d(plane)/d(pixel) at each corner: differentiating `A(corners) g = right`.
+    /// d(g)/d(corner pixels), from d(plane)/d(pixel) at each corner: the derivative of `A(corners) g = right`.
     pub(super) fn corner_jacobian(&self, jacobians: &[Matrix2<f64>; 4]) -> SMatrix<f64, 8, 8> {
         let mut right = SMatrix::<f64, 8, 8>::zeros();
         for (k, ([s, t], jacobian)) in CORNERS.into_iter().zip(jacobians).enumerate() {
-            let slope = self.slope(&TagPlace { s, t, scale: 1.0 });
-            right.fixed_view_mut::<2, 2>(2 * k, 2 * k).copy_from(&(-slope * jacobian));
+            let tag_by_plane = self.jacobian(&TagPoint { s, t, scale: 1.0 });
+            right.fixed_view_mut::<2, 2>(2 * k, 2 * k).copy_from(&(-tag_by_plane * jacobian));
         }
         self.inverse_system * right
     }
@@ -83,8 +84,8 @@ mod tests {
     fn corners_fall_on_corners_and_derivatives_agree_with_differences() {
         let homography = Homography::new(&corners()).expect("a square");
         for (corner, [s, t]) in corners().iter().zip(CORNERS) {
-            let place = homography.place(corner);
-            assert!((place.s - s).abs() < 1e-12 && (place.t - t).abs() < 1e-12);
+            let point = homography.map(corner);
+            assert!((point.s - s).abs() < 1e-12 && (point.t - t).abs() < 1e-12);
         }
         let analytic = homography.corner_jacobian(&[Matrix2::identity(); 4]);
         for k in 0..8 {

@@ -1,6 +1,6 @@
-//! The standard normal distribution from a table: value and integral to 1e-6.
+//! Density and integral of the standard normal distribution from a table, accurate to 1e-6.
 
-/// Beyond this many standard deviations there is nothing.
+/// Range of the table in standard deviations; the density beyond is taken as 0.
 pub(super) const REACH: f64 = 4.0;
 const STEPS_PER_STD: usize = 256;
 const N_NODES: usize = 2 * 4 * STEPS_PER_STD + 2;
@@ -30,11 +30,11 @@ impl NormalTable {
     /// Integral from minus infinity to z, and density there; |z| up to [`REACH`].
     #[inline]
     pub(super) fn at(&self, z: f64) -> [f64; 2] {
-        let place = (z.clamp(-REACH, REACH) + REACH) * STEPS_PER_STD as f64;
-        let k = place as usize;
-        let share = place - k as f64;
+        let position = (z.clamp(-REACH, REACH) + REACH) * STEPS_PER_STD as f64;
+        let k = position as usize;
+        let fraction = position - k as f64;
         let [a, b] = [self.nodes[k], self.nodes[k + 1]];
-        [a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1])]
+        [a[0] + fraction * (b[0] - a[0]), a[1] + fraction * (b[1] - a[1])]
     }
 }
 

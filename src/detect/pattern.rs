@@ -1,10 +1,10 @@
-//! What a tag looks like out of focus: its cells convolved with a Gaussian, and the derivatives of that.
+//! Reflectance of a blurred tag: its cells convolved with a Gaussian, with derivatives.
 //!
-//! Place (u, v) in cells from the bottom left corner of the black square as printed, u right, v up, 0 .. 8; beyond is white.
-//! The separable part is a product of normal integrals; the blur's cross term enters to first order, for convolution with a
-//! Gaussian obeys the heat equation: dP/dC_uv = d2P/(du dv).
+//! Position (u, v) in cells from the bottom left corner of the black square as printed, u right, v up, 0 .. 8; beyond
+//! is white. The separable part is a product of normal integrals. The blur's cross term enters to first order:
+//! convolution with a Gaussian obeys the heat equation, dP/dC_uv = d2P/(du dv).
 
-use super::normal::{NormalTable, REACH};
+use crate::normal::{NormalTable, REACH};
 
 pub(super) use armcal_core::optics::tag36h11::TAG_CELLS as N_CELLS;
 
@@ -25,9 +25,9 @@ pub(super) struct Blurred {
     pub vv: f64,
 }
 
-/// How much the cells along one axis weigh at a place, with derivatives.
+/// Weights of the cells along one axis at a position, with derivatives.
 struct Axis {
-    /// Index of the first, the rim counted.
+    /// Index of the first cell, rim included.
     first: usize,
     n: usize,
     weights: [[f64; 3]; MAX_CELLS],
@@ -35,13 +35,13 @@ struct Axis {
 
 impl Axis {
     #[inline]
-    fn at(table: &NormalTable, place: f64, std: f64) -> Self {
-        let first_edge = (place - REACH * std).ceil().clamp(0.0, 9.0) as usize;
-        let last_edge = (place + REACH * std).floor().clamp(-1.0, N_CELLS as f64);
+    fn at(table: &NormalTable, position: f64, std: f64) -> Self {
+        let first_edge = (position - REACH * std).ceil().clamp(0.0, 9.0) as usize;
+        let last_edge = (position + REACH * std).floor().clamp(-1.0, N_CELLS as f64);
         let mut axis = Self { first: 0, n: 1, weights: [[0.0; 3]; MAX_CELLS] };
         let n_edges = (last_edge + 1.0) as usize - first_edge.min((last_edge + 1.0) as usize);
         if n_edges == 0 {
-            axis.first = (place.floor() + 1.0).clamp(0.0, (MAX_CELLS - 1) as f64) as usize;
+            axis.first = (position.floor() + 1.0).clamp(0.0, (MAX_CELLS - 1) as f64) as usize;
             axis.weights[0] = [1.0, 0.0, 0.0];
             return axis;
         }
@@ -50,7 +50,7 @@ impl Axis {
         let mut before = [0.0; 3];
         let inverse = 1.0 / std;
         for k in 0..n_edges {
-            let z = ((first_edge + k) as f64 - place) * inverse;
+            let z = ((first_edge + k) as f64 - position) * inverse;
             let [integral, density] = table.at(z);
             let here = [integral, -density * inverse, -z * density * inverse * inverse];
             axis.weights[k] = [here[0] - before[0], here[1] - before[1], here[2] - before[2]];
@@ -73,11 +73,11 @@ impl Cells {
         Self(cells)
     }
 
-    /// `covariance`: of the blur, uu, uv, vv, cells squared.
+    /// Blurred reflectance at a position. `covariance`: of the blur, uu, uv, vv, cells squared.
     #[inline]
-    pub(super) fn blurred(&self, table: &NormalTable, place: [f64; 2], covariance: [f64; 3]) -> Blurred {
-        let along_u = Axis::at(table, place[0], covariance[0].sqrt());
-        let along_v = Axis::at(table, place[1], covariance[2].sqrt());
+    pub(super) fn blurred(&self, table: &NormalTable, position: [f64; 2], covariance: [f64; 3]) -> Blurred {
+        let along_u = Axis::at(table, position[0], covariance[0].sqrt());
+        let along_v = Axis::at(table, position[1], covariance[2].sqrt());
         let mut out = Blurred::default();
         for j in 0..along_v.n {
             let line = &self.0[along_v.first + j];
@@ -100,10 +100,10 @@ impl Cells {
         out
     }
 
-    /// Whether all cells within a rectangle about a place are alike, so that nothing changes there.
-    pub(super) fn is_flat(&self, place: [f64; 2], reach: [f64; 2]) -> bool {
+    /// Whether all cells within a rectangle about a position have one colour.
+    pub(super) fn is_flat(&self, position: [f64; 2], reach: [f64; 2]) -> bool {
         let index = |x: f64| (x.floor() + 1.0).clamp(0.0, (MAX_CELLS - 1) as f64) as usize;
-        let [columns, rows] = std::array::from_fn(|k| index(place[k] - reach[k])..=index(place[k] + reach[k]));
+        let [columns, rows] = std::array::from_fn(|k| index(position[k] - reach[k])..=index(position[k] + reach[k]));
         let first = self.0[*rows.start()][*columns.start()];
         rows.clone().all(|row| columns.clone().all(|column| self.0[row][column] == first))
     }

@@ -1,79 +1,86 @@
-//! The pixels that a fit looks at: those of the tag and its white rim where the pattern changes, and few of the others.
+//! Pixels of a fit: those of the tag and its white rim near an edge of the pattern, and a few in flat areas.
 
 use nalgebra::{Matrix2, Vector2};
 
-use super::GreyImage;
-use super::bearings::RectifiedView;
-use super::homography::Homography;
-use super::pattern::{Cells, N_CELLS};
+use crate::bearings::RectifiedView;
+use crate::homography::Homography;
+use crate::image::GreyImage;
+use crate::pattern::{Cells, N_CELLS};
 
 /// Half of the tag's side in cells: s = +-1 at u = 0 and 8.
 pub(super) const HALF: f64 = N_CELLS as f64 / 2.0;
-/// Blur expected before anything is known, px.
+/// Std of the blur assumed before the fit, px.
 const TYPICAL_BLUR_PX: f64 = 0.8;
-/// A pixel this far from the next edge of a cell tells nothing of where the edge is.
+/// A pixel farther than this from the next cell edge has no information on the edge's position.
 const EDGE_REACH_PX: f64 = 3.0;
-/// Every so many of the others tell black and white.
+/// One of this many flat pixels is used, for the grey levels of black and white.
 const FLAT_STRIDE: u32 = 23;
 
-/// One pixel.
+/// One pixel of a fit.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sample {
-    /// Its line of sight in the tag's plane view, and d(plane)/d(pixel).
+    /// Position in the rectified view, and d(plane)/d(pixel).
     pub plane: Vector2<f64>,
     pub jacobian: Matrix2<f64>,
     pub value: f64,
-    /// Orders the samples at random, the same in every run.
+    /// Pseudo-random sort key, the same in every run.
     order: u32,
 }
 
-/// Fills `samples` with at most `limit` pixels, in an order whose every beginning is spread over the tag.
-pub(super) fn collect(
-    samples: &mut Vec<Sample>,
-    image: &GreyImage,
-    view: &RectifiedView,
-    start: &Homography,
-    cells: &Cells,
-    corners_px: &[[f64; 2]; 4],
-    limit: usize,
-) {
-    samples.clear();
-    let Some([columns, rows]) = window(image, corners_px) else { return };
-    for y in rows {
-        let line = &image.data[y * image.width..][..image.width];
-        for x in columns.clone() {
-            let pixel = [x as f64, y as f64];
-            let Some(plane) = view.plane(pixel) else { continue };
-            let place = start.place(&plane);
-            // The plane's horizon: what lies behind it is no part of the tag.
-            if place.scale <= 0.0 || place.s.abs().max(place.t.abs()) > 1.25 {
-                continue;
-            }
-            let Some((_, jacobian)) = view.plane_with_jacobian(pixel) else { continue };
-            let slope = start.slope(&place) * jacobian * HALF;
-            let cells_per_px = [slope.row(0).norm(), slope.row(1).norm()];
-            let at = [(place.s + 1.0) * HALF, (place.t + 1.0) * HALF];
-            let is_within = |k: usize| {
-                // The rim is one cell wide; what lies beyond it must not shine in.
-                let rim = (1.0 - 2.5 * TYPICAL_BLUR_PX * cells_per_px[k]).clamp(0.3, 0.8);
-                (-rim..=2.0 * HALF + rim).contains(&at[k])
-            };
-            if !(is_within(0) && is_within(1)) {
-                continue;
-            }
-            let order = scatter(x as u32, y as u32);
-            let is_flat = cells.is_flat(at, cells_per_px.map(|c| EDGE_REACH_PX * c));
-            if is_flat && !order.is_multiple_of(FLAT_STRIDE) {
-                continue;
-            }
-            samples.push(Sample { plane, jacobian, value: f64::from(line[x]), order });
-        }
-    }
-    samples.sort_unstable_by_key(|sample| sample.order);
-    samples.truncate(limit);
+/// A tag in an image, by its initial corners.
+pub(super) struct TagRegion<'a> {
+    pub image: &'a GreyImage<'a>,
+    pub view: &'a RectifiedView<'a>,
+    pub homography: &'a Homography,
+    pub cells: &'a Cells,
+    pub corners_px: &'a [[f64; 2]; 4],
 }
 
-/// Columns and rows about the tag with its rim.
+impl TagRegion<'_> {
+    /// Fills `samples` with at most `limit` pixels in pseudo-random order, so that every prefix is spread over the tag.
+    pub(super) fn sample(&self, limit: usize, samples: &mut Vec<Sample>) {
+        samples.clear();
+        let Some([columns, rows]) = window(self.image, self.corners_px) else { return };
+        for y in rows {
+            let line = &self.image.data[y * self.image.width..][..self.image.width];
+            for x in columns.clone() {
+                samples.extend(self.sample_pixel(x, y, f64::from(line[x])));
+            }
+        }
+        samples.sort_unstable_by_key(|sample| sample.order);
+        samples.truncate(limit);
+    }
+
+    /// A pixel's sample; `None` beside the tag and in most of its flat areas.
+    #[inline]
+    fn sample_pixel(&self, x: usize, y: usize, value: f64) -> Option<Sample> {
+        let pixel = [x as f64, y as f64];
+        let plane = self.view.plane(pixel)?;
+        let point = self.homography.map(&plane);
+        // A scale of 0 or less is beyond the horizon of the tag's plane.
+        if point.scale <= 0.0 || point.s.abs().max(point.t.abs()) > 1.25 {
+            return None;
+        }
+        let (_, jacobian) = self.view.plane_with_jacobian(pixel)?;
+        let cells_by_pixel = self.homography.jacobian(&point) * jacobian * HALF;
+        let cells_per_px = [cells_by_pixel.row(0).norm(), cells_by_pixel.row(1).norm()];
+        let at = [(point.s + 1.0) * HALF, (point.t + 1.0) * HALF];
+        let is_within = |k: usize| {
+            // The rim is one cell wide; the blur must not carry in light from beyond it.
+            let rim = (1.0 - 2.5 * TYPICAL_BLUR_PX * cells_per_px[k]).clamp(0.3, 0.8);
+            (-rim..=2.0 * HALF + rim).contains(&at[k])
+        };
+        if !(is_within(0) && is_within(1)) {
+            return None;
+        }
+        let order = hash_pixel(x as u32, y as u32);
+        let is_flat = self.cells.is_flat(at, cells_per_px.map(|c| EDGE_REACH_PX * c));
+        let is_wanted = !is_flat || order.is_multiple_of(FLAT_STRIDE);
+        is_wanted.then_some(Sample { plane, jacobian, value, order })
+    }
+}
+
+/// Columns and rows that hold the tag with its rim.
 fn window(image: &GreyImage, corners_px: &[[f64; 2]; 4]) -> Option<[std::ops::Range<usize>; 2]> {
     let sizes = [image.width, image.height];
     let mut ranges = [0..0, 0..0];
@@ -90,8 +97,8 @@ fn window(image: &GreyImage, corners_px: &[[f64; 2]; 4]) -> Option<[std::ops::Ra
     Some(ranges)
 }
 
-/// A hash of a pixel's place (the finalizer of MurmurHash3), different for every pixel of images below 65536 px.
-fn scatter(x: u32, y: u32) -> u32 {
+/// Hash of a pixel's coordinates (the finalizer of MurmurHash3), unique in images below 65536 px.
+fn hash_pixel(x: u32, y: u32) -> u32 {
     let mut h = x ^ (y << 16);
     h = (h ^ (h >> 16)).wrapping_mul(0x85eb_ca6b);
     h = (h ^ (h >> 13)).wrapping_mul(0xc2b2_ae35);

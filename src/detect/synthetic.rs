@@ -1,4 +1,5 @@
-//! Images of tags by brute force, for tests: every pixel is the mean of many rays. Shares no code with the fit but the lens.
+//! Images of tags by brute force, for tests: every pixel is the mean of many rays. Shares no code with the fit but the
+//! lens.
 
 use std::ops::Range;
 
@@ -10,14 +11,15 @@ use armcal_core::optics::{Fisheye, square_corners, tag36h11};
 
 /// A tag in the camera frame.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Placed {
+pub(super) struct PlacedTag {
     pub id: u32,
     pub size_m: f64,
     pub camera_from_tag: Isometry3<f64>,
 }
 
-impl Placed {
-    /// Towards `direction`, leaning by `incidence_rad` about a line at `azimuth_rad`, turned by `spin_rad`.
+impl PlacedTag {
+    /// A tag at `center_m` that faces the camera, tilted by `incidence_rad` about a line at `azimuth_rad`, turned by
+    /// `spin_rad`.
     pub(super) fn new(
         id: u32,
         size_m: f64,
@@ -41,9 +43,9 @@ impl Placed {
     }
 }
 
-/// Light and optics of an image.
+/// Light, blur and noise of an image.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Look {
+pub(super) struct Rendering {
     pub black: f64,
     pub white: f64,
     pub around: f64,
@@ -53,10 +55,10 @@ pub(super) struct Look {
     pub noise: f64,
 }
 
-pub(super) const CLEAN: Look = Look { black: 30.0, white: 200.0, around: 90.0, blur_px: 0.5, noise: 0.0 };
+pub(super) const CLEAN: Rendering = Rendering { black: 30.0, white: 200.0, around: 90.0, blur_px: 0.5, noise: 0.0 };
 
 /// Reflectance at (x, y), m; `None` beside the tag and its rim.
-fn reflectance(tag: &Placed, x: f64, y: f64) -> Option<bool> {
+fn reflectance(tag: &PlacedTag, x: f64, y: f64) -> Option<bool> {
     let cell = tag.size_m / 8.0;
     let (column, row) = ((x / cell + 4.0).floor(), (4.0 - y / cell).floor());
     if !(-1.0..=8.0).contains(&column) || !(-1.0..=8.0).contains(&row) {
@@ -68,7 +70,7 @@ fn reflectance(tag: &Placed, x: f64, y: f64) -> Option<bool> {
     Some(tag36h11::cells(tag.id).expect("an id of the family")[row as usize][column as usize])
 }
 
-fn ray(lens: &Fisheye, look: &Look, tags: &[Placed], pixel: Vector2<f64>) -> f64 {
+fn ray(lens: &Fisheye, rendering: &Rendering, tags: &[PlacedTag], pixel: Vector2<f64>) -> f64 {
     let Some(bearing) = lens.unproject(&pixel) else { return 0.0 };
     for tag in tags {
         let inverse = tag.camera_from_tag.inverse();
@@ -77,20 +79,20 @@ fn ray(lens: &Fisheye, look: &Look, tags: &[Placed], pixel: Vector2<f64>) -> f64
         if along > 0.0 {
             let at = origin + direction * along;
             if let Some(is_white) = reflectance(tag, at.x, at.y) {
-                return if is_white { look.white } else { look.black };
+                return if is_white { rendering.white } else { rendering.black };
             }
         }
     }
-    look.around
+    rendering.around
 }
 
 /// Rays along a pixel's side.
 const N: usize = 8;
 
 /// Renders tags, the first in front; pixels beside them are not traced.
-pub(super) fn render(lens: &Fisheye, look: &Look, tags: &[Placed], rng: &mut ChaCha8Rng) -> Vec<u8> {
+pub(super) fn render(lens: &Fisheye, rendering: &Rendering, tags: &[PlacedTag], rng: &mut ChaCha8Rng) -> Vec<u8> {
     let [width, height] = lens.resolution_px.map(|n| n as usize);
-    let mut grey = vec![look.around; width * height];
+    let mut grey = vec![rendering.around; width * height];
     for tag in tags {
         let Some(corners) = tag.corners_px(lens) else { continue };
         let range = |axis: usize, size: usize| {
@@ -99,25 +101,31 @@ pub(super) fn render(lens: &Fisheye, look: &Look, tags: &[Placed], rng: &mut Cha
             let rim = 0.3 * (high - low) + 4.0;
             (low - rim).max(0.0) as usize..((high + rim) as usize + 1).min(size)
         };
-        draw(lens, look, tags, [range(0, width), range(1, height)], &mut grey);
+        draw(lens, rendering, tags, [range(0, width), range(1, height)], &mut grey);
     }
     let mut noisy = |value: f64| {
-        let normal: f64 = if look.noise > 0.0 { StandardNormal.sample(rng) } else { 0.0 };
-        (value + look.noise * normal).round().clamp(0.0, 255.0) as u8
+        let normal: f64 = if rendering.noise > 0.0 { StandardNormal.sample(rng) } else { 0.0 };
+        (value + rendering.noise * normal).round().clamp(0.0, 255.0) as u8
     };
     grey.into_iter().map(&mut noisy).collect()
 }
 
 /// Traces a window at N x N rays a pixel, blurs that, and averages.
-fn draw(lens: &Fisheye, look: &Look, tags: &[Placed], [columns, rows]: [Range<usize>; 2], grey: &mut [f64]) {
+fn draw(
+    lens: &Fisheye,
+    rendering: &Rendering,
+    tags: &[PlacedTag],
+    [columns, rows]: [Range<usize>; 2],
+    grey: &mut [f64],
+) {
     let width = lens.resolution_px[0] as usize;
     let (nx, ny) = (columns.len() * N, rows.len() * N);
     let at = |start: usize, k: usize| start as f64 - 0.5 + (k as f64 + 0.5) / N as f64;
     let fine: Vec<f64> = (0..nx * ny)
-        .map(|i| ray(lens, look, tags, Vector2::new(at(columns.start, i % nx), at(rows.start, i / nx))))
+        .map(|i| ray(lens, rendering, tags, Vector2::new(at(columns.start, i % nx), at(rows.start, i / nx))))
         .collect();
-    let across = blur(&fine, nx, 1, look.blur_px);
-    let both = blur(&across, ny, nx, look.blur_px);
+    let across = blur(&fine, nx, 1, rendering.blur_px);
+    let both = blur(&across, ny, nx, rendering.blur_px);
     for (j, y) in rows.enumerate() {
         for (i, x) in columns.clone().enumerate() {
             let rays = (0..N * N).map(|k| both[(j * N + k / N) * nx + i * N + k % N]);
@@ -134,10 +142,10 @@ fn blur(values: &[f64], n: usize, stride: usize, std_px: f64) -> Vec<f64> {
     let sum: f64 = weights.iter().sum();
     let mut out = vec![0.0; values.len()];
     for (i, out) in out.iter_mut().enumerate() {
-        let place = (i / stride % n) as isize;
+        let index = (i / stride % n) as isize;
         for (k, weight) in (-reach..=reach).zip(&weights) {
-            let other = (place + k).clamp(0, n as isize - 1);
-            *out += weight / sum * values[(i as isize + (other - place) * stride as isize) as usize];
+            let other = (index + k).clamp(0, n as isize - 1);
+            *out += weight / sum * values[(i as isize + (other - index) * stride as isize) as usize];
         }
     }
     out

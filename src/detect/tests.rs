@@ -1,12 +1,12 @@
-//! Corners found against corners projected, and what is not taken for a tag, on images with known truth.
+//! Detected against projected corners, and rejected candidates, on images with known truth.
 
 use std::f64::consts::TAU;
 
 use nalgebra::{Vector2, Vector3};
 use rand::RngExt;
 
-use super::synthetic::{CLEAN, Look, Placed, render};
-use super::*;
+use crate::synthetic::{CLEAN, PlacedTag, Rendering, render};
+use crate::*;
 use armcal_core::optics::Fisheye;
 use armcal_core::optics::fixture::lens;
 use armcal_core::stats::{quantile, stream_rng};
@@ -16,25 +16,25 @@ fn detector(lens: &Fisheye, settings: DetectorSettings) -> TagDetector {
     TagDetector::new(lens, settings).expect("it starts")
 }
 
-fn look_at(lens: &Fisheye, settings: DetectorSettings, data: &[u8]) -> Detected {
+fn detect_in(lens: &Fisheye, settings: DetectorSettings, data: &[u8]) -> ImageDetections {
     let [width, height] = lens.resolution_px.map(|n| n as usize);
     detector(lens, settings).detect(GreyImage { width, height, data }).expect("an image of the lens")
 }
 
-fn drawn(lens: &Fisheye, look: &Look, tags: &[Placed]) -> Vec<u8> {
-    render(lens, look, tags, &mut stream_rng(1, "detect/test"))
+fn drawn(lens: &Fisheye, rendering: &Rendering, tags: &[PlacedTag]) -> Vec<u8> {
+    render(lens, rendering, tags, &mut stream_rng(1, "detect/test"))
 }
 
-fn ahead(id: u32, x_m: f64, z_m: f64) -> Placed {
-    Placed::new(id, 0.15, Vector3::new(x_m, 0.05, z_m), [0.3, 0.5, 0.2])
+fn ahead(id: u32, x_m: f64, z_m: f64) -> PlacedTag {
+    PlacedTag::new(id, 0.15, Vector3::new(x_m, 0.05, z_m), [0.3, 0.5, 0.2])
 }
 
-fn reasons(seen: &Detected) -> Vec<(u32, RejectReason)> {
-    seen.rejects.iter().map(|reject| (reject.id, reject.reason)).collect()
+fn reasons(detections: &ImageDetections) -> Vec<(u32, RejectReason)> {
+    detections.rejects.iter().map(|reject| (reject.id, reject.reason)).collect()
 }
 
 #[derive(Default)]
-struct Found {
+struct DetectionErrors {
     n_drawn: usize,
     n_found: usize,
     errors_px: Vec<f64>,
@@ -42,7 +42,7 @@ struct Found {
     normalised: Vec<f64>,
 }
 
-impl Found {
+impl DetectionErrors {
     /// Per coordinate.
     fn rms_px(&self) -> f64 {
         (self.errors_px.iter().map(|e| e * e).sum::<f64>() / self.errors_px.len() as f64 / 2.0).sqrt()
@@ -54,67 +54,75 @@ impl Found {
 }
 
 /// One tag an image, anywhere in view.
-fn trials(seeds: std::ops::Range<u64>, look: &Look, ranges_m: [f64; 2], incidences_rad: [f64; 2]) -> Found {
+fn trials(
+    seeds: std::ops::Range<u64>,
+    rendering: &Rendering,
+    ranges_m: [f64; 2],
+    incidences_rad: [f64; 2],
+) -> DetectionErrors {
     let lens = lens();
     let mut detector = detector(&lens, DetectorSettings::default());
-    let mut found = Found::default();
+    let mut errors = DetectionErrors::default();
     for seed in seeds {
         let mut rng = stream_rng(seed, "detect/trials");
         let mut uniform = |[a, b]: [f64; 2]| rng.random_range(a..=b);
         let (angle, around, range) = (uniform([0.0, 1.1]), uniform([0.0, TAU]), uniform(ranges_m));
         let center = Vector3::new(angle.sin() * around.cos(), angle.sin() * around.sin(), angle.cos()) * range;
         let pose = [uniform(incidences_rad), uniform([0.0, TAU]), uniform([0.0, TAU])];
-        let tag = Placed::new((seed * 7 % 587) as u32, 0.15, center, pose);
+        let tag = PlacedTag::new((seed * 7 % 587) as u32, 0.15, center, pose);
         let Some(truth) = tag.corners_px(&lens) else { continue };
-        let data = render(&lens, look, &[tag], &mut rng);
-        found.n_drawn += 1;
-        let seen = detector.detect(GreyImage { width: 1224, height: 1024, data: &data }).expect("of the lens");
-        let Some(seen) = seen.tags.first() else { continue };
-        assert_eq!(seen.detection.id, tag.id);
-        found.n_found += 1;
-        for ((corner, truth), covariance) in seen.detection.corners_px.iter().zip(truth).zip(&seen.covariances_px2) {
+        let data = render(&lens, rendering, &[tag], &mut rng);
+        errors.n_drawn += 1;
+        let detections = detector.detect(GreyImage { width: 1224, height: 1024, data: &data }).expect("of the lens");
+        let Some(detections) = detections.tags.first() else { continue };
+        assert_eq!(detections.detection.id, tag.id);
+        errors.n_found += 1;
+        for ((corner, truth), covariance) in
+            detections.detection.corners_px.iter().zip(truth).zip(&detections.covariances_px2)
+        {
             let error = Vector2::from(*corner) - Vector2::from(truth);
             let inverse = covariance.try_inverse().expect("regular");
-            found.errors_px.push(error.norm());
-            found.normalised.push((error.transpose() * inverse * error).x);
+            errors.errors_px.push(error.norm());
+            errors.normalised.push((error.transpose() * inverse * error).x);
         }
     }
-    found
+    errors
 }
 
 /// Any spin and place: the order of the corners is right, or errors would be as large as a side.
 #[test]
 fn clean_corners_are_those_of_the_projection() {
     for (ranges, incidences) in [([0.4, 0.8], [0.0, 0.9]), ([0.8, 1.6], [0.0, 0.9]), ([1.6, 2.5], [0.0, 0.6])] {
-        let found = trials(0..12, &CLEAN, ranges, incidences);
-        let worst = quantile(&found.errors_px, 0.95).expect("some");
+        let errors = trials(0..12, &CLEAN, ranges, incidences);
+        let worst = quantile(&errors.errors_px, 0.95).expect("some");
         eprintln!(
             "{ranges:?} m: {} of {}, rms {:.4} px, 95 % below {worst:.4} px",
-            found.n_found,
-            found.n_drawn,
-            found.rms_px()
+            errors.n_found,
+            errors.n_drawn,
+            errors.rms_px()
         );
-        assert_eq!(found.n_found, found.n_drawn);
-        assert!(found.rms_px() < 0.02 && worst < 0.05, "{} {worst}", found.rms_px());
+        assert_eq!(errors.n_found, errors.n_drawn);
+        assert!(errors.rms_px() < 0.02 && worst < 0.05, "{} {worst}", errors.rms_px());
     }
 }
 
-/// In white noise the covariances are 1.5 times too large, which snow needs: means of 2/1.5. Those of some 150 squares have a
-/// standard deviation of 0.11; the floor makes the largest contrast's errors smaller than said.
+/// In white noise the covariances are 1.5 times too large, which snow needs: means of 2/1.5. Those of some 150 squares
+/// have a standard deviation of 0.11; the floor makes the largest contrast's errors smaller than said.
 #[test]
 fn noisy_corners_err_as_their_covariance_says() {
     for (contrast, blur_px, band) in [(120.0, 1.0, 0.5..=2.2), (40.0, 0.4, 0.9..=2.2), (30.0, 1.0, 0.9..=2.2)] {
-        let look = Look { white: 40.0 + contrast, black: 40.0, around: 60.0, blur_px, noise: 3.0 };
-        let found = trials(100..140, &look, [0.5, 2.0], [0.0, 0.9]);
-        let mean = found.mean_normalised();
-        let [middle, high] = [0.5, 0.95].map(|q| quantile(&found.normalised, q).expect("some"));
+        let rendering = Rendering { white: 40.0 + contrast, black: 40.0, around: 60.0, blur_px, noise: 3.0 };
+        let errors = trials(100..140, &rendering, [0.5, 2.0], [0.0, 0.9]);
+        let mean = errors.mean_normalised();
+        let [middle, high] = [0.5, 0.95].map(|q| quantile(&errors.normalised, q).expect("some"));
         eprintln!(
-            "contrast {contrast}, blur {blur_px}: {} of {}, rms {:.4} px, squares mean {mean:.2}, 50 % {middle:.2}, 95 % {high:.2}",
-            found.n_found,
-            found.n_drawn,
-            found.rms_px()
+            "contrast {contrast}, blur {blur_px}: {} of {}, rms {:.4} px, \
+             squares mean {mean:.2}, 50 % {middle:.2}, 95 % {high:.2}",
+            errors.n_found,
+            errors.n_drawn,
+            errors.rms_px()
         );
-        assert!(found.n_found + 1 >= found.n_drawn && found.rms_px() < 0.1);
+        assert!(errors.n_found + 1 >= errors.n_drawn && errors.rms_px() < 0.1);
         // Chi-square of 2 degrees: median 1.39, 95 % below 5.99.
         assert!(band.contains(&mean) && middle < 1.9 && high < 8.0, "{mean} {middle} {high}");
     }
@@ -126,16 +134,16 @@ fn noise_shows_nothing() {
     for seed in 0..4 {
         let mut rng = stream_rng(seed, "detect/noise");
         let data: Vec<u8> = (0..1224 * 1024).map(|_| rng.random_range(0..=255)).collect();
-        let seen = look_at(&lens, DetectorSettings::default(), &data);
-        assert!(seen.tags.is_empty(), "{:?}", seen.tags);
+        let detections = detect_in(&lens, DetectorSettings::default(), &data);
+        assert!(detections.tags.is_empty(), "{:?}", detections.tags);
     }
     // Patches of random cells in place of a tag's, as large as one: nothing of the family.
     let mut rng = stream_rng(9, "detect/noise");
     for _ in 0..3 {
         let cells: Vec<u8> = (0..128 * 154).map(|_| if rng.random_range(0.0..1.0) < 0.5 { 20 } else { 220 }).collect();
         let data: Vec<u8> = (0..1224 * 1024).map(|i| cells[i / 1224 / 8 * 154 + i % 1224 / 8]).collect();
-        let seen = look_at(&lens, DetectorSettings::default(), &data);
-        assert!(seen.tags.is_empty(), "{:?}", seen.tags);
+        let detections = detect_in(&lens, DetectorSettings::default(), &data);
+        assert!(detections.tags.is_empty(), "{:?}", detections.tags);
     }
 }
 
@@ -143,9 +151,9 @@ fn noise_shows_nothing() {
 fn an_id_at_two_places_is_no_tag() {
     let lens = lens();
     let tags = [ahead(5, -0.2, 0.8), ahead(5, 0.2, 0.8), ahead(6, 0.0, 1.4)];
-    let seen = look_at(&lens, DetectorSettings::default(), &drawn(&lens, &CLEAN, &tags));
-    assert_eq!(seen.tags.iter().map(|tag| tag.detection.id).collect::<Vec<_>>(), [6]);
-    assert_eq!(reasons(&seen), [(5, RejectReason::SeenTwice); 2]);
+    let detections = detect_in(&lens, DetectorSettings::default(), &drawn(&lens, &CLEAN, &tags));
+    assert_eq!(detections.tags.iter().map(|tag| tag.detection.id).collect::<Vec<_>>(), [6]);
+    assert_eq!(reasons(&detections), [(5, RejectReason::SeenTwice); 2]);
 }
 
 /// Cells painted over: as many as are corrected, and more.
@@ -172,12 +180,12 @@ fn wrong_bits_are_counted() {
         data
     };
     let strict = || DetectorSettings { max_wrong_bits: 0, ..DetectorSettings::default() };
-    assert_eq!(look_at(&lens, strict(), &clean).tags.len(), 1);
-    assert_eq!(look_at(&lens, DetectorSettings::default(), &painted(2)).tags.len(), 1);
-    let seen = look_at(&lens, strict(), &painted(1));
-    assert!(seen.tags.is_empty());
-    assert_eq!(reasons(&seen), [(3, RejectReason::WrongBits)]);
-    assert!(look_at(&lens, DetectorSettings::default(), &painted(4)).tags.is_empty());
+    assert_eq!(detect_in(&lens, strict(), &clean).tags.len(), 1);
+    assert_eq!(detect_in(&lens, DetectorSettings::default(), &painted(2)).tags.len(), 1);
+    let detections = detect_in(&lens, strict(), &painted(1));
+    assert!(detections.tags.is_empty());
+    assert_eq!(reasons(&detections), [(3, RejectReason::WrongBits)]);
+    assert!(detect_in(&lens, DetectorSettings::default(), &painted(4)).tags.is_empty());
 }
 
 #[test]
@@ -187,18 +195,18 @@ fn doubtful_tags_are_rejected_with_the_reason() {
     let clean = drawn(&lens, &CLEAN, &[tag]);
     let default = DetectorSettings::default;
     let other = DetectorSettings { known_ids: Some(vec![41]), ..default() };
-    assert_eq!(reasons(&look_at(&lens, other, &clean)), [(42, RejectReason::UnknownId)]);
+    assert_eq!(reasons(&detect_in(&lens, other, &clean)), [(42, RejectReason::UnknownId)]);
     let large = DetectorSettings { min_side_px: 300.0, ..default() };
-    assert_eq!(reasons(&look_at(&lens, large, &clean)), [(42, RejectReason::TooSmall)]);
+    assert_eq!(reasons(&detect_in(&lens, large, &clean)), [(42, RejectReason::TooSmall)]);
     let contrast = DetectorSettings { min_contrast: 200.0, ..default() };
-    assert_eq!(reasons(&look_at(&lens, contrast, &clean)), [(42, RejectReason::LowContrast)]);
+    assert_eq!(reasons(&detect_in(&lens, contrast, &clean)), [(42, RejectReason::LowContrast)]);
     // A tag whose border the image does not have where the code says: half of it hidden by a grey bar.
     let sure = DetectorSettings { max_corner_std_px: 1e-4, ..default() };
-    assert_eq!(reasons(&look_at(&lens, sure, &clean)), [(42, RejectReason::PoorEdges)]);
+    assert_eq!(reasons(&detect_in(&lens, sure, &clean)), [(42, RejectReason::PoorEdges)]);
     // Beyond the field of view that belief has.
     let narrow = Fisheye { max_view_angle_rad: 0.05, ..lens };
-    let seen = look_at(&narrow, default(), &clean);
-    assert_eq!(reasons(&seen), [(42, RejectReason::OutOfView)]);
+    let detections = detect_in(&narrow, default(), &clean);
+    assert_eq!(reasons(&detections), [(42, RejectReason::OutOfView)]);
 }
 
 /// Tags near the rim, where the lens bends most, and those that the image cuts off.
@@ -209,18 +217,18 @@ fn the_rim_of_the_image_is_no_trap() {
     for step in 0..12 {
         let angle = 1.1 + 0.03 * f64::from(step);
         let center = Vector3::new(angle.sin(), 0.1, angle.cos()) * 0.7;
-        let tag = Placed::new(step, 0.15, center, [0.2, f64::from(step), 0.0]);
+        let tag = PlacedTag::new(step, 0.15, center, [0.2, f64::from(step), 0.0]);
         let truth = tag.corners_px(&lens);
         // The whole scene is drawn even where corners are beyond the rim.
-        let seen = look_at(&lens, DetectorSettings::default(), &drawn(&lens, &CLEAN, &[tag]));
+        let detections = detect_in(&lens, DetectorSettings::default(), &drawn(&lens, &CLEAN, &[tag]));
         let Some(truth) = truth else {
-            assert!(seen.tags.is_empty());
+            assert!(detections.tags.is_empty());
             continue;
         };
         n_whole += 1;
-        for found in &seen.tags {
+        for errors in &detections.tags {
             n_found += 1;
-            for (a, b) in found.detection.corners_px.iter().zip(truth) {
+            for (a, b) in errors.detection.corners_px.iter().zip(truth) {
                 assert!((a[0] - b[0]).hypot(a[1] - b[1]) < 0.1, "{a:?} {b:?}");
             }
         }
@@ -231,7 +239,7 @@ fn the_rim_of_the_image_is_no_trap() {
 #[test]
 fn the_same_image_gives_the_same_bytes_and_a_wrong_size_an_error() {
     let lens = lens();
-    let data = drawn(&lens, &Look { noise: 4.0, ..CLEAN }, &[ahead(7, 0.1, 0.9), ahead(8, -0.3, 1.2)]);
+    let data = drawn(&lens, &Rendering { noise: 4.0, ..CLEAN }, &[ahead(7, 0.1, 0.9), ahead(8, -0.3, 1.2)]);
     let image = GreyImage { width: 1224, height: 1024, data: &data };
     let mut detector = detector(&lens, DetectorSettings::default());
     let first = detector.detect(image).expect("detected");

@@ -3,11 +3,12 @@
 use nalgebra::Vector3;
 use rerun::{LineStrips3D, Points3D};
 
-use super::ReplayScene;
-use super::colors;
-use super::rrd::EntityLog;
-use super::scenery::{BASE, Mover};
-use super::shapes::{Look, fix_shapes, path_part, transform, vector};
+use crate::colors;
+use crate::entities::BASE;
+use crate::entity_log::EntityLog;
+use crate::scene::ReplayScene;
+use crate::scenery::Mover;
+use crate::shapes::{Look, log_shapes, path_part, transform, vector};
 use armcal_core::spatial::{Base, Pose, Tool};
 use armcal_core::streams::{CaptureSet, JointAngles, MarkKind};
 
@@ -55,7 +56,7 @@ impl ReplayScene<'_> {
 /// Draws the arms and what belongs to them.
 pub(super) fn draw(run: &ReplayScene, stream: &mut EntityLog) {
     let mut shown = Arm::new(run, stream, "arm", Look::Drawn);
-    fix_camera(run, stream, &shown);
+    log_camera(run, stream, &shown);
     for time_s in run.tracks.frames() {
         if let Some(angles) = run.shown_angles(time_s) {
             shown.place(run, stream, time_s, &angles);
@@ -86,14 +87,14 @@ impl Arm {
             let entity = format!("{BASE}/{name}/{n}_{}", path_part(&body.name));
             // The base does not move in itself: one drawing of it is enough.
             if n > 0 || matches!(look, Look::Drawn) {
-                fix_shapes(stream, &entity, &body.visuals, look);
+                log_shapes(stream, &entity, &body.visuals, look);
             }
             bodies.push(Mover::new(entity));
         }
         let mut jaws = Vec::new();
         for (n, jaw) in run.robot.gripper.iter().flat_map(|gripper| &gripper.jaws).enumerate() {
             let entity = format!("{BASE}/{name}/jaw_{n}_{}", path_part(&jaw.name));
-            fix_shapes(stream, &entity, &jaw.visuals, look);
+            log_shapes(stream, &entity, &jaw.visuals, look);
             jaws.push(Mover::new(entity));
         }
         Self { bodies, jaws }
@@ -113,7 +114,7 @@ impl Arm {
 }
 
 /// The camera's lines of sight towards the corners of its image.
-fn fix_camera(run: &ReplayScene, stream: &mut EntityLog, arm: &Arm) {
+fn log_camera(run: &ReplayScene, stream: &mut EntityLog, arm: &Arm) {
     let camera = &run.robot.camera;
     let Some(carrier) = arm.bodies.get(camera.mount.n_joints) else { return };
     let entity = format!("{}/camera", carrier.entity());

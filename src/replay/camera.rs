@@ -3,15 +3,13 @@
 use nalgebra::{Isometry3, Point3, Vector2, Vector3};
 use rerun::{Clear, EncodedImage, Image, LineStrips2D, Radius};
 
-use super::ReplayScene;
-use super::colors;
-use super::rrd::EntityLog;
+use crate::colors;
+use crate::entities::CAMERA;
+use crate::entity_log::EntityLog;
+use crate::scene::ReplayScene;
 use armcal_core::optics::Fisheye;
 use armcal_core::robot::SurveyedTag;
 use armcal_core::streams::{DetectionReject, TagDetection};
-
-/// The image plane's entity; raw pixels.
-pub(super) const CAMERA: &str = "/camera";
 
 /// The image is drawn at most this often.
 const VIEWS_HZ: f64 = 12.5;

@@ -27,8 +27,8 @@ pub(super) const BASE_TAG: Rgba = [70, 140, 255, 255];
 pub(super) const OIL: Rgba = [255, 150, 60, 255];
 pub(super) const COLD: Rgba = [90, 170, 255, 255];
 
-/// The tool's way of a plan.
-pub(super) const PLANNED_WAY: Rgba = [150, 165, 185, 255];
+/// The tool's path in a plan.
+pub(super) const PLANNED_PATH: Rgba = [150, 165, 185, 255];
 /// Arms that the errors allow.
 pub(super) const MARGIN: Rgba = [255, 190, 70, 26];
 pub(super) const MARGIN_TOOL: Rgba = [255, 190, 70, 255];

@@ -4,15 +4,13 @@ use std::collections::BTreeMap;
 
 use rerun::{StateChange, StateConfiguration, TextLog, TextLogLevel};
 
-use super::ReplayScene;
-use super::colors::{self, Rgba};
-use super::rrd::EntityLog;
-use super::shapes::path_part;
-use super::tracks::Span;
+use crate::colors::{self, Rgba};
+use crate::entities::{LOG, STATE};
+use crate::entity_log::EntityLog;
+use crate::scene::ReplayScene;
+use crate::shapes::path_part;
+use crate::tracks::Span;
 use armcal_core::streams::{CaptureSet, LogLevel, MarkKind, Phase, ReachAttempt};
-
-pub(super) const STATE: &str = "/state";
-pub(super) const LOG: &str = "/log";
 
 /// Draws the lanes and the log.
 pub(super) fn draw(run: &ReplayScene, stream: &mut EntityLog) {

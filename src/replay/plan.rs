@@ -1,7 +1,7 @@
 //! A plan as a file for the viewer: the arm goes along its paths as it would, with all that it may be off by around it.
 //!
-//! What a session would record of its motions is made up from the plan and drawn as a recording is; the margins, the tags'
-//! chances and the plots over the poses come on top.
+//! What a session would record of its motions is made up from the plan and drawn as a recording is; the margins, the
+//! tags' chances and the plots over the poses come on top.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -9,13 +9,16 @@ use std::path::{Path, PathBuf};
 use rerun::components::MarkerShape;
 use rerun::{Boxes3D, FillMode, LineStrips3D, Points3D, Scalars, SeriesLines, SeriesPoints};
 
-use super::colors::{self, Rgba};
-use super::error::ReplayError;
-use super::rrd::EntityLog;
-use super::scenery::{BASE, Mover};
-use super::shapes::{Look, fix_shapes, path_part, quaternion, vector};
-use super::tracks::Tracks;
-use super::{ReplayInput, ReplayScene, layout, rrd};
+use crate::colors::{self, Rgba};
+use crate::entities::{BASE, CLEARANCE, PREDICTED};
+use crate::entity_log::EntityLog;
+use crate::error::ReplayError;
+use crate::identity::Identity;
+use crate::scene::{ReplayInput, ReplayScene};
+use crate::scenery::Mover;
+use crate::shapes::{Look, log_shapes, path_part, quaternion, vector};
+use crate::tracks::Tracks;
+use crate::{blueprint, recording, rrd};
 use armcal_belief::plan::{PlanFile, PoseTable, SetName, Timing};
 use armcal_core::log::{Completeness, Recording};
 use armcal_core::robot::{Robot, Vehicle};
@@ -24,9 +27,6 @@ use armcal_core::streams::{
     CaptureSet, JointAngles, JointStateBelief, LogLevel, LogLine, Mark, MarkKind, Message, Phase, ReachTask,
 };
 use armcal_core::time::{SIMULATION_EPOCH, Stamp};
-
-pub(super) const CLEARANCE: &str = "/plots/clearance";
-pub(super) const PREDICTED: &str = "/plots/predicted";
 
 /// Steps of what moves.
 const FRAME_HZ: f64 = 12.5;
@@ -44,28 +44,28 @@ pub struct PlanInput<'a> {
     pub markdown: &'a str,
 }
 
-/// Writes `out`, an .rrd file with its layout, replacing one of that name.
+/// Writes `out`, an .rrd file with its blueprint, replacing one of that name.
 ///
 /// # Errors
 /// [`ReplayError`] when it cannot be written, or the plan is another arm's.
 pub fn write_plan_rrd(input: &PlanInput<'_>, out: &Path) -> Result<(), ReplayError> {
-    let recording = as_recorded(input);
+    let messages = plan_recording(input);
     let shown = ReplayInput {
-        recording: &recording,
+        recording: &messages,
         truth: None,
         robot: input.robot,
         vehicle: Some(input.vehicle),
         scene: Some(input.scene),
         summary_markdown: Some(input.markdown),
     };
-    let tracks = Tracks::new(&recording, input.robot)?;
+    let tracks = Tracks::new(&messages, input.robot)?;
     let run = ReplayScene { tracks, truth: None, robot: input.robot, vehicle: shown.vehicle, scene: shown.scene };
-    let mut stream = super::draw(&run, &shown);
+    let mut stream = recording::draw(&run, &shown);
     draw_tool_path(&run, &mut stream);
     draw_margins(input, &run, &mut stream);
-    draw_sights(input, &mut stream);
+    draw_expected_tags(input, &mut stream);
     draw_plots(input, &mut stream);
-    rrd::write(out, &rrd::Identity::of(&shown)?, &layout::build_plan(&run), stream)
+    rrd::write(out, &Identity::of(&shown)?, &blueprint::build_plan(&run), stream)
 }
 
 /// The plan's motions as messages.
@@ -75,12 +75,12 @@ struct PlanMessages<'a> {
     time_s: f64,
 }
 
-fn as_recorded(input: &PlanInput<'_>) -> Recording {
-    let mut imagined = PlanMessages { input, messages: Vec::new(), time_s: 0.0 };
-    imagined.go();
+fn plan_recording(input: &PlanInput<'_>) -> Recording {
+    let mut motions = PlanMessages { input, messages: Vec::new(), time_s: 0.0 };
+    motions.add_all();
     Recording {
         path: PathBuf::from("plan.toml"),
-        messages: imagined.messages,
+        messages: motions.messages,
         joint_names: input.plan.joints.clone(),
         completeness: Completeness::Whole,
         raw: Vec::new(),
@@ -92,12 +92,12 @@ fn as_recorded(input: &PlanInput<'_>) -> Recording {
 }
 
 impl PlanMessages<'_> {
-    fn go(&mut self) {
+    fn add_all(&mut self) {
         let PlanInput { plan, task, .. } = *self.input;
         let (targets_m, tolerance_m) = (task.targets_m.clone(), task.tolerance_m);
         let stamp = self.stamp();
-        self.tell(Message::Task(ReachTask { stamp, targets_m, tolerance_m }));
-        self.stand(&JointAngles::from_slice(&plan.start_rad));
+        self.push(Message::Task(ReachTask { stamp, targets_m, tolerance_m }));
+        self.joint_state(&JointAngles::from_slice(&plan.start_rad));
         let dwell_s = plan.totals.arm_time_s - plan.pose.last().map_or(0.0, |pose| pose.arm_time_s);
         for (pose, path) in plan.pose.iter().zip(&plan.path) {
             self.phase(Phase::Move);
@@ -107,7 +107,7 @@ impl PlanMessages<'_> {
             self.phase(Phase::Settle);
             let angles = JointAngles::from_slice(&pose.angles_rad);
             self.rest_until(&angles, pose.arm_time_s);
-            self.look(pose, &angles, dwell_s);
+            self.capture(pose, &angles, dwell_s);
         }
         self.phase(Phase::Done);
     }
@@ -116,18 +116,18 @@ impl PlanMessages<'_> {
         SIMULATION_EPOCH.plus_s(self.time_s)
     }
 
-    fn tell(&mut self, message: Message) {
+    fn push(&mut self, message: Message) {
         self.messages.push((self.stamp(), message));
     }
 
-    fn stand(&mut self, angles: &JointAngles) {
+    fn joint_state(&mut self, angles: &JointAngles) {
         let stamp = self.stamp();
-        self.tell(Message::JointStates(JointStateBelief { stamp, angles: *angles }));
+        self.push(Message::JointStates(JointStateBelief { stamp, angles: *angles }));
     }
 
     fn phase(&mut self, phase: Phase) {
         let stamp = self.stamp();
-        self.tell(Message::Mark(Mark { start: stamp, end: stamp, kind: MarkKind::Phase(phase) }));
+        self.push(Message::Mark(Mark { start: stamp, end: stamp, kind: MarkKind::Phase(phase) }));
     }
 
     fn edge(&mut self, from: &JointAngles, to: &JointAngles, duration_s: f64) {
@@ -136,19 +136,24 @@ impl PlanMessages<'_> {
         for k in 1..=steps {
             let share = f64::from(k) / f64::from(steps);
             self.time_s = began_s + share * duration_s;
-            self.stand(&Timing::set_point(from, to, share));
+            self.joint_state(&Timing::set_point(from, to, share));
         }
     }
 
     fn rest_until(&mut self, angles: &JointAngles, time_s: f64) {
         self.time_s = self.time_s.max(time_s);
-        self.stand(angles);
+        self.joint_state(angles);
     }
 
-    fn look(&mut self, pose: &PoseTable, angles: &JointAngles, dwell_s: f64) {
+    fn capture(&mut self, pose: &PoseTable, angles: &JointAngles, dwell_s: f64) {
         self.phase(Phase::Capture);
         let stamp = self.stamp();
-        self.tell(Message::Log(LogLine { stamp, level: LogLevel::Info, name: "plan".to_owned(), text: words(pose) }));
+        self.push(Message::Log(LogLine {
+            stamp,
+            level: LogLevel::Info,
+            name: "plan".to_owned(),
+            text: pose_text(pose),
+        }));
         self.rest_until(angles, self.time_s + dwell_s);
         let set = match pose.set {
             SetName::Fit => CaptureSet::Fit,
@@ -156,11 +161,11 @@ impl PlanMessages<'_> {
         };
         let kind = MarkKind::Capture { set, pose_idx: pose.number as u32 - 1 };
         let end = self.stamp();
-        self.tell(Message::Mark(Mark { start: stamp, end, kind }));
+        self.push(Message::Mark(Mark { start: stamp, end, kind }));
     }
 }
 
-fn words(pose: &PoseTable) -> String {
+fn pose_text(pose: &PoseTable) -> String {
     let tags: Vec<String> =
         pose.tags.iter().map(|tag| format!("{} ({:.0} %)", tag.id, 100.0 * tag.probability)).collect();
     let error = pose.predicted_tool_error_m.map_or_else(String::new, |m| format!(", {:.2} mm predicted", 1e3 * m));
@@ -178,7 +183,7 @@ fn draw_tool_path(run: &ReplayScene, stream: &mut EntityLog) {
     let tool = |angles: &JointAngles| run.robot.chain.link_poses(angles).frame(&run.robot.tool.mount);
     let way: Vec<[f32; 3]> =
         run.tracks.believed.iter().map(|(_, angles)| vector(&tool(angles).translation.vector)).collect();
-    let strip = LineStrips3D::new([way]).with_radii([0.003]).with_colors([colors::PLANNED_WAY]);
+    let strip = LineStrips3D::new([way]).with_radii([0.003]).with_colors([colors::PLANNED_PATH]);
     stream.log_static(&format!("{BASE}/planned_way"), &strip);
 }
 
@@ -189,7 +194,7 @@ fn draw_margins(input: &PlanInput<'_>, run: &ReplayScene, stream: &mut EntityLog
     for (n, _) in CORNERS.iter().enumerate() {
         let bodies = robot.bodies.iter().enumerate().skip(1).map(|(body, link)| {
             let entity = format!("{BASE}/margins/arm_{n}/{body}_{}", path_part(&link.name));
-            fix_shapes(stream, &entity, &link.collisions, Look::Ghost(colors::MARGIN));
+            log_shapes(stream, &entity, &link.collisions, Look::Ghost(colors::MARGIN));
             Mover::new(entity)
         });
         ghosts.push(bodies.collect());
@@ -232,7 +237,7 @@ fn error_at(plan: &PlanFile, time_s: f64) -> JointAngles {
 }
 
 /// Frames around the tags that the next pose is to see, coloured by how likely that is.
-fn draw_sights(input: &PlanInput<'_>, stream: &mut EntityLog) {
+fn draw_expected_tags(input: &PlanInput<'_>, stream: &mut EntityLog) {
     let entity = format!("{BASE}/sights");
     let mut since_s = 0.0;
     for pose in &input.plan.pose {

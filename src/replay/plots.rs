@@ -3,16 +3,11 @@
 use rerun::components::MarkerShape;
 use rerun::{Scalars, SeriesLines, SeriesPoints};
 
-use super::ReplayScene;
-use super::colors::{self, Rgba};
-use super::rrd::EntityLog;
+use crate::colors::{self, Rgba};
+use crate::entities::{COUNTS, JOINT_ANGLE, JOINT_ERROR, TEMPERATURE, TOOL_ERROR};
+use crate::entity_log::EntityLog;
+use crate::scene::ReplayScene;
 use armcal_core::streams::{JointAngles, ReachAttempt};
-
-pub(super) const JOINT_ERROR: &str = "/plots/joint_error";
-pub(super) const JOINT_ANGLE: &str = "/plots/joint_angle";
-pub(super) const TOOL_ERROR: &str = "/plots/tool_error";
-pub(super) const TEMPERATURE: &str = "/plots/temperature";
-pub(super) const COUNTS: &str = "/plots/counts";
 
 /// Samples of what moves, and of what does not, a second.
 const FAST_HZ: f64 = 12.5;

@@ -3,17 +3,13 @@
 use nalgebra::{Isometry3, Translation3};
 use rerun::{Boxes3D, FillMode, Points3D, ViewCoordinates};
 
-use super::ReplayScene;
-use super::colors;
-use super::rrd::EntityLog;
-use super::shapes::{Look, fix_shapes, quaternion, transform, vector};
+use crate::colors;
+use crate::entities::{BASE, VEHICLE, WORLD};
+use crate::entity_log::EntityLog;
+use crate::scene::ReplayScene;
+use crate::shapes::{Look, log_shapes, quaternion, transform, vector};
 use armcal_core::robot::SurveyedTag;
 use armcal_core::spatial::{Pose, Vehicle, World};
-
-/// Entities that carry the frames.
-pub(super) const WORLD: &str = "/world";
-pub(super) const VEHICLE: &str = "/world/vehicle";
-pub(super) const BASE: &str = "/world/vehicle/base";
 
 /// Half of the seafloor that is drawn, m.
 const SEAFLOOR_HALF_M: f64 = 8.0;
@@ -71,7 +67,7 @@ pub(super) fn draw(run: &ReplayScene, stream: &mut EntityLog) {
     }
     if let Some(vehicle) = run.vehicle {
         let parts = vehicle.parts.iter().map(|part| &part.placed);
-        fix_shapes(stream, &format!("{VEHICLE}/body"), parts, Look::Drawn);
+        log_shapes(stream, &format!("{VEHICLE}/body"), parts, Look::Drawn);
         stream.log_static(BASE, &transform(vehicle.vehicle_from_base.isometry()));
     }
     draw_tags(run, stream);
@@ -86,7 +82,7 @@ fn draw_site(run: &ReplayScene, stream: &mut EntityLog) {
         stream.log_static(&format!("{WORLD}/seafloor"), &floor);
     }
     let obstacles = scene.obstacles.iter().map(|part| &part.placed);
-    fix_shapes(stream, &format!("{WORLD}/obstacles"), obstacles, Look::Drawn);
+    log_shapes(stream, &format!("{WORLD}/obstacles"), obstacles, Look::Drawn);
 }
 
 /// Each tag as a white plate with a black square and a white middle; the base tag's plate is blue.

@@ -3,8 +3,8 @@
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use rerun::{Boxes3D, Capsules3D, Cylinders3D, Ellipsoids3D, FillMode, Mesh3D, Transform3D};
 
-use super::colors::Rgba;
-use super::rrd::EntityLog;
+use crate::colors::Rgba;
+use crate::entity_log::EntityLog;
 use armcal_core::robot::{Hull, PlacedShape, Shape};
 
 /// How a body looks.
@@ -49,7 +49,7 @@ impl Batch {
 }
 
 /// Draws shapes, fixed in the frame of `entity`, under it.
-pub(super) fn fix_shapes<'a>(
+pub(super) fn log_shapes<'a>(
     stream: &mut EntityLog,
     entity: &str,
     shapes: impl IntoIterator<Item = &'a PlacedShape>,

@@ -4,12 +4,11 @@ use std::fmt::Write;
 
 use rerun::TextDocument;
 
-use super::rrd::EntityLog;
-use super::{ReplayInput, ReplayScene};
+use crate::entities::SUMMARY;
+use crate::entity_log::EntityLog;
+use crate::scene::{ReplayInput, ReplayScene};
 use armcal_core::log::Completeness;
 use armcal_core::streams::ReachAttempt;
-
-pub(super) const SUMMARY: &str = "/summary";
 
 /// Draws the page.
 pub(super) fn draw(run: &ReplayScene, input: &ReplayInput, stream: &mut EntityLog) {

@@ -3,12 +3,12 @@
 use nalgebra::Vector3;
 use rerun::{LineStrips3D, Points3D};
 
-use super::ReplayScene;
-use super::colors::{self, Rgba};
-use super::rrd::EntityLog;
-use super::scenery::BASE;
-use super::shapes::vector;
-use super::tracks::Span;
+use crate::colors::{self, Rgba};
+use crate::entities::BASE;
+use crate::entity_log::EntityLog;
+use crate::scene::ReplayScene;
+use crate::shapes::vector;
+use crate::tracks::Span;
 use armcal_core::streams::{MarkKind, ReachAttempt, ReachTask};
 
 /// Small tolerances are drawn larger than they are, to be seen at all, m.

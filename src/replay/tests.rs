@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
-use super::*;
+use crate::*;
 use armcal_core::kinematics::{IkGoal, IkSettings, JointLimits, solve_position};
-use armcal_core::log::{RecordingHeader, RecordingWriter, RosMessage, read_recording, ros};
-use armcal_core::robot::{Hull, Part, PlacedShape, Shape};
+use armcal_core::log::{Recording, RecordingHeader, RecordingWriter, RosMessage, read_recording, ros};
+use armcal_core::robot::{Hull, Part, PlacedShape, Robot, Shape};
 use armcal_core::routine::Scene;
 use armcal_core::sensor::ArmSensors;
 use armcal_core::streams::{

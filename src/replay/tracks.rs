@@ -4,7 +4,7 @@ use std::path::Path;
 
 use nalgebra::{Isometry3, UnitQuaternion};
 
-use super::error::ReplayError;
+use crate::error::ReplayError;
 use armcal_core::log::{LogError, Recording, for_each_image};
 use armcal_core::robot::Robot;
 use armcal_core::spatial::{Pose, Vehicle, World};

@@ -5,8 +5,8 @@ use std::path::Path;
 use nalgebra::Isometry3;
 use serde::Deserialize;
 
-use super::error::ReplayError;
-use super::tracks::{TimeSeries, Tracks, blend_angles, blend_poses};
+use crate::error::ReplayError;
+use crate::tracks::{TimeSeries, Tracks, blend_angles, blend_poses};
 use armcal_core::log::{CdrError, RawMessage, decode, for_each_raw, ros};
 use armcal_core::robot::Robot;
 use armcal_core::spatial::{Base, Frame, Pose, Tool, Vehicle, World};

@@ -1,19 +1,19 @@
-//! The arm's own controller: closes the loop on its own sensors, in raw counts, at 100 Hz.
+//! The arm's controller: a closed loop on the joint sensors, in raw counts, at 100 Hz.
 //!
-//! Proportional with feed-forward of the set-point's rate; readings are low-pass filtered, and wild ones left out; the
-//! valve's deadband is jumped over, and the valve closes within a small band about the set-point. A joint that creeps
-//! faster than the loop can answer is held against what it creeps, learnt with the valve open near the set-point. Counts
-//! become angles by the datasheet's scale only, for the controller knows neither gain nor offset errors. The word's wrap
-//! is honoured: the short way round counts.
+//! It is proportional, with feed-forward of the set-point's rate. Readings are low-pass filtered and outliers rejected.
+//! The command skips the valve's deadband, and the valve closes within a small band about the set-point. For a joint
+//! that creeps faster than the loop corrects, the controller learns a counter-command while the valve is open near the
+//! set-point. Counts become angles by the nominal scale, without gain and offset errors. Differences of counts take the
+//! shorter way across the wrap.
 
-use super::spec::{CONTROL_PERIOD_S, HydraulicsSpec};
+use crate::spec::{CONTROL_PERIOD_S, HydraulicsSpec};
 use armcal_core::robot::JointSensorSpec;
 use armcal_core::streams::{JointCounts, MAX_JOINTS};
 
 /// Set-points that come no farther apart than this make a path with a rate, periods.
 const PATH_PERIODS: u32 = 10;
 
-/// How far about the set-point creep is learnt, rest bands.
+/// Distance from the set-point within which creep is learnt, rest bands.
 const FAR_BANDS: f64 = 8.0;
 /// What a joint may do, over what its open valve gives it, before its readings count as wild: it swings on its oil.
 const REACHABLE: f64 = 2.0;
@@ -35,7 +35,7 @@ pub(super) struct Controller {
     path_periods: u32,
 }
 
-/// What all joints' loops have in common.
+/// Settings common to all joints' loops.
 #[derive(Clone, Copy, Debug)]
 struct Tuning {
     spec: HydraulicsSpec,
@@ -54,11 +54,11 @@ struct JointLoop {
     n_rejected: f64,
     filtered_counts: f64,
     feed_forward_rad_s: f64,
-    /// What the joint creeps by itself, the other way: learnt at rest.
+    /// Negative creep of the joint, learnt at rest.
     hold_rad_s: f64,
     /// With the valve open near the set-point.
     periods_near: u32,
-    /// Where the spool was sent.
+    /// Last command to the spool.
     spool: f64,
     play_side: f64,
     rest: Rest,
@@ -71,8 +71,8 @@ enum Rest {
 }
 
 impl Controller {
-    /// Starts at rest where `measured` says. `gear_ratio`, one a joint: it was tuned on this arm and knows which way the
-    /// counts run, else it would drive away from its set-points.
+    /// Starts at rest where `measured` says. `gear_ratio`, one a joint: it was tuned on this arm and knows which way
+    /// the counts run, else it would drive away from its set-points.
     pub(super) fn new(
         spec: &HydraulicsSpec,
         sensors: &[JointSensorSpec],
@@ -164,8 +164,8 @@ impl JointLoop {
         }
     }
 
-    /// The valve closes within the rest band, and opens again for a path or beyond twice the band. It stays open to hold a
-    /// joint against its creep.
+    /// The valve closes within the rest band, and opens again for a path or beyond twice the band. It stays open to
+    /// hold a joint against its creep.
     fn open_or_close(&mut self, spec: &HydraulicsSpec, error_rad: f64) {
         let band_rad = match self.rest {
             Rest::Closed => 2.0 * spec.rest_band_rad,

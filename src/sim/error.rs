@@ -1,4 +1,4 @@
-//! What can keep a world from being built, or its truth from being kept.
+//! Errors of building a world and of recording its truth.
 
 use std::path::PathBuf;
 

@@ -1,4 +1,4 @@
-//! What several tests of the truth side start from.
+//! Common start of the simulator's tests.
 
 use armcal_core::robot::{JointSensorSpec, SensorKind};
 

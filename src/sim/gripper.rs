@@ -1,7 +1,7 @@
 //! The gripper's jaws: they follow their command at a limited rate behind a valve's lag.
 //!
-//! `v` is the rate of the gap, `w = clamp((told - gap)/(4 lag), +-rate)` the rate wanted: `dv/dt = (w - v)/lag`. With that gain
-//! the loop is critically damped, so that the jaws do not swing past what they were told.
+//! `v` is the rate of the gap, `w = clamp((command - gap)/(4 lag), +-rate)` the rate wanted: `dv/dt = (w - v)/lag`.
+//! With that gain the loop is critically damped: the jaws do not overshoot their command.
 
 use armcal_core::robot::GripperSpec;
 
@@ -42,7 +42,7 @@ impl Gripper {
         self.opening_m = (self.opening_m + self.rate_m_s * step_s).clamp(0.0, self.opening_max_m);
     }
 
-    /// Comes to rest where it was told, for time that passes unseen.
+    /// Comes to rest at its command, for time that is skipped.
     pub(super) fn arrive(&mut self) {
         (self.opening_m, self.rate_m_s) = (self.told_m, 0.0);
     }

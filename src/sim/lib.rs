@@ -1,12 +1,13 @@
 //! TRUTH: a simulated arm on a vehicle at sea, with the errors that real ones have.
 //!
-//! [`World`] is an `Arm` like any other: it takes set-points in raw counts and answers with messages. What it knows
-//! beyond them (as-built sensors, true poses, contacts) goes into a truth stream of its own, which only the score
-//! reads. Arm and vehicle are one multibody in water, on compliant oil columns; the vehicle moves as prescribed or floats free; every error of
-//! [`WorldSpec`] is drawn from a random stream named after it, so that one seed gives one world, byte for byte.
+//! [`World`] is an `Arm`: it takes set-points in raw counts and returns messages. Its truth (as-built sensors, true
+//! poses, contacts) goes into a stream of its own, which only the score reads. Arm and vehicle are one multibody in
+//! water, on compliant oil columns; the vehicle moves as prescribed or floats free. Each error of [`WorldSpec`] has a
+//! random stream of its own, so that one seed gives one world, byte for byte.
 
 mod as_built;
-mod contact;
+mod body_poses;
+mod contact_onset;
 mod controller;
 mod convert;
 pub mod dynamics;
@@ -17,13 +18,12 @@ mod fixture;
 mod gripper;
 mod hydraulics;
 pub mod imaging;
-mod joint_load;
 mod physics;
-mod places;
-mod recorded;
+mod recorded_motion;
 mod sensors;
 mod solids;
 mod spec;
+mod temperatures;
 pub mod truth;
 mod vehicle;
 mod world;
@@ -34,7 +34,7 @@ pub use as_built::{
 };
 pub use error::SimError;
 pub use fault::{Fault, ScheduledFault};
-pub use recorded::{RecordedMotion, VehicleKinematics};
+pub use recorded_motion::{RecordedMotion, VehicleKinematics};
 pub use spec::{
     CameraMode, CameraWorldSpec, ClockSpec, HydraulicsSpec, ImageSpec, JointSensorsSpec, MotionKind, PhysicsSpec,
     Points, PortKind, TagsSpec, TemperatureSpec, UnmodelledObstacles, VehicleMotionSpec, WaterKind, WaterSpec,

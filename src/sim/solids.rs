@@ -1,12 +1,12 @@
-//! Every solid thing once: for collision, clearance and what hides a tag.
+//! Solids of arm, vehicle and scene: for collision, clearance and occlusion of tags.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use parry3d::math::{Pose3, Vec3};
 use parry3d::query::{self, Ray};
 use parry3d::shape::SharedShape;
 
-use super::convert::to_rapier;
-use super::places::BodyPoses;
+use crate::body_poses::BodyPoses;
+use crate::convert::to_rapier;
 use armcal_core::robot::{PlacedShape, Robot, Shape, Vehicle, parry_pose};
 use armcal_core::routine::Scene;
 
@@ -32,7 +32,7 @@ pub(super) struct Solid {
     half_extents_m: Vec3,
 }
 
-/// What a shape is fixed to.
+/// Body or frame that carries a shape.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Carrier {
     /// Body of the arm: 0 is the base, and with it the vehicle.
@@ -167,7 +167,7 @@ impl Solids {
         }
     }
 
-    /// The smallest distance of the given shapes, as placed; from `far_m` on not told apart.
+    /// Smallest distance of the given shapes as placed, at most `far_m`.
     pub(super) fn least_distance_m(&self, pairs: &[(usize, usize)], far_m: f64) -> f64 {
         pairs.iter().fold(far_m, |least_m, &(i, j)| {
             if self.is_farther(i, j, least_m) { least_m } else { least_m.min(self.distance(i, j)) }
@@ -190,7 +190,7 @@ impl Solids {
             || beside(&self.placed[i], a.half_extents_m, self.placed[j].translation, b.radius_m)
     }
 
-    /// How far the shapes on a carrier reach from its origin, m.
+    /// Largest distance of a carrier's shapes from its origin, m.
     pub(super) fn extent_m(&self, carrier: Carrier) -> f64 {
         let on_it = self.shapes.iter().filter(|solid| solid.carrier == carrier);
         on_it.map(|solid| solid.carrier_from_shape.translation.length() + solid.radius_m).fold(0.0, f64::max)

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector2;
 
-use super::trials::{DetectionStudy, Outcome, TagTrial};
+use crate::trials::{DetectionStudy, Outcome, TagTrial};
 use armcal_core::optics::{CornerNoise, DetectionChance};
 use armcal_sim::WaterKind;
 

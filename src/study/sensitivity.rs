@@ -8,7 +8,7 @@ use std::fmt::Write as _;
 use nalgebra::Point3;
 use rand::RngExt;
 
-use super::charts::{Axis, Panel, Series, Style, svg};
+use crate::charts::{Axis, Panel, Series, Style, svg};
 use armcal_belief::calib::{JointParameters, PositionMethod, PositionProblem, TagMeasurement, TagObservation, View};
 use armcal_belief::plan::{ClearanceModel, VisibilityModel};
 use armcal_core::joints::JointAngles;

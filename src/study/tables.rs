@@ -5,9 +5,9 @@ use std::fmt::Write as _;
 
 use nalgebra::Vector2;
 
-use super::noise_fit::FittedNoise;
-use super::scenes::water_name;
-use super::trials::{DetectionStudy, Outcome, TagTrial};
+use crate::noise_fit::FittedNoise;
+use crate::scenes::water_name;
+use crate::trials::{DetectionStudy, Outcome, TagTrial};
 use armcal_core::stats::quantile;
 
 /// Error of each corner, px, with its squared size in units of the detector's own covariance.

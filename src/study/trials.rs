@@ -2,10 +2,10 @@
 
 use nalgebra::{Isometry3, Matrix2, Unit, Vector3};
 
-use super::scenes::{Condition, Scene, image_spec, lights, wall, wall_place};
+use crate::scenes::{Condition, Scene, image_spec, lights, wall, wall_place};
 use armcal_core::optics::Fisheye;
 use armcal_core::streams::RejectReason;
-use armcal_detect::{DetectError, Detected, DetectorSettings, GreyImage, TagDetector};
+use armcal_detect::{DetectError, DetectorSettings, GreyImage, ImageDetections, TagDetector};
 use armcal_sim::WaterKind;
 use armcal_sim::imaging::{Imager, Shot};
 
@@ -119,7 +119,7 @@ fn shoot(imager: &mut Imager, scene: &Scene, condition: &Condition, number: u64,
         is_silty: false,
         number,
     };
-    imager.shoot(&shot).grey(grey);
+    imager.take_image(&shot).grey(grey);
 }
 
 fn compare(
@@ -127,7 +127,7 @@ fn compare(
     scene: &Scene,
     condition: &Condition,
     image: &str,
-    seen: &Detected,
+    seen: &ImageDetections,
     study: &mut DetectionStudy,
 ) {
     let mut n_matched = 0;

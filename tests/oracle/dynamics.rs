@@ -2,7 +2,7 @@
 
 use armcal::robot::Robot;
 use armcal::sim::dynamics::{
-    BaseCoupling, Body, Coordinates, Environment, Equations, Force, Inertia, MAX_DOF, Motion, Multibody,
+    BaseCoupling, Body, Coordinates, Environment, EquationInput, Equations, Force, Inertia, MAX_DOF, Motion, Multibody,
 };
 use armcal::streams::{JointAngles, MAX_JOINTS};
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
@@ -212,7 +212,8 @@ pub(super) fn equations(
     around: &Environment,
     base: &BaseCoupling,
 ) -> Equations {
-    arm.equations(&of(q), &of(qd), around, base, &[Force::zero(); MAX_JOINTS + 1])
+    let (angles, rates, extra) = (&of(q), &of(qd), &[Force::zero(); MAX_JOINTS + 1]);
+    arm.equations(&EquationInput { angles, rates, around, base, extra })
 }
 
 /// `M x + bias`.

@@ -221,8 +221,8 @@ fn a_misread_tag_has_another_id_and_the_same_corners() {
 #[test]
 fn blows_move_what_they_hit() {
     let blows = [
-        Fault::VehicleKnocked { force_n: [4000.0, 0.0, 0.0], duration_s: 0.2, at_m: [0.0; 3] },
-        Fault::ArmBumped { link: "forearm_link".to_owned(), force_n: [0.0, 0.0, -800.0], duration_s: 0.2 },
+        Fault::VehicleImpulse { force_n: [4000.0, 0.0, 0.0], duration_s: 0.2, at_m: [0.0; 3] },
+        Fault::ArmImpulse { link: "forearm_link".to_owned(), force_n: [0.0, 0.0, -800.0], duration_s: 0.2 },
     ];
     for blow in blows {
         let (_, calm) = run(Vec::new(), 25.0, STAY);
@@ -245,7 +245,7 @@ fn blows_move_what_they_hit() {
         eprintln!("{}: vehicle {vehicle_m:.3} m, joints {joints_rad:.1e} rad", blow.kind());
         match blow {
             // 800 N s on 4 t: 0.2 m/s for a second or two.
-            Fault::VehicleKnocked { .. } => assert!((0.1..1.0).contains(&vehicle_m), "{vehicle_m}"),
+            Fault::VehicleImpulse { .. } => assert!((0.1..1.0).contains(&vehicle_m), "{vehicle_m}"),
             _ => assert!(vehicle_m == 0.0 && joints_rad > 5e-3, "{joints_rad}"),
         }
         let last = differences[differences.len() - 1];

@@ -1,9 +1,10 @@
-//! What is drawn, and what of it the truth writes down.
+//! As-built values: distributions, and their record in the truth.
 
 use std::path::Path;
 
-use super::*;
-use armcal_core::robot::{SensorKind, load, load_vehicle};
+use crate::as_built::*;
+use crate::spec::WorldSpec;
+use armcal_core::robot::{Robot, SensorKind, load, load_vehicle};
 
 fn robot() -> Robot {
     let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("robots");
@@ -13,6 +14,15 @@ fn robot() -> Robot {
 
 fn rms(values: &[f64]) -> f64 {
     (values.iter().map(|x| x * x).sum::<f64>() / values.len() as f64).sqrt()
+}
+
+/// Mean and spread of normal samples, to 4 sigma.
+pub(super) fn assert_normal(what: &str, samples: &[f64], std: f64) {
+    let n = samples.len() as f64;
+    let mean = samples.iter().sum::<f64>() / n;
+    let spread = (samples.iter().map(|x| x * x).sum::<f64>() / n).sqrt();
+    assert!(mean.abs() < 4.0 * std / n.sqrt(), "{what}: mean {mean}");
+    assert!((spread / std - 1.0).abs() < 4.0 / (2.0 * n).sqrt(), "{what}: {spread} against {std}");
 }
 
 /// Effects that are off leave no trace in the truth, and truths without them read.

@@ -1,8 +1,8 @@
-//! One body and what the water does to it: its inertia with the added mass, buoyancy, Morison's drag.
+//! One body in water: inertia with added mass, buoyancy, Morison's drag.
 
 use nalgebra::{Isometry3, Matrix3, Vector3};
 
-use super::spatial::{Force, Inertia, Motion};
+use crate::dynamics::spatial::{Force, Inertia, Motion};
 use armcal_core::robot::{LinkBody, PlacedShape};
 
 /// A body in its own link's frame.
@@ -31,7 +31,7 @@ pub struct HullDrag {
     pub quadratic: [f64; 6],
 }
 
-/// What the water drags of a body: at three points along its longest axis, per axis of its shape, in the link's frame.
+/// Drag surfaces of a body: at three points along its longest axis, per axis of its shape, in the link's frame.
 #[derive(Clone, Copy, Debug)]
 pub struct Surface {
     pub points_m: [Vector3<f64>; 3],
@@ -126,8 +126,8 @@ impl Body {
         weight + Force::at(&center, &(self.displaced_kg * (water_acceleration - gravity)))
     }
 
-    /// Morison's drag, `-1/2 rho Cd A |v| v` per axis of each shape at points along it; `motion` is that of the body against
-    /// the water.
+    /// Morison's drag, `-1/2 rho Cd A |v| v` per axis of each shape at points along it; `motion` is that of the body
+    /// against the water.
     pub(super) fn drag(&self, place: &Isometry3<f64>, motion: &Motion) -> Force {
         let mut total = Force::zero();
         if let Some(hull) = &self.hull {
@@ -197,9 +197,9 @@ fn volume_centroid(shapes: &[PlacedShape]) -> Option<Vector3<f64>> {
     (volume > 0.0).then(|| moment / volume)
 }
 
-/// Added mass of a shape in its owner's frame. A sphere's is half the displaced mass. Another shape's across each axis is
-/// that of a strip, `rho pi/4 a2 b` for a face of sides a <= b, with Pabst's factor for its finite length (Pabst 1930; DNV-RP-C205
-/// table A-2); turning, the strips of the longest axis move across the water.
+/// Added mass of a shape in its owner's frame. A sphere's is half the displaced mass. Another shape's across each axis
+/// is that of a strip, `rho pi/4 a2 b` for a face of sides a <= b, with Pabst's factor for its finite length (Pabst
+/// 1930; DNV-RP-C205 table A-2); turning, the strips of the longest axis move across the water.
 fn added_inertia(placed: &PlacedShape, water: &WaterProperties) -> Inertia {
     let size = Vector3::from(placed.shape.box_m());
     let scale = water.density_kg_m3 * water.added_mass_coefficient;

@@ -2,20 +2,20 @@
 
 use nalgebra::{Isometry3, Vector3};
 
-use super::body::Body;
-use super::spatial::{Force, Inertia, Motion};
-use super::system::{Coordinates, Symmetric};
+use crate::dynamics::body::Body;
+use crate::dynamics::spatial::{Force, Inertia, Motion};
+use crate::dynamics::system::{Coordinates, Symmetric};
 use armcal_core::kinematics::{Chain, LinkPoses};
 use armcal_core::streams::{JointAngles, MAX_JOINTS};
 
-/// The arm on its base. Body 0 is what the base carries; body `j + 1` hangs on joint `j`.
+/// The arm on its base. Body 0 is the base's own; body `j + 1` is moved by joint `j`.
 #[derive(Clone, Debug)]
 pub struct Multibody {
     chain: Chain,
     bodies: Vec<Body>,
 }
 
-/// What surrounds the arm at one instant, in base axes.
+/// Gravity, base velocity and water about the arm at one instant, in base axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Environment {
     /// m/s2.
@@ -40,18 +40,30 @@ impl Environment {
         }
     }
 
+    #[inline]
     fn water_moves(&self) -> bool {
         self.water_velocity != Vector3::zeros() || self.water_acceleration != Vector3::zeros()
     }
 }
 
-/// How the base takes part.
+/// Coupling of the base to the arm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum BaseCoupling {
     /// It accelerates as prescribed: spatial acceleration about its origin, base axes.
     Prescribed(Motion),
     /// It is free: its six coordinates (angular, then linear, base axes) come before the joints'.
     Free,
+}
+
+/// One state of the system, and the forces besides those of gravity and water.
+#[derive(Clone, Copy, Debug)]
+pub struct EquationInput<'a> {
+    pub angles: &'a JointAngles,
+    pub rates: &'a JointAngles,
+    pub around: &'a Environment,
+    pub base: &'a BaseCoupling,
+    /// On each body about the base's origin in base axes, e.g. of contacts.
+    pub extra: &'a [Force; MAX_JOINTS + 1],
 }
 
 /// Inertia and bias of one state.
@@ -72,7 +84,7 @@ impl Multibody {
         Self { chain, bodies }
     }
 
-    /// Replaces what the base carries.
+    /// Replaces the base's own body.
     pub fn set_base(&mut self, body: Body) {
         self.bodies[0] = body;
     }
@@ -87,21 +99,13 @@ impl Multibody {
         &self.bodies
     }
 
-    /// Inertia and bias at `angles` and `rates`. `extra` are forces on each body about the base's origin in base axes, e.g. of
-    /// contacts.
+    /// Inertia and bias of one state.
     #[must_use]
-    pub fn equations(
-        &self,
-        angles: &JointAngles,
-        rates: &JointAngles,
-        around: &Environment,
-        base: &BaseCoupling,
-        extra: &[Force; MAX_JOINTS + 1],
-    ) -> Equations {
+    pub fn equations(&self, input: &EquationInput) -> Equations {
+        let EquationInput { angles, rates, around, base, extra } = *input;
         let n = self.chain.n_joints();
         let poses = self.chain.link_poses(angles);
         let axes = joint_axes(&poses, n);
-        let water_moves = around.water_moves();
         let mut composite = [Inertia::zero(); MAX_JOINTS + 1];
         let mut force = [Force::zero(); MAX_JOINTS + 1];
         let mut velocity = around.base_velocity;
@@ -120,8 +124,7 @@ impl Multibody {
                 continue;
             }
             let place = poses.link(body);
-            let (inertia, wanted) =
-                self.bodies[body].newton_euler(place, &velocity, &acceleration, around, water_moves);
+            let (inertia, wanted) = self.bodies[body].newton_euler(place, &velocity, &acceleration, around);
             composite[body] = inertia;
             force[body] = wanted - extra[body];
         }
@@ -138,8 +141,13 @@ impl Multibody {
     pub fn static_torques(&self, angles: &JointAngles, gravity: &Vector3<f64>) -> JointAngles {
         let still = Environment { gravity: *gravity, ..Environment::still(0.0) };
         let rates = JointAngles::from_fn(angles.len(), |_| 0.0);
-        let base = BaseCoupling::Prescribed(Motion::zero());
-        let equations = self.equations(angles, &rates, &still, &base, &[Force::zero(); MAX_JOINTS + 1]);
+        let equations = self.equations(&EquationInput {
+            angles,
+            rates: &rates,
+            around: &still,
+            base: &BaseCoupling::Prescribed(Motion::zero()),
+            extra: &[Force::zero(); MAX_JOINTS + 1],
+        });
         JointAngles::from_fn(angles.len(), |j| -equations.bias[j])
     }
 
@@ -163,18 +171,17 @@ impl Multibody {
 impl Body {
     /// Inertia of the body, and the force that it needs to move so, both about the base's origin.
     ///
-    /// The water's part, with `u` its velocity and `r` the body's velocity against it (Kirchhoff; in the frame that moves with
-    /// the water the spatial acceleration has `w x u` more): `Ia (a + w x u - du/dt) + r x* Ia r`.
+    /// The water's part, with `u` its velocity and `r` the body's velocity against it (Kirchhoff; in the frame that
+    /// moves with the water the spatial acceleration has `w x u` more): `Ia (a + w x u - du/dt) + r x* Ia r`.
     fn newton_euler(
         &self,
         place: &Isometry3<f64>,
         velocity: &Motion,
         acceleration: &Motion,
         around: &Environment,
-        water_moves: bool,
     ) -> (Inertia, Force) {
         let against_water = Motion::new(velocity.angular, velocity.linear - around.water_velocity);
-        let (inertia, inertial) = if water_moves {
+        let (inertia, inertial) = if around.water_moves() {
             let (rigid, added) = (self.rigid.placed(place), self.added.placed(place));
             let seen = velocity.angular.cross(&around.water_velocity) - around.water_acceleration;
             let in_water = Motion::new(acceleration.angular, acceleration.linear + seen);
@@ -210,7 +217,7 @@ fn assemble(
 ) -> Equations {
     let first = if matches!(base, BaseCoupling::Free) { 6 } else { 0 };
     let mut inertia = Symmetric::zeros(first + n);
-    let mut bias = [0.0; super::MAX_DOF];
+    let mut bias = [0.0; crate::dynamics::MAX_DOF];
     for j in 0..n {
         let carried = composite[j + 1].momentum(&axes[j]);
         for (i, axis) in axes.iter().enumerate().take(j + 1) {

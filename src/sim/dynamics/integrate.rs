@@ -1,31 +1,33 @@
-//! One step: ROS2, a linearly implicit Runge-Kutta method of second order (Verwer, Spee, Blom, Hundsdorfer, SIAM J. Sci.
-//! Comput. 20, 1999), `gamma = 1 - 1/sqrt 2`, L-stable.
+//! One step: ROS2, a linearly implicit Runge-Kutta method of second order (Verwer, Spee, Blom, Hundsdorfer, SIAM J.
+//! Sci. Comput. 20, 1999), `gamma = 1 - 1/sqrt 2`, L-stable.
 //!
-//! For `y' = f(y)` and any matrix `A` near its Jacobian: `(1 - g h A) k1 = f(y)`, `(1 - g h A) w = f(y + h k1) - 2 g h A k1`,
-//! `y += h/2 (k1 + w)`. The order does not depend on `A`, stability does: here it holds the springs and dampers about the
-//! joints and those of contacts. Their blocks put `g h C + g2 h2 K` on top of the inertia, so that a step costs two
-//! factorisations of it. A free base moves on its group, by the exponential of its twist.
+//! For `y' = f(y)` and any matrix `A` near its Jacobian: `(1 - g h A) k1 = f(y)`,
+//! `(1 - g h A) w = f(y + h k1) - 2 g h A k1`, `y += h/2 (k1 + w)`. The order does not depend on `A`, stability does:
+//! here it holds the springs and dampers about the joints and those of contacts. Their blocks put `g h C + g2 h2 K` on
+//! top of the inertia, so that a step costs two factorisations of it. A free base moves on its group, by the
+//! exponential of its twist.
 
 use nalgebra::{Isometry3, Vector6};
 
-use super::equations::{BaseCoupling, Environment, Equations, Multibody};
-use super::spatial::{Force, Motion};
-use super::system::{Coordinates, MAX_DOF, Symmetric};
-use crate::joint_load::JointLoad;
+use crate::dynamics::JointLoad;
+use crate::dynamics::equations::{BaseCoupling, Environment, EquationInput, Equations, Multibody};
+use crate::dynamics::spatial::{Force, Motion};
+use crate::dynamics::system::{Coordinates, MAX_DOF, Symmetric};
 use armcal_core::spatial::exp;
 use armcal_core::streams::{JointAngles, MAX_JOINTS};
 
-/// Where the system is and how it moves.
+/// Positions and velocities of the system.
 #[derive(Clone, Copy, Debug)]
 pub struct SystemState {
     pub angles: JointAngles,
     pub rates: JointAngles,
-    /// Of a free base; of one that moves as prescribed the caller knows.
+    /// Of a free base; the caller has that of a prescribed base.
     pub world_from_base: Isometry3<f64>,
     pub base_velocity: Motion,
 }
 
-/// A spring and a damper along one direction of the generalised coordinates: `force = start - stiffness travel - damping rate`.
+/// A spring and a damper along one direction of the generalised coordinates:
+/// `force = start - stiffness travel - damping rate`.
 #[derive(Clone, Copy, Debug)]
 pub struct ContactRow {
     pub direction: Coordinates,
@@ -34,7 +36,7 @@ pub struct ContactRow {
     pub damping_n_s_m: f64,
 }
 
-/// What acts during one step.
+/// Loads during one step.
 pub struct StepInput<'a> {
     pub step_s: f64,
     pub loads: &'a [JointLoad; MAX_JOINTS],
@@ -81,8 +83,13 @@ impl Multibody {
     fn slope(&self, input: &StepInput, stage: Stage, at: &SystemState, first: Option<&Slope>) -> Slope {
         let gh = GAMMA * input.step_s;
         let (around, base) = (input.around)(stage, at);
-        let Equations { mut inertia, bias, first_joint } =
-            self.equations(&at.angles, &at.rates, &around, &base, input.extra);
+        let Equations { mut inertia, bias, first_joint } = self.equations(&EquationInput {
+            angles: &at.angles,
+            rates: &at.rates,
+            around: &around,
+            base: &base,
+            extra: input.extra,
+        });
         let n = first_joint + self.chain().n_joints();
         let mut velocity = coordinates(at, first_joint);
         let mut forces: Coordinates = std::array::from_fn(|i| -bias[i]);
@@ -103,15 +110,9 @@ impl Multibody {
         if !input.contacts.is_empty() {
             let now = coordinates(at, first_joint);
             let travel: Coordinates = first.map_or([0.0; MAX_DOF], |f| f.position.map(|rate| rate * input.step_s));
+            let state = RowState { n, gh, now: &now, travel: &travel, velocity: &velocity, first };
             for row in input.contacts {
-                add_row(
-                    row,
-                    gh,
-                    n,
-                    &mut inertia,
-                    &mut forces,
-                    &RowState { now: &now, travel: &travel, velocity: &velocity, first },
-                );
+                add_row(row, &state, &mut inertia, &mut forces);
             }
         }
         let acceleration = inertia.solve(&forces);
@@ -119,8 +120,12 @@ impl Multibody {
     }
 }
 
-/// What a contact's force in a stage depends on.
+/// State that a contact's force in a stage depends on.
 struct RowState<'a> {
+    /// Coordinates of the system.
+    n: usize,
+    /// Step length times gamma, s.
+    gh: f64,
     now: &'a Coordinates,
     /// Since the step's start.
     travel: &'a Coordinates,
@@ -129,8 +134,9 @@ struct RowState<'a> {
     first: Option<&'a Slope>,
 }
 
-fn add_row(row: &ContactRow, gh: f64, n: usize, inertia: &mut Symmetric, forces: &mut Coordinates, state: &RowState) {
-    let along = |v: &Coordinates| (0..n).map(|i| row.direction[i] * v[i]).sum::<f64>();
+fn add_row(row: &ContactRow, state: &RowState, inertia: &mut Symmetric, forces: &mut Coordinates) {
+    let gh = state.gh;
+    let along = |v: &Coordinates| (0..state.n).map(|i| row.direction[i] * v[i]).sum::<f64>();
     let (k, c) = (row.stiffness_n_m, row.damping_n_s_m);
     let mut force = row.start_n - k * along(state.travel) - c * along(state.now) - gh * k * along(state.velocity);
     if let Some(first) = state.first {

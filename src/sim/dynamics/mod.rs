@@ -1,21 +1,22 @@
 //! Rigid-body dynamics of arm and vehicle as one system, in water.
 //!
-//! [`Multibody`] has the drawing's masses and what the water adds to them; [`Multibody::equations`] gives the joint-space
+//! [`Multibody`] has the nominal masses and the water's added masses; [`Multibody::equations`] gives the joint-space
 //! inertia and the bias forces of one state (composite rigid bodies and recursive Newton-Euler, Featherstone 2008,
-//! chapters 5, 6 and 9), on a base that moves as prescribed or floats free. `integrate` takes the steps, linearly implicit
-//! in what acts about the joints. No allocation, no engine: oracles compare it with Pinocchio.
+//! chapters 5, 6 and 9), on a base that moves as prescribed or floats free. `integrate` takes the steps, linearly
+//! implicit in the loads about the joints. It allocates nothing. Oracles compare it with Pinocchio.
 
 mod body;
 mod equations;
 mod integrate;
+mod joint_load;
 mod spatial;
 mod system;
 
-pub use super::joint_load::JointLoad;
 pub(crate) use body::WaterProperties;
 pub use body::{Body, HullDrag, Surface};
-pub use equations::{BaseCoupling, Environment, Equations, Multibody};
+pub use equations::{BaseCoupling, Environment, EquationInput, Equations, Multibody};
 pub use integrate::{ContactRow, Stage, StepInput, SystemState};
+pub use joint_load::JointLoad;
 pub use spatial::{Force, Inertia, Motion};
 pub use system::{Coordinates, MAX_DOF, Symmetric};
 

@@ -2,8 +2,8 @@
 
 use nalgebra::{Isometry3, Matrix3, UnitQuaternion, Vector3};
 
-use super::*;
-use crate::joint_load::JointLoad;
+use crate::dynamics::JointLoad;
+use crate::dynamics::*;
 use armcal_core::kinematics::{Chain, ChainJoint};
 use armcal_core::robot::{PlacedShape, Robot, Shape, load};
 use armcal_core::streams::{JointAngles, MAX_JOINTS};
@@ -29,7 +29,7 @@ fn at_rest(angles: JointAngles) -> SystemState {
     }
 }
 
-/// What acts on a system that floats free in water at rest.
+/// Loads on a free-floating system in water at rest.
 struct Float<'a> {
     step_s: f64,
     gravity_m_s2: f64,
@@ -85,13 +85,15 @@ fn is_multiple(t: f64, every: f64) -> bool {
     (t / every - (t / every).round()).abs() < 1e-6
 }
 
-/// The Titan on a vehicle of `mass_kg`, wet or dry, without drag.
-fn on_vehicle(robot: &Robot, mass_kg: f64, is_wet: bool) -> Multibody {
-    let water = WaterProperties { density_kg_m3: if is_wet { 1025.0 } else { 0.0 }, ..SEA };
+const SEA_KG_M3: f64 = 1025.0;
+
+/// The Titan on a vehicle of `mass_kg`, without drag, in water or, at density 0, in air.
+fn on_vehicle(robot: &Robot, mass_kg: f64, density_kg_m3: f64) -> Multibody {
+    let water = WaterProperties { density_kg_m3, ..SEA };
     let mut bodies: Vec<Body> = robot.bodies.iter().map(|link| Body::link(link, &water)).collect();
     let inertia = Matrix3::from_diagonal(&(Vector3::new(0.5, 0.9, 1.0) * mass_kg));
     let mut vehicle = Body::dry(mass_kg, Vector3::new(-1.7, 0.6, -0.1), &inertia);
-    if is_wet {
+    if density_kg_m3 > 0.0 {
         let linear = Matrix3::from_diagonal(&(Vector3::new(0.5, 1.0, 1.5) * mass_kg));
         vehicle.added = Inertia { rotational: inertia * 0.5, coupling: Matrix3::zeros(), linear };
     }
@@ -100,6 +102,16 @@ fn on_vehicle(robot: &Robot, mass_kg: f64, is_wet: bool) -> Multibody {
     }
     bodies[0] = vehicle;
     Multibody::new(robot.chain.clone(), bodies)
+}
+
+fn equations(
+    system: &Multibody,
+    angles: &JointAngles,
+    rates: &JointAngles,
+    around: &Environment,
+    base: &BaseCoupling,
+) -> Equations {
+    system.equations(&EquationInput { angles, rates, around, base, extra: &[Force::zero(); MAX_JOINTS + 1] })
 }
 
 /// Momentum about the world's origin in world axes.
@@ -114,13 +126,13 @@ fn push_about(t: f64, j: usize) -> f64 {
     [200.0, 300.0, 150.0, 40.0, 30.0, 10.0][j.min(5)] * ((1.0 + 0.3 * j as f64) * t).sin()
 }
 
-/// An arm that swings about on a free vehicle in still water without drag cannot change the momentum of the whole: that of the
-/// water which moves with the bodies is part of it.
+/// An arm that swings about on a free vehicle in still water without drag cannot change the momentum of the whole: that
+/// of the water which moves with the bodies is part of it.
 #[test]
 fn arm_and_free_vehicle_keep_their_momentum() {
     let robot = titan();
-    for is_wet in [false, true] {
-        let system = on_vehicle(&robot, 400.0, is_wet);
+    for (medium, density_kg_m3) in [("dry", 0.0), ("wet", SEA_KG_M3)] {
+        let system = on_vehicle(&robot, 400.0, density_kg_m3);
         let drift = [4e-3, 2e-3, 1e-3].map(|step_s| {
             let mut state = at_rest(robot.stowed);
             Float { step_s, gravity_m_s2: 0.0, torque_n_m: &push_about, damping_n_m_s_rad: 50.0 }.run_seen(
@@ -131,10 +143,7 @@ fn arm_and_free_vehicle_keep_their_momentum() {
                     if is_multiple(t, 0.04) {
                         let own = system.momentum(&at.angles, &at.rates, &Motion::zero());
                         let (own, left) = (own.moment.norm(), world_momentum(&system, at).moment.norm());
-                        eprintln!(
-                            "plot momentum/{}/{step_s} {t:.3} {left:e} {own:e}",
-                            ["dry", "wet"][usize::from(is_wet)]
-                        );
+                        eprintln!("plot momentum/{medium}/{step_s} {t:.3} {left:e} {own:e}");
                     }
                 },
             );
@@ -145,7 +154,7 @@ fn arm_and_free_vehicle_keep_their_momentum() {
             let left = world_momentum(&system, &state);
             (left.force.norm() / own.force.norm()).max(left.moment.norm() / own.moment.norm())
         });
-        eprintln!("wet {is_wet}: momentum left at 4, 2, 1 ms over the arm's own {drift:?}");
+        eprintln!("{medium}: momentum left at 4, 2, 1 ms over the arm's own {drift:?}");
         assert!(drift[1] < 1e-4, "{drift:?}");
         assert!(drift[0] / drift[2] > 8.0, "of second order at least: {drift:?}");
     }
@@ -189,7 +198,7 @@ fn an_undamped_swing_keeps_its_energy() {
     let around = Environment::still(G);
     let energy = |state: &SystemState| {
         let base = BaseCoupling::Prescribed(Motion::zero());
-        let e = system.equations(&state.angles, &state.rates, &around, &base, &[Force::zero(); MAX_JOINTS + 1]);
+        let e = equations(&system, &state.angles, &state.rates, &around, &base);
         let rates: Coordinates = std::array::from_fn(|j| if j < 6 { state.rates[j] } else { 0.0 });
         let kinetic = 0.5 * e.inertia.quadratic(&rates);
         let poses = system.chain().link_poses(&state.angles);
@@ -287,7 +296,8 @@ fn ball(mass_kg: f64, radius_m: f64, drag_coefficient: f64) -> Multibody {
     Multibody::new(Chain::new(Vec::new()), vec![Body::link(&link, &water)])
 }
 
-/// A sinking ball: `v = vt tanh(t a / vt)` with `a = (m - md) g / (m + md/2)`, `vt` where drag balances the weight in water.
+/// A sinking ball: `v = vt tanh(t a / vt)` with `a = (m - md) g / (m + md/2)`, `vt` where drag balances the weight in
+/// water.
 #[test]
 fn a_ball_sinks_at_its_terminal_velocity() {
     let (mass, radius, cd) = (60.0, 0.2, 0.5);
@@ -326,18 +336,18 @@ fn accelerating_water_takes_a_ball_along() {
     let to_base = turned.rotation.inverse();
     let around = Environment { water_acceleration: to_base * acceleration, ..Environment::still(0.0) };
     let none = JointAngles::from_slice(&[]);
-    let e = system.equations(&none, &none, &around, &BaseCoupling::Free, &[Force::zero(); MAX_JOINTS + 1]);
+    let e = equations(&system, &none, &none, &around, &BaseCoupling::Free);
     let a = Motion::from_slice(&e.inertia.solve(&std::array::from_fn(|i| -e.bias[i]))).linear;
     let expected = to_base * acceleration * (1.5 * displaced / (mass + 0.5 * displaced));
     assert!((a - expected).norm() < 1e-12, "{a} {expected}");
 }
 
-/// Seen from water that moves steadily nothing changes: a spinning, sliding hull of uneven added mass accelerates alike in still
-/// water and carried along by a current (Galilei).
+/// Seen from water that moves steadily nothing changes: a spinning, sliding hull of uneven added mass accelerates alike
+/// in still water and carried along by a current (Galilei).
 #[test]
 fn a_current_carries_everything_along() {
     let robot = titan();
-    let system = on_vehicle(&robot, 400.0, true);
+    let system = on_vehicle(&robot, 400.0, SEA_KG_M3);
     let rates = JointAngles::from_slice(&[0.3, -0.2, 0.4, 0.5, -0.6, 0.2]);
     let velocity = Motion::new(Vector3::new(0.2, -0.3, 0.5), Vector3::new(0.4, 0.1, -0.2));
     let current = Vector3::new(0.7, -0.4, 0.3);
@@ -347,7 +357,7 @@ fn a_current_carries_everything_along() {
             water_velocity: water,
             ..Environment::still(G)
         };
-        let e = system.equations(&robot.stowed, &rates, &around, &BaseCoupling::Free, &[Force::zero(); MAX_JOINTS + 1]);
+        let e = equations(&system, &robot.stowed, &rates, &around, &BaseCoupling::Free);
         let a = e.inertia.solve(&std::array::from_fn(|i| -e.bias[i]));
         // In inertial axes: a point's acceleration is that of the components plus w x v.
         let spatial = Motion::from_slice(&a);

@@ -1,17 +1,17 @@
 //! One joint's actuator: piston, oil column, relief valve, friction and end stops.
 
-use super::ActuatorInput;
-use super::end_stop::EndStop;
-use super::friction::Friction;
-use super::valve::Valve;
-use crate::joint_load::JointLoad;
+use crate::dynamics::JointLoad;
+use crate::hydraulics::actuator_input::ActuatorInput;
+use crate::hydraulics::end_stop::EndStop;
+use crate::hydraulics::friction::Friction;
+use crate::hydraulics::valve::Valve;
 use crate::spec::HydraulicsSpec;
 use armcal_core::kinematics::JointLimits;
 
 /// The drive of one joint.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Actuator {
-    /// Where the piston stops; the joint itself stops there when it has end stops.
+    /// Ends of the piston's stroke; a joint with end stops stops there, too.
     limits: Option<JointLimits>,
     pub(super) torque_max_n_m: f64,
     /// Of a fully open valve without load.
@@ -25,7 +25,7 @@ pub(super) struct Actuator {
     valve: Valve,
     friction: Friction,
     end_stop: EndStop,
-    /// Where the joint would be if oil were stiff.
+    /// Position of the joint with incompressible oil.
     pub(super) piston_rad: f64,
     pub(super) piston_rate_rad_s: f64,
     /// Of the oil's pressure at the start of the last step.
@@ -116,8 +116,8 @@ impl Actuator {
         supply_w - self.middle_n_m * self.piston_rate_rad_s
     }
 
-    /// Moves the piston by a step with the `share` of the asked oil that the pump gives, then settles what acts about the
-    /// joint during the step.
+    /// Moves the piston by a step with the `share` of the asked oil that the pump gives, then settles what acts about
+    /// the joint during the step.
     pub(super) fn advance(&mut self, share: f64, step_s: f64, angle_rad: f64, rate_rad_s: f64) {
         let before_rad = self.piston_rad;
         let leak_rad_s = if self.is_locked { 0.0 } else { self.leakage_rad_s_n_m * self.middle_n_m };
@@ -141,8 +141,9 @@ impl Actuator {
         self.load = self.column + self.friction.load() + self.end_stop.load(angle_rad, rate_rad_s);
     }
 
-    /// Lets the piston yield where the relief valve, or a damaged hose, holds no more at the step's end (`angle_rad`). While
-    /// the joint drives it on (`slip_rad_s`, joint against piston), the column gives that torque and nothing else.
+    /// Lets the piston yield where the relief valve, or a damaged hose, holds no more at the step's end (`angle_rad`).
+    /// While the joint drives it on (`slip_rad_s`, joint against piston), the column gives that torque and nothing
+    /// else.
     fn relieve(&mut self, next_rad: &mut f64, angle_rad: f64, slip_rad_s: f64) -> bool {
         if self.is_locked {
             return false;

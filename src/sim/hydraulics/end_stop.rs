@@ -1,6 +1,6 @@
 //! Stops at the ends of a joint's range: stiff, one-sided, without bounce.
 
-use crate::joint_load::JointLoad;
+use crate::dynamics::JointLoad;
 use crate::spec::HydraulicsSpec;
 use armcal_core::kinematics::JointLimits;
 

@@ -1,11 +1,11 @@
-//! Dry friction of one joint's seals and bearings, which really holds.
+//! Dry friction of one joint's seals and bearings, with true sticking.
 //!
 //! An elasto-plastic element (Prandtl's; Dupont, Hayward, Armstrong, Altpeter, IEEE Trans. Autom. Control 47, 2002): a
 //! bristle that is a spring about its anchor until it breaks away at the stiction torque, and drags its anchor along at
 //! the sliding torque after that. Below breakaway it is a spring and nothing else, so that nothing can creep: neither
 //! under a steady load nor under one that shakes.
 
-use crate::joint_load::JointLoad;
+use crate::dynamics::JointLoad;
 use crate::spec::HydraulicsSpec;
 
 #[derive(Clone, Copy, Debug)]
@@ -19,7 +19,7 @@ pub(super) struct Friction {
     damping_n_m_s_rad: f64,
     /// In the coming step, while it is stuck.
     stuck_damping_n_m_s_rad: f64,
-    /// Where the bristle would be without torque.
+    /// Anchor of the bristle: its position without torque.
     anchor_rad: f64,
     slide: Slide,
 }

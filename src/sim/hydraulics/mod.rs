@@ -1,115 +1,18 @@
-//! Valves, pump and oil columns: from the controller's command to what acts about each joint.
+//! Valves, pump and oil columns: from the controller's command to the load about each joint.
 //!
-//! A `valve`'s spool lags behind its command and opens beyond a deadband; the valves share one pump. Their oil moves each
-//! `actuator`'s piston, which meets the joint through a column of oil that is a spring; a relief valve lets it yield.
-//! `friction` holds the joint below its breakaway torque, and an `end_stop` at the ends of its range.
+//! A `valve`'s spool lags behind its command and opens beyond a deadband; the valves share one pump. Their oil moves
+//! each `actuator`'s piston, which meets the joint through a column of oil that is a spring; a relief valve lets it
+//! yield. `friction` holds the joint below its breakaway torque, and an `end_stop` at the ends of its range.
 
 mod actuator;
+mod actuator_input;
 mod end_stop;
 mod friction;
+mod system;
 mod valve;
 
-use super::joint_load::JointLoad;
-use super::spec::HydraulicsSpec;
-use actuator::Actuator;
-use armcal_core::kinematics::JointLimits;
-use armcal_core::streams::{JointAngles, MAX_JOINTS};
-
-/// All drives and the pump.
-#[derive(Clone, Debug)]
-pub(super) struct Hydraulics {
-    pump_flow_m3_s: f64,
-    /// Of the pump's pressure and flow, over the nominal ones.
-    pump_ratio: f64,
-    actuators: Vec<Actuator>,
-    heat_w: f64,
-    step_s: f64,
-}
-
-/// What a drive is built from.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct ActuatorInput {
-    pub limits: Option<JointLimits>,
-    /// At the supply pressure, N m; from the URDF's effort.
-    pub torque_max_n_m: f64,
-    /// The controller's rate limit.
-    pub rate_limit_rad_s: f64,
-}
-
-impl Hydraulics {
-    pub(super) fn new(spec: &HydraulicsSpec, inputs: &[ActuatorInput], step_s: f64) -> Self {
-        Self {
-            pump_flow_m3_s: spec.pump_flow_l_min / 60_000.0,
-            pump_ratio: 1.0,
-            actuators: inputs.iter().map(|input| Actuator::new(spec, input, step_s)).collect(),
-            heat_w: 0.0,
-            step_s,
-        }
-    }
-
-    /// The longest step in which the valves' flow can follow the torque that it makes: the load changes the rate of a fully open
-    /// valve, `rate_max/(2 tau_max)` per N m, and the piston's way the load, K per rad, and that is not taken implicitly.
-    pub(super) fn longest_step_s(&self) -> f64 {
-        let relaxation = |a: &Actuator| 2.0 * a.torque_max_n_m / (a.stiffness_n_m_rad * a.rate_max_rad_s);
-        0.5 * self.actuators.iter().map(relaxation).fold(f64::INFINITY, f64::min)
-    }
-
-    /// Places the pistons so that the columns carry `-torques` at `angles`, at rest and without friction's help.
-    pub(super) fn balance(&mut self, angles: &JointAngles, torques: &JointAngles) {
-        for (j, actuator) in self.actuators.iter_mut().enumerate() {
-            actuator.balance(angles[j], torques[j]);
-        }
-    }
-
-    /// Moves spools, pistons and friction by one step from the joints' state at its start; `commands` are -1..1.
-    pub(super) fn step(&mut self, commands: &[f64; MAX_JOINTS], angles: &JointAngles, rates: &JointAngles) {
-        let mut flow_m3_s = 0.0;
-        for (j, actuator) in self.actuators.iter_mut().enumerate() {
-            flow_m3_s += actuator.ask(commands[j], self.pump_ratio, angles[j]);
-        }
-        // One pump feeds all: when they ask for more, each gets its share.
-        let pump_m3_s = self.pump_flow_m3_s * self.pump_ratio;
-        let share = if flow_m3_s > pump_m3_s { pump_m3_s / flow_m3_s } else { 1.0 };
-        self.heat_w = 0.0;
-        for (j, actuator) in self.actuators.iter_mut().enumerate() {
-            actuator.advance(share, self.step_s, angles[j], rates[j]);
-            self.heat_w += actuator.heat_w(self.pump_ratio);
-        }
-    }
-
-    /// What acts about joint `joint` during the coming step: oil column, friction and end stop.
-    pub(super) fn load(&self, joint: usize) -> JointLoad {
-        self.actuators[joint].load
-    }
-
-    /// The torque that each oil column puts on its joint, N m.
-    pub(super) fn torques(&self, angles: &JointAngles, rates: &JointAngles) -> JointAngles {
-        JointAngles::from_fn(self.actuators.len(), |j| self.actuators[j].column_torque_n_m(angles[j], rates[j]))
-    }
-
-    /// Power that warmed the oil during the last step, W: what the pump's oil brought, supply pressure times the flow over
-    /// the valves, less what the pistons did. It is lost in the valves, in leaks and over the relief valves; a load that
-    /// sinks adds its own. The pump is taken to give no more oil than is asked for.
-    pub(super) fn power_w(&self) -> f64 {
-        self.heat_w
-    }
-
-    /// Joint `joint` locks: its valve shuts for good and its piston stays where it is.
-    pub(super) fn lock(&mut self, joint: usize) {
-        self.actuators[joint].is_locked = true;
-    }
-
-    /// The hose of joint `joint` holds no more than `ratio` (0..1) of its pressure: the valve's head falls, and so does what
-    /// the closed column carries. At 0 both ports are open: only friction and end stops act about the joint.
-    pub(super) fn lose_pressure(&mut self, joint: usize, ratio: f64) {
-        self.actuators[joint].hose_ratio = ratio.clamp(0.0, 1.0);
-    }
-
-    /// The pump gives no more than `ratio` (0..1) of its pressure and flow. Closed columns go on carrying their loads.
-    pub(super) fn lose_pump(&mut self, ratio: f64) {
-        self.pump_ratio = ratio.clamp(0.0, 1.0);
-    }
-}
+pub(crate) use actuator_input::actuator_inputs;
+pub(crate) use system::Hydraulics;
 
 #[cfg(test)]
 mod tests;

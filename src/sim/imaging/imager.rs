@@ -1,25 +1,29 @@
-//! The camera of a scene: made once, shot often.
+//! The imager: lens, lights and solids of a scene, and one image at a time.
 
 use nalgebra::{Isometry3, Unit, Vector3};
 use rayon::prelude::*;
 
-use super::frame::Frame;
-use super::light::Light;
-use super::rays::Rays;
-use super::scene::{Appearance, Object};
-use super::sensor::{BAND_ROWS, Sensor};
-use super::shade::Shader;
-use super::shape::Form;
-use super::snow::{self, Flake};
-use super::tag::Board;
-use super::texture::Texture;
-use super::trace::{Canvas, Tracer};
+use crate::imaging::auto_exposure::AutoExposure;
+use crate::imaging::canvas::Canvas;
+use crate::imaging::frame::Frame;
+use crate::imaging::light::Light;
+use crate::imaging::marine_snow::{self, Flake};
+use crate::imaging::math::image_key;
+use crate::imaging::rays::Rays;
+use crate::imaging::scene::{Appearance, Object};
+use crate::imaging::seafloor_texture::Texture;
+use crate::imaging::sensor::{BAND_ROWS, Sensor};
+use crate::imaging::shader::Shader;
+use crate::imaging::shape::Form;
+use crate::imaging::tag_board::Board;
+use crate::imaging::tracer::Tracer;
 use crate::spec::ImageSpec;
 use armcal_core::optics::Fisheye;
 use armcal_core::robot::Shape;
 use armcal_core::stats::stream_rng;
 
-/// A printed tag: its frame has x right and y up as printed, z out of the print; `size_m` is the outer side of its black border.
+/// A printed tag: its frame has x right and y up as printed, z out of the print; `size_m` is the outer side of its
+/// black border.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TagPlane {
     pub id: u32,
@@ -29,7 +33,7 @@ pub struct TagPlane {
 }
 
 impl TagPlane {
-    /// One that does not move against the base.
+    /// A tag at rest relative to the base.
     #[must_use]
     pub fn fixed(id: u32, size_m: f64, base_from_tag: Isometry3<f64>) -> Self {
         Self { id, size_m, base_from_tag: [base_from_tag; 3] }
@@ -42,11 +46,11 @@ pub struct SolidShape {
     pub shape: Shape,
     /// As a screen shows it.
     pub color_rgb: [u8; 3],
-    /// It bears the seafloor's texture in place of its colour.
+    /// Whether it has the seafloor's texture in place of its colour.
     pub is_ground: bool,
 }
 
-/// What one image is taken of.
+/// Camera and scene of one image.
 #[derive(Clone, Copy, Debug)]
 pub struct Shot<'a> {
     /// When the shutter opens, halfway, and when it closes; the camera's frame has x right, y down, z along its axis.
@@ -82,12 +86,13 @@ pub struct Imager {
     texture: Texture,
     canvas: Canvas,
     flakes: Vec<Flake>,
+    auto_exposure: AutoExposure,
     sensor: Sensor,
     seed: u64,
     frame: Frame,
 }
 
-/// What silt sends back, cd/m2: grey brown. Assumed.
+/// Radiance of silt, cd/m2: grey brown. Assumed.
 const SILT_CD_M2: [f32; 3] = [9.0, 8.0, 6.0];
 
 impl Imager {
@@ -106,6 +111,7 @@ impl Imager {
             texture: Texture::new(),
             canvas: Canvas::new(n_pixels),
             flakes: Vec::new(),
+            auto_exposure: AutoExposure::new(),
             sensor: Sensor::new(spec, key("image/noise")),
             seed: key("image/snow"),
             frame: Frame { width: rays.width, height: rays.height, rgb: vec![0; 3 * n_pixels] },
@@ -113,7 +119,7 @@ impl Imager {
         }
     }
 
-    /// What is there besides tags.
+    /// Sets the solids of the scene.
     pub fn set_solids(&mut self, solids: &[SolidShape]) {
         let look = |solid: &SolidShape| {
             let linear = |value: u8| (f32::from(value) / 255.0).powf(2.2);
@@ -123,7 +129,7 @@ impl Imager {
     }
 
     /// Takes an image.
-    pub fn shoot(&mut self, shot: &Shot) -> &Frame {
+    pub fn take_image(&mut self, shot: &Shot) -> &Frame {
         let camera_from_base = shot.base_from_camera[1].inverse();
         let shader = Shader::new(&self.spec, &self.lights, &camera_from_base, &shot.up, &self.rays);
         if shot.is_silty {
@@ -133,8 +139,9 @@ impl Imager {
         }
         let planes = &mut self.canvas.planes;
         self.sensor.blur(planes, self.rays.width);
-        let exposure = self.sensor.expose(&self.spec, planes, &self.rays);
-        self.sensor.read(&self.spec, exposure, planes, &self.rays, shot.number, &mut self.frame.rgb);
+        let exposure = self.auto_exposure.choose(&self.spec, planes, &self.rays);
+        let readout = self.sensor.readout(&self.spec, exposure, &self.rays, shot.number);
+        readout.write(planes, self.rays.width, &mut self.frame.rgb);
         &self.frame
     }
 
@@ -151,14 +158,14 @@ impl Imager {
         let (rays, texture) = (&self.rays, &self.texture);
         self.canvas.trace(&Tracer { rays, objects: &objects, shader, texture });
         if self.spec.snow_per_m3 > 0.0 {
-            snow::fall(&self.spec, &self.lens, shader, self.seed, shot.number, &mut self.flakes);
+            marine_snow::fall(&self.spec, &self.lens, shader, image_key(self.seed, shot.number), &mut self.flakes);
             let flakes = &self.flakes;
             let Canvas { ranges, planes: [red, green, blue], .. } = &mut self.canvas;
             let ranges = &*ranges;
             let band = rays.width * BAND_ROWS;
             let bands = red.par_chunks_mut(band).zip(green.par_chunks_mut(band)).zip(blue.par_chunks_mut(band));
             bands.enumerate().for_each(|(n, ((red, green), blue))| {
-                snow::draw(flakes, rays, ranges, n * BAND_ROWS, &mut [red, green, blue]);
+                marine_snow::draw(flakes, rays, ranges, n * BAND_ROWS, &mut [red, green, blue]);
             });
         }
     }

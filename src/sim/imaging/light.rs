@@ -2,8 +2,8 @@
 
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 
-use super::math::{exp, exp2, max};
-use super::{Rgb, Vec3};
+use crate::imaging::math::{exp, exp2, max};
+use crate::imaging::{Rgb, Vec3};
 
 /// A white lamp in the base frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -15,8 +15,8 @@ pub struct Light {
     pub half_angle_rad: f64,
 }
 
-/// A lamp in the camera's frame. At angle `a` from its axis it has `I0 2^(-(1 - cos a)/(1 - cos half))` cd (assumed); `I0`
-/// follows from the flux over the whole sphere.
+/// A lamp in the camera's frame. At angle `a` from its axis it has `I0 2^(-(1 - cos a)/(1 - cos half))` cd (assumed);
+/// `I0` follows from the flux over the whole sphere.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Lamp {
     position: Vec3,
@@ -39,8 +39,8 @@ impl Lamp {
         }
     }
 
-    /// Light through a unit area across the ray at `point`, lx, without the water's losses, the way's length, and the unit vector
-    /// towards the lamp.
+    /// Light through a unit area across the ray at `point`, lx, without the water's losses, the way's length, and the
+    /// unit vector towards the lamp.
     #[inline]
     fn arriving(&self, point: &Vec3) -> (f32, f32, Vec3) {
         /// Nearer than this a lamp is no point.

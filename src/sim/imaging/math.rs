@@ -46,6 +46,11 @@ pub(super) fn unit(hash: u64) -> f32 {
     (hash >> 40) as f32 * (1.0 / 16_777_216.0)
 }
 
+/// Selects the random numbers of image `number`.
+pub(super) fn image_key(seed: u64, number: u64) -> u64 {
+    hash(seed ^ hash(number))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,11 +1,12 @@
-//! The direction that each pixel sees, once for a camera.
+//! Ray of each pixel, computed once for a camera.
 
 use rayon::prelude::*;
 
-use super::Vec3;
+use crate::imaging::Vec3;
 use armcal_core::optics::Fisheye;
 
-/// Unit vectors in the camera's frame, pixel by pixel, rows from the top. Beyond the lens's field of view they are zero.
+/// Unit vectors in the camera's frame, pixel by pixel, rows from the top. Beyond the lens's field of view they are
+/// zero.
 #[derive(Clone, Debug)]
 pub(super) struct Rays {
     pub width: usize,
@@ -59,8 +60,8 @@ impl Rays {
         (self.spans[row][0]..self.spans[row][1]).contains(&column)
     }
 
-    /// The direction at a pixel and how it changes by one pixel across and down. Beside the image or the field of view the
-    /// difference to the other side stands in.
+    /// The direction at a pixel and how it changes by one pixel across and down. Beside the image or the field of view
+    /// the difference to the other side stands in.
     pub(super) fn with_slopes(&self, column: usize, row: usize) -> (Vec3, Vec3, Vec3) {
         let here = self.at(column, row);
         let slope = |before: Option<Vec3>, after: Option<Vec3>| match (before, after) {

@@ -1,10 +1,10 @@
-//! What one image may show, placed before the camera, and which part of it each tile of the image may meet.
+//! Objects of one image in the camera's frame, and the candidates of each tile of the image.
 
 use nalgebra::{Isometry3, Point3};
 
-use super::rays::Rays;
-use super::shape::{Form, Lanes, Place};
-use super::{Rgb, Vec3};
+use crate::imaging::rays::Rays;
+use crate::imaging::shape::{Form, Lanes, Place};
+use crate::imaging::{Rgb, Vec3};
 use armcal_core::spatial::{exp, log};
 
 /// Samples of place and time on a pixel that an edge crosses.
@@ -13,12 +13,12 @@ pub(super) const SAMPLES: usize = 32;
 pub(super) const TILE_PX: usize = 32;
 /// A face of an object takes its lowest bits, the object's number plus one the others; 0 is open water.
 pub(super) const FACE_BITS: u32 = 3;
-/// What moves less than this while the shutter is open stands still, px.
+/// Smallest image motion during the exposure that counts as motion, px.
 const STILL_PX: f32 = 0.01;
 /// Cells that are narrower than this in the image are sampled everywhere, px.
 const FINE_CELL_PX: f32 = 2.5;
 
-/// What a surface looks like.
+/// Appearance of a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Appearance {
     Tag,
@@ -93,8 +93,8 @@ impl<'a> Object<'a> {
     }
 }
 
-/// Where a sample lies on its pixel, px from the centre, and when in the exposure; each in -0.5..0.5 and of mean 0. A rank-1
-/// lattice (1, 7, 5)/32: its planes are 0.18 apart in place, and each coordinate takes 32 even steps.
+/// Where a sample lies on its pixel, px from the centre, and when in the exposure; each in -0.5..0.5 and of mean 0. A
+/// rank-1 lattice (1, 7, 5)/32: its planes are 0.18 apart in place, and each coordinate takes 32 even steps.
 pub(super) fn offset(sample: usize) -> [f32; 3] {
     [1, 7, 5].map(|step| (((sample * step) % SAMPLES) as f32 + 0.5) / SAMPLES as f32 - 0.5)
 }
@@ -164,7 +164,8 @@ impl Cone {
         };
         let axis = rim().sum::<Vec3>().try_normalize(1e-6)?;
         let cos = rim().map(|ray| ray.dot(&axis)).fold(1.0, f32::min);
-        // Some pixels more, for samples beside the centres, rays between those of the rim, and the edge of the field of view.
+        // Some pixels more, for samples beside the centres, rays between those of the rim, and the edge of the field of
+        // view.
         let half_rad = cos.clamp(-1.0, 1.0).acos() + 10.0 / rays.focal_px;
         Some(Self { axis, cos: half_rad.cos(), sin: half_rad.sin() })
     }

@@ -1,24 +1,16 @@
 //! From radiance to bytes: the lens's blur and vignetting, exposure, shot and read noise, 8 bits.
 //!
-//! A pixel collects `N = q e V L` electrons, q electrons for 1 cd/m2, `V = 1 - v (r / r_max)^2`, and reads `N + sqrt(s^2 N + n^2)`
-//! times a normal number. The camera chooses the exposure share e <= 1 and the gain g >= 1 so that its bright pixels come to a
-//! set share of full scale. The response is linear, as machine vision cameras have it.
+//! A pixel collects `N = q e V L` electrons, q electrons for 1 cd/m2, `V = 1 - v (r / r_max)^2`, and reads
+//! `N + sqrt(s^2 N + n^2)` times a normal number. The camera chooses the exposure share e <= 1 and the gain g >= 1 so
+//! that its bright pixels come to a set share of full scale. The response is linear, as machine vision cameras have it.
 
 use rayon::prelude::*;
 
-use super::math::{hash, max};
-use super::rays::Rays;
+use crate::imaging::auto_exposure::Exposure;
+use crate::imaging::math::{hash, image_key, max};
+use crate::imaging::rays::Rays;
 use crate::spec::ImageSpec;
 
-/// Bright pixels: so large a share of those that see is at or above the level that is set.
-const BRIGHT_SHARE: f64 = 0.002;
-/// What they come to, of full scale.
-const BRIGHT_LEVEL: f32 = 0.85;
-/// Every so many pixels across and down are looked at for it.
-const LOOK_PX: usize = 3;
-/// Bits of a float below the buckets' width: 64 in each octave.
-const BUCKET_SHIFT: u32 = 17;
-const BUCKETS: usize = 1 << (31 - BUCKET_SHIFT);
 /// Rows that one thread works on.
 pub(super) const BAND_ROWS: usize = 32;
 const NORMALS: usize = 4096;
@@ -30,21 +22,13 @@ pub(super) struct Sensor {
     kernel: Vec<f32>,
     /// Quantiles of the normal distribution, scaled to unit variance.
     normals: Vec<f32>,
-    buckets: Vec<u32>,
     spare: Vec<f32>,
     seed: u64,
 }
 
-/// What the camera set for an image.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Exposure {
-    pub share: f32,
-    pub gain: f32,
-}
-
 impl Sensor {
     pub(super) fn new(spec: &ImageSpec, seed: u64) -> Self {
-        Self { kernel: gaussian(spec.blur_px), normals: normals(), buckets: vec![0; BUCKETS], spare: Vec::new(), seed }
+        Self { kernel: gaussian(spec.blur_px), normals: normals(), spare: Vec::new(), seed }
     }
 
     /// The lens's blur.
@@ -70,64 +54,14 @@ impl Sensor {
         }
     }
 
-    /// What the camera sets by itself, or was told.
-    pub(super) fn expose(&mut self, spec: &ImageSpec, planes: &[Vec<f32>; 3], rays: &Rays) -> Exposure {
-        if spec.gain > 0.0 {
-            return Exposure { share: 1.0, gain: spec.gain as f32 };
-        }
-        let electrons = self.bright(planes, rays) * spec.electrons_per_cd_m2 as f32;
-        let wanted = BRIGHT_LEVEL * spec.full_well_electrons as f32;
-        if electrons > wanted {
-            return Exposure { share: wanted / electrons, gain: 1.0 };
-        }
-        Exposure { share: 1.0, gain: (wanted / electrons.max(1e-3)).min(spec.gain_max as f32) }
-    }
-
-    /// The level that the bright pixels reach, cd/m2, to a part in 64.
-    fn bright(&mut self, planes: &[Vec<f32>; 3], rays: &Rays) -> f32 {
-        self.buckets.fill(0);
-        let mut n_seen = 0_u32;
-        for row in (0..rays.height).step_by(LOOK_PX) {
-            let [first, behind] = rays.spans[row];
-            for i in (row * rays.width + first..row * rays.width + behind).step_by(LOOK_PX) {
-                let brightest = planes.iter().map(|plane| plane[i]).fold(0.0, max);
-                self.buckets[(brightest.to_bits() >> BUCKET_SHIFT) as usize] += 1;
-                n_seen += 1;
-            }
-        }
-        let wanted = (f64::from(n_seen) * BRIGHT_SHARE) as u32;
-        let mut above = 0;
-        let bucket = (0..BUCKETS).rev().find(|&bucket| {
-            above += self.buckets[bucket];
-            above > wanted
-        });
-        f32::from_bits((bucket.unwrap_or(0) as u32) << BUCKET_SHIFT)
-    }
-
-    /// The bytes of image `number`.
-    pub(super) fn read(
-        &self,
-        spec: &ImageSpec,
-        exposure: Exposure,
-        planes: &[Vec<f32>; 3],
-        rays: &Rays,
-        number: u64,
-        rgb: &mut [u8],
-    ) {
-        let width = rays.width;
-        let readout = Readout::new(spec, exposure, rays, hash(self.seed ^ hash(number)), &self.normals);
-        rgb.par_chunks_mut(3 * width * BAND_ROWS).enumerate().for_each(|(band, out)| {
-            for (k, line) in out.chunks_mut(3 * width).enumerate() {
-                let row = band * BAND_ROWS + k;
-                let at = row * width..(row + 1) * width;
-                readout.line(row, [&planes[0][at.clone()], &planes[1][at.clone()], &planes[2][at]], line);
-            }
-        });
+    /// The readout of image `number`.
+    pub(super) fn readout(&self, spec: &ImageSpec, exposure: Exposure, rays: &Rays, number: u64) -> Readout<'_> {
+        Readout::new(spec, exposure, rays, image_key(self.seed, number), &self.normals)
     }
 }
 
-/// All that is the same for each pixel of an image.
-struct Readout<'a> {
+/// Values common to all pixels of an image.
+pub(super) struct Readout<'a> {
     electrons_per_cd_m2: f32,
     counts_per_electron: f32,
     read_variance: f32,
@@ -154,6 +88,17 @@ impl<'a> Readout<'a> {
             key,
             normals,
         }
+    }
+
+    /// The bytes of an image.
+    pub(super) fn write(&self, planes: &[Vec<f32>; 3], width: usize, rgb: &mut [u8]) {
+        rgb.par_chunks_mut(3 * width * BAND_ROWS).enumerate().for_each(|(band, out)| {
+            for (k, line) in out.chunks_mut(3 * width).enumerate() {
+                let row = band * BAND_ROWS + k;
+                let at = row * width..(row + 1) * width;
+                self.line(row, [&planes[0][at.clone()], &planes[1][at.clone()], &planes[2][at]], line);
+            }
+        });
     }
 
     fn line(&self, row: usize, planes: [&[f32]; 3], out: &mut [u8]) {
@@ -212,8 +157,8 @@ fn gaussian(sigma_px: f64) -> Vec<f32> {
     (0..=reach).map(|k| (weight(k) / sum) as f32).collect()
 }
 
-/// The normal distribution's quantiles at the middles of even shares, by bisection of its distribution function (the series of
-/// Marsaglia 2004), scaled to a variance of one.
+/// The normal distribution's quantiles at the middles of even shares, by bisection of its distribution function (the
+/// series of Marsaglia 2004), scaled to a variance of one.
 fn normals() -> Vec<f32> {
     let below = |x: f64| {
         let (mut sum, mut term, mut n) = (x, x, 1.0);

@@ -1,11 +1,11 @@
-//! Rays against convex shapes, several at a time. Rays start outside: what holds the eye is not seen.
+//! Intersection of rays with convex shapes, several at a time. A shape around the camera is invisible.
 
-use super::Vec3;
-use super::math::{max, min};
-use super::tag::Board;
+use crate::imaging::Vec3;
+use crate::imaging::math::{max, min};
+use crate::imaging::tag_board::Board;
 use armcal_core::robot::Shape;
 
-/// What an object is to a ray, in its own frame; lengths in m.
+/// Form of an object in its own frame; lengths in m.
 #[derive(Clone, Debug)]
 pub(super) enum Form {
     Tag(Board),
@@ -31,7 +31,7 @@ pub(super) enum Form {
     },
 }
 
-/// Where an object stands to the camera.
+/// Pose of an object in the camera's frame.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Place {
     /// Rows of `object_from_camera`'s rotation.
@@ -67,7 +67,7 @@ impl Place {
         Vec3::from_fn(|i, _| self.eye[i] + range_m * turned[i][0])
     }
 
-    /// Where a ray meets the plane z = 0, x and y in the object's frame, m.
+    /// Intersection of a ray with the plane z = 0, x and y in the object's frame, m.
     #[inline]
     pub(super) fn on_plane(&self, ray: [f32; 3]) -> [f32; 2] {
         let d = self.turn(&ray.map(|v| [v]));
@@ -127,7 +127,7 @@ impl Form {
                 let [x, y] = place.on_plane([ray.x, ray.y, ray.z]);
                 board.face(x, y)
             }
-            Self::Tag(_) => super::tag::FACE_BACK,
+            Self::Tag(_) => crate::imaging::tag_board::FACE_BACK,
             Self::Capsule { .. } | Self::Sphere { .. } => 0,
             _ => self.normal(&place.point(ray, range_m)).0,
         }
@@ -146,13 +146,13 @@ impl Form {
         if is_tag { -place.eye[2] / Vec3::from(place.rows[2]).dot(ray) } else { range_m }
     }
 
-    /// What a ray that enters at `range_m` meets: the true range, the face and the outer normal (camera frame).
+    /// Surface where a ray enters at `range_m`: true range, face and outer normal (camera frame).
     pub(super) fn meet(&self, place: &Place, ray: &Vec3, range_m: f32) -> (f32, u16, Vec3) {
         if let Self::Tag(board) = self {
             let range_m = self.true_range(place, ray, range_m);
             let point = place.point(ray, range_m);
             let is_front = place.eye[2] > 0.0;
-            let face = if is_front { board.face(point.x, point.y) } else { super::tag::FACE_BACK };
+            let face = if is_front { board.face(point.x, point.y) } else { crate::imaging::tag_board::FACE_BACK };
             let normal = Vec3::from(place.rows[2]) * if is_front { 1.0 } else { -1.0 };
             return (range_m, face, normal);
         }
@@ -201,7 +201,7 @@ impl Form {
 
 #[inline]
 fn enter_board<const N: usize>(half: f32, e: &[f32; 3], d: &Lanes<N>) -> [f32; N] {
-    let lift = if e[2] > 0.0 { super::tag::CLEAR_OF_BACKING_M } else { 0.0 };
+    let lift = if e[2] > 0.0 { crate::imaging::tag_board::CLEAR_OF_BACKING_M } else { 0.0 };
     std::array::from_fn(|k| {
         let inverse = 1.0 / d[2][k];
         let range = -e[2] * inverse;

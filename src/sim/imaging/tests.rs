@@ -5,9 +5,9 @@ use std::f64::consts::{PI, TAU};
 use nalgebra::{Isometry3, Point3, Translation3, Unit, UnitQuaternion, Vector2, Vector3};
 use rand::RngExt;
 
-use super::light::Lamp;
-use super::shape::{Form, Place};
-use super::*;
+use crate::imaging::light::Lamp;
+use crate::imaging::shape::{Form, Place};
+use crate::imaging::*;
 use armcal_core::optics::{fixture::lens, square_corners};
 use armcal_core::robot::{Hull, Shape, parry_pose};
 use armcal_core::stats::stream_rng;
@@ -18,7 +18,8 @@ const WHITE: f64 = 0.85;
 const BLACK: f64 = 0.05;
 const COUNTS_PER_CD_M2: f64 = 255.0 * PI / 1000.0;
 
-/// A tag `range_m` ahead of the camera in a direction by pixel, turned by `tilt` (rad, its own axes) from facing the camera.
+/// A tag `range_m` ahead of the camera in a direction by pixel, turned by `tilt` (rad, its own axes) from facing the
+/// camera.
 fn ahead(pixel: [f64; 2], range_m: f64, tilt: [f64; 3]) -> Isometry3<f64> {
     let ray = lens().unproject(&Vector2::from(pixel)).expect("in view");
     let facing = UnitQuaternion::rotation_between(&Vector3::z(), &-ray.into_inner())
@@ -36,7 +37,7 @@ fn grey(frame: &Frame) -> Vec<f64> {
 }
 
 fn shot(spec: &ImageSpec, lights: &[Light], tags: &[TagPlane]) -> Frame {
-    Imager::new(&lens(), spec, lights, 3).shoot(&Shot::of_tags(Isometry3::identity(), tags, 0)).clone()
+    Imager::new(&lens(), spec, lights, 3).take_image(&Shot::of_tags(Isometry3::identity(), tags, 0)).clone()
 }
 
 fn at(frame: &Frame, pixel: [f64; 2]) -> [f64; 3] {
@@ -53,8 +54,8 @@ fn between(image: &[f64], pixel: &Vector2<f64>) -> f64 {
     (1.0 - v) * row(i) + v * row(i + width)
 }
 
-/// The sides of the black border where the projection puts them: across each the brightness falls from white to black, and the
-/// area under the profile tells where, whatever the pixels' blur.
+/// The sides of the black border where the projection puts them: across each the brightness falls from white to black,
+/// and the area under the profile tells where, whatever the pixels' blur.
 #[test]
 fn edges_lie_where_the_projection_puts_them() {
     const REACH_PX: f64 = 2.5;
@@ -67,7 +68,7 @@ fn edges_lie_where_the_projection_puts_them() {
         let pixel = [center()[0] + draw(350.0), center()[1] + draw(300.0)];
         let pose = ahead(pixel, 0.55 + draw(0.1), [draw(0.6), draw(0.6), draw(PI)]);
         let tag = TagPlane::fixed(number as u32, 0.15, pose);
-        let image = grey(imager.shoot(&Shot::of_tags(Isometry3::identity(), &[tag], number)));
+        let image = grey(imager.take_image(&Shot::of_tags(Isometry3::identity(), &[tag], number)));
         let project = |p: &Point3<f64>| lens().project(&(pose * p).coords).expect("in view");
         let corners = square_corners(0.15);
         for k in 0..4 {
@@ -186,7 +187,7 @@ fn the_sensor_has_the_vignette_and_the_noise_that_it_says() {
     let silty = |spec: &ImageSpec, number: u64| {
         let mut imager = Imager::new(&lens(), spec, &[], 3);
         let silt = Shot { is_silty: true, ..Shot::of_tags(Isometry3::identity(), &[], number) };
-        imager.shoot(&silt).clone()
+        imager.take_image(&silt).clone()
     };
     let (quiet, level) = (silty(&spec, 0), 8.0 * 400.0 * 255.0 * 2.0 / 10_000.0);
     for pixel in [center(), [0.0, 0.0], [1223.0, 1023.0], [100.0, 700.0]] {
@@ -233,12 +234,12 @@ fn motion_blur_is_the_mean_over_the_exposure() {
         (Vector2::new(sum.x, sum.y) / sum.z, sum.z)
     };
     let moved = Shot { base_from_camera: [-1.0, 0.0, 1.0].map(turned), ..Shot::of_tags(turned(0.0), &board, 0) };
-    let (blurred, light) = centroid(&grey(imager.shoot(&moved)));
+    let (blurred, light) = centroid(&grey(imager.take_image(&moved)));
     let (mut mean, mut mean_light, mut ends) = (Vector2::zeros(), 0.0, Vec::new());
     const INSTANTS: i32 = 24;
     for k in 0..INSTANTS {
         let t = -1.0 + (2.0 * f64::from(k) + 1.0) / f64::from(INSTANTS);
-        let (sharp, light) = centroid(&grey(imager.shoot(&Shot::of_tags(turned(t), &board, 0))));
+        let (sharp, light) = centroid(&grey(imager.take_image(&Shot::of_tags(turned(t), &board, 0))));
         mean += sharp / f64::from(INSTANTS);
         mean_light += light / f64::from(INSTANTS);
         ends.push(sharp);
@@ -284,8 +285,8 @@ fn threads_do_not_show() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(n_threads).build().expect("threads");
         let still = Shot::of_tags(base_from_camera[1], &tags, 7);
         pool.install(|| {
-            let moving = imager.shoot(&Shot { solids: &solids, base_from_camera, ..still }).clone();
-            (moving, imager.shoot(&Shot { solids: &solids, ..still }).clone())
+            let moving = imager.take_image(&Shot { solids: &solids, base_from_camera, ..still }).clone();
+            (moving, imager.take_image(&Shot { solids: &solids, ..still }).clone())
         })
     };
     let (one, two) = (render(1), render(3));
@@ -303,7 +304,7 @@ fn what_is_nearer_hides_what_is_behind_it() {
     let mut level = |along_m: f64| {
         // In the tag's frame: its own plate's front face lies `along_m` before the print.
         let plate = [pose * Isometry3::translation(0.0, 0.0, along_m - 0.005); 3];
-        let frame = imager.shoot(&Shot { solids: &[plate], ..Shot::of_tags(Isometry3::identity(), &tag, 0) });
+        let frame = imager.take_image(&Shot { solids: &[plate], ..Shot::of_tags(Isometry3::identity(), &tag, 0) });
         at(frame, center())[1]
     };
     let white = 255.0 * WHITE;
@@ -382,7 +383,7 @@ fn rays_meet_shapes_where_parry_says() {
     }
 }
 
-/// How near a ray comes to a shape, m.
+/// Smallest distance of a ray from a shape, m.
 fn nearest(solid: &dyn parry3d::shape::Shape, pose: &parry3d::math::Pose3, ray: &parry3d::query::Ray) -> f64 {
     let at = |k: i32| solid.distance_to_point(pose, ray.origin + ray.dir * (0.005 * f64::from(k)), true);
     (0..600).map(at).fold(f64::INFINITY, f64::min)

@@ -1,10 +1,11 @@
-//! What the water does to light: `I = J exp(-bD z) + Binf (1 - exp(-bB z))` for each channel (Akkaynak and Treibitz 2018).
+//! Attenuation and veiling light of water: `I = J exp(-bD z) + Binf (1 - exp(-bB z))` for each channel (Akkaynak and
+//! Treibitz 2018).
 //!
-//! Of absorption a and scattering b after Jerlov (1976): `bD = a + b`, what is left of a narrow beam. The veil closes in by
-//! `bB = 2 a + b` (assumed): its light has a way out, too, on which it is absorbed, while scattering is mostly forward. `Binf`
-//! is what lamps and sun send back from far away (`shade`).
+//! Of absorption a and scattering b after Jerlov (1976): `bD = a + b`, what is left of a narrow beam. The veil closes
+//! in by `bB = 2 a + b` (assumed): its light has a way out, too, on which it is absorbed, while scattering is mostly
+//! forward. `Binf` is what lamps and sun send back from far away (`shade`).
 
-use super::Rgb;
+use crate::imaging::Rgb;
 use crate::spec::{ImageSpec, WaterKind};
 
 /// Coefficients for red, green and blue, 1/m.

@@ -1,4 +1,4 @@
-//! What touches what, and how hard: contacts from the engine's collision pipeline, forces by a spring and a damper.
+//! Contacts from the engine's collision pipeline, with forces by a spring and a damper.
 //!
 //! The engine finds manifolds (broad phase, narrow phase, persistent points); the arm's own equations take the forces
 //! implicitly. Friction is viscous below a small slip rate and Coulomb's above.
@@ -8,10 +8,10 @@ use rapier3d::geometry::{ActiveCollisionTypes, ColliderBuilder, ColliderHandle};
 use rapier3d::pipeline::{ActiveHooks, PairFilterContext, PhysicsHooks, PhysicsWorld};
 use rapier3d::prelude::SolverFlags;
 
-use super::guard::ContactGuard;
+use crate::body_poses::BodyPoses;
 use crate::convert::from_rapier;
 use crate::dynamics::{ContactRow, Coordinates, Force, MAX_DOF, Motion};
-use crate::places::BodyPoses;
+use crate::physics::contact_guard::ContactGuard;
 use crate::solids::{Carrier, PairTable, Solid, Solids};
 use crate::spec::PhysicsSpec;
 use armcal_core::kinematics::{Chain, LinkPoses};
@@ -200,8 +200,8 @@ impl Contact {
         }
     }
 
-    /// How each coordinate moves the pushed body's point along `axis` against the other's, and what the ground or a base that
-    /// moves as prescribed adds to that rate.
+    /// How each coordinate moves the pushed body's point along `axis` against the other's, and what the ground or a
+    /// base that moves as prescribed adds to that rate.
     fn direction(&self, axis: &Vector3<f64>, state: &ContactState) -> (Coordinates, f64) {
         let unit = Force::at(&self.point, axis);
         let mut direction = [0.0; MAX_DOF];

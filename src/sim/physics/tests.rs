@@ -1,12 +1,15 @@
 //! The moving base against equations of motion that were set up by hand.
 
-use nalgebra::{Matrix3, Unit};
+use nalgebra::{Isometry3, Matrix3, Unit, Vector3};
 
-use super::*;
-use crate::spec::VehicleMotionSpec;
-use crate::vehicle::VehicleMotion;
-use armcal_core::kinematics::ChainJoint;
-use armcal_core::robot::{Robot, load};
+use crate::dynamics::{Force, JointLoad};
+use crate::physics::*;
+use crate::spec::{PhysicsSpec, VehicleMotionSpec, WaterSpec};
+use crate::vehicle::{BaseState, GRAVITY_M_S2, VehicleMotion, WaterMotion};
+use armcal_core::kinematics::{Chain, ChainJoint};
+use armcal_core::robot::{LinkBody, Robot, load};
+use armcal_core::spatial::Pose;
+use armcal_core::streams::{JointAngles, MAX_JOINTS};
 
 const DRY: WaterSpec = WaterSpec {
     density_kg_m3: 0.0,

@@ -1,18 +1,12 @@
-//! What a real arm's sensors make of the truth: counts, pixels, temperatures, attitude, pressure.
+//! Simulated sensors: joint counts, tag detections, temperatures, attitude and pressure from the true state.
 
 pub(super) mod attitude;
 pub(super) mod camera;
 pub(super) mod joint;
-pub(super) mod temperatures;
+mod oil_state;
 pub(super) mod thermometer;
 
-/// What lies about the joint sensors, in their oil.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct OilState {
-    pub oil_c: f64,
-    /// Above the surface's.
-    pub pressure_pa: f64,
-}
+pub(super) use oil_state::OilState;
 
 #[cfg(test)]
 mod tests;

@@ -1,4 +1,4 @@
-//! All sensors in a world of their own.
+//! All sensors together, without a world.
 
 use std::path::Path;
 

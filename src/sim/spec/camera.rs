@@ -5,8 +5,8 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::image::CameraMode;
-use super::{CheckedTable, DEG, table};
+use crate::spec::image::CameraMode;
+use crate::spec::table::{CheckedTable, DEG, table};
 use armcal_core::robot::FileIssue;
 
 /// The window between lens and water.
@@ -113,7 +113,8 @@ table!(
         base_std_m: Option<f64> = None;
         #[serde(skip_serializing_if = "Option::is_none")]
         base_std_rad: Option<f64> = None;
-        /// Of the tag on the gripper, against its drawing; 0.3 mm and 0.1 deg where left out. Assumed: a measuring arm on the bench.
+        /// Of the tag on the gripper, against its drawing; 0.3 mm and 0.1 deg where left out. Assumed: a measuring arm
+        /// on the bench.
         #[serde(skip_serializing_if = "Option::is_none")]
         gripper_std_m: Option<f64> = None;
         #[serde(skip_serializing_if = "Option::is_none")]
@@ -122,13 +123,17 @@ table!(
 );
 
 impl TagsSpec {
-    /// How well one tag was surveyed, (m, rad) per axis.
-    pub(crate) fn survey_std(&self, is_base_tag: bool) -> (f64, f64) {
-        let own = |own: Option<f64>, common: f64| own.filter(|_| is_base_tag).unwrap_or(common);
-        (own(self.base_std_m, self.survey_std_m), own(self.base_std_rad, self.survey_std_rad))
+    /// Standard deviations of a surveyed tag's pose, (m, rad) per axis.
+    pub(crate) fn survey_std(&self) -> (f64, f64) {
+        (self.survey_std_m, self.survey_std_rad)
     }
 
-    /// How well the tag on the gripper was, (m, rad) per axis.
+    /// Those of the base tag.
+    pub(crate) fn base_tag_std(&self) -> (f64, f64) {
+        (self.base_std_m.unwrap_or(self.survey_std_m), self.base_std_rad.unwrap_or(self.survey_std_rad))
+    }
+
+    /// Those of the tag on the gripper.
     pub(crate) fn gripper_std(&self) -> (f64, f64) {
         (self.gripper_std_m.unwrap_or(0.0003), self.gripper_std_rad.unwrap_or(0.1 * DEG))
     }

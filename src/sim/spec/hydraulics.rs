@@ -5,14 +5,15 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::{CheckedTable, DEG, table};
+use crate::spec::table::{CheckedTable, DEG, table};
 use armcal_core::robot::FileIssue;
 
 table!(
     /// Valves, oil, pump, friction, end stops, and the arm's own controller. Torque limits come from the URDF's effort.
     #[derive(Copy)]
     HydraulicsSpec {
-        /// Share of the spool's travel that passes no oil; the controller compensates it. Proportional valves: 2 to 5 %.
+        /// Share of the spool's travel that passes no oil; the controller compensates it. Proportional valves: 2 to 5
+        /// %.
         deadband = 0.03, in 0.0..=0.5;
         /// Time constant of the spool; 20 to 80 ms for the valves of such arms.
         valve_lag_s = 0.05, in 1e-3..=1.0;
@@ -34,7 +35,8 @@ table!(
         relief_ratio = 1.2, in 1.0..=10.0;
         /// Rate of a fully open valve without load, over the controller's rate limit. Assumed.
         rate_margin = 1.3, in 1.0..=10.0;
-        /// Dry friction of a fast joint over its full torque; 0 for none. Assumed: seals of cylinders take a few per cent.
+        /// Dry friction of a fast joint over its full torque; 0 for none. Assumed: seals of cylinders take a few per
+        /// cent.
         coulomb_friction_ratio = COULOMB_FRICTION_RATIO, in 0.0..=0.5;
         /// The same at breakaway; below the former it counts as that. Assumed.
         stiction_ratio = STICTION_RATIO, in 0.0..=0.5;
@@ -56,7 +58,8 @@ table!(
         controller_creep_gain = 0.5, in 0.0..=1.0;
         /// The controller drives each sensor to its set-point plus this, by the datasheet's scale.
         controller_bias_rad = 0.0, in -0.5..=0.5;
-        /// Readings in a row that the controller leaves out when the joint cannot have come there; 0: it believes them all.
+        /// Readings in a row that the controller leaves out when the joint cannot have come there; 0: it believes them
+        /// all.
         controller_jump_reject = 10.0, in 0.0..=1000.0;
     }
 );

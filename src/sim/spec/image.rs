@@ -5,7 +5,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::{CheckedTable, table};
+use crate::spec::table::{CheckedTable, table};
 use armcal_core::robot::FileIssue;
 
 /// Whether the wrist camera's detections come from pixels.
@@ -43,8 +43,8 @@ table!(
     ImageSpec {
         /// Factor on the water's coefficients; 0 takes the water away.
         turbidity = 1.0, in 0.0..=100.0;
-        /// Share of the scattered light that comes back per steradian, for what lamps light up on the way. Petzold (1972): 0.018
-        /// over the half sphere.
+        /// Share of the scattered light that comes back per steradian, for what lamps light up on the way. Petzold
+        /// (1972): 0.018 over the half sphere.
         backscatter_per_sr = 0.003, in 0.0..=1.0;
         /// Sunlight on a surface that faces up; at depth there is none.
         ambient_lux = 0.0, in 0.0..=1e6;
@@ -54,11 +54,11 @@ table!(
         snow_radius_m = 0.0005, in 1e-5..=0.02;
         /// Standard deviation of the lens's blur, a Gaussian. Assumed; 0 is none.
         blur_px = 0.5, in 0.0..=10.0;
-        /// Share of the light that is lost at half the image's diagonal from its centre; it grows with the square of the distance.
-        /// Assumed; 0 is none.
+        /// Share of the light that is lost at half the image's diagonal from its centre; it grows with the square of
+        /// the distance. Assumed; 0 is none.
         vignetting = 0.3, in 0.0..=1.0;
-        /// Electrons that a pixel collects per cd/m2 in the longest exposure that the camera gives itself. Assumed: f/2.8, 10 ms,
-        /// 6.9 um pixels.
+        /// Electrons that a pixel collects per cd/m2 in the longest exposure that the camera gives itself. Assumed:
+        /// f/2.8, 10 ms, 6.9 um pixels.
         electrons_per_cd_m2 = 100.0, in 1e-3..=1e6;
         /// Electrons at which a pixel is full; that is 255 at gain 1. Assumed.
         full_well_electrons = 10_000.0, in 100.0..=1e6;
@@ -89,8 +89,8 @@ table!(
 );
 
 impl ImageSpec {
-    /// Nothing between scene and pixels: even light of 1000 lux from all sides, no water, no blur, no noise, a fixed gain at which
-    /// white is 0.85 of full scale.
+    /// Nothing between scene and pixels: even light of 1000 lux from all sides, no water, no blur, no noise, a fixed
+    /// gain at which white is 0.85 of full scale.
     #[must_use]
     pub fn clean() -> Self {
         Self {

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::{CheckedTable, DEG, table};
+use crate::spec::table::{CheckedTable, DEG, table};
 use armcal_core::robot::FileIssue;
 
 table!(

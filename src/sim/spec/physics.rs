@@ -5,8 +5,11 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::{CheckedTable, table};
+use crate::spec::table::{CheckedTable, table};
 use armcal_core::robot::FileIssue;
+
+/// Length of a control period, s: the arm's own controller runs at 100 Hz.
+pub(crate) const CONTROL_PERIOD_S: f64 = 0.01;
 
 table!(
     /// The integrator and the rate of the truth's record.
@@ -18,7 +21,8 @@ table!(
         truth_rate_hz = 50.0, in 0.1..=100.0;
         /// Rate at which the clearance is measured.
         clearance_rate_hz = 5.0, in 0.1..=100.0;
-        /// Of two parts that touch (assumed: structure and hoses give, not steel alone), shared by their points of contact.
+        /// Of two parts that touch (assumed: structure and hoses give, not steel alone), shared by their points of
+        /// contact.
         contact_stiffness_n_m = 5e5, in 1e3..=1e9;
         /// Damping of a contact over its stiffness (assumed: it hardly rebounds).
         contact_damping_s = 0.01, in 0.0..=1.0;

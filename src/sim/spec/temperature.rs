@@ -5,7 +5,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::{CheckedTable, table};
+use crate::spec::table::{CheckedTable, table};
 use armcal_core::robot::FileIssue;
 
 /// The longest profile of the water.
@@ -26,8 +26,9 @@ table!(
         /// constant.
         water_change_k = 0.0, in -60.0..=60.0;
         water_time_constant_s = 1800.0, in 1.0..=1e6;
-        /// Heat capacity of the oil and what it warms. Above 0 the oil warms by the power that the hydraulics lose and cools
-        /// towards the water with its time constant, and `oil_rise_k` does not count. Assumed: 20 L of oil hold 3.3e4 J/K.
+        /// Heat capacity of the oil and what it warms. Above 0 the oil warms by the power that the hydraulics lose and
+        /// cools towards the water with its time constant, and `oil_rise_k` does not count. Assumed: 20 L of oil hold
+        /// 3.3e4 J/K.
         oil_heat_capacity_j_per_k = 0.0, in 0.0..=1e9;
         /// Standard deviation of each thermometer's constant error. Assumed.
         thermometer_bias_std_k = 0.0, in 0.0..=5.0;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::{CheckedTable, DEG, table};
+use crate::spec::table::{CheckedTable, DEG, table};
 use armcal_core::robot::FileIssue;
 
 /// Where the vehicle's motion comes from.
@@ -48,7 +48,8 @@ table!(
         station_damping_ratio = 0.9, in 0.0..=5.0;
         /// First-order lag of the thrusters (assumed).
         thruster_lag_s = 0.2, in 0.0..=5.0;
-        /// Random force on a free vehicle in each direction, in the band of the periods: tether and turbulence (assumed).
+        /// Random force on a free vehicle in each direction, in the band of the periods: tether and turbulence
+        /// (assumed).
         wobble_force_rms_n = 0.0, in 0.0..=1e5;
         wobble_moment_rms_n_m = 0.0, in 0.0..=1e5;
     } and {

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::CheckedTable;
+use crate::spec::table::CheckedTable;
 use armcal_core::robot::FileIssue;
 
 /// Sea water about the arm.

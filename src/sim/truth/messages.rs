@@ -19,7 +19,7 @@ pub const OIL_TEMPERATURE: &str = "/truth/oil_temperature";
 pub const WATER_TEMPERATURE: &str = "/truth/water_temperature";
 pub const CLEARANCE: &str = "/truth/clearance";
 pub const CONTACTS: &str = "/truth/contacts";
-/// What broke, when it did.
+/// A fault when it happens.
 pub const FAULTS: &str = "/truth/faults";
 
 /// armcal_msgs/msg/Contact: two parts began to touch.

@@ -1,119 +1,14 @@
-//! The truth's own stream: what the score compares belief with, in a file that belief never opens.
+//! The truth stream: reference of the score, in a file that belief never opens.
 
 mod messages;
-mod read;
-mod record;
-
-use serde::{Deserialize, Serialize};
+mod reader;
+mod recorder;
+mod records;
 
 pub use messages::{
     CAMERA_POSE, CLEARANCE, CONTACTS, Clearance, Contact, FAULTS, JOINT_STATES, OIL_TEMPERATURE, TOOL_POSE,
     VEHICLE_POSE, WATER_TEMPERATURE, WORLD,
 };
-pub use read::{Truth, read_truth};
-pub use record::TruthRecorder;
-
-use super::as_built::AsBuilt;
-use armcal_core::spatial::{Base, Camera, Pose, Tool, Vehicle, World};
-use armcal_core::streams::{JointAngles, SinkError};
-use armcal_core::time::Stamp;
-
-/// What holds for the whole run.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct TruthHeader {
-    pub robot: String,
-    pub vehicle: String,
-    pub joint_names: Vec<String>,
-    #[serde(with = "seed_text")]
-    pub seed: u64,
-    /// `[world]` as TOML text, every key written out.
-    pub spec_toml: String,
-    pub as_built: AsBuilt,
-}
-
-/// The true state at one instant.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TruthState {
-    pub stamp: Stamp,
-    pub angles: JointAngles,
-    /// rad/s.
-    pub rates: JointAngles,
-    /// Of the oil columns, N m.
-    pub torques: JointAngles,
-    pub base_from_tool: Pose<Base, Tool>,
-    pub base_from_camera: Pose<Base, Camera>,
-    pub world_from_vehicle: Pose<World, Vehicle>,
-    pub oil_c: f64,
-    pub water_c: f64,
-}
-
-/// Two parts began to touch.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct TruthContact {
-    pub stamp: Stamp,
-    pub part_a: String,
-    pub part_b: String,
-}
-
-/// The nearest two parts at one instant; not above 0 where they touch.
-#[derive(Clone, Debug, PartialEq)]
-pub struct TruthClearance {
-    pub stamp: Stamp,
-    pub distance_m: f64,
-    pub part_a: String,
-    pub part_b: String,
-}
-
-/// Something broke.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct TruthFault {
-    pub stamp: Stamp,
-    /// As routines name it.
-    pub kind: String,
-    /// What the routine says of it beside that: `joint = "wrist_yaw"`.
-    pub details: String,
-}
-
-/// Takes the truth as it comes, in the order of time.
-pub trait TruthSink {
-    /// Comes first, once.
-    ///
-    /// # Errors
-    /// Here and below: when it cannot be kept.
-    fn begin(&mut self, header: &TruthHeader) -> Result<(), SinkError>;
-
-    /// # Errors
-    /// See [`Self::begin`].
-    fn state(&mut self, state: &TruthState) -> Result<(), SinkError>;
-
-    /// # Errors
-    /// See [`Self::begin`].
-    fn contact(&mut self, contact: &TruthContact) -> Result<(), SinkError>;
-
-    /// # Errors
-    /// See [`Self::begin`].
-    fn clearance(&mut self, clearance: &TruthClearance) -> Result<(), SinkError>;
-
-    /// # Errors
-    /// See [`Self::begin`].
-    fn fault(&mut self, fault: &TruthFault) -> Result<(), SinkError>;
-
-    /// Comes last, once.
-    ///
-    /// # Errors
-    /// See [`Self::begin`].
-    fn finish(self: Box<Self>) -> Result<(), SinkError>;
-}
-
-/// TOML has no integers beyond 63 bits: the seed travels as text.
-mod seed_text {
-    use serde::{Deserialize, Deserializer, Serializer, de};
-
-    pub(super) fn serialize<S: Serializer>(seed: &u64, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_str(seed)
-    }
-
-    pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u64, D::Error> {
-        String::deserialize(deserializer)?.parse().map_err(de::Error::custom)
-    }
-}
+pub use reader::{Truth, read_truth};
+pub use recorder::TruthRecorder;
+pub use records::{TruthClearance, TruthContact, TruthFault, TruthHeader, TruthSink, TruthState};

@@ -2,17 +2,17 @@
 
 use nalgebra::{Isometry3, Matrix3, Vector3};
 
-use super::BaseState;
-use super::swell::{Axis, draw_axis, sum};
 use crate::dynamics::{Body, Force, HullDrag, Inertia, Motion, Multibody};
 use crate::error::SimError;
 use crate::fault::Impulse;
 use crate::spec::{VehicleMotionSpec, WaterSpec};
+use crate::vehicle::base_state::BaseState;
+use crate::vehicle::sinusoids::{SinusoidSum, draw_sinusoids, evaluate};
 use armcal_core::robot::{FileIssue, Vehicle, VehicleDynamics};
 use armcal_core::streams::JointAngles;
 
-/// How long a knock lasts, s: short against the vehicle's motion, long against a step.
-const KNOCK_S: f64 = 0.1;
+/// Duration of an impulse, s: short against the vehicle's motion, long against a step.
+const IMPULSE_DURATION_S: f64 = 0.1;
 
 /// Thrusters, and what pushes the vehicle besides the water that it moves through.
 #[derive(Clone, Debug)]
@@ -26,8 +26,8 @@ pub(crate) struct FreeVehicle {
     /// Thrust and moment as they are, behind the thrusters' lag, vehicle axes.
     thrust: [f64; 6],
     /// Random forces and moments, in the band of the motion's periods.
-    wobble: [Axis; 6],
-    knock: Option<(f64, Impulse)>,
+    wobble: [SinusoidSum; 6],
+    impulse: Option<(f64, Impulse)>,
 }
 
 impl FreeVehicle {
@@ -49,14 +49,14 @@ impl FreeVehicle {
             thrust: [0.0; 6],
             wobble: std::array::from_fn(|axis| {
                 let rms = if axis < 3 { spec.wobble_force_rms_n } else { spec.wobble_moment_rms_n_m };
-                draw_axis(spec, rms, seed, &format!("wobble/{axis}"))
+                draw_sinusoids(spec, rms, seed, &format!("wobble/{axis}"))
             }),
-            knock: None,
+            impulse: None,
         })
     }
 
-    /// The vehicle as body 0 of the system, ballasted so that it floats level with the arm as it is now: its displacement
-    /// carries vehicle and arm, and the centre of buoyancy lies above the common centre of weight.
+    /// The vehicle as body 0 of the system, ballasted so that it floats level with the arm as it is now: its
+    /// displacement carries vehicle and arm, and the centre of buoyancy lies above the common centre of weight.
     pub(crate) fn body(&self, vehicle: &Vehicle, water: &WaterSpec, arm: &Multibody, angles: &JointAngles) -> Body {
         let d = &self.dynamics;
         let to_base = &self.base_from_vehicle;
@@ -78,7 +78,8 @@ impl FreeVehicle {
         let (weight, moment) = wet_weight(arm, angles);
         let down = to_base.rotation * -Vector3::z();
         body.displaced_kg = vehicle.mass_kg + weight;
-        // Level: the moments of all weights (the vehicle's own at its origin) and of the buoyancy balance about the base.
+        // Level: the moments of all weights (the vehicle's own at its origin) and of the buoyancy balance about the
+        // base.
         let weights = moment + vehicle.mass_kg * body.com_m;
         let above = to_base.rotation * Vector3::new(0.0, 0.0, d.center_of_buoyancy_m[2]);
         let center = weights / body.displaced_kg;
@@ -87,25 +88,26 @@ impl FreeVehicle {
     }
 
     /// Something hits the vehicle.
-    pub(crate) fn knock(&mut self, t_s: f64, knock: &Impulse) {
-        self.knock = Some((t_s, *knock));
+    pub(crate) fn impulse(&mut self, t_s: f64, impulse: &Impulse) {
+        self.impulse = Some((t_s, *impulse));
     }
 
-    /// What acts on the vehicle in the step from `t_s`, about the base's origin in base axes.
+    /// Force on the vehicle in the step from `t_s`, about the base's origin in base axes.
     pub(crate) fn force(&mut self, t_s: f64, step_s: f64, base: &BaseState) -> Force {
         self.keep_station(step_s, base);
         let mut total = self.thrust;
         for (slot, axis) in total.iter_mut().zip(&self.wobble) {
-            *slot += sum(axis, t_s)[0];
+            *slot += evaluate(axis, t_s)[0];
         }
-        if let Some((start_s, knock)) = &self.knock {
+        if let Some((start_s, impulse)) = &self.impulse {
             let since = t_s - start_s;
-            if (0.0..KNOCK_S).contains(&since) {
+            if (0.0..IMPULSE_DURATION_S).contains(&since) {
                 // Half a sine: its mean is 2/pi of its height.
-                let shape = (std::f64::consts::PI * since / KNOCK_S).sin() * std::f64::consts::FRAC_PI_2 / KNOCK_S;
+                let shape = (std::f64::consts::PI * since / IMPULSE_DURATION_S).sin() * std::f64::consts::FRAC_PI_2
+                    / IMPULSE_DURATION_S;
                 for i in 0..3 {
-                    total[i] += shape * knock.impulse_n_s[i];
-                    total[3 + i] += shape * knock.angular_impulse_n_m_s[i];
+                    total[i] += shape * impulse.impulse_n_s[i];
+                    total[3 + i] += shape * impulse.angular_impulse_n_m_s[i];
                 }
             }
         }
@@ -115,7 +117,8 @@ impl FreeVehicle {
         Force::new(moment + to_base.translation.vector.cross(&force), force)
     }
 
-    /// PID on position and attitude, as dynamic positioning has it, with the thrusters' lag and limits. It knows where it is.
+    /// PID on position and attitude, as dynamic positioning has it, with the thrusters' lag and limits. It knows where
+    /// it is.
     fn keep_station(&mut self, step_s: f64, base: &BaseState) {
         let w = self.spec.station_keeping_rad_s;
         if w == 0.0 {

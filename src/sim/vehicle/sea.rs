@@ -1,14 +1,15 @@
-//! How the water moves about the vehicle: a current, and waves that fade with depth.
+//! Motion of the water about the vehicle: a current, and waves that fade with depth.
 //!
-//! Waves are a sum of linear deep-water waves, `w2 = g k`, whose orbits have radius `a exp(-k depth)`; their amplitudes follow the
-//! spectrum of Pierson and Moskowitz for the asked significant height and peak period (DNV-RP-C205, section 3.5.5). The motion is
-//! that at the vehicle's station, the same all about the arm, for the waves that reach down are much longer than an arm.
+//! Waves are a sum of linear deep-water waves, `w2 = g k`, whose orbits have radius `a exp(-k depth)`; their amplitudes
+//! follow the spectrum of Pierson and Moskowitz for the asked significant height and peak period (DNV-RP-C205, section
+//! 3.5.5). The motion is that at the vehicle's station, the same all about the arm, for the waves that reach down are
+//! much longer than an arm.
 
 use nalgebra::Vector3;
 use rand::RngExt;
 
-use super::GRAVITY_M_S2;
 use crate::spec::WaterSpec;
+use crate::vehicle::base_state::GRAVITY_M_S2;
 use armcal_core::stats::stream_rng;
 
 const N_WAVES: usize = 16;

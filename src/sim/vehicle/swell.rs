@@ -1,46 +1,30 @@
-//! The vehicle rocked by a swell: a prescribed motion about its station, in closed form.
+//! Motion of a vehicle in a swell: prescribed, about its station, in closed form.
 //!
 //! Each of x, y, z, roll, pitch, yaw is a sum of sinusoids with random periods and phases, scaled to its rms and
 //! swelling smoothly from rest, so that position, velocity and acceleration are exact and need no integration. The arm
 //! does not push such a vehicle back (4 t against 100 kg, and a pilot's station keeping).
 
 use nalgebra::{UnitQuaternion, Vector3};
-use rand::RngExt;
 
-use super::VehicleKinematics;
+use crate::recorded_motion::VehicleKinematics;
 use crate::spec::VehicleMotionSpec;
-use armcal_core::stats::stream_rng;
+use crate::vehicle::sinusoids::{Derivatives, SinusoidSum, draw_sinusoids, evaluate};
 
-const N_SINUSOIDS: usize = 6;
 const AXES: [&str; 6] = ["x", "y", "z", "roll", "pitch", "yaw"];
 
 /// Sums of sinusoids over time.
 #[derive(Clone, Debug)]
 pub(super) struct Swell {
-    axes: [Axis; 6],
+    axes: [SinusoidSum; 6],
     ramp_s: f64,
 }
 
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Sinusoid {
-    amplitude: f64,
-    rate_rad_s: f64,
-    phase_rad: f64,
-}
-
-/// One axis: a sum of sinusoids.
-pub(super) type Axis = [Sinusoid; N_SINUSOIDS];
-
-/// Value, first and second derivative.
-pub(super) type Jet = [f64; 3];
-
 impl Swell {
     pub(super) fn new(spec: &VehicleMotionSpec, seed: u64) -> Self {
-        let mut axes = [[Sinusoid::default(); N_SINUSOIDS]; 6];
-        for (k, axis) in axes.iter_mut().enumerate() {
+        let axes = std::array::from_fn(|k| {
             let rms = if k < 3 { spec.translation_rms_m } else { spec.rotation_rms_rad };
-            *axis = draw_axis(spec, rms, seed, AXES[k]);
-        }
+            draw_sinusoids(spec, rms, seed, AXES[k])
+        });
         Self { axes, ramp_s: spec.ramp_s }
     }
 
@@ -49,7 +33,7 @@ impl Swell {
         let ramp = smooth_ramp(t_s, self.ramp_s);
         let mut jets = [[0.0; 3]; 6];
         for (jet, axis) in jets.iter_mut().zip(&self.axes) {
-            *jet = ramped(&sum(axis, t_s), &ramp);
+            *jet = ramped(&evaluate(axis, t_s), &ramp);
         }
         let vector = |order: usize| Vector3::new(jets[0][order], jets[1][order], jets[2][order]);
         let (rate, angular_acceleration) = body_rates(&jets[3], &jets[4], &jets[5]);
@@ -64,39 +48,8 @@ impl Swell {
     }
 }
 
-/// Random shares and phases, periods spread evenly in their logarithm; the rms of the sum of sinusoids is exact.
-pub(super) fn draw_axis(spec: &VehicleMotionSpec, rms: f64, seed: u64, name: &str) -> Axis {
-    let mut rng = stream_rng(seed, &format!("vehicle/{name}"));
-    let (low, high) = (spec.period_min_s.ln(), spec.period_max_s.ln());
-    let mut axis = [Sinusoid::default(); N_SINUSOIDS];
-    for (k, sinusoid) in axis.iter_mut().enumerate() {
-        // One period from each sixth of the band: no two alike, for beats would change the rms of a short run.
-        let place = (k as f64 + rng.random_range(0.0..1.0)) / N_SINUSOIDS as f64;
-        sinusoid.rate_rad_s = std::f64::consts::TAU / (low + place * (high - low)).exp();
-        sinusoid.amplitude = rng.random_range(0.5..1.0);
-        sinusoid.phase_rad = rng.random_range(0.0..std::f64::consts::TAU);
-    }
-    let norm = axis.iter().map(|s| 0.5 * s.amplitude * s.amplitude).sum::<f64>().sqrt();
-    for sinusoid in &mut axis {
-        sinusoid.amplitude *= rms / norm;
-    }
-    axis
-}
-
-/// Value and derivatives of the sum.
-pub(super) fn sum(axis: &Axis, t_s: f64) -> Jet {
-    let mut jet = [0.0; 3];
-    for s in axis {
-        let (sin, cos) = (s.rate_rad_s * t_s + s.phase_rad).sin_cos();
-        jet[0] += s.amplitude * sin;
-        jet[1] += s.amplitude * s.rate_rad_s * cos;
-        jet[2] -= s.amplitude * s.rate_rad_s * s.rate_rad_s * sin;
-    }
-    jet
-}
-
 /// `10 s^3 - 15 s^4 + 6 s^5` of s = t/length: rest, velocity and acceleration zero at both ends.
-fn smooth_ramp(t_s: f64, length_s: f64) -> Jet {
+fn smooth_ramp(t_s: f64, length_s: f64) -> Derivatives {
     if t_s >= length_s {
         return [1.0, 0.0, 0.0];
     }
@@ -109,12 +62,12 @@ fn smooth_ramp(t_s: f64, length_s: f64) -> Jet {
 }
 
 /// The product rule.
-fn ramped(f: &Jet, r: &Jet) -> Jet {
+fn ramped(f: &Derivatives, r: &Derivatives) -> Derivatives {
     [f[0] * r[0], f[1] * r[0] + f[0] * r[1], f[2] * r[0] + 2.0 * f[1] * r[1] + f[0] * r[2]]
 }
 
 /// Angular velocity and acceleration in body axes from roll, pitch, yaw of `R = Rz(yaw) Ry(pitch) Rx(roll)`.
-pub(super) fn body_rates(roll: &Jet, pitch: &Jet, yaw: &Jet) -> (Vector3<f64>, Vector3<f64>) {
+fn body_rates(roll: &Derivatives, pitch: &Derivatives, yaw: &Derivatives) -> (Vector3<f64>, Vector3<f64>) {
     let (sr, cr) = roll[0].sin_cos();
     let (sp, cp) = pitch[0].sin_cos();
     let rate = Vector3::new(roll[1] - yaw[1] * sp, pitch[1] * cr + yaw[1] * sr * cp, -pitch[1] * sr + yaw[1] * cr * cp);
@@ -138,7 +91,7 @@ mod tests {
         let mut squares = 0.0;
         for i in 0..n {
             let t = 10.0 + f64::from(i) * 0.25;
-            squares += sum(&swell.axes[4], t)[0].powi(2);
+            squares += evaluate(&swell.axes[4], t)[0].powi(2);
         }
         let rms = (squares / f64::from(n)).sqrt();
         assert!((rms - 0.1).abs() < 2e-3, "rms {rms}");

@@ -1,45 +1,12 @@
-//! Things break: at steps of the script, or when their time has come, and the truth's stream says so.
+//! Execution of faults, at steps of the script or at their time, with a record in the truth.
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
-use super::World;
-use crate::fault::{Fault, Impulse, ScheduledFault};
+use crate::fault::{Fault, Impulse};
+use crate::sensors::joint::JointSensor;
 use crate::truth::TruthFault;
+use crate::world::simulation::World;
 use armcal_core::streams::ArmError;
-
-/// Times are met to this, s: whole periods are not exact in binary.
-const SAME_TIME_S: f64 = 1e-9;
-
-/// The faults that have a time, in its order.
-#[derive(Clone, Debug)]
-pub(super) struct Timeline {
-    /// Time and place in the spec's list, the next one last.
-    ahead: Vec<(f64, usize)>,
-    /// When something last broke, at a step or by itself.
-    last_s: Option<f64>,
-}
-
-impl Timeline {
-    pub(super) fn new(faults: &[ScheduledFault]) -> Self {
-        let timed = faults.iter().enumerate().filter_map(|(index, scheduled)| Some((scheduled.at_s?, index)));
-        let mut ahead: Vec<(f64, usize)> = timed.collect();
-        // Stable: of one time, those that stand first happen first.
-        ahead.sort_by(|a, b| a.0.total_cmp(&b.0));
-        ahead.reverse();
-        Self { ahead, last_s: None }
-    }
-
-    fn take_due(&mut self, time_s: f64) -> Option<usize> {
-        let (_, index) = self.ahead.pop_if(|(at_s, _)| *at_s <= time_s + SAME_TIME_S)?;
-        Some(index)
-    }
-
-    /// Whether nothing broke in the last `before_s` and nothing will in the next `after_s`.
-    pub(super) fn is_calm(&self, time_s: f64, before_s: f64, after_s: f64) -> bool {
-        self.last_s.is_none_or(|last_s| time_s - last_s >= before_s)
-            && self.ahead.last().is_none_or(|(at_s, _)| *at_s > time_s + after_s)
-    }
-}
 
 impl World {
     /// Brings fault `number` of the script's steps about.
@@ -69,8 +36,8 @@ impl World {
         }
         match fault {
             Fault::SensorJump { joint, by_rad } => self.at_sensor(&joint, |pot| pot.jump(by_rad)),
-            Fault::SensorStuck { joint } => self.at_sensor(&joint, super::JointSensor::stick),
-            Fault::SensorDead { joint } => self.at_sensor(&joint, super::JointSensor::die),
+            Fault::SensorStuck { joint } => self.at_sensor(&joint, JointSensor::stick),
+            Fault::SensorDead { joint } => self.at_sensor(&joint, JointSensor::die),
             Fault::JointLocked { joint } => {
                 if let Some(joint) = self.joint(&joint) {
                     self.hydraulics.lock(joint);
@@ -89,10 +56,10 @@ impl World {
             }
             Fault::TagMisread { id, as_id } => self.camera.misread(id, as_id),
             Fault::Silt { seconds } => self.camera.blind(stamp.plus_s(seconds)),
-            Fault::VehicleKnocked { force_n, duration_s, at_m } => {
-                self.knock(&Impulse::new(force_n, duration_s, at_m));
+            Fault::VehicleImpulse { force_n, duration_s, at_m } => {
+                self.impulse(&Impulse::new(force_n, duration_s, at_m));
             }
-            Fault::ArmBumped { link, force_n, duration_s } => self.bump(&link, force_n, duration_s),
+            Fault::ArmImpulse { link, force_n, duration_s } => self.bump(&link, force_n, duration_s),
         }
         Ok(())
     }
@@ -101,22 +68,22 @@ impl World {
         self.robot.sensors.iter().position(|sensor| sensor.joint == name)
     }
 
-    fn at_sensor(&mut self, joint: &str, act: impl FnOnce(&mut super::JointSensor)) {
+    fn at_sensor(&mut self, joint: &str, act: impl FnOnce(&mut JointSensor)) {
         if let Some(pot) = self.joint(joint).and_then(|joint| self.pots.get_mut(joint)) {
             act(pot);
         }
     }
 
-    /// A blow to the vehicle: a free one takes the impulse, one on a prescribed path swings out as its impulse says and comes back.
-    fn knock(&mut self, knock: &Impulse) {
+    /// Impulse on the vehicle: a force on a free one, a displacement and return of a prescribed one.
+    fn impulse(&mut self, impulse: &Impulse) {
         let t_s = self.time_s();
         match &mut self.free {
-            Some(free) => free.knock(t_s, knock),
+            Some(free) => free.impulse(t_s, impulse),
             None => {
                 let mass_kg = self.vehicle.mass_kg;
                 // Without figures of its own: a radius of gyration of 0.9 m (assumed).
                 let inertia = self.vehicle.dynamics.map_or([0.81 * mass_kg; 3], |dynamics| dynamics.inertia_kg_m2);
-                self.motion.knock(t_s, knock, mass_kg, &Vector3::from(inertia));
+                self.motion.impulse(t_s, impulse, mass_kg, &Vector3::from(inertia));
             }
         }
     }

@@ -1,18 +1,18 @@
-//! The camera in step with the world: what it sees and when its images arrive.
+//! The camera in step with the world: its images and their arrival.
 
 use nalgebra::Isometry3;
 
-use super::World;
-use crate::sensors::camera::{ArmMotion, Exposed, Moment, Places};
-use armcal_core::streams::{ArmError, CameraImage, DetectionRejects, ImageDemand, Message};
+use crate::sensors::camera::{ArmMotion, CameraShot, ScenePoses, ShutterState};
+use crate::world::simulation::World;
+use armcal_core::streams::{ArmError, CameraImage, DetectionRejects, Message};
 use armcal_core::time::Stamp;
 
 impl World {
     /// The shutter closes now.
     pub(super) fn expose(&mut self) -> Result<(), ArmError> {
         let links = self.place_solids();
-        let moment = Moment {
-            places: Places {
+        let shutter = ShutterState {
+            poses: ScenePoses {
                 links: &links,
                 base_from_world: *self.base.world_from_base.inverse().isometry(),
                 jaws: self.jaw_shifts(),
@@ -20,9 +20,9 @@ impl World {
             solids: &self.solids,
             motion: ArmMotion { chain: &self.robot.chain, angles: self.physics.angles(), rates: self.physics.rates() },
             closed: self.stamp(),
-            is_wanted: self.image_demand == ImageDemand::All,
+            demand: self.image_demand,
         };
-        let taken = self.camera.take(&moment).map_err(|error| ArmError::Camera(error.into()))?;
+        let taken = self.camera.take_image(&shutter).map_err(|error| ArmError::Camera(error.into()))?;
         let Some(mut image) = taken else { return Ok(()) };
         // It never arrives before the image ahead of it.
         if let Some(ahead) = self.images.back() {
@@ -32,14 +32,14 @@ impl World {
         Ok(())
     }
 
-    /// How far each jaw has gone from where it is drawn.
+    /// Displacement of each jaw from the drawing.
     fn jaw_shifts(&self) -> [Isometry3<f64>; 2] {
         let jaws = self.robot.gripper.as_ref().zip(self.gripper.as_ref());
         std::array::from_fn(|n| jaws.map_or_else(Isometry3::identity, |(spec, jaws)| spec.shift(n, jaws.opening_m)))
     }
 
-    /// What an image becomes for those who listen.
-    pub(super) fn deliver(&mut self, at: Stamp, image: Exposed) {
+    /// Messages of an image.
+    pub(super) fn deliver(&mut self, at: Stamp, image: CameraShot) {
         let stamp = image.detections.stamp;
         self.outbox.push((at, Message::Detections(image.detections)));
         if !image.rejects.is_empty() {

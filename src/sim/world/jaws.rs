@@ -1,12 +1,13 @@
-//! The gripper in step with the world: it moves once in a control period and tells its gap when that changes.
+//! The gripper in step with the world: one motion per control period, and a message when the gap changes.
 
-use super::{SLOW_PERIODS, World};
 use crate::spec::CONTROL_PERIOD_S;
+use crate::world::readings::SLOW_PERIODS;
+use crate::world::simulation::World;
 use armcal_core::streams::{ArmError, GripperSample, Message};
 
-/// While the jaws move, their gap is told each so many periods: 25 Hz.
+/// Periods between messages of the gap while the jaws move: 25 Hz.
 const TOLD_EVERY: u64 = 4;
-/// What the measured gap is rounded to, m (assumed).
+/// Resolution of the measured gap, m (assumed).
 const RESOLUTION_M: f64 = 1e-4;
 
 impl World {
@@ -23,7 +24,7 @@ impl World {
         let Some(jaws) = &mut self.gripper else { return };
         let was_moving = jaws.is_moving();
         jaws.step(CONTROL_PERIOD_S);
-        // The slow streams tell it in any case.
+        // The slow streams send it in any case.
         if was_moving && period.is_multiple_of(TOLD_EVERY) && !period.is_multiple_of(SLOW_PERIODS) {
             self.report_gap();
         }

@@ -1,22 +1,36 @@
-//! What a world is put together from, and held against before it starts.
+//! Input of a world, and the initial values of its parts.
 
-use std::path::Path;
-
-use super::WorldInput;
 use crate::as_built::AsBuilt;
 use crate::error::SimError;
-use crate::hydraulics::{ActuatorInput, Hydraulics};
+use crate::physics::ArmPhysics;
 use crate::sensors::OilState;
 use crate::sensors::joint::{JointInput, JointSensor};
-use crate::sensors::temperatures::Temperatures;
 use crate::sensors::thermometer::gauge_pressure_pa;
-use crate::spec::WorldSpec;
+use crate::spec::{JointSensorsSpec, MotionKind, WorldSpec};
+use crate::temperatures::Temperatures;
 use crate::truth::TruthHeader;
-use armcal_core::robot::{FileIssue, Robot};
+use crate::vehicle::{BaseState, FreeVehicle};
+use armcal_core::robot::{Robot, Vehicle};
+use armcal_core::routine::Scene;
 use armcal_core::streams::{JointAngles, JointCounts};
+
+/// Parts of a world.
+#[derive(Clone, Debug)]
+pub struct WorldInput<'a> {
+    pub robot: &'a Robot,
+    pub vehicle: &'a Vehicle,
+    pub scene: &'a Scene,
+    pub spec: WorldSpec,
+    pub seed: u64,
+}
 
 /// An arm that starts nearer to an end stop than this starts at this distance, rad.
 const END_STOP_MARGIN_RAD: f64 = 1e-3;
+
+pub(super) fn joint_sensors(robot: &Robot, built: &AsBuilt, spec: &JointSensorsSpec, seed: u64) -> Vec<JointSensor> {
+    let sensors = robot.sensors.iter().zip(&built.joints);
+    sensors.map(|(nominal, joint)| JointSensor::new(nominal, joint, spec, seed)).collect()
+}
 
 /// The true angles at which every sensor reads `stowed` by the datasheet, kept within the end stops.
 pub(super) fn stowed_angles(robot: &Robot, pots: &mut [JointSensor], around: &OilState) -> JointAngles {
@@ -45,39 +59,20 @@ pub(super) fn surroundings(spec: &WorldSpec, temperatures: &Temperatures, t_s: f
     OilState { oil_c: temperatures.oil_c(t_s), pressure_pa: gauge_pressure_pa(&spec.water, depth_m) }
 }
 
-/// Whether the step is short enough for the oil's stiffness.
-///
-/// # Errors
-/// [`SimError::Spec`] with the longest step; what [`actuators`] says.
-pub(crate) fn check_step(spec: &WorldSpec, robot: &Robot, file: &Path) -> Result<(), SimError> {
-    let longest_s = Hydraulics::new(&spec.hydraulics, &actuators(robot)?, spec.physics.step_s).longest_step_s();
-    if spec.physics.step_s <= longest_s {
-        return Ok(());
+/// The free vehicle that the world asks for, set on the physics at its start; `None` for a prescribed motion.
+pub(super) fn free_vehicle(
+    input: &WorldInput,
+    physics: &mut ArmPhysics,
+    base: &BaseState,
+) -> Result<Option<FreeVehicle>, SimError> {
+    let WorldInput { vehicle, spec, seed, .. } = input;
+    if spec.vehicle.motion != MotionKind::Free {
+        return Ok(None);
     }
-    let problem = format!(
-        "{} s is too large for the oil's stiffness (bulk_modulus_pa, dead_volume_ratio): at most {longest_s:.2e} s",
-        spec.physics.step_s
-    );
-    Err(FileIssue::new(file, "world.physics.step_s", problem).into())
-}
-
-/// Torque limits from the URDF's effort, rates from the sensors' table.
-pub(super) fn actuators(robot: &Robot) -> Result<Vec<ActuatorInput>, SimError> {
-    let file = robot.folder.join("robot.toml");
-    let urdf = urdf_rs::read_from_string(&robot.urdf_text).ok();
-    let effort =
-        |name: &str| urdf.iter().flat_map(|u| &u.joints).find(|j| j.name == name).map_or(0.0, |j| j.limit.effort);
-    let joints = robot.chain.joints().iter().zip(&robot.sensors);
-    joints
-        .map(|(joint, sensor)| {
-            let effort_n_m = effort(&joint.name);
-            if !(effort_n_m.is_finite() && effort_n_m > 0.0) {
-                return Err(SimError::NoEffort { file: file.clone(), joint: joint.name.clone(), effort_n_m });
-            }
-            let rate_limit_rad_s = sensor.max_rate_rad_s;
-            Ok(ActuatorInput { limits: joint.limits, torque_max_n_m: effort_n_m, rate_limit_rad_s })
-        })
-        .collect()
+    let free = FreeVehicle::new(vehicle, &spec.vehicle, *seed)?;
+    let body = free.body(vehicle, &spec.water, physics.multibody(), &physics.angles());
+    physics.set_free(body, base.world_from_base.isometry());
+    Ok(Some(free))
 }
 
 pub(super) fn header(input: &WorldInput, as_built: AsBuilt) -> Result<TruthHeader, SimError> {

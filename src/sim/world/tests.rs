@@ -1,10 +1,13 @@
-//! The world from inside: what its messages cannot show.
+//! The world's inner state, which its messages do not have.
 
 use std::path::Path;
 
-use super::*;
+use crate::spec::WorldSpec;
+use crate::world::*;
 use armcal_core::robot::{load, load_vehicle};
-use armcal_core::streams::JointAngles;
+use armcal_core::routine::Scene;
+use armcal_core::streams::{Arm, JointAngles, MAX_JOINTS, Message, Sink};
+use armcal_core::time::Stamp;
 
 const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
 
@@ -14,8 +17,8 @@ fn world(spec: WorldSpec, seed: u64) -> World {
     World::new(WorldInput { robot: &robot, vehicle: &vehicle, scene: &Scene::default(), spec, seed }).expect("a world")
 }
 
-/// With closed valves that do not leak the joints give as far as the oil does, and come back: no creep of any solver in ten
-/// minutes of gravity and rocking. Means over 100 s, several times the slowest period, tell creep from giving.
+/// With closed valves that do not leak the joints give as far as the oil does, and come back: no creep of any solver in
+/// ten minutes of gravity and rocking. Means over 100 s, several times the slowest period, tell creep from giving.
 #[test]
 fn a_locked_valve_does_not_creep() {
     const LIMIT_RAD: f64 = 1e-4;
@@ -49,7 +52,7 @@ fn floating(change: impl Fn(&mut WorldSpec)) -> World {
     world(spec, 3)
 }
 
-/// Where the vehicle is after `seconds` with the valves closed: distance from its station (m), angle (rad).
+/// Position of the vehicle after `seconds` with the valves closed: distance from its station (m), angle (rad).
 fn drifted(world: &mut World, seconds: f64) -> (f64, f64) {
     for _ in 0..(seconds / world.spec.physics.step_s) as u32 {
         world.physics_step(&[0.0; MAX_JOINTS]).expect("it steps");
@@ -58,7 +61,8 @@ fn drifted(world: &mut World, seconds: f64) -> (f64, f64) {
     (pose.origin().vector().norm(), pose.rotation().angle())
 }
 
-/// Ballasted for its arm it floats level by itself; its thrusters hold it in a current, and without them it drifts away.
+/// Ballasted for its arm it floats level by itself; its thrusters hold it in a current, and without them it drifts
+/// away.
 #[test]
 fn a_free_vehicle_floats_level_and_keeps_its_station() {
     let thrusters_off = |spec: &mut WorldSpec| spec.vehicle.station_keeping_rad_s = 0.0;
@@ -76,13 +80,13 @@ fn a_free_vehicle_floats_level_and_keeps_its_station() {
     assert!(drifted(&mut floating(both), 60.0).0 > 2.0, "without thrusters it goes with the water");
 }
 
-/// A blow of 800 N s sets the vehicle and the water that it moves off at impulse over their mass.
+/// After an impulse of 800 N s the speed is impulse over the mass of vehicle and added water.
 #[test]
 fn a_free_vehicle_takes_the_impulse_of_a_knock() {
     let mut world = floating(|spec| spec.vehicle.station_keeping_rad_s = 0.0);
     let added_kg = world.vehicle.dynamics.expect("figures of the vehicle").added_mass_kg[0];
-    let knock = crate::fault::Impulse { impulse_n_s: [800.0, 0.0, 0.0], angular_impulse_n_m_s: [0.0; 3] };
-    world.free.as_mut().expect("it floats").knock(0.0, &knock);
+    let impulse = crate::fault::Impulse { impulse_n_s: [800.0, 0.0, 0.0], angular_impulse_n_m_s: [0.0; 3] };
+    world.free.as_mut().expect("it floats").impulse(0.0, &impulse);
     for _ in 0..60 {
         world.physics_step(&[0.0; MAX_JOINTS]).expect("it steps");
     }
@@ -200,8 +204,8 @@ fn largest(a: &[Place], b: &[Place]) -> (f64, f64) {
     )
 }
 
-/// The same moves with ever longer steps, against a quarter of a millisecond. What differs at rest is mostly where in its
-/// rest band the controller's noisy readings let each valve close.
+/// The same moves with ever longer steps, against a quarter of a millisecond. What differs at rest is mostly where in
+/// its rest band the controller's noisy readings let each valve close.
 #[test]
 fn the_step_is_short_enough() {
     /// Of the calibrated arm's errors (5 mm), a tenth; and the rest band is 3.5e-4 rad.

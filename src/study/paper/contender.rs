@@ -1,6 +1,6 @@
 //! A method with its settings.
 
-use super::scene::{Draw, Guess, Setting};
+use crate::paper::scene::{Draw, Guess, Setting};
 use armcal_belief::calib::bundle::{BundleInput, HyperparameterMode, Hyperparameters, Model, estimate};
 use armcal_belief::calib::{
     Gauge, JointParameters, Parameter, ParameterKind, PositionMethod, PositionProblem, PositionSearch, Scaling,

@@ -1,7 +1,7 @@
 //! What is compared, and what the paper says of it.
 
-use super::contender::{MethodVariant, Solver};
-use super::scene::{Guess, PoseSampling, Readings, Setting};
+use crate::paper::contender::{MethodVariant, Solver};
+use crate::paper::scene::{Guess, PoseSampling, Readings, Setting};
 use armcal_belief::calib::{Gauge, PositionMethod, SearchOptions};
 
 /// How many draws.

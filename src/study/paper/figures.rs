@@ -2,11 +2,11 @@
 
 use nalgebra::Point3;
 
-use super::PaperStudyError;
-use super::contender::MethodVariant;
-use super::scene::{Draw, Setting};
-use super::trials::PaperRow;
 use crate::charts::{Axis, Panel, Series, Style, svg};
+use crate::paper::PaperStudyError;
+use crate::paper::contender::MethodVariant;
+use crate::paper::scene::{Draw, Setting};
+use crate::paper::trials::PaperRow;
 use armcal_belief::calib::{Gauge, JointParameters};
 use armcal_core::robot::Robot;
 

@@ -5,7 +5,7 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use super::PaperStudyError;
+use crate::paper::PaperStudyError;
 use armcal_belief::calib::{JointParameters, Parameter, ParameterKind, TagMeasurement, TagObservation, View};
 use armcal_core::joints::JointAngles;
 use armcal_core::robot::{Robot, SurveyedTag, TagSurvey};

@@ -2,9 +2,9 @@
 
 use std::fmt::Write as _;
 
-use super::experiments::Experiment;
-use super::scene::{Guess, PoseSampling, Readings};
-use super::trials::PaperRow;
+use crate::paper::experiments::Experiment;
+use crate::paper::scene::{Guess, PoseSampling, Readings};
+use crate::paper::trials::PaperRow;
 
 fn mm(metres: f64) -> String {
     let mm = 1e3 * metres;

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::*;
+use crate::paper::*;
 use armcal_belief::calib::Gauge;
 use armcal_core::robot::{Robot, load};
 

@@ -3,10 +3,10 @@
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use super::PaperStudyError;
-use super::contender::MethodVariant;
-use super::experiments::Experiment;
-use super::scene::{Draw, Setting};
+use crate::paper::PaperStudyError;
+use crate::paper::contender::MethodVariant;
+use crate::paper::experiments::Experiment;
+use crate::paper::scene::{Draw, Setting};
 use armcal_belief::calib::{PositionProblem, fisher_information};
 use armcal_core::numeric::Outcome;
 use armcal_core::robot::Robot;

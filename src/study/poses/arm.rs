@@ -7,7 +7,7 @@ use nalgebra::{Isometry3, Vector3};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-use super::normal;
+use crate::poses::normal;
 use armcal_belief::calib::{MeanCorners, TagMeasurement, TagObservation, View};
 use armcal_belief::plan::{ClearanceModel, PosePlan, VisibilityModel};
 use armcal_core::joints::MAX_JOINTS;

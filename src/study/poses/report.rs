@@ -2,8 +2,8 @@
 
 use std::fmt::Write as _;
 
-use super::{CRITERIA, POSES, PoseRow};
 use crate::charts::{Axis, Panel, Series, Style, svg};
+use crate::poses::{CRITERIA, POSES, PoseRow};
 use armcal_core::routine::PoseCriterion;
 use armcal_core::stats::quantile;
 

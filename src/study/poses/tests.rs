@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::*;
+use crate::poses::*;
 
 fn rows(seeds: std::ops::Range<u64>) -> Vec<PoseRow> {
     let file = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("routines/titan4-quickstart.toml");

@@ -5,8 +5,8 @@ use std::f64::consts::TAU;
 use rand::RngExt;
 use rand_distr::{Distribution, StandardNormal};
 
-use super::*;
 use crate::controller::Controller;
+use crate::hydraulics::tests::*;
 use crate::spec::CONTROL_PERIOD_S;
 use armcal_core::robot::JointSensorSpec;
 use armcal_core::stats::stream_rng;
@@ -98,7 +98,7 @@ fn worst_rest_rad(spec: &HydraulicsSpec, input: ActuatorInput, inertia: f64, loa
     })
 }
 
-/// Where a joint rests: the mean over the last of eight seconds. It swings about it as the vehicle rocks its load.
+/// Rest angle of a joint: the mean over the last of eight seconds. It swings about it as the vehicle rocks its load.
 #[test]
 fn a_joint_rests_within_a_twentieth_of_a_degree_of_its_set_point() {
     let standard = HydraulicsSpec::default();

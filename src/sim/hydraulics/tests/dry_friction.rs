@@ -2,7 +2,8 @@
 
 use std::f64::consts::TAU;
 
-use super::*;
+use crate::hydraulics::friction::Friction;
+use crate::hydraulics::tests::*;
 
 const INERTIA: f64 = 50.0;
 /// Of the shoulder, N m.
@@ -131,7 +132,7 @@ fn a_thrown_joint_stops_where_friction_has_taken_its_energy() {
 fn the_sliding_torque_follows_stribecks_curve() {
     let spec = dry();
     for rate in [0.02, 0.05, 0.1, 0.3, -0.05] {
-        let mut friction = friction::Friction::new(&spec, SHOULDER.torque_max_n_m);
+        let mut friction = Friction::new(&spec, SHOULDER.torque_max_n_m);
         friction.settle(0.0);
         let mut angle = 0.0;
         for _ in 0..2000 {
@@ -144,14 +145,14 @@ fn the_sliding_torque_follows_stribecks_curve() {
     }
 }
 
-/// There and back at a steady rate, the bristle's torque without its damping: from one turn it unbends and bends the other way
-/// up to the stiction, then slides. The loop holds the energy of a cycle.
+/// There and back at a steady rate, the bristle's torque without its damping: from one turn it unbends and bends the
+/// other way up to the stiction, then slides. The loop holds the energy of a cycle.
 #[test]
 fn a_cycle_takes_the_energy_of_its_loop() {
     const AMPLITUDE: f64 = 4e-3;
     const STEPS: u32 = 4000;
     for rate in [0.005_f64, 0.05, 0.15] {
-        let mut friction = friction::Friction::new(&dry(), SHOULDER.torque_max_n_m);
+        let mut friction = Friction::new(&dry(), SHOULDER.torque_max_n_m);
         friction.settle(0.0);
         let (mut work, mut before) = (0.0, 0.0);
         // A quarter to get there, a cycle to forget the start, a cycle to measure.

@@ -1,6 +1,6 @@
-//! What breaks in a drive.
+//! Faults of an actuator.
 
-use super::*;
+use crate::hydraulics::tests::*;
 
 #[test]
 fn a_locked_joint_stays_and_its_neighbour_goes() {

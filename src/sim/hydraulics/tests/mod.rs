@@ -5,10 +5,15 @@ mod dry_friction;
 mod faults;
 mod oil;
 
-use super::*;
+use crate::hydraulics::Hydraulics;
+use crate::hydraulics::actuator::Actuator;
+use crate::hydraulics::actuator_input::ActuatorInput;
+use crate::spec::HydraulicsSpec;
+use armcal_core::kinematics::JointLimits;
+use armcal_core::streams::{JointAngles, MAX_JOINTS};
 
-/// Joints without a body: each is an inertia under its drive and an outer torque. Linearly implicit, of second order (ROS2
-/// of Verwer, Spee, Blom and Hundsdorfer, SIAM J. Sci. Comput. 20, 1999).
+/// Joints without a body: each is an inertia under its drive and an outer torque. Linearly implicit, of second order
+/// (ROS2 of Verwer, Spee, Blom and Hundsdorfer, SIAM J. Sci. Comput. 20, 1999).
 pub(super) struct Rig {
     pub(super) hydraulics: Hydraulics,
     pub(super) inertia_kg_m2: f64,

@@ -1,6 +1,6 @@
 //! Valve, pump, column, leak, relief.
 
-use super::*;
+use crate::hydraulics::tests::*;
 
 #[test]
 fn the_flow_depends_on_opening_and_load() {

@@ -1,10 +1,10 @@
-//! What the window between lens and water does to rays.
+//! Refraction by the port between lens and water.
 //!
-//! A flat port: with `s = sin` of the angle in air, a ray reaches the radius
-//! `d tan(a) + t s / sqrt(ng^2 - s^2) + (z - d - t) s / sqrt(nw^2 - s^2)` at depth z. A dome: concentric spheres keep
-//! `n b` (b the ray's distance from their centre; Bouguer's formula), so that a ray leaves with `b / nw`, turned towards the
-//! centre's side by `asin(b / Ri) - asin(b / ng Ri) + asin(b / ng Ro) - asin(b / nw Ro)`. Each is solved for the ray that meets
-//! a point. Indices: air 1, acrylic 1.49, water 1.333 (sea water: up to 1.34).
+//! Flat port: with `s = sin` of the angle in air, a ray reaches the radius
+//! `d tan(a) + t s / sqrt(ng^2 - s^2) + (z - d - t) s / sqrt(nw^2 - s^2)` at depth z. Dome: concentric spheres keep
+//! `n b` constant (b the ray's distance from their centre; Bouguer's formula). A ray leaves with `b / nw`, turned
+//! towards the centre's side by `asin(b / Ri) - asin(b / ng Ri) + asin(b / ng Ro) - asin(b / nw Ro)`. Both are solved
+//! for the ray that meets a point. Indices: air 1, acrylic 1.49, water 1.333 (sea water: up to 1.34).
 
 use nalgebra::Vector3;
 
@@ -12,7 +12,7 @@ use nalgebra::Vector3;
 pub(super) const GLASS_INDEX: f64 = 1.49;
 pub(super) const WATER_INDEX: f64 = 1.333;
 
-/// The window before a lens; lengths in the camera's frame.
+/// The window in front of a lens; lengths in the camera's frame.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Port {
     None,
@@ -21,9 +21,9 @@ pub(super) enum Port {
 }
 
 impl Port {
-    /// The direction in air from which the lens sees a point in the water (camera frame, any length); `None` for a
-    /// point that is not in the water or that no ray reaches.
-    pub(super) fn seen_from(&self, point_m: &Vector3<f64>) -> Option<Vector3<f64>> {
+    /// Direction in air of the ray from a point in the water to the lens (camera frame, any length). `None` for a point
+    /// that is not in the water or that no ray reaches.
+    pub(super) fn direction_in_air(&self, point_m: &Vector3<f64>) -> Option<Vector3<f64>> {
         match *self {
             Self::None => Some(*point_m),
             Self::Flat { distance_m, thickness_m } => through_plane(point_m, distance_m, thickness_m),
@@ -35,7 +35,7 @@ impl Port {
 }
 
 fn through_plane(point_m: &Vector3<f64>, distance_m: f64, thickness_m: f64) -> Option<Vector3<f64>> {
-    /// Tangent in air beyond which there is no lens: half a milliradian from grazing.
+    /// Largest tangent in air: half a milliradian from grazing.
     const STEEPEST: f64 = 2000.0;
     let wet_m = point_m.z - distance_m - thickness_m;
     let radius_m = point_m.x.hypot(point_m.y);
@@ -45,8 +45,8 @@ fn through_plane(point_m: &Vector3<f64>, distance_m: f64, thickness_m: f64) -> O
     if radius_m < 1e-12 * point_m.z {
         return Some(*point_m);
     }
-    // Radius that a ray of tangent u in air reaches, and its slope.
-    let reached = |u: f64| {
+    // Radius that a ray of tangent u in air reaches, and its derivative.
+    let radius_at = |u: f64| {
         let sine = u / (1.0 + u * u).sqrt();
         let sine_slope = (1.0 + u * u).powf(-1.5);
         let layer = |length_m: f64, index: f64| {
@@ -56,20 +56,20 @@ fn through_plane(point_m: &Vector3<f64>, distance_m: f64, thickness_m: f64) -> O
         let ((glass, glass_slope), (water, water_slope)) = (layer(thickness_m, GLASS_INDEX), layer(wet_m, WATER_INDEX));
         (distance_m * u + glass + water, distance_m + glass_slope + water_slope)
     };
-    if reached(STEEPEST).0 < radius_m {
+    if radius_at(STEEPEST).0 < radius_m {
         return None;
     }
-    // Newton's method kept inside a shrinking bracket, from the paraxial ray on.
+    // Newton's method with a shrinking bracket, from the paraxial ray.
     let (mut low, mut high) = (0.0, STEEPEST);
     let mut u = (WATER_INDEX * radius_m / point_m.z).min(STEEPEST);
     for _ in 0..100 {
-        let (reach_m, slope) = reached(u);
-        if reach_m > radius_m {
+        let (radius_at_u_m, slope) = radius_at(u);
+        if radius_at_u_m > radius_m {
             high = u
         } else {
             low = u
         }
-        let newton = u - (reach_m - radius_m) / slope;
+        let newton = u - (radius_at_u_m - radius_m) / slope;
         let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
         let is_done = (next - u).abs() <= 1e-15 * (1.0 + u);
         u = next;
@@ -81,7 +81,7 @@ fn through_plane(point_m: &Vector3<f64>, distance_m: f64, thickness_m: f64) -> O
 }
 
 fn through_sphere(point_m: &Vector3<f64>, center_m: &Vector3<f64>, inner_m: f64, outer_m: f64) -> Option<Vector3<f64>> {
-    // About the sphere's centre: the pupil and the point. All normals pass through the centre, so the ray stays in the
+    // Pupil and point relative to the sphere's centre. All normals pass through the centre, so the ray stays in the
     // plane of the three, with axes along the line of sight and across it.
     let (pupil, point) = (-center_m, point_m - center_m);
     if point.norm() <= outer_m {
@@ -115,13 +115,14 @@ fn through_sphere(point_m: &Vector3<f64>, center_m: &Vector3<f64>, inner_m: f64,
     angle.is_finite().then(|| along * angle.cos() + across * angle.sin())
 }
 
-/// How far a ray turns that starts at `lever_m` from the centre of a dome, rad, and its slope by the lever, rad/m.
+/// Angle by which a dome turns a ray that starts `lever_m` from its centre, rad, and the derivative by the lever,
+/// rad/m.
 fn turn_in_dome(lever_m: f64, inner_m: f64, outer_m: f64) -> (f64, f64) {
     let refractions =
         [(inner_m, 1.0), (GLASS_INDEX * inner_m, -1.0), (GLASS_INDEX * outer_m, 1.0), (WATER_INDEX * outer_m, -1.0)];
-    refractions.iter().fold((0.0, 0.0), |(turn, slope), (reach_m, sign)| {
-        let root = (reach_m * reach_m - lever_m * lever_m).sqrt();
-        (turn + sign * (lever_m / reach_m).asin(), slope + sign / root)
+    refractions.iter().fold((0.0, 0.0), |(turn, slope), (radius_at_u_m, sign)| {
+        let root = (radius_at_u_m * radius_at_u_m - lever_m * lever_m).sqrt();
+        (turn + sign * (lever_m / radius_at_u_m).asin(), slope + sign / root)
     })
 }
 
@@ -157,17 +158,17 @@ mod tests {
                     from + along * (-half + (half * half - q.norm_squared() + radius * radius).sqrt())
                 };
                 let inner = leave(&Vector3::zeros(), &direction, inner_radius_m);
-                let inwards = |place: &Vector3<f64>| (center_m - place).normalize();
-                let glass = refracted(&direction, &inwards(&inner), 1.0, GLASS_INDEX);
+                let inward_normal = |place: &Vector3<f64>| (center_m - place).normalize();
+                let glass = refracted(&direction, &inward_normal(&inner), 1.0, GLASS_INDEX);
                 let outer = leave(&inner, &glass, inner_radius_m + thickness_m);
-                (outer, refracted(&glass, &inwards(&outer), GLASS_INDEX, WATER_INDEX))
+                (outer, refracted(&glass, &inward_normal(&outer), GLASS_INDEX, WATER_INDEX))
             }
         }
     }
 
-    fn assert_seen_again(port: &Port, start: &Vector3<f64>, range_m: f64) -> Result<(), TestCaseError> {
+    fn assert_round_trip(port: &Port, start: &Vector3<f64>, range_m: f64) -> Result<(), TestCaseError> {
         let (outer, wet) = traced(port, start);
-        let seen = port.seen_from(&(outer + wet * range_m)).expect("a ray reaches it");
+        let seen = port.direction_in_air(&(outer + wet * range_m)).expect("a ray reaches it");
         let apart = seen.normalize().cross(&start.normalize()).norm();
         prop_assert!(apart < 1e-12, "{apart} rad apart");
         Ok(())
@@ -175,42 +176,42 @@ mod tests {
 
     proptest! {
         #[test]
-        fn a_flat_port_sees_what_a_traced_ray_meets(
+        fn a_flat_port_inverts_a_traced_ray(
             angle in 0.0f64..1.45, azimuth in -3.1f64..3.1, range_m in 0.05f64..5.0,
             distance_m in 0.0f64..0.2, thickness_m in 0.0f64..0.05,
         ) {
             let start = Vector3::new(angle.sin() * azimuth.cos(), angle.sin() * azimuth.sin(), angle.cos());
-            assert_seen_again(&Port::Flat { distance_m, thickness_m }, &start, range_m)?;
+            assert_round_trip(&Port::Flat { distance_m, thickness_m }, &start, range_m)?;
         }
 
         #[test]
-        fn a_dome_sees_what_a_traced_ray_meets(
+        fn a_dome_inverts_a_traced_ray(
             angle in 0.0f64..1.6, azimuth in -3.1f64..3.1, range_m in 0.05f64..5.0,
             x in -0.014f64..0.014, y in -0.014f64..0.014, z in -0.014f64..0.014,
             thickness_m in 0.0f64..0.05,
         ) {
             let start = Vector3::new(angle.sin() * azimuth.cos(), angle.sin() * azimuth.sin(), angle.cos());
             let port = Port::Dome { center_m: Vector3::new(x, y, z), inner_radius_m: 0.05, thickness_m };
-            assert_seen_again(&port, &start, range_m)?;
+            assert_round_trip(&port, &start, range_m)?;
         }
     }
 
     /// A case that Newton's method once missed.
     #[test]
-    fn a_thick_dome_aside_shows_what_touches_it() {
+    fn a_thick_decentred_dome_inverts_a_ray_from_its_surface() {
         let center_m = Vector3::new(0.0, -0.005_984_014_066_287_652, 0.0);
         let port = Port::Dome { center_m, inner_radius_m: 0.05, thickness_m: 0.019_330_072_291_360_43 };
-        assert_seen_again(&port, &Vector3::z(), 0.05).expect("seen again");
+        assert_round_trip(&port, &Vector3::z(), 0.05).expect("seen again");
     }
 
     #[test]
-    fn a_centred_dome_bends_nothing_and_no_port_sees_what_is_inside_of_it() {
+    fn a_centred_dome_turns_no_ray_and_no_port_projects_points_inside_it() {
         let point = Vector3::new(0.3, -0.2, 0.5);
         let dome = Port::Dome { center_m: Vector3::zeros(), inner_radius_m: 0.05, thickness_m: 0.01 };
-        assert_eq!(dome.seen_from(&point), Some(point));
-        assert!(dome.seen_from(&Vector3::new(0.0, 0.01, 0.055)).is_none());
+        assert_eq!(dome.direction_in_air(&point), Some(point));
+        assert!(dome.direction_in_air(&Vector3::new(0.0, 0.01, 0.055)).is_none());
         let flat = Port::Flat { distance_m: 0.02, thickness_m: 0.01 };
-        assert!(flat.seen_from(&Vector3::new(0.0, 0.01, 0.025)).is_none());
+        assert!(flat.direction_in_air(&Vector3::new(0.0, 0.01, 0.025)).is_none());
     }
 
     /// To first order a thin dome that lies e aside turns the line of sight by `e (1 - 1/n) (1/R - 1/range)`.
@@ -220,7 +221,7 @@ mod tests {
         for range_m in [0.2, 1.0, 5.0] {
             let center_m = Vector3::new(ASIDE_M, 0.0, 0.0);
             let dome = Port::Dome { center_m, inner_radius_m: 0.05, thickness_m: 0.0 };
-            let seen = dome.seen_from(&Vector3::new(0.0, 0.0, range_m)).expect("in the water");
+            let seen = dome.direction_in_air(&Vector3::new(0.0, 0.0, range_m)).expect("in the water");
             let expected = ASIDE_M * (1.0 - 1.0 / WATER_INDEX) * (1.0 / 0.05 - 1.0 / range_m);
             let angle = seen.x.abs().atan2(seen.z);
             assert!((angle / expected - 1.0).abs() < 1e-6, "{angle} against {expected}");
@@ -231,7 +232,7 @@ mod tests {
     #[test]
     fn a_flat_port_magnifies_by_the_waters_index() {
         let flat = Port::Flat { distance_m: 0.0, thickness_m: 0.0 };
-        let seen = flat.seen_from(&Vector3::new(1e-5, 0.0, 1.0)).expect("in the water");
+        let seen = flat.direction_in_air(&Vector3::new(1e-5, 0.0, 1.0)).expect("in the water");
         assert!((seen.x / seen.z / 1e-5 - WATER_INDEX).abs() < 1e-9);
     }
 }

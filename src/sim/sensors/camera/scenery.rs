@@ -1,35 +1,35 @@
-//! What the rendered camera sees besides tags: the arm as drawn, the vehicle, obstacles, the seafloor.
+//! Solids of a rendered image: the arm as drawn, the vehicle, obstacles, the seafloor.
 
 use nalgebra::{Isometry3, Point3};
 
+use crate::body_poses::BodyPoses;
 use crate::convert::to_rapier;
 use crate::imaging::SolidShape;
-use crate::places::BodyPoses;
 use crate::solids::{Carrier, HOUSING_M, seafloor};
 use armcal_core::robot::{PlacedShape, Robot, Vehicle, parry_pose};
 use armcal_core::routine::Scene;
 
-/// Solid shapes, and what each is fixed to.
+/// Solid shapes, and the body that carries each.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Scenery {
     pub shapes: Vec<SolidShape>,
-    fixed: Vec<Fixed>,
+    carried_shapes: Vec<CarriedShape>,
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Fixed {
+struct CarriedShape {
     carrier: Carrier,
     carrier_from_shape: Isometry3<f64>,
-    /// 0 or 1 for what slides with a jaw.
+    /// Index of the jaw that carries the shape, if any.
     jaw: Option<usize>,
 }
 
-/// Where everything is that moves.
+/// Poses of all moving bodies.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Places<'a> {
+pub(crate) struct ScenePoses<'a> {
     pub links: &'a BodyPoses,
     pub base_from_world: Isometry3<f64>,
-    /// Shifts of the jaws from where they are drawn, on their link.
+    /// Displacements of the jaws from the drawing, on their link.
     pub jaws: [Isometry3<f64>; 2],
 }
 
@@ -38,7 +38,7 @@ impl Scenery {
         let mut scenery = Self::default();
         let base_from_vehicle = vehicle.vehicle_from_base.inverse();
         for (body, link) in robot.bodies.iter().enumerate() {
-            // Where nothing is drawn, what the arm must not touch stands in.
+            // A link without visual shapes shows its collision shapes.
             let shapes = if link.visuals.is_empty() { &link.collisions } else { &link.visuals };
             for placed in shapes.iter().filter(|placed| !is_housing(robot, body, placed)) {
                 scenery.push(Carrier::Body(body), &Isometry3::identity(), placed, None);
@@ -71,31 +71,31 @@ impl Scenery {
         jaw: Option<usize>,
     ) {
         let carrier_from_shape = carrier_from_owner * placed.owner_from_shape;
-        self.fixed.push(Fixed { carrier, carrier_from_shape, jaw });
+        self.carried_shapes.push(CarriedShape { carrier, carrier_from_shape, jaw });
         let PlacedShape { shape, color_rgb, .. } = placed;
         self.shapes.push(SolidShape { shape: shape.clone(), color_rgb: *color_rgb, is_ground: false });
     }
 
-    /// `base_from_shape` of each shape at three instants, into `out`; `carried` moves what is on a body at the last of them to
-    /// where it was.
+    /// `base_from_shape` of each shape at three instants, into `out`; `carried` has the motions of a body from the last
+    /// instant to each of them.
     pub(super) fn place(
         &self,
-        places: &Places,
+        poses: &ScenePoses,
         carried: &dyn Fn(usize) -> [Isometry3<f64>; 3],
         out: &mut Vec<[Isometry3<f64>; 3]>,
     ) {
         out.clear();
         let mut of_body = (usize::MAX, [Isometry3::identity(); 3]);
-        for fixed in &self.fixed {
-            out.push(match fixed.carrier {
-                Carrier::World => [places.base_from_world * fixed.carrier_from_shape; 3],
-                Carrier::Body(0) => [fixed.carrier_from_shape; 3],
+        for shape in &self.carried_shapes {
+            out.push(match shape.carrier {
+                Carrier::World => [poses.base_from_world * shape.carrier_from_shape; 3],
+                Carrier::Body(0) => [shape.carrier_from_shape; 3],
                 Carrier::Body(body) => {
                     if of_body.0 != body {
                         of_body = (body, carried(body));
                     }
-                    let shift = fixed.jaw.map_or_else(Isometry3::identity, |jaw| places.jaws[jaw]);
-                    let now = places.links.link(body) * shift * fixed.carrier_from_shape;
+                    let shift = shape.jaw.map_or_else(Isometry3::identity, |jaw| poses.jaws[jaw]);
+                    let now = poses.links.link(body) * shift * shape.carrier_from_shape;
                     of_body.1.map(|moved| moved * now)
                 }
             });
@@ -103,11 +103,11 @@ impl Scenery {
     }
 }
 
-/// Whether a shape drawn on a link holds the camera: on its link, and near its eye.
+/// Whether a shape holds the camera: it is on the camera's link and near its pupil.
 fn is_housing(robot: &Robot, body: usize, placed: &PlacedShape) -> bool {
     let mount = &robot.camera.mount;
     let pose = parry_pose(&(placed.owner_from_shape * placed.shape.axis_fix()));
-    let eye = Point3::from(mount.link_from_frame.translation.vector);
-    let local = pose.inverse_transform_point(to_rapier(&eye.coords));
+    let pupil = Point3::from(mount.link_from_frame.translation.vector);
+    let local = pose.inverse_transform_point(to_rapier(&pupil.coords));
     body == mount.n_joints && placed.shape.to_parry().distance_to_local_point(local, true) < HOUSING_M
 }

@@ -1,14 +1,21 @@
 //! The camera against what its lens, its motion and its clock give in closed form.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
-use nalgebra::{Point3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector2, Vector3};
 
-use super::*;
-use crate::spec::PortKind;
-use armcal_core::optics::{Fisheye, square_corners};
-use armcal_core::robot::{load, load_vehicle};
+use crate::as_built::AsBuilt;
+use crate::body_poses::BodyPoses;
+use crate::sensors::camera::ported_lens::PortedLens;
+use crate::sensors::camera::*;
+use crate::solids::Solids;
+use crate::spec::{CameraMode, CameraWorldSpec, CornerNoiseKind, PortKind, WorldSpec};
+use armcal_core::optics::{CornerNoise, Fisheye, square_corners};
+use armcal_core::robot::{Robot, load, load_vehicle};
 use armcal_core::routine::Scene;
+use armcal_core::streams::{ImageDemand, JointAngles, TagDetections};
+use armcal_core::time::{SIMULATION_EPOCH, Stamp};
 
 mod rendered;
 
@@ -46,7 +53,11 @@ impl Site {
     fn image(&self, camera: &mut WristCamera, rates_rad_s: f64, at_s: f64) -> (Stamp, TagDetections) {
         let rates = JointAngles::from_fn(self.robot.n_joints(), |_| rates_rad_s);
         let motion = ArmMotion { chain: &self.robot.chain, angles: self.robot.stowed, rates };
-        camera.expose(&self.links, &self.solids, &motion, SIMULATION_EPOCH.plus_s(at_s))
+        let poses =
+            ScenePoses { links: &self.links, base_from_world: Isometry3::identity(), jaws: [Isometry3::identity(); 2] };
+        let closed = SIMULATION_EPOCH.plus_s(at_s);
+        let (solids, demand) = (&self.solids, ImageDemand::All);
+        camera.project_tags(&ShutterState { poses, solids, motion, closed, demand })
     }
 
     /// Corners by the drawing's lens, with the joints where they were `earlier_s` before.
@@ -79,7 +90,8 @@ fn an_instant_shows_where_the_corners_are() {
     }
 }
 
-/// The tag on the gripper is where the last joint carries it, is hidden by the wrist behind it, and moves no other tag's noise.
+/// The tag on the gripper is where the last joint carries it, is hidden by the wrist behind it, and moves no other
+/// tag's noise.
 #[test]
 fn the_tag_on_the_gripper_turns_with_the_last_joint_until_the_wrist_hides_it() {
     let mut with = site(|spec| spec.camera.corner_noise_px = 0.3);
@@ -273,15 +285,15 @@ fn corners_go_through_the_lens_as_built() {
     }
 }
 
-/// Behind a thin flat port at the pupil an angle becomes `asin(n sin)`, through a lens shorter by n: the drawing's focal length
-/// on the axis, and another one outwards. A dome beside the pupil shifts corners by some pixels.
+/// Behind a thin flat port at the pupil an angle becomes `asin(n sin)`, through a lens shorter by n: the drawing's
+/// focal length on the axis, and another one outwards. A dome beside the pupil shifts corners by some pixels.
 #[test]
 fn ports_keep_the_focal_length_near_the_axis() {
     let shift = |change: &dyn Fn(&mut CameraWorldSpec), angle_rad: f64, range_m: f64| {
         let site = site(|spec| change(&mut spec.camera));
-        let eye = PortedLens::new(&site.robot.camera.lens, &site.built, &site.spec.camera);
+        let lens = PortedLens::new(&site.robot.camera.lens, &site.built, &site.spec.camera);
         let point = Vector3::new(angle_rad.sin(), 0.0, angle_rad.cos()) * range_m;
-        (eye.project(&point).expect("in view") - site.robot.camera.lens.project(&point).expect("in view")).norm()
+        (lens.project(&point).expect("in view") - site.robot.camera.lens.project(&point).expect("in view")).norm()
     };
     let flat = |spec: &mut CameraWorldSpec| spec.port = PortKind::Flat;
     let dome = |spec: &mut CameraWorldSpec| {
@@ -319,7 +331,8 @@ fn ports_keep_the_focal_length_near_the_axis() {
     assert_eq!(shift(&centred, 0.7, 1.0), 0.0);
 }
 
-/// Squared errors in units of the model's covariance are chi-square of 2 degrees, and tags are found as often as it says.
+/// Squared errors in units of the model's covariance are chi-square of 2 degrees, and tags are found as often as it
+/// says.
 #[test]
 fn fitted_noise_and_misses_are_those_of_the_model() {
     let site = site(|spec| spec.camera.noise = CornerNoiseKind::Fitted);

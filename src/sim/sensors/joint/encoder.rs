@@ -1,7 +1,7 @@
 //! An encoder: `reading = shaft + offset + e sin(shaft + phase)`, in whole steps of a turn.
 //!
-//! The once-a-turn error is that of a disc off its axis (eccentricity over the lines' radius). No wiper, no track: neither
-//! temperature, pressure, drift nor noise move it.
+//! The once-a-turn error is that of a disc off its axis (eccentricity over the lines' radius). No wiper, no track:
+//! neither temperature, pressure, drift nor noise move it.
 
 use std::f64::consts::TAU;
 

@@ -1,133 +1,16 @@
 //! A joint sensor: true angle to raw counts.
 //!
-//! In stages: the play between joint and shaft; what the element makes of the shaft's angle, by its kind (`pot`,
-//! `encoder`, `resolver`); a slip on the shaft; gears; and the word (`word`): the datasheet's scale, noise, the
-//! converter's step, the wrap, and words that say nothing.
+//! In stages: backlash between joint and shaft; the sensing element by its kind (`potentiometer`, `encoder`,
+//! `resolver`); a slip on the shaft; gears; and the `quantizer`: nominal scale, noise, resolution, wrap, and the words
+//! of a broken wire.
 
 mod encoder;
-mod pot;
+mod joint_sensor;
+mod potentiometer;
+mod quantizer;
 mod resolver;
-mod word;
 
-use super::OilState;
-use crate::as_built::JointAsBuilt;
-use crate::spec::JointSensorsSpec;
-use armcal_core::robot::{JointSensorSpec, SensorKind};
-use encoder::Encoder;
-use pot::Pot;
-use resolver::Resolver;
-use word::Quantizer;
-
-/// One joint sensor as built.
-#[derive(Clone, Debug)]
-pub(crate) struct JointSensor {
-    center_rad: f64,
-    gear_ratio: f64,
-    /// Of the reading by the shaft's angle, nearly.
-    slope: f64,
-    half_play_rad: f64,
-    shaft_rad: f64,
-    element: Element,
-    /// What slips on the shaft added.
-    jump_rad: f64,
-    word: Quantizer,
-}
-
-/// What turns the shaft's angle into a reading.
-#[derive(Clone, Debug)]
-enum Element {
-    Potentiometer(Box<Pot>),
-    Encoder(Encoder),
-    Resolver(Resolver),
-}
-
-/// What a sample depends on besides the sensor itself.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct JointInput {
-    pub angle_rad: f64,
-    pub around: OilState,
-    /// Since the last sample, s.
-    pub elapsed_s: f64,
-}
-
-impl JointSensor {
-    pub(crate) fn new(nominal: &JointSensorSpec, built: &JointAsBuilt, spec: &JointSensorsSpec, seed: u64) -> Self {
-        let element = match nominal.kind {
-            SensorKind::Potentiometer => Element::Potentiometer(Box::new(Pot::new(built, spec, seed))),
-            SensorKind::Encoder => Element::Encoder(Encoder::new(built, spec)),
-            SensorKind::Resolver => Element::Resolver(Resolver::new(built, spec)),
-        };
-        Self {
-            center_rad: built.center_rad,
-            gear_ratio: built.gear_ratio,
-            slope: 1.0 + built.gain_error,
-            half_play_rad: 0.5 * spec.backlash_rad,
-            shaft_rad: built.center_rad,
-            element,
-            jump_rad: 0.0,
-            word: Quantizer::new(nominal, spec, seed),
-        }
-    }
-
-    /// Centres play and hysteresis at `angle_rad`.
-    pub(crate) fn settle(&mut self, angle_rad: f64) {
-        self.shaft_rad = angle_rad;
-        if let Element::Potentiometer(pot) = &mut self.element {
-            pot.settle(angle_rad);
-        }
-    }
-
-    /// The reading without noise and steps at a settled shaft angle, rad.
-    fn reading_rad(&self, shaft_rad: f64, around: &OilState) -> f64 {
-        let read = match &self.element {
-            Element::Potentiometer(pot) => pot.reading_rad(shaft_rad, around),
-            Element::Encoder(encoder) => encoder.reading_rad(shaft_rad),
-            Element::Resolver(resolver) => resolver.reading_rad(shaft_rad, around),
-        };
-        read + self.jump_rad
-    }
-
-    /// It slips: reads `by_rad` more from now on.
-    pub(crate) fn jump(&mut self, by_rad: f64) {
-        self.jump_rad += by_rad;
-    }
-
-    /// It keeps its last word from now on.
-    pub(crate) fn stick(&mut self) {
-        self.word.stick();
-    }
-
-    /// Its line breaks: from now on it reads an open input, 0 counts and the converter's noise.
-    pub(crate) fn die(&mut self) {
-        self.word.die();
-    }
-
-    /// The shaft angle at which it reads `reading_rad`: fixed-point iteration, for what bends the scale is slight.
-    pub(crate) fn angle_for_reading(&self, reading_rad: f64, around: &OilState) -> f64 {
-        let mut angle = reading_rad;
-        for _ in 0..200 {
-            angle += (reading_rad - self.reading_rad(angle, around)) / self.slope;
-        }
-        angle
-    }
-
-    /// Takes a sample, raw counts 0..wrap.
-    pub(crate) fn sample(&mut self, input: &JointInput) -> f64 {
-        let half_play = self.half_play_rad;
-        self.shaft_rad = self.shaft_rad.clamp(input.angle_rad - half_play, input.angle_rad + half_play);
-        let (place_rad, is_open) = match &mut self.element {
-            Element::Potentiometer(pot) => pot.advance(self.shaft_rad, input.elapsed_s),
-            Element::Encoder(_) | Element::Resolver(_) => (self.shaft_rad, false),
-        };
-        let mut reading_rad = self.reading_rad(place_rad, &input.around);
-        if let Element::Encoder(encoder) = &self.element {
-            reading_rad = encoder.stepped_rad(reading_rad);
-        }
-        // Gears between shaft and sensor turn about the middle of the range, where both agree.
-        let travel_rad = self.gear_ratio * (reading_rad - self.center_rad);
-        self.word.read((!is_open).then_some(self.center_rad + travel_rad))
-    }
-}
+pub(crate) use joint_sensor::{JointInput, JointSensor};
 
 #[cfg(test)]
 mod random_tests;

@@ -1,8 +1,9 @@
-//! What a potentiometer's chance does: histogram, walks, drop-outs. Seeds are fixed; limits are about 4 sigma.
+//! Random effects of a potentiometer: histogram, walks, drop-outs. Seeds are fixed; limits are about 4 sigma.
 
-use super::tests::{COUNTS_PER_RAD, at, perfect, pot, reading_of, silent};
-use super::*;
-use crate::as_built::WornSpot;
+use crate::as_built::{JointAsBuilt, WornSpot};
+use crate::sensors::joint::tests::{COUNTS_PER_RAD, at, perfect, pot, reading_of, silent};
+use crate::sensors::joint::*;
+use crate::spec::JointSensorsSpec;
 
 /// The normal distribution: a series without cancellation, exact to rounding within 6 sigma.
 fn normal_cdf(x: f64) -> f64 {
@@ -64,8 +65,8 @@ fn allan_variance(samples: &[f64], m: usize) -> (f64, usize) {
     (0.5 * squares / (means.len() - 1) as f64, means.len() - 1)
 }
 
-/// White noise falls as sigma^2 / m, the walk grows as q (2 m^2 + 1) / 6 m, which tends to K^2 tau / 3 (Allan variance of
-/// rate random walk, IEEE Std 952): the standard world's sensor, one reading a second for 36 h, 16 seeds.
+/// White noise falls as sigma^2 / m, the walk grows as q (2 m^2 + 1) / 6 m, which tends to K^2 tau / 3 (Allan variance
+/// of rate random walk, IEEE Std 952): the standard world's sensor, one reading a second for 36 h, 16 seeds.
 #[test]
 fn the_allan_variance_of_noise_and_drift_is_the_closed_one() {
     const N: usize = 1 << 17;
@@ -169,8 +170,8 @@ fn dropouts(spec: &JointSensorsSpec, built: &JointAsBuilt, angle_rad: f64, elaps
     (lost / f64::from(N), lost / runs)
 }
 
-/// The chain in time: a share `l / (l + f)` is lost; a drop-out that a sample met lasts `1 / P(found at the next)` samples
-/// on average, `P = f / (l + f) (1 - exp(-(l + f) dt))`.
+/// The chain in time: a share `l / (l + f)` is lost; a drop-out that a sample met lasts `1 / P(found at the next)`
+/// samples on average, `P = f / (l + f) (1 - exp(-(l + f) dt))`.
 #[test]
 fn dropouts_come_and_last_as_the_chain_says() {
     let spot = WornSpot { center_rad: -1.0, peak_rad: 0.0, width_rad: 0.05 };
@@ -197,7 +198,8 @@ fn dropouts_come_and_last_as_the_chain_says() {
     assert_eq!(share, 0.0, "20 widths from the spot");
 }
 
-/// What is switched on shifts nothing else: the noise of a sensor with drop-outs and drift by use is that of one without.
+/// What is switched on shifts nothing else: the noise of a sensor with drop-outs and drift by use is that of one
+/// without.
 #[test]
 fn effects_have_random_streams_of_their_own() {
     let plain = JointSensorsSpec { noise_rms_counts: 1.5, drift_rad_per_sqrt_h: 1e-3, ..silent() };

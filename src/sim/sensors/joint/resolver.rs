@@ -1,4 +1,5 @@
-//! A resolver: `reading = shaft + offset + c (T - T0) + (atan2((1 + a) sin f, cos(f + q)) - f) / p`, `f = p shaft + phase`.
+//! A resolver: `reading = shaft + offset + c (T - T0) + (atan2((1 + a) sin f, cos(f + q)) - f) / p`,
+//! `f = p shaft + phase`.
 //!
 //! The windings' voltages differ by a and lack q to a right angle; p pole pairs. To first order the error is
 //! `(a sin 2f + q (1 - cos 2f)) / 2p`: twice an electrical turn.

@@ -2,8 +2,11 @@
 
 use std::num::NonZeroU8;
 
-use super::*;
-use crate::as_built::{Harmonic, ResolverAsBuilt, WornSpot};
+use crate::as_built::{Harmonic, JointAsBuilt, ResolverAsBuilt, WornSpot};
+use crate::sensors::OilState;
+use crate::sensors::joint::*;
+use crate::spec::JointSensorsSpec;
+use armcal_core::robot::{JointSensorSpec, SensorKind};
 
 pub(super) const COUNTS_PER_RAD: f64 = 46.0 * 180.0 / std::f64::consts::PI;
 const OFFSET_COUNTS: f64 = 65322.0;
@@ -156,7 +159,8 @@ fn the_errors_over_the_range_are_their_closed_forms() {
     }
 }
 
-/// From rest: the contact lags by its share of the way up to half the width, and after each turn by as much the other way.
+/// From rest: the contact lags by its share of the way up to half the width, and after each turn by as much the other
+/// way.
 #[test]
 fn the_loops_of_play_and_hysteresis_are_their_closed_forms() {
     let (width, step) = (0.01_f64, 0.0005);

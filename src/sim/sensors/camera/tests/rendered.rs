@@ -1,28 +1,32 @@
 //! The rendered camera against the geometric one.
 
-use super::*;
+use crate::sensors::camera::tests::*;
 
 impl Site {
-    /// Moments of a rendered camera: the images that it gives, one a second.
-    fn rendered(&self, rates_rad_s: f64, seconds: u32, change: impl Fn(&mut WristCamera, u32)) -> Vec<Exposed> {
+    /// Images of a rendered camera, one a second.
+    fn rendered(&self, rates_rad_s: f64, seconds: u32, change: impl Fn(&mut WristCamera, u32)) -> Vec<CameraShot> {
         let root =
             Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("robots/vehicles/work-class-front.toml");
         let vehicle = load_vehicle(&root).expect("it reads");
         let Self { robot, solids, spec, links, .. } = self;
         let mut camera = self.camera();
         let scene = Scene { seafloor_z_m: Some(-2.2), obstacles: Vec::new() };
-        camera.render(&RenderInput { robot, vehicle: &vehicle, scene: &scene, spec, seed: 4 }).expect("a camera");
+        camera
+            .enable_rendering(&RenderInput { robot, vehicle: &vehicle, scene: &scene, spec, seed: 4 })
+            .expect("a camera");
         let rates = JointAngles::from_fn(robot.n_joints(), |_| rates_rad_s);
         let take = |second: u32| {
             change(&mut camera, second);
-            let places = Places {
+            let poses = ScenePoses {
                 links,
                 base_from_world: vehicle.vehicle_from_base.inverse().isometry().to_owned(),
                 jaws: [Isometry3::identity(); 2],
             };
             let motion = ArmMotion { chain: &robot.chain, angles: robot.stowed, rates };
             let closed = SIMULATION_EPOCH.plus_s(f64::from(second));
-            camera.take(&Moment { places, solids, motion, closed, is_wanted: true }).expect("an image")
+            camera
+                .take_image(&ShutterState { poses, solids, motion, closed, demand: ImageDemand::All })
+                .expect("an image")
         };
         (0..seconds).filter_map(take).collect()
     }

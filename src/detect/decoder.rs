@@ -1,0 +1,104 @@
+//! Candidate tags from the AprilTag project's C library, in the image as it is and in its contrast-normalized copy.
+
+use apriltag::{Detector, Family, Image};
+
+use crate::contrast::ContrastNormalizer;
+use crate::error::DetectError;
+use crate::image::GreyImage;
+
+/// Largest Hamming distance that the library decodes. The gates reject codes with more wrong bits than the settings
+/// allow.
+const DECODED_WRONG_BITS: usize = 2;
+/// The library has pixel centres at halves.
+const CENTER_SHIFT_PX: f64 = 0.5;
+/// Fixed, so that the result does not depend on the machine. Two threads are no faster: the library starts them for
+/// each image.
+const LIBRARY_THREADS: u8 = 1;
+/// Rows of the library's images are padded to a multiple of this many bytes.
+const ALIGNMENT: usize = 96;
+
+/// A decoded quadrilateral before it is fitted.
+#[derive(Clone, Debug)]
+pub(crate) struct Candidate {
+    pub id: u32,
+    pub hamming: usize,
+    pub decision_margin: f64,
+    pub corners_px: [[f64; 2]; 4],
+}
+
+/// The library with its two images.
+#[derive(Debug)]
+pub(crate) struct QuadDecoder {
+    library: Detector,
+    image: Image,
+    normalized: Image,
+    normalizer: ContrastNormalizer,
+}
+
+impl QuadDecoder {
+    pub(crate) fn new([width, height]: [usize; 2]) -> Result<Self, DetectError> {
+        let library_error = |error: apriltag::Error| DetectError::Library(error.to_string());
+        let mut library = Detector::builder()
+            .add_family_bits(Family::tag_36h11(), DECODED_WRONG_BITS)
+            .build()
+            .map_err(library_error)?;
+        library.set_thread_number(LIBRARY_THREADS);
+        library.set_refine_edges(true);
+        let blank = || Image::zeros_with_alignment(width, height, ALIGNMENT).map_err(library_error);
+        Ok(Self { library, image: blank()?, normalized: blank()?, normalizer: ContrastNormalizer::default() })
+    }
+
+    /// Candidates in the image as it is.
+    pub(crate) fn decode(&mut self, image: &GreyImage, decimation: f32) -> Vec<Candidate> {
+        self.load(image);
+        decode(&mut self.library, &self.image, decimation)
+    }
+
+    /// The same; a second thread normalizes the contrast meanwhile.
+    pub(crate) fn decode_and_normalize(&mut self, image: &GreyImage, decimation: f32) -> Vec<Candidate> {
+        self.load(image);
+        let Self { library, image: buffer, normalized, normalizer } = self;
+        let stride = normalized.stride();
+        let normalized = normalized.as_slice_mut();
+        std::thread::scope(|scope| {
+            scope.spawn(|| normalizer.normalize(image.data, image.width, normalized, stride));
+            decode(library, buffer, decimation)
+        })
+    }
+
+    /// Candidates in the normalized image of the last [`Self::decode_and_normalize`].
+    pub(crate) fn decode_normalized(&mut self, decimation: f32) -> Vec<Candidate> {
+        decode(&mut self.library, &self.normalized, decimation)
+    }
+
+    fn load(&mut self, image: &GreyImage) {
+        let stride = self.image.stride();
+        let rows = self.image.as_slice_mut().chunks_exact_mut(stride);
+        for (row, line) in rows.zip(image.data.chunks_exact(image.width)) {
+            row[..image.width].copy_from_slice(line);
+        }
+    }
+}
+
+/// Candidates by id and position: the library's own order is that of its hash tables.
+fn decode(library: &mut Detector, image: &Image, decimation: f32) -> Vec<Candidate> {
+    library.set_decimation(decimation);
+    let detections = library.detect(image);
+    let mut candidates: Vec<Candidate> = detections
+        .iter()
+        .filter_map(|detection| {
+            Some(Candidate {
+                id: u32::try_from(detection.id()).ok()?,
+                hamming: detection.hamming(),
+                decision_margin: f64::from(detection.decision_margin()),
+                corners_px: detection.corners().map(|corner| corner.map(|x| x - CENTER_SHIFT_PX)),
+            })
+        })
+        .filter(|candidate| candidate.corners_px.iter().flatten().all(|x| x.is_finite()))
+        .collect();
+    candidates.sort_by(|a, b| {
+        let by_position = a.corners_px[0].iter().zip(&b.corners_px[0]).map(|(x, y)| x.total_cmp(y));
+        by_position.fold(a.id.cmp(&b.id), std::cmp::Ordering::then)
+    });
+    candidates
+}

@@ -1,0 +1,11 @@
+//! Errors of the detector.
+
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum DetectError {
+    #[error("the image holds {bytes} bytes, not {width} x {height}")]
+    Size { bytes: usize, width: usize, height: usize },
+    #[error("the image is {width} x {height} pixels, the lens's is {lens_width} x {lens_height}")]
+    Resolution { width: usize, height: usize, lens_width: usize, lens_height: usize },
+    #[error("the AprilTag library failed: {0}")]
+    Library(String),
+}

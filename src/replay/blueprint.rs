@@ -1,0 +1,232 @@
+//! The viewer's layout, written down entry by entry: the SDK's builder cannot set the eye, the axes or the legends, and
+//! names its parts by chance.
+
+use rerun::AsComponents;
+use rerun::external::re_sdk_types::blueprint::archetypes::{
+    Background, ContainerBlueprint, EyeControls3D, LineGrid3D, PanelBlueprint, PlotLegend, TextLogColumns, TimeAxis,
+    TimePanelBlueprint, ViewBlueprint, ViewContents, ViewportBlueprint, VisualBounds2D,
+};
+use rerun::external::re_sdk_types::blueprint::components::{
+    BackgroundKind, ContainerKind, Corner2D, PanelState, PlayState, RootContainer,
+};
+use rerun::external::re_sdk_types::blueprint::datatypes::{TextLogColumn, TextLogColumnKind};
+use rerun::external::re_sdk_types::datatypes::{Range2D, TimeInt, TimeRange, TimeRangeBoundary};
+use rerun::external::uuid::Uuid;
+
+use crate::colors;
+use crate::entities::{
+    CAMERA, CLEARANCE, COUNTS, JOINT_ANGLE, JOINT_ERROR, LOG, PREDICTED, STATE, SUMMARY, TEMPERATURE, TOOL_ERROR, WORLD,
+};
+use crate::entity_log::TIMELINE;
+use crate::scene::ReplayScene;
+use crate::viewpoint;
+
+/// One entity of the layout.
+pub(super) struct Entry {
+    pub path: String,
+    pub what: Box<dyn AsComponents>,
+}
+
+/// Longer recordings play faster, to be over in about this time, s.
+const WATCHED_S: f64 = 120.0;
+
+/// A view or container that was written down: its path, for the container around it.
+struct Part(String);
+
+#[derive(Default)]
+struct Builder {
+    entries: Vec<Entry>,
+    parts: u128,
+}
+
+/// The layout for what `run` has to show.
+pub(super) fn build(run: &ReplayScene) -> Vec<Entry> {
+    let mut b = Builder::default();
+    let scene = scene_view(&mut b, run);
+    let camera = camera_view(&mut b, run);
+    let texts = text_tabs(&mut b, run);
+    let below = b.container(ContainerKind::Horizontal, &[(camera, 5.0), (texts, 6.0)]);
+    let left = b.container(ContainerKind::Vertical, &[(scene, 5.0), (below, 4.0)]);
+    let right = right_column(&mut b, run);
+    let main = b.container(ContainerKind::Horizontal, &[(left, 3.0), (right, 2.0)]);
+    let root = if run.tracks.marks.is_empty() {
+        main
+    } else {
+        let phases = b.view("StateTimeline", "What the arm does", STATE);
+        b.container(ContainerKind::Vertical, &[(main, 4.3), (phases, 1.0)])
+    };
+    b.finish(&root, run)
+}
+
+/// The layout of a plan.
+pub(super) fn build_plan(run: &ReplayScene) -> Vec<Entry> {
+    let mut b = Builder::default();
+    let scene = titled_scene(&mut b, run, "Plan: solid = believed arm, amber = arms that the errors allow");
+    let camera = titled_camera(&mut b, run, "Wrist camera: tags where the believed arm expects them");
+    let summary = b.view("TextDocument", "Plan", SUMMARY);
+    let log = b.view("TextLog", "Poses", LOG);
+    let columns = [TextLogColumn { kind: TextLogColumnKind::Body, visible: true.into() }];
+    b.property(&log, "TextLogColumns", TextLogColumns::new().with_text_log_columns(columns));
+    let texts = b.tabs(&[log, summary]);
+    let below = b.container(ContainerKind::Horizontal, &[(camera, 5.0), (texts, 6.0)]);
+    let left = b.container(ContainerKind::Vertical, &[(scene, 5.0), (below, 4.0)]);
+    let clearance = b.plot("Clearance [mm]", CLEARANCE, legend(Corner2D::RightTop), run);
+    let predicted = b.plot("Predicted tool error [mm]", PREDICTED, legend(Corner2D::RightTop), run);
+    let angles = b.plot("Joint angles as believed [deg]", JOINT_ANGLE, legend(Corner2D::RightTop), run);
+    let right = b.container(ContainerKind::Vertical, &[(clearance, 3.0), (predicted, 2.4), (angles, 2.2)]);
+    let main = b.container(ContainerKind::Horizontal, &[(left, 3.0), (right, 2.0)]);
+    let phases = b.view("StateTimeline", "What the arm would do", STATE);
+    let root = b.container(ContainerKind::Vertical, &[(main, 4.3), (phases, 1.0)]);
+    b.finish(&root, run)
+}
+
+fn scene_view(b: &mut Builder, run: &ReplayScene) -> Part {
+    let title = if run.has_true_joints() {
+        "Scene: solid arm = true, pink ghost = believed"
+    } else {
+        "Scene: the arm as believed"
+    };
+    titled_scene(b, run, title)
+}
+
+fn titled_scene(b: &mut Builder, run: &ReplayScene, title: &str) -> Part {
+    let view = b.view("3D", title, WORLD);
+    let viewpoint = viewpoint::frame(run);
+    b.property(
+        &view,
+        "EyeControls3D",
+        EyeControls3D::new().with_position(viewpoint.position).with_look_target(viewpoint.target),
+    );
+    let water = Background::new(BackgroundKind::SolidColor).with_color(colors::WATER);
+    b.property(&view, "Background", water);
+    b.property(&view, "LineGrid3D", LineGrid3D::new().with_visible(false));
+    view
+}
+
+fn camera_view(b: &mut Builder, run: &ReplayScene) -> Part {
+    let title = if run.tracks.rejects.is_empty() {
+        "Wrist camera: green = tags seen, pink = expected"
+    } else {
+        "Wrist camera: green seen, orange rejected, pink expected"
+    };
+    titled_camera(b, run, title)
+}
+
+fn titled_camera(b: &mut Builder, run: &ReplayScene, title: &str) -> Part {
+    let view = b.view("2D", title, CAMERA);
+    let [width, height] = run.robot.camera.lens.resolution_px.map(f64::from);
+    let bounds = VisualBounds2D::new(Range2D { x_range: [0.0, width].into(), y_range: [0.0, height].into() });
+    b.property(&view, "VisualBounds2D", bounds);
+    let dark = Background::new(BackgroundKind::SolidColor).with_color([4, 5, 6, 255]);
+    b.property(&view, "Background", dark);
+    view
+}
+
+fn right_column(b: &mut Builder, run: &ReplayScene) -> Part {
+    let mut rows = Vec::new();
+    if run.has_true_joints() {
+        rows.push((b.plot("Joint error: believed - true [deg]", JOINT_ERROR, legend(Corner2D::RightTop), run), 3.0));
+    }
+    let title = if run.has_true_joints() {
+        "Joint angles [deg]: bright believed, dark true"
+    } else {
+        "Joint angles as believed [deg]"
+    };
+    // The colours are explained beside the errors, where there are any.
+    let colors_here = legend(Corner2D::RightTop).with_visible(!run.has_true_joints());
+    rows.push((b.plot(title, JOINT_ANGLE, colors_here, run), 2.2));
+    if run.has_true_tool() {
+        rows.push((b.plot("Tool error [mm]", TOOL_ERROR, legend(Corner2D::RightTop), run), 2.4));
+    }
+    if !run.tracks.oil_c.is_empty() || !run.tracks.water_c.is_empty() {
+        rows.push((b.plot("Temperature [C]", TEMPERATURE, legend(Corner2D::LeftTop), run), 1.5));
+    }
+    b.container(ContainerKind::Vertical, &rows)
+}
+
+fn legend(corner: Corner2D) -> PlotLegend {
+    PlotLegend::new().with_corner(corner)
+}
+
+fn text_tabs(b: &mut Builder, run: &ReplayScene) -> Part {
+    let summary = b.view("TextDocument", "Summary", SUMMARY);
+    let log = b.view("TextLog", "Log", LOG);
+    let kinds = [TextLogColumnKind::LogLevel, TextLogColumnKind::Body];
+    let columns = kinds.map(|kind| TextLogColumn { kind, visible: true.into() });
+    b.property(&log, "TextLogColumns", TextLogColumns::new().with_text_log_columns(columns));
+    let counts = b.plot("Raw counts", COUNTS, legend(Corner2D::LeftTop), run);
+    b.tabs(&[summary, log, counts])
+}
+
+impl Builder {
+    fn next_id(&mut self) -> Uuid {
+        self.parts += 1;
+        Uuid::from_u128(0x6172_6d63_616c_0000_0000_0000_0000_0000 + self.parts)
+    }
+
+    fn add(&mut self, path: String, what: impl AsComponents + 'static) {
+        self.entries.push(Entry { path, what: Box::new(what) });
+    }
+
+    /// A view of all that lies under `origin`.
+    fn view(&mut self, class: &str, title: &str, origin: &str) -> Part {
+        let path = format!("view/{}", self.next_id());
+        self.add(format!("{path}/ViewContents"), ViewContents::new(["$origin/**"]));
+        let view = ViewBlueprint::new(class).with_display_name(title).with_space_origin(origin);
+        self.add(path.clone(), view);
+        Part(path)
+    }
+
+    /// A plot over the whole recording; by itself the viewer shows what is near the time cursor.
+    fn plot(&mut self, title: &str, origin: &str, legend: PlotLegend, run: &ReplayScene) -> Part {
+        let view = self.view("TimeSeries", title, origin);
+        self.property(&view, "PlotLegend", legend);
+        let [start, end] =
+            [0.0, run.tracks.duration_s].map(|time_s| TimeRangeBoundary::Absolute(TimeInt((time_s * 1e9) as i64)));
+        self.property(&view, "TimeAxis", TimeAxis::new().with_view_range(TimeRange { start, end }));
+        view
+    }
+
+    fn property(&mut self, view: &Part, name: &str, what: impl AsComponents + 'static) {
+        self.add(format!("{}/{name}", view.0), what);
+    }
+
+    /// A row or a column of parts, each with its share of the length.
+    fn container(&mut self, kind: ContainerKind, parts: &[(Part, f32)]) -> Part {
+        let shares = parts.iter().map(|(_, share)| *share);
+        let container = ContainerBlueprint::new(kind).with_contents(parts.iter().map(|(part, _)| part.0.as_str()));
+        let container = match kind {
+            ContainerKind::Horizontal => container.with_col_shares(shares),
+            _ => container.with_row_shares(shares),
+        };
+        let path = format!("container/{}", self.next_id());
+        self.add(path.clone(), container);
+        Part(path)
+    }
+
+    /// Tabs, the first of them in front.
+    fn tabs(&mut self, parts: &[Part]) -> Part {
+        let container = ContainerBlueprint::new(ContainerKind::Tabs).with_contents(parts.iter().map(|p| p.0.as_str()));
+        let container = match parts.first() {
+            Some(first) => container.with_active_tab(first.0.as_str()),
+            None => container,
+        };
+        let path = format!("container/{}", self.next_id());
+        self.add(path.clone(), container);
+        Part(path)
+    }
+
+    fn finish(mut self, root: &Part, run: &ReplayScene) -> Vec<Entry> {
+        let id = root.0.rsplit('/').next().and_then(|id| Uuid::parse_str(id).ok()).unwrap_or_default();
+        let viewport = ViewportBlueprint::new().with_root_container(RootContainer(id.into()));
+        self.add("viewport".to_owned(), viewport.with_auto_layout(false).with_auto_views(false));
+        for panel in ["blueprint_panel", "selection_panel"] {
+            self.add(panel.to_owned(), PanelBlueprint::new().with_state(PanelState::Collapsed));
+        }
+        let speed = (run.tracks.duration_s / WATCHED_S).ceil().max(1.0);
+        let time = TimePanelBlueprint::new().with_state(PanelState::Collapsed).with_timeline(TIMELINE);
+        let time = time.with_play_state(PlayState::Playing).with_playback_speed(speed);
+        self.add("time_panel".to_owned(), time);
+        self.entries
+    }
+}

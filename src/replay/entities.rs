@@ -1,0 +1,20 @@
+//! Paths of the entities that more than one module names.
+
+/// Frames World, Vehicle and Base.
+pub(super) const WORLD: &str = "/world";
+pub(super) const VEHICLE: &str = "/world/vehicle";
+pub(super) const BASE: &str = "/world/vehicle/base";
+/// The wrist camera's image plane, raw pixels.
+pub(super) const CAMERA: &str = "/camera";
+/// Plots.
+pub(super) const JOINT_ERROR: &str = "/plots/joint_error";
+pub(super) const JOINT_ANGLE: &str = "/plots/joint_angle";
+pub(super) const TOOL_ERROR: &str = "/plots/tool_error";
+pub(super) const TEMPERATURE: &str = "/plots/temperature";
+pub(super) const COUNTS: &str = "/plots/counts";
+pub(super) const CLEARANCE: &str = "/plots/clearance";
+pub(super) const PREDICTED: &str = "/plots/predicted";
+/// Lanes of states, and the lines of the log.
+pub(super) const STATE: &str = "/state";
+pub(super) const LOG: &str = "/log";
+pub(super) const SUMMARY: &str = "/summary";

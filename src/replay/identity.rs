@@ -1,0 +1,38 @@
+//! Identity of a recording in the viewer.
+
+use std::fs::File;
+use std::path::PathBuf;
+
+use crate::error::ReplayError;
+use crate::scene::ReplayInput;
+use armcal_core::log::MessageHasher;
+use armcal_core::robot::Robot;
+
+/// What tells one recording from another in the viewer: a hash of everything that shapes the file.
+pub(super) struct Identity {
+    pub recording_id: String,
+}
+
+impl Identity {
+    /// Hashes the recording's messages, the truth file and the rest of what is shown.
+    pub fn of(input: &ReplayInput) -> Result<Self, ReplayError> {
+        let mut hasher = blake3::Hasher::new();
+        let mut messages = MessageHasher::new(&input.recording.joint_names);
+        for (log_time, message) in &input.recording.messages {
+            // A message that no file could hold (it was made, not read) is left out of the hash, not of the picture.
+            let _ = messages.add(*log_time, message);
+        }
+        hasher.update(messages.hex().as_bytes());
+        if let Some(path) = input.truth {
+            let read = File::open(path).and_then(|file| hasher.update_reader(file).map(|_| ()));
+            read.map_err(|source| armcal_core::log::LogError::Read { path: path.to_owned(), source })?;
+        }
+        // Where the robot's drawings lie does not matter.
+        let robot = Robot { folder: PathBuf::new(), ..input.robot.clone() };
+        // What a robot or a vehicle may lack is not in the identity of one that does.
+        let drawings = format!("{robot:?}{:?}{:?}", input.vehicle, input.scene);
+        hasher.update(drawings.replace("gripper_tag: None, ", "").replace("lights: [], ", "").as_bytes());
+        hasher.update(input.summary_markdown.unwrap_or_default().as_bytes());
+        Ok(Self { recording_id: hasher.finalize().to_hex()[..32].to_owned() })
+    }
+}

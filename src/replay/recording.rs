@@ -1,0 +1,44 @@
+//! A recording as a file for the viewer.
+
+use std::path::Path;
+
+use crate::entity_log::EntityLog;
+use crate::error::ReplayError;
+use crate::identity::Identity;
+use crate::scene::{ReplayInput, ReplayScene};
+use crate::tracks::Tracks;
+use crate::truth::Truth;
+use crate::{arms, blueprint, camera, phases, plots, rrd, scenery, summary, targets};
+
+/// Writes `out`, an .rrd file with its blueprint, replacing one of that name.
+///
+/// # Errors
+/// [`ReplayError`]: nothing to show, a truth file or joints that do not fit, or a file that cannot be written.
+pub fn write_rrd(input: &ReplayInput, out: &Path) -> Result<(), ReplayError> {
+    let mut tracks = Tracks::new(input.recording, input.robot)?;
+    // A recording that was never in a file has no images.
+    if input.recording.path.is_file() {
+        tracks.take_images(&input.recording.path)?;
+    }
+    let truth = match input.truth {
+        Some(path) => Some(Truth::read(path, input.robot, &tracks)?),
+        None => None,
+    };
+    let run = ReplayScene { tracks, truth, robot: input.robot, vehicle: input.vehicle, scene: input.scene };
+    let stream = draw(&run, input);
+    let identity = Identity::of(input)?;
+    rrd::write(out, &identity, &blueprint::build(&run), stream)
+}
+
+/// All entities of a recording, measured or planned.
+pub(super) fn draw(run: &ReplayScene<'_>, input: &ReplayInput<'_>) -> EntityLog {
+    let mut stream = EntityLog::default();
+    scenery::draw(run, &mut stream);
+    arms::draw(run, &mut stream);
+    targets::draw(run, &mut stream);
+    camera::draw(run, &mut stream);
+    plots::draw(run, &mut stream);
+    phases::draw(run, &mut stream);
+    summary::draw(run, input, &mut stream);
+    stream
+}

@@ -1,0 +1,32 @@
+//! The attitude sensor as built.
+
+use serde::{Deserialize, Serialize};
+
+use crate::as_built::normal::normal_vector;
+use crate::spec::VehicleMotionSpec;
+
+/// Constant errors of the attitude sensor, in its own axes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct AttitudeAsBuilt {
+    /// Rotation vector of the sensor's axes in the vehicle's.
+    pub misalignment_rad: [f64; 3],
+    /// At the start.
+    pub gyro_bias_rad_s: [f64; 3],
+    pub accelerometer_bias_m_s2: [f64; 3],
+}
+
+impl AttitudeAsBuilt {
+    pub(super) fn draw(spec: &VehicleMotionSpec, seed: u64) -> Self {
+        let normal = |what: &str, std: f64| normal_vector(seed, what, std).into();
+        Self {
+            misalignment_rad: normal("attitude/misalignment", spec.attitude_misalignment_std_rad),
+            gyro_bias_rad_s: normal("attitude/gyro", spec.gyro_bias_std_rad_s),
+            accelerometer_bias_m_s2: normal("attitude/accelerometer", spec.accelerometer_bias_std_m_s2),
+        }
+    }
+
+    /// Whether it is exact, as the standard world's is.
+    pub(super) fn is_exact(&self) -> bool {
+        *self == Self::default()
+    }
+}

@@ -1,0 +1,41 @@
+//! Tag poses as built: the survey's poses with random errors.
+
+use serde::{Deserialize, Serialize};
+
+use crate::as_built::pose::{PlainPose, normal_twist};
+use crate::spec::TagsSpec;
+use armcal_core::robot::{Robot, SurveyedTag};
+use armcal_core::spatial::{Base, Link, Pose, Tag};
+
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TagAsBuilt {
+    pub id: u32,
+    pub size_m: f64,
+    /// `base_from_tag`.
+    pub pose: PlainPose,
+}
+
+impl TagAsBuilt {
+    #[must_use]
+    pub fn base_from_tag(&self) -> Pose<Base, Tag> {
+        self.pose.to_pose()
+    }
+}
+
+/// Each tag of the survey; the base tag has a standard deviation of its own.
+pub(super) fn draw_tags(robot: &Robot, spec: &TagsSpec, seed: u64) -> Vec<TagAsBuilt> {
+    let draw_tag = |tag: &SurveyedTag| {
+        let (std_m, std_rad) = if tag.id == robot.base_tag { spec.base_tag_std() } else { spec.survey_std() };
+        let error = normal_twist(seed, &format!("as_built/tag/{}", tag.id), std_m, std_rad);
+        TagAsBuilt { id: tag.id, size_m: tag.size_m, pose: PlainPose::of(&tag.base_from_tag.perturbed(&error)) }
+    };
+    robot.tags.iter().map(draw_tag).collect()
+}
+
+/// `link_from_tag` of the tag on the gripper, if the robot has one.
+pub(super) fn draw_gripper_tag(robot: &Robot, spec: &TagsSpec, seed: u64) -> Option<PlainPose> {
+    let tag = robot.gripper_tag?;
+    let (std_m, std_rad) = spec.gripper_std();
+    let error = normal_twist(seed, "as_built/gripper_tag", std_m, std_rad);
+    Some(PlainPose::of(&Pose::<Link, Tag>::from_isometry(tag.mount.link_from_frame).perturbed(&error)))
+}

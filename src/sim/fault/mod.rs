@@ -1,0 +1,19 @@
+//! Faults of the simulated arm: their kinds, when they happen, and how a routine states them.
+//!
+//! `kinds` has the faults, `list` reads their tables, `robot_check` checks them against a robot, `timeline` orders the
+//! timed ones. `world::faults` carries them out.
+
+mod impulse;
+mod kinds;
+mod list;
+mod robot_check;
+mod timeline;
+
+pub(crate) use impulse::Impulse;
+pub use kinds::{Fault, ScheduledFault};
+pub(crate) use list::{list_key, read_list, read_one};
+pub(crate) use robot_check::RobotCheck;
+pub(crate) use timeline::Timeline;
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,34 @@
+//! Ranges, torque limits and rate limits of a robot's actuators.
+
+use crate::error::SimError;
+use armcal_core::kinematics::JointLimits;
+use armcal_core::robot::Robot;
+
+/// Data that an actuator is built from.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ActuatorInput {
+    pub limits: Option<JointLimits>,
+    /// At the supply pressure, N m; from the URDF's effort.
+    pub torque_max_n_m: f64,
+    /// The controller's rate limit.
+    pub rate_limit_rad_s: f64,
+}
+
+/// Torque limits from the URDF's effort, rates from the sensors' table.
+pub(crate) fn actuator_inputs(robot: &Robot) -> Result<Vec<ActuatorInput>, SimError> {
+    let file = robot.folder.join("robot.toml");
+    let urdf = urdf_rs::read_from_string(&robot.urdf_text).ok();
+    let effort =
+        |name: &str| urdf.iter().flat_map(|u| &u.joints).find(|j| j.name == name).map_or(0.0, |j| j.limit.effort);
+    let joints = robot.chain.joints().iter().zip(&robot.sensors);
+    joints
+        .map(|(joint, sensor)| {
+            let effort_n_m = effort(&joint.name);
+            if !(effort_n_m.is_finite() && effort_n_m > 0.0) {
+                return Err(SimError::NoEffort { file: file.clone(), joint: joint.name.clone(), effort_n_m });
+            }
+            let rate_limit_rad_s = sensor.max_rate_rad_s;
+            Ok(ActuatorInput { limits: joint.limits, torque_max_n_m: effort_n_m, rate_limit_rad_s })
+        })
+        .collect()
+}

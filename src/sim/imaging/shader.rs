@@ -1,0 +1,159 @@
+//! Radiance of a surface: `albedo * factor + veil`.
+//!
+//! Lambert: `factor = E / pi exp(-bD z)` with the illuminance E of lamps and sun. The veil far away is what the water
+//! itself sends back, lit by the lamps: `Binf = integral of b p E(s) exp(-bD s) ds` along the ray (single scattering),
+//! on a coarse grid of rays; and the sun's, `E b / (4 pi bB)` (assumed: even in all directions). Lamps cast no shadows.
+
+use std::f32::consts::{FRAC_1_PI, PI};
+
+use nalgebra::Isometry3;
+
+use crate::imaging::light::{Lamp, Light};
+use crate::imaging::math::exp;
+use crate::imaging::rays::Rays;
+use crate::imaging::water::Water;
+use crate::imaging::{Rgb, Vec3};
+use crate::spec::ImageSpec;
+
+/// Distance of the veil's nodes, px.
+const NODE_PX: usize = 16;
+/// Ranges at which the veil's integral is sampled: even steps of the root, so that near ones are close.
+const STEPS: usize = 16;
+
+/// Lights and water of one image.
+#[derive(Clone, Debug)]
+pub(super) struct Shader {
+    pub water: Water,
+    pub lamps: Vec<Lamp>,
+    ambient_lux: f32,
+    /// Towards the surface of the sea, camera frame.
+    up: Vec3,
+    veil: Veil,
+    /// Without lamps and with no water there is no up and down either: light from all sides.
+    is_even: bool,
+}
+
+/// `Binf` on a grid over the image, linear in between.
+#[derive(Clone, Debug, Default)]
+struct Veil {
+    columns: usize,
+    nodes: Vec<Rgb>,
+}
+
+/// `radiance = albedo * factor + veil`, cd/m2.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Shade {
+    pub factor: Rgb,
+    pub veil: Rgb,
+}
+
+impl Shader {
+    pub(super) fn new(
+        spec: &ImageSpec,
+        lights: &[Light],
+        camera_from_base: &Isometry3<f64>,
+        up: &nalgebra::Vector3<f64>,
+        rays: &Rays,
+    ) -> Self {
+        let mut shader = Self {
+            water: Water::new(spec),
+            lamps: lights.iter().map(|light| Lamp::new(light, camera_from_base)).collect(),
+            ambient_lux: spec.ambient_lux as f32,
+            up: (camera_from_base.rotation * up).cast(),
+            veil: Veil::default(),
+            is_even: lights.is_empty() && spec.turbidity == 0.0,
+        };
+        shader.veil = shader.spread_veil(spec, rays);
+        shader
+    }
+
+    fn spread_veil(&self, spec: &ImageSpec, rays: &Rays) -> Veil {
+        use rayon::prelude::*;
+        let columns = rays.width.div_ceil(NODE_PX) + 1;
+        let rows = rays.height.div_ceil(NODE_PX) + 1;
+        let given = spec.veil_cd_m2.map(|veil| veil.map(|v| v as f32));
+        let has_lamps = !self.lamps.is_empty() && self.water.in_scatter_per_m_sr.iter().any(|b| *b > 0.0);
+        let sunny: Rgb = std::array::from_fn(|k| {
+            let back = self.water.backscatter_per_m[k];
+            if back > 0.0 { self.ambient_lux * self.water.scatter_per_m[k] / (4.0 * PI * back) } else { 0.0 }
+        });
+        let node = |n: usize| {
+            if let Some(given) = given {
+                return given;
+            }
+            let (column, row) =
+                ((n % columns * NODE_PX).min(rays.width - 1), (n / columns * NODE_PX).min(rays.height - 1));
+            let mut veil = sunny;
+            if has_lamps {
+                // Beside the field of view the nearest ray that sees stands in.
+                let [first, behind] = rays.spans[row];
+                if first < behind {
+                    self.scattered_back(&rays.at(column.clamp(first, behind - 1), row), &mut veil);
+                }
+            }
+            veil
+        };
+        Veil { columns, nodes: (0..columns * rows).into_par_iter().map(node).collect() }
+    }
+
+    /// Adds the light of the lamps that the water on a ray sends back.
+    fn scattered_back(&self, ray: &Vec3, sum: &mut Rgb) {
+        let clearest_per_m = self.water.direct_per_m.iter().fold(f32::INFINITY, |a, b| a.min(*b));
+        let far_m = (4.0 / clearest_per_m.max(0.01)).min(12.0);
+        for step in 0..STEPS {
+            let at = |k: f32| far_m * (k / STEPS as f32).powi(2);
+            let (near_m, next_m) = (at(step as f32), at(step as f32 + 1.0));
+            let middle_m = at(step as f32 + 0.5);
+            let mut lux = [0.0; 3];
+            for lamp in &self.lamps {
+                lamp.light_up_all_sides(&(ray * middle_m), &self.water.direct_per_m, &mut lux);
+            }
+            for k in 0..3 {
+                sum[k] += self.water.in_scatter_per_m_sr[k]
+                    * lux[k]
+                    * exp(-self.water.direct_per_m[k] * middle_m)
+                    * (next_m - near_m);
+            }
+        }
+    }
+
+    /// The veil far away at a pixel.
+    #[inline]
+    pub(super) fn veil_at(&self, column: usize, row: usize) -> Rgb {
+        let Veil { columns, nodes } = &self.veil;
+        let (i, j) = (column / NODE_PX, row / NODE_PX);
+        let part = |x: usize| (x % NODE_PX) as f32 / NODE_PX as f32;
+        let (u, v) = (part(column), part(row));
+        let n = j * columns + i;
+        let (a, b, c, d) = (&nodes[n], &nodes[n + 1], &nodes[n + columns], &nodes[n + columns + 1]);
+        std::array::from_fn(|k| (1.0 - v) * (a[k] + u * (b[k] - a[k])) + v * (c[k] + u * (d[k] - c[k])))
+    }
+
+    /// Open water.
+    #[inline]
+    pub(super) fn open(&self, column: usize, row: usize) -> Shade {
+        Shade { factor: [0.0; 3], veil: self.veil_at(column, row) }
+    }
+
+    /// A surface at `point` (camera frame) with unit normal `normal`, seen at a pixel.
+    pub(super) fn shade(&self, point: &Vec3, normal: &Vec3, column: usize, row: usize) -> Shade {
+        let sky = if self.is_even { 1.0 } else { 0.5 + 0.5 * normal.dot(&self.up) };
+        let mut lux = [self.ambient_lux * sky; 3];
+        for lamp in &self.lamps {
+            lamp.light_up(point, normal, &self.water.direct_per_m, &mut lux);
+        }
+        let range_m = point.norm();
+        let far = self.veil_at(column, row);
+        Shade {
+            factor: std::array::from_fn(|k| lux[k] * FRAC_1_PI * exp(-self.water.direct_per_m[k] * range_m)),
+            veil: std::array::from_fn(|k| far[k] * (1.0 - exp(-self.water.backscatter_per_m[k] * range_m))),
+        }
+    }
+}
+
+impl Shade {
+    #[inline]
+    pub(super) fn radiance(&self, albedo: &Rgb) -> Rgb {
+        std::array::from_fn(|k| albedo[k] * self.factor[k] + self.veil[k])
+    }
+}

@@ -1,0 +1,250 @@
+//! Radiance of the pixels in a band of rows.
+//!
+//! A block of pixels that see one face is shaded at its corners and linear in between. A pixel with another face in its
+//! neighbourhood, or swept by one while the shutter is open, is the mean of `SAMPLES` rays.
+
+use crate::imaging::edges::has_other_face;
+use crate::imaging::scene::{Appearance, FACE_BITS, Object, TILE_PX};
+use crate::imaging::shader::Shade;
+use crate::imaging::tag_board;
+use crate::imaging::tracer::{Candidates, Tracer, object_of};
+use crate::imaging::{Rgb, Vec3};
+
+/// Sides of blocks that share their shading, px.
+const BLOCKS_PX: [usize; 2] = [8, 4];
+
+/// Rows of the image that one thread shades.
+pub(super) struct Band<'a> {
+    pub tracer: &'a Tracer<'a>,
+    pub faces: &'a [u16],
+    pub ranges: &'a [f32],
+    pub swept: Option<&'a [u8]>,
+    pub top: usize,
+    pub planes: [&'a mut [f32]; 3],
+}
+
+/// Intersection of a ray with an object.
+pub(super) struct Intersection {
+    pub ray: Vec3,
+    pub range_m: f32,
+    pub face: u16,
+    /// In the camera's frame.
+    pub normal: Vec3,
+}
+
+/// Shades of flat faces that a smallest block has already seen: a few pixels make no difference to them.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct ShadeCache {
+    shades: [(u16, Shade); 4],
+    n: usize,
+}
+
+impl ShadeCache {
+    #[inline]
+    pub(super) fn shade(&mut self, key: u16, object: &Object, make: impl FnOnce() -> Shade) -> Shade {
+        if !object.form.is_flat() {
+            return make();
+        }
+        let before = &self.shades[..self.n.min(self.shades.len())];
+        if let Some((_, shade)) = before.iter().find(|(other, _)| *other == key) {
+            return *shade;
+        }
+        let shade = make();
+        self.shades[self.n % self.shades.len()] = (key, shade);
+        self.n += 1;
+        shade
+    }
+}
+
+impl Tracer<'_> {
+    /// The shade of a face that is known to lie on a pixel's ray at `range_m`, and its reflectance there.
+    fn surface(&self, face: u16, range_m: f32, at: [usize; 2]) -> (Shade, Rgb) {
+        let [column, row] = at;
+        let Some(n) = object_of(face) else { return (self.shader.open(column, row), [0.0; 3]) };
+        let object = &self.objects[n];
+        let ray = self.rays.at(column, row);
+        let (_, _, normal) = object.form.meet(&object.place, &ray, range_m);
+        let shade = self.shader.shade(&(ray * range_m), &normal, column, row);
+        (shade, self.albedo(object, &Intersection { ray, range_m, face, normal }))
+    }
+
+    #[inline]
+    pub(super) fn albedo(&self, object: &Object, at: &Intersection) -> Rgb {
+        match object.look {
+            Appearance::Tag => tag_board::albedo(at.face & ((1 << FACE_BITS) - 1)),
+            Appearance::Plain(albedo) => albedo,
+            Appearance::Ground => {
+                let place = object.place.point(&at.ray, at.range_m);
+                self.texture.albedo(place.x, place.y, self.ground_level(&at.ray, at.range_m, &at.normal))
+            }
+        }
+    }
+
+    /// The copy of the texture that a pixel takes.
+    fn ground_level(&self, ray: &Vec3, range_m: f32, normal: &Vec3) -> usize {
+        self.texture.level(range_m / (self.rays.focal_px * ray.dot(normal).abs().max(0.05)))
+    }
+}
+
+impl Band<'_> {
+    /// `tiles` has the candidates of each.
+    pub(super) fn shade(&mut self, tiles: &[Candidates]) {
+        let width = self.tracer.rays.width;
+        let rows = self.planes[0].len() / width;
+        for (column, found) in (0..width).step_by(TILE_PX).zip(tiles) {
+            let right = (column + TILE_PX).min(width);
+            for y in (0..rows).step_by(BLOCKS_PX[0]) {
+                for x in (column..right).step_by(BLOCKS_PX[0]) {
+                    let block = [x, y, (x + BLOCKS_PX[0]).min(right), (y + BLOCKS_PX[0]).min(rows)];
+                    self.shade_block(block, 0, found);
+                }
+            }
+        }
+    }
+
+    /// Left, top, right, bottom; the last two are behind it. Rows count within the band.
+    fn shade_block(&mut self, block: [usize; 4], level: usize, found: &[(f32, u16)]) {
+        let [left, top, right, bottom] = block;
+        if self.is_uniform(block) {
+            return self.fill(block);
+        }
+        if let Some(side) = BLOCKS_PX.get(level + 1) {
+            for y in (top..bottom).step_by(*side) {
+                for x in (left..right).step_by(*side) {
+                    self.shade_block([x, y, (x + side).min(right), (y + side).min(bottom)], level + 1, found);
+                }
+            }
+            return;
+        }
+        let mut known = ShadeCache::default();
+        for y in top..bottom {
+            for x in left..right {
+                let rgb = self.pixel(x, self.top + y, found, &mut known);
+                self.set(x, y, rgb);
+            }
+        }
+    }
+
+    fn pixel(&self, x: usize, row: usize, found: &[(f32, u16)], known: &mut ShadeCache) -> Rgb {
+        let Tracer { rays, objects, .. } = self.tracer;
+        if !rays.sees(x, row) {
+            return [0.0; 3];
+        }
+        let i = row * rays.width + x;
+        if let Some(swept) = self.swept {
+            if swept[i] == 1 {
+                return self.tracer.sampled(found, x, row, known);
+            }
+        } else if has_other_face(self.faces, rays.width, rays.height, x, row) {
+            let mut near = [(0.0, 0_u16); 9];
+            let n = self.neighbours(x, row, &mut near);
+            return self.tracer.sampled(&near[..n], x, row, known);
+        }
+        let Some(object) = object_of(self.faces[i]).map(|n| &objects[n]) else {
+            return self.tracer.shader.open(x, row).veil;
+        };
+        if object.look == Appearance::Tag {
+            let tracer = self.tracer;
+            let key = self.faces[i] & !((1 << FACE_BITS) - 1);
+            let shade = known.shade(key, object, || tracer.surface(self.faces[i], self.ranges[i], [x, row]).0);
+            return shade.radiance(&tag_board::albedo(self.faces[i] & ((1 << FACE_BITS) - 1)));
+        }
+        let (shade, albedo) = self.tracer.surface(self.faces[i], self.ranges[i], [x, row]);
+        shade.radiance(&albedo)
+    }
+
+    /// The objects that a pixel and its neighbours see, as candidates.
+    fn neighbours(&self, x: usize, row: usize, near: &mut [(f32, u16); 9]) -> usize {
+        let Tracer { rays, .. } = self.tracer;
+        let mut n = 0;
+        for y in row.saturating_sub(1)..=(row + 1).min(rays.height - 1) {
+            for x in x.saturating_sub(1)..=(x + 1).min(rays.width - 1) {
+                let Some(object) = object_of(self.faces[y * rays.width + x]) else { continue };
+                if near[..n].iter().all(|(_, other)| usize::from(*other) != object) {
+                    near[n] = (0.0, object as u16);
+                    n += 1;
+                }
+            }
+        }
+        n
+    }
+
+    /// Whether a block and the pixels around it show one face, in full view.
+    fn is_uniform(&self, [left, top, right, bottom]: [usize; 4]) -> bool {
+        let Tracer { rays, .. } = self.tracer;
+        let (x0, x1) = (left.saturating_sub(1), (right + 1).min(rays.width));
+        let (y0, y1) = ((self.top + top).saturating_sub(1), (self.top + bottom + 1).min(rays.height));
+        let own = self.faces[y0 * rays.width + x0];
+        (y0..y1).all(|y| {
+            let line = y * rays.width + x0..y * rays.width + x1;
+            let [first, behind] = rays.spans[y];
+            x0 >= first
+                && x1 <= behind
+                && self.faces[line.clone()].iter().all(|face| *face == own)
+                && self.swept.is_none_or(|swept| swept[line].iter().all(|mark| *mark == 0))
+        })
+    }
+
+    /// Shades a uniform block by its corners.
+    fn fill(&mut self, block: [usize; 4]) {
+        let [left, top, right, bottom] = block;
+        let width = self.tracer.rays.width;
+        let face = self.faces[(self.top + top) * width + left];
+        let corner = |x: usize, y: usize| {
+            let range_m = self.ranges[(self.top + y) * width + x];
+            self.tracer.surface(face, range_m, [x, self.top + y])
+        };
+        let corners =
+            [corner(left, top), corner(right - 1, top), corner(left, bottom - 1), corner(right - 1, bottom - 1)];
+        let object = object_of(face).map(|n| &self.tracer.objects[n]);
+        if let Some(object) = object.filter(|object| object.look == Appearance::Ground) {
+            return self.fill_ground(block, object, &corners.map(|(shade, _)| shade));
+        }
+        let radiance = corners.map(|(shade, albedo)| shade.radiance(&albedo));
+        for channel in 0..3 {
+            let corner = radiance.map(|rgb| rgb[channel]);
+            for y in top..bottom {
+                let (start, step) = line(&corner, y - top, bottom - top, right - left);
+                let out = &mut self.planes[channel][y * width + left..y * width + right];
+                out.iter_mut().enumerate().for_each(|(k, value)| *value = start + step * k as f32);
+            }
+        }
+    }
+
+    /// Light is linear in a block, the texture is not.
+    fn fill_ground(&mut self, [left, top, right, bottom]: [usize; 4], object: &Object, corners: &[Shade; 4]) {
+        let Tracer { rays, texture, .. } = self.tracer;
+        let first = rays.at(left, self.top + top);
+        let first_m = self.ranges[(self.top + top) * rays.width + left];
+        let (_, _, normal) = object.form.meet(&object.place, &first, first_m);
+        let level = self.tracer.ground_level(&first, first_m, &normal);
+        for y in top..bottom {
+            let of =
+                |pick: &dyn Fn(&Shade) -> f32| line(&corners.map(|c| pick(&c)), y - top, bottom - top, right - left);
+            let factor: [_; 3] = std::array::from_fn(|k| of(&|c| c.factor[k]));
+            let veil: [_; 3] = std::array::from_fn(|k| of(&|c| c.veil[k]));
+            for x in left..right {
+                let range_m = self.ranges[(self.top + y) * rays.width + x];
+                let place = object.place.point(&rays.at(x, self.top + y), range_m);
+                let albedo = texture.albedo(place.x, place.y, level);
+                let at = |(start, step): (f32, f32)| start + step * (x - left) as f32;
+                self.set(x, y, std::array::from_fn(|k| at(factor[k]) * albedo[k] + at(veil[k])));
+            }
+        }
+    }
+
+    #[inline]
+    fn set(&mut self, x: usize, y: usize, rgb: Rgb) {
+        let i = y * self.tracer.rays.width + x;
+        self.planes.iter_mut().zip(rgb).for_each(|(plane, value)| plane[i] = value);
+    }
+}
+
+/// The values of one row between four corners (top left, top right, bottom left, bottom right): the first and the step.
+#[inline]
+fn line(corner: &[f32; 4], row: usize, rows: usize, columns: usize) -> (f32, f32) {
+    let down = row as f32 / (rows.max(2) - 1) as f32;
+    let first = corner[0] + down * (corner[2] - corner[0]);
+    let last = corner[1] + down * (corner[3] - corner[1]);
+    (first, (last - first) / (columns.max(2) - 1) as f32)
+}

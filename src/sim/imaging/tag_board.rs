@@ -1,0 +1,55 @@
+//! Tags: boards without thickness, one side printed.
+
+use crate::imaging::Rgb;
+use armcal_core::optics::tag36h11::{BOARD_CELLS, TAG_CELLS, cells};
+
+/// Diffuse reflectance of the white and the black of a board. Assumed: matt laminate.
+pub(super) const WHITE: f32 = 0.85;
+pub(super) const BLACK: f32 = 0.05;
+/// Faces of a tag, for telling edges.
+pub(super) const FACE_WHITE: u16 = 0;
+pub(super) const FACE_BLACK: u16 = 1;
+pub(super) const FACE_BACK: u16 = 2;
+/// A tag wins over what lies before it by less than this, along its normal: it is glued to something, and neither's
+/// place is exact. As for the geometric camera.
+pub(super) const CLEAR_OF_BACKING_M: f32 = 0.006;
+
+/// A tag's printed pattern and size.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Board {
+    /// Row by row from the top of the board, the left cell the highest of 10 bits; 1 is black.
+    rows: [u16; BOARD_CELLS],
+    pub half_m: f32,
+    cells_per_m: f32,
+}
+
+impl Board {
+    /// An id that the family does not have is a blank board.
+    pub(super) fn new(id: u32, size_m: f64) -> Self {
+        let mut rows = [0; BOARD_CELLS];
+        if let Some(cells) = cells(id) {
+            for (row, cells) in rows[1..=TAG_CELLS].iter_mut().zip(&cells) {
+                *row = cells.iter().fold(0, |bits, is_white| bits << 1 | u16::from(!is_white)) << 1;
+            }
+        }
+        let cell_m = size_m / TAG_CELLS as f64;
+        Self { rows, half_m: (0.5 * cell_m * BOARD_CELLS as f64) as f32, cells_per_m: (1.0 / cell_m) as f32 }
+    }
+
+    /// The face at a place of the front, x right, y up, m.
+    #[inline]
+    pub(super) fn face(&self, x: f32, y: f32) -> u16 {
+        let last = BOARD_CELLS - 1;
+        let column = (((x + self.half_m) * self.cells_per_m) as usize).min(last);
+        let row = (((self.half_m - y) * self.cells_per_m) as usize).min(last);
+        if self.rows[row] >> (last - column) & 1 == 1 { FACE_BLACK } else { FACE_WHITE }
+    }
+
+    pub(super) fn cell_m(&self) -> f32 {
+        1.0 / self.cells_per_m
+    }
+}
+
+pub(super) fn albedo(face: u16) -> Rgb {
+    [if face == FACE_BLACK { BLACK } else { WHITE }; 3]
+}

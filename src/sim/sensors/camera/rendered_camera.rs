@@ -1,0 +1,150 @@
+//! The rendered camera: images are rendered and the tag detector reads them.
+
+use std::fmt;
+
+use nalgebra::{Isometry3, Unit, Vector3};
+
+use crate::error::SimError;
+use crate::imaging::{Frame, Imager, Light, Shot, TagPlane};
+use crate::sensors::camera::ported_lens::PortedLens;
+use crate::sensors::camera::scenery::{ScenePoses, Scenery};
+use crate::spec::{ImageSpec, WorldSpec};
+use armcal_core::robot::{FileIssue, Robot, Vehicle};
+use armcal_core::routine::Scene;
+use armcal_core::streams::{DetectionReject, ImageDemand, TagDetection};
+use armcal_core::time::Stamp;
+use armcal_detect::{DetectorSettings, GreyImage, TagDetector};
+
+/// Parts of a world that make a rendered camera.
+#[derive(Clone, Copy)]
+pub(crate) struct RenderInput<'a> {
+    pub robot: &'a Robot,
+    pub vehicle: &'a Vehicle,
+    pub scene: &'a Scene,
+    pub spec: &'a WorldSpec,
+    pub seed: u64,
+}
+
+pub(super) struct RenderedCamera {
+    imager: Imager,
+    scenery: Scenery,
+    detector: TagDetector,
+    spec: ImageSpec,
+    number: u64,
+    last_taken: Option<Stamp>,
+    last_logged: Option<Stamp>,
+    grey: Vec<u8>,
+    solids: Vec<[Isometry3<f64>; 3]>,
+}
+
+/// Camera poses, tags and poses of one image.
+pub(super) struct RenderScene<'a> {
+    pub base_from_camera: [Isometry3<f64>; 3],
+    pub tags: &'a [TagPlane],
+    pub poses: ScenePoses<'a>,
+    pub is_silty: bool,
+}
+
+/// Detections of one image.
+#[derive(Clone, Debug, Default)]
+pub(super) struct DetectedImage {
+    pub tags: Vec<TagDetection>,
+    pub rejects: Vec<DetectionReject>,
+    /// The image itself, if it is to be recorded.
+    pub jpeg: Option<Vec<u8>>,
+}
+
+impl fmt::Debug for RenderedCamera {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("RenderedCamera").field("number", &self.number).finish_non_exhaustive()
+    }
+}
+
+impl RenderedCamera {
+    /// # Errors
+    /// [`SimError`] where there is no light, or no detector.
+    pub(super) fn new(input: &RenderInput, ported: &PortedLens) -> Result<Self, SimError> {
+        let RenderInput { robot, vehicle, scene, spec, seed } = *input;
+        let image = spec.image;
+        if vehicle.lights.is_empty() && image.ambient_lux <= 0.0 {
+            let problem = "needs one or more lights: images are rendered and world.image.ambient_lux is 0";
+            return Err(FileIssue::new(&vehicle.file, "light", problem).into());
+        }
+        let base_from_vehicle = *vehicle.vehicle_from_base.inverse().isometry();
+        let light = |light: &armcal_core::robot::VehicleLight| Light {
+            position_m: base_from_vehicle * light.position_m,
+            direction: Unit::new_normalize(base_from_vehicle * light.direction.into_inner()),
+            flux_lm: light.flux_lm,
+            half_angle_rad: light.half_angle_rad,
+        };
+        let lights: Vec<Light> = vehicle.lights.iter().map(light).collect();
+        let scenery = Scenery::new(robot, vehicle, scene);
+        let mut imager = Imager::new(&ported.lens, &image, &lights, seed);
+        imager.set_solids(&scenery.shapes);
+        // The detector knows the lens of the drawing.
+        let detector = TagDetector::new(&robot.camera.lens, DetectorSettings::default())
+            .map_err(|error| SimError::Detector(error.to_string()))?;
+        Ok(Self {
+            imager,
+            scenery,
+            detector,
+            spec: image,
+            number: 0,
+            last_taken: None,
+            last_logged: None,
+            grey: Vec::new(),
+            solids: Vec::new(),
+        })
+    }
+
+    /// Whether an image is to be taken now.
+    pub(super) fn is_due(&self, demand: ImageDemand, now: Stamp) -> bool {
+        let preview_s = if self.spec.preview_hz > 0.0 { 1.0 / self.spec.preview_hz } else { f64::INFINITY };
+        demand == ImageDemand::All
+            || self.last_taken.map_or(preview_s.is_finite(), |last| now.since_s(last) >= preview_s - 1e-6)
+    }
+
+    pub(super) fn take_image(
+        &mut self,
+        scene_state: &RenderScene,
+        carried: &dyn Fn(usize) -> [Isometry3<f64>; 3],
+        now: Stamp,
+    ) -> Result<DetectedImage, SimError> {
+        self.scenery.place(&scene_state.poses, carried, &mut self.solids);
+        let up = Unit::new_normalize(scene_state.poses.base_from_world.rotation * Vector3::z());
+        let frame = self.imager.take_image(&Shot {
+            base_from_camera: scene_state.base_from_camera,
+            tags: scene_state.tags,
+            solids: &self.solids,
+            up,
+            is_silty: scene_state.is_silty,
+            number: self.number,
+        });
+        self.number += 1;
+        self.last_taken = Some(now);
+        frame.grey(&mut self.grey);
+        let image = GreyImage { width: frame.width, height: frame.height, data: &self.grey };
+        let detections = self.detector.detect(image).map_err(|error| SimError::Detector(error.to_string()))?;
+        let is_logged = self.last_logged.is_none_or(|last| now.since_s(last) >= self.spec.log_period_s - 1e-6);
+        if is_logged {
+            self.last_logged = Some(now);
+        }
+        Ok(DetectedImage {
+            tags: detections.tags.into_iter().map(|tag| tag.detection).collect(),
+            rejects: detections.rejects,
+            jpeg: is_logged.then(|| jpeg_bytes(frame, self.spec.jpeg_quality)).transpose()?,
+        })
+    }
+}
+
+/// As JPEG; colours at half the resolution.
+fn jpeg_bytes(frame: &Frame, quality: f64) -> Result<Vec<u8>, SimError> {
+    use jpeg_encoder::{ColorType, Encoder, SamplingFactor};
+    let side = |n: usize| u16::try_from(n).map_err(|_| SimError::Jpeg(format!("a side of {n} pixels is too long")));
+    let mut out = Vec::with_capacity(frame.rgb.len() / 10);
+    let mut encoder = Encoder::new(&mut out, quality.round() as u8);
+    encoder.set_sampling_factor(SamplingFactor::F_2_2);
+    let (width, height) = (side(frame.width)?, side(frame.height)?);
+    encoder.encode(&frame.rgb, width, height, ColorType::Rgb).map_err(|error| SimError::Jpeg(error.to_string()))?;
+    Ok(out)
+}

@@ -1,0 +1,72 @@
+//! `[world]` tables: keys, ranges and text.
+
+use std::path::Path;
+
+use super::*;
+use crate::error::SimError;
+
+fn read(text: &str) -> Result<WorldSpec, SimError> {
+    WorldSpec::from_table(&text.parse().expect("valid TOML"), Path::new("r.toml"))
+}
+
+fn problem(text: &str) -> String {
+    read(text).expect_err("refused").to_string()
+}
+
+#[test]
+fn an_empty_world_is_the_standard_one() {
+    assert_eq!(read("").expect("valid"), WorldSpec::default());
+    assert_eq!(WorldSpec::default().steps_per_period(), 5);
+}
+
+#[test]
+fn errors_name_file_key_and_range() {
+    let text = problem("[camera]\nrate_hz = 1000.0");
+    assert!(text.contains("r.toml") && text.contains("world.camera.rate_hz") && text.contains("0.1 .. 100"), "{text}");
+    assert!(problem("[clock]\ncamera_jitter_s = nan").contains("camera_jitter_s"));
+    assert!(problem("[clock]\ncamera_jiter_s = 0.1").contains("camera_jiter_s"));
+    assert!(problem("[clocks]").contains("world.clocks"));
+    assert!(problem("[vehicle]\nperiod_min_s = 20.0").contains("period_max_s"));
+    assert!(problem("[physics]\nstep_s = 0.003").contains("step_s"));
+    assert!(problem("[camera]\nrate_hz = \"fast\"").contains("world.camera"));
+}
+
+#[test]
+fn what_the_water_carries_is_the_arms_own_figure_unless_the_world_has_one() {
+    for (arm, fraction) in [("titan4", 0.22), ("kraft-predator", 0.3625)] {
+        let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("robots").join(arm);
+        let robot = armcal_core::robot::load(&folder).expect("the robot reads");
+        let spec = |text: &str| read(text).expect("valid").completed(&robot);
+        assert_eq!(spec("").water.buoyancy(), fraction);
+        assert_eq!(spec("[water]\nbuoyancy_fraction = 0.5").water.buoyancy(), 0.5);
+        assert!(spec("").to_toml().expect("text").contains(&format!("buoyancy_fraction = {fraction}")));
+    }
+    assert!(problem("[water]\nbuoyancy_fraction = 1.0").contains("world.water.buoyancy_fraction"));
+    assert!(problem("[water]\ndrag = 1.0").contains("drag"));
+}
+
+#[test]
+fn images_have_their_keys_and_limits() {
+    let spec = read("[camera]\nmode = \"rendered\"\n[image]\nwater = \"coastal\"\nsnow_per_m3 = 10.0").expect("valid");
+    assert_eq!((spec.camera.mode, spec.image.water), (CameraMode::Rendered, WaterKind::Coastal));
+    assert!(problem("[image]\nblur_px = 11.0").contains("world.image.blur_px"));
+    assert!(problem("[image]\nwater = \"muddy\"").contains("world.image"));
+    assert!(problem("[image]\ndirect_per_m = [0.1, -0.1, 0.1]").contains("world.image.direct_per_m"));
+    for port in ["port = \"flat\"", "port = \"dome\"\ndome_decentre_std_m = 0.001"] {
+        let text = problem(&format!("[camera]\nmode = \"rendered\"\n{port}"));
+        assert!(text.contains("world.camera.port") && text.contains("no single point"), "{text}");
+    }
+    assert!(read("[camera]\nmode = \"rendered\"\nport = \"dome\"").is_ok());
+    // Worlds without images are written as ever.
+    let text = WorldSpec::default().to_toml().expect("text");
+    assert!(!text.contains("image") && !text.contains("mode"), "{text}");
+    let rendered = read("[camera]\nmode = \"rendered\"").expect("valid").to_toml().expect("text");
+    assert!(rendered.contains("turbidity = 1.0") && rendered.contains("mode = \"rendered\""), "{rendered}");
+    assert_eq!(read(&rendered).expect("valid").to_toml().expect("text"), rendered);
+}
+
+#[test]
+fn the_text_of_a_spec_reads_back() {
+    let spec = read("[camera]\nrate_hz = 10.0").expect("valid");
+    assert_eq!(read(&spec.to_toml().expect("text")).expect("valid"), spec);
+}

@@ -1,0 +1,213 @@
+//! The whole `[world]`: its sub-tables, and the checks that concern more than one of them.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::Arc;
+
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+use crate::error::SimError;
+use crate::fault::{self, ScheduledFault};
+use crate::recorded_motion::RecordedMotion;
+use crate::spec::camera::{CameraWorldSpec, ClockSpec, PortKind, TagsSpec};
+use crate::spec::hydraulics::HydraulicsSpec;
+use crate::spec::image::{CameraMode, ImageSpec};
+use crate::spec::joint_sensors::JointSensorsSpec;
+use crate::spec::obstacles::UnmodelledObstacles;
+use crate::spec::physics::{CONTROL_PERIOD_S, PhysicsSpec};
+use crate::spec::table::CheckedTable;
+use crate::spec::temperature::TemperatureSpec;
+use crate::spec::vehicle::{MotionKind, VehicleMotionSpec};
+use crate::spec::water::WaterSpec;
+use armcal_core::robot::{FileIssue, PartFile, Robot, check_parts};
+use armcal_core::routine::Scene;
+
+/// `[world]`, checked.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct WorldSpec {
+    pub physics: PhysicsSpec,
+    pub joint_sensors: JointSensorsSpec,
+    pub temperature: TemperatureSpec,
+    pub clock: ClockSpec,
+    pub camera: CameraWorldSpec,
+    pub tags: TagsSpec,
+    /// Written out where images are rendered or it was set.
+    #[serde(skip_serializing_if = "ImageSpec::is_default")]
+    pub image: ImageSpec,
+    pub vehicle: VehicleMotionSpec,
+    pub hydraulics: HydraulicsSpec,
+    pub water: WaterSpec,
+    /// By joint: counts per radian over the datasheet's. Negative: they run the other way. The arm's own controller
+    /// knows.
+    pub gear_ratio: BTreeMap<String, f64>,
+    /// The motion that `vehicle.motion_file` names, read with the routine.
+    #[serde(skip)]
+    pub recorded: Option<Arc<RecordedMotion>>,
+    /// What stands in the water and nobody has drawn: `[[world.obstacle]]`, as `[[obstacle]]`.
+    #[serde(skip_serializing_if = "UnmodelledObstacles::is_none")]
+    pub obstacle: UnmodelledObstacles,
+    /// What breaks: in the order of the routine's `fault` steps, then what has a time.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub fault: Vec<ScheduledFault>,
+}
+
+impl WorldSpec {
+    /// Reads `[world]` of the routine `file`. Each sub-table is named as the field here.
+    ///
+    /// # Errors
+    /// [`SimError::Spec`] naming file, key and the allowed range; NaN is in no range.
+    pub fn from_table(table: &toml::Table, file: &Path) -> Result<Self, SimError> {
+        const TABLES: [&str; 13] = [
+            "physics",
+            "joint_sensors",
+            "temperature",
+            "clock",
+            "camera",
+            "tags",
+            "image",
+            "vehicle",
+            "hydraulics",
+            "water",
+            "gear_ratio",
+            "obstacle",
+            "fault",
+        ];
+        if let Some(key) = table.keys().find(|key| !TABLES.contains(&key.as_str())) {
+            let problem = format!("is unknown; [world] has the tables {}", TABLES.join(", "));
+            return Err(FileIssue::new(file, format!("world.{key}"), problem).into());
+        }
+        let reader = Reader { table, file };
+        let spec = Self {
+            physics: reader.read("physics")?,
+            joint_sensors: reader.read("joint_sensors")?,
+            temperature: reader.read("temperature")?,
+            clock: reader.read("clock")?,
+            camera: reader.read("camera")?,
+            tags: reader.read("tags")?,
+            image: reader.read("image")?,
+            vehicle: reader.read("vehicle")?,
+            hydraulics: reader.read("hydraulics")?,
+            water: reader.read("water")?,
+            gear_ratio: reader.parse("gear_ratio")?,
+            recorded: None,
+            obstacle: UnmodelledObstacles(
+                check_parts(&reader.parse::<Vec<PartFile>>("obstacle")?, file, "world.obstacle")?.1,
+            ),
+            fault: fault::read_list(table, file)?,
+        };
+        for (joint, ratio) in &spec.gear_ratio {
+            let key = format!("world.gear_ratio.{joint} (size)");
+            FileIssue::check_range(file, &key, ratio.abs(), 0.01..=100.0)?;
+        }
+        spec.check_relations(file)?;
+        Ok(spec)
+    }
+
+    /// Reads the recorded motion that the vehicle shall follow, if any; its file's place counts from `folder`.
+    ///
+    /// # Errors
+    /// [`SimError`] naming that file, line and column.
+    pub(crate) fn read_motion(&mut self, folder: &Path) -> Result<(), SimError> {
+        if let Some(file) = &self.vehicle.motion_file {
+            self.recorded = Some(Arc::new(RecordedMotion::read(&folder.join(file))?));
+        }
+        Ok(())
+    }
+
+    /// As TOML, every key written out.
+    ///
+    /// # Errors
+    /// [`SimError::SpecText`], which no checked spec causes.
+    pub fn to_toml(&self) -> Result<String, SimError> {
+        let mut text = toml::to_string(self)?;
+        if self.camera.mode == CameraMode::Rendered && self.image.is_default() {
+            text = format!("{text}\n[image]\n{}", toml::to_string(&self.image)?);
+        }
+        Ok(text)
+    }
+
+    /// The scene as it truly is: as drawn, and what nobody has drawn.
+    ///
+    /// # Errors
+    /// None for a checked spec.
+    pub(crate) fn true_scene(&self, drawn: &Scene) -> Result<Scene, SimError> {
+        let (undrawn, _) = check_parts(&self.obstacle.0, Path::new("[world]"), "obstacle")?;
+        let obstacles = drawn.obstacles.iter().cloned().chain(undrawn).collect();
+        Ok(Scene { obstacles, ..*drawn })
+    }
+
+    /// With what only the robot says filled in.
+    #[must_use]
+    pub fn completed(mut self, robot: &Robot) -> Self {
+        self.water.buoyancy_fraction.get_or_insert(robot.buoyancy_fraction);
+        self
+    }
+
+    /// Physics steps in a control period.
+    #[must_use]
+    pub fn steps_per_period(&self) -> u64 {
+        (CONTROL_PERIOD_S / self.physics.step_s).round() as u64
+    }
+
+    /// Images are rendered for rays through one point.
+    fn check_view_point(&self, file: &Path) -> Result<(), FileIssue> {
+        let camera = &self.camera;
+        let has_one = match camera.port {
+            PortKind::None => true,
+            PortKind::Dome => camera.dome_decentre_std_m == 0.0,
+            PortKind::Flat => false,
+        };
+        if camera.mode == CameraMode::Geometric || has_one {
+            return Ok(());
+        }
+        let problem = "a flat port or a dome beside the pupil sees from no single point: with mode = \"rendered\" only \
+                       \"none\", or \"dome\" with dome_decentre_std_m = 0, are allowed";
+        Err(FileIssue::new(file, "world.camera.port", problem))
+    }
+
+    fn check_relations(&self, file: &Path) -> Result<(), FileIssue> {
+        let (min, max) = (self.vehicle.period_min_s, self.vehicle.period_max_s);
+        if min > max {
+            let problem = format!("{max} is below period_min_s, {min}");
+            return Err(FileIssue::new(file, "world.vehicle.period_max_s", problem));
+        }
+        let is_recorded = self.vehicle.motion == MotionKind::Recorded;
+        if is_recorded != self.vehicle.motion_file.is_some() {
+            let problem = "goes with motion = \"recorded\", and that with it";
+            return Err(FileIssue::new(file, "world.vehicle.motion_file", problem));
+        }
+        let step_s = self.physics.step_s;
+        if (self.steps_per_period() as f64 * step_s - CONTROL_PERIOD_S).abs() > 1e-9 {
+            let problem = format!("{step_s} does not divide the control period of {CONTROL_PERIOD_S} s");
+            return Err(FileIssue::new(file, "world.physics.step_s", problem));
+        }
+        self.image.check_relations(file)?;
+        self.check_view_point(file)?;
+        self.tags.check_options(file)?;
+        self.temperature.check_relations(file)?;
+        self.joint_sensors.check_relations(file)
+    }
+}
+
+struct Reader<'a> {
+    table: &'a toml::Table,
+    file: &'a Path,
+}
+
+impl Reader<'_> {
+    fn read<T: CheckedTable>(&self, name: &str) -> Result<T, FileIssue> {
+        let parsed: T = self.parse(name)?;
+        parsed.check(self.file, &format!("world.{name}"))?;
+        Ok(parsed)
+    }
+
+    fn parse<T: DeserializeOwned + Default>(&self, name: &str) -> Result<T, FileIssue> {
+        match self.table.get(name) {
+            None => Ok(T::default()),
+            Some(value) => value.clone().try_into().map_err(|error: toml::de::Error| {
+                FileIssue::new(self.file, format!("world.{name}"), error.message().trim_end().to_owned())
+            }),
+        }
+    }
+}

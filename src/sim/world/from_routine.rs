@@ -1,0 +1,63 @@
+//! A routine's `[world]` and faults, read and checked against its robot.
+
+use std::path::Path;
+
+use crate::error::SimError;
+use crate::fault::{Fault, RobotCheck, ScheduledFault, list_key, read_one};
+use crate::hydraulics::{Hydraulics, actuator_inputs};
+use crate::spec::WorldSpec;
+use armcal_core::robot::{FileIssue, Robot};
+use armcal_core::routine::{Routine, Step};
+
+impl WorldSpec {
+    /// Reads a routine's `[world]` and the tables of its `fault` steps, and checks them against its robot. The steps'
+    /// faults come first in the list, then those with a time.
+    ///
+    /// # Errors
+    /// [`SimError::Spec`] naming file, key and what is allowed.
+    pub fn from_routine(routine: &Routine, robot: &Robot) -> Result<Self, SimError> {
+        let mut spec = Self::from_table(&routine.world, &routine.file)?;
+        spec.read_motion(routine.file.parent().unwrap_or(Path::new(".")))?;
+        check_step(&spec, robot, &routine.file)?;
+        let check = RobotCheck { routine, robot };
+        for joint in spec.gear_ratio.keys() {
+            check.check_joint("world.gear_ratio", joint)?;
+        }
+        for (index, scheduled) in spec.fault.iter().enumerate() {
+            let key = list_key(index);
+            let Some(at_s) = scheduled.at_s else {
+                let problem = "needs at_s, the time when it happens; faults without one are steps of the script: \
+                               [[step]] do = \"fault\"";
+                return Err(FileIssue::new(&routine.file, key, problem).into());
+            };
+            check.check_range(&key, "at_s", at_s, 0.0..=1e6)?;
+            check.check_fault(&key, &scheduled.fault)?;
+        }
+        let steps = routine.steps.iter().enumerate().filter(|(_, step)| matches!(step, Step::Fault { .. }));
+        let mut of_steps: Vec<ScheduledFault> = Vec::new();
+        for (table, (index, _)) in routine.faults.iter().zip(steps) {
+            let key = format!("step {} (fault)", index + 1);
+            let fault: Fault = read_one(toml::Value::Table(table.clone()), &routine.file, &key)?;
+            check.check_fault(&key, &fault)?;
+            of_steps.push(fault.into());
+        }
+        spec.fault.splice(0..0, of_steps);
+        Ok(spec)
+    }
+}
+
+/// Whether the step is short enough for the oil's stiffness.
+///
+/// # Errors
+/// [`SimError::Spec`] with the longest step; what [`actuator_inputs`] says.
+fn check_step(spec: &WorldSpec, robot: &Robot, file: &Path) -> Result<(), SimError> {
+    let longest_s = Hydraulics::new(&spec.hydraulics, &actuator_inputs(robot)?, spec.physics.step_s).longest_step_s();
+    if spec.physics.step_s <= longest_s {
+        return Ok(());
+    }
+    let problem = format!(
+        "{} s is too large for the oil's stiffness (bulk_modulus_pa, dead_volume_ratio): at most {longest_s:.2e} s",
+        spec.physics.step_s
+    );
+    Err(FileIssue::new(file, "world.physics.step_s", problem).into())
+}

@@ -1,0 +1,66 @@
+//! Waiting: time that passes at rest, in strides of a second.
+
+use crate::spec::CONTROL_PERIOD_S;
+use crate::world::readings::SLOW_PERIODS;
+use crate::world::setup::{sample_joint_sensors, surroundings};
+use crate::world::simulation::World;
+use armcal_core::streams::{Arm, ArmError, JointSensorSample, Message, Sink};
+
+/// The end of a wait that passes step by step, s.
+const AWAKE_S: f64 = 2.0;
+/// Length of a skipped stride, s.
+const STRIDE_S: f64 = SLOW_PERIODS as f64 * CONTROL_PERIOD_S;
+/// After something broke the arm's dynamics go on for this long, s: it may sag, or drive off by a wrong sensor.
+const UPSET_S: f64 = 10.0;
+
+impl World {
+    /// Of the vehicle now, below the surface.
+    pub(super) fn depth_m(&self) -> f64 {
+        self.spec.water.depth_m - self.base.world_from_vehicle.origin().vector().z
+    }
+
+    /// Whole seconds at rest are skipped, with one reading of each slow stream and of the joints a second. The last
+    /// ones pass step by step, so that the controller answers to what drifted meanwhile; so do those in which and after
+    /// which something breaks, so that it breaks at its time and the arm answers to it.
+    pub(super) fn rest(&mut self, seconds: f64, sink: &mut dyn Sink) -> Result<(), ArmError> {
+        let until = self.now().plus_s(seconds);
+        // To a whole second first, for slow streams keep their beat.
+        while self.now() < until && !(self.step / self.spec.steps_per_period()).is_multiple_of(SLOW_PERIODS) {
+            self.step(sink)?;
+        }
+        while until.since_s(self.now()) > AWAKE_S {
+            if self.timeline.is_calm(self.time_s(), UPSET_S, STRIDE_S) {
+                self.skip();
+                self.hand_over(sink)?;
+            } else {
+                for _ in 0..SLOW_PERIODS {
+                    self.step(sink)?;
+                }
+            }
+        }
+        while self.now() < until {
+            self.step(sink)?;
+        }
+        Ok(())
+    }
+
+    /// One second at rest in one go: the world's clock, temperatures and drift go on, the arm's dynamics do not.
+    fn skip(&mut self) {
+        self.settle_jaws();
+        self.step += SLOW_PERIODS * self.spec.steps_per_period();
+        let (now, t_s) = (self.stamp(), self.time_s());
+        if self.free.is_none() {
+            self.base = self.motion.at(t_s);
+        }
+        self.water = self.sea.at(t_s);
+        self.n_images = (t_s * self.spec.camera.rate_hz + 1e-9).floor() as u64;
+        while let Some(image) = self.images.pop_front() {
+            self.deliver(image.arrival.min(now), image);
+        }
+        self.warm(t_s, STRIDE_S);
+        let around = surroundings(&self.spec, &self.temperatures, t_s, self.depth_m());
+        self.measured = sample_joint_sensors(&mut self.pots, &self.physics.angles(), &around, STRIDE_S);
+        self.outbox.push((now, Message::JointSensors(JointSensorSample { stamp: now, counts: self.measured })));
+        self.sample_slow_sensors(now, t_s);
+    }
+}

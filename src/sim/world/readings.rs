@@ -1,0 +1,59 @@
+//! Messages of the sensors, control period by control period.
+
+use crate::spec::CONTROL_PERIOD_S;
+use crate::world::setup::{sample_joint_sensors, surroundings};
+use crate::world::simulation::World;
+use armcal_core::streams::{ArmError, JointSensorSample, Message, Sink, Thermometer};
+use armcal_core::time::Stamp;
+
+const ATTITUDE_PERIODS: u64 = 5;
+pub(super) const SLOW_PERIODS: u64 = 100;
+
+impl World {
+    /// Readings at the end of the period, and images that arrived in it.
+    pub(super) fn collect_messages(&mut self) {
+        let (now, t_s) = (self.stamp(), self.time_s());
+        let period = self.step / self.spec.steps_per_period();
+        while let Some(image) = self.images.pop_front_if(|image| image.arrival <= now) {
+            self.deliver(image.arrival, image);
+        }
+        self.warm(t_s, CONTROL_PERIOD_S);
+        let around = surroundings(&self.spec, &self.temperatures, t_s, self.depth_m());
+        self.measured = sample_joint_sensors(&mut self.pots, &self.physics.angles(), &around, CONTROL_PERIOD_S);
+        let sample = JointSensorSample { stamp: now, counts: self.measured };
+        self.outbox.push((now, Message::JointSensors(sample)));
+        self.move_jaws(period);
+        if period.is_multiple_of(ATTITUDE_PERIODS) {
+            let attitude = self.attitude.sample(&self.base, now);
+            self.outbox.push((now, Message::Attitude(attitude)));
+        }
+        if period.is_multiple_of(SLOW_PERIODS) {
+            self.sample_slow_sensors(now, t_s);
+        }
+    }
+
+    /// Water and oil until `t_s`: what the drives take from the pump and do not pass on as work warms the oil.
+    pub(super) fn warm(&mut self, t_s: f64, elapsed_s: f64) {
+        self.temperatures.advance(t_s, elapsed_s, self.hydraulics.power_w().max(0.0), self.depth_m());
+    }
+
+    /// Thermometers and depth gauge.
+    pub(super) fn sample_slow_sensors(&mut self, now: Stamp, t_s: f64) {
+        let oil_c = self.temperatures.oil_c(t_s);
+        let oil = self.slow.temperature(Thermometer::Oil, oil_c, now);
+        let water = self.slow.temperature(Thermometer::Water, self.temperatures.water_c(t_s), now);
+        let heave_m = self.base.world_from_vehicle.origin().vector().z;
+        let pressure = self.slow.pressure(heave_m, now);
+        self.outbox.push((now, Message::Temperature(oil)));
+        self.outbox.push((now, Message::Temperature(water)));
+        self.outbox.push((now, Message::Pressure(pressure)));
+        self.report_gap();
+    }
+
+    pub(super) fn hand_over(&mut self, sink: &mut dyn Sink) -> Result<(), ArmError> {
+        for (log_time, message) in self.outbox.drain(..) {
+            sink.record(log_time, &message).map_err(ArmError::Sink)?;
+        }
+        self.record_truth()
+    }
+}

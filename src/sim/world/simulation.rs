@@ -1,0 +1,183 @@
+//! Parts of a world, and their step.
+
+use std::collections::VecDeque;
+
+use crate::as_built::AsBuilt;
+use crate::body_poses::BodyPoses;
+use crate::contact_onset::ContactOnsets;
+use crate::controller::Controller;
+use crate::dynamics::{Force, JointLoad};
+use crate::error::SimError;
+use crate::fault::Timeline;
+use crate::gripper::Gripper;
+use crate::hydraulics::{Hydraulics, actuator_inputs};
+use crate::physics::{ArmPhysics, Drive, PhysicsInput};
+use crate::sensors::attitude::AttitudeSensor;
+use crate::sensors::camera::{CameraInput, CameraShot, RenderInput, WristCamera};
+use crate::sensors::joint::JointSensor;
+use crate::sensors::thermometer::SlowSensors;
+use crate::solids::Solids;
+use crate::spec::{CONTROL_PERIOD_S, WorldSpec};
+use crate::temperatures::Temperatures;
+use crate::truth::{TruthHeader, TruthSink};
+use crate::vehicle::{BaseState, FreeVehicle, Sea, VehicleMotion, WaterMotion};
+use crate::world::setup::{
+    WorldInput, free_vehicle, header, joint_sensors, sample_joint_sensors, stowed_angles, surroundings,
+};
+use armcal_core::robot::{Robot, Vehicle};
+use armcal_core::streams::{ArmError, ImageDemand, JointCounts, MAX_JOINTS, Message};
+use armcal_core::time::{SIMULATION_EPOCH, Stamp};
+
+/// A simulated arm. Its sensors start at `stowed` by the datasheet, so that the arm itself is where their errors put
+/// it.
+pub struct World {
+    pub(super) spec: WorldSpec,
+    pub(super) robot: Robot,
+    pub(super) header: TruthHeader,
+    /// Of a vehicle whose motion is prescribed.
+    pub(super) motion: VehicleMotion,
+    /// A vehicle that floats.
+    pub(super) free: Option<FreeVehicle>,
+    pub(super) sea: Sea,
+    /// The water now.
+    pub(super) water: WaterMotion,
+    /// The base now.
+    pub(super) base: BaseState,
+    pub(super) vehicle: Vehicle,
+    pub(super) solids: Solids,
+    pub(super) physics: ArmPhysics,
+    pub(super) hydraulics: Hydraulics,
+    pub(super) gripper: Option<Gripper>,
+    pub(super) controller: Controller,
+    pub(super) pots: Vec<JointSensor>,
+    pub(super) temperatures: Temperatures,
+    pub(super) slow: SlowSensors,
+    pub(super) attitude: AttitudeSensor,
+    pub(super) camera: WristCamera,
+    pub(super) contacts: ContactOnsets,
+    /// Images under way; the line keeps their order.
+    pub(super) images: VecDeque<CameraShot>,
+    pub(super) image_demand: ImageDemand,
+    pub(super) n_images: u64,
+    pub(super) outbox: Vec<(Stamp, Message)>,
+    pub(super) measured: JointCounts,
+    pub(super) step: u64,
+    pub(super) timeline: Timeline,
+    pub(super) truth: Option<Box<dyn TruthSink>>,
+}
+
+impl World {
+    /// # Errors
+    /// [`SimError`] when the robot lacks masses or effort limits.
+    pub fn new(mut input: WorldInput) -> Result<Self, SimError> {
+        input.spec = input.spec.completed(input.robot);
+        let WorldInput { robot, vehicle, scene, seed, .. } = input;
+        let spec = input.spec.clone();
+        let scene = &spec.true_scene(scene)?;
+        robot.require_masses()?;
+        let built = AsBuilt::draw(robot, &spec, seed);
+        let gear_ratios: Vec<f64> = built.joints.iter().map(|joint| joint.gear_ratio).collect();
+        let step_s = CONTROL_PERIOD_S / spec.steps_per_period() as f64;
+        let temperatures = Temperatures::new(&spec.temperature, spec.water.depth_m);
+        let mut pots = joint_sensors(robot, &built, &spec.joint_sensors, seed);
+        let around = surroundings(&spec, &temperatures, 0.0, spec.water.depth_m);
+        let angles = stowed_angles(robot, &mut pots, &around);
+        let solids = Solids::new(robot, vehicle, scene);
+        let motion = VehicleMotion::new(&spec.vehicle, spec.recorded.as_ref(), vehicle.vehicle_from_base, seed);
+        let base = motion.at(0.0);
+        let mut hydraulics = Hydraulics::new(&spec.hydraulics, &actuator_inputs(robot)?, step_s);
+        let mut physics = ArmPhysics::new(&PhysicsInput {
+            chain: &robot.chain,
+            bodies: &robot.bodies,
+            solids: Some(&solids),
+            water: &spec.water,
+            spec: &spec.physics,
+            angles,
+        });
+        let free = free_vehicle(&input, &mut physics, &base)?;
+        hydraulics.balance(&angles, &physics.static_torques(&base.gravity, &angles));
+        let sea = Sea::new(&spec.water, seed);
+        let measured = sample_joint_sensors(&mut pots, &angles, &around, 0.0);
+        let mut camera = WristCamera::new(&CameraInput { robot, built: &built, solids: &solids, spec: &spec, seed });
+        camera.enable_rendering(&RenderInput { robot, vehicle, scene, spec: &spec, seed })?;
+        Ok(Self {
+            controller: Controller::new(&spec.hydraulics, &robot.sensors, &gear_ratios, &measured),
+            slow: SlowSensors::new(&spec.temperature, &spec.water, &built.gauges, seed),
+            attitude: AttitudeSensor::new(&spec.vehicle, &built.attitude, seed),
+            camera,
+            contacts: ContactOnsets::new(solids.pairs(), step_s),
+            images: VecDeque::new(),
+            image_demand: ImageDemand::Few,
+            n_images: 0,
+            outbox: Vec::with_capacity(16),
+            gripper: robot.gripper.as_ref().map(|gripper| Gripper::new(gripper, spec.hydraulics.valve_lag_s)),
+            step: 0,
+            timeline: Timeline::new(&spec.fault),
+            truth: None,
+            header: header(&input, built)?,
+            robot: robot.clone(),
+            spec,
+            motion,
+            free,
+            water: sea.at(0.0),
+            sea,
+            base,
+            vehicle: vehicle.clone(),
+            solids,
+            physics,
+            hydraulics,
+            pots,
+            temperatures,
+            measured,
+        })
+    }
+
+    pub(super) fn time_s(&self) -> f64 {
+        // Multiplied, not summed: whole periods fall on whole stamps.
+        self.step as f64 / self.spec.steps_per_period() as f64 * CONTROL_PERIOD_S
+    }
+
+    pub(super) fn stamp(&self) -> Stamp {
+        SIMULATION_EPOCH.plus_s(self.time_s())
+    }
+
+    pub(super) fn physics_step(&mut self, commands: &[f64; MAX_JOINTS]) -> Result<(), ArmError> {
+        let (angles, rates) = (self.physics.angles(), self.physics.rates());
+        self.hydraulics.step(commands, &angles, &rates);
+        let friction =
+            JointLoad { damping_n_m_s_rad: self.spec.water.joint_friction_n_m_s_rad, ..JointLoad::default() };
+        let loads = std::array::from_fn(|j| {
+            if j < angles.len() { self.hydraulics.load(j) + friction } else { JointLoad::default() }
+        });
+        let (t_s, step_s) = (self.time_s(), self.spec.physics.step_s);
+        self.step += 1;
+        let next_s = self.time_s();
+        let vehicle_force = match &mut self.free {
+            Some(free) => free.force(t_s, step_s, &self.base),
+            None => Force::zero(),
+        };
+        let water_next = self.sea.at(next_s);
+        let next = if self.free.is_some() { self.base } else { self.motion.at(next_s) };
+        self.physics.step(&Drive {
+            base: [&self.base, &next],
+            water: [self.water, water_next],
+            vehicle_force,
+            loads: &loads,
+        });
+        self.water = water_next;
+        self.base = if self.free.is_some() { self.physics.base_state(&self.vehicle.vehicle_from_base) } else { next };
+        self.watch_contacts()?;
+        let next_image_s = (self.n_images + 1) as f64 / self.spec.camera.rate_hz;
+        if self.time_s() >= next_image_s - 1e-9 {
+            self.n_images += 1;
+            self.expose()?;
+        }
+        Ok(())
+    }
+
+    pub(super) fn place_solids(&mut self) -> BodyPoses {
+        let links = self.physics.poses();
+        self.solids.place(&links, self.base.world_from_base.inverse().isometry());
+        links
+    }
+}

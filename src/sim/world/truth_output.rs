@@ -1,0 +1,88 @@
+//! The truth's stream of a world: states, clearances and contacts.
+
+use crate::error::SimError;
+use crate::spec::CONTROL_PERIOD_S;
+use crate::truth::{TruthClearance, TruthContact, TruthSink, TruthState};
+use crate::world::simulation::World;
+use armcal_core::spatial::Pose;
+use armcal_core::streams::ArmError;
+
+impl World {
+    /// Hands the truth to `sink` from now on.
+    ///
+    /// # Errors
+    /// [`SimError::Truth`] when the sink refuses.
+    pub fn set_truth_sink(&mut self, mut sink: Box<dyn TruthSink>) -> Result<(), SimError> {
+        sink.begin(&self.header).map_err(SimError::Truth)?;
+        self.truth = Some(sink);
+        Ok(())
+    }
+
+    /// Ends the truth's stream, if there is one.
+    ///
+    /// # Errors
+    /// [`SimError::Truth`] when the sink cannot keep what it has.
+    pub fn finish_truth(&mut self) -> Result<(), SimError> {
+        self.truth.take().map_or(Ok(()), |sink| sink.finish().map_err(SimError::Truth))
+    }
+
+    pub(super) fn watch_contacts(&mut self) -> Result<(), ArmError> {
+        let stamp = self.stamp();
+        let began = self.contacts.update(&self.physics, self.step);
+        let Some(truth) = &mut self.truth else { return Ok(()) };
+        for &(a, b) in began {
+            let name = |part| self.solids.part_name(part).to_owned();
+            let contact = TruthContact { stamp, part_a: name(a), part_b: name(b) };
+            truth.contact(&contact).map_err(ArmError::Sink)?;
+        }
+        Ok(())
+    }
+
+    pub(super) fn record_truth(&mut self) -> Result<(), ArmError> {
+        if self.truth.is_none() {
+            return Ok(());
+        }
+        let period = self.step / self.spec.steps_per_period();
+        let is_due = |rate_hz: f64| period.is_multiple_of(periods_between(rate_hz));
+        if is_due(self.spec.physics.truth_rate_hz) {
+            let state = self.truth_state();
+            if let Some(truth) = &mut self.truth {
+                truth.state(&state).map_err(ArmError::Sink)?;
+            }
+        }
+        if is_due(self.spec.physics.clearance_rate_hz) {
+            self.place_solids();
+            let stamp = self.stamp();
+            if let (Some(nearest), Some(truth)) = (self.solids.nearest(), &mut self.truth) {
+                let name = |part| self.solids.part_name(part).to_owned();
+                let (part_a, part_b) = (name(nearest.part_a), name(nearest.part_b));
+                let clearance = TruthClearance { stamp, distance_m: nearest.distance_m, part_a, part_b };
+                truth.clearance(&clearance).map_err(ArmError::Sink)?;
+            }
+        }
+        Ok(())
+    }
+
+    pub(super) fn truth_state(&self) -> TruthState {
+        let (angles, rates) = (self.physics.angles(), self.physics.rates());
+        let links = self.physics.poses();
+        let t_s = self.time_s();
+        TruthState {
+            stamp: self.stamp(),
+            angles,
+            rates,
+            torques: self.hydraulics.torques(&angles, &rates),
+            // The engine's raw poses get their names here: the tool and the camera in the base frame.
+            base_from_tool: Pose::from_isometry(links.frame(&self.robot.tool.mount)),
+            base_from_camera: Pose::from_isometry(self.camera.base_from_camera(&links)),
+            world_from_vehicle: self.base.world_from_vehicle,
+            oil_c: self.temperatures.oil_c(t_s),
+            water_c: self.temperatures.water_c(t_s),
+        }
+    }
+}
+
+/// Whole control periods between samples of about `rate_hz`.
+fn periods_between(rate_hz: f64) -> u64 {
+    (1.0 / (rate_hz * CONTROL_PERIOD_S)).round().max(1.0) as u64
+}
