@@ -1,7 +1,7 @@
 //! A driver for an arm of your own: the trait `Arm`, and a whole session with it.
 //!
 //! `cargo run --release --example own_arm`. The arm here is ideal but for its joint sensors, which are off by gain and
-//! offset. It follows set-points by its own readings and sees the tags through a perfect lens. A driver for hardware sends
+//! offset. It follows set-points by its own readings and sees the tags with some noise. A driver for hardware sends
 //! set-points to a controller, and hands on the messages that come back.
 
 use std::error::Error;
@@ -9,18 +9,23 @@ use std::path::Path;
 
 use armcal::optics::square_corners;
 use armcal::session::run;
+use armcal::stats::stream_rng;
 use armcal::streams::{JointSensorSample, TagDetection, TagDetections};
 use armcal::time::SIMULATION_EPOCH;
 use armcal::{
     Arm, ArmError, ArmSensors, JointAngles, JointCounts, Message, Method, Recorder, RecordingHeader, RecordingWriter,
     Robot, SessionInputs, Sink, Stamp, Unwatched, load_routine,
 };
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
 
 const PERIOD_S: f64 = 0.02;
 /// Control periods between two images.
 const IMAGE_EVERY: u64 = 10;
 /// Share of the way to the set-point that the arm goes in one period.
 const FOLLOWING: f64 = 0.3;
+/// Standard deviation of a corner, px.
+const CORNER_NOISE_PX: f64 = 0.3;
 
 struct MyArm<'a> {
     robot: &'a Robot,
@@ -29,6 +34,7 @@ struct MyArm<'a> {
     true_angles: JointAngles,
     set_point: JointCounts,
     n_periods: u64,
+    noise: ChaCha8Rng,
 }
 
 impl<'a> MyArm<'a> {
@@ -39,18 +45,27 @@ impl<'a> MyArm<'a> {
             model.correction.offset_rad += 0.02 * (1.5 - joint as f64);
         }
         let set_point = ArmSensors::nominal(robot).counts(&robot.stowed);
-        Self { robot, true_angles: sensors.angles(&set_point), sensors, set_point, n_periods: 0 }
+        Self {
+            robot,
+            true_angles: sensors.angles(&set_point),
+            sensors,
+            set_point,
+            n_periods: 0,
+            noise: stream_rng(1, "corners"),
+        }
     }
 
     /// All tags that lie in the image with all corners; nothing hides anything from this camera.
-    fn detections(&self) -> Vec<TagDetection> {
+    fn detections(&mut self) -> Vec<TagDetection> {
         let base_from_camera = self.robot.chain.frame(&self.true_angles, &self.robot.camera.mount);
         let lens = &self.robot.camera.lens;
+        let mut noise_px = || CORNER_NOISE_PX * Distribution::<f64>::sample(&StandardNormal, &mut self.noise);
         let detect = |tag: &armcal::robot::SurveyedTag| {
             let camera_from_tag = base_from_camera.inverse() * tag.base_from_tag.isometry();
             let mut corners_px = [[0.0; 2]; 4];
             for (pixel, corner) in corners_px.iter_mut().zip(square_corners(tag.size_m)) {
-                *pixel = lens.project(&(camera_from_tag * corner).coords).filter(|px| lens.contains(px))?.into();
+                let exact = lens.project(&(camera_from_tag * corner).coords).filter(|px| lens.contains(px))?;
+                *pixel = [exact.x + noise_px(), exact.y + noise_px()];
             }
             let faces_camera =
                 camera_from_tag.translation.vector.dot(&(camera_from_tag * nalgebra::Vector3::z())) < 0.0;
