@@ -7,7 +7,8 @@
 //! `bumps` runs into things that nobody has drawn;
 //! `planning` reads plans and holds random arms against them;
 //! `determinism`, `closed_loop`, `script` and `cli` run the program, `kill` ends it badly; `sim` looks at the simulated
-//! world from outside; `uncalibrated` calibrates arms of which little is known; `real` reads recordings of real arms; `tagmap` maps tags in recordings that the test writes.
+//! world from outside; `uncalibrated` calibrates arms of which little is known; `real` reads recordings of real arms; `tagmap` maps tags in recordings that the
+//! test writes; `repository` reads sources and pages.
 
 mod bumps;
 mod cli;
@@ -25,6 +26,7 @@ mod planning;
 mod property;
 mod real;
 mod recovery;
+mod repository;
 mod script;
 mod sim;
 mod support;

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use armcal::calib::Calibration;
 use armcal::log::{RecordingHeader, RecordingWriter, for_each_raw, read_attachments, read_recording, strip};
@@ -164,95 +164,21 @@ fn attached_drawings_are_the_files_that_belief_may_read() {
     assert!(attached["robot.toml"] == robot_toml);
 }
 
-fn sources(folder: &Path) -> Vec<PathBuf> {
-    let mut found = Vec::new();
-    for entry in fs::read_dir(folder).expect("a source folder").flatten() {
-        let path = entry.path();
-        if path.is_dir() {
-            found.extend(sources(&path));
-        } else if path.extension().is_some_and(|extension| extension == "rs") {
-            found.push(path);
-        }
-    }
-    found
-}
-
-/// Top-level modules of the crate that a source names, by `crate::name` or `crate::{name, ..}`.
-fn modules_named(source: &str) -> Vec<String> {
-    let word = |text: &str| text.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect::<String>();
-    let mut names = Vec::new();
-    for prefix in ["crate::", "armcal::"] {
-        for (at, _) in source.match_indices(prefix) {
-            let rest = &source[at + prefix.len()..];
-            let Some(group) = rest.strip_prefix('{') else {
-                names.push(word(rest));
-                continue;
-            };
-            let mut depth = 0;
-            let mut is_start = true;
-            for (at, c) in group.char_indices() {
-                match c {
-                    '}' if depth == 0 => break,
-                    '{' => depth += 1,
-                    '}' => depth -= 1,
-                    ',' => is_start = true,
-                    c if is_start && depth == 0 && !c.is_whitespace() => {
-                        names.push(word(&group[at..]));
-                        is_start = false;
-                    }
-                    _ => {}
-                }
-            }
-        }
-    }
-    names
-}
-
+/// The compiler lets a crate name only what it depends on.
 #[test]
-fn the_source_scan_sees_grouped_imports() {
-    let names = modules_named("use crate::{robot::{self, sim}, sim::World,\n stats};\nlet x = armcal::calib::y;");
-    assert_eq!(names, ["robot", "sim", "stats", "calib"]);
-}
-
-#[test]
-fn belief_never_names_the_simulator_and_truth_never_names_belief() {
-    let belief = ["calib", "plan", "verify", "session", "tagmap"];
-    for (folders, forbidden) in [(&belief[..], &["sim", "score", "cli", "report"][..]), (&["sim"], &belief[..])] {
-        for folder in folders {
-            let files = sources(&root().join("src").join(folder));
-            assert!(!files.is_empty(), "{folder}");
-            for file in files {
-                for name in modules_named(&read(&file)) {
-                    assert!(!forbidden.contains(&name.as_str()), "{} names crate::{name}", file.display());
-                }
-            }
-        }
-    }
-}
-
-/// Where streams and files of both sides meet, neither side is named.
-#[test]
-fn the_meeting_place_names_neither_side() {
-    for folder in [
-        "streams",
-        "log",
-        "routine",
-        "input",
-        "robot",
-        "sensor",
-        "kinematics",
-        "optics",
-        "detect",
-        "spatial",
-        "stats",
-        "time",
+fn belief_does_not_depend_on_the_simulator_nor_truth_on_belief() {
+    for (member, allowed) in [
+        ("core", &[][..]),
+        ("detect", &["armcal-core"]),
+        ("belief", &["armcal-core"]),
+        ("sim", &["armcal-core", "armcal-detect"]),
+        ("replay", &["armcal-core", "armcal-belief"]),
     ] {
-        for file in sources(&root().join("src").join(folder)) {
-            for name in modules_named(&read(&file)) {
-                let is_above = ["calib", "plan", "verify", "session", "tagmap", "sim", "score", "report", "cli"]
-                    .contains(&name.as_str());
-                assert!(!is_above, "{} names crate::{name}", file.display());
-            }
+        let manifest: toml::Table = read(&root().join("src").join(member).join("Cargo.toml")).parse().expect("TOML");
+        let tables = ["dependencies", "dev-dependencies", "build-dependencies"].map(|name| manifest.get(name));
+        for name in tables.into_iter().flatten().flat_map(|table| table.as_table().expect("a table").keys()) {
+            let is_allowed = !name.starts_with("armcal") || allowed.contains(&name.as_str());
+            assert!(is_allowed, "{member} depends on {name}");
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 
 #[cfg(feature = "viewer")]
 use crate::cli::replay;
@@ -50,6 +50,12 @@ enum Command {
     Replay(replay::ReplayArgs),
     /// Read robot folders, routines, vehicles, calibrations, input maps, tag maps, tasks and plans, and say what is wrong with them
     Check(check::CheckArgs),
+}
+
+/// The definition of the command line, for those who check quoted command lines.
+#[must_use]
+pub fn command() -> clap::Command {
+    Cli::command()
 }
 
 /// Parses the command line, does what it says and gives the exit code; errors go to stderr once, here.

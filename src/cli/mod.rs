@@ -39,5 +39,5 @@ mod study_plan;
 mod study_poses;
 mod tagmap;
 
-pub use command_line::main;
+pub use command_line::{command, main};
 pub use exit::Exit;

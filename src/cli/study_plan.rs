@@ -16,8 +16,8 @@ use armcal_core::robot::{SELF_COLLISION_FILE, load, load_vehicle, load_without_p
 use armcal_core::routine::{self, Scene};
 use armcal_core::streams::Message;
 use armcal_study::{
-    Belief, EdgeStudy, PathSite, PathStudy, edge_study, edges_csv, edges_json, mean_time_under_s, path_study,
-    paths_csv, problem_json, queries_json, random_edges, stray_study,
+    Belief, EdgeStudy, PathQueries, PathSite, PathStudy, edge_study, edges_csv, edges_json, mean_time_under_s,
+    path_study, paths_csv, problem_json, queries_json, random_edges, stray_study,
 };
 
 /// Free water that the studies keep, m.
@@ -141,7 +141,8 @@ pub(super) fn paths(args: &PathsArgs) -> Result<Exit> {
         let site = PathSite { name: vehicle.name.clone(), robot, vehicle, scene: routine.scene };
         for belief in Belief::ALL {
             eprintln!("{}, {} ...", site.name, belief.name());
-            let study = path_study(&site, belief, args.n as usize, MARGIN_M, args.seed, &clock);
+            let queries = PathQueries { n: args.n as usize, margin_m: MARGIN_M, seed: args.seed };
+            let study = path_study(&site, belief, queries, &clock);
             if belief == Belief::Alone {
                 let problem = problem_json(&site, &queries_json(&study), MARGIN_M);
                 written.push((format!("paths-{}.json", site.name), problem.to_string()));

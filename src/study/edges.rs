@@ -75,10 +75,12 @@ pub fn edge_study(
         certified.push(clearance.find_violation_exact(from, to, margin_m).is_none());
         certify_s.push(clock() - start_s);
     }
-    let judged = edges.par_iter().zip(&certified).map(|(edge, &is_certified)| EdgeRow {
-        longest_step_rad: edge[0].max_abs_difference(&edge[1]),
-        is_certified,
-        violation_at: scan(clearance, edge, margin_m, is_certified),
+    let judged = edges.par_iter().zip(&certified).map(|(edge, &is_certified)| {
+        let longest_step_rad = edge[0].max_abs_difference(&edge[1]);
+        let fine = (longest_step_rad / SCAN_RAD).ceil().max(1.0) as u32;
+        let coarse_violation = if is_certified { None } else { scan(clearance, edge, margin_m, COARSE) };
+        let violation_at = coarse_violation.or_else(|| scan(clearance, edge, margin_m, fine));
+        EdgeRow { longest_step_rad, is_certified, violation_at }
     });
     EdgeStudy { arm: robot.name.clone(), rows: judged.collect(), certify_s }
 }
@@ -101,17 +103,13 @@ pub fn mean_time_under_s(
     (clock() - start_s) / edges.len().max(1) as f64
 }
 
-/// The first place found at which the arm is nearer than the margin.
-fn scan(clearance: &ClearanceModel<'_>, [from, to]: &Edge, margin_m: f64, is_certified: bool) -> Option<f64> {
-    let longest_rad = from.max_abs_difference(to);
-    let is_too_near = |share: f64| {
+/// The first of `n_steps` equal steps of the edge at which the arm is nearer than the margin, as a share of the edge.
+fn scan(clearance: &ClearanceModel<'_>, [from, to]: &Edge, margin_m: f64, n_steps: u32) -> Option<f64> {
+    let is_too_near = |share: &f64| {
         let at = JointAngles::from_fn(from.len(), |j| from[j] + share * (to[j] - from[j]));
         clearance.is_nearer_than(&at, margin_m - ROUNDING_M)
     };
-    let n = (longest_rad / SCAN_RAD).ceil().max(1.0) as u32;
-    let shares = |n: u32| (0..=n).map(move |k| f64::from(k) / f64::from(n));
-    let coarse = if is_certified { None } else { shares(COARSE).find(|share| is_too_near(*share)) };
-    coarse.or_else(|| shares(n).find(|share| is_too_near(*share)))
+    (0..=n_steps).map(|k| f64::from(k) / f64::from(n_steps)).find(is_too_near)
 }
 
 impl EdgeStudy {

@@ -21,7 +21,7 @@ mod trials;
 
 pub use edges::{Edge, EdgeRow, EdgeStudy, edge_study, edges_csv, edges_json, mean_time_under_s, random_edges};
 pub use noise_fit::{FittedNoise, fit_noise};
-pub use paths::{Belief, PathRow, PathSite, PathStudy, path_study, paths_csv, problem_json, queries_json};
+pub use paths::{Belief, PathQueries, PathRow, PathSite, PathStudy, path_study, paths_csv, problem_json, queries_json};
 pub use poses::{PoseRow, PoseStudyError, pose_study, poses_csv, poses_figure, poses_table};
 pub use scenes::{Condition, TAG_SIZE_M, conditions, water_name};
 pub use sensitivity::{Sensitivity, SensitivityPoint, sensitivity};

@@ -93,16 +93,18 @@ impl PathSite {
     }
 }
 
-/// Plans `n` random queries. `clock`: seconds.
+/// The random queries of a study.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PathQueries {
+    pub n: usize,
+    pub margin_m: f64,
+    pub seed: u64,
+}
+
+/// Plans random queries. `clock`: seconds.
 #[must_use]
-pub fn path_study(
-    site: &PathSite,
-    belief: Belief,
-    n: usize,
-    margin_m: f64,
-    seed: u64,
-    clock: &dyn Fn() -> f64,
-) -> PathStudy {
+pub fn path_study(site: &PathSite, belief: Belief, queries: PathQueries, clock: &dyn Fn() -> f64) -> PathStudy {
+    let PathQueries { n, margin_m, seed } = queries;
     let (believed, bounds) = site.believed(belief);
     let clearance = ClearanceModel::new(&believed.robot, &believed.vehicle, &believed.scene);
     let limits = bounds.safe_limits(&believed.robot);
@@ -249,7 +251,7 @@ mod tests {
         let robot = load(&root.join("titan4")).expect("the robot reads").mounted_on(&vehicle).expect("it fits");
         let scene = Scene { seafloor_z_m: Some(-2.2), obstacles: vec![] };
         let site = PathSite { name: "tight-basket".to_owned(), robot, vehicle, scene };
-        let study = |seed| path_study(&site, Belief::Alone, 12, 0.05, seed, &|| 0.0);
+        let study = |seed| path_study(&site, Belief::Alone, PathQueries { n: 12, margin_m: 0.05, seed }, &|| 0.0);
         let (first, again, other) = (study(1), study(1), study(2));
         let csv = |study: &PathStudy| paths_csv(std::slice::from_ref(study));
         assert_eq!(csv(&first), csv(&again), "the same seed gives the same bytes");

@@ -95,11 +95,11 @@ pub fn detection_study(
         let [width, height] = lens.resolution_px.map(|n| n as usize);
         let image = GreyImage { width, height, data: &grey };
         let rendered_s = watcher.wall_s();
-        let seen = detector.detect(image)?;
+        let detected = detector.detect(image)?;
         study.render_s.push(rendered_s - start_s);
         study.detect_s.push(watcher.wall_s() - rendered_s);
         let name = format!("{n:04}.png");
-        compare(lens, &scene, condition, &name, &seen, &mut study);
+        study.add(&Trial { lens, scene: &scene, condition, image: &name }, &detected);
         study.n_images += 1;
         watcher.image(&name, image, n + 1, conditions.len())?;
     }
@@ -122,46 +122,50 @@ fn shoot(imager: &mut Imager, scene: &Scene, condition: &Condition, number: u64,
     imager.take_image(&shot).grey(grey);
 }
 
-fn compare(
-    lens: &Fisheye,
-    scene: &Scene,
-    condition: &Condition,
-    image: &str,
-    seen: &ImageDetections,
-    study: &mut DetectionStudy,
-) {
-    let mut n_matched = 0;
-    for tag in &scene.tags {
-        let Some(truth_px) = scene.corners_px(lens, tag) else {
-            // Cut off by the image's rim: what is found of it is no error.
-            n_matched += seen.tags.iter().filter(|found| found.detection.id == tag.id).count();
-            continue;
-        };
-        let shortest_side_px = shortest_side_px(&truth_px);
-        let is_here = |corners: &[[f64; 2]; 4]| largest_px(corners, &truth_px) < MATCH_SHARE * shortest_side_px;
-        let found = seen.tags.iter().find(|t| t.detection.id == tag.id && is_here(&t.detection.corners_px));
-        let rejected = || seen.rejects.iter().find(|r| r.id == tag.id && is_here(&r.corners_px));
-        let outcome = match found {
-            Some(found) => {
-                n_matched += 1;
-                let corners_px = found.detection.corners_px;
-                Outcome::Found { corners_px, covariances_px2: found.covariances_px2 }
-            }
-            None => rejected().map_or(Outcome::Missed, |reject| Outcome::Rejected(reject.reason)),
-        };
-        let sight = tag.camera_from_tag.translation.vector;
-        study.trials.push(TagTrial {
-            image: image.to_owned(),
-            condition: *condition,
-            id: tag.id,
-            incidence_rad: tag.incidence_rad,
-            view_angle_rad: sight.xy().norm().atan2(sight.z),
-            shortest_side_px,
-            truth_px,
-            outcome,
-        });
+/// One image, and the scene that it shows.
+struct Trial<'a> {
+    lens: &'a Fisheye,
+    scene: &'a Scene,
+    condition: &'a Condition,
+    image: &'a str,
+}
+
+impl DetectionStudy {
+    /// Compares the detections in an image with the projected tags.
+    fn add(&mut self, trial: &Trial<'_>, detected: &ImageDetections) {
+        let mut n_matched = 0;
+        for tag in &trial.scene.tags {
+            let Some(truth_px) = trial.scene.corners_px(trial.lens, tag) else {
+                // Cut off by the image's rim: what is found of it is no error.
+                n_matched += detected.tags.iter().filter(|found| found.detection.id == tag.id).count();
+                continue;
+            };
+            let shortest_side_px = shortest_side_px(&truth_px);
+            let is_here = |corners: &[[f64; 2]; 4]| largest_px(corners, &truth_px) < MATCH_SHARE * shortest_side_px;
+            let found = detected.tags.iter().find(|t| t.detection.id == tag.id && is_here(&t.detection.corners_px));
+            let rejected = || detected.rejects.iter().find(|r| r.id == tag.id && is_here(&r.corners_px));
+            let outcome = match found {
+                Some(found) => {
+                    n_matched += 1;
+                    let corners_px = found.detection.corners_px;
+                    Outcome::Found { corners_px, covariances_px2: found.covariances_px2 }
+                }
+                None => rejected().map_or(Outcome::Missed, |reject| Outcome::Rejected(reject.reason)),
+            };
+            let center_m = tag.camera_from_tag.translation.vector;
+            self.trials.push(TagTrial {
+                image: trial.image.to_owned(),
+                condition: *trial.condition,
+                id: tag.id,
+                incidence_rad: tag.incidence_rad,
+                view_angle_rad: center_m.xy().norm().atan2(center_m.z),
+                shortest_side_px,
+                truth_px,
+                outcome,
+            });
+        }
+        self.n_false += detected.tags.len() - n_matched;
     }
-    study.n_false += seen.tags.len() - n_matched;
 }
 
 fn shortest_side_px(corners: &[[f64; 2]; 4]) -> f64 {

@@ -44,6 +44,21 @@ pub fn read(path: &Path) -> String {
     fs::read_to_string(path).expect("read")
 }
 
+/// All files below `folder` with this extension, sorted.
+pub fn files_below(folder: &Path, extension: &str) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    for entry in fs::read_dir(folder).expect("a folder").flatten() {
+        let path = entry.path();
+        if path.is_dir() {
+            found.extend(files_below(&path, extension));
+        } else if path.extension().is_some_and(|of| of == extension) {
+            found.push(path);
+        }
+    }
+    found.sort();
+    found
+}
+
 /// A routine of some three simulated minutes: few poses, few targets, the standard world otherwise.
 #[derive(Clone, Debug)]
 pub struct ShortRoutine {

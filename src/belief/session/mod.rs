@@ -21,9 +21,11 @@ mod recorder;
 mod scale_identification;
 mod script;
 mod settling;
+mod unwatched;
 
 pub use outcome::{AssertResult, Epoch, EstimateUpdate, Outcome, ReachStep, Visit};
 pub use recorder::Recorder;
+pub use unwatched::Unwatched;
 
 use crate::calib::CalibError;
 use crate::plan::PlanError;

@@ -48,61 +48,94 @@ const INITIAL_ERRORS: [(f64, f64); 4] = [(0.01, 1.0), (0.025, 2.5), (0.05, 5.0),
 /// All tables of the study.
 #[must_use]
 pub fn experiments(tier: Tier) -> Vec<Experiment> {
-    let n = |full: usize, small: usize| if tier == Tier::Full { full } else { small };
-    let standard = Setting::default();
-    let at_1_cm = Setting { noise_m: 0.01, ..standard };
-    let [free, fixed] = [Gauge::Free, Gauge::Fixed].map(MethodVariant::minimum_variance);
+    let mut all = of_data(tier);
+    all.extend(of_the_search(tier));
+    all
+}
+
+fn n_draws(tier: Tier, full: usize, small: usize) -> usize {
+    if tier == Tier::Full { full } else { small }
+}
+
+fn at_1_cm() -> Setting {
+    Setting { noise_m: 0.01, ..Setting::default() }
+}
+
+fn minimum_variances() -> [MethodVariant; 2] {
+    [Gauge::Free, Gauge::Fixed].map(MethodVariant::minimum_variance)
+}
+
+/// Every method; minimum variance with its gauge free and fixed.
+fn all_methods() -> Vec<MethodVariant> {
+    let [free, fixed] = minimum_variances();
     let (distance, squares) = (MethodVariant::minimum_distance(), MethodVariant::least_squares());
-    let bundle = MethodVariant::bundle();
-    let with_map = vec![distance, fixed, squares, bundle];
-    let all = vec![distance, free, fixed, squares, bundle];
+    vec![distance, free, fixed, squares, MethodVariant::bundle()]
+}
+
+/// Every method that knows where the landmarks are.
+fn fixed_gauge_methods() -> Vec<MethodVariant> {
+    let [_, fixed] = minimum_variances();
+    vec![MethodVariant::minimum_distance(), fixed, MethodVariant::least_squares(), MethodVariant::bundle()]
+}
+
+/// Tables of noise, numbers and poses.
+fn of_data(tier: Tier) -> Vec<Experiment> {
+    let standard = Setting::default();
     let sizes = SIZES.iter().filter(|(poses, _)| tier == Tier::Full || *poses < 200);
-    let initial = INITIAL_ERRORS.iter().flat_map(|(gain_error, deg)| {
-        let of = Setting { gain_error: *gain_error, offset_error_rad: deg.to_radians(), ..standard };
-        [of, Setting { noise_m: 0.01, ..of }]
-    });
-    let paper = SearchOptions::of_the_paper();
-    let starts = SearchOptions { n_starts: 4, ..SearchOptions::default() };
     vec![
         Experiment {
             name: "no noise",
             title: "Without noise",
             settings: vec![standard, Setting { readings: Readings::WholeCounts, ..standard }],
-            contenders: all.clone(),
-            draws: n(100, 8),
+            contenders: all_methods(),
+            draws: n_draws(tier, 100, 8),
         },
         Experiment {
             name: "noise",
             title: "Noise of the positions",
             settings: NOISES_M.iter().map(|&noise_m| Setting { noise_m, ..standard }).collect(),
-            contenders: all.clone(),
-            draws: n(200, 12),
+            contenders: all_methods(),
+            draws: n_draws(tier, 200, 12),
         },
         Experiment {
             name: "size",
             title: "Numbers of poses and landmarks, noise 1 cm",
-            settings: sizes.map(|&(poses, tags)| Setting { poses, tags, ..at_1_cm }).collect(),
-            contenders: with_map.clone(),
-            draws: n(200, 8),
+            settings: sizes.map(|&(poses, tags)| Setting { poses, tags, ..at_1_cm() }).collect(),
+            contenders: fixed_gauge_methods(),
+            draws: n_draws(tier, 200, 8),
         },
         Experiment {
             name: "sight",
             title: "The same from poses that have every landmark in the image, noise 1 cm",
-            settings: vec![Setting { sight: PoseSampling::InImage, ..at_1_cm }],
-            contenders: with_map.clone(),
-            draws: n(200, 8),
+            settings: vec![Setting { sight: PoseSampling::InImage, ..at_1_cm() }],
+            contenders: fixed_gauge_methods(),
+            draws: n_draws(tier, 200, 8),
         },
+    ]
+}
+
+/// Tables of the search: its start, its units and its settings.
+fn of_the_search(tier: Tier) -> Vec<Experiment> {
+    let standard = Setting::default();
+    let initial = INITIAL_ERRORS.iter().flat_map(|(gain_error, deg)| {
+        let of = Setting { gain_error: *gain_error, offset_error_rad: deg.to_radians(), ..standard };
+        [of, Setting { noise_m: 0.01, ..of }]
+    });
+    let (distance, [free, fixed]) = (MethodVariant::minimum_distance(), minimum_variances());
+    let paper = SearchOptions::of_the_paper();
+    let starts = SearchOptions { n_starts: 4, ..SearchOptions::default() };
+    vec![
         Experiment {
             name: "initial error",
             title: "Error of the first guess",
             settings: initial.collect(),
-            contenders: with_map,
-            draws: n(60, 6),
+            contenders: fixed_gauge_methods(),
+            draws: n_draws(tier, 60, 6),
         },
         Experiment {
             name: "preconditioning",
             title: "Preconditioning, settings and starts of the search",
-            settings: vec![standard, at_1_cm],
+            settings: vec![standard, at_1_cm()],
             contenders: vec![
                 distance,
                 distance.raw("minimum distance, raw units"),
@@ -112,14 +145,14 @@ pub fn experiments(tier: Tier) -> Vec<Experiment> {
                 fixed.named("minimum variance, gauge fixed, the paper's settings", paper),
                 free.named("minimum variance, gauge free, 4 starts", starts),
             ],
-            draws: n(24, 4),
+            draws: n_draws(tier, 24, 4),
         },
         Experiment {
             name: "from the truth",
             title: "The search begins at the true sensors (Figure 3, right), noise 1 cm",
-            settings: vec![Setting { guess: Guess::Truth, ..at_1_cm }],
-            contenders: all,
-            draws: n(60, 6),
+            settings: vec![Setting { guess: Guess::Truth, ..at_1_cm() }],
+            contenders: all_methods(),
+            draws: n_draws(tier, 60, 6),
         },
     ]
 }

@@ -92,7 +92,7 @@ const MAX_TRIES: usize = 200_000;
 impl Draw {
     /// Draw number `number` of a study with `seed`.
     ///
-    /// Landmarks lie uniformly in the box around the robot's own tags, poses as [`Sight`] says.
+    /// Landmarks lie uniformly in the box around the robot's own tags, poses as [`PoseSampling`] says.
     ///
     /// # Errors
     /// [`PaperStudyError::Scene`] when no pose sees all landmarks.
@@ -104,7 +104,9 @@ impl Draw {
         let views = (0..setting.poses)
             .map(|pose_idx| {
                 let angles = seeing_pose(&robot, setting.sight, &mut poses)?;
-                Ok(view(&robot, &truth, setting, pose_idx as u32, &angles, &mut noise))
+                let read_rad = read_angles(&robot, &truth, setting.readings, &angles);
+                let tags = observations(&robot, &angles, setting.noise_m, &mut noise);
+                Ok(View { tags, ..View::of_reading(pose_idx as u32, SIMULATION_EPOCH, read_rad) })
             })
             .collect::<Result<_, PaperStudyError>>()?;
         let mut tool = rng("tool");
@@ -205,18 +207,11 @@ fn seeing_pose(robot: &Robot, sight: PoseSampling, rng: &mut ChaCha8Rng) -> Resu
     Err(PaperStudyError::Scene { robot: robot.name.clone(), problem })
 }
 
-fn view(
-    robot: &Robot,
-    truth: &JointParameters,
-    setting: &Setting,
-    pose_idx: u32,
-    angles: &JointAngles,
-    rng: &mut ChaCha8Rng,
-) -> View {
-    let camera_from_base = robot.chain.link_poses(angles).frame(&robot.camera.mount).inverse();
-    let read_rad = JointAngles::from_fn(robot.n_joints(), |joint| {
+/// Travel of each joint by its own sensor, rad.
+fn read_angles(robot: &Robot, truth: &JointParameters, readings: Readings, angles: &JointAngles) -> JointAngles {
+    JointAngles::from_fn(robot.n_joints(), |joint| {
         let travel_rad = travel_rad(robot, truth, angles, joint);
-        match setting.readings {
+        match readings {
             Readings::Exact => travel_rad,
             Readings::WholeCounts => {
                 let spec = &robot.sensors[joint];
@@ -226,10 +221,15 @@ fn view(
                 (counts - center_counts) / spec.counts_per_rad
             }
         }
-    });
-    let tag_view = |(tag_idx, tag): (usize, &SurveyedTag)| {
+    })
+}
+
+/// Positions of all landmarks in the camera frame, with noise.
+fn observations(robot: &Robot, angles: &JointAngles, noise_m: f64, rng: &mut ChaCha8Rng) -> Vec<TagObservation> {
+    let camera_from_base = robot.chain.link_poses(angles).frame(&robot.camera.mount).inverse();
+    let observation = |(tag_idx, tag): (usize, &SurveyedTag)| {
         let exact = camera_from_base * Point3::from(tag.base_from_tag.origin().vector());
-        let noise = Vector3::from_fn(|_, _| setting.noise_m * Distribution::<f64>::sample(&StandardNormal, rng));
+        let noise = Vector3::from_fn(|_, _| noise_m * Distribution::<f64>::sample(&StandardNormal, rng));
         TagObservation {
             id: tag.id,
             tag_idx,
@@ -237,6 +237,5 @@ fn view(
             measured: TagMeasurement::Position,
         }
     };
-    let tags = robot.tags.iter().enumerate().map(tag_view).collect();
-    View { tags, ..View::of_reading(pose_idx, SIMULATION_EPOCH, read_rad) }
+    robot.tags.iter().enumerate().map(observation).collect()
 }
