@@ -22,9 +22,10 @@ pub const MIN_VIEWS: usize = 3;
 
 /// Calibrates `robot`'s joint sensors from the captured views of a recording, by the tags that it says were there.
 ///
-/// A recording that marks its calibrations is worked through as it was marked, and the last one is the result: each uses the
-/// views of its mark's span, a warm one starts from the last accepted one before it. Without such a mark all captured
-/// views make one calibration. Sensors whose scale was measured on the way (`identify` marks) take it from there.
+/// A recording that marks its calibrations is worked through as it was marked, and the last one is the result: each
+/// uses the views of its mark's span, a warm one starts from the last accepted one before it. Without such a mark all
+/// captured views make one calibration. Sensors whose scale was measured on the way (`identify` marks) take it from
+/// there.
 ///
 /// # Errors
 /// [`CalibError`] when the recording holds nothing to fit. A doubtful fit is returned with [`Status::Refused`].
@@ -128,8 +129,8 @@ impl MarkedRun<'_> {
         Ok(CalibrationData { name, messages_hash, data, gripper_tag_data, held_out, robot, identified })
     }
 
-    /// The views that tell of the camera mount where these are more than the marked ones: what the tag on the gripper showed before
-    /// stays true for a warm start; a fresh one forgets it.
+    /// The views that tell of the camera mount where these are more than the marked ones: what the tag on the gripper
+    /// showed before stays true for a warm start; a fresh one forgets it.
     fn gripper_tag_data(&self, robot: &Robot, marked: &MarkedCalibration) -> Option<CaptureData> {
         let (_, to) = marked.span.filter(|_| marked.is_warm && robot.gripper_tag.is_some())?;
         Some(associate_within(self.recording, robot, Some((Stamp { nanos: i64::MIN }, to))))

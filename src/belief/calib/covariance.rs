@@ -4,8 +4,8 @@
 //! curvature, `B` the scatter of its gradient. `B` is summed by views, for all tags of one view share one camera pose
 //! and its error. Errors common to all views (camera mount, survey of a tag) do not show in any scatter; they are added
 //! from the priors through the same curvature. What a straight line leaves of a sensor's error (nonlinearity,
-//! temperature) is there again at every new pose; at the tool it is added from the datasheet's linearity, or from more than
-//! that where the residuals say that the sensors are worse than their datasheet.
+//! temperature) is there again at every new pose; at the tool it is added from the datasheet's linearity, or from more
+//! than that where the residuals say that the sensors are worse than their datasheet.
 
 use nalgebra::{Const, DMatrix, DVector, Dyn, Matrix3, Matrix6, OMatrix, Vector3, Vector6};
 
@@ -23,7 +23,8 @@ use armcal_core::streams::{JointAngles, MAX_JOINTS, ReachTask};
 pub struct ParameterCovariance {
     pub parameters: Vec<Parameter>,
     pub matrix: DMatrix<f64>,
-    /// One sigma of what the parameters leave of each sensor's error at a new pose; `None` takes the datasheet's linearity.
+    /// One sigma of what the parameters leave of each sensor's error at a new pose; `None` takes the datasheet's
+    /// linearity.
     pub residual_std_rad: Option<[f64; MAX_JOINTS]>,
 }
 
@@ -156,8 +157,9 @@ impl ParameterCovariance {
 
 /// How many times the datasheets' linearity the sensors must have for the residuals to be what they are; at least 1.
 ///
-/// `sum |residual|^2 = sum (tr(mount) + tr(survey) + tr(corners) + s^2 tr(linearity))` over all tags of fitted and held-out
-/// views, solved for `s`. Fitted views count for the share that the parameters leave free: a view adds about three numbers.
+/// `sum |residual|^2 = sum (tr(mount) + tr(survey) + tr(corners) + s^2 tr(linearity))` over all tags of fitted and
+/// held-out views, solved for `s`. Fitted views count for the share that the parameters leave free: a view adds about
+/// three numbers.
 #[must_use]
 pub fn linearity_scale(
     fit: &PositionProblem<'_>,

@@ -19,7 +19,8 @@ pub(crate) fn fold_of(views: &[View], fold: usize) -> (Vec<View>, Vec<View>) {
     (of(false), of(true))
 }
 
-/// Each view by the parameters that `fit` estimates from the views of the other folds; a fold without an estimate does not count.
+/// Each view by the parameters that `fit` estimates from the views of the other folds; a fold without an estimate does
+/// not count.
 pub(crate) fn cross_validate(
     robot: &Robot,
     views: &[View],
@@ -65,7 +66,8 @@ fn by_camera(views: &[View], robot: &Robot, at: &JointParameters) -> Vec<View> {
 }
 
 impl FoldSums {
-    /// Adds views left out, by what was found without them: the arm as found, and its parameters; `nominal` is the drawing.
+    /// Adds views left out, by what was found without them: the arm as found, and its parameters; `nominal` is the
+    /// drawing.
     pub fn add(&mut self, held_out: &[View], as_found: &Robot, at: &JointParameters, nominal: &Robot) {
         let (by_found, by_drawing) =
             (by_camera(held_out, as_found, at), by_camera(held_out, nominal, &JointParameters::default()));

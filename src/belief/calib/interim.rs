@@ -11,10 +11,11 @@ use armcal_core::log::Recording;
 use armcal_core::robot::Robot;
 use armcal_core::time::Stamp;
 
-/// Estimates by `bundle` from the views captured since `from`, one view or more, starting from the datasheet or a `prior`.
+/// Estimates by `bundle` from the views captured since `from`, one view or more, starting from the datasheet or a
+/// `prior`.
 ///
-/// It is not judged: no view is left out, no failed joint looked for, and its status says nothing. Its covariance is what margins
-/// are made of, so it is refused where the residuals show that the model does not hold.
+/// It is not judged: no view is left out, no failed joint looked for, and its status says nothing. Its covariance is
+/// what margins are made of, so it is refused where the residuals show that the model does not hold.
 ///
 /// # Errors
 /// [`CalibError`] where the views tell nothing yet, or contradict each other or the prior.

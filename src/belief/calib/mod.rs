@@ -1,8 +1,8 @@
 //! BELIEF: from a recording and a nominal robot to calibrated joint sensors.
 //!
-//! `calibrate` works through the calibrations that a recording marks. `views` turns messages into views of an arm at rest;
-//! `bundle` is the default method, `methods` are the paper's; `cross_validation` and `acceptance` judge what comes out;
-//! `result` is calibration.toml. `interim` estimates during a capture. Nothing here knows of a simulator.
+//! `calibrate` works through the calibrations that a recording marks. `views` turns messages into views of an arm at
+//! rest; `bundle` is the default method, `methods` are the paper's; `cross_validation` and `acceptance` judge what
+//! comes out; `result` is calibration.toml. `interim` estimates during a capture. Nothing here knows of a simulator.
 
 mod acceptance;
 mod angles_by_camera;

@@ -1,6 +1,8 @@
-//! The parameters of the joint sensors: gain, offset, nonlinearity and what changes with temperature, pressure and time.
+//! The parameters of the joint sensors: gain, offset, nonlinearity and what changes with temperature, pressure and
+//! time.
 //!
-//! `theta_j = center_j + gain_j * travel_j + offset_j` (the paper's equation 2), and the terms of [`armcal_core::sensor`].
+//! `theta_j = center_j + gain_j * travel_j + offset_j` (the paper's equation 2), and the terms of
+//! [`armcal_core::sensor`].
 
 use armcal_core::robot::{JointSensorSpec, Robot};
 use armcal_core::sensor::{ArmSensors, ConditionChange, Conditions, Correction, N_SHAPE, Terms, nonlinearity_basis};

@@ -198,20 +198,20 @@ impl fmt::Display for Refusal {
             Self::Geometry(geometry) => write!(f, "{geometry}"),
             Self::SensorError { joint, std_rad, datasheet_std_rad } => write!(
                 f,
-                "joint sensors do not explain the data: {joint} needs a random error of {:.2} deg from view to view, its \
-                 datasheet has {:.2} deg; a joint that slips, or links that are not as in the drawing",
+                "joint sensors do not explain the data: {joint} needs a random error of {:.2} deg from view to view, \
+                 its datasheet has {:.2} deg; a joint that slips, or links that are not as in the drawing",
                 std_rad.to_degrees(),
                 datasheet_std_rad.to_degrees()
             ),
             Self::BeyondDatasheet { parameter, sigmas } => write!(
                 f,
-                "{parameter} is estimated {sigmas:.0} sigma from its datasheet: the joint or its sensor has failed, or it is \
-                 another sensor"
+                "{parameter} is estimated {sigmas:.0} sigma from its datasheet: the joint or its sensor has failed, \
+                 or it is another sensor"
             ),
             Self::Outliers { outliers, observations } => write!(
                 f,
-                "{outliers} of {observations} tag observations fit no arm of this drawing: other tags, or links that are not \
-                 as in the drawing"
+                "{outliers} of {observations} tag observations fit no arm of this drawing: other tags, or links that \
+                 are not as in the drawing"
             ),
             Self::Innovations { quantity, per_dof, limit, expected: [low, high] } => write!(
                 f,
@@ -250,8 +250,9 @@ impl Refusal {
                 let mm = |m: Option<f64>| m.unwrap_or(f64::INFINITY) * 1e3;
                 write!(
                     f,
-                    "the sensor of {joint} is {}, and the task needs that joint: without it the tool error is {:.0} mm for a \
-                     tolerance of {:.1} mm; while the camera sees tags and tells the joint's angle it is {:.1} mm",
+                    "the sensor of {joint} is {}, and the task needs that joint: without it the tool error is {:.0} \
+                     mm for a tolerance of {:.1} mm; while the camera sees tags and tells the joint's angle it is \
+                     {:.1} mm",
                     kind.name(),
                     mm(*tool_error_m),
                     tolerance_m * 1e3,

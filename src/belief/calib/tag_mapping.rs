@@ -1,9 +1,9 @@
 //! Where the tags are, when no survey says it: from the captured views themselves, before any joint enters.
 //!
-//! `tagmap` solves cameras and tags together from the fitted views' corner pixels; what is known of some tags (the base tag at least)
-//! anchors it, with its standard deviations. The map's tags then stand for surveyed ones. Their errors are not independent: a base
-//! tag that is turned by a little turns the whole map about it (0.2 deg is 7 mm at 2 m), so that the joint covariance of all
-//! positions, anchor included, goes into the predicted tool error.
+//! `tagmap` solves cameras and tags together from the fitted views' corner pixels; what is known of some tags (the base
+//! tag at least) anchors it, with its standard deviations. The map's tags then stand for surveyed ones. Their errors
+//! are not independent: a base tag that is turned by a little turns the whole map about it (0.2 deg is 7 mm at 2 m), so
+//! that the joint covariance of all positions, anchor included, goes into the predicted tool error.
 
 use std::collections::BTreeMap;
 
@@ -55,7 +55,8 @@ pub(crate) struct Mapped {
     pub result: MapResult,
 }
 
-/// A tag whose place in the base tag's frame is less sure than this per axis is left out, m. Assumed: ten times a usual survey.
+/// A tag whose place in the base tag's frame is less sure than this per axis is left out, m. Assumed: ten times a usual
+/// survey.
 const MAX_RELATIVE_STD_M: f64 = 0.01;
 
 /// Maps the tags of `data`'s fitted views; takes the detections of tags that the map lacks out of all views.
@@ -213,7 +214,8 @@ fn position_std_m(joint: &DMatrix<f64>, n: usize, pose: &Pose<Base, Tag>) -> [f6
 
 /// What an anchor that was held adds to the joint covariance of `ids`: it carries the whole map with it.
 ///
-/// With `T = A X` and `A exp(xi0)`, the tag moves by `X^-1 xi0 X`: `omega = R^T omega0`, `rho = R^T (rho0 - [t]x omega0)`.
+/// With `T = A X` and `A exp(xi0)`, the tag moves by `X^-1 xi0 X`: `omega = R^T omega0`, `rho = R^T (rho0 - [t]x
+/// omega0)`.
 fn shared_error(map: &TagMap, ids: &[u32], anchor: &Anchor) -> DMatrix<f64> {
     let n = 6 * ids.len();
     let Some((std, held)) = anchor.held_std.zip(map.tag(anchor.id)) else { return DMatrix::zeros(n, n) };

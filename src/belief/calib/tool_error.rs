@@ -1,8 +1,8 @@
 //! How sure the tool's position and orientation are, by the covariance of the sensors' parameters.
 //!
-//! `J P J^T + sum_j (dx/dtheta_j) (dx/dtheta_j)^T s_j^2`: P the covariance of the estimated parameters, J the tool's derivative by
-//! them, and s_j^2 what each joint has besides: the datasheet's variance of what was not estimated, and of what no parameter
-//! describes.
+//! `J P J^T + sum_j (dx/dtheta_j) (dx/dtheta_j)^T s_j^2`: P the covariance of the estimated parameters, J the tool's
+//! derivative by them, and s_j^2 what each joint has besides: the datasheet's variance of what was not estimated, and
+//! of what no parameter describes.
 
 use nalgebra::{DMatrix, Matrix3, Matrix6, SMatrix, SVector, Vector3, Vector6};
 
@@ -14,7 +14,8 @@ use armcal_core::sensor::{ArmSensors, ConditionChange, Conditions};
 use armcal_core::streams::JointAngles;
 
 impl ParameterCovariance {
-    /// Covariance of the tool's position (base frame, m^2) for an arm at `angles` under the sensors' reference conditions.
+    /// Covariance of the tool's position (base frame, m^2) for an arm at `angles` under the sensors' reference
+    /// conditions.
     #[must_use]
     pub fn tool_position_m2(&self, robot: &Robot, sensors: &ArmSensors, angles: &JointAngles) -> Matrix3<f64> {
         self.tool_position_under_m2(robot, sensors, angles, &sensors.reference)
@@ -36,8 +37,8 @@ impl ParameterCovariance {
         self.propagated(&at, |joint| at.poses.point_jacobian(joint, &at.tool_m))
     }
 
-    /// Covariance of the tool's pose: position (m) in the first three rows, then orientation (rad, a small turn about the axes of the
-    /// base frame), both in the base frame.
+    /// Covariance of the tool's pose: position (m) in the first three rows, then orientation (rad, a small turn about
+    /// the axes of the base frame), both in the base frame.
     #[must_use]
     pub fn tool_pose(
         &self,

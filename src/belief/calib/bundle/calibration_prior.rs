@@ -1,12 +1,13 @@
 //! A warm start: an earlier calibration as prior, and whether the new views agree with it.
 //!
-//! The prior's mean and covariance P0 are those of calibration.toml, about its own reference conditions, widened by what may have
-//! happened since: each offset by the datasheet's random walk, `drift^2 hours`. Parameters that it lacks come from the datasheet.
+//! The prior's mean and covariance P0 are those of calibration.toml, about its own reference conditions, widened by
+//! what may have happened since: each offset by the datasheet's random walk, `drift^2 hours`. Parameters that it lacks
+//! come from the datasheet.
 //!
-//! Agreement: the views are fitted once more under P1 = P0 + W, where W lets each offset slip as far as the datasheet's own sigma.
-//! With the posterior covariance C and `A = I - C P1^-1`, the estimate moves from the prior by d, which has the covariance
-//! `S = A P0 A^T + A C` if the prior holds (linear Gaussian model); `d^T S^+ d` is then chi-square with as many degrees of freedom
-//! as S has eigenvalues above `LEAST_SHARE` in units of P0.
+//! Agreement: the views are fitted once more under P1 = P0 + W, where W lets each offset slip as far as the datasheet's
+//! own sigma. With the posterior covariance C and `A = I - C P1^-1`, the estimate moves from the prior by d, which has
+//! the covariance `S = A P0 A^T + A C` if the prior holds (linear Gaussian model); `d^T S^+ d` is then chi-square with
+//! as many degrees of freedom as S has eigenvalues above `LEAST_SHARE` in units of P0.
 
 use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen, Vector6};
 
@@ -31,7 +32,8 @@ pub const MOUNT_ROWS: [&str; 6] =
 const USUAL_DRIFT_STD_RAD_PER_SQRT_H: f64 = 0.02 * std::f64::consts::PI / 180.0;
 /// How far a sensor may slip where the datasheet says that it has no offset, rad. Assumed.
 const LEAST_SLIP_STD_RAD: f64 = 0.02;
-/// The file's numbers are rounded to seven digits: this share of the variances is added so that the matrix has an inverse.
+/// The file's numbers are rounded to seven digits: this share of the variances is added so that the matrix has an
+/// inverse.
 const ROUNDING: f64 = 1e-6;
 /// Directions of which the views tell less than this, in units of the prior's variance, are not tested.
 const LEAST_SHARE: f64 = 0.1;

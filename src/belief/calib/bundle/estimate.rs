@@ -1,4 +1,5 @@
-//! The estimate from start to end: a robust start, what does not belong left out, the scales by evidence, the rest by least squares.
+//! The estimate from start to end: a robust start, what does not belong left out, the scales by evidence, the rest by
+//! least squares.
 
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix6, Vector6};
 
@@ -30,7 +31,8 @@ pub struct Estimate<'a> {
 }
 
 const CORNER_WIDTH: f64 = 3.0;
-/// Cost per used measurement above which something does not hold. Good views have about one (corner noise is not quite normal).
+/// Cost per used measurement above which something does not hold. Good views have about one (corner noise is not quite
+/// normal).
 const CONSISTENT_COST: f64 = 3.0;
 const MAX_ROUNDS: usize = 40;
 const CONVERGED_CHANGE: f64 = 0.01;
@@ -125,8 +127,8 @@ fn cost_at(problem: &BundleProblem<'_>, state: &State) -> f64 {
 }
 
 impl Estimate<'_> {
-    /// Whether the observations that are used and the priors fit together about as well as their standard deviations say: the cost, a
-    /// sum of squares in standard deviations, is not many times the number of measurements.
+    /// Whether the observations that are used and the priors fit together about as well as their standard deviations
+    /// say: the cost, a sum of squares in standard deviations, is not many times the number of measurements.
     #[must_use]
     pub fn is_consistent(&self) -> bool {
         let used = self.problem.observations.iter().filter(|observation| observation.is_used);
@@ -206,7 +208,8 @@ impl Estimate<'_> {
         self.posterior.covariance.view((0, 0), (n, n)).into_owned()
     }
 
-    /// `link_from_camera`, and its covariance (translation m, rotation rad, on the right); the prior's where it is not estimated.
+    /// `link_from_camera`, and its covariance (translation m, rotation rad, on the right); the prior's where it is not
+    /// estimated.
     #[must_use]
     pub fn mount(&self) -> (Isometry3<f64>, Matrix6<f64>) {
         let covariance = match self.problem.layout.mount {
@@ -216,7 +219,8 @@ impl Estimate<'_> {
         (self.solved.state.mount, covariance)
     }
 
-    /// `base_from_tag` of each of the robot's tags, and its covariance (on the right); `None` for tags that were not seen.
+    /// `base_from_tag` of each of the robot's tags, and its covariance (on the right); `None` for tags that were not
+    /// seen.
     #[must_use]
     pub fn tag(&self, tag_idx: usize) -> (Isometry3<f64>, Option<Matrix6<f64>>) {
         let at = self.problem.layout.tags[tag_idx];

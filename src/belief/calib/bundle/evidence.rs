@@ -1,8 +1,8 @@
 //! Noise and prior sizes from the data: MacKay's fixed point of the evidence.
 //!
-//! For a group of parameters x with prior variance s^2 and posterior variances v, `gamma = sum (1 - v / s^2)` of them are told by
-//! the data, and `s^2 = (sum x^2 + nu s0^2) / (gamma + nu)` (MacKay 1992, eq. 4.9), with nu pseudo-observations of the datasheet's
-//! s0. The noise: `(sum chi^2 + nu) / (N - gamma_all + nu)`.
+//! For a group of parameters x with prior variance s^2 and posterior variances v, `gamma = sum (1 - v / s^2)` of them
+//! are told by the data, and `s^2 = (sum x^2 + nu s0^2) / (gamma + nu)` (MacKay 1992, eq. 4.9), with nu
+//! pseudo-observations of the datasheet's s0. The noise: `(sum chi^2 + nu) / (N - gamma_all + nu)`.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 

@@ -1,9 +1,10 @@
-//! Which joint failed, and how: one joint at a time is freed in all views, and the angles that the camera then shows are held
-//! against its readings.
+//! Which joint failed, and how: one joint at a time is freed in all views, and the angles that the camera then shows
+//! are held against its readings.
 //!
-//! A hypothesis must explain the data better than a sound arm by far: with the datasheet's scales, the sum of the observations'
-//! chi-squares (each cut where a observation would be rejected), plus the joints' own and their parameters' prior, plus `2 ln(prior std / posterior std)` for
-//! each reading that is given up (Laplace's approximation of the evidence, MacKay 1992, with a round figure), must fall by `MARGIN`.
+//! A hypothesis must explain the data better than a sound arm by far: with the datasheet's scales, the sum of the
+//! observations' chi-squares (each cut where a observation would be rejected), plus the joints' own and their
+//! parameters' prior, plus `2 ln(prior std / posterior std)` for each reading that is given up (Laplace's approximation
+//! of the evidence, MacKay 1992, with a round figure), must fall by `MARGIN`.
 
 use crate::calib::bundle::estimate::Estimate;
 use crate::calib::bundle::failure_pattern::{FailurePattern, Readings};
@@ -31,8 +32,8 @@ const STILL_SIGMAS: f64 = 8.0;
 /// At most this many failures are looked for beyond those that the readings alone show.
 const MAX_FOUND: usize = 2;
 
-/// The failures that `views` show beside the `declared` ones, which come first and with what was found of them; `found` is the
-/// estimate under the declared ones alone.
+/// The failures that `views` show beside the `declared` ones, which come first and with what was found of them; `found`
+/// is the estimate under the declared ones alone.
 pub fn failures(robot: &Robot, views: &[View], declared: &[Failure], found: Option<&Estimate<'_>>) -> Vec<Failure> {
     let mut known = declared.to_vec();
     let shown = views.iter().filter(|view| !view.tags.is_empty()).count();

@@ -36,7 +36,8 @@ pub(crate) enum FailurePattern {
 /// An angle that is spread by less than this many of its own sigma, or than `LOCKED_RAD`, does not change.
 const LOCKED_SIGMAS: f64 = 3.0;
 const LOCKED_RAD: f64 = 0.2 * std::f64::consts::PI / 180.0;
-/// A sensor that says something follows the angle to this share of the angle's spread, with about the datasheet's slope.
+/// A sensor that says something follows the angle to this share of the angle's spread, with about the datasheet's
+/// slope.
 const FOLLOWS: f64 = 0.3;
 /// A step that lasts leaves this share of the squares that a straight line leaves.
 const STEP_LEAVES: f64 = 1.0 / 6.0;
@@ -187,7 +188,8 @@ impl Readings {
             }
             FailurePattern::Locked(SensorUse::Ignored) => {
                 format!(
-                    "the camera shows one angle in {n} views (within {shown:.2} deg); the sensor reads {read:.2} deg apart, or elsewhere"
+                    "the camera shows one angle in {n} views (within {shown:.2} deg); the sensor reads {read:.2} deg \
+                     apart, or elsewhere"
                 )
             }
             FailurePattern::Stuck => {
@@ -204,7 +206,8 @@ impl Readings {
                 let step = self.step_rad(before.len()).unwrap_or(0.0).to_degrees();
                 let after = n - before.len();
                 format!(
-                    "the sensor slipped by {step:.2} deg between {before} views and {after} views, the first of them pose {}",
+                    "the sensor slipped by {step:.2} deg between {before} views and {after} views, the first of them \
+                     pose {}",
                     pose(*since),
                     before = before.len()
                 )

@@ -1,8 +1,8 @@
 //! Joints whose sensor says nothing, in all views or in some: how they look to the estimator.
 //!
-//! A reading that says nothing is replaced by the angle that the tags show (found by search, so that the solver starts near), and
-//! the joint's error in that view gets a standard deviation that leaves it open ([`View::is_free`]). A locked joint is a sensor
-//! that always reads the same and whose offset nobody knows: one column for all views.
+//! A reading that says nothing is replaced by the angle that the tags show (found by search, so that the solver starts
+//! near), and the joint's error in that view gets a standard deviation that leaves it open ([`View::is_free`]). A
+//! locked joint is a sensor that always reads the same and whose offset nobody knows: one column for all views.
 
 use crate::calib::angles_by_camera::set_by_camera;
 use crate::calib::bundle::estimate::{Estimate, estimate};

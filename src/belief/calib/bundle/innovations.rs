@@ -1,9 +1,11 @@
-//! Views that were left out, by what was learnt from the others: the innovations, with the covariance that they should have.
+//! Views that were left out, by what was learnt from the others: the innovations, with the covariance that they should
+//! have.
 //!
-//! All left-out views of a fold at once: with the fold's normal equations `N` (its priors among them) and those of the left-out views
-//! `N_o y = r_o`, their own parameters eliminated, `chi2 = sum |r|^2 - own - r_o^T (N + N_o)^-1 r_o`: the innovations' squares under
-//! measurement noise, joint errors and the parameters' covariance together. With the camera of each view free, what is left is the
-//! noise within the views; the difference is chi-square with six numbers a view: how well cameras are foretold.
+//! All left-out views of a fold at once: with the fold's normal equations `N` (its priors among them) and those of the
+//! left-out views `N_o y = r_o`, their own parameters eliminated, `chi2 = sum |r|^2 - own - r_o^T (N + N_o)^-1 r_o`:
+//! the innovations' squares under measurement noise, joint errors and the parameters' covariance together. With the
+//! camera of each view free, what is left is the noise within the views; the difference is chi-square with six numbers
+//! a view: how well cameras are foretold.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Isometry3};
 
@@ -46,7 +48,8 @@ const FREE_CAMERA: f64 = 100.0;
 const TOLD: f64 = 0.3;
 
 impl Estimate<'_> {
-    /// Of `left_out`, views with their places among all; `outliers` of all views do not count. `None` if there is no factor.
+    /// Of `left_out`, views with their places among all; `outliers` of all views do not count. `None` if there is no
+    /// factor.
     #[must_use]
     pub fn innovations(
         &self,

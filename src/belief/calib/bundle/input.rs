@@ -16,8 +16,8 @@ pub struct BundleInput<'a> {
     pub scales: Hyperparameters,
     /// Where the search begins, and the reference of the terms.
     pub guess: JointParameters,
-    /// Of the joints' parameters, where there is more than the datasheet: mean and information (inverse covariance). Six rows more are
-    /// the camera mount's, about where `robot` has it.
+    /// Of the joints' parameters, where there is more than the datasheet: mean and information (inverse covariance).
+    /// Six rows more are the camera mount's, about where `robot` has it.
     pub joint_prior: Option<(DVector<f64>, DMatrix<f64>)>,
     pub evidence: HyperparameterMode,
 }

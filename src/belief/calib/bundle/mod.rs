@@ -1,8 +1,9 @@
 //! BUNDLE: maximum a posteriori over everything that the measurements depend on.
 //!
-//! `model` says what has a column and which sizes are not known; `problem` puts views and priors into form; `observation_term` linearizes one
-//! tag in one view, `linearize` sums the normal equations with the views' own parameters eliminated, `solve` is
-//! Levenberg-Marquardt; `evidence` fits noise and prior sizes, `select` decides on doubtful terms; `estimate` is the way from a robust start to the answer.
+//! `model` says what has a column and which sizes are not known; `problem` puts views and priors into form;
+//! `observation_term` linearizes one tag in one view, `linearize` sums the normal equations with the views' own
+//! parameters eliminated, `solve` is Levenberg-Marquardt; `evidence` fits noise and prior sizes, `select` decides on
+//! doubtful terms; `estimate` is the way from a robust start to the answer.
 
 pub(crate) mod calibration;
 mod calibration_prior;

@@ -41,12 +41,13 @@ pub struct Hyperparameters {
     /// Of positions and poses that a recording gives in place of corners.
     pub position_std_m: f64,
     pub rotation_std_rad: f64,
-    /// The error that all tags of a view share (positions by SLAM have it): translation m, rotation rad. `None`: there is none.
+    /// The error that all tags of a view share (positions by SLAM have it): translation m, rotation rad. `None`: there
+    /// is none.
     pub camera_error_std: Option<[f64; 2]>,
 }
 
-/// Correlation length of a sensor's nonlinearity, half ranges. Assumed: four waves over the range are then still half as likely
-/// as one.
+/// Correlation length of a sensor's nonlinearity, half ranges. Assumed: four waves over the range are then still half
+/// as likely as one.
 pub const SHAPE_LENGTH: f64 = 0.16;
 
 impl Hyperparameters {

@@ -1,9 +1,10 @@
 //! Which of the doubtful terms the data ask for, by Laplace's approximation of the evidence.
 //!
-//! `ln Z = -cost/2 + (ln|P| - ln|N|)/2 + sum over views (ln|L| - ln|S^T G S + L|)/2 - n ln(noise)` at the fitted scales: N the reduced
-//! normal matrix, P the common parameters' prior, L the views' own (MacKay 1992, eq. 4.4). A term comes in when it brings three
-//! nats or more (Kass and Raftery 1995: strong evidence). What a sensor of its kind is known to have (nonlinearity, temperature,
-//! play) is in from the start: its prior size is fitted, so that it costs nothing where there is none.
+//! `ln Z = -cost/2 + (ln|P| - ln|N|)/2 + sum over views (ln|L| - ln|S^T G S + L|)/2 - n ln(noise)` at the fitted
+//! scales: N the reduced normal matrix, P the common parameters' prior, L the views' own (MacKay 1992, eq. 4.4). A term
+//! comes in when it brings three nats or more (Kass and Raftery 1995: strong evidence). What a sensor of its kind is
+//! known to have (nonlinearity, temperature, play) is in from the start: its prior size is fitted, so that it costs
+//! nothing where there is none.
 
 use nalgebra::Cholesky;
 

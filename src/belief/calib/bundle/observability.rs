@@ -1,12 +1,14 @@
 //! What the data determine, before anything is solved.
 //!
-//! The normal equations at the robust start without the priors of joints, mount, gripper tag and clock; the tags' poses (about their
-//! survey) and the sensors' nonlinearity (a process of its prior's size) are eliminated with what the views have of their own. Scaled
-//! by the prior's sigmas, an eigenvalue below 1 is a direction that the prior tells more of than the data; the others count for the indices.
+//! The normal equations at the robust start without the priors of joints, mount, gripper tag and clock; the tags' poses
+//! (about their survey) and the sensors' nonlinearity (a process of its prior's size) are eliminated with what the
+//! views have of their own. Scaled by the prior's sigmas, an eigenvalue below 1 is a direction that the prior tells
+//! more of than the data; the others count for the indices.
 //!
-//! Indices of observability, of the singular values s_1 >= .. >= s_L of the scaled, whitened Jacobian (roots of those eigenvalues) and m
-//! views: O1 = (prod s)^(1/L) / sqrt(m) (Borm and Menq 1991), O2 = s_L / s_1 (Driels and Pathre 1990), O3 = s_L and
-//! O4 = s_L^2 / s_1 (Nahvi, Hollerbach and Hayward 1994; Nahvi and Hollerbach 1996), O5 = 1 / sum(1 / s) (Sun and Hollerbach 2008).
+//! Indices of observability, of the singular values s_1 >= .. >= s_L of the scaled, whitened Jacobian (roots of those
+//! eigenvalues) and m views: O1 = (prod s)^(1/L) / sqrt(m) (Borm and Menq 1991), O2 = s_L / s_1 (Driels and Pathre
+//! 1990), O3 = s_L and O4 = s_L^2 / s_1 (Nahvi, Hollerbach and Hayward 1994; Nahvi and Hollerbach 1996), O5 = 1 / sum(1
+//! / s) (Sun and Hollerbach 2008).
 
 use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
 
@@ -166,7 +168,8 @@ fn summarized(information: DMatrix<f64>, names: &[Name], n_views: usize) -> Obse
     }
 }
 
-/// Directions of the space that the columns of `space` span, each with as few parameters as elimination with the largest pivots leaves.
+/// Directions of the space that the columns of `space` span, each with as few parameters as elimination with the
+/// largest pivots leaves.
 fn in_words(space: &mut DMatrix<f64>, names: &[Name]) -> Vec<NullDirection> {
     let n = space.ncols();
     for k in 0..n {
@@ -187,8 +190,8 @@ fn in_words(space: &mut DMatrix<f64>, names: &[Name]) -> Vec<NullDirection> {
     all
 }
 
-/// What counts in a direction: what is large in units of its prior. An angle among the largest counts angles by themselves, too: a turn of
-/// a mount that is well known and an offset that is not move the camera alike.
+/// What counts in a direction: what is large in units of its prior. An angle among the largest counts angles by
+/// themselves, too: a turn of a mount that is well known and an offset that is not move the camera alike.
 fn spoken(direction: &DVector<f64>, names: &[Name]) -> NullDirection {
     let own = DVector::from_fn(names.len(), |k, _| direction[k] * names[k].sigma);
     let first = direction.iamax();

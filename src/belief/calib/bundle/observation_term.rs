@@ -1,8 +1,9 @@
 //! What one observation says of the camera's pose relative to the tag.
 //!
-//! With X = camera_from_tag, a point c of the tag is at p = X c. The camera's pose perturbed on the right by xi = (rho, omega) moves
-//! it by `dp = -rho - omega x p`; the tag's by xi_T does the same with the opposite sign and `xi = Ad(X) xi_T`. So one 6x6 matrix
-//! in the camera's frame carries all: `H = sum J^T W J`, `g = sum J^T W r`, J = d(prediction)/d(xi), r = measured - predicted.
+//! With X = camera_from_tag, a point c of the tag is at p = X c. The camera's pose perturbed on the right by xi = (rho,
+//! omega) moves it by `dp = -rho - omega x p`; the tag's by xi_T does the same with the opposite sign and `xi = Ad(X)
+//! xi_T`. So one 6x6 matrix in the camera's frame carries all: `H = sum J^T W J`, `g = sum J^T W r`, J =
+//! d(prediction)/d(xi), r = measured - predicted.
 
 use nalgebra::{Isometry3, Matrix2x3, Matrix6, SMatrix, SVector, Vector2, Vector3, Vector6};
 
@@ -49,8 +50,8 @@ pub(crate) fn unseen_chi2(seen: &WeightedMeasurement) -> f64 {
     seen.n_coordinates() as f64 * UNSEEN_SIGMAS * UNSEEN_SIGMAS
 }
 
-/// Inverse of the right Jacobian of SE(3), to the second order: `log(exp(d) exp(x)) = d + J x`. For deviations from a prior,
-/// which are small (Barfoot, eq. 7.83).
+/// Inverse of the right Jacobian of SE(3), to the second order: `log(exp(d) exp(x)) = d + J x`. For deviations from a
+/// prior, which are small (Barfoot, eq. 7.83).
 pub(crate) fn right_jacobian_inverse(d: &Vector6<f64>) -> Matrix6<f64> {
     let rho = skew(&Vector3::new(d[0], d[1], d[2]));
     let phi = skew(&Vector3::new(d[3], d[4], d[5]));
@@ -62,8 +63,8 @@ pub(crate) fn right_jacobian_inverse(d: &Vector6<f64>) -> Matrix6<f64> {
 }
 
 impl PoseInformation {
-    /// Linearizes; `noise` multiplies all standard deviations. Adds the lens's part to `by_lens` where that is wanted. `None`
-    /// where a corner is beyond the lens's view.
+    /// Linearizes; `noise` multiplies all standard deviations. Adds the lens's part to `by_lens` where that is wanted.
+    /// `None` where a corner is beyond the lens's view.
     pub(crate) fn of(
         seen: &WeightedMeasurement,
         camera_from_tag: &Isometry3<f64>,

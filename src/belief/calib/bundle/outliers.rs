@@ -1,4 +1,5 @@
-//! Tag observations that do not fit the rest: rejected by their chi-square between two solutions, and readmitted where they fit.
+//! Tag observations that do not fit the rest: rejected by their chi-square between two solutions, and readmitted where
+//! they fit.
 
 use crate::calib::bundle::problem::{BundleProblem, WeightedMeasurement};
 use crate::calib::bundle::solve::Solved;
@@ -13,7 +14,8 @@ pub struct Outlier {
     pub sigmas: f64,
 }
 
-/// An observation whose chi-square is this many times its number of coordinates belongs elsewhere; one below `READMIT` belongs here.
+/// An observation whose chi-square is this many times its number of coordinates belongs elsewhere; one below `READMIT`
+/// belongs here.
 const REJECT: f64 = 7.5;
 const READMIT: f64 = 5.0;
 

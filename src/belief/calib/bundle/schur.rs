@@ -172,7 +172,8 @@ impl SchurBlock {
         out
     }
 
-    /// `S^T sum H_i A`: own parameters by the common columns; multiplied by a step it is what the step adds to the gradient.
+    /// `S^T sum H_i A`: own parameters by the common columns; multiplied by a step it is what the step adds to the
+    /// gradient.
     pub(crate) fn own_by_columns(&self, problem: &BundleProblem<'_>, by_tag: &ByTag, view_idx: usize) -> DMatrix<f64> {
         let layout = &problem.layout;
         let mut out = DMatrix::zeros(N_VIEW_PARAMETERS, layout.n);

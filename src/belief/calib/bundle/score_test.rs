@@ -1,9 +1,10 @@
 //! Would another geometry explain the data better than joint sensors can?
 //!
-//! The score test (Rao 1948; the Lagrange multiplier test): each link's place and turn is a trial parameter z, zero in the model. With
-//! everything else at its optimum, `s = d(-cost/2)/dz` and z's information `I`, all other parameters eliminated under their priors,
-//! follow from the normal equations without another fit: `z = I^-1 s` is what the data ask for, `s^T I^-1 s` is chi-square under
-//! the model. Directions that the data tell less of than [`SIZE_M`] or [`SIZE_RAD`] do not count.
+//! The score test (Rao 1948; the Lagrange multiplier test): each link's place and turn is a trial parameter z, zero in
+//! the model. With everything else at its optimum, `s = d(-cost/2)/dz` and z's information `I`, all other parameters
+//! eliminated under their priors, follow from the normal equations without another fit: `z = I^-1 s` is what the data
+//! ask for, `s^T I^-1 s` is chi-square under the model. Directions that the data tell less of than [`SIZE_M`] or
+//! [`SIZE_RAD`] do not count.
 
 use nalgebra::{DMatrix, DVector, Matrix6, SMatrix, Vector3, Vector6};
 
@@ -20,7 +21,8 @@ use armcal_core::stats::chi_square_above;
 /// Size of an error of geometry that is worth a look: what the data cannot tell to that is not tested.
 const SIZE_M: f64 = 0.01;
 const SIZE_RAD: f64 = 0.0175;
-/// Trial columns: of each joint's place in its parent link three of translation, then three of rotation; then the mount's six.
+/// Trial columns: of each joint's place in its parent link three of translation, then three of rotation; then the
+/// mount's six.
 const N_TRIALS: usize = 6 * MAX_JOINTS + 6;
 const MOUNT: usize = 6 * MAX_JOINTS;
 

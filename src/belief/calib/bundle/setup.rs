@@ -76,7 +76,8 @@ impl BundleSetup {
         self.usable_prior().map_or(0.0, |prior| prior.elapsed_h)
     }
 
-    /// The views with the angles that were found where no sensor tells them; `parameters` without those of joints that have none.
+    /// The views with the angles that were found where no sensor tells them; `parameters` without those of joints that
+    /// have none.
     pub(crate) fn with_estimated_angles(&self, found: &Estimate<'_>, parameters: &JointParameters) -> Vec<View> {
         let sensors = parameters.sensors(&self.applied.robot);
         let mut views = self.applied.views.clone();

@@ -92,8 +92,8 @@ pub(crate) fn prior_table(
     }
 }
 
-/// The covariance with the camera mount's rows, so that a warm start knows it together with the joints; of the joints' parameters
-/// those that `kept` has.
+/// The covariance with the camera mount's rows, so that a warm start knows it together with the joints; of the joints'
+/// parameters those that `kept` has.
 pub(crate) fn covariance_with_mount(robot: &Robot, found: &Estimate<'_>, kept: &[String]) -> Option<CovarianceTable> {
     let full = with_mount_rows(found)?;
     let all = found.joint_parameters();

@@ -1,5 +1,5 @@
-//! Whether joint sensors explain the data of a calibration by `bundle`: score test of the link geometry, size of the sensors' errors,
-//! outliers, and innovations of held-out views.
+//! Whether joint sensors explain the data of a calibration by `bundle`: score test of the link geometry, size of the
+//! sensors' errors, outliers, and innovations of held-out views.
 
 use crate::calib::bundle::estimate::Estimate;
 use crate::calib::bundle::innovations::{Innovations, JointInnovation};
@@ -30,15 +30,19 @@ pub(crate) struct VerdictInput<'a> {
 
 /// Probability that a good arm fails any one check by chance.
 const FALSE_ALARM: f64 = 1e-4;
-/// Geometry that would move the tool by less than this, and by less than the predicted error, is no reason to refuse, m.
+/// Geometry that would move the tool by less than this, and by less than the predicted error, is no reason to refuse,
+/// m.
 const WORTH_M: f64 = 0.004;
-/// A joint's error from view to view over its datasheet's linearity: sensors do not have more, after what is smooth is taken off.
+/// A joint's error from view to view over its datasheet's linearity: sensors do not have more, after what is smooth is
+/// taken off.
 const MAX_OVER_LINEARITY: f64 = 3.0;
-/// Gains and offsets farther from the datasheet than this are no calibration any more; the paper's methods stop there, too.
+/// Gains and offsets farther from the datasheet than this are no calibration any more; the paper's methods stop there,
+/// too.
 const MAX_SIGMAS_OFF: f64 = 6.0;
 /// Share of the tag observations that may be outliers.
 const MAX_OUTLIERS: f64 = 0.25;
-/// Over chi-square's quantile, for pixel noise has longer tails than a normal one and the tags' corners common errors. Measured.
+/// Over chi-square's quantile, for pixel noise has longer tails than a normal one and the tags' corners common errors.
+/// Measured.
 const TAILS: f64 = 1.5;
 /// So many times that limit is refused: innovations then are about three times as large as they should be.
 const FAR_BEYOND: f64 = 4.0;
@@ -133,7 +137,8 @@ impl VerdictInput<'_> {
         refusal
     }
 
-    /// Gains and offsets beyond what a sensor of that datasheet can have: a joint that does not move, or another sensor.
+    /// Gains and offsets beyond what a sensor of that datasheet can have: a joint that does not move, or another
+    /// sensor.
     fn beyond_datasheet(&self, table: &mut VerdictTable) -> Option<Refusal> {
         let (robot, at) = (self.input.robot, self.found.parameters());
         let linear = self.found.joint_parameters().iter().filter(|p| p.prior_std(robot) > 0.0);
@@ -220,7 +225,8 @@ impl VerdictInput<'_> {
                 if !check.holds {
                     let name = &spec.joint;
                     table.warnings.push(format!(
-                        "{name}: errors of neighbouring views {along} are correlated ({sigmas:.1} sigmas): the model lacks a smooth effect"
+                        "{name}: errors of neighbouring views {along} are correlated ({sigmas:.1} sigmas): the model \
+                         lacks a smooth effect"
                     ));
                 }
                 table.checks.push(check);
@@ -315,8 +321,8 @@ fn worn(joint: &str, std_rad: f64) -> Finding {
     }
 }
 
-/// How many of its own standard deviations von Neumann's ratio lies below 2 (von Neumann 1941): positive where neighbours are alike.
-/// `None` below eight values.
+/// How many of its own standard deviations von Neumann's ratio lies below 2 (von Neumann 1941): positive where
+/// neighbours are alike. `None` below eight values.
 fn serial_sigmas(values: &[f64]) -> Option<f64> {
     const LEAST: usize = 8;
     let n = values.len() as f64;
@@ -325,7 +331,8 @@ fn serial_sigmas(values: &[f64]) -> Option<f64> {
     }
     let squares: f64 = values.iter().map(|v| v * v).sum();
     let steps: f64 = values.windows(2).map(|pair| (pair[1] - pair[0]).powi(2)).sum();
-    // About zero, not the mean: the model says that it is zero. E = 2 (n - 1) / n, var = 4 (n - 2) / n^2 for unit normal values, nearly.
+    // About zero, not the mean: the model says that it is zero. E = 2 (n - 1) / n, var = 4 (n - 2) / n^2 for unit
+    // normal values, nearly.
     let ratio = steps / squares;
     (squares > 0.0).then(|| (2.0 * (n - 1.0) / n - ratio) / (2.0 * (n - 2.0).sqrt() / n))
 }

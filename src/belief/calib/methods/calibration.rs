@@ -117,8 +117,8 @@ struct Solved {
     unobservable: Vec<Unobservable>,
 }
 
-/// The answer of a method on positions and its covariance. Takes out of `free` what the method cannot determine; `None` if nothing
-/// is left.
+/// The answer of a method on positions and its covariance. Takes out of `free` what the method cannot determine; `None`
+/// if nothing is left.
 fn solve(method: Method, problem: &PositionProblem<'_>, free: &mut Vec<Parameter>, start: &Start) -> Option<Solved> {
     let (guess, errors) = (&start.guess, &start.errors);
     let mut unobservable = Vec::new();

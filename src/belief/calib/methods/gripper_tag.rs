@@ -1,12 +1,12 @@
 //! What a tag on the gripper says: where the camera hangs, and the sensors of the joints between the two.
 //!
-//! `camera_from_tag = mount^-1 * W(theta) * tool_from_tag`, `W` the joints between camera and tag with
-//! `theta = center + gain * travel + offset`. From the tag's corner pixels in all views: the camera's mount, where the tag was glued,
-//! gain and offset of these joints, each about its prior (robot.toml), by Levenberg-Marquardt.
-//! Poses are perturbed on the right. A joint that turns through a wide angle parts the tag's own error, which turns with it, from
-//! the mount's, which does not; along the joint's axis the two stay together, and a turn of the mount about that axis looks like the
-//! joint's offset: there the covariance keeps the priors. The joints' nonlinearity is new at every view:
-//! `R = sigma^2 / n_frames * I + sum_j (d u / d theta_j) (d u / d theta_j)^T linearity_j^2` for the eight coordinates `u` of a view.
+//! `camera_from_tag = mount^-1 * W(theta) * tool_from_tag`, `W` the joints between camera and tag with `theta = center
+//! + gain * travel + offset`. From the tag's corner pixels in all views: the camera's mount, where the tag was glued,
+//! gain and offset of these joints, each about its prior (robot.toml), by Levenberg-Marquardt. Poses are perturbed on
+//! the right. A joint that turns through a wide angle parts the tag's own error, which turns with it, from the mount's,
+//! which does not; along the joint's axis the two stay together, and a turn of the mount about that axis looks like the
+//! joint's offset: there the covariance keeps the priors. The joints' nonlinearity is new at every view: `R = sigma^2 /
+//! n_frames * I + sum_j (d u / d theta_j) (d u / d theta_j)^T linearity_j^2` for the eight coordinates `u` of a view.
 
 use std::ops::Range;
 
@@ -43,8 +43,8 @@ const MAX_PRIOR_SIGMAS: f64 = 6.0;
 const MIN_STD: f64 = 1e-9;
 const DAMPING: Damping =
     Damping { first: 0.0, min: 0.0, max: f64::INFINITY, down: 0.1, up: 10.0, min_after_rejection: 1.0 };
-/// A step this small in units of the priors' sigma changes nothing. The views' weights change a little with the state: the cost may
-/// grow by a share without a step being wrong.
+/// A step this small in units of the priors' sigma changes nothing. The views' weights change a little with the state:
+/// the cost may grow by a share without a step being wrong.
 const STOP: StopRule = StopRule { step_length: 1e-5, slack: 1e-3, ..StopRule::after(50) };
 
 /// Solves for mount and joints; an error says why the tag is left out.
@@ -162,7 +162,8 @@ impl LeastSquares for Search<'_, '_> {
     }
 }
 
-/// One view's eight coordinates: measured less predicted, their Jacobian, and by each joint's angle (last `joints` columns).
+/// One view's eight coordinates: measured less predicted, their Jacobian, and by each joint's angle (last `joints`
+/// columns).
 struct Linearized {
     residual_px: SVector<f64, 8>,
     /// Mount, then tag.
@@ -293,7 +294,8 @@ impl Problem<'_> {
             let (pixel, by_point) = robot.camera.lens.project_with_jacobian(&in_camera)?;
             let residual = Vector2::from(seen.corners_px[k]) - pixel;
             view.residual_px.fixed_rows_mut::<2>(2 * k).copy_from(&residual);
-            // Of mount * exp(xi): -translation + point x rotation. Of tag * exp(xi): R (translation - corner x rotation).
+            // Of mount * exp(xi): -translation + point x rotation. Of tag * exp(xi): R (translation - corner x
+            // rotation).
             let blocks = [-Matrix3::identity(), skew(&in_camera), rotation, -rotation * skew(&corner.coords)];
             for (n, block) in blocks.iter().enumerate() {
                 view.by_poses.fixed_view_mut::<2, 3>(2 * k, 3 * n).copy_from(&(by_point * block));
@@ -313,7 +315,8 @@ impl Problem<'_> {
             let sigmas = rows.map(|row| (off[row] / std[row]).abs()).fold(0.0, f64::max);
             if sigmas > MAX_PRIOR_SIGMAS {
                 return Err(format!(
-                    "by the tag on the gripper the {what} is {sigmas:.0} sigma from where robot.toml has it: knocked, or another tag"
+                    "by the tag on the gripper the {what} is {sigmas:.0} sigma from where robot.toml has it: knocked, \
+                     or another tag"
                 ));
             }
         }

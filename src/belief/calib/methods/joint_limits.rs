@@ -1,8 +1,10 @@
-//! Joint limits: a joint's sensor from its readings at its nominal end stops (Williams 1991, which the paper starts from).
+//! Joint limits: a joint's sensor from its readings at its nominal end stops (Williams 1991, which the paper starts
+//! from).
 //!
-//! `angle = center + gain travel + offset` (the paper's equation 1 about the middle of the range) through two stops or more: the
-//! straight line of least squares. Cost: sum of squared differences between nominal and fitted angle, rad^2. It needs no
-//! camera, and knows nothing but what the drawing says of the stops; where the vehicle is in the way of one there is none.
+//! `angle = center + gain travel + offset` (the paper's equation 1 about the middle of the range) through two stops or
+//! more: the straight line of least squares. Cost: sum of squared differences between nominal and fitted angle, rad^2.
+//! It needs no camera, and knows nothing but what the drawing says of the stops; where the vehicle is in the way of one
+//! there is none.
 
 use nalgebra::{DMatrix, Matrix2, Vector2};
 

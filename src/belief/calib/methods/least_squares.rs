@@ -1,6 +1,8 @@
-//! Least squares on landmark positions: what isotropic Gaussian noise asks for, and the reference for the paper's methods.
+//! Least squares on landmark positions: what isotropic Gaussian noise asks for, and the reference for the paper's
+//! methods.
 //!
-//! Levenberg-Marquardt in prior-scaled parameters (no prior enters), with the analytic Jacobians of [`PositionProblem`].
+//! Levenberg-Marquardt in prior-scaled parameters (no prior enters), with the analytic Jacobians of
+//! [`PositionProblem`].
 
 use nalgebra::{DMatrix, DVector};
 
@@ -104,8 +106,9 @@ impl LeastSquares for Descent<'_> {
     }
 }
 
-/// Fisher information of landmark positions with isotropic Gaussian noise of `position_std_m` per axis, at `at`, by `free` in
-/// their own units: `J^T J / sigma^2`. Its inverse bounds the covariance of every unbiased estimator (Cramer and Rao).
+/// Fisher information of landmark positions with isotropic Gaussian noise of `position_std_m` per axis, at `at`, by
+/// `free` in their own units: `J^T J / sigma^2`. Its inverse bounds the covariance of every unbiased estimator (Cramer
+/// and Rao).
 #[must_use]
 pub fn fisher_information(
     problem: &PositionProblem<'_>,

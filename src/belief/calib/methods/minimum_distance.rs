@@ -1,4 +1,5 @@
-//! The paper's proposed method: least sum of distances between seen and surveyed landmarks, over all landmarks, by BOBYQA.
+//! The paper's proposed method: least sum of distances between seen and surveyed landmarks, over all landmarks, by
+//! BOBYQA.
 
 use crate::calib::methods::position_problem::PositionProblem;
 use crate::calib::methods::{PositionMethod, SearchOptions, Solution};

@@ -1,10 +1,10 @@
 //! The paper's first method, after Kim et al. (2010): the same landmark, seen from many poses, must lie in one place.
 //!
-//! Objective: `sum_j tr(C_j)`, `C_j` the covariance (divisor m - 1) of the m positions of landmark j in the base frame, over the
-//! landmarks seen at least twice. No map is needed, and so the objective knows nothing of what turns all positions together:
-//! an offset of the first joint turns them about its axis and changes no distance between any two of them. That is no weak
-//! direction but an exact freedom of gauge, which noise has nothing to do with. The offset is held, and so is everything
-//! else that the views leave without any effect.
+//! Objective: `sum_j tr(C_j)`, `C_j` the covariance (divisor m - 1) of the m positions of landmark j in the base frame,
+//! over the landmarks seen at least twice. No map is needed, and so the objective knows nothing of what turns all
+//! positions together: an offset of the first joint turns them about its axis and changes no distance between any two
+//! of them. That is no weak direction but an exact freedom of gauge, which noise has nothing to do with. The offset is
+//! held, and so is everything else that the views leave without any effect.
 
 use nalgebra::{Const, DMatrix, DVector, Dyn, OMatrix, Vector3};
 
@@ -155,8 +155,8 @@ pub fn determined_by_variance(
         .copied()
         .filter(is_first_offset)
         .map(|parameter| {
-            let reason = "minimum variance is exactly blind to it: it turns every position about the first axis alike. Held; \
-                          only the place of a base tag determines it";
+            let reason = "minimum variance is exactly blind to it: it turns every position about the first axis \
+                          alike. Held; only the place of a base tag determines it";
             Unobservable { parameter, reason: reason.to_owned() }
         })
         .collect();
@@ -189,9 +189,9 @@ fn largest_in_null_space(problem: &PositionProblem<'_>, free: &[Parameter], gues
     (share > PART_OF_NULL).then_some(worst)
 }
 
-/// Covariance of what minimum variance determined, as the sandwich `A^-1 B A^-1` over views, and d(parameter)/d(mount), six
-/// columns; see [`ParameterCovariance::estimate`], whose objective is the other. The landmarks' means are eliminated, so that
-/// no survey enters; the mount's error does. What is held keeps its prior.
+/// Covariance of what minimum variance determined, as the sandwich `A^-1 B A^-1` over views, and d(parameter)/d(mount),
+/// six columns; see [`ParameterCovariance::estimate`], whose objective is the other. The landmarks' means are
+/// eliminated, so that no survey enters; the mount's error does. What is held keeps its prior.
 #[must_use]
 pub fn variance_covariance(
     problem: &PositionProblem<'_>,

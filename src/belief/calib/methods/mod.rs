@@ -1,8 +1,9 @@
 //! The methods that the paper names, on one interface: positions of landmarks in, gain and offset of each joint out.
 //!
-//! `minimum_distance` and `minimum_variance` are the paper's equations, `search` how both are minimized: BOBYQA in a box, from
-//! one start or several. `least_squares` is the reference that Gaussian noise asks for. `joint_limits` needs no camera: the
-//! nominal end stops of each joint against its readings there. The interface is [`PositionMethod::solve`].
+//! `minimum_distance` and `minimum_variance` are the paper's equations, `search` how both are minimized: BOBYQA in a
+//! box, from one start or several. `least_squares` is the reference that Gaussian noise asks for. `joint_limits` needs
+//! no camera: the nominal end stops of each joint against its readings there. The interface is
+//! [`PositionMethod::solve`].
 
 pub(crate) mod calibration;
 pub(crate) mod end_stops;
@@ -35,8 +36,8 @@ pub struct Solution {
     pub parameters: JointParameters,
     pub outcome: Outcome,
     pub evaluations: usize,
-    /// The method's objective at the first guess and at the end, in its own unit: m for minimum distance, m^2 for minimum
-    /// variance and least squares, rad^2 for joint limits.
+    /// The method's objective at the first guess and at the end, in its own unit: m for minimum distance, m^2 for
+    /// minimum variance and least squares, rad^2 for joint limits.
     pub cost_initial: f64,
     pub cost_final: f64,
 }

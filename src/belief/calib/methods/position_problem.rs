@@ -168,7 +168,8 @@ impl<'a> PositionProblem<'a> {
         (residuals, jacobian)
     }
 
-    /// d(residual)/d(parameter): a joint turns everything behind it, `axis x (point - origin)` times d(angle)/d(parameter).
+    /// d(residual)/d(parameter): a joint turns everything behind it, `axis x (point - origin)` times
+    /// d(angle)/d(parameter).
     pub(crate) fn derivative(&self, o: &TagResidual<'_>, parameter: Parameter) -> Vector3<f64> {
         if parameter.joint >= self.robot.camera.mount.n_joints {
             return Vector3::zeros();

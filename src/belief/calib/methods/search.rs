@@ -1,8 +1,8 @@
 //! BOBYQA in a box about the datasheet: Powell (2009), port of PRIMA.
 //!
-//! Parameters are rescaled by their initial uncertainty (the paper's preconditioning), so that all need steps of about one;
-//! bounds keep them within what a sensor of that datasheet can be. Without it the search runs on the numbers of the paper's
-//! equation 1, `theta = k1 eta + k2`, as they are: rad per count and rad.
+//! Parameters are rescaled by their initial uncertainty (the paper's preconditioning), so that all need steps of about
+//! one; bounds keep them within what a sensor of that datasheet can be. Without it the search runs on the numbers of
+//! the paper's equation 1, `theta = k1 eta + k2`, as they are: rad per count and rad.
 
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -24,8 +24,8 @@ const ON_BOUND: f64 = 0.999;
 pub enum Scaling {
     /// Preconditioned: every parameter in units of its prior sigma.
     PriorSigma,
-    /// `k1` in rad per count and `k2` in rad, the angle where the signed reading is zero. Radii of the trust region are in units
-    /// of the narrowest sigma, for no larger one fits into the box.
+    /// `k1` in rad per count and `k2` in rad, the angle where the signed reading is zero. Radii of the trust region are
+    /// in units of the narrowest sigma, for no larger one fits into the box.
     Raw,
 }
 
@@ -69,8 +69,8 @@ impl Default for SearchOptions {
 }
 
 impl SearchOptions {
-    /// What the paper's authors set, as far as a box allows: rho to 1e-6, n + 2 points, 10 000 evaluations. Their first radius
-    /// of 10 sigma is wider than the box; the largest that fits is 6.
+    /// What the paper's authors set, as far as a box allows: rho to 1e-6, n + 2 points, 10 000 evaluations. Their first
+    /// radius of 10 sigma is wider than the box; the largest that fits is 6.
     #[must_use]
     pub fn of_the_paper() -> Self {
         Self { rho_begin: BOUND_SIGMAS, rho_end: 1e-6, interpolation: Interpolation::AndTwo, ..Self::default() }

@@ -186,8 +186,8 @@ fn minimum_variance_is_exactly_blind_to_the_first_offset_and_to_nothing_else() {
     }
 }
 
-/// One joint that never moved: its gain is as good as an offset, and of the two one is left; the camera's one view of a landmark
-/// says nothing at all.
+/// One joint that never moved: its gain is as good as an offset, and of the two one is left; the camera's one view of a
+/// landmark says nothing at all.
 #[test]
 fn what_the_views_leave_without_effect_is_held_and_named() {
     let robot = titan();

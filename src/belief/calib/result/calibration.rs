@@ -26,8 +26,8 @@ pub enum Status {
 
 /// One calibration, as its file has it.
 ///
-/// `angle_rad = center_rad + offset_rad + gain_rad_per_count * travel_counts`, where `travel_counts` is the reading less
-/// the datasheet's reading at `center_rad`, wrapped to half a word either way.
+/// `angle_rad = center_rad + offset_rad + gain_rad_per_count * travel_counts`, where `travel_counts` is the reading
+/// less the datasheet's reading at `center_rad`, wrapped to half a word either way.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Calibration {
@@ -40,7 +40,8 @@ pub struct Calibration {
     pub refusal: Option<String>,
     /// Hash of the recorded messages that this rests on (blake3).
     pub messages_hash: String,
-    /// Hash of the covariance in the file beside; absent before the calibration was written, and in files of before there was one.
+    /// Hash of the covariance in the file beside; absent before the calibration was written, and in files of before
+    /// there was one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub covariance_hash: Option<String>,
     /// What the data did not determine, and why; these keep the datasheet's values.
@@ -126,8 +127,8 @@ pub struct JointResult {
     /// The gain over the datasheet's; negative where the counts run the other way.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gain_over_datasheet: Option<f64>,
-    /// Counts per radian over the datasheet's, where they were measured first because nobody knew them; the gain's relative
-    /// standard deviation in `covariance` is about that scale.
+    /// Counts per radian over the datasheet's, where they were measured first because nobody knew them; the gain's
+    /// relative standard deviation in `covariance` is about that scale.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub identified_ratio: Option<f64>,
     /// One sigma of what the parameters leave of the sensor's error; absent where that is the datasheet's linearity.

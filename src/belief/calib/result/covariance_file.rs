@@ -17,9 +17,9 @@ const FULL_DIGITS_ROWS: usize = 24;
 const CALIBRATION_HASH: &str = "calibration_hash";
 
 const HEAD: &str = "\
-# Covariance of the parameters that the calibration beside this file estimated: row i of lower_triangle has columns 0 .. i.
-# Gains are relative (1 is the datasheet's, or the identified scale's), offsets in rad, terms in the units of their keys,
-# the camera mount in m and rad.
+# Covariance of the parameters that the calibration beside this file estimated; row i of lower_triangle has columns
+# 0 .. i. Gains are relative (1 is the datasheet's, or the identified scale's), offsets in rad, terms in the units of
+# their keys, the camera mount in m and rad.
 ";
 
 /// Estimated parameters by [`Parameter::name`](crate::calib::Parameter::name): gains relative, offsets in rad, ... and

@@ -44,7 +44,8 @@ pub struct FailedJointTable {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PriorTable {
-    /// Whether prior and views can both be right. Where they cannot, a script's recalibration rests on the new views alone.
+    /// Whether prior and views can both be right. Where they cannot, a script's recalibration rests on the new views
+    /// alone.
     pub agrees: bool,
     /// Whether the result rests on it.
     pub used: bool,

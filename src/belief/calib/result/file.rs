@@ -35,10 +35,12 @@ impl JointResult {
 const LEAST_SLOPE: f64 = 0.2;
 
 const TERMS_HEAD: &str = "\
-# With [joint.terms], in rad, x = travel / (counts per rad) / half_range_rad held to -1 .. 1, L = 1.25, T K, P MPa and t hours from
-# [reference], a = -1 or 1 the way that the joint moved last (0: not known), the angle has beyond that
-# sum_h nonlinearity_rad[h] phi_h(x) + offset_rad_per_k T + gain_per_k T travel / (counts per rad) + offset_rad_per_mpa P + drift_rad_per_h t
-# + half_backlash_rad a, with phi_h(x) = sin(pi h (x + L) / 2 L) / sqrt(L), h = 1, 2, ..
+# With [joint.terms], in rad, the angle has beyond that
+#   sum_h nonlinearity_rad[h] phi_h(x) + offset_rad_per_k T + gain_per_k T travel / (counts per rad)
+#   + offset_rad_per_mpa P + drift_rad_per_h t + half_backlash_rad a
+# with phi_h(x) = sin(pi h (x + L) / 2 L) / sqrt(L), h = 1, 2, .., L = 1.25, x = travel / (counts per rad) /
+# half_range_rad held to -1 .. 1; T K, P MPa and t hours from [reference], a = -1 or 1 the way that the joint moved
+# last (0: not known).
 ";
 
 impl Calibration {
@@ -77,8 +79,8 @@ impl Calibration {
         Ok(sensors)
     }
 
-    /// `robot` with the sensor scales that were measured on the way, which the covariance's gains are relative to, and with
-    /// sensors as far from straight as the residuals say.
+    /// `robot` with the sensor scales that were measured on the way, which the covariance's gains are relative to, and
+    /// with sensors as far from straight as the residuals say.
     #[must_use]
     pub fn scaled_robot(&self, robot: &Robot) -> Robot {
         let mut scaled = robot.clone().with_linearity(self.fit.linearity_scale);
@@ -153,7 +155,8 @@ impl Calibration {
     /// Reads a calibration file and the covariance beside it.
     ///
     /// # Errors
-    /// [`CalibrationFileError`] naming file, key and allowed range; a covariance that is missing or another calibration's.
+    /// [`CalibrationFileError`] naming file, key and allowed range; a covariance that is missing or another
+    /// calibration's.
     pub fn read(file: &Path) -> Result<Self, CalibrationFileError> {
         let text = read_text(file)?;
         let mut calibration = Self::parse(file, &text)?;
@@ -163,8 +166,8 @@ impl Calibration {
         Ok(calibration)
     }
 
-    /// Reads the text of a calibration file alone, for what needs no covariance: that of the result is empty, unless an older
-    /// file has it inside. `file` is for messages.
+    /// Reads the text of a calibration file alone, for what needs no covariance: that of the result is empty, unless an
+    /// older file has it inside. `file` is for messages.
     ///
     /// # Errors
     /// [`CalibrationFileError`] naming file, key and allowed range.

@@ -12,15 +12,18 @@ pub enum CalibrationFileError {
     #[error("{file}: is for robot `{found}` with joints {found_joints:?}, not for `{expected}`")]
     OtherRobot { file: String, found: String, found_joints: Vec<String>, expected: String },
     #[error(
-        "{file}: joint `{joint}`: terms.nonlinearity_rad bends the sensor to {least:.2} .. {most:.2} times its gain, so that readings have no \
-         certain angle; allowed is 0.2 .. 1.8"
+        "{file}: joint `{joint}`: terms.nonlinearity_rad bends the sensor to {least:.2} .. {most:.2} times its gain, \
+         so that readings have no certain angle; allowed is 0.2 .. 1.8"
     )]
     Bent { file: String, joint: String, least: f64, most: f64 },
-    #[error("{}: is missing: it is the covariance of {}, without which that is no prior; put it beside it", file.display(), calibration.display())]
+    #[error(
+        "{}: is missing: it is the covariance of {}, without which that is no prior; put it beside it",
+        file.display(), calibration.display()
+    )]
     NoCovariance { file: PathBuf, calibration: PathBuf },
     #[error(
-        "{}: is the covariance of another calibration than {} (or one of them was edited); put the two files of one calibration \
-         beside each other", file.display(), calibration.display()
+        "{}: is the covariance of another calibration than {} (or one of them was edited); put the two files of one \
+         calibration beside each other", file.display(), calibration.display()
     )]
     ForeignCovariance { file: PathBuf, calibration: PathBuf },
 }

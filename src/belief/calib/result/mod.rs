@@ -1,8 +1,8 @@
 //! The answer: calibration.toml, its tables and its short form.
 //!
-//! `calibration` is the file's content, `assemble` fills it; the other files are its tables. `file` reads and writes it, `covariance_file` the
-//! covariance beside it, `compact` is
-//! one line of less than 512 bytes, `lookup` a table from counts to radians.
+//! `calibration` is the file's content, `assemble` fills it; the other files are its tables. `file` reads and writes
+//! it, `covariance_file` the covariance beside it, `compact` is one line of less than 512 bytes, `lookup` a table from
+//! counts to radians.
 
 pub(crate) mod assemble;
 #[cfg(test)]

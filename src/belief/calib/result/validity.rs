@@ -9,8 +9,9 @@ use armcal_core::streams::JointAngles;
 const MARGIN_RAD: f64 = 0.05;
 
 impl Calibration {
-    /// In words, what `angles` (of as many joints as there are, base first) under `conditions` have beyond what the calibration saw;
-    /// nothing where all is within it. Joints of which nothing was estimated have no range, and what is unknown is not beyond.
+    /// In words, what `angles` (of as many joints as there are, base first) under `conditions` have beyond what the
+    /// calibration saw; nothing where all is within it. Joints of which nothing was estimated have no range, and what
+    /// is unknown is not beyond.
     #[must_use]
     pub fn beyond(&self, angles: &JointAngles, conditions: &Conditions) -> Vec<String> {
         let joints = self.joint.iter().zip(angles.iter()).filter(|(j, _)| j.gain_estimated || j.offset_estimated);
@@ -38,7 +39,8 @@ impl Calibration {
     }
 }
 
-/// Joint by joint, how many of a task's postures go how far beyond what the views covered; nothing where all are within it.
+/// Joint by joint, how many of a task's postures go how far beyond what the views covered; nothing where all are within
+/// it.
 pub(crate) fn not_covered(calibration: &Calibration, postures: &[JointAngles]) -> Vec<String> {
     let joints = calibration.joint.iter().enumerate().filter(|(_, j)| j.gain_estimated || j.offset_estimated);
     let of_joint = |(joint, result): (usize, &JointResult)| {

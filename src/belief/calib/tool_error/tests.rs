@@ -158,7 +158,8 @@ fn residuals_play_and_drift_add_what_they_are() {
     );
 }
 
-/// Where nothing was seen the prior of the shape speaks. At the ends of the range it is narrower: the functions vanish beyond.
+/// Where nothing was seen the prior of the shape speaks. At the ends of the range it is narrower: the functions vanish
+/// beyond.
 #[test]
 fn a_shape_that_nothing_determined_is_as_wide_as_its_prior() {
     let robot = titan();

@@ -1,7 +1,8 @@
 //! From messages to views: which readings and which corners belong to one arm at rest.
 //!
-//! A capture mark gives the span by the joint sensors' clock. Readings in it are averaged as travel (never as raw words, which wrap),
-//! corners of one tag over the frames in it. The arm is at rest there, so that a camera clock some ten milliseconds late changes nothing.
+//! A capture mark gives the span by the joint sensors' clock. Readings in it are averaged as travel (never as raw
+//! words, which wrap), corners of one tag over the frames in it. The arm is at rest there, so that a camera clock some
+//! ten milliseconds late changes nothing.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;

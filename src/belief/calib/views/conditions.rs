@@ -1,7 +1,8 @@
-//! What surrounds a standing arm in a recording: how warm its oil is, how deep it is, and which way each joint came from.
+//! What surrounds a standing arm in a recording: how warm its oil is, how deep it is, and which way each joint came
+//! from.
 //!
-//! Thermometers and the depth gauge speak once in a while; a reading inside of a span counts as the span's, else the line
-//! between the nearest before and after it. All is found by the messages' own stamps.
+//! Thermometers and the depth gauge speak once in a while; a reading inside of a span counts as the span's, else the
+//! line between the nearest before and after it. All is found by the messages' own stamps.
 
 use crate::calib::views::message_index::MessageIndex;
 use armcal_core::log::Recording;
@@ -43,8 +44,8 @@ impl ConditionHistory {
         Self::heard_until(recording, Stamp { nanos: i64::MAX })
     }
 
-    /// What was measured and recorded by `until`: all that a calibration at that time could know, so that the finished recording gives
-    /// the same result as the one that was still growing.
+    /// What was measured and recorded by `until`: all that a calibration at that time could know, so that the finished
+    /// recording gives the same result as the one that was still growing.
     #[must_use]
     pub fn heard_until(recording: &Recording, until: Stamp) -> Self {
         let mut found = Self::default();
@@ -161,8 +162,9 @@ fn apart_rad(spec: &JointSensorSpec, a: f64, b: f64) -> f64 {
 }
 
 impl MessageIndex<'_> {
-    /// The way that each joint came to where it rests over `mark`, at the mean travel `rest_rad`: by the last readings before the
-    /// mark that are clearly elsewhere. -1 or 1, 0 where it has not moved for long. Appends the messages that decided it.
+    /// The way that each joint came to where it rests over `mark`, at the mean travel `rest_rad`: by the last readings
+    /// before the mark that are clearly elsewhere. -1 or 1, 0 where it has not moved for long. Appends the messages
+    /// that decided it.
     pub(crate) fn approach(
         &self,
         mark: &Mark,

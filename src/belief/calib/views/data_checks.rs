@@ -17,10 +17,12 @@ pub(crate) fn check_joints(recording: &Recording, robot: &Robot) -> Result<(), C
     Ok(())
 }
 
-/// The largest share of messages with numbers that are not finite. Assumed: a sensor that fails now and then still serves.
+/// The largest share of messages with numbers that are not finite. Assumed: a sensor that fails now and then still
+/// serves.
 const MAX_NOT_FINITE_SHARE: f64 = 0.01;
 
-/// Stamps that go backwards leave open which reading belongs to which view, and numbers that are none which sensor works.
+/// Stamps that go backwards leave open which reading belongs to which view, and numbers that are none which sensor
+/// works.
 pub(crate) fn check_order(recording: &Recording) -> Result<(), CalibError> {
     let streams = [topics::Stream::JointSensors, topics::Stream::Detections];
     for stream in streams {

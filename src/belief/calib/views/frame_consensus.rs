@@ -1,7 +1,8 @@
 //! Frames of one view that agree about a tag.
 //!
-//! The arm stands still, so a tag's corners stay where they are but for noise. A detector that reads one id wrongly in one frame
-//! puts another tag's corners under this id: the mean of all frames would be off by a share of the distance between the two tags.
+//! The arm stands still, so a tag's corners stay where they are but for noise. A detector that reads one id wrongly in
+//! one frame puts another tag's corners under this id: the mean of all frames would be off by a share of the distance
+//! between the two tags.
 
 use crate::calib::views::view::MeanCorners;
 
@@ -12,13 +13,14 @@ type Corners = [[f64; 2]; 4];
 const CLOSE_SIGMAS: f64 = 10.0;
 /// The same in units of the usual distance between one frame and the next nearest, where that is more.
 const USUAL_DISTANCES: f64 = 6.0;
-/// However noisy the corners are: farther apart than this many sigma is elsewhere. Tags do not stand that close to each other.
+/// However noisy the corners are: farther apart than this many sigma is elsewhere. Tags do not stand that close to each
+/// other.
 const ELSEWHERE_SIGMAS: f64 = 100.0;
 
 /// The mean over the frames that agree, and how many do not; no mean where fewer than half of them do.
 ///
-/// Frames agree that lie within a gate of one of them, in every coordinate; the largest such set counts. Where all frames lie
-/// within ten sigma (`corner_std_px`, per coordinate) of each other nothing is left out.
+/// Frames agree that lie within a gate of one of them, in every coordinate; the largest such set counts. Where all
+/// frames lie within ten sigma (`corner_std_px`, per coordinate) of each other nothing is left out.
 pub(crate) fn agreeing_mean(frames: &[Corners], corner_std_px: f64) -> (Option<MeanCorners>, usize) {
     if spread_px(frames) <= CLOSE_SIGMAS * corner_std_px {
         return (mean(frames.iter()), 0);

@@ -1,8 +1,9 @@
 //! From messages to views of an arm at rest.
 //!
-//! `association` finds the readings and corners of each captured view, `frame_consensus` the frames of it that agree, `conditions` the
-//! temperatures and the pressure under which it was captured. `external` does the same for recordings that mark no views, `pooling` for
-//! several recordings. `scale_identification` measures the scale of an unknown sensor; `data_checks` refuses unusable recordings.
+//! `association` finds the readings and corners of each captured view, `frame_consensus` the frames of it that agree,
+//! `conditions` the temperatures and the pressure under which it was captured. `external` does the same for recordings
+//! that mark no views, `pooling` for several recordings. `scale_identification` measures the scale of an unknown
+//! sensor; `data_checks` refuses unusable recordings.
 
 pub(crate) mod association;
 pub(crate) mod calibration_data;

@@ -15,8 +15,8 @@ use armcal_core::time::Stamp;
 /// Poses of one recording are numbered below this.
 const POSES_PER_RECORDING: u32 = 1_000_000;
 
-/// Makes the captured views of all recordings ready, whatever calibrations they mark; `survey` instead of what they say of the tags,
-/// `task` where none of them names one. The order of the recordings does not matter.
+/// Makes the captured views of all recordings ready, whatever calibrations they mark; `survey` instead of what they say
+/// of the tags, `task` where none of them names one. The order of the recordings does not matter.
 ///
 /// # Errors
 /// [`CalibError`]: other joints, stamps that go backwards, nothing captured, one recording twice, different surveys.

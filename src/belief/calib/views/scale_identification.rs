@@ -1,9 +1,9 @@
 //! The scale of a sensor of which nobody knows how many counts a radian has, nor which way they run.
 //!
 //! One joint moves a little while the others stand still. Between two such views the camera turns by the joint's own
-//! rotation, whatever the other joints' errors are: `R_0^T R_v = exp(axis * (theta_v - theta_0))` with the axis fixed in
-//! the camera. Each view's camera pose comes from all its tags' corners; the turn's common axis is the principal one of the
-//! rotation vectors, its direction the drawing's; the slope of the turn against the readings is the gain.
+//! rotation, whatever the other joints' errors are: `R_0^T R_v = exp(axis * (theta_v - theta_0))` with the axis fixed
+//! in the camera. Each view's camera pose comes from all its tags' corners; the turn's common axis is the principal one
+//! of the rotation vectors, its direction the drawing's; the slope of the turn against the readings is the gain.
 
 use nalgebra::{DVector, Isometry3, Matrix3, Matrix6, SMatrix, Vector2, Vector3, Vector6};
 

@@ -54,7 +54,8 @@ impl View {
 pub struct MeanCorners {
     pub corners_px: [[f64; 2]; 4],
     pub n_frames: usize,
-    /// Sum over frames and the eight coordinates of the squared deviation from the mean; it has `8 (n_frames - 1)` degrees of freedom.
+    /// Sum over frames and the eight coordinates of the squared deviation from the mean; it has `8 (n_frames - 1)`
+    /// degrees of freedom.
     pub scatter_px2: f64,
 }
 
@@ -149,7 +150,8 @@ pub struct CaptureData {
     pub pressure_pa: Option<(f64, f64)>,
     /// Indices of the recording's messages that were used, ascending.
     pub used: Vec<usize>,
-    /// Those beyond them that only sensors with terms rest on: thermometers near the views, readings before them. Ascending.
+    /// Those beyond them that only sensors with terms rest on: thermometers near the views, readings before them.
+    /// Ascending.
     pub used_for_terms: Vec<usize>,
 }
 

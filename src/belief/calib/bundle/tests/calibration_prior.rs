@@ -136,7 +136,8 @@ fn an_honest_prior_has_its_chi_square_and_is_not_refused() {
     }
     let mean = share.iter().sum::<f64>() / SEEDS as f64;
     eprintln!("chi-square over its degrees of freedom: {mean:.3}; {refused} of {SEEDS} refused");
-    // The survey's errors are the same both times, which makes the two agree a little better than two independent looks.
+    // The survey's errors are the same both times, which makes the two agree a little better than two independent
+    // looks.
     assert!((0.75..1.15).contains(&mean), "chi-square over its degrees of freedom: {mean:.3}");
     assert!(refused <= 1, "{refused} of {SEEDS} refused");
 }

@@ -97,7 +97,8 @@ fn check(kind: FailedKind, seeds: std::ops::Range<u64>, break_it: impl Fn(&mut C
         let mut case = case(seed, (kind == FailedKind::Locked).then_some(joint));
         let expected = break_it(&mut case, joint, seed);
         let failures = found_failures(&case, &[]);
-        // A gain near zero imitates a locked joint; the verdict then refuses it, for no sensor is so far from its datasheet.
+        // A gain near zero imitates a locked joint; the verdict then refuses it, for no sensor is so far from its
+        // datasheet.
         if kind == FailedKind::Locked && failures.is_empty() {
             missed += 1;
             continue;

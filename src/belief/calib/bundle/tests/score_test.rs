@@ -167,7 +167,8 @@ fn views_that_were_left_out_are_as_far_off_as_foretold() {
     let ratio = |(chi2, dof): (f64, usize)| chi2 / dof as f64;
     let joints = squares / n_joints as f64;
     println!(
-        "innovations: cameras {:.3} of {}, coordinates {:.3} of {}, joints {joints:.3} of {n_joints}; {beyond} of 100 folds beyond 99 %",
+        "innovations: cameras {:.3} of {}, coordinates {:.3} of {}, joints {joints:.3} of {n_joints}; {beyond} of 100 \
+         folds beyond 99 %",
         ratio(camera),
         camera.1,
         ratio(coordinates),

@@ -1,9 +1,9 @@
 //! A calibration in one line of printable ASCII below 512 bytes, for links that carry little (an acoustic modem).
 //!
-//! `armcal1 ROBOT METHOD VERDICT tTIME eMEDIAN/P95 hHASH rARM JOINT.. #SUM`, see docs/files.md. Corrections are relative
-//! to the robot's datasheet, so the line means something only together with the robot folder that it was made with; `r`
-//! tells whether the folder at the other end has the same joints. Sensors with terms make an `armcal2`, which has a reference
-//! and, behind each joint's gain and offset, its `terms` in whole steps.
+//! `armcal1 ROBOT METHOD VERDICT tTIME eMEDIAN/P95 hHASH rARM JOINT.. #SUM`, see docs/files.md. Corrections are
+//! relative to the robot's datasheet, so the line means something only together with the robot folder that it was made
+//! with; `r` tells whether the folder at the other end has the same joints. Sensors with terms make an `armcal2`, which
+//! has a reference and, behind each joint's gain and offset, its `terms` in whole steps.
 
 mod fields;
 mod terms;
@@ -25,8 +25,8 @@ use armcal_core::streams::MAX_JOINTS;
 
 /// The text is shorter than this, bytes.
 pub const MAX_COMPACT_BYTES: usize = 512;
-/// Corrections and their deviations are whole multiples of 1e-7 (gains: relative, offsets: rad). Half of that at 8 joints
-/// of a 5 m arm at the ends of their ranges moves the tool by less than 0.01 mm.
+/// Corrections and their deviations are whole multiples of 1e-7 (gains: relative, offsets: rad). Half of that at 8
+/// joints of a 5 m arm at the ends of their ranges moves the tool by less than 0.01 mm.
 const STEPS: f64 = 1e7;
 /// With terms of 1e-6, which leaves room for them; the tool of a 2 m arm moves by less than 0.02 mm.
 const STEPS_WITH_TERMS: f64 = 1e6;
@@ -241,8 +241,8 @@ fn compact_joint(calibration: &Calibration, joint: &JointResult, per_unit: f64) 
     })
 }
 
-/// Gain over the datasheet's. Where an older calibration.toml does not name it, an estimated gain's deviation stands in it
-/// twice, absolute and (in the covariance) relative; one that was not estimated is the datasheet's.
+/// Gain over the datasheet's. Where an older calibration.toml does not name it, an estimated gain's deviation stands in
+/// it twice, absolute and (in the covariance) relative; one that was not estimated is the datasheet's.
 fn relative_gain(calibration: &Calibration, joint: &JointResult) -> Result<f64, CompactError> {
     if let Some(gain) = joint.gain_over_datasheet {
         return Ok(gain);

@@ -1,7 +1,7 @@
 //! What `armcal2` has beyond `armcal1`: the reference, and each joint's terms in whole steps.
 //!
-//! A number of steps is one to four printable characters: digits of base 45, the last from the first half of [`DIGITS`], those
-//! before it from the second half, so that small numbers are short and none needs a space between.
+//! A number of steps is one to four printable characters: digits of base 45, the last from the first half of
+//! [`DIGITS`], those before it from the second half, so that small numbers are short and none needs a space between.
 
 use serde::Serialize;
 
@@ -11,8 +11,8 @@ use crate::calib::result::compact::{CompactError, MAX_STEPS};
 use armcal_core::sensor::{Conditions, N_SHAPE, Terms};
 use armcal_core::time::Stamp;
 
-/// Steps of the shape's coefficients, finest first, rad; the finest that fits is used. The coarsest moves the tool of a 2 m arm by
-/// less than 0.05 mm.
+/// Steps of the shape's coefficients, finest first, rad; the finest that fits is used. The coarsest moves the tool of a
+/// 2 m arm by less than 0.05 mm.
 pub(crate) const SHAPE_STEPS_RAD: [f64; 3] = [1e-6, 2e-6, 5e-6];
 /// Steps per rad/K and rad/MPa, 1/K, rad/h, rad: half a step at 20 K, 20 MPa or 5 h moves a joint by at most 5e-6 rad.
 const OFFSET_STEPS: f64 = 2e6;

@@ -224,7 +224,8 @@ proptest! {
     fn any_calibration_comes_back_within_half_a_step(
         joints in (1usize..=8).prop_flat_map(|n| (0..n).map(any_joint).collect::<Vec<_>>()), is_refused: bool
     ) {
-        let full = calibration("arm 7", &joints, is_refused.then_some(Refusal::Overfitted { held_out_m: 0.011, fit_m: 0.004 }));
+        let refusal = is_refused.then_some(Refusal::Overfitted { held_out_m: 0.011, fit_m: 0.004 });
+        let full = calibration("arm 7", &joints, refusal);
         let text = text_of(&full);
         prop_assert!(text.len() < MAX_COMPACT_BYTES);
         let read = CompactCalibration::from_text(&text).unwrap();
@@ -236,7 +237,8 @@ proptest! {
             let slack = 1.01 / STEPS;
             prop_assert!((-1e-12..slack).contains(&(joint.gain_std.unwrap() - gain.1)));
             prop_assert!((-1e-12..slack).contains(&(joint.offset_std_rad.unwrap() - offset.1)));
-            prop_assert_eq!((joint.gain_estimated, joint.offset_estimated), (given.gain.is_some(), given.offset.is_some()));
+            let estimated = (joint.gain_estimated, joint.offset_estimated);
+            prop_assert_eq!(estimated, (given.gain.is_some(), given.offset.is_some()));
         }
     }
 

@@ -155,8 +155,8 @@ fn what_lies_beyond_is_named_and_what_lies_within_is_not() {
     angles[0] = -0.7;
     let beyond = Conditions { oil_c: Some(7.5), pressure_pa: Some(2.75e6), stamp: Some(stamp.plus_s(10.0 * 3600.0)) };
     let told = calibration.beyond(&angles, &beyond).join("; ");
-    let expected = "shoulder_yaw at -0.70 rad is 0.30 rad beyond -0.40 .. 0.60; oil at 7.5 C is 2.5 K beyond 10.0 .. 20.0 C; \
-                    pressure of 2.8 MPa is 0.8 MPa beyond 1.0 .. 2.0 MPa; it is 10.0 h old";
+    let expected = "shoulder_yaw at -0.70 rad is 0.30 rad beyond -0.40 .. 0.60; oil at 7.5 C is 2.5 K beyond 10.0 .. \
+                    20.0 C; pressure of 2.8 MPa is 0.8 MPa beyond 1.0 .. 2.0 MPa; it is 10.0 h old";
     assert_eq!(told, expected);
     let words = calibration.valid_for().join(", ");
     assert!(words.contains("shoulder_yaw -0.40 .. 0.60 rad") && words.contains("oil 10.0 .. 20.0 C"), "{words}");

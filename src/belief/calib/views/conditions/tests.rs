@@ -93,7 +93,8 @@ fn samples_within_a_span_are_averaged_and_others_joined_by_a_line() {
 #[test]
 fn a_view_knows_its_rate_and_the_side_that_each_joint_came_from() {
     let robot = titan();
-    // Joint 0 came from below, 1 from above, 2 overshot from below, 3 never moved, 4 jumped once, 5 came from below and creeps.
+    // Joint 0 came from below, 1 from above, 2 overshot from below, 3 never moved, 4 jumped once, 5 came from below and
+    // creeps.
     let travel = |s: f64, j: usize| match j {
         0 => (0.1 * (s - 3.0)).min(0.0) + 0.4,
         1 => 0.4 - (0.1 * (s - 3.0)).min(0.0),

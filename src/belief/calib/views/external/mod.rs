@@ -1,8 +1,8 @@
 //! Views from recordings of real arms, which mark nothing.
 //!
-//! `pairing` finds the joint reading that belongs to a tag message; `views` merges what was seen while the arm stood still into one
-//! view; `landmarks` averages a landmark over its frames. Here the views of all recordings come together, by their stamps; all are
-//! fitted, and held out in turn for the verdict.
+//! `pairing` finds the joint reading that belongs to a tag message; `views` merges what was seen while the arm stood
+//! still into one view; `landmarks` averages a landmark over its frames. Here the views of all recordings come
+//! together, by their stamps; all are fitted, and held out in turn for the verdict.
 
 mod landmarks;
 mod pairing;
@@ -52,7 +52,8 @@ pub fn prepare_foreign(
             *data.rejected.entry(why).or_default() += n;
         }
     }
-    // Recordings may overlap in time; the message's hash settles the order of equal stamps whatever the order of the arguments.
+    // Recordings may overlap in time; the message's hash settles the order of equal stamps whatever the order of the
+    // arguments.
     views.sort_by(|(a, of_a), (b, of_b)| a.end.cmp(&b.end).then(of_a.cmp(of_b)));
     data.n_marks = views.len();
     let numbered = |(k, (view, _))| View { pose_idx: k as u32, ..view };

@@ -1,7 +1,8 @@
 //! Which joint reading belongs to a stamp.
 //!
-//! A stream of readings is continuous where neighbours are a quarter of a second apart or less: between them the travel is
-//! interpolated, and its rate is known. Recordings with one reading a pose have no neighbours to go between: the nearest counts.
+//! A stream of readings is continuous where neighbours are a quarter of a second apart or less: between them the travel
+//! is interpolated, and its rate is known. Recordings with one reading a pose have no neighbours to go between: the
+//! nearest counts.
 
 use armcal_core::input::{ForeignRecording, Reading};
 use armcal_core::robot::Robot;

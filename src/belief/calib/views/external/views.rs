@@ -11,7 +11,8 @@ use armcal_core::streams::JointAngles;
 
 /// Readings within this many sigma of each other are of one pose. Assumed.
 const SAME_POSE_SIGMAS: f64 = 5.0;
-/// Faster than this, beyond what noise makes of it, is on the way, rad/s: at a reach of 2 m and a camera clock 50 ms late, 1 mm.
+/// Faster than this, beyond what noise makes of it, is on the way, rad/s: at a reach of 2 m and a camera clock 50 ms
+/// late, 1 mm.
 const REST_RATE_RAD_S: f64 = 0.01;
 /// Noise of a rate that counts as none, sigma.
 const RATE_SIGMAS: f64 = 5.0;
@@ -94,8 +95,8 @@ impl Maker<'_> {
         self.noise_rad.iter().enumerate().all(|(joint, noise)| close(joint, *noise))
     }
 
-    /// Whether the arm has stood still since the group began. Only a continuous stream can tell; of the others each reading is a pose
-    /// that somebody recorded, and what was seen about it is of that pose.
+    /// Whether the arm has stood still since the group began. Only a continuous stream can tell; of the others each
+    /// reading is a pose that somebody recorded, and what was seen about it is of that pose.
     fn belongs(&self, group: &[PairedFrame<'_>], next: &PairedFrame<'_>) -> bool {
         let (Some(first), Some(last)) = (group.first(), group.last()) else { return true };
         if !(last.paired.is_continuous && next.paired.is_continuous) {
