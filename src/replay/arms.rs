@@ -1,4 +1,4 @@
-//! The true and the believed arm, the camera's reach, the views taken and the tool's path.
+//! The true and the believed arm, the camera's view cone, captured views and the tool's path.
 
 use nalgebra::Vector3;
 use rerun::{LineStrips3D, Points3D};
@@ -15,7 +15,7 @@ use armcal_core::streams::{CaptureSet, JointAngles, MarkKind};
 /// The tool's path is drawn this far back, s, with so many points a second.
 const TRAIL_S: f64 = 12.0;
 const TRAIL_HZ: f64 = 5.0;
-/// How far the lines of sight at the image's corners are drawn, m.
+/// Length of the lines of sight at the image's corners, m.
 const SIGHT_M: f64 = 0.22;
 
 impl ReplayScene<'_> {
@@ -25,7 +25,7 @@ impl ReplayScene<'_> {
         truth.or_else(|| self.tracks.believed.at(time_s).copied())
     }
 
-    /// Where the arm believed its tool to be.
+    /// Tool pose of the belief.
     pub(super) fn believed_tool(&self, time_s: f64) -> Option<Pose<Base, Tool>> {
         let angles = self.tracks.believed.at(time_s)?;
         Some(Pose::from_isometry(self.robot.chain.link_poses(angles).frame(&self.robot.tool.mount)))
@@ -152,7 +152,7 @@ fn draw_trail(run: &ReplayScene, stream: &mut EntityLog) {
     }
 }
 
-/// Where the camera stood for each view that was taken: one colour for views that are fitted, one for those held out.
+/// Camera position of each captured view: one colour for fitted views, one for held-out ones.
 fn draw_captures(run: &ReplayScene, stream: &mut EntityLog) {
     let (mut places, mut shades) = (Vec::new(), Vec::new());
     let mut marks: Vec<_> = run.tracks.marks.iter().collect();

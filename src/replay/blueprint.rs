@@ -1,5 +1,5 @@
-//! The viewer's layout, written down entry by entry: the SDK's builder cannot set the eye, the axes or the legends, and
-//! names its parts by chance.
+//! The viewer's layout, written down entry by entry: the SDK's builder cannot set the viewpoint, the axes or the
+//! legends, and names its parts by chance.
 
 use rerun::AsComponents;
 use rerun::external::re_sdk_types::blueprint::archetypes::{
@@ -39,7 +39,7 @@ struct Builder {
     parts: u128,
 }
 
-/// The layout for what `run` has to show.
+/// The layout for the data of `run`.
 pub(super) fn build(run: &ReplayScene) -> Vec<Entry> {
     let mut b = Builder::default();
     let scene = scene_view(&mut b, run);

@@ -1,4 +1,4 @@
-//! The wrist camera's image plane: tags as seen, and where the believed arm expects them.
+//! The wrist camera's image plane: detections, rejects, and tags as the belief predicts them.
 
 use nalgebra::{Isometry3, Point3, Vector2, Vector3};
 use rerun::{Clear, EncodedImage, Image, LineStrips2D, Radius};
@@ -13,7 +13,7 @@ use armcal_core::streams::{DetectionReject, TagDetection};
 
 /// The image is drawn at most this often.
 const VIEWS_HZ: f64 = 12.5;
-/// Without a new frame for this long, what was seen is taken down, s.
+/// Detections disappear after this time without a new image, s.
 const STALE_S: f64 = 0.6;
 /// And the image itself.
 const STALE_IMAGE_S: f64 = 2.5;
@@ -84,7 +84,7 @@ fn draw_seen(run: &ReplayScene, stream: &mut EntityLog) {
     draw_quads(run, stream, &entity, views.collect());
 }
 
-/// What the detector did not believe, and why.
+/// Rejected detections with their reasons.
 fn draw_rejected(run: &ReplayScene, stream: &mut EntityLog) {
     if run.tracks.rejects.is_empty() {
         return;
@@ -116,7 +116,7 @@ fn draw_quads(run: &ReplayScene, stream: &mut EntityLog, entity: &str, mut views
     }
 }
 
-/// A closed outline and what stands beside it.
+/// A closed outline and its label.
 type Quad = (Vec<[f32; 2]>, String);
 
 fn seen_quad(tag: &TagDetection) -> Quad {
@@ -136,7 +136,7 @@ fn quads(quads: impl Iterator<Item = Quad>) -> LineStrips2D {
     LineStrips2D::update_fields().with_strips(strips).with_labels(labels)
 }
 
-/// Where the believed arm expects the surveyed tags.
+/// Surveyed tags as the belief predicts them.
 fn draw_expected(run: &ReplayScene, stream: &mut EntityLog) {
     let entity = format!("{CAMERA}/expected");
     let style = LineStrips2D::update_fields().with_radii([Radius::new_ui_points(1.0)]).with_colors([colors::BELIEVED]);

@@ -9,9 +9,9 @@ pub(super) const SEAFLOOR: Rgba = [92, 84, 66, 255];
 /// The arm as believed, drawn through the true one.
 pub(super) const GHOST: Rgba = [255, 60, 220, 110];
 pub(super) const BELIEVED: Rgba = [255, 90, 225, 255];
-/// What the camera measured.
+/// Detections.
 pub(super) const SEEN: Rgba = [60, 230, 120, 255];
-/// What the detector did not believe.
+/// Rejected detections.
 pub(super) const REJECTED: Rgba = [255, 120, 50, 255];
 /// The lens's reach into the scene and in the image.
 pub(super) const CAMERA: Rgba = [70, 200, 255, 255];

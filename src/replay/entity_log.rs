@@ -20,10 +20,10 @@ const CHUNK_STRIDE: u64 = 1 << 16;
 /// The viewer holds rows of a later time for newer, so that what a user changes in the layout must come after ours.
 pub(super) const IDENTITY_NANOS: u64 = 1_000_000_000;
 
-/// One row of an entity: its time in nanoseconds and what it holds.
+/// One row of an entity: time in nanoseconds, and data.
 type Row = (i64, Vec<SerializedComponentBatch>);
 
-/// What is drawn, by entity; entities are written in the order of their names.
+/// Drawn data by entity; entities are written in the order of their names.
 #[derive(Default)]
 pub(super) struct EntityLog {
     fixed: BTreeMap<String, Vec<SerializedComponentBatch>>,
@@ -31,12 +31,12 @@ pub(super) struct EntityLog {
 }
 
 impl EntityLog {
-    /// Draws something that holds at all times.
+    /// Logs data without a time.
     pub fn log_static(&mut self, entity: &str, what: &dyn AsComponents) {
         self.fixed.entry(entity.to_owned()).or_default().extend(what.as_serialized_batches());
     }
 
-    /// Draws something that holds from `time_s` on. Times of one entity must not go backwards.
+    /// Logs data from `time_s` on. Times of one entity must not go backwards.
     pub fn draw(&mut self, entity: &str, time_s: f64, what: &dyn AsComponents) {
         let nanos = (time_s * 1e9).round() as i64;
         self.rows.entry(entity.to_owned()).or_default().push((nanos, what.as_serialized_batches()));

@@ -1,4 +1,4 @@
-//! Why a recording cannot be shown.
+//! Errors of a replay.
 
 use std::path::PathBuf;
 
@@ -6,7 +6,7 @@ use rerun::external::re_log_encoding::EncodeError;
 
 use armcal_core::log::{CdrError, LogError};
 
-/// Why no .rrd was written.
+/// Error of writing an .rrd file.
 #[derive(Debug, thiserror::Error)]
 pub enum ReplayError {
     #[error("{}: the recording has no messages, there is nothing to show", path.display())]

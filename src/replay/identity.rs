@@ -8,7 +8,7 @@ use crate::scene::ReplayInput;
 use armcal_core::log::MessageHasher;
 use armcal_core::robot::Robot;
 
-/// What tells one recording from another in the viewer: a hash of everything that shapes the file.
+/// Recording id in the viewer: a hash of all data that shape the file.
 pub(super) struct Identity {
     pub recording_id: String,
 }
@@ -19,7 +19,7 @@ impl Identity {
         let mut hasher = blake3::Hasher::new();
         let mut messages = MessageHasher::new(&input.recording.joint_names);
         for (log_time, message) in &input.recording.messages {
-            // A message that no file could hold (it was made, not read) is left out of the hash, not of the picture.
+            // A message that no file can hold is not part of the hash.
             let _ = messages.add(*log_time, message);
         }
         hasher.update(messages.hex().as_bytes());
@@ -27,9 +27,9 @@ impl Identity {
             let read = File::open(path).and_then(|file| hasher.update_reader(file).map(|_| ()));
             read.map_err(|source| armcal_core::log::LogError::Read { path: path.to_owned(), source })?;
         }
-        // Where the robot's drawings lie does not matter.
+        // The robot's folder is not part of the identity.
         let robot = Robot { folder: PathBuf::new(), ..input.robot.clone() };
-        // What a robot or a vehicle may lack is not in the identity of one that does.
+        // Optional parts that are absent are not part of the identity.
         let drawings = format!("{robot:?}{:?}{:?}", input.vehicle, input.scene);
         hasher.update(drawings.replace("gripper_tag: None, ", "").replace("lights: [], ", "").as_bytes());
         hasher.update(input.summary_markdown.unwrap_or_default().as_bytes());

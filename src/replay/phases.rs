@@ -1,4 +1,4 @@
-//! What the arm was doing, as lanes of states, and the log.
+//! Phases, views and reaches as lanes of states, and the log.
 
 use std::collections::BTreeMap;
 
@@ -45,11 +45,11 @@ fn draw_phases(run: &ReplayScene, stream: &mut EntityLog) {
     }
 }
 
-/// What a lane says of a mark.
+/// State of a lane for one mark.
 struct State {
-    /// Tells it from the lane's other states.
+    /// Unique in the lane.
     name: String,
-    /// What is written on it, short because spans are.
+    /// Short text on the span.
     label: String,
     color: Rgba,
 }

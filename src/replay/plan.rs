@@ -1,7 +1,7 @@
-//! A plan as a file for the viewer: the arm goes along its paths as it would, with all that it may be off by around it.
+//! A plan as a file for the viewer: the arm's motion along its paths, with its error bounds.
 //!
-//! What a session would record of its motions is made up from the plan and drawn as a recording is; the margins, the
-//! tags' chances and the plots over the poses come on top.
+//! The messages that a session would record are computed from the plan and drawn like a recording. Margins, detection
+//! probabilities and plots over the poses are added.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -33,7 +33,7 @@ const FRAME_HZ: f64 = 12.5;
 /// The arms that are drawn for all within the errors: every joint off to the same side, and every other one.
 const CORNERS: [u32; 4] = [0b0000_0000, 0b1111_1111, 0b0101_0101, 0b1010_1010];
 
-/// A plan and what it was made for.
+/// A plan, and the robot, vehicle, scene and task that it was made for.
 pub struct PlanInput<'a> {
     pub plan: &'a PlanFile,
     pub robot: &'a Robot,
@@ -178,7 +178,7 @@ fn pose_text(pose: &PoseTable) -> String {
     )
 }
 
-/// The whole way of the tool.
+/// The whole path of the tool.
 fn draw_tool_path(run: &ReplayScene, stream: &mut EntityLog) {
     let tool = |angles: &JointAngles| run.robot.chain.link_poses(angles).frame(&run.robot.tool.mount);
     let way: Vec<[f32; 3]> =
@@ -187,7 +187,7 @@ fn draw_tool_path(run: &ReplayScene, stream: &mut EntityLog) {
     stream.log_static(&format!("{BASE}/planned_way"), &strip);
 }
 
-/// Arms at corners of the error box, see-through, and where the tool may be for all of its corners.
+/// Transparent arms at corners of the error box, and the tool positions of all corners.
 fn draw_margins(input: &PlanInput<'_>, run: &ReplayScene, stream: &mut EntityLog) {
     let robot = input.robot;
     let mut ghosts: Vec<Vec<Mover>> = Vec::new();
@@ -236,7 +236,7 @@ fn error_at(plan: &PlanFile, time_s: f64) -> JointAngles {
     JointAngles::from_fn(plan.joints.len(), |j| a[j] + share * (b[j] - a[j]))
 }
 
-/// Frames around the tags that the next pose is to see, coloured by how likely that is.
+/// Frames around the tags expected at the next pose, coloured by the probability of detection.
 fn draw_expected_tags(input: &PlanInput<'_>, stream: &mut EntityLog) {
     let entity = format!("{BASE}/sights");
     let mut since_s = 0.0;

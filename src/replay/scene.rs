@@ -8,7 +8,7 @@ use armcal_core::log::Recording;
 use armcal_core::robot::{Robot, Vehicle};
 use armcal_core::routine::Scene;
 
-/// What to show.
+/// Recording, truth and drawings to show.
 pub struct ReplayInput<'a> {
     pub recording: &'a Recording,
     /// The simulator's truth file, if there is one.
@@ -20,7 +20,7 @@ pub struct ReplayInput<'a> {
     pub summary_markdown: Option<&'a str>,
 }
 
-/// Everything that the drawing modules share.
+/// Data shared by the drawing modules.
 pub(crate) struct ReplayScene<'a> {
     pub tracks: Tracks<'a>,
     pub truth: Option<Truth>,

@@ -1,4 +1,4 @@
-//! What stands still about the arm: seafloor, obstacles, vehicle and tags; and how the vehicle moves.
+//! Surroundings of the arm: seafloor, obstacles, tags, and the moving vehicle.
 
 use nalgebra::{Isometry3, Translation3};
 use rerun::{Boxes3D, FillMode, Points3D, ViewCoordinates};
@@ -18,7 +18,7 @@ const SAME_M: f64 = 2e-5;
 const SAME_RAD: f64 = 2e-5;
 
 impl ReplayScene<'_> {
-    /// Where the vehicle was: by truth, else turned as its attitude sensor says, else at rest.
+    /// Pose of the vehicle: by truth, else by its attitude sensor, else at rest.
     pub(super) fn world_from_vehicle(&self, time_s: f64) -> Pose<World, Vehicle> {
         let measured = || {
             let turn = self.tracks.attitude.at(time_s)?;
@@ -29,7 +29,7 @@ impl ReplayScene<'_> {
     }
 }
 
-/// An entity that moves; what stands still is not drawn again.
+/// An entity that moves; it is drawn again only after a motion.
 pub(super) struct Mover {
     entity: String,
     last: Option<Isometry3<f64>>,

@@ -1,4 +1,4 @@
-//! A page of text: the run's own summary, or what the recording holds; then how to read the picture.
+//! Page of text: the run's summary or the recording's contents, then a legend of the picture.
 
 use std::fmt::Write;
 

@@ -1,4 +1,4 @@
-//! The reach task: targets, and where the tool truly came to rest for each.
+//! The reach task: targets, and the true rest position of the tool for each.
 
 use nalgebra::Vector3;
 use rerun::{LineStrips3D, Points3D};
@@ -20,7 +20,7 @@ pub(super) struct Arrival {
     pub time_s: f64,
     pub attempt: ReachAttempt,
     pub target_idx: usize,
-    /// Where the tool came to rest, base frame, m.
+    /// Rest position of the tool, base frame, m.
     pub rest_m: Vector3<f64>,
     pub miss_m: f64,
     pub hit: bool,
@@ -34,7 +34,7 @@ impl ReplayScene<'_> {
         arrivals
     }
 
-    /// What a mark says of a reach, if it does.
+    /// The arrival of a reach mark.
     pub(super) fn arrival(&self, mark: &Span) -> Option<Arrival> {
         let MarkKind::Reach { attempt, target_idx } = mark.kind else { return None };
         let (_, task) = self.tracks.task?;
@@ -47,7 +47,7 @@ impl ReplayScene<'_> {
     }
 }
 
-/// Draws the targets and what became of them.
+/// Draws the targets and their arrivals.
 pub(super) fn draw(run: &ReplayScene, stream: &mut EntityLog) {
     let Some((since_s, task)) = run.tracks.task else { return };
     let mut board = TargetMarkers::new(task);
@@ -61,7 +61,7 @@ pub(super) fn draw(run: &ReplayScene, stream: &mut EntityLog) {
     }
 }
 
-/// What is known of each target so far.
+/// Arrivals at each target so far.
 struct TargetMarkers<'a> {
     task: &'a ReachTask,
     latest: Vec<Option<Arrival>>,
@@ -95,7 +95,7 @@ impl<'a> TargetMarkers<'a> {
         stream.draw(&format!("{BASE}/task/targets"), time_s, &balls);
     }
 
-    /// What the attempt before calibration missed the target of a later `arrival` by.
+    /// Miss of the same target before calibration, for an `arrival` after it.
     fn missed_before_m(&self, arrival: &Arrival) -> Option<f64> {
         let earlier = |a: &&Arrival| a.target_idx == arrival.target_idx && a.attempt == ReachAttempt::Before;
         let before = self.all.iter().rev().find(earlier)?;

@@ -20,7 +20,7 @@ const CLOCKS_AGREE_S: f64 = 1.0;
 const MIN_SPACING_S: f64 = 0.0095;
 /// The same for images, which take most of the file.
 const MIN_IMAGE_SPACING_S: f64 = 0.095;
-/// Above this a stray log time, not a run, is the likely reason.
+/// Longest recording. Beyond it a wrong log time is likely.
 const LONGEST_S: f64 = 7.0 * 24.0 * 3600.0;
 /// Steps of everything that moves.
 const FRAME_HZ: f64 = 25.0;
@@ -99,7 +99,7 @@ pub(super) struct Tracks<'a> {
     /// Between the jaws, m.
     pub gripper: TimeSeries<f64>,
     pub views: Vec<(f64, &'a TagDetections)>,
-    /// What the detector saw and did not believe.
+    /// Rejected detections.
     pub rejects: Vec<(f64, &'a DetectionRejects)>,
     /// Camera images, ascending.
     pub images: Vec<(f64, CameraImage)>,
@@ -195,7 +195,7 @@ impl<'a> Tracks<'a> {
         Span { start_s, end_s, kind: mark.kind }
     }
 
-    /// Where a message belongs: by its own stamp if that clock agrees with the recorder's, else by its log time.
+    /// Time of a message: its own stamp if that clock agrees with the recorder's, else its log time.
     pub fn place_s(&self, log_time: Stamp, stamp: Stamp) -> f64 {
         let (logged_s, stamped_s) = (log_time.since_s(self.start), stamp.since_s(self.start));
         let placed_s = if (stamped_s - logged_s).abs() <= CLOCKS_AGREE_S { stamped_s } else { logged_s };

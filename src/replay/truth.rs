@@ -18,13 +18,13 @@ const VEHICLE_POSE: &str = "/truth/vehicle_pose";
 const TOOL_POSE: &str = "/truth/tool_pose";
 const FAULTS: &str = "/truth/faults";
 
-/// What was true; any track may be empty.
+/// True states over time; any series may be empty.
 #[derive(Default)]
 pub(super) struct Truth {
     joints: TimeSeries<JointAngles>,
     world_from_vehicle: TimeSeries<Isometry3<f64>>,
     base_from_tool: TimeSeries<Isometry3<f64>>,
-    /// What broke, each with its time, s.
+    /// Faults with their times, s.
     pub faults: Vec<(f64, String)>,
 }
 
@@ -61,7 +61,7 @@ impl Truth {
         self.world_from_vehicle.between(time_s, blend_poses).map(Pose::from_isometry)
     }
 
-    /// Where the tool truly was.
+    /// True pose of the tool.
     pub fn base_from_tool(&self, time_s: f64) -> Option<Pose<Base, Tool>> {
         self.base_from_tool.between(time_s, blend_poses).map(Pose::from_isometry)
     }

@@ -1,4 +1,4 @@
-//! Hands a file to an installed Rerun viewer.
+//! Start of an installed Rerun viewer.
 
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -6,7 +6,7 @@ use std::process::{Child, Command, Stdio};
 /// The viewer's program, looked up on PATH.
 const PROGRAM: &str = "rerun";
 
-/// Why no viewer opened.
+/// Error of opening a viewer.
 #[derive(Debug, thiserror::Error)]
 pub enum ViewerError {
     #[error("{}: there is no such file", path.display())]

@@ -1,4 +1,4 @@
-//! Where the 3D view is looked at from: so that the arm and its work fill the picture.
+//! Viewpoint of the 3D view: the arm and its work fill the picture.
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
@@ -9,15 +9,15 @@ use crate::shapes::vector;
 /// wide).
 const HALF_UP: f64 = 0.52;
 const HALF_ACROSS: f64 = 1.7 * HALF_UP;
-/// How much of the picture the scene may take.
+/// Share of the picture that the scene takes.
 const FILL: f64 = 0.82;
-/// Moments of the run that are looked at for where the arm goes.
+/// Samples of the arm's configuration over the run.
 const SAMPLES: u32 = 200;
-/// From the front of the base to its side and up: direction to the eye, about z from x, and above the horizon, rad.
+/// Direction to the viewpoint in the base frame, rad: about z from x, and above the horizon.
 const AZIMUTH_RAD: f64 = -0.95;
 const ELEVATION_RAD: f64 = 0.36;
 
-/// An eye and what it looks at, world frame, m.
+/// Position of the viewer and the point in the picture's centre, world frame, m.
 pub(super) struct Viewpoint {
     pub position: [f32; 3],
     pub target: [f32; 3],
@@ -37,7 +37,7 @@ pub(super) fn frame(run: &ReplayScene) -> Viewpoint {
     points.extend(run.robot.tags.iter().map(|tag| tag.base_from_tag.origin().vector()));
     points.extend(run.tracks.task.iter().flat_map(|(_, task)| task.targets_m.iter().map(|t| Vector3::from(*t))));
     points.push(Vector3::zeros());
-    // The axes of the picture: towards the eye, to its right and up.
+    // The axes of the picture: towards the viewer, to its right and up.
     let around = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), AZIMUTH_RAD);
     let towards = around * Vector3::new(ELEVATION_RAD.cos(), 0.0, ELEVATION_RAD.sin());
     let right = Vector3::z().cross(&towards).normalize();

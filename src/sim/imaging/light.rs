@@ -2,8 +2,7 @@
 
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 
-use crate::imaging::math::{exp, exp2, max};
-use crate::imaging::{Rgb, Vec3};
+use crate::imaging::math::{Rgb, Vec3, exp, exp2, max};
 
 /// A white lamp in the base frame.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -6,8 +6,7 @@
 
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
 
-use crate::imaging::Vec3;
-use crate::imaging::math::{exp, hash, unit};
+use crate::imaging::math::{Vec3, exp, hash, unit};
 use crate::imaging::rays::Rays;
 use crate::imaging::shader::Shader;
 use crate::spec::ImageSpec;

@@ -1,4 +1,9 @@
-//! Fast functions that give the same bits on every machine.
+//! Vectors, colours, and fast functions that give the same bits on every machine.
+
+/// A vector in the camera's frame or an object's, single precision.
+pub(super) type Vec3 = nalgebra::Vector3<f32>;
+/// Red, green, blue.
+pub(super) type Rgb = [f32; 3];
 
 /// `exp(x)` for x <= 0 to a relative error of 1e-6 and of the bits of x; 0 below -87.
 #[inline]

@@ -32,10 +32,5 @@ pub use light::Light;
 
 pub use crate::spec::{CameraMode, ImageSpec, WaterKind};
 
-/// A vector in the camera's frame or an object's, single precision.
-type Vec3 = nalgebra::Vector3<f32>;
-/// Red, green, blue.
-type Rgb = [f32; 3];
-
 #[cfg(test)]
 mod tests;

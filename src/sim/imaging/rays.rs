@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::imaging::Vec3;
+use crate::imaging::math::Vec3;
 use armcal_core::optics::Fisheye;
 
 /// Unit vectors in the camera's frame, pixel by pixel, rows from the top. Beyond the lens's field of view they are

@@ -2,9 +2,9 @@
 
 use nalgebra::{Isometry3, Point3};
 
+use crate::imaging::math::{Rgb, Vec3};
 use crate::imaging::rays::Rays;
 use crate::imaging::shape::{Form, Lanes, Place};
-use crate::imaging::{Rgb, Vec3};
 use armcal_core::spatial::{exp, log};
 
 /// Samples of place and time on a pixel that an edge crosses.

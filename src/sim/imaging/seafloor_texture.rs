@@ -1,7 +1,6 @@
 //! The seafloor's texture: smooth noise on all scales, periodic, with ever coarser copies for the distance. Assumed.
 
-use crate::imaging::Rgb;
-use crate::imaging::math::{hash, unit};
+use crate::imaging::math::{Rgb, hash, unit};
 
 /// Side of the finest level, texels.
 const SIDE: usize = 512;

@@ -9,10 +9,9 @@ use std::f32::consts::{FRAC_1_PI, PI};
 use nalgebra::Isometry3;
 
 use crate::imaging::light::{Lamp, Light};
-use crate::imaging::math::exp;
+use crate::imaging::math::{Rgb, Vec3, exp};
 use crate::imaging::rays::Rays;
 use crate::imaging::water::Water;
-use crate::imaging::{Rgb, Vec3};
 use crate::spec::ImageSpec;
 
 /// Distance of the veil's nodes, px.

@@ -4,11 +4,11 @@
 //! neighbourhood, or swept by one while the shutter is open, is the mean of `SAMPLES` rays.
 
 use crate::imaging::edges::has_other_face;
+use crate::imaging::math::{Rgb, Vec3};
 use crate::imaging::scene::{Appearance, FACE_BITS, Object, TILE_PX};
 use crate::imaging::shader::Shade;
 use crate::imaging::tag_board;
 use crate::imaging::tracer::{Candidates, Tracer, object_of};
-use crate::imaging::{Rgb, Vec3};
 
 /// Sides of blocks that share their shading, px.
 const BLOCKS_PX: [usize; 2] = [8, 4];

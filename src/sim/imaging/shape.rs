@@ -1,7 +1,6 @@
 //! Intersection of rays with convex shapes, several at a time. A shape around the camera is invisible.
 
-use crate::imaging::Vec3;
-use crate::imaging::math::{max, min};
+use crate::imaging::math::{Vec3, max, min};
 use crate::imaging::tag_board::Board;
 use armcal_core::robot::Shape;
 

@@ -1,12 +1,12 @@
 //! Radiance of a pixel on an edge: the mean over samples of position and time.
 
+use crate::imaging::math::{Rgb, Vec3};
 use crate::imaging::scene::{Appearance, FACE_BITS, Object, SAMPLES, first_met, offset};
 use crate::imaging::shader::Shade;
 use crate::imaging::shading::{Intersection, ShadeCache};
 use crate::imaging::shape::{Form, Lanes};
 use crate::imaging::tag_board;
 use crate::imaging::tracer::Tracer;
-use crate::imaging::{Rgb, Vec3};
 
 /// The rays of one pixel's samples, and what they meet.
 struct Samples {

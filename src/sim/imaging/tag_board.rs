@@ -1,6 +1,6 @@
 //! Tags: boards without thickness, one side printed.
 
-use crate::imaging::Rgb;
+use crate::imaging::math::Rgb;
 use armcal_core::optics::tag36h11::{BOARD_CELLS, TAG_CELLS, cells};
 
 /// Diffuse reflectance of the white and the black of a board. Assumed: matt laminate.

@@ -6,6 +6,7 @@ use nalgebra::{Isometry3, Point3, Translation3, Unit, UnitQuaternion, Vector2, V
 use rand::RngExt;
 
 use crate::imaging::light::Lamp;
+use crate::imaging::math::Vec3;
 use crate::imaging::shape::{Form, Place};
 use crate::imaging::*;
 use armcal_core::optics::{fixture::lens, square_corners};

@@ -1,6 +1,6 @@
 //! Intersection of rays with objects, in tiles of the image.
 
-use crate::imaging::Vec3;
+use crate::imaging::math::Vec3;
 use crate::imaging::rays::Rays;
 use crate::imaging::scene::{FACE_BITS, Object, TILE_PX, candidates, first_met};
 use crate::imaging::seafloor_texture::Texture;

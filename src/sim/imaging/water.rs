@@ -5,7 +5,7 @@
 //! in by `bB = 2 a + b` (assumed): its light has a way out, too, on which it is absorbed, while scattering is mostly
 //! forward. `Binf` is what lamps and sun send back from far away (`shade`).
 
-use crate::imaging::Rgb;
+use crate::imaging::math::Rgb;
 use crate::spec::{ImageSpec, WaterKind};
 
 /// Coefficients for red, green and blue, 1/m.

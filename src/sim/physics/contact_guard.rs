@@ -15,7 +15,7 @@ use armcal_core::streams::{JointAngles, MAX_JOINTS};
 const CONTACT_M: f64 = 0.022;
 /// A pair nearer than this is left to the engine: it would have to be measured in every other step, m.
 const NEAR_M: f64 = 0.03;
-/// Distances beyond this are not told apart, m.
+/// Largest distance that is measured, m.
 const FAR_M: f64 = 0.5;
 /// Steps between measurements of a pair that is left to the engine.
 const NEAR_STEPS: u64 = 10;

@@ -26,7 +26,7 @@ pub(crate) struct FreeVehicle {
     /// Thrust and moment as they are, behind the thrusters' lag, vehicle axes.
     thrust: [f64; 6],
     /// Random forces and moments, in the band of the motion's periods.
-    wobble: [SinusoidSum; 6],
+    disturbance: [SinusoidSum; 6],
     impulse: Option<(f64, Impulse)>,
 }
 
@@ -47,7 +47,7 @@ impl FreeVehicle {
             reckoned: std::array::from_fn(|i| if i < 3 { linear[i] } else { angular[i - 3] }),
             integral: [0.0; 6],
             thrust: [0.0; 6],
-            wobble: std::array::from_fn(|axis| {
+            disturbance: std::array::from_fn(|axis| {
                 let rms = if axis < 3 { spec.wobble_force_rms_n } else { spec.wobble_moment_rms_n_m };
                 draw_sinusoids(spec, rms, seed, &format!("wobble/{axis}"))
             }),
@@ -96,7 +96,7 @@ impl FreeVehicle {
     pub(crate) fn force(&mut self, t_s: f64, step_s: f64, base: &BaseState) -> Force {
         self.keep_station(step_s, base);
         let mut total = self.thrust;
-        for (slot, axis) in total.iter_mut().zip(&self.wobble) {
+        for (slot, axis) in total.iter_mut().zip(&self.disturbance) {
             *slot += evaluate(axis, t_s)[0];
         }
         if let Some((start_s, impulse)) = &self.impulse {

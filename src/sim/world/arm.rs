@@ -11,7 +11,7 @@ impl Arm for World {
     }
 
     fn command(&mut self, set_point: &JointCounts) -> Result<(), ArmError> {
-        let expected = self.pots.len();
+        let expected = self.joint_sensors.len();
         if set_point.len() != expected {
             return Err(ArmError::JointCount { got: set_point.len(), expected });
         }

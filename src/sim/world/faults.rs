@@ -31,11 +31,11 @@ impl World {
         self.timeline.last_s = Some(self.time_s());
         let stamp = self.stamp();
         if let Some(truth) = &mut self.truth {
-            let told = TruthFault { stamp, kind: fault.kind().to_owned(), details: fault.details() };
-            truth.fault(&told).map_err(ArmError::Sink)?;
+            let record = TruthFault { stamp, kind: fault.kind().to_owned(), details: fault.details() };
+            truth.fault(&record).map_err(ArmError::Sink)?;
         }
         match fault {
-            Fault::SensorJump { joint, by_rad } => self.at_sensor(&joint, |pot| pot.jump(by_rad)),
+            Fault::SensorJump { joint, by_rad } => self.at_sensor(&joint, |sensor| sensor.jump(by_rad)),
             Fault::SensorStuck { joint } => self.at_sensor(&joint, JointSensor::stick),
             Fault::SensorDead { joint } => self.at_sensor(&joint, JointSensor::die),
             Fault::JointLocked { joint } => {
@@ -69,8 +69,8 @@ impl World {
     }
 
     fn at_sensor(&mut self, joint: &str, act: impl FnOnce(&mut JointSensor)) {
-        if let Some(pot) = self.joint(joint).and_then(|joint| self.pots.get_mut(joint)) {
-            act(pot);
+        if let Some(sensor) = self.joint(joint).and_then(|joint| self.joint_sensors.get_mut(joint)) {
+            act(sensor);
         }
     }
 

@@ -33,25 +33,25 @@ pub(super) fn joint_sensors(robot: &Robot, built: &AsBuilt, spec: &JointSensorsS
 }
 
 /// The true angles at which every sensor reads `stowed` by the datasheet, kept within the end stops.
-pub(super) fn stowed_angles(robot: &Robot, pots: &mut [JointSensor], around: &OilState) -> JointAngles {
+pub(super) fn stowed_angles(robot: &Robot, sensors: &mut [JointSensor], around: &OilState) -> JointAngles {
     JointAngles::from_fn(robot.n_joints(), |j| {
-        let wanted = pots[j].angle_for_reading(robot.stowed[j], around);
+        let wanted = sensors[j].angle_for_reading(robot.stowed[j], around);
         let angle = robot.chain.joints()[j].limits.map_or(wanted, |limits| {
             wanted.clamp(limits.lower_rad + END_STOP_MARGIN_RAD, limits.upper_rad - END_STOP_MARGIN_RAD)
         });
-        pots[j].settle(angle);
+        sensors[j].settle(angle);
         angle
     })
 }
 
 pub(super) fn sample_joint_sensors(
-    pots: &mut [JointSensor],
+    sensors: &mut [JointSensor],
     angles: &JointAngles,
     around: &OilState,
     elapsed_s: f64,
 ) -> JointCounts {
     let around = *around;
-    JointCounts::from_fn(pots.len(), |j| pots[j].sample(&JointInput { angle_rad: angles[j], around, elapsed_s }))
+    JointCounts::from_fn(sensors.len(), |j| sensors[j].sample(&JointInput { angle_rad: angles[j], around, elapsed_s }))
 }
 
 /// At a depth below the surface.

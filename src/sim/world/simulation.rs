@@ -49,7 +49,7 @@ pub struct World {
     pub(super) hydraulics: Hydraulics,
     pub(super) gripper: Option<Gripper>,
     pub(super) controller: Controller,
-    pub(super) pots: Vec<JointSensor>,
+    pub(super) joint_sensors: Vec<JointSensor>,
     pub(super) temperatures: Temperatures,
     pub(super) slow: SlowSensors,
     pub(super) attitude: AttitudeSensor,
@@ -79,9 +79,9 @@ impl World {
         let gear_ratios: Vec<f64> = built.joints.iter().map(|joint| joint.gear_ratio).collect();
         let step_s = CONTROL_PERIOD_S / spec.steps_per_period() as f64;
         let temperatures = Temperatures::new(&spec.temperature, spec.water.depth_m);
-        let mut pots = joint_sensors(robot, &built, &spec.joint_sensors, seed);
+        let mut joint_sensors = joint_sensors(robot, &built, &spec.joint_sensors, seed);
         let around = surroundings(&spec, &temperatures, 0.0, spec.water.depth_m);
-        let angles = stowed_angles(robot, &mut pots, &around);
+        let angles = stowed_angles(robot, &mut joint_sensors, &around);
         let solids = Solids::new(robot, vehicle, scene);
         let motion = VehicleMotion::new(&spec.vehicle, spec.recorded.as_ref(), vehicle.vehicle_from_base, seed);
         let base = motion.at(0.0);
@@ -97,7 +97,7 @@ impl World {
         let free = free_vehicle(&input, &mut physics, &base)?;
         hydraulics.balance(&angles, &physics.static_torques(&base.gravity, &angles));
         let sea = Sea::new(&spec.water, seed);
-        let measured = sample_joint_sensors(&mut pots, &angles, &around, 0.0);
+        let measured = sample_joint_sensors(&mut joint_sensors, &angles, &around, 0.0);
         let mut camera = WristCamera::new(&CameraInput { robot, built: &built, solids: &solids, spec: &spec, seed });
         camera.enable_rendering(&RenderInput { robot, vehicle, scene, spec: &spec, seed })?;
         Ok(Self {
@@ -126,7 +126,7 @@ impl World {
             solids,
             physics,
             hydraulics,
-            pots,
+            joint_sensors,
             temperatures,
             measured,
         })

@@ -23,7 +23,7 @@ fn world(spec: WorldSpec, seed: u64) -> World {
 fn a_locked_valve_does_not_creep() {
     const LIMIT_RAD: f64 = 1e-4;
     let mut world = world(WorldSpec::default(), 1);
-    let n = world.pots.len();
+    let n = world.joint_sensors.len();
     let start = world.physics.angles();
     let (mut first, mut last, mut swing) = ([0.0; MAX_JOINTS], [0.0; MAX_JOINTS], 0.0_f64);
     const STEPS: u32 = 300_000;
