@@ -1,23 +1,16 @@
-//! What the arm believes while views are still being captured.
+//! Interim estimates during a capture.
 //!
-//! After every few views the recording so far is estimated, and the arm goes on by that: its set-points, its margins, the poses
-//! that it still wants. A calibration that is accepted in the end takes its place; one that is refused, and it is forgotten.
+//! After every few views the recording so far is estimated. Set-points, margins and the remaining poses then follow the
+//! interim estimate. The final calibration replaces it; if that is refused, the belief before the capture returns.
 
 use crate::calib::{Calibration, interim_estimate};
 use crate::plan::JointErrorBounds;
 use crate::session::SessionError;
 use crate::session::outcome::Epoch;
-use crate::session::script::{FreshBounds, ScriptRunner};
+use crate::session::runner::{SavedBelief, ScriptRunner};
 use armcal_core::routine::{CaptureSettings, Margins, Method};
 use armcal_core::sensor::ArmSensors;
 use armcal_core::streams::{JointAngles, LogLevel};
-
-/// What was believed before the first running estimate of a capture.
-pub(crate) struct SavedBelief {
-    sensors: ArmSensors,
-    bounds: JointErrorBounds,
-    fresh: Option<FreshBounds>,
-}
 
 impl ScriptRunner<'_, '_> {
     /// Whether this capture estimates as it goes.

@@ -6,7 +6,7 @@
 
 use crate::plan::{Edge, Path};
 use crate::session::SessionError;
-use crate::session::script::ScriptRunner;
+use crate::session::runner::ScriptRunner;
 use armcal_core::routine::StopsSettings;
 use armcal_core::streams::{JointAngles, LogLevel, MarkKind, Phase};
 

@@ -2,7 +2,7 @@
 
 use crate::plan::ClearanceModel;
 use crate::session::SessionError;
-use crate::session::script::ScriptRunner;
+use crate::session::runner::ScriptRunner;
 use armcal_core::routine::Step;
 use armcal_core::streams::{GripperCommand, LogLevel, Mark, MarkKind, Message};
 

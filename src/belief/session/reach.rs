@@ -2,7 +2,7 @@
 
 use crate::plan::{PlanError, TargetRequest, plan_targets};
 use crate::session::SessionError;
-use crate::session::script::ScriptRunner;
+use crate::session::runner::ScriptRunner;
 use armcal_core::routine::ReachSettings;
 use armcal_core::streams::{JointAngles, LogLevel, MarkKind, Phase, ReachAttempt};
 

@@ -6,7 +6,8 @@
 
 use nalgebra::{Isometry3, Vector6};
 
-use crate::tagmap::linearize::{Normal, Reduced, cost, squares};
+use crate::tagmap::linearize::{cost, squares};
+use crate::tagmap::normal_equations::{NormalEquations, Reduced};
 use crate::tagmap::problem::{Block, MapProblem};
 use armcal_core::numeric::{self, Damping, LeastSquares, Loss, Outcome, Proposal, Stop, StopRule};
 use armcal_core::spatial::exp;
@@ -37,7 +38,7 @@ const ROUNDING: f64 = 1e-12;
 
 /// Lowers the cost from the state of `problem` on; whether it came to rest.
 pub(super) fn minimize(problem: &mut MapProblem<'_>, loss: Loss, converged: f64) -> bool {
-    let mut normal = Normal::new(problem);
+    let mut normal = NormalEquations::new(problem);
     normal.update(problem, loss);
     let state = State::of(problem);
     let mut search = Search { problem, loss, normal, state, has_trial: false };
@@ -55,7 +56,7 @@ pub(super) fn minimize(problem: &mut MapProblem<'_>, loss: Loss, converged: f64)
 struct Search<'a, 'b> {
     problem: &'a mut MapProblem<'b>,
     loss: Loss,
-    normal: Normal,
+    normal: NormalEquations,
     /// What was accepted last.
     state: State,
     has_trial: bool,
@@ -119,7 +120,7 @@ impl State {
 }
 
 /// Takes one damped step; `false` where the system is singular.
-fn step(problem: &mut MapProblem<'_>, normal: &Normal, damping: f64) -> bool {
+fn step(problem: &mut MapProblem<'_>, normal: &NormalEquations, damping: f64) -> bool {
     let Some(Reduced { system, right, inverses }) = normal.reduce(problem, damping) else { return false };
     let Some(factor) = system.factorize() else { return false };
     let nodes = factor.solve(&right);

@@ -6,7 +6,7 @@
 
 use nalgebra::{Isometry3, Matrix3, Matrix6, UnitQuaternion, Vector3};
 
-use crate::tagmap::linearize::Normal;
+use crate::tagmap::normal_equations::NormalEquations;
 use crate::tagmap::problem::{AttitudeLink, Block, Extra, MapProblem};
 
 fn error(problem: &MapProblem<'_>, link: &AttitudeLink) -> Vector3<f64> {
@@ -32,7 +32,7 @@ fn nodes(problem: &MapProblem<'_>, link: &AttitudeLink) -> [usize; 3] {
     [of(link.moving), of(link.fixed), problem.extras[link.world].node]
 }
 
-pub(super) fn add(normal: &mut Normal, problem: &MapProblem<'_>) {
+pub(super) fn add(normal: &mut NormalEquations, problem: &MapProblem<'_>) {
     for link in &problem.links {
         let residual = -error(problem, link);
         let fixed = problem.blocks[link.fixed].pose.rotation.inverse().to_rotation_matrix();

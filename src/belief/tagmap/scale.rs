@@ -6,8 +6,8 @@
 
 use nalgebra::Vector3;
 
-use crate::tagmap::initial_guess::is_rigid;
 use crate::tagmap::screen::Screened;
+use crate::tagmap::tag_pairs::is_rigid;
 use crate::tagmap::types::MapInput;
 
 /// A size that cannot be right.

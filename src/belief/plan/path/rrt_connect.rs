@@ -9,7 +9,7 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 use crate::plan::motion::edge::{Edge, Path, SLOWEST};
-use crate::plan::path::planner::{PathPlanner, between};
+use crate::plan::path::edge_check::{PathPlanner, between};
 use armcal_core::streams::{JointAngles, MAX_JOINTS};
 
 /// Longest step by which a tree grows: of a joint that moves the arm's farthest point most, rad.

@@ -8,8 +8,9 @@ use nalgebra::Vector3;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
+use crate::plan::PlanError;
 use crate::plan::view_planning::camera_ik::CameraGoal;
-use crate::plan::view_planning::{PlanError, PoseRequest};
+use crate::plan::view_planning::request::PoseRequest;
 use armcal_core::kinematics::JointLimits;
 use armcal_core::robot::Robot;
 use armcal_core::streams::{JointAngles, MAX_JOINTS};

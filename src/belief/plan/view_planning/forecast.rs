@@ -6,8 +6,8 @@
 
 use nalgebra::{Cholesky, DMatrix, Matrix6, Vector3};
 
-use crate::plan::view_planning::PoseRequest;
 use crate::plan::view_planning::parameter_prior::{ParameterPrior, WIDTH, basis};
+use crate::plan::view_planning::request::PoseRequest;
 use crate::plan::view_planning::view_information::ViewJacobian;
 use armcal_core::robot::Robot;
 use armcal_core::stats::quantile;

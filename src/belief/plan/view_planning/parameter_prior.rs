@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, Matrix6, Vector6};
 
 use crate::calib::bundle::{Hyperparameters, MOUNT_ROWS};
 use crate::calib::{Calibration, Parameter, ParameterKind};
-use crate::plan::view_planning::PoseRequest;
+use crate::plan::view_planning::request::PoseRequest;
 use armcal_core::robot::{FailedKind, Robot};
 use armcal_core::sensor::{N_SHAPE, nonlinearity_basis};
 use armcal_core::spatial::adjoint;

@@ -6,7 +6,8 @@ use nalgebra::{Isometry3, Translation3};
 use serde::Deserialize;
 
 use crate::tagmap::check::SIZE_RANGE_M;
-use crate::tagmap::files::{TagFile, yaml};
+use crate::tagmap::files::tag_file::TagFile;
+use crate::tagmap::files::yaml;
 use crate::tagmap::types::{Body, TagPrior};
 use armcal_core::robot::{FileIssue, RobotError};
 

@@ -1,9 +1,9 @@
 //! Our tag map file.
 //!
-//! `version = 1`, `frame`, and one `[[tag]]` each with `id` (or `name`, for a landmark that is no AprilTag), `size_m`, `position_m`,
-//! `quaternion_wxyz`, `position_std_m`; all but the first may be absent where nobody knows them. Further keys, all optional: `base_tag` and `default_size_m` (of tags that are not named) at the top; `rotation_std_rad` and `frame`
-//! of a tag that is in another frame than the file's, such as a group that nothing ties to the first; `[[body]]` with `name`
-//! and `moving`, for frames that move.
+//! `version = 1`, `frame`, and one `[[tag]]` each with `id` (or `name`, for a landmark that is not an AprilTag), `size_m`,
+//! `position_m`, `quaternion_wxyz` and `position_std_m`; all but the first may be absent. Further optional keys: `base_tag`
+//! and `default_size_m` (of tags without an entry) at the top; `rotation_std_rad` and `frame` of a tag in another frame than
+//! the file's, such as a separate group; `[[body]]` with `name` and `moving`, for frames that move.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -12,8 +12,9 @@ use nalgebra::Isometry3;
 use serde::Deserialize;
 
 use crate::tagmap::check::SIZE_RANGE_M;
-use crate::tagmap::files::landmarks::{FIRST_NAMED_ID, Landmark, LandmarkFile};
-use crate::tagmap::files::{TagFile, WrittenGroup};
+use crate::tagmap::files::landmark::{FIRST_NAMED_ID, Landmark, LandmarkFile};
+use crate::tagmap::files::tag_file::TagFile;
+use crate::tagmap::files::written::WrittenGroup;
 use crate::tagmap::types::{Body, TagPrior};
 use armcal_core::robot::{FileIssue, RobotError, parse_toml};
 use armcal_core::spatial::{Base, Pose, Tag};
