@@ -1,7 +1,7 @@
 //! The whole of a capture before anything moves: poses, the paths between them, and what each keeps clear.
 //!
-//! What a session does with the arm in hand, done on paper: the arm is taken to stand at its stowed pose, and to be as wrong
-//! as the datasheet, or an earlier calibration, allows.
+//! What a session does with the arm in hand, done on paper: the arm is taken to stand at its stowed pose, and to be as
+//! wrong as the datasheet, or an earlier calibration, allows.
 
 use rand_chacha::ChaCha8Rng;
 

@@ -26,8 +26,8 @@ impl ScriptRunner<'_, '_> {
         }
     }
 
-    /// Estimates from the views captured since the last calibration and goes on by that; where nothing can be told yet, by what
-    /// was believed before.
+    /// Estimates from the views captured since the last calibration and goes on by that; where nothing can be told yet,
+    /// by what was believed before.
     pub(crate) fn update_estimate(&mut self) -> Result<Option<Calibration>, SessionError> {
         let recording = self.driver.recorder.read_back()?;
         let began_s = self.driver.progress.wall_s();
@@ -70,7 +70,8 @@ impl ScriptRunner<'_, '_> {
         JointErrorBounds::believed(&calibration.scaled_robot(self.setup.robot), calibration, sensors)
     }
 
-    /// Root mean square of the tool's position error that `calibration` expects over the task, m; `None` without a task.
+    /// Root mean square of the tool's position error that `calibration` expects over the task, m; `None` without a
+    /// task.
     pub(crate) fn expected_tool_error_m(&self, calibration: &Calibration) -> Option<f64> {
         let targets: &[JointAngles] = &self.planned.as_ref()?.targets;
         let robot = calibration.scaled_robot(self.setup.robot);

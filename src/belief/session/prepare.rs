@@ -50,8 +50,8 @@ impl ScriptRunner<'_, '_> {
         !VisibilityModel::default().visible(&self.robot, self.clearance, angles).is_empty()
     }
 
-    /// Believed angles at the task's targets. Those that are reached for before any calibration must be clear for every arm that the
-    /// datasheet allows; for the others it is enough that the believed arm gets there.
+    /// Believed angles at the task's targets. Those that are reached for before any calibration must be clear for every
+    /// arm that the datasheet allows; for the others it is enough that the believed arm gets there.
     fn plan_task(&mut self) -> Result<Vec<JointAngles>, SessionError> {
         let routine = self.setup.routine;
         let margin_m = self.margin_m();

@@ -37,8 +37,8 @@ pub struct MotionAhead {
     /// Number of straight edges of the path.
     pub edges: usize,
     pub duration_s: f64,
-    /// Certified clearance of every arm within the error bounds, m, less the bound of the vehicle's motion; `None` for motions
-    /// with another proof (scale identification, end stops).
+    /// Certified clearance of every arm within the error bounds, m, less the bound of the vehicle's motion; `None` for
+    /// motions with another proof (scale identification, end stops).
     pub clearance_m: Option<f64>,
 }
 

@@ -12,7 +12,8 @@ use armcal_core::sensor::ArmSensors;
 use armcal_core::stats::stream_rng;
 use armcal_core::streams::{Arm, JointAngles, LogLevel, Mark, MarkKind, Message, Phase, ReachAttempt};
 
-/// Shares of the clearance that are tried in this order for a path from a place that the whole of it does not let the arm leave.
+/// Shares of the clearance that are tried in this order for a path from a place that the whole of it does not let the
+/// arm leave.
 const START_SHARES: [f64; 3] = [0.5, 0.2, 0.05];
 
 /// Carries out the routine's script.
@@ -155,7 +156,8 @@ impl ScriptRunner<'_, '_> {
         let mut planner = PathPlanner { clearance, bounds, limits: &limits, margin_m };
         let mut outcome = planner.plan(&from, to, &mut self.rng);
         for share in START_SHARES {
-            // A new calibration, or open jaws, may find the arm nearer to something than it believed to be: it must get away.
+            // A new calibration, or open jaws, may find the arm nearer to something than it believed to be: it must get
+            // away.
             let is_stuck = match &outcome {
                 Err(PathError::StartTooNear { .. }) => true,
                 // Clear where it stands, and not for what a joint strays by as soon as it moves.

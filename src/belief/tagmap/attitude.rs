@@ -1,8 +1,8 @@
 //! The attitude sensor: how a moving body is turned, seen against a fixed one.
 //!
-//! With the sensor's A = world_from_moving, the rotations of the two blocks M = moving_from_camera and F = fixed_from_camera
-//! of one view, and W = world_from_fixed, unknown but the same in all views: `E = F^-1 W^-1 A M` is the identity but for the
-//! sensor's error. residual = -log(E); on the right, dE = xi_M - xi_F - F^-1 xi_W.
+//! With the sensor's A = world_from_moving, the rotations of the two blocks M = moving_from_camera and F =
+//! fixed_from_camera of one view, and W = world_from_fixed, unknown but the same in all views: `E = F^-1 W^-1 A M` is
+//! the identity but for the sensor's error. residual = -log(E); on the right, dE = xi_M - xi_F - F^-1 xi_W.
 
 use nalgebra::{Isometry3, Matrix3, Matrix6, UnitQuaternion, Vector3};
 

@@ -1,7 +1,8 @@
 //! Where to begin: groups of tags that images connect, each laid out from the relative poses that images vote for.
 //!
-//! Pairs of tags are joined in the order of how much is seen of both (a spanning tree, Kruskal 1956), so long as the vote
-//! of their images carries; a pair whose images contradict each other is passed over. `grow` then lays the groups out anew.
+//! Pairs of tags are joined in the order of how much is seen of both (a spanning tree, Kruskal 1956), so long as the
+//! vote of their images carries; a pair whose images contradict each other is passed over. `grow` then lays the groups
+//! out anew.
 
 use nalgebra::Isometry3;
 

@@ -105,7 +105,8 @@ impl NormalEquations {
         }
     }
 
-    /// residual = log(T^-1 B P) for a tag at T whose place on a body at B is P; B is the identity for the group's own body.
+    /// residual = log(T^-1 B P) for a tag at T whose place on a body at B is P; B is the identity for the group's own
+    /// body.
     fn add_prior(&mut self, problem: &MapProblem<'_>, tag: &TagState) {
         let (Some(prior), Some(node)) = (&tag.prior, tag.node) else { return };
         let owner = prior.owner.map(|owner| &problem.extras[owner]);

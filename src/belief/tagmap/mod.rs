@@ -1,9 +1,9 @@
 //! Tag mapping: poses of tags from camera views alone; no joint angle is used.
 //!
-//! `screen` validates detections and solves each square; `vote`, `initial_guess` and `incremental_layout` lay out groups of
-//! tags; `linearize`, `normal_equations`, `sparse` and `adjust` are the bundle adjustment on corner pixels (Triggs et al.
-//! 2000); `result` is the map with its accuracy; `scale` finds wrong tag sizes. `files` reads and writes files of tags and
-//! cameras, `recording` gets views from recordings.
+//! `screen` validates detections and solves each square; `vote`, `initial_guess` and `incremental_layout` lay out
+//! groups of tags; `linearize`, `normal_equations`, `sparse` and `adjust` are the bundle adjustment on corner pixels
+//! (Triggs et al. 2000); `result` is the map with its accuracy; `scale` finds wrong tag sizes. `files` reads and writes
+//! files of tags and cameras, `recording` gets views from recordings.
 
 mod adjust;
 mod assemble;

@@ -32,7 +32,8 @@ pub(super) struct NormalEquations {
 }
 
 impl NormalEquations {
-    /// The reduced system with `damping` added to each diagonal, relative to it; and the inverses of the eliminated blocks.
+    /// The reduced system with `damping` added to each diagonal, relative to it; and the inverses of the eliminated
+    /// blocks.
     pub(super) fn reduce(&self, problem: &MapProblem<'_>, damping: f64) -> Option<Reduced> {
         let mut system = System::zeros(&self.pattern);
         let mut right = self.nodes_right.clone();
@@ -90,7 +91,8 @@ impl NormalEquations {
     }
 }
 
-/// Keeps a step possible while some camera or tag sees nothing at all: what is determined has 1e4 and more (1/m^2, 1/rad^2).
+/// Keeps a step possible while some camera or tag sees nothing at all: what is determined has 1e4 and more (1/m^2,
+/// 1/rad^2).
 const UNDETERMINED: f64 = 1e-6;
 
 fn damped(block: &Matrix6<f64>, damping: f64) -> Matrix6<f64> {

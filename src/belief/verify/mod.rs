@@ -1,6 +1,7 @@
 //! Verification of reaches as far as the arm itself can tell.
 //!
-//! `reach_rest` gives the believed tool position at each target. `score` compares it with the truth, which is unknown here.
+//! `reach_rest` gives the believed tool position at each target. `score` compares it with the truth, which is unknown
+//! here.
 
 mod reach_rest;
 

@@ -1,8 +1,8 @@
 //! Recordings of real arms by an input map (TOML).
 //!
-//! `map` reads the input map: topics, frames and names. `external` reads a recording by it, message by message, into raw joint
-//! readings (`joints`) and detections (`tags`); it pairs and averages nothing. `task` reads `--task` files, the targets that
-//! the arm is calibrated for.
+//! `map` reads the input map: topics, frames and names. `external` reads a recording by it, message by message, into
+//! raw joint readings (`joints`) and detections (`tags`); it pairs and averages nothing. `task` reads `--task` files,
+//! the targets that the arm is calibrated for.
 
 mod error;
 mod external;

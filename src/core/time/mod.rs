@@ -1,7 +1,7 @@
 //! Time stamps.
 //!
-//! All streams have nanoseconds since a fixed epoch; a duration is seconds in `f64`. The library reads no clock: simulator and
-//! recorder give the time, so that the library stays deterministic.
+//! All streams have nanoseconds since a fixed epoch; a duration is seconds in `f64`. The library reads no clock:
+//! simulator and recorder give the time, so that the library stays deterministic.
 
 mod stamp;
 

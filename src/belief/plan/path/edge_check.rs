@@ -36,8 +36,8 @@ impl PathPlanner<'_> {
         self.keeps_clear(&Edge { from: *from, to: *to, time_scale: SLOWEST }, &mut 0)
     }
 
-    /// How slow the straight edge must be driven for that, as little as will do; `None` where no slowness up to `at_most` does.
-    /// `n_regions` grows by what it cost.
+    /// How slow the straight edge must be driven for that, as little as will do; `None` where no slowness up to
+    /// `at_most` does. `n_regions` grows by what it cost.
     pub(crate) fn time_scale(
         &self,
         from: &JointAngles,

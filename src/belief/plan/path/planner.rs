@@ -1,7 +1,7 @@
 //! Path planning between two configurations.
 //!
-//! The straight edge is tried first. Where it is blocked, RRT-Connect (`rrt_connect`) searches a path, and shortcuts make
-//! it faster. An error names the closest goal that can be reached on the straight edge.
+//! The straight edge is tried first. Where it is blocked, RRT-Connect (`rrt_connect`) searches a path, and shortcuts
+//! make it faster. An error names the closest goal that can be reached on the straight edge.
 
 use rand_chacha::ChaCha8Rng;
 

@@ -64,7 +64,8 @@ fn duration_s(planner: &PathPlanner<'_>, waypoints: &[JointAngles]) -> f64 {
     planner.clearance.timing().path_duration_s(&path)
 }
 
-/// In all three sites, under wide and narrow bounds: paths are found, keep clear wherever one looks, and are the same again.
+/// In all three sites, under wide and narrow bounds: paths are found, keep clear wherever one looks, and are the same
+/// again.
 #[test]
 fn paths_are_found_and_keep_clear_and_are_the_same_again() {
     for name in ["open-frame", "tight-basket", "under-ice"] {

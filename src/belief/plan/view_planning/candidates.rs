@@ -1,8 +1,9 @@
 //! Poses that may be taken: they see enough tags for most arms that the belief allows, and keep clear for every one.
 //!
-//! Drawn in turn evenly over the narrowed joint ranges, from boxes of growing size around where the arm is (under a wide belief only
-//! poses near the present one are certain to be clear), and by the camera's inverse kinematics at the tags. Cheap tests come
-//! first: field of view, clearance of the believed arm, probability of the tags, the certificate, what hides them.
+//! Drawn in turn evenly over the narrowed joint ranges, from boxes of growing size around where the arm is (under a
+//! wide belief only poses near the present one are certain to be clear), and by the camera's inverse kinematics at the
+//! tags. Cheap tests come first: field of view, clearance of the believed arm, probability of the tags, the
+//! certificate, what hides them.
 
 use nalgebra::Vector3;
 use rand::RngExt;
@@ -86,7 +87,8 @@ pub(crate) struct Search<'a> {
     pub refused: InfeasibleCounts,
 }
 
-/// Joints from this one on do not move the camera; they stay where they are, but for those that turn a tag on the gripper.
+/// Joints from this one on do not move the camera; they stay where they are, but for those that turn a tag on the
+/// gripper.
 fn n_seen(robot: &Robot) -> usize {
     robot.camera.mount.n_joints
 }
@@ -250,7 +252,8 @@ impl<'a> Search<'a> {
     }
 }
 
-/// Errors between the bounds by the distribution that the sum of a gain's and an offset's uniform error has: a triangle.
+/// Errors between the bounds by the distribution that the sum of a gain's and an offset's uniform error has: a
+/// triangle.
 fn arms() -> [[f64; MAX_JOINTS]; N_ARMS] {
     let mut step = 1.0;
     let steps: [f64; MAX_JOINTS] = std::array::from_fn(|_| {

@@ -1,9 +1,10 @@
 //! View planning: the calibration views with the most information for the task and the arm's time.
 //!
-//! `candidates` draws poses that see enough tags and keep the margin, some by inverse kinematics of the camera (`camera_ik`).
-//! `parameter_prior` is the covariance of the parameters; a view is a rank-6 update of it (`view_information`, `criterion`).
-//! `selection` chooses views, `visit_order` orders them, `forecast` predicts the tool error, `stop_reason` ends the capture.
-//! The default objective is the test-pose criterion of Klimchik et al. (2014).
+//! `candidates` draws poses that see enough tags and keep the margin, some by inverse kinematics of the camera
+//! (`camera_ik`). `parameter_prior` is the covariance of the parameters; a view is a rank-6 update of it
+//! (`view_information`, `criterion`). `selection` chooses views, `visit_order` orders them, `forecast` predicts the
+//! tool error, `stop_reason` ends the capture. The default objective is the test-pose criterion of Klimchik et al.
+//! (2014).
 
 mod camera_ik;
 mod candidates;

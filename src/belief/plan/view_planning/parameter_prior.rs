@@ -1,8 +1,9 @@
 //! What is not known of the arm, as one covariance that every view makes smaller.
 //!
-//! Columns: of each joint before the camera gain, offset and the coefficients of its nonlinearity ([`WIDTH`] in all), then the
-//! camera's mount (translation m, rotation rad, on the right) and the survey's common error (a twist of all tags together
-//! in the base frame). The covariance is what the estimator `bundle` takes for its prior, or the running estimate's.
+//! Columns: of each joint before the camera gain, offset and the coefficients of its nonlinearity ([`WIDTH`] in all),
+//! then the camera's mount (translation m, rotation rad, on the right) and the survey's common error (a twist of all
+//! tags together in the base frame). The covariance is what the estimator `bundle` takes for its prior, or the running
+//! estimate's.
 
 use nalgebra::{DMatrix, Matrix6, Vector6};
 

@@ -47,8 +47,8 @@ impl DesignInputs {
     }
 }
 
-/// Where tags have to be mapped first, one view in so many shows one whose place is known: the map hangs on that tag, and is turned
-/// about it by as much as its corners leave its direction open.
+/// Where tags have to be mapped first, one view in so many shows one whose place is known: the map hangs on that tag,
+/// and is turned about it by as much as its corners leave its direction open.
 const ANCHORED_EVERY: usize = 2;
 
 impl PosePool {
@@ -80,8 +80,8 @@ impl PosePool {
         self.candidates.is_empty()
     }
 
-    /// Chooses `request.n_fit` views for the fit and `n_held_out` for the verdict, by `request.capture.choose`; fewer where there are
-    /// fewer and the choice will be renewed anyway (`capture.replan_every`).
+    /// Chooses `request.n_fit` views for the fit and `n_held_out` for the verdict, by `request.capture.choose`; fewer
+    /// where there are fewer and the choice will be renewed anyway (`capture.replan_every`).
     ///
     /// # Errors
     /// [`PlanError::TooFewPoses`].

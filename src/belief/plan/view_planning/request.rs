@@ -16,8 +16,8 @@ pub struct PosePlan {
     pub predicted_tool_error_m: f64,
     /// The same before any of them.
     pub tool_error_before_m: f64,
-    /// Fitted views, in this order, after which the tool error is predicted to be below `capture.stop_at_tool_error_m`; `None`
-    /// without that limit, or where these views do not reach it.
+    /// Fitted views, in this order, after which the tool error is predicted to be below `capture.stop_at_tool_error_m`;
+    /// `None` without that limit, or where these views do not reach it.
     pub needed: Option<usize>,
     /// Time of the arm, s: motion from rest to rest, settling (2 s assumed) and the dwell.
     pub arm_time_s: f64,
@@ -58,8 +58,8 @@ pub struct PoseRequest<'a> {
     pub n_held_out: usize,
     /// The interim estimate; `None`: the datasheets.
     pub belief: Option<&'a Calibration>,
-    /// Fitted views of the interim estimate. They share the survey's error with the views to come, so their information is
-    /// recomputed from `prior`; the interim estimate then gives only the noise. Empty: its covariance is used.
+    /// Fitted views of the interim estimate. They share the survey's error with the views to come, so their information
+    /// is recomputed from `prior`; the interim estimate then gives only the noise. Empty: its covariance is used.
     pub taken: &'a [CapturedView],
     /// Prior of the estimate before the first of `taken`; `None`: the datasheets.
     pub prior: Option<&'a Calibration>,
@@ -69,7 +69,8 @@ pub struct PoseRequest<'a> {
     pub failed: &'a [JointAngles],
     /// Joint angles of the arm at the task's targets.
     pub task: &'a [JointAngles],
-    /// Tool positions of the task. No capture pose is near them, so that the task tests configurations that are not fitted.
+    /// Tool positions of the task. No capture pose is near them, so that the task tests configurations that are not
+    /// fitted.
     pub targets_m: &'a [[f64; 3]],
     pub start: &'a JointAngles,
 }

@@ -1,7 +1,7 @@
 //! Landmarks of a tag map, and the survey that joints are calibrated by.
 //!
-//! A landmark may be less than an AprilTag: without size, without rotation, with a name instead of a number. The use of the
-//! detections decides whether that is enough.
+//! A landmark may be less than an AprilTag: without size, without rotation, with a name instead of a number. The use of
+//! the detections decides whether that is enough.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -48,8 +48,8 @@ pub struct NamedSurvey {
 impl LandmarkFile {
     /// The survey around `robot` for tags that are used so.
     ///
-    /// Of a landmark that is used by its position alone the rotation may be unknown (half a turn of sigma) and the size too (NaN).
-    /// A tag without any place can be used by its corners: its place is found from the views.
+    /// Of a landmark that is used by its position alone the rotation may be unknown (half a turn of sigma) and the size
+    /// too (NaN). A tag without any place can be used by its corners: its place is found from the views.
     ///
     /// # Errors
     /// [`FileIssue`] naming `file`, the landmark and the key.
