@@ -242,7 +242,8 @@ impl Planner<'_> {
         }
         let nearest = self.request.clearance.find_violation_arriving(angles, self.bounds(), self.margin_m())?;
         Some(format!(
-            "the pose comes within {:.3} m of clearance between {nearest} for an arm within the sensors' error; {:.3} m are needed",
+            "the pose comes within {:.3} m of clearance between {nearest} for an arm within the sensors' error; \
+             {:.3} m are needed",
             nearest.distance_m,
             self.margin_m()
         ))

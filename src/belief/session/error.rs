@@ -19,7 +19,8 @@ pub enum SessionError {
     #[error("the arm sends no joint readings")]
     NoReadings,
     #[error(
-        "none of the {planned} planned poses was captured: to {blocked} no path led, at {restless} the arm did not come to \
+        "none of the {planned} planned poses was captured: to {blocked} no path led, at {restless} the arm did not \
+         come to \
          rest by its own sensors (too noisy, or it oscillates?)"
     )]
     NothingCaptured { planned: usize, blocked: usize, restless: usize },

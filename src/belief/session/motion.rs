@@ -303,7 +303,8 @@ impl<'b> Driver<'b> {
         self.set_point = at;
         self.command()?;
         let text = format!(
-            "bump: {} is {behind_rad:.3} rad from its set-point, {allowed_rad:.3} rad would still be usual; the arm stops and \
+            "bump: {} is {behind_rad:.3} rad from its set-point, {allowed_rad:.3} rad would still be usual; the arm \
+             stops and \
              backs out along the path it came",
             self.robot.sensors[joint].joint
         );

@@ -209,7 +209,8 @@ impl ScriptRunner<'_, '_> {
         self.progress_at(Phase::Move, 0, 1);
         if let Some(nearest) = self.clearance.find_violation_arriving(&to, &self.bounds, self.margin_m()) {
             return Err(wrong(format!(
-                "the pose comes within {:.3} m of clearance between {nearest} for an arm within the sensors' error; {:.3} m are needed",
+                "the pose comes within {:.3} m of clearance between {nearest} for an arm within the sensors' error; \
+                 {:.3} m are needed",
                 nearest.distance_m,
                 self.margin_m()
             )));

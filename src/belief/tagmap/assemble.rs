@@ -82,7 +82,8 @@ fn doubts(problem: &MapProblem<'_>) -> Vec<String> {
             if off.component_mul(&prior.information).dot(&off) > FAR_FROM_KNOWN {
                 let (mm, deg) = (off.fixed_rows::<3>(0).norm() * 1e3, off.fixed_rows::<3>(3).norm().to_degrees());
                 out.push(format!(
-                    "tag {id}: its known place disagrees with the views by {mm:.1} mm and {deg:.2} deg, beyond its standard deviations"
+                    "tag {id}: its known place disagrees with the views by {mm:.1} mm and {deg:.2} deg, beyond its \
+                     standard deviations"
                 ));
             }
         }

@@ -234,7 +234,8 @@ mod tests {
 
     fn mesh(keys: &str) -> String {
         format!(
-            "shape = \"mesh\"\nposition_m = [1, 2, 3]\nquaternion_wxyz = [0.7071067811865476, 0, 0, 0.7071067811865476]\n{keys}"
+            "shape = \"mesh\"\nposition_m = [1, 2, 3]\nquaternion_wxyz = [0.7071067811865476, 0, 0, \
+             0.7071067811865476]\n{keys}"
         )
     }
 

@@ -57,7 +57,8 @@ impl SelfPairs {
         let text = toml::to_string(&raw)
             .map_err(|error| FileIssue::new(file, "pair", format!("has no TOML form: {error}")))?;
         Ok(format!(
-            "# Links of this arm that can come nearer to each other than near_m, among n random configurations within the joint\n\
+            "# Links of this arm that can come nearer to each other than near_m, among n random configurations \
+             within the joint\n\
              # limits and the datasheet's errors beyond them. Neighbours along the chain are left out. Made by\n\
              # `armcal study pairs {}`; make it anew when the URDF changes.\n{text}",
             robot.folder.display()

@@ -6,7 +6,8 @@ use armcal_core::streams::JointAngles;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PathError {
     #[error(
-        "no way round was found after {tried} attempts; what blocks the straight way is {nearest} ({distance_m:.3} m), and \
+        "no way round was found after {tried} attempts; what blocks the straight way is {nearest} ({distance_m:.3} \
+         m), and \
          {free:.0} % of it are free",
         free = 100.0 * free_share
     )]

@@ -307,7 +307,8 @@ impl InfeasibleCounts {
             return format!("{unsure} poses see enough tags only if the joints are where they are believed to be");
         }
         format!(
-            "{enough} poses have enough tags in view, but the believed arm touches something there, or its tool is at a target"
+            "{enough} poses have enough tags in view, but the believed arm touches something there, or its tool is \
+             at a target"
         )
     }
 }

@@ -62,7 +62,8 @@ mod tests {
     use crate::tagmap::files::landmark::{FIRST_NAMED_ID, NamedSurvey, UNKNOWN_ROTATION_STD_RAD};
     use armcal_core::input::TagUse;
 
-    const TWO: &str = "version = 1\nframe = \"base_link\"\n[[tag]]\nid = 2\nsize_m = 0.16\nposition_m = [0.0, 0.0, 1.0]\n\
+    const TWO: &str = "version = 1\nframe = \"base_link\"\n[[tag]]\nid = 2\nsize_m = 0.16\nposition_m = [0.0, 0.0, \
+        1.0]\n\
         quaternion_wxyz = [1.0, 0.0, 0.0, 0.0]\nposition_std_m = [0.001, 0.002, 0.003]\n\
         [[tag]]\nname = \"board\"\nposition_m = [0.1, 0.2, 0.3]\n";
 

@@ -194,7 +194,8 @@ fn what_is_wrong_with_a_camera_is_said_with_file_key_and_what_is_supported() {
     let model = with("distortion_model: equidistant", "distortion_model: omni");
     assert_eq!(
         model,
-        "cameras.yaml: cam0.distortion_model: `omni` is not supported; use equidistant (fisheye), radtan (plumb_bob), none"
+        "cameras.yaml: cam0.distortion_model: `omni` is not supported; use equidistant (fisheye), radtan \
+         (plumb_bob), none"
     );
     assert!(
         with("camera_model: pinhole", "camera_model: ds")
