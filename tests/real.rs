@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use armcal::calib::{
-    Calibration, CalibrationData, ForeignContext, Status, TagMeasurement, calibrate_data, prepare_foreign,
+    Calibration, CalibrationData, ExternalContext, Status, TagMeasurement, calibrate_data, prepare_external,
 };
-use armcal::input::{ForeignRecording, InputMap, parse_input_map, parse_task, read_foreign};
+use armcal::input::{ExternalRecording, InputMap, parse_input_map, parse_task, read_external};
 use armcal::log::{RecordingHeader, RecordingWriter, RosMessage, ros};
 use armcal::robot::{Robot, TagSurvey};
 use armcal::routine::Method;
@@ -15,7 +15,7 @@ use armcal::tagmap::files::read_landmarks;
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use serde_json::Value;
 
-use crate::support::foreign::{
+use crate::support::external::{
     AS_IN_2018, INPUT_MAP, Noise, Pose, RealTitan, at, header, joint_state, transform, write_poses,
 };
 use crate::support::synthetic::{N_SEEN, TrueArm, add_noise};
@@ -106,8 +106,8 @@ fn a_real_titans_recording_gives_all_figures_and_the_papers_objective() {
 }
 
 fn prepared(robot: &Robot, path: &Path, map: &InputMap) -> CalibrationData {
-    let recording: ForeignRecording = read_foreign(path, map, robot).expect("it reads");
-    prepare_foreign(&[recording], map, robot, ForeignContext::default()).expect("views")
+    let recording: ExternalRecording = read_external(path, map, robot).expect("it reads");
+    prepare_external(&[recording], map, robot, ExternalContext::default()).expect("views")
 }
 
 /// The robot with the landmarks, and the views.
@@ -396,7 +396,7 @@ fn streams_become_one_view_for_each_rest_of_the_arm() {
 }
 
 #[test]
-fn corners_of_a_foreign_detector_are_used_as_our_own_are() {
+fn corners_of_an_external_detector_are_used_as_our_own_are() {
     let robot = titan();
     let mut rng = stream_rng(10, "corners");
     let arm = TrueArm::with_sensor_errors(&robot, &mut rng);

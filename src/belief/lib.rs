@@ -1,4 +1,4 @@
-//! BELIEF: what an arm can tell of itself.
+//! Belief: estimates and plans from messages of the arm alone.
 #![forbid(unsafe_code)]
 
 pub mod calib;

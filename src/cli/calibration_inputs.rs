@@ -5,13 +5,13 @@ use std::path::{Path, PathBuf};
 use anyhow::Result;
 
 use crate::cli::exit::UsageError;
-use crate::cli::losses::{warn_of_foreign, warn_of_losses};
+use crate::cli::losses::{warn_of_external, warn_of_losses};
 use armcal_belief::calib::{
-    Calibration, CalibrationFileError, ForeignContext, Status, calibrate, calibrate_data, calibrate_with_survey,
-    prepare_foreign, prepare_pooled,
+    Calibration, CalibrationFileError, ExternalContext, Status, calibrate, calibrate_data, calibrate_with_survey,
+    prepare_external, prepare_pooled,
 };
 use armcal_belief::tagmap::files::{LandmarkFile, NamedSurvey, read_landmarks};
-use armcal_core::input::{ChildFrame, InputMap, TagUse, read_foreign, read_input_map, read_task};
+use armcal_core::input::{ChildFrame, InputMap, TagUse, read_external, read_input_map, read_task};
 use armcal_core::log::read_recording;
 use armcal_core::robot::{FileIssue, Robot};
 use armcal_core::routine::Method;
@@ -36,7 +36,7 @@ impl CalibrationInputs<'_> {
             self.task.map(|file| Ok::<_, anyhow::Error>(read_task(file)?.for_robot(file, self.robot)?)).transpose()?;
         let landmarks = self.tag_map.map(|file| Ok::<_, anyhow::Error>((file, read_landmarks(file)?))).transpose()?;
         match self.input {
-            Some(file) => self.of_foreign(file, landmarks, task, prior.as_ref()),
+            Some(file) => self.of_external(file, landmarks, task, prior.as_ref()),
             None => self.of_own(landmarks, task, prior.as_ref()),
         }
     }
@@ -78,7 +78,7 @@ impl CalibrationInputs<'_> {
     }
 
     /// Recordings of a real arm, by an input map.
-    fn of_foreign(
+    fn of_external(
         &self,
         file: &Path,
         landmarks: Option<(&Path, LandmarkFile)>,
@@ -101,15 +101,15 @@ impl CalibrationInputs<'_> {
         let mut recordings = Vec::new();
         let mut lost = false;
         for path in self.recordings {
-            let recording = read_foreign(path, &map, &robot)?;
-            lost |= warn_of_foreign(&recording, &robot);
+            let recording = read_external(path, &map, &robot)?;
+            lost |= warn_of_external(&recording, &robot);
             recordings.push(recording);
         }
         if task.is_none() {
             eprintln!("note: no task is named (--task), so that no tool error is predicted");
         }
-        let context = ForeignContext { task, landmark_names: named.names, plain_landmark };
-        let prepared = prepare_foreign(&recordings, &map, &robot, context)?;
+        let context = ExternalContext { task, landmark_names: named.names, plain_landmark };
+        let prepared = prepare_external(&recordings, &map, &robot, context)?;
         Ok((calibrate_data(prepared, self.method, prior)?, lost))
     }
 }

@@ -1,6 +1,6 @@
 //! What of a recording could not be used, said on stderr.
 
-use armcal_core::input::ForeignRecording;
+use armcal_core::input::ExternalRecording;
 use armcal_core::log::{Completeness, Recording};
 use armcal_core::robot::Robot;
 
@@ -31,7 +31,7 @@ pub(super) fn warn_of_losses(recording: &Recording) -> bool {
 }
 
 /// Says on stderr what of a real arm's recording is not used; `true` if something was lost.
-pub(super) fn warn_of_foreign(recording: &ForeignRecording, robot: &Robot) -> bool {
+pub(super) fn warn_of_external(recording: &ExternalRecording, robot: &Robot) -> bool {
     let file = recording.path.display();
     let is_whole = recording.completeness == Completeness::Whole;
     if !is_whole {

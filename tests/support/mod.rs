@@ -1,6 +1,6 @@
 //! What several modules need: a short routine, the program's answers, one run that all share, and edited copies of files.
 
-pub mod foreign;
+pub mod external;
 pub mod synthetic;
 
 use std::fmt::Write as _;

@@ -45,7 +45,7 @@ pub use result::{
     ReferenceTable, Status, SurveyCoverage, TermsTable, ValidRange, VerdictTable, covariance_file,
 };
 pub use views::{
-    CalibrationData, CaptureData, ConditionHistory, EndStopReading, ForeignContext, HeldOut, IdentifiedScale,
+    CalibrationData, CaptureData, ConditionHistory, EndStopReading, ExternalContext, HeldOut, IdentifiedScale,
     MeanCorners, ObservationRejection, TagMeasurement, TagObservation, View, associate, associate_within,
-    identify_scales, prepare_foreign, prepare_pooled, surveyed,
+    identify_scales, prepare_external, prepare_pooled, surveyed,
 };

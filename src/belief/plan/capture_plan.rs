@@ -1,7 +1,7 @@
 //! The whole of a capture before anything moves: poses, the paths between them, and what each keeps clear.
 //!
-//! What a session does with the arm in hand, done on paper: the arm is taken to stand at its stowed pose, and to be as wrong
-//! as the datasheet, or an earlier calibration, allows.
+//! What a session does with the arm in hand, done on paper: the arm is taken to stand at its stowed pose, and to be as
+//! wrong as the datasheet, or an earlier calibration, allows.
 
 use rand_chacha::ChaCha8Rng;
 
@@ -242,7 +242,8 @@ impl Planner<'_> {
         }
         let nearest = self.request.clearance.find_violation_arriving(angles, self.bounds(), self.margin_m())?;
         Some(format!(
-            "the pose comes within {:.3} m of clearance between {nearest} for an arm within the sensors' error; {:.3} m are needed",
+            "the pose comes within {:.3} m of clearance between {nearest} for an arm within the sensors' error; \
+             {:.3} m are needed",
             nearest.distance_m,
             self.margin_m()
         ))

@@ -20,7 +20,8 @@ pub enum PlanError {
     )]
     StartTooClose { clearance_m: f64, nearest: String, needed_m: f64 },
     #[error(
-        "no pose was found that sees {min_tags} of the {n_tags} surveyed tags and keeps {clearance_m:.3} m clear ({tried} tried): {hint}"
+        "no pose was found that sees {min_tags} of the {n_tags} surveyed tags and keeps {clearance_m:.3} m clear \
+         ({tried} tried): {hint}"
     )]
     NoUsefulPose { min_tags: u32, n_tags: usize, clearance_m: f64, tried: usize, hint: String },
     #[error("no pose was found that sees {min_tags} of the {n_tags} surveyed tags: min_tags may be 1 to {n_tags}")]

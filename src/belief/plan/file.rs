@@ -11,7 +11,8 @@ use crate::plan::view_planning::StopReason;
 use armcal_core::robot::{FileIssue, Robot, RobotError, parse_toml, read_text};
 use armcal_core::streams::{CaptureSet, JointAngles, MAX_JOINTS};
 
-/// One plan, as its file has it. Angles are believed ones, in rad; counts are what the arm's controller is sent for them.
+/// One plan, as its file has it. Angles are believed ones, in rad; counts are what the arm's controller is sent for
+/// them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PlanFile {
@@ -20,7 +21,8 @@ pub struct PlanFile {
     pub robot: String,
     pub vehicle: String,
     pub seed: u64,
-    /// Of the routine with what was replaced in it, the robot's and the vehicle's files, the prior and the program's version.
+    /// Of the routine with what was replaced in it, the robot's and the vehicle's files, the prior and the program's
+    /// version.
     pub inputs_hash: String,
     /// `datasheet`, or the hash of the messages that the calibration given as a prior rests on.
     pub prior: String,
@@ -110,7 +112,8 @@ pub struct PathTable {
     /// Both ends included; straight lines in joint space between, each from rest to rest.
     pub waypoints_rad: Vec<Vec<f64>>,
     pub waypoints_counts: Vec<Vec<f64>>,
-    /// Of the edge behind each waypoint but the last; those that must be driven slowly take longer than their joints need.
+    /// Of the edge behind each waypoint but the last; those that must be driven slowly take longer than their joints
+    /// need.
     pub edge_durations_s: Vec<f64>,
 }
 

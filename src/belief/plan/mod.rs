@@ -1,9 +1,9 @@
-//! BELIEF: which configurations to look from, and how to get there without touching anything while the joints are still wrong.
+//! Planning: calibration views, and paths that keep the margin while the joint sensors are not yet calibrated.
 //!
-//! `bounds`: how far a joint may be off; `motion`: how it moves along an edge; `clearance`: distances of one arm to what is around it; `certify`: the proof for every arm
-//! within the bounds, at a configuration or along an edge; `path`: RRT-Connect over certified edges;
-//! `visibility`: which tags are seen; `view_planning`: which views to capture; `targets`: the reach task. `capture_plan` puts all of
-//! it together before anything moves, `file` is plan.toml.
+//! `bounds`: joint error bounds; `motion`: time scaling and tracking error; `clearance`: distances of one arm to its
+//! environment; `certify`: the proof for every arm within the bounds; `path`: RRT-Connect over certified edges;
+//! `visibility`: visible tags; `view_planning`: views to capture; `targets`: the reach task. `capture_plan` combines
+//! them before the first motion, `file` is plan.toml.
 
 mod bounds;
 mod capture_plan;

@@ -56,8 +56,8 @@ impl VisibilityModel {
             .map(|(idx, _)| idx)
     }
 
-    /// Whether the camera sees the tag on the gripper, whose links hide it at some angles. It is meant to be near: only the
-    /// incidence, the image and what lies between count.
+    /// Whether the camera sees the tag on the gripper, whose links hide it at some angles. It is meant to be near: only
+    /// the incidence, the image and what lies between count.
     #[must_use]
     pub fn sees_gripper_tag(
         &self,

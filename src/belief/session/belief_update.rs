@@ -1,23 +1,16 @@
-//! What the arm believes while views are still being captured.
+//! Interim estimates during a capture.
 //!
-//! After every few views the recording so far is estimated, and the arm goes on by that: its set-points, its margins, the poses
-//! that it still wants. A calibration that is accepted in the end takes its place; one that is refused, and it is forgotten.
+//! After every few views the recording so far is estimated. Set-points, margins and the remaining poses then follow the
+//! interim estimate. The final calibration replaces it; if that is refused, the belief before the capture returns.
 
 use crate::calib::{Calibration, interim_estimate};
 use crate::plan::JointErrorBounds;
 use crate::session::SessionError;
 use crate::session::outcome::Epoch;
-use crate::session::script::{FreshBounds, ScriptRunner};
+use crate::session::runner::{SavedBelief, ScriptRunner};
 use armcal_core::routine::{CaptureSettings, Margins, Method};
 use armcal_core::sensor::ArmSensors;
 use armcal_core::streams::{JointAngles, LogLevel};
-
-/// What was believed before the first running estimate of a capture.
-pub(crate) struct SavedBelief {
-    sensors: ArmSensors,
-    bounds: JointErrorBounds,
-    fresh: Option<FreshBounds>,
-}
 
 impl ScriptRunner<'_, '_> {
     /// Whether this capture estimates as it goes.
@@ -33,8 +26,8 @@ impl ScriptRunner<'_, '_> {
         }
     }
 
-    /// Estimates from the views captured since the last calibration and goes on by that; where nothing can be told yet, by what
-    /// was believed before.
+    /// Estimates from the views captured since the last calibration and goes on by that; where nothing can be told yet,
+    /// by what was believed before.
     pub(crate) fn update_estimate(&mut self) -> Result<Option<Calibration>, SessionError> {
         let recording = self.driver.recorder.read_back()?;
         let began_s = self.driver.progress.wall_s();
@@ -77,7 +70,8 @@ impl ScriptRunner<'_, '_> {
         JointErrorBounds::believed(&calibration.scaled_robot(self.setup.robot), calibration, sensors)
     }
 
-    /// Root mean square of the tool's position error that `calibration` expects over the task, m; `None` without a task.
+    /// Root mean square of the tool's position error that `calibration` expects over the task, m; `None` without a
+    /// task.
     pub(crate) fn expected_tool_error_m(&self, calibration: &Calibration) -> Option<f64> {
         let targets: &[JointAngles] = &self.planned.as_ref()?.targets;
         let robot = calibration.scaled_robot(self.setup.robot);

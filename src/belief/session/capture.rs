@@ -7,7 +7,7 @@ use crate::plan::{
 };
 use crate::session::SessionError;
 use crate::session::outcome::{EstimateUpdate, Visit};
-use crate::session::script::ScriptRunner;
+use crate::session::runner::ScriptRunner;
 use armcal_core::robot::Robot;
 use armcal_core::routine::CaptureSettings;
 use armcal_core::stats::stream_rng;

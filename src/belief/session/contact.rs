@@ -1,9 +1,10 @@
 //! Whether the arm has run into something, by what it was told and what its own sensors say.
 //!
-//! A hydraulic joint is always a little behind its set-point: by a time that its valve takes, and, at rest, by what load and
-//! friction leave. How much is this arm's own matter and is learnt while it moves; a joint that stays farther off than
-//! that has been held up, or pushed away. This is the classical test of a residual against a threshold that goes with the
-//! motion (De Luca and Mattone 2003 do it with momentum, for arms that measure torques; this one measures angles alone).
+//! A hydraulic joint is always a little behind its set-point: by a time that its valve takes, and, at rest, by what
+//! load and friction leave. How much is this arm's own matter and is learnt while it moves; a joint that stays farther
+//! off than that has been held up, or pushed away. This is the classical test of a residual against a threshold that
+//! goes with the motion (De Luca and Mattone 2003 do it with momentum, for arms that measure torques; this one measures
+//! angles alone).
 
 use crate::session::settling::NEAR_RAD;
 use armcal_core::robot::Robot;
@@ -17,7 +18,8 @@ const MAX_PERIODS: usize = 32;
 const UNUSUAL: f64 = 2.5;
 /// Share of the distance within which a joint counts as at its set-point that is no touch, whatever has been usual.
 const NO_TOUCH: f64 = 0.5;
-/// What is taken for usual until something has been learnt: seconds behind a moving set-point, and distance from a resting one.
+/// What is taken for usual until something has been learnt: seconds behind a moving set-point, and distance from a
+/// resting one.
 const FIRST_LAG_S: f64 = 0.3;
 const FIRST_REST_RAD: f64 = 0.02;
 /// Edges that this first guess weighs as much as, and edges that are remembered.
@@ -235,7 +237,8 @@ mod tests {
             Self { watch: ContactDetector::new(robot, PERIOD_S), rng, joint_rad: 0.0, noise_rad: 0.001 }
         }
 
-        /// One edge at `rate` and a rest; `act` changes the joint after each period, and the reading. Gives when a bump was told, s.
+        /// One edge at `rate` and a rest; `act` changes the joint after each period, and the reading. Gives when a bump
+        /// was told, s.
         fn edge(&mut self, to: f64, rate_rad_s: f64, mut act: impl FnMut(f64, &mut f64, &mut f64)) -> Option<f64> {
             let from = WAY_RAD - to;
             let duration_s = WAY_RAD / rate_rad_s;

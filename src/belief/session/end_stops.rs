@@ -1,12 +1,12 @@
 //! Presses joints against their nominal end stops, one after the other, as joint limits wants them (Williams 1991).
 //!
-//! Each joint goes alone from the stowed pose, past its nominal stop by as much as its sensor may be wrong, so that every arm
-//! within the bounds comes to its stop. Where the vehicle, the arm itself or the seafloor may be in the way of any of them, the
-//! stop is refused and named: this is what makes the method useless on many vehicles.
+//! Each joint goes alone from the stowed pose, past its nominal stop by as much as its sensor may be wrong, so that
+//! every arm within the bounds comes to its stop. Where the vehicle, the arm itself or the seafloor may be in the way
+//! of any of them, the stop is refused and named: this is what makes the method useless on many vehicles.
 
 use crate::plan::{Edge, Path};
 use crate::session::SessionError;
-use crate::session::script::ScriptRunner;
+use crate::session::runner::ScriptRunner;
 use armcal_core::routine::StopsSettings;
 use armcal_core::streams::{JointAngles, LogLevel, MarkKind, Phase};
 

@@ -2,7 +2,7 @@
 
 use crate::plan::ClearanceModel;
 use crate::session::SessionError;
-use crate::session::script::ScriptRunner;
+use crate::session::runner::ScriptRunner;
 use armcal_core::routine::Step;
 use armcal_core::streams::{GripperCommand, LogLevel, Mark, MarkKind, Message};
 
@@ -14,8 +14,8 @@ const PATIENCE_S: f64 = 2.0;
 const AS_AT_REST_M: f64 = 1e-6;
 
 impl ScriptRunner<'_, '_> {
-    /// Drives the jaws to `opening`, 0 (closed) .. 1 (open), and waits until they are there. From then on the arm keeps their
-    /// width clear, until they are no wider than at rest.
+    /// Drives the jaws to `opening`, 0 (closed) .. 1 (open), and waits until they are there. From then on the arm keeps
+    /// their width clear, until they are no wider than at rest.
     pub(crate) fn grip(&mut self, step: usize, opening: f64) -> Result<(), SessionError> {
         let wrong = |problem: String| SessionError::Step { step, problem };
         let gripper = self.robot.gripper.clone().ok_or_else(|| wrong("the arm has no gripper".to_owned()))?;
@@ -23,7 +23,8 @@ impl ScriptRunner<'_, '_> {
         let is_wide = opening_m > gripper.rest_opening_m + AS_AT_REST_M;
         let crowded = |run: &Self| run.jaws.open.find_violation(&run.driver.set_point(), &run.bounds, 0.0);
         if is_wide && (crowded(self).is_some() || !self.can_leave(self.jaws.open)) {
-            // Folded up for a view the arm may be in its own jaws' way; where it is stowed there is room on any vehicle so far.
+            // Folded up for a view the arm may be in its own jaws' way; where it is stowed there is room on any vehicle
+            // so far.
             let stowed = self.robot.stowed;
             self.go(&stowed)?;
             self.driver.settle()?;
@@ -60,8 +61,8 @@ impl ScriptRunner<'_, '_> {
 }
 
 impl<'a> ScriptRunner<'a, '_> {
-    /// For the targets that are planned before anything moves: with open jaws if one is touched before a calibration, after
-    /// which they are planned anew.
+    /// For the targets that are planned before anything moves: with open jaws if one is touched before a calibration,
+    /// after which they are planned anew.
     pub(crate) fn clearance_at_targets(&self) -> &'a ClearanceModel<'a> {
         let mut uncalibrated = self.setup.routine.steps.iter().take_while(|step| !matches!(step, Step::Calibrate(_)));
         let is_touched = uncalibrated.any(|step| matches!(step, Step::Reach(reach) if reach.touch));

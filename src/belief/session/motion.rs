@@ -1,4 +1,5 @@
-//! Drives an arm along believed angles and waits until its own sensors say that it stands, or that it has met something.
+//! Drives an arm along believed angles and waits until its own sensors say that it stands, or that it has met
+//! something.
 
 use crate::plan::{Edge, Path, Timing};
 use crate::session::contact::{ContactDetector, ContactEvent};
@@ -302,7 +303,8 @@ impl<'b> Driver<'b> {
         self.set_point = at;
         self.command()?;
         let text = format!(
-            "bump: {} is {behind_rad:.3} rad from its set-point, {allowed_rad:.3} rad would still be usual; the arm stops and \
+            "bump: {} is {behind_rad:.3} rad from its set-point, {allowed_rad:.3} rad would still be usual; the arm \
+             stops and \
              backs out along the path it came",
             self.robot.sensors[joint].joint
         );
@@ -320,8 +322,8 @@ impl<'b> Driver<'b> {
         Ok(MotionOutcome::Bumped { joint, at })
     }
 
-    /// Waits until the arm stands at its set-point; `false` when it does not within the limit, or is pushed off: then it goes
-    /// back the way it came.
+    /// Waits until the arm stands at its set-point; `false` when it does not within the limit, or is pushed off: then
+    /// it goes back the way it came.
     pub fn settle(&mut self) -> Result<bool, SessionError> {
         match self.stand()? {
             Some(SettleOutcome::Still) => Ok(true),
@@ -352,7 +354,8 @@ impl<'b> Driver<'b> {
         Ok(None)
     }
 
-    /// Waits until the arm stands while `joint` is pressed against something; `false` when it does not within the limit.
+    /// Waits until the arm stands while `joint` is pressed against something; `false` when it does not within the
+    /// limit.
     pub fn press(&mut self, joint: usize) -> Result<bool, SessionError> {
         let mut stillness = SettlingDetector::new(self.believed_angles()?);
         let mut waited_s = 0.0;

@@ -53,8 +53,8 @@ pub struct Visit {
     pub believed: JointAngles,
     /// Views that this belief rests on.
     pub belief_views: usize,
-    /// Of the end of each link, from the first joint's on: the distance from where it is believed to be that is exceeded with a
-    /// probability of 1 %, m.
+    /// Of the end of each link, from the first joint's on: the distance from where it is believed to be that is
+    /// exceeded with a probability of 1 %, m.
     pub link_q99_m: Vec<f64>,
     /// Root mean square over the task, m.
     pub expected_tool_error_m: Option<f64>,

@@ -1,20 +1,12 @@
-//! What can be planned before anything moves, so that a task that cannot be done is refused in time.
+//! Planning before the first motion, so that an infeasible task is refused in time.
 
 use std::collections::BTreeSet;
 
-use crate::plan::{JointErrorBounds, PlanError, PosePlan, TargetRequest, VisibilityModel, plan_targets};
+use crate::plan::{JointErrorBounds, PlanError, TargetRequest, VisibilityModel, plan_targets};
 use crate::session::SessionError;
-use crate::session::script::ScriptRunner;
+use crate::session::runner::{Planned, ScriptRunner};
 use armcal_core::routine::{CaptureSettings, Step};
 use armcal_core::streams::{JointAngles, Phase};
-
-/// What was planned before anything moved.
-pub(crate) struct Planned {
-    /// Believed angles at each of the task's targets.
-    pub targets: Vec<JointAngles>,
-    /// For the first capture, if the sensors are still believed to be the datasheet's by then.
-    pub first_capture: Option<PosePlan>,
-}
 
 impl ScriptRunner<'_, '_> {
     /// Plans all that can be planned, so that a task that cannot be done is refused before anything moves.
@@ -58,8 +50,8 @@ impl ScriptRunner<'_, '_> {
         !VisibilityModel::default().visible(&self.robot, self.clearance, angles).is_empty()
     }
 
-    /// Believed angles at the task's targets. Those that are reached for before any calibration must be clear for every arm that the
-    /// datasheet allows; for the others it is enough that the believed arm gets there.
+    /// Believed angles at the task's targets. Those that are reached for before any calibration must be clear for every
+    /// arm that the datasheet allows; for the others it is enough that the believed arm gets there.
     fn plan_task(&mut self) -> Result<Vec<JointAngles>, SessionError> {
         let routine = self.setup.routine;
         let margin_m = self.margin_m();

@@ -2,7 +2,7 @@
 
 use crate::plan::{PlanError, TargetRequest, plan_targets};
 use crate::session::SessionError;
-use crate::session::script::ScriptRunner;
+use crate::session::runner::ScriptRunner;
 use armcal_core::routine::ReachSettings;
 use armcal_core::streams::{JointAngles, LogLevel, MarkKind, Phase, ReachAttempt};
 
@@ -10,7 +10,8 @@ use armcal_core::streams::{JointAngles, LogLevel, MarkKind, Phase, ReachAttempt}
 const REACH_DWELL_S: f64 = 0.6;
 
 impl ScriptRunner<'_, '_> {
-    /// Goes to each target and rests there for a moment; if it is to be touched, with open jaws, which then close on it.
+    /// Goes to each target and rests there for a moment; if it is to be touched, with open jaws, which then close on
+    /// it.
     pub(crate) fn reach(&mut self, step: usize, settings: &ReachSettings) -> Result<(), SessionError> {
         let ReachSettings { targets, touch } = settings;
         if *touch {
@@ -42,8 +43,8 @@ impl ScriptRunner<'_, '_> {
         Ok(())
     }
 
-    /// Says once what the targets ask beyond what the calibration in use saw, if that is more than straight lines: a fitted shape
-    /// is worth nothing where there were no views.
+    /// Says once what the targets ask beyond what the calibration in use saw, if that is more than straight lines: a
+    /// fitted shape is worth nothing where there were no views.
     fn warn_beyond(&mut self, postures: &[Option<JointAngles>]) -> Result<(), SessionError> {
         let calibration = self.epochs.last().and_then(|epoch| epoch.calibration.as_ref());
         let Some(calibration) = calibration.filter(|c| c.reference.is_some()) else { return Ok(()) };
@@ -61,8 +62,8 @@ impl ScriptRunner<'_, '_> {
         self.driver.log(LogLevel::Warn, &text)
     }
 
-    /// Believed angles at each target. A target that a calibration puts out of reach is no reason to lose the rest: it is
-    /// named and left out.
+    /// Believed angles at each target. A target that a calibration puts out of reach is no reason to lose the rest: it
+    /// is named and left out.
     fn postures(&mut self, targets: &[usize], attempt: ReachAttempt) -> Result<Vec<Option<JointAngles>>, SessionError> {
         let planned = self.planned.as_ref().map(|planned| planned.targets.clone()).unwrap_or_default();
         let preferred: Vec<JointAngles> = targets.iter().filter_map(|&target| planned.get(target)).copied().collect();

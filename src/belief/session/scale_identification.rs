@@ -5,7 +5,7 @@ use crate::calib::{IdentifiedScale, associate, identify_scales};
 use crate::plan::{JointErrorBounds, Path, UnknownScale};
 use crate::session::SessionError;
 use crate::session::motion::MotionOutcome;
-use crate::session::script::ScriptRunner;
+use crate::session::runner::ScriptRunner;
 use armcal_core::robot::Robot;
 use armcal_core::routine::IdentifySettings;
 use armcal_core::sensor::ArmSensors;

@@ -1,25 +1,26 @@
-//! Goes through a routine's steps.
-
-use rand_chacha::ChaCha8Rng;
+//! The steps of a routine's script, carried out in order.
 
 use crate::calib::{Calibration, CalibrationFileError, Status, calibrate};
 use crate::plan::{ClearanceModel, Elapsed, JointErrorBounds, LeastClearance, PathError, PathPlanner};
-use crate::session::belief_update::SavedBelief;
+use crate::session::inputs::SessionInputs;
 use crate::session::motion::{Driver, MotionOutcome};
-use crate::session::outcome::{AssertResult, Epoch, EstimateUpdate, Outcome, ReachStep, Visit};
-use crate::session::prepare::Planned;
-use crate::session::{Progress, Recorder, SessionError, SessionInputs};
-use armcal_core::robot::Robot;
+use crate::session::outcome::{AssertResult, Epoch, Outcome, ReachStep};
+use crate::session::runner::{FreshBounds, Jaws, ScriptRunner, Tally};
+use crate::session::{Progress, Recorder, SessionError};
 use armcal_core::routine::{AssertFigure, AssertLimits, CalibrateSettings, CalibrateViews, MoveGoal, OnRefusal, Step};
 use armcal_core::sensor::ArmSensors;
 use armcal_core::stats::stream_rng;
 use armcal_core::streams::{Arm, JointAngles, LogLevel, Mark, MarkKind, Message, Phase, ReachAttempt};
-use armcal_core::time::Stamp;
 
-/// Shares of the clearance that are tried in this order for a path from a place that the whole of it does not let the arm leave.
+/// Shares of the clearance that are tried in this order for a path from a place that the whole of it does not let the
+/// arm leave.
 const START_SHARES: [f64; 3] = [0.5, 0.2, 0.05];
 
-pub(crate) fn run(
+/// Carries out the routine's script.
+///
+/// # Errors
+/// [`SessionError`]; the recording up to then stays readable.
+pub fn run(
     setup: &SessionInputs<'_>,
     arm: &mut dyn Arm,
     recorder: &mut Recorder,
@@ -66,62 +67,6 @@ pub(crate) fn run(
     let stopped = run.steps()?;
     run.driver.phase(Phase::Done)?;
     run.finish(stopped)
-}
-
-/// Counts of a run.
-#[derive(Default)]
-pub(crate) struct Tally {
-    pub poses: usize,
-    pub poses_skipped: usize,
-    pub targets_skipped: usize,
-    pub calibration_wall_s: f64,
-}
-
-/// Bounds of a calibration, and when and how warm it was.
-pub(crate) struct FreshBounds {
-    pub bounds: JointErrorBounds,
-    pub at: Stamp,
-    pub oil_c: Option<f64>,
-}
-
-/// The arm among what surrounds it, by its jaws.
-pub(crate) struct Jaws<'a> {
-    pub at_rest: &'a ClearanceModel<'a>,
-    pub open: &'a ClearanceModel<'a>,
-}
-
-pub(crate) struct ScriptRunner<'a, 'b> {
-    pub setup: &'a SessionInputs<'a>,
-    /// With the sensor scales that were measured on the way.
-    pub robot: Robot,
-    /// How wrong the sensors believed in may be by now.
-    pub bounds: JointErrorBounds,
-    /// And how wrong they were when they were new: none for a datasheet's, which hold for good.
-    pub fresh: Option<FreshBounds>,
-    /// While views are being captured: what was believed before.
-    pub before_running: Option<SavedBelief>,
-    pub rng: ChaCha8Rng,
-    /// With the jaws as they are now.
-    pub clearance: &'a ClearanceModel<'a>,
-    pub jaws: Jaws<'a>,
-    pub driver: Driver<'b>,
-    pub planned: Option<Planned>,
-    began: Stamp,
-    /// Views captured from here on have been in no calibration.
-    pub views_since: Stamp,
-    /// Views marked so far; numbers them.
-    pub poses_marked: u32,
-    calibration: Option<Calibration>,
-    /// The last one that was accepted.
-    pub accepted: Option<Calibration>,
-    /// Captured views and what was believed there.
-    pub visits: Vec<Visit>,
-    pub renewals: Vec<EstimateUpdate>,
-    pub capture_ended: Option<String>,
-    pub tally: Tally,
-    pub epochs: Vec<Epoch>,
-    reaches: Vec<ReachStep>,
-    asserts: Vec<AssertResult>,
 }
 
 impl ScriptRunner<'_, '_> {
@@ -211,7 +156,8 @@ impl ScriptRunner<'_, '_> {
         let mut planner = PathPlanner { clearance, bounds, limits: &limits, margin_m };
         let mut outcome = planner.plan(&from, to, &mut self.rng);
         for share in START_SHARES {
-            // A new calibration, or open jaws, may find the arm nearer to something than it believed to be: it must get away.
+            // A new calibration, or open jaws, may find the arm nearer to something than it believed to be: it must get
+            // away.
             let is_stuck = match &outcome {
                 Err(PathError::StartTooNear { .. }) => true,
                 // Clear where it stands, and not for what a joint strays by as soon as it moves.
@@ -263,7 +209,8 @@ impl ScriptRunner<'_, '_> {
         self.progress_at(Phase::Move, 0, 1);
         if let Some(nearest) = self.clearance.find_violation_arriving(&to, &self.bounds, self.margin_m()) {
             return Err(wrong(format!(
-                "the pose comes within {:.3} m of clearance between {nearest} for an arm within the sensors' error; {:.3} m are needed",
+                "the pose comes within {:.3} m of clearance between {nearest} for an arm within the sensors' error; \
+                 {:.3} m are needed",
                 nearest.distance_m,
                 self.margin_m()
             )));

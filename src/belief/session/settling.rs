@@ -56,7 +56,8 @@ mod tests {
     const PERIOD_S: f64 = 0.01;
     const REST_S: f64 = 0.4;
 
-    /// Moves at `rate` towards zero, stops `left` before it, and is read with noise; gives when it counts as standing, s.
+    /// Moves at `rate` towards zero, stops `left` before it, and is read with noise; gives when it counts as standing,
+    /// s.
     fn stood_at_s(rate_rad_s: f64, left_rad: f64, noise_rad: f64, seed: u64) -> Option<f64> {
         let mut rng = stream_rng(seed, "stillness");
         let set_point = JointAngles::zeros(2);

@@ -6,27 +6,29 @@
 
 use nalgebra::{Isometry3, Vector6};
 
-use crate::tagmap::linearize::{Normal, Reduced, cost, squares};
+use crate::tagmap::linearize::{cost, squares};
+use crate::tagmap::normal_equations::{NormalEquations, Reduced};
 use crate::tagmap::problem::{Block, MapProblem};
 use armcal_core::numeric::{self, Damping, LeastSquares, Loss, Outcome, Proposal, Stop, StopRule};
 use armcal_core::spatial::exp;
 
-/// Width of the Cauchy loss, in standard deviations found (Zhang 1997: 2.385 costs 5 % of efficiency; it is the start alone).
+/// Width of the Cauchy loss, in standard deviations found (Zhang 1997: 2.385 costs 5 % of efficiency; it is the start
+/// alone).
 const CAUCHY_WIDTH: f64 = 2.385;
 /// The very first loss, whose pull does not fade.
 const FIRST_WIDTH: f64 = 1.345;
 /// Corners to here count fully in the end; one in 3000 honest ones lies beyond.
 const HUBER_WIDTH: f64 = 4.0;
-/// Bounds of the scale that is taken from the residuals, over the corners' standard deviation given: a detector's noise lies well
-/// within; what lies beyond is a wrong model. Assumed.
+/// Bounds of the scale that is taken from the residuals, over the corners' standard deviation given: a detector's noise
+/// lies well within; what lies beyond is a wrong model. Assumed.
 const SCALE_BOUNDS: (f64, f64) = (0.02, 50.0);
 /// The median of the length of a two-dimensional unit normal vector is sqrt(2 ln 2).
 const MEDIAN_OF_LENGTH: f64 = 1.177_41;
 const MAX_ITERATIONS: usize = 50;
 /// Steps that change the cost by less than this share of it end an adjustment.
 const CONVERGED: f64 = 1e-14;
-/// A chi-square that still falls by less than this a step moves nothing by a noticeable share of its standard deviation. A loss that
-/// is not quadratic converges no faster than this where a few detections lie beyond its width.
+/// A chi-square that still falls by less than this a step moves nothing by a noticeable share of its standard
+/// deviation. A loss that is not quadratic converges no faster than this where a few detections lie beyond its width.
 const AT_REST: f64 = 1e-3;
 /// Where only a start is wanted.
 const ROUGHLY: f64 = 1e-3;
@@ -37,7 +39,7 @@ const ROUNDING: f64 = 1e-12;
 
 /// Lowers the cost from the state of `problem` on; whether it came to rest.
 pub(super) fn minimize(problem: &mut MapProblem<'_>, loss: Loss, converged: f64) -> bool {
-    let mut normal = Normal::new(problem);
+    let mut normal = NormalEquations::new(problem);
     normal.update(problem, loss);
     let state = State::of(problem);
     let mut search = Search { problem, loss, normal, state, has_trial: false };
@@ -55,7 +57,7 @@ pub(super) fn minimize(problem: &mut MapProblem<'_>, loss: Loss, converged: f64)
 struct Search<'a, 'b> {
     problem: &'a mut MapProblem<'b>,
     loss: Loss,
-    normal: Normal,
+    normal: NormalEquations,
     /// What was accepted last.
     state: State,
     has_trial: bool,
@@ -119,7 +121,7 @@ impl State {
 }
 
 /// Takes one damped step; `false` where the system is singular.
-fn step(problem: &mut MapProblem<'_>, normal: &Normal, damping: f64) -> bool {
+fn step(problem: &mut MapProblem<'_>, normal: &NormalEquations, damping: f64) -> bool {
     let Some(Reduced { system, right, inverses }) = normal.reduce(problem, damping) else { return false };
     let Some(factor) = system.factorize() else { return false };
     let nodes = factor.solve(&right);
@@ -185,8 +187,8 @@ pub(super) fn approach(problem: &mut MapProblem<'_>) {
     }
 }
 
-/// Uses exactly the detections that agree to within `beyond` standard deviations (root mean square over their corners, of
-/// the scale found); whether that changed anything.
+/// Uses exactly the detections that agree to within `beyond` standard deviations (root mean square over their corners,
+/// of the scale found); whether that changed anything.
 pub(super) fn select(problem: &mut MapProblem<'_>, beyond: f64) -> bool {
     let limit = 4.0 * 2.0 * (beyond * scale(problem)).powi(2);
     let mut changed = false;

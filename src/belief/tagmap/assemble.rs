@@ -6,7 +6,8 @@ use nalgebra::{Isometry3, Matrix6};
 
 use crate::tagmap::adjust::degrees_of_freedom;
 use crate::tagmap::groups::Group;
-use crate::tagmap::linearize::{Normal, cost};
+use crate::tagmap::linearize::cost;
+use crate::tagmap::normal_equations::NormalEquations;
 use crate::tagmap::problem::MapProblem;
 use crate::tagmap::result::{MapGroup, MappedTag, RelativeBodyPose, TagMap};
 use crate::tagmap::screen::Screened;
@@ -25,7 +26,7 @@ pub(super) fn assemble(
     noise_scale: f64,
 ) -> TagMap {
     let quadratic = Loss::Square;
-    let mut normal = Normal::new(problem);
+    let mut normal = NormalEquations::new(problem);
     normal.update(problem, quadratic);
     let (factor, inverses) = match normal.reduce(problem, 0.0) {
         Some(reduced) => (reduced.system.factorize(), reduced.inverses),
@@ -81,7 +82,8 @@ fn doubts(problem: &MapProblem<'_>) -> Vec<String> {
             if off.component_mul(&prior.information).dot(&off) > FAR_FROM_KNOWN {
                 let (mm, deg) = (off.fixed_rows::<3>(0).norm() * 1e3, off.fixed_rows::<3>(3).norm().to_degrees());
                 out.push(format!(
-                    "tag {id}: its known place disagrees with the views by {mm:.1} mm and {deg:.2} deg, beyond its standard deviations"
+                    "tag {id}: its known place disagrees with the views by {mm:.1} mm and {deg:.2} deg, beyond its \
+                     standard deviations"
                 ));
             }
         }
@@ -172,7 +174,7 @@ fn mapped(problem: &MapProblem<'_>, pixels: &Pixels, factor: Option<&Factor>) ->
 fn relative(
     problem: &MapProblem<'_>,
     screened: &Screened,
-    normal: &Normal,
+    normal: &NormalEquations,
     inverses: &[Matrix6<f64>],
     factor: Option<&Factor>,
 ) -> Vec<RelativeBodyPose> {
@@ -224,7 +226,7 @@ impl InverseColumns<'_> {
 /// Covariance of a camera's pose: its own part plus that of its tags.
 fn block_covariance(
     problem: &MapProblem<'_>,
-    normal: &Normal,
+    normal: &NormalEquations,
     inverse: &Matrix6<f64>,
     idx: usize,
     columns: &mut InverseColumns<'_>,

@@ -1,12 +1,12 @@
 //! The attitude sensor: how a moving body is turned, seen against a fixed one.
 //!
-//! With the sensor's A = world_from_moving, the rotations of the two blocks M = moving_from_camera and F = fixed_from_camera
-//! of one view, and W = world_from_fixed, unknown but the same in all views: `E = F^-1 W^-1 A M` is the identity but for the
-//! sensor's error. residual = -log(E); on the right, dE = xi_M - xi_F - F^-1 xi_W.
+//! With the sensor's A = world_from_moving, the rotations of the two blocks M = moving_from_camera and F =
+//! fixed_from_camera of one view, and W = world_from_fixed, unknown but the same in all views: `E = F^-1 W^-1 A M` is
+//! the identity but for the sensor's error. residual = -log(E); on the right, dE = xi_M - xi_F - F^-1 xi_W.
 
 use nalgebra::{Isometry3, Matrix3, Matrix6, UnitQuaternion, Vector3};
 
-use crate::tagmap::linearize::Normal;
+use crate::tagmap::normal_equations::NormalEquations;
 use crate::tagmap::problem::{AttitudeLink, Block, Extra, MapProblem};
 
 fn error(problem: &MapProblem<'_>, link: &AttitudeLink) -> Vector3<f64> {
@@ -32,7 +32,7 @@ fn nodes(problem: &MapProblem<'_>, link: &AttitudeLink) -> [usize; 3] {
     [of(link.moving), of(link.fixed), problem.extras[link.world].node]
 }
 
-pub(super) fn add(normal: &mut Normal, problem: &MapProblem<'_>) {
+pub(super) fn add(normal: &mut NormalEquations, problem: &MapProblem<'_>) {
     for link in &problem.links {
         let residual = -error(problem, link);
         let fixed = problem.blocks[link.fixed].pose.rotation.inverse().to_rotation_matrix();

@@ -23,8 +23,8 @@ pub(super) struct Group {
     pub(super) frame: GroupFrame,
 }
 
-/// Sets up groups, frames, priors, nodes and blocks anew for the observations in use. `problem.tags` hold provisional poses that
-/// are right relative to each other among those of one `label`.
+/// Sets up groups, frames, priors, nodes and blocks anew for the observations in use. `problem.tags` hold provisional
+/// poses that are right relative to each other among those of one `label`.
 pub(super) fn build(
     problem: &mut MapProblem<'_>,
     label: &[usize],
@@ -82,7 +82,8 @@ fn components(observations: &[Observation], label: &[usize]) -> Vec<Vec<usize>> 
     components.into_values().collect()
 }
 
-/// The body in whose frame a group is: that of the base tag, or the first with a place, of those with a tag of known place.
+/// The body in whose frame a group is: that of the base tag, or the first with a place, of those with a tag of known
+/// place.
 fn frame_body(tags: &[TagState], group: &[usize], bodies: &[Body], settings: &MapSettings) -> Option<usize> {
     let given = || group.iter().map(|tag| &tags[*tag]).filter(|tag| tag.given.is_some());
     let base = given().find(|tag| Some(tag.id) == settings.base_tag).map(|tag| tag.body);

@@ -1,15 +1,15 @@
-//! Poses of a group's tags to begin with, one tag after the other.
+//! Initial poses of the tags of a group, one tag after the other.
 //!
 //! The tree of relative poses connects neighbours by long ways round, along which errors add up. So each group is laid
-//! out again from its most seen tag on: next is always the tag that shares most with those already placed; its images are
-//! located by all placed tags in them, and it is put where its images, together, want it. Neighbours then agree to a few
-//! pixels however long the chain, which the adjustment needs.
+//! out again from its most seen tag on: next is always the tag that shares most with those already placed; its images
+//! are located by all placed tags in them, and it is put where its images, together, want it. Neighbours then agree to
+//! a few pixels however long the chain, which the adjustment needs.
 
 use nalgebra::Isometry3;
 
-use crate::tagmap::initial_guess::{Pairs, consensus};
 use crate::tagmap::localize::{localize, place_tag, refine_tag, tag_cost};
 use crate::tagmap::problem::Observation;
+use crate::tagmap::tag_pairs::{Pairs, consensus};
 use crate::tagmap::vote::is_finite;
 use armcal_core::optics::CameraModel;
 

@@ -19,7 +19,8 @@ fn cost(camera: &CameraModel, camera_from_tag: &Isometry3<f64>, seen: &Observati
     squares(camera, camera_from_tag, seen).into_iter().map(|n2| loss.of(n2 * px * px).0).sum()
 }
 
-/// frame_from_camera for which the tags fit best, out of each tag's own two solutions, refined on all corners; and its misfit.
+/// frame_from_camera for which the tags fit best, out of each tag's own two solutions, refined on all corners; and its
+/// misfit.
 pub(super) fn localize(
     cameras: &[CameraModel],
     seen: &[(&Observation, Isometry3<f64>)],
@@ -118,7 +119,8 @@ fn step(
     normal.cholesky().map(|normal| normal.solve(&right))
 }
 
-/// A tag's pose for which its images fit best, out of the solutions of each, and its misfit; `images` with frame_from_camera.
+/// A tag's pose for which its images fit best, out of the solutions of each, and its misfit; `images` with
+/// frame_from_camera.
 pub(super) fn place_tag(
     cameras: &[CameraModel],
     images: &[(&Observation, Isometry3<f64>)],

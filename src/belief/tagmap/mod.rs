@@ -1,9 +1,9 @@
-//! BELIEF: where the tags are, from camera views alone.
+//! Tag mapping: poses of tags from camera views alone; no joint angle is used.
 //!
-//! `screen` rejects what cannot be a detection and solves every square both ways; `start` votes relative poses of tags and
-//! builds each connected group up from them; `problem`, `sparse` and `adjust` are the bundle adjustment on corner pixels
-//! (Triggs et al. 2000); `result` says how good the map is; `scale` finds sizes that are off. `files` reads and writes the
-//! formats of TagSLAM and Kalibr and our own, `recording` gets views from recordings. No joint angle enters anywhere.
+//! `screen` validates detections and solves each square; `vote`, `initial_guess` and `incremental_layout` lay out
+//! groups of tags; `linearize`, `normal_equations`, `sparse` and `adjust` are the bundle adjustment on corner pixels
+//! (Triggs et al. 2000); `result` is the map with its accuracy; `scale` finds wrong tag sizes. `files` reads and writes
+//! files of tags and cameras, `recording` gets views from recordings.
 
 mod adjust;
 mod assemble;
@@ -14,12 +14,14 @@ mod incremental_layout;
 mod initial_guess;
 mod linearize;
 mod localize;
+mod normal_equations;
 mod problem;
 mod result;
 mod scale;
 mod screen;
 mod solve;
 mod sparse;
+mod tag_pairs;
 mod types;
 mod vote;
 

@@ -42,8 +42,9 @@ struct Contents {
     attitudes: Vec<(Stamp, UnitQuaternion<f64>)>,
 }
 
-/// Reads the detections of `cameras`: of each the topic that its file names, if the recording has it; failing that `topic`, or
-/// the only one that there is, for the first camera. `rules` says which detections are left out or stand for others.
+/// Reads the detections of `cameras`: of each the topic that its file names, if the recording has it; failing that
+/// `topic`, or the only one that there is, for the first camera. `rules` says which detections are left out or stand
+/// for others.
 ///
 /// # Errors
 /// [`ViewsError`].

@@ -17,8 +17,8 @@ pub struct MappedTag {
     pub group: usize,
     /// In the group's frame.
     pub frame_from_tag: Isometry3<f64>,
-    /// Of a perturbation on the right, `frame_from_tag * exp(xi)`, xi = (translation m, rotation rad) along the tag's axes. It is
-    /// relative to what anchors the group: zero for a tag that is held.
+    /// Of a perturbation on the right, `frame_from_tag * exp(xi)`, xi = (translation m, rotation rad) along the tag's
+    /// axes. It is relative to what anchors the group: zero for a tag that is held.
     pub covariance: Matrix6<f64>,
     pub n_views: usize,
     /// Of its corners: root mean square distance between measured and predicted pixel; 0 where none is used.
@@ -131,8 +131,8 @@ impl TagMap {
         counts
     }
 
-    /// Joint covariance of several tags, 6 rows for each in the order asked for, as [`MappedTag::covariance`]; `None` if one of
-    /// them is not in the map.
+    /// Joint covariance of several tags, 6 rows for each in the order asked for, as [`MappedTag::covariance`]; `None`
+    /// if one of them is not in the map.
     #[must_use]
     pub fn joint_covariance(&self, ids: &[u32]) -> Option<DMatrix<f64>> {
         let nodes = ids.iter().map(|id| self.tag(*id).map(|tag| tag.node)).collect::<Option<Vec<_>>>()?;

@@ -1,13 +1,13 @@
 //! Tag sizes that are off, by tags whose distance is known.
 //!
-//! A square solved with a size that is too large by a factor lies farther away by the same factor, along the same line of
-//! sight. So with two tags of known distance D at p_a and p_b (camera frame), `|s_a p_a - s_b p_b| = D` tells the factors s by which
-//! the sizes must be multiplied: 1 where they are right.
+//! A square solved with a size that is too large by a factor lies farther away by the same factor, along the same line
+//! of sight. So with two tags of known distance D at p_a and p_b (camera frame), `|s_a p_a - s_b p_b| = D` tells the
+//! factors s by which the sizes must be multiplied: 1 where they are right.
 
 use nalgebra::Vector3;
 
-use crate::tagmap::initial_guess::is_rigid;
 use crate::tagmap::screen::Screened;
+use crate::tagmap::tag_pairs::is_rigid;
 use crate::tagmap::types::MapInput;
 
 /// A size that cannot be right.

@@ -1,4 +1,5 @@
-//! From detections to observations: sorted, so that the order of the input does not matter, and each a square by itself.
+//! From detections to observations: sorted, so that the order of the input does not matter, and each a square by
+//! itself.
 
 use std::collections::{BTreeMap, BTreeSet};
 

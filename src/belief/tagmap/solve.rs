@@ -22,8 +22,8 @@ const MUCH_WORSE: f64 = 1.25;
 
 /// Finds where the tags are, by bundle adjustment on the corner pixels of all views (Triggs et al. 2000).
 ///
-/// Nothing but the views, the tags' sizes and the places of some tags enters. The result does not depend on the order of
-/// views, tags or detections.
+/// Nothing but the views, the tags' sizes and the places of some tags enters. The result does not depend on the order
+/// of views, tags or detections.
 ///
 /// # Errors
 /// [`TagMapError`] when the input cannot be meant, or shows none of the tags that would anchor the map.
@@ -120,8 +120,8 @@ impl ProblemBuilder<'_, '_> {
     }
 }
 
-/// Finds cameras and tags that have come to rest in a wrong place (the mirror image of the right one, mostly), and puts them
-/// where their images fit better; whether there were any.
+/// Finds cameras and tags that have come to rest in a wrong place (the mirror image of the right one, mostly), and puts
+/// them where their images fit better; whether there were any.
 fn repair(problem: &mut MapProblem<'_>) -> bool {
     let mut changed = false;
     for idx in 0..problem.blocks.len() {

@@ -1,8 +1,8 @@
 //! Sparse symmetric systems of 6x6 blocks, by Cholesky.
 //!
-//! The reduced camera-free system of the tags has a block where two tags were seen together (Triggs et al. 2000, sec. 6.1): few
-//! of all pairs. Blocks are eliminated in the order of least degree (ties by number, so that the order is always the same), with
-//! the fill found once and used for every iteration.
+//! The reduced camera-free system of the tags has a block where two tags were seen together (Triggs et al. 2000, sec.
+//! 6.1): few of all pairs. Blocks are eliminated in the order of least degree (ties by number, so that the order is
+//! always the same), with the fill found once and used for every iteration.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;

@@ -22,7 +22,8 @@ pub struct MapView {
     pub camera: usize,
     pub stamp: Stamp,
     pub tags: Vec<MapDetection>,
-    /// world_from_body of the moving body that carries an attitude sensor ([`MapSettings::attitude_body`]), at the stamp.
+    /// world_from_body of the moving body that carries an attitude sensor ([`MapSettings::attitude_body`]), at the
+    /// stamp.
     pub attitude: Option<UnitQuaternion<f64>>,
 }
 
@@ -32,7 +33,8 @@ pub struct Body {
     pub name: String,
     /// Static bodies do not move relative to each other, so that their tags make one map; a moving one has its own.
     pub is_static: bool,
-    /// frame_from_body for static bodies that know their places relative to each other; `None` is estimated from the tags.
+    /// frame_from_body for static bodies that know their places relative to each other; `None` is estimated from the
+    /// tags.
     pub pose: Option<Isometry3<f64>>,
 }
 

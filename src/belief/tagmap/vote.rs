@@ -1,8 +1,9 @@
 //! Where one tag is from another, by a vote of the images that show both.
 //!
-//! A square seen nearly head-on has two poses (Collins and Bartoli 2014), so that each image of two tags gives up to four
-//! relative poses, one of them right. Wrong ones differ from image to image, right ones agree: the pose with the least sum
-//! of truncated squared Mahalanobis distances to the nearest pose of each other image wins, and is refined on its voters.
+//! A square seen nearly head-on has two poses (Collins and Bartoli 2014), so that each image of two tags gives up to
+//! four relative poses, one of them right. Wrong ones differ from image to image, right ones agree: the pose with the
+//! least sum of truncated squared Mahalanobis distances to the nearest pose of each other image wins, and is refined on
+//! its voters.
 
 use nalgebra::{Isometry3, Matrix6, Vector6};
 

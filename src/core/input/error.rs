@@ -35,7 +35,8 @@ pub enum InputError {
     #[error("{file}: topic {topic}: {disorder}")]
     Disorder { file: String, topic: String, disorder: StampRegression },
     #[error(
-        "{file}: topic {topic}: the joints {recorded:?} lack {missing:?} of the robot's {expected:?}; names that differ go into \
+        "{file}: topic {topic}: the joints {recorded:?} lack {missing:?} of the robot's {expected:?}; names that \
+         differ go into \
          `joint_sensors.names` of the input map"
     )]
     JointNames { file: String, topic: String, recorded: Vec<String>, missing: Vec<String>, expected: Vec<String> },

@@ -67,7 +67,7 @@ impl<'a> JointReader<'a> {
         if names != positions {
             return Err(InputError::NameCount { file: file(), place, names, positions });
         }
-        let stamp = super::foreign::stamp_or_log_time(message.header.stamp, raw.log_time());
+        let stamp = super::stamp::stamp_or_log_time(message.header.stamp, raw.log_time());
         self.learn_layout(&message.name);
         let at = &self.layout.1;
         if at[..self.n_needed].iter().any(Option::is_none) {

@@ -1,18 +1,19 @@
-//! Recordings of real arms: what an input map (TOML) says of them, and what they hold.
+//! Recordings of real arms by an input map (TOML).
 //!
-//! `map` reads the input map: topics, frames and names. `foreign` reads a recording by it, message by message and with the number
-//! of each, into raw joint readings (`joints`) and what the camera saw (`tags`); it pairs and averages nothing. `task` reads
-//! `--task` files: what the arm is calibrated for, where no recording says it.
+//! `map` reads the input map: topics, frames and names. `external` reads a recording by it, message by message, into
+//! raw joint readings (`joints`) and detections (`tags`); it pairs and averages nothing. `task` reads `--task` files,
+//! the targets that the arm is calibrated for.
 
 mod error;
-mod foreign;
+mod external;
 mod joints;
 mod map;
+mod stamp;
 mod tags;
 mod task;
 
 pub use error::{BadPlace, InputError};
-pub use foreign::{ForeignRecording, read_foreign};
+pub use external::{ExternalRecording, read_external};
 pub use joints::Reading;
 pub use map::{ChildFrame, InputMap, NotFinite, TagUse, WhileMoving, parse_input_map, read_input_map};
 pub use tags::{ExternalDetection, RawMeasurement, TagFrame};

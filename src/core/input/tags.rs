@@ -1,12 +1,12 @@
-//! What the camera saw: transforms of `tf2_msgs/msg/TFMessage`, or corners of `apriltag_msgs/msg/AprilTagDetectionArray`.
+//! Detections from transforms (`tf2_msgs/msg/TFMessage`) or corners (`apriltag_msgs/msg/AprilTagDetectionArray`).
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 
 use super::error::{BadPlace, InputError};
-use super::foreign::stamp_or_log_time;
 use super::map::{InputMap, NotFinite, TagUse, without_slash};
+use super::stamp::stamp_or_log_time;
 use crate::log::ros::{AprilTagDetectionArray, TfMessage, TransformStamped};
 use crate::log::{RawMessage, StampOrder, decode};
 use crate::time::Stamp;

@@ -90,8 +90,8 @@ pub fn one_of_each() -> Vec<Message> {
     messages
 }
 
-/// `n` steps of one joint sample each, with one of the other messages every tenth step. Numbers vary so that chunks do not
-/// shrink to nothing.
+/// `n` steps of one joint sample each, with one of the other messages every tenth step. Numbers vary so that chunks do
+/// not shrink to nothing.
 pub fn stream(n: usize) -> Vec<(Stamp, Message)> {
     // Those that are read back by default.
     let others: Vec<_> = one_of_each().into_iter().filter(|m| !matches!(m, Message::Image(_))).collect();

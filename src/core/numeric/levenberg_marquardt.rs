@@ -1,8 +1,8 @@
-//! Levenberg-Marquardt: damped Gauss-Newton steps, the damping lowered after a step that helps and raised after one that does not
-//! (Levenberg 1944, Marquardt 1963).
+//! Levenberg-Marquardt: damped Gauss-Newton steps, the damping lowered after a step that helps and raised after one
+//! that does not (Levenberg 1944, Marquardt 1963).
 //!
-//! The loop knows neither matrices nor states: a [`LeastSquares`] problem solves its own normal equations, dense, sparse or with blocks
-//! eliminated, and keeps its memory, so that a step allocates nothing that the problem does not.
+//! The loop knows neither matrices nor states: a [`LeastSquares`] problem solves its own normal equations, dense,
+//! sparse or with blocks eliminated, and keeps its memory, so that a step allocates nothing that the problem does not.
 
 /// A cost that damped Gauss-Newton steps lower. The problem holds a current state, linearized, and one trial state.
 pub trait LeastSquares {
@@ -55,7 +55,8 @@ pub struct StopRule {
     pub cost: f64,
     /// Share of the cost by which a step may raise it, and still count as one that helps.
     pub slack: f64,
-    /// Gain over the cost that is no more than the rounding of a sum: a step that should save no more, and does not, ends the search.
+    /// Gain over the cost that is no more than the rounding of a sum: a step that should save no more, and does not,
+    /// ends the search.
     pub rounding: f64,
 }
 

@@ -1,6 +1,6 @@
-//! Numerical methods that know no arm: nonlinear least squares and robust losses.
+//! Numerical methods: nonlinear least squares and robust losses.
 //!
-//! `levenberg_marquardt` is the one loop of all least-squares fits, `loss` the family of losses by which far residuals count less.
+//! `levenberg_marquardt` solves all least-squares fits; `loss` has the robust loss functions (Huber, Cauchy).
 
 mod levenberg_marquardt;
 mod loss;

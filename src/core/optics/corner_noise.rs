@@ -2,15 +2,17 @@
 //!
 //! A side is an edge between black and white. One pixel of its length places it to `s_e sqrt(b)`, where b is the blur's
 //! standard deviation across it: the bound for a step blurred by a Gaussian in white noise n has the variance
-//! `2 sqrt(pi) b (n/c)^2` (matched filter). The contrast c falls with the range, so that s_e grows as `exp(a range)`. A line through L such pixels
-//! is known at its ends to `4 s_e^2 b / L`, and a corner is where two such lines meet: with their normals as the rows of N,
-//! its covariance is `N^-1 diag(v_1, v_2) N^-T` and a floor. Short and slanted sides make it large by themselves. Tags are
-//! found with a chance that is logistic in their shortest side and in their range.
+//! `2 sqrt(pi) b (n/c)^2` (matched filter). The contrast c falls with the range, so that s_e grows as `exp(a range)`. A
+//! line through L such pixels is known at its ends to `4 s_e^2 b / L`, and a corner is where two such lines meet: with
+//! their normals as the rows of N, its covariance is `N^-1 diag(v_1, v_2) N^-T` and a floor. Short and slanted sides
+//! make it large by themselves. Tags are found with a chance that is logistic in their shortest side and in their
+//! range.
 
 use nalgebra::{Matrix2, Vector2};
 
 /// Corner covariances and chance of detection in one kind of water. The constants are fitted by
-/// `armcal study detection --repeats 2` to tags of 0.15 m under the lamps that it says, with a camera of 1224 x 1024 pixels.
+/// `armcal study detection --repeats 2` to tags of 0.15 m under the lamps that it says, with a camera of 1224 x 1024
+/// pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CornerNoise {
     /// How well 1 px of an edge's length is placed at range 0, per root of the blur: px.
@@ -59,8 +61,8 @@ impl CornerNoise {
         chance: DetectionChance { half_side_px: 41.86, side_width_px: 7.39, half_range_m: 0.89, range_width_m: 0.3 },
     };
 
-    /// Covariance of each corner, px2, for corners in the order of a detection. `blur_px`: how far the image moved while the
-    /// shutter was open.
+    /// Covariance of each corner, px2, for corners in the order of a detection. `blur_px`: how far the image moved
+    /// while the shutter was open.
     #[must_use]
     pub fn covariances_px2(&self, corners_px: &[[f64; 2]; 4], range_m: f64, blur_px: f64) -> [Matrix2<f64>; 4] {
         let blur_std_px = SHARP_PX.hypot(blur_px / 12.0_f64.sqrt());

@@ -15,8 +15,8 @@ pub struct Fisheye {
 }
 
 impl Fisheye {
-    /// A lens of which no field of view is given: as far from the axis as the projected radius grows, but no farther than
-    /// half as far again as the image's corners, nor than 172 deg.
+    /// A lens of which no field of view is given: as far from the axis as the projected radius grows, but no farther
+    /// than half as far again as the image's corners, nor than 172 deg.
     #[must_use]
     pub fn with_widest_view(
         focal_px: [f64; 2],

@@ -1,9 +1,8 @@
-//! Cameras: points to pixels and back.
+//! Camera models: projection of points to pixels, and bearings of pixels.
 //!
-//! `Fisheye` is the equidistant model of Kannala and Brandt (2006, eq. 6 to the fourth odd term), as OpenCV's
-//! `cv::fisheye` and Kalibr's `equidistant` use it; `Radtan` is Brown's pinhole, `CameraModel` either of them; `square` finds a
-//! tag's pose from its four corners through any [`Lens`].
-//! Oracle: OpenCV (tests/oracle).
+//! `Fisheye` is the equidistant model of Kannala and Brandt (2006, eq. 6 to the fourth odd term), as in OpenCV's
+//! `cv::fisheye` and Kalibr's `equidistant`. `Radtan` is Brown's pinhole model, `CameraModel` either of them. `square`
+//! computes the pose of a tag from its four corners for any [`Lens`]. Oracle: OpenCV (tests/oracle).
 
 mod camera;
 mod corner_noise;

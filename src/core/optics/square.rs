@@ -1,9 +1,9 @@
 //! The pose of a square tag from its four corner pixels.
 //!
 //! A homography between the tag's plane and the bearings (turned so that the tag lies ahead, which keeps fisheye
-//! angles beyond 90 deg regular) gives the start; Levenberg-Marquardt on the pixels refines it. A square seen nearly head-on
-//! has two poses that fit almost equally well (Collins and Bartoli 2014): both are refined, the better one is taken,
-//! and the ratio of their costs is reported. The tag's centre hardly depends on which one it is.
+//! angles beyond 90 deg regular) gives the start; Levenberg-Marquardt on the pixels refines it. A square seen nearly
+//! head-on has two poses that fit almost equally well (Collins and Bartoli 2014): both are refined, the better one is
+//! taken, and the ratio of their costs is reported. The tag's centre hardly depends on which one it is.
 
 use nalgebra::{Isometry3, Matrix2x6, Matrix3, Matrix6, Point3, Rotation3, SMatrix, SVector, Translation3};
 use nalgebra::{UnitQuaternion, Vector2, Vector3, Vector6};
@@ -49,8 +49,8 @@ pub fn solve_square(lens: &impl Lens, size_m: f64, corners_px: &[[f64; 2]; 4]) -
     best.pose(other.map(|o| o.cost)).ok_or(SquareError::Degenerate)
 }
 
-/// Both poses that a square seen at `corners_px` may have, the better one first; the second is `None` where there is none but
-/// the first.
+/// Both poses that a square seen at `corners_px` may have, the better one first; the second is `None` where there is
+/// none but the first.
 ///
 /// # Errors
 /// As [`solve_square`].

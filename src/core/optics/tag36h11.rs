@@ -1,7 +1,8 @@
 //! The printed pattern of the tag family 36h11 (Olson 2011; Wang and Olson 2016): 587 codes of 6 x 6 cells.
 //!
-//! `tag36h11.txt` comes from OpenCV's dictionary (tests/oracle/make_tag36h11.py), turned upright: OpenCV holds the family turned
-//! by half a turn against the AprilTag project's images. The AprilTag library reads every tag back, id and corners.
+//! `tag36h11.txt` comes from OpenCV's dictionary (tests/oracle/make_tag36h11.py), turned upright: OpenCV holds the
+//! family turned by half a turn against the AprilTag project's images. The AprilTag library reads every tag back, id
+//! and corners.
 
 use std::sync::LazyLock;
 
@@ -17,8 +18,8 @@ static CODES: LazyLock<Vec<u64>> = LazyLock::new(|| {
     include_str!("tag36h11.txt").lines().filter_map(|line| u64::from_str_radix(line.trim(), 16).ok()).collect()
 });
 
-/// The cells of tag `id` as printed, rows from the top, each from the left; true is white. The outer ring is the black border.
-/// `None` for an id that the family does not have.
+/// The cells of tag `id` as printed, rows from the top, each from the left; true is white. The outer ring is the black
+/// border. `None` for an id that the family does not have.
 #[must_use]
 pub fn cells(id: u32) -> Option<[[bool; TAG_CELLS]; TAG_CELLS]> {
     let code = *CODES.get(id as usize)?;

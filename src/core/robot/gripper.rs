@@ -1,7 +1,7 @@
 //! `[gripper]` of robot.toml: two parallel jaws that slide apart and together.
 //!
-//! The jaws are links of the URDF, fixed to the tool's link at their rest opening. Mass, collision shapes and kinematics
-//! are those of the chain; only the visual shapes of the jaws move.
+//! The jaws are links of the URDF, fixed to the tool's link at their rest opening. Mass, collision shapes and
+//! kinematics are those of the chain; only the visual shapes of the jaws move.
 
 use std::path::Path;
 

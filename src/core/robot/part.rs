@@ -75,8 +75,8 @@ pub(super) fn check_place(file: &Path, key: &str, position_m: &[f64; 3]) -> Resu
     position_m.iter().try_for_each(|&value| FileIssue::check_range(file, key, value, -1e4..=1e4).map(|_| ()))
 }
 
-/// The parts of `raw`, a list `table` of `file`, and the same list without mesh files: meshes as hulls with their points,
-/// for a recording.
+/// The parts of `raw`, a list `table` of `file`, and the same list without mesh files: meshes as hulls with their
+/// points, for a recording.
 ///
 /// # Errors
 /// [`RobotError`] naming file and key; for meshes, both files.
@@ -234,7 +234,8 @@ mod tests {
 
     fn mesh(keys: &str) -> String {
         format!(
-            "shape = \"mesh\"\nposition_m = [1, 2, 3]\nquaternion_wxyz = [0.7071067811865476, 0, 0, 0.7071067811865476]\n{keys}"
+            "shape = \"mesh\"\nposition_m = [1, 2, 3]\nquaternion_wxyz = [0.7071067811865476, 0, 0, \
+             0.7071067811865476]\n{keys}"
         )
     }
 

@@ -1,7 +1,7 @@
 //! The file self_collision.toml of a robot folder: pairs of links that can come near each other.
 //!
-//! `plan::sample_self_pairs` (`armcal study pairs`) finds them by sampling; planning skips all other pairs. The file holds
-//! the hash of the URDF and is valid for that URDF only.
+//! `plan::sample_self_pairs` (`armcal study pairs`) finds them by sampling; planning skips all other pairs. The file
+//! holds the hash of the URDF and is valid for that URDF only.
 
 use std::path::Path;
 
@@ -57,7 +57,8 @@ impl SelfPairs {
         let text = toml::to_string(&raw)
             .map_err(|error| FileIssue::new(file, "pair", format!("has no TOML form: {error}")))?;
         Ok(format!(
-            "# Links of this arm that can come nearer to each other than near_m, among n random configurations within the joint\n\
+            "# Links of this arm that can come nearer to each other than near_m, among n random configurations \
+             within the joint\n\
              # limits and the datasheet's errors beyond them. Neighbours along the chain are left out. Made by\n\
              # `armcal study pairs {}`; make it anew when the URDF changes.\n{text}",
             robot.folder.display()

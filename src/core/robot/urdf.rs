@@ -287,8 +287,8 @@ impl UrdfChain<'_> {
         Ok(body.visuals)
     }
 
-    /// Bodies 0..=n: the base with everything fixed to it, then one per joint of the chain. The links in `apart` move by
-    /// themselves; their visual shapes are omitted.
+    /// Bodies 0..=n: the base with everything fixed to it, then one per joint of the chain. The links in `apart` move
+    /// by themselves; their visual shapes are omitted.
     ///
     /// # Errors
     /// [`RobotError::Value`] for invalid numbers or shapes.

@@ -54,8 +54,8 @@ impl StationKeeping {
     }
 }
 
-/// The vehicle as a body in water, about its origin (the centre of mass) in its own axes. Arrays of six hold x, y, z, then
-/// about x, y, z.
+/// The vehicle as a body in water, about its origin (the centre of mass) in its own axes. Arrays of six hold x, y, z,
+/// then about x, y, z.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct VehicleDynamics {

@@ -8,7 +8,8 @@ use serde::{Deserialize, Serialize};
 pub enum Method {
     /// Nominal end stops against the readings there (Williams 1991); needs no camera.
     JointLimits,
-    /// The paper's first method: least spread of every landmark's positions; needs no map, and cannot find the first offset.
+    /// The paper's first method: least spread of every landmark's positions; needs no map, and cannot find the first
+    /// offset.
     MinimumVariance,
     /// The paper's proposed method: least sum of distances to known landmarks.
     MinimumDistance,

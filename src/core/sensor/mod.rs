@@ -1,9 +1,9 @@
-//! Belief's model of a joint sensor: counts to an angle and back.
+//! The model of a joint sensor: counts to an angle and back.
 //!
-//! `angle = center + gain * nominal_travel + offset`, where `nominal_travel` (rad) is what the datasheet makes of the
-//! counts, measured from the middle of the joint's range: the paper's `theta = k1 * eta + k2` with `k2` taken where
-//! it matters, so that gain and offset hardly correlate. Gain 1 and offset 0 are the datasheet itself. What a straight line leaves
-//! (nonlinearity, temperature, pressure, drift, play) are further terms, zero where no method estimates them.
+//! `angle = center + gain * nominal_travel + offset`, with `nominal_travel` (rad) from the datasheet and measured from
+//! the middle of the joint's range: the paper's `theta = k1 * eta + k2`, but with nearly uncorrelated gain and offset.
+//! Gain 1 and offset 0 are the datasheet. Nonlinearity, temperature, pressure, drift and backlash are further terms,
+//! zero where no method estimates them.
 
 mod model;
 

@@ -10,7 +10,8 @@ pub const N_SHAPE: usize = 12;
 /// What calibration adds to the datasheet: with the travel t from the middle of the range,
 /// `angle = center + (gain + gain_per_k T) t + offset + sum_h shape_h phi_h(t / half_range)
 ///  + offset_per_k T + offset_per_mpa P + drift h + half_play a`,
-/// T (K), P (MPa) and h (hours) the [`Departure`] from the calibration's reference, a the side that the joint came from.
+/// T (K), P (MPa) and h (hours) the [`Departure`] from the calibration's reference, a the side that the joint came
+/// from.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Correction {
     /// Factor on the nominal travel; 1 is the datasheet.
@@ -48,12 +49,13 @@ impl Default for Correction {
     }
 }
 
-/// Half-width of the interval that [`nonlinearity_basis`] lives on, in half ranges: beyond the joint's own, for the functions vanish at
-/// its ends.
+/// Half-width of the interval that [`nonlinearity_basis`] lives on, in half ranges: beyond the joint's own, for the functions
+/// vanish at its ends.
 const SHAPE_DOMAIN: f64 = 1.25;
 
-/// Smooth functions over the joint's range: `phi_h(x) = sin(pi h (x + L) / 2 L) / sqrt(L)`, h = 1.., L = 1.25, x in -1..1; with
-/// the prior variances of [`shape_prior`] a Gaussian process by its eigenfunctions (Solin and Sarkka 2020, eq. 6). Constant outside.
+/// Smooth functions over the joint's range: `phi_h(x) = sin(pi h (x + L) / 2 L) / sqrt(L)`, h = 1.., L = 1.25, x in
+/// -1..1; with the prior variances of [`shape_prior`] a Gaussian process by its eigenfunctions (Solin and Sarkka 2020,
+/// eq. 6). Constant outside.
 #[must_use]
 pub fn nonlinearity_basis(x: f64) -> [f64; N_SHAPE] {
     let turn = std::f64::consts::PI * (x.clamp(-1.0, 1.0) + SHAPE_DOMAIN) / (2.0 * SHAPE_DOMAIN);
@@ -67,8 +69,9 @@ pub fn nonlinearity_basis(x: f64) -> [f64; N_SHAPE] {
     })
 }
 
-/// Prior standard deviations of the coefficients of [`nonlinearity_basis`] for a process of unit standard deviation with a squared
-/// exponential covariance of length `length` half ranges: `S(w)^(1/2)` at `w = pi h / 2 L` (Solin and Sarkka 2020, eq. 8).
+/// Prior standard deviations of the coefficients of [`nonlinearity_basis`] for a process of unit standard deviation with a
+/// squared exponential covariance of length `length` half ranges: `S(w)^(1/2)` at `w = pi h / 2 L` (Solin and Sarkka
+/// 2020, eq. 8).
 #[must_use]
 pub fn shape_prior(length: f64) -> [f64; N_SHAPE] {
     std::array::from_fn(|n| {
@@ -107,7 +110,8 @@ impl Conditions {
 }
 
 impl Correction {
-    /// The angle at `travel_rad` from the middle of the range; `approach` is -1, 0 (unknown) or 1: the way that the joint moved.
+    /// The angle at `travel_rad` from the middle of the range; `approach` is -1, 0 (unknown) or 1: the way that the
+    /// joint moved.
     #[must_use]
     pub fn angle_rad(
         &self,
@@ -197,8 +201,8 @@ impl SensorModel {
         travel
     }
 
-    /// Least and greatest slope of the angle over the range, relative to the gain; 1 and 1 for a straight sensor. Readings have one
-    /// angle, and [`Self::counts`] finds it, where both lie well within 0 .. 2.
+    /// Least and greatest slope of the angle over the range, relative to the gain; 1 and 1 for a straight sensor.
+    /// Readings have one angle, and [`Self::counts`] finds it, where both lie well within 0 .. 2.
     #[must_use]
     pub fn slope_over_gain(&self) -> (f64, f64) {
         if self.correction.terms.are_zero() {

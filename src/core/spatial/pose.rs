@@ -148,8 +148,8 @@ impl<A: Frame, B: Frame> Mul<Point<B>> for Pose<A, B> {
     }
 }
 
-/// The adjoint of a pose: maps a twist (translation, rotation) of frame B to frame A, `exp(Ad xi) = X exp(xi) X^-1` (Barfoot, eq. 7.46
-/// with the halves exchanged).
+/// The adjoint of a pose: maps a twist (translation, rotation) of frame B to frame A, `exp(Ad xi) = X exp(xi) X^-1`
+/// (Barfoot, eq. 7.46 with the halves exchanged).
 #[must_use]
 pub fn adjoint(a_from_b: &Isometry3<f64>) -> Matrix6<f64> {
     let rotation = *a_from_b.rotation.to_rotation_matrix().matrix();
@@ -166,7 +166,8 @@ pub fn skew(v: &Vector3<f64>) -> Matrix3<f64> {
     v.cross_matrix()
 }
 
-/// The exponential map of SE(3); `xi` = (translation m, rotation rad). Barfoot, State Estimation for Robotics, eq. 7.86.
+/// The exponential map of SE(3); `xi` = (translation m, rotation rad). Barfoot, State Estimation for Robotics, eq.
+/// 7.86.
 #[must_use]
 pub fn exp(xi: &Vector6<f64>) -> Isometry3<f64> {
     let rho = Vector3::new(xi[0], xi[1], xi[2]);

@@ -74,8 +74,8 @@ mod tests {
     }
 
     /// For an odd number the resampled median is an order statistic, whose distribution is binomial: P(median of the
-    /// resample is at most the k-th of nine) = P(five or more of nine draws with p = k/9), which is 0.0015, 0.030, 0.145,
-    /// 0.38 for k = 1 to 4. The low end is the first k that passes the tail.
+    /// resample is at most the k-th of nine) = P(five or more of nine draws with p = k/9), which is 0.0015, 0.030,
+    /// 0.145, 0.38 for k = 1 to 4. The low end is the first k that passes the tail.
     #[test]
     fn ends_are_the_order_statistics_that_the_binomial_gives() {
         let samples: Vec<f64> = (1..=9).map(f64::from).collect();

@@ -1,8 +1,8 @@
 //! The chi-square distribution: how likely a sum of squares is by chance.
 
-/// Probability that a chi-square variable of `dof` degrees of freedom exceeds `x`: `Q(dof/2, x/2)`, the regularized incomplete gamma
-/// function by its series below `a + 1` and by Lentz's continued fraction above (Press et al., Numerical Recipes, 6.2). Not a number
-/// where `x` is none; 1 without degrees of freedom.
+/// Probability that a chi-square variable of `dof` degrees of freedom exceeds `x`: `Q(dof/2, x/2)`, the regularized
+/// incomplete gamma function by its series below `a + 1` and by Lentz's continued fraction above (Press et al.,
+/// Numerical Recipes, 6.2). Not a number where `x` is none; 1 without degrees of freedom.
 #[must_use]
 pub fn chi_square_above(x: f64, dof: usize) -> f64 {
     let (a, x) = (0.5 * dof as f64, 0.5 * x);

@@ -65,7 +65,8 @@ pub trait Arm {
     /// Length of a control period, s.
     fn period_s(&self) -> f64;
 
-    /// Lets at least `seconds` pass with the arm at rest; an arm may send fewer messages meanwhile than [`Self::step`] does.
+    /// Lets at least `seconds` pass with the arm at rest; an arm may send fewer messages meanwhile than [`Self::step`]
+    /// does.
     ///
     /// # Errors
     /// As [`Self::step`].
@@ -77,8 +78,8 @@ pub trait Arm {
         Ok(())
     }
 
-    /// Commands the opening of the jaws, from 0 (closed) to 1 (open). An arm without jaws returns an error, or else a script
-    /// could not tell a touch from nothing.
+    /// Commands the opening of the jaws, from 0 (closed) to 1 (open). An arm without jaws returns an error, or else a
+    /// script could not tell a touch from nothing.
     ///
     /// # Errors
     /// [`ArmError::NoGripper`], [`ArmError::Opening`].

@@ -257,8 +257,8 @@ pub enum Phase {
 pub enum MarkKind {
     /// The arm stood still over the mark's span: detections and readings in it belong together.
     Capture { set: CaptureSet, pose_idx: u32 },
-    /// The arm stood still, and since the first such view of `joint_idx` no other joint was told to move: what the camera's
-    /// turn against the readings says about the sensor's scale.
+    /// The arm stood still, and since the first such view of `joint_idx` no other joint was told to move: what the
+    /// camera's turn against the readings says about the sensor's scale.
     Identify { joint_idx: u32 },
     /// The joint stood at one of its nominal end stops, where the drawing has this angle.
     Stop { joint_idx: u32, angle_rad: f64 },

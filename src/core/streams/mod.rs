@@ -1,7 +1,7 @@
-//! What flows between an arm and those who watch it: messages, and the traits of their ends.
+//! Streams: messages of an arm, and the interfaces of the arm and of receivers.
 //!
-//! Truth (a simulated arm) and belief (calibration, planning) meet here and in `log`, nowhere else. Every value in a
-//! message is one that a real arm, camera, recorder or operator could have given: raw counts, corner pixels, readings.
+//! Simulator and estimator share this module and `log` only. A message holds only values that a real arm, camera,
+//! recorder or operator can give: raw counts, corner pixels, readings.
 
 mod arm;
 mod message;

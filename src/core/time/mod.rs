@@ -1,42 +1,8 @@
 //! Time stamps.
 //!
-//! All streams carry nanoseconds since a fixed epoch; a duration is seconds in `f64`. There is no clock here: whoever
-//! makes a stamp (the simulator, a recorder) brings the time, so that the library stays deterministic.
+//! All streams have nanoseconds since a fixed epoch; a duration is seconds in `f64`. The library reads no clock:
+//! simulator and recorder give the time, so that the library stays deterministic.
 
-use serde::{Deserialize, Serialize};
+mod stamp;
 
-/// A point in time, nanoseconds since the Unix epoch.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-pub struct Stamp {
-    pub nanos: i64,
-}
-
-/// Where simulated time starts: 2026-01-01T00:00:00Z. Fixed, so that recordings repeat byte for byte.
-pub const SIMULATION_EPOCH: Stamp = Stamp { nanos: 1_767_225_600_000_000_000 };
-
-impl Stamp {
-    /// The stamp that lies `seconds` after `self` (before, if negative), rounded to whole nanoseconds.
-    #[must_use]
-    pub fn plus_s(self, seconds: f64) -> Self {
-        Self { nanos: self.nanos.saturating_add((seconds * 1e9).round() as i64) }
-    }
-
-    /// Seconds from `earlier` to `self`; negative if `self` comes first.
-    #[must_use]
-    pub fn since_s(self, earlier: Self) -> f64 {
-        // i128: the difference of two arbitrary recorded stamps may not fit an i64.
-        (i128::from(self.nanos) - i128::from(earlier.nanos)) as f64 * 1e-9
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn adding_and_subtracting_seconds_round_trips() {
-        let later = SIMULATION_EPOCH.plus_s(12.345_678_9);
-        assert!((later.since_s(SIMULATION_EPOCH) - 12.345_678_9).abs() < 1e-9);
-        assert!((SIMULATION_EPOCH.since_s(later) + 12.345_678_9).abs() < 1e-9);
-    }
-}
+pub use stamp::{SIMULATION_EPOCH, Stamp};

@@ -19,7 +19,7 @@ pub(crate) mod view;
 pub use association::{associate, associate_within, surveyed};
 pub use calibration_data::{CalibrationData, HeldOut};
 pub use conditions::ConditionHistory;
-pub use external::{ForeignContext, prepare_foreign};
+pub use external::{ExternalContext, prepare_external};
 pub use pooling::prepare_pooled;
 pub use scale_identification::{IdentifiedScale, identify_scales};
 pub use view::{CaptureData, EndStopReading, MeanCorners, ObservationRejection, TagMeasurement, TagObservation, View};

@@ -1,7 +1,8 @@
 //! Arms drawn from the belief: where the links may be when the sensors say where they are.
 //!
-//! Quantiles of the links' displacement come from these arms by counting, with the exact kinematics: under the datasheet the errors
-//! are uniform and large, so that neither a normal distribution nor a linearization gives an honest 99 %.
+//! Quantiles of the links' displacement come from these arms by counting, with the exact kinematics: under the
+//! datasheet the errors are uniform and large, so that neither a normal distribution nor a linearization gives an
+//! honest 99 %.
 
 use nalgebra::{DVector, Point3};
 use rand::RngExt;
@@ -68,8 +69,8 @@ impl ArmEnsemble {
         Self { sensors, arms, parameters, n_joints: robot.n_joints(), departure }
     }
 
-    /// By an estimate, under the conditions of now: by its covariance, within what the datasheet allows. Joints that it did not
-    /// determine are the datasheet's.
+    /// By an estimate, under the conditions of now: by its covariance, within what the datasheet allows. Joints that it
+    /// did not determine are the datasheet's.
     #[must_use]
     pub fn believed(robot: &Robot, calibration: &Calibration, now: &Conditions, rng: &mut ChaCha8Rng) -> Self {
         let robot = calibration.scaled_robot(robot);
@@ -131,7 +132,8 @@ impl ArmEnsemble {
         })
     }
 
-    /// Of the end of each link, from the first joint's on, the `quantile` of its distance from where it is believed to be, m.
+    /// Of the end of each link, from the first joint's on, the `quantile` of its distance from where it is believed to
+    /// be, m.
     #[must_use]
     pub fn link_displacement_quantiles_m(&self, robot: &Robot, believed: &JointAngles, quantile: f64) -> Vec<f64> {
         let there = link_ends(robot, &robot.chain.link_poses(believed));
@@ -148,8 +150,8 @@ impl ArmEnsemble {
 
 /// What the datasheet says of gains and offsets, where the estimate took a normal prior for it.
 ///
-/// The estimate's density is the likelihood times that normal prior; what is believed is the likelihood times a uniform density
-/// within the datasheet's bounds. The two differ where the views have told little.
+/// The estimate's density is the likelihood times that normal prior; what is believed is the likelihood times a uniform
+/// density within the datasheet's bounds. The two differ where the views have told little.
 struct Datasheet {
     joints: Vec<DatasheetJoint>,
 }
@@ -198,7 +200,8 @@ impl Datasheet {
     }
 }
 
-/// Indices of `n` draws, each as often as its weight asks for (systematic resampling); all alike where no draw has any weight.
+/// Indices of `n` draws, each as often as its weight asks for (systematic resampling); all alike where no draw has any
+/// weight.
 fn resampled(drawn: &[(DVector<f64>, f64)], n: usize) -> Vec<usize> {
     let total: f64 = drawn.iter().map(|(_, weight)| weight).sum();
     if !(total > 0.0 && total.is_finite()) {
@@ -293,7 +296,8 @@ mod tests {
         beyond as f64 / links as f64
     }
 
-    /// Arms drawn anew, under the datasheet and under an estimate, are beyond the 99 % quantile in about 1 % of the cases.
+    /// Arms drawn anew, under the datasheet and under an estimate, are beyond the 99 % quantile in about 1 % of the
+    /// cases.
     #[test]
     fn the_quantile_is_exceeded_as_often_as_it_says() {
         let robot = titan();

@@ -1,10 +1,11 @@
-//! Error bounds from an estimate: how far its covariance lets each joint be off, as an envelope that is convex in the angle.
+//! Error bounds from an estimate: how far its covariance lets each joint be off, as an envelope that is convex in the
+//! angle.
 //!
-//! Over the whole range the sigma `s(t)` of the joint's angle at travel t comes from the covariance of all of the joint's
-//! parameters (`s^2 = b(t)^T P b(t)`, b the derivative of the angle by them). Where a few views have told where the joint is at
-//! one angle and little of its gain, four sigma of a normal prior are far more than the datasheet's worst gain allows; there the
-//! bound is what the worst gain makes of the way from the angle that is known. The least `a + k |angle - pivot|` above the lesser
-//! of the two is the bound.
+//! Over the whole range the sigma `s(t)` of the joint's angle at travel t comes from the covariance of all of the
+//! joint's parameters (`s^2 = b(t)^T P b(t)`, b the derivative of the angle by them). Where a few views have told where
+//! the joint is at one angle and little of its gain, four sigma of a normal prior are far more than the datasheet's
+//! worst gain allows; there the bound is what the worst gain makes of the way from the angle that is known. The least
+//! `a + k |angle - pivot|` above the lesser of the two is the bound.
 
 use crate::calib::{Calibration, Parameter, ParameterCovariance, ParameterKind};
 use crate::plan::bounds::joint_bounds::{JointBound, JointErrorBounds};
@@ -19,7 +20,8 @@ const PLACES: usize = 41;
 const AT_REST_RAD: f64 = 0.0016;
 
 impl JointErrorBounds {
-    /// Of the sensors that `calibration` found, accepted or not; joints that it did not determine keep the datasheet's bounds.
+    /// Of the sensors that `calibration` found, accepted or not; joints that it did not determine keep the datasheet's
+    /// bounds.
     ///
     /// `sensors` are the calibration's own.
     #[must_use]

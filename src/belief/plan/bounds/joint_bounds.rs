@@ -116,8 +116,8 @@ impl JointErrorBounds {
         self.joints[joint].slope
     }
 
-    /// The drawing's limits less the error there and what an arm overshoots that comes slowly: believed angles that no arm
-    /// within the bounds drives into a stop.
+    /// The drawing's limits less the error there and what an arm overshoots that comes slowly: believed angles that no
+    /// arm within the bounds drives into a stop.
     #[must_use]
     pub fn safe_limits(&self, robot: &Robot) -> Vec<JointLimits> {
         let arriving = TrackingErrorBound::arriving(robot);

@@ -1,7 +1,7 @@
-//! How far a joint may be from where it is believed to be.
+//! Joint error bounds: the largest difference of true and believed joint angles.
 //!
-//! `joint_bounds`: by the datasheet, or by an estimate's covariance (`estimate_bounds`); `ensemble`: arms drawn from the
-//! belief.
+//! `joint_bounds`: from the datasheet, or from the covariance of an estimate (`estimate_bounds`); `ensemble`: arms
+//! drawn from the belief.
 
 pub(crate) mod ensemble;
 mod estimate_bounds;

@@ -1,7 +1,8 @@
-//! Proves that every arm within the joint errors keeps clear, at one configuration or along an edge.
+//! Certificates that every arm within the joint errors keeps the margin, at one configuration or along an edge.
 //!
-//! `sweep` looks at stretches of an edge from the coarse to the fine, `error_box` halves the joint errors of a pair where halving the edge
-//! does not help, `motion_bound` is the most that one shape moves against another within such a region. `violation` is what planning asks.
+//! `sweep` tests intervals of an edge from coarse to fine. `error_box` halves the joint errors of a pair where halving
+//! the edge does not help. `motion_bound` is the largest displacement of one shape against another within such a
+//! region. `violation` is the interface for planning.
 
 mod error_box;
 mod motion_bound;

@@ -162,7 +162,8 @@ impl ArmRegion {
         for joint in first_joint..outer_body {
             let half_rad = self.error_half_rad[joint];
             if half_rad > 0.0 {
-                // Along the direction a point p moves by `direction . (axis x (p - origin)) = turn . (p - origin)` a radian.
+                // Along the direction a point p moves by `direction . (axis x (p - origin)) = turn . (p - origin)` a
+                // radian.
                 let turn = direction.cross(self.axes[joint]);
                 let rate_m = turn.dot(placed.center - self.origins[joint]);
                 first_m += half_rad * (rate_m.abs() + placed.extent_m(turn));

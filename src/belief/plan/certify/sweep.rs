@@ -121,8 +121,8 @@ impl Sweep<'_> {
         self.from[joint] + share * (self.to[joint] - self.from[joint])
     }
 
-    /// The most that a joint may be off on a stretch of the way, rad. The sensor's error is convex in the angle, so that it
-    /// is largest at an end.
+    /// The most that a joint may be off on a stretch of the way, rad. The sensor's error is convex in the angle, so
+    /// that it is largest at an end.
     pub(crate) fn error_rad(&self, joint: usize, along: [f64; 2]) -> f64 {
         let Some(bounds) = self.bounds else { return 0.0 };
         let [begin, end] = along.map(|share| bounds.error_rad(joint, self.believed(joint, share)));
@@ -187,7 +187,8 @@ impl Sweep<'_> {
         open.drifting(spot.drift(between, outer, direction)).map_or(Finding::Clear, Finding::Open)
     }
 
-    /// The same of a pair that is open and not too near, along the direction of its closest points; `None`: it is clear.
+    /// The same of a pair that is open and not too near, along the direction of its closest points; `None`: it is
+    /// clear.
     pub(crate) fn test_pair_exact(&self, open: &OpenPair, spot: &ArmRegion, moved: &[ShapeMotion]) -> Option<OpenPair> {
         let pair = self.model.pair(open.pair);
         let (outer, other) = (&moved[pair.outer()], self.model.other_at(pair, |inner| &moved[inner].placed));

@@ -61,7 +61,8 @@ impl ClearanceModel<'_> {
     }
 
     /// The closest pair over every arm within `bounds` whose sensors read `believed`, as far as the answer matters: its
-    /// distance is at least `enough_m` where all of them are proven to keep that, else it is that of one which does not.
+    /// distance is at least `enough_m` where all of them are proven to keep that, else it is that of one which does
+    /// not.
     #[must_use]
     pub fn nearest_under(&self, believed: &JointAngles, bounds: &JointErrorBounds, enough_m: f64) -> ClosestPair {
         self.find_violation(believed, bounds, enough_m).unwrap_or_else(|| {

@@ -1,7 +1,8 @@
-//! Clearance between the arm and everything else, for one configuration.
+//! Clearance between the arm and its environment at one configuration.
 //!
-//! `model` is the arm and what is around it, `shapes` their collision shapes, `separation` the distance of two of them, `pair` which of
-//! them are tested, `pair_distance` how much distance each pair needs; `self_collision` finds the pairs of links that can come near each other.
+//! `model` is the arm with its environment, `shapes` their collision shapes, `separation` the distance of two shapes,
+//! `pair` the tested pairs, `pair_distance` the distance that each pair needs; `self_collision` finds the pairs of
+//! links that can come near each other.
 
 pub(crate) mod model;
 pub(crate) mod pair;

@@ -1,8 +1,8 @@
 //! Free water between the arm and everything else, for one arm or for every arm within the joint errors.
 //!
 //! Moving shapes are the links' collision primitives; standing ones the vehicle's parts (fixed in the base frame),
-//! obstacles and the seafloor (fixed in the world; what the vehicle's motion about its station may do is added to the margin).
-//! Links closer than two joints apart cannot be told from a joint and are not tested against each other.
+//! obstacles and the seafloor (fixed in the world; what the vehicle's motion about its station may do is added to the
+//! margin). Links closer than two joints apart cannot be told from a joint and are not tested against each other.
 
 use nalgebra::Vector3;
 use parry3d::math::{Pose3, Vec3};

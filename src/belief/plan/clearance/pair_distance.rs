@@ -148,8 +148,8 @@ impl ClearanceModel<'_> {
         if grows { self.gripper_growth_m } else { 0.0 }
     }
 
-    /// A true distance in the terms of the margin; shapes that touch stay at zero. `sway_m`: what the vehicle's motion may
-    /// take from it.
+    /// A true distance in the terms of the margin; shapes that touch stay at zero. `sway_m`: what the vehicle's motion
+    /// may take from it.
     pub(crate) fn in_margin_m(&self, pair: Pair, distance_m: f64, sway_m: f64) -> f64 {
         let distance_m = (distance_m - self.growth_m(pair)).max(0.0);
         match pair {

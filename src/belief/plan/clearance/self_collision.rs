@@ -12,11 +12,12 @@ use armcal_core::streams::JointAngles;
 
 /// Links that were never nearer than this are left out of the list, m: more than a margin asks for, and [`UNSEEN_M`].
 const NEAR_M: f64 = 0.2;
-/// What random configurations may have missed, m: links that were never nearer than a distance are taken to keep it less this.
+/// What random configurations may have missed, m: links that were never nearer than a distance are taken to keep it
+/// less this.
 pub(crate) const UNSEEN_M: f64 = 0.05;
 
-/// The nearest that each two links of the arm come to each other in `n` random configurations: within the joint limits, and
-/// beyond them by what the datasheet lets the sensors hide.
+/// The nearest that each two links of the arm come to each other in `n` random configurations: within the joint limits,
+/// and beyond them by what the datasheet lets the sensors hide.
 #[must_use]
 pub fn sample_self_pairs(robot: &Robot, n: u64, seed: u64) -> SelfPairs {
     let clearance = ClearanceModel::of_arm_alone(robot);

@@ -53,7 +53,8 @@ pub(crate) struct Shapes<'a> {
 pub(crate) struct Separation {
     /// Zero: touching or inside each other.
     pub distance_m: f64,
-    /// Unit, from the other shape to the outer one; zero where no direction separates them (shapes that are not convex).
+    /// Unit, from the other shape to the outer one; zero where no direction separates them (shapes that are not
+    /// convex).
     pub direction: Vec3,
     /// A lower bound on the distance that holds along `direction`.
     pub gap_m: f64,

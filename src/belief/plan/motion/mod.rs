@@ -1,4 +1,4 @@
-//! How the arm moves between two configurations: the line, its duration, and what the joints leave it by.
+//! Motion between two configurations: the straight line, its duration, and the tracking error of the joints.
 
 pub(crate) mod edge;
 pub(crate) mod timing;

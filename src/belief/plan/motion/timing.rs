@@ -1,8 +1,8 @@
 //! How long motions take: rest to rest on each edge, within the joints' rates and the pump's flow.
 //!
-//! All joints go the same share of their way at the same time, by a cubic `s = u^2 (3 - 2 u)` of the share `u` of time; its
-//! rate is largest at the middle, 1.5 times its mean. An edge takes as long as the slowest of its joints needs, and as
-//! the pump needs for all of them: `sum_j D_j |rate_j| <= Q`, with `D_j` the oil that joint j takes a radian.
+//! All joints go the same share of their way at the same time, by a cubic `s = u^2 (3 - 2 u)` of the share `u` of time;
+//! its rate is largest at the middle, 1.5 times its mean. An edge takes as long as the slowest of its joints needs, and
+//! as the pump needs for all of them: `sum_j D_j |rate_j| <= Q`, with `D_j` the oil that joint j takes a radian.
 
 use crate::plan::motion::edge::{Edge, Path};
 use armcal_core::robot::Robot;
@@ -10,8 +10,8 @@ use armcal_core::streams::JointAngles;
 
 /// Share of rates and flow that set-points use; the rest is left to the controller.
 pub(crate) const RATE_SHARE: f64 = 0.7;
-/// How long an arm takes to come to rest after a path, s: 0.84 in the median and 1.14 in the 90 % quantile of a simulated arm's
-/// 58 rests, assumed for others.
+/// How long an arm takes to come to rest after a path, s: 0.84 in the median and 1.14 in the 90 % quantile of a
+/// simulated arm's 58 rests, assumed for others.
 pub(crate) const SETTLE_S: f64 = 1.0;
 /// Largest rate of the cubic over its mean.
 const CUBIC_PEAK: f64 = 1.5;

@@ -1,9 +1,10 @@
-//! How far the arm leaves the straight line of an edge while it moves: its joints lag, droop and overshoot, each its own way.
+//! How far the arm leaves the straight line of an edge while it moves: its joints lag, droop and overshoot, each its
+//! own way.
 //!
-//! Set-points go rest to rest by a cubic (`timing`), whose rate at the share `u` of time is `4 u (1 - u)` of its largest. A
-//! joint that lags by up to `lag_spread_s` more or less than the others is off the line by that times its rate, though never by more
-//! than it was to move so far, and by a droop in proportion to the rate; an overshoot comes at the end of the edge, ahead for the
-//! most part. What does not move does not stray.
+//! Set-points go rest to rest by a cubic (`timing`), whose rate at the share `u` of time is `4 u (1 - u)` of its
+//! largest. A joint that lags by up to `lag_spread_s` more or less than the others is off the line by that times its
+//! rate, though never by more than it was to move so far, and by a droop in proportion to the rate; an overshoot comes
+//! at the end of the edge, ahead for the most part. What does not move does not stray.
 
 use crate::plan::motion::edge::{Edge, SLOWEST};
 use crate::plan::motion::timing::{RATE_SHARE, Timing};
@@ -61,7 +62,8 @@ impl TrackingErrorBound {
         most_rad.max(-least_rad)
     }
 
-    /// The middle of where the joint may come to rest, off the edge's end, rad; on the way in proportion to the share of it.
+    /// The middle of where the joint may come to rest, off the edge's end, rad; on the way in proportion to the share
+    /// of it.
     #[must_use]
     pub fn middle_rad(&self, joint: usize) -> f64 {
         let [least_rad, most_rad] = self.end_rad[joint];

@@ -1,10 +1,14 @@
-//! Paths between configurations that keep clear for every arm within the joint errors.
+//! Paths between configurations that keep the margin for every arm within the joint errors.
 //!
-//! `planner` tries the straight edge and, where it is blocked, `rrt_connect` and shortcuts; each edge is certified, not sampled.
+//! `planner` tries the straight edge; where it is blocked, `rrt_connect` and shortcuts. `edge_check` certifies each
+//! edge instead of sampling it.
 
-pub(crate) mod planner;
+mod edge_check;
+mod error;
+mod planner;
 mod rrt_connect;
 #[cfg(test)]
 mod tests;
 
-pub use planner::{PathError, PathPlanner};
+pub use edge_check::PathPlanner;
+pub use error::PathError;

@@ -1,15 +1,15 @@
 //! RRT-Connect (Kuffner and LaValle 2000) over certified edges, and shortcuts.
 //!
-//! Two trees grow from start and goal. Samples are the stowed pose first, then draws about the straight way and over all
-//! of the joints' ranges in turn. Work is counted in regions that certifying looks at, so that a search ends after the same
-//! work on every machine. A path found is made quicker: waypoints are left out, then random places on it are connected
-//! directly as long as both edges about the shortcut are certified too.
+//! Two trees grow from start and goal. Samples are the stowed pose first, then draws about the straight way and over
+//! all of the joints' ranges in turn. Work is counted in regions that certifying looks at, so that a search ends after
+//! the same work on every machine. A path found is made quicker: waypoints are left out, then random places on it are
+//! connected directly as long as both edges about the shortcut are certified too.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 use crate::plan::motion::edge::{Edge, Path, SLOWEST};
-use crate::plan::path::planner::{PathPlanner, between};
+use crate::plan::path::edge_check::{PathPlanner, between};
 use armcal_core::streams::{JointAngles, MAX_JOINTS};
 
 /// Longest step by which a tree grows: of a joint that moves the arm's farthest point most, rad.
@@ -191,8 +191,9 @@ impl<'a, 'b> RrtConnect<'a, 'b> {
         self.time_scale(from, to, along_s / timing.least_duration_s(from, to))
     }
 
-    /// The path with a straight edge from place `a` to place `b` on it (waypoint and share of the edge behind it), where that
-    /// saves time and its three new edges are certified: a part of an edge is driven at other rates than the whole.
+    /// The path with a straight edge from place `a` to place `b` on it (waypoint and share of the edge behind it),
+    /// where that saves time and its three new edges are certified: a part of an edge is driven at other rates than the
+    /// whole.
     fn shortcut(&mut self, path: &Path, a: f64, b: f64) -> Option<Path> {
         let (before, after) = (a.floor() as usize, b.floor() as usize);
         if before == after {

@@ -7,7 +7,8 @@ use crate::plan::bounds::JointErrorBounds;
 use crate::plan::clearance::ClearanceModel;
 use crate::plan::motion::edge::{SLOWEST, SLOWNESS};
 use crate::plan::motion::{Edge, Path, TrackingErrorBound};
-use crate::plan::path::planner::*;
+use crate::plan::path::edge_check::*;
+use crate::plan::path::error::PathError;
 use crate::plan::path::rrt_connect::RrtConnect;
 use armcal_core::joints::JointAngles;
 use armcal_core::kinematics::JointLimits;
@@ -63,7 +64,8 @@ fn duration_s(planner: &PathPlanner<'_>, waypoints: &[JointAngles]) -> f64 {
     planner.clearance.timing().path_duration_s(&path)
 }
 
-/// In all three sites, under wide and narrow bounds: paths are found, keep clear wherever one looks, and are the same again.
+/// In all three sites, under wide and narrow bounds: paths are found, keep clear wherever one looks, and are the same
+/// again.
 #[test]
 fn paths_are_found_and_keep_clear_and_are_the_same_again() {
     for name in ["open-frame", "tight-basket", "under-ice"] {

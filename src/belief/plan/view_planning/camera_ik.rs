@@ -1,7 +1,8 @@
 //! Inverse kinematics of the camera: its eye to a place, its optical axis along a direction.
 //!
-//! Levenberg's damped least squares on five numbers: the eye's distance (m) and the axis's turn `a x a*` (rad, weighted by the
-//! range, so that both count as displacements at the tag). The arm need not get there: what it comes to is tested like any other pose.
+//! Levenberg's damped least squares on five numbers: the eye's distance (m) and the axis's turn `a x a*` (rad, weighted
+//! by the range, so that both count as displacements at the tag). The arm need not get there: what it comes to is
+//! tested like any other pose.
 
 use nalgebra::{SMatrix, SVector, Vector3};
 use rand::RngExt;

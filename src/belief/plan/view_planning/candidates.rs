@@ -1,15 +1,17 @@
 //! Poses that may be taken: they see enough tags for most arms that the belief allows, and keep clear for every one.
 //!
-//! Drawn in turn evenly over the narrowed joint ranges, from boxes of growing size around where the arm is (under a wide belief only
-//! poses near the present one are certain to be clear), and by the camera's inverse kinematics at the tags. Cheap tests come
-//! first: field of view, clearance of the believed arm, probability of the tags, the certificate, what hides them.
+//! Drawn in turn evenly over the narrowed joint ranges, from boxes of growing size around where the arm is (under a
+//! wide belief only poses near the present one are certain to be clear), and by the camera's inverse kinematics at the
+//! tags. Cheap tests come first: field of view, clearance of the believed arm, probability of the tags, the
+//! certificate, what hides them.
 
 use nalgebra::Vector3;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
+use crate::plan::PlanError;
 use crate::plan::view_planning::camera_ik::CameraGoal;
-use crate::plan::view_planning::{PlanError, PoseRequest};
+use crate::plan::view_planning::request::PoseRequest;
 use armcal_core::kinematics::JointLimits;
 use armcal_core::robot::Robot;
 use armcal_core::streams::{JointAngles, MAX_JOINTS};
@@ -85,7 +87,8 @@ pub(crate) struct Search<'a> {
     pub refused: InfeasibleCounts,
 }
 
-/// Joints from this one on do not move the camera; they stay where they are, but for those that turn a tag on the gripper.
+/// Joints from this one on do not move the camera; they stay where they are, but for those that turn a tag on the
+/// gripper.
 fn n_seen(robot: &Robot) -> usize {
     robot.camera.mount.n_joints
 }
@@ -249,7 +252,8 @@ impl<'a> Search<'a> {
     }
 }
 
-/// Errors between the bounds by the distribution that the sum of a gain's and an offset's uniform error has: a triangle.
+/// Errors between the bounds by the distribution that the sum of a gain's and an offset's uniform error has: a
+/// triangle.
 fn arms() -> [[f64; MAX_JOINTS]; N_ARMS] {
     let mut step = 1.0;
     let steps: [f64; MAX_JOINTS] = std::array::from_fn(|_| {
@@ -303,7 +307,8 @@ impl InfeasibleCounts {
             return format!("{unsure} poses see enough tags only if the joints are where they are believed to be");
         }
         format!(
-            "{enough} poses have enough tags in view, but the believed arm touches something there, or its tool is at a target"
+            "{enough} poses have enough tags in view, but the believed arm touches something there, or its tool is \
+             at a target"
         )
     }
 }

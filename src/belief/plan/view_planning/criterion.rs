@@ -1,9 +1,9 @@
 //! What a view is worth: by how much it lowers the logarithm of the measure that views are chosen by.
 //!
-//! A view with `G = twists basis` and unit noise takes `P G^T S^-1 G P` off the covariance P, `S = I + G P G^T` (6 x 6). With
-//! the measure's rows L and `Y = L P G^T S^(-T/2)` (6 columns) the tool's variance, and the sum of variances, fall by `|Y|^2`, the
-//! volume by the factor `det(I - Y^T Y)`, and the largest variance becomes that of `L P L^T - Y Y^T`. G is never written out: P is
-//! taken to the few directions first.
+//! A view with `G = twists basis` and unit noise takes `P G^T S^-1 G P` off the covariance P, `S = I + G P G^T` (6 x
+//! 6). With the measure's rows L and `Y = L P G^T S^(-T/2)` (6 columns) the tool's variance, and the sum of variances,
+//! fall by `|Y|^2`, the volume by the factor `det(I - Y^T Y)`, and the largest variance becomes that of `L P L^T - Y
+//! Y^T`. G is never written out: P is taken to the few directions first.
 
 use nalgebra::{Cholesky, DMatrix, Matrix6, SMatrix, SymmetricEigen};
 
@@ -21,7 +21,8 @@ type Linear = SMatrix<f64, MAX_LINEAR, MAX_LINEAR>;
 #[derive(Clone, Debug)]
 pub(crate) struct DesignObjective {
     criterion: PoseCriterion,
-    /// L: of the tool's position at the targets over the root of their number, or of gains and offsets in units of their priors.
+    /// L: of the tool's position at the targets over the root of their number, or of gains and offsets in units of
+    /// their priors.
     rows: DMatrix<f64>,
     /// What no view lowers.
     floor: f64,

@@ -1,13 +1,14 @@
 //! The tool error to be expected once views are fitted, every tag with a survey error of its own.
 //!
-//! The information of joints, mount and tags together: a view with the camera's twists by parameters B, by tags `-Ad_i`, and by its own
-//! joint errors D (variance s^2) adds `sum G_i^T H_i G_i` with `G_i = [B, -Ad_i]`, less what its own errors take:
-//! `V (diag(1/s^2) + D^T H D)^-1 V^T`, `V = sum G_i^T H_i D`. These are the normal equations of `bundle` at what is believed.
+//! The information of joints, mount and tags together: a view with the camera's twists by parameters B, by tags
+//! `-Ad_i`, and by its own joint errors D (variance s^2) adds `sum G_i^T H_i G_i` with `G_i = [B, -Ad_i]`, less what
+//! its own errors take: `V (diag(1/s^2) + D^T H D)^-1 V^T`, `V = sum G_i^T H_i D`. These are the normal equations of
+//! `bundle` at what is believed.
 
 use nalgebra::{Cholesky, DMatrix, Matrix6, Vector3};
 
-use crate::plan::view_planning::PoseRequest;
 use crate::plan::view_planning::parameter_prior::{ParameterPrior, WIDTH, basis};
+use crate::plan::view_planning::request::PoseRequest;
 use crate::plan::view_planning::view_information::ViewJacobian;
 use armcal_core::robot::Robot;
 use armcal_core::stats::quantile;
@@ -29,11 +30,13 @@ pub(crate) struct Forecast {
 pub(crate) struct Task {
     /// Tool position by parameters, three rows a target, over the root of the number of targets.
     pub rows: DMatrix<f64>,
-    /// Variance that no view of the camera lowers, m^2: what parameters leave of each sensor, and joints behind the camera.
+    /// Variance that no view of the camera lowers, m^2: what parameters leave of each sensor, and joints behind the
+    /// camera.
     pub floor_m2: f64,
 }
 
-/// What the joints at the edges of their reachable ranges count beside the task. Assumed: little, so that the task decides.
+/// What the joints at the edges of their reachable ranges count beside the task. Assumed: little, so that the task
+/// decides.
 const EDGE_SHARE: f64 = 0.3;
 /// Quantiles of the reachable angles that count as edges.
 const EDGES: [f64; 2] = [0.01, 0.99];
@@ -69,8 +72,9 @@ impl Task {
 }
 
 impl Task {
-    /// The rows, and ten more for what lies beyond the task: each joint at both edges of what `angles` reach, as far as it moves the tool
-    /// at the targets, with the share [`EDGE_SHARE`] of the whole. Margins shrink where joints are known, and there are tasks after this one.
+    /// The rows, and ten more for what lies beyond the task: each joint at both edges of what `angles` reach, as far as
+    /// it moves the tool at the targets, with the share [`EDGE_SHARE`] of the whole. Margins shrink where joints are
+    /// known, and there are tasks after this one.
     pub(crate) fn with_edges(&self, robot: &Robot, n_joints: usize, angles: &[JointAngles]) -> DMatrix<f64> {
         let n_rows = self.rows.nrows();
         let mut rows = self.rows.clone().resize_vertically(n_rows + 2 * n_joints, 0.0);

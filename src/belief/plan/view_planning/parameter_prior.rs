@@ -1,14 +1,15 @@
 //! What is not known of the arm, as one covariance that every view makes smaller.
 //!
-//! Columns: of each joint before the camera gain, offset and the coefficients of its nonlinearity ([`WIDTH`] in all), then the
-//! camera's mount (translation m, rotation rad, on the right) and the survey's common error (a twist of all tags together
-//! in the base frame). The covariance is what the estimator `bundle` takes for its prior, or the running estimate's.
+//! Columns: of each joint before the camera gain, offset and the coefficients of its nonlinearity ([`WIDTH`] in all),
+//! then the camera's mount (translation m, rotation rad, on the right) and the survey's common error (a twist of all
+//! tags together in the base frame). The covariance is what the estimator `bundle` takes for its prior, or the running
+//! estimate's.
 
 use nalgebra::{DMatrix, Matrix6, Vector6};
 
 use crate::calib::bundle::{Hyperparameters, MOUNT_ROWS};
 use crate::calib::{Calibration, Parameter, ParameterKind};
-use crate::plan::view_planning::PoseRequest;
+use crate::plan::view_planning::request::PoseRequest;
 use armcal_core::robot::{FailedKind, Robot};
 use armcal_core::sensor::{N_SHAPE, nonlinearity_basis};
 use armcal_core::spatial::adjoint;

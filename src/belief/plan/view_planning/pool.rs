@@ -3,15 +3,16 @@
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
+use crate::plan::PlanError;
 use crate::plan::motion::timing::{SETTLE_S, Timing};
 use crate::plan::view_planning::candidates::{Candidate, InfeasibleCounts, Search};
 use crate::plan::view_planning::criterion::{DesignObjective, DesignState};
 use crate::plan::view_planning::forecast::{Forecast, Task};
 use crate::plan::view_planning::parameter_prior::ParameterPrior;
+use crate::plan::view_planning::request::{CapturedView, PlannedPose, PosePlan, PoseRequest};
 use crate::plan::view_planning::selection::ViewSelector;
 use crate::plan::view_planning::view_information::{CornerModel, ViewJacobian, WhitenedView};
 use crate::plan::view_planning::visit_order::Tour;
-use crate::plan::view_planning::{PlanError, PlannedPose, PosePlan, PoseRequest};
 use armcal_core::routine::PoseCriterion;
 use armcal_core::streams::{CaptureSet, JointAngles};
 
@@ -38,7 +39,7 @@ impl DesignInputs {
 
     /// The views that are taken already, linearized.
     fn taken(&self, request: &PoseRequest<'_>) -> Vec<ViewJacobian> {
-        let look = |view: &crate::plan::view_planning::CapturedView| {
+        let look = |view: &CapturedView| {
             let tags: Vec<(usize, f64)> = view.tags.iter().map(|&tag| (tag, 1.0)).collect();
             ViewJacobian::new(request.robot, self.optics, &view.angles, &tags)
         };
@@ -46,8 +47,8 @@ impl DesignInputs {
     }
 }
 
-/// Where tags have to be mapped first, one view in so many shows one whose place is known: the map hangs on that tag, and is turned
-/// about it by as much as its corners leave its direction open.
+/// Where tags have to be mapped first, one view in so many shows one whose place is known: the map hangs on that tag,
+/// and is turned about it by as much as its corners leave its direction open.
 const ANCHORED_EVERY: usize = 2;
 
 impl PosePool {
@@ -79,8 +80,8 @@ impl PosePool {
         self.candidates.is_empty()
     }
 
-    /// Chooses `request.n_fit` views for the fit and `n_held_out` for the verdict, by `request.capture.choose`; fewer where there are
-    /// fewer and the choice will be renewed anyway (`capture.replan_every`).
+    /// Chooses `request.n_fit` views for the fit and `n_held_out` for the verdict, by `request.capture.choose`; fewer
+    /// where there are fewer and the choice will be renewed anyway (`capture.replan_every`).
     ///
     /// # Errors
     /// [`PlanError::TooFewPoses`].
@@ -209,6 +210,19 @@ impl PosePool {
         let (candidates, tried) = (self.candidates.len(), self.refused.tried);
         PosePlan { poses, predicted_tool_error_m, tool_error_before_m, needed, arm_time_s, candidates, tried }
     }
+}
+
+/// More candidates than this gain little.
+const CANDIDATES_PER_POSE: usize = 20;
+const MIN_CANDIDATES: usize = 300;
+
+/// Chooses `n_fit` views for the fit and `n_held_out` for the verdict.
+///
+/// # Errors
+/// [`PlanError::NoUsefulPose`], [`PlanError::TooFewPoses`], [`PlanError::TooFewTags`].
+pub fn choose_poses(request: &PoseRequest<'_>, rng: &mut ChaCha8Rng) -> Result<PosePlan, PlanError> {
+    let wanted = request.n_fit + request.n_held_out;
+    PosePool::gather(request, (wanted * CANDIDATES_PER_POSE).max(MIN_CANDIDATES), rng)?.choose(request, rng)
 }
 
 /// Time of a view besides the way to it, s.

@@ -1,9 +1,9 @@
 //! Which of the candidates: greedily the most telling for the arm's time, then by exchange.
 //!
-//! A pick is worth its gain (the fall of the measure's logarithm) over the root of the time that it adds to the tour: cost-benefit
-//! greedy (Leskovec et al. 2007) with the exponent [`TIME_POWER`]. Gains fall as views come in, so a gain computed earlier
-//! is taken for an upper bound, and most candidates need not be looked at again (lazy greedy, Minoux 1978). Exchange then
-//! puts one candidate in place of one pick as long as `ln measure + TIME_POWER ln time` falls.
+//! A pick is worth its gain (the fall of the measure's logarithm) over the root of the time that it adds to the tour:
+//! cost-benefit greedy (Leskovec et al. 2007) with the exponent [`TIME_POWER`]. Gains fall as views come in, so a gain
+//! computed earlier is taken for an upper bound, and most candidates need not be looked at again (lazy greedy, Minoux
+//! 1978). Exchange then puts one candidate in place of one pick as long as `ln measure + TIME_POWER ln time` falls.
 
 use crate::plan::view_planning::candidates::Candidate;
 use crate::plan::view_planning::criterion::{DesignState, Scratch};

@@ -31,7 +31,8 @@ fn pool(site: &Site, n: usize, seed: u64) -> PosePool {
     PosePool::gather(&site.request(&clearance), n, &mut rng(seed)).expect("candidates")
 }
 
-/// Camera from tag with one parameter moved: joints' by their basis, mount on the right, survey on the left of all tags.
+/// Camera from tag with one parameter moved: joints' by their basis, mount on the right, survey on the left of all
+/// tags.
 fn camera_from_tag(
     robot: &Robot,
     angles: &JointAngles,
@@ -170,8 +171,8 @@ fn exchange_never_makes_it_worse_and_greedy_beats_any_order() {
     }
 }
 
-/// The tool's variance is not submodular: what one view tells may need another. Stale gains then are no bounds, but the choice is
-/// worth about as much.
+/// The tool's variance is not submodular: what one view tells may need another. Stale gains then are no bounds, but the
+/// choice is worth about as much.
 #[test]
 fn the_lazy_choice_is_worth_what_the_eager_one_is() {
     let site = Site::titan();
@@ -271,7 +272,8 @@ fn views_of_unknown_tags_hang_on_a_known_one() {
     }
 }
 
-/// Where the choice is renewed soon, what is visited first tells most for its time; and fewer poses than wanted will do.
+/// Where the choice is renewed soon, what is visited first tells most for its time; and fewer poses than wanted will
+/// do.
 #[test]
 fn the_first_visits_tell_most_where_the_choice_is_renewed() {
     let mut site = Site::titan();

@@ -1,9 +1,10 @@
 //! A view to come, linearized: what its tags' corners will tell of the camera's pose.
 //!
-//! The camera's pose perturbed on the right by `xi` (translation, rotation) moves a point p of its frame by `-rho - omega x p`,
-//! so that one tag has the information `H = sum over corners J^T W J`, J = d(pixel)/d(xi), W the inverse of the corner noise.
-//! Parameters move the camera by `xi = sum_j d_j (b_j . p_j) + mount - Ad(camera from base) survey`, d_j the twist that joint j
-//! gives it. The joints' own errors of a view add `sum_j d_j d_j^T s_j^2` to the noise `H^-1`.
+//! The camera's pose perturbed on the right by `xi` (translation, rotation) moves a point p of its frame by `-rho -
+//! omega x p`, so that one tag has the information `H = sum over corners J^T W J`, J = d(pixel)/d(xi), W the inverse of
+//! the corner noise. Parameters move the camera by `xi = sum_j d_j (b_j . p_j) + mount - Ad(camera from base) survey`,
+//! d_j the twist that joint j gives it. The joints' own errors of a view add `sum_j d_j d_j^T s_j^2` to the noise
+//! `H^-1`.
 
 use nalgebra::{Cholesky, Isometry3, Matrix6, SMatrix, Vector3};
 
@@ -54,8 +55,8 @@ pub(crate) struct CornerModel {
 const FRAMES_PER_S: f64 = 5.0;
 /// Range at which robot.toml's corner noise is meant, facing the tag, m.
 const REFERENCE_RANGE_M: f64 = 1.0;
-/// Of each tag's own survey error, the share that counts as noise of a view when views are ranked: the rest is known as soon as a few views
-/// have tied the tags together. Assumed; the forecast has each tag by itself.
+/// Of each tag's own survey error, the share that counts as noise of a view when views are ranked: the rest is known as
+/// soon as a few views have tied the tags together. Assumed; the forecast has each tag by itself.
 const OWN_SURVEY_SHARE: f64 = 0.35;
 
 impl CornerModel {
@@ -84,8 +85,8 @@ impl CornerModel {
         Some(rows.iter().zip(weights).map(|(row, weight)| row.tr_mul(row) * weight).sum())
     }
 
-    /// Inverse variance of each corner's coordinates, px^-2: robot.toml's at the reference range, and by the model of corner
-    /// noise at others.
+    /// Inverse variance of each corner's coordinates, px^-2: robot.toml's at the reference range, and by the model of
+    /// corner noise at others.
     fn weights(&self, robot: &Robot, corners_px: &[[f64; 2]; 4], range_m: f64, size_m: f64) -> [f64; 4] {
         let usual_px2 = reference_px2(robot.camera.lens.focal_px[0], size_m);
         let stated_px2 = (robot.camera.corner_std_px * self.noise).powi(2) / self.n_frames;

@@ -1,7 +1,8 @@
 //! The order of visits: little time of the arm.
 //!
-//! An open tour from where the arm is, by cheapest insertion, then 2-opt and or-opt (moves of up to three poses) until neither helps
-//! (Croes 1958, Or 1976). Times of edges are those of rest-to-rest motion; paths that have to go around something take longer.
+//! An open tour from where the arm is, by cheapest insertion, then 2-opt and or-opt (moves of up to three poses) until
+//! neither helps (Croes 1958, Or 1976). Times of edges are those of rest-to-rest motion; paths that have to go around
+//! something take longer.
 
 use crate::plan::motion::timing::Timing;
 use armcal_core::streams::JointAngles;

@@ -6,7 +6,8 @@ use nalgebra::{Isometry3, Translation3};
 use serde::Deserialize;
 
 use crate::tagmap::check::SIZE_RANGE_M;
-use crate::tagmap::files::{TagFile, yaml};
+use crate::tagmap::files::tag_file::TagFile;
+use crate::tagmap::files::yaml;
 use crate::tagmap::types::{Body, TagPrior};
 use armcal_core::robot::{FileIssue, RobotError};
 
@@ -26,8 +27,8 @@ pub(super) fn is_target(text: &str) -> bool {
     text.lines().any(|line| line.trim_start().starts_with("target_type"))
 }
 
-/// Tags are numbered from the lower left by rows; the board's frame has its origin at the first tag's lower left corner, x right,
-/// y up, z out of it.
+/// Tags are numbered from the lower left by rows; the board's frame has its origin at the first tag's lower left
+/// corner, x right, y up, z out of it.
 pub(super) fn parse(file: &Path, text: &str) -> Result<TagFile, RobotError> {
     let raw: TargetYaml = yaml::parse(file, text)?;
     if raw.target_type != "aprilgrid" {

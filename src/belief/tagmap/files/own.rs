@@ -1,9 +1,10 @@
 //! Our tag map file.
 //!
-//! `version = 1`, `frame`, and one `[[tag]]` each with `id` (or `name`, for a landmark that is no AprilTag), `size_m`, `position_m`,
-//! `quaternion_wxyz`, `position_std_m`; all but the first may be absent where nobody knows them. Further keys, all optional: `base_tag` and `default_size_m` (of tags that are not named) at the top; `rotation_std_rad` and `frame`
-//! of a tag that is in another frame than the file's, such as a group that nothing ties to the first; `[[body]]` with `name`
-//! and `moving`, for frames that move.
+//! `version = 1`, `frame`, and one `[[tag]]` each with `id` (or `name`, for a landmark that is not an AprilTag),
+//! `size_m`, `position_m`, `quaternion_wxyz` and `position_std_m`; all but the first may be absent. Further optional
+//! keys: `base_tag` and `default_size_m` (of tags without an entry) at the top; `rotation_std_rad` and `frame` of a tag
+//! in another frame than the file's, such as a separate group; `[[body]]` with `name` and `moving`, for frames that
+//! move.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -12,8 +13,9 @@ use nalgebra::Isometry3;
 use serde::Deserialize;
 
 use crate::tagmap::check::SIZE_RANGE_M;
-use crate::tagmap::files::landmarks::{FIRST_NAMED_ID, Landmark, LandmarkFile};
-use crate::tagmap::files::{TagFile, WrittenGroup};
+use crate::tagmap::files::landmark::{FIRST_NAMED_ID, Landmark, LandmarkFile};
+use crate::tagmap::files::tag_file::TagFile;
+use crate::tagmap::files::written::WrittenGroup;
 use crate::tagmap::types::{Body, TagPrior};
 use armcal_core::robot::{FileIssue, RobotError, parse_toml};
 use armcal_core::spatial::{Base, Pose, Tag};
@@ -133,7 +135,8 @@ fn pose(file: &Path, key: &str, position: [f64; 3], wxyz: [f64; 4]) -> Result<Is
     Ok(*pose.ok_or_else(|| FileIssue::new(file, key, "must be finite, the quaternion not zero"))?.isometry())
 }
 
-/// Exact where all are zero or absent. The position's are along the frame's axes, so the largest counts for all of them.
+/// Exact where all are zero or absent. The position's are along the frame's axes, so the largest counts for all of
+/// them.
 fn std(file: &Path, tag: &TagToml, key: &impl Fn(&str) -> String) -> Result<Option<[f64; 6]>, RobotError> {
     let (position, rotation) = (tag.position_std_m.unwrap_or_default(), tag.rotation_std_rad.unwrap_or_default());
     for (name, values) in [("position_std_m", position), ("rotation_std_rad", rotation)] {

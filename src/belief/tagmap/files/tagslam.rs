@@ -8,8 +8,9 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 use serde::Deserialize;
 
 use crate::tagmap::check::SIZE_RANGE_M;
+use crate::tagmap::files::tag_file::{Remap, TagFile};
+use crate::tagmap::files::written::WrittenGroup;
 use crate::tagmap::files::yaml::{self, PoseYaml};
-use crate::tagmap::files::{Remap, TagFile, WrittenGroup};
 use crate::tagmap::types::{Body, TagPrior};
 use armcal_core::robot::{FileIssue, RobotError};
 use armcal_core::time::Stamp;

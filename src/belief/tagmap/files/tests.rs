@@ -4,9 +4,8 @@ use std::path::Path;
 
 use nalgebra::{Isometry3, Matrix6, Translation3, UnitQuaternion, Vector3};
 
-use crate::tagmap::files::{
-    NamedCamera, TagFile, Written, WrittenGroup, cameras_to_yaml, own, parse_cameras, parse_tags, tagslam,
-};
+use crate::tagmap::files::written::{WrittenGroup, WrittenTag};
+use crate::tagmap::files::{NamedCamera, TagFile, cameras_to_yaml, own, parse_cameras, parse_tags, tagslam};
 use armcal_core::optics::{CameraModel, Fisheye, Radtan};
 use armcal_core::time::Stamp;
 
@@ -195,7 +194,8 @@ fn what_is_wrong_with_a_camera_is_said_with_file_key_and_what_is_supported() {
     let model = with("distortion_model: equidistant", "distortion_model: omni");
     assert_eq!(
         model,
-        "cameras.yaml: cam0.distortion_model: `omni` is not supported; use equidistant (fisheye), radtan (plumb_bob), none"
+        "cameras.yaml: cam0.distortion_model: `omni` is not supported; use equidistant (fisheye), radtan \
+         (plumb_bob), none"
     );
     assert!(
         with("camera_model: pinhole", "camera_model: ds")
@@ -216,7 +216,7 @@ fn group(frame: &str, ids: [u32; 2]) -> WrittenGroup {
         let pose = Isometry3::from_parts(Translation3::new(0.1, -0.2, f64::from(id) / 3.0), turn);
         let std = [1e-3, 2e-3, 3e-3, 0.01, 0.02, 0.03];
         let covariance = Matrix6::from_diagonal(&std.map(|s: f64| s * s).into());
-        Written { id, size_m: 0.16, pose, position_std_m: [1e-3, 2e-3, 3e-3], covariance }
+        WrittenTag { id, size_m: 0.16, pose, position_std_m: [1e-3, 2e-3, 3e-3], covariance }
     };
     WrittenGroup { frame: frame.to_owned(), is_static: true, tags: ids.map(tag).to_vec() }
 }

@@ -48,8 +48,9 @@ fn over_seeds(camera: CameraModel, seeds: std::ops::Range<u64>, settings: &MapSe
     }
 }
 
-/// 99 +- 2 % of 500 cases, and no more than 1.1 times the Cramer-Rao bound; the sample's own scatter is 3 % of the bound. The
-/// narrower pinhole sees some tags in one or two images, and these few decide its sum; there each tag counts alike.
+/// 99 +- 2 % of 500 cases, and no more than 1.1 times the Cramer-Rao bound; the sample's own scatter is 3 % of the
+/// bound. The narrower pinhole sees some tags in one or two images, and these few decide its sum; there each tag counts
+/// alike.
 #[test]
 fn errors_are_as_small_as_possible_and_as_large_as_said() {
     for (camera, seeds) in [(fisheye(), 0..100), (pinhole(), 0..40)] {

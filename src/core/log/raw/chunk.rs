@@ -48,8 +48,8 @@ pub fn for_each_record_of_cut(bytes: &[u8], head: &ChunkHead, visit: impl FnMut(
     let _ = drive(options().with_record_length_limit(MAX_CUT_RECORD_BYTES), &chunk, visit);
 }
 
-/// Records of the summary section, footer included, if its checksum holds. `bytes` runs from the data end record in front
-/// of the summary to the end of the footer.
+/// Records of the summary section, footer included, if its checksum holds. `bytes` runs from the data end record in
+/// front of the summary to the end of the footer.
 pub fn verified_summary(bytes: &[u8]) -> McapResult<Vec<(u8, Vec<u8>)>> {
     let mut records = Vec::new();
     let options = options().with_validate_summary_section_crc(true).with_record_length_limit(bytes.len());

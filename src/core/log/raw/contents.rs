@@ -50,8 +50,8 @@ impl FileContents {
         totals.uncompressed_bytes += head.uncompressed_bytes;
     }
 
-    /// Adds a header, metadata or attachment record. `body` is the beginning of its fields, `record` their place. `None`
-    /// if it is malformed.
+    /// Adds a header, metadata or attachment record. `body` is the beginning of its fields, `record` their place.
+    /// `None` if it is malformed.
     pub(super) fn take(&mut self, opcode: u8, body: &[u8], record: (u64, u64)) -> Option<()> {
         let mut fields = Fields(body);
         match opcode {

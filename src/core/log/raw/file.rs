@@ -11,8 +11,8 @@ use crate::log::error::LogError;
 
 /// Hands every readable message of an MCAP file to `visit`, in the order of the file.
 ///
-/// A chunk's messages are visited once its checksum has been verified. From a cut last chunk, the messages before the cut
-/// are visited unverified.
+/// A chunk's messages are visited once its checksum has been verified. From a cut last chunk, the messages before the
+/// cut are visited unverified.
 ///
 /// # Errors
 /// [`LogError::Read`], [`LogError::Empty`], [`LogError::NotMcap`]. Damage and cuts are no errors, see

@@ -95,7 +95,8 @@ pub struct ChunkHead {
 }
 
 impl ChunkHead {
-    /// Parses bytes from the chunk's opcode on; `None` unless they hold the whole head of a chunk of a known compression.
+    /// Parses bytes from the chunk's opcode on; `None` unless they hold the whole head of a chunk of a known
+    /// compression.
     pub fn parse(bytes: &[u8]) -> Option<Self> {
         Self::parse_body(bytes).filter(|_| bytes[0] == mcap::records::op::CHUNK)
     }

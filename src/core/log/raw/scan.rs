@@ -215,8 +215,8 @@ impl<R: Read + Seek, F: FnMut(&RawMessage<'_>)> Scan<R, F> {
         Ok(Next::At(at + PREFIX_BYTES as u64 + prefix.len))
     }
 
-    /// Why a record contradicts its opcode. An opcode has no checksum; a changed one must neither hide a record nor turn
-    /// another record into a message.
+    /// Why a record contradicts its opcode. An opcode has no checksum; a changed one must neither hide a record nor
+    /// turn another record into a message.
     fn contradiction(&mut self, at: u64, prefix: Prefix) -> io::Result<Option<&'static str>> {
         let left = self.window.len() - at;
         let start = self.window.bytes(at, left.min(CHUNK_HEAD_BYTES as u64) as usize)?;

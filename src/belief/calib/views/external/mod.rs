@@ -11,14 +11,14 @@ use std::collections::BTreeMap;
 
 use crate::calib::views::view::{CaptureData, ObservationRejection, View};
 use crate::calib::{CalibError, CalibrationData, HeldOut};
-use armcal_core::input::{ForeignRecording, InputMap};
+use armcal_core::input::{ExternalRecording, InputMap};
 use armcal_core::robot::Robot;
 use armcal_core::streams::ReachTask;
 use views::RecordingViews;
 
 /// What is known beside the recordings.
 #[derive(Clone, Debug, Default)]
-pub struct ForeignContext {
+pub struct ExternalContext {
     pub task: Option<ReachTask>,
     /// Names of landmarks that are no numbered tags.
     pub landmark_names: BTreeMap<u32, String>,
@@ -30,11 +30,11 @@ pub struct ForeignContext {
 ///
 /// # Errors
 /// [`CalibError::Twice`] for a recording that is given twice, [`CalibError::NoTags`] without any view.
-pub fn prepare_foreign(
-    recordings: &[ForeignRecording],
+pub fn prepare_external(
+    recordings: &[ExternalRecording],
     map: &InputMap,
     robot: &Robot,
-    context: ForeignContext,
+    context: ExternalContext,
 ) -> Result<CalibrationData, CalibError> {
     let name = names_of(recordings);
     let mut data = CaptureData { task: context.task, landmark_names: context.landmark_names, ..CaptureData::default() };
@@ -75,7 +75,7 @@ pub fn prepare_foreign(
     })
 }
 
-fn names_of(recordings: &[ForeignRecording]) -> String {
+fn names_of(recordings: &[ExternalRecording]) -> String {
     let mut names: Vec<String> = recordings.iter().map(|recording| recording.path.display().to_string()).collect();
     names.sort();
     names.join(", ")

@@ -4,7 +4,7 @@
 //! is interpolated, and its rate is known. Recordings with one reading a pose have no neighbours to go between: the
 //! nearest counts.
 
-use armcal_core::input::{ForeignRecording, Reading};
+use armcal_core::input::{ExternalRecording, Reading};
 use armcal_core::robot::Robot;
 use armcal_core::sensor::{ArmSensors, wrap_symmetric};
 use armcal_core::streams::JointAngles;
@@ -37,7 +37,7 @@ pub(crate) struct TravelSeries<'a> {
 }
 
 impl<'a> TravelSeries<'a> {
-    pub fn new(recording: &'a ForeignRecording, robot: &Robot, max_gap_s: f64) -> Self {
+    pub fn new(recording: &'a ExternalRecording, robot: &Robot, max_gap_s: f64) -> Self {
         let sensors = ArmSensors::nominal(robot);
         let travel = |reading: &Reading| {
             JointAngles::from_fn(robot.n_joints(), |j| {

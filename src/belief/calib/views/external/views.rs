@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use crate::calib::views::external::landmarks::{Averaged, average};
 use crate::calib::views::external::pairing::{RATE_WINDOW_S, TravelSample, TravelSeries};
 use crate::calib::views::view::{ObservationRejection, TagObservation, View};
-use armcal_core::input::{ForeignRecording, InputMap, RawMeasurement, TagFrame, WhileMoving};
+use armcal_core::input::{ExternalRecording, InputMap, RawMeasurement, TagFrame, WhileMoving};
 use armcal_core::robot::Robot;
 use armcal_core::streams::JointAngles;
 
@@ -43,7 +43,7 @@ struct Maker<'a> {
 }
 
 impl RecordingViews {
-    pub fn of(recording: &ForeignRecording, map: &InputMap, robot: &Robot, plain_landmark: Option<u32>) -> Self {
+    pub fn of(recording: &ExternalRecording, map: &InputMap, robot: &Robot, plain_landmark: Option<u32>) -> Self {
         let moving = &robot.sensors[..robot.camera.mount.n_joints];
         let mut maker = Maker {
             robot,

@@ -1,4 +1,4 @@
-//! Reads a recording by an input map.
+//! Reader of recordings of other systems, by an input map.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -7,40 +7,33 @@ use super::error::InputError;
 use super::joints::{JointReader, Reading};
 use super::map::{InputMap, TagUse};
 use super::tags::{TagFrame, TagReader};
-use crate::log::ros::Time;
 use crate::log::{Completeness, RawMessage, for_each_raw};
 use crate::robot::Robot;
-use crate::time::Stamp;
 
-/// What a recording of a real arm holds for calibration.
+/// Joint readings and detections of a recording of a real arm.
 #[derive(Clone, Debug)]
-pub struct ForeignRecording {
+pub struct ExternalRecording {
     pub path: PathBuf,
-    /// By their stamps.
+    /// In the order of their stamps.
     pub readings: Vec<Reading>,
-    /// By their stamps; each has a tag.
+    /// In the order of their stamps; each has a tag.
     pub frames: Vec<TagFrame>,
     /// Joints of the robot that no reading has, by index; none of them moves the camera.
     pub absent_joints: Vec<usize>,
     /// Recorded joints that the robot lacks.
     pub extra_joints: Vec<String>,
-    /// What was not used, by reason.
+    /// Number of unused messages by reason.
     pub left_out: BTreeMap<String, u64>,
     pub completeness: Completeness,
 }
 
-/// A header's stamp; the recorder's where the sender left it zero or it is none.
-pub(super) fn stamp_or_log_time(stamp: Time, log_time: Stamp) -> Stamp {
-    Stamp::try_from(stamp).ok().filter(|stamp| stamp.nanos != 0).unwrap_or(log_time)
-}
-
-/// Reads the joint readings and tags of a recording; joints are matched by name, in whatever order they come.
+/// Reads the joint readings and tags of a recording; joints are matched by name.
 ///
-/// Joints behind the camera may be absent, unless the robot has a tag on its gripper.
+/// Joints distal to the camera may be absent, unless the robot has a tag on its gripper.
 ///
 /// # Errors
 /// [`InputError`], naming file, topic, message and field.
-pub fn read_foreign(path: &Path, map: &InputMap, robot: &Robot) -> Result<ForeignRecording, InputError> {
+pub fn read_external(path: &Path, map: &InputMap, robot: &Robot) -> Result<ExternalRecording, InputError> {
     let file = path.display().to_string();
     let joints = robot.joint_names();
     let n_needed = if robot.gripper_tag.is_some() { joints.len() } else { robot.camera.mount.n_joints };
@@ -94,10 +87,10 @@ pub fn read_foreign(path: &Path, map: &InputMap, robot: &Robot) -> Result<Foreig
     left_out.extend(of_tags);
     let completeness = summary.completeness;
     let path = path.to_owned();
-    Ok(ForeignRecording { path, readings: sorted, frames, absent_joints, extra_joints, left_out, completeness })
+    Ok(ExternalRecording { path, readings: sorted, frames, absent_joints, extra_joints, left_out, completeness })
 }
 
-/// Of topic, log time and bytes, each with its length.
+/// Hash of topic, log time and bytes.
 fn digest(raw: &RawMessage<'_>) -> [u8; 32] {
     let mut hasher = blake3::Hasher::new();
     hasher.update(&(raw.topic().len() as u64).to_le_bytes());

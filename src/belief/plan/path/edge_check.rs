@@ -1,0 +1,95 @@
+//! Checks of configurations and edges for every arm within the joint errors.
+
+use crate::plan::bounds::joint_bounds::JointErrorBounds;
+use crate::plan::clearance::ClearanceModel;
+use crate::plan::motion::edge::{Edge, SLOWEST, SLOWNESS};
+use crate::plan::motion::tracking_error::TrackingErrorBound;
+use armcal_core::kinematics::JointLimits;
+use armcal_core::streams::JointAngles;
+
+/// Plans paths under one belief.
+#[derive(Clone, Copy)]
+pub struct PathPlanner<'a> {
+    pub clearance: &'a ClearanceModel<'a>,
+    pub bounds: &'a JointErrorBounds,
+    pub limits: &'a [JointLimits],
+    /// Free water to keep, m.
+    pub margin_m: f64,
+}
+
+impl PathPlanner<'_> {
+    /// Whether every arm within the bounds keeps the margin at rest at `angles`.
+    #[must_use]
+    pub fn is_free(&self, angles: &JointAngles) -> bool {
+        self.clearance.find_violation(angles, self.bounds, self.margin_m).is_none()
+    }
+
+    /// Whether every arm within the bounds keeps the margin when it comes to `angles` slowly.
+    #[must_use]
+    pub fn is_free_to_arrive(&self, angles: &JointAngles) -> bool {
+        self.clearance.find_violation_arriving(angles, self.bounds, self.margin_m).is_none()
+    }
+
+    /// Whether every arm within the bounds keeps the margin along the straight edge, if it goes slowly enough.
+    #[must_use]
+    pub fn is_edge_free(&self, from: &JointAngles, to: &JointAngles) -> bool {
+        self.keeps_clear(&Edge { from: *from, to: *to, time_scale: SLOWEST }, &mut 0)
+    }
+
+    /// How slow the straight edge must be driven for that, as little as will do; `None` where no slowness up to
+    /// `at_most` does. `n_regions` grows by what it cost.
+    pub(crate) fn time_scale(
+        &self,
+        from: &JointAngles,
+        to: &JointAngles,
+        at_most: f64,
+        n_regions: &mut usize,
+    ) -> Option<f64> {
+        let mut holds = |slowness| {
+            let edge = Edge { from: *from, to: *to, time_scale: slowness };
+            self.is_within_limits(&edge) && self.keeps_clear(&edge, n_regions)
+        };
+        let levels = &SLOWNESS[..SLOWNESS.iter().take_while(|&&slowness| slowness <= at_most).count()];
+        let [quickest, .., slowest] = *levels else {
+            return levels.first().copied().filter(|&only| holds(only));
+        };
+        // Most are clear at full speed; of the others, the slowest tells whether to go on.
+        if holds(quickest) {
+            return Some(quickest);
+        }
+        if !holds(slowest) {
+            return None;
+        }
+        let (mut too_quick, mut slow) = (0, levels.len() - 1);
+        while slow - too_quick > 1 {
+            let middle = (too_quick + slow) / 2;
+            if holds(levels[middle]) { slow = middle } else { too_quick = middle }
+        }
+        Some(levels[slow])
+    }
+
+    /// Whether every arm within the bounds keeps the margin along the edge at its speed.
+    pub(crate) fn keeps_clear(&self, edge: &Edge, n_regions: &mut usize) -> bool {
+        let verdict = self.clearance.sweep(edge, self.bounds, self.margin_m).verdict();
+        *n_regions += verdict.n_regions;
+        verdict.violation.is_none()
+    }
+
+    /// Whether no joint overshoots its limits at the end of the edge by more than they leave room for.
+    pub(crate) fn is_within_limits(&self, edge: &Edge) -> bool {
+        let stray = TrackingErrorBound::new(self.clearance.robot(), self.clearance.timing(), edge);
+        let arriving = TrackingErrorBound::arriving(self.clearance.robot());
+        (0..self.clearance.n_error_joints()).all(|j| {
+            let JointLimits { lower_rad, upper_rad } = self.limits[j];
+            let way_rad = edge.to[j] - edge.from[j];
+            let left_rad = if way_rad > 0.0 { upper_rad - edge.to[j] } else { edge.to[j] - lower_rad };
+            // What is beyond its limits already comes back.
+            way_rad == 0.0 || stray.end_rad(j) <= left_rad.max(0.0) + arriving.end_rad(j)
+        })
+    }
+}
+
+/// A place on the straight way.
+pub(crate) fn between(from: &JointAngles, to: &JointAngles, share: f64) -> JointAngles {
+    JointAngles::from_fn(from.len(), |j| if from[j] == to[j] { from[j] } else { from[j] + share * (to[j] - from[j]) })
+}

@@ -1,0 +1,34 @@
+//! Errors of a session.
+
+use crate::calib::CalibError;
+use crate::plan::PlanError;
+use armcal_core::log::LogError;
+use armcal_core::streams::ArmError;
+
+/// The reason why a run ended early.
+#[derive(Debug, thiserror::Error)]
+pub enum SessionError {
+    #[error(transparent)]
+    Plan(#[from] PlanError),
+    #[error(transparent)]
+    Arm(#[from] ArmError),
+    #[error(transparent)]
+    Log(#[from] LogError),
+    #[error(transparent)]
+    Calib(#[from] CalibError),
+    #[error("the arm sends no joint readings")]
+    NoReadings,
+    #[error(
+        "none of the {planned} planned poses was captured: to {blocked} no path led, at {restless} the arm did not \
+         come to \
+         rest by its own sensors (too noisy, or it oscillates?)"
+    )]
+    NothingCaptured { planned: usize, blocked: usize, restless: usize },
+    #[error("step {step}: the arm has no joint `{joint}`; it has {joints:?}")]
+    UnknownJoint { step: usize, joint: String, joints: Vec<String> },
+    #[error("step {step}: {problem}")]
+    Step { step: usize, problem: String },
+    /// Stopped by the caller; the arm holds its last set-point.
+    #[error("stopped on request at {at_s:.1} s of the arm's time")]
+    Interrupted { at_s: f64 },
+}

@@ -1,0 +1,104 @@
+//! Landmarks of a tag map, and the survey that joints are calibrated by.
+//!
+//! A landmark may be less than an AprilTag: without size, without rotation, with a name instead of a number. The use of
+//! the detections decides whether that is enough.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use nalgebra::Isometry3;
+
+use armcal_core::input::TagUse;
+use armcal_core::robot::{FileIssue, Robot, SurveyedTag, TagSurvey};
+use armcal_core::spatial::{Base, Pose, Tag};
+
+/// Numbers of landmarks that have a name and no number: this plus their place in the file, from 0.
+pub const FIRST_NAMED_ID: u32 = 1_000_000;
+/// One sigma of a rotation of which nothing is known, rad: half a turn.
+pub const UNKNOWN_ROTATION_STD_RAD: f64 = std::f64::consts::PI;
+
+/// A landmark as a tag map has it, in the frame of the file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Landmark {
+    pub id: u32,
+    pub name: Option<String>,
+    pub size_m: Option<f64>,
+    pub position_m: Option<[f64; 3]>,
+    pub quaternion_wxyz: Option<[f64; 4]>,
+    /// Zero where the file says nothing: exact.
+    pub position_std_m: f64,
+    pub rotation_std_rad: f64,
+}
+
+/// What a tag map says of landmarks in its frame.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct LandmarkFile {
+    pub frame: String,
+    pub base_tag: Option<u32>,
+    pub landmarks: Vec<Landmark>,
+}
+
+/// A survey for one use, and the names in it.
+#[derive(Clone, Debug)]
+pub struct NamedSurvey {
+    pub survey: TagSurvey,
+    pub names: BTreeMap<u32, String>,
+}
+
+impl LandmarkFile {
+    /// The survey around `robot` for tags that are used so.
+    ///
+    /// Of a landmark that is used by its position alone the rotation may be unknown (half a turn of sigma) and the size
+    /// too (NaN). A tag without any place can be used by its corners: its place is found from the views.
+    ///
+    /// # Errors
+    /// [`FileIssue`] naming `file`, the landmark and the key.
+    pub fn survey(&self, file: &Path, robot: &Robot, tag_use: TagUse) -> Result<NamedSurvey, FileIssue> {
+        if self.frame != robot.base_link {
+            let problem = format!("is `{}`; the arm's base is `{}`", self.frame, robot.base_link);
+            return Err(FileIssue::new(file, "frame", problem));
+        }
+        let tags: Vec<SurveyedTag> =
+            self.landmarks.iter().map(|landmark| landmark.surveyed(file, tag_use)).collect::<Result<_, _>>()?;
+        let ids: Vec<u32> = tags.iter().map(|tag| tag.id).collect();
+        let base_tag = self.base_tag.or(Some(robot.base_tag)).filter(|id| ids.contains(id)).or(ids.first().copied());
+        let base_tag = base_tag.ok_or_else(|| FileIssue::new(file, "tag", "holds no tag in that frame"))?;
+        let named = self.landmarks.iter().filter_map(|landmark| Some((landmark.id, landmark.name.clone()?)));
+        Ok(NamedSurvey { survey: TagSurvey { base_tag, tags }, names: named.collect() })
+    }
+}
+
+impl Landmark {
+    fn surveyed(&self, file: &Path, tag_use: TagUse) -> Result<SurveyedTag, FileIssue> {
+        let label = self.name.as_ref().map_or_else(|| format!("tag {}", self.id), |name| format!("tag `{name}`"));
+        let missing =
+            |key: &str, why: &str| FileIssue::new(file, format!("{label}: {key}"), format!("is missing; {why}"));
+        if tag_use == TagUse::Corners && self.size_m.is_none() {
+            return Err(missing("size_m", "a tag's corners need its size"));
+        }
+        let is_unknown = self.position_m.is_none() && self.quaternion_wxyz.is_none();
+        if tag_use != TagUse::Corners && self.position_m.is_none() {
+            return Err(missing("position_m", "a landmark that is used by its position or pose needs it"));
+        }
+        if tag_use != TagUse::Position && self.quaternion_wxyz.is_none() && !is_unknown {
+            return Err(missing("quaternion_wxyz", "without it a landmark can be used by its position alone"));
+        }
+        let (position_std_m, rotation_std_rad) = match (self.position_m, self.quaternion_wxyz) {
+            (Some(_), Some(_)) => (self.position_std_m, self.rotation_std_rad),
+            (Some(_), None) => (self.position_std_m, UNKNOWN_ROTATION_STD_RAD),
+            _ => (f64::INFINITY, f64::INFINITY),
+        };
+        let pose = Pose::from_position_quaternion_wxyz(
+            self.position_m.unwrap_or_default(),
+            self.quaternion_wxyz.unwrap_or([1.0, 0.0, 0.0, 0.0]),
+        );
+        let pose: Pose<Base, Tag> = pose.unwrap_or_else(|| Pose::from_isometry(Isometry3::identity()));
+        Ok(SurveyedTag {
+            id: self.id,
+            size_m: self.size_m.unwrap_or(f64::NAN),
+            base_from_tag: pose,
+            position_std_m,
+            rotation_std_rad,
+        })
+    }
+}

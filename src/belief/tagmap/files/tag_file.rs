@@ -1,0 +1,37 @@
+//! The contents of a file about tags.
+
+use std::collections::BTreeSet;
+
+use crate::tagmap::types::{Body, TagPrior};
+use armcal_core::time::Stamp;
+
+/// Detections of one tag that stand for another, in a span of time: a tag number that was hung up twice.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Remap {
+    pub id: u32,
+    pub as_id: u32,
+    /// `None`: of every camera.
+    pub camera: Option<String>,
+    pub from: Stamp,
+    pub to: Stamp,
+}
+
+/// What a file says of tags.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct TagFile {
+    /// The frame that the poses are in, as the file names it.
+    pub frame: String,
+    pub bodies: Vec<Body>,
+    pub tags: Vec<TagPrior>,
+    /// Size (m) and body of tags that are not named.
+    pub default_tag: Option<(f64, usize)>,
+    pub base_tag: Option<u32>,
+    pub ignored: BTreeSet<u32>,
+    /// Detections with more corrected bits are not used.
+    pub max_hamming: Option<i32>,
+    /// Single detections that shall not be used.
+    pub squashed: Vec<(Stamp, BTreeSet<u32>)>,
+    pub remaps: Vec<Remap>,
+    /// What the file asks for that has no effect here.
+    pub ignored_keys: Vec<String>,
+}

@@ -1,0 +1,143 @@
+//! The arm at rest for a reach: readings and believed tool position, from the recording's reach marks.
+//!
+//! Conditions and readings are averaged over each mark; the sensors are those believed at its start.
+
+use nalgebra::Vector3;
+
+use crate::calib::ConditionHistory;
+use armcal_core::log::Recording;
+use armcal_core::robot::Robot;
+use armcal_core::sensor::{ArmSensors, Conditions};
+use armcal_core::streams::{JointAngles, MarkKind, Message, ReachAttempt};
+use armcal_core::time::Stamp;
+
+/// The arm at rest for one target.
+#[derive(Clone, Debug)]
+pub struct ReachRest {
+    pub attempt: ReachAttempt,
+    pub target_idx: usize,
+    pub target_m: [f64; 3],
+    pub start: Stamp,
+    pub end: Stamp,
+    /// Over the mark, as far as the recording tells.
+    pub conditions: Conditions,
+    /// Joint angles as believed under the sensors of that moment and these conditions.
+    pub believed: JointAngles,
+    /// The tool as believed, base frame, m.
+    pub believed_tool_m: Vector3<f64>,
+}
+
+/// The sensors that the arm believed in, each from its stamp on; in the order of time, and not empty.
+pub type Beliefs<'a> = [(Stamp, &'a ArmSensors)];
+
+/// Those believed in at `stamp`: the first of all before the first stamp.
+fn believed_at<'a>(beliefs: &Beliefs<'a>, stamp: Stamp) -> Option<&'a ArmSensors> {
+    let later = beliefs.partition_point(|(from, _)| *from <= stamp);
+    beliefs.get(later.saturating_sub(1)).map(|(_, sensors)| *sensors)
+}
+
+/// Every reach of a recording, in the order of its marks. Marks without readings or without a target are left out.
+#[must_use]
+pub fn reaches(recording: &Recording, robot: &Robot, beliefs: &Beliefs<'_>) -> Vec<ReachRest> {
+    let task = recording.messages.iter().find_map(|(_, message)| match message {
+        Message::Task(task) => Some(task),
+        _ => None,
+    });
+    let Some(task) = task else { return Vec::new() };
+    let readings: Vec<_> = recording
+        .messages
+        .iter()
+        .filter_map(|(_, message)| match message {
+            Message::JointSensors(sample) => Some(sample),
+            _ => None,
+        })
+        .collect();
+    let surroundings = ConditionHistory::of(recording);
+    let marks = recording.messages.iter().filter_map(|(_, message)| match message {
+        Message::Mark(mark) => Some(mark),
+        _ => None,
+    });
+    marks
+        .filter_map(|mark| {
+            let MarkKind::Reach { attempt, target_idx } = mark.kind else { return None };
+            let target_m = *task.targets_m.get(target_idx as usize)?;
+            let sensors = believed_at(beliefs, mark.start)?;
+            let from = readings.partition_point(|sample| sample.stamp < mark.start);
+            let to = readings.partition_point(|sample| sample.stamp <= mark.end);
+            let span = readings.get(from..to).filter(|span| !span.is_empty())?;
+            let conditions = surroundings.over(mark.start, mark.end);
+            // Angles, not raw words, are averaged: the words wrap.
+            let mut believed = JointAngles::zeros(robot.n_joints());
+            for sample in span {
+                for (sum, angle) in believed.iter_mut().zip(sensors.angles_under(&sample.counts, &conditions).iter()) {
+                    *sum += angle / span.len() as f64;
+                }
+            }
+            let tool = robot.chain.link_poses(&believed).frame(&robot.tool.mount).translation.vector;
+            Some(ReachRest {
+                attempt,
+                target_idx: target_idx as usize,
+                target_m,
+                start: mark.start,
+                end: mark.end,
+                conditions,
+                believed,
+                believed_tool_m: tool,
+            })
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::calib::JointParameters;
+    use armcal_core::log::Completeness;
+    use armcal_core::streams::{JointSensorSample, Mark, ReachTask, TemperatureSample, Thermometer};
+    use armcal_core::time::SIMULATION_EPOCH;
+
+    /// Two rests with the same readings; in between the oil has warmed by 10 K.
+    #[test]
+    fn a_rest_is_believed_under_its_own_conditions() {
+        let folder = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("robots/titan4");
+        let robot = armcal_core::robot::load(&folder).expect("the robot reads");
+        let at = |seconds: f64| SIMULATION_EPOCH.plus_s(seconds);
+        let counts = ArmSensors::nominal(&robot).counts(&robot.stowed);
+        let targets_m = vec![[1.0, 0.0, 0.0]];
+        let mut messages = vec![Message::Task(ReachTask { stamp: at(0.0), targets_m, tolerance_m: 0.01 })];
+        for (start_s, temperature_c) in [(10.0, 20.0), (500.0, 30.0)] {
+            let thermometer = Thermometer::Oil;
+            let stamp = at(start_s - 5.0);
+            messages.push(Message::Temperature(TemperatureSample {
+                stamp,
+                thermometer,
+                temperature_c,
+                variance_c2: 0.1,
+            }));
+            let stamp = at(start_s + 0.2);
+            messages.push(Message::JointSensors(JointSensorSample { stamp, counts }));
+            let kind = MarkKind::Reach { attempt: ReachAttempt::After, target_idx: 0 };
+            messages.push(Message::Mark(Mark { start: at(start_s), end: at(start_s + 0.6), kind }));
+        }
+        let recording = Recording {
+            path: "synthetic.mcap".into(),
+            messages: messages.into_iter().map(|message| (SIMULATION_EPOCH, message)).collect(),
+            joint_names: robot.joint_names(),
+            completeness: Completeness::Whole,
+            raw: Vec::new(),
+            unknown_topics: Default::default(),
+            rejected: Default::default(),
+            non_monotonic: 0,
+            stamp_regressions: Default::default(),
+        };
+        let reference = Conditions { oil_c: Some(20.0), ..Conditions::default() };
+        let mut parameters = JointParameters { reference, ..JointParameters::default() };
+        parameters.terms[1].offset_rad_per_k = 1e-3;
+        let sensors = parameters.sensors(&robot);
+        let rests = reaches(&recording, &robot, &[(at(0.0), &sensors)]);
+        let believed: Vec<f64> = rests.iter().map(|rest| rest.believed[1] - robot.stowed[1]).collect();
+        assert!(believed[0].abs() < 1e-9 && (believed[1] - 1e-2).abs() < 1e-9, "{believed:?}");
+        assert_eq!(rests[1].conditions.oil_c, Some(30.0));
+        assert_ne!(rests[0].believed_tool_m, rests[1].believed_tool_m);
+    }
+}
