@@ -247,8 +247,8 @@ fn simulation(c: &mut Criterion) {
     images(c, &robot, &vehicle, &scene);
 }
 
-/// The wrist camera's view of the stowed arm, the vehicle and its tags, at half and at full resolution, and the same with
-/// detection.
+/// The wrist camera's view of the stowed arm, the vehicle and its tags, at half and at full resolution, and the same
+/// with detection.
 #[cfg(feature = "sim")]
 fn images(c: &mut Criterion, robot: &Robot, vehicle: &Vehicle, scene: &Scene) {
     use armcal::detect::{DetectorSettings, GreyImage, TagDetector};

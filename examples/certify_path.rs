@@ -1,7 +1,7 @@
 //! A path for an arm of your own: planned, certified for every arm within the sensors' error bounds, and timed.
 //!
-//! `cargo run --release --example certify_path -- ROBOT_FOLDER VEHICLE_FILE`; without arguments a Titan 4 class arm on a
-//! work-class vehicle. Start and goal are random configurations that are clear themselves.
+//! `cargo run --release --example certify_path -- ROBOT_FOLDER VEHICLE_FILE`; without arguments a Titan 4 class arm on
+//! a work-class vehicle. Start and goal are random configurations that are clear themselves.
 
 use std::env::args;
 use std::error::Error;

@@ -12,10 +12,10 @@
 //!
 //! | layer | modules | job |
 //! |---|---|---|
-//! | belief | [`calib`], [`tagmap`], [`plan`], [`verify`], [`session`] | estimates, plans, acts; knows what a real arm knows |
+//! | belief | [`calib`], [`tagmap`], [`plan`], [`verify`], [`session`] | estimates, plans, acts |
 //! | truth | `sim` (feature `sim`) | the simulated arm, vehicle, water and sensors |
 //! | meeting place | [`streams`], [`log`], [`routine`], [`input`] | messages, recordings, routines |
-//! | arm | [`robot`], [`sensor`], [`kinematics`], [`optics`]; `detect` (feature `sim`) | nominal arm, models; tags in images |
+//! | arm | [`robot`], [`sensor`], [`kinematics`], [`optics`]; `detect` (feature `sim`) | nominal arm; tags in images |
 //! | base | [`joints`], [`spatial`], [`stats`], [`time`] | units and frames as types; random streams; stamps |
 //!
 //! Without the default features `sim` and `viewer`, the library is the estimator and the planner alone.

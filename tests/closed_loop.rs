@@ -13,8 +13,8 @@ use crate::support::{Nowhere, ShortRoutine, finished, temp, titan, vehicle_file}
 
 /// None left out.
 const SEEDS: std::ops::RangeInclusive<u64> = 1..=5;
-/// m, median over the seeds of the median over the targets. 12 poses leave 6.0 mm over these seeds and 2.5 .. 7.4 mm for
-/// each of seeds 1 to 10: the sensors' nonlinearity and a camera mount that no number of views shows.
+/// m, median over the seeds of the median over the targets. 12 poses leave 6.0 mm over these seeds and 2.5 .. 7.4 mm
+/// for each of seeds 1 to 10: the sensors' nonlinearity and a camera mount that no number of views shows.
 const TOOL_ERROR_M: f64 = 0.008;
 /// m, of the miss at the target, which adds what the controller leaves at rest; 5.7 mm over these seeds.
 const REACH_ERROR_M: f64 = 0.010;

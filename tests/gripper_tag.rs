@@ -67,7 +67,8 @@ fn with_a_tag_on_the_gripper_the_tool_is_known_better_and_how_well() {
     let [with, without, foretold, foretold_without, nees] =
         [&with, &without, &foretold, &foretold_without, &nees].map(|values| median(values));
     eprintln!(
-        "tool {:.2} mm (predicted {:.2}) with, {:.2} mm (predicted {:.2}) without; better in {n_better} of {}; NEES {nees:.2}",
+        "tool {:.2} mm (predicted {:.2}) with, {:.2} mm (predicted {:.2}) without; better in {n_better} of {}; NEES \
+         {nees:.2}",
         with * 1e3,
         foretold * 1e3,
         without * 1e3,

@@ -1,14 +1,13 @@
 //! Integration tests: one binary, for each further one would link the viewer's SDK again.
 //!
-//! `oracle` compares with tools that share no code with ours, `golden` with figures that others published; `property` holds
-//! for any input; `recovery` puts known errors in and gets them back, `gripper_tag` with a tag that ties tool to camera,
-//! `map` with tags that nobody surveyed, `methods` by the paper's other methods, `detections` with some that are wrong, `failed` with sensors that fail; `wall` proves what belief does not know;
-//! `vehicles` puts every arm on every vehicle;
-//! `bumps` runs into things that nobody has drawn;
-//! `planning` reads plans and holds random arms against them;
-//! `determinism`, `closed_loop`, `script` and `cli` run the program, `kill` ends it badly; `sim` looks at the simulated
-//! world from outside; `uncalibrated` calibrates arms of which little is known; `real` reads recordings of real arms; `tagmap` maps tags in recordings that the
-//! test writes; `repository` reads sources and pages.
+//! `oracle` compares with tools that share no code with ours, `golden` with figures that others published; `property`
+//! holds for any input; `recovery` puts known errors in and gets them back, `gripper_tag` with a tag that ties tool to
+//! camera, `map` with tags that nobody surveyed, `methods` by the paper's other methods, `detections` with some that
+//! are wrong, `failed` with sensors that fail; `wall` proves what belief does not know; `vehicles` puts every arm on
+//! every vehicle; `bumps` runs into things that nobody has drawn; `planning` reads plans and holds random arms against
+//! them; `determinism`, `closed_loop`, `script` and `cli` run the program, `kill` ends it badly; `sim` looks at the
+//! simulated world from outside; `uncalibrated` calibrates arms of which little is known; `real` reads recordings of
+//! real arms; `tagmap` maps tags in recordings that the test writes; `repository` reads sources and pages.
 
 mod bumps;
 mod cli;

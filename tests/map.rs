@@ -18,7 +18,8 @@ const NOISE_PX: f64 = 0.134;
 const MACHINED: (f64, f64) = (0.0002, 0.00035);
 const SURVEYED: (f64, f64) = (0.001, 0.0035);
 
-/// The arm with straight sensors and a camera where the drawing has it: what is left is the map. Every view has five frames.
+/// The arm with straight sensors and a camera where the drawing has it: what is left is the map. Every view has five
+/// frames.
 fn titan_with(base_std: (f64, f64)) -> Robot {
     let mut robot = titan();
     robot.camera.corner_std_px = NOISE_PX;

@@ -113,7 +113,8 @@ fn minimum_variance_finds_all_but_the_first_offset_and_says_so() {
         // What is held is right if the datasheet is.
         arm.offset_rad[0] = 0.0;
         let found = calibrate(&recording(&arm, &mut rng), &robot, Method::MinimumVariance).expect("calibrated");
-        // How far the held offset may be off decides: its datasheet's sigma alone moves the tool by about the tolerance.
+        // How far the held offset may be off decides: its datasheet's sigma alone moves the tool by about the
+        // tolerance.
         let by_prediction = |why: &String| why.starts_with("the predicted tool error");
         assert!(found.refusal.as_ref().is_none_or(by_prediction), "{:?}", found.refusal);
         assert!(largest_error(&arm, &found, 0..N_SEEN) < 1e-6);

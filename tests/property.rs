@@ -108,7 +108,8 @@ fn pixels_round_trip_over_the_whole_image() {
 #[test]
 fn inverse_kinematics_reaches_what_forward_kinematics_gives() {
     const TOLERANCE_M: f64 = 1e-6;
-    /// Of random goals and starts, 0.65 of these; the rest ends in a corner of the limits, and planning tries another start.
+    /// Of random goals and starts, 0.65 of these; the rest ends in a corner of the limits, and planning tries another
+    /// start.
     const SHARE: f64 = 0.5;
     let robot = titan();
     let mut rng = stream_rng(1, "inverse");
@@ -188,7 +189,8 @@ fn counts_rescaled_by_a_thousand_change_nothing() {
             sample.counts.iter_mut().for_each(|counts| *counts *= FACTOR);
         }
     }
-    // Relative: rounding of travels that come from words a thousand times as large; BOBYQA stops within 1e-7 of a prior's sigma.
+    // Relative: rounding of travels that come from words a thousand times as large; BOBYQA stops within 1e-7 of a
+    // prior's sigma.
     for (method, tolerance) in [(Method::MinimumDistance, 1e-6), (Method::Bundle, 1e-9)] {
         let a = calibrate(&recording, &robot, method).expect("calibrated");
         let b = calibrate(&fine, &fine_robot, method).expect("calibrated");

@@ -152,7 +152,8 @@ fn recovered(method: Method, seeds: u64) -> [f64; 4] {
 fn known_errors_come_back_within_what_the_result_says_of_itself() {
     for (method, seeds) in [(Method::MinimumDistance, 24), (Method::Bundle, 12)] {
         let [median, p95, ratio, refused] = recovered(method, seeds);
-        // A normal's are 0.67 and 1.96; the mount's prior makes the sigmas larger than needed here, where it hangs as drawn.
+        // A normal's are 0.67 and 1.96; the mount's prior makes the sigmas larger than needed here, where it hangs as
+        // drawn.
         assert!((0.3..0.85).contains(&median) && p95 < 2.4, "{method}: median {median}, 95 % {p95}");
         assert!(ratio < 0.25 && refused <= 2.0, "{method}: {ratio}, {refused}");
     }
@@ -420,7 +421,8 @@ fn corners_of_an_external_detector_are_used_as_our_own_are() {
         writer.write_ros("/tags", &ros::AprilTagDetectionArray::SCHEMA, now, &array).expect("written");
     }
     writer.finish().expect("finished");
-    let map = "version = 1\n[joint_sensors]\ntopic = \"/words\"\n[tags]\ntopic = \"/tags\"\ncamera_frame = \"wrist_optical\"\nuse = \"corners\"\n";
+    let map = "version = 1\n[joint_sensors]\ntopic = \"/words\"\n[tags]\ntopic = \"/tags\"\n\
+        camera_frame = \"wrist_optical\"\nuse = \"corners\"\n";
     write(&given.file("map.toml"), map);
     let mut command = program();
     command.arg("calibrate").arg(given.file("arm.mcap")).arg("--robot").arg(robot_folder());

@@ -55,8 +55,8 @@ fn median(values: &[f64]) -> f64 {
 
 #[test]
 fn noise_free_linear_sensors_are_recovered_through_a_file() {
-    /// m at the tool. BOBYQA stops at a trust region of 1e-7 prior sigma, 5e-9 rad or 1e-8 m at 2 m; the sum of distances
-    /// has a kink at its minimum, so that some ten times that is left.
+    /// m at the tool. BOBYQA stops at a trust region of 1e-7 prior sigma, 5e-9 rad or 1e-8 m at 2 m; the sum of
+    /// distances has a kink at its minimum, so that some ten times that is left.
     const TOLERANCE_M: f64 = 1e-6;
     let robot = titan();
     let mut rng = stream_rng(1, "noise-free");
@@ -93,8 +93,8 @@ fn normalized_errors(arm: &TrueArm, calibration: &Calibration) -> Vec<f64> {
     ratios
 }
 
-/// The least that any unbiased estimator can leave at the tool, rms over the noise, at each test pose, m: Cramer-Rao with
-/// camera and tags known, from differences of the generator's pixels.
+/// The least that any unbiased estimator can leave at the tool, rms over the noise, at each test pose, m: Cramer-Rao
+/// with camera and tags known, from differences of the generator's pixels.
 fn bound_m(arm: &TrueArm, shots: &[Shot]) -> Vec<f64> {
     const STEP: f64 = 1e-6;
     // A sensor read as `gain (1 + step)` or `offset + step` puts the arm where `turned` says.
@@ -265,8 +265,8 @@ fn identify_messages(arm: &TrueArm, joint: usize, rng: &mut ChaCha8Rng) -> Recor
     recording
 }
 
-/// The gain of one sensor is off by any factor and either sign; the other sensors, the camera and the tags are as wrong as
-/// their datasheets allow.
+/// The gain of one sensor is off by any factor and either sign; the other sensors, the camera and the tags are as wrong
+/// as their datasheets allow.
 #[test]
 fn an_unknown_scale_is_recovered_with_its_sign() {
     let robot = titan();

@@ -231,7 +231,8 @@ fn a_size_that_is_off_by_ten_is_warned_of() {
     let place = hall.truth[4].translation.vector;
     let rotation = hall.truth[4].rotation.scaled_axis();
     let pose = format!(
-        "size: 1.0\n         pose:\n           position: {{x: {:?}, y: {:?}, z: {:?}}}\n           rotation: {{x: {:?}, y: {:?}, z: {:?}}}\n           position_noise: {{x: 0.001, y: 0.001, z: 0.001}}\n",
+        "size: 1.0\n         pose:\n           position: {{x: {:?}, y: {:?}, z: {:?}}}\n           \
+         rotation: {{x: {:?}, y: {:?}, z: {:?}}}\n           position_noise: {{x: 0.001, y: 0.001, z: 0.001}}\n",
         place.x, place.y, place.z, rotation.x, rotation.y, rotation.z
     );
     edit(&hall.file("tagslam.yaml"), "size: 0.1\n", &pose);

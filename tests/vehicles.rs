@@ -1,4 +1,5 @@
-//! Every arm on every vehicle; tags that belong to the vehicle; meshes that stand in the way and travel with a recording.
+//! Every arm on every vehicle; tags that belong to the vehicle; meshes that stand in the way and travel with a
+//! recording.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -183,8 +184,8 @@ fn copy_of(arm: &str, folder: &Path) -> PathBuf {
     copy
 }
 
-/// The whole loop with the second arm, on a vehicle with tags of its own, beside a mesh: what calibration takes from it is in
-/// the recording's messages, and what the replay draws in its attachments.
+/// The whole loop with the second arm, on a vehicle with tags of its own, beside a mesh: what calibration takes from it
+/// is in the recording's messages, and what the replay draws in its attachments.
 #[test]
 fn tags_of_the_vehicle_and_meshes_travel_with_the_recording() {
     const ARM: &str = "kraft-predator";
@@ -196,7 +197,8 @@ fn tags_of_the_vehicle_and_meshes_travel_with_the_recording() {
         robot: arm_folder(ARM),
         vehicle: root().join("robots/vehicles/open-frame.toml"),
         targets_m: vec![[1.074, 0.001, -0.008], [1.012, 0.595, 0.147], [0.820, -0.755, 0.793], [0.867, -1.068, 0.076]],
-        tail: "[[obstacle]]\nname = \"rock\"\nshape = \"mesh\"\nfile = \"block.obj\"\nscale_m = 0.002\nposition_m = [3.4, 0.0, -1.4]\n"
+        tail: "[[obstacle]]\nname = \"rock\"\nshape = \"mesh\"\nfile = \"block.obj\"\nscale_m = 0.002\n\
+            position_m = [3.4, 0.0, -1.4]\n"
             .to_owned(),
         ..ShortRoutine::default()
     };

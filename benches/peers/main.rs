@@ -1,8 +1,9 @@
 //! Ours beside NLopt and Ceres on the same numbers, one core, in one run: README.md beside this file says how.
 //!
-//! `cargo bench --no-default-features --bench peers -- BUILD_FOLDER`. Without the folder of the built C++ programs only ours runs.
+//! `cargo bench --no-default-features --bench peers -- BUILD_FOLDER`. Without the folder of the built C++ programs only
+//! ours runs.
 
-#[path = "../problems/mod.rs"]
+#[path = "../problems.rs"]
 mod problems;
 mod text;
 

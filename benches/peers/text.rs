@@ -1,4 +1,5 @@
-//! The problems as plain text: words and numbers with 17 digits, separated by blanks, in the order that problem.h reads.
+//! The problems as plain text: words and numbers with 17 digits, separated by blanks, in the order that problem.h
+//! reads.
 
 use std::fmt::Write;
 

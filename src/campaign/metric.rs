@@ -54,16 +54,22 @@ metrics! {
         let (before, after) = (tool(before(f)?)?.median, tool(after(f)?)?.median);
         (after > 0.0).then_some(before / after)
     };
-    ReachErrorBeforeMedian = "reach_error_before_median_m", Metres, MoreIsWorse, |f| Some(before(f)?.reach_error_m?.median);
+    ReachErrorBeforeMedian = "reach_error_before_median_m", Metres, MoreIsWorse, |f| {
+        Some(before(f)?.reach_error_m?.median)
+    };
     ReachErrorBeforeMax = "reach_error_before_max_m", Metres, MoreIsWorse, |f| Some(before(f)?.reach_error_m?.max);
-    ReachErrorAfterMedian = "reach_error_after_median_m", Metres, MoreIsWorse, |f| Some(after(f)?.reach_error_m?.median);
+    ReachErrorAfterMedian = "reach_error_after_median_m", Metres, MoreIsWorse, |f| {
+        Some(after(f)?.reach_error_m?.median)
+    };
     ReachErrorAfterMax = "reach_error_after_max_m", Metres, MoreIsWorse, |f| Some(after(f)?.reach_error_m?.max);
     HitsBefore = "hits_before", Count, LessIsWorse, |f| Some(before(f)?.hits as f64);
     HitsAfter = "hits_after", Count, LessIsWorse, |f| Some(after(f)?.hits as f64);
     Contacts = "contacts", Count, MoreIsWorse, |f| f.summary.capture.collisions.map(|n| n as f64);
     MinClearance = "min_clearance_m", Metres, LessIsWorse, |f| f.summary.capture.min_clearance_m;
     MarginLinks = "margin_links", Count, MoreIsWorse, |f| Some(f.summary.capture.margins.as_ref()?.links as f64);
-    MarginExceededQ99 = "margin_exceeded_q99", Count, MoreIsWorse, |f| Some(f.summary.capture.margins.as_ref()?.exceeded_q99 as f64);
+    MarginExceededQ99 = "margin_exceeded_q99", Count, MoreIsWorse, |f| {
+        Some(f.summary.capture.margins.as_ref()?.exceeded_q99 as f64)
+    };
     MarginLargest = "margin_largest_m", Metres, MoreIsWorse, |f| Some(f.summary.capture.margins.as_ref()?.largest_m);
     Renewals = "renewals", Count, MoreIsWorse, |f| Some(f.summary.capture.renewals.len() as f64);
     Poses = "poses", Count, MoreIsWorse, |f| Some(f.summary.capture.poses as f64);
@@ -78,9 +84,15 @@ metrics! {
     HeldOutRmsPx = "held_out_rms_px", Pixels, MoreIsWorse, |f| f.summary.held_out.rms_px;
     HeldOutRms = "held_out_rms_m", Metres, MoreIsWorse, |f| f.summary.held_out.rms_m;
     HeldOutNominalRms = "held_out_nominal_rms_m", Metres, MoreIsWorse, |f| f.summary.held_out.nominal_rms_m;
-    PredictedToolErrorMedian = "predicted_tool_error_median_m", Metres, MoreIsWorse, |f| Some(f.summary.calibration.predicted_tool_error_m?.median);
-    PredictedToolErrorP95 = "predicted_tool_error_p95_m", Metres, MoreIsWorse, |f| Some(f.summary.calibration.predicted_tool_error_m?.p95);
-    PredictedToolErrorMax = "predicted_tool_error_max_m", Metres, MoreIsWorse, |f| Some(f.summary.calibration.predicted_tool_error_m?.max);
+    PredictedToolErrorMedian = "predicted_tool_error_median_m", Metres, MoreIsWorse, |f| {
+        Some(f.summary.calibration.predicted_tool_error_m?.median)
+    };
+    PredictedToolErrorP95 = "predicted_tool_error_p95_m", Metres, MoreIsWorse, |f| {
+        Some(f.summary.calibration.predicted_tool_error_m?.p95)
+    };
+    PredictedToolErrorMax = "predicted_tool_error_max_m", Metres, MoreIsWorse, |f| {
+        Some(f.summary.calibration.predicted_tool_error_m?.max)
+    };
     Nees = "nees", None, MoreIsWorse, |f| f.summary.score.as_ref()?.nees;
 }
 

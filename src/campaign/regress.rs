@@ -1,9 +1,9 @@
 //! Is it worse than it was? New rows against a baseline's, pair by pair: the same setting, the same seed.
 //!
 //! A pair shares its world, so that what differs is the program or the setting under test, not luck with a seed. The
-//! median of new over baseline is too much when it reaches the budget AND the ratios lie above 1 beyond doubt: the lower
-//! end of the bootstrap's interval (one-sided 95 %) is above 1. Noise alone moves ratios both ways and fails the second
-//! condition in one case of twenty at most; a worsening of the budget's size in all pairs meets both.
+//! median of new over baseline is too much when it reaches the budget AND the ratios lie above 1 beyond doubt: the
+//! lower end of the bootstrap's interval (one-sided 95 %) is above 1. Noise alone moves ratios both ways and fails the
+//! second condition in one case of twenty at most; a worsening of the budget's size in all pairs meets both.
 
 use comfy_table::Table as Grid;
 use comfy_table::presets::UTF8_FULL_CONDENSED;

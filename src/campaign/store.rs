@@ -1,8 +1,9 @@
 //! Rows on disk: each as soon as it is there, all of them in order at the end.
 //!
-//! While a campaign runs, rows grow in FILE.partial: a line with the fingerprint, the names, then rows in the order in which
-//! runs ended, each flushed and synced. A kill can tear the last line at most. At the end FILE and what belongs to it
-//! are written as a whole and put in place, FILE.partial goes last: a kill in between only means to write them again.
+//! While a campaign runs, rows grow in FILE.partial: a line with the fingerprint, the names, then rows in the order in
+//! which runs ended, each flushed and synced. A kill can tear the last line at most. At the end FILE and what belongs
+//! to it are written as a whole and put in place, FILE.partial goes last: a kill in between only means to write them
+//! again.
 
 use std::collections::BTreeSet;
 use std::fs::{File, OpenOptions, TryLockError};
@@ -42,8 +43,8 @@ impl Store {
     /// Opens the rows at `out` (a .csv), with those that earlier calls have left there.
     ///
     /// # Errors
-    /// [`CampaignError::OtherCampaign`] when they are of another fingerprint, [`CampaignError::Busy`], or what cannot be
-    /// read or written.
+    /// [`CampaignError::OtherCampaign`] when they are of another fingerprint, [`CampaignError::Busy`], or what cannot
+    /// be read or written.
     pub fn open(
         out: &Path,
         fingerprint: &str,

@@ -47,7 +47,8 @@ fn title(setting: &SettingStatistics) -> String {
     let SettingStatistics { settings, runs, accepted, missed, refused, failed, with_contacts, .. } = setting;
     let which = if settings.is_empty() { String::new() } else { format!("{settings}: ") };
     format!(
-        "{which}{runs} runs: {accepted} accepted, {missed} missed a limit, {refused} refused, {failed} failed; {with_contacts} with contacts"
+        "{which}{runs} runs: {accepted} accepted, {missed} missed a limit, {refused} refused, {failed} failed; \
+         {with_contacts} with contacts"
     )
 }
 

@@ -35,7 +35,8 @@ enum Command {
     /// Show what one wrong joint offset does to the paper's two objectives and to the tool
     #[cfg(feature = "sim")]
     Sensitivity(sensitivity::SensitivityArgs),
-    /// Choose poses and paths for a routine's first capture without moving: plan.toml for an operator, plan.rrd to look at
+    /// Choose poses and paths for a routine's first capture without moving: plan.toml for an operator, plan.rrd to look
+    /// at
     Plan(plan::PlanArgs),
     /// Calibrate from recordings, simulated or of a real arm
     Calibrate(calibrate::CalibrateArgs),
@@ -48,7 +49,8 @@ enum Command {
     /// Open a recording in the Rerun viewer, or write it as .rrd
     #[cfg(feature = "viewer")]
     Replay(replay::ReplayArgs),
-    /// Read robot folders, routines, vehicles, calibrations, input maps, tag maps, tasks and plans, and say what is wrong with them
+    /// Read robot folders, routines, vehicles, calibrations, input maps, tag maps, tasks and plans, and say what is
+    /// wrong with them
     Check(check::CheckArgs),
 }
 

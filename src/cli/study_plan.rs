@@ -33,7 +33,10 @@ pub(super) struct EdgesArgs {
     #[arg(long, value_name = "DIR", default_value = "recordings/study-edges")]
     out: PathBuf,
     /// Random edges of each arm
-    #[arg(long, value_name = "N", default_value_t = 20_000, value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
+    #[arg(
+        long, value_name = "N", default_value_t = 20_000,
+        value_parser = clap::value_parser!(u32).range(1..=10_000_000)
+    )]
     n: u32,
     /// Robot folders
     #[arg(long, value_name = "DIR", default_values = ["robots/titan4", "robots/kraft-predator"], num_args = 1..)]
@@ -73,7 +76,10 @@ pub(super) struct PairsArgs {
     /// Robot folder; its self_collision.toml is written
     robot: PathBuf,
     /// Random configurations
-    #[arg(long, value_name = "N", default_value_t = 200_000, value_parser = clap::value_parser!(u64).range(1..=1_000_000_000))]
+    #[arg(
+        long, value_name = "N", default_value_t = 200_000,
+        value_parser = clap::value_parser!(u64).range(1..=1_000_000_000)
+    )]
     n: u64,
     /// Seed of the configurations
     #[arg(long, value_name = "N", default_value_t = 1)]

@@ -1,8 +1,8 @@
 //! The folder that a run writes to: one run at a time, all results at once or none, and no recording lost.
 //!
-//! Everything grows in `NAME.partial`. [`OutputFolder::commit`] puts all of it in place at the end: the old summary.json
-//! goes first and the new one comes last, so a folder with a summary.json holds the files of one run. What a killed or
-//! broken run leaves is moved to `run-cut-N.mcap` and `truth-cut-N.mcap`.
+//! Everything grows in `NAME.partial`. [`OutputFolder::commit`] puts all of it in place at the end: the old
+//! summary.json goes first and the new one comes last, so a folder with a summary.json holds the files of one run. What
+//! a killed or broken run leaves is moved to `run-cut-N.mcap` and `truth-cut-N.mcap`.
 
 use std::fs::{self, File, TryLockError};
 use std::io::ErrorKind;
@@ -36,7 +36,8 @@ pub struct OutputFolder {
 }
 
 impl OutputFolder {
-    /// Makes the folder, keeps other runs out, and moves aside what a killed run left in it: gives where its recording is now.
+    /// Makes the folder, keeps other runs out, and moves aside what a killed run left in it: gives where its recording
+    /// is now.
     ///
     /// # Errors
     /// When the folder cannot be made or written to, belongs to another run, or something is in the way of a result.

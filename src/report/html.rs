@@ -7,7 +7,8 @@ use crate::report::table::{check_lines, labelled, score_rows};
 use crate::score::Score;
 use armcal_belief::calib::{Calibration, Status};
 
-const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;max-width:60em;margin:2em auto;padding:0 1em;color:#1b2733}\
+const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;max-width:60em;margin:2em auto;\
+    padding:0 1em;color:#1b2733}\
 table{border-collapse:collapse;margin:1em 0}td,th{padding:.3em .9em;border-bottom:1px solid #d5dce3;text-align:right}\
 td:first-child,th:first-child{text-align:left}.ok{color:#0a7d38}.no{color:#b3261e}svg{width:100%;height:auto}\
 .notes td{text-align:left;vertical-align:top}small{color:#5b6b79}";
@@ -65,7 +66,8 @@ fn bars(score: &Score) -> Markup {
                     @let y = 18 + 36 * k;
                     text x="0" y=(y + 14) font-size="13" { (name) }
                     rect x="90" y=(y) width=(x(error.median * 1e3) - 90.0) height="18" fill=(color) { }
-                    line x1=(x(error.median * 1e3)) x2=(x(error.max * 1e3)) y1=(y + 9) y2=(y + 9) stroke=(color) stroke-width="2" { }
+                    @let [median, max] = [x(error.median * 1e3), x(error.max * 1e3)];
+                    line x1=(median) x2=(max) y1=(y + 9) y2=(y + 9) stroke=(color) stroke-width="2" { }
                     circle cx=(x(error.p95 * 1e3)) cy=(y + 9) r="4" fill=(color) { }
                 }
             }
@@ -83,15 +85,23 @@ fn joint_section(calibration: &Calibration) -> Markup {
     markup! {
         h2 { "Joint sensors" }
         table {
-            tr { th { "joint" } th { "gain, rad/count" } th { "1 sigma, %" } th { "offset, deg" } th { "1 sigma, deg" } th { "covered, deg" } }
+            tr {
+                th { "joint" } th { "gain, rad/count" } th { "1 sigma, %" }
+                th { "offset, deg" } th { "1 sigma, deg" } th { "covered, deg" }
+            }
             @for joint in &calibration.joint {
                 tr {
-                    td { (joint.name) @if !joint.gain_estimated && !joint.offset_estimated { " " small { "(not calibrated)" } } }
+                    td {
+                        (joint.name)
+                        @if !joint.gain_estimated && !joint.offset_estimated { " " small { "(not calibrated)" } }
+                    }
                     td { (format!("{:.8}", joint.gain_rad_per_count)) }
-                    td { (percent(joint.gain_std_rad_per_count / joint.gain_rad_per_count.abs()).trim_start_matches('+')) }
+                    @let gain_std = joint.gain_std_rad_per_count / joint.gain_rad_per_count.abs();
+                    td { (percent(gain_std).trim_start_matches('+')) }
                     td { (format!("{:+.3}", joint.offset_rad.to_degrees())) }
                     td { (format!("{:.3}", joint.offset_std_rad.to_degrees())) }
-                    td { (format!("{:.0} .. {:.0}", joint.covered_rad[0].to_degrees(), joint.covered_rad[1].to_degrees())) }
+                    @let [from_deg, to_deg] = joint.covered_rad.map(f64::to_degrees);
+                    td { (format!("{from_deg:.0} .. {to_deg:.0}")) }
                 }
             }
         }

@@ -201,7 +201,8 @@ fn time_line(summary: &RunSummary) -> Option<String> {
     let waited_s = summary.waited_s.unwrap_or(0.0);
     let waited = if waited_s > 0.0 { format!(", {waited_s:.0} s waiting") } else { String::new() };
     Some(format!(
-        "time         {simulated_s:.0} s simulated ({motion_s:.0} s of them moving{waited}) in {:.1} s: {:.0} times real time",
+        "time         {simulated_s:.0} s simulated ({motion_s:.0} s of them moving{waited}) in {:.1} s: {:.0} times \
+         real time",
         summary.wall_s,
         (simulated_s - waited_s) / summary.wall_s.max(1e-9)
     ))

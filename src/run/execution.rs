@@ -87,8 +87,8 @@ impl Run<'_> {
                 Ok((outcome, recorder))
             }
             Err(error) => {
-                // Whole up to here: what happened before the failure can be looked at. If the recording itself failed, this
-                // fails too, and `error` says why.
+                // Whole up to here: what happened before the failure can be looked at. If the recording itself failed,
+                // this fails too, and `error` says why.
                 let _ = recorder.into_writer().finish();
                 Err(Failure::of_session(error))
             }

@@ -31,8 +31,8 @@ pub struct Score {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub nees: Option<f64>,
     pub joints: Vec<JointScore>,
-    /// Every `reach` step of the script. `before` is the first of them under the datasheet's sensors, `after` the last under
-    /// calibrated ones.
+    /// Every `reach` step of the script. `before` is the first of them under the datasheet's sensors, `after` the last
+    /// under calibrated ones.
     pub reaches: Vec<ReachScore>,
 }
 

@@ -11,8 +11,9 @@ use armcal_sim::truth::Truth;
 
 /// The touches of one `reach` step; `None` where none was asked for.
 ///
-/// A target was touched if it lay between the jaws when they began to close: across, in the direction in which they close, nearer
-/// to the tool point than half the gap as measured, and along the jaws' faces not farther than the task's tolerance.
+/// A target was touched if it lay between the jaws when they began to close: across, in the direction in which they
+/// close, nearer to the tool point than half the gap as measured, and along the jaws' faces not farther than the task's
+/// tolerance.
 pub(super) fn touches(
     recording: &Recording,
     truth: &Truth,

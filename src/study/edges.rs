@@ -1,9 +1,9 @@
 //! Certified edges against brute force.
 //!
-//! Random edges of the believed arm alone, over the whole of its joint ranges, in a scene. Each is certified, and each is
-//! scanned by distance queries at joint steps of [`SCAN_RAD`]: an edge called free along all of it, an edge called blocked
-//! until an arm is too near. What the certificate calls free and the scan does not is missed; what it calls blocked and
-//! the scan does not is refused though free.
+//! Random edges of the believed arm alone, over the whole of its joint ranges, in a scene. Each is certified, and each
+//! is scanned by distance queries at joint steps of [`SCAN_RAD`]: an edge called free along all of it, an edge called
+//! blocked until an arm is too near. What the certificate calls free and the scan does not is missed; what it calls
+//! blocked and the scan does not is refused though free.
 
 use rand::RngExt;
 use rayon::prelude::*;

@@ -1,11 +1,11 @@
 //! Studies of parts on their own, against known truth.
 //!
 //! `detection`: tags at set ranges and incidences in three kinds of water, at rest and in motion (`scenes`), rendered,
-//! detected and compared with the projection (`trials`). From that: rates and errors by condition (`tables`), and the model
-//! of corner noise and detection that the geometric camera may draw from (`noise_fit`). tests/oracle/compare_detectors.py
-//! runs other detectors on the same images. `paper`: the paper's comparison of methods, and `sensitivity` its Figures 4 and 7;
-//! `poses`: error over poses and the arm's time, by how the poses are chosen; `charts` draws them. `edges`: certified edges against
-//! brute force; `paths`: planning between random poses.
+//! detected and compared with the projection (`trials`). From that: rates and errors by condition (`tables`), and the
+//! model of corner noise and detection that the geometric camera may draw from (`noise_fit`).
+//! tests/oracle/compare_detectors.py runs other detectors on the same images. `paper`: the paper's comparison of
+//! methods, and `sensitivity` its Figures 4 and 7; `poses`: error over poses and the arm's time, by how the poses are
+//! chosen; `charts` draws them. `edges`: certified edges against brute force; `paths`: planning between random poses.
 
 mod charts;
 mod edges;

@@ -1,8 +1,9 @@
 //! Planning between random poses in the vehicles' sites.
 //!
-//! Queries are pairs of random poses that are free under the belief planned with, and nothing else is known of them. Three
-//! beliefs: the believed arm alone on a vehicle at rest (which other planners can be compared on), calibrated joints,
-//! and the datasheet's. [`problem_json`] writes shapes and queries of the first for tests/oracle/compare_ompl.py.
+//! Queries are pairs of random poses that are free under the belief planned with, and nothing else is known of them.
+//! Three beliefs: the believed arm alone on a vehicle at rest (which other planners can be compared on), calibrated
+//! joints, and the datasheet's. [`problem_json`] writes shapes and queries of the first for
+//! tests/oracle/compare_ompl.py.
 
 use nalgebra::Isometry3;
 use serde_json::{Value, json};
@@ -196,7 +197,8 @@ pub fn problem_json(site: &PathSite, queries: &[Value], margin_m: f64) -> Value 
         })
     });
     let bodies = robot.bodies.iter().map(|body| {
-        json!({ "name": body.name, "shapes": body.collisions.iter().map(|s| shape(s, &Isometry3::identity())).collect::<Vec<_>>() })
+        let shapes = body.collisions.iter().map(|s| shape(s, &Isometry3::identity())).collect::<Vec<_>>();
+        json!({ "name": body.name, "shapes": shapes })
     });
     json!({
         "site": site.name, "arm": robot.name, "margin_m": margin_m,

@@ -1,7 +1,7 @@
 //! The paper's Figures 4 and 7: what one wrong offset does to either objective, and to the tool.
 //!
-//! The sensors are right and nothing is noisy; the offset of one joint at a time is swept from 0 to 180 deg. Poses are drawn
-//! from a seed among those in which the routine's tags are visible from the routine's vehicle.
+//! The sensors are right and nothing is noisy; the offset of one joint at a time is swept from 0 to 180 deg. Poses are
+//! drawn from a seed among those in which the routine's tags are visible from the routine's vehicle.
 
 use std::fmt::Write as _;
 
@@ -197,12 +197,14 @@ impl Sensitivity {
     #[must_use]
     pub fn statement(&self) -> String {
         let mut out = format!(
-            "True sensors, no noise, {} poses that see {} tags in all. Each joint's offset alone is wrong by 0 to 180 deg.\n\n",
+            "True sensors, no noise, {} poses that see {} tags in all. Each joint's offset alone is wrong by 0 to 180 \
+             deg.\n\n",
             self.poses, self.tags_seen
         );
         out.push_str(
-            "| joint | variance at 5 deg m^2 | at 25 deg | distance at 5 deg m | at 25 deg | tool at 5 deg mm | at 25 deg | \
-             largest change of variance m^2 |\n|---|--:|--:|--:|--:|--:|--:|--:|\n",
+            "| joint | variance at 5 deg m^2 | at 25 deg | distance at 5 deg m | at 25 deg | tool at 5 deg mm | at 25 \
+             deg | largest change of variance m^2 \
+             |\n|---|--:|--:|--:|--:|--:|--:|--:|\n",
         );
         for (joint, name) in self.joints.iter().enumerate() {
             let at = |deg: f64, value: fn(&SensitivityPoint) -> f64| {
@@ -223,10 +225,12 @@ impl Sensitivity {
         let first = &self.joints[0];
         let _ = writeln!(
             out,
-            "\n{first}: minimum variance is exactly blind to its offset. Over 0 to 180 deg the objective changes by {:.1e} m^2, \
-             which is rounding: an offset of the first joint turns every landmark about the first axis alike, and no distance \
-             between any two changes. This is a freedom of gauge, not a weak response: no amount of data and no lack of noise \
-             removes it. Minimum distance sees it, for it knows where the landmarks are.",
+            "\n{first}: minimum variance is exactly blind to its offset. Over 0 to 180 deg the objective changes by \
+             {:.1e} m^2, which is rounding: an offset of the first joint turns every landmark about the first axis \
+             alike, and no distance \
+             between any two changes. This is a freedom of gauge, not a weak response: no amount of data and no lack \
+             of noise removes it. Minimum distance sees it, for it knows where the landmarks \
+             are.",
             self.largest_change_m2(0)
         );
         for name in &self.joints[self.n_seen.min(self.joints.len())..] {

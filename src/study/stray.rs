@@ -1,8 +1,8 @@
 //! How far an arm left the straight lines that it was commanded along, from a recording.
 //!
-//! Set-points that lie on one line make an edge. Each reading on it is compared with the nearest point of the line, joint by
-//! joint: what is left over is what the joints lag, droop and overshoot each in its own way, which planning bounds by
-//! robot.toml's `[motion]` (`plan::Stray`).
+//! Set-points that lie on one line make an edge. Each reading on it is compared with the nearest point of the line,
+//! joint by joint: what is left over is what the joints lag, droop and overshoot each in its own way, which planning
+//! bounds by robot.toml's `[motion]` (`plan::Stray`).
 
 use armcal_belief::plan::{Edge as Motion, Timing, TrackingErrorBound};
 use armcal_core::robot::Robot;
@@ -28,7 +28,8 @@ const NOISE_SIGMAS: f64 = 4.0;
 pub struct StrayStudy {
     pub n_edges: usize,
     pub n_readings: usize,
-    /// Readings of which some joint is off the line by more than the bound and its noise, on the way and where the edge ends.
+    /// Readings of which some joint is off the line by more than the bound and its noise, on the way and where the edge
+    /// ends.
     pub n_beyond: [usize; 2],
     pub joints: Vec<JointStray>,
 }
@@ -43,7 +44,8 @@ pub struct JointStray {
     pub most_lag_s: f64,
     /// Largest distance while the edge ends, rad.
     pub most_at_end_rad: f64,
-    /// The least `overshoot_rad` of `[motion]` that covers the ends of all edges on which it has a tenth of its rate or more.
+    /// The least `overshoot_rad` of `[motion]` that covers the ends of all edges on which it has a tenth of its rate or
+    /// more.
     pub most_overshoot_rad: f64,
     /// Largest share of the bound.
     pub most_of_bound: f64,
@@ -246,9 +248,9 @@ mod tests {
         let study = stray_study(&robot, &messages);
         assert_eq!(study.n_edges, 2, "{}", study.summary());
         let lags: Vec<f64> = study.joints.iter().map(|joint| joint.most_lag_s).collect();
-        // Against the nearest point of the line joint 0 is late by `lag (1 - u_0^2)` and the others by `-lag u_0^2`, u the edge's
-        // direction: 0.139 s on the second edge, 0.083 s on the first. While the rate falls, what was lost at a higher rate counts
-        // for more; the largest is up to 1.4 times that.
+        // Against the nearest point of the line joint 0 is late by `lag (1 - u_0^2)` and the others by `-lag u_0^2`, u
+        // the edge's direction: 0.139 s on the second edge, 0.083 s on the first. While the rate falls, what was lost
+        // at a higher rate counts for more; the largest is up to 1.4 times that.
         assert!((0.139..0.139 * 1.4).contains(&lags[0]), "{lags:?}");
         assert!(lags[1..3].iter().all(|lag| (0.083..0.083 * 1.4).contains(lag)), "{lags:?}");
         assert!(lags[3..].iter().all(|lag| *lag == 0.0), "{lags:?}");

@@ -73,7 +73,8 @@ pub fn trials_csv(study: &DetectionStudy) -> String {
 #[must_use]
 pub fn truth_csv(study: &DetectionStudy) -> String {
     let mut out = String::from(
-        "image,water,blur_px,range_m,incidence_deg,id,shortest_side_px,x0,y0,x1,y1,x2,y2,x3,y3,found,fx0,fy0,fx1,fy1,fx2,fy2,fx3,fy3\n",
+        "image,water,blur_px,range_m,incidence_deg,id,shortest_side_px,x0,y0,x1,y1,x2,y2,x3,y3,found,fx0,fy0,fx1,fy1,\
+         fx2,fy2,fx3,fy3\n",
     );
     for trial in &study.trials {
         let condition = &trial.condition;
@@ -138,8 +139,8 @@ impl Sums {
     }
 }
 
-/// One line a condition: detection rate, rms error of a corner coordinate, what the detector's covariances say it is, and
-/// the mean squared normalised error of a corner (2 where they are right).
+/// One line a condition: detection rate, rms error of a corner coordinate, what the detector's covariances say it is,
+/// and the mean squared normalised error of a corner (2 where they are right).
 #[must_use]
 pub fn conditions_csv(study: &DetectionStudy) -> String {
     let mut by_condition = BTreeMap::<[i64; 4], (&TagTrial, Sums)>::new();
@@ -195,8 +196,9 @@ pub fn report(study: &DetectionStudy, fitted: &[FittedNoise]) -> String {
         let (noise, chance) = (&fit.noise, &fit.noise.chance);
         let _ = writeln!(
             out,
-            "{:8} edge_std_px {:.4}, contrast_loss_per_m {:.3}, floor_std_px {:.4}; half_side_px {:.2}, side_width_px {:.2}, \
-             half_range_m {:.2}, range_width_m {:.2}; {} corners, mean chi-square {:.2}",
+            "{:8} edge_std_px {:.4}, contrast_loss_per_m {:.3}, floor_std_px {:.4}; half_side_px {:.2}, side_width_px \
+             {:.2}, half_range_m {:.2}, range_width_m {:.2}; {} corners, mean chi-square \
+             {:.2}",
             water_name(fit.water),
             noise.edge_std_px,
             noise.contrast_loss_per_m,

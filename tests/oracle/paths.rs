@@ -1,4 +1,5 @@
-//! Whole motions against DOP853 on Pinocchio's dynamics: an arm that falls, one on a shaken base, one that rocks a light vehicle.
+//! Whole motions against DOP853 on Pinocchio's dynamics: an arm that falls, one on a shaken base, one that rocks a
+//! light vehicle.
 //!
 //! The equations of motion are integrated here by Runge-Kutta 4, so that no step of the world's own can be to blame.
 

@@ -87,7 +87,8 @@ fn write_rod(folder: &Path, stowed_rad: f64) -> (PathBuf, PathBuf) {
     let urdf = r#"<robot name="rod">
         <link name="base_link"/>
         <link name="rod"><inertial><origin xyz="0 0 -0.5"/><mass value="2"/>
-            <inertia ixx="0.16666666666666666" ixy="0" ixz="0" iyy="0.16666666666666666" iyz="0" izz="0.001"/></inertial></link>
+            <inertia ixx="0.16666666666666666" ixy="0" ixz="0" iyy="0.16666666666666666" iyz="0" izz="0.001"/>
+        </inertial></link>
         <joint name="hinge" type="continuous"><parent link="base_link"/><child link="rod"/><axis xyz="0 -1 0"/>
             <limit effort="1e-9" velocity="1"/></joint>
     </robot>"#;

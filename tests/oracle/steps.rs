@@ -1,4 +1,5 @@
-//! The world's own steps against the motions of `paths`: how far off they are, and that a shorter step is better by its square.
+//! The world's own steps against the motions of `paths`: how far off they are, and that a shorter step is better by its
+//! square.
 
 use armcal::sim::dynamics::{
     BaseCoupling, Environment, Force, JointLoad, Motion, Multibody, Stage, StepInput, SystemState,

@@ -1,4 +1,5 @@
-//! Single bodies in water against closed forms, DOP853 and gz-sim's integration tests: `tests/oracle/make_water_golden.py`.
+//! Single bodies in water against closed forms, DOP853 and gz-sim's integration tests:
+//! `tests/oracle/make_water_golden.py`.
 
 use armcal::sim::dynamics::{
     BaseCoupling, Body, Environment, Force, Inertia, JointLoad, Motion, Multibody, Stage, StepInput, Surface,
@@ -106,8 +107,8 @@ struct Float {
     gz_tolerance_m: f64,
 }
 
-/// One body that floats free, and what acts on it beyond the water. It carries an arm without mass, for only drawings make chains;
-/// its dampers hold it.
+/// One body that floats free, and what acts on it beyond the water. It carries an arm without mass, for only drawings
+/// make chains; its dampers hold it.
 struct Swim<'a> {
     body: Body,
     step_s: f64,

@@ -39,7 +39,8 @@ fn targets(page: &str) -> Vec<(usize, String)> {
     ends.collect()
 }
 
-/// Anchors of a page's headings by GitHub's rule: lower case, punctuation dropped, hyphens for spaces, repetitions numbered.
+/// Anchors of a page's headings by GitHub's rule: lower case, punctuation dropped, hyphens for spaces, repetitions
+/// numbered.
 fn anchors(page: &str) -> Vec<String> {
     let mut is_fenced = false;
     let mut n_of: BTreeMap<String, usize> = BTreeMap::new();

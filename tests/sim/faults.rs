@@ -183,8 +183,8 @@ fn a_moved_tag_is_seen_where_it_is_now() {
     let states = witness.states.borrow();
     let (mut squares, mut n) = ([0.0, 0.0], [0.0, 0.0]);
     for (stamp, tag) in tags(&tape).iter().filter(|(_, tag)| tag.id == id) {
-        // Stamps are late by 20 ms; images are taken five times a second, states every 20 ms. That of 2.0 s is taken before the
-        // period at whose beginning the tag is moved.
+        // Stamps are late by 20 ms; images are taken five times a second, states every 20 ms. That of 2.0 s is taken
+        // before the period at whose beginning the tag is moved.
         let exposed_s = ((seconds(*stamp) - 0.02) * 5.0).round() / 5.0;
         let state = &states[(exposed_s * 50.0).round() as usize - 1];
         let is_moved = usize::from(exposed_s > 2.01);
@@ -217,7 +217,8 @@ fn a_misread_tag_has_another_id_and_the_same_corners() {
     assert_eq!(renamed, tags(&upset));
 }
 
-/// A blow moves what it hits, and the truth says when: the vehicle swings out and comes back, the joints give and come back.
+/// A blow moves what it hits, and the truth says when: the vehicle swings out and comes back, the joints give and come
+/// back.
 #[test]
 fn blows_move_what_they_hit() {
     let blows = [

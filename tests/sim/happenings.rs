@@ -47,7 +47,8 @@ fn an_hour_at_rest_passes_with_temperatures_and_drift_and_the_arm_in_its_place()
             let cold_rad =
                 built.temperature_offset_rad_per_k * cold_k + built.temperature_gain_per_k * cold_k * travel_rad;
             let moved_rad = last.angles[joint] - first.angles[joint];
-            // The rest band of the controller twice, the play of the shaft, and the walk of an hour, 0.02 deg one sigma.
+            // The rest band of the controller twice, the play of the shaft, and the walk of an hour, 0.02 deg one
+            // sigma.
             assert!((moved_rad + cold_rad).abs() < 0.0025, "seed {seed}, joint {joint}: {moved_rad} {cold_rad}");
             squares += (moved_rad + cold_rad).powi(2);
         }

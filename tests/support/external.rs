@@ -1,4 +1,5 @@
-//! Recordings as a real arm's recorder makes them: raw words that wrap, tags as transforms of the camera's frame, nothing marked.
+//! Recordings as a real arm's recorder makes them: raw words that wrap, tags as transforms of the camera's frame,
+//! nothing marked.
 
 use std::path::Path;
 

@@ -1,4 +1,5 @@
-//! What several modules need: a short routine, the program's answers, one run that all share, and edited copies of files.
+//! What several modules need: a short routine, the program's answers, one run that all share, and edited copies of
+//! files.
 
 pub mod external;
 pub mod synthetic;

@@ -1,5 +1,6 @@
 //! Recordings of an arm whose errors are known, made without the estimator's code: readings by the datasheet's formula,
-//! pixels by a projection of its own. Only the forward kinematics is the library's; Pinocchio vouches for it (`oracle`).
+//! pixels by a projection of its own. Only the forward kinematics is the library's; Pinocchio vouches for it
+//! (`oracle`).
 
 use armcal::calib::Calibration;
 use armcal::kinematics::Attachment;

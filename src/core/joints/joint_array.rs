@@ -26,7 +26,7 @@ pub type JointAngles = JointArray<Radians>;
 /// Raw readings of the joint sensors, counts. Not angles: a sensor model converts, and only it.
 ///
 /// ```compile_fail
-/// use armcal::joints::{JointAngles, JointCounts};
+/// use armcal_core::joints::{JointAngles, JointCounts};
 /// let counts = JointCounts::from_slice(&[1.0, 2.0]);
 /// let angles: JointAngles = counts; // counts are not radians
 /// ```

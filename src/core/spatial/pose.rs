@@ -10,7 +10,7 @@ use super::frames::Frame;
 /// `a_from_b`: maps coordinates in frame `B` (metres) to frame `A`.
 ///
 /// ```compile_fail
-/// use armcal::spatial::{Base, Camera, Pose, Tag, Tool};
+/// use armcal_core::spatial::{Base, Camera, Pose, Tag, Tool};
 /// let base_from_camera: Pose<Base, Camera> = Pose::identity();
 /// let tool_from_tag: Pose<Tool, Tag> = Pose::identity();
 /// let wrong = base_from_camera * tool_from_tag; // Camera and Tool do not cancel
@@ -24,7 +24,7 @@ pub struct Pose<A: Frame, B: Frame> {
 /// A position in frame `A`, metres.
 ///
 /// ```compile_fail
-/// use armcal::spatial::{Base, Camera, Point, Pose, Tag};
+/// use armcal_core::spatial::{Base, Camera, Point, Pose, Tag};
 /// let base_from_camera: Pose<Base, Camera> = Pose::identity();
 /// let in_tag: Point<Tag> = Point::new(0.0, 0.0, 0.0);
 /// let wrong = base_from_camera * in_tag; // a point in the tag's frame is not one in the camera's

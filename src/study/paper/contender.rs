@@ -12,7 +12,8 @@ use armcal_core::numeric::Outcome;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Solver {
     Position(PositionMethod),
-    /// Maximum a posteriori on positions, noise fitted; the model of this study's data: gains and offsets, exact mount and map.
+    /// Maximum a posteriori on positions, noise fitted; the model of this study's data: gains and offsets, exact mount
+    /// and map.
     Bundle,
 }
 
@@ -64,8 +65,8 @@ impl MethodVariant {
         Self { name, options: SearchOptions { scaling: Scaling::Raw, ..self.options }, ..self }
     }
 
-    /// The answer for `draw`. With the gauge fixed, the first joint's offset is held at its true value, as a tag beside the base
-    /// would tell it.
+    /// The answer for `draw`. With the gauge fixed, the first joint's offset is held at its true value, as a tag beside
+    /// the base would tell it.
     #[must_use]
     pub fn solve(&self, draw: &Draw, setting: &Setting, watch: &mut dyn FnMut(f64)) -> Solution {
         let problem = PositionProblem::new(&draw.robot, &draw.views);

@@ -1,8 +1,9 @@
 //! The paper's study again: gains and offsets from landmark positions with isotropic noise, on its own arm.
 //!
-//! `scene` draws an arm, landmarks, poses and readings; `contender` is a method with its settings; `trials` runs contenders on
-//! the same draws and measures the tool; `experiments` lists what is compared, with the paper's own figures; `tables` and
-//! `figures` show it. Draws run in parallel and are gathered in order, so that threads do not show.
+//! `scene` draws an arm, landmarks, poses and readings; `contender` is a method with its settings; `trials` runs
+//! contenders on the same draws and measures the tool; `experiments` lists what is compared, with the paper's own
+//! figures; `tables` and `figures` show it. Draws run in parallel and are gathered in order, so that threads do not
+//! show.
 
 mod contender;
 mod experiments;

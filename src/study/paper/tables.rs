@@ -39,14 +39,17 @@ fn data(row: &PaperRow) -> String {
 #[must_use]
 pub fn paper_markdown(experiments: &[Experiment], rows: &[PaperRow]) -> String {
     let mut out = String::from(
-        "Tool error in mm: of each draw the root mean square over 100 random poses; over the draws its root mean square, median \
-         and 95th percentile. Bound: Cramer-Rao, map known, all gains and offsets unknown. Over LS: root mean square over that \
-         of least squares on the same draws. Cost: medians of the method's own equation. Data: poses x landmarks, noise per axis.\n",
+        "Tool error in mm: of each draw the root mean square over 100 random poses; over the draws its root mean \
+         square, median and 95th percentile. Bound: Cramer-Rao, map known, all gains and offsets unknown. Over LS: \
+         root mean square over that \
+         of least squares on the same draws. Cost: medians of the method's own equation. Data: poses x landmarks, \
+         noise per axis.\n",
     );
     for experiment in experiments {
         let _ = writeln!(out, "\n## {}\n", experiment.title);
         out.push_str(
-            "| data | method | rms | median | 95 % | bound | over LS | before | cost at first | cost at end | evaluations | converged | paper |\n\
+            "| data | method | rms | median | 95 % | bound | over LS | before | cost at first | cost at end | \
+             evaluations | converged | paper |\n\
              |---|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n",
         );
         for row in rows.iter().filter(|row| row.experiment == experiment.name) {
@@ -79,8 +82,9 @@ pub fn paper_markdown(experiments: &[Experiment], rows: &[PaperRow]) -> String {
 #[must_use]
 pub fn paper_csv(rows: &[PaperRow]) -> String {
     let mut out = String::from(
-        "experiment,method,poses,landmarks,noise_m,gain_error,offset_error_rad,whole_counts,in_image,from_the_truth,draws,tool_rms_m,tool_median_m,\
-         tool_p95_m,bound_rms_m,over_least_squares,before_rms_m,cost_initial_median,cost_final_median,evaluations_median,\
+        "experiment,method,poses,landmarks,noise_m,gain_error,offset_error_rad,whole_counts,in_image,from_the_truth,\
+         draws,tool_rms_m,tool_median_m,tool_p95_m,bound_rms_m,over_least_squares,before_rms_m,cost_initial_median,\
+         cost_final_median,evaluations_median,\
          converged,paper\n",
     );
     let optional = |value: Option<f64>| value.map_or_else(String::new, |value| format!("{value:.6e}"));

@@ -1,13 +1,13 @@
 //! An arm as the world draws it, and what it shows at poses; it is put there, not driven.
 //!
-//! Readings: `(1 + g + g_T warm)(theta - m) + nonlinearity(theta) + o + o_T warm + drift + play`, as the world's potentiometers have it. The
-//! oil warms with the tour's time. Corners: five images of the standard noise, of which some miss the tag.
+//! Readings: `(1 + g + g_T warm)(theta - m) + nonlinearity(theta) + o + o_T warm + drift + play`, as the world's
+//! potentiometers have it. The oil warms with the tour's time. Corners: five images of the standard noise, of which
+//! some miss the tag.
 
 use nalgebra::{Isometry3, Vector3};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-use crate::poses::normal;
 use armcal_belief::calib::{MeanCorners, TagMeasurement, TagObservation, View};
 use armcal_belief::plan::{ClearanceModel, PosePlan, VisibilityModel};
 use armcal_core::joints::MAX_JOINTS;
@@ -159,7 +159,8 @@ impl<'a> TrueArm<'a> {
         (n_frames > 0).then_some(MeanCorners { corners_px, n_frames, scatter_px2 })
     }
 
-    /// Distance of the tool from where it is sent, by an arm whose controller is told counts by `sensors`, at their reference.
+    /// Distance of the tool from where it is sent, by an arm whose controller is told counts by `sensors`, at their
+    /// reference.
     pub(super) fn tool_error_m(&self, sensors: &ArmSensors, to: &JointAngles) -> f64 {
         let travel = |j: usize| sensors.models[j].travel_under_rad(to[j], &Default::default());
         let reading = JointAngles::from_fn(to.len(), |j| self.robot.sensors[j].center_rad + travel(j));
@@ -168,4 +169,9 @@ impl<'a> TrueArm<'a> {
         let tool = |angles: &JointAngles| self.robot.chain.frame(angles, &self.robot.tool.mount).translation.vector;
         (tool(&self.angles(&reading, &moment)) - tool(to)).norm()
     }
+}
+
+/// Standard normal, from a stream.
+fn normal(rng: &mut ChaCha8Rng) -> f64 {
+    rand_distr::Distribution::<f64>::sample(&rand_distr::StandardNormal, rng)
 }

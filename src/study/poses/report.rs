@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use crate::charts::{Axis, Panel, Series, Style, svg};
-use crate::poses::{CRITERIA, POSES, PoseRow};
+use crate::poses::study::{CRITERIA, POSES, PoseRow};
 use armcal_core::routine::PoseCriterion;
 use armcal_core::stats::quantile;
 
@@ -40,8 +40,8 @@ fn quantile_of(rows: &[PoseRow], criterion: PoseCriterion, poses: usize, q: f64,
     quantile(&of(rows, criterion, poses).map(f).collect::<Vec<_>>(), q).unwrap_or(f64::NAN)
 }
 
-/// Poses and time of the arm (s) at which the median of the true error comes down to `limit_m`, between numbers of poses on a
-/// straight line; `None` where it does not.
+/// Poses and time of the arm (s) at which the median of the true error comes down to `limit_m`, between numbers of
+/// poses on a straight line; `None` where it does not.
 fn cost(rows: &[PoseRow], criterion: PoseCriterion, limit_m: f64) -> Option<[f64; 2]> {
     let at = |poses: usize| {
         let median = |f: fn(&PoseRow) -> f64| quantile_of(rows, criterion, poses, 0.5, f);
@@ -79,7 +79,8 @@ pub fn poses_table(rows: &[PoseRow]) -> String {
     }
     let _ = writeln!(
         out,
-        "\npredicted over true, root mean squares over seeds: by the plan, by bundle\n\n| poses | tool error | random |\n|--:|--:|--:|"
+        "\npredicted over true, root mean squares over seeds: by the plan, by bundle\n\n\
+         | poses | tool error | random |\n|--:|--:|--:|"
     );
     for poses in POSES {
         let ratio = |criterion: PoseCriterion, f: fn(&PoseRow) -> f64| {

@@ -2,7 +2,10 @@
 
 use std::path::Path;
 
-use crate::poses::*;
+use crate::poses::study::{CRITERIA, POSES, PoseRow, pose_study};
+use crate::poses::{poses_csv, poses_figure, poses_table};
+use armcal_core::routine::PoseCriterion;
+use armcal_sim::WorldSpec;
 
 fn rows(seeds: std::ops::Range<u64>) -> Vec<PoseRow> {
     let file = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("routines/titan4-quickstart.toml");

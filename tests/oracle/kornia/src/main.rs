@@ -1,4 +1,5 @@
-//! Detects tags in all PNG files of a folder: `image ms`, then ` id x0 y0 .. x3 y3` for each tag; pixel centres at whole numbers.
+//! Detects tags in all PNG files of a folder: `image ms`, then ` id x0 y0 .. x3 y3` for each tag; pixel centres at
+//! whole numbers.
 
 use std::time::Instant;
 
