@@ -193,8 +193,8 @@ fn a_regression_is_found_and_none_is_found_where_none_is() {
     regress(&["--seeds", "3", "--baseline"]).expect("no such seed", 2, &["baseline.csv", "seeds"]);
 }
 
-/// What the project itself is held against: the stored baseline, in small. The whole of it: `armcal regress
-/// routines/regression.toml --baseline routines/regression-baseline.csv`.
+/// What the project itself is held against: the stored baseline, in small. The whole of it:
+/// `armcal regress routines/regression.toml --baseline routines/regression-baseline.csv`.
 #[test]
 fn the_routine_of_the_project_is_not_worse_than_its_baseline() {
     let [routine, baseline] =

@@ -214,8 +214,8 @@ fn position_std_m(joint: &DMatrix<f64>, n: usize, pose: &Pose<Base, Tag>) -> [f6
 
 /// What an anchor that was held adds to the joint covariance of `ids`: it carries the whole map with it.
 ///
-/// With `T = A X` and `A exp(xi0)`, the tag moves by `X^-1 xi0 X`: `omega = R^T omega0`, `rho = R^T (rho0 - [t]x
-/// omega0)`.
+/// With `T = A X` and `A exp(xi0)`, the tag moves by `X^-1 xi0 X`: `omega = R^T omega0`,
+/// `rho = R^T (rho0 - [t]x omega0)`.
 fn shared_error(map: &TagMap, ids: &[u32], anchor: &Anchor) -> DMatrix<f64> {
     let n = 6 * ids.len();
     let Some((std, held)) = anchor.held_std.zip(map.tag(anchor.id)) else { return DMatrix::zeros(n, n) };

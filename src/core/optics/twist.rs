@@ -2,8 +2,9 @@
 
 use nalgebra::{Matrix2x3, Vector3};
 
-/// Rows of d(pixel)/d(xi), pixels by metres and radians: the camera's pose perturbed on the right by `xi = (rho,
-/// omega)` moves a point p of its frame by `-rho - omega x p`. `by_point`: d(pixel)/d(point) of the lens at `point`.
+/// Rows of d(pixel)/d(xi), pixels by metres and radians: the camera's pose perturbed on the right by
+/// `xi = (rho, omega)` moves a point p of its frame by `-rho - omega x p`. `by_point`: d(pixel)/d(point) of the lens at
+/// `point`.
 #[must_use]
 pub fn image_jacobian(by_point: &Matrix2x3<f64>, point: &Vector3<f64>) -> [[f64; 6]; 2] {
     let p = point;

@@ -7,11 +7,10 @@ use crate::time::Stamp;
 /// Terms of the smooth nonlinearity of each sensor.
 pub const N_SHAPE: usize = 12;
 
-/// What calibration adds to the datasheet: with the travel t from the middle of the range,
-/// `angle = center + (gain + gain_per_k T) t + offset + sum_h shape_h phi_h(t / half_range)
-///  + offset_per_k T + offset_per_mpa P + drift h + half_play a`,
-/// T (K), P (MPa) and h (hours) the [`Departure`] from the calibration's reference, a the side that the joint came
-/// from.
+/// What calibration adds to the datasheet. With the travel t from the middle of the range, the angle is
+/// `center + (gain + gain_per_k T) t + offset + sum_h nonlinearity_h phi_h(t / half_range)` and
+/// `offset_per_k T + offset_per_mpa P + drift h + half_backlash a`, with T (K), P (MPa) and h (hours) the
+/// [`Departure`] from the calibration's reference and a the side that the joint came from.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Correction {
     /// Factor on the nominal travel; 1 is the datasheet.
@@ -49,8 +48,8 @@ impl Default for Correction {
     }
 }
 
-/// Half-width of the interval that [`nonlinearity_basis`] lives on, in half ranges: beyond the joint's own, for the functions
-/// vanish at its ends.
+/// Half-width of the interval that [`nonlinearity_basis`] lives on, in half ranges: beyond the joint's own, for the
+/// functions vanish at its ends.
 const SHAPE_DOMAIN: f64 = 1.25;
 
 /// Smooth functions over the joint's range: `phi_h(x) = sin(pi h (x + L) / 2 L) / sqrt(L)`, h = 1.., L = 1.25, x in
@@ -69,9 +68,9 @@ pub fn nonlinearity_basis(x: f64) -> [f64; N_SHAPE] {
     })
 }
 
-/// Prior standard deviations of the coefficients of [`nonlinearity_basis`] for a process of unit standard deviation with a
-/// squared exponential covariance of length `length` half ranges: `S(w)^(1/2)` at `w = pi h / 2 L` (Solin and Sarkka
-/// 2020, eq. 8).
+/// Prior standard deviations of the coefficients of [`nonlinearity_basis`] for a process of unit standard deviation
+/// with a squared exponential covariance of length `length` half ranges: `S(w)^(1/2)` at `w = pi h / 2 L` (Solin and
+/// Sarkka 2020, eq. 8).
 #[must_use]
 pub fn shape_prior(length: f64) -> [f64; N_SHAPE] {
     std::array::from_fn(|n| {

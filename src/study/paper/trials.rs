@@ -95,8 +95,8 @@ fn pair(
     })
 }
 
-/// The least mean square of the tool's error over the tool poses that any unbiased estimator can have on this draw: `J
-/// C J^T` with the inverse of the Fisher information for `C` (Cramer-Rao), m^2.
+/// The least mean square of the tool's error over the tool poses that any unbiased estimator can have on this draw:
+/// `J C J^T` with the inverse of the Fisher information for `C` (Cramer-Rao), m^2.
 fn bound_m2(draw: &Draw, noise_m: f64) -> Option<f64> {
     let problem = PositionProblem::new(&draw.robot, &draw.views);
     let free = draw.parameters();

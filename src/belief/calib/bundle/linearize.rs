@@ -1,10 +1,11 @@
 //! Normal equations of one state, the views' own parameters eliminated (Schur complement).
 //!
-//! In a view all acts through the twist u of the camera (right, camera frame) that each observation i sees: `u_i = S l
-//! + T y - Ad_i tau_i`: l the view's own parameters (joint errors, camera error) with prior `L^-1`, y the common ones
-//! along the directions T (joints, mount, time offset), tau_i the tag's pose. With `H_i` of each observation and `G =
-//! sum H_i`, elimination of l leaves, for the blocks a and b, `sum A_a^T H_i A_b - (sum A_a^T H_i) M (sum H_i A_b)`, `M
-//! = S (S^T G S + L)^-1 S^T`: all of it 6x6 algebra, whatever the number of corners.
+//! In a view all acts through the twist u of the camera (right, camera frame) that each observation i sees:
+//! `u_i = S l + T y - Ad_i tau_i`: l the view's own parameters (joint errors, camera error) with prior `L^-1`, y the
+//! common ones along the directions T (joints, mount, time offset), tau_i the tag's pose. With `H_i` of each
+//! observation and `G = sum H_i`, elimination of l leaves, for the blocks a and b,
+//! `sum A_a^T H_i A_b - (sum A_a^T H_i) M (sum H_i A_b)`, `M = S (S^T G S + L)^-1 S^T`: all of it 6x6 algebra, whatever
+//! the number of corners.
 
 use nalgebra::{DMatrix, DVector, Matrix6, SMatrix, SVector, Vector6};
 

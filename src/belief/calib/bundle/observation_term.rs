@@ -1,8 +1,8 @@
 //! What one observation says of the camera's pose relative to the tag.
 //!
 //! With X = camera_from_tag, a point c of the tag is at p = X c. The camera's pose perturbed on the right by xi = (rho,
-//! omega) moves it by `dp = -rho - omega x p`; the tag's by xi_T does the same with the opposite sign and `xi = Ad(X)
-//! xi_T`. So one 6x6 matrix in the camera's frame carries all: `H = sum J^T W J`, `g = sum J^T W r`, J =
+//! omega) moves it by `dp = -rho - omega x p`; the tag's by xi_T does the same with the opposite sign and
+//! `xi = Ad(X) xi_T`. So one 6x6 matrix in the camera's frame carries all: `H = sum J^T W J`, `g = sum J^T W r`, J =
 //! d(prediction)/d(xi), r = measured - predicted.
 
 use nalgebra::{Isometry3, Matrix2x3, Matrix6, SMatrix, SVector, Vector2, Vector3, Vector6};

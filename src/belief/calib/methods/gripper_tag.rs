@@ -1,12 +1,13 @@
 //! What a tag on the gripper says: where the camera hangs, and the sensors of the joints between the two.
 //!
-//! `camera_from_tag = mount^-1 * W(theta) * tool_from_tag`, `W` the joints between camera and tag with `theta = center
-//! + gain * travel + offset`. From the tag's corner pixels in all views: the camera's mount, where the tag was glued,
-//! gain and offset of these joints, each about its prior (robot.toml), by Levenberg-Marquardt. Poses are perturbed on
-//! the right. A joint that turns through a wide angle parts the tag's own error, which turns with it, from the mount's,
-//! which does not; along the joint's axis the two stay together, and a turn of the mount about that axis looks like the
-//! joint's offset: there the covariance keeps the priors. The joints' nonlinearity is new at every view: `R = sigma^2 /
-//! n_frames * I + sum_j (d u / d theta_j) (d u / d theta_j)^T linearity_j^2` for the eight coordinates `u` of a view.
+//! `camera_from_tag = mount^-1 * W(theta) * tool_from_tag`, `W` the joints between camera and tag with
+//! `theta = center + gain * travel + offset`. From the tag's corner pixels in all views: the camera's mount, where the
+//! tag was glued, gain and offset of these joints, each about its prior (robot.toml), by Levenberg-Marquardt. Poses are
+//! perturbed on the right. A joint that turns through a wide angle parts the tag's own error, which turns with it, from
+//! the mount's, which does not; along the joint's axis the two stay together, and a turn of the mount about that axis
+//! looks like the joint's offset: there the covariance keeps the priors. The joints' nonlinearity is new at every view:
+//! `R = sigma^2 / n_frames * I + sum_j (d u / d theta_j) (d u / d theta_j)^T linearity_j^2` for the eight coordinates
+//! `u` of a view.
 
 use std::ops::Range;
 

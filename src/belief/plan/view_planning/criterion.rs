@@ -2,8 +2,8 @@
 //!
 //! A view with `G = twists basis` and unit noise takes `P G^T S^-1 G P` off the covariance P, `S = I + G P G^T` (6 x
 //! 6). With the measure's rows L and `Y = L P G^T S^(-T/2)` (6 columns) the tool's variance, and the sum of variances,
-//! fall by `|Y|^2`, the volume by the factor `det(I - Y^T Y)`, and the largest variance becomes that of `L P L^T - Y
-//! Y^T`. G is never written out: P is taken to the few directions first.
+//! fall by `|Y|^2`, the volume by the factor `det(I - Y^T Y)`, and the largest variance becomes that of
+//! `L P L^T - Y Y^T`. G is never written out: P is taken to the few directions first.
 
 use nalgebra::{Cholesky, DMatrix, Matrix6, SMatrix, SymmetricEigen};
 

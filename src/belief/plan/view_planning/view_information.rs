@@ -1,10 +1,10 @@
 //! A view to come, linearized: what its tags' corners will tell of the camera's pose.
 //!
-//! The camera's pose perturbed on the right by `xi` (translation, rotation) moves a point p of its frame by `-rho -
-//! omega x p`, so that one tag has the information `H = sum over corners J^T W J`, J = d(pixel)/d(xi), W the inverse of
-//! the corner noise. Parameters move the camera by `xi = sum_j d_j (b_j . p_j) + mount - Ad(camera from base) survey`,
-//! d_j the twist that joint j gives it. The joints' own errors of a view add `sum_j d_j d_j^T s_j^2` to the noise
-//! `H^-1`.
+//! The camera's pose perturbed on the right by `xi` (translation, rotation) moves a point p of its frame by
+//! `-rho - omega x p`, so that one tag has the information `H = sum over corners J^T W J`, J = d(pixel)/d(xi), W the
+//! inverse of the corner noise. Parameters move the camera by
+//! `xi = sum_j d_j (b_j . p_j) + mount - Ad(camera from base) survey`, d_j the twist that joint j gives it. The joints'
+//! own errors of a view add `sum_j d_j d_j^T s_j^2` to the noise `H^-1`.
 
 use nalgebra::{Cholesky, Isometry3, Matrix6, SMatrix, Vector3};
 
