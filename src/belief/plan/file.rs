@@ -131,8 +131,9 @@ const LENGTH_DIGITS: f64 = 1e5;
 const TIME_DIGITS: f64 = 1e3;
 
 const HEAD: &str = "\
-# Poses to look from and the paths between them, planned before anything moves. Angles (rad) are believed ones; raw counts are the
-# set-points that an operator commands for them. Every arm within error_bound_rad keeps proven_clearance_m.
+# Poses to look from and the paths between them, planned before anything moves. Angles (rad) are believed ones; raw
+# counts are the set-points that an operator commands for them. Every arm within error_bound_rad keeps
+# proven_clearance_m.
 ";
 
 impl PlanFile {

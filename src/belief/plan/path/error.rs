@@ -22,8 +22,8 @@ pub enum PathError {
     #[error("the start is too near: {distance_m:.3} m between {nearest}; {needed_m:.3} m are needed (0: in collision)")]
     StartTooNear { nearest: String, distance_m: f64, needed_m: f64 },
     #[error(
-        "the goal is too near: {distance_m:.3} m between {nearest}; {needed_m:.3} m are needed (0: in collision); free is the \
-         straight way up to {free:.3?} rad",
+        "the goal is too near: {distance_m:.3} m between {nearest}; {needed_m:.3} m are needed (0: in collision); \
+         free is the straight way up to {free:.3?} rad",
         free = nearest_free.to_vec()
     )]
     GoalTooNear {
@@ -34,8 +34,8 @@ pub enum PathError {
         nearest_free: JointAngles,
     },
     #[error(
-        "the goal turns joint {joint} to {angle_rad:.3} rad; for every arm within the sensors' error to stay off its stops, \
-         {lower_rad:.3} to {upper_rad:.3} rad are left"
+        "the goal turns joint {joint} to {angle_rad:.3} rad; for every arm within the sensors' error to stay off its \
+         stops, {lower_rad:.3} to {upper_rad:.3} rad are left"
     )]
     GoalBeyondLimits { joint: usize, angle_rad: f64, lower_rad: f64, upper_rad: f64 },
 }
