@@ -2,6 +2,7 @@
 
 mod commands;
 mod links;
+mod names;
 mod structure;
 
 use std::path::PathBuf;
@@ -15,6 +16,12 @@ fn pages() -> Vec<PathBuf> {
         pages.extend(files_below(&root().join(folder), "md"));
     }
     pages
+}
+
+/// All sources in Rust.
+fn sources() -> Vec<PathBuf> {
+    let folders = ["src", "tests", "benches", "examples"].map(|folder| root().join(folder));
+    folders.iter().flat_map(|folder| files_below(folder, "rs")).collect()
 }
 
 /// Fails with all of `violations`, one a line.

@@ -10,7 +10,7 @@ use clap::{Args, Subcommand};
 use crate::cli::exit::Exit;
 use crate::cli::study_paper::{PaperArgs, paper};
 use crate::cli::study_plan::{
-    EdgesArgs, PairsArgs, PathsArgs, StrayArgs, edges, paths, self_collision, tracking_error,
+    EdgesArgs, PathsArgs, SelfCollisionArgs, TrackingErrorArgs, edges, paths, self_collision, tracking_error,
 };
 use crate::cli::study_poses::{PosesArgs, poses};
 use crate::output;
@@ -39,9 +39,11 @@ enum Study {
     /// Plan between random poses at several sites, under wide and narrow bounds
     Paths(PathsArgs),
     /// Find which links of an arm can come near each other, and store it in the robot's folder
-    Pairs(PairsArgs),
+    #[command(alias = "pairs")]
+    SelfCollision(SelfCollisionArgs),
     /// Measure how far the joints of a recording left the straight lines of their set-points
-    Stray(StrayArgs),
+    #[command(alias = "stray")]
+    TrackingError(TrackingErrorArgs),
     /// Choose poses by each criterion and at random, and compare the tool error that they leave
     Poses(PosesArgs),
 }
@@ -77,8 +79,8 @@ pub(super) fn study(args: &StudyArgs) -> Result<Exit> {
         Study::Paper(args) => paper(args),
         Study::Edges(args) => edges(args),
         Study::Paths(args) => paths(args),
-        Study::Pairs(args) => self_collision(args),
-        Study::Stray(args) => tracking_error(args),
+        Study::SelfCollision(args) => self_collision(args),
+        Study::TrackingError(args) => tracking_error(args),
         Study::Poses(args) => poses(args),
     }
 }

@@ -17,7 +17,7 @@ use armcal_core::routine::{self, Scene};
 use armcal_core::streams::Message;
 use armcal_study::{
     Belief, EdgeStudy, PathQueries, PathSite, PathStudy, edge_study, edges_csv, edges_json, mean_time_under_s,
-    path_study, paths_csv, problem_json, queries_json, random_edges, stray_study,
+    path_study, paths_csv, problem_json, queries_json, random_edges, tracking_error_study,
 };
 
 /// Free water that the studies keep, m.
@@ -72,7 +72,7 @@ pub(super) struct PathsArgs {
 }
 
 #[derive(Debug, Args)]
-pub(super) struct PairsArgs {
+pub(super) struct SelfCollisionArgs {
     /// Robot folder; its self_collision.toml is written
     robot: PathBuf,
     /// Random configurations
@@ -87,7 +87,7 @@ pub(super) struct PairsArgs {
 }
 
 #[derive(Debug, Args)]
-pub(super) struct StrayArgs {
+pub(super) struct TrackingErrorArgs {
     /// The recording (run.mcap)
     recording: PathBuf,
     /// Robot folder of the arm
@@ -96,11 +96,11 @@ pub(super) struct StrayArgs {
 }
 
 /// How far the arm left the lines that it was sent along.
-pub(super) fn tracking_error(args: &StrayArgs) -> Result<Exit> {
+pub(super) fn tracking_error(args: &TrackingErrorArgs) -> Result<Exit> {
     let robot = load(&args.robot)?;
     let recording = read_recording(&args.recording)?;
     let messages: Vec<Message> = recording.messages.into_iter().map(|(_, message)| message).collect();
-    say(&stray_study(&robot, &messages).summary())?;
+    say(&tracking_error_study(&robot, &messages).summary())?;
     Ok(Exit::Ok)
 }
 
@@ -163,7 +163,7 @@ pub(super) fn paths(args: &PathsArgs) -> Result<Exit> {
     Ok(Exit::Ok)
 }
 
-pub(super) fn self_collision(args: &PairsArgs) -> Result<Exit> {
+pub(super) fn self_collision(args: &SelfCollisionArgs) -> Result<Exit> {
     let robot = load_without_pairs(&args.robot)?;
     let found = sample_self_pairs(&robot, args.n, args.seed);
     let file = args.robot.join(SELF_COLLISION_FILE);

@@ -15,8 +15,8 @@ mod paths;
 mod poses;
 mod scenes;
 mod sensitivity;
-mod stray;
 mod tables;
+mod tracking_error;
 mod trials;
 
 pub use edges::{Edge, EdgeRow, EdgeStudy, edge_study, edges_csv, edges_json, mean_time_under_s, random_edges};
@@ -25,6 +25,6 @@ pub use paths::{Belief, PathQueries, PathRow, PathSite, PathStudy, path_study, p
 pub use poses::{PoseRow, PoseStudyError, pose_study, poses_csv, poses_figure, poses_table};
 pub use scenes::{Condition, TAG_SIZE_M, conditions, water_name};
 pub use sensitivity::{Sensitivity, SensitivityPoint, sensitivity};
-pub use stray::{JointStray, StrayStudy, stray_study};
 pub use tables::{conditions_csv, report, trials_csv, truth_csv};
+pub use tracking_error::{JointTrackingError, TrackingErrorStudy, tracking_error_study};
 pub use trials::{DetectionStudy, Outcome, StudyError, TagTrial, Watcher, detection_study};

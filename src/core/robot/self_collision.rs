@@ -1,6 +1,6 @@
 //! The file self_collision.toml of a robot folder: pairs of links that can come near each other.
 //!
-//! `plan::sample_self_pairs` (`armcal study pairs`) finds them by sampling; planning skips all other pairs. The file
+//! `plan::sample_self_pairs` (`armcal study self-collision`) finds them by sampling; planning skips all other pairs. The file
 //! holds the hash of the URDF and is valid for that URDF only.
 
 use std::path::Path;
@@ -60,7 +60,7 @@ impl SelfPairs {
             "# Links of this arm that can come nearer to each other than near_m, among n random configurations \
              within the joint\n\
              # limits and the datasheet's errors beyond them. Neighbours along the chain are left out. Made by\n\
-             # `armcal study pairs {}`; make it anew when the URDF changes.\n{text}",
+             # `armcal study self-collision {}`; make it anew when the URDF changes.\n{text}",
             robot.folder.display()
         ))
     }
@@ -77,7 +77,7 @@ pub(super) fn read(folder: &Path, urdf_text: &str, bodies: &[LinkBody]) -> Resul
     FileIssue::check_range(&file, "near_m", raw.near_m, 0.0..=10.0)?;
     if raw.urdf_blake3 != hash(urdf_text) {
         let problem = format!(
-            "the URDF has changed; make the file again with `armcal study pairs {}`, or remove it",
+            "the URDF has changed; make the file again with `armcal study self-collision {}`, or remove it",
             folder.display()
         );
         return Err(FileIssue::new(&file, "urdf_blake3", problem).into());
@@ -128,7 +128,7 @@ mod tests {
         let urdf = folder.path().join("titan4.urdf");
         std::fs::write(&urdf, robot.urdf_text.replace("0.83228", "0.83229")).expect("written");
         let error = super::super::load(folder.path()).expect_err("another drawing").to_string();
-        assert!(error.contains("self_collision.toml") && error.contains("armcal study pairs"), "{error}");
+        assert!(error.contains("self_collision.toml") && error.contains("armcal study self-collision"), "{error}");
         assert!(super::super::load_without_pairs(folder.path()).is_ok());
     }
 }

@@ -34,12 +34,12 @@ enum MapFile {
 
 impl SiteFile {
     pub(super) fn map(&self, file: &Path) -> Result<MapKnowledge, FileIssue> {
-        let stray = || FileIssue::new(file, "site.known_tags", "goes with map = \"partly\", and that with it");
+        let tracking_error = || FileIssue::new(file, "site.known_tags", "goes with map = \"partly\", and that with it");
         match (self.map.unwrap_or(MapFile::Known), &self.known_tags) {
             (MapFile::Known, None) => Ok(MapKnowledge::Known),
             (MapFile::Unknown, None) => Ok(MapKnowledge::Unknown),
             (MapFile::Partly, Some(known)) => Ok(MapKnowledge::Partly(known.clone())),
-            _ => Err(stray()),
+            _ => Err(tracking_error()),
         }
     }
 

@@ -50,8 +50,11 @@ table!(
         thruster_lag_s = 0.2, in 0.0..=5.0;
         /// Random force on a free vehicle in each direction, in the band of the periods: tether and turbulence
         /// (assumed).
-        wobble_force_rms_n = 0.0, in 0.0..=1e5;
-        wobble_moment_rms_n_m = 0.0, in 0.0..=1e5;
+        #[serde(alias = "wobble_force_rms_n")]
+        disturbance_force_rms_n = 0.0, in 0.0..=1e5;
+        /// The same as a moment.
+        #[serde(alias = "wobble_moment_rms_n_m")]
+        disturbance_moment_rms_n_m = 0.0, in 0.0..=1e5;
     } and {
         /// Prescribed by the figures above, prescribed by a file, or free.
         motion: MotionKind = MotionKind::Swell;

@@ -48,7 +48,7 @@ impl FreeVehicle {
             integral: [0.0; 6],
             thrust: [0.0; 6],
             disturbance: std::array::from_fn(|axis| {
-                let rms = if axis < 3 { spec.wobble_force_rms_n } else { spec.wobble_moment_rms_n_m };
+                let rms = if axis < 3 { spec.disturbance_force_rms_n } else { spec.disturbance_moment_rms_n_m };
                 draw_sinusoids(spec, rms, seed, &format!("wobble/{axis}"))
             }),
             impulse: None,

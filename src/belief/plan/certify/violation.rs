@@ -42,9 +42,8 @@ impl ClearanceModel<'_> {
         bounds: &JointErrorBounds,
         margin_m: f64,
     ) -> Option<ClosestPair> {
-        let stray = TrackingErrorBound::arriving(self.robot);
-        Sweep { model: self, from: *at, to: *at, bounds: Some(bounds), tracking_error: stray, margin_m }
-            .first_too_near()
+        let tracking_error = TrackingErrorBound::arriving(self.robot);
+        Sweep { model: self, from: *at, to: *at, bounds: Some(bounds), tracking_error, margin_m }.first_too_near()
     }
 
     /// The same for every arm along an edge, driven as [`Timing`] has it: with what the joints stray on the way.
@@ -54,10 +53,10 @@ impl ClearanceModel<'_> {
     }
 
     pub(crate) fn sweep<'b>(&'b self, edge: &Edge, bounds: &'b JointErrorBounds, margin_m: f64) -> Sweep<'b> {
-        let stray = TrackingErrorBound::new(self.robot, &self.timing, edge);
+        let tracking_error = TrackingErrorBound::new(self.robot, &self.timing, edge);
         // The line to the middle of where the joints may come to rest.
-        let to = JointAngles::from_fn(edge.to.len(), |joint| edge.to[joint] + stray.middle_rad(joint));
-        Sweep { model: self, from: edge.from, to, bounds: Some(bounds), tracking_error: stray, margin_m }
+        let to = JointAngles::from_fn(edge.to.len(), |joint| edge.to[joint] + tracking_error.middle_rad(joint));
+        Sweep { model: self, from: edge.from, to, bounds: Some(bounds), tracking_error, margin_m }
     }
 
     /// The closest pair over every arm within `bounds` whose sensors read `believed`, as far as the answer matters: its

@@ -30,9 +30,9 @@ impl TrackingErrorBound {
     /// On an edge, driven as `timing` says.
     #[must_use]
     pub fn new(robot: &Robot, timing: &Timing, edge: &Edge) -> Self {
-        let mut stray = Self::default();
+        let mut tracking_error = Self::default();
         if edge.from == edge.to {
-            return stray;
+            return tracking_error;
         }
         let motion = robot.drive.motion;
         let rates_rad_s = timing.peak_rates_rad_s(edge);
@@ -40,12 +40,13 @@ impl TrackingErrorBound {
             let share = rate_rad_s / sensor.max_rate_rad_s;
             let way_rad = edge.to[joint] - edge.from[joint];
             let (ahead_rad, behind_rad) = (motion.overshoot_rad * share, -BEHIND * motion.overshoot_rad * share);
-            stray.lag_rad[joint] = motion.lag_spread_s * rate_rad_s;
-            stray.droop_rad[joint] = motion.droop_rad * share;
-            stray.way_rad[joint] = way_rad.abs();
-            stray.end_rad[joint] = if way_rad < 0.0 { [-ahead_rad, -behind_rad] } else { [behind_rad, ahead_rad] };
+            tracking_error.lag_rad[joint] = motion.lag_spread_s * rate_rad_s;
+            tracking_error.droop_rad[joint] = motion.droop_rad * share;
+            tracking_error.way_rad[joint] = way_rad.abs();
+            tracking_error.end_rad[joint] =
+                if way_rad < 0.0 { [-ahead_rad, -behind_rad] } else { [behind_rad, ahead_rad] };
         }
-        stray
+        tracking_error
     }
 
     /// Where an edge ends that was driven as slowly as any, whichever it was: what its joints overshoot at most.
@@ -122,18 +123,18 @@ mod tests {
         (to[0], to[1]) = (from[0] + 0.6, from[1] - 0.4);
         for slowness in [1.0, 4.0] {
             let edge = Edge { from, to, time_scale: slowness };
-            let (stray, rates_rad_s) =
+            let (tracking_error, rates_rad_s) =
                 (TrackingErrorBound::new(&robot, &timing, &edge), timing.peak_rates_rad_s(&edge));
             for joint in 0..2 {
                 let full_rad = 0.05 * rates_rad_s[joint] / robot.sensors[joint].max_rate_rad_s;
                 let way = (to[joint] - from[joint]).signum();
                 for share in [0.5, 1.0] {
                     let (middle_rad, most_rad) =
-                        (way * share * stray.middle_rad(joint), stray.most_rad(joint, [share; 2]));
+                        (way * share * tracking_error.middle_rad(joint), tracking_error.most_rad(joint, [share; 2]));
                     assert!((middle_rad + most_rad - share * full_rad).abs() < 1e-12, "{joint}: ahead");
                     assert!((middle_rad - most_rad + 0.25 * share * full_rad).abs() < 1e-12, "{joint}: behind");
                 }
-                assert!((stray.end_rad(joint) - full_rad).abs() < 1e-12);
+                assert!((tracking_error.end_rad(joint) - full_rad).abs() < 1e-12);
             }
             let fastest = (0..2).map(|j| rates_rad_s[j] / robot.sensors[j].max_rate_rad_s).fold(0.0, f64::max);
             assert!((fastest - RATE_SHARE / slowness).abs() < 1e-9, "{fastest}");
@@ -152,7 +153,7 @@ mod tests {
         let mut to = from;
         (to[0], to[1], to[4]) = (from[0] + 0.9, from[1] - 0.3, from[4] + 0.5);
         let edge = Edge::at_full_speed(from, to);
-        let stray = TrackingErrorBound::new(&robot, &timing, &edge);
+        let tracking_error = TrackingErrorBound::new(&robot, &timing, &edge);
         let duration_s = timing.edge_duration_s(&edge);
         let mut closest = f64::INFINITY;
         for step in 0..=500 {
@@ -162,7 +163,7 @@ mod tests {
             for joint in 0..from.len() {
                 let late = Timing::set_point(&from, &to, (u - motion.lag_spread_s / duration_s).clamp(0.0, 1.0));
                 let lag_rad = (late[joint] - at[joint]).abs();
-                let bound_rad = stray.most_rad(joint, [share; 2]);
+                let bound_rad = tracking_error.most_rad(joint, [share; 2]);
                 // The cubic has slowed down by the end of the lag: before the end, the bound needs no help.
                 if u < 0.5 {
                     assert!(lag_rad <= bound_rad + 1e-12, "joint {joint} at {u}: {lag_rad} {bound_rad}");
@@ -179,7 +180,10 @@ mod tests {
             for along in [[0.0, 1.0], [0.2, 0.3], [1.0, 1.0]] {
                 for joint in 0..from.len() {
                     let quicker_rad = slowness * slow.most_rad(joint, along);
-                    assert!((quicker_rad - stray.most_rad(joint, along)).abs() < 1e-12, "it goes with the rate");
+                    assert!(
+                        (quicker_rad - tracking_error.most_rad(joint, along)).abs() < 1e-12,
+                        "it goes with the rate"
+                    );
                 }
             }
             let arriving = TrackingErrorBound::arriving(&robot);

@@ -77,14 +77,14 @@ impl PathPlanner<'_> {
 
     /// Whether no joint overshoots its limits at the end of the edge by more than they leave room for.
     pub(crate) fn is_within_limits(&self, edge: &Edge) -> bool {
-        let stray = TrackingErrorBound::new(self.clearance.robot(), self.clearance.timing(), edge);
+        let tracking_error = TrackingErrorBound::new(self.clearance.robot(), self.clearance.timing(), edge);
         let arriving = TrackingErrorBound::arriving(self.clearance.robot());
         (0..self.clearance.n_error_joints()).all(|j| {
             let JointLimits { lower_rad, upper_rad } = self.limits[j];
             let way_rad = edge.to[j] - edge.from[j];
             let left_rad = if way_rad > 0.0 { upper_rad - edge.to[j] } else { edge.to[j] - lower_rad };
             // What is beyond its limits already comes back.
-            way_rad == 0.0 || stray.end_rad(j) <= left_rad.max(0.0) + arriving.end_rad(j)
+            way_rad == 0.0 || tracking_error.end_rad(j) <= left_rad.max(0.0) + arriving.end_rad(j)
         })
     }
 }

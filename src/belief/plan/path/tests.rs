@@ -89,7 +89,7 @@ fn paths_are_found_and_keep_clear_and_are_the_same_again() {
                 bent += i32::from(path.waypoints.len() > 2);
                 assert_eq!((path.waypoints[0], path.waypoints[path.waypoints.len() - 1]), (from, to));
                 for edge in path.edges() {
-                    let stray = TrackingErrorBound::new(&site.robot, clearance.timing(), &edge);
+                    let tracking_error = TrackingErrorBound::new(&site.robot, clearance.timing(), &edge);
                     for step in 0..=10 {
                         let share = f64::from(step) / 10.0;
                         let on_line = between(&edge.from, &edge.to, share);
@@ -100,8 +100,8 @@ fn paths_are_found_and_keep_clear_and_are_the_same_again() {
                                 if j >= 5 {
                                     return on_line[j];
                                 }
-                                let off_rad = sign(&mut rng) * stray.most_rad(j, [share; 2]);
-                                let at_rad = on_line[j] + share * stray.middle_rad(j) + off_rad;
+                                let off_rad = sign(&mut rng) * tracking_error.most_rad(j, [share; 2]);
+                                let at_rad = on_line[j] + share * tracking_error.middle_rad(j) + off_rad;
                                 at_rad + sign(&mut rng) * bounds.error_rad(j, at_rad)
                             });
                             assert!(!clearance.is_nearer_than(&arm, MARGIN_M - 1e-9), "{name} {belief}: {on_line:?}");
@@ -162,9 +162,9 @@ fn edges_near_things_are_driven_slowly_and_the_others_are_not() {
         counts[level] += 1;
         let edge = Edge { from, to, time_scale: slowness };
         assert!(planner.keeps_clear(&edge, &mut 0) && planner.is_within_limits(&edge));
-        let stray = TrackingErrorBound::new(&site.robot, clearance.timing(), &edge);
+        let tracking_error = TrackingErrorBound::new(&site.robot, clearance.timing(), &edge);
         for joint in 0..5 {
-            let at_end_rad = to[joint] + (to[joint] - from[joint]).signum() * stray.end_rad(joint);
+            let at_end_rad = to[joint] + (to[joint] - from[joint]).signum() * tracking_error.end_rad(joint);
             let arriving_rad = TrackingErrorBound::arriving(&site.robot).end_rad(joint);
             assert!(at_end_rad <= limits[joint].upper_rad + arriving_rad + 1e-9, "{joint}: {at_end_rad}");
             assert!(at_end_rad >= limits[joint].lower_rad - arriving_rad - 1e-9, "{joint}: {at_end_rad}");

@@ -25,18 +25,18 @@ const NOISE_SIGMAS: f64 = 4.0;
 
 /// What the readings on all edges show.
 #[derive(Clone, Debug, PartialEq)]
-pub struct StrayStudy {
+pub struct TrackingErrorStudy {
     pub n_edges: usize,
     pub n_readings: usize,
     /// Readings of which some joint is off the line by more than the bound and its noise, on the way and where the edge
     /// ends.
     pub n_beyond: [usize; 2],
-    pub joints: Vec<JointStray>,
+    pub joints: Vec<JointTrackingError>,
 }
 
 /// The same of one joint, noise taken off.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct JointStray {
+pub struct JointTrackingError {
     pub name: String,
     /// Largest distance from the line, rad.
     pub most_rad: f64,
@@ -60,7 +60,7 @@ struct Edge {
 
 /// Compares readings with set-points, both by the datasheet's scale.
 #[must_use]
-pub fn stray_study(robot: &Robot, messages: &[Message]) -> StrayStudy {
+pub fn tracking_error_study(robot: &Robot, messages: &[Message]) -> TrackingErrorStudy {
     let sensors = ArmSensors::nominal(robot);
     let mut commands = Vec::new();
     let mut readings = Vec::new();
@@ -73,8 +73,9 @@ pub fn stray_study(robot: &Robot, messages: &[Message]) -> StrayStudy {
     }
     commands.sort_by_key(|(stamp, _)| *stamp);
     readings.sort_by_key(|(stamp, _)| *stamp);
-    let joints = robot.joint_names().into_iter().map(|name| JointStray { name, ..JointStray::default() });
-    let mut study = StrayStudy { n_edges: 0, n_readings: 0, n_beyond: [0; 2], joints: joints.collect() };
+    let joints =
+        robot.joint_names().into_iter().map(|name| JointTrackingError { name, ..JointTrackingError::default() });
+    let mut study = TrackingErrorStudy { n_edges: 0, n_readings: 0, n_beyond: [0; 2], joints: joints.collect() };
     let edges = edges(&commands);
     for (k, edge) in edges.iter().enumerate() {
         study.n_edges += 1;
@@ -138,14 +139,14 @@ fn nearest(from: &JointAngles, to: &JointAngles, at: &JointAngles) -> (f64, Join
     (share, JointAngles::from_fn(from.len(), |j| from[j] + share * (to[j] - from[j])))
 }
 
-impl StrayStudy {
+impl TrackingErrorStudy {
     fn add(&mut self, robot: &Robot, edge: &Edge, stamp: Stamp, reading: &JointAngles) {
         let (share, on_line) = nearest(&edge.from, &edge.to, reading);
         let timing = Timing::new(robot);
         let duration_s = edge.end.since_s(edge.start);
         // Set-points begin and end with a rest of a period or so, by which the edge seems quicker than it was.
         let slowness = f64::max(duration_s / timing.least_duration_s(&edge.from, &edge.to), 1.0);
-        let stray =
+        let tracking_error =
             TrackingErrorBound::new(robot, &timing, &Motion { from: edge.from, to: edge.to, time_scale: slowness });
         let u = (stamp.since_s(edge.start) / duration_s).clamp(0.0, 1.0);
         let mut is_beyond = false;
@@ -154,8 +155,8 @@ impl StrayStudy {
             let noise_rad = NOISE_SIGMAS * sensor.noise_std_counts / sensor.counts_per_rad.abs();
             let signed_rad = reading[joint] - on_line[joint];
             let off_rad = (signed_rad.abs() - noise_rad).max(0.0);
-            let off_middle_rad = |stray: &TrackingErrorBound| {
-                ((signed_rad - share * stray.middle_rad(joint)).abs() - noise_rad).max(0.0)
+            let off_middle_rad = |tracking_error: &TrackingErrorBound| {
+                ((signed_rad - share * tracking_error.middle_rad(joint)).abs() - noise_rad).max(0.0)
             };
             let rate_rad_s = 6.0 * u * (1.0 - u) * (edge.to[joint] - edge.from[joint]).abs() / duration_s;
             let peak_rad_s = 1.5 * (edge.to[joint] - edge.from[joint]).abs() / duration_s;
@@ -166,12 +167,12 @@ impl StrayStudy {
             if share >= AT_END {
                 found.most_at_end_rad = found.most_at_end_rad.max(off_rad);
                 // What does not move by itself tells nothing of how far a moving joint overshoots.
-                if stray.end_rad(joint) > LEAST_RATE_SHARE * robot.drive.motion.overshoot_rad {
-                    let full_rad = off_rad * robot.drive.motion.overshoot_rad / stray.end_rad(joint);
+                if tracking_error.end_rad(joint) > LEAST_RATE_SHARE * robot.drive.motion.overshoot_rad {
+                    let full_rad = off_rad * robot.drive.motion.overshoot_rad / tracking_error.end_rad(joint);
                     found.most_overshoot_rad = found.most_overshoot_rad.max(full_rad);
                 }
             }
-            let (bound_rad, off_rad) = (stray.most_rad(joint, [share; 2]), off_middle_rad(&stray));
+            let (bound_rad, off_rad) = (tracking_error.most_rad(joint, [share; 2]), off_middle_rad(&tracking_error));
             is_beyond |= off_rad > bound_rad;
             if bound_rad > 1e-4 {
                 found.most_of_bound = found.most_of_bound.max(off_rad / bound_rad);
@@ -245,7 +246,7 @@ mod tests {
             }
             began_s += 0.01 * f64::from(n + 61);
         }
-        let study = stray_study(&robot, &messages);
+        let study = tracking_error_study(&robot, &messages);
         assert_eq!(study.n_edges, 2, "{}", study.summary());
         let lags: Vec<f64> = study.joints.iter().map(|joint| joint.most_lag_s).collect();
         // Against the nearest point of the line joint 0 is late by `lag (1 - u_0^2)` and the others by `-lag u_0^2`, u
