@@ -7,8 +7,8 @@ mod folder;
 pub use files::OutputError;
 #[cfg(feature = "sim")]
 pub(crate) use files::complete;
-pub(crate) use files::{check_replaceable, make_folder, parent, write_together};
 #[cfg(any(feature = "sim", feature = "viewer"))]
-pub(crate) use files::{partial, with_suffix, write_whole};
+pub(crate) use files::{check_replaceable, parent, partial, with_suffix, write_whole};
+pub(crate) use files::{make_folder, write_together};
 #[cfg(feature = "sim")]
 pub use folder::OutputFolder;
