@@ -8,8 +8,9 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use crate::calib::methods::position_problem::PositionProblem;
-use crate::calib::methods::{Outcome, Solution};
+use crate::calib::methods::solution::Solution;
 use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
+use armcal_core::numeric::Outcome;
 use armcal_core::robot::Robot;
 use armcal_core::sensor::wrap_symmetric;
 use armcal_core::stats::stream_rng;

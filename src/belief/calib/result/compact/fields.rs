@@ -1,6 +1,7 @@
 //! What the fields of the compact text have in common.
 
-use crate::calib::result::compact::{CompactError, MAX_STEPS};
+use crate::calib::result::compact::error::CompactError;
+use crate::calib::result::compact::precision::MAX_STEPS;
 
 pub(crate) fn bad(field: impl Into<String>, found: &str, expected: &'static str) -> CompactError {
     CompactError::Field { field: field.into(), found: printable(found), expected }

@@ -6,8 +6,9 @@
 use serde::Serialize;
 
 use crate::calib::ReferenceTable;
+use crate::calib::result::compact::error::CompactError;
 use crate::calib::result::compact::fields::{bad, whole};
-use crate::calib::result::compact::{CompactError, MAX_STEPS};
+use crate::calib::result::compact::precision::MAX_STEPS;
 use armcal_core::sensor::{Conditions, N_SHAPE, Terms};
 use armcal_core::time::Stamp;
 

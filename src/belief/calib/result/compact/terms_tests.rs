@@ -4,6 +4,8 @@ use rand::RngExt;
 
 use crate::calib::fixture::{estimate, sample, titan, with_terms};
 use crate::calib::result::compact::*;
+use armcal_core::robot::Robot;
+use armcal_core::sensor::ArmSensors;
 use armcal_core::sensor::Conditions;
 use armcal_core::stats::{quantile, stream_rng};
 use armcal_core::streams::JointAngles;

@@ -4,11 +4,14 @@ use proptest::prelude::*;
 
 use crate::calib::refusal::Refusal;
 use crate::calib::result::bare::bare;
+use crate::calib::result::calibration::{Calibration, JointResult, Status};
+use crate::calib::result::compact::precision::STEPS;
 use crate::calib::result::compact::*;
 use crate::calib::result::covariance_file::CovarianceTable;
 use crate::calib::result::metrics::HeldOutMetrics;
 use crate::calib::result::valid_range::ValidRange;
 use armcal_core::numeric::Outcome;
+use armcal_core::routine::Method;
 use armcal_core::stats::Summary;
 
 /// Gain and offset corrections with deviations; `None` where the datasheet's stays.

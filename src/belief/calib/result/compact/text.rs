@@ -2,11 +2,12 @@
 
 use std::fmt::Write as _;
 
+use crate::calib::result::calibration::Status;
+use crate::calib::result::compact::content::{CompactCalibration, CompactJoint, PredictedToolError};
+use crate::calib::result::compact::error::CompactError;
 use crate::calib::result::compact::fields::{bad, printable, whole};
-use crate::calib::result::compact::{
-    CompactCalibration, CompactError, CompactJoint, CompactReference, CompactTerms, HASH_DIGITS, PredictedToolError,
-    STEPS, STEPS_WITH_TERMS, Status, UM_PER_M,
-};
+use crate::calib::result::compact::precision::{HASH_DIGITS, STEPS, STEPS_WITH_TERMS, UM_PER_M};
+use crate::calib::result::compact::terms::{CompactReference, CompactTerms};
 use armcal_core::routine::Method;
 use armcal_core::streams::MAX_JOINTS;
 

@@ -1,0 +1,97 @@
+//! The views of all recordings of an arm together, by their stamps; all are fitted, and held out in turn for the verdict.
+
+use std::collections::BTreeMap;
+
+use crate::calib::views::external::views::RecordingViews;
+use crate::calib::views::view::{CaptureData, ObservationRejection, View};
+use crate::calib::{CalibError, CalibrationData, HeldOut};
+use armcal_core::input::{ExternalRecording, InputMap};
+use armcal_core::robot::Robot;
+use armcal_core::streams::ReachTask;
+
+/// What is known beside the recordings.
+#[derive(Clone, Debug, Default)]
+pub struct ExternalContext {
+    pub task: Option<ReachTask>,
+    /// Names of landmarks that are no numbered tags.
+    pub landmark_names: BTreeMap<u32, String>,
+    /// The landmark of a plain `child_frame`.
+    pub plain_landmark: Option<u32>,
+}
+
+/// Makes views of recordings of one arm; `robot` has the landmarks that were around it.
+///
+/// # Errors
+/// [`CalibError::Twice`] for a recording that is given twice, [`CalibError::NoTags`] without any view.
+pub fn prepare_external(
+    recordings: &[ExternalRecording],
+    map: &InputMap,
+    robot: &Robot,
+    context: ExternalContext,
+) -> Result<CalibrationData, CalibError> {
+    let name = names_of(recordings);
+    let mut data = CaptureData { task: context.task, landmark_names: context.landmark_names, ..CaptureData::default() };
+    let mut views: Vec<(View, [u8; 32])> = Vec::new();
+    let mut digests: Vec<[u8; 32]> = Vec::new();
+    for recording in recordings {
+        let made = RecordingViews::of(recording, map, robot, context.plain_landmark);
+        if made.views.iter().any(|(_, first)| views.iter().any(|(_, other)| other == first)) {
+            return Err(CalibError::Twice { recording: recording.path.display().to_string() });
+        }
+        views.extend(made.views);
+        digests.extend(made.digests);
+        data.ids_seen.extend(made.ids_seen);
+        for (why, n) in made.rejected {
+            *data.rejected.entry(why).or_default() += n;
+        }
+    }
+    // Recordings may overlap in time; the message's hash settles the order of equal stamps whatever the order of the
+    // arguments.
+    views.sort_by(|(a, of_a), (b, of_b)| a.end.cmp(&b.end).then(of_a.cmp(of_b)));
+    data.n_marks = views.len();
+    let numbered = |(k, (view, _))| View { pose_idx: k as u32, ..view };
+    data.fit = views.into_iter().enumerate().map(numbered).collect();
+    data.ids_seen.sort_unstable();
+    data.ids_seen.dedup();
+    if data.fit.is_empty() {
+        return Err(no_views(name, robot, &data));
+    }
+    let messages_hash = hash(&mut digests);
+    Ok(CalibrationData {
+        name,
+        messages_hash,
+        data,
+        gripper_tag_data: None,
+        held_out: HeldOut::CrossValidation,
+        robot: robot.clone(),
+        identified: Vec::new(),
+    })
+}
+
+fn names_of(recordings: &[ExternalRecording]) -> String {
+    let mut names: Vec<String> = recordings.iter().map(|recording| recording.path.display().to_string()).collect();
+    names.sort();
+    names.join(", ")
+}
+
+fn no_views(recording: String, robot: &Robot, data: &CaptureData) -> CalibError {
+    if data.rejected.keys().any(|why| *why != ObservationRejection::UnknownTag) {
+        let reasons = data.rejected_by_reason();
+        let reasons: Vec<String> = reasons.iter().map(|(why, n)| format!("{n} {}", why.replace('_', " "))).collect();
+        return CalibError::AllRejected { recording, reasons: reasons.join(", ") };
+    }
+    let known = robot.tags.iter().map(|tag| tag.id).collect();
+    CalibError::NoTags { recording, robot: robot.name.clone(), known, seen: data.ids_seen.clone() }
+}
+
+/// Of the messages that the views come from, in whatever order and files they were.
+fn hash(digests: &mut Vec<[u8; 32]>) -> String {
+    digests.sort_unstable();
+    digests.dedup();
+    let mut hasher = blake3::Hasher::new();
+    hasher.update(b"armcal foreign messages 1");
+    for digest in digests.iter() {
+        hasher.update(digest);
+    }
+    hasher.finalize().to_hex().to_string()
+}
