@@ -19,7 +19,15 @@ use crate::support::{
     Answer, FinishedRun, ShortRoutine, answer, calibrate, finished, program, robot_folder, run, temp,
 };
 
-const RESULTS: [&str; 6] = ["run.mcap", "truth.mcap", "run.rrd", "calibration.toml", "report.html", "summary.json"];
+const RESULTS: [&str; 7] = [
+    "run.mcap",
+    "truth.mcap",
+    "run.rrd",
+    "calibration.toml",
+    "calibration.covariance.toml",
+    "report.html",
+    "summary.json",
+];
 
 /// A run that takes as little time as one can.
 fn quick() -> ShortRoutine {

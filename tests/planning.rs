@@ -19,7 +19,7 @@ fn plan(routine: &Path, out: &Path, more: &[&str]) -> Answer {
 /// Plans and reads what was written.
 #[track_caller]
 fn planned(routine: &Path, out: &Path, more: &[&str]) -> PlanFile {
-    plan(routine, out, more).expect("a plan", 0, &["predicted after the last one", "plan"]);
+    plan(routine, out, more).expect("a plan", 0, &["predicted after the last pose", "plan"]);
     PlanFile::read(&out.join("plan.toml")).expect("the plan reads")
 }
 

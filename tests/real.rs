@@ -245,7 +245,7 @@ fn several_recordings_count_as_one_in_any_order() {
         given.calibrate_of(&order, &[]).expect("two", 0, &["ACCEPTED", "57 poses"]);
         assert!(read(&given.file("out/calibration.toml")) == one, "{order:?}");
     }
-    given.calibrate_of(&["a.mcap", "b.mcap", "a.mcap"], &[]).expect("twice", 2, &["a.mcap", "twice"]);
+    given.calibrate_of(&["a.mcap", "b.mcap", "a.mcap"], &[]).expect("twice", 2, &["a.mcap", "duplicate recording"]);
 }
 
 /// What is done to the poses, and what the refusal must name.
@@ -428,7 +428,7 @@ fn corners_of_an_external_detector_are_used_as_our_own_are() {
     command.arg("calibrate").arg(given.file("arm.mcap")).arg("--robot").arg(robot_folder());
     command.arg("--input").arg(given.file("map.toml")).arg("--out").arg(given.file("out"));
     command.args(["--method", "minimum_distance"]);
-    answer(&mut command).expect("corners", 0, &["ACCEPTED", "24 poses", "px in the image"]);
+    answer(&mut command).expect("corners", 0, &["ACCEPTED", "24 poses", "reprojection error"]);
     for (j, joint) in given.calibration().joint.iter().enumerate().take(N_SEEN) {
         let off_rad = joint.offset_rad - arm.offset_rad[j];
         assert!(off_rad.abs() < 4.0 * joint.offset_std_rad, "{}: {off_rad} rad", joint.name);
@@ -500,6 +500,9 @@ fn task_and_prior_are_taken_from_files() {
     given.calibrate(&[]).expect("again", 0, &[]);
     let prior = given.file("prior.toml");
     std::fs::copy(given.file("out/calibration.toml"), &prior).expect("copied");
+    let alone = ["--prior", prior.to_str().expect("a path")];
+    given.calibrate(&alone).expect("without its covariance", 2, &["prior.covariance.toml", "is missing"]);
+    std::fs::copy(given.file("out/calibration.covariance.toml"), given.file("prior.covariance.toml")).expect("copied");
     let with_prior = ["--prior", prior.to_str().expect("a path"), "--method", "minimum_distance"];
     given.calibrate(&with_prior).expect("the same views again", 0, &["ACCEPTED"]);
     let summary = given.summary();
@@ -547,5 +550,5 @@ fn several_recordings_of_our_own_are_pooled_in_any_order() {
     let both = read(&out.join("calibration.toml"));
     calibrate(["b.mcap", "a.mcap"]).expect("the other way round", 0, &["ACCEPTED"]);
     assert!(read(&out.join("calibration.toml")) == both);
-    calibrate(["a.mcap", "a.mcap"]).expect("one twice", 2, &["a.mcap", "twice"]);
+    calibrate(["a.mcap", "a.mcap"]).expect("one twice", 2, &["a.mcap", "duplicate recording"]);
 }

@@ -256,7 +256,7 @@ fn what_is_wrong_with_a_vehicles_tags_is_named() {
         edit(&file, from, to);
         answer(program().arg("check").arg(&file)).expect(to, 2, words);
     };
-    check("base_tag = 0\n", "", &["v.toml", "base_tag", "is needed"]);
+    check("base_tag = 0\n", "", &["v.toml", "base_tag", "is required"]);
     check("base_tag = 0\n", "base_tag = 9\n", &["v.toml", "base_tag", "tag 9"]);
     check("id = 1\n", "id = 0\n", &["v.toml", "tag 0: id", "twice"]);
     check("size_m = 0.15\n", "size_m = -0.15\n", &["v.toml", "tag 0: size_m", "0.001 .. 10"]);
@@ -276,7 +276,7 @@ fn what_is_wrong_with_a_mesh_of_a_routine_is_named() {
     };
     write(&folder.path().join("flat.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
     write(&folder.path().join("text.stl"), "no mesh");
-    for (name, words) in [("none.stl", "cannot be read"), ("text.stl", "is no mesh"), ("flat.obj", "is flat")] {
+    for (name, words) in [("none.stl", "cannot be read"), ("text.stl", "is not a mesh"), ("flat.obj", "is flat")] {
         let routine = ShortRoutine { tail: tail(name), ..ShortRoutine::default() }.write(folder.path());
         answer(program().arg("check").arg(&routine)).expect(
             name,

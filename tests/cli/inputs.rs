@@ -119,7 +119,7 @@ const ROBOT: &[Spoilt] = &[
         "opens_along = [0.0, 0.0, 0.0]",
         &["robot.toml", "gripper.opens_along", "direction"],
     ),
-    ("\"jaw_left_link\", ", "\"claw\", ", &["robot.toml", "gripper.jaws", "`claw` is no link"]),
+    ("\"jaw_left_link\", ", "\"claw\", ", &["robot.toml", "gripper.jaws", "`claw` is not a link"]),
     ("\"jaw_left_link\", ", "\"fisheye\", ", &["robot.toml", "gripper.jaws", "not fixed to the link of the tool"]),
     ("\"jaw_left_link\", ", "\"jaw_right_link\", ", &["robot.toml", "gripper.jaws", "twice"]),
     ("closing_time_s = 2.0", "closing_time_s = 2.0\nforce_n = 4.0", &["robot.toml", "force_n"]),
@@ -300,16 +300,24 @@ fn check_looks_at_every_file() {
 fn check_refuses_a_spoilt_calibration() {
     let folder = temp();
     let file = folder.path().join("calibration.toml");
-    let good = crate::support::read(&crate::support::shared_run().file("calibration.toml"));
+    let covariance = folder.path().join("calibration.covariance.toml");
+    let good = ["calibration.toml", "calibration.covariance.toml"]
+        .map(|name| crate::support::read(&crate::support::shared_run().file(name)));
     let spoilt: [(&str, &str, &[&str]); 4] = [
         ("version = 1", "version = 9", &["calibration.toml", "version"]),
         ("offset_rad = ", "offset_rad = 99", &["calibration.toml", "shoulder_yaw", "offset_rad"]),
         ("status = ", "statuss = ", &["calibration.toml", "status"]),
-        ("rows = [[", "rows = [[0.0], [", &["calibration.toml", "covariance.rows"]),
+        ("messages_hash = \"", "messages_hash = \"0", &["calibration.covariance.toml", "another calibration"]),
     ];
     for (from, to, words) in spoilt {
-        write(&file, &good);
+        write(&file, &good[0]);
+        write(&covariance, &good[1]);
         edit(&file, from, to);
         check(&file).expect(to, 2, words);
     }
+    write(&file, &good[0]);
+    edit(&covariance, "lower_triangle = [", "lower_triangle = [[1.0], ");
+    check(&file).expect("a row too many", 2, &["calibration.covariance.toml", "lower_triangle"]);
+    std::fs::remove_file(&covariance).expect("removed");
+    check(&file).expect("alone", 0, &["no prior", "calibration.covariance.toml is missing"]);
 }

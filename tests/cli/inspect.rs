@@ -39,7 +39,7 @@ fn the_sample_is_described() {
         "some 50",
         "robot.toml (application/toml)",
         "determined   shoulder_yaw gain, shoulder_yaw offset",
-        "undetermined wrist_rotate gain: the camera hangs before this joint",
+        "undetermined wrist_rotate gain: the joint is distal to the camera",
         "enough       views",
     ];
     inspect(&sample(), &[]).expect("sample", 0, &words);
@@ -48,7 +48,7 @@ fn the_sample_is_described() {
     let json: serde_json::Value = serde_json::from_str(&told.stdout).expect("JSON");
     assert_eq!(json["completeness"]["state"], "whole");
     assert_eq!(json["arm"]["views_fit"], 14);
-    assert_eq!(json["determined"]["views"], 14);
+    assert_eq!(json["observable"]["views"], 14);
     let by_topic: u64 =
         json["topics"].as_array().expect("topics").iter().map(|t| t["messages"].as_u64().unwrap()).sum();
     assert_eq!(json["messages"].as_u64(), Some(by_topic));

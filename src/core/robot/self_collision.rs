@@ -1,7 +1,7 @@
 //! The file self_collision.toml of a robot folder: pairs of links that can come near each other.
 //!
-//! `plan::sample_self_pairs` (`armcal study self-collision`) finds them by sampling; planning skips all other pairs. The file
-//! holds the hash of the URDF and is valid for that URDF only.
+//! `plan::sample_self_pairs` (`armcal study self-collision`) finds them by sampling; planning skips all other pairs.
+//! The file holds the hash of the URDF and is valid for that URDF only.
 
 use std::path::Path;
 

@@ -51,7 +51,7 @@ impl StopReason {
 impl std::fmt::Display for StopReason {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Self::ToolError => write!(f, "stop_at_tool_error_m is reached by prediction"),
+            Self::ToolError => write!(f, "predicted tool error has reached stop_at_tool_error_m"),
             Self::Poses => write!(f, "all planned views captured"),
             Self::Time => write!(f, "max_time_s has passed"),
             Self::NoPoseLeft => write!(f, "no pose is left that sees enough tags and keeps clear"),

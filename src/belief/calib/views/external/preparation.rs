@@ -1,4 +1,5 @@
-//! The views of all recordings of an arm together, by their stamps; all are fitted, and held out in turn for the verdict.
+//! The views of all recordings of an arm together, by their stamps; all are fitted, and held out in turn for the
+//! verdict.
 
 use std::collections::BTreeMap;
 
