@@ -118,12 +118,12 @@ fn what_is_wrong_with_a_tag_file_is_said_with_file_key_and_range() {
         with("default_tag_size: 0.2", "default_tag_size: 0").contains("bodies.hall.default_tag_size: 0 is outside")
     );
     assert!(with("tag_size: 0.05", "tag_size: 0").contains("bodies.cart.board.tag_size"));
-    assert!(with("id: 3", "id: 2").contains("tag 2: id: stands twice"));
+    assert!(with("id: 3", "id: 2").contains("tag 2: id: is defined twice"));
     assert!(with("default_body: hall", "default_body: attic").contains("`attic` is none of"));
     assert!(with("type: board", "type: sphere").contains("`sphere` is not supported; use simple, board"));
     assert!(with("1533224423.510462496", "noon").contains("squash.time: `noon` is no time"));
     assert!(refusal("tagslam.yaml", "bodies: 3").contains("tagslam.yaml"));
-    assert!(refusal("tags.json", "{}").contains("`.json` is no form of tag files"));
+    assert!(refusal("tags.json", "{}").contains("`.json` is not a format of tag files"));
     let own = "version = 1\nframe = \"base\"\n[[tag]]\nid = 2\nsize_m = 0.0\n";
     assert_eq!(refusal("map.toml", own), "map.toml: tag 2: size_m: 0 is outside 0.001 .. 10");
     assert!(refusal("map.toml", &own.replace("= 1\n", "= 3\n")).contains("version: 3 is not supported"));
