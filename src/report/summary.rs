@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::score::{MarginSummary, Score};
 use armcal_belief::calib::{
     Calibration, CameraMount, FailedJointTable, Finding, JointResult, MapResult, ObservabilityTable, PriorTable,
-    Refusal, Status, VerdictTable,
+    Refusal, Reservation, Status, VerdictTable,
 };
 use armcal_core::numeric::Outcome;
 use armcal_core::routine::AssertFigure;
@@ -105,9 +105,15 @@ pub struct CalibrationSummary {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub largest_gain_change: Option<GainChange>,
     pub predicted_tool_error_m: Option<Summary>,
+    /// The same with what the drawing leaves open.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub predicted_tool_error_with_priors_m: Option<Summary>,
     /// By the tag on the gripper, where the robot has one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera_mount: Option<CameraMount>,
+    /// What rests on priors alone, the largest at the tool first.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub reservations: Vec<Reservation>,
     /// What is other than robot.toml, survey and drawing say, the most telling first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub findings: Vec<Finding>,
@@ -223,7 +229,9 @@ impl RunSummary {
                 unobservable: calibration.unobservable.clone(),
                 largest_gain_change: GainChange::largest(&calibration.joint),
                 predicted_tool_error_m: calibration.predicted_tool_error_m,
+                predicted_tool_error_with_priors_m: calibration.predicted_tool_error_with_priors_m,
                 camera_mount: calibration.camera_mount.clone(),
+                reservations: calibration.reservations.clone(),
                 findings: calibration.findings.clone(),
                 failed_joint: calibration.failed_joint.clone(),
                 prior: calibration.prior.clone(),

@@ -146,6 +146,13 @@ fn accuracy_lines(summary: &RunSummary) -> Vec<String> {
             Unit::Metres.shown(predicted.max, 1)
         )
     }));
+    lines.extend(summary.calibration.predicted_tool_error_with_priors_m.map(|predicted| {
+        format!(
+            "with priors  tool error {} median, {} worst: what no view shows may be as far off as the drawing's sigmas",
+            Unit::Metres.shown(predicted.median, 1),
+            Unit::Metres.shown(predicted.max, 1)
+        )
+    }));
     lines
 }
 
@@ -187,7 +194,8 @@ fn contact_line(capture: &CaptureSummary) -> Option<String> {
 
 /// What the result does not hold for.
 fn coverage_lines(calibration: &CalibrationSummary) -> Vec<String> {
-    let mut lines = Vec::new();
+    let mut lines: Vec<String> =
+        calibration.reservations.iter().map(|reservation| format!("reservation  {reservation}")).collect();
     if let Some(verdict) = &calibration.verdict {
         lines.extend(verdict.warnings.iter().map(|line| format!("warning      {line}")));
         lines.extend(verdict.not_covered.iter().map(|line| format!("not covered  {line}")));

@@ -32,6 +32,8 @@ pub struct ParameterCovariance {
 #[derive(Clone, Debug)]
 pub struct ToolErrorPrediction {
     pub error_m: Summary,
+    /// The arm's angles at each target that inverse kinematics reaches, and the error there, m.
+    pub targets: Vec<(JointAngles, f64)>,
 }
 
 /// Distances below this do not make the objective's curvature larger: it is where pixel noise sits, m.
@@ -239,6 +241,7 @@ pub fn predict_tool_error(
 ) -> Option<ToolErrorPrediction> {
     let sensors = at.sensors(robot);
     let error_m = |angles: &JointAngles| covariance.tool_position_m2(robot, &sensors, angles).trace().max(0.0).sqrt();
-    let errors: Vec<f64> = task_angles(robot, task?).iter().map(error_m).collect();
-    Some(ToolErrorPrediction { error_m: Summary::of(&errors)? })
+    let targets: Vec<(JointAngles, f64)> = task_angles(robot, task?).into_iter().map(|at| (at, error_m(&at))).collect();
+    let errors: Vec<f64> = targets.iter().map(|(_, error_m)| *error_m).collect();
+    Some(ToolErrorPrediction { error_m: Summary::of(&errors)?, targets })
 }

@@ -19,6 +19,7 @@ mod interim;
 mod methods;
 mod parameters;
 mod refusal;
+mod reservation;
 mod result;
 mod tag_mapping;
 mod tool_error;
@@ -38,6 +39,7 @@ pub use methods::{
 };
 pub use parameters::{JointParameters, Parameter, ParameterKind};
 pub use refusal::{InnovationQuantity, Refusal};
+pub use reservation::Reservation;
 pub use result::{
     Calibration, CalibrationFileError, CalibrationFiles, CameraMount, Check, CompactCalibration, CompactError,
     CompactJoint, CovarianceTable, FailedJointTable, FitMetrics, HeldOutMetrics, JointResult, LookupTable,

@@ -41,6 +41,14 @@ pub enum Refusal {
         predicted_m: f64,
         tolerance_m: f64,
     },
+    /// The same with what rests on the drawing alone.
+    PriorsBeyondTolerance {
+        predicted_m: f64,
+        tolerance_m: f64,
+        /// The largest part of it.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        most: Option<String>,
+    },
     /// Another link geometry explains the data, and joint sensors do not.
     Geometry(GeometryError),
     /// A joint's error from view to view is beyond what such a sensor can have.
@@ -135,7 +143,7 @@ impl Refusal {
             Self::NoHeldOutTag => "no_held_out",
             Self::NoBetterThanDatasheet { .. } => "no_better",
             Self::Overfitted { .. } => "overfitted",
-            Self::BeyondTolerance { .. } => "tool_error",
+            Self::BeyondTolerance { .. } | Self::PriorsBeyondTolerance { .. } => "tool_error",
             _ => "other",
         }
     }
@@ -151,6 +159,9 @@ impl Refusal {
                 "keep the datasheet's sensors, or check tag map, camera mount and time stamps"
             }
             Self::Overfitted { .. } => "capture more views, or more different ones",
+            Self::PriorsBeyondTolerance { .. } => {
+                "put a tag on the gripper, or measure the arm and state its sigmas in [geometry] of robot.toml"
+            }
             Self::BeyondTolerance { .. } => "capture more views, or put a tag on the gripper",
             Self::Geometry(_) => "check the drawing against the arm",
             Self::SensorError { .. } | Self::SensorFailed { .. } => "check that joint's sensor",
@@ -195,6 +206,16 @@ impl fmt::Display for Refusal {
                 mm(*predicted_m),
                 mm(*tolerance_m)
             ),
+            Self::PriorsBeyondTolerance { predicted_m, tolerance_m, most } => {
+                write!(
+                    f,
+                    "predicted tool error with what no view shows is {:.1} mm (95 % of the targets), the task \
+                     tolerates {:.1} mm",
+                    mm(*predicted_m),
+                    mm(*tolerance_m)
+                )?;
+                most.as_ref().map_or(Ok(()), |most| write!(f, "; most of it by the {most}"))
+            }
             Self::Geometry(geometry) => write!(f, "{geometry}"),
             Self::SensorError { joint, std_rad, datasheet_std_rad } => write!(
                 f,

@@ -7,6 +7,7 @@ use serde::Deserialize;
 use super::camera::{CameraFile, check_camera};
 use super::drive::{DriveSpec, HydraulicsFile, MotionSpec, check_displacements};
 use super::error::{FileIssue, RobotError, parse_toml, read_text};
+use super::geometry::GeometryPriors;
 use super::gripper::GripperFile;
 use super::gripper_tag::GripperTagFile;
 use super::joint_sensor::{SensorFile, check_sensors};
@@ -34,6 +35,8 @@ struct RobotFile {
     hydraulics: Option<HydraulicsFile>,
     #[serde(default)]
     motion: MotionSpec,
+    #[serde(default)]
+    geometry: GeometryPriors,
     camera: CameraFile,
     #[serde(default)]
     tag: Vec<TagFile>,
@@ -116,6 +119,7 @@ pub fn load_without_pairs(folder: &Path) -> Result<Robot, RobotError> {
         self_pairs: None,
         sensors,
         drive,
+        geometry: raw.geometry.check(&file)?,
         camera,
         tags,
     })

@@ -9,6 +9,7 @@ use super::camera::CameraSpec;
 use super::drive::DriveSpec;
 use super::error::{FileIssue, RobotError};
 use super::failed::FailedJoint;
+use super::geometry::GeometryPriors;
 use super::gripper::GripperSpec;
 use super::gripper_tag::GripperTag;
 use super::joint_sensor::JointSensorSpec;
@@ -33,6 +34,8 @@ pub struct Robot {
     pub self_pairs: Option<SelfPairs>,
     pub sensors: Vec<JointSensorSpec>,
     pub drive: DriveSpec,
+    /// How well the drawing is known.
+    pub geometry: GeometryPriors,
     pub tool: ToolSpec,
     /// `None` where the tool is no gripper.
     pub gripper: Option<GripperSpec>,

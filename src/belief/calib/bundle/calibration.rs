@@ -26,8 +26,10 @@ use crate::calib::result::metrics::HeldOutMetrics;
 use crate::calib::tag_mapping::map_unknown_tags;
 use crate::calib::views::calibration_data::CalibrationData;
 use crate::calib::views::view::{ObservationRejection, View};
+use armcal_core::joints::JointAngles;
 use armcal_core::robot::{JointSensorSpec, Robot};
 use armcal_core::routine::Method;
+use armcal_core::stats::Summary;
 
 /// What an estimate is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -129,6 +131,7 @@ impl<'a> BundleCalibration<'a> {
                 let (found, innovations) = (&estimated.estimate, &diagnosis.innovations[..]);
                 let task = self.data.data.task.as_ref();
                 VerdictInput { input, found, innovations, task }.judge(&mut calibration);
+                self.state_reservations(estimated, &diagnosis, &mut calibration);
             }
         }
         Ok(calibration)
@@ -263,6 +266,38 @@ impl<'a> BundleCalibration<'a> {
         });
         refusals.extend(impact.refusals(&calibration.failed_joint));
         calibration.refuse_first_for(refusals);
+    }
+
+    /// Writes what rests on priors alone to the result, and refuses it where that may be more than the task allows.
+    fn state_reservations(&self, estimated: &Estimated<'_>, diagnosis: &Diagnosis, calibration: &mut Calibration) {
+        let parameters = estimated.estimate.parameters();
+        let Some(by_data) = self.impact(estimated, diagnosis, &parameters).prediction() else {
+            // Without a task the views' own configurations stand for it, and there is no limit.
+            let views = estimated.estimate.view_angles();
+            let error_m = |at: &JointAngles| {
+                let sensors = parameters.sensors(&diagnosis.robot);
+                diagnosis.covariance.tool_position_m2(&diagnosis.robot, &sensors, at).trace().max(0.0).sqrt()
+            };
+            let errors: Vec<f64> = views.iter().map(error_m).collect();
+            let median_m = Summary::of(&errors).map_or(0.0, |summary| summary.median);
+            calibration.reservations = estimated.estimate.prior_impact(&views, median_m).reservations;
+            return;
+        };
+        let (targets, errors): (Vec<JointAngles>, Vec<f64>) = by_data.targets.into_iter().unzip();
+        let by_priors = estimated.estimate.prior_impact(&targets, by_data.error_m.median);
+        let both = errors.iter().zip(&by_priors.covariances_m2).map(|(error, by)| (error * error + by.trace()).sqrt());
+        let with_priors = Summary::of(&both.collect::<Vec<f64>>());
+        calibration.predicted_tool_error_with_priors_m = with_priors;
+        calibration.reservations = by_priors.reservations;
+        let task = self.data.data.task.as_ref();
+        if let (Some(predicted), Some(task)) = (with_priors, task)
+            && predicted.p95 > task.tolerance_m
+            && by_data.error_m.p95 <= task.tolerance_m
+        {
+            let most = calibration.reservations.first().map(|reservation| reservation.what.clone());
+            let (predicted_m, tolerance_m) = (predicted.p95, task.tolerance_m);
+            calibration.refuse_for([Refusal::PriorsBeyondTolerance { predicted_m, tolerance_m, most }]);
+        }
     }
 
     /// Whether the views agree with the prior, and what that refuses for.

@@ -2,7 +2,7 @@
 
 use crate::calib::bundle::estimate::Estimate;
 use crate::calib::bundle::failures::{Failure, FailureSource};
-use crate::calib::covariance::{ParameterCovariance, predict_tool_error};
+use crate::calib::covariance::{ParameterCovariance, ToolErrorPrediction, predict_tool_error};
 use crate::calib::finding::{Finding, FindingKind, FindingUnit};
 use crate::calib::parameters::JointParameters;
 use crate::calib::refusal::Refusal;
@@ -37,7 +37,12 @@ enum AngleSource {
 impl FailureImpact<'_> {
     /// The tool error that is to be expected as things are.
     pub(crate) fn tool_error_m(&self) -> Option<Summary> {
-        self.tool_error_where(usize::MAX, AngleSource::AsItIs)
+        self.prediction().map(|predicted| predicted.error_m)
+    }
+
+    /// The same at each target.
+    pub(crate) fn prediction(&self) -> Option<ToolErrorPrediction> {
+        self.prediction_where(usize::MAX, AngleSource::AsItIs)
     }
 
     pub(crate) fn tables(&self) -> Vec<FailedJointTable> {
@@ -100,6 +105,10 @@ impl FailureImpact<'_> {
 
     /// With the angle of `joint` known in that way, those of the other failed joints as they are.
     fn tool_error_where(&self, joint: usize, known: AngleSource) -> Option<Summary> {
+        self.prediction_where(joint, known).map(|predicted| predicted.error_m)
+    }
+
+    fn prediction_where(&self, joint: usize, known: AngleSource) -> Option<ToolErrorPrediction> {
         let mut robot = self.robot.clone();
         let mut covariance = self.covariance.clone();
         let mut residual_std_rad = covariance.residual_std_rad?;
@@ -134,7 +143,7 @@ impl FailureImpact<'_> {
             }
         }
         covariance.residual_std_rad = Some(residual_std_rad);
-        predict_tool_error(&robot, self.parameters, &covariance, self.task).map(|predicted| predicted.error_m)
+        predict_tool_error(&robot, self.parameters, &covariance, self.task)
     }
 
     /// Each failed joint as a finding: the estimate takes account of it.

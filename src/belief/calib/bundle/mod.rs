@@ -24,6 +24,7 @@ mod outliers;
 mod prior_terms;
 mod priors;
 mod problem;
+mod reservations;
 mod robust_start;
 mod schur;
 mod score_test;

@@ -15,6 +15,7 @@ use crate::calib::bundle::schur::{N_VIEW_PARAMETERS, SchurBlock};
 use crate::calib::geometry_error::ErrorKind;
 use armcal_core::joints::{JointAngles, MAX_JOINTS};
 use armcal_core::kinematics::LinkPoses;
+use armcal_core::sensor::ArmSensors;
 use armcal_core::spatial::adjoint;
 use armcal_core::stats::chi_square_above;
 
@@ -53,9 +54,9 @@ pub struct ScoreTestResult {
 type Trials = SMatrix<f64, 6, N_TRIALS>;
 
 /// Score and information of all trials, and how the common parameters follow them.
-struct Score {
+pub(crate) struct Score {
     score: DVector<f64>,
-    information: DMatrix<f64>,
+    pub(crate) information: DMatrix<f64>,
     /// d(common)/d(trial).
     sensitivity: DMatrix<f64>,
 }
@@ -116,36 +117,43 @@ impl Estimate<'_> {
 
     /// How far the tool is elsewhere over `task` with the trial at `first` of `size`, the joints' parameters following.
     fn tool_shift_m(&self, score: &Score, first: usize, size: &Vector3<f64>, task: &[JointAngles]) -> f64 {
-        let robot = self.problem.robot;
-        let layout = &self.problem.layout;
-        let step = score.sensitivity.columns(first, 3) * size;
-        let sensors = self.parameters().sensors(robot);
-        let mut sum = 0.0;
-        for angles in task {
-            let poses = robot.chain.link_poses(angles);
-            let tool_m = poses.frame(&robot.tool.mount).translation.vector;
-            let mut moved = Vector3::zeros();
-            if first < MOUNT && first / 6 < robot.tool.mount.n_joints {
-                let turned = poses.link(first / 6).rotation * size;
-                let origin = poses.joint_origin(first / 6);
-                moved += if first.is_multiple_of(6) { turned } else { turned.cross(&(tool_m - origin)) };
-            }
-            for (column, parameter) in layout.parameters.iter().enumerate() {
-                let joint = parameter.joint;
-                if joint < robot.tool.mount.n_joints {
-                    let model = &sensors.models[joint];
-                    let still = armcal_core::sensor::ConditionChange::default();
-                    let travel_rad = model.travel_under_rad(angles[joint], &still);
-                    let by = parameter.kind.angle_derivative(&model.spec, travel_rad, &still, 0.0);
-                    moved += poses.point_jacobian(joint, &tool_m) * (by * step[column]);
-                }
-            }
-            sum += moved.norm_squared();
-        }
-        (sum / task.len().max(1) as f64).sqrt()
+        let sensors = self.parameters().sensors(self.problem.robot);
+        let square = |angles: &JointAngles| self.tool_shift(score, first, size, (&sensors, angles)).norm_squared();
+        (task.iter().map(square).sum::<f64>() / task.len().max(1) as f64).sqrt()
     }
 
-    fn score(&self) -> Score {
+    /// The same for an arm at one configuration, base frame, m.
+    pub(crate) fn tool_shift(
+        &self,
+        score: &Score,
+        first: usize,
+        size: &Vector3<f64>,
+        (sensors, angles): (&ArmSensors, &JointAngles),
+    ) -> Vector3<f64> {
+        let robot = self.problem.robot;
+        let poses = robot.chain.link_poses(angles);
+        let tool_m = poses.frame(&robot.tool.mount).translation.vector;
+        let mut moved = Vector3::zeros();
+        if first < MOUNT && first / 6 < robot.tool.mount.n_joints {
+            let turned = poses.link(first / 6).rotation * size;
+            let origin = poses.joint_origin(first / 6);
+            moved += if first.is_multiple_of(6) { turned } else { turned.cross(&(tool_m - origin)) };
+        }
+        let step = score.sensitivity.columns(first, 3) * size;
+        for (column, parameter) in self.problem.layout.parameters.iter().enumerate() {
+            let joint = parameter.joint;
+            if joint < robot.tool.mount.n_joints {
+                let model = &sensors.models[joint];
+                let still = armcal_core::sensor::ConditionChange::default();
+                let travel_rad = model.travel_under_rad(angles[joint], &still);
+                let by = parameter.kind.angle_derivative(&model.spec, travel_rad, &still, 0.0);
+                moved += poses.point_jacobian(joint, &tool_m) * (by * step[column]);
+            }
+        }
+        moved
+    }
+
+    pub(crate) fn score(&self) -> Score {
         let problem = &self.problem;
         let n = problem.layout.n;
         let mut score = DVector::zeros(N_TRIALS);
@@ -244,7 +252,7 @@ impl Estimate<'_> {
 }
 
 /// First trial column, and the size in whose units it is looked at.
-fn columns(element: GeometryElement, error: ErrorKind) -> (usize, f64) {
+pub(crate) fn columns(element: GeometryElement, error: ErrorKind) -> (usize, f64) {
     let first = match element {
         GeometryElement::Joint(joint) => 6 * joint,
         GeometryElement::Mount => MOUNT,

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::calib::finding::Finding;
 use crate::calib::refusal::{Refusal, in_words};
+use crate::calib::reservation::Reservation;
 use crate::calib::result::camera_mount::CameraMount;
 use crate::calib::result::covariance_file::CovarianceTable;
 use crate::calib::result::failed_joint::{FailedJointTable, PriorTable};
@@ -53,6 +54,9 @@ pub struct Calibration {
     pub held_out: HeldOutMetrics,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub predicted_tool_error_m: Option<Summary>,
+    /// The same with what the drawing leaves open: link geometry and tool point with their priors.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub predicted_tool_error_with_priors_m: Option<Summary>,
     pub valid: ValidRange,
     /// What the joints' terms are counted from, where there are any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -82,6 +86,9 @@ pub struct Calibration {
     /// The reasons to refuse as data, the most telling first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub refusals: Vec<Refusal>,
+    /// What rests on priors alone, the largest at the tool first.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub reservations: Vec<Reservation>,
     /// What is other than robot.toml, survey and drawing say, the most telling first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub findings: Vec<Finding>,

@@ -4,5 +4,6 @@ mod calibration_prior;
 mod data;
 mod equations;
 mod failures;
+mod reservations;
 mod score_test;
 mod statistics;

@@ -1,0 +1,47 @@
+//! What a calibration rests on beside the data: elements of the geometry that no view shows.
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+use crate::calib::finding::FindingUnit;
+
+/// One element that the data do not tell, so that the answer holds only as far as its prior does.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Reservation {
+    /// The element and its axis: `camera mount, turn about y`.
+    pub what: String,
+    /// One sigma of the drawing, in `unit`.
+    pub prior_std: f64,
+    pub unit: FindingUnit,
+    /// By one sigma of the prior, root mean square over the task, m.
+    pub tool_error_m: f64,
+}
+
+impl Reservation {
+    /// Tool error by one `unit` of the element, m per m or m per rad.
+    #[must_use]
+    pub fn tool_error_per_unit(&self) -> f64 {
+        self.tool_error_m / self.prior_std
+    }
+}
+
+impl fmt::Display for Reservation {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { what, prior_std, unit, tool_error_m } = self;
+        // One unit that people measure in.
+        let (scale, name) = match unit {
+            FindingUnit::Metre => (1e3, "mm"),
+            FindingUnit::Radian => (1f64.to_degrees(), "deg"),
+            FindingUnit::One => (1.0, ""),
+        };
+        write!(
+            f,
+            "1 {name} of {what}, unseen: {:.1} mm at the tool; the drawing has {:.2} {name}: {:.1} mm",
+            1e3 * self.tool_error_per_unit() / scale,
+            prior_std * scale,
+            1e3 * tool_error_m
+        )
+    }
+}
