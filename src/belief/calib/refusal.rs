@@ -206,16 +206,6 @@ impl fmt::Display for Refusal {
                 mm(*predicted_m),
                 mm(*tolerance_m)
             ),
-            Self::PriorsBeyondTolerance { predicted_m, tolerance_m, most } => {
-                write!(
-                    f,
-                    "predicted tool error with what no view shows is {:.1} mm (95 % of the targets), the task \
-                     tolerates {:.1} mm",
-                    mm(*predicted_m),
-                    mm(*tolerance_m)
-                )?;
-                most.as_ref().map_or(Ok(()), |most| write!(f, "; most of it by the {most}"))
-            }
             Self::Geometry(geometry) => write!(f, "{geometry}"),
             Self::SensorError { joint, std_rad, datasheet_std_rad } => write!(
                 f,
@@ -243,7 +233,9 @@ impl fmt::Display for Refusal {
             Self::PriorReused => write!(f, "the prior rests on these very messages, which must not count twice"),
             Self::PriorSingular => write!(f, "the prior's covariance has no inverse"),
             Self::PriorUntested => write!(f, "the views determine too little to be tested against the prior"),
-            Self::PriorContradicted { .. } | Self::SensorFailed { .. } => self.fmt_long(f),
+            Self::PriorContradicted { .. } | Self::SensorFailed { .. } | Self::PriorsBeyondTolerance { .. } => {
+                self.fmt_long(f)
+            }
             Self::TooFewViewsSinceSlip { joint, evidence, views } => {
                 write!(f, "{joint}: {evidence}; {views} views are too few to calibrate it as it is now")
             }
@@ -279,6 +271,16 @@ impl Refusal {
                     tolerance_m * 1e3,
                     mm(*tool_error_by_camera_m)
                 )
+            }
+            Self::PriorsBeyondTolerance { predicted_m, tolerance_m, most } => {
+                write!(
+                    f,
+                    "predicted tool error with what no view shows is {:.1} mm (95 % of the targets), the task \
+                     tolerates {:.1} mm",
+                    predicted_m * 1e3,
+                    tolerance_m * 1e3
+                )?;
+                most.as_ref().map_or(Ok(()), |most| write!(f, "; most of it by the {most}"))
             }
             _ => Ok(()),
         }
