@@ -185,6 +185,32 @@ pub struct AssertSummary {
     pub holds: bool,
 }
 
+impl CalibrationSummary {
+    fn of(calibration: &Calibration, wall_s: f64) -> Self {
+        Self {
+            outcome: calibration.fit.outcome,
+            evaluations: calibration.fit.evaluations,
+            wall_s,
+            residual_rms_px: calibration.fit.rms_px,
+            residual_rms_m: calibration.fit.rms_m.is_finite().then_some(calibration.fit.rms_m),
+            cost_initial: calibration.fit.cost_initial,
+            cost_final: calibration.fit.cost_final,
+            unobservable: calibration.unobservable.clone(),
+            largest_gain_change: GainChange::largest(&calibration.joint),
+            predicted_tool_error_m: calibration.predicted_tool_error_m,
+            predicted_tool_error_with_priors_m: calibration.predicted_tool_error_with_priors_m,
+            camera_mount: calibration.camera_mount.clone(),
+            reservations: calibration.reservations.clone(),
+            findings: calibration.findings.clone(),
+            failed_joint: calibration.failed_joint.clone(),
+            prior: calibration.prior.clone(),
+            map: calibration.map.clone(),
+            observability: calibration.observability.clone(),
+            verdict: calibration.verdict.clone(),
+        }
+    }
+}
+
 impl RunSummary {
     /// The part that a calibration alone can fill.
     #[must_use]
@@ -218,27 +244,7 @@ impl RunSummary {
                 renewals: Vec::new(),
                 stop_reason: None,
             },
-            calibration: CalibrationSummary {
-                outcome: calibration.fit.outcome,
-                evaluations: calibration.fit.evaluations,
-                wall_s: calibration_wall_s,
-                residual_rms_px: calibration.fit.rms_px,
-                residual_rms_m: calibration.fit.rms_m.is_finite().then_some(calibration.fit.rms_m),
-                cost_initial: calibration.fit.cost_initial,
-                cost_final: calibration.fit.cost_final,
-                unobservable: calibration.unobservable.clone(),
-                largest_gain_change: GainChange::largest(&calibration.joint),
-                predicted_tool_error_m: calibration.predicted_tool_error_m,
-                predicted_tool_error_with_priors_m: calibration.predicted_tool_error_with_priors_m,
-                camera_mount: calibration.camera_mount.clone(),
-                reservations: calibration.reservations.clone(),
-                findings: calibration.findings.clone(),
-                failed_joint: calibration.failed_joint.clone(),
-                prior: calibration.prior.clone(),
-                map: calibration.map.clone(),
-                observability: calibration.observability.clone(),
-                verdict: calibration.verdict.clone(),
-            },
+            calibration: CalibrationSummary::of(calibration, calibration_wall_s),
             held_out: HeldOutSummary {
                 views: calibration.held_out.views,
                 cross_validated: calibration.held_out.cross_validated,

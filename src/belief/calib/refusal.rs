@@ -224,18 +224,13 @@ impl fmt::Display for Refusal {
                 "{outliers} of {observations} tag observations fit no arm of this drawing: other tags, or links that \
                  are not as in the drawing"
             ),
-            Self::Innovations { quantity, per_dof, limit, expected: [low, high] } => write!(
-                f,
-                "{}: chi-square per degree of freedom is {per_dof:.2}, above {limit:.2} (expected in 95 % of cases: \
-                 {low:.2} .. {high:.2}): views that the fit did not use are worse than it predicts",
-                quantity.name()
-            ),
             Self::PriorReused => write!(f, "the prior rests on these very messages, which must not count twice"),
             Self::PriorSingular => write!(f, "the prior's covariance has no inverse"),
             Self::PriorUntested => write!(f, "the views determine too little to be tested against the prior"),
-            Self::PriorContradicted { .. } | Self::SensorFailed { .. } | Self::PriorsBeyondTolerance { .. } => {
-                self.fmt_long(f)
-            }
+            Self::PriorContradicted { .. }
+            | Self::SensorFailed { .. }
+            | Self::PriorsBeyondTolerance { .. }
+            | Self::Innovations { .. } => self.fmt_long(f),
             Self::TooFewViewsSinceSlip { joint, evidence, views } => {
                 write!(f, "{joint}: {evidence}; {views} views are too few to calibrate it as it is now")
             }
@@ -282,6 +277,12 @@ impl Refusal {
                 )?;
                 most.as_ref().map_or(Ok(()), |most| write!(f, "; most of it by the {most}"))
             }
+            Self::Innovations { quantity, per_dof, limit, expected: [low, high] } => write!(
+                f,
+                "{}: chi-square per degree of freedom is {per_dof:.2}, above {limit:.2} (expected in 95 % of cases: \
+                 {low:.2} .. {high:.2}): views that the fit did not use are worse than it predicts",
+                quantity.name()
+            ),
             _ => Ok(()),
         }
     }
