@@ -82,7 +82,7 @@ fn a_capture_says_why_it_ended() {
     let by_error = ended("error", &[]);
     assert!(by_error.contains("predicted tool error"), "{by_error}");
     let by_poses = ended("poses", &["capture.stop_at_tool_error_m=0.0001", "capture.poses=12"]);
-    assert!(by_poses.contains("all views"), "{by_poses}");
+    assert!(by_poses.contains("all planned views"), "{by_poses}");
     let by_time = ended("time", &["capture.stop_at_tool_error_m=0.0001", "capture.max_time_s=110.0"]);
     assert!(by_time.contains("time"), "{by_time}");
 }
