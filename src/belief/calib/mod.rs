@@ -1,10 +1,10 @@
 //! BELIEF: from a recording and a nominal robot to calibrated joint sensors.
 //!
 //! `calibrate` works through the calibrations that a recording marks. `views` turns messages into views of an arm at
-//! rest; `bundle` is the default method, `methods` are the paper's; `cross_validation` and `acceptance` judge what
-//! comes out; `result` is calibration.toml. `interim` estimates during a capture. Nothing here knows of a simulator.
+//! rest; `bundle` is the default method, `methods` are the paper's; `cross_validation` and `refusal_conditions` judge
+//! what comes out; `result` is calibration.toml. `interim` estimates during a capture. Nothing here knows of a
+//! simulator.
 
-mod acceptance;
 mod angles_by_camera;
 pub mod bundle;
 mod calibrate;
@@ -19,13 +19,13 @@ mod interim;
 mod methods;
 mod parameters;
 mod refusal;
+mod refusal_conditions;
 mod reservation;
 mod result;
 mod tag_mapping;
 mod tool_error;
 mod views;
 
-pub use acceptance::{MIN_HELD_OUT_VIEWS, MIN_VIEWS_PER_PARAMETER, fewest_views};
 pub use calibrate::{MIN_VIEWS, calibrate, calibrate_data, calibrate_with_survey};
 pub use covariance::{CommonErrors, ParameterCovariance, ToolErrorPrediction};
 pub use error::CalibError;
@@ -39,6 +39,7 @@ pub use methods::{
 };
 pub use parameters::{JointParameters, Parameter, ParameterKind};
 pub use refusal::{InnovationQuantity, Refusal};
+pub use refusal_conditions::{MIN_HELD_OUT_VIEWS, MIN_VIEWS_PER_PARAMETER, fewest_views};
 pub use reservation::Reservation;
 pub use result::{
     Calibration, CalibrationFileError, CalibrationFiles, CameraMount, Check, CompactCalibration, CompactError,

@@ -2,7 +2,7 @@
 
 use super::error::EncodeError;
 use super::header::RecordingHeader;
-use super::topics::{Stream, encode_message};
+use super::message_codec::{Stream, encode_message};
 use crate::streams::Message;
 use crate::time::Stamp;
 

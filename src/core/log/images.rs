@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use super::error::LogError;
+use super::message_codec::Stream;
 use super::raw::for_each_raw;
-use super::topics::Stream;
 use crate::streams::{CameraImage, Message};
 use crate::time::Stamp;
 

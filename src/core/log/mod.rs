@@ -2,8 +2,8 @@
 //!
 //! [`RecordingWriter`] is a sink of `streams`; its bytes depend on its input only. [`read_recording`] reads recordings
 //! of simulated and real arms and reports the losses of a cut or damaged file. [`for_each_raw`] and [`decode`] read any
-//! topic of any MCAP file. The table `topics::Stream` names topic, ROS type and codec of each stream; `messages` holds
-//! the codecs. [`hash_messages`] hashes messages, not files; [`strip`] copies the messages alone.
+//! topic of any MCAP file. The table `message_codec::Stream` names topic, ROS type and codec of each stream; `messages`
+//! holds the codecs. [`hash_messages`] hashes messages, not files; [`strip`] copies the messages alone.
 
 #[macro_use]
 mod schema;
@@ -14,6 +14,7 @@ mod error;
 mod hash;
 mod header;
 mod images;
+mod message_codec;
 pub mod messages;
 mod order;
 mod raw;
@@ -31,6 +32,7 @@ pub use error::{DecodeRejection, EncodeError, LogError};
 pub use hash::{MessageHasher, hash_messages};
 pub use header::RecordingHeader;
 pub use images::for_each_image;
+pub use message_codec::Stream;
 /// The ROS types of the messages.
 pub use messages as ros;
 pub use order::{StampOrder, StampRegression};

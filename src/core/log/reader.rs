@@ -4,10 +4,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use super::error::{DecodeRejection, LogError};
+use super::message_codec::Stream;
 use super::messages::joints::FirstNames;
 use super::order::{StampOrder, StampRegression};
 use super::raw::{Completeness, RawMessage, RawSummary, for_each_raw};
-use super::topics::{Stream, VIEWER_TOPICS};
+use super::topics::VIEWER_TOPICS;
 use crate::streams::Message;
 use crate::time::Stamp;
 

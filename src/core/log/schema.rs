@@ -70,8 +70,8 @@ macro_rules! message {
 
 #[cfg(test)]
 mod tests {
+    use super::super::message_codec::Stream;
     use super::super::messages::{CameraInfo, PoseStamped, StringMessage, TfMessage};
-    use super::super::topics::Stream;
     use super::*;
 
     #[test]

@@ -17,8 +17,8 @@ use serde::Serialize;
 use super::cdr;
 use super::error::{EncodeError, LogError};
 use super::header::RecordingHeader;
+use super::message_codec::{Stream, encode_message};
 use super::schema::RosSchema;
-use super::topics::{Stream, encode_message};
 use crate::streams::{Message, Sink, SinkError};
 use crate::time::Stamp;
 

@@ -5,8 +5,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde::Serialize;
 
 use armcal_core::log::ros::{AprilTagDetectionArray, JointState, TfMessage};
-use armcal_core::log::topics::{self, Stream};
 use armcal_core::log::{RawMessage, decode};
+use armcal_core::log::{Stream, topics};
 
 /// One topic.
 #[derive(Clone, Debug, PartialEq, Serialize)]

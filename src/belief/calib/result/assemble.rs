@@ -1,10 +1,10 @@
 //! What every method's calibration.toml holds; each method adds its own tables.
 
-use crate::calib::acceptance::{AcceptanceData, refusal};
 use crate::calib::covariance::ParameterCovariance;
 use crate::calib::methods::Solution;
 use crate::calib::methods::position_problem::PositionProblem;
 use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
+use crate::calib::refusal_conditions::{AcceptanceData, refusal};
 use crate::calib::result::calibration::{Calibration, JointResult, Status};
 use crate::calib::result::covariance_file::CovarianceTable;
 use crate::calib::result::metrics::{FitMetrics, HeldOutMetrics};

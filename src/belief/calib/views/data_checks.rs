@@ -2,7 +2,7 @@
 
 use crate::calib::CalibError;
 use crate::calib::views::view::CaptureData;
-use armcal_core::log::{Recording, topics};
+use armcal_core::log::{Recording, Stream};
 use armcal_core::robot::Robot;
 
 pub(crate) fn check_joints(recording: &Recording, robot: &Robot) -> Result<(), CalibError> {
@@ -24,9 +24,9 @@ const MAX_NOT_FINITE_SHARE: f64 = 0.01;
 /// Stamps that go backwards leave open which reading belongs to which view, and numbers that are none which sensor
 /// works.
 pub(crate) fn check_order(recording: &Recording) -> Result<(), CalibError> {
-    let streams = [topics::Stream::JointSensors, topics::Stream::Detections];
+    let streams = [Stream::JointSensors, Stream::Detections];
     for stream in streams {
-        let n_read = recording.messages.iter().filter(|(_, m)| topics::Stream::of(m) == stream).count() as u64;
+        let n_read = recording.messages.iter().filter(|(_, m)| Stream::of(m) == stream).count() as u64;
         let start = format!("{}: ", stream.topic());
         for (what, &n) in &recording.rejected {
             if what.starts_with(&start)

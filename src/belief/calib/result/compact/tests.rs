@@ -140,7 +140,7 @@ fn what_is_not_finite_is_unknown_or_refused() {
 /// Each reason that the verdict can give has a code of its own.
 #[test]
 fn every_refusal_has_a_code() {
-    use crate::calib::acceptance::{AcceptanceData, refusal};
+    use crate::calib::refusal_conditions::{AcceptanceData, refusal};
     let good = AcceptanceData {
         outcome: Outcome::Converged,
         held_out_views: 8,
