@@ -25,6 +25,8 @@ pub struct AcceptanceData {
 pub const MIN_HELD_OUT_VIEWS: usize = 3;
 /// Held-out views this much worse than fitted ones mean that the fit learnt its own noise.
 const MAX_HELD_OUT_OVER_FIT: f64 = 2.5;
+/// Held-out views this good are no sign of it, however well the others fit: tags are not surveyed better, m.
+const HARMLESS_HELD_OUT_M: f64 = 0.001;
 /// Each view adds about three numbers that do not share its camera-pose error; fewer views than parameters overfit.
 pub const MIN_VIEWS_PER_PARAMETER: f64 = 1.0;
 
@@ -52,7 +54,7 @@ pub fn refusal(e: &AcceptanceData) -> Option<Refusal> {
     if held_out_m >= datasheet_m {
         return Some(Refusal::NoBetterThanDatasheet { held_out_m, datasheet_m });
     }
-    if held_out_m > MAX_HELD_OUT_OVER_FIT * e.fit_rms_m {
+    if held_out_m > HARMLESS_HELD_OUT_M.max(MAX_HELD_OUT_OVER_FIT * e.fit_rms_m) {
         return Some(Refusal::Overfitted { held_out_m, fit_m: e.fit_rms_m });
     }
     if let (Some(predicted_m), Some(tolerance_m)) = (e.predicted_tool_error_m, e.tolerance_m)
@@ -84,6 +86,8 @@ mod tests {
     #[test]
     fn each_single_fault_refuses_and_none_accepts() {
         assert_eq!(refusal(&good()), None);
+        let exact = AcceptanceData { held_out_rms_m: Some(0.0005), fit_rms_m: 0.0001, ..good() };
+        assert_eq!(refusal(&exact), None, "half a millimetre is no overfitting");
         let faults = [
             AcceptanceData { outcome: Outcome::Stalled, ..good() },
             AcceptanceData { fit_views: 8, ..good() },

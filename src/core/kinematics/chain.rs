@@ -50,11 +50,13 @@ impl Chain {
         Self { joints }
     }
 
+    #[inline]
     #[must_use]
     pub fn joints(&self) -> &[ChainJoint] {
         &self.joints
     }
 
+    #[inline]
     #[must_use]
     pub fn n_joints(&self) -> usize {
         self.joints.len()
@@ -79,6 +81,7 @@ impl Chain {
     }
 
     /// The pose of one attached frame in the base frame at `angles` (rad), to the bit that of [`Self::link_poses`].
+    #[inline]
     #[must_use]
     pub fn frame(&self, angles: &JointAngles, attachment: &Attachment) -> Isometry3<f64> {
         let mut base_from_link = Isometry3::identity();
@@ -92,24 +95,28 @@ impl Chain {
 
 impl LinkPoses {
     /// `base_from_link` of the base (0) or of the child link of joint `body - 1`.
+    #[inline]
     #[must_use]
     pub fn link(&self, body: usize) -> &Isometry3<f64> {
         &self.base_from_link[..=self.n_joints][body]
     }
 
     /// The pose of an attached frame in the base frame; the caller names it.
+    #[inline]
     #[must_use]
     pub fn frame(&self, attachment: &Attachment) -> Isometry3<f64> {
         self.link(attachment.n_joints) * attachment.link_from_frame
     }
 
     /// Axis of joint `joint` in the base frame, unit.
+    #[inline]
     #[must_use]
     pub fn axis(&self, joint: usize) -> &Vector3<f64> {
         &self.axes[..self.n_joints][joint]
     }
 
     /// Origin of joint `joint` in the base frame, m.
+    #[inline]
     #[must_use]
     pub fn joint_origin(&self, joint: usize) -> &Vector3<f64> {
         // A joint's rotation leaves its own origin where it is, so the child link's origin serves.
@@ -117,6 +124,7 @@ impl LinkPoses {
     }
 
     /// d(point)/d(angle of `joint`), m/rad, for a point (base frame) carried by that joint: `axis x (point - origin)`.
+    #[inline]
     #[must_use]
     pub fn point_jacobian(&self, joint: usize, point_m: &Vector3<f64>) -> Vector3<f64> {
         self.axis(joint).cross(&(point_m - self.joint_origin(joint)))

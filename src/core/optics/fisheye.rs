@@ -58,6 +58,7 @@ impl Fisheye {
     }
 
     /// Projects a point (camera frame, m); `None` beyond the field of view or at the camera itself.
+    #[inline]
     #[must_use]
     pub fn project(&self, point_m: &Vector3<f64>) -> Option<Vector2<f64>> {
         let r = point_m.x.hypot(point_m.y);
@@ -143,6 +144,7 @@ impl Fisheye {
     }
 
     /// Whether a pixel lies in the image.
+    #[inline]
     #[must_use]
     pub fn contains(&self, pixel_px: &Vector2<f64>) -> bool {
         let [w, h] = self.resolution_px.map(f64::from);

@@ -56,6 +56,7 @@ const SHAPE_DOMAIN: f64 = 1.25;
 /// -1..1; with the prior variances of [`shape_prior`] a Gaussian process by its eigenfunctions (Solin and Sarkka 2020,
 /// eq. 6). Constant outside.
 #[must_use]
+#[inline]
 pub fn nonlinearity_basis(x: f64) -> [f64; N_SHAPE] {
     let turn = std::f64::consts::PI * (x.clamp(-1.0, 1.0) + SHAPE_DOMAIN) / (2.0 * SHAPE_DOMAIN);
     let (sin, cos) = turn.sin_cos();

@@ -4,6 +4,7 @@ use crate::calib::bundle::calibration_prior::PriorConsistency;
 use crate::calib::bundle::estimate::{Estimate, estimate};
 use crate::calib::bundle::failure_impact::FailureImpact;
 use crate::calib::bundle::failures::Failure;
+use crate::calib::bundle::freed_tags::MovedTags;
 use crate::calib::bundle::innovations::Innovations;
 use crate::calib::bundle::input::{BundleInput, HyperparameterMode};
 use crate::calib::bundle::model_selection::Selection;
@@ -47,6 +48,8 @@ pub(crate) struct BundleCalibration<'a> {
     prior: Option<&'a Calibration>,
     map: Option<MapResult>,
     purpose: EstimatePurpose,
+    /// Tags that were freed of their survey.
+    moved: MovedTags,
 }
 
 /// Fewer views do not determine how large noise and nonlinearity are: the datasheet's figures stand.
@@ -89,7 +92,8 @@ impl<'a> BundleCalibration<'a> {
         });
         let held_out = std::mem::take(&mut data.data.held_out);
         data.data.fit.extend(held_out);
-        Ok(Self { data, prior, map, purpose })
+        let moved = MovedTags::new(&data.robot);
+        Ok(Self { data, prior, map, purpose, moved })
     }
 
     /// # Errors
@@ -100,6 +104,14 @@ impl<'a> BundleCalibration<'a> {
         let first = BundleSetup::new(&self.data.robot, &views, &declared, self.prior);
         self.check_observable(&first, &declared)?;
         let estimated = self.first_estimate(&first);
+        if self.purpose == EstimatePurpose::Final
+            && let Some((estimate, _)) = &estimated
+            && self.moved.revise(estimate, &mut self.data.robot)
+        {
+            drop(estimated);
+            self.data.data.fit = views;
+            return self.calibrate();
+        }
         let failures = match self.purpose {
             EstimatePurpose::Final => first.failures(&self.data.robot, &views, estimated.as_ref().map(|(e, _)| e)),
             EstimatePurpose::Interim => declared.clone(),
@@ -132,6 +144,7 @@ impl<'a> BundleCalibration<'a> {
                 let task = self.data.data.task.as_ref();
                 VerdictInput { input, found, innovations, task }.judge(&mut calibration);
                 self.state_reservations(estimated, &diagnosis, &mut calibration);
+                self.moved.report(&estimated.estimate, &mut calibration);
             }
         }
         Ok(calibration)

@@ -9,12 +9,11 @@
 use nalgebra::{Matrix3, Vector3};
 
 use crate::calib::bundle::estimate::Estimate;
-use crate::calib::bundle::score_test::{GeometryElement, Score, columns};
+use crate::calib::bundle::score_test::{GeometryElement, Score, ToolJacobian, columns};
 use crate::calib::finding::FindingUnit;
 use crate::calib::geometry_error::ErrorKind;
 use crate::calib::reservation::Reservation;
 use armcal_core::joints::JointAngles;
-use armcal_core::sensor::ArmSensors;
 
 /// Share of the prior's variance that the views leave, above which an element counts as unseen.
 const UNSEEN_SHARE: f64 = 0.5;
@@ -63,14 +62,14 @@ impl Estimate<'_> {
     fn held_elements(&self, task: &[JointAngles]) -> Vec<HeldElement> {
         let robot = self.problem.robot;
         let score = self.score();
-        let sensors = self.parameters().sensors(robot);
+        let tool = self.tool_jacobians(task);
         let joints = (0..robot.tool.mount.n_joints).map(GeometryElement::Joint);
         let mount = self.problem.layout.mount.map(|_| GeometryElement::Mount);
         let mut elements = Vec::new();
         for element in joints.chain(mount) {
             for error in [ErrorKind::Shift, ErrorKind::Turn] {
                 for axis in 0..3 {
-                    elements.push(self.held_element(&score, (element, error, axis), (&sensors, task)));
+                    elements.push(self.held_element(&score, (element, error, axis), &tool));
                 }
             }
         }
@@ -82,7 +81,7 @@ impl Estimate<'_> {
         &self,
         score: &Score,
         (element, error, axis): (GeometryElement, ErrorKind, usize),
-        (sensors, task): (&ArmSensors, &[JointAngles]),
+        tool: &[ToolJacobian],
     ) -> HeldElement {
         let robot = self.problem.robot;
         let (priors, camera) = (&robot.geometry, &robot.camera);
@@ -98,7 +97,7 @@ impl Estimate<'_> {
         // The mount's own prior takes part in its information.
         let share_left = if is_estimated { 1.0 - seen } else { 1.0 / (1.0 + seen) };
         let size = Vector3::ith(axis, prior_std);
-        let shifts = task.iter().map(|angles| self.tool_shift(score, first, &size, (sensors, angles))).collect();
+        let shifts = tool.iter().map(|at| at.shift(score, first, &size)).collect();
         let name = match element {
             GeometryElement::Joint(joint) => format!("the place of {}", robot.chain.joints()[joint].name),
             GeometryElement::Mount => "camera mount".to_owned(),

@@ -13,9 +13,11 @@ use crate::calib::bundle::observation_term::PoseInformation;
 use crate::calib::bundle::problem::WeightedMeasurement;
 use crate::calib::bundle::schur::{N_VIEW_PARAMETERS, SchurBlock};
 use crate::calib::geometry_error::ErrorKind;
+use crate::calib::parameters::Parameter;
 use armcal_core::joints::{JointAngles, MAX_JOINTS};
 use armcal_core::kinematics::LinkPoses;
-use armcal_core::sensor::ArmSensors;
+use armcal_core::robot::Robot;
+use armcal_core::sensor::{ArmSensors, ConditionChange};
 use armcal_core::spatial::adjoint;
 use armcal_core::stats::chi_square_above;
 
@@ -75,8 +77,9 @@ impl Estimate<'_> {
         let mut elements: Vec<GeometryElement> = (0..n_seen).map(GeometryElement::Joint).collect();
         elements.extend(self.problem.layout.mount.map(|_| GeometryElement::Mount));
         let both = elements.iter().flat_map(|&element| [(element, ErrorKind::Shift), (element, ErrorKind::Turn)]);
+        let task = self.tool_jacobians(task);
         let mut out: Vec<ScoreTestResult> =
-            both.filter_map(|(element, error)| self.score_test(&score, element, error, task)).collect();
+            both.filter_map(|(element, error)| self.score_test(&score, element, error, &task)).collect();
         out.sort_by(|a, b| a.probability.total_cmp(&b.probability).then(b.chi2.total_cmp(&a.chi2)));
         out
     }
@@ -92,7 +95,7 @@ impl Estimate<'_> {
         score: &Score,
         element: GeometryElement,
         error: ErrorKind,
-        task: &[JointAngles],
+        task: &[ToolJacobian],
     ) -> Option<ScoreTestResult> {
         let (first, unit) = columns(element, error);
         let information = score.information.fixed_view::<3, 3>(first, first).into_owned() * (unit * unit);
@@ -111,46 +114,16 @@ impl Estimate<'_> {
             return None;
         }
         let probability = chi_square_above(chi2, dof);
-        let tool_m = self.tool_shift_m(score, first, &size, task);
+        let square = |at: &ToolJacobian| at.shift(score, first, &size).norm_squared();
+        let tool_m = (task.iter().map(square).sum::<f64>() / task.len().max(1) as f64).sqrt();
         Some(ScoreTestResult { element, error, size, chi2, dof, probability, tool_m })
     }
 
-    /// How far the tool is elsewhere over `task` with the trial at `first` of `size`, the joints' parameters following.
-    fn tool_shift_m(&self, score: &Score, first: usize, size: &Vector3<f64>, task: &[JointAngles]) -> f64 {
-        let sensors = self.parameters().sensors(self.problem.robot);
-        let square = |angles: &JointAngles| self.tool_shift(score, first, size, (&sensors, angles)).norm_squared();
-        (task.iter().map(square).sum::<f64>() / task.len().max(1) as f64).sqrt()
-    }
-
-    /// The same for an arm at one configuration, base frame, m.
-    pub(crate) fn tool_shift(
-        &self,
-        score: &Score,
-        first: usize,
-        size: &Vector3<f64>,
-        (sensors, angles): (&ArmSensors, &JointAngles),
-    ) -> Vector3<f64> {
+    /// Tool and its derivatives at each configuration of `task`.
+    pub(crate) fn tool_jacobians(&self, task: &[JointAngles]) -> Vec<ToolJacobian> {
         let robot = self.problem.robot;
-        let poses = robot.chain.link_poses(angles);
-        let tool_m = poses.frame(&robot.tool.mount).translation.vector;
-        let mut moved = Vector3::zeros();
-        if first < MOUNT && first / 6 < robot.tool.mount.n_joints {
-            let turned = poses.link(first / 6).rotation * size;
-            let origin = poses.joint_origin(first / 6);
-            moved += if first.is_multiple_of(6) { turned } else { turned.cross(&(tool_m - origin)) };
-        }
-        let step = score.sensitivity.columns(first, 3) * size;
-        for (column, parameter) in self.problem.layout.parameters.iter().enumerate() {
-            let joint = parameter.joint;
-            if joint < robot.tool.mount.n_joints {
-                let model = &sensors.models[joint];
-                let still = armcal_core::sensor::ConditionChange::default();
-                let travel_rad = model.travel_under_rad(angles[joint], &still);
-                let by = parameter.kind.angle_derivative(&model.spec, travel_rad, &still, 0.0);
-                moved += poses.point_jacobian(joint, &tool_m) * (by * step[column]);
-            }
-        }
-        moved
+        let sensors = self.parameters().sensors(robot);
+        task.iter().map(|angles| ToolJacobian::new(robot, &self.problem.layout.parameters, &sensors, angles)).collect()
     }
 
     pub(crate) fn score(&self) -> Score {
@@ -248,6 +221,53 @@ impl Estimate<'_> {
         let error = if is_gripper { nalgebra::Isometry3::identity() } else { self.solved.state.camera_error[view_idx] };
         trials.fixed_view_mut::<6, 6>(0, MOUNT).copy_from(&adjoint(&error.inverse()));
         trials
+    }
+}
+
+/// The tool at one configuration, and how it moves.
+pub(crate) struct ToolJacobian {
+    poses: LinkPoses,
+    /// Base frame.
+    tool_m: Vector3<f64>,
+    /// By the estimated joints' parameters, m per unit.
+    by_parameters: Vec<Vector3<f64>>,
+    n_joints: usize,
+}
+
+impl ToolJacobian {
+    fn new(robot: &Robot, parameters: &[Parameter], sensors: &ArmSensors, angles: &JointAngles) -> Self {
+        let poses = robot.chain.link_poses(angles);
+        let tool = &robot.tool.mount;
+        let tool_m = poses.frame(tool).translation.vector;
+        let still = ConditionChange::default();
+        let travel_rad = JointAngles::from_fn(angles.len(), |j| sensors.models[j].travel_under_rad(angles[j], &still));
+        let by = |parameter: &Parameter| {
+            let joint = parameter.joint;
+            if joint >= tool.n_joints {
+                return Vector3::zeros();
+            }
+            let spec = &sensors.models[joint].spec;
+            poses.point_jacobian(joint, &tool_m) * parameter.kind.angle_derivative(spec, travel_rad[joint], &still, 0.0)
+        };
+        let by_parameters = parameters.iter().map(by).collect();
+        Self { by_parameters, tool_m, n_joints: tool.n_joints, poses }
+    }
+
+    /// Where the tool is with the trial at `first` of `size`, the joints' parameters following: beyond where it
+    /// is without, base frame, m.
+    pub(crate) fn shift(&self, score: &Score, first: usize, size: &Vector3<f64>) -> Vector3<f64> {
+        let mut moved = Vector3::zeros();
+        let joint = first / 6;
+        if first < MOUNT && joint < self.n_joints {
+            let turned = self.poses.link(joint).rotation * size;
+            let lever = self.tool_m - self.poses.joint_origin(joint);
+            moved += if first.is_multiple_of(6) { turned } else { turned.cross(&lever) };
+        }
+        let step = score.sensitivity.columns(first, 3) * size;
+        for (by, step) in self.by_parameters.iter().zip(step.iter()) {
+            moved += by * *step;
+        }
+        moved
     }
 }
 

@@ -44,6 +44,7 @@ impl Timing {
     }
 
     /// Of the straight edge between two poses as quickly as rates and flow allow, s; 0 where nothing moves.
+    #[inline]
     #[must_use]
     pub fn least_duration_s(&self, from: &JointAngles, to: &JointAngles) -> f64 {
         let (mut slowest_s, mut oil_l) = (0.0, 0.0);
@@ -56,6 +57,7 @@ impl Timing {
     }
 
     /// The set-point on an edge after `share_of_time` (0 to 1) of its duration.
+    #[inline]
     #[must_use]
     pub fn set_point(from: &JointAngles, to: &JointAngles, share_of_time: f64) -> JointAngles {
         let share = share_of_time * share_of_time * (3.0 - 2.0 * share_of_time);

@@ -4,6 +4,7 @@ mod calibration_prior;
 mod data;
 mod equations;
 mod failures;
+mod moved_tags;
 mod reservations;
 mod score_test;
 mod statistics;

@@ -22,7 +22,7 @@ const N_VIEWS: usize = 30;
 const ALPHA: f64 = 1e-3;
 
 /// `robot` with the place of `joint` in its parent link changed.
-fn with_link(robot: &Robot, joint: usize, longer_m: f64, twist: Vector3<f64>) -> Robot {
+pub(super) fn with_link(robot: &Robot, joint: usize, longer_m: f64, twist: Vector3<f64>) -> Robot {
     let mut joints = robot.chain.joints().to_vec();
     let place = &mut joints[joint].parent_from_joint;
     let along = place.translation.vector.normalize();
@@ -32,7 +32,17 @@ fn with_link(robot: &Robot, joint: usize, longer_m: f64, twist: Vector3<f64>) ->
 }
 
 /// Views of the arm `real` with sensors drawn from what is believed of `robot`.
-fn views_of(robot: &Robot, real: &Robot, seed: u64) -> (Vec<View>, Model) {
+pub(super) fn views_of(robot: &Robot, real: &Robot, seed: u64) -> (Vec<View>, Model) {
+    views_of_changed(robot, real, seed, |_| {})
+}
+
+/// The same, with the drawn truth changed.
+pub(super) fn views_of_changed(
+    robot: &Robot,
+    real: &Robot,
+    seed: u64,
+    change: impl FnOnce(&mut Truth),
+) -> (Vec<View>, Model) {
     let mut rng = rng(seed, "alarm");
     let scales = Hyperparameters::datasheet(robot);
     let mut model = Model {
@@ -46,13 +56,14 @@ fn views_of(robot: &Robot, real: &Robot, seed: u64) -> (Vec<View>, Model) {
     let noise = Noise { corner_px: 0.3, n_frames: 8, joint_rad: scales.joint_std_rad };
     let first = Truth::draw(robot, &model, &scales, &mut rng);
     model.joints = model_for(robot, &views(robot, &first, &noise, 10, &mut rng)).joints;
-    let truth = Truth::draw(robot, &model, &scales, &mut rng);
+    let mut truth = Truth::draw(robot, &model, &scales, &mut rng);
+    change(&mut truth);
     let mut views = views(real, &truth, &noise, N_VIEWS, &mut rng);
     views.iter_mut().for_each(|view| view.n_readings = 1_000_000);
     (views, model)
 }
 
-fn input<'a>(robot: &'a Robot, views: &'a [View], model: &Model) -> BundleInput<'a> {
+pub(super) fn input<'a>(robot: &'a Robot, views: &'a [View], model: &Model) -> BundleInput<'a> {
     BundleInput {
         robot,
         views,
