@@ -1,9 +1,9 @@
 //! Tags that are not where the survey has them.
 //!
-//! Each tag's pose is estimated under its survey's prior. If the survey holds, the estimate departs from it by d (on the
-//! right, m and rad) with the covariance `S - C`, S the prior's and C the posterior's: what the data moved it by. In
-//! units of the prior, over the directions of which the data tell, `d^T (S - C)^-1 d` is chi-square. A tag beyond its
-//! limit is freed of its survey if that explains more than any other error of the geometry does.
+//! Each tag's pose is estimated under its survey's prior. If the survey holds, the estimate departs from it by d (on
+//! the right, m and rad) with the covariance `S - C`, S the prior's and C the posterior's: what the data moved it by.
+//! In units of the prior, over the directions of which the data tell, `d^T (S - C)^-1 d` is chi-square. A tag beyond
+//! its limit is freed of its survey if that explains more than any other error of the geometry does.
 
 use nalgebra::{Matrix6, Vector6};
 
