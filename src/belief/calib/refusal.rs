@@ -6,6 +6,7 @@ use armcal_core::numeric::Outcome;
 use armcal_core::robot::FailedKind;
 use serde::{Deserialize, Serialize};
 
+use crate::calib::baseline_comparison::SIGNIFICANCE;
 use crate::calib::geometry_error::GeometryError;
 
 /// One reason to refuse. Angles in rad, lengths in m.
@@ -30,6 +31,12 @@ pub enum Refusal {
     NoBetterThanDatasheet {
         held_out_m: f64,
         datasheet_m: f64,
+    },
+    /// Held-out views fit no better, beyond chance, than with mount and map fitted and the datasheet's sensors.
+    NoBetterThanBaseline {
+        held_out_m: f64,
+        baseline_m: f64,
+        p_value: f64,
     },
     /// Held-out views fit much worse than fitted ones.
     Overfitted {
@@ -141,7 +148,7 @@ impl Refusal {
             Self::NotSolved { .. } => "solver",
             Self::TooFewHeldOutViews { .. } => "few_held_out",
             Self::NoHeldOutTag => "no_held_out",
-            Self::NoBetterThanDatasheet { .. } => "no_better",
+            Self::NoBetterThanDatasheet { .. } | Self::NoBetterThanBaseline { .. } => "no_better",
             Self::Overfitted { .. } => "overfitted",
             Self::BeyondTolerance { .. } | Self::PriorsBeyondTolerance { .. } => "tool_error",
             _ => "other",
@@ -155,7 +162,7 @@ impl Refusal {
             Self::TooFewViews { .. } | Self::TooFewViewsSinceSlip { .. } | Self::PriorUntested => "capture more views",
             Self::NotSolved { .. } => "capture views that move each joint over more of its range",
             Self::TooFewHeldOutViews { .. } | Self::NoHeldOutTag => "hold out more views that show tags",
-            Self::NoBetterThanDatasheet { .. } => {
+            Self::NoBetterThanDatasheet { .. } | Self::NoBetterThanBaseline { .. } => {
                 "keep the datasheet's sensors, or check tag map, camera mount and time stamps"
             }
             Self::Overfitted { .. } => "capture more views, or more different ones",
@@ -193,6 +200,13 @@ impl fmt::Display for Refusal {
                 "held-out views are no better than with the datasheet: {:.1} mm against {:.1} mm",
                 mm(*held_out_m),
                 mm(*datasheet_m)
+            ),
+            Self::NoBetterThanBaseline { held_out_m, baseline_m, p_value } => write!(
+                f,
+                "held-out views are no better than with the datasheet's sensors once camera mount and tag map are \
+                 fitted: {:.1} mm against {:.1} mm (p = {p_value:.2}, below {SIGNIFICANCE} wanted)",
+                mm(*held_out_m),
+                mm(*baseline_m)
             ),
             Self::Overfitted { held_out_m, fit_m } => write!(
                 f,

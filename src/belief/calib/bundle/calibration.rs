@@ -1,5 +1,6 @@
 //! One calibration by `bundle`, step by step: estimate, diagnose, report, judge.
 
+use crate::calib::bundle::baseline::Baseline;
 use crate::calib::bundle::calibration_prior::PriorConsistency;
 use crate::calib::bundle::estimate::{Estimate, estimate};
 use crate::calib::bundle::failure_impact::FailureImpact;
@@ -13,7 +14,7 @@ use crate::calib::bundle::setup::{BundleSetup, declared};
 use crate::calib::bundle::tables::{camera_mount_table, covariance_with_mount, map_table, model_table, prior_table};
 use crate::calib::bundle::verdict::VerdictInput;
 use crate::calib::covariance::ParameterCovariance;
-use crate::calib::cross_validation::{FOLDS, FoldSums, fold_of};
+use crate::calib::cross_validation::{FOLDS, Fold, FoldSums, fold_of};
 use crate::calib::error::CalibError;
 use crate::calib::methods::Solution;
 use crate::calib::methods::observability::{Unobservable, grouped_names};
@@ -142,7 +143,8 @@ impl<'a> BundleCalibration<'a> {
                 let input = &BundleInput { views: &diagnosis.views, ..estimated.setup.input() };
                 let (found, innovations) = (&estimated.estimate, &diagnosis.innovations[..]);
                 let task = self.data.data.task.as_ref();
-                VerdictInput { input, found, innovations, task }.judge(&mut calibration);
+                let covariance = &diagnosis.covariance;
+                VerdictInput { input, found, innovations, covariance, task }.judge(&mut calibration);
                 self.state_reservations(estimated, &diagnosis, &mut calibration);
                 self.moved.report(&estimated.estimate, &mut calibration);
             }
@@ -178,7 +180,7 @@ impl<'a> BundleCalibration<'a> {
         // Held-out views of a freed joint are linearized where the camera saw it.
         let input = BundleInput { views: &views, ..setup.input() };
         let (held_out, innovations) = match self.purpose {
-            EstimatePurpose::Final => cross_validated(&input, estimate),
+            EstimatePurpose::Final => cross_validated(&input, estimate, &setup.applied.robot),
             EstimatePurpose::Interim => (FoldSums::default().metrics(), Vec::new()),
         };
         let parameters = estimate.joint_parameters().to_vec();
@@ -358,9 +360,15 @@ fn unobservable(robot: &Robot, setup: &BundleSetup, estimate: &Estimate<'_>) -> 
     missing.map(Unobservable::distal).chain(setup.unobservable()).collect()
 }
 
-/// Held-out views by what was estimated from the other folds, with the hyperparameters of all.
-fn cross_validated(input: &BundleInput<'_>, all: &Estimate<'_>) -> (HeldOutMetrics, Vec<Innovations>) {
+/// Held-out views by what was estimated from the other folds, with the hyperparameters of all; and by mount and map
+/// alone about `datasheet`.
+fn cross_validated(
+    input: &BundleInput<'_>,
+    all: &Estimate<'_>,
+    datasheet: &Robot,
+) -> (HeldOutMetrics, Vec<Innovations>) {
     let mut sums = FoldSums::default();
+    let baseline = Baseline::new(datasheet, input.views);
     let mut innovations = Vec::new();
     for fold in 0..FOLDS {
         let (fitted, held_out) = fold_of(input.views, fold);
@@ -375,7 +383,13 @@ fn cross_validated(input: &BundleInput<'_>, all: &Estimate<'_>) -> (HeldOutMetri
         let with_places: Vec<(usize, View)> =
             held_out.iter().enumerate().map(|(n, view)| (n * FOLDS + fold, view.clone())).collect();
         innovations.extend(found.innovations(&part, &with_places, &all.outliers));
-        sums.add(&held_out, &found.as_found(input.robot), &found.parameters(), input.robot);
+        sums.add(&Fold {
+            views: &held_out,
+            as_found: &found.as_found(input.robot),
+            at: &found.parameters(),
+            nominal: input.robot,
+            baseline: baseline.as_ref().and_then(|baseline| baseline.fit(datasheet, &fitted)).as_ref(),
+        });
     }
     (sums.metrics(), innovations)
 }

@@ -5,6 +5,7 @@
 //! parameters eliminated, `solve` is Levenberg-Marquardt; `evidence` fits noise and prior sizes, `select` decides on
 //! doubtful terms; `estimate` is the way from a robust start to the answer.
 
+pub(crate) mod baseline;
 pub(crate) mod calibration;
 mod calibration_prior;
 mod estimate;

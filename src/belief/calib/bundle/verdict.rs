@@ -1,12 +1,13 @@
 //! Whether joint sensors explain the data of a calibration by `bundle`: score test of the link geometry, size of the
 //! sensors' errors, outliers, and innovations of held-out views.
 
+use crate::calib::baseline_comparison::SIGNIFICANCE;
 use crate::calib::bundle::estimate::Estimate;
 use crate::calib::bundle::innovations::{Innovations, JointInnovation};
 use crate::calib::bundle::input::BundleInput;
 use crate::calib::bundle::observability::{Observability, observability};
 use crate::calib::bundle::score_test::{GeometryElement, ScoreTestResult};
-use crate::calib::covariance::task_angles;
+use crate::calib::covariance::{ParameterCovariance, task_angles};
 use crate::calib::finding::{Finding, FindingKind, FindingUnit};
 use crate::calib::geometry_error::{ErrorKind, GeometryError};
 use crate::calib::parameters::ParameterKind;
@@ -16,6 +17,7 @@ use crate::calib::result::validity::not_covered;
 use crate::calib::result::verdict_tables::{Check, ObservabilityTable, VerdictTable};
 use armcal_core::joints::JointAngles;
 use armcal_core::robot::Robot;
+use armcal_core::sensor::ConditionChange;
 use armcal_core::stats::chi_square_quantile;
 use armcal_core::streams::ReachTask;
 
@@ -25,6 +27,8 @@ pub(crate) struct VerdictInput<'a> {
     pub found: &'a Estimate<'a>,
     /// Of each fold.
     pub innovations: &'a [Innovations],
+    /// Of the sensors' parameters.
+    pub covariance: &'a ParameterCovariance,
     pub task: Option<&'a ReachTask>,
 }
 
@@ -39,6 +43,10 @@ const MAX_OVER_LINEARITY: f64 = 3.0;
 /// Gains and offsets farther from the datasheet than this are no calibration any more; the paper's methods stop there,
 /// too.
 const MAX_SIGMAS_OFF: f64 = 6.0;
+/// Sensors that move the tool by more than this many times its predicted error claim more than chance.
+const MAX_UNCONFIRMED: f64 = 3.0;
+/// Held-out views this much farther off than with mount and map alone, and beyond chance, refute a calibration.
+const MAX_OVER_BASELINE: f64 = 1.1;
 /// Share of the tag observations that may be outliers.
 const MAX_OUTLIERS: f64 = 0.25;
 /// Over chi-square's quantile, for pixel noise has longer tails than a normal one and the tags' corners common errors.
@@ -59,6 +67,7 @@ impl VerdictInput<'_> {
         let mut table = VerdictTable { warnings: Vec::new(), not_covered: Vec::new(), checks: Vec::new() };
         let refusals = [
             self.geometry(&configurations, calibration, &mut table),
+            self.baseline(&configurations, calibration, &mut table),
             self.sensors(calibration, &mut table),
             self.beyond_datasheet(&mut table),
             self.outliers(calibration, &mut table),
@@ -111,6 +120,60 @@ impl VerdictInput<'_> {
             table.checks.push(check);
         }
         refusal
+    }
+
+    /// Whether the views confirm what the sensors are changed by: held-out views fit better than with mount and map
+    /// alone, or the change is no larger than the predicted error.
+    fn baseline(
+        &self,
+        configurations: &[JointAngles],
+        calibration: &Calibration,
+        table: &mut VerdictTable,
+    ) -> Option<Refusal> {
+        let (held_out_m, baseline) = calibration.held_out.rms_m.zip(calibration.held_out.baseline)?;
+        let change = self.change_at_tool(configurations);
+        let is_worse = baseline.p_value > 1.0 - SIGNIFICANCE && baseline.ratio > MAX_OVER_BASELINE;
+        table.checks.push(Check {
+            what: "held out against mount and map alone: probability that it is no better".to_owned(),
+            value: baseline.p_value,
+            limit: SIGNIFICANCE,
+            holds: baseline.is_beaten(),
+        });
+        if baseline.is_beaten() {
+            return None;
+        }
+        let check = Check::at_most("change at the tool over its predicted error", change, MAX_UNCONFIRMED);
+        let refusal =
+            Refusal::NoBetterThanBaseline { held_out_m, baseline_m: baseline.rms_m, p_value: baseline.p_value };
+        let is_refused = !check.holds || is_worse;
+        table.checks.push(check);
+        if is_refused {
+            return Some(refusal);
+        }
+        table.warnings.push(format!(
+            "the datasheet's sensors explain the held-out views as well: {:.1} mm once mount and map are fitted, {:.1} \
+             mm with sensors calibrated; they need no calibration that these views could show",
+            1e3 * baseline.rms_m,
+            1e3 * held_out_m
+        ));
+        None
+    }
+
+    /// How far the estimated sensors move the tool from where the datasheet has it at the same readings, over the
+    /// predicted error; root mean squares over the configurations.
+    fn change_at_tool(&self, configurations: &[JointAngles]) -> f64 {
+        let robot = self.input.robot;
+        let sensors = self.found.parameters().sensors(robot);
+        let tool = |angles: &JointAngles| robot.chain.link_poses(angles).frame(&robot.tool.mount).translation.vector;
+        let (mut moved_m2, mut predicted_m2) = (0.0, 0.0);
+        for angles in configurations {
+            let by_datasheet = JointAngles::from_fn(angles.len(), |j| {
+                robot.sensors[j].center_rad + sensors.models[j].travel_under_rad(angles[j], &ConditionChange::default())
+            });
+            moved_m2 += (tool(angles) - tool(&by_datasheet)).norm_squared();
+            predicted_m2 += self.covariance.tool_position_m2(robot, &sensors, angles).trace().max(0.0);
+        }
+        (moved_m2 / predicted_m2).sqrt()
     }
 
     /// Whether the joints' errors are those of such sensors.
