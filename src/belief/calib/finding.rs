@@ -28,6 +28,7 @@ pub struct Finding {
 #[serde(rename_all = "snake_case")]
 pub enum FindingKind {
     TagMoved,
+    Lens,
     Link,
     CameraMount,
     Base,

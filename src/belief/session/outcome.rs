@@ -1,6 +1,7 @@
 //! What a run leaves, as far as the arm itself can tell.
 
 use crate::calib::Calibration;
+use armcal_core::kinematics::LinkCorrections;
 use armcal_core::routine::AssertFigure;
 use armcal_core::sensor::ArmSensors;
 use armcal_core::streams::{JointAngles, ReachAttempt};
@@ -44,6 +45,14 @@ pub struct Epoch {
     pub sensors: ArmSensors,
     /// Where they come from; `None` for the datasheet.
     pub calibration: Option<Calibration>,
+}
+
+impl Epoch {
+    /// The links believed in, beyond the drawing.
+    #[must_use]
+    pub fn links(&self) -> LinkCorrections {
+        self.calibration.as_ref().map(Calibration::link_corrections).unwrap_or_default()
+    }
 }
 
 /// A captured view, and what was believed just before it.

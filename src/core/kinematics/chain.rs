@@ -3,6 +3,7 @@
 use nalgebra::{Isometry3, Unit, UnitQuaternion, Vector3};
 
 use crate::joints::{JointAngles, MAX_JOINTS};
+use crate::kinematics::link_correction::LinkCorrections;
 
 /// Joint range, rad.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -65,6 +66,31 @@ impl Chain {
     /// Poses of all links at `angles` (rad).
     #[must_use]
     pub fn link_poses(&self, angles: &JointAngles) -> LinkPoses {
+        self.link_poses_by(angles, |_, joint| joint.parent_from_joint)
+    }
+
+    /// The same for the arm with `corrections` of its drawing.
+    #[must_use]
+    pub fn corrected_link_poses(&self, angles: &JointAngles, corrections: &LinkCorrections) -> LinkPoses {
+        self.link_poses_by(angles, |i, joint| corrections[i].applied_to(&joint.parent_from_joint))
+    }
+
+    /// The chain with `corrections` of its drawing.
+    #[must_use]
+    pub fn corrected(&self, corrections: &LinkCorrections) -> Self {
+        let mut joints = self.joints.clone();
+        for (joint, correction) in joints.iter_mut().zip(corrections) {
+            joint.parent_from_joint = correction.applied_to(&joint.parent_from_joint);
+        }
+        Self { joints }
+    }
+
+    #[inline]
+    fn link_poses_by(
+        &self,
+        angles: &JointAngles,
+        parent_from_joint: impl Fn(usize, &ChainJoint) -> Isometry3<f64>,
+    ) -> LinkPoses {
         debug_assert_eq!(angles.len(), self.joints.len());
         let mut poses = LinkPoses {
             n_joints: self.joints.len(),
@@ -72,7 +98,7 @@ impl Chain {
             axes: [Vector3::zeros(); MAX_JOINTS],
         };
         for (i, (joint, &angle_rad)) in self.joints.iter().zip(angles.iter()).enumerate() {
-            let base_from_joint = poses.base_from_link[i] * joint.parent_from_joint;
+            let base_from_joint = poses.base_from_link[i] * parent_from_joint(i, joint);
             poses.axes[i] = base_from_joint.rotation * joint.axis.into_inner();
             // The frames change inside the recursion, so it runs on raw isometries; callers name the frames.
             poses.base_from_link[i + 1] = base_from_joint * UnitQuaternion::from_axis_angle(&joint.axis, angle_rad);

@@ -194,7 +194,9 @@ pub fn log(isometry: &Isometry3<f64>) -> Vector6<f64> {
     Vector6::new(rho.x, rho.y, rho.z, phi.x, phi.y, phi.z)
 }
 
-fn left_jacobian(phi: &Vector3<f64>) -> Matrix3<f64> {
+/// Left Jacobian of SO(3): `exp(phi + d) = exp(J d) exp(phi)` for small d (Sola et al. 2018, eq. 145).
+#[must_use]
+pub fn left_jacobian(phi: &Vector3<f64>) -> Matrix3<f64> {
     let angle = phi.norm();
     if angle < 1e-6 {
         return Matrix3::identity() + 0.5 * skew(phi);

@@ -109,7 +109,7 @@ impl CalibrationPrior {
                 scales.joint_std_rad[parameter.joint] = std_rad[parameter.joint].max(1e-5);
             }
         }
-        let model = model(applied, &guess.reference, &known.parameters);
+        let model = Model { n_links: prior.link.len(), ..model(applied, &guess.reference, &known.parameters) };
         let mount = prior.camera_mount.as_ref().and_then(|table| Some((table.link_from_camera()?, mount_rows(prior)?)));
         let mount = mount.filter(|_| model.mount);
         if let Some((link_from_camera, rows)) = &mount {
@@ -120,9 +120,7 @@ impl CalibrationPrior {
             };
             (robot.camera.mount_std_m, robot.camera.mount_std_rad) = (rms(0), rms(3));
         }
-        let parameters: Vec<Parameter> = (0..robot.n_joints())
-            .flat_map(|joint| model.joints[joint].iter().map(move |&kind| Parameter { joint, kind }))
-            .collect();
+        let parameters = model.parameters();
         let elapsed_h = elapsed_h(prior, views);
         let mount = mount.map(|(_, rows)| rows);
         let columns = PriorColumns { robot: &robot, scales: &scales, parameters: &parameters, mount };
@@ -157,12 +155,7 @@ impl CalibrationPrior {
 
     /// Gains and offsets that the prior knows no better than half as well as the datasheet.
     pub fn n_unknown(&self, datasheet: &Robot) -> usize {
-        let parameters = self
-            .model
-            .joints
-            .iter()
-            .enumerate()
-            .flat_map(|(joint, kinds)| kinds.iter().map(move |&kind| Parameter { joint, kind }));
+        let parameters = self.model.parameters().into_iter();
         let is_unknown = |(k, p): &(usize, Parameter)| {
             matches!(p.kind, ParameterKind::Gain | ParameterKind::Offset)
                 && self.covariance[(*k, *k)].sqrt() > 0.5 * p.prior_std(datasheet)

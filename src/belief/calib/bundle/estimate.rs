@@ -7,7 +7,7 @@ use crate::calib::bundle::evidence::{Posterior, change, joint_info, updated};
 use crate::calib::bundle::input::{BundleInput, HyperparameterMode};
 use crate::calib::bundle::model::{Hyperparameters, Model};
 use crate::calib::bundle::outliers::{Outlier, outliers, reject};
-use crate::calib::bundle::priors::prior;
+use crate::calib::bundle::priors::{mount_std, prior};
 use crate::calib::bundle::problem::{BundleProblem, State, WeightedMeasurement, parameters_of};
 use crate::calib::bundle::robust_start::{robust_start, straight_sensor_std};
 use crate::calib::bundle::solve::{LOOSE, Solved, TIGHT, solve, until};
@@ -69,6 +69,7 @@ pub fn estimate<'a>(input: &BundleInput<'a>) -> Option<Estimate<'a>> {
                 problem.scales = next;
                 if input.joint_prior.is_none() {
                     problem.prior.joint_info = joint_info(&problem, &problem.scales);
+                    problem.prior.mount_std = mount_std(input.robot, &problem.scales);
                 }
             }
         }
@@ -232,7 +233,7 @@ impl Estimate<'_> {
     #[must_use]
     pub fn as_found(&self, robot: &Robot) -> Robot {
         let (mount, covariance) = self.mount();
-        let mut found = robot.clone().with_camera_at(mount, &covariance);
+        let mut found = self.parameters().with_links(robot.clone()).with_camera_at(mount, &covariance);
         for (tag_idx, tag) in found.tags.iter_mut().enumerate() {
             let (pose, covariance) = self.tag(tag_idx);
             tag.base_from_tag = Pose::from_isometry(pose);

@@ -10,6 +10,7 @@ use crate::calib::reservation::Reservation;
 use crate::calib::result::camera_mount::CameraMount;
 use crate::calib::result::covariance_file::CovarianceTable;
 use crate::calib::result::failed_joint::{FailedJointTable, PriorTable};
+use crate::calib::result::link_table::LinkResult;
 use crate::calib::result::map_table::MapResult;
 use crate::calib::result::metrics::{FitMetrics, HeldOutMetrics};
 use crate::calib::result::model_table::ModelTable;
@@ -77,6 +78,9 @@ pub struct Calibration {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub model: Option<ModelTable>,
     pub joint: Vec<JointResult>,
+    /// Joints' places on their parent links, where the data asked for others than the drawing's.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub link: Vec<LinkResult>,
     /// Joints that failed, or whose sensors did.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub failed_joint: Vec<FailedJointTable>,
