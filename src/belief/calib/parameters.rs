@@ -12,7 +12,9 @@ use armcal_core::streams::MAX_JOINTS;
 /// Gain (dimensionless, 1 = datasheet) and offset (rad) of every joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointParameters {
+    /// Factor on the nominal travel, base first; 1 beyond the arm's joints.
     pub gain: [f64; MAX_JOINTS],
+    /// Added to the angle, base first.
     pub offset_rad: [f64; MAX_JOINTS],
     /// Zero under methods that estimate straight sensors.
     pub terms: [Terms; MAX_JOINTS],
@@ -35,6 +37,7 @@ impl Default for JointParameters {
 }
 
 impl JointParameters {
+    /// Value in the parameter's own unit.
     #[must_use]
     pub fn get(&self, parameter: Parameter) -> f64 {
         match parameter.kind {
@@ -51,6 +54,7 @@ impl JointParameters {
         }
     }
 
+    /// Sets the value in the parameter's own unit.
     pub fn set(&mut self, parameter: Parameter, value: f64) {
         match parameter.kind {
             ParameterKind::Gain => self.gain[parameter.joint] = value,
@@ -66,6 +70,7 @@ impl JointParameters {
         }
     }
 
+    /// All parameters of one joint.
     #[must_use]
     pub fn correction(&self, joint: usize) -> Correction {
         Correction { gain: self.gain[joint], offset_rad: self.offset_rad[joint], terms: self.terms[joint] }
@@ -98,16 +103,24 @@ impl JointParameters {
     }
 }
 
+/// What a parameter of a joint sensor acts on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum ParameterKind {
+    /// Factor on the nominal travel.
     Gain,
+    /// Added to the angle, rad.
     Offset,
     /// A coefficient of the nonlinearity, 0 .. [`N_SHAPE`](armcal_core::sensor::N_SHAPE).
     Shape(u8),
+    /// Change of the offset with the oil temperature, rad/K.
     OffsetPerK,
+    /// Change of the gain with the oil temperature, 1/K.
     GainPerK,
+    /// Change of the offset with the ambient pressure, rad/MPa.
     OffsetPerMpa,
+    /// Change of the offset with time, rad/h.
     DriftPerH,
+    /// Half of the backlash between joint and sensor shaft, rad.
     HalfBacklash,
     /// Of the joint's origin along an axis of its parent link, m.
     LinkShift(u8),
@@ -167,7 +180,9 @@ const AXES: [&str; 3] = ["x", "y", "z"];
 /// One number that may be estimated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Parameter {
+    /// Index of the joint, base first.
     pub joint: usize,
+    /// Which of its parameters.
     pub kind: ParameterKind,
 }
 

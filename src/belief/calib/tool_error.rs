@@ -24,7 +24,7 @@ impl ParameterCovariance {
     /// Covariance of the tool's position (base frame, m^2) for an arm at `angles` under `conditions`.
     ///
     /// Estimated parameters enter with their covariance, the others with the datasheet's sigma, and every sensor with
-    /// what its parameters leave ([`Self::residual_std_rad`]) and its play.
+    /// what its parameters leave (`residual_std_rad`) and its play.
     #[must_use]
     pub fn tool_position_under_m2(
         &self,

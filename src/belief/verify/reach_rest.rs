@@ -14,10 +14,15 @@ use armcal_core::time::Stamp;
 /// The arm at rest for one target.
 #[derive(Clone, Debug)]
 pub struct ReachRest {
+    /// From the mark: before or after a calibration was believed in.
     pub attempt: ReachAttempt,
+    /// Number of the task's target, from 0.
     pub target_idx: usize,
+    /// Position of the target, base frame.
     pub target_m: [f64; 3],
+    /// Start of the mark, by the joint sensors' clock.
     pub start: Stamp,
+    /// End of the mark.
     pub end: Stamp,
     /// Over the mark, as far as the recording tells.
     pub conditions: Conditions,
@@ -30,7 +35,9 @@ pub struct ReachRest {
 /// What the arm believed of itself from a stamp on.
 #[derive(Clone, Copy, Debug)]
 pub struct Belief<'a> {
+    /// When the belief began.
     pub from: Stamp,
+    /// The sensors believed in.
     pub sensors: &'a ArmSensors,
     /// Beyond the drawing.
     pub links: LinkCorrections,

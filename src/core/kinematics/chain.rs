@@ -8,16 +8,22 @@ use crate::kinematics::link_correction::LinkCorrections;
 /// Joint range, rad.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointLimits {
+    /// Smallest angle.
     pub lower_rad: f64,
+    /// Largest angle.
     pub upper_rad: f64,
 }
 
 /// One moving joint: fixed transform from the parent joint's link frame, then a rotation about `axis`.
 #[derive(Clone, Debug)]
 pub struct ChainJoint {
+    /// Name of the joint in the URDF.
     pub name: String,
+    /// Name of the link that it moves.
     pub child_link: String,
+    /// Pose of the joint's frame at angle zero in the frame of the parent link.
     pub parent_from_joint: Isometry3<f64>,
+    /// Axis of rotation in the joint's frame; angles count by the right-hand rule.
     pub axis: Unit<Vector3<f64>>,
     /// `None` for a continuous joint.
     pub limits: Option<JointLimits>,
@@ -26,7 +32,9 @@ pub struct ChainJoint {
 /// A frame fixed to the link behind the first `n_joints` joints (0: the base).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Attachment {
+    /// Number of joints proximal to the link.
     pub n_joints: usize,
+    /// Pose of the frame in the link's frame.
     pub link_from_frame: Isometry3<f64>,
 }
 
@@ -46,17 +54,20 @@ pub struct LinkPoses {
 }
 
 impl Chain {
+    /// A chain of these joints, base first; at most `MAX_JOINTS`.
     pub fn new(joints: Vec<ChainJoint>) -> Self {
         assert!(joints.len() <= MAX_JOINTS, "readers of files check the number of joints");
         Self { joints }
     }
 
+    /// The joints, base first.
     #[inline]
     #[must_use]
     pub fn joints(&self) -> &[ChainJoint] {
         &self.joints
     }
 
+    /// Number of moving joints.
     #[inline]
     #[must_use]
     pub fn n_joints(&self) -> usize {

@@ -45,7 +45,9 @@ const Z_OF_JOINTS: f64 = 3.9;
 pub struct CalibrationPrior {
     /// With the camera where the prior found it.
     pub robot: Robot,
+    /// What the new views tell, and all that the prior knows.
     pub model: Model,
+    /// The datasheet's, with the prior's error from view to view.
     pub scales: Hyperparameters,
     /// The prior's values and reference.
     pub guess: JointParameters,
@@ -60,18 +62,24 @@ pub struct CalibrationPrior {
 /// Whether prior and views can both be right.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PriorConsistency {
+    /// Square of the estimate's move from the prior under its covariance.
     pub chi2: f64,
+    /// Number of directions that the views tell enough of to be tested.
     pub degrees_of_freedom: usize,
     /// The 0.999 quantile.
     pub limit: f64,
     /// The joint that is off the most in its own sigma, by how much on average over the views, and that sigma, rad.
     pub joint: usize,
+    /// See `joint`; positive where the new views put the angle above the prior's.
     pub off_rad: f64,
+    /// See `joint`.
     pub off_std_rad: f64,
+    /// Share of the observations that a fit under the widened prior uses.
     pub used_share: f64,
 }
 
 impl PriorConsistency {
+    /// Whether move, joint or share of used observations is beyond what happens by chance.
     pub fn is_beyond_chance(&self) -> bool {
         // Not a number is no agreement.
         !(self.chi2 <= self.limit

@@ -19,6 +19,7 @@ pub struct Model {
     pub lens: bool,
     /// The tags' poses, about the survey's.
     pub tags: bool,
+    /// Pose of the tag on the gripper, about the drawing's.
     pub gripper_tag: bool,
     /// How much later the joint sensors' stamps are than the camera's.
     pub time_offset: bool,
@@ -33,10 +34,15 @@ pub struct Hyperparameters {
     pub free_joint_std_rad: f64,
     /// Size of each sensor's nonlinearity.
     pub shape_std_rad: [f64; MAX_JOINTS],
+    /// Change of an offset with the oil temperature.
     pub offset_std_rad_per_k: f64,
+    /// Change of a gain with the oil temperature.
     pub gain_std_per_k: f64,
+    /// Change of an offset with the ambient pressure.
     pub offset_std_rad_per_mpa: f64,
+    /// Drift of an offset.
     pub drift_std_rad_per_h: f64,
+    /// Half of the backlash between joint and sensor shaft.
     pub half_play_std_rad: f64,
     /// Of each joint's place on its parent link: shift m, turn rad.
     pub link_std: [[f64; 2]; MAX_JOINTS],
@@ -46,6 +52,7 @@ pub struct Hyperparameters {
     pub noise: f64,
     /// Of positions and poses that a recording gives in place of corners.
     pub position_std_m: f64,
+    /// Of poses that a recording gives in place of corners.
     pub rotation_std_rad: f64,
     /// The error that all tags of a view share (positions by SLAM have it): translation m, rotation rad. `None`: there
     /// is none.

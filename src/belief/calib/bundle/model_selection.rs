@@ -19,14 +19,18 @@ use crate::calib::views::view::TagMeasurement;
 pub enum OptionalTerm {
     /// An error of the camera's pose that all tags of a view share.
     CameraError,
+    /// Between the clocks of joint sensors and camera; only where joints move.
     TimeOffset,
+    /// Of every joint's offset; only in long sessions without a prior.
     Drift,
 }
 
 /// Whether a doubtful term came in, and what it brought.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Selection {
+    /// The term that was tried.
     pub term: OptionalTerm,
+    /// Whether it stayed.
     pub is_in: bool,
     /// Natural logarithm of the evidence with it over that without.
     pub gain_nats: f64,

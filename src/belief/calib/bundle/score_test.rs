@@ -30,7 +30,7 @@ const SIZE_RAD: f64 = 0.0175;
 const N_TRIALS: usize = 6 * MAX_JOINTS + 6;
 const MOUNT: usize = 6 * MAX_JOINTS;
 
-/// A element of the geometry that is tested.
+/// An element of the geometry that is tested.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum GeometryElement {
     /// Where the joint sits on its parent link.
@@ -42,11 +42,15 @@ pub enum GeometryElement {
 /// What one change of the geometry would explain.
 #[derive(Clone, Debug)]
 pub struct ScoreTestResult {
+    /// The element that would be elsewhere.
     pub element: GeometryElement,
+    /// Shifted or turned.
     pub error: ErrorKind,
     /// What the data ask for, in the parent link's frame (the camera's for the mount): m or rad.
     pub size: Vector3<f64>,
+    /// Chi-square of the score, where the model holds.
     pub chi2: f64,
+    /// Number of directions that the data tell enough of, 1 to 3.
     pub dof: usize,
     /// That chance alone makes chi2 as large.
     pub probability: f64,

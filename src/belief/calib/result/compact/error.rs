@@ -5,6 +5,7 @@ use armcal_core::streams::MAX_JOINTS;
 
 /// Why a calibration has no compact form, or a text is none.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[expect(missing_docs, reason = "each variant's message says what it is")]
 pub enum CompactError {
     #[error("no compact calibration: it does not begin with `armcal1` or `armcal2`")]
     NotCompact,
