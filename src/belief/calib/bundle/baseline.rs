@@ -27,6 +27,7 @@ impl Baseline {
     pub(crate) fn new(robot: &Robot, views: &[View]) -> Option<Self> {
         let model = Model {
             joints: vec![Vec::new(); robot.n_joints()],
+            n_links: 0,
             mount: robot.camera.mount_std_m > 0.0 || robot.camera.mount_std_rad > 0.0,
             lens: false,
             tags: true,

@@ -8,6 +8,8 @@
 pub(crate) mod baseline;
 pub(crate) mod calibration;
 mod calibration_prior;
+mod drawing;
+mod drawing_report;
 mod estimate;
 mod evidence;
 mod failure_detection;
@@ -18,6 +20,7 @@ mod freed_tags;
 mod innovations;
 mod input;
 mod linearize;
+mod link_columns;
 mod model;
 mod model_selection;
 mod moved_tags;

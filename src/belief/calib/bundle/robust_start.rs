@@ -30,6 +30,7 @@ pub(crate) fn robust_start(input: &BundleInput<'_>) -> (JointParameters, usize) 
     };
     let model = Model {
         joints: input.model.joints.iter().enumerate().map(of_joint).collect(),
+        n_links: 0,
         mount: false,
         lens: false,
         tags: false,

@@ -3,6 +3,7 @@
 mod baseline;
 mod calibration_prior;
 mod data;
+mod drawing;
 mod equations;
 mod failures;
 mod moved_tags;
