@@ -85,6 +85,24 @@ pub enum Refusal {
         /// The datasheet's linearity.
         datasheet_std_rad: f64,
     },
+    /// A sensor is farther from a straight line than one of its datasheet can be.
+    Nonlinearity {
+        /// The joint's name.
+        joint: String,
+        /// Fitted size of the nonlinearity.
+        std_rad: f64,
+        /// Linearity by the datasheet.
+        datasheet_std_rad: f64,
+    },
+    /// Corners are farther off than the stated noise explains.
+    CornerNoise {
+        /// Of corners averaged over a view.
+        residual_px: f64,
+        /// Of one frame, by robot.toml.
+        stated_px: f64,
+        /// Largest residual that is accepted.
+        limit_px: f64,
+    },
     /// A gain or offset that no sensor of this datasheet has.
     BeyondDatasheet {
         /// Name of the parameter: `shoulder_yaw gain`.
@@ -219,7 +237,10 @@ impl Refusal {
             }
             Self::BeyondTolerance { .. } => "capture more views, or put a tag on the gripper",
             Self::Geometry(_) => "check the drawing against the arm",
-            Self::SensorError { .. } | Self::SensorFailed { .. } => "check that joint's sensor",
+            Self::CornerNoise { .. } => "check lens, corner noise and tag sizes in robot.toml, and the tag map",
+            Self::SensorError { .. } | Self::Nonlinearity { .. } | Self::SensorFailed { .. } => {
+                "check that joint's sensor"
+            }
             Self::BeyondDatasheet { .. } => "check joint and sensor, and robot.toml against the sensor that is there",
             Self::Outliers { .. } => "check tag map, tag ids and the drawing",
             Self::Innovations { .. } => "look for what moved or warmed up during the capture",
@@ -292,6 +313,8 @@ impl fmt::Display for Refusal {
             Self::PriorContradicted { .. }
             | Self::SensorFailed { .. }
             | Self::PriorsBeyondTolerance { .. }
+            | Self::Nonlinearity { .. }
+            | Self::CornerNoise { .. }
             | Self::Innovations { .. } => self.fmt_long(f),
             Self::TooFewViewsSinceSlip { joint, evidence, views } => {
                 write!(f, "{joint}: {evidence}; {views} views are too few to calibrate it as it is now")
@@ -329,6 +352,19 @@ impl Refusal {
                     mm(*tool_error_by_camera_m)
                 )
             }
+            Self::Nonlinearity { joint, std_rad, datasheet_std_rad } => write!(
+                f,
+                "{joint} is farther from a straight line than a sensor of its datasheet: {:.2} deg, {:.1} times the \
+                 datasheet's {:.2} deg",
+                std_rad.to_degrees(),
+                std_rad / datasheet_std_rad,
+                datasheet_std_rad.to_degrees()
+            ),
+            Self::CornerNoise { residual_px, stated_px, limit_px } => write!(
+                f,
+                "the model does not explain the corners: averaged over a view they are {residual_px:.2} px off, above \
+                 {limit_px:.2} px; robot.toml has {stated_px:.2} px for one frame"
+            ),
             Self::PriorsBeyondTolerance { predicted_m, tolerance_m, most } => {
                 write!(
                     f,

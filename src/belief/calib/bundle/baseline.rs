@@ -25,6 +25,24 @@ const SETTLED: f64 = 0.8;
 impl Baseline {
     /// `None` where the views determine nothing.
     pub(crate) fn new(robot: &Robot, views: &[View]) -> Option<Self> {
+        let (mut baseline, usual) = (Self::start(robot), Hyperparameters::datasheet(robot));
+        for _ in 0..MAX_PASSES {
+            let mut next = baseline.estimate(robot, views, HyperparameterMode::Fitted)?.scales().clone();
+            for (std_rad, usual_rad) in next.joint_std_rad.iter_mut().zip(&usual.joint_std_rad) {
+                *std_rad = std_rad.max(*usual_rad);
+            }
+            let mut joints = next.joint_std_rad.iter().zip(&baseline.scales.joint_std_rad).take(robot.n_joints());
+            let has_settled = joints.all(|(now, before)| *now > SETTLED * before);
+            baseline.scales = next;
+            if has_settled {
+                break;
+            }
+        }
+        Some(baseline)
+    }
+
+    /// Before any view.
+    fn start(robot: &Robot) -> Self {
         let model = Model {
             joints: vec![Vec::new(); robot.n_joints()],
             n_links: 0,
@@ -38,17 +56,7 @@ impl Baseline {
         for (std_rad, spec) in scales.joint_std_rad.iter_mut().zip(&robot.sensors) {
             *std_rad = std_rad.max(spec.offset_std_rad.hypot(spec.gain_std * spec.half_range_rad));
         }
-        let mut baseline = Self { model, scales };
-        for _ in 0..MAX_PASSES {
-            let next = baseline.estimate(robot, views, HyperparameterMode::Fitted)?.scales().clone();
-            let mut joints = next.joint_std_rad.iter().zip(&baseline.scales.joint_std_rad).take(robot.n_joints());
-            let has_settled = joints.all(|(now, before)| *now > SETTLED * before);
-            baseline.scales = next;
-            if has_settled {
-                break;
-            }
-        }
-        Some(baseline)
+        Self { model, scales }
     }
 
     /// The arm by `views`.

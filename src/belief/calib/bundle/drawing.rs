@@ -14,7 +14,7 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 use crate::calib::bundle::estimate::{Estimate, estimate};
 use crate::calib::bundle::evidence::SCALE_BOUNDS;
 use crate::calib::bundle::input::BundleInput;
-use crate::calib::bundle::model_selection::log_evidence;
+use crate::calib::bundle::model_selection::evidence_gain_nats;
 use crate::calib::bundle::score_test::GeometryElement;
 use armcal_core::joints::MAX_JOINTS;
 
@@ -64,15 +64,14 @@ impl Drawing {
         if !self.has_lens && !found.has_positions() {
             alternatives.push(Self { has_lens: true, ..self.clone() });
         }
-        let least = log_evidence(found) + MIN_GAIN_NATS;
-        let evidence = |drawing: &Self| {
+        let gain_nats = |drawing: &Self| {
             let mut input = input.clone();
             drawing.apply(&mut input);
-            estimate(&input).map_or(f64::NEG_INFINITY, |found| log_evidence(&found))
+            estimate(&input).map_or(f64::NEG_INFINITY, |wider| evidence_gain_nats(&wider, found))
         };
-        let all = alternatives.into_iter().map(|drawing| (evidence(&drawing), drawing));
-        let (best, drawing) = all.max_by(|a, b| a.0.total_cmp(&b.0))?;
-        (best > least).then_some(drawing)
+        let all = alternatives.into_iter().map(|drawing| (gain_nats(&drawing), drawing));
+        let (best_nats, drawing) = all.max_by(|a, b| a.0.total_cmp(&b.0))?;
+        (best_nats > MIN_GAIN_NATS).then_some(drawing)
     }
 }
 

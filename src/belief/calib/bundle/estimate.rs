@@ -8,7 +8,7 @@ use crate::calib::bundle::input::{BundleInput, HyperparameterMode};
 use crate::calib::bundle::model::{Hyperparameters, Model};
 use crate::calib::bundle::outliers::{Outlier, outliers, reject};
 use crate::calib::bundle::priors::{mount_std, prior};
-use crate::calib::bundle::problem::{BundleProblem, State, WeightedMeasurement, parameters_of};
+use crate::calib::bundle::problem::{BundleProblem, ObservationTerm, State, WeightedMeasurement, parameters_of};
 use crate::calib::bundle::robust_start::{robust_start, straight_sensor_std};
 use crate::calib::bundle::solve::{LOOSE, Solved, TIGHT, solve, until};
 use crate::calib::parameters::{JointParameters, Parameter};
@@ -190,6 +190,17 @@ impl Estimate<'_> {
     #[must_use]
     pub fn scales(&self) -> &Hyperparameters {
         &self.problem.scales
+    }
+
+    /// Root mean square of the standard deviation that the corners of a view have by their frames and robot.toml, before
+    /// the fitted noise, px; `None` without corners.
+    pub(crate) fn mean_corner_std_px(&self) -> Option<f64> {
+        let variance = |observation: &ObservationTerm| match observation.data {
+            WeightedMeasurement::Corners { info, .. } if observation.is_used => Some(1.0 / info),
+            _ => None,
+        };
+        let variances: Vec<f64> = self.problem.observations.iter().filter_map(variance).collect();
+        (!variances.is_empty()).then(|| (variances.iter().sum::<f64>() / variances.len() as f64).sqrt())
     }
 
     /// Whether positions or poses were measured in place of corners.

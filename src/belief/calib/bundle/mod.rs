@@ -36,6 +36,7 @@ mod schur;
 mod score_test;
 mod setup;
 mod solve;
+mod stated_error;
 mod tables;
 mod verdict;
 
