@@ -24,6 +24,9 @@ pub enum Refusal {
     NotSolved {
         /// Stalled or degenerate.
         outcome: Outcome,
+        /// Steps or evaluations until then.
+        #[serde(default)]
+        evaluations: usize,
     },
     /// Fewer held-out views than a verdict needs.
     TooFewHeldOutViews {
@@ -238,9 +241,8 @@ impl Refusal {
             Self::BeyondTolerance { .. } => "capture more views, or put a tag on the gripper",
             Self::Geometry(_) => "check the drawing against the arm",
             Self::CornerNoise { .. } => "check lens, corner noise and tag sizes in robot.toml, and the tag map",
-            Self::SensorError { .. } | Self::Nonlinearity { .. } | Self::SensorFailed { .. } => {
-                "check that joint's sensor"
-            }
+            Self::SensorError { .. } | Self::SensorFailed { .. } => "check that joint's sensor",
+            Self::Nonlinearity { .. } => "replace the sensor, or state its linearity in robot.toml",
             Self::BeyondDatasheet { .. } => "check joint and sensor, and robot.toml against the sensor that is there",
             Self::Outliers { .. } => "check tag map, tag ids and the drawing",
             Self::Innovations { .. } => "look for what moved or warmed up during the capture",
@@ -251,19 +253,29 @@ impl Refusal {
     }
 }
 
-/// Cause and evidence in one sentence.
+/// Cause, evidence, and what to do next.
 impl fmt::Display for Refusal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.fmt_cause(f)?;
+        write!(f, "; {}", self.remedy())
+    }
+}
+
+impl Refusal {
+    /// Cause and evidence.
+    fn fmt_cause(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mm = |m: f64| m * 1e3;
         match self {
             Self::TooFewViews { views, parameters } => {
                 write!(f, "{views} views to fit are too few for {parameters} parameters, however many tags each shows")
             }
-            Self::NotSolved { outcome } => write!(f, "the solver {}", outcome.name()),
+            Self::NotSolved { outcome, evaluations } => {
+                write!(f, "the solver {} after {evaluations} steps", outcome.name())
+            }
             Self::TooFewHeldOutViews { views, needed } => {
                 write!(f, "only {views} held-out views show a tag; {needed} are needed for a verdict")
             }
-            Self::NoHeldOutTag => write!(f, "the held-out views hold no usable tag"),
+            Self::NoHeldOutTag => write!(f, "the held-out views hold no usable tag (0 seen)"),
             Self::NoBetterThanDatasheet { held_out_m, datasheet_m } => write!(
                 f,
                 "held-out views are no better than with the datasheet: {:.1} mm against {:.1} mm",
@@ -293,7 +305,7 @@ impl fmt::Display for Refusal {
             Self::SensorError { joint, std_rad, datasheet_std_rad } => write!(
                 f,
                 "joint sensors do not explain the data: {joint} needs a random error of {:.2} deg from view to view, \
-                 its datasheet has {:.2} deg; a joint that slips, or links that are not as in the drawing",
+                 its datasheet has {:.2} deg: a joint that slips, or links that are not as in the drawing",
                 std_rad.to_degrees(),
                 datasheet_std_rad.to_degrees()
             ),
@@ -317,7 +329,7 @@ impl fmt::Display for Refusal {
             | Self::CornerNoise { .. }
             | Self::Innovations { .. } => self.fmt_long(f),
             Self::TooFewViewsSinceSlip { joint, evidence, views } => {
-                write!(f, "{joint}: {evidence}; {views} views are too few to calibrate it as it is now")
+                write!(f, "{joint}: {evidence}; the {views} views since are too few to calibrate it as it is now")
             }
         }
     }
@@ -409,6 +421,53 @@ mod tests {
         assert_eq!(in_words(&[]), None);
     }
 
+    /// One of each kind that says something measured.
+    fn measured() -> Vec<Refusal> {
+        let joint = || "wrist_yaw".to_owned();
+        vec![
+            Refusal::TooFewViews { views: 8, parameters: 10 },
+            Refusal::NotSolved { outcome: Outcome::Stalled, evaluations: 40 },
+            Refusal::TooFewHeldOutViews { views: 1, needed: 3 },
+            Refusal::NoHeldOutTag,
+            Refusal::NoBetterThanDatasheet { held_out_m: 0.02, datasheet_m: 0.019 },
+            Refusal::NoBetterThanBaseline { held_out_m: 0.0201, baseline_m: 0.0203, p_value: 0.4 },
+            Refusal::Overfitted { held_out_m: 0.011, fit_m: 0.004 },
+            Refusal::BeyondTolerance { predicted_m: 0.03, tolerance_m: 0.02 },
+            Refusal::PriorsBeyondTolerance { predicted_m: 0.03, tolerance_m: 0.02, most: None },
+            Refusal::SensorError { joint: joint(), std_rad: 0.01, datasheet_std_rad: 0.002 },
+            Refusal::Nonlinearity { joint: joint(), std_rad: 0.03, datasheet_std_rad: 0.002 },
+            Refusal::CornerNoise { residual_px: 1.2, stated_px: 0.3, limit_px: 0.9 },
+            Refusal::BeyondDatasheet { parameter: "wrist_yaw offset".to_owned(), sigmas: 9.0 },
+            Refusal::Outliers { outliers: 40, observations: 100 },
+            Refusal::Innovations {
+                quantity: InnovationQuantity::Coordinates,
+                per_dof: 9.0,
+                limit: 1.7,
+                expected: [0.9, 1.1],
+            },
+            Refusal::TooFewViewsSinceSlip { joint: joint(), evidence: "it slipped".to_owned(), views: 4 },
+            Refusal::SensorFailed {
+                joint: joint(),
+                kind: FailedKind::Dead,
+                tool_error_m: Some(0.2),
+                tool_error_by_camera_m: Some(0.01),
+                tolerance_m: 0.02,
+            },
+        ]
+    }
+
+    #[test]
+    fn each_reason_says_a_figure_and_what_to_do_next() {
+        for refusal in measured() {
+            let words = refusal.to_string();
+            assert!(words.contains(|c: char| c.is_ascii_digit()), "{words}");
+            assert!(words.ends_with(&format!("; {}", refusal.remedy())), "{words}");
+        }
+        for refusal in [Refusal::PriorReused, Refusal::PriorSingular, Refusal::PriorUntested] {
+            assert!(refusal.to_string().ends_with(refusal.remedy()));
+        }
+    }
+
     #[test]
     fn a_reason_survives_the_file() {
         let geometry = Refusal::Geometry(GeometryError {
@@ -433,7 +492,9 @@ mod tests {
             limit: 22.0,
             used_share: 0.4,
         };
-        let file = File { refusals: vec![geometry, Refusal::NotSolved { outcome: Outcome::Stalled }, contradicted] };
+        let file = File {
+            refusals: vec![geometry, Refusal::NotSolved { outcome: Outcome::Stalled, evaluations: 40 }, contradicted],
+        };
         let text = toml::to_string(&file).expect("it has a TOML form");
         assert_eq!(toml::from_str::<File>(&text).expect("it reads"), file, "{text}");
     }

@@ -9,6 +9,8 @@ use armcal_core::robot::Robot;
 #[derive(Clone, Copy, Debug)]
 pub struct AcceptanceData {
     pub outcome: Outcome,
+    /// Steps or evaluations of the solver.
+    pub evaluations: usize,
     pub held_out_views: usize,
     pub held_out_rms_m: Option<f64>,
     /// The same views with the datasheet's sensors, and with mount and map fitted besides; `None` where the method
@@ -46,7 +48,7 @@ pub fn refusal(e: &AcceptanceData) -> Option<Refusal> {
         return Some(Refusal::TooFewViews { views: e.fit_views, parameters: e.n_parameters });
     }
     if e.outcome != Outcome::Converged {
-        return Some(Refusal::NotSolved { outcome: e.outcome });
+        return Some(Refusal::NotSolved { outcome: e.outcome, evaluations: e.evaluations });
     }
     if e.held_out_views < MIN_HELD_OUT_VIEWS {
         return Some(Refusal::TooFewHeldOutViews { views: e.held_out_views, needed: MIN_HELD_OUT_VIEWS });
@@ -76,6 +78,7 @@ mod tests {
     fn good() -> AcceptanceData {
         AcceptanceData {
             outcome: Outcome::Converged,
+            evaluations: 120,
             held_out_views: 8,
             held_out_rms_m: Some(0.004),
             held_out_nominal_rms_m: Some(0.08),

@@ -127,7 +127,10 @@ impl<'a> BundleCalibration<'a> {
             second = BundleSetup::new(&self.data.robot, &views, &failures, self.prior).with_drawing(&self.drawing);
             (&second, second.estimate())
         };
-        let (estimate, selections) = estimated.ok_or_else(|| self.nothing_observable())?;
+        let (mut estimate, selections) = estimated.ok_or_else(|| self.nothing_observable())?;
+        if self.purpose == EstimatePurpose::Final && std::env::var("B1_OFF").unwrap_or_default() != "all" {
+            estimate.marginalize(&setup.input().scales);
+        }
         self.finish(&Estimated { setup, failures: &failures, estimate, selections })
     }
 
@@ -205,7 +208,7 @@ impl<'a> BundleCalibration<'a> {
         let residual_std_rad = std::array::from_fn(|joint| match robot.sensors.get(joint) {
             // Nothing is known of a joint distal to the camera but its datasheet.
             Some(spec) if parameters.iter().all(|p| p.joint != joint) => spec.linearity_std_rad,
-            _ => estimate.scales().joint_std_rad[joint],
+            _ => estimate.wide_scales().joint_std_rad[joint],
         });
         let matrix = estimate.joint_covariance();
         let covariance = ParameterCovariance { parameters, matrix, residual_std_rad: Some(residual_std_rad) };

@@ -21,6 +21,7 @@ mod innovations;
 mod input;
 mod linearize;
 mod link_columns;
+mod marginal;
 mod model;
 mod model_selection;
 mod moved_tags;

@@ -12,7 +12,7 @@ use nalgebra::Cholesky;
 use crate::calib::bundle::estimate::{Estimate, estimate};
 use crate::calib::bundle::input::BundleInput;
 use crate::calib::bundle::linearize::NormalEquations;
-use crate::calib::bundle::problem::BundleProblem;
+use crate::calib::bundle::problem::{BundleProblem, WeightedMeasurement};
 use crate::calib::bundle::solve::{TIGHT, solve};
 use crate::calib::parameters::ParameterKind;
 use crate::calib::views::view::TagMeasurement;
@@ -41,7 +41,7 @@ pub struct Selection {
 
 const MIN_GAIN_NATS: f64 = 3.0;
 /// First guess of the error of positions by SLAM: translation m, rotation rad (assumed; the evidence fits both).
-const CAMERA_ERROR_STD: [f64; 2] = [0.005, 0.01];
+pub(crate) const CAMERA_ERROR_STD: [f64; 2] = [0.005, 0.01];
 /// Sessions shorter than this do not drift, h.
 const MIN_SESSION_H: f64 = 0.2;
 /// Slower joints have no clock to tell, rad/s.
@@ -134,8 +134,17 @@ fn log_evidence(problem: &BundleProblem<'_>, normal: &NormalEquations) -> f64 {
         - 2.0 * problem.layout.lens.map_or(0.0, |_| log_sum(&problem.prior.lens_std))
         - 2.0 * problem.layout.mount.map_or(0.0, |_| log_sum(&problem.prior.mount_std));
     let of_views: f64 = normal.eliminated.iter().map(|own| own.log_ratio).sum();
-    let n: usize = problem.observations.iter().filter(|s| s.is_used).map(|s| s.data.n_coordinates()).sum();
-    0.5 * (of_prior - of_normal + of_views - normal.cost) - n as f64 * problem.scales.noise.ln()
+    let log_noise = |data: &WeightedMeasurement| {
+        let [position, rotation] = [problem.scales.position_std_m, problem.scales.rotation_std_rad].map(f64::ln);
+        match data {
+            WeightedMeasurement::Corners { .. } => data.n_coordinates() as f64 * problem.scales.noise.ln(),
+            WeightedMeasurement::Position { .. } => 3.0 * position,
+            WeightedMeasurement::Pose { .. } => 3.0 * (position + rotation),
+        }
+    };
+    let used = problem.observations.iter().filter(|observation| observation.is_used);
+    let of_noise: f64 = used.map(|observation| log_noise(&observation.data)).sum();
+    0.5 * (of_prior - of_normal + of_views - normal.cost) - of_noise
 }
 
 fn log_sum(std: &[f64]) -> f64 {

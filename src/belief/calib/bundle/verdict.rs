@@ -3,9 +3,11 @@
 
 use crate::calib::baseline_comparison::SIGNIFICANCE;
 use crate::calib::bundle::estimate::Estimate;
+use crate::calib::bundle::evidence::{NOISE_BOUNDS, POSITION_BOUNDS, SCALE_BOUNDS};
 use crate::calib::bundle::innovations::{Innovations, JointInnovation};
 use crate::calib::bundle::input::BundleInput;
 use crate::calib::bundle::model::Hyperparameters;
+use crate::calib::bundle::model_selection::CAMERA_ERROR_STD;
 use crate::calib::bundle::observability::{Observability, observability};
 use crate::calib::bundle::score_test::{GeometryElement, ScoreTestResult};
 use crate::calib::covariance::{ParameterCovariance, task_angles};
@@ -83,6 +85,7 @@ impl VerdictInput<'_> {
             self.innovations(&mut table),
         ];
         self.whiteness(&mut table);
+        table.warnings.extend(self.scales_at_bounds());
         table.not_covered = not_covered(calibration, &targets);
         if self.has_unseen_links() {
             let words = "links distal to the camera: errors are unobservable without a gripper tag";
@@ -362,6 +365,39 @@ impl VerdictInput<'_> {
                 table.checks.push(check);
             }
         }
+    }
+
+    /// Fitted sizes that the data would have beyond their bounds.
+    fn scales_at_bounds(&self) -> Vec<String> {
+        const NEAR: f64 = 1e-6;
+        let (robot, now, first) = (self.input.robot, self.found.scales(), &self.input.scales);
+        let mut all = vec![("noise of corners".to_owned(), now.noise, 1.0, NOISE_BOUNDS)];
+        if self.found.has_positions() {
+            all[0] = ("noise of positions, m".to_owned(), now.position_std_m, first.position_std_m, POSITION_BOUNDS);
+        }
+        if self.found.has_poses() {
+            let (now, first) = (now.rotation_std_rad, first.rotation_std_rad);
+            all.push(("noise of rotations, rad".to_owned(), now, first, POSITION_BOUNDS));
+        }
+        // Small sizes are harmless: what is not there needs none.
+        let above = [0.0, SCALE_BOUNDS[1]];
+        for (joint, spec) in robot.sensors.iter().enumerate().take(robot.camera.mount.n_joints) {
+            let (now_rad, first_rad) = (now.joint_std_rad[joint], first.joint_std_rad[joint]);
+            all.push((format!("{}: error from view to view, rad", spec.joint), now_rad, first_rad, above));
+            let (now_rad, first_rad) = (now.shape_std_rad[joint], first.shape_std_rad[joint]);
+            all.push((format!("{}: nonlinearity, rad", spec.joint), now_rad, first_rad, above));
+        }
+        for (k, name) in ["m", "rad"].into_iter().enumerate() {
+            if let Some(now) = now.camera_error_std {
+                let first = first.camera_error_std.unwrap_or(CAMERA_ERROR_STD);
+                all.push((format!("camera error shared by a view, {name}"), now[k], first[k], above));
+            }
+        }
+        let is_at_bound = |(_, now, first, [low, high]): &(String, f64, f64, [f64; 2])| {
+            *now <= first * low * (1.0 + NEAR) || *now >= first * high * (1.0 - NEAR)
+        };
+        let beyond = all.into_iter().filter(is_at_bound);
+        beyond.map(|(what, now, ..)| format!("{what}: fitted to {now:.2e}, the bound of what is fitted")).collect()
     }
 
     /// Links between camera and tool that no tag shows.

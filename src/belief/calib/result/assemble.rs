@@ -57,6 +57,7 @@ pub(crate) fn assemble(source: &Provenance<'_>, fit: &Fit<'_>, evidence: Evidenc
     let must_improve = source.method != Method::Bundle;
     let refusals: Vec<_> = refusal(&AcceptanceData {
         outcome: fit.solution.outcome,
+        evaluations: fit.solution.evaluations,
         held_out_views: held_out.views,
         held_out_rms_m: held_out.rms_m,
         held_out_nominal_rms_m: held_out.nominal_rms_m.filter(|_| must_improve),

@@ -9,4 +9,5 @@ mod failures;
 mod moved_tags;
 mod reservations;
 mod score_test;
+mod small_samples;
 mod statistics;

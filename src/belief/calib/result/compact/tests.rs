@@ -146,6 +146,7 @@ fn every_refusal_has_a_code() {
     let by_chance = |p_value| BaselineComparison { rms_m: 0.05, ratio: 0.08, p_value };
     let good = AcceptanceData {
         outcome: Outcome::Converged,
+        evaluations: 120,
         held_out_views: 8,
         held_out_rms_m: Some(0.004),
         held_out_nominal_rms_m: Some(0.08),
