@@ -127,15 +127,13 @@ impl<'a> BundleCalibration<'a> {
             second = BundleSetup::new(&self.data.robot, &views, &failures, self.prior).with_drawing(&self.drawing);
             (&second, second.estimate())
         };
-        let (mut estimate, selections) = estimated.ok_or_else(|| self.nothing_observable())?;
-        if self.purpose == EstimatePurpose::Final && std::env::var("B1_OFF").unwrap_or_default() != "all" {
-            estimate.marginalize(&setup.input().scales);
-        }
-        self.finish(&Estimated { setup, failures: &failures, estimate, selections })
+        let (estimate, selections) = estimated.ok_or_else(|| self.nothing_observable())?;
+        self.finish(Estimated { setup, failures: &failures, estimate, selections })
     }
 
-    fn finish(mut self, estimated: &Estimated<'_>) -> Result<Calibration, CalibError> {
-        let diagnosis = self.diagnose(estimated);
+    fn finish(mut self, mut estimated: Estimated<'_>) -> Result<Calibration, CalibError> {
+        let diagnosis = self.diagnose(&mut estimated);
+        let estimated = &estimated;
         self.data.data.fit.clone_from(&diagnosis.views);
         let mut calibration = self.report(estimated, &diagnosis);
         self.judge_failures_and_prior(estimated, &diagnosis, &mut calibration);
@@ -149,8 +147,7 @@ impl<'a> BundleCalibration<'a> {
                 let input = &BundleInput { views: &diagnosis.views, ..estimated.setup.input() };
                 let (found, innovations) = (&estimated.estimate, &diagnosis.innovations[..]);
                 let task = self.data.data.task.as_ref();
-                let covariance = &diagnosis.covariance;
-                VerdictInput { input, found, innovations, covariance, task }.judge(&mut calibration);
+                VerdictInput { input, found, innovations, task }.judge(&mut calibration);
                 self.state_reservations(estimated, &diagnosis, &mut calibration);
                 self.moved.report(&estimated.estimate, &mut calibration);
                 let targets = task.map(|task| task_angles(&diagnosis.robot, task)).unwrap_or_default();
@@ -193,7 +190,7 @@ impl<'a> BundleCalibration<'a> {
     }
 
     /// Held-out figures, the arm as estimated, and the covariance of its sensors.
-    fn diagnose(&self, estimated: &Estimated<'_>) -> Diagnosis {
+    fn diagnose(&self, estimated: &mut Estimated<'_>) -> Diagnosis {
         let Estimated { setup, estimate, .. } = estimated;
         let robot = &self.data.robot;
         let without_failed = setup.without_failed(&estimate.parameters());
@@ -204,11 +201,12 @@ impl<'a> BundleCalibration<'a> {
             EstimatePurpose::Final => cross_validated(&input, estimate, &setup.applied.robot),
             EstimatePurpose::Interim => (FoldSums::default().metrics(), Vec::new()),
         };
+        estimate.widen(&innovations, &setup.input().scales);
         let parameters = estimate.joint_parameters().to_vec();
         let residual_std_rad = std::array::from_fn(|joint| match robot.sensors.get(joint) {
             // Nothing is known of a joint distal to the camera but its datasheet.
             Some(spec) if parameters.iter().all(|p| p.joint != joint) => spec.linearity_std_rad,
-            _ => estimate.wide_scales().joint_std_rad[joint],
+            _ => estimate.residual_std_rad(joint),
         });
         let matrix = estimate.joint_covariance();
         let covariance = ParameterCovariance { parameters, matrix, residual_std_rad: Some(residual_std_rad) };

@@ -243,7 +243,7 @@ impl Estimate<'_> {
     #[must_use]
     pub fn joint_covariance(&self) -> DMatrix<f64> {
         let n = self.problem.layout.n_joint();
-        self.wide_posterior().covariance.view((0, 0), (n, n)).into_owned()
+        self.wide_covariance().view((0, 0), (n, n)).into_owned()
     }
 
     /// `link_from_camera`, and its covariance (translation m, rotation rad, on the right); the prior's where it is not
@@ -251,7 +251,7 @@ impl Estimate<'_> {
     #[must_use]
     pub fn mount(&self) -> (Isometry3<f64>, Matrix6<f64>) {
         let covariance = match self.problem.layout.mount {
-            Some(at) => self.wide_posterior().covariance.fixed_view::<6, 6>(at, at).into_owned(),
+            Some(at) => self.wide_covariance().fixed_view::<6, 6>(at, at).into_owned(),
             None => Matrix6::from_diagonal(&Vector6::from(self.problem.prior.mount_std.map(|std| std * std))),
         };
         (self.solved.state.mount, covariance)

@@ -22,7 +22,8 @@ impl Estimate<'_> {
         quantile(&configurations.iter().map(error_m).collect::<Vec<f64>>(), 0.5)
     }
 
-    fn stated_covariance(&self, input: &BundleInput<'_>) -> Option<ParameterCovariance> {
+    /// Of the joints' parameters, with the fitted scales, each at most what robot.toml states.
+    pub(crate) fn stated_covariance(&self, input: &BundleInput<'_>) -> Option<ParameterCovariance> {
         let mut problem = self.problem.clone();
         problem.scales = at_most_stated(&problem.scales, input);
         if input.joint_prior.is_none() {

@@ -10,7 +10,7 @@ use crate::calib::bundle::model::Hyperparameters;
 use crate::calib::bundle::model_selection::CAMERA_ERROR_STD;
 use crate::calib::bundle::observability::{Observability, observability};
 use crate::calib::bundle::score_test::{GeometryElement, ScoreTestResult};
-use crate::calib::covariance::{ParameterCovariance, task_angles};
+use crate::calib::covariance::task_angles;
 use crate::calib::finding::{Finding, FindingKind, FindingUnit};
 use crate::calib::geometry_error::{ErrorKind, GeometryError};
 use crate::calib::parameters::{Parameter, ParameterKind};
@@ -30,8 +30,6 @@ pub(crate) struct VerdictInput<'a> {
     pub found: &'a Estimate<'a>,
     /// Of each fold.
     pub innovations: &'a [Innovations],
-    /// Of the sensors' parameters.
-    pub covariance: &'a ParameterCovariance,
     pub task: Option<&'a ReachTask>,
 }
 
@@ -149,7 +147,7 @@ impl VerdictInput<'_> {
         table: &mut VerdictTable,
     ) -> Option<Refusal> {
         let (held_out_m, baseline) = calibration.held_out.rms_m.zip(calibration.held_out.baseline)?;
-        let change = self.change_at_tool(configurations);
+        let change = self.change_at_tool(configurations)?;
         table.checks.push(Check {
             what: "held out against mount and map alone: probability that it is no better".to_owned(),
             value: baseline.p_value,
@@ -176,10 +174,11 @@ impl VerdictInput<'_> {
         None
     }
 
-    /// How far the estimated sensors move the tool from where the datasheet has it at the same readings, over the
-    /// predicted error; root mean squares over the configurations.
-    fn change_at_tool(&self, configurations: &[JointAngles]) -> f64 {
+    /// How far the estimated sensors move the tool from where the datasheet has it at the same readings, over the error
+    /// predicted by the stated figures; root mean squares over the configurations.
+    fn change_at_tool(&self, configurations: &[JointAngles]) -> Option<f64> {
         let robot = self.input.robot;
+        let covariance = self.found.stated_covariance(self.input)?;
         let sensors = self.found.parameters().sensors(robot);
         let tool = |angles: &JointAngles| robot.chain.link_poses(angles).frame(&robot.tool.mount).translation.vector;
         let (mut moved_m2, mut predicted_m2) = (0.0, 0.0);
@@ -188,9 +187,9 @@ impl VerdictInput<'_> {
                 robot.sensors[j].center_rad + sensors.models[j].travel_under_rad(angles[j], &ConditionChange::default())
             });
             moved_m2 += (tool(angles) - tool(&by_datasheet)).norm_squared();
-            predicted_m2 += self.covariance.tool_position_m2(robot, &sensors, angles).trace().max(0.0);
+            predicted_m2 += covariance.tool_position_m2(robot, &sensors, angles).trace().max(0.0);
         }
-        (moved_m2 / predicted_m2).sqrt()
+        Some((moved_m2 / predicted_m2).sqrt())
     }
 
     /// Whether the joints' errors are those of such sensors.

@@ -14,6 +14,9 @@ pub struct ModelTable {
     /// The same of poses' rotations.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rotation_std_rad: Option<f64>,
+    /// All variances are multiplied by it, for held-out cameras were farther off than predicted.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub variance_factor: Option<f64>,
     /// The error of the camera's pose that all tags of a view share: translation m, rotation rad.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera_error_std: Option<[f64; 2]>,
