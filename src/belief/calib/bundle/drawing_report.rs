@@ -1,6 +1,7 @@
 //! What an estimate found of the drawing: links, base, camera mount and lens that are not as drawn.
 //!
-//! An element counts whose estimate z is many sigmas of the drawing's prior from it. Were the drawing kept, the sensors'
+//! An element counts whose estimate z is many sigmas of the drawing's prior from it, and which its own covariance C does
+//! not explain: `z^T C^-1 z` is large. Were the drawing kept, the sensors'
 //! parameters x would follow the posterior's covariance, `dx = C_xz C_zz^-1 z`, and the tool would be off by what both
 //! move it together.
 
@@ -15,8 +16,8 @@ use armcal_core::spatial::log;
 
 /// Sigmas of the drawing's prior, over three axes together, from which an element is named.
 const NAMED_SIGMAS: f64 = 6.0;
-/// Times its own uncertainty that an element must be off, too.
-const SURE_SIGMAS: f64 = 4.0;
+/// Root of `z^T C^-1 z` that an element must have, too.
+const SURE_SIGMAS: f64 = 5.0;
 
 /// Three numbers of the drawing that were estimated.
 struct Departure {
@@ -24,8 +25,10 @@ struct Departure {
     name: String,
     unit: FindingUnit,
     size: Vector3<f64>,
-    /// Of the size, by the posterior: the root of the largest eigenvalue of its covariance.
+    /// Along the size, by the posterior.
     std: f64,
+    /// Over the posterior's covariance.
+    sure_sigmas: f64,
     /// Over the drawing's prior.
     sigmas: f64,
     tool_m: Option<f64>,
@@ -40,8 +43,7 @@ impl Estimate<'_> {
         } else {
             found.extend(self.mount_departures());
         }
-        found
-            .retain(|departure| departure.sigmas > NAMED_SIGMAS && departure.size.norm() > SURE_SIGMAS * departure.std);
+        found.retain(|departure| departure.sigmas > NAMED_SIGMAS && departure.sure_sigmas > SURE_SIGMAS);
         found.sort_by(|a, b| b.sigmas.total_cmp(&a.sigmas));
         let mut findings: Vec<Finding> = found.iter().map(Departure::finding).collect();
         let mut words: Vec<String> = found.iter().map(Departure::words).collect();
@@ -73,7 +75,8 @@ impl Estimate<'_> {
                 name,
                 unit: [FindingUnit::Metre, FindingUnit::Radian][kind],
                 sigmas: size.norm() / priors[kind].max(1e-9),
-                std: largest_std(&covariance),
+                std: std_along(&covariance, &size),
+                sure_sigmas: sigmas(&covariance, &size),
                 tool_m: Some(self.tool_moved_m(&tool, first, &size)),
                 size,
             }
@@ -87,12 +90,14 @@ impl Estimate<'_> {
         let columns = self.problem.layout.mount.into_iter().flat_map(|at| [(at, 0), (at + 3, 1)]);
         columns.map(move |(first, kind)| {
             let size = off.fixed_rows::<3>(3 * kind).into_owned();
+            let covariance = self.covariance3(first);
             Departure {
                 kind: FindingKind::CameraMount,
                 name: "camera mount".to_owned(),
                 unit: [FindingUnit::Metre, FindingUnit::Radian][kind],
                 sigmas: size.norm() / priors[kind].max(1e-9),
-                std: largest_std(&self.covariance3(first)),
+                std: std_along(&covariance, &size),
+                sure_sigmas: sigmas(&covariance, &size),
                 size,
                 tool_m: None,
             }
@@ -136,8 +141,13 @@ impl Estimate<'_> {
     }
 }
 
-fn largest_std(covariance: &Matrix3<f64>) -> f64 {
-    covariance.symmetric_eigenvalues().max().max(0.0).sqrt()
+fn std_along(covariance: &Matrix3<f64>, size: &Vector3<f64>) -> f64 {
+    let along = size.try_normalize(0.0).unwrap_or_else(Vector3::x);
+    (covariance * along).dot(&along).max(0.0).sqrt()
+}
+
+fn sigmas(covariance: &Matrix3<f64>, size: &Vector3<f64>) -> f64 {
+    covariance.try_inverse().map_or(0.0, |inverse| size.dot(&(inverse * size)).max(0.0).sqrt())
 }
 
 impl Departure {
