@@ -34,8 +34,8 @@ pub(crate) struct LinkStart {
     mount_scale: [f64; 2],
 }
 
-/// What an alternative must bring; good arms seldom reach a tenth of it (measured, docs/verdict.md).
-const MIN_GAIN_NATS: f64 = 8.0;
+/// What an alternative must bring. Of 60 good arms one reached 5 (docs/verdict.md).
+const MIN_GAIN_NATS: f64 = 6.0;
 /// Sizes of an error that are tried, over robot.toml's.
 const MULTIPLES: [f64; 5] = [2.0, 5.0, 10.0, 20.0, 40.0];
 
@@ -59,7 +59,10 @@ impl Drawing {
             // A warm start knows the links from before, and its own test of agreement.
             return None;
         }
-        let links = found.link_start().filter(|_| self.links.is_none())?;
+        let (links, gain) = found.link_start();
+        if self.links.is_some() || gain < MIN_GAIN_NATS {
+            return None;
+        }
         let mut alternatives = vec![Self { links: Some(links), ..self.clone() }];
         if !self.has_lens && !found.has_positions() {
             alternatives.push(Self { has_lens: true, ..self.clone() });
@@ -77,8 +80,8 @@ impl Drawing {
 }
 
 impl Estimate<'_> {
-    /// Where to start links from; `None` where no error of the drawing would explain much.
-    fn link_start(&self) -> Option<LinkStart> {
+    /// Where to start links from, and what that may bring, nats.
+    pub(crate) fn link_start(&self) -> (LinkStart, f64) {
         let robot = self.problem.robot;
         let score = self.score();
         let n_links = self.n_seen_joints();
@@ -106,16 +109,13 @@ impl Estimate<'_> {
         let all = (0..n_links).flat_map(|joint| [0, 1].map(|kind| three(6 * joint + 3 * kind, priors[kind]))).flatten();
         consider(&all.collect::<Vec<_>>(), None);
         let (gain, element, multiple) = best;
-        if gain < MIN_GAIN_NATS {
-            return None;
-        }
         let mut start = LinkStart { n_links, multiples: [[1.0; 2]; MAX_JOINTS], mount_scale: [1.0; 2] };
         match element {
             Some((GeometryElement::Joint(joint), kind)) => start.multiples[joint][kind] = multiple,
             Some((GeometryElement::Mount, kind)) => start.mount_scale[kind] = multiple,
             None => start.multiples = [[multiple; 2]; MAX_JOINTS],
         }
-        Some(start)
+        (start, gain)
     }
 }
 

@@ -14,10 +14,8 @@ use crate::calib::result::calibration::Calibration;
 use armcal_core::joints::JointAngles;
 use armcal_core::spatial::log;
 
-/// Sigmas of the drawing's prior, over three axes together, from which an element is named.
-const NAMED_SIGMAS: f64 = 6.0;
-/// Root of `z^T C^-1 z` that an element must have, too.
-const SURE_SIGMAS: f64 = 5.0;
+/// Sigmas, of the drawing's prior and of the estimate alike, from which an element is named.
+const NAMED_SIGMAS: f64 = 4.0;
 
 /// Three numbers of the drawing that were estimated.
 struct Departure {
@@ -43,8 +41,10 @@ impl Estimate<'_> {
         } else {
             found.extend(self.mount_departures());
         }
-        found.retain(|departure| departure.sigmas > NAMED_SIGMAS && departure.sure_sigmas > SURE_SIGMAS);
-        found.sort_by(|a, b| b.sigmas.total_cmp(&a.sigmas));
+        found.sort_by(|a, b| b.weight().total_cmp(&a.weight()));
+        // Where links were freed, the likeliest is named in any case.
+        let n = found.iter().filter(|departure| departure.weight() > NAMED_SIGMAS).count();
+        found.truncate(n.max(1));
         let mut findings: Vec<Finding> = found.iter().map(Departure::finding).collect();
         let mut words: Vec<String> = found.iter().map(Departure::words).collect();
         if let Some((finding, word)) = self.lens_finding() {
@@ -151,6 +151,11 @@ fn sigmas(covariance: &Matrix3<f64>, size: &Vector3<f64>) -> f64 {
 }
 
 impl Departure {
+    /// Sigmas of the drawing's prior or of the estimate, whichever are fewer.
+    fn weight(&self) -> f64 {
+        self.sigmas.min(self.sure_sigmas)
+    }
+
     fn finding(&self) -> Finding {
         Finding {
             kind: self.kind,
