@@ -77,6 +77,11 @@ impl<'a> Oracle<'a> {
         Ok(Self { capture, views: exact, model, scales, guess })
     }
 
+    /// The arm as drawn, with the right survey.
+    pub(super) fn robot(&self) -> &Robot {
+        &self.capture.robot
+    }
+
     /// Of several changes at once.
     pub(super) fn effect(&self, perturbations: &[Perturbation]) -> OracleEffect {
         let falsified = falsified_robot(&self.capture.robot, perturbations);

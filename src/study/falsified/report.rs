@@ -111,5 +111,6 @@ pub fn falsified_markdown(study: &FalsifiedStudy) -> String {
             share(unseen, FalsifiedRow::is_reserved_rightly),
         );
     }
+    let _ = write!(out, "\n{}", study.classes.markdown());
     out
 }

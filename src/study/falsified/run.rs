@@ -108,15 +108,19 @@ pub fn falsified_study(
     seeds: std::ops::Range<u64>,
 ) -> Result<FalsifiedStudy, FalsifiedError> {
     let scene = Scene { routine, robot, vehicle };
-    let first_capture = Capture::simulate(&scene, seeds.start)?;
-    let classes = equivalence_classes(&Oracle::new(&first_capture)?);
+    let first = Capture::simulate(&scene, seeds.start)?;
+    let first_oracle = Oracle::new(&first)?;
+    let classes = equivalence_classes(&first_oracle);
+    let rows_of = |capture: &Capture, oracle: &Oracle<'_>| -> Vec<FalsifiedRow> {
+        cases.par_iter().map(|case| row(capture, oracle, &classes, case)).collect()
+    };
+    let mut rows = rows_of(&first, &first_oracle);
     let of_seed = |seed: u64| -> Result<Vec<FalsifiedRow>, FalsifiedError> {
         let capture = Capture::simulate(&scene, seed)?;
-        let oracle = Oracle::new(&capture)?;
-        Ok(cases.par_iter().map(|case| row(&capture, &oracle, &classes, case)).collect())
+        Ok(rows_of(&capture, &Oracle::new(&capture)?))
     };
-    let by_seed: Vec<Result<Vec<FalsifiedRow>, FalsifiedError>> = seeds.into_par_iter().map(of_seed).collect();
-    let mut rows = Vec::new();
+    let others = seeds.start + 1..seeds.end;
+    let by_seed: Vec<Result<Vec<FalsifiedRow>, FalsifiedError>> = others.into_par_iter().map(of_seed).collect();
     for of_seed in by_seed {
         rows.extend(of_seed?);
     }
