@@ -70,7 +70,9 @@ impl Capture {
         session::run(&inputs, &mut world, &mut recorder, &mut Unwatched)?;
         world.finish_truth()?;
         recorder.into_writer().finish().map_err(FalsifiedError::of("recording"))?;
-        let recording = read_recording(&run).map_err(FalsifiedError::of("recording"))?;
+        let mut recording = read_recording(&run).map_err(FalsifiedError::of("recording"))?;
+        // The folder has another name each time, and messages name the file.
+        recording.path = "run.mcap".into();
         Self::of(scene.robot, seed, recording, &read_truth(&truth)?)
     }
 
@@ -178,7 +180,7 @@ fn keep_views(recording: &mut Recording, n: usize) {
     recording.messages.retain(|(_, message)| is_capture(message).is_none_or(|mark| kept.contains(&mark.start)));
 }
 
-/// Keeps `n` captures and divides each, so that there are [`ALIKE_VIEWS`] views.
+/// Keeps `n` captures and divides each, so that there are [`ALIKE_VIEWS`] views; some may be too short for an image.
 fn split_views(recording: &mut Recording, n: usize) {
     keep_views(recording, n);
     let parts = ALIKE_VIEWS / n.max(1);

@@ -18,6 +18,7 @@ mod run;
 mod tests;
 
 pub use cases::{Case, CaseKind, Tier, falsified_cases};
+pub use classes::EquivalenceClasses;
 pub use error::FalsifiedError;
 pub use report::{falsified_csv, falsified_markdown};
 pub use run::{FalsifiedRow, FalsifiedStudy, RunStatus, falsified_study};

@@ -9,7 +9,7 @@ use crate::falsified::error::FalsifiedError;
 use crate::falsified::naming::{causes_of_finding, first_causes, right_causes};
 use crate::falsified::oracle::{Oracle, OracleEffect};
 use crate::falsified::perturbation::{Perturbation, falsified_robot};
-use armcal_belief::calib::{Calibration, Status, calibrate_with_survey};
+use armcal_belief::calib::{Calibration, Finding, FindingKind, Status, calibrate_with_survey};
 use armcal_belief::verify::reaches;
 use armcal_core::log::Recording;
 use armcal_core::robot::{Robot, Vehicle};
@@ -69,11 +69,18 @@ impl FalsifiedRow {
         self.status != RunStatus::Accepted || self.repaired > 0
     }
 
-    /// Accepted, with a true error (95 % of the targets) above three times what was predicted, priors included.
+    /// Accepted, with a true error (95 % of the targets) above three times what was predicted, priors included; or
+    /// with sensors that no program can read.
     #[must_use]
     pub fn is_wrongly_accepted(&self) -> bool {
         let limit_m = self.predicted_with_priors_m.or(self.predicted_m).map_or(f64::INFINITY, |p| 3.0 * p.p95);
-        self.status == RunStatus::Accepted && self.true_m.is_some_and(|error| error.p95 > limit_m)
+        self.status == RunStatus::Accepted && self.true_m.is_none_or(|error| error.p95 > limit_m)
+    }
+
+    /// Accepted without a repair, and the tool is off by more than `limit_m` at 95 % of the targets.
+    #[must_use]
+    pub fn is_let_through(&self, limit_m: f64) -> bool {
+        !self.is_refused_or_repaired() && self.true_m.is_none_or(|error| error.p95 > limit_m)
     }
 
     #[must_use]
@@ -176,8 +183,8 @@ fn row(capture: &Capture, oracle: &Oracle<'_>, classes: &EquivalenceClasses, cas
 }
 
 /// Single outliers are left out of every calibration: that is no repair of an element.
-fn is_repair(finding: &armcal_belief::calib::Finding) -> bool {
-    finding.repaired && finding.kind != armcal_belief::calib::FindingKind::Outliers
+fn is_repair(finding: &Finding) -> bool {
+    finding.repaired && finding.kind != FindingKind::Outliers
 }
 
 fn findings(robot: &Robot, calibration: &Calibration) -> Vec<String> {
@@ -188,9 +195,15 @@ fn findings(robot: &Robot, calibration: &Calibration) -> Vec<String> {
     words.collect()
 }
 
+/// The arm that is believed in after a calibration that was given `robot`: what was repaired of the drawing belongs
+/// here.
+fn believed_robot(robot: &Robot, calibration: &Calibration) -> Robot {
+    calibration.scaled_robot(robot)
+}
+
 /// Distance of the tool as the calibrated arm believes it from where it is, at each target.
 fn true_error(rests: &[TrueRest], recording: &Recording, robot: &Robot, calibration: &Calibration) -> Option<Summary> {
-    let believed = calibration.scaled_robot(robot);
+    let believed = believed_robot(robot, calibration);
     let sensors = calibration.sensors(&believed).ok()?;
     let first = rests.first()?.start;
     let errors = reaches(recording, &believed, &[(first, &sensors)]).into_iter().filter_map(|rest| {
