@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use crate::falsified::cases::{Case, CaseKind};
 use crate::falsified::error::FalsifiedError;
-use crate::falsified::perturbation::{SensorFault, SoundReading};
+use crate::falsified::perturbation::{CaptureHalf, SensorFault, SoundReading};
 use armcal_belief::calib::surveyed;
 use armcal_belief::session::{self, Recorder, SessionInputs, Unwatched};
 use armcal_core::log::{Recording, RecordingHeader, RecordingWriter, read_recording};
@@ -102,6 +102,10 @@ impl Capture {
         Ok(Self { seed, robot, recording, rests, middle, middle_travel_rad })
     }
 
+    pub(super) fn half(&self, at: Stamp) -> CaptureHalf {
+        if at > self.middle { CaptureHalf::Second } else { CaptureHalf::First }
+    }
+
     /// The recording with the wrong readings of `fault`, if any, and with the views of `case`.
     pub(super) fn falsified(&self, case: &Case, fault: Option<&SensorFault>) -> Recording {
         let mut recording = self.recording.clone();
@@ -124,7 +128,7 @@ impl Capture {
             let sound = SoundReading {
                 travel_rad: sensor.nominal_travel_rad(sample.counts[joint]),
                 middle_travel_rad: self.middle_travel_rad[joint],
-                is_late: sample.stamp > self.middle,
+                half: self.half(sample.stamp),
             };
             let travel_rad = fault.travel_rad(&sensor, &sound);
             sample.counts[joint] = sensor.counts(sensor.spec.center_rad + travel_rad);

@@ -9,7 +9,7 @@
 
 use crate::falsified::capture::Capture;
 use crate::falsified::error::FalsifiedError;
-use crate::falsified::perturbation::{Perturbation, SoundReading, falsified_robot};
+use crate::falsified::perturbation::{CaptureHalf, Perturbation, SoundReading, falsified_robot};
 use armcal_belief::calib::bundle::{
     BundleInput, HyperparameterMode, Hyperparameters, Model, estimate, least_squares, model_for, reference,
 };
@@ -87,7 +87,7 @@ impl<'a> Oracle<'a> {
         let falsified = falsified_robot(&self.capture.robot, perturbations);
         let mut views = self.views.clone();
         for view in &mut views {
-            view.travel_rad = self.read(perturbations, &view.travel_rad, view.end > self.capture.middle);
+            view.travel_rad = self.read(perturbations, &view.travel_rad, self.capture.half(view.end));
         }
         let fit = least_squares(
             &BundleInput {
@@ -106,7 +106,7 @@ impl<'a> Oracle<'a> {
         let square = |angles: &JointAngles| {
             let right = &self.capture.robot;
             let travel = JointAngles::from_fn(angles.len(), |joint| angles[joint] - right.sensors[joint].center_rad);
-            let read = self.read(perturbations, &travel, true);
+            let read = self.read(perturbations, &travel, CaptureHalf::Second);
             let believed = JointAngles::from_fn(angles.len(), |joint| {
                 let model = &sensors.models[joint];
                 model.correction.angle_rad(&model.spec, read[joint], &still, 0.0)
@@ -120,13 +120,13 @@ impl<'a> Oracle<'a> {
     }
 
     /// What the sensors read under the faults among `perturbations`.
-    fn read(&self, perturbations: &[Perturbation], travel_rad: &JointAngles, is_late: bool) -> JointAngles {
+    fn read(&self, perturbations: &[Perturbation], travel_rad: &JointAngles, half: CaptureHalf) -> JointAngles {
         let mut read = *travel_rad;
         for fault in perturbations.iter().filter_map(Perturbation::sensor_fault) {
             let joint = fault.joint;
             let sensor = SensorModel::nominal(&self.capture.robot.sensors[joint]);
             let middle_travel_rad = self.capture.middle_travel_rad[joint];
-            let sound = SoundReading { travel_rad: travel_rad[joint], middle_travel_rad, is_late };
+            let sound = SoundReading { travel_rad: travel_rad[joint], middle_travel_rad, half };
             read[joint] = fault.travel_rad(&sensor, &sound);
         }
         read

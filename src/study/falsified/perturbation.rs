@@ -59,16 +59,23 @@ pub(super) struct SoundReading {
     pub travel_rad: f64,
     /// The same in the middle of the capture.
     pub middle_travel_rad: f64,
-    /// After the middle of the capture.
-    pub is_late: bool,
+    pub half: CaptureHalf,
+}
+
+/// Before or after the middle of the capture; what comes after the capture belongs to the second half.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum CaptureHalf {
+    First,
+    Second,
 }
 
 impl SensorFault {
     /// What the sensor reads, travel by the datasheet, rad.
     pub(super) fn travel_rad(&self, sensor: &SensorModel, sound: &SoundReading) -> f64 {
+        let is_late = sound.half == CaptureHalf::Second;
         match self.reading {
-            WrongReading::Stuck if sound.is_late => sound.middle_travel_rad,
-            WrongReading::Slipped(by_rad) if sound.is_late => sound.travel_rad + by_rad,
+            WrongReading::Stuck if is_late => sound.middle_travel_rad,
+            WrongReading::Slipped(by_rad) if is_late => sound.travel_rad + by_rad,
             WrongReading::Stuck | WrongReading::Slipped(_) => sound.travel_rad,
             WrongReading::Dead => sensor.nominal_travel_rad(0.0),
             WrongReading::Reversed => -sound.travel_rad,
