@@ -10,7 +10,8 @@ use crate::falsified::naming::{causes_of_finding, first_causes, right_causes};
 use crate::falsified::oracle::{Oracle, OracleEffect};
 use crate::falsified::perturbation::{Perturbation, falsified_robot};
 use armcal_belief::calib::{Calibration, Finding, FindingKind, Status, calibrate_with_survey};
-use armcal_belief::verify::reaches;
+use armcal_belief::verify::{Belief, reaches};
+use armcal_core::kinematics::LinkCorrections;
 use armcal_core::log::Recording;
 use armcal_core::robot::{Robot, Vehicle};
 use armcal_core::routine::{Method, Routine};
@@ -206,9 +207,11 @@ fn true_error(rests: &[TrueRest], recording: &Recording, robot: &Robot, calibrat
     let believed = believed_robot(robot, calibration);
     let sensors = calibration.sensors(&believed).ok()?;
     let first = rests.first()?.start;
-    let errors = reaches(recording, &believed, &[(first, &sensors)]).into_iter().filter_map(|rest| {
+    // The links are in the robot already.
+    let belief = Belief { from: first, sensors: &sensors, links: LinkCorrections::default() };
+    let errors = reaches(recording, &believed, &[belief]).into_iter().filter_map(|rest| {
         let true_rest = rests.iter().find(|true_rest| true_rest.start == rest.start)?;
-        Some((rest.believed_tool_m - true_rest.tool_m).norm())
+        Some((rest.believed_tool.origin().vector() - true_rest.tool_m).norm())
     });
     Summary::of(&errors.collect::<Vec<f64>>())
 }
