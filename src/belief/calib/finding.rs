@@ -32,6 +32,10 @@ pub struct Finding {
 pub enum FindingKind {
     /// A surveyed tag; the size is its distance from the survey.
     TagMoved,
+    /// A tag of another size than the survey's; the size is the relative difference.
+    TagSize,
+    /// Two tags, each with the other's id.
+    TagSwapped,
     /// The lens against robot.toml; the size is the relative error of its focal length.
     Lens,
     /// A link's length or twist against the drawing.

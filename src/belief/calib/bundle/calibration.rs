@@ -150,7 +150,7 @@ impl<'a> BundleCalibration<'a> {
                 self.moved.report(&estimated.estimate, &mut calibration);
                 let targets = task.map(|task| task_angles(&diagnosis.robot, task)).unwrap_or_default();
                 let at = if targets.is_empty() { found.view_angles() } else { targets };
-                found.report_drawing(&at, &mut calibration);
+                found.report_drawing(&self.drawing, &at, &mut calibration);
             }
         }
         Ok(calibration)
@@ -158,14 +158,14 @@ impl<'a> BundleCalibration<'a> {
 
     /// Whether survey or drawing are to be taken otherwise than so far.
     fn revise(&mut self, setup: &BundleSetup, estimate: &Estimate<'_>) -> bool {
-        if self.moved.revise(estimate, &mut self.data.robot) {
+        let by_moved_tag = self.moved.gain_nats(estimate);
+        if let Some(better) = self.drawing.better(&setup.input(), estimate, by_moved_tag) {
+            self.drawing.apply_new_faults(&better, &mut self.data.robot);
+            self.moved.resurveyed(&self.data.robot, &better);
+            self.drawing = better;
             return true;
         }
-        let better = self.drawing.better(&setup.input(), estimate);
-        if let Some(drawing) = &better {
-            self.drawing.clone_from(drawing);
-        }
-        better.is_some()
+        self.moved.revise(estimate, &mut self.data.robot)
     }
 
     fn nothing_observable(&self) -> CalibError {

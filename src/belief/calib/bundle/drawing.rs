@@ -1,13 +1,17 @@
 //! Is the drawing right? Other explanations of the same views, compared by their evidence.
 //!
-//! Where the score test says that links, base or mount would explain the data better than joint sensors do, the views
-//! are estimated again under each alternative: link geometry with columns of its own, and a lens with columns. The one
-//! of most evidence stays if it brings [`MIN_GAIN_NATS`] or more. A tag that was moved is freed before that
-//! (module `freed_tags`).
+//! Where the score test says that links, base or mount would explain the data better than joint sensors do, where tags
+//! are not where they should be or do not fit at all, the views are estimated again under each alternative: link
+//! geometry with columns of its own, a lens with columns, a tag of another size, two tags exchanged. The one of most
+//! evidence stays if it brings [`MIN_GAIN_NATS`] or more, and more than freeing a tag that was moved (module
+//! `freed_tags`) would. Then all begins again, until nothing explains more.
 //!
 //! The score test says beforehand what links may bring: with the pull s and the information I of trial columns z under
 //! a prior of variance a^2, Laplace's approximation is `ln Z(a) - ln Z(0) = s^T (I + a^-2)^-1 s / 2 - ln det(1 + a^2 I)
 //! / 2`. The element and size of the largest gain are where the sizes of the links' errors start from.
+//!
+//! Alternatives reject other observations. For the comparison, a rejected one costs what it is rejected at (a truncated
+//! square), so that explaining it counts.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
@@ -15,14 +19,18 @@ use crate::calib::bundle::estimate::{Estimate, estimate};
 use crate::calib::bundle::evidence::SCALE_BOUNDS;
 use crate::calib::bundle::input::BundleInput;
 use crate::calib::bundle::model_selection::log_evidence;
+use crate::calib::bundle::outliers::REJECT;
 use crate::calib::bundle::score_test::GeometryElement;
+use crate::calib::bundle::tag_identity::TagFault;
 use armcal_core::joints::MAX_JOINTS;
+use armcal_core::robot::Robot;
 
-/// What of the drawing is estimated beside the joint sensors.
+/// What of the drawing is taken otherwise, or estimated beside the joint sensors.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Drawing {
     pub links: Option<LinkStart>,
     pub has_lens: bool,
+    pub tags: Vec<TagFault>,
 }
 
 /// Where the sizes of the links' errors start from, and how many joints have columns.
@@ -38,45 +46,77 @@ pub(crate) struct LinkStart {
 const MIN_GAIN_NATS: f64 = 6.0;
 /// Sizes of an error that are tried, over robot.toml's.
 const MULTIPLES: [f64; 5] = [2.0, 5.0, 10.0, 20.0, 40.0];
+/// A lens that is not the one of robot.toml may be off by so many of a measured lens's sigmas.
+const LENS_SCALE: f64 = 10.0;
 
 impl Drawing {
     /// Gives `input` the columns of this drawing.
     pub(crate) fn apply(&self, input: &mut BundleInput<'_>) {
-        input.model.lens |= self.has_lens;
+        if self.has_lens {
+            input.model.lens = true;
+            input.scales.lens_scale = LENS_SCALE;
+        }
         let Some(start) = &self.links else { return };
         input.model.n_links = input.model.n_links.max(start.n_links);
-        let (link_std, multiples) = (&mut input.scales.link_std, &start.multiples);
-        for (std, by) in link_std.iter_mut().flatten().zip(multiples.iter().flatten()) {
-            *std *= by;
+        let priors = &input.robot.geometry;
+        for ([shift, turn], [by_shift, by_turn]) in input.scales.link_std.iter_mut().zip(&start.multiples) {
+            *shift = by_shift * priors.link_position_std_m;
+            *turn = by_turn * priors.link_rotation_std_rad;
         }
         input.scales.mount_scale = start.mount_scale;
     }
 
-    /// The drawing of most evidence, if another than this explains the views much better; `input` has this one's
-    /// columns, `found` is its estimate.
-    pub(crate) fn better(&self, input: &BundleInput<'_>, found: &Estimate<'_>) -> Option<Self> {
+    /// The drawing of most evidence, if another than this explains the views much better, and by more than
+    /// `least_nats`; `input` has this one's columns and tags, `found` is its estimate.
+    pub(crate) fn better(&self, input: &BundleInput<'_>, found: &Estimate<'_>, least_nats: f64) -> Option<Self> {
         if input.joint_prior.is_some() {
             // A warm start knows the links from before, and its own test of agreement.
             return None;
         }
-        let (links, gain) = found.link_start();
-        if self.links.is_some() || gain < MIN_GAIN_NATS {
-            return None;
-        }
-        let mut alternatives = vec![Self { links: Some(links), ..self.clone() }];
-        if !self.has_lens && !found.has_positions() {
-            alternatives.push(Self { has_lens: true, ..self.clone() });
-        }
-        let least = log_evidence(found) + MIN_GAIN_NATS;
-        let evidence = |drawing: &Self| {
-            let mut input = input.clone();
-            drawing.apply(&mut input);
-            estimate(&input).map_or(f64::NEG_INFINITY, |found| log_evidence(&found))
-        };
-        let all = alternatives.into_iter().map(|drawing| (evidence(&drawing), drawing));
-        let (best, drawing) = all.max_by(|a, b| a.0.total_cmp(&b.0))?;
-        (best > least).then_some(drawing)
+        let before = evidence(found);
+        let gains = self.alternatives(input, found).into_iter().filter_map(|drawing| {
+            let mut robot = input.robot.clone();
+            self.apply_new_faults(&drawing, &mut robot);
+            let mut other = BundleInput { robot: &robot, ..input.clone() };
+            drawing.apply(&mut other);
+            let gain = evidence(&estimate(&other)?) - before;
+            Some((gain, drawing))
+        });
+        let (gain, drawing) = gains.max_by(|a, b| a.0.total_cmp(&b.0))?;
+        (gain > least_nats.max(MIN_GAIN_NATS)).then_some(drawing)
     }
+
+    /// What else may explain the views, none where nothing is suspicious.
+    fn alternatives(&self, input: &BundleInput<'_>, found: &Estimate<'_>) -> Vec<Self> {
+        let (links, gain) = found.link_start();
+        let faults = found.tag_faults(input.views);
+        let is_suspicious = gain > MIN_GAIN_NATS || !faults.is_empty() || !found.departed_tags().is_empty();
+        let mut all = Vec::new();
+        if self.links.is_none() && gain > MIN_GAIN_NATS {
+            all.push(Self { links: Some(links), ..self.clone() });
+        }
+        if is_suspicious && !self.has_lens && !found.has_positions() {
+            all.push(Self { has_lens: true, ..self.clone() });
+        }
+        let new = faults.into_iter().filter(|fault| !self.tags.iter().any(|known| known.meets(fault)));
+        all.extend(new.map(|fault| {
+            let tags = self.tags.iter().copied().chain([fault]).collect();
+            Self { tags, ..self.clone() }
+        }));
+        all
+    }
+
+    /// Where `next` takes tags otherwise than this, `robot` does, too.
+    pub(crate) fn apply_new_faults(&self, next: &Self, robot: &mut Robot) {
+        next.tags[self.tags.len()..].iter().for_each(|fault| fault.apply(robot));
+    }
+}
+
+/// Logarithm of the evidence, rejected observations at the cost that they are rejected at.
+fn evidence(found: &Estimate<'_>) -> f64 {
+    let rejected = found.problem.observations.iter().filter(|observation| !observation.is_used);
+    let n = rejected.map(|observation| observation.data.n_coordinates()).sum::<usize>() as f64;
+    log_evidence(found) - n * (0.5 * REJECT + found.problem.scales.noise.ln())
 }
 
 impl Estimate<'_> {

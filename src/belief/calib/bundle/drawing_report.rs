@@ -7,8 +7,10 @@
 
 use nalgebra::{DVector, Matrix3, Vector3};
 
+use crate::calib::bundle::drawing::Drawing;
 use crate::calib::bundle::estimate::Estimate;
 use crate::calib::bundle::score_test::ToolJacobian;
+use crate::calib::bundle::tag_identity::TagFault;
 use crate::calib::finding::{Finding, FindingKind, FindingUnit};
 use crate::calib::result::calibration::Calibration;
 use armcal_core::joints::JointAngles;
@@ -34,7 +36,7 @@ struct Departure {
 
 impl Estimate<'_> {
     /// Writes what is not as drawn to `calibration`, the most telling first; `task`: angles at which the tool matters.
-    pub(crate) fn report_drawing(&self, task: &[JointAngles], calibration: &mut Calibration) {
+    pub(crate) fn report_drawing(&self, drawing: &Drawing, task: &[JointAngles], calibration: &mut Calibration) {
         let mut found: Vec<Departure> = self.link_departures(task).collect();
         if self.problem.layout.links.is_empty() {
             found.clear();
@@ -47,7 +49,8 @@ impl Estimate<'_> {
         found.truncate(n.max(1));
         let mut findings: Vec<Finding> = found.iter().map(Departure::finding).collect();
         let mut words: Vec<String> = found.iter().map(Departure::words).collect();
-        if let Some((finding, word)) = self.lens_finding() {
+        let of_tags = drawing.tags.iter().map(|fault| self.tag_finding(fault));
+        for (finding, word) in self.lens_finding().into_iter().chain(of_tags) {
             findings.push(finding);
             words.push(word);
         }
@@ -125,6 +128,27 @@ impl Estimate<'_> {
             Finding { kind: FindingKind::Lens, name, size, unit, tool_error_m: None, time_s: None, repaired: true },
             words,
         ))
+    }
+
+    fn tag_finding(&self, fault: &TagFault) -> (Finding, String) {
+        let tags = &self.problem.robot.tags;
+        let (kind, name, size, words) = match *fault {
+            TagFault::Swapped([a, b]) => {
+                let (a, b) = (tags[a].id, tags[b].id);
+                let words = format!("tags {a} and {b} hang in each other's place: taken so; correct the survey");
+                (FindingKind::TagSwapped, format!("{a} and {b}"), None, words)
+            }
+            TagFault::Size { tag_idx, ratio } => {
+                let (id, size_mm) = (tags[tag_idx].id, 1e3 * tags[tag_idx].size_m);
+                let percent = 100.0 * (ratio - 1.0);
+                let words = format!(
+                    "tag {id} is {size_mm:.1} mm wide, {percent:+.1} % of the survey: taken so; measure it again"
+                );
+                (FindingKind::TagSize, id.to_string(), Some(ratio - 1.0), words)
+            }
+        };
+        let unit = size.map(|_| FindingUnit::One);
+        (Finding { kind, name, size, unit, tool_error_m: None, time_s: None, repaired: true }, words)
     }
 
     fn covariance3(&self, first: usize) -> Matrix3<f64> {

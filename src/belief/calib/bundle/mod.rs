@@ -36,6 +36,7 @@ mod score_test;
 mod setup;
 mod solve;
 mod tables;
+mod tag_identity;
 mod verdict;
 
 pub use calibration_prior::{CalibrationPrior, MOUNT_ROWS, PriorConsistency, with_mount_rows};

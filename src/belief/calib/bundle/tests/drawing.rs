@@ -32,7 +32,7 @@ fn case(robot: &Robot, real: &Robot, seed: u64) -> Case {
 /// `input` with the drawing that explains the views better, if there is one.
 fn revised<'a>(input: &BundleInput<'a>) -> Option<BundleInput<'a>> {
     let first = estimate(input).expect("solved");
-    let drawing = Drawing::default().better(input, &first)?;
+    let drawing = Drawing::default().better(input, &first, 0.0)?;
     let mut wider = input.clone();
     drawing.apply(&mut wider);
     Some(wider)
