@@ -31,6 +31,7 @@ pub enum FindingKind {
     Link,
     CameraMount,
     Base,
+    Tool,
     SensorSlip,
     SensorFailed,
     SensorWorn,

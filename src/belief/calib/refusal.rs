@@ -74,6 +74,19 @@ pub enum Refusal {
         limit: f64,
         expected: [f64; 2],
     },
+    /// The tool touched surveyed surfaces elsewhere than it was predicted to.
+    Touch {
+        /// Along the normal of the surface that is farthest off: positive is out of it.
+        off_m: f64,
+        surface: String,
+        chi2: f64,
+        limit: f64,
+        /// What explains it, alike.
+        causes: Vec<String>,
+        link: String,
+        /// What a wrong tool point would be off by, axes of `link`.
+        tool_point_m: [f64; 3],
+    },
     /// The prior rests on the same messages.
     PriorReused,
     /// The prior's covariance has no inverse.
@@ -168,6 +181,9 @@ impl Refusal {
             Self::BeyondDatasheet { .. } => "check joint and sensor, and robot.toml against the sensor that is there",
             Self::Outliers { .. } => "check tag map, tag ids and the drawing",
             Self::Innovations { .. } => "look for what moved or warmed up during the capture",
+            Self::Touch { .. } => {
+                "measure the tool point ([tool] point_m of robot.toml), the links beyond the camera and the camera's mount"
+            }
             Self::PriorReused => "give a prior that was made from other views",
             Self::PriorSingular => "make the prior anew",
             Self::PriorContradicted { .. } => "calibrate without the prior",
@@ -230,6 +246,7 @@ impl fmt::Display for Refusal {
             Self::PriorContradicted { .. }
             | Self::SensorFailed { .. }
             | Self::PriorsBeyondTolerance { .. }
+            | Self::Touch { .. }
             | Self::Innovations { .. } => self.fmt_long(f),
             Self::TooFewViewsSinceSlip { joint, evidence, views } => {
                 write!(f, "{joint}: {evidence}; {views} views are too few to calibrate it as it is now")
@@ -277,6 +294,16 @@ impl Refusal {
                 )?;
                 most.as_ref().map_or(Ok(()), |most| write!(f, "; most of it by the {most}"))
             }
+            Self::Touch { off_m, surface, chi2, limit, causes, link, tool_point_m: [x, y, z] } => write!(
+                f,
+                "touch: the tool is {:.0} mm from where it should be at {surface} (chi-square {chi2:.0}, limit \
+                 {limit:.0}): {}; as a tool point it would be off by [{:.1}, {:.1}, {:.1}] mm in the axes of {link}",
+                off_m.abs() * 1e3,
+                causes.join(", or "),
+                x * 1e3,
+                y * 1e3,
+                z * 1e3
+            ),
             Self::Innovations { quantity, per_dof, limit, expected: [low, high] } => write!(
                 f,
                 "{}: chi-square per degree of freedom is {per_dof:.2}, above {limit:.2} (expected in 95 % of cases: \

@@ -20,6 +20,8 @@ pub const GRIPPER_STATE: &str = "/gripper_state";
 pub const GRIPPER_COMMAND: &str = "/gripper_command";
 pub const TASK: &str = "/task";
 pub const TAG_SURVEY: &str = "/tag_survey";
+/// The tool against surveyed surfaces.
+pub const TOUCH: &str = "/touch";
 pub const MARKS: &str = "/marks";
 pub const LOG: &str = "/log";
 

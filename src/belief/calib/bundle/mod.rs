@@ -33,6 +33,7 @@ mod score_test;
 mod setup;
 mod solve;
 mod tables;
+mod touch_term;
 mod verdict;
 
 pub use calibration_prior::{CalibrationPrior, MOUNT_ROWS, PriorConsistency, with_mount_rows};

@@ -10,6 +10,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::calib::bundle::estimate::Estimate;
 use crate::calib::bundle::score_test::{GeometryElement, Score, ToolJacobian, columns};
+use crate::calib::bundle::touch_term::TouchUpdate;
 use crate::calib::finding::FindingUnit;
 use crate::calib::geometry_error::ErrorKind;
 use crate::calib::reservation::Reservation;
@@ -19,6 +20,8 @@ use armcal_core::joints::JointAngles;
 const UNSEEN_SHARE: f64 = 0.5;
 /// A reservation is worth a line where one sigma of it moves the tool by more than this share of the predicted error.
 const WORTH_SHARE: f64 = 0.5;
+/// Touches that tell an element to so many sigmas of its prior would show it where it is beyond the drawing's figure.
+const TOUCHED_SIGMAS: f64 = 5.0;
 
 /// An element of the geometry along one axis, with its prior.
 struct HeldElement {
@@ -27,6 +30,8 @@ struct HeldElement {
     prior_std: f64,
     /// Share of the prior's variance that the views leave.
     share_left: f64,
+    /// One sigma to which touches tell it; infinite without them.
+    touched_std: f64,
     /// Of the tool by one sigma, at each configuration, m.
     shifts: Vec<Vector3<f64>>,
     /// Whether the estimate has it as a parameter, so that its covariance has it already.
@@ -43,15 +48,31 @@ pub(crate) struct PriorImpact {
 
 impl Estimate<'_> {
     /// What the drawing leaves open at `task`, where the data alone predict `predicted_m`.
+    #[cfg(test)]
     pub(crate) fn prior_impact(&self, task: &[JointAngles], predicted_m: f64) -> PriorImpact {
-        let elements = self.held_elements(task);
+        self.prior_impact_with(None, task, predicted_m)
+    }
+
+    /// The same where touches tell of it, too; of the estimate by the views alone.
+    pub(crate) fn prior_impact_with(
+        &self,
+        touches: Option<&TouchUpdate>,
+        task: &[JointAngles],
+        predicted_m: f64,
+    ) -> PriorImpact {
+        let tool = self.tool_jacobians(task);
+        let elements = self.held_elements(touches, task, &tool);
         let covariance = |at: usize| {
+            if let Some(touches) = touches {
+                return touches.beside_parameters_m2(self.problem.robot, &tool[at]);
+            }
             let unmodelled = elements.iter().filter(|element| !element.is_estimated);
             unmodelled.map(|element| element.shifts[at] * element.shifts[at].transpose()).sum()
         };
         let mut reservations: Vec<Reservation> = elements
             .iter()
             .filter(|element| element.share_left > UNSEEN_SHARE && element.prior_std > 0.0)
+            .filter(|element| element.touched_std > TOUCHED_SIGMAS * element.prior_std)
             .map(HeldElement::reservation)
             .filter(|reservation| reservation.tool_error_m > WORTH_SHARE * predicted_m)
             .collect();
@@ -59,21 +80,25 @@ impl Estimate<'_> {
         PriorImpact { reservations, covariances_m2: (0..task.len()).map(covariance).collect() }
     }
 
-    fn held_elements(&self, task: &[JointAngles]) -> Vec<HeldElement> {
+    fn held_elements(
+        &self,
+        touches: Option<&TouchUpdate>,
+        task: &[JointAngles],
+        tool: &[ToolJacobian],
+    ) -> Vec<HeldElement> {
         let robot = self.problem.robot;
         let score = self.score();
-        let tool = self.tool_jacobians(task);
         let joints = (0..robot.tool.mount.n_joints).map(GeometryElement::Joint);
         let mount = self.problem.layout.mount.map(|_| GeometryElement::Mount);
         let mut elements = Vec::new();
         for element in joints.chain(mount) {
             for error in [ErrorKind::Shift, ErrorKind::Turn] {
                 for axis in 0..3 {
-                    elements.push(self.held_element(&score, (element, error, axis), &tool));
+                    elements.push(self.held_element(&score, (element, error, axis), tool, touches));
                 }
             }
         }
-        elements.extend((0..3).map(|axis| self.tool_point(axis, task)));
+        elements.extend((0..3).map(|axis| self.tool_point(axis, task, touches)));
         elements
     }
 
@@ -82,6 +107,7 @@ impl Estimate<'_> {
         score: &Score,
         (element, error, axis): (GeometryElement, ErrorKind, usize),
         tool: &[ToolJacobian],
+        touches: Option<&TouchUpdate>,
     ) -> HeldElement {
         let robot = self.problem.robot;
         let (priors, camera) = (&robot.geometry, &robot.camera);
@@ -104,11 +130,14 @@ impl Estimate<'_> {
         };
         let way = if error == ErrorKind::Shift { "shift along" } else { "turn about" };
         let what = format!("{name}, {way} {}", AXES[axis]);
-        HeldElement { what, unit, prior_std, share_left, shifts, is_estimated }
+        // The mount's prior is in the estimate, and is left there.
+        let own_std = if is_estimated { 0.0 } else { prior_std };
+        let touched_std = touches.map_or(f64::INFINITY, |touches| touches.std_of_trial(first, axis, own_std));
+        HeldElement { what, unit, prior_std, share_left, touched_std, shifts, is_estimated }
     }
 
     /// No view shows the tool's point.
-    fn tool_point(&self, axis: usize, task: &[JointAngles]) -> HeldElement {
+    fn tool_point(&self, axis: usize, task: &[JointAngles], touches: Option<&TouchUpdate>) -> HeldElement {
         let robot = self.problem.robot;
         let prior_std = robot.geometry.tool_position_std_m;
         let tool = &robot.tool.mount;
@@ -119,6 +148,7 @@ impl Estimate<'_> {
             unit: FindingUnit::Metre,
             prior_std,
             share_left: 1.0,
+            touched_std: touches.map_or(f64::INFINITY, |touches| touches.std_of_tool_point(robot, axis)),
             shifts: task.iter().map(shift).collect(),
             is_estimated: false,
         }

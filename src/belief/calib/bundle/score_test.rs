@@ -13,7 +13,8 @@ use crate::calib::bundle::observation_term::PoseInformation;
 use crate::calib::bundle::problem::WeightedMeasurement;
 use crate::calib::bundle::schur::{N_VIEW_PARAMETERS, SchurBlock};
 use crate::calib::geometry_error::ErrorKind;
-use crate::calib::parameters::Parameter;
+use crate::calib::parameters::{JointParameters, Parameter};
+use crate::calib::views::view::View;
 use armcal_core::joints::{JointAngles, MAX_JOINTS};
 use armcal_core::kinematics::LinkPoses;
 use armcal_core::robot::Robot;
@@ -226,11 +227,11 @@ impl Estimate<'_> {
 
 /// The tool at one configuration, and how it moves.
 pub(crate) struct ToolJacobian {
-    poses: LinkPoses,
+    pub(crate) poses: LinkPoses,
     /// Base frame.
-    tool_m: Vector3<f64>,
+    pub(crate) tool_m: Vector3<f64>,
     /// By the estimated joints' parameters, m per unit.
-    by_parameters: Vec<Vector3<f64>>,
+    pub(crate) by_parameters: Vec<Vector3<f64>>,
     n_joints: usize,
 }
 
@@ -250,6 +251,28 @@ impl ToolJacobian {
             poses.point_jacobian(joint, &tool_m) * parameter.kind.angle_derivative(spec, travel_rad[joint], &still, 0.0)
         };
         let by_parameters = parameters.iter().map(by).collect();
+        Self { by_parameters, tool_m, n_joints: tool.n_joints, poses }
+    }
+
+    /// By the readings of an arm at rest, under their conditions.
+    pub(crate) fn of_view(robot: &Robot, estimated: &[Parameter], at: &JointParameters, view: &View) -> Self {
+        let departure = view.conditions.departure_from(&at.reference);
+        let angles = JointAngles::from_fn(robot.n_joints(), |joint| {
+            let (spec, travel_rad) = (&robot.sensors[joint], view.travel_rad[joint]);
+            at.correction(joint).angle_rad(spec, travel_rad, &departure, view.approach[joint])
+        });
+        let poses = robot.chain.link_poses(&angles);
+        let tool = &robot.tool.mount;
+        let tool_m = poses.frame(tool).translation.vector;
+        let by = |&Parameter { joint, kind }: &Parameter| {
+            if joint >= tool.n_joints {
+                return Vector3::zeros();
+            }
+            let (spec, travel_rad) = (&robot.sensors[joint], view.travel_rad[joint]);
+            let by_angle = kind.angle_derivative(spec, travel_rad, &departure, view.approach[joint]);
+            poses.point_jacobian(joint, &tool_m) * by_angle
+        };
+        let by_parameters = estimated.iter().map(by).collect();
         Self { by_parameters, tool_m, n_joints: tool.n_joints, poses }
     }
 
