@@ -13,6 +13,7 @@ use super::gripper_tag::GripperTagFile;
 use super::joint_sensor::{SensorFile, check_sensors};
 use super::nominal::{Robot, ToolSpec, check_stowed};
 use super::self_collision;
+use super::shape::{PlacedShape, Shape};
 use super::survey::{TagFile, check_tags};
 use super::urdf::{UrdfChain, UrdfModel};
 use crate::spatial::{Base, Pose};
@@ -47,7 +48,10 @@ struct RobotFile {
 struct ToolFile {
     link: String,
     point_m: [f64; 3],
+    tip_radius_m: Option<f64>,
 }
+
+const TIP_RGB: [u8; 3] = [200, 205, 215];
 
 /// Of a Titan: 100 kg in air, 78 kg in sea water.
 fn default_buoyancy_fraction() -> f64 {
@@ -76,7 +80,7 @@ pub fn load_without_pairs(folder: &Path) -> Result<Robot, RobotError> {
     let chain = urdf.chain(&raw.base_link, &[&raw.tool.link, &raw.camera.link])?;
     let jaws = raw.gripper.as_ref().map(GripperFile::jaws).unwrap_or_default();
     let arm = UrdfChain { urdf: &urdf, base_link: &raw.base_link, chain: &chain };
-    let bodies = arm.bodies(jaws)?;
+    let mut bodies = arm.bodies(jaws)?;
     let sensors = check_sensors(&file, &raw.joint_sensor, &chain)?;
     let drive = DriveSpec {
         pump_l_per_min: raw.hydraulics.map(|hydraulics| hydraulics.check(&file)).transpose()?,
@@ -94,6 +98,14 @@ pub fn load_without_pairs(folder: &Path) -> Result<Robot, RobotError> {
     }
     let gripper = raw.gripper.map(|gripper| gripper.check(&file, &arm, &tool)).transpose()?;
     tool.link_from_frame *= nalgebra::Translation3::from(raw.tool.point_m);
+    if let Some(radius_m) = raw.tool.tip_radius_m {
+        let radius_m = FileIssue::check_range(&file, "tool.tip_radius_m", radius_m, 0.002..=0.2)?;
+        let owner_from_shape = tool.link_from_frame;
+        let tip = PlacedShape { owner_from_shape, shape: Shape::Sphere { radius_m }, color_rgb: TIP_RGB };
+        let body = &mut bodies[tool.n_joints];
+        body.visuals.push(tip.clone());
+        body.collisions.push(tip);
+    }
     let camera_mount = arm.attachment(&raw.camera.link)?;
     let camera = check_camera(&file, raw.camera, camera_mount)?;
     let tags = check_tags(&file, &raw.tag, raw.base_tag, &Pose::<Base, Base>::identity())?;
@@ -110,7 +122,7 @@ pub fn load_without_pairs(folder: &Path) -> Result<Robot, RobotError> {
         base_link: raw.base_link,
         stowed,
         buoyancy_fraction: FileIssue::check_range(&file, "buoyancy_fraction", raw.buoyancy_fraction, 0.0..=0.95)?,
-        tool: ToolSpec { mount: tool },
+        tool: ToolSpec { mount: tool, tip_radius_m: raw.tool.tip_radius_m },
         gripper,
         gripper_tag,
         base_tag: raw.base_tag,

@@ -32,8 +32,9 @@ pub(crate) const MIN_TOUCHES: usize = 3;
 const FALSE_ALARM: f64 = 1e-4;
 /// Above this quantile the touches are less sure than their sigmas say: the ratio of Birge (1932).
 const USUAL: f64 = 0.95;
-/// A cause that explains the touches nearly as well as the best one is of its class.
+/// A cause that leaves no more than this, or this share of all, beyond the best one is of its class.
 const ALIKE_CHI2: f64 = 6.0;
+const ALIKE_SHARE: f64 = 0.1;
 /// Directions of a cause that the touches tell less than this of, relative to the best one, are left out.
 const TOLD_SHARE: f64 = 1e-3;
 
@@ -229,9 +230,7 @@ impl TouchUpdate {
         if holds {
             return;
         }
-        let tool = self.tool_point(robot);
-        let shift_m: Vector3<f64> = tool.size.fixed_rows::<3>(0).into_owned();
-        let refusal = self.refusal(robot, tool);
+        let shift_m = self.tool_point_m(robot);
         calibration.findings.insert(
             0,
             Finding {
@@ -244,17 +243,17 @@ impl TouchUpdate {
                 repaired: false,
             },
         );
-        calibration.refuse_for([refusal]);
+        calibration.refuse_for([self.refusal(robot)]);
     }
 
-    fn refusal(&self, robot: &Robot, tool: Cause) -> Refusal {
+    pub(crate) fn refusal(&self, robot: &Robot) -> Refusal {
         let worst = self.innovations.iamax();
-        let tool_m = [tool.size[0], tool.size[1], tool.size[2]];
-        let mut causes = vec![tool, self.mount_turn()];
+        let mut causes = vec![self.tool_point(robot), self.mount_turn()];
         causes.extend((0..self.names.len()).map(|k| self.surface(k)));
         let best = causes.iter().map(|cause| cause.chi2_left).fold(f64::INFINITY, f64::min);
+        let alike = best + ALIKE_CHI2.max(ALIKE_SHARE * self.chi2);
         let class: Vec<String> =
-            causes.into_iter().filter(|cause| cause.chi2_left <= best + ALIKE_CHI2).map(|cause| cause.words).collect();
+            causes.into_iter().filter(|cause| cause.chi2_left <= alike).map(|cause| cause.words).collect();
         Refusal::Touch {
             off_m: self.innovations[worst],
             surface: self.names[worst].clone(),
@@ -262,8 +261,13 @@ impl TouchUpdate {
             limit: self.limit,
             causes: class,
             link: tool_link(robot),
-            tool_point_m: tool_m,
+            tool_point_m: self.tool_point_m(robot).into(),
         }
+    }
+
+    /// What a wrong tool point alone would be off by, axes of its link.
+    pub(crate) fn tool_point_m(&self, robot: &Robot) -> Vector3<f64> {
+        self.tool_point(robot).size.fixed_rows::<3>(0).into_owned()
     }
 
     fn tool_point(&self, robot: &Robot) -> Cause {
