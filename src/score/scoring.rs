@@ -41,7 +41,8 @@ pub struct ScoreInput<'a> {
 /// # Errors
 /// [`SimError::TruthFile`] when the truth cannot be read.
 pub fn score(input: &ScoreInput<'_>) -> Result<Scored, SimError> {
-    let truth = read_truth(input.truth)?;
+    let mut truth = read_truth(input.truth)?;
+    touch::leave_out_meant(&mut truth, input.recording, input.robot);
     let outcome = input.outcome;
     let beliefs: Vec<_> = outcome.epochs.iter().map(|epoch| (epoch.from, &epoch.sensors)).collect();
     let rests = reaches(input.recording, input.robot, &beliefs);
