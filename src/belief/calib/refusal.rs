@@ -84,7 +84,7 @@ pub enum Refusal {
         /// What explains it, alike.
         causes: Vec<String>,
         link: String,
-        /// What a wrong tool point would be off by, axes of `link`.
+        /// From the drawn tool point to one that would explain it best, axes of `link`.
         tool_point_m: [f64; 3],
     },
     /// The prior rests on the same messages.
@@ -173,7 +173,8 @@ impl Refusal {
             }
             Self::Overfitted { .. } => "capture more views, or more different ones",
             Self::PriorsBeyondTolerance { .. } => {
-                "put a tag on the gripper, or measure the arm and state its sigmas in [geometry] of robot.toml"
+                "put a tag on the gripper, touch three surveyed surfaces (step `touch`), or measure the arm and state its \
+                 sigmas in [geometry] of robot.toml"
             }
             Self::BeyondTolerance { .. } => "capture more views, or put a tag on the gripper",
             Self::Geometry(_) => "check the drawing against the arm",
@@ -297,7 +298,7 @@ impl Refusal {
             Self::Touch { off_m, surface, chi2, limit, causes, link, tool_point_m: [x, y, z] } => write!(
                 f,
                 "touch: the tool is {:.0} mm from where it should be at {surface} (chi-square {chi2:.0}, limit \
-                 {limit:.0}): {}; as a tool point it would be off by [{:.1}, {:.1}, {:.1}] mm in the axes of {link}",
+                 {limit:.0}): {}; a tool point [{:.1}, {:.1}, {:.1}] mm from the drawn one, in the axes of {link}, would explain it best",
                 off_m.abs() * 1e3,
                 causes.join(", or "),
                 x * 1e3,
@@ -362,7 +363,18 @@ mod tests {
             limit: 22.0,
             used_share: 0.4,
         };
-        let file = File { refusals: vec![geometry, Refusal::NotSolved { outcome: Outcome::Stalled }, contradicted] };
+        let touch = Refusal::Touch {
+            off_m: 0.018,
+            surface: "toe plate".to_owned(),
+            chi2: 250.0,
+            limit: 21.1,
+            causes: vec!["tool point or links beyond the camera".to_owned()],
+            link: "manipulator_link".to_owned(),
+            tool_point_m: [0.0, 0.02, -0.001],
+        };
+        assert!(touch.to_string().starts_with("touch: the tool is 18 mm from where it should be at toe plate"));
+        let file =
+            File { refusals: vec![geometry, Refusal::NotSolved { outcome: Outcome::Stalled }, contradicted, touch] };
         let text = toml::to_string(&file).expect("it has a TOML form");
         assert_eq!(toml::from_str::<File>(&text).expect("it reads"), file, "{text}");
     }

@@ -175,10 +175,10 @@ impl<'a> BundleCalibration<'a> {
                 let (found, innovations) = (estimated.by_views(), &diagnosis.innovations[..]);
                 let task = self.data.data.task.as_ref();
                 VerdictInput { input, found, innovations, task }.judge(&mut calibration);
-                self.state_reservations(estimated, &diagnosis, &mut calibration);
                 if let Some(touched) = &estimated.touches {
                     touched.update.judge(&self.data.robot, &mut calibration);
                 }
+                self.state_reservations(estimated, &diagnosis, &mut calibration);
                 self.moved.report(&estimated.estimate, &mut calibration);
             }
         }

@@ -17,6 +17,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix3, Vector3};
 use crate::calib::bundle::estimate::Estimate;
 use crate::calib::bundle::score_test::{GeometryElement, Score, ToolJacobian, columns};
 use crate::calib::bundle::solve::shifted;
+use crate::calib::bundle::verdict::UNSEEN_LINKS;
 use crate::calib::finding::{Finding, FindingKind, FindingUnit};
 use crate::calib::geometry_error::ErrorKind;
 use crate::calib::refusal::Refusal;
@@ -226,6 +227,7 @@ impl TouchUpdate {
         let holds = check.holds;
         if let Some(verdict) = &mut calibration.verdict {
             verdict.checks.push(check);
+            verdict.warnings.retain(|warning| warning != UNSEEN_LINKS);
         }
         if holds {
             return;

@@ -186,6 +186,35 @@ fn a_tool_point_two_centimetres_off_is_refused_and_measured() {
     assert!(worst_m < 0.01, "{worst_m} m");
 }
 
+/// Whatever a tool point is off by: accepted only where the predicted error says so.
+#[test]
+fn no_tool_point_is_accepted_far_beyond_its_prediction() {
+    let robot = titan();
+    let at = task(&robot);
+    let (mut accepted, mut worst) = (0, 0.0_f64);
+    for (k, size_m) in [0.003, 0.005, 0.007, 0.009, 0.012, 0.02].into_iter().enumerate() {
+        for seed in 0..20 {
+            let off_m = Vector3::ith(seed as usize % 3, size_m);
+            let case = case(&robot, 100 * k as u64 + seed, |real, _| {
+                real.tool.mount.link_from_frame.translation.vector += off_m;
+            });
+            let found = estimate(&input(&robot, &case.views, &case.model)).expect("solved");
+            let update = found.touch_update(&case.touches).expect("touches");
+            if update.chi2 > update.limit {
+                continue;
+            }
+            accepted += 1;
+            let touched = found.with_touches(&update);
+            let beside = found.prior_impact_with(Some(&update), &at, 0.0).covariances_m2;
+            let predicted: f64 = predicted_m2(&touched, &beside, &at).iter().map(Matrix3::trace).sum();
+            let error = |at: &JointAngles| tool_error(&robot, &case, &touched.parameters(), at).norm_squared();
+            worst = worst.max((at.iter().map(error).sum::<f64>() / predicted).sqrt());
+        }
+    }
+    println!("{accepted} of 120 accepted, at most {worst:.1} times the prediction");
+    assert!(worst < 3.0, "{worst}");
+}
+
 #[test]
 fn a_camera_turned_about_the_last_joint_before_it_is_refused() {
     let robot = titan();
