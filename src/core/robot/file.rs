@@ -2,8 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
+use nalgebra::Isometry3;
 use serde::Deserialize;
 
+use super::body::LinkBody;
 use super::camera::{CameraFile, check_camera};
 use super::drive::{DriveSpec, HydraulicsFile, MotionSpec, check_displacements};
 use super::error::{FileIssue, RobotError, parse_toml, read_text};
@@ -99,12 +101,8 @@ pub fn load_without_pairs(folder: &Path) -> Result<Robot, RobotError> {
     let gripper = raw.gripper.map(|gripper| gripper.check(&file, &arm, &tool)).transpose()?;
     tool.link_from_frame *= nalgebra::Translation3::from(raw.tool.point_m);
     if let Some(radius_m) = raw.tool.tip_radius_m {
-        let radius_m = FileIssue::check_range(&file, "tool.tip_radius_m", radius_m, 0.002..=0.2)?;
-        let owner_from_shape = tool.link_from_frame;
-        let tip = PlacedShape { owner_from_shape, shape: Shape::Sphere { radius_m }, color_rgb: TIP_RGB };
-        let body = &mut bodies[tool.n_joints];
-        body.visuals.push(tip.clone());
-        body.collisions.push(tip);
+        FileIssue::check_range(&file, "tool.tip_radius_m", radius_m, 0.002..=0.2)?;
+        add_tip(&mut bodies[tool.n_joints], tool.link_from_frame, radius_m);
     }
     let camera_mount = arm.attachment(&raw.camera.link)?;
     let camera = check_camera(&file, raw.camera, camera_mount)?;
@@ -135,6 +133,13 @@ pub fn load_without_pairs(folder: &Path) -> Result<Robot, RobotError> {
         camera,
         tags,
     })
+}
+
+/// The ball about the tool point, the last of its link's shapes.
+fn add_tip(body: &mut LinkBody, owner_from_shape: Isometry3<f64>, radius_m: f64) {
+    let tip = PlacedShape { owner_from_shape, shape: Shape::Sphere { radius_m }, color_rgb: TIP_RGB };
+    body.visuals.push(tip.clone());
+    body.collisions.push(tip);
 }
 
 /// The URDF that robot.toml names, or else a file of that name beside robot.toml, as in the attachments of a recording.
