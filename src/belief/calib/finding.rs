@@ -44,6 +44,8 @@ pub enum FindingKind {
     CameraMount,
     /// The base against the survey, or all tags together.
     Base,
+    /// The tool point or links beyond the camera, by touches of surveyed surfaces.
+    Tool,
     /// A sensor that slipped on its shaft; the size is the step.
     SensorSlip,
     /// A joint or sensor that failed otherwise.

@@ -219,7 +219,8 @@ fn true_error(rests: &[TrueRest], recording: &Recording, robot: &Robot, calibrat
 /// Tool's shift per unit by the reservation about the case's element, if there is one.
 fn reserved_per_unit(robot: &Robot, case: &Case, calibration: &Calibration) -> Option<f64> {
     let what = reserved_element(robot, case)?;
-    let found = calibration.reservations.iter().find(|reservation| reservation.what == what)?;
+    let of_any_axis = format!("{}any axis", what.trim_end_matches(['x', 'y', 'z']));
+    let found = calibration.reservations.iter().find(|r| r.what == what || r.what == of_any_axis)?;
     (found.prior_std > 0.0).then(|| found.tool_error_m / found.prior_std)
 }
 

@@ -46,6 +46,9 @@ pub(crate) struct LinkStart {
 const MIN_GAIN_NATS: f64 = 6.0;
 /// Sizes of an error that are tried, over robot.toml's.
 const MULTIPLES: [f64; 5] = [2.0, 5.0, 10.0, 20.0, 40.0];
+/// Scales that all tags may have been printed at, and how often the interval is cut: to some 0.03 %.
+const LOG_RATIOS: [f64; 2] = [-0.15, 0.15];
+const GOLDEN_STEPS: usize = 14;
 /// A lens that is not the one of robot.toml may be off by so many of a measured lens's sigmas.
 const LENS_SCALE: f64 = 10.0;
 
@@ -74,16 +77,31 @@ impl Drawing {
             return None;
         }
         let before = evidence(found);
-        let gains = self.alternatives(input, found).into_iter().filter_map(|drawing| {
+        let least_nats = least_nats.max(MIN_GAIN_NATS);
+        let gain = |drawing: &Self| {
             let mut robot = input.robot.clone();
-            self.apply_new_faults(&drawing, &mut robot);
+            self.apply_new_faults(drawing, &mut robot);
             let mut other = BundleInput { robot: &robot, ..input.clone() };
             drawing.apply(&mut other);
-            let gain = evidence(&estimate(&other)?) - before;
-            Some((gain, drawing))
-        });
-        let (gain, drawing) = gains.max_by(|a, b| a.0.total_cmp(&b.0))?;
-        (gain > least_nats.max(MIN_GAIN_NATS)).then_some(drawing)
+            estimate(&other).map_or(f64::NEG_INFINITY, |found| evidence(&found) - before)
+        };
+        let mut gains: Vec<(f64, Self)> =
+            self.alternatives(input, found).into_iter().map(|drawing| (gain(&drawing), drawing)).collect();
+        // Tags that were printed at another scale look much like another focal length.
+        let is_like_scale =
+            gains.iter().any(|(gain, drawing)| *gain > least_nats && drawing.has_lens && !self.has_lens);
+        let is_scaled = self.tags.iter().any(|fault| matches!(fault, TagFault::AllSizes { .. }));
+        if is_like_scale && !is_scaled {
+            let scaled = |ratio: f64| self.with_fault(TagFault::AllSizes { ratio });
+            let ratio = best_ratio(|ratio| gain(&scaled(ratio)));
+            gains.push((gain(&scaled(ratio)), scaled(ratio)));
+        }
+        let (gain, drawing) = gains.into_iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
+        (gain > least_nats).then_some(drawing)
+    }
+
+    fn with_fault(&self, fault: TagFault) -> Self {
+        Self { tags: self.tags.iter().copied().chain([fault]).collect(), ..self.clone() }
     }
 
     /// What else may explain the views, none where nothing is suspicious.
@@ -99,10 +117,7 @@ impl Drawing {
             all.push(Self { has_lens: true, ..self.clone() });
         }
         let new = faults.into_iter().filter(|fault| !self.tags.iter().any(|known| known.meets(fault)));
-        all.extend(new.map(|fault| {
-            let tags = self.tags.iter().copied().chain([fault]).collect();
-            Self { tags, ..self.clone() }
-        }));
+        all.extend(new.map(|fault| self.with_fault(fault)));
         all
     }
 
@@ -110,6 +125,27 @@ impl Drawing {
     pub(crate) fn apply_new_faults(&self, next: &Self, robot: &mut Robot) {
         next.tags[self.tags.len()..].iter().for_each(|fault| fault.apply(robot));
     }
+}
+
+/// Where `gain` is largest, by golden sections of the logarithm.
+fn best_ratio(gain: impl Fn(f64) -> f64) -> f64 {
+    let golden = 0.5 * (5f64.sqrt() - 1.0);
+    let gain = |log: f64| gain(log.exp());
+    let [mut low, mut high] = LOG_RATIOS;
+    let [mut a, mut b] = [high - golden * (high - low), low + golden * (high - low)];
+    let [mut at_a, mut at_b] = [gain(a), gain(b)];
+    for _ in 0..GOLDEN_STEPS {
+        if at_a > at_b {
+            (high, b, at_b) = (b, a, at_a);
+            a = high - golden * (high - low);
+            at_a = gain(a);
+        } else {
+            (low, a, at_a) = (a, b, at_b);
+            b = low + golden * (high - low);
+            at_b = gain(b);
+        }
+    }
+    (0.5 * (low + high)).exp()
 }
 
 /// Logarithm of the evidence, rejected observations at the cost that they are rejected at.

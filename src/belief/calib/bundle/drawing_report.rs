@@ -12,12 +12,19 @@ use crate::calib::bundle::estimate::Estimate;
 use crate::calib::bundle::score_test::ToolJacobian;
 use crate::calib::bundle::tag_identity::TagFault;
 use crate::calib::finding::{Finding, FindingKind, FindingUnit};
+use crate::calib::geometry_error::{ErrorKind, GeometryError};
+use crate::calib::refusal::Refusal;
 use crate::calib::result::calibration::Calibration;
 use armcal_core::joints::JointAngles;
+use armcal_core::robot::Robot;
 use armcal_core::spatial::log;
 
 /// Sigmas, of the drawing's prior and of the estimate alike, from which an element is named.
 const NAMED_SIGMAS: f64 = 4.0;
+
+/// A base that is off by less than this at arm's length refuses nothing, m.
+const WORTH_M: f64 = 0.004;
+const REACH_M: f64 = 1.0;
 
 /// Three numbers of the drawing that were estimated.
 struct Departure {
@@ -49,6 +56,10 @@ impl Estimate<'_> {
         found.truncate(n.max(1));
         let mut findings: Vec<Finding> = found.iter().map(Departure::finding).collect();
         let mut words: Vec<String> = found.iter().map(Departure::words).collect();
+        if let Some(base) = found.iter().find(|departure| departure.is_undecided()) {
+            // Base or tags: the tool follows the one, and not the other.
+            calibration.refuse_first_for([Refusal::Geometry(base.geometry_error(self.problem.robot))]);
+        }
         let of_tags = drawing.tags.iter().map(|fault| self.tag_finding(fault));
         for (finding, word) in self.lens_finding().into_iter().chain(of_tags) {
             findings.push(finding);
@@ -146,6 +157,11 @@ impl Estimate<'_> {
                 );
                 (FindingKind::TagSize, id.to_string(), Some(ratio - 1.0), words)
             }
+            TagFault::AllSizes { ratio } => {
+                let percent = 100.0 * (ratio - 1.0);
+                let words = format!("all tags are {percent:+.1} % of the survey's size: taken so; measure one again");
+                (FindingKind::TagSize, "all".to_owned(), Some(ratio - 1.0), words)
+            }
         };
         let unit = size.map(|_| FindingUnit::One);
         (Finding { kind, name, size, unit, tool_error_m: None, time_s: None, repaired: true }, words)
@@ -180,6 +196,26 @@ impl Departure {
         self.sigmas.min(self.sure_sigmas)
     }
 
+    /// A base that is not as drawn and tags that hang elsewhere all together look the same, and differ at the tool.
+    fn is_undecided(&self) -> bool {
+        let size_m = self.size.norm() * if self.unit == FindingUnit::Radian { REACH_M } else { 1.0 };
+        self.kind == FindingKind::Base
+            && self.weight() > NAMED_SIGMAS
+            && size_m.max(self.tool_m.unwrap_or(0.0)) > WORTH_M
+    }
+
+    fn geometry_error(&self, robot: &Robot) -> GeometryError {
+        GeometryError {
+            element: self.name.clone(),
+            joint: Some(robot.chain.joints()[0].name.clone()),
+            error: if self.unit == FindingUnit::Radian { ErrorKind::Turn } else { ErrorKind::Shift },
+            size: self.size.into(),
+            chi2: self.sure_sigmas.powi(2),
+            limit: NAMED_SIGMAS.powi(2),
+            tool_error_m: self.tool_m.unwrap_or(0.0),
+        }
+    }
+
     fn finding(&self) -> Finding {
         Finding {
             kind: self.kind,
@@ -188,7 +224,7 @@ impl Departure {
             unit: Some(self.unit),
             tool_error_m: self.tool_m,
             time_s: None,
-            repaired: true,
+            repaired: !self.is_undecided(),
         }
     }
 

@@ -40,7 +40,7 @@ impl MovedTags {
                 TagFault::Swapped(pair) => {
                     pair.iter().for_each(|&tag| self.surveyed[tag].base_from_tag = robot.tags[tag].base_from_tag);
                 }
-                TagFault::Size { tag_idx, .. } => self.surveyed[tag_idx].size_m = robot.tags[tag_idx].size_m,
+                TagFault::Size { .. } | TagFault::AllSizes { .. } => {}
             }
         }
     }

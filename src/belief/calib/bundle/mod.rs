@@ -37,6 +37,7 @@ mod setup;
 mod solve;
 mod tables;
 mod tag_identity;
+mod touch_term;
 mod verdict;
 
 pub use calibration_prior::{CalibrationPrior, MOUNT_ROWS, PriorConsistency, with_mount_rows};

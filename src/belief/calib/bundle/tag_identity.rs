@@ -20,6 +20,8 @@ pub(crate) enum TagFault {
     Swapped([usize; 2]),
     /// True size over the drawn one.
     Size { tag_idx: usize, ratio: f64 },
+    /// The same of all tags: printed at another scale.
+    AllSizes { ratio: f64 },
 }
 
 impl TagFault {
@@ -32,6 +34,7 @@ impl TagFault {
                 robot.tags[b].base_from_tag = place;
             }
             Self::Size { tag_idx, ratio } => robot.tags[tag_idx].size_m *= ratio,
+            Self::AllSizes { ratio } => robot.tags.iter_mut().for_each(|tag| tag.size_m *= ratio),
         }
     }
 
@@ -39,6 +42,7 @@ impl TagFault {
         match *self {
             Self::Swapped(pair) => pair.to_vec(),
             Self::Size { tag_idx, .. } => vec![tag_idx],
+            Self::AllSizes { .. } => Vec::new(),
         }
     }
 

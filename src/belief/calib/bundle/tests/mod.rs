@@ -9,3 +9,4 @@ mod moved_tags;
 mod reservations;
 mod score_test;
 mod statistics;
+mod touches;
