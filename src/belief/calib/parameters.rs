@@ -7,6 +7,7 @@
 use armcal_core::robot::{JointSensorSpec, Robot};
 use armcal_core::sensor::{ArmSensors, ConditionChange, Conditions, Correction, N_SHAPE, Terms, nonlinearity_basis};
 use armcal_core::streams::MAX_JOINTS;
+use armcal_core::time::Stamp;
 
 /// Gain (dimensionless, 1 = datasheet) and offset (rad) of every joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,6 +43,8 @@ impl JointParameters {
             ParameterKind::OffsetPerMpa => self.terms[parameter.joint].offset_rad_per_mpa,
             ParameterKind::DriftPerH => self.terms[parameter.joint].drift_rad_per_h,
             ParameterKind::HalfBacklash => self.terms[parameter.joint].half_backlash_rad,
+            // These are the sensors as they are now.
+            ParameterKind::StepBefore(_) => 0.0,
         }
     }
 
@@ -55,6 +58,7 @@ impl JointParameters {
             ParameterKind::OffsetPerMpa => self.terms[parameter.joint].offset_rad_per_mpa = value,
             ParameterKind::DriftPerH => self.terms[parameter.joint].drift_rad_per_h = value,
             ParameterKind::HalfBacklash => self.terms[parameter.joint].half_backlash_rad = value,
+            ParameterKind::StepBefore(_) => {}
         }
     }
 
@@ -92,10 +96,12 @@ pub enum ParameterKind {
     OffsetPerMpa,
     DriftPerH,
     HalfBacklash,
+    /// What the angle was more at the same reading before the sensor slipped: in views that end before this stamp, rad.
+    StepBefore(Stamp),
 }
 
 impl ParameterKind {
-    /// All of them, in their order.
+    /// All that a sensor keeps, in their order.
     pub fn all() -> impl Iterator<Item = Self> {
         let shape = (0..N_SHAPE as u8).map(Self::Shape);
         let rest = [Self::OffsetPerK, Self::GainPerK, Self::OffsetPerMpa, Self::DriftPerH, Self::HalfBacklash];
@@ -120,6 +126,7 @@ impl ParameterKind {
             Self::OffsetPerMpa => departure.pressure_mpa,
             Self::DriftPerH => departure.elapsed_h,
             Self::HalfBacklash => approach,
+            Self::StepBefore(_) => 0.0,
         }
     }
 }
@@ -144,6 +151,12 @@ impl Parameter {
         }
     }
 
+    /// Whether it tells of the sensor before it slipped, and not of the sensor as it is.
+    #[must_use]
+    pub fn is_step(self) -> bool {
+        matches!(self.kind, ParameterKind::StepBefore(_))
+    }
+
     /// `shoulder_yaw gain`.
     #[must_use]
     pub fn name(self, robot: &Robot) -> String {
@@ -156,6 +169,7 @@ impl Parameter {
             ParameterKind::OffsetPerMpa => "offset per MPa",
             ParameterKind::DriftPerH => "drift per h",
             ParameterKind::HalfBacklash => "half play",
+            ParameterKind::StepBefore(_) => "step",
         };
         format!("{} {kind}", robot.sensors[self.joint].joint)
     }

@@ -2,6 +2,7 @@
 
 use crate::calib::bundle::calibration_prior::PriorConsistency;
 use crate::calib::bundle::estimate::{Estimate, estimate};
+use crate::calib::bundle::failure_detection::FailureSearch;
 use crate::calib::bundle::failure_impact::FailureImpact;
 use crate::calib::bundle::failures::Failure;
 use crate::calib::bundle::freed_tags::MovedTags;
@@ -113,7 +114,10 @@ impl<'a> BundleCalibration<'a> {
             return self.calibrate();
         }
         let failures = match self.purpose {
-            EstimatePurpose::Final => first.failures(&self.data.robot, &views, estimated.as_ref().map(|(e, _)| e)),
+            EstimatePurpose::Final => {
+                let search = FailureSearch { robot: &self.data.robot, views: &views, prior: self.prior };
+                search.failures(&declared, estimated.as_ref().map(|(estimate, _)| estimate))
+            }
             EstimatePurpose::Interim => declared.clone(),
         };
         let second;
@@ -174,13 +178,14 @@ impl<'a> BundleCalibration<'a> {
         let Estimated { setup, estimate, .. } = estimated;
         let robot = &self.data.robot;
         let without_failed = setup.without_failed(&estimate.parameters());
-        let views = setup.with_estimated_angles(estimate, &without_failed);
+        let with_steps = setup.with_estimated_angles(estimate, &without_failed);
         // Held-out views of a freed joint are linearized where the camera saw it.
-        let input = BundleInput { views: &views, ..setup.input() };
+        let input = BundleInput { views: &with_steps, ..setup.input() };
         let (held_out, innovations) = match self.purpose {
             EstimatePurpose::Final => cross_validated(&input, estimate),
             EstimatePurpose::Interim => (FoldSums::default().metrics(), Vec::new()),
         };
+        let views = estimate.as_read_now(&with_steps);
         let parameters = estimate.joint_parameters().to_vec();
         let residual_std_rad = std::array::from_fn(|joint| match robot.sensors.get(joint) {
             // Nothing is known of a joint distal to the camera but its datasheet.
@@ -188,7 +193,8 @@ impl<'a> BundleCalibration<'a> {
             _ => estimate.scales().joint_std_rad[joint],
         });
         let matrix = estimate.joint_covariance();
-        let covariance = ParameterCovariance { parameters, matrix, residual_std_rad: Some(residual_std_rad) };
+        let all = ParameterCovariance { parameters, matrix, residual_std_rad: Some(residual_std_rad) };
+        let covariance = all.without(|parameter| parameter.is_step());
         Diagnosis { robot: estimate.as_found(&setup.applied.robot), views, held_out, innovations, covariance }
     }
 
@@ -375,7 +381,7 @@ fn cross_validated(input: &BundleInput<'_>, all: &Estimate<'_>) -> (HeldOutMetri
         let with_places: Vec<(usize, View)> =
             held_out.iter().enumerate().map(|(n, view)| (n * FOLDS + fold, view.clone())).collect();
         innovations.extend(found.innovations(&part, &with_places, &all.outliers));
-        sums.add(&held_out, &found.as_found(input.robot), &found.parameters(), input.robot);
+        sums.add(&found.as_read_now(&held_out), &found.as_found(input.robot), &found.parameters(), input.robot);
     }
     (sums.metrics(), innovations)
 }

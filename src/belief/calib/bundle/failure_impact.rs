@@ -12,6 +12,9 @@ use armcal_core::robot::{FailedJoint, FailedKind, Robot};
 use armcal_core::stats::Summary;
 use armcal_core::streams::ReachTask;
 
+/// Fewer views do not tell where a sensor stands since it slipped from views in which it jumped.
+const MIN_VIEWS_SINCE: usize = 3;
+
 /// An estimate with failed joints, on the way to the tool.
 pub(crate) struct FailureImpact<'a> {
     pub datasheet: &'a Robot,
@@ -148,16 +151,21 @@ impl FailureImpact<'_> {
 
     /// Each failed joint as a finding: the estimate takes account of it.
     pub(crate) fn findings(&self) -> Vec<Finding> {
-        let of = |failure: &Failure| Finding {
-            kind: if failure.since.is_some() { FindingKind::SensorSlip } else { FindingKind::SensorFailed },
+        self.failures.iter().map(|failure| self.finding(failure)).collect()
+    }
+
+    fn finding(&self, failure: &Failure) -> Finding {
+        let kind = if failure.is_step() { FindingKind::SensorSlip } else { FindingKind::SensorFailed };
+        let size = failure.since.and_then(|since| self.found.step(failure.joint, self.views[since].end));
+        Finding {
+            kind,
             name: self.robot.sensors[failure.joint].joint.clone(),
-            size: failure.step_rad,
-            unit: failure.step_rad.map(|_| FindingUnit::Radian),
+            size: size.map(|(size_rad, _)| size_rad),
+            unit: size.map(|_| FindingUnit::Radian),
             tool_error_m: None,
             time_s: failure.since.and_then(|view_idx| self.since_first_view_s(view_idx)),
             repaired: true,
-        };
-        self.failures.iter().map(of).collect()
+        }
     }
 
     fn since_first_view_s(&self, view_idx: usize) -> Option<f64> {
@@ -172,8 +180,9 @@ impl FailureImpact<'_> {
 
     fn refusal(&self, failure: &Failure, table: &FailedJointTable) -> Option<Refusal> {
         let joint = table.joint.clone();
-        if failure.has_too_few_views_since(self.views.len()) {
-            let views = self.views.len() - failure.views.len();
+        if let Some(views) = failure.n_views_since(self.views)
+            && views < MIN_VIEWS_SINCE
+        {
             return Some(Refusal::TooFewViewsSinceSlip { joint, evidence: table.evidence.clone(), views });
         }
         let task = self.task?;

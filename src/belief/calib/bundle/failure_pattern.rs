@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use crate::calib::bundle::estimate::Estimate;
-use crate::calib::bundle::failures::{FAR_RAD, FAR_SIGMAS, SensorUse};
+use crate::calib::bundle::failures::{FAR_RAD, FAR_SIGMAS, SensorUse, slip_in_words};
 use crate::calib::views::view::View;
 use armcal_core::robot::Robot;
 use armcal_core::stats::quantile;
@@ -29,8 +29,8 @@ pub(crate) enum FailurePattern {
     Dead,
     /// The readings of these views are off.
     Single(Vec<usize>),
-    /// The readings are off against each other before and since a view.
-    Lasting { before: Vec<usize>, since: usize },
+    /// The readings are off against each other before and since a view, by so much, rad.
+    Lasting { since: usize, step_rad: f64 },
 }
 
 /// An angle that is spread by less than this many of its own sigma, or than `LOCKED_RAD`, does not change.
@@ -123,11 +123,7 @@ impl Readings {
         let is_clear = squares < STEP_LEAVES * without
             && step_rad.abs() > FAR_RAD.max(3.0 * sigma_rad)
             && sigma_rad < FOLLOWS * deviation(&self.angle_rad);
-        is_clear.then(|| {
-            let mut before = self.view_idx[..at].to_vec();
-            before.sort_unstable();
-            FailurePattern::Lasting { before, since: self.view_idx[at] }
-        })
+        is_clear.then(|| FailurePattern::Lasting { since: self.view_idx[at], step_rad })
     }
 
     /// Sum of squares about a straight line with a step at the `at`-th view, and the step; at the end there is none.
@@ -141,11 +137,6 @@ impl Readings {
         let x = matrix.cholesky()?.solve(&right);
         // Which way the reading went off: against the angle.
         Some(((0..self.len()).map(|k| (self.angle_rad[k] - row(k).dot(&x)).powi(2)).sum(), -x[2]))
-    }
-
-    /// By how much the readings stepped at the `at`-th view.
-    pub(crate) fn step_rad(&self, at: usize) -> Option<f64> {
-        self.squares_with_step(at).map(|(_, step_rad)| step_rad)
     }
 
     /// Distances from the line of least absolute deviations, and its slope (iteratively reweighted least squares).
@@ -202,16 +193,7 @@ impl Readings {
                 let poses: Vec<u32> = of.iter().map(|&k| pose(k)).collect();
                 format!("the reading is off in {} of {n} views (poses {poses:?})", of.len())
             }
-            FailurePattern::Lasting { before, since } => {
-                let step = self.step_rad(before.len()).unwrap_or(0.0).to_degrees();
-                let after = n - before.len();
-                format!(
-                    "the sensor slipped by {step:.2} deg between {before} views and {after} views, the first of them \
-                     pose {}",
-                    pose(*since),
-                    before = before.len()
-                )
-            }
+            FailurePattern::Lasting { since, step_rad } => slip_in_words(*step_rad, views, *since),
         }
     }
 }

@@ -31,13 +31,15 @@ mod robust_start;
 mod schur;
 mod score_test;
 mod setup;
+mod slips;
 mod solve;
+mod step_test;
 mod tables;
 mod verdict;
 
 pub use calibration_prior::{CalibrationPrior, MOUNT_ROWS, PriorConsistency, with_mount_rows};
 pub use estimate::{Estimate, LeastSquares, estimate, least_squares};
-pub use failure_detection::failures;
+pub use failure_detection::FailureSearch;
 pub use failures::{Failure, FailureAdjusted, FailureSource, SensorUse};
 pub use innovations::{Innovations, JointInnovation};
 pub use input::{BundleInput, HyperparameterMode};

@@ -97,7 +97,7 @@ fn with<'a>(input: &BundleInput<'a>, term: OptionalTerm) -> BundleInput<'a> {
 }
 
 /// Up to what all models of the same data share.
-fn log_evidence(found: &Estimate<'_>) -> f64 {
+pub(crate) fn log_evidence(found: &Estimate<'_>) -> f64 {
     let (problem, normal) = (&found.problem, &found.solved.normal);
     let log_det = |matrix: &nalgebra::DMatrix<f64>| {
         Cholesky::new(matrix.clone()).map(|f| 2.0 * f.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>())

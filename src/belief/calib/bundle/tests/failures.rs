@@ -3,7 +3,7 @@
 use rand::RngExt;
 
 use crate::calib::bundle::estimate::Estimate;
-use crate::calib::bundle::failure_detection::failures;
+use crate::calib::bundle::failure_detection::FailureSearch;
 use crate::calib::bundle::failures::{Failure, FailureAdjusted, FailureSource, SensorUse};
 use crate::calib::bundle::input::HyperparameterMode;
 use crate::calib::bundle::model::Hyperparameters;
@@ -44,7 +44,8 @@ fn case(seed: u64, locked: Option<usize>) -> Case {
 fn found_failures(case: &Case, declared: &[Failure]) -> Vec<Failure> {
     let applied = FailureAdjusted::new(&case.robot, &case.views, declared, &JointParameters::default());
     let found = applied.estimate(HyperparameterMode::Fitted);
-    failures(&case.robot, &case.views, declared, found.as_ref())
+    let search = FailureSearch { robot: &case.robot, views: &case.views, prior: None };
+    search.failures(declared, found.as_ref())
 }
 
 /// What a broken wire reads: noise about zero counts.

@@ -7,4 +7,5 @@ mod failures;
 mod moved_tags;
 mod reservations;
 mod score_test;
+mod slips;
 mod statistics;
