@@ -1,5 +1,6 @@
 //! Belief: estimates and plans from messages of the arm alone.
 #![forbid(unsafe_code)]
+#![warn(missing_docs)]
 
 pub mod calib;
 pub mod plan;

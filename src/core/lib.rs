@@ -1,5 +1,6 @@
 //! What truth and belief share: arm, sensors, optics, messages, recordings, routines.
 #![forbid(unsafe_code)]
+#![warn(missing_docs)]
 
 pub mod input;
 pub mod joints;

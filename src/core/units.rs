@@ -7,7 +7,9 @@ pub enum Unit {
     Metres,
     /// Shown in degrees.
     Radians,
+    /// Shown as stored.
     Seconds,
+    /// Shown as stored.
     Pixels,
     /// Whole, from 0.
     Count,

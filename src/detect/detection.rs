@@ -16,6 +16,8 @@ pub struct DetectedTag {
 /// Tags and rejected candidates of one image; tags by id, rejects by id and position.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ImageDetections {
+    /// Those that passed all gates; an id once.
     pub tags: Vec<DetectedTag>,
+    /// Each with the first gate that it failed.
     pub rejects: Vec<DetectionReject>,
 }

@@ -1,6 +1,8 @@
 //! Errors of the detector.
 
+/// Why an image could not be searched for tags.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[expect(missing_docs, reason = "each variant's message says what it is")]
 pub enum DetectError {
     #[error("the image holds {bytes} bytes, not {width} x {height}")]
     Size { bytes: usize, width: usize, height: usize },

@@ -5,12 +5,11 @@ use std::path::Path;
 use nalgebra::Vector3;
 
 use crate::score::{JointScore, MarginSummary, ReachScore, Score, ScoreSide, margins, touch};
-use armcal_belief::session::{AssertResult, Outcome, ReachStep};
-use armcal_belief::verify::{ReachRest, reaches};
+use armcal_belief::session::{AssertResult, Epoch, Outcome, ReachStep};
+use armcal_belief::verify::{Belief, ReachRest, reaches};
 use armcal_core::log::Recording;
 use armcal_core::robot::Robot;
 use armcal_core::routine::AssertFigure;
-use armcal_core::spatial::{Base, Pose, Tool};
 use armcal_core::stats::Summary;
 use armcal_core::streams::ReachAttempt;
 use armcal_sim::SimError;
@@ -43,9 +42,9 @@ pub struct ScoreInput<'a> {
 pub fn score(input: &ScoreInput<'_>) -> Result<Scored, SimError> {
     let truth = read_truth(input.truth)?;
     let outcome = input.outcome;
-    let beliefs: Vec<_> = outcome.epochs.iter().map(|epoch| (epoch.from, &epoch.sensors)).collect();
+    let beliefs: Vec<_> = outcome.epochs.iter().map(belief).collect();
     let rests = reaches(input.recording, input.robot, &beliefs);
-    let compared: Vec<Compared> = rests.iter().filter_map(|rest| compare(rest, input.robot, &truth)).collect();
+    let compared: Vec<Compared> = rests.iter().filter_map(|rest| compare(rest, &truth)).collect();
     let of_step = |step: &ReachStep| -> Vec<&Compared> {
         compared.iter().filter(|c| (step.start..=step.end).contains(&c.rest.start)).collect()
     };
@@ -94,6 +93,10 @@ fn completed(limit: &AssertResult, score: &Score, truth: &Truth) -> AssertResult
     AssertResult { value, ..limit.clone() }
 }
 
+fn belief(epoch: &Epoch) -> Belief<'_> {
+    Belief { from: epoch.from, sensors: &epoch.sensors, links: epoch.links() }
+}
+
 /// One rest, believed and true.
 struct Compared<'a> {
     rest: &'a ReachRest,
@@ -103,17 +106,15 @@ struct Compared<'a> {
     joint_error_rad: Vec<f64>,
 }
 
-fn compare<'a>(rest: &'a ReachRest, robot: &Robot, truth: &Truth) -> Option<Compared<'a>> {
+fn compare<'a>(rest: &'a ReachRest, truth: &Truth) -> Option<Compared<'a>> {
     // The middle of the mark: the arm stands over all of it.
     let stamp = rest.start.plus_s(0.5 * rest.end.since_s(rest.start));
     let state = truth.state_at(stamp)?;
     let true_tool = state.base_from_tool;
-    let believed_tool: Pose<Base, Tool> =
-        Pose::from_isometry(robot.chain.link_poses(&rest.believed).frame(&robot.tool.mount));
     Some(Compared {
         rest,
-        tool_error_m: rest.believed_tool_m - true_tool.origin().vector(),
-        tool_error_rad: armcal_core::spatial::rotation_angle_between(&believed_tool, &true_tool),
+        tool_error_m: rest.believed_tool.origin().vector() - true_tool.origin().vector(),
+        tool_error_rad: armcal_core::spatial::rotation_angle_between(&rest.believed_tool, &true_tool),
         reach_error_m: (Vector3::from(rest.target_m) - true_tool.origin().vector()).norm(),
         joint_error_rad: rest.believed.iter().zip(state.angles.iter()).map(|(b, t)| wrapped(b - t)).collect(),
     })

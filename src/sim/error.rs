@@ -7,6 +7,7 @@ use armcal_core::streams::SinkError;
 
 /// Why there is no simulated world.
 #[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "each variant's message says what it is")]
 pub enum SimError {
     /// A wrong value in the routine's `[world]`.
     #[error(transparent)]

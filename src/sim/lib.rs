@@ -4,6 +4,7 @@
 //! poses, contacts) goes into a stream of its own, which only the score reads. Arm and vehicle are one multibody in
 //! water, on compliant oil columns; the vehicle moves as prescribed or floats free. Each error of [`WorldSpec`] has a
 //! random stream of its own, so that one seed gives one world, byte for byte.
+#![warn(missing_docs)]
 
 mod as_built;
 mod body_poses;

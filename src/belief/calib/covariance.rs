@@ -21,7 +21,9 @@ use armcal_core::streams::{JointAngles, MAX_JOINTS, ReachTask};
 /// Covariance of the free parameters, in their own units (gain: 1, offset: rad).
 #[derive(Clone, Debug)]
 pub struct ParameterCovariance {
+    /// In the order of the rows.
     pub parameters: Vec<Parameter>,
+    /// Square and symmetric; infinite where the data determine nothing.
     pub matrix: DMatrix<f64>,
     /// One sigma of what the parameters leave of each sensor's error at a new pose; `None` takes the datasheet's
     /// linearity.
@@ -31,6 +33,7 @@ pub struct ParameterCovariance {
 /// What the tool's position error is expected to be at the task's targets.
 #[derive(Clone, Debug)]
 pub struct ToolErrorPrediction {
+    /// Over the targets that inverse kinematics reaches.
     pub error_m: Summary,
     /// The arm's angles at each target that inverse kinematics reaches, and the error there, m.
     pub targets: Vec<(JointAngles, f64)>,

@@ -4,6 +4,7 @@ use armcal_core::log::StampRegression;
 
 /// Why no calibration came out at all; a poor one comes out refused instead.
 #[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "each variant's message says what it is")]
 pub enum CalibError {
     #[error("{recording}: the joints {recorded:?} are not those of robot `{robot}`: {expected:?}")]
     JointNames { recording: String, robot: String, recorded: Vec<String>, expected: Vec<String> },

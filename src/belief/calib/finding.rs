@@ -6,12 +6,14 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Finding {
+    /// What was found.
     pub kind: FindingKind,
     /// Joint, tag id or link.
     pub name: String,
     /// In `unit`; absent where the finding has no size.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub size: Option<f64>,
+    /// Absent where the finding has no size.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unit: Option<FindingUnit>,
     /// Root mean square over the task, where it was predicted.
@@ -24,26 +26,40 @@ pub struct Finding {
     pub repaired: bool,
 }
 
+/// What may be other than it was said to be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum FindingKind {
+    /// A surveyed tag; the size is its distance from the survey.
     TagMoved,
+    /// The lens against robot.toml; the size is the relative error of its focal length.
+    Lens,
+    /// A link's length or twist against the drawing.
     Link,
+    /// The camera's mount against the drawing, beyond its prior.
     CameraMount,
+    /// The base against the survey, or all tags together.
     Base,
+    /// A sensor that slipped on its shaft; the size is the step.
     SensorSlip,
+    /// A joint or sensor that failed otherwise.
     SensorFailed,
+    /// A sensor with more error from view to view than its datasheet allows; the size is one sigma.
     SensorWorn,
+    /// Tag observations that the fit rejected; the size is their number.
     Outliers,
 }
 
 /// SI, and plain numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum FindingUnit {
+    /// Lengths.
     #[serde(rename = "m")]
     Metre,
+    /// Angles.
     #[serde(rename = "rad")]
     Radian,
+    /// Counts.
     #[serde(rename = "1")]
     One,
 }

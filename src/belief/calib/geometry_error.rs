@@ -4,6 +4,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
+/// In which way an element of the geometry is off.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ErrorKind {
@@ -32,10 +33,13 @@ pub struct GeometryError {
     /// The joint that sits on it; none for the camera.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub joint: Option<String>,
+    /// Shifted or turned.
     pub error: ErrorKind,
     /// In the element's own axes, m or rad.
     pub size: [f64; 3],
+    /// Chi-square of the score test.
     pub chi2: f64,
+    /// Chi-square that chance exceeds too seldom to be believed.
     pub limit: f64,
     /// Root mean square over the task, m.
     pub tool_error_m: f64,

@@ -43,7 +43,7 @@ pub use refusal_conditions::{MIN_HELD_OUT_VIEWS, MIN_VIEWS_PER_PARAMETER, fewest
 pub use reservation::Reservation;
 pub use result::{
     Calibration, CalibrationFileError, CalibrationFiles, CameraMount, Check, CompactCalibration, CompactError,
-    CompactJoint, CovarianceTable, FailedJointTable, FitMetrics, HeldOutMetrics, JointResult, LookupTable,
+    CompactJoint, CovarianceTable, FailedJointTable, FitMetrics, HeldOutMetrics, JointResult, LinkResult, LookupTable,
     MAX_COMPACT_BYTES, MapResult, MapTag, ModelTable, ObservabilityTable, PredictedToolError, PriorTable,
     ReferenceTable, Status, SurveyCoverage, TermsTable, ValidRange, VerdictTable, covariance_file,
 };

@@ -4,6 +4,7 @@
 //! `theta_j = center_j + gain_j * travel_j + offset_j` (the paper's equation 2), and the terms of
 //! [`armcal_core::sensor`].
 
+use armcal_core::kinematics::LinkCorrections;
 use armcal_core::robot::{JointSensorSpec, Robot};
 use armcal_core::sensor::{ArmSensors, ConditionChange, Conditions, Correction, N_SHAPE, Terms, nonlinearity_basis};
 use armcal_core::streams::MAX_JOINTS;
@@ -12,10 +13,14 @@ use armcal_core::time::Stamp;
 /// Gain (dimensionless, 1 = datasheet) and offset (rad) of every joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointParameters {
+    /// Factor on the nominal travel, base first; 1 beyond the arm's joints.
     pub gain: [f64; MAX_JOINTS],
+    /// Added to the angle, base first.
     pub offset_rad: [f64; MAX_JOINTS],
     /// Zero under methods that estimate straight sensors.
     pub terms: [Terms; MAX_JOINTS],
+    /// Where joints sit on their parent links beyond the drawing; zero where that was not estimated.
+    pub links: LinkCorrections,
     /// What the terms are counted from.
     pub reference: Conditions,
 }
@@ -26,12 +31,14 @@ impl Default for JointParameters {
             gain: [1.0; MAX_JOINTS],
             offset_rad: [0.0; MAX_JOINTS],
             terms: [Terms::default(); MAX_JOINTS],
+            links: LinkCorrections::default(),
             reference: Conditions::default(),
         }
     }
 }
 
 impl JointParameters {
+    /// Value in the parameter's own unit.
     #[must_use]
     pub fn get(&self, parameter: Parameter) -> f64 {
         match parameter.kind {
@@ -45,9 +52,12 @@ impl JointParameters {
             ParameterKind::HalfBacklash => self.terms[parameter.joint].half_backlash_rad,
             // These are the sensors as they are now.
             ParameterKind::StepBefore(_) => 0.0,
+            ParameterKind::LinkShift(axis) => self.links[parameter.joint].shift_m[usize::from(axis)],
+            ParameterKind::LinkTurn(axis) => self.links[parameter.joint].turn_rad[usize::from(axis)],
         }
     }
 
+    /// Sets the value in the parameter's own unit.
     pub fn set(&mut self, parameter: Parameter, value: f64) {
         match parameter.kind {
             ParameterKind::Gain => self.gain[parameter.joint] = value,
@@ -59,9 +69,12 @@ impl JointParameters {
             ParameterKind::DriftPerH => self.terms[parameter.joint].drift_rad_per_h = value,
             ParameterKind::HalfBacklash => self.terms[parameter.joint].half_backlash_rad = value,
             ParameterKind::StepBefore(_) => {}
+            ParameterKind::LinkShift(axis) => self.links[parameter.joint].shift_m[usize::from(axis)] = value,
+            ParameterKind::LinkTurn(axis) => self.links[parameter.joint].turn_rad[usize::from(axis)] = value,
         }
     }
 
+    /// All parameters of one joint.
     #[must_use]
     pub fn correction(&self, joint: usize) -> Correction {
         Correction { gain: self.gain[joint], offset_rad: self.offset_rad[joint], terms: self.terms[joint] }
@@ -71,6 +84,15 @@ impl JointParameters {
     #[must_use]
     pub fn are_linear(&self) -> bool {
         self.terms.iter().all(Terms::are_zero)
+    }
+
+    /// `robot` with its links as estimated.
+    #[must_use]
+    pub fn with_links(&self, mut robot: Robot) -> Robot {
+        if self.links != LinkCorrections::default() {
+            robot.chain = robot.chain.corrected(&self.links);
+        }
+        robot
     }
 
     /// The sensors of `robot` with these parameters.
@@ -85,19 +107,31 @@ impl JointParameters {
     }
 }
 
+/// What a parameter of a joint sensor acts on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum ParameterKind {
+    /// Factor on the nominal travel.
     Gain,
+    /// Added to the angle, rad.
     Offset,
     /// A coefficient of the nonlinearity, 0 .. [`N_SHAPE`](armcal_core::sensor::N_SHAPE).
     Shape(u8),
+    /// Change of the offset with the oil temperature, rad/K.
     OffsetPerK,
+    /// Change of the gain with the oil temperature, 1/K.
     GainPerK,
+    /// Change of the offset with the ambient pressure, rad/MPa.
     OffsetPerMpa,
+    /// Change of the offset with time, rad/h.
     DriftPerH,
+    /// Half of the backlash between joint and sensor shaft, rad.
     HalfBacklash,
     /// What the angle was more at the same reading before the sensor slipped: in views that end before this stamp, rad.
     StepBefore(Stamp),
+    /// Of the joint's origin along an axis of its parent link, m.
+    LinkShift(u8),
+    /// Of the joint's attitude about an axis of its parent link, rad.
+    LinkTurn(u8),
 }
 
 impl ParameterKind {
@@ -106,6 +140,22 @@ impl ParameterKind {
         let shape = (0..N_SHAPE as u8).map(Self::Shape);
         let rest = [Self::OffsetPerK, Self::GainPerK, Self::OffsetPerMpa, Self::DriftPerH, Self::HalfBacklash];
         [Self::Gain, Self::Offset].into_iter().chain(shape).chain(rest)
+    }
+
+    /// All of a joint's place on its parent link, in their order.
+    pub fn all_of_link() -> impl Iterator<Item = Self> {
+        (0..3).map(Self::LinkShift).chain((0..3).map(Self::LinkTurn))
+    }
+
+    /// All of a joint: its sensor's, then its link's.
+    pub fn all_of_joint() -> impl Iterator<Item = Self> {
+        Self::all().chain(Self::all_of_link())
+    }
+
+    /// Whether it is of the link's geometry, not of a sensor.
+    #[must_use]
+    pub fn is_of_link(self) -> bool {
+        matches!(self, Self::LinkShift(_) | Self::LinkTurn(_))
     }
 
     /// d(angle)/d(parameter) at `travel_rad`, in rad per the parameter's unit.
@@ -127,14 +177,19 @@ impl ParameterKind {
             Self::DriftPerH => departure.elapsed_h,
             Self::HalfBacklash => approach,
             Self::StepBefore(_) => 0.0,
+            Self::LinkShift(_) | Self::LinkTurn(_) => 0.0,
         }
     }
 }
 
+const AXES: [&str; 3] = ["x", "y", "z"];
+
 /// One number that may be estimated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Parameter {
+    /// Index of the joint, base first.
     pub joint: usize,
+    /// Which of its parameters.
     pub kind: ParameterKind,
 }
 
@@ -170,6 +225,12 @@ impl Parameter {
             ParameterKind::DriftPerH => "drift per h",
             ParameterKind::HalfBacklash => "half play",
             ParameterKind::StepBefore(_) => "step",
+            ParameterKind::LinkShift(axis) => {
+                return format!("{} place {}", robot.sensors[self.joint].joint, AXES[usize::from(axis)]);
+            }
+            ParameterKind::LinkTurn(axis) => {
+                return format!("{} place r{}", robot.sensors[self.joint].joint, AXES[usize::from(axis)]);
+            }
         };
         format!("{} {kind}", robot.sensors[self.joint].joint)
     }

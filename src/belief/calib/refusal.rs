@@ -14,36 +14,51 @@ use crate::calib::geometry_error::GeometryError;
 pub enum Refusal {
     /// Fewer fitted views than gains and offsets to estimate.
     TooFewViews {
+        /// Fitted views that show a tag.
         views: usize,
+        /// Gains and offsets of the sensors that move the camera.
         parameters: usize,
     },
     /// The solver did not converge.
     NotSolved {
+        /// Stalled or degenerate.
         outcome: Outcome,
     },
+    /// Fewer held-out views than a verdict needs.
     TooFewHeldOutViews {
+        /// Held-out views that show a tag.
         views: usize,
+        /// The fewest that are enough.
         needed: usize,
     },
+    /// No held-out view shows a usable tag.
     NoHeldOutTag,
     /// Held-out views fit no better than with the datasheet's sensors.
     NoBetterThanDatasheet {
+        /// Root mean square distance between predicted and surveyed tags.
         held_out_m: f64,
+        /// The same with the datasheet's sensors.
         datasheet_m: f64,
     },
     /// Held-out views fit much worse than fitted ones.
     Overfitted {
+        /// Root mean square distance between predicted and surveyed tags.
         held_out_m: f64,
+        /// The same of the fitted views.
         fit_m: f64,
     },
     /// The predicted tool error (95 % of the targets) exceeds the task's tolerance.
     BeyondTolerance {
+        /// 95th percentile over the targets.
         predicted_m: f64,
+        /// The task's tolerance.
         tolerance_m: f64,
     },
     /// The same with what rests on the drawing alone.
     PriorsBeyondTolerance {
+        /// 95th percentile over the targets.
         predicted_m: f64,
+        /// The task's tolerance.
         tolerance_m: f64,
         /// The largest part of it.
         #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -53,25 +68,36 @@ pub enum Refusal {
     Geometry(GeometryError),
     /// A joint's error from view to view is beyond what such a sensor can have.
     SensorError {
+        /// Name of the joint in the URDF.
         joint: String,
+        /// One sigma from view to view, as fitted.
         std_rad: f64,
+        /// The datasheet's linearity.
         datasheet_std_rad: f64,
     },
     /// A gain or offset that no sensor of this datasheet has.
     BeyondDatasheet {
+        /// Name of the parameter: `shoulder_yaw gain`.
         parameter: String,
+        /// Distance from the datasheet in its prior's standard deviations.
         sigmas: f64,
     },
     /// Too many tag observations do not fit.
     Outliers {
+        /// Number of rejected tag observations.
         outliers: usize,
+        /// Number of all.
         observations: usize,
     },
     /// Held-out views are predicted worse than the estimate says.
     Innovations {
+        /// Which innovations.
         quantity: InnovationQuantity,
+        /// Chi-square over its degrees of freedom; 1 is expected.
         per_dof: f64,
+        /// Largest `per_dof` that is no warning.
         limit: f64,
+        /// Range of `per_dof` in 95 % of cases, by chance alone.
         expected: [f64; 2],
     },
     /// The prior rests on the same messages.
@@ -82,38 +108,57 @@ pub enum Refusal {
     PriorUntested,
     /// Prior and views cannot both be right.
     PriorContradicted {
+        /// The joint that is off the most in its own sigma.
         joint: String,
+        /// Mean over the views; positive where the new views put its angle above the prior's.
         off_rad: f64,
+        /// One sigma of `off_rad`.
         off_std_rad: f64,
+        /// Square of the estimate's move from the prior under its covariance.
         chi2: f64,
+        /// Number of directions that the views tell enough of to be tested.
         degrees_of_freedom: usize,
+        /// The 0.999 quantile of `chi2`.
         limit: f64,
+        /// Share of the observations that fit anything near the prior.
         used_share: f64,
     },
     /// A sensor slipped, and too few views show it as it is now.
     TooFewViewsSinceSlip {
+        /// Name of the joint in the URDF.
         joint: String,
+        /// What shows the slip, in words.
         evidence: String,
+        /// Views since the slip.
         views: usize,
     },
     /// A sensor failed whose joint the task needs.
     SensorFailed {
+        /// Name of the joint in the URDF.
         joint: String,
+        /// What is wrong with its sensor.
         kind: FailedKind,
+        /// Over the task's targets, 95th percentile, without the sensor; absent where nothing predicts it.
         tool_error_m: Option<f64>,
+        /// The same while the camera shows the joint's angle.
         tool_error_by_camera_m: Option<f64>,
+        /// The task's tolerance.
         tolerance_m: f64,
     },
 }
 
+/// Which innovations of held-out views are tested.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum InnovationQuantity {
+    /// Poses of the cameras, six numbers a view.
     CameraPoses,
+    /// All measured coordinates.
     Coordinates,
 }
 
 impl InnovationQuantity {
+    /// As sentences call it.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {

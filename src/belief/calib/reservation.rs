@@ -14,6 +14,7 @@ pub struct Reservation {
     pub what: String,
     /// One sigma of the drawing, in `unit`.
     pub prior_std: f64,
+    /// Unit of `prior_std`.
     pub unit: FindingUnit,
     /// By one sigma of the prior, root mean square over the task, m.
     pub tool_error_m: f64,

@@ -24,7 +24,7 @@ impl ParameterCovariance {
     /// Covariance of the tool's position (base frame, m^2) for an arm at `angles` under `conditions`.
     ///
     /// Estimated parameters enter with their covariance, the others with the datasheet's sigma, and every sensor with
-    /// what its parameters leave ([`Self::residual_std_rad`]) and its play.
+    /// what its parameters leave (`residual_std_rad`) and its play.
     #[must_use]
     pub fn tool_position_under_m2(
         &self,
@@ -34,7 +34,7 @@ impl ParameterCovariance {
         conditions: &Conditions,
     ) -> Matrix3<f64> {
         let at = Posture::new(robot, sensors, angles, conditions);
-        self.propagated(&at, |joint| at.poses.point_jacobian(joint, &at.tool_m))
+        self.propagated(&at, |moved, _| moved)
     }
 
     /// Covariance of the tool's pose: position (m) in the first three rows, then orientation (rad, a small turn about
@@ -48,22 +48,19 @@ impl ParameterCovariance {
         conditions: &Conditions,
     ) -> Matrix6<f64> {
         let at = Posture::new(robot, sensors, angles, conditions);
-        self.propagated(&at, |joint| {
-            let (by_angle, axis) = (at.poses.point_jacobian(joint, &at.tool_m), at.poses.axis(joint));
-            Vector6::new(by_angle.x, by_angle.y, by_angle.z, axis.x, axis.y, axis.z)
-        })
+        self.propagated(&at, |moved, turned| Vector6::new(moved.x, moved.y, moved.z, turned.x, turned.y, turned.z))
     }
 
-    /// To what has the derivative `by_angle` by each joint's angle.
+    /// To what `of_twist` makes of the tool's motion: of its point, and about the base's axes.
     fn propagated<const R: usize>(
         &self,
         at: &Posture<'_>,
-        by_angle: impl Fn(usize) -> SVector<f64, R>,
+        of_twist: impl Fn(Vector3<f64>, Vector3<f64>) -> SVector<f64, R>,
     ) -> SMatrix<f64, R, R> {
         let mut estimated = DMatrix::zeros(R, self.parameters.len());
         let mut covariance = SMatrix::<f64, R, R>::zeros();
         for joint in 0..at.robot.tool.mount.n_joints {
-            let by_angle = by_angle(joint);
+            let by_angle = of_twist(at.poses.point_jacobian(joint, &at.tool_m), *at.poses.axis(joint));
             let model = &at.sensors.models[joint];
             let travel_rad = model.travel_under_rad(at.angles[joint], &at.departure);
             for kind in ParameterKind::all() {
@@ -83,6 +80,11 @@ impl ParameterCovariance {
             let wandered_rad2 = self.wandered_rad2(at, joint) + model.correction.terms.half_backlash_rad.powi(2);
             if wandered_rad2 > 0.0 {
                 covariance += outer(&by_angle) * wandered_rad2;
+            }
+        }
+        for (column, parameter) in self.parameters.iter().enumerate() {
+            if let Some((moved, turned)) = at.by_link(*parameter) {
+                estimated.fixed_view_mut::<R, 1>(0, column).copy_from(&of_twist(moved, turned));
             }
         }
         let full = &estimated * &self.matrix * estimated.transpose();
@@ -120,6 +122,21 @@ impl<'a> Posture<'a> {
         let poses = robot.chain.link_poses(angles);
         let tool_m = poses.frame(&robot.tool.mount).translation.vector;
         Self { robot, sensors, angles, departure: conditions.departure_from(&sensors.reference), poses, tool_m }
+    }
+
+    /// The tool's motion by a parameter of link geometry; `None` for others.
+    fn by_link(&self, parameter: Parameter) -> Option<(Vector3<f64>, Vector3<f64>)> {
+        let joint = parameter.joint;
+        let along = |axis: u8| self.poses.link(joint).rotation * Vector3::ith(usize::from(axis), 1.0);
+        match parameter.kind {
+            _ if joint >= self.robot.tool.mount.n_joints => None,
+            ParameterKind::LinkShift(axis) => Some((along(axis), Vector3::zeros())),
+            ParameterKind::LinkTurn(axis) => {
+                let turned = along(axis);
+                Some((turned.cross(&(self.tool_m - self.poses.joint_origin(joint))), turned))
+            }
+            _ => None,
+        }
     }
 }
 

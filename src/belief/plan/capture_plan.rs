@@ -25,13 +25,16 @@ use armcal_core::streams::JointAngles;
 /// What is believed of an arm that has not moved yet.
 #[derive(Clone, Debug)]
 pub struct ArmBelief {
+    /// Sensors believed in.
     pub sensors: ArmSensors,
+    /// How far the true angles may be from those of `sensors`.
     pub bounds: JointErrorBounds,
     /// Where the two come from; `None`: the datasheet.
     pub calibration: Option<Calibration>,
 }
 
 impl ArmBelief {
+    /// The datasheet's sensors and their worst case.
     #[must_use]
     pub fn datasheet(robot: &Robot) -> Self {
         Self { sensors: ArmSensors::nominal(robot), bounds: JointErrorBounds::datasheet(robot), calibration: None }
@@ -50,35 +53,47 @@ impl ArmBelief {
 
 /// What is planned for.
 pub struct ItineraryRequest<'a> {
+    /// Nominal arm.
     pub robot: &'a Robot,
+    /// Task, capture settings and script.
     pub routine: &'a Routine,
     /// With the jaws at rest.
     pub clearance: &'a ClearanceModel<'a>,
     /// With the jaws as they are at the task's targets.
     pub clearance_at_targets: &'a ClearanceModel<'a>,
+    /// Sensors and error bounds of the arm.
     pub belief: &'a ArmBelief,
 }
 
 /// Poses in the order of their visit, each with the way there.
 #[derive(Clone, Debug)]
 pub struct CapturePlan {
+    /// The stowed configuration, believed angles.
     pub start: JointAngles,
+    /// Views that a path leads to, in the order of their visit.
     pub visits: Vec<PlannedVisit>,
+    /// Poses chosen that no path leads to.
     pub left_out: Vec<UnreachablePose>,
     /// Targets of the task that no pose reaches under this belief.
     pub warnings: Vec<String>,
+    /// Why there are no more views.
     pub stop: StopReason,
-    /// Before the first view, s: none. After the last, the arm's time.
+    /// By the arm's clock, from the start to the end of the last view; 0 without views.
     pub arm_time_s: f64,
 }
 
 /// One view and the way there.
 #[derive(Clone, Debug)]
 pub struct PlannedVisit {
+    /// Angles, tags and predicted tool error.
     pub pose: PlannedPose,
+    /// From the visit before, or from the start.
     pub path: Path,
+    /// Time of the path alone.
     pub duration_s: f64,
+    /// Least along the path.
     pub path_clearance: LeastClearance,
+    /// At the pose itself.
     pub clearance: LeastClearance,
     /// What is nearest to the believed arm at the pose.
     pub nearest: ClosestPair,
@@ -130,12 +145,15 @@ impl LeastClearance {
 /// A pose that no path leads to.
 #[derive(Clone, Debug)]
 pub struct UnreachablePose {
+    /// Believed angles of the pose.
     pub angles: JointAngles,
+    /// Why there is no path.
     pub why: PathError,
 }
 
 /// Why nothing could be planned.
 #[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "each variant's message says what it is")]
 pub enum ItineraryError {
     #[error(transparent)]
     Plan(#[from] PlanError),

@@ -6,6 +6,7 @@ use crate::plan::path::PathError;
 
 /// Why there is no plan.
 #[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "each variant's message says what it is")]
 pub enum PlanError {
     #[error("target {target} at ({x:.3}, {y:.3}, {z:.3}) m: {source}", x = at_m[0], y = at_m[1], z = at_m[2])]
     TargetOutOfReach { target: usize, at_m: [f64; 3], source: IkError },

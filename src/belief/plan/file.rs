@@ -16,10 +16,15 @@ use armcal_core::streams::{CaptureSet, JointAngles, MAX_JOINTS};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PlanFile {
+    /// Of the format: 1.
     pub version: u32,
+    /// Name of the routine.
     pub routine: String,
+    /// Name of the robot.
     pub robot: String,
+    /// Name of the vehicle.
     pub vehicle: String,
+    /// Of the plan's random numbers.
     pub seed: u64,
     /// Of the routine with what was replaced in it, the robot's and the vehicle's files, the prior and the program's
     /// version.
@@ -30,21 +35,28 @@ pub struct PlanFile {
     pub joints: Vec<String>,
     /// Free water kept beyond what the sensors may hide, m.
     pub margin_m: f64,
+    /// Believed angles where the arm starts.
     pub start_rad: Vec<f64>,
+    /// Readings there under the belief.
     pub start_counts: Vec<f64>,
     /// What of the task cannot be reached under this belief.
     pub warnings: Vec<String>,
+    /// Sums over the plan.
     pub totals: PlanTotals,
+    /// In the order of visits.
     pub pose: Vec<PoseTable>,
     /// `path[n]` leads to `pose[n]`.
     pub path: Vec<PathTable>,
+    /// Poses chosen that no path leads to.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub left_out: Vec<LeftOutTable>,
 }
 
+/// Sums over a plan.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PlanTotals {
+    /// Number of planned views.
     pub poses: usize,
     /// Poses chosen that no path leads to.
     pub left_out: usize,
@@ -57,19 +69,25 @@ pub struct PlanTotals {
     /// Root mean square over the task's targets after the last view; absent where nothing predicts it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub predicted_tool_error_m: Option<f64>,
+    /// Why there are no more views.
     pub stop_reason: StopReason,
 }
 
+/// One planned view.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PoseTable {
     /// From 1, in the order of visits.
     pub number: usize,
+    /// Whether the fit may use it.
     pub set: SetName,
+    /// Believed angles.
     pub angles_rad: Vec<f64>,
+    /// Set-point: the readings there under the belief.
     pub raw_counts: Vec<f64>,
     /// Largest distance of each joint's true angle from the believed one.
     pub error_bound_rad: Vec<f64>,
+    /// Root mean square over the task's targets once this view and those before it are fitted; absent where unknown.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub predicted_tool_error_m: Option<f64>,
     /// Of an arm that is where it is believed to be, beyond what the vehicle's motion takes; 0.4 stands for all above.
@@ -81,6 +99,7 @@ pub struct PoseTable {
     pub clearance_between: Vec<String>,
     /// By the arm's clock since the start, when the view is taken.
     pub arm_time_s: f64,
+    /// Surveyed tags that the view is planned for.
     pub tags: Vec<TagTable>,
 }
 
@@ -88,39 +107,52 @@ pub struct PoseTable {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SetName {
+    /// The fit uses it.
     Fit,
+    /// Only the verdict uses it.
     HeldOut,
 }
 
+/// A tag that a view is planned for.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TagTable {
+    /// Number of the tag.
     pub id: u32,
     /// That the camera sees it, under the belief.
     pub probability: f64,
 }
 
+/// The way to one view.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PathTable {
     /// 0 is the start.
     pub from: usize,
+    /// Number of the pose that it leads to.
     pub to: usize,
+    /// Time of the motion alone.
     pub duration_s: f64,
+    /// Least of an arm that is where it is believed to be, by samples.
     pub clearance_m: f64,
+    /// Least of every arm within the error bounds.
     pub proven_clearance_m: f64,
     /// Both ends included; straight lines in joint space between, each from rest to rest.
     pub waypoints_rad: Vec<Vec<f64>>,
+    /// Readings at the waypoints under the belief.
     pub waypoints_counts: Vec<Vec<f64>>,
     /// Of the edge behind each waypoint but the last; those that must be driven slowly take longer than their joints
     /// need.
     pub edge_durations_s: Vec<f64>,
 }
 
+/// A pose that no path leads to.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LeftOutTable {
+    /// Believed angles.
     pub angles_rad: Vec<f64>,
+    /// Why there is no path.
     pub reason: String,
 }
 
@@ -254,10 +286,15 @@ impl PlanFile {
 /// Names and hashes of what was planned for.
 #[derive(Clone, Debug)]
 pub struct PlanHeader {
+    /// Name of the routine.
     pub routine: String,
+    /// Name of the vehicle.
     pub vehicle: String,
+    /// Of the plan's random numbers.
     pub seed: u64,
+    /// See [`PlanFile::inputs_hash`].
     pub inputs_hash: String,
+    /// See [`PlanFile::margin_m`].
     pub margin_m: f64,
 }
 

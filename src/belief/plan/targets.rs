@@ -43,9 +43,11 @@ pub fn plan_targets(
 
 /// What to reach and how.
 pub struct TargetRequest<'a> {
+    /// Tool positions, base frame.
     pub targets_m: &'a [[f64; 3]],
     /// Postures to stay near, one a target.
     pub preferred: Option<&'a [JointAngles]>,
+    /// Clearance to keep.
     pub margin_m: f64,
 }
 

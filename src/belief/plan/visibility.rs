@@ -10,7 +10,9 @@ use armcal_core::streams::JointAngles;
 /// Conditions under which a detector reads a tag reliably.
 #[derive(Clone, Copy, Debug)]
 pub struct VisibilityModel {
+    /// Largest distance from the camera to the tag's centre.
     pub max_range_m: f64,
+    /// Smallest distance from the camera to the tag's centre.
     pub min_range_m: f64,
     /// Between the tag's normal and the line to the camera.
     pub max_incidence_rad: f64,

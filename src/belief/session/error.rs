@@ -7,6 +7,7 @@ use armcal_core::streams::ArmError;
 
 /// The reason why a run ended early.
 #[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "each variant's message says what it is")]
 pub enum SessionError {
     #[error(transparent)]
     Plan(#[from] PlanError),

@@ -1,6 +1,7 @@
 //! What a run leaves, as far as the arm itself can tell.
 
 use crate::calib::Calibration;
+use armcal_core::kinematics::LinkCorrections;
 use armcal_core::routine::AssertFigure;
 use armcal_core::sensor::ArmSensors;
 use armcal_core::streams::{JointAngles, ReachAttempt};
@@ -17,6 +18,7 @@ pub struct Outcome {
     pub poses_skipped: usize,
     /// Targets given up, over all attempts.
     pub targets_skipped: usize,
+    /// Time of the whole run, by the arm's clock.
     pub duration_s: f64,
     /// Time for which the arm was moving, not standing, s.
     pub motion_s: f64,
@@ -28,10 +30,13 @@ pub struct Outcome {
     pub epochs: Vec<Epoch>,
     /// Captured views, in their order.
     pub visits: Vec<Visit>,
+    /// Updates of the interim estimate, over all captures.
     pub renewals: Vec<EstimateUpdate>,
     /// Why the last capture took no more views.
     pub capture_ended: Option<String>,
+    /// In the order of the script.
     pub reaches: Vec<ReachStep>,
+    /// Every limit in the order of the script, with those that it did not come to.
     pub asserts: Vec<AssertResult>,
     /// Why the script ended before its last step.
     pub stopped: Option<String>,
@@ -40,16 +45,28 @@ pub struct Outcome {
 /// The sensors that the arm believed in from a moment on.
 #[derive(Clone, Debug)]
 pub struct Epoch {
+    /// Start of this belief, by the arm's clock.
     pub from: Stamp,
+    /// Sensors believed in from then until the next epoch.
     pub sensors: ArmSensors,
     /// Where they come from; `None` for the datasheet.
     pub calibration: Option<Calibration>,
 }
 
+impl Epoch {
+    /// The links believed in, beyond the drawing.
+    #[must_use]
+    pub fn links(&self) -> LinkCorrections {
+        self.calibration.as_ref().map(Calibration::link_corrections).unwrap_or_default()
+    }
+}
+
 /// A captured view, and what was believed just before it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Visit {
+    /// Start of the dwell, by the arm's clock.
     pub at: Stamp,
+    /// Joint angles by the readings under the belief of that moment.
     pub believed: JointAngles,
     /// Views that this belief rests on.
     pub belief_views: usize,
@@ -58,12 +75,14 @@ pub struct Visit {
     pub link_q99_m: Vec<f64>,
     /// Root mean square over the task, m.
     pub expected_tool_error_m: Option<f64>,
+    /// Sum over the surveyed tags of the probability that the camera sees them there.
     pub tags_expected: f64,
 }
 
 /// A renewal of the belief while views were captured.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EstimateUpdate {
+    /// Number of views captured so far in this capture.
     pub views: usize,
     /// Since the capture began.
     pub elapsed_s: f64,
@@ -76,8 +95,11 @@ pub struct EstimateUpdate {
 pub struct ReachStep {
     /// Number of the step in the script, from 1.
     pub step: usize,
+    /// Whether the arm believed in a calibration.
     pub attempt: ReachAttempt,
+    /// Start of the step, by the arm's clock.
     pub start: Stamp,
+    /// End of the step.
     pub end: Stamp,
 }
 
@@ -86,7 +108,9 @@ pub struct ReachStep {
 pub struct AssertResult {
     /// Number of the step in the script, from 1.
     pub step: usize,
+    /// The figure that the limit is for.
     pub figure: AssertFigure,
+    /// In the figure's unit; a minimum for the clearance, else a maximum.
     pub limit: f64,
     /// `None`: the arm itself cannot know it, or there is no such figure.
     pub value: Option<f64>,

@@ -30,12 +30,15 @@ pub trait Progress {
 /// A planned motion before its start.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MotionAhead {
+    /// Names of the joints, base first.
     pub joints: Vec<String>,
     /// Believed.
     pub from: JointAngles,
+    /// Believed.
     pub to: JointAngles,
     /// Number of straight edges of the path.
     pub edges: usize,
+    /// Planned time from rest to rest, without settling.
     pub duration_s: f64,
     /// Certified clearance of every arm within the error bounds, m, less the bound of the vehicle's motion; `None` for
     /// motions with another proof (scale identification, end stops).
@@ -45,6 +48,7 @@ pub struct MotionAhead {
 /// An operator's answer to a motion.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Approval {
+    /// The motion begins.
     Approve,
     /// The arm waits where it is, and asks again.
     Hold,

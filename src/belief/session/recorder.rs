@@ -23,6 +23,7 @@ pub struct Recorder {
 }
 
 impl Recorder {
+    /// Writes to `writer`; no reading is known yet.
     #[must_use]
     pub fn new(writer: RecordingWriter) -> Self {
         Self {
@@ -45,6 +46,7 @@ impl Recorder {
         read_recording(self.writer.path())
     }
 
+    /// The writer, to add to the recording or to finish it.
     #[must_use]
     pub fn into_writer(self) -> RecordingWriter {
         self.writer

@@ -15,6 +15,8 @@ use armcal_core::streams::{Arm, JointAngles, LogLevel, Mark, MarkKind, Message, 
 /// Shares of the clearance that are tried in this order for a path from a place that the whole of it does not let the
 /// arm leave.
 const START_SHARES: [f64; 3] = [0.5, 0.2, 0.05];
+/// How far from a joint the arm may be that its link's turn moves, m.
+const LINK_REACH_M: f64 = 2.0;
 
 /// Carries out the routine's script.
 ///
@@ -75,8 +77,12 @@ impl ScriptRunner<'_, '_> {
         self.driver.progress.update(phase, done, total, elapsed_s);
     }
 
+    /// Clearance to keep; more by what links are off the drawing, which the bodies that clearances are computed with
+    /// follow.
     pub fn margin_m(&self) -> f64 {
-        self.setup.routine.capture.clearance_m
+        let links = self.epochs.last().map(Epoch::links).unwrap_or_default();
+        let by_links_m: f64 = links.iter().map(|link| link.shift_m.norm() + LINK_REACH_M * link.turn_rad.norm()).sum();
+        self.setup.routine.capture.clearance_m + by_links_m
     }
 
     /// Whether the arm believes in a calibration.
@@ -265,6 +271,7 @@ impl ScriptRunner<'_, '_> {
     fn believe(&mut self, calibration: &Calibration) -> Result<(), SessionError> {
         let wrong = |error: CalibrationFileError| SessionError::Step { step: 0, problem: error.to_string() };
         let sensors = calibration.sensors(self.setup.robot).map_err(wrong)?;
+        self.robot.chain = self.setup.robot.chain.corrected(&calibration.link_corrections());
         self.bounds = self.kept_clear(self.bounds_of(calibration, &sensors));
         let (bounds, at, oil_c) = (self.bounds.clone(), self.driver.now(), self.driver.recorder.oil_c);
         self.fresh = Some(FreshBounds { bounds, at, oil_c });

@@ -13,9 +13,11 @@ use armcal_core::time::Stamp;
 /// Views of a recording, and what was left out.
 #[derive(Clone, Debug)]
 pub struct RecordedViews {
+    /// By camera, then in the order of the file.
     pub views: Vec<MapView>,
     /// Topic of each camera that has one in the recording: (index of the camera, topic).
     pub topics: Vec<(usize, String)>,
+    /// Whether the file could be read to its end.
     pub completeness: Completeness,
     /// Messages and detections that were left out, by reason.
     pub left_out: BTreeMap<&'static str, usize>,
@@ -25,6 +27,7 @@ pub struct RecordedViews {
 
 /// Why a recording has no views.
 #[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "each variant's message says what it is")]
 pub enum ViewsError {
     #[error(transparent)]
     Log(#[from] LogError),

@@ -11,7 +11,9 @@ use crate::tagmap::types::{MapRejection, RejectedDetection};
 /// A tag's estimate.
 #[derive(Clone, Debug)]
 pub struct MappedTag {
+    /// Number of the tag.
     pub id: u32,
+    /// Side of the black square, as given.
     pub size_m: f64,
     /// Index into [`TagMap::groups`].
     pub group: usize,
@@ -20,6 +22,7 @@ pub struct MappedTag {
     /// Of a perturbation on the right, `frame_from_tag * exp(xi)`, xi = (translation m, rotation rad) along the tag's
     /// axes. It is relative to what anchors the group: zero for a tag that is held.
     pub covariance: Matrix6<f64>,
+    /// Number of views in the fit that show it.
     pub n_views: usize,
     /// Of its corners: root mean square distance between measured and predicted pixel; 0 where none is used.
     pub rms_px: f64,
@@ -63,11 +66,13 @@ pub enum GroupFrame {
 /// Tags that views connect with each other, and with no others.
 #[derive(Clone, Debug)]
 pub struct MapGroup {
+    /// Frame of its tags' `frame_from_tag`.
     pub frame: GroupFrame,
     /// Indices into the input's bodies.
     pub bodies: Vec<usize>,
     /// Ascending.
     pub tags: Vec<u32>,
+    /// Views in the fit that show a tag of the group.
     pub n_views: usize,
 }
 
@@ -78,6 +83,7 @@ pub struct RelativeBodyPose {
     pub view: usize,
     /// Indices into [`TagMap::groups`].
     pub first: usize,
+    /// See `first`.
     pub second: usize,
     /// Frame of the first group from that of the second.
     pub first_from_second: Isometry3<f64>,
@@ -94,7 +100,9 @@ pub struct TagMap {
     pub tags: Vec<MappedTag>,
     /// For each view of the input and each group: frame_from_camera, where it shows tags of the group.
     pub views: Vec<BTreeMap<usize, Isometry3<f64>>>,
+    /// By view, then by `second`; `first` is the same for all of a view.
     pub relative: Vec<RelativeBodyPose>,
+    /// All of the input, rejected ones included.
     pub n_detections: usize,
     /// Detections in the fit.
     pub n_used: usize,
@@ -102,20 +110,27 @@ pub struct TagMap {
     pub rms_px: f64,
     /// The same over those too that were rejected as inconsistent but have a prediction.
     pub rms_all_px: f64,
+    /// Median distance between measured and predicted corner over all that are in the fit.
     pub median_px: f64,
     /// Sum of squared whitened residuals and its degrees of freedom.
     pub chi_square: f64,
+    /// Corner and prior residuals less the unknowns of tags and views.
     pub degrees_of_freedom: usize,
     /// By what the corners' standard deviations were multiplied in the end; 1 if the noise was given.
     pub noise_scale: f64,
+    /// By view, then by id.
     pub rejected: Vec<RejectedDetection>,
+    /// Tags whose size disagrees with the known distances between tags.
     pub scale_warnings: Vec<ScaleWarning>,
+    /// Sentences for people; empty where nothing is doubtful.
     pub warnings: Vec<String>,
+    /// Whether the last fit found a minimum.
     pub has_converged: bool,
     pub(super) factor: Option<Factor>,
 }
 
 impl TagMap {
+    /// The tag of that id; `None` where the map lacks it.
     #[must_use]
     pub fn tag(&self, id: u32) -> Option<&MappedTag> {
         self.tags.binary_search_by_key(&id, |tag| tag.id).ok().map(|idx| &self.tags[idx])

@@ -8,6 +8,7 @@ use armcal_core::time::Stamp;
 /// One tag in one image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MapDetection {
+    /// As detected.
     pub id: u32,
     /// Raw pixels in the order of `optics::square_corners`.
     pub corners_px: [[f64; 2]; 4],
@@ -20,7 +21,9 @@ pub struct MapDetection {
 pub struct MapView {
     /// Index into [`MapInput::cameras`].
     pub camera: usize,
+    /// Time of the exposure.
     pub stamp: Stamp,
+    /// As detected, in any order; unknown tags included.
     pub tags: Vec<MapDetection>,
     /// world_from_body of the moving body that carries an attitude sensor ([`MapSettings::attitude_body`]), at the
     /// stamp.
@@ -30,6 +33,7 @@ pub struct MapView {
 /// Something rigid that carries tags.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Body {
+    /// Name in files.
     pub name: String,
     /// Static bodies do not move relative to each other, so that their tags make one map; a moving one has its own.
     pub is_static: bool,
@@ -41,7 +45,9 @@ pub struct Body {
 /// What is known of a tag before.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TagPrior {
+    /// Number of the tag.
     pub id: u32,
+    /// Side of the black square.
     pub size_m: f64,
     /// Index into [`MapInput::bodies`].
     pub body: usize,
@@ -73,13 +79,16 @@ pub enum NoiseScale {
     Estimated,
 }
 
+/// Settings of a map.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MapSettings {
+    /// How much of the tags' poses is believed.
     pub mode: MapMode,
     /// The tag that anchors the map; without it the tags with poses do, and failing that the first of each group.
     pub base_tag: Option<u32>,
     /// Of a corner, each direction; where the detections bring no covariances.
     pub corner_std_px: f64,
+    /// Whether the residuals scale the covariances.
     pub noise: NoiseScale,
     /// Size and body of tags that no prior names; `None` rejects them.
     pub default_tag: Option<(f64, usize)>,
@@ -115,9 +124,13 @@ impl Default for MapSettings {
 /// All that [`super::solve`] works on.
 #[derive(Clone, Copy, Debug)]
 pub struct MapInput<'a> {
+    /// Lenses.
     pub cameras: &'a [CameraModel],
+    /// In any order.
     pub views: &'a [MapView],
+    /// Bodies that carry the tags.
     pub bodies: &'a [Body],
+    /// Each id once.
     pub tags: &'a [TagPrior],
 }
 
@@ -137,6 +150,7 @@ pub enum MapRejection {
 }
 
 impl MapRejection {
+    /// As files write it.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -160,12 +174,15 @@ impl MapRejection {
 pub struct RejectedDetection {
     /// Index into [`MapInput::views`].
     pub view: usize,
+    /// As detected.
     pub id: u32,
+    /// The first check that it failed.
     pub reason: MapRejection,
 }
 
 /// Why no map came out.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[expect(missing_docs, reason = "each variant's message says what it is")]
 pub enum TagMapError {
     #[error("no view shows a tag, so there is nothing to map")]
     NoDetections,

@@ -5,4 +5,4 @@
 
 mod reach_rest;
 
-pub use reach_rest::{Beliefs, ReachRest, reaches};
+pub use reach_rest::{Belief, ReachRest, reaches};

@@ -2,43 +2,56 @@
 //!
 //! Conditions and readings are averaged over each mark; the sensors are those believed at its start.
 
-use nalgebra::Vector3;
-
 use crate::calib::ConditionHistory;
+use armcal_core::kinematics::LinkCorrections;
 use armcal_core::log::Recording;
 use armcal_core::robot::Robot;
 use armcal_core::sensor::{ArmSensors, Conditions};
+use armcal_core::spatial::{Base, Pose, Tool};
 use armcal_core::streams::{JointAngles, MarkKind, Message, ReachAttempt};
 use armcal_core::time::Stamp;
 
 /// The arm at rest for one target.
 #[derive(Clone, Debug)]
 pub struct ReachRest {
+    /// From the mark: before or after a calibration was believed in.
     pub attempt: ReachAttempt,
+    /// Number of the task's target, from 0.
     pub target_idx: usize,
+    /// Position of the target, base frame.
     pub target_m: [f64; 3],
+    /// Start of the mark, by the joint sensors' clock.
     pub start: Stamp,
+    /// End of the mark.
     pub end: Stamp,
     /// Over the mark, as far as the recording tells.
     pub conditions: Conditions,
     /// Joint angles as believed under the sensors of that moment and these conditions.
     pub believed: JointAngles,
-    /// The tool as believed, base frame, m.
-    pub believed_tool_m: Vector3<f64>,
+    /// The tool as believed, by the links of that moment.
+    pub believed_tool: Pose<Base, Tool>,
 }
 
-/// The sensors that the arm believed in, each from its stamp on; in the order of time, and not empty.
-pub type Beliefs<'a> = [(Stamp, &'a ArmSensors)];
+/// What the arm believed of itself from a stamp on.
+#[derive(Clone, Copy, Debug)]
+pub struct Belief<'a> {
+    /// When the belief began.
+    pub from: Stamp,
+    /// The sensors believed in.
+    pub sensors: &'a ArmSensors,
+    /// Beyond the drawing.
+    pub links: LinkCorrections,
+}
 
-/// Those believed in at `stamp`: the first of all before the first stamp.
-fn believed_at<'a>(beliefs: &Beliefs<'a>, stamp: Stamp) -> Option<&'a ArmSensors> {
-    let later = beliefs.partition_point(|(from, _)| *from <= stamp);
-    beliefs.get(later.saturating_sub(1)).map(|(_, sensors)| *sensors)
+/// The belief at `stamp`: the first of all before the first stamp. `beliefs` are in the order of time.
+fn believed_at<'a>(beliefs: &[Belief<'a>], stamp: Stamp) -> Option<Belief<'a>> {
+    let later = beliefs.partition_point(|belief| belief.from <= stamp);
+    beliefs.get(later.saturating_sub(1)).copied()
 }
 
 /// Every reach of a recording, in the order of its marks. Marks without readings or without a target are left out.
 #[must_use]
-pub fn reaches(recording: &Recording, robot: &Robot, beliefs: &Beliefs<'_>) -> Vec<ReachRest> {
+pub fn reaches(recording: &Recording, robot: &Robot, beliefs: &[Belief<'_>]) -> Vec<ReachRest> {
     let task = recording.messages.iter().find_map(|(_, message)| match message {
         Message::Task(task) => Some(task),
         _ => None,
@@ -61,7 +74,7 @@ pub fn reaches(recording: &Recording, robot: &Robot, beliefs: &Beliefs<'_>) -> V
         .filter_map(|mark| {
             let MarkKind::Reach { attempt, target_idx } = mark.kind else { return None };
             let target_m = *task.targets_m.get(target_idx as usize)?;
-            let sensors = believed_at(beliefs, mark.start)?;
+            let Belief { sensors, links, .. } = believed_at(beliefs, mark.start)?;
             let from = readings.partition_point(|sample| sample.stamp < mark.start);
             let to = readings.partition_point(|sample| sample.stamp <= mark.end);
             let span = readings.get(from..to).filter(|span| !span.is_empty())?;
@@ -73,7 +86,7 @@ pub fn reaches(recording: &Recording, robot: &Robot, beliefs: &Beliefs<'_>) -> V
                     *sum += angle / span.len() as f64;
                 }
             }
-            let tool = robot.chain.link_poses(&believed).frame(&robot.tool.mount).translation.vector;
+            let tool = robot.chain.corrected_link_poses(&believed, &links).frame(&robot.tool.mount);
             Some(ReachRest {
                 attempt,
                 target_idx: target_idx as usize,
@@ -82,7 +95,7 @@ pub fn reaches(recording: &Recording, robot: &Robot, beliefs: &Beliefs<'_>) -> V
                 end: mark.end,
                 conditions,
                 believed,
-                believed_tool_m: tool,
+                believed_tool: Pose::from_isometry(tool),
             })
         })
         .collect()
@@ -134,10 +147,14 @@ mod tests {
         let mut parameters = JointParameters { reference, ..JointParameters::default() };
         parameters.terms[1].offset_rad_per_k = 1e-3;
         let sensors = parameters.sensors(&robot);
-        let rests = reaches(&recording, &robot, &[(at(0.0), &sensors)]);
+        let rests = reaches(
+            &recording,
+            &robot,
+            &[Belief { from: at(0.0), sensors: &sensors, links: LinkCorrections::default() }],
+        );
         let believed: Vec<f64> = rests.iter().map(|rest| rest.believed[1] - robot.stowed[1]).collect();
         assert!(believed[0].abs() < 1e-9 && (believed[1] - 1e-2).abs() < 1e-9, "{believed:?}");
         assert_eq!(rests[1].conditions.oil_c, Some(30.0));
-        assert_ne!(rests[0].believed_tool_m, rests[1].believed_tool_m);
+        assert_ne!(rests[0].believed_tool.origin().vector(), rests[1].believed_tool.origin().vector());
     }
 }

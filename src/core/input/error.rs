@@ -5,7 +5,9 @@ use crate::log::{CdrError, LogError, StampRegression};
 /// A message by its topic and its number there, from 1, in the order of the file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct BadPlace {
+    /// Name as recorded.
     pub topic: String,
+    /// Number on its topic, from 1, in the order of the file.
     pub message: u64,
 }
 
@@ -17,6 +19,7 @@ impl std::fmt::Display for BadPlace {
 
 /// Why a recording of a real arm was refused; `file` is the recording.
 #[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "each variant's message says what it is")]
 pub enum InputError {
     #[error(transparent)]
     Log(#[from] LogError),

@@ -13,6 +13,7 @@ use crate::robot::Robot;
 /// Joint readings and detections of a recording of a real arm.
 #[derive(Clone, Debug)]
 pub struct ExternalRecording {
+    /// The recording's file, as given.
     pub path: PathBuf,
     /// In the order of their stamps.
     pub readings: Vec<Reading>,
@@ -24,6 +25,7 @@ pub struct ExternalRecording {
     pub extra_joints: Vec<String>,
     /// Number of unused messages by reason.
     pub left_out: BTreeMap<String, u64>,
+    /// Whether the file could be read to its end.
     pub completeness: Completeness,
 }
 

@@ -12,6 +12,7 @@ use crate::time::Stamp;
 /// One raw reading of all joints, in the robot's order.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reading {
+    /// Header's stamp, or the log time where the header has none.
     pub stamp: Stamp,
     /// As recorded; 0 for joints that the recording lacks.
     pub counts: JointCounts,

@@ -41,6 +41,7 @@ pub enum WhileMoving {
     /// Clocks of arm and camera differ: at 0.1 rad/s some 50 ms are 0.3 deg.
     #[default]
     LeaveOut,
+    /// They count as any other.
     Use,
 }
 
@@ -48,6 +49,7 @@ pub enum WhileMoving {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum NotFinite {
+    /// The recording is refused with the place of the first one.
     #[default]
     Refuse,
     /// The message (of a joint reading) or the tag is left out and counted.
@@ -58,7 +60,12 @@ pub enum NotFinite {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum ChildFrame {
     /// The tag's number stands between the two.
-    Numbered { before: String, after: String },
+    Numbered {
+        /// Text in front of the id; may be empty.
+        before: String,
+        /// Text behind the id; may be empty.
+        after: String,
+    },
     /// One landmark.
     Plain(String),
 }
@@ -91,16 +98,23 @@ impl ChildFrame {
 /// A checked input map.
 #[derive(Clone, Debug, PartialEq)]
 pub struct InputMap {
+    /// Topic of the joint readings, `sensor_msgs/msg/JointState`.
     pub joint_topic: String,
     /// Robot's joint to recorded name, where they differ.
     pub joint_names: BTreeMap<String, String>,
+    /// Topic of the tags, `tf2_msgs/msg/TFMessage` or `apriltag_msgs/msg/AprilTagDetectionArray`.
     pub tag_topic: String,
     /// Without a leading slash, as all frames here.
     pub camera_frame: Option<String>,
+    /// Names of the tags' frames; `None` with [`TagUse::Corners`] alone.
     pub child_frame: Option<ChildFrame>,
+    /// What of a tag's measurement counts.
     pub tag_use: TagUse,
+    /// Largest gap between a tag message and the nearest joint reading; a tag farther off is left out.
     pub max_gap_s: f64,
+    /// What becomes of tags seen while the arm moved.
     pub while_moving: WhileMoving,
+    /// What becomes of NaN and infinities.
     pub not_finite: NotFinite,
 }
 

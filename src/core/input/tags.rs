@@ -16,6 +16,7 @@ use crate::time::Stamp;
 pub struct ExternalDetection {
     /// Its number; `None` is the one landmark of a plain `child_frame`.
     pub id: Option<u32>,
+    /// What the recording says of it, in the form that the input map asks for.
     pub seen: RawMeasurement,
 }
 
@@ -33,7 +34,9 @@ pub enum RawMeasurement {
 /// What the camera saw at one stamp.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TagFrame {
+    /// Header's stamp, or the log time where the header has none.
     pub stamp: Stamp,
+    /// Sorted by id, each once; never empty.
     pub tags: Vec<ExternalDetection>,
     /// Hashes of the messages that it comes from.
     pub digests: Vec<[u8; 32]>,

@@ -20,6 +20,7 @@ use crate::time::Stamp;
 /// A checked task file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TaskFile {
+    /// Largest distance between tool and target that counts as a hit.
     pub tolerance_m: f64,
     /// Tool positions in the base frame, m.
     pub targets_m: Vec<[f64; 3]>,

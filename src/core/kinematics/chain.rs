@@ -3,20 +3,27 @@
 use nalgebra::{Isometry3, Unit, UnitQuaternion, Vector3};
 
 use crate::joints::{JointAngles, MAX_JOINTS};
+use crate::kinematics::link_correction::LinkCorrections;
 
 /// Joint range, rad.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointLimits {
+    /// Smallest angle.
     pub lower_rad: f64,
+    /// Largest angle.
     pub upper_rad: f64,
 }
 
 /// One moving joint: fixed transform from the parent joint's link frame, then a rotation about `axis`.
 #[derive(Clone, Debug)]
 pub struct ChainJoint {
+    /// Name of the joint in the URDF.
     pub name: String,
+    /// Name of the link that it moves.
     pub child_link: String,
+    /// Pose of the joint's frame at angle zero in the frame of the parent link.
     pub parent_from_joint: Isometry3<f64>,
+    /// Axis of rotation in the joint's frame; angles count by the right-hand rule.
     pub axis: Unit<Vector3<f64>>,
     /// `None` for a continuous joint.
     pub limits: Option<JointLimits>,
@@ -25,7 +32,9 @@ pub struct ChainJoint {
 /// A frame fixed to the link behind the first `n_joints` joints (0: the base).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Attachment {
+    /// Number of joints proximal to the link.
     pub n_joints: usize,
+    /// Pose of the frame in the link's frame.
     pub link_from_frame: Isometry3<f64>,
 }
 
@@ -45,17 +54,20 @@ pub struct LinkPoses {
 }
 
 impl Chain {
+    /// A chain of these joints, base first; at most `MAX_JOINTS`.
     pub fn new(joints: Vec<ChainJoint>) -> Self {
         assert!(joints.len() <= MAX_JOINTS, "readers of files check the number of joints");
         Self { joints }
     }
 
+    /// The joints, base first.
     #[inline]
     #[must_use]
     pub fn joints(&self) -> &[ChainJoint] {
         &self.joints
     }
 
+    /// Number of moving joints.
     #[inline]
     #[must_use]
     pub fn n_joints(&self) -> usize {
@@ -65,6 +77,31 @@ impl Chain {
     /// Poses of all links at `angles` (rad).
     #[must_use]
     pub fn link_poses(&self, angles: &JointAngles) -> LinkPoses {
+        self.link_poses_by(angles, |_, joint| joint.parent_from_joint)
+    }
+
+    /// The same for the arm with `corrections` of its drawing.
+    #[must_use]
+    pub fn corrected_link_poses(&self, angles: &JointAngles, corrections: &LinkCorrections) -> LinkPoses {
+        self.link_poses_by(angles, |i, joint| corrections[i].applied_to(&joint.parent_from_joint))
+    }
+
+    /// The chain with `corrections` of its drawing.
+    #[must_use]
+    pub fn corrected(&self, corrections: &LinkCorrections) -> Self {
+        let mut joints = self.joints.clone();
+        for (joint, correction) in joints.iter_mut().zip(corrections) {
+            joint.parent_from_joint = correction.applied_to(&joint.parent_from_joint);
+        }
+        Self { joints }
+    }
+
+    #[inline]
+    fn link_poses_by(
+        &self,
+        angles: &JointAngles,
+        parent_from_joint: impl Fn(usize, &ChainJoint) -> Isometry3<f64>,
+    ) -> LinkPoses {
         debug_assert_eq!(angles.len(), self.joints.len());
         let mut poses = LinkPoses {
             n_joints: self.joints.len(),
@@ -72,7 +109,7 @@ impl Chain {
             axes: [Vector3::zeros(); MAX_JOINTS],
         };
         for (i, (joint, &angle_rad)) in self.joints.iter().zip(angles.iter()).enumerate() {
-            let base_from_joint = poses.base_from_link[i] * joint.parent_from_joint;
+            let base_from_joint = poses.base_from_link[i] * parent_from_joint(i, joint);
             poses.axes[i] = base_from_joint.rotation * joint.axis.into_inner();
             // The frames change inside the recursion, so it runs on raw isometries; callers name the frames.
             poses.base_from_link[i + 1] = base_from_joint * UnitQuaternion::from_axis_angle(&joint.axis, angle_rad);

@@ -12,6 +12,7 @@ use crate::numeric::{Damping, LeastSquares, Proposal, Stop, StopRule, minimize};
 /// Where to bring a frame's origin, base frame, m.
 #[derive(Clone, Copy, Debug)]
 pub struct IkGoal {
+    /// Where the frame's origin is to be, base frame.
     pub position_m: Vector3<f64>,
 }
 
@@ -22,11 +23,15 @@ pub struct IkSettings {
     pub limits: Vec<JointLimits>,
     /// Joints that stay at the seed's angle.
     pub locked: Vec<bool>,
+    /// Distance from the goal at which the search ends.
     pub tolerance_m: f64,
+    /// Limit of the steps proposed.
     pub max_iterations: usize,
 }
 
+/// Why no angles were found.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[expect(missing_docs, reason = "each variant's message says what it is")]
 pub enum IkError {
     /// The goal is farther away than the arm is long, or behind its limits.
     #[error("out of reach: the nearest point found is {error_m:.3} m from the target")]

@@ -5,6 +5,8 @@
 
 mod chain;
 mod inverse;
+mod link_correction;
 
 pub use chain::{Attachment, Chain, ChainJoint, JointLimits, LinkPoses};
 pub use inverse::{IkError, IkGoal, IkSettings, solve_position};
+pub use link_correction::{LinkCorrection, LinkCorrections};

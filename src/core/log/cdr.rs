@@ -10,6 +10,7 @@ const MAX_PADDING_BYTES: usize = 7;
 
 /// Why bytes are not a message of the expected type. Without values, so that equal causes count as one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[expect(missing_docs, reason = "each variant's message says what it is")]
 pub enum CdrError {
     #[error("the bytes do not begin with a header of plain CDR")]
     Header,

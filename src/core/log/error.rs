@@ -7,6 +7,7 @@ use crate::time::Stamp;
 
 /// Why a recording could not be read or written at all.
 #[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "each variant's message says what it is")]
 pub enum LogError {
     #[error("{}: cannot be read: {source}", path.display())]
     Read { path: PathBuf, source: std::io::Error },
@@ -30,6 +31,7 @@ pub enum LogError {
 
 /// Why a message cannot be encoded.
 #[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "each variant's message says what it is")]
 pub enum EncodeError {
     #[error("the message has {got} joints, the recording names {expected}")]
     JointCount { got: usize, expected: usize },
@@ -45,6 +47,7 @@ pub enum EncodeError {
 
 /// Why a message of a recording is rejected. Rejections are counted by topic and reported.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[expect(missing_docs, reason = "each variant's message says what it is")]
 pub enum DecodeRejection {
     #[error("message encoding is {found:?}, not \"cdr\"")]
     MessageEncoding { found: String },

@@ -18,6 +18,7 @@ pub struct MessageHasher {
 }
 
 impl MessageHasher {
+    /// The hash of no messages; `joint_names`, base first, become part of the bytes of joint messages.
     #[must_use]
     pub fn new(joint_names: &[String]) -> Self {
         let mut hasher = blake3::Hasher::new();

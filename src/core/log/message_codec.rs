@@ -21,6 +21,7 @@ use crate::streams::{
 
 /// The streams of [`Message`]s, one topic each.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[expect(missing_docs, reason = "each stream is described at its topic, in `topics`")]
 pub enum Stream {
     JointSensors,
     JointCommands,
@@ -41,6 +42,7 @@ pub enum Stream {
 }
 
 impl Stream {
+    /// Every stream once.
     pub const ALL: [Self; 16] = [
         Self::JointSensors,
         Self::JointCommands,

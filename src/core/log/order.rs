@@ -15,6 +15,7 @@ const JITTER_S: f64 = 0.1;
 pub struct StampRegression {
     /// Number of the message within its topic, from 1, in the order of the file.
     pub message: u64,
+    /// The stamp that is too early.
     pub stamp: Stamp,
     /// The latest stamp before it.
     pub latest: Stamp,
@@ -44,6 +45,7 @@ impl StampOrder {
         self.latest = Some(latest.max(stamp));
     }
 
+    /// The first place where the stamps go backwards by more than the jitter.
     #[must_use]
     pub fn first_regression(&self) -> Option<StampRegression> {
         self.first

@@ -26,22 +26,28 @@ pub struct TopicMap {
 /// A message kept undecoded, see [`TopicMap::raw`]; `super::decode` reads its bytes.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RawRecord {
+    /// As recorded.
     pub topic: String,
     /// Name of its type; empty where the file has none.
     pub schema_name: String,
+    /// Such as `cdr`.
     pub message_encoding: String,
+    /// Recorder's clock.
     pub log_time: Stamp,
+    /// Encoded bytes, as recorded.
     pub data: Vec<u8>,
 }
 
 /// The messages of a recording, checked: every number in them is finite, and all joint messages have the same joints.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recording {
+    /// The file, as given.
     pub path: PathBuf,
     /// With their log times, ordered by them; those of equal log time are in the order of the file.
     pub messages: Vec<(Stamp, Message)>,
     /// As the joint messages name them, base first; empty if there are none.
     pub joint_names: Vec<String>,
+    /// Whether the file could be read to its end.
     pub completeness: Completeness,
     /// Messages kept undecoded, in the same order.
     pub raw: Vec<RawRecord>,

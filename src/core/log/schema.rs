@@ -14,6 +14,7 @@ pub struct RosSchema {
 
 /// A message whose bytes are CDR and whose definition is known.
 pub trait RosMessage: Serialize + DeserializeOwned {
+    /// Name and definition of the ROS type.
     const SCHEMA: RosSchema;
 }
 

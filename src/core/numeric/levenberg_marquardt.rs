@@ -31,11 +31,15 @@ pub struct Proposal {
 /// The course of the damping.
 #[derive(Clone, Copy, Debug)]
 pub struct Damping {
+    /// At the start; at least this after equations without a factor.
     pub first: f64,
+    /// Least damping after a step that lowers the cost.
     pub min: f64,
+    /// The search ends above it.
     pub max: f64,
     /// Factor after a step that lowers the cost, and after one that does not.
     pub down: f64,
+    /// Factor after a step that does not lower the cost, or equations without a factor.
     pub up: f64,
     /// Least damping after a step that does not lower the cost.
     pub min_after_rejection: f64,
@@ -50,6 +54,7 @@ pub struct StopRule {
     pub predicted_gain: f64,
     /// Gain of a step over the cost before it.
     pub gain: f64,
+    /// Length of an accepted step, in the problem's own unit.
     pub step_length: f64,
     /// Cost.
     pub cost: f64,
@@ -72,6 +77,7 @@ impl StopRule {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {
+    /// One of the rules for a minimum stopped the search.
     Converged,
     /// The budget of evaluations ran out, or a parameter came to rest on its bound.
     Stalled,
@@ -80,6 +86,7 @@ pub enum Outcome {
 }
 
 impl Outcome {
+    /// As files write it.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -93,29 +100,37 @@ impl Outcome {
 /// What ended the loop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stop {
+    /// A step saves too little of the cost: [`StopRule::gain`], [`StopRule::predicted_gain`].
     Gain,
+    /// See [`StopRule::step_length`].
     StepLength,
+    /// See [`StopRule::cost`].
     Cost,
     /// No step saves more than the last digits of the cost.
     Rounding,
+    /// See [`StopRule::max_iterations`].
     Iterations,
     /// No step helps, however short.
     Damping,
     /// The normal equations have no factor, however damped.
     Singular,
+    /// The cost is not finite.
     NotFinite,
 }
 
 /// How it went.
 #[derive(Clone, Copy, Debug)]
 pub struct Report {
+    /// Why it ended.
     pub stop: Stop,
+    /// Number of steps proposed.
     pub iterations: usize,
     /// Of the last step that helped, its gain over the cost before it; 1 if none did.
     pub last_gain: f64,
 }
 
 impl Report {
+    /// What the stop means for the result.
     #[must_use]
     pub fn outcome(&self) -> Outcome {
         match self.stop {

@@ -40,12 +40,14 @@ is_a_lens!(CameraModel);
 /// A camera of either model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum CameraModel {
+    /// Kannala and Brandt's fisheye.
     Equidistant(Fisheye),
     /// Without distortion it is the plain pinhole.
     Radtan(Radtan),
 }
 
 impl CameraModel {
+    /// Pixel of a point (camera frame, m); `None` where the lens does not see.
     #[must_use]
     pub fn project(&self, point_m: &Vector3<f64>) -> Option<Vector2<f64>> {
         match self {
@@ -54,6 +56,7 @@ impl CameraModel {
         }
     }
 
+    /// Projection and d(pixel)/d(point), px/m; `None` where the lens does not see.
     #[must_use]
     pub fn project_with_jacobian(&self, point_m: &Vector3<f64>) -> Option<(Vector2<f64>, Matrix2x3<f64>)> {
         match self {
@@ -62,6 +65,7 @@ impl CameraModel {
         }
     }
 
+    /// The direction (camera frame, unit) that a pixel sees; `None` where no point is projected to it.
     #[must_use]
     pub fn unproject(&self, pixel_px: &Vector2<f64>) -> Option<Unit<Vector3<f64>>> {
         match self {
@@ -70,6 +74,7 @@ impl CameraModel {
         }
     }
 
+    /// Columns and rows.
     #[must_use]
     pub fn resolution_px(&self) -> [u32; 2] {
         match self {
@@ -78,6 +83,7 @@ impl CameraModel {
         }
     }
 
+    /// Focal lengths along x and y.
     #[must_use]
     pub fn focal_px(&self) -> [f64; 2] {
         match self {
@@ -86,6 +92,7 @@ impl CameraModel {
         }
     }
 
+    /// Principal point, x and y.
     #[must_use]
     pub fn center_px(&self) -> [f64; 2] {
         match self {

@@ -21,15 +21,20 @@ pub struct CornerNoise {
     pub contrast_loss_per_m: f64,
     /// Of each coordinate, whatever the edges; px.
     pub floor_std_px: f64,
+    /// Chance that a tag is found.
     pub chance: DetectionChance,
 }
 
 /// `1/(1 + exp(-(side - half_side)/side_width))` times the same with the range falling.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DetectionChance {
+    /// Shortest side of a tag in the image at which the chance is 1/2, as far as the side matters.
     pub half_side_px: f64,
+    /// Width of the logistic function of the side.
     pub side_width_px: f64,
+    /// Range at which the chance is 1/2, as far as the range matters.
     pub half_range_m: f64,
+    /// Width of the logistic function of the range.
     pub range_width_m: f64,
 }
 
@@ -78,6 +83,7 @@ impl CornerNoise {
 }
 
 impl DetectionChance {
+    /// Chance, 0..1, for a tag whose shortest side in the image and distance from the camera are these.
     #[must_use]
     pub fn of(&self, shortest_side_px: f64, range_m: f64) -> f64 {
         let logistic = |x: f64| 1.0 / (1.0 + (-x).exp());

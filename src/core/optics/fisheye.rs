@@ -6,9 +6,13 @@ use nalgebra::{Matrix2x3, Unit, Vector2, Vector3};
 /// where theta is the angle from the optical axis (z) and r = |(x, y)|. Pixel centres at whole numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fisheye {
+    /// Focal lengths along x and y.
     pub focal_px: [f64; 2],
+    /// Principal point, x and y.
     pub center_px: [f64; 2],
+    /// k1, k2, k3, k4.
     pub distortion: [f64; 4],
+    /// Columns and rows.
     pub resolution_px: [u32; 2],
     /// Half of the field of view; nothing beyond it is seen.
     pub max_view_angle_rad: f64,

@@ -9,10 +9,13 @@ use nalgebra::{Matrix2, Matrix2x3, Unit, Vector2, Vector3};
 /// Pixel centres at whole numbers. All zero is the plain pinhole.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Radtan {
+    /// Focal lengths along x and y.
     pub focal_px: [f64; 2],
+    /// Principal point, x and y.
     pub center_px: [f64; 2],
     /// k1, k2, p1, p2, k3: the order of OpenCV.
     pub distortion: [f64; 5],
+    /// Columns and rows.
     pub resolution_px: [u32; 2],
     /// Largest r that is seen: up to there the distorted radius grows, so that a pixel has one bearing.
     max_radius: f64,

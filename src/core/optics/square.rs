@@ -15,6 +15,7 @@ use crate::spatial::{Camera, Pose, Tag, skew};
 /// A tag's pose in the camera frame, and how well it fits.
 #[derive(Clone, Copy, Debug)]
 pub struct SquarePose {
+    /// The z axis of the tag points out of its printed side.
     pub camera_from_tag: Pose<Camera, Tag>,
     /// Root mean square over the 8 corner coordinates, px.
     pub rms_px: f64,
@@ -24,7 +25,9 @@ pub struct SquarePose {
     pub covariance_unit_px: Matrix6<f64>,
 }
 
+/// Why corners have no pose.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[expect(missing_docs, reason = "each variant's message says what it is")]
 pub enum SquareError {
     #[error("a corner lies outside of the lens's field of view")]
     OutOfView,

@@ -7,12 +7,17 @@ use super::shape::PlacedShape;
 /// Mass and shapes of everything that moves with one joint, fixed children included, in that joint's link frame.
 #[derive(Clone, Debug)]
 pub struct LinkBody {
+    /// The link that the joint moves, or the base link.
     pub name: String,
+    /// 0 where the URDF gives no mass.
     pub mass_kg: f64,
+    /// Centre of mass.
     pub com_m: Vector3<f64>,
     /// About the centre of mass, axes of the link.
     pub inertia_kg_m2: Matrix3<f64>,
+    /// To display; without the jaws of a gripper.
     pub visuals: Vec<PlacedShape>,
+    /// For clearance and contact.
     pub collisions: Vec<PlacedShape>,
 }
 

@@ -11,12 +11,17 @@ use crate::optics::Fisheye;
 /// The nominal camera.
 #[derive(Clone, Debug)]
 pub struct CameraSpec {
+    /// Name of the camera's frame in recordings.
     pub name: String,
+    /// Nominal `link_from_camera` on the link that carries it.
     pub mount: Attachment,
+    /// Nominal lens.
     pub lens: Fisheye,
+    /// One sigma of each coordinate of a detected corner.
     pub corner_std_px: f64,
     /// One sigma per axis of the mount's error.
     pub mount_std_m: f64,
+    /// One sigma per axis of the mount's rotation error.
     pub mount_std_rad: f64,
 }
 

@@ -16,6 +16,7 @@ pub struct DriveSpec {
     pub pump_l_per_min: Option<f64>,
     /// Oil per radian of each joint, L/rad.
     pub displacement_l_per_rad: Vec<f64>,
+    /// Tracking error of all joints.
     pub motion: MotionSpec,
 }
 

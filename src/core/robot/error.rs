@@ -6,13 +6,17 @@ use std::path::{Path, PathBuf};
 #[derive(Clone, Debug, thiserror::Error, PartialEq)]
 #[error("{}: {key}: {problem}", file.display())]
 pub struct FileIssue {
+    /// The file with the wrong value.
     pub file: PathBuf,
+    /// The value's place in the file, dotted.
     pub key: String,
+    /// End of a sentence that begins with the key.
     pub problem: String,
 }
 
 /// Why a robot folder or vehicle file was refused.
 #[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "each variant's message says what it is")]
 pub enum RobotError {
     #[error("{}: cannot be read: {source}", file.display())]
     Unreadable { file: PathBuf, source: std::io::Error },

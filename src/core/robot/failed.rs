@@ -17,8 +17,10 @@ pub enum FailedKind {
 }
 
 impl FailedKind {
+    /// Every kind once.
     pub const ALL: [Self; 4] = [Self::Locked, Self::Dead, Self::Stuck, Self::Jumps];
 
+    /// As files and the command line write it.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -29,6 +31,7 @@ impl FailedKind {
         }
     }
 
+    /// The kind of that name.
     #[must_use]
     pub fn of_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|kind| kind.name() == name)
@@ -38,7 +41,9 @@ impl FailedKind {
 /// A joint that is declared to have failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct FailedJoint {
+    /// Index of the joint, base first.
     pub joint: usize,
+    /// What is wrong with it.
     pub kind: FailedKind,
 }
 

@@ -16,6 +16,7 @@ use crate::kinematics::Attachment;
 /// The jaws and their motion.
 #[derive(Clone, Debug)]
 pub struct GripperSpec {
+    /// The first opens along `opens_along`, the second against it.
     pub jaws: [Jaw; 2],
     /// Direction in which the first jaw opens, axes of the link that carries them; the second moves the other way.
     pub opens_along: Unit<Vector3<f64>>,
@@ -32,6 +33,7 @@ pub struct GripperSpec {
 /// The visual shapes of one jaw.
 #[derive(Clone, Debug)]
 pub struct Jaw {
+    /// Its link in the URDF.
     pub name: String,
     /// In the frame of the link that carries it, at the rest opening.
     pub visuals: Vec<PlacedShape>,

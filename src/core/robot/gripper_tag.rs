@@ -16,6 +16,7 @@ use crate::spatial::{Link, Pose, Tag};
 /// A tag on a link distal to the camera.
 #[derive(Clone, Copy, Debug)]
 pub struct GripperTag {
+    /// Number in the family 36h11; none of the surveyed tags has it.
     pub id: u32,
     /// Side of the black square, m.
     pub size_m: f64,
@@ -23,6 +24,7 @@ pub struct GripperTag {
     pub mount: Attachment,
     /// One sigma per axis of the tag's pose.
     pub position_std_m: f64,
+    /// One sigma per axis of the tag's rotation.
     pub rotation_std_rad: f64,
 }
 

@@ -38,6 +38,7 @@ struct Outline {
 
 /// Why points have no convex body.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[expect(missing_docs, reason = "each variant's message says what it is")]
 pub enum HullError {
     #[error("has {got} points in its hull, at most {MAX_HULL_POINTS} are allowed; simplify the mesh")]
     TooManyPoints { got: usize },
@@ -88,11 +89,13 @@ impl Hull {
         Ok(CenteredHull { points_m, center_m })
     }
 
+    /// Its corners alone, in the frame of the points that it was made from.
     #[must_use]
     pub fn corners_m(&self) -> &[[f64; 3]] {
         &self.corners_m
     }
 
+    /// Indices of the corners of each outer triangle, counter-clockwise from outside.
     #[must_use]
     pub fn triangles(&self) -> &[[u32; 3]] {
         &self.triangles

@@ -11,19 +11,26 @@ use crate::kinematics::{Chain, ChainJoint};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SensorKind {
+    /// Resistive track: nonlinear, and sensitive to temperature and pressure.
     Potentiometer,
+    /// Digital word of a disc: its main error is eccentricity.
     Encoder,
+    /// Windings: errors periodic in the turn, and a temperature coefficient.
     Resolver,
 }
 
 /// A joint sensor by its datasheet: `angle = center + wrap(counts - counts(center)) / counts_per_rad`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointSensorSpec {
+    /// Name of the joint in the URDF.
     pub joint: String,
+    /// See [`SensorKind`].
     pub kind: SensorKind,
     /// The reading at angle zero.
     pub offset_counts: f64,
+    /// Negative where the reading falls as the angle grows.
     pub counts_per_rad: f64,
+    /// The reading repeats after so many counts, at least the joint's range.
     pub wrap_counts: f64,
     /// The middle of the joint's range, about which gain errors are defined.
     pub center_rad: f64,
@@ -31,11 +38,13 @@ pub struct JointSensorSpec {
     pub half_range_rad: f64,
     /// One sigma of the relative gain error.
     pub gain_std: f64,
+    /// One sigma of the offset error.
     pub offset_std_rad: f64,
     /// Largest relative gain error that planning allows for.
     pub gain_bound: f64,
     /// Largest offset error that planning allows for.
     pub offset_bound_rad: f64,
+    /// One sigma of a single reading.
     pub noise_std_counts: f64,
     /// One sigma of the error left by gain and offset: nonlinearity, temperature, wear.
     pub linearity_std_rad: f64,
@@ -43,6 +52,7 @@ pub struct JointSensorSpec {
     pub temperature_std_rad_per_k: f64,
     /// One sigma of the offset's drift in one hour, a random walk.
     pub drift_std_rad_per_sqrt_h: f64,
+    /// Largest rate that the joint is driven at.
     pub max_rate_rad_s: f64,
 }
 

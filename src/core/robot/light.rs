@@ -11,9 +11,13 @@ use super::part::check_place;
 /// A white light on a vehicle, in the vehicle's frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct VehicleLight {
+    /// Name in the vehicle's file.
     pub name: String,
+    /// Position of the source.
     pub position_m: Point3<f64>,
+    /// Axis of the beam, away from the source.
     pub direction: Unit<Vector3<f64>>,
+    /// Luminous flux.
     pub flux_lm: f64,
     /// Angle from the beam's axis to half of its intensity.
     pub half_angle_rad: f64,

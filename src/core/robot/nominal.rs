@@ -22,28 +22,41 @@ use crate::kinematics::{Attachment, Chain};
 /// The nominal arm: drawing, datasheets and survey.
 #[derive(Clone, Debug)]
 pub struct Robot {
+    /// Name in robot.toml.
     pub name: String,
+    /// Folder of robot.toml.
     pub folder: PathBuf,
+    /// File name of the URDF, without a folder.
     pub urdf_name: String,
+    /// The URDF as read.
     pub urdf_text: String,
+    /// Link of the URDF whose frame is the base frame.
     pub base_link: String,
+    /// Moving joints from the base link to tool and camera.
     pub chain: Chain,
     /// Bodies 0..=n_joints: base first.
     pub bodies: Vec<LinkBody>,
     /// Links that can come near each other; `None` without a self_collision.toml.
     pub self_pairs: Option<SelfPairs>,
+    /// One per joint, base first.
     pub sensors: Vec<JointSensorSpec>,
+    /// Oil consumption and tracking error of the drives.
     pub drive: DriveSpec,
     /// How well the drawing is known.
     pub geometry: GeometryPriors,
+    /// The tool point.
     pub tool: ToolSpec,
     /// `None` where the tool is no gripper.
     pub gripper: Option<GripperSpec>,
     /// A tag distal to the camera.
     pub gripper_tag: Option<GripperTag>,
+    /// Lens and mount of the wrist camera.
     pub camera: CameraSpec,
+    /// Tags by survey, with those whose pose is unknown; without the tag on the gripper.
     pub tags: Vec<SurveyedTag>,
+    /// Id of the tag beside the base; one of `tags` where there are any.
     pub base_tag: u32,
+    /// Joint angles in which the arm is stowed, rad.
     pub stowed: JointAngles,
     /// Weight of the displaced sea water divided by the arm's weight.
     pub buoyancy_fraction: f64,
@@ -51,6 +64,7 @@ pub struct Robot {
     pub failed: Vec<FailedJoint>,
 }
 
+/// `[tool]` of robot.toml.
 #[derive(Clone, Debug)]
 pub struct ToolSpec {
     /// The tool point, axes of the link that carries it.
@@ -58,16 +72,19 @@ pub struct ToolSpec {
 }
 
 impl Robot {
+    /// Number of moving joints.
     #[must_use]
     pub fn n_joints(&self) -> usize {
         self.chain.n_joints()
     }
 
+    /// The surveyed tag with this id; `None` for the tag on the gripper, too.
     #[must_use]
     pub fn tag(&self, id: u32) -> Option<&SurveyedTag> {
         self.tags.iter().find(|tag| tag.id == id)
     }
 
+    /// Names of the moving joints in the URDF, base first.
     #[must_use]
     pub fn joint_names(&self) -> Vec<String> {
         self.sensors.iter().map(|s| s.joint.clone()).collect()

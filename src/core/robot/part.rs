@@ -15,7 +15,9 @@ use crate::spatial::{Pose, Vehicle as VehicleFrame};
 /// One convex part, placed in its owner's frame.
 #[derive(Clone, Debug)]
 pub struct Part {
+    /// Name in its file; parts of a decomposed mesh are numbered.
     pub name: String,
+    /// Shape, pose and colour.
     pub placed: PlacedShape,
 }
 

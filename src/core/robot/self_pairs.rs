@@ -5,9 +5,11 @@
 pub struct SelfPairs {
     /// Seed and number of the random configurations.
     pub seed: u64,
+    /// See `seed`.
     pub n: u64,
     /// Smallest distance of all other pairs, m.
     pub near_m: f64,
+    /// Each pair once; neighbours along the chain are not among them.
     pub pairs: Vec<SelfPair>,
 }
 

@@ -11,19 +11,28 @@ use super::hull::Hull;
 /// A convex shape about its own centre, lengths in m. Cylinders and capsules lie along z, as in URDF.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Shape {
+    /// Edges along the axes.
     Box {
+        /// Whole lengths of the edges along x, y, z.
         size_m: [f64; 3],
     },
+    /// Its ends are flat.
     Cylinder {
+        /// Radius about z.
         radius_m: f64,
+        /// Whole length along z.
         length_m: f64,
     },
     /// `length_m` is the distance between the centres of the caps.
     Capsule {
+        /// Of the body and of the caps.
         radius_m: f64,
+        /// Whole length is this and two radii.
         length_m: f64,
     },
+    /// About the centre.
     Sphere {
+        /// Half of the diameter.
         radius_m: f64,
     },
     /// Convex hull of a mesh.
@@ -33,8 +42,11 @@ pub enum Shape {
 /// A shape with its pose in its owner's frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlacedShape {
+    /// Pose of the shape's centre in the owner's frame.
     pub owner_from_shape: Isometry3<f64>,
+    /// The shape about its own centre.
     pub shape: Shape,
+    /// For display: red, green, blue.
     pub color_rgb: [u8; 3],
 }
 

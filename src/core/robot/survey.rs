@@ -12,6 +12,7 @@ use crate::spatial::{Base, Frame, Pose, Tag};
 /// A tag with a surveyed pose, or with an unknown one.
 #[derive(Clone, Debug)]
 pub struct SurveyedTag {
+    /// Number in the family 36h11.
     pub id: u32,
     /// Side of the black square. NaN where it is unknown, for a landmark used by its position or pose alone.
     pub size_m: f64,
@@ -19,6 +20,7 @@ pub struct SurveyedTag {
     pub base_from_tag: Pose<Base, Tag>,
     /// One sigma per axis; infinite where the pose is unknown.
     pub position_std_m: f64,
+    /// One sigma per axis of the rotation; infinite where the pose is unknown.
     pub rotation_std_rad: f64,
 }
 
@@ -45,7 +47,9 @@ pub enum MapKnowledge {
 /// Standard deviations of the base tag's pose that replace those of its file.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BaseTagStd {
+    /// One sigma per axis; `None` keeps the file's.
     pub position_std_m: Option<f64>,
+    /// One sigma per axis; `None` keeps the file's.
     pub rotation_std_rad: Option<f64>,
 }
 
@@ -54,6 +58,7 @@ pub struct BaseTagStd {
 pub struct TagSurvey {
     /// The tag beside the base; the replay shows it.
     pub base_tag: u32,
+    /// Each id once; the base tag is one of them.
     pub tags: Vec<SurveyedTag>,
 }
 

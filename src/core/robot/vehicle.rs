@@ -14,18 +14,25 @@ use crate::spatial::{Base, Pose, Vehicle as VehicleFrame};
 /// The nominal vehicle.
 #[derive(Clone, Debug)]
 pub struct Vehicle {
+    /// The file that it was read from.
     pub file: PathBuf,
+    /// Name in its file.
     pub name: String,
+    /// Dry mass without the arm.
     pub mass_kg: f64,
+    /// Mount of the arm.
     pub vehicle_from_base: Pose<VehicleFrame, Base>,
+    /// Convex shapes in the vehicle's frame.
     pub parts: Vec<Part>,
     /// The tags that it carries; `None`: those of robot.toml are valid.
     pub survey: Option<TagSurvey>,
+    /// Lights in the vehicle's frame; empty where the file has none.
     pub lights: Vec<VehicleLight>,
     /// Stowed configurations on this vehicle by the robot's name; they replace those of robot.toml.
     pub stowed_rad: BTreeMap<String, Vec<f64>>,
     /// Needed by a free vehicle; `None` where the file has none.
     pub dynamics: Option<VehicleDynamics>,
+    /// Station-keeping errors; the default's where the file has none.
     pub station_keeping: StationKeeping,
     /// The file's text for a recording, with meshes replaced by hulls.
     pub text: String,
@@ -35,7 +42,9 @@ pub struct Vehicle {
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct StationKeeping {
+    /// Per axis.
     pub position_std_m: f64,
+    /// Per angle.
     pub attitude_std_rad: f64,
 }
 
@@ -59,8 +68,11 @@ impl StationKeeping {
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct VehicleDynamics {
+    /// Moments of inertia about x, y, z, without the water.
     pub inertia_kg_m2: [f64; 3],
+    /// Mass of the water that moves along x, y, z with it.
     pub added_mass_kg: [f64; 3],
+    /// Inertia of the water that turns about x, y, z with it.
     pub added_inertia_kg_m2: [f64; 3],
     /// Only its height matters: the vehicle is ballasted so that it floats level with the arm stowed.
     pub center_of_buoyancy_m: [f64; 3],
@@ -70,6 +82,7 @@ pub struct VehicleDynamics {
     pub drag_quadratic: [f64; 6],
     /// Of all thrusters together; 0 on axes without authority.
     pub thrust_max_n: [f64; 3],
+    /// Of all thrusters together about x, y, z; 0 on axes without authority.
     pub moment_max_n_m: [f64; 3],
 }
 

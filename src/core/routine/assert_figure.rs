@@ -64,6 +64,7 @@ impl AssertFigure {
         }
     }
 
+    /// Unit of its value and limit.
     #[must_use]
     pub const fn unit(self) -> Unit {
         match self {
@@ -79,6 +80,7 @@ impl AssertFigure {
         }
     }
 
+    /// What must have happened before it has a value.
     #[must_use]
     pub const fn needs(self) -> Needs {
         match self {
@@ -112,6 +114,7 @@ impl AssertLimits {
         self.0.iter().map(|(figure, limit)| (*figure, *limit))
     }
 
+    /// Whether no figure has a limit.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()

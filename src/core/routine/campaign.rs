@@ -26,11 +26,13 @@ impl SeedRange {
         (first <= last).then_some(Self { first, last })
     }
 
+    /// Every seed of the range, ascending.
     #[must_use]
     pub fn seeds(self) -> RangeInclusive<u64> {
         self.first..=self.last
     }
 
+    /// Whether the range has this seed.
     #[must_use]
     pub fn contains(self, seed: u64) -> bool {
         self.seeds().contains(&seed)
@@ -57,6 +59,7 @@ impl fmt::Display for SeedRange {
 /// `[campaign]`: which seeds, and which settings each of them meets.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CampaignSettings {
+    /// `None` where the command line must give them.
     pub seeds: Option<SeedRange>,
     /// Keys with their values, sorted by key; the full product is run.
     pub matrix: Vec<(String, Vec<Value>)>,
@@ -68,13 +71,19 @@ pub struct CampaignSettings {
 pub struct RegressSettings {
     /// Limits of new over baseline, median over the pairs.
     pub tool_error_ratio: f64,
+    /// The same of the distance between target and tool.
     pub reach_error_ratio: f64,
+    /// The same of the fit's residual in the image.
     pub residual_ratio: f64,
+    /// The same of the held-out tags' position error.
     pub held_out_ratio: f64,
+    /// The same of the scatter of corners within a capture.
     pub corner_scatter_ratio: f64,
+    /// The same of the simulated time.
     pub time_ratio: f64,
     /// Limits of the new value itself, median over the seeds, m.
     pub tool_error_m: Option<f64>,
+    /// The same of the distance between target and tool; `None` sets no limit.
     pub reach_error_m: Option<f64>,
 }
 

@@ -15,23 +15,33 @@ use crate::robot::{self, BaseTagStd, FailedJoint, FileIssue, MapKnowledge, Robot
 /// A checked routine.
 #[derive(Clone, Debug)]
 pub struct Routine {
+    /// The routine's file.
     pub file: PathBuf,
+    /// Letters, digits, - and _: it names the output folder.
     pub name: String,
+    /// Folder of robot.toml, relative to the working directory.
     pub robot_folder: PathBuf,
+    /// The vehicle's file, relative to the working directory.
     pub vehicle_file: PathBuf,
+    /// Of everything random in a run: the truth, and the plan's samples.
     pub seed: u64,
+    /// Method of every calibration in the script.
     pub method: Method,
+    /// Seafloor and obstacles that planning knows.
     pub scene: Scene,
     /// The only tags that are there; all of the vehicle's or the robot's where it says nothing.
     pub tags: Option<Vec<u32>>,
     /// How much of the tags' places is known.
     pub map: MapKnowledge,
+    /// Replacements of the base tag's standard deviations.
     pub base_tag_std: BaseTagStd,
     /// Joints that are declared to have failed, by name and kind.
     pub failed_joints: Vec<FailedJointEntry>,
     /// The scene alone, as TOML, to travel with a recording.
     pub scene_toml: String,
+    /// Settings of the captures; a step may change its own.
     pub capture: CaptureSettings,
+    /// Targets and tolerance.
     pub task: TaskSettings,
     /// What to do, in order.
     pub steps: Vec<Step>,
@@ -121,6 +131,7 @@ impl Routine {
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FailedJointEntry {
+    /// Name of the joint in the URDF.
     pub joint: String,
     /// `locked`, `dead`, `stuck` or `jumps`.
     pub kind: String,

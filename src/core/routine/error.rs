@@ -4,6 +4,7 @@ use crate::robot::{FileIssue, RobotError};
 
 /// Why a routine was refused.
 #[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "each variant's message says what it is")]
 pub enum RoutineError {
     #[error(transparent)]
     File(#[from] RobotError),

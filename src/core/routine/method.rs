@@ -19,6 +19,7 @@ pub enum Method {
 }
 
 impl Method {
+    /// Every method once.
     pub const ALL: [Self; 4] = [Self::JointLimits, Self::MinimumVariance, Self::MinimumDistance, Self::Bundle];
 }
 

@@ -17,6 +17,7 @@ use crate::robot::{FileIssue, parse_toml, read_text};
 pub struct Override {
     /// Dotted path into the routine; a number counts within a list, from 0.
     pub key: String,
+    /// It replaces the file's, whatever type that has.
     pub value: Value,
 }
 

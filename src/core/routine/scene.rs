@@ -13,6 +13,7 @@ use crate::robot::{FileIssue, Part, PartFile, check_parts, parse_toml, read_text
 pub struct Scene {
     /// Height of the seafloor in the world frame; `None` in open water.
     pub seafloor_z_m: Option<f64>,
+    /// Their poses are in the world frame.
     pub obstacles: Vec<Part>,
 }
 

@@ -15,6 +15,7 @@ pub enum Step {
     Reach(ReachSettings),
     /// Opens or closes the gripper: 0 closed, 1 open.
     Grip {
+        /// 0..1 of the largest opening.
         opening: f64,
     },
     /// Plans views, visits them and records what is seen.
@@ -23,15 +24,19 @@ pub enum Step {
     Identify(IdentifySettings),
     /// Drives joints to their nominal end stops and records the readings there.
     Stops(StopsSettings),
+    /// Estimates the sensors from what was captured.
     Calibrate(CalibrateSettings),
     /// The arm rests while the world goes on.
     Wait {
+        /// By the arm's clock.
         seconds: f64,
     },
     /// Something breaks: number `number` of the routine's faults, which only the simulator reads.
     Fault {
+        /// From 0.
         number: usize,
     },
+    /// Notes whether figures of the run keep their limits.
     Assert(AssertLimits),
 }
 
@@ -76,6 +81,7 @@ pub struct ReachSettings {
 /// How the scale of one sensor is measured.
 #[derive(Clone, Debug, PartialEq)]
 pub struct IdentifySettings {
+    /// Name of the joint in the URDF.
     pub joint: String,
     /// The joint turns at most this many times as far as the datasheet's scale says, either way round.
     pub gain_max: f64,
@@ -96,10 +102,14 @@ pub struct StopsSettings {
     pub dwell_s: f64,
 }
 
+/// Settings of `calibrate` and `recalibrate`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CalibrateSettings {
+    /// Fresh for `calibrate`, warm for `recalibrate`.
     pub prior: PriorSource,
+    /// Captured views that it uses.
     pub views: CalibrateViews,
+    /// What happens if it is refused.
     pub on_refusal: OnRefusal,
 }
 
@@ -121,5 +131,6 @@ pub enum OnRefusal {
     /// The script ends there.
     #[default]
     Stop,
+    /// The script goes on.
     Continue,
 }

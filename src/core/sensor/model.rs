@@ -10,13 +10,14 @@ pub const N_SHAPE: usize = 12;
 /// What calibration adds to the datasheet. With the travel t from the middle of the range, the angle is
 /// `center + (gain + gain_per_k T) t + offset + sum_h nonlinearity_h phi_h(t / half_range)` and
 /// `offset_per_k T + offset_per_mpa P + drift h + half_backlash a`, with T (K), P (MPa) and h (hours) the
-/// [`Departure`] from the calibration's reference and a the side that the joint came from.
+/// [`ConditionChange`] from the calibration's reference and a the side that the joint came from.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Correction {
     /// Factor on the nominal travel; 1 is the datasheet.
     pub gain: f64,
     /// Added to the angle, rad.
     pub offset_rad: f64,
+    /// Coefficients beyond gain and offset.
     pub terms: Terms,
 }
 
@@ -25,10 +26,13 @@ pub struct Correction {
 pub struct Terms {
     /// Coefficients of [`nonlinearity_basis`].
     pub nonlinearity_rad: [f64; N_SHAPE],
+    /// Change of the offset with the oil temperature.
     pub offset_rad_per_k: f64,
     /// 1/K.
     pub gain_per_k: f64,
+    /// Change of the offset with the ambient pressure.
     pub offset_rad_per_mpa: f64,
+    /// Change of the offset with time.
     pub drift_rad_per_h: f64,
     /// Half of the play between joint and sensor shaft.
     pub half_backlash_rad: f64,
@@ -83,16 +87,22 @@ pub fn shape_prior(length: f64) -> [f64; N_SHAPE] {
 /// How far things are from a calibration's reference.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ConditionChange {
+    /// Oil temperature above the reference's.
     pub oil_k: f64,
+    /// Ambient pressure above the reference's.
     pub pressure_mpa: f64,
+    /// Time since the reference; negative before it.
     pub elapsed_h: f64,
 }
 
 /// What a reading depends on besides the angle; `None` is unknown and counts as the reference's.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Conditions {
+    /// Oil temperature, degrees Celsius.
     pub oil_c: Option<f64>,
+    /// Ambient pressure, absolute.
     pub pressure_pa: Option<f64>,
+    /// Time of the reading, by the joint sensors' clock.
     pub stamp: Option<Stamp>,
 }
 
@@ -140,11 +150,14 @@ impl Correction {
 /// A joint sensor as believed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SensorModel {
+    /// Datasheet.
     pub spec: JointSensorSpec,
+    /// What calibration adds to it.
     pub correction: Correction,
 }
 
 impl SensorModel {
+    /// The datasheet's sensor, without a correction.
     #[must_use]
     pub fn nominal(spec: &JointSensorSpec) -> Self {
         Self { spec: spec.clone(), correction: Correction::default() }
@@ -231,6 +244,7 @@ pub fn wrap_symmetric(value: f64, period: f64) -> f64 {
 /// The sensors of an arm, base first.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ArmSensors {
+    /// One per joint.
     pub models: Vec<SensorModel>,
     /// What the corrections' terms are counted from.
     pub reference: Conditions,

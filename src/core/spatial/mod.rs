@@ -8,4 +8,4 @@ mod frames;
 mod pose;
 
 pub use frames::{Base, Camera, Frame, Link, Tag, Tool, Vehicle, World};
-pub use pose::{Point, Pose, adjoint, exp, log, rotation_angle_between, skew};
+pub use pose::{Point, Pose, adjoint, exp, left_jacobian, log, rotation_angle_between, skew};

@@ -36,6 +36,7 @@ pub struct Point<A: Frame> {
 }
 
 impl<A: Frame, B: Frame> Pose<A, B> {
+    /// Equal frames.
     #[must_use]
     pub fn identity() -> Self {
         Self::from_isometry(Isometry3::identity())
@@ -66,6 +67,7 @@ impl<A: Frame, B: Frame> Pose<A, B> {
         Self::from_isometry(Isometry3::from_parts(Translation3::from(Vector3::from(position_m)), rotation))
     }
 
+    /// `b_from_a`.
     #[must_use]
     pub fn inverse(&self) -> Pose<B, A> {
         Pose::from_isometry(self.isometry.inverse())
@@ -83,11 +85,13 @@ impl<A: Frame, B: Frame> Pose<A, B> {
         Point::from_vector(self.isometry.translation.vector)
     }
 
+    /// Rotation of `a_from_b`.
     #[must_use]
     pub fn rotation(&self) -> UnitQuaternion<f64> {
         self.isometry.rotation
     }
 
+    /// Rotation of `a_from_b` as w, x, y, z, unit.
     #[must_use]
     pub fn quaternion_wxyz(&self) -> [f64; 4] {
         let q = self.isometry.rotation;
@@ -102,26 +106,31 @@ impl<A: Frame, B: Frame> Pose<A, B> {
 }
 
 impl<A: Frame> Point<A> {
+    /// From coordinates in frame `A`.
     #[must_use]
     pub fn new(x_m: f64, y_m: f64, z_m: f64) -> Self {
         Self::from_vector(Vector3::new(x_m, y_m, z_m))
     }
 
+    /// From a vector of coordinates; the caller vouches for the frame.
     #[must_use]
     pub fn from_vector(vector_m: Vector3<f64>) -> Self {
         Self { coords: Point3::from(vector_m), frame: PhantomData }
     }
 
+    /// From x, y, z; the caller vouches for the frame.
     #[must_use]
     pub fn from_array(xyz_m: [f64; 3]) -> Self {
         Self::from_vector(Vector3::from(xyz_m))
     }
 
+    /// The coordinates as a raw vector, m.
     #[must_use]
     pub fn vector(&self) -> Vector3<f64> {
         self.coords.coords
     }
 
+    /// The coordinates x, y, z, m.
     #[must_use]
     pub fn to_array(self) -> [f64; 3] {
         self.coords.coords.into()
@@ -194,7 +203,9 @@ pub fn log(isometry: &Isometry3<f64>) -> Vector6<f64> {
     Vector6::new(rho.x, rho.y, rho.z, phi.x, phi.y, phi.z)
 }
 
-fn left_jacobian(phi: &Vector3<f64>) -> Matrix3<f64> {
+/// Left Jacobian of SO(3): `exp(phi + d) = exp(J d) exp(phi)` for small d (Sola et al. 2018, eq. 145).
+#[must_use]
+pub fn left_jacobian(phi: &Vector3<f64>) -> Matrix3<f64> {
     let angle = phi.norm();
     if angle < 1e-6 {
         return Matrix3::identity() + 0.5 * skew(phi);

@@ -7,7 +7,9 @@ use super::{quantile, stream_rng};
 /// Where a figure lies with the asked coverage.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Interval {
+    /// Lower end, in the unit of the samples.
     pub low: f64,
+    /// Upper end.
     pub high: f64,
 }
 

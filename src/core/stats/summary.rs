@@ -5,9 +5,13 @@ use serde::{Deserialize, Serialize};
 /// Count, median, 95th percentile and maximum, the form of every statistic in summary.json.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Summary {
+    /// Number of samples, one or more.
     pub n: usize,
+    /// Mean of the middle two for an even number.
     pub median: f64,
+    /// 95th percentile, interpolated.
     pub p95: f64,
+    /// Largest sample.
     pub max: f64,
 }
 

@@ -16,6 +16,7 @@ pub type SinkError = Box<dyn std::error::Error + Send + Sync>;
 
 /// Why an arm did not carry out a command.
 #[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "each variant's message says what it is")]
 pub enum ArmError {
     #[error("the arm's stream could not be recorded: {0}")]
     Sink(#[source] SinkError),

@@ -19,7 +19,9 @@ pub enum Message {
     Rejects(DetectionRejects),
     /// One camera image, compressed.
     Image(CameraImage),
+    /// Temperature of oil or water.
     Temperature(TemperatureSample),
+    /// Pressure at the depth sensor.
     Pressure(PressureSample),
     /// The vehicle's attitude sensor.
     Attitude(Attitude),
@@ -33,31 +35,43 @@ pub enum Message {
     Survey(RecordedSurvey),
     /// A span of the recording that means something.
     Mark(Mark),
+    /// A line of text for people.
     Log(LogLine),
 }
 
+/// Raw readings of all joints at one time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointSensorSample {
+    /// Sender's clock.
     pub stamp: Stamp,
+    /// One per joint, base first.
     pub counts: JointCounts,
 }
 
 /// Set-points in raw counts: the arm's own controller closes its loop on its own sensors.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointCommand {
+    /// Sender's clock.
     pub stamp: Stamp,
+    /// One per joint, base first.
     pub counts: JointCounts,
 }
 
+/// Angles of all joints under the belief of the moment.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointStateBelief {
+    /// Sender's clock.
     pub stamp: Stamp,
+    /// One per joint, base first, rad.
     pub angles: JointAngles,
 }
 
+/// All tags of one image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TagDetections {
+    /// Time of the exposure.
     pub stamp: Stamp,
+    /// In the detector's order; empty where it saw none.
     pub tags: Vec<TagDetection>,
 }
 
@@ -65,7 +79,9 @@ pub struct TagDetections {
 /// that is tag-frame (-s/2, -s/2), (s/2, -s/2), (s/2, s/2), (-s/2, s/2).
 #[derive(Clone, Debug, PartialEq)]
 pub struct TagDetection {
+    /// Number in the family 36h11.
     pub id: u32,
+    /// Order and frame: see above.
     pub corners_px: [[f64; 2]; 4],
     /// The detector's decision margin, larger is surer; as apriltag gives it.
     pub decision_margin: f64,
@@ -91,6 +107,7 @@ pub enum RejectReason {
 }
 
 impl RejectReason {
+    /// Every reason once.
     pub const ALL: [Self; 7] = [
         Self::WrongBits,
         Self::LowContrast,
@@ -101,6 +118,7 @@ impl RejectReason {
         Self::UnknownId,
     ];
 
+    /// As recordings write it.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -120,95 +138,130 @@ impl RejectReason {
 pub struct DetectionReject {
     /// As decoded, right or wrong.
     pub id: u32,
+    /// As a [`TagDetection`]'s.
     pub corners_px: [[f64; 2]; 4],
+    /// The first check that it failed.
     pub reason: RejectReason,
 }
 
 /// What was rejected in one image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DetectionRejects {
+    /// Time of the exposure.
     pub stamp: Stamp,
+    /// In the detector's order.
     pub rejects: Vec<DetectionReject>,
 }
 
 /// A camera image as JPEG.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CameraImage {
+    /// Time of the exposure.
     pub stamp: Stamp,
+    /// Bytes of the JPEG file.
     pub jpeg: Vec<u8>,
 }
 
+/// What a thermometer measures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Thermometer {
+    /// Hydraulic oil of the arm.
     Oil,
+    /// Sea water about the vehicle.
     Water,
 }
 
+/// One reading of a thermometer.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TemperatureSample {
+    /// Sender's clock.
     pub stamp: Stamp,
+    /// What is measured.
     pub thermometer: Thermometer,
+    /// Degrees Celsius.
     pub temperature_c: f64,
+    /// Noise of a reading; 0 where it is unknown.
     pub variance_c2: f64,
 }
 
+/// One reading of the depth sensor.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PressureSample {
+    /// Sender's clock.
     pub stamp: Stamp,
+    /// Absolute pressure.
     pub pressure_pa: f64,
+    /// Noise of a reading; 0 where it is unknown.
     pub variance_pa2: f64,
 }
 
 /// Attitude of the vehicle in the world, with its body rates and specific force, as an IMU gives them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Attitude {
+    /// Sender's clock.
     pub stamp: Stamp,
+    /// `world_from_vehicle`, unit.
     pub quaternion_wxyz: [f64; 4],
+    /// In the vehicle's axes.
     pub angular_velocity_rad_s: [f64; 3],
+    /// In the vehicle's axes, +g upwards at rest.
     pub specific_force_m_s2: [f64; 3],
 }
 
 /// The gap between the jaws, 0 where they meet.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GripperSample {
+    /// Sender's clock.
     pub stamp: Stamp,
+    /// Measured.
     pub opening_m: f64,
 }
 
 /// The gap between the jaws that they are driven to.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GripperCommand {
+    /// Sender's clock.
     pub stamp: Stamp,
+    /// Set-point.
     pub opening_m: f64,
 }
 
 /// Positions that the tool is to reach, in the base frame, and how near counts as a hit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ReachTask {
+    /// Sender's clock.
     pub stamp: Stamp,
+    /// In the order by which marks number them.
     pub targets_m: Vec<[f64; 3]>,
+    /// Largest distance that counts as a hit.
     pub tolerance_m: f64,
 }
 
 /// Tags as surveyed before the dive, in the base frame: what belief takes for known.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RecordedSurvey {
+    /// Sender's clock.
     pub stamp: Stamp,
     /// The tag beside the base; one of `tags`.
     pub base_tag: u32,
+    /// Each id once.
     pub tags: Vec<RecordedTag>,
 }
 
 /// One tag of a survey: `base_from_tag` as numbers, that they come out of a file as they went in.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RecordedTag {
+    /// Number in the family 36h11.
     pub id: u32,
     /// Side of the black square.
     pub size_m: f64,
+    /// Origin of the tag in the base frame.
     pub position_m: [f64; 3],
+    /// `base_from_tag`, unit.
     pub quaternion_wxyz: [f64; 4],
     /// Infinite, as the rotation's, where only the tag's size is known; the pose is then the identity.
     pub position_std_m: f64,
+    /// One sigma per axis, as the position's.
     pub rotation_std_rad: f64,
 }
 
@@ -242,34 +295,63 @@ pub enum ReachAttempt {
 /// What the arm is doing, for people who watch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Phase {
+    /// Plans paths and views.
     Plan,
+    /// On the way.
     Move,
+    /// Waits for the arm to come to rest.
     Settle,
+    /// Records a view at rest.
     Capture,
+    /// Estimates the sensors.
     Calibrate,
+    /// Goes to a target of the task.
     Reach,
     /// The arm rests while the world goes on.
     Wait,
+    /// The script has ended.
     Done,
 }
 
+/// What a span of a recording was for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum MarkKind {
     /// The arm stood still over the mark's span: detections and readings in it belong together.
-    Capture { set: CaptureSet, pose_idx: u32 },
+    Capture {
+        /// Whether the fit may use the view.
+        set: CaptureSet,
+        /// Number of the view in the recording, from 0.
+        pose_idx: u32,
+    },
     /// The arm stood still, and since the first such view of `joint_idx` no other joint was told to move: what the
     /// camera's turn against the readings says about the sensor's scale.
-    Identify { joint_idx: u32 },
+    Identify {
+        /// Index of the joint, base first.
+        joint_idx: u32,
+    },
     /// The joint stood at one of its nominal end stops, where the drawing has this angle.
-    Stop { joint_idx: u32, angle_rad: f64 },
+    Stop {
+        /// Index of the joint, base first.
+        joint_idx: u32,
+        /// Nominal angle of the stop.
+        angle_rad: f64,
+    },
     /// Somebody declared that this joint, or its sensor, has failed; it holds for the whole recording.
     Failed(FailedJoint),
     /// A calibration from the views captured within the span.
     Calibrate(PriorSource),
     /// The arm came to rest for a target.
-    Reach { attempt: ReachAttempt, target_idx: u32 },
+    Reach {
+        /// Under which sensors.
+        attempt: ReachAttempt,
+        /// Number of the task's target, from 0.
+        target_idx: u32,
+    },
     /// The jaws closed on a target, from wide open.
-    Touch { target_idx: u32 },
+    Touch {
+        /// Number of the task's target, from 0.
+        target_idx: u32,
+    },
     /// A phase began at `start`.
     Phase(Phase),
 }
@@ -277,23 +359,36 @@ pub enum MarkKind {
 /// A span `start..=end` by the joint sensors' clock.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mark {
+    /// First instant.
     pub start: Stamp,
+    /// Last instant, not before `start`.
     pub end: Stamp,
+    /// What was done in it.
     pub kind: MarkKind,
 }
 
+/// Severity of a log line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum LogLevel {
+    /// Of use to developers alone.
     Debug,
+    /// The normal course of things.
     Info,
+    /// Unexpected; the run goes on.
     Warn,
+    /// Something failed.
     Error,
 }
 
+/// A line of text for people.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LogLine {
+    /// Sender's clock.
     pub stamp: Stamp,
+    /// Severity.
     pub level: LogLevel,
+    /// Part of the program that says it.
     pub name: String,
+    /// The message itself.
     pub text: String,
 }

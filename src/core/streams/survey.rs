@@ -6,6 +6,7 @@ use crate::spatial::{Base, Pose, Tag};
 use crate::time::Stamp;
 
 impl RecordedSurvey {
+    /// The message of `survey` at `stamp`; unknown poses become the identity.
     #[must_use]
     pub fn new(stamp: Stamp, survey: &TagSurvey) -> Self {
         // Of an unknown tag's place not even the drawing goes into a recording: nobody can use it by mistake.

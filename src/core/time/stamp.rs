@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 /// A point in time, nanoseconds since the Unix epoch.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct Stamp {
+    /// Negative before 1970.
     pub nanos: i64,
 }
 

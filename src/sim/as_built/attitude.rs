@@ -12,6 +12,7 @@ pub struct AttitudeAsBuilt {
     pub misalignment_rad: [f64; 3],
     /// At the start.
     pub gyro_bias_rad_s: [f64; 3],
+    /// Of the specific force; constant.
     pub accelerometer_bias_m_s2: [f64; 3],
 }
 

@@ -8,8 +8,11 @@ use crate::spec::WorldSpec;
 /// Constant errors of thermometers and depth gauge.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct GaugesAsBuilt {
+    /// Added to what the oil's thermometer reads.
     pub oil_bias_k: f64,
+    /// Added to what the water's thermometer reads.
     pub water_bias_k: f64,
+    /// Added to what the depth gauge reads.
     pub pressure_bias_pa: f64,
     /// Relative.
     pub pressure_scale_error: f64,

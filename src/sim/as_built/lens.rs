@@ -10,8 +10,11 @@ use armcal_core::stats::stream_rng;
 /// A lens as built; its resolution and field of view are the drawing's.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LensAsBuilt {
+    /// Focal lengths along x and y.
     pub focal_px: [f64; 2],
+    /// Principal point, x and y.
     pub center_px: [f64; 2],
+    /// k1, k2, k3, k4.
     pub distortion: [f64; 4],
 }
 

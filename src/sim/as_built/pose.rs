@@ -10,7 +10,9 @@ use armcal_core::stats::stream_rng;
 /// A pose as files write it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlainPose {
+    /// Origin of the pose's second frame in the first.
     pub position_m: [f64; 3],
+    /// Rotation from the second frame to the first.
     pub quaternion_wxyz: [f64; 4],
 }
 

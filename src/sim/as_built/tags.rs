@@ -7,15 +7,19 @@ use crate::spec::TagsSpec;
 use armcal_core::robot::{Robot, SurveyedTag};
 use armcal_core::spatial::{Base, Link, Pose, Tag};
 
+/// A surveyed tag where it truly is.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TagAsBuilt {
+    /// Number of the tag.
     pub id: u32,
+    /// Side of the black square, as surveyed.
     pub size_m: f64,
     /// `base_from_tag`.
     pub pose: PlainPose,
 }
 
 impl TagAsBuilt {
+    /// True pose.
     #[must_use]
     pub fn base_from_tag(&self) -> Pose<Base, Tag> {
         self.pose.to_pose()

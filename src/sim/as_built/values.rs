@@ -19,15 +19,19 @@ use armcal_core::spatial::{Camera, Link, Pose, Tag};
 /// Everything that was drawn for one seed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AsBuilt {
+    /// Joint sensors, base first.
     pub joints: Vec<JointAsBuilt>,
     /// `link_from_camera` on the link that carries the camera.
     pub camera_mount: PlainPose,
+    /// Surveyed tags, in the order of the survey.
     pub tags: Vec<TagAsBuilt>,
     /// `link_from_tag` of the tag on the gripper.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gripper_tag: Option<PlainPose>,
+    /// Thermometers and depth gauge.
     #[serde(default, skip_serializing_if = "GaugesAsBuilt::is_exact")]
     pub gauges: GaugesAsBuilt,
+    /// The vehicle's attitude sensor.
     #[serde(default, skip_serializing_if = "AttitudeAsBuilt::is_exact")]
     pub attitude: AttitudeAsBuilt,
     /// Where it differs from the nominal scene.

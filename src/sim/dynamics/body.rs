@@ -8,14 +8,19 @@ use armcal_core::robot::{LinkBody, PlacedShape};
 /// A body in its own link's frame.
 #[derive(Clone, Debug)]
 pub struct Body {
+    /// Dry mass.
     pub mass_kg: f64,
+    /// Centre of mass.
     pub com_m: Vector3<f64>,
     /// Mass of the displaced water, kg.
     pub displaced_kg: f64,
+    /// Where the weight of the displaced water acts.
     pub center_of_buoyancy_m: Vector3<f64>,
+    /// Dry inertia, about the link's origin.
     pub rigid: Inertia,
     /// Added mass of the water, about the link's origin.
     pub added: Inertia,
+    /// One per collision shape of a link; none for other bodies.
     pub surfaces: Vec<Surface>,
     /// Of a vehicle.
     pub hull: Option<HullDrag>,
@@ -24,6 +29,7 @@ pub struct Body {
 /// Drag of a hull along and about its own axes, `-(linear + quadratic |v|) v`; x, y, z, then about x, y, z.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HullDrag {
+    /// Pose of the hull's axes in the base frame.
     pub base_from_hull: Isometry3<f64>,
     /// N s/m and N m s/rad.
     pub linear: [f64; 6],
@@ -34,6 +40,7 @@ pub struct HullDrag {
 /// Drag surfaces of a body: at three points along its longest axis, per axis of its shape, in the link's frame.
 #[derive(Clone, Copy, Debug)]
 pub struct Surface {
+    /// Points at which a third of the drag acts each.
     pub points_m: [Vector3<f64>; 3],
     /// Axes of the shape as columns.
     pub axes: Matrix3<f64>,

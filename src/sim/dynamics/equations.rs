@@ -58,9 +58,13 @@ pub enum BaseCoupling {
 /// One state of the system, and the forces besides those of gravity and water.
 #[derive(Clone, Copy, Debug)]
 pub struct EquationInput<'a> {
+    /// Joint angles, rad.
     pub angles: &'a JointAngles,
+    /// Joint rates, rad/s.
     pub rates: &'a JointAngles,
+    /// Gravity, base velocity and water.
     pub around: &'a Environment,
+    /// Whether the base moves as prescribed.
     pub base: &'a BaseCoupling,
     /// On each body about the base's origin in base axes, e.g. of contacts.
     pub extra: &'a [Force; MAX_JOINTS + 1],
@@ -69,6 +73,7 @@ pub struct EquationInput<'a> {
 /// Inertia and bias of one state.
 #[derive(Clone, Copy, Debug)]
 pub struct Equations {
+    /// Inertia of the generalised coordinates, added mass included.
     pub inertia: Symmetric,
     /// Generalised forces that keep the accelerations at zero (those of the base at the prescribed ones), N m (N).
     pub bias: Coordinates,
@@ -89,11 +94,13 @@ impl Multibody {
         self.bodies[0] = body;
     }
 
+    /// The kinematics of the arm.
     #[must_use]
     pub fn chain(&self) -> &Chain {
         &self.chain
     }
 
+    /// Bodies of the links 0..=n, base first.
     #[must_use]
     pub fn bodies(&self) -> &[Body] {
         &self.bodies

@@ -19,10 +19,13 @@ use armcal_core::streams::{JointAngles, MAX_JOINTS};
 /// Positions and velocities of the system.
 #[derive(Clone, Copy, Debug)]
 pub struct SystemState {
+    /// Joint angles, rad.
     pub angles: JointAngles,
+    /// Joint rates, rad/s.
     pub rates: JointAngles,
     /// Of a free base; the caller has that of a prescribed base.
     pub world_from_base: Isometry3<f64>,
+    /// Spatial velocity of a free base about its origin, base axes.
     pub base_velocity: Motion,
 }
 
@@ -30,18 +33,25 @@ pub struct SystemState {
 /// `force = start - stiffness travel - damping rate`.
 #[derive(Clone, Copy, Debug)]
 pub struct ContactRow {
+    /// Direction in the generalised coordinates.
     pub direction: Coordinates,
+    /// Force along it at the start of the step, at rest.
     pub start_n: f64,
+    /// Of the spring.
     pub stiffness_n_m: f64,
+    /// Of the damper.
     pub damping_n_s_m: f64,
 }
 
 /// Loads during one step.
 pub struct StepInput<'a> {
+    /// Length of the step.
     pub step_s: f64,
+    /// Torque about each joint, linear in angle and rate.
     pub loads: &'a [JointLoad; MAX_JOINTS],
     /// On each body about the base's origin, base axes.
     pub extra: &'a [Force; MAX_JOINTS + 1],
+    /// Springs and dampers of the points of contact.
     pub contacts: &'a [ContactRow],
     /// Whether the base is free.
     pub is_free: bool,
@@ -49,9 +59,12 @@ pub struct StepInput<'a> {
     pub around: &'a dyn Fn(Stage, &SystemState) -> (Environment, BaseCoupling),
 }
 
+/// Instant of a step at which the method evaluates the slope.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
+    /// The state before the step.
     Start,
+    /// The state that the first slope predicts.
     End,
 }
 

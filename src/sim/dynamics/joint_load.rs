@@ -4,8 +4,11 @@
 /// may be as stiff as oil is.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct JointLoad {
+    /// Torque at angle and rate zero.
     pub constant_n_m: f64,
+    /// Of the spring towards angle zero.
     pub stiffness_n_m_rad: f64,
+    /// Of the damper.
     pub damping_n_m_s_rad: f64,
 }
 

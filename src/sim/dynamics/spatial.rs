@@ -25,11 +25,13 @@ pub struct Force {
 }
 
 impl Motion {
+    /// From its two parts.
     #[must_use]
     pub fn new(angular: Vector3<f64>, linear: Vector3<f64>) -> Self {
         Self { angular, linear }
     }
 
+    /// No motion.
     #[must_use]
     pub fn zero() -> Self {
         Self::new(Vector3::zeros(), Vector3::zeros())
@@ -104,11 +106,13 @@ impl std::ops::Mul<f64> for Motion {
 }
 
 impl Force {
+    /// From its two parts.
     #[must_use]
     pub fn new(moment: Vector3<f64>, force: Vector3<f64>) -> Self {
         Self { moment, force }
     }
 
+    /// No force.
     #[must_use]
     pub fn zero() -> Self {
         Self::new(Vector3::zeros(), Vector3::zeros())
@@ -161,6 +165,7 @@ pub struct Inertia {
 }
 
 impl Inertia {
+    /// No inertia.
     #[must_use]
     pub fn zero() -> Self {
         Self { rotational: Matrix3::zeros(), coupling: Matrix3::zeros(), linear: Matrix3::zeros() }

@@ -16,26 +16,31 @@ pub struct Symmetric {
 }
 
 impl Symmetric {
+    /// All zero, `n` rows.
     #[must_use]
     pub fn zeros(n: usize) -> Self {
         debug_assert!(n <= MAX_DOF);
         Self { n, lower: [[0.0; MAX_DOF]; MAX_DOF] }
     }
 
+    /// Number of rows.
     #[must_use]
     pub fn n(&self) -> usize {
         self.n
     }
 
+    /// An entry, whichever triangle it is in.
     #[must_use]
     pub fn get(&self, row: usize, column: usize) -> f64 {
         self.lower[row.max(column)][row.min(column)]
     }
 
+    /// Sets an entry and its mirror image.
     pub fn set(&mut self, row: usize, column: usize, value: f64) {
         self.lower[row.max(column)][row.min(column)] = value;
     }
 
+    /// Adds to an entry and its mirror image.
     pub fn add(&mut self, row: usize, column: usize, value: f64) {
         self.lower[row.max(column)][row.min(column)] += value;
     }

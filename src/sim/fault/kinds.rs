@@ -7,45 +7,84 @@ use serde::{Deserialize, Serialize};
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Fault {
     /// The sensor slips on its shaft: it reads `by_rad` more from now on.
-    SensorJump { joint: String, by_rad: f64 },
+    SensorJump {
+        /// Name of the joint in the URDF.
+        joint: String,
+        /// Positive: it reads a larger angle.
+        by_rad: f64,
+    },
     /// The sensor keeps the word that it reads now.
-    SensorStuck { joint: String },
+    SensorStuck {
+        /// Name of the joint in the URDF.
+        joint: String,
+    },
     /// The sensor's wire breaks: its word says nothing about the joint any more.
-    SensorDead { joint: String },
+    SensorDead {
+        /// Name of the joint in the URDF.
+        joint: String,
+    },
     /// The valve jams shut: the oil holds the joint where it is.
-    JointLocked { joint: String },
+    JointLocked {
+        /// Name of the joint in the URDF.
+        joint: String,
+    },
     /// This share of the supply pressure is lost, of one joint's valve (a hose leaks) or of the pump.
     PressureLost {
+        /// Name of the joint in the URDF; `None`: the pump.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         joint: Option<String>,
         /// 0: none is lost, 1: all of it.
         ratio: f64,
     },
     /// The tag falls off.
-    TagLost { id: u32 },
+    TagLost {
+        /// Number of the tag.
+        id: u32,
+    },
     /// The tag is displaced by a translation and a rotation vector in its own axes.
     TagMoved {
+        /// Number of the tag.
         id: u32,
+        /// Translation along the tag's axes.
         #[serde(default)]
         by_m: [f64; 3],
+        /// Rotation vector along the tag's axes.
         #[serde(default)]
         by_rad: [f64; 3],
     },
     /// The detector takes the tag for another one.
-    TagMisread { id: u32, as_id: u32 },
+    TagMisread {
+        /// Number of the tag.
+        id: u32,
+        /// The number that is read in its place.
+        as_id: u32,
+    },
     /// The camera sees nothing for a while.
-    Silt { seconds: f64 },
+    Silt {
+        /// How long the camera sees nothing.
+        seconds: f64,
+    },
     /// Something strikes the vehicle: a force in vehicle axes for a moment, at a point of it (its origin, if left out).
     #[serde(rename = "vehicle_knocked")]
     VehicleImpulse {
+        /// In vehicle axes.
         force_n: [f64; 3],
+        /// How long the force acts.
         duration_s: f64,
+        /// In the vehicle's frame.
         #[serde(default)]
         at_m: [f64; 3],
     },
     /// Something strikes a link at its centre of mass: a force in base axes for a moment.
     #[serde(rename = "arm_bumped")]
-    ArmImpulse { link: String, force_n: [f64; 3], duration_s: f64 },
+    ArmImpulse {
+        /// Name of the link in the URDF.
+        link: String,
+        /// In base axes.
+        force_n: [f64; 3],
+        /// How long the force acts.
+        duration_s: f64,
+    },
 }
 
 /// A fault and when it happens.
@@ -54,6 +93,7 @@ pub struct ScheduledFault {
     /// Seconds after the start; `None`: at its step of the script.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub at_s: Option<f64>,
+    /// What breaks.
     #[serde(flatten)]
     pub fault: Fault,
 }

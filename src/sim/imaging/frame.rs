@@ -3,8 +3,11 @@
 /// 8 bits a channel, rows from the top, red, green, blue.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Frame {
+    /// Columns.
     pub width: usize,
+    /// Rows.
     pub height: usize,
+    /// Three bytes a pixel.
     pub rgb: Vec<u8>,
 }
 

@@ -26,7 +26,9 @@ use armcal_core::stats::stream_rng;
 /// black border.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TagPlane {
+    /// Number in the family 36h11.
     pub id: u32,
+    /// Outer side of its black border.
     pub size_m: f64,
     /// When the shutter opens, halfway, and when it closes.
     pub base_from_tag: [Isometry3<f64>; 3],
@@ -43,6 +45,7 @@ impl TagPlane {
 /// A solid thing, wherever it is.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SolidShape {
+    /// About its own centre; its pose is in [`Shot::solids`].
     pub shape: Shape,
     /// As a screen shows it.
     pub color_rgb: [u8; 3],
@@ -55,6 +58,7 @@ pub struct SolidShape {
 pub struct Shot<'a> {
     /// When the shutter opens, halfway, and when it closes; the camera's frame has x right, y down, z along its axis.
     pub base_from_camera: [Isometry3<f64>; 3],
+    /// Printed tags of the scene.
     pub tags: &'a [TagPlane],
     /// `base_from_shape` of each of the imager's solids, or of none, at the same instants.
     pub solids: &'a [[Isometry3<f64>; 3]],
@@ -170,6 +174,7 @@ impl Imager {
         }
     }
 
+    /// The lens that it renders with.
     #[must_use]
     pub fn lens(&self) -> &Fisheye {
         &self.lens

@@ -7,8 +7,11 @@ use crate::imaging::math::{Rgb, Vec3, exp, exp2, max};
 /// A white lamp in the base frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Light {
+    /// Position of the source.
     pub position_m: Point3<f64>,
+    /// Axis of the beam, away from the source.
     pub direction: Unit<Vector3<f64>>,
+    /// Luminous flux.
     pub flux_lm: f64,
     /// From the beam's axis to where it has half its intensity, rad.
     pub half_angle_rad: f64,

@@ -62,8 +62,11 @@ table!(
         miss_probability = 0.02, in 0.0..=1.0;
         /// Standard deviation per axis of the mount's error.
         mount_std_rad = 0.2 * DEG, in 0.0..=0.5;
+        /// The same of its position.
         mount_std_m = 0.002, in 0.0..=0.2;
+        /// Images a second.
         rate_hz = 5.0, in 0.1..=100.0;
+        /// Largest distance at which the detector still finds a tag.
         max_range_m = 2.5, in 0.1..=50.0;
         /// Angle between the tag's normal and the line of sight.
         max_incidence_rad = 70.0 * DEG, in 0.1..=1.55;
@@ -105,18 +108,22 @@ table!(
     /// How well the tags were surveyed.
     #[derive(Copy)]
     TagsSpec {
+        /// Standard deviation per axis of a tag's position error.
         survey_std_m = 0.001, in 0.0..=0.2;
+        /// Standard deviation per axis of a tag's rotation error.
         survey_std_rad = 0.2 * DEG, in 0.0..=0.5;
     } and {
         /// Of the base tag alone, where it is machined or measured better than the others.
         #[serde(skip_serializing_if = "Option::is_none")]
         base_std_m: Option<f64> = None;
+        /// The same of its rotation.
         #[serde(skip_serializing_if = "Option::is_none")]
         base_std_rad: Option<f64> = None;
         /// Of the tag on the gripper, against its drawing; 0.3 mm and 0.1 deg where left out. Assumed: a measuring arm
         /// on the bench.
         #[serde(skip_serializing_if = "Option::is_none")]
         gripper_std_m: Option<f64> = None;
+        /// The same of its rotation.
         #[serde(skip_serializing_if = "Option::is_none")]
         gripper_std_rad: Option<f64> = None;
     }

@@ -32,6 +32,7 @@ pub enum WaterKind {
     /// Ocean.
     #[default]
     Clear,
+    /// Coastal water.
     Coastal,
     /// Harbour.
     Turbid,

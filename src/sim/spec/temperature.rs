@@ -15,8 +15,11 @@ table!(
     /// Oil and water. The oil warms as `start + rise * (1 - exp(-t / time constant))`, or by the arm's work.
     #[derive(Copy)]
     TemperatureSpec {
+        /// Water temperature at the start, where it is the same at all depths.
         water_c = 4.0, in -3.0..=40.0;
+        /// Oil temperature at the start.
         oil_start_c = 10.0, in -3.0..=80.0;
+        /// Rise of the oil in the long run.
         oil_rise_k = 8.0, in 0.0..=60.0;
         /// 300 s: 6.9 K of the 8 K within 10 minutes.
         oil_time_constant_s = 300.0, in 1.0..=1e5;
@@ -25,6 +28,7 @@ table!(
         /// The water changes by this much in the long run (a dive into colder water); the oil follows with its own time
         /// constant.
         water_change_k = 0.0, in -60.0..=60.0;
+        /// Time constant of that change.
         water_time_constant_s = 1800.0, in 1.0..=1e6;
         /// Heat capacity of the oil and what it warms. Above 0 the oil warms by the power that the hydraulics lose and
         /// cools towards the water with its time constant, and `oil_rise_k` does not count. Assumed: 20 L of oil hold
@@ -53,6 +57,7 @@ pub struct Points {
 }
 
 impl Points {
+    /// The figures of the list.
     #[must_use]
     pub fn as_slice(&self) -> &[f64] {
         &self.values[..self.n]

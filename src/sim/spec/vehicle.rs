@@ -28,7 +28,9 @@ table!(
         rotation_rms_rad = 0.5 * DEG, in 0.0..=0.3;
         /// In each direction.
         translation_rms_m = 0.03, in 0.0..=2.0;
+        /// Shortest period of the motion.
         period_min_s = 5.0, in 0.5..=600.0;
+        /// Longest period of the motion.
         period_max_s = 15.0, in 0.5..=600.0;
         /// The motion swells over this time at the start.
         ramp_s = 5.0, in 0.0..=600.0;
@@ -40,11 +42,15 @@ table!(
         gyro_drift_rad_s_per_sqrt_h = 0.0, in 0.0..=1.0;
         /// Standard deviation per axis of the specific force's bias. Assumed.
         accelerometer_bias_std_m_s2 = 0.0, in 0.0..=10.0;
+        /// Noise of the attitude, one sigma per axis.
         attitude_noise_rad = 0.05 * DEG, in 0.0..=0.2;
+        /// Noise of the rates, one sigma per axis.
         gyro_noise_rad_s = 5e-4, in 0.0..=1.0;
+        /// Noise of the specific force, one sigma per axis.
         accelerometer_noise_m_s2 = 0.02, in 0.0..=10.0;
         /// Of a free vehicle's position and attitude control (assumed: a pilot's aid); 0 for thrusters that are off.
         station_keeping_rad_s = 0.5, in 0.0..=5.0;
+        /// Damping ratio of that control.
         station_damping_ratio = 0.9, in 0.0..=5.0;
         /// First-order lag of the thrusters (assumed).
         thruster_lag_s = 0.2, in 0.0..=5.0;

@@ -11,6 +11,7 @@ use armcal_core::robot::FileIssue;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct WaterSpec {
+    /// 0: neither drag nor buoyancy.
     pub density_kg_m3: f64,
     /// Of every link, per axis of its shapes.
     pub drag_coefficient: f64,
@@ -24,6 +25,7 @@ pub struct WaterSpec {
     pub pressure_scale_std: f64,
     /// Of the vehicle's station below the surface.
     pub depth_m: f64,
+    /// Noise of a single reading, one sigma.
     pub pressure_noise_pa: f64,
     /// Scale of the links' theoretical added mass; 0 for none.
     pub added_mass_coefficient: f64,

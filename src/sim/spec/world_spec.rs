@@ -26,17 +26,26 @@ use armcal_core::routine::Scene;
 /// `[world]`, checked.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct WorldSpec {
+    /// Integrator and rates of the truth's record.
     pub physics: PhysicsSpec,
+    /// Errors of the joint sensors.
     pub joint_sensors: JointSensorsSpec,
+    /// Oil and water temperature, and their thermometers.
     pub temperature: TemperatureSpec,
+    /// Errors of the camera's clock.
     pub clock: ClockSpec,
+    /// Lens, mount and detections of the camera.
     pub camera: CameraWorldSpec,
+    /// How well the tags were surveyed.
     pub tags: TagsSpec,
     /// Written out where images are rendered or it was set.
     #[serde(skip_serializing_if = "ImageSpec::is_default")]
     pub image: ImageSpec,
+    /// Motion of the vehicle, and its attitude sensor.
     pub vehicle: VehicleMotionSpec,
+    /// Valves, oil, pump, friction, stops and controller.
     pub hydraulics: HydraulicsSpec,
+    /// Density, current, waves and depth gauge.
     pub water: WaterSpec,
     /// By joint: counts per radian over the datasheet's. Negative: they run the other way. The arm's own controller
     /// knows.

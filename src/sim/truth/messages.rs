@@ -15,9 +15,13 @@ pub const TOOL_POSE: &str = "/truth/tool_pose";
 pub const CAMERA_POSE: &str = "/truth/camera_pose";
 /// `world_from_vehicle`.
 pub const VEHICLE_POSE: &str = "/truth/vehicle_pose";
+/// True oil temperature, degrees Celsius.
 pub const OIL_TEMPERATURE: &str = "/truth/oil_temperature";
+/// True water temperature, degrees Celsius.
 pub const WATER_TEMPERATURE: &str = "/truth/water_temperature";
+/// The nearest two watched parts and their distance.
 pub const CLEARANCE: &str = "/truth/clearance";
+/// Two parts when they begin to touch.
 pub const CONTACTS: &str = "/truth/contacts";
 /// A fault when it happens.
 pub const FAULTS: &str = "/truth/faults";
@@ -25,17 +29,24 @@ pub const FAULTS: &str = "/truth/faults";
 /// armcal_msgs/msg/Contact: two parts began to touch.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Contact {
+    /// Time of the contact; the frame is the base.
     pub header: Header,
+    /// Name of a link or of something around the arm.
     pub part_a: String,
+    /// The other part.
     pub part_b: String,
 }
 
 /// armcal_msgs/msg/Clearance: the nearest two parts and their distance.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Clearance {
+    /// Time of the state; the frame is the base.
     pub header: Header,
+    /// Not above 0 where they touch.
     pub distance_m: f64,
+    /// Name of a link or of something around the arm.
     pub part_a: String,
+    /// The other part.
     pub part_b: String,
 }
 

@@ -14,10 +14,13 @@ use armcal_core::time::Stamp;
 /// Contents of truth.mcap.
 #[derive(Clone, Debug)]
 pub struct Truth {
+    /// Constants of the run.
     pub header: TruthHeader,
     /// In the order of time, at the truth's rate.
     pub states: Vec<TruthState>,
+    /// In the order of time.
     pub contacts: Vec<TruthContact>,
+    /// In the order of time, at a rate of their own.
     pub clearances: Vec<TruthClearance>,
     /// Faults in the order of time.
     pub faults: Vec<TruthFault>,

@@ -17,10 +17,15 @@ use armcal_core::streams::{JointAngles, JointCounts};
 /// Parts of a world.
 #[derive(Clone, Debug)]
 pub struct WorldInput<'a> {
+    /// Nominal arm.
     pub robot: &'a Robot,
+    /// Nominal vehicle with its tags.
     pub vehicle: &'a Vehicle,
+    /// Nominal seafloor and obstacles.
     pub scene: &'a Scene,
+    /// `[world]`, checked.
     pub spec: WorldSpec,
+    /// Of everything random in the world.
     pub seed: u64,
 }
 

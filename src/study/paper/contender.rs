@@ -95,6 +95,7 @@ fn bundle(draw: &Draw, guess: &JointParameters) -> Solution {
     let kinds = |joint| if joint < n_seen { vec![ParameterKind::Gain, ParameterKind::Offset] } else { Vec::new() };
     let model = Model {
         joints: (0..draw.robot.n_joints()).map(kinds).collect(),
+        n_links: 0,
         mount: false,
         lens: false,
         tags: false,

@@ -1,6 +1,7 @@
 //! One calibration by `bundle`, step by step: estimate, diagnose, report, judge.
 
 use crate::calib::bundle::calibration_prior::PriorConsistency;
+use crate::calib::bundle::drawing::Drawing;
 use crate::calib::bundle::estimate::{Estimate, estimate};
 use crate::calib::bundle::failure_detection::FailureSearch;
 use crate::calib::bundle::failure_impact::FailureImpact;
@@ -13,7 +14,7 @@ use crate::calib::bundle::outliers::Outlier;
 use crate::calib::bundle::setup::{BundleSetup, declared};
 use crate::calib::bundle::tables::{camera_mount_table, covariance_with_mount, map_table, model_table, prior_table};
 use crate::calib::bundle::verdict::VerdictInput;
-use crate::calib::covariance::ParameterCovariance;
+use crate::calib::covariance::{ParameterCovariance, task_angles};
 use crate::calib::cross_validation::{FOLDS, FoldSums, fold_of};
 use crate::calib::error::CalibError;
 use crate::calib::methods::Solution;
@@ -51,6 +52,8 @@ pub(crate) struct BundleCalibration<'a> {
     purpose: EstimatePurpose,
     /// Tags that were freed of their survey.
     moved: MovedTags,
+    /// What of the drawing is estimated.
+    drawing: Drawing,
 }
 
 /// Fewer views do not determine how large noise and nonlinearity are: the datasheet's figures stand.
@@ -94,7 +97,7 @@ impl<'a> BundleCalibration<'a> {
         let held_out = std::mem::take(&mut data.data.held_out);
         data.data.fit.extend(held_out);
         let moved = MovedTags::new(&data.robot);
-        Ok(Self { data, prior, map, purpose, moved })
+        Ok(Self { data, prior, map, purpose, moved, drawing: Drawing::default() })
     }
 
     /// # Errors
@@ -102,12 +105,12 @@ impl<'a> BundleCalibration<'a> {
     pub(crate) fn calibrate(mut self) -> Result<Calibration, CalibError> {
         let views = std::mem::take(&mut self.data.data.fit);
         let declared = declared(&self.data.robot, &views);
-        let first = BundleSetup::new(&self.data.robot, &views, &declared, self.prior);
+        let first = BundleSetup::new(&self.data.robot, &views, &declared, self.prior).with_drawing(&self.drawing);
         self.check_observable(&first, &declared)?;
         let estimated = self.first_estimate(&first);
         if self.purpose == EstimatePurpose::Final
             && let Some((estimate, _)) = &estimated
-            && self.moved.revise(estimate, &mut self.data.robot)
+            && self.revise(&first, estimate)
         {
             drop(estimated);
             self.data.data.fit = views;
@@ -124,7 +127,7 @@ impl<'a> BundleCalibration<'a> {
         let (setup, estimated) = if failures == declared {
             (&first, estimated)
         } else {
-            second = BundleSetup::new(&self.data.robot, &views, &failures, self.prior);
+            second = BundleSetup::new(&self.data.robot, &views, &failures, self.prior).with_drawing(&self.drawing);
             (&second, second.estimate())
         };
         let (estimate, selections) = estimated.ok_or_else(|| self.nothing_observable())?;
@@ -149,9 +152,24 @@ impl<'a> BundleCalibration<'a> {
                 VerdictInput { input, found, innovations, task }.judge(&mut calibration);
                 self.state_reservations(estimated, &diagnosis, &mut calibration);
                 self.moved.report(&estimated.estimate, &mut calibration);
+                let targets = task.map(|task| task_angles(&diagnosis.robot, task)).unwrap_or_default();
+                let at = if targets.is_empty() { found.view_angles() } else { targets };
+                found.report_drawing(&at, &mut calibration);
             }
         }
         Ok(calibration)
+    }
+
+    /// Whether survey or drawing are to be taken otherwise than so far.
+    fn revise(&mut self, setup: &BundleSetup, estimate: &Estimate<'_>) -> bool {
+        if self.moved.revise(estimate, &mut self.data.robot) {
+            return true;
+        }
+        let better = self.drawing.better(&setup.input(), estimate);
+        if let Some(drawing) = &better {
+            self.drawing.clone_from(drawing);
+        }
+        better.is_some()
     }
 
     fn nothing_observable(&self) -> CalibError {

@@ -45,7 +45,9 @@ const Z_OF_JOINTS: f64 = 3.9;
 pub struct CalibrationPrior {
     /// With the camera where the prior found it.
     pub robot: Robot,
+    /// What the new views tell, and all that the prior knows.
     pub model: Model,
+    /// The datasheet's, with the prior's error from view to view.
     pub scales: Hyperparameters,
     /// The prior's values and reference.
     pub guess: JointParameters,
@@ -60,18 +62,24 @@ pub struct CalibrationPrior {
 /// Whether prior and views can both be right.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PriorConsistency {
+    /// Square of the estimate's move from the prior under its covariance.
     pub chi2: f64,
+    /// Number of directions that the views tell enough of to be tested.
     pub degrees_of_freedom: usize,
     /// The 0.999 quantile.
     pub limit: f64,
     /// The joint that is off the most in its own sigma, by how much on average over the views, and that sigma, rad.
     pub joint: usize,
+    /// See `joint`; positive where the new views put the angle above the prior's.
     pub off_rad: f64,
+    /// See `joint`.
     pub off_std_rad: f64,
+    /// Share of the observations that a fit under the widened prior uses.
     pub used_share: f64,
 }
 
 impl PriorConsistency {
+    /// Whether move, joint or share of used observations is beyond what happens by chance.
     pub fn is_beyond_chance(&self) -> bool {
         // Not a number is no agreement.
         !(self.chi2 <= self.limit
@@ -109,7 +117,7 @@ impl CalibrationPrior {
                 scales.joint_std_rad[parameter.joint] = std_rad[parameter.joint].max(1e-5);
             }
         }
-        let model = model(applied, &guess.reference, &known.parameters);
+        let model = Model { n_links: prior.link.len(), ..model(applied, &guess.reference, &known.parameters) };
         let mount = prior.camera_mount.as_ref().and_then(|table| Some((table.link_from_camera()?, mount_rows(prior)?)));
         let mount = mount.filter(|_| model.mount);
         if let Some((link_from_camera, rows)) = &mount {
@@ -120,9 +128,7 @@ impl CalibrationPrior {
             };
             (robot.camera.mount_std_m, robot.camera.mount_std_rad) = (rms(0), rms(3));
         }
-        let parameters: Vec<Parameter> = (0..robot.n_joints())
-            .flat_map(|joint| model.joints[joint].iter().map(move |&kind| Parameter { joint, kind }))
-            .collect();
+        let parameters = model.parameters();
         let elapsed_h = elapsed_h(prior, views);
         let mount = mount.map(|(_, rows)| rows);
         let columns = PriorColumns { robot: &robot, scales: &scales, parameters: &parameters, mount };
@@ -157,12 +163,7 @@ impl CalibrationPrior {
 
     /// Gains and offsets that the prior knows no better than half as well as the datasheet.
     pub fn n_unknown(&self, datasheet: &Robot) -> usize {
-        let parameters = self
-            .model
-            .joints
-            .iter()
-            .enumerate()
-            .flat_map(|(joint, kinds)| kinds.iter().map(move |&kind| Parameter { joint, kind }));
+        let parameters = self.model.parameters().into_iter();
         let is_unknown = |(k, p): &(usize, Parameter)| {
             matches!(p.kind, ParameterKind::Gain | ParameterKind::Offset)
                 && self.covariance[(*k, *k)].sqrt() > 0.5 * p.prior_std(datasheet)

@@ -7,7 +7,7 @@ use crate::calib::bundle::evidence::{Posterior, change, joint_info, updated};
 use crate::calib::bundle::input::{BundleInput, HyperparameterMode};
 use crate::calib::bundle::model::{Hyperparameters, Model};
 use crate::calib::bundle::outliers::{Outlier, outliers, reject};
-use crate::calib::bundle::priors::prior;
+use crate::calib::bundle::priors::{mount_std, prior};
 use crate::calib::bundle::problem::{BundleProblem, State, WeightedMeasurement, parameters_of};
 use crate::calib::bundle::robust_start::{RobustStart, robust_start, straight_sensor_std};
 use crate::calib::bundle::solve::{LOOSE, Solved, TIGHT, solve, until};
@@ -21,12 +21,17 @@ pub struct Estimate<'a> {
     pub(crate) problem: BundleProblem<'a>,
     pub(crate) solved: Solved,
     pub(crate) posterior: Posterior,
+    /// What was estimated.
     pub model: Model,
+    /// The initial guess; what has no column keeps its values, and its reference is that of the terms.
     pub guess: JointParameters,
+    /// Tag observations that the estimate rejected.
     pub outliers: Vec<Outlier>,
+    /// Steps of all solutions, the robust start included.
     pub iterations: usize,
     /// The cost at the first guess and at the end, under the scales of the end.
     pub cost_initial: f64,
+    /// Sum of squared whitened residuals, priors and views' own errors included.
     pub cost_final: f64,
 }
 
@@ -70,6 +75,7 @@ pub fn estimate<'a>(input: &BundleInput<'a>) -> Option<Estimate<'a>> {
                 problem.scales = next;
                 if input.joint_prior.is_none() {
                     problem.prior.joint_info = joint_info(&problem, &problem.scales);
+                    problem.prior.mount_std = mount_std(input.robot, &problem.scales);
                 }
             }
         }
@@ -98,10 +104,15 @@ pub fn estimate<'a>(input: &BundleInput<'a>) -> Option<Estimate<'a>> {
 /// Plain least squares from the guess, every observation used, the scales as given: what a solver alone is compared by.
 #[derive(Clone, Debug)]
 pub struct LeastSquares {
+    /// Those of the least cost.
     pub parameters: JointParameters,
+    /// How the solver ended.
     pub outcome: Outcome,
+    /// Number of steps.
     pub iterations: usize,
+    /// Sum of squared whitened residuals at the guess.
     pub cost_initial: f64,
+    /// The same at the end.
     pub cost_final: f64,
 }
 
@@ -170,6 +181,7 @@ impl Estimate<'_> {
         parameters_of(&self.problem, &self.solved.state, &self.guess)
     }
 
+    /// How the last solution ended.
     #[must_use]
     pub fn outcome(&self) -> Outcome {
         self.solved.outcome
@@ -203,6 +215,7 @@ impl Estimate<'_> {
         &self.problem.layout.parameters
     }
 
+    /// Covariance of [`Self::joint_parameters`], in their units.
     #[must_use]
     pub fn joint_covariance(&self) -> DMatrix<f64> {
         let n = self.problem.layout.n_joint();
@@ -233,7 +246,7 @@ impl Estimate<'_> {
     #[must_use]
     pub fn as_found(&self, robot: &Robot) -> Robot {
         let (mount, covariance) = self.mount();
-        let mut found = robot.clone().with_camera_at(mount, &covariance);
+        let mut found = self.parameters().with_links(robot.clone()).with_camera_at(mount, &covariance);
         for (tag_idx, tag) in found.tags.iter_mut().enumerate() {
             let (pose, covariance) = self.tag(tag_idx);
             tag.base_from_tag = Pose::from_isometry(pose);

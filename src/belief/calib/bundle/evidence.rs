@@ -28,11 +28,12 @@ pub(crate) struct Posterior {
 pub(crate) const NU_JOINT: f64 = 3.0;
 const NU_SHAPE: f64 = 2.0;
 const NU_TERM: f64 = 2.0;
+const NU_LINK: f64 = 2.0;
 const NU_NOISE: f64 = 20.0;
 const NU_CAMERA: f64 = 6.0;
 /// Bounds of the noise's factor, and of every other scale over its first guess.
 const NOISE_BOUNDS: [f64; 2] = [0.1, 30.0];
-const SCALE_BOUNDS: [f64; 2] = [0.02, 50.0];
+pub(crate) const SCALE_BOUNDS: [f64; 2] = [0.02, 50.0];
 
 impl Posterior {
     /// `None` where the normal equations have no inverse.
@@ -183,6 +184,7 @@ fn update_terms(
             next.shape_std_rad[joint] = sums.std(NU_SHAPE, first.shape_std_rad[joint]);
         }
     }
+    update_links(problem, state, posterior, first, next);
     let all = 0..layout.n_joint();
     let is = |kind: ParameterKind| move |other: ParameterKind| (other == kind).then_some(1.0);
     let now = &problem.scales;
@@ -206,6 +208,38 @@ fn update_terms(
         let sums = of_kinds(&is(kind), all.clone(), std);
         if sums != Sums::default() {
             *next = sums.std(NU_TERM, first);
+        }
+    }
+}
+
+/// Each link's shift and turn has a size of its own, so that one wrong link does not loosen the others (automatic
+/// relevance determination, MacKay 1994); the camera mount's likewise.
+fn update_links(
+    problem: &BundleProblem<'_>,
+    state: &State,
+    posterior: &Posterior,
+    first: &Hyperparameters,
+    next: &mut Hyperparameters,
+) {
+    let layout = &problem.layout;
+    for (k, columns) in layout.links.clone().collect::<Vec<_>>().chunks_exact(3).enumerate() {
+        let mut sums = Sums::default();
+        for &column in columns {
+            let value = state.joint[column] - problem.prior.joint_mean[column];
+            sums.add(value, posterior.covariance[(column, column)], problem.scales.link_std[k / 2][k % 2]);
+        }
+        next.link_std[k / 2][k % 2] = sums.std(NU_LINK, first.link_std[k / 2][k % 2]);
+    }
+    if let (Some(at), false) = (layout.mount, layout.links.is_empty()) {
+        let off = log(&problem.prior.mount.inv_mul(&state.mount));
+        let unit = problem.prior.mount_std.map(BundleProblem::at_least);
+        for kind in 0..2 {
+            let (mut sums, scale) = (Sums::default(), problem.scales.mount_scale[kind]);
+            for row in 3 * kind..3 * kind + 3 {
+                let unit = unit[row] / scale;
+                sums.add(off[row] / unit, posterior.covariance[(at + row, at + row)] / (unit * unit), scale);
+            }
+            next.mount_scale[kind] = sums.std(NU_LINK, 1.0);
         }
     }
 }
@@ -256,6 +290,8 @@ pub(crate) fn change(a: &Hyperparameters, b: &Hyperparameters) -> f64 {
         ];
         all.extend(s.joint_std_rad);
         all.extend(s.shape_std_rad);
+        all.extend(s.link_std.iter().flatten());
+        all.extend(s.mount_scale);
         all.extend(s.camera_error_std.into_iter().flatten());
         all
     };

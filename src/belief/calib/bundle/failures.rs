@@ -23,7 +23,9 @@ pub(crate) const MIN_VIEWS: usize = 5;
 /// Who says that a joint failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FailureSource {
+    /// An operator, by a mark of the recording or in the routine.
     Declared,
+    /// The estimator, by what the tags show.
     Detected,
 }
 
@@ -39,9 +41,13 @@ pub enum SensorUse {
 /// One failed joint, and what is not used of it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Failure {
+    /// Index of the joint, base first.
     pub joint: usize,
+    /// What is wrong with it.
     pub kind: FailedKind,
+    /// Who says so.
     pub found: FailureSource,
+    /// Whether any of the sensor's readings are used.
     pub reading: SensorUse,
     /// Views whose reading says nothing, ascending.
     pub views: Vec<usize>,
@@ -119,8 +125,11 @@ pub(crate) fn slip_in_words(step_rad: f64, views: &[View], since: usize) -> Stri
 
 /// An arm and its views with the failed joints taken care of.
 pub struct FailureAdjusted {
+    /// A locked joint has a sensor of unknown offset.
     pub robot: Robot,
+    /// Unused readings replaced by what the camera shows.
     pub views: Vec<View>,
+    /// The failed joints.
     pub failures: Vec<Failure>,
 }
 
@@ -166,6 +175,7 @@ impl FailureAdjusted {
         model
     }
 
+    /// Takes the columns of sensors that say nothing from `model`.
     pub fn restrict(&self, model: &mut Model) {
         for failure in self.failures.iter().filter(|failure| failure.leaves_no_sensor()) {
             let is_locked = failure.kind == FailedKind::Locked;
@@ -193,6 +203,7 @@ impl FailureAdjusted {
         }
     }
 
+    /// The estimate from the datasheet; `None` where the views determine nothing.
     pub fn estimate(&self, evidence: HyperparameterMode) -> Option<Estimate<'_>> {
         estimate(&self.input(evidence))
     }

@@ -24,19 +24,24 @@ use armcal_core::numeric::Loss;
 pub struct Innovations {
     /// Of all coordinates.
     pub chi2: f64,
+    /// Number of those coordinates.
     pub dof: usize,
     /// Of the cameras' poses alone.
     pub camera_chi2: f64,
+    /// Six per view that shows enough.
     pub camera_dof: usize,
+    /// Those that the views tell enough of.
     pub joints: Vec<JointInnovation>,
 }
 
 /// What a joint was off in a view that was left out.
 #[derive(Clone, Copy, Debug)]
 pub struct JointInnovation {
+    /// Index of the joint, base first.
     pub joint: usize,
     /// Among all views.
     pub view_idx: usize,
+    /// Travel from the middle of its range by the datasheet.
     pub travel_rad: f64,
     /// Over the standard deviation that it should have: of unit variance under the model.
     pub normalised: f64,

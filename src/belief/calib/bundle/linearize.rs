@@ -2,13 +2,14 @@
 //!
 //! In a view all acts through the twist u of the camera (right, camera frame) that each observation i sees:
 //! `u_i = S l + T y - Ad_i tau_i`: l the view's own parameters (joint errors, camera error) with prior `L^-1`, y the
-//! common ones along the directions T (joints, mount, time offset), tau_i the tag's pose. With `H_i` of each
+//! common ones along the directions T (joints, links, mount, time offset), tau_i the tag's pose. With `H_i` of each
 //! observation and `G = sum H_i`, elimination of l leaves, for the blocks a and b,
 //! `sum A_a^T H_i A_b - (sum A_a^T H_i) M (sum H_i A_b)`, `M = S (S^T G S + L)^-1 S^T`: all of it 6x6 algebra, whatever
 //! the number of corners.
 
 use nalgebra::{DMatrix, DVector, Matrix6, SMatrix, SVector, Vector6};
 
+use crate::calib::bundle::link_columns::{LinkSums, LinkTwists, link_twists};
 use crate::calib::bundle::observation_term::{LensInformation, PoseInformation, right_jacobian_inverse};
 use crate::calib::bundle::problem::{BundleProblem, State};
 use crate::calib::bundle::schur::{
@@ -98,7 +99,7 @@ impl NormalEquations {
     fn add_view(&mut self, at: &Point<'_, '_>, view_idx: usize) {
         let Point { problem, state, .. } = at;
         let view = &problem.views[view_idx];
-        let poses = problem.robot.chain.link_poses(&problem.angles(view_idx, state));
+        let poses = problem.link_poses(view_idx, state);
         let before = poses.link(problem.n_camera_joints) * state.mount;
         self.add_group(
             at,
@@ -159,6 +160,12 @@ impl NormalEquations {
                 by_lens: sums.by_lens,
             };
             self.add_lens(&columns, &lens);
+        }
+        if !problem.layout.links.is_empty() {
+            let twists = link_twists(group, &problem.link_corrections(at.state));
+            own.by_links = h_sum * twists;
+            let link = LinkSums { twists, q, m, g: g_sum - h_sum * shift, m_h_sum, by_lens: sums.by_lens, h_sum };
+            self.add_links(&columns, &link, &own, &directions);
         }
         self.infos = infos;
         self.lens_infos = lens_infos;
@@ -294,6 +301,7 @@ impl NormalEquations {
             log_ratio: info.map(f64::ln).sum() - log_det,
             range: group.observations.clone(),
             by_lens: SMatrix::zeros(),
+            by_links: LinkTwists::zeros(),
             has_any: true,
         }
     }

@@ -7,6 +7,8 @@
 
 pub(crate) mod calibration;
 mod calibration_prior;
+mod drawing;
+mod drawing_report;
 mod estimate;
 mod evidence;
 mod failure_detection;
@@ -17,6 +19,7 @@ mod freed_tags;
 mod innovations;
 mod input;
 mod linearize;
+mod link_columns;
 mod model;
 mod model_selection;
 mod moved_tags;

@@ -1,6 +1,6 @@
 //! What is estimated, and how large the things are that are not known exactly.
 
-use crate::calib::parameters::ParameterKind;
+use crate::calib::parameters::{Parameter, ParameterKind};
 use crate::calib::views::view::View;
 use armcal_core::joints::MAX_JOINTS;
 use armcal_core::robot::{JointSensorSpec, Robot};
@@ -11,12 +11,15 @@ use armcal_core::sensor::{Conditions, N_SHAPE, shape_prior};
 pub struct Model {
     /// Of each joint of the arm, base first.
     pub joints: Vec<Vec<ParameterKind>>,
+    /// How many joints, base first, have columns of their place on the parent link, about the drawing's.
+    pub n_links: usize,
     /// The camera's mount, about the drawing's.
     pub mount: bool,
     /// Focal lengths, centre and distortion, about robot.toml's.
     pub lens: bool,
     /// The tags' poses, about the survey's.
     pub tags: bool,
+    /// Pose of the tag on the gripper, about the drawing's.
     pub gripper_tag: bool,
     /// How much later the joint sensors' stamps are than the camera's.
     pub time_offset: bool,
@@ -31,15 +34,25 @@ pub struct Hyperparameters {
     pub free_joint_std_rad: f64,
     /// Size of each sensor's nonlinearity.
     pub shape_std_rad: [f64; MAX_JOINTS],
+    /// Change of an offset with the oil temperature.
     pub offset_std_rad_per_k: f64,
+    /// Change of a gain with the oil temperature.
     pub gain_std_per_k: f64,
+    /// Change of an offset with the ambient pressure.
     pub offset_std_rad_per_mpa: f64,
+    /// Drift of an offset.
     pub drift_std_rad_per_h: f64,
+    /// Half of the backlash between joint and sensor shaft.
     pub half_play_std_rad: f64,
+    /// Of each joint's place on its parent link: shift m, turn rad.
+    pub link_std: [[f64; 2]; MAX_JOINTS],
+    /// Of the camera mount, over what robot.toml says of it: shift, turn.
+    pub mount_scale: [f64; 2],
     /// All measurements' standard deviations over what is stated for them.
     pub noise: f64,
     /// Of positions and poses that a recording gives in place of corners.
     pub position_std_m: f64,
+    /// Of poses that a recording gives in place of corners.
     pub rotation_std_rad: f64,
     /// The error that all tags of a view share (positions by SLAM have it): translation m, rotation rad. `None`: there
     /// is none.
@@ -74,6 +87,8 @@ impl Hyperparameters {
             offset_std_rad_per_mpa: 1e-4,
             drift_std_rad_per_h: 1e-3,
             half_play_std_rad: 2e-4,
+            link_std: [[robot.geometry.link_position_std_m, robot.geometry.link_rotation_std_rad]; MAX_JOINTS],
+            mount_scale: [1.0; 2],
             noise: 1.0,
             position_std_m: 0.005,
             rotation_std_rad: 0.02,
@@ -94,7 +109,20 @@ impl Hyperparameters {
             ParameterKind::DriftPerH => self.drift_std_rad_per_h,
             ParameterKind::HalfBacklash => self.half_play_std_rad,
             ParameterKind::StepBefore(_) => STEP_STD_RAD,
+            ParameterKind::LinkShift(_) => self.link_std[joint][0],
+            ParameterKind::LinkTurn(_) => self.link_std[joint][1],
         }
+    }
+}
+
+impl Model {
+    /// The joints' parameters in the order of their columns: sensors joint by joint, then links joint by joint.
+    #[must_use]
+    pub fn parameters(&self) -> Vec<Parameter> {
+        let of_sensors =
+            self.joints.iter().enumerate().flat_map(|(joint, kinds)| kinds.iter().map(move |&kind| (joint, kind)));
+        let of_links = (0..self.n_links).flat_map(|joint| ParameterKind::all_of_link().map(move |kind| (joint, kind)));
+        of_sensors.chain(of_links).map(|(joint, kind)| Parameter { joint, kind }).collect()
     }
 }
 
@@ -151,6 +179,7 @@ pub fn model_for(robot: &Robot, views: &[View]) -> Model {
     };
     Model {
         joints: (0..robot.n_joints()).map(joint).collect(),
+        n_links: 0,
         mount: robot.camera.mount_std_m > 0.0 || robot.camera.mount_std_rad > 0.0,
         lens: false,
         tags: true,

@@ -10,6 +10,7 @@ use nalgebra::Cholesky;
 
 use crate::calib::bundle::estimate::{Estimate, estimate};
 use crate::calib::bundle::input::BundleInput;
+use crate::calib::bundle::problem::BundleProblem;
 use crate::calib::parameters::ParameterKind;
 use crate::calib::views::view::TagMeasurement;
 
@@ -18,14 +19,18 @@ use crate::calib::views::view::TagMeasurement;
 pub enum OptionalTerm {
     /// An error of the camera's pose that all tags of a view share.
     CameraError,
+    /// Between the clocks of joint sensors and camera; only where joints move.
     TimeOffset,
+    /// Of every joint's offset; only in long sessions without a prior.
     Drift,
 }
 
 /// Whether a doubtful term came in, and what it brought.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Selection {
+    /// The term that was tried.
     pub term: OptionalTerm,
+    /// Whether it stayed.
     pub is_in: bool,
     /// Natural logarithm of the evidence with it over that without.
     pub gain_nats: f64,
@@ -104,8 +109,14 @@ pub(crate) fn log_evidence(found: &Estimate<'_>) -> f64 {
     };
     let Some(of_normal) = log_det(&normal.matrix) else { return f64::NEG_INFINITY };
     let of_prior = log_det(&problem.prior.joint_info).unwrap_or(f64::NEG_INFINITY)
-        - 2.0 * problem.layout.time.map_or(0.0, |_| problem.prior.time_std_s.ln());
+        - 2.0 * problem.layout.time.map_or(0.0, |_| problem.prior.time_std_s.ln())
+        - 2.0 * problem.layout.lens.map_or(0.0, |_| log_sum(&problem.prior.lens_std))
+        - 2.0 * problem.layout.mount.map_or(0.0, |_| log_sum(&problem.prior.mount_std));
     let of_views: f64 = normal.eliminated.iter().map(|own| own.log_ratio).sum();
     let n: usize = problem.observations.iter().filter(|s| s.is_used).map(|s| s.data.n_coordinates()).sum();
     0.5 * (of_prior - of_normal + of_views - normal.cost) - n as f64 * problem.scales.noise.ln()
+}
+
+fn log_sum(std: &[f64]) -> f64 {
+    std.iter().map(|std| BundleProblem::at_least(*std).ln()).sum()
 }

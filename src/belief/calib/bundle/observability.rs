@@ -26,9 +26,11 @@ use armcal_core::robot::Robot;
 pub struct Observability {
     /// Directions that the data tell more of than the prior, of as many as there are parameters.
     pub rank: usize,
+    /// Number of tested parameters: joints without nonlinearity, mount, gripper tag, clock and lens, where estimated.
     pub n_parameters: usize,
     /// Largest over smallest singular value, of the directions that the data tell more of; so are the indices.
     pub condition_number: f64,
+    /// O1 to O5, see the module; all 0 where the rank is 0.
     pub o: [f64; 5],
     /// Directions that are held by the prior, in words.
     pub null_space: Vec<NullDirection>,
@@ -68,7 +70,7 @@ pub fn observability(input: &BundleInput<'_>) -> Option<Observability> {
     let kept = |column: usize| {
         layout.parameters.get(column).map_or_else(
             || !layout.tags.iter().flatten().any(|at| (*at..at + 6).contains(&column)),
-            |p| !matches!(p.kind, ParameterKind::Shape(_) | ParameterKind::StepBefore(_)),
+            |p| !matches!(p.kind, ParameterKind::Shape(_) | ParameterKind::StepBefore(_)) && !p.kind.is_of_link(),
         )
     };
     let wanted: Vec<usize> = (0..layout.n).filter(|&column| kept(column)).collect();

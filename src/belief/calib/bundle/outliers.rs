@@ -8,7 +8,9 @@ use crate::calib::views::view::View;
 /// A tag observation that does not fit the rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Outlier {
+    /// Index into the views of the input.
     pub view_idx: usize,
+    /// Id of the tag, which may be that on the gripper.
     pub tag_id: u32,
     /// Root mean square of its coordinates' residuals in standard deviations.
     pub sigmas: f64,

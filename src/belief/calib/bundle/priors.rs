@@ -7,6 +7,7 @@ use crate::calib::bundle::model::Hyperparameters;
 use crate::calib::bundle::problem::{BundleProblem, Layout, Prior};
 use crate::calib::parameters::{JointParameters, Parameter};
 use crate::calib::views::view::TagMeasurement;
+use armcal_core::robot::Robot;
 
 /// The datasheet's and the survey's priors.
 pub(crate) fn prior(input: &BundleInput<'_>, scales: &Hyperparameters) -> Prior {
@@ -31,7 +32,7 @@ pub(crate) fn prior(input: &BundleInput<'_>, scales: &Hyperparameters) -> Prior 
         joint_mean,
         joint_info,
         mount: camera.mount.link_from_frame,
-        mount_std: six(camera.mount_std_m, camera.mount_std_rad),
+        mount_std: mount_std(robot, scales),
         time_std_s: 0.05,
         lens: camera.lens,
         lens_std: [1.0, 1.0, 1.0, 1.0, 1e-2, 1e-2, 1e-2, 1e-2],
@@ -40,6 +41,12 @@ pub(crate) fn prior(input: &BundleInput<'_>, scales: &Hyperparameters) -> Prior 
         gripper_tag: gripper.map_or_else(Isometry3::identity, |tag| tag.mount.link_from_frame),
         gripper_tag_std: gripper.map_or([0.0; 6], |tag| six(tag.position_std_m, tag.rotation_std_rad)),
     }
+}
+
+/// One sigma of the camera mount.
+pub(crate) fn mount_std(robot: &Robot, scales: &Hyperparameters) -> [f64; 6] {
+    let (camera, [shift, turn]) = (&robot.camera, scales.mount_scale);
+    std::array::from_fn(|k| if k < 3 { shift * camera.mount_std_m } else { turn * camera.mount_std_rad })
 }
 
 /// One sigma of a tag's place; a landmark that is seen as a position alone has no attitude to speak of.

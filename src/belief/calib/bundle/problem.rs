@@ -9,6 +9,7 @@ use crate::calib::bundle::model::{Hyperparameters, Model};
 use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
 use crate::calib::views::view::{MeanCorners, TagMeasurement, View};
 use armcal_core::joints::{JointAngles, MAX_JOINTS};
+use armcal_core::kinematics::{LinkCorrections, LinkPoses};
 use armcal_core::optics::Fisheye;
 use armcal_core::robot::Robot;
 
@@ -18,6 +19,8 @@ pub(crate) struct Layout {
     /// Columns 0.. : the joints' parameters, joint by joint.
     pub parameters: Vec<Parameter>,
     pub of_joint: Vec<Range<usize>>,
+    /// Six columns of each joint whose place on its parent link is estimated, base first; the last of `parameters`.
+    pub links: Range<usize>,
     pub mount: Option<usize>,
     pub time: Option<usize>,
     pub lens: Option<usize>,
@@ -97,6 +100,8 @@ pub(crate) struct BundleProblem<'a> {
     pub observations: Vec<ObservationTerm>,
     pub prior: Prior,
     pub scales: Hyperparameters,
+    /// Links as they were known before.
+    pub guess_links: LinkCorrections,
     /// Joints before the camera.
     pub n_camera_joints: usize,
 }
@@ -138,12 +143,14 @@ const CORNER_PRIOR_DOF: f64 = 16.0;
 impl Layout {
     pub(crate) fn new(robot: &Robot, model: &Model, views: &[View]) -> Self {
         let mut layout = Self { tags: vec![None; robot.tags.len()], ..Self::default() };
-        for (joint, kinds) in model.joints.iter().enumerate() {
-            let start = layout.parameters.len();
-            layout.parameters.extend(kinds.iter().map(|&kind| Parameter { joint, kind }));
-            layout.of_joint.push(start..layout.parameters.len());
+        layout.parameters = model.parameters();
+        let mut start = 0;
+        for kinds in &model.joints {
+            layout.of_joint.push(start..start + kinds.len());
+            start += kinds.len();
         }
         layout.n = layout.parameters.len();
+        layout.links = start..layout.n;
         let mut take = |wanted: bool, n: usize| {
             let at = layout.n;
             wanted.then(|| {
@@ -204,7 +211,8 @@ impl<'a> BundleProblem<'a> {
             });
             data.push(view_data(input, view, &layout, from..to, gripper));
         }
-        Self { robot, layout, views: data, observations, prior, scales, n_camera_joints: robot.camera.mount.n_joints }
+        let (guess_links, n_camera_joints) = (input.guess.links, robot.camera.mount.n_joints);
+        Self { robot, layout, views: data, observations, prior, scales, guess_links, n_camera_joints }
     }
 
     /// The state where nothing is off its prior, but for the joints' parameters, which are `guess`'s.
@@ -251,6 +259,27 @@ impl<'a> BundleProblem<'a> {
             let estimated: f64 = columns.map(|column| view.basis[column] * state.joint[column]).sum();
             view.fixed_rad[j] + estimated + state.joint_error[view_idx][j] + view.rate_rad_s[j] * state.time_s
         })
+    }
+
+    /// The links' corrections in `state`; those of the guess where they are not estimated.
+    pub(crate) fn link_corrections(&self, state: &State) -> LinkCorrections {
+        let mut corrections = self.guess_links;
+        let columns = self.layout.links.clone();
+        for (six, correction) in state.joint.rows_range(columns).as_slice().chunks_exact(6).zip(&mut corrections) {
+            correction.shift_m.copy_from_slice(&six[..3]);
+            correction.turn_rad.copy_from_slice(&six[3..]);
+        }
+        corrections
+    }
+
+    /// Poses of all links in a view.
+    pub(crate) fn link_poses(&self, view_idx: usize, state: &State) -> LinkPoses {
+        let angles = self.angles(view_idx, state);
+        let corrections = self.link_corrections(state);
+        if corrections == LinkCorrections::default() {
+            return self.robot.chain.link_poses(&angles);
+        }
+        self.robot.chain.corrected_link_poses(&angles, &corrections)
     }
 
     /// One sigma of a standard deviation that is in use: never zero.

@@ -86,15 +86,18 @@ impl Estimate<'_> {
         let robot = self.problem.robot;
         let (priors, camera) = (&robot.geometry, &robot.camera);
         let (first, _) = columns(element, error);
-        let is_estimated = element == GeometryElement::Mount;
-        let (prior_std, unit) = match (is_estimated, error) {
-            (true, ErrorKind::Shift) => (camera.mount_std_m, FindingUnit::Metre),
-            (true, ErrorKind::Turn) => (camera.mount_std_rad, FindingUnit::Radian),
-            (false, ErrorKind::Shift) => (priors.link_position_std_m, FindingUnit::Metre),
-            (false, ErrorKind::Turn) => (priors.link_rotation_std_rad, FindingUnit::Radian),
+        let (scales, n_links) = (&self.problem.scales, self.problem.layout.links.len() / 6);
+        let kind = usize::from(error == ErrorKind::Turn);
+        let (is_estimated, prior_std) = match element {
+            GeometryElement::Mount => {
+                (true, scales.mount_scale[kind] * [camera.mount_std_m, camera.mount_std_rad][kind])
+            }
+            GeometryElement::Joint(joint) if joint < n_links => (true, scales.link_std[joint][kind]),
+            GeometryElement::Joint(_) => (false, [priors.link_position_std_m, priors.link_rotation_std_rad][kind]),
         };
+        let unit = [FindingUnit::Metre, FindingUnit::Radian][kind];
         let seen = score.information[(first + axis, first + axis)] * prior_std * prior_std;
-        // The mount's own prior takes part in its information.
+        // The prior of what is estimated takes part in its information.
         let share_left = if is_estimated { 1.0 - seen } else { 1.0 / (1.0 + seen) };
         let size = Vector3::ith(axis, prior_std);
         let shifts = tool.iter().map(|at| at.shift(score, first, &size)).collect();

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use nalgebra::{Const, DMatrix, DVector, Isometry3, Matrix6, SMatrix, SVector, Vector6};
 
+use crate::calib::bundle::link_columns::LinkTwists;
 use crate::calib::bundle::problem::{BundleProblem, Layout, ViewData};
 use armcal_core::joints::MAX_JOINTS;
 use armcal_core::kinematics::LinkPoses;
@@ -33,6 +34,8 @@ pub(crate) struct SchurBlock {
     pub log_ratio: f64,
     /// The lens's part, `sum H_ic`.
     pub by_lens: SMatrix<f64, 6, 8>,
+    /// `sum H_i T` of the links' columns.
+    pub by_links: LinkTwists,
     /// Whether the group has any parameters of its own.
     pub has_any: bool,
 }
@@ -66,6 +69,15 @@ impl<'a> Columns<'a> {
         Self { layout: &problem.layout, view: &problem.views[group.view_idx], joints: group.joints.clone() }
     }
 
+    pub(crate) fn layout(&self) -> &'a Layout {
+        self.layout
+    }
+
+    /// The joints whose motion the group's observations see.
+    pub(crate) fn joints(&self) -> Range<usize> {
+        self.joints.clone()
+    }
+
     /// The directions that have columns.
     pub(crate) fn directions(&self) -> impl Iterator<Item = usize> + use<> {
         let mount = if self.layout.mount.is_some() { MOUNT..MOUNT + 6 } else { 0..0 };
@@ -96,6 +108,7 @@ impl SchurBlock {
             range,
             log_ratio: 0.0,
             by_lens: SMatrix::zeros(),
+            by_links: LinkTwists::zeros(),
             has_any: false,
         }
     }
@@ -130,6 +143,9 @@ impl SchurBlock {
         }
         if let Some(at) = problem.layout.lens {
             pushed += self.by_lens * step.fixed_rows::<8>(at);
+        }
+        for (k, column) in problem.layout.links.clone().enumerate() {
+            pushed += self.by_links.column(k) * step[column];
         }
         pushed
     }
@@ -169,6 +185,9 @@ impl SchurBlock {
             let mut view = out.fixed_view_mut::<6, 8>(0, at);
             view += self.by_lens;
         }
+        for (k, column) in layout.links.clone().enumerate() {
+            out.column_mut(column).copy_from(&self.by_links.column(k));
+        }
         out
     }
 
@@ -195,6 +214,9 @@ impl SchurBlock {
         if let Some(at) = layout.lens {
             let mut view = out.generic_view_mut((0, at), (Const::<N_VIEW_PARAMETERS>, Const::<8>));
             view += self.twists.transpose() * self.by_lens;
+        }
+        for (k, column) in layout.links.clone().enumerate() {
+            out.column_mut(column).copy_from(&self.twists.tr_mul(&self.by_links.column(k)));
         }
         out
     }

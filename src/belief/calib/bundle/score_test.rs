@@ -9,11 +9,12 @@
 use nalgebra::{DMatrix, DVector, Matrix6, SMatrix, Vector3, Vector6};
 
 use crate::calib::bundle::estimate::Estimate;
+use crate::calib::bundle::link_columns::link_twist;
 use crate::calib::bundle::observation_term::PoseInformation;
 use crate::calib::bundle::problem::WeightedMeasurement;
 use crate::calib::bundle::schur::{N_VIEW_PARAMETERS, SchurBlock};
 use crate::calib::geometry_error::ErrorKind;
-use crate::calib::parameters::Parameter;
+use crate::calib::parameters::{Parameter, ParameterKind};
 use armcal_core::joints::{JointAngles, MAX_JOINTS};
 use armcal_core::kinematics::LinkPoses;
 use armcal_core::robot::Robot;
@@ -29,7 +30,7 @@ const SIZE_RAD: f64 = 0.0175;
 const N_TRIALS: usize = 6 * MAX_JOINTS + 6;
 const MOUNT: usize = 6 * MAX_JOINTS;
 
-/// A element of the geometry that is tested.
+/// An element of the geometry that is tested.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum GeometryElement {
     /// Where the joint sits on its parent link.
@@ -41,11 +42,15 @@ pub enum GeometryElement {
 /// What one change of the geometry would explain.
 #[derive(Clone, Debug)]
 pub struct ScoreTestResult {
+    /// The element that would be elsewhere.
     pub element: GeometryElement,
+    /// Shifted or turned.
     pub error: ErrorKind,
     /// What the data ask for, in the parent link's frame (the camera's for the mount): m or rad.
     pub size: Vector3<f64>,
+    /// Chi-square of the score, where the model holds.
     pub chi2: f64,
+    /// Number of directions that the data tell enough of, 1 to 3.
     pub dof: usize,
     /// That chance alone makes chi2 as large.
     pub probability: f64,
@@ -57,7 +62,7 @@ type Trials = SMatrix<f64, 6, N_TRIALS>;
 
 /// Score and information of all trials, and how the common parameters follow them.
 pub(crate) struct Score {
-    score: DVector<f64>,
+    pub(crate) score: DVector<f64>,
     pub(crate) information: DMatrix<f64>,
     /// d(common)/d(trial).
     sensitivity: DMatrix<f64>,
@@ -67,14 +72,8 @@ impl Estimate<'_> {
     /// All that can be tested, the least likely by chance first; `task`: the arm's angles at the task's targets.
     #[must_use]
     pub fn score_tests(&self, task: &[JointAngles]) -> Vec<ScoreTestResult> {
-        let robot = self.problem.robot;
         let score = self.score();
-        let has_gripper = self.problem.layout.gripper_tag.is_some();
-        let n_seen = match &robot.gripper_tag {
-            Some(tag) if has_gripper => tag.mount.n_joints,
-            _ => self.problem.n_camera_joints,
-        };
-        let mut elements: Vec<GeometryElement> = (0..n_seen).map(GeometryElement::Joint).collect();
+        let mut elements: Vec<GeometryElement> = (0..self.n_seen_joints()).map(GeometryElement::Joint).collect();
         elements.extend(self.problem.layout.mount.map(|_| GeometryElement::Mount));
         let both = elements.iter().flat_map(|&element| [(element, ErrorKind::Shift), (element, ErrorKind::Turn)]);
         let task = self.tool_jacobians(task);
@@ -82,6 +81,14 @@ impl Estimate<'_> {
             both.filter_map(|(element, error)| self.score_test(&score, element, error, &task)).collect();
         out.sort_by(|a, b| a.probability.total_cmp(&b.probability).then(b.chi2.total_cmp(&a.chi2)));
         out
+    }
+
+    /// Joints, base first, that some view sees move.
+    pub(crate) fn n_seen_joints(&self) -> usize {
+        match &self.problem.robot.gripper_tag {
+            Some(tag) if self.problem.layout.gripper_tag.is_some() => tag.mount.n_joints,
+            _ => self.problem.n_camera_joints,
+        }
     }
 
     /// The arm's angles in each view.
@@ -121,9 +128,9 @@ impl Estimate<'_> {
 
     /// Tool and its derivatives at each configuration of `task`.
     pub(crate) fn tool_jacobians(&self, task: &[JointAngles]) -> Vec<ToolJacobian> {
-        let robot = self.problem.robot;
-        let sensors = self.parameters().sensors(robot);
-        task.iter().map(|angles| ToolJacobian::new(robot, &self.problem.layout.parameters, &sensors, angles)).collect()
+        let at = self.parameters();
+        let (robot, sensors) = (at.with_links(self.problem.robot.clone()), at.sensors(self.problem.robot));
+        task.iter().map(|angles| ToolJacobian::new(&robot, &self.problem.layout.parameters, &sensors, angles)).collect()
     }
 
     pub(crate) fn score(&self) -> Score {
@@ -134,7 +141,7 @@ impl Estimate<'_> {
         let mut cross = DMatrix::zeros(N_TRIALS, n);
         let mut groups = self.solved.normal.eliminated.iter();
         for (view_idx, view) in problem.views.iter().enumerate() {
-            let poses = problem.robot.chain.link_poses(&problem.angles(view_idx, &self.solved.state));
+            let poses = problem.link_poses(view_idx, &self.solved.state);
             for own in groups.by_ref().take(1 + usize::from(view.gripper.is_some())) {
                 let base_from_camera = self.base_from_camera(view_idx, own, &poses);
                 let trials = self.trials(view_idx, own, &poses, &base_from_camera);
@@ -205,17 +212,11 @@ impl Estimate<'_> {
             _ => (0..problem.n_camera_joints, 1.0),
         };
         let mut trials = Trials::zeros();
-        let to_camera = base_from_camera.rotation.inverse();
-        let center = base_from_camera.translation.vector;
         for joint in joints {
-            let lever = center - poses.joint_origin(joint);
             for axis in 0..3 {
-                let direction = poses.link(joint).rotation * Vector3::ith(axis, sign);
-                let shift = to_camera * direction;
-                trials.fixed_view_mut::<3, 1>(0, 6 * joint + axis).copy_from(&shift);
-                let swept = to_camera * direction.cross(&lever);
-                trials.fixed_view_mut::<3, 1>(0, 6 * joint + 3 + axis).copy_from(&swept);
-                trials.fixed_view_mut::<3, 1>(3, 6 * joint + 3 + axis).copy_from(&shift);
+                let [shift, turn] = link_twist(poses, base_from_camera, joint, [Vector3::ith(axis, sign); 2]);
+                trials.set_column(6 * joint + axis, &shift);
+                trials.set_column(6 * joint + 3 + axis, &turn);
             }
         }
         let error = if is_gripper { nalgebra::Isometry3::identity() } else { self.solved.state.camera_error[view_idx] };
@@ -246,11 +247,22 @@ impl ToolJacobian {
             if joint >= tool.n_joints {
                 return Vector3::zeros();
             }
+            let along = |axis: u8| poses.link(joint).rotation * Vector3::ith(usize::from(axis), 1.0);
+            match parameter.kind {
+                ParameterKind::LinkShift(axis) => return along(axis),
+                ParameterKind::LinkTurn(axis) => return along(axis).cross(&(tool_m - poses.joint_origin(joint))),
+                _ => {}
+            }
             let spec = &sensors.models[joint].spec;
             poses.point_jacobian(joint, &tool_m) * parameter.kind.angle_derivative(spec, travel_rad[joint], &still, 0.0)
         };
         let by_parameters = parameters.iter().map(by).collect();
         Self { by_parameters, tool_m, n_joints: tool.n_joints, poses }
+    }
+
+    /// How the tool moves by changes of the estimated joints' parameters, base frame, m.
+    pub(crate) fn moved_by(&self, changes: &DVector<f64>) -> Vector3<f64> {
+        self.by_parameters.iter().zip(changes.iter()).map(|(by, change)| by * *change).sum()
     }
 
     /// Where the tool is with the trial at `first` of `size`, the joints' parameters following: beyond where it
@@ -264,10 +276,7 @@ impl ToolJacobian {
             moved += if first.is_multiple_of(6) { turned } else { turned.cross(&lever) };
         }
         let step = score.sensitivity.columns(first, 3) * size;
-        for (by, step) in self.by_parameters.iter().zip(step.iter()) {
-            moved += by * *step;
-        }
-        moved
+        moved + self.moved_by(&step)
     }
 }
 

@@ -1,6 +1,7 @@
 //! What `bundle` is started from: failed joints taken care of, a prior taken up.
 
 use crate::calib::bundle::calibration_prior::CalibrationPrior;
+use crate::calib::bundle::drawing::Drawing;
 use crate::calib::bundle::estimate::Estimate;
 use crate::calib::bundle::failures::{Failure, FailureAdjusted, SensorUse};
 use crate::calib::bundle::input::{BundleInput, HyperparameterMode};
@@ -17,6 +18,7 @@ use armcal_core::robot::{FailedKind, Robot};
 pub(crate) struct BundleSetup {
     pub applied: FailureAdjusted,
     prior: Option<Result<CalibrationPrior, Refusal>>,
+    drawing: Drawing,
 }
 
 /// The declared failures of `robot`.
@@ -30,7 +32,12 @@ impl BundleSetup {
         let at = prior.map_or_else(JointParameters::default, |prior| prior.parameters(robot));
         let applied = FailureAdjusted::new(robot, views, failed, &at);
         let prior = prior.map(|prior| CalibrationPrior::new(prior, &applied).ok_or(Refusal::PriorSingular));
-        Self { applied, prior }
+        Self { applied, prior, drawing: Drawing::default() }
+    }
+
+    /// The same with what of the drawing is estimated, too.
+    pub(crate) fn with_drawing(self, drawing: &Drawing) -> Self {
+        Self { drawing: drawing.clone(), ..self }
     }
 
     /// The prior, or why it is of no use.
@@ -45,7 +52,9 @@ impl BundleSetup {
     pub(crate) fn input(&self) -> BundleInput<'_> {
         let of_prior =
             self.usable_prior().and_then(|prior| prior.input(&self.applied.views, HyperparameterMode::Fitted));
-        of_prior.unwrap_or_else(|| self.applied.input(HyperparameterMode::Fitted))
+        let mut input = of_prior.unwrap_or_else(|| self.applied.input(HyperparameterMode::Fitted));
+        self.drawing.apply(&mut input);
+        input
     }
 
     pub(crate) fn estimate(&self) -> Option<(Estimate<'_>, Vec<Selection>)> {

@@ -19,7 +19,9 @@ use armcal_core::robot::Robot;
 /// Sensors by their stops.
 #[derive(Clone, Debug)]
 pub struct EndStopFit {
+    /// Gains and offsets of the fitted joints; the others keep the guess.
     pub solution: Solution,
+    /// Of the fitted joints' gains and offsets.
     pub covariance: ParameterCovariance,
     /// Joints without two stops, and why.
     pub left_out: Vec<Unobservable>,

@@ -59,6 +59,7 @@ pub struct VarianceObjective<'a> {
 }
 
 impl<'a> VarianceObjective<'a> {
+    /// The objective over all tags of the views.
     #[must_use]
     pub fn new(problem: &'a PositionProblem<'a>) -> Self {
         Self { problem, clouds: vec![Cloud::default(); problem.robot.tags.len()] }

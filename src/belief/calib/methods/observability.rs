@@ -14,7 +14,9 @@ use armcal_core::robot::Robot;
 /// A parameter that stays at its datasheet value, and why.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Unobservable {
+    /// Gain or offset of a joint.
     pub parameter: Parameter,
+    /// End of a sentence about the parameter, for people.
     pub reason: String,
 }
 

@@ -16,7 +16,9 @@ use armcal_core::streams::JointAngles;
 /// Views with known landmarks.
 #[derive(Clone, Debug)]
 pub struct PositionProblem<'a> {
+    /// Nominal arm with surveyed landmarks.
     pub robot: &'a Robot,
+    /// Views without tags count for nothing.
     pub views: &'a [View],
 }
 
@@ -36,6 +38,7 @@ pub(crate) struct TagResidual<'a> {
 }
 
 impl<'a> PositionProblem<'a> {
+    /// Landmarks of `views` against the survey of `robot`.
     #[must_use]
     pub fn new(robot: &'a Robot, views: &'a [View]) -> Self {
         Self { robot, views }
@@ -88,6 +91,7 @@ impl<'a> PositionProblem<'a> {
         })
     }
 
+    /// Number of tags in all views.
     #[must_use]
     pub fn n_observations(&self) -> usize {
         self.views.iter().map(|view| view.tags.len()).sum()

@@ -42,6 +42,7 @@ pub enum Interpolation {
 /// How the box is searched.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SearchOptions {
+    /// In which numbers the search moves.
     pub scaling: Scaling,
     /// The first is the guess, the others are drawn from the prior; the lowest cost wins.
     pub n_starts: usize,
@@ -49,9 +50,11 @@ pub struct SearchOptions {
     pub seed: u64,
     /// First and last trust-region radius, in prior sigma.
     pub rho_begin: f64,
+    /// See `rho_begin`.
     pub rho_end: f64,
     /// Of each start.
     pub max_evaluations: usize,
+    /// Points of the quadratic model.
     pub interpolation: Interpolation,
 }
 
@@ -81,10 +84,13 @@ impl SearchOptions {
 /// What to search, and how.
 #[derive(Clone, Copy, Debug)]
 pub struct PositionSearch<'a> {
+    /// Views and landmarks.
     pub problem: &'a PositionProblem<'a>,
     /// Gains and offsets that are searched for; all else stays at `guess`.
     pub free: &'a [Parameter],
+    /// Start of the first search, and the middle of the box.
     pub guess: &'a JointParameters,
+    /// How the box is searched.
     pub options: &'a SearchOptions,
 }
 

@@ -7,6 +7,7 @@ use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
 use crate::calib::refusal_conditions::{AcceptanceData, refusal};
 use crate::calib::result::calibration::{Calibration, JointResult, Status};
 use crate::calib::result::covariance_file::CovarianceTable;
+use crate::calib::result::link_table::LinkResult;
 use crate::calib::result::metrics::{FitMetrics, HeldOutMetrics};
 use crate::calib::result::terms_table::{ReferenceTable, TermsTable};
 use crate::calib::result::valid_range::ValidRange;
@@ -89,6 +90,7 @@ pub(crate) fn assemble(source: &Provenance<'_>, fit: &Fit<'_>, evidence: Evidenc
         model: None,
         outliers: Vec::new(),
         joint: joint_results(source, fit),
+        link: LinkResult::all(source.robot, at, fit.covariance),
         failed_joint: Vec::new(),
         prior: None,
         covariance_hash: None,

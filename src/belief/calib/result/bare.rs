@@ -41,6 +41,7 @@ pub(in crate::calib) fn bare(robot: &str, method: Method) -> Calibration {
         model: None,
         outliers: Vec::new(),
         joint: Vec::new(),
+        link: Vec::new(),
         failed_joint: Vec::new(),
         prior: None,
         covariance_hash: None,

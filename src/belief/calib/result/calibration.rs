@@ -10,6 +10,7 @@ use crate::calib::reservation::Reservation;
 use crate::calib::result::camera_mount::CameraMount;
 use crate::calib::result::covariance_file::CovarianceTable;
 use crate::calib::result::failed_joint::{FailedJointTable, PriorTable};
+use crate::calib::result::link_table::LinkResult;
 use crate::calib::result::map_table::MapResult;
 use crate::calib::result::metrics::{FitMetrics, HeldOutMetrics};
 use crate::calib::result::model_table::ModelTable;
@@ -21,7 +22,9 @@ use crate::calib::result::verdict_tables::{ObservabilityTable, VerdictTable};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Status {
+    /// No reason to refuse was found.
     Accepted,
+    /// The reasons are in `refusals`.
     Refused,
 }
 
@@ -32,9 +35,13 @@ pub enum Status {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Calibration {
+    /// Of the format: 1.
     pub version: u32,
+    /// Name of the robot.
     pub robot: String,
+    /// Method that made it.
     pub method: Method,
+    /// Whether it may be used.
     pub status: Status,
     /// All reasons to refuse in words.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -50,18 +57,22 @@ pub struct Calibration {
     /// Tag observations that the fit rejected: `pose 12: tag 3: 45 sigma`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub outliers: Vec<String>,
+    /// Solver and fitted views.
     pub fit: FitMetrics,
+    /// Views that the fit did not use.
     pub held_out: HeldOutMetrics,
+    /// Over the task's targets; absent without a task.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub predicted_tool_error_m: Option<Summary>,
     /// The same with what the drawing leaves open: link geometry and tool point with their priors.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub predicted_tool_error_with_priors_m: Option<Summary>,
+    /// Conditions that the captured views covered.
     pub valid: ValidRange,
     /// What the joints' terms are counted from, where there are any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reference: Option<ReferenceTable>,
-    /// Where the robot has a tag on the gripper.
+    /// Of `bundle`, and of other methods where the robot has a tag on the gripper.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera_mount: Option<CameraMount>,
     /// Where the tags were found to be, where no survey said it.
@@ -76,7 +87,11 @@ pub struct Calibration {
     /// What `bundle` took for its model.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub model: Option<ModelTable>,
+    /// One per joint, base first.
     pub joint: Vec<JointResult>,
+    /// Joints' places on their parent links, where the data asked for others than the drawing's.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub link: Vec<LinkResult>,
     /// Joints that failed, or whose sensors did.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub failed_joint: Vec<FailedJointTable>,
@@ -117,17 +132,25 @@ impl Calibration {
     }
 }
 
+/// The sensor of one joint.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct JointResult {
+    /// Name of the joint in the URDF.
     pub name: String,
+    /// Middle of the joint's range by the drawing.
     pub center_rad: f64,
+    /// Negative where the reading falls as the angle grows.
     pub gain_rad_per_count: f64,
+    /// Added to the angle.
     pub offset_rad: f64,
     /// One sigma; the datasheet's where the joint was not determined.
     pub gain_std_rad_per_count: f64,
+    /// One sigma; the datasheet's where the joint was not determined.
     pub offset_std_rad: f64,
+    /// Whether these views, or those of the prior, determined the gain.
     pub gain_estimated: bool,
+    /// Whether these views, or those of the prior, determined the offset.
     pub offset_estimated: bool,
     /// Angles that the captured views covered.
     pub covered_rad: [f64; 2],

@@ -16,12 +16,15 @@ pub struct CameraMount {
     pub left_out: Option<String>,
     /// `link_from_camera` on the link that carries the camera.
     pub position_m: [f64; 3],
+    /// Rotation of `link_from_camera`.
     pub quaternion_wxyz: [f64; 4],
     /// One sigma per axis of the camera.
     pub position_std_m: [f64; 3],
+    /// One sigma about each axis of the camera.
     pub rotation_std_rad: [f64; 3],
     /// Views that showed the tag.
     pub views: usize,
+    /// Of the tag's corners, root mean square distance in the image; absent where no fit of it alone was made.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rms_px: Option<f64>,
 }

@@ -27,6 +27,7 @@ const HEAD: &str = "\
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CovarianceTable {
+    /// Names in the order of the rows.
     pub parameters: Vec<String>,
     /// Square and symmetric.
     pub rows: Vec<Vec<f64>>,

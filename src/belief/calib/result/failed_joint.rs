@@ -9,7 +9,9 @@ use armcal_core::stats::Summary;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FailedJointTable {
+    /// Name of the joint in the URDF.
     pub joint: String,
+    /// What is wrong with it.
     pub kind: FailedKind,
     /// `declared` or `detected`.
     pub found: String,
@@ -23,6 +25,7 @@ pub struct FailedJointTable {
     /// Where a locked joint stands, with one sigma.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub angle_rad: Option<f64>,
+    /// Absent where `angle_rad` is.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub angle_std_rad: Option<f64>,
     /// One sigma of the angle where the camera alone tells it, in a view like those.
@@ -53,13 +56,17 @@ pub struct PriorTable {
     pub messages_hash: String,
     /// Hours since its last view.
     pub elapsed_h: f64,
+    /// Square of the estimate's move from the prior under its covariance.
     pub chi_square: f64,
+    /// Number of directions that the views tell enough of to be tested.
     pub degrees_of_freedom: usize,
     /// The 0.999 quantile.
     pub chi_square_limit: f64,
     /// The joint that is off the most in its own sigma: mean over the views.
     pub worst_joint: String,
+    /// Positive where the new views put the joint's angle above the prior's.
     pub worst_off_rad: f64,
+    /// One sigma of `worst_off_rad`.
     pub worst_off_std_rad: f64,
 }
 

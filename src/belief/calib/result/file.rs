@@ -7,7 +7,9 @@ use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
 use crate::calib::result::calibration::{Calibration, JointResult};
 use crate::calib::result::covariance_file::CovarianceTable;
 use crate::calib::result::file_error::CalibrationFileError;
+use crate::calib::result::link_table::LinkResult;
 use crate::calib::result::terms_table::TermsTable;
+use armcal_core::kinematics::LinkCorrections;
 use armcal_core::robot::{FileIssue, JointSensorSpec, Robot, RobotError, parse_toml, read_text};
 use armcal_core::sensor::{ArmSensors, Correction};
 
@@ -79,8 +81,8 @@ impl Calibration {
         Ok(sensors)
     }
 
-    /// `robot` with the sensor scales that were measured on the way, which the covariance's gains are relative to, and
-    /// with sensors as far from straight as the residuals say.
+    /// `robot` with the sensor scales that were measured on the way, which the covariance's gains are relative to, with
+    /// sensors as far from straight as the residuals say, and with its links as calibrated.
     #[must_use]
     pub fn scaled_robot(&self, robot: &Robot) -> Robot {
         let mut scaled = robot.clone().with_linearity(self.fit.linearity_scale);
@@ -89,7 +91,7 @@ impl Calibration {
                 *spec = spec.with_scale(ratio);
             }
         }
-        scaled
+        self.parameters(robot).with_links(scaled)
     }
 
     /// The parameters relative to the sensors of `robot`, whose joints must be this calibration's.
@@ -101,14 +103,26 @@ impl Calibration {
             parameters.terms[joint] = result.terms.as_ref().map(TermsTable::terms).unwrap_or_default();
         }
         parameters.reference = self.reference.map(|table| table.conditions()).unwrap_or_default();
+        parameters.links = self.link_corrections();
         parameters
+    }
+
+    /// Where joints sit on their parent links beyond the drawing; zero where that was not estimated.
+    #[must_use]
+    pub fn link_corrections(&self) -> LinkCorrections {
+        let mut corrections = LinkCorrections::default();
+        for (joint, correction) in self.joint.iter().zip(&mut corrections) {
+            let link = self.link.iter().find(|link| link.joint == joint.name);
+            *correction = link.map(LinkResult::correction).unwrap_or_default();
+        }
+        corrections
     }
 
     /// The covariance of the estimated parameters for `robot`'s joints; rows that name no joint of it are left out.
     #[must_use]
     pub fn parameter_covariance(&self, robot: &Robot) -> ParameterCovariance {
-        let all =
-            (0..robot.n_joints()).flat_map(|joint| ParameterKind::all().map(move |kind| Parameter { joint, kind }));
+        let all = (0..robot.n_joints())
+            .flat_map(|joint| ParameterKind::all_of_joint().map(move |kind| Parameter { joint, kind }));
         let rows: Vec<(usize, Parameter)> =
             all.filter_map(|p| Some((self.covariance.row(&p.name(robot))?, p))).collect();
         let at = |row: usize, column: usize| self.covariance.rows[row].get(column).copied().unwrap_or(f64::NAN);

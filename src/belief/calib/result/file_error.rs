@@ -6,6 +6,7 @@ use armcal_core::robot::RobotError;
 
 /// Why a calibration file was refused.
 #[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "each variant's message says what it is")]
 pub enum CalibrationFileError {
     #[error(transparent)]
     File(#[from] RobotError),

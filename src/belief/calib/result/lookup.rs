@@ -11,6 +11,7 @@ const POINTS: usize = 65;
 /// The angle of one joint over its range under the reference's conditions.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LookupTable {
+    /// Name of the joint in the URDF.
     pub joint: String,
     /// Reading less the datasheet's reading in the middle of the range; ascending or descending.
     pub travel_counts: Vec<f64>,

@@ -10,6 +10,7 @@ pub struct MapResult {
     pub known: SurveyCoverage,
     /// The arm's base link, whose frame the tags' places are in.
     pub frame: String,
+    /// Id of the tag beside the base.
     pub base_tag: u32,
     /// Views that it was made from.
     pub views: usize,
@@ -19,6 +20,7 @@ pub struct MapResult {
     pub rejected: usize,
     /// `tag N: why`; their detections are not used for the joints either.
     pub left_out: Vec<String>,
+    /// Tags of the map, known ones included; those that are left out are missing.
     pub tag: Vec<MapTag>,
 }
 
@@ -36,14 +38,19 @@ pub enum SurveyCoverage {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MapTag {
+    /// Number of the tag.
     pub id: u32,
+    /// Side of the black square.
     pub size_m: f64,
+    /// Origin of the tag.
     pub position_m: [f64; 3],
+    /// `base_from_tag`.
     pub quaternion_wxyz: [f64; 4],
     /// Along the base frame's axes, the anchor's own error included.
     pub position_std_m: [f64; 3],
     /// About the tag's axes.
     pub rotation_std_rad: [f64; 3],
+    /// Number of views that show it.
     pub n_views: usize,
 }
 

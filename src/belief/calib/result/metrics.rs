@@ -9,16 +9,24 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FitMetrics {
+    /// How the solver ended.
     pub outcome: Outcome,
+    /// Of the objective; iterations of `bundle`.
     pub evaluations: usize,
+    /// At the initial guess, in the unit of the method's objective.
     pub cost_initial: f64,
+    /// At the end.
     pub cost_final: f64,
+    /// Fitted views that show a tag.
     pub views: usize,
+    /// Tags in those views, each view's by itself.
     pub tags_seen: usize,
+    /// Detections rejected in all captured views, and outliers of the fit.
     pub rejected: usize,
     /// The same by reason; not in the file.
     #[serde(default, skip_serializing)]
     pub rejected_by_reason: BTreeMap<String, usize>,
+    /// Root mean square distance between the tags' predicted and surveyed positions.
     pub rms_m: f64,
     /// Absent where the recording has positions or poses and no corners.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -36,10 +44,12 @@ fn as_the_datasheet_says() -> f64 {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct HeldOutMetrics {
+    /// Number of views that show a tag.
     pub views: usize,
     /// By cross-validation: each view was held out of one fold, and fitted in the end; else the fit never saw these.
     #[serde(default, alias = "in_turn", skip_serializing_if = "std::ops::Not::not")]
     pub cross_validated: bool,
+    /// Root mean square distance between the tags' predicted and surveyed positions; absent without a tag.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rms_m: Option<f64>,
     /// The mean of the same distances, where views were cross-validated.
@@ -48,6 +58,7 @@ pub struct HeldOutMetrics {
     /// Mean distance of the camera from where the landmarks' measured poses have it, m; where the recording has poses.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera_mean_m: Option<f64>,
+    /// Root mean square reprojection error per corner; absent without corners.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rms_px: Option<f64>,
     /// The same views with the datasheet's sensors.

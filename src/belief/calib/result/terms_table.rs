@@ -14,8 +14,10 @@ use armcal_core::time::Stamp;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ReferenceTable {
+    /// Oil temperature, degrees Celsius.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub oil_c: Option<f64>,
+    /// Ambient pressure, absolute.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pressure_pa: Option<f64>,
     /// Nanoseconds since the epoch.
@@ -32,27 +34,37 @@ pub struct TermsTable {
     /// Coefficients of [`nonlinearity_basis`](armcal_core::sensor::nonlinearity_basis).
     #[serde(skip_serializing_if = "Option::is_none", alias = "shape_rad")]
     pub nonlinearity_rad: Option<Vec<f64>>,
+    /// One sigma of each coefficient, 0 for those that were held; absent where none was estimated.
     #[serde(skip_serializing_if = "Option::is_none", alias = "shape_rad_std")]
     pub nonlinearity_rad_std: Option<Vec<f64>>,
+    /// Change of the offset with the oil temperature.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub offset_rad_per_k: Option<f64>,
+    /// One sigma; absent where it was not estimated, as for all that follow.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub offset_rad_per_k_std: Option<f64>,
     /// Of the gain relative to the datasheet's.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gain_per_k: Option<f64>,
+    /// One sigma.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gain_per_k_std: Option<f64>,
+    /// Change of the offset with the ambient pressure.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub offset_rad_per_mpa: Option<f64>,
+    /// One sigma.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub offset_rad_per_mpa_std: Option<f64>,
+    /// Change of the offset with time.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub drift_rad_per_h: Option<f64>,
+    /// One sigma.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub drift_rad_per_h_std: Option<f64>,
+    /// Half of the backlash between joint and sensor shaft.
     #[serde(skip_serializing_if = "Option::is_none", alias = "half_play_rad")]
     pub half_backlash_rad: Option<f64>,
+    /// One sigma.
     #[serde(skip_serializing_if = "Option::is_none", alias = "half_play_rad_std")]
     pub half_backlash_rad_std: Option<f64>,
 }
@@ -66,6 +78,7 @@ impl ReferenceTable {
         (!parameters.are_linear() || covariance.parameters.iter().any(is_term)).then_some(table)
     }
 
+    /// As the sensor model has them.
     #[must_use]
     pub fn conditions(&self) -> Conditions {
         let Self { oil_c, pressure_pa, time_nanos } = *self;

@@ -17,10 +17,13 @@ const MARGIN_H: f64 = 6.0;
 pub struct ValidRange {
     /// When the last view was captured, nanoseconds since the epoch.
     pub time_nanos: i64,
+    /// Lowest and highest oil temperature, degrees Celsius; absent where it was not measured.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub oil_c: Option<[f64; 2]>,
+    /// Lowest and highest water temperature, degrees Celsius; absent where it was not measured.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub water_c: Option<[f64; 2]>,
+    /// Lowest and highest ambient pressure, absolute; absent where it was not measured.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pressure_pa: Option<[f64; 2]>,
 }

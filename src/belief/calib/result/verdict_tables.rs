@@ -14,10 +14,15 @@ pub struct ObservabilityTable {
     /// Largest over smallest singular value of the directions that count in `rank`; absent where there are none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub condition_number: Option<f64>,
+    /// Index of Borm and Menq (1991), per root of the number of views; all indices are 0 where the rank is 0.
     pub o1: f64,
+    /// Smallest over largest singular value (Driels and Pathre 1990).
     pub o2: f64,
+    /// Smallest singular value.
     pub o3: f64,
+    /// Its square over the largest one.
     pub o4: f64,
+    /// 1 over the sum of the inverse singular values (Sun and Hollerbach 2008).
     pub o5: f64,
     /// Directions that the data tell less of than the priors do, in words.
     #[serde(alias = "null")]
@@ -34,6 +39,7 @@ pub struct VerdictTable {
     pub warnings: Vec<String>,
     /// Where the task goes beyond what the views covered.
     pub not_covered: Vec<String>,
+    /// Every test in its order, passed or not.
     pub checks: Vec<Check>,
 }
 
@@ -41,9 +47,13 @@ pub struct VerdictTable {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Check {
+    /// The figure and its unit, in words.
     pub what: String,
+    /// Value of the figure.
     pub value: f64,
+    /// The largest value that passes.
     pub limit: f64,
+    /// Whether it passes.
     pub holds: bool,
 }
 

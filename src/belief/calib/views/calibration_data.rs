@@ -23,12 +23,15 @@ pub struct CalibrationData {
     pub name: String,
     /// Of the messages that the views come from.
     pub messages_hash: String,
+    /// Fitted and held-out views, task and end stops.
     pub data: CaptureData,
     /// The views that tell of the camera's mount, where they are others than `data`'s.
     pub gripper_tag_data: Option<CaptureData>,
+    /// Which views the verdict rests on.
     pub held_out: HeldOut,
     /// With the tags that were around it, and the scales of `identified`.
     pub robot: Robot,
+    /// Scales that were measured because nobody knew them; empty as a rule.
     pub identified: Vec<IdentifiedScale>,
 }
 

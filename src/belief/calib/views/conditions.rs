@@ -39,6 +39,7 @@ pub struct ConditionHistory {
 }
 
 impl ConditionHistory {
+    /// All readings of the recording.
     #[must_use]
     pub fn of(recording: &Recording) -> Self {
         Self::heard_until(recording, Stamp { nanos: i64::MAX })

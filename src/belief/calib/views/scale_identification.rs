@@ -18,6 +18,7 @@ use armcal_core::streams::JointAngles;
 /// A sensor's measured scale.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct IdentifiedScale {
+    /// Index of the joint, base first.
     pub joint: usize,
     /// Counts per radian over the datasheet's; negative when they run the other way.
     pub ratio: f64,

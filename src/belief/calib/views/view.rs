@@ -11,7 +11,9 @@ use armcal_core::time::Stamp;
 /// Averaged data of an arm at rest that looks at tags.
 #[derive(Clone, Debug)]
 pub struct View {
+    /// Number in its capture mark, 0 under other marks; of external recordings, by time.
     pub pose_idx: u32,
+    /// End of the capture mark; of external recordings, the stamp of the last image.
     pub end: Stamp,
     /// Mean travel of each joint from the middle of its range by the datasheet, rad.
     pub travel_rad: JointAngles,
@@ -25,6 +27,7 @@ pub struct View {
     pub is_free: [bool; MAX_JOINTS],
     /// Oil temperature, pressure and time of the readings.
     pub conditions: Conditions,
+    /// Surveyed tags that were seen, by id, each once.
     pub tags: Vec<TagObservation>,
     /// The tag on the gripper, where the robot has one and it was seen.
     pub gripper_tag: Option<MeanCorners>,
@@ -52,7 +55,9 @@ impl View {
 /// Corners of one tag, averaged over the frames of a view.
 #[derive(Clone, Copy, Debug)]
 pub struct MeanCorners {
+    /// Mean over the frames, raw pixels.
     pub corners_px: [[f64; 2]; 4],
+    /// Number of averaged frames.
     pub n_frames: usize,
     /// Sum over frames and the eight coordinates of the squared deviation from the mean; it has `8 (n_frames - 1)`
     /// degrees of freedom.
@@ -73,11 +78,13 @@ pub enum TagMeasurement {
 /// One tag in one view.
 #[derive(Clone, Copy, Debug)]
 pub struct TagObservation {
+    /// Number of the tag, or that which stands for a named landmark.
     pub id: u32,
     /// Index into the robot's surveyed tags.
     pub tag_idx: usize,
     /// The tag's centre in the camera frame, m.
     pub center_in_camera_m: Vector3<f64>,
+    /// Corners, position or pose.
     pub measured: TagMeasurement,
 }
 
@@ -114,6 +121,7 @@ pub enum ObservationRejection {
 }
 
 impl ObservationRejection {
+    /// As files write it.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -132,21 +140,29 @@ impl ObservationRejection {
 /// The views of a recording, and what else a calibration takes from it.
 #[derive(Clone, Debug, Default)]
 pub struct CaptureData {
+    /// Views that the fit uses.
     pub fit: Vec<View>,
+    /// Views marked as held out; `bundle` fits them, too, and cross-validates all.
     pub held_out: Vec<View>,
     /// Views in which only one joint moved, by that joint; in the order of time.
     pub identify: BTreeMap<u32, Vec<View>>,
     /// Readings at nominal end stops, in the order of time.
     pub stops: Vec<(Stamp, EndStopReading)>,
+    /// The first one of the recording; `None` where it has none.
     pub task: Option<ReachTask>,
+    /// Number of capture marks, those without a view included; of external recordings, of views.
     pub n_marks: usize,
+    /// Number of detections by reason, over all views.
     pub rejected: BTreeMap<ObservationRejection, usize>,
+    /// Ids seen in any view, unknown ones included; ascending, each once.
     pub ids_seen: Vec<u32>,
     /// Names of landmarks that are no numbered tags, by the number that stands for them.
     pub landmark_names: BTreeMap<u32, String>,
     /// Lowest and highest reading over the captured spans, C.
     pub oil_c: Option<(f64, f64)>,
+    /// The same of the water, C.
     pub water_c: Option<(f64, f64)>,
+    /// Lowest and highest pressure over the captured spans, absolute.
     pub pressure_pa: Option<(f64, f64)>,
     /// Indices of the recording's messages that were used, ascending.
     pub used: Vec<usize>,
@@ -191,6 +207,7 @@ impl CaptureData {
 /// Readings of one joint that stood at a nominal stop.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EndStopReading {
+    /// Index of the joint, base first.
     pub joint: usize,
     /// Where the drawing has the stop.
     pub angle_rad: f64,

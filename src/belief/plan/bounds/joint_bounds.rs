@@ -37,6 +37,7 @@ impl JointBound {
 /// What has passed since some bounds held.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Elapsed {
+    /// Time since then; less than 0 counts as 0.
     pub seconds: f64,
     /// Change of the oil's temperature, K.
     pub warmed_k: f64,
@@ -45,6 +46,7 @@ pub struct Elapsed {
 /// A joint whose sensor's scale nobody knows, at a pose that is known otherwise (a mechanical rest).
 #[derive(Clone, Copy, Debug)]
 pub struct UnknownScale {
+    /// Index of the joint, base first.
     pub joint: usize,
     /// Where it rests, rad.
     pub rest_rad: f64,

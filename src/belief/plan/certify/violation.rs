@@ -34,7 +34,7 @@ impl ClearanceModel<'_> {
         .first_too_near()
     }
 
-    /// As [`Self::too_near`] where the arm comes to rest after a slow edge: with what its joints overshoot.
+    /// As [`Self::find_violation`] where the arm comes to rest after a slow edge: with what its joints overshoot.
     #[must_use]
     pub fn find_violation_arriving(
         &self,
@@ -46,7 +46,7 @@ impl ClearanceModel<'_> {
         Sweep { model: self, from: *at, to: *at, bounds: Some(bounds), tracking_error, margin_m }.first_too_near()
     }
 
-    /// The same for every arm along an edge, driven as [`Timing`] has it: with what the joints stray on the way.
+    /// The same for every arm along an edge, driven as `Timing` has it: with what the joints stray on the way.
     #[must_use]
     pub fn find_violation_along(&self, edge: &Edge, bounds: &JointErrorBounds, margin_m: f64) -> Option<ClosestPair> {
         self.sweep(edge, bounds, margin_m).first_too_near()

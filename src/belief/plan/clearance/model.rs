@@ -23,7 +23,9 @@ use armcal_core::streams::JointAngles;
 pub struct ClosestPair {
     /// Zero: touching or inside each other.
     pub distance_m: f64,
+    /// Name of the proximal link, or of the link where `second` is none; empty where nothing is near.
     pub first: String,
+    /// Name of the other link, vehicle part, obstacle or seafloor; empty where nothing is near.
     pub second: String,
 }
 
@@ -81,6 +83,7 @@ pub const SELF_MARGIN_REDUCTION_M: f64 = 0.03;
 const SWAY_SIGMAS: f64 = 3.0;
 
 impl<'a> ClearanceModel<'a> {
+    /// The arm on its vehicle in the scene, with the jaws at rest.
     #[must_use]
     pub fn new(robot: &'a Robot, vehicle: &Vehicle, scene: &Scene) -> Self {
         let moving = moving(robot);

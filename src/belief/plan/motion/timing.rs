@@ -28,6 +28,7 @@ pub struct Timing {
 }
 
 impl Timing {
+    /// Limits of the nominal drives and the pump, less a share for the controller.
     #[must_use]
     pub fn new(robot: &Robot) -> Self {
         Self {

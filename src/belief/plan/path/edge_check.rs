@@ -10,8 +10,11 @@ use armcal_core::streams::JointAngles;
 /// Plans paths under one belief.
 #[derive(Clone, Copy)]
 pub struct PathPlanner<'a> {
+    /// The arm and what is around it.
     pub clearance: &'a ClearanceModel<'a>,
+    /// Joint errors for which the margin is kept.
     pub bounds: &'a JointErrorBounds,
+    /// Range of the believed angles, one per joint.
     pub limits: &'a [JointLimits],
     /// Free water to keep, m.
     pub margin_m: f64,

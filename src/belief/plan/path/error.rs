@@ -4,6 +4,7 @@ use armcal_core::streams::JointAngles;
 
 /// Why there is no path.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[expect(missing_docs, reason = "each variant's message says what it is")]
 pub enum PathError {
     #[error(
         "no way round was found after {tried} attempts; what blocks the straight way is {nearest} ({distance_m:.3} \

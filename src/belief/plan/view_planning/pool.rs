@@ -70,11 +70,13 @@ impl PosePool {
         Ok(Self { candidates, refused })
     }
 
+    /// Number of candidates.
     #[must_use]
     pub fn len(&self) -> usize {
         self.candidates.len()
     }
 
+    /// Never: [`Self::gather`] fails instead.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.candidates.is_empty()

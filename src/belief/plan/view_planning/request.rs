@@ -11,6 +11,7 @@ use armcal_core::streams::{CaptureSet, JointAngles};
 /// Poses in the order of their visit.
 #[derive(Clone, Debug)]
 pub struct PosePlan {
+    /// In the order of visits, held-out views among them.
     pub poses: Vec<PlannedPose>,
     /// Root mean square tool error at the targets, m, after a fit of all poses; that of `bundle` at the believed arm.
     pub predicted_tool_error_m: f64,
@@ -19,15 +20,18 @@ pub struct PosePlan {
     /// Fitted views, in this order, after which the tool error is predicted to be below `capture.stop_at_tool_error_m`;
     /// `None` without that limit, or where these views do not reach it.
     pub needed: Option<usize>,
-    /// Time of the arm, s: motion from rest to rest, settling (2 s assumed) and the dwell.
+    /// Time of the arm, s: motion from rest to rest, settling (1 s assumed) and the dwell.
     pub arm_time_s: f64,
+    /// Number of configurations that the choice was from.
     pub candidates: usize,
+    /// Number of configurations drawn to find the candidates.
     pub tried: usize,
 }
 
 /// A planned view.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlannedPose {
+    /// Whether the fit may use it.
     pub set: CaptureSet,
     /// Believed.
     pub angles: JointAngles,
@@ -48,13 +52,19 @@ pub struct CapturedView {
 
 /// Inputs of view planning.
 pub struct PoseRequest<'a> {
+    /// Nominal arm, with the tags of the survey.
     pub robot: &'a Robot,
+    /// The arm and what is around it.
     pub clearance: &'a ClearanceModel<'a>,
+    /// Joint errors for which the margin is kept.
     pub bounds: &'a JointErrorBounds,
+    /// Conditions under which a tag counts as seen.
     pub visibility: &'a VisibilityModel,
+    /// Criterion, margin, dwell and limits of the capture.
     pub capture: &'a CaptureSettings,
     /// Views for the fit that are still to be chosen, and for the verdict.
     pub n_fit: usize,
+    /// Views for the verdict that are still to be chosen.
     pub n_held_out: usize,
     /// The interim estimate; `None`: the datasheets.
     pub belief: Option<&'a Calibration>,
@@ -72,5 +82,6 @@ pub struct PoseRequest<'a> {
     /// Tool positions of the task. No capture pose is near them, so that the task tests configurations that are not
     /// fitted.
     pub targets_m: &'a [[f64; 3]],
+    /// Believed angles from which the first path starts.
     pub start: &'a JointAngles,
 }

@@ -13,7 +13,9 @@ use armcal_core::robot::{FileIssue, RobotError, read_text};
 /// A camera as files name it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NamedCamera {
+    /// Key of the camera in the file, such as `cam0`.
     pub name: String,
+    /// Lens and resolution.
     pub model: CameraModel,
     /// Topic of its images.
     pub image_topic: Option<String>,

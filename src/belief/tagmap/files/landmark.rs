@@ -20,28 +20,39 @@ pub const UNKNOWN_ROTATION_STD_RAD: f64 = std::f64::consts::PI;
 /// A landmark as a tag map has it, in the frame of the file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Landmark {
+    /// Number of the tag, or [`FIRST_NAMED_ID`] plus its place for a landmark with a name alone.
     pub id: u32,
+    /// `None` where the file gives a number alone.
     pub name: Option<String>,
+    /// Side of the black square; `None` where unknown.
     pub size_m: Option<f64>,
+    /// In the file's frame; `None` where unknown.
     pub position_m: Option<[f64; 3]>,
+    /// frame_from_tag; `None` where unknown.
     pub quaternion_wxyz: Option<[f64; 4]>,
     /// Zero where the file says nothing: exact.
     pub position_std_m: f64,
+    /// Largest of the three axes; zero where the file says nothing.
     pub rotation_std_rad: f64,
 }
 
 /// What a tag map says of landmarks in its frame.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LandmarkFile {
+    /// Name of the frame in which the landmarks are.
     pub frame: String,
+    /// `None` where the file names none.
     pub base_tag: Option<u32>,
+    /// In the order of the file; each id once.
     pub landmarks: Vec<Landmark>,
 }
 
 /// A survey for one use, and the names in it.
 #[derive(Clone, Debug)]
 pub struct NamedSurvey {
+    /// Surveyed tags in the base frame.
     pub survey: TagSurvey,
+    /// Names by id, of the landmarks that have one.
     pub names: BTreeMap<u32, String>,
 }
 

@@ -8,11 +8,15 @@ use armcal_core::time::Stamp;
 /// Detections of one tag that stand for another, in a span of time: a tag number that was hung up twice.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Remap {
+    /// Id as detected.
     pub id: u32,
+    /// Id of the tag that it is.
     pub as_id: u32,
     /// `None`: of every camera.
     pub camera: Option<String>,
+    /// First instant.
     pub from: Stamp,
+    /// Last instant, itself included.
     pub to: Stamp,
 }
 
@@ -21,16 +25,21 @@ pub struct Remap {
 pub struct TagFile {
     /// The frame that the poses are in, as the file names it.
     pub frame: String,
+    /// Bodies that carry tags, by first appearance in the file.
     pub bodies: Vec<Body>,
+    /// In the order of the file.
     pub tags: Vec<TagPrior>,
     /// Size (m) and body of tags that are not named.
     pub default_tag: Option<(f64, usize)>,
+    /// `None` where the file names none.
     pub base_tag: Option<u32>,
+    /// Ids whose detections are not used.
     pub ignored: BTreeSet<u32>,
     /// Detections with more corrected bits are not used.
     pub max_hamming: Option<i32>,
     /// Single detections that shall not be used.
     pub squashed: Vec<(Stamp, BTreeSet<u32>)>,
+    /// The first one that fits a detection holds.
     pub remaps: Vec<Remap>,
     /// What the file asks for that has no effect here.
     pub ignored_keys: Vec<String>,

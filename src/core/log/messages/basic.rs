@@ -12,7 +12,9 @@ const NANOS_PER_S: i64 = 1_000_000_000;
 /// builtin_interfaces/msg/Time: seconds and nanoseconds since the Unix epoch.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Time {
+    /// Whole seconds, rounded down; negative before 1970.
     pub sec: i32,
+    /// Rest, 0..1e9.
     pub nanosec: u32,
 }
 
@@ -39,7 +41,9 @@ impl TryFrom<Time> for Stamp {
 /// std_msgs/msg/Header.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Header {
+    /// Sender's clock.
     pub stamp: Time,
+    /// Frame of the message's coordinates; empty where it has none.
     pub frame_id: String,
 }
 
@@ -55,6 +59,7 @@ impl Header {
 
 /// geometry_msgs/msg/Quaternion.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[expect(missing_docs, reason = "the fields are those of the ROS type")]
 pub struct Quaternion {
     pub x: f64,
     pub y: f64,
@@ -78,6 +83,7 @@ impl Quaternion {
 
 /// geometry_msgs/msg/Vector3.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[expect(missing_docs, reason = "the fields are those of the ROS type")]
 pub struct Vector3 {
     pub x: f64,
     pub y: f64,
@@ -101,6 +107,7 @@ impl From<Vector3> for [f64; 3] {
 
 /// geometry_msgs/msg/Transform, m.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[expect(missing_docs, reason = "the fields are those of the ROS type")]
 pub struct Transform {
     pub translation: Vector3,
     pub rotation: Quaternion,
@@ -108,6 +115,7 @@ pub struct Transform {
 
 /// geometry_msgs/msg/Pose, m.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[expect(missing_docs, reason = "the fields are those of the ROS type")]
 pub struct Pose {
     pub position: Point,
     pub orientation: Quaternion,
@@ -116,7 +124,9 @@ pub struct Pose {
 /// apriltag_msgs/msg/Point, px.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PixelPoint {
+    /// Column, to the right; 0 in the middle of the first pixel.
     pub x: f64,
+    /// Row, downwards; 0 in the middle of the first pixel.
     pub y: f64,
 }
 

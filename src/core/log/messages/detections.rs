@@ -12,12 +12,19 @@ use crate::streams::{TagDetection, TagDetections};
 /// apriltag_msgs/msg/AprilTagDetection; the corners in the order of `streams::TagDetection`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct AprilTagDetection {
+    /// `tag36h11` in our recordings; not read.
     pub family: String,
+    /// Number in the family; negative ones are rejected.
     pub id: i32,
+    /// Number of bits that the decoder corrected; 0 in our recordings.
     pub hamming: i32,
+    /// Unused; 0 in our recordings.
     pub goodness: f32,
+    /// Larger is surer, as apriltag gives it.
     pub decision_margin: f32,
+    /// Mean of the corners in our recordings; not read.
     pub centre: PixelPoint,
+    /// Raw, distorted pixels.
     pub corners: [PixelPoint; 4],
     /// Row by row; zeros where the writer has none.
     pub homography: [f64; 9],
@@ -26,7 +33,9 @@ pub struct AprilTagDetection {
 /// apriltag_msgs/msg/AprilTagDetectionArray.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct AprilTagDetectionArray {
+    /// Stamp of the image, and the frame of the camera.
     pub header: Header,
+    /// Every tag of the image.
     pub detections: Vec<AprilTagDetection>,
 }
 

@@ -11,8 +11,11 @@ use crate::streams::CameraImage;
 /// sensor_msgs/msg/CompressedImage.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct CompressedImage {
+    /// Stamp of the exposure, and the frame of the camera.
     pub header: Header,
+    /// `jpeg`, or a text that contains it; all else is rejected.
     pub format: String,
+    /// Bytes of the JPEG file.
     pub data: Vec<u8>,
 }
 

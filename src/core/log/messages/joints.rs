@@ -20,10 +20,15 @@ pub(in crate::log) type FirstNames = Option<Vec<String>>;
 /// sensor_msgs/msg/JointState; position in rad, or in raw counts on `/joint_sensors` and `/joint_commands`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct JointState {
+    /// Stamp of the readings or set-points; the frame is empty.
     pub header: Header,
+    /// Names of the joints.
     pub name: Vec<String>,
+    /// One number per name.
     pub position: Vec<f64>,
+    /// Empty in our recordings; not read.
     pub velocity: Vec<f64>,
+    /// Empty in our recordings; not read.
     pub effort: Vec<f64>,
 }
 

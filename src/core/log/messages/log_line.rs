@@ -10,12 +10,19 @@ use crate::streams::{LogLevel, LogLine};
 /// rcl_interfaces/msg/Log; levels 10 debug, 20 info, 30 warn, 40 error, 50 fatal.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Log {
+    /// Sender's clock.
     pub stamp: Time,
+    /// Numbers between two levels mean the lower one.
     pub level: u8,
+    /// Part of the program that says it.
     pub name: String,
+    /// The text.
     pub msg: String,
+    /// Source file; empty in our recordings.
     pub file: String,
+    /// Function of the source; empty in our recordings.
     pub function: String,
+    /// Line of the source; 0 in our recordings.
     pub line: u32,
 }
 

@@ -13,9 +13,13 @@ use crate::streams::{self, CaptureSet, MarkKind, Phase, PriorSource, ReachAttemp
 /// armcal_msgs/msg/Mark: what the span `start..=end` was for.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Mark {
+    /// By the joint sensors' clock.
     pub start: Time,
+    /// Not before `start`.
     pub end: Time,
+    /// Such as `capture_fit`; an end stop's kind contains its angle, rad.
     pub kind: String,
+    /// Number of a pose, joint or target, from 0; 0 for kinds without one.
     pub index: u32,
 }
 

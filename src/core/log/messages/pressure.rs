@@ -12,8 +12,11 @@ use crate::streams::PressureSample;
 /// sensor_msgs/msg/FluidPressure, Pa and Pa squared.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct FluidPressure {
+    /// Stamp, and the frame of the vehicle.
     pub header: Header,
+    /// Absolute pressure.
     pub fluid_pressure: f64,
+    /// 0 where it is unknown.
     pub variance: f64,
 }
 

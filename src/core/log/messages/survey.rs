@@ -14,18 +14,26 @@ use crate::streams::{RecordedSurvey, RecordedTag};
 /// armcal_msgs/msg/SurveyedTag: `pose` in the frame of the survey's header, m; one sigma per axis.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SurveyedTag {
+    /// Number in the family.
     pub id: u32,
+    /// Side of the black square.
     pub size_m: f64,
+    /// `base_from_tag`; the identity where it is unknown.
     pub pose: Pose,
+    /// Infinite where the pose is unknown.
     pub position_std_m: f64,
+    /// Infinite where the pose is unknown.
     pub rotation_std_rad: f64,
 }
 
 /// armcal_msgs/msg/TagSurvey: where the tags are.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TagSurvey {
+    /// Stamp, and the frame of the arm's base.
     pub header: Header,
+    /// Id of the tag beside the base; one of `tags`.
     pub base_tag: u32,
+    /// Each id once.
     pub tags: Vec<SurveyedTag>,
 }
 

@@ -12,8 +12,11 @@ use crate::streams;
 /// armcal_msgs/msg/ReachTask: `targets` in the frame `header.frame_id`, m.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ReachTask {
+    /// Stamp, and the frame of the arm's base.
     pub header: Header,
+    /// Positions that the tool is to reach.
     pub targets: Vec<Point>,
+    /// Largest distance that counts as a hit; above 0.
     pub tolerance_m: f64,
 }
 

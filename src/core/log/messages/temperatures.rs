@@ -12,8 +12,11 @@ use crate::streams::{TemperatureSample, Thermometer};
 /// sensor_msgs/msg/Temperature, degrees Celsius and their square.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Temperature {
+    /// Stamp, and the frame of the vehicle.
     pub header: Header,
+    /// Of the oil or the water; the topic says which.
     pub temperature: f64,
+    /// 0 where it is unknown.
     pub variance: f64,
 }
 

@@ -8,6 +8,7 @@ use crate::log::schema::{RosMessage, RosSchema};
 /// std_msgs/msg/String.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StringMessage {
+    /// The text; on `/robot_description` a URDF.
     pub data: String,
 }
 
@@ -15,6 +16,7 @@ message!(StringMessage, "std_msgs/msg/String", "string data\n");
 
 /// sensor_msgs/msg/RegionOfInterest, px.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[expect(missing_docs, reason = "the fields are those of the ROS type")]
 pub struct RegionOfInterest {
     pub x_offset: u32,
     pub y_offset: u32,
@@ -26,17 +28,27 @@ pub struct RegionOfInterest {
 /// sensor_msgs/msg/CameraInfo, px; `k`, `r`, `p` row by row.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct CameraInfo {
+    /// The frame of the camera; no stamp.
     pub header: Header,
+    /// Rows of the image.
     pub height: u32,
+    /// Columns of the image.
     pub width: u32,
     /// "equidistant" for four coefficients of a fisheye, "plumb_bob" for five of a pinhole camera.
     pub distortion_model: String,
+    /// Coefficients of the distortion.
     pub d: Vec<f64>,
+    /// Intrinsics: focal lengths and centre.
     pub k: [f64; 9],
+    /// Rectification; the identity for a single camera.
     pub r: [f64; 9],
+    /// Projection of the rectified image.
     pub p: [f64; 12],
+    /// 0: no binning.
     pub binning_x: u32,
+    /// 0: no binning.
     pub binning_y: u32,
+    /// All zero: the whole image.
     pub roi: RegionOfInterest,
 }
 
@@ -55,14 +67,18 @@ message!(
 /// geometry_msgs/msg/TransformStamped: maps coordinates of `child_frame_id` to `header.frame_id`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TransformStamped {
+    /// Stamp, and the parent frame.
     pub header: Header,
+    /// The child frame.
     pub child_frame_id: String,
+    /// Pose of the child in the parent frame.
     pub transform: Transform,
 }
 
 /// tf2_msgs/msg/TFMessage.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TfMessage {
+    /// In any order; stamps may differ.
     pub transforms: Vec<TransformStamped>,
 }
 
@@ -83,7 +99,9 @@ message!(
 /// geometry_msgs/msg/PoseStamped.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PoseStamped {
+    /// Stamp, and the frame in which the pose is.
     pub header: Header,
+    /// Position and orientation in that frame.
     pub pose: Pose,
 }
 

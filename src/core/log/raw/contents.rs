@@ -12,16 +12,22 @@ pub const MAX_HEAD_BYTES: u64 = 1 << 20;
 /// Number and bytes of the chunks of one compression.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ChunkTotals {
+    /// Number of chunks.
     pub chunks: u64,
+    /// As stored.
     pub compressed_bytes: u64,
+    /// As the chunks' headers declare it.
     pub uncompressed_bytes: u64,
 }
 
 /// An attached file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct AttachmentInfo {
+    /// File name given by the writer.
     pub name: String,
+    /// Such as `application/xml`.
     pub media_type: String,
+    /// Length of the attached data.
     pub bytes: u64,
     /// Start in the file and length of the record's fields.
     pub(in crate::log) record: (u64, u64),
@@ -38,7 +44,9 @@ pub struct FileContents {
     pub library: String,
     /// Readable chunks by compression: `zstd`, `lz4` or empty.
     pub chunks: BTreeMap<&'static str, ChunkTotals>,
+    /// In the order of the file; their data stay in the file.
     pub attachments: Vec<AttachmentInfo>,
+    /// Name and key-value pairs of each record, in the order of the file.
     pub metadata: Vec<(String, BTreeMap<String, String>)>,
 }
 

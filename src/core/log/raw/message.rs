@@ -8,16 +8,22 @@ use crate::time::Stamp;
 /// Type of a topic's messages, as the file declares it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Schema {
+    /// Full name, such as `sensor_msgs/msg/JointState`.
     pub name: String,
+    /// Form of `data`, such as `ros2msg`.
     pub encoding: String,
+    /// Definition of the type.
     pub data: Vec<u8>,
 }
 
 /// A topic, as the file declares it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Channel {
+    /// Such as `/joint_sensors`.
     pub topic: String,
+    /// Such as `cdr`.
     pub message_encoding: String,
+    /// Key-value pairs that the writer gave; empty in our recordings.
     pub metadata: BTreeMap<String, String>,
     /// `None` where the channel declares no type, or one that the file lacks.
     pub schema: Option<Rc<Schema>>,
@@ -26,16 +32,20 @@ pub struct Channel {
 /// One message, undecoded.
 #[derive(Clone, Copy, Debug)]
 pub struct RawMessage<'a> {
+    /// Its topic and type.
     pub channel: &'a Channel,
     /// Recorder's clock, nanoseconds since the Unix epoch.
     pub log_time_nanos: u64,
     /// Sender's clock, or the log time.
     pub publish_time_nanos: u64,
+    /// Counter of the sender or recorder within the topic.
     pub sequence: u32,
+    /// Encoded fields, without the record's header.
     pub data: &'a [u8],
 }
 
 impl RawMessage<'_> {
+    /// Topic of its channel.
     #[must_use]
     pub fn topic(&self) -> &str {
         &self.channel.topic

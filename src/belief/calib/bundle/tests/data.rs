@@ -8,7 +8,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use crate::calib::bundle::model::{Hyperparameters, Model};
-use crate::calib::parameters::{JointParameters, Parameter};
+use crate::calib::parameters::JointParameters;
 use crate::calib::views::view::{MeanCorners, TagMeasurement, TagObservation, View};
 use armcal_core::joints::{JointAngles, MAX_JOINTS};
 use armcal_core::optics::square_corners;
@@ -48,12 +48,9 @@ impl Truth {
     /// Drawn from the priors of `model` under `scales`.
     pub fn draw(robot: &Robot, model: &Model, scales: &Hyperparameters, rng: &mut ChaCha8Rng) -> Self {
         let mut parameters = JointParameters { reference: reference(), ..JointParameters::default() };
-        for (joint, kinds) in model.joints.iter().enumerate() {
-            for &kind in kinds {
-                let parameter = Parameter { joint, kind };
-                let std = scales.prior_std(&robot.sensors[joint], joint, kind);
-                parameters.set(parameter, parameters.get(parameter) + std * normal(rng));
-            }
+        for parameter in model.parameters() {
+            let std = scales.prior_std(&robot.sensors[parameter.joint], parameter.joint, parameter.kind);
+            parameters.set(parameter, parameters.get(parameter) + std * normal(rng));
         }
         let camera = &robot.camera;
         let mount = &camera.mount.link_from_frame;
@@ -123,7 +120,7 @@ fn look(robot: &Robot, truth: &Truth, noise: &Noise, view: &mut View, rng: &mut 
     for (angle, std) in angles.iter_mut().zip(noise.joint_rad) {
         *angle += std * normal(rng);
     }
-    let poses = robot.chain.link_poses(&angles);
+    let poses = robot.chain.corrected_link_poses(&angles, &truth.parameters.links);
     let base_from_camera = poses.link(robot.camera.mount.n_joints) * truth.mount;
     for (tag_idx, tag) in robot.tags.iter().enumerate() {
         let camera_from_tag = base_from_camera.inv_mul(&truth.tags[tag_idx]);

@@ -32,6 +32,7 @@ fn case(seed: u64) -> Case {
     scales.camera_error_std = Some([0.003, 0.004]);
     let mut model = Model {
         joints: vec![Vec::new(); robot.n_joints()],
+        n_links: robot.n_joints(),
         mount: true,
         lens: true,
         tags: true,

@@ -2,6 +2,7 @@
 
 mod calibration_prior;
 mod data;
+mod drawing;
 mod equations;
 mod failures;
 mod moved_tags;

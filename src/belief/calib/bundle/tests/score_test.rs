@@ -47,6 +47,7 @@ pub(super) fn views_of_changed(
     let scales = Hyperparameters::datasheet(robot);
     let mut model = Model {
         joints: vec![Vec::new(); robot.n_joints()],
+        n_links: 0,
         mount: true,
         lens: false,
         tags: true,

@@ -42,6 +42,7 @@ fn case(robot: &Robot, seed: u64, n_views: usize) -> Case<'_> {
     // A first look tells which terms are excited; the truth is then drawn with them.
     let mut model = Model {
         joints: vec![Vec::new(); robot.n_joints()],
+        n_links: 0,
         mount: true,
         lens: false,
         tags: true,

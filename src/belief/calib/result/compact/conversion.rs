@@ -20,6 +20,9 @@ impl CompactCalibration {
     /// # Errors
     /// [`CompactError`] when a value is not finite or beyond the form's range.
     pub fn of(calibration: &Calibration) -> Result<Self, CompactError> {
+        if !calibration.link.is_empty() {
+            return Err(CompactError::Links);
+        }
         let n = calibration.joint.len();
         if !(1..=MAX_JOINTS).contains(&n) {
             return Err(CompactError::Joints { joints: n });

@@ -5,6 +5,7 @@ use armcal_core::streams::MAX_JOINTS;
 
 /// Why a calibration has no compact form, or a text is none.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[expect(missing_docs, reason = "each variant's message says what it is")]
 pub enum CompactError {
     #[error("no compact calibration: it does not begin with `armcal1` or `armcal2`")]
     NotCompact,
@@ -22,6 +23,8 @@ pub enum CompactError {
     NoRelativeGain { joint: String },
     #[error("joint `{joint}`: terms about a scale that was measured on the way have no compact form")]
     MeasuredScale { joint: String },
+    #[error("link geometry was estimated and has no compact form: a robot needs `[[link]]` of calibration.toml, too")]
+    Links,
     #[error("the compact form has {bytes} bytes, must be below {MAX_COMPACT_BYTES}")]
     TooLong { bytes: usize },
     #[error("compact calibration: was made for robot `{found}`, not for `{expected}`, or for other joints of it")]

@@ -13,6 +13,7 @@ use armcal_core::streams::ReachTask;
 /// What is known beside the recordings.
 #[derive(Clone, Debug, Default)]
 pub struct ExternalContext {
+    /// `None`: no tool error is predicted.
     pub task: Option<ReachTask>,
     /// Names of landmarks that are no numbered tags.
     pub landmark_names: BTreeMap<u32, String>,

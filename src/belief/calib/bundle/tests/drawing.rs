@@ -1,0 +1,150 @@
+//! Drawings that are wrong: links and base estimated beside the sensors.
+
+use nalgebra::Vector3;
+
+use crate::calib::bundle::drawing::Drawing;
+use crate::calib::bundle::estimate::{Estimate, estimate};
+use crate::calib::bundle::input::{BundleInput, HyperparameterMode};
+use crate::calib::bundle::model::Model;
+use crate::calib::bundle::tests::data::{normal, reference, rng, titan};
+use crate::calib::bundle::tests::score_test::{input, views_of_changed, with_link};
+use crate::calib::parameters::JointParameters;
+use crate::calib::views::view::View;
+use armcal_core::joints::JointAngles;
+use armcal_core::kinematics::LinkCorrection;
+use armcal_core::robot::Robot;
+use armcal_core::sensor::ConditionChange;
+use armcal_core::stats::quantile;
+
+/// An arm's views, and the sensors that it really has.
+struct Case {
+    views: Vec<View>,
+    model: Model,
+    truth: JointParameters,
+}
+
+fn case(robot: &Robot, real: &Robot, seed: u64) -> Case {
+    let mut truth = JointParameters::default();
+    let (views, model) = views_of_changed(robot, real, seed, |drawn| truth = drawn.parameters);
+    Case { views, model, truth }
+}
+
+/// `input` with the drawing that explains the views better, if there is one.
+fn revised<'a>(input: &BundleInput<'a>) -> Option<BundleInput<'a>> {
+    let first = estimate(input).expect("solved");
+    let drawing = Drawing::default().better(input, &first)?;
+    let mut wider = input.clone();
+    drawing.apply(&mut wider);
+    Some(wider)
+}
+
+/// Distances between the tool of `real` with the true sensors and that of `robot` as found, m, at drawn travels.
+fn tool_errors_m(real: &Robot, truth: &JointParameters, robot: &Robot, found: &Estimate<'_>, seed: u64) -> Vec<f64> {
+    let mut rng = rng(seed, "drawing task");
+    let still = ConditionChange::default();
+    let tool = |robot: &Robot, at: &JointParameters, travel: &JointAngles| {
+        let angles = JointAngles::from_fn(robot.n_joints(), |j| {
+            at.correction(j).angle_rad(&robot.sensors[j], travel[j], &still, 0.0)
+        });
+        at.with_links(robot.clone()).chain.frame(&angles, &robot.tool.mount).translation.vector
+    };
+    let half = |j: usize| robot.sensors[j].half_range_rad.min(1.3);
+    let travel = |rng: &mut _| JointAngles::from_fn(robot.n_joints(), |j| 0.6 * half(j) * uniform(rng));
+    let all = (0..12).map(|_| travel(&mut rng)).collect::<Vec<_>>();
+    all.iter().map(|at| (tool(real, truth, at) - tool(robot, &found.parameters(), at)).norm()).collect()
+}
+
+fn uniform(rng: &mut rand_chacha::ChaCha8Rng) -> f64 {
+    use rand::RngExt;
+    rng.random_range(-1.0..1.0)
+}
+
+fn median(values: &[f64]) -> f64 {
+    quantile(values, 0.5).expect("values")
+}
+
+#[test]
+fn a_good_drawing_stays() {
+    let robot = titan();
+    const SEEDS: u64 = 60;
+    let revised = (0..SEEDS).filter(|&seed| {
+        let case = case(&robot, &robot, seed);
+        revised(&input(&robot, &case.views, &case.model)).is_some()
+    });
+    let n = revised.count();
+    println!("{n} of {SEEDS} good drawings revised");
+    assert!(n <= 1, "{n} of {SEEDS}");
+}
+
+#[test]
+fn a_wrong_link_is_estimated_and_the_tool_as_good_as_with_the_right_one() {
+    let robot = titan();
+    const SEEDS: u64 = 6;
+    for joint in 1..robot.camera.mount.n_joints {
+        let (mut wrong, mut right, mut drawn, mut n_named) = (Vec::new(), Vec::new(), Vec::new(), 0);
+        for seed in 0..SEEDS {
+            let real = with_link(&robot, joint, 0.01, Vector3::new(0.006, -0.006, 0.003));
+            let case = case(&robot, &real, seed);
+            let as_drawn = input(&robot, &case.views, &case.model);
+            let wider = revised(&as_drawn).unwrap_or_else(|| panic!("joint {joint}, seed {seed}: not revised"));
+            let found = estimate(&wider).expect("solved");
+            let known = estimate(&input(&real, &case.views, &case.model)).expect("solved");
+            let first = estimate(&as_drawn).expect("solved");
+            wrong.extend(tool_errors_m(&real, &case.truth, &robot, &found, seed));
+            right.extend(tool_errors_m(&real, &case.truth, &real, &known, seed));
+            drawn.extend(tool_errors_m(&real, &case.truth, &robot, &first, seed));
+            let links = found.parameters().links;
+            let worst = (0..wider.model.n_links).max_by(|a, b| size(&links[*a]).total_cmp(&size(&links[*b])));
+            n_named += u64::from(worst == Some(joint));
+        }
+        let [wrong, right, drawn] = [&wrong, &right, &drawn].map(|errors| 1e3 * median(errors));
+        println!(
+            "joint {joint}: {wrong:.2} mm (right drawing {right:.2}, as drawn {drawn:.2}), named {n_named} of {SEEDS}"
+        );
+        assert!(wrong < 2.5 * right && wrong < 0.5 * drawn, "joint {joint}: {wrong} mm, {right} mm, {drawn} mm");
+        assert!(n_named >= 5, "joint {joint}: named {n_named} of {SEEDS}");
+    }
+}
+
+/// In millimetres and milliradians.
+fn size(link: &LinkCorrection) -> f64 {
+    1e3 * (link.shift_m.norm() + link.turn_rad.norm())
+}
+
+/// `robot` with every seen link drawn about its place: shifts of 2 mm, turns of 5 mrad.
+fn drawn_links(robot: &Robot, seed: u64) -> JointParameters {
+    let mut rng = rng(seed, "links");
+    let mut at = JointParameters { reference: reference(), ..JointParameters::default() };
+    for link in at.links.iter_mut().take(robot.camera.mount.n_joints) {
+        *link = LinkCorrection {
+            shift_m: 0.002 * Vector3::from_fn(|_, _| normal(&mut rng)),
+            turn_rad: 0.005 * Vector3::from_fn(|_, _| normal(&mut rng)),
+        };
+    }
+    at
+}
+
+#[test]
+fn links_that_are_all_a_little_off_cost_little_more_than_their_bound() {
+    let drawn = titan();
+    const SEEDS: u64 = 12;
+    let (mut error2, mut bound2) = (0.0, 0.0);
+    for seed in 0..SEEDS {
+        let real = drawn_links(&drawn, seed).with_links(drawn.clone());
+        let case = case(&drawn, &real, seed);
+        let wider = revised(&input(&drawn, &case.views, &case.model)).expect("revised");
+        let found = estimate(&wider).expect("solved");
+        // The bound: the same views under the sizes that the links' errors really have.
+        let mut known = wider.clone();
+        known.evidence = HyperparameterMode::Given;
+        known.scales.link_std = [[0.002, 0.005]; 8];
+        known.scales.mount_scale = [1.0; 2];
+        let bound = estimate(&known).expect("solved");
+        let square = |errors: Vec<f64>| errors.iter().map(|e| e * e).sum::<f64>();
+        error2 += square(tool_errors_m(&real, &case.truth, &drawn, &found, seed));
+        bound2 += square(tool_errors_m(&real, &case.truth, &drawn, &bound, seed));
+    }
+    let ratio = (error2 / bound2).sqrt();
+    println!("all links off: tool error {ratio:.3} times that under the true sizes");
+    assert!(ratio < 1.15, "{ratio}");
+}

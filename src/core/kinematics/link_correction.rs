@@ -1,0 +1,27 @@
+//! Where joints sit on their parent links beyond what the drawing says.
+
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+
+use crate::joints::MAX_JOINTS;
+
+/// What is to be added to one joint's place in its parent link, along and about the parent link's axes.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct LinkCorrection {
+    /// Of the joint's origin, m.
+    pub shift_m: Vector3<f64>,
+    /// Of the joint's attitude, about its origin: a rotation vector, rad.
+    pub turn_rad: Vector3<f64>,
+}
+
+/// Of every joint, base first.
+pub type LinkCorrections = [LinkCorrection; MAX_JOINTS];
+
+impl LinkCorrection {
+    /// The corrected `parent_from_joint`.
+    #[inline]
+    #[must_use]
+    pub fn applied_to(&self, parent_from_joint: &Isometry3<f64>) -> Isometry3<f64> {
+        let shift = Translation3::from(parent_from_joint.translation.vector + self.shift_m);
+        Isometry3::from_parts(shift, UnitQuaternion::from_scaled_axis(self.turn_rad) * parent_from_joint.rotation)
+    }
+}
