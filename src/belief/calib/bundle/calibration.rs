@@ -108,17 +108,10 @@ impl<'a> BundleCalibration<'a> {
         let first = BundleSetup::new(&self.data.robot, &views, &declared, self.prior).with_drawing(&self.drawing);
         self.check_observable(&first, &declared)?;
         let estimated = self.first_estimate(&first);
-        if self.purpose == EstimatePurpose::Final
-            && let Some((estimate, _)) = &estimated
-            && self.revise(&first, estimate)
-        {
-            drop(estimated);
-            self.data.data.fit = views;
-            return self.calibrate();
-        }
         let failures = match self.purpose {
             EstimatePurpose::Final => {
-                let search = FailureSearch { robot: &self.data.robot, views: &views, prior: self.prior };
+                let (robot, prior, drawing) = (&self.data.robot, self.prior, &self.drawing);
+                let search = FailureSearch { robot, views: &views, prior, drawing };
                 search.failures(&declared, estimated.as_ref().map(|(estimate, _)| estimate))
             }
             EstimatePurpose::Interim => declared.clone(),
@@ -130,6 +123,14 @@ impl<'a> BundleCalibration<'a> {
             second = BundleSetup::new(&self.data.robot, &views, &failures, self.prior).with_drawing(&self.drawing);
             (&second, second.estimate())
         };
+        if self.purpose == EstimatePurpose::Final
+            && let Some((estimate, _)) = &estimated
+            && self.revise(setup, estimate)
+        {
+            drop(estimated);
+            self.data.data.fit = views;
+            return self.calibrate();
+        }
         let (estimate, selections) = estimated.ok_or_else(|| self.nothing_observable())?;
         self.finish(&Estimated { setup, failures: &failures, estimate, selections })
     }
@@ -301,7 +302,7 @@ impl<'a> BundleCalibration<'a> {
         calibration.prior = self.prior.zip(consistency).map(|(prior, consistency)| {
             prior_table(prior, estimated.setup.elapsed_h(), &consistency, &self.data.robot)
         });
-        refusals.extend(impact.refusals(&calibration.failed_joint));
+        refusals.extend(impact.refusals());
         calibration.refuse_first_for(refusals);
     }
 

@@ -6,13 +6,15 @@
 //! parameters' prior, plus `2 ln(prior std / posterior std)` for each reading that is given up (Laplace's approximation
 //! of the evidence, MacKay 1992, with a round figure), must fall by `MARGIN`.
 
-use crate::calib::bundle::estimate::Estimate;
+use crate::calib::bundle::drawing::Drawing;
+use crate::calib::bundle::estimate::{Estimate, estimate};
 use crate::calib::bundle::failure_pattern::{FailurePattern, Readings};
 use crate::calib::bundle::failures::{
     FAR_RAD, FAR_SIGMAS, Failure, FailureAdjusted, FailureSource, MIN_VIEWS, SensorUse,
 };
 use crate::calib::bundle::input::HyperparameterMode;
 use crate::calib::bundle::setup::BundleSetup;
+use crate::calib::bundle::slips::log_evidence_of_all;
 use crate::calib::parameters::{JointParameters, ParameterKind};
 use crate::calib::result::calibration::Calibration;
 use crate::calib::views::view::View;
@@ -37,18 +39,19 @@ const STILL_SIGMAS: f64 = 8.0;
 const MAX_FOUND: usize = 2;
 
 /// An arm and its views, in which failures are looked for.
-pub struct FailureSearch<'a> {
+pub(crate) struct FailureSearch<'a> {
     pub robot: &'a Robot,
     pub views: &'a [View],
     /// What the estimates rest on beside the datasheet.
     pub prior: Option<&'a Calibration>,
+    /// What of the drawing is estimated, too.
+    pub drawing: &'a Drawing,
 }
 
 impl FailureSearch<'_> {
     /// The failures that the views show beside the `declared` ones, which come first and with what was found of them;
     /// `found` is the estimate under the declared ones alone.
-    #[must_use]
-    pub fn failures(&self, declared: &[Failure], found: Option<&Estimate<'_>>) -> Vec<Failure> {
+    pub(crate) fn failures(&self, declared: &[Failure], found: Option<&Estimate<'_>>) -> Vec<Failure> {
         let mut known = declared.to_vec();
         let shown = self.views.iter().filter(|view| !view.tags.is_empty()).count();
         if shown < MIN_VIEWS {
@@ -64,14 +67,13 @@ impl FailureSearch<'_> {
         if known == declared {
             return self.failures_beside(known, found);
         }
-        let setup = BundleSetup::new(self.robot, self.views, &known, self.prior);
-        self.failures_beside(known, setup.estimate().as_ref().map(|(found, _)| found))
+        self.failures_beside(known.clone(), self.setup(&known).estimate().as_ref().map(|(found, _)| found))
     }
 
     /// `known` and what the estimate under them shows beside: slips, then sensors that say nothing, one at a time, then
     /// two at once.
     fn failures_beside(&self, known: Vec<Failure>, found: Option<&Estimate<'_>>) -> Vec<Failure> {
-        let is_sound = found.is_some_and(|found| !is_suspicious(self.robot, found));
+        let is_sound = found.is_some_and(|found| !is_suspicious(found));
         let slips = found.map_or_else(|| known.clone(), |found| self.with_slips(known.clone(), found));
         if slips == known && is_sound || slips != known && !self.is_suspicious_under(&slips) {
             return slips;
@@ -88,16 +90,20 @@ impl FailureSearch<'_> {
         if best == known {
             return known;
         }
-        let setup = BundleSetup::new(self.robot, self.views, &best, self.prior);
-        match setup.estimate() {
-            Some((found, _)) => self.with_slips(best, &found),
-            None => best,
+        let setup = self.setup(&best);
+        let Some((better, _)) = setup.estimate() else { return known };
+        if found.is_some_and(|found| !explains_most(found, &better)) {
+            return known;
         }
+        self.with_slips(best, &better)
+    }
+
+    pub(crate) fn setup(&self, known: &[Failure]) -> BundleSetup {
+        BundleSetup::new(self.robot, self.views, known, self.prior).with_drawing(self.drawing)
     }
 
     fn is_suspicious_under(&self, known: &[Failure]) -> bool {
-        let setup = BundleSetup::new(self.robot, self.views, known, self.prior);
-        setup.estimate().is_none_or(|(found, _)| is_suspicious(self.robot, &found))
+        self.setup(known).estimate().is_none_or(|(found, _)| is_suspicious(&found))
     }
 
     fn likelier(&self, a: Vec<Failure>, b: Vec<Failure>) -> Vec<Failure> {
@@ -147,13 +153,20 @@ impl FailureSearch<'_> {
         let mut freed = known.to_vec();
         freed.extend(ignored);
         let applied = self.applied(&freed);
-        let found = applied.estimate(HyperparameterMode::Given)?;
+        let found = self.estimate(&applied)?;
         let [a, b] = pair.map(|joint| self.failure_of(joint, &found, FailureSource::Detected));
         Some([a?, b?])
     }
 
     fn applied(&self, failures: &[Failure]) -> FailureAdjusted {
         FailureAdjusted::new(self.robot, self.views, failures, &JointParameters::default())
+    }
+
+    /// Under the datasheet's scales.
+    fn estimate<'b>(&self, applied: &'b FailureAdjusted) -> Option<Estimate<'b>> {
+        let mut input = applied.input(HyperparameterMode::Given);
+        self.drawing.apply(&mut input);
+        estimate(&input)
     }
 
     /// Whether the reading stands still over all views.
@@ -169,7 +182,7 @@ impl FailureSearch<'_> {
         let mut freed: Vec<Failure> = known.iter().filter(|failure| failure.joint != joint).cloned().collect();
         freed.push(Failure::without_sensor(joint, FailedKind::Dead, FailureSource::Detected, self.views.len()));
         let applied = self.applied(&freed);
-        let found = applied.estimate(HyperparameterMode::Given)?;
+        let found = self.estimate(&applied)?;
         self.failure_of(joint, &found, source)
     }
 
@@ -192,6 +205,10 @@ impl FailureSearch<'_> {
                 Failure { kind, reading, views: Vec::new(), evidence, ..all }
             }
             FailurePattern::Locked(SensorUse::Ignored) => Failure { kind: FailedKind::Locked, evidence, ..all },
+            FailurePattern::Reversed(line) => Failure { line: Some(*line), evidence, ..all },
+            FailurePattern::Scaled(line) => {
+                Failure { line: Some(*line), reading: SensorUse::Used, views: Vec::new(), evidence, ..all }
+            }
             FailurePattern::Stuck => Failure { kind: FailedKind::Stuck, evidence, ..all },
             FailurePattern::Dead => Failure { evidence, ..all },
             FailurePattern::Single(views) => {
@@ -232,12 +249,17 @@ impl FailureSearch<'_> {
 
     fn score(&self, failures: &[Failure]) -> f64 {
         let applied = self.applied(failures);
-        applied.estimate(HyperparameterMode::Given).map_or(f64::MAX, |found| score(&found))
+        self.estimate(&applied).map_or(f64::MAX, |found| score(&found))
     }
 }
 
 fn is_failed(known: &[Failure], joint: usize) -> bool {
     known.iter().any(|failure| failure.joint == joint)
+}
+
+/// Whether `better` is likelier than `without` by more than other links, mounts or tags would be.
+fn explains_most(without: &Estimate<'_>, better: &Estimate<'_>) -> bool {
+    2.0 * (log_evidence_of_all(better) - log_evidence_of_all(without)) > MARGIN.max(without.largest_other_chi2())
 }
 
 /// What the data cost under an estimate, see the module.
@@ -268,8 +290,8 @@ fn is_beyond_datasheet(robot: &Robot, found: &Estimate<'_>) -> bool {
 }
 
 /// Whether an estimate looks as if some sensor did not belong.
-fn is_suspicious(robot: &Robot, found: &Estimate<'_>) -> bool {
-    let problem = &found.problem;
+pub(crate) fn is_suspicious(found: &Estimate<'_>) -> bool {
+    let (problem, robot) = (&found.problem, found.problem.robot);
     let used = |observations: &std::ops::Range<usize>| {
         problem.observations[observations.clone()].iter().filter(|observation| observation.is_used).count()
     };

@@ -38,6 +38,19 @@ pub enum SensorUse {
     Ignored,
 }
 
+/// How a joint's angle goes with its reading where that is not as its datasheet has it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SensorLine {
+    /// Of the angle by the datasheet's travel; below zero the sensor is reversed.
+    pub slope: f64,
+    /// Angle at no travel, from the middle of the range.
+    pub offset_rad: f64,
+}
+
+/// Priors of a sensor of another scale than its datasheet's: gain, and offset in rad. Wide.
+const OTHER_GAIN_STD: f64 = 1.0;
+const OTHER_OFFSET_STD_RAD: f64 = 0.5;
+
 /// One failed joint, and what is not used of it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Failure {
@@ -55,6 +68,8 @@ pub struct Failure {
     pub since: Option<usize>,
     /// By how much more it reads since, rad.
     pub step_rad: Option<f64>,
+    /// Of a reversed sensor, whose reading is not used, and of one of another scale, whose gain is estimated.
+    pub line: Option<SensorLine>,
     /// What shows it, in words.
     pub evidence: String,
 }
@@ -71,6 +86,7 @@ impl Failure {
             views,
             since: None,
             step_rad: None,
+            line: None,
             evidence: String::new(),
         }
     }
@@ -151,6 +167,11 @@ impl FailureAdjusted {
         for failure in failures.iter().filter(|f| f.kind == FailedKind::Locked && f.leaves_no_sensor()) {
             applied.lock(failure.joint);
         }
+        for failure in failures.iter().filter(|failure| failure.line.is_some() && !failure.leaves_no_sensor()) {
+            let spec = &mut applied.robot.sensors[failure.joint];
+            spec.gain_std = spec.gain_std.max(OTHER_GAIN_STD);
+            spec.offset_std_rad = spec.offset_std_rad.max(OTHER_OFFSET_STD_RAD);
+        }
         applied
     }
 
@@ -197,13 +218,24 @@ impl FailureAdjusted {
             views: &self.views,
             model: self.model(),
             scales: Hyperparameters::datasheet(&self.robot),
-            guess: JointParameters { reference: reference(&self.views), ..JointParameters::default() },
+            guess: self.guess(),
             joint_prior: None,
             evidence,
         }
     }
 
     /// The estimate from the datasheet; `None` where the views determine nothing.
+    fn guess(&self) -> JointParameters {
+        let mut guess = JointParameters { reference: reference(&self.views), ..JointParameters::default() };
+        for (joint, line) in self.failures.iter().filter_map(|failure| Some((failure.joint, failure.line?))) {
+            if !self.failures.iter().any(|failure| failure.joint == joint && failure.leaves_no_sensor()) {
+                (guess.gain[joint], guess.offset_rad[joint]) = (line.slope, line.offset_rad);
+            }
+        }
+        guess
+    }
+
+    /// The estimate from the datasheet.
     pub fn estimate(&self, evidence: HyperparameterMode) -> Option<Estimate<'_>> {
         estimate(&self.input(evidence))
     }

@@ -42,8 +42,7 @@ mod verdict;
 
 pub use calibration_prior::{CalibrationPrior, MOUNT_ROWS, PriorConsistency, with_mount_rows};
 pub use estimate::{Estimate, LeastSquares, estimate, least_squares};
-pub use failure_detection::FailureSearch;
-pub use failures::{Failure, FailureAdjusted, FailureSource, SensorUse};
+pub use failures::{Failure, FailureAdjusted, FailureSource, SensorLine, SensorUse};
 pub use innovations::{Innovations, JointInnovation};
 pub use input::{BundleInput, HyperparameterMode};
 pub use model::{Hyperparameters, MIN_GRIPPER_VIEWS, Model, SHAPE_LENGTH, model_for, reference};

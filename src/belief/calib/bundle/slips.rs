@@ -11,7 +11,6 @@ use crate::calib::bundle::failures::Failure;
 use crate::calib::bundle::model::STEP_STD_RAD;
 use crate::calib::bundle::model_selection::log_evidence;
 use crate::calib::bundle::outliers::rejection_chi2;
-use crate::calib::bundle::setup::BundleSetup;
 use crate::calib::bundle::step_test::{OffsetPrior, StepCandidate};
 use crate::calib::parameters::{Parameter, ParameterKind};
 use crate::calib::views::view::View;
@@ -64,7 +63,7 @@ impl FailureSearch<'_> {
     ) -> Option<Vec<Failure>> {
         let mut with = known.to_vec();
         with.push(self.slip(step));
-        let setup = BundleSetup::new(self.robot, self.views, &with, self.prior);
+        let setup = self.setup(&with);
         let (better, _) = setup.estimate()?;
         let (size_rad, std_rad) = better.step(step.joint, self.views[step.since].end)?;
         let likelihood_ratio =
@@ -97,7 +96,7 @@ impl FailureSearch<'_> {
 }
 
 /// A rejected observation costs what it would at the limit, so that estimates that reject others compare.
-fn log_evidence_of_all(found: &Estimate<'_>) -> f64 {
+pub(crate) fn log_evidence_of_all(found: &Estimate<'_>) -> f64 {
     let rejected = found.problem.observations.iter().filter(|observation| !observation.is_used);
     log_evidence(found) - 0.5 * rejected.map(|observation| rejection_chi2(&observation.data)).sum::<f64>()
 }
@@ -134,7 +133,7 @@ impl Estimate<'_> {
     }
 
     /// The most that a change of one link, of the mount or of one tag would take off the cost.
-    fn largest_other_chi2(&self) -> f64 {
+    pub(crate) fn largest_other_chi2(&self) -> f64 {
         let by_links = self.score_tests(&self.view_angles()).into_iter().map(|result| result.chi2);
         let tags = 0..self.problem.robot.tags.len();
         let by_tags = tags.filter_map(|tag_idx| self.tag_departure(tag_idx)).map(|departure| departure.chi2);

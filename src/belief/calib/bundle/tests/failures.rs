@@ -2,6 +2,7 @@
 
 use rand::RngExt;
 
+use crate::calib::bundle::drawing::Drawing;
 use crate::calib::bundle::estimate::Estimate;
 use crate::calib::bundle::failure_detection::FailureSearch;
 use crate::calib::bundle::failures::{Failure, FailureAdjusted, FailureSource, SensorUse};
@@ -44,7 +45,7 @@ fn case(seed: u64, locked: Option<usize>) -> Case {
 fn found_failures(case: &Case, declared: &[Failure]) -> Vec<Failure> {
     let applied = FailureAdjusted::new(&case.robot, &case.views, declared, &JointParameters::default());
     let found = applied.estimate(HyperparameterMode::Fitted);
-    let search = FailureSearch { robot: &case.robot, views: &case.views, prior: None };
+    let search = FailureSearch { robot: &case.robot, views: &case.views, prior: None, drawing: &Drawing::default() };
     search.failures(declared, found.as_ref())
 }
 

@@ -2,6 +2,7 @@
 
 use rand::RngExt;
 
+use crate::calib::bundle::drawing::Drawing;
 use crate::calib::bundle::estimate::Estimate;
 use crate::calib::bundle::failure_detection::FailureSearch;
 use crate::calib::bundle::failures::{Failure, FailureAdjusted};
@@ -58,7 +59,8 @@ fn noncentrality(case: &Case, joint: usize, since: usize) -> f64 {
 fn found_failures(case: &Case) -> Vec<Failure> {
     let applied = FailureAdjusted::new(&case.robot, &case.views, &[], &JointParameters::default());
     let found = applied.estimate(HyperparameterMode::Fitted);
-    FailureSearch { robot: &case.robot, views: &case.views, prior: None }.failures(&[], found.as_ref())
+    FailureSearch { robot: &case.robot, views: &case.views, prior: None, drawing: &Drawing::default() }
+        .failures(&[], found.as_ref())
 }
 
 /// Root mean square of the tool's error over the range of the views, m.
