@@ -1,5 +1,6 @@
 //! One calibration by `bundle`, step by step: estimate, diagnose, report, judge.
 
+use crate::calib::angles_by_camera::set_by_camera;
 use crate::calib::bundle::calibration_prior::PriorConsistency;
 use crate::calib::bundle::drawing::Drawing;
 use crate::calib::bundle::estimate::{Estimate, estimate};
@@ -198,7 +199,6 @@ impl<'a> BundleCalibration<'a> {
         let robot = &self.data.robot;
         let without_failed = setup.without_failed(&estimate.parameters());
         let with_steps = setup.with_estimated_angles(estimate, &without_failed);
-        // Held-out views of a freed joint are linearized where the camera saw it.
         let input = BundleInput { views: &with_steps, ..setup.input() };
         let (held_out, innovations) = match self.purpose {
             EstimatePurpose::Final => cross_validated(&input, estimate),
@@ -388,7 +388,7 @@ fn cross_validated(input: &BundleInput<'_>, all: &Estimate<'_>) -> (HeldOutMetri
     let mut sums = FoldSums::default();
     let mut innovations = Vec::new();
     for fold in 0..FOLDS {
-        let (fitted, held_out) = fold_of(input.views, fold);
+        let (fitted, mut held_out) = fold_of(input.views, fold);
         let part = BundleInput {
             views: &fitted,
             model: all.model.clone(),
@@ -397,10 +397,15 @@ fn cross_validated(input: &BundleInput<'_>, all: &Estimate<'_>) -> (HeldOutMetri
             ..input.clone()
         };
         let Some(found) = estimate(&part) else { continue };
+        let as_found = found.as_found(input.robot);
+        // Where no sensor tells an angle, the view's own tags tell where to linearize, with nothing of other folds.
+        for view in &mut held_out {
+            set_by_camera(&as_found, view, &found.parameters());
+        }
         let with_places: Vec<(usize, View)> =
             held_out.iter().enumerate().map(|(n, view)| (n * FOLDS + fold, view.clone())).collect();
         innovations.extend(found.innovations(&part, &with_places, &all.outliers));
-        sums.add(&found.as_read_now(&held_out), &found.as_found(input.robot), &found.parameters(), input.robot);
+        sums.add(&found.as_read_now(&held_out), &as_found, &found.parameters(), input.robot);
     }
     (sums.metrics(), innovations)
 }

@@ -15,7 +15,7 @@ use crate::calib::bundle::failures::{
 use crate::calib::bundle::input::HyperparameterMode;
 use crate::calib::bundle::setup::BundleSetup;
 use crate::calib::bundle::slips::log_evidence_of_all;
-use crate::calib::parameters::{JointParameters, ParameterKind};
+use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
 use crate::calib::result::calibration::Calibration;
 use crate::calib::views::view::View;
 use armcal_core::robot::{FailedKind, Robot};
@@ -283,10 +283,29 @@ fn score(found: &Estimate<'_>) -> f64 {
 /// A gain or offset that no sensor of the datasheet has: a locked joint looks like one of gain zero.
 fn is_beyond_datasheet(robot: &Robot, found: &Estimate<'_>) -> bool {
     let (sound, at) = (JointParameters::default(), found.parameters());
-    found.joint_parameters().iter().any(|p| {
+    found.joint_parameters().iter().enumerate().any(|(column, p)| {
         let is_known = matches!(p.kind, ParameterKind::Gain | ParameterKind::Offset) && p.prior_std(robot) > 0.0;
-        is_known && (at.get(*p) - sound.get(*p)).abs() > FAR_SIGMAS * p.prior_std(robot)
+        let limit = FAR_SIGMAS * p.prior_std(robot);
+        // What the gain does not take up may have gone to the nonlinearity.
+        let slope_off = if p.kind == ParameterKind::Gain { (found.slope(*p, column) - 1.0).abs() } else { 0.0 };
+        is_known && ((at.get(*p) - sound.get(*p)).abs() > limit || slope_off > limit)
     })
+}
+
+impl Estimate<'_> {
+    /// Of the joint's estimated angles by its readings; one where they do not move.
+    fn slope(&self, gain: Parameter, column: usize) -> f64 {
+        let problem = &self.problem;
+        let views = (0..problem.views.len()).filter(|&view_idx| self.uses(view_idx));
+        let points: Vec<[f64; 2]> = views
+            .map(|k| [problem.views[k].basis[column], problem.angles(k, &self.solved.state)[gain.joint]])
+            .collect();
+        let n = points.len().max(1) as f64;
+        let mean = [0, 1].map(|axis| points.iter().map(|point| point[axis]).sum::<f64>() / n);
+        let sum = |axis: usize| points.iter().map(|p| (p[0] - mean[0]) * (p[axis] - mean[axis])).sum::<f64>();
+        let squares = sum(0);
+        if squares > 0.0 { sum(1) / squares } else { 1.0 }
+    }
 }
 
 /// Whether an estimate looks as if some sensor did not belong.

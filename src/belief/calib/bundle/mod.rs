@@ -35,6 +35,7 @@ mod schur;
 mod score_test;
 mod setup;
 mod slips;
+pub(crate) mod slips_since;
 mod solve;
 mod step_test;
 mod tables;

@@ -3,7 +3,8 @@
 //! The score test of steps proposes a joint and a change point; all is then estimated anew with that step as a column,
 //! and the change point is moved where the test of further steps asks for it. A step stays where twice the logarithm of
 //! the evidences' ratio, less what the step's wide prior costs (`2 ln(prior std / posterior std)`, so that it is a
-//! ratio of likelihoods), exceeds [`MIN_LIKELIHOOD_RATIO`], and what other links, mounts or tags would explain.
+//! ratio of likelihoods), and the square of the step in its standard deviations both exceed [`MIN_LIKELIHOOD_RATIO`],
+//! and what other links, mounts or tags would explain.
 
 use crate::calib::bundle::estimate::Estimate;
 use crate::calib::bundle::failure_detection::FailureSearch;
@@ -17,11 +18,11 @@ use crate::calib::views::view::View;
 use armcal_core::joints::MAX_JOINTS;
 use armcal_core::time::Stamp;
 
-/// What a candidate must promise to be fitted: about one good arm in a hundred has one.
-const WORTH_A_FIT: f64 = 20.0;
-/// Chi-square's quantile at 1e-4 over some two hundred joints and change points is 25; the joint's variance is fitted to
-/// the same few views, which takes as much again as Student's distribution has over the normal one.
-const MIN_LIKELIHOOD_RATIO: f64 = 32.0;
+/// What a candidate must promise to be fitted: three to four good arms in a hundred have one.
+const WORTH_A_FIT: f64 = 16.0;
+/// Good arms have 18 at most in 200 (measured), and chi-square's quantile at 1e-4 over some hundred joints and change
+/// points is 24.
+const MIN_LIKELIHOOD_RATIO: f64 = 24.0;
 /// Smaller steps are drift, and do no harm, rad.
 const MIN_STEP_RAD: f64 = 0.05 * std::f64::consts::PI / 180.0;
 const MAX_STEPS: usize = 3;
@@ -68,6 +69,8 @@ impl FailureSearch<'_> {
         let (size_rad, std_rad) = better.step(step.joint, self.views[step.since].end)?;
         let likelihood_ratio =
             2.0 * (log_evidence_of_all(&better) - baseline.log_evidence) + 2.0 * (STEP_STD_RAD / std_rad).ln();
+        // An estimate that is better for another reason says nothing of the step.
+        let likelihood_ratio = likelihood_ratio.min((size_rad / std_rad).powi(2));
         if likelihood_ratio <= least {
             return None;
         }
