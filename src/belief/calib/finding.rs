@@ -48,6 +48,10 @@ pub enum FindingKind {
     Tool,
     /// A sensor that slipped on its shaft; the size is the step.
     SensorSlip,
+    /// A sensor that reads the other way; the size is the slope of the angle by the reading.
+    SensorReversed,
+    /// A sensor of another scale than its datasheet's; the size is the slope of the angle by the reading.
+    SensorScale,
     /// A joint or sensor that failed otherwise.
     SensorFailed,
     /// A sensor with more error from view to view than its datasheet allows; the size is one sigma.

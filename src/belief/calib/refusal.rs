@@ -149,6 +149,13 @@ pub enum Refusal {
         /// Views since the slip.
         views: usize,
     },
+    /// A sensor that reads the other way, or of another scale, and the rest does not fit with its gain estimated.
+    SensorLine {
+        /// The joint.
+        joint: String,
+        /// Of the angle by the reading, 1 by the datasheet.
+        slope: f64,
+    },
     /// A sensor failed whose joint the task needs.
     SensorFailed {
         /// Name of the joint in the URDF.
@@ -228,6 +235,7 @@ impl Refusal {
             Self::BeyondTolerance { .. } => "capture more views, or put a tag on the gripper",
             Self::Geometry(_) => "check the drawing against the arm",
             Self::SensorError { .. } | Self::SensorFailed { .. } => "check that joint's sensor",
+            Self::SensorLine { .. } => "swap its ends, or correct scale_counts_per_deg and its sign in robot.toml",
             Self::BeyondDatasheet { .. } => "check joint and sensor, and robot.toml against the sensor that is there",
             Self::Outliers { .. } => "check tag map, tag ids and the drawing",
             Self::Innovations { .. } => "look for what moved or warmed up during the capture",
@@ -298,6 +306,10 @@ impl fmt::Display for Refusal {
             | Self::PriorsBeyondTolerance { .. }
             | Self::Touch { .. }
             | Self::Innovations { .. } => self.fmt_long(f),
+            Self::SensorLine { joint, slope } => {
+                let what = if *slope < 0.0 { "reversed" } else { "of another scale than its datasheet's" };
+                write!(f, "the sensor of {joint} is {what}: the camera's angles follow it with a slope of {slope:.2}")
+            }
             Self::TooFewViewsSinceSlip { joint, evidence, views } => {
                 write!(f, "{joint}: {evidence}; {views} views are too few to calibrate it as it is now")
             }

@@ -1,8 +1,10 @@
 //! One calibration by `bundle`, step by step: estimate, diagnose, report, judge.
 
+use crate::calib::angles_by_camera::set_by_camera;
 use crate::calib::bundle::calibration_prior::PriorConsistency;
 use crate::calib::bundle::drawing::Drawing;
 use crate::calib::bundle::estimate::{Estimate, estimate};
+use crate::calib::bundle::failure_detection::FailureSearch;
 use crate::calib::bundle::failure_impact::FailureImpact;
 use crate::calib::bundle::failures::Failure;
 use crate::calib::bundle::freed_tags::MovedTags;
@@ -133,16 +135,12 @@ impl<'a> BundleCalibration<'a> {
         let first = BundleSetup::new(&self.data.robot, &views, &declared, self.prior).with_drawing(&self.drawing);
         self.check_observable(&first, &declared)?;
         let estimated = self.first_estimate(&first);
-        if self.purpose == EstimatePurpose::Final
-            && let Some((estimate, _)) = &estimated
-            && self.revise(&first, estimate)
-        {
-            drop(estimated);
-            self.data.data.fit = views;
-            return self.calibrate();
-        }
         let failures = match self.purpose {
-            EstimatePurpose::Final => first.failures(&self.data.robot, &views, estimated.as_ref().map(|(e, _)| e)),
+            EstimatePurpose::Final => {
+                let (robot, prior, drawing) = (&self.data.robot, self.prior, &self.drawing);
+                let search = FailureSearch { robot, views: &views, prior, drawing };
+                search.failures(&declared, estimated.as_ref().map(|(estimate, _)| estimate))
+            }
             EstimatePurpose::Interim => declared.clone(),
         };
         let second;
@@ -152,6 +150,14 @@ impl<'a> BundleCalibration<'a> {
             second = BundleSetup::new(&self.data.robot, &views, &failures, self.prior).with_drawing(&self.drawing);
             (&second, second.estimate())
         };
+        if self.purpose == EstimatePurpose::Final
+            && let Some((estimate, _)) = &estimated
+            && self.revise(setup, estimate)
+        {
+            drop(estimated);
+            self.data.data.fit = views;
+            return self.calibrate();
+        }
         let (estimate, selections) = estimated.ok_or_else(|| self.nothing_observable())?;
         let estimated = Estimated { setup, failures: &failures, estimate, selections, touches: None };
         let touches: &[Touch] = match self.purpose {
@@ -227,13 +233,13 @@ impl<'a> BundleCalibration<'a> {
         let Estimated { setup, estimate, .. } = estimated;
         let robot = &self.data.robot;
         let without_failed = setup.without_failed(&estimate.parameters());
-        let views = setup.with_estimated_angles(estimate, &without_failed);
-        // Held-out views of a freed joint are linearized where the camera saw it.
-        let input = BundleInput { views: &views, ..setup.input() };
+        let with_steps = setup.with_estimated_angles(estimate, &without_failed);
+        let input = BundleInput { views: &with_steps, ..setup.input() };
         let (held_out, innovations) = match self.purpose {
             EstimatePurpose::Final => cross_validated(&input, estimate),
             EstimatePurpose::Interim => (FoldSums::default().metrics(), Vec::new()),
         };
+        let views = estimate.as_read_now(&with_steps);
         let parameters = estimate.joint_parameters().to_vec();
         let residual_std_rad = std::array::from_fn(|joint| match robot.sensors.get(joint) {
             // Nothing is known of a joint distal to the camera but its datasheet.
@@ -241,7 +247,8 @@ impl<'a> BundleCalibration<'a> {
             _ => estimate.scales().joint_std_rad[joint],
         });
         let matrix = estimate.joint_covariance();
-        let covariance = ParameterCovariance { parameters, matrix, residual_std_rad: Some(residual_std_rad) };
+        let all = ParameterCovariance { parameters, matrix, residual_std_rad: Some(residual_std_rad) };
+        let covariance = all.without(|parameter| parameter.is_step());
         Diagnosis { robot: estimate.as_found(&setup.applied.robot), views, held_out, innovations, covariance }
     }
 
@@ -330,7 +337,7 @@ impl<'a> BundleCalibration<'a> {
         calibration.prior = self.prior.zip(consistency).map(|(prior, consistency)| {
             prior_table(prior, estimated.setup.elapsed_h(), &consistency, &self.data.robot)
         });
-        refusals.extend(impact.refusals(&calibration.failed_joint));
+        refusals.extend(impact.refusals());
         calibration.refuse_first_for(refusals);
     }
 
@@ -422,7 +429,7 @@ fn cross_validated(input: &BundleInput<'_>, all: &Estimate<'_>) -> (HeldOutMetri
     let mut sums = FoldSums::default();
     let mut innovations = Vec::new();
     for fold in 0..FOLDS {
-        let (fitted, held_out) = fold_of(input.views, fold);
+        let (fitted, mut held_out) = fold_of(input.views, fold);
         let part = BundleInput {
             views: &fitted,
             model: all.model.clone(),
@@ -431,10 +438,15 @@ fn cross_validated(input: &BundleInput<'_>, all: &Estimate<'_>) -> (HeldOutMetri
             ..input.clone()
         };
         let Some(found) = estimate(&part) else { continue };
+        let as_found = found.as_found(input.robot);
+        // Where no sensor tells an angle, the view's own tags tell where to linearize, with nothing of other folds.
+        for view in &mut held_out {
+            set_by_camera(&as_found, view, &found.parameters());
+        }
         let with_places: Vec<(usize, View)> =
             held_out.iter().enumerate().map(|(n, view)| (n * FOLDS + fold, view.clone())).collect();
         innovations.extend(found.innovations(&part, &with_places, &all.outliers));
-        sums.add(&held_out, &found.as_found(input.robot), &found.parameters(), input.robot);
+        sums.add(&found.as_read_now(&held_out), &as_found, &found.parameters(), input.robot);
     }
     (sums.metrics(), innovations)
 }

@@ -34,6 +34,11 @@ pub(crate) fn reject(problem: &mut BundleProblem<'_>, solved: &Solved) -> bool {
     changed
 }
 
+/// Chi-square above which an observation is rejected.
+pub(crate) fn rejection_chi2(seen: &WeightedMeasurement) -> f64 {
+    REJECT * seen.n_coordinates() as f64 * noise_excess(seen)
+}
+
 /// Positions and poses come with a standard deviation that is a guess until the scales are fitted.
 fn noise_excess(seen: &WeightedMeasurement) -> f64 {
     match seen {

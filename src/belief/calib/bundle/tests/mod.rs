@@ -8,5 +8,7 @@ mod failures;
 mod moved_tags;
 mod reservations;
 mod score_test;
+
+mod slips;
 mod statistics;
 mod touches;
