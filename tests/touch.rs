@@ -1,4 +1,4 @@
-//! The tool against surveyed plates: felt where they are, used by the calibration, and telling when the drawing is wrong.
+//! The tool against surveyed plates: felt where they are, used by the calibration, and telling of a wrong drawing.
 
 use std::path::Path;
 

@@ -229,8 +229,8 @@ impl Refusal {
             }
             Self::Overfitted { .. } => "capture more views, or more different ones",
             Self::PriorsBeyondTolerance { .. } => {
-                "put a tag on the gripper, touch three surveyed surfaces (step `touch`), or measure the arm and state its \
-                 sigmas in [geometry] of robot.toml"
+                "put a tag on the gripper, touch three surveyed surfaces (step `touch`), or measure the arm and state \
+                 its sigmas in [geometry] of robot.toml"
             }
             Self::BeyondTolerance { .. } => "capture more views, or put a tag on the gripper",
             Self::Geometry(_) => "check the drawing against the arm",
@@ -240,7 +240,8 @@ impl Refusal {
             Self::Outliers { .. } => "check tag map, tag ids and the drawing",
             Self::Innovations { .. } => "look for what moved or warmed up during the capture",
             Self::Touch { .. } => {
-                "measure the tool point ([tool] point_m of robot.toml), the links beyond the camera and the camera's mount"
+                "measure the tool point ([tool] point_m of robot.toml), the links beyond the camera and its \
+                 mount"
             }
             Self::PriorReused => "give a prior that was made from other views",
             Self::PriorSingular => "make the prior anew",
@@ -359,7 +360,8 @@ impl Refusal {
             Self::Touch { off_m, surface, chi2, limit, causes, link, tool_point_m: [x, y, z] } => write!(
                 f,
                 "touch: the tool is {:.0} mm from where it should be at {surface} (chi-square {chi2:.0}, limit \
-                 {limit:.0}): {}; a tool point [{:.1}, {:.1}, {:.1}] mm from the drawn one, in the axes of {link}, would explain it best",
+                 {limit:.0}): {}; a tool point [{:.1}, {:.1}, {:.1}] mm from the drawn one, in the axes of {link}, \
+                 would explain it best",
                 off_m.abs() * 1e3,
                 causes.join(", or "),
                 x * 1e3,

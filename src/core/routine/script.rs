@@ -415,7 +415,7 @@ mod tests {
                 "step 1 (touch): normal: has the length 2",
             ),
             (
-                "[[step]]\ndo = \"touch\"\npart = \"bar\"\npoint_m = [1.0, 0.0, 0.0]\nnormal = [0.0, 0.0, 1.0]\nstd_m = 0.0",
+                "[[step]]\ndo = \"touch\"\npart = \"bar\"\npoint_m = [1, 0, 0]\nnormal = [0, 0, 1]\nstd_m = 0.0",
                 "step 1 (touch): std_m: 0 is outside",
             ),
             ("[[step]]\ndo = \"capture\"\nposes = 1", "step 1 (capture): poses: 1 is outside"),
