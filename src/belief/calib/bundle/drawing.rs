@@ -87,11 +87,8 @@ impl Drawing {
         };
         let mut gains: Vec<(f64, Self)> =
             self.alternatives(input, found).into_iter().map(|drawing| (gain(&drawing), drawing)).collect();
-        // Tags that were printed at another scale look much like another focal length.
-        let is_like_scale =
-            gains.iter().any(|(gain, drawing)| *gain > least_nats && drawing.has_lens && !self.has_lens);
         let is_scaled = self.tags.iter().any(|fault| matches!(fault, TagFault::AllSizes { .. }));
-        if is_like_scale && !is_scaled {
+        if found.most_tags_are_doubtful() && !is_scaled {
             let scaled = |ratio: f64| self.with_fault(TagFault::AllSizes { ratio });
             let ratio = best_ratio(|ratio| gain(&scaled(ratio)));
             gains.push((gain(&scaled(ratio)), scaled(ratio)));

@@ -74,10 +74,8 @@ struct SeenTag {
 impl Estimate<'_> {
     /// The faults of tags that `views` speak for; each has to prove itself by an estimate.
     pub(crate) fn tag_faults(&self, views: &[View]) -> Vec<TagFault> {
-        let elsewhere = self.departed_tags();
-        let n_tags = self.problem.robot.tags.len();
-        let doubtful = (0..n_tags).filter(|&tag| self.rejected_share(tag) > REJECTED_SHARE || elsewhere.contains(&tag));
-        let seen: Vec<SeenTag> = doubtful.map(|tag_idx| self.seen(tag_idx, views)).collect();
+        let doubtful = self.doubtful_tags();
+        let seen: Vec<SeenTag> = doubtful.into_iter().map(|tag_idx| self.seen(tag_idx, views)).collect();
         let seen: Vec<&SeenTag> = seen.iter().filter(|tag| tag.observations.len() >= MIN_OBSERVATIONS).collect();
         let robot = self.problem.robot;
         let mut faults = Vec::new();
@@ -87,6 +85,18 @@ impl Estimate<'_> {
         }
         faults.extend(seen.iter().filter_map(|tag| tag.size(robot)));
         faults
+    }
+
+    /// Tags that do not fit, or that the data have elsewhere.
+    fn doubtful_tags(&self) -> Vec<usize> {
+        let elsewhere = self.departed_tags();
+        let is_doubtful = |tag: &usize| self.rejected_share(*tag) > REJECTED_SHARE || elsewhere.contains(tag);
+        (0..self.problem.robot.tags.len()).filter(is_doubtful).collect()
+    }
+
+    /// Whether more is wrong with the tags than that some were moved.
+    pub(crate) fn most_tags_are_doubtful(&self) -> bool {
+        2 * self.doubtful_tags().len() > self.problem.robot.tags.len()
     }
 
     /// Share of a tag's observations that are rejected.
