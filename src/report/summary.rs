@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::score::{MarginSummary, Score};
 use armcal_belief::calib::{
-    Calibration, CameraMount, FailedJointTable, Finding, JointResult, MapResult, ObservabilityTable, PriorTable,
-    Refusal, Reservation, Status, VerdictTable,
+    BaselineComparison, Calibration, CameraMount, FailedJointTable, Finding, JointResult, MapResult,
+    ObservabilityTable, PriorTable, Refusal, Reservation, Status, VerdictTable,
 };
 use armcal_core::numeric::Outcome;
 use armcal_core::routine::AssertFigure;
@@ -171,6 +171,9 @@ pub struct HeldOutSummary {
     pub camera_mean_m: Option<f64>,
     /// The same views with the datasheet's sensors.
     pub nominal_rms_m: Option<f64>,
+    /// The same by mount and map alone, and whether the calibration beats that.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub baseline: Option<BaselineComparison>,
 }
 
 /// One limit of an `assert` step.
@@ -253,6 +256,7 @@ impl RunSummary {
                 mean_m: calibration.held_out.mean_m,
                 camera_mean_m: calibration.held_out.camera_mean_m,
                 nominal_rms_m: calibration.held_out.nominal_rms_m,
+                baseline: calibration.held_out.baseline,
             },
             score: None,
             asserts: Vec::new(),

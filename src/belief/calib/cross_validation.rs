@@ -1,7 +1,8 @@
 //! k-fold cross-validation (Stone 1974), by views: all tags of one view share errors.
 
 use crate::calib::angles_by_camera::set_by_camera;
-use crate::calib::methods::position_problem::PositionProblem;
+use crate::calib::baseline_comparison::BaselineComparison;
+use crate::calib::methods::position_problem::{PositionProblem, TagResidual};
 use crate::calib::parameters::JointParameters;
 use crate::calib::result::metrics::HeldOutMetrics;
 use crate::calib::views::view::View;
@@ -19,28 +20,42 @@ pub(crate) fn fold_of(views: &[View], fold: usize) -> (Vec<View>, Vec<View>) {
     (of(false), of(true))
 }
 
-/// Each view by the parameters that `fit` estimates from the views of the other folds; a fold without an estimate does
-/// not count.
+/// Each view by the parameters that `fit` and the arm that `baseline` estimate from the views of the other folds; a
+/// fold without an estimate does not count.
 pub(crate) fn cross_validate(
     robot: &Robot,
     views: &[View],
     fit: impl Fn(&[View]) -> Option<JointParameters>,
+    baseline: impl Fn(&[View]) -> Option<Robot>,
 ) -> HeldOutMetrics {
     let mut sums = FoldSums::default();
     for fold in 0..FOLDS {
-        let (fitted, held_out) = fold_of(views, fold);
-        if fitted.is_empty() || held_out.is_empty() {
+        let (fitted, views) = fold_of(views, fold);
+        if fitted.is_empty() || views.is_empty() {
             continue;
         }
         if let Some(at) = fit(&fitted) {
-            sums.add(&held_out, robot, &at, robot);
+            let baseline = baseline(&fitted);
+            sums.add(&Fold { views: &views, as_found: robot, at: &at, nominal: robot, baseline: baseline.as_ref() });
         }
     }
     sums.metrics()
 }
 
+/// The held-out views of a fold, and what was found without them.
+pub(crate) struct Fold<'a> {
+    pub views: &'a [View],
+    /// The arm as found, and its parameters.
+    pub as_found: &'a Robot,
+    pub at: &'a JointParameters,
+    /// The drawing.
+    pub nominal: &'a Robot,
+    /// With mount and map fitted, the joints at the datasheet.
+    pub baseline: Option<&'a Robot>,
+}
+
 /// Sums over the folds.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct FoldSums {
     n_views: usize,
     /// Landmarks seen, and squares and sizes of their distances.
@@ -48,6 +63,11 @@ pub(crate) struct FoldSums {
     sum_m2: f64,
     sum_m: f64,
     nominal_m2: f64,
+    /// By the baseline: landmarks and squares of distances; of each view the mean logarithm of its distances over the
+    /// calibration's.
+    n_baseline: usize,
+    baseline_m2: f64,
+    log_ratios: Vec<f64>,
     /// Of those, the ones with corners.
     n_corners: usize,
     sum_px2: f64,
@@ -66,13 +86,14 @@ fn by_camera(views: &[View], robot: &Robot, at: &JointParameters) -> Vec<View> {
 }
 
 impl FoldSums {
-    /// Adds views left out, by what was found without them: the arm as found, and its parameters; `nominal` is the
-    /// drawing.
-    pub fn add(&mut self, held_out: &[View], as_found: &Robot, at: &JointParameters, nominal: &Robot) {
-        let (by_found, by_drawing) =
-            (by_camera(held_out, as_found, at), by_camera(held_out, nominal, &JointParameters::default()));
+    pub fn add(&mut self, fold: &Fold<'_>) {
+        let Fold { views, as_found, at, nominal, baseline } = *fold;
+        let datasheet = JointParameters::default();
+        let (by_found, by_drawing) = (by_camera(views, as_found, at), by_camera(views, nominal, &datasheet));
         let problem = PositionProblem::new(as_found, &by_found);
+        let mut distances = ViewDistances::new(views.len());
         problem.each(at, |o| {
+            distances.add(o);
             self.n += 1;
             self.sum_m2 += o.residual_m.norm_squared();
             self.sum_m += o.residual_m.norm();
@@ -82,11 +103,22 @@ impl FoldSums {
                 self.camera_sum_m += off_m;
             }
         });
-        let seen = held_out.iter().flat_map(|view| &view.tags).filter(|tag| tag.corners().is_some()).count() as f64;
+        let seen = views.iter().flat_map(|view| &view.tags).filter(|tag| tag.corners().is_some()).count() as f64;
         self.sum_px2 += problem.reprojection_rms_px(at).map_or(0.0, |rms_px| rms_px * rms_px * seen);
-        PositionProblem::new(nominal, &by_drawing)
-            .each(&JointParameters::default(), |o| self.nominal_m2 += o.residual_m.norm_squared());
-        self.n_views += held_out.iter().filter(|view| !view.tags.is_empty()).count();
+        PositionProblem::new(nominal, &by_drawing).each(&datasheet, |o| self.nominal_m2 += o.residual_m.norm_squared());
+        self.n_views += views.iter().filter(|view| !view.tags.is_empty()).count();
+        if let Some(baseline) = baseline {
+            let by_baseline = by_camera(views, baseline, &datasheet);
+            let mut of_baseline = ViewDistances::new(views.len());
+            PositionProblem::new(baseline, &by_baseline).each(&datasheet, |o| of_baseline.add(o));
+            self.n_baseline += of_baseline.n.iter().sum::<usize>();
+            self.baseline_m2 += of_baseline.sum_m2;
+            self.log_ratios.extend(distances.log_ratios(&of_baseline));
+        }
+    }
+
+    fn comparison(&self) -> Option<BaselineComparison> {
+        BaselineComparison::new((self.baseline_m2 / self.n_baseline as f64).sqrt(), &self.log_ratios)
     }
 
     pub fn metrics(&self) -> HeldOutMetrics {
@@ -99,6 +131,49 @@ impl FoldSums {
             camera_mean_m: mean(self.camera_sum_m, self.n_poses),
             rms_px: mean(self.sum_px2, self.n_corners).map(f64::sqrt),
             nominal_rms_m: mean(self.nominal_m2, self.n).map(f64::sqrt),
+            baseline: self.comparison(),
         }
+    }
+}
+
+/// The same views, fitted by others, by a calibration and by the baseline; `None` below two views.
+pub(crate) fn compared(
+    problem: &PositionProblem<'_>,
+    at: &JointParameters,
+    baseline: &PositionProblem<'_>,
+) -> Option<BaselineComparison> {
+    let [mut by_calibration, mut by_baseline] = [0, 1].map(|_| ViewDistances::new(problem.views.len()));
+    problem.each(at, |o| by_calibration.add(o));
+    baseline.each(&JointParameters::default(), |o| by_baseline.add(o));
+    let rms_m = (by_baseline.sum_m2 / baseline.n_observations() as f64).sqrt();
+    BaselineComparison::new(rms_m, &by_calibration.log_ratios(&by_baseline))
+}
+
+/// Distances between seen and surveyed landmarks, view by view.
+struct ViewDistances {
+    n: Vec<usize>,
+    sum_ln: Vec<f64>,
+    sum_m2: f64,
+}
+
+/// Smaller distances are rounding, m.
+const LEAST_DISTANCE_M: f64 = 1e-9;
+
+impl ViewDistances {
+    fn new(n_views: usize) -> Self {
+        Self { n: vec![0; n_views], sum_ln: vec![0.0; n_views], sum_m2: 0.0 }
+    }
+
+    fn add(&mut self, o: &TagResidual<'_>) {
+        let distance_m = o.residual_m.norm();
+        self.n[o.view_idx] += 1;
+        self.sum_ln[o.view_idx] += distance_m.max(LEAST_DISTANCE_M).ln();
+        self.sum_m2 += distance_m * distance_m;
+    }
+
+    /// Mean logarithm of `others` over these, of each view with landmarks.
+    fn log_ratios(&self, others: &Self) -> Vec<f64> {
+        let views = self.n.iter().zip(self.sum_ln.iter().zip(&others.sum_ln)).filter(|(n, _)| **n > 0);
+        views.map(|(n, (own, other))| (other - own) / *n as f64).collect()
     }
 }

@@ -6,6 +6,7 @@
 //! simulator.
 
 mod angles_by_camera;
+mod baseline_comparison;
 pub mod bundle;
 mod calibrate;
 mod covariance;
@@ -26,6 +27,7 @@ mod tag_mapping;
 mod tool_error;
 mod views;
 
+pub use baseline_comparison::{BaselineComparison, SIGNIFICANCE};
 pub use calibrate::{MIN_VIEWS, calibrate, calibrate_data, calibrate_with_survey};
 pub use covariance::{CommonErrors, ParameterCovariance, ToolErrorPrediction};
 pub use error::CalibError;

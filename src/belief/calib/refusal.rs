@@ -6,6 +6,7 @@ use armcal_core::numeric::Outcome;
 use armcal_core::robot::FailedKind;
 use serde::{Deserialize, Serialize};
 
+use crate::calib::baseline_comparison::SIGNIFICANCE;
 use crate::calib::geometry_error::GeometryError;
 
 /// One reason to refuse. Angles in rad, lengths in m.
@@ -23,6 +24,9 @@ pub enum Refusal {
     NotSolved {
         /// Stalled or degenerate.
         outcome: Outcome,
+        /// Steps or evaluations until then.
+        #[serde(default)]
+        evaluations: usize,
     },
     /// Fewer held-out views than a verdict needs.
     TooFewHeldOutViews {
@@ -39,6 +43,15 @@ pub enum Refusal {
         held_out_m: f64,
         /// The same with the datasheet's sensors.
         datasheet_m: f64,
+    },
+    /// Held-out views fit no better, beyond chance, than with mount and map fitted and the datasheet's sensors.
+    NoBetterThanBaseline {
+        /// Position error of the tags in held-out views.
+        held_out_m: f64,
+        /// The same with mount and map alone.
+        baseline_m: f64,
+        /// Probability of as large an improvement where there is none.
+        p_value: f64,
     },
     /// Held-out views fit much worse than fitted ones.
     Overfitted {
@@ -74,6 +87,24 @@ pub enum Refusal {
         std_rad: f64,
         /// The datasheet's linearity.
         datasheet_std_rad: f64,
+    },
+    /// A sensor is farther from a straight line than one of its datasheet can be.
+    Nonlinearity {
+        /// The joint's name.
+        joint: String,
+        /// Fitted size of the nonlinearity.
+        std_rad: f64,
+        /// Linearity by the datasheet.
+        datasheet_std_rad: f64,
+    },
+    /// Corners are farther off than the stated noise explains.
+    CornerNoise {
+        /// Of corners averaged over a view.
+        residual_px: f64,
+        /// Of one frame, by robot.toml.
+        stated_px: f64,
+        /// Largest residual that is accepted.
+        limit_px: f64,
     },
     /// A gain or offset that no sensor of this datasheet has.
     BeyondDatasheet {
@@ -210,7 +241,7 @@ impl Refusal {
             Self::NotSolved { .. } => "solver",
             Self::TooFewHeldOutViews { .. } => "few_held_out",
             Self::NoHeldOutTag => "no_held_out",
-            Self::NoBetterThanDatasheet { .. } => "no_better",
+            Self::NoBetterThanDatasheet { .. } | Self::NoBetterThanBaseline { .. } => "no_better",
             Self::Overfitted { .. } => "overfitted",
             Self::BeyondTolerance { .. } | Self::PriorsBeyondTolerance { .. } => "tool_error",
             _ => "other",
@@ -224,7 +255,7 @@ impl Refusal {
             Self::TooFewViews { .. } | Self::TooFewViewsSinceSlip { .. } | Self::PriorUntested => "capture more views",
             Self::NotSolved { .. } => "capture views that move each joint over more of its range",
             Self::TooFewHeldOutViews { .. } | Self::NoHeldOutTag => "hold out more views that show tags",
-            Self::NoBetterThanDatasheet { .. } => {
+            Self::NoBetterThanDatasheet { .. } | Self::NoBetterThanBaseline { .. } => {
                 "keep the datasheet's sensors, or check tag map, camera mount and time stamps"
             }
             Self::Overfitted { .. } => "capture more views, or more different ones",
@@ -234,8 +265,10 @@ impl Refusal {
             }
             Self::BeyondTolerance { .. } => "capture more views, or put a tag on the gripper",
             Self::Geometry(_) => "check the drawing against the arm",
+            Self::CornerNoise { .. } => "check lens, corner noise and tag sizes in robot.toml, and the tag map",
             Self::SensorError { .. } | Self::SensorFailed { .. } => "check that joint's sensor",
             Self::SensorLine { .. } => "swap its ends, or correct scale_counts_per_deg and its sign in robot.toml",
+            Self::Nonlinearity { .. } => "replace the sensor, or state its linearity in robot.toml",
             Self::BeyondDatasheet { .. } => "check joint and sensor, and robot.toml against the sensor that is there",
             Self::Outliers { .. } => "check tag map, tag ids and the drawing",
             Self::Innovations { .. } => "look for what moved or warmed up during the capture",
@@ -250,24 +283,41 @@ impl Refusal {
     }
 }
 
-/// Cause and evidence in one sentence.
+/// Cause, evidence, and what to do next.
 impl fmt::Display for Refusal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.fmt_cause(f)?;
+        write!(f, "; {}", self.remedy())
+    }
+}
+
+impl Refusal {
+    /// Cause and evidence.
+    fn fmt_cause(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mm = |m: f64| m * 1e3;
         match self {
             Self::TooFewViews { views, parameters } => {
                 write!(f, "{views} views to fit are too few for {parameters} parameters, however many tags each shows")
             }
-            Self::NotSolved { outcome } => write!(f, "the solver {}", outcome.name()),
+            Self::NotSolved { outcome, evaluations } => {
+                write!(f, "the solver {} after {evaluations} steps", outcome.name())
+            }
             Self::TooFewHeldOutViews { views, needed } => {
                 write!(f, "only {views} held-out views show a tag; {needed} are needed for a verdict")
             }
-            Self::NoHeldOutTag => write!(f, "the held-out views hold no usable tag"),
+            Self::NoHeldOutTag => write!(f, "the held-out views hold no usable tag (0 seen)"),
             Self::NoBetterThanDatasheet { held_out_m, datasheet_m } => write!(
                 f,
                 "held-out views are no better than with the datasheet: {:.1} mm against {:.1} mm",
                 mm(*held_out_m),
                 mm(*datasheet_m)
+            ),
+            Self::NoBetterThanBaseline { held_out_m, baseline_m, p_value } => write!(
+                f,
+                "held-out views are no better than with the datasheet's sensors once camera mount and tag map are \
+                 fitted: {:.1} mm against {:.1} mm (p = {p_value:.2}, below {SIGNIFICANCE} wanted)",
+                mm(*held_out_m),
+                mm(*baseline_m)
             ),
             Self::Overfitted { held_out_m, fit_m } => write!(
                 f,
@@ -285,7 +335,7 @@ impl fmt::Display for Refusal {
             Self::SensorError { joint, std_rad, datasheet_std_rad } => write!(
                 f,
                 "joint sensors do not explain the data: {joint} needs a random error of {:.2} deg from view to view, \
-                 its datasheet has {:.2} deg; a joint that slips, or links that are not as in the drawing",
+                 its datasheet has {:.2} deg: a joint that slips, or links that are not as in the drawing",
                 std_rad.to_degrees(),
                 datasheet_std_rad.to_degrees()
             ),
@@ -306,13 +356,15 @@ impl fmt::Display for Refusal {
             | Self::SensorFailed { .. }
             | Self::PriorsBeyondTolerance { .. }
             | Self::Touch { .. }
+            | Self::Nonlinearity { .. }
+            | Self::CornerNoise { .. }
             | Self::Innovations { .. } => self.fmt_long(f),
             Self::SensorLine { joint, slope } => {
                 let what = if *slope < 0.0 { "reversed" } else { "of another scale than its datasheet's" };
                 write!(f, "the sensor of {joint} is {what}: the camera's angles follow it with a slope of {slope:.2}")
             }
             Self::TooFewViewsSinceSlip { joint, evidence, views } => {
-                write!(f, "{joint}: {evidence}; {views} views are too few to calibrate it as it is now")
+                write!(f, "{joint}: {evidence}; the {views} views since are too few to calibrate it as it is now")
             }
         }
     }
@@ -347,6 +399,19 @@ impl Refusal {
                     mm(*tool_error_by_camera_m)
                 )
             }
+            Self::Nonlinearity { joint, std_rad, datasheet_std_rad } => write!(
+                f,
+                "{joint} is farther from a straight line than a sensor of its datasheet: {:.2} deg, {:.1} times the \
+                 datasheet's {:.2} deg",
+                std_rad.to_degrees(),
+                std_rad / datasheet_std_rad,
+                datasheet_std_rad.to_degrees()
+            ),
+            Self::CornerNoise { residual_px, stated_px, limit_px } => write!(
+                f,
+                "the model does not explain the corners: averaged over a view they are {residual_px:.2} px off, above \
+                 {limit_px:.2} px; robot.toml has {stated_px:.2} px for one frame"
+            ),
             Self::PriorsBeyondTolerance { predicted_m, tolerance_m, most } => {
                 write!(
                     f,
@@ -402,6 +467,53 @@ mod tests {
         assert_eq!(in_words(&[]), None);
     }
 
+    /// One of each kind that says something measured.
+    fn measured() -> Vec<Refusal> {
+        let joint = || "wrist_yaw".to_owned();
+        vec![
+            Refusal::TooFewViews { views: 8, parameters: 10 },
+            Refusal::NotSolved { outcome: Outcome::Stalled, evaluations: 40 },
+            Refusal::TooFewHeldOutViews { views: 1, needed: 3 },
+            Refusal::NoHeldOutTag,
+            Refusal::NoBetterThanDatasheet { held_out_m: 0.02, datasheet_m: 0.019 },
+            Refusal::NoBetterThanBaseline { held_out_m: 0.0201, baseline_m: 0.0203, p_value: 0.4 },
+            Refusal::Overfitted { held_out_m: 0.011, fit_m: 0.004 },
+            Refusal::BeyondTolerance { predicted_m: 0.03, tolerance_m: 0.02 },
+            Refusal::PriorsBeyondTolerance { predicted_m: 0.03, tolerance_m: 0.02, most: None },
+            Refusal::SensorError { joint: joint(), std_rad: 0.01, datasheet_std_rad: 0.002 },
+            Refusal::Nonlinearity { joint: joint(), std_rad: 0.03, datasheet_std_rad: 0.002 },
+            Refusal::CornerNoise { residual_px: 1.2, stated_px: 0.3, limit_px: 0.9 },
+            Refusal::BeyondDatasheet { parameter: "wrist_yaw offset".to_owned(), sigmas: 9.0 },
+            Refusal::Outliers { outliers: 40, observations: 100 },
+            Refusal::Innovations {
+                quantity: InnovationQuantity::Coordinates,
+                per_dof: 9.0,
+                limit: 1.7,
+                expected: [0.9, 1.1],
+            },
+            Refusal::TooFewViewsSinceSlip { joint: joint(), evidence: "it slipped".to_owned(), views: 4 },
+            Refusal::SensorFailed {
+                joint: joint(),
+                kind: FailedKind::Dead,
+                tool_error_m: Some(0.2),
+                tool_error_by_camera_m: Some(0.01),
+                tolerance_m: 0.02,
+            },
+        ]
+    }
+
+    #[test]
+    fn each_reason_says_a_figure_and_what_to_do_next() {
+        for refusal in measured() {
+            let words = refusal.to_string();
+            assert!(words.contains(|c: char| c.is_ascii_digit()), "{words}");
+            assert!(words.ends_with(&format!("; {}", refusal.remedy())), "{words}");
+        }
+        for refusal in [Refusal::PriorReused, Refusal::PriorSingular, Refusal::PriorUntested] {
+            assert!(refusal.to_string().ends_with(refusal.remedy()));
+        }
+    }
+
     #[test]
     fn a_reason_survives_the_file() {
         let geometry = Refusal::Geometry(GeometryError {
@@ -436,8 +548,14 @@ mod tests {
             tool_point_m: [0.0, 0.02, -0.001],
         };
         assert!(touch.to_string().starts_with("touch: the tool is 18 mm from where it should be at toe plate"));
-        let file =
-            File { refusals: vec![geometry, Refusal::NotSolved { outcome: Outcome::Stalled }, contradicted, touch] };
+        let file = File {
+            refusals: vec![
+                geometry,
+                Refusal::NotSolved { outcome: Outcome::Stalled, evaluations: 40 },
+                contradicted,
+                touch,
+            ],
+        };
         let text = toml::to_string(&file).expect("it has a TOML form");
         assert_eq!(toml::from_str::<File>(&text).expect("it reads"), file, "{text}");
     }

@@ -1,5 +1,6 @@
 //! Accept or refuse: the held-out views decide, never the fit's own residuals.
 
+use crate::calib::baseline_comparison::BaselineComparison;
 use crate::calib::refusal::Refusal;
 use armcal_core::numeric::Outcome;
 use armcal_core::robot::Robot;
@@ -8,10 +9,14 @@ use armcal_core::robot::Robot;
 #[derive(Clone, Copy, Debug)]
 pub struct AcceptanceData {
     pub outcome: Outcome,
+    /// Steps or evaluations of the solver.
+    pub evaluations: usize,
     pub held_out_views: usize,
     pub held_out_rms_m: Option<f64>,
-    /// The same views with the datasheet's sensors.
+    /// The same views with the datasheet's sensors, and with mount and map fitted besides; `None` where the method
+    /// judges them by its own covariance, or nothing could be fitted.
     pub held_out_nominal_rms_m: Option<f64>,
+    pub baseline: Option<BaselineComparison>,
     pub fit_rms_m: f64,
     /// Wanted of the sensors that move the camera, whether these views determine them or not.
     pub n_parameters: usize,
@@ -43,16 +48,17 @@ pub fn refusal(e: &AcceptanceData) -> Option<Refusal> {
         return Some(Refusal::TooFewViews { views: e.fit_views, parameters: e.n_parameters });
     }
     if e.outcome != Outcome::Converged {
-        return Some(Refusal::NotSolved { outcome: e.outcome });
+        return Some(Refusal::NotSolved { outcome: e.outcome, evaluations: e.evaluations });
     }
     if e.held_out_views < MIN_HELD_OUT_VIEWS {
         return Some(Refusal::TooFewHeldOutViews { views: e.held_out_views, needed: MIN_HELD_OUT_VIEWS });
     }
-    let (Some(held_out_m), Some(datasheet_m)) = (e.held_out_rms_m, e.held_out_nominal_rms_m) else {
-        return Some(Refusal::NoHeldOutTag);
-    };
-    if held_out_m >= datasheet_m {
+    let Some(held_out_m) = e.held_out_rms_m else { return Some(Refusal::NoHeldOutTag) };
+    if let Some(datasheet_m) = e.held_out_nominal_rms_m.filter(|datasheet_m| held_out_m >= *datasheet_m) {
         return Some(Refusal::NoBetterThanDatasheet { held_out_m, datasheet_m });
+    }
+    if let Some(BaselineComparison { rms_m, p_value, .. }) = e.baseline.filter(|baseline| !baseline.is_beaten()) {
+        return Some(Refusal::NoBetterThanBaseline { held_out_m, baseline_m: rms_m, p_value });
     }
     if held_out_m > HARMLESS_HELD_OUT_M.max(MAX_HELD_OUT_OVER_FIT * e.fit_rms_m) {
         return Some(Refusal::Overfitted { held_out_m, fit_m: e.fit_rms_m });
@@ -72,9 +78,11 @@ mod tests {
     fn good() -> AcceptanceData {
         AcceptanceData {
             outcome: Outcome::Converged,
+            evaluations: 120,
             held_out_views: 8,
             held_out_rms_m: Some(0.004),
             held_out_nominal_rms_m: Some(0.08),
+            baseline: Some(BaselineComparison { rms_m: 0.05, ratio: 0.08, p_value: 1e-4 }),
             fit_rms_m: 0.004,
             n_parameters: 10,
             fit_views: 30,
@@ -94,6 +102,10 @@ mod tests {
             AcceptanceData { held_out_views: 2, ..good() },
             AcceptanceData { held_out_rms_m: None, ..good() },
             AcceptanceData { held_out_rms_m: Some(0.09), ..good() },
+            AcceptanceData {
+                baseline: Some(BaselineComparison { rms_m: 0.0041, ratio: 0.97, p_value: 0.2 }),
+                ..good()
+            },
             AcceptanceData { held_out_rms_m: Some(0.011), ..good() },
             AcceptanceData { predicted_tool_error_m: Some(0.03), ..good() },
             AcceptanceData { predicted_tool_error_m: Some(f64::NAN), ..good() },

@@ -37,7 +37,7 @@ pub fn chi_square_quantile(p: f64, dof: usize) -> f64 {
 }
 
 /// `ln Gamma(dof / 2)`, by the recurrence from 1 or 1/2.
-fn ln_gamma_of_half(dof: usize) -> f64 {
+pub(super) fn ln_gamma_of_half(dof: usize) -> f64 {
     let (mut at, mut value) = if dof.is_multiple_of(2) { (1.0, 0.0) } else { (0.5, 0.5 * std::f64::consts::PI.ln()) };
     while at < 0.5 * dof as f64 {
         value += f64::ln(at);

@@ -6,9 +6,11 @@
 mod bootstrap;
 mod chi_square;
 mod rng;
+mod student;
 mod summary;
 
 pub use bootstrap::{Interval, median_interval};
 pub use chi_square::{chi_square_above, chi_square_quantile};
 pub use rng::stream_rng;
+pub use student::student_t_above;
 pub use summary::{Summary, quantile};

@@ -1,6 +1,7 @@
 //! One calibration by `bundle`, step by step: estimate, diagnose, report, judge.
 
 use crate::calib::angles_by_camera::set_by_camera;
+use crate::calib::bundle::baseline::Baseline;
 use crate::calib::bundle::calibration_prior::PriorConsistency;
 use crate::calib::bundle::drawing::Drawing;
 use crate::calib::bundle::estimate::{Estimate, estimate};
@@ -17,7 +18,7 @@ use crate::calib::bundle::tables::{camera_mount_table, covariance_with_mount, ma
 use crate::calib::bundle::touch_term::TouchUpdate;
 use crate::calib::bundle::verdict::VerdictInput;
 use crate::calib::covariance::{ParameterCovariance, task_angles};
-use crate::calib::cross_validation::{FOLDS, FoldSums, fold_of};
+use crate::calib::cross_validation::{FOLDS, Fold, FoldSums, fold_of};
 use crate::calib::error::CalibError;
 use crate::calib::methods::Solution;
 use crate::calib::methods::observability::{Unobservable, grouped_names};
@@ -165,11 +166,12 @@ impl<'a> BundleCalibration<'a> {
             EstimatePurpose::Interim => &[],
         };
         let estimated = estimated.with_touches(touches, &self.data.robot);
-        self.finish(&estimated)
+        self.finish(estimated)
     }
 
-    fn finish(mut self, estimated: &Estimated<'_>) -> Result<Calibration, CalibError> {
-        let diagnosis = self.diagnose(estimated);
+    fn finish(mut self, mut estimated: Estimated<'_>) -> Result<Calibration, CalibError> {
+        let diagnosis = self.diagnose(&mut estimated);
+        let estimated = &estimated;
         self.data.data.fit.clone_from(&diagnosis.views);
         let mut calibration = self.report(estimated, &diagnosis);
         self.judge_failures_and_prior(estimated, &diagnosis, &mut calibration);
@@ -229,22 +231,23 @@ impl<'a> BundleCalibration<'a> {
     }
 
     /// Held-out figures, the arm as estimated, and the covariance of its sensors.
-    fn diagnose(&self, estimated: &Estimated<'_>) -> Diagnosis {
+    fn diagnose(&self, estimated: &mut Estimated<'_>) -> Diagnosis {
         let Estimated { setup, estimate, .. } = estimated;
         let robot = &self.data.robot;
         let without_failed = setup.without_failed(&estimate.parameters());
         let with_steps = setup.with_estimated_angles(estimate, &without_failed);
         let input = BundleInput { views: &with_steps, ..setup.input() };
         let (held_out, innovations) = match self.purpose {
-            EstimatePurpose::Final => cross_validated(&input, estimate),
+            EstimatePurpose::Final => cross_validated(&input, estimate, &setup.applied.robot),
             EstimatePurpose::Interim => (FoldSums::default().metrics(), Vec::new()),
         };
         let views = estimate.as_read_now(&with_steps);
+        estimate.widen(&innovations, &setup.input().scales);
         let parameters = estimate.joint_parameters().to_vec();
         let residual_std_rad = std::array::from_fn(|joint| match robot.sensors.get(joint) {
             // Nothing is known of a joint distal to the camera but its datasheet.
             Some(spec) if parameters.iter().all(|p| p.joint != joint) => spec.linearity_std_rad,
-            _ => estimate.scales().joint_std_rad[joint],
+            _ => estimate.residual_std_rad(joint),
         });
         let matrix = estimate.joint_covariance();
         let all = ParameterCovariance { parameters, matrix, residual_std_rad: Some(residual_std_rad) };
@@ -424,9 +427,15 @@ fn unobservable(robot: &Robot, setup: &BundleSetup, estimate: &Estimate<'_>) -> 
     missing.map(Unobservable::distal).chain(setup.unobservable()).collect()
 }
 
-/// Held-out views by what was estimated from the other folds, with the hyperparameters of all.
-fn cross_validated(input: &BundleInput<'_>, all: &Estimate<'_>) -> (HeldOutMetrics, Vec<Innovations>) {
+/// Held-out views by what was estimated from the other folds, with the hyperparameters of all; and by mount and map
+/// alone about `datasheet`.
+fn cross_validated(
+    input: &BundleInput<'_>,
+    all: &Estimate<'_>,
+    datasheet: &Robot,
+) -> (HeldOutMetrics, Vec<Innovations>) {
     let mut sums = FoldSums::default();
+    let baseline = Baseline::new(datasheet, input.views);
     let mut innovations = Vec::new();
     for fold in 0..FOLDS {
         let (fitted, mut held_out) = fold_of(input.views, fold);
@@ -446,7 +455,13 @@ fn cross_validated(input: &BundleInput<'_>, all: &Estimate<'_>) -> (HeldOutMetri
         let with_places: Vec<(usize, View)> =
             held_out.iter().enumerate().map(|(n, view)| (n * FOLDS + fold, view.clone())).collect();
         innovations.extend(found.innovations(&part, &with_places, &all.outliers));
-        sums.add(&found.as_read_now(&held_out), &as_found, &found.parameters(), input.robot);
+        sums.add(&Fold {
+            views: &found.as_read_now(&held_out),
+            as_found: &as_found,
+            at: &found.parameters(),
+            nominal: input.robot,
+            baseline: baseline.as_ref().and_then(|baseline| baseline.fit(datasheet, &fitted)).as_ref(),
+        });
     }
     (sums.metrics(), innovations)
 }

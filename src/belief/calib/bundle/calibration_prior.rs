@@ -334,5 +334,5 @@ pub fn with_mount_rows(found: &Estimate<'_>) -> Option<DMatrix<f64>> {
     let at = found.problem.layout.mount?;
     let n = found.problem.layout.n_joint();
     debug_assert_eq!(at, n);
-    Some(found.posterior.covariance.view((0, 0), (n + 6, n + 6)).into_owned())
+    Some(found.wide_covariance().view((0, 0), (n + 6, n + 6)).into_owned())
 }

@@ -149,7 +149,7 @@ fn best_ratio(gain: impl Fn(f64) -> f64) -> f64 {
 fn evidence(found: &Estimate<'_>) -> f64 {
     let rejected = found.problem.observations.iter().filter(|observation| !observation.is_used);
     let n = rejected.map(|observation| observation.data.n_coordinates()).sum::<usize>() as f64;
-    log_evidence(found) - n * (0.5 * REJECT + found.problem.scales.noise.ln())
+    log_evidence(&found.problem, &found.solved.normal) - n * (0.5 * REJECT + found.problem.scales.noise.ln())
 }
 
 impl Estimate<'_> {

@@ -3,12 +3,13 @@
 
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix6, Vector6};
 
-use crate::calib::bundle::evidence::{Posterior, change, joint_info, updated};
+use crate::calib::bundle::evidence::{Posterior, ScaleTarget, change, joint_info, updated};
 use crate::calib::bundle::input::{BundleInput, HyperparameterMode};
+use crate::calib::bundle::marginal::Marginal;
 use crate::calib::bundle::model::{Hyperparameters, Model};
 use crate::calib::bundle::outliers::{Outlier, outliers, reject};
 use crate::calib::bundle::priors::{mount_std, prior};
-use crate::calib::bundle::problem::{BundleProblem, State, WeightedMeasurement, parameters_of};
+use crate::calib::bundle::problem::{BundleProblem, ObservationTerm, State, WeightedMeasurement, parameters_of};
 use crate::calib::bundle::robust_start::{RobustStart, robust_start, straight_sensor_std};
 use crate::calib::bundle::solve::{LOOSE, Solved, TIGHT, solve, until};
 use crate::calib::parameters::{JointParameters, Parameter};
@@ -22,6 +23,10 @@ pub struct Estimate<'a> {
     pub(crate) problem: BundleProblem<'a>,
     pub(crate) solved: Solved,
     pub(crate) posterior: Posterior,
+    /// What covariances count besides, where it was asked for.
+    pub(crate) marginal: Option<Marginal>,
+    /// Whether the joints' prior is the datasheet's under the fitted scales.
+    pub(crate) has_own_priors: bool,
     /// What was estimated.
     pub model: Model,
     /// The initial guess; what has no column keeps its values, and its reference is that of the terms.
@@ -59,7 +64,7 @@ pub fn estimate<'a>(input: &BundleInput<'a>) -> Option<Estimate<'a>> {
     iterations += solved.iterations;
     reject(&mut problem, &solved);
     if input.evidence == HyperparameterMode::Given {
-        problem.scales.clone_from(&input.scales);
+        problem.set_scales(input.scales.clone());
     }
     let first = input.scales.clone();
     let mut posterior;
@@ -70,10 +75,10 @@ pub fn estimate<'a>(input: &BundleInput<'a>) -> Option<Estimate<'a>> {
         posterior = Posterior::of(&problem, &solved.normal)?;
         let mut settled = !reject(&mut problem, &solved);
         if input.evidence == HyperparameterMode::Fitted && round < MAX_ROUNDS {
-            let next = updated(&problem, &solved.state, &solved.normal, &posterior, &first);
+            let next = updated(&problem, &solved.state, &solved.normal, &posterior, &ScaleTarget::fitted(&first));
             settled &= change(&next, &problem.scales) < CONVERGED_CHANGE;
             if !settled {
-                problem.scales = next;
+                problem.set_scales(next);
                 if input.joint_prior.is_none() {
                     problem.prior.joint_info = joint_info(&problem, &problem.scales);
                     problem.prior.mount_std = mount_std(input.robot, &problem.scales);
@@ -93,6 +98,8 @@ pub fn estimate<'a>(input: &BundleInput<'a>) -> Option<Estimate<'a>> {
         problem,
         solved,
         posterior,
+        marginal: None,
+        has_own_priors: input.joint_prior.is_none(),
         model,
         guess: input.guess,
         outliers,
@@ -194,6 +201,17 @@ impl Estimate<'_> {
         &self.problem.scales
     }
 
+    /// Root mean square of the standard deviation that the corners of a view have by their frames and robot.toml, before
+    /// the fitted noise, px; `None` without corners.
+    pub(crate) fn mean_corner_std_px(&self) -> Option<f64> {
+        let variance = |observation: &ObservationTerm| match observation.data {
+            WeightedMeasurement::Corners { info, .. } if observation.is_used => Some(1.0 / info),
+            _ => None,
+        };
+        let variances: Vec<f64> = self.problem.observations.iter().filter_map(variance).collect();
+        (!variances.is_empty()).then(|| (variances.iter().sum::<f64>() / variances.len() as f64).sqrt())
+    }
+
     /// Whether positions or poses were measured in place of corners.
     #[must_use]
     pub fn has_positions(&self) -> bool {
@@ -201,6 +219,13 @@ impl Estimate<'_> {
             .observations
             .iter()
             .any(|observation| !matches!(observation.data, WeightedMeasurement::Corners { .. }))
+    }
+
+    /// Whether poses were measured in place of corners.
+    #[must_use]
+    pub fn has_poses(&self) -> bool {
+        let mut observations = self.problem.observations.iter();
+        observations.any(|observation| matches!(observation.data, WeightedMeasurement::Pose { .. }))
     }
 
     /// How much later the joint sensors' stamps are than the camera's, and one sigma; `None` where it is not estimated.
@@ -220,7 +245,7 @@ impl Estimate<'_> {
     #[must_use]
     pub fn joint_covariance(&self) -> DMatrix<f64> {
         let n = self.problem.layout.n_joint();
-        self.posterior.covariance.view((0, 0), (n, n)).into_owned()
+        self.wide_covariance().view((0, 0), (n, n)).into_owned()
     }
 
     /// `link_from_camera`, and its covariance (translation m, rotation rad, on the right); the prior's where it is not
@@ -228,7 +253,7 @@ impl Estimate<'_> {
     #[must_use]
     pub fn mount(&self) -> (Isometry3<f64>, Matrix6<f64>) {
         let covariance = match self.problem.layout.mount {
-            Some(at) => self.posterior.covariance.fixed_view::<6, 6>(at, at).into_owned(),
+            Some(at) => self.wide_covariance().fixed_view::<6, 6>(at, at).into_owned(),
             None => Matrix6::from_diagonal(&Vector6::from(self.problem.prior.mount_std.map(|std| std * std))),
         };
         (self.solved.state.mount, covariance)

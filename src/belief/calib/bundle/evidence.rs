@@ -8,10 +8,11 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 
 use crate::calib::bundle::linearize::NormalEquations;
 use crate::calib::bundle::model::{Hyperparameters, SHAPE_LENGTH};
-use crate::calib::bundle::problem::{BundleProblem, State};
+use crate::calib::bundle::problem::{BundleProblem, State, WeightedMeasurement};
 use crate::calib::bundle::schur::N_VIEW_PARAMETERS;
 use crate::calib::parameters::ParameterKind;
 use armcal_core::joints::MAX_JOINTS;
+use armcal_core::numeric::Loss;
 use armcal_core::sensor::shape_prior;
 use armcal_core::spatial::log;
 
@@ -32,7 +33,9 @@ const NU_LINK: f64 = 2.0;
 const NU_NOISE: f64 = 20.0;
 const NU_CAMERA: f64 = 6.0;
 /// Bounds of the noise's factor, and of every other scale over its first guess.
-const NOISE_BOUNDS: [f64; 2] = [0.1, 30.0];
+pub(crate) const NOISE_BOUNDS: [f64; 2] = [0.1, 30.0];
+/// Of positions and rotations over their first guess, which nobody stated.
+pub(crate) const POSITION_BOUNDS: [f64; 2] = [1e-3, 1e3];
 pub(crate) const SCALE_BOUNDS: [f64; 2] = [0.02, 50.0];
 
 impl Posterior {
@@ -71,31 +74,143 @@ impl Sums {
         self.gamma += (1.0 - variance / (std * std)).clamp(0.0, 1.0);
     }
 
-    fn std(&self, nu: f64, first: f64) -> f64 {
-        let std = ((self.squares + nu * first * first) / (self.gamma + nu)).sqrt();
+    fn std(&self, nu: f64, first: f64, moment: ScaleMoment) -> f64 {
+        let std = ((self.squares + nu * first * first) / moment.divisor(self.gamma + nu)).sqrt();
         std.clamp(first * SCALE_BOUNDS[0], first * SCALE_BOUNDS[1])
     }
 }
 
-/// The scales that `posterior` asks for; `first` are those that it all began with.
+/// Which square of a scale is taken of its inverse chi-square distribution.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum ScaleMoment {
+    /// The sum of squares over the degrees of freedom: what the evidence asks for.
+    Fitted,
+    /// The mean.
+    Mean,
+}
+
+impl ScaleMoment {
+    /// Of a sum of squares of `dof` degrees of freedom. A mean needs more than two; below four it counts as twice the
+    /// fitted square.
+    fn divisor(self, dof: f64) -> f64 {
+        match self {
+            Self::Fitted => dof,
+            Self::Mean => (dof - 2.0).max(0.5 * dof),
+        }
+    }
+}
+
+/// Where the scales began, and which squares of them are wanted.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ScaleTarget<'a> {
+    first: &'a Hyperparameters,
+    moment: ScaleMoment,
+}
+
+impl<'a> ScaleTarget<'a> {
+    pub(crate) fn fitted(first: &'a Hyperparameters) -> Self {
+        Self { first, moment: ScaleMoment::Fitted }
+    }
+
+    pub(crate) fn mean(first: &'a Hyperparameters) -> Self {
+        Self { first, moment: ScaleMoment::Mean }
+    }
+}
+
+/// The scales that `posterior` asks for.
 pub(crate) fn updated(
     problem: &BundleProblem<'_>,
     state: &State,
     normal: &NormalEquations,
     posterior: &Posterior,
-    first: &Hyperparameters,
+    target: &ScaleTarget<'_>,
 ) -> Hyperparameters {
     let mut next = problem.scales.clone();
-    update_joints(problem, state, posterior, first, &mut next);
-    update_terms(problem, state, posterior, first, &mut next);
-    update_camera_error(problem, state, posterior, first, &mut next);
-    let n_coordinates: usize = problem.observations.iter().filter(|s| s.is_used).map(|s| s.data.n_coordinates()).sum();
-    let chi2: f64 =
-        problem.observations.iter().zip(&normal.chi2).filter(|(s, _)| s.is_used).map(|(_, chi2)| chi2).sum();
-    let free = (n_coordinates as f64 - determined(problem, posterior)).max(1.0);
-    let factor = ((chi2 + NU_NOISE) / (free + NU_NOISE)).sqrt();
-    next.noise = (problem.scales.noise * factor).clamp(NOISE_BOUNDS[0], NOISE_BOUNDS[1]);
+    update_joints(problem, state, posterior, target, &mut next);
+    update_terms(problem, state, posterior, target, &mut next);
+    update_camera_error(problem, state, posterior, target, &mut next);
+    update_noise(problem, state, (normal, posterior), target, &mut next);
     next
+}
+
+/// The noise of corners; of a recording with positions or poses in their place theirs, each by itself.
+fn update_noise(
+    problem: &BundleProblem<'_>,
+    state: &State,
+    (normal, posterior): (&NormalEquations, &Posterior),
+    target: &ScaleTarget<'_>,
+    next: &mut Hyperparameters,
+) {
+    let used = || problem.observations.iter().enumerate().filter(|(_, observation)| observation.is_used);
+    let n_of = |kind: NoiseKind| used().map(|(_, observation)| kind.n_coordinates(&observation.data)).sum::<usize>();
+    let [n_positions, n_rotations] = [NoiseKind::Position, NoiseKind::Rotation].map(n_of);
+    let mut chi2: f64 = used().map(|(at, _)| normal.chi2[at]).sum();
+    let mut told = determined(problem, posterior);
+    let factor = |chi2: f64, n: usize, told: f64| {
+        let free = (n as f64 - told).max(1.0);
+        ((chi2 + NU_NOISE) / target.moment.divisor(free + NU_NOISE)).sqrt()
+    };
+    for (kind, n, now, std) in [
+        (NoiseKind::Position, n_positions, problem.scales.position_std_m, &mut next.position_std_m),
+        (NoiseKind::Rotation, n_rotations, problem.scales.rotation_std_rad, &mut next.rotation_std_rad),
+    ] {
+        if n > 0 {
+            let (own_chi2, own_told) = share_of(problem, state, normal, kind);
+            let first = kind.std(target.first);
+            *std = (now * factor(own_chi2, n, own_told)).clamp(first * POSITION_BOUNDS[0], first * POSITION_BOUNDS[1]);
+            (chi2, told) = (chi2 - own_chi2, told - own_told);
+        }
+    }
+    let n_corners = n_of(NoiseKind::Corner);
+    if n_corners > 0 {
+        let noise = problem.scales.noise * factor(chi2, n_corners, told);
+        next.noise = noise.clamp(NOISE_BOUNDS[0], NOISE_BOUNDS[1]);
+    }
+}
+
+/// What has a noise of its own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum NoiseKind {
+    Corner,
+    Position,
+    Rotation,
+}
+
+impl NoiseKind {
+    fn n_coordinates(self, data: &WeightedMeasurement) -> usize {
+        match (self, data) {
+            (Self::Corner, WeightedMeasurement::Corners { .. }) => data.n_coordinates(),
+            (Self::Position, WeightedMeasurement::Position { .. } | WeightedMeasurement::Pose { .. })
+            | (Self::Rotation, WeightedMeasurement::Pose { .. }) => 3,
+            _ => 0,
+        }
+    }
+
+    /// Of positions and rotations.
+    fn std(self, scales: &Hyperparameters) -> f64 {
+        if self == Self::Rotation { scales.rotation_std_rad } else { scales.position_std_m }
+    }
+}
+
+/// Of positions or of rotations: chi-square, and how many parameters they determine. With the information of that kind
+/// times `1 + e`, chi-square grows by `e` times its part, and `ln det` of the normal matrix, the views' own parameters
+/// with it, by `ln (1 + e)` times the parameters told.
+fn share_of(problem: &BundleProblem<'_>, state: &State, normal: &NormalEquations, kind: NoiseKind) -> (f64, f64) {
+    const STEP: f64 = 1e-3;
+    let mut stiffer = problem.clone();
+    let by = |wanted: NoiseKind| if kind == wanted { 1.0 + STEP } else { 1.0 };
+    stiffer.weigh_positions([by(NoiseKind::Position), by(NoiseKind::Rotation)]);
+    let mut other = NormalEquations::new(&stiffer);
+    other.update(&stiffer, state, Loss::Square);
+    let log_det = |normal: &NormalEquations| {
+        let of_views: f64 = normal.eliminated.iter().map(|own| own.log_ratio).sum();
+        Cholesky::new(normal.matrix.clone())
+            .map_or(f64::NAN, |f| 2.0 * f.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>() - of_views)
+    };
+    let used = problem.observations.iter().zip(other.chi2.iter().zip(&normal.chi2)).filter(|(o, _)| o.is_used);
+    let chi2 = used.map(|(_, (stiffer, chi2))| stiffer - chi2).sum::<f64>() / STEP;
+    let told = (log_det(&other) - log_det(normal)) / STEP.ln_1p();
+    (chi2.max(0.0), if told.is_finite() { told.max(0.0) } else { 0.0 })
 }
 
 /// How many parameters, the views' own among them, the data determine.
@@ -133,9 +248,10 @@ fn update_joints(
     problem: &BundleProblem<'_>,
     state: &State,
     posterior: &Posterior,
-    first: &Hyperparameters,
+    target: &ScaleTarget<'_>,
     next: &mut Hyperparameters,
 ) {
+    let ScaleTarget { first, moment } = *target;
     for joint in 0..problem.robot.n_joints() {
         let (mut sums, mut reading_var, mut n) = (Sums::default(), 0.0, 0.0);
         for (view_idx, view) in problem.views.iter().enumerate() {
@@ -149,7 +265,7 @@ fn update_joints(
         }
         if n > 0.0 {
             let reading_var = reading_var / n;
-            let total = sums.std(NU_JOINT, first.joint_std_rad[joint].hypot(reading_var.sqrt()));
+            let total = sums.std(NU_JOINT, first.joint_std_rad[joint].hypot(reading_var.sqrt()), moment);
             let least = first.joint_std_rad[joint] * SCALE_BOUNDS[0];
             next.joint_std_rad[joint] = (total * total - reading_var).max(least * least).sqrt();
         }
@@ -160,9 +276,10 @@ fn update_terms(
     problem: &BundleProblem<'_>,
     state: &State,
     posterior: &Posterior,
-    first: &Hyperparameters,
+    target: &ScaleTarget<'_>,
     next: &mut Hyperparameters,
 ) {
+    let ScaleTarget { first, moment } = *target;
     let layout = &problem.layout;
     let basis = shape_prior(SHAPE_LENGTH);
     let of_kinds = |wanted: &dyn Fn(ParameterKind) -> Option<f64>, columns: std::ops::Range<usize>, std: f64| {
@@ -181,10 +298,10 @@ fn update_terms(
     for (joint, columns) in layout.of_joint.iter().enumerate() {
         let sums = of_kinds(&shape, columns.clone(), problem.scales.shape_std_rad[joint]);
         if sums != Sums::default() {
-            next.shape_std_rad[joint] = sums.std(NU_SHAPE, first.shape_std_rad[joint]);
+            next.shape_std_rad[joint] = sums.std(NU_SHAPE, first.shape_std_rad[joint], moment);
         }
     }
-    update_links(problem, state, posterior, first, next);
+    update_links(problem, state, posterior, target, next);
     let all = 0..layout.n_joint();
     let is = |kind: ParameterKind| move |other: ParameterKind| (other == kind).then_some(1.0);
     let now = &problem.scales;
@@ -207,7 +324,7 @@ fn update_terms(
     ] {
         let sums = of_kinds(&is(kind), all.clone(), std);
         if sums != Sums::default() {
-            *next = sums.std(NU_TERM, first);
+            *next = sums.std(NU_TERM, first, moment);
         }
     }
 }
@@ -218,9 +335,10 @@ fn update_links(
     problem: &BundleProblem<'_>,
     state: &State,
     posterior: &Posterior,
-    first: &Hyperparameters,
+    target: &ScaleTarget<'_>,
     next: &mut Hyperparameters,
 ) {
+    let ScaleTarget { first, moment } = *target;
     let layout = &problem.layout;
     for (k, columns) in layout.links.clone().collect::<Vec<_>>().chunks_exact(3).enumerate() {
         let mut sums = Sums::default();
@@ -228,7 +346,7 @@ fn update_links(
             let value = state.joint[column] - problem.prior.joint_mean[column];
             sums.add(value, posterior.covariance[(column, column)], problem.scales.link_std[k / 2][k % 2]);
         }
-        next.link_std[k / 2][k % 2] = sums.std(NU_LINK, first.link_std[k / 2][k % 2]);
+        next.link_std[k / 2][k % 2] = sums.std(NU_LINK, first.link_std[k / 2][k % 2], moment);
     }
     if let (Some(at), false) = (layout.mount, layout.links.is_empty()) {
         let off = log(&problem.prior.mount.inv_mul(&state.mount));
@@ -239,7 +357,7 @@ fn update_links(
                 let unit = unit[row] / scale;
                 sums.add(off[row] / unit, posterior.covariance[(at + row, at + row)] / (unit * unit), scale);
             }
-            next.mount_scale[kind] = sums.std(NU_LINK, 1.0);
+            next.mount_scale[kind] = sums.std(NU_LINK, 1.0, moment);
         }
     }
 }
@@ -254,9 +372,10 @@ fn update_camera_error(
     problem: &BundleProblem<'_>,
     state: &State,
     posterior: &Posterior,
-    first: &Hyperparameters,
+    target: &ScaleTarget<'_>,
     next: &mut Hyperparameters,
 ) {
+    let ScaleTarget { first, moment } = *target;
     let (Some(now), Some(first)) = (problem.scales.camera_error_std, first.camera_error_std) else { return };
     let mut sums = [Sums::default(); 2];
     for (error, own) in state.camera_error.iter().zip(&posterior.own) {
@@ -265,7 +384,7 @@ fn update_camera_error(
             sums[k / 3].add(d[k], own[MAX_JOINTS + k], now[k / 3]);
         }
     }
-    next.camera_error_std = Some([0, 1].map(|k| sums[k].std(NU_CAMERA, first[k])));
+    next.camera_error_std = Some([0, 1].map(|k| sums[k].std(NU_CAMERA, first[k], moment)));
 }
 
 /// The prior's information on the joints' parameters under `scales`.
@@ -282,6 +401,8 @@ pub(crate) fn change(a: &Hyperparameters, b: &Hyperparameters) -> f64 {
     let numbers = |s: &Hyperparameters| {
         let mut all = vec![
             s.noise,
+            s.position_std_m,
+            s.rotation_std_rad,
             s.offset_std_rad_per_k,
             s.gain_std_per_k,
             s.offset_std_rad_per_mpa,

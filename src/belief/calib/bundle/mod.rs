@@ -5,6 +5,7 @@
 //! parameters eliminated, `solve` is Levenberg-Marquardt; `evidence` fits noise and prior sizes, `select` decides on
 //! doubtful terms; `estimate` is the way from a robust start to the answer.
 
+pub(crate) mod baseline;
 pub(crate) mod calibration;
 mod calibration_prior;
 mod drawing;
@@ -20,6 +21,7 @@ mod innovations;
 mod input;
 mod linearize;
 mod link_columns;
+mod marginal;
 mod model;
 mod model_selection;
 mod moved_tags;
@@ -37,6 +39,7 @@ mod setup;
 mod slips;
 pub(crate) mod slips_since;
 mod solve;
+mod stated_error;
 mod step_test;
 mod tables;
 mod tag_identity;

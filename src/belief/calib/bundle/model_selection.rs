@@ -6,11 +6,14 @@
 //! known to have (nonlinearity, temperature, play) is in from the start: its prior size is fitted, so that it costs
 //! nothing where there is none.
 
+use armcal_core::numeric::Loss;
 use nalgebra::Cholesky;
 
 use crate::calib::bundle::estimate::{Estimate, estimate};
 use crate::calib::bundle::input::BundleInput;
-use crate::calib::bundle::problem::BundleProblem;
+use crate::calib::bundle::linearize::NormalEquations;
+use crate::calib::bundle::problem::{BundleProblem, WeightedMeasurement};
+use crate::calib::bundle::solve::{TIGHT, solve};
 use crate::calib::parameters::ParameterKind;
 use crate::calib::views::view::TagMeasurement;
 
@@ -38,7 +41,7 @@ pub struct Selection {
 
 const MIN_GAIN_NATS: f64 = 3.0;
 /// First guess of the error of positions by SLAM: translation m, rotation rad (assumed; the evidence fits both).
-const CAMERA_ERROR_STD: [f64; 2] = [0.005, 0.01];
+pub(crate) const CAMERA_ERROR_STD: [f64; 2] = [0.005, 0.01];
 /// Sessions shorter than this do not drift, h.
 const MIN_SESSION_H: f64 = 0.2;
 /// Slower joints have no clock to tell, rad/s.
@@ -53,7 +56,7 @@ pub fn select_model<'a>(input: &BundleInput<'a>) -> Option<(Estimate<'a>, Vec<Se
     for term in candidates(input) {
         let wider = with(&best_input, term);
         let Some(found) = estimate(&wider) else { continue };
-        let gain_nats = log_evidence(&found) - log_evidence(&best);
+        let gain_nats = evidence_gain_nats(&found, &best);
         let is_in = gain_nats > MIN_GAIN_NATS;
         selections.push(Selection { term, is_in, gain_nats });
         if is_in {
@@ -101,9 +104,27 @@ fn with<'a>(input: &BundleInput<'a>, term: OptionalTerm) -> BundleInput<'a> {
     wider
 }
 
+/// Natural logarithm of the evidence of `wider` over that of `other`, two models of the same views, on the observations
+/// that both use: one that rejects more has less to explain.
+pub(crate) fn evidence_gain_nats(wider: &Estimate<'_>, other: &Estimate<'_>) -> f64 {
+    let observations = wider.problem.observations.iter().zip(&other.problem.observations);
+    let shared: Vec<bool> = observations.map(|(a, b)| a.is_used && b.is_used).collect();
+    log_evidence_on(wider, &shared) - log_evidence_on(other, &shared)
+}
+
+/// With the scales of `found` and the observations that are `used`.
+fn log_evidence_on(found: &Estimate<'_>, used: &[bool]) -> f64 {
+    if found.problem.observations.iter().zip(used).all(|(observation, used)| observation.is_used == *used) {
+        return log_evidence(&found.problem, &found.solved.normal);
+    }
+    let mut problem = found.problem.clone();
+    problem.observations.iter_mut().zip(used).for_each(|(observation, used)| observation.is_used = *used);
+    let solved = solve(&problem, found.solved.state.clone(), Loss::Square, TIGHT);
+    log_evidence(&problem, &solved.normal)
+}
+
 /// Up to what all models of the same data share.
-pub(crate) fn log_evidence(found: &Estimate<'_>) -> f64 {
-    let (problem, normal) = (&found.problem, &found.solved.normal);
+pub(crate) fn log_evidence(problem: &BundleProblem<'_>, normal: &NormalEquations) -> f64 {
     let log_det = |matrix: &nalgebra::DMatrix<f64>| {
         Cholesky::new(matrix.clone()).map(|f| 2.0 * f.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>())
     };
@@ -113,8 +134,17 @@ pub(crate) fn log_evidence(found: &Estimate<'_>) -> f64 {
         - 2.0 * problem.layout.lens.map_or(0.0, |_| log_sum(&problem.prior.lens_std))
         - 2.0 * problem.layout.mount.map_or(0.0, |_| log_sum(&problem.prior.mount_std));
     let of_views: f64 = normal.eliminated.iter().map(|own| own.log_ratio).sum();
-    let n: usize = problem.observations.iter().filter(|s| s.is_used).map(|s| s.data.n_coordinates()).sum();
-    0.5 * (of_prior - of_normal + of_views - normal.cost) - n as f64 * problem.scales.noise.ln()
+    let log_noise = |data: &WeightedMeasurement| {
+        let [position, rotation] = [problem.scales.position_std_m, problem.scales.rotation_std_rad].map(f64::ln);
+        match data {
+            WeightedMeasurement::Corners { .. } => data.n_coordinates() as f64 * problem.scales.noise.ln(),
+            WeightedMeasurement::Position { .. } => 3.0 * position,
+            WeightedMeasurement::Pose { .. } => 3.0 * (position + rotation),
+        }
+    };
+    let used = problem.observations.iter().filter(|observation| observation.is_used);
+    let of_noise: f64 = used.map(|observation| log_noise(&observation.data)).sum();
+    0.5 * (of_prior - of_normal + of_views - normal.cost) - of_noise
 }
 
 fn log_sum(std: &[f64]) -> f64 {

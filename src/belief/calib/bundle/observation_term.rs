@@ -63,7 +63,7 @@ pub(crate) fn right_jacobian_inverse(d: &Vector6<f64>) -> Matrix6<f64> {
 }
 
 impl PoseInformation {
-    /// Linearizes; `noise` multiplies all standard deviations. Adds the lens's part to `by_lens` where that is wanted.
+    /// Linearizes; `noise` multiplies the corners' standard deviations. Adds the lens's part to `by_lens` where that is wanted.
     /// `None` where a corner is beyond the lens's view.
     pub(crate) fn of(
         seen: &WeightedMeasurement,
@@ -79,10 +79,10 @@ impl PoseInformation {
                 of_corners(&corners, camera_from_tag, lens, by_lens)
             }
             WeightedMeasurement::Position { in_camera_m, info } => {
-                Some(of_position(in_camera_m, info * scale, camera_from_tag))
+                Some(of_position(in_camera_m, *info, camera_from_tag))
             }
             WeightedMeasurement::Pose { tag_from_camera, info_position, info_rotation } => {
-                Some(of_pose(tag_from_camera, info_position * scale, info_rotation * scale, camera_from_tag))
+                Some(of_pose(tag_from_camera, *info_position, *info_rotation, camera_from_tag))
             }
         }
     }

@@ -215,6 +215,27 @@ impl<'a> BundleProblem<'a> {
         Self { robot, layout, views: data, observations, prior, scales, guess_links, n_camera_joints }
     }
 
+    /// Takes `scales` over, with the weights that depend on them.
+    pub(crate) fn set_scales(&mut self, scales: Hyperparameters) {
+        self.scales = scales;
+        self.weigh_positions([1.0; 2]);
+    }
+
+    /// Weighs positions and rotations, other than corners, by the scales, each times its `factor`.
+    pub(crate) fn weigh_positions(&mut self, factor: [f64; 2]) {
+        let position = factor[0] * self.scales.position_std_m.powi(-2);
+        let rotation = factor[1] * self.scales.rotation_std_rad.powi(-2);
+        for observation in &mut self.observations {
+            match &mut observation.data {
+                WeightedMeasurement::Corners { .. } => {}
+                WeightedMeasurement::Position { info, .. } => *info = position,
+                WeightedMeasurement::Pose { info_position, info_rotation, .. } => {
+                    (*info_position, *info_rotation) = (position, rotation);
+                }
+            }
+        }
+    }
+
     /// The state where nothing is off its prior, but for the joints' parameters, which are `guess`'s.
     pub(crate) fn start(&self, guess: &JointParameters) -> State {
         let parameters = &self.layout.parameters;

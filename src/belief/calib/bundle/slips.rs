@@ -101,7 +101,8 @@ impl FailureSearch<'_> {
 /// A rejected observation costs what it would at the limit, so that estimates that reject others compare.
 pub(crate) fn log_evidence_of_all(found: &Estimate<'_>) -> f64 {
     let rejected = found.problem.observations.iter().filter(|observation| !observation.is_used);
-    log_evidence(found) - 0.5 * rejected.map(|observation| rejection_chi2(&observation.data)).sum::<f64>()
+    log_evidence(&found.problem, &found.solved.normal)
+        - 0.5 * rejected.map(|observation| rejection_chi2(&observation.data)).sum::<f64>()
 }
 
 impl Estimate<'_> {

@@ -26,7 +26,9 @@ pub(crate) fn model_table(robot: &Robot, found: &Estimate<'_>, selections: &[Sel
         |s: &Selection| format!("{}: {}, {:+.1} nats", name(s.term), if s.is_in { "in" } else { "out" }, s.gain_nats);
     ModelTable {
         noise_scale: scales.noise,
-        position_std_m: found.has_positions().then_some(scales.noise * scales.position_std_m),
+        position_std_m: found.has_positions().then_some(scales.position_std_m),
+        rotation_std_rad: found.has_poses().then_some(scales.rotation_std_rad),
+        variance_factor: found.marginal.as_ref().map(|marginal| marginal.factor),
         camera_error_std: scales.camera_error_std,
         time_offset_s: found.time_offset_s(),
         nonlinearity_std_rad: scales.shape_std_rad[..n_estimated.min(robot.n_joints())].to_vec(),

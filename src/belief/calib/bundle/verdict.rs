@@ -1,21 +1,26 @@
 //! Whether joint sensors explain the data of a calibration by `bundle`: score test of the link geometry, size of the
 //! sensors' errors, outliers, and innovations of held-out views.
 
+use crate::calib::baseline_comparison::SIGNIFICANCE;
 use crate::calib::bundle::estimate::Estimate;
+use crate::calib::bundle::evidence::{NOISE_BOUNDS, POSITION_BOUNDS, SCALE_BOUNDS};
 use crate::calib::bundle::innovations::{Innovations, JointInnovation};
 use crate::calib::bundle::input::BundleInput;
+use crate::calib::bundle::model::Hyperparameters;
+use crate::calib::bundle::model_selection::CAMERA_ERROR_STD;
 use crate::calib::bundle::observability::{Observability, observability};
 use crate::calib::bundle::score_test::{GeometryElement, ScoreTestResult};
 use crate::calib::covariance::task_angles;
 use crate::calib::finding::{Finding, FindingKind, FindingUnit};
 use crate::calib::geometry_error::{ErrorKind, GeometryError};
-use crate::calib::parameters::ParameterKind;
+use crate::calib::parameters::{Parameter, ParameterKind};
 use crate::calib::refusal::{InnovationQuantity, Refusal};
 use crate::calib::result::calibration::Calibration;
 use crate::calib::result::validity::not_covered;
 use crate::calib::result::verdict_tables::{Check, ObservabilityTable, VerdictTable};
 use armcal_core::joints::JointAngles;
 use armcal_core::robot::Robot;
+use armcal_core::sensor::ConditionChange;
 use armcal_core::stats::chi_square_quantile;
 use armcal_core::streams::ReachTask;
 
@@ -36,9 +41,19 @@ const WORTH_M: f64 = 0.004;
 /// A joint's error from view to view over its datasheet's linearity: sensors do not have more, after what is smooth is
 /// taken off.
 const MAX_OVER_LINEARITY: f64 = 3.0;
+/// Nonlinearity over the datasheet's above which a sensor is called worn, and above which it is no such sensor any more.
+const WORN: f64 = 3.0;
+const MAX_NONLINEARITY: f64 = 10.0;
+/// Noise over the stated one above which something is not as stated: a warning.
+const NOISY: f64 = 2.0;
+/// Corners averaged over a view may be off by so many times what robot.toml says of one frame: averages are better than
+/// one frame, and what lenses and printed tags lack stays below it.
+const MAX_OVER_CORNER_NOISE: f64 = 3.0;
 /// Gains and offsets farther from the datasheet than this are no calibration any more; the paper's methods stop there,
 /// too.
 const MAX_SIGMAS_OFF: f64 = 6.0;
+/// Sensors that move the tool by more than this many times its predicted error claim more than chance.
+const MAX_UNCONFIRMED: f64 = 3.0;
 /// Share of the tag observations that may be outliers.
 const MAX_OUTLIERS: f64 = 0.25;
 /// Over chi-square's quantile, for pixel noise has longer tails than a normal one and the tags' corners common errors.
@@ -61,12 +76,16 @@ impl VerdictInput<'_> {
         let mut table = VerdictTable { warnings: Vec::new(), not_covered: Vec::new(), checks: Vec::new() };
         let refusals = [
             self.geometry(&configurations, calibration, &mut table),
+            self.baseline(&configurations, calibration, &mut table),
             self.sensors(calibration, &mut table),
+            self.nonlinearity(calibration, &mut table),
+            self.corner_noise(&mut table),
             self.beyond_datasheet(&mut table),
             self.outliers(calibration, &mut table),
             self.innovations(&mut table),
         ];
         self.whiteness(&mut table);
+        table.warnings.extend(self.scales_at_bounds());
         table.not_covered = not_covered(calibration, &targets);
         if self.has_unseen_links() {
             table.warnings.push(UNSEEN_LINKS.to_owned());
@@ -93,7 +112,13 @@ impl VerdictInput<'_> {
             results.retain(|result| result.element != GeometryElement::Joint(0));
         }
         let false_alarm = FALSE_ALARM / results.len().max(1) as f64;
-        let worth_m = calibration.predicted_tool_error_m.map_or(WORTH_M, |p| p.median.min(WORTH_M));
+        // What the model fails to explain inflates the predicted error: the stated figures bound it.
+        let predicted_m = calibration.predicted_tool_error_m.map(|p| {
+            self.found
+                .stated_tool_error_m(self.input, configurations)
+                .map_or(p.median, |stated_m| stated_m.min(p.median))
+        });
+        let worth_m = predicted_m.map_or(WORTH_M, |predicted_m| predicted_m.min(WORTH_M));
         let mut refusal = None;
         for result in &results {
             let limit = chi_square_quantile(1.0 - false_alarm, result.dof);
@@ -114,13 +139,68 @@ impl VerdictInput<'_> {
         refusal
     }
 
+    /// Whether the views confirm what the sensors are changed by: held-out views fit better than with mount and map
+    /// alone, or the change is no larger than the predicted error.
+    fn baseline(
+        &self,
+        configurations: &[JointAngles],
+        calibration: &Calibration,
+        table: &mut VerdictTable,
+    ) -> Option<Refusal> {
+        let (held_out_m, baseline) = calibration.held_out.rms_m.zip(calibration.held_out.baseline)?;
+        let change = self.change_at_tool(configurations)?;
+        table.checks.push(Check {
+            what: "held out against mount and map alone: probability that it is no better".to_owned(),
+            value: baseline.p_value,
+            limit: SIGNIFICANCE,
+            holds: baseline.is_beaten(),
+        });
+        if baseline.is_beaten() {
+            return None;
+        }
+        let check = Check::at_most("change at the tool over its predicted error", change, MAX_UNCONFIRMED);
+        let refusal =
+            Refusal::NoBetterThanBaseline { held_out_m, baseline_m: baseline.rms_m, p_value: baseline.p_value };
+        let is_confirmed = check.holds;
+        table.checks.push(check);
+        if !is_confirmed {
+            return Some(refusal);
+        }
+        table.warnings.push(format!(
+            "the datasheet's sensors explain the held-out views as well: {:.1} mm once mount and map are fitted, {:.1} \
+             mm with sensors calibrated; they need no calibration that these views could show",
+            1e3 * baseline.rms_m,
+            1e3 * held_out_m
+        ));
+        None
+    }
+
+    /// How far the estimated sensors move the tool from where the datasheet has it at the same readings, over the error
+    /// predicted by the stated figures; root mean squares over the configurations.
+    fn change_at_tool(&self, configurations: &[JointAngles]) -> Option<f64> {
+        let robot = self.input.robot;
+        let covariance = self.found.stated_covariance(self.input)?;
+        let sensors = self.found.parameters().sensors(robot);
+        let tool = |angles: &JointAngles| robot.chain.link_poses(angles).frame(&robot.tool.mount).translation.vector;
+        let (mut moved_m2, mut predicted_m2) = (0.0, 0.0);
+        for angles in configurations {
+            let by_datasheet = JointAngles::from_fn(angles.len(), |j| {
+                robot.sensors[j].center_rad + sensors.models[j].travel_under_rad(angles[j], &ConditionChange::default())
+            });
+            moved_m2 += (tool(angles) - tool(&by_datasheet)).norm_squared();
+            predicted_m2 += covariance.tool_position_m2(robot, &sensors, angles).trace().max(0.0);
+        }
+        Some((moved_m2 / predicted_m2).sqrt())
+    }
+
     /// Whether the joints' errors are those of such sensors.
     fn sensors(&self, calibration: &mut Calibration, table: &mut VerdictTable) -> Option<Refusal> {
         let robot = self.input.robot;
+        let stated = Hyperparameters::datasheet(robot);
         let mut refusal = None;
         for (joint, spec) in robot.sensors.iter().enumerate().take(robot.camera.mount.n_joints) {
             let std_rad = self.found.scales().joint_std_rad[joint];
-            let limit_rad = MAX_OVER_LINEARITY * spec.linearity_std_rad.max(self.input.scales.joint_std_rad[joint]);
+            let limit_rad = MAX_OVER_LINEARITY * spec.linearity_std_rad.max(stated.joint_std_rad[joint]);
             let check = Check::at_most(format!("{}: error from view to view, rad", spec.joint), std_rad, limit_rad);
             if !check.holds && self.found.has_positions() {
                 // Their noise has no datasheet, and one landmark a view cannot part it from the joints' errors.
@@ -135,6 +215,58 @@ impl VerdictInput<'_> {
             }
             table.checks.push(check);
         }
+        refusal
+    }
+
+    /// Whether what is not straight in the sensors is what their datasheets allow; it is estimated, up to a limit.
+    fn nonlinearity(&self, calibration: &mut Calibration, table: &mut VerdictTable) -> Option<Refusal> {
+        let robot = self.input.robot;
+        let mut refusal = None;
+        for (joint, spec) in robot.sensors.iter().enumerate() {
+            let is_shape = |p: &Parameter| p.joint == joint && matches!(p.kind, ParameterKind::Shape(_));
+            if !self.found.joint_parameters().iter().any(is_shape) {
+                continue;
+            }
+            let (std_rad, datasheet_std_rad) = (self.found.scales().shape_std_rad[joint], spec.linearity_std_rad);
+            let what = format!("{}: nonlinearity over its datasheet's", spec.joint);
+            let check = Check::at_most(what, std_rad / datasheet_std_rad, WORN);
+            let is_refused = check.value > MAX_NONLINEARITY && !self.found.has_positions();
+            if !check.holds {
+                calibration.findings.push(Finding { repaired: !is_refused, ..worn(&spec.joint, std_rad) });
+                table.warnings.push(format!(
+                    "{} is worn: its nonlinearity is {:.2} deg, {:.1} times its datasheet's; estimated with the rest",
+                    spec.joint,
+                    std_rad.to_degrees(),
+                    check.value
+                ));
+            }
+            if is_refused && refusal.is_none() {
+                let joint = spec.joint.clone();
+                refusal = Some(Refusal::Nonlinearity { joint, std_rad, datasheet_std_rad });
+            }
+            table.checks.push(check);
+        }
+        refusal
+    }
+
+    /// Whether corners are as far off as robot.toml says: the fitted noise would hide what the model lacks.
+    fn corner_noise(&self, table: &mut VerdictTable) -> Option<Refusal> {
+        let stated_px = self.input.robot.camera.corner_std_px;
+        let mean_px = self.found.mean_corner_std_px()?;
+        let noise = self.found.scales().noise;
+        let check = Check::at_most("corners: noise over what frames and robot.toml say", noise, NOISY);
+        if !check.holds {
+            table.warnings.push(format!(
+                "corners are {noise:.1} times as far off as frames and robot.toml say: lens, tag sizes or map are not \
+                 as stated, or the corner noise ({stated_px:.2} px) is"
+            ));
+        }
+        table.checks.push(check);
+        let limit_px = MAX_OVER_CORNER_NOISE * stated_px;
+        let check = Check::at_most("corners averaged over a view: residual, px", noise * mean_px, limit_px);
+        let residual_px = check.value;
+        let refusal = (!check.holds).then_some(Refusal::CornerNoise { residual_px, stated_px, limit_px });
+        table.checks.push(check);
         refusal
     }
 
@@ -233,6 +365,39 @@ impl VerdictInput<'_> {
                 table.checks.push(check);
             }
         }
+    }
+
+    /// Fitted sizes that the data would have beyond their bounds.
+    fn scales_at_bounds(&self) -> Vec<String> {
+        const NEAR: f64 = 1e-6;
+        let (robot, now, first) = (self.input.robot, self.found.scales(), &self.input.scales);
+        let mut all = vec![("noise of corners".to_owned(), now.noise, 1.0, NOISE_BOUNDS)];
+        if self.found.has_positions() {
+            all[0] = ("noise of positions, m".to_owned(), now.position_std_m, first.position_std_m, POSITION_BOUNDS);
+        }
+        if self.found.has_poses() {
+            let (now, first) = (now.rotation_std_rad, first.rotation_std_rad);
+            all.push(("noise of rotations, rad".to_owned(), now, first, POSITION_BOUNDS));
+        }
+        // Small sizes are harmless: what is not there needs none.
+        let above = [0.0, SCALE_BOUNDS[1]];
+        for (joint, spec) in robot.sensors.iter().enumerate().take(robot.camera.mount.n_joints) {
+            let (now_rad, first_rad) = (now.joint_std_rad[joint], first.joint_std_rad[joint]);
+            all.push((format!("{}: error from view to view, rad", spec.joint), now_rad, first_rad, above));
+            let (now_rad, first_rad) = (now.shape_std_rad[joint], first.shape_std_rad[joint]);
+            all.push((format!("{}: nonlinearity, rad", spec.joint), now_rad, first_rad, above));
+        }
+        for (k, name) in ["m", "rad"].into_iter().enumerate() {
+            if let Some(now) = now.camera_error_std {
+                let first = first.camera_error_std.unwrap_or(CAMERA_ERROR_STD);
+                all.push((format!("camera error shared by a view, {name}"), now[k], first[k], above));
+            }
+        }
+        let is_at_bound = |(_, now, first, [low, high]): &(String, f64, f64, [f64; 2])| {
+            *now <= first * low * (1.0 + NEAR) || *now >= first * high * (1.0 - NEAR)
+        };
+        let beyond = all.into_iter().filter(is_at_bound);
+        beyond.map(|(what, now, ..)| format!("{what}: fitted to {now:.2e}, the bound of what is fitted")).collect()
     }
 
     /// Links between camera and tool that no tag shows.

@@ -2,8 +2,9 @@
 
 use nalgebra::DMatrix;
 
+use crate::calib::bundle::baseline::Baseline;
 use crate::calib::covariance::{CommonErrors, ParameterCovariance, linearity_scale, predict_tool_error};
-use crate::calib::cross_validation::cross_validate;
+use crate::calib::cross_validation::{compared, cross_validate};
 use crate::calib::error::CalibError;
 use crate::calib::methods::gripper_tag::{MountEstimate, mount_by_gripper_tag};
 use crate::calib::methods::minimum_distance::minimum_distance;
@@ -16,8 +17,10 @@ use crate::calib::result::assemble::{Evidence, Fit, Provenance, assemble, held_o
 use crate::calib::result::calibration::Calibration;
 use crate::calib::result::camera_mount::CameraMount;
 use crate::calib::result::map_table::MapResult;
+use crate::calib::result::metrics::HeldOutMetrics;
 use crate::calib::tag_mapping::map_unknown_tags;
 use crate::calib::views::calibration_data::{CalibrationData, HeldOut};
+use crate::calib::views::view::View;
 use armcal_core::robot::Robot;
 use armcal_core::routine::Method;
 
@@ -57,14 +60,7 @@ pub(crate) fn calibrate_positions(
     let Solved { solution, covariance, .. } = solved;
     let held_out_problem = PositionProblem::new(&start.robot, &data.data.held_out);
     let linearity_scale = linearity_scale(&problem, &held_out_problem, &solution.parameters, free.len());
-    let held_out = match data.held_out {
-        HeldOut::AsMarked => held_out_metrics(&held_out_problem, &solution.parameters),
-        HeldOut::CrossValidation => cross_validate(&start.robot, &data.data.fit, |views| {
-            let mut free = free.clone();
-            let part = PositionProblem::new(&start.robot, views);
-            solve(method, &part, &mut free, &start).map(|solved| solved.solution.parameters)
-        }),
-    };
+    let held_out = held_out(&data, method, &start, (&free, &solution.parameters));
     let as_found = start.robot.clone().with_linearity(linearity_scale);
     let predicted = predict_tool_error(&as_found, &solution.parameters, &covariance, data.data.task.as_ref());
     let source = Provenance {
@@ -84,6 +80,33 @@ pub(crate) fn calibrate_positions(
         map: start.map,
         ..calibration
     })
+}
+
+/// Held-out views by `at`, the calibration of `free`, and by mount and map alone.
+fn held_out(
+    data: &CalibrationData,
+    method: Method,
+    start: &Start,
+    (free, at): (&[Parameter], &JointParameters),
+) -> HeldOutMetrics {
+    let views = &data.data.fit;
+    let baseline = Baseline::new(&start.robot, views);
+    let by_baseline = |views: &[View]| baseline.as_ref().and_then(|baseline| baseline.fit(&start.robot, views));
+    match data.held_out {
+        HeldOut::AsMarked => {
+            let held_out = &data.data.held_out;
+            let problem = PositionProblem::new(&start.robot, held_out);
+            let compare = |robot: Robot| compared(&problem, at, &PositionProblem::new(&robot, held_out));
+            HeldOutMetrics { baseline: by_baseline(views).and_then(compare), ..held_out_metrics(&problem, at) }
+        }
+        HeldOut::CrossValidation => {
+            let fit = |views: &[View]| {
+                let part = PositionProblem::new(&start.robot, views);
+                solve(method, &part, &mut free.to_vec(), start).map(|solved| solved.solution.parameters)
+            };
+            cross_validate(&start.robot, views, fit, by_baseline)
+        }
+    }
 }
 
 fn start(data: &mut CalibrationData, prior: Option<&Calibration>) -> Result<Start, CalibError> {

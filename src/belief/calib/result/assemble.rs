@@ -53,11 +53,15 @@ pub(crate) fn assemble(source: &Provenance<'_>, fit: &Fit<'_>, evidence: Evidenc
     let at = &fit.solution.parameters;
     let metrics = fit_metrics(source, fit);
     let Evidence { held_out, predicted_tool_error_m, n_parameters } = evidence;
+    // `bundle` knows how sure its parameters are, and judges by that whether they must be better.
+    let must_improve = source.method != Method::Bundle;
     let refusals: Vec<_> = refusal(&AcceptanceData {
         outcome: fit.solution.outcome,
+        evaluations: fit.solution.evaluations,
         held_out_views: held_out.views,
         held_out_rms_m: held_out.rms_m,
-        held_out_nominal_rms_m: held_out.nominal_rms_m,
+        held_out_nominal_rms_m: held_out.nominal_rms_m.filter(|_| must_improve),
+        baseline: held_out.baseline.filter(|_| must_improve),
         fit_rms_m: metrics.rms_m,
         n_parameters,
         fit_views: metrics.views,
@@ -130,6 +134,7 @@ pub(crate) fn held_out_metrics(problem: &PositionProblem<'_>, at: &JointParamete
         rms_m: problem.rms_m(at),
         rms_px: problem.reprojection_rms_px(at),
         nominal_rms_m: problem.rms_m(&JointParameters::default()),
+        baseline: None,
     }
 }
 

@@ -31,6 +31,7 @@ pub(in crate::calib) fn bare(robot: &str, method: Method) -> Calibration {
             camera_mean_m: None,
             rms_px: None,
             nominal_rms_m: None,
+            baseline: None,
         },
         predicted_tool_error_m: None,
         predicted_tool_error_with_priors_m: None,

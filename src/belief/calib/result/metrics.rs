@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use crate::calib::baseline_comparison::BaselineComparison;
 use armcal_core::numeric::Outcome;
 use serde::{Deserialize, Serialize};
 
@@ -64,4 +65,7 @@ pub struct HeldOutMetrics {
     /// The same views with the datasheet's sensors.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub nominal_rms_m: Option<f64>,
+    /// The same views by mount and map alone, fitted to the same views as the calibration.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub baseline: Option<BaselineComparison>,
 }

@@ -11,6 +11,12 @@ pub struct ModelTable {
     /// Positions or poses that a recording gave in place of corners: their noise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub position_std_m: Option<f64>,
+    /// The same of poses' rotations.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rotation_std_rad: Option<f64>,
+    /// All variances are multiplied by it, for held-out cameras were farther off than predicted.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub variance_factor: Option<f64>,
     /// The error of the camera's pose that all tags of a view share: translation m, rotation rad.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera_error_std: Option<[f64; 2]>,

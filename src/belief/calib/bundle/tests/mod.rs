@@ -1,5 +1,6 @@
 //! On data of the estimator's own model: the equations against differences, the estimate against its bound.
 
+mod baseline;
 mod calibration_prior;
 mod data;
 mod drawing;
@@ -8,7 +9,7 @@ mod failures;
 mod moved_tags;
 mod reservations;
 mod score_test;
-
 mod slips;
+mod small_samples;
 mod statistics;
 mod touches;

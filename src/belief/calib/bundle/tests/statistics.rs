@@ -79,7 +79,7 @@ fn task(robot: &Robot, rng: &mut ChaCha8Rng) -> Vec<JointAngles> {
     (0..12).map(|_| JointAngles::from_fn(robot.n_joints(), |j| travel(j, rng))).collect()
 }
 
-fn tool(robot: &Robot, parameters: &JointParameters, travel: &JointAngles) -> nalgebra::Vector3<f64> {
+pub(super) fn tool(robot: &Robot, parameters: &JointParameters, travel: &JointAngles) -> nalgebra::Vector3<f64> {
     let still = ConditionChange::default();
     let angles = JointAngles::from_fn(robot.n_joints(), |j| {
         parameters.correction(j).angle_rad(&robot.sensors[j], travel[j], &still, 0.0)
@@ -88,16 +88,21 @@ fn tool(robot: &Robot, parameters: &JointParameters, travel: &JointAngles) -> na
 }
 
 /// d(tool)/d(joint parameter), at the truth.
-fn tool_jacobian(case: &Case<'_>, parameters: &[Parameter], travel: &JointAngles) -> DMatrix<f64> {
+pub(super) fn tool_jacobian(
+    robot: &Robot,
+    truth: &Truth,
+    parameters: &[Parameter],
+    travel: &JointAngles,
+) -> DMatrix<f64> {
     let still = ConditionChange::default();
-    let angles = JointAngles::from_fn(case.robot.n_joints(), |j| {
-        case.truth.parameters.correction(j).angle_rad(&case.robot.sensors[j], travel[j], &still, 0.0)
+    let angles = JointAngles::from_fn(robot.n_joints(), |j| {
+        truth.parameters.correction(j).angle_rad(&robot.sensors[j], travel[j], &still, 0.0)
     });
-    let poses = case.robot.chain.link_poses(&angles);
-    let tool = poses.frame(&case.robot.tool.mount).translation.vector;
+    let poses = robot.chain.link_poses(&angles);
+    let tool = poses.frame(&robot.tool.mount).translation.vector;
     let mut out = DMatrix::zeros(3, parameters.len());
     for (column, p) in parameters.iter().enumerate() {
-        let by = p.kind.angle_derivative(&case.robot.sensors[p.joint], travel[p.joint], &still, 0.0);
+        let by = p.kind.angle_derivative(&robot.sensors[p.joint], travel[p.joint], &still, 0.0);
         out.set_column(column, &(poses.point_jacobian(p.joint, &tool) * by));
     }
     out
@@ -146,7 +151,7 @@ fn tally(robot: &Robot, seeds: std::ops::Range<u64>, n_views: usize) -> Tally {
         let mut nees = 0.0;
         let travels = task(robot, &mut rng);
         for travel in &travels {
-            let jacobian = tool_jacobian(&case, parameters, travel);
+            let jacobian = tool_jacobian(robot, &case.truth, parameters, travel);
             let error = tool(robot, &at, travel) - tool(robot, &case.truth.parameters, travel);
             let three = |c: &DMatrix<f64>| -> Matrix3<f64> {
                 (&jacobian * c * jacobian.transpose()).fixed_view::<3, 3>(0, 0).into_owned()
@@ -226,7 +231,7 @@ fn two_calibrations_from_disjoint_views_agree() {
         let covariance = covariance.view((0, 0), (joints, joints)).into_owned();
         let mut rng = rng(seed, "task");
         for travel in task(&robot, &mut rng) {
-            let jacobian = tool_jacobian(&case, a.joint_parameters(), &travel);
+            let jacobian = tool_jacobian(&robot, &case.truth, a.joint_parameters(), &travel);
             let difference = tool(&robot, &a.parameters(), &travel) - tool(&robot, &b.parameters(), &travel);
             let three: Matrix3<f64> =
                 (&jacobian * &covariance * jacobian.transpose()).fixed_view::<3, 3>(0, 0).into_owned();

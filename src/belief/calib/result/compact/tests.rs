@@ -72,6 +72,7 @@ fn calibration(robot: &str, joints: &[Joint], refusal: Option<Refusal>) -> Calib
             rms_m: Some(0.01),
             rms_px: Some(2.6),
             nominal_rms_m: Some(0.2),
+            baseline: None,
         },
         predicted_tool_error_m: Some(Summary { n: 4, median: 0.005_879_45, p95: 0.006_070_3, max: 0.006_085 }),
         valid: ValidRange { time_nanos: 1_767_225_749_230_000_000, oil_c: None, water_c: None, pressure_pa: None },
@@ -140,12 +141,16 @@ fn what_is_not_finite_is_unknown_or_refused() {
 /// Each reason that the verdict can give has a code of its own.
 #[test]
 fn every_refusal_has_a_code() {
+    use crate::calib::baseline_comparison::BaselineComparison;
     use crate::calib::refusal_conditions::{AcceptanceData, refusal};
+    let by_chance = |p_value| BaselineComparison { rms_m: 0.05, ratio: 0.08, p_value };
     let good = AcceptanceData {
         outcome: Outcome::Converged,
+        evaluations: 120,
         held_out_views: 8,
         held_out_rms_m: Some(0.004),
         held_out_nominal_rms_m: Some(0.08),
+        baseline: Some(by_chance(1e-4)),
         fit_rms_m: 0.004,
         n_parameters: 10,
         fit_views: 30,
@@ -158,6 +163,7 @@ fn every_refusal_has_a_code() {
         (AcceptanceData { held_out_views: 2, ..good }, "few_held_out"),
         (AcceptanceData { held_out_rms_m: None, ..good }, "no_held_out"),
         (AcceptanceData { held_out_rms_m: Some(0.09), ..good }, "no_better"),
+        (AcceptanceData { baseline: Some(by_chance(0.2)), ..good }, "no_better"),
         (AcceptanceData { held_out_rms_m: Some(0.011), ..good }, "overfitted"),
         (AcceptanceData { predicted_tool_error_m: Some(0.03), ..good }, "tool_error"),
     ];

@@ -1,0 +1,113 @@
+//! Calibrations against mount and map alone.
+
+use rand::seq::SliceRandom;
+
+use crate::calib::bundle::model::{Hyperparameters, model_for};
+use crate::calib::bundle::tests::data::{Noise, Truth, rng, titan, views};
+use crate::calib::calibrate_data;
+use crate::calib::parameters::JointParameters;
+use crate::calib::refusal::Refusal;
+use crate::calib::result::calibration::{Calibration, Status};
+use crate::calib::views::calibration_data::{CalibrationData, HeldOut};
+use crate::calib::views::view::CaptureData;
+use armcal_core::routine::Method;
+
+const SEEDS: std::ops::Range<u64> = 7000..7020;
+/// Of those, one whose estimate no other test finds fault with where the readings are shuffled.
+const SHUFFLED_SEED: u64 = 7013;
+const N_VIEWS: usize = 25;
+
+/// What the sensors of an arm are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Sensors {
+    AsDrawn,
+    /// Within the datasheet's sigmas.
+    OutOfCalibration,
+    /// The readings belong to other views.
+    Shuffled,
+}
+
+fn calibrated(sensors: Sensors, method: Method, seed: u64) -> Calibration {
+    let robot = titan();
+    let mut rng = rng(seed, "baseline");
+    let scales = Hyperparameters::datasheet(&robot);
+    let noise = Noise { corner_px: 0.3, n_frames: 8, joint_rad: scales.joint_std_rad };
+    let mut model = model_for(&robot, &[]);
+    model.joints.iter_mut().for_each(|kinds| kinds.truncate(2));
+    let mut truth = Truth::draw(&robot, &model, &scales, &mut rng);
+    if sensors != Sensors::OutOfCalibration {
+        truth.parameters = JointParameters { reference: truth.parameters.reference, ..JointParameters::default() };
+    }
+    let mut views = views(&robot, &truth, &noise, N_VIEWS, &mut rng);
+    if sensors == Sensors::Shuffled {
+        let mut readings: Vec<_> = views.iter().map(|view| view.travel_rad).collect();
+        readings.shuffle(&mut rng);
+        views.iter_mut().zip(readings).for_each(|(view, reading)| view.travel_rad = reading);
+    }
+    let data = CalibrationData {
+        name: "synthetic".to_owned(),
+        messages_hash: String::new(),
+        data: CaptureData { fit: views, n_marks: N_VIEWS, ..CaptureData::default() },
+        gripper_tag_data: None,
+        held_out: HeldOut::CrossValidation,
+        robot,
+        identified: Vec::new(),
+    };
+    calibrate_data(data, method, None).expect("a result")
+}
+
+#[derive(Debug, Default)]
+struct Counts {
+    beaten: usize,
+    refused: usize,
+    /// For being no better than the datasheet's sensors.
+    no_better: usize,
+}
+
+fn counts(sensors: Sensors, method: Method) -> Counts {
+    let mut counts = Counts::default();
+    for seed in SEEDS {
+        let found = calibrated(sensors, method, seed);
+        let baseline = found.held_out.baseline.expect("compared");
+        let is_no_better = |refusal: &Refusal| {
+            matches!(refusal, Refusal::NoBetterThanDatasheet { .. } | Refusal::NoBetterThanBaseline { .. })
+        };
+        counts.beaten += usize::from(baseline.is_beaten());
+        counts.refused += usize::from(found.status == Status::Refused);
+        counts.no_better += usize::from(found.refusals.iter().any(is_no_better));
+        if found.status == Status::Refused {
+            println!("seed {seed}: {} ({baseline:?})", found.refusal.unwrap_or_default());
+        }
+    }
+    println!("{sensors:?}, {method:?}: {counts:?} of {}", SEEDS.count());
+    counts
+}
+
+#[test]
+fn sensors_that_need_nothing_are_no_reason_to_refuse_bundle() {
+    let counts = counts(Sensors::AsDrawn, Method::Bundle);
+    assert!(counts.beaten <= 2 && counts.refused == 0, "{counts:?}");
+}
+
+#[test]
+fn sensors_out_of_calibration_beat_mount_and_map_alone() {
+    for method in [Method::Bundle, Method::MinimumDistance] {
+        let counts = counts(Sensors::OutOfCalibration, method);
+        assert!(counts.beaten == SEEDS.count() && counts.refused == 0, "{method:?}: {counts:?}");
+    }
+}
+
+#[test]
+fn a_method_of_the_paper_is_refused_where_it_beats_nothing() {
+    for method in [Method::MinimumDistance, Method::MinimumVariance] {
+        let counts = counts(Sensors::AsDrawn, method);
+        assert!(counts.no_better + 1 >= SEEDS.count(), "{method:?}: {counts:?}");
+    }
+}
+
+#[test]
+fn readings_of_other_views_confirm_nothing() {
+    let found = calibrated(Sensors::Shuffled, Method::Bundle, SHUFFLED_SEED);
+    let is_no_better = |refusal: &Refusal| matches!(refusal, Refusal::NoBetterThanBaseline { .. });
+    assert!(found.refusals.iter().any(is_no_better), "{:?}", found.refusal);
+}
