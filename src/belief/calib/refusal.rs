@@ -282,12 +282,9 @@ impl fmt::Display for Refusal {
             Self::PriorUntested => write!(f, "the views determine too little to be tested against the prior"),
             Self::PriorContradicted { .. }
             | Self::SensorFailed { .. }
+            | Self::SensorLine { .. }
             | Self::PriorsBeyondTolerance { .. }
             | Self::Innovations { .. } => self.fmt_long(f),
-            Self::SensorLine { joint, slope } => {
-                let what = if *slope < 0.0 { "reversed" } else { "of another scale than its datasheet's" };
-                write!(f, "the sensor of {joint} is {what}: the camera's angles follow it with a slope of {slope:.2}")
-            }
             Self::TooFewViewsSinceSlip { joint, evidence, views } => {
                 write!(f, "{joint}: {evidence}; {views} views are too few to calibrate it as it is now")
             }
@@ -323,6 +320,10 @@ impl Refusal {
                     tolerance_m * 1e3,
                     mm(*tool_error_by_camera_m)
                 )
+            }
+            Self::SensorLine { joint, slope } => {
+                let what = if *slope < 0.0 { "reversed" } else { "of another scale than its datasheet's" };
+                write!(f, "the sensor of {joint} is {what}: the camera's angles follow it with a slope of {slope:.2}")
             }
             Self::PriorsBeyondTolerance { predicted_m, tolerance_m, most } => {
                 write!(
