@@ -100,6 +100,23 @@ pub enum Refusal {
         /// Range of `per_dof` in 95 % of cases, by chance alone.
         expected: [f64; 2],
     },
+    /// The tool touched surveyed surfaces elsewhere than it was predicted to.
+    Touch {
+        /// Along the normal of the surface that is farthest off: positive is out of it.
+        off_m: f64,
+        /// That surface.
+        surface: String,
+        /// Of all touches together.
+        chi2: f64,
+        /// Largest `chi2` that is no reason.
+        limit: f64,
+        /// What explains it, alike.
+        causes: Vec<String>,
+        /// The link that carries the tool.
+        link: String,
+        /// From the drawn tool point to one that would explain it best, axes of `link`.
+        tool_point_m: [f64; 3],
+    },
     /// The prior rests on the same messages.
     PriorReused,
     /// The prior's covariance has no inverse.
@@ -212,7 +229,8 @@ impl Refusal {
             }
             Self::Overfitted { .. } => "capture more views, or more different ones",
             Self::PriorsBeyondTolerance { .. } => {
-                "put a tag on the gripper, or measure the arm and state its sigmas in [geometry] of robot.toml"
+                "put a tag on the gripper, touch three surveyed surfaces (step `touch`), or measure the arm and state its \
+                 sigmas in [geometry] of robot.toml"
             }
             Self::BeyondTolerance { .. } => "capture more views, or put a tag on the gripper",
             Self::Geometry(_) => "check the drawing against the arm",
@@ -221,6 +239,9 @@ impl Refusal {
             Self::BeyondDatasheet { .. } => "check joint and sensor, and robot.toml against the sensor that is there",
             Self::Outliers { .. } => "check tag map, tag ids and the drawing",
             Self::Innovations { .. } => "look for what moved or warmed up during the capture",
+            Self::Touch { .. } => {
+                "measure the tool point ([tool] point_m of robot.toml), the links beyond the camera and the camera's mount"
+            }
             Self::PriorReused => "give a prior that was made from other views",
             Self::PriorSingular => "make the prior anew",
             Self::PriorContradicted { .. } => "calibrate without the prior",
@@ -284,6 +305,7 @@ impl fmt::Display for Refusal {
             | Self::SensorFailed { .. }
             | Self::SensorLine { .. }
             | Self::PriorsBeyondTolerance { .. }
+            | Self::Touch { .. }
             | Self::Innovations { .. } => self.fmt_long(f),
             Self::TooFewViewsSinceSlip { joint, evidence, views } => {
                 write!(f, "{joint}: {evidence}; {views} views are too few to calibrate it as it is now")
@@ -335,6 +357,16 @@ impl Refusal {
                 )?;
                 most.as_ref().map_or(Ok(()), |most| write!(f, "; most of it by the {most}"))
             }
+            Self::Touch { off_m, surface, chi2, limit, causes, link, tool_point_m: [x, y, z] } => write!(
+                f,
+                "touch: the tool is {:.0} mm from where it should be at {surface} (chi-square {chi2:.0}, limit \
+                 {limit:.0}): {}; a tool point [{:.1}, {:.1}, {:.1}] mm from the drawn one, in the axes of {link}, would explain it best",
+                off_m.abs() * 1e3,
+                causes.join(", or "),
+                x * 1e3,
+                y * 1e3,
+                z * 1e3
+            ),
             Self::Innovations { quantity, per_dof, limit, expected: [low, high] } => write!(
                 f,
                 "{}: chi-square per degree of freedom is {per_dof:.2}, above {limit:.2} (expected in 95 % of cases: \
@@ -393,7 +425,18 @@ mod tests {
             limit: 22.0,
             used_share: 0.4,
         };
-        let file = File { refusals: vec![geometry, Refusal::NotSolved { outcome: Outcome::Stalled }, contradicted] };
+        let touch = Refusal::Touch {
+            off_m: 0.018,
+            surface: "toe plate".to_owned(),
+            chi2: 250.0,
+            limit: 21.1,
+            causes: vec!["tool point or links beyond the camera".to_owned()],
+            link: "manipulator_link".to_owned(),
+            tool_point_m: [0.0, 0.02, -0.001],
+        };
+        assert!(touch.to_string().starts_with("touch: the tool is 18 mm from where it should be at toe plate"));
+        let file =
+            File { refusals: vec![geometry, Refusal::NotSolved { outcome: Outcome::Stalled }, contradicted, touch] };
         let text = toml::to_string(&file).expect("it has a TOML form");
         assert_eq!(toml::from_str::<File>(&text).expect("it reads"), file, "{text}");
     }

@@ -14,6 +14,7 @@ use crate::calib::bundle::model_selection::Selection;
 use crate::calib::bundle::outliers::Outlier;
 use crate::calib::bundle::setup::{BundleSetup, declared};
 use crate::calib::bundle::tables::{camera_mount_table, covariance_with_mount, map_table, model_table, prior_table};
+use crate::calib::bundle::touch_term::TouchUpdate;
 use crate::calib::bundle::verdict::VerdictInput;
 use crate::calib::covariance::{ParameterCovariance, task_angles};
 use crate::calib::cross_validation::{FOLDS, FoldSums, fold_of};
@@ -29,7 +30,7 @@ use crate::calib::result::map_table::MapResult;
 use crate::calib::result::metrics::HeldOutMetrics;
 use crate::calib::tag_mapping::map_unknown_tags;
 use crate::calib::views::calibration_data::CalibrationData;
-use crate::calib::views::view::{ObservationRejection, View};
+use crate::calib::views::view::{ObservationRejection, Touch, View};
 use armcal_core::joints::JointAngles;
 use armcal_core::robot::{JointSensorSpec, Robot};
 use armcal_core::routine::Method;
@@ -66,6 +67,31 @@ struct Estimated<'a> {
     failures: &'a [Failure],
     estimate: Estimate<'a>,
     selections: Vec<Selection>,
+    touches: Option<Touched<'a>>,
+}
+
+/// What touches added to an estimate.
+struct Touched<'a> {
+    /// By the views alone.
+    before: Estimate<'a>,
+    update: TouchUpdate,
+}
+
+impl<'a> Estimated<'a> {
+    /// Takes the touches in, if there are enough and every joint up to the tool has a sensor.
+    fn with_touches(mut self, touches: &[Touch], robot: &Robot) -> Self {
+        let has_sensors = (0..robot.tool.mount.n_joints).all(|joint| !self.setup.has_no_sensor(joint));
+        if let Some(update) = self.estimate.touch_update(touches).filter(|_| has_sensors) {
+            let updated = self.estimate.with_touches(&update);
+            let before = std::mem::replace(&mut self.estimate, updated);
+            self.touches = Some(Touched { before, update });
+        }
+        self
+    }
+
+    fn by_views(&self) -> &Estimate<'a> {
+        self.touches.as_ref().map_or(&self.estimate, |touched| &touched.before)
+    }
 }
 
 /// What an estimate means, before it is judged.
@@ -133,7 +159,13 @@ impl<'a> BundleCalibration<'a> {
             return self.calibrate();
         }
         let (estimate, selections) = estimated.ok_or_else(|| self.nothing_observable())?;
-        self.finish(&Estimated { setup, failures: &failures, estimate, selections })
+        let estimated = Estimated { setup, failures: &failures, estimate, selections, touches: None };
+        let touches: &[Touch] = match self.purpose {
+            EstimatePurpose::Final => &self.data.data.touches,
+            EstimatePurpose::Interim => &[],
+        };
+        let estimated = estimated.with_touches(touches, &self.data.robot);
+        self.finish(&estimated)
     }
 
     fn finish(mut self, estimated: &Estimated<'_>) -> Result<Calibration, CalibError> {
@@ -149,14 +181,17 @@ impl<'a> BundleCalibration<'a> {
             EstimatePurpose::Interim => {}
             EstimatePurpose::Final => {
                 let input = &BundleInput { views: &diagnosis.views, ..estimated.setup.input() };
-                let (found, innovations) = (&estimated.estimate, &diagnosis.innovations[..]);
+                let (found, innovations) = (estimated.by_views(), &diagnosis.innovations[..]);
                 let task = self.data.data.task.as_ref();
                 VerdictInput { input, found, innovations, task }.judge(&mut calibration);
+                if let Some(touched) = &estimated.touches {
+                    touched.update.judge(&self.data.robot, &mut calibration);
+                }
                 self.state_reservations(estimated, &diagnosis, &mut calibration);
                 self.moved.report(&estimated.estimate, &mut calibration);
                 let targets = task.map(|task| task_angles(&diagnosis.robot, task)).unwrap_or_default();
                 let at = if targets.is_empty() { found.view_angles() } else { targets };
-                found.report_drawing(&at, &mut calibration);
+                found.report_drawing(&self.drawing, &at, &mut calibration);
             }
         }
         Ok(calibration)
@@ -164,14 +199,14 @@ impl<'a> BundleCalibration<'a> {
 
     /// Whether survey or drawing are to be taken otherwise than so far.
     fn revise(&mut self, setup: &BundleSetup, estimate: &Estimate<'_>) -> bool {
-        if self.moved.revise(estimate, &mut self.data.robot) {
+        let by_moved_tag = self.moved.gain_nats(estimate);
+        if let Some(better) = self.drawing.better(&setup.input(), estimate, by_moved_tag) {
+            self.drawing.apply_new_faults(&better, &mut self.data.robot);
+            self.moved.resurveyed(&self.data.robot, &better);
+            self.drawing = better;
             return true;
         }
-        let better = self.drawing.better(&setup.input(), estimate);
-        if let Some(drawing) = &better {
-            self.drawing.clone_from(drawing);
-        }
-        better.is_some()
+        self.moved.revise(estimate, &mut self.data.robot)
     }
 
     fn nothing_observable(&self) -> CalibError {
@@ -309,6 +344,9 @@ impl<'a> BundleCalibration<'a> {
     /// Writes what rests on priors alone to the result, and refuses it where that may be more than the task allows.
     fn state_reservations(&self, estimated: &Estimated<'_>, diagnosis: &Diagnosis, calibration: &mut Calibration) {
         let parameters = estimated.estimate.parameters();
+        let touches = estimated.touches.as_ref().map(|touched| &touched.update);
+        let by_priors =
+            |at: &[JointAngles], median_m: f64| estimated.by_views().prior_impact_with(touches, at, median_m);
         let Some(by_data) = self.impact(estimated, diagnosis, &parameters).prediction() else {
             // Without a task the views' own configurations stand for it, and there is no limit.
             let views = estimated.estimate.view_angles();
@@ -318,12 +356,15 @@ impl<'a> BundleCalibration<'a> {
             };
             let errors: Vec<f64> = views.iter().map(error_m).collect();
             let median_m = Summary::of(&errors).map_or(0.0, |summary| summary.median);
-            calibration.reservations = estimated.estimate.prior_impact(&views, median_m).reservations;
+            calibration.reservations = by_priors(&views, median_m).reservations;
             return;
         };
         let (targets, errors): (Vec<JointAngles>, Vec<f64>) = by_data.targets.into_iter().unzip();
-        let by_priors = estimated.estimate.prior_impact(&targets, by_data.error_m.median);
-        let both = errors.iter().zip(&by_priors.covariances_m2).map(|(error, by)| (error * error + by.trace()).sqrt());
+        let by_priors = by_priors(&targets, by_data.error_m.median);
+        let both = errors
+            .iter()
+            .zip(&by_priors.covariances_m2)
+            .map(|(error, by)| (error * error + by.trace()).max(0.0).sqrt());
         let with_priors = Summary::of(&both.collect::<Vec<f64>>());
         calibration.predicted_tool_error_with_priors_m = with_priors;
         calibration.reservations = by_priors.reservations;

@@ -17,6 +17,7 @@ use armcal_core::robot::Robot;
 use armcal_core::spatial::Pose;
 
 /// The answer.
+#[derive(Clone)]
 pub struct Estimate<'a> {
     pub(crate) problem: BundleProblem<'a>,
     pub(crate) solved: Solved,

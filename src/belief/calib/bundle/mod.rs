@@ -39,6 +39,8 @@ pub(crate) mod slips_since;
 mod solve;
 mod step_test;
 mod tables;
+mod tag_identity;
+mod touch_term;
 mod verdict;
 
 pub use calibration_prior::{CalibrationPrior, MOUNT_ROWS, PriorConsistency, with_mount_rows};

@@ -48,6 +48,8 @@ pub struct Hyperparameters {
     pub link_std: [[f64; 2]; MAX_JOINTS],
     /// Of the camera mount, over what robot.toml says of it: shift, turn.
     pub mount_scale: [f64; 2],
+    /// Of the lens, over its prior's.
+    pub lens_scale: f64,
     /// All measurements' standard deviations over what is stated for them.
     pub noise: f64,
     /// Of positions and poses that a recording gives in place of corners.
@@ -89,6 +91,7 @@ impl Hyperparameters {
             half_play_std_rad: 2e-4,
             link_std: [[robot.geometry.link_position_std_m, robot.geometry.link_rotation_std_rad]; MAX_JOINTS],
             mount_scale: [1.0; 2],
+            lens_scale: 1.0,
             noise: 1.0,
             position_std_m: 0.005,
             rotation_std_rad: 0.02,

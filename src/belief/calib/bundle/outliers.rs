@@ -18,7 +18,7 @@ pub struct Outlier {
 
 /// An observation whose chi-square is this many times its number of coordinates belongs elsewhere; one below `READMIT`
 /// belongs here.
-const REJECT: f64 = 7.5;
+pub(crate) const REJECT: f64 = 7.5;
 const READMIT: f64 = 5.0;
 
 /// Marks what does not belong; whether anything changed.

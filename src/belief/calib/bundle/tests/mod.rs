@@ -11,3 +11,4 @@ mod score_test;
 
 mod slips;
 mod statistics;
+mod touches;
