@@ -359,7 +359,7 @@ impl<'a> BundleCalibration<'a> {
             };
             let errors: Vec<f64> = views.iter().map(error_m).collect();
             let median_m = Summary::of(&errors).map_or(0.0, |summary| summary.median);
-            calibration.reservations = by_priors(&views, median_m).reservations;
+            calibration.reservations = by_priors(&views, median_m).told();
             return;
         };
         let (targets, errors): (Vec<JointAngles>, Vec<f64>) = by_data.targets.into_iter().unzip();
@@ -370,7 +370,7 @@ impl<'a> BundleCalibration<'a> {
             .map(|(error, by)| (error * error + by.trace()).max(0.0).sqrt());
         let with_priors = Summary::of(&both.collect::<Vec<f64>>());
         calibration.predicted_tool_error_with_priors_m = with_priors;
-        calibration.reservations = by_priors.reservations;
+        calibration.reservations = by_priors.told();
         let task = self.data.data.task.as_ref();
         if let (Some(predicted), Some(task)) = (with_priors, task)
             && predicted.p95 > task.tolerance_m

@@ -22,7 +22,7 @@ const UNSEEN_SHARE: f64 = 0.5;
 const WORTH_SHARE: f64 = 0.5;
 /// The same where nothing watches over what is beyond the camera.
 const WORTH_SHARE_UNWATCHED: f64 = 0.1;
-/// Of so many lines, the largest at the tool first.
+/// So many are told, the largest at the tool first.
 const MAX_RESERVATIONS: usize = 5;
 /// Touches that tell an element to so many sigmas of its prior would show it where it is beyond the drawing's figure.
 const TOUCHED_SIGMAS: f64 = 5.0;
@@ -50,6 +50,14 @@ pub(crate) struct PriorImpact {
     pub reservations: Vec<Reservation>,
     /// Added to the tool's covariance at each configuration, m^2.
     pub covariances_m2: Vec<Matrix3<f64>>,
+}
+
+impl PriorImpact {
+    /// The reservations that are told.
+    pub(crate) fn told(mut self) -> Vec<Reservation> {
+        self.reservations.truncate(MAX_RESERVATIONS);
+        self.reservations
+    }
 }
 
 impl Estimate<'_> {
@@ -87,7 +95,6 @@ impl Estimate<'_> {
             .filter(|reservation| reservation.tool_error_m > worth_m)
             .collect();
         reservations.sort_by(|a, b| b.tool_error_m.total_cmp(&a.tool_error_m));
-        reservations.truncate(MAX_RESERVATIONS);
         PriorImpact { reservations, covariances_m2: (0..task.len()).map(covariance).collect() }
     }
 
@@ -109,7 +116,7 @@ impl Estimate<'_> {
                 .extend(six().map(|(error, axis)| self.held_element(&score, (element, error, axis), tool, touches)));
         }
         if self.problem.layout.links.is_empty() {
-            elements.extend(six().map(|(error, axis)| self.survey_frame(&score, (error, axis), tool)));
+            elements.extend(six().map(|(error, axis)| self.survey_frame(&score, (error, axis), tool, touches)));
         }
         elements.extend((0..3).map(|axis| self.tool_point(axis, task, touches)));
         all_axes_alike(elements)
@@ -154,13 +161,20 @@ impl Estimate<'_> {
 
     /// All tags together against the base: the same views as a base that is off the other way, and the tool that follows
     /// the estimate alone. Nobody states how well that is known; as well as a link, it is assumed.
-    fn survey_frame(&self, score: &Score, (error, axis): (ErrorKind, usize), tool: &[ToolJacobian]) -> HeldElement {
+    fn survey_frame(
+        &self,
+        score: &Score,
+        (error, axis): (ErrorKind, usize),
+        tool: &[ToolJacobian],
+        touches: Option<&TouchUpdate>,
+    ) -> HeldElement {
         let base = self.held_element(score, (GeometryElement::Joint(0), error, axis), tool, None);
         let (first, _) = columns(GeometryElement::Joint(0), error);
         let size = Vector3::ith(axis, base.prior_std);
         let way = if error == ErrorKind::Shift { "shift along" } else { "turn about" };
         HeldElement {
             what: format!("tag survey, {way} {}", AXES[axis]),
+            touched_std: touches.map_or(f64::INFINITY, |touches| touches.std_of_survey(first, axis)),
             shifts: tool.iter().map(|at| -at.followed(score, first, &size)).collect(),
             ..base
         }

@@ -212,6 +212,12 @@ impl TouchUpdate {
         self.std_of(&self.along(shift), own_prior_std)
     }
 
+    /// The same of the tag survey's frame, against the joint whose trial is at `first + axis`.
+    pub(crate) fn std_of_survey(&self, first: usize, axis: usize) -> f64 {
+        let shift = |tool: &ToolJacobian| -tool.followed(&self.score, first, &Vector3::ith(axis, 1.0));
+        self.std_of(&self.along(shift), 0.0)
+    }
+
     /// The same of the tool point along an axis of its link.
     pub(crate) fn std_of_tool_point(&self, robot: &Robot, axis: usize) -> f64 {
         let shift = |tool: &ToolJacobian| tool.poses.frame(&robot.tool.mount).rotation * Vector3::ith(axis, 1.0);
