@@ -7,7 +7,8 @@
 //! every vehicle; `bumps` runs into things that nobody has drawn; `planning` reads plans and holds random arms against
 //! them; `determinism`, `closed_loop`, `script` and `cli` run the program, `kill` ends it badly; `sim` looks at the
 //! simulated world from outside; `uncalibrated` calibrates arms of which little is known; `real` reads recordings of
-//! real arms; `tagmap` maps tags in recordings that the test writes; `repository` reads sources and pages.
+//! real arms; `tagmap` maps tags in recordings that the test writes; `touch` feels surveyed plates
+//! with the tool; `repository` reads sources and pages.
 
 mod bumps;
 mod cli;
@@ -30,6 +31,7 @@ mod script;
 mod sim;
 mod support;
 mod tagmap;
+mod touch;
 mod uncalibrated;
 mod vehicles;
 mod wall;

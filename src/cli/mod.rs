@@ -32,6 +32,8 @@ mod stdout;
 #[cfg(feature = "sim")]
 mod study;
 #[cfg(feature = "sim")]
+mod study_falsified;
+#[cfg(feature = "sim")]
 mod study_paper;
 #[cfg(feature = "sim")]
 mod study_plan;

@@ -8,6 +8,7 @@ use anyhow::{Context, Result};
 use clap::{Args, Subcommand};
 
 use crate::cli::exit::Exit;
+use crate::cli::study_falsified::{FalsifiedArgs, falsified};
 use crate::cli::study_paper::{PaperArgs, paper};
 use crate::cli::study_plan::{
     EdgesArgs, PathsArgs, SelfCollisionArgs, TrackingErrorArgs, edges, paths, self_collision, tracking_error,
@@ -46,6 +47,8 @@ enum Study {
     TrackingError(TrackingErrorArgs),
     /// Choose poses by each criterion and at random, and compare the tool error that they leave
     Poses(PosesArgs),
+    /// Falsify drawing, survey or a sensor after a capture, and compare the verdict with the truth
+    Falsified(FalsifiedArgs),
 }
 
 #[derive(Debug, Args)]
@@ -82,6 +85,7 @@ pub(super) fn study(args: &StudyArgs) -> Result<Exit> {
         Study::SelfCollision(args) => self_collision(args),
         Study::TrackingError(args) => tracking_error(args),
         Study::Poses(args) => poses(args),
+        Study::Falsified(args) => falsified(args),
     }
 }
 

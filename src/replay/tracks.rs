@@ -171,6 +171,7 @@ impl<'a> Tracks<'a> {
             | Message::GripperCommand(_)
             | Message::Pressure(_)
             | Message::Survey(_)
+            | Message::Touch(_)
             | Message::Image(_) => {}
         }
     }

@@ -247,14 +247,15 @@ fn mount_line(mount: &CameraMount) -> String {
     match &mount.left_out {
         Some(why) => format!("camera mount by the drawing: {why}"),
         None => {
-            let rms = |v: [f64; 3]| (v.iter().map(|v| v * v).sum::<f64>() / 3.0).sqrt();
-            let (std_mm, std_deg) = (rms(mount.position_std_m) * 1e3, rms(mount.rotation_std_rad).to_degrees());
+            // The axis that is known least: the others say nothing for it.
+            let worst = |v: [f64; 3]| v.into_iter().fold(0.0, f64::max);
+            let (std_mm, std_deg) = (worst(mount.position_std_m) * 1e3, worst(mount.rotation_std_rad).to_degrees());
             let by_tag = match (mount.views, mount.rms_px) {
                 (0, _) => "by the tags around the arm".to_owned(),
                 (views, Some(rms_px)) => format!("by the tag on the gripper in {views} views ({rms_px:.2} px)"),
                 (views, None) => format!("by the tags around the arm and the one on the gripper in {views} views"),
             };
-            format!("camera mount {by_tag}: known to {std_mm:.1} mm, {std_deg:.2} deg")
+            format!("camera mount {by_tag}: known to {std_mm:.1} mm, {std_deg:.2} deg in its worst axis")
         }
     }
 }

@@ -40,7 +40,8 @@ pub struct ScoreInput<'a> {
 /// # Errors
 /// [`SimError::TruthFile`] when the truth cannot be read.
 pub fn score(input: &ScoreInput<'_>) -> Result<Scored, SimError> {
-    let truth = read_truth(input.truth)?;
+    let mut truth = read_truth(input.truth)?;
+    touch::leave_out_meant(&mut truth, input.recording, input.robot);
     let outcome = input.outcome;
     let beliefs: Vec<_> = outcome.epochs.iter().map(belief).collect();
     let rests = reaches(input.recording, input.robot, &beliefs);

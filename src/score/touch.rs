@@ -6,8 +6,34 @@ use crate::score::TouchScore;
 use armcal_belief::session::ReachStep;
 use armcal_core::log::Recording;
 use armcal_core::robot::Robot;
-use armcal_core::streams::{Mark, MarkKind, Message};
+use armcal_core::streams::{Mark, MarkKind, Message, ToolTouch};
+use armcal_core::time::Stamp;
 use armcal_sim::truth::Truth;
+
+/// Before and after a recorded touch of a surface, contacts of tool and surface are meant, s.
+const BEFORE_TOUCH_S: f64 = 100.0;
+const AFTER_TOUCH_S: f64 = 40.0;
+
+/// Leaves the contacts and clearances out that steps `touch` came for.
+pub(super) fn leave_out_meant(truth: &mut Truth, recording: &Recording, robot: &Robot) {
+    let tool = &robot.bodies[robot.tool.mount.n_joints].name;
+    let touches: Vec<&ToolTouch> = recording
+        .messages
+        .iter()
+        .filter_map(|(_, message)| match message {
+            Message::Touch(touch) => Some(touch),
+            _ => None,
+        })
+        .collect();
+    let is_meant = |at: Stamp, a: &String, b: &String| {
+        touches.iter().any(|touch| {
+            let is_near = (-BEFORE_TOUCH_S..=touch.duration_s + AFTER_TOUCH_S).contains(&at.since_s(touch.stamp));
+            is_near && (a == tool && *b == touch.surface || b == tool && *a == touch.surface)
+        })
+    };
+    truth.contacts.retain(|contact| !is_meant(contact.stamp, &contact.part_a, &contact.part_b));
+    truth.clearances.retain(|clearance| !is_meant(clearance.stamp, &clearance.part_a, &clearance.part_b));
+}
 
 /// The touches of one `reach` step; `None` where none was asked for.
 ///

@@ -5,10 +5,11 @@
 //! model of corner noise and detection that the geometric camera may draw from (`noise_fit`).
 //! tests/oracle/compare_detectors.py runs other detectors on the same images. `paper`: the paper's comparison of
 //! methods, and `sensitivity` its Figures 4 and 7; `poses`: error over poses and the arm's time, by how the poses are
-//! chosen; `charts` draws them. `edges`: certified edges against brute force; `paths`: planning between random poses.
+//! chosen; `charts` draws them. `falsified`: the verdict where drawing, survey or a sensor is wrong. `edges`: certified edges against brute force; `paths`: planning between random poses.
 
 mod charts;
 mod edges;
+mod falsified;
 mod noise_fit;
 pub mod paper;
 mod paths;
@@ -20,6 +21,10 @@ mod tracking_error;
 mod trials;
 
 pub use edges::{Edge, EdgeRow, EdgeStudy, edge_study, edges_csv, edges_json, mean_time_under_s, random_edges};
+pub use falsified::{
+    Case, CaseKind, EquivalenceClasses, FalsifiedError, FalsifiedRow, FalsifiedStudy, RunStatus, Tier, falsified_cases,
+    falsified_csv, falsified_markdown, falsified_study,
+};
 pub use noise_fit::{FittedNoise, fit_noise};
 pub use paths::{Belief, PathQueries, PathRow, PathSite, PathStudy, path_study, paths_csv, problem_json, queries_json};
 pub use poses::{PoseRow, PoseStudyError, pose_study, poses_csv, poses_figure, poses_table};

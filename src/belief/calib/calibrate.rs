@@ -7,6 +7,7 @@ use armcal_core::streams::{Mark, MarkKind, Message, PriorSource};
 use armcal_core::time::Stamp;
 
 use crate::calib::bundle::calibration::{BundleCalibration, EstimatePurpose};
+use crate::calib::bundle::slips_since::slips_since;
 use crate::calib::error::CalibError;
 use crate::calib::methods::calibration::calibrate_positions;
 use crate::calib::methods::end_stops;
@@ -102,7 +103,11 @@ impl MarkedRun<'_> {
         let Some(contradicted) = contradicted.map(|table| table.clone().unused()) else { return Ok(warm) };
         // Something happened to the arm since: the new views alone tell how it is now, if they are enough.
         match calibrate_data(data, self.method, None)? {
-            fresh if fresh.status == Status::Accepted => Ok(Calibration { prior: Some(contradicted), ..fresh }),
+            mut fresh if fresh.status == Status::Accepted => {
+                let slips: Vec<_> = prior.iter().flat_map(|prior| slips_since(prior, &fresh, self.robot)).collect();
+                fresh.findings.extend(slips);
+                Ok(Calibration { prior: Some(contradicted), ..fresh })
+            }
             _ => Ok(warm),
         }
     }

@@ -144,7 +144,13 @@ impl ParameterCovariance {
     /// Nothing known of the parameters of `joint`.
     #[must_use]
     pub fn without_joint(&self, joint: usize) -> Self {
-        let kept: Vec<usize> = (0..self.parameters.len()).filter(|&k| self.parameters[k].joint != joint).collect();
+        self.without(|parameter| parameter.joint == joint)
+    }
+
+    /// Marginal of the other parameters.
+    #[must_use]
+    pub fn without(&self, is_dropped: impl Fn(Parameter) -> bool) -> Self {
+        let kept: Vec<usize> = (0..self.parameters.len()).filter(|&k| !is_dropped(self.parameters[k])).collect();
         Self {
             parameters: kept.iter().map(|&k| self.parameters[k]).collect(),
             matrix: DMatrix::from_fn(kept.len(), kept.len(), |i, k| self.matrix[(kept[i], kept[k])]),

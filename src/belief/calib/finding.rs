@@ -32,6 +32,10 @@ pub struct Finding {
 pub enum FindingKind {
     /// A surveyed tag; the size is its distance from the survey.
     TagMoved,
+    /// A tag of another size than the survey's; the size is the relative difference.
+    TagSize,
+    /// Two tags, each with the other's id.
+    TagSwapped,
     /// The lens against robot.toml; the size is the relative error of its focal length.
     Lens,
     /// A link's length or twist against the drawing.
@@ -40,8 +44,14 @@ pub enum FindingKind {
     CameraMount,
     /// The base against the survey, or all tags together.
     Base,
+    /// The tool point or links beyond the camera, by touches of surveyed surfaces.
+    Tool,
     /// A sensor that slipped on its shaft; the size is the step.
     SensorSlip,
+    /// A sensor that reads the other way; the size is the slope of the angle by the reading.
+    SensorReversed,
+    /// A sensor of another scale than its datasheet's; the size is the slope of the angle by the reading.
+    SensorScale,
     /// A joint or sensor that failed otherwise.
     SensorFailed,
     /// A sensor with more error from view to view than its datasheet allows; the size is one sigma.

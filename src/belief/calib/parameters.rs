@@ -8,6 +8,7 @@ use armcal_core::kinematics::LinkCorrections;
 use armcal_core::robot::{JointSensorSpec, Robot};
 use armcal_core::sensor::{ArmSensors, ConditionChange, Conditions, Correction, N_SHAPE, Terms, nonlinearity_basis};
 use armcal_core::streams::MAX_JOINTS;
+use armcal_core::time::Stamp;
 
 /// Gain (dimensionless, 1 = datasheet) and offset (rad) of every joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,6 +50,8 @@ impl JointParameters {
             ParameterKind::OffsetPerMpa => self.terms[parameter.joint].offset_rad_per_mpa,
             ParameterKind::DriftPerH => self.terms[parameter.joint].drift_rad_per_h,
             ParameterKind::HalfBacklash => self.terms[parameter.joint].half_backlash_rad,
+            // These are the sensors as they are now.
+            ParameterKind::StepBefore(_) => 0.0,
             ParameterKind::LinkShift(axis) => self.links[parameter.joint].shift_m[usize::from(axis)],
             ParameterKind::LinkTurn(axis) => self.links[parameter.joint].turn_rad[usize::from(axis)],
         }
@@ -65,6 +68,7 @@ impl JointParameters {
             ParameterKind::OffsetPerMpa => self.terms[parameter.joint].offset_rad_per_mpa = value,
             ParameterKind::DriftPerH => self.terms[parameter.joint].drift_rad_per_h = value,
             ParameterKind::HalfBacklash => self.terms[parameter.joint].half_backlash_rad = value,
+            ParameterKind::StepBefore(_) => {}
             ParameterKind::LinkShift(axis) => self.links[parameter.joint].shift_m[usize::from(axis)] = value,
             ParameterKind::LinkTurn(axis) => self.links[parameter.joint].turn_rad[usize::from(axis)] = value,
         }
@@ -122,6 +126,8 @@ pub enum ParameterKind {
     DriftPerH,
     /// Half of the backlash between joint and sensor shaft, rad.
     HalfBacklash,
+    /// What the angle was more at the same reading before the sensor slipped: in views that end before this stamp, rad.
+    StepBefore(Stamp),
     /// Of the joint's origin along an axis of its parent link, m.
     LinkShift(u8),
     /// Of the joint's attitude about an axis of its parent link, rad.
@@ -129,7 +135,7 @@ pub enum ParameterKind {
 }
 
 impl ParameterKind {
-    /// All of a sensor, in their order.
+    /// All that a sensor keeps, in their order.
     pub fn all() -> impl Iterator<Item = Self> {
         let shape = (0..N_SHAPE as u8).map(Self::Shape);
         let rest = [Self::OffsetPerK, Self::GainPerK, Self::OffsetPerMpa, Self::DriftPerH, Self::HalfBacklash];
@@ -170,6 +176,7 @@ impl ParameterKind {
             Self::OffsetPerMpa => departure.pressure_mpa,
             Self::DriftPerH => departure.elapsed_h,
             Self::HalfBacklash => approach,
+            Self::StepBefore(_) => 0.0,
             Self::LinkShift(_) | Self::LinkTurn(_) => 0.0,
         }
     }
@@ -199,6 +206,12 @@ impl Parameter {
         }
     }
 
+    /// Whether it tells of the sensor before it slipped, and not of the sensor as it is.
+    #[must_use]
+    pub fn is_step(self) -> bool {
+        matches!(self.kind, ParameterKind::StepBefore(_))
+    }
+
     /// `shoulder_yaw gain`.
     #[must_use]
     pub fn name(self, robot: &Robot) -> String {
@@ -211,6 +224,7 @@ impl Parameter {
             ParameterKind::OffsetPerMpa => "offset per MPa",
             ParameterKind::DriftPerH => "drift per h",
             ParameterKind::HalfBacklash => "half play",
+            ParameterKind::StepBefore(_) => "step",
             ParameterKind::LinkShift(axis) => {
                 return format!("{} place {}", robot.sensors[self.joint].joint, AXES[usize::from(axis)]);
             }

@@ -131,6 +131,23 @@ pub enum Refusal {
         /// Range of `per_dof` in 95 % of cases, by chance alone.
         expected: [f64; 2],
     },
+    /// The tool touched surveyed surfaces elsewhere than it was predicted to.
+    Touch {
+        /// Along the normal of the surface that is farthest off: positive is out of it.
+        off_m: f64,
+        /// That surface.
+        surface: String,
+        /// Of all touches together.
+        chi2: f64,
+        /// Largest `chi2` that is no reason.
+        limit: f64,
+        /// What explains it, alike.
+        causes: Vec<String>,
+        /// The link that carries the tool.
+        link: String,
+        /// From the drawn tool point to one that would explain it best, axes of `link`.
+        tool_point_m: [f64; 3],
+    },
     /// The prior rests on the same messages.
     PriorReused,
     /// The prior's covariance has no inverse.
@@ -162,6 +179,13 @@ pub enum Refusal {
         evidence: String,
         /// Views since the slip.
         views: usize,
+    },
+    /// A sensor that reads the other way, or of another scale, and the rest does not fit with its gain estimated.
+    SensorLine {
+        /// The joint.
+        joint: String,
+        /// Of the angle by the reading, 1 by the datasheet.
+        slope: f64,
     },
     /// A sensor failed whose joint the task needs.
     SensorFailed {
@@ -236,16 +260,22 @@ impl Refusal {
             }
             Self::Overfitted { .. } => "capture more views, or more different ones",
             Self::PriorsBeyondTolerance { .. } => {
-                "put a tag on the gripper, or measure the arm and state its sigmas in [geometry] of robot.toml"
+                "put a tag on the gripper, touch three surveyed surfaces (step `touch`), or measure the arm and state \
+                 its sigmas in [geometry] of robot.toml"
             }
             Self::BeyondTolerance { .. } => "capture more views, or put a tag on the gripper",
             Self::Geometry(_) => "check the drawing against the arm",
             Self::CornerNoise { .. } => "check lens, corner noise and tag sizes in robot.toml, and the tag map",
             Self::SensorError { .. } | Self::SensorFailed { .. } => "check that joint's sensor",
+            Self::SensorLine { .. } => "swap its ends, or correct scale_counts_per_deg and its sign in robot.toml",
             Self::Nonlinearity { .. } => "replace the sensor, or state its linearity in robot.toml",
             Self::BeyondDatasheet { .. } => "check joint and sensor, and robot.toml against the sensor that is there",
             Self::Outliers { .. } => "check tag map, tag ids and the drawing",
             Self::Innovations { .. } => "look for what moved or warmed up during the capture",
+            Self::Touch { .. } => {
+                "measure the tool point ([tool] point_m of robot.toml), the links beyond the camera and its \
+                 mount"
+            }
             Self::PriorReused => "give a prior that was made from other views",
             Self::PriorSingular => "make the prior anew",
             Self::PriorContradicted { .. } => "calibrate without the prior",
@@ -264,6 +294,26 @@ impl fmt::Display for Refusal {
 impl Refusal {
     /// Cause and evidence.
     fn fmt_cause(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Geometry(_)
+            | Self::SensorError { .. }
+            | Self::BeyondDatasheet { .. }
+            | Self::Nonlinearity { .. }
+            | Self::SensorLine { .. }
+            | Self::SensorFailed { .. }
+            | Self::TooFewViewsSinceSlip { .. }
+            | Self::Touch { .. } => self.fmt_of_arm(f),
+            Self::Innovations { .. }
+            | Self::PriorReused
+            | Self::PriorSingular
+            | Self::PriorUntested
+            | Self::PriorContradicted { .. } => self.fmt_of_prediction(f),
+            _ => self.fmt_of_data(f),
+        }
+    }
+
+    /// What views and figures lack.
+    fn fmt_of_data(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mm = |m: f64| m * 1e3;
         match self {
             Self::TooFewViews { views, parameters } => {
@@ -301,6 +351,33 @@ impl Refusal {
                 mm(*predicted_m),
                 mm(*tolerance_m)
             ),
+            Self::PriorsBeyondTolerance { predicted_m, tolerance_m, most } => {
+                write!(
+                    f,
+                    "predicted tool error with what no view shows is {:.1} mm (95 % of the targets), the task \
+                     tolerates {:.1} mm",
+                    predicted_m * 1e3,
+                    tolerance_m * 1e3
+                )?;
+                most.as_ref().map_or(Ok(()), |most| write!(f, "; most of it by the {most}"))
+            }
+            Self::Outliers { outliers, observations } => write!(
+                f,
+                "{outliers} of {observations} tag observations fit no arm of this drawing: other tags, or links that \
+                 are not as in the drawing"
+            ),
+            Self::CornerNoise { residual_px, stated_px, limit_px } => write!(
+                f,
+                "the model does not explain the corners: averaged over a view they are {residual_px:.2} px off, above \
+                 {limit_px:.2} px; robot.toml has {stated_px:.2} px for one frame"
+            ),
+            _ => Ok(()),
+        }
+    }
+
+    /// What is wrong with the arm.
+    fn fmt_of_arm(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
             Self::Geometry(geometry) => write!(f, "{geometry}"),
             Self::SensorError { joint, std_rad, datasheet_std_rad } => write!(
                 f,
@@ -314,42 +391,17 @@ impl Refusal {
                 "{parameter} is estimated {sigmas:.0} sigma from its datasheet: the joint or its sensor has failed, \
                  or it is another sensor"
             ),
-            Self::Outliers { outliers, observations } => write!(
+            Self::Nonlinearity { joint, std_rad, datasheet_std_rad } => write!(
                 f,
-                "{outliers} of {observations} tag observations fit no arm of this drawing: other tags, or links that \
-                 are not as in the drawing"
+                "{joint} is farther from a straight line than a sensor of its datasheet: {:.2} deg, {:.1} times the \
+                 datasheet's {:.2} deg",
+                std_rad.to_degrees(),
+                std_rad / datasheet_std_rad,
+                datasheet_std_rad.to_degrees()
             ),
-            Self::PriorReused => write!(f, "the prior rests on these very messages, which must not count twice"),
-            Self::PriorSingular => write!(f, "the prior's covariance has no inverse"),
-            Self::PriorUntested => write!(f, "the views determine too little to be tested against the prior"),
-            Self::PriorContradicted { .. }
-            | Self::SensorFailed { .. }
-            | Self::PriorsBeyondTolerance { .. }
-            | Self::Nonlinearity { .. }
-            | Self::CornerNoise { .. }
-            | Self::Innovations { .. } => self.fmt_long(f),
-            Self::TooFewViewsSinceSlip { joint, evidence, views } => {
-                write!(f, "{joint}: {evidence}; the {views} views since are too few to calibrate it as it is now")
-            }
-        }
-    }
-}
-
-impl Refusal {
-    fn fmt_long(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::PriorContradicted { joint, off_rad, off_std_rad, chi2, degrees_of_freedom, limit, used_share } => {
-                write!(
-                    f,
-                    "the new views contradict the prior: chi-square {chi2:.1} of {degrees_of_freedom}, expected below \
-                     {limit:.1} in 99.9 % of cases; {joint} is off by {:.2} deg ({:.3} deg allowed, one sigma)",
-                    off_rad.to_degrees(),
-                    off_std_rad.to_degrees()
-                )?;
-                if *used_share < MIN_USED_SHARE {
-                    write!(f, "; only {:.0} % of the tag observations fit anything near it", 100.0 * used_share)?;
-                }
-                Ok(())
+            Self::SensorLine { joint, slope } => {
+                let what = if *slope < 0.0 { "reversed" } else { "of another scale than its datasheet's" };
+                write!(f, "the sensor of {joint} is {what}: the camera's angles follow it with a slope of {slope:.2}")
             }
             Self::SensorFailed { joint, kind, tool_error_m, tool_error_by_camera_m, tolerance_m } => {
                 let mm = |m: Option<f64>| m.unwrap_or(f64::INFINITY) * 1e3;
@@ -364,35 +416,49 @@ impl Refusal {
                     mm(*tool_error_by_camera_m)
                 )
             }
-            Self::Nonlinearity { joint, std_rad, datasheet_std_rad } => write!(
-                f,
-                "{joint} is farther from a straight line than a sensor of its datasheet: {:.2} deg, {:.1} times the \
-                 datasheet's {:.2} deg",
-                std_rad.to_degrees(),
-                std_rad / datasheet_std_rad,
-                datasheet_std_rad.to_degrees()
-            ),
-            Self::CornerNoise { residual_px, stated_px, limit_px } => write!(
-                f,
-                "the model does not explain the corners: averaged over a view they are {residual_px:.2} px off, above \
-                 {limit_px:.2} px; robot.toml has {stated_px:.2} px for one frame"
-            ),
-            Self::PriorsBeyondTolerance { predicted_m, tolerance_m, most } => {
-                write!(
-                    f,
-                    "predicted tool error with what no view shows is {:.1} mm (95 % of the targets), the task \
-                     tolerates {:.1} mm",
-                    predicted_m * 1e3,
-                    tolerance_m * 1e3
-                )?;
-                most.as_ref().map_or(Ok(()), |most| write!(f, "; most of it by the {most}"))
+            Self::TooFewViewsSinceSlip { joint, evidence, views } => {
+                write!(f, "{joint}: {evidence}; the {views} views since are too few to calibrate it as it is now")
             }
+            Self::Touch { off_m, surface, chi2, limit, causes, link, tool_point_m: [x, y, z] } => write!(
+                f,
+                "touch: the tool is {:.0} mm from where it should be at {surface} (chi-square {chi2:.0}, limit \
+                 {limit:.0}): {}; a tool point [{:.1}, {:.1}, {:.1}] mm from the drawn one, in the axes of {link}, \
+                 would explain it best",
+                off_m.abs() * 1e3,
+                causes.join(", or "),
+                x * 1e3,
+                y * 1e3,
+                z * 1e3
+            ),
+            _ => Ok(()),
+        }
+    }
+
+    /// What is not as it was predicted: by the fit, or by the prior.
+    fn fmt_of_prediction(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
             Self::Innovations { quantity, per_dof, limit, expected: [low, high] } => write!(
                 f,
                 "{}: chi-square per degree of freedom is {per_dof:.2}, above {limit:.2} (expected in 95 % of cases: \
                  {low:.2} .. {high:.2}): views that the fit did not use are worse than it predicts",
                 quantity.name()
             ),
+            Self::PriorReused => write!(f, "the prior rests on these very messages, which must not count twice"),
+            Self::PriorSingular => write!(f, "the prior's covariance has no inverse"),
+            Self::PriorUntested => write!(f, "the views determine too little to be tested against the prior"),
+            Self::PriorContradicted { joint, off_rad, off_std_rad, chi2, degrees_of_freedom, limit, used_share } => {
+                write!(
+                    f,
+                    "the new views contradict the prior: chi-square {chi2:.1} of {degrees_of_freedom}, expected below \
+                     {limit:.1} in 99.9 % of cases; {joint} is off by {:.2} deg ({:.3} deg allowed, one sigma)",
+                    off_rad.to_degrees(),
+                    off_std_rad.to_degrees()
+                )?;
+                if *used_share < MIN_USED_SHARE {
+                    write!(f, "; only {:.0} % of the tag observations fit anything near it", 100.0 * used_share)?;
+                }
+                Ok(())
+            }
             _ => Ok(()),
         }
     }
@@ -492,8 +558,23 @@ mod tests {
             limit: 22.0,
             used_share: 0.4,
         };
+        let touch = Refusal::Touch {
+            off_m: 0.018,
+            surface: "toe plate".to_owned(),
+            chi2: 250.0,
+            limit: 21.1,
+            causes: vec!["tool point or links beyond the camera".to_owned()],
+            link: "manipulator_link".to_owned(),
+            tool_point_m: [0.0, 0.02, -0.001],
+        };
+        assert!(touch.to_string().starts_with("touch: the tool is 18 mm from where it should be at toe plate"));
         let file = File {
-            refusals: vec![geometry, Refusal::NotSolved { outcome: Outcome::Stalled, evaluations: 40 }, contradicted],
+            refusals: vec![
+                geometry,
+                Refusal::NotSolved { outcome: Outcome::Stalled, evaluations: 40 },
+                contradicted,
+                touch,
+            ],
         };
         let text = toml::to_string(&file).expect("it has a TOML form");
         assert_eq!(toml::from_str::<File>(&text).expect("it reads"), file, "{text}");

@@ -1,8 +1,9 @@
 //! Sessions: a routine's script carried out on any [`Arm`](armcal_core::streams::Arm), known only through its messages.
 //!
 //! `prepare` plans before the first motion, `script` carries out the steps: `reach`, `capture` (with `belief_update`),
-//! `grip`, `scale_identification`, `end_stops`. `motion` drives the arm, `settling` detects rest, `contact` detects
-//! contacts and `approval` asks an operator before a motion. `recorder` keeps every message; `outcome` is the result.
+//! `grip`, `touch`, `scale_identification`, `end_stops`. `motion` drives the arm, `settling` detects rest, `contact`
+//! detects contacts and `approval` asks an operator before a motion. `recorder` keeps every message; `outcome` is the
+//! result.
 
 mod approval;
 mod belief_update;
@@ -22,6 +23,7 @@ mod runner;
 mod scale_identification;
 mod script;
 mod settling;
+mod touch;
 mod unwatched;
 
 pub use error::SessionError;

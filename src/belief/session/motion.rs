@@ -1,6 +1,8 @@
 //! Drives an arm along believed angles and waits until its own sensors say that it stands, or that it has met
 //! something.
 
+use nalgebra::Vector3;
+
 use crate::plan::{Edge, Path, Timing};
 use crate::session::contact::{ContactDetector, ContactEvent};
 use crate::session::settling::SettlingDetector;
@@ -277,6 +279,35 @@ impl<'b> Driver<'b> {
         self.bumps.forget();
         self.came.clone_from(&path.waypoints);
         Ok(())
+    }
+
+    /// One control period towards a set-point near the last one, whatever is met.
+    pub(crate) fn follow_point(&mut self, to: &JointAngles) -> Result<(), SessionError> {
+        self.set_point = *to;
+        self.command()?;
+        self.step()?;
+        self.motion_s += self.arm.period_s();
+        Ok(())
+    }
+
+    /// A contact that was meant is over.
+    pub(crate) fn forget_contact(&mut self) {
+        self.bumps.forget();
+        self.came = vec![self.set_point];
+    }
+
+    /// Where the tool is by the latest readings, base frame, m.
+    pub(crate) fn believed_tool_m(&self) -> Result<Vector3<f64>, SessionError> {
+        Ok(self.tool_m(&self.believed_angles()?))
+    }
+
+    /// Where it was last sent.
+    pub(crate) fn set_tool_m(&self) -> Vector3<f64> {
+        self.tool_m(&self.set_point)
+    }
+
+    fn tool_m(&self, angles: &JointAngles) -> Vector3<f64> {
+        self.robot.chain.link_poses(angles).frame(&self.robot.tool.mount).translation.vector
     }
 
     fn follow_edge(&mut self, edge: &Edge, heed: ContactMonitoring) -> Result<Option<ContactEvent>, SessionError> {

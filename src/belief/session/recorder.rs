@@ -70,7 +70,8 @@ impl Sink for Recorder {
         }
         self.writer.record(log_time, message)?;
         // A view that was captured is on disk before the arm moves on.
-        if matches!(message, Message::Mark(mark) if !matches!(mark.kind, MarkKind::Phase(_))) {
+        let is_touch = matches!(message, Message::Touch(_));
+        if is_touch || matches!(message, Message::Mark(mark) if !matches!(mark.kind, MarkKind::Phase(_))) {
             self.writer.flush()?;
         }
         Ok(())

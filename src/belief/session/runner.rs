@@ -1,5 +1,6 @@
 //! State of a script that is carried out.
 
+use nalgebra::Vector3;
 use rand_chacha::ChaCha8Rng;
 
 use crate::calib::Calibration;
@@ -53,6 +54,8 @@ pub(crate) struct ScriptRunner<'a, 'b> {
     pub began: Stamp,
     /// Views captured from here on have been in no calibration.
     pub views_since: Stamp,
+    /// Normals of the surfaces that were touched, axes of the tool's link.
+    pub touched: Vec<Vector3<f64>>,
     /// Views marked so far; numbers them.
     pub poses_marked: u32,
     pub calibration: Option<Calibration>,

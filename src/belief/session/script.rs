@@ -49,6 +49,7 @@ pub fn run(
         planned: None,
         began,
         views_since: began,
+        touched: Vec::new(),
         poses_marked: 0,
         calibration: None,
         accepted: None,
@@ -111,6 +112,7 @@ impl ScriptRunner<'_, '_> {
                     self.identify(number, settings).map_err(|error| after_motion(number, error))?;
                 }
                 Step::Stops(settings) => self.stops(number, settings)?,
+                Step::Touch(settings) => self.touch_surface(number, settings)?,
                 Step::Calibrate(settings) => {
                     let refusal = self.calibrate(settings)?;
                     if let (Some(why), OnRefusal::Stop) = (refusal, settings.on_refusal) {

@@ -89,6 +89,10 @@ pub enum DecodeRejection {
     TagTwice,
     #[error("the survey's base tag is none of its tags")]
     NoBaseTag,
+    #[error("the normal's length differs from 1 by more than 1 %")]
+    NormalLength,
+    #[error("std_m is not above 0, or tip_radius_m below 0")]
+    TouchSize,
     #[error("unknown reason for a reject")]
     UnknownReason,
     #[error("an image that is no JPEG")]

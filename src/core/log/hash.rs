@@ -84,7 +84,10 @@ mod tests {
     /// A changed byte of any message would make calibrations of old recordings differ.
     #[test]
     fn hash_of_known_messages_is_unchanged() {
-        let messages: Vec<_> = samples::one_of_each().into_iter().map(|m| (SIMULATION_EPOCH, m)).collect();
+        let mut messages: Vec<_> = samples::one_of_each().into_iter().map(|m| (SIMULATION_EPOCH, m)).collect();
+        assert_eq!(hash(&messages), "284650a436f17712e8021e288ecbfcf39080665fc3de7173838e3f595093c25e");
+        // Kinds that came later leave the others as they were.
+        messages.retain(|(_, message)| !matches!(message, Message::Touch(_)));
         assert_eq!(hash(&messages), "ead77c6dbcc91e1cb3529dc86dbf8835242371c4826425d354d239f002ced0de");
     }
 

@@ -6,13 +6,13 @@ use super::header::RecordingHeader;
 use super::messages::joints::FirstNames;
 use super::messages::{
     AprilTagDetectionArray, CompressedImage, DetectionRejects, FluidPressure, Imu, JointState, Log, Mark, ReachTask,
-    TagSurvey, Temperature, attitude, detections, images, joints, log_line, marks, pressure, rejects, survey, task,
-    temperatures,
+    TagSurvey, Temperature, Touch, attitude, detections, images, joints, log_line, marks, pressure, rejects, survey,
+    task, temperatures, touch,
 };
 use super::schema::{RosMessage, RosSchema};
 use super::topics::{
     DEPTH_PRESSURE, DETECTIONS, GRIPPER_COMMAND, GRIPPER_STATE, IMAGES, JOINT_COMMANDS, JOINT_SENSORS, JOINT_STATES,
-    LOG, MARKS, OIL_TEMPERATURE, REJECTS, TAG_SURVEY, TASK, VEHICLE_IMU, WATER_TEMPERATURE,
+    LOG, MARKS, OIL_TEMPERATURE, REJECTS, TAG_SURVEY, TASK, TOUCH, VEHICLE_IMU, WATER_TEMPERATURE,
 };
 use crate::joints::{JointAngles, JointCounts};
 use crate::streams::{
@@ -37,13 +37,14 @@ pub enum Stream {
     GripperCommand,
     Task,
     TagSurvey,
+    Touch,
     Marks,
     Log,
 }
 
 impl Stream {
     /// Every stream once.
-    pub const ALL: [Self; 16] = [
+    pub const ALL: [Self; 17] = [
         Self::JointSensors,
         Self::JointCommands,
         Self::JointStates,
@@ -58,6 +59,7 @@ impl Stream {
         Self::GripperCommand,
         Self::Task,
         Self::TagSurvey,
+        Self::Touch,
         Self::Marks,
         Self::Log,
     ];
@@ -82,6 +84,7 @@ impl Stream {
             Message::GripperCommand(_) => Self::GripperCommand,
             Message::Task(_) => Self::Task,
             Message::Survey(_) => Self::TagSurvey,
+            Message::Touch(_) => Self::Touch,
             Message::Mark(_) => Self::Marks,
             Message::Log(_) => Self::Log,
         }
@@ -104,6 +107,7 @@ impl Stream {
             Self::GripperCommand => (GRIPPER_COMMAND, &JointState::SCHEMA),
             Self::Task => (TASK, &ReachTask::SCHEMA),
             Self::TagSurvey => (TAG_SURVEY, &TagSurvey::SCHEMA),
+            Self::Touch => (TOUCH, &Touch::SCHEMA),
             Self::Marks => (MARKS, &Mark::SCHEMA),
             Self::Log => (LOG, &Log::SCHEMA),
         }
@@ -160,6 +164,7 @@ impl Stream {
             }
             Self::Task => Message::Task(task::from_ros(&cdr::decode(bytes)?)?),
             Self::TagSurvey => Message::Survey(survey::from_ros(&cdr::decode(bytes)?)?),
+            Self::Touch => Message::Touch(touch::from_ros(cdr::decode(bytes)?)?),
             Self::Marks => Message::Mark(marks::from_ros(&cdr::decode(bytes)?)?),
             Self::Log => Message::Log(log_line::from_ros(cdr::decode(bytes)?)?),
         })
@@ -189,6 +194,7 @@ pub(super) fn encode_message(
         Message::GripperCommand(m) => cdr::encode(&joints::gripper_to_ros(m.stamp, m.opening_m)?, out)?,
         Message::Task(m) => cdr::encode(&task::to_ros(m, header)?, out)?,
         Message::Survey(m) => cdr::encode(&survey::to_ros(m, header)?, out)?,
+        Message::Touch(m) => cdr::encode(&touch::to_ros(m, header)?, out)?,
         Message::Mark(m) => cdr::encode(&marks::to_ros(m)?, out)?,
         Message::Log(m) => cdr::encode(&log_line::to_ros(m)?, out)?,
     }

@@ -7,7 +7,7 @@ use crate::streams::{
     Attitude, CameraImage, CaptureSet, DetectionReject, DetectionRejects, GripperCommand, GripperSample, JointAngles,
     JointCommand, JointCounts, JointSensorSample, JointStateBelief, LogLevel, LogLine, Mark, MarkKind, Message, Phase,
     PressureSample, PriorSource, ReachAttempt, ReachTask, RecordedSurvey, RecordedTag, RejectReason, Sink,
-    TagDetection, TagDetections, TemperatureSample, Thermometer,
+    TagDetection, TagDetections, TemperatureSample, Thermometer, ToolTouch,
 };
 use crate::time::{SIMULATION_EPOCH, Stamp};
 use std::path::Path;
@@ -83,6 +83,15 @@ pub fn one_of_each() -> Vec<Message> {
         Message::Gripper(GripperSample { stamp, opening_m: 0.0985 }),
         Message::GripperCommand(GripperCommand { stamp, opening_m: 0.1 }),
         Message::Task(ReachTask { stamp, targets_m: vec![[1.0, 0.2, -0.3], [0.9, 0.0, 0.1]], tolerance_m: 0.01 }),
+        Message::Touch(ToolTouch {
+            stamp,
+            duration_s: 0.5,
+            surface: "toe plate".to_owned(),
+            point_m: [1.3, 0.4, -1.0],
+            normal: [0.0, -0.6, 0.8],
+            tip_radius_m: 0.04,
+            std_m: 0.001,
+        }),
         Message::Survey(RecordedSurvey { stamp, base_tag: 12, tags: vec![tag_at(3, 1.1), tag_at(12, -0.2)] }),
     ];
     messages.extend(marks(stamp));

@@ -28,6 +28,8 @@ pub const GRIPPER_COMMAND: &str = "/gripper_command";
 pub const TASK: &str = "/task";
 /// Surveyed tags, `armcal_msgs/msg/TagSurvey`, base frame.
 pub const TAG_SURVEY: &str = "/tag_survey";
+/// The tool against surveyed surfaces.
+pub const TOUCH: &str = "/touch";
 /// Spans of the recording by kind, `armcal_msgs/msg/Mark`.
 pub const MARKS: &str = "/marks";
 /// Text for people, `rcl_interfaces/msg/Log`.

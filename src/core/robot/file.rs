@@ -2,8 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
+use nalgebra::Isometry3;
 use serde::Deserialize;
 
+use super::body::LinkBody;
 use super::camera::{CameraFile, check_camera};
 use super::drive::{DriveSpec, HydraulicsFile, MotionSpec, check_displacements};
 use super::error::{FileIssue, RobotError, parse_toml, read_text};
@@ -13,6 +15,7 @@ use super::gripper_tag::GripperTagFile;
 use super::joint_sensor::{SensorFile, check_sensors};
 use super::nominal::{Robot, ToolSpec, check_stowed};
 use super::self_collision;
+use super::shape::{PlacedShape, Shape};
 use super::survey::{TagFile, check_tags};
 use super::urdf::{UrdfChain, UrdfModel};
 use crate::spatial::{Base, Pose};
@@ -47,7 +50,10 @@ struct RobotFile {
 struct ToolFile {
     link: String,
     point_m: [f64; 3],
+    tip_radius_m: Option<f64>,
 }
+
+const TIP_RGB: [u8; 3] = [200, 205, 215];
 
 /// Of a Titan: 100 kg in air, 78 kg in sea water.
 fn default_buoyancy_fraction() -> f64 {
@@ -76,7 +82,7 @@ pub fn load_without_pairs(folder: &Path) -> Result<Robot, RobotError> {
     let chain = urdf.chain(&raw.base_link, &[&raw.tool.link, &raw.camera.link])?;
     let jaws = raw.gripper.as_ref().map(GripperFile::jaws).unwrap_or_default();
     let arm = UrdfChain { urdf: &urdf, base_link: &raw.base_link, chain: &chain };
-    let bodies = arm.bodies(jaws)?;
+    let mut bodies = arm.bodies(jaws)?;
     let sensors = check_sensors(&file, &raw.joint_sensor, &chain)?;
     let drive = DriveSpec {
         pump_l_per_min: raw.hydraulics.map(|hydraulics| hydraulics.check(&file)).transpose()?,
@@ -94,6 +100,10 @@ pub fn load_without_pairs(folder: &Path) -> Result<Robot, RobotError> {
     }
     let gripper = raw.gripper.map(|gripper| gripper.check(&file, &arm, &tool)).transpose()?;
     tool.link_from_frame *= nalgebra::Translation3::from(raw.tool.point_m);
+    if let Some(radius_m) = raw.tool.tip_radius_m {
+        FileIssue::check_range(&file, "tool.tip_radius_m", radius_m, 0.002..=0.2)?;
+        add_tip(&mut bodies[tool.n_joints], tool.link_from_frame, radius_m);
+    }
     let camera_mount = arm.attachment(&raw.camera.link)?;
     let camera = check_camera(&file, raw.camera, camera_mount)?;
     let tags = check_tags(&file, &raw.tag, raw.base_tag, &Pose::<Base, Base>::identity())?;
@@ -110,7 +120,7 @@ pub fn load_without_pairs(folder: &Path) -> Result<Robot, RobotError> {
         base_link: raw.base_link,
         stowed,
         buoyancy_fraction: FileIssue::check_range(&file, "buoyancy_fraction", raw.buoyancy_fraction, 0.0..=0.95)?,
-        tool: ToolSpec { mount: tool },
+        tool: ToolSpec { mount: tool, tip_radius_m: raw.tool.tip_radius_m },
         gripper,
         gripper_tag,
         base_tag: raw.base_tag,
@@ -123,6 +133,13 @@ pub fn load_without_pairs(folder: &Path) -> Result<Robot, RobotError> {
         camera,
         tags,
     })
+}
+
+/// The ball about the tool point, the last of its link's shapes.
+fn add_tip(body: &mut LinkBody, owner_from_shape: Isometry3<f64>, radius_m: f64) {
+    let tip = PlacedShape { owner_from_shape, shape: Shape::Sphere { radius_m }, color_rgb: TIP_RGB };
+    body.visuals.push(tip.clone());
+    body.collisions.push(tip);
 }
 
 /// The URDF that robot.toml names, or else a file of that name beside robot.toml, as in the attachments of a recording.

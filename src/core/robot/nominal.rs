@@ -69,6 +69,8 @@ pub struct Robot {
 pub struct ToolSpec {
     /// The tool point, axes of the link that carries it.
     pub mount: Attachment,
+    /// Of a ball about the tool point, which touches first; `None` where nobody says what touches.
+    pub tip_radius_m: Option<f64>,
 }
 
 impl Robot {

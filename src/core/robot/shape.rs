@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Point3};
 use parry3d::math::{Pose3, Rot3, Vec3};
 use parry3d::shape::SharedShape;
 
@@ -48,6 +48,15 @@ pub struct PlacedShape {
     pub shape: Shape,
     /// For display: red, green, blue.
     pub color_rgb: [u8; 3],
+}
+
+impl PlacedShape {
+    /// Distance of a point in the owner's frame from the solid shape, m.
+    #[must_use]
+    pub fn distance_m(&self, point: &Point3<f64>) -> f64 {
+        let pose = parry_pose(&(self.owner_from_shape * self.shape.axis_fix()));
+        self.shape.to_parry().distance_to_point(&pose, Vec3::new(point.x, point.y, point.z), true)
+    }
 }
 
 impl Shape {

@@ -9,7 +9,7 @@ use super::error::RoutineError;
 use super::method::Method;
 use super::scene::Scene;
 use super::settings::{CaptureSettings, TaskSettings};
-use super::step::{MoveGoal, ReachSettings, Step};
+use super::step::{MoveGoal, ReachSettings, Step, TouchSettings};
 use crate::robot::{self, BaseTagStd, FailedJoint, FileIssue, MapKnowledge, Robot, Vehicle};
 
 /// A checked routine.
@@ -75,7 +75,7 @@ impl Routine {
             robot = robot.with_survey(survey.clone());
             vehicle.survey = Some(survey);
         }
-        self.check_against(&robot)?;
+        self.check_against(&robot, &vehicle)?;
         let failed = self.failed_of(&robot)?;
         let robot = robot.with_failed(&failed);
         Ok((robot, vehicle))
@@ -89,11 +89,11 @@ impl Routine {
         self.failed_joints.iter().enumerate().map(of).collect()
     }
 
-    /// What only the robot can tell: whether the steps fit its joints.
+    /// What only robot and vehicle can tell: whether the steps fit them.
     ///
     /// # Errors
     /// [`RoutineError`] naming the step.
-    fn check_against(&self, robot: &Robot) -> Result<(), RoutineError> {
+    fn check_against(&self, robot: &Robot, vehicle: &Vehicle) -> Result<(), RoutineError> {
         let joints = robot.joint_names();
         for (index, step) in self.steps.iter().enumerate() {
             let key = format!("step {} ({})", index + 1, step.name());
@@ -119,12 +119,45 @@ impl Routine {
                 Step::Grip { .. } | Step::Reach(ReachSettings { touch: true, .. }) if robot.gripper.is_none() => {
                     format!("robot `{}` has no [gripper] in its robot.toml", robot.name)
                 }
+                Step::Touch(settings) => match touch_problem(settings, robot, vehicle) {
+                    None => continue,
+                    Some(problem) => problem,
+                },
                 _ => continue,
             };
             return Err(FileIssue::new(&self.file, key, problem).into());
         }
         Ok(())
     }
+}
+
+/// A point this near to a part's surface lies on it, m.
+const ON_SURFACE_M: f64 = 0.005;
+
+/// Why the arm cannot touch that plane; `None` where it may.
+fn touch_problem(settings: &TouchSettings, robot: &Robot, vehicle: &Vehicle) -> Option<String> {
+    let Some(radius_m) = robot.tool.tip_radius_m else {
+        return Some(format!(
+            "robot `{}` has no [tool] tip_radius_m in its robot.toml (0.002 .. 0.2): nobody says what touches",
+            robot.name
+        ));
+    };
+    let Some(part) = vehicle.parts.iter().find(|part| part.name == settings.part) else {
+        let names: Vec<&str> = vehicle.parts.iter().map(|part| part.name.as_str()).collect();
+        return Some(format!("part `{}` is none of the vehicle's: {}", settings.part, names.join(", ")));
+    };
+    let distance_m =
+        |out_m: f64| part.placed.distance_m(&(vehicle.vehicle_from_base.isometry() * settings.point_at(out_m)));
+    let (at_m, beside_m) = (distance_m(0.0), distance_m(radius_m));
+    if at_m > ON_SURFACE_M {
+        return Some(format!("point_m lies {at_m:.3} m off `{}`; it is a point of its surface", settings.part));
+    }
+    ((beside_m - radius_m).abs() > ON_SURFACE_M).then(|| {
+        format!(
+            "normal does not lead out of `{}`: {radius_m} m along it is {beside_m:.3} m away from it",
+            settings.part
+        )
+    })
 }
 
 /// `[[failed_joint]]`.

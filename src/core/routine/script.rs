@@ -10,6 +10,7 @@ use super::error::RoutineError;
 use super::settings::{CaptureSettings, Margins, PoseCriterion, TaskSettings};
 use super::step::{
     CalibrateSettings, CalibrateViews, IdentifySettings, MoveGoal, OnRefusal, ReachSettings, Step, StopsSettings,
+    TouchSettings,
 };
 use crate::robot::FileIssue;
 use crate::streams::PriorSource;
@@ -22,7 +23,7 @@ pub(super) fn standard(capture: CaptureSettings, task: &TaskSettings) -> Vec<Ste
     vec![reach(), Step::Capture(capture), Step::Calibrate(calibrate), reach()]
 }
 
-const NAMES: &str = "move, reach, grip, capture, identify, stops, calibrate, recalibrate, wait, fault, assert";
+const NAMES: &str = "move, reach, grip, capture, identify, stops, touch, calibrate, recalibrate, wait, fault, assert";
 
 /// Steps in order, and the tables of the faults in order, unread.
 pub(super) struct Script {
@@ -59,6 +60,7 @@ pub(super) fn read(
             "capture" => reader.capture(capture)?,
             "identify" => reader.identify()?,
             "stops" => reader.stops()?,
+            "touch" => reader.touch()?,
             "calibrate" => reader.calibrate(PriorSource::Fresh)?,
             "recalibrate" => reader.calibrate(PriorSource::Warm)?,
             "wait" => reader.wait()?,
@@ -237,6 +239,48 @@ impl StepReader<'_> {
         Ok(Step::Stops(StopsSettings { joints, dwell_s: self.range("dwell_s", dwell_s, 0.2..=60.0)? }))
     }
 
+    fn touch(&self) -> Result<Step, FileIssue> {
+        #[derive(Deserialize)]
+        #[serde(deny_unknown_fields)]
+        struct Raw {
+            part: String,
+            point_m: [f64; 3],
+            normal: [f64; 3],
+            #[serde(default = "one_millimetre")]
+            std_m: f64,
+            #[serde(default = "ten_centimetres")]
+            approach_m: f64,
+            #[serde(default = "one_second")]
+            dwell_s: f64,
+        }
+        fn one_millimetre() -> f64 {
+            1e-3
+        }
+        fn ten_centimetres() -> f64 {
+            0.1
+        }
+        fn one_second() -> f64 {
+            1.0
+        }
+        let raw: Raw = self.parse()?;
+        for value in raw.point_m {
+            self.range("point_m", value, -10.0..=10.0)?;
+        }
+        let length = raw.normal.iter().map(|v| v * v).sum::<f64>().sqrt();
+        if !(0.99..=1.01).contains(&length) {
+            let problem = format!("has the length {length}; it is a direction out of the surface, of length 1");
+            return Err(FileIssue::new(self.file, self.key("normal"), problem));
+        }
+        Ok(Step::Touch(TouchSettings {
+            part: raw.part,
+            point_m: raw.point_m,
+            normal: raw.normal.map(|v| v / length),
+            std_m: self.range("std_m", raw.std_m, 1e-5..=0.1)?,
+            approach_m: self.range("approach_m", raw.approach_m, 0.05..=0.5)?,
+            dwell_s: self.range("dwell_s", raw.dwell_s, 0.2..=60.0)?,
+        }))
+    }
+
     fn calibrate(&self, prior: PriorSource) -> Result<Step, FileIssue> {
         #[derive(Deserialize)]
         #[serde(deny_unknown_fields)]
@@ -279,7 +323,7 @@ fn check_order(file: &Path, steps: &[Step]) -> Result<(), FileIssue> {
             Err(FileIssue::new(file, format!("step {} ({})", index + 1, step.name()), problem.to_owned()))
         };
         match step {
-            Step::Move(_) | Step::Stops(_) => moved = true,
+            Step::Move(_) | Step::Stops(_) | Step::Touch(_) => moved = true,
             Step::Reach(_) => (reaches, moved) = (reaches + 1, true),
             Step::Capture(_) => (captures, moved) = (captures + 1, true),
             Step::Identify(_) if moved => {
@@ -365,6 +409,15 @@ mod tests {
             ("[[step]]\ndo = \"reach\"\ntargets = []", "needs one number"),
             ("[[step]]\ndo = \"grip\"", "step 1 (grip): missing field `opening`"),
             ("[[step]]\ndo = \"grip\"\nopening = 1.5", "step 1 (grip): opening: 1.5 is outside 0 .. 1"),
+            ("[[step]]\ndo = \"touch\"", "step 1 (touch): missing field `part`"),
+            (
+                "[[step]]\ndo = \"touch\"\npart = \"bar\"\npoint_m = [1.0, 0.0, 0.0]\nnormal = [0.0, 0.0, 2.0]",
+                "step 1 (touch): normal: has the length 2",
+            ),
+            (
+                "[[step]]\ndo = \"touch\"\npart = \"bar\"\npoint_m = [1, 0, 0]\nnormal = [0, 0, 1]\nstd_m = 0.0",
+                "step 1 (touch): std_m: 0 is outside",
+            ),
             ("[[step]]\ndo = \"capture\"\nposes = 1", "step 1 (capture): poses: 1 is outside"),
             ("[[step]]\ndo = \"capture\"\npose = 30", "unknown field `pose`"),
             ("[[step]]\ndo = \"calibrate\"", "no `capture` comes before it"),

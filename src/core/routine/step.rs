@@ -1,5 +1,6 @@
 //! The steps of a script.
 
+use nalgebra::{Point3, Vector3};
 use serde::Deserialize;
 
 use super::assert_figure::AssertLimits;
@@ -24,6 +25,8 @@ pub enum Step {
     Identify(IdentifySettings),
     /// Drives joints to their nominal end stops and records the readings there.
     Stops(StopsSettings),
+    /// Touches a surveyed surface with the tool and records where the arm feels it.
+    Touch(TouchSettings),
     /// Estimates the sensors from what was captured.
     Calibrate(CalibrateSettings),
     /// The arm rests while the world goes on.
@@ -51,6 +54,7 @@ impl Step {
             Self::Capture(_) => "capture",
             Self::Identify(_) => "identify",
             Self::Stops(_) => "stops",
+            Self::Touch(_) => "touch",
             Self::Calibrate(CalibrateSettings { prior: PriorSource::Fresh, .. }) => "calibrate",
             Self::Calibrate(CalibrateSettings { prior: PriorSource::Warm, .. }) => "recalibrate",
             Self::Wait { .. } => "wait",
@@ -100,6 +104,31 @@ pub struct StopsSettings {
     pub joints: Vec<String>,
     /// How long the readings at a stop are averaged.
     pub dwell_s: f64,
+}
+
+/// A plane that the tool's tip touches.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TouchSettings {
+    /// The vehicle's part that carries it.
+    pub part: String,
+    /// Where it is touched, base frame.
+    pub point_m: [f64; 3],
+    /// Out of the surface, unit length, base frame.
+    pub normal: [f64; 3],
+    /// One sigma along the normal: of the survey and of what is felt.
+    pub std_m: f64,
+    /// From this far on the tip comes slowly.
+    pub approach_m: f64,
+    /// How long the arm rests there.
+    pub dwell_s: f64,
+}
+
+impl TouchSettings {
+    /// The place that is touched, and so far out of the surface, base frame.
+    #[must_use]
+    pub fn point_at(&self, out_m: f64) -> Point3<f64> {
+        Point3::from(self.point_m) + Vector3::from(self.normal) * out_m
+    }
 }
 
 /// Settings of `calibrate` and `recalibrate`.

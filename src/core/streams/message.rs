@@ -33,6 +33,8 @@ pub enum Message {
     Task(ReachTask),
     /// Where the tags are, where the vehicle says it and not the robot's file.
     Survey(RecordedSurvey),
+    /// The tool against a surveyed surface.
+    Touch(ToolTouch),
     /// A span of the recording that means something.
     Mark(Mark),
     /// A line of text for people.
@@ -263,6 +265,28 @@ pub struct RecordedTag {
     pub position_std_m: f64,
     /// One sigma per axis, as the position's.
     pub rotation_std_rad: f64,
+}
+
+/// The tool's tip rested against a surveyed plane, felt by the arm or its pilot: `normal . (tool - point) = tip_radius`
+/// within one sigma, by the joint sensors' readings from `stamp` on for `duration_s`.
+///
+/// A tip in a socket is three of these with normals at right angles and no radius.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ToolTouch {
+    /// When the tip began to rest there.
+    pub stamp: Stamp,
+    /// How long it did.
+    pub duration_s: f64,
+    /// Name of the surface, for people.
+    pub surface: String,
+    /// Any point of the plane, base frame.
+    pub point_m: [f64; 3],
+    /// Out of the surface, unit length, base frame.
+    pub normal: [f64; 3],
+    /// Of a ball about the tool point; zero for a tip that is the tool point.
+    pub tip_radius_m: f64,
+    /// One sigma along the normal: the surface's survey and what is felt of it.
+    pub std_m: f64,
 }
 
 /// Which share of the data a captured view belongs to.

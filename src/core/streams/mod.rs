@@ -13,5 +13,5 @@ pub use message::{
     Attitude, CameraImage, CaptureSet, DetectionReject, DetectionRejects, GripperCommand, GripperSample, JointCommand,
     JointSensorSample, JointStateBelief, LogLevel, LogLine, Mark, MarkKind, Message, Phase, PressureSample,
     PriorSource, ReachAttempt, ReachTask, RecordedSurvey, RecordedTag, RejectReason, TagDetection, TagDetections,
-    TemperatureSample, Thermometer,
+    TemperatureSample, Thermometer, ToolTouch,
 };

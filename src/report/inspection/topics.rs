@@ -201,6 +201,7 @@ fn known_as(topic: &str, schema: &str) -> Option<&'static str> {
             Stream::GripperCommand => "gap told to the jaws",
             Stream::Task => "reach task",
             Stream::TagSurvey => "where the tags are",
+            Stream::Touch => "touches of surveyed surfaces",
             Stream::Marks => "marks of views and phases",
             Stream::Log => "log",
         });

@@ -1,9 +1,11 @@
 //! One calibration by `bundle`, step by step: estimate, diagnose, report, judge.
 
+use crate::calib::angles_by_camera::set_by_camera;
 use crate::calib::bundle::baseline::Baseline;
 use crate::calib::bundle::calibration_prior::PriorConsistency;
 use crate::calib::bundle::drawing::Drawing;
 use crate::calib::bundle::estimate::{Estimate, estimate};
+use crate::calib::bundle::failure_detection::FailureSearch;
 use crate::calib::bundle::failure_impact::FailureImpact;
 use crate::calib::bundle::failures::Failure;
 use crate::calib::bundle::freed_tags::MovedTags;
@@ -13,6 +15,7 @@ use crate::calib::bundle::model_selection::Selection;
 use crate::calib::bundle::outliers::Outlier;
 use crate::calib::bundle::setup::{BundleSetup, declared};
 use crate::calib::bundle::tables::{camera_mount_table, covariance_with_mount, map_table, model_table, prior_table};
+use crate::calib::bundle::touch_term::TouchUpdate;
 use crate::calib::bundle::verdict::VerdictInput;
 use crate::calib::covariance::{ParameterCovariance, task_angles};
 use crate::calib::cross_validation::{FOLDS, Fold, FoldSums, fold_of};
@@ -28,7 +31,7 @@ use crate::calib::result::map_table::MapResult;
 use crate::calib::result::metrics::HeldOutMetrics;
 use crate::calib::tag_mapping::map_unknown_tags;
 use crate::calib::views::calibration_data::CalibrationData;
-use crate::calib::views::view::{ObservationRejection, View};
+use crate::calib::views::view::{ObservationRejection, Touch, View};
 use armcal_core::joints::JointAngles;
 use armcal_core::robot::{JointSensorSpec, Robot};
 use armcal_core::routine::Method;
@@ -65,6 +68,31 @@ struct Estimated<'a> {
     failures: &'a [Failure],
     estimate: Estimate<'a>,
     selections: Vec<Selection>,
+    touches: Option<Touched<'a>>,
+}
+
+/// What touches added to an estimate.
+struct Touched<'a> {
+    /// By the views alone.
+    before: Estimate<'a>,
+    update: TouchUpdate,
+}
+
+impl<'a> Estimated<'a> {
+    /// Takes the touches in, if there are enough and every joint up to the tool has a sensor.
+    fn with_touches(mut self, touches: &[Touch], robot: &Robot) -> Self {
+        let has_sensors = (0..robot.tool.mount.n_joints).all(|joint| !self.setup.has_no_sensor(joint));
+        if let Some(update) = self.estimate.touch_update(touches).filter(|_| has_sensors) {
+            let updated = self.estimate.with_touches(&update);
+            let before = std::mem::replace(&mut self.estimate, updated);
+            self.touches = Some(Touched { before, update });
+        }
+        self
+    }
+
+    fn by_views(&self) -> &Estimate<'a> {
+        self.touches.as_ref().map_or(&self.estimate, |touched| &touched.before)
+    }
 }
 
 /// What an estimate means, before it is judged.
@@ -108,16 +136,12 @@ impl<'a> BundleCalibration<'a> {
         let first = BundleSetup::new(&self.data.robot, &views, &declared, self.prior).with_drawing(&self.drawing);
         self.check_observable(&first, &declared)?;
         let estimated = self.first_estimate(&first);
-        if self.purpose == EstimatePurpose::Final
-            && let Some((estimate, _)) = &estimated
-            && self.revise(&first, estimate)
-        {
-            drop(estimated);
-            self.data.data.fit = views;
-            return self.calibrate();
-        }
         let failures = match self.purpose {
-            EstimatePurpose::Final => first.failures(&self.data.robot, &views, estimated.as_ref().map(|(e, _)| e)),
+            EstimatePurpose::Final => {
+                let (robot, prior, drawing) = (&self.data.robot, self.prior, &self.drawing);
+                let search = FailureSearch { robot, views: &views, prior, drawing };
+                search.failures(&declared, estimated.as_ref().map(|(estimate, _)| estimate))
+            }
             EstimatePurpose::Interim => declared.clone(),
         };
         let second;
@@ -127,8 +151,22 @@ impl<'a> BundleCalibration<'a> {
             second = BundleSetup::new(&self.data.robot, &views, &failures, self.prior).with_drawing(&self.drawing);
             (&second, second.estimate())
         };
+        if self.purpose == EstimatePurpose::Final
+            && let Some((estimate, _)) = &estimated
+            && self.revise(setup, estimate)
+        {
+            drop(estimated);
+            self.data.data.fit = views;
+            return self.calibrate();
+        }
         let (estimate, selections) = estimated.ok_or_else(|| self.nothing_observable())?;
-        self.finish(Estimated { setup, failures: &failures, estimate, selections })
+        let estimated = Estimated { setup, failures: &failures, estimate, selections, touches: None };
+        let touches: &[Touch] = match self.purpose {
+            EstimatePurpose::Final => &self.data.data.touches,
+            EstimatePurpose::Interim => &[],
+        };
+        let estimated = estimated.with_touches(touches, &self.data.robot);
+        self.finish(estimated)
     }
 
     fn finish(mut self, mut estimated: Estimated<'_>) -> Result<Calibration, CalibError> {
@@ -145,14 +183,17 @@ impl<'a> BundleCalibration<'a> {
             EstimatePurpose::Interim => {}
             EstimatePurpose::Final => {
                 let input = &BundleInput { views: &diagnosis.views, ..estimated.setup.input() };
-                let (found, innovations) = (&estimated.estimate, &diagnosis.innovations[..]);
+                let (found, innovations) = (estimated.by_views(), &diagnosis.innovations[..]);
                 let task = self.data.data.task.as_ref();
                 VerdictInput { input, found, innovations, task }.judge(&mut calibration);
+                if let Some(touched) = &estimated.touches {
+                    touched.update.judge(&self.data.robot, &mut calibration);
+                }
                 self.state_reservations(estimated, &diagnosis, &mut calibration);
                 self.moved.report(&estimated.estimate, &mut calibration);
                 let targets = task.map(|task| task_angles(&diagnosis.robot, task)).unwrap_or_default();
                 let at = if targets.is_empty() { found.view_angles() } else { targets };
-                found.report_drawing(&at, &mut calibration);
+                found.report_drawing(&self.drawing, &at, &mut calibration);
             }
         }
         Ok(calibration)
@@ -160,14 +201,14 @@ impl<'a> BundleCalibration<'a> {
 
     /// Whether survey or drawing are to be taken otherwise than so far.
     fn revise(&mut self, setup: &BundleSetup, estimate: &Estimate<'_>) -> bool {
-        if self.moved.revise(estimate, &mut self.data.robot) {
+        let by_moved_tag = self.moved.gain_nats(estimate);
+        if let Some(better) = self.drawing.better(&setup.input(), estimate, by_moved_tag) {
+            self.drawing.apply_new_faults(&better, &mut self.data.robot);
+            self.moved.resurveyed(&self.data.robot, &better);
+            self.drawing = better;
             return true;
         }
-        let better = self.drawing.better(&setup.input(), estimate);
-        if let Some(drawing) = &better {
-            self.drawing.clone_from(drawing);
-        }
-        better.is_some()
+        self.moved.revise(estimate, &mut self.data.robot)
     }
 
     fn nothing_observable(&self) -> CalibError {
@@ -194,13 +235,13 @@ impl<'a> BundleCalibration<'a> {
         let Estimated { setup, estimate, .. } = estimated;
         let robot = &self.data.robot;
         let without_failed = setup.without_failed(&estimate.parameters());
-        let views = setup.with_estimated_angles(estimate, &without_failed);
-        // Held-out views of a freed joint are linearized where the camera saw it.
-        let input = BundleInput { views: &views, ..setup.input() };
+        let with_steps = setup.with_estimated_angles(estimate, &without_failed);
+        let input = BundleInput { views: &with_steps, ..setup.input() };
         let (held_out, innovations) = match self.purpose {
             EstimatePurpose::Final => cross_validated(&input, estimate, &setup.applied.robot),
             EstimatePurpose::Interim => (FoldSums::default().metrics(), Vec::new()),
         };
+        let views = estimate.as_read_now(&with_steps);
         estimate.widen(&innovations, &setup.input().scales);
         let parameters = estimate.joint_parameters().to_vec();
         let residual_std_rad = std::array::from_fn(|joint| match robot.sensors.get(joint) {
@@ -209,7 +250,8 @@ impl<'a> BundleCalibration<'a> {
             _ => estimate.residual_std_rad(joint),
         });
         let matrix = estimate.joint_covariance();
-        let covariance = ParameterCovariance { parameters, matrix, residual_std_rad: Some(residual_std_rad) };
+        let all = ParameterCovariance { parameters, matrix, residual_std_rad: Some(residual_std_rad) };
+        let covariance = all.without(|parameter| parameter.is_step());
         Diagnosis { robot: estimate.as_found(&setup.applied.robot), views, held_out, innovations, covariance }
     }
 
@@ -298,13 +340,16 @@ impl<'a> BundleCalibration<'a> {
         calibration.prior = self.prior.zip(consistency).map(|(prior, consistency)| {
             prior_table(prior, estimated.setup.elapsed_h(), &consistency, &self.data.robot)
         });
-        refusals.extend(impact.refusals(&calibration.failed_joint));
+        refusals.extend(impact.refusals());
         calibration.refuse_first_for(refusals);
     }
 
     /// Writes what rests on priors alone to the result, and refuses it where that may be more than the task allows.
     fn state_reservations(&self, estimated: &Estimated<'_>, diagnosis: &Diagnosis, calibration: &mut Calibration) {
         let parameters = estimated.estimate.parameters();
+        let touches = estimated.touches.as_ref().map(|touched| &touched.update);
+        let by_priors =
+            |at: &[JointAngles], median_m: f64| estimated.by_views().prior_impact_with(touches, at, median_m);
         let Some(by_data) = self.impact(estimated, diagnosis, &parameters).prediction() else {
             // Without a task the views' own configurations stand for it, and there is no limit.
             let views = estimated.estimate.view_angles();
@@ -314,15 +359,18 @@ impl<'a> BundleCalibration<'a> {
             };
             let errors: Vec<f64> = views.iter().map(error_m).collect();
             let median_m = Summary::of(&errors).map_or(0.0, |summary| summary.median);
-            calibration.reservations = estimated.estimate.prior_impact(&views, median_m).reservations;
+            calibration.reservations = by_priors(&views, median_m).told();
             return;
         };
         let (targets, errors): (Vec<JointAngles>, Vec<f64>) = by_data.targets.into_iter().unzip();
-        let by_priors = estimated.estimate.prior_impact(&targets, by_data.error_m.median);
-        let both = errors.iter().zip(&by_priors.covariances_m2).map(|(error, by)| (error * error + by.trace()).sqrt());
+        let by_priors = by_priors(&targets, by_data.error_m.median);
+        let both = errors
+            .iter()
+            .zip(&by_priors.covariances_m2)
+            .map(|(error, by)| (error * error + by.trace()).max(0.0).sqrt());
         let with_priors = Summary::of(&both.collect::<Vec<f64>>());
         calibration.predicted_tool_error_with_priors_m = with_priors;
-        calibration.reservations = by_priors.reservations;
+        calibration.reservations = by_priors.told();
         let task = self.data.data.task.as_ref();
         if let (Some(predicted), Some(task)) = (with_priors, task)
             && predicted.p95 > task.tolerance_m
@@ -390,7 +438,7 @@ fn cross_validated(
     let baseline = Baseline::new(datasheet, input.views);
     let mut innovations = Vec::new();
     for fold in 0..FOLDS {
-        let (fitted, held_out) = fold_of(input.views, fold);
+        let (fitted, mut held_out) = fold_of(input.views, fold);
         let part = BundleInput {
             views: &fitted,
             model: all.model.clone(),
@@ -399,12 +447,17 @@ fn cross_validated(
             ..input.clone()
         };
         let Some(found) = estimate(&part) else { continue };
+        let as_found = found.as_found(input.robot);
+        // Where no sensor tells an angle, the view's own tags tell where to linearize, with nothing of other folds.
+        for view in &mut held_out {
+            set_by_camera(&as_found, view, &found.parameters());
+        }
         let with_places: Vec<(usize, View)> =
             held_out.iter().enumerate().map(|(n, view)| (n * FOLDS + fold, view.clone())).collect();
         innovations.extend(found.innovations(&part, &with_places, &all.outliers));
         sums.add(&Fold {
-            views: &held_out,
-            as_found: &found.as_found(input.robot),
+            views: &found.as_read_now(&held_out),
+            as_found: &as_found,
             at: &found.parameters(),
             nominal: input.robot,
             baseline: baseline.as_ref().and_then(|baseline| baseline.fit(datasheet, &fitted)).as_ref(),

@@ -20,7 +20,7 @@ use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
 use crate::calib::refusal::{MIN_USED_SHARE, Refusal};
 use crate::calib::result::calibration::Calibration;
 use crate::calib::views::view::View;
-use armcal_core::robot::Robot;
+use armcal_core::robot::{JointSensorSpec, Robot};
 use armcal_core::sensor::Conditions;
 use armcal_core::time::Stamp;
 
@@ -289,9 +289,7 @@ fn covariances(prior: &Calibration, columns: &PriorColumns<'_>, elapsed_h: f64) 
         if rows[k].is_none() {
             covariance[(k, k)] = scales.prior_std(spec, p.joint, p.kind).max(1e-9).powi(2);
         } else if p.kind == ParameterKind::Offset {
-            let silent = spec.drift_std_rad_per_sqrt_h == 0.0;
-            let drift = if silent { USUAL_DRIFT_STD_RAD_PER_SQRT_H } else { spec.drift_std_rad_per_sqrt_h };
-            covariance[(k, k)] += drift * drift * elapsed_h;
+            covariance[(k, k)] += drift_std_rad_per_sqrt_h(spec).powi(2) * elapsed_h;
         }
     }
     let mut widened = covariance.clone();
@@ -299,6 +297,12 @@ fn covariances(prior: &Calibration, columns: &PriorColumns<'_>, elapsed_h: f64) 
         widened[(k, k)] += robot.sensors[p.joint].offset_std_rad.max(LEAST_SLIP_STD_RAD).powi(2);
     }
     (covariance, widened)
+}
+
+/// By the datasheet, or what is usual.
+pub(crate) fn drift_std_rad_per_sqrt_h(spec: &JointSensorSpec) -> f64 {
+    let stated = spec.drift_std_rad_per_sqrt_h;
+    if stated == 0.0 { USUAL_DRIFT_STD_RAD_PER_SQRT_H } else { stated }
 }
 
 /// Symmetric, and with an inverse in spite of the file's rounding.

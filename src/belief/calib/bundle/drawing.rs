@@ -1,28 +1,36 @@
 //! Is the drawing right? Other explanations of the same views, compared by their evidence.
 //!
-//! Where the score test says that links, base or mount would explain the data better than joint sensors do, the views
-//! are estimated again under each alternative: link geometry with columns of its own, and a lens with columns. The one
-//! of most evidence stays if it brings [`MIN_GAIN_NATS`] or more. A tag that was moved is freed before that
-//! (module `freed_tags`).
+//! Where the score test says that links, base or mount would explain the data better than joint sensors do, where tags
+//! are not where they should be or do not fit at all, the views are estimated again under each alternative: link
+//! geometry with columns of its own, a lens with columns, a tag of another size, two tags exchanged. The one of most
+//! evidence stays if it brings [`MIN_GAIN_NATS`] or more, and more than freeing a tag that was moved (module
+//! `freed_tags`) would. Then all begins again, until nothing explains more.
 //!
 //! The score test says beforehand what links may bring: with the pull s and the information I of trial columns z under
 //! a prior of variance a^2, Laplace's approximation is `ln Z(a) - ln Z(0) = s^T (I + a^-2)^-1 s / 2 - ln det(1 + a^2 I)
 //! / 2`. The element and size of the largest gain are where the sizes of the links' errors start from.
+//!
+//! Alternatives reject other observations. For the comparison, a rejected one costs what it is rejected at (a truncated
+//! square), so that explaining it counts.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use crate::calib::bundle::estimate::{Estimate, estimate};
 use crate::calib::bundle::evidence::SCALE_BOUNDS;
 use crate::calib::bundle::input::BundleInput;
-use crate::calib::bundle::model_selection::evidence_gain_nats;
+use crate::calib::bundle::model_selection::log_evidence;
+use crate::calib::bundle::outliers::REJECT;
 use crate::calib::bundle::score_test::GeometryElement;
+use crate::calib::bundle::tag_identity::TagFault;
 use armcal_core::joints::MAX_JOINTS;
+use armcal_core::robot::Robot;
 
-/// What of the drawing is estimated beside the joint sensors.
+/// What of the drawing is taken otherwise, or estimated beside the joint sensors.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Drawing {
     pub links: Option<LinkStart>,
     pub has_lens: bool,
+    pub tags: Vec<TagFault>,
 }
 
 /// Where the sizes of the links' errors start from, and how many joints have columns.
@@ -34,50 +42,119 @@ pub(crate) struct LinkStart {
     mount_scale: [f64; 2],
 }
 
-/// What an alternative must bring; good arms seldom reach a tenth of it (measured, docs/verdict.md).
-const MIN_GAIN_NATS: f64 = 8.0;
+/// What an alternative must bring. Of 60 good arms one reached 5 (docs/verdict.md).
+const MIN_GAIN_NATS: f64 = 6.0;
 /// Sizes of an error that are tried, over robot.toml's.
 const MULTIPLES: [f64; 5] = [2.0, 5.0, 10.0, 20.0, 40.0];
+/// Scales that all tags may have been printed at, and how often the interval is cut: to some 0.03 %.
+const LOG_RATIOS: [f64; 2] = [-0.15, 0.15];
+const GOLDEN_STEPS: usize = 14;
+/// A lens that is not the one of robot.toml may be off by so many of a measured lens's sigmas.
+const LENS_SCALE: f64 = 10.0;
 
 impl Drawing {
     /// Gives `input` the columns of this drawing.
     pub(crate) fn apply(&self, input: &mut BundleInput<'_>) {
-        input.model.lens |= self.has_lens;
+        if self.has_lens {
+            input.model.lens = true;
+            input.scales.lens_scale = LENS_SCALE;
+        }
         let Some(start) = &self.links else { return };
         input.model.n_links = input.model.n_links.max(start.n_links);
-        let (link_std, multiples) = (&mut input.scales.link_std, &start.multiples);
-        for (std, by) in link_std.iter_mut().flatten().zip(multiples.iter().flatten()) {
-            *std *= by;
+        let priors = &input.robot.geometry;
+        for ([shift, turn], [by_shift, by_turn]) in input.scales.link_std.iter_mut().zip(&start.multiples) {
+            *shift = by_shift * priors.link_position_std_m;
+            *turn = by_turn * priors.link_rotation_std_rad;
         }
         input.scales.mount_scale = start.mount_scale;
     }
 
-    /// The drawing of most evidence, if another than this explains the views much better; `input` has this one's
-    /// columns, `found` is its estimate.
-    pub(crate) fn better(&self, input: &BundleInput<'_>, found: &Estimate<'_>) -> Option<Self> {
+    /// The drawing of most evidence, if another than this explains the views much better, and by more than
+    /// `least_nats`; `input` has this one's columns and tags, `found` is its estimate.
+    pub(crate) fn better(&self, input: &BundleInput<'_>, found: &Estimate<'_>, least_nats: f64) -> Option<Self> {
         if input.joint_prior.is_some() {
             // A warm start knows the links from before, and its own test of agreement.
             return None;
         }
-        let links = found.link_start().filter(|_| self.links.is_none())?;
-        let mut alternatives = vec![Self { links: Some(links), ..self.clone() }];
-        if !self.has_lens && !found.has_positions() {
-            alternatives.push(Self { has_lens: true, ..self.clone() });
-        }
-        let gain_nats = |drawing: &Self| {
-            let mut input = input.clone();
-            drawing.apply(&mut input);
-            estimate(&input).map_or(f64::NEG_INFINITY, |wider| evidence_gain_nats(&wider, found))
+        let before = evidence(found);
+        let least_nats = least_nats.max(MIN_GAIN_NATS);
+        let gain = |drawing: &Self| {
+            let mut robot = input.robot.clone();
+            self.apply_new_faults(drawing, &mut robot);
+            let mut other = BundleInput { robot: &robot, ..input.clone() };
+            drawing.apply(&mut other);
+            estimate(&other).map_or(f64::NEG_INFINITY, |found| evidence(&found) - before)
         };
-        let all = alternatives.into_iter().map(|drawing| (gain_nats(&drawing), drawing));
-        let (best_nats, drawing) = all.max_by(|a, b| a.0.total_cmp(&b.0))?;
-        (best_nats > MIN_GAIN_NATS).then_some(drawing)
+        let mut gains: Vec<(f64, Self)> =
+            self.alternatives(input, found).into_iter().map(|drawing| (gain(&drawing), drawing)).collect();
+        let is_scaled = self.tags.iter().any(|fault| matches!(fault, TagFault::AllSizes { .. }));
+        if found.most_tags_are_doubtful() && !is_scaled {
+            let scaled = |ratio: f64| self.with_fault(TagFault::AllSizes { ratio });
+            let ratio = best_ratio(|ratio| gain(&scaled(ratio)));
+            gains.push((gain(&scaled(ratio)), scaled(ratio)));
+        }
+        let (gain, drawing) = gains.into_iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
+        (gain > least_nats).then_some(drawing)
+    }
+
+    fn with_fault(&self, fault: TagFault) -> Self {
+        Self { tags: self.tags.iter().copied().chain([fault]).collect(), ..self.clone() }
+    }
+
+    /// What else may explain the views, none where nothing is suspicious.
+    fn alternatives(&self, input: &BundleInput<'_>, found: &Estimate<'_>) -> Vec<Self> {
+        let (links, gain) = found.link_start();
+        let faults = found.tag_faults(input.views);
+        let is_suspicious = gain > MIN_GAIN_NATS || !faults.is_empty() || !found.departed_tags().is_empty();
+        let mut all = Vec::new();
+        if self.links.is_none() && gain > MIN_GAIN_NATS {
+            all.push(Self { links: Some(links), ..self.clone() });
+        }
+        if is_suspicious && !self.has_lens && !found.has_positions() {
+            all.push(Self { has_lens: true, ..self.clone() });
+        }
+        let new = faults.into_iter().filter(|fault| !self.tags.iter().any(|known| known.meets(fault)));
+        all.extend(new.map(|fault| self.with_fault(fault)));
+        all
+    }
+
+    /// Where `next` takes tags otherwise than this, `robot` does, too.
+    pub(crate) fn apply_new_faults(&self, next: &Self, robot: &mut Robot) {
+        next.tags[self.tags.len()..].iter().for_each(|fault| fault.apply(robot));
     }
 }
 
+/// Where `gain` is largest, by golden sections of the logarithm.
+fn best_ratio(gain: impl Fn(f64) -> f64) -> f64 {
+    let golden = 0.5 * (5f64.sqrt() - 1.0);
+    let gain = |log: f64| gain(log.exp());
+    let [mut low, mut high] = LOG_RATIOS;
+    let [mut a, mut b] = [high - golden * (high - low), low + golden * (high - low)];
+    let [mut at_a, mut at_b] = [gain(a), gain(b)];
+    for _ in 0..GOLDEN_STEPS {
+        if at_a > at_b {
+            (high, b, at_b) = (b, a, at_a);
+            a = high - golden * (high - low);
+            at_a = gain(a);
+        } else {
+            (low, a, at_a) = (a, b, at_b);
+            b = low + golden * (high - low);
+            at_b = gain(b);
+        }
+    }
+    (0.5 * (low + high)).exp()
+}
+
+/// Logarithm of the evidence, rejected observations at the cost that they are rejected at.
+fn evidence(found: &Estimate<'_>) -> f64 {
+    let rejected = found.problem.observations.iter().filter(|observation| !observation.is_used);
+    let n = rejected.map(|observation| observation.data.n_coordinates()).sum::<usize>() as f64;
+    log_evidence(&found.problem, &found.solved.normal) - n * (0.5 * REJECT + found.problem.scales.noise.ln())
+}
+
 impl Estimate<'_> {
-    /// Where to start links from; `None` where no error of the drawing would explain much.
-    fn link_start(&self) -> Option<LinkStart> {
+    /// Where to start links from, and what that may bring, nats.
+    pub(crate) fn link_start(&self) -> (LinkStart, f64) {
         let robot = self.problem.robot;
         let score = self.score();
         let n_links = self.n_seen_joints();
@@ -105,16 +182,13 @@ impl Estimate<'_> {
         let all = (0..n_links).flat_map(|joint| [0, 1].map(|kind| three(6 * joint + 3 * kind, priors[kind]))).flatten();
         consider(&all.collect::<Vec<_>>(), None);
         let (gain, element, multiple) = best;
-        if gain < MIN_GAIN_NATS {
-            return None;
-        }
         let mut start = LinkStart { n_links, multiples: [[1.0; 2]; MAX_JOINTS], mount_scale: [1.0; 2] };
         match element {
             Some((GeometryElement::Joint(joint), kind)) => start.multiples[joint][kind] = multiple,
             Some((GeometryElement::Mount, kind)) => start.mount_scale[kind] = multiple,
             None => start.multiples = [[multiple; 2]; MAX_JOINTS],
         }
-        Some(start)
+        (start, gain)
     }
 }
 

@@ -1,22 +1,30 @@
 //! What an estimate found of the drawing: links, base, camera mount and lens that are not as drawn.
 //!
-//! An element counts whose estimate z is many sigmas of the drawing's prior from it. Were the drawing kept, the sensors'
+//! An element counts whose estimate z is many sigmas of the drawing's prior from it, and which its own covariance C does
+//! not explain: `z^T C^-1 z` is large. Were the drawing kept, the sensors'
 //! parameters x would follow the posterior's covariance, `dx = C_xz C_zz^-1 z`, and the tool would be off by what both
 //! move it together.
 
 use nalgebra::{DVector, Matrix3, Vector3};
 
+use crate::calib::bundle::drawing::Drawing;
 use crate::calib::bundle::estimate::Estimate;
 use crate::calib::bundle::score_test::ToolJacobian;
+use crate::calib::bundle::tag_identity::TagFault;
 use crate::calib::finding::{Finding, FindingKind, FindingUnit};
+use crate::calib::geometry_error::{ErrorKind, GeometryError};
+use crate::calib::refusal::Refusal;
 use crate::calib::result::calibration::Calibration;
 use armcal_core::joints::JointAngles;
+use armcal_core::robot::Robot;
 use armcal_core::spatial::log;
 
-/// Sigmas of the drawing's prior, over three axes together, from which an element is named.
-const NAMED_SIGMAS: f64 = 6.0;
-/// Times its own uncertainty that an element must be off, too.
-const SURE_SIGMAS: f64 = 4.0;
+/// Sigmas, of the drawing's prior and of the estimate alike, from which an element is named.
+const NAMED_SIGMAS: f64 = 4.0;
+
+/// A base that is off by less than this at arm's length refuses nothing, m.
+const WORTH_M: f64 = 0.004;
+const REACH_M: f64 = 1.0;
 
 /// Three numbers of the drawing that were estimated.
 struct Departure {
@@ -24,8 +32,10 @@ struct Departure {
     name: String,
     unit: FindingUnit,
     size: Vector3<f64>,
-    /// Of the size, by the posterior: the root of the largest eigenvalue of its covariance.
+    /// Along the size, by the posterior.
     std: f64,
+    /// Over the posterior's covariance.
+    sure_sigmas: f64,
     /// Over the drawing's prior.
     sigmas: f64,
     tool_m: Option<f64>,
@@ -33,19 +43,25 @@ struct Departure {
 
 impl Estimate<'_> {
     /// Writes what is not as drawn to `calibration`, the most telling first; `task`: angles at which the tool matters.
-    pub(crate) fn report_drawing(&self, task: &[JointAngles], calibration: &mut Calibration) {
+    pub(crate) fn report_drawing(&self, drawing: &Drawing, task: &[JointAngles], calibration: &mut Calibration) {
         let mut found: Vec<Departure> = self.link_departures(task).collect();
         if self.problem.layout.links.is_empty() {
             found.clear();
         } else {
             found.extend(self.mount_departures());
         }
-        found
-            .retain(|departure| departure.sigmas > NAMED_SIGMAS && departure.size.norm() > SURE_SIGMAS * departure.std);
-        found.sort_by(|a, b| b.sigmas.total_cmp(&a.sigmas));
+        found.sort_by(|a, b| b.weight().total_cmp(&a.weight()));
+        // Where links were freed, the likeliest is named in any case.
+        let n = found.iter().filter(|departure| departure.weight() > NAMED_SIGMAS).count();
+        found.truncate(n.max(1));
         let mut findings: Vec<Finding> = found.iter().map(Departure::finding).collect();
         let mut words: Vec<String> = found.iter().map(Departure::words).collect();
-        if let Some((finding, word)) = self.lens_finding() {
+        if let Some(base) = found.iter().find(|departure| departure.is_undecided()) {
+            // Base or tags: the tool follows the one, and not the other.
+            calibration.refuse_first_for([Refusal::Geometry(base.geometry_error(self.problem.robot))]);
+        }
+        let of_tags = drawing.tags.iter().map(|fault| self.tag_finding(fault));
+        for (finding, word) in self.lens_finding().into_iter().chain(of_tags) {
             findings.push(finding);
             words.push(word);
         }
@@ -73,7 +89,8 @@ impl Estimate<'_> {
                 name,
                 unit: [FindingUnit::Metre, FindingUnit::Radian][kind],
                 sigmas: size.norm() / priors[kind].max(1e-9),
-                std: largest_std(&covariance),
+                std: std_along(&covariance, &size),
+                sure_sigmas: sigmas(&covariance, &size),
                 tool_m: Some(self.tool_moved_m(&tool, first, &size)),
                 size,
             }
@@ -87,12 +104,14 @@ impl Estimate<'_> {
         let columns = self.problem.layout.mount.into_iter().flat_map(|at| [(at, 0), (at + 3, 1)]);
         columns.map(move |(first, kind)| {
             let size = off.fixed_rows::<3>(3 * kind).into_owned();
+            let covariance = self.covariance3(first);
             Departure {
                 kind: FindingKind::CameraMount,
                 name: "camera mount".to_owned(),
                 unit: [FindingUnit::Metre, FindingUnit::Radian][kind],
                 sigmas: size.norm() / priors[kind].max(1e-9),
-                std: largest_std(&self.covariance3(first)),
+                std: std_along(&covariance, &size),
+                sure_sigmas: sigmas(&covariance, &size),
                 size,
                 tool_m: None,
             }
@@ -122,6 +141,32 @@ impl Estimate<'_> {
         ))
     }
 
+    fn tag_finding(&self, fault: &TagFault) -> (Finding, String) {
+        let tags = &self.problem.robot.tags;
+        let (kind, name, size, words) = match *fault {
+            TagFault::Swapped([a, b]) => {
+                let (a, b) = (tags[a].id, tags[b].id);
+                let words = format!("tags {a} and {b} hang in each other's place: taken so; correct the survey");
+                (FindingKind::TagSwapped, format!("{a} and {b}"), None, words)
+            }
+            TagFault::Size { tag_idx, ratio } => {
+                let (id, size_mm) = (tags[tag_idx].id, 1e3 * tags[tag_idx].size_m);
+                let percent = 100.0 * (ratio - 1.0);
+                let words = format!(
+                    "tag {id} is {size_mm:.1} mm wide, {percent:+.1} % of the survey: taken so; measure it again"
+                );
+                (FindingKind::TagSize, id.to_string(), Some(ratio - 1.0), words)
+            }
+            TagFault::AllSizes { ratio } => {
+                let percent = 100.0 * (ratio - 1.0);
+                let words = format!("all tags are {percent:+.1} % of the survey's size: taken so; measure one again");
+                (FindingKind::TagSize, "all".to_owned(), Some(ratio - 1.0), words)
+            }
+        };
+        let unit = size.map(|_| FindingUnit::One);
+        (Finding { kind, name, size, unit, tool_error_m: None, time_s: None, repaired: true }, words)
+    }
+
     fn covariance3(&self, first: usize) -> Matrix3<f64> {
         self.posterior.covariance.fixed_view::<3, 3>(first, first).into_owned()
     }
@@ -136,11 +181,41 @@ impl Estimate<'_> {
     }
 }
 
-fn largest_std(covariance: &Matrix3<f64>) -> f64 {
-    covariance.symmetric_eigenvalues().max().max(0.0).sqrt()
+fn std_along(covariance: &Matrix3<f64>, size: &Vector3<f64>) -> f64 {
+    let along = size.try_normalize(0.0).unwrap_or_else(Vector3::x);
+    (covariance * along).dot(&along).max(0.0).sqrt()
+}
+
+fn sigmas(covariance: &Matrix3<f64>, size: &Vector3<f64>) -> f64 {
+    covariance.try_inverse().map_or(0.0, |inverse| size.dot(&(inverse * size)).max(0.0).sqrt())
 }
 
 impl Departure {
+    /// Sigmas of the drawing's prior or of the estimate, whichever are fewer.
+    fn weight(&self) -> f64 {
+        self.sigmas.min(self.sure_sigmas)
+    }
+
+    /// A base that is not as drawn and tags that hang elsewhere all together look the same, and differ at the tool.
+    fn is_undecided(&self) -> bool {
+        let size_m = self.size.norm() * if self.unit == FindingUnit::Radian { REACH_M } else { 1.0 };
+        self.kind == FindingKind::Base
+            && self.weight() > NAMED_SIGMAS
+            && size_m.max(self.tool_m.unwrap_or(0.0)) > WORTH_M
+    }
+
+    fn geometry_error(&self, robot: &Robot) -> GeometryError {
+        GeometryError {
+            element: self.name.clone(),
+            joint: Some(robot.chain.joints()[0].name.clone()),
+            error: if self.unit == FindingUnit::Radian { ErrorKind::Turn } else { ErrorKind::Shift },
+            size: self.size.into(),
+            chi2: self.sure_sigmas.powi(2),
+            limit: NAMED_SIGMAS.powi(2),
+            tool_error_m: self.tool_m.unwrap_or(0.0),
+        }
+    }
+
     fn finding(&self) -> Finding {
         Finding {
             kind: self.kind,
@@ -149,7 +224,7 @@ impl Departure {
             unit: Some(self.unit),
             tool_error_m: self.tool_m,
             time_s: None,
-            repaired: true,
+            repaired: !self.is_undecided(),
         }
     }
 

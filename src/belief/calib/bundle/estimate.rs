@@ -10,7 +10,7 @@ use crate::calib::bundle::model::{Hyperparameters, Model};
 use crate::calib::bundle::outliers::{Outlier, outliers, reject};
 use crate::calib::bundle::priors::{mount_std, prior};
 use crate::calib::bundle::problem::{BundleProblem, ObservationTerm, State, WeightedMeasurement, parameters_of};
-use crate::calib::bundle::robust_start::{robust_start, straight_sensor_std};
+use crate::calib::bundle::robust_start::{RobustStart, robust_start, straight_sensor_std};
 use crate::calib::bundle::solve::{LOOSE, Solved, TIGHT, solve, until};
 use crate::calib::parameters::{JointParameters, Parameter};
 use armcal_core::numeric::{Loss, Outcome};
@@ -18,6 +18,7 @@ use armcal_core::robot::Robot;
 use armcal_core::spatial::Pose;
 
 /// The answer.
+#[derive(Clone)]
 pub struct Estimate<'a> {
     pub(crate) problem: BundleProblem<'a>,
     pub(crate) solved: Solved,
@@ -50,11 +51,12 @@ const CONVERGED_CHANGE: f64 = 0.01;
 /// Estimates; `None` where the views determine nothing at all (no cost that is finite).
 #[must_use]
 pub fn estimate<'a>(input: &BundleInput<'a>) -> Option<Estimate<'a>> {
-    let (start, mut iterations) = robust_start(input);
+    let RobustStart { parameters: start, steps, mut iterations } = robust_start(input);
     let prior = |scales: &Hyperparameters| prior(input, scales);
     let mut problem = BundleProblem::new(input, prior(&input.scales));
     let first_state = problem.start(&input.guess);
     let mut state = problem.start(&start);
+    problem.set_steps(&mut state, &steps);
     state.tags.clone_from(&first_state.tags);
     // Robustly on the corners; straight sensors leave what the datasheet says.
     problem.scales.joint_std_rad = straight_sensor_std(input);

@@ -26,7 +26,7 @@ pub(crate) struct Posterior {
 }
 
 /// Pseudo-observations that the first guess of each scale counts for.
-const NU_JOINT: f64 = 3.0;
+pub(crate) const NU_JOINT: f64 = 3.0;
 const NU_SHAPE: f64 = 2.0;
 const NU_TERM: f64 = 2.0;
 const NU_LINK: f64 = 2.0;

@@ -1,6 +1,7 @@
 //! What failed joints cost at the tool, and whether the task can do with them.
 
 use crate::calib::bundle::estimate::Estimate;
+use crate::calib::bundle::failure_detection::is_suspicious;
 use crate::calib::bundle::failures::{Failure, FailureSource};
 use crate::calib::covariance::{ParameterCovariance, ToolErrorPrediction, predict_tool_error};
 use crate::calib::finding::{Finding, FindingKind, FindingUnit};
@@ -11,6 +12,9 @@ use crate::calib::views::view::View;
 use armcal_core::robot::{FailedJoint, FailedKind, Robot};
 use armcal_core::stats::Summary;
 use armcal_core::streams::ReachTask;
+
+/// Fewer views do not tell where a sensor stands since it slipped from views in which it jumped.
+const MIN_VIEWS_SINCE: usize = 3;
 
 /// An estimate with failed joints, on the way to the tool.
 pub(crate) struct FailureImpact<'a> {
@@ -45,8 +49,10 @@ impl FailureImpact<'_> {
         self.prediction_where(usize::MAX, AngleSource::AsItIs)
     }
 
+    /// Of those that have a place in the result: reversed sensors and other scales are findings alone.
     pub(crate) fn tables(&self) -> Vec<FailedJointTable> {
-        self.failures.iter().map(|failure| self.table(failure)).collect()
+        let tabled = self.failures.iter().filter(|failure| failure.line.is_none());
+        tabled.map(|failure| self.table(failure)).collect()
     }
 
     fn table(&self, failure: &Failure) -> FailedJointTable {
@@ -148,16 +154,35 @@ impl FailureImpact<'_> {
 
     /// Each failed joint as a finding: the estimate takes account of it.
     pub(crate) fn findings(&self) -> Vec<Finding> {
-        let of = |failure: &Failure| Finding {
-            kind: if failure.since.is_some() { FindingKind::SensorSlip } else { FindingKind::SensorFailed },
-            name: self.robot.sensors[failure.joint].joint.clone(),
-            size: failure.step_rad,
-            unit: failure.step_rad.map(|_| FindingUnit::Radian),
+        self.failures.iter().map(|failure| self.finding(failure)).collect()
+    }
+
+    fn finding(&self, failure: &Failure) -> Finding {
+        let joint = failure.joint;
+        let step = failure.since.and_then(|since| self.found.step(joint, self.views[since].end));
+        let (kind, size, unit) = match (failure.line, step) {
+            (Some(line), _) if failure.leaves_no_sensor() => {
+                (FindingKind::SensorReversed, Some(line.slope), Some(FindingUnit::One))
+            }
+            (Some(_), _) => (FindingKind::SensorScale, Some(self.parameters.gain[joint]), Some(FindingUnit::One)),
+            (None, Some((size_rad, _))) => (FindingKind::SensorSlip, Some(size_rad), Some(FindingUnit::Radian)),
+            (None, None) => (FindingKind::SensorFailed, None, None),
+        };
+        let is_repaired = failure.line.is_none() || self.is_calibrated_anew(failure);
+        Finding {
+            kind,
+            name: self.robot.sensors[joint].joint.clone(),
+            size,
+            unit,
             tool_error_m: None,
             time_s: failure.since.and_then(|view_idx| self.since_first_view_s(view_idx)),
-            repaired: true,
-        };
-        self.failures.iter().map(of).collect()
+            repaired: is_repaired,
+        }
+    }
+
+    /// Whether a sensor of another scale is estimated with the rest, and the rest fits.
+    fn is_calibrated_anew(&self, failure: &Failure) -> bool {
+        !failure.leaves_no_sensor() && !is_suspicious(self.found)
     }
 
     fn since_first_view_s(&self, view_idx: usize) -> Option<f64> {
@@ -166,21 +191,26 @@ impl FailureImpact<'_> {
     }
 
     /// Why the calibration cannot be used for its task, or at all.
-    pub(crate) fn refusals(&self, tables: &[FailedJointTable]) -> Vec<Refusal> {
-        self.failures.iter().zip(tables).filter_map(|(failure, table)| self.refusal(failure, table)).collect()
+    pub(crate) fn refusals(&self) -> Vec<Refusal> {
+        self.failures.iter().filter_map(|failure| self.refusal(failure)).collect()
     }
 
-    fn refusal(&self, failure: &Failure, table: &FailedJointTable) -> Option<Refusal> {
-        let joint = table.joint.clone();
-        if failure.has_too_few_views_since(self.views.len()) {
-            let views = self.views.len() - failure.views.len();
-            return Some(Refusal::TooFewViewsSinceSlip { joint, evidence: table.evidence.clone(), views });
+    fn refusal(&self, failure: &Failure) -> Option<Refusal> {
+        let joint = self.robot.sensors[failure.joint].joint.clone();
+        if let Some(line) = failure.line.filter(|_| !self.is_calibrated_anew(failure)) {
+            return Some(Refusal::SensorLine { joint, slope: line.slope });
+        }
+        if let Some(views) = failure.n_views_since(self.views)
+            && views < MIN_VIEWS_SINCE
+        {
+            return Some(Refusal::TooFewViewsSinceSlip { joint, evidence: failure.evidence.clone(), views });
         }
         let task = self.task?;
         let is_needed = failure.joint < self.robot.tool.mount.n_joints;
         if !failure.leaves_no_sensor() || failure.kind == FailedKind::Locked || !is_needed {
             return None;
         }
+        let table = self.table(failure);
         Some(Refusal::SensorFailed {
             joint,
             kind: failure.kind,

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use crate::calib::bundle::estimate::Estimate;
-use crate::calib::bundle::failures::{FAR_RAD, FAR_SIGMAS, SensorUse};
+use crate::calib::bundle::failures::{FAR_RAD, FAR_SIGMAS, SensorLine, SensorUse, slip_in_words};
 use crate::calib::views::view::View;
 use armcal_core::robot::Robot;
 use armcal_core::stats::quantile;
@@ -27,10 +27,14 @@ pub(crate) enum FailurePattern {
     Stuck,
     /// They have nothing to do with each other.
     Dead,
+    /// They go the other way, along a line.
+    Reversed(SensorLine),
+    /// They go along a line of a slope that no sensor of the datasheet has.
+    Scaled(SensorLine),
     /// The readings of these views are off.
     Single(Vec<usize>),
-    /// The readings are off against each other before and since a view.
-    Lasting { before: Vec<usize>, since: usize },
+    /// The readings are off against each other before and since a view, by so much, rad.
+    Lasting { since: usize, step_rad: f64 },
 }
 
 /// An angle that is spread by less than this many of its own sigma, or than `LOCKED_RAD`, does not change.
@@ -39,6 +43,9 @@ const LOCKED_RAD: f64 = 0.2 * std::f64::consts::PI / 180.0;
 /// A sensor that says something follows the angle to this share of the angle's spread, with about the datasheet's
 /// slope.
 const FOLLOWS: f64 = 0.3;
+/// Distances from a straight line, as a share of the angle's spread, and the least uncertainty of a gain.
+const STRAIGHT: f64 = 0.05;
+const LEAST_GAIN_STD: f64 = 0.01;
 /// A step that lasts leaves this share of the squares that a straight line leaves.
 const STEP_LEAVES: f64 = 1.0 / 6.0;
 const MIN_SIDE: usize = 2;
@@ -84,11 +91,16 @@ impl Readings {
             let near_zero = counts.min(spec.wrap_counts - counts) < FAR_SIGMAS * spec.noise_std_counts.max(1.0);
             return Some(if near_zero { FailurePattern::Dead } else { FailurePattern::Stuck });
         }
+        let (off_rad, line) = self.off_line(spec.center_rad);
+        let slope = line.slope;
+        let sizes: Vec<f64> = off_rad.iter().map(|off| off.abs()).collect();
+        let is_straight = 1.4826 * quantile(&sizes, 0.5)? < STRAIGHT * spread_rad;
+        if is_straight && (slope - 1.0).abs() > FAR_SIGMAS * spec.gain_std.max(LEAST_GAIN_STD) {
+            return Some(if slope < 0.0 { FailurePattern::Reversed(line) } else { FailurePattern::Scaled(line) });
+        }
         if let Some(step) = self.step() {
             return Some(step);
         }
-        let (off_rad, slope) = self.off_line();
-        let sizes: Vec<f64> = off_rad.iter().map(|off| off.abs()).collect();
         let sigma_rad = (1.4826 * quantile(&sizes, 0.5)?).max(own_rad);
         if 1.4826 * quantile(&sizes, 0.5)? > FOLLOWS * spread_rad || !(0.7..1.3).contains(&slope) {
             return Some(FailurePattern::Dead);
@@ -123,11 +135,7 @@ impl Readings {
         let is_clear = squares < STEP_LEAVES * without
             && step_rad.abs() > FAR_RAD.max(3.0 * sigma_rad)
             && sigma_rad < FOLLOWS * deviation(&self.angle_rad);
-        is_clear.then(|| {
-            let mut before = self.view_idx[..at].to_vec();
-            before.sort_unstable();
-            FailurePattern::Lasting { before, since: self.view_idx[at] }
-        })
+        is_clear.then(|| FailurePattern::Lasting { since: self.view_idx[at], step_rad })
     }
 
     /// Sum of squares about a straight line with a step at the `at`-th view, and the step; at the end there is none.
@@ -143,13 +151,8 @@ impl Readings {
         Some(((0..self.len()).map(|k| (self.angle_rad[k] - row(k).dot(&x)).powi(2)).sum(), -x[2]))
     }
 
-    /// By how much the readings stepped at the `at`-th view.
-    pub(crate) fn step_rad(&self, at: usize) -> Option<f64> {
-        self.squares_with_step(at).map(|(_, step_rad)| step_rad)
-    }
-
-    /// Distances from the line of least absolute deviations, and its slope (iteratively reweighted least squares).
-    fn off_line(&self) -> (Vec<f64>, f64) {
+    /// Distances from the line of least absolute deviations, and the line (iteratively reweighted least squares).
+    fn off_line(&self, center_rad: f64) -> (Vec<f64>, SensorLine) {
         const ROUNDS: usize = 60;
         const FLOOR_RAD: f64 = 1e-5;
         let differences: Vec<f64> = self.angle_rad.iter().zip(&self.travel_rad).map(|(a, t)| a - t).collect();
@@ -169,7 +172,7 @@ impl Readings {
             slope = (w * at - t * a) / determinant;
             offset = (a - slope * t) / w;
         }
-        (off(offset, slope), slope)
+        (off(offset, slope), SensorLine { slope, offset_rad: offset - center_rad })
     }
 
     /// What shows the pattern.
@@ -198,20 +201,19 @@ impl Readings {
             FailurePattern::Dead => {
                 format!("the reading spans {read:.1} deg and does not follow the {shown:.1} deg that the camera shows")
             }
+            FailurePattern::Reversed(SensorLine { slope, .. }) => format!(
+                "the reading goes the other way: over {n} views the {shown:.1} deg that the camera shows follow it \
+                 with a slope of {slope:.2}"
+            ),
+            FailurePattern::Scaled(SensorLine { slope, .. }) => format!(
+                "the {shown:.1} deg that the camera shows in {n} views follow the {read:.1} deg of the reading along \
+                 a line of slope {slope:.2}"
+            ),
             FailurePattern::Single(of) => {
                 let poses: Vec<u32> = of.iter().map(|&k| pose(k)).collect();
                 format!("the reading is off in {} of {n} views (poses {poses:?})", of.len())
             }
-            FailurePattern::Lasting { before, since } => {
-                let step = self.step_rad(before.len()).unwrap_or(0.0).to_degrees();
-                let after = n - before.len();
-                format!(
-                    "the sensor slipped by {step:.2} deg between {before} views and {after} views, the first of them \
-                     pose {}",
-                    pose(*since),
-                    before = before.len()
-                )
-            }
+            FailurePattern::Lasting { since, step_rad } => slip_in_words(*step_rad, views, *since),
         }
     }
 }

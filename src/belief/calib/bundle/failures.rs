@@ -38,6 +38,19 @@ pub enum SensorUse {
     Ignored,
 }
 
+/// How a joint's angle goes with its reading where that is not as its datasheet has it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SensorLine {
+    /// Of the angle by the datasheet's travel; below zero the sensor is reversed.
+    pub slope: f64,
+    /// Angle at no travel, from the middle of the range.
+    pub offset_rad: f64,
+}
+
+/// Priors of a sensor of another scale than its datasheet's: gain, and offset in rad. Wide.
+const OTHER_GAIN_STD: f64 = 1.0;
+const OTHER_OFFSET_STD_RAD: f64 = 0.5;
+
 /// One failed joint, and what is not used of it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Failure {
@@ -51,10 +64,12 @@ pub struct Failure {
     pub reading: SensorUse,
     /// Views whose reading says nothing, ascending.
     pub views: Vec<usize>,
-    /// Of a slip that lasts: the first view after it in the order of time; the readings before it are not used.
+    /// Of a slip that lasts: the first view after it in the order of time; before it the sensor had another offset.
     pub since: Option<usize>,
-    /// By how much the readings are off against each other before and since, rad.
+    /// By how much more it reads since, rad.
     pub step_rad: Option<f64>,
+    /// Of a reversed sensor, whose reading is not used, and of one of another scale, whose gain is estimated.
+    pub line: Option<SensorLine>,
     /// What shows it, in words.
     pub evidence: String,
 }
@@ -71,6 +86,7 @@ impl Failure {
             views,
             since: None,
             step_rad: None,
+            line: None,
             evidence: String::new(),
         }
     }
@@ -85,15 +101,42 @@ impl Failure {
         }
     }
 
-    /// A slip so late that the sensor as it is now shows in hardly any view.
-    pub fn has_too_few_views_since(&self, n_views: usize) -> bool {
-        self.since.is_some() && n_views - self.views.len() < MIN_VIEWS
+    /// A sensor that slipped by `step_rad` before the view `since`.
+    pub fn slip(joint: usize, step_rad: f64, views: &[View], since: usize) -> Self {
+        Self {
+            reading: SensorUse::Used,
+            since: Some(since),
+            step_rad: Some(step_rad),
+            evidence: slip_in_words(step_rad, views, since),
+            ..Self::without_sensor(joint, FailedKind::Jumps, FailureSource::Detected, 0)
+        }
+    }
+
+    /// Whether the sensor slipped once for good.
+    pub fn is_step(&self) -> bool {
+        self.since.is_some()
+    }
+
+    /// How many of `views` show the sensor as it is since it slipped.
+    pub fn n_views_since(&self, views: &[View]) -> Option<usize> {
+        let since = views[self.since?].end;
+        Some(views.iter().filter(|view| view.end >= since && !view.tags.is_empty()).count())
     }
 
     /// Whether the joint's parameters have no data at all.
     pub fn leaves_no_sensor(&self) -> bool {
         self.reading == SensorUse::Ignored
     }
+}
+
+/// `the sensor slipped by 1.00 deg between 9 views and 11 views, the first of them pose 9`.
+pub(crate) fn slip_in_words(step_rad: f64, views: &[View], since: usize) -> String {
+    let n_before = views.iter().filter(|view| view.end < views[since].end).count();
+    let (step_deg, n_after, pose_idx) = (step_rad.to_degrees(), views.len() - n_before, views[since].pose_idx);
+    format!(
+        "the sensor slipped by {step_deg:.2} deg between {n_before} views and {n_after} views, the first of them pose \
+         {pose_idx}"
+    )
 }
 
 /// An arm and its views with the failed joints taken care of.
@@ -123,6 +166,11 @@ impl FailureAdjusted {
         }
         for failure in failures.iter().filter(|f| f.kind == FailedKind::Locked && f.leaves_no_sensor()) {
             applied.lock(failure.joint);
+        }
+        for failure in failures.iter().filter(|failure| failure.line.is_some() && !failure.leaves_no_sensor()) {
+            let spec = &mut applied.robot.sensors[failure.joint];
+            spec.gain_std = spec.gain_std.max(OTHER_GAIN_STD);
+            spec.offset_std_rad = spec.offset_std_rad.max(OTHER_OFFSET_STD_RAD);
         }
         applied
     }
@@ -154,6 +202,13 @@ impl FailureAdjusted {
             let is_locked = failure.kind == FailedKind::Locked;
             model.joints[failure.joint] = if is_locked { vec![ParameterKind::Offset] } else { Vec::new() };
         }
+        for (failure, since) in self.failures.iter().filter_map(|failure| Some((failure, failure.since?))) {
+            let kinds = &mut model.joints[failure.joint];
+            // Without a column of its own the sensor is exact.
+            if !kinds.is_empty() {
+                kinds.push(ParameterKind::StepBefore(self.views[since].end));
+            }
+        }
     }
 
     /// From the datasheet.
@@ -163,13 +218,24 @@ impl FailureAdjusted {
             views: &self.views,
             model: self.model(),
             scales: Hyperparameters::datasheet(&self.robot),
-            guess: JointParameters { reference: reference(&self.views), ..JointParameters::default() },
+            guess: self.guess(),
             joint_prior: None,
             evidence,
         }
     }
 
     /// The estimate from the datasheet; `None` where the views determine nothing.
+    fn guess(&self) -> JointParameters {
+        let mut guess = JointParameters { reference: reference(&self.views), ..JointParameters::default() };
+        for (joint, line) in self.failures.iter().filter_map(|failure| Some((failure.joint, failure.line?))) {
+            if !self.failures.iter().any(|failure| failure.joint == joint && failure.leaves_no_sensor()) {
+                (guess.gain[joint], guess.offset_rad[joint]) = (line.slope, line.offset_rad);
+            }
+        }
+        guess
+    }
+
+    /// The estimate from the datasheet.
     pub fn estimate(&self, evidence: HyperparameterMode) -> Option<Estimate<'_>> {
         estimate(&self.input(evidence))
     }

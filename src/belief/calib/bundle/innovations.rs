@@ -24,11 +24,11 @@ use armcal_core::numeric::Loss;
 pub struct Innovations {
     /// Of all coordinates.
     pub chi2: f64,
-    /// Number of those coordinates.
+    /// Number of those coordinates, less one for each joint of a view whose sensor says nothing.
     pub dof: usize,
     /// Of the cameras' poses alone.
     pub camera_chi2: f64,
-    /// Six per view that shows enough.
+    /// Six per view that shows enough, less one for each joint whose sensor says nothing.
     pub camera_dof: usize,
     /// Those that the views tell enough of.
     pub joints: Vec<JointInnovation>,
@@ -86,8 +86,17 @@ impl Estimate<'_> {
         }
         let (foretold, chi2) = self.with_data(&problem, &state)?;
         let joints = foretold.joints(&problem, left_out);
-        let dof = problem.observations.iter().filter(|s| s.is_used).map(|s| s.data.n_coordinates()).sum();
-        let camera_dof = (0..views.len()).map(|view_idx| camera_numbers(&problem, view_idx)).sum();
+        // A joint without a sensor takes up one number of its view, whatever it is.
+        let taken = |view_idx: usize| problem.views[view_idx].is_free.iter().filter(|is_free| **is_free).count();
+        let told = |view_idx: usize| {
+            let used = &problem.observations[problem.views[view_idx].observations.clone()];
+            used.iter().filter(|s| s.is_used).map(|s| s.data.n_coordinates()).sum::<usize>()
+        };
+        let numbers = |of: &dyn Fn(usize) -> usize| -> usize {
+            (0..views.len()).map(|view_idx| of(view_idx).saturating_sub(taken(view_idx))).sum()
+        };
+        let dof = numbers(&told);
+        let camera_dof = numbers(&|view_idx| camera_numbers(&problem, view_idx));
         problem.scales.camera_error_std = Some([FREE_CAMERA; 2]);
         let (_, free_chi2) = self.with_data(&problem, &state)?;
         Some(Innovations { chi2, dof, camera_chi2: (chi2 - free_chi2).max(0.0), camera_dof, joints })

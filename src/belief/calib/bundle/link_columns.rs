@@ -26,7 +26,7 @@ pub(crate) fn link_twists(group: &Group<'_>, corrections: &LinkCorrections) -> L
         for axis in 0..3 {
             let shift = Vector3::ith(axis, group.sign);
             let turn = by_turn.column(axis) * group.sign;
-            let [shift, turn] = link_twist(group.poses, &group.base_from_camera, joint, [shift, turn.into()]);
+            let [shift, turn] = link_twist(group.poses, &group.base_from_camera, joint, [shift, turn]);
             twists.set_column(6 * joint + axis, &shift);
             twists.set_column(6 * joint + 3 + axis, &turn);
         }

@@ -18,6 +18,7 @@ use armcal_core::numeric::Loss;
 use nalgebra::DMatrix;
 
 /// What leaves an estimate as its covariance.
+#[derive(Clone)]
 pub(crate) struct Marginal {
     /// Of the common parameters.
     pub covariance: DMatrix<f64>,

@@ -48,6 +48,8 @@ pub struct Hyperparameters {
     pub link_std: [[f64; 2]; MAX_JOINTS],
     /// Of the camera mount, over what robot.toml says of it: shift, turn.
     pub mount_scale: [f64; 2],
+    /// Of the lens, over its prior's.
+    pub lens_scale: f64,
     /// All measurements' standard deviations over what is stated for them.
     pub noise: f64,
     /// Of positions and poses that a recording gives in place of corners.
@@ -62,6 +64,9 @@ pub struct Hyperparameters {
 /// Correlation length of a sensor's nonlinearity, half ranges. Assumed: four waves over the range are then still half
 /// as likely as one.
 pub const SHAPE_LENGTH: f64 = 0.16;
+
+/// How far a sensor may slip on its shaft, rad. Assumed: wide, the views tell it.
+pub(crate) const STEP_STD_RAD: f64 = 0.1;
 
 impl Hyperparameters {
     /// What robot.toml says, and where it is silent what is usual (assumed; the data correct it).
@@ -86,6 +91,7 @@ impl Hyperparameters {
             half_play_std_rad: 2e-4,
             link_std: [[robot.geometry.link_position_std_m, robot.geometry.link_rotation_std_rad]; MAX_JOINTS],
             mount_scale: [1.0; 2],
+            lens_scale: 1.0,
             noise: 1.0,
             position_std_m: 0.005,
             rotation_std_rad: 0.02,
@@ -105,6 +111,7 @@ impl Hyperparameters {
             ParameterKind::OffsetPerMpa => self.offset_std_rad_per_mpa,
             ParameterKind::DriftPerH => self.drift_std_rad_per_h,
             ParameterKind::HalfBacklash => self.half_play_std_rad,
+            ParameterKind::StepBefore(_) => STEP_STD_RAD,
             ParameterKind::LinkShift(_) => self.link_std[joint][0],
             ParameterKind::LinkTurn(_) => self.link_std[joint][1],
         }

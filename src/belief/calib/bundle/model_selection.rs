@@ -124,7 +124,7 @@ fn log_evidence_on(found: &Estimate<'_>, used: &[bool]) -> f64 {
 }
 
 /// Up to what all models of the same data share.
-fn log_evidence(problem: &BundleProblem<'_>, normal: &NormalEquations) -> f64 {
+pub(crate) fn log_evidence(problem: &BundleProblem<'_>, normal: &NormalEquations) -> f64 {
     let log_det = |matrix: &nalgebra::DMatrix<f64>| {
         Cholesky::new(matrix.clone()).map(|f| 2.0 * f.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>())
     };

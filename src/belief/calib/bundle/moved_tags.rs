@@ -51,6 +51,13 @@ impl Estimate<'_> {
         (worst.chi2 > by_geometry).then_some(worst)
     }
 
+    /// Tags that the data have elsewhere than their survey, by more than chance.
+    pub(crate) fn departed_tags(&self) -> Vec<usize> {
+        let all: Vec<TagDeparture> =
+            (0..self.problem.robot.tags.len()).filter_map(|tag_idx| self.tag_departure(tag_idx)).collect();
+        all.iter().filter(|departure| !departure.is_by_chance(all.len())).map(|departure| departure.tag_idx).collect()
+    }
+
     /// `None` where the data tell nothing of the tag.
     pub(crate) fn tag_departure(&self, tag_idx: usize) -> Option<TagDeparture> {
         let (pose, covariance) = self.tag(tag_idx);

@@ -64,13 +64,13 @@ const NAMED: f64 = 0.3;
 /// At the robust start of `input`; `None` where nothing has a column.
 #[must_use]
 pub fn observability(input: &BundleInput<'_>) -> Option<Observability> {
-    let (start, _) = robust_start(input);
+    let start = robust_start(input);
     let mut priors = prior(input, &input.scales);
     let layout = Layout::new(input.robot, &input.model, input.views);
     let kept = |column: usize| {
         layout.parameters.get(column).map_or_else(
             || !layout.tags.iter().flatten().any(|at| (*at..at + 6).contains(&column)),
-            |p| !matches!(p.kind, ParameterKind::Shape(_)) && !p.kind.is_of_link(),
+            |p| !matches!(p.kind, ParameterKind::Shape(_) | ParameterKind::StepBefore(_)) && !p.kind.is_of_link(),
         )
     };
     let wanted: Vec<usize> = (0..layout.n).filter(|&column| kept(column)).collect();
@@ -88,7 +88,9 @@ pub fn observability(input: &BundleInput<'_>) -> Option<Observability> {
     (priors.time_std_s, priors.lens_std) = (f64::INFINITY, [f64::INFINITY; 8]);
     let problem = BundleProblem::new(input, priors);
     let mut normal = NormalEquations::new(&problem);
-    normal.update(&problem, &problem.start(&start), Loss::Square);
+    let mut state = problem.start(&start.parameters);
+    problem.set_steps(&mut state, &start.steps);
+    normal.update(&problem, &state, Loss::Square);
     let information = information(&problem, &normal, &wanted, &sigma)?;
     let is_term = |column: usize| {
         let kind = layout.parameters.get(column).map(|p| p.kind);

@@ -18,7 +18,7 @@ pub struct Outlier {
 
 /// An observation whose chi-square is this many times its number of coordinates belongs elsewhere; one below `READMIT`
 /// belongs here.
-const REJECT: f64 = 7.5;
+pub(crate) const REJECT: f64 = 7.5;
 const READMIT: f64 = 5.0;
 
 /// Marks what does not belong; whether anything changed.
@@ -32,6 +32,11 @@ pub(crate) fn reject(problem: &mut BundleProblem<'_>, solved: &Solved) -> bool {
         observation.is_used = belongs;
     }
     changed
+}
+
+/// Chi-square above which an observation is rejected.
+pub(crate) fn rejection_chi2(seen: &WeightedMeasurement) -> f64 {
+    REJECT * seen.n_coordinates() as f64 * noise_excess(seen)
 }
 
 /// Positions and poses come with a standard deviation that is a guess until the scales are fitted.

@@ -9,6 +9,9 @@ use crate::calib::parameters::{JointParameters, Parameter};
 use crate::calib::views::view::TagMeasurement;
 use armcal_core::robot::Robot;
 
+/// One sigma of a lens as it is usually measured: focal lengths and centre px, then distortion. Assumed.
+const LENS_STD: [f64; 8] = [1.0, 1.0, 1.0, 1.0, 1e-2, 1e-2, 1e-2, 1e-2];
+
 /// The datasheet's and the survey's priors.
 pub(crate) fn prior(input: &BundleInput<'_>, scales: &Hyperparameters) -> Prior {
     let robot = input.robot;
@@ -35,7 +38,7 @@ pub(crate) fn prior(input: &BundleInput<'_>, scales: &Hyperparameters) -> Prior 
         mount_std: mount_std(robot, scales),
         time_std_s: 0.05,
         lens: camera.lens,
-        lens_std: [1.0, 1.0, 1.0, 1.0, 1e-2, 1e-2, 1e-2, 1e-2],
+        lens_std: LENS_STD.map(|std| std * scales.lens_scale),
         tags: robot.tags.iter().map(|tag| *tag.base_from_tag.isometry()).collect(),
         tags_std: (0..robot.tags.len()).map(|tag_idx| tag_std(input, tag_idx)).collect(),
         gripper_tag: gripper.map_or_else(Isometry3::identity, |tag| tag.mount.link_from_frame),

@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector, Isometry3, Vector3};
 
 use crate::calib::bundle::input::BundleInput;
 use crate::calib::bundle::model::{Hyperparameters, Model};
-use crate::calib::parameters::{JointParameters, Parameter};
+use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
 use crate::calib::views::view::{MeanCorners, TagMeasurement, View};
 use armcal_core::joints::{JointAngles, MAX_JOINTS};
 use armcal_core::kinematics::{LinkCorrections, LinkPoses};
@@ -251,6 +251,20 @@ impl<'a> BundleProblem<'a> {
         }
     }
 
+    /// The steps of sensors that slipped.
+    pub(crate) fn steps(&self, state: &State) -> Vec<(Parameter, f64)> {
+        let all = self.layout.parameters.iter().copied().zip(state.joint.iter().copied());
+        all.filter(|(p, _)| p.is_step()).collect()
+    }
+
+    pub(crate) fn set_steps(&self, state: &mut State, steps: &[(Parameter, f64)]) {
+        for (parameter, step_rad) in steps {
+            if let Some(column) = self.layout.parameters.iter().position(|p| p == parameter) {
+                state.joint[column] = *step_rad;
+            }
+        }
+    }
+
     /// Variance of what a joint is off in a view beyond the sensor's model, rad^2.
     pub(crate) fn joint_error_var(&self, view: &ViewData, joint: usize) -> f64 {
         if view.is_free[joint] {
@@ -326,7 +340,10 @@ fn view_data(
         let travel_rad = view.travel_rad[joint];
         let mut fixed = guess.correction(joint).angle_rad(spec, travel_rad, &departure, view.approach[joint]);
         for parameter in &layout.parameters[layout.of_joint[joint].clone()] {
-            let by = parameter.kind.angle_derivative(spec, travel_rad, &departure, view.approach[joint]);
+            let by = match parameter.kind {
+                ParameterKind::StepBefore(since) => f64::from(view.end < since),
+                kind => kind.angle_derivative(spec, travel_rad, &departure, view.approach[joint]),
+            };
             fixed -= by * guess.get(*parameter);
             data.basis.push(by);
         }

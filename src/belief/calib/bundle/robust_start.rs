@@ -5,7 +5,7 @@ use crate::calib::bundle::model::{Hyperparameters, Model};
 use crate::calib::bundle::priors::prior;
 use crate::calib::bundle::problem::{BundleProblem, parameters_of};
 use crate::calib::bundle::solve::{LOOSE, solve};
-use crate::calib::parameters::{JointParameters, ParameterKind};
+use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
 use crate::calib::views::view::TagMeasurement;
 use armcal_core::joints::MAX_JOINTS;
 use armcal_core::numeric::Loss;
@@ -14,8 +14,16 @@ use armcal_core::numeric::Loss;
 const START_STD_M: [f64; 3] = [0.3, 0.1, 0.03];
 const START_WIDTH: f64 = 1.0;
 
-/// Gain and offset from the tags' positions in the camera frame; what is far counts little.
-pub(crate) fn robust_start(input: &BundleInput<'_>) -> (JointParameters, usize) {
+/// Where the estimate starts.
+pub(crate) struct RobustStart {
+    pub parameters: JointParameters,
+    /// What the sensors slipped by.
+    pub steps: Vec<(Parameter, f64)>,
+    pub iterations: usize,
+}
+
+/// Gain, offset and steps from the tags' positions in the camera frame; what is far counts little.
+pub(crate) fn robust_start(input: &BundleInput<'_>) -> RobustStart {
     let mut views = input.views.to_vec();
     for view in &mut views {
         view.gripper_tag = None;
@@ -23,7 +31,9 @@ pub(crate) fn robust_start(input: &BundleInput<'_>) -> (JointParameters, usize) 
             tag.measured = TagMeasurement::Position;
         }
     }
-    let linear = |kind: &ParameterKind| matches!(kind, ParameterKind::Gain | ParameterKind::Offset);
+    let linear = |kind: &ParameterKind| {
+        matches!(kind, ParameterKind::Gain | ParameterKind::Offset | ParameterKind::StepBefore(_))
+    };
     let n_before = input.robot.camera.mount.n_joints;
     let of_joint = |(joint, kinds): (usize, &Vec<ParameterKind>)| {
         if joint < n_before { kinds.iter().copied().filter(linear).collect() } else { Vec::new() }
@@ -37,7 +47,7 @@ pub(crate) fn robust_start(input: &BundleInput<'_>) -> (JointParameters, usize) 
         gripper_tag: false,
         time_offset: false,
     };
-    let mut parameters = input.guess;
+    let (mut parameters, mut steps) = (input.guess, Vec::new());
     let mut iterations = 0;
     for std_m in START_STD_M {
         let scales = Hyperparameters {
@@ -47,11 +57,14 @@ pub(crate) fn robust_start(input: &BundleInput<'_>) -> (JointParameters, usize) 
         };
         let linear = BundleInput { views: &views, model: model.clone(), joint_prior: None, scales, ..input.clone() };
         let problem = BundleProblem::new(&linear, prior(&linear, &linear.scales));
-        let solved = solve(&problem, problem.start(&parameters), Loss::Cauchy { c: START_WIDTH }, LOOSE);
+        let mut start = problem.start(&parameters);
+        problem.set_steps(&mut start, &steps);
+        let solved = solve(&problem, start, Loss::Cauchy { c: START_WIDTH }, LOOSE);
         iterations += solved.iterations;
         parameters = parameters_of(&problem, &solved.state, &parameters);
+        steps = problem.steps(&solved.state);
     }
-    (parameters, iterations)
+    RobustStart { parameters, steps, iterations }
 }
 
 /// At least the datasheet's linearity: what straight sensors leave.

@@ -14,7 +14,8 @@ use crate::calib::bundle::observation_term::PoseInformation;
 use crate::calib::bundle::problem::WeightedMeasurement;
 use crate::calib::bundle::schur::{N_VIEW_PARAMETERS, SchurBlock};
 use crate::calib::geometry_error::ErrorKind;
-use crate::calib::parameters::{Parameter, ParameterKind};
+use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
+use crate::calib::views::view::View;
 use armcal_core::joints::{JointAngles, MAX_JOINTS};
 use armcal_core::kinematics::LinkPoses;
 use armcal_core::robot::Robot;
@@ -227,11 +228,11 @@ impl Estimate<'_> {
 
 /// The tool at one configuration, and how it moves.
 pub(crate) struct ToolJacobian {
-    poses: LinkPoses,
+    pub(crate) poses: LinkPoses,
     /// Base frame.
-    tool_m: Vector3<f64>,
+    pub(crate) tool_m: Vector3<f64>,
     /// By the estimated joints' parameters, m per unit.
-    by_parameters: Vec<Vector3<f64>>,
+    pub(crate) by_parameters: Vec<Vector3<f64>>,
     n_joints: usize,
 }
 
@@ -247,16 +248,39 @@ impl ToolJacobian {
             if joint >= tool.n_joints {
                 return Vector3::zeros();
             }
-            let along = |axis: u8| poses.link(joint).rotation * Vector3::ith(usize::from(axis), 1.0);
-            match parameter.kind {
-                ParameterKind::LinkShift(axis) => return along(axis),
-                ParameterKind::LinkTurn(axis) => return along(axis).cross(&(tool_m - poses.joint_origin(joint))),
-                _ => {}
+            if parameter.kind.is_of_link() {
+                return by_link(&poses, &tool_m, *parameter);
             }
             let spec = &sensors.models[joint].spec;
             poses.point_jacobian(joint, &tool_m) * parameter.kind.angle_derivative(spec, travel_rad[joint], &still, 0.0)
         };
         let by_parameters = parameters.iter().map(by).collect();
+        Self { by_parameters, tool_m, n_joints: tool.n_joints, poses }
+    }
+
+    /// By the readings of an arm at rest, under their conditions.
+    pub(crate) fn of_view(robot: &Robot, estimated: &[Parameter], at: &JointParameters, view: &View) -> Self {
+        let departure = view.conditions.departure_from(&at.reference);
+        let angles = JointAngles::from_fn(robot.n_joints(), |joint| {
+            let (spec, travel_rad) = (&robot.sensors[joint], view.travel_rad[joint]);
+            at.correction(joint).angle_rad(spec, travel_rad, &departure, view.approach[joint])
+        });
+        let poses = robot.chain.link_poses(&angles);
+        let tool = &robot.tool.mount;
+        let tool_m = poses.frame(tool).translation.vector;
+        let by = |parameter: &Parameter| {
+            let Parameter { joint, kind } = *parameter;
+            if joint >= tool.n_joints {
+                return Vector3::zeros();
+            }
+            if kind.is_of_link() {
+                return by_link(&poses, &tool_m, *parameter);
+            }
+            let (spec, travel_rad) = (&robot.sensors[joint], view.travel_rad[joint]);
+            let by_angle = kind.angle_derivative(spec, travel_rad, &departure, view.approach[joint]);
+            poses.point_jacobian(joint, &tool_m) * by_angle
+        };
+        let by_parameters = estimated.iter().map(by).collect();
         Self { by_parameters, tool_m, n_joints: tool.n_joints, poses }
     }
 
@@ -275,8 +299,22 @@ impl ToolJacobian {
             let lever = self.tool_m - self.poses.joint_origin(joint);
             moved += if first.is_multiple_of(6) { turned } else { turned.cross(&lever) };
         }
-        let step = score.sensitivity.columns(first, 3) * size;
-        moved + self.moved_by(&step)
+        moved + self.followed(score, first, size)
+    }
+
+    /// What of that the joints' parameters alone do, which follow the trial.
+    pub(crate) fn followed(&self, score: &Score, first: usize, size: &Vector3<f64>) -> Vector3<f64> {
+        self.moved_by(&(score.sensitivity.columns(first, 3) * size))
+    }
+}
+
+/// The tool's motion by a parameter of link geometry, m per unit.
+fn by_link(poses: &LinkPoses, tool_m: &Vector3<f64>, Parameter { joint, kind }: Parameter) -> Vector3<f64> {
+    let along = |axis: u8| poses.link(joint).rotation * Vector3::ith(usize::from(axis), 1.0);
+    match kind {
+        ParameterKind::LinkShift(axis) => along(axis),
+        ParameterKind::LinkTurn(axis) => along(axis).cross(&(tool_m - poses.joint_origin(joint))),
+        _ => Vector3::zeros(),
     }
 }
 

@@ -3,7 +3,6 @@
 use crate::calib::bundle::calibration_prior::CalibrationPrior;
 use crate::calib::bundle::drawing::Drawing;
 use crate::calib::bundle::estimate::Estimate;
-use crate::calib::bundle::failure_detection::failures;
 use crate::calib::bundle::failures::{Failure, FailureAdjusted, SensorUse};
 use crate::calib::bundle::input::{BundleInput, HyperparameterMode};
 use crate::calib::bundle::model_selection::{Selection, select_model};
@@ -60,11 +59,6 @@ impl BundleSetup {
 
     pub(crate) fn estimate(&self) -> Option<(Estimate<'_>, Vec<Selection>)> {
         select_model(&self.input())
-    }
-
-    /// This setup's failures, and those that the views show beside them.
-    pub(crate) fn failures(&self, robot: &Robot, views: &[View], found: Option<&Estimate<'_>>) -> Vec<Failure> {
-        failures(robot, views, &self.applied.failures, found)
     }
 
     /// Gains and offsets that the views alone must tell.

@@ -24,6 +24,7 @@ pub(crate) const fn until(max_iterations: usize, predicted_gain: f64) -> StopRul
 }
 
 /// The state at the end, its normal equations, and how it went.
+#[derive(Clone)]
 pub(crate) struct Solved {
     pub state: State,
     pub normal: NormalEquations,
@@ -118,6 +119,12 @@ fn own_gain(normal: &NormalEquations) -> f64 {
     normal.eliminated.iter().filter(|own| own.has_any).map(|own| own.gradient.dot(&(own.inverse * own.gradient))).sum()
 }
 
+/// Moves what is estimated by `step` of the common parameters; the views' own stay.
+pub(crate) fn shifted(problem: &BundleProblem<'_>, step: &DVector<f64>, state: &mut State) {
+    let from = state.clone();
+    step_common(problem, &from, step, state);
+}
+
 #[cfg(test)]
 pub(crate) fn stepped(
     problem: &BundleProblem<'_>,
@@ -138,6 +145,18 @@ fn take_step(
     step: &DVector<f64>,
     next: &mut State,
 ) {
+    step_common(problem, state, step, next);
+    let mut groups = normal.eliminated.iter();
+    for (view_idx, view) in problem.views.iter().enumerate() {
+        let n_groups = 1 + usize::from(view.gripper.is_some());
+        for own in groups.by_ref().take(n_groups).filter(|own| own.has_any) {
+            let pushed = own.push(problem, &normal.by_tag, view_idx, step);
+            add_own(problem, own, view_idx, &pushed, next);
+        }
+    }
+}
+
+fn step_common(problem: &BundleProblem<'_>, state: &State, step: &DVector<f64>, next: &mut State) {
     let layout = &problem.layout;
     let twist = |at: usize| Vector6::from_fn(|k, _| step[at + k]);
     next.copy_from(state);
@@ -164,14 +183,6 @@ fn take_step(
     }
     if let Some(at) = layout.gripper_tag {
         next.gripper_tag *= exp(&twist(at));
-    }
-    let mut groups = normal.eliminated.iter();
-    for (view_idx, view) in problem.views.iter().enumerate() {
-        let n_groups = 1 + usize::from(view.gripper.is_some());
-        for own in groups.by_ref().take(n_groups).filter(|own| own.has_any) {
-            let pushed = own.push(problem, &normal.by_tag, view_idx, step);
-            add_own(problem, own, view_idx, &pushed, next);
-        }
     }
 }
 

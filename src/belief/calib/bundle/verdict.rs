@@ -61,6 +61,8 @@ const MAX_OUTLIERS: f64 = 0.25;
 const TAILS: f64 = 1.5;
 /// So many times that limit is refused: innovations then are about three times as large as they should be.
 const FAR_BEYOND: f64 = 4.0;
+/// A warning that touches answer.
+pub(crate) const UNSEEN_LINKS: &str = "links distal to the camera: errors are unobservable without a gripper tag";
 /// Standard deviation over the prior's above which the prior holds a parameter.
 const HELD: f64 = 0.7;
 
@@ -86,8 +88,7 @@ impl VerdictInput<'_> {
         table.warnings.extend(self.scales_at_bounds());
         table.not_covered = not_covered(calibration, &targets);
         if self.has_unseen_links() {
-            let words = "links distal to the camera: errors are unobservable without a gripper tag";
-            table.warnings.push(words.to_owned());
+            table.warnings.push(UNSEEN_LINKS.to_owned());
         }
         calibration.verdict = Some(table);
         if let Some(found) = observability(self.input) {

@@ -7,18 +7,21 @@
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 
+use nalgebra::Vector3;
+
 use crate::calib::views::conditions::{ConditionHistory, TravelRate};
 use crate::calib::views::frame_consensus::agreeing_mean;
 use crate::calib::views::message_index::MessageIndex;
 use crate::calib::views::view::{
-    CaptureData, EndStopReading, MeanCorners, ObservationRejection, TagMeasurement, TagObservation, View,
+    CaptureData, EndStopReading, MeanCorners, ObservationRejection, TagMeasurement, TagObservation, Touch, View,
 };
 use armcal_core::log::Recording;
 use armcal_core::optics::{SquareError, SquarePose, solve_square};
 use armcal_core::robot::{FailedJoint, Robot};
 use armcal_core::sensor::ArmSensors;
 use armcal_core::streams::{
-    CaptureSet, JointAngles, Mark, MarkKind, Message, RecordedSurvey, TagDetections, Thermometer,
+    CaptureSet, JointAngles, Mark, MarkKind, Message, PriorSource, RecordedSurvey, TagDetections, Thermometer,
+    ToolTouch,
 };
 use armcal_core::time::Stamp;
 
@@ -86,6 +89,7 @@ pub fn associate_within(recording: &Recording, robot: &Robot, span: Option<(Stam
                 association.data.used.push(idx);
             }
             Message::Survey(_) if recorded.is_some_and(|(at, _)| at == idx) => association.data.used.push(idx),
+            Message::Touch(touch) if touch.stamp.plus_s(touch.duration_s) <= to => association.add_touch(idx, touch),
             Message::Mark(mark) if mark.end <= to => association.add_mark(idx, mark),
             _ => {}
         }
@@ -137,6 +141,29 @@ impl Association<'_> {
             }
             _ => {}
         }
+    }
+
+    fn add_touch(&mut self, idx: usize, touch: &ToolTouch) {
+        if touch.stamp < self.from {
+            return;
+        }
+        self.data.used.push(idx);
+        let (start, end) = (touch.stamp, touch.stamp.plus_s(touch.duration_s));
+        // Neither phase nor kind is looked at.
+        let span = Mark { start, end, kind: MarkKind::Calibrate(PriorSource::Fresh) };
+        let Some(mut view) = self.view(&span, 0) else { return };
+        view.tags.clear();
+        let used = &mut self.data.used_for_terms;
+        view.conditions = self.conditions.over_noting(start, end, used);
+        view.approach = self.index.approach(&span, &view.travel_rad, &self.sensors, used);
+        self.data.touches.push(Touch {
+            surface: touch.surface.clone(),
+            point_m: touch.point_m.into(),
+            normal: Vector3::from(touch.normal).normalize(),
+            tip_radius_m: touch.tip_radius_m,
+            std_m: touch.std_m,
+            view,
+        });
     }
 
     /// The view of a mark's span; `None` where no joint was read in it.

@@ -121,6 +121,7 @@ fn add(data: &mut CaptureData, part: CaptureData, first_pose_idx: u32) {
     }
     data.task = data.task.take().or(part.task);
     data.stops.extend(part.stops);
+    data.touches.extend(part.touches);
     data.n_marks += part.n_marks;
     for (why, n) in part.rejected {
         *data.rejected.entry(why).or_default() += n;

@@ -148,6 +148,8 @@ pub struct CaptureData {
     pub identify: BTreeMap<u32, Vec<View>>,
     /// Readings at nominal end stops, in the order of time.
     pub stops: Vec<(Stamp, EndStopReading)>,
+    /// The tool against surveyed surfaces, in the order of time.
+    pub touches: Vec<Touch>,
     /// The first one of the recording; `None` where it has none.
     pub task: Option<ReachTask>,
     /// Number of capture marks, those without a view included; of external recordings, of views.
@@ -179,6 +181,7 @@ impl CaptureData {
     /// Puts everything in an order that does not depend on when it was marked.
     pub(crate) fn sort(&mut self) {
         self.stops.sort_by_key(|(end, _)| *end);
+        self.touches.sort_by_key(|touch| touch.view.end);
         self.fit.sort_by_key(|view| view.pose_idx);
         self.held_out.sort_by_key(|view| view.pose_idx);
         for views in self.identify.values_mut() {
@@ -202,6 +205,21 @@ impl CaptureData {
         }
         counts
     }
+}
+
+/// The tool's tip against a surveyed plane, by readings of the arm at rest there: `normal . (tool - point) = radius`.
+#[derive(Clone, Debug)]
+pub struct Touch {
+    pub surface: String,
+    /// Base frame.
+    pub point_m: Vector3<f64>,
+    /// Out of the surface, base frame.
+    pub normal: Vector3<f64>,
+    pub tip_radius_m: f64,
+    /// One sigma along the normal.
+    pub std_m: f64,
+    /// Readings and conditions; its tags are not looked at.
+    pub view: View,
 }
 
 /// Readings of one joint that stood at a nominal stop.

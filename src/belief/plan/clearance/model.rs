@@ -100,6 +100,23 @@ impl<'a> ClearanceModel<'a> {
         Self::of(robot, moving, standing, StationBound::new(vehicle))
     }
 
+    /// For a touch of the vehicle's part of that name by the tool's tip: all but that part, and that part alone against
+    /// an arm without its tip.
+    #[must_use]
+    pub fn for_touch(robot: &'a Robot, vehicle: &Vehicle, scene: &Scene, part: &str) -> [Self; 2] {
+        let all = Self::new(robot, vehicle, scene);
+        let (touched, rest): (Vec<_>, Vec<_>) = all.standing.into_iter().partition(|standing| standing.name == part);
+        let mut without_tip = moving(robot);
+        if robot.tool.tip_radius_m.is_some()
+            && let Some(tip) = without_tip.iter().rposition(|shape| shape.body == robot.tool.mount.n_joints)
+        {
+            // The last shape of its body.
+            without_tip.remove(tip);
+        }
+        let of = |moving, standing| Self::of(robot, moving, standing, StationBound::new(vehicle));
+        [of(moving(robot), rest), of(without_tip, touched)]
+    }
+
     /// Nothing around the arm but itself.
     #[must_use]
     pub(crate) fn of_arm_alone(robot: &'a Robot) -> Self {

@@ -16,6 +16,7 @@ pub(super) mod rejects;
 pub(super) mod survey;
 pub(super) mod task;
 pub(super) mod temperatures;
+pub(super) mod touch;
 mod viewers;
 
 pub use attitude::Imu;
@@ -30,4 +31,5 @@ pub use rejects::{DetectionReject, DetectionRejects};
 pub use survey::{SurveyedTag, TagSurvey};
 pub use task::ReachTask;
 pub use temperatures::Temperature;
+pub use touch::Touch;
 pub use viewers::{CameraInfo, PoseStamped, RegionOfInterest, StringMessage, TfMessage, TransformStamped};

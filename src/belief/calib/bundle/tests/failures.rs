@@ -1,17 +1,21 @@
 //! Sensors that fail in views of the estimator's own model: found, named, and the rest calibrated as well as it can be.
 
+use nalgebra::{Isometry3, Vector3};
 use rand::RngExt;
 
+use crate::calib::bundle::drawing::Drawing;
 use crate::calib::bundle::estimate::Estimate;
-use crate::calib::bundle::failure_detection::failures;
+use crate::calib::bundle::failure_detection::{FailureSearch, is_suspicious};
 use crate::calib::bundle::failures::{Failure, FailureAdjusted, FailureSource, SensorUse};
 use crate::calib::bundle::input::HyperparameterMode;
 use crate::calib::bundle::model::Hyperparameters;
 use crate::calib::bundle::model::model_for;
 use crate::calib::bundle::tests::data::{Noise, Truth, rng, titan, views};
+use crate::calib::bundle::tests::score_test::with_link;
 use crate::calib::parameters::JointParameters;
 use crate::calib::views::view::View;
 use armcal_core::robot::{FailedKind, Robot};
+use armcal_core::spatial::Pose;
 
 const N_VIEWS: usize = 20;
 
@@ -44,7 +48,8 @@ fn case(seed: u64, locked: Option<usize>) -> Case {
 fn found_failures(case: &Case, declared: &[Failure]) -> Vec<Failure> {
     let applied = FailureAdjusted::new(&case.robot, &case.views, declared, &JointParameters::default());
     let found = applied.estimate(HyperparameterMode::Fitted);
-    failures(&case.robot, &case.views, declared, found.as_ref())
+    let search = FailureSearch { robot: &case.robot, views: &case.views, prior: None, drawing: &Drawing::default() };
+    search.failures(declared, found.as_ref())
 }
 
 /// What a broken wire reads: noise about zero counts.
@@ -192,7 +197,8 @@ fn since_a_lasting_slip_the_sensor_is_calibrated_as_it_is_now() {
         for view in &mut case.views[..9] {
             view.travel_rad[joint] -= 0.03;
         }
-        (0..9).collect()
+        // All readings are used, those before with another offset.
+        Vec::new()
     });
 }
 
@@ -205,4 +211,99 @@ fn what_is_declared_is_believed_and_not_looked_for() {
     }
     let declared = [Failure::without_sensor(2, FailedKind::Dead, FailureSource::Declared, N_VIEWS)];
     assert_eq!(found_failures(&case, &declared), declared);
+}
+
+/// The sensor of `joint` reads another line.
+fn rescale(case: &mut Case, joint: usize, factor: f64) {
+    for view in &mut case.views {
+        view.travel_rad[joint] *= factor;
+    }
+}
+
+fn random_words(case: &mut Case, joint: usize, seed: u64) {
+    let mut rng = rng(seed, "words");
+    for view in &mut case.views {
+        view.travel_rad[joint] = rng.random_range(-1.5..1.5);
+    }
+}
+
+#[test]
+fn reversed_and_rescaled_sensors_are_told_by_their_slope() {
+    for seed in 60..75 {
+        let joint = (seed % 5) as usize;
+        for factor in [-1.0, 0.5, 1.5] {
+            let mut case = case(seed, None);
+            rescale(&mut case, joint, factor);
+            let failures = found_failures(&case, &[]);
+            let [Failure { joint: found, line: Some(line), reading, .. }] = &failures[..] else {
+                panic!("seed {seed}, factor {factor}: {failures:?}")
+            };
+            let expected = case.truth.parameters.gain[joint] / factor;
+            assert_eq!(*found, joint, "seed {seed}, factor {factor}");
+            assert!((line.slope / expected - 1.0).abs() < 0.03, "seed {seed}, factor {factor}: {line:?} {expected}");
+            assert_eq!(*reading == SensorUse::Ignored, factor < 0.0, "a reversed sensor is not used");
+            if factor > 0.0 {
+                let applied = FailureAdjusted::new(&case.robot, &case.views, &failures, &JointParameters::default());
+                let found = applied.estimate(HyperparameterMode::Fitted).expect("solved");
+                assert!((found.parameters().gain[joint] / expected - 1.0).abs() < 0.01, "seed {seed}");
+                assert!(!is_suspicious(&found), "seed {seed}, factor {factor}: the rest fits");
+            }
+        }
+    }
+}
+
+#[test]
+fn two_failed_sensors_are_told_apart() {
+    let mut told = 0;
+    let all: Vec<u64> = (80..100).collect();
+    for &seed in &all {
+        let (a, b) = ((seed % 5) as usize, ((seed + 1 + seed / 5 % 4) % 5) as usize);
+        let mut case = case(seed, None);
+        random_words(&mut case, a, seed);
+        let second = match seed % 3 {
+            0 => {
+                random_words(&mut case, b, seed + 1000);
+                FailedKind::Dead
+            }
+            1 => {
+                rescale(&mut case, b, -1.0);
+                FailedKind::Dead
+            }
+            _ => {
+                for view in &mut case.views[11..] {
+                    view.travel_rad[b] += 0.03;
+                }
+                FailedKind::Jumps
+            }
+        };
+        let mut named: Vec<(usize, FailedKind)> =
+            found_failures(&case, &[]).iter().map(|f| (f.joint, f.kind)).collect();
+        named.sort_by_key(|(joint, _)| *joint);
+        let mut expected = [(a, FailedKind::Dead), (b, second)];
+        expected.sort_by_key(|(joint, _)| *joint);
+        if named == expected {
+            told += 1;
+        } else {
+            println!("seed {seed}: {named:?}, not {expected:?}");
+        }
+    }
+    println!("two failed sensors: told apart in {told} of {}", all.len());
+    assert!(told + 1 >= all.len(), "{told} of {}", all.len());
+}
+
+#[test]
+fn a_drawing_that_is_wrong_fails_no_sensor() {
+    for seed in 0..12 {
+        let mut case = case(seed, None);
+        match seed % 3 {
+            0 => case.robot = with_link(&case.robot, 1 + seed as usize % 4, 0.01, Vector3::zeros()),
+            1 => {
+                let tag = &mut case.robot.tags[seed as usize % 8];
+                let aside = Isometry3::translation(0.04, 0.0, 0.0) * tag.base_from_tag.isometry();
+                tag.base_from_tag = Pose::from_isometry(aside);
+            }
+            _ => case.robot.camera.lens.focal_px = case.robot.camera.lens.focal_px.map(|px| 1.02 * px),
+        }
+        assert_eq!(found_failures(&case, &[]), Vec::new(), "seed {seed}");
+    }
 }

@@ -9,5 +9,7 @@ mod failures;
 mod moved_tags;
 mod reservations;
 mod score_test;
+mod slips;
 mod small_samples;
 mod statistics;
+mod touches;

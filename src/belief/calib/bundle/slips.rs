@@ -1,0 +1,146 @@
+//! Sensors that slipped on their shafts during a capture: found, and fitted as steps.
+//!
+//! The score test of steps proposes a joint and a change point; all is then estimated anew with that step as a column,
+//! and the change point is moved where the test of further steps asks for it. A step stays where twice the logarithm of
+//! the evidences' ratio, less what the step's wide prior costs (`2 ln(prior std / posterior std)`, so that it is a
+//! ratio of likelihoods), and the square of the step in its standard deviations both exceed [`MIN_LIKELIHOOD_RATIO`],
+//! and what other links, mounts or tags would explain.
+
+use crate::calib::bundle::estimate::Estimate;
+use crate::calib::bundle::failure_detection::FailureSearch;
+use crate::calib::bundle::failures::Failure;
+use crate::calib::bundle::model::STEP_STD_RAD;
+use crate::calib::bundle::model_selection::log_evidence;
+use crate::calib::bundle::outliers::rejection_chi2;
+use crate::calib::bundle::step_test::{OffsetPrior, StepCandidate};
+use crate::calib::parameters::{Parameter, ParameterKind};
+use crate::calib::views::view::View;
+use armcal_core::joints::MAX_JOINTS;
+use armcal_core::time::Stamp;
+
+/// What a candidate must promise to be fitted: three to four good arms in a hundred have one.
+const WORTH_A_FIT: f64 = 16.0;
+/// Good arms have 18 at most in 200 (measured), and chi-square's quantile at 1e-4 over some hundred joints and change
+/// points is 24.
+const MIN_LIKELIHOOD_RATIO: f64 = 24.0;
+/// Smaller steps are drift, and do no harm, rad.
+const MIN_STEP_RAD: f64 = 0.05 * std::f64::consts::PI / 180.0;
+const MAX_STEPS: usize = 3;
+/// How often a change point is moved.
+const MAX_MOVES: usize = 3;
+/// A further step that promises more than this may be the change point's being elsewhere.
+const MISPLACED: f64 = 6.0;
+
+/// What a step is measured by.
+struct Baseline {
+    /// Logarithm of the evidence without it.
+    log_evidence: f64,
+    /// What one other link, mount or tag would take off the cost.
+    by_others: f64,
+}
+
+impl FailureSearch<'_> {
+    /// `known` and the slips that the views show beside them; `found` is the estimate under `known`.
+    pub(crate) fn with_slips(&self, known: Vec<Failure>, found: &Estimate<'_>) -> Vec<Failure> {
+        if known.iter().filter(|failure| failure.is_step()).count() >= MAX_STEPS {
+            return known;
+        }
+        let candidates = self.candidates(found).into_iter().filter(|step| step.likelihood_ratio > WORTH_A_FIT);
+        let Some(step) = candidates.max_by(|a, b| a.likelihood_ratio.total_cmp(&b.likelihood_ratio)) else {
+            return known;
+        };
+        let baseline = Baseline { log_evidence: log_evidence_of_all(found), by_others: found.largest_other_chi2() };
+        self.with_step(&known, &step, &baseline, (f64::NEG_INFINITY, MAX_MOVES)).unwrap_or(known)
+    }
+
+    /// `known` and this step, or one of the same joint at a better change point, and further ones; `None` where it is
+    /// none, or not above `least`.
+    fn with_step(
+        &self,
+        known: &[Failure],
+        step: &StepCandidate,
+        baseline: &Baseline,
+        (least, moves): (f64, usize),
+    ) -> Option<Vec<Failure>> {
+        let mut with = known.to_vec();
+        with.push(self.slip(step));
+        let setup = self.setup(&with);
+        let (better, _) = setup.estimate()?;
+        let (size_rad, std_rad) = better.step(step.joint, self.views[step.since].end)?;
+        let likelihood_ratio =
+            2.0 * (log_evidence_of_all(&better) - baseline.log_evidence) + 2.0 * (STEP_STD_RAD / std_rad).ln();
+        // An estimate that is better for another reason says nothing of the step.
+        let likelihood_ratio = likelihood_ratio.min((size_rad / std_rad).powi(2));
+        if likelihood_ratio <= least {
+            return None;
+        }
+        let elsewhere = self.candidates(&better).into_iter().filter(|other| {
+            other.joint == step.joint && other.since != step.since && other.likelihood_ratio > MISPLACED && moves > 0
+        });
+        let moved =
+            elsewhere.filter_map(|other| self.with_step(known, &other, baseline, (likelihood_ratio, moves - 1))).next();
+        if moved.is_some() {
+            return moved;
+        }
+        let is_clear = likelihood_ratio > MIN_LIKELIHOOD_RATIO.max(baseline.by_others) && size_rad.abs() > MIN_STEP_RAD;
+        is_clear.then(|| self.with_slips(with, &better))
+    }
+
+    fn candidates(&self, found: &Estimate<'_>) -> Vec<StepCandidate> {
+        let mut order: Vec<usize> = (0..self.views.len()).collect();
+        order.sort_by_key(|&view_idx| (self.views[view_idx].end, view_idx));
+        let offsets = if self.prior.is_some() { OffsetPrior::Calibrated } else { OffsetPrior::Datasheet };
+        found.likeliest_steps(&order, offsets)
+    }
+
+    fn slip(&self, step: &StepCandidate) -> Failure {
+        Failure::slip(step.joint, step.size_rad, self.views, step.since)
+    }
+}
+
+/// A rejected observation costs what it would at the limit, so that estimates that reject others compare.
+pub(crate) fn log_evidence_of_all(found: &Estimate<'_>) -> f64 {
+    let rejected = found.problem.observations.iter().filter(|observation| !observation.is_used);
+    log_evidence(&found.problem, &found.solved.normal)
+        - 0.5 * rejected.map(|observation| rejection_chi2(&observation.data)).sum::<f64>()
+}
+
+impl Estimate<'_> {
+    /// A step that has a column, and one sigma, rad.
+    pub(crate) fn step(&self, joint: usize, since: Stamp) -> Option<(f64, f64)> {
+        let step = Parameter { joint, kind: ParameterKind::StepBefore(since) };
+        let column = self.problem.layout.parameters.iter().position(|p| *p == step)?;
+        Some((self.solved.state.joint[column], self.posterior.covariance[(column, column)].max(0.0).sqrt()))
+    }
+
+    /// `views` with the readings that the sensors as they are now would have had before they slipped.
+    pub(crate) fn as_read_now(&self, views: &[View]) -> Vec<View> {
+        let mut views = views.to_vec();
+        let parameters = self.parameters();
+        let sensors = parameters.sensors(self.problem.robot);
+        let mut steps = [0.0; MAX_JOINTS];
+        for view in &mut views {
+            steps.fill(0.0);
+            for (step, step_rad) in self.problem.steps(&self.solved.state) {
+                if matches!(step.kind, ParameterKind::StepBefore(since) if view.end < since) {
+                    steps[step.joint] += step_rad;
+                }
+            }
+            let change = view.conditions.departure_from(&parameters.reference);
+            for (joint, step_rad) in steps.iter().enumerate().filter(|(_, step_rad)| **step_rad != 0.0) {
+                let sensor = &sensors.models[joint];
+                let angle_rad = sensor.correction.angle_rad(&sensor.spec, view.travel_rad[joint], &change, 0.0);
+                view.travel_rad[joint] = sensor.travel_under_rad(angle_rad + step_rad, &change);
+            }
+        }
+        views
+    }
+
+    /// The most that a change of one link, of the mount or of one tag would take off the cost.
+    pub(crate) fn largest_other_chi2(&self) -> f64 {
+        let by_links = self.score_tests(&self.view_angles()).into_iter().map(|result| result.chi2);
+        let tags = 0..self.problem.robot.tags.len();
+        let by_tags = tags.filter_map(|tag_idx| self.tag_departure(tag_idx)).map(|departure| departure.chi2);
+        by_links.chain(by_tags).fold(0.0, f64::max)
+    }
+}

@@ -1,0 +1,168 @@
+//! Tags that are others than the survey has them for: two ids exchanged, or a tag of another size.
+//!
+//! The camera's poses T_i come from the other tags. A tag that is seen at m_i (camera frame, by its drawn size) and
+//! surveyed at p seems to be at `q_i = T_i m_i`. Where the median of q_i is the place of another tag that does not fit,
+//! and that one's is this one's, their ids are exchanged. A tag of another size is seen too far or too near by the
+//! ratio of the sizes: the median of `|T_i^-1 p| / |m_i|`, if that brings its observations together.
+
+use nalgebra::{Isometry3, Vector3};
+
+use crate::calib::bundle::estimate::Estimate;
+use crate::calib::bundle::problem::WeightedMeasurement;
+use crate::calib::views::view::View;
+use armcal_core::robot::Robot;
+use armcal_core::stats::quantile;
+
+/// What a tag may be in place of what the survey says.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum TagFault {
+    /// Indices into the robot's tags.
+    Swapped([usize; 2]),
+    /// True size over the drawn one.
+    Size { tag_idx: usize, ratio: f64 },
+    /// The same of all tags: printed at another scale.
+    AllSizes { ratio: f64 },
+}
+
+impl TagFault {
+    /// Makes `robot`'s survey what it is under this fault.
+    pub(crate) fn apply(&self, robot: &mut Robot) {
+        match *self {
+            Self::Swapped([a, b]) => {
+                let place = robot.tags[a].base_from_tag;
+                robot.tags[a].base_from_tag = robot.tags[b].base_from_tag;
+                robot.tags[b].base_from_tag = place;
+            }
+            Self::Size { tag_idx, ratio } => robot.tags[tag_idx].size_m *= ratio,
+            Self::AllSizes { ratio } => robot.tags.iter_mut().for_each(|tag| tag.size_m *= ratio),
+        }
+    }
+
+    fn tags(&self) -> Vec<usize> {
+        match *self {
+            Self::Swapped(pair) => pair.to_vec(),
+            Self::Size { tag_idx, .. } => vec![tag_idx],
+            Self::AllSizes { .. } => Vec::new(),
+        }
+    }
+
+    /// Whether both say something of one tag.
+    pub(crate) fn meets(&self, other: &Self) -> bool {
+        self.tags().iter().any(|tag| other.tags().contains(tag))
+    }
+}
+
+/// A tag is looked at where so many of its observations are rejected, or all the data have it elsewhere.
+const REJECTED_SHARE: f64 = 0.5;
+const MIN_OBSERVATIONS: usize = 3;
+/// Exchanged ids: so near each other's places, m, and so much nearer than to their own.
+const SAME_PLACE_M: f64 = 0.05;
+const NEARER: f64 = 0.3;
+/// A size counts from this ratio on, and from so many of its standard errors.
+const LEAST_RATIO: f64 = 0.005;
+const SURE_SIGMAS: f64 = 4.0;
+/// It must bring the observations of its tag this much nearer to the survey.
+const CLOSER: f64 = 0.6;
+
+/// A tag as the views have it.
+struct SeenTag {
+    tag_idx: usize,
+    /// (base_from_camera, position in the camera frame).
+    observations: Vec<(Isometry3<f64>, Vector3<f64>)>,
+}
+
+impl Estimate<'_> {
+    /// The faults of tags that `views` speak for; each has to prove itself by an estimate.
+    pub(crate) fn tag_faults(&self, views: &[View]) -> Vec<TagFault> {
+        let doubtful = self.doubtful_tags();
+        let seen: Vec<SeenTag> = doubtful.into_iter().map(|tag_idx| self.seen(tag_idx, views)).collect();
+        let seen: Vec<&SeenTag> = seen.iter().filter(|tag| tag.observations.len() >= MIN_OBSERVATIONS).collect();
+        let robot = self.problem.robot;
+        let mut faults = Vec::new();
+        for (k, a) in seen.iter().enumerate() {
+            let exchanged = seen[k + 1..].iter().find(|b| a.is_at(robot, b.tag_idx) && b.is_at(robot, a.tag_idx));
+            faults.extend(exchanged.map(|b| TagFault::Swapped([a.tag_idx, b.tag_idx])));
+        }
+        faults.extend(seen.iter().filter_map(|tag| tag.size(robot)));
+        faults
+    }
+
+    /// Tags that do not fit, or that the data have elsewhere.
+    fn doubtful_tags(&self) -> Vec<usize> {
+        let elsewhere = self.departed_tags();
+        let is_doubtful = |tag: &usize| self.rejected_share(*tag) > REJECTED_SHARE || elsewhere.contains(tag);
+        (0..self.problem.robot.tags.len()).filter(is_doubtful).collect()
+    }
+
+    /// Whether more is wrong with the tags than that some were moved.
+    pub(crate) fn most_tags_are_doubtful(&self) -> bool {
+        2 * self.doubtful_tags().len() > self.problem.robot.tags.len()
+    }
+
+    /// Share of a tag's observations that are rejected.
+    fn rejected_share(&self, tag_idx: usize) -> f64 {
+        let of_tag = || self.problem.observations.iter().filter(|observation| observation.tag == tag_idx);
+        of_tag().filter(|observation| !observation.is_used).count() as f64 / of_tag().count().max(1) as f64
+    }
+
+    /// Where the views that other tags place see a tag.
+    fn seen(&self, tag_idx: usize, views: &[View]) -> SeenTag {
+        let problem = &self.problem;
+        let mut observations = Vec::new();
+        for (view_idx, (data, view)) in problem.views.iter().zip(views).enumerate() {
+            let of_view = &problem.observations[data.observations.clone()];
+            let is_placed = of_view.iter().any(|other| other.is_used && other.tag != tag_idx);
+            let Some(tag) = view.tags.iter().find(|tag| tag.tag_idx == tag_idx).filter(|_| is_placed) else { continue };
+            let is_image = of_view.iter().all(|other| matches!(other.data, WeightedMeasurement::Corners { .. }));
+            if is_image {
+                let state = &self.solved.state;
+                let link = *problem.link_poses(view_idx, state).link(problem.n_camera_joints);
+                observations.push((link * state.mount * state.camera_error[view_idx], tag.center_in_camera_m));
+            }
+        }
+        SeenTag { tag_idx, observations }
+    }
+}
+
+impl SeenTag {
+    /// The median of where it seems to be, base frame.
+    fn place(&self, ratio: f64) -> Vector3<f64> {
+        let along = |axis: usize| {
+            let all = self
+                .observations
+                .iter()
+                .map(|(base_from_camera, at)| (base_from_camera * nalgebra::Point3::from(at * ratio))[axis]);
+            quantile(&all.collect::<Vec<f64>>(), 0.5).unwrap_or(0.0)
+        };
+        Vector3::new(along(0), along(1), along(2))
+    }
+
+    fn is_at(&self, robot: &Robot, other: usize) -> bool {
+        let place = |tag_idx: usize| robot.tags[tag_idx].base_from_tag.isometry().translation.vector;
+        let there_m = (self.place(1.0) - place(other)).norm();
+        there_m < SAME_PLACE_M && there_m < NEARER * (self.place(1.0) - place(self.tag_idx)).norm()
+    }
+
+    fn size(&self, robot: &Robot) -> Option<TagFault> {
+        let survey = robot.tags[self.tag_idx].base_from_tag.isometry().translation.vector;
+        let ratios: Vec<f64> = self
+            .observations
+            .iter()
+            .map(|(base_from_camera, at)| {
+                base_from_camera.inverse_transform_point(&survey.into()).coords.norm() / at.norm()
+            })
+            .collect();
+        let ratio = quantile(&ratios, 0.5)?;
+        let spread: Vec<f64> = ratios.iter().map(|r| (r - ratio).abs()).collect();
+        let std = 1.4826 * quantile(&spread, 0.5)? / (ratios.len() as f64).sqrt();
+        let distance_m = |ratio: f64| {
+            let off = self.observations.iter().map(|(base_from_camera, at)| {
+                (base_from_camera * nalgebra::Point3::from(at * ratio) - nalgebra::Point3::from(survey)).norm()
+            });
+            quantile(&off.collect::<Vec<f64>>(), 0.5).unwrap_or(f64::INFINITY)
+        };
+        let is_sure = (ratio - 1.0).abs() > LEAST_RATIO.max(SURE_SIGMAS * std);
+        let is_closer = distance_m(ratio) < CLOSER * distance_m(1.0);
+        (is_sure && is_closer).then_some(TagFault::Size { tag_idx: self.tag_idx, ratio })
+    }
+}

@@ -1,0 +1,23 @@
+//! Why the study has no result.
+
+use armcal_belief::session::SessionError;
+use armcal_sim::SimError;
+
+/// Why the study has no result.
+#[derive(Debug, thiserror::Error)]
+pub enum FalsifiedError {
+    #[error("{0}")]
+    Scene(String),
+    #[error("{what}: {problem}")]
+    File { what: &'static str, problem: String },
+    #[error(transparent)]
+    World(#[from] SimError),
+    #[error(transparent)]
+    Session(#[from] SessionError),
+}
+
+impl FalsifiedError {
+    pub(super) fn of<E: std::fmt::Display>(what: &'static str) -> impl Fn(E) -> Self {
+        move |error| Self::File { what, problem: error.to_string() }
+    }
+}

@@ -1,0 +1,242 @@
+//! The study: each case of each seed calibrated and scored.
+
+use rayon::prelude::*;
+
+use crate::falsified::capture::{Capture, Scene, TrueRest};
+use crate::falsified::cases::{AXES, Case, CaseKind, Element};
+use crate::falsified::classes::{EquivalenceClasses, equivalence_classes};
+use crate::falsified::error::FalsifiedError;
+use crate::falsified::naming::{causes_of_finding, first_causes, right_causes};
+use crate::falsified::oracle::{Oracle, OracleEffect};
+use crate::falsified::perturbation::{Perturbation, falsified_robot};
+use armcal_belief::calib::{Calibration, Finding, FindingKind, Status, calibrate_with_survey};
+use armcal_belief::verify::{Belief, reaches};
+use armcal_core::kinematics::LinkCorrections;
+use armcal_core::log::Recording;
+use armcal_core::robot::{Robot, Vehicle};
+use armcal_core::routine::{Method, Routine};
+use armcal_core::stats::Summary;
+
+/// A reservation's length per unit counts as right within this share.
+const RESERVATION_SHARE: f64 = 0.1;
+
+/// What became of a calibration.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RunStatus {
+    Accepted,
+    Refused,
+    /// No calibration came out at all.
+    Failed,
+}
+
+/// One calibration under one falsification.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FalsifiedRow {
+    pub seed: u64,
+    pub case: Case,
+    pub element: String,
+    pub status: RunStatus,
+    /// What it names first; several for a group.
+    pub named_first: Vec<String>,
+    /// Every finding, repaired ones with a `+`.
+    pub findings: Vec<String>,
+    pub repaired: usize,
+    /// Reason to refuse in words, or why there is no calibration.
+    pub reason: String,
+    pub predicted_m: Option<Summary>,
+    pub predicted_with_priors_m: Option<Summary>,
+    /// Distance at the task's targets of the tool as believed from where it is.
+    pub true_m: Option<Summary>,
+    /// None where views are taken away and nothing is wrong.
+    pub oracle: Option<OracleEffect>,
+    /// Whether what is named first is what was falsified, or what the data cannot tell from it; `None` where there is
+    /// nothing to name.
+    pub is_named: Option<bool>,
+    /// Of the reservation about the element, m per rad or m per m.
+    pub reserved_per_unit: Option<f64>,
+}
+
+/// All rows, and which causes the data of the first seed cannot tell apart.
+pub struct FalsifiedStudy {
+    /// By seed, in the order of the cases.
+    pub rows: Vec<FalsifiedRow>,
+    pub classes: EquivalenceClasses,
+}
+
+impl FalsifiedRow {
+    /// Caught: nobody acts on it as it is.
+    #[must_use]
+    pub fn is_refused_or_repaired(&self) -> bool {
+        self.status != RunStatus::Accepted || self.repaired > 0
+    }
+
+    /// Accepted, with a true error (95 % of the targets) above three times what was predicted, priors included; or
+    /// with sensors that no program can read.
+    #[must_use]
+    pub fn is_wrongly_accepted(&self) -> bool {
+        let limit_m = self.predicted_with_priors_m.or(self.predicted_m).map_or(f64::INFINITY, |p| 3.0 * p.p95);
+        self.status == RunStatus::Accepted && self.true_m.is_none_or(|error| error.p95 > limit_m)
+    }
+
+    /// Accepted without a repair, and the tool is off by more than `limit_m` at 95 % of the targets.
+    #[must_use]
+    pub fn is_let_through(&self, limit_m: f64) -> bool {
+        !self.is_refused_or_repaired() && self.true_m.is_none_or(|error| error.p95 > limit_m)
+    }
+
+    #[must_use]
+    pub fn is_seen(&self) -> bool {
+        self.oracle.is_some_and(|oracle| oracle.is_seen())
+    }
+
+    /// Whether the falsification alone moves the tool by more than `factor` times what the data alone predict of a
+    /// good arm.
+    #[must_use]
+    pub fn matters(&self, factor: f64, good_p95_m: f64) -> bool {
+        self.oracle.is_some_and(|oracle| oracle.tool_m > factor * good_p95_m)
+    }
+
+    /// Whether a reservation has the tool's shift per unit within a tenth.
+    #[must_use]
+    pub fn is_reserved_rightly(&self) -> bool {
+        let true_per_unit = self.oracle.map(|oracle| oracle.tool_m / self.case.size.abs());
+        let pair = self.reserved_per_unit.zip(true_per_unit);
+        pair.is_some_and(|(said, is)| (said - is).abs() <= RESERVATION_SHARE * is)
+    }
+}
+
+/// Runs `seeds` of the routine's world under every case.
+///
+/// # Errors
+/// Where a world cannot be made or driven, or a good arm's views determine nothing.
+pub fn falsified_study(
+    routine: &Routine,
+    (robot, vehicle): (&Robot, &Vehicle),
+    cases: &[Case],
+    seeds: std::ops::Range<u64>,
+) -> Result<FalsifiedStudy, FalsifiedError> {
+    let scene = Scene { routine, robot, vehicle };
+    let first = Capture::simulate(&scene, seeds.start)?;
+    let first_oracle = Oracle::new(&first)?;
+    let classes = equivalence_classes(&first_oracle);
+    let rows_of = |capture: &Capture, oracle: &Oracle<'_>| -> Vec<FalsifiedRow> {
+        cases.par_iter().map(|case| row(capture, oracle, &classes, case)).collect()
+    };
+    let mut rows = rows_of(&first, &first_oracle);
+    let of_seed = |seed: u64| -> Result<Vec<FalsifiedRow>, FalsifiedError> {
+        let capture = Capture::simulate(&scene, seed)?;
+        Ok(rows_of(&capture, &Oracle::new(&capture)?))
+    };
+    let others = seeds.start + 1..seeds.end;
+    let by_seed: Vec<Result<Vec<FalsifiedRow>, FalsifiedError>> = others.into_par_iter().map(of_seed).collect();
+    for of_seed in by_seed {
+        rows.extend(of_seed?);
+    }
+    Ok(FalsifiedStudy { rows, classes })
+}
+
+fn row(capture: &Capture, oracle: &Oracle<'_>, classes: &EquivalenceClasses, case: &Case) -> FalsifiedRow {
+    let seed = capture.seed;
+    let perturbations = case.perturbations(&capture.robot, seed);
+    let robot = falsified_robot(&capture.robot, &perturbations);
+    let fault = perturbations.iter().find_map(Perturbation::sensor_fault);
+    let recording = capture.falsified(case, fault.as_ref());
+    let effect = (!perturbations.is_empty()).then(|| oracle.effect(&perturbations));
+    let blank = FalsifiedRow {
+        seed,
+        case: *case,
+        element: case.element_name(&capture.robot, seed),
+        status: RunStatus::Failed,
+        named_first: Vec::new(),
+        findings: Vec::new(),
+        repaired: 0,
+        reason: String::new(),
+        predicted_m: None,
+        predicted_with_priors_m: None,
+        true_m: None,
+        oracle: effect,
+        is_named: None,
+        reserved_per_unit: None,
+    };
+    let mut right = right_causes(&robot, case, seed);
+    let is_nameable = !right.is_empty();
+    right.extend(classes.of(&perturbations));
+    let is_named = |first: &[String]| is_nameable.then(|| first.iter().any(|cause| right.contains(cause)));
+    match calibrate_with_survey(&recording, &robot, Method::Bundle) {
+        Err(error) => FalsifiedRow { reason: error.to_string(), is_named: is_named(&[]), ..blank },
+        Ok(calibration) => {
+            let named_first = first_causes(&robot, &calibration);
+            FalsifiedRow {
+                status: if calibration.status == Status::Accepted { RunStatus::Accepted } else { RunStatus::Refused },
+                findings: findings(&robot, &calibration),
+                repaired: calibration.findings.iter().filter(|finding| is_repair(finding)).count(),
+                reason: calibration.refusal.clone().unwrap_or_default(),
+                predicted_m: calibration.predicted_tool_error_m,
+                predicted_with_priors_m: calibration.predicted_tool_error_with_priors_m,
+                true_m: true_error(&capture.rests, &recording, &robot, &calibration),
+                is_named: is_named(&named_first),
+                reserved_per_unit: reserved_per_unit(&robot, case, &calibration),
+                named_first,
+                ..blank
+            }
+        }
+    }
+}
+
+/// Single outliers are left out of every calibration: that is no repair of an element.
+fn is_repair(finding: &Finding) -> bool {
+    finding.repaired && finding.kind != FindingKind::Outliers
+}
+
+fn findings(robot: &Robot, calibration: &Calibration) -> Vec<String> {
+    let words = calibration.findings.iter().map(|finding| {
+        let causes = causes_of_finding(robot, finding).join("+");
+        if finding.repaired { format!("{causes}(+)") } else { causes }
+    });
+    words.collect()
+}
+
+/// The arm that is believed in after a calibration that was given `robot`: what was repaired of the drawing belongs
+/// here.
+fn believed_robot(robot: &Robot, calibration: &Calibration) -> Robot {
+    calibration.scaled_robot(robot)
+}
+
+/// Distance of the tool as the calibrated arm believes it from where it is, at each target.
+fn true_error(rests: &[TrueRest], recording: &Recording, robot: &Robot, calibration: &Calibration) -> Option<Summary> {
+    let believed = believed_robot(robot, calibration);
+    let sensors = calibration.sensors(&believed).ok()?;
+    let first = rests.first()?.start;
+    // The links are in the robot already.
+    let belief = Belief { from: first, sensors: &sensors, links: LinkCorrections::default() };
+    let errors = reaches(recording, &believed, &[belief]).into_iter().filter_map(|rest| {
+        let true_rest = rests.iter().find(|true_rest| true_rest.start == rest.start)?;
+        Some((rest.believed_tool.origin().vector() - true_rest.tool_m).norm())
+    });
+    Summary::of(&errors.collect::<Vec<f64>>())
+}
+
+/// Tool's shift per unit by the reservation about the case's element, if there is one.
+fn reserved_per_unit(robot: &Robot, case: &Case, calibration: &Calibration) -> Option<f64> {
+    let what = reserved_element(robot, case)?;
+    let of_any_axis = format!("{}any axis", what.trim_end_matches(['x', 'y', 'z']));
+    let found = calibration.reservations.iter().find(|r| r.what == what || r.what == of_any_axis)?;
+    (found.prior_std > 0.0).then(|| found.tool_error_m / found.prior_std)
+}
+
+/// How a reservation about the case's element begins.
+fn reserved_element(robot: &Robot, case: &Case) -> Option<String> {
+    let place = |joint: usize| format!("the place of {}", robot.chain.joints()[joint].name);
+    let (element, axis) = match (case.kind, case.element) {
+        (CaseKind::MountTurned | CaseKind::MountShifted, Element::Axis(axis)) => ("camera mount".to_owned(), axis),
+        (CaseKind::ToolShifted, Element::Axis(axis)) => ("tool point".to_owned(), axis),
+        (CaseKind::SurveyTurned, Element::Axis(axis)) => ("tag survey".to_owned(), axis),
+        (_, Element::JointAxis { joint, axis }) => (place(joint), axis),
+        _ => return None,
+    };
+    let way = match case.kind.unit().1 {
+        "deg" => "turn about",
+        _ => "shift along",
+    };
+    Some(format!("{element}, {way} {}", AXES[axis]))
+}

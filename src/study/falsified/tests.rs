@@ -1,0 +1,184 @@
+//! On two seeds: falsifications are applied, seen, named and scored as they are meant to be.
+
+use std::path::Path;
+use std::sync::OnceLock;
+
+use nalgebra::Vector3;
+
+use crate::falsified::capture::{Capture, Scene};
+use crate::falsified::cases::{Case, CaseKind, Element, Tier, falsified_cases};
+use crate::falsified::naming::{causes_of_finding, right_causes};
+use crate::falsified::oracle::Oracle;
+use crate::falsified::perturbation::{Perturbation, SensorFault, WrongReading};
+use crate::falsified::run::{FalsifiedRow, FalsifiedStudy, RunStatus, falsified_study};
+use crate::falsified::{falsified_csv, falsified_markdown};
+use armcal_belief::calib::{Finding, FindingKind};
+use armcal_core::robot::{Robot, Vehicle};
+use armcal_core::routine::Routine;
+
+fn scene() -> (Routine, Robot, Vehicle) {
+    let file = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("routines/titan4-quickstart.toml");
+    let routine = armcal_core::routine::load(&file).expect("the routine reads");
+    let (robot, vehicle) = routine.load_arm().expect("the robot reads");
+    (routine, robot, vehicle)
+}
+
+fn study(cases: &[Case], seeds: std::ops::Range<u64>) -> FalsifiedStudy {
+    let (routine, robot, vehicle) = scene();
+    falsified_study(&routine, (&robot, &vehicle), cases, seeds).expect("a study")
+}
+
+/// The small tier on two seeds.
+fn small() -> &'static FalsifiedStudy {
+    static SMALL: OnceLock<FalsifiedStudy> = OnceLock::new();
+    SMALL.get_or_init(|| study(&falsified_cases(&scene().1, Tier::Small), 1..3))
+}
+
+fn of(kind: CaseKind) -> impl Iterator<Item = &'static FalsifiedRow> {
+    small().rows.iter().filter(move |row| row.case.kind == kind)
+}
+
+/// 95 % of the targets, m.
+fn true_p95_m(row: &FalsifiedRow) -> f64 {
+    row.true_m.map_or(f64::INFINITY, |error| error.p95)
+}
+
+#[test]
+fn a_good_arm_is_left_alone() {
+    for row in of(CaseKind::GoodArm) {
+        assert_eq!((row.status, row.repaired), (RunStatus::Accepted, 0), "{row:?}");
+        assert!(!row.is_wrongly_accepted() && true_p95_m(row) < 0.004, "{row:?}");
+    }
+}
+
+#[test]
+fn what_the_data_see_is_refused_or_repaired() {
+    let good_m: Vec<f64> = of(CaseKind::GoodArm).map(true_p95_m).collect();
+    let seen = small().rows.iter().filter(|row| row.is_seen());
+    let large: Vec<&FalsifiedRow> = seen.filter(|row| row.matters(3.0, 0.0015)).collect();
+    assert!(large.len() >= 10, "{}", large.len());
+    for row in large {
+        assert!(row.is_refused_or_repaired(), "{row:?}");
+    }
+    for row in of(CaseKind::TagMoved) {
+        assert!(row.repaired == 1 && row.is_named == Some(true), "{row:?}");
+        assert!(true_p95_m(row) < 1.5 * good_m[row.seed as usize - 1], "{row:?}");
+    }
+    for row in of(CaseKind::LinkShifted).chain(of(CaseKind::SensorDead)).chain(of(CaseKind::SensorSlipped)) {
+        assert!(row.is_seen() && row.is_named == Some(true), "{row:?}");
+    }
+    for row in of(CaseKind::FewViews) {
+        assert!(!row.is_wrongly_accepted() && row.oracle.is_none() && row.is_named.is_none(), "{row:?}");
+    }
+}
+
+#[test]
+fn what_no_view_shows_is_known_to_the_oracle() {
+    for row in of(CaseKind::MountTurned) {
+        let is_about_y = row.case.element == Element::Axis(1);
+        assert_eq!(row.is_seen(), !is_about_y, "{row:?}");
+        if is_about_y {
+            // 5 deg: the tool is off by what the oracle says, and the reservation has it.
+            let oracle_m = row.oracle.expect("a falsification").tool_m;
+            let true_m = row.true_m.expect("a calibration").median;
+            assert!((true_m / oracle_m - 1.0).abs() < 0.1 && row.is_reserved_rightly(), "{row:?}");
+        }
+    }
+    for row in of(CaseKind::ToolShifted) {
+        let oracle = row.oracle.expect("a falsification");
+        assert!(oracle.non_centrality < 1e-6 && (oracle.tool_m - 0.02).abs() < 1e-9, "{row:?}");
+        // It does not hold yet that anything is said of it: the table counts it as wrongly accepted.
+        assert!(row.status != RunStatus::Accepted || (true_p95_m(row) - 0.02).abs() < 0.004, "{row:?}");
+    }
+}
+
+#[test]
+fn table_and_csv_have_every_row_and_kind() {
+    let study = small();
+    let csv = falsified_csv(&study.rows);
+    assert_eq!(csv.lines().count(), study.rows.len() + 1);
+    assert!(!csv.contains("/tmp"), "{csv}");
+    let table = falsified_markdown(study);
+    for row in &study.rows {
+        assert!(table.contains(&format!("| {} | ", row.case.kind.name())), "{table}");
+    }
+    assert!(table.contains("| good arm | 2 | 2 | 0 | 0 | 0 |"), "{table}");
+}
+
+#[test]
+fn the_same_seed_gives_the_same_rows_on_any_number_of_threads() {
+    let few = [CaseKind::GoodArm, CaseKind::SensorSlipped, CaseKind::TagMoved];
+    let cases: Vec<Case> =
+        falsified_cases(&scene().1, Tier::Small).into_iter().filter(|case| few.contains(&case.kind)).collect();
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a pool");
+    let alone = pool.install(|| study(&cases, 1..2));
+    let is_among = |row: &&FalsifiedRow| row.seed == 1 && few.contains(&row.case.kind);
+    let together: Vec<FalsifiedRow> = small().rows.iter().filter(is_among).cloned().collect();
+    assert_eq!(alone.rows, together);
+    assert_eq!(alone.classes.markdown(), small().classes.markdown());
+}
+
+#[test]
+fn the_oracle_is_a_quadratic_form_of_small_errors() {
+    let (routine, robot, vehicle) = scene();
+    let scene = Scene { routine: &routine, robot: &robot, vehicle: &vehicle };
+    let capture = Capture::simulate(&scene, 1).expect("a capture");
+    let oracle = Oracle::new(&capture).expect("an estimate");
+    let cost = |of: &[Perturbation]| oracle.effect(of).non_centrality;
+    let none = oracle.effect(&[]);
+    assert!(none.non_centrality < 1e-9 && none.tool_m < 1e-9, "{none:?}");
+    let slip = |by_rad: f64| Perturbation::Sensor(SensorFault { joint: 2, reading: WrongReading::Slipped(by_rad) });
+    for unit in [
+        Perturbation::LinkShift(2, Vector3::x()),
+        Perturbation::LinkTurn(3, Vector3::x()),
+        Perturbation::TagShift(4, Vector3::y()),
+        Perturbation::TagSize(1, 1.0),
+        Perturbation::FocalLength([1.0, 0.0]),
+        slip(1.0),
+    ] {
+        let [one, two, back] = [1e-3, 2e-3, -1e-3].map(|size| cost(&[unit.scaled(size)]));
+        assert!(one > 0.5 && (two / one - 4.0).abs() < 0.1 && (back / one - 1.0).abs() < 0.05, "{unit:?} {one} {two}");
+    }
+}
+
+#[test]
+fn causes_that_the_data_cannot_tell_apart_are_one_class() {
+    let classes = &small().classes;
+    let slip = Perturbation::Sensor(SensorFault { joint: 2, reading: WrongReading::Slipped(1.0) });
+    // A shift along the parallel axes of two pitch joints is one and the same for both.
+    let of = |unit: Perturbation| classes.of(&[unit.scaled(0.01)]);
+    let along_axis = of(Perturbation::LinkShift(2, Vector3::z()));
+    let others = ["link:forearm_pitch", "link:shoulder_pitch", "link:wrist_pitch"];
+    assert!(others.iter().all(|other| along_axis.iter().any(|cause| cause == other)), "{along_axis:?}");
+    assert_eq!(of(Perturbation::LinkShift(2, Vector3::x())), ["link:forearm_pitch"]);
+    assert_eq!(of(Perturbation::TagShift(3, Vector3::new(1.0, 1.0, 0.0))), ["tag:3"]);
+    assert_eq!(of(slip), ["sensor_slip:forearm_pitch"]);
+    assert!(of(Perturbation::TagsSwapped(0, 1)).is_empty());
+}
+
+#[test]
+fn causes_are_named_alike_whoever_names_them() {
+    let (_, robot, _) = scene();
+    let finding = |kind, name: &str| Finding {
+        kind,
+        name: name.to_owned(),
+        size: None,
+        unit: None,
+        tool_error_m: None,
+        time_s: None,
+        repaired: false,
+    };
+    let causes = |kind, name: &str| causes_of_finding(&robot, &finding(kind, name));
+    // The joint that sits on the link is the one whose place is wrong.
+    let upper_arm = &robot.chain.joints()[1].child_link;
+    assert_eq!(causes(FindingKind::Link, upper_arm), ["link:forearm_pitch"]);
+    assert_eq!(causes(FindingKind::TagMoved, "tags 3, 5 and 7"), ["tag:3", "tag:5", "tag:7"]);
+    assert_eq!(causes(FindingKind::CameraMount, "camera mount"), ["camera_mount"]);
+    assert_eq!(causes(FindingKind::SensorSlip, "wrist_yaw"), ["sensor_slip:wrist_yaw"]);
+    let all = falsified_cases(&robot, Tier::Full);
+    let unnamed = all.iter().filter(|case| right_causes(&robot, case, 1).is_empty());
+    let is_of_views = |case: &Case| [CaseKind::GoodArm, CaseKind::FewViews, CaseKind::AlikeViews].contains(&case.kind);
+    assert!(unnamed.clone().all(is_of_views) && unnamed.count() == 5);
+    let changes = all.iter().filter(|case| !case.perturbations(&robot, 1).is_empty());
+    assert_eq!(changes.count(), all.len() - 5);
+}
