@@ -1,9 +1,8 @@
 //! What an estimate found of the drawing: links, base, camera mount and lens that are not as drawn.
 //!
-//! An element counts whose estimate z is many sigmas of the drawing's prior from it, and which its own covariance C does
-//! not explain: `z^T C^-1 z` is large. Were the drawing kept, the sensors'
-//! parameters x would follow the posterior's covariance, `dx = C_xz C_zz^-1 z`, and the tool would be off by what both
-//! move it together.
+//! An element counts whose estimate z is many sigmas of the drawing's prior from it, and which its own covariance C
+//! does not explain: `z^T C^-1 z` is large. Were the drawing kept, the sensors' parameters x would follow the
+//! posterior's covariance, `dx = C_xz C_zz^-1 z`, and the tool would be off by what both move it together.
 
 use nalgebra::{DVector, Matrix3, Vector3};
 

@@ -3,9 +3,8 @@
 
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix6, Vector6};
 
-use crate::calib::bundle::evidence::{Posterior, ScaleTarget, change, joint_info, updated};
+use crate::calib::bundle::evidence::{Marginal, Posterior, ScaleTarget, change, joint_info, updated};
 use crate::calib::bundle::input::{BundleInput, HyperparameterMode};
-use crate::calib::bundle::marginal::Marginal;
 use crate::calib::bundle::model::{Hyperparameters, Model};
 use crate::calib::bundle::outliers::{Outlier, outliers, reject};
 use crate::calib::bundle::priors::{mount_std, prior};
@@ -201,8 +200,8 @@ impl Estimate<'_> {
         &self.problem.scales
     }
 
-    /// Root mean square of the standard deviation that the corners of a view have by their frames and robot.toml, before
-    /// the fitted noise, px; `None` without corners.
+    /// Root mean square of the standard deviation that the corners of a view have by their frames and robot.toml,
+    /// before the fitted noise, px; `None` without corners.
     pub(crate) fn mean_corner_std_px(&self) -> Option<f64> {
         let variance = |observation: &ObservationTerm| match observation.data {
             WeightedMeasurement::Corners { info, .. } if observation.is_used => Some(1.0 / info),

@@ -25,6 +25,17 @@ pub(crate) struct Posterior {
     pub own: Vec<[f64; N_VIEW_PARAMETERS]>,
 }
 
+/// What leaves an estimate as its covariance.
+#[derive(Clone)]
+pub(crate) struct Marginal {
+    /// Of the common parameters.
+    pub covariance: DMatrix<f64>,
+    /// What each joint is off at a new pose.
+    pub joint_std_rad: [f64; MAX_JOINTS],
+    /// Of the variances, by the held-out cameras.
+    pub factor: f64,
+}
+
 /// Pseudo-observations that the first guess of each scale counts for.
 pub(crate) const NU_JOINT: f64 = 3.0;
 const NU_SHAPE: f64 = 2.0;

@@ -13,8 +13,8 @@ use crate::calib::bundle::failures::{
     FAR_RAD, FAR_SIGMAS, Failure, FailureAdjusted, FailureSource, MIN_VIEWS, SensorUse,
 };
 use crate::calib::bundle::input::HyperparameterMode;
+use crate::calib::bundle::model_selection::log_evidence_of_all;
 use crate::calib::bundle::setup::BundleSetup;
-use crate::calib::bundle::slips::log_evidence_of_all;
 use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
 use crate::calib::result::calibration::Calibration;
 use crate::calib::views::view::View;

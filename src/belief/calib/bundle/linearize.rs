@@ -9,11 +9,11 @@
 
 use nalgebra::{DMatrix, DVector, Matrix6, SMatrix, SVector, Vector6};
 
-use crate::calib::bundle::link_columns::{LinkSums, LinkTwists, link_twists};
+use crate::calib::bundle::link_twists::{LinkSums, link_twists};
 use crate::calib::bundle::observation_term::{LensInformation, PoseInformation, right_jacobian_inverse};
 use crate::calib::bundle::problem::{BundleProblem, State};
 use crate::calib::bundle::schur::{
-    Columns, Directions, Group, MOUNT, N_DIRECTIONS, N_VIEW_PARAMETERS, Own, SchurBlock, TIME,
+    Columns, Directions, Group, LinkTwists, MOUNT, N_DIRECTIONS, N_VIEW_PARAMETERS, Own, SchurBlock, TIME,
 };
 use armcal_core::joints::MAX_JOINTS;
 use armcal_core::numeric::Loss;

@@ -1,32 +1,20 @@
 //! The covariance without taking the fitted scales for known.
 //!
-//! Held-out cameras test it: their innovations' chi-square over its `n` degrees of freedom is one where scales and model
-//! are right. Where it is more, two things are added. A scale's square has, of its `nu` degrees of freedom, an inverse
-//! chi-square distribution: the fit takes `sum / nu`, its mean is `sum / (nu - 2)`, and what it scales is Student's t
-//! with that mean for its variance (Gelman et al. 2013, Bayesian Data Analysis, 2.6 and 3.2); the covariance is that of
-//! scales whose squares are at their means. And all variances are multiplied by the mean of what is left to explain,
-//! `chi2 / (n - 2)` (Birge 1932, with the same mean).
+//! Held-out cameras test it: their innovations' chi-square over its `n` degrees of freedom is one where scales and
+//! model are right. Where it is more, two things are added. A scale's square has, of its `nu` degrees of freedom, an
+//! inverse chi-square distribution: the fit takes `sum / nu`, its mean is `sum / (nu - 2)`, and what it scales is
+//! Student's t with that mean for its variance (Gelman et al. 2013, Bayesian Data Analysis, 2.6 and 3.2); the
+//! covariance is that of scales whose squares are at their means. And all variances are multiplied by the mean of what
+//! is left to explain, `chi2 / (n - 2)` (Birge 1932, with the same mean).
 
 use crate::calib::bundle::estimate::Estimate;
-use crate::calib::bundle::evidence::{Posterior, ScaleTarget, joint_info, updated};
+use crate::calib::bundle::evidence::{Marginal, Posterior, ScaleTarget, joint_info, updated};
 use crate::calib::bundle::innovations::Innovations;
 use crate::calib::bundle::linearize::NormalEquations;
 use crate::calib::bundle::model::Hyperparameters;
 use crate::calib::bundle::priors::mount_std;
-use armcal_core::joints::MAX_JOINTS;
 use armcal_core::numeric::Loss;
 use nalgebra::DMatrix;
-
-/// What leaves an estimate as its covariance.
-#[derive(Clone)]
-pub(crate) struct Marginal {
-    /// Of the common parameters.
-    pub covariance: DMatrix<f64>,
-    /// What each joint is off at a new pose.
-    pub joint_std_rad: [f64; MAX_JOINTS],
-    /// Of the variances, by the held-out cameras.
-    pub factor: f64,
-}
 
 impl Estimate<'_> {
     /// Widens the covariance where `innovations` of the folds are larger than they should be; `first` are the scales

@@ -1,9 +1,7 @@
 //! BUNDLE: maximum a posteriori over everything that the measurements depend on.
 //!
-//! `model` says what has a column and which sizes are not known; `problem` puts views and priors into form;
-//! `observation_term` linearizes one tag in one view, `linearize` sums the normal equations with the views' own
-//! parameters eliminated, `solve` is Levenberg-Marquardt; `evidence` fits noise and prior sizes, `select` decides on
-//! doubtful terms; `estimate` is the way from a robust start to the answer.
+//! `model` says what has a column, `problem` puts views and priors into form, `linearize` sums the normal equations,
+//! `solve` is Levenberg-Marquardt, `evidence` fits sizes, `drawing` and `failure_detection` explain what does not fit.
 
 pub(crate) mod baseline;
 pub(crate) mod calibration;
@@ -21,6 +19,7 @@ mod innovations;
 mod input;
 mod linearize;
 mod link_columns;
+mod link_twists;
 mod marginal;
 mod model;
 mod model_selection;

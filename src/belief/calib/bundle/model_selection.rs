@@ -12,6 +12,7 @@ use nalgebra::Cholesky;
 use crate::calib::bundle::estimate::{Estimate, estimate};
 use crate::calib::bundle::input::BundleInput;
 use crate::calib::bundle::linearize::NormalEquations;
+use crate::calib::bundle::outliers::rejection_chi2;
 use crate::calib::bundle::problem::{BundleProblem, WeightedMeasurement};
 use crate::calib::bundle::solve::{TIGHT, solve};
 use crate::calib::parameters::ParameterKind;
@@ -149,4 +150,11 @@ pub(crate) fn log_evidence(problem: &BundleProblem<'_>, normal: &NormalEquations
 
 fn log_sum(std: &[f64]) -> f64 {
     std.iter().map(|std| BundleProblem::at_least(*std).ln()).sum()
+}
+
+/// A rejected observation costs what it would at the limit, so that estimates that reject others compare.
+pub(crate) fn log_evidence_of_all(found: &Estimate<'_>) -> f64 {
+    let rejected = found.problem.observations.iter().filter(|observation| !observation.is_used);
+    log_evidence(&found.problem, &found.solved.normal)
+        - 0.5 * rejected.map(|observation| rejection_chi2(&observation.data)).sum::<f64>()
 }

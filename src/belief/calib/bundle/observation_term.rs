@@ -63,8 +63,8 @@ pub(crate) fn right_jacobian_inverse(d: &Vector6<f64>) -> Matrix6<f64> {
 }
 
 impl PoseInformation {
-    /// Linearizes; `noise` multiplies the corners' standard deviations. Adds the lens's part to `by_lens` where that is wanted.
-    /// `None` where a corner is beyond the lens's view.
+    /// Linearizes; `noise` multiplies the corners' standard deviations. Adds the lens's part to `by_lens` where that is
+    /// wanted. `None` where a corner is beyond the lens's view.
     pub(crate) fn of(
         seen: &WeightedMeasurement,
         camera_from_tag: &Isometry3<f64>,

@@ -159,8 +159,8 @@ impl Estimate<'_> {
         HeldElement { what, unit, prior_std, share_left, touched_std, shifts, is_estimated, is_spoken_of: false }
     }
 
-    /// All tags together against the base: the same views as a base that is off the other way, and the tool that follows
-    /// the estimate alone. Nobody states how well that is known; as well as a link, it is assumed.
+    /// All tags together against the base: the same views as a base that is off the other way, and the tool that
+    /// follows the estimate alone. Nobody states how well that is known; as well as a link, it is assumed.
     fn survey_frame(
         &self,
         score: &Score,

@@ -4,7 +4,6 @@ use std::ops::Range;
 
 use nalgebra::{Const, DMatrix, DVector, Isometry3, Matrix6, SMatrix, SVector, Vector6};
 
-use crate::calib::bundle::link_columns::LinkTwists;
 use crate::calib::bundle::problem::{BundleProblem, Layout, ViewData};
 use armcal_core::joints::MAX_JOINTS;
 use armcal_core::kinematics::LinkPoses;
@@ -18,6 +17,11 @@ pub(crate) const TIME: usize = MAX_JOINTS + 6;
 
 pub(crate) type Own = SMatrix<f64, N_VIEW_PARAMETERS, N_VIEW_PARAMETERS>;
 pub(crate) type Directions = SMatrix<f64, 6, N_DIRECTIONS>;
+
+/// Columns of all links that an arm may have.
+pub(crate) const N_LINK_COLUMNS: usize = 6 * MAX_JOINTS;
+/// Twists of the camera (right, camera frame) by each link column.
+pub(crate) type LinkTwists = SMatrix<f64, 6, N_LINK_COLUMNS>;
 
 /// What is needed to get a view's own parameters back, and their covariance.
 #[derive(Clone, Debug)]

@@ -9,7 +9,7 @@
 use nalgebra::{DMatrix, DVector, Matrix6, SMatrix, Vector3, Vector6};
 
 use crate::calib::bundle::estimate::Estimate;
-use crate::calib::bundle::link_columns::link_twist;
+use crate::calib::bundle::link_twists::link_twist;
 use crate::calib::bundle::observation_term::PoseInformation;
 use crate::calib::bundle::problem::WeightedMeasurement;
 use crate::calib::bundle::schur::{N_VIEW_PARAMETERS, SchurBlock};

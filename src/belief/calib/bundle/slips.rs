@@ -10,8 +10,7 @@ use crate::calib::bundle::estimate::Estimate;
 use crate::calib::bundle::failure_detection::FailureSearch;
 use crate::calib::bundle::failures::Failure;
 use crate::calib::bundle::model::STEP_STD_RAD;
-use crate::calib::bundle::model_selection::log_evidence;
-use crate::calib::bundle::outliers::rejection_chi2;
+use crate::calib::bundle::model_selection::log_evidence_of_all;
 use crate::calib::bundle::step_test::{OffsetPrior, StepCandidate};
 use crate::calib::parameters::{Parameter, ParameterKind};
 use crate::calib::views::view::View;
@@ -96,13 +95,6 @@ impl FailureSearch<'_> {
     fn slip(&self, step: &StepCandidate) -> Failure {
         Failure::slip(step.joint, step.size_rad, self.views, step.since)
     }
-}
-
-/// A rejected observation costs what it would at the limit, so that estimates that reject others compare.
-pub(crate) fn log_evidence_of_all(found: &Estimate<'_>) -> f64 {
-    let rejected = found.problem.observations.iter().filter(|observation| !observation.is_used);
-    log_evidence(&found.problem, &found.solved.normal)
-        - 0.5 * rejected.map(|observation| rejection_chi2(&observation.data)).sum::<f64>()
 }
 
 impl Estimate<'_> {

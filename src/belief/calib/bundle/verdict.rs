@@ -41,7 +41,8 @@ const WORTH_M: f64 = 0.004;
 /// A joint's error from view to view over its datasheet's linearity: sensors do not have more, after what is smooth is
 /// taken off.
 const MAX_OVER_LINEARITY: f64 = 3.0;
-/// Nonlinearity over the datasheet's above which a sensor is called worn, and above which it is no such sensor any more.
+/// Nonlinearity over the datasheet's above which a sensor is called worn, and above which it is no such sensor any
+/// more.
 const WORN: f64 = 3.0;
 const MAX_NONLINEARITY: f64 = 10.0;
 /// Noise over the stated one above which something is not as stated: a warning.

@@ -37,7 +37,8 @@ fn case(seed: u64, n_views: usize) -> Case {
     Case { robot, truth, views }
 }
 
-/// The sensor of `joint` turns by `by_rad` on its shaft before view `since`; the truth is that of the sensor since then.
+/// The sensor of `joint` turns by `by_rad` on its shaft before view `since`; the truth is that of the sensor since
+/// then.
 fn slip(case: &mut Case, joint: usize, since: usize, by_rad: f64) {
     let sensors = case.truth.parameters.sensors(&case.robot);
     let sensor = &sensors.models[joint];

@@ -101,8 +101,8 @@ fn few_views_and_worn_sensors_are_not_too_sure_of_themselves() {
         for n_views in [10, 12, 20, 40] {
             let [known, widened] = measured(n_views, worse);
             println!(
-                "sensors {what}, {n_views} views: scales taken for known: NEES {:.2}, error over predicted {:.2} (95 %), \
-                 {:.2} at most; widened: {:.2}, {:.2}, {:.2}",
+                "sensors {what}, {n_views} views: scales taken for known: NEES {:.2}, error over predicted {:.2} (95 \
+                 %), {:.2} at most; widened: {:.2}, {:.2}, {:.2}",
                 known[0], known[1], known[2], widened[0], widened[1], widened[2]
             );
             assert!(limits.contains(&widened[0]), "{what}, {n_views} views: NEES {:.2}", widened[0]);

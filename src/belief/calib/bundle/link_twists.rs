@@ -1,0 +1,53 @@
+//! Twists of the camera by where joints sit on their parent links.
+
+use nalgebra::{Isometry3, Matrix6, SMatrix, Vector3, Vector6};
+
+use crate::calib::bundle::schur::{Group, LinkTwists};
+use armcal_core::kinematics::{LinkCorrections, LinkPoses};
+use armcal_core::spatial::left_jacobian;
+
+/// Of the joints of `group`; zero elsewhere.
+pub(crate) fn link_twists(group: &Group<'_>, corrections: &LinkCorrections) -> LinkTwists {
+    let mut twists = LinkTwists::zeros();
+    for joint in group.joints.clone() {
+        let by_turn = left_jacobian(&corrections[joint].turn_rad);
+        for axis in 0..3 {
+            let shift = Vector3::ith(axis, group.sign);
+            let turn = by_turn.column(axis) * group.sign;
+            let [shift, turn] = link_twist(group.poses, &group.base_from_camera, joint, [shift, turn]);
+            twists.set_column(6 * joint + axis, &shift);
+            twists.set_column(6 * joint + 3 + axis, &turn);
+        }
+    }
+    twists
+}
+
+/// Twists of the camera by a shift and by a turn of a joint's place, in its parent link's axes.
+pub(crate) fn link_twist(
+    poses: &LinkPoses,
+    base_from_camera: &Isometry3<f64>,
+    joint: usize,
+    [shift, turn]: [Vector3<f64>; 2],
+) -> [Vector6<f64>; 2] {
+    let to_camera = base_from_camera.rotation.inverse();
+    let lever = base_from_camera.translation.vector - poses.joint_origin(joint);
+    let [shift, turn] = [shift, turn].map(|by| poses.link(joint).rotation * by);
+    let (moved, swept, turned) = (to_camera * shift, to_camera * turn.cross(&lever), to_camera * turn);
+    [
+        Vector6::new(moved.x, moved.y, moved.z, 0.0, 0.0, 0.0),
+        Vector6::new(swept.x, swept.y, swept.z, turned.x, turned.y, turned.z),
+    ]
+}
+
+/// What the links' block takes from a group whose own parameters are eliminated (module `linearize`).
+pub(crate) struct LinkSums {
+    pub twists: LinkTwists,
+    /// `G - G M G`.
+    pub q: Matrix6<f64>,
+    pub m: Matrix6<f64>,
+    pub m_h_sum: Matrix6<f64>,
+    pub h_sum: Matrix6<f64>,
+    /// Gradient by the camera's twist, the own parameters eliminated.
+    pub g: Vector6<f64>,
+    pub by_lens: SMatrix<f64, 6, 8>,
+}
