@@ -4,7 +4,9 @@
 //! reading is larger by d in all views before c. With the joint's error in view v, e_v, counted from there, d acts
 //! through the errors' prior alone. So its score and its information, everything else eliminated, are
 //!
-//!     z = sum w_v e_v        I = sum w_v - sum w_u w_v cov(e_u, e_v)        over views before c, w = 1 / var(e)
+//! ```text
+//! z = sum w_v e_v        I = sum w_v - sum w_u w_v cov(e_u, e_v)        over views before c, w = 1 / var(e)
+//! ```
 //!
 //! with the posterior covariance of the errors (Rao 1948). `z^2 / I` is chi-square of one degree of freedom. A step
 //! that is not in the model inflates the joint's own fitted variance, and chi-square stays small. What it takes off
