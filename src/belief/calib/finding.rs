@@ -32,6 +32,8 @@ pub struct Finding {
 pub enum FindingKind {
     /// A surveyed tag; the size is its distance from the survey.
     TagMoved,
+    /// Tags that were moved together; the size is their median distance from the survey.
+    TagsMoved,
     /// A tag of another size than the survey's; the size is the relative difference.
     TagSize,
     /// Two tags, each with the other's id.

@@ -8,13 +8,13 @@ use crate::calib::bundle::estimate::{Estimate, estimate};
 use crate::calib::bundle::failure_detection::FailureSearch;
 use crate::calib::bundle::failure_impact::FailureImpact;
 use crate::calib::bundle::failures::Failure;
-use crate::calib::bundle::freed_tags::MovedTags;
 use crate::calib::bundle::innovations::Innovations;
 use crate::calib::bundle::input::{BundleInput, HyperparameterMode};
 use crate::calib::bundle::model_selection::Selection;
 use crate::calib::bundle::outliers::Outlier;
 use crate::calib::bundle::setup::{BundleSetup, declared};
 use crate::calib::bundle::tables::{camera_mount_table, covariance_with_mount, map_table, model_table, prior_table};
+use crate::calib::bundle::tags::freed::MovedTags;
 use crate::calib::bundle::touch_term::TouchUpdate;
 use crate::calib::bundle::verdict::VerdictInput;
 use crate::calib::covariance::{ParameterCovariance, task_angles};
@@ -204,7 +204,7 @@ impl<'a> BundleCalibration<'a> {
         let by_moved_tag = self.moved.gain_nats(estimate);
         if let Some(better) = self.drawing.better(&setup.input(), estimate, by_moved_tag) {
             self.drawing.apply_new_faults(&better, &mut self.data.robot);
-            self.moved.resurveyed(&self.data.robot, &better);
+            self.moved.resurveyed(&mut self.data.robot, &better);
             self.drawing = better;
             return true;
         }

@@ -2,9 +2,9 @@
 //!
 //! Where the score test says that links, base or mount would explain the data better than joint sensors do, where tags
 //! are not where they should be or do not fit at all, the views are estimated again under each alternative: link
-//! geometry with columns of its own, a lens with columns, a tag of another size, two tags exchanged. The one of most
-//! evidence stays if it brings [`MIN_GAIN_NATS`] or more, and more than freeing a tag that was moved (module
-//! `freed_tags`) would. Then all begins again, until nothing explains more.
+//! geometry with columns of its own, a lens with columns, tags of another size, two tags exchanged, tags that were moved
+//! together. The one of most evidence stays if it brings [`MIN_GAIN_NATS`] or more, and more than freeing a tag that was moved (module
+//! `tags::freed`) would. Then all begins again, until nothing explains more.
 //!
 //! The score test says beforehand what links may bring: with the pull s and the information I of trial columns z under
 //! a prior of variance a^2, Laplace's approximation is `ln Z(a) - ln Z(0) = s^T (I + a^-2)^-1 s / 2 - ln det(1 + a^2 I)
@@ -21,7 +21,8 @@ use crate::calib::bundle::input::BundleInput;
 use crate::calib::bundle::model_selection::log_evidence;
 use crate::calib::bundle::outliers::REJECT;
 use crate::calib::bundle::score_test::GeometryElement;
-use crate::calib::bundle::tag_identity::TagFault;
+use crate::calib::bundle::tags::group::moved_group;
+use crate::calib::bundle::tags::identity::{TagFault, common_size_ratio};
 use armcal_core::joints::MAX_JOINTS;
 use armcal_core::robot::Robot;
 
@@ -46,9 +47,10 @@ pub(crate) struct LinkStart {
 const MIN_GAIN_NATS: f64 = 6.0;
 /// Sizes of an error that are tried, over robot.toml's.
 const MULTIPLES: [f64; 5] = [2.0, 5.0, 10.0, 20.0, 40.0];
-/// Scales that all tags may have been printed at, and how often the interval is cut: to some 0.03 %.
-const LOG_RATIOS: [f64; 2] = [-0.15, 0.15];
-const GOLDEN_STEPS: usize = 14;
+/// The scale of all tags is looked for so near to what the distances between them say, and the interval cut so often: to
+/// some 0.03 %.
+const LOG_RATIO_RANGE: f64 = 0.01;
+const GOLDEN_STEPS: usize = 8;
 /// A lens that is not the one of robot.toml may be off by so many of a measured lens's sigmas.
 const LENS_SCALE: f64 = 10.0;
 
@@ -87,18 +89,29 @@ impl Drawing {
         };
         let mut gains: Vec<(f64, Self)> =
             self.alternatives(input, found).into_iter().map(|drawing| (gain(&drawing), drawing)).collect();
-        let is_scaled = self.tags.iter().any(|fault| matches!(fault, TagFault::AllSizes { .. }));
-        if found.most_tags_are_doubtful() && !is_scaled {
-            let scaled = |ratio: f64| self.with_fault(TagFault::AllSizes { ratio });
-            let ratio = best_ratio(|ratio| gain(&scaled(ratio)));
+        if let Some(ratio) = self.common_size_ratio(input) {
+            let scaled = |ratio: f64| self.with_faults([TagFault::AllSizes { ratio }]);
+            let ratio = best_ratio(ratio, |ratio| gain(&scaled(ratio)));
             gains.push((gain(&scaled(ratio)), scaled(ratio)));
         }
         let (gain, drawing) = gains.into_iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
         (gain > least_nats).then_some(drawing)
     }
 
-    fn with_fault(&self, fault: TagFault) -> Self {
-        Self { tags: self.tags.iter().copied().chain([fault]).collect(), ..self.clone() }
+    fn with_faults(&self, faults: impl IntoIterator<Item = TagFault>) -> Self {
+        Self { tags: self.tags.iter().copied().chain(faults).collect(), ..self.clone() }
+    }
+
+    fn common_size_ratio(&self, input: &BundleInput<'_>) -> Option<f64> {
+        let is_scaled = self.tags.iter().any(|fault| matches!(fault, TagFault::AllSizes { .. }));
+        if is_scaled { None } else { common_size_ratio(input.views, input.robot) }
+    }
+
+    /// Tags that were moved together, if several are doubtful and none was found so far.
+    fn moved_group(&self, input: &BundleInput<'_>, found: &Estimate<'_>) -> Option<Self> {
+        let is_known = self.tags.iter().any(|fault| matches!(fault, TagFault::Moved { .. }));
+        let group = if is_known || found.doubtful_tags().len() < 2 { Vec::new() } else { moved_group(input) };
+        (!group.is_empty()).then(|| self.with_faults(group))
     }
 
     /// What else may explain the views, none where nothing is suspicious.
@@ -114,7 +127,8 @@ impl Drawing {
             all.push(Self { has_lens: true, ..self.clone() });
         }
         let new = faults.into_iter().filter(|fault| !self.tags.iter().any(|known| known.meets(fault)));
-        all.extend(new.map(|fault| self.with_fault(fault)));
+        all.extend(new.map(|fault| self.with_faults([fault])));
+        all.extend(self.moved_group(input, found));
         all
     }
 
@@ -124,11 +138,11 @@ impl Drawing {
     }
 }
 
-/// Where `gain` is largest, by golden sections of the logarithm.
-fn best_ratio(gain: impl Fn(f64) -> f64) -> f64 {
+/// Where `gain` is largest near `ratio`, by golden sections of the logarithm.
+fn best_ratio(ratio: f64, gain: impl Fn(f64) -> f64) -> f64 {
     let golden = 0.5 * (5f64.sqrt() - 1.0);
     let gain = |log: f64| gain(log.exp());
-    let [mut low, mut high] = LOG_RATIOS;
+    let [mut low, mut high] = [-LOG_RATIO_RANGE, LOG_RATIO_RANGE].map(|by| ratio.ln() + by);
     let [mut a, mut b] = [high - golden * (high - low), low + golden * (high - low)];
     let [mut at_a, mut at_b] = [gain(a), gain(b)];
     for _ in 0..GOLDEN_STEPS {

@@ -9,7 +9,7 @@ use nalgebra::{DVector, Matrix3, Vector3};
 use crate::calib::bundle::drawing::Drawing;
 use crate::calib::bundle::estimate::Estimate;
 use crate::calib::bundle::score_test::ToolJacobian;
-use crate::calib::bundle::tag_identity::TagFault;
+use crate::calib::bundle::tags::identity::TagFault;
 use crate::calib::finding::{Finding, FindingKind, FindingUnit};
 use crate::calib::geometry_error::{ErrorKind, GeometryError};
 use crate::calib::refusal::Refusal;
@@ -59,7 +59,7 @@ impl Estimate<'_> {
             // Base or tags: the tool follows the one, and not the other.
             calibration.refuse_first_for([Refusal::Geometry(base.geometry_error(self.problem.robot))]);
         }
-        let of_tags = drawing.tags.iter().map(|fault| self.tag_finding(fault));
+        let of_tags = drawing.tags.iter().filter_map(|fault| self.tag_finding(fault));
         for (finding, word) in self.lens_finding().into_iter().chain(of_tags) {
             findings.push(finding);
             words.push(word);
@@ -140,7 +140,8 @@ impl Estimate<'_> {
         ))
     }
 
-    fn tag_finding(&self, fault: &TagFault) -> (Finding, String) {
+    /// Of tags that were moved, others tell (module `tags::freed`).
+    fn tag_finding(&self, fault: &TagFault) -> Option<(Finding, String)> {
         let tags = &self.problem.robot.tags;
         let (kind, name, size, words) = match *fault {
             TagFault::Swapped([a, b]) => {
@@ -161,9 +162,10 @@ impl Estimate<'_> {
                 let words = format!("all tags are {percent:+.1} % of the survey's size: taken so; measure one again");
                 (FindingKind::TagSize, "all".to_owned(), Some(ratio - 1.0), words)
             }
+            TagFault::Moved { .. } => return None,
         };
         let unit = size.map(|_| FindingUnit::One);
-        (Finding { kind, name, size, unit, tool_error_m: None, time_s: None, repaired: true }, words)
+        Some((Finding { kind, name, size, unit, tool_error_m: None, time_s: None, repaired: true }, words))
     }
 
     fn covariance3(&self, first: usize) -> Matrix3<f64> {

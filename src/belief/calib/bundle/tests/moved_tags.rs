@@ -2,7 +2,9 @@
 
 use nalgebra::{Isometry3, Vector3};
 
+use crate::calib::bundle::drawing::Drawing;
 use crate::calib::bundle::estimate::estimate;
+use crate::calib::bundle::tags::identity::TagFault;
 use crate::calib::bundle::tests::data::titan;
 use crate::calib::bundle::tests::score_test::{input, views_of, views_of_changed, with_link};
 
@@ -50,4 +52,42 @@ fn a_good_survey_and_a_wrong_link_are_left_alone() {
     }
     println!("tags suspected: {} of {SEEDS} good arms, {} with a wrong link", suspected[0], suspected[1]);
     assert!(suspected[0] == 0 && suspected[1] <= 2, "{suspected:?} of {SEEDS}");
+}
+
+/// Tags that were moved, those that the drawing has moved together, and how many the first estimate has elsewhere.
+fn moved_together(seed: u64, moved_m: f64, n: usize) -> (Vec<usize>, Vec<usize>, usize) {
+    let robot = titan();
+    let n_tags = robot.tags.len();
+    let mut moved: Vec<usize> = (0..n).map(|k| (seed as usize + k) % n_tags).collect();
+    moved.sort_unstable();
+    let aside = Vector3::new(0.6, if seed % 2 == 0 { 0.8 } else { -0.8 }, 0.0) * moved_m;
+    let (views, model) = views_of_changed(&robot, &robot, seed, |truth| {
+        for &tag in &moved {
+            truth.tags[tag] = Isometry3::translation(aside.x, aside.y, aside.z) * truth.tags[tag];
+        }
+    });
+    let input = input(&robot, &views, &model);
+    let found = estimate(&input).expect("solved");
+    let drawing = Drawing::default().better(&input, &found, 0.0).unwrap_or_default();
+    let named = drawing.tags.iter().filter_map(|fault| match fault {
+        TagFault::Moved { tag_idx, .. } => Some(*tag_idx),
+        _ => None,
+    });
+    let mut named: Vec<usize> = named.collect();
+    named.sort_unstable();
+    (moved, named, found.departed_tags().len())
+}
+
+#[test]
+fn tags_that_were_moved_together_are_named() {
+    for (moved_m, n) in [(0.01, 2), (0.01, 3), (0.04, 3)] {
+        // Where no tag departs, base and joints take all of it up.
+        let seen: Vec<bool> = (0..16)
+            .map(|seed| moved_together(seed, moved_m, n))
+            .filter_map(|(moved, named, n_departed)| (n_departed > 1).then_some(moved == named))
+            .collect();
+        let named = seen.iter().filter(|is_named| **is_named).count();
+        println!("{n} tags by {moved_m} m: named in {named} of {}", seen.len());
+        assert!(seen.len() >= 8 && named * 10 >= seen.len() * 9, "{n} tags by {moved_m} m: {named} of {}", seen.len());
+    }
 }

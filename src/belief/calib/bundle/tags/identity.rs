@@ -1,15 +1,17 @@
-//! Tags that are others than the survey has them for: two ids exchanged, or a tag of another size.
+//! Tags that are others than the survey has them for: two ids exchanged, a tag of another size, all of another size.
 //!
 //! The camera's poses T_i come from the other tags. A tag that is seen at m_i (camera frame, by its drawn size) and
 //! surveyed at p seems to be at `q_i = T_i m_i`. Where the median of q_i is the place of another tag that does not fit,
 //! and that one's is this one's, their ids are exchanged. A tag of another size is seen too far or too near by the
-//! ratio of the sizes: the median of `|T_i^-1 p| / |m_i|`, if that brings its observations together.
+//! ratio of the sizes: the median of `|T_i^-1 p| / |m_i|`, if that brings its observations together. Where all tags are
+//! of another size, so is each distance between two of them in one view: the median of `|p_a - p_b| / |m_a - m_b|`, which
+//! no joint has a part in.
 
 use nalgebra::{Isometry3, Vector3};
 
 use crate::calib::bundle::estimate::Estimate;
 use crate::calib::bundle::problem::WeightedMeasurement;
-use crate::calib::views::view::View;
+use crate::calib::views::view::{TagObservation, View};
 use armcal_core::robot::Robot;
 use armcal_core::stats::quantile;
 
@@ -22,6 +24,8 @@ pub(crate) enum TagFault {
     Size { tag_idx: usize, ratio: f64 },
     /// The same of all tags: printed at another scale.
     AllSizes { ratio: f64 },
+    /// Moved with others, by about so much in m and rad (module `group`).
+    Moved { tag_idx: usize, std: [f64; 2] },
 }
 
 impl TagFault {
@@ -35,13 +39,17 @@ impl TagFault {
             }
             Self::Size { tag_idx, ratio } => robot.tags[tag_idx].size_m *= ratio,
             Self::AllSizes { ratio } => robot.tags.iter_mut().for_each(|tag| tag.size_m *= ratio),
+            Self::Moved { tag_idx, std } => {
+                let tag = &mut robot.tags[tag_idx];
+                [tag.position_std_m, tag.rotation_std_rad] = std;
+            }
         }
     }
 
     fn tags(&self) -> Vec<usize> {
         match *self {
             Self::Swapped(pair) => pair.to_vec(),
-            Self::Size { tag_idx, .. } => vec![tag_idx],
+            Self::Size { tag_idx, .. } | Self::Moved { tag_idx, .. } => vec![tag_idx],
             Self::AllSizes { .. } => Vec::new(),
         }
     }
@@ -61,6 +69,8 @@ const NEARER: f64 = 0.3;
 /// A size counts from this ratio on, and from so many of its standard errors.
 const LEAST_RATIO: f64 = 0.005;
 const SURE_SIGMAS: f64 = 4.0;
+/// Tags nearer to each other tell nothing of their size, m.
+const LEAST_DISTANCE_M: f64 = 0.1;
 /// It must bring the observations of its tag this much nearer to the survey.
 const CLOSER: f64 = 0.6;
 
@@ -88,15 +98,10 @@ impl Estimate<'_> {
     }
 
     /// Tags that do not fit, or that the data have elsewhere.
-    fn doubtful_tags(&self) -> Vec<usize> {
+    pub(crate) fn doubtful_tags(&self) -> Vec<usize> {
         let elsewhere = self.departed_tags();
         let is_doubtful = |tag: &usize| self.rejected_share(*tag) > REJECTED_SHARE || elsewhere.contains(tag);
         (0..self.problem.robot.tags.len()).filter(is_doubtful).collect()
-    }
-
-    /// Whether more is wrong with the tags than that some were moved.
-    pub(crate) fn most_tags_are_doubtful(&self) -> bool {
-        2 * self.doubtful_tags().len() > self.problem.robot.tags.len()
     }
 
     /// Share of a tag's observations that are rejected.
@@ -122,6 +127,26 @@ impl Estimate<'_> {
         }
         SeenTag { tag_idx, observations }
     }
+}
+
+/// True size of all tags over the drawn one, by the distances between tags of one view; `None` where the drawn size
+/// explains them, or no view has two tags.
+pub(crate) fn common_size_ratio(views: &[View], robot: &Robot) -> Option<f64> {
+    let place = |tag: &TagObservation| robot.tags[tag.tag_idx].base_from_tag.isometry().translation.vector;
+    let (mut ratios, mut n_views) = (Vec::new(), 0);
+    for view in views {
+        let tags: Vec<&TagObservation> = view.tags.iter().filter(|tag| tag.corners().is_some()).collect();
+        n_views += u32::from(tags.len() > 1);
+        for (n, a) in tags.iter().enumerate() {
+            let others = tags[n + 1..].iter().map(|b| ((place(a) - place(b)).norm(), a, b));
+            let seen_m = |a: &TagObservation, b: &TagObservation| (a.center_in_camera_m - b.center_in_camera_m).norm();
+            ratios.extend(others.filter(|(m, ..)| *m > LEAST_DISTANCE_M).map(|(m, a, b)| m / seen_m(a, b)));
+        }
+    }
+    let ratio = quantile(&ratios, 0.5)?;
+    let spread: Vec<f64> = ratios.iter().map(|r| (r - ratio).abs()).collect();
+    let std = 1.4826 * quantile(&spread, 0.5)? / f64::from(n_views).sqrt();
+    ((ratio - 1.0).abs() > LEAST_RATIO.max(SURE_SIGMAS * std)).then_some(ratio)
 }
 
 impl SeenTag {

@@ -1,0 +1,120 @@
+//! Tags that were found moved: freed of their survey, estimated with the rest, and reported.
+
+use crate::calib::bundle::drawing::Drawing;
+use crate::calib::bundle::estimate::Estimate;
+use crate::calib::bundle::tags::identity::TagFault;
+use crate::calib::finding::{Finding, FindingKind, FindingUnit};
+use crate::calib::result::calibration::Calibration;
+use armcal_core::robot::{Robot, SurveyedTag};
+use armcal_core::spatial::log;
+use armcal_core::stats::quantile;
+
+/// Which tags were freed, and the survey as it was.
+pub(crate) struct MovedTags {
+    surveyed: Vec<SurveyedTag>,
+    freed: Vec<usize>,
+    /// Tags that were moved together.
+    group: Vec<usize>,
+    /// More tags than may have moved do not fit: the survey stands, and other tests say what is wrong.
+    has_given_up: bool,
+}
+
+/// Prior of a freed tag: anywhere.
+const FREED_STD_M: f64 = 1.0;
+const FREED_STD_RAD: f64 = 1.0;
+/// Tags that must stay where the survey has them.
+const MIN_TRUSTED: usize = 3;
+
+impl MovedTags {
+    pub(crate) fn new(robot: &Robot) -> Self {
+        Self { surveyed: robot.tags.clone(), freed: Vec::new(), group: Vec::new(), has_given_up: false }
+    }
+
+    /// What freeing the next tag may bring: half of its chi-square, nats; zero where none was moved.
+    pub(crate) fn gain_nats(&self, estimate: &Estimate<'_>) -> f64 {
+        let moved = (!self.has_given_up).then(|| estimate.moved_tag()).flatten();
+        moved.map_or(0.0, |moved| 0.5 * moved.chi2)
+    }
+
+    /// Takes over what `drawing` says of tags, so that a freed tag's distance is from there.
+    pub(crate) fn resurveyed(&mut self, robot: &mut Robot, drawing: &Drawing) {
+        for fault in &drawing.tags {
+            match *fault {
+                TagFault::Swapped(pair) => {
+                    pair.iter().for_each(|&tag| self.surveyed[tag].base_from_tag = robot.tags[tag].base_from_tag);
+                }
+                TagFault::Moved { tag_idx, .. } if !self.group.contains(&tag_idx) => self.group.push(tag_idx),
+                TagFault::Size { .. } | TagFault::AllSizes { .. } | TagFault::Moved { .. } => {}
+            }
+        }
+        free(robot, &self.group);
+    }
+
+    /// Frees the next tag of `robot` that `estimate` has elsewhere, or takes all of them back; whether it did either.
+    pub(crate) fn revise(&mut self, estimate: &Estimate<'_>, robot: &mut Robot) -> bool {
+        if self.has_given_up {
+            return false;
+        }
+        let Some(moved) = estimate.moved_tag() else { return false };
+        let trusted = robot.tags.iter().filter(|tag| tag.position_std_m < FREED_STD_M).count();
+        if self.freed.len() >= robot.tags.len() / 4 || trusted <= MIN_TRUSTED {
+            self.has_given_up = true;
+            let had_any = !self.freed.is_empty();
+            self.freed.clear();
+            robot.tags.clone_from(&self.surveyed);
+            free(robot, &self.group);
+            return had_any;
+        }
+        free(robot, &[moved.tag_idx]);
+        self.freed.push(moved.tag_idx);
+        true
+    }
+
+    /// The freed tags as findings, which refuse nothing: those that were moved together in one.
+    pub(crate) fn report(&self, estimate: &Estimate<'_>, calibration: &mut Calibration) {
+        let alone = self.freed.iter().filter(|tag| !self.group.contains(tag)).map(std::slice::from_ref);
+        for tags in (!self.group.is_empty()).then_some(&self.group[..]).into_iter().chain(alone) {
+            let (finding, words) = self.finding(estimate, tags);
+            calibration.findings.push(finding);
+            if let Some(verdict) = &mut calibration.verdict {
+                verdict.warnings.push(words);
+            }
+        }
+    }
+
+    /// The size is the median distance of the tags from their survey.
+    fn finding(&self, estimate: &Estimate<'_>, tags: &[usize]) -> (Finding, String) {
+        let by = |&tag: &usize| log(&self.surveyed[tag].base_from_tag.isometry().inv_mul(&estimate.tag(tag).0));
+        let median = |first: usize| {
+            let all: Vec<f64> = tags.iter().map(|tag| by(tag).fixed_rows::<3>(first).norm()).collect();
+            quantile(&all, 0.5).unwrap_or(0.0)
+        };
+        let (shift_m, turn_rad) = (median(0), median(3));
+        let name = list(&tags.iter().map(|&tag| self.surveyed[tag].id.to_string()).collect::<Vec<_>>());
+        let (kind, what) = match tags {
+            [_] => (FindingKind::TagMoved, format!("tag {name} is")),
+            _ => (FindingKind::TagsMoved, format!("tags {name} are together")),
+        };
+        let (shift_mm, turn_deg) = (1e3 * shift_m, turn_rad.to_degrees());
+        let words = format!("{what} {shift_mm:.1} mm and {turn_deg:.1} deg from the survey: estimated with the rest");
+        let (size, unit) = (Some(shift_m), Some(FindingUnit::Metre));
+        (Finding { kind, name, size, unit, tool_error_m: None, time_s: None, repaired: true }, words)
+    }
+}
+
+/// Takes the survey's word on `tags` away.
+fn free(robot: &mut Robot, tags: &[usize]) {
+    for &tag in tags {
+        let tag = &mut robot.tags[tag];
+        (tag.position_std_m, tag.rotation_std_rad) = (FREED_STD_M, FREED_STD_RAD);
+    }
+}
+
+/// `1, 2 and 3`.
+fn list(names: &[String]) -> String {
+    match names {
+        [] => String::new(),
+        [one] => one.clone(),
+        [first @ .., last] => format!("{} and {last}", first.join(", ")),
+    }
+}
