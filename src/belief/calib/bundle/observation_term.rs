@@ -20,6 +20,8 @@ pub(crate) struct PoseInformation {
     pub adjoint: Matrix6<f64>,
     /// Sum of squares of the whitened residuals.
     pub chi2: f64,
+    /// The same of each corner, used or not; zero without corners.
+    pub corner_chi2: [f64; 4],
 }
 
 /// The lens's part: columns fx, fy, cx, cy, k1..k4.
@@ -74,8 +76,8 @@ impl PoseInformation {
     ) -> Option<Self> {
         let scale = noise.powi(-2);
         match seen {
-            WeightedMeasurement::Corners { corners_px, half_size_m, info } => {
-                let corners = Corners { corners_px, half_size_m: *half_size_m, info: info * scale };
+            WeightedMeasurement::Corners { corners_px, half_size_m, info, used } => {
+                let corners = Corners { corners_px, half_size_m: *half_size_m, info: info * scale, used };
                 of_corners(&corners, camera_from_tag, lens, by_lens)
             }
             WeightedMeasurement::Position { in_camera_m, info } => {
@@ -89,7 +91,8 @@ impl PoseInformation {
 
     /// A observation that is not possible: it pulls nowhere and costs much.
     pub(crate) fn unseen(seen: &WeightedMeasurement) -> Self {
-        Self { h: Matrix6::zeros(), g: Vector6::zeros(), adjoint: Matrix6::identity(), chi2: unseen_chi2(seen) }
+        let (chi2, corner_chi2) = (unseen_chi2(seen), [UNSEEN_SIGMAS * UNSEEN_SIGMAS; 4]);
+        Self { h: Matrix6::zeros(), g: Vector6::zeros(), adjoint: Matrix6::identity(), chi2, corner_chi2 }
     }
 
     pub(crate) fn weighted(&mut self, weight: f64) {
@@ -103,6 +106,7 @@ struct Corners<'a> {
     corners_px: &'a [[f64; 2]; 4],
     half_size_m: f64,
     info: f64,
+    used: &'a [bool; 4],
 }
 
 fn of_corners(
@@ -111,20 +115,24 @@ fn of_corners(
     lens: &Fisheye,
     mut by_lens: Option<&mut LensInformation>,
 ) -> Option<PoseInformation> {
-    let Corners { corners_px, half_size_m, info } = *corners;
+    let Corners { corners_px, half_size_m, info, used } = *corners;
     let rotation = *camera_from_tag.rotation.to_rotation_matrix().matrix();
     let center = camera_from_tag.translation.vector;
     let (x, y) = (rotation.column(0) * half_size_m, rotation.column(1) * half_size_m);
     let points = [center - x - y, center + x - y, center + x + y, center - x + y];
     let mut h = [[0.0; 6]; 6];
     let mut g = [0.0; 6];
-    let mut chi2 = 0.0;
+    let (mut chi2, mut corner_chi2) = (0.0, [0.0; 4]);
     let mut projected = [(Vector2::zeros(), Matrix2x3::zeros()); 4];
     for (out, p) in projected.iter_mut().zip(&points) {
         *out = lens.project_with_jacobian(p)?;
     }
-    for ((p, measured), (pixel, by_point)) in points.iter().zip(corners_px).zip(projected) {
+    for (corner, ((p, measured), (pixel, by_point))) in points.iter().zip(corners_px).zip(projected).enumerate() {
         let residual = [measured[0] - pixel.x, measured[1] - pixel.y];
+        corner_chi2[corner] = info * (residual[0] * residual[0] + residual[1] * residual[1]);
+        if !used[corner] {
+            continue;
+        }
         let rows = image_jacobian(&by_point, p);
         for (row, &r) in rows.iter().zip(&residual) {
             chi2 += r * r;
@@ -151,7 +159,7 @@ fn of_corners(
     }
     let h = Matrix6::from_fn(|i, k| info * if i >= k { h[i][k] } else { h[k][i] });
     let g = Vector6::from(g) * info;
-    Some(PoseInformation { h, g, adjoint: adjoint(camera_from_tag), chi2: chi2 * info })
+    Some(PoseInformation { h, g, adjoint: adjoint(camera_from_tag), chi2: chi2 * info, corner_chi2 })
 }
 
 /// d(pixel)/d(fx, fy, cx, cy, k1..k4), x row and y row.
@@ -186,6 +194,7 @@ fn of_position(in_camera_m: &Vector3<f64>, info: f64, camera_from_tag: &Isometry
         g: transposed * residual,
         adjoint: adjoint(camera_from_tag),
         chi2: info * residual.norm_squared(),
+        corner_chi2: [0.0; 4],
     }
 }
 
@@ -205,5 +214,6 @@ fn of_pose(
         g: weighted * -off,
         adjoint: adjoint(camera_from_tag),
         chi2: off.component_mul(&off).dot(&info),
+        corner_chi2: [0.0; 4],
     }
 }

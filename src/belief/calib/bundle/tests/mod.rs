@@ -2,6 +2,7 @@
 
 mod baseline;
 mod calibration_prior;
+mod corner_outliers;
 mod data;
 mod drawing;
 mod equations;
