@@ -8,7 +8,7 @@
 use nalgebra::{Isometry3, Matrix2x3, Matrix6, SMatrix, SVector, Vector2, Vector3, Vector6};
 
 use crate::calib::bundle::problem::WeightedMeasurement;
-use armcal_core::optics::{Fisheye, image_jacobian};
+use armcal_core::optics::{CameraModel, image_jacobian};
 use armcal_core::spatial::{adjoint, log, skew};
 
 /// A observation linearized, in the camera's frame.
@@ -24,7 +24,7 @@ pub(crate) struct PoseInformation {
     pub corner_chi2: [f64; 4],
 }
 
-/// The lens's part: columns fx, fy, cx, cy, k1..k4.
+/// The lens's part, by its intrinsics: focal lengths, centre, four coefficients of distortion.
 #[derive(Clone, Debug)]
 pub(crate) struct LensInformation {
     pub cross: SMatrix<f64, 6, 8>,
@@ -70,7 +70,7 @@ impl PoseInformation {
     pub(crate) fn of(
         seen: &WeightedMeasurement,
         camera_from_tag: &Isometry3<f64>,
-        lens: &Fisheye,
+        lens: &CameraModel,
         noise: f64,
         by_lens: Option<&mut LensInformation>,
     ) -> Option<Self> {
@@ -112,7 +112,7 @@ struct Corners<'a> {
 fn of_corners(
     corners: &Corners<'_>,
     camera_from_tag: &Isometry3<f64>,
-    lens: &Fisheye,
+    lens: &CameraModel,
     mut by_lens: Option<&mut LensInformation>,
 ) -> Option<PoseInformation> {
     let Corners { corners_px, half_size_m, info, used } = *corners;
@@ -144,10 +144,10 @@ fn of_corners(
             }
         }
         if let Some(by_lens) = &mut by_lens {
-            let columns = lens_columns(lens, p);
+            let columns = lens.by_intrinsics(p)?;
             for axis in 0..2 {
                 let row = Vector6::from(rows[axis]);
-                let column = columns[axis];
+                let column = columns.row(axis).transpose();
                 by_lens.cross += row * column.transpose();
                 by_lens.h += column * column.transpose();
                 by_lens.g += column * residual[axis];
@@ -160,26 +160,6 @@ fn of_corners(
     let h = Matrix6::from_fn(|i, k| info * if i >= k { h[i][k] } else { h[k][i] });
     let g = Vector6::from(g) * info;
     Some(PoseInformation { h, g, adjoint: adjoint(camera_from_tag), chi2: chi2 * info, corner_chi2 })
-}
-
-/// d(pixel)/d(fx, fy, cx, cy, k1..k4), x row and y row.
-fn lens_columns(lens: &Fisheye, p: &Vector3<f64>) -> [SVector<f64, 8>; 2] {
-    let r = p.x.hypot(p.y);
-    let theta = r.atan2(p.z);
-    let (ux, uy) = if r > 0.0 { (p.x / r, p.y / r) } else { (0.0, 0.0) };
-    let t2 = theta * theta;
-    let powers = [theta * t2, theta * t2 * t2, theta * t2 * t2 * t2, theta * t2 * t2 * t2 * t2];
-    let distorted = theta + powers.iter().zip(&lens.distortion).map(|(t, k)| t * k).sum::<f64>();
-    let row = |direction: f64, axis: usize| {
-        let mut out = SVector::<f64, 8>::zeros();
-        out[axis] = distorted * direction;
-        out[2 + axis] = 1.0;
-        for (k, power) in powers.iter().enumerate() {
-            out[4 + k] = lens.focal_px[axis] * direction * power;
-        }
-        out
-    };
-    [row(ux, 0), row(uy, 1)]
 }
 
 fn of_position(in_camera_m: &Vector3<f64>, info: f64, camera_from_tag: &Isometry3<f64>) -> PoseInformation {

@@ -10,7 +10,7 @@ use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
 use crate::calib::views::view::{MeanCorners, TagMeasurement, View};
 use armcal_core::joints::{JointAngles, MAX_JOINTS};
 use armcal_core::kinematics::{LinkCorrections, LinkPoses};
-use armcal_core::optics::Fisheye;
+use armcal_core::optics::CameraModel;
 use armcal_core::robot::Robot;
 
 /// Where each parameter's column is.
@@ -102,7 +102,7 @@ pub(crate) struct Prior {
     pub mount: Isometry3<f64>,
     pub mount_std: [f64; 6],
     pub time_std_s: f64,
-    pub lens: Fisheye,
+    pub lens: CameraModel,
     pub lens_std: [f64; 8],
     pub tags: Vec<Isometry3<f64>>,
     /// Infinite where nothing is known.
@@ -131,7 +131,7 @@ pub(crate) struct State {
     pub joint: DVector<f64>,
     pub mount: Isometry3<f64>,
     pub time_s: f64,
-    pub lens: Fisheye,
+    pub lens: CameraModel,
     pub tags: Vec<Isometry3<f64>>,
     pub gripper_tag: Isometry3<f64>,
     /// Of each view: what each joint is off beyond the sensor's model, rad.

@@ -36,7 +36,7 @@ fn soil(views: &mut [View], probability: f64, rng: &mut ChaCha8Rng) -> Vec<Corne
 }
 
 /// Squared error of the tool, m^2, and NEES, means over the task.
-fn tool_error(case: &Case<'_>, found: &Estimate<'_>, seed: u64) -> [f64; 2] {
+pub(super) fn tool_error(case: &Case<'_>, found: &Estimate<'_>, seed: u64) -> [f64; 2] {
     let (at, covariance, parameters) = (found.parameters(), found.joint_covariance(), found.joint_parameters());
     let travels = task(case.robot, &mut rng(seed, "task"));
     let mut sums = [0.0; 2];

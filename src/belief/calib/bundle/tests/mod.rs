@@ -7,6 +7,7 @@ mod data;
 mod drawing;
 mod equations;
 mod failures;
+mod lenses;
 mod moved_tags;
 mod reservations;
 mod score_test;
