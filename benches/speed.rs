@@ -252,7 +252,7 @@ fn simulation(c: &mut Criterion) {
 #[cfg(feature = "sim")]
 fn images(c: &mut Criterion, robot: &Robot, vehicle: &Vehicle, scene: &Scene) {
     use armcal::detect::{DetectorSettings, GreyImage, TagDetector};
-    use armcal::optics::Fisheye;
+    use armcal::optics::{CameraModel, Fisheye, LensModel};
     use armcal::robot::PlacedShape;
     use armcal::sim::imaging::{ImageSpec, Imager, Light, Shot, SolidShape, TagPlane};
 
@@ -283,12 +283,13 @@ fn images(c: &mut Criterion, robot: &Robot, vehicle: &Vehicle, scene: &Scene) {
         })
         .collect();
     let half = robot.camera.lens;
-    let full = Fisheye {
-        focal_px: half.focal_px.map(|f| 2.0 * f),
-        center_px: half.center_px.map(|c| 2.0 * (c + 0.5) - 0.5),
-        resolution_px: half.resolution_px.map(|n| 2 * n),
-        ..half
-    };
+    let LensModel::Equidistant(lens) = half.lens else { panic!("a fisheye") };
+    let full = CameraModel::from(Fisheye {
+        focal_px: lens.focal_px.map(|f| 2.0 * f),
+        center_px: lens.center_px.map(|c| 2.0 * (c + 0.5) - 0.5),
+        resolution_px: lens.resolution_px.map(|n| 2 * n),
+        ..lens
+    });
     let spec = ImageSpec { snow_per_m3: 100.0, ..ImageSpec::default() };
     let shot = Shot { solids: &poses, ..Shot::of_tags(links.frame(&robot.camera.mount), &tags, 0) };
     for (name, lens) in [("half", half), ("full", full)] {
@@ -368,7 +369,7 @@ fn detect(c: &mut Criterion) {
     let mut grey = Vec::new();
     let shot = Shot::of_tags(Isometry3::identity(), &tags, 1);
     Imager::new(&lens, &ImageSpec::default(), &[light], 1).take_image(&shot).grey(&mut grey);
-    let [width, height] = lens.resolution_px.map(|n| n as usize);
+    let [width, height] = lens.resolution_px().map(|n| n as usize);
     let mut detector = TagDetector::new(&lens, DetectorSettings::default()).expect("it starts");
     let image = GreyImage { width, height, data: &grey };
     assert_eq!(detector.detect(image).expect("of the lens").tags.len(), tags.len());

@@ -186,6 +186,6 @@ fn the_golden_lens_is_the_robots() {
     let robot = titan();
     let (_, camera) = lenses().remove(0);
     let lens = &robot.camera.lens;
-    assert_eq!((camera.focal_px, camera.center_px), (lens.focal_px, lens.center_px));
-    assert_eq!((camera.distortion, camera.resolution_px), (lens.distortion, lens.resolution_px));
+    assert_eq!((camera.focal_px, camera.center_px), (lens.focal_px(), lens.center_px()));
+    assert_eq!((&camera.distortion[..], camera.resolution_px), (&lens.distortion()[..], lens.resolution_px()));
 }

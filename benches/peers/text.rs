@@ -48,7 +48,7 @@ pub fn bundle(problem: &Problem, relative_gain: f64) -> String {
     arm(&mut out, problem);
     let lens = &robot.camera.lens;
     out.push_str("lens\n");
-    numbers(&mut out, lens.focal_px.into_iter().chain(lens.center_px).chain(lens.distortion));
+    numbers(&mut out, lens.focal_px().into_iter().chain(lens.center_px()).chain(lens.distortion()));
     let parameters = problem.parameters();
     let _ = writeln!(out, "parameters {}", parameters.len());
     for p in &parameters {

@@ -15,7 +15,7 @@ use crate::cli::study_plan::{
 };
 use crate::cli::study_poses::{PosesArgs, poses};
 use crate::output;
-use armcal_core::optics::Fisheye;
+use armcal_core::optics::CameraModel;
 use armcal_core::stats::quantile;
 use armcal_detect::{DetectorSettings, GreyImage};
 use armcal_sim::WaterKind;
@@ -90,7 +90,7 @@ pub(super) fn study(args: &StudyArgs) -> Result<Exit> {
 }
 
 fn detection(args: &DetectionArgs) -> Result<Exit> {
-    let lens: Fisheye = armcal_core::robot::load(&args.robot)?.camera.lens;
+    let lens: CameraModel = armcal_core::robot::load(&args.robot)?.camera.lens;
     let settings = DetectorSettings {
         decimation: args.decimation,
         second_decimation: args.second_decimation,

@@ -92,7 +92,7 @@ fn of_robot(recording: &Path, robot: &Robot) -> Result<Known> {
     let robot = &*surveyed(&read, robot);
     let camera = NamedCamera {
         name: robot.camera.name.clone(),
-        model: robot.camera.lens.into(),
+        model: robot.camera.lens,
         image_topic: None,
         tag_topic: Some(topics::DETECTIONS.to_owned()),
     };

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix2, Rotation3, Vector2, Vector3};
 
-use armcal_core::optics::Fisheye;
+use armcal_core::optics::CameraModel;
 
 const N_NODES: usize = 4096;
 /// Smallest cosine between a pixel's bearing and that of the tag's centre: 80 deg.
@@ -19,9 +19,9 @@ pub(super) struct BearingTable {
 }
 
 impl BearingTable {
-    pub(super) fn new(lens: &Fisheye) -> Self {
-        let [fx, cx, cy] = [lens.focal_px[0], lens.center_px[0], lens.center_px[1]];
-        let edge = Vector3::new(lens.max_view_angle_rad.sin(), 0.0, lens.max_view_angle_rad.cos());
+    pub(super) fn new(lens: &CameraModel) -> Self {
+        let [fx, cx, cy] = [lens.focal_px()[0], lens.center_px()[0], lens.center_px()[1]];
+        let edge = Vector3::new(lens.max_view_angle_rad().sin(), 0.0, lens.max_view_angle_rad().cos());
         let largest = lens.project(&(edge * (1.0 - 1e-12))).map_or(0.0, |pixel| ((pixel.x - cx) / fx).powi(2));
         let nodes_per_square = (N_NODES - 1) as f64 / largest.max(1e-9);
         let at = |k: usize| {
@@ -30,7 +30,7 @@ impl BearingTable {
             bearing.map_or([1.0, 1.0], |b| [if theta_d > 1e-9 { b.x / theta_d } else { 1.0 }, b.z])
         };
         let nodes = (0..N_NODES).map(at).collect();
-        Self { focal_px: lens.focal_px, center_px: lens.center_px, nodes_per_square, nodes }
+        Self { focal_px: lens.focal_px(), center_px: lens.center_px(), nodes_per_square, nodes }
     }
 
     /// Bearing of a pixel (camera frame, of length 1 to 1e-8); `None` beyond the field of view.

@@ -12,7 +12,7 @@ use crate::gates::{gate_candidate, gate_fit};
 use crate::image::GreyImage;
 use crate::pattern::Cells;
 use crate::settings::DetectorSettings;
-use armcal_core::optics::{Fisheye, tag36h11};
+use armcal_core::optics::{CameraModel, tag36h11};
 use armcal_core::streams::{RejectReason, TagDetection};
 
 /// Finds tags in images of one camera. The same image gives the same result.
@@ -25,7 +25,7 @@ pub struct TagDetector {
 /// Fits and gates candidates.
 #[derive(Debug)]
 struct Refiner {
-    lens: Fisheye,
+    lens: CameraModel,
     settings: DetectorSettings,
     table: BearingTable,
     fitter: Fitter,
@@ -36,8 +36,8 @@ impl TagDetector {
     ///
     /// # Errors
     /// [`DetectError::Library`] if the C library cannot start.
-    pub fn new(lens: &Fisheye, settings: DetectorSettings) -> Result<Self, DetectError> {
-        let decoder = QuadDecoder::new(lens.resolution_px.map(|n| n as usize))?;
+    pub fn new(lens: &CameraModel, settings: DetectorSettings) -> Result<Self, DetectError> {
+        let decoder = QuadDecoder::new(lens.resolution_px().map(|n| n as usize))?;
         let refiner = Refiner { lens: *lens, settings, table: BearingTable::new(lens), fitter: Fitter::new() };
         Ok(Self { decoder, refiner })
     }
@@ -87,7 +87,7 @@ impl TagDetector {
         if Some(data.len()) != width.checked_mul(height) {
             return Err(DetectError::Size { bytes: data.len(), width, height });
         }
-        let [lens_width, lens_height] = self.refiner.lens.resolution_px.map(|n| n as usize);
+        let [lens_width, lens_height] = self.refiner.lens.resolution_px().map(|n| n as usize);
         if [width, height] != [lens_width, lens_height] {
             return Err(DetectError::Resolution { width, height, lens_width, lens_height });
         }

@@ -5,13 +5,13 @@ use nalgebra::Matrix2;
 use crate::decoder::Candidate;
 use crate::fit::Fit;
 use crate::settings::DetectorSettings;
-use armcal_core::optics::Fisheye;
+use armcal_core::optics::CameraModel;
 use armcal_core::streams::RejectReason;
 
 /// Gates before the fit: Hamming distance, id, field of view and size.
 pub(super) fn gate_candidate(
     settings: &DetectorSettings,
-    lens: &Fisheye,
+    lens: &CameraModel,
     candidate: &Candidate,
 ) -> Result<(), RejectReason> {
     if candidate.hamming > settings.max_wrong_bits {
@@ -27,7 +27,7 @@ pub(super) fn gate_candidate(
 /// before the fit.
 pub(super) fn gate_fit(
     settings: &DetectorSettings,
-    lens: &Fisheye,
+    lens: &CameraModel,
     start_px: &[[f64; 2]; 4],
     fit: &Fit,
 ) -> Result<(), RejectReason> {
@@ -50,7 +50,11 @@ pub(super) fn gate_fit(
     Ok(())
 }
 
-fn gate_corners(settings: &DetectorSettings, lens: &Fisheye, corners_px: &[[f64; 2]; 4]) -> Result<(), RejectReason> {
+fn gate_corners(
+    settings: &DetectorSettings,
+    lens: &CameraModel,
+    corners_px: &[[f64; 2]; 4],
+) -> Result<(), RejectReason> {
     let is_in_view = |c: &[f64; 2]| lens.contains(&(*c).into()) && lens.unproject(&(*c).into()).is_some();
     if !corners_px.iter().all(is_in_view) {
         return Err(RejectReason::OutOfView);

@@ -7,7 +7,7 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector2, Vector3};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use armcal_core::optics::{Fisheye, square_corners, tag36h11};
+use armcal_core::optics::{CameraModel, square_corners, tag36h11};
 
 /// A tag in the camera frame.
 #[derive(Clone, Copy, Debug)]
@@ -33,7 +33,7 @@ impl PlacedTag {
         Self { id, size_m, camera_from_tag: Isometry3::from_parts(Translation3::from(center_m), facing * lean * turn) }
     }
 
-    pub(super) fn corners_px(&self, lens: &Fisheye) -> Option<[[f64; 2]; 4]> {
+    pub(super) fn corners_px(&self, lens: &CameraModel) -> Option<[[f64; 2]; 4]> {
         let pixels = square_corners(self.size_m).map(|c| lens.project(&(self.camera_from_tag * c).coords));
         let mut out = [[0.0; 2]; 4];
         for (corner, pixel) in out.iter_mut().zip(pixels) {
@@ -70,7 +70,7 @@ fn reflectance(tag: &PlacedTag, x: f64, y: f64) -> Option<bool> {
     Some(tag36h11::cells(tag.id).expect("an id of the family")[row as usize][column as usize])
 }
 
-fn ray(lens: &Fisheye, rendering: &Rendering, tags: &[PlacedTag], pixel: Vector2<f64>) -> f64 {
+fn ray(lens: &CameraModel, rendering: &Rendering, tags: &[PlacedTag], pixel: Vector2<f64>) -> f64 {
     let Some(bearing) = lens.unproject(&pixel) else { return 0.0 };
     for tag in tags {
         let inverse = tag.camera_from_tag.inverse();
@@ -90,8 +90,8 @@ fn ray(lens: &Fisheye, rendering: &Rendering, tags: &[PlacedTag], pixel: Vector2
 const N: usize = 8;
 
 /// Renders tags, the first in front; pixels beside them are not traced.
-pub(super) fn render(lens: &Fisheye, rendering: &Rendering, tags: &[PlacedTag], rng: &mut ChaCha8Rng) -> Vec<u8> {
-    let [width, height] = lens.resolution_px.map(|n| n as usize);
+pub(super) fn render(lens: &CameraModel, rendering: &Rendering, tags: &[PlacedTag], rng: &mut ChaCha8Rng) -> Vec<u8> {
+    let [width, height] = lens.resolution_px().map(|n| n as usize);
     let mut grey = vec![rendering.around; width * height];
     for tag in tags {
         let Some(corners) = tag.corners_px(lens) else { continue };
@@ -112,13 +112,13 @@ pub(super) fn render(lens: &Fisheye, rendering: &Rendering, tags: &[PlacedTag], 
 
 /// Traces a window at N x N rays a pixel, blurs that, and averages.
 fn draw(
-    lens: &Fisheye,
+    lens: &CameraModel,
     rendering: &Rendering,
     tags: &[PlacedTag],
     [columns, rows]: [Range<usize>; 2],
     grey: &mut [f64],
 ) {
-    let width = lens.resolution_px[0] as usize;
+    let width = lens.resolution_px()[0] as usize;
     let (nx, ny) = (columns.len() * N, rows.len() * N);
     let at = |start: usize, k: usize| start as f64 - 0.5 + (k as f64 + 0.5) / N as f64;
     let fine: Vec<f64> = (0..nx * ny)

@@ -7,21 +7,21 @@ use rand::RngExt;
 
 use crate::synthetic::{CLEAN, PlacedTag, Rendering, render};
 use crate::*;
-use armcal_core::optics::Fisheye;
-use armcal_core::optics::fixture::lens;
+use armcal_core::optics::fixture::{fisheye, lens};
+use armcal_core::optics::{CameraModel, Fisheye};
 use armcal_core::stats::{quantile, stream_rng};
 use armcal_core::streams::RejectReason;
 
-fn detector(lens: &Fisheye, settings: DetectorSettings) -> TagDetector {
+fn detector(lens: &CameraModel, settings: DetectorSettings) -> TagDetector {
     TagDetector::new(lens, settings).expect("it starts")
 }
 
-fn detect_in(lens: &Fisheye, settings: DetectorSettings, data: &[u8]) -> ImageDetections {
-    let [width, height] = lens.resolution_px.map(|n| n as usize);
+fn detect_in(lens: &CameraModel, settings: DetectorSettings, data: &[u8]) -> ImageDetections {
+    let [width, height] = lens.resolution_px().map(|n| n as usize);
     detector(lens, settings).detect(GreyImage { width, height, data }).expect("an image of the lens")
 }
 
-fn drawn(lens: &Fisheye, rendering: &Rendering, tags: &[PlacedTag]) -> Vec<u8> {
+fn drawn(lens: &CameraModel, rendering: &Rendering, tags: &[PlacedTag]) -> Vec<u8> {
     render(lens, rendering, tags, &mut stream_rng(1, "detect/test"))
 }
 
@@ -204,7 +204,7 @@ fn doubtful_tags_are_rejected_with_the_reason() {
     let sure = DetectorSettings { max_corner_std_px: 1e-4, ..default() };
     assert_eq!(reasons(&detect_in(&lens, sure, &clean)), [(42, RejectReason::PoorEdges)]);
     // Beyond the field of view that belief has.
-    let narrow = Fisheye { max_view_angle_rad: 0.05, ..lens };
+    let narrow = Fisheye { max_view_angle_rad: 0.05, ..fisheye() }.into();
     let detections = detect_in(&narrow, default(), &clean);
     assert_eq!(reasons(&detections), [(42, RejectReason::OutOfView)]);
 }

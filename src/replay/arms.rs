@@ -120,7 +120,7 @@ fn log_camera(run: &ReplayScene, stream: &mut EntityLog, arm: &Arm) {
     let entity = format!("{}/camera", carrier.entity());
     stream.log_static(&entity, &transform(&camera.mount.link_from_frame));
     // The image's corners may lie beyond the field of view: a cone of a narrower angle shows the direction as well.
-    let half_angle_rad = camera.lens.max_view_angle_rad.min(0.6);
+    let half_angle_rad = camera.lens.max_view_angle_rad().min(0.6);
     let rays = [[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]].map(|[x, y]: [f64; 2]| {
         let across = SIGHT_M * half_angle_rad.tan();
         vector(&Vector3::new(0.75 * across * x, 0.63 * across * y, SIGHT_M))

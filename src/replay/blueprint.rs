@@ -114,7 +114,7 @@ fn camera_view(b: &mut Builder, run: &ReplayScene) -> Part {
 
 fn titled_camera(b: &mut Builder, run: &ReplayScene, title: &str) -> Part {
     let view = b.view("2D", title, CAMERA);
-    let [width, height] = run.robot.camera.lens.resolution_px.map(f64::from);
+    let [width, height] = run.robot.camera.lens.resolution_px().map(f64::from);
     let bounds = VisualBounds2D::new(Range2D { x_range: [0.0, width].into(), y_range: [0.0, height].into() });
     b.property(&view, "VisualBounds2D", bounds);
     let dark = Background::new(BackgroundKind::SolidColor).with_color([4, 5, 6, 255]);

@@ -7,7 +7,7 @@ use crate::colors;
 use crate::entities::CAMERA;
 use crate::entity_log::EntityLog;
 use crate::scene::ReplayScene;
-use armcal_core::optics::Fisheye;
+use armcal_core::optics::CameraModel;
 use armcal_core::robot::SurveyedTag;
 use armcal_core::streams::{DetectionReject, TagDetection};
 
@@ -25,7 +25,7 @@ const RINGS_RAD: [f64; 2] = [std::f64::consts::FRAC_PI_6, std::f64::consts::FRAC
 /// Draws the image plane.
 pub(super) fn draw(run: &ReplayScene, stream: &mut EntityLog) {
     let lens = &run.robot.camera.lens;
-    let [width, height] = lens.resolution_px;
+    let [width, height] = lens.resolution_px();
     if run.tracks.images.is_empty() {
         stream.log_static(&format!("{CAMERA}/background"), &Image::from_rgb24(background(lens), [width, height]));
     } else {
@@ -52,8 +52,8 @@ fn draw_images(run: &ReplayScene, stream: &mut EntityLog) {
 }
 
 /// Dark water inside of the field of view, black outside.
-fn background(lens: &Fisheye) -> Vec<u8> {
-    let [width, height] = lens.resolution_px;
+fn background(lens: &CameraModel) -> Vec<u8> {
+    let [width, height] = lens.resolution_px();
     let mut pixels = Vec::with_capacity(3 * width as usize * height as usize);
     for y in 0..height {
         for x in 0..width {
@@ -65,7 +65,7 @@ fn background(lens: &Fisheye) -> Vec<u8> {
 }
 
 /// The circle of all bearings at an angle from the optical axis.
-fn ring(lens: &Fisheye, angle_rad: f64) -> Vec<[f32; 2]> {
+fn ring(lens: &CameraModel, angle_rad: f64) -> Vec<[f32; 2]> {
     let around = (0..=96).map(|n| f64::from(n) * std::f64::consts::TAU / 96.0);
     let bearings = around.map(|a| Vector3::new(angle_rad.sin() * a.cos(), angle_rad.sin() * a.sin(), angle_rad.cos()));
     bearings.filter_map(|bearing| lens.project(&bearing)).map(|pixel| corner(pixel.into())).collect()

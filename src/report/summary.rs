@@ -58,6 +58,9 @@ pub struct CaptureSummary {
     pub views: usize,
     pub detections: usize,
     pub rejected: usize,
+    /// Single corners that the fit rejected; the others of their tags are in use.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rejected_corners: Option<usize>,
     /// The same by reason.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub rejected_by_reason: BTreeMap<String, usize>,
@@ -240,6 +243,7 @@ impl RunSummary {
                 views: calibration.fit.views,
                 detections: calibration.fit.tags_seen,
                 rejected: calibration.fit.rejected,
+                rejected_corners: calibration.fit.rejected_corners,
                 rejected_by_reason: calibration.fit.rejected_by_reason.clone(),
                 collisions: None,
                 min_clearance_m: None,

@@ -163,12 +163,13 @@ fn accuracy_lines(summary: &RunSummary) -> Vec<String> {
 /// How many views there were, what of them was left out, and why the capture ended.
 fn capture_lines(capture: &CaptureSummary) -> Vec<String> {
     let mut lines = vec![format!(
-        "captured     {} poses, {} skipped; {} tag observations in {} fitted views, {} rejected; {} targets skipped",
+        "captured     {} poses, {} skipped; {} tag observations in {} fitted views, {} rejected{}; {} targets skipped",
         capture.poses,
         capture.poses_skipped,
         capture.detections,
         capture.views,
         capture.rejected,
+        capture.rejected_corners.map_or(String::new(), |n| format!(" and {n} single corners")),
         capture.targets_skipped
     )];
     if !capture.rejected_by_reason.is_empty() {

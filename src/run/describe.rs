@@ -26,13 +26,13 @@ pub(super) fn describe(writer: &mut RecordingWriter, inputs: &RunInputs, now: St
 
 fn camera_info(robot: &Robot) -> CameraInfo {
     let lens = &robot.camera.lens;
-    let ([fx, fy], [cx, cy]) = (lens.focal_px, lens.center_px);
+    let ([fx, fy], [cx, cy], [width, height]) = (lens.focal_px(), lens.center_px(), lens.resolution_px());
     CameraInfo {
         header: Header { frame_id: robot.camera.name.clone(), ..Header::default() },
-        width: lens.resolution_px[0],
-        height: lens.resolution_px[1],
-        distortion_model: "equidistant".to_owned(),
-        d: lens.distortion.to_vec(),
+        width,
+        height,
+        distortion_model: lens.name().to_owned(),
+        d: lens.distortion(),
         k: [fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0],
         r: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
         p: [fx, 0.0, cx, 0.0, 0.0, fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0],

@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-use armcal_core::optics::{Fisheye, square_corners};
+use armcal_core::optics::{CameraModel, square_corners};
 use armcal_core::robot::Shape;
 use armcal_core::stats::stream_rng;
 use armcal_sim::imaging::{Light, SolidShape, TagPlane};
@@ -104,7 +104,7 @@ pub(super) fn wall_place(range_m: f64) -> Isometry3<f64> {
 }
 
 impl Scene {
-    pub(super) fn new(lens: &Fisheye, condition: &Condition, seed: u64) -> Self {
+    pub(super) fn new(lens: &CameraModel, condition: &Condition, seed: u64) -> Self {
         let Condition { water, blur_px, range_m, repeat } = *condition;
         let name = format!("study/detection/{}/{blur_px}/{range_m}/{repeat}", water_name(water));
         let mut rng = stream_rng(seed, &name);
@@ -123,7 +123,7 @@ impl Scene {
         let tags = tags.collect();
         // A sideways motion that moves the image of the middle by the blur.
         let way: f64 = rng.random_range(0.0..std::f64::consts::TAU);
-        let half_m = 0.5 * blur_px * range_m / lens.focal_px[0];
+        let half_m = 0.5 * blur_px * range_m / lens.focal_px()[0];
         let moved = |share: f64| Isometry3::translation(share * half_m * way.cos(), share * half_m * way.sin(), 0.0);
         Self { tags, from_camera: [moved(-1.0), moved(0.0), moved(1.0)], has_wall: repeat % 2 == 0 }
     }
@@ -133,7 +133,7 @@ impl Scene {
     }
 
     /// A tag's corners, means over the exposure (Simpson's rule); `None` unless all are in the image.
-    pub(super) fn corners_px(&self, lens: &Fisheye, tag: &PlacedTag) -> Option<[[f64; 2]; 4]> {
+    pub(super) fn corners_px(&self, lens: &CameraModel, tag: &PlacedTag) -> Option<[[f64; 2]; 4]> {
         let mut mean = [[0.0; 2]; 4];
         for (from_camera, weight) in self.from_camera.iter().zip([1.0, 4.0, 1.0]) {
             for (sum, corner) in mean.iter_mut().zip(square_corners(TAG_SIZE_M)) {

@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Matrix2, Unit, Vector3};
 
 use crate::scenes::{Condition, Scene, image_spec, lights, wall, wall_place};
-use armcal_core::optics::Fisheye;
+use armcal_core::optics::CameraModel;
 use armcal_core::streams::RejectReason;
 use armcal_detect::{DetectError, DetectorSettings, GreyImage, ImageDetections, TagDetector};
 use armcal_sim::WaterKind;
@@ -70,7 +70,7 @@ pub struct DetectionStudy {
 /// # Errors
 /// [`StudyError`] of detector or watcher.
 pub fn detection_study(
-    lens: &Fisheye,
+    lens: &CameraModel,
     settings: &DetectorSettings,
     conditions: &[Condition],
     seed: u64,
@@ -92,7 +92,7 @@ pub fn detection_study(
             }
         };
         shoot(imager, &scene, condition, n as u64, &mut grey);
-        let [width, height] = lens.resolution_px.map(|n| n as usize);
+        let [width, height] = lens.resolution_px().map(|n| n as usize);
         let image = GreyImage { width, height, data: &grey };
         let rendered_s = watcher.wall_s();
         let detected = detector.detect(image)?;
@@ -124,7 +124,7 @@ fn shoot(imager: &mut Imager, scene: &Scene, condition: &Condition, number: u64,
 
 /// One image, and the scene that it shows.
 struct Trial<'a> {
-    lens: &'a Fisheye,
+    lens: &'a CameraModel,
     scene: &'a Scene,
     condition: &'a Condition,
     image: &'a str,

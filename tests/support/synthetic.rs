@@ -5,7 +5,7 @@
 use armcal::calib::Calibration;
 use armcal::kinematics::Attachment;
 use armcal::log::{Completeness, Recording};
-use armcal::optics::Fisheye;
+use armcal::optics::CameraModel;
 use armcal::robot::Robot;
 use armcal::stats::{quantile, stream_rng};
 use armcal::streams::{
@@ -221,13 +221,13 @@ fn small_motion(std_m: f64, std_rad: f64, rng: &mut ChaCha8Rng) -> Isometry3<f64
 }
 
 /// Kannala-Brandt in polar form, within 1.25 rad of the axis and 10 px of the border.
-fn pixel(lens: &Fisheye, p: &Point3<f64>) -> Option<[f64; 2]> {
+fn pixel(lens: &CameraModel, p: &Point3<f64>) -> Option<[f64; 2]> {
     let theta = p.x.hypot(p.y).atan2(p.z);
-    let [k1, k2, k3, k4] = lens.distortion;
+    let [.., k1, k2, k3, k4] = lens.intrinsics();
     let radius = theta + k1 * theta.powi(3) + k2 * theta.powi(5) + k3 * theta.powi(7) + k4 * theta.powi(9);
     let azimuth = p.y.atan2(p.x);
-    let u = lens.center_px[0] + lens.focal_px[0] * radius * azimuth.cos();
-    let v = lens.center_px[1] + lens.focal_px[1] * radius * azimuth.sin();
-    let [width, height] = lens.resolution_px.map(f64::from);
+    let u = lens.center_px()[0] + lens.focal_px()[0] * radius * azimuth.cos();
+    let v = lens.center_px()[1] + lens.focal_px()[1] * radius * azimuth.sin();
+    let [width, height] = lens.resolution_px().map(f64::from);
     (theta < 1.25 && (10.0..width - 10.0).contains(&u) && (10.0..height - 10.0).contains(&v)).then_some([u, v])
 }

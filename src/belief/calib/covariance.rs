@@ -205,7 +205,7 @@ pub fn linearity_scale(
 fn drawing_variance_m2(robot: &Robot, tag: &TagObservation) -> f64 {
     let (camera, survey) = (&robot.camera, &robot.tags[tag.tag_idx]);
     let range_m = tag.center_in_camera_m.norm();
-    let bearing_rad = camera.corner_std_px / camera.lens.focal_px[0];
+    let bearing_rad = camera.corner_std_px / camera.lens.focal_px()[0];
     // The range comes from the apparent size: `range^2 / size` times the bearing's error.
     let along_m = range_m * range_m * bearing_rad / survey.size_m;
     let across_m = range_m * bearing_rad;

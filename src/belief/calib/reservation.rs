@@ -35,7 +35,7 @@ impl fmt::Display for Reservation {
         let (scale, name) = match unit {
             FindingUnit::Metre => (1e3, "mm"),
             FindingUnit::Radian => (1f64.to_degrees(), "deg"),
-            FindingUnit::One => (1.0, ""),
+            FindingUnit::One => (1e2, "%"),
         };
         write!(
             f,

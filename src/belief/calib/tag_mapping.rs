@@ -14,7 +14,6 @@ use crate::calib::error::CalibError;
 use crate::calib::result::map_table::{MapResult, MapTag, SurveyCoverage};
 use crate::calib::views::view::{CaptureData, View};
 use crate::tagmap::{Body, MapDetection, MapInput, MapMode, MapSettings, MapView, NoiseScale, TagMap, TagPrior, solve};
-use armcal_core::optics::CameraModel;
 use armcal_core::robot::{Robot, SurveyedTag, TagSurvey};
 use armcal_core::spatial::{Base, Pose, Tag, skew};
 
@@ -64,7 +63,7 @@ fn map_tags(data: &mut CaptureData, robot: &Robot) -> Result<Mapped, String> {
     let views: Vec<MapView> = data.fit.iter().map(|view| map_view(view, robot)).collect();
     let bodies = [Body { name: robot.base_link.clone(), is_static: true, pose: Some(Isometry3::identity()) }];
     let priors: Vec<TagPrior> = robot.tags.iter().map(prior).collect();
-    let cameras = [CameraModel::from(robot.camera.lens)];
+    let cameras = [robot.camera.lens];
     let settings = MapSettings {
         mode: MapMode::PartlyKnown,
         corner_std_px: robot.camera.corner_std_px,

@@ -85,8 +85,8 @@ impl VisibilityModel {
     fn in_image(&self, robot: &Robot, in_camera: &Point3<f64>) -> bool {
         let lens = &robot.camera.lens;
         let angle = in_camera.x.hypot(in_camera.y).atan2(in_camera.z);
-        let [width, height] = lens.resolution_px.map(f64::from);
-        angle < lens.max_view_angle_rad - self.edge_rad
+        let [width, height] = lens.resolution_px().map(f64::from);
+        angle < lens.max_view_angle_rad() - self.edge_rad
             && lens.project(&in_camera.coords).is_some_and(|pixel| {
                 (self.border_px..=width - self.border_px).contains(&pixel.x)
                     && (self.border_px..=height - self.border_px).contains(&pixel.y)

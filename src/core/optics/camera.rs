@@ -1,8 +1,9 @@
 //! Any camera: one set of methods over the models.
 
-use nalgebra::{Matrix2x3, Unit, Vector2, Vector3};
+use nalgebra::{Matrix2x3, SMatrix, Unit, Vector2, Vector3};
 
 use super::fisheye::Fisheye;
+use super::flat_port::FlatPort;
 use super::radtan::Radtan;
 
 /// What pose estimation asks of a camera; points in the camera frame, m.
@@ -37,79 +38,232 @@ is_a_lens!(Fisheye);
 is_a_lens!(Radtan);
 is_a_lens!(CameraModel);
 
-/// A camera of either model.
+/// A lens of either model.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum CameraModel {
+pub enum LensModel {
     /// Kannala and Brandt's fisheye.
     Equidistant(Fisheye),
     /// Without distortion it is the plain pinhole.
     Radtan(Radtan),
 }
 
+/// Any camera: a lens, and the window before it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CameraModel {
+    /// In air where there is a window, in its medium otherwise.
+    pub lens: LensModel,
+    /// The window; `None` where the lens was measured as it looks, in its medium.
+    pub port: Option<FlatPort>,
+}
+
+/// Calls the same of either lens.
+macro_rules! of_lens {
+    ($camera:expr, $lens:ident => $value:expr) => {
+        match &$camera.lens {
+            LensModel::Equidistant($lens) => $value,
+            LensModel::Radtan($lens) => $value,
+        }
+    };
+}
+
 impl CameraModel {
     /// Pixel of a point (camera frame, m); `None` where the lens does not see.
+    #[inline]
     #[must_use]
     pub fn project(&self, point_m: &Vector3<f64>) -> Option<Vector2<f64>> {
-        match self {
-            Self::Equidistant(lens) => lens.project(point_m),
-            Self::Radtan(lens) => lens.project(point_m),
+        match &self.port {
+            None => of_lens!(self, lens => lens.project(point_m)),
+            Some(port) => {
+                let direction = port.direction_in_air(point_m)?;
+                of_lens!(self, lens => lens.project(&direction))
+            }
         }
     }
 
     /// Projection and d(pixel)/d(point), px/m; `None` where the lens does not see.
+    #[inline]
     #[must_use]
     pub fn project_with_jacobian(&self, point_m: &Vector3<f64>) -> Option<(Vector2<f64>, Matrix2x3<f64>)> {
-        match self {
-            Self::Equidistant(lens) => lens.project_with_jacobian(point_m),
-            Self::Radtan(lens) => lens.project_with_jacobian(point_m),
+        match &self.port {
+            None => of_lens!(self, lens => lens.project_with_jacobian(point_m)),
+            Some(port) => {
+                let (direction, by_point) = port.direction_with_jacobian(point_m)?;
+                let (pixel, by_direction) = of_lens!(self, lens => lens.project_with_jacobian(&direction))?;
+                Some((pixel, by_direction * by_point))
+            }
         }
     }
 
-    /// The direction (camera frame, unit) that a pixel sees; `None` where no point is projected to it.
+    /// The direction (camera frame, unit) that a pixel sees; `None` where no point is projected to it. Behind a window
+    /// rays do not meet in one point: it is that of the ray's point a metre away.
     #[must_use]
     pub fn unproject(&self, pixel_px: &Vector2<f64>) -> Option<Unit<Vector3<f64>>> {
-        match self {
-            Self::Equidistant(lens) => lens.unproject(pixel_px),
-            Self::Radtan(lens) => lens.unproject(pixel_px),
+        let direction = of_lens!(self, lens => lens.unproject(pixel_px))?;
+        self.port.as_ref().map_or(Some(direction), |port| port.direction_in_water(&direction))
+    }
+
+    /// Derivatives of a point's pixel by [`Self::intrinsics`]; `None` where the lens does not see.
+    #[must_use]
+    pub fn by_intrinsics(&self, point_m: &Vector3<f64>) -> Option<SMatrix<f64, 2, 8>> {
+        let direction = self.port.map_or(Some(*point_m), |port| port.direction_in_air(point_m))?;
+        of_lens!(self, lens => lens.by_intrinsics(&direction))
+    }
+
+    /// Focal lengths, centre, and the first four coefficients of distortion.
+    #[must_use]
+    pub fn intrinsics(&self) -> [f64; 8] {
+        let ([fx, fy], [cx, cy]) = (self.focal_px(), self.center_px());
+        let [a, b, c, d] = of_lens!(self, lens => std::array::from_fn(|k| lens.distortion[k]));
+        [fx, fy, cx, cy, a, b, c, d]
+    }
+
+    /// The same camera with other [`Self::intrinsics`].
+    #[must_use]
+    pub fn with_intrinsics(&self, [fx, fy, cx, cy, k @ ..]: [f64; 8]) -> Self {
+        let mut other = *self;
+        match &mut other.lens {
+            LensModel::Equidistant(lens) => {
+                (lens.focal_px, lens.center_px, lens.distortion) = ([fx, fy], [cx, cy], k);
+            }
+            LensModel::Radtan(lens) => {
+                (lens.focal_px, lens.center_px) = ([fx, fy], [cx, cy]);
+                lens.distortion[..4].copy_from_slice(&k);
+            }
         }
+        other
     }
 
     /// Columns and rows.
+    #[inline]
     #[must_use]
     pub fn resolution_px(&self) -> [u32; 2] {
-        match self {
-            Self::Equidistant(lens) => lens.resolution_px,
-            Self::Radtan(lens) => lens.resolution_px,
-        }
+        of_lens!(self, lens => lens.resolution_px)
     }
 
     /// Focal lengths along x and y.
+    #[inline]
     #[must_use]
     pub fn focal_px(&self) -> [f64; 2] {
-        match self {
-            Self::Equidistant(lens) => lens.focal_px,
-            Self::Radtan(lens) => lens.focal_px,
-        }
+        of_lens!(self, lens => lens.focal_px)
     }
 
     /// Principal point, x and y.
+    #[inline]
     #[must_use]
     pub fn center_px(&self) -> [f64; 2] {
-        match self {
-            Self::Equidistant(lens) => lens.center_px,
-            Self::Radtan(lens) => lens.center_px,
+        of_lens!(self, lens => lens.center_px)
+    }
+
+    /// All coefficients of distortion in the order of their model.
+    #[must_use]
+    pub fn distortion(&self) -> Vec<f64> {
+        of_lens!(self, lens => lens.distortion.to_vec())
+    }
+
+    /// The model's name, as ROS and Kalibr have it.
+    #[must_use]
+    pub fn name(&self) -> &'static str {
+        match self.lens {
+            LensModel::Equidistant(_) => "equidistant",
+            LensModel::Radtan(_) => "plumb_bob",
         }
+    }
+
+    /// Half of the field of view in front of the window; nothing beyond it is seen.
+    #[must_use]
+    pub fn max_view_angle_rad(&self) -> f64 {
+        let angle_rad = match &self.lens {
+            LensModel::Equidistant(lens) => lens.max_view_angle_rad,
+            LensModel::Radtan(lens) => (lens.max_radius() * (1.0 - 1e-9)).atan(),
+        };
+        match &self.port {
+            None => angle_rad,
+            Some(port) => (angle_rad.min(std::f64::consts::FRAC_PI_2).sin() / port.water_index).asin(),
+        }
+    }
+
+    /// Whether the projected radius grows with the angle, so that pixels have one bearing.
+    #[must_use]
+    pub fn is_monotonic(&self) -> bool {
+        of_lens!(self, lens => lens.is_monotonic())
+    }
+
+    /// Whether a pixel lies in the image.
+    #[inline]
+    #[must_use]
+    pub fn contains(&self, pixel_px: &Vector2<f64>) -> bool {
+        let [w, h] = self.resolution_px().map(f64::from);
+        (0.0..=w - 1.0).contains(&pixel_px.x) && (0.0..=h - 1.0).contains(&pixel_px.y)
     }
 }
 
 impl From<Fisheye> for CameraModel {
     fn from(lens: Fisheye) -> Self {
-        Self::Equidistant(lens)
+        Self { lens: LensModel::Equidistant(lens), port: None }
     }
 }
 
 impl From<Radtan> for CameraModel {
     fn from(lens: Radtan) -> Self {
-        Self::Radtan(lens)
+        Self { lens: LensModel::Radtan(lens), port: None }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::optics::fixture::lens;
+    use proptest::prelude::*;
+
+    fn cameras() -> [CameraModel; 4] {
+        let port = FlatPort { distance_m: 0.02, thickness_m: 0.01, glass_index: 1.49, water_index: 1.333 };
+        let pinhole: CameraModel =
+            Radtan::new([500.0, 501.0], [610.0, 515.0], [-0.12, 0.03, 5e-4, -3e-4, 0.01], [1224, 1024]).into();
+        [lens(), pinhole, CameraModel { port: Some(port), ..lens() }, CameraModel { port: Some(port), ..pinhole }]
+    }
+
+    proptest! {
+        #[test]
+        fn derivatives_are_those_of_differences(x in -0.6f64..0.6, y in -0.6f64..0.6, z in 0.3f64..2.0) {
+            const H: f64 = 1e-6;
+            let point = Vector3::new(x, y, z);
+            for camera in cameras() {
+                let Some((pixel, by_point)) = camera.project_with_jacobian(&point) else { continue };
+                prop_assert_eq!(camera.project(&point).map(|p| (p - pixel).norm() < 1e-9), Some(true));
+                for axis in 0..3 {
+                    let ends = [H, -H].map(|h| camera.project(&(point + Vector3::ith(axis, h))));
+                    let [Some(plus), Some(minus)] = ends else { continue };
+                    let difference = (plus - minus) / (2.0 * H);
+                    prop_assert!((by_point.column(axis) - difference).norm() < 1e-4 * (1.0 + difference.norm()));
+                }
+                let by_intrinsics = camera.by_intrinsics(&point).expect("in view");
+                for k in 0..8 {
+                    let ends = [H, -H].map(|h| {
+                        let mut at = camera.intrinsics();
+                        at[k] += h;
+                        camera.with_intrinsics(at).project(&point)
+                    });
+                    let [Some(plus), Some(minus)] = ends else { continue };
+                    let difference = (plus - minus) / (2.0 * H);
+                    let off = (by_intrinsics.column(k) - difference).norm();
+                    prop_assert!(off < 1e-4 * (1.0 + difference.norm()), "{k}: {off}");
+                }
+            }
+        }
+
+        #[test]
+        fn a_square_behind_a_port_has_its_pose(x in -0.2f64..0.2, y in -0.2f64..0.2, z in 0.4f64..1.5) {
+            use crate::optics::{solve_square, square_corners};
+            use nalgebra::{Isometry3, Translation3, UnitQuaternion};
+            for camera in cameras() {
+                let turn = UnitQuaternion::from_scaled_axis(Vector3::new(2.8, 0.3, 0.2));
+                let pose = Isometry3::from_parts(Translation3::new(x, y, z), turn);
+                let corners = square_corners(0.15).map(|corner| camera.project(&(pose * corner).coords));
+                let [Some(a), Some(b), Some(c), Some(d)] = corners else { continue };
+                let solved = solve_square(&camera, 0.15, &[a, b, c, d].map(Into::into)).expect("a pose");
+                let off = solved.camera_from_tag.isometry().inv_mul(&pose);
+                prop_assert!(off.translation.vector.norm() < 1e-6 && off.rotation.angle() < 1e-6);
+            }
+        }
     }
 }

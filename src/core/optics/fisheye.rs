@@ -1,6 +1,6 @@
 //! The equidistant fisheye lens.
 
-use nalgebra::{Matrix2x3, Unit, Vector2, Vector3};
+use nalgebra::{Matrix2x3, SMatrix, SVector, Unit, Vector2, Vector3};
 
 /// `theta_d = theta (1 + k1 theta^2 + k2 theta^4 + k3 theta^6 + k4 theta^8)`, `pixel = f * theta_d * (x, y)/r + c`,
 /// where theta is the angle from the optical axis (z) and r = |(x, y)|. Pixel centres at whole numbers.
@@ -110,6 +110,27 @@ impl Fisheye {
             fy * axial * uy,
         );
         Some((pixel, jacobian))
+    }
+
+    /// d(pixel)/d(fx, fy, cx, cy, k1, k2, k3, k4).
+    pub(super) fn by_intrinsics(&self, point_m: &Vector3<f64>) -> Option<SMatrix<f64, 2, 8>> {
+        self.project(point_m)?;
+        let r = point_m.x.hypot(point_m.y);
+        let theta = r.atan2(point_m.z);
+        let (ux, uy) = if r > 0.0 { (point_m.x / r, point_m.y / r) } else { (0.0, 0.0) };
+        let t2 = theta * theta;
+        let powers = [theta * t2, theta * t2 * t2, theta * t2 * t2 * t2, theta * t2 * t2 * t2 * t2];
+        let distorted = theta + powers.iter().zip(&self.distortion).map(|(t, k)| t * k).sum::<f64>();
+        let row = |direction: f64, axis: usize| {
+            let mut out = SVector::<f64, 8>::zeros();
+            out[axis] = distorted * direction;
+            out[2 + axis] = 1.0;
+            for (k, power) in powers.iter().enumerate() {
+                out[4 + k] = self.focal_px[axis] * direction * power;
+            }
+            out.transpose()
+        };
+        Some(SMatrix::from_rows(&[row(ux, 0), row(uy, 1)]))
     }
 
     /// The direction (camera frame, unit) that a pixel sees; `None` beyond the field of view.

@@ -1,20 +1,23 @@
 //! Camera models: projection of points to pixels, and bearings of pixels.
 //!
 //! `Fisheye` is the equidistant model of Kannala and Brandt (2006, eq. 6 to the fourth odd term), as in OpenCV's
-//! `cv::fisheye` and Kalibr's `equidistant`. `Radtan` is Brown's pinhole model, `CameraModel` either of them. `square`
+//! `cv::fisheye` and Kalibr's `equidistant`. `Radtan` is Brown's pinhole model, `CameraModel` either of them, with or
+//! without a window before it (`FlatPort`). `square`
 //! computes the pose of a tag from its four corners for any [`Lens`]. Oracle: OpenCV (tests/oracle).
 
 mod camera;
 mod corner_noise;
 mod fisheye;
+mod flat_port;
 mod radtan;
 mod square;
 pub mod tag36h11;
 mod twist;
 
-pub use camera::{CameraModel, Lens};
+pub use camera::{CameraModel, Lens, LensModel};
 pub use corner_noise::{CornerNoise, DetectionChance};
 pub use fisheye::Fisheye;
+pub use flat_port::FlatPort;
 pub use radtan::Radtan;
 pub use square::{SquareError, SquarePose, solve_square, solve_square_both, square_corners};
 pub use twist::image_jacobian;
@@ -22,10 +25,15 @@ pub use twist::image_jacobian;
 /// The wrist camera's lens, for tests.
 #[doc(hidden)]
 pub mod fixture {
-    use super::Fisheye;
+    use super::{CameraModel, Fisheye};
 
     #[must_use]
-    pub fn lens() -> Fisheye {
+    pub fn lens() -> CameraModel {
+        fisheye().into()
+    }
+
+    #[must_use]
+    pub fn fisheye() -> Fisheye {
         Fisheye {
             focal_px: [387.33, 387.06],
             center_px: [633.6, 510.9],

@@ -1,6 +1,6 @@
 //! The pinhole with radial and tangential distortion.
 
-use nalgebra::{Matrix2, Matrix2x3, Unit, Vector2, Vector3};
+use nalgebra::{Matrix2, Matrix2x3, SMatrix, Unit, Vector2, Vector3};
 
 /// Brown's model (1971) as OpenCV's `projectPoints`, ROS's `plumb_bob` and Kalibr's `radtan` write it: with
 /// `(a, b) = (x, y)/z` and `r^2 = a^2 + b^2`,
@@ -51,6 +51,12 @@ impl Radtan {
     #[must_use]
     pub fn max_radius(&self) -> f64 {
         self.max_radius
+    }
+
+    /// Whether the projected radius grows as far as is seen.
+    #[must_use]
+    pub fn is_monotonic(&self) -> bool {
+        (0..=200).all(|i| self.radial_slope((self.max_radius * f64::from(i) / 200.0).powi(2)) > 0.0)
     }
 
     fn radial(&self, r2: f64) -> f64 {
@@ -113,6 +119,22 @@ impl Radtan {
         let pixel =
             Vector2::new(self.focal_px[0] * d.x + self.center_px[0], self.focal_px[1] * d.y + self.center_px[1]);
         Some((pixel, focal * of_distortion * of_division))
+    }
+
+    /// d(pixel)/d(fx, fy, cx, cy, k1, k2, p1, p2).
+    pub(super) fn by_intrinsics(&self, point_m: &Vector3<f64>) -> Option<SMatrix<f64, 2, 8>> {
+        let (a, b) = self.normalized(point_m)?;
+        let (d, _) = self.distort(a, b);
+        let r2 = a * a + b * b;
+        let [fx, fy] = self.focal_px;
+        let (x, y) = (fx * a * r2, fy * b * r2);
+        let row = |focal: [f64; 2], center: [f64; 2], k: [f64; 4]| {
+            SMatrix::<f64, 1, 8>::from_row_slice(&[focal[0], focal[1], center[0], center[1], k[0], k[1], k[2], k[3]])
+        };
+        Some(SMatrix::from_rows(&[
+            row([d.x, 0.0], [1.0, 0.0], [x, x * r2, fx * 2.0 * a * b, fx * (r2 + 2.0 * a * a)]),
+            row([0.0, d.y], [0.0, 1.0], [y, y * r2, fy * (r2 + 2.0 * b * b), fy * 2.0 * a * b]),
+        ]))
     }
 
     /// The direction (camera frame, unit) that a pixel sees; `None` beyond the range of unique bearings.

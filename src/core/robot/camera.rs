@@ -6,7 +6,7 @@ use serde::Deserialize;
 
 use super::error::{FileIssue, RobotError};
 use crate::kinematics::Attachment;
-use crate::optics::Fisheye;
+use crate::optics::{CameraModel, Fisheye, FlatPort, Radtan};
 
 /// The nominal camera.
 #[derive(Clone, Debug)]
@@ -16,13 +16,32 @@ pub struct CameraSpec {
     /// Nominal `link_from_camera` on the link that carries it.
     pub mount: Attachment,
     /// Nominal lens.
-    pub lens: Fisheye,
+    pub lens: CameraModel,
     /// One sigma of each coordinate of a detected corner.
     pub corner_std_px: f64,
+    /// How well the lens is known.
+    pub lens_priors: LensPriors,
     /// One sigma per axis of the mount's error.
     pub mount_std_m: f64,
     /// One sigma per axis of the mount's rotation error.
     pub mount_std_rad: f64,
+}
+
+/// One sigma of a lens as it was measured; the defaults are those of a usual calibration by a board (assumed).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LensPriors {
+    /// Of the focal length, relative.
+    pub focal_std: f64,
+    /// Of the centre along each axis.
+    pub center_std_px: f64,
+    /// Of each coefficient.
+    pub distortion_std: f64,
+}
+
+impl Default for LensPriors {
+    fn default() -> Self {
+        Self { focal_std: 2.5e-3, center_std_px: 1.0, distortion_std: 1e-2 }
+    }
 }
 
 #[derive(Deserialize)]
@@ -34,44 +53,110 @@ pub(super) struct CameraFile {
     resolution_px: [u32; 2],
     focal_px: [f64; 2],
     center_px: [f64; 2],
-    distortion: [f64; 4],
-    max_view_angle_rad: f64,
+    distortion: Vec<f64>,
+    max_view_angle_rad: Option<f64>,
+    port: Option<PortFile>,
     corner_std_px: f64,
+    focal_std: Option<f64>,
+    center_std_px: Option<f64>,
+    distortion_std: Option<f64>,
     mount_std_m: f64,
     mount_std_rad: f64,
 }
 
-pub(super) fn check_camera(file: &Path, raw: CameraFile, mount: Attachment) -> Result<CameraSpec, RobotError> {
-    if raw.model != "equidistant" {
-        let problem = format!("`{}` is not supported; use \"equidistant\" (Kannala-Brandt)", raw.model);
-        return Err(FileIssue::new(file, "camera.model", problem).into());
+/// A flat window before the lens.
+#[derive(Clone, Copy, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct PortFile {
+    distance_m: f64,
+    thickness_m: f64,
+    #[serde(default = "acrylic")]
+    glass_index: f64,
+    #[serde(default = "water")]
+    water_index: f64,
+}
+
+fn acrylic() -> f64 {
+    1.49
+}
+
+fn water() -> f64 {
+    1.333
+}
+
+impl PortFile {
+    fn check(self, file: &Path) -> Result<FlatPort, FileIssue> {
+        let check = |key: &str, value, range| FileIssue::check_range(file, &format!("camera.port.{key}"), value, range);
+        Ok(FlatPort {
+            distance_m: check("distance_m", self.distance_m, 0.0..=0.5)?,
+            thickness_m: check("thickness_m", self.thickness_m, 0.0..=0.1)?,
+            glass_index: check("glass_index", self.glass_index, 1.0..=3.0)?,
+            water_index: check("water_index", self.water_index, 1.0..=2.0)?,
+        })
     }
+}
+
+/// The lens of `[camera]`, without the window.
+fn lens(file: &Path, raw: &CameraFile) -> Result<CameraModel, FileIssue> {
+    let issue = |key: &str, problem: String| FileIssue::new(file, &format!("camera.{key}"), problem);
+    let (focal, center, resolution) = (raw.focal_px, raw.center_px, raw.resolution_px);
+    match (raw.model.as_str(), &raw.distortion[..]) {
+        ("equidistant", &[k1, k2, k3, k4]) => {
+            let angle = raw.max_view_angle_rad.ok_or_else(|| issue("max_view_angle_rad", "is missing".to_owned()))?;
+            let lens = Fisheye {
+                focal_px: focal,
+                center_px: center,
+                distortion: [k1, k2, k3, k4],
+                resolution_px: resolution,
+                max_view_angle_rad: FileIssue::check_range(file, "camera.max_view_angle_rad", angle, 0.1..=3.0)?,
+            };
+            let problem =
+                "the projected radius does not grow up to max_view_angle_rad; lower the angle or correct distortion";
+            let is_monotonic = lens.is_monotonic();
+            is_monotonic.then_some(lens.into()).ok_or_else(|| issue("distortion", problem.to_owned()))
+        }
+        ("pinhole", k) if matches!(k.len(), 0 | 4 | 5) => {
+            if raw.max_view_angle_rad.is_some() {
+                let problem = "a pinhole's follows from its image: leave it out".to_owned();
+                return Err(issue("max_view_angle_rad", problem));
+            }
+            let k = std::array::from_fn(|at| k.get(at).copied().unwrap_or(0.0));
+            Ok(Radtan::new(focal, center, k, resolution).into())
+        }
+        ("equidistant", k) => Err(issue("distortion", format!("has {} numbers, needs 4: k1 to k4", k.len()))),
+        ("pinhole", k) => {
+            Err(issue("distortion", format!("has {} numbers, needs none, 4 or 5: k1, k2, p1, p2, k3", k.len())))
+        }
+        (other, _) => {
+            let problem = format!("`{other}` is not supported; use \"equidistant\" (Kannala-Brandt) or \"pinhole\"");
+            Err(issue("model", problem))
+        }
+    }
+}
+
+pub(super) fn check_camera(file: &Path, raw: CameraFile, mount: Attachment) -> Result<CameraSpec, RobotError> {
     let check = |key: &str, value: f64, range| FileIssue::check_range(file, &format!("camera.{key}"), value, range);
     for k in 0..2 {
         check("resolution_px", f64::from(raw.resolution_px[k]), 16.0..=65536.0)?;
         check("focal_px", raw.focal_px[k], 1.0..=1e6)?;
         check("center_px", raw.center_px[k], -1e6..=1e6)?;
     }
-    for value in raw.distortion {
-        check("distortion", value, -10.0..=10.0)?;
+    for value in &raw.distortion {
+        check("distortion", *value, -10.0..=10.0)?;
     }
-    let max_view_angle_rad = check("max_view_angle_rad", raw.max_view_angle_rad, 0.1..=3.0)?;
-    let lens = Fisheye {
-        focal_px: raw.focal_px,
-        center_px: raw.center_px,
-        distortion: raw.distortion,
-        resolution_px: raw.resolution_px,
-        max_view_angle_rad,
+    let port = raw.port.map(|port| port.check(file)).transpose()?;
+    let lens = CameraModel { port, ..lens(file, &raw)? };
+    let usual = LensPriors::default();
+    let lens_priors = LensPriors {
+        focal_std: check("focal_std", raw.focal_std.unwrap_or(usual.focal_std), 0.0..=0.1)?,
+        center_std_px: check("center_std_px", raw.center_std_px.unwrap_or(usual.center_std_px), 0.0..=100.0)?,
+        distortion_std: check("distortion_std", raw.distortion_std.unwrap_or(usual.distortion_std), 0.0..=1.0)?,
     };
-    if !lens.is_monotonic() {
-        let problem =
-            "the projected radius does not grow up to max_view_angle_rad; lower the angle or correct distortion";
-        return Err(FileIssue::new(file, "camera.distortion", problem).into());
-    }
     Ok(CameraSpec {
         name: raw.name,
         mount,
         lens,
+        lens_priors,
         corner_std_px: check("corner_std_px", raw.corner_std_px, 1e-3..=100.0)?,
         mount_std_m: check("mount_std_m", raw.mount_std_m, 0.0..=1.0)?,
         mount_std_rad: check("mount_std_rad", raw.mount_std_rad, 0.0..=1.0)?,

@@ -26,7 +26,7 @@ mod urdf;
 mod vehicle;
 
 pub use body::LinkBody;
-pub use camera::CameraSpec;
+pub use camera::{CameraSpec, LensPriors};
 pub use drive::{DriveSpec, MotionSpec};
 pub use error::{FileIssue, RobotError, parse_toml, read_text};
 pub use failed::{FailedJoint, FailedKind};

@@ -18,7 +18,7 @@ use crate::imaging::shape::Form;
 use crate::imaging::tag_board::Board;
 use crate::imaging::tracer::Tracer;
 use crate::spec::ImageSpec;
-use armcal_core::optics::Fisheye;
+use armcal_core::optics::CameraModel;
 use armcal_core::robot::Shape;
 use armcal_core::stats::stream_rng;
 
@@ -82,7 +82,7 @@ impl<'a> Shot<'a> {
 /// Renders images with one lens in one water.
 #[derive(Clone, Debug)]
 pub struct Imager {
-    lens: Fisheye,
+    lens: CameraModel,
     spec: ImageSpec,
     lights: Vec<Light>,
     solids: Vec<(Form, Appearance)>,
@@ -102,7 +102,7 @@ const SILT_CD_M2: [f32; 3] = [9.0, 8.0, 6.0];
 impl Imager {
     /// Noise and snow are drawn for `seed`.
     #[must_use]
-    pub fn new(lens: &Fisheye, spec: &ImageSpec, lights: &[Light], seed: u64) -> Self {
+    pub fn new(lens: &CameraModel, spec: &ImageSpec, lights: &[Light], seed: u64) -> Self {
         use rand::Rng;
         let rays = Rays::new(lens);
         let n_pixels = rays.width * rays.height;
@@ -176,7 +176,7 @@ impl Imager {
 
     /// The lens that it renders with.
     #[must_use]
-    pub fn lens(&self) -> &Fisheye {
+    pub fn lens(&self) -> &CameraModel {
         &self.lens
     }
 }

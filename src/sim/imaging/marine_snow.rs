@@ -10,7 +10,7 @@ use crate::imaging::math::{Vec3, exp, hash, unit};
 use crate::imaging::rays::Rays;
 use crate::imaging::shader::Shader;
 use crate::spec::ImageSpec;
-use armcal_core::optics::Fisheye;
+use armcal_core::optics::CameraModel;
 
 /// Particles farther away are too faint to tell, m.
 const FAR_M: f32 = 2.0;
@@ -31,9 +31,9 @@ pub(super) struct Flake {
 }
 
 /// The particles of one image into `out`; `key` selects their random numbers.
-pub(super) fn fall(spec: &ImageSpec, lens: &Fisheye, shader: &Shader, key: u64, out: &mut Vec<Flake>) {
+pub(super) fn fall(spec: &ImageSpec, lens: &CameraModel, shader: &Shader, key: u64, out: &mut Vec<Flake>) {
     out.clear();
-    let cos_least = lens.max_view_angle_rad.cos() as f32;
+    let cos_least = lens.max_view_angle_rad().cos() as f32;
     let volume_m3 = TAU / 3.0 * (1.0 - cos_least) * FAR_M.powi(3);
     let n = (spec.snow_per_m3 as f32 * volume_m3).round() as u64;
     for k in 0..n {
@@ -48,7 +48,7 @@ pub(super) fn fall(spec: &ImageSpec, lens: &Fisheye, shader: &Shader, key: u64, 
         let Some(pixel) = lens.project(&point.cast()) else { continue };
         // Sizes: exponential, so that few are large.
         let radius_m = spec.snow_radius_m as f32 * -(1.0 - draw(3)).ln();
-        let focal_px = lens.focal_px[0] as f32;
+        let focal_px = lens.focal_px()[0] as f32;
         let radius_px = focal_px * radius_m / range_m;
         let sigma_px = (0.25 * radius_px * radius_px + 0.16).sqrt().min(LARGEST_PX);
         let mut lux = [0.5 * spec.ambient_lux as f32; 3];

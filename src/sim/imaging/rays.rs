@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use crate::imaging::math::Vec3;
-use armcal_core::optics::Fisheye;
+use armcal_core::optics::CameraModel;
 
 /// Unit vectors in the camera's frame, pixel by pixel, rows from the top. Beyond the lens's field of view they are
 /// zero.
@@ -21,8 +21,8 @@ pub(super) struct Rays {
 }
 
 impl Rays {
-    pub(super) fn new(lens: &Fisheye) -> Self {
-        let [width, height] = lens.resolution_px.map(|n| n as usize);
+    pub(super) fn new(lens: &CameraModel) -> Self {
+        let [width, height] = lens.resolution_px().map(|n| n as usize);
         let n = width * height;
         let (mut x, mut y, mut z) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
         let mut spans = vec![[0; 2]; height];
@@ -44,8 +44,8 @@ impl Rays {
             y,
             z,
             spans,
-            focal_px: lens.focal_px.iter().fold(0.0, |a: f64, b| a.max(*b)) as f32,
-            center_px: lens.center_px.map(|c| c as f32),
+            focal_px: lens.focal_px().iter().fold(0.0, |a: f64, b| a.max(*b)) as f32,
+            center_px: lens.center_px().map(|c| c as f32),
         }
     }
 

@@ -30,7 +30,7 @@ fn ahead(pixel: [f64; 2], range_m: f64, tilt: [f64; 3]) -> Isometry3<f64> {
 }
 
 fn center() -> [f64; 2] {
-    lens().center_px
+    lens().center_px()
 }
 
 fn grey(frame: &Frame) -> Vec<f64> {
@@ -48,7 +48,7 @@ fn at(frame: &Frame, pixel: [f64; 2]) -> [f64; 3] {
 
 /// Between pixels.
 fn between(image: &[f64], pixel: &Vector2<f64>) -> f64 {
-    let width = lens().resolution_px[0] as usize;
+    let width = lens().resolution_px()[0] as usize;
     let (x, y) = (pixel.x.floor(), pixel.y.floor());
     let (u, v, i) = (pixel.x - x, pixel.y - y, y as usize * width + x as usize);
     let row = |i: usize| (1.0 - u) * image[i] + u * image[i + 1];
@@ -228,7 +228,7 @@ fn motion_blur_is_the_mean_over_the_exposure() {
     };
     let mut imager = Imager::new(&lens(), &ImageSpec::clean(), &[], 1);
     let centroid = |image: &[f64]| {
-        let width = lens().resolution_px[0] as usize;
+        let width = lens().resolution_px()[0] as usize;
         let sum = image.iter().enumerate().fold(Vector3::zeros(), |sum, (i, value)| {
             sum + Vector3::new((i % width) as f64, (i / width) as f64, 1.0) * *value
         });

@@ -211,14 +211,14 @@ impl Perturbation {
                 (0..robot.tags.len()).for_each(|tag| change_tag(robot, tag, |place| turn * place));
             }
             Self::FocalLength(by) => {
-                for (focal_px, by) in robot.camera.lens.focal_px.iter_mut().zip(by) {
-                    *focal_px *= 1.0 + by;
-                }
+                let mut at = robot.camera.lens.intrinsics();
+                at.iter_mut().zip(by).for_each(|(focal_px, by)| *focal_px *= 1.0 + by);
+                robot.camera.lens = robot.camera.lens.with_intrinsics(at);
             }
             Self::ImageCentre(by) => {
-                for (center_px, by) in robot.camera.lens.center_px.iter_mut().zip(by) {
-                    *center_px += by;
-                }
+                let mut at = robot.camera.lens.intrinsics();
+                at[2..].iter_mut().zip(by).for_each(|(center_px, by)| *center_px += by);
+                robot.camera.lens = robot.camera.lens.with_intrinsics(at);
             }
             Self::Sensor(_) => {}
         }

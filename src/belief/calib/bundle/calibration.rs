@@ -259,8 +259,10 @@ impl<'a> BundleCalibration<'a> {
     fn report(&mut self, estimated: &Estimated<'_>, diagnosis: &Diagnosis) -> Calibration {
         let Estimated { setup, estimate, selections, .. } = estimated;
         for outlier in &estimate.outliers {
-            *self.data.data.rejected.entry(ObservationRejection::Outlier).or_default() += 1;
-            tracing::debug!("view {}: tag {} rejected", outlier.view_idx, outlier.tag_id);
+            if outlier.corner.is_none() {
+                self.data.data.reject(ObservationRejection::Outlier, 1);
+            }
+            tracing::debug!("view {}: tag {} rejected, corner {:?}", outlier.view_idx, outlier.tag_id, outlier.corner);
         }
         let datasheet = &self.data.robot;
         let robot = Robot { sensors: with_datasheets(&diagnosis.robot, datasheet, setup), ..diagnosis.robot.clone() };
@@ -281,7 +283,9 @@ impl<'a> BundleCalibration<'a> {
             predicted_tool_error_m: self.impact(estimated, diagnosis, &parameters).tool_error_m(),
             n_parameters: setup.n_wanted(datasheet),
         };
-        let calibration = assemble(&source, &fit, evidence);
+        let mut calibration = assemble(&source, &fit, evidence);
+        let n_corners = estimate.outliers.iter().filter(|outlier| outlier.corner.is_some()).count();
+        calibration.fit.rejected_corners = (n_corners > 0).then_some(n_corners);
         let kept = &calibration.covariance.parameters;
         let with_mount = covariance_with_mount(&robot, estimate, kept);
         Calibration {
@@ -411,10 +415,11 @@ fn with_datasheets(estimated: &Robot, datasheet: &Robot, setup: &BundleSetup) ->
     pairs.map(|(joint, (own, nominal))| if setup.has_no_sensor(joint) { nominal } else { own }.clone()).collect()
 }
 
-/// `pose 12: tag 3: 45 sigma`.
+/// `pose 12: tag 3: 45 sigma`, or `pose 12: tag 3, corner 0: 45 sigma`.
 fn named(outlier: &Outlier, views: &[View]) -> String {
     let pose_idx = views.get(outlier.view_idx).map_or(0, |view| view.pose_idx);
-    format!("pose {pose_idx}: tag {}: {:.0} sigma", outlier.tag_id, outlier.sigmas)
+    let corner = outlier.corner.map_or(String::new(), |corner| format!(", corner {corner}"));
+    format!("pose {pose_idx}: tag {}{corner}: {:.0} sigma", outlier.tag_id, outlier.sigmas)
 }
 
 /// Gains and offsets that keep the datasheet's value: of joints distal to the camera, and of failed ones.

@@ -19,7 +19,7 @@ use crate::calib::bundle::estimate::{Estimate, estimate};
 use crate::calib::bundle::evidence::SCALE_BOUNDS;
 use crate::calib::bundle::input::BundleInput;
 use crate::calib::bundle::model_selection::log_evidence;
-use crate::calib::bundle::outliers::REJECT;
+use crate::calib::bundle::outliers::{Rejected, rejected};
 use crate::calib::bundle::score_test::GeometryElement;
 use crate::calib::bundle::tags::group::moved_group;
 use crate::calib::bundle::tags::identity::{TagFault, common_size_ratio};
@@ -161,9 +161,10 @@ fn best_ratio(ratio: f64, gain: impl Fn(f64) -> f64) -> f64 {
 
 /// Logarithm of the evidence, rejected observations at the cost that they are rejected at.
 fn evidence(found: &Estimate<'_>) -> f64 {
-    let rejected = found.problem.observations.iter().filter(|observation| !observation.is_used);
-    let n = rejected.map(|observation| observation.data.n_coordinates()).sum::<usize>() as f64;
-    log_evidence(&found.problem, &found.solved.normal) - n * (0.5 * REJECT + found.problem.scales.noise.ln())
+    let log_noise = found.problem.scales.noise.ln();
+    let cost = |rejected: Rejected| 0.5 * rejected.chi2 + rejected.n_coordinates as f64 * log_noise;
+    let rejected = found.problem.observations.iter().map(|observation| cost(rejected(observation)));
+    log_evidence(&found.problem, &found.solved.normal) - rejected.sum::<f64>()
 }
 
 impl Estimate<'_> {

@@ -122,13 +122,13 @@ impl Estimate<'_> {
         let at = self.problem.layout.lens?;
         let (lens, drawn) = (&self.solved.state.lens, &self.problem.prior.lens);
         let std = |k: usize| self.posterior.covariance[(at + k, at + k)].max(0.0).sqrt();
-        let ratio = lens.focal_px[0] / drawn.focal_px[0] - 1.0;
-        let shift = [0, 1].map(|k| lens.center_px[k] - drawn.center_px[k]);
+        let ratio = lens.focal_px()[0] / drawn.focal_px()[0] - 1.0;
+        let shift = [0, 1].map(|k| lens.center_px()[k] - drawn.center_px()[k]);
         let words = format!(
             "camera: focal length {:+.2} % of robot.toml's (sigma {:.2} %), centre off by {:.1}, {:.1} px: estimated \
              with the rest; measure the intrinsics again",
             100.0 * ratio,
-            100.0 * std(0) / drawn.focal_px[0],
+            100.0 * std(0) / drawn.focal_px()[0],
             shift[0],
             shift[1],
         );

@@ -14,6 +14,8 @@ use crate::calib::bundle::failures::{
 };
 use crate::calib::bundle::input::HyperparameterMode;
 use crate::calib::bundle::model_selection::log_evidence_of_all;
+use crate::calib::bundle::outliers::rejected;
+use crate::calib::bundle::problem::ObservationTerm;
 use crate::calib::bundle::setup::BundleSetup;
 use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
 use crate::calib::result::calibration::Calibration;
@@ -266,8 +268,11 @@ fn explains_most(without: &Estimate<'_>, better: &Estimate<'_>) -> bool {
 fn score(found: &Estimate<'_>) -> f64 {
     let problem = &found.problem;
     let observations = problem.observations.iter().zip(&found.solved.normal.chi2);
-    let mut sum: f64 =
-        observations.map(|(seen, chi2)| chi2.min(MAX_PER_COORDINATE * seen.data.n_coordinates() as f64)).sum();
+    let of_observation = |(seen, chi2): (&ObservationTerm, &f64)| {
+        let of_corners = if seen.is_used { rejected(seen).chi2 } else { 0.0 };
+        chi2.min(MAX_PER_COORDINATE * seen.data.n_coordinates() as f64) + of_corners
+    };
+    let mut sum: f64 = observations.map(of_observation).sum();
     let off = &found.solved.state.joint - &problem.prior.joint_mean;
     sum += (&problem.prior.joint_info * &off).dot(&off);
     sum += PER_STEP * problem.layout.parameters.iter().filter(|p| p.is_step()).count() as f64;

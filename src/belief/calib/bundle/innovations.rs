@@ -69,8 +69,14 @@ impl Estimate<'_> {
             for (observation, tag) in problem.observations[observations].iter_mut().zip(&view.tags) {
                 let is_known =
                     problem.layout.tags.iter().all(Option::is_none) || problem.layout.tags[observation.tag].is_some();
-                let is_out = outliers.iter().any(|out| out.view_idx == *view_idx && out.tag_id == tag.id);
-                observation.is_used = is_known && !is_out;
+                let mut used = [is_known; 4];
+                for out in outliers.iter().filter(|out| out.view_idx == *view_idx && out.tag_id == tag.id) {
+                    match out.corner {
+                        Some(corner) => used[corner] = false,
+                        None => used = [false; 4],
+                    }
+                }
+                observation.set_used(used);
             }
         }
         let state = State {

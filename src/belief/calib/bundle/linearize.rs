@@ -61,6 +61,8 @@ pub(crate) struct NormalEquations {
     pub by_tag: Vec<(Matrix6<f64>, Option<usize>)>,
     /// Sum of squares of each observation's whitened residuals.
     pub chi2: Vec<f64>,
+    /// The same of each corner, used or not.
+    pub corner_chi2: Vec<[f64; 4]>,
     /// Of the group at hand; kept, so that the loop does not allocate.
     infos: Vec<PoseInformation>,
     /// As many, where the lens has columns.
@@ -78,6 +80,7 @@ impl NormalEquations {
             eliminated: Vec::with_capacity(n_groups),
             by_tag: vec![(Matrix6::zeros(), None); problem.observations.len()],
             chi2: vec![0.0; problem.observations.len()],
+            corner_chi2: vec![[0.0; 4]; problem.observations.len()],
             infos: Vec::new(),
             lens_infos: Vec::new(),
         }
@@ -236,7 +239,7 @@ impl NormalEquations {
             let mut info =
                 PoseInformation::of(&observation.data, &camera_from_tag, &state.lens, problem.scales.noise, by_lens)
                     .unwrap_or_else(|| PoseInformation::unseen(&observation.data));
-            self.chi2[at] = info.chi2;
+            (self.chi2[at], self.corner_chi2[at]) = (info.chi2, info.corner_chi2);
             self.by_tag[at].1 = column;
             let (cost, weight) = if observation.is_used {
                 loss.of_coordinates(info.chi2, observation.data.n_coordinates())

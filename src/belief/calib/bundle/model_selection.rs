@@ -12,7 +12,7 @@ use nalgebra::Cholesky;
 use crate::calib::bundle::estimate::{Estimate, estimate};
 use crate::calib::bundle::input::BundleInput;
 use crate::calib::bundle::linearize::NormalEquations;
-use crate::calib::bundle::outliers::rejection_chi2;
+use crate::calib::bundle::outliers::rejected;
 use crate::calib::bundle::problem::{BundleProblem, WeightedMeasurement};
 use crate::calib::bundle::solve::{TIGHT, solve};
 use crate::calib::parameters::ParameterKind;
@@ -109,17 +109,18 @@ fn with<'a>(input: &BundleInput<'a>, term: OptionalTerm) -> BundleInput<'a> {
 /// that both use: one that rejects more has less to explain.
 pub(crate) fn evidence_gain_nats(wider: &Estimate<'_>, other: &Estimate<'_>) -> f64 {
     let observations = wider.problem.observations.iter().zip(&other.problem.observations);
-    let shared: Vec<bool> = observations.map(|(a, b)| a.is_used && b.is_used).collect();
+    let both = |a: [bool; 4], b: [bool; 4]| [0, 1, 2, 3].map(|corner| a[corner] && b[corner]);
+    let shared: Vec<[bool; 4]> = observations.map(|(a, b)| both(a.used(), b.used())).collect();
     log_evidence_on(wider, &shared) - log_evidence_on(other, &shared)
 }
 
-/// With the scales of `found` and the observations that are `used`.
-fn log_evidence_on(found: &Estimate<'_>, used: &[bool]) -> f64 {
-    if found.problem.observations.iter().zip(used).all(|(observation, used)| observation.is_used == *used) {
+/// With the scales of `found` and the corners that are `used`.
+fn log_evidence_on(found: &Estimate<'_>, used: &[[bool; 4]]) -> f64 {
+    if found.problem.observations.iter().zip(used).all(|(observation, used)| observation.used() == *used) {
         return log_evidence(&found.problem, &found.solved.normal);
     }
     let mut problem = found.problem.clone();
-    problem.observations.iter_mut().zip(used).for_each(|(observation, used)| observation.is_used = *used);
+    problem.observations.iter_mut().zip(used).for_each(|(observation, used)| observation.set_used(*used));
     let solved = solve(&problem, found.solved.state.clone(), Loss::Square, TIGHT);
     log_evidence(&problem, &solved.normal)
 }
@@ -154,7 +155,6 @@ fn log_sum(std: &[f64]) -> f64 {
 
 /// A rejected observation costs what it would at the limit, so that estimates that reject others compare.
 pub(crate) fn log_evidence_of_all(found: &Estimate<'_>) -> f64 {
-    let rejected = found.problem.observations.iter().filter(|observation| !observation.is_used);
-    log_evidence(&found.problem, &found.solved.normal)
-        - 0.5 * rejected.map(|observation| rejection_chi2(&observation.data)).sum::<f64>()
+    let rejected = found.problem.observations.iter().map(|observation| rejected(observation).chi2);
+    log_evidence(&found.problem, &found.solved.normal) - 0.5 * rejected.sum::<f64>()
 }

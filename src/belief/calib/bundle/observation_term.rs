@@ -8,7 +8,7 @@
 use nalgebra::{Isometry3, Matrix2x3, Matrix6, SMatrix, SVector, Vector2, Vector3, Vector6};
 
 use crate::calib::bundle::problem::WeightedMeasurement;
-use armcal_core::optics::{Fisheye, image_jacobian};
+use armcal_core::optics::{CameraModel, image_jacobian};
 use armcal_core::spatial::{adjoint, log, skew};
 
 /// A observation linearized, in the camera's frame.
@@ -20,9 +20,11 @@ pub(crate) struct PoseInformation {
     pub adjoint: Matrix6<f64>,
     /// Sum of squares of the whitened residuals.
     pub chi2: f64,
+    /// The same of each corner, used or not; zero without corners.
+    pub corner_chi2: [f64; 4],
 }
 
-/// The lens's part: columns fx, fy, cx, cy, k1..k4.
+/// The lens's part, by its intrinsics: focal lengths, centre, four coefficients of distortion.
 #[derive(Clone, Debug)]
 pub(crate) struct LensInformation {
     pub cross: SMatrix<f64, 6, 8>,
@@ -68,14 +70,14 @@ impl PoseInformation {
     pub(crate) fn of(
         seen: &WeightedMeasurement,
         camera_from_tag: &Isometry3<f64>,
-        lens: &Fisheye,
+        lens: &CameraModel,
         noise: f64,
         by_lens: Option<&mut LensInformation>,
     ) -> Option<Self> {
         let scale = noise.powi(-2);
         match seen {
-            WeightedMeasurement::Corners { corners_px, half_size_m, info } => {
-                let corners = Corners { corners_px, half_size_m: *half_size_m, info: info * scale };
+            WeightedMeasurement::Corners { corners_px, half_size_m, info, used } => {
+                let corners = Corners { corners_px, half_size_m: *half_size_m, info: info * scale, used };
                 of_corners(&corners, camera_from_tag, lens, by_lens)
             }
             WeightedMeasurement::Position { in_camera_m, info } => {
@@ -89,7 +91,8 @@ impl PoseInformation {
 
     /// A observation that is not possible: it pulls nowhere and costs much.
     pub(crate) fn unseen(seen: &WeightedMeasurement) -> Self {
-        Self { h: Matrix6::zeros(), g: Vector6::zeros(), adjoint: Matrix6::identity(), chi2: unseen_chi2(seen) }
+        let (chi2, corner_chi2) = (unseen_chi2(seen), [UNSEEN_SIGMAS * UNSEEN_SIGMAS; 4]);
+        Self { h: Matrix6::zeros(), g: Vector6::zeros(), adjoint: Matrix6::identity(), chi2, corner_chi2 }
     }
 
     pub(crate) fn weighted(&mut self, weight: f64) {
@@ -103,28 +106,33 @@ struct Corners<'a> {
     corners_px: &'a [[f64; 2]; 4],
     half_size_m: f64,
     info: f64,
+    used: &'a [bool; 4],
 }
 
 fn of_corners(
     corners: &Corners<'_>,
     camera_from_tag: &Isometry3<f64>,
-    lens: &Fisheye,
+    lens: &CameraModel,
     mut by_lens: Option<&mut LensInformation>,
 ) -> Option<PoseInformation> {
-    let Corners { corners_px, half_size_m, info } = *corners;
+    let Corners { corners_px, half_size_m, info, used } = *corners;
     let rotation = *camera_from_tag.rotation.to_rotation_matrix().matrix();
     let center = camera_from_tag.translation.vector;
     let (x, y) = (rotation.column(0) * half_size_m, rotation.column(1) * half_size_m);
     let points = [center - x - y, center + x - y, center + x + y, center - x + y];
     let mut h = [[0.0; 6]; 6];
     let mut g = [0.0; 6];
-    let mut chi2 = 0.0;
+    let (mut chi2, mut corner_chi2) = (0.0, [0.0; 4]);
     let mut projected = [(Vector2::zeros(), Matrix2x3::zeros()); 4];
     for (out, p) in projected.iter_mut().zip(&points) {
         *out = lens.project_with_jacobian(p)?;
     }
-    for ((p, measured), (pixel, by_point)) in points.iter().zip(corners_px).zip(projected) {
+    for (corner, ((p, measured), (pixel, by_point))) in points.iter().zip(corners_px).zip(projected).enumerate() {
         let residual = [measured[0] - pixel.x, measured[1] - pixel.y];
+        corner_chi2[corner] = info * (residual[0] * residual[0] + residual[1] * residual[1]);
+        if !used[corner] {
+            continue;
+        }
         let rows = image_jacobian(&by_point, p);
         for (row, &r) in rows.iter().zip(&residual) {
             chi2 += r * r;
@@ -136,10 +144,10 @@ fn of_corners(
             }
         }
         if let Some(by_lens) = &mut by_lens {
-            let columns = lens_columns(lens, p);
+            let columns = lens.by_intrinsics(p)?;
             for axis in 0..2 {
                 let row = Vector6::from(rows[axis]);
-                let column = columns[axis];
+                let column = columns.row(axis).transpose();
                 by_lens.cross += row * column.transpose();
                 by_lens.h += column * column.transpose();
                 by_lens.g += column * residual[axis];
@@ -151,27 +159,7 @@ fn of_corners(
     }
     let h = Matrix6::from_fn(|i, k| info * if i >= k { h[i][k] } else { h[k][i] });
     let g = Vector6::from(g) * info;
-    Some(PoseInformation { h, g, adjoint: adjoint(camera_from_tag), chi2: chi2 * info })
-}
-
-/// d(pixel)/d(fx, fy, cx, cy, k1..k4), x row and y row.
-fn lens_columns(lens: &Fisheye, p: &Vector3<f64>) -> [SVector<f64, 8>; 2] {
-    let r = p.x.hypot(p.y);
-    let theta = r.atan2(p.z);
-    let (ux, uy) = if r > 0.0 { (p.x / r, p.y / r) } else { (0.0, 0.0) };
-    let t2 = theta * theta;
-    let powers = [theta * t2, theta * t2 * t2, theta * t2 * t2 * t2, theta * t2 * t2 * t2 * t2];
-    let distorted = theta + powers.iter().zip(&lens.distortion).map(|(t, k)| t * k).sum::<f64>();
-    let row = |direction: f64, axis: usize| {
-        let mut out = SVector::<f64, 8>::zeros();
-        out[axis] = distorted * direction;
-        out[2 + axis] = 1.0;
-        for (k, power) in powers.iter().enumerate() {
-            out[4 + k] = lens.focal_px[axis] * direction * power;
-        }
-        out
-    };
-    [row(ux, 0), row(uy, 1)]
+    Some(PoseInformation { h, g, adjoint: adjoint(camera_from_tag), chi2: chi2 * info, corner_chi2 })
 }
 
 fn of_position(in_camera_m: &Vector3<f64>, info: f64, camera_from_tag: &Isometry3<f64>) -> PoseInformation {
@@ -186,6 +174,7 @@ fn of_position(in_camera_m: &Vector3<f64>, info: f64, camera_from_tag: &Isometry
         g: transposed * residual,
         adjoint: adjoint(camera_from_tag),
         chi2: info * residual.norm_squared(),
+        corner_chi2: [0.0; 4],
     }
 }
 
@@ -205,5 +194,6 @@ fn of_pose(
         g: weighted * -off,
         adjoint: adjoint(camera_from_tag),
         chi2: off.component_mul(&off).dot(&info),
+        corner_chi2: [0.0; 4],
     }
 }

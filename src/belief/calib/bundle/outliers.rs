@@ -1,42 +1,89 @@
-//! Tag observations that do not fit the rest: rejected by their chi-square between two solutions, and readmitted where
-//! they fit.
+//! Tag observations and corners that do not fit the rest: rejected by their chi-square between two solutions, and
+//! readmitted where they fit.
+//!
+//! One corner that does not belong (occluded, blurred, beside an edge) leaves the other three in use if these fit. Two
+//! such corners, or chi-square of all without any, are a tag that is elsewhere or another one: all four go.
 
-use crate::calib::bundle::problem::{BundleProblem, WeightedMeasurement};
+use crate::calib::bundle::problem::{BundleProblem, ObservationTerm, WeightedMeasurement};
 use crate::calib::bundle::solve::Solved;
 use crate::calib::views::view::View;
 
-/// A tag observation that does not fit the rest.
+/// A tag observation, or a corner of one, that does not fit the rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Outlier {
     /// Index into the views of the input.
     pub view_idx: usize,
     /// Id of the tag, which may be that on the gripper.
     pub tag_id: u32,
-    /// Root mean square of its coordinates' residuals in standard deviations.
+    /// The corner, in the detector's order; `None` where all of the observation is rejected.
+    pub corner: Option<usize>,
+    /// Root mean square of the rejected coordinates' residuals in standard deviations.
     pub sigmas: f64,
 }
 
-/// An observation whose chi-square is this many times its number of coordinates belongs elsewhere; one below `READMIT`
-/// belongs here.
-pub(crate) const REJECT: f64 = 7.5;
-const READMIT: f64 = 5.0;
+/// Chi-square per coordinate above which an observation belongs elsewhere, and below which it belongs here.
+const LIMITS: Limits = Limits { reject: 7.5, readmit: 5.0 };
+/// Chi-square of a corner: that one of four normal corners is beyond these is as likely (5e-10, 3e-6) as that an
+/// observation with eight coordinates is beyond its own, `4 exp(-x / 2) = P(chi-square of 8 > 60, 40)`.
+const CORNER_LIMITS: Limits = Limits { reject: 45.7, readmit: 28.1 };
+
+/// What is rejected beyond the one comes back below the other.
+struct Limits {
+    reject: f64,
+    readmit: f64,
+}
+
+impl Limits {
+    fn of(&self, is_used: bool) -> f64 {
+        if is_used { self.reject } else { self.readmit }
+    }
+}
 
 /// Marks what does not belong; whether anything changed.
 pub(crate) fn reject(problem: &mut BundleProblem<'_>, solved: &Solved) -> bool {
     let mut changed = false;
-    for (observation, chi2) in problem.observations.iter_mut().zip(&solved.normal.chi2) {
-        let n = observation.data.n_coordinates() as f64;
-        let limit = if observation.is_used { REJECT } else { READMIT };
-        let belongs = *chi2 < limit * n * noise_excess(&observation.data);
-        changed |= belongs != observation.is_used;
-        observation.is_used = belongs;
+    let normal = &solved.normal;
+    for (at, observation) in problem.observations.iter_mut().enumerate() {
+        let before = observation.used();
+        let used = match observation.data {
+            WeightedMeasurement::Corners { .. } => fitting_corners(before, &normal.corner_chi2[at]),
+            _ => {
+                let n = observation.data.n_coordinates() as f64;
+                let limit = LIMITS.of(observation.is_used) * n * noise_excess(&observation.data);
+                [normal.chi2[at] < limit; 4]
+            }
+        };
+        changed |= used != before;
+        observation.set_used(used);
     }
     changed
 }
 
-/// Chi-square above which an observation is rejected.
-pub(crate) fn rejection_chi2(seen: &WeightedMeasurement) -> f64 {
-    REJECT * seen.n_coordinates() as f64 * noise_excess(seen)
+/// The corners that belong: all, three, or none.
+fn fitting_corners(before: [bool; 4], chi2: &[f64; 4]) -> [bool; 4] {
+    let belongs = |corner: usize| chi2[corner] < CORNER_LIMITS.of(before[corner]);
+    let used = [0, 1, 2, 3].map(belongs);
+    let n = used.iter().filter(|is_used| **is_used).count();
+    let sum: f64 = chi2.iter().zip(used).filter(|(_, is_used)| *is_used).map(|(chi2, _)| chi2).sum();
+    let limit = LIMITS.of(before.contains(&true)) * 2.0 * n as f64;
+    if n >= 3 && sum < limit { used } else { [false; 4] }
+}
+
+/// What is rejected of an observation.
+pub(crate) struct Rejected {
+    pub n_coordinates: usize,
+    /// What it was rejected at.
+    pub chi2: f64,
+}
+
+pub(crate) fn rejected(observation: &ObservationTerm) -> Rejected {
+    let data = &observation.data;
+    if !observation.is_used {
+        let n_coordinates = data.n_coordinates();
+        return Rejected { n_coordinates, chi2: LIMITS.reject * n_coordinates as f64 * noise_excess(data) };
+    }
+    let n_corners = observation.used().iter().filter(|is_used| !**is_used).count();
+    Rejected { n_coordinates: 2 * n_corners, chi2: CORNER_LIMITS.reject * n_corners as f64 }
 }
 
 /// Positions and poses come with a standard deviation that is a guess until the scales are fitted.
@@ -53,13 +100,20 @@ pub(crate) fn outliers(problem: &BundleProblem<'_>, views: &[View], solved: &Sol
     for (view_idx, view) in problem.views.iter().enumerate() {
         for at in view.observations.clone().chain(view.gripper) {
             let observation = &problem.observations[at];
-            if observation.is_used {
-                continue;
-            }
             let gripper = problem.robot.gripper_tag.map_or(0, |tag| tag.id);
             let tag_id = views[view_idx].tags.get(at - view.observations.start).map_or(gripper, |tag| tag.id);
-            let sigmas = (solved.normal.chi2[at] / observation.data.n_coordinates() as f64).sqrt();
-            out.push(Outlier { view_idx, tag_id, sigmas });
+            let mut add = |corner, chi2: f64, n: usize| {
+                out.push(Outlier { view_idx, tag_id, corner, sigmas: (chi2 / n as f64).sqrt() });
+            };
+            if !observation.is_used {
+                add(None, solved.normal.chi2[at], observation.data.n_coordinates());
+                continue;
+            }
+            for (corner, is_used) in observation.used().into_iter().enumerate() {
+                if !is_used {
+                    add(Some(corner), solved.normal.corner_chi2[at][corner], 2);
+                }
+            }
         }
     }
     out

@@ -38,7 +38,7 @@ impl NormalEquations {
             self.add_number_prior(at, state.time_s, prior.time_std_s);
         }
         if let Some(at) = layout.lens {
-            for (k, (value, mean)) in lens_values(&state.lens).iter().zip(lens_values(&prior.lens)).enumerate() {
+            for (k, (value, mean)) in state.lens.intrinsics().iter().zip(prior.lens.intrinsics()).enumerate() {
                 self.add_number_prior(at + k, value - mean, prior.lens_std[k]);
             }
         }
@@ -62,10 +62,4 @@ impl NormalEquations {
         right -= weighted * d;
         self.cost += d.component_mul(&d).dot(&info);
     }
-}
-
-/// fx, fy, cx, cy, k1..k4.
-fn lens_values(lens: &armcal_core::optics::Fisheye) -> [f64; 8] {
-    let ([fx, fy], [cx, cy], [k1, k2, k3, k4]) = (lens.focal_px, lens.center_px, lens.distortion);
-    [fx, fy, cx, cy, k1, k2, k3, k4]
 }

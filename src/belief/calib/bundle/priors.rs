@@ -7,10 +7,7 @@ use crate::calib::bundle::model::Hyperparameters;
 use crate::calib::bundle::problem::{BundleProblem, Layout, Prior};
 use crate::calib::parameters::{JointParameters, Parameter};
 use crate::calib::views::view::TagMeasurement;
-use armcal_core::robot::Robot;
-
-/// One sigma of a lens as it is usually measured: focal lengths and centre px, then distortion. Assumed.
-const LENS_STD: [f64; 8] = [1.0, 1.0, 1.0, 1.0, 1e-2, 1e-2, 1e-2, 1e-2];
+use armcal_core::robot::{CameraSpec, LensPriors, Robot};
 
 /// The datasheet's and the survey's priors.
 pub(crate) fn prior(input: &BundleInput<'_>, scales: &Hyperparameters) -> Prior {
@@ -38,12 +35,20 @@ pub(crate) fn prior(input: &BundleInput<'_>, scales: &Hyperparameters) -> Prior 
         mount_std: mount_std(robot, scales),
         time_std_s: 0.05,
         lens: camera.lens,
-        lens_std: LENS_STD.map(|std| std * scales.lens_scale),
+        lens_std: lens_std(camera).map(|std| std * scales.lens_scale),
         tags: robot.tags.iter().map(|tag| *tag.base_from_tag.isometry()).collect(),
         tags_std: (0..robot.tags.len()).map(|tag_idx| tag_std(input, tag_idx)).collect(),
         gripper_tag: gripper.map_or_else(Isometry3::identity, |tag| tag.mount.link_from_frame),
         gripper_tag_std: gripper.map_or([0.0; 6], |tag| six(tag.position_std_m, tag.rotation_std_rad)),
     }
+}
+
+/// One sigma of the lens's columns: focal lengths and centre px, then distortion.
+pub(crate) fn lens_std(camera: &CameraSpec) -> [f64; 8] {
+    let LensPriors { focal_std, center_std_px, distortion_std } = camera.lens_priors;
+    let [fx, fy] = camera.lens.focal_px().map(|px| px * focal_std);
+    let [center, k] = [center_std_px, distortion_std];
+    [fx, fy, center, center, k, k, k, k]
 }
 
 /// One sigma of the camera mount.

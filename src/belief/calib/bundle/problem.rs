@@ -10,7 +10,7 @@ use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
 use crate::calib::views::view::{MeanCorners, TagMeasurement, View};
 use armcal_core::joints::{JointAngles, MAX_JOINTS};
 use armcal_core::kinematics::{LinkCorrections, LinkPoses};
-use armcal_core::optics::Fisheye;
+use armcal_core::optics::CameraModel;
 use armcal_core::robot::Robot;
 
 /// Where each parameter's column is.
@@ -40,18 +40,37 @@ pub(crate) struct ObservationTerm {
     pub is_used: bool,
 }
 
+impl ObservationTerm {
+    /// Which corners are used; of a position or pose all four or none.
+    pub(crate) fn used(&self) -> [bool; 4] {
+        match self.data {
+            WeightedMeasurement::Corners { used, .. } if self.is_used => used,
+            _ => [self.is_used; 4],
+        }
+    }
+
+    /// Uses no other corners than these; an observation without any is out as a whole.
+    pub(crate) fn set_used(&mut self, corners: [bool; 4]) {
+        self.is_used = corners.contains(&true);
+        if let WeightedMeasurement::Corners { used, .. } = &mut self.data {
+            *used = if self.is_used { corners } else { [true; 4] };
+        }
+    }
+}
+
 /// Measurements with the inverse of their variance.
 #[derive(Clone, Debug)]
 pub(crate) enum WeightedMeasurement {
-    Corners { corners_px: [[f64; 2]; 4], half_size_m: f64, info: f64 },
+    Corners { corners_px: [[f64; 2]; 4], half_size_m: f64, info: f64, used: [bool; 4] },
     Position { in_camera_m: Vector3<f64>, info: f64 },
     Pose { tag_from_camera: Isometry3<f64>, info_position: f64, info_rotation: f64 },
 }
 
 impl WeightedMeasurement {
+    /// Of the corners that are used.
     pub(crate) fn n_coordinates(&self) -> usize {
         match self {
-            Self::Corners { .. } => 8,
+            Self::Corners { used, .. } => 2 * used.iter().filter(|is_used| **is_used).count(),
             Self::Position { .. } => 3,
             Self::Pose { .. } => 6,
         }
@@ -83,7 +102,7 @@ pub(crate) struct Prior {
     pub mount: Isometry3<f64>,
     pub mount_std: [f64; 6],
     pub time_std_s: f64,
-    pub lens: Fisheye,
+    pub lens: CameraModel,
     pub lens_std: [f64; 8],
     pub tags: Vec<Isometry3<f64>>,
     /// Infinite where nothing is known.
@@ -112,7 +131,7 @@ pub(crate) struct State {
     pub joint: DVector<f64>,
     pub mount: Isometry3<f64>,
     pub time_s: f64,
-    pub lens: Fisheye,
+    pub lens: CameraModel,
     pub tags: Vec<Isometry3<f64>>,
     pub gripper_tag: Isometry3<f64>,
     /// Of each view: what each joint is off beyond the sensor's model, rad.
@@ -167,6 +186,23 @@ impl Layout {
         }
         layout.gripper_tag = take(model.gripper_tag, 6);
         layout
+    }
+
+    /// First column of the tags.
+    pub(crate) fn first_of_tags(&self) -> usize {
+        self.tags.iter().flatten().chain(&self.gripper_tag).copied().min().unwrap_or(self.n)
+    }
+
+    /// The same with eight columns of the lens before the tags.
+    pub(crate) fn with_lens(&self) -> Self {
+        let moved = |at: &Option<usize>| at.map(|at| at + 8);
+        Self {
+            lens: Some(self.first_of_tags()),
+            tags: self.tags.iter().map(moved).collect(),
+            gripper_tag: moved(&self.gripper_tag),
+            n: self.n + 8,
+            ..self.clone()
+        }
     }
 
     pub(crate) fn n_joint(&self) -> usize {
@@ -315,7 +351,7 @@ fn corners(robot: &Robot, seen: &MeanCorners, size_m: f64) -> WeightedMeasuremen
     let known_px2 = robot.camera.corner_std_px.powi(2);
     let one_frame_px2 = (CORNER_PRIOR_DOF * known_px2 + seen.scatter_px2) / (CORNER_PRIOR_DOF + dof);
     let info = seen.n_frames.max(1) as f64 / one_frame_px2;
-    WeightedMeasurement::Corners { corners_px: seen.corners_px, half_size_m: 0.5 * size_m, info }
+    WeightedMeasurement::Corners { corners_px: seen.corners_px, half_size_m: 0.5 * size_m, info, used: [true; 4] }
 }
 
 fn view_data(

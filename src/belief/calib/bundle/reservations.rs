@@ -6,6 +6,8 @@
 //! `t = (d tool/dz + d tool/dx dx/dz) s`. Views leave `1 / (1 + I s^2)` of the prior's variance: an element of which
 //! more than half is left is unseen. What is not estimated adds `t t^T` to the tool's covariance.
 
+mod lens;
+
 use nalgebra::{Matrix3, Vector3};
 
 use crate::calib::bundle::estimate::Estimate;
@@ -40,8 +42,8 @@ struct HeldElement {
     shifts: Vec<Vector3<f64>>,
     /// Whether another element's line speaks of it, too.
     is_spoken_of: bool,
-    /// Whether the estimate has it as a parameter, so that its covariance has it already.
-    is_estimated: bool,
+    /// Whether the tool's covariance has it already: by the estimate's parameters, or by the lens's.
+    is_counted: bool,
 }
 
 /// What priors alone say of the tool.
@@ -75,7 +77,9 @@ impl Estimate<'_> {
         predicted_m: f64,
     ) -> PriorImpact {
         let tool = self.tool_jacobians(task);
-        let elements = self.held_elements(touches, task, &tool);
+        let lens = self.held_lens();
+        let mut elements = self.held_elements(touches, task, &tool);
+        elements.extend(lens.iter().flat_map(|lens| lens.elements(&tool)));
         // Without a tag on the gripper and without touches nothing watches over what is beyond the camera.
         let is_watched = touches.is_some() || self.problem.layout.gripper_tag.is_some();
         let worth_m = if is_watched { WORTH_SHARE } else { WORTH_SHARE_UNWATCHED } * predicted_m;
@@ -83,8 +87,10 @@ impl Estimate<'_> {
             if let Some(touches) = touches {
                 return touches.beside_parameters_m2(self.problem.robot, &tool[at]);
             }
-            let unmodelled = elements.iter().filter(|element| !element.is_estimated);
-            unmodelled.map(|element| element.shifts[at] * element.shifts[at].transpose()).sum()
+            let unmodelled = elements.iter().filter(|element| !element.is_counted);
+            let by_drawing: Matrix3<f64> =
+                unmodelled.map(|element| element.shifts[at] * element.shifts[at].transpose()).sum();
+            by_drawing + lens.as_ref().map_or_else(Matrix3::zeros, |lens| lens.covariance_m2(&tool[at]))
         };
         let mut reservations: Vec<Reservation> = elements
             .iter()
@@ -156,7 +162,16 @@ impl Estimate<'_> {
         // The mount's prior is in the estimate, and is left there.
         let own_std = if is_estimated { 0.0 } else { prior_std };
         let touched_std = touches.map_or(f64::INFINITY, |touches| touches.std_of_trial(first, axis, own_std));
-        HeldElement { what, unit, prior_std, share_left, touched_std, shifts, is_estimated, is_spoken_of: false }
+        HeldElement {
+            what,
+            unit,
+            prior_std,
+            share_left,
+            touched_std,
+            shifts,
+            is_counted: is_estimated,
+            is_spoken_of: false,
+        }
     }
 
     /// All tags together against the base: the same views as a base that is off the other way, and the tool that
@@ -194,7 +209,7 @@ impl Estimate<'_> {
             share_left: 1.0,
             touched_std: touches.map_or(f64::INFINITY, |touches| touches.std_of_tool_point(robot, axis)),
             shifts: task.iter().map(shift).collect(),
-            is_estimated: false,
+            is_counted: false,
             is_spoken_of: false,
         }
     }

@@ -168,13 +168,8 @@ fn step_common(problem: &BundleProblem<'_>, state: &State, step: &DVector<f64>, 
         next.time_s += step[at];
     }
     if let Some(at) = layout.lens {
-        for k in 0..2 {
-            next.lens.focal_px[k] += step[at + k];
-            next.lens.center_px[k] += step[at + 2 + k];
-        }
-        for k in 0..4 {
-            next.lens.distortion[k] += step[at + 4 + k];
-        }
+        let now = next.lens.intrinsics();
+        next.lens = next.lens.with_intrinsics(std::array::from_fn(|k| now[k] + step[at + k]));
     }
     for (pose, column) in next.tags.iter_mut().zip(&layout.tags) {
         if let Some(at) = column {

@@ -117,6 +117,7 @@ fn fit_metrics(source: &Provenance<'_>, fit: &Fit<'_>) -> FitMetrics {
         views: source.data.fit.iter().filter(|view| !view.tags.is_empty()).count(),
         tags_seen: fit.problem.n_observations(),
         rejected: source.data.rejected.values().sum(),
+        rejected_corners: None,
         rejected_by_reason: source.data.rejected_by_reason(),
         rms_m: fit.problem.rms_m(at).unwrap_or(f64::NAN),
         rms_px: fit.problem.reprojection_rms_px(at),

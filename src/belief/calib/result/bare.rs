@@ -59,6 +59,7 @@ fn fit() -> FitMetrics {
         views: 14,
         tags_seen: 0,
         rejected: 0,
+        rejected_corners: None,
         rejected_by_reason: Default::default(),
         rms_m: 0.0,
         rms_px: Some(0.0),

@@ -24,6 +24,9 @@ pub struct FitMetrics {
     pub tags_seen: usize,
     /// Detections rejected in all captured views, and outliers of the fit.
     pub rejected: usize,
+    /// Single corners that the fit rejected; the others of their tags are in use.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rejected_corners: Option<usize>,
     /// The same by reason; not in the file.
     #[serde(default, skip_serializing)]
     pub rejected_by_reason: BTreeMap<String, usize>,

@@ -88,7 +88,7 @@ impl CornerModel {
     /// Inverse variance of each corner's coordinates, px^-2: robot.toml's at the reference range, and by the model of
     /// corner noise at others.
     fn weights(&self, robot: &Robot, corners_px: &[[f64; 2]; 4], range_m: f64, size_m: f64) -> [f64; 4] {
-        let usual_px2 = reference_px2(robot.camera.lens.focal_px[0], size_m);
+        let usual_px2 = reference_px2(robot.camera.lens.focal_px()[0], size_m);
         let stated_px2 = (robot.camera.corner_std_px * self.noise).powi(2) / self.n_frames;
         let variances = CornerNoise::COASTAL.covariances_px2(corners_px, range_m, 0.0);
         variances.map(|variance| usual_px2 / (0.5 * variance.trace() * stated_px2))

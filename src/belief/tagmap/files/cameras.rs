@@ -7,7 +7,7 @@ use std::path::Path;
 use serde::Deserialize;
 
 use crate::tagmap::files::yaml;
-use armcal_core::optics::{CameraModel, Fisheye, Radtan};
+use armcal_core::optics::{CameraModel, Fisheye, LensModel, Radtan};
 use armcal_core::robot::{FileIssue, RobotError, read_text};
 
 /// A camera as files name it.
@@ -91,16 +91,16 @@ fn camera(file: &Path, name: &str, raw: &CameraYaml) -> Result<NamedCamera, Robo
     let (focal, center, resolution) = ([fx, fy], [cx, cy], [width, height]);
     let model = match (raw.distortion_model.as_str(), &raw.distortion_coeffs[..]) {
         ("equidistant" | "fisheye", &[k1, k2, k3, k4]) => {
-            CameraModel::Equidistant(Fisheye::with_widest_view(focal, center, [k1, k2, k3, k4], resolution))
+            CameraModel::from(Fisheye::with_widest_view(focal, center, [k1, k2, k3, k4], resolution))
         }
         ("radtan" | "plumb_bob", &[k1, k2, p1, p2]) => {
-            CameraModel::Radtan(Radtan::new(focal, center, [k1, k2, p1, p2, 0.0], resolution))
+            CameraModel::from(Radtan::new(focal, center, [k1, k2, p1, p2, 0.0], resolution))
         }
         ("radtan" | "plumb_bob", &[k1, k2, p1, p2, k3]) => {
-            CameraModel::Radtan(Radtan::new(focal, center, [k1, k2, p1, p2, k3], resolution))
+            CameraModel::from(Radtan::new(focal, center, [k1, k2, p1, p2, k3], resolution))
         }
         ("none", coefficients) if coefficients.iter().all(|k| *k == 0.0) => {
-            CameraModel::Radtan(Radtan::new(focal, center, [0.0; 5], resolution))
+            CameraModel::from(Radtan::new(focal, center, [0.0; 5], resolution))
         }
         ("none", _) => {
             return Err(issue("distortion_coeffs", "must be empty or zero where the model is none".to_owned()));
@@ -123,9 +123,9 @@ fn camera(file: &Path, name: &str, raw: &CameraYaml) -> Result<NamedCamera, Robo
 pub fn cameras_to_yaml(cameras: &[NamedCamera]) -> String {
     let mut out = String::new();
     for camera in cameras {
-        let (model, coefficients) = match camera.model {
-            CameraModel::Equidistant(lens) => ("equidistant", lens.distortion.to_vec()),
-            CameraModel::Radtan(lens) => ("radtan", lens.distortion.to_vec()),
+        let (model, coefficients) = match camera.model.lens {
+            LensModel::Equidistant(lens) => ("equidistant", lens.distortion.to_vec()),
+            LensModel::Radtan(lens) => ("radtan", lens.distortion.to_vec()),
         };
         let ([fx, fy], [cx, cy]) = (camera.model.focal_px(), camera.model.center_px());
         let _ = writeln!(out, "{}:\n  camera_model: pinhole", camera.name);

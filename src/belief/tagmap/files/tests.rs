@@ -6,7 +6,7 @@ use nalgebra::{Isometry3, Matrix6, Translation3, UnitQuaternion, Vector3};
 
 use crate::tagmap::files::written::{WrittenGroup, WrittenTag};
 use crate::tagmap::files::{NamedCamera, TagFile, cameras_to_yaml, own, parse_cameras, parse_tags, tagslam};
-use armcal_core::optics::{CameraModel, Fisheye, Radtan};
+use armcal_core::optics::{Fisheye, LensModel, Radtan};
 use armcal_core::time::Stamp;
 
 fn tags(name: &str, text: &str) -> TagFile {
@@ -170,11 +170,11 @@ cam1:
 fn cameras_of_tagslam_and_kalibr_are_read_and_written() {
     let cameras = parse_cameras(Path::new("cameras.yaml"), CAMERAS).unwrap();
     assert_eq!(cameras.len(), 2);
-    let CameraModel::Equidistant(lens) = cameras[0].model else { panic!("{:?}", cameras[0]) };
+    let LensModel::Equidistant(lens) = cameras[0].model.lens else { panic!("{:?}", cameras[0]) };
     assert_eq!((lens.focal_px, lens.center_px), ([465.609, 465.632], [622.637, 513.902]));
     assert!(lens.is_monotonic() && lens.max_view_angle_rad > 1.6, "{}", lens.max_view_angle_rad);
     assert_eq!(cameras[0].tag_topic.as_deref(), Some("/left/tags"));
-    let CameraModel::Radtan(lens) = cameras[1].model else { panic!("{:?}", cameras[1]) };
+    let LensModel::Radtan(lens) = cameras[1].model.lens else { panic!("{:?}", cameras[1]) };
     assert_eq!(lens.distortion, [-0.16, 0.09, -0.0002, -0.0002, 0.0]);
     let again = parse_cameras(Path::new("cameras.yaml"), &cameras_to_yaml(&cameras)).unwrap();
     assert_eq!(again, cameras);

@@ -119,7 +119,7 @@ pub(super) fn size_of(id: u32) -> f64 {
 }
 
 pub(super) fn fisheye() -> CameraModel {
-    armcal_core::optics::fixture::lens().into()
+    armcal_core::optics::fixture::lens()
 }
 
 pub(super) fn pinhole() -> CameraModel {

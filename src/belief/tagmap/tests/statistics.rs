@@ -4,7 +4,7 @@ use crate::tagmap::tests::bound::cramer_rao;
 use crate::tagmap::tests::fixture::{Scene, body, fisheye, look, looking, pinhole, settings, wall};
 use crate::tagmap::tests::{distances, position_errors};
 use crate::tagmap::{MapInput, MapSettings, MapView, NoiseScale, TagPrior, solve};
-use armcal_core::optics::{CameraModel, SquarePose, solve_square_both};
+use armcal_core::optics::{CameraModel, LensModel, SquarePose, solve_square_both};
 use armcal_core::stats::stream_rng;
 use armcal_core::time::Stamp;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
@@ -60,7 +60,7 @@ fn errors_are_as_small_as_possible_and_as_large_as_said() {
         assert!(n >= 150);
         assert!((0.97..=1.0).contains(&share_within), "{share_within}");
         assert!((0.85..=1.1).contains(&each), "{each}");
-        let is_wide = matches!(camera, CameraModel::Equidistant(_));
+        let is_wide = matches!(camera.lens, LensModel::Equidistant(_));
         assert!(!is_wide || (0.85..=1.1).contains(&efficiency), "{efficiency}");
     }
 }

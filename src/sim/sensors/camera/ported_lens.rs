@@ -2,34 +2,34 @@
 //!
 //! The drawing's lens is calibrated in water behind a perfect dome. Behind a flat port the lens's own focal length is
 //! shorter by the water's index. Near the axis both together then have the drawing's focal length; farther out they
-//! differ.
+//! differ. A drawing that has a flat port itself has its lens in air, and the world's port takes its place.
 
 use nalgebra::{Vector2, Vector3};
 
 use crate::as_built::AsBuilt;
 use crate::sensors::camera::port::{Port, WATER_INDEX};
 use crate::spec::{CameraWorldSpec, PortKind};
-use armcal_core::optics::Fisheye;
+use armcal_core::optics::CameraModel;
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PortedLens {
-    /// In air.
-    pub lens: Fisheye,
+    /// In air; behind its own window where the drawing has one and the world no other.
+    pub lens: CameraModel,
     pub port: Port,
 }
 
 impl PortedLens {
-    pub(super) fn new(nominal: &Fisheye, built: &AsBuilt, spec: &CameraWorldSpec) -> Self {
+    pub(super) fn new(nominal: &CameraModel, built: &AsBuilt, spec: &CameraWorldSpec) -> Self {
         let lens = built.lens.map_or(*nominal, |lens| lens.applied(nominal));
         let thickness_m = spec.port_thickness_m;
         match (spec.port, built.dome_center_m) {
             (PortKind::Dome, Some(center_m)) => {
                 let (center_m, inner_radius_m) = (Vector3::from(center_m), spec.dome_radius_m);
-                Self { lens, port: Port::Dome { center_m, inner_radius_m, thickness_m } }
+                Self { lens: in_air(&lens), port: Port::Dome { center_m, inner_radius_m, thickness_m } }
             }
             (PortKind::None | PortKind::Dome, _) => Self { lens, port: Port::None },
             (PortKind::Flat, _) => Self {
-                lens: Fisheye { focal_px: lens.focal_px.map(|focal| focal / WATER_INDEX), ..lens },
+                lens: if lens.port.is_some() { in_air(&lens) } else { shorter(&lens) },
                 port: Port::Flat { distance_m: spec.port_distance_m, thickness_m },
             },
         }
@@ -44,4 +44,15 @@ impl PortedLens {
     pub(super) fn contains(&self, pixel_px: &Vector2<f64>) -> bool {
         self.lens.contains(pixel_px)
     }
+}
+
+fn in_air(lens: &CameraModel) -> CameraModel {
+    CameraModel { port: None, ..*lens }
+}
+
+/// The lens in air that has the drawing's focal length in water.
+fn shorter(lens: &CameraModel) -> CameraModel {
+    let [fx, fy, rest @ ..] = lens.intrinsics();
+    let [cx, cy, a, b, c, d] = rest;
+    lens.with_intrinsics([fx / WATER_INDEX, fy / WATER_INDEX, cx, cy, a, b, c, d])
 }

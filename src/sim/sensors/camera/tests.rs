@@ -11,7 +11,7 @@ use crate::sensors::camera::ported_lens::PortedLens;
 use crate::sensors::camera::*;
 use crate::solids::Solids;
 use crate::spec::{CameraMode, CameraWorldSpec, CornerNoiseKind, PortKind, WorldSpec};
-use armcal_core::optics::{CornerNoise, Fisheye, square_corners};
+use armcal_core::optics::{CornerNoise, square_corners};
 use armcal_core::robot::{Robot, load, load_vehicle};
 use armcal_core::routine::Scene;
 use armcal_core::streams::{ImageDemand, JointAngles, TagDetections};
@@ -307,7 +307,8 @@ fn ports_keep_the_focal_length_near_the_axis() {
     };
     assert!(shift(&thin, 0.001, 1.0) < 1e-4, "{}", shift(&thin, 0.001, 1.0));
     let lens = site(|_| {}).robot.camera.lens;
-    let short = Fisheye { focal_px: lens.focal_px.map(|f| f / 1.333), ..lens };
+    let [fx, fy, cx, cy, k1, k2, k3, k4] = lens.intrinsics();
+    let short = lens.with_intrinsics([fx / 1.333, fy / 1.333, cx, cy, k1, k2, k3, k4]);
     for angle in [0.2_f64, 0.5, 0.7] {
         let in_air = (1.333 * angle.sin()).asin();
         let ray = |angle: f64| Vector3::new(angle.sin(), 0.0, angle.cos());

@@ -2,10 +2,12 @@
 
 mod baseline;
 mod calibration_prior;
+mod corner_outliers;
 mod data;
 mod drawing;
 mod equations;
 mod failures;
+mod lenses;
 mod moved_tags;
 mod reservations;
 mod score_test;

@@ -163,3 +163,31 @@ fn a_gripper_tag_shows_the_turn_that_nothing_else_shows() {
     println!("turn of the mount by its prior: {:.2} mm without, {:.2} mm with", without * 1e3, with * 1e3);
     assert!(without > 5e-4 && with < 0.3 * without, "{without} m without, {with} m with");
 }
+
+/// Views tell the lens, so that its prior is made narrow for it to be unseen.
+#[test]
+fn a_lens_that_is_off_moves_the_tool_as_its_reservation_says() {
+    const LONGER: f64 = 1e-3;
+    let mut robot = titan();
+    robot.camera.lens_priors.focal_std = 1e-6;
+    let (reservations, as_drawn) = all_reservations(&robot);
+    let reservation = reservations.iter().find(|r| r.what == "camera lens, focal length").expect("unseen");
+    let mut real = robot.clone();
+    let mut at = real.camera.lens.intrinsics();
+    at[..2].iter_mut().for_each(|focal_px| *focal_px *= 1.0 + LONGER);
+    real.camera.lens = real.camera.lens.with_intrinsics(at);
+    let mount = robot.camera.mount.link_from_frame;
+    let errors = with_estimate(&robot, &real, mount, |found| tool_errors(&robot, &real, found));
+    let moved_m = rms(errors.iter().zip(&as_drawn).map(|(with, without)| with - without));
+    let expected_m = reservation.tool_error_per_unit() * LONGER;
+    println!("{reservation}; by 0.1 %: {:.3} mm, expected {:.3} mm", moved_m * 1e3, expected_m * 1e3);
+    assert!((moved_m / expected_m - 1.0).abs() < 0.1, "{moved_m} m, expected {expected_m} m");
+}
+
+/// At robot.toml's sigmas good views leave little of the lens to its priors.
+#[test]
+fn views_that_tell_the_lens_have_no_reservation_about_it() {
+    let (reservations, _) = all_reservations(&titan());
+    let of_lens: Vec<_> = reservations.iter().filter(|r| r.what.starts_with("camera lens")).collect();
+    assert!(of_lens.iter().all(|r| r.what.contains(", k")), "{of_lens:?}");
+}

@@ -24,10 +24,10 @@ use armcal_core::spatial::log;
 const N_FRAMES: usize = 8;
 
 /// An arm, views of it, and what is believed of it.
-struct Case<'a> {
-    robot: &'a Robot,
-    truth: Truth,
-    views: Vec<View>,
+pub(super) struct Case<'a> {
+    pub robot: &'a Robot,
+    pub truth: Truth,
+    pub views: Vec<View>,
     scales: Hyperparameters,
     model: Model,
 }
@@ -36,7 +36,7 @@ fn scales(robot: &Robot) -> Hyperparameters {
     Hyperparameters::datasheet(robot)
 }
 
-fn case(robot: &Robot, seed: u64, n_views: usize) -> Case<'_> {
+pub(super) fn case(robot: &Robot, seed: u64, n_views: usize) -> Case<'_> {
     let mut rng = rng(seed, "statistics");
     let scales = scales(robot);
     // A first look tells which terms are excited; the truth is then drawn with them.
@@ -60,7 +60,7 @@ fn case(robot: &Robot, seed: u64, n_views: usize) -> Case<'_> {
     Case { robot, truth, views, scales, model }
 }
 
-fn input<'a>(case: &'a Case<'_>, views: &'a [View], evidence: HyperparameterMode) -> BundleInput<'a> {
+pub(super) fn input<'a>(case: &'a Case<'_>, views: &'a [View], evidence: HyperparameterMode) -> BundleInput<'a> {
     BundleInput {
         robot: case.robot,
         views,
@@ -73,7 +73,7 @@ fn input<'a>(case: &'a Case<'_>, views: &'a [View], evidence: HyperparameterMode
 }
 
 /// Travels at which tools are compared: the range that the views were taken in.
-fn task(robot: &Robot, rng: &mut ChaCha8Rng) -> Vec<JointAngles> {
+pub(super) fn task(robot: &Robot, rng: &mut ChaCha8Rng) -> Vec<JointAngles> {
     let travel =
         |j: usize, rng: &mut ChaCha8Rng| rng.random_range(-0.8..0.8) * robot.sensors[j].half_range_rad.min(1.3);
     (0..12).map(|_| JointAngles::from_fn(robot.n_joints(), |j| travel(j, rng))).collect()
