@@ -16,8 +16,11 @@ pub struct Reservation {
     pub prior_std: f64,
     /// Unit of `prior_std`.
     pub unit: FindingUnit,
-    /// By one sigma of the prior, root mean square over the task, m.
+    /// By one sigma of the prior, root mean square over the task, m; of several axes the largest.
     pub tool_error_m: f64,
+    /// The same for each axis of `what`, where it has several that differ.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub by_axis_m: Vec<f64>,
 }
 
 impl Reservation {
@@ -30,19 +33,21 @@ impl Reservation {
 
 impl fmt::Display for Reservation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { what, prior_std, unit, tool_error_m } = self;
+        let Self { what, prior_std, unit, tool_error_m, by_axis_m } = self;
+        let all_m = if by_axis_m.is_empty() { std::slice::from_ref(tool_error_m) } else { by_axis_m };
         // One unit that people measure in.
         let (scale, name) = match unit {
             FindingUnit::Metre => (1e3, "mm"),
             FindingUnit::Radian => (1f64.to_degrees(), "deg"),
             FindingUnit::One => (1e2, "%"),
         };
+        let list = |factor: f64| all_m.iter().map(|m| format!("{:.1}", factor * m)).collect::<Vec<_>>().join(", ");
         write!(
             f,
-            "1 {name} of {what}, unseen: {:.1} mm at the tool; the drawing has {:.2} {name}: {:.1} mm",
-            1e3 * self.tool_error_per_unit() / scale,
+            "1 {name} of {what}, unseen: {} mm at the tool; the drawing has {:.2} {name}: {} mm",
+            list(1e3 / (prior_std * scale)),
             prior_std * scale,
-            1e3 * tool_error_m
+            list(1e3)
         )
     }
 }

@@ -218,14 +218,18 @@ fn true_error(rests: &[TrueRest], recording: &Recording, robot: &Robot, calibrat
 
 /// Tool's shift per unit by the reservation about the case's element, if there is one.
 fn reserved_per_unit(robot: &Robot, case: &Case, calibration: &Calibration) -> Option<f64> {
-    let what = reserved_element(robot, case)?;
-    let of_any_axis = format!("{}any axis", what.trim_end_matches(['x', 'y', 'z']));
-    let found = calibration.reservations.iter().find(|r| r.what == what || r.what == of_any_axis)?;
-    (found.prior_std > 0.0).then(|| found.tool_error_m / found.prior_std)
+    let (stem, axis) = reserved_element(robot, case)?;
+    calibration.reservations.iter().filter(|found| found.prior_std > 0.0).find_map(|found| {
+        let axes = found.what.strip_prefix(&stem)?;
+        let at = axes.split(", ").position(|name| name == axis);
+        let of_axis_m = at.map(|at| found.by_axis_m.get(at).copied().unwrap_or(found.tool_error_m));
+        let tool_m = of_axis_m.or_else(|| (axes == "any axis").then_some(found.tool_error_m))?;
+        Some(tool_m / found.prior_std)
+    })
 }
 
-/// How a reservation about the case's element begins.
-fn reserved_element(robot: &Robot, case: &Case) -> Option<String> {
+/// How a reservation about the case's element begins, and its axis.
+fn reserved_element(robot: &Robot, case: &Case) -> Option<(String, &'static str)> {
     let place = |joint: usize| format!("the place of {}", robot.chain.joints()[joint].name);
     let (element, axis) = match (case.kind, case.element) {
         (CaseKind::MountTurned | CaseKind::MountShifted, Element::Axis(axis)) => ("camera mount".to_owned(), axis),
@@ -238,5 +242,5 @@ fn reserved_element(robot: &Robot, case: &Case) -> Option<String> {
         "deg" => "turn about",
         _ => "shift along",
     };
-    Some(format!("{element}, {way} {}", AXES[axis]))
+    Some((format!("{element}, {way} "), AXES[axis]))
 }

@@ -23,7 +23,7 @@ const UNSEEN_SHARE: f64 = 0.5;
 /// A reservation is worth a line where one sigma of it moves the tool by more than this share of the predicted error.
 const WORTH_SHARE: f64 = 0.5;
 /// The same where nothing watches over what is beyond the camera.
-const WORTH_SHARE_UNWATCHED: f64 = 0.1;
+const WORTH_SHARE_UNWATCHED: f64 = 0.04;
 /// So many are told, the largest at the tool first.
 const MAX_RESERVATIONS: usize = 5;
 /// Touches that tell an element to so many sigmas of its prior would show it where it is beyond the drawing's figure.
@@ -31,7 +31,9 @@ const TOUCHED_SIGMAS: f64 = 5.0;
 
 /// An element of the geometry along one axis, with its prior.
 struct HeldElement {
-    what: String,
+    /// What it is, up to its axis.
+    stem: String,
+    axis: &'static str,
     unit: FindingUnit,
     prior_std: f64,
     /// Share of the prior's variance that the views leave.
@@ -40,8 +42,6 @@ struct HeldElement {
     touched_std: f64,
     /// Of the tool by one sigma, at each configuration, m.
     shifts: Vec<Vector3<f64>>,
-    /// Whether another element's line speaks of it, too.
-    is_spoken_of: bool,
     /// Whether the tool's covariance has it already: by the estimate's parameters, or by the lens's.
     is_counted: bool,
 }
@@ -92,14 +92,8 @@ impl Estimate<'_> {
                 unmodelled.map(|element| element.shifts[at] * element.shifts[at].transpose()).sum();
             by_drawing + lens.as_ref().map_or_else(Matrix3::zeros, |lens| lens.covariance_m2(&tool[at]))
         };
-        let mut reservations: Vec<Reservation> = elements
-            .iter()
-            .filter(|element| element.share_left > UNSEEN_SHARE && element.prior_std > 0.0)
-            .filter(|element| !element.is_spoken_of)
-            .filter(|element| element.touched_std > TOUCHED_SIGMAS * element.prior_std)
-            .map(HeldElement::reservation)
-            .filter(|reservation| reservation.tool_error_m > worth_m)
-            .collect();
+        let mut reservations: Vec<Reservation> =
+            elements.chunk_by(|a, b| a.stem == b.stem).flat_map(|alike| reservations_of(alike, worth_m)).collect();
         reservations.sort_by(|a, b| b.tool_error_m.total_cmp(&a.tool_error_m));
         PriorImpact { reservations, covariances_m2: (0..task.len()).map(covariance).collect() }
     }
@@ -125,7 +119,7 @@ impl Estimate<'_> {
             elements.extend(six().map(|(error, axis)| self.survey_frame(&score, (error, axis), tool, touches)));
         }
         elements.extend((0..3).map(|axis| self.tool_point(axis, task, touches)));
-        all_axes_alike(elements)
+        elements
     }
 
     fn held_element(
@@ -158,19 +152,19 @@ impl Estimate<'_> {
             GeometryElement::Mount => "camera mount".to_owned(),
         };
         let way = if error == ErrorKind::Shift { "shift along" } else { "turn about" };
-        let what = format!("{name}, {way} {}", AXES[axis]);
+        let stem = format!("{name}, {way} ");
         // The mount's prior is in the estimate, and is left there.
         let own_std = if is_estimated { 0.0 } else { prior_std };
         let touched_std = touches.map_or(f64::INFINITY, |touches| touches.std_of_trial(first, axis, own_std));
         HeldElement {
-            what,
+            stem,
+            axis: AXES[axis],
             unit,
             prior_std,
             share_left,
             touched_std,
             shifts,
             is_counted: is_estimated,
-            is_spoken_of: false,
         }
     }
 
@@ -188,7 +182,7 @@ impl Estimate<'_> {
         let size = Vector3::ith(axis, base.prior_std);
         let way = if error == ErrorKind::Shift { "shift along" } else { "turn about" };
         HeldElement {
-            what: format!("tag survey, {way} {}", AXES[axis]),
+            stem: format!("tag survey, {way} "),
             touched_std: touches.map_or(f64::INFINITY, |touches| touches.std_of_survey(first, axis)),
             shifts: tool.iter().map(|at| -at.followed(score, first, &size)).collect(),
             ..base
@@ -203,14 +197,14 @@ impl Estimate<'_> {
         let shift =
             |angles: &JointAngles| robot.chain.link_poses(angles).frame(tool).rotation * Vector3::ith(axis, prior_std);
         HeldElement {
-            what: format!("tool point, shift along {}", AXES[axis]),
+            stem: "tool point, shift along ".to_owned(),
+            axis: AXES[axis],
             unit: FindingUnit::Metre,
             prior_std,
             share_left: 1.0,
             touched_std: touches.map_or(f64::INFINITY, |touches| touches.std_of_tool_point(robot, axis)),
             shifts: task.iter().map(shift).collect(),
             is_counted: false,
-            is_spoken_of: false,
         }
     }
 }
@@ -219,26 +213,35 @@ const AXES: [&str; 3] = ["x", "y", "z"];
 /// Axes whose shifts are within this share of one another at the tool are spoken of together.
 const ALIKE: f64 = 0.05;
 
-/// Names three neighbouring elements that only differ by their axis, and mean the same at the tool, as one.
-fn all_axes_alike(mut elements: Vec<HeldElement>) -> Vec<HeldElement> {
-    for three in elements.chunks_exact_mut(3) {
-        let sizes = [0, 1, 2].map(|axis| three[axis].reservation().tool_error_m);
-        let (least, most) =
-            (sizes.iter().copied().fold(f64::INFINITY, f64::min), sizes.iter().copied().fold(0.0, f64::max));
-        let is_open = |element: &HeldElement| element.share_left > UNSEEN_SHARE && element.touched_std.is_infinite();
-        if most - least <= ALIKE * most && three.iter().all(is_open) {
-            let stem = three[0].what.trim_end_matches(AXES[0]).to_owned();
-            three[0].what = format!("{stem}any axis");
-            three[1..].iter_mut().for_each(|element| element.is_spoken_of = true);
-        }
-    }
-    elements
+/// What is told of elements that only differ by their axis.
+fn reservations_of(elements: &[HeldElement], worth_m: f64) -> Option<Reservation> {
+    let open: Vec<&HeldElement> = elements.iter().filter(|e| e.is_open() && e.tool_error_m() > worth_m).collect();
+    let each: Vec<f64> = open.iter().map(|element| element.tool_error_m()).collect();
+    let (least, most) = (each.iter().copied().fold(f64::INFINITY, f64::min), each.iter().copied().fold(0.0, f64::max));
+    let first = open.first()?;
+    let are_alike = most - least <= ALIKE * most;
+    let axes = match &open[..] {
+        [_, _, _] if are_alike => "any axis".to_owned(),
+        _ => open.iter().map(|element| element.axis).collect::<Vec<_>>().join(", "),
+    };
+    Some(Reservation {
+        what: format!("{}{axes}", first.stem),
+        prior_std: first.prior_std,
+        unit: first.unit,
+        tool_error_m: most,
+        by_axis_m: if are_alike { Vec::new() } else { each },
+    })
 }
 
 impl HeldElement {
-    fn reservation(&self) -> Reservation {
+    /// Neither views nor touches tell it.
+    fn is_open(&self) -> bool {
+        self.share_left > UNSEEN_SHARE && self.prior_std > 0.0 && self.touched_std > TOUCHED_SIGMAS * self.prior_std
+    }
+
+    /// By one sigma, root mean square.
+    fn tool_error_m(&self) -> f64 {
         let n = self.shifts.len().max(1) as f64;
-        let tool_error_m = (self.shifts.iter().map(Vector3::norm_squared).sum::<f64>() / n).sqrt();
-        Reservation { what: self.what.clone(), prior_std: self.prior_std, unit: self.unit, tool_error_m }
+        (self.shifts.iter().map(Vector3::norm_squared).sum::<f64>() / n).sqrt()
     }
 }

@@ -102,13 +102,13 @@ impl HeldLens {
             ("centre along y", FindingUnit::Radian, center_rad),
         ];
         first.into_iter().chain(rest).enumerate().map(move |(k, (what, unit, prior_std))| HeldElement {
-            what: format!("camera lens, {what}"),
+            stem: format!("camera lens, {what}"),
+            axis: "",
             unit,
             prior_std,
             share_left: 1.0 / (1.0 + self.information[(k, k)]),
             touched_std: f64::INFINITY,
             shifts: shifts.iter().map(|of_tool| of_tool[k]).collect(),
-            is_spoken_of: false,
             is_counted: true,
         })
     }

@@ -133,10 +133,14 @@ fn an_unseen_change_moves_the_tool_as_its_reservation_says() {
     let mut n_checked = 0;
     for (change, axis) in changes.into_iter().flat_map(|change| (0..3).map(move |axis| (change, axis))) {
         let name = change.name(&robot, axis);
-        let of_any_axis = format!("{}any axis", name.trim_end_matches(['x', 'y', 'z']));
-        let is_of_change = |reservation: &&Reservation| reservation.what == name || reservation.what == of_any_axis;
-        let Some(reservation) = reservations.iter().find(is_of_change) else { continue };
-        let expected_m = reservation.tool_error_per_unit() * change.size();
+        let (stem, letter) = name.split_at(name.len() - 1);
+        let expected = reservations.iter().find_map(|found| {
+            let axes = found.what.strip_prefix(stem)?;
+            let at = axes.split(", ").position(|of| of == letter || of == "any axis")?;
+            Some(found.by_axis_m.get(at).copied().unwrap_or(found.tool_error_m) / found.prior_std)
+        });
+        let Some(per_unit) = expected else { continue };
+        let expected_m = per_unit * change.size();
         // What the joints follow altogether leaves nothing to compare.
         if expected_m < 2e-5 {
             continue;
