@@ -224,7 +224,7 @@ fn is_locked(robot: &Robot, joint: usize) -> bool {
 }
 
 /// The arm's angles at each target that inverse kinematics reaches: from where the arm rested for it, as a `reach` goes
-/// there; where it did not, from the stowed pose.
+/// there; where it did not, from the stowed pose or the other rests.
 #[must_use]
 pub fn task_angles(robot: &Robot, TaskRests { task, rests }: TaskRests<'_>) -> Vec<JointAngles> {
     let open = JointLimits { lower_rad: -std::f64::consts::TAU, upper_rad: std::f64::consts::TAU };
@@ -240,7 +240,9 @@ pub fn task_angles(robot: &Robot, TaskRests { task, rests }: TaskRests<'_>) -> V
         let rest = |rest: &JointAngles| {
             JointAngles::from_fn(rest.len(), |j| if settings.locked[j] { robot.stowed[j] } else { rest[j] })
         };
-        rests.get(&target_idx).map(rest).and_then(|rest| from(&rest)).or_else(|| from(&robot.stowed))
+        let own = rests.get(&target_idx).map(rest).and_then(|rest| from(&rest));
+        // With a joint that is locked elsewhere the way there may lead past a limit.
+        own.or_else(|| from(&robot.stowed)).or_else(|| rests.values().find_map(|other| from(&rest(other))))
     });
     reached.collect()
 }

@@ -1,11 +1,15 @@
 //! What a run leaves, as far as the arm itself can tell.
 
+use std::fmt;
+
 use crate::calib::Calibration;
+use crate::session::held_joint::HeldJoint;
 use armcal_core::kinematics::LinkCorrections;
 use armcal_core::routine::AssertFigure;
 use armcal_core::sensor::ArmSensors;
 use armcal_core::streams::{JointAngles, ReachAttempt};
 use armcal_core::time::Stamp;
+use serde::{Deserialize, Serialize};
 
 /// What came out.
 #[derive(Debug)]
@@ -40,6 +44,35 @@ pub struct Outcome {
     pub asserts: Vec<AssertResult>,
     /// Why the script ended before its last step.
     pub stopped: Option<String>,
+    /// Joints that were given up, in the order of time.
+    pub held: Vec<HeldJoint>,
+    /// What they left within reach, by the last reach.
+    pub still_reachable: Option<StillReachable>,
+}
+
+/// Which targets of a reach an arm with joints that are given up still reaches.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct StillReachable {
+    /// Names of the joints.
+    pub joints: Vec<String>,
+    /// How many targets a plan leads to.
+    pub reachable: usize,
+    /// How many were asked for.
+    pub of: usize,
+    /// Numbers of the targets that a sound arm would reach.
+    pub needs: Vec<usize>,
+}
+
+impl fmt::Display for StillReachable {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "still reachable: {} of {}", self.reachable, self.of)?;
+        let (joints, targets) = (self.joints.join(", "), self.needs.iter().map(usize::to_string).collect::<Vec<_>>());
+        match &targets[..] {
+            [] => Ok(()),
+            [one] => write!(f, "; target {one} needs {joints}"),
+            _ => write!(f, "; targets {} need {joints}", targets.join(", ")),
+        }
+    }
 }
 
 /// The sensors that the arm believed in from a moment on.

@@ -46,14 +46,16 @@ pub fn surveyed<'a>(recording: &Recording, robot: &'a Robot) -> Cow<'a, Robot> {
     }
 }
 
-/// `robot` of which the joints have failed that the recording says have.
+/// `robot` of which the joints have failed that the recording says have by the end of `span`; `None` is all of it.
 #[must_use]
-pub(crate) fn declared_failed(recording: &Recording, robot: &Robot) -> Robot {
+pub(crate) fn declared_failed(recording: &Recording, robot: &Robot, span: Option<(Stamp, Stamp)>) -> Robot {
     let failed: Vec<FailedJoint> = recording
         .messages
         .iter()
         .filter_map(|(_, message)| match message {
-            Message::Mark(Mark { kind: MarkKind::Failed(failed), .. }) => Some(*failed),
+            Message::Mark(Mark { end, kind: MarkKind::Failed(failed), .. }) => {
+                span.is_none_or(|(_, to)| *end <= to).then_some(*failed)
+            }
             _ => None,
         })
         .filter(|failed| failed.joint < robot.n_joints())

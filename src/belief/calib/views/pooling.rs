@@ -35,7 +35,7 @@ pub fn prepare_pooled(
         Some(survey) => robot.clone().with_survey(survey.clone()),
         None => common_survey(recordings, robot)?,
     };
-    let robot = recordings.iter().fold(robot, |robot, recording| declared_failed(recording, &robot));
+    let robot = recordings.iter().fold(robot, |robot, recording| declared_failed(recording, &robot, None));
     let mut pooled = pool(recordings, &robot, method)?;
     let (robot, identified) = identify_scales(&pooled.data, &robot)?;
     if !identified.is_empty() {
