@@ -8,7 +8,7 @@ use crate::session::held_joint::{HeldJoint, hold_in, holding_bounds};
 use crate::session::outcome::{Epoch, StillReachable};
 use crate::session::runner::ScriptRunner;
 use armcal_core::robot::FailedKind;
-use armcal_core::streams::{JointAngles, LogLevel};
+use armcal_core::streams::JointAngles;
 
 /// Multiple of one sigma of a joint's angle that is kept clear for, and what an arm at rest stands off besides, rad.
 const SIGMAS: f64 = 4.0;
@@ -90,14 +90,10 @@ impl ScriptRunner<'_, '_> {
         self.driver.held.iter().find(|held| !held.is_located && held.joint < n)
     }
 
-    /// Notes and says which of `targets` held joints leave within reach; `plans` are those without them.
-    pub(crate) fn note_reachable(
-        &mut self,
-        targets: &[usize],
-        plans: &[Result<JointAngles, PlanError>],
-    ) -> Result<(), SessionError> {
+    /// Notes which of `targets` held joints leave within reach; `plans` are those without them.
+    pub(crate) fn note_reachable(&mut self, targets: &[usize], plans: &[Result<JointAngles, PlanError>]) {
         if self.driver.held.is_empty() {
-            return Ok(());
+            return;
         }
         let lost: Vec<usize> = targets.iter().zip(plans).filter(|(_, plan)| plan.is_err()).map(|(t, _)| *t).collect();
         let targets_m: Vec<[f64; 3]> = lost.iter().map(|&t| self.setup.routine.task.targets_m[t]).collect();
@@ -108,9 +104,7 @@ impl ScriptRunner<'_, '_> {
         let needs = lost.iter().zip(&sound).filter(|(_, plan)| plan.is_ok()).map(|(target, _)| *target).collect();
         let names = self.robot.joint_names();
         let joints: Vec<String> = self.driver.held.iter().map(|held| names[held.joint].clone()).collect();
-        let still = StillReachable { joints, reachable: targets.len() - lost.len(), of: targets.len(), needs };
-        self.driver.log(LogLevel::Warn, &still.to_string())?;
-        self.still_reachable = Some(still);
-        Ok(())
+        let (reachable, of) = (targets.len() - lost.len(), targets.len());
+        self.still_reachable = Some(StillReachable { joints, reachable, of, needs, no_path: Vec::new() });
     }
 }

@@ -209,10 +209,11 @@ impl<'b> Driver<'b> {
         Ok(self.held.len() > n_held)
     }
 
-    /// Stops where the arm is.
+    /// Stops where the arm is; what still swings then is no contact.
     fn stop_here(&mut self) -> Result<(), SessionError> {
         self.set_point = self.believed_angles()?;
         self.command()?;
+        self.hold(REST_S)?;
         self.came = vec![self.set_point];
         self.bumps.forget();
         let _ = self.stand()?;

@@ -55,23 +55,23 @@ pub struct Outcome {
 pub struct StillReachable {
     /// Names of the joints.
     pub joints: Vec<String>,
-    /// How many targets a plan leads to.
+    /// How many targets a plan and a path lead to.
     pub reachable: usize,
     /// How many were asked for.
     pub of: usize,
     /// Numbers of the targets that a sound arm would reach.
     pub needs: Vec<usize>,
+    /// Numbers of those that have a plan, and no path, or did not come to rest.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub no_path: Vec<usize>,
 }
 
 impl fmt::Display for StillReachable {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "still reachable: {} of {}", self.reachable, self.of)?;
-        let (joints, targets) = (self.joints.join(", "), self.needs.iter().map(usize::to_string).collect::<Vec<_>>());
-        match &targets[..] {
-            [] => Ok(()),
-            [one] => write!(f, "; target {one} needs {joints}"),
-            _ => write!(f, "; targets {} need {joints}", targets.join(", ")),
-        }
+        let joints = self.joints.join(", ");
+        self.needs.iter().try_for_each(|target| write!(f, "; target {target} needs {joints}"))?;
+        self.no_path.iter().try_for_each(|target| write!(f, "; no path to target {target} without {joints}"))
     }
 }
 

@@ -30,6 +30,10 @@ impl ScriptRunner<'_, '_> {
             }
             if !arrived {
                 self.tally.targets_skipped += 1;
+                if let Some(still) = self.still_reachable.as_mut().filter(|_| postures[n].is_some()) {
+                    still.reachable -= 1;
+                    still.no_path.push(target);
+                }
                 continue;
             }
             let kind = MarkKind::Reach { attempt, target_idx: target as u32 };
@@ -41,7 +45,10 @@ impl ScriptRunner<'_, '_> {
         if *touch {
             self.rest_jaws(step)?;
         }
-        Ok(())
+        match &self.still_reachable {
+            Some(still) => self.driver.log(LogLevel::Warn, &still.to_string()),
+            None => Ok(()),
+        }
     }
 
     fn arrive(&mut self, at: Option<JointAngles>) -> Result<bool, SessionError> {
@@ -88,7 +95,7 @@ impl ScriptRunner<'_, '_> {
         let targets_m: Vec<[f64; 3]> = targets.iter().map(|&t| self.setup.routine.task.targets_m[t]).collect();
         let request = TargetRequest { targets_m: &targets_m, preferred: Some(&preferred), margin_m: self.margin_m() };
         let solved = plan_targets(&self.robot, self.clearance, &self.bounds, &request, &mut self.rng);
-        self.note_reachable(targets, &solved)?;
+        self.note_reachable(targets, &solved);
         solved.into_iter().map(|planned| self.or_skipped(planned)).collect()
     }
 
