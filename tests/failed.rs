@@ -6,7 +6,7 @@ use armcal::robot::{FailedKind, Robot};
 use armcal::routine::Method;
 use armcal::streams::Message;
 
-use crate::support::{answer, program, read, robot_folder, shared_run, temp, titan};
+use crate::support::{self, ShortRoutine, answer, finished, program, read, robot_folder, shared_run, temp, titan};
 
 const FOREARM: usize = 2;
 const WRIST_PITCH: usize = 3;
@@ -123,4 +123,32 @@ fn a_joint_is_declared_on_the_command_line() {
         let refused = with(wrong);
         assert!(refused.code != 0 && refused.stderr.contains(word), "{refused:?}");
     }
+}
+
+/// A sensor sticks after the first calibration: the joint is held, the rest captures, calibrates and reaches without
+/// it, and the finished recording gives the same calibration.
+#[test]
+fn an_arm_whose_sensor_sticks_goes_on_without_that_joint() {
+    let steps = ["capture", "calibrate", "fault", "reach", "capture", "recalibrate", "reach"].map(|step| {
+        let fault = if step == "fault" { "kind = \"sensor_stuck\"\njoint = \"forearm_pitch\"\n" } else { "" };
+        format!("[[step]]\ndo = \"{step}\"\n{fault}")
+    });
+    let folder = temp();
+    let run = finished(&ShortRoutine { tail: steps.concat(), ..ShortRoutine::default() }, folder.path());
+    let summary = run.summary();
+    let [held] = &summary.held_joints[..] else { panic!("{:?}", summary.held_joints) };
+    assert_eq!((held.joint.as_str(), held.kind), ("forearm_pitch", FailedKind::Stuck));
+    let calibration = Calibration::read(&run.file("calibration.toml")).expect("it reads");
+    let [failed] = &calibration.failed_joint[..] else { panic!("{:?}", calibration.failed_joint) };
+    assert_eq!((failed.joint.as_str(), failed.kind), ("forearm_pitch", FailedKind::Locked));
+    let prior = calibration.prior.as_ref().expect("it starts from the first");
+    assert!(prior.chi_square < 5.0 * prior.degrees_of_freedom as f64, "{prior:?}");
+    let still = summary.still_reachable.as_ref().expect("a reach after it");
+    let reached =
+        summary.score.as_ref().and_then(|score| score.reaches.last()?.side.tool_error_m).expect("some reached");
+    assert!(reached.n == still.reachable && reached.n + still.needs.len() + still.no_path.len() <= still.of, "{still}");
+    assert!(reached.n >= 3 && reached.median < 0.005, "{reached:?}");
+    assert_eq!(summary.capture.collisions, Some(0));
+    support::calibrate(&run.file("run.mcap"), &robot_folder(), folder.path()).expect("calibrate", 0, &["ACCEPTED"]);
+    assert!(read(&folder.path().join("calibration.toml")) == read(&run.file("calibration.toml")));
 }

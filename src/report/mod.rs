@@ -12,5 +12,7 @@ mod table;
 
 pub use html::html;
 pub use markdown::markdown;
-pub use summary::{AssertSummary, CalibrationSummary, CaptureSummary, HeldOutSummary, RenewalSummary, RunSummary};
+pub use summary::{
+    AssertSummary, CalibrationSummary, CaptureSummary, HeldJointSummary, HeldOutSummary, RenewalSummary, RunSummary,
+};
 pub use table::table;

@@ -9,7 +9,9 @@ use armcal_belief::calib::{
     BaselineComparison, Calibration, CameraMount, FailedJointTable, Finding, JointResult, MapResult,
     ObservabilityTable, PriorTable, Refusal, Reservation, Status, VerdictTable,
 };
+use armcal_belief::session::StillReachable;
 use armcal_core::numeric::Outcome;
+use armcal_core::robot::FailedKind;
 use armcal_core::routine::AssertFigure;
 use armcal_core::stats::Summary;
 
@@ -38,6 +40,12 @@ pub struct RunSummary {
     /// Why the script ended before its last step.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stopped: Option<String>,
+    /// Joints that were given up on the way, in the order of time.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub held_joints: Vec<HeldJointSummary>,
+    /// What they leave within reach.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub still_reachable: Option<StillReachable>,
     pub capture: CaptureSummary,
     pub calibration: CalibrationSummary,
     pub held_out: HeldOutSummary,
@@ -47,6 +55,17 @@ pub struct RunSummary {
     /// The script's `assert` steps.
     #[serde(default)]
     pub asserts: Vec<AssertSummary>,
+}
+
+/// A joint that did not follow its set-points and was held from then on.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct HeldJointSummary {
+    pub joint: String,
+    /// What was seen of it.
+    pub kind: FailedKind,
+    /// Where it was last believed to stand, and how far that may be off.
+    pub angle_rad: f64,
+    pub bound_rad: f64,
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -234,6 +253,8 @@ impl RunSummary {
             motion_s: None,
             waited_s: None,
             stopped: None,
+            held_joints: Vec::new(),
+            still_reachable: None,
             wall_s: calibration_wall_s,
             capture: CaptureSummary {
                 poses: calibration.fit.views

@@ -4,7 +4,7 @@ use comfy_table::presets::UTF8_FULL_CONDENSED;
 use comfy_table::{CellAlignment, Table};
 
 use crate::report::summary::{
-    AssertSummary, CalibrationSummary, CaptureSummary, GainChange, RenewalSummary, RunSummary,
+    AssertSummary, CalibrationSummary, CaptureSummary, GainChange, HeldJointSummary, RenewalSummary, RunSummary,
 };
 use crate::score::{ReachScore, ScoreSide};
 use armcal_belief::calib::{CameraMount, FailedJointTable, MapResult, PriorTable, Status, SurveyCoverage};
@@ -119,6 +119,8 @@ pub(super) fn check_lines(summary: &RunSummary) -> Vec<String> {
     lines.extend(coverage_lines(&summary.calibration));
     lines.extend(reach_lines(summary));
     lines.extend(summary.asserts.iter().map(assert_line));
+    lines.extend(summary.held_joints.iter().map(held_line));
+    lines.extend(summary.still_reachable.iter().map(|still| format!("reachable    {still}")));
     lines.extend(summary.stopped.iter().map(|why| format!("stopped      {why}")));
     lines.extend(time_line(summary));
     lines
@@ -265,6 +267,12 @@ fn failed_line(failed: &FailedJointTable) -> String {
     let FailedJointTable { joint, kind, found, evidence, .. } = failed;
     let colon = if evidence.is_empty() { "" } else { ": " };
     format!("failed       {joint} {} ({found}){colon}{evidence}", kind.name())
+}
+
+fn held_line(held: &HeldJointSummary) -> String {
+    let HeldJointSummary { joint, kind, angle_rad, bound_rad } = held;
+    let (kind, bound_deg) = (kind.name(), bound_rad.to_degrees());
+    format!("held         {joint} ({kind}) since it did not follow: at {angle_rad:.3} rad within {bound_deg:.2} deg")
 }
 
 fn prior_line(prior: &PriorTable) -> String {

@@ -6,12 +6,14 @@ use std::path::PathBuf;
 use crate::output::{OutputError, OutputFolder};
 #[cfg(feature = "viewer")]
 use crate::report::markdown;
-use crate::report::{AssertSummary, RenewalSummary, RunSummary, html};
+use crate::report::{AssertSummary, HeldJointSummary, RenewalSummary, RunSummary, html};
 use crate::run::describe::describe;
 use crate::run::{Failure, RunError, RunInputs, Stage, corner_scatter_px};
 use crate::score::{ScoreInput, score};
 use armcal_belief::calib::Calibration;
-use armcal_belief::session::{self, AssertResult, EstimateUpdate, Outcome, Progress, Recorder, SessionInputs};
+use armcal_belief::session::{
+    self, AssertResult, EstimateUpdate, HeldJoint, Outcome, Progress, Recorder, SessionInputs,
+};
 use armcal_core::log::{Recording, RecordingHeader, RecordingWriter, read_recording};
 use armcal_core::streams::Arm;
 use armcal_sim::truth::TruthRecorder;
@@ -167,6 +169,14 @@ impl Run<'_> {
         summary.motion_s = Some(outcome.motion_s);
         summary.waited_s = Some(outcome.waited_s);
         summary.stopped.clone_from(&outcome.stopped);
+        let held = |held: &HeldJoint| HeldJointSummary {
+            joint: self.inputs.robot.sensors[held.joint].joint.clone(),
+            kind: held.kind,
+            angle_rad: held.angle_rad,
+            bound_rad: held.bound_rad,
+        };
+        summary.held_joints = outcome.held.iter().map(held).collect();
+        summary.still_reachable.clone_from(&outcome.still_reachable);
         summary.asserts = scored.asserts.iter().map(assert_summary).collect();
         summary.capture.poses = outcome.poses;
         summary.capture.poses_skipped = outcome.poses_skipped;

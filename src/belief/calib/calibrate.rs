@@ -41,8 +41,7 @@ pub fn calibrate(recording: &Recording, robot: &Robot, method: Method) -> Result
 pub fn calibrate_with_survey(recording: &Recording, robot: &Robot, method: Method) -> Result<Calibration, CalibError> {
     check_joints(recording, robot)?;
     check_order(recording)?;
-    let robot = declared_failed(recording, robot);
-    let mut run = MarkedRun { recording, robot: &robot, method, used: Vec::new() };
+    let mut run = MarkedRun { recording, robot, method, used: Vec::new() };
     let marked = marked_calibrations(recording);
     let (last, earlier) = marked.split_last().map_or((MarkedCalibration::default(), &[][..]), |(l, e)| (*l, e));
     let mut accepted: Option<Calibration> = None;
@@ -115,8 +114,9 @@ impl MarkedRun<'_> {
     /// The views of a marked calibration, and the hash of all messages used up to it.
     fn data(&mut self, marked: &MarkedCalibration) -> Result<CalibrationData, CalibError> {
         let name = self.recording.path.display().to_string();
-        let mut data = associate_within(self.recording, self.robot, marked.span);
-        let (robot, identified) = identify_scales(&data, self.robot)?;
+        let robot = declared_failed(self.recording, self.robot, marked.span);
+        let mut data = associate_within(self.recording, &robot, marked.span);
+        let (robot, identified) = identify_scales(&data, &robot)?;
         if !identified.is_empty() {
             // Travel is counted in the sensor's own scale.
             data = associate_within(self.recording, &robot, marked.span);

@@ -12,11 +12,11 @@ use nalgebra::{Const, DMatrix, DVector, Dyn, Matrix3, Matrix6, OMatrix, Vector3,
 use crate::calib::methods::gripper_tag::MountEstimate;
 use crate::calib::methods::position_problem::PositionProblem;
 use crate::calib::parameters::{JointParameters, Parameter};
-use crate::calib::views::view::TagObservation;
+use crate::calib::views::view::{TagObservation, TaskRests};
 use armcal_core::kinematics::{IkGoal, IkSettings, JointLimits, solve_position};
 use armcal_core::robot::{FailedJoint, FailedKind, Robot};
 use armcal_core::stats::Summary;
-use armcal_core::streams::{JointAngles, MAX_JOINTS, ReachTask};
+use armcal_core::streams::{JointAngles, MAX_JOINTS};
 
 /// Covariance of the free parameters, in their own units (gain: 1, offset: rad).
 #[derive(Clone, Debug)]
@@ -223,9 +223,10 @@ fn is_locked(robot: &Robot, joint: usize) -> bool {
     robot.failed.contains(&FailedJoint { joint, kind: FailedKind::Locked })
 }
 
-/// The arm's angles at each target of `task` that inverse kinematics reaches.
+/// The arm's angles at each target that inverse kinematics reaches: from where the arm rested for it, as a `reach` goes
+/// there; where it did not, from the stowed pose or the other rests.
 #[must_use]
-pub fn task_angles(robot: &Robot, task: &ReachTask) -> Vec<JointAngles> {
+pub fn task_angles(robot: &Robot, TaskRests { task, rests }: TaskRests<'_>) -> Vec<JointAngles> {
     let open = JointLimits { lower_rad: -std::f64::consts::TAU, upper_rad: std::f64::consts::TAU };
     let settings = IkSettings {
         limits: robot.chain.joints().iter().map(|joint| joint.limits.unwrap_or(open)).collect(),
@@ -233,9 +234,15 @@ pub fn task_angles(robot: &Robot, task: &ReachTask) -> Vec<JointAngles> {
         tolerance_m: 1e-4,
         max_iterations: 200,
     };
-    let reached = task.targets_m.iter().filter_map(|target| {
+    let reached = (0..).zip(&task.targets_m).filter_map(|(target_idx, target)| {
         let goal = IkGoal { position_m: Vector3::from(*target) };
-        solve_position(&robot.chain, &robot.tool.mount, &goal, &robot.stowed, &settings).ok()
+        let from = |start: &JointAngles| solve_position(&robot.chain, &robot.tool.mount, &goal, start, &settings).ok();
+        let rest = |rest: &JointAngles| {
+            JointAngles::from_fn(rest.len(), |j| if settings.locked[j] { robot.stowed[j] } else { rest[j] })
+        };
+        let own = rests.get(&target_idx).map(rest).and_then(|rest| from(&rest));
+        // With a joint that is locked elsewhere the way there may lead past a limit.
+        own.or_else(|| from(&robot.stowed)).or_else(|| rests.values().find_map(|other| from(&rest(other))))
     });
     reached.collect()
 }
@@ -246,11 +253,46 @@ pub fn predict_tool_error(
     robot: &Robot,
     at: &JointParameters,
     covariance: &ParameterCovariance,
-    task: Option<&ReachTask>,
+    task: Option<TaskRests<'_>>,
 ) -> Option<ToolErrorPrediction> {
     let sensors = at.sensors(robot);
     let error_m = |angles: &JointAngles| covariance.tool_position_m2(robot, &sensors, angles).trace().max(0.0).sqrt();
     let targets: Vec<(JointAngles, f64)> = task_angles(robot, task?).into_iter().map(|at| (at, error_m(&at))).collect();
     let errors: Vec<f64> = targets.iter().map(|(_, error_m)| *error_m).collect();
     Some(ToolErrorPrediction { error_m: Summary::of(&errors)?, targets })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::calib::fixture::titan;
+    use armcal_core::streams::ReachTask;
+    use std::collections::BTreeMap;
+
+    /// A target is predicted for where the arm stood at it; for the stowed pose's solution where it was never reached
+    /// for, or where no solution leads from the rest.
+    #[test]
+    fn a_target_is_predicted_where_the_arm_rested_for_it() {
+        let robot = titan();
+        let tool_m = |at: &JointAngles| robot.chain.frame(at, &robot.tool.mount).translation.vector;
+        let mut rested = robot.stowed;
+        for (joint, by_rad) in [(0, -0.6), (1, 0.4), (2, -0.5), (3, 0.9), (4, 0.5)] {
+            rested[joint] += by_rad;
+        }
+        // Wrong sensors: it rested beside the target.
+        let mut at_target = rested;
+        (0..5).for_each(|joint| at_target[joint] += 0.02);
+        let task =
+            ReachTask { stamp: Default::default(), targets_m: vec![tool_m(&at_target).into()], tolerance_m: 0.01 };
+        let angles = |rests: &[(u32, JointAngles)]| {
+            let rests: BTreeMap<u32, JointAngles> = rests.iter().copied().collect();
+            task_angles(&robot, TaskRests { task: &task, rests: &rests })
+        };
+        let [by_rest] = angles(&[(0, rested)])[..] else { panic!("one target") };
+        let by_stowed = angles(&[]);
+        assert!(by_rest.max_abs_difference(&rested) < 0.12, "{by_rest:?}");
+        assert!((tool_m(&by_rest) - tool_m(&at_target)).norm() < 1e-3);
+        assert!(by_stowed[0].max_abs_difference(&rested) > 0.2, "{by_stowed:?}");
+        assert_eq!(angles(&[(1, rested)]), by_stowed);
+    }
 }

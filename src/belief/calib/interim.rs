@@ -29,7 +29,7 @@ pub fn interim_estimate(
     let robot = surveyed(recording, robot);
     check_joints(recording, &robot)?;
     check_order(recording)?;
-    let robot = declared_failed(recording, &robot);
+    let robot = declared_failed(recording, &robot, None);
     let span = Some((from, Stamp { nanos: i64::MAX }));
     let mut data = associate_within(recording, &robot, span);
     let (robot, identified) = identify_scales(&data, &robot)?;

@@ -26,9 +26,11 @@ pub fn plan_targets(
     request: &TargetRequest<'_>,
     rng: &mut ChaCha8Rng,
 ) -> Vec<Result<JointAngles, PlanError>> {
+    let limits = bounds.safe_limits(robot);
+    let is_locked = |j: usize| limits[j].are_locked() || (j + 1 == robot.tool.mount.n_joints && on_tool_axis(robot));
     let settings = IkSettings {
-        limits: bounds.safe_limits(robot),
-        locked: (0..robot.n_joints()).map(|j| j + 1 == robot.tool.mount.n_joints && on_tool_axis(robot)).collect(),
+        locked: (0..robot.n_joints()).map(is_locked).collect(),
+        limits,
         tolerance_m: IK_TOLERANCE_M,
         max_iterations: 200,
     };

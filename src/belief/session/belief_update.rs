@@ -6,7 +6,6 @@
 use crate::calib::{Calibration, interim_estimate};
 use crate::plan::JointErrorBounds;
 use crate::session::SessionError;
-use crate::session::outcome::Epoch;
 use crate::session::runner::{SavedBelief, ScriptRunner};
 use armcal_core::routine::{CaptureSettings, Margins, Method};
 use armcal_core::sensor::ArmSensors;
@@ -51,9 +50,10 @@ impl ScriptRunner<'_, '_> {
             self.before_running = Some(SavedBelief { sensors, bounds, fresh: self.fresh.take() });
         }
         self.bounds = self.kept_clear(self.bounds_of(&calibration, &sensors));
-        self.driver.believe(sensors.clone());
-        let last = self.epochs.last().and_then(|epoch| epoch.calibration.clone());
-        self.epochs.push(Epoch { from: self.driver.now(), sensors, calibration: last });
+        self.locate_held(&calibration);
+        self.hold_failed();
+        self.driver.believe(sensors);
+        self.note_belief();
         Ok(Some(calibration))
     }
 
@@ -61,9 +61,9 @@ impl ScriptRunner<'_, '_> {
     pub(crate) fn forget_running(&mut self) {
         let Some(SavedBelief { sensors, bounds, fresh }) = self.before_running.take() else { return };
         (self.bounds, self.fresh) = (bounds, fresh);
-        self.driver.believe(sensors.clone());
-        let last = self.epochs.last().and_then(|epoch| epoch.calibration.clone());
-        self.epochs.push(Epoch { from: self.driver.now(), sensors, calibration: last });
+        self.hold_failed();
+        self.driver.believe(sensors);
+        self.note_belief();
     }
 
     pub(crate) fn bounds_of(&self, calibration: &Calibration, sensors: &ArmSensors) -> JointErrorBounds {
@@ -73,6 +73,9 @@ impl ScriptRunner<'_, '_> {
     /// Root mean square of the tool's position error that `calibration` expects over the task, m; `None` without a
     /// task.
     pub(crate) fn expected_tool_error_m(&self, calibration: &Calibration) -> Option<f64> {
+        if !self.driver.held.is_empty() {
+            return calibration.predicted_tool_error_m.map(|summary| summary.median);
+        }
         let targets: &[JointAngles] = &self.planned.as_ref()?.targets;
         let robot = calibration.scaled_robot(self.setup.robot);
         let sensors = calibration.sensors(&robot).ok()?;

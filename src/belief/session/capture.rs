@@ -74,6 +74,11 @@ impl<'a> CaptureRun<'a> {
         }
     }
 
+    /// From the first view again: a joint that failed has made another arm of it.
+    fn anew(&self, robot: &Robot, began: Stamp) -> Self {
+        Self { tried: self.tried, blocked: self.blocked, ..Self::new(self.settings, robot, began) }
+    }
+
     fn captured(&self) -> usize {
         self.n_fit + self.n_held_out
     }
@@ -174,6 +179,12 @@ impl ScriptRunner<'_, '_> {
             self.capture_at_start(&mut views)?;
         }
         let why = loop {
+            if self.take_up_failures() {
+                (plan, views) = (None, views.anew(&self.robot, self.driver.now()));
+                if replans {
+                    self.capture_at_start(&mut views)?;
+                }
+            }
             if let Some(why) = views.enough(self.driver.now()) {
                 break why;
             }
@@ -249,7 +260,8 @@ impl ScriptRunner<'_, '_> {
     fn capture_at_start(&mut self, views: &mut CaptureRun<'_>) -> Result<(), SessionError> {
         let here = self.driver.set_point();
         let tags = VisibilityModel::default().visible(&self.robot, self.clearance, &here);
-        if tags.is_empty() {
+        // Where a joint stands that nobody has seen, only a look can tell.
+        if tags.is_empty() && self.unlocated().is_none() {
             return Ok(());
         }
         let pose = PlannedPose {
@@ -268,6 +280,9 @@ impl ScriptRunner<'_, '_> {
     fn visit_some(&mut self, plan: &PosePlan, views: &mut CaptureRun<'_>) -> Result<(), SessionError> {
         let replans = self.replans(views.settings);
         for pose in &plan.poses {
+            if self.driver.held.len() > self.n_held {
+                return Ok(());
+            }
             if replans && (views.is_renewal_due() || views.enough(self.driver.now()).is_some()) {
                 return Ok(());
             }

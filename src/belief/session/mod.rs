@@ -2,7 +2,7 @@
 //!
 //! `prepare` plans before the first motion, `script` carries out the steps: `reach`, `capture` (with `belief_update`),
 //! `grip`, `touch`, `scale_identification`, `end_stops`. `motion` drives the arm, `settling` detects rest, `contact`
-//! detects contacts and `approval` asks an operator before a motion. `recorder` keeps every message; `outcome` is the
+//! detects contacts, `following` joints that do not follow (`held_joint`, `failed_joints`), and `approval` asks an operator before a motion. `recorder` keeps every message; `outcome` is the
 //! result.
 
 mod approval;
@@ -11,7 +11,10 @@ mod capture;
 mod contact;
 mod end_stops;
 mod error;
+mod failed_joints;
+mod following;
 mod grip;
+mod held_joint;
 mod inputs;
 mod motion;
 mod outcome;
@@ -27,8 +30,9 @@ mod touch;
 mod unwatched;
 
 pub use error::SessionError;
+pub use held_joint::HeldJoint;
 pub use inputs::SessionInputs;
-pub use outcome::{AssertResult, Epoch, EstimateUpdate, Outcome, ReachStep, Visit};
+pub use outcome::{AssertResult, Epoch, EstimateUpdate, Outcome, ReachStep, StillReachable, Visit};
 pub use progress::{Approval, MotionAhead, Progress};
 pub use recorder::Recorder;
 pub use script::run;

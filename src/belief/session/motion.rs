@@ -5,9 +5,11 @@ use nalgebra::Vector3;
 
 use crate::plan::{Edge, Path, Timing};
 use crate::session::contact::{ContactDetector, ContactEvent};
-use crate::session::settling::SettlingDetector;
+use crate::session::following::FollowWatch;
+use crate::session::held_joint::{HeldJoint, holding_counts, holding_sensors, with_held};
+use crate::session::settling::{NEAR_RAD, SettlingDetector};
 use crate::session::{MotionAhead, Progress, Recorder, SessionError};
-use armcal_core::robot::{FailedJoint, Robot, Vehicle};
+use armcal_core::robot::{FailedJoint, FailedKind, Robot, Vehicle};
 use armcal_core::routine::TaskSettings;
 use armcal_core::sensor::{ArmSensors, Conditions};
 use armcal_core::streams::{
@@ -31,6 +33,9 @@ pub(crate) struct Driver<'b> {
     pub waited_s: f64,
     timing: Timing,
     bumps: ContactDetector,
+    following: FollowWatch,
+    /// Joints that have failed and are left where they are.
+    pub held: Vec<HeldJoint>,
     /// The last motion's waypoints, for the way back.
     came: Vec<JointAngles>,
 }
@@ -86,6 +91,7 @@ impl<'b> Driver<'b> {
         // Sensors that begin are the datasheet's, the same under all conditions.
         let set_point = sensors.angles(&counts);
         let (timing, bumps) = (Timing::new(robot), ContactDetector::new(robot, arm.period_s()));
+        let following = FollowWatch::new(robot, arm.period_s());
         let mut driver = Self {
             robot,
             arm,
@@ -99,6 +105,8 @@ impl<'b> Driver<'b> {
             waited_s: 0.0,
             timing,
             bumps,
+            following,
+            held: Vec::new(),
             came: vec![set_point],
         };
         driver.command()?;
@@ -130,7 +138,7 @@ impl<'b> Driver<'b> {
 
     /// The readings that the set-point stands for under the sensors of now.
     fn set_point_counts(&self) -> JointCounts {
-        self.sensors.counts_under(&self.set_point, &self.conditions())
+        holding_counts(&self.held, self.sensors.counts_under(&self.set_point, &self.conditions()))
     }
 
     /// The latest raw readings.
@@ -158,8 +166,58 @@ impl<'b> Driver<'b> {
 
     /// Takes over other sensors; the arm stays where it is, only what that is called changes.
     pub fn believe(&mut self, sensors: ArmSensors) {
+        let sensors = holding_sensors(&self.held, sensors);
         self.set_point = sensors.angles_under(&self.set_point_counts(), &self.conditions());
         self.sensors = sensors;
+    }
+
+    /// Gives a joint up that has failed: it is left where it is, and the recording says so.
+    pub fn hold_joint(&mut self, joint: usize, kind: FailedKind) -> Result<(), SessionError> {
+        let counts = self.counts()?[joint];
+        let read_rad = self.believed_angles()?[joint];
+        // The word of a broken wire tells nothing: it was near its set-point before.
+        let angle_rad = if kind == FailedKind::Dead { self.set_point[joint] } else { read_rad };
+        let (since, astray_rad) = (self.arm.now(), HeldJoint::astray_rad(self.robot, joint, kind));
+        let is_located = kind == FailedKind::Locked;
+        self.held.push(HeldJoint { joint, kind, since, counts, angle_rad, bound_rad: astray_rad, is_located });
+        self.believe(self.sensors.clone());
+        self.command()?;
+        // Whatever its sensor is worth: from now on it stands at one angle.
+        self.record_failed(&[FailedJoint { joint, kind: FailedKind::Locked }])?;
+        let what = match kind {
+            FailedKind::Stuck => "its reading stands still to the count while its set-point moves",
+            FailedKind::Dead => "its reading leapt to where no joint comes so fast, and stays there",
+            FailedKind::Locked => "it does not leave the place where it rested",
+            FailedKind::Jumps => "its readings jump",
+        };
+        let name = &self.robot.sensors[joint].joint;
+        let text =
+            format!("{name} does not follow its set-points: {what}. It is held where it is, and plans do without it");
+        self.log(LogLevel::Warn, &text)
+    }
+
+    /// Gives the joints up that have stayed where they rested while their set-points left.
+    fn hold_unmoved(&mut self, is_suspect: impl Fn(usize, f64) -> bool) -> Result<bool, SessionError> {
+        let believed = self.believed_angles()?;
+        let n_held = self.held.len();
+        for joint in 0..believed.len() {
+            let off_rad = (self.set_point[joint] - believed[joint]).abs();
+            if is_suspect(joint, off_rad) && !self.is_held(joint) && self.following.has_not_moved(joint) {
+                self.hold_joint(joint, FailedKind::Locked)?;
+            }
+        }
+        Ok(self.held.len() > n_held)
+    }
+
+    /// Stops where the arm is; what still swings then is no contact.
+    fn stop_here(&mut self) -> Result<(), SessionError> {
+        self.set_point = self.believed_angles()?;
+        self.command()?;
+        self.hold(REST_S)?;
+        self.came = vec![self.set_point];
+        self.bumps.forget();
+        let _ = self.stand()?;
+        Ok(())
     }
 
     pub fn record(&mut self, message: &Message) -> Result<(), SessionError> {
@@ -209,6 +267,12 @@ impl<'b> Driver<'b> {
             return Err(self.interrupt()?);
         }
         self.arm.step(self.recorder)?;
+        let (counts, set_counts) = (self.counts()?, self.set_point_counts());
+        if let Some((joint, kind)) = self.following.update(&set_counts, &counts)
+            && self.held.iter().all(|held| held.joint != joint)
+        {
+            self.hold_joint(joint, kind)?;
+        }
         self.ticks += 1;
         if self.ticks.is_multiple_of(BELIEF_EVERY) {
             let stamp = self.arm.now();
@@ -261,6 +325,10 @@ impl<'b> Driver<'b> {
         self.ask(path, clearance_m)?;
         for (n, edge) in path.edges().enumerate() {
             if let Some(bump) = self.follow_edge(&edge, ContactMonitoring::Bumps)? {
+                if self.hold_unmoved(|joint, _| joint == bump.joint)? || self.is_held(bump.joint) {
+                    self.stop_here()?;
+                    return Ok(MotionOutcome::Bumped { joint: bump.joint, at: self.set_point });
+                }
                 self.came = path.waypoints[..=n].to_vec();
                 return self.retreat(bump);
             }
@@ -279,6 +347,10 @@ impl<'b> Driver<'b> {
         self.bumps.forget();
         self.came.clone_from(&path.waypoints);
         Ok(())
+    }
+
+    fn is_held(&self, joint: usize) -> bool {
+        self.held.iter().any(|held| held.joint == joint)
     }
 
     /// One control period towards a set-point near the last one, whatever is met.
@@ -313,9 +385,15 @@ impl<'b> Driver<'b> {
     fn follow_edge(&mut self, edge: &Edge, heed: ContactMonitoring) -> Result<Option<ContactEvent>, SessionError> {
         let steps = (self.timing.edge_duration_s(edge) / self.arm.period_s()).ceil().max(1.0);
         for k in 1..=steps as u64 {
-            self.set_point = Timing::set_point(&edge.from, &edge.to, k as f64 / steps);
+            let n_held = self.held.len();
+            self.set_point = with_held(&self.held, &Timing::set_point(&edge.from, &edge.to, k as f64 / steps));
             self.command()?;
             self.step()?;
+            if heed == ContactMonitoring::Bumps
+                && let Some(failed) = self.held.get(n_held)
+            {
+                return Ok(Some(ContactEvent { joint: failed.joint, behind_rad: 0.0, allowed_rad: 0.0 }));
+            }
             if heed == ContactMonitoring::Bumps
                 && let Some(bump) = self.bumps.update(&self.set_point, &self.believed_angles()?)
             {
@@ -359,10 +437,19 @@ impl<'b> Driver<'b> {
         match self.stand()? {
             Some(SettleOutcome::Still) => Ok(true),
             Some(SettleOutcome::PushedOff(bump)) => {
-                let _ = self.retreat(bump)?;
+                if self.hold_unmoved(|joint, _| joint == bump.joint)? {
+                    self.stop_here()?;
+                } else {
+                    let _ = self.retreat(bump)?;
+                }
                 Ok(false)
             }
-            None => Ok(false),
+            None => {
+                if self.hold_unmoved(|_, off_rad| off_rad > 2.0 * NEAR_RAD)? {
+                    self.stop_here()?;
+                }
+                Ok(false)
+            }
         }
     }
 

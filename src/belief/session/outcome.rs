@@ -1,11 +1,15 @@
 //! What a run leaves, as far as the arm itself can tell.
 
+use std::fmt;
+
 use crate::calib::Calibration;
+use crate::session::held_joint::HeldJoint;
 use armcal_core::kinematics::LinkCorrections;
 use armcal_core::routine::AssertFigure;
 use armcal_core::sensor::ArmSensors;
 use armcal_core::streams::{JointAngles, ReachAttempt};
 use armcal_core::time::Stamp;
+use serde::{Deserialize, Serialize};
 
 /// What came out.
 #[derive(Debug)]
@@ -40,6 +44,35 @@ pub struct Outcome {
     pub asserts: Vec<AssertResult>,
     /// Why the script ended before its last step.
     pub stopped: Option<String>,
+    /// Joints that were given up, in the order of time.
+    pub held: Vec<HeldJoint>,
+    /// What they left within reach, by the last reach.
+    pub still_reachable: Option<StillReachable>,
+}
+
+/// Which targets of a reach an arm with joints that are given up still reaches.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct StillReachable {
+    /// Names of the joints.
+    pub joints: Vec<String>,
+    /// How many targets a plan and a path lead to.
+    pub reachable: usize,
+    /// How many were asked for.
+    pub of: usize,
+    /// Numbers of the targets that a sound arm would reach.
+    pub needs: Vec<usize>,
+    /// Numbers of those that have a plan, and no path, or did not come to rest.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub no_path: Vec<usize>,
+}
+
+impl fmt::Display for StillReachable {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "still reachable: {} of {}", self.reachable, self.of)?;
+        let joints = self.joints.join(", ");
+        self.needs.iter().try_for_each(|target| write!(f, "; target {target} needs {joints}"))?;
+        self.no_path.iter().try_for_each(|target| write!(f, "; no path to target {target} without {joints}"))
+    }
 }
 
 /// The sensors that the arm believed in from a moment on.

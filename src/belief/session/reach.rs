@@ -18,17 +18,22 @@ impl ScriptRunner<'_, '_> {
             self.grip(step, 1.0)?;
         }
         let attempt = self.attempt();
-        let postures = self.postures(targets, attempt)?;
+        let mut postures = self.postures(targets, attempt)?;
         self.warn_beyond(&postures)?;
         self.driver.phase(Phase::Reach)?;
-        for (n, (&target, angles)) in targets.iter().zip(&postures).enumerate() {
+        for (n, &target) in targets.iter().enumerate() {
             self.progress_at(Phase::Reach, n, targets.len());
-            let arrived = match angles {
-                Some(angles) => self.go(angles)? && self.driver.settle()?,
-                None => false,
-            };
+            let mut arrived = self.arrive(postures[n])?;
+            while !arrived && self.take_up_failures() {
+                postures = self.postures(targets, attempt)?;
+                arrived = self.arrive(postures[n])?;
+            }
             if !arrived {
                 self.tally.targets_skipped += 1;
+                if let Some(still) = self.still_reachable.as_mut().filter(|_| postures[n].is_some()) {
+                    still.reachable -= 1;
+                    still.no_path.push(target);
+                }
                 continue;
             }
             let kind = MarkKind::Reach { attempt, target_idx: target as u32 };
@@ -40,7 +45,17 @@ impl ScriptRunner<'_, '_> {
         if *touch {
             self.rest_jaws(step)?;
         }
-        Ok(())
+        match &self.still_reachable {
+            Some(still) => self.driver.log(LogLevel::Warn, &still.to_string()),
+            None => Ok(()),
+        }
+    }
+
+    fn arrive(&mut self, at: Option<JointAngles>) -> Result<bool, SessionError> {
+        match at {
+            Some(angles) => Ok(self.go(&angles)? && self.driver.settle()?),
+            None => Ok(false),
+        }
     }
 
     /// Says once what the targets ask beyond what the calibration in use saw, if that is more than straight lines: a
@@ -67,12 +82,20 @@ impl ScriptRunner<'_, '_> {
     fn postures(&mut self, targets: &[usize], attempt: ReachAttempt) -> Result<Vec<Option<JointAngles>>, SessionError> {
         let planned = self.planned.as_ref().map(|planned| planned.targets.clone()).unwrap_or_default();
         let preferred: Vec<JointAngles> = targets.iter().filter_map(|&target| planned.get(target)).copied().collect();
-        if attempt == ReachAttempt::Before && preferred.len() == targets.len() {
+        let has_failed = !self.driver.held.is_empty();
+        if let Some(held) = self.unlocated() {
+            let name = &self.robot.sensors[held.joint].joint;
+            let text = format!("all targets are left out: no view has shown yet where {name} stands");
+            self.driver.log(LogLevel::Warn, &text)?;
+            return Ok(vec![None; targets.len()]);
+        }
+        if attempt == ReachAttempt::Before && preferred.len() == targets.len() && !has_failed {
             return Ok(preferred.into_iter().map(Some).collect());
         }
         let targets_m: Vec<[f64; 3]> = targets.iter().map(|&t| self.setup.routine.task.targets_m[t]).collect();
         let request = TargetRequest { targets_m: &targets_m, preferred: Some(&preferred), margin_m: self.margin_m() };
         let solved = plan_targets(&self.robot, self.clearance, &self.bounds, &request, &mut self.rng);
+        self.note_reachable(targets, &solved);
         solved.into_iter().map(|planned| self.or_skipped(planned)).collect()
     }
 

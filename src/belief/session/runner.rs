@@ -7,7 +7,7 @@ use crate::calib::Calibration;
 use crate::plan::{ClearanceModel, JointErrorBounds, PosePlan};
 use crate::session::inputs::SessionInputs;
 use crate::session::motion::Driver;
-use crate::session::outcome::{AssertResult, Epoch, EstimateUpdate, ReachStep, Visit};
+use crate::session::outcome::{AssertResult, Epoch, EstimateUpdate, ReachStep, StillReachable, Visit};
 use armcal_core::robot::Robot;
 use armcal_core::sensor::ArmSensors;
 use armcal_core::streams::JointAngles;
@@ -51,6 +51,7 @@ pub(crate) struct ScriptRunner<'a, 'b> {
     pub jaws: Jaws<'a>,
     pub driver: Driver<'b>,
     pub planned: Option<Planned>,
+    /// Views captured from here on are of the arm as it is.
     pub began: Stamp,
     /// Views captured from here on have been in no calibration.
     pub views_since: Stamp,
@@ -69,6 +70,10 @@ pub(crate) struct ScriptRunner<'a, 'b> {
     pub epochs: Vec<Epoch>,
     pub reaches: Vec<ReachStep>,
     pub asserts: Vec<AssertResult>,
+    /// Joints that were given up, of which belief and plans know.
+    pub n_held: usize,
+    /// By the last reach with a joint that was given up.
+    pub still_reachable: Option<StillReachable>,
 }
 
 /// What was planned before anything moved.

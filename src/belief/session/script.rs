@@ -2,6 +2,7 @@
 
 use crate::calib::{Calibration, CalibrationFileError, Status, calibrate};
 use crate::plan::{ClearanceModel, Elapsed, JointErrorBounds, LeastClearance, PathError, PathPlanner};
+use crate::session::held_joint::with_held;
 use crate::session::inputs::SessionInputs;
 use crate::session::motion::{Driver, MotionOutcome};
 use crate::session::outcome::{AssertResult, Epoch, Outcome, ReachStep};
@@ -60,6 +61,8 @@ pub fn run(
         epochs: vec![Epoch { from: began, sensors, calibration: None }],
         reaches: Vec::new(),
         asserts: Vec::new(),
+        n_held: 0,
+        still_reachable: None,
         driver,
     };
     run.bounds = run.kept_clear(JointErrorBounds::datasheet(setup.robot));
@@ -100,6 +103,7 @@ impl ScriptRunner<'_, '_> {
         for (index, step) in routine.steps.iter().enumerate() {
             let number = index + 1;
             self.age();
+            self.take_up_failures();
             match step {
                 Step::Move(goal) => self.move_to(number, goal)?,
                 Step::Reach(reach) => {
@@ -153,11 +157,14 @@ impl ScriptRunner<'_, '_> {
             reaches: self.reaches,
             asserts: self.asserts,
             stopped,
+            held: self.driver.held,
+            still_reachable: self.still_reachable,
         })
     }
 
     /// Goes to believed angles by a certified path; `false` when there is none.
     pub fn go(&mut self, to: &JointAngles) -> Result<bool, SessionError> {
+        let to = &with_held(&self.driver.held, to);
         let limits = self.bounds.safe_limits(&self.robot);
         let from = self.driver.set_point();
         let (clearance, bounds, margin_m) = (self.clearance, &self.bounds, self.margin_m());
@@ -213,6 +220,7 @@ impl ScriptRunner<'_, '_> {
                 return Err(wrong(problem));
             }
         };
+        let to = with_held(&self.driver.held, &to);
         self.driver.phase(Phase::Move)?;
         self.progress_at(Phase::Move, 0, 1);
         if let Some(nearest) = self.clearance.find_violation_arriving(&to, &self.bounds, self.margin_m()) {
@@ -257,6 +265,7 @@ impl ScriptRunner<'_, '_> {
         } else {
             self.forget_running();
         }
+        self.hold_found(&calibration)?;
         let refusal = calibration.refusal.clone();
         self.calibration = Some(calibration);
         Ok(refusal)
@@ -268,6 +277,7 @@ impl ScriptRunner<'_, '_> {
         let warmed_k = self.driver.recorder.oil_c.zip(fresh.oil_c).map_or(0.0, |(now, then)| now - then);
         let age = Elapsed { seconds: self.driver.now().since_s(fresh.at), warmed_k };
         self.bounds = fresh.bounds.widened(&self.robot, age);
+        self.hold_failed();
     }
 
     fn believe(&mut self, calibration: &Calibration) -> Result<(), SessionError> {
@@ -275,10 +285,12 @@ impl ScriptRunner<'_, '_> {
         let sensors = calibration.sensors(self.setup.robot).map_err(wrong)?;
         self.robot.chain = self.setup.robot.chain.corrected(&calibration.link_corrections());
         self.bounds = self.kept_clear(self.bounds_of(calibration, &sensors));
+        self.locate_held(calibration);
+        self.hold_failed();
         let (bounds, at, oil_c) = (self.bounds.clone(), self.driver.now(), self.driver.recorder.oil_c);
         self.fresh = Some(FreshBounds { bounds, at, oil_c });
-        self.driver.believe(sensors.clone());
-        let from = self.driver.now();
+        self.driver.believe(sensors);
+        let (from, sensors) = (self.driver.now(), self.driver.sensors.clone());
         self.epochs.push(Epoch { from, sensors, calibration: Some(calibration.clone()) });
         Ok(())
     }

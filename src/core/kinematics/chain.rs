@@ -14,6 +14,14 @@ pub struct JointLimits {
     pub upper_rad: f64,
 }
 
+impl JointLimits {
+    /// Whether there is but one angle.
+    #[must_use]
+    pub fn are_locked(&self) -> bool {
+        self.lower_rad == self.upper_rad
+    }
+}
+
 /// One moving joint: fixed transform from the parent joint's link frame, then a rotation about `axis`.
 #[derive(Clone, Debug)]
 pub struct ChainJoint {
@@ -93,6 +101,14 @@ impl Chain {
         for (joint, correction) in joints.iter_mut().zip(corrections) {
             joint.parent_from_joint = correction.applied_to(&joint.parent_from_joint);
         }
+        Self { joints }
+    }
+
+    /// The chain whose joint number `joint` has the range of one angle, `angle_rad`.
+    #[must_use]
+    pub fn locked(&self, joint: usize, angle_rad: f64) -> Self {
+        let mut joints = self.joints.clone();
+        joints[joint].limits = Some(JointLimits { lower_rad: angle_rad, upper_rad: angle_rad });
         Self { joints }
     }
 

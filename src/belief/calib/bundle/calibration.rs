@@ -170,6 +170,11 @@ impl<'a> BundleCalibration<'a> {
     }
 
     fn finish(mut self, mut estimated: Estimated<'_>) -> Result<Calibration, CalibError> {
+        // What no sensor told at a rest stays as it was stowed.
+        for failure in estimated.failures.iter().filter(|failure| failure.leaves_no_sensor()) {
+            let stowed_rad = self.data.robot.stowed[failure.joint];
+            self.data.data.rests.values_mut().for_each(|rest| rest[failure.joint] = stowed_rad);
+        }
         let diagnosis = self.diagnose(&mut estimated);
         let estimated = &estimated;
         self.data.data.fit.clone_from(&diagnosis.views);
@@ -184,7 +189,7 @@ impl<'a> BundleCalibration<'a> {
             EstimatePurpose::Final => {
                 let input = &BundleInput { views: &diagnosis.views, ..estimated.setup.input() };
                 let (found, innovations) = (estimated.by_views(), &diagnosis.innovations[..]);
-                let task = self.data.data.task.as_ref();
+                let task = self.data.data.task_rests();
                 VerdictInput { input, found, innovations, task }.judge(&mut calibration);
                 if let Some(touched) = &estimated.touches {
                     touched.update.judge(&self.data.robot, &mut calibration);
@@ -324,7 +329,7 @@ impl<'a> BundleCalibration<'a> {
             found: &estimated.estimate,
             parameters,
             covariance: &diagnosis.covariance,
-            task: self.data.data.task.as_ref(),
+            task: self.data.data.task_rests(),
         }
     }
 

@@ -12,7 +12,7 @@
 use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen, Vector6};
 
 use crate::calib::bundle::estimate::{Estimate, estimate};
-use crate::calib::bundle::failures::FailureAdjusted;
+use crate::calib::bundle::failures::{Failure, FailureAdjusted};
 use crate::calib::bundle::input::{BundleInput, HyperparameterMode};
 use crate::calib::bundle::model::reference;
 use crate::calib::bundle::model::{Hyperparameters, Model};
@@ -20,7 +20,7 @@ use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
 use crate::calib::refusal::{MIN_USED_SHARE, Refusal};
 use crate::calib::result::calibration::Calibration;
 use crate::calib::views::view::View;
-use armcal_core::robot::{JointSensorSpec, Robot};
+use armcal_core::robot::{FailedKind, JointSensorSpec, Robot};
 use armcal_core::sensor::Conditions;
 use armcal_core::time::Stamp;
 
@@ -110,8 +110,16 @@ impl CalibrationPrior {
         if guess.reference == Conditions::default() {
             guess.reference = reference(views);
         }
+        // What the prior knows of a sensor is nothing about where a locked joint stands.
+        let is_locked = |failure: &&Failure| failure.kind == FailedKind::Locked && failure.leaves_no_sensor();
+        let locked: Vec<usize> = applied.failures.iter().filter(is_locked).map(|failure| failure.joint).collect();
+        for &joint in &locked {
+            for parameter in ParameterKind::all().map(|kind| Parameter { joint, kind }) {
+                guess.set(parameter, JointParameters::default().get(parameter));
+            }
+        }
         let mut scales = Hyperparameters::datasheet(&robot);
-        let known = prior.parameter_covariance(&robot);
+        let known = prior.parameter_covariance(&robot).without(|parameter| locked.contains(&parameter.joint));
         if let Some(std_rad) = known.residual_std_rad {
             for parameter in known.parameters.iter().filter(|p| p.kind == ParameterKind::Offset) {
                 scales.joint_std_rad[parameter.joint] = std_rad[parameter.joint].max(1e-5);
@@ -131,7 +139,7 @@ impl CalibrationPrior {
         let parameters = model.parameters();
         let elapsed_h = elapsed_h(prior, views);
         let mount = mount.map(|(_, rows)| rows);
-        let columns = PriorColumns { robot: &robot, scales: &scales, parameters: &parameters, mount };
+        let columns = PriorColumns { robot: &robot, scales: &scales, parameters: &parameters, mount, locked: &locked };
         let (covariance, widened) = covariances(prior, &columns, elapsed_h);
         let n = covariance.nrows();
         let mean = DVector::from_fn(n, |k, _| parameters.get(k).map_or(0.0, |p| guess.get(*p)));
@@ -271,12 +279,14 @@ struct PriorColumns<'a> {
     parameters: &'a [Parameter],
     /// The mount's rows in the prior's covariance.
     mount: Option<[usize; 6]>,
+    /// Joints of which the prior says nothing.
+    locked: &'a [usize],
 }
 
 /// P0 and P1, see the module.
 fn covariances(prior: &Calibration, columns: &PriorColumns<'_>, elapsed_h: f64) -> (DMatrix<f64>, DMatrix<f64>) {
-    let PriorColumns { robot, scales, parameters, mount } = columns;
-    let row = |p: &Parameter| prior.covariance.row(&p.name(robot));
+    let PriorColumns { robot, scales, parameters, mount, locked } = columns;
+    let row = |p: &Parameter| prior.covariance.row(&p.name(robot)).filter(|_| !locked.contains(&p.joint));
     let mut rows: Vec<Option<usize>> = parameters.iter().map(row).collect();
     rows.extend(mount.iter().flatten().map(|row| Some(*row)));
     let n = rows.len();

@@ -8,10 +8,9 @@ use crate::calib::finding::{Finding, FindingKind, FindingUnit};
 use crate::calib::parameters::JointParameters;
 use crate::calib::refusal::Refusal;
 use crate::calib::result::failed_joint::FailedJointTable;
-use crate::calib::views::view::View;
+use crate::calib::views::view::{TaskRests, View};
 use armcal_core::robot::{FailedJoint, FailedKind, Robot};
 use armcal_core::stats::Summary;
-use armcal_core::streams::ReachTask;
 
 /// Fewer views do not tell where a sensor stands since it slipped from views in which it jumped.
 const MIN_VIEWS_SINCE: usize = 3;
@@ -27,7 +26,7 @@ pub(crate) struct FailureImpact<'a> {
     pub parameters: &'a JointParameters,
     /// With the locked joints' rows.
     pub covariance: &'a ParameterCovariance,
-    pub task: Option<&'a ReachTask>,
+    pub task: Option<TaskRests<'a>>,
 }
 
 /// How a failed joint's angle is known.
@@ -205,7 +204,7 @@ impl FailureImpact<'_> {
         {
             return Some(Refusal::TooFewViewsSinceSlip { joint, evidence: failure.evidence.clone(), views });
         }
-        let task = self.task?;
+        let task = self.task?.task;
         let is_needed = failure.joint < self.robot.tool.mount.n_joints;
         if !failure.leaves_no_sensor() || failure.kind == FailedKind::Locked || !is_needed {
             return None;

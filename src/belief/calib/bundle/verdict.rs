@@ -18,11 +18,11 @@ use crate::calib::refusal::{InnovationQuantity, Refusal};
 use crate::calib::result::calibration::Calibration;
 use crate::calib::result::validity::not_covered;
 use crate::calib::result::verdict_tables::{Check, ObservabilityTable, VerdictTable};
+use crate::calib::views::view::TaskRests;
 use armcal_core::joints::JointAngles;
 use armcal_core::robot::Robot;
 use armcal_core::sensor::ConditionChange;
 use armcal_core::stats::chi_square_quantile;
-use armcal_core::streams::ReachTask;
 
 /// What a verdict on an estimate rests on.
 pub(crate) struct VerdictInput<'a> {
@@ -30,7 +30,7 @@ pub(crate) struct VerdictInput<'a> {
     pub found: &'a Estimate<'a>,
     /// Of each fold.
     pub innovations: &'a [Innovations],
-    pub task: Option<&'a ReachTask>,
+    pub task: Option<TaskRests<'a>>,
 }
 
 /// Probability that a good arm fails any one check by chance.

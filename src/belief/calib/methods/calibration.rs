@@ -62,7 +62,7 @@ pub(crate) fn calibrate_positions(
     let linearity_scale = linearity_scale(&problem, &held_out_problem, &solution.parameters, free.len());
     let held_out = held_out(&data, method, &start, (&free, &solution.parameters));
     let as_found = start.robot.clone().with_linearity(linearity_scale);
-    let predicted = predict_tool_error(&as_found, &solution.parameters, &covariance, data.data.task.as_ref());
+    let predicted = predict_tool_error(&as_found, &solution.parameters, &covariance, data.data.task_rests());
     let source = Provenance {
         messages_hash: &data.messages_hash,
         robot: &start.robot,

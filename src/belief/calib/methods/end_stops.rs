@@ -28,7 +28,7 @@ pub(crate) fn calibrate(data: CalibrationData, prior: Option<&Calibration>) -> R
     let (problem, held_out) = (PositionProblem::new(&robot, &data.fit), PositionProblem::new(&robot, &data.held_out));
     let linearity_scale = linearity_scale(&problem, &held_out, at, 0);
     let as_found = robot.clone().with_linearity(linearity_scale);
-    let predicted = predict_tool_error(&as_found, at, covariance, data.task.as_ref());
+    let predicted = predict_tool_error(&as_found, at, covariance, data.task_rests());
     let source = Provenance {
         messages_hash: &messages_hash,
         robot: &robot,

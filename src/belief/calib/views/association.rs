@@ -46,14 +46,16 @@ pub fn surveyed<'a>(recording: &Recording, robot: &'a Robot) -> Cow<'a, Robot> {
     }
 }
 
-/// `robot` of which the joints have failed that the recording says have.
+/// `robot` of which the joints have failed that the recording says have by the end of `span`; `None` is all of it.
 #[must_use]
-pub(crate) fn declared_failed(recording: &Recording, robot: &Robot) -> Robot {
+pub(crate) fn declared_failed(recording: &Recording, robot: &Robot, span: Option<(Stamp, Stamp)>) -> Robot {
     let failed: Vec<FailedJoint> = recording
         .messages
         .iter()
         .filter_map(|(_, message)| match message {
-            Message::Mark(Mark { kind: MarkKind::Failed(failed), .. }) => Some(*failed),
+            Message::Mark(Mark { end, kind: MarkKind::Failed(failed), .. }) => {
+                span.is_none_or(|(_, to)| *end <= to).then_some(*failed)
+            }
             _ => None,
         })
         .filter(|failed| failed.joint < robot.n_joints())
@@ -80,6 +82,7 @@ pub fn associate_within(recording: &Recording, robot: &Robot, span: Option<(Stam
         conditions: ConditionHistory::heard_until(recording, to),
         from,
         data: CaptureData::default(),
+        rested: BTreeMap::new(),
     };
     let recorded = recorded_survey(recording);
     for (idx, message) in recording.messages.iter().map(|(_, m)| m).enumerate() {
@@ -106,6 +109,8 @@ struct Association<'a> {
     conditions: ConditionHistory,
     from: Stamp,
     data: CaptureData,
+    /// End of the last rest for each target.
+    rested: BTreeMap<u32, Stamp>,
 }
 
 impl Association<'_> {
@@ -124,6 +129,7 @@ impl Association<'_> {
                 }
             }
             MarkKind::Failed(_) => self.data.used.push(idx),
+            MarkKind::Reach { target_idx, .. } => self.add_rest(idx, mark, target_idx),
             MarkKind::Identify { joint_idx } => {
                 self.data.used.push(idx);
                 if let Some(view) = self.view(mark, 0) {
@@ -141,6 +147,26 @@ impl Association<'_> {
             }
             _ => {}
         }
+    }
+
+    /// Where the arm rested for a target: of several rests the last, whatever calibration it was for.
+    fn add_rest(&mut self, idx: usize, mark: &Mark, target_idx: u32) {
+        if self.rested.get(&target_idx).is_some_and(|last| *last > mark.end) {
+            return;
+        }
+        let readings = self.index.span(mark).iter().filter_map(|&(_, idx)| match &self.index.messages[idx].1 {
+            Message::JointSensors(sample) => Some((idx, self.sensors.angles(&sample.counts))),
+            _ => None,
+        });
+        let (read, angles): (Vec<usize>, Vec<JointAngles>) = readings.unzip();
+        if angles.is_empty() {
+            return;
+        }
+        let mean = |j: usize| angles.iter().map(|angles| angles[j]).sum::<f64>() / angles.len() as f64;
+        self.data.rests.insert(target_idx, JointAngles::from_fn(self.robot.n_joints(), mean));
+        self.rested.insert(target_idx, mark.end);
+        self.data.used.push(idx);
+        self.data.used.extend(read);
     }
 
     fn add_touch(&mut self, idx: usize, touch: &ToolTouch) {

@@ -22,4 +22,6 @@ pub use conditions::ConditionHistory;
 pub use external::{ExternalContext, prepare_external};
 pub use pooling::prepare_pooled;
 pub use scale_identification::{IdentifiedScale, identify_scales};
-pub use view::{CaptureData, EndStopReading, MeanCorners, ObservationRejection, TagMeasurement, TagObservation, View};
+pub use view::{
+    CaptureData, EndStopReading, MeanCorners, ObservationRejection, TagMeasurement, TagObservation, TaskRests, View,
+};

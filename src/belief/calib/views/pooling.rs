@@ -35,7 +35,7 @@ pub fn prepare_pooled(
         Some(survey) => robot.clone().with_survey(survey.clone()),
         None => common_survey(recordings, robot)?,
     };
-    let robot = recordings.iter().fold(robot, |robot, recording| declared_failed(recording, &robot));
+    let robot = recordings.iter().fold(robot, |robot, recording| declared_failed(recording, &robot, None));
     let mut pooled = pool(recordings, &robot, method)?;
     let (robot, identified) = identify_scales(&pooled.data, &robot)?;
     if !identified.is_empty() {
@@ -119,7 +119,9 @@ fn add(data: &mut CaptureData, part: CaptureData, first_pose_idx: u32) {
     for (joint, views) in part.identify {
         data.identify.entry(joint).or_default().extend(views);
     }
-    data.task = data.task.take().or(part.task);
+    if data.task.is_none() {
+        (data.task, data.rests) = (part.task, part.rests);
+    }
     data.stops.extend(part.stops);
     data.touches.extend(part.touches);
     data.n_marks += part.n_marks;

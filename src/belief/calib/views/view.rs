@@ -152,6 +152,8 @@ pub struct CaptureData {
     pub touches: Vec<Touch>,
     /// The first one of the recording; `None` where it has none.
     pub task: Option<ReachTask>,
+    /// Angles by the datasheet at which the arm last rested for a target of the task, by the target's number.
+    pub rests: BTreeMap<u32, JointAngles>,
     /// Number of capture marks, those without a view included; of external recordings, of views.
     pub n_marks: usize,
     /// Number of detections by reason, over all views.
@@ -173,7 +175,22 @@ pub struct CaptureData {
     pub used_for_terms: Vec<usize>,
 }
 
+/// The task, and the configurations in which the arm rested for its targets.
+#[derive(Clone, Copy, Debug)]
+pub struct TaskRests<'a> {
+    /// Targets and tolerance.
+    pub task: &'a ReachTask,
+    /// By the target's number; those that were not reached for are absent.
+    pub rests: &'a BTreeMap<u32, JointAngles>,
+}
+
 impl CaptureData {
+    /// `None` without a task.
+    #[must_use]
+    pub fn task_rests(&self) -> Option<TaskRests<'_>> {
+        Some(TaskRests { task: self.task.as_ref()?, rests: &self.rests })
+    }
+
     pub(crate) fn reject(&mut self, why: ObservationRejection, n: usize) {
         *self.rejected.entry(why).or_default() += n;
     }

@@ -107,6 +107,11 @@ impl JointErrorBounds {
         bounds
     }
 
+    /// A joint that stands within `bound_rad` of `angle_rad`, whatever its sensor says.
+    pub fn hold(&mut self, joint: usize, angle_rad: f64, bound_rad: f64) {
+        self.joints[joint] = JointBound { pivot_rad: angle_rad, at_pivot_rad: bound_rad, slope: 0.0 };
+    }
+
     /// Largest distance of the true angle of `joint` from `believed_rad`, rad.
     #[must_use]
     pub fn error_rad(&self, joint: usize, believed_rad: f64) -> f64 {
@@ -129,6 +134,7 @@ impl JointErrorBounds {
             .iter()
             .enumerate()
             .map(|(joint, spec)| match spec.limits {
+                Some(limits) if limits.are_locked() => limits,
                 None => JointLimits { lower_rad: -std::f64::consts::PI, upper_rad: std::f64::consts::PI },
                 Some(limits) => JointLimits {
                     lower_rad: limits.lower_rad + self.error_rad(joint, limits.lower_rad) + arriving.end_rad(joint),

@@ -1,0 +1,193 @@
+//! Whether each joint follows its set-points, by its raw word alone.
+//!
+//! Three failures are told from a contact, which stops a joint that was moving: a word that stays the same to the count
+//! while the set-point leaves (`stuck`: a live sensor is noisy); a word that leapt farther than any joint turns and
+//! stands still there, away from the set-point (`dead`); and a joint that has stood where it was at rest since before
+//! the set-point left (`locked`), which is asked for when a contact is suspected.
+
+use armcal_core::robot::{FailedKind, Robot};
+use armcal_core::sensor::wrap_symmetric;
+use armcal_core::streams::JointCounts;
+
+/// A word that is the same for this long, while the set-point leaves by `LEFT_RAD`, is stuck, s.
+const SAME_S: f64 = 0.15;
+const LEFT_RAD: f64 = 0.03;
+/// A word that leapt and stood still for so long is dead: spikes are shorter, s.
+const LEAPT_S: f64 = 0.3;
+/// A joint has been at rest when reading and set-point stood still, near each other, for so long, s.
+const REST_S: f64 = 0.3;
+const NEAR_RAD: f64 = 0.02;
+/// Readings of a joint at rest lie within so many standard deviations of the noise, and two counts.
+const NOISE_SIGMAS: f64 = 10.0;
+/// No joint turns faster than this many times its rate.
+const REACHABLE: f64 = 3.0;
+/// A sensor with less noise may read the same for long, counts.
+const NOISY_COUNTS: f64 = 1.0;
+
+/// Follows set-points and words, one pair a control period.
+pub(crate) struct FollowWatch {
+    period_s: f64,
+    joints: Vec<JointFollow>,
+}
+
+struct JointFollow {
+    wrap_counts: f64,
+    noise_counts: f64,
+    /// Largest difference of readings at rest.
+    rest_counts: f64,
+    /// Largest step in one period.
+    leap_counts: f64,
+    counts_per_rad: f64,
+    /// Word and set-point of the period before.
+    last: Option<(f64, f64)>,
+    same_s: f64,
+    /// Set-point when the word began to stay the same.
+    set_at_same: f64,
+    /// Word about which it stands still, and for how long.
+    anchor: f64,
+    still_s: f64,
+    set_still_s: f64,
+    has_leapt: bool,
+    has_rested: bool,
+}
+
+impl FollowWatch {
+    pub(crate) fn new(robot: &Robot, period_s: f64) -> Self {
+        let joints = robot.sensors.iter().map(|spec| {
+            let counts_per_rad = spec.counts_per_rad.abs();
+            JointFollow {
+                wrap_counts: spec.wrap_counts,
+                noise_counts: spec.noise_std_counts,
+                rest_counts: NOISE_SIGMAS * spec.noise_std_counts + 2.0,
+                leap_counts: REACHABLE * spec.max_rate_rad_s * period_s * counts_per_rad
+                    + NOISE_SIGMAS * spec.noise_std_counts,
+                counts_per_rad,
+                last: None,
+                same_s: 0.0,
+                set_at_same: 0.0,
+                anchor: 0.0,
+                still_s: 0.0,
+                set_still_s: 0.0,
+                has_leapt: false,
+                has_rested: false,
+            }
+        });
+        Self { period_s, joints: joints.collect() }
+    }
+
+    /// Takes one period; gives a joint whose sensor has failed by now.
+    pub(crate) fn update(&mut self, set_point: &JointCounts, word: &JointCounts) -> Option<(usize, FailedKind)> {
+        let mut failed = None;
+        for (joint, watch) in self.joints.iter_mut().enumerate() {
+            let kind = watch.update(set_point[joint], word[joint], self.period_s);
+            failed = failed.or(kind.map(|kind| (joint, kind)));
+        }
+        failed
+    }
+
+    /// Whether `joint` has stood still since it was at rest at its set-point.
+    pub(crate) fn has_not_moved(&self, joint: usize) -> bool {
+        self.joints[joint].has_rested
+    }
+}
+
+impl JointFollow {
+    fn update(&mut self, set: f64, word: f64, period_s: f64) -> Option<FailedKind> {
+        let Some((last_set, last_word)) = self.last.replace((set, word)) else {
+            (self.set_at_same, self.anchor) = (set, word);
+            return None;
+        };
+        let apart = |a: f64, b: f64| wrap_symmetric(a - b, self.wrap_counts).abs();
+        let (off_counts, leap_counts) = (apart(set, word), apart(word, last_word));
+        let left_counts = apart(set, self.set_at_same);
+        let (moved_counts, near_counts) = (apart(word, self.anchor), NEAR_RAD * self.counts_per_rad);
+        let set_stands = apart(set, last_set) < 1e-6;
+        (self.same_s, self.set_at_same) =
+            if word == last_word { (self.same_s + period_s, self.set_at_same) } else { (0.0, set) };
+        self.set_still_s = if set_stands { self.set_still_s + period_s } else { 0.0 };
+        if moved_counts > self.rest_counts {
+            (self.anchor, self.still_s, self.has_rested) = (word, 0.0, false);
+        }
+        self.still_s += period_s;
+        self.has_leapt = (self.has_leapt || leap_counts > self.leap_counts) && off_counts > self.leap_counts;
+        self.has_rested |= self.still_s.min(self.set_still_s) > REST_S && off_counts < near_counts;
+        if self.has_leapt && self.still_s > LEAPT_S {
+            return Some(FailedKind::Dead);
+        }
+        let is_same = self.noise_counts >= NOISY_COUNTS && self.same_s > SAME_S;
+        (is_same && left_counts > LEFT_RAD * self.counts_per_rad).then_some(FailedKind::Stuck)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use armcal_core::stats::stream_rng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    const PERIOD_S: f64 = 0.01;
+    const JOINT: usize = 2;
+
+    /// What becomes of an edge of 0.5 rad at 0.25 rad/s after a rest; `word` makes the word of the exact one.
+    fn told(seed: u64, mut word: impl FnMut(f64, f64) -> f64) -> (Option<(f64, FailedKind)>, bool) {
+        let robot = crate::calib::fixture::titan();
+        let spec = &robot.sensors[JOINT];
+        let mut watch = FollowWatch::new(&robot, PERIOD_S);
+        let mut rng = stream_rng(seed, "following");
+        let mut at = 0.0;
+        let quiet = |counts: f64| {
+            let mut words = [2000.0; 6];
+            words[JOINT] = counts;
+            JointCounts::from_slice(&words)
+        };
+        for k in 0..350 {
+            let t_s = f64::from(k) * PERIOD_S;
+            let set = 2000.0 + spec.counts_per_rad * (0.25 * (t_s - 1.0)).clamp(0.0, 0.5);
+            at += (set - 2000.0 - at) * PERIOD_S / 0.12;
+            let noise: f64 = StandardNormal.sample(&mut rng);
+            let exact = (2000.0 + at + spec.noise_std_counts * noise).round();
+            if let Some((joint, kind)) = watch.update(&quiet(set), &quiet(word(t_s, exact))) {
+                assert_eq!(joint, JOINT);
+                return (Some((t_s, kind)), watch.has_not_moved(JOINT));
+            }
+        }
+        (None, watch.has_not_moved(JOINT))
+    }
+
+    #[test]
+    fn a_joint_that_does_not_follow_is_told_from_one_that_is_held_up_or_slips() {
+        for seed in 1..=20 {
+            assert_eq!(told(seed, |_, word| word), (None, true), "it has come to rest");
+            let mut last = 0.0;
+            let stuck = told(seed, |t_s, word| {
+                last = if t_s < 0.8 { word } else { last };
+                last
+            });
+            assert!(matches!(stuck.0, Some((at_s, FailedKind::Stuck)) if at_s < 1.3), "{stuck:?}");
+            let dead = told(seed, |t_s, word| if t_s < 0.8 { word } else { 0.0 });
+            assert!(matches!(dead.0, Some((at_s, FailedKind::Dead)) if at_s < 1.2), "{dead:?}");
+            // Locked: noise goes on, and the joint stands.
+            let mut first = None;
+            let locked = told(seed, |t_s, word| {
+                let here = *first.get_or_insert(word);
+                if t_s < 1.0 { word } else { here + (word * 7.0).rem_euclid(3.0) - 1.0 }
+            });
+            assert_eq!(locked, (None, true));
+            // Spikes, and a slip that the controller works off.
+            let spikes = |t_s: f64, word: f64| if (t_s * 100.0) as u32 % 40 < 5 { word + 500.0 } else { word };
+            assert_eq!(told(seed, spikes).0, None);
+            let slip = |t_s: f64, word: f64| if t_s > 1.5 { word + 300.0 * (1.5 - t_s).exp() } else { word };
+            assert_eq!(told(seed, slip).0, None);
+        }
+    }
+
+    #[test]
+    fn a_joint_that_is_stopped_on_its_way_has_moved() {
+        let mut stopped = None;
+        let (failed, has_not_moved) = told(1, |t_s, word| {
+            let noise = (word * 7.0).rem_euclid(5.0) - 2.0;
+            if t_s < 2.0 { word } else { *stopped.get_or_insert(word) + noise }
+        });
+        assert_eq!((failed, has_not_moved), (None, false));
+    }
+}
