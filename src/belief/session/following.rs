@@ -3,7 +3,8 @@
 //! Three failures are told from a contact, which stops a joint that was moving: a word that stays the same to the count
 //! while the set-point leaves (`stuck`: a live sensor is noisy); a word that leapt farther than any joint turns and
 //! stands still there, away from the set-point (`dead`); and a joint that has stood where it was at rest since before
-//! the set-point left (`locked`), which is asked for when a contact is suspected.
+//! the set-point left (`locked`). A joint in cold oil starts late, so that this takes three suspected contacts and a
+//! set-point that has gone far: at the third the joint is probed, and the contact not obeyed until it moves or has not.
 
 use armcal_core::robot::{FailedKind, Robot};
 use armcal_core::sensor::wrap_symmetric;
@@ -21,8 +22,14 @@ const NEAR_RAD: f64 = 0.02;
 const NOISE_SIGMAS: f64 = 10.0;
 /// No joint turns faster than this many times its rate.
 const REACHABLE: f64 = 3.0;
-/// A sensor with less noise may read the same for long, counts.
+/// A sensor with less noise may read the same for long, counts; as may one whose word did not flicker for so many
+/// periods at rest.
 const NOISY_COUNTS: f64 = 1.0;
+const FLICKERS: u32 = 30;
+/// Suspected contacts of a joint that has not moved, after which it is probed.
+const SUSPECTED: u32 = 2;
+/// A joint that has not moved while its set-point went so far, and three times as far as noise does, is locked, rad.
+const DECISIVE_RAD: f64 = 0.1;
 
 /// Follows set-points and words, one pair a control period.
 pub(crate) struct FollowWatch {
@@ -49,6 +56,12 @@ struct JointFollow {
     set_still_s: f64,
     has_leapt: bool,
     has_rested: bool,
+    /// Set-point at that rest.
+    set_at_rest: f64,
+    /// Contacts suspected since.
+    n_suspected: u32,
+    /// Periods at rest in which the word changed.
+    n_flickers: u32,
 }
 
 impl FollowWatch {
@@ -70,6 +83,9 @@ impl FollowWatch {
                 set_still_s: 0.0,
                 has_leapt: false,
                 has_rested: false,
+                set_at_rest: 0.0,
+                n_suspected: 0,
+                n_flickers: 0,
             }
         });
         Self { period_s, joints: joints.collect() }
@@ -86,12 +102,36 @@ impl FollowWatch {
     }
 
     /// Whether `joint` has stood still since it was at rest at its set-point.
+    #[cfg(test)]
     pub(crate) fn has_not_moved(&self, joint: usize) -> bool {
         self.joints[joint].has_rested
+    }
+
+    /// Whether that is because it is locked.
+    pub(crate) fn is_locked(&self, joint: usize) -> bool {
+        self.joints[joint].is_locked()
+    }
+
+    /// Notes that `joint` is suspected to be in contact.
+    pub(crate) fn suspect(&mut self, joint: usize) {
+        let watch = &mut self.joints[joint];
+        watch.n_suspected += u32::from(watch.has_rested);
+    }
+
+    /// Whether `joint` is to go on, contact or not, until it has moved or proves to be locked.
+    pub(crate) fn is_probed(&self, joint: usize) -> bool {
+        let watch = &self.joints[joint];
+        watch.has_rested && watch.n_suspected >= SUSPECTED && !watch.is_locked()
     }
 }
 
 impl JointFollow {
+    fn is_locked(&self) -> bool {
+        let gone_counts =
+            self.last.map_or(0.0, |(set, _)| wrap_symmetric(set - self.set_at_rest, self.wrap_counts).abs());
+        self.has_rested && gone_counts > (DECISIVE_RAD * self.counts_per_rad).max(3.0 * self.rest_counts)
+    }
+
     fn update(&mut self, set: f64, word: f64, period_s: f64) -> Option<FailedKind> {
         let Some((last_set, last_word)) = self.last.replace((set, word)) else {
             (self.set_at_same, self.anchor) = (set, word);
@@ -106,15 +146,19 @@ impl JointFollow {
             if word == last_word { (self.same_s + period_s, self.set_at_same) } else { (0.0, set) };
         self.set_still_s = if set_stands { self.set_still_s + period_s } else { 0.0 };
         if moved_counts > self.rest_counts {
-            (self.anchor, self.still_s, self.has_rested) = (word, 0.0, false);
+            (self.anchor, self.still_s, self.has_rested, self.n_suspected) = (word, 0.0, false, 0);
         }
         self.still_s += period_s;
         self.has_leapt = (self.has_leapt || leap_counts > self.leap_counts) && off_counts > self.leap_counts;
-        self.has_rested |= self.still_s.min(self.set_still_s) > REST_S && off_counts < near_counts;
+        self.n_flickers += u32::from(self.set_still_s > REST_S && word != last_word);
+        if self.still_s.min(self.set_still_s) > REST_S && off_counts < near_counts {
+            (self.has_rested, self.set_at_rest) = (true, set);
+        }
         if self.has_leapt && self.still_s > LEAPT_S {
             return Some(FailedKind::Dead);
         }
-        let is_same = self.noise_counts >= NOISY_COUNTS && self.same_s > SAME_S;
+        let is_noisy = self.noise_counts >= NOISY_COUNTS && self.n_flickers > FLICKERS;
+        let is_same = is_noisy && self.same_s > SAME_S;
         (is_same && left_counts > LEFT_RAD * self.counts_per_rad).then_some(FailedKind::Stuck)
     }
 }

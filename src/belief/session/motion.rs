@@ -202,7 +202,7 @@ impl<'b> Driver<'b> {
         let n_held = self.held.len();
         for joint in 0..believed.len() {
             let off_rad = (self.set_point[joint] - believed[joint]).abs();
-            if is_suspect(joint, off_rad) && !self.is_held(joint) && self.following.has_not_moved(joint) {
+            if is_suspect(joint, off_rad) && !self.is_held(joint) && self.following.is_locked(joint) {
                 self.hold_joint(joint, FailedKind::Locked)?;
             }
         }
@@ -329,6 +329,7 @@ impl<'b> Driver<'b> {
                     self.stop_here()?;
                     return Ok(MotionOutcome::Bumped { joint: bump.joint, at: self.set_point });
                 }
+                self.following.suspect(bump.joint);
                 self.came = path.waypoints[..=n].to_vec();
                 return self.retreat(bump);
             }
@@ -396,6 +397,7 @@ impl<'b> Driver<'b> {
             }
             if heed == ContactMonitoring::Bumps
                 && let Some(bump) = self.bumps.update(&self.set_point, &self.believed_angles()?)
+                && !self.following.is_probed(bump.joint)
             {
                 self.motion_s += k as f64 * self.arm.period_s();
                 return Ok(Some(bump));
@@ -461,7 +463,9 @@ impl<'b> Driver<'b> {
             self.step()?;
             waited_s += self.arm.period_s();
             let now = self.believed_angles()?;
-            if let Some(bump) = self.bumps.update(&self.set_point, &now) {
+            if let Some(bump) = self.bumps.update(&self.set_point, &now)
+                && !self.following.is_probed(bump.joint)
+            {
                 return Ok(Some(SettleOutcome::PushedOff(bump)));
             }
             if stillness.update(&now, &self.set_point, self.arm.period_s()) >= REST_S {
