@@ -36,6 +36,8 @@ impl fmt::Display for Reservation {
             FindingUnit::Metre => (1e3, "mm"),
             FindingUnit::Radian => (1f64.to_degrees(), "deg"),
             FindingUnit::One => (1.0, ""),
+            FindingUnit::RadianPerNewtonMetre => (1e3 * 1f64.to_degrees(), "deg per kN m"),
+            FindingUnit::Newton => (1.0, "N"),
         };
         write!(
             f,

@@ -64,6 +64,33 @@ impl Chain {
         &self.sag
     }
 
+    /// The farthest that sag may bring any point of the arm from where it would be, m: with every link stretched out
+    /// from each joint.
+    #[must_use]
+    pub fn most_sag_m(&self) -> f64 {
+        let tool = &self.loads.tool;
+        let length = |body: usize| match self.joints.get(body) {
+            Some(next) => next.parent_from_joint.translation.vector.norm(),
+            None => tool.link_from_frame.translation.vector.norm(),
+        };
+        let (mut reach_m, mut most_nm, mut weight_n, mut most_m) = (0.0, 0.0, 0.0, 0.0);
+        for body in (0..=self.joints.len()).rev() {
+            // Of what hangs behind the body's far end, carried by its near end.
+            let load = &self.loads.links[body];
+            let tool_n = if body == tool.n_joints { self.sag.tool_load_n.abs() } else { 0.0 };
+            weight_n += tool_n;
+            most_nm += weight_n * length(body) + load.moment_nm.norm();
+            weight_n += load.weight_n.abs();
+            reach_m += length(body);
+            let compliance = match body.checked_sub(1) {
+                Some(joint) => self.sag.joint_rad_per_nm[joint].abs(),
+                None => self.sag.mount_rad_per_nm.iter().fold(0.0, |most: f64, by| most.max(by.abs())),
+            };
+            most_m += compliance * most_nm * reach_m;
+        }
+        most_m
+    }
+
     /// The joints, base first.
     #[inline]
     #[must_use]

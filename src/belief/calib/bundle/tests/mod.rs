@@ -8,6 +8,7 @@ mod equations;
 mod failures;
 mod moved_tags;
 mod reservations;
+mod sag;
 mod score_test;
 mod slips;
 mod small_samples;
