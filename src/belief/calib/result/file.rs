@@ -116,7 +116,8 @@ impl Calibration {
             let link = self.link.iter().find(|link| link.joint == joint.name);
             *correction = link.map(LinkResult::correction).unwrap_or_default();
         }
-        corrections.sag = self.sag.as_ref().map(|sag| sag.sag(&self.joint)).unwrap_or_default();
+        let names = self.joint.iter().map(|joint| joint.name.as_str());
+        corrections.sag = self.sag.as_ref().map(|sag| sag.sag(names)).unwrap_or_default();
         corrections
     }
 

@@ -6,7 +6,6 @@ use serde::{Deserialize, Serialize};
 
 use crate::calib::covariance::ParameterCovariance;
 use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
-use crate::calib::result::calibration::JointResult;
 use armcal_core::kinematics::Sag;
 use armcal_core::robot::{FileIssue, Robot};
 
@@ -57,11 +56,12 @@ impl SagTable {
         })
     }
 
-    pub(crate) fn sag(&self, joints: &[JointResult]) -> Sag {
+    /// Of the arm whose joints have these names, base first.
+    pub(crate) fn sag<'a>(&self, joints: impl Iterator<Item = &'a str>) -> Sag {
         let (mount_rad_per_nm, tool_load_n) = (self.mount_rad_per_nm, self.tool_load_n);
         let mut sag = Sag { mount_rad_per_nm, tool_load_n, ..Sag::default() };
         for (rad_per_nm, joint) in sag.joint_rad_per_nm.iter_mut().zip(joints) {
-            let known = self.joint.iter().find(|known| known.joint == joint.name);
+            let known = self.joint.iter().find(|known| known.joint == joint);
             *rad_per_nm = known.map_or(0.0, |known| known.rad_per_nm);
         }
         sag

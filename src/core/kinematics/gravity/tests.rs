@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::*;
 use crate::joints::JointAngles;
-use crate::kinematics::LinkCorrections;
+use crate::kinematics::{Chain, IkGoal, IkSettings, JointLimits, LinkCorrections, solve_position};
 use crate::robot::{Robot, load};
 use rand::RngExt;
 
@@ -122,5 +122,34 @@ fn an_arm_bends_by_its_compliances_and_no_other_way() {
         assert!((moved - foretold).norm() < 0.01 * moved.norm() + 1e-9, "{moved} for {foretold}");
         // Downwards: what gives, gives way to the weight.
         assert!(moved.z < 1e-6, "{moved}");
+    }
+}
+
+/// The tool comes to its target though the arm bends on its way there.
+#[test]
+fn a_bending_arm_reaches_its_targets() {
+    let robot = titan();
+    let mut sag = Sag { tool_load_n: 300.0, mount_rad_per_nm: [1e-5; 3], ..Sag::default() };
+    sag.joint_rad_per_nm[..5].fill(2e-5);
+    let bent = robot.chain.corrected(&LinkCorrections { sag, ..LinkCorrections::default() });
+    let limit = |j: usize| JointLimits {
+        lower_rad: robot.sensors[j].center_rad - robot.sensors[j].half_range_rad,
+        upper_rad: robot.sensors[j].center_rad + robot.sensors[j].half_range_rad,
+    };
+    let settings = IkSettings {
+        limits: (0..robot.n_joints()).map(limit).collect(),
+        locked: vec![false; robot.n_joints()],
+        tolerance_m: 1e-6,
+        max_iterations: 200,
+    };
+    for seed in drawn_angles(&robot, "targets") {
+        let tool = |chain: &Chain, at: &JointAngles| chain.frame(at, &robot.tool.mount).translation.vector;
+        let goal = IkGoal { position_m: tool(&robot.chain, &seed) };
+        let sag_m = (tool(&bent, &seed) - goal.position_m).norm();
+        assert!(sag_m < bent.most_sag_m(), "{sag_m} m, at most {} m", bent.most_sag_m());
+        let Ok(found) = solve_position(&bent, &robot.tool.mount, &goal, &seed, &settings) else {
+            panic!("{seed:?} is {sag_m} m off and stays so");
+        };
+        assert!((tool(&bent, &found) - goal.position_m).norm() < 1e-6);
     }
 }

@@ -78,7 +78,7 @@ fn sorted(values: &[f64]) -> Vec<f64> {
     values
 }
 
-pub(super) fn median(values: &[f64]) -> f64 {
+fn median(values: &[f64]) -> f64 {
     quantile(values, 0.5).expect("values")
 }
 
