@@ -97,8 +97,8 @@ impl ArmLoads {
 
     fn torques_by(&self, poses: &LinkPoses, (moments, base): &Moments) -> AboutAxes {
         let mut torques = AboutAxes { base: self.up.cross(base), ..Default::default() };
-        for joint in 0..poses.n_joints() {
-            torques.joints[joint] = poses.axis(joint).dot(&self.up.cross(&moments[joint]));
+        for (joint, moment) in moments.iter().enumerate().take(poses.n_joints()) {
+            torques.joints[joint] = poses.axis(joint).dot(&self.up.cross(moment));
         }
         torques
     }

@@ -114,7 +114,6 @@ pub fn load_without_pairs(folder: &Path) -> Result<Robot, RobotError> {
     }
     let geometry = raw.geometry.check(&file)?;
     let buoyancy_fraction = FileIssue::check_range(&file, "buoyancy_fraction", raw.buoyancy_fraction, 0.0..=0.95)?;
-    let chain = chain.with_loads(loads(&geometry, &bodies, buoyancy_fraction, tool));
     Ok(Robot {
         failed: Vec::new(),
         name: raw.name,
@@ -128,7 +127,7 @@ pub fn load_without_pairs(folder: &Path) -> Result<Robot, RobotError> {
         gripper,
         gripper_tag,
         base_tag: raw.base_tag,
-        chain,
+        chain: chain.with_loads(loads(&geometry, &bodies, buoyancy_fraction, tool)),
         bodies,
         self_pairs: None,
         sensors,
