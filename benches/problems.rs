@@ -85,6 +85,7 @@ fn model(robot: &Robot) -> Model {
     Model {
         joints: (0..robot.n_joints()).map(kinds).collect(),
         n_links: 0,
+        n_compliant: 0,
         mount: true,
         lens: false,
         tags: true,

@@ -42,6 +42,9 @@ pub enum FindingKind {
     Lens,
     /// A link's length or twist against the drawing.
     Link,
+    /// A joint or the base's mount that gives under the arm's weight, or a load at the tool: the size is its compliance
+    /// or the load.
+    Sag,
     /// The camera's mount against the drawing, beyond its prior.
     CameraMount,
     /// The base against the survey, or all tags together.
@@ -74,4 +77,10 @@ pub enum FindingUnit {
     /// Counts.
     #[serde(rename = "1")]
     One,
+    /// Compliances.
+    #[serde(rename = "rad/(N m)")]
+    RadianPerNewtonMetre,
+    /// Loads.
+    #[serde(rename = "N")]
+    Newton,
 }

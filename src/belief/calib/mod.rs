@@ -7,6 +7,7 @@
 
 mod angles_by_camera;
 mod baseline_comparison;
+mod body_motion;
 pub mod bundle;
 mod calibrate;
 mod covariance;
@@ -45,9 +46,10 @@ pub use refusal_conditions::{MIN_HELD_OUT_VIEWS, MIN_VIEWS_PER_PARAMETER, fewest
 pub use reservation::Reservation;
 pub use result::{
     Calibration, CalibrationFileError, CalibrationFiles, CameraMount, Check, CompactCalibration, CompactError,
-    CompactJoint, CovarianceTable, FailedJointTable, FitMetrics, HeldOutMetrics, JointResult, LinkResult, LookupTable,
-    MAX_COMPACT_BYTES, MapResult, MapTag, ModelTable, ObservabilityTable, PredictedToolError, PriorTable,
-    ReferenceTable, Status, SurveyCoverage, TermsTable, ValidRange, VerdictTable, covariance_file,
+    CompactJoint, CovarianceTable, FailedJointTable, FitMetrics, HeldOutMetrics, JointCompliance, JointResult,
+    LinkResult, LookupTable, MAX_COMPACT_BYTES, MapResult, MapTag, ModelTable, ObservabilityTable, PredictedToolError,
+    PriorTable, ReferenceTable, SagTable, Status, SurveyCoverage, TermsTable, ValidRange, VerdictTable,
+    covariance_file,
 };
 pub use views::{
     CalibrationData, CaptureData, ConditionHistory, EndStopReading, ExternalContext, HeldOut, IdentifiedScale,

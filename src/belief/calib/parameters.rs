@@ -54,6 +54,9 @@ impl JointParameters {
             ParameterKind::StepBefore(_) => 0.0,
             ParameterKind::LinkShift(axis) => self.links[parameter.joint].shift_m[usize::from(axis)],
             ParameterKind::LinkTurn(axis) => self.links[parameter.joint].turn_rad[usize::from(axis)],
+            ParameterKind::Compliance => self.links.sag.joint_rad_per_nm[parameter.joint],
+            ParameterKind::MountCompliance(axis) => self.links.sag.mount_rad_per_nm[usize::from(axis)],
+            ParameterKind::ToolLoad => self.links.sag.tool_load_n,
         }
     }
 
@@ -71,6 +74,9 @@ impl JointParameters {
             ParameterKind::StepBefore(_) => {}
             ParameterKind::LinkShift(axis) => self.links[parameter.joint].shift_m[usize::from(axis)] = value,
             ParameterKind::LinkTurn(axis) => self.links[parameter.joint].turn_rad[usize::from(axis)] = value,
+            ParameterKind::Compliance => self.links.sag.joint_rad_per_nm[parameter.joint] = value,
+            ParameterKind::MountCompliance(axis) => self.links.sag.mount_rad_per_nm[usize::from(axis)] = value,
+            ParameterKind::ToolLoad => self.links.sag.tool_load_n = value,
         }
     }
 
@@ -132,6 +138,12 @@ pub enum ParameterKind {
     LinkShift(u8),
     /// Of the joint's attitude about an axis of its parent link, rad.
     LinkTurn(u8),
+    /// Of the joint's angle behind its sensor by the torque of weight, rad/(N m).
+    Compliance,
+    /// Of the base's turn about one of its axes by the torque of weight, rad/(N m); of joint 0 alone.
+    MountCompliance(u8),
+    /// Weight at the tool that the drawing does not have, N; of joint 0 alone.
+    ToolLoad,
 }
 
 impl ParameterKind {
@@ -147,15 +159,16 @@ impl ParameterKind {
         (0..3).map(Self::LinkShift).chain((0..3).map(Self::LinkTurn))
     }
 
-    /// All of a joint: its sensor's, then its link's.
-    pub fn all_of_joint() -> impl Iterator<Item = Self> {
-        Self::all().chain(Self::all_of_link())
-    }
-
-    /// Whether it is of the link's geometry, not of a sensor.
+    /// Whether it is of the link's geometry or of how the arm bends, not of a sensor.
     #[must_use]
     pub fn is_of_link(self) -> bool {
-        matches!(self, Self::LinkShift(_) | Self::LinkTurn(_))
+        matches!(self, Self::LinkShift(_) | Self::LinkTurn(_)) || self.is_of_sag()
+    }
+
+    /// Whether it is of how the arm bends under its weight.
+    #[must_use]
+    pub fn is_of_sag(self) -> bool {
+        matches!(self, Self::Compliance | Self::MountCompliance(_) | Self::ToolLoad)
     }
 
     /// d(angle)/d(parameter) at `travel_rad`, in rad per the parameter's unit.
@@ -178,6 +191,7 @@ impl ParameterKind {
             Self::HalfBacklash => approach,
             Self::StepBefore(_) => 0.0,
             Self::LinkShift(_) | Self::LinkTurn(_) => 0.0,
+            Self::Compliance | Self::MountCompliance(_) | Self::ToolLoad => 0.0,
         }
     }
 }
@@ -194,6 +208,20 @@ pub struct Parameter {
 }
 
 impl Parameter {
+    /// All that a calibration may hold of an arm of `n_joints`: joint by joint its sensor's and its link's, then sag's.
+    pub fn all(n_joints: usize) -> impl Iterator<Item = Self> {
+        let of_joint = || ParameterKind::all().chain(ParameterKind::all_of_link());
+        let of_joints = (0..n_joints).flat_map(move |joint| of_joint().map(move |kind| Self { joint, kind }));
+        of_joints.chain(Self::all_of_sag(n_joints))
+    }
+
+    /// All of how an arm bends whose first `n_joints` give.
+    pub fn all_of_sag(n_joints: usize) -> impl Iterator<Item = Self> {
+        let of_arm = (0..3).map(ParameterKind::MountCompliance).chain([ParameterKind::ToolLoad]);
+        let of_joints = (0..n_joints).map(|joint| Self { joint, kind: ParameterKind::Compliance });
+        of_joints.chain(of_arm.map(|kind| Self { joint: 0, kind }))
+    }
+
     /// One sigma of the datasheet's prior, in the parameter's unit; zero for terms that the datasheet does not know.
     #[must_use]
     pub fn prior_std(self, robot: &Robot) -> f64 {
@@ -231,6 +259,9 @@ impl Parameter {
             ParameterKind::LinkTurn(axis) => {
                 return format!("{} place r{}", robot.sensors[self.joint].joint, AXES[usize::from(axis)]);
             }
+            ParameterKind::Compliance => "compliance",
+            ParameterKind::MountCompliance(axis) => return format!("mount compliance r{}", AXES[usize::from(axis)]),
+            ParameterKind::ToolLoad => return "load at the tool".to_owned(),
         };
         format!("{} {kind}", robot.sensors[self.joint].joint)
     }

@@ -40,6 +40,8 @@ impl fmt::Display for Reservation {
             FindingUnit::Metre => (1e3, "mm"),
             FindingUnit::Radian => (1f64.to_degrees(), "deg"),
             FindingUnit::One => (1e2, "%"),
+            FindingUnit::RadianPerNewtonMetre => (1e3 * 1f64.to_degrees(), "deg per kN m"),
+            FindingUnit::Newton => (1.0, "N"),
         };
         let list = |factor: f64| all_m.iter().map(|m| format!("{:.1}", factor * m)).collect::<Vec<_>>().join(", ");
         write!(

@@ -83,7 +83,7 @@ impl ParameterCovariance {
             }
         }
         for (column, parameter) in self.parameters.iter().enumerate() {
-            if let Some((moved, turned)) = at.by_link(*parameter) {
+            if let Some([moved, turned]) = at.by_body(*parameter) {
                 estimated.fixed_view_mut::<R, 1>(0, column).copy_from(&of_twist(moved, turned));
             }
         }
@@ -124,19 +124,9 @@ impl<'a> Posture<'a> {
         Self { robot, sensors, angles, departure: conditions.departure_from(&sensors.reference), poses, tool_m }
     }
 
-    /// The tool's motion by a parameter of link geometry; `None` for others.
-    fn by_link(&self, parameter: Parameter) -> Option<(Vector3<f64>, Vector3<f64>)> {
-        let joint = parameter.joint;
-        let along = |axis: u8| self.poses.link(joint).rotation * Vector3::ith(usize::from(axis), 1.0);
-        match parameter.kind {
-            _ if joint >= self.robot.tool.mount.n_joints => None,
-            ParameterKind::LinkShift(axis) => Some((along(axis), Vector3::zeros())),
-            ParameterKind::LinkTurn(axis) => {
-                let turned = along(axis);
-                Some((turned.cross(&(self.tool_m - self.poses.joint_origin(joint))), turned))
-            }
-            _ => None,
-        }
+    /// The tool's motion by a parameter of the arm's body; `None` for others.
+    fn by_body(&self, parameter: Parameter) -> Option<[Vector3<f64>; 2]> {
+        parameter.body_motion(&self.robot.chain, &self.poses, 0..self.robot.tool.mount.n_joints, &self.tool_m)
     }
 }
 

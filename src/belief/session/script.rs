@@ -8,6 +8,7 @@ use crate::session::motion::{Driver, MotionOutcome};
 use crate::session::outcome::{AssertResult, Epoch, Outcome, ReachStep};
 use crate::session::runner::{FreshBounds, Jaws, ScriptRunner, Tally};
 use crate::session::{Progress, Recorder, SessionError};
+use armcal_core::kinematics::LinkCorrection;
 use armcal_core::routine::{AssertFigure, AssertLimits, CalibrateSettings, CalibrateViews, MoveGoal, OnRefusal, Step};
 use armcal_core::sensor::ArmSensors;
 use armcal_core::stats::stream_rng;
@@ -85,8 +86,9 @@ impl ScriptRunner<'_, '_> {
     /// follow.
     pub fn margin_m(&self) -> f64 {
         let links = self.epochs.last().map(Epoch::links).unwrap_or_default();
-        let by_links_m: f64 = links.iter().map(|link| link.shift_m.norm() + LINK_REACH_M * link.turn_rad.norm()).sum();
-        self.setup.routine.capture.clearance_m + by_links_m
+        let by_link = |link: &LinkCorrection| link.shift_m.norm() + LINK_REACH_M * link.turn_rad.norm();
+        let by_links_m: f64 = links.places.iter().map(by_link).sum();
+        self.setup.routine.capture.clearance_m + by_links_m + self.robot.chain.most_sag_m()
     }
 
     /// Whether the arm believes in a calibration.

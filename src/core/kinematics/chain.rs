@@ -1,9 +1,11 @@
 //! The chain and its forward kinematics.
 
-use nalgebra::{Isometry3, Unit, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
 
 use crate::joints::{JointAngles, MAX_JOINTS};
+use crate::kinematics::gravity::{AboutAxes, ArmLoads, Sag};
 use crate::kinematics::link_correction::LinkCorrections;
+use crate::kinematics::link_poses::{Attachment, LinkPoses};
 
 /// Joint range, rad.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,35 +39,64 @@ pub struct ChainJoint {
     pub limits: Option<JointLimits>,
 }
 
-/// A frame fixed to the link behind the first `n_joints` joints (0: the base).
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Attachment {
-    /// Number of joints proximal to the link.
-    pub n_joints: usize,
-    /// Pose of the frame in the link's frame.
-    pub link_from_frame: Isometry3<f64>,
-}
-
 /// A serial chain of revolute joints, base first.
 #[derive(Clone, Debug)]
 pub struct Chain {
     joints: Vec<ChainJoint>,
-}
-
-/// `base_from_link` for the base (index 0) and each joint's child link.
-#[derive(Clone, Copy, Debug)]
-pub struct LinkPoses {
-    n_joints: usize,
-    base_from_link: [Isometry3<f64>; MAX_JOINTS + 1],
-    /// Unit axes of the joints in the base frame.
-    axes: [Vector3<f64>; MAX_JOINTS],
+    loads: ArmLoads,
+    sag: Sag,
 }
 
 impl Chain {
     /// A chain of these joints, base first; at most `MAX_JOINTS`.
     pub fn new(joints: Vec<ChainJoint>) -> Self {
         assert!(joints.len() <= MAX_JOINTS, "readers of files check the number of joints");
-        Self { joints }
+        Self { joints, loads: ArmLoads::default(), sag: Sag::default() }
+    }
+
+    /// The same chain with these loads.
+    #[must_use]
+    pub fn with_loads(self, loads: ArmLoads) -> Self {
+        Self { loads, ..self }
+    }
+
+    /// What it carries.
+    #[must_use]
+    pub fn loads(&self) -> &ArmLoads {
+        &self.loads
+    }
+
+    /// How much it gives.
+    #[must_use]
+    pub fn sag(&self) -> &Sag {
+        &self.sag
+    }
+
+    /// The farthest that sag may bring any point of the arm from where it would be, m: with every link stretched out
+    /// from each joint.
+    #[must_use]
+    pub fn most_sag_m(&self) -> f64 {
+        let tool = &self.loads.tool;
+        let length = |body: usize| match self.joints.get(body) {
+            Some(next) => next.parent_from_joint.translation.vector.norm(),
+            None => tool.link_from_frame.translation.vector.norm(),
+        };
+        let (mut reach_m, mut most_nm, mut weight_n, mut most_m) = (0.0, 0.0, 0.0, 0.0);
+        for body in (0..=self.joints.len()).rev() {
+            // Of what hangs behind the body's far end, carried by its near end.
+            let load = &self.loads.links[body];
+            let tool_n = if body == tool.n_joints { self.sag.tool_load_n.abs() } else { 0.0 };
+            weight_n += tool_n;
+            most_nm += weight_n * length(body) + load.moment_nm.norm();
+            weight_n += load.weight_n.abs();
+            reach_m += length(body);
+            let compliance = match body.checked_sub(1) {
+                Some(joint) => self.sag.joint_rad_per_nm[joint].abs(),
+                None => self.sag.mount_rad_per_nm.iter().fold(0.0, |most: f64, by| most.max(by.abs())),
+            };
+            most_m += compliance * most_nm * reach_m;
+        }
+        most_m
     }
 
     /// The joints, base first.
@@ -82,26 +113,43 @@ impl Chain {
         self.joints.len()
     }
 
-    /// Poses of all links at `angles` (rad).
+    /// Poses of all links at `angles` by the sensors (rad).
     #[must_use]
     pub fn link_poses(&self, angles: &JointAngles) -> LinkPoses {
-        self.link_poses_by(angles, |_, joint| joint.parent_from_joint)
+        self.bent_poses(angles, &self.sag, |_, joint| joint.parent_from_joint)
     }
 
-    /// The same for the arm with `corrections` of its drawing.
+    /// The same for the arm with `corrections` of its drawing, its own sag aside.
     #[must_use]
     pub fn corrected_link_poses(&self, angles: &JointAngles, corrections: &LinkCorrections) -> LinkPoses {
-        self.link_poses_by(angles, |i, joint| corrections[i].applied_to(&joint.parent_from_joint))
+        self.bent_poses(angles, &corrections.sag, |i, joint| corrections[i].applied_to(&joint.parent_from_joint))
     }
 
     /// The chain with `corrections` of its drawing.
     #[must_use]
     pub fn corrected(&self, corrections: &LinkCorrections) -> Self {
-        let mut joints = self.joints.clone();
-        for (joint, correction) in joints.iter_mut().zip(corrections) {
+        let mut corrected = Self { sag: corrections.sag, ..self.clone() };
+        for (joint, correction) in corrected.joints.iter_mut().zip(&corrections.places) {
             joint.parent_from_joint = correction.applied_to(&joint.parent_from_joint);
         }
-        Self { joints }
+        corrected
+    }
+
+    #[inline]
+    fn bent_poses(
+        &self,
+        angles: &JointAngles,
+        sag: &Sag,
+        parent_from_joint: impl Fn(usize, &ChainJoint) -> Isometry3<f64>,
+    ) -> LinkPoses {
+        let straight = self.link_poses_by(angles, &Isometry3::identity(), &parent_from_joint);
+        if sag.is_rigid() {
+            return straight;
+        }
+        let bend: AboutAxes = sag.bend(&self.loads.torques(&straight, sag.tool_load_n));
+        let bent = JointAngles::from_fn(angles.len(), |joint| angles[joint] + bend.joints[joint]);
+        let base = Isometry3::from_parts(Translation3::identity(), bend.base_turn());
+        self.link_poses_by(&bent, &base, &parent_from_joint)
     }
 
     /// The chain whose joint number `joint` has the range of one angle, `angle_rad`.
@@ -109,19 +157,20 @@ impl Chain {
     pub fn locked(&self, joint: usize, angle_rad: f64) -> Self {
         let mut joints = self.joints.clone();
         joints[joint].limits = Some(JointLimits { lower_rad: angle_rad, upper_rad: angle_rad });
-        Self { joints }
+        Self { joints, ..self.clone() }
     }
 
     #[inline]
     fn link_poses_by(
         &self,
         angles: &JointAngles,
-        parent_from_joint: impl Fn(usize, &ChainJoint) -> Isometry3<f64>,
+        base: &Isometry3<f64>,
+        parent_from_joint: &impl Fn(usize, &ChainJoint) -> Isometry3<f64>,
     ) -> LinkPoses {
         debug_assert_eq!(angles.len(), self.joints.len());
         let mut poses = LinkPoses {
             n_joints: self.joints.len(),
-            base_from_link: [Isometry3::identity(); MAX_JOINTS + 1],
+            base_from_link: [*base; MAX_JOINTS + 1],
             axes: [Vector3::zeros(); MAX_JOINTS],
         };
         for (i, (joint, &angle_rad)) in self.joints.iter().zip(angles.iter()).enumerate() {
@@ -137,6 +186,9 @@ impl Chain {
     #[inline]
     #[must_use]
     pub fn frame(&self, angles: &JointAngles, attachment: &Attachment) -> Isometry3<f64> {
+        if !self.sag.is_rigid() {
+            return self.link_poses(angles).frame(attachment);
+        }
         let mut base_from_link = Isometry3::identity();
         for (joint, &angle_rad) in self.joints[..attachment.n_joints].iter().zip(angles.iter()) {
             let turn = UnitQuaternion::from_axis_angle(&joint.axis, angle_rad);
@@ -146,48 +198,9 @@ impl Chain {
     }
 }
 
-impl LinkPoses {
-    /// `base_from_link` of the base (0) or of the child link of joint `body - 1`.
-    #[inline]
-    #[must_use]
-    pub fn link(&self, body: usize) -> &Isometry3<f64> {
-        &self.base_from_link[..=self.n_joints][body]
-    }
-
-    /// The pose of an attached frame in the base frame; the caller names it.
-    #[inline]
-    #[must_use]
-    pub fn frame(&self, attachment: &Attachment) -> Isometry3<f64> {
-        self.link(attachment.n_joints) * attachment.link_from_frame
-    }
-
-    /// Axis of joint `joint` in the base frame, unit.
-    #[inline]
-    #[must_use]
-    pub fn axis(&self, joint: usize) -> &Vector3<f64> {
-        &self.axes[..self.n_joints][joint]
-    }
-
-    /// Origin of joint `joint` in the base frame, m.
-    #[inline]
-    #[must_use]
-    pub fn joint_origin(&self, joint: usize) -> &Vector3<f64> {
-        // A joint's rotation leaves its own origin where it is, so the child link's origin serves.
-        &self.base_from_link[joint + 1].translation.vector
-    }
-
-    /// d(point)/d(angle of `joint`), m/rad, for a point (base frame) carried by that joint: `axis x (point - origin)`.
-    #[inline]
-    #[must_use]
-    pub fn point_jacobian(&self, joint: usize, point_m: &Vector3<f64>) -> Vector3<f64> {
-        self.axis(joint).cross(&(point_m - self.joint_origin(joint)))
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::Translation3;
     use rand::RngExt;
 
     #[test]

@@ -5,7 +5,8 @@
 
 use nalgebra::{DMatrix, Vector3};
 
-use super::chain::{Attachment, Chain, JointLimits};
+use super::chain::{Chain, JointLimits};
+use super::link_poses::Attachment;
 use crate::joints::{JointAngles, MAX_JOINTS};
 use crate::numeric::{Damping, LeastSquares, Proposal, Stop, StopRule, minimize};
 

@@ -1,8 +1,11 @@
-//! Where joints sit on their parent links beyond what the drawing says.
+//! Where joints sit on their parent links beyond what the drawing says, and how the arm bends.
+
+use std::ops::{Index, IndexMut};
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use crate::joints::MAX_JOINTS;
+use crate::kinematics::gravity::Sag;
 
 /// What is to be added to one joint's place in its parent link, along and about the parent link's axes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -13,8 +16,29 @@ pub struct LinkCorrection {
     pub turn_rad: Vector3<f64>,
 }
 
-/// Of every joint, base first.
-pub type LinkCorrections = [LinkCorrection; MAX_JOINTS];
+/// What a whole arm is beyond its drawing; indexed by joint.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct LinkCorrections {
+    /// Of every joint, base first.
+    pub places: [LinkCorrection; MAX_JOINTS],
+    /// How it bends under its weight.
+    pub sag: Sag,
+}
+
+impl Index<usize> for LinkCorrections {
+    type Output = LinkCorrection;
+
+    #[inline]
+    fn index(&self, joint: usize) -> &LinkCorrection {
+        &self.places[joint]
+    }
+}
+
+impl IndexMut<usize> for LinkCorrections {
+    fn index_mut(&mut self, joint: usize) -> &mut LinkCorrection {
+        &mut self.places[joint]
+    }
+}
 
 impl LinkCorrection {
     /// The corrected `parent_from_joint`.

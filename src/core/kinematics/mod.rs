@@ -1,12 +1,16 @@
 //! Forward kinematics, Jacobians and inverse kinematics of a serial chain, from the URDF's figures.
 //!
-//! Pure geometry: no sensors, no masses. Angles in, poses in the base frame out. Nothing here allocates; the chain
-//! holds at most `MAX_JOINTS` joints. Oracle: Pinocchio (tests/oracle).
+//! No sensors; masses only where the arm bends under them (`gravity`). Angles in, poses in the base frame out. Nothing
+//! here allocates; the chain holds at most `MAX_JOINTS` joints. Oracle: Pinocchio (tests/oracle).
 
 mod chain;
+mod gravity;
 mod inverse;
 mod link_correction;
+mod link_poses;
 
-pub use chain::{Attachment, Chain, ChainJoint, JointLimits, LinkPoses};
+pub use chain::{Chain, ChainJoint, JointLimits};
+pub use gravity::{AboutAxes, ArmLoads, LinkLoad, Sag};
 pub use inverse::{IkError, IkGoal, IkSettings, solve_position};
 pub use link_correction::{LinkCorrection, LinkCorrections};
+pub use link_poses::{Attachment, LinkPoses};

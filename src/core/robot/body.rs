@@ -3,6 +3,10 @@
 use nalgebra::{Isometry3, Matrix3, Vector3};
 
 use super::shape::PlacedShape;
+use crate::kinematics::LinkLoad;
+
+/// Assumed: the standard's.
+const GRAVITY_M_S2: f64 = 9.80665;
 
 /// Mass and shapes of everything that moves with one joint, fixed children included, in that joint's link frame.
 #[derive(Clone, Debug)]
@@ -45,5 +49,27 @@ impl LinkBody {
         self.inertia_kg_m2 += part + shift(com - new_com, mass_kg);
         self.com_m = new_com;
         self.mass_kg = total;
+    }
+
+    /// Centre of the collision shapes' volume in the link's frame, where buoyancy acts; every shape is symmetric about
+    /// its own centre. `None` without a shape.
+    #[must_use]
+    pub fn volume_centroid_m(&self) -> Option<Vector3<f64>> {
+        let mut moment = Vector3::zeros();
+        let mut volume = 0.0;
+        for placed in &self.collisions {
+            let v = placed.shape.to_parry().mass_properties(1.0).mass();
+            moment += v * placed.owner_from_shape.translation.vector;
+            volume += v;
+        }
+        (volume > 0.0).then(|| moment / volume)
+    }
+
+    /// Weight less buoyancy, where the water carries `buoyancy_fraction` of the weight.
+    pub(super) fn load(&self, buoyancy_fraction: f64) -> LinkLoad {
+        let weight_n = GRAVITY_M_S2 * self.mass_kg;
+        let buoyancy_n = buoyancy_fraction * weight_n;
+        let centroid_m = self.volume_centroid_m().unwrap_or(self.com_m);
+        LinkLoad { weight_n: weight_n - buoyancy_n, moment_nm: self.com_m * weight_n - centroid_m * buoyancy_n }
     }
 }

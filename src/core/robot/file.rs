@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Vector3};
 use serde::Deserialize;
 
 use super::body::LinkBody;
@@ -18,6 +18,7 @@ use super::self_collision;
 use super::shape::{PlacedShape, Shape};
 use super::survey::{TagFile, check_tags};
 use super::urdf::{UrdfChain, UrdfModel};
+use crate::kinematics::{ArmLoads, Attachment};
 use crate::spatial::{Base, Pose};
 
 #[derive(Deserialize)]
@@ -111,6 +112,8 @@ pub fn load_without_pairs(folder: &Path) -> Result<Robot, RobotError> {
     if let Some(tag) = &gripper_tag {
         tag.check_id(&file, &tags)?;
     }
+    let geometry = raw.geometry.check(&file)?;
+    let buoyancy_fraction = FileIssue::check_range(&file, "buoyancy_fraction", raw.buoyancy_fraction, 0.0..=0.95)?;
     Ok(Robot {
         failed: Vec::new(),
         name: raw.name,
@@ -119,20 +122,28 @@ pub fn load_without_pairs(folder: &Path) -> Result<Robot, RobotError> {
         urdf_text: urdf.text,
         base_link: raw.base_link,
         stowed,
-        buoyancy_fraction: FileIssue::check_range(&file, "buoyancy_fraction", raw.buoyancy_fraction, 0.0..=0.95)?,
+        buoyancy_fraction,
         tool: ToolSpec { mount: tool, tip_radius_m: raw.tool.tip_radius_m },
         gripper,
         gripper_tag,
         base_tag: raw.base_tag,
-        chain,
+        chain: chain.with_loads(loads(&geometry, &bodies, buoyancy_fraction, tool)),
         bodies,
         self_pairs: None,
         sensors,
         drive,
-        geometry: raw.geometry.check(&file)?,
+        geometry,
         camera,
         tags,
     })
+}
+
+fn loads(geometry: &GeometryPriors, bodies: &[LinkBody], buoyancy_fraction: f64, tool: Attachment) -> ArmLoads {
+    let mut loads = ArmLoads { up: Vector3::from(geometry.up).normalize(), tool, ..ArmLoads::default() };
+    for (load, body) in loads.links.iter_mut().zip(bodies) {
+        *load = body.load(buoyancy_fraction);
+    }
+    loads
 }
 
 /// The ball about the tool point, the last of its link's shapes.

@@ -80,7 +80,7 @@ impl Body {
             mass_kg: link.mass_kg,
             com_m: link.com_m,
             displaced_kg: if is_wet { water.buoyancy_fraction * link.mass_kg } else { 0.0 },
-            center_of_buoyancy_m: volume_centroid(&link.collisions).unwrap_or(link.com_m),
+            center_of_buoyancy_m: link.volume_centroid_m().unwrap_or(link.com_m),
             rigid: Inertia::rigid(link.mass_kg, &link.com_m, &link.inertia_kg_m2),
             added,
             surfaces: link.collisions.iter().map(|placed| Surface::of(placed, water)).collect(),
@@ -190,18 +190,6 @@ impl Surface {
             factors: areas * (0.5 * water.density_kg_m3 * water.drag_coefficient / 3.0),
         }
     }
-}
-
-/// Centre of the shapes' volume in the owner's frame; every shape is symmetric about its own centre.
-fn volume_centroid(shapes: &[PlacedShape]) -> Option<Vector3<f64>> {
-    let mut moment = Vector3::zeros();
-    let mut volume = 0.0;
-    for placed in shapes {
-        let v = placed.shape.to_parry().mass_properties(1.0).mass();
-        moment += v * placed.owner_from_shape.translation.vector;
-        volume += v;
-    }
-    (volume > 0.0).then(|| moment / volume)
 }
 
 /// Added mass of a shape in its owner's frame. A sphere's is half the displaced mass. Another shape's across each axis

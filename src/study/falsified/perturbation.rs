@@ -245,7 +245,7 @@ fn turned_in_place(place: &Isometry3<f64>, by: &Vector3<f64>) -> Isometry3<f64> 
 fn change_joint(robot: &mut Robot, joint: usize, change: impl Fn(Isometry3<f64>) -> Isometry3<f64>) {
     let mut joints: Vec<ChainJoint> = robot.chain.joints().to_vec();
     joints[joint].parent_from_joint = change(joints[joint].parent_from_joint);
-    robot.chain = Chain::new(joints);
+    robot.chain = Chain::new(joints).with_loads(*robot.chain.loads());
 }
 
 fn change_tag(robot: &mut Robot, tag: usize, change: impl Fn(Isometry3<f64>) -> Isometry3<f64>) {

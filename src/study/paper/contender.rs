@@ -96,6 +96,7 @@ fn bundle(draw: &Draw, guess: &JointParameters) -> Solution {
     let model = Model {
         joints: (0..draw.robot.n_joints()).map(kinds).collect(),
         n_links: 0,
+        n_compliant: 0,
         mount: false,
         lens: false,
         tags: false,

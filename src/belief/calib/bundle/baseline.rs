@@ -46,6 +46,7 @@ impl Baseline {
         let model = Model {
             joints: vec![Vec::new(); robot.n_joints()],
             n_links: 0,
+            n_compliant: 0,
             mount: robot.camera.mount_std_m > 0.0 || robot.camera.mount_std_rad > 0.0,
             lens: false,
             tags: true,

@@ -125,7 +125,11 @@ impl CalibrationPrior {
                 scales.joint_std_rad[parameter.joint] = std_rad[parameter.joint].max(1e-5);
             }
         }
-        let model = Model { n_links: prior.link.len(), ..model(applied, &guess.reference, &known.parameters) };
+        let model = Model {
+            n_links: prior.link.len(),
+            n_compliant: prior.sag.as_ref().map_or(0, |sag| sag.joint.len()),
+            ..model(applied, &guess.reference, &known.parameters)
+        };
         let mount = prior.camera_mount.as_ref().and_then(|table| Some((table.link_from_camera()?, mount_rows(prior)?)));
         let mount = mount.filter(|_| model.mount);
         if let Some((link_from_camera, rows)) = &mount {

@@ -2,9 +2,10 @@
 //!
 //! Where the score test says that links, base or mount would explain the data better than joint sensors do, where tags
 //! are not where they should be or do not fit at all, the views are estimated again under each alternative: link
-//! geometry with columns of its own, a lens with columns, tags of another size, two tags exchanged, tags that were moved
-//! together. The one of most evidence stays if it brings [`MIN_GAIN_NATS`] or more, and more than freeing a tag that was moved (module
-//! `tags::freed`) would. Then all begins again, until nothing explains more.
+//! geometry with columns of its own, an arm that bends under its weight (`sag_start`), a lens with columns, tags of
+//! another size, two tags exchanged, tags that were moved together. The one of most evidence stays if it brings
+//! [`MIN_GAIN_NATS`] or more, and more than freeing a tag that was moved (module `tags::freed`) would. Then all begins
+//! again, until nothing explains more.
 //!
 //! The score test says beforehand what links may bring: with the pull s and the information I of trial columns z under
 //! a prior of variance a^2, Laplace's approximation is `ln Z(a) - ln Z(0) = s^T (I + a^-2)^-1 s / 2 - ln det(1 + a^2 I)
@@ -14,6 +15,8 @@
 //! square), so that explaining it counts.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
+
+use sag_start::SagStart;
 
 use crate::calib::bundle::estimate::{Estimate, estimate};
 use crate::calib::bundle::evidence::SCALE_BOUNDS;
@@ -26,10 +29,13 @@ use crate::calib::bundle::tags::identity::{TagFault, common_size_ratio};
 use armcal_core::joints::MAX_JOINTS;
 use armcal_core::robot::Robot;
 
+mod sag_start;
+
 /// What of the drawing is taken otherwise, or estimated beside the joint sensors.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Drawing {
     pub links: Option<LinkStart>,
+    pub sag: Option<SagStart>,
     pub has_lens: bool,
     pub tags: Vec<TagFault>,
 }
@@ -46,7 +52,7 @@ pub(crate) struct LinkStart {
 /// What an alternative must bring. Of 60 good arms one reached 5 (docs/verdict.md).
 const MIN_GAIN_NATS: f64 = 6.0;
 /// Sizes of an error that are tried, over robot.toml's.
-const MULTIPLES: [f64; 5] = [2.0, 5.0, 10.0, 20.0, 40.0];
+pub(crate) const MULTIPLES: [f64; 5] = [2.0, 5.0, 10.0, 20.0, 40.0];
 /// The scale of all tags is looked for so near to what the distances between them say, and the interval cut so often: to
 /// some 0.03 %.
 const LOG_RATIO_RANGE: f64 = 0.01;
@@ -60,6 +66,9 @@ impl Drawing {
         if self.has_lens {
             input.model.lens = true;
             input.scales.lens_scale = LENS_SCALE;
+        }
+        if let Some(start) = &self.sag {
+            start.apply(input);
         }
         let Some(start) = &self.links else { return };
         input.model.n_links = input.model.n_links.max(start.n_links);
@@ -117,11 +126,16 @@ impl Drawing {
     /// What else may explain the views, none where nothing is suspicious.
     fn alternatives(&self, input: &BundleInput<'_>, found: &Estimate<'_>) -> Vec<Self> {
         let (links, gain) = found.link_start();
+        let (sag, sag_gain) = found.sag_start();
         let faults = found.tag_faults(input.views);
-        let is_suspicious = gain > MIN_GAIN_NATS || !faults.is_empty() || !found.departed_tags().is_empty();
+        let is_suspicious =
+            gain.max(sag_gain) > MIN_GAIN_NATS || !faults.is_empty() || !found.departed_tags().is_empty();
         let mut all = Vec::new();
         if self.links.is_none() && gain > MIN_GAIN_NATS {
             all.push(Self { links: Some(links), ..self.clone() });
+        }
+        if self.sag.is_none() && sag_gain > MIN_GAIN_NATS {
+            all.push(Self { sag: Some(sag), ..self.clone() });
         }
         if is_suspicious && !self.has_lens && !found.has_positions() {
             all.push(Self { has_lens: true, ..self.clone() });
@@ -208,7 +222,12 @@ impl Estimate<'_> {
 }
 
 /// What trial columns would bring under priors of `multiple` times their (column, std).
-fn gain_nats(score: &DVector<f64>, information: &DMatrix<f64>, columns: &[(usize, f64)], multiple: f64) -> f64 {
+pub(crate) fn gain_nats(
+    score: &DVector<f64>,
+    information: &DMatrix<f64>,
+    columns: &[(usize, f64)],
+    multiple: f64,
+) -> f64 {
     let n = columns.len();
     let unit = |k: usize| columns[k].1 * multiple;
     let scaled = DMatrix::from_fn(n, n, |i, k| {

@@ -25,6 +25,8 @@ const NAMED_SIGMAS: f64 = 4.0;
 const WORTH_M: f64 = 0.004;
 const REACH_M: f64 = 1.0;
 
+mod sag_report;
+
 /// Three numbers of the drawing that were estimated.
 struct Departure {
     kind: FindingKind,
@@ -60,7 +62,7 @@ impl Estimate<'_> {
             calibration.refuse_first_for([Refusal::Geometry(base.geometry_error(self.problem.robot))]);
         }
         let of_tags = drawing.tags.iter().filter_map(|fault| self.tag_finding(fault));
-        for (finding, word) in self.lens_finding().into_iter().chain(of_tags) {
+        for (finding, word) in self.sag_findings(task).into_iter().chain(self.lens_finding()).chain(of_tags) {
             findings.push(finding);
             words.push(word);
         }

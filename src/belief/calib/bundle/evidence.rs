@@ -313,6 +313,7 @@ fn update_terms(
         }
     }
     update_links(problem, state, posterior, target, next);
+    update_sag(problem, state, posterior, target, next);
     let all = 0..layout.n_joint();
     let is = |kind: ParameterKind| move |other: ParameterKind| (other == kind).then_some(1.0);
     let now = &problem.scales;
@@ -373,6 +374,30 @@ fn update_links(
     }
 }
 
+/// Joints share a size of their compliances; the base has its own.
+fn update_sag(
+    problem: &BundleProblem<'_>,
+    state: &State,
+    posterior: &Posterior,
+    target: &ScaleTarget<'_>,
+    next: &mut Hyperparameters,
+) {
+    let ScaleTarget { first, moment } = *target;
+    let mut sums = [Sums::default(); 2];
+    for column in problem.layout.sag.clone() {
+        let group = match problem.layout.parameters[column].kind {
+            ParameterKind::Compliance => 0,
+            ParameterKind::MountCompliance(_) => 1,
+            _ => continue,
+        };
+        let value = state.joint[column] - problem.prior.joint_mean[column];
+        sums[group].add(value, posterior.covariance[(column, column)], problem.scales.compliance_std[group]);
+    }
+    if !problem.layout.sag.is_empty() {
+        next.compliance_std = [0, 1].map(|group| sums[group].std(NU_LINK, first.compliance_std[group], moment));
+    }
+}
+
 impl PartialEq for Sums {
     fn eq(&self, other: &Self) -> bool {
         self.squares == other.squares && self.gamma == other.gamma
@@ -423,6 +448,7 @@ pub(crate) fn change(a: &Hyperparameters, b: &Hyperparameters) -> f64 {
         all.extend(s.joint_std_rad);
         all.extend(s.shape_std_rad);
         all.extend(s.link_std.iter().flatten());
+        all.extend(s.compliance_std);
         all.extend(s.mount_scale);
         all.extend(s.camera_error_std.into_iter().flatten());
         all

@@ -9,7 +9,7 @@
 
 use nalgebra::{DMatrix, DVector, Matrix6, SMatrix, SVector, Vector6};
 
-use crate::calib::bundle::link_twists::{LinkSums, link_twists};
+use crate::calib::bundle::link_twists::{LinkSums, link_twists, sag_twist};
 use crate::calib::bundle::observation_term::{LensInformation, PoseInformation, right_jacobian_inverse};
 use crate::calib::bundle::problem::{BundleProblem, State};
 use crate::calib::bundle::schur::{
@@ -135,7 +135,7 @@ impl NormalEquations {
 
     fn add_group(&mut self, at: &Point<'_, '_>, group: &Group<'_>) {
         let problem = at.problem;
-        let directions = directions(problem, group);
+        let directions = directions(at, group);
         self.linearize_sightings(at, group);
         let infos = std::mem::take(&mut self.infos);
         let lens_infos = std::mem::take(&mut self.lens_infos);
@@ -164,8 +164,8 @@ impl NormalEquations {
             };
             self.add_lens(&columns, &lens);
         }
-        if !problem.layout.links.is_empty() {
-            let twists = link_twists(group, &problem.link_corrections(at.state));
+        if !problem.layout.body().is_empty() {
+            let twists = link_twists(problem, group, &problem.link_corrections(at.state));
             own.by_links = h_sum * twists;
             let link = LinkSums { twists, q, m, g: g_sum - h_sum * shift, m_h_sum, by_lens: sums.by_lens, h_sum };
             self.add_links(&columns, &link, &own, &directions);
@@ -396,8 +396,9 @@ struct LensSums<'a> {
 }
 
 /// Twists of the camera (right, camera frame) by each common direction.
-fn directions(problem: &BundleProblem<'_>, group: &Group<'_>) -> Directions {
+fn directions(Point { problem, state, .. }: &Point<'_, '_>, group: &Group<'_>) -> Directions {
     let Group { poses, base_from_camera, .. } = group;
+    let sag = problem.link_corrections(state).sag;
     let view = &problem.views[group.view_idx];
     let mut directions = Directions::zeros();
     let center = base_from_camera.translation.vector;
@@ -406,7 +407,11 @@ fn directions(problem: &BundleProblem<'_>, group: &Group<'_>) -> Directions {
         let rotation = base_from_camera.rotation.inverse();
         let moved = rotation * poses.point_jacobian(joint, &center) * group.sign;
         let turned = rotation * poses.axis(joint) * group.sign;
-        let twist = Vector6::new(moved.x, moved.y, moved.z, turned.x, turned.y, turned.z);
+        let mut twist = Vector6::new(moved.x, moved.y, moved.z, turned.x, turned.y, turned.z);
+        if !sag.is_rigid() {
+            let change = problem.robot.chain.loads().torque_derivatives(poses, sag.tool_load_n, joint);
+            twist += sag_twist(group, &sag.bend(&change));
+        }
         directions.set_column(joint, &twist);
         by_time += twist * view.rate_rad_s[joint];
     }

@@ -1,6 +1,6 @@
-//! The links' columns of the normal equations: where joints sit on their parent links.
+//! The body's columns of the normal equations: where joints sit on their parent links, and how the arm bends.
 //!
-//! Six columns a joint: shift along and turn about the parent link's axes. A turn phi acts as a rotation vector, so
+//! Six columns a joint for its link: shift along and turn about the parent link's axes. A turn phi acts as a rotation vector, so
 //! that a change of it turns the link by `J(phi)`, the left Jacobian of SO(3). They are one dense block, present only
 //! where links are estimated.
 
@@ -49,8 +49,9 @@ impl NormalEquations {
     }
 }
 
-/// (column among the links', column of the matrix) of the group's joints.
+/// (column among the body's, column of the matrix) of the group's joints.
 fn link_range(columns: &Columns<'_>, layout: &Layout) -> impl Iterator<Item = (usize, usize)> + use<> {
     let (joints, first, n) = (columns.joints(), layout.links.start, layout.links.len());
-    (6 * joints.start..(6 * joints.end).min(n)).map(move |k| (k, first + k))
+    let of_links = (6 * joints.start).min(n)..(6 * joints.end).min(n);
+    of_links.chain(n..n + layout.sag.len()).map(move |k| (k, first + k))
 }

@@ -1,15 +1,26 @@
-//! Twists of the camera by where joints sit on their parent links.
+//! Twists of the camera by where joints sit on their parent links, and by how the arm bends.
 
 use nalgebra::{Isometry3, Matrix6, SMatrix, Vector3, Vector6};
 
+use crate::calib::body_motion::SagPoint;
+use crate::calib::bundle::problem::BundleProblem;
 use crate::calib::bundle::schur::{Group, LinkTwists};
-use armcal_core::kinematics::{LinkCorrections, LinkPoses};
+use armcal_core::kinematics::{AboutAxes, LinkCorrections, LinkPoses};
 use armcal_core::spatial::left_jacobian;
 
 /// Of the joints of `group`; zero elsewhere.
-pub(crate) fn link_twists(group: &Group<'_>, corrections: &LinkCorrections) -> LinkTwists {
+pub(crate) fn link_twists(problem: &BundleProblem<'_>, group: &Group<'_>, corrections: &LinkCorrections) -> LinkTwists {
     let mut twists = LinkTwists::zeros();
-    for joint in group.joints.clone() {
+    let layout = &problem.layout;
+    let n_links = layout.links.len();
+    if !layout.sag.is_empty() {
+        let at = SagPoint::new(problem.robot.chain.loads(), &corrections.sag, group.poses);
+        for (k, column) in layout.sag.clone().enumerate() {
+            let twist = sag_twist(group, &at.turns(layout.parameters[column]));
+            twists.set_column(n_links + k, &twist);
+        }
+    }
+    for joint in group.joints.clone().take_while(|joint| 6 * joint < n_links) {
         let by_turn = left_jacobian(&corrections[joint].turn_rad);
         for axis in 0..3 {
             let shift = Vector3::ith(axis, group.sign);
@@ -20,6 +31,15 @@ pub(crate) fn link_twists(group: &Group<'_>, corrections: &LinkCorrections) -> L
         }
     }
     twists
+}
+
+/// Twist of the camera by turns of the group's joints and of the base.
+pub(crate) fn sag_twist(group: &Group<'_>, turns: &AboutAxes) -> Vector6<f64> {
+    let center = group.base_from_camera.translation.vector;
+    let to_camera = group.base_from_camera.rotation.inverse();
+    let [moved, turned] =
+        turns.motion(group.poses, group.joints.clone(), &center).map(|by| to_camera * by * group.sign);
+    Vector6::new(moved.x, moved.y, moved.z, turned.x, turned.y, turned.z)
 }
 
 /// Twists of the camera by a shift and by a turn of a joint's place, in its parent link's axes.

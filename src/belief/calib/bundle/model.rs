@@ -13,6 +13,9 @@ pub struct Model {
     pub joints: Vec<Vec<ParameterKind>>,
     /// How many joints, base first, have columns of their place on the parent link, about the drawing's.
     pub n_links: usize,
+    /// How many joints, base first, have a column of their compliance, with the base's and a load at the tool; 0: none
+    /// of these.
+    pub n_compliant: usize,
     /// The camera's mount, about the drawing's.
     pub mount: bool,
     /// Focal lengths, centre and distortion, about robot.toml's.
@@ -46,6 +49,10 @@ pub struct Hyperparameters {
     pub half_play_std_rad: f64,
     /// Of each joint's place on its parent link: shift m, turn rad.
     pub link_std: [[f64; 2]; MAX_JOINTS],
+    /// Of the joints' compliances, and of the base's on what carries it, rad/(N m).
+    pub compliance_std: [f64; 2],
+    /// Of the load at the tool, N.
+    pub tool_load_std_n: f64,
     /// Of the camera mount, over what robot.toml says of it: shift, turn.
     pub mount_scale: [f64; 2],
     /// Of the lens, over its prior's.
@@ -90,6 +97,11 @@ impl Hyperparameters {
             drift_std_rad_per_h: 1e-3,
             half_play_std_rad: 2e-4,
             link_std: [[robot.geometry.link_position_std_m, robot.geometry.link_rotation_std_rad]; MAX_JOINTS],
+            compliance_std: [
+                robot.geometry.joint_compliance_std_rad_per_nm,
+                robot.geometry.mount_compliance_std_rad_per_nm,
+            ],
+            tool_load_std_n: robot.geometry.tool_load_std_n,
             mount_scale: [1.0; 2],
             lens_scale: 1.0,
             noise: 1.0,
@@ -114,18 +126,22 @@ impl Hyperparameters {
             ParameterKind::StepBefore(_) => STEP_STD_RAD,
             ParameterKind::LinkShift(_) => self.link_std[joint][0],
             ParameterKind::LinkTurn(_) => self.link_std[joint][1],
+            ParameterKind::Compliance => self.compliance_std[0],
+            ParameterKind::MountCompliance(_) => self.compliance_std[1],
+            ParameterKind::ToolLoad => self.tool_load_std_n,
         }
     }
 }
 
 impl Model {
-    /// The joints' parameters in the order of their columns: sensors joint by joint, then links joint by joint.
+    /// The joints' parameters in the order of their columns: sensors joint by joint, links joint by joint, sag.
     #[must_use]
     pub fn parameters(&self) -> Vec<Parameter> {
         let of_sensors =
             self.joints.iter().enumerate().flat_map(|(joint, kinds)| kinds.iter().map(move |&kind| (joint, kind)));
         let of_links = (0..self.n_links).flat_map(|joint| ParameterKind::all_of_link().map(move |kind| (joint, kind)));
-        of_sensors.chain(of_links).map(|(joint, kind)| Parameter { joint, kind }).collect()
+        let of_sag = Parameter::all_of_sag(self.n_compliant).filter(|_| self.n_compliant > 0);
+        of_sensors.chain(of_links).map(|(joint, kind)| Parameter { joint, kind }).chain(of_sag).collect()
     }
 }
 
@@ -183,6 +199,7 @@ pub fn model_for(robot: &Robot, views: &[View]) -> Model {
     Model {
         joints: (0..robot.n_joints()).map(joint).collect(),
         n_links: 0,
+        n_compliant: 0,
         mount: robot.camera.mount_std_m > 0.0 || robot.camera.mount_std_rad > 0.0,
         lens: false,
         tags: true,

@@ -21,6 +21,8 @@ pub(crate) struct Layout {
     pub of_joint: Vec<Range<usize>>,
     /// Six columns of each joint whose place on its parent link is estimated, base first; the last of `parameters`.
     pub links: Range<usize>,
+    /// Right after them those of how the arm bends.
+    pub sag: Range<usize>,
     pub mount: Option<usize>,
     pub time: Option<usize>,
     pub lens: Option<usize>,
@@ -169,7 +171,8 @@ impl Layout {
             start += kinds.len();
         }
         layout.n = layout.parameters.len();
-        layout.links = start..layout.n;
+        layout.links = start..start + 6 * model.n_links;
+        layout.sag = layout.links.end..layout.n;
         let mut take = |wanted: bool, n: usize| {
             let at = layout.n;
             wanted.then(|| {
@@ -203,6 +206,11 @@ impl Layout {
             n: self.n + 8,
             ..self.clone()
         }
+    }
+
+    /// Columns of links and sag.
+    pub(crate) fn body(&self) -> Range<usize> {
+        self.links.start..self.sag.end
     }
 
     pub(crate) fn n_joint(&self) -> usize {
@@ -322,11 +330,19 @@ impl<'a> BundleProblem<'a> {
     pub(crate) fn link_corrections(&self, state: &State) -> LinkCorrections {
         let mut corrections = self.guess_links;
         let columns = self.layout.links.clone();
-        for (six, correction) in state.joint.rows_range(columns).as_slice().chunks_exact(6).zip(&mut corrections) {
+        let links = state.joint.rows_range(columns);
+        for (six, correction) in links.as_slice().chunks_exact(6).zip(&mut corrections.places) {
             correction.shift_m.copy_from_slice(&six[..3]);
             correction.turn_rad.copy_from_slice(&six[3..]);
         }
-        corrections
+        if self.layout.sag.is_empty() {
+            return corrections;
+        }
+        let mut all = JointParameters { links: corrections, ..JointParameters::default() };
+        for column in self.layout.sag.clone() {
+            all.set(self.layout.parameters[column], state.joint[column]);
+        }
+        all.links
     }
 
     /// Poses of all links in a view.

@@ -41,6 +41,7 @@ pub(crate) fn robust_start(input: &BundleInput<'_>) -> RobustStart {
     let model = Model {
         joints: input.model.joints.iter().enumerate().map(of_joint).collect(),
         n_links: 0,
+        n_compliant: 0,
         mount: false,
         lens: false,
         tags: false,

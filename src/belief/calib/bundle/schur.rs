@@ -18,9 +18,9 @@ pub(crate) const TIME: usize = MAX_JOINTS + 6;
 pub(crate) type Own = SMatrix<f64, N_VIEW_PARAMETERS, N_VIEW_PARAMETERS>;
 pub(crate) type Directions = SMatrix<f64, 6, N_DIRECTIONS>;
 
-/// Columns of all links that an arm may have.
-pub(crate) const N_LINK_COLUMNS: usize = 6 * MAX_JOINTS;
-/// Twists of the camera (right, camera frame) by each link column.
+/// Columns of all links that an arm may have, of their compliances, the base's and a load at the tool.
+pub(crate) const N_LINK_COLUMNS: usize = 7 * MAX_JOINTS + 4;
+/// Twists of the camera (right, camera frame) by each column of links and sag, in the order of [`Layout::body`].
 pub(crate) type LinkTwists = SMatrix<f64, 6, N_LINK_COLUMNS>;
 
 /// What is needed to get a view's own parameters back, and their covariance.
@@ -38,7 +38,7 @@ pub(crate) struct SchurBlock {
     pub log_ratio: f64,
     /// The lens's part, `sum H_ic`.
     pub by_lens: SMatrix<f64, 6, 8>,
-    /// `sum H_i T` of the links' columns.
+    /// `sum H_i T` of the columns of links and sag.
     pub by_links: LinkTwists,
     /// Whether the group has any parameters of its own.
     pub has_any: bool,
@@ -148,7 +148,7 @@ impl SchurBlock {
         if let Some(at) = problem.layout.lens {
             pushed += self.by_lens * step.fixed_rows::<8>(at);
         }
-        for (k, column) in problem.layout.links.clone().enumerate() {
+        for (k, column) in problem.layout.body().enumerate() {
             pushed += self.by_links.column(k) * step[column];
         }
         pushed
@@ -189,7 +189,7 @@ impl SchurBlock {
             let mut view = out.fixed_view_mut::<6, 8>(0, at);
             view += self.by_lens;
         }
-        for (k, column) in layout.links.clone().enumerate() {
+        for (k, column) in layout.body().enumerate() {
             out.column_mut(column).copy_from(&self.by_links.column(k));
         }
         out
@@ -219,7 +219,7 @@ impl SchurBlock {
             let mut view = out.generic_view_mut((0, at), (Const::<N_VIEW_PARAMETERS>, Const::<8>));
             view += self.twists.transpose() * self.by_lens;
         }
-        for (k, column) in layout.links.clone().enumerate() {
+        for (k, column) in layout.body().enumerate() {
             out.column_mut(column).copy_from(&self.twists.tr_mul(&self.by_links.column(k)));
         }
         out

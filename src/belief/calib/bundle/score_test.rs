@@ -12,9 +12,9 @@ use crate::calib::bundle::estimate::Estimate;
 use crate::calib::bundle::link_twists::link_twist;
 use crate::calib::bundle::observation_term::PoseInformation;
 use crate::calib::bundle::problem::WeightedMeasurement;
-use crate::calib::bundle::schur::{N_VIEW_PARAMETERS, SchurBlock};
+use crate::calib::bundle::schur::{Group, N_VIEW_PARAMETERS, SchurBlock};
 use crate::calib::geometry_error::ErrorKind;
-use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
+use crate::calib::parameters::{JointParameters, Parameter};
 use crate::calib::views::view::View;
 use armcal_core::joints::{JointAngles, MAX_JOINTS};
 use armcal_core::kinematics::LinkPoses;
@@ -135,23 +135,27 @@ impl Estimate<'_> {
     }
 
     pub(crate) fn score(&self) -> Score {
+        self.score_of(trials)
+    }
+
+    /// Score of the trials whose twists of the camera (right, camera frame) `trials` gives for each group.
+    pub(crate) fn score_of<const N: usize>(&self, trials: impl Fn(&Group<'_>) -> SMatrix<f64, 6, N>) -> Score {
         let problem = &self.problem;
         let n = problem.layout.n;
-        let mut score = DVector::zeros(N_TRIALS);
-        let mut information = DMatrix::zeros(N_TRIALS, N_TRIALS);
-        let mut cross = DMatrix::zeros(N_TRIALS, n);
+        let mut score = DVector::zeros(N);
+        let mut information = DMatrix::zeros(N, N);
+        let mut cross = DMatrix::zeros(N, n);
         let mut groups = self.solved.normal.eliminated.iter();
         for (view_idx, view) in problem.views.iter().enumerate() {
             let poses = problem.link_poses(view_idx, &self.solved.state);
             for own in groups.by_ref().take(1 + usize::from(view.gripper.is_some())) {
-                let base_from_camera = self.base_from_camera(view_idx, own, &poses);
-                let trials = self.trials(view_idx, own, &poses, &base_from_camera);
-                let (h, g) = self.gradient(own, &poses, &base_from_camera);
+                let group = self.group(view_idx, own, &poses);
+                let trials = trials(&group);
+                let (h, g) = self.gradient(&group);
                 let m = own.twists * own.inverse * own.twists.transpose();
                 let left = trials.transpose() * (Matrix6::identity() - h * m);
                 score += left_times(&trials, &(g - h * (own.twists * (own.inverse * own.gradient))));
-                information +=
-                    DMatrix::from_fn(N_TRIALS, N_TRIALS, |i, k| (left.row(i) * h).dot(&trials.column(k).transpose()));
+                information += DMatrix::from_fn(N, N, |i, k| (left.row(i) * h).dot(&trials.column(k).transpose()));
                 cross += left * own.twist_by_columns(problem, &self.solved.normal.by_tag, view_idx);
             }
         }
@@ -161,33 +165,50 @@ impl Estimate<'_> {
         Score { score, information, sensitivity: followed }
     }
 
-    fn is_gripper(&self, view_idx: usize, own: &SchurBlock) -> bool {
-        self.problem.views[view_idx].gripper == Some(own.range.start)
-    }
-
-    fn base_from_camera(&self, view_idx: usize, own: &SchurBlock, poses: &LinkPoses) -> nalgebra::Isometry3<f64> {
-        let state = &self.solved.state;
-        let before = poses.link(self.problem.n_camera_joints) * state.mount;
-        if self.is_gripper(view_idx, own) { before } else { before * state.camera_error[view_idx] }
+    /// What carries the observations of `own`.
+    fn group<'b>(&self, view_idx: usize, own: &SchurBlock, poses: &'b LinkPoses) -> Group<'b> {
+        let (problem, state) = (&self.problem, &self.solved.state);
+        let observations = own.range.clone();
+        let before = poses.link(problem.n_camera_joints) * state.mount;
+        match &problem.robot.gripper_tag {
+            // Links behind the camera move the tag, not the camera.
+            Some(tag) if problem.views[view_idx].gripper == Some(own.range.start) => Group {
+                view_idx,
+                joints: problem.n_camera_joints..tag.mount.n_joints,
+                sign: -1.0,
+                by_mount: Matrix6::identity(),
+                camera_error: None,
+                observations,
+                poses,
+                base_from_camera: before,
+            },
+            _ => Group {
+                view_idx,
+                joints: 0..problem.n_camera_joints,
+                sign: 1.0,
+                by_mount: adjoint(&state.camera_error[view_idx].inverse()),
+                camera_error: None,
+                observations,
+                poses,
+                base_from_camera: before * state.camera_error[view_idx],
+            },
+        }
     }
 
     /// Curvature and pull of a group's observations on the camera's twist.
-    fn gradient(
-        &self,
-        own: &SchurBlock,
-        poses: &LinkPoses,
-        base_from_camera: &nalgebra::Isometry3<f64>,
-    ) -> (Matrix6<f64>, Vector6<f64>) {
+    fn gradient(&self, group: &Group<'_>) -> (Matrix6<f64>, Vector6<f64>) {
         let (problem, state) = (&self.problem, &self.solved.state);
         let (mut h, mut g) = (Matrix6::zeros(), Vector6::zeros());
-        for observation in problem.observations[own.range.clone()].iter().filter(|observation| observation.is_used) {
+        for observation in
+            problem.observations[group.observations.clone()].iter().filter(|observation| observation.is_used)
+        {
             let pose = match &problem.robot.gripper_tag {
                 Some(tag) if observation.tag == problem.robot.tags.len() => {
-                    poses.link(tag.mount.n_joints) * state.gripper_tag
+                    group.poses.link(tag.mount.n_joints) * state.gripper_tag
                 }
                 _ => state.tags[observation.tag],
             };
-            let camera_from_tag = base_from_camera.inv_mul(&pose);
+            let camera_from_tag = group.base_from_camera.inv_mul(&pose);
             let data: &WeightedMeasurement = &observation.data;
             if let Some(info) = PoseInformation::of(data, &camera_from_tag, &state.lens, problem.scales.noise, None) {
                 h += info.h;
@@ -196,34 +217,21 @@ impl Estimate<'_> {
         }
         (h, g)
     }
+}
 
-    /// Twists of the camera (right, camera frame) by each trial parameter.
-    fn trials(
-        &self,
-        view_idx: usize,
-        own: &SchurBlock,
-        poses: &LinkPoses,
-        base_from_camera: &nalgebra::Isometry3<f64>,
-    ) -> Trials {
-        let problem = &self.problem;
-        let is_gripper = self.is_gripper(view_idx, own);
-        // Links behind the camera move the tag, not the camera.
-        let (joints, sign) = match &problem.robot.gripper_tag {
-            Some(tag) if is_gripper => (problem.n_camera_joints..tag.mount.n_joints, -1.0),
-            _ => (0..problem.n_camera_joints, 1.0),
-        };
-        let mut trials = Trials::zeros();
-        for joint in joints {
-            for axis in 0..3 {
-                let [shift, turn] = link_twist(poses, base_from_camera, joint, [Vector3::ith(axis, sign); 2]);
-                trials.set_column(6 * joint + axis, &shift);
-                trials.set_column(6 * joint + 3 + axis, &turn);
-            }
+/// Twists of the camera (right, camera frame) by each trial parameter.
+fn trials(group: &Group<'_>) -> Trials {
+    let mut trials = Trials::zeros();
+    for joint in group.joints.clone() {
+        for axis in 0..3 {
+            let by = [Vector3::ith(axis, group.sign); 2];
+            let [shift, turn] = link_twist(group.poses, &group.base_from_camera, joint, by);
+            trials.set_column(6 * joint + axis, &shift);
+            trials.set_column(6 * joint + 3 + axis, &turn);
         }
-        let error = if is_gripper { nalgebra::Isometry3::identity() } else { self.solved.state.camera_error[view_idx] };
-        trials.fixed_view_mut::<6, 6>(0, MOUNT).copy_from(&adjoint(&error.inverse()));
-        trials
     }
+    trials.fixed_view_mut::<6, 6>(0, MOUNT).copy_from(&group.by_mount);
+    trials
 }
 
 /// The tool at one configuration, and how it moves.
@@ -249,7 +257,7 @@ impl ToolJacobian {
                 return Vector3::zeros();
             }
             if parameter.kind.is_of_link() {
-                return by_link(&poses, &tool_m, *parameter);
+                return by_body(robot, &poses, &tool_m, *parameter);
             }
             let spec = &sensors.models[joint].spec;
             poses.point_jacobian(joint, &tool_m) * parameter.kind.angle_derivative(spec, travel_rad[joint], &still, 0.0)
@@ -274,7 +282,7 @@ impl ToolJacobian {
                 return Vector3::zeros();
             }
             if kind.is_of_link() {
-                return by_link(&poses, &tool_m, *parameter);
+                return by_body(robot, &poses, &tool_m, *parameter);
             }
             let (spec, travel_rad) = (&robot.sensors[joint], view.travel_rad[joint]);
             let by_angle = kind.angle_derivative(spec, travel_rad, &departure, view.approach[joint]);
@@ -308,14 +316,10 @@ impl ToolJacobian {
     }
 }
 
-/// The tool's motion by a parameter of link geometry, m per unit.
-fn by_link(poses: &LinkPoses, tool_m: &Vector3<f64>, Parameter { joint, kind }: Parameter) -> Vector3<f64> {
-    let along = |axis: u8| poses.link(joint).rotation * Vector3::ith(usize::from(axis), 1.0);
-    match kind {
-        ParameterKind::LinkShift(axis) => along(axis),
-        ParameterKind::LinkTurn(axis) => along(axis).cross(&(tool_m - poses.joint_origin(joint))),
-        _ => Vector3::zeros(),
-    }
+/// The tool's motion by a parameter of the arm's body, m per unit.
+fn by_body(robot: &Robot, poses: &LinkPoses, tool_m: &Vector3<f64>, parameter: Parameter) -> Vector3<f64> {
+    let motion = parameter.body_motion(&robot.chain, poses, 0..robot.tool.mount.n_joints, tool_m);
+    motion.map_or_else(Vector3::zeros, |[moved, _]| moved)
 }
 
 /// First trial column, and the size in whose units it is looked at.
@@ -330,8 +334,8 @@ pub(crate) fn columns(element: GeometryElement, error: ErrorKind) -> (usize, f64
     }
 }
 
-fn left_times(trials: &Trials, pull: &Vector6<f64>) -> DVector<f64> {
-    DVector::from_iterator(N_TRIALS, trials.column_iter().map(|column| column.dot(pull)))
+fn left_times<const N: usize>(trials: &SMatrix<f64, 6, N>, pull: &Vector6<f64>) -> DVector<f64> {
+    DVector::from_iterator(N, trials.column_iter().map(|column| column.dot(pull)))
 }
 
 const _: () = assert!(N_VIEW_PARAMETERS == MAX_JOINTS + 6, "a view's own parameters are joints and camera");

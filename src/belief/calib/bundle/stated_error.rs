@@ -42,6 +42,9 @@ fn at_most_stated(fitted: &Hyperparameters, input: &BundleInput<'_>) -> Hyperpar
     let stated = Hyperparameters::datasheet(input.robot);
     let mut scales = fitted.clone();
     scales.noise = fitted.noise.min(stated.noise);
+    for (std, stated) in scales.compliance_std.iter_mut().zip(stated.compliance_std) {
+        *std = std.min(stated);
+    }
     for (joint, spec) in input.robot.sensors.iter().enumerate() {
         let linearity_std_rad = spec.linearity_std_rad.max(stated.joint_std_rad[joint]);
         scales.joint_std_rad[joint] = fitted.joint_std_rad[joint].min(linearity_std_rad);

@@ -9,6 +9,7 @@ use crate::calib::result::calibration::{Calibration, JointResult, Status};
 use crate::calib::result::covariance_file::CovarianceTable;
 use crate::calib::result::link_table::LinkResult;
 use crate::calib::result::metrics::{FitMetrics, HeldOutMetrics};
+use crate::calib::result::sag_table::SagTable;
 use crate::calib::result::terms_table::{ReferenceTable, TermsTable};
 use crate::calib::result::valid_range::ValidRange;
 use crate::calib::views::scale_identification::IdentifiedScale;
@@ -95,6 +96,7 @@ pub(crate) fn assemble(source: &Provenance<'_>, fit: &Fit<'_>, evidence: Evidenc
         outliers: Vec::new(),
         joint: joint_results(source, fit),
         link: LinkResult::all(source.robot, at, fit.covariance),
+        sag: SagTable::of(source.robot, at, fit.covariance),
         failed_joint: Vec::new(),
         prior: None,
         covariance_hash: None,

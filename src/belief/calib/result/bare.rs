@@ -43,6 +43,7 @@ pub(in crate::calib) fn bare(robot: &str, method: Method) -> Calibration {
         outliers: Vec::new(),
         joint: Vec::new(),
         link: Vec::new(),
+        sag: None,
         failed_joint: Vec::new(),
         prior: None,
         covariance_hash: None,

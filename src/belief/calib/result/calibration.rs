@@ -14,6 +14,7 @@ use crate::calib::result::link_table::LinkResult;
 use crate::calib::result::map_table::MapResult;
 use crate::calib::result::metrics::{FitMetrics, HeldOutMetrics};
 use crate::calib::result::model_table::ModelTable;
+use crate::calib::result::sag_table::SagTable;
 use crate::calib::result::terms_table::{ReferenceTable, TermsTable};
 use crate::calib::result::valid_range::ValidRange;
 use crate::calib::result::verdict_tables::{ObservabilityTable, VerdictTable};
@@ -92,6 +93,9 @@ pub struct Calibration {
     /// Joints' places on their parent links, where the data asked for others than the drawing's.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub link: Vec<LinkResult>,
+    /// How the arm bends under its weight, where the data asked for it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sag: Option<SagTable>,
     /// Joints that failed, or whose sensors did.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub failed_joint: Vec<FailedJointTable>,

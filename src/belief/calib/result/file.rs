@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::calib::covariance::ParameterCovariance;
-use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
+use crate::calib::parameters::{JointParameters, Parameter};
 use crate::calib::result::calibration::{Calibration, JointResult};
 use crate::calib::result::covariance_file::CovarianceTable;
 use crate::calib::result::file_error::CalibrationFileError;
@@ -107,22 +107,24 @@ impl Calibration {
         parameters
     }
 
-    /// Where joints sit on their parent links beyond the drawing; zero where that was not estimated.
+    /// Where joints sit on their parent links beyond the drawing, and how the arm bends; zero where that was not
+    /// estimated.
     #[must_use]
     pub fn link_corrections(&self) -> LinkCorrections {
         let mut corrections = LinkCorrections::default();
-        for (joint, correction) in self.joint.iter().zip(&mut corrections) {
+        for (joint, correction) in self.joint.iter().zip(&mut corrections.places) {
             let link = self.link.iter().find(|link| link.joint == joint.name);
             *correction = link.map(LinkResult::correction).unwrap_or_default();
         }
+        let names = self.joint.iter().map(|joint| joint.name.as_str());
+        corrections.sag = self.sag.as_ref().map(|sag| sag.sag(names)).unwrap_or_default();
         corrections
     }
 
     /// The covariance of the estimated parameters for `robot`'s joints; rows that name no joint of it are left out.
     #[must_use]
     pub fn parameter_covariance(&self, robot: &Robot) -> ParameterCovariance {
-        let all = (0..robot.n_joints())
-            .flat_map(|joint| ParameterKind::all_of_joint().map(move |kind| Parameter { joint, kind }));
+        let all = Parameter::all(robot.n_joints());
         let rows: Vec<(usize, Parameter)> =
             all.filter_map(|p| Some((self.covariance.row(&p.name(robot))?, p))).collect();
         let at = |row: usize, column: usize| self.covariance.rows[row].get(column).copied().unwrap_or(f64::NAN);
@@ -209,6 +211,7 @@ impl Calibration {
             }
         }
         self.reference.map_or(Ok(()), |reference| reference.check(file))?;
+        self.sag.as_ref().map_or(Ok(()), |sag| sag.check(file))?;
         let n = self.covariance.parameters.len();
         if self.covariance.rows.len() != n || self.covariance.rows.iter().any(|row| row.len() != n) {
             return Err(FileIssue::new(file, "covariance.rows", format!("needs {n} rows of {n} numbers")));

@@ -50,6 +50,8 @@ fn std_of(kind: ParameterKind) -> f64 {
         ParameterKind::StepBefore(_) => 1e-2,
         ParameterKind::LinkShift(_) => 1e-3,
         ParameterKind::LinkTurn(_) => 5e-4,
+        ParameterKind::Compliance | ParameterKind::MountCompliance(_) => 2e-6,
+        ParameterKind::ToolLoad => 50.0,
     }
 }
 

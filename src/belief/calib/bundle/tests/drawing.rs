@@ -6,7 +6,7 @@ use crate::calib::bundle::drawing::Drawing;
 use crate::calib::bundle::estimate::{Estimate, estimate};
 use crate::calib::bundle::input::{BundleInput, HyperparameterMode};
 use crate::calib::bundle::model::Model;
-use crate::calib::bundle::tests::data::{normal, reference, rng, titan};
+use crate::calib::bundle::tests::data::{Truth, normal, reference, rng, titan};
 use crate::calib::bundle::tests::score_test::{input, views_of_changed, with_link};
 use crate::calib::parameters::JointParameters;
 use crate::calib::views::view::View;
@@ -17,15 +17,22 @@ use armcal_core::sensor::ConditionChange;
 use armcal_core::stats::quantile;
 
 /// An arm's views, and the sensors that it really has.
-struct Case {
-    views: Vec<View>,
-    model: Model,
-    truth: JointParameters,
+pub(super) struct Case {
+    pub views: Vec<View>,
+    pub model: Model,
+    pub truth: JointParameters,
 }
 
 fn case(robot: &Robot, real: &Robot, seed: u64) -> Case {
+    case_changed(robot, real, seed, |_| {})
+}
+
+pub(super) fn case_changed(robot: &Robot, real: &Robot, seed: u64, change: impl FnOnce(&mut Truth)) -> Case {
     let mut truth = JointParameters::default();
-    let (views, model) = views_of_changed(robot, real, seed, |drawn| truth = drawn.parameters);
+    let (views, model) = views_of_changed(robot, real, seed, |drawn| {
+        change(drawn);
+        truth = drawn.parameters;
+    });
     Case { views, model, truth }
 }
 
@@ -39,7 +46,13 @@ fn revised<'a>(input: &BundleInput<'a>) -> Option<BundleInput<'a>> {
 }
 
 /// Distances between the tool of `real` with the true sensors and that of `robot` as found, m, at drawn travels.
-fn tool_errors_m(real: &Robot, truth: &JointParameters, robot: &Robot, found: &Estimate<'_>, seed: u64) -> Vec<f64> {
+pub(super) fn tool_errors_m(
+    real: &Robot,
+    truth: &JointParameters,
+    robot: &Robot,
+    found: &Estimate<'_>,
+    seed: u64,
+) -> Vec<f64> {
     let mut rng = rng(seed, "drawing task");
     let still = ConditionChange::default();
     let tool = |robot: &Robot, at: &JointParameters, travel: &JointAngles| {
@@ -124,7 +137,7 @@ fn size(link: &LinkCorrection) -> f64 {
 fn drawn_links(robot: &Robot, seed: u64) -> JointParameters {
     let mut rng = rng(seed, "links");
     let mut at = JointParameters { reference: reference(), ..JointParameters::default() };
-    for link in at.links.iter_mut().take(robot.camera.mount.n_joints) {
+    for link in at.links.places.iter_mut().take(robot.camera.mount.n_joints) {
         *link = LinkCorrection {
             shift_m: 0.002 * Vector3::from_fn(|_, _| normal(&mut rng)),
             turn_rad: 0.005 * Vector3::from_fn(|_, _| normal(&mut rng)),

@@ -33,6 +33,7 @@ fn case(seed: u64) -> Case {
     let mut model = Model {
         joints: vec![Vec::new(); robot.n_joints()],
         n_links: robot.n_joints(),
+        n_compliant: robot.n_joints(),
         mount: true,
         lens: true,
         tags: true,

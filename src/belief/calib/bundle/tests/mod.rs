@@ -10,6 +10,7 @@ mod failures;
 mod lenses;
 mod moved_tags;
 mod reservations;
+mod sag;
 mod score_test;
 mod slips;
 mod small_samples;

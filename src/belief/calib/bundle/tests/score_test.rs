@@ -49,6 +49,7 @@ pub(super) fn views_of_changed(
     let mut model = Model {
         joints: vec![Vec::new(); robot.n_joints()],
         n_links: 0,
+        n_compliant: 0,
         mount: true,
         lens: false,
         tags: true,

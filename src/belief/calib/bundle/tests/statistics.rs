@@ -43,6 +43,7 @@ pub(super) fn case(robot: &Robot, seed: u64, n_views: usize) -> Case<'_> {
     let mut model = Model {
         joints: vec![Vec::new(); robot.n_joints()],
         n_links: 0,
+        n_compliant: 0,
         mount: true,
         lens: false,
         tags: true,

@@ -52,6 +52,7 @@ fn case(robot: &Robot, seed: u64, change: impl FnOnce(&mut Robot, &mut Truth)) -
     let mut model = Model {
         joints: vec![Vec::new(); robot.n_joints()],
         n_links: 0,
+        n_compliant: 0,
         mount: true,
         lens: false,
         tags: true,

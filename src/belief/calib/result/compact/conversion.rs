@@ -20,7 +20,7 @@ impl CompactCalibration {
     /// # Errors
     /// [`CompactError`] when a value is not finite or beyond the form's range.
     pub fn of(calibration: &Calibration) -> Result<Self, CompactError> {
-        if !calibration.link.is_empty() {
+        if !calibration.link.is_empty() || calibration.sag.is_some() {
             return Err(CompactError::Links);
         }
         let n = calibration.joint.len();

@@ -23,7 +23,10 @@ pub enum CompactError {
     NoRelativeGain { joint: String },
     #[error("joint `{joint}`: terms about a scale that was measured on the way have no compact form")]
     MeasuredScale { joint: String },
-    #[error("link geometry was estimated and has no compact form: a robot needs `[[link]]` of calibration.toml, too")]
+    #[error(
+        "link geometry or sag was estimated and has no compact form: a robot needs `[[link]]` and `[sag]` of \
+             calibration.toml, too"
+    )]
     Links,
     #[error("the compact form has {bytes} bytes, must be below {MAX_COMPACT_BYTES}")]
     TooLong { bytes: usize },

@@ -1,0 +1,68 @@
+//! Where an arm's links and the frames on them are.
+
+use nalgebra::{Isometry3, Vector3};
+
+use crate::joints::MAX_JOINTS;
+
+/// A frame fixed to the link behind the first `n_joints` joints (0: the base).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Attachment {
+    /// Number of joints proximal to the link.
+    pub n_joints: usize,
+    /// Pose of the frame in the link's frame.
+    pub link_from_frame: Isometry3<f64>,
+}
+
+/// `base_from_link` for the base (index 0) and each joint's child link.
+#[derive(Clone, Copy, Debug)]
+pub struct LinkPoses {
+    pub(super) n_joints: usize,
+    pub(super) base_from_link: [Isometry3<f64>; MAX_JOINTS + 1],
+    /// Unit axes of the joints in the base frame.
+    pub(super) axes: [Vector3<f64>; MAX_JOINTS],
+}
+
+impl LinkPoses {
+    /// Number of moving joints.
+    #[inline]
+    #[must_use]
+    pub fn n_joints(&self) -> usize {
+        self.n_joints
+    }
+
+    /// `base_from_link` of the base (0) or of the child link of joint `body - 1`.
+    #[inline]
+    #[must_use]
+    pub fn link(&self, body: usize) -> &Isometry3<f64> {
+        &self.base_from_link[..=self.n_joints][body]
+    }
+
+    /// The pose of an attached frame in the base frame; the caller names it.
+    #[inline]
+    #[must_use]
+    pub fn frame(&self, attachment: &Attachment) -> Isometry3<f64> {
+        self.link(attachment.n_joints) * attachment.link_from_frame
+    }
+
+    /// Axis of joint `joint` in the base frame, unit.
+    #[inline]
+    #[must_use]
+    pub fn axis(&self, joint: usize) -> &Vector3<f64> {
+        &self.axes[..self.n_joints][joint]
+    }
+
+    /// Origin of joint `joint` in the base frame, m.
+    #[inline]
+    #[must_use]
+    pub fn joint_origin(&self, joint: usize) -> &Vector3<f64> {
+        // A joint's rotation leaves its own origin where it is, so the child link's origin serves.
+        &self.base_from_link[joint + 1].translation.vector
+    }
+
+    /// d(point)/d(angle of `joint`), m/rad, for a point (base frame) carried by that joint: `axis x (point - origin)`.
+    #[inline]
+    #[must_use]
+    pub fn point_jacobian(&self, joint: usize, point_m: &Vector3<f64>) -> Vector3<f64> {
+        self.axis(joint).cross(&(point_m - self.joint_origin(joint)))
+    }
+}
