@@ -98,7 +98,7 @@ impl PortFile {
 
 /// The lens of `[camera]`, without the window.
 fn lens(file: &Path, raw: &CameraFile) -> Result<CameraModel, FileIssue> {
-    let issue = |key: &str, problem: String| FileIssue::new(file, &format!("camera.{key}"), problem);
+    let issue = |key: &str, problem: String| FileIssue::new(file, format!("camera.{key}"), problem);
     let (focal, center, resolution) = (raw.focal_px, raw.center_px, raw.resolution_px);
     match (raw.model.as_str(), &raw.distortion[..]) {
         ("equidistant", &[k1, k2, k3, k4]) => {

@@ -33,9 +33,25 @@ struct Limits {
     readmit: f64,
 }
 
+/// Whether something was used so far.
+#[derive(Clone, Copy)]
+enum Before {
+    Used,
+    Rejected,
+}
+
+impl From<bool> for Before {
+    fn from(is_used: bool) -> Self {
+        if is_used { Self::Used } else { Self::Rejected }
+    }
+}
+
 impl Limits {
-    fn of(&self, is_used: bool) -> f64 {
-        if is_used { self.reject } else { self.readmit }
+    fn of(&self, before: impl Into<Before>) -> f64 {
+        match before.into() {
+            Before::Used => self.reject,
+            Before::Rejected => self.readmit,
+        }
     }
 }
 

@@ -38,8 +38,8 @@ pub(crate) enum OffsetPrior {
     Calibrated,
 }
 
-/// Views on each side of a change point: a single one is a jump, not a step.
-const MIN_SIDE: usize = 2;
+/// Views on each side of a change point: one or two are a jump, not a step.
+const MIN_SIDE: usize = 3;
 /// Views that tell less of a joint's error than this share of its variance are on no side.
 const LEAST_TOLD: f64 = 0.01;
 /// More of a joint's errors than this share is no longer told apart from all of them.

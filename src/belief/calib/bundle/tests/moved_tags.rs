@@ -60,7 +60,7 @@ fn moved_together(seed: u64, moved_m: f64, n: usize) -> (Vec<usize>, Vec<usize>,
     let n_tags = robot.tags.len();
     let mut moved: Vec<usize> = (0..n).map(|k| (seed as usize + k) % n_tags).collect();
     moved.sort_unstable();
-    let aside = Vector3::new(0.6, if seed % 2 == 0 { 0.8 } else { -0.8 }, 0.0) * moved_m;
+    let aside = Vector3::new(0.6, if seed.is_multiple_of(2) { 0.8 } else { -0.8 }, 0.0) * moved_m;
     let (views, model) = views_of_changed(&robot, &robot, seed, |truth| {
         for &tag in &moved {
             truth.tags[tag] = Isometry3::translation(aside.x, aside.y, aside.z) * truth.tags[tag];
