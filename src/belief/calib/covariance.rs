@@ -276,7 +276,7 @@ mod tests {
         let robot = titan();
         let tool_m = |at: &JointAngles| robot.chain.frame(at, &robot.tool.mount).translation.vector;
         let mut rested = robot.stowed;
-        for (joint, by_rad) in [(0, -0.6), (1, 0.4), (2, -0.5), (3, 0.9), (4, 0.5)] {
+        for (joint, by_rad) in [(0, -0.6), (1, -0.5), (2, 0.8), (3, -0.9), (4, 0.5)] {
             rested[joint] += by_rad;
         }
         // Wrong sensors: it rested beside the target.

@@ -184,7 +184,7 @@ mod tests {
             words[JOINT] = counts;
             JointCounts::from_slice(&words)
         };
-        for k in 0..350 {
+        for k in 0..450 {
             let t_s = f64::from(k) * PERIOD_S;
             let set = 2000.0 + spec.counts_per_rad * (0.25 * (t_s - 1.0)).clamp(0.0, 0.5);
             at += (set - 2000.0 - at) * PERIOD_S / 0.12;

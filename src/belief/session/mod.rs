@@ -2,8 +2,8 @@
 //!
 //! `prepare` plans before the first motion, `script` carries out the steps: `reach`, `capture` (with `belief_update`),
 //! `grip`, `touch`, `scale_identification`, `end_stops`. `motion` drives the arm, `settling` detects rest, `contact`
-//! detects contacts, `following` joints that do not follow (`held_joint`, `failed_joints`), and `approval` asks an operator before a motion. `recorder` keeps every message; `outcome` is the
-//! result.
+//! detects contacts, `following` joints that do not follow (`held_joint`, `failed_joints`), and `approval` asks an
+//! operator before a motion. `recorder` keeps every message; `outcome` is the result.
 
 mod approval;
 mod belief_update;
