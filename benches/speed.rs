@@ -199,7 +199,7 @@ fn tag_map(c: &mut Criterion) {
         std: None,
     };
     let priors: Vec<TagPrior> = (0_u32..).zip(&tags).map(prior).collect();
-    let cameras = [lens.into()];
+    let cameras = [lens];
     let input = MapInput { cameras: &cameras, views: &views, bodies: &bodies, tags: &priors };
     let settings = MapSettings { base_tag: Some(0), ..MapSettings::default() };
     c.bench_function("tagmap: 300 images of up to 8 tags", |b| b.iter(|| solve(black_box(&input), &settings)));
