@@ -148,8 +148,8 @@ impl Sag {
 }
 
 impl AboutAxes {
-    /// How a frame at `point_m` (base frame) behind `joints` moves, where these are small turns: its point m, and itself
-    /// about the base's axes rad. The base's own turn counts where `joints` begin at the base.
+    /// How a frame at `point_m` (base frame) behind `joints` moves, where these are small turns: its point m, and
+    /// itself about the base's axes rad. The base's own turn counts where `joints` begin at the base.
     #[must_use]
     pub fn motion(&self, poses: &LinkPoses, joints: Range<usize>, point_m: &Vector3<f64>) -> [Vector3<f64>; 2] {
         let base = if joints.start == 0 { self.base } else { Vector3::zeros() };

@@ -8,8 +8,9 @@
 //! again, until nothing explains more.
 //!
 //! The score test says beforehand what links may bring: with the pull s and the information I of trial columns z under
-//! a prior of variance a^2, Laplace's approximation is `ln Z(a) - ln Z(0) = s^T (I + a^-2)^-1 s / 2 - ln det(1 + a^2 I)
-//! / 2`. The element and size of the largest gain are where the sizes of the links' errors start from.
+//! a prior of variance a^2, Laplace's approximation is
+//! `ln Z(a) - ln Z(0) = s^T (I + a^-2)^-1 s / 2 - ln det(1 + a^2 I) / 2`. The element and size of the largest gain are
+//! where the sizes of the links' errors start from.
 //!
 //! Alternatives reject other observations. For the comparison, a rejected one costs what it is rejected at (a truncated
 //! square), so that explaining it counts.
@@ -53,8 +54,8 @@ pub(crate) struct LinkStart {
 const MIN_GAIN_NATS: f64 = 6.0;
 /// Sizes of an error that are tried, over robot.toml's.
 pub(crate) const MULTIPLES: [f64; 5] = [2.0, 5.0, 10.0, 20.0, 40.0];
-/// The scale of all tags is looked for so near to what the distances between them say, and the interval cut so often: to
-/// some 0.03 %.
+/// The scale of all tags is looked for so near to what the distances between them say, and the interval cut so often:
+/// to some 0.03 %.
 const LOG_RATIO_RANGE: f64 = 0.01;
 const GOLDEN_STEPS: usize = 8;
 /// A lens that is not the one of robot.toml may be off by so many of a measured lens's sigmas.

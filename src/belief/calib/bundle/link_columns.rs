@@ -1,8 +1,8 @@
 //! The body's columns of the normal equations: where joints sit on their parent links, and how the arm bends.
 //!
-//! Six columns a joint for its link: shift along and turn about the parent link's axes. A turn phi acts as a rotation vector, so
-//! that a change of it turns the link by `J(phi)`, the left Jacobian of SO(3). They are one dense block, present only
-//! where links are estimated.
+//! Six columns a joint for its link: shift along and turn about the parent link's axes. A turn phi acts as a rotation
+//! vector, so that a change of it turns the link by `J(phi)`, the left Jacobian of SO(3). They are one dense block,
+//! present only where links are estimated.
 
 use crate::calib::bundle::linearize::NormalEquations;
 use crate::calib::bundle::link_twists::LinkSums;

@@ -43,7 +43,8 @@ impl Estimate<'_> {
             .unknown_sag(columns.start)
             .map_or(0.0, |follow| tool.iter().map(|at| at.moved_by(&follow).norm_squared()).sum::<f64>()));
         let whole = format!(
-            "the arm bends under its weight: estimated with the sensors, which alone would have left {:.1} mm at the tool",
+            "the arm bends under its weight: estimated with the sensors, which alone would have left {:.1} mm at the \
+             tool",
             1e3 * unknown_m
         );
         let whole = (finding("arm".to_owned(), None, unknown_m), whole);

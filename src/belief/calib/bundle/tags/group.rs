@@ -3,8 +3,8 @@
 //! Where several tags are off, the estimate under their survey is a compromise, and every tag seems to have moved. So
 //! all tags are freed. Their departures d from the survey then have the covariance `V = C + S`, of the estimate and the
 //! survey, and the model `d = J m + sum of E_i x_i`: one motion m of all of them against the base, for which no tag is
-//! to blame, and a departure of its own of each tag i that was moved. Generalized least squares; the tags that save most
-//! of `d^T V^-1 d` were moved, while each saves enough. The evidence decides whether they stay.
+//! to blame, and a departure of its own of each tag i that was moved. Generalized least squares; the tags that save
+//! most of `d^T V^-1 d` were moved, while each saves enough. The evidence decides whether they stay.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 

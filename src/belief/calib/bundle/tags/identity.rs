@@ -4,8 +4,8 @@
 //! surveyed at p seems to be at `q_i = T_i m_i`. Where the median of q_i is the place of another tag that does not fit,
 //! and that one's is this one's, their ids are exchanged. A tag of another size is seen too far or too near by the
 //! ratio of the sizes: the median of `|T_i^-1 p| / |m_i|`, if that brings its observations together. Where all tags are
-//! of another size, so is each distance between two of them in one view: the median of `|p_a - p_b| / |m_a - m_b|`, which
-//! no joint has a part in.
+//! of another size, so is each distance between two of them in one view: the median of `|p_a - p_b| / |m_a - m_b|`,
+//! which no joint has a part in.
 
 use nalgebra::{Isometry3, Vector3};
 

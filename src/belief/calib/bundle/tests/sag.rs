@@ -90,7 +90,8 @@ fn a_soft_arm_is_as_good_as_a_stiff_one() {
         let of = |errors: &[f64]| [0.5, 0.95].map(|q| 1e3 * quantile(errors, q).expect("values"));
         let [stiff, plain, bent] = [&stiff, &plain, &bent].map(|errors| of(errors));
         println!(
-            "{rad_per_nm:.0e} rad/(N m), {load_n} N: stiff {stiff:.2?}, soft as drawn {plain:.2?}, with sag {bent:.2?} mm; \
+            "{rad_per_nm:.0e} rad/(N m), {load_n} N: stiff {stiff:.2?}, soft as drawn {plain:.2?}, with sag \
+             {bent:.2?} mm; \
              sag {n_named}, links {n_links} of {SEEDS}"
         );
         assert!(bent[0] < 1.3 * stiff[0] && bent[1] < 1.3 * stiff[1], "{bent:?} mm, {stiff:?} mm");
