@@ -51,8 +51,8 @@ fn a_good_arm_is_left_alone() {
     }
 }
 
-/// Links, tool point, survey frame and lens from robot.toml's own sigmas: the tool is as far off as data and priors say.
-/// By data alone the mean would be above 9.
+/// Links, tool point, survey frame and lens from robot.toml's own sigmas: the tool is as far off as data and priors
+/// say.
 #[test]
 fn a_drawing_within_its_sigmas_is_as_wrong_as_predicted() {
     let nees: Vec<f64> = of(CaseKind::WithinSigmas).filter_map(|row| row.nees_with_priors).collect();

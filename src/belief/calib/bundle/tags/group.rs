@@ -6,11 +6,11 @@
 //! to blame, and a departure of its own of each tag i that was moved. Generalized least squares; the tags that save
 //! most of `d^T V^-1 d` were moved, while each saves enough. The evidence decides whether they stay.
 
-use nalgebra::{Cholesky, DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector, Vector3};
 
 use crate::calib::bundle::estimate::{Estimate, estimate};
 use crate::calib::bundle::input::BundleInput;
-use crate::calib::bundle::tags::identity::TagFault;
+use crate::calib::bundle::tags::identity::{NEARER, TagFault};
 use armcal_core::robot::Robot;
 use armcal_core::spatial::{adjoint, log};
 
@@ -42,6 +42,9 @@ pub(crate) fn moved_group(input: &BundleInput<'_>) -> Vec<TagFault> {
         let squares: f64 = (0..moved.len()).map(|k| own.fixed_rows::<3>(6 * k + first).norm_squared()).sum();
         (squares / (3 * moved.len()) as f64).sqrt()
     });
+    if let Some(exchanged) = departures.exchanged(&moved) {
+        return vec![exchanged];
+    }
     let fault = |&at: &usize| {
         let tag_idx = departures.tags[at];
         let tag = &input.robot.tags[tag_idx];
@@ -54,6 +57,8 @@ pub(crate) fn moved_group(input: &BundleInput<'_>) -> Vec<TagFault> {
 struct Departures {
     /// Indices into the robot's tags, six rows each.
     tags: Vec<usize>,
+    /// Where each is by the survey, and by the views, base frame, m.
+    places: Vec<[Vector3<f64>; 2]>,
     whitened: DVector<f64>,
     /// What makes departures white.
     factor: Cholesky<f64, nalgebra::Dyn>,
@@ -69,11 +74,14 @@ impl Departures {
         let column = |row: usize| seen[row / 6].1 + row % 6;
         let mut covariance = DMatrix::from_fn(n, n, |i, k| found.posterior.covariance[(column(i), column(k))]);
         let mut by = DVector::zeros(n);
+        let mut places = Vec::with_capacity(seen.len());
         let mut common = DMatrix::zeros(n, 6);
         for (k, &(tag_idx, _)) in seen.iter().enumerate() {
             let tag = &robot.tags[tag_idx];
             let surveyed = tag.base_from_tag.isometry();
-            by.fixed_rows_mut::<6>(6 * k).copy_from(&log(&surveyed.inv_mul(&found.tag(tag_idx).0)));
+            let (pose, _) = found.tag(tag_idx);
+            places.push([surveyed.translation.vector, pose.translation.vector]);
+            by.fixed_rows_mut::<6>(6 * k).copy_from(&log(&surveyed.inv_mul(&pose)));
             common.fixed_rows_mut::<6>(6 * k).copy_from(&adjoint(&surveyed.inverse()));
             for row in 0..6 {
                 let std = if row < 3 { tag.position_std_m } else { tag.rotation_std_rad };
@@ -83,7 +91,7 @@ impl Departures {
         let factor = Cholesky::new(covariance)?;
         let whitened = factor.l_dirty().solve_lower_triangular(&by)?;
         let common = factor.l_dirty().solve_lower_triangular(&common)?;
-        Some(Self { tags: seen.into_iter().map(|(tag, _)| tag).collect(), whitened, factor, common })
+        Some(Self { tags: seen.into_iter().map(|(tag, _)| tag).collect(), places, whitened, factor, common })
     }
 
     /// Places in `tags` of those that were moved.
@@ -103,6 +111,17 @@ impl Departures {
             }
         }
         best.1
+    }
+
+    /// Two of `moved` that are each at the other's place: not moved, but with exchanged ids.
+    fn exchanged(&self, moved: &[usize]) -> Option<TagFault> {
+        let is_at = |a: usize, b: usize| {
+            let [[own, found], [other, _]] = [self.places[a], self.places[b]];
+            (found - other).norm() < NEARER * (found - own).norm()
+        };
+        let mut pairs = moved.iter().enumerate().flat_map(|(k, &a)| moved[k + 1..].iter().map(move |&b| (a, b)));
+        let (a, b) = pairs.find(|&(a, b)| is_at(a, b) && is_at(b, a))?;
+        Some(TagFault::Swapped([self.tags[a].min(self.tags[b]), self.tags[a].max(self.tags[b])]))
     }
 
     /// Each moved tag's departure from the survey beside the common motion, six numbers each.

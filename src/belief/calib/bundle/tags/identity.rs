@@ -65,7 +65,7 @@ const REJECTED_SHARE: f64 = 0.5;
 const MIN_OBSERVATIONS: usize = 3;
 /// Exchanged ids: so near each other's places, m, and so much nearer than to their own.
 const SAME_PLACE_M: f64 = 0.05;
-const NEARER: f64 = 0.3;
+pub(crate) const NEARER: f64 = 0.3;
 /// A size counts from this ratio on, and from so many of its standard errors.
 const LEAST_RATIO: f64 = 0.005;
 const SURE_SIGMAS: f64 = 4.0;

@@ -91,3 +91,22 @@ fn tags_that_were_moved_together_are_named() {
         assert!(seen.len() >= 8 && named * 10 >= seen.len() * 9, "{n} tags by {moved_m} m: {named} of {}", seen.len());
     }
 }
+
+#[test]
+fn tags_with_exchanged_ids_are_no_group() {
+    let robot = titan();
+    let n_tags = robot.tags.len();
+    let (mut named, mut all) = (0, 0);
+    for seed in 0..8 {
+        let pair = [seed as usize % n_tags, (seed as usize + 1) % n_tags];
+        let (views, model) = views_of_changed(&robot, &robot, seed, |truth| truth.tags.swap(pair[0], pair[1]));
+        let input = input(&robot, &views, &model);
+        let found = estimate(&input).expect("solved");
+        let drawing = Drawing::default().better(&input, &found, 0.0).unwrap_or_default();
+        let sorted = [pair[0].min(pair[1]), pair[0].max(pair[1])];
+        named += usize::from(drawing.tags == [TagFault::Swapped(sorted)]);
+        all += 1;
+    }
+    println!("exchanged: named in {named} of {all}");
+    assert!(named * 8 >= all * 7, "{named} of {all}");
+}
