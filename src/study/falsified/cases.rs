@@ -18,8 +18,6 @@ pub struct Case {
 pub enum CaseKind {
     /// Nothing: the control.
     GoodArm,
-    /// Everything of drawing, survey and lens, drawn from robot.toml's own sigmas; the size is the draw's number.
-    WithinSigmas,
     MountTurned,
     MountShifted,
     TagMoved,
@@ -81,9 +79,8 @@ const MM: f64 = 1e-3;
 pub(super) const AXES: [&str; 3] = ["x", "y", "z"];
 
 impl CaseKind {
-    pub const ALL: [Self; 25] = [
+    pub const ALL: [Self; 24] = [
         Self::GoodArm,
-        Self::WithinSigmas,
         Self::MountTurned,
         Self::MountShifted,
         Self::TagMoved,
@@ -113,7 +110,6 @@ impl CaseKind {
     pub fn name(self) -> &'static str {
         match self {
             Self::GoodArm => "good arm",
-            Self::WithinSigmas => "within sigmas",
             Self::MountTurned => "mount turned",
             Self::MountShifted => "mount shifted",
             Self::TagMoved => "tag moved",
@@ -159,7 +155,6 @@ impl CaseKind {
             Self::TagSize | Self::AllTagSizes | Self::FocalLength => (100.0, "%"),
             Self::ImageCentre => (1.0, "px"),
             Self::FewViews | Self::AlikeViews => (1.0, "views"),
-            Self::WithinSigmas => (1.0, "draw"),
             Self::SensorRescaled => (1.0, "times"),
             Self::GoodArm | Self::IdsSwapped | Self::SensorStuck | Self::SensorDead | Self::SensorReversed => (1.0, ""),
         }
@@ -212,8 +207,7 @@ fn tags(first: usize, n: usize) -> Element {
 fn small() -> Vec<Case> {
     use CaseKind as K;
     use Element::{Axis, Joint, JointAxis, Whole};
-    let drawn = (1..=6).map(|draw| Case::new(K::WithinSigmas, Whole, f64::from(draw)));
-    let single = [
+    vec![
         Case::new(K::GoodArm, Whole, 0.0),
         Case::new(K::MountTurned, Axis(1), 5.0 * DEG),
         Case::new(K::MountTurned, Axis(0), 5.0 * DEG),
@@ -226,13 +220,11 @@ fn small() -> Vec<Case> {
         Case::new(K::SensorReversed, Joint(2), 0.0),
         Case::new(K::SensorSlipped, Joint(1), 1.0 * DEG),
         Case::new(K::FewViews, Whole, 10.0),
-    ];
-    single.into_iter().chain(drawn).collect()
+    ]
 }
 
 fn full(robot: &Robot) -> Vec<Case> {
     let mut all = vec![Case::new(CaseKind::GoodArm, Element::Whole, 0.0)];
-    all.extend([1.0, 2.0].map(|draw| Case::new(CaseKind::WithinSigmas, Element::Whole, draw)));
     all.extend(of_camera());
     all.extend(of_tags());
     all.extend(of_links(robot));

@@ -72,7 +72,7 @@ pub(super) fn right_causes(robot: &Robot, case: &Case, seed: u64) -> Vec<String>
     let one = |word: &str| vec![word.to_owned()];
     let of_joint = |word: &str| vec![format!("{word}:{joint}")];
     match case.kind {
-        CaseKind::GoodArm | CaseKind::WithinSigmas | CaseKind::FewViews | CaseKind::AlikeViews => Vec::new(),
+        CaseKind::GoodArm | CaseKind::FewViews | CaseKind::AlikeViews => Vec::new(),
         CaseKind::MountTurned | CaseKind::MountShifted => one("camera_mount"),
         CaseKind::TagMoved | CaseKind::TagsMoved => tags("tag"),
         CaseKind::TagSize => tags("tag_size"),

@@ -2,7 +2,6 @@
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use rand::RngExt;
-use rand_distr::StandardNormal;
 
 use crate::falsified::cases::{Case, CaseKind, Element};
 use armcal_core::kinematics::{Chain, ChainJoint};
@@ -31,8 +30,6 @@ pub(super) enum Perturbation {
     SurveyTurn(Vector3<f64>),
     FocalLength([f64; 2]),
     ImageCentre([f64; 2]),
-    /// Of each coefficient.
-    Distortion([f64; 4]),
     Sensor(SensorFault),
 }
 
@@ -99,7 +96,6 @@ impl Case {
         };
         let tags = self.tags(n_tags, seed);
         match (self.kind, self.element) {
-            (CaseKind::WithinSigmas, _) => self.drawn_within_sigmas(robot, seed),
             (CaseKind::MountTurned, _) => vec![P::MountTurn(along)],
             (CaseKind::MountShifted, _) => vec![P::MountShift(along)],
             (CaseKind::TagMoved | CaseKind::TagsMoved, _) => {
@@ -125,29 +121,6 @@ impl Case {
             }
             _ => Vec::new(),
         }
-    }
-
-    /// Places of all joints, tool point, frame of the survey and lens: everything that the estimate holds, or holds
-    /// priors of, beside the camera mount and each tag, which the world draws.
-    fn drawn_within_sigmas(&self, robot: &Robot, seed: u64) -> Vec<Perturbation> {
-        use Perturbation as P;
-        let (geometry, lens) = (&robot.geometry, &robot.camera.lens_priors);
-        let mut rng = stream_rng(seed, &format!("within sigmas {}", self.size));
-        let mut drawn = |std: f64| std * rng.sample::<f64, _>(StandardNormal);
-        let mut three = |std: f64| Vector3::from_fn(|_, _| drawn(std));
-        let [link_m, link_rad] = [geometry.link_position_std_m, geometry.link_rotation_std_rad];
-        let joints = 0..robot.tool.mount.n_joints;
-        let mut all: Vec<P> = joints
-            .flat_map(|joint| [P::LinkShift(joint, three(link_m)), P::LinkTurn(joint, three(link_rad))])
-            .collect();
-        all.push(P::ToolShift(three(geometry.tool_position_std_m)));
-        let aside = three(link_m);
-        all.push(P::SurveyTurn(three(link_rad)));
-        all.extend((0..robot.tags.len()).map(|tag| P::TagShift(tag, aside)));
-        all.push(P::FocalLength([drawn(lens.focal_std); 2]));
-        all.push(P::ImageCentre([0; 2].map(|_| drawn(lens.center_std_px))));
-        all.push(P::Distortion([0; 4].map(|_| drawn(lens.distortion_std))));
-        all
     }
 
     fn wrong_reading(&self) -> Option<WrongReading> {
@@ -198,7 +171,6 @@ impl Perturbation {
             Self::SurveyTurn(by) => Self::SurveyTurn(by * factor),
             Self::FocalLength(by) => Self::FocalLength(by.map(|by| by * factor)),
             Self::ImageCentre(by) => Self::ImageCentre(by.map(|by| by * factor)),
-            Self::Distortion(by) => Self::Distortion(by.map(|by| by * factor)),
             Self::Sensor(SensorFault { joint, reading: WrongReading::Slipped(by) }) => {
                 Self::Sensor(SensorFault { joint, reading: WrongReading::Slipped(by * factor) })
             }
@@ -246,11 +218,6 @@ impl Perturbation {
             Self::ImageCentre(by) => {
                 let mut at = robot.camera.lens.intrinsics();
                 at[2..].iter_mut().zip(by).for_each(|(center_px, by)| *center_px += by);
-                robot.camera.lens = robot.camera.lens.with_intrinsics(at);
-            }
-            Self::Distortion(by) => {
-                let mut at = robot.camera.lens.intrinsics();
-                at[4..].iter_mut().zip(by).for_each(|(k, by)| *k += by);
                 robot.camera.lens = robot.camera.lens.with_intrinsics(at);
             }
             Self::Sensor(_) => {}

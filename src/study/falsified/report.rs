@@ -20,7 +20,7 @@ pub fn falsified_csv(rows: &[FalsifiedRow]) -> String {
     let mut out = String::from(
         "seed,kind,element,size,unit,status,named_first,named_rightly,findings,repaired,predicted_median_mm,\
          predicted_p95_mm,with_priors_median_mm,with_priors_p95_mm,true_median_mm,true_p95_mm,wrongly_accepted,\
-         non_centrality,oracle_tool_mm,seen,reserved_mm_per_unit,oracle_mm_per_unit,nees_with_priors,reason\n",
+         non_centrality,oracle_tool_mm,seen,reserved_mm_per_unit,oracle_mm_per_unit,reason\n",
     );
     for row in rows {
         let (factor, unit) = row.case.kind.unit();
@@ -51,7 +51,6 @@ pub fn falsified_csv(rows: &[FalsifiedRow]) -> String {
             oracle.map_or(String::new(), |o| o.is_seen().to_string()),
             number(row.reserved_per_unit.map(per_unit)),
             number(true_per_unit),
-            number(row.nees_with_priors),
             format!("\"{}\"", row.reason.replace('"', "'")),
         ];
         let _ = writeln!(out, "{}", columns.join(","));
@@ -67,17 +66,6 @@ fn share<'a>(rows: impl Iterator<Item = &'a FalsifiedRow>, holds: impl Fn(&Falsi
         n_held += usize::from(holds(row));
     }
     if n == 0 { String::new() } else { format!("{n_held}/{n}") }
-}
-
-/// Drawings within their sigmas, where there are any.
-fn nees_line(rows: &[FalsifiedRow]) -> String {
-    let within = rows.iter().filter(|row| row.case.kind == CaseKind::WithinSigmas);
-    let nees: Vec<f64> = within.filter_map(|row| row.nees_with_priors).collect();
-    if nees.is_empty() {
-        return String::new();
-    }
-    let mean = nees.iter().sum::<f64>() / nees.len() as f64;
-    format!("drawings within their sigmas: mean NEES with priors {mean:.2} of 3 over {} drawings\n\n", nees.len())
 }
 
 /// A line for each kind of falsification.
@@ -97,7 +85,6 @@ pub fn falsified_markdown(study: &FalsifiedStudy) -> String {
          |---|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n",
         1e3 * good_p95_m
     );
-    out = nees_line(rows) + &out;
     let mut kinds: Vec<Option<CaseKind>> = CaseKind::ALL.into_iter().map(Some).collect();
     kinds.push(None);
     for kind in kinds {

@@ -9,10 +9,7 @@ use crate::falsified::error::FalsifiedError;
 use crate::falsified::naming::{causes_of_finding, first_causes, right_causes};
 use crate::falsified::oracle::{Oracle, OracleEffect};
 use crate::falsified::perturbation::{Perturbation, falsified_robot};
-use armcal_belief::calib::bundle::{BundleInput, HyperparameterMode, Hyperparameters, estimate, model_for, reference};
-use armcal_belief::calib::{
-    Calibration, Finding, FindingKind, JointParameters, Status, View, associate, calibrate_with_survey,
-};
+use armcal_belief::calib::{Calibration, Finding, FindingKind, Status, calibrate_with_survey};
 use armcal_belief::verify::{Belief, reaches};
 use armcal_core::kinematics::LinkCorrections;
 use armcal_core::log::Recording;
@@ -50,15 +47,13 @@ pub struct FalsifiedRow {
     pub predicted_with_priors_m: Option<Summary>,
     /// Distance at the task's targets of the tool as believed from where it is.
     pub true_m: Option<Summary>,
-    /// None where views are taken away and nothing is wrong, and of a drawing within its sigmas.
+    /// None where views are taken away and nothing is wrong.
     pub oracle: Option<OracleEffect>,
     /// Whether what is named first is what was falsified, or what the data cannot tell from it; `None` where there is
     /// nothing to name.
     pub is_named: Option<bool>,
     /// Of the reservation about the element, m per rad or m per m.
     pub reserved_per_unit: Option<f64>,
-    /// Mean of `e^T P^-1 e` over the targets, priors included, of a drawing within its sigmas that was not revised.
-    pub nees_with_priors: Option<f64>,
 }
 
 /// All rows, and which causes the data of the first seed cannot tell apart.
@@ -146,8 +141,7 @@ fn row(capture: &Capture, oracle: &Oracle<'_>, classes: &EquivalenceClasses, cas
     let robot = falsified_robot(&capture.robot, &perturbations);
     let fault = perturbations.iter().find_map(Perturbation::sensor_fault);
     let recording = capture.falsified(case, fault.as_ref());
-    let is_one_cause = !perturbations.is_empty() && case.kind != CaseKind::WithinSigmas;
-    let effect = is_one_cause.then(|| oracle.effect(&perturbations));
+    let effect = (!perturbations.is_empty()).then(|| oracle.effect(&perturbations));
     let blank = FalsifiedRow {
         seed,
         case: *case,
@@ -163,7 +157,6 @@ fn row(capture: &Capture, oracle: &Oracle<'_>, classes: &EquivalenceClasses, cas
         oracle: effect,
         is_named: None,
         reserved_per_unit: None,
-        nees_with_priors: None,
     };
     let mut right = right_causes(&robot, case, seed);
     let is_nameable = !right.is_empty();
@@ -173,14 +166,10 @@ fn row(capture: &Capture, oracle: &Oracle<'_>, classes: &EquivalenceClasses, cas
         Err(error) => FalsifiedRow { reason: error.to_string(), is_named: is_named(&[]), ..blank },
         Ok(calibration) => {
             let named_first = first_causes(&robot, &calibration);
-            let repaired = calibration.findings.iter().filter(|finding| is_repair(finding)).count();
-            let is_within_sigmas = matches!(case.kind, CaseKind::WithinSigmas | CaseKind::GoodArm) && repaired == 0;
-            let nees = is_within_sigmas.then(|| nees_with_priors(&capture.rests, &recording, &robot, &calibration));
             FalsifiedRow {
-                nees_with_priors: nees.flatten(),
                 status: if calibration.status == Status::Accepted { RunStatus::Accepted } else { RunStatus::Refused },
                 findings: findings(&robot, &calibration),
-                repaired,
+                repaired: calibration.findings.iter().filter(|finding| is_repair(finding)).count(),
                 reason: calibration.refusal.clone().unwrap_or_default(),
                 predicted_m: calibration.predicted_tool_error_m,
                 predicted_with_priors_m: calibration.predicted_tool_error_with_priors_m,
@@ -225,40 +214,6 @@ fn true_error(rests: &[TrueRest], recording: &Recording, robot: &Robot, calibrat
         Some((rest.believed_tool.origin().vector() - true_rest.tool_m).norm())
     });
     Summary::of(&errors.collect::<Vec<f64>>())
-}
-
-/// How large the tool's error is for its covariance by data and priors.
-fn nees_with_priors(
-    rests: &[TrueRest],
-    recording: &Recording,
-    robot: &Robot,
-    calibration: &Calibration,
-) -> Option<f64> {
-    let views = associate(recording, robot);
-    let views: Vec<View> = views.fit.into_iter().chain(views.held_out).collect();
-    let input = BundleInput {
-        robot,
-        views: &views,
-        model: model_for(robot, &views),
-        scales: Hyperparameters::datasheet(robot),
-        guess: JointParameters { reference: reference(&views), ..JointParameters::default() },
-        joint_prior: None,
-        evidence: HyperparameterMode::Fitted,
-    };
-    let found = estimate(&input)?;
-    let covariance = calibration.parameter_covariance(robot);
-    let sensors = calibration.sensors(robot).ok()?;
-    let belief = Belief { from: rests.first()?.start, sensors: &sensors, links: LinkCorrections::default() };
-    let (mut sum, mut n) = (0.0, 0);
-    for rest in reaches(recording, robot, &[belief]) {
-        let Some(truth) = rests.iter().find(|truth| truth.start == rest.start) else { continue };
-        let by_data = covariance.tool_position_under_m2(robot, &sensors, &rest.believed, &rest.conditions);
-        let by_priors = found.tool_covariances_by_priors_m2(&[rest.believed]);
-        let error = rest.believed_tool.origin().vector() - truth.tool_m;
-        sum += error.dot(&((by_data + by_priors.first()?).try_inverse()? * error));
-        n += 1;
-    }
-    (n > 0).then(|| sum / f64::from(n))
 }
 
 /// Tool's shift per unit by the reservation about the case's element, if there is one.

@@ -63,13 +63,6 @@ impl PriorImpact {
 }
 
 impl Estimate<'_> {
-    /// What the drawing and the lens leave open of the tool's position at each of `task`, m^2 in the base frame: to be
-    /// added to what the estimated parameters say.
-    #[must_use]
-    pub fn tool_covariances_by_priors_m2(&self, task: &[JointAngles]) -> Vec<Matrix3<f64>> {
-        self.prior_impact_with(None, task, 0.0).covariances_m2
-    }
-
     /// What the drawing leaves open at `task`, where the data alone predict `predicted_m`.
     #[cfg(test)]
     pub(crate) fn prior_impact(&self, task: &[JointAngles], predicted_m: f64) -> PriorImpact {
