@@ -38,7 +38,10 @@ impl TagFault {
                 robot.tags[b].base_from_tag = place;
             }
             Self::Size { tag_idx, ratio } => robot.tags[tag_idx].size_m *= ratio,
-            Self::AllSizes { ratio } => robot.tags.iter_mut().for_each(|tag| tag.size_m *= ratio),
+            Self::AllSizes { ratio } => {
+                robot.tags.iter_mut().for_each(|tag| tag.size_m *= ratio);
+                robot.gripper_tag.iter_mut().for_each(|tag| tag.size_m *= ratio);
+            }
             Self::Moved { tag_idx, std } => {
                 let tag = &mut robot.tags[tag_idx];
                 [tag.position_std_m, tag.rotation_std_rad] = std;
