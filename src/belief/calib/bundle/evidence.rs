@@ -137,45 +137,195 @@ pub(crate) fn updated(
     target: &ScaleTarget<'_>,
 ) -> Hyperparameters {
     let mut next = problem.scales.clone();
-    update_joints(problem, state, posterior, target, &mut next);
-    update_terms(problem, state, posterior, target, &mut next);
-    update_camera_error(problem, state, posterior, target, &mut next);
-    update_noise(problem, state, (normal, posterior), target, &mut next);
+    let update = ScaleUpdate { problem, state, posterior, target };
+    update.update_joints(&mut next);
+    update.update_terms(&mut next);
+    update.update_camera_error(&mut next);
+    update.update_noise(normal, &mut next);
     next
 }
 
-/// The noise of corners; of a recording with positions or poses in their place theirs, each by itself.
-fn update_noise(
-    problem: &BundleProblem<'_>,
-    state: &State,
-    (normal, posterior): (&NormalEquations, &Posterior),
-    target: &ScaleTarget<'_>,
-    next: &mut Hyperparameters,
-) {
-    let used = || problem.observations.iter().enumerate().filter(|(_, observation)| observation.is_used);
-    let n_of = |kind: NoiseKind| used().map(|(_, observation)| kind.n_coordinates(&observation.data)).sum::<usize>();
-    let [n_positions, n_rotations] = [NoiseKind::Position, NoiseKind::Rotation].map(n_of);
-    let mut chi2: f64 = used().map(|(at, _)| normal.chi2[at]).sum();
-    let mut told = determined(problem, posterior);
-    let factor = |chi2: f64, n: usize, told: f64| {
-        let free = (n as f64 - told).max(1.0);
-        ((chi2 + NU_NOISE) / target.moment.divisor(free + NU_NOISE)).sqrt()
-    };
-    for (kind, n, now, std) in [
-        (NoiseKind::Position, n_positions, problem.scales.position_std_m, &mut next.position_std_m),
-        (NoiseKind::Rotation, n_rotations, problem.scales.rotation_std_rad, &mut next.rotation_std_rad),
-    ] {
-        if n > 0 {
-            let (own_chi2, own_told) = share_of(problem, state, normal, kind);
-            let first = kind.std(target.first);
-            *std = (now * factor(own_chi2, n, own_told)).clamp(first * POSITION_BOUNDS[0], first * POSITION_BOUNDS[1]);
-            (chi2, told) = (chi2 - own_chi2, told - own_told);
+/// What new scales follow from.
+struct ScaleUpdate<'a, 'b> {
+    problem: &'a BundleProblem<'b>,
+    state: &'a State,
+    posterior: &'a Posterior,
+    target: &'a ScaleTarget<'a>,
+}
+
+impl ScaleUpdate<'_, '_> {
+    fn update_joints(&self, next: &mut Hyperparameters) {
+        let Self { problem, state, posterior, .. } = *self;
+        let ScaleTarget { first, moment } = *self.target;
+        for joint in 0..problem.robot.n_joints() {
+            let (mut sums, mut reading_var, mut n) = (Sums::default(), 0.0, 0.0);
+            for (view_idx, view) in problem.views.iter().enumerate() {
+                let variance = posterior.own[view_idx][joint];
+                if view.is_free[joint] || variance <= 0.0 {
+                    continue;
+                }
+                sums.add(state.joint_error[view_idx][joint], variance, problem.joint_error_var(view, joint).sqrt());
+                reading_var += view.reading_var[joint];
+                n += 1.0;
+            }
+            if n > 0.0 {
+                let reading_var = reading_var / n;
+                let total = sums.std(NU_JOINT, first.joint_std_rad[joint].hypot(reading_var.sqrt()), moment);
+                let least = first.joint_std_rad[joint] * SCALE_BOUNDS[0];
+                next.joint_std_rad[joint] = (total * total - reading_var).max(least * least).sqrt();
+            }
         }
     }
-    let n_corners = n_of(NoiseKind::Corner);
-    if n_corners > 0 {
-        let noise = problem.scales.noise * factor(chi2, n_corners, told);
-        next.noise = noise.clamp(NOISE_BOUNDS[0], NOISE_BOUNDS[1]);
+
+    fn update_terms(&self, next: &mut Hyperparameters) {
+        let Self { problem, state, posterior, .. } = *self;
+        let ScaleTarget { first, moment } = *self.target;
+        let layout = &problem.layout;
+        let basis = shape_prior(SHAPE_LENGTH);
+        let of_kinds = |wanted: &dyn Fn(ParameterKind) -> Option<f64>, columns: std::ops::Range<usize>, std: f64| {
+            let mut sums = Sums::default();
+            for column in columns {
+                let Some(unit) = wanted(layout.parameters[column].kind) else { continue };
+                let variance = posterior.covariance[(column, column)] / (unit * unit);
+                sums.add((state.joint[column] - problem.prior.joint_mean[column]) / unit, variance, std);
+            }
+            sums
+        };
+        let shape = |kind: ParameterKind| match kind {
+            ParameterKind::Shape(h) => Some(basis[usize::from(h)]),
+            _ => None,
+        };
+        for (joint, columns) in layout.of_joint.iter().enumerate() {
+            let sums = of_kinds(&shape, columns.clone(), problem.scales.shape_std_rad[joint]);
+            if sums != Sums::default() {
+                next.shape_std_rad[joint] = sums.std(NU_SHAPE, first.shape_std_rad[joint], moment);
+            }
+        }
+        self.update_links(next);
+        self.update_sag(next);
+        let all = 0..layout.n_joint();
+        let is = |kind: ParameterKind| move |other: ParameterKind| (other == kind).then_some(1.0);
+        let now = &problem.scales;
+        for (kind, std, first, next) in [
+            (
+                ParameterKind::OffsetPerK,
+                now.offset_std_rad_per_k,
+                first.offset_std_rad_per_k,
+                &mut next.offset_std_rad_per_k,
+            ),
+            (ParameterKind::GainPerK, now.gain_std_per_k, first.gain_std_per_k, &mut next.gain_std_per_k),
+            (
+                ParameterKind::OffsetPerMpa,
+                now.offset_std_rad_per_mpa,
+                first.offset_std_rad_per_mpa,
+                &mut next.offset_std_rad_per_mpa,
+            ),
+            (
+                ParameterKind::DriftPerH,
+                now.drift_std_rad_per_h,
+                first.drift_std_rad_per_h,
+                &mut next.drift_std_rad_per_h,
+            ),
+            (ParameterKind::HalfBacklash, now.half_play_std_rad, first.half_play_std_rad, &mut next.half_play_std_rad),
+        ] {
+            let sums = of_kinds(&is(kind), all.clone(), std);
+            if sums != Sums::default() {
+                *next = sums.std(NU_TERM, first, moment);
+            }
+        }
+    }
+
+    /// Each link's shift and turn has a size of its own, so that one wrong link does not loosen the others (automatic
+    /// relevance determination, MacKay 1994); the camera mount's likewise.
+    fn update_links(&self, next: &mut Hyperparameters) {
+        let Self { problem, state, posterior, .. } = *self;
+        let ScaleTarget { first, moment } = *self.target;
+        let layout = &problem.layout;
+        for (k, columns) in layout.links.clone().collect::<Vec<_>>().chunks_exact(3).enumerate() {
+            let mut sums = Sums::default();
+            for &column in columns {
+                let value = state.joint[column] - problem.prior.joint_mean[column];
+                sums.add(value, posterior.covariance[(column, column)], problem.scales.link_std[k / 2][k % 2]);
+            }
+            next.link_std[k / 2][k % 2] = sums.std(NU_LINK, first.link_std[k / 2][k % 2], moment);
+        }
+        if let (Some(at), false) = (layout.mount, layout.links.is_empty()) {
+            let off = log(&problem.prior.mount.inv_mul(&state.mount));
+            let unit = problem.prior.mount_std.map(BundleProblem::at_least);
+            for kind in 0..2 {
+                let (mut sums, scale) = (Sums::default(), problem.scales.mount_scale[kind]);
+                for row in 3 * kind..3 * kind + 3 {
+                    let unit = unit[row] / scale;
+                    sums.add(off[row] / unit, posterior.covariance[(at + row, at + row)] / (unit * unit), scale);
+                }
+                next.mount_scale[kind] = sums.std(NU_LINK, 1.0, moment);
+            }
+        }
+    }
+
+    /// Joints share a size of their compliances; the base has its own.
+    fn update_sag(&self, next: &mut Hyperparameters) {
+        let Self { problem, state, posterior, .. } = *self;
+        let ScaleTarget { first, moment } = *self.target;
+        let mut sums = [Sums::default(); 2];
+        for column in problem.layout.sag.clone() {
+            let group = match problem.layout.parameters[column].kind {
+                ParameterKind::Compliance => 0,
+                ParameterKind::MountCompliance(_) => 1,
+                _ => continue,
+            };
+            let value = state.joint[column] - problem.prior.joint_mean[column];
+            sums[group].add(value, posterior.covariance[(column, column)], problem.scales.compliance_std[group]);
+        }
+        if !problem.layout.sag.is_empty() {
+            next.compliance_std = [0, 1].map(|group| sums[group].std(NU_LINK, first.compliance_std[group], moment));
+        }
+    }
+
+    fn update_camera_error(&self, next: &mut Hyperparameters) {
+        let Self { problem, state, posterior, .. } = *self;
+        let ScaleTarget { first, moment } = *self.target;
+        let (Some(now), Some(first)) = (problem.scales.camera_error_std, first.camera_error_std) else { return };
+        let mut sums = [Sums::default(); 2];
+        for (error, own) in state.camera_error.iter().zip(&posterior.own) {
+            let d = log(error);
+            for k in (0..6).filter(|k| own[MAX_JOINTS + k] > 0.0) {
+                sums[k / 3].add(d[k], own[MAX_JOINTS + k], now[k / 3]);
+            }
+        }
+        next.camera_error_std = Some([0, 1].map(|k| sums[k].std(NU_CAMERA, first[k], moment)));
+    }
+
+    /// The noise of corners; of a recording with positions or poses in their place theirs, each by itself.
+    fn update_noise(&self, normal: &NormalEquations, next: &mut Hyperparameters) {
+        let Self { problem, state, posterior, .. } = *self;
+        let used = || problem.observations.iter().enumerate().filter(|(_, observation)| observation.is_used);
+        let n_of =
+            |kind: NoiseKind| used().map(|(_, observation)| kind.n_coordinates(&observation.data)).sum::<usize>();
+        let [n_positions, n_rotations] = [NoiseKind::Position, NoiseKind::Rotation].map(n_of);
+        let mut chi2: f64 = used().map(|(at, _)| normal.chi2[at]).sum();
+        let mut told = determined(problem, posterior);
+        let factor = |chi2: f64, n: usize, told: f64| {
+            let free = (n as f64 - told).max(1.0);
+            ((chi2 + NU_NOISE) / self.target.moment.divisor(free + NU_NOISE)).sqrt()
+        };
+        for (kind, n, now, std) in [
+            (NoiseKind::Position, n_positions, problem.scales.position_std_m, &mut next.position_std_m),
+            (NoiseKind::Rotation, n_rotations, problem.scales.rotation_std_rad, &mut next.rotation_std_rad),
+        ] {
+            if n > 0 {
+                let (own_chi2, own_told) = share_of(problem, state, normal, kind);
+                let first = kind.std(self.target.first);
+                *std =
+                    (now * factor(own_chi2, n, own_told)).clamp(first * POSITION_BOUNDS[0], first * POSITION_BOUNDS[1]);
+                (chi2, told) = (chi2 - own_chi2, told - own_told);
+            }
+        }
+        let n_corners = n_of(NoiseKind::Corner);
+        if n_corners > 0 {
+            let noise = problem.scales.noise * factor(chi2, n_corners, told);
+            next.noise = noise.clamp(NOISE_BOUNDS[0], NOISE_BOUNDS[1]);
+        }
     }
 }
 
@@ -255,172 +405,10 @@ pub(crate) fn determined(problem: &BundleProblem<'_>, posterior: &Posterior) -> 
     gamma
 }
 
-fn update_joints(
-    problem: &BundleProblem<'_>,
-    state: &State,
-    posterior: &Posterior,
-    target: &ScaleTarget<'_>,
-    next: &mut Hyperparameters,
-) {
-    let ScaleTarget { first, moment } = *target;
-    for joint in 0..problem.robot.n_joints() {
-        let (mut sums, mut reading_var, mut n) = (Sums::default(), 0.0, 0.0);
-        for (view_idx, view) in problem.views.iter().enumerate() {
-            let variance = posterior.own[view_idx][joint];
-            if view.is_free[joint] || variance <= 0.0 {
-                continue;
-            }
-            sums.add(state.joint_error[view_idx][joint], variance, problem.joint_error_var(view, joint).sqrt());
-            reading_var += view.reading_var[joint];
-            n += 1.0;
-        }
-        if n > 0.0 {
-            let reading_var = reading_var / n;
-            let total = sums.std(NU_JOINT, first.joint_std_rad[joint].hypot(reading_var.sqrt()), moment);
-            let least = first.joint_std_rad[joint] * SCALE_BOUNDS[0];
-            next.joint_std_rad[joint] = (total * total - reading_var).max(least * least).sqrt();
-        }
-    }
-}
-
-fn update_terms(
-    problem: &BundleProblem<'_>,
-    state: &State,
-    posterior: &Posterior,
-    target: &ScaleTarget<'_>,
-    next: &mut Hyperparameters,
-) {
-    let ScaleTarget { first, moment } = *target;
-    let layout = &problem.layout;
-    let basis = shape_prior(SHAPE_LENGTH);
-    let of_kinds = |wanted: &dyn Fn(ParameterKind) -> Option<f64>, columns: std::ops::Range<usize>, std: f64| {
-        let mut sums = Sums::default();
-        for column in columns {
-            let Some(unit) = wanted(layout.parameters[column].kind) else { continue };
-            let variance = posterior.covariance[(column, column)] / (unit * unit);
-            sums.add((state.joint[column] - problem.prior.joint_mean[column]) / unit, variance, std);
-        }
-        sums
-    };
-    let shape = |kind: ParameterKind| match kind {
-        ParameterKind::Shape(h) => Some(basis[usize::from(h)]),
-        _ => None,
-    };
-    for (joint, columns) in layout.of_joint.iter().enumerate() {
-        let sums = of_kinds(&shape, columns.clone(), problem.scales.shape_std_rad[joint]);
-        if sums != Sums::default() {
-            next.shape_std_rad[joint] = sums.std(NU_SHAPE, first.shape_std_rad[joint], moment);
-        }
-    }
-    update_links(problem, state, posterior, target, next);
-    update_sag(problem, state, posterior, target, next);
-    let all = 0..layout.n_joint();
-    let is = |kind: ParameterKind| move |other: ParameterKind| (other == kind).then_some(1.0);
-    let now = &problem.scales;
-    for (kind, std, first, next) in [
-        (
-            ParameterKind::OffsetPerK,
-            now.offset_std_rad_per_k,
-            first.offset_std_rad_per_k,
-            &mut next.offset_std_rad_per_k,
-        ),
-        (ParameterKind::GainPerK, now.gain_std_per_k, first.gain_std_per_k, &mut next.gain_std_per_k),
-        (
-            ParameterKind::OffsetPerMpa,
-            now.offset_std_rad_per_mpa,
-            first.offset_std_rad_per_mpa,
-            &mut next.offset_std_rad_per_mpa,
-        ),
-        (ParameterKind::DriftPerH, now.drift_std_rad_per_h, first.drift_std_rad_per_h, &mut next.drift_std_rad_per_h),
-        (ParameterKind::HalfBacklash, now.half_play_std_rad, first.half_play_std_rad, &mut next.half_play_std_rad),
-    ] {
-        let sums = of_kinds(&is(kind), all.clone(), std);
-        if sums != Sums::default() {
-            *next = sums.std(NU_TERM, first, moment);
-        }
-    }
-}
-
-/// Each link's shift and turn has a size of its own, so that one wrong link does not loosen the others (automatic
-/// relevance determination, MacKay 1994); the camera mount's likewise.
-fn update_links(
-    problem: &BundleProblem<'_>,
-    state: &State,
-    posterior: &Posterior,
-    target: &ScaleTarget<'_>,
-    next: &mut Hyperparameters,
-) {
-    let ScaleTarget { first, moment } = *target;
-    let layout = &problem.layout;
-    for (k, columns) in layout.links.clone().collect::<Vec<_>>().chunks_exact(3).enumerate() {
-        let mut sums = Sums::default();
-        for &column in columns {
-            let value = state.joint[column] - problem.prior.joint_mean[column];
-            sums.add(value, posterior.covariance[(column, column)], problem.scales.link_std[k / 2][k % 2]);
-        }
-        next.link_std[k / 2][k % 2] = sums.std(NU_LINK, first.link_std[k / 2][k % 2], moment);
-    }
-    if let (Some(at), false) = (layout.mount, layout.links.is_empty()) {
-        let off = log(&problem.prior.mount.inv_mul(&state.mount));
-        let unit = problem.prior.mount_std.map(BundleProblem::at_least);
-        for kind in 0..2 {
-            let (mut sums, scale) = (Sums::default(), problem.scales.mount_scale[kind]);
-            for row in 3 * kind..3 * kind + 3 {
-                let unit = unit[row] / scale;
-                sums.add(off[row] / unit, posterior.covariance[(at + row, at + row)] / (unit * unit), scale);
-            }
-            next.mount_scale[kind] = sums.std(NU_LINK, 1.0, moment);
-        }
-    }
-}
-
-/// Joints share a size of their compliances; the base has its own.
-fn update_sag(
-    problem: &BundleProblem<'_>,
-    state: &State,
-    posterior: &Posterior,
-    target: &ScaleTarget<'_>,
-    next: &mut Hyperparameters,
-) {
-    let ScaleTarget { first, moment } = *target;
-    let mut sums = [Sums::default(); 2];
-    for column in problem.layout.sag.clone() {
-        let group = match problem.layout.parameters[column].kind {
-            ParameterKind::Compliance => 0,
-            ParameterKind::MountCompliance(_) => 1,
-            _ => continue,
-        };
-        let value = state.joint[column] - problem.prior.joint_mean[column];
-        sums[group].add(value, posterior.covariance[(column, column)], problem.scales.compliance_std[group]);
-    }
-    if !problem.layout.sag.is_empty() {
-        next.compliance_std = [0, 1].map(|group| sums[group].std(NU_LINK, first.compliance_std[group], moment));
-    }
-}
-
 impl PartialEq for Sums {
     fn eq(&self, other: &Self) -> bool {
         self.squares == other.squares && self.gamma == other.gamma
     }
-}
-
-fn update_camera_error(
-    problem: &BundleProblem<'_>,
-    state: &State,
-    posterior: &Posterior,
-    target: &ScaleTarget<'_>,
-    next: &mut Hyperparameters,
-) {
-    let ScaleTarget { first, moment } = *target;
-    let (Some(now), Some(first)) = (problem.scales.camera_error_std, first.camera_error_std) else { return };
-    let mut sums = [Sums::default(); 2];
-    for (error, own) in state.camera_error.iter().zip(&posterior.own) {
-        let d = log(error);
-        for k in (0..6).filter(|k| own[MAX_JOINTS + k] > 0.0) {
-            sums[k / 3].add(d[k], own[MAX_JOINTS + k], now[k / 3]);
-        }
-    }
-    next.camera_error_std = Some([0, 1].map(|k| sums[k].std(NU_CAMERA, first[k], moment)));
 }
 
 /// The prior's information on the joints' parameters under `scales`.
