@@ -33,25 +33,10 @@ struct Limits {
     readmit: f64,
 }
 
-/// Whether something was used so far.
-#[derive(Clone, Copy)]
-enum Before {
-    Used,
-    Rejected,
-}
-
-impl From<bool> for Before {
-    fn from(is_used: bool) -> Self {
-        if is_used { Self::Used } else { Self::Rejected }
-    }
-}
-
 impl Limits {
-    fn of(&self, before: impl Into<Before>) -> f64 {
-        match before.into() {
-            Before::Used => self.reject,
-            Before::Rejected => self.readmit,
-        }
+    /// Of each by whether it was used so far.
+    fn of<const N: usize>(&self, used: [bool; N]) -> [f64; N] {
+        used.map(|is_used| if is_used { self.reject } else { self.readmit })
     }
 }
 
@@ -65,8 +50,8 @@ pub(crate) fn reject(problem: &mut BundleProblem<'_>, solved: &Solved) -> bool {
             WeightedMeasurement::Corners { .. } => fitting_corners(before, &normal.corner_chi2[at]),
             _ => {
                 let n = observation.data.n_coordinates() as f64;
-                let limit = LIMITS.of(observation.is_used) * n * noise_excess(&observation.data);
-                [normal.chi2[at] < limit; 4]
+                let excess = noise_excess(&observation.data);
+                LIMITS.of(before).map(|limit| normal.chi2[at] < limit * n * excess)
             }
         };
         changed |= used != before;
@@ -77,12 +62,12 @@ pub(crate) fn reject(problem: &mut BundleProblem<'_>, solved: &Solved) -> bool {
 
 /// The corners that belong: all, three, or none.
 fn fitting_corners(before: [bool; 4], chi2: &[f64; 4]) -> [bool; 4] {
-    let belongs = |corner: usize| chi2[corner] < CORNER_LIMITS.of(before[corner]);
-    let used = [0, 1, 2, 3].map(belongs);
+    let limits = CORNER_LIMITS.of(before);
+    let used = [0, 1, 2, 3].map(|corner| chi2[corner] < limits[corner]);
     let n = used.iter().filter(|is_used| **is_used).count();
     let sum: f64 = chi2.iter().zip(used).filter(|(_, is_used)| *is_used).map(|(chi2, _)| chi2).sum();
-    let limit = LIMITS.of(before.contains(&true)) * 2.0 * n as f64;
-    if n >= 3 && sum < limit { used } else { [false; 4] }
+    let [limit] = LIMITS.of([before.contains(&true)]);
+    if n >= 3 && sum < limit * 2.0 * n as f64 { used } else { [false; 4] }
 }
 
 /// What is rejected of an observation.
