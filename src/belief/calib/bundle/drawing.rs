@@ -22,8 +22,7 @@ use sag_start::SagStart;
 use crate::calib::bundle::estimate::{Estimate, estimate};
 use crate::calib::bundle::evidence::SCALE_BOUNDS;
 use crate::calib::bundle::input::BundleInput;
-use crate::calib::bundle::model_selection::log_evidence;
-use crate::calib::bundle::outliers::{Rejected, rejected};
+use crate::calib::bundle::model_selection::log_evidence_of_all;
 use crate::calib::bundle::score_test::GeometryElement;
 use crate::calib::bundle::tags::group::moved_group;
 use crate::calib::bundle::tags::identity::{TagFault, common_size_ratio};
@@ -88,14 +87,14 @@ impl Drawing {
             // A warm start knows the links from before, and its own test of agreement.
             return None;
         }
-        let before = evidence(found);
+        let before = log_evidence_of_all(found);
         let least_nats = least_nats.max(MIN_GAIN_NATS);
         let gain = |drawing: &Self| {
             let mut robot = input.robot.clone();
             self.apply_new_faults(drawing, &mut robot);
             let mut other = BundleInput { robot: &robot, ..input.clone() };
             drawing.apply(&mut other);
-            estimate(&other).map_or(f64::NEG_INFINITY, |found| evidence(&found) - before)
+            estimate(&other).map_or(f64::NEG_INFINITY, |found| log_evidence_of_all(&found) - before)
         };
         let mut gains: Vec<(f64, Self)> =
             self.alternatives(input, found).into_iter().map(|drawing| (gain(&drawing), drawing)).collect();
@@ -172,14 +171,6 @@ fn best_ratio(ratio: f64, gain: impl Fn(f64) -> f64) -> f64 {
         }
     }
     (0.5 * (low + high)).exp()
-}
-
-/// Logarithm of the evidence, rejected observations at the cost that they are rejected at.
-fn evidence(found: &Estimate<'_>) -> f64 {
-    let log_noise = found.problem.scales.noise.ln();
-    let cost = |rejected: Rejected| 0.5 * rejected.chi2 + rejected.n_coordinates as f64 * log_noise;
-    let rejected = found.problem.observations.iter().map(|observation| cost(rejected(observation)));
-    log_evidence(&found.problem, &found.solved.normal) - rejected.sum::<f64>()
 }
 
 impl Estimate<'_> {

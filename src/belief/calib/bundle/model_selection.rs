@@ -12,7 +12,7 @@ use nalgebra::Cholesky;
 use crate::calib::bundle::estimate::{Estimate, estimate};
 use crate::calib::bundle::input::BundleInput;
 use crate::calib::bundle::linearize::NormalEquations;
-use crate::calib::bundle::outliers::rejected;
+use crate::calib::bundle::outliers::{Rejected, rejected};
 use crate::calib::bundle::problem::{BundleProblem, WeightedMeasurement};
 use crate::calib::bundle::solve::{TIGHT, solve};
 use crate::calib::parameters::ParameterKind;
@@ -153,8 +153,10 @@ fn log_sum(std: &[f64]) -> f64 {
     std.iter().map(|std| BundleProblem::at_least(*std).ln()).sum()
 }
 
-/// A rejected observation costs what it would at the limit, so that estimates that reject others compare.
+/// With what is rejected at the cost that it is rejected at, so that estimates that reject others compare.
 pub(crate) fn log_evidence_of_all(found: &Estimate<'_>) -> f64 {
-    let rejected = found.problem.observations.iter().map(|observation| rejected(observation).chi2);
-    log_evidence(&found.problem, &found.solved.normal) - 0.5 * rejected.sum::<f64>()
+    let log_noise = found.problem.scales.noise.ln();
+    let cost = |rejected: Rejected| 0.5 * rejected.chi2 + rejected.n_coordinates as f64 * log_noise;
+    let rejected = found.problem.observations.iter().map(|observation| cost(rejected(observation)));
+    log_evidence(&found.problem, &found.solved.normal) - rejected.sum::<f64>()
 }
