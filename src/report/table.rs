@@ -271,8 +271,10 @@ fn failed_line(failed: &FailedJointTable) -> String {
 
 fn held_line(held: &HeldJointSummary) -> String {
     let HeldJointSummary { joint, kind, angle_rad, bound_rad } = held;
-    let (kind, bound_deg) = (kind.name(), bound_rad.to_degrees());
-    format!("held         {joint} ({kind}) since it did not follow: at {angle_rad:.3} rad within {bound_deg:.2} deg")
+    let (kind, [angle_deg, bound_deg]) = (kind.name(), [angle_rad, bound_rad].map(|rad| rad.to_degrees()));
+    format!(
+        "held         {joint} ({kind}): did not follow its set-points, stands at {angle_deg:.1} deg within {bound_deg:.2} deg"
+    )
 }
 
 fn prior_line(prior: &PriorTable) -> String {
