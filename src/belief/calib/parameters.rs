@@ -161,7 +161,7 @@ impl ParameterKind {
 
     /// Whether it is of the link's geometry or of how the arm bends, not of a sensor.
     #[must_use]
-    pub fn is_of_link(self) -> bool {
+    pub fn is_of_body(self) -> bool {
         matches!(self, Self::LinkShift(_) | Self::LinkTurn(_)) || self.is_of_sag()
     }
 

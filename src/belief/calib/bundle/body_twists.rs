@@ -4,13 +4,13 @@ use nalgebra::{Isometry3, Matrix6, SMatrix, Vector3, Vector6};
 
 use crate::calib::body_motion::SagPoint;
 use crate::calib::bundle::problem::BundleProblem;
-use crate::calib::bundle::schur::{Group, LinkTwists};
+use crate::calib::bundle::schur::{BodyTwists, Group};
 use armcal_core::kinematics::{AboutAxes, LinkCorrections, LinkPoses};
 use armcal_core::spatial::left_jacobian;
 
 /// Of the joints of `group`; zero elsewhere.
-pub(crate) fn link_twists(problem: &BundleProblem<'_>, group: &Group<'_>, corrections: &LinkCorrections) -> LinkTwists {
-    let mut twists = LinkTwists::zeros();
+pub(crate) fn body_twists(problem: &BundleProblem<'_>, group: &Group<'_>, corrections: &LinkCorrections) -> BodyTwists {
+    let mut twists = BodyTwists::zeros();
     let layout = &problem.layout;
     let n_links = layout.links.len();
     if !layout.sag.is_empty() {
@@ -60,8 +60,8 @@ pub(crate) fn link_twist(
 }
 
 /// What the links' block takes from a group whose own parameters are eliminated (module `linearize`).
-pub(crate) struct LinkSums {
-    pub twists: LinkTwists,
+pub(crate) struct BodySums {
+    pub twists: BodyTwists,
     /// `G - G M G`.
     pub q: Matrix6<f64>,
     pub m: Matrix6<f64>,

@@ -9,21 +9,22 @@
 
 use nalgebra::{DMatrix, DVector, Matrix6, SMatrix, SVector, Vector6};
 
-use crate::calib::bundle::link_twists::{LinkSums, link_twists, sag_twist};
+use crate::calib::bundle::body_twists::{BodySums, body_twists, sag_twist};
 use crate::calib::bundle::observation_term::{LensInformation, PoseInformation, right_jacobian_inverse};
 use crate::calib::bundle::problem::{BundleProblem, State};
 use crate::calib::bundle::schur::{
-    Columns, Directions, Group, LinkTwists, MOUNT, N_DIRECTIONS, N_VIEW_PARAMETERS, Own, SchurBlock, TIME,
+    BodyTwists, Columns, Directions, Group, MOUNT, N_DIRECTIONS, N_VIEW_PARAMETERS, Own, SchurBlock, TIME,
 };
 use armcal_core::joints::MAX_JOINTS;
+use armcal_core::kinematics::LinkCorrections;
 use armcal_core::numeric::Loss;
-use armcal_core::spatial::adjoint;
 use armcal_core::spatial::log;
 
 /// Where to linearize, and under which loss.
 struct Point<'a, 'b> {
     problem: &'a BundleProblem<'b>,
     state: &'a State,
+    corrections: LinkCorrections,
     loss: Loss,
 }
 
@@ -92,7 +93,7 @@ impl NormalEquations {
         self.right.fill(0.0);
         self.eliminated.clear();
         self.cost = 0.0;
-        let at = Point { problem, state, loss };
+        let at = Point { problem, state, corrections: problem.link_corrections(state), loss };
         for view_idx in 0..problem.views.len() {
             self.add_view(&at, view_idx);
         }
@@ -101,36 +102,8 @@ impl NormalEquations {
 
     fn add_view(&mut self, at: &Point<'_, '_>, view_idx: usize) {
         let Point { problem, state, .. } = at;
-        let view = &problem.views[view_idx];
         let poses = problem.link_poses(view_idx, state);
-        let before = poses.link(problem.n_camera_joints) * state.mount;
-        self.add_group(
-            at,
-            &Group {
-                view_idx,
-                joints: 0..problem.n_camera_joints,
-                sign: 1.0,
-                by_mount: adjoint(&state.camera_error[view_idx].inverse()),
-                camera_error: problem.scales.camera_error_std.is_some().then_some(&state.camera_error[view_idx]),
-                observations: view.observations.clone(),
-                poses: &poses,
-                base_from_camera: before * state.camera_error[view_idx],
-            },
-        );
-        if let (Some(observation), Some(tag)) = (view.gripper, &problem.robot.gripper_tag) {
-            let group = Group {
-                view_idx,
-                joints: problem.n_camera_joints..tag.mount.n_joints,
-                // Joints distal to the camera move the tag, not the camera.
-                sign: -1.0,
-                by_mount: Matrix6::identity(),
-                camera_error: None,
-                observations: observation..observation + 1,
-                poses: &poses,
-                base_from_camera: before,
-            };
-            self.add_group(at, &group);
-        }
+        Group::of_view(problem, state, view_idx, &poses).for_each(|group| self.add_group(at, &group));
     }
 
     fn add_group(&mut self, at: &Point<'_, '_>, group: &Group<'_>) {
@@ -165,10 +138,10 @@ impl NormalEquations {
             self.add_lens(&columns, &lens);
         }
         if !problem.layout.body().is_empty() {
-            let twists = link_twists(problem, group, &problem.link_corrections(at.state));
-            own.by_links = h_sum * twists;
-            let link = LinkSums { twists, q, m, g: g_sum - h_sum * shift, m_h_sum, by_lens: sums.by_lens, h_sum };
-            self.add_links(&columns, &link, &own, &directions);
+            let twists = body_twists(problem, group, &at.corrections);
+            own.by_body = h_sum * twists;
+            let link = BodySums { twists, q, m, g: g_sum - h_sum * shift, m_h_sum, by_lens: sums.by_lens, h_sum };
+            self.add_body(&columns, &link, &own, &directions);
         }
         self.infos = infos;
         self.lens_infos = lens_infos;
@@ -220,7 +193,7 @@ impl NormalEquations {
 
     /// Linearized observations, weighted by the loss, their cost added.
     fn linearize_sightings(&mut self, point: &Point<'_, '_>, group: &Group<'_>) {
-        let Point { problem, state, loss } = point;
+        let Point { problem, state, loss, .. } = point;
         self.infos.clear();
         self.lens_infos.clear();
         for at in group.observations.clone() {
@@ -304,7 +277,7 @@ impl NormalEquations {
             log_ratio: info.map(f64::ln).sum() - log_det,
             range: group.observations.clone(),
             by_lens: SMatrix::zeros(),
-            by_links: LinkTwists::zeros(),
+            by_body: BodyTwists::zeros(),
             has_any: true,
         }
     }
@@ -396,9 +369,9 @@ struct LensSums<'a> {
 }
 
 /// Twists of the camera (right, camera frame) by each common direction.
-fn directions(Point { problem, state, .. }: &Point<'_, '_>, group: &Group<'_>) -> Directions {
+fn directions(Point { problem, corrections, .. }: &Point<'_, '_>, group: &Group<'_>) -> Directions {
     let Group { poses, base_from_camera, .. } = group;
-    let sag = problem.link_corrections(state).sag;
+    let sag = &corrections.sag;
     let view = &problem.views[group.view_idx];
     let mut directions = Directions::zeros();
     let center = base_from_camera.translation.vector;

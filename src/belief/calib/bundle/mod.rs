@@ -4,6 +4,8 @@
 //! `solve` is Levenberg-Marquardt, `evidence` fits sizes, `drawing` and `failure_detection` explain what does not fit.
 
 pub(crate) mod baseline;
+mod body_columns;
+mod body_twists;
 pub(crate) mod calibration;
 mod calibration_prior;
 mod drawing;
@@ -17,8 +19,6 @@ mod failures;
 mod innovations;
 mod input;
 mod linearize;
-mod link_columns;
-mod link_twists;
 mod marginal;
 mod model;
 mod model_selection;

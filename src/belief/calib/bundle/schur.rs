@@ -4,9 +4,10 @@ use std::ops::Range;
 
 use nalgebra::{Const, DMatrix, DVector, Isometry3, Matrix6, SMatrix, SVector, Vector6};
 
-use crate::calib::bundle::problem::{BundleProblem, Layout, ViewData};
+use crate::calib::bundle::problem::{BundleProblem, Layout, State, ViewData};
 use armcal_core::joints::MAX_JOINTS;
 use armcal_core::kinematics::LinkPoses;
+use armcal_core::spatial::adjoint;
 
 /// A view's own parameters: an error of each joint, then the camera's six.
 pub(crate) const N_VIEW_PARAMETERS: usize = MAX_JOINTS + 6;
@@ -19,9 +20,9 @@ pub(crate) type Own = SMatrix<f64, N_VIEW_PARAMETERS, N_VIEW_PARAMETERS>;
 pub(crate) type Directions = SMatrix<f64, 6, N_DIRECTIONS>;
 
 /// Columns of all links that an arm may have, of their compliances, the base's and a load at the tool.
-pub(crate) const N_LINK_COLUMNS: usize = 7 * MAX_JOINTS + 4;
+pub(crate) const N_BODY_COLUMNS: usize = 7 * MAX_JOINTS + 4;
 /// Twists of the camera (right, camera frame) by each column of links and sag, in the order of [`Layout::body`].
-pub(crate) type LinkTwists = SMatrix<f64, 6, N_LINK_COLUMNS>;
+pub(crate) type BodyTwists = SMatrix<f64, 6, N_BODY_COLUMNS>;
 
 /// What is needed to get a view's own parameters back, and their covariance.
 #[derive(Clone, Debug)]
@@ -39,7 +40,7 @@ pub(crate) struct SchurBlock {
     /// The lens's part, `sum H_ic`.
     pub by_lens: SMatrix<f64, 6, 8>,
     /// `sum H_i T` of the columns of links and sag.
-    pub by_links: LinkTwists,
+    pub by_body: BodyTwists,
     /// Whether the group has any parameters of its own.
     pub has_any: bool,
 }
@@ -56,6 +57,42 @@ pub(crate) struct Group<'a> {
     pub observations: Range<usize>,
     pub poses: &'a LinkPoses,
     pub base_from_camera: Isometry3<f64>,
+}
+
+impl<'a> Group<'a> {
+    /// The groups of a view: the tags about the arm, then the tag on the gripper where it is seen.
+    pub(crate) fn of_view(
+        problem: &BundleProblem<'_>,
+        state: &'a State,
+        view_idx: usize,
+        poses: &'a LinkPoses,
+    ) -> impl Iterator<Item = Self> + use<'a> {
+        let view = &problem.views[view_idx];
+        let error = &state.camera_error[view_idx];
+        let before = poses.link(problem.n_camera_joints) * state.mount;
+        let of_tags = Self {
+            view_idx,
+            joints: 0..problem.n_camera_joints,
+            sign: 1.0,
+            by_mount: adjoint(&error.inverse()),
+            camera_error: problem.scales.camera_error_std.is_some().then_some(error),
+            observations: view.observations.clone(),
+            poses,
+            base_from_camera: before * error,
+        };
+        let of_gripper = view.gripper.zip(problem.robot.gripper_tag).map(|(observation, tag)| Self {
+            view_idx,
+            joints: problem.n_camera_joints..tag.mount.n_joints,
+            // Joints distal to the camera move the tag, not the camera.
+            sign: -1.0,
+            by_mount: Matrix6::identity(),
+            camera_error: None,
+            observations: observation..observation + 1,
+            poses,
+            base_from_camera: before,
+        });
+        std::iter::once(of_tags).chain(of_gripper)
+    }
 }
 
 /// `H_i Ad_i` and column of the tag of each observation.
@@ -112,7 +149,7 @@ impl SchurBlock {
             range,
             log_ratio: 0.0,
             by_lens: SMatrix::zeros(),
-            by_links: LinkTwists::zeros(),
+            by_body: BodyTwists::zeros(),
             has_any: false,
         }
     }
@@ -149,7 +186,7 @@ impl SchurBlock {
             pushed += self.by_lens * step.fixed_rows::<8>(at);
         }
         for (k, column) in problem.layout.body().enumerate() {
-            pushed += self.by_links.column(k) * step[column];
+            pushed += self.by_body.column(k) * step[column];
         }
         pushed
     }
@@ -190,7 +227,7 @@ impl SchurBlock {
             view += self.by_lens;
         }
         for (k, column) in layout.body().enumerate() {
-            out.column_mut(column).copy_from(&self.by_links.column(k));
+            out.column_mut(column).copy_from(&self.by_body.column(k));
         }
         out
     }
@@ -220,7 +257,7 @@ impl SchurBlock {
             view += self.twists.transpose() * self.by_lens;
         }
         for (k, column) in layout.body().enumerate() {
-            out.column_mut(column).copy_from(&self.twists.tr_mul(&self.by_links.column(k)));
+            out.column_mut(column).copy_from(&self.twists.tr_mul(&self.by_body.column(k)));
         }
         out
     }

@@ -8,11 +8,11 @@
 
 use nalgebra::{DMatrix, DVector, Matrix6, SMatrix, Vector3, Vector6};
 
+use crate::calib::bundle::body_twists::link_twist;
 use crate::calib::bundle::estimate::Estimate;
-use crate::calib::bundle::link_twists::link_twist;
 use crate::calib::bundle::observation_term::PoseInformation;
 use crate::calib::bundle::problem::WeightedMeasurement;
-use crate::calib::bundle::schur::{Group, N_VIEW_PARAMETERS, SchurBlock};
+use crate::calib::bundle::schur::{Group, N_VIEW_PARAMETERS};
 use crate::calib::geometry_error::ErrorKind;
 use crate::calib::parameters::{JointParameters, Parameter};
 use crate::calib::views::view::View;
@@ -20,7 +20,6 @@ use armcal_core::joints::{JointAngles, MAX_JOINTS};
 use armcal_core::kinematics::LinkPoses;
 use armcal_core::robot::Robot;
 use armcal_core::sensor::{ArmSensors, ConditionChange};
-use armcal_core::spatial::adjoint;
 use armcal_core::stats::chi_square_above;
 
 /// Size of an error of geometry that is worth a look: what the data cannot tell to that is not tested.
@@ -146,10 +145,9 @@ impl Estimate<'_> {
         let mut information = DMatrix::zeros(N, N);
         let mut cross = DMatrix::zeros(N, n);
         let mut groups = self.solved.normal.eliminated.iter();
-        for (view_idx, view) in problem.views.iter().enumerate() {
+        for view_idx in 0..problem.views.len() {
             let poses = problem.link_poses(view_idx, &self.solved.state);
-            for own in groups.by_ref().take(1 + usize::from(view.gripper.is_some())) {
-                let group = self.group(view_idx, own, &poses);
+            for (group, own) in Group::of_view(problem, &self.solved.state, view_idx, &poses).zip(groups.by_ref()) {
                 let trials = trials(&group);
                 let (h, g) = self.gradient(&group);
                 let m = own.twists * own.inverse * own.twists.transpose();
@@ -163,36 +161,6 @@ impl Estimate<'_> {
         score += followed.tr_mul(&self.solved.normal.right);
         information += &cross * &followed;
         Score { score, information, sensitivity: followed }
-    }
-
-    /// What carries the observations of `own`.
-    fn group<'b>(&self, view_idx: usize, own: &SchurBlock, poses: &'b LinkPoses) -> Group<'b> {
-        let (problem, state) = (&self.problem, &self.solved.state);
-        let observations = own.range.clone();
-        let before = poses.link(problem.n_camera_joints) * state.mount;
-        match &problem.robot.gripper_tag {
-            // Links behind the camera move the tag, not the camera.
-            Some(tag) if problem.views[view_idx].gripper == Some(own.range.start) => Group {
-                view_idx,
-                joints: problem.n_camera_joints..tag.mount.n_joints,
-                sign: -1.0,
-                by_mount: Matrix6::identity(),
-                camera_error: None,
-                observations,
-                poses,
-                base_from_camera: before,
-            },
-            _ => Group {
-                view_idx,
-                joints: 0..problem.n_camera_joints,
-                sign: 1.0,
-                by_mount: adjoint(&state.camera_error[view_idx].inverse()),
-                camera_error: None,
-                observations,
-                poses,
-                base_from_camera: before * state.camera_error[view_idx],
-            },
-        }
     }
 
     /// Curvature and pull of a group's observations on the camera's twist.
@@ -256,7 +224,7 @@ impl ToolJacobian {
             if joint >= tool.n_joints {
                 return Vector3::zeros();
             }
-            if parameter.kind.is_of_link() {
+            if parameter.kind.is_of_body() {
                 return by_body(robot, &poses, &tool_m, *parameter);
             }
             let spec = &sensors.models[joint].spec;
@@ -281,7 +249,7 @@ impl ToolJacobian {
             if joint >= tool.n_joints {
                 return Vector3::zeros();
             }
-            if kind.is_of_link() {
+            if kind.is_of_body() {
                 return by_body(robot, &poses, &tool_m, *parameter);
             }
             let (spec, travel_rad) = (&robot.sensors[joint], view.travel_rad[joint]);

@@ -6,10 +6,10 @@
 use nalgebra::SMatrix;
 
 use crate::calib::body_motion::SagPoint;
+use crate::calib::bundle::body_twists::sag_twist;
 use crate::calib::bundle::drawing::{MULTIPLES, gain_nats};
 use crate::calib::bundle::estimate::Estimate;
 use crate::calib::bundle::input::BundleInput;
-use crate::calib::bundle::link_twists::sag_twist;
 use crate::calib::bundle::schur::Group;
 use crate::calib::parameters::Parameter;
 use armcal_core::joints::MAX_JOINTS;
