@@ -8,7 +8,7 @@
 
 use crate::calib::bundle::drawing::Drawing;
 use crate::calib::bundle::estimate::{Estimate, estimate};
-use crate::calib::bundle::failure_pattern::{FailurePattern, Readings};
+use crate::calib::bundle::failure_pattern::{FailurePattern, MIN_STILL_VIEWS, Readings, n_still};
 use crate::calib::bundle::failures::{
     FAR_RAD, FAR_SIGMAS, Failure, FailureAdjusted, FailureSource, MIN_VIEWS, SensorUse,
 };
@@ -35,8 +35,6 @@ const PER_STEP: f64 = 9.0;
 const MAX_PER_COORDINATE: f64 = 7.5;
 /// The evidence that a failure needs: odds of e^15 to one.
 const MARGIN: f64 = 30.0;
-/// A reading moved if it spans more sigma of its noise than this.
-const STILL_SIGMAS: f64 = 8.0;
 /// At most this many failures are looked for beyond those that the readings alone show.
 const MAX_FOUND: usize = 2;
 
@@ -171,12 +169,12 @@ impl FailureSearch<'_> {
         estimate(&input)
     }
 
-    /// Whether the reading stands still over all views.
+    /// Whether the reading stands still over all views, or since one of them.
     fn is_still(&self, joint: usize) -> bool {
-        let spec = &self.robot.sensors[joint];
-        let travel = self.views.iter().filter(|view| !view.tags.is_empty()).map(|view| view.travel_rad[joint]);
-        let (low, high) = travel.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), t| (l.min(t), h.max(t)));
-        high - low <= STILL_SIGMAS * spec.noise_std_counts / spec.counts_per_rad.abs()
+        let mut shown: Vec<&View> = self.views.iter().filter(|view| !view.tags.is_empty()).collect();
+        shown.sort_by_key(|view| view.end);
+        let travel_rad: Vec<f64> = shown.iter().map(|view| view.travel_rad[joint]).collect();
+        n_still(&travel_rad, &self.robot.sensors[joint]) >= MIN_STILL_VIEWS.min(travel_rad.len())
     }
 
     /// What is wrong with a joint's sensor under the `known` failures and this sensor ignored.
@@ -211,7 +209,7 @@ impl FailureSearch<'_> {
             FailurePattern::Scaled(line) => {
                 Failure { line: Some(*line), reading: SensorUse::Used, views: Vec::new(), evidence, ..all }
             }
-            FailurePattern::Stuck => Failure { kind: FailedKind::Stuck, evidence, ..all },
+            FailurePattern::Stuck(_) => Failure { kind: FailedKind::Stuck, evidence, ..all },
             FailurePattern::Dead => Failure { evidence, ..all },
             FailurePattern::Single(views) => {
                 let (kind, reading, views) = (FailedKind::Jumps, SensorUse::Used, views.clone());

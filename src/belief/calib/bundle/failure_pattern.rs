@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, Vector3};
 use crate::calib::bundle::estimate::Estimate;
 use crate::calib::bundle::failures::{FAR_RAD, FAR_SIGMAS, SensorLine, SensorUse, slip_in_words};
 use crate::calib::views::view::View;
-use armcal_core::robot::Robot;
+use armcal_core::robot::{JointSensorSpec, Robot};
 use armcal_core::stats::quantile;
 
 /// One joint over the views that show tags, in the order of time.
@@ -23,8 +23,8 @@ pub(crate) struct Readings {
 pub(crate) enum FailurePattern {
     /// The angle is always the same.
     Locked(SensorUse),
-    /// The reading is always the same, the angle is not.
-    Stuck,
+    /// The reading is the same in so many views up to the last, the angle is not.
+    Stuck(usize),
     /// They have nothing to do with each other.
     Dead,
     /// They go the other way, along a line.
@@ -53,6 +53,24 @@ const MIN_SIDE: usize = 2;
 const MAX_SINGLE: f64 = 0.4;
 /// A locked joint's sensor is right if it is off by less than this many of the datasheet's sigma.
 const RIGHT_SIGMAS: f64 = 4.0;
+
+/// A reading moved if it spans more sigma of its noise than this.
+const STILL_SIGMAS: f64 = 8.0;
+/// Fewer views with the same reading are chance.
+pub(crate) const MIN_STILL_VIEWS: usize = 4;
+/// Motion that the camera must show meanwhile, over its sigma or [`LOCKED_RAD`].
+const STUCK_SIGMAS: f64 = 5.0;
+
+/// How many of the last readings are the same but for noise.
+pub(crate) fn n_still(travel_rad: &[f64], spec: &JointSensorSpec) -> usize {
+    let span_rad = STILL_SIGMAS * spec.noise_std_counts / spec.counts_per_rad.abs();
+    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+    let is_same = |travel_rad: &&f64| {
+        (low, high) = (low.min(**travel_rad), high.max(**travel_rad));
+        high - low <= span_rad
+    };
+    travel_rad.iter().rev().take_while(is_same).count()
+}
 
 impl Readings {
     /// Of an estimate in which the joint is free in all views.
@@ -83,13 +101,18 @@ impl Readings {
         if spread_rad < LOCKED_RAD.max(LOCKED_SIGMAS * own_rad) {
             return Some(FailurePattern::Locked(self.sensor_of_locked(robot, noise_rad)));
         }
+        let n_still = n_still(&self.travel_rad, spec);
+        let shown_rad = deviation(&self.angle_rad[self.len() - n_still..]);
+        if n_still >= MIN_STILL_VIEWS && n_still < self.len() && shown_rad > STUCK_SIGMAS * own_rad.max(LOCKED_RAD) {
+            return Some(FailurePattern::Stuck(n_still));
+        }
         if deviation(&self.travel_rad) < noise_rad {
             let counts = (spec.offset_counts
                 + spec.counts_per_rad * (spec.center_rad + quantile(&self.travel_rad, 0.5)?))
             .rem_euclid(spec.wrap_counts);
             // A broken wire reads nothing but noise about zero.
             let near_zero = counts.min(spec.wrap_counts - counts) < FAR_SIGMAS * spec.noise_std_counts.max(1.0);
-            return Some(if near_zero { FailurePattern::Dead } else { FailurePattern::Stuck });
+            return Some(if near_zero { FailurePattern::Dead } else { FailurePattern::Stuck(self.len()) });
         }
         let (off_rad, line) = self.off_line(spec.center_rad);
         let slope = line.slope;
@@ -195,8 +218,12 @@ impl Readings {
                      apart, or elsewhere"
                 )
             }
-            FailurePattern::Stuck => {
-                format!("the reading stands still over {n} views while the camera shows {shown:.1} deg of motion")
+            FailurePattern::Stuck(n_still) => {
+                let shown = range_deg(&self.angle_rad[n - n_still..]);
+                let since = if *n_still < n { "the last " } else { "" };
+                format!(
+                    "the reading stands still over {since}{n_still} views while the camera shows {shown:.1} deg of motion"
+                )
             }
             FailurePattern::Dead => {
                 format!("the reading spans {read:.1} deg and does not follow the {shown:.1} deg that the camera shows")

@@ -158,6 +158,33 @@ fn a_word_that_stays_is_stuck_and_not_locked() {
 }
 
 #[test]
+fn a_word_that_stays_from_some_view_on_is_stuck() {
+    for since in [10, 15] {
+        check(FailedKind::Stuck, 60..65, |case, joint, _| {
+            let word_rad = case.views[since].travel_rad[joint];
+            for (k, view) in case.views[since..].iter_mut().enumerate() {
+                view.travel_rad[joint] = word_rad + 1e-5 * (k % 3) as f64;
+            }
+            (0..N_VIEWS).collect()
+        });
+    }
+}
+
+#[test]
+fn a_joint_that_is_left_where_it_is_for_some_views_is_sound() {
+    for seed in 0..5 {
+        let joint = (seed % 5) as usize;
+        // Its model is that of a joint that stands still: an offset alone.
+        let mut case = case(seed, Some(joint));
+        let moving = case.robot.clone();
+        let noise = Noise { corner_px: 0.3, n_frames: 5, joint_rad: Hyperparameters::datasheet(&moving).joint_std_rad };
+        let first = views(&moving, &case.truth, &noise, N_VIEWS - 5, &mut rng(seed, "moving"));
+        case.views.splice(..N_VIEWS - 5, first);
+        assert_eq!(found_failures(&case, &[]), Vec::new(), "seed {seed}");
+    }
+}
+
+#[test]
 fn a_joint_that_stays_is_locked_whatever_its_sensor_reads() {
     check(FailedKind::Locked, 30..35, |case, joint, seed| {
         let mut rng = rng(seed, "words");
