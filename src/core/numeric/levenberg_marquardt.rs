@@ -148,6 +148,7 @@ const TINY_COST: f64 = 1e-300;
 pub fn minimize(problem: &mut impl LeastSquares, damping: &Damping, stop: &StopRule) -> Report {
     let mut level = damping.first;
     let mut report = Report { stop: Stop::Iterations, iterations: 0, last_gain: 1.0 };
+    let mut last_predicted_gain = f64::INFINITY;
     while report.iterations < stop.max_iterations {
         let cost = problem.cost();
         if cost < stop.cost {
@@ -166,6 +167,7 @@ pub fn minimize(problem: &mut impl LeastSquares, damping: &Damping, stop: &StopR
             return Report { stop, ..report };
         }
         report.iterations += 1;
+        last_predicted_gain = predicted_gain.abs();
         let trial = problem.trial_cost();
         // Not a number is no lower cost either.
         if let Some(trial) = trial.filter(|trial| *trial <= cost * (1.0 + stop.slack)) {
@@ -193,6 +195,9 @@ pub fn minimize(problem: &mut impl LeastSquares, damping: &Damping, stop: &StopR
     }
     if problem.cost() < stop.cost {
         report.stop = Stop::Cost;
+    } else if last_predicted_gain <= stop.rounding * problem.cost() {
+        // Steps to and fro between states that differ by rounding alone.
+        report.stop = Stop::Rounding;
     }
     report
 }
@@ -299,5 +304,37 @@ mod tests {
             let report = minimize(&mut Wall { has_factor }, &DAMPING, &StopRule::after(1000));
             assert_eq!((report.stop, report.outcome()), (stop, outcome));
         }
+    }
+
+    /// Two states whose costs differ by rounding, each a step from the other.
+    struct Swing {
+        cost: f64,
+    }
+
+    impl LeastSquares for Swing {
+        fn cost(&self) -> f64 {
+            self.cost
+        }
+
+        fn propose(&mut self, _: f64) -> Option<Proposal> {
+            Some(Proposal { length: f64::INFINITY, predicted_gain: 1e-13 })
+        }
+
+        fn trial_cost(&mut self) -> Option<f64> {
+            Some(1.0 + 1e-14 - (self.cost - 1.0))
+        }
+
+        fn accept(&mut self) {
+            self.cost = 1.0 + 1e-14 - (self.cost - 1.0);
+        }
+    }
+
+    #[test]
+    fn swinging_within_rounding_is_converged() {
+        let rule = StopRule { predicted_gain: 1e-15, slack: 1e-13, rounding: 1e-11, ..StopRule::after(20) };
+        let report = minimize(&mut Swing { cost: 1.0 }, &DAMPING, &rule);
+        assert_eq!((report.stop, report.iterations, report.outcome()), (Stop::Rounding, 20, Outcome::Converged));
+        let report = minimize(&mut Swing { cost: 1.0 }, &DAMPING, &StopRule { rounding: 0.0, ..rule });
+        assert_eq!(report.outcome(), Outcome::Stalled);
     }
 }
