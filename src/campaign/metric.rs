@@ -93,6 +93,11 @@ metrics! {
     PredictedToolErrorMax = "predicted_tool_error_max_m", Metres, MoreIsWorse, |f| {
         Some(f.summary.calibration.predicted_tool_error_m?.max)
     };
+    PredictedWithPriorsP95 = "predicted_tool_error_with_priors_p95_m", Metres, MoreIsWorse, |f| {
+        Some(f.summary.calibration.predicted_tool_error_with_priors_m?.p95)
+    };
+    Findings = "findings", Count, MoreIsWorse, |f| Some(f.summary.calibration.findings.len() as f64);
+    Reservations = "reservations", Count, MoreIsWorse, |f| Some(f.summary.calibration.reservations.len() as f64);
     Nees = "nees", None, MoreIsWorse, |f| f.summary.score.as_ref()?.nees;
 }
 
