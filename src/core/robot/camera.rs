@@ -40,7 +40,7 @@ pub struct LensPriors {
 
 impl Default for LensPriors {
     fn default() -> Self {
-        Self { focal_std: 2.5e-3, center_std_px: 1.0, distortion_std: 1e-2 }
+        Self { focal_std: 2.5e-3, center_std_px: 1.0, distortion_std: 1e-3 }
     }
 }
 

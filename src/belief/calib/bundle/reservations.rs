@@ -115,9 +115,7 @@ impl Estimate<'_> {
             elements
                 .extend(six().map(|(error, axis)| self.held_element(&score, (element, error, axis), tool, touches)));
         }
-        if self.problem.layout.links.is_empty() {
-            elements.extend(six().map(|(error, axis)| self.survey_frame(&score, (error, axis), tool, touches)));
-        }
+        elements.extend(six().map(|(error, axis)| self.survey_frame(&score, (error, axis), tool, touches)));
         elements.extend((0..3).map(|axis| self.tool_point(axis, task, touches)));
         elements
     }
@@ -179,12 +177,20 @@ impl Estimate<'_> {
     ) -> HeldElement {
         let base = self.held_element(score, (GeometryElement::Joint(0), error, axis), tool, None);
         let (first, _) = columns(GeometryElement::Joint(0), error);
-        let size = Vector3::ith(axis, base.prior_std);
-        let way = if error == ErrorKind::Shift { "shift along" } else { "turn about" };
+        let priors = &self.problem.robot.geometry;
+        let (way, prior_std) = match error {
+            ErrorKind::Shift => ("shift along", priors.link_position_std_m),
+            ErrorKind::Turn => ("turn about", priors.link_rotation_std_rad),
+        };
+        let size = Vector3::ith(axis, prior_std);
         HeldElement {
             stem: format!("tag survey, {way} "),
+            prior_std,
+            // A base that is estimated takes up all of it.
+            share_left: if base.is_counted { 1.0 } else { base.share_left },
             touched_std: touches.map_or(f64::INFINITY, |touches| touches.std_of_survey(first, axis)),
             shifts: tool.iter().map(|at| -at.followed(score, first, &size)).collect(),
+            is_counted: false,
             ..base
         }
     }

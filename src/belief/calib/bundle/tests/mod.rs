@@ -16,3 +16,4 @@ mod slips;
 mod small_samples;
 mod statistics;
 mod touches;
+mod within_sigmas;
