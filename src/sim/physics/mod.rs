@@ -1,13 +1,16 @@
-//! The arm on its vehicle with its contacts: the multibody's state, moved step by step.
+//! The arm on its vehicle with its contacts, moved step by step by an engine.
 //!
-//! `dynamics` has the equations of motion and their integrator; rapier's collision pipeline finds the contacts. Each
-//! joint is held by its oil column, an implicit spring of the hydraulics.
+//! [`ArmPhysics`] hands each step to an `engine`: `featherstone` has equations of motion of our own. Each joint is held
+//! by its oil column, an implicit spring of the hydraulics. The `contact_guard` tells when nothing can touch.
 
 mod arm_physics;
 mod contact_guard;
-mod contacts;
+mod engine;
+mod featherstone;
+mod pair_filter;
 
-pub(crate) use arm_physics::{ArmPhysics, Drive, PhysicsInput};
+pub(crate) use arm_physics::ArmPhysics;
+pub(crate) use engine::{Drive, PhysicsInput};
 
 #[cfg(test)]
 mod tests;

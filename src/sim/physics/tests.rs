@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Matrix3, Unit, Vector3};
 
-use crate::dynamics::{Force, JointLoad};
+use crate::dynamics::{Body, Force, JointLoad, WaterProperties};
 use crate::physics::*;
 use crate::spec::{PhysicsSpec, VehicleMotionSpec, WaterSpec};
 use crate::vehicle::{BaseState, GRAVITY_M_S2, VehicleMotion, WaterMotion};
@@ -34,14 +34,17 @@ fn titan() -> Robot {
 /// An arm that collides with nothing.
 fn physics(chain: &Chain, bodies: &[LinkBody], step_s: f64, angles: JointAngles) -> ArmPhysics {
     let spec = PhysicsSpec { step_s, ..PhysicsSpec::default() };
-    ArmPhysics::new(&PhysicsInput { chain, bodies, solids: None, water: &DRY, spec: &spec, angles })
+    let water = WaterProperties::of(&DRY);
+    let bodies = bodies.iter().map(|link| Body::link(link, &water)).collect();
+    ArmPhysics::new(PhysicsInput { chain, bodies, free_base: None, solids: None, spec: &spec, angles })
 }
 
 /// One step without anything about the joints, the base moving from one state to the other.
 fn swing(physics: &mut ArmPhysics, from: &BaseState, to: &BaseState) {
     let still = WaterMotion { velocity: Vector3::zeros(), acceleration: Vector3::zeros() };
     let loads = [JointLoad::default(); MAX_JOINTS];
-    let drive = Drive { base: [from, to], water: [still; 2], vehicle_force: Force::zero(), loads: &loads };
+    let drive =
+        Drive { base: [from, to], water: [still; 2], wrenches: &[Force::zero(); MAX_JOINTS + 1], loads: &loads };
     physics.step(&drive);
 }
 

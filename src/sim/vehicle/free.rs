@@ -2,14 +2,14 @@
 
 use nalgebra::{Isometry3, Matrix3, Vector3};
 
-use crate::dynamics::{Body, Force, HullDrag, Inertia, Motion, Multibody};
+use crate::dynamics::{Body, Force, HullDrag, Inertia, Motion};
 use crate::error::SimError;
 use crate::fault::Impulse;
 use crate::spec::{VehicleMotionSpec, WaterSpec};
 use crate::vehicle::base_state::BaseState;
 use crate::vehicle::sinusoids::{SinusoidSum, draw_sinusoids, evaluate};
+use armcal_core::kinematics::LinkPoses;
 use armcal_core::robot::{FileIssue, Vehicle, VehicleDynamics};
-use armcal_core::streams::JointAngles;
 
 /// Duration of an impulse, s: short against the vehicle's motion, long against a step.
 const IMPULSE_DURATION_S: f64 = 0.1;
@@ -57,7 +57,7 @@ impl FreeVehicle {
 
     /// The vehicle as body 0 of the system, ballasted so that it floats level with the arm as it is now: its
     /// displacement carries vehicle and arm, and the centre of buoyancy lies above the common centre of weight.
-    pub(crate) fn body(&self, vehicle: &Vehicle, water: &WaterSpec, arm: &Multibody, angles: &JointAngles) -> Body {
+    pub(crate) fn body(&self, vehicle: &Vehicle, water: &WaterSpec, poses: &LinkPoses, links: &[Body]) -> Body {
         let d = &self.dynamics;
         let to_base = &self.base_from_vehicle;
         let diagonal = |v: &[f64; 3]| Matrix3::from_diagonal(&Vector3::from(*v));
@@ -75,7 +75,7 @@ impl FreeVehicle {
         };
         body.added = added.placed(to_base);
         body.hull = Some(HullDrag { base_from_hull: *to_base, linear: d.drag_linear, quadratic: d.drag_quadratic });
-        let (weight, moment) = wet_weight(arm, angles);
+        let (weight, moment) = wet_weight(poses, links);
         let down = to_base.rotation * -Vector3::z();
         body.displaced_kg = vehicle.mass_kg + weight;
         // Level: the moments of all weights (the vehicle's own at its origin) and of the buoyancy balance about the
@@ -151,10 +151,9 @@ impl FreeVehicle {
 }
 
 /// Wet mass of the arm, kg, and its first moment about the base's origin, kg m.
-fn wet_weight(arm: &Multibody, angles: &JointAngles) -> (f64, Vector3<f64>) {
-    let poses = arm.chain().link_poses(angles);
+fn wet_weight(poses: &LinkPoses, links: &[Body]) -> (f64, Vector3<f64>) {
     let (mut mass, mut moment) = (0.0, Vector3::zeros());
-    for (i, body) in arm.bodies().iter().enumerate().skip(1) {
+    for (i, body) in links.iter().enumerate().skip(1) {
         let place = poses.link(i);
         let at = |p: &Vector3<f64>| place.rotation * p + place.translation.vector;
         mass += body.mass_kg - body.displaced_kg;

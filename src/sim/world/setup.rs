@@ -1,16 +1,16 @@
 //! Input of a world, and the initial values of its parts.
 
 use crate::as_built::AsBuilt;
+use crate::dynamics::{Body, WaterProperties};
 use crate::error::SimError;
-use crate::physics::ArmPhysics;
 use crate::sensors::OilState;
 use crate::sensors::joint::{JointInput, JointSensor};
 use crate::sensors::thermometer::gauge_pressure_pa;
-use crate::spec::{JointSensorsSpec, MotionKind, WorldSpec};
+use crate::spec::{JointSensorsSpec, MotionKind, WaterSpec, WorldSpec};
 use crate::temperatures::Temperatures;
 use crate::truth::TruthHeader;
-use crate::vehicle::{BaseState, FreeVehicle};
-use armcal_core::robot::{Robot, Vehicle};
+use crate::vehicle::FreeVehicle;
+use armcal_core::robot::{LinkBody, Robot, Vehicle};
 use armcal_core::routine::Scene;
 use armcal_core::streams::{JointAngles, JointCounts};
 
@@ -64,19 +64,24 @@ pub(super) fn surroundings(spec: &WorldSpec, temperatures: &Temperatures, t_s: f
     OilState { oil_c: temperatures.oil_c(t_s), pressure_pa: gauge_pressure_pa(&spec.water, depth_m) }
 }
 
-/// The free vehicle that the world asks for, set on the physics at its start; `None` for a prescribed motion.
+/// The drawing's links in this water.
+pub(super) fn arm_bodies(links: &[LinkBody], water: &WaterSpec) -> Vec<Body> {
+    let water = WaterProperties::of(water);
+    links.iter().map(|link| Body::link(link, &water)).collect()
+}
+
+/// The free vehicle that the world asks for, its body put in the base's place; `None` for a prescribed motion.
 pub(super) fn free_vehicle(
     input: &WorldInput,
-    physics: &mut ArmPhysics,
-    base: &BaseState,
+    bodies: &mut [Body],
+    angles: &JointAngles,
 ) -> Result<Option<FreeVehicle>, SimError> {
     let WorldInput { vehicle, spec, seed, .. } = input;
     if spec.vehicle.motion != MotionKind::Free {
         return Ok(None);
     }
     let free = FreeVehicle::new(vehicle, &spec.vehicle, *seed)?;
-    let body = free.body(vehicle, &spec.water, physics.multibody(), &physics.angles());
-    physics.set_free(body, base.world_from_base.isometry());
+    bodies[0] = free.body(vehicle, &spec.water, &input.robot.chain.link_poses(angles), bodies);
     Ok(Some(free))
 }
 

@@ -22,7 +22,7 @@ use crate::temperatures::Temperatures;
 use crate::truth::{TruthHeader, TruthSink};
 use crate::vehicle::{BaseState, FreeVehicle, Sea, VehicleMotion, WaterMotion};
 use crate::world::setup::{
-    WorldInput, free_vehicle, header, joint_sensors, sample_joint_sensors, stowed_angles, surroundings,
+    WorldInput, arm_bodies, free_vehicle, header, joint_sensors, sample_joint_sensors, stowed_angles, surroundings,
 };
 use armcal_core::robot::{Robot, Vehicle};
 use armcal_core::streams::{ArmError, ImageDemand, JointCounts, MAX_JOINTS, Message};
@@ -86,15 +86,16 @@ impl World {
         let motion = VehicleMotion::new(&spec.vehicle, spec.recorded.as_ref(), vehicle.vehicle_from_base, seed);
         let base = motion.at(0.0);
         let mut hydraulics = Hydraulics::new(&spec.hydraulics, &actuator_inputs(robot)?, step_s);
-        let mut physics = ArmPhysics::new(&PhysicsInput {
+        let mut bodies = arm_bodies(&robot.bodies, &spec.water);
+        let free = free_vehicle(&input, &mut bodies, &angles)?;
+        let physics = ArmPhysics::new(PhysicsInput {
             chain: &robot.chain,
-            bodies: &robot.bodies,
+            bodies,
+            free_base: free.as_ref().map(|_| *base.world_from_base.isometry()),
             solids: Some(&solids),
-            water: &spec.water,
             spec: &spec.physics,
             angles,
         });
-        let free = free_vehicle(&input, &mut physics, &base)?;
         hydraulics.balance(&angles, &physics.static_torques(&base.gravity, &angles));
         let sea = Sea::new(&spec.water, seed);
         let measured = sample_joint_sensors(&mut joint_sensors, &angles, &around, 0.0);
@@ -152,20 +153,20 @@ impl World {
         let (t_s, step_s) = (self.time_s(), self.spec.physics.step_s);
         self.step += 1;
         let next_s = self.time_s();
-        let vehicle_force = match &mut self.free {
-            Some(free) => free.force(t_s, step_s, &self.base),
-            None => Force::zero(),
-        };
+        let mut wrenches = [Force::zero(); MAX_JOINTS + 1];
+        if let Some(free) = &mut self.free {
+            wrenches[0] = free.force(t_s, step_s, &self.base);
+        }
         let water_next = self.sea.at(next_s);
         let next = if self.free.is_some() { self.base } else { self.motion.at(next_s) };
         self.physics.step(&Drive {
             base: [&self.base, &next],
             water: [self.water, water_next],
-            vehicle_force,
+            wrenches: &wrenches,
             loads: &loads,
         });
         self.water = water_next;
-        self.base = if self.free.is_some() { self.physics.base_state(&self.vehicle.vehicle_from_base) } else { next };
+        self.base = self.physics.base_state(&self.vehicle.vehicle_from_base).unwrap_or(next);
         self.watch_contacts()?;
         let next_image_s = (self.n_images + 1) as f64 / self.spec.camera.rate_hz;
         if self.time_s() >= next_image_s - 1e-9 {

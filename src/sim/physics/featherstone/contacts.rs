@@ -5,14 +5,14 @@
 
 use nalgebra::{Isometry3, Vector3};
 use rapier3d::geometry::{ActiveCollisionTypes, ColliderBuilder, ColliderHandle};
-use rapier3d::pipeline::{ActiveHooks, PairFilterContext, PhysicsHooks, PhysicsWorld};
-use rapier3d::prelude::SolverFlags;
+use rapier3d::pipeline::{ActiveHooks, PhysicsWorld};
 
 use crate::body_poses::BodyPoses;
 use crate::convert::from_rapier;
 use crate::dynamics::{ContactRow, Coordinates, Force, MAX_DOF, Motion};
 use crate::physics::contact_guard::ContactGuard;
-use crate::solids::{Carrier, PairTable, Solid, Solids};
+use crate::physics::pair_filter::PairFilter;
+use crate::solids::{Carrier, Solid, Solids};
 use crate::spec::PhysicsSpec;
 use armcal_core::kinematics::{Chain, LinkPoses};
 use armcal_core::robot::parry_pose;
@@ -31,18 +31,6 @@ pub(super) struct ContactWorld {
     spec: PhysicsSpec,
     rows: Vec<ContactRow>,
     touching: Vec<(usize, usize)>,
-}
-
-struct PairFilter {
-    pairs: PairTable,
-}
-
-impl PhysicsHooks for PairFilter {
-    fn filter_contact_pair(&self, context: &PairFilterContext) -> Option<SolverFlags> {
-        let part = |handle| context.colliders.get(handle).map(|c| c.user_data as usize);
-        let (a, b) = (part(context.collider1)?, part(context.collider2)?);
-        self.pairs.is_watched(a, b).then_some(SolverFlags::COMPUTE_RIGID_IMPULSES)
-    }
 }
 
 /// State that contact forces depend on.
@@ -74,7 +62,7 @@ impl ContactWorld {
             .collect();
         Self {
             engine,
-            filter: PairFilter { pairs: solids.pairs().clone() },
+            filter: PairFilter::new(solids),
             colliders,
             guard: ContactGuard::new(chain, solids, angles),
             is_colliding: true,
