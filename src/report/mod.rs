@@ -14,5 +14,6 @@ pub use html::html;
 pub use markdown::markdown;
 pub use summary::{
     AssertSummary, CalibrationSummary, CaptureSummary, HeldJointSummary, HeldOutSummary, RenewalSummary, RunSummary,
+    WorldSummary,
 };
 pub use table::table;

@@ -46,6 +46,9 @@ pub struct RunSummary {
     /// What they leave within reach.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub still_reachable: Option<StillReachable>,
+    /// Of a simulated arm.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub world: Option<WorldSummary>,
     pub capture: CaptureSummary,
     pub calibration: CalibrationSummary,
     pub held_out: HeldOutSummary,
@@ -55,6 +58,13 @@ pub struct RunSummary {
     /// The script's `assert` steps.
     #[serde(default)]
     pub asserts: Vec<AssertSummary>,
+}
+
+/// What simulated the arm.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct WorldSummary {
+    /// `featherstone` or `rapier`.
+    pub engine: String,
 }
 
 /// A joint that did not follow its set-points and was held from then on.
@@ -256,6 +266,7 @@ impl RunSummary {
             held_joints: Vec::new(),
             still_reachable: None,
             wall_s: calibration_wall_s,
+            world: None,
             capture: CaptureSummary {
                 poses: calibration.fit.views
                     + if calibration.held_out.cross_validated { 0 } else { calibration.held_out.views },

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use crate::output::{OutputError, OutputFolder};
 #[cfg(feature = "viewer")]
 use crate::report::markdown;
-use crate::report::{AssertSummary, HeldJointSummary, RenewalSummary, RunSummary, html};
+use crate::report::{AssertSummary, HeldJointSummary, RenewalSummary, RunSummary, WorldSummary, html};
 use crate::run::describe::describe;
 use crate::run::{Failure, RunError, RunInputs, Stage, corner_scatter_px};
 use crate::score::{ScoreInput, score};
@@ -165,6 +165,7 @@ impl Run<'_> {
         let mut summary = RunSummary::of_calibration(&outcome.calibration, outcome.calibration_wall_s);
         summary.routine = Some(self.inputs.routine.name.clone());
         summary.seed = Some(self.seed);
+        summary.world = Some(WorldSummary { engine: self.inputs.spec.engine().name().to_owned() });
         summary.simulated_s = Some(outcome.duration_s);
         summary.motion_s = Some(outcome.motion_s);
         summary.waited_s = Some(outcome.waited_s);

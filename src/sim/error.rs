@@ -19,6 +19,8 @@ pub enum SimError {
     NoEffort { file: PathBuf, joint: String, effort_n_m: f64 },
     #[error("the physics engine refused joint `{joint}`")]
     Joint { joint: String },
+    #[error("the engine \"rapier\" has no vehicle that floats: use \"featherstone\"")]
+    FreeBase,
     #[error("world spec cannot be written as text: {0}")]
     SpecText(#[from] toml::ser::Error),
     #[error("the tag detector: {0}")]

@@ -118,7 +118,7 @@ impl Body {
 
     /// Gravity, and the weight of the displaced water against it at its centre. Water that accelerates pushes what it
     /// surrounds as it would push itself (Froude and Krylov).
-    pub(super) fn weight(
+    pub(crate) fn weight(
         &self,
         place: &Isometry3<f64>,
         gravity: &Vector3<f64>,

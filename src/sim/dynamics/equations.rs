@@ -180,7 +180,7 @@ impl Body {
     ///
     /// The water's part, with `u` its velocity and `r` the body's velocity against it (Kirchhoff; in the frame that
     /// moves with the water the spatial acceleration has `w x u` more): `Ia (a + w x u - du/dt) + r x* Ia r`.
-    fn newton_euler(
+    pub(crate) fn newton_euler(
         &self,
         place: &Isometry3<f64>,
         velocity: &Motion,

@@ -1,11 +1,14 @@
-//! State of arm and vehicle, moved step by step by an engine.
+//! State of arm and vehicle, moved step by step by the engine that the world names.
 
 use nalgebra::Vector3;
 
 use crate::body_poses::BodyPoses;
 use crate::dynamics::Force;
+use crate::error::SimError;
 use crate::physics::engine::{Drive, Engine, PhysicsInput};
 use crate::physics::featherstone::Featherstone;
+use crate::physics::rapier::RapierArm;
+use crate::spec::EngineKind;
 use crate::vehicle::BaseState;
 use armcal_core::spatial::{Base, Pose, Vehicle};
 use armcal_core::streams::JointAngles;
@@ -27,9 +30,15 @@ struct Push {
 }
 
 impl ArmPhysics {
-    pub(crate) fn new(input: PhysicsInput) -> Self {
+    /// # Errors
+    /// [`SimError`] for what the engine cannot do.
+    pub(crate) fn new(input: PhysicsInput) -> Result<Self, SimError> {
         let step_s = input.spec.step_s;
-        Self { engine: Box::new(Featherstone::new(input)), push: None, step_s }
+        let engine: Box<dyn Engine> = match input.engine {
+            EngineKind::Featherstone => Box::new(Featherstone::new(input)),
+            EngineKind::Rapier => Box::new(RapierArm::new(input)?),
+        };
+        Ok(Self { engine, push: None, step_s })
     }
 
     /// True joint angles, rad.

@@ -5,7 +5,7 @@ use nalgebra::{Isometry3, Vector3};
 use crate::body_poses::BodyPoses;
 use crate::dynamics::{Body, Force, JointLoad};
 use crate::solids::Solids;
-use crate::spec::PhysicsSpec;
+use crate::spec::{EngineKind, PhysicsSpec};
 use crate::vehicle::{BaseState, WaterMotion};
 use armcal_core::kinematics::Chain;
 use armcal_core::spatial::{Base, Pose, Vehicle};
@@ -20,6 +20,7 @@ pub(crate) struct PhysicsInput<'a> {
     pub free_base: Option<Isometry3<f64>>,
     /// `None` for an arm that collides with nothing.
     pub solids: Option<&'a Solids>,
+    pub engine: EngineKind,
     pub spec: &'a PhysicsSpec,
     pub angles: JointAngles,
 }

@@ -1,13 +1,15 @@
-//! The arm on its vehicle with its contacts, moved step by step by an engine.
+//! The arm on its vehicle with its contacts, moved step by step by one of two engines.
 //!
-//! [`ArmPhysics`] hands each step to an `engine`: `featherstone` has equations of motion of our own. Each joint is held
-//! by its oil column, an implicit spring of the hydraulics. The `contact_guard` tells when nothing can touch.
+//! [`ArmPhysics`] hands each step to the `engine` that `[world.physics]` names: `featherstone` has equations of motion
+//! of our own, `rapier` the multibody of that library. Each joint is held by its oil column, an implicit spring of the
+//! hydraulics. The `contact_guard` tells when nothing can touch.
 
 mod arm_physics;
 mod contact_guard;
 mod engine;
 mod featherstone;
 mod pair_filter;
+mod rapier;
 
 pub(crate) use arm_physics::ArmPhysics;
 pub(crate) use engine::{Drive, PhysicsInput};

@@ -4,12 +4,14 @@ use nalgebra::{Isometry3, Matrix3, Unit, Vector3};
 
 use crate::dynamics::{Body, Force, JointLoad, WaterProperties};
 use crate::physics::*;
-use crate::spec::{PhysicsSpec, VehicleMotionSpec, WaterSpec};
+use crate::spec::{EngineKind, PhysicsSpec, VehicleMotionSpec, WaterSpec};
 use crate::vehicle::{BaseState, GRAVITY_M_S2, VehicleMotion, WaterMotion};
 use armcal_core::kinematics::{Chain, ChainJoint};
 use armcal_core::robot::{LinkBody, Robot, load};
 use armcal_core::spatial::Pose;
 use armcal_core::streams::{JointAngles, MAX_JOINTS};
+
+mod engines;
 
 const DRY: WaterSpec = WaterSpec {
     density_kg_m3: 0.0,
@@ -33,19 +35,29 @@ fn titan() -> Robot {
 
 /// An arm that collides with nothing.
 fn physics(chain: &Chain, bodies: &[LinkBody], step_s: f64, angles: JointAngles) -> ArmPhysics {
+    physics_by(EngineKind::Featherstone, chain, bodies, step_s, angles)
+}
+
+fn physics_by(engine: EngineKind, chain: &Chain, bodies: &[LinkBody], step_s: f64, angles: JointAngles) -> ArmPhysics {
     let spec = PhysicsSpec { step_s, ..PhysicsSpec::default() };
     let water = WaterProperties::of(&DRY);
     let bodies = bodies.iter().map(|link| Body::link(link, &water)).collect();
-    ArmPhysics::new(PhysicsInput { chain, bodies, free_base: None, solids: None, spec: &spec, angles })
+    ArmPhysics::new(PhysicsInput { chain, bodies, free_base: None, solids: None, engine, spec: &spec, angles })
+        .expect("an arm")
 }
 
 /// One step without anything about the joints, the base moving from one state to the other.
 fn swing(physics: &mut ArmPhysics, from: &BaseState, to: &BaseState) {
+    physics.step(&drive([from, to], &[JointLoad::default(); MAX_JOINTS]));
+}
+
+const NO_WRENCHES: [Force; MAX_JOINTS + 1] =
+    [Force { moment: Vector3::new(0.0, 0.0, 0.0), force: Vector3::new(0.0, 0.0, 0.0) }; MAX_JOINTS + 1];
+
+/// What acts in still water.
+fn drive<'a>(base: [&'a BaseState; 2], loads: &'a [JointLoad; MAX_JOINTS]) -> Drive<'a> {
     let still = WaterMotion { velocity: Vector3::zeros(), acceleration: Vector3::zeros() };
-    let loads = [JointLoad::default(); MAX_JOINTS];
-    let drive =
-        Drive { base: [from, to], water: [still; 2], wrenches: &[Force::zero(); MAX_JOINTS + 1], loads: &loads };
-    physics.step(&drive);
+    Drive { base, water: [still; 2], wrenches: &NO_WRENCHES, loads }
 }
 
 fn still(gravity: Vector3<f64>) -> BaseState {
@@ -68,14 +80,14 @@ const MASS: f64 = 5.0;
 const LENGTH: f64 = 0.5;
 const INERTIA: f64 = 0.1;
 
-/// One joint at `origin` about `axis`, the bar along `along`.
+/// One joint at `origin` about `axis`, the bar along `along`; by an engine with a step (s), from an angle (rad).
 fn pendulum(
     origin: Vector3<f64>,
     axis: Unit<Vector3<f64>>,
     along: Vector3<f64>,
-    step_s: f64,
-    angle: f64,
+    start: (EngineKind, f64, f64),
 ) -> ArmPhysics {
+    let (engine, step_s, angle) = start;
     let joint = ChainJoint {
         name: "j".into(),
         child_link: "bar".into(),
@@ -91,7 +103,8 @@ fn pendulum(
         visuals: Vec::new(),
         collisions: Vec::new(),
     };
-    physics(&Chain::new(vec![joint]), &[body("base"), body("bar")], step_s, JointAngles::from_slice(&[angle]))
+    let bodies = [body("base"), body("bar")];
+    physics_by(engine, &Chain::new(vec![joint]), &bodies, step_s, JointAngles::from_slice(&[angle]))
 }
 
 /// `angle'' = f(t, angle)` by classic Runge-Kutta.
@@ -113,8 +126,8 @@ fn runge_kutta(f: impl Fn(f64, f64) -> f64, start: f64, end_s: f64) -> f64 {
 const SWING_S: f64 = 6.0;
 
 /// A pendulum that hangs from a base shaken by 0.3 m at 0.5 Hz along x.
-fn shaken(step_s: f64) -> f64 {
-    let mut physics = pendulum(Vector3::zeros(), Vector3::y_axis(), -Vector3::z(), step_s, 0.5);
+fn shaken(engine: EngineKind, step_s: f64) -> f64 {
+    let mut physics = pendulum(Vector3::zeros(), Vector3::y_axis(), -Vector3::z(), (engine, step_s, 0.5));
     let base = |t_s: f64| {
         let mut base = still(Vector3::new(0.0, 0.0, -9.81));
         base.acceleration.x = shake(t_s);
@@ -140,7 +153,7 @@ fn a_shaken_base_swings_the_pendulum() {
     let total = INERTIA + MASS * LENGTH * LENGTH;
     let exact = runge_kutta(|t, q| MASS * LENGTH * (shake(t) * q.cos() - 9.81 * q.sin()) / total, 0.5, SWING_S);
     let unshaken = runge_kutta(|_, q| -MASS * LENGTH * 9.81 * q.sin() / total, 0.5, SWING_S);
-    let errors = [4e-3, 2e-3, 1e-3].map(|step_s| shaken(step_s) - exact);
+    let errors = [4e-3, 2e-3, 1e-3].map(|step_s| shaken(EngineKind::Featherstone, step_s) - exact);
     eprintln!("exact {exact:.6} unshaken {unshaken:.4}, errors at 4, 2, 1 ms {errors:?}");
     for (step_s, error) in [4e-3, 2e-3, 1e-3].iter().zip(errors) {
         eprintln!("plot convergence/pendulum {step_s} {:e}", error.abs());
@@ -160,7 +173,8 @@ fn a_turning_base_pulls_the_bar_outwards() {
     let total = INERTIA + MASS * LENGTH * LENGTH;
     let exact = runge_kutta(|_, q| -MASS * radius * LENGTH * w * w * q.sin() / total, 0.8, 4.0);
     let [coarse, fine] = [4e-3, 2e-3].map(|step_s| {
-        let mut physics = pendulum(Vector3::x() * radius, Vector3::z_axis(), Vector3::x(), step_s, 0.8);
+        let mut physics =
+            pendulum(Vector3::x() * radius, Vector3::z_axis(), Vector3::x(), (EngineKind::Featherstone, step_s, 0.8));
         let mut base = still(Vector3::zeros());
         base.angular_velocity.z = w;
         for _ in 0..(4.0 / step_s).round() as u32 {
@@ -176,7 +190,8 @@ fn a_turning_base_pulls_the_bar_outwards() {
 /// Without torque about its axis a bar keeps its direction in the world however the base turns about that axis.
 #[test]
 fn a_base_that_speeds_up_leaves_a_free_bar_behind() {
-    let mut physics = pendulum(Vector3::zeros(), Vector3::z_axis(), Vector3::x(), 1e-3, 0.0);
+    let mut physics =
+        pendulum(Vector3::zeros(), Vector3::z_axis(), Vector3::x(), (EngineKind::Featherstone, 1e-3, 0.0));
     let base = |t: f64| {
         let mut base = still(Vector3::zeros());
         base.angular_acceleration.z = (2.0 * t).cos();

@@ -21,7 +21,7 @@ pub use image::{CameraMode, ImageSpec, WaterKind};
 pub use joint_sensors::JointSensorsSpec;
 pub use obstacles::UnmodelledObstacles;
 pub(crate) use physics::CONTROL_PERIOD_S;
-pub use physics::PhysicsSpec;
+pub use physics::{EngineKind, PhysicsSpec};
 pub use temperature::{Points, TemperatureSpec};
 pub use vehicle::{MotionKind, VehicleMotionSpec};
 pub use water::WaterSpec;

@@ -29,4 +29,30 @@ table!(
         /// Coulomb friction of a contact (assumed: wet steel); viscous below 1 mm/s.
         contact_friction = 0.3, in 0.0..=2.0;
     }
+    and {
+        /// What moves the arm; not named: `WorldSpec::engine`.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        engine: Option<EngineKind> = None;
+    }
 );
+
+/// Engines of rigid bodies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum EngineKind {
+    /// Equations of motion of our own, of second order in the step.
+    Featherstone,
+    /// Rapier's multibody, of first order; on a prescribed vehicle only.
+    Rapier,
+}
+
+impl EngineKind {
+    /// As in routines.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Featherstone => "featherstone",
+            Self::Rapier => "rapier",
+        }
+    }
+}

@@ -70,3 +70,17 @@ fn the_text_of_a_spec_reads_back() {
     let spec = read("[camera]\nrate_hz = 10.0").expect("valid");
     assert_eq!(read(&spec.to_toml().expect("text")).expect("valid"), spec);
 }
+
+#[test]
+fn an_engine_that_is_named_is_never_replaced() {
+    let engine = |text: &str| read(text).expect("valid").engine();
+    assert_eq!(engine(""), EngineKind::Featherstone);
+    assert_eq!(engine("[physics]\nengine = \"rapier\""), EngineKind::Rapier);
+    assert_eq!(engine("[vehicle]\nmotion = \"free\""), EngineKind::Featherstone);
+    let text = problem("[physics]\nengine = \"rapier\"\n[vehicle]\nmotion = \"free\"");
+    assert!(text.contains("r.toml") && text.contains("world.physics.engine"), "{text}");
+    let text = problem("[physics]\nengine = \"bullet\"");
+    assert!(text.contains("featherstone") && text.contains("rapier"), "{text}");
+    let named = read("[physics]\nengine = \"rapier\"").expect("valid");
+    assert_eq!(read(&named.to_toml().expect("text")).expect("valid"), named);
+}

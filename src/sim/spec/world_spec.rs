@@ -15,7 +15,7 @@ use crate::spec::hydraulics::HydraulicsSpec;
 use crate::spec::image::{CameraMode, ImageSpec};
 use crate::spec::joint_sensors::JointSensorsSpec;
 use crate::spec::obstacles::UnmodelledObstacles;
-use crate::spec::physics::{CONTROL_PERIOD_S, PhysicsSpec};
+use crate::spec::physics::{CONTROL_PERIOD_S, EngineKind, PhysicsSpec};
 use crate::spec::table::CheckedTable;
 use crate::spec::temperature::TemperatureSpec;
 use crate::spec::vehicle::{MotionKind, VehicleMotionSpec};
@@ -153,6 +153,12 @@ impl WorldSpec {
         self
     }
 
+    /// What moves the arm: as named, else the equations of our own.
+    #[must_use]
+    pub fn engine(&self) -> EngineKind {
+        self.physics.engine.unwrap_or(EngineKind::Featherstone)
+    }
+
     /// Physics steps in a control period.
     #[must_use]
     pub fn steps_per_period(&self) -> u64 {
@@ -185,6 +191,10 @@ impl WorldSpec {
         if is_recorded != self.vehicle.motion_file.is_some() {
             let problem = "goes with motion = \"recorded\", and that with it";
             return Err(FileIssue::new(file, "world.vehicle.motion_file", problem));
+        }
+        if self.engine() == EngineKind::Rapier && self.vehicle.motion == MotionKind::Free {
+            let problem = "\"rapier\" has no vehicle that floats (motion = \"free\"): use \"featherstone\"";
+            return Err(FileIssue::new(file, "world.physics.engine", problem));
         }
         let step_s = self.physics.step_s;
         if (self.steps_per_period() as f64 * step_s - CONTROL_PERIOD_S).abs() > 1e-9 {

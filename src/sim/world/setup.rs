@@ -3,14 +3,16 @@
 use crate::as_built::AsBuilt;
 use crate::dynamics::{Body, WaterProperties};
 use crate::error::SimError;
+use crate::physics::{ArmPhysics, PhysicsInput};
 use crate::sensors::OilState;
 use crate::sensors::joint::{JointInput, JointSensor};
 use crate::sensors::thermometer::gauge_pressure_pa;
-use crate::spec::{JointSensorsSpec, MotionKind, WaterSpec, WorldSpec};
+use crate::solids::Solids;
+use crate::spec::{JointSensorsSpec, MotionKind, WorldSpec};
 use crate::temperatures::Temperatures;
 use crate::truth::TruthHeader;
-use crate::vehicle::FreeVehicle;
-use armcal_core::robot::{LinkBody, Robot, Vehicle};
+use crate::vehicle::{BaseState, FreeVehicle};
+use armcal_core::robot::{Robot, Vehicle};
 use armcal_core::routine::Scene;
 use armcal_core::streams::{JointAngles, JointCounts};
 
@@ -64,25 +66,31 @@ pub(super) fn surroundings(spec: &WorldSpec, temperatures: &Temperatures, t_s: f
     OilState { oil_c: temperatures.oil_c(t_s), pressure_pa: gauge_pressure_pa(&spec.water, depth_m) }
 }
 
-/// The drawing's links in this water.
-pub(super) fn arm_bodies(links: &[LinkBody], water: &WaterSpec) -> Vec<Body> {
-    let water = WaterProperties::of(water);
-    links.iter().map(|link| Body::link(link, &water)).collect()
-}
-
-/// The free vehicle that the world asks for, its body put in the base's place; `None` for a prescribed motion.
-pub(super) fn free_vehicle(
+/// The arm, and the free vehicle that the world asks for; none for a prescribed motion.
+pub(super) fn arm_physics(
     input: &WorldInput,
-    bodies: &mut [Body],
-    angles: &JointAngles,
-) -> Result<Option<FreeVehicle>, SimError> {
-    let WorldInput { vehicle, spec, seed, .. } = input;
-    if spec.vehicle.motion != MotionKind::Free {
-        return Ok(None);
+    solids: &Solids,
+    base: &BaseState,
+    angles: JointAngles,
+) -> Result<(ArmPhysics, Option<FreeVehicle>), SimError> {
+    let WorldInput { robot, vehicle, spec, seed, .. } = input;
+    let water = WaterProperties::of(&spec.water);
+    let mut bodies: Vec<Body> = robot.bodies.iter().map(|link| Body::link(link, &water)).collect();
+    let is_free = spec.vehicle.motion == MotionKind::Free;
+    let free = is_free.then(|| FreeVehicle::new(vehicle, &spec.vehicle, *seed)).transpose()?;
+    if let Some(free) = &free {
+        bodies[0] = free.body(vehicle, &spec.water, &robot.chain.link_poses(&angles), &bodies);
     }
-    let free = FreeVehicle::new(vehicle, &spec.vehicle, *seed)?;
-    bodies[0] = free.body(vehicle, &spec.water, &input.robot.chain.link_poses(angles), bodies);
-    Ok(Some(free))
+    let physics = ArmPhysics::new(PhysicsInput {
+        chain: &robot.chain,
+        bodies,
+        free_base: free.as_ref().map(|_| *base.world_from_base.isometry()),
+        solids: Some(solids),
+        engine: spec.engine(),
+        spec: &spec.physics,
+        angles,
+    })?;
+    Ok((physics, free))
 }
 
 pub(super) fn header(input: &WorldInput, as_built: AsBuilt) -> Result<TruthHeader, SimError> {

@@ -11,7 +11,7 @@ use crate::error::SimError;
 use crate::fault::Timeline;
 use crate::gripper::Gripper;
 use crate::hydraulics::{Hydraulics, actuator_inputs};
-use crate::physics::{ArmPhysics, Drive, PhysicsInput};
+use crate::physics::{ArmPhysics, Drive};
 use crate::sensors::attitude::AttitudeSensor;
 use crate::sensors::camera::{CameraInput, CameraShot, RenderInput, WristCamera};
 use crate::sensors::joint::JointSensor;
@@ -22,7 +22,7 @@ use crate::temperatures::Temperatures;
 use crate::truth::{TruthHeader, TruthSink};
 use crate::vehicle::{BaseState, FreeVehicle, Sea, VehicleMotion, WaterMotion};
 use crate::world::setup::{
-    WorldInput, arm_bodies, free_vehicle, header, joint_sensors, sample_joint_sensors, stowed_angles, surroundings,
+    WorldInput, arm_physics, header, joint_sensors, sample_joint_sensors, stowed_angles, surroundings,
 };
 use armcal_core::robot::{Robot, Vehicle};
 use armcal_core::streams::{ArmError, ImageDemand, JointCounts, MAX_JOINTS, Message};
@@ -86,16 +86,7 @@ impl World {
         let motion = VehicleMotion::new(&spec.vehicle, spec.recorded.as_ref(), vehicle.vehicle_from_base, seed);
         let base = motion.at(0.0);
         let mut hydraulics = Hydraulics::new(&spec.hydraulics, &actuator_inputs(robot)?, step_s);
-        let mut bodies = arm_bodies(&robot.bodies, &spec.water);
-        let free = free_vehicle(&input, &mut bodies, &angles)?;
-        let physics = ArmPhysics::new(PhysicsInput {
-            chain: &robot.chain,
-            bodies,
-            free_base: free.as_ref().map(|_| *base.world_from_base.isometry()),
-            solids: Some(&solids),
-            spec: &spec.physics,
-            angles,
-        });
+        let (physics, free) = arm_physics(&input, &solids, &base, angles)?;
         hydraulics.balance(&angles, &physics.static_torques(&base.gravity, &angles));
         let sea = Sea::new(&spec.water, seed);
         let measured = sample_joint_sensors(&mut joint_sensors, &angles, &around, 0.0);

@@ -2,12 +2,14 @@
 
 use std::path::Path;
 
-use crate::spec::WorldSpec;
+use crate::spec::{EngineKind, WorldSpec};
 use crate::world::*;
 use armcal_core::robot::{load, load_vehicle};
 use armcal_core::routine::Scene;
 use armcal_core::streams::{Arm, JointAngles, MAX_JOINTS, Message, Sink};
 use armcal_core::time::Stamp;
+
+mod engines;
 
 const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
 
@@ -21,8 +23,14 @@ fn world(spec: WorldSpec, seed: u64) -> World {
 /// ten minutes of gravity and rocking. Means over 100 s, several times the slowest period, tell creep from giving.
 #[test]
 fn a_locked_valve_does_not_creep() {
+    does_not_creep(EngineKind::Featherstone);
+}
+
+fn does_not_creep(engine: EngineKind) {
     const LIMIT_RAD: f64 = 1e-4;
-    let mut world = world(WorldSpec::default(), 1);
+    let mut spec = WorldSpec::default();
+    spec.physics.engine = Some(engine);
+    let mut world = world(spec, 1);
     let n = world.joint_sensors.len();
     let start = world.physics.angles();
     let (mut first, mut last, mut swing) = ([0.0; MAX_JOINTS], [0.0; MAX_JOINTS], 0.0_f64);
@@ -40,7 +48,7 @@ fn a_locked_valve_does_not_creep() {
         }
     }
     let crept = (0..n).map(|j| (last[j] - first[j]).abs()).fold(0.0, f64::max);
-    eprintln!("crept {crept:.1e} rad in 10 minutes, swung by {swing:.1e}");
+    eprintln!("{engine:?} crept {crept:.1e} rad in 10 minutes, swung by {swing:.1e}");
     assert!(crept < LIMIT_RAD, "{crept}");
     assert!(swing > crept && swing < 1e-3, "the oil gives: {swing}");
 }
@@ -156,7 +164,7 @@ const MOVES: [[f64; 6]; 5] = [
 type Place = (JointAngles, nalgebra::Vector3<f64>);
 
 /// Drives the moves by set-points, as a session does; gives every period on the way and the mean over each rest.
-fn driven(step_s: f64, seed: u64) -> (Vec<Place>, Vec<Place>) {
+fn driven(step_s: f64, seed: u64, engine: EngineKind) -> (Vec<Place>, Vec<Place>) {
     struct Nothing;
     impl Sink for Nothing {
         fn record(&mut self, _: Stamp, _: &Message) -> Result<(), armcal_core::streams::SinkError> {
@@ -166,7 +174,7 @@ fn driven(step_s: f64, seed: u64) -> (Vec<Place>, Vec<Place>) {
     const MOVE_PERIODS: u32 = 400;
     const REST_PERIODS: u32 = 300;
     let mut spec = WorldSpec::default();
-    spec.physics.step_s = step_s;
+    (spec.physics.step_s, spec.physics.engine) = (step_s, Some(engine));
     let mut world = world(spec, seed);
     let sensors = armcal_core::sensor::ArmSensors::nominal(&world.robot);
     let stowed = world.robot.stowed;
@@ -213,9 +221,9 @@ fn the_step_is_short_enough() {
     const MOVING_RAD: f64 = 2e-3;
     eprintln!("step_ms  seed  moving_rad  moving_mm  rest_rad  rest_mm");
     for seed in [4, 5, 6] {
-        let (fine, fine_rest) = driven(2.5e-4, seed);
+        let (fine, fine_rest) = driven(2.5e-4, seed, EngineKind::Featherstone);
         for step_s in [5e-4, 1e-3, 2e-3, 2.5e-3, 5e-3] {
-            let (on_the_way, at_rest) = driven(step_s, seed);
+            let (on_the_way, at_rest) = driven(step_s, seed, EngineKind::Featherstone);
             let ((moving_rad, moving_m), (rest_rad, rest_m)) =
                 (largest(&on_the_way, &fine), largest(&at_rest, &fine_rest));
             eprintln!(

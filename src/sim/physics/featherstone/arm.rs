@@ -27,7 +27,7 @@ pub(in crate::physics) struct Featherstone {
 
 impl Featherstone {
     pub(in crate::physics) fn new(input: PhysicsInput) -> Self {
-        let PhysicsInput { chain, mut bodies, free_base, solids, spec, angles } = input;
+        let PhysicsInput { chain, mut bodies, free_base, solids, spec, angles, .. } = input;
         if free_base.is_none() {
             bodies[0] = Body::none();
         }
