@@ -1,6 +1,6 @@
 //! Wrenches on the links: gravity, water, and the inertia of a base that moves.
 
-use nalgebra::Vector3;
+use nalgebra::{Isometry3, Matrix3, Vector3};
 
 use crate::dynamics::{Body, Environment, Force, Inertia, Motion};
 use armcal_core::kinematics::LinkPoses;
@@ -44,14 +44,23 @@ impl Link {
     }
 
     /// Inertia of rapier's rigid body about its centre of mass, link axes.
-    pub(super) fn engine_inertia_kg_m2(&self) -> nalgebra::Matrix3<f64> {
+    pub(super) fn engine_inertia_kg_m2(&self) -> Matrix3<f64> {
         self.engine.shifted(&-self.engine_com_m).rotational
     }
 
     /// Wrench of gravity and buoyancy alone.
-    pub(super) fn weight(&self, place: &nalgebra::Isometry3<f64>, gravity: &Vector3<f64>) -> Force {
+    pub(super) fn weight(&self, place: &Isometry3<f64>, gravity: &Vector3<f64>) -> Force {
         self.body.weight(place, gravity, &Vector3::zeros())
     }
+}
+
+/// Momentum of a motion, the inertia in its own frame at `place`: cheaper than to turn the inertia.
+fn momentum(inertia: &Inertia, place: &Isometry3<f64>, motion: &Motion) -> Force {
+    let to_own = place.rotation.inverse();
+    let own = Motion::new(to_own * motion.angular, to_own * motion.at(&place.translation.vector));
+    let found = inertia.momentum(&own);
+    let force = place.rotation * found.force;
+    Force::new(place.rotation * found.moment + place.translation.vector.cross(&force), force)
 }
 
 /// Wrench on each link 1..=n: what moves rapier's rigid bodies, in base axes, as the links move in the world.
@@ -80,8 +89,8 @@ pub(super) fn link_wrenches(links: &[Link], state: &ArmState) -> [Force; MAX_JOI
         let velocity = *base + own;
         let acceleration = state.base_acceleration + own_acceleration + base.cross(&own);
         let (_, needed) = link.body.newton_euler(place, &velocity, &acceleration, state.around);
-        let engine = link.engine.placed(place);
-        wrenches[j + 1] = engine.momentum(&own_acceleration) + own.cross_force(&engine.momentum(&own)) - needed;
+        let engine = |motion: &Motion| momentum(&link.engine, place, motion);
+        wrenches[j + 1] = engine(&own_acceleration) + own.cross_force(&engine(&own)) - needed;
     }
     wrenches
 }
