@@ -14,9 +14,9 @@ use crate::plan::clearance::separation::{Placed, gap_m, separate};
 use crate::plan::clearance::shapes::{LinkShape, StaticShape, pairs, vec3};
 use crate::plan::motion::timing::Timing;
 use armcal_core::kinematics::LinkPoses;
-use armcal_core::robot::{MAX_COLLISION_SHAPES, Robot, StationKeeping, Vehicle, parry_pose};
+use armcal_core::robot::{MAX_COLLISION_SHAPES, PlacedShape, Robot, StationKeeping, Vehicle, parry_pose};
 use armcal_core::routine::Scene;
-use armcal_core::streams::JointAngles;
+use armcal_core::streams::{JointAngles, MAX_JOINTS};
 
 /// The closest pair and their distance.
 #[derive(Clone, Debug, PartialEq)]
@@ -40,8 +40,8 @@ pub struct ClearanceModel<'a> {
     pub(crate) robot: &'a Robot,
     pub(crate) moving: Vec<LinkShape>,
     pub(crate) standing: Vec<StaticShape>,
-    /// Joints whose error moves a collision shape in a way that matters.
-    pub(crate) n_error_joints: usize,
+    /// Of each joint: whether its error moves an outline in a way that matters.
+    pub(crate) has_error: [bool; MAX_JOINTS],
     pub(crate) pairs: Vec<Pair>,
     /// Of each pair: whether it is of links that the robot's folder does not list as ever near each other.
     pub(crate) is_unlisted: Vec<bool>,
@@ -79,6 +79,8 @@ const FAR_M: f64 = 0.4;
 pub(crate) const TOUCHING_M: f64 = 1e-6;
 /// Links of one arm neither sway against each other nor are surveyed: they need less water than the vehicle does.
 pub const SELF_MARGIN_REDUCTION_M: f64 = 0.03;
+/// A tool whose boxes stay this near to the axis that it turns about counts as round, m.
+const ROUND_TOOL_M: f64 = 0.07;
 /// Of the vehicle's position and attitude.
 const SWAY_SIGMAS: f64 = 3.0;
 
@@ -125,8 +127,7 @@ impl<'a> ClearanceModel<'a> {
     }
 
     fn of(robot: &'a Robot, moving: Vec<LinkShape>, standing: Vec<StaticShape>, sway: StationBound) -> Self {
-        // The last joint turns a nearly round gripper about its own axis: its error moves no outline.
-        let n_error_joints = robot.chain.joints().iter().filter(|joint| joint.limits.is_some()).count();
+        let has_error = std::array::from_fn(|joint| joint < robot.n_joints() && !turns_round_tool(robot, joint));
         let pairs = pairs(&moving, &standing);
         let is_listed = |inner: usize, outer: usize| {
             robot.self_pairs.as_ref().is_none_or(|stored| stored.has(moving[inner].body, moving[outer].body))
@@ -134,7 +135,7 @@ impl<'a> ClearanceModel<'a> {
         let is_unlisted = |pair: &Pair| matches!(*pair, Pair::Links { outer, inner } if !is_listed(inner, outer));
         let is_unlisted = pairs.iter().map(is_unlisted).collect();
         let timing = Timing::new(robot);
-        Self { robot, moving, standing, n_error_joints, pairs, is_unlisted, gripper_growth_m: 0.0, sway, timing }
+        Self { robot, moving, standing, has_error, pairs, is_unlisted, gripper_growth_m: 0.0, sway, timing }
     }
 
     /// The same with a gripper that stands out by `growth_m` more than its shapes: its jaws are open.
@@ -229,6 +230,21 @@ impl<'a> ClearanceModel<'a> {
                 !beside(&isometry.translation.vector, m.radius_m) && hit(&parry_pose(&isometry), &m.shape)
             })
     }
+}
+
+/// Whether a joint has no stops and turns a slender tool, and nothing else, about its own axis: its error hardly moves
+/// an outline.
+fn turns_round_tool(robot: &Robot, joint: usize) -> bool {
+    let spec = &robot.chain.joints()[joint];
+    let is_slender = |placed: &PlacedShape| {
+        let bounds = placed.shape.to_parry().compute_local_aabb();
+        let from_shape = placed.owner_from_shape * placed.shape.axis_fix();
+        bounds.vertices().iter().all(|corner| {
+            let at = from_shape * nalgebra::Point3::new(corner.x, corner.y, corner.z);
+            spec.axis.cross(&at.coords).norm() <= ROUND_TOOL_M
+        })
+    };
+    spec.limits.is_none() && joint + 1 == robot.n_joints() && robot.bodies[joint + 1].collisions.iter().all(is_slender)
 }
 
 fn moving(robot: &Robot) -> Vec<LinkShape> {

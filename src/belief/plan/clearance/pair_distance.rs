@@ -20,8 +20,13 @@ impl ClearanceModel<'_> {
         &self.pairs
     }
 
-    pub(crate) fn n_error_joints(&self) -> usize {
-        self.n_error_joints
+    /// Whether a joint's error counts: all but that of one that turns a round tool about its axis.
+    pub(crate) fn has_error(&self, joint: usize) -> bool {
+        self.has_error[joint]
+    }
+
+    pub(crate) fn has_stops(&self, joint: usize) -> bool {
+        self.robot.chain.joints()[joint].limits.is_some()
     }
 
     pub(crate) fn stowed(&self) -> &JointAngles {

@@ -42,7 +42,7 @@ impl PathPlanner<'_> {
 
     /// A goal may be beyond what is safe only where the start is farther beyond.
     fn check_limits(&self, from: &JointAngles, to: &JointAngles) -> Result<(), PathError> {
-        for (joint, limits) in self.limits.iter().enumerate().take(self.clearance.n_error_joints()) {
+        for (joint, limits) in self.limits.iter().enumerate().filter(|(joint, _)| self.clearance.has_stops(*joint)) {
             let JointLimits { lower_rad, upper_rad } = *limits;
             let beyond_rad = |angle: f64| (lower_rad - angle).max(angle - upper_rad);
             if beyond_rad(to[joint]) > beyond_rad(from[joint]).max(0.0) + ROUNDING_RAD {
