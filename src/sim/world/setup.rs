@@ -6,6 +6,7 @@ use crate::physics::ArmPhysics;
 use crate::sensors::OilState;
 use crate::sensors::joint::{JointInput, JointSensor};
 use crate::sensors::thermometer::gauge_pressure_pa;
+use crate::solids::Solids;
 use crate::spec::{JointSensorsSpec, MotionKind, WorldSpec};
 use crate::temperatures::Temperatures;
 use crate::truth::TruthHeader;
@@ -62,6 +63,14 @@ pub(super) fn sample_joint_sensors(
 /// At a depth below the surface.
 pub(super) fn surroundings(spec: &WorldSpec, temperatures: &Temperatures, t_s: f64, depth_m: f64) -> OilState {
     OilState { oil_c: temperatures.oil_c(t_s), pressure_pa: gauge_pressure_pa(&spec.water, depth_m) }
+}
+
+/// The scene as it truly is, and the solids in it.
+pub(super) fn scenery(input: &WorldInput) -> Result<(Scene, Solids), SimError> {
+    let scene = input.spec.true_scene(input.scene)?;
+    let solids = Solids::new(input.robot, input.vehicle, &scene);
+    let pairs = solids.overlaps();
+    if pairs.is_empty() { Ok((scene, solids)) } else { Err(SimError::StowedInside { pairs }) }
 }
 
 /// The free vehicle that the world asks for, set on the physics at its start; `None` for a prescribed motion.
