@@ -19,6 +19,22 @@ const MARGIN_M: f64 = 0.03;
 const ROUNDING_M: f64 = 1e-9;
 const N_JOINTS: [usize; 4] = [4, 6, 7, 8];
 
+/// A box or a cylinder along most of the link, beside its axis.
+fn drawn_link(number: usize, length_m: f64, rng: &mut ChaCha8Rng) -> String {
+    let (radius_m, beside_m): (f64, f64) = (rng.random_range(0.02..0.05), rng.random_range(-0.05..0.05));
+    let shape = if rng.random_range(0.0..1.0) < 0.5 {
+        format!("<box size=\"{} {} {}\"/>", 0.8 * length_m, 2.0 * radius_m, 3.0 * radius_m)
+    } else {
+        format!("<cylinder radius=\"{radius_m}\" length=\"{}\"/>", 0.8 * length_m)
+    };
+    format!(
+        "<link name=\"l{number}\"><inertial><mass value=\"5\"/><inertia ixx=\"0.1\" ixy=\"0\" ixz=\"0\" \
+         iyy=\"0.1\" iyz=\"0\" izz=\"0.1\"/></inertial><collision>\
+         <origin xyz=\"{} {beside_m} 0\" rpy=\"0 1.5708 0\"/><geometry>{shape}</geometry></collision></link>\n",
+        0.5 * length_m
+    )
+}
+
 /// A serial arm with one joint without stops for certain (the first, a middle or the last one, by its number), and
 /// others by chance.
 fn drawn_arm(number: usize, rng: &mut ChaCha8Rng) -> Robot {
@@ -50,21 +66,7 @@ fn drawn_arm(number: usize, rng: &mut ChaCha8Rng) -> Robot {
         )
         .expect("written");
         length_m = rng.random_range(0.15..0.5);
-        let (radius_m, beside_m): (f64, f64) = (rng.random_range(0.02..0.05), rng.random_range(-0.05..0.05));
-        let shape = if rng.random_range(0.0..1.0) < 0.5 {
-            format!("<box size=\"{} {} {}\"/>", 0.8 * length_m, 2.0 * radius_m, 3.0 * radius_m)
-        } else {
-            format!("<cylinder radius=\"{radius_m}\" length=\"{}\"/>", 0.8 * length_m)
-        };
-        writeln!(
-            urdf,
-            "<link name=\"l{}\"><inertial><mass value=\"5\"/><inertia ixx=\"0.1\" ixy=\"0\" ixz=\"0\" iyy=\"0.1\" iyz=\"0\" \
-             izz=\"0.1\"/></inertial><collision><origin xyz=\"{} {beside_m} 0\" rpy=\"0 1.5708 0\"/>\
-             <geometry>{shape}</geometry></collision></link>",
-            j + 1,
-            0.5 * length_m
-        )
-        .expect("written");
+        urdf.push_str(&drawn_link(j + 1, length_m, rng));
         writeln!(
             sensors,
             "[[joint_sensor]]\njoint = \"j{j}\"\nkind = \"potentiometer\"\noffset_counts = 0.0\n\

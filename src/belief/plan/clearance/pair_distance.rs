@@ -178,6 +178,7 @@ impl ClearanceModel<'_> {
     /// The pair at a distance in the terms of the margin.
     pub(crate) fn named(&self, pair: Pair, distance_m: f64) -> ClosestPair {
         let (first, second) = self.names(pair);
-        ClosestPair { distance_m, first, second }
+        let reduction_m = if matches!(pair, Pair::Links { .. }) { SELF_MARGIN_REDUCTION_M } else { 0.0 };
+        ClosestPair { distance_m, reduction_m, first, second }
     }
 }
