@@ -10,11 +10,12 @@ use crate::campaign::Request;
 use crate::cli::exit::{Exit, UsageError, explain};
 use crate::cli::overrides::OverrideArgs;
 use armcal_belief::calib::{Calibration, CalibrationFileError};
-use armcal_belief::plan::PlanFile;
+use armcal_belief::plan::{ClearanceModel, PlanFile, SceneCheck, SceneIssues};
 use armcal_belief::tagmap::files::read_landmarks;
 use armcal_core::input::{InputMap, TagUse, read_input_map, read_task};
-use armcal_core::robot::{self, Robot};
-use armcal_core::routine::{self, Overrides, Step};
+use armcal_core::robot::{self, Robot, Vehicle};
+use armcal_core::routine::{self, Overrides, Routine, Step};
+use armcal_core::stats::stream_rng;
 
 #[derive(Debug, Args)]
 pub(super) struct CheckArgs {
@@ -31,7 +32,12 @@ pub(super) fn check(args: &CheckArgs) -> Result<Exit> {
     let mut all_good = true;
     for file in &args.files {
         match check_one(file, &overrides) {
-            Ok(found) => println!("ok: {}: {found}", file.display()),
+            Ok(found) => {
+                println!("ok: {}: {}", file.display(), found.text);
+                for warning in &found.warnings {
+                    println!("warning: {}: {warning}", file.display());
+                }
+            }
             Err(error) => {
                 all_good = false;
                 println!("error: {}", explain(&error));
@@ -41,13 +47,33 @@ pub(super) fn check(args: &CheckArgs) -> Result<Exit> {
     Ok(if all_good { Exit::Ok } else { Exit::InvalidInput })
 }
 
-fn check_one(file: &Path, overrides: &Overrides) -> Result<String> {
-    if file.is_dir() {
-        return Ok(describe_robot(&robot::load(file)?));
+/// What a file holds, and what a run would go on without.
+struct Found {
+    text: String,
+    warnings: Vec<String>,
+}
+
+fn check_one(file: &Path, overrides: &Overrides) -> Result<Found> {
+    let is_robot = file.file_name().is_some_and(|name| name == "robot.toml");
+    if !file.is_dir() && !is_robot {
+        let text = std::fs::read_to_string(file).with_context(|| format!("{}: cannot be read", file.display()))?;
+        let table: toml::Table = toml::from_str(&text).with_context(|| format!("{}: is no TOML", file.display()))?;
+        if table.contains_key("robot") && table.contains_key("vehicle") && !table.contains_key("inputs_hash") {
+            return check_routine(file, overrides);
+        }
     }
-    if file.file_name().is_some_and(|name| name == "robot.toml") {
-        return Ok(describe_robot(&robot::load(file.parent().unwrap_or(Path::new(".")))?));
-    }
+    let text = if file.is_dir() {
+        describe_robot(&robot::load(file)?)?
+    } else if is_robot {
+        describe_robot(&robot::load(file.parent().unwrap_or(Path::new(".")))?)?
+    } else {
+        describe(file)?
+    };
+    Ok(Found { text, warnings: Vec::new() })
+}
+
+/// What a file that is neither robot nor routine holds.
+fn describe(file: &Path) -> Result<String> {
     let text = std::fs::read_to_string(file).with_context(|| format!("{}: cannot be read", file.display()))?;
     let table: toml::Table = toml::from_str(&text).with_context(|| format!("{}: is no TOML", file.display()))?;
     if table.contains_key("inputs_hash") {
@@ -58,9 +84,6 @@ fn check_one(file: &Path, overrides: &Overrides) -> Result<String> {
             "plan for `{}`, {poses} poses in {arm_min:.1} min, at least {least_m:.3} m clear",
             plan.robot
         ));
-    }
-    if table.contains_key("robot") && table.contains_key("vehicle") {
-        return check_routine(file, overrides);
     }
     if table.contains_key("part") {
         let vehicle = robot::load_vehicle(file)?;
@@ -115,29 +138,60 @@ fn describe_input(map: &InputMap) -> String {
     format!("input map: joint readings on {}, {tags}", map.joint_topic)
 }
 
-fn describe_robot(robot: &Robot) -> String {
+fn describe_robot(robot: &Robot) -> Result<String> {
+    let overlaps = ClearanceModel::of_arm_alone(robot).overlaps(&robot.stowed);
+    if let Some(pair) = overlaps.first() {
+        let file = robot.folder.join("robot.toml");
+        return Err(UsageError(format!(
+            "{}: stowed_rad: {pair} overlap there ({} pairs in all). Links that touch by design belong to \
+             allowed_pairs",
+            file.display(),
+            overlaps.len()
+        ))
+        .into());
+    }
+
     let mass_kg: f64 = robot.bodies.iter().map(|body| body.mass_kg).sum();
     let simulated = if robot.require_masses().is_ok() { "" } else { "; a link has no mass, so it cannot be simulated" };
-    format!(
+    Ok(format!(
         "robot `{}`, {} joints, {} tags, {mass_kg:.1} kg{simulated}",
         robot.name,
         robot.n_joints(),
         robot.tags.len()
-    )
+    ))
 }
 
-fn check_routine(file: &Path, overrides: &Overrides) -> Result<String> {
+/// The scene's geometry: stowed arm, tags and targets.
+fn scene_issues(routine: &Routine, robot: &Robot, vehicle: &Vehicle) -> SceneIssues {
+    let model = || ClearanceModel::new(robot, vehicle, &routine.scene);
+    let clearance = model();
+    let growth_m = robot.gripper.as_ref().map_or(0.0, |gripper| gripper.outline_growth_m(gripper.opening_max_m));
+    let open = model().with_grown_gripper(growth_m);
+    let is_touched = routine.steps.iter().any(|step| matches!(step, Step::Reach(reach) if reach.touch));
+    let clearance_at_targets = if is_touched { &open } else { &clearance };
+    let check = SceneCheck { robot, routine, clearance: &clearance, clearance_at_targets };
+    check.issues(&mut stream_rng(routine.seed, "check"))
+}
+
+fn check_routine(file: &Path, overrides: &Overrides) -> Result<Found> {
     let routine = &routine::load_with(file, overrides)?;
     let (robot, vehicle) = routine.load_arm()?;
     #[cfg(feature = "sim")]
-    armcal_sim::WorldSpec::from_routine(routine, &robot)?;
+    let beyond = armcal_sim::WorldSpec::from_routine(routine, &robot)?.beyond_datasheet(&robot);
+    #[cfg(not(feature = "sim"))]
+    let beyond = Vec::new();
+    let SceneIssues { errors, mut warnings } = scene_issues(routine, &robot, &vehicle);
+    warnings.extend(beyond);
+    if !errors.is_empty() {
+        return Err(UsageError(format!("{}: {}", file.display(), errors.join("; "))).into());
+    }
     #[cfg(feature = "sim")]
     if !routine.campaign.matrix.is_empty() {
         // Every point of the matrix is a routine of its own.
         crate::campaign::Prepared::load(Request { routine: file.to_owned(), overrides: overrides.clone() })?;
     }
     let farthest = routine.task.targets_m.iter().map(|t| nalgebra::Vector3::from(*t).norm()).fold(0.0, f64::max);
-    Ok(format!(
+    let text = format!(
         "routine `{}`: robot `{}` on `{}`, {} steps ({}), {} targets up to {farthest:.2} m from the base",
         routine.name,
         robot.name,
@@ -145,7 +199,8 @@ fn check_routine(file: &Path, overrides: &Overrides) -> Result<String> {
         routine.steps.len(),
         routine.steps.iter().map(described).collect::<Vec<_>>().join(", "),
         routine.task.targets_m.len()
-    ))
+    );
+    Ok(Found { text, warnings })
 }
 
 fn described(step: &Step) -> String {

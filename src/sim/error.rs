@@ -17,6 +17,12 @@ pub enum SimError {
     Robot(#[from] RobotError),
     #[error("{}: joint `{joint}` has effort limit {effort_n_m}; a simulated joint needs one above 0", file.display())]
     NoEffort { file: PathBuf, joint: String, effort_n_m: f64 },
+    #[error(
+        "the arm is stowed inside something: {} overlap at stowed_rad. Parts that touch by design belong to \
+         allowed_pairs of robot.toml",
+        pairs.join(", ")
+    )]
+    StowedInside { pairs: Vec<String> },
     #[error("the physics engine refused joint `{joint}`")]
     Joint { joint: String },
     #[error("the engine \"rapier\" has no vehicle that floats: use \"featherstone\"")]

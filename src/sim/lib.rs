@@ -8,6 +8,7 @@
 
 mod as_built;
 mod body_poses;
+mod clearance_watch;
 mod contact_onset;
 mod controller;
 mod convert;

@@ -7,8 +7,10 @@ use parry3d::shape::SharedShape;
 
 use crate::body_poses::BodyPoses;
 use crate::convert::to_rapier;
+use armcal_core::kinematics::Chain;
 use armcal_core::robot::{PlacedShape, Robot, Shape, Vehicle, parry_pose};
 use armcal_core::routine::Scene;
+use armcal_core::streams::MAX_JOINTS;
 
 /// Solid shapes with their places in the base frame, and which pairs of parts may touch.
 #[derive(Clone)]
@@ -18,6 +20,8 @@ pub(super) struct Solids {
     /// `base_from_shape` of each shape, as last placed.
     placed: Vec<Pose3>,
     pairs: PairTable,
+    /// Watched pairs of parts that overlap where the drawings have the arm stowed.
+    overlaps: Vec<(usize, usize)>,
     n_bodies: usize,
 }
 
@@ -69,6 +73,7 @@ impl Solids {
             shapes: Vec::new(),
             placed: Vec::new(),
             pairs: PairTable { n_parts: 0, watched: Vec::new() },
+            overlaps: Vec::new(),
             n_bodies: robot.bodies.len(),
         };
         for (body, link) in robot.bodies.iter().enumerate() {
@@ -90,7 +95,7 @@ impl Solids {
             let index = solids.name(&obstacle.name);
             solids.push(index, Carrier::World, &obstacle.placed, &Isometry3::identity());
         }
-        solids.watch_pairs(robot);
+        solids.watch_pairs(robot, base_from_vehicle.isometry());
         solids
     }
 
@@ -109,18 +114,22 @@ impl Solids {
         self.placed.push(pose);
     }
 
-    /// Watches every link against everything, except neighbours in the chain and parts that overlap where the drawings
-    /// have the arm stowed: those are drawn into each other.
-    fn watch_pairs(&mut self, robot: &Robot) {
+    /// Watches every link against everything, except neighbours in the chain and what touches by design (the robot's
+    /// `allowed_pairs`): what planning keeps apart, too.
+    fn watch_pairs(&mut self, robot: &Robot, base_from_world: &Isometry3<f64>) {
         let n_parts = self.names.len();
         self.pairs = PairTable { n_parts, watched: vec![false; n_parts * n_parts] };
         let stowed = BodyPoses::drawn(robot.n_joints(), &robot.chain.link_poses(&robot.stowed));
-        self.place(&stowed, &Isometry3::identity());
+        self.place(&stowed, base_from_world);
         for a in 1..self.n_bodies {
             for b in (0..n_parts).filter(|&b| b < a.saturating_sub(1) || b >= self.n_bodies) {
                 let on_ground = self.shapes.iter().any(|s| s.part == b && s.carrier == Carrier::World);
-                if on_ground || self.distance_of_parts(a, b) > 0.0 {
-                    self.pairs.watch(a, b);
+                if !on_ground && robot.allowed_pairs.has(&self.names[a], &self.names[b]) {
+                    continue;
+                }
+                self.pairs.watch(a, b);
+                if self.distance_of_parts(a, b) <= 0.0 {
+                    self.overlaps.push((a, b));
                 }
             }
         }
@@ -149,6 +158,12 @@ impl Solids {
 
     pub(super) fn pairs(&self) -> &PairTable {
         &self.pairs
+    }
+
+    /// Names of the parts that overlap where the drawings have the arm stowed, and should not.
+    pub(super) fn overlaps(&self) -> Vec<String> {
+        let names = |&(a, b): &(usize, usize)| format!("`{}` and `{}`", self.names[a], self.names[b]);
+        self.overlaps.iter().map(names).collect()
     }
 
     pub(super) fn part_name(&self, part: usize) -> &str {
@@ -190,8 +205,48 @@ impl Solids {
             || beside(&self.placed[i], a.half_extents_m, self.placed[j].translation, b.radius_m)
     }
 
+    /// For each joint between two bodies, an upper bound on the distance of the outer one's shapes from its axis, m.
+    pub(super) fn levers_m(&self, chain: &Chain, inner: usize, outer: usize) -> [f64; MAX_JOINTS] {
+        let own_m = self.extent_m(Carrier::Body(outer));
+        let mut levers_m = [0.0; MAX_JOINTS];
+        for (joint, lever_m) in levers_m.iter_mut().enumerate().take(outer).skip(inner) {
+            let links = &chain.joints()[joint + 1..outer];
+            *lever_m = own_m + links.iter().map(|next| next.parent_from_joint.translation.vector.norm()).sum::<f64>();
+        }
+        levers_m
+    }
+
+    /// Shapes on `inner` and on the body `outer` that are watched against each other.
+    pub(super) fn watched_pairs(&self, inner: Carrier, outer: usize) -> Vec<(usize, usize)> {
+        let on = |carrier: Carrier| self.shapes.iter().enumerate().filter(move |(_, solid)| solid.carrier == carrier);
+        on(inner)
+            .flat_map(|(i, a)| on(Carrier::Body(outer)).map(move |(j, b)| (i, a.part, j, b.part)))
+            .filter(|&(_, a, _, b)| self.pairs.is_watched(a, b))
+            .map(|(i, _, j, _)| (i, j))
+            .collect()
+    }
+
+    /// Whether a shape belongs to the arm or its base link.
+    pub(super) fn is_of_arm(&self, shape: usize) -> bool {
+        self.shapes[shape].part < self.n_bodies
+    }
+
+    /// The nearest of the given shapes as placed, if nearer than `far_m`.
+    pub(super) fn nearest_of(&self, pairs: &[(usize, usize)], far_m: f64) -> Option<Nearest> {
+        pairs.iter().fold(None, |nearest: Option<Nearest>, &(i, j)| {
+            let best_m = nearest.map_or(far_m, |nearest| nearest.distance_m);
+            if self.is_farther(i, j, best_m) {
+                return nearest;
+            }
+            let distance_m = self.distance(i, j);
+            // As in `nearest`: the arm's part first.
+            let (part_a, part_b) = (self.shapes[j].part, self.shapes[i].part);
+            if distance_m < best_m { Some(Nearest { distance_m, part_a, part_b }) } else { nearest }
+        })
+    }
+
     /// Largest distance of a carrier's shapes from its origin, m.
-    pub(super) fn extent_m(&self, carrier: Carrier) -> f64 {
+    fn extent_m(&self, carrier: Carrier) -> f64 {
         let on_it = self.shapes.iter().filter(|solid| solid.carrier == carrier);
         on_it.map(|solid| solid.carrier_from_shape.translation.length() + solid.radius_m).fold(0.0, f64::max)
     }

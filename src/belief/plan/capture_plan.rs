@@ -224,9 +224,9 @@ impl Planner<'_> {
         match self.request.clearance.find_violation(&self.start(), self.bounds(), needed_m) {
             None => Ok(()),
             Some(nearest) => Err(PlanError::StartTooClose {
-                clearance_m: nearest.distance_m,
+                clearance_m: nearest.true_distance_m(),
+                needed_m: nearest.needed_m(needed_m),
                 nearest: nearest.to_string(),
-                needed_m,
             }),
         }
     }
@@ -262,8 +262,8 @@ impl Planner<'_> {
         Some(format!(
             "the pose comes within {:.3} m of clearance between {nearest} for an arm within the sensors' error; \
              {:.3} m are needed",
-            nearest.distance_m,
-            self.margin_m()
+            nearest.true_distance_m(),
+            nearest.needed_m(self.margin_m())
         ))
     }
 

@@ -3,7 +3,7 @@
 //! `bounds`: joint error bounds; `motion`: time scaling and tracking error; `clearance`: distances of one arm to its
 //! environment; `certify`: the proof for every arm within the bounds; `path`: RRT-Connect over certified edges;
 //! `visibility`: visible tags; `view_planning`: views to capture; `targets`: the reach task. `capture_plan` combines
-//! them before the first motion, `file` is plan.toml.
+//! them before the first motion, `file` is plan.toml; `scene_check` is what `armcal check` looks at.
 
 mod bounds;
 mod capture_plan;
@@ -13,6 +13,7 @@ mod error;
 mod file;
 mod motion;
 mod path;
+mod scene_check;
 mod targets;
 mod view_planning;
 mod visibility;
@@ -27,7 +28,8 @@ pub use error::PlanError;
 pub use file::{LeftOutTable, PathTable, PlanFile, PlanHeader, PlanTotals, PoseTable, SetName, TagTable};
 pub use motion::{Edge, Path, Timing, TrackingErrorBound};
 pub use path::{PathError, PathPlanner};
-pub use targets::{TargetRequest, plan_targets};
+pub use scene_check::{SceneCheck, SceneIssues};
+pub use targets::{TargetRequest, plan_targets, plan_task};
 pub use view_planning::{
     CaptureState, CapturedView, PlannedPose, PosePlan, PosePool, PoseRequest, StopReason, choose_poses,
 };

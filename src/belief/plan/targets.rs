@@ -1,5 +1,7 @@
 //! Joint angles for the reach task's targets, clear for every arm within the joint errors.
 
+use std::collections::BTreeSet;
+
 use nalgebra::Vector3;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -9,10 +11,13 @@ use crate::plan::bounds::joint_bounds::JointErrorBounds;
 use crate::plan::clearance::{ClearanceModel, ClosestPair};
 use armcal_core::kinematics::{IkError, IkGoal, IkSettings, solve_position};
 use armcal_core::robot::Robot;
+use armcal_core::routine::{Routine, Step};
 use armcal_core::streams::JointAngles;
 
 /// Starts of the inverse kinematics beside the preferred ones.
 const RANDOM_SEEDS: usize = 24;
+/// A target of the task that none of those leads to is tried so many times more, from draws of its own.
+const SPARE_TRIES: usize = 8;
 const IK_TOLERANCE_M: f64 = 1e-6;
 
 /// Solves every target under one belief, near `preferred` postures where given.
@@ -51,6 +56,49 @@ pub struct TargetRequest<'a> {
     pub preferred: Option<&'a [JointAngles]>,
     /// Clearance to keep.
     pub margin_m: f64,
+}
+
+/// Believed angles at the task's targets. Those that are reached for before any calibration must be clear for every arm
+/// within the bounds; for the others it is enough that the believed arm gets there.
+pub fn plan_task(
+    robot: &Robot,
+    clearance: &ClearanceModel<'_>,
+    bounds: &JointErrorBounds,
+    routine: &Routine,
+    rng: &mut ChaCha8Rng,
+) -> Vec<Result<JointAngles, PlanError>> {
+    let margin_m = routine.capture.clearance_m;
+    let request = TargetRequest { targets_m: &routine.task.targets_m, preferred: None, margin_m };
+    let mut planned = plan_targets(robot, clearance, bounds, &request, rng);
+    let (at_first, believed) = (reached_at_first(&routine.steps), JointErrorBounds::none(robot));
+    if planned.iter().enumerate().any(|(target, planned)| planned.is_err() && !at_first.contains(&target)) {
+        let later = plan_targets(robot, clearance, &believed, &request, rng);
+        let either = planned.into_iter().zip(later).enumerate();
+        let of = |(target, (now, later)): (usize, (Result<_, _>, _))| {
+            if at_first.contains(&target) { now } else { now.or(later) }
+        };
+        planned = either.map(of).collect();
+    }
+    let mut spare = rng.clone();
+    for (target, planned) in planned.iter_mut().enumerate().filter(|(_, planned)| planned.is_err()) {
+        let one = TargetRequest { targets_m: &routine.task.targets_m[target..=target], ..request };
+        let bounds = if at_first.contains(&target) { bounds } else { &believed };
+        let mut tries = (0..SPARE_TRIES).flat_map(|_| plan_targets(robot, clearance, bounds, &one, &mut spare));
+        if let Some(found) = tries.find(Result::is_ok) {
+            *planned = found;
+        }
+    }
+    planned
+}
+
+/// Targets that are reached for before any calibration.
+fn reached_at_first(steps: &[Step]) -> BTreeSet<usize> {
+    let before = steps.iter().take_while(|step| !matches!(step, Step::Calibrate(_)));
+    let targets = before.filter_map(|step| match step {
+        Step::Reach(reach) => Some(reach.targets.iter().copied()),
+        _ => None,
+    });
+    targets.flatten().collect()
 }
 
 struct TargetSolver<'a> {
@@ -100,9 +148,9 @@ impl TargetSolver<'_> {
             (None, Some(nearest), _) => Err(PlanError::TargetTooClose {
                 target,
                 at_m,
-                clearance_m: nearest.distance_m,
+                clearance_m: nearest.true_distance_m(),
+                needed_m: nearest.needed_m(self.margin_m),
                 nearest: nearest.to_string(),
-                needed_m: self.margin_m,
             }),
             (None, None, Some(source)) => Err(PlanError::TargetOutOfReach { target, at_m, source }),
             (None, None, None) => unreachable!("an attempt either fails or gives angles"),

@@ -93,20 +93,37 @@ impl VisibilityModel {
             })
     }
 
+    /// What hides the first of the tags in view that something hides.
+    #[must_use]
+    pub fn hidden_by<'a>(
+        &self,
+        robot: &Robot,
+        clearance: &'a ClearanceModel<'_>,
+        angles: &JointAngles,
+    ) -> Option<&'a str> {
+        let poses = robot.chain.link_poses(angles);
+        self.in_view(robot, &poses).find_map(|idx| self.tag_hidden_by(robot, clearance, &poses, idx))
+    }
+
+    /// What hides a corner of a tag (by its index).
+    pub(crate) fn tag_hidden_by<'a>(
+        &self,
+        robot: &Robot,
+        clearance: &'a ClearanceModel<'_>,
+        poses: &LinkPoses,
+        idx: usize,
+    ) -> Option<&'a str> {
+        let (tag, eye) = (&robot.tags[idx], poses.frame(&robot.camera.mount).translation.vector);
+        armcal_core::optics::square_corners(tag.size_m).iter().find_map(|corner| {
+            let target = tag.base_from_tag.isometry() * corner;
+            clearance.sight_blocker(poses, [&eye, &target.coords], 0.01)
+        })
+    }
+
     /// Indices of the tags in view that nothing hides.
     #[must_use]
     pub fn visible(&self, robot: &Robot, clearance: &ClearanceModel<'_>, angles: &JointAngles) -> Vec<usize> {
         let poses = robot.chain.link_poses(angles);
-        let eye = poses.frame(&robot.camera.mount).translation.vector;
-        self.in_view(robot, &poses)
-            .filter(|&idx| {
-                let tag = &robot.tags[idx];
-                let corners = armcal_core::optics::square_corners(tag.size_m);
-                corners.iter().all(|corner| {
-                    let target = tag.base_from_tag.isometry() * corner;
-                    !clearance.blocks_sight(&poses, &eye, &target.coords, 0.01)
-                })
-            })
-            .collect()
+        self.in_view(robot, &poses).filter(|&idx| self.tag_hidden_by(robot, clearance, &poses, idx).is_none()).collect()
     }
 }

@@ -18,6 +18,8 @@ use armcal_core::time::Stamp;
 const FIRST_RENEWAL: usize = 3;
 /// Tries at poses, beside those wanted, after which a capture goes no further.
 const SPARE_TRIES: usize = 10;
+/// So many poses in a row at which the arm did not settle, or met something on its way, end a capture.
+const MOST_IN_VAIN: usize = 6;
 /// Sightings as predicted that a tag is given in advance.
 const TRUST_IN_ADVANCE: f64 = 2.0;
 
@@ -34,6 +36,11 @@ struct CaptureRun<'a> {
     n_for_verdict: usize,
     tried: usize,
     blocked: usize,
+    /// Poses on the way to which the arm met something, and those at which it did not settle.
+    met: usize,
+    restless: usize,
+    /// Of these, the last ones in a row.
+    in_vain: usize,
     /// Readings at the captured views, and the tags (index) that were seen.
     taken: Vec<(JointCounts, Vec<usize>)>,
     /// Poses that were tried in vain.
@@ -62,6 +69,9 @@ impl<'a> CaptureRun<'a> {
             n_for_verdict: fewest_views(robot),
             tried: 0,
             blocked: 0,
+            met: 0,
+            restless: 0,
+            in_vain: 0,
             taken: Vec::new(),
             failed: Vec::new(),
             expected: none.clone(),
@@ -76,7 +86,8 @@ impl<'a> CaptureRun<'a> {
 
     /// From the first view again: a joint that failed has made another arm of it.
     fn anew(&self, robot: &Robot, began: Stamp) -> Self {
-        Self { tried: self.tried, blocked: self.blocked, ..Self::new(self.settings, robot, began) }
+        let Self { tried, blocked, met, restless, .. } = *self;
+        Self { tried, blocked, met, restless, ..Self::new(self.settings, robot, began) }
     }
 
     fn captured(&self) -> usize {
@@ -104,6 +115,17 @@ impl<'a> CaptureRun<'a> {
                 || (self.captured() > self.renewed_at && self.enough_at.is_some_and(|n| self.n_fit >= n)))
     }
 
+    /// Why it is no use to go on.
+    fn is_in_vain(&self) -> Option<String> {
+        let Self { met, restless, in_vain, .. } = *self;
+        (in_vain >= MOST_IN_VAIN).then(|| {
+            format!(
+                "{in_vain} poses in a row were in vain (over all, the arm met something on the way to {met}, and did \
+                 not come to rest at {restless})"
+            )
+        })
+    }
+
     /// Why no more views are wanted.
     fn enough(&self, now: Stamp) -> Option<String> {
         let CaptureSettings { poses, held_out, .. } = self.settings;
@@ -114,6 +136,9 @@ impl<'a> CaptureRun<'a> {
             elapsed_s: now.since_s(self.began),
             predicted_tool_error_m: self.expected_tool_error_m.filter(|_| self.n_fit >= self.n_for_verdict),
         };
+        if let Some(why) = self.is_in_vain() {
+            return Some(why);
+        }
         let stop = StopReason::decide(self.settings, &state)?;
         // Views for the verdict are wanted whatever the fit says.
         (stop != StopReason::Poses || self.wanted() == [0, 0]).then(|| stop.to_string())
@@ -211,17 +236,32 @@ impl ScriptRunner<'_, '_> {
             views.enough_at = chosen.needed.map(|needed| (views.n_fit + needed).max(views.n_for_verdict));
             self.visit_some(&chosen, &mut views)?;
             if !replans {
-                break format!("{} poses were visited", views.tried);
+                break views.is_in_vain().unwrap_or_else(|| format!("{} poses were visited", views.tried));
             }
         };
+        self.end_capture(&views, why)
+    }
+
+    /// Says why there are no more views; an error where there are too few for any calibration.
+    fn end_capture(&mut self, views: &CaptureRun<'_>, why: String) -> Result<(), SessionError> {
+        let CaptureRun { tried, blocked, met, restless, .. } = *views;
+        let why = match self.driver.flow.weak_pump() {
+            Some(pump) if met + restless > 0 => format!("{why}; {pump}"),
+            _ => why,
+        };
         self.driver.log(LogLevel::Info, &format!("no more views: {why}"))?;
-        self.capture_ended = Some(why);
-        self.tally.poses += views.captured();
-        if views.captured() == 0 {
-            let (planned, blocked) = (views.tried, views.blocked);
-            return Err(SessionError::NothingCaptured { planned, blocked, restless: planned - blocked });
+        self.capture_ended = Some(why.clone());
+        let captured = views.captured();
+        self.tally.poses += captured;
+        let are_too_few = views.wanted() != [0, 0] && (self.poses_marked as usize) < LEAST_VIEWS;
+        if captured > 0 && !are_too_few {
+            return Ok(());
         }
-        Ok(())
+        let why = match self.driver.why_blocked.take() {
+            Some(last) => format!("{why}; to the last without a path: {last}"),
+            None => why,
+        };
+        Err(SessionError::TooFewViews { captured, tried, blocked, met, restless, why })
     }
 
     fn log_plan(&mut self, plan: &PosePlan) -> Result<(), SessionError> {
@@ -283,14 +323,23 @@ impl ScriptRunner<'_, '_> {
             if self.driver.held.len() > self.n_held {
                 return Ok(());
             }
+            if views.is_in_vain().is_some() {
+                return Ok(());
+            }
             if replans && (views.is_renewal_due() || views.enough(self.driver.now()).is_some()) {
                 return Ok(());
             }
             self.progress_at(Phase::Capture, views.captured(), views.captured() + views.wanted().iter().sum::<usize>());
             self.driver.phase(Phase::Move)?;
+            let n_met = self.driver.n_met;
             if !self.go(&pose.angles)? {
                 views.tried += 1;
-                views.blocked += 1;
+                if self.driver.n_met > n_met {
+                    views.met += 1;
+                    views.in_vain += 1;
+                } else {
+                    views.blocked += 1;
+                }
                 views.failed.push(pose.angles);
                 self.tally.poses_skipped += 1;
                 continue;
@@ -312,9 +361,12 @@ impl ScriptRunner<'_, '_> {
         if !self.driver.settle()? {
             self.driver.log(LogLevel::Warn, &format!("pose {number} is left out: the arm did not settle"))?;
             self.tally.poses_skipped += 1;
+            views.restless += 1;
+            views.in_vain += 1;
             views.failed.push(pose.angles);
             return Ok(Visited::Failed);
         }
+        views.in_vain = 0;
         self.driver.phase(Phase::Capture)?;
         self.note_visit(pose, views)?;
         let kind = MarkKind::Capture { set: pose.set, pose_idx: number };

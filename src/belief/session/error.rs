@@ -20,11 +20,11 @@ pub enum SessionError {
     #[error("the arm sends no joint readings")]
     NoReadings,
     #[error(
-        "none of the {planned} planned poses was captured: to {blocked} no path led, at {restless} the arm did not \
-         come to \
-         rest by its own sensors (too noisy, or it oscillates?)"
+        "{captured} of the {tried} poses that were tried were captured, fewer than a calibration needs: to {blocked} \
+         no path led, on the way to {met} the arm met something, at {restless} it did \
+         not come to rest by its own sensors (too noisy, or it oscillates?); {why}"
     )]
-    NothingCaptured { planned: usize, blocked: usize, restless: usize },
+    TooFewViews { captured: usize, tried: usize, blocked: usize, met: usize, restless: usize, why: String },
     #[error("step {step}: the arm has no joint `{joint}`; it has {joints:?}")]
     UnknownJoint { step: usize, joint: String, joints: Vec<String> },
     #[error("step {step}: {problem}")]

@@ -12,6 +12,7 @@ mod contact;
 mod end_stops;
 mod error;
 mod failed_joints;
+mod flow;
 mod following;
 mod grip;
 mod held_joint;

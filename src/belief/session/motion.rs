@@ -5,6 +5,7 @@ use nalgebra::Vector3;
 
 use crate::plan::{Edge, Path, Timing};
 use crate::session::contact::{ContactDetector, ContactEvent};
+use crate::session::flow::FlowWatch;
 use crate::session::following::FollowWatch;
 use crate::session::held_joint::{HeldJoint, holding_counts, holding_sensors, with_held};
 use crate::session::settling::{NEAR_RAD, SettlingDetector};
@@ -34,6 +35,11 @@ pub(crate) struct Driver<'b> {
     timing: Timing,
     bumps: ContactDetector,
     following: FollowWatch,
+    pub flow: FlowWatch,
+    /// How often the arm has met something.
+    pub n_met: usize,
+    /// Why there was no path the last time.
+    pub why_blocked: Option<String>,
     /// Joints that have failed and are left where they are.
     pub held: Vec<HeldJoint>,
     /// The last motion's waypoints, for the way back.
@@ -92,6 +98,7 @@ impl<'b> Driver<'b> {
         let set_point = sensors.angles(&counts);
         let (timing, bumps) = (Timing::new(robot), ContactDetector::new(robot, arm.period_s()));
         let following = FollowWatch::new(robot, arm.period_s());
+        let flow = FlowWatch::new(robot, arm.period_s());
         let mut driver = Self {
             robot,
             arm,
@@ -106,6 +113,9 @@ impl<'b> Driver<'b> {
             timing,
             bumps,
             following,
+            flow,
+            n_met: 0,
+            why_blocked: None,
             held: Vec::new(),
             came: vec![set_point],
         };
@@ -274,6 +284,9 @@ impl<'b> Driver<'b> {
             self.hold_joint(joint, kind)?;
         }
         self.ticks += 1;
+        if self.flow.is_due(self.ticks) {
+            self.flow.update([self.set_point, self.believed_angles()?]);
+        }
         if self.ticks.is_multiple_of(BELIEF_EVERY) {
             let stamp = self.arm.now();
             let angles = self.believed_angles()?;
@@ -409,6 +422,7 @@ impl<'b> Driver<'b> {
 
     /// Stops where the arm is and goes back the way it came, slowly.
     fn retreat(&mut self, bump: ContactEvent) -> Result<MotionOutcome, SessionError> {
+        self.n_met += 1;
         let ContactEvent { joint, behind_rad, allowed_rad } = bump;
         let at = self.believed_angles()?;
         self.set_point = at;

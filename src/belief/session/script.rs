@@ -200,6 +200,7 @@ impl ScriptRunner<'_, '_> {
             }
             Err(blocked) => {
                 self.driver.log(LogLevel::Warn, &format!("a pose is left out: {blocked}"))?;
+                self.driver.why_blocked = Some(blocked.to_string());
                 Ok(false)
             }
         }
@@ -229,8 +230,8 @@ impl ScriptRunner<'_, '_> {
             return Err(wrong(format!(
                 "the pose comes within {:.3} m of clearance between {nearest} for an arm within the sensors' error; \
                  {:.3} m are needed",
-                nearest.distance_m,
-                self.margin_m()
+                nearest.true_distance_m(),
+                nearest.needed_m(self.margin_m())
             )));
         }
         if !self.go(&to)? {

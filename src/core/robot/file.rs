@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use nalgebra::{Isometry3, Vector3};
 use serde::Deserialize;
 
+use super::allowed_pairs::AllowedPairs;
 use super::body::LinkBody;
 use super::camera::{CameraFile, check_camera};
 use super::drive::{DriveSpec, HydraulicsFile, MotionSpec, check_displacements};
@@ -30,6 +31,8 @@ struct RobotFile {
     base_link: String,
     base_tag: u32,
     stowed_rad: Vec<f64>,
+    #[serde(default)]
+    allowed_pairs: Vec<[String; 2]>,
     #[serde(default = "default_buoyancy_fraction")]
     buoyancy_fraction: f64,
     tool: ToolFile,
@@ -52,6 +55,14 @@ struct ToolFile {
     link: String,
     point_m: [f64; 3],
     tip_radius_m: Option<f64>,
+}
+
+impl ToolFile {
+    fn check_point(&self, file: &Path) -> Result<(), FileIssue> {
+        self.point_m
+            .iter()
+            .try_for_each(|value| FileIssue::check_range(file, "tool.point_m", *value, -10.0..=10.0).map(drop))
+    }
 }
 
 const TIP_RGB: [u8; 3] = [200, 205, 215];
@@ -84,6 +95,7 @@ pub fn load_without_pairs(folder: &Path) -> Result<Robot, RobotError> {
     let jaws = raw.gripper.as_ref().map(GripperFile::jaws).unwrap_or_default();
     let arm = UrdfChain { urdf: &urdf, base_link: &raw.base_link, chain: &chain };
     let mut bodies = arm.bodies(jaws)?;
+    let allowed_pairs = AllowedPairs::check(&file, raw.allowed_pairs, &bodies)?;
     let sensors = check_sensors(&file, &raw.joint_sensor, &chain)?;
     let drive = DriveSpec {
         pump_l_per_min: raw.hydraulics.map(|hydraulics| hydraulics.check(&file)).transpose()?,
@@ -96,9 +108,7 @@ pub fn load_without_pairs(folder: &Path) -> Result<Robot, RobotError> {
     };
     let stowed = check_stowed(&file, "stowed_rad", &raw.stowed_rad, chain.n_joints())?;
     let mut tool = arm.attachment(&raw.tool.link)?;
-    for value in raw.tool.point_m {
-        FileIssue::check_range(&file, "tool.point_m", value, -10.0..=10.0)?;
-    }
+    raw.tool.check_point(&file)?;
     let gripper = raw.gripper.map(|gripper| gripper.check(&file, &arm, &tool)).transpose()?;
     tool.link_from_frame *= nalgebra::Translation3::from(raw.tool.point_m);
     if let Some(radius_m) = raw.tool.tip_radius_m {
@@ -130,6 +140,7 @@ pub fn load_without_pairs(folder: &Path) -> Result<Robot, RobotError> {
         chain: chain.with_loads(loads(&geometry, &bodies, buoyancy_fraction, tool)),
         bodies,
         self_pairs: None,
+        allowed_pairs,
         sensors,
         drive,
         geometry,

@@ -3,6 +3,7 @@
 //! `load` reads a robot folder (robot.toml and its URDF) into a checked `Robot`; `load_vehicle` reads a `Vehicle`.
 //! Shapes are convex, meshes are convex hulls. As-built values are in `sim`, estimates in `calib`.
 
+mod allowed_pairs;
 mod body;
 mod camera;
 mod drive;
@@ -25,6 +26,7 @@ mod survey;
 mod urdf;
 mod vehicle;
 
+pub use allowed_pairs::AllowedPairs;
 pub use body::LinkBody;
 pub use camera::{CameraSpec, LensPriors};
 pub use drive::{DriveSpec, MotionSpec};

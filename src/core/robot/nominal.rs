@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::{Isometry3, Matrix6};
 
+use super::allowed_pairs::AllowedPairs;
 use super::body::LinkBody;
 use super::camera::CameraSpec;
 use super::drive::DriveSpec;
@@ -38,6 +39,8 @@ pub struct Robot {
     pub bodies: Vec<LinkBody>,
     /// Links that can come near each other; `None` without a self_collision.toml.
     pub self_pairs: Option<SelfPairs>,
+    /// Parts that touch by design.
+    pub allowed_pairs: AllowedPairs,
     /// One per joint, base first.
     pub sensors: Vec<JointSensorSpec>,
     /// Oil consumption and tracking error of the drives.
@@ -103,8 +106,10 @@ impl Robot {
     /// The arm on `vehicle`: with the vehicle's tags and its stowed configuration of this arm, where it has any.
     ///
     /// # Errors
-    /// [`RobotError`] naming the vehicle's file when it has another number of stowed angles.
+    /// [`RobotError`] naming the vehicle's file when it has another number of stowed angles, and robot.toml when it
+    /// names a part in `allowed_pairs` that neither has.
     pub fn mounted_on(mut self, vehicle: &Vehicle) -> Result<Self, RobotError> {
+        self.allowed_pairs.check_names(&self.folder.join("robot.toml"), &self.bodies, vehicle)?;
         if let Some(stowed_rad) = vehicle.stowed_rad.get(&self.name) {
             let key = format!("stowed_rad.{}", self.name);
             self.stowed = check_stowed(&vehicle.file, &key, stowed_rad, self.n_joints())?;

@@ -14,13 +14,14 @@ pub(super) fn draw_joint(robot: &Robot, joint: usize, spec: &WorldSpec, seed: u6
     let limits = robot.chain.joints()[joint].limits;
     let name = &robot.sensors[joint].joint;
     let sensors = &spec.joint_sensors;
+    let [gain_max, offset_max_rad] = spec.sensor_errors_max(&robot.sensors[joint]);
     let mut built = JointAsBuilt {
         name: name.clone(),
         center_rad: robot.sensors[joint].center_rad,
         // A joint without stops is measured over one turn.
         range_rad: limits.map_or(TAU, |l| l.upper_rad - l.lower_rad),
         gain_error: 0.0,
-        offset_error_rad: sensors.offset_error_max_rad * effect_rng(seed, "offset", name).random_range(-1.0..=1.0),
+        offset_error_rad: offset_max_rad * effect_rng(seed, "offset", name).random_range(-1.0..=1.0),
         temperature_offset_rad_per_k: 0.0,
         temperature_gain_per_k: 0.0,
         gear_ratio: spec.gear_ratio.get(name).copied().unwrap_or(1.0),
@@ -32,7 +33,7 @@ pub(super) fn draw_joint(robot: &Robot, joint: usize, spec: &WorldSpec, seed: u6
         resolver: None,
     };
     match robot.sensors[joint].kind {
-        SensorKind::Potentiometer => built.draw_potentiometer(sensors, seed),
+        SensorKind::Potentiometer => built.draw_potentiometer(sensors, gain_max, seed),
         SensorKind::Encoder => built.draw_encoder(sensors, seed),
         SensorKind::Resolver => built.draw_resolver(sensors, seed),
     }

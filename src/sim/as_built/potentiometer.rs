@@ -9,10 +9,10 @@ use crate::as_built::normal::{effect_normal, effect_rng};
 use crate::spec::JointSensorsSpec;
 
 impl JointAsBuilt {
-    pub(super) fn draw_potentiometer(&mut self, sensors: &JointSensorsSpec, seed: u64) {
+    pub(super) fn draw_potentiometer(&mut self, sensors: &JointSensorsSpec, gain_max: f64, seed: u64) {
         let name = self.name.clone();
         let normal = |effect: &str, std: f64| effect_normal(seed, effect, &name, std);
-        self.gain_error = sensors.gain_error_max * effect_rng(seed, "gain", &name).random_range(-1.0..=1.0);
+        self.gain_error = gain_max * effect_rng(seed, "gain", &name).random_range(-1.0..=1.0);
         self.temperature_offset_rad_per_k = normal("temperature_offset", sensors.temperature_offset_std_rad_per_k);
         self.temperature_gain_per_k = normal("temperature_gain", sensors.temperature_gain_std_per_k);
         self.pressure_offset_rad_per_mpa = normal("pressure_offset", sensors.pressure_offset_std_rad_per_mpa);

@@ -98,3 +98,24 @@ fn joints_differ_as_the_world_asks() {
     assert!((up - 0.5).abs() < 4.0 * 0.5 / n.sqrt(), "{up}");
     assert!(spots.iter().all(|spot| spot.peak_rad.abs() == 0.01));
 }
+
+/// A joint with a narrow datasheet in a world that does not say how far sensors err, and in one that does.
+#[test]
+fn a_world_that_does_not_say_keeps_to_each_joints_bounds() {
+    let mut robot = robot();
+    (robot.sensors[2].gain_bound, robot.sensors[2].offset_bound_rad) = (0.01, 0.02);
+    let said = WorldSpec::default();
+    let unsaid = WorldSpec { by_datasheet: [true; 2], ..WorldSpec::default() };
+    let mut beyond = 0;
+    for seed in 0..40 {
+        let [said, unsaid] = [&said, &unsaid].map(|spec| AsBuilt::draw(&robot, spec, seed));
+        let joint = &unsaid.joints[2];
+        assert!(joint.gain_error.abs() <= 0.01 && joint.offset_error_rad.abs() <= 0.02, "{joint:?}");
+        beyond += u32::from(said.joints[2].offset_error_rad.abs() > 0.02);
+        assert_eq!(said.joints[1], unsaid.joints[1]);
+    }
+    assert!(beyond > 20, "{beyond}");
+    assert!(unsaid.beyond_datasheet(&robot).is_empty());
+    let warnings = said.beyond_datasheet(&robot);
+    assert!(warnings.len() == 2 && warnings[1].contains("offset_error_max_rad"), "{warnings:?}");
+}

@@ -52,10 +52,10 @@ impl ContactGuard {
         let mut groups = Vec::new();
         for outer in 1..n_bodies {
             for inner in 0..outer {
-                let levers_m = levers_m(chain, solids, inner, outer);
+                let levers_m = solids.levers_m(chain, inner, outer);
                 groups.extend(Group::new(solids, Carrier::Body(inner), outer, levers_m));
             }
-            groups.extend(Group::new(solids, Carrier::World, outer, levers_m(chain, solids, 0, outer)));
+            groups.extend(Group::new(solids, Carrier::World, outer, solids.levers_m(chain, 0, outer)));
         }
         // From the base's origin rather than the first joint's axis.
         let first_m = chain.joints().first().map_or(0.0, |joint| joint.parent_from_joint.translation.vector.norm());
@@ -106,13 +106,7 @@ impl ContactGuard {
 
 impl Group {
     fn new(solids: &Solids, inner: Carrier, outer: usize, levers_m: [f64; MAX_JOINTS]) -> Option<Self> {
-        let on =
-            |carrier: Carrier| solids.shapes().iter().enumerate().filter(move |(_, solid)| solid.carrier == carrier);
-        let pairs: Vec<(usize, usize)> = on(inner)
-            .flat_map(|(i, a)| on(Carrier::Body(outer)).map(move |(j, b)| (i, a.part, j, b.part)))
-            .filter(|&(_, a, _, b)| solids.pairs().is_watched(a, b))
-            .map(|(i, _, j, _)| (i, j))
-            .collect();
+        let pairs = solids.watched_pairs(inner, outer);
         let is_on_ground = inner == Carrier::World;
         (!pairs.is_empty()).then_some(Self {
             pairs,
@@ -135,17 +129,6 @@ impl Group {
         }
         self.distance_m - (self.path_m(path_rad, ground_path_m) - self.path_m) < CONTACT_M
     }
-}
-
-/// For each joint between two bodies, an upper bound on the distance of the outer one's shapes from its axis.
-fn levers_m(chain: &Chain, solids: &Solids, inner: usize, outer: usize) -> [f64; MAX_JOINTS] {
-    let own_m = solids.extent_m(Carrier::Body(outer));
-    let mut levers_m = [0.0; MAX_JOINTS];
-    for (joint, lever_m) in levers_m.iter_mut().enumerate().take(outer).skip(inner) {
-        let links = &chain.joints()[joint + 1..outer];
-        *lever_m = own_m + links.iter().map(|next| next.parent_from_joint.translation.vector.norm()).sum::<f64>();
-    }
-    levers_m
 }
 
 #[cfg(test)]

@@ -20,7 +20,7 @@ use crate::spec::table::CheckedTable;
 use crate::spec::temperature::TemperatureSpec;
 use crate::spec::vehicle::{MotionKind, VehicleMotionSpec};
 use crate::spec::water::WaterSpec;
-use armcal_core::robot::{FileIssue, PartFile, Robot, check_parts};
+use armcal_core::robot::{FileIssue, JointSensorSpec, PartFile, Robot, check_parts};
 use armcal_core::routine::Scene;
 
 /// `[world]`, checked.
@@ -53,6 +53,10 @@ pub struct WorldSpec {
     /// The motion that `vehicle.motion_file` names, read with the routine.
     #[serde(skip)]
     pub recorded: Option<Arc<RecordedMotion>>,
+    /// Whether the largest gain and offset errors are at most each joint's own bounds in robot.toml: so where a routine
+    /// does not say how large they are.
+    #[serde(skip)]
+    pub by_datasheet: [bool; 2],
     /// What stands in the water and nobody has drawn: `[[world.obstacle]]`, as `[[obstacle]]`.
     #[serde(skip_serializing_if = "UnmodelledObstacles::is_none")]
     pub obstacle: UnmodelledObstacles,
@@ -100,6 +104,7 @@ impl WorldSpec {
             water: reader.read("water")?,
             gear_ratio: reader.parse("gear_ratio")?,
             recorded: None,
+            by_datasheet: [false; 2],
             obstacle: UnmodelledObstacles(
                 check_parts(&reader.parse::<Vec<PartFile>>("obstacle")?, file, "world.obstacle")?.1,
             ),
@@ -159,10 +164,43 @@ impl WorldSpec {
         self.physics.engine.unwrap_or(EngineKind::Featherstone)
     }
 
+    /// Largest gain error (relative) and offset error (rad) that a joint's sensor may be built with.
+    #[must_use]
+    pub fn sensor_errors_max(&self, sensor: &JointSensorSpec) -> [f64; 2] {
+        let asked = [self.joint_sensors.gain_error_max, self.joint_sensors.offset_error_max_rad];
+        let bounds = [sensor.gain_bound, sensor.offset_bound_rad];
+        std::array::from_fn(|k| if self.by_datasheet[k] { asked[k].min(bounds[k]) } else { asked[k] })
+    }
+
+    /// Sizes that are larger than what robot.toml says of a joint, so that no margin holds them.
+    #[must_use]
+    pub fn beyond_datasheet(&self, robot: &Robot) -> Vec<String> {
+        let keys = [("gain_error_max", "gain_bound"), ("offset_error_max_rad", "offset_bound_rad")];
+        let beyond = |(k, (key, bound)): (usize, (&str, &str))| {
+            let bounds = robot.sensors.iter().map(|sensor| ([sensor.gain_bound, sensor.offset_bound_rad][k], sensor));
+            let (least, sensor) = bounds.min_by(|a, b| a.0.total_cmp(&b.0))?;
+            let asked = self.sensor_errors_max(sensor)[k];
+            (asked > least).then(|| {
+                format!(
+                    "world.joint_sensors.{key} = {asked} is beyond {bound} = {least} of `{}` in robot.toml: margins do \
+                     not hold what the world draws",
+                    sensor.joint
+                )
+            })
+        };
+        keys.into_iter().enumerate().filter_map(beyond).collect()
+    }
+
     /// Physics steps in a control period.
     #[must_use]
     pub fn steps_per_period(&self) -> u64 {
         (CONTROL_PERIOD_S / self.physics.step_s).round() as u64
+    }
+
+    /// Time of a physics step, s.
+    pub(crate) fn time_s(&self, step: u64) -> f64 {
+        // Multiplied, not summed: whole periods fall on whole stamps.
+        step as f64 / self.steps_per_period() as f64 * CONTROL_PERIOD_S
     }
 
     /// Images are rendered for rays through one point.

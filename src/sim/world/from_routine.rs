@@ -17,6 +17,8 @@ impl WorldSpec {
     /// [`SimError::Spec`] naming file, key and what is allowed.
     pub fn from_routine(routine: &Routine, robot: &Robot) -> Result<Self, SimError> {
         let mut spec = Self::from_table(&routine.world, &routine.file)?;
+        let is_said = |key| routine.world.get("joint_sensors").is_some_and(|sensors| sensors.get(key).is_some());
+        spec.by_datasheet = ["gain_error_max", "offset_error_max_rad"].map(|key| !is_said(key));
         spec.read_motion(routine.file.parent().unwrap_or(Path::new(".")))?;
         check_step(&spec, robot, &routine.file)?;
         let check = RobotCheck { routine, robot };

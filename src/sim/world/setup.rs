@@ -66,6 +66,14 @@ pub(super) fn surroundings(spec: &WorldSpec, temperatures: &Temperatures, t_s: f
     OilState { oil_c: temperatures.oil_c(t_s), pressure_pa: gauge_pressure_pa(&spec.water, depth_m) }
 }
 
+/// The scene as it truly is, and the solids in it.
+pub(super) fn scenery(input: &WorldInput) -> Result<(Scene, Solids), SimError> {
+    let scene = input.spec.true_scene(input.scene)?;
+    let solids = Solids::new(input.robot, input.vehicle, &scene);
+    let pairs = solids.overlaps();
+    if pairs.is_empty() { Ok((scene, solids)) } else { Err(SimError::StowedInside { pairs }) }
+}
+
 /// The arm, and the free vehicle that the world asks for; none for a prescribed motion.
 pub(super) fn arm_physics(
     input: &WorldInput,

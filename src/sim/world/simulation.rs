@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 
 use crate::as_built::AsBuilt;
 use crate::body_poses::BodyPoses;
+use crate::clearance_watch::ClearanceWatch;
 use crate::contact_onset::ContactOnsets;
 use crate::controller::Controller;
 use crate::dynamics::{Force, JointLoad};
@@ -22,7 +23,7 @@ use crate::temperatures::Temperatures;
 use crate::truth::{TruthHeader, TruthSink};
 use crate::vehicle::{BaseState, FreeVehicle, Sea, VehicleMotion, WaterMotion};
 use crate::world::setup::{
-    WorldInput, arm_physics, header, joint_sensors, sample_joint_sensors, stowed_angles, surroundings,
+    WorldInput, arm_physics, header, joint_sensors, sample_joint_sensors, scenery, stowed_angles, surroundings,
 };
 use armcal_core::robot::{Robot, Vehicle};
 use armcal_core::streams::{ArmError, ImageDemand, JointCounts, MAX_JOINTS, Message};
@@ -55,6 +56,8 @@ pub struct World {
     pub(super) attitude: AttitudeSensor,
     pub(super) camera: WristCamera,
     pub(super) contacts: ContactOnsets,
+    /// `None` while nobody takes the truth.
+    pub(super) clearance: Option<ClearanceWatch>,
     /// Images under way; the line keeps their order.
     pub(super) images: VecDeque<CameraShot>,
     pub(super) image_demand: ImageDemand,
@@ -68,12 +71,11 @@ pub struct World {
 
 impl World {
     /// # Errors
-    /// [`SimError`] when the robot lacks masses or effort limits.
+    /// [`SimError`] when the robot lacks masses or effort limits, or is stowed inside something.
     pub fn new(mut input: WorldInput) -> Result<Self, SimError> {
         input.spec = input.spec.completed(input.robot);
-        let WorldInput { robot, vehicle, scene, seed, .. } = input;
+        let WorldInput { robot, vehicle, seed, .. } = input;
         let spec = input.spec.clone();
-        let scene = &spec.true_scene(scene)?;
         robot.require_masses()?;
         let built = AsBuilt::draw(robot, &spec, seed);
         let gear_ratios: Vec<f64> = built.joints.iter().map(|joint| joint.gear_ratio).collect();
@@ -82,15 +84,15 @@ impl World {
         let mut joint_sensors = joint_sensors(robot, &built, &spec.joint_sensors, seed);
         let around = surroundings(&spec, &temperatures, 0.0, spec.water.depth_m);
         let angles = stowed_angles(robot, &mut joint_sensors, &around);
-        let solids = Solids::new(robot, vehicle, scene);
+        let (scene, solids) = &scenery(&input)?;
         let motion = VehicleMotion::new(&spec.vehicle, spec.recorded.as_ref(), vehicle.vehicle_from_base, seed);
         let base = motion.at(0.0);
         let mut hydraulics = Hydraulics::new(&spec.hydraulics, &actuator_inputs(robot)?, step_s);
-        let (physics, free) = arm_physics(&input, &solids, &base, angles)?;
+        let (physics, free) = arm_physics(&input, solids, &base, angles)?;
         hydraulics.balance(&angles, &physics.static_torques(&base.gravity, &angles));
         let sea = Sea::new(&spec.water, seed);
         let measured = sample_joint_sensors(&mut joint_sensors, &angles, &around, 0.0);
-        let mut camera = WristCamera::new(&CameraInput { robot, built: &built, solids: &solids, spec: &spec, seed });
+        let mut camera = WristCamera::new(&CameraInput { robot, built: &built, solids, spec: &spec, seed });
         camera.enable_rendering(&RenderInput { robot, vehicle, scene, spec: &spec, seed })?;
         Ok(Self {
             controller: Controller::new(&spec.hydraulics, &robot.sensors, &gear_ratios, &measured),
@@ -98,6 +100,7 @@ impl World {
             attitude: AttitudeSensor::new(&spec.vehicle, &built.attitude, seed),
             camera,
             contacts: ContactOnsets::new(solids.pairs(), step_s),
+            clearance: None,
             images: VecDeque::new(),
             image_demand: ImageDemand::Few,
             n_images: 0,
@@ -115,7 +118,7 @@ impl World {
             sea,
             base,
             vehicle: vehicle.clone(),
-            solids,
+            solids: solids.clone(),
             physics,
             hydraulics,
             joint_sensors,
@@ -125,8 +128,7 @@ impl World {
     }
 
     pub(super) fn time_s(&self) -> f64 {
-        // Multiplied, not summed: whole periods fall on whole stamps.
-        self.step as f64 / self.spec.steps_per_period() as f64 * CONTROL_PERIOD_S
+        self.spec.time_s(self.step)
     }
 
     pub(super) fn stamp(&self) -> Stamp {
@@ -159,6 +161,7 @@ impl World {
         self.water = water_next;
         self.base = self.physics.base_state(&self.vehicle.vehicle_from_base).unwrap_or(next);
         self.watch_contacts()?;
+        self.watch_clearance();
         let next_image_s = (self.n_images + 1) as f64 / self.spec.camera.rate_hz;
         if self.time_s() >= next_image_s - 1e-9 {
             self.n_images += 1;

@@ -1,11 +1,13 @@
 //! The truth's stream of a world: states, clearances and contacts.
 
+use crate::clearance_watch::{ArmPlace, ClearanceWatch};
 use crate::error::SimError;
 use crate::spec::CONTROL_PERIOD_S;
 use crate::truth::{TruthClearance, TruthContact, TruthSink, TruthState};
 use crate::world::simulation::World;
 use armcal_core::spatial::Pose;
 use armcal_core::streams::ArmError;
+use armcal_core::time::SIMULATION_EPOCH;
 
 impl World {
     /// Hands the truth to `sink` from now on.
@@ -15,6 +17,9 @@ impl World {
     pub fn set_truth_sink(&mut self, mut sink: Box<dyn TruthSink>) -> Result<(), SimError> {
         sink.begin(&self.header).map_err(SimError::Truth)?;
         self.truth = Some(sink);
+        let base_from_ground = *self.base.world_from_base.inverse().isometry();
+        let place = ArmPlace { step: self.step, angles: &self.physics.angles(), base_from_ground: &base_from_ground };
+        self.clearance = Some(ClearanceWatch::new(&self.robot.chain, &self.solids, &place));
         Ok(())
     }
 
@@ -38,6 +43,13 @@ impl World {
         Ok(())
     }
 
+    pub(super) fn watch_clearance(&mut self) {
+        let Self { clearance: Some(watch), solids, physics, base, step, .. } = self else { return };
+        let base_from_ground = *base.world_from_base.inverse().isometry();
+        let place = ArmPlace { step: *step, angles: &physics.angles(), base_from_ground: &base_from_ground };
+        watch.follow(solids, &place, || physics.poses());
+    }
+
     pub(super) fn record_truth(&mut self) -> Result<(), ArmError> {
         if self.truth.is_none() {
             return Ok(());
@@ -52,8 +64,11 @@ impl World {
         }
         if is_due(self.spec.physics.clearance_rate_hz) {
             self.place_solids();
-            let stamp = self.stamp();
-            if let (Some(nearest), Some(truth)) = (self.solids.nearest(), &mut self.truth) {
+            let sampled = self.solids.nearest().map(|nearest| (nearest, self.step));
+            // The least of all steps since the last sample, where nothing was nearer before.
+            let low = self.clearance.as_mut().zip(sampled).and_then(|(watch, (now, _))| watch.take_low(now.distance_m));
+            if let (Some((nearest, step)), Some(truth)) = (low.or(sampled), &mut self.truth) {
+                let stamp = SIMULATION_EPOCH.plus_s(self.spec.time_s(step));
                 let name = |part| self.solids.part_name(part).to_owned();
                 let (part_a, part_b) = (name(nearest.part_a), name(nearest.part_b));
                 let clearance = TruthClearance { stamp, distance_m: nearest.distance_m, part_a, part_b };

@@ -3,7 +3,6 @@
 use crate::plan::motion::tracking_error::TrackingErrorBound;
 use armcal_core::kinematics::JointLimits;
 use armcal_core::robot::{JointSensorSpec, Robot};
-use armcal_core::streams::JointAngles;
 
 /// Per joint, how far it may be off: least at one angle, and more by a slope on either side of it.
 ///
@@ -142,18 +141,6 @@ impl JointErrorBounds {
                 },
             })
             .collect()
-    }
-
-    /// Believed angles to the corner `corner` of the error box over the first `n_joints` joints (bit set: upper end).
-    #[must_use]
-    pub fn corner(&self, believed: &JointAngles, n_joints: usize, corner: usize) -> JointAngles {
-        JointAngles::from_fn(believed.len(), |joint| {
-            if joint >= n_joints {
-                return believed[joint];
-            }
-            let error_rad = self.error_rad(joint, believed[joint]);
-            if corner >> joint & 1 == 1 { believed[joint] + error_rad } else { believed[joint] - error_rad }
-        })
     }
 }
 

@@ -61,7 +61,7 @@ impl Sweep<'_> {
     /// Errors of a stretch: the largest on it, within those of the region it comes from.
     pub(crate) fn region(&self, along: [f64; 2], within: Option<&Region>) -> Region {
         let mut error_rad = [[0.0; 2]; MAX_JOINTS];
-        for (joint, error) in error_rad.iter_mut().enumerate().take(self.model.n_error_joints()) {
+        for (joint, error) in error_rad.iter_mut().enumerate().filter(|(joint, _)| self.model.has_error(*joint)) {
             let most = self.error_rad(joint, along);
             let [low, high] = within.map_or([-most, most], |region| region.error_rad[joint]);
             *error = [low.max(-most), high.min(most)];

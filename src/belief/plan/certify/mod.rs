@@ -6,6 +6,8 @@
 
 mod error_box;
 mod motion_bound;
+#[cfg(test)]
+mod random_arms;
 mod sweep;
 #[cfg(test)]
 mod tests;

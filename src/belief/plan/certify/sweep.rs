@@ -140,8 +140,8 @@ impl Sweep<'_> {
             step_rad[joint] = half * (self.to[joint] - self.from[joint]);
         }
         if self.bounds.is_some() {
-            for (joint, error) in error_half_rad.iter_mut().enumerate().take(self.model.n_error_joints()) {
-                *error = self.error_rad(joint, along);
+            for joint in (0..angles.len()).filter(|&joint| self.model.has_error(joint)) {
+                error_half_rad[joint] = self.error_rad(joint, along);
             }
         }
         ArmRegion::new(&self.model.link_poses(&angles), angles.len(), step_rad, error_half_rad)

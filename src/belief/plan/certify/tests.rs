@@ -45,11 +45,16 @@ fn several_bounds(robot: &Robot) -> Vec<JointErrorBounds> {
     vec![prior, all_but_one, all]
 }
 
-/// Any arm within the bounds.
-fn some_arm(at: &JointAngles, bounds: &JointErrorBounds, n: usize, rng: &mut ChaCha8Rng) -> JointAngles {
+/// Any arm within the bounds; only the joints of `errs` may be off.
+pub(super) fn some_arm(
+    at: &JointAngles,
+    bounds: &JointErrorBounds,
+    errs: impl Fn(usize) -> bool,
+    rng: &mut ChaCha8Rng,
+) -> JointAngles {
     let on_edge = rng.random_range(0.0..1.0) < 0.5;
     JointAngles::from_fn(at.len(), |joint| {
-        if joint >= n {
+        if !errs(joint) {
             return at[joint];
         }
         let share = if on_edge && rng.random_range(0.0..1.0) < 0.7 {
@@ -63,9 +68,14 @@ fn some_arm(at: &JointAngles, bounds: &JointErrorBounds, n: usize, rng: &mut Cha
 
 /// The least clearance that 2^5 corners, the middle and 60 more arms find.
 fn brute_m(clearance: &ClearanceModel<'_>, at: &JointAngles, bounds: &JointErrorBounds, rng: &mut ChaCha8Rng) -> f64 {
-    let n = clearance.n_error_joints();
-    let corners = (0..1usize << n).map(|corner| bounds.corner(at, n, corner));
-    let others = (0..60).map(|_| some_arm(at, bounds, n, rng));
+    let corner = |corner: usize| {
+        JointAngles::from_fn(at.len(), |joint| {
+            let error_rad = if clearance.has_error(joint) { bounds.error_rad(joint, at[joint]) } else { 0.0 };
+            if corner >> joint & 1 == 1 { at[joint] + error_rad } else { at[joint] - error_rad }
+        })
+    };
+    let corners = (0..1usize << 5).map(corner);
+    let others = (0..60).map(|_| some_arm(at, bounds, |joint| clearance.has_error(joint), rng));
     corners.chain(others).chain([*at]).map(|arm| clearance.nearest(&arm).distance_m).fold(f64::INFINITY, f64::min)
 }
 

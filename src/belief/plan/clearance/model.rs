@@ -14,19 +14,35 @@ use crate::plan::clearance::separation::{Placed, gap_m, separate};
 use crate::plan::clearance::shapes::{LinkShape, StaticShape, pairs, vec3};
 use crate::plan::motion::timing::Timing;
 use armcal_core::kinematics::LinkPoses;
-use armcal_core::robot::{MAX_COLLISION_SHAPES, Robot, StationKeeping, Vehicle, parry_pose};
+use armcal_core::robot::{MAX_COLLISION_SHAPES, PlacedShape, Robot, StationKeeping, Vehicle, parry_pose};
 use armcal_core::routine::Scene;
-use armcal_core::streams::JointAngles;
+use armcal_core::streams::{JointAngles, MAX_JOINTS};
 
 /// The closest pair and their distance.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ClosestPair {
-    /// Zero: touching or inside each other.
+    /// In the terms of the margin: of two links by `reduction_m` more than it is. Zero: touching or inside each other.
     pub distance_m: f64,
+    /// By how much nearer than the margin the pair may be, m: zero but for two links of the arm.
+    pub reduction_m: f64,
     /// Name of the proximal link, or of the link where `second` is none; empty where nothing is near.
     pub first: String,
     /// Name of the other link, vehicle part, obstacle or seafloor; empty where nothing is near.
     pub second: String,
+}
+
+impl ClosestPair {
+    /// The distance as it is, m.
+    #[must_use]
+    pub fn true_distance_m(&self) -> f64 {
+        (self.distance_m - self.reduction_m).max(0.0)
+    }
+
+    /// The distance that the pair needs under a margin, m.
+    #[must_use]
+    pub fn needed_m(&self, margin_m: f64) -> f64 {
+        (margin_m - self.reduction_m).max(0.0)
+    }
 }
 
 impl std::fmt::Display for ClosestPair {
@@ -40,8 +56,8 @@ pub struct ClearanceModel<'a> {
     pub(crate) robot: &'a Robot,
     pub(crate) moving: Vec<LinkShape>,
     pub(crate) standing: Vec<StaticShape>,
-    /// Joints whose error moves a collision shape in a way that matters.
-    pub(crate) n_error_joints: usize,
+    /// Of each joint: whether its error moves an outline in a way that matters.
+    pub(crate) has_error: [bool; MAX_JOINTS],
     pub(crate) pairs: Vec<Pair>,
     /// Of each pair: whether it is of links that the robot's folder does not list as ever near each other.
     pub(crate) is_unlisted: Vec<bool>,
@@ -79,6 +95,8 @@ const FAR_M: f64 = 0.4;
 pub(crate) const TOUCHING_M: f64 = 1e-6;
 /// Links of one arm neither sway against each other nor are surveyed: they need less water than the vehicle does.
 pub const SELF_MARGIN_REDUCTION_M: f64 = 0.03;
+/// A tool whose boxes stay this near to the axis that it turns about counts as round, m.
+const ROUND_TOOL_M: f64 = 0.07;
 /// Of the vehicle's position and attitude.
 const SWAY_SIGMAS: f64 = 3.0;
 
@@ -119,22 +137,21 @@ impl<'a> ClearanceModel<'a> {
 
     /// Nothing around the arm but itself.
     #[must_use]
-    pub(crate) fn of_arm_alone(robot: &'a Robot) -> Self {
+    pub fn of_arm_alone(robot: &'a Robot) -> Self {
         let sway = StationBound { position_m: 0.0, attitude_rad: 0.0, center_of_mass: Vec3::ZERO };
         Self::of(robot, moving(robot), Vec::new(), sway)
     }
 
     fn of(robot: &'a Robot, moving: Vec<LinkShape>, standing: Vec<StaticShape>, sway: StationBound) -> Self {
-        // The last joint turns a nearly round gripper about its own axis: its error moves no outline.
-        let n_error_joints = robot.chain.joints().iter().filter(|joint| joint.limits.is_some()).count();
-        let pairs = pairs(&moving, &standing);
+        let has_error = std::array::from_fn(|joint| joint < robot.n_joints() && !turns_round_tool(robot, joint));
+        let pairs = pairs(robot, &moving, &standing);
         let is_listed = |inner: usize, outer: usize| {
             robot.self_pairs.as_ref().is_none_or(|stored| stored.has(moving[inner].body, moving[outer].body))
         };
         let is_unlisted = |pair: &Pair| matches!(*pair, Pair::Links { outer, inner } if !is_listed(inner, outer));
         let is_unlisted = pairs.iter().map(is_unlisted).collect();
         let timing = Timing::new(robot);
-        Self { robot, moving, standing, n_error_joints, pairs, is_unlisted, gripper_growth_m: 0.0, sway, timing }
+        Self { robot, moving, standing, has_error, pairs, is_unlisted, gripper_growth_m: 0.0, sway, timing }
     }
 
     /// The same with a gripper that stands out by `growth_m` more than its shapes: its jaws are open.
@@ -148,6 +165,37 @@ impl<'a> ClearanceModel<'a> {
     pub fn nearest(&self, angles: &JointAngles) -> ClosestPair {
         let poses = self.robot.chain.link_poses(angles);
         self.nearest_below(&poses, FAR_M)
+    }
+
+    /// Every two parts that overlap for one arm exactly at `angles`, and do not touch by design.
+    #[must_use]
+    pub fn overlaps(&self, angles: &JointAngles) -> Vec<ClosestPair> {
+        let placed = self.placed(&self.link_poses(angles));
+        let mut found: Vec<ClosestPair> = Vec::new();
+        for &pair in &self.pairs {
+            let at = [&placed[pair.outer()], self.other_at(pair, |inner| &placed[inner])];
+            let near = gap_m(&at[0].bounds, &at[1].bounds) <= 0.0;
+            if near && separate(&self.shapes(pair), at, at[0].rough_direction(at[1])).distance_m <= 0.0 {
+                let named = self.named(pair, 0.0);
+                if !found.contains(&named) {
+                    found.push(named);
+                }
+            }
+        }
+        found
+    }
+
+    /// What a point lies deeper inside than `depth_m`, of what stands around the arm and its base link.
+    #[must_use]
+    pub(crate) fn holder(&self, point_m: &Vector3<f64>, depth_m: f64) -> Option<&str> {
+        let point = vec3(point_m);
+        let holds = |pose: &Pose3, shape: &SharedShape| {
+            let near = shape.project_point(pose, point, false);
+            near.is_inside && (near.point - point).length() > depth_m
+        };
+        let standing = self.standing.iter().find(|s| holds(&s.placed.pose, &s.shape)).map(|s| s.name.as_str());
+        let base = |m: &&LinkShape| m.body == 0 && holds(&parry_pose(&m.body_from_shape), &m.shape);
+        standing.or_else(|| self.moving.iter().find(base).map(|m| m.name.as_str()))
     }
 
     /// Whether one arm exactly at `angles` has anything nearer than `margin_m`.
@@ -192,8 +240,10 @@ impl<'a> ClearanceModel<'a> {
                 nearest = Some(pair);
             }
         }
-        let (first, second) = nearest.map_or_else(Default::default, |pair| self.names(pair));
-        ClosestPair { distance_m: best_m, first, second }
+        match nearest {
+            Some(pair) => self.named(pair, best_m),
+            None => ClosestPair { distance_m: best_m, reduction_m: 0.0, first: String::new(), second: String::new() },
+        }
     }
 
     fn placed(&self, poses: &LinkPoses) -> [Placed; MAX_COLLISION_SHAPES] {
@@ -207,6 +257,16 @@ impl<'a> ClearanceModel<'a> {
     /// Whether something stands on the line between two points of the base frame; `skip_m` is left out at its far end.
     #[must_use]
     pub fn blocks_sight(&self, poses: &LinkPoses, from_m: &Vector3<f64>, to_m: &Vector3<f64>, skip_m: f64) -> bool {
+        self.sight_blocker(poses, [from_m, to_m], skip_m).is_some()
+    }
+
+    /// The name of what stands there.
+    pub(crate) fn sight_blocker(
+        &self,
+        poses: &LinkPoses,
+        [from_m, to_m]: [&Vector3<f64>; 2],
+        skip_m: f64,
+    ) -> Option<&str> {
         let sight = to_m - from_m;
         let length = sight.norm();
         let direction = sight / length.max(1e-9);
@@ -216,19 +276,36 @@ impl<'a> ClearanceModel<'a> {
         let ray = query::Ray::new(vec3(&start), vec3(&direction));
         let reach = length - near_m - skip_m;
         if reach <= 0.0 {
-            return false;
+            return None;
         }
         let hit = |pose: &Pose3, shape: &SharedShape| shape.cast_ray(pose, &ray, reach, true).is_some();
         let beside = |center: &Vector3<f64>, radius_m: f64| {
             let along = (center - start).dot(&direction).clamp(0.0, reach);
             (center - (start + direction * along)).norm() > radius_m
         };
-        self.standing.iter().any(|s| !beside(&s.center_m, s.radius_m) && hit(&s.placed.pose, &s.shape))
-            || self.moving.iter().any(|m| {
-                let isometry = poses.link(m.body) * m.body_from_shape;
-                !beside(&isometry.translation.vector, m.radius_m) && hit(&parry_pose(&isometry), &m.shape)
-            })
+        let stands = |s: &&StaticShape| !beside(&s.center_m, s.radius_m) && hit(&s.placed.pose, &s.shape);
+        let moves = |m: &&LinkShape| {
+            let isometry = poses.link(m.body) * m.body_from_shape;
+            !beside(&isometry.translation.vector, m.radius_m) && hit(&parry_pose(&isometry), &m.shape)
+        };
+        let standing = self.standing.iter().find(stands).map(|s| s.name.as_str());
+        standing.or_else(|| self.moving.iter().find(moves).map(|m| m.name.as_str()))
     }
+}
+
+/// Whether a joint has no stops and turns a slender tool, and nothing else, about its own axis: its error hardly moves
+/// an outline.
+fn turns_round_tool(robot: &Robot, joint: usize) -> bool {
+    let spec = &robot.chain.joints()[joint];
+    let is_slender = |placed: &PlacedShape| {
+        let bounds = placed.shape.to_parry().compute_local_aabb();
+        let from_shape = placed.owner_from_shape * placed.shape.axis_fix();
+        bounds.vertices().iter().all(|corner| {
+            let at = from_shape * nalgebra::Point3::new(corner.x, corner.y, corner.z);
+            spec.axis.cross(&at.coords).norm() <= ROUND_TOOL_M
+        })
+    };
+    spec.limits.is_none() && joint + 1 == robot.n_joints() && robot.bodies[joint + 1].collisions.iter().all(is_slender)
 }
 
 fn moving(robot: &Robot) -> Vec<LinkShape> {

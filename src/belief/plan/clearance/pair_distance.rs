@@ -20,8 +20,13 @@ impl ClearanceModel<'_> {
         &self.pairs
     }
 
-    pub(crate) fn n_error_joints(&self) -> usize {
-        self.n_error_joints
+    /// Whether a joint's error counts: all but that of one that turns a round tool about its axis.
+    pub(crate) fn has_error(&self, joint: usize) -> bool {
+        self.has_error[joint]
+    }
+
+    pub(crate) fn has_stops(&self, joint: usize) -> bool {
+        self.robot.chain.joints()[joint].limits.is_some()
     }
 
     pub(crate) fn stowed(&self) -> &JointAngles {
@@ -173,6 +178,7 @@ impl ClearanceModel<'_> {
     /// The pair at a distance in the terms of the margin.
     pub(crate) fn named(&self, pair: Pair, distance_m: f64) -> ClosestPair {
         let (first, second) = self.names(pair);
-        ClosestPair { distance_m, first, second }
+        let reduction_m = if matches!(pair, Pair::Links { .. }) { SELF_MARGIN_REDUCTION_M } else { 0.0 };
+        ClosestPair { distance_m, reduction_m, first, second }
     }
 }

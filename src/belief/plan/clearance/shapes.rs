@@ -127,12 +127,15 @@ impl ShapeBox {
     }
 }
 
-/// Every two shapes that may touch. What is fixed to the base stands where it is bolted on.
-pub(crate) fn pairs(moving: &[LinkShape], standing: &[StaticShape]) -> Vec<Pair> {
+/// Every two shapes that are kept apart. What is fixed to the base stands where it is bolted on.
+pub(crate) fn pairs(robot: &Robot, moving: &[LinkShape], standing: &[StaticShape]) -> Vec<Pair> {
     let mut pairs = Vec::new();
     for (i, shape) in moving.iter().enumerate().filter(|(_, shape)| shape.body > 0) {
-        pairs.extend((0..standing.len()).map(|k| Pair::Standing { moving: i, standing: k }));
-        let inner = moving.iter().enumerate().filter(|(_, other)| other.body + MIN_BODY_GAP <= shape.body);
+        let may_touch = |other: &str| robot.allowed_pairs.has(&shape.name, other);
+        let around = standing.iter().enumerate().filter(|(_, other)| other.is_of_world || !may_touch(&other.name));
+        pairs.extend(around.map(|(k, _)| Pair::Standing { moving: i, standing: k }));
+        let is_apart = |other: &LinkShape| other.body + MIN_BODY_GAP <= shape.body && !may_touch(&other.name);
+        let inner = moving.iter().enumerate().filter(|(_, other)| is_apart(other));
         pairs.extend(inner.map(|(j, _)| Pair::Links { outer: i, inner: j }));
     }
     pairs

@@ -82,7 +82,7 @@ impl PathPlanner<'_> {
     pub(crate) fn is_within_limits(&self, edge: &Edge) -> bool {
         let tracking_error = TrackingErrorBound::new(self.clearance.robot(), self.clearance.timing(), edge);
         let arriving = TrackingErrorBound::arriving(self.clearance.robot());
-        (0..self.clearance.n_error_joints()).all(|j| {
+        (0..edge.to.len()).filter(|&j| self.clearance.has_stops(j)).all(|j| {
             let JointLimits { lower_rad, upper_rad } = self.limits[j];
             let way_rad = edge.to[j] - edge.from[j];
             let left_rad = if way_rad > 0.0 { upper_rad - edge.to[j] } else { edge.to[j] - lower_rad };

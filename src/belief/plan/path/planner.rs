@@ -42,7 +42,7 @@ impl PathPlanner<'_> {
 
     /// A goal may be beyond what is safe only where the start is farther beyond.
     fn check_limits(&self, from: &JointAngles, to: &JointAngles) -> Result<(), PathError> {
-        for (joint, limits) in self.limits.iter().enumerate().take(self.clearance.n_error_joints()) {
+        for (joint, limits) in self.limits.iter().enumerate().filter(|(joint, _)| self.clearance.has_stops(*joint)) {
             let JointLimits { lower_rad, upper_rad } = *limits;
             let beyond_rad = |angle: f64| (lower_rad - angle).max(angle - upper_rad);
             if beyond_rad(to[joint]) > beyond_rad(from[joint]).max(0.0) + ROUNDING_RAD {
@@ -54,16 +54,16 @@ impl PathPlanner<'_> {
 
     fn check_ends(&self, from: &JointAngles, to: &JointAngles) -> Result<(), PathError> {
         if let Some(found) = self.clearance.find_violation(from, self.bounds, self.margin_m) {
-            let (nearest, distance_m) = (found.to_string(), found.distance_m);
-            return Err(PathError::StartTooNear { nearest, distance_m, needed_m: self.margin_m });
+            let (distance_m, needed_m) = (found.true_distance_m(), found.needed_m(self.margin_m));
+            return Err(PathError::StartTooNear { nearest: found.to_string(), distance_m, needed_m });
         }
         let too_near = |at: &JointAngles| self.clearance.find_violation_arriving(at, self.bounds, self.margin_m);
         let Some(found) = too_near(to) else { return Ok(()) };
         let free_share = halved(|share| too_near(&between(from, to, share)).is_none());
         Err(PathError::GoalTooNear {
             nearest: found.to_string(),
-            distance_m: found.distance_m,
-            needed_m: self.margin_m,
+            distance_m: found.true_distance_m(),
+            needed_m: found.needed_m(self.margin_m),
             nearest_free: between(from, to, free_share),
         })
     }
@@ -80,7 +80,7 @@ impl PathPlanner<'_> {
             });
         PathError::Blocked {
             tried,
-            distance_m: nearest.as_ref().map_or(self.margin_m, |found| found.distance_m),
+            distance_m: nearest.as_ref().map_or(self.margin_m, ClosestPair::true_distance_m),
             nearest: nearest.map_or_else(String::new, |found| found.to_string()),
             free_share: halved(|share| self.is_edge_free(from, &between(from, to, share))),
         }

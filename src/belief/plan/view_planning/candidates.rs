@@ -10,6 +10,7 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 use crate::plan::PlanError;
+use crate::plan::clearance::ClosestPair;
 use crate::plan::view_planning::camera_ik::CameraGoal;
 use crate::plan::view_planning::request::PoseRequest;
 use armcal_core::kinematics::JointLimits;
@@ -35,9 +36,13 @@ pub(crate) struct InfeasibleCounts {
     /// How many draws have 0, 1, .. tags in view; the last counts all beyond.
     by_tags: [usize; MOST_TAGS + 1],
     /// The tag in view of a pose that came nearest to being clear, and by how much it lacks.
-    nearest: Option<(u32, f64)>,
+    nearest: Option<(u32, ClosestPair)>,
     /// See enough tags with the believed arm, but not with most that the belief allows.
     unsure: usize,
+    /// See enough, and have their tool at a target.
+    at_target: usize,
+    /// Keep clear and have enough tags in view, and something hides them: what, and how many poses.
+    hidden: Vec<(String, usize)>,
     /// See enough tags, and some arm within the bounds comes too near.
     blocked: usize,
 }
@@ -189,6 +194,7 @@ impl<'a> Search<'a> {
         let tool = poses.frame(&robot.tool.mount).translation.vector;
         let near_target = |target: &[f64; 3]| (tool - Vector3::from(*target)).norm() < TARGET_DISTANCE_M;
         if request.targets_m.iter().any(near_target) {
+            self.refused.at_target += 1;
             return None;
         }
         let margin_m = request.capture.clearance_m;
@@ -203,14 +209,17 @@ impl<'a> Search<'a> {
         if let Some(nearest) = request.clearance.find_violation_arriving(&angles, request.bounds, margin_m) {
             self.refused.blocked += 1;
             let tag = request.visibility.in_view(robot, &poses).next().map(|idx| robot.tags[idx].id);
-            if let Some(tag) = tag.filter(|_| self.refused.nearest.is_none_or(|(_, most)| nearest.distance_m > most)) {
-                self.refused.nearest = Some((tag, nearest.distance_m));
+            let best = |(_, most): &(u32, ClosestPair)| nearest.distance_m > most.distance_m;
+            if let Some(tag) = tag.filter(|_| self.refused.nearest.as_ref().is_none_or(best)) {
+                self.refused.nearest = Some((tag, nearest));
             }
             return None;
         }
         let tags = self.expected_tags(&angles);
         if tags.iter().map(|(_, share)| share).sum::<f64>() < min_tags as f64 {
-            self.refused.unsure += 1;
+            // In view they are, for most arms.
+            let blocker = request.visibility.hidden_by(robot, request.clearance, &angles).unwrap_or("the arm itself");
+            self.refused.count_hidden(blocker);
             return None;
         }
         let shows_known_tag = tags.iter().any(|&(idx, share)| share > 0.5 && robot.tags[idx].is_known());
@@ -269,6 +278,13 @@ fn arms() -> [[f64; MAX_JOINTS]; N_ARMS] {
 }
 
 impl InfeasibleCounts {
+    fn count_hidden(&mut self, blocker: &str) {
+        match self.hidden.iter_mut().find(|(name, _)| name == blocker) {
+            Some((_, n)) => *n += 1,
+            None => self.hidden.push((blocker.to_owned(), 1)),
+        }
+    }
+
     /// Why there is none, with the nearest thing that would work.
     pub(crate) fn no_pose(&self, request: &PoseRequest<'_>) -> PlanError {
         PlanError::NoUsefulPose {
@@ -297,19 +313,29 @@ impl InfeasibleCounts {
                 None => "no tag comes into view of the camera from any pose tried".to_owned(),
             };
         }
-        if let Some((tag, distance_m)) = self.nearest {
+        // The last test that any draw came to.
+        if let Some((blocker, n)) = self.hidden.iter().max_by_key(|(_, n)| *n) {
+            return format!("{n} poses keep clear and have enough tags in view, but `{blocker}` hides them");
+        }
+        if let Some((tag, nearest)) = &self.nearest {
+            let margin_m = request.capture.clearance_m;
             return format!(
-                "tag {tag} comes into view at best with {distance_m:.3} m of clearance for every arm within the bounds"
+                "tag {tag} comes into view at best with {:.3} m of clearance between {nearest} for every arm within \
+                 the bounds; {:.3} m are needed",
+                nearest.true_distance_m(),
+                nearest.needed_m(margin_m)
             );
         }
+        let poses = format!("{enough} poses have enough tags in view, but");
         if self.unsure > 0 {
-            let unsure = self.unsure;
-            return format!("{unsure} poses see enough tags only if the joints are where they are believed to be");
+            format!("{poses} {} of them only if the joints are where they are believed to be", self.unsure)
+        } else if self.blocked > 0 {
+            format!("{poses} the believed arm is too near to something there")
+        } else if self.at_target > 0 {
+            format!("{poses} their tool is at a target")
+        } else {
+            format!("{poses} the tag on the gripper is hidden there, or they were tried in vain")
         }
-        format!(
-            "{enough} poses have enough tags in view, but the believed arm touches something there, or its tool is \
-             at a target"
-        )
     }
 }
 

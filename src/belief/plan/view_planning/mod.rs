@@ -6,7 +6,7 @@
 //! tool error, `stop_reason` ends the capture. The default objective is the test-pose criterion of Klimchik et al.
 //! (2014).
 
-mod camera_ik;
+pub(crate) mod camera_ik;
 mod candidates;
 mod criterion;
 #[cfg(test)]
