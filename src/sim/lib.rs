@@ -24,6 +24,7 @@ mod recorded_motion;
 mod sensors;
 mod solids;
 mod spec;
+mod structure;
 mod temperatures;
 pub mod truth;
 mod vehicle;
@@ -38,7 +39,7 @@ pub use fault::{Fault, ScheduledFault};
 pub use recorded_motion::{RecordedMotion, VehicleKinematics};
 pub use spec::{
     CameraMode, CameraWorldSpec, ClockSpec, HydraulicsSpec, ImageSpec, JointSensorsSpec, MotionKind, PhysicsSpec,
-    Points, PortKind, TagsSpec, TemperatureSpec, UnmodelledObstacles, VehicleMotionSpec, WaterKind, WaterSpec,
-    WorldSpec,
+    Points, PortKind, StructureSpec, TagsSpec, TemperatureSpec, UnmodelledObstacles, VehicleMotionSpec, WaterKind,
+    WaterSpec, WorldSpec,
 };
 pub use world::{World, WorldInput};

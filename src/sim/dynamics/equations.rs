@@ -100,6 +100,10 @@ impl Multibody {
         &self.chain
     }
 
+    pub(super) fn chain_mut(&mut self) -> &mut Chain {
+        &mut self.chain
+    }
+
     /// Bodies of the links 0..=n, base first.
     #[must_use]
     pub fn bodies(&self) -> &[Body] {
@@ -180,7 +184,7 @@ impl Body {
     ///
     /// The water's part, with `u` its velocity and `r` the body's velocity against it (Kirchhoff; in the frame that
     /// moves with the water the spatial acceleration has `w x u` more): `Ia (a + w x u - du/dt) + r x* Ia r`.
-    fn newton_euler(
+    pub(super) fn newton_euler(
         &self,
         place: &Isometry3<f64>,
         velocity: &Motion,
@@ -206,7 +210,7 @@ impl Body {
     }
 }
 
-fn joint_axes(poses: &LinkPoses, n: usize) -> [Motion; MAX_JOINTS] {
+pub(super) fn joint_axes(poses: &LinkPoses, n: usize) -> [Motion; MAX_JOINTS] {
     let mut axes = [Motion::zero(); MAX_JOINTS];
     for (j, slot) in axes.iter_mut().enumerate().take(n) {
         *slot = Motion::rotation(poses.axis(j), poses.joint_origin(j));

@@ -37,6 +37,8 @@ pub(crate) struct PhysicsInput<'a> {
     /// `None` for an arm that collides with nothing.
     pub solids: Option<&'a Solids>,
     pub water: &'a WaterSpec,
+    /// A body that one of them carries.
+    pub payload: Option<&'a (usize, Body)>,
     pub spec: &'a PhysicsSpec,
     pub angles: JointAngles,
 }
@@ -48,6 +50,8 @@ pub(crate) struct Drive<'a> {
     pub water: [WaterMotion; 2],
     /// About the base's origin, base axes.
     pub vehicle_force: Force,
+    /// On each body besides, about the base's origin, base axes.
+    pub pulls: &'a [Force; MAX_JOINTS + 1],
     pub loads: &'a [JointLoad; MAX_JOINTS],
 }
 
@@ -64,6 +68,9 @@ impl ArmPhysics {
     pub(crate) fn new(input: &PhysicsInput) -> Self {
         let water = WaterProperties::of(input.water);
         let mut bodies: Vec<Body> = input.bodies.iter().map(|link| Body::link(link, &water)).collect();
+        if let Some((body, payload)) = input.payload {
+            bodies[*body].carry(payload);
+        }
         bodies[0] = Body::none();
         let contacts = input.solids.map(|s| (ContactWorld::new(input.chain, s, input.spec, &input.angles), s.clone()));
         let state = SystemState {
@@ -93,6 +100,12 @@ impl ArmPhysics {
 
     pub(crate) fn multibody(&self) -> &Multibody {
         &self.multibody
+    }
+
+    /// Puts the first joint where the mount has brought it.
+    pub(crate) fn set_first_place(&mut self, base_from_joint: &Isometry3<f64>) {
+        self.multibody.set_first_place(base_from_joint);
+        self.poses = self.multibody.chain().link_poses(&self.state.angles);
     }
 
     /// True joint angles, rad.
@@ -148,8 +161,8 @@ impl ArmPhysics {
 
     /// Forces on each body besides what gravity and water do.
     fn extra(&mut self, drive: &Drive) -> [Force; MAX_JOINTS + 1] {
-        let mut extra = [Force::zero(); MAX_JOINTS + 1];
-        extra[0] = drive.vehicle_force;
+        let mut extra = *drive.pulls;
+        extra[0] += drive.vehicle_force;
         if let Some(push) = &mut self.push {
             let place = self.poses.link(push.body);
             let point = place.rotation * push.point_m + place.translation.vector;
@@ -160,11 +173,6 @@ impl ArmPhysics {
             }
         }
         extra
-    }
-
-    /// Torque of gravity and buoyancy about each joint at `angles`, N m.
-    pub(crate) fn static_torques(&self, gravity: &Vector3<f64>, angles: &JointAngles) -> JointAngles {
-        self.multibody.static_torques(angles, gravity)
     }
 
     /// Calls `touch` with the two parts of every pair that touches now.

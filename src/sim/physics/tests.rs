@@ -34,14 +34,20 @@ fn titan() -> Robot {
 /// An arm that collides with nothing.
 fn physics(chain: &Chain, bodies: &[LinkBody], step_s: f64, angles: JointAngles) -> ArmPhysics {
     let spec = PhysicsSpec { step_s, ..PhysicsSpec::default() };
-    ArmPhysics::new(&PhysicsInput { chain, bodies, solids: None, water: &DRY, spec: &spec, angles })
+    ArmPhysics::new(&PhysicsInput { chain, bodies, solids: None, water: &DRY, payload: None, spec: &spec, angles })
 }
 
 /// One step without anything about the joints, the base moving from one state to the other.
 fn swing(physics: &mut ArmPhysics, from: &BaseState, to: &BaseState) {
     let still = WaterMotion { velocity: Vector3::zeros(), acceleration: Vector3::zeros() };
     let loads = [JointLoad::default(); MAX_JOINTS];
-    let drive = Drive { base: [from, to], water: [still; 2], vehicle_force: Force::zero(), loads: &loads };
+    let drive = Drive {
+        base: [from, to],
+        water: [still; 2],
+        vehicle_force: Force::zero(),
+        pulls: &[Force::zero(); MAX_JOINTS + 1],
+        loads: &loads,
+    };
     physics.step(&drive);
 }
 

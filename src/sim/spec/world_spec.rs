@@ -16,6 +16,7 @@ use crate::spec::image::{CameraMode, ImageSpec};
 use crate::spec::joint_sensors::JointSensorsSpec;
 use crate::spec::obstacles::UnmodelledObstacles;
 use crate::spec::physics::{CONTROL_PERIOD_S, PhysicsSpec};
+use crate::spec::structure::StructureSpec;
 use crate::spec::table::CheckedTable;
 use crate::spec::temperature::TemperatureSpec;
 use crate::spec::vehicle::{MotionKind, VehicleMotionSpec};
@@ -47,6 +48,9 @@ pub struct WorldSpec {
     pub hydraulics: HydraulicsSpec,
     /// Density, current, waves and depth gauge.
     pub water: WaterSpec,
+    /// What gives and pulls about the arm; written out where anything does.
+    #[serde(skip_serializing_if = "StructureSpec::is_default")]
+    pub structure: StructureSpec,
     /// By joint: counts per radian over the datasheet's. Negative: they run the other way. The arm's own controller
     /// knows.
     pub gear_ratio: BTreeMap<String, f64>,
@@ -67,7 +71,7 @@ impl WorldSpec {
     /// # Errors
     /// [`SimError::Spec`] naming file, key and the allowed range; NaN is in no range.
     pub fn from_table(table: &toml::Table, file: &Path) -> Result<Self, SimError> {
-        const TABLES: [&str; 13] = [
+        const TABLES: [&str; 14] = [
             "physics",
             "joint_sensors",
             "temperature",
@@ -78,6 +82,7 @@ impl WorldSpec {
             "vehicle",
             "hydraulics",
             "water",
+            "structure",
             "gear_ratio",
             "obstacle",
             "fault",
@@ -98,6 +103,7 @@ impl WorldSpec {
             vehicle: reader.read("vehicle")?,
             hydraulics: reader.read("hydraulics")?,
             water: reader.read("water")?,
+            structure: reader.read("structure")?,
             gear_ratio: reader.parse("gear_ratio")?,
             recorded: None,
             obstacle: UnmodelledObstacles(

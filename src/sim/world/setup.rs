@@ -1,12 +1,15 @@
 //! Input of a world, and the initial values of its parts.
 
 use crate::as_built::AsBuilt;
+use crate::dynamics::{Body, WaterProperties};
 use crate::error::SimError;
-use crate::physics::ArmPhysics;
+use crate::physics::{ArmPhysics, PhysicsInput};
 use crate::sensors::OilState;
 use crate::sensors::joint::{JointInput, JointSensor};
 use crate::sensors::thermometer::gauge_pressure_pa;
+use crate::solids::Solids;
 use crate::spec::{JointSensorsSpec, MotionKind, WorldSpec};
+use crate::structure::{FlexibleArm, payload};
 use crate::temperatures::Temperatures;
 use crate::truth::TruthHeader;
 use crate::vehicle::{BaseState, FreeVehicle};
@@ -62,6 +65,29 @@ pub(super) fn sample_joint_sensors(
 /// At a depth below the surface.
 pub(super) fn surroundings(spec: &WorldSpec, temperatures: &Temperatures, t_s: f64, depth_m: f64) -> OilState {
     OilState { oil_c: temperatures.oil_c(t_s), pressure_pa: gauge_pressure_pa(&spec.water, depth_m) }
+}
+
+/// What gives and pulls about the arm, its own base and the payload included.
+pub(super) fn flexible_arm(robot: &Robot, spec: &WorldSpec) -> FlexibleArm {
+    let water = WaterProperties::of(&spec.water);
+    let mut bodies: Vec<Body> = robot.bodies.iter().map(|link| Body::link(link, &water)).collect();
+    if let Some((body, payload)) = payload(spec, robot) {
+        bodies[body].carry(&payload);
+    }
+    FlexibleArm::new(&spec.structure, robot, bodies, spec.physics.step_s)
+}
+
+/// The arm with its payload at rest at these angles.
+pub(super) fn arm_physics(robot: &Robot, spec: &WorldSpec, solids: &Solids, angles: JointAngles) -> ArmPhysics {
+    ArmPhysics::new(&PhysicsInput {
+        chain: &robot.chain,
+        bodies: &robot.bodies,
+        solids: Some(solids),
+        water: &spec.water,
+        payload: payload(spec, robot).as_ref(),
+        spec: &spec.physics,
+        angles,
+    })
 }
 
 /// The free vehicle that the world asks for, set on the physics at its start; `None` for a prescribed motion.

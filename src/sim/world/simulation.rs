@@ -11,21 +11,23 @@ use crate::error::SimError;
 use crate::fault::Timeline;
 use crate::gripper::Gripper;
 use crate::hydraulics::{Hydraulics, actuator_inputs};
-use crate::physics::{ArmPhysics, Drive, PhysicsInput};
+use crate::physics::{ArmPhysics, Drive};
 use crate::sensors::attitude::AttitudeSensor;
 use crate::sensors::camera::{CameraInput, CameraShot, RenderInput, WristCamera};
 use crate::sensors::joint::JointSensor;
 use crate::sensors::thermometer::SlowSensors;
 use crate::solids::Solids;
 use crate::spec::{CONTROL_PERIOD_S, WorldSpec};
+use crate::structure::{ArmState, Balance, FlexibleArm};
 use crate::temperatures::Temperatures;
 use crate::truth::{TruthHeader, TruthSink};
 use crate::vehicle::{BaseState, FreeVehicle, Sea, VehicleMotion, WaterMotion};
 use crate::world::setup::{
-    WorldInput, free_vehicle, header, joint_sensors, sample_joint_sensors, stowed_angles, surroundings,
+    WorldInput, arm_physics, flexible_arm, free_vehicle, header, joint_sensors, sample_joint_sensors, stowed_angles,
+    surroundings,
 };
 use armcal_core::robot::{Robot, Vehicle};
-use armcal_core::streams::{ArmError, ImageDemand, JointCounts, MAX_JOINTS, Message};
+use armcal_core::streams::{ArmError, ImageDemand, JointAngles, JointCounts, MAX_JOINTS, Message};
 use armcal_core::time::{SIMULATION_EPOCH, Stamp};
 
 /// A simulated arm. Its sensors start at `stowed` by the datasheet, so that the arm itself is where their errors put
@@ -46,6 +48,7 @@ pub struct World {
     pub(super) vehicle: Vehicle,
     pub(super) solids: Solids,
     pub(super) physics: ArmPhysics,
+    pub(super) structure: FlexibleArm,
     pub(super) hydraulics: Hydraulics,
     pub(super) gripper: Option<Gripper>,
     pub(super) controller: Controller,
@@ -81,23 +84,19 @@ impl World {
         let temperatures = Temperatures::new(&spec.temperature, spec.water.depth_m);
         let mut joint_sensors = joint_sensors(robot, &built, &spec.joint_sensors, seed);
         let around = surroundings(&spec, &temperatures, 0.0, spec.water.depth_m);
-        let angles = stowed_angles(robot, &mut joint_sensors, &around);
+        let shafts = stowed_angles(robot, &mut joint_sensors, &around);
         let solids = Solids::new(robot, vehicle, scene);
         let motion = VehicleMotion::new(&spec.vehicle, spec.recorded.as_ref(), vehicle.vehicle_from_base, seed);
         let base = motion.at(0.0);
         let mut hydraulics = Hydraulics::new(&spec.hydraulics, &actuator_inputs(robot)?, step_s);
-        let mut physics = ArmPhysics::new(&PhysicsInput {
-            chain: &robot.chain,
-            bodies: &robot.bodies,
-            solids: Some(&solids),
-            water: &spec.water,
-            spec: &spec.physics,
-            angles,
-        });
+        let mut structure = flexible_arm(robot, &spec);
+        let Balance { angles, torques } = structure.settle(&shafts, &base.gravity);
+        let mut physics = arm_physics(robot, &spec, &solids, angles);
+        physics.set_first_place(&structure.first_place());
         let free = free_vehicle(&input, &mut physics, &base)?;
-        hydraulics.balance(&angles, &physics.static_torques(&base.gravity, &angles));
+        hydraulics.balance(&shafts, &torques);
         let sea = Sea::new(&spec.water, seed);
-        let measured = sample_joint_sensors(&mut joint_sensors, &angles, &around, 0.0);
+        let measured = sample_joint_sensors(&mut joint_sensors, &shafts, &around, 0.0);
         let mut camera = WristCamera::new(&CameraInput { robot, built: &built, solids: &solids, spec: &spec, seed });
         camera.enable_rendering(&RenderInput { robot, vehicle, scene, spec: &spec, seed })?;
         Ok(Self {
@@ -125,6 +124,7 @@ impl World {
             vehicle: vehicle.clone(),
             solids,
             physics,
+            structure,
             hydraulics,
             joint_sensors,
             temperatures,
@@ -142,13 +142,16 @@ impl World {
     }
 
     pub(super) fn physics_step(&mut self, commands: &[f64; MAX_JOINTS]) -> Result<(), ArmError> {
-        let (angles, rates) = (self.physics.angles(), self.physics.rates());
+        let (angles, rates) = self.shafts();
         self.hydraulics.step(commands, &angles, &rates);
         let friction =
             JointLoad { damping_n_m_s_rad: self.spec.water.joint_friction_n_m_s_rad, ..JointLoad::default() };
-        let loads = std::array::from_fn(|j| {
-            if j < angles.len() { self.hydraulics.load(j) + friction } else { JointLoad::default() }
-        });
+        let (links, link_rates) = (self.physics.angles(), self.physics.rates());
+        let mut loads = [JointLoad::default(); MAX_JOINTS];
+        for (j, load) in loads.iter_mut().enumerate().take(links.len()) {
+            let drive = self.hydraulics.load(j);
+            *load = self.structure.load(j, drive, [links[j], link_rates[j]]) + friction;
+        }
         let (t_s, step_s) = (self.time_s(), self.spec.physics.step_s);
         self.step += 1;
         let next_s = self.time_s();
@@ -162,10 +165,12 @@ impl World {
             base: [&self.base, &next],
             water: [self.water, water_next],
             vehicle_force,
+            pulls: &self.structure.pulls(&links),
             loads: &loads,
         });
         self.water = water_next;
         self.base = if self.free.is_some() { self.physics.base_state(&self.vehicle.vehicle_from_base) } else { next };
+        self.bend();
         self.watch_contacts()?;
         let next_image_s = (self.n_images + 1) as f64 / self.spec.camera.rate_hz;
         if self.time_s() >= next_image_s - 1e-9 {
@@ -173,6 +178,20 @@ impl World {
             self.expose()?;
         }
         Ok(())
+    }
+
+    /// Angles and rates of the joints' shafts, which the sensors read.
+    pub(super) fn shafts(&self) -> (JointAngles, JointAngles) {
+        self.structure.shafts(&self.physics.angles(), &self.physics.rates())
+    }
+
+    /// Shafts and mount follow the step.
+    fn bend(&mut self) {
+        let (angles, rates) = (self.physics.angles(), self.physics.rates());
+        let state = ArmState { angles: &angles, rates: &rates, base: &self.base, water: &self.water };
+        if let Some(place) = self.structure.follow(&state) {
+            self.physics.set_first_place(&place);
+        }
     }
 
     pub(super) fn place_solids(&mut self) -> BodyPoses {
