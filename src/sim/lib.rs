@@ -38,8 +38,8 @@ pub use error::SimError;
 pub use fault::{Fault, ScheduledFault};
 pub use recorded_motion::{RecordedMotion, VehicleKinematics};
 pub use spec::{
-    CameraMode, CameraWorldSpec, ClockSpec, HydraulicsSpec, ImageSpec, JointSensorsSpec, MotionKind, PhysicsSpec,
-    Points, PortKind, StructureSpec, TagsSpec, TemperatureSpec, UnmodelledObstacles, VehicleMotionSpec, WaterKind,
-    WaterSpec, WorldSpec,
+    CameraMode, CameraWorldSpec, ClockSpec, GroundSpec, HydraulicsSpec, ImageSpec, JointSensorsSpec, MotionKind,
+    PhysicsSpec, Points, PortKind, StructureSpec, TagsSpec, TemperatureSpec, UnmodelledObstacles, VehicleMotionSpec,
+    WaterKind, WaterSpec, WorldSpec,
 };
 pub use world::{World, WorldInput};

@@ -4,6 +4,7 @@
 //! Angles are rad, temperatures Celsius.
 
 mod camera;
+mod ground;
 mod hydraulics;
 mod image;
 mod joint_sensors;
@@ -17,6 +18,7 @@ mod water;
 mod world_spec;
 
 pub use camera::{CameraWorldSpec, ClockSpec, CornerNoiseKind, PortKind, TagsSpec};
+pub use ground::GroundSpec;
 pub use hydraulics::HydraulicsSpec;
 pub use image::{CameraMode, ImageSpec, WaterKind};
 pub use joint_sensors::JointSensorsSpec;

@@ -11,6 +11,7 @@ use crate::error::SimError;
 use crate::fault::{self, ScheduledFault};
 use crate::recorded_motion::RecordedMotion;
 use crate::spec::camera::{CameraWorldSpec, ClockSpec, PortKind, TagsSpec};
+use crate::spec::ground::GroundSpec;
 use crate::spec::hydraulics::HydraulicsSpec;
 use crate::spec::image::{CameraMode, ImageSpec};
 use crate::spec::joint_sensors::JointSensorsSpec;
@@ -51,6 +52,9 @@ pub struct WorldSpec {
     /// What gives and pulls about the arm; written out where anything does.
     #[serde(skip_serializing_if = "StructureSpec::is_default")]
     pub structure: StructureSpec,
+    /// Soft ground under the vehicle; written out where it is not the standard's.
+    #[serde(skip_serializing_if = "GroundSpec::is_default")]
+    pub ground: GroundSpec,
     /// By joint: counts per radian over the datasheet's. Negative: they run the other way. The arm's own controller
     /// knows.
     pub gear_ratio: BTreeMap<String, f64>,
@@ -71,7 +75,7 @@ impl WorldSpec {
     /// # Errors
     /// [`SimError::Spec`] naming file, key and the allowed range; NaN is in no range.
     pub fn from_table(table: &toml::Table, file: &Path) -> Result<Self, SimError> {
-        const TABLES: [&str; 14] = [
+        const TABLES: [&str; 15] = [
             "physics",
             "joint_sensors",
             "temperature",
@@ -83,6 +87,7 @@ impl WorldSpec {
             "hydraulics",
             "water",
             "structure",
+            "ground",
             "gear_ratio",
             "obstacle",
             "fault",
@@ -104,6 +109,7 @@ impl WorldSpec {
             hydraulics: reader.read("hydraulics")?,
             water: reader.read("water")?,
             structure: reader.read("structure")?,
+            ground: reader.read("ground")?,
             gear_ratio: reader.parse("gear_ratio")?,
             recorded: None,
             obstacle: UnmodelledObstacles(
@@ -191,6 +197,10 @@ impl WorldSpec {
         if is_recorded != self.vehicle.motion_file.is_some() {
             let problem = "goes with motion = \"recorded\", and that with it";
             return Err(FileIssue::new(file, "world.vehicle.motion_file", problem));
+        }
+        if self.vehicle.motion == MotionKind::Parked && self.ground.vehicle_weight_n <= 0.0 {
+            let problem = "must be above 0 for [world.vehicle] motion = \"parked\"";
+            return Err(FileIssue::new(file, "world.ground.vehicle_weight_n", problem));
         }
         let step_s = self.physics.step_s;
         if (self.steps_per_period() as f64 * step_s - CONTROL_PERIOD_S).abs() > 1e-9 {

@@ -97,11 +97,12 @@ pub(super) fn free_vehicle(
     base: &BaseState,
 ) -> Result<Option<FreeVehicle>, SimError> {
     let WorldInput { vehicle, spec, seed, .. } = input;
-    if spec.vehicle.motion != MotionKind::Free {
+    if !matches!(spec.vehicle.motion, MotionKind::Free | MotionKind::Parked) {
         return Ok(None);
     }
-    let free = FreeVehicle::new(vehicle, &spec.vehicle, *seed)?;
-    let body = free.body(vehicle, &spec.water, physics.multibody(), &physics.angles());
+    let mut free = FreeVehicle::new(vehicle, &spec.vehicle, *seed)?;
+    let mut body = free.body(vehicle, &spec.water, physics.multibody(), &physics.angles());
+    free.put_on_ground(&spec.ground, vehicle, input.scene.seafloor_z_m, &mut body)?;
     physics.set_free(body, base.world_from_base.isometry());
     Ok(Some(free))
 }
