@@ -25,6 +25,7 @@ mod recorded_motion;
 mod sensors;
 mod solids;
 mod spec;
+mod structure;
 mod temperatures;
 pub mod truth;
 mod vehicle;
@@ -38,8 +39,8 @@ pub use error::SimError;
 pub use fault::{Fault, ScheduledFault};
 pub use recorded_motion::{RecordedMotion, VehicleKinematics};
 pub use spec::{
-    CameraMode, CameraWorldSpec, ClockSpec, EngineKind, HydraulicsSpec, ImageSpec, JointSensorsSpec, MotionKind,
-    PhysicsSpec, Points, PortKind, TagsSpec, TemperatureSpec, UnmodelledObstacles, VehicleMotionSpec, WaterKind,
-    WaterSpec, WorldSpec,
+    CameraMode, CameraWorldSpec, ClockSpec, EngineKind, GroundSpec, HydraulicsSpec, ImageSpec, JointSensorsSpec,
+    MotionKind, PhysicsSpec, Points, PortKind, StructureSpec, TagsSpec, TemperatureSpec, UnmodelledObstacles,
+    VehicleMotionSpec, WaterKind, WaterSpec, WorldSpec,
 };
 pub use world::{World, WorldInput};

@@ -99,6 +99,13 @@ impl Chain {
         most_m
     }
 
+    /// Puts the first joint elsewhere on the base.
+    pub fn set_first_place(&mut self, base_from_joint: &Isometry3<f64>) {
+        if let Some(first) = self.joints.first_mut() {
+            first.parent_from_joint = *base_from_joint;
+        }
+    }
+
     /// The joints, base first.
     #[inline]
     #[must_use]

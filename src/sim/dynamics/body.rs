@@ -174,7 +174,7 @@ impl HullDrag {
 
 impl Surface {
     /// Each point takes a third of the areas of the box about the shape.
-    fn of(placed: &PlacedShape, water: &WaterProperties) -> Self {
+    pub(super) fn of(placed: &PlacedShape, water: &WaterProperties) -> Self {
         let size = Vector3::from(placed.shape.box_m());
         let areas = Vector3::new(size.y * size.z, size.x * size.z, size.x * size.y);
         let long = size.imax();
@@ -195,7 +195,7 @@ impl Surface {
 /// Added mass of a shape in its owner's frame. A sphere's is half the displaced mass. Another shape's across each axis
 /// is that of a strip, `rho pi/4 a2 b` for a face of sides a <= b, with Pabst's factor for its finite length (Pabst
 /// 1930; DNV-RP-C205 table A-2); turning, the strips of the longest axis move across the water.
-fn added_inertia(placed: &PlacedShape, water: &WaterProperties) -> Inertia {
+pub(super) fn added_inertia(placed: &PlacedShape, water: &WaterProperties) -> Inertia {
     let size = Vector3::from(placed.shape.box_m());
     let scale = water.density_kg_m3 * water.added_mass_coefficient;
     let is_ball = matches!(placed.shape, armcal_core::robot::Shape::Sphere { .. });

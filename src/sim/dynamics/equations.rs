@@ -100,6 +100,10 @@ impl Multibody {
         &self.chain
     }
 
+    pub(super) fn chain_mut(&mut self) -> &mut Chain {
+        &mut self.chain
+    }
+
     /// Bodies of the links 0..=n, base first.
     #[must_use]
     pub fn bodies(&self) -> &[Body] {
@@ -206,7 +210,7 @@ impl Body {
     }
 }
 
-fn joint_axes(poses: &LinkPoses, n: usize) -> [Motion; MAX_JOINTS] {
+pub(super) fn joint_axes(poses: &LinkPoses, n: usize) -> [Motion; MAX_JOINTS] {
     let mut axes = [Motion::zero(); MAX_JOINTS];
     for (j, slot) in axes.iter_mut().enumerate().take(n) {
         *slot = Motion::rotation(poses.axis(j), poses.joint_origin(j));

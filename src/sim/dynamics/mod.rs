@@ -5,7 +5,9 @@
 //! chapters 5, 6 and 9), on a base that moves as prescribed or floats free. `integrate` takes the steps, linearly
 //! implicit in the loads about the joints. It allocates nothing. Oracles compare it with Pinocchio.
 
+mod base_force;
 mod body;
+mod carried_body;
 mod equations;
 mod integrate;
 mod joint_load;

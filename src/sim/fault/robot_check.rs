@@ -71,8 +71,8 @@ impl RobotCheck<'_> {
         self.check_name(key, "joint", joint, &self.robot.joint_names())
     }
 
-    /// The base does not move on the vehicle: it is no link that can be bumped.
-    fn check_link(&self, key: &str, link: &str) -> Result<(), FileIssue> {
+    /// The base does not move on the vehicle: it is no link that can be bumped or pulled.
+    pub(crate) fn check_link(&self, key: &str, link: &str) -> Result<(), FileIssue> {
         let links: Vec<String> = self.robot.bodies[1..].iter().map(|body| body.name.clone()).collect();
         self.check_name(key, "link", link, &links)
     }

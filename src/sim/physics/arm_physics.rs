@@ -1,6 +1,6 @@
 //! State of arm and vehicle, moved step by step by the engine that the world names.
 
-use nalgebra::Vector3;
+use nalgebra::{Isometry3, Vector3};
 
 use crate::body_poses::BodyPoses;
 use crate::dynamics::Force;
@@ -39,6 +39,11 @@ impl ArmPhysics {
             EngineKind::Rapier => Box::new(RapierArm::new(input)?),
         };
         Ok(Self { engine, push: None, step_s })
+    }
+
+    /// Puts the first joint where the mount has brought it.
+    pub(crate) fn set_first_place(&mut self, base_from_joint: &Isometry3<f64>) {
+        self.engine.set_first_place(base_from_joint);
     }
 
     /// True joint angles, rad.
@@ -80,11 +85,6 @@ impl ArmPhysics {
             self.push = None;
         }
         self.engine.step(&Drive { wrenches: &wrenches, ..*drive });
-    }
-
-    /// Torque of gravity and buoyancy about each joint at `angles`, N m.
-    pub(crate) fn static_torques(&self, gravity: &Vector3<f64>, angles: &JointAngles) -> JointAngles {
-        self.engine.static_torques(gravity, angles)
     }
 
     /// Calls `touch` with the two parts of every pair that touches now.

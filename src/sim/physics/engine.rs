@@ -1,6 +1,6 @@
 //! What an engine of rigid bodies does for an arm on its vehicle.
 
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::Isometry3;
 
 use crate::body_poses::BodyPoses;
 use crate::dynamics::{Body, Force, JointLoad};
@@ -52,11 +52,15 @@ pub(super) trait Engine: Send {
         None
     }
 
+    /// Puts the first joint where the mount has brought it.
+    fn set_first_place(&mut self, base_from_joint: &Isometry3<f64>);
+
     /// One step.
     fn step(&mut self, drive: &Drive);
 
     /// Torque of gravity and buoyancy about each joint at `angles`, N m.
-    fn static_torques(&self, gravity: &Vector3<f64>, angles: &JointAngles) -> JointAngles;
+    #[cfg(test)]
+    fn static_torques(&self, gravity: &nalgebra::Vector3<f64>, angles: &JointAngles) -> JointAngles;
 
     /// Calls `touch` with the two parts of every pair that touched in the last step.
     fn for_each_contact(&self, touch: &mut dyn FnMut(usize, usize));

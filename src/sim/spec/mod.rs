@@ -4,11 +4,13 @@
 //! Angles are rad, temperatures Celsius.
 
 mod camera;
+mod ground;
 mod hydraulics;
 mod image;
 mod joint_sensors;
 mod obstacles;
 mod physics;
+mod structure;
 mod table;
 mod temperature;
 mod vehicle;
@@ -16,12 +18,14 @@ mod water;
 mod world_spec;
 
 pub use camera::{CameraWorldSpec, ClockSpec, CornerNoiseKind, PortKind, TagsSpec};
+pub use ground::GroundSpec;
 pub use hydraulics::HydraulicsSpec;
 pub use image::{CameraMode, ImageSpec, WaterKind};
 pub use joint_sensors::JointSensorsSpec;
 pub use obstacles::UnmodelledObstacles;
 pub(crate) use physics::CONTROL_PERIOD_S;
 pub use physics::{EngineKind, PhysicsSpec};
+pub use structure::StructureSpec;
 pub use temperature::{Points, TemperatureSpec};
 pub use vehicle::{MotionKind, VehicleMotionSpec};
 pub use water::WaterSpec;

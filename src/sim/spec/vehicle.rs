@@ -19,6 +19,9 @@ pub enum MotionKind {
     Recorded,
     /// The vehicle floats, pushed by the water, its thrusters and the arm; its file's `[dynamics]` has the figures.
     Free,
+    /// It stands on the seabed, its thrusters off: a free body on soft ground, rocked by the arm. `[world.ground]` has
+    /// the figures.
+    Parked,
 }
 
 table!(
@@ -62,7 +65,7 @@ table!(
         #[serde(alias = "wobble_moment_rms_n_m")]
         disturbance_moment_rms_n_m = 0.0, in 0.0..=1e5;
     } and {
-        /// Prescribed by the figures above, prescribed by a file, or free.
+        /// Prescribed by the figures above, prescribed by a file, free, or parked.
         motion: MotionKind = MotionKind::Swell;
         /// CSV of a recorded motion, beside the routine.
         motion_file: Option<PathBuf> = None;

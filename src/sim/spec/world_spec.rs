@@ -11,11 +11,13 @@ use crate::error::SimError;
 use crate::fault::{self, ScheduledFault};
 use crate::recorded_motion::RecordedMotion;
 use crate::spec::camera::{CameraWorldSpec, ClockSpec, PortKind, TagsSpec};
+use crate::spec::ground::GroundSpec;
 use crate::spec::hydraulics::HydraulicsSpec;
 use crate::spec::image::{CameraMode, ImageSpec};
 use crate::spec::joint_sensors::JointSensorsSpec;
 use crate::spec::obstacles::UnmodelledObstacles;
 use crate::spec::physics::{CONTROL_PERIOD_S, EngineKind, PhysicsSpec};
+use crate::spec::structure::StructureSpec;
 use crate::spec::table::CheckedTable;
 use crate::spec::temperature::TemperatureSpec;
 use crate::spec::vehicle::{MotionKind, VehicleMotionSpec};
@@ -47,6 +49,12 @@ pub struct WorldSpec {
     pub hydraulics: HydraulicsSpec,
     /// Density, current, waves and depth gauge.
     pub water: WaterSpec,
+    /// What gives and pulls about the arm; written out where anything does.
+    #[serde(skip_serializing_if = "StructureSpec::is_default")]
+    pub structure: StructureSpec,
+    /// Soft ground under the vehicle; written out where it is not the standard's.
+    #[serde(skip_serializing_if = "GroundSpec::is_default")]
+    pub ground: GroundSpec,
     /// By joint: counts per radian over the datasheet's. Negative: they run the other way. The arm's own controller
     /// knows.
     pub gear_ratio: BTreeMap<String, f64>,
@@ -71,7 +79,7 @@ impl WorldSpec {
     /// # Errors
     /// [`SimError::Spec`] naming file, key and the allowed range; NaN is in no range.
     pub fn from_table(table: &toml::Table, file: &Path) -> Result<Self, SimError> {
-        const TABLES: [&str; 13] = [
+        const TABLES: [&str; 15] = [
             "physics",
             "joint_sensors",
             "temperature",
@@ -82,6 +90,8 @@ impl WorldSpec {
             "vehicle",
             "hydraulics",
             "water",
+            "structure",
+            "ground",
             "gear_ratio",
             "obstacle",
             "fault",
@@ -102,6 +112,8 @@ impl WorldSpec {
             vehicle: reader.read("vehicle")?,
             hydraulics: reader.read("hydraulics")?,
             water: reader.read("water")?,
+            structure: reader.read("structure")?,
+            ground: reader.read("ground")?,
             gear_ratio: reader.parse("gear_ratio")?,
             recorded: None,
             by_datasheet: [false; 2],
@@ -230,9 +242,13 @@ impl WorldSpec {
             let problem = "goes with motion = \"recorded\", and that with it";
             return Err(FileIssue::new(file, "world.vehicle.motion_file", problem));
         }
-        if self.engine() == EngineKind::Rapier && self.vehicle.motion == MotionKind::Free {
-            let problem = "\"rapier\" has no vehicle that floats (motion = \"free\"): use \"featherstone\"";
+        if self.engine() == EngineKind::Rapier && matches!(self.vehicle.motion, MotionKind::Free | MotionKind::Parked) {
+            let problem = "\"rapier\" has no vehicle that floats (motion = \"free\", \"parked\"): use \"featherstone\"";
             return Err(FileIssue::new(file, "world.physics.engine", problem));
+        }
+        if self.vehicle.motion == MotionKind::Parked && self.ground.vehicle_weight_n <= 0.0 {
+            let problem = "must be above 0 for [world.vehicle] motion = \"parked\"";
+            return Err(FileIssue::new(file, "world.ground.vehicle_weight_n", problem));
         }
         let step_s = self.physics.step_s;
         if (self.steps_per_period() as f64 * step_s - CONTROL_PERIOD_S).abs() > 1e-9 {

@@ -5,8 +5,9 @@ use nalgebra::{Isometry3, Matrix3, Vector3};
 use crate::dynamics::{Body, Force, HullDrag, Inertia, Motion};
 use crate::error::SimError;
 use crate::fault::Impulse;
-use crate::spec::{VehicleMotionSpec, WaterSpec};
-use crate::vehicle::base_state::BaseState;
+use crate::spec::{GroundSpec, MotionKind, VehicleMotionSpec, WaterSpec};
+use crate::vehicle::base_state::{BaseState, GRAVITY_M_S2};
+use crate::vehicle::ground::Ground;
 use crate::vehicle::sinusoids::{SinusoidSum, draw_sinusoids, evaluate};
 use armcal_core::kinematics::LinkPoses;
 use armcal_core::robot::{FileIssue, Vehicle, VehicleDynamics};
@@ -28,6 +29,7 @@ pub(crate) struct FreeVehicle {
     /// Random forces and moments, in the band of the motion's periods.
     disturbance: [SinusoidSum; 6],
     impulse: Option<(f64, Impulse)>,
+    ground: Option<Ground>,
 }
 
 impl FreeVehicle {
@@ -52,6 +54,7 @@ impl FreeVehicle {
                 draw_sinusoids(spec, rms, seed, &format!("wobble/{axis}"))
             }),
             impulse: None,
+            ground: None,
         })
     }
 
@@ -87,6 +90,39 @@ impl FreeVehicle {
         body
     }
 
+    /// Takes weight off the buoyancy of `body`, the vehicle's, and puts ground below it: where it has sunk in if it is
+    /// parked, else at the seafloor, if there is one.
+    ///
+    /// # Errors
+    /// [`SimError::Spec`] where a parked vehicle's weight is not above its lowest corners.
+    pub(crate) fn put_on_ground(
+        &mut self,
+        spec: &GroundSpec,
+        vehicle: &Vehicle,
+        seafloor_z_m: Option<f64>,
+        body: &mut Body,
+    ) -> Result<(), SimError> {
+        body.displaced_kg -= spec.vehicle_weight_n / GRAVITY_M_S2;
+        if self.spec.motion != MotionKind::Parked {
+            self.ground = seafloor_z_m.map(|z_m| Ground::plane(spec, vehicle, z_m));
+            return Ok(());
+        }
+        self.spec.station_keeping_rad_s = 0.0;
+        let center_m = self.base_from_vehicle.inverse_transform_point(&body.center_of_buoyancy_m.into()).coords;
+        self.ground = Ground::parked(spec, vehicle, &center_m);
+        if self.ground.is_none() {
+            let problem = "its weight is not above the lowest corners of its parts: it cannot be parked on them";
+            return Err(FileIssue::new(&vehicle.file, "part", problem).into());
+        }
+        Ok(())
+    }
+
+    /// What the ground carries, N.
+    #[cfg(test)]
+    pub(crate) fn ground_load_n(&self) -> f64 {
+        self.ground.as_ref().map_or(0.0, |ground| ground.load_n)
+    }
+
     /// Something hits the vehicle.
     pub(crate) fn impulse(&mut self, t_s: f64, impulse: &Impulse) {
         self.impulse = Some((t_s, *impulse));
@@ -114,7 +150,8 @@ impl FreeVehicle {
         let to_base = &self.base_from_vehicle;
         let force = to_base.rotation * Vector3::from_column_slice(&total[..3]);
         let moment = to_base.rotation * Vector3::from_column_slice(&total[3..]);
-        Force::new(moment + to_base.translation.vector.cross(&force), force)
+        let on_ground = self.ground.as_mut().map_or_else(Force::zero, |ground| ground.force(base));
+        Force::new(moment + to_base.translation.vector.cross(&force), force) + on_ground
     }
 
     /// PID on position and attitude, as dynamic positioning has it, with the thrusters' lag and limits. It knows where

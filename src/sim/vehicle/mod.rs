@@ -6,6 +6,7 @@
 
 mod base_state;
 mod free;
+mod ground;
 mod impulse_response;
 mod prescribed;
 mod sea;

@@ -25,6 +25,13 @@ impl WorldSpec {
         for joint in spec.gear_ratio.keys() {
             check.check_joint("world.gear_ratio", joint)?;
         }
+        let structure = &spec.structure;
+        for joint in structure.joint_compliance_rad_per_nm.keys().chain(structure.bearing_play_rad.keys()) {
+            check.check_joint("world.structure", joint)?;
+        }
+        if structure.hose_stiffness_n_m > 0.0 {
+            check.check_link("world.structure.hose_link", &structure.hose_link)?;
+        }
         for (index, scheduled) in spec.fault.iter().enumerate() {
             let key = list_key(index);
             let Some(at_s) = scheduled.at_s else {

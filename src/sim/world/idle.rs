@@ -59,7 +59,8 @@ impl World {
         }
         self.warm(t_s, STRIDE_S);
         let around = surroundings(&self.spec, &self.temperatures, t_s, self.depth_m());
-        self.measured = sample_joint_sensors(&mut self.joint_sensors, &self.physics.angles(), &around, STRIDE_S);
+        let (angles, _) = self.shafts();
+        self.measured = sample_joint_sensors(&mut self.joint_sensors, &angles, &around, STRIDE_S);
         self.outbox.push((now, Message::JointSensors(JointSensorSample { stamp: now, counts: self.measured })));
         self.sample_slow_sensors(now, t_s);
     }

@@ -19,8 +19,8 @@ impl World {
         }
         self.warm(t_s, CONTROL_PERIOD_S);
         let around = surroundings(&self.spec, &self.temperatures, t_s, self.depth_m());
-        self.measured =
-            sample_joint_sensors(&mut self.joint_sensors, &self.physics.angles(), &around, CONTROL_PERIOD_S);
+        let (angles, _) = self.shafts();
+        self.measured = sample_joint_sensors(&mut self.joint_sensors, &angles, &around, CONTROL_PERIOD_S);
         let sample = JointSensorSample { stamp: now, counts: self.measured };
         self.outbox.push((now, Message::JointSensors(sample)));
         self.move_jaws(period);

@@ -9,9 +9,11 @@ use crate::sensors::joint::{JointInput, JointSensor};
 use crate::sensors::thermometer::gauge_pressure_pa;
 use crate::solids::Solids;
 use crate::spec::{JointSensorsSpec, MotionKind, WorldSpec};
+use crate::structure::{FlexibleArm, payload};
 use crate::temperatures::Temperatures;
 use crate::truth::TruthHeader;
 use crate::vehicle::{BaseState, FreeVehicle};
+use armcal_core::kinematics::Chain;
 use armcal_core::robot::{Robot, Vehicle};
 use armcal_core::routine::Scene;
 use armcal_core::streams::{JointAngles, JointCounts};
@@ -74,23 +76,39 @@ pub(super) fn scenery(input: &WorldInput) -> Result<(Scene, Solids), SimError> {
     if pairs.is_empty() { Ok((scene, solids)) } else { Err(SimError::StowedInside { pairs }) }
 }
 
-/// The arm, and the free vehicle that the world asks for; none for a prescribed motion.
+/// Bodies of the links 0..=n, base first, the payload with the one that carries it.
+fn bodies(robot: &Robot, spec: &WorldSpec) -> Vec<Body> {
+    let water = WaterProperties::of(&spec.water);
+    let mut bodies: Vec<Body> = robot.bodies.iter().map(|link| Body::link(link, &water)).collect();
+    if let Some((body, payload)) = payload(spec, robot) {
+        bodies[body].carry(&payload);
+    }
+    bodies
+}
+
+/// What gives and pulls about the arm, its own base and the payload included.
+pub(super) fn flexible_arm(robot: &Robot, spec: &WorldSpec) -> FlexibleArm {
+    FlexibleArm::new(&spec.structure, robot, bodies(robot, spec), spec.physics.step_s)
+}
+
+/// The arm on its mount as `chain` has it, and the vehicle that floats or is parked; none for a prescribed motion.
 pub(super) fn arm_physics(
     input: &WorldInput,
     solids: &Solids,
     base: &BaseState,
+    chain: &Chain,
     angles: JointAngles,
 ) -> Result<(ArmPhysics, Option<FreeVehicle>), SimError> {
     let WorldInput { robot, vehicle, spec, seed, .. } = input;
-    let water = WaterProperties::of(&spec.water);
-    let mut bodies: Vec<Body> = robot.bodies.iter().map(|link| Body::link(link, &water)).collect();
-    let is_free = spec.vehicle.motion == MotionKind::Free;
-    let free = is_free.then(|| FreeVehicle::new(vehicle, &spec.vehicle, *seed)).transpose()?;
-    if let Some(free) = &free {
-        bodies[0] = free.body(vehicle, &spec.water, &robot.chain.link_poses(&angles), &bodies);
+    let mut bodies = bodies(robot, spec);
+    let is_free = matches!(spec.vehicle.motion, MotionKind::Free | MotionKind::Parked);
+    let mut free = is_free.then(|| FreeVehicle::new(vehicle, &spec.vehicle, *seed)).transpose()?;
+    if let Some(free) = &mut free {
+        bodies[0] = free.body(vehicle, &spec.water, &chain.link_poses(&angles), &bodies);
+        free.put_on_ground(&spec.ground, vehicle, input.scene.seafloor_z_m, &mut bodies[0])?;
     }
     let physics = ArmPhysics::new(PhysicsInput {
-        chain: &robot.chain,
+        chain,
         bodies,
         free_base: free.as_ref().map(|_| *base.world_from_base.isometry()),
         solids: Some(solids),

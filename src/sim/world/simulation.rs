@@ -7,7 +7,7 @@ use crate::body_poses::BodyPoses;
 use crate::clearance_watch::ClearanceWatch;
 use crate::contact_onset::ContactOnsets;
 use crate::controller::Controller;
-use crate::dynamics::{Force, JointLoad};
+use crate::dynamics::JointLoad;
 use crate::error::SimError;
 use crate::fault::Timeline;
 use crate::gripper::Gripper;
@@ -19,14 +19,16 @@ use crate::sensors::joint::JointSensor;
 use crate::sensors::thermometer::SlowSensors;
 use crate::solids::Solids;
 use crate::spec::{CONTROL_PERIOD_S, WorldSpec};
+use crate::structure::{ArmState, Balance, FlexibleArm};
 use crate::temperatures::Temperatures;
 use crate::truth::{TruthHeader, TruthSink};
 use crate::vehicle::{BaseState, FreeVehicle, Sea, VehicleMotion, WaterMotion};
 use crate::world::setup::{
-    WorldInput, arm_physics, header, joint_sensors, sample_joint_sensors, scenery, stowed_angles, surroundings,
+    WorldInput, arm_physics, flexible_arm, header, joint_sensors, sample_joint_sensors, scenery, stowed_angles,
+    surroundings,
 };
 use armcal_core::robot::{Robot, Vehicle};
-use armcal_core::streams::{ArmError, ImageDemand, JointCounts, MAX_JOINTS, Message};
+use armcal_core::streams::{ArmError, ImageDemand, JointAngles, JointCounts, MAX_JOINTS, Message};
 use armcal_core::time::{SIMULATION_EPOCH, Stamp};
 
 /// A simulated arm. Its sensors start at `stowed` by the datasheet, so that the arm itself is where their errors put
@@ -47,6 +49,7 @@ pub struct World {
     pub(super) vehicle: Vehicle,
     pub(super) solids: Solids,
     pub(super) physics: ArmPhysics,
+    pub(super) structure: FlexibleArm,
     pub(super) hydraulics: Hydraulics,
     pub(super) gripper: Option<Gripper>,
     pub(super) controller: Controller,
@@ -83,15 +86,19 @@ impl World {
         let temperatures = Temperatures::new(&spec.temperature, spec.water.depth_m);
         let mut joint_sensors = joint_sensors(robot, &built, &spec.joint_sensors, seed);
         let around = surroundings(&spec, &temperatures, 0.0, spec.water.depth_m);
-        let angles = stowed_angles(robot, &mut joint_sensors, &around);
+        let shafts = stowed_angles(robot, &mut joint_sensors, &around);
         let (scene, solids) = &scenery(&input)?;
         let motion = VehicleMotion::new(&spec.vehicle, spec.recorded.as_ref(), vehicle.vehicle_from_base, seed);
         let base = motion.at(0.0);
         let mut hydraulics = Hydraulics::new(&spec.hydraulics, &actuator_inputs(robot)?, step_s);
-        let (physics, free) = arm_physics(&input, solids, &base, angles)?;
-        hydraulics.balance(&angles, &physics.static_torques(&base.gravity, &angles));
+        let mut structure = flexible_arm(robot, &spec);
+        let Balance { angles, torques } = structure.settle(&shafts, &base.gravity);
+        let mut chain = robot.chain.clone();
+        chain.set_first_place(&structure.first_place());
+        let (physics, free) = arm_physics(&input, solids, &base, &chain, angles)?;
+        hydraulics.balance(&shafts, &torques);
         let sea = Sea::new(&spec.water, seed);
-        let measured = sample_joint_sensors(&mut joint_sensors, &angles, &around, 0.0);
+        let measured = sample_joint_sensors(&mut joint_sensors, &shafts, &around, 0.0);
         let mut camera = WristCamera::new(&CameraInput { robot, built: &built, solids, spec: &spec, seed });
         camera.enable_rendering(&RenderInput { robot, vehicle, scene, spec: &spec, seed })?;
         Ok(Self {
@@ -120,6 +127,7 @@ impl World {
             vehicle: vehicle.clone(),
             solids: solids.clone(),
             physics,
+            structure,
             hydraulics,
             joint_sensors,
             temperatures,
@@ -136,19 +144,22 @@ impl World {
     }
 
     pub(super) fn physics_step(&mut self, commands: &[f64; MAX_JOINTS]) -> Result<(), ArmError> {
-        let (angles, rates) = (self.physics.angles(), self.physics.rates());
+        let (angles, rates) = self.shafts();
         self.hydraulics.step(commands, &angles, &rates);
         let friction =
             JointLoad { damping_n_m_s_rad: self.spec.water.joint_friction_n_m_s_rad, ..JointLoad::default() };
-        let loads = std::array::from_fn(|j| {
-            if j < angles.len() { self.hydraulics.load(j) + friction } else { JointLoad::default() }
-        });
+        let (links, link_rates) = (self.physics.angles(), self.physics.rates());
+        let mut loads = [JointLoad::default(); MAX_JOINTS];
+        for (j, load) in loads.iter_mut().enumerate().take(links.len()) {
+            let drive = self.hydraulics.load(j);
+            *load = self.structure.load(j, drive, [links[j], link_rates[j]]) + friction;
+        }
         let (t_s, step_s) = (self.time_s(), self.spec.physics.step_s);
         self.step += 1;
         let next_s = self.time_s();
-        let mut wrenches = [Force::zero(); MAX_JOINTS + 1];
+        let mut wrenches = self.structure.pulls(&links);
         if let Some(free) = &mut self.free {
-            wrenches[0] = free.force(t_s, step_s, &self.base);
+            wrenches[0] += free.force(t_s, step_s, &self.base);
         }
         let water_next = self.sea.at(next_s);
         let next = if self.free.is_some() { self.base } else { self.motion.at(next_s) };
@@ -160,6 +171,7 @@ impl World {
         });
         self.water = water_next;
         self.base = self.physics.base_state(&self.vehicle.vehicle_from_base).unwrap_or(next);
+        self.bend();
         self.watch_contacts()?;
         self.watch_clearance();
         let next_image_s = (self.n_images + 1) as f64 / self.spec.camera.rate_hz;
@@ -168,6 +180,20 @@ impl World {
             self.expose()?;
         }
         Ok(())
+    }
+
+    /// Angles and rates of the joints' shafts, which the sensors read.
+    pub(super) fn shafts(&self) -> (JointAngles, JointAngles) {
+        self.structure.shafts(&self.physics.angles(), &self.physics.rates())
+    }
+
+    /// Shafts and mount follow the step.
+    fn bend(&mut self) {
+        let (angles, rates) = (self.physics.angles(), self.physics.rates());
+        let state = ArmState { angles: &angles, rates: &rates, base: &self.base, water: &self.water };
+        if let Some(place) = self.structure.follow(&state) {
+            self.physics.set_first_place(&place);
+        }
     }
 
     pub(super) fn place_solids(&mut self) -> BodyPoses {

@@ -14,9 +14,14 @@ mod engines;
 const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
 
 fn world(spec: WorldSpec, seed: u64) -> World {
+    world_above(spec, seed, None)
+}
+
+fn world_above(spec: WorldSpec, seed: u64, seafloor_z_m: Option<f64>) -> World {
     let robot = load(&Path::new(ROOT).join("robots/titan4")).expect("the robot reads");
     let vehicle = load_vehicle(&Path::new(ROOT).join("robots/vehicles/work-class-front.toml")).expect("it reads");
-    World::new(WorldInput { robot: &robot, vehicle: &vehicle, scene: &Scene::default(), spec, seed }).expect("a world")
+    let scene = Scene { seafloor_z_m, ..Scene::default() };
+    World::new(WorldInput { robot: &robot, vehicle: &vehicle, scene: &scene, spec, seed }).expect("a world")
 }
 
 /// With closed valves that do not leak the joints give as far as the oil does, and come back: no creep of any solver in
@@ -238,4 +243,49 @@ fn the_step_is_short_enough() {
             }
         }
     }
+}
+
+/// A vehicle on the seabed: the ground carries its weight while it rocks under the arm, and it stays.
+#[test]
+fn parked_skids_carry_the_weight() {
+    let weight_n = 1500.0;
+    let mut spec = WorldSpec::default();
+    spec.vehicle.motion = crate::spec::MotionKind::Parked;
+    spec.ground.vehicle_weight_n = weight_n;
+    let mut world = world(spec, 1);
+    let mut mean_n = 0.0;
+    const STEPS: u32 = 10_000;
+    for step in 0..STEPS {
+        // The shoulder swings to and fro by its valve.
+        let swing = 0.3 * (f64::from(step) * 2e-3).sin();
+        world.physics_step(&std::array::from_fn(|j| if j == 1 { swing } else { 0.0 })).expect("it steps");
+        let load_n = world.free.as_ref().expect("it is free").ground_load_n();
+        mean_n += load_n / f64::from(STEPS);
+    }
+    let (away_m, turned_rad) = drifted(&mut world, 10.0);
+    let rest_n = world.free.as_ref().expect("it is free").ground_load_n();
+    eprintln!("carried {mean_n:.1} N on the way, {rest_n:.2} N at rest; moved by {away_m:.1e} m, {turned_rad:.1e} rad");
+    assert!((mean_n / weight_n - 1.0).abs() < 0.01 && (rest_n / weight_n - 1.0).abs() < 0.001);
+    assert!(away_m < 5e-3 && turned_rad < 5e-3, "{away_m} {turned_rad}");
+    assert!(turned_rad > 1e-6, "soft ground gives: {turned_rad}");
+}
+
+/// A floating vehicle that is too heavy sinks until it stands on its skids, and stays there.
+#[test]
+fn a_sinking_vehicle_lands_and_stays() {
+    let mut spec = WorldSpec::default();
+    spec.vehicle.motion = crate::spec::MotionKind::Free;
+    spec.vehicle.station_keeping_rad_s = 0.0;
+    spec.ground.vehicle_weight_n = 800.0;
+    spec.water.current_m_s = [0.05, 0.0, 0.0];
+    let mut world = world_above(spec, 1, Some(-2.2));
+    drifted(&mut world, 60.0);
+    let landed = world.base.world_from_vehicle.origin().vector();
+    drifted(&mut world, 60.0);
+    let stays = world.base.world_from_vehicle.origin().vector();
+    // The skids' lower faces are 1.01 m below the origin.
+    eprintln!("landed at {landed:.4?}, moved by {:.1e} m in a minute", (stays - landed).norm());
+    assert!((stays.z + 1.19).abs() < 0.03, "{stays}");
+    assert!((stays - landed).norm() < 1e-4, "{landed} {stays}");
+    assert!((world.free.as_ref().expect("it is free").ground_load_n() / 800.0 - 1.0).abs() < 0.01);
 }

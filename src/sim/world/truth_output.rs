@@ -80,13 +80,14 @@ impl World {
 
     pub(super) fn truth_state(&self) -> TruthState {
         let (angles, rates) = (self.physics.angles(), self.physics.rates());
+        let (shaft_angles, shaft_rates) = self.shafts();
         let links = self.physics.poses();
         let t_s = self.time_s();
         TruthState {
             stamp: self.stamp(),
             angles,
             rates,
-            torques: self.hydraulics.torques(&angles, &rates),
+            torques: self.hydraulics.torques(&shaft_angles, &shaft_rates),
             // The engine's raw poses get their names here: the tool and the camera in the base frame.
             base_from_tool: Pose::from_isometry(links.frame(&self.robot.tool.mount)),
             base_from_camera: Pose::from_isometry(self.camera.base_from_camera(&links)),

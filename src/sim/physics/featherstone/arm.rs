@@ -69,6 +69,11 @@ impl Engine for Featherstone {
             .then(|| BaseState::of_free_base(world_from_base, base_velocity, &self.base_rate, vehicle_from_base))
     }
 
+    fn set_first_place(&mut self, base_from_joint: &Isometry3<f64>) {
+        self.multibody.set_first_place(base_from_joint);
+        self.poses = self.multibody.chain().link_poses(&self.state.angles);
+    }
+
     fn step(&mut self, drive: &Drive) {
         let before = self.state.base_velocity;
         let mut state = self.state;
@@ -96,6 +101,7 @@ impl Engine for Featherstone {
         self.poses = self.multibody.chain().link_poses(&state.angles);
     }
 
+    #[cfg(test)]
     fn static_torques(&self, gravity: &Vector3<f64>, angles: &JointAngles) -> JointAngles {
         self.multibody.static_torques(angles, gravity)
     }

@@ -1,6 +1,6 @@
 //! The arm as rapier's multibody, moved step by step.
 
-use nalgebra::Vector3;
+use nalgebra::{Isometry3, Vector3};
 use rapier3d::dynamics::{Multibody, MultibodyJointHandle, RigidBodyBuilder, RigidBodyHandle};
 use rapier3d::geometry::ColliderHandle;
 use rapier3d::pipeline::PhysicsWorld;
@@ -197,6 +197,19 @@ impl Engine for RapierArm {
         BodyPoses::drawn(self.links.len(), &self.chain.link_poses(&self.angles()))
     }
 
+    fn set_first_place(&mut self, base_from_joint: &Isometry3<f64>) {
+        self.chain.set_first_place(base_from_joint);
+        let (Some((multibody, _)), Some(first)) =
+            (self.engine.multibody_joints.get_mut(self.tip), self.chain.joints().first())
+        else {
+            return;
+        };
+        if let Some(link) = multibody.link_mut(1) {
+            link.joint.data.local_frame1 = revolute(base_from_joint, &first.axis).local_frame1;
+        }
+        self.state.poses_ahead = self.chain.link_poses(&self.state.angles_ahead);
+    }
+
     fn step(&mut self, drive: &Drive) {
         let [start, end] = drive.base;
         let state = ArmState {
@@ -220,6 +233,7 @@ impl Engine for RapierArm {
         self.read_state();
     }
 
+    #[cfg(test)]
     fn static_torques(&self, gravity: &Vector3<f64>, angles: &JointAngles) -> JointAngles {
         let poses = self.chain.link_poses(angles);
         JointAngles::from_fn(angles.len(), |j| {

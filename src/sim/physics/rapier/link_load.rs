@@ -49,6 +49,7 @@ impl Link {
     }
 
     /// Wrench of gravity and buoyancy alone.
+    #[cfg(test)]
     pub(super) fn weight(&self, place: &Isometry3<f64>, gravity: &Vector3<f64>) -> Force {
         self.body.weight(place, gravity, &Vector3::zeros())
     }

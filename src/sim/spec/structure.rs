@@ -1,0 +1,114 @@
+//! `[world.structure]`.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use crate::spec::table::CheckedTable;
+use armcal_core::robot::FileIssue;
+
+/// What gives and pulls about the arm. Nothing does in the standard world.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct StructureSpec {
+    /// By joint: how far the link turns behind its sensor under a torque. 0 for joints that are not named.
+    pub joint_compliance_rad_per_nm: BTreeMap<String, f64>,
+    /// By joint, of those that give: full width of the play between sensor and link.
+    pub bearing_play_rad: BTreeMap<String, f64>,
+    /// How far the base turns on the vehicle under a moment about each of its axes.
+    pub mount_compliance_rad_per_nm: [f64; 3],
+    /// How far it moves under a force along each of its axes.
+    pub mount_compliance_m_per_n: [f64; 3],
+    /// Damping of the mount over its stiffness; assumed.
+    pub mount_damping_s: f64,
+    /// Mass of a ball in the gripper; 0 for none.
+    pub payload_kg: f64,
+    /// Steel by default.
+    pub payload_density_kg_m3: f64,
+    /// Its centre from the tool point, axes of the tool's link.
+    pub payload_offset_m: [f64; 3],
+    /// A hose to a link; none without a stiffness.
+    pub hose_link: String,
+    /// Where it is tied to the link, in the link's frame.
+    pub hose_point_m: [f64; 3],
+    /// Where it comes from, base frame.
+    pub hose_anchor_m: [f64; 3],
+    /// It pulls when its ends are farther apart than this.
+    pub hose_length_m: f64,
+    /// Of its pull; 0 for no hose.
+    pub hose_stiffness_n_m: f64,
+}
+
+impl Default for StructureSpec {
+    fn default() -> Self {
+        Self {
+            joint_compliance_rad_per_nm: BTreeMap::new(),
+            bearing_play_rad: BTreeMap::new(),
+            mount_compliance_rad_per_nm: [0.0; 3],
+            mount_compliance_m_per_n: [0.0; 3],
+            mount_damping_s: 0.01,
+            payload_kg: 0.0,
+            payload_density_kg_m3: 7850.0,
+            payload_offset_m: [0.0; 3],
+            hose_link: String::new(),
+            hose_point_m: [0.0; 3],
+            hose_anchor_m: [0.0; 3],
+            hose_length_m: 0.0,
+            hose_stiffness_n_m: 0.0,
+        }
+    }
+}
+
+impl StructureSpec {
+    pub(super) fn is_default(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// Of a joint that is not named: 0.
+    pub(crate) fn joint_compliance(&self, joint: &str) -> f64 {
+        self.joint_compliance_rad_per_nm.get(joint).copied().unwrap_or(0.0)
+    }
+
+    /// Of a joint that is not named: 0.
+    pub(crate) fn bearing_play(&self, joint: &str) -> f64 {
+        self.bearing_play_rad.get(joint).copied().unwrap_or(0.0)
+    }
+
+    /// Whether the base gives on the vehicle.
+    pub(crate) fn mount_gives(&self) -> bool {
+        self.mount_compliance_rad_per_nm != [0.0; 3] || self.mount_compliance_m_per_n != [0.0; 3]
+    }
+}
+
+impl CheckedTable for StructureSpec {
+    fn check(&self, file: &Path, table: &str) -> Result<(), FileIssue> {
+        let check = |key: &str, value: f64, range| {
+            FileIssue::check_range(file, &format!("{table}.{key}"), value, range).map(|_| ())
+        };
+        let vector = |key: &str, values: &[f64; 3], range: std::ops::RangeInclusive<f64>| {
+            let each = |(axis, value): (usize, &f64)| check(&format!("{key}[{axis}]"), *value, range.clone());
+            values.iter().enumerate().try_for_each(each)
+        };
+        for (joint, compliance) in &self.joint_compliance_rad_per_nm {
+            check(&format!("joint_compliance_rad_per_nm.{joint}"), *compliance, 0.0..=1e-2)?;
+        }
+        for (joint, play) in &self.bearing_play_rad {
+            check(&format!("bearing_play_rad.{joint}"), *play, 0.0..=0.1)?;
+            if *play > 0.0 && self.joint_compliance(joint) == 0.0 {
+                let problem = "needs joint_compliance_rad_per_nm of that joint: what lies beyond the play gives, too";
+                return Err(FileIssue::new(file, format!("{table}.bearing_play_rad.{joint}"), problem));
+            }
+        }
+        vector("mount_compliance_rad_per_nm", &self.mount_compliance_rad_per_nm, 0.0..=1e-2)?;
+        vector("mount_compliance_m_per_n", &self.mount_compliance_m_per_n, 0.0..=1e-2)?;
+        check("mount_damping_s", self.mount_damping_s, 0.0..=10.0)?;
+        check("payload_kg", self.payload_kg, 0.0..=1e4)?;
+        check("payload_density_kg_m3", self.payload_density_kg_m3, 100.0..=2e4)?;
+        vector("payload_offset_m", &self.payload_offset_m, -10.0..=10.0)?;
+        vector("hose_point_m", &self.hose_point_m, -10.0..=10.0)?;
+        vector("hose_anchor_m", &self.hose_anchor_m, -10.0..=10.0)?;
+        check("hose_length_m", self.hose_length_m, 0.0..=100.0)?;
+        check("hose_stiffness_n_m", self.hose_stiffness_n_m, 0.0..=1e4)
+    }
+}
