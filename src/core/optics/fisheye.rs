@@ -18,6 +18,9 @@ pub struct Fisheye {
     pub max_view_angle_rad: f64,
 }
 
+/// So far outside of the field of view points still have derivatives.
+const BEYOND_RAD: f64 = 0.05;
+
 impl Fisheye {
     /// A lens of which no field of view is given: as far from the axis as the projected radius grows, but no farther
     /// than half as far again as the image's corners, nor than 172 deg.
@@ -41,6 +44,11 @@ impl Fisheye {
             }
         }
         lens
+    }
+
+    fn is_far_outside(&self, theta: f64) -> bool {
+        let beyond_rad = theta - self.max_view_angle_rad;
+        beyond_rad > BEYOND_RAD || beyond_rad > 0.0 && self.distorted_slope(theta) <= 0.0
     }
 
     fn distorted(&self, theta: f64) -> f64 {
@@ -78,14 +86,15 @@ impl Fisheye {
         ))
     }
 
-    /// Projection and its Jacobian d(pixel)/d(point), px/m.
+    /// Projection and its Jacobian d(pixel)/d(point), px/m. Points up to [`BEYOND_RAD`] outside of the field of view have
+    /// a pixel, too, as far as the radius grows: an estimate that moves a corner across its edge meets no wall there.
     #[must_use]
     pub fn project_with_jacobian(&self, point_m: &Vector3<f64>) -> Option<(Vector2<f64>, Matrix2x3<f64>)> {
         let (x, y, z) = (point_m.x, point_m.y, point_m.z);
         let r = x.hypot(y);
         let theta = r.atan2(z);
         let d2 = r * r + z * z;
-        if theta > self.max_view_angle_rad || d2 < 1e-18 {
+        if self.is_far_outside(theta) || d2 < 1e-18 {
             return None;
         }
         let [fx, fy] = self.focal_px;
@@ -114,9 +123,11 @@ impl Fisheye {
 
     /// d(pixel)/d(fx, fy, cx, cy, k1, k2, k3, k4).
     pub(super) fn by_intrinsics(&self, point_m: &Vector3<f64>) -> Option<SMatrix<f64, 2, 8>> {
-        self.project(point_m)?;
         let r = point_m.x.hypot(point_m.y);
         let theta = r.atan2(point_m.z);
+        if self.is_far_outside(theta) {
+            return None;
+        }
         let (ux, uy) = if r > 0.0 { (point_m.x / r, point_m.y / r) } else { (0.0, 0.0) };
         let t2 = theta * theta;
         let powers = [theta * t2, theta * t2 * t2, theta * t2 * t2 * t2, theta * t2 * t2 * t2 * t2];
@@ -207,6 +218,17 @@ mod tests {
                 prop_assert!((jacobian.column(axis) - difference).norm() < 1e-4 * (1.0 + difference.norm()));
             }
         }
+    }
+
+    #[test]
+    fn derivatives_go_on_beyond_the_edge_of_the_field_of_view() {
+        let lens = crate::optics::fixture::fisheye();
+        let at = |angle_rad: f64| Vector3::new(angle_rad.sin(), 0.0, angle_rad.cos());
+        let edge_rad = lens.max_view_angle_rad;
+        let radius_px = |angle_rad: f64| lens.project_with_jacobian(&at(angle_rad)).map(|(pixel, _)| pixel.x);
+        assert!(lens.project(&at(edge_rad + 0.01)).is_none());
+        assert!(radius_px(edge_rad + 0.01) > radius_px(edge_rad));
+        assert_eq!(radius_px(edge_rad + 2.0 * BEYOND_RAD), None);
     }
 
     #[test]

@@ -5,7 +5,8 @@ use crate::calib::bundle::input::HyperparameterMode;
 use crate::calib::bundle::tests::corner_outliers::tool_error;
 use crate::calib::bundle::tests::data::titan;
 use crate::calib::bundle::tests::statistics::{case, input};
-use armcal_core::optics::{CameraModel, FlatPort, Radtan};
+use armcal_core::numeric::Outcome;
+use armcal_core::optics::{CameraModel, Fisheye, FlatPort, LensModel, Radtan};
 use armcal_core::robot::Robot;
 use armcal_core::stats::quantile;
 
@@ -65,4 +66,22 @@ fn a_flat_port_is_no_bias_where_it_is_in_the_model() {
     );
     assert!(with_m < 2e-3 && (1.8..4.5).contains(&nees), "{with_m} {nees}");
     assert!(without_m > 3.0 * with_m, "{without_m} {with_m}");
+}
+
+/// The farthest corner of all views lies a little beyond the edge of the field of view as robot.toml has it.
+#[test]
+fn a_corner_at_the_edge_of_the_field_of_view_is_no_wall() {
+    for seed in 4000..4010 {
+        let robot = titan();
+        let mut case = case(&robot, seed, N_VIEWS);
+        let corners = case.views.iter().flat_map(|view| &view.tags).filter_map(|tag| tag.corners());
+        let angles = corners.flat_map(|seen| seen.corners_px).filter_map(|px| robot.camera.lens.unproject(&px.into()));
+        let farthest_rad = angles.map(|bearing| bearing.z.acos()).fold(0.0, f64::max);
+        let LensModel::Equidistant(lens) = robot.camera.lens.lens else { panic!("a fisheye") };
+        let narrow = with_camera(Fisheye { max_view_angle_rad: farthest_rad - 1e-3, ..lens }.into());
+        case.robot = &narrow;
+        let found = estimate(&input(&case, &case.views, HyperparameterMode::Fitted)).expect("solved");
+        assert!(found.outliers.is_empty(), "seed {seed}: {:?}", found.outliers);
+        assert_eq!(found.solved.outcome, Outcome::Converged, "seed {seed}");
+    }
 }
