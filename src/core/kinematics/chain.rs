@@ -153,10 +153,15 @@ impl Chain {
         if sag.is_rigid() {
             return straight;
         }
-        let bend: AboutAxes = sag.bend(&self.loads.torques(&straight, sag.tool_load_n));
-        let bent = JointAngles::from_fn(angles.len(), |joint| angles[joint] + bend.joints[joint]);
-        let base = Isometry3::from_parts(Translation3::identity(), bend.base_turn());
-        self.link_poses_by(&bent, &base, &parent_from_joint)
+        // The load of the bent arm, for the straight one's is off by as much as bending turns a link.
+        let mut poses = straight;
+        for _ in 0..2 {
+            let bend: AboutAxes = sag.bend(&self.loads.torques(&poses, sag.tool_load_n));
+            let bent = JointAngles::from_fn(angles.len(), |joint| angles[joint] + bend.joints[joint]);
+            let base = Isometry3::from_parts(Translation3::identity(), bend.base_turn());
+            poses = self.link_poses_by(&bent, &base, &parent_from_joint);
+        }
+        poses
     }
 
     /// The chain whose joint number `joint` has the range of one angle, `angle_rad`.

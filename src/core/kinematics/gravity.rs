@@ -9,8 +9,7 @@
 //! ```
 //!
 //! Each joint then turns by `c_j tau_j` behind its sensor, and the base by `(c_x M_x, c_y M_y, c_z M_z)` on what
-//! carries it. Torques are those of the straight arm at the sensors' angles: what bending changes of them is of second
-//! order.
+//! carries it. Torques are those of the arm bent by the torques of the straight one: what is left is of third order.
 
 use std::ops::Range;
 
