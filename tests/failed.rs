@@ -134,7 +134,8 @@ fn an_arm_whose_sensor_sticks_goes_on_without_that_joint() {
         format!("[[step]]\ndo = \"{step}\"\n{fault}")
     });
     let folder = temp();
-    let run = finished(&ShortRoutine { tail: steps.concat(), ..ShortRoutine::default() }, folder.path());
+    // In this world the forearm stops where four of the targets are left.
+    let run = finished(&ShortRoutine { seed: 3, tail: steps.concat(), ..ShortRoutine::default() }, folder.path());
     let summary = run.summary();
     let [held] = &summary.held_joints[..] else { panic!("{:?}", summary.held_joints) };
     assert_eq!((held.joint.as_str(), held.kind), ("forearm_pitch", FailedKind::Stuck));
@@ -147,7 +148,7 @@ fn an_arm_whose_sensor_sticks_goes_on_without_that_joint() {
     let reached =
         summary.score.as_ref().and_then(|score| score.reaches.last()?.side.tool_error_m).expect("some reached");
     assert!(reached.n == still.reachable && reached.n + still.needs.len() + still.no_path.len() <= still.of, "{still}");
-    assert!(reached.n >= 3 && reached.median < 0.005, "{reached:?}");
+    assert!(reached.n >= 3 && reached.median < 0.005, "{reached:?}; {still}");
     assert_eq!(summary.capture.collisions, Some(0));
     support::calibrate(&run.file("run.mcap"), &robot_folder(), folder.path()).expect("calibrate", 0, &["ACCEPTED"]);
     assert!(read(&folder.path().join("calibration.toml")) == read(&run.file("calibration.toml")));

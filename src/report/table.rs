@@ -273,7 +273,8 @@ fn held_line(held: &HeldJointSummary) -> String {
     let HeldJointSummary { joint, kind, angle_rad, bound_rad } = held;
     let (kind, [angle_deg, bound_deg]) = (kind.name(), [angle_rad, bound_rad].map(|rad| rad.to_degrees()));
     format!(
-        "held         {joint} ({kind}): did not follow its set-points, stands at {angle_deg:.1} deg within {bound_deg:.2} deg"
+        "held         {joint} ({kind}): did not follow its set-points, stands at {angle_deg:.1} deg within \
+         {bound_deg:.2} deg"
     )
 }
 

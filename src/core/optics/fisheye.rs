@@ -86,8 +86,8 @@ impl Fisheye {
         ))
     }
 
-    /// Projection and its Jacobian d(pixel)/d(point), px/m. Points up to [`BEYOND_RAD`] outside of the field of view have
-    /// a pixel, too, as far as the radius grows: an estimate that moves a corner across its edge meets no wall there.
+    /// Projection and its Jacobian d(pixel)/d(point), px/m. Points up to 0.05 rad outside of the field of view have a
+    /// pixel, too, as far as the radius grows: an estimate that moves a corner across its edge meets no wall there.
     #[must_use]
     pub fn project_with_jacobian(&self, point_m: &Vector3<f64>) -> Option<(Vector2<f64>, Matrix2x3<f64>)> {
         let (x, y, z) = (point_m.x, point_m.y, point_m.z);

@@ -222,7 +222,8 @@ impl Readings {
                 let shown = range_deg(&self.angle_rad[n - n_still..]);
                 let since = if *n_still < n { "the last " } else { "" };
                 format!(
-                    "the reading stands still over {since}{n_still} views while the camera shows {shown:.1} deg of motion"
+                    "the reading stands still over {since}{n_still} views while the camera shows {shown:.1} deg of \
+                     motion"
                 )
             }
             FailurePattern::Dead => {
