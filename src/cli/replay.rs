@@ -38,6 +38,7 @@ pub(super) fn replay(args: &ReplayArgs) -> Result<Exit> {
         robot: &drawings.robot,
         vehicle: drawings.vehicle.as_ref(),
         scene: drawings.scene.as_ref(),
+        believed_links: &[],
         summary_markdown: None,
     };
     match &args.save {

@@ -9,6 +9,7 @@ use crate::entity_log::EntityLog;
 use crate::scene::ReplayScene;
 use crate::scenery::Mover;
 use crate::shapes::{Look, log_shapes, path_part, transform, vector};
+use armcal_core::kinematics::LinkPoses;
 use armcal_core::spatial::{Base, Pose, Tool};
 use armcal_core::streams::{CaptureSet, JointAngles, MarkKind};
 
@@ -28,7 +29,7 @@ impl ReplayScene<'_> {
     /// Tool pose of the belief.
     pub(super) fn believed_tool(&self, time_s: f64) -> Option<Pose<Base, Tool>> {
         let angles = self.tracks.believed.at(time_s)?;
-        Some(Pose::from_isometry(self.robot.chain.link_poses(angles).frame(&self.robot.tool.mount)))
+        Some(Pose::from_isometry(self.believed_poses(time_s, angles).frame(&self.robot.tool.mount)))
     }
 
     /// The tool by truth, else as believed.
@@ -59,14 +60,14 @@ pub(super) fn draw(run: &ReplayScene, stream: &mut EntityLog) {
     log_camera(run, stream, &shown);
     for time_s in run.tracks.frames() {
         if let Some(angles) = run.shown_angles(time_s) {
-            shown.place(run, stream, time_s, &angles);
+            shown.place(run, stream, time_s, &run.robot.chain.link_poses(&angles));
         }
     }
     if run.has_true_joints() && !run.tracks.believed.is_empty() {
         let mut believed = Arm::new(run, stream, "believed_arm", Look::Ghost(colors::GHOST));
         for time_s in run.tracks.frames() {
             if let Some(angles) = run.tracks.believed.at(time_s) {
-                believed.place(run, stream, time_s, angles);
+                believed.place(run, stream, time_s, &run.believed_poses(time_s, angles));
             }
         }
     }
@@ -100,8 +101,7 @@ impl Arm {
         Self { bodies, jaws }
     }
 
-    fn place(&mut self, run: &ReplayScene, stream: &mut EntityLog, time_s: f64, angles: &JointAngles) {
-        let poses = run.robot.chain.link_poses(angles);
+    fn place(&mut self, run: &ReplayScene, stream: &mut EntityLog, time_s: f64, poses: &LinkPoses) {
         for (n, body) in self.bodies.iter_mut().enumerate() {
             body.place(stream, time_s, poses.link(n));
         }

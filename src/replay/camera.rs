@@ -144,7 +144,7 @@ fn draw_expected(run: &ReplayScene, stream: &mut EntityLog) {
     let mut drawn: Option<Vec<Vec<[f32; 2]>>> = None;
     for time_s in run.tracks.ticks(VIEWS_HZ) {
         let Some(angles) = run.tracks.believed.at(time_s) else { continue };
-        let base_from_camera = run.robot.chain.link_poses(angles).frame(&run.robot.camera.mount);
+        let base_from_camera = run.believed_poses(time_s, angles).frame(&run.robot.camera.mount);
         let strips: Vec<_> =
             run.robot.tags.iter().filter_map(|tag| expected_outline(run, &base_from_camera, tag)).collect();
         if drawn.as_ref() != Some(&strips) {

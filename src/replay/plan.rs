@@ -56,10 +56,12 @@ pub fn write_plan_rrd(input: &PlanInput<'_>, out: &Path) -> Result<(), ReplayErr
         robot: input.robot,
         vehicle: Some(input.vehicle),
         scene: Some(input.scene),
+        believed_links: &[],
         summary_markdown: Some(input.markdown),
     };
     let tracks = Tracks::new(&messages, input.robot)?;
-    let run = ReplayScene { tracks, truth: None, robot: input.robot, vehicle: shown.vehicle, scene: shown.scene };
+    let ReplayInput { robot, vehicle, scene, .. } = shown;
+    let run = ReplayScene { tracks, truth: None, robot, vehicle, scene, believed_chains: Vec::new() };
     let mut stream = recording::draw(&run, &shown);
     draw_tool_path(&run, &mut stream);
     draw_margins(input, &run, &mut stream);

@@ -90,7 +90,7 @@ fn draw_tool_error(run: &ReplayScene, stream: &mut EntityLog) {
         }
         next_s = time_s + 0.9 / FAST_HZ;
         let Some(truth) = run.truth.as_ref().and_then(|truth| truth.base_from_tool(*time_s)) else { continue };
-        let tool = run.robot.chain.link_poses(angles).frame(&run.robot.tool.mount);
+        let tool = run.believed_poses(*time_s, angles).frame(&run.robot.tool.mount);
         let error_m = (tool.translation.vector - truth.origin().vector()).norm();
         stream.draw(&believed, *time_s, &Scalars::single(1000.0 * error_m));
     }

@@ -15,6 +15,14 @@ use crate::{arms, blueprint, camera, phases, plots, rrd, scenery, summary, targe
 /// # Errors
 /// [`ReplayError`]: nothing to show, a truth file or joints that do not fit, or a file that cannot be written.
 pub fn write_rrd(input: &ReplayInput, out: &Path) -> Result<(), ReplayError> {
+    let run = scene(input)?;
+    let stream = draw(&run, input);
+    let identity = Identity::of(input)?;
+    rrd::write(out, &identity, &blueprint::build(&run), stream)
+}
+
+/// The recording as the drawing modules share it.
+pub(super) fn scene<'a>(input: &ReplayInput<'a>) -> Result<ReplayScene<'a>, ReplayError> {
     let mut tracks = Tracks::new(input.recording, input.robot)?;
     // A recording that was never in a file has no images.
     if input.recording.path.is_file() {
@@ -24,10 +32,11 @@ pub fn write_rrd(input: &ReplayInput, out: &Path) -> Result<(), ReplayError> {
         Some(path) => Some(Truth::read(path, input.robot, &tracks)?),
         None => None,
     };
-    let run = ReplayScene { tracks, truth, robot: input.robot, vehicle: input.vehicle, scene: input.scene };
-    let stream = draw(&run, input);
-    let identity = Identity::of(input)?;
-    rrd::write(out, &identity, &blueprint::build(&run), stream)
+    let believed = input.believed_links.iter();
+    let believed_chains =
+        believed.map(|(since, links)| (tracks.place_s(*since, *since), input.robot.chain.corrected(links))).collect();
+    let ReplayInput { robot, vehicle, scene, .. } = *input;
+    Ok(ReplayScene { tracks, truth, robot, vehicle, scene, believed_chains })
 }
 
 /// All entities of a recording, measured or planned.

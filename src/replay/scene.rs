@@ -4,9 +4,12 @@ use std::path::Path;
 
 use crate::tracks::Tracks;
 use crate::truth::Truth;
+use armcal_core::joints::JointAngles;
+use armcal_core::kinematics::{Chain, LinkCorrections, LinkPoses};
 use armcal_core::log::Recording;
 use armcal_core::robot::{Robot, Vehicle};
 use armcal_core::routine::Scene;
+use armcal_core::time::Stamp;
 
 /// Recording, truth and drawings to show.
 pub struct ReplayInput<'a> {
@@ -16,6 +19,8 @@ pub struct ReplayInput<'a> {
     pub robot: &'a Robot,
     pub vehicle: Option<&'a Vehicle>,
     pub scene: Option<&'a Scene>,
+    /// Since when the arm was believed to be other than drawn, and how; in the order of time.
+    pub believed_links: &'a [(Stamp, LinkCorrections)],
     /// Shown as it is, in place of a short description of the recording.
     pub summary_markdown: Option<&'a str>,
 }
@@ -27,4 +32,15 @@ pub(crate) struct ReplayScene<'a> {
     pub robot: &'a Robot,
     pub vehicle: Option<&'a Vehicle>,
     pub scene: Option<&'a Scene>,
+    /// Arms that were believed in since a time, s, before which there was the drawing.
+    pub believed_chains: Vec<(f64, Chain)>,
+}
+
+impl ReplayScene<'_> {
+    /// Poses of the links of the arm that was believed in, at believed angles.
+    pub(crate) fn believed_poses(&self, time_s: f64, angles: &JointAngles) -> LinkPoses {
+        let since = self.believed_chains.partition_point(|(since_s, _)| *since_s <= time_s);
+        let chain = since.checked_sub(1).map_or(&self.robot.chain, |at| &self.believed_chains[at].1);
+        chain.link_poses(angles)
+    }
 }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use crate::*;
-use armcal_core::kinematics::{IkGoal, IkSettings, JointLimits, solve_position};
+use armcal_core::kinematics::{IkGoal, IkSettings, JointLimits, LinkCorrections, solve_position};
 use armcal_core::log::{Recording, RecordingHeader, RecordingWriter, RosMessage, read_recording, ros};
 use armcal_core::robot::{Hull, Part, PlacedShape, Robot, Shape};
 use armcal_core::routine::Scene;
@@ -226,7 +226,15 @@ fn small() -> (tempfile::TempDir, Recording, PathBuf, Robot) {
 }
 
 fn input<'a>(recording: &'a Recording, robot: &'a Robot) -> ReplayInput<'a> {
-    ReplayInput { recording, truth: None, robot, vehicle: None, scene: None, summary_markdown: None }
+    ReplayInput {
+        recording,
+        truth: None,
+        robot,
+        vehicle: None,
+        scene: None,
+        believed_links: &[],
+        summary_markdown: None,
+    }
 }
 
 /// Entities of the recording in a file, as Rerun's own decoder reads it, with their rows.
@@ -297,6 +305,19 @@ fn a_run_becomes_a_file_that_rerun_reads() {
     }
     assert!(entities.keys().any(|entity| entity.contains("/believed_arm/6_")));
     assert!(entities["/plots/joint_error"] > 100);
+}
+
+/// The believed arm is the drawing's until links were estimated, and theirs from then on.
+#[test]
+fn the_believed_arm_is_that_of_its_time() {
+    let (_dir, recording, _, robot) = small();
+    let mut links = LinkCorrections::default();
+    links[1].shift_m.x = 0.01;
+    let shown = ReplayInput { believed_links: &[(SIMULATION_EPOCH.plus_s(2.0), links)], ..input(&recording, &robot) };
+    let run = crate::recording::scene(&shown).unwrap();
+    let tool_m = |time_s: f64| run.believed_poses(time_s, &robot.stowed).frame(&robot.tool.mount).translation.vector;
+    assert_eq!(tool_m(1.9), robot.chain.frame(&robot.stowed, &robot.tool.mount).translation.vector);
+    assert!(((tool_m(2.0) - tool_m(1.9)).norm() - 0.01).abs() < 1e-9);
 }
 
 #[test]

@@ -144,7 +144,7 @@ impl Run<'_> {
         let mut summary = self.summary(&outcome, &recording)?;
         if self.keep == Keep::Everything {
             #[cfg(feature = "viewer")]
-            self.mirror(&recording, &summary)?;
+            self.mirror(&recording, &summary, &outcome)?;
             // Taken last: the replay is part of what a user waits for.
             summary.wall_s = progress.wall_s();
             self.write_texts(&outcome.calibration, &summary)?;
@@ -204,8 +204,9 @@ impl Run<'_> {
     }
 
     #[cfg(feature = "viewer")]
-    fn mirror(&self, recording: &Recording, summary: &RunSummary) -> Result<(), RunError> {
+    fn mirror(&self, recording: &Recording, summary: &RunSummary, outcome: &Outcome) -> Result<(), RunError> {
         let markdown = markdown(summary);
+        let believed_links: Vec<_> = outcome.epochs.iter().map(|epoch| (epoch.from, epoch.links())).collect();
         let truth = self.partial("truth.mcap");
         armcal_replay::write_rrd(
             &armcal_replay::ReplayInput {
@@ -214,6 +215,7 @@ impl Run<'_> {
                 robot: &self.inputs.robot,
                 vehicle: Some(&self.inputs.vehicle),
                 scene: Some(&self.inputs.routine.scene),
+                believed_links: &believed_links,
                 summary_markdown: Some(&markdown),
             },
             &self.partial("run.rrd"),
