@@ -19,7 +19,7 @@ use armcal_core::sensor::{ArmSensors, ConditionChange};
 use armcal_core::stats::quantile;
 
 /// The drawing that explains the views best, step by step.
-fn revised(input: &BundleInput<'_>) -> Drawing {
+pub(super) fn revised(input: &BundleInput<'_>) -> Drawing {
     let mut drawing = Drawing::default();
     for _ in 0..4 {
         let mut wider = input.clone();
