@@ -86,8 +86,7 @@ fn planned(
 ) -> Result<PlanFile> {
     let model = || ClearanceModel::new(robot, vehicle, &routine.scene);
     let clearance = model();
-    let growth_m = robot.gripper.as_ref().map_or(0.0, |gripper| gripper.outline_growth_m(gripper.opening_max_m));
-    let open = model().with_grown_gripper(growth_m);
+    let open = model().with_open_jaws();
     let is_touched = routine.steps.iter().any(|step| matches!(step, Step::Reach(reach) if reach.touch));
     let clearance_at_targets = if is_touched { &open } else { &clearance };
     let request = ItineraryRequest { robot, routine, clearance: &clearance, clearance_at_targets, belief };

@@ -29,7 +29,7 @@ pub use file::{LeftOutTable, PathTable, PlanFile, PlanHeader, PlanTotals, PoseTa
 pub use motion::{Edge, Path, Timing, TrackingErrorBound};
 pub use path::{PathError, PathPlanner};
 pub use scene_check::{SceneCheck, SceneIssues};
-pub use targets::{TargetRequest, plan_targets, plan_task};
+pub use targets::{TargetRequest, grips_at_first, plan_targets, plan_task};
 pub use view_planning::{
     CaptureState, CapturedView, PlannedPose, PosePlan, PosePool, PoseRequest, StopReason, choose_poses,
 };

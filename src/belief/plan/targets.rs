@@ -11,7 +11,7 @@ use crate::plan::bounds::joint_bounds::JointErrorBounds;
 use crate::plan::clearance::{ClearanceModel, ClosestPair};
 use armcal_core::kinematics::{IkError, IkGoal, IkSettings, solve_position};
 use armcal_core::robot::Robot;
-use armcal_core::routine::{Routine, Step};
+use armcal_core::routine::{ReachSettings, Routine, Step};
 use armcal_core::streams::JointAngles;
 
 /// Starts of the inverse kinematics beside the preferred ones.
@@ -91,14 +91,24 @@ pub fn plan_task(
     planned
 }
 
+/// Whether jaws close on a target before any calibration, so that the task is planned for open jaws; after it targets
+/// are planned anew.
+#[must_use]
+pub fn grips_at_first(steps: &[Step]) -> bool {
+    first_reaches(steps).any(|reach| reach.touch)
+}
+
 /// Targets that are reached for before any calibration.
 fn reached_at_first(steps: &[Step]) -> BTreeSet<usize> {
+    first_reaches(steps).flat_map(|reach| reach.targets.iter().copied()).collect()
+}
+
+fn first_reaches(steps: &[Step]) -> impl Iterator<Item = &ReachSettings> {
     let before = steps.iter().take_while(|step| !matches!(step, Step::Calibrate(_)));
-    let targets = before.filter_map(|step| match step {
-        Step::Reach(reach) => Some(reach.targets.iter().copied()),
+    before.filter_map(|step| match step {
+        Step::Reach(reach) => Some(reach),
         _ => None,
-    });
-    targets.flatten().collect()
+    })
 }
 
 struct TargetSolver<'a> {

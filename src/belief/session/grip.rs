@@ -1,9 +1,8 @@
 //! Opens and closes the gripper, and keeps room for open jaws.
 
-use crate::plan::ClearanceModel;
+use crate::plan::{ClearanceModel, grips_at_first};
 use crate::session::SessionError;
 use crate::session::runner::ScriptRunner;
-use armcal_core::routine::Step;
 use armcal_core::streams::{GripperCommand, LogLevel, Mark, MarkKind, Message};
 
 /// The jaws are where they were told within this, m.
@@ -64,9 +63,7 @@ impl<'a> ScriptRunner<'a, '_> {
     /// For the targets that are planned before anything moves: with open jaws if one is touched before a calibration,
     /// after which they are planned anew.
     pub(crate) fn clearance_at_targets(&self) -> &'a ClearanceModel<'a> {
-        let mut uncalibrated = self.setup.routine.steps.iter().take_while(|step| !matches!(step, Step::Calibrate(_)));
-        let is_touched = uncalibrated.any(|step| matches!(step, Step::Reach(reach) if reach.touch));
-        if is_touched { self.jaws.open } else { self.clearance }
+        if grips_at_first(&self.setup.routine.steps) { self.jaws.open } else { self.clearance }
     }
 }
 

@@ -32,8 +32,7 @@ pub fn run(
 ) -> Result<Outcome, SessionError> {
     let model = || ClearanceModel::new(setup.robot, setup.vehicle, &setup.routine.scene);
     let clearance = model();
-    let growth_m = setup.robot.gripper.as_ref().map_or(0.0, |gripper| gripper.outline_growth_m(gripper.opening_max_m));
-    let open_clearance = model().with_grown_gripper(growth_m);
+    let open_clearance = model().with_open_jaws();
     let sensors = ArmSensors::nominal(setup.robot);
     let mut driver = Driver::new(setup.robot, arm, recorder, sensors.clone(), progress)?;
     driver.record_survey(setup.vehicle)?;

@@ -160,6 +160,14 @@ impl<'a> ClearanceModel<'a> {
         Self { gripper_growth_m: growth_m, ..self }
     }
 
+    /// The same with its jaws as wide open as they go.
+    #[must_use]
+    pub fn with_open_jaws(self) -> Self {
+        let gripper = self.robot.gripper.as_ref();
+        let growth_m = gripper.map_or(0.0, |gripper| gripper.outline_growth_m(gripper.opening_max_m));
+        self.with_grown_gripper(growth_m)
+    }
+
     /// The closest pair for one arm exactly at `angles`; distances are cut off at 0.4 m.
     #[must_use]
     pub fn nearest(&self, angles: &JointAngles) -> ClosestPair {
