@@ -10,7 +10,7 @@ use crate::campaign::Request;
 use crate::cli::exit::{Exit, UsageError, explain};
 use crate::cli::overrides::OverrideArgs;
 use armcal_belief::calib::{Calibration, CalibrationFileError};
-use armcal_belief::plan::{ClearanceModel, PlanFile, SceneCheck, SceneIssues};
+use armcal_belief::plan::{ClearanceModel, PlanFile, SceneCheck, SceneIssues, grips_at_first};
 use armcal_belief::tagmap::files::read_landmarks;
 use armcal_core::input::{InputMap, TagUse, read_input_map, read_task};
 use armcal_core::robot::{self, Robot, Vehicle};
@@ -54,28 +54,23 @@ struct Found {
 }
 
 fn check_one(file: &Path, overrides: &Overrides) -> Result<Found> {
-    let is_robot = file.file_name().is_some_and(|name| name == "robot.toml");
-    if !file.is_dir() && !is_robot {
+    let text = if file.is_dir() {
+        describe_robot(&robot::load(file)?)?
+    } else if file.file_name().is_some_and(|name| name == "robot.toml") {
+        describe_robot(&robot::load(file.parent().unwrap_or(Path::new(".")))?)?
+    } else {
         let text = std::fs::read_to_string(file).with_context(|| format!("{}: cannot be read", file.display()))?;
         let table: toml::Table = toml::from_str(&text).with_context(|| format!("{}: is no TOML", file.display()))?;
         if table.contains_key("robot") && table.contains_key("vehicle") && !table.contains_key("inputs_hash") {
             return check_routine(file, overrides);
         }
-    }
-    let text = if file.is_dir() {
-        describe_robot(&robot::load(file)?)?
-    } else if is_robot {
-        describe_robot(&robot::load(file.parent().unwrap_or(Path::new(".")))?)?
-    } else {
-        describe(file)?
+        describe(file, &text, &table)?
     };
     Ok(Found { text, warnings: Vec::new() })
 }
 
 /// What a file that is neither robot nor routine holds.
-fn describe(file: &Path) -> Result<String> {
-    let text = std::fs::read_to_string(file).with_context(|| format!("{}: cannot be read", file.display()))?;
-    let table: toml::Table = toml::from_str(&text).with_context(|| format!("{}: is no TOML", file.display()))?;
+fn describe(file: &Path, text: &str, table: &toml::Table) -> Result<String> {
     if table.contains_key("inputs_hash") {
         let plan = PlanFile::read(file)?;
         let (poses, least_m) = (plan.pose.len(), plan.totals.least_clearance_m);
@@ -103,7 +98,7 @@ fn describe(file: &Path) -> Result<String> {
         return Ok(format!("task, {targets} targets and {poses} poses, tolerance {} mm", task.tolerance_m * 1e3));
     }
     if table.contains_key("messages_hash") {
-        return describe_calibration(file, &text);
+        return describe_calibration(file, text);
     }
     Err(UsageError(format!(
         "{}: is none of robot, routine, vehicle, calibration, input map, tag map, task, plan",
@@ -150,7 +145,6 @@ fn describe_robot(robot: &Robot) -> Result<String> {
         ))
         .into());
     }
-
     let mass_kg: f64 = robot.bodies.iter().map(|body| body.mass_kg).sum();
     let simulated = if robot.require_masses().is_ok() { "" } else { "; a link has no mass, so it cannot be simulated" };
     Ok(format!(
@@ -164,11 +158,9 @@ fn describe_robot(robot: &Robot) -> Result<String> {
 /// The scene's geometry: stowed arm, tags and targets.
 fn scene_issues(routine: &Routine, robot: &Robot, vehicle: &Vehicle) -> SceneIssues {
     let model = || ClearanceModel::new(robot, vehicle, &routine.scene);
-    let clearance = model();
-    let growth_m = robot.gripper.as_ref().map_or(0.0, |gripper| gripper.outline_growth_m(gripper.opening_max_m));
-    let open = model().with_grown_gripper(growth_m);
-    let is_touched = routine.steps.iter().any(|step| matches!(step, Step::Reach(reach) if reach.touch));
-    let clearance_at_targets = if is_touched { &open } else { &clearance };
+    let (clearance, open) = (model(), model().with_open_jaws());
+    // As a run plans them.
+    let clearance_at_targets = if grips_at_first(&routine.steps) { &open } else { &clearance };
     let check = SceneCheck { robot, routine, clearance: &clearance, clearance_at_targets };
     check.issues(&mut stream_rng(routine.seed, "check"))
 }
