@@ -5,8 +5,8 @@ use nalgebra::{Isometry3, Matrix3, Vector3};
 use super::shape::PlacedShape;
 use crate::kinematics::LinkLoad;
 
-/// Assumed: the standard's.
-const GRAVITY_M_S2: f64 = 9.80665;
+/// Standard gravity, m/s2.
+pub const GRAVITY_M_S2: f64 = 9.80665;
 
 /// Mass and shapes of everything that moves with one joint, fixed children included, in that joint's link frame.
 #[derive(Clone, Debug)]

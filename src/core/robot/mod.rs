@@ -27,7 +27,7 @@ mod urdf;
 mod vehicle;
 
 pub use allowed_pairs::AllowedPairs;
-pub use body::LinkBody;
+pub use body::{GRAVITY_M_S2, LinkBody};
 pub use camera::{CameraSpec, LensPriors};
 pub use drive::{DriveSpec, MotionSpec};
 pub use error::{FileIssue, RobotError, parse_toml, read_text};

@@ -5,9 +5,9 @@ use nalgebra::{Isometry3, Matrix3, Unit, Vector3};
 use crate::dynamics::{Body, Force, JointLoad, WaterProperties};
 use crate::physics::*;
 use crate::spec::{EngineKind, PhysicsSpec, VehicleMotionSpec, WaterSpec};
-use crate::vehicle::{BaseState, GRAVITY_M_S2, VehicleMotion, WaterMotion};
+use crate::vehicle::{BaseState, VehicleMotion, WaterMotion};
 use armcal_core::kinematics::{Chain, ChainJoint};
-use armcal_core::robot::{LinkBody, Robot, load};
+use armcal_core::robot::{GRAVITY_M_S2, LinkBody, Robot, load};
 use armcal_core::spatial::Pose;
 use armcal_core::streams::{JointAngles, MAX_JOINTS};
 

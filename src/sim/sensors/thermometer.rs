@@ -8,7 +8,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 use crate::as_built::GaugesAsBuilt;
 use crate::spec::{TemperatureSpec, WaterSpec};
-use crate::vehicle::GRAVITY_M_S2;
+use armcal_core::robot::GRAVITY_M_S2;
 use armcal_core::stats::stream_rng;
 use armcal_core::streams::{PressureSample, TemperatureSample, Thermometer};
 use armcal_core::time::Stamp;

@@ -56,9 +56,8 @@ impl FlexibleArm {
         for (shaft, joint) in shafts.iter_mut().zip(robot.chain.joints()) {
             *shaft = JointShaft::new(spec.joint_compliance(&joint.name), spec.bearing_play(&joint.name));
         }
-        let first = robot.chain.joints().first();
         Self {
-            drawn: first.map_or_else(Isometry3::identity, |joint| joint.parent_from_joint),
+            drawn: robot.chain.first_place(),
             arm: Multibody::new(robot.chain.clone(), bodies),
             is_stiff: shafts.iter().all(JointShaft::is_rigid),
             shafts,
@@ -92,7 +91,7 @@ impl FlexibleArm {
 
     /// Place of the first joint in the base frame.
     pub(crate) fn first_place(&self) -> Isometry3<f64> {
-        self.arm.chain().joints()[0].parent_from_joint
+        self.arm.chain().first_place()
     }
 
     /// Angles and rates of the shafts, which the sensors and the drives are on.
@@ -150,13 +149,7 @@ impl FlexibleArm {
     /// The wrench of base and arm on the vehicle: weight, water, inertia and hose. Contacts of the arm are left out.
     fn load_on_mount(&self, state: &ArmState) -> Force {
         let ArmState { angles, rates, base, water } = *state;
-        let to_base = base.world_from_base.rotation().inverse();
-        let around = Environment {
-            gravity: base.gravity,
-            base_velocity: base.motion(),
-            water_velocity: to_base * water.velocity,
-            water_acceleration: to_base * water.acceleration,
-        };
+        let around = base.environment(water);
         let input = EquationInput {
             angles,
             rates,

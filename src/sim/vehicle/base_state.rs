@@ -2,12 +2,11 @@
 
 use nalgebra::{Isometry3, Translation3, Vector3};
 
-use crate::dynamics::Motion;
+use crate::dynamics::{Environment, Motion};
 use crate::recorded_motion::VehicleKinematics;
+use crate::vehicle::sea::WaterMotion;
+use armcal_core::robot::GRAVITY_M_S2;
 use armcal_core::spatial::{Base, Pose, Vehicle, World};
-
-/// Standard gravity, m/s2.
-pub(crate) const GRAVITY_M_S2: f64 = 9.806_65;
 
 /// The base frame's motion at one instant, in base axes unless named otherwise.
 #[derive(Clone, Copy, Debug)]
@@ -31,6 +30,17 @@ pub(crate) struct BaseState {
 }
 
 impl BaseState {
+    /// What is around the arm on a base that moves as prescribed, in `water` (world axes).
+    pub(crate) fn environment(&self, water: &WaterMotion) -> Environment {
+        let to_base = self.world_from_base.rotation().inverse();
+        Environment {
+            gravity: self.gravity,
+            base_velocity: self.motion(),
+            water_velocity: to_base * water.velocity,
+            water_acceleration: to_base * water.acceleration,
+        }
+    }
+
     /// Rigid body: `a_base = a + alpha x r + w x (w x r)`, `v_base = v + w x r`, all in vehicle axes, then in base
     /// axes.
     pub(crate) fn of(jet: &VehicleKinematics, vehicle_from_base: &Pose<Vehicle, Base>) -> Self {

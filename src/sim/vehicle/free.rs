@@ -6,11 +6,11 @@ use crate::dynamics::{Body, Force, HullDrag, Inertia, Motion};
 use crate::error::SimError;
 use crate::fault::Impulse;
 use crate::spec::{GroundSpec, MotionKind, VehicleMotionSpec, WaterSpec};
-use crate::vehicle::base_state::{BaseState, GRAVITY_M_S2};
+use crate::vehicle::base_state::BaseState;
 use crate::vehicle::ground::Ground;
 use crate::vehicle::sinusoids::{SinusoidSum, draw_sinusoids, evaluate};
 use armcal_core::kinematics::LinkPoses;
-use armcal_core::robot::{FileIssue, Vehicle, VehicleDynamics};
+use armcal_core::robot::{FileIssue, GRAVITY_M_S2, Vehicle, VehicleDynamics};
 
 /// Duration of an impulse, s: short against the vehicle's motion, long against a step.
 const IMPULSE_DURATION_S: f64 = 0.1;

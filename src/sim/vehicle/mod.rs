@@ -13,7 +13,7 @@ mod sea;
 mod sinusoids;
 mod swell;
 
-pub(crate) use base_state::{BaseState, GRAVITY_M_S2};
+pub(crate) use base_state::BaseState;
 pub(crate) use free::FreeVehicle;
 pub(crate) use prescribed::VehicleMotion;
 pub(crate) use sea::{Sea, WaterMotion};

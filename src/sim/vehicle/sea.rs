@@ -9,7 +9,7 @@ use nalgebra::Vector3;
 use rand::RngExt;
 
 use crate::spec::WaterSpec;
-use crate::vehicle::base_state::GRAVITY_M_S2;
+use armcal_core::robot::GRAVITY_M_S2;
 use armcal_core::stats::stream_rng;
 
 const N_WAVES: usize = 16;

@@ -7,8 +7,9 @@ use crate::dynamics::{BaseCoupling, Body, Environment, MAX_DOF, Motion, Multibod
 use crate::physics::engine::{Drive, Engine, PhysicsInput};
 use crate::physics::featherstone::contacts::{ContactState, ContactWorld};
 use crate::solids::Solids;
-use crate::vehicle::{BaseState, GRAVITY_M_S2};
+use crate::vehicle::BaseState;
 use armcal_core::kinematics::LinkPoses;
+use armcal_core::robot::GRAVITY_M_S2;
 use armcal_core::spatial::{Base, Pose, Vehicle};
 use armcal_core::streams::JointAngles;
 
@@ -80,8 +81,11 @@ impl Engine for Featherstone {
         let Self { multibody, contacts, poses, is_free, step_s, .. } = self;
         let is_free = *is_free;
         let first_joint = if is_free { 6 } else { 0 };
+        let first_place = multibody.chain().first_place();
         let rows = match contacts {
-            Some((world, solids)) => world.update(solids.shapes(), &contact_state(&state, poses, first_joint, drive)),
+            Some((world, solids)) => {
+                world.update(solids.shapes(), &contact_state(&state, poses, (first_joint, first_place), drive))
+            }
             None => &[],
         };
         let around = |stage: Stage, at: &SystemState| {
@@ -129,21 +133,14 @@ fn free_environment(drive: &Drive, stage: Stage, at: &SystemState) -> (Environme
 /// Environment of a base that moves as prescribed.
 fn prescribed_environment(drive: &Drive, stage: Stage) -> (Environment, BaseCoupling) {
     let end = usize::from(stage == Stage::End);
-    let (base, water) = (drive.base[end], &drive.water[end]);
-    let to_base = base.world_from_base.rotation().inverse();
-    let around = Environment {
-        gravity: base.gravity,
-        base_velocity: base.motion(),
-        water_velocity: to_base * water.velocity,
-        water_acceleration: to_base * water.acceleration,
-    };
-    (around, BaseCoupling::Prescribed(base.spatial_acceleration()))
+    let base = drive.base[end];
+    (base.environment(&drive.water[end]), BaseCoupling::Prescribed(base.spatial_acceleration()))
 }
 
 fn contact_state<'a>(
     state: &'a SystemState,
     poses: &'a LinkPoses,
-    first_joint: usize,
+    (first_joint, first_place): (usize, Isometry3<f64>),
     drive: &Drive,
 ) -> ContactState<'a> {
     let mut velocity = [0.0; MAX_DOF];
@@ -156,5 +153,5 @@ fn contact_state<'a>(
     for (slot, rate) in velocity[first_joint..].iter_mut().zip(state.rates.iter()) {
         *slot = *rate;
     }
-    ContactState { poses, angles: &state.angles, velocity, first_joint, base_velocity, base_from_ground }
+    ContactState { poses, angles: &state.angles, velocity, first_joint, base_velocity, base_from_ground, first_place }
 }
