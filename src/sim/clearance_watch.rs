@@ -3,12 +3,11 @@
 //! Distances are measured now and then; in between, the paths of joints and ground bound what a group of pairs can have
 //! lost. Only a step in which some pair may be nearer than any was before is measured.
 
-use nalgebra::Isometry3;
-
 use crate::body_poses::BodyPoses;
+use crate::pair_motion::{ArmPlace, PairGroup, PairMotion};
 use crate::solids::{Carrier, Nearest, Solids};
 use armcal_core::kinematics::Chain;
-use armcal_core::streams::{JointAngles, MAX_JOINTS};
+use armcal_core::streams::MAX_JOINTS;
 
 /// What a least distance may be below the one that is found, m.
 const RESOLUTION_M: f64 = 0.0002;
@@ -20,14 +19,9 @@ const AFTER_CONTACT_M: f64 = 0.02;
 /// Follows the arm step by step.
 pub(super) struct ClearanceWatch {
     groups: Vec<Group>,
-    angles: JointAngles,
-    base_from_ground: Isometry3<f64>,
-    path_rad: [f64; MAX_JOINTS],
-    /// Bound of the ground's path within the arm's reach, m.
-    ground_path_m: f64,
-    /// Of any point of the arm from any joint's axis, and from the base.
+    motion: PairMotion,
+    /// Of any point of the arm from any joint's axis.
     most_levers_m: [f64; MAX_JOINTS],
-    reach_m: f64,
     /// Path of any pair that is left until one must be looked at, m.
     slack_m: f64,
     /// Of pairs that do not touch.
@@ -38,88 +32,69 @@ pub(super) struct ClearanceWatch {
 
 /// Pairs of a link's shapes with what is not the arm.
 struct Group {
-    pairs: Vec<(usize, usize)>,
-    levers_m: [f64; MAX_JOINTS],
-    is_on_ground: bool,
+    pairs: PairGroup,
     /// At the last measurement, and the path until then.
     distance_m: f64,
     path_m: f64,
 }
 
-/// Where the arm is at the end of a step.
-pub(super) struct ArmPlace<'a> {
-    pub step: u64,
-    pub angles: &'a JointAngles,
-    pub base_from_ground: &'a Isometry3<f64>,
-}
-
 impl ClearanceWatch {
-    pub(super) fn new(chain: &Chain, solids: &Solids, start: &ArmPlace<'_>) -> Self {
-        let mut groups = Vec::new();
-        for outer in 1..=chain.n_joints() {
-            for inner in [Carrier::Body(0), Carrier::World] {
-                let mut pairs = solids.watched_pairs(inner, outer);
-                pairs.retain(|&(i, _)| !solids.is_of_arm(i));
-                let is_on_ground = inner == Carrier::World;
-                let levers_m = solids.levers_m(chain, 0, outer);
-                if !pairs.is_empty() {
-                    groups.push(Group { pairs, levers_m, is_on_ground, distance_m: 0.0, path_m: 0.0 });
-                }
-            }
-        }
+    pub(super) fn new(chain: &Chain, solids: &Solids, start: &ArmPlace) -> Self {
+        let around = [Carrier::Body(0), Carrier::World];
+        let groups: Vec<PairGroup> = (1..=chain.n_joints())
+            .flat_map(|outer| around.into_iter().filter_map(move |inner| PairGroup::new(chain, solids, inner, outer)))
+            .filter_map(|mut group| {
+                group.pairs.retain(|&(i, _)| !solids.is_of_arm(i));
+                (!group.pairs.is_empty()).then_some(group)
+            })
+            .collect();
         let most = |joint: usize| groups.iter().map(|group| group.levers_m[joint]).fold(0.0, f64::max);
-        let most_levers_m: [f64; MAX_JOINTS] = std::array::from_fn(most);
-        let first_m = chain.joints().first().map_or(0.0, |joint| joint.parent_from_joint.translation.vector.norm());
         Self {
-            angles: *start.angles,
-            base_from_ground: *start.base_from_ground,
-            path_rad: [0.0; MAX_JOINTS],
-            ground_path_m: 0.0,
-            reach_m: first_m + most_levers_m[0],
-            most_levers_m,
+            most_levers_m: std::array::from_fn(most),
+            motion: PairMotion::new(&groups, start),
             slack_m: 0.0,
             least_m: f64::INFINITY,
             low: None,
-            groups,
+            groups: groups.into_iter().map(|pairs| Group { pairs, distance_m: 0.0, path_m: 0.0 }).collect(),
         }
     }
 
-    /// Takes the state at the end of a step.
-    pub(super) fn follow(&mut self, solids: &mut Solids, place: &ArmPlace<'_>, links: impl FnOnce() -> BodyPoses) {
-        for (joint, (now, before)) in place.angles.iter().zip(self.angles.iter()).enumerate() {
-            let way_rad = (now - before).abs();
-            self.path_rad[joint] += way_rad;
-            self.slack_m -= self.most_levers_m[joint] * way_rad;
+    /// Takes the state at the end of `step`.
+    pub(super) fn follow(
+        &mut self,
+        solids: &mut Solids,
+        place: &ArmPlace,
+        step: u64,
+        links: impl FnOnce() -> BodyPoses,
+    ) {
+        let path = self.motion.follow(place);
+        for (lever_m, path_rad) in self.most_levers_m.iter().zip(path.joints_rad) {
+            self.slack_m -= lever_m * path_rad;
         }
-        if place.base_from_ground != &self.base_from_ground {
-            let moved = self.base_from_ground.inverse() * place.base_from_ground;
-            let ground_m = moved.translation.vector.norm() + moved.rotation.angle() * self.reach_m;
-            self.ground_path_m += ground_m;
-            self.slack_m -= ground_m;
-        }
-        (self.angles, self.base_from_ground) = (*place.angles, *place.base_from_ground);
+        self.slack_m -= path.ground_m + path.mount_m;
         if self.slack_m <= 0.0 {
-            self.look(solids, place, links);
+            self.look(solids, step, |solids| solids.place(&links(), &place.base_from_ground));
         }
     }
 
-    fn look(&mut self, solids: &mut Solids, place: &ArmPlace<'_>, links: impl FnOnce() -> BodyPoses) {
-        let mut links = Some(links);
+    /// Measures what may be nearer than anything was; `put` puts the solids in their places.
+    fn look(&mut self, solids: &mut Solids, step: u64, put: impl FnOnce(&mut Solids)) {
+        let mut put = Some(put);
         self.slack_m = f64::INFINITY;
-        let Self { groups, path_rad, ground_path_m, least_m, low, slack_m, .. } = self;
+        let Self { groups, motion, least_m, low, slack_m, .. } = self;
         for group in groups {
-            let path_m = group.path_m(path_rad, *ground_path_m);
+            let path_m = motion.path_m(&group.pairs);
             if group.distance_m - (path_m - group.path_m) <= *least_m - RESOLUTION_M {
-                if let Some(links) = links.take() {
-                    solids.place(&links(), place.base_from_ground);
+                if let Some(put) = put.take() {
+                    put(solids);
                 }
                 let far_m = if least_m.is_finite() { *least_m + FAR_M } else { 2.0 * FAR_M };
-                let nearest = solids.nearest_of(&group.pairs, far_m);
+                let nearest = solids.nearest_of(&group.pairs.pairs, far_m);
                 group.path_m = path_m;
                 group.distance_m = nearest.map_or(far_m, |nearest| nearest.distance_m);
                 if let Some(nearest) = nearest.filter(|nearest| nearest.distance_m < *least_m) {
                     if nearest.distance_m > 0.0 {
-                        (*least_m, *low) = (nearest.distance_m, Some((nearest, place.step)));
+                        (*least_m, *low) = (nearest.distance_m, Some((nearest, step)));
                     } else {
                         group.distance_m = *least_m + AFTER_CONTACT_M;
                     }
@@ -141,27 +116,18 @@ impl ClearanceWatch {
     }
 }
 
-impl Group {
-    fn path_m(&self, path_rad: &[f64; MAX_JOINTS], ground_path_m: f64) -> f64 {
-        let ground_m = if self.is_on_ground { ground_path_m } else { 0.0 };
-        self.levers_m.iter().zip(path_rad).map(|(lever_m, path)| lever_m * path).sum::<f64>() + ground_m
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use std::path::Path;
 
+    use nalgebra::Isometry3;
     use rand::RngExt;
 
     use super::*;
     use armcal_core::robot::{load, load_vehicle};
     use armcal_core::routine::Scene;
     use armcal_core::stats::stream_rng;
-
-    fn at<'a>(step: u64, angles: &'a JointAngles, base_from_ground: &'a Isometry3<f64>) -> ArmPlace<'a> {
-        ArmPlace { step, angles, base_from_ground }
-    }
+    use armcal_core::streams::JointAngles;
 
     /// Arms that wander about over a seafloor that heaves: the least of all steps is found whenever there is a new one,
     /// and samples alone miss it.
@@ -175,10 +141,12 @@ mod tests {
         let mut solids = Solids::new(&robot, &vehicle, &scene);
         let (mut measured, mut missed_m) = (0, 0.0_f64);
         for seed in 1..=12 {
-            let mut rng = stream_rng(seed, "wandering arm");
+            let (mut rng, mut mount_rng) = (stream_rng(seed, "wandering arm"), stream_rng(seed, "mount"));
             let mut angles = robot.stowed;
             let mut ground = Isometry3::identity();
-            let mut watch = ClearanceWatch::new(&robot.chain, &solids, &at(0, &angles, &ground));
+            let mut mount = robot.chain.joints()[0].parent_from_joint;
+            let start = ArmPlace { angles, base_from_ground: ground, first_place: mount };
+            let mut watch = ClearanceWatch::new(&robot.chain, &solids, &start);
             let mut rates = JointAngles::zeros(6);
             let (mut least_m, mut found_m, mut sampled_m) = (f64::INFINITY, f64::INFINITY, f64::INFINITY);
             for step in 1..=2400 {
@@ -187,8 +155,13 @@ mod tests {
                 }
                 angles = JointAngles::from_fn(6, |j| angles[j] + rates[j]);
                 ground.translation.z += rng.random_range(-1e-3..1e-3);
-                let links = || BodyPoses::drawn(6, &robot.chain.link_poses(&angles));
-                watch.follow(&mut solids, &at(step, &angles, &ground), || {
+                // A mount that gives.
+                mount.translation.y += mount_rng.random_range(-3e-4..3e-4);
+                let mut chain = robot.chain.clone();
+                chain.set_first_place(&mount);
+                let links = || BodyPoses::drawn(6, &chain.link_poses(&angles));
+                let place = ArmPlace { angles, base_from_ground: ground, first_place: mount };
+                watch.follow(&mut solids, &place, step, || {
                     measured += 1;
                     links()
                 });

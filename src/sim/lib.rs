@@ -20,6 +20,7 @@ mod fixture;
 mod gripper;
 mod hydraulics;
 pub mod imaging;
+mod pair_motion;
 mod physics;
 mod recorded_motion;
 mod sensors;

@@ -99,6 +99,12 @@ impl Chain {
         most_m
     }
 
+    /// Place of the first joint on the base; the base's own for a chain without joints.
+    #[must_use]
+    pub fn first_place(&self) -> Isometry3<f64> {
+        self.joints.first().map_or_else(Isometry3::identity, |first| first.parent_from_joint)
+    }
+
     /// Puts the first joint elsewhere on the base.
     pub fn set_first_place(&mut self, base_from_joint: &Isometry3<f64>) {
         if let Some(first) = self.joints.first_mut() {

@@ -4,12 +4,10 @@
 //! paths bound what a pair can have lost, so that a step in which nothing can touch is known without looking. The
 //! motion is the same to rounding: the engine adds up a link's inertia in another way when its shapes are switched off.
 
-use nalgebra::Isometry3;
-
 use crate::body_poses::BodyPoses;
+use crate::pair_motion::{ArmPlace, PairGroup, PairMotion};
 use crate::solids::{Carrier, Solids};
 use armcal_core::kinematics::Chain;
-use armcal_core::streams::{JointAngles, MAX_JOINTS};
 
 /// The engine makes contacts of pairs nearer than 20 mm, its prediction distance, m.
 const CONTACT_M: f64 = 0.022;
@@ -24,22 +22,12 @@ const NEAR_STEPS: u64 = 10;
 pub(super) struct ContactGuard {
     solids: Solids,
     groups: Vec<Group>,
-    angles: JointAngles,
-    base_from_ground: Isometry3<f64>,
-    /// Path of each joint since the start, rad.
-    path_rad: [f64; MAX_JOINTS],
-    /// Bound of the ground's path within the arm's reach, m.
-    ground_path_m: f64,
-    reach_m: f64,
+    motion: PairMotion,
     step: u64,
 }
 
-/// Pairs of shapes that the same joints move against each other.
 struct Group {
-    pairs: Vec<(usize, usize)>,
-    /// By what each joint can move the pairs against each other, m/rad; zero for other joints.
-    levers_m: [f64; MAX_JOINTS],
-    is_on_ground: bool,
+    pairs: PairGroup,
     /// The least distance at the last measurement, and the path until then.
     distance_m: f64,
     path_m: f64,
@@ -47,55 +35,30 @@ struct Group {
 }
 
 impl ContactGuard {
-    pub(super) fn new(chain: &Chain, solids: &Solids, angles: &JointAngles) -> Self {
-        let n_bodies = chain.n_joints() + 1;
-        let mut groups = Vec::new();
-        for outer in 1..n_bodies {
-            for inner in 0..outer {
-                let levers_m = solids.levers_m(chain, inner, outer);
-                groups.extend(Group::new(solids, Carrier::Body(inner), outer, levers_m));
-            }
-            groups.extend(Group::new(solids, Carrier::World, outer, solids.levers_m(chain, 0, outer)));
-        }
-        // From the base's origin rather than the first joint's axis.
-        let first_m = chain.joints().first().map_or(0.0, |joint| joint.parent_from_joint.translation.vector.norm());
-        let reach_m = first_m + groups.iter().map(|group| group.levers_m[0]).fold(0.0, f64::max);
-        Self {
-            solids: solids.clone(),
-            groups,
-            angles: *angles,
-            base_from_ground: Isometry3::identity(),
-            path_rad: [0.0; MAX_JOINTS],
-            ground_path_m: 0.0,
-            reach_m,
-            step: 0,
-        }
+    pub(super) fn new(chain: &Chain, solids: &Solids, start: &ArmPlace) -> Self {
+        let inner = |outer: usize| (0..outer).map(Carrier::Body).chain([Carrier::World]);
+        let groups: Vec<PairGroup> = (1..=chain.n_joints())
+            .flat_map(|outer| inner(outer).filter_map(move |inner| PairGroup::new(chain, solids, inner, outer)))
+            .collect();
+        let motion = PairMotion::new(&groups, start);
+        let unmeasured = |pairs| Group { pairs, distance_m: 0.0, path_m: 0.0, measured_at: 0 };
+        Self { solids: solids.clone(), groups: groups.into_iter().map(unmeasured).collect(), motion, step: 0 }
     }
 
     /// Takes the state at the start of a step; gives whether any pair may be near enough for a contact in it.
-    pub(super) fn contact_is_possible(
-        &mut self,
-        angles: &JointAngles,
-        links: impl FnOnce() -> BodyPoses,
-        base_from_ground: &Isometry3<f64>,
-    ) -> bool {
-        for (joint, (now, before)) in angles.iter().zip(self.angles.iter()).enumerate() {
-            self.path_rad[joint] += (now - before).abs();
-        }
-        let moved = self.base_from_ground.inverse() * base_from_ground;
-        self.ground_path_m += moved.translation.vector.norm() + moved.rotation.angle() * self.reach_m;
-        (self.angles, self.base_from_ground) = (*angles, *base_from_ground);
+    pub(super) fn contact_is_possible(&mut self, place: &ArmPlace, links: impl FnOnce() -> BodyPoses) -> bool {
+        self.motion.follow(place);
         self.step += 1;
-        let Self { groups, path_rad, ground_path_m, step, solids, .. } = self;
+        let Self { groups, motion, step, solids } = self;
         let mut links = Some(links);
         let mut is_possible = false;
         for group in groups {
-            if group.is_outdated(path_rad, *ground_path_m, *step) {
+            if group.is_outdated(motion, *step) {
                 if let Some(links) = links.take() {
-                    solids.place(&links(), base_from_ground);
+                    solids.place(&links(), &place.base_from_ground);
                 }
-                group.distance_m = solids.least_distance_m(&group.pairs, FAR_M);
-                group.path_m = group.path_m(path_rad, *ground_path_m);
+                group.distance_m = solids.least_distance_m(&group.pairs.pairs, FAR_M);
+                group.path_m = motion.path_m(&group.pairs);
                 group.measured_at = *step;
             }
             is_possible |= group.distance_m < NEAR_M;
@@ -105,29 +68,11 @@ impl ContactGuard {
 }
 
 impl Group {
-    fn new(solids: &Solids, inner: Carrier, outer: usize, levers_m: [f64; MAX_JOINTS]) -> Option<Self> {
-        let pairs = solids.watched_pairs(inner, outer);
-        let is_on_ground = inner == Carrier::World;
-        (!pairs.is_empty()).then_some(Self {
-            pairs,
-            levers_m,
-            is_on_ground,
-            distance_m: 0.0,
-            path_m: 0.0,
-            measured_at: 0,
-        })
-    }
-
-    fn path_m(&self, path_rad: &[f64; MAX_JOINTS], ground_path_m: f64) -> f64 {
-        let ground_m = if self.is_on_ground { ground_path_m } else { 0.0 };
-        self.levers_m.iter().zip(path_rad).map(|(lever_m, path)| lever_m * path).sum::<f64>() + ground_m
-    }
-
-    fn is_outdated(&self, path_rad: &[f64; MAX_JOINTS], ground_path_m: f64, step: u64) -> bool {
+    fn is_outdated(&self, motion: &PairMotion, step: u64) -> bool {
         if self.distance_m < NEAR_M {
             return self.measured_at == 0 || step - self.measured_at >= NEAR_STEPS;
         }
-        self.distance_m - (self.path_m(path_rad, ground_path_m) - self.path_m) < CONTACT_M
+        self.distance_m - (motion.path_m(&self.pairs) - self.path_m) < CONTACT_M
     }
 }
 
@@ -135,12 +80,14 @@ impl Group {
 mod tests {
     use std::path::Path;
 
+    use nalgebra::Isometry3;
     use rand::RngExt;
 
     use super::*;
     use armcal_core::robot::{load, load_vehicle};
     use armcal_core::routine::Scene;
     use armcal_core::stats::stream_rng;
+    use armcal_core::streams::JointAngles;
 
     /// The engine's prediction distance.
     const PREDICTED_M: f64 = 0.02;
@@ -159,7 +106,10 @@ mod tests {
         for seed in 1..=12 {
             let mut rng = stream_rng(seed, "wandering arm");
             let mut angles = robot.stowed;
-            let mut guard = ContactGuard::new(&robot.chain, &solids, &angles);
+            let mut mount = robot.chain.joints()[0].parent_from_joint;
+            let ground = Isometry3::identity();
+            let start = ArmPlace { angles, base_from_ground: ground, first_place: mount };
+            let mut guard = ContactGuard::new(&robot.chain, &solids, &start);
             let mut heave_m: f64 = 0.0;
             for leg in 0..6 {
                 let rates = JointAngles::from_fn(6, |_| rng.random_range(-2e-3..2e-3));
@@ -168,8 +118,13 @@ mod tests {
                     heave_m += rng.random_range(-1e-3..1e-3);
                     let tilt = nalgebra::Vector3::new(0.02 * heave_m, 0.3 * heave_m, 0.0);
                     let ground = Isometry3::new(nalgebra::Vector3::new(0.0, 0.0, heave_m), tilt);
-                    let links = || BodyPoses::drawn(6, &robot.chain.link_poses(&angles));
-                    if guard.contact_is_possible(&angles, links, &ground) {
+                    // A mount that gives.
+                    mount.translation.z += rng.random_range(-3e-4..3e-4);
+                    let mut chain = robot.chain.clone();
+                    chain.set_first_place(&mount);
+                    let links = || BodyPoses::drawn(6, &chain.link_poses(&angles));
+                    let place = ArmPlace { angles, base_from_ground: ground, first_place: mount };
+                    if guard.contact_is_possible(&place, links) {
                         left += 1;
                         continue;
                     }

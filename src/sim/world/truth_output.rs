@@ -1,7 +1,8 @@
 //! The truth's stream of a world: states, clearances and contacts.
 
-use crate::clearance_watch::{ArmPlace, ClearanceWatch};
+use crate::clearance_watch::ClearanceWatch;
 use crate::error::SimError;
+use crate::pair_motion::ArmPlace;
 use crate::spec::CONTROL_PERIOD_S;
 use crate::truth::{TruthClearance, TruthContact, TruthSink, TruthState};
 use crate::world::simulation::World;
@@ -17,8 +18,7 @@ impl World {
     pub fn set_truth_sink(&mut self, mut sink: Box<dyn TruthSink>) -> Result<(), SimError> {
         sink.begin(&self.header).map_err(SimError::Truth)?;
         self.truth = Some(sink);
-        let base_from_ground = *self.base.world_from_base.inverse().isometry();
-        let place = ArmPlace { step: self.step, angles: &self.physics.angles(), base_from_ground: &base_from_ground };
+        let place = self.arm_place();
         self.clearance = Some(ClearanceWatch::new(&self.robot.chain, &self.solids, &place));
         Ok(())
     }
@@ -43,11 +43,18 @@ impl World {
         Ok(())
     }
 
+    fn arm_place(&self) -> ArmPlace {
+        ArmPlace {
+            angles: self.physics.angles(),
+            base_from_ground: *self.base.world_from_base.inverse().isometry(),
+            first_place: self.structure.first_place(),
+        }
+    }
+
     pub(super) fn watch_clearance(&mut self) {
-        let Self { clearance: Some(watch), solids, physics, base, step, .. } = self else { return };
-        let base_from_ground = *base.world_from_base.inverse().isometry();
-        let place = ArmPlace { step: *step, angles: &physics.angles(), base_from_ground: &base_from_ground };
-        watch.follow(solids, &place, || physics.poses());
+        let place = self.arm_place();
+        let Self { clearance: Some(watch), solids, physics, step, .. } = self else { return };
+        watch.follow(solids, &place, *step, || physics.poses());
     }
 
     pub(super) fn record_truth(&mut self) -> Result<(), ArmError> {

@@ -10,6 +10,7 @@ use rapier3d::pipeline::{ActiveHooks, PhysicsWorld};
 use crate::body_poses::BodyPoses;
 use crate::convert::from_rapier;
 use crate::dynamics::{ContactRow, Coordinates, Force, MAX_DOF, Motion};
+use crate::pair_motion::ArmPlace;
 use crate::physics::contact_guard::ContactGuard;
 use crate::physics::pair_filter::PairFilter;
 use crate::solids::{Carrier, Solid, Solids};
@@ -43,6 +44,8 @@ pub(super) struct ContactState<'a> {
     /// Of the base against the ground; nil in `velocity` where it moves as prescribed.
     pub base_velocity: Motion,
     pub base_from_ground: Isometry3<f64>,
+    /// Of the first joint on the base.
+    pub first_place: Isometry3<f64>,
 }
 
 impl ContactWorld {
@@ -60,11 +63,13 @@ impl ContactWorld {
                 (engine.colliders.insert(collider), solid.carrier)
             })
             .collect();
+        let start =
+            ArmPlace { angles: *angles, base_from_ground: Isometry3::identity(), first_place: chain.first_place() };
         Self {
             engine,
             filter: PairFilter::new(solids),
             colliders,
-            guard: ContactGuard::new(chain, solids, angles),
+            guard: ContactGuard::new(chain, solids, &start),
             is_colliding: true,
             spec: *spec,
             rows: Vec::with_capacity(64),
@@ -78,7 +83,12 @@ impl ContactWorld {
         self.touching.clear();
         let n = state.angles.len();
         let links = || BodyPoses::drawn(n, state.poses);
-        let needed = self.guard.contact_is_possible(state.angles, links, &state.base_from_ground);
+        let place = ArmPlace {
+            angles: *state.angles,
+            base_from_ground: state.base_from_ground,
+            first_place: state.first_place,
+        };
+        let needed = self.guard.contact_is_possible(&place, links);
         if needed != self.is_colliding {
             self.is_colliding = needed;
             for (handle, _) in &self.colliders {

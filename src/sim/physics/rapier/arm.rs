@@ -9,6 +9,7 @@ use crate::body_poses::BodyPoses;
 use crate::convert::to_rapier;
 use crate::dynamics::{Environment, Force, JointLoad};
 use crate::error::SimError;
+use crate::pair_motion::ArmPlace;
 use crate::physics::contact_guard::ContactGuard;
 use crate::physics::engine::{Drive, Engine, PhysicsInput};
 use crate::physics::pair_filter::PairFilter;
@@ -81,7 +82,8 @@ impl RapierArm {
         let contacts = solids.map(|solids| {
             let ground = engine.bodies.insert(RigidBodyBuilder::kinematic_position_based().can_sleep(false));
             let colliders = add_colliders(&mut engine, solids, spec, &handles, ground);
-            let guard = ContactGuard::new(chain, solids, &angles);
+            let start = ArmPlace { angles, base_from_ground: Isometry3::identity(), first_place: chain.first_place() };
+            let guard = ContactGuard::new(chain, solids, &start);
             let filter = PairFilter::new(solids);
             Contacts { filter, guard, colliders, ground, is_on: false }
         });
@@ -149,10 +151,12 @@ impl RapierArm {
 
     /// Moves the ground, and lets the engine look for contacts only while there can be any.
     fn prepare_contacts(&mut self, drive: &Drive) {
-        let Self { contacts: Some(contacts), engine, state, .. } = self else { return };
+        let Self { contacts: Some(contacts), engine, state, chain, .. } = self else { return };
         let base_from_ground = drive.base.map(|base| *base.world_from_base.inverse().isometry());
         let links = || BodyPoses::drawn(state.rates.len(), &state.poses_ahead);
-        let needed = contacts.guard.contact_is_possible(&state.angles_ahead, links, &base_from_ground[0]);
+        let (angles, first_place) = (state.angles_ahead, chain.first_place());
+        let place = ArmPlace { angles, base_from_ground: base_from_ground[0], first_place };
+        let needed = contacts.guard.contact_is_possible(&place, links);
         if needed != contacts.is_on {
             contacts.is_on = needed;
             for &handle in &contacts.colliders {
