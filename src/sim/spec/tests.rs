@@ -74,11 +74,18 @@ fn the_text_of_a_spec_reads_back() {
 #[test]
 fn an_engine_that_is_named_is_never_replaced() {
     let engine = |text: &str| read(text).expect("valid").engine();
-    assert_eq!(engine(""), EngineKind::Featherstone);
+    assert_eq!(engine(""), EngineKind::Rapier);
     assert_eq!(engine("[physics]\nengine = \"rapier\""), EngineKind::Rapier);
-    assert_eq!(engine("[vehicle]\nmotion = \"free\""), EngineKind::Featherstone);
+    assert_eq!(engine("[physics]\nengine = \"featherstone\""), EngineKind::Featherstone);
+    for motion in ["free", "parked"] {
+        let text = format!("[vehicle]\nmotion = \"{motion}\"\n[ground]\nvehicle_weight_n = 1500");
+        assert_eq!(engine(&text), EngineKind::Featherstone);
+    }
     let text = problem("[physics]\nengine = \"rapier\"\n[vehicle]\nmotion = \"free\"");
     assert!(text.contains("r.toml") && text.contains("world.physics.engine"), "{text}");
+    let text = problem("[physics]\ncontact_stiffness_n_m = 1e6");
+    assert!(text.contains("world.physics.contact_stiffness_n_m") && text.contains("featherstone"), "{text}");
+    engine("[physics]\nengine = \"featherstone\"\ncontact_stiffness_n_m = 1e6");
     let text = problem("[physics]\nengine = \"bullet\"");
     assert!(text.contains("featherstone") && text.contains("rapier"), "{text}");
     let named = read("[physics]\nengine = \"rapier\"").expect("valid");

@@ -170,10 +170,39 @@ impl WorldSpec {
         self
     }
 
-    /// What moves the arm: as named, else the equations of our own.
+    /// What moves the arm: as named, else rapier's multibody where it can carry the vehicle.
     #[must_use]
     pub fn engine(&self) -> EngineKind {
-        self.physics.engine.unwrap_or(EngineKind::Featherstone)
+        let by_default = if self.vehicle_floats() { EngineKind::Featherstone } else { EngineKind::Rapier };
+        self.physics.engine.unwrap_or(by_default)
+    }
+
+    fn vehicle_floats(&self) -> bool {
+        matches!(self.vehicle.motion, MotionKind::Free | MotionKind::Parked)
+    }
+
+    /// What rapier cannot do is refused by its key.
+    fn check_engine(&self, file: &Path) -> Result<(), FileIssue> {
+        if self.engine() != EngineKind::Rapier {
+            return Ok(());
+        }
+        if self.vehicle_floats() {
+            let problem = "\"rapier\" has no vehicle that floats (motion = \"free\", \"parked\"): use \"featherstone\"";
+            return Err(FileIssue::new(file, "world.physics.engine", problem));
+        }
+        let (physics, usual) = (&self.physics, PhysicsSpec::default());
+        let softness = [
+            ("contact_stiffness_n_m", physics.contact_stiffness_n_m, usual.contact_stiffness_n_m),
+            ("contact_damping_s", physics.contact_damping_s, usual.contact_damping_s),
+        ];
+        match softness.iter().find(|(_, asked, usual)| asked != usual) {
+            None => Ok(()),
+            Some((key, ..)) => {
+                let problem =
+                    "contacts of \"rapier\" have a softness of their own: set engine = \"featherstone\" beside it";
+                Err(FileIssue::new(file, format!("world.physics.{key}"), problem))
+            }
+        }
     }
 
     /// Largest gain error (relative) and offset error (rad) that a joint's sensor may be built with.
@@ -242,10 +271,7 @@ impl WorldSpec {
             let problem = "goes with motion = \"recorded\", and that with it";
             return Err(FileIssue::new(file, "world.vehicle.motion_file", problem));
         }
-        if self.engine() == EngineKind::Rapier && matches!(self.vehicle.motion, MotionKind::Free | MotionKind::Parked) {
-            let problem = "\"rapier\" has no vehicle that floats (motion = \"free\", \"parked\"): use \"featherstone\"";
-            return Err(FileIssue::new(file, "world.physics.engine", problem));
-        }
+        self.check_engine(file)?;
         if self.vehicle.motion == MotionKind::Parked && self.ground.vehicle_weight_n <= 0.0 {
             let problem = "must be above 0 for [world.vehicle] motion = \"parked\"";
             return Err(FileIssue::new(file, "world.ground.vehicle_weight_n", problem));
