@@ -174,7 +174,7 @@ impl ScriptRunner<'_, '_> {
         choose_poses(
             &PoseRequest {
                 robot: &self.robot,
-                clearance: self.clearance,
+                clearance: &self.clearance,
                 bounds: &self.bounds,
                 visibility: &VisibilityModel::default(),
                 capture: views.settings,
@@ -299,7 +299,7 @@ impl ScriptRunner<'_, '_> {
     /// Where the arm stands nothing can be hit: what tags can be seen from there tell where it is.
     fn capture_at_start(&mut self, views: &mut CaptureRun<'_>) -> Result<(), SessionError> {
         let here = self.driver.set_point();
-        let tags = VisibilityModel::default().visible(&self.robot, self.clearance, &here);
+        let tags = VisibilityModel::default().visible(&self.robot, &self.clearance, &here);
         // Where a joint stands that nobody has seen, only a look can tell.
         if tags.is_empty() && self.unlocated().is_none() {
             return Ok(());

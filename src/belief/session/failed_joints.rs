@@ -100,7 +100,7 @@ impl ScriptRunner<'_, '_> {
         let request = TargetRequest { targets_m: &targets_m, preferred: None, margin_m: self.margin_m() };
         // By a sound arm: what it cannot reach either is no failed joint's fault.
         let none = JointErrorBounds::none(self.setup.robot);
-        let sound = plan_targets(self.setup.robot, self.clearance, &none, &request, &mut self.rng);
+        let sound = plan_targets(self.setup.robot, &self.clearance, &none, &request, &mut self.rng);
         let needs = lost.iter().zip(&sound).filter(|(_, plan)| plan.is_ok()).map(|(target, _)| *target).collect();
         let names = self.robot.joint_names();
         let joints: Vec<String> = self.driver.held.iter().map(|held| names[held.joint].clone()).collect();

@@ -1,5 +1,7 @@
 //! Opens and closes the gripper, and keeps room for open jaws.
 
+use std::rc::Rc;
+
 use crate::plan::{ClearanceModel, grips_at_first};
 use crate::session::SessionError;
 use crate::session::runner::ScriptRunner;
@@ -21,7 +23,8 @@ impl ScriptRunner<'_, '_> {
         let opening_m = opening * gripper.opening_max_m;
         let is_wide = opening_m > gripper.rest_opening_m + AS_AT_REST_M;
         let crowded = |run: &Self| run.jaws.open.find_violation(&run.driver.set_point(), &run.bounds, 0.0);
-        if is_wide && (crowded(self).is_some() || !self.can_leave(self.jaws.open)) {
+        let open = Rc::clone(&self.jaws.open);
+        if is_wide && (crowded(self).is_some() || !self.can_leave(&open)) {
             // Folded up for a view the arm may be in its own jaws' way; where it is stowed there is room on any vehicle
             // so far.
             let stowed = self.robot.stowed;
@@ -33,12 +36,12 @@ impl ScriptRunner<'_, '_> {
         }
         // Opening jaws need their room at once, closing ones until they are closed.
         if is_wide {
-            self.clearance = self.jaws.open;
+            self.clearance = Rc::clone(&self.jaws.open);
         }
         if !self.driver.grip(opening, opening_m, 2.0 * gripper.closing_time_s + PATIENCE_S)? {
             self.driver.log(LogLevel::Warn, &format!("the jaws did not come to {opening_m:.3} m"))?;
         } else if !is_wide {
-            self.clearance = self.jaws.at_rest;
+            self.clearance = Rc::clone(&self.jaws.at_rest);
         }
         Ok(())
     }
@@ -62,8 +65,8 @@ impl ScriptRunner<'_, '_> {
 impl<'a> ScriptRunner<'a, '_> {
     /// For the targets that are planned before anything moves: with open jaws if one is touched before a calibration,
     /// after which they are planned anew.
-    pub(crate) fn clearance_at_targets(&self) -> &'a ClearanceModel<'a> {
-        if grips_at_first(&self.setup.routine.steps) { self.jaws.open } else { self.clearance }
+    pub(crate) fn clearance_at_targets(&self) -> Rc<ClearanceModel<'a>> {
+        if grips_at_first(&self.setup.routine.steps) { Rc::clone(&self.jaws.open) } else { Rc::clone(&self.clearance) }
     }
 }
 

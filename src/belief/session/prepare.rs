@@ -27,7 +27,7 @@ impl ScriptRunner<'_, '_> {
             return Err(PlanError::StartTooClose { clearance_m, nearest: nearest.to_string(), needed_m }.into());
         }
         let bounds = &self.bounds;
-        let targets = plan_task(&self.robot, self.clearance_at_targets(), bounds, routine, &mut self.rng);
+        let targets = plan_task(&self.robot, &self.clearance_at_targets(), bounds, routine, &mut self.rng);
         let targets = targets.into_iter().collect::<Result<Vec<_>, _>>()?;
         self.planned = Some(Planned { targets, first_capture: None });
         self.progress_at(Phase::Plan, 1, 2);
@@ -57,7 +57,7 @@ impl ScriptRunner<'_, '_> {
     }
 
     fn sees_tags_from(&self, angles: &JointAngles) -> bool {
-        !VisibilityModel::default().visible(&self.robot, self.clearance, angles).is_empty()
+        !VisibilityModel::default().visible(&self.robot, &self.clearance, angles).is_empty()
     }
 }
 

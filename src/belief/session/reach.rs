@@ -94,7 +94,7 @@ impl ScriptRunner<'_, '_> {
         }
         let targets_m: Vec<[f64; 3]> = targets.iter().map(|&t| self.setup.routine.task.targets_m[t]).collect();
         let request = TargetRequest { targets_m: &targets_m, preferred: Some(&preferred), margin_m: self.margin_m() };
-        let solved = plan_targets(&self.robot, self.clearance, &self.bounds, &request, &mut self.rng);
+        let solved = plan_targets(&self.robot, &self.clearance, &self.bounds, &request, &mut self.rng);
         self.note_reachable(targets, &solved);
         solved.into_iter().map(|planned| self.or_skipped(planned)).collect()
     }

@@ -1,5 +1,7 @@
 //! State of a script that is carried out.
 
+use std::rc::Rc;
+
 use nalgebra::Vector3;
 use rand_chacha::ChaCha8Rng;
 
@@ -8,6 +10,7 @@ use crate::plan::{ClearanceModel, JointErrorBounds, PosePlan};
 use crate::session::inputs::SessionInputs;
 use crate::session::motion::Driver;
 use crate::session::outcome::{AssertResult, Epoch, EstimateUpdate, ReachStep, StillReachable, Visit};
+use armcal_core::kinematics::Chain;
 use armcal_core::robot::Robot;
 use armcal_core::sensor::ArmSensors;
 use armcal_core::streams::JointAngles;
@@ -31,8 +34,16 @@ pub(crate) struct FreshBounds {
 
 /// The arm among what surrounds it, by its jaws.
 pub(crate) struct Jaws<'a> {
-    pub at_rest: &'a ClearanceModel<'a>,
-    pub open: &'a ClearanceModel<'a>,
+    pub at_rest: Rc<ClearanceModel<'a>>,
+    pub open: Rc<ClearanceModel<'a>>,
+}
+
+impl<'a> Jaws<'a> {
+    /// Of an arm that may bend as far as `chain` can.
+    pub(crate) fn new(setup: &SessionInputs<'a>, chain: &Chain) -> Self {
+        let model = || ClearanceModel::new(setup.robot, setup.vehicle, &setup.routine.scene).with_sag(chain);
+        Self { at_rest: Rc::new(model()), open: Rc::new(model().with_open_jaws()) }
+    }
 }
 
 pub(crate) struct ScriptRunner<'a, 'b> {
@@ -47,7 +58,7 @@ pub(crate) struct ScriptRunner<'a, 'b> {
     pub before_running: Option<SavedBelief>,
     pub rng: ChaCha8Rng,
     /// With the jaws as they are now.
-    pub clearance: &'a ClearanceModel<'a>,
+    pub clearance: Rc<ClearanceModel<'a>>,
     pub jaws: Jaws<'a>,
     pub driver: Driver<'b>,
     pub planned: Option<Planned>,

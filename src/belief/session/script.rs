@@ -1,5 +1,7 @@
 //! The steps of a routine's script, carried out in order.
 
+use std::rc::Rc;
+
 use crate::calib::{Calibration, CalibrationFileError, Status, calibrate};
 use crate::plan::{ClearanceModel, Elapsed, JointErrorBounds, LeastClearance, PathError, PathPlanner};
 use crate::session::held_joint::with_held;
@@ -30,9 +32,7 @@ pub fn run(
     recorder: &mut Recorder,
     progress: &mut dyn Progress,
 ) -> Result<Outcome, SessionError> {
-    let model = || ClearanceModel::new(setup.robot, setup.vehicle, &setup.routine.scene);
-    let clearance = model();
-    let open_clearance = model().with_open_jaws();
+    let jaws = Jaws::new(setup, &setup.robot.chain);
     let sensors = ArmSensors::nominal(setup.robot);
     let mut driver = Driver::new(setup.robot, arm, recorder, sensors.clone(), progress)?;
     driver.record_survey(setup.vehicle)?;
@@ -45,8 +45,8 @@ pub fn run(
         fresh: None,
         before_running: None,
         rng: stream_rng(setup.seed, "plan"),
-        clearance: &clearance,
-        jaws: Jaws { at_rest: &clearance, open: &open_clearance },
+        clearance: Rc::clone(&jaws.at_rest),
+        jaws,
         planned: None,
         began,
         views_since: began,
@@ -87,7 +87,7 @@ impl ScriptRunner<'_, '_> {
         let links = self.epochs.last().map(Epoch::links).unwrap_or_default();
         let by_link = |link: &LinkCorrection| link.shift_m.norm() + LINK_REACH_M * link.turn_rad.norm();
         let by_links_m: f64 = links.places.iter().map(by_link).sum();
-        self.setup.routine.capture.clearance_m + by_links_m + self.robot.chain.most_sag_m()
+        self.setup.routine.capture.clearance_m + by_links_m
     }
 
     /// Whether the arm believes in a calibration.
@@ -168,7 +168,7 @@ impl ScriptRunner<'_, '_> {
         let to = &with_held(&self.driver.held, to);
         let limits = self.bounds.safe_limits(&self.robot);
         let from = self.driver.set_point();
-        let (clearance, bounds, margin_m) = (self.clearance, &self.bounds, self.margin_m());
+        let (clearance, bounds, margin_m) = (&self.clearance, &self.bounds, self.margin_m());
         let mut planner = PathPlanner { clearance, bounds, limits: &limits, margin_m };
         let mut outcome = planner.plan(&from, to, &mut self.rng);
         for share in START_SHARES {
@@ -193,7 +193,7 @@ impl ScriptRunner<'_, '_> {
         match outcome {
             Ok(path) => {
                 let asks = self.driver.progress.wants_to_approve();
-                let least = || LeastClearance::along(self.clearance, &self.bounds, &path, planner.margin_m);
+                let least = || LeastClearance::along(&self.clearance, &self.bounds, &path, planner.margin_m);
                 let clearance_m = asks.then(|| least().proven_m);
                 Ok(self.driver.follow_told(&path, clearance_m)? == MotionOutcome::Arrived)
             }
@@ -286,6 +286,9 @@ impl ScriptRunner<'_, '_> {
         let wrong = |error: CalibrationFileError| SessionError::Step { step: 0, problem: error.to_string() };
         let sensors = calibration.sensors(self.setup.robot).map_err(wrong)?;
         self.robot.chain = self.setup.robot.chain.corrected(&calibration.link_corrections());
+        let are_open = Rc::ptr_eq(&self.clearance, &self.jaws.open);
+        self.jaws = Jaws::new(self.setup, &self.robot.chain);
+        self.clearance = Rc::clone(if are_open { &self.jaws.open } else { &self.jaws.at_rest });
         self.bounds = self.kept_clear(self.bounds_of(calibration, &sensors));
         self.locate_held(calibration);
         self.hold_failed();

@@ -170,8 +170,9 @@ impl ScriptRunner<'_, '_> {
 
     /// The way that tells most beside the touches before, among those on which the tip touches first.
     fn slow_way(&mut self, settings: &TouchSettings, radius_m: f64) -> Option<SlowWay> {
-        let clearances =
-            ClearanceModel::for_touch(self.setup.robot, self.setup.vehicle, &self.setup.routine.scene, &settings.part);
+        let setup = self.setup;
+        let clearances = ClearanceModel::for_touch(setup.robot, setup.vehicle, &setup.routine.scene, &settings.part)
+            .map(|clearance| clearance.with_sag(&self.robot.chain));
         let told: Matrix3<f64> = self.touched.iter().map(|normal| normal * normal.transpose()).sum();
         let left = (told + Matrix3::identity() / UNTOLD).try_inverse()?;
         let here = self.driver.set_point();

@@ -72,16 +72,16 @@ impl Chain {
         &self.sag
     }
 
-    /// The farthest that sag may bring any point of the arm from where it would be, m: with every link stretched out
-    /// from each joint.
+    /// The farthest that sag at the near end of each body (base first: of the mount) may bring any point behind it from
+    /// where it would be, m: with every link stretched out from each joint.
     #[must_use]
-    pub fn most_sag_m(&self) -> f64 {
+    pub fn most_sag_m(&self) -> [f64; MAX_JOINTS + 1] {
         let tool = &self.loads.tool;
         let length = |body: usize| match self.joints.get(body) {
             Some(next) => next.parent_from_joint.translation.vector.norm(),
             None => tool.link_from_frame.translation.vector.norm(),
         };
-        let (mut reach_m, mut most_nm, mut weight_n, mut most_m) = (0.0, 0.0, 0.0, 0.0);
+        let (mut reach_m, mut most_nm, mut weight_n, mut most_m) = (0.0, 0.0, 0.0, [0.0; MAX_JOINTS + 1]);
         for body in (0..=self.joints.len()).rev() {
             // Of what hangs behind the body's far end, carried by its near end.
             let load = &self.loads.links[body];
@@ -94,7 +94,7 @@ impl Chain {
                 Some(joint) => self.sag.joint_rad_per_nm[joint].abs(),
                 None => self.sag.mount_rad_per_nm.iter().fold(0.0, |most: f64, by| most.max(by.abs())),
             };
-            most_m += compliance * most_nm * reach_m;
+            most_m[body] = compliance * most_nm * reach_m;
         }
         most_m
     }

@@ -13,7 +13,7 @@ use crate::plan::clearance::pair::Pair;
 use crate::plan::clearance::separation::{Placed, gap_m, separate};
 use crate::plan::clearance::shapes::{LinkShape, StaticShape, pairs, vec3};
 use crate::plan::motion::timing::Timing;
-use armcal_core::kinematics::LinkPoses;
+use armcal_core::kinematics::{Chain, LinkPoses};
 use armcal_core::robot::{MAX_COLLISION_SHAPES, PlacedShape, Robot, StationKeeping, Vehicle, parry_pose};
 use armcal_core::routine::Scene;
 use armcal_core::streams::{JointAngles, MAX_JOINTS};
@@ -63,6 +63,8 @@ pub struct ClearanceModel<'a> {
     pub(crate) is_unlisted: Vec<bool>,
     /// By how much the gripper stands out beyond its shapes, m.
     pub(crate) gripper_growth_m: f64,
+    /// What sag may move, by the body whose near end gives, m ([`Chain::most_sag_m`]).
+    pub(crate) sag_m: [f64; MAX_JOINTS + 1],
     pub(crate) sway: StationBound,
     pub(crate) timing: Timing,
 }
@@ -151,13 +153,30 @@ impl<'a> ClearanceModel<'a> {
         let is_unlisted = |pair: &Pair| matches!(*pair, Pair::Links { outer, inner } if !is_listed(inner, outer));
         let is_unlisted = pairs.iter().map(is_unlisted).collect();
         let timing = Timing::new(robot);
-        Self { robot, moving, standing, has_error, pairs, is_unlisted, gripper_growth_m: 0.0, sway, timing }
+        Self {
+            robot,
+            moving,
+            standing,
+            has_error,
+            pairs,
+            is_unlisted,
+            gripper_growth_m: 0.0,
+            sag_m: [0.0; MAX_JOINTS + 1],
+            sway,
+            timing,
+        }
     }
 
     /// The same with a gripper that stands out by `growth_m` more than its shapes: its jaws are open.
     #[must_use]
     pub fn with_grown_gripper(self, growth_m: f64) -> Self {
         Self { gripper_growth_m: growth_m, ..self }
+    }
+
+    /// The same for an arm that may bend as far as `chain` can: the shapes follow the straight one.
+    #[must_use]
+    pub fn with_sag(self, chain: &Chain) -> Self {
+        Self { sag_m: chain.most_sag_m(), ..self }
     }
 
     /// The same with its jaws as wide open as they go.

@@ -134,7 +134,7 @@ impl ClearanceModel<'_> {
             Pair::Standing { .. } => margin_m,
             Pair::Links { .. } => margin_m - SELF_MARGIN_REDUCTION_M,
         };
-        needed_m.max(TOUCHING_M) + self.growth_m(pair)
+        needed_m.max(TOUCHING_M) + self.taken_m(pair)
     }
 
     /// Whether a pair (by its number) is known to be never so near.
@@ -143,7 +143,16 @@ impl ClearanceModel<'_> {
             && self.robot.self_pairs.as_ref().is_some_and(|stored| distance_m <= stored.near_m - UNSEEN_M)
     }
 
-    /// What open jaws take from the distance of a pair.
+    /// What open jaws and sag take from the distance of a pair. Links bend against each other only between their
+    /// bodies.
+    fn taken_m(&self, pair: Pair) -> f64 {
+        let bodies = match pair {
+            Pair::Standing { moving, .. } => 0..=self.moving[moving].body,
+            Pair::Links { outer, inner } => self.moving[inner].body + 1..=self.moving[outer].body,
+        };
+        self.sag_m[bodies].iter().sum::<f64>() + self.growth_m(pair)
+    }
+
     fn growth_m(&self, pair: Pair) -> f64 {
         let is_gripper = |moving: usize| self.moving[moving].body == self.robot.tool.mount.n_joints;
         let grows = match pair {
@@ -156,7 +165,7 @@ impl ClearanceModel<'_> {
     /// A true distance in the terms of the margin; shapes that touch stay at zero. `sway_m`: what the vehicle's motion
     /// may take from it.
     pub(crate) fn in_margin_m(&self, pair: Pair, distance_m: f64, sway_m: f64) -> f64 {
-        let distance_m = (distance_m - self.growth_m(pair)).max(0.0);
+        let distance_m = (distance_m - self.taken_m(pair)).max(0.0);
         match pair {
             // An obstacle inside the margin for the vehicle's motion is as near as touching.
             Pair::Standing { .. } if self.sways(pair) => (distance_m - sway_m).max(0.0),
@@ -180,5 +189,51 @@ impl ClearanceModel<'_> {
         let (first, second) = self.names(pair);
         let reduction_m = if matches!(pair, Pair::Links { .. }) { SELF_MARGIN_REDUCTION_M } else { 0.0 };
         ClosestPair { distance_m, reduction_m, first, second }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use rand::RngExt;
+
+    use super::*;
+    use armcal_core::kinematics::{LinkCorrections, Sag};
+    use armcal_core::robot::{load, load_vehicle};
+    use armcal_core::routine::Scene;
+    use armcal_core::stats::stream_rng;
+
+    /// No pair of the bent arm is nearer than the straight one's distance less what sag takes; what it takes from two
+    /// links of the forearm is a small part of what it takes from the tool and the vehicle.
+    #[test]
+    fn what_sag_takes_bounds_every_pair_of_the_bent_arm() {
+        let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("robots");
+        let robot = load(&root.join("titan4")).expect("the robot reads");
+        let vehicle = load_vehicle(&root.join("vehicles/work-class-front.toml")).expect("the vehicle reads");
+        let scene = Scene { seafloor_z_m: Some(-2.2), obstacles: Vec::new() };
+        let mut sag = Sag { tool_load_n: 200.0, mount_rad_per_nm: [8e-6; 3], ..Sag::default() };
+        sag.joint_rad_per_nm[..6].fill(1.6e-5);
+        let chain = robot.chain.corrected(&LinkCorrections { sag, ..LinkCorrections::default() });
+        let bent_robot = Robot { chain, ..robot.clone() };
+        let straight = ClearanceModel::new(&robot, &vehicle, &scene).with_sag(&bent_robot.chain);
+        let bent = ClearanceModel::new(&bent_robot, &vehicle, &scene);
+        let (mut rng, mut closed_m, mut compared) = (stream_rng(1, "bent arms"), 0.0_f64, 0);
+        for _ in 0..60 {
+            let angles = JointAngles::from_fn(6, |j| {
+                let sensor = &robot.sensors[j];
+                sensor.center_rad + rng.random_range(-1.0..1.0) * sensor.half_range_rad
+            });
+            for pair in 0..straight.pairs.len() {
+                let of = |model: &ClearanceModel<'_>| model.distance_below(pair, &angles, 1.0, Vec3::ZERO);
+                let (Some(proven), Some(true_m)) = (of(&straight), of(&bent)) else { continue };
+                closed_m = closed_m.max(proven + straight.taken_m(straight.pair(pair)) - true_m);
+                compared += 1;
+                assert!(true_m >= proven - 1e-6, "{:?} at {angles:?}: {true_m}, at least {proven}", bent.pair(pair));
+            }
+        }
+        assert!(compared > 1000 && closed_m > 2e-3, "{compared} pairs, nearer by up to {closed_m} m");
+        let taken_m = |inner: usize, outer: usize| straight.sag_m[inner + 1..=outer].iter().sum::<f64>();
+        assert!(5.0 * taken_m(3, 5) < straight.sag_m.iter().sum(), "{:?}", straight.sag_m);
     }
 }
