@@ -18,8 +18,8 @@ pub enum SimError {
     #[error("{}: joint `{joint}` has effort limit {effort_n_m}; a simulated joint needs one above 0", file.display())]
     NoEffort { file: PathBuf, joint: String, effort_n_m: f64 },
     #[error(
-        "the arm is stowed inside something: {} overlap at stowed_rad. Parts that touch by design belong to \
-         allowed_pairs of robot.toml",
+        "the arm is stowed inside something, or its vehicle is: {} overlap at stowed_rad. Parts of the arm that touch \
+         by design belong to allowed_pairs of robot.toml",
         pairs.join(", ")
     )]
     StowedInside { pairs: Vec<String> },

@@ -31,6 +31,8 @@ pub(super) struct PairGroup {
     pub pairs: Vec<(usize, usize)>,
     /// By what each joint can move the pairs against each other, m/rad; zero for other joints.
     pub levers_m: [f64; MAX_JOINTS],
+    /// From the base's origin, every point of the vehicle; zero where the pairs are of the arm.
+    vehicle_reach_m: f64,
     is_on_ground: bool,
     /// Of the arm against the base or the ground.
     is_on_mount: bool,
@@ -44,15 +46,16 @@ pub(super) struct StepPath {
 }
 
 impl PairMotion {
-    /// From the base's origin and not from the first joint's axis, every point of the arm is within `reach_m`.
+    /// From the base's origin and not from the first joint's axis, every point that is watched is within `reach_m`.
     pub(super) fn new(groups: &[PairGroup], start: &ArmPlace) -> Self {
         let first_m = start.first_place.translation.vector.norm();
+        let reach_m = |group: &PairGroup| (first_m + group.levers_m[0]).max(group.vehicle_reach_m);
         Self {
             at: *start,
             path_rad: [0.0; MAX_JOINTS],
             ground_path_m: 0.0,
             mount_path_m: 0.0,
-            reach_m: first_m + groups.iter().map(|group| group.levers_m[0]).fold(0.0, f64::max),
+            reach_m: groups.iter().map(reach_m).fold(first_m, f64::max),
         }
     }
 
@@ -89,7 +92,7 @@ impl PairMotion {
 }
 
 impl PairGroup {
-    /// Watched pairs of what `inner` carries and the link `outer`; `None` where there is none.
+    /// Watched pairs of what `inner` carries and the body `outer`; `None` where there is none.
     pub(super) fn new(chain: &Chain, solids: &Solids, inner: Carrier, outer: usize) -> Option<Self> {
         let first = if let Carrier::Body(body) = inner { body } else { 0 };
         let pairs = solids.watched_pairs(inner, outer);
@@ -97,7 +100,8 @@ impl PairGroup {
             pairs,
             levers_m: solids.levers_m(chain, first, outer),
             is_on_ground: inner == Carrier::World,
-            is_on_mount: first == 0,
+            vehicle_reach_m: if outer == 0 { solids.extent_m(Carrier::Body(0)) } else { 0.0 },
+            is_on_mount: first == 0 && outer > 0,
         })
     }
 }

@@ -23,6 +23,7 @@ pub(super) struct Solids {
     /// Watched pairs of parts that overlap where the drawings have the arm stowed.
     overlaps: Vec<(usize, usize)>,
     n_bodies: usize,
+    first_obstacle: usize,
 }
 
 #[derive(Clone)]
@@ -75,6 +76,7 @@ impl Solids {
             pairs: PairTable { n_parts: 0, watched: Vec::new() },
             overlaps: Vec::new(),
             n_bodies: robot.bodies.len(),
+            first_obstacle: 0,
         };
         for (body, link) in robot.bodies.iter().enumerate() {
             let part = solids.name(&link.name);
@@ -91,6 +93,7 @@ impl Solids {
             let index = solids.name("seafloor");
             solids.push(index, Carrier::World, &seafloor(z_m), &Isometry3::identity());
         }
+        solids.first_obstacle = solids.names.len();
         for obstacle in &scene.obstacles {
             let index = solids.name(&obstacle.name);
             solids.push(index, Carrier::World, &obstacle.placed, &Isometry3::identity());
@@ -117,21 +120,37 @@ impl Solids {
     /// Watches every link against everything, except neighbours in the chain and what touches by design (the robot's
     /// `allowed_pairs`): what planning keeps apart, too.
     fn watch_pairs(&mut self, robot: &Robot, base_from_world: &Isometry3<f64>) {
-        let n_parts = self.names.len();
+        let (n_bodies, n_parts) = (self.n_bodies, self.names.len());
         self.pairs = PairTable { n_parts, watched: vec![false; n_parts * n_parts] };
         let stowed = BodyPoses::drawn(robot.n_joints(), &robot.chain.link_poses(&robot.stowed));
         self.place(&stowed, base_from_world);
         for a in 1..self.n_bodies {
-            for b in (0..n_parts).filter(|&b| b < a.saturating_sub(1) || b >= self.n_bodies) {
+            for b in (0..n_parts).filter(|&b| b < a.saturating_sub(1) || b >= n_bodies) {
                 let on_ground = self.shapes.iter().any(|s| s.part == b && s.carrier == Carrier::World);
                 if !on_ground && robot.allowed_pairs.has(&self.names[a], &self.names[b]) {
                     continue;
                 }
-                self.pairs.watch(a, b);
-                if self.distance_of_parts(a, b) <= 0.0 {
-                    self.overlaps.push((a, b));
-                }
+                self.watch(a, b);
             }
+        }
+    }
+
+    /// Watches what the vehicle carries against obstacles, too: for one that is not moved as prescribed. The seafloor
+    /// below it is soft ground.
+    pub(super) fn watch_vehicle(&mut self) {
+        let (n_bodies, first_obstacle) = (self.n_bodies, self.first_obstacle);
+        for a in (0..first_obstacle).filter(|&a| !(1..n_bodies).contains(&a)) {
+            let is_carried = self.shapes.iter().any(|s| s.part == a && s.carrier == Carrier::Body(0));
+            for b in (first_obstacle..self.names.len()).filter(|_| is_carried) {
+                self.watch(a, b);
+            }
+        }
+    }
+
+    fn watch(&mut self, a: usize, b: usize) {
+        self.pairs.watch(a, b);
+        if self.distance_of_parts(a, b) <= 0.0 {
+            self.overlaps.push((a, b));
         }
     }
 
@@ -246,7 +265,7 @@ impl Solids {
     }
 
     /// Largest distance of a carrier's shapes from its origin, m.
-    fn extent_m(&self, carrier: Carrier) -> f64 {
+    pub(super) fn extent_m(&self, carrier: Carrier) -> f64 {
         let on_it = self.shapes.iter().filter(|solid| solid.carrier == carrier);
         on_it.map(|solid| solid.carrier_from_shape.translation.length() + solid.radius_m).fold(0.0, f64::max)
     }
@@ -256,8 +275,9 @@ impl Solids {
         let mut nearest: Option<Nearest> = None;
         for (i, a) in self.shapes.iter().enumerate() {
             for (j, b) in self.shapes.iter().enumerate().skip(i + 1) {
+                let links = [a, b].into_iter().filter(|solid| (1..self.n_bodies).contains(&solid.part)).count();
                 let is_own = a.part < self.n_bodies && b.part < self.n_bodies;
-                if is_own || !self.pairs.is_watched(a.part, b.part) {
+                if links == 0 || is_own || !self.pairs.is_watched(a.part, b.part) {
                     continue;
                 }
                 let best = nearest.map_or(f64::INFINITY, |n| n.distance_m);

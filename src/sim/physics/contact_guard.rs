@@ -37,7 +37,7 @@ struct Group {
 impl ContactGuard {
     pub(super) fn new(chain: &Chain, solids: &Solids, start: &ArmPlace) -> Self {
         let inner = |outer: usize| (0..outer).map(Carrier::Body).chain([Carrier::World]);
-        let groups: Vec<PairGroup> = (1..=chain.n_joints())
+        let groups: Vec<PairGroup> = (0..=chain.n_joints())
             .flat_map(|outer| inner(outer).filter_map(move |inner| PairGroup::new(chain, solids, inner, outer)))
             .collect();
         let motion = PairMotion::new(&groups, start);

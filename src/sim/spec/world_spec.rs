@@ -177,7 +177,9 @@ impl WorldSpec {
         self.physics.engine.unwrap_or(by_default)
     }
 
-    fn vehicle_floats(&self) -> bool {
+    /// Whether the vehicle is a body of the equations of motion: it floats free or is parked.
+    #[must_use]
+    pub fn vehicle_floats(&self) -> bool {
         matches!(self.vehicle.motion, MotionKind::Free | MotionKind::Parked)
     }
 

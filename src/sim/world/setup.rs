@@ -8,7 +8,7 @@ use crate::sensors::OilState;
 use crate::sensors::joint::{JointInput, JointSensor};
 use crate::sensors::thermometer::gauge_pressure_pa;
 use crate::solids::Solids;
-use crate::spec::{JointSensorsSpec, MotionKind, WorldSpec};
+use crate::spec::{JointSensorsSpec, WorldSpec};
 use crate::structure::{FlexibleArm, payload};
 use crate::temperatures::Temperatures;
 use crate::truth::TruthHeader;
@@ -71,7 +71,10 @@ pub(super) fn surroundings(spec: &WorldSpec, temperatures: &Temperatures, t_s: f
 /// The scene as it truly is, and the solids in it.
 pub(super) fn scenery(input: &WorldInput) -> Result<(Scene, Solids), SimError> {
     let scene = input.spec.true_scene(input.scene)?;
-    let solids = Solids::new(input.robot, input.vehicle, &scene);
+    let mut solids = Solids::new(input.robot, input.vehicle, &scene);
+    if input.spec.vehicle_floats() {
+        solids.watch_vehicle();
+    }
     let pairs = solids.overlaps();
     if pairs.is_empty() { Ok((scene, solids)) } else { Err(SimError::StowedInside { pairs }) }
 }
@@ -101,8 +104,7 @@ pub(super) fn arm_physics(
 ) -> Result<(ArmPhysics, Option<FreeVehicle>), SimError> {
     let WorldInput { robot, vehicle, spec, seed, .. } = input;
     let mut bodies = bodies(robot, spec);
-    let is_free = matches!(spec.vehicle.motion, MotionKind::Free | MotionKind::Parked);
-    let mut free = is_free.then(|| FreeVehicle::new(vehicle, &spec.vehicle, *seed)).transpose()?;
+    let mut free = spec.vehicle_floats().then(|| FreeVehicle::new(vehicle, &spec.vehicle, *seed)).transpose()?;
     if let Some(free) = &mut free {
         bodies[0] = free.body(vehicle, &spec.water, &chain.link_poses(&angles), &bodies);
         free.put_on_ground(&spec.ground, vehicle, input.scene.seafloor_z_m, &mut bodies[0])?;

@@ -2,9 +2,11 @@
 
 use std::path::Path;
 
-use crate::spec::{EngineKind, WorldSpec};
+use nalgebra::Isometry3;
+
+use crate::spec::{EngineKind, PhysicsSpec, WorldSpec};
 use crate::world::*;
-use armcal_core::robot::{load, load_vehicle};
+use armcal_core::robot::{Part, PlacedShape, Shape, load, load_vehicle};
 use armcal_core::routine::Scene;
 use armcal_core::streams::{Arm, JointAngles, MAX_JOINTS, Message, Sink};
 use armcal_core::time::Stamp;
@@ -18,9 +20,12 @@ fn world(spec: WorldSpec, seed: u64) -> World {
 }
 
 fn world_above(spec: WorldSpec, seed: u64, seafloor_z_m: Option<f64>) -> World {
+    world_in(spec, seed, Scene { seafloor_z_m, ..Scene::default() })
+}
+
+fn world_in(spec: WorldSpec, seed: u64, scene: Scene) -> World {
     let robot = load(&Path::new(ROOT).join("robots/titan4")).expect("the robot reads");
     let vehicle = load_vehicle(&Path::new(ROOT).join("robots/vehicles/work-class-front.toml")).expect("it reads");
-    let scene = Scene { seafloor_z_m, ..Scene::default() };
     World::new(WorldInput { robot: &robot, vehicle: &vehicle, scene: &scene, spec, seed }).expect("a world")
 }
 
@@ -288,4 +293,42 @@ fn a_sinking_vehicle_lands_and_stays() {
     assert!((stays.z + 1.19).abs() < 0.03, "{stays}");
     assert!((stays - landed).norm() < 1e-4, "{landed} {stays}");
     assert!((world.free.as_ref().expect("it is free").ground_load_n() / 800.0 - 1.0).abs() < 0.01);
+}
+
+/// A floating vehicle that is too heavy comes down on a block, on which its skids stand as on springs; without it, it
+/// goes through there.
+#[test]
+fn a_sinking_vehicle_stands_on_an_obstacle() {
+    const WEIGHT_N: f64 = 800.0;
+    // The skids' lower faces are 1.01 m below the origin.
+    let block = |top_m: f64| Part {
+        name: "block".to_owned(),
+        placed: PlacedShape {
+            owner_from_shape: Isometry3::translation(0.0, 0.0, top_m - 0.25),
+            shape: Shape::Box { size_m: [6.0, 6.0, 0.5] },
+            color_rgb: [0; 3],
+        },
+    };
+    let after_60_s = |obstacles: Vec<Part>| {
+        let mut spec = WorldSpec::default();
+        spec.vehicle.motion = crate::spec::MotionKind::Free;
+        spec.vehicle.station_keeping_rad_s = 0.0;
+        spec.ground.vehicle_weight_n = WEIGHT_N;
+        let mut world = world_in(spec, 1, Scene { seafloor_z_m: None, obstacles });
+        drifted(&mut world, 60.0);
+        let mut touching = Vec::new();
+        let name = |part: usize| world.solids.part_name(part);
+        world.physics.for_each_contact(|a, b| touching.push((name(a), name(b))));
+        let touching: Vec<String> = touching.iter().map(|(a, b)| format!("{a} {b}")).collect();
+        (world.base.world_from_vehicle.origin().vector().z, touching)
+    };
+    let (fallen_m, nothing) = after_60_s(Vec::new());
+    assert!(fallen_m < -2.0 && nothing.is_empty(), "{fallen_m} {nothing:?}");
+    let (stands_m, touching) = after_60_s(vec![block(-1.4)]);
+    let sunk_in_m = -0.39 - stands_m;
+    eprintln!("sunk in by {:.2} mm, {touching:?}", 1e3 * sunk_in_m);
+    // Each pair of parts is one spring.
+    let expected_m = WEIGHT_N / (touching.len() as f64 * PhysicsSpec::default().contact_stiffness_n_m);
+    assert!(touching.len() >= 2 && touching.iter().all(|pair| pair.contains("block")), "{touching:?}");
+    assert!((sunk_in_m / expected_m - 1.0).abs() < 0.3, "{sunk_in_m} m, by the springs {expected_m} m");
 }
