@@ -12,7 +12,9 @@ use armcal::stats::quantile;
 use armcal::streams::Arm;
 use nalgebra::Vector3;
 
-use crate::support::{FinishedRun, Nowhere, ShortRoutine, finished, read, root, run, temp, titan, vehicle_file};
+use crate::support::{
+    FinishedRun, Nowhere, ShortRoutine, answer, finished, program, read, root, run, temp, titan, vehicle_file,
+};
 
 /// None left out.
 const SEEDS: std::ops::RangeInclusive<u64> = 1..=5;
@@ -81,6 +83,18 @@ fn an_arm_that_bends_is_calibrated_with_its_sag() {
     for (name, bytes) in read_attachments(&recording).expect("it reads") {
         assert_eq!(told(&bytes), [false; 3], "{name}");
     }
+
+    // The arm that is believed in bends in the replay, too, if its calibration is there to tell.
+    let alone = temp();
+    std::fs::copy(&recording, alone.path().join("run.mcap")).expect("copied");
+    let replayed = |folder: &Path| {
+        let saved = folder.join("replay.rrd");
+        answer(program().arg("replay").arg(folder.join("run.mcap")).arg("--save").arg(&saved)).expect("replay", 0, &[]);
+        std::fs::read(saved).expect("written")
+    };
+    let straight = replayed(alone.path());
+    std::fs::copy(finished.file("calibration.toml"), alone.path().join("calibration.toml")).expect("copied");
+    assert!(replayed(alone.path()) != straight);
 }
 
 /// On the seabed, where most such arms work.

@@ -8,15 +8,17 @@ use clap::Args;
 use crate::cli::exit::{Exit, UsageError};
 use crate::cli::losses::warn_of_losses;
 use crate::output;
-use armcal_belief::calib::surveyed;
+use armcal_belief::calib::{Calibration, Status, surveyed};
+use armcal_core::kinematics::LinkCorrections;
 use armcal_core::log::{Recording, read_attachments, read_recording};
 use armcal_core::robot::{self, Robot, Vehicle};
 use armcal_core::routine::{self, Scene};
+use armcal_core::time::Stamp;
 use armcal_replay::{ReplayInput, open_viewer, write_rrd};
 
 #[derive(Debug, Args)]
 pub(super) struct ReplayArgs {
-    /// The recording (.mcap); a truth.mcap beside it is shown with it
+    /// The recording (.mcap); a truth.mcap beside it is shown with it, and links and sag by a calibration.toml
     recording: PathBuf,
     /// Write this .rrd file instead of opening the viewer
     #[arg(long)]
@@ -31,6 +33,7 @@ pub(super) fn replay(args: &ReplayArgs) -> Result<Exit> {
     let lost = warn_of_losses(&recording);
     let drawings = Drawings::find(args, &recording)?;
     let truth = truth_beside(&args.recording);
+    let believed_links = links_beside(&args.recording, &drawings.robot);
     let truth = (truth != args.recording && truth.is_file()).then_some(truth);
     let input = ReplayInput {
         recording: &recording,
@@ -38,7 +41,7 @@ pub(super) fn replay(args: &ReplayArgs) -> Result<Exit> {
         robot: &drawings.robot,
         vehicle: drawings.vehicle.as_ref(),
         scene: drawings.scene.as_ref(),
-        believed_links: &[],
+        believed_links: &believed_links,
         summary_markdown: None,
     };
     match &args.save {
@@ -65,6 +68,30 @@ fn truth_beside(recording: &Path) -> PathBuf {
         .and_then(|name| name.to_str()?.strip_prefix("run"))
         .filter(|rest| rest.starts_with("-cut-") || *rest == ".mcap.partial");
     recording.with_file_name(format!("truth{}", unfinished.unwrap_or(".mcap")))
+}
+
+/// Links and sag by the accepted calibration beside a recording of the same arm, from its last view on.
+fn links_beside(recording: &Path, robot: &Robot) -> Vec<(Stamp, LinkCorrections)> {
+    let file = recording.with_file_name("calibration.toml");
+    if !file.is_file() {
+        return Vec::new();
+    }
+    // Without its covariance, too: links are in the table.
+    let read = std::fs::read_to_string(&file).map_err(|error| error.to_string());
+    match read.and_then(|text| Calibration::parse(&file, &text).map_err(|error| error.to_string())) {
+        Ok(calibration)
+            if calibration.robot == robot.name
+                && calibration.joint.len() == robot.n_joints()
+                && calibration.status == Status::Accepted =>
+        {
+            vec![(Stamp { nanos: calibration.valid.time_nanos }, calibration.link_corrections())]
+        }
+        Ok(_) => Vec::new(),
+        Err(why) => {
+            eprintln!("warning: the arm is shown as drawn: {why}");
+            Vec::new()
+        }
+    }
 }
 
 /// The arm and its surroundings as drawn, from the recording's own attachments or a robot folder.
