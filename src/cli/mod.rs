@@ -39,6 +39,8 @@ mod study_paper;
 mod study_plan;
 #[cfg(feature = "sim")]
 mod study_poses;
+#[cfg(feature = "sim")]
+mod study_worlds;
 mod tagmap;
 
 pub use command_line::{command, main};

@@ -14,6 +14,7 @@ use crate::cli::study_plan::{
     EdgesArgs, PathsArgs, SelfCollisionArgs, TrackingErrorArgs, edges, paths, self_collision, tracking_error,
 };
 use crate::cli::study_poses::{PosesArgs, poses};
+use crate::cli::study_worlds::{WorldsArgs, worlds};
 use crate::output;
 use armcal_core::optics::CameraModel;
 use armcal_core::stats::quantile;
@@ -49,6 +50,8 @@ enum Study {
     Poses(PosesArgs),
     /// Falsify drawing, survey or a sensor after a capture, and compare the verdict with the truth
     Falsified(FalsifiedArgs),
+    /// Run a routine in worlds drawn from all that `[world]` allows, and look for what must not be
+    Worlds(WorldsArgs),
 }
 
 #[derive(Debug, Args)]
@@ -86,6 +89,7 @@ pub(super) fn study(args: &StudyArgs) -> Result<Exit> {
         Study::TrackingError(args) => tracking_error(args),
         Study::Poses(args) => poses(args),
         Study::Falsified(args) => falsified(args),
+        Study::Worlds(args) => worlds(args),
     }
 }
 

@@ -40,8 +40,8 @@ pub use error::SimError;
 pub use fault::{Fault, ScheduledFault};
 pub use recorded_motion::{RecordedMotion, VehicleKinematics};
 pub use spec::{
-    CameraMode, CameraWorldSpec, ClockSpec, EngineKind, GroundSpec, HydraulicsSpec, ImageSpec, JointSensorsSpec,
-    MotionKind, PhysicsSpec, Points, PortKind, StructureSpec, TagsSpec, TemperatureSpec, UnmodelledObstacles,
-    VehicleMotionSpec, WaterKind, WaterSpec, WorldSpec,
+    CameraMode, CameraWorldSpec, ClockSpec, EngineKind, Figure, GroundSpec, HydraulicsSpec, ImageSpec,
+    JointSensorsSpec, MotionKind, PhysicsSpec, Points, PortKind, StructureSpec, TagsSpec, TemperatureSpec,
+    UnmodelledObstacles, VehicleMotionSpec, WaterKind, WaterSpec, WorldSpec,
 };
 pub use world::{World, WorldInput};

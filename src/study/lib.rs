@@ -6,7 +6,7 @@
 //! tests/oracle/compare_detectors.py runs other detectors on the same images. `paper`: the paper's comparison of
 //! methods, and `sensitivity` its Figures 4 and 7; `poses`: error over poses and the arm's time, by how the poses are
 //! chosen; `charts` draws them. `falsified`: the verdict where drawing, survey or a sensor is wrong. `edges`: certified
-//! edges against brute force; `paths`: planning between random poses.
+//! edges against brute force; `paths`: planning between random poses; `worlds`: closed loops in any world allowed.
 
 mod charts;
 mod edges;
@@ -20,6 +20,7 @@ mod sensitivity;
 mod tables;
 mod tracking_error;
 mod trials;
+mod worlds;
 
 pub use edges::{Edge, EdgeRow, EdgeStudy, edge_study, edges_csv, edges_json, mean_time_under_s, random_edges};
 pub use falsified::{
@@ -34,3 +35,4 @@ pub use sensitivity::{Sensitivity, SensitivityPoint, sensitivity};
 pub use tables::{conditions_csv, report, trials_csv, truth_csv};
 pub use tracking_error::{JointTrackingError, TrackingErrorStudy, tracking_error_study};
 pub use trials::{DetectionStudy, Outcome, StudyError, TagTrial, Watcher, detection_study};
+pub use worlds::{DrawnWorld, drawn_world};

@@ -26,6 +26,7 @@ pub use obstacles::UnmodelledObstacles;
 pub(crate) use physics::CONTROL_PERIOD_S;
 pub use physics::{EngineKind, PhysicsSpec};
 pub use structure::StructureSpec;
+pub use table::Figure;
 pub use temperature::{Points, TemperatureSpec};
 pub use vehicle::{MotionKind, VehicleMotionSpec};
 pub use water::WaterSpec;

@@ -1,5 +1,6 @@
 //! Definition of one table of `[world]`: keys, defaults and allowed ranges.
 
+use std::ops::RangeInclusive;
 use std::path::Path;
 
 use serde::de::DeserializeOwned;
@@ -37,9 +38,32 @@ macro_rules! table {
                 Ok(())
             }
         }
+
+        impl $name {
+            /// Keys of this table with their defaults and allowed ranges.
+            pub(super) fn figures(table: &str) -> Vec<$crate::spec::table::Figure> {
+                let usual = Self::default();
+                vec![$($crate::spec::table::Figure {
+                    key: format!("world.{table}.{}", stringify!($field)),
+                    usual: usual.$field,
+                    range: $range,
+                }),+]
+            }
+        }
     };
 }
 pub(super) use table;
+
+/// A key of `[world]` that holds a number.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Figure {
+    /// As in `--set`.
+    pub key: String,
+    /// Of the standard world.
+    pub usual: f64,
+    /// What is allowed.
+    pub range: RangeInclusive<f64>,
+}
 
 pub(super) trait CheckedTable: DeserializeOwned + Default {
     fn check(&self, file: &Path, table: &str) -> Result<(), FileIssue>;

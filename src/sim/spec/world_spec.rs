@@ -18,7 +18,7 @@ use crate::spec::joint_sensors::JointSensorsSpec;
 use crate::spec::obstacles::UnmodelledObstacles;
 use crate::spec::physics::{CONTROL_PERIOD_S, EngineKind, PhysicsSpec};
 use crate::spec::structure::StructureSpec;
-use crate::spec::table::CheckedTable;
+use crate::spec::table::{CheckedTable, Figure};
 use crate::spec::temperature::TemperatureSpec;
 use crate::spec::vehicle::{MotionKind, VehicleMotionSpec};
 use crate::spec::water::WaterSpec;
@@ -139,6 +139,24 @@ impl WorldSpec {
             self.recorded = Some(Arc::new(RecordedMotion::read(&folder.join(file))?));
         }
         Ok(())
+    }
+
+    /// Numbers of the tables that are numbers throughout: keys, defaults, allowed ranges.
+    #[must_use]
+    pub fn figures() -> Vec<Figure> {
+        [
+            PhysicsSpec::figures("physics"),
+            JointSensorsSpec::figures("joint_sensors"),
+            TemperatureSpec::figures("temperature"),
+            ClockSpec::figures("clock"),
+            CameraWorldSpec::figures("camera"),
+            TagsSpec::figures("tags"),
+            ImageSpec::figures("image"),
+            VehicleMotionSpec::figures("vehicle"),
+            HydraulicsSpec::figures("hydraulics"),
+            GroundSpec::figures("ground"),
+        ]
+        .concat()
     }
 
     /// As TOML, every key written out.

@@ -1,0 +1,265 @@
+//! `armcal study worlds`: closed loops of this program in worlds drawn from all that is allowed.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result};
+use clap::Args;
+use rayon::prelude::*;
+
+use crate::cli::exit::Exit;
+use crate::cli::stdout::say;
+use crate::output;
+use crate::report::RunSummary;
+use armcal_belief::calib::Status;
+use armcal_core::log::read_recording;
+use armcal_core::streams::Message;
+use armcal_study::{DrawnWorld, drawn_world};
+
+/// 99.9 % of the errors whose root mean square is 1, whatever their directions: that of one dimension is the largest.
+const SIGMAS_99_9: f64 = 3.29;
+/// Fewer views than the routines have, for time's sake.
+const SHORT: [&str; 2] = ["capture.poses=14", "capture.held_out=4"];
+/// Looks at a child every so often.
+const LOOK: Duration = Duration::from_millis(20);
+
+#[derive(Debug, Args)]
+pub(super) struct WorldsArgs {
+    /// Folder for rows.csv and report.md
+    #[arg(long, value_name = "DIR", default_value = "recordings/study-worlds")]
+    out: PathBuf,
+    /// Routines, each with its vehicle; may be given several times
+    #[arg(long, value_name = "FILE", default_values = ["routines/titan4-quickstart.toml",
+        "routines/kraft-open-frame.toml", "routines/tight-basket.toml", "routines/under-ice.toml"])]
+    routine: Vec<PathBuf>,
+    /// Arms; may be given several times
+    #[arg(long, value_name = "DIR", default_values = ["robots/titan4", "robots/kraft-predator"])]
+    robot: Vec<PathBuf>,
+    /// Worlds
+    #[arg(long, value_name = "N", default_value_t = 1000, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
+    runs: u64,
+    /// Number of the first
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    first: u64,
+    /// A run that takes longer hangs, s
+    #[arg(long, value_name = "S", default_value_t = 300, value_parser = clap::value_parser!(u64).range(1..=86_400))]
+    timeout: u64,
+    /// Runs at once; all cores if not given. The results do not depend on it
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+}
+
+/// What became of one world.
+struct Row {
+    world: DrawnWorld,
+    ending: String,
+    /// As the program put it.
+    reason: String,
+    summary: Option<RunSummary>,
+    bumps: usize,
+    seconds: f64,
+}
+
+pub(super) fn worlds(args: &WorldsArgs) -> Result<Exit> {
+    output::make_folder(&args.out)?;
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(args.threads.unwrap_or(0).into()).build()?;
+    let numbers: Vec<u64> = (args.first..args.first.saturating_add(args.runs)).collect();
+    let rows: Result<Vec<Row>> = pool.install(|| numbers.par_iter().map(|number| run_one(args, *number)).collect());
+    let rows = rows?;
+    let report = report(&rows);
+    for (name, text) in [("rows.csv", csv(args, &rows)), ("report.md", report.clone())] {
+        let path = args.out.join(name);
+        fs::write(&path, text).with_context(|| format!("{}: cannot be written", path.display()))?;
+    }
+    say(&format!("{report}\nwritten      {}", args.out.display()))?;
+    Ok(if rows.iter().all(|row| row.faults().is_empty()) { Exit::Ok } else { Exit::Refused })
+}
+
+/// A process of its own, so that nothing that it does harms the rest.
+fn run_one(args: &WorldsArgs, number: u64) -> Result<Row> {
+    let world = drawn_world(number, args.robot.len(), args.routine.len());
+    let folder = tempfile::tempdir_in(&args.out).context("no folder for a run can be made")?;
+    let said = folder.path().join("stderr");
+    let mut command = Command::new(std::env::current_exe().context("this program cannot be found")?);
+    command.arg("run").arg(&args.routine[world.routine]).arg("--seed").arg(number.to_string());
+    command.arg("--robot").arg(&args.robot[world.arm]);
+    for setting in SHORT.iter().copied().chain(world.settings.iter().map(String::as_str)) {
+        command.arg("--set").arg(setting);
+    }
+    let out = folder.path().join("run");
+    let stderr = File::create(&said).with_context(|| format!("{}: cannot be written", said.display()))?;
+    let began = Instant::now();
+    let mut child = command
+        .arg("--out")
+        .arg(&out)
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .stderr(stderr)
+        .spawn()
+        .context("this program cannot be started")?;
+    let status = wait(&mut child, Duration::from_secs(args.timeout))?;
+    let seconds = began.elapsed().as_secs_f64();
+    let said = String::from_utf8_lossy(&fs::read(&said).unwrap_or_default()).into_owned();
+    let summary = fs::read_to_string(out.join("summary.json")).ok().and_then(|text| serde_json::from_str(&text).ok());
+    let (ending, reason) = ending(status, &said, summary.as_ref());
+    Ok(Row { world, ending, reason, bumps: bumps_told(&out), summary, seconds })
+}
+
+/// `None` after the time is over; the child is ended then.
+fn wait(child: &mut Child, limit: Duration) -> Result<Option<ExitStatus>> {
+    let began = Instant::now();
+    loop {
+        if let Some(status) = child.try_wait()? {
+            return Ok(Some(status));
+        }
+        if began.elapsed() > limit {
+            child.kill()?;
+            child.wait()?;
+            return Ok(None);
+        }
+        std::thread::sleep(LOOK);
+    }
+}
+
+/// How a run ended, and why, for the table.
+fn ending(status: Option<ExitStatus>, said: &str, summary: Option<&RunSummary>) -> (String, String) {
+    let last = said.lines().rev().find(|line| line.starts_with("error")).unwrap_or_default().to_owned();
+    let Some(status) = status else { return ("hangs".to_owned(), last) };
+    let Some(code) = status.code() else { return (format!("killed: {status}"), last) };
+    if said.contains("panicked") {
+        return (
+            "panics".to_owned(),
+            said.lines().find(|line| line.contains("panicked")).unwrap_or_default().to_owned(),
+        );
+    }
+    match (code, summary) {
+        (0 | 4, Some(summary)) if summary.status == Status::Accepted => {
+            let broken: Vec<&str> = summary.asserts.iter().filter(|a| !a.holds).map(|a| a.key.key()).collect();
+            let ending = if broken.is_empty() { "accepted" } else { "accepted, an assert does not hold" };
+            (ending.to_owned(), broken.join(", "))
+        }
+        (4, Some(summary)) => ("refused".to_owned(), summary.refusal.clone().unwrap_or_default()),
+        (1, _) => ("stopped".to_owned(), last),
+        (2, _) => ("cannot be planned or read".to_owned(), last),
+        _ => (format!("exit code {code}"), last),
+    }
+}
+
+/// Bumps that the log tells of.
+fn bumps_told(out: &Path) -> usize {
+    let Ok(recording) = read_recording(out.join("run.mcap")) else { return 0 };
+    recording.messages.iter().filter(|(_, m)| matches!(m, Message::Log(log) if log.text.starts_with("bump"))).count()
+}
+
+impl Row {
+    fn contacts(&self) -> usize {
+        self.summary.as_ref().and_then(|summary| summary.capture.collisions).unwrap_or(0)
+    }
+
+    /// Of the accepted: the largest error at a target, and the 99.9 % bound of what was predicted there.
+    fn error_and_bound_m(&self) -> Option<(f64, f64)> {
+        let summary = self.summary.as_ref().filter(|summary| summary.status == Status::Accepted)?;
+        let after = summary.score.as_ref()?.after.as_ref()?.tool_error_m?.max;
+        let predicted = summary.calibration.predicted_tool_error_with_priors_m?.max;
+        Some((after, SIGMAS_99_9 * predicted))
+    }
+
+    /// What must not be.
+    fn faults(&self) -> Vec<&'static str> {
+        let mut faults = Vec::new();
+        if ["panics", "hangs"].contains(&self.ending.as_str()) || self.ending.starts_with("killed") {
+            faults.push("does not end by itself");
+        }
+        if self.contacts() > 0 && self.bumps == 0 {
+            faults.push("touches something and does not tell");
+        }
+        let is_good = self.ending.starts_with("accepted");
+        if !is_good && self.reason.is_empty() {
+            faults.push("fails without a reason");
+        }
+        if self.error_and_bound_m().is_some_and(|(error_m, bound_m)| error_m > bound_m) {
+            faults.push("accepted beyond its bound");
+        }
+        faults
+    }
+}
+
+/// Reasons without their numbers, names and files, to be counted.
+fn kind_of(reason: &str) -> String {
+    let reason = reason.rsplit_once(".mcap: ").map_or(reason, |(_, reason)| reason);
+    let reason = reason.rsplit_once(".toml: ").map_or(reason, |(_, reason)| reason);
+    let mut kind = String::new();
+    let mut quoted = false;
+    for c in reason.chars() {
+        match c {
+            '`' => quoted = !quoted,
+            _ if quoted => continue,
+            '0'..='9' if kind.ends_with('#') => continue,
+            '0'..='9' => kind.push('#'),
+            _ => kind.push(c),
+        }
+    }
+    kind.chars().take(110).collect::<String>().replace('|', "/")
+}
+
+fn report(rows: &[Row]) -> String {
+    let mut text = format!("# {} closed loops in worlds drawn from all that is allowed\n\n", rows.len());
+    let mut endings: BTreeMap<(&str, String), Vec<u64>> = BTreeMap::new();
+    for row in rows {
+        endings.entry((&row.ending, kind_of(&row.reason))).or_default().push(row.world.number);
+    }
+    let mut endings: Vec<_> = endings.into_iter().collect();
+    endings.sort_by_key(|(_, numbers)| std::cmp::Reverse(numbers.len()));
+    text.push_str("| runs | ending | reason | first |\n|--:|---|---|--:|\n");
+    for ((ending, reason), numbers) in &endings {
+        let _ = writeln!(text, "| {} | {ending} | {reason} | {} |", numbers.len(), numbers[0]);
+    }
+    let mut faults: BTreeMap<&str, Vec<u64>> = BTreeMap::new();
+    for row in rows {
+        for fault in row.faults() {
+            faults.entry(fault).or_default().push(row.world.number);
+        }
+    }
+    let accepted = rows.iter().filter(|row| row.error_and_bound_m().is_some()).count();
+    let slowest = rows.iter().map(|row| row.seconds).fold(0.0, f64::max);
+    let _ = writeln!(text, "\n{accepted} accepted with a truth to compare; the slowest run took {slowest:.0} s.");
+    for (fault, numbers) in &faults {
+        let _ = writeln!(text, "- {fault}: {} ({numbers:?})", numbers.len());
+    }
+    if faults.is_empty() {
+        text.push_str("Nothing that must not be.\n");
+    }
+    text
+}
+
+fn csv(args: &WorldsArgs, rows: &[Row]) -> String {
+    let mut text =
+        "number,robot,routine,settings,ending,reason,tool_error_max_m,bound_m,contacts,bumps,faults\n".to_owned();
+    let quoted = |field: &str| format!("\"{}\"", field.replace('"', "\"\""));
+    for row in rows {
+        let (robot, routine) = (&args.robot[row.world.arm], &args.routine[row.world.routine]);
+        let [error, bound] = match row.error_and_bound_m() {
+            Some((error_m, bound_m)) => [error_m.to_string(), bound_m.to_string()],
+            None => [String::new(), String::new()],
+        };
+        let fields = [
+            row.world.number.to_string(),
+            quoted(&robot.display().to_string()),
+            quoted(&routine.display().to_string()),
+            quoted(&row.world.settings.join("; ")),
+            quoted(&row.ending),
+            quoted(&row.reason),
+            error,
+            bound,
+            row.contacts().to_string(),
+            row.bumps.to_string(),
+            quoted(&row.faults().join("; ")),
+        ];
+        let _ = writeln!(text, "{}", fields.join(","));
+    }
+    text
+}
