@@ -11,6 +11,7 @@ use crate::campaign::{CampaignSummary, Prepared, Request, Shard, Store, jobs, me
 use crate::cli::batch::{BatchRun, CampaignBar, check_name, exit_of, interrupts, range_of, run_many};
 use crate::cli::exit::{Exit, UsageError};
 use crate::cli::overrides::OverrideArgs;
+use crate::cli::stdout::{note, say};
 use crate::output;
 use crate::run::Keep;
 use armcal_core::routine::SeedRange;
@@ -60,7 +61,7 @@ fn merged(paths: &[PathBuf], out: &Path) -> Result<Exit> {
     let (rows, summary) = merge(paths)?;
     output::make_folder(output::parent(out))?;
     write_results(out, &rows, &summary)?;
-    Ok(show(&summary, out))
+    show(&summary, out)
 }
 
 fn run(args: &CampaignArgs, routine: &Path) -> Result<Exit> {
@@ -77,7 +78,7 @@ fn run(args: &CampaignArgs, routine: &Path) -> Result<Exit> {
     let n_before = store.table().rows.len();
     let jobs = jobs(&prepared, range, args.shard, &store.done());
     if n_before > 0 {
-        eprintln!("{n_before} rows are there already; {} runs are left", jobs.len());
+        note(format_args!("{n_before} rows are there already; {} runs are left", jobs.len()));
     }
     let folder = output::with_suffix(&out, if args.keep { ".runs" } else { ".work" });
     let keep = if args.keep { Keep::Everything } else { Keep::StreamsAlone };
@@ -90,18 +91,17 @@ fn run(args: &CampaignArgs, routine: &Path) -> Result<Exit> {
     bar.finish();
     if !whole? {
         let done = store.table().rows.len();
-        eprintln!("stopped with {done} rows kept; the same command goes on from there");
+        note(format_args!("stopped with {done} rows kept; the same command goes on from there"));
         return Ok(Exit::Failure);
     }
     let (_, summary) = store.finish(&prepared.routine.name)?;
     if !jobs.is_empty() {
-        eprintln!("{} runs in {:.0} s", jobs.len(), started.elapsed().as_secs_f64());
+        note(format_args!("{} runs in {:.0} s", jobs.len(), started.elapsed().as_secs_f64()));
     }
-    Ok(show(&summary, &out))
+    show(&summary, &out)
 }
 
-fn show(summary: &CampaignSummary, out: &Path) -> Exit {
-    print!("{}", table(summary));
-    println!("written      {}", out.display());
-    exit_of(summary)
+fn show(summary: &CampaignSummary, out: &Path) -> Result<Exit> {
+    say(&format!("{}written      {}", table(summary), out.display()))?;
+    Ok(exit_of(summary))
 }

@@ -11,6 +11,7 @@ use crate::campaign::{
 use crate::cli::batch::{BatchRun, CampaignBar, check_name, interrupts, range_of, run_many};
 use crate::cli::exit::{Exit, UsageError};
 use crate::cli::overrides::OverrideArgs;
+use crate::cli::stdout::{note, say};
 use crate::output;
 use crate::run::Keep;
 use armcal_core::routine::SeedRange;
@@ -51,7 +52,7 @@ pub(super) fn regress(args: &RegressArgs) -> Result<Exit> {
         None => jobs(&prepared, range_of(args.seeds, &prepared)?, None, &std::collections::BTreeSet::new()),
     };
     let Some(now) = run(args, &prepared, &jobs)? else {
-        eprintln!("stopped; nothing was compared");
+        note("stopped; nothing was compared");
         return Ok(Exit::Failure);
     };
     if let Some(out) = args.write_baseline.as_ref().or(args.out.as_ref()) {
@@ -59,16 +60,13 @@ pub(super) fn regress(args: &RegressArgs) -> Result<Exit> {
     }
     let Some(baseline) = baseline else {
         let summary = statistics(&now, &prepared.routine.name, &prepared.fingerprint);
-        print!("{}", table(&summary));
-        println!("written      {}", args.write_baseline.as_deref().unwrap_or(&args.routine).display());
+        let out = args.write_baseline.as_deref().unwrap_or(&args.routine);
+        say(&format!("{}written      {}", table(&summary), out.display()))?;
         return Ok(crate::cli::batch::exit_of(&summary));
     };
     let comparison = compare(&baseline, &now, &prepared.routine.regress);
-    println!("{}", regress_table(&comparison));
-    println!(
-        "regress      {}",
-        if comparison.is_worse() { "WORSE than the baseline" } else { "not worse than the baseline" }
-    );
+    let verdict = if comparison.is_worse() { "WORSE than the baseline" } else { "not worse than the baseline" };
+    say(&format!("{}\nregress      {verdict}", regress_table(&comparison)))?;
     Ok(if comparison.is_worse() { Exit::Refused } else { Exit::Ok })
 }
 

@@ -7,6 +7,7 @@ use clap::Args;
 
 use crate::cli::exit::{Exit, UsageError};
 use crate::cli::losses::warn_of_losses;
+use crate::cli::stdout::say;
 use crate::output;
 use armcal_belief::calib::surveyed;
 use armcal_core::log::{Recording, read_attachments, read_recording};
@@ -46,7 +47,7 @@ pub(super) fn replay(args: &ReplayArgs) -> Result<Exit> {
             output::check_replaceable(out)?;
             write_rrd(&input, &output::partial(out))?;
             output::complete(out)?;
-            println!("written      {}", out.display());
+            say(&format!("written      {}", out.display()))?;
         }
         None => {
             let folder = tempfile::tempdir().context("no temporary folder can be made")?.keep();
