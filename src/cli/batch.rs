@@ -12,6 +12,7 @@ use crate::campaign::{
     CampaignError, CampaignSummary, Engine, Job, Prepared, Row, RunStatus, SingleRun, Table, run_job, run_jobs,
 };
 use crate::cli::exit::{Exit, UsageError, of_cause, of_summary};
+use crate::cli::stdout::note;
 use crate::output;
 use crate::report::RunSummary;
 use crate::run::Keep;
@@ -78,10 +79,10 @@ pub(super) fn range_of(asked: Option<SeedRange>, prepared: &Prepared) -> Result<
     Ok(asked.or(prepared.routine.campaign.seeds).ok_or_else(problem)?)
 }
 
-/// Tables are .csv: the other files' names come from it.
+/// Tables are .csv: the other files' names come from it. Tried before hours of work, not after.
 pub(super) fn check_name(out: &Path) -> Result<()> {
     if out.extension().is_some_and(|extension| extension == "csv") {
-        return output::make_folder(output::parent(out)).map_err(Into::into);
+        return output::check_writable(out).map_err(Into::into);
     }
     Err(UsageError(format!("{}: the name of a table must end in .csv", out.display())).into())
 }
@@ -146,6 +147,11 @@ impl CampaignBar {
         let (failed, refused) = (self.failed, self.refused);
         self.bar.set_message(format!("tool error {median} (median), {refused} refused or missed, {failed} failed"));
         self.bar.inc(1);
+    }
+
+    /// A line above the bar, on stderr, whether that is a terminal or not.
+    pub fn say(&self, line: &str) {
+        self.bar.suspend(|| note(line));
     }
 
     pub fn finish(&self) {

@@ -7,7 +7,7 @@ use anyhow::Result;
 use clap::Args;
 
 use crate::campaign::ExistingRows;
-use crate::campaign::{CampaignSummary, Prepared, Request, Shard, Store, jobs, merge, table, write_results};
+use crate::campaign::{CampaignSummary, Origin, Prepared, Request, Shard, Store, jobs, merge, table, write_results};
 use crate::cli::batch::{BatchRun, CampaignBar, check_name, exit_of, interrupts, range_of, run_many};
 use crate::cli::exit::{Exit, UsageError};
 use crate::cli::overrides::OverrideArgs;
@@ -74,7 +74,8 @@ fn run(args: &CampaignArgs, routine: &Path) -> Result<Exit> {
     check_name(&out)?;
     let range = range_of(args.seeds, &prepared)?;
     let existing = if args.fresh { ExistingRows::Discard } else { ExistingRows::Keep };
-    let mut store = Store::open(&out, &prepared.fingerprint, prepared.columns.names(), existing)?;
+    let store = Store::open(&out, &prepared.fingerprint, prepared.columns.names(), existing)?;
+    let mut store = store.of(Origin::of_campaign(&prepared)?);
     let n_before = store.table().rows.len();
     let jobs = jobs(&prepared, range, args.shard, &store.done());
     if n_before > 0 {

@@ -67,6 +67,14 @@ pub(crate) fn check_replaceable(path: &Path) -> Result<(), OutputError> {
     }
 }
 
+/// That `path` can be written: its folder is there, made if need be, and takes files.
+pub(crate) fn check_writable(path: &Path) -> Result<(), OutputError> {
+    let folder = parent(path);
+    make_folder(folder)?;
+    check_replaceable(path)?;
+    NamedTempFile::new_in(folder).map(drop).map_err(OutputError::of(folder, "cannot write into this folder"))
+}
+
 /// The folder that holds `path`.
 pub(crate) fn parent(path: &Path) -> &Path {
     path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))

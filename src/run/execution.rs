@@ -181,7 +181,8 @@ impl Run<'_> {
         summary.asserts = scored.asserts.iter().map(assert_summary).collect();
         summary.capture.poses = outcome.poses;
         summary.capture.poses_skipped = outcome.poses_skipped;
-        summary.capture.targets_skipped = outcome.targets_skipped;
+        summary.capture.targets_skipped = outcome.skipped_targets.len();
+        summary.capture.skipped_targets.clone_from(&outcome.skipped_targets);
         summary.capture.collisions = Some(scored.collisions);
         summary.capture.min_clearance_m = scored.min_clearance_m;
         summary.capture.margins = scored.margins;

@@ -7,7 +7,7 @@ use crate::calib::Calibration;
 use crate::plan::{ClearanceModel, JointErrorBounds, PosePlan};
 use crate::session::inputs::SessionInputs;
 use crate::session::motion::Driver;
-use crate::session::outcome::{AssertResult, Epoch, EstimateUpdate, ReachStep, StillReachable, Visit};
+use crate::session::outcome::{AssertResult, Epoch, EstimateUpdate, ReachStep, SkippedTarget, StillReachable, Visit};
 use armcal_core::robot::Robot;
 use armcal_core::sensor::ArmSensors;
 use armcal_core::streams::JointAngles;
@@ -18,7 +18,7 @@ use armcal_core::time::Stamp;
 pub(crate) struct Tally {
     pub poses: usize,
     pub poses_skipped: usize,
-    pub targets_skipped: usize,
+    pub skipped_targets: Vec<SkippedTarget>,
     pub calibration_wall_s: f64,
 }
 
