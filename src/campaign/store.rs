@@ -54,6 +54,7 @@ impl Store {
     ) -> Result<Self, CampaignError> {
         output::make_folder(output::parent(out))?;
         let partial = output::partial(out);
+        output::refuse_link(&partial)?;
         let file = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(&partial);
         let file = file.map_err(OutputError::of(&partial, "cannot be opened"))?;
         match file.try_lock() {

@@ -1,11 +1,10 @@
 //! What `campaign` and `regress` share: runs on all cores, progress, Ctrl-C.
 
 use std::path::Path;
-use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::campaign::{
@@ -85,18 +84,6 @@ pub(super) fn check_name(out: &Path) -> Result<()> {
         return output::check_writable(out).map_err(Into::into);
     }
     Err(UsageError(format!("{}: the name of a table must end in .csv", out.display())).into())
-}
-
-/// A flag that Ctrl-C or a polite kill sets; the second time the program ends at once.
-pub(super) fn interrupts() -> Result<Arc<AtomicBool>> {
-    let stop = Arc::new(AtomicBool::new(false));
-    for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
-        let code = i32::from(Exit::Failure.code());
-        signal_hook::flag::register_conditional_shutdown(signal, code, Arc::clone(&stop))
-            .and_then(|_| signal_hook::flag::register(signal, Arc::clone(&stop)))
-            .context("Ctrl-C cannot be watched")?;
-    }
-    Ok(stop)
 }
 
 /// A clock alone: nobody watches a single run of many.

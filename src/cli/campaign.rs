@@ -8,8 +8,9 @@ use clap::Args;
 
 use crate::campaign::ExistingRows;
 use crate::campaign::{CampaignSummary, Origin, Prepared, Request, Shard, Store, jobs, merge, table, write_results};
-use crate::cli::batch::{BatchRun, CampaignBar, check_name, exit_of, interrupts, range_of, run_many};
+use crate::cli::batch::{BatchRun, CampaignBar, check_name, exit_of, range_of, run_many};
 use crate::cli::exit::{Exit, UsageError};
+use crate::cli::interrupt::Interrupt;
 use crate::cli::overrides::OverrideArgs;
 use crate::cli::stdout::{note, say};
 use crate::output;
@@ -66,7 +67,7 @@ fn merged(paths: &[PathBuf], out: &Path) -> Result<Exit> {
 
 fn run(args: &CampaignArgs, routine: &Path) -> Result<Exit> {
     let started = Instant::now();
-    let stop = interrupts()?;
+    let stop = Interrupt::install()?;
     let request = Request { routine: routine.to_owned(), overrides: args.overrides.overrides() };
     let prepared = Prepared::load(request)?;
     let out =
@@ -83,7 +84,7 @@ fn run(args: &CampaignArgs, routine: &Path) -> Result<Exit> {
     }
     let folder = output::with_suffix(&out, if args.keep { ".runs" } else { ".work" });
     let keep = if args.keep { Keep::Everything } else { Keep::StreamsAlone };
-    let many = BatchRun { prepared: &prepared, folder: &folder, keep, threads: args.threads, stop: &stop };
+    let many = BatchRun { prepared: &prepared, folder: &folder, keep, threads: args.threads, stop: stop.flag() };
     let mut bar = CampaignBar::new(&prepared, store.table(), jobs.len());
     let whole = run_many(&many, &jobs, &mut |row| {
         bar.add(&row);

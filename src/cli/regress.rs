@@ -10,8 +10,9 @@ use crate::campaign::{
     Comparison, Job, Metric, Prepared, Request, Row, Table, Undecided, Verdict, baseline_text, compare, jobs,
     read_baseline, regress_junit, regress_markdown, regress_table, statistics, table, table_text,
 };
-use crate::cli::batch::{BatchRun, CampaignBar, check_name, interrupts, range_of, run_many};
+use crate::cli::batch::{BatchRun, CampaignBar, check_name, range_of, run_many};
 use crate::cli::exit::{Exit, UsageError};
+use crate::cli::interrupt::Interrupt;
 use crate::cli::overrides::OverrideArgs;
 use crate::cli::stdout::{note, say};
 use crate::output;
@@ -164,10 +165,15 @@ fn jobs_of(baseline: &Table, args: &RegressArgs, prepared: &Prepared) -> Result<
 
 /// The new rows, sorted; `None` when stopped. Nothing is taken over from earlier runs: the program may have changed.
 fn run(args: &RegressArgs, prepared: &Prepared, jobs: &[Job]) -> Result<Option<Table>> {
-    let stop = interrupts()?;
+    let stop = Interrupt::install()?;
     let folder = tempfile::tempdir().context("no temporary folder can be made")?;
-    let many =
-        BatchRun { prepared, folder: folder.path(), keep: Keep::StreamsAlone, threads: args.threads, stop: &stop };
+    let many = BatchRun {
+        prepared,
+        folder: folder.path(),
+        keep: Keep::StreamsAlone,
+        threads: args.threads,
+        stop: stop.flag(),
+    };
     let mut now = Table { names: prepared.columns.names(), rows: Vec::new() };
     let mut bar = CampaignBar::new(prepared, &now, jobs.len());
     let started = Instant::now();

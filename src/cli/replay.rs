@@ -44,9 +44,9 @@ pub(super) fn replay(args: &ReplayArgs) -> Result<Exit> {
     };
     match &args.save {
         Some(out) => {
-            output::check_replaceable(out)?;
-            write_rrd(&input, &output::partial(out))?;
-            output::complete(out)?;
+            let growing = output::Beside::begin(out)?;
+            write_rrd(&input, growing.grows_at())?;
+            growing.put_in_place()?;
             say(&format!("written      {}", out.display()))?;
         }
         None => {

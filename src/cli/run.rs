@@ -53,6 +53,9 @@ pub(super) fn run(args: &RunArgs) -> Result<Exit> {
     };
     bar.finish();
     let finished = result.map_err(explained)?;
+    if let Some(why) = &finished.replay_failure {
+        note(format_args!("warning: there is no replay, all other files are whole: {why}"));
+    }
     say(&format!("{}\nwritten      {}", table(&finished.summary), out.display()))?;
     Ok(of_summary(&finished.summary))
 }

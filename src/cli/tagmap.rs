@@ -65,6 +65,7 @@ impl From<Mode> for MapMode {
 const MAX_REJECTED_SHARE: f64 = 0.2;
 
 pub(super) fn tagmap(args: &TagmapArgs) -> Result<Exit> {
+    args.out.as_deref().map(output::check_writable).transpose()?;
     let (cameras, tags, settings) = match (&args.robot, &args.camera, &args.tags) {
         (Some(folder), ..) => of_robot(&args.recording, &robot::load(folder)?)?,
         (None, Some(camera), Some(tags)) => of_files(camera, tags)?,

@@ -162,6 +162,24 @@ fn overrides_pass_the_checks_of_the_file() {
     answer(&mut check).expect("check", 0, &["17 poses"]);
 }
 
+/// What the machine was at fault for is no row: the same command makes the run again. A limit on the size of files
+/// stands for the full disk.
+#[cfg(unix)]
+#[test]
+fn a_full_disk_is_no_row_and_the_run_is_made_again() {
+    let folder = temp();
+    let mut short = ShortRoutine { poses: 10, held_out: 3, ..ShortRoutine::default() };
+    short.targets_m.truncate(1);
+    let routine = short.write(folder.path());
+    let out = folder.path().join("c.csv");
+    let mut shell = Command::new("sh");
+    shell.arg("-c").arg("ulimit -f 400; exec \"$0\" \"$@\"").arg(env!("CARGO_BIN_EXE_armcal"));
+    shell.arg("campaign").arg(&routine).args(["--seeds", "1"]).arg("--out").arg(&out);
+    answer(&mut shell).expect("full", 1, &["seed 1", "cannot be written", "goes on from there"]);
+    assert!(!read(&folder.path().join("c.csv.partial")).contains("failed") && !out.exists());
+    answer(&mut campaign(&routine, &out, &["--seeds", "1"])).expect("with room", 0, &["1 accepted", "0 failed"]);
+}
+
 /// The gate stands open for the same program, and shuts when the camera or the controller is worse.
 #[test]
 fn a_regression_is_found_and_none_is_found_where_none_is() {
@@ -208,7 +226,7 @@ fn a_baseline_of_something_else_is_refused_and_builds_get_their_files() {
     let told = regress(&["--json", "--junit", &junit, "--markdown", &markdown, "--baseline"]);
     told.expect("itself", 0, &["\"verdict\": \"not_worse\"", "s of the arm's time each: about"]);
     serde_json::from_str::<serde_json::Value>(&told.stdout).expect("JSON alone on stdout");
-    assert!(read(Path::new(&junit)).contains("<testsuites name=\"armcal regress\" tests=\"11\" failures=\"0\""));
+    assert!(read(Path::new(&junit)).contains("tests=\"11\" skipped=\"0\" failures=\"0\" errors=\"0\""));
     assert!(read(Path::new(&markdown)).contains("| tool error"));
 
     let refused = |what: &str, words: &[&str]| {
