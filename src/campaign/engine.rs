@@ -44,7 +44,7 @@ pub fn run_jobs(
         let Ok(mut rows) = rows.lock() else { return };
         let (on_row, result) = &mut *rows;
         if result.is_ok() {
-            *result = row.and_then(|row| on_row(row));
+            *result = row.and_then(on_row);
         }
         if result.is_err() {
             next.store(jobs.len(), Ordering::SeqCst);
