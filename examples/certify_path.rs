@@ -3,6 +3,8 @@
 //! `cargo run --release --example certify_path -- ROBOT_FOLDER VEHICLE_FILE`; without arguments a Titan 4 class arm on
 //! a work-class vehicle. Start and goal are random configurations that are clear themselves.
 
+#![allow(clippy::print_stdout, reason = "a small program, for a terminal")]
+
 use std::env::args;
 use std::error::Error;
 use std::path::{Path, PathBuf};

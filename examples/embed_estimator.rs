@@ -3,6 +3,8 @@
 //! `cargo run --release --example embed_estimator`. The messages come from `recordings/sample/run.mcap`; an application
 //! passes on what its own drivers receive. The estimator reads recorded bytes only, so the messages go to a file first.
 
+#![allow(clippy::print_stdout, reason = "a small program, for a terminal")]
+
 use std::error::Error;
 use std::path::Path;
 

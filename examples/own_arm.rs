@@ -4,6 +4,8 @@
 //! offset. It follows set-points by its own readings and sees the tags with some noise. A driver for hardware sends
 //! set-points to a controller, and hands on the messages that come back.
 
+#![allow(clippy::print_stdout, reason = "a small program, for a terminal")]
+
 use std::error::Error;
 use std::path::Path;
 

@@ -7,10 +7,11 @@ use std::process::Stdio;
 use armcal::calib::Calibration;
 use armcal::log::read_recording;
 use armcal::sim::truth::{Truth, read_truth};
+use armcal::stats::Summary;
 use armcal::streams::{LogLevel, Message};
 use armcal::time::Stamp;
 
-use crate::support::{Answer, ShortRoutine, answer, finished, program, root, temp, write};
+use crate::support::{Answer, FinishedRun, ShortRoutine, answer, finished, program, root, temp, write};
 
 /// A touch that is older than this when it is noticed has been noticed late, s.
 const NOTICED_S: f64 = 1.0;
@@ -48,6 +49,7 @@ fn an_undrawn_rock_is_noticed_left_alone_and_calibrated_around() {
     assert!(truth.contacts.iter().any(|c| c.part_a == "undrawn" || c.part_b == "undrawn"), "{:?}", truth.contacts);
     assert!(!bumps.is_empty());
     assert!(summary.capture.targets_skipped >= 1, "the rock lies in the target");
+    skipped_targets_are_named(&run);
     for (stamp, level, text) in &bumps {
         assert_eq!(*level, LogLevel::Warn);
         let age_s = touched_before_s(&truth, *stamp).expect("something was touched");
@@ -69,6 +71,39 @@ fn an_undrawn_rock_is_noticed_left_alone_and_calibrated_around() {
     // Belief knows nothing of the rock: not in what it was given, only in what it felt.
     let bytes = String::from_utf8_lossy(&run.bytes("run.mcap")).into_owned();
     assert!(!bytes.contains("undrawn"));
+}
+
+/// With the reason in every place where a run is told of; errors before and after are over the same targets.
+fn skipped_targets_are_named(run: &FinishedRun) {
+    let summary = run.summary();
+    let skipped = &summary.capture.skipped_targets;
+    assert_eq!(skipped.len(), summary.capture.targets_skipped);
+    let html = String::from_utf8(run.bytes("report.html")).expect("text");
+    let lines = logged(&run.file("run.mcap"), "a target is left out: ");
+    for one in skipped {
+        assert!(one.target == 3 && one.reason.contains("met something"), "{one}");
+        assert!(html.contains(&one.to_string()) && lines.iter().any(|(.., text)| text.contains(&one.to_string())));
+    }
+    let score = summary.score.expect("a score");
+    let after = score.after.expect("accepted");
+    assert!(!score.compared_targets.contains(&3), "{:?}", score.compared_targets);
+    assert_eq!((score.before.targets, after.targets), (5, 5));
+    let n = |side: Option<Summary>| side.map(|summary| summary.n);
+    assert_eq!(n(score.before.tool_error_m), Some(score.compared_targets.len()));
+    assert_eq!(n(after.tool_error_m), Some(score.compared_targets.len()));
+}
+
+/// "4 of 5" with a target that was skipped is no "all".
+#[test]
+fn limits_of_hits_and_skipped_targets_fail_a_run_that_hits_few() {
+    let folder = temp();
+    let steps = "[[step]]\ndo = \"capture\"\n[[step]]\ndo = \"calibrate\"\n[[step]]\ndo = \"reach\"\n[[step]]\n\
+                 do = \"assert\"\nhits = 5\ntargets_skipped = 0\nposes = 10\nposes_skipped = 9\n";
+    let routine = ShortRoutine { tail: format!("{ROCK}{steps}"), ..ShortRoutine::default() }.write(folder.path());
+    let told = crate::support::run(&routine, &folder.path().join("out"));
+    let words = ["FAILS: step 4, hits 5 against 4", "FAILS: step 4, targets_skipped 0 against 1", "4 of 5"];
+    told.expect("skipped", 4, &words);
+    told.expect("named", 4, &["skipped      step 3, target 3: the arm met something", "holds: step 4, poses 10"]);
 }
 
 /// Ten ordinary runs, among them rough water, worn sensors, a vehicle that floats and a joint that is declared locked.

@@ -3,6 +3,7 @@
 mod campaigns;
 mod inputs;
 mod inspect;
+mod output;
 mod recordings;
 mod situations;
 mod small;

@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::support::{ShortRoutine, answer, finished, program, shared_run, temp};
+use crate::support::{ShortRoutine, answer, finished, program, read, shared_run, temp, write};
 
 /// summary.json without what the wall clock says.
 fn without_wall_time(summary: &[u8]) -> Value {
@@ -17,15 +17,37 @@ fn a_routine_repeats_byte_for_byte_on_one_thread_and_in_another_place() {
     let first = shared_run();
     let folder = temp();
     let out = folder.path().join("again");
+    // The same files, spelled otherwise.
+    let routine = folder.path().join("other.toml");
+    write(&routine, &read(&first.routine).replace("/robots/", "/robots/../robots/./"));
     let mut again = program();
     again.env("RAYON_NUM_THREADS", "1").env("TZ", "Pacific/Chatham").env("LC_ALL", "tr_TR.UTF-8");
     again.current_dir(folder.path());
-    answer(again.arg("run").arg(&first.routine).arg("--out").arg(&out)).expect("again", 0, &["ACCEPTED"]);
-    for name in ["run.mcap", "truth.mcap", "calibration.toml"] {
+    answer(again.arg("run").arg("other.toml").arg("--out").arg(&out)).expect("again", 0, &["ACCEPTED"]);
+    for name in ["run.mcap", "truth.mcap", "run.rrd", "calibration.toml", "calibration.covariance.toml"] {
         assert!(first.bytes(name) == std::fs::read(out.join(name)).expect("written"), "{name} differs");
     }
+    let html = |bytes: Vec<u8>| {
+        let text = String::from_utf8(bytes).expect("text");
+        let (before, time) = text.split_once("<td>time</td>").expect("a line of times");
+        format!("{before}{}", time.split_once("</tr>").expect("its end").1)
+    };
+    assert_eq!(html(first.bytes("report.html")), html(std::fs::read(out.join("report.html")).expect("written")));
+
     let again = std::fs::read(out.join("summary.json")).expect("written");
     assert_eq!(without_wall_time(&first.bytes("summary.json")), without_wall_time(&again));
+}
+
+#[test]
+fn replaying_a_recording_twice_gives_the_same_bytes() {
+    let folder = temp();
+    let [a, b] = ["a.rrd", "b.rrd"].map(|name| {
+        let mut replay = program();
+        replay.arg("replay").arg(shared_run().file("run.mcap")).arg("--save").arg(name).current_dir(folder.path());
+        answer(&mut replay).expect(name, 0, &["written"]);
+        std::fs::read(folder.path().join(name)).expect("written")
+    });
+    assert!(a == b);
 }
 
 #[test]

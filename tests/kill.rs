@@ -3,6 +3,8 @@
 //!
 //! `ARMCAL_KILLS=50` makes the kill study longer than the three kills of every test run.
 
+mod commands;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -277,6 +279,62 @@ fn a_full_disk_is_told_and_costs_nothing_that_was_there() {
             assert!(found.completeness.state != State::Damaged, "limit {limit}: {:?}", found.completeness);
         }
     }
+}
+
+/// The replay is larger than what is recorded: it alone does not fit, and costs nothing else.
+#[cfg(unix)]
+#[test]
+fn a_replay_that_does_not_fit_is_a_warning() {
+    let folder = temp();
+    let tail = "[world.physics]\ntruth_rate_hz = 10.0\n".to_owned();
+    let routine = ShortRoutine { tail, ..quick() }.write(folder.path());
+    let out = folder.path().join("out");
+    let mut shell = Command::new("sh");
+    let line = "ulimit -f 6000; exec \"$0\" run \"$1\" --out \"$2\"";
+    shell.arg("-c").arg(line).arg(env!("CARGO_BIN_EXE_armcal")).arg(&routine).arg(&out);
+    answer(&mut shell).expect("no replay", 0, &["warning: there is no replay", "run.rrd", "ACCEPTED"]);
+    let mut expected: Vec<&str> = RESULTS.into_iter().filter(|name| *name != "run.rrd").collect();
+    expected.sort_unstable();
+    assert_eq!(names(&out), expected);
+    inspect(&out.join("run.mcap")).expect("the recording", 0, &["state        whole"]);
+}
+
+/// As a terminal that is closed does it; a run under `nohup` goes on.
+#[cfg(unix)]
+#[test]
+fn a_hangup_stops_a_run_unless_it_was_started_to_ignore_it() {
+    let folder = temp();
+    let routine = quick().write(folder.path());
+    let out = folder.path().join("out");
+    let mut child = start(&routine, &out);
+    wait_until_it_moves(&mut child, &out.join("run.mcap.partial"));
+    signal(&child, "HUP");
+    let (code, said) = end(child);
+    assert_eq!(code, Some(1), "{said}");
+    check_interrupted(&out.join("run-cut-1.mcap"));
+
+    let out = folder.path().join("nohup");
+    let mut shell = Command::new("sh");
+    shell.arg("-c").arg("trap '' HUP; exec \"$0\" run \"$1\" --out \"$2\"").arg(env!("CARGO_BIN_EXE_armcal"));
+    shell.arg(&routine).arg(&out).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = shell.spawn().expect("the program starts");
+    wait_until_it_moves(&mut child, &out.join("run.mcap.partial"));
+    signal(&child, "HUP");
+    let (code, said) = end(child);
+    assert_eq!(code, Some(0), "{said}");
+}
+
+#[test]
+fn a_folder_that_was_removed_is_named() {
+    let folder = temp();
+    let routine = quick().write(folder.path());
+    let out = folder.path().join("out");
+    let mut child = start(&routine, &out);
+    wait_until_it_moves(&mut child, &out.join("run.mcap.partial"));
+    fs::remove_dir_all(&out).expect("removed");
+    let (code, said) = end(child);
+    assert_eq!(code, Some(1), "{said}");
+    assert!(said.contains("the output folder was removed") && said.contains("out"), "{said}");
 }
 
 #[test]

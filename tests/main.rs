@@ -10,6 +10,8 @@
 //! real arms; `tagmap` maps tags in recordings that the test writes; `touch` feels surveyed plates
 //! with the tool; `repository` reads sources and pages.
 
+#![allow(clippy::print_stderr, reason = "figures of a test, for whoever reads its output")]
+
 mod bumps;
 mod cli;
 mod closed_loop;

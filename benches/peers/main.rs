@@ -3,6 +3,8 @@
 //! `cargo bench --no-default-features --bench peers -- BUILD_FOLDER`. Without the folder of the built C++ programs only
 //! ours runs.
 
+#![allow(clippy::print_stdout, reason = "a small program, for a terminal")]
+
 #[path = "../problems.rs"]
 mod problems;
 mod text;

@@ -28,11 +28,11 @@ const STACK_BYTES: usize = 8 << 20;
 /// says so. `false` when it was stopped before the last job.
 ///
 /// # Errors
-/// What `on_row` says, whereupon no further job begins; [`CampaignError::Threads`].
+/// What `runner` or `on_row` says, whereupon no further job begins; [`CampaignError::Threads`].
 pub fn run_jobs(
     engine: &Engine<'_>,
     jobs: &[Job],
-    runner: &(dyn Fn(&Job) -> Row + Sync),
+    runner: &(dyn Fn(&Job) -> Result<Row, CampaignError> + Sync),
     on_row: &mut (dyn FnMut(Row) -> Result<(), CampaignError> + Send),
 ) -> Result<bool, CampaignError> {
     let pool =
@@ -40,11 +40,11 @@ pub fn run_jobs(
     let next = AtomicUsize::new(0);
     let n_done = AtomicUsize::new(0);
     let rows = Mutex::new((on_row, Ok(())));
-    let give = |row: Row| {
+    let give = |row: Result<Row, CampaignError>| {
         let Ok(mut rows) = rows.lock() else { return };
         let (on_row, result) = &mut *rows;
         if result.is_ok() {
-            *result = on_row(row);
+            *result = row.and_then(on_row);
         }
         if result.is_err() {
             next.store(jobs.len(), Ordering::SeqCst);
@@ -56,7 +56,8 @@ pub fn run_jobs(
         while !engine.stop.load(Ordering::SeqCst) {
             let Some(job) = jobs.get(next.fetch_add(1, Ordering::SeqCst)) else { break };
             // Nothing outlives a broken run but its row: every run builds its own world.
-            give(catch_unwind(AssertUnwindSafe(|| runner(job))).unwrap_or_else(|why| engine.panicked(job, &*why)));
+            let row = catch_unwind(AssertUnwindSafe(|| runner(job)));
+            give(row.unwrap_or_else(|why| Ok(engine.panicked(job, &*why))));
         }
     });
     let (_, result) = rows.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
@@ -98,12 +99,16 @@ pub(super) mod tests {
         Job { setting, settings: format!("s={setting}"), seed, command: format!("armcal run r.toml --seed {seed}") }
     }
 
-    pub fn good(job: &Job) -> Row {
+    pub fn good(job: &Job) -> Result<Row, CampaignError> {
         let figures = vec![Some(job.seed as f64), Some(1.0), None];
-        Row { status: RunStatus::Accepted, exit_code: 0, figures, ..job.failed("", String::new(), 3) }
+        Ok(Row { status: RunStatus::Accepted, exit_code: 0, figures, ..job.failed("", String::new(), 3) })
     }
 
-    fn all(threads: usize, stop: &AtomicBool, runner: &(dyn Fn(&Job) -> Row + Sync)) -> (Vec<Row>, bool) {
+    fn all(
+        threads: usize,
+        stop: &AtomicBool,
+        runner: &(dyn Fn(&Job) -> Result<Row, CampaignError> + Sync),
+    ) -> (Vec<Row>, bool) {
         let jobs: Vec<Job> = (0..40).map(|k| job(k % 2, u64::from(k / 2))).collect();
         let engine = Engine { threads: Some(threads), stop, n_figures: 3, panic_exit_code: 1 };
         let mut rows = Vec::new();

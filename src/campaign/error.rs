@@ -27,6 +27,8 @@ pub enum CampaignError {
     Busy { path: PathBuf },
     #[error("{}: the row of setting {setting}, seed {seed} is not the same in both files", path.display())]
     Conflict { path: PathBuf, setting: u32, seed: u64 },
+    #[error("seed {seed}: {source}; the rows before are kept, and the same command goes on from there")]
+    Machine { seed: u64, source: Box<RunError> },
     #[error("{0}")]
     Usage(String),
     #[error("{0}")]
@@ -43,6 +45,14 @@ impl CampaignError {
     /// Whether the user's input is at fault, not the machine. [`Self::Input`] leaves that to its source.
     #[must_use]
     pub fn is_invalid_input(&self) -> bool {
-        !matches!(self, Self::Output(_) | Self::Input(_) | Self::Parquet { .. } | Self::Json(_) | Self::Threads(_))
+        !matches!(
+            self,
+            Self::Output(_)
+                | Self::Machine { .. }
+                | Self::Input(_)
+                | Self::Parquet { .. }
+                | Self::Json(_)
+                | Self::Threads(_)
+        )
     }
 }

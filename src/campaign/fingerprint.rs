@@ -33,7 +33,7 @@ pub fn fingerprint(effective: &Table, settings: &[RunInputs]) -> Result<String, 
 }
 
 /// Places of files are left out, for their contents count.
-fn without_seeds(effective: &Table) -> Table {
+pub(super) fn without_seeds(effective: &Table) -> Table {
     let mut table = effective.clone();
     for key in ["seed", "regress", "robot", "vehicle"] {
         table.remove(key);

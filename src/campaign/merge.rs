@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use crate::campaign::store::read_summary;
-use crate::campaign::{CampaignError, CampaignSummary, Row, Table, read_table, statistics};
+use crate::campaign::{CampaignError, CampaignSummary, Origin, Row, Table, read_table, statistics};
 
 /// Puts tables of one campaign together. A row that is in several must be the same in all.
 ///
@@ -13,7 +13,7 @@ use crate::campaign::{CampaignError, CampaignSummary, Row, Table, read_table, st
 pub fn merge(paths: &[PathBuf]) -> Result<(Table, CampaignSummary), CampaignError> {
     let mut rows: BTreeMap<(u32, u64), Row> = BTreeMap::new();
     let mut names: Option<Vec<String>> = None;
-    let mut of: Option<(String, String)> = None;
+    let mut of: Option<(String, String, Option<Origin>)> = None;
     for path in paths {
         let table = read_table(path)?;
         let problem = |problem: &str| CampaignError::Table { path: path.clone(), problem: problem.to_owned() };
@@ -21,7 +21,7 @@ pub fn merge(paths: &[PathBuf]) -> Result<(Table, CampaignSummary), CampaignErro
             return Err(problem("has other columns than the first table"));
         }
         if let Some(summary) = read_summary(path)? {
-            let its = (summary.routine, summary.fingerprint);
+            let its = (summary.routine, summary.fingerprint, summary.origin);
             if of.get_or_insert_with(|| its.clone()) != &its {
                 return Err(problem("is of another campaign than the tables before it, by the summaries beside them"));
             }
@@ -35,8 +35,8 @@ pub fn merge(paths: &[PathBuf]) -> Result<(Table, CampaignSummary), CampaignErro
         }
     }
     let table = Table { names: names.unwrap_or_default(), rows: rows.into_values().collect() };
-    let (routine, fingerprint) = of.unwrap_or_default();
-    let summary = statistics(&table, &routine, &fingerprint);
+    let (routine, fingerprint, origin) = of.unwrap_or_default();
+    let summary = CampaignSummary { origin, ..statistics(&table, &routine, &fingerprint) };
     Ok((table, summary))
 }
 

@@ -102,6 +102,20 @@ metrics! {
 }
 
 impl Metric {
+    /// What `armcal regress` looks at.
+    pub const COMPARED: &[Self] = &[
+        Self::Contacts,
+        Self::HitsAfter,
+        Self::TargetsSkipped,
+        Self::Poses,
+        Self::ToolErrorAfterMedian,
+        Self::ReachErrorAfterMedian,
+        Self::ResidualRmsPx,
+        Self::HeldOutRms,
+        Self::CornerScatterPx,
+        Self::SimulatedTime,
+    ];
+
     /// As tables and summaries name it.
     #[must_use]
     pub const fn name(self) -> &'static str {

@@ -5,6 +5,7 @@
 //! compares rows with those of a baseline, pair by pair. Rows hold no wall time: files do not depend on the number of
 //! threads, nor on how often a campaign was broken off. Exit codes come in from the command line.
 
+mod baseline;
 mod columns;
 mod engine;
 mod error;
@@ -13,8 +14,10 @@ mod jobs;
 mod matrix;
 mod merge;
 mod metric;
+mod origin;
 mod parquet_file;
 mod regress;
+mod regress_report;
 mod row;
 mod shard;
 mod single;
@@ -23,6 +26,7 @@ mod store;
 mod table_file;
 mod tables;
 
+pub use baseline::{baseline_text, read_baseline};
 pub use columns::Columns;
 pub use engine::{Engine, run_jobs};
 pub use error::CampaignError;
@@ -31,11 +35,14 @@ pub use jobs::{Job, Prepared, Request, jobs};
 pub use matrix::{Setting, settings};
 pub use merge::merge;
 pub use metric::{Metric, Worsening};
-pub use regress::{Comparison, compare, regress_table};
+pub use origin::Origin;
+pub use regress::{Comparison, Verdict, compare};
+pub use regress_report::{Undecided, regress_junit, regress_markdown, regress_table};
 pub use row::{Row, RunStatus};
 pub use shard::Shard;
 pub use single::{SingleRun, run_job};
 pub use statistics::{CampaignSummary, FigureStatistics, SettingStatistics, statistics};
 pub use store::{ExistingRows, Store, write_results};
+pub(crate) use table_file::parse_table;
 pub use table_file::{Table, read_table, table_text};
 pub use tables::{markdown, table};

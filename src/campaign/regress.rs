@@ -3,47 +3,58 @@
 //! A pair shares its world, so that what differs is the program or the setting under test, not luck with a seed. The
 //! median of new over baseline is too much when it reaches the budget AND the ratios lie above 1 beyond doubt: the
 //! lower end of the bootstrap's interval (one-sided 95 %) is above 1. Noise alone moves ratios both ways and fails the
-//! second condition in one case of twenty at most; a worsening of the budget's size in all pairs meets both.
+//! second condition in one case of twenty at most; a worsening of the budget's size in all pairs meets both. An
+//! interval that holds both 1 and the budget decides nothing, and is said to be inconclusive.
 
-use comfy_table::Table as Grid;
-use comfy_table::presets::UTF8_FULL_CONDENSED;
+use serde::Serialize;
 
 use crate::campaign::{Metric, Row, RunStatus, Table};
 use armcal_core::routine::RegressSettings;
-use armcal_core::stats::{median_interval, quantile};
+use armcal_core::stats::{Interval, median_interval, quantile};
+use armcal_core::units::Unit;
 
 /// What came out of a comparison.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Comparison {
+    pub version: u32,
+    pub verdict: Verdict,
     pub pairs: usize,
-    pub checks: Vec<Check>,
     /// Every figure of every pair is the same.
     pub identical: bool,
+    pub checks: Vec<Check>,
     /// The repeat commands of the worst pairs of the checks that failed, each once.
     pub worst: Vec<WorstPair>,
 }
 
-impl Comparison {
-    #[must_use]
-    pub fn is_worse(&self) -> bool {
-        self.checks.iter().any(|check| check.worse)
-    }
+/// How a check came out; of several the last one of this list counts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    NotWorse,
+    /// The pairs fit both no change and more than the budget.
+    Inconclusive,
+    Worse,
 }
 
 /// One thing that was compared.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Check {
     pub what: &'static str,
     /// Pairs with the figure on both sides.
     pub n: usize,
-    pub value: String,
-    pub certainty: String,
-    pub budget: String,
-    pub worse: bool,
+    #[serde(skip)]
+    pub unit: Unit,
+    /// Median of ratios or of new figures; or the number of pairs that are worse.
+    pub value: Option<f64>,
+    /// 90 % interval of the median.
+    pub low: Option<f64>,
+    pub high: Option<f64>,
+    pub budget: f64,
+    pub verdict: Verdict,
 }
 
 /// A pair to look at.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct WorstPair {
     pub what: &'static str,
     pub seed: u64,
@@ -72,7 +83,10 @@ pub fn compare(baseline: &Table, now: &Table, budgets: &RegressSettings) -> Comp
         now.rows.iter().filter_map(|row| Some(Pair { baseline: partner(&row)?, now: row })).collect();
     let mut judge = Judge { baseline, now, pairs: &pairs, checks: Vec::new(), worst: Vec::new() };
     judge.endings();
-    judge.contacts();
+    judge.count("contacts, new", Metric::Contacts, |was, is| is > 0.0 && was == 0.0);
+    judge.count("targets skipped, more", Metric::TargetsSkipped, |was, is| is > was);
+    judge.count("targets hit, fewer", Metric::HitsAfter, |was, is| is < was);
+    judge.ratio("poses, baseline over new", Metric::Poses, budgets.poses_ratio);
     judge.ratio("tool error", Metric::ToolErrorAfterMedian, budgets.tool_error_ratio);
     judge.ratio("miss at the target", Metric::ReachErrorAfterMedian, budgets.reach_error_ratio);
     judge.ratio("residual", Metric::ResidualRmsPx, budgets.residual_ratio);
@@ -82,7 +96,8 @@ pub fn compare(baseline: &Table, now: &Table, budgets: &RegressSettings) -> Comp
     judge.limit("tool error, itself", Metric::ToolErrorAfterMedian, budgets.tool_error_m);
     judge.limit("miss, itself", Metric::ReachErrorAfterMedian, budgets.reach_error_m);
     let identical = baseline.names == now.names && pairs.iter().all(|p| p.baseline.figures == p.now.figures);
-    Comparison { pairs: pairs.len(), checks: judge.checks, worst: judge.worst, identical }
+    let verdict = judge.checks.iter().map(|check| check.verdict).max().unwrap_or(Verdict::Inconclusive);
+    Comparison { version: 1, verdict, pairs: pairs.len(), identical, checks: judge.checks, worst: judge.worst }
 }
 
 struct Judge<'a> {
@@ -93,7 +108,23 @@ struct Judge<'a> {
     worst: Vec<WorstPair>,
 }
 
-impl Judge<'_> {
+/// A figure of a pair, in the baseline and now.
+struct Figures<'a> {
+    pair: &'a Pair<'a>,
+    was: Option<f64>,
+    is: Option<f64>,
+}
+
+impl<'a> Judge<'a> {
+    fn figures(&self, metric: Metric) -> Vec<Figures<'a>> {
+        let figures = |pair| Figures { pair, was: self.was(pair, metric), is: figure(self.now, pair.now, metric) };
+        self.pairs.iter().map(figures).collect()
+    }
+
+    fn was(&self, pair: &Pair<'_>, metric: Metric) -> Option<f64> {
+        figure(self.baseline, pair.baseline, metric)
+    }
+
     /// Any run that ended worse than its partner.
     fn endings(&mut self) {
         let rank = |status| match status {
@@ -110,20 +141,21 @@ impl Judge<'_> {
         self.any("missed, refused or failed, new", self.pairs.len(), found);
     }
 
-    /// Any contact in a run that had none.
-    fn contacts(&mut self) {
-        let touched = |pair: &Pair<'_>| {
-            let was = figure(self.baseline, pair.baseline, Metric::Contacts);
-            let is = figure(self.now, pair.now, Metric::Contacts).filter(|n| *n > 0.0)?;
-            was.is_none_or(|n| n == 0.0).then(|| format!("{is:.0} contacts, had none"))
+    /// Any run with a count that `is_worse` than its partner's; a run that has none, though its partner has, counts 0.
+    fn count(&mut self, what: &'static str, metric: Metric, is_worse: fn(f64, f64) -> bool) {
+        let figures = self.figures(metric);
+        let detail = |one: &Figures<'a>| {
+            let (was, is) = (one.was.unwrap_or(0.0), one.is.unwrap_or(0.0));
+            is_worse(was, is).then(|| (one.pair, format!("{is:.0}, was {was:.0}")))
         };
-        let found: Vec<_> = self.pairs.iter().filter_map(|pair| Some((pair, touched(pair)?))).collect();
-        self.any("contacts, new", self.pairs.len(), found);
+        let found: Vec<_> = figures.iter().filter_map(detail).collect();
+        self.any(what, figures.len(), found);
     }
 
     fn any(&mut self, what: &'static str, n: usize, found: Vec<(&Pair<'_>, String)>) {
-        let (value, worse) = (found.len().to_string(), !found.is_empty());
-        self.checks.push(Check { what, n, value, certainty: String::new(), budget: "0".to_owned(), worse });
+        let verdict = if found.is_empty() { Verdict::NotWorse } else { Verdict::Worse };
+        let value = Some(found.len() as f64);
+        self.checks.push(Check { what, n, unit: Unit::Count, value, low: None, high: None, budget: 0.0, verdict });
         self.name_worst(what, found);
     }
 
@@ -137,54 +169,75 @@ impl Judge<'_> {
         }));
     }
 
-    /// New over baseline.
+    /// New over baseline; of poses, of which fewer is worse, baseline over new.
     fn ratio(&mut self, what: &'static str, metric: Metric, budget: f64) {
-        let mut ratios: Vec<(&Pair<'_>, f64)> = self
-            .pairs
-            .iter()
-            .filter_map(|pair| {
-                Some((pair, ratio(figure(self.baseline, pair.baseline, metric)?, figure(self.now, pair.now, metric)?)))
-            })
-            .collect();
-        let values: Vec<f64> = ratios.iter().map(|(_, ratio)| *ratio).collect();
-        let (median, interval) = (quantile(&values, 0.5), median_interval(&values, COVERAGE));
-        let worse = median.is_some_and(|median| median >= budget * (1.0 - ROUNDING))
-            && interval.is_some_and(|interval| interval.low > 1.0);
-        self.checks.push(Check {
-            what,
-            n: values.len(),
-            value: median.map_or_else(|| "-".to_owned(), |median| format!("x {median:.3}")),
-            certainty: interval.map_or_else(String::new, |i| format!("{:.3} .. {:.3}", i.low, i.high)),
-            budget: format!("below x {budget:.3}"),
-            worse,
-        });
-        if worse {
-            ratios.sort_by(|a, b| b.1.total_cmp(&a.1));
-            self.name_worst(what, ratios.into_iter().map(|(pair, ratio)| (pair, format!("x {ratio:.3}"))).collect());
-        }
+        let figures = self.figures(metric);
+        let of = |one: &Figures<'a>| match metric {
+            Metric::Poses => Some((one.pair, ratio(one.is?, one.was?))),
+            _ => Some((one.pair, ratio(one.was?, one.is?))),
+        };
+        let ratios: Vec<(&Pair<'_>, f64)> = figures.iter().filter_map(of).collect();
+        let are_lost = ratios.is_empty() && figures.iter().any(|one| one.was.is_some());
+        let reaches = |value: f64| value >= budget * (1.0 - ROUNDING);
+        let judged = |median: f64, interval: Interval| match () {
+            () if reaches(median) && interval.low > 1.0 => Verdict::Worse,
+            () if reaches(interval.high) && interval.low <= 1.0 => Verdict::Inconclusive,
+            () => Verdict::NotWorse,
+        };
+        let without = if are_lost { Verdict::Inconclusive } else { Verdict::NotWorse };
+        let check = Check { what, n: ratios.len(), unit: Unit::Ratio, budget, ..Check::without(without) };
+        self.median(check, ratios, judged);
     }
 
     /// The new figure itself.
     fn limit(&mut self, what: &'static str, metric: Metric, budget: Option<f64>) {
         let Some(budget) = budget else { return };
-        let unit = metric.unit();
-        let mut found: Vec<(&Pair<'_>, f64)> =
-            self.pairs.iter().filter_map(|pair| Some((pair, figure(self.now, pair.now, metric)?))).collect();
+        let found: Vec<(&Pair<'_>, f64)> =
+            self.figures(metric).into_iter().filter_map(|one| Some((one.pair, one.is?))).collect();
+        let judged = |median, _| if median > budget { Verdict::Worse } else { Verdict::NotWorse };
+        let check =
+            Check { what, n: found.len(), unit: metric.unit(), budget, ..Check::without(Verdict::Inconclusive) };
+        self.median(check, found, judged);
+    }
+
+    /// Judges the median of `found` and its interval; `check` holds where nothing was found.
+    fn median(
+        &mut self,
+        mut check: Check,
+        mut found: Vec<(&Pair<'_>, f64)>,
+        judged: impl Fn(f64, Interval) -> Verdict,
+    ) {
         let values: Vec<f64> = found.iter().map(|(_, value)| *value).collect();
-        let (median, interval) = (quantile(&values, 0.5), median_interval(&values, COVERAGE));
-        let worse = median.is_some_and(|median| median > budget);
-        self.checks.push(Check {
-            what,
-            n: values.len(),
-            value: unit.shown_if(median, 2),
-            certainty: interval
-                .map_or_else(String::new, |i| format!("{} .. {}", unit.number(i.low, 2), unit.number(i.high, 2))),
-            budget: unit.shown(budget, 2),
-            worse,
-        });
-        if worse {
+        if let (Some(median), Some(interval)) = (quantile(&values, 0.5), median_interval(&values, COVERAGE)) {
+            check = Check {
+                value: Some(median),
+                low: Some(interval.low),
+                high: Some(interval.high),
+                verdict: judged(median, interval),
+                ..check
+            };
+        }
+        if check.verdict == Verdict::Worse {
             found.sort_by(|a, b| b.1.total_cmp(&a.1));
-            self.name_worst(what, found.into_iter().map(|(pair, value)| (pair, unit.shown(value, 2))).collect());
+            let named = found.into_iter().map(|(pair, value)| (pair, check.shown(value))).collect();
+            self.name_worst(check.what, named);
+        }
+        self.checks.push(check);
+    }
+}
+
+impl Check {
+    /// Of no figures at all.
+    fn without(verdict: Verdict) -> Self {
+        Self { what: "", n: 0, unit: Unit::None, value: None, low: None, high: None, budget: 0.0, verdict }
+    }
+
+    /// A value of this check, as people read it.
+    pub(super) fn shown(&self, value: f64) -> String {
+        match self.unit {
+            Unit::Ratio => format!("x {value:.3}"),
+            Unit::Count => format!("{value:.0}"),
+            unit => unit.shown(value, 2),
         }
     }
 }
@@ -198,34 +251,10 @@ fn ratio(was: f64, is: f64) -> f64 {
     if was == is { 1.0 } else { is / was }
 }
 
-/// Lays a comparison out for a terminal.
-#[must_use]
-pub fn regress_table(comparison: &Comparison) -> String {
-    let mut grid = Grid::new();
-    grid.load_preset(UTF8_FULL_CONDENSED);
-    grid.set_header(["new over baseline, by seed", "pairs", "median", "90 % interval", "budget", ""]);
-    for check in &comparison.checks {
-        let verdict = match (check.worse, check.n) {
-            (true, _) => "WORSE",
-            (false, 0) => "no pairs",
-            (false, _) => "ok",
-        };
-        grid.add_row([check.what, &check.n.to_string(), &check.value, &check.certainty, &check.budget, verdict]);
-    }
-    let mut text = grid.to_string();
-    if comparison.identical && comparison.pairs > 0 {
-        text.push_str("\nevery figure of every run is the same as in the baseline");
-    }
-    for pair in &comparison.worst {
-        let setting = if pair.settings.is_empty() { String::new() } else { format!(" ({})", pair.settings) };
-        text.push_str(&format!("\n{}: seed {}{setting}: {}\n  {}", pair.what, pair.seed, pair.detail, pair.command));
-    }
-    text
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::campaign::regress_report::regress_table;
     use crate::campaign::table_file::tests::row;
     use armcal_core::stats::stream_rng;
     use rand_distr::{Distribution, LogNormal};
@@ -237,14 +266,14 @@ mod tests {
     }
 
     fn is_worse(baseline: &Table, now: &Table) -> bool {
-        compare(baseline, now, &RegressSettings::default()).is_worse()
+        compare(baseline, now, &RegressSettings::default()).verdict == Verdict::Worse
     }
 
     #[test]
     fn a_table_against_itself_is_the_same() {
         let base = table([0.004, 0.005, 0.006]);
         let comparison = compare(&base, &base, &RegressSettings::default());
-        assert!(comparison.identical && !comparison.is_worse() && comparison.pairs == 3);
+        assert!(comparison.identical && comparison.verdict == Verdict::NotWorse && comparison.pairs == 3);
         assert!(regress_table(&comparison).contains("x 1.000"));
         assert!(regress_table(&comparison).contains("is the same"));
     }
@@ -293,7 +322,7 @@ mod tests {
             ..failed.rows[1].clone()
         };
         let comparison = compare(&base, &failed, &RegressSettings::default());
-        assert!(comparison.is_worse());
+        assert_eq!(comparison.verdict, Verdict::Worse);
         assert_eq!(comparison.worst[0].seed, 2);
         assert!(regress_table(&comparison).contains("--seed 2"), "{comparison:?}");
         assert!(!is_worse(&failed, &failed) && !is_worse(&failed, &base));
@@ -303,11 +332,45 @@ mod tests {
         assert!(!is_worse(&touched, &touched) && !is_worse(&touched, &base));
     }
 
+    /// "4 of 4" after "0 of 3" with a skipped target, or hits that are lost, passed once.
+    #[test]
+    fn lost_hits_skipped_targets_and_fewer_poses_are_worse() {
+        let names = [Metric::HitsAfter, Metric::TargetsSkipped, Metric::Poses].map(|metric| metric.name().to_owned());
+        let table = |figures: [f64; 3]| {
+            let rows = (1..=5).map(|seed| Row { figures: figures.map(Some).to_vec(), ..row(0, seed) });
+            Table { names: names.to_vec(), rows: rows.collect() }
+        };
+        let base = table([4.0, 0.0, 14.0]);
+        for worse in [[3.0, 0.0, 14.0], [4.0, 1.0, 14.0], [4.0, 0.0, 12.0]] {
+            assert!(is_worse(&base, &table(worse)), "{worse:?}");
+            assert!(!is_worse(&table(worse), &base), "{worse:?}");
+        }
+        assert!(!is_worse(&base, &table([4.0, 0.0, 13.0])), "one pose of 14 is within the budget");
+        let mut none = base.clone();
+        none.rows[2].figures[0] = None;
+        assert!(is_worse(&base, &none), "no reach under a calibration hits nothing");
+    }
+
+    #[test]
+    fn an_interval_that_holds_no_change_and_too_much_decides_nothing() {
+        let base = table([0.004; 6]);
+        let verdict = |factors: [f64; 6]| {
+            compare(&base, &table(factors.map(|factor| 0.004 * factor)), &RegressSettings::default()).verdict
+        };
+        assert_eq!(verdict([0.8, 0.9, 1.0, 1.05, 1.3, 1.4]), Verdict::Inconclusive);
+        assert_eq!(verdict([0.97, 0.98, 0.99, 1.01, 1.02, 1.03]), Verdict::NotWorse);
+        assert_eq!(verdict([0.5, 0.6, 0.7, 0.8, 0.9, 0.95]), Verdict::NotWorse);
+        assert_eq!(verdict([1.2, 1.25, 1.3, 1.35, 1.4, 1.45]), Verdict::Worse);
+        let mut lost = base.clone();
+        lost.rows.iter_mut().for_each(|row| row.figures[0] = None);
+        assert_eq!(compare(&base, &lost, &RegressSettings::default()).verdict, Verdict::Inconclusive);
+    }
+
     #[test]
     fn a_limit_judges_the_new_figure_itself() {
         let base = table([0.004, 0.005, 0.006]);
         let budgets = |m| RegressSettings { tool_error_m: Some(m), ..RegressSettings::default() };
-        assert!(!compare(&base, &base, &budgets(0.0051)).is_worse());
-        assert!(compare(&base, &base, &budgets(0.0049)).is_worse());
+        assert!(compare(&base, &base, &budgets(0.0051)).verdict == Verdict::NotWorse);
+        assert!(compare(&base, &base, &budgets(0.0049)).verdict == Verdict::Worse);
     }
 }

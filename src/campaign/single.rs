@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::campaign::row::one_line;
-use crate::campaign::{Job, Prepared, Row, RunStatus};
+use crate::campaign::{CampaignError, Job, Prepared, Row, RunStatus};
 use crate::output::OutputFolder;
 use crate::report::RunSummary;
 use crate::run::{Failure, Finished, Keep, RunError, RunInputs, execute};
@@ -21,12 +21,16 @@ pub struct SingleRun<'a> {
     pub exit_code: &'a (dyn Fn(Result<&RunSummary, &RunError>) -> u8 + Sync),
 }
 
-/// Runs a job. Whatever happens is in the row.
-pub fn run_job(run: &SingleRun<'_>, job: &Job, progress: &mut dyn Progress) -> Row {
+/// Runs a job. Whatever happens to the arm is in the row.
+///
+/// # Errors
+/// [`CampaignError::Machine`] where the machine was at fault, such as a full disk: that is no row, for the next try may
+/// go well.
+pub fn run_job(run: &SingleRun<'_>, job: &Job, progress: &mut dyn Progress) -> Result<Row, CampaignError> {
     let folder = run.folder.join(format!("{}-{}", job.setting, job.seed));
     let n_figures = run.prepared.columns.names().len();
     let Some(inputs) = run.prepared.inputs.get(job.setting as usize) else {
-        return job.failed("input", format!("there is no setting {}", job.setting), n_figures);
+        return Ok(job.failed("input", format!("there is no setting {}", job.setting), n_figures));
     };
     let result = in_folder(inputs, job, &folder, run.keep, progress);
     if run.keep == Keep::StreamsAlone {
@@ -34,11 +38,16 @@ pub fn run_job(run: &SingleRun<'_>, job: &Job, progress: &mut dyn Progress) -> R
         let _ = std::fs::remove_dir_all(&folder);
     }
     match result {
-        Ok(finished) => Row { exit_code: (run.exit_code)(Ok(&finished.summary)), ..of_finished(run, job, &finished) },
-        Err(failure) => Row {
+        Ok(finished) => {
+            Ok(Row { exit_code: (run.exit_code)(Ok(&finished.summary)), ..of_finished(run, job, &finished) })
+        }
+        Err(failure) if failure.error.is_of_machine() => {
+            Err(CampaignError::Machine { seed: job.seed, source: failure.error })
+        }
+        Err(failure) => Ok(Row {
             exit_code: (run.exit_code)(Err(&failure.error)),
             ..job.failed(failure.stage.name(), failure_text(&failure.error, &folder), n_figures)
-        },
+        }),
     }
 }
 

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use crate::campaign::{Metric, Row, RunStatus, Table, Worsening};
+use crate::campaign::{Metric, Origin, Row, RunStatus, Table, Worsening};
 use armcal_core::stats::{median_interval, quantile};
 
 /// The summary beside a campaign's table.
@@ -13,6 +13,9 @@ pub struct CampaignSummary {
     pub version: u32,
     pub routine: String,
     pub fingerprint: String,
+    /// What the rows are of, for a comparison with them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub origin: Option<Origin>,
     pub settings: Vec<SettingStatistics>,
 }
 
@@ -69,7 +72,8 @@ pub fn statistics(table: &Table, routine: &str, fingerprint: &str) -> CampaignSu
         by_setting.entry(row.setting).or_default().push(row);
     }
     let settings = by_setting.into_values().map(|rows| of_setting(table, &rows)).collect();
-    CampaignSummary { version: 1, routine: routine.to_owned(), fingerprint: fingerprint.to_owned(), settings }
+    let (routine, fingerprint) = (routine.to_owned(), fingerprint.to_owned());
+    CampaignSummary { version: 1, routine, fingerprint, origin: None, settings }
 }
 
 /// `rows`: one or more.

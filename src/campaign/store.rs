@@ -14,7 +14,7 @@ use crate::campaign::parquet_file::parquet_bytes;
 use crate::campaign::statistics::{CampaignSummary, statistics};
 use crate::campaign::table_file::{Table, parse_table, read_table, row_line, table_text};
 use crate::campaign::tables::markdown;
-use crate::campaign::{CampaignError, Row};
+use crate::campaign::{CampaignError, Origin, Row};
 use crate::output::{self, OutputError};
 
 /// The rows of one campaign; no other process writes to them meanwhile.
@@ -23,6 +23,7 @@ pub struct Store {
     out: PathBuf,
     file: File,
     fingerprint: String,
+    origin: Option<Origin>,
     table: Table,
     /// Whether the files in place already hold all rows.
     in_place: bool,
@@ -53,6 +54,7 @@ impl Store {
     ) -> Result<Self, CampaignError> {
         output::make_folder(output::parent(out))?;
         let partial = output::partial(out);
+        output::refuse_link(&partial)?;
         let file = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(&partial);
         let file = file.map_err(OutputError::of(&partial, "cannot be opened"))?;
         match file.try_lock() {
@@ -62,12 +64,25 @@ impl Store {
             Err(TryLockError::Error(_)) => {}
         }
         let table = Table { names, rows: Vec::new() };
-        let mut store = Self { out: out.to_owned(), file, fingerprint: fingerprint.to_owned(), table, in_place: false };
+        let mut store = Self {
+            out: out.to_owned(),
+            file,
+            fingerprint: fingerprint.to_owned(),
+            origin: None,
+            table,
+            in_place: false,
+        };
         let loaded = store.load(&partial, existing);
         if loaded.is_err() && std::fs::metadata(&partial).is_ok_and(|found| found.len() == 0) {
             let _ = std::fs::remove_file(&partial);
         }
         loaded.map(|()| store)
+    }
+
+    /// The same, with what the summary says that the rows are of.
+    #[must_use]
+    pub fn of(self, origin: Origin) -> Self {
+        Self { origin: Some(origin), ..self }
     }
 
     fn load(&mut self, partial: &Path, existing: ExistingRows) -> Result<(), CampaignError> {
@@ -179,6 +194,7 @@ impl Store {
     pub fn finish(mut self, routine: &str) -> Result<(Table, CampaignSummary), CampaignError> {
         self.table.rows.sort_by_key(Row::key);
         let summary = statistics(&self.table, routine, &self.fingerprint);
+        let summary = CampaignSummary { origin: self.origin, ..summary };
         if !self.in_place {
             write_results(&self.out, &self.table, &summary)?;
         }

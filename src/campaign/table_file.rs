@@ -75,9 +75,9 @@ pub fn read_table(path: &Path) -> Result<Table, CampaignError> {
     parse_table(&bytes).map_err(|problem| CampaignError::Table { path: path.to_owned(), problem })
 }
 
-/// `bytes`: header and rows.
-pub(super) fn parse_table(bytes: &[u8]) -> Result<Table, String> {
-    let mut reader = csv::ReaderBuilder::new().has_headers(true).from_reader(bytes);
+/// `bytes`: header and rows; lines that begin with # are left out.
+pub(crate) fn parse_table(bytes: &[u8]) -> Result<Table, String> {
+    let mut reader = csv::ReaderBuilder::new().has_headers(true).comment(Some(b'#')).from_reader(bytes);
     let header = reader.headers().map_err(|error| format!("is no CSV: {error}"))?.clone();
     if header.len() < FIXED.len() || header.iter().zip(FIXED).any(|(found, expected)| found != expected) {
         return Err(format!("is no table of a campaign: its columns must begin with {}", FIXED.join(", ")));

@@ -1,17 +1,17 @@
 //! What `campaign` and `regress` share: runs on all cores, progress, Ctrl-C.
 
 use std::path::Path;
-use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::campaign::{
     CampaignError, CampaignSummary, Engine, Job, Prepared, Row, RunStatus, SingleRun, Table, run_job, run_jobs,
 };
 use crate::cli::exit::{Exit, UsageError, of_cause, of_summary};
+use crate::cli::stdout::note;
 use crate::output;
 use crate::report::RunSummary;
 use crate::run::Keep;
@@ -78,24 +78,12 @@ pub(super) fn range_of(asked: Option<SeedRange>, prepared: &Prepared) -> Result<
     Ok(asked.or(prepared.routine.campaign.seeds).ok_or_else(problem)?)
 }
 
-/// Tables are .csv: the other files' names come from it.
+/// Tables are .csv: the other files' names come from it. Tried before hours of work, not after.
 pub(super) fn check_name(out: &Path) -> Result<()> {
     if out.extension().is_some_and(|extension| extension == "csv") {
-        return output::make_folder(output::parent(out)).map_err(Into::into);
+        return output::check_writable(out).map_err(Into::into);
     }
     Err(UsageError(format!("{}: the name of a table must end in .csv", out.display())).into())
-}
-
-/// A flag that Ctrl-C or a polite kill sets; the second time the program ends at once.
-pub(super) fn interrupts() -> Result<Arc<AtomicBool>> {
-    let stop = Arc::new(AtomicBool::new(false));
-    for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
-        let code = i32::from(Exit::Failure.code());
-        signal_hook::flag::register_conditional_shutdown(signal, code, Arc::clone(&stop))
-            .and_then(|_| signal_hook::flag::register(signal, Arc::clone(&stop)))
-            .context("Ctrl-C cannot be watched")?;
-    }
-    Ok(stop)
 }
 
 /// A clock alone: nobody watches a single run of many.
@@ -146,6 +134,11 @@ impl CampaignBar {
         let (failed, refused) = (self.failed, self.refused);
         self.bar.set_message(format!("tool error {median} (median), {refused} refused or missed, {failed} failed"));
         self.bar.inc(1);
+    }
+
+    /// A line above the bar, on stderr, whether that is a terminal or not.
+    pub fn say(&self, line: &str) {
+        self.bar.suspend(|| note(line));
     }
 
     pub fn finish(&self) {

@@ -61,6 +61,8 @@ pub(super) fn calibrate(args: &CalibrateArgs) -> Result<Exit> {
     let failed: Vec<FailedJoint> =
         args.failed.iter().map(|text| failed_joint(text, &robot)).collect::<Result<_, _>>()?;
     let robot = robot.with_failed(&failed);
+    // Before minutes of work, not after.
+    let _lock = output::FolderLock::take(&args.out)?;
     let given = CalibrationInputs {
         recordings: &args.recordings,
         robot: &robot,
@@ -76,7 +78,6 @@ pub(super) fn calibrate(args: &CalibrateArgs) -> Result<Exit> {
     // Before anything is written: what has no compact form shall leave no half of the answer.
     let shown =
         if args.compact { CompactCalibration::of(&calibration)?.to_text()? } else { table(&summary).to_string() };
-    output::make_folder(&args.out)?;
     let json = serde_json::to_string_pretty(&summary).context("summary.json")?;
     let (map_file, calibration_file) = (args.out.join("tagmap.toml"), args.out.join("calibration.toml"));
     let covariance_file = covariance_file(&calibration_file);

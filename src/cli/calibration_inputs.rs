@@ -6,6 +6,7 @@ use anyhow::Result;
 
 use crate::cli::exit::UsageError;
 use crate::cli::losses::{warn_of_external, warn_of_losses};
+use crate::cli::stdout::note;
 use armcal_belief::calib::{
     Calibration, CalibrationFileError, ExternalContext, Status, calibrate, calibrate_data, calibrate_with_survey,
     prepare_external, prepare_pooled,
@@ -106,7 +107,7 @@ impl CalibrationInputs<'_> {
             recordings.push(recording);
         }
         if task.is_none() {
-            eprintln!("note: no task is named (--task), so that no tool error is predicted");
+            note("note: no task is named (--task), so that no tool error is predicted");
         }
         let context = ExternalContext { task, landmark_names: named.names, plain_landmark };
         let prepared = prepare_external(&recordings, &map, &robot, context)?;

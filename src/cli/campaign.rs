@@ -7,10 +7,12 @@ use anyhow::Result;
 use clap::Args;
 
 use crate::campaign::ExistingRows;
-use crate::campaign::{CampaignSummary, Prepared, Request, Shard, Store, jobs, merge, table, write_results};
-use crate::cli::batch::{BatchRun, CampaignBar, check_name, exit_of, interrupts, range_of, run_many};
+use crate::campaign::{CampaignSummary, Origin, Prepared, Request, Shard, Store, jobs, merge, table, write_results};
+use crate::cli::batch::{BatchRun, CampaignBar, check_name, exit_of, range_of, run_many};
 use crate::cli::exit::{Exit, UsageError};
+use crate::cli::interrupt::Interrupt;
 use crate::cli::overrides::OverrideArgs;
+use crate::cli::stdout::{note, say};
 use crate::output;
 use crate::run::Keep;
 use armcal_core::routine::SeedRange;
@@ -60,12 +62,12 @@ fn merged(paths: &[PathBuf], out: &Path) -> Result<Exit> {
     let (rows, summary) = merge(paths)?;
     output::make_folder(output::parent(out))?;
     write_results(out, &rows, &summary)?;
-    Ok(show(&summary, out))
+    show(&summary, out)
 }
 
 fn run(args: &CampaignArgs, routine: &Path) -> Result<Exit> {
     let started = Instant::now();
-    let stop = interrupts()?;
+    let stop = Interrupt::install()?;
     let request = Request { routine: routine.to_owned(), overrides: args.overrides.overrides() };
     let prepared = Prepared::load(request)?;
     let out =
@@ -73,15 +75,16 @@ fn run(args: &CampaignArgs, routine: &Path) -> Result<Exit> {
     check_name(&out)?;
     let range = range_of(args.seeds, &prepared)?;
     let existing = if args.fresh { ExistingRows::Discard } else { ExistingRows::Keep };
-    let mut store = Store::open(&out, &prepared.fingerprint, prepared.columns.names(), existing)?;
+    let store = Store::open(&out, &prepared.fingerprint, prepared.columns.names(), existing)?;
+    let mut store = store.of(Origin::of_campaign(&prepared)?);
     let n_before = store.table().rows.len();
     let jobs = jobs(&prepared, range, args.shard, &store.done());
     if n_before > 0 {
-        eprintln!("{n_before} rows are there already; {} runs are left", jobs.len());
+        note(format_args!("{n_before} rows are there already; {} runs are left", jobs.len()));
     }
     let folder = output::with_suffix(&out, if args.keep { ".runs" } else { ".work" });
     let keep = if args.keep { Keep::Everything } else { Keep::StreamsAlone };
-    let many = BatchRun { prepared: &prepared, folder: &folder, keep, threads: args.threads, stop: &stop };
+    let many = BatchRun { prepared: &prepared, folder: &folder, keep, threads: args.threads, stop: stop.flag() };
     let mut bar = CampaignBar::new(&prepared, store.table(), jobs.len());
     let whole = run_many(&many, &jobs, &mut |row| {
         bar.add(&row);
@@ -90,18 +93,17 @@ fn run(args: &CampaignArgs, routine: &Path) -> Result<Exit> {
     bar.finish();
     if !whole? {
         let done = store.table().rows.len();
-        eprintln!("stopped with {done} rows kept; the same command goes on from there");
+        note(format_args!("stopped with {done} rows kept; the same command goes on from there"));
         return Ok(Exit::Failure);
     }
     let (_, summary) = store.finish(&prepared.routine.name)?;
     if !jobs.is_empty() {
-        eprintln!("{} runs in {:.0} s", jobs.len(), started.elapsed().as_secs_f64());
+        note(format_args!("{} runs in {:.0} s", jobs.len(), started.elapsed().as_secs_f64()));
     }
-    Ok(show(&summary, &out))
+    show(&summary, &out)
 }
 
-fn show(summary: &CampaignSummary, out: &Path) -> Exit {
-    print!("{}", table(summary));
-    println!("written      {}", out.display());
-    exit_of(summary)
+fn show(summary: &CampaignSummary, out: &Path) -> Result<Exit> {
+    say(&format!("{}written      {}", table(summary), out.display()))?;
+    Ok(exit_of(summary))
 }

@@ -1,11 +1,14 @@
 //! The commands: parse, dispatch, exit code.
 
+use std::io::Write;
 use std::process::ExitCode;
 
+use anyhow::Result;
 use clap::{CommandFactory, Parser, Subcommand};
 
 #[cfg(feature = "viewer")]
 use crate::cli::replay;
+use crate::cli::stdout::{is_written, note};
 use crate::cli::{calibrate, check, exit, export, inspect, plan, tagmap};
 #[cfg(feature = "sim")]
 use crate::cli::{campaign, regress, run, sensitivity, study};
@@ -63,12 +66,16 @@ pub fn command() -> clap::Command {
 /// Parses the command line, does what it says and gives the exit code; errors go to stderr once, here.
 #[must_use]
 pub fn main() -> ExitCode {
-    let cli = Cli::parse();
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(answer) => return clap_answer(&answer),
+    };
     tracing_subscriber::fmt()
         .with_writer(std::io::stderr)
         .with_max_level(tracing::Level::WARN)
         .without_time()
         .with_target(false)
+        .log_internal_errors(false)
         .init();
     let result = match cli.command {
         #[cfg(feature = "sim")]
@@ -90,11 +97,23 @@ pub fn main() -> ExitCode {
         Command::Replay(args) => replay::replay(&args),
         Command::Check(args) => check::check(&args),
     };
-    match result {
-        Ok(exit) => exit.into(),
-        Err(error) => {
-            eprintln!("error: {}", exit::explain(&error));
-            exit::of_error(&error).into()
-        }
+    ended(result)
+}
+
+fn ended(result: Result<exit::Exit>) -> ExitCode {
+    result
+        .unwrap_or_else(|error| {
+            note(format_args!("error: {}", exit::explain(&error)));
+            exit::of_error(&error)
+        })
+        .into()
+}
+
+/// The help that was asked for, on stdout; or, on stderr, what is wrong with the command line.
+fn clap_answer(answer: &clap::Error) -> ExitCode {
+    let printed = answer.print().and_then(|()| std::io::stdout().flush());
+    if answer.use_stderr() {
+        return exit::Exit::InvalidInput.into();
     }
+    ended(is_written(printed).map(|()| exit::Exit::Ok))
 }

@@ -1,4 +1,5 @@
-//! Ctrl-C and SIGTERM: the first asks the run to stop and to finish its recording, the second ends the program at once.
+//! Ctrl-C, SIGTERM and SIGHUP: the first asks the work to stop and to finish its files, the second ends the program at
+//! once.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -7,9 +8,6 @@ use anyhow::{Context, Result};
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
 
-/// Exit codes of the second signal, 128 and its number, as shells give them.
-const SIGNALS: [(i32, i32); 2] = [(SIGINT, 130), (SIGTERM, 143)];
-
 /// Whether somebody asked the program to stop. Clones share the answer.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Interrupt {
@@ -17,15 +15,18 @@ pub(super) struct Interrupt {
 }
 
 impl Interrupt {
-    /// Listens to signals from now on.
+    /// Listens to signals from now on. Exit codes of the second signal are 128 and its number, as shells give them.
     ///
     /// # Errors
     /// When the system refuses.
     pub fn install() -> Result<Self> {
         let interrupt = Self::default();
-        for (signal, code) in SIGNALS {
+        let mut signals = vec![SIGINT, SIGTERM];
+        #[cfg(unix)]
+        signals.extend(Some(signal_hook::consts::SIGHUP).filter(|signal| !is_ignored(*signal)));
+        for signal in signals {
             // In this order the first signal finds no request yet.
-            flag::register_conditional_shutdown(signal, code, Arc::clone(&interrupt.requested))
+            flag::register_conditional_shutdown(signal, 128 + signal, Arc::clone(&interrupt.requested))
                 .and_then(|_| flag::register(signal, Arc::clone(&interrupt.requested)))
                 .context("signals cannot be listened to")?;
         }
@@ -39,4 +40,18 @@ impl Interrupt {
     pub fn is_requested(&self) -> bool {
         self.requested.load(Ordering::SeqCst)
     }
+
+    /// The answer as a flag.
+    pub fn flag(&self) -> &AtomicBool {
+        &self.requested
+    }
+}
+
+/// Whether the program was started to ignore this signal, as `nohup` does with SIGHUP; known on Linux alone.
+#[cfg(unix)]
+fn is_ignored(signal: i32) -> bool {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    let mask = ignored.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).unwrap_or(0);
+    mask >> (signal - 1) & 1 == 1
 }

@@ -1,5 +1,6 @@
 //! What of a recording could not be used, said on stderr.
 
+use crate::cli::stdout::note;
 use armcal_core::input::ExternalRecording;
 use armcal_core::log::{Completeness, Recording};
 use armcal_core::robot::Robot;
@@ -19,13 +20,13 @@ pub(super) fn warn_of_losses(recording: &Recording) -> bool {
     let file = recording.path.display();
     let whole = recording.completeness == Completeness::Whole;
     if !whole {
-        eprintln!("warning: {file}: {}; what could be read is used", describe(&recording.completeness));
+        note(format_args!("warning: {file}: {}; what could be read is used", describe(&recording.completeness)));
     }
     for (what, n) in &recording.rejected {
-        eprintln!("warning: {file}: {n} messages rejected on {what}");
+        note(format_args!("warning: {file}: {n} messages rejected on {what}"));
     }
     if recording.non_monotonic > 0 {
-        eprintln!("warning: {file}: log time went backwards {} times", recording.non_monotonic);
+        note(format_args!("warning: {file}: log time went backwards {} times", recording.non_monotonic));
     }
     !whole || !recording.rejected.is_empty()
 }
@@ -35,19 +36,22 @@ pub(super) fn warn_of_external(recording: &ExternalRecording, robot: &Robot) -> 
     let file = recording.path.display();
     let is_whole = recording.completeness == Completeness::Whole;
     if !is_whole {
-        eprintln!("warning: {file}: {}; what could be read is used", describe(&recording.completeness));
+        note(format_args!("warning: {file}: {}; what could be read is used", describe(&recording.completeness)));
     }
     for (what, n) in &recording.left_out {
-        eprintln!("warning: {file}: {n} {what} left out");
+        note(format_args!("warning: {file}: {n} {what} left out"));
     }
     if !recording.extra_joints.is_empty() {
-        eprintln!("note: {file}: joints that the robot lacks are ignored: {}", recording.extra_joints.join(", "));
+        note(format_args!(
+            "note: {file}: joints that the robot lacks are ignored: {}",
+            recording.extra_joints.join(", ")
+        ));
     }
     for &joint in &recording.absent_joints {
         let name = &robot.sensors[joint].joint;
-        eprintln!(
+        note(format_args!(
             "note: {file}: has no readings of {name}; the camera hangs before it, its angle is taken as the middle"
-        );
+        ));
     }
     !is_whole || !recording.left_out.is_empty()
 }

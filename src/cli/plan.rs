@@ -10,7 +10,7 @@ use comfy_table::{CellAlignment, Table};
 use crate::cli::calibration_inputs::read_prior;
 use crate::cli::exit::Exit;
 use crate::cli::overrides::OverrideArgs;
-use crate::cli::stdout::say;
+use crate::cli::stdout::{note, say};
 use crate::output;
 use armcal_belief::plan::{
     ArmBelief, ClearanceModel, ItineraryRequest, PlanFile, PlanHeader, PoseTable, SetName, plan_itinerary,
@@ -57,10 +57,10 @@ pub(super) fn plan(args: &PlanArgs) -> Result<Exit> {
     };
     let file = planned(&routine, (&robot, &vehicle), &belief, header)?;
     for warning in &file.warnings {
-        eprintln!("warning: {warning}");
+        note(format_args!("warning: {warning}"));
     }
     for left in &file.left_out {
-        eprintln!("warning: a pose is left out: {}", left.reason);
+        note(format_args!("warning: a pose is left out: {}", left.reason));
     }
     let out = args.out.clone().unwrap_or_else(|| Path::new("recordings").join(format!("{}-plan", routine.name)));
     output::make_folder(&out)?;

@@ -5,6 +5,7 @@ use std::time::Instant;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::cli::interrupt::Interrupt;
+use crate::cli::stdout::note;
 use armcal_belief::session::Progress;
 use armcal_core::streams::Phase;
 
@@ -28,7 +29,7 @@ impl Bar {
 
     /// A line above the bar, on stderr, whether that is a terminal or not.
     pub fn say(&self, line: &str) {
-        self.bar.suspend(|| eprintln!("{line}"));
+        self.bar.suspend(|| note(format_args!("{line}")));
     }
 
     pub fn finish(&self) {

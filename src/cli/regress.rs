@@ -1,19 +1,24 @@
 //! `armcal regress`: is it worse than it was?
 
 use std::path::PathBuf;
+use std::time::Instant;
 
 use anyhow::{Context, Result};
 use clap::Args;
 
 use crate::campaign::{
-    Job, Prepared, Request, Row, Table, compare, jobs, read_table, regress_table, statistics, table, table_text,
+    Comparison, Job, Metric, Prepared, Request, Row, Table, Undecided, Verdict, baseline_text, compare, jobs,
+    read_baseline, regress_junit, regress_markdown, regress_table, statistics, table, table_text,
 };
-use crate::cli::batch::{BatchRun, CampaignBar, check_name, interrupts, range_of, run_many};
+use crate::cli::batch::{BatchRun, CampaignBar, check_name, range_of, run_many};
 use crate::cli::exit::{Exit, UsageError};
+use crate::cli::interrupt::Interrupt;
 use crate::cli::overrides::OverrideArgs;
+use crate::cli::stdout::{note, say};
 use crate::output;
 use crate::run::Keep;
 use armcal_core::routine::SeedRange;
+use armcal_core::stats::quantile;
 
 #[derive(Debug, Args)]
 #[command(group(clap::ArgGroup::new("side").required(true).args(["baseline", "write_baseline"])))]
@@ -36,6 +41,18 @@ pub(super) struct RegressArgs {
     /// Threads, one run on each; all cores if not given
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
+    /// Exit with 0 where the pairs decide nothing: they fit both no change and more than the budget
+    #[arg(long, conflicts_with = "write_baseline")]
+    allow_inconclusive: bool,
+    /// Print the comparison as JSON instead of the table
+    #[arg(long, conflicts_with = "write_baseline")]
+    json: bool,
+    /// Write the comparison as JUnit's XML, too, a test case a check
+    #[arg(long, value_name = "FILE", conflicts_with = "write_baseline")]
+    junit: Option<PathBuf>,
+    /// Write the comparison as Markdown, too
+    #[arg(long, value_name = "FILE", conflicts_with = "write_baseline")]
+    markdown: Option<PathBuf>,
     #[command(flatten)]
     overrides: OverrideArgs,
 }
@@ -44,32 +61,87 @@ pub(super) fn regress(args: &RegressArgs) -> Result<Exit> {
     if let Some(out) = args.write_baseline.as_ref().or(args.out.as_ref()) {
         check_name(out)?;
     }
+    for path in args.junit.iter().chain(&args.markdown) {
+        output::check_writable(path)?;
+    }
     let prepared = Prepared::load(Request { routine: args.routine.clone(), overrides: args.overrides.overrides() })?;
-    let baseline = args.baseline.as_deref().map(read_table).transpose()?;
+    let baseline = args.baseline.as_deref().map(|path| read_baseline(path, &prepared)).transpose()?;
     let jobs = match &baseline {
         Some(baseline) => jobs_of(baseline, args, &prepared)?,
         None => jobs(&prepared, range_of(args.seeds, &prepared)?, None, &std::collections::BTreeSet::new()),
     };
+    note(foretold(baseline.as_ref(), jobs.len(), n_threads(args)));
     let Some(now) = run(args, &prepared, &jobs)? else {
-        eprintln!("stopped; nothing was compared");
+        note("stopped; nothing was compared");
         return Ok(Exit::Failure);
     };
-    if let Some(out) = args.write_baseline.as_ref().or(args.out.as_ref()) {
-        output::write_whole(out, table_text(&now).as_bytes())?;
+    match baseline {
+        Some(baseline) => compared(args, &prepared, &baseline, &now),
+        None => written(args, &prepared, &now),
     }
-    let Some(baseline) = baseline else {
-        let summary = statistics(&now, &prepared.routine.name, &prepared.fingerprint);
-        print!("{}", table(&summary));
-        println!("written      {}", args.write_baseline.as_deref().unwrap_or(&args.routine).display());
-        return Ok(crate::cli::batch::exit_of(&summary));
-    };
-    let comparison = compare(&baseline, &now, &prepared.routine.regress);
-    println!("{}", regress_table(&comparison));
-    println!(
-        "regress      {}",
-        if comparison.is_worse() { "WORSE than the baseline" } else { "not worse than the baseline" }
-    );
-    Ok(if comparison.is_worse() { Exit::Refused } else { Exit::Ok })
+}
+
+/// Puts the runs down as a baseline.
+fn written(args: &RegressArgs, prepared: &Prepared, now: &Table) -> Result<Exit> {
+    let out = args.write_baseline.as_deref().unwrap_or(&args.routine);
+    output::write_whole(out, baseline_text(prepared, now)?.as_bytes())?;
+    let summary = statistics(now, &prepared.routine.name, &prepared.fingerprint);
+    say(&format!("{}written      {}", table(&summary), out.display()))?;
+    Ok(crate::cli::batch::exit_of(&summary))
+}
+
+/// Holds the runs against the baseline, and puts down what came out.
+fn compared(args: &RegressArgs, prepared: &Prepared, baseline: &Table, now: &Table) -> Result<Exit> {
+    if let Some(out) = &args.out {
+        output::write_whole(out, table_text(now).as_bytes())?;
+    }
+    let comparison = compare(baseline, now, &prepared.routine.regress);
+    let name = &prepared.routine.name;
+    if let Some(path) = &args.markdown {
+        output::write_whole(path, regress_markdown(&comparison, name).as_bytes())?;
+    }
+    if let Some(path) = &args.junit {
+        let undecided = if args.allow_inconclusive { Undecided::Passes } else { Undecided::Fails };
+        let xml = regress_junit(&comparison, name, undecided).context("the comparison has no XML form")?;
+        output::write_whole(path, xml.as_bytes())?;
+    }
+    say(&if args.json { json(&comparison, args)? } else { regress_table(&comparison) })?;
+    Ok(match comparison.verdict {
+        Verdict::Worse => Exit::Refused,
+        Verdict::Inconclusive if !args.allow_inconclusive => Exit::Refused,
+        Verdict::Inconclusive | Verdict::NotWorse => Exit::Ok,
+    })
+}
+
+fn json(comparison: &Comparison, args: &RegressArgs) -> Result<String> {
+    let mut value = serde_json::to_value(comparison).context("the comparison has no JSON form")?;
+    value["routine"] = args.routine.display().to_string().into();
+    value["baseline"] = args.baseline.as_ref().map(|path| path.display().to_string()).into();
+    serde_json::to_string_pretty(&value).context("the comparison has no JSON form")
+}
+
+/// What a run is usually faster than the arm, with tags as corners. Rendered images take tens of times as long.
+const USUAL_SPEED: f64 = 50.0;
+
+fn n_threads(args: &RegressArgs) -> usize {
+    let cores = || std::thread::available_parallelism().map_or(1, usize::from);
+    args.threads.map_or_else(cores, usize::from)
+}
+
+/// How many runs there are, and how long they may take.
+fn foretold(baseline: Option<&Table>, n_jobs: usize, n_threads: usize) -> String {
+    let times_s: Vec<f64> = baseline
+        .and_then(|table| Some((table, table.place(Metric::SimulatedTime)?)))
+        .map(|(table, place)| table.rows.iter().filter_map(|row| row.figures[place]).collect())
+        .unwrap_or_default();
+    let runs = format!("{n_jobs} runs on {n_threads} threads");
+    match quantile(&times_s, 0.5) {
+        Some(each_s) => format!(
+            "{runs}, {each_s:.0} s of the arm's time each: about {:.0} s at the usual {USUAL_SPEED:.0} times real time",
+            each_s / USUAL_SPEED * n_jobs.div_ceil(n_threads) as f64
+        ),
+        None => format!("{runs}; the first one says how long they take"),
+    }
 }
 
 /// The runs of the baseline, as the routine makes them today.
@@ -93,14 +165,25 @@ fn jobs_of(baseline: &Table, args: &RegressArgs, prepared: &Prepared) -> Result<
 
 /// The new rows, sorted; `None` when stopped. Nothing is taken over from earlier runs: the program may have changed.
 fn run(args: &RegressArgs, prepared: &Prepared, jobs: &[Job]) -> Result<Option<Table>> {
-    let stop = interrupts()?;
+    let stop = Interrupt::install()?;
     let folder = tempfile::tempdir().context("no temporary folder can be made")?;
-    let many =
-        BatchRun { prepared, folder: folder.path(), keep: Keep::StreamsAlone, threads: args.threads, stop: &stop };
+    let many = BatchRun {
+        prepared,
+        folder: folder.path(),
+        keep: Keep::StreamsAlone,
+        threads: args.threads,
+        stop: stop.flag(),
+    };
     let mut now = Table { names: prepared.columns.names(), rows: Vec::new() };
     let mut bar = CampaignBar::new(prepared, &now, jobs.len());
+    let started = Instant::now();
     let whole = run_many(&many, jobs, &mut |row| {
         bar.add(&row);
+        if now.rows.is_empty() && jobs.len() > 1 {
+            let first_s = started.elapsed().as_secs_f64();
+            let all_s = first_s * jobs.len().div_ceil(n_threads(args)) as f64;
+            bar.say(&format!("the first run took {first_s:.0} s: about {all_s:.0} s for all of them"));
+        }
         now.rows.push(row);
         Ok(())
     });

@@ -7,6 +7,7 @@ use clap::Args;
 
 use crate::cli::exit::{Exit, UsageError};
 use crate::cli::losses::warn_of_losses;
+use crate::cli::stdout::say;
 use crate::output;
 use armcal_belief::calib::{Calibration, Status, surveyed};
 use armcal_core::kinematics::LinkCorrections;
@@ -46,10 +47,10 @@ pub(super) fn replay(args: &ReplayArgs) -> Result<Exit> {
     };
     match &args.save {
         Some(out) => {
-            output::check_replaceable(out)?;
-            write_rrd(&input, &output::partial(out))?;
-            output::complete(out)?;
-            println!("written      {}", out.display());
+            let growing = output::Beside::begin(out)?;
+            write_rrd(&input, growing.grows_at())?;
+            growing.put_in_place()?;
+            say(&format!("written      {}", out.display()))?;
         }
         None => {
             let folder = tempfile::tempdir().context("no temporary folder can be made")?.keep();

@@ -11,7 +11,7 @@ use crate::cli::exit::{Exit, of_summary};
 use crate::cli::interrupt::Interrupt;
 use crate::cli::overrides::OverrideArgs;
 use crate::cli::progress::Bar;
-use crate::cli::stdout::say;
+use crate::cli::stdout::{note, say};
 use crate::output::OutputFolder;
 use crate::report::table;
 use crate::run::{Failure, Keep, RunInputs, execute};
@@ -40,7 +40,10 @@ pub(super) fn run(args: &RunArgs) -> Result<Exit> {
     let out = args.out.clone().unwrap_or_else(|| Path::new("recordings").join(&inputs.routine.name));
     let (output, left_behind) = OutputFolder::open(&out)?;
     if let Some(kept) = left_behind {
-        eprintln!("warning: an earlier run into this folder did not end; its recording is now {}", kept.display());
+        note(format_args!(
+            "warning: an earlier run into this folder did not end; its recording is now {}",
+            kept.display()
+        ));
     }
     let mut bar = Bar::new(started, Interrupt::install()?);
     let result = if args.confirm {
@@ -50,6 +53,9 @@ pub(super) fn run(args: &RunArgs) -> Result<Exit> {
     };
     bar.finish();
     let finished = result.map_err(explained)?;
+    if let Some(why) = &finished.replay_failure {
+        note(format_args!("warning: there is no replay, all other files are whole: {why}"));
+    }
     say(&format!("{}\nwritten      {}", table(&finished.summary), out.display()))?;
     Ok(of_summary(&finished.summary))
 }

@@ -1,14 +1,29 @@
-//! Text to stdout: a reader that has gone away is no error, a full disk is one, and neither is a panic.
+//! The one way out for text: results to stdout, notes to stderr.
+//!
+//! A reader that has gone away (`| head`) is no error: the command works on, writes its files, and exits as it would
+//! have. A stdout that cannot be written (a full disk) is one error, told after the files are in place. Neither is a
+//! panic, as `println!` would make it; clippy denies that everywhere.
 
-use std::io::{ErrorKind, Write};
+use std::fmt::Display;
+use std::io::{ErrorKind, Result as IoResult, Write};
 
 use anyhow::{Context, Result};
 
-/// Writes `text` and ends the line.
+/// Writes `text` to stdout and ends the line.
 pub(super) fn say(text: &str) -> Result<()> {
     let mut stdout = std::io::stdout().lock();
-    match writeln!(stdout, "{text}").and_then(|()| stdout.flush()) {
+    is_written(writeln!(stdout, "{text}").and_then(|()| stdout.flush()))
+}
+
+/// Whether stdout took what it was given.
+pub(super) fn is_written(written: IoResult<()>) -> Result<()> {
+    match written {
         Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
         written => written.context("stdout: cannot be written"),
     }
+}
+
+/// Writes a line to stderr. Where that cannot be written nobody can be told, and the work goes on.
+pub(super) fn note(text: impl Display) {
+    let _ = writeln!(std::io::stderr().lock(), "{text}");
 }

@@ -8,6 +8,7 @@ use anyhow::{Context, Result};
 use clap::{Args, Subcommand};
 
 use crate::cli::exit::Exit;
+use crate::cli::stdout::{note, say};
 use crate::cli::study_falsified::{FalsifiedArgs, falsified};
 use crate::cli::study_paper::{PaperArgs, paper};
 use crate::cli::study_plan::{
@@ -120,8 +121,7 @@ fn detection(args: &DetectionArgs) -> Result<Exit> {
         let ms = 1e3 * quantile(&study.detect_s, 0.5).unwrap_or(f64::NAN);
         write(folder, "time_ms.txt", &format!("{ms:.2}"))?;
     }
-    print!("{text}");
-    println!("written      {}", args.out.display());
+    say(&format!("{text}written      {}", args.out.display()))?;
     Ok(Exit::Ok)
 }
 
@@ -137,7 +137,7 @@ impl Watcher for Clock<'_> {
 
     fn image(&mut self, name: &str, image: GreyImage, n_done: usize, n_all: usize) -> Result<(), StudyError> {
         if n_done.is_multiple_of(50) {
-            eprintln!("{n_done} of {n_all} images");
+            note(format_args!("{n_done} of {n_all} images"));
         }
         let Some(folder) = self.images else { return Ok(()) };
         let path = folder.join(name);

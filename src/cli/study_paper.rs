@@ -7,7 +7,7 @@ use anyhow::{Context, Result};
 use clap::Args;
 
 use crate::cli::exit::Exit;
-use crate::cli::stdout::say;
+use crate::cli::stdout::{note, say};
 use crate::output;
 use armcal_study::paper::{Tier, experiments, paper_csv, paper_figures, paper_markdown, run_experiment};
 
@@ -33,7 +33,7 @@ pub(super) fn paper(args: &PaperArgs) -> Result<Exit> {
     let experiments = experiments(if args.quick { Tier::Small } else { Tier::Full });
     let mut rows = Vec::new();
     for experiment in &experiments {
-        eprintln!("{} ...", experiment.title);
+        note(format_args!("{} ...", experiment.title));
         rows.extend(run_experiment(&robot, experiment, args.seed)?);
     }
     let report = paper_markdown(&experiments, &rows);

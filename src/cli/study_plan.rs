@@ -8,7 +8,7 @@ use anyhow::{Context, Result};
 use clap::Args;
 
 use crate::cli::exit::Exit;
-use crate::cli::stdout::say;
+use crate::cli::stdout::{note, say};
 use crate::output;
 use armcal_belief::plan::{ClearanceModel, sample_self_pairs};
 use armcal_core::log::read_recording;
@@ -117,7 +117,7 @@ pub(super) fn edges(args: &EdgesArgs) -> Result<Exit> {
         let edges = random_edges(&site.robot, args.n as usize, args.seed);
         let start_s = clock();
         let study = edge_study(&site.robot, &clearance, &edges, MARGIN_M, &clock);
-        eprintln!("{}: {} edges certified and scanned in {:.0} s", study.arm, edges.len(), clock() - start_s);
+        note(format_args!("{}: {} edges certified and scanned in {:.0} s", study.arm, edges.len(), clock() - start_s));
         let n_timed = edges.len().min(TIMED_EDGES);
         for belief in [Belief::Calibrated, Belief::Datasheet] {
             let (_, bounds) = site.believed(belief);
@@ -146,7 +146,7 @@ pub(super) fn paths(args: &PathsArgs) -> Result<Exit> {
         let robot = load(&args.robot)?.mounted_on(&vehicle)?;
         let site = PathSite { name: vehicle.name.clone(), robot, vehicle, scene: routine.scene };
         for belief in Belief::ALL {
-            eprintln!("{}, {} ...", site.name, belief.name());
+            note(format_args!("{}, {} ...", site.name, belief.name()));
             let queries = PathQueries { n: args.n as usize, margin_m: MARGIN_M, seed: args.seed };
             let study = path_study(&site, belief, queries, &clock);
             if belief == Belief::Alone {

@@ -8,7 +8,7 @@ use comfy_table::presets::UTF8_FULL_CONDENSED;
 use comfy_table::{CellAlignment, Table};
 
 use crate::cli::exit::Exit;
-use crate::cli::stdout::say;
+use crate::cli::stdout::{note, say};
 use crate::output;
 use armcal_belief::calib::surveyed;
 use armcal_belief::tagmap::files::{NamedCamera, TagFile, map_to_text, read_cameras, read_tags};
@@ -65,6 +65,7 @@ impl From<Mode> for MapMode {
 const MAX_REJECTED_SHARE: f64 = 0.2;
 
 pub(super) fn tagmap(args: &TagmapArgs) -> Result<Exit> {
+    args.out.as_deref().map(output::check_writable).transpose()?;
     let (cameras, tags, settings) = match (&args.robot, &args.camera, &args.tags) {
         (Some(folder), ..) => of_robot(&args.recording, &robot::load(folder)?)?,
         (None, Some(camera), Some(tags)) => of_files(camera, tags)?,
@@ -196,27 +197,27 @@ fn describe(map: &TagMap, read: &RecordedViews, cameras: &[NamedCamera]) -> Stri
 fn warn(file: &str, map: &TagMap, read: &RecordedViews, tags: &TagFile) -> Exit {
     let is_whole = read.completeness == Completeness::Whole;
     if !is_whole {
-        eprintln!("warning: {file}: is not whole; what could be read is used");
+        note(format_args!("warning: {file}: is not whole; what could be read is used"));
     }
     for (what, n) in &read.left_out {
-        eprintln!("warning: {file}: {n} {what} left out");
+        note(format_args!("warning: {file}: {n} {what} left out"));
     }
     for key in &tags.ignored_keys {
-        eprintln!("warning: {key} has no effect here");
+        note(format_args!("warning: {key} has no effect here"));
     }
     for warning in &map.scale_warnings {
-        eprintln!("warning: {warning}");
+        note(format_args!("warning: {warning}"));
     }
     for warning in &map.warnings {
-        eprintln!("warning: {warning}");
+        note(format_args!("warning: {warning}"));
     }
     if !map.has_converged {
-        eprintln!("warning: the fit did not come to rest");
+        note("warning: the fit did not come to rest");
     }
     let faults = map.rejected.iter().filter(|rejected| rejected.reason.is_fault()).count();
     let too_many = faults as f64 > MAX_REJECTED_SHARE * map.n_detections as f64;
     if too_many {
-        eprintln!("warning: {file}: {faults} of {} detections rejected", map.n_detections);
+        note(format_args!("warning: {file}: {faults} of {} detections rejected", map.n_detections));
     }
     let is_sound =
         is_whole && read.n_unreadable == 0 && !too_many && map.has_converged && map.scale_warnings.is_empty();

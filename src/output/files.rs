@@ -1,9 +1,7 @@
 //! Files put in place when they are whole.
 
-use std::io::{Error, Write};
+use std::io::Error;
 use std::path::{Path, PathBuf};
-
-use tempfile::NamedTempFile;
 
 /// Why a file or folder could not be written; the source, if there is one, says what the system thinks of it.
 #[derive(Debug, thiserror::Error)]
@@ -25,38 +23,6 @@ impl OutputError {
     }
 }
 
-/// Writes `bytes` beside `path` and puts them in its place in one step.
-#[cfg(feature = "sim")]
-pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
-    write_together(&[(path, bytes)])
-}
-
-/// Writes all of `files` beside their places and then puts each in its place in one step; if one cannot be written,
-/// none is replaced. The old last file goes first and the new one comes last: it vouches for the others.
-pub(crate) fn write_together(files: &[(&Path, &[u8])]) -> Result<(), OutputError> {
-    let written = files.iter().map(|(path, bytes)| write_beside(path, bytes)).collect::<Result<Vec<_>, _>>()?;
-    if let [_, .., (last, _)] = files
-        && last.is_file()
-    {
-        std::fs::remove_file(last).map_err(OutputError::of(last, "cannot be replaced"))?;
-    }
-    for (file, (path, _)) in written.into_iter().zip(files) {
-        file.persist(path).map_err(|failed| OutputError::of(path, "cannot be put in place")(failed.error))?;
-    }
-    Ok(())
-}
-
-fn write_beside(path: &Path, bytes: &[u8]) -> Result<NamedTempFile, OutputError> {
-    check_replaceable(path)?;
-    let folder = parent(path);
-    let mut file = NamedTempFile::new_in(folder).map_err(OutputError::of(folder, "cannot write into this folder"))?;
-    file.write_all(bytes)
-        .and_then(|()| file.as_file().sync_all())
-        .map_err(OutputError::of(path, "cannot be written"))?;
-    make_readable(file.path()).map_err(OutputError::of(path, "cannot be made readable"))?;
-    Ok(file)
-}
-
 /// That `path` can be replaced by a file: a folder or a device such as /dev/full cannot.
 pub(crate) fn check_replaceable(path: &Path) -> Result<(), OutputError> {
     match std::fs::metadata(path) {
@@ -67,31 +33,27 @@ pub(crate) fn check_replaceable(path: &Path) -> Result<(), OutputError> {
     }
 }
 
+/// Files that grow under a name that others can foretell are never reached through a link.
+pub(crate) fn refuse_link(path: &Path) -> Result<(), OutputError> {
+    match std::fs::symlink_metadata(path) {
+        Ok(found) if found.is_symlink() => Err(OutputError::new(path, "is a link, and is not followed: remove it")),
+        _ => Ok(()),
+    }
+}
+
 /// The folder that holds `path`.
 pub(crate) fn parent(path: &Path) -> &Path {
     path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// Temporary files are private; results are for everybody whom the folder lets in.
-fn make_readable(path: &Path) -> Result<(), Error> {
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        std::fs::set_permissions(path, std::fs::Permissions::from_mode(0o644))?;
-    }
-    #[cfg(not(unix))]
-    let _ = path;
-    Ok(())
-}
-
 /// `path` with `.partial` added: where a stream grows until it is whole.
-#[cfg(any(feature = "sim", feature = "viewer"))]
+#[cfg(feature = "sim")]
 pub(crate) fn partial(path: &Path) -> PathBuf {
     with_suffix(path, ".partial")
 }
 
 /// `path` with text added to its name.
-#[cfg(any(feature = "sim", feature = "viewer"))]
+#[cfg(feature = "sim")]
 pub(crate) fn with_suffix(path: &Path, suffix: &str) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
     name.push(suffix);
@@ -99,7 +61,7 @@ pub(crate) fn with_suffix(path: &Path, suffix: &str) -> PathBuf {
 }
 
 /// Puts a finished stream in its place.
-#[cfg(any(feature = "sim", feature = "viewer"))]
+#[cfg(feature = "sim")]
 pub(crate) fn complete(path: &Path) -> Result<(), OutputError> {
     check_replaceable(path)?;
     std::fs::rename(partial(path), path).map_err(OutputError::of(path, "cannot be put in place"))

@@ -4,11 +4,11 @@
 //! summary.json goes first and the new one comes last, so a folder with a summary.json holds the files of one run. What
 //! a killed or broken run leaves is moved to `run-cut-N.mcap` and `truth-cut-N.mcap`.
 
-use std::fs::{self, File, TryLockError};
+use std::fs::{self, File};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-use crate::output::{OutputError, check_replaceable, complete, make_folder, partial};
+use crate::output::{FolderLock, OutputError, check_replaceable, complete, partial};
 use armcal_core::log::{LogError, for_each_raw, topics};
 
 /// What a run leaves, in the order in which it is put in place.
@@ -24,15 +24,13 @@ const RESULTS: [&str; 8] = [
 ];
 /// Its presence says that the files beside it are those of one run.
 const SUMMARY: &str = "summary.json";
-const LOCK: &str = "armcal.lock";
 const RECORDINGS: [&str; 2] = ["run", "truth"];
 
 /// An output folder that belongs to this run as long as the value lives.
 #[derive(Debug)]
 pub struct OutputFolder {
     folder: PathBuf,
-    is_new: bool,
-    lock: Option<File>,
+    _lock: FolderLock,
 }
 
 impl OutputFolder {
@@ -42,10 +40,7 @@ impl OutputFolder {
     /// # Errors
     /// When the folder cannot be made or written to, belongs to another run, or something is in the way of a result.
     pub fn open(folder: &Path) -> Result<(Self, Option<PathBuf>), OutputError> {
-        let is_new = !folder.exists();
-        make_folder(folder)?;
-        let mut output = Self { folder: folder.to_owned(), is_new, lock: None };
-        output.lock = Some(lock(folder)?);
+        let output = Self { folder: folder.to_owned(), _lock: FolderLock::take(folder)? };
         for name in RESULTS {
             check_replaceable(&folder.join(name))?;
             check_replaceable(&output.partial(name))?;
@@ -66,6 +61,21 @@ impl OutputFolder {
     pub fn write(&self, name: &str, bytes: &[u8]) -> Result<(), OutputError> {
         let path = self.partial(name);
         fs::write(&path, bytes).map_err(OutputError::of(&path, "cannot be written"))
+    }
+
+    /// Removes what there is of a result that could not be written.
+    ///
+    /// # Errors
+    /// When it cannot be removed.
+    pub fn leave_out(&self, name: &str) -> Result<(), OutputError> {
+        remove(&self.partial(name))
+    }
+
+    /// The error that names the folder, where somebody has removed it meanwhile.
+    #[must_use]
+    pub fn is_gone(&self) -> Option<OutputError> {
+        let problem = "the output folder was removed while the run was going on";
+        (!self.folder.is_dir()).then(|| OutputError::new(&self.folder, problem))
     }
 
     #[must_use]
@@ -133,19 +143,6 @@ impl OutputFolder {
     }
 }
 
-impl Drop for OutputFolder {
-    fn drop(&mut self) {
-        if self.lock.is_some() {
-            // Removed while it is held: whoever opens it after this makes a new one.
-            let _ = fs::remove_file(self.folder.join(LOCK));
-        }
-        if self.is_new {
-            // Only if nothing is in it.
-            let _ = fs::remove_dir(&self.folder);
-        }
-    }
-}
-
 /// A recording with any reading of the arm, or one that cannot be read and might hold some.
 fn is_worth_keeping(path: &Path) -> bool {
     let mut readings = 0_u64;
@@ -161,48 +158,6 @@ fn remove(path: &Path) -> Result<(), OutputError> {
         Err(error) if error.kind() != ErrorKind::NotFound => Err(OutputError::of(path, "cannot be removed")(error)),
         _ => Ok(()),
     }
-}
-
-/// Keeps a second run out of the folder; the system gives the lock back however the program ends.
-fn lock(folder: &Path) -> Result<File, OutputError> {
-    let path = folder.join(LOCK);
-    loop {
-        let file = File::options()
-            .create(true)
-            .write(true)
-            .truncate(false)
-            .open(&path)
-            .map_err(OutputError::of(folder, "cannot write into this folder"))?;
-        match file.try_lock() {
-            Err(TryLockError::WouldBlock) => {
-                return Err(OutputError::new(
-                    folder,
-                    "another run is writing into this folder; choose another with --out",
-                ));
-            }
-            // A file system without locks keeps nobody out, but it can hold a run.
-            Err(TryLockError::Error(error)) if error.kind() != ErrorKind::Unsupported => {
-                return Err(OutputError::of(&path, "cannot be locked")(error));
-            }
-            _ => {}
-        }
-        // The run before may have removed the file between our opening and locking it.
-        if is_at(&file, &path) {
-            return Ok(file);
-        }
-    }
-}
-
-#[cfg(unix)]
-fn is_at(file: &File, path: &Path) -> bool {
-    use std::os::unix::fs::MetadataExt;
-    let id = |metadata: fs::Metadata| (metadata.dev(), metadata.ino());
-    file.metadata().ok().map(id) == fs::metadata(path).ok().map(id)
-}
-
-#[cfg(not(unix))]
-fn is_at(_: &File, path: &Path) -> bool {
-    path.exists()
 }
 
 #[cfg(test)]

@@ -1,14 +1,20 @@
 //! Files that replace others only once they are whole, and the folder of a run.
 
+mod beside;
 mod files;
 #[cfg(feature = "sim")]
 mod folder;
+mod lock;
 
-pub use files::OutputError;
+#[cfg(feature = "viewer")]
+pub(crate) use beside::Beside;
 #[cfg(feature = "sim")]
-pub(crate) use files::complete;
-#[cfg(any(feature = "sim", feature = "viewer"))]
-pub(crate) use files::{check_replaceable, parent, partial, with_suffix, write_whole};
-pub(crate) use files::{make_folder, write_together};
+pub(crate) use beside::write_whole;
+pub(crate) use beside::{check_writable, write_together};
+pub use files::OutputError;
+pub(crate) use files::{check_replaceable, make_folder, parent, refuse_link};
+#[cfg(feature = "sim")]
+pub(crate) use files::{complete, partial, with_suffix};
 #[cfg(feature = "sim")]
 pub use folder::OutputFolder;
+pub(crate) use lock::FolderLock;

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use crate::error::ReplayError;
 use crate::scene::ReplayInput;
 use armcal_core::log::MessageHasher;
-use armcal_core::robot::Robot;
+use armcal_core::robot::{Robot, Vehicle};
 
 /// Recording id in the viewer: a hash of all data that shape the file.
 pub(super) struct Identity {
@@ -27,10 +27,11 @@ impl Identity {
             let read = File::open(path).and_then(|file| hasher.update_reader(file).map(|_| ()));
             read.map_err(|source| armcal_core::log::LogError::Read { path: path.to_owned(), source })?;
         }
-        // The robot's folder is not part of the identity.
+        // Where files lie, and how that is spelled, is not part of the identity.
         let robot = Robot { folder: PathBuf::new(), ..input.robot.clone() };
+        let vehicle = input.vehicle.map(|vehicle| Vehicle { file: PathBuf::new(), ..vehicle.clone() });
         // Optional parts that are absent are not part of the identity.
-        let drawings = format!("{robot:?}{:?}{:?}", input.vehicle, input.scene);
+        let drawings = format!("{robot:?}{vehicle:?}{:?}", input.scene);
         hasher.update(drawings.replace("gripper_tag: None, ", "").replace("lights: [], ", "").as_bytes());
         hasher.update(input.summary_markdown.unwrap_or_default().as_bytes());
         Ok(Self { recording_id: hasher.finalize().to_hex()[..32].to_owned() })

@@ -9,7 +9,7 @@ use armcal_belief::calib::{
     BaselineComparison, Calibration, CameraMount, FailedJointTable, Finding, JointResult, MapResult,
     ObservabilityTable, PriorTable, Refusal, Reservation, Status, VerdictTable,
 };
-use armcal_belief::session::StillReachable;
+use armcal_belief::session::{SkippedTarget, StillReachable};
 use armcal_core::numeric::Outcome;
 use armcal_core::robot::FailedKind;
 use armcal_core::routine::AssertFigure;
@@ -83,6 +83,9 @@ pub struct CaptureSummary {
     pub poses: usize,
     pub poses_skipped: usize,
     pub targets_skipped: usize,
+    /// Which, and why.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub skipped_targets: Vec<SkippedTarget>,
     /// Views with tags that the fit used.
     pub views: usize,
     pub detections: usize,
@@ -272,6 +275,7 @@ impl RunSummary {
                     + if calibration.held_out.cross_validated { 0 } else { calibration.held_out.views },
                 poses_skipped: 0,
                 targets_skipped: 0,
+                skipped_targets: Vec::new(),
                 views: calibration.fit.views,
                 detections: calibration.fit.tags_seen,
                 rejected: calibration.fit.rejected,

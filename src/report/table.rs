@@ -59,7 +59,10 @@ pub(super) fn score_rows(before: &ScoreSide, after: Option<&ScoreSide>) -> Vec<[
         };
         rows.push([figure.name.to_owned(), show(b), show(a), ratio]);
     }
-    let hits = |side: &ScoreSide| format!("{} of {}", side.hits, side.reach_error_m.map_or(0, |s| s.n));
+    let hits = |side: &ScoreSide| match side.targets {
+        0 => "-".to_owned(),
+        asked => format!("{} of {asked}", side.hits),
+    };
     rows.push([
         "targets hit within tolerance".to_owned(),
         hits(before),
@@ -117,6 +120,7 @@ pub(super) fn check_lines(summary: &RunSummary) -> Vec<String> {
     lines.extend(calibration_lines(&summary.calibration));
     lines.extend(contact_line(&summary.capture));
     lines.extend(coverage_lines(&summary.calibration));
+    lines.extend(compared_line(summary));
     lines.extend(reach_lines(summary));
     lines.extend(summary.asserts.iter().map(assert_line));
     lines.extend(summary.held_joints.iter().map(held_line));
@@ -178,6 +182,7 @@ fn capture_lines(capture: &CaptureSummary) -> Vec<String> {
         let reasons = capture.rejected_by_reason.iter().map(|(why, n)| format!("{n} {}", why.replace('_', " ")));
         lines.push(format!("rejected     {}", reasons.collect::<Vec<_>>().join(", ")));
     }
+    lines.extend(capture.skipped_targets.iter().map(|skipped| format!("skipped      {skipped}")));
     lines.extend(capture.stop_reason.as_ref().map(|why| stop_reason_line(why, &capture.renewals)));
     lines
 }
@@ -307,6 +312,21 @@ fn map_lines(map: &MapResult) -> Vec<String> {
     lines
 }
 
+/// Which targets errors before and after are compared over, where those are not all.
+fn compared_line(summary: &RunSummary) -> Option<String> {
+    let score = summary.score.as_ref()?;
+    let after = score.after.as_ref()?;
+    let (common, all) = (&score.compared_targets, score.before.targets.max(after.targets));
+    if common.is_empty() && score.before.reach_error_m.is_some() {
+        return Some(
+            "compared     no target was reached both before and after: the errors are of different ones".to_owned(),
+        );
+    }
+    let numbers = common.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
+    (!common.is_empty() && common.len() < all)
+        .then(|| format!("compared     errors before and after are over targets {numbers} of {all}"))
+}
+
 /// Every reach of a script that has more than the usual two, or in which targets are touched.
 fn reach_lines(summary: &RunSummary) -> Vec<String> {
     let reaches = summary.score.as_ref().map(|score| score.reaches.as_slice()).unwrap_or_default();
@@ -329,11 +349,13 @@ fn reach_lines(summary: &RunSummary) -> Vec<String> {
 fn assert_line(limit: &AssertSummary) -> String {
     let verdict = if limit.holds { "holds" } else { "FAILS" };
     let unit = limit.key.unit();
+    let digits = if unit == Unit::Count { 0 } else { 2 };
     let value = limit.value.map_or_else(
         || "there is no such figure (the script did not come to it, or nothing was measured)".to_owned(),
-        |value| unit.shown(value, 2),
+        |value| unit.shown(value, digits),
     );
-    format!("assert       {verdict}: step {}, {} {} against {value}", limit.step, limit.key, unit.shown(limit.limit, 2))
+    let asked = unit.shown(limit.limit, digits);
+    format!("assert       {verdict}: step {}, {} {asked} against {value}", limit.step, limit.key)
 }
 
 #[cfg(test)]

@@ -55,9 +55,16 @@ pub enum RunError {
     Output(#[from] OutputError),
     #[error("summary.json: {0}")]
     Json(#[from] serde_json::Error),
-    #[cfg(feature = "viewer")]
-    #[error("{0}")]
-    Replay(#[from] armcal_replay::ReplayError),
+}
+
+impl RunError {
+    /// Whether the machine is at fault, such as a full disk or a folder that was removed: the next try may go well.
+    #[must_use]
+    pub fn is_of_machine(&self) -> bool {
+        let mut causes =
+            std::iter::successors(Some(self as &(dyn std::error::Error + 'static)), |error| error.source());
+        matches!(self, Self::Output(_)) || causes.any(|cause| cause.is::<std::io::Error>())
+    }
 }
 
 /// A run that failed.

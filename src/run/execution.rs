@@ -35,6 +35,8 @@ pub struct Finished {
     pub calibration: Calibration,
     /// See [`corner_scatter_px`].
     pub corner_scatter_px: Option<f64>,
+    /// Why there is no replay, though there should be one.
+    pub replay_failure: Option<String>,
 }
 
 /// Runs the closed loop with `seed` and scores it. The watcher's clock is taken to have started with the command: its
@@ -116,6 +118,9 @@ impl Run<'_> {
 
     /// Keeps and names the recording that a broken run leaves; one in which nothing moved yet is removed.
     fn broken_off(&self, failure: Failure) -> Failure {
+        if let Some(error) = self.output.is_gone() {
+            return Failure { stage: failure.stage, error: Box::new(error.into()), kept: None };
+        }
         if matches!(failure.stage, Stage::Input | Stage::World | Stage::Plan) {
             self.output.discard();
             return failure;
@@ -142,15 +147,20 @@ impl Run<'_> {
     fn write_results(&self, outcome: Outcome, progress: &mut dyn Progress) -> Result<Finished, RunError> {
         let recording = read_recording(self.partial("run.mcap"))?;
         let mut summary = self.summary(&outcome, &recording)?;
+        let mut replay_failure = None;
         if self.keep == Keep::Everything {
+            // The calibration is worth more than its picture; a full disk has room again for the small files.
             #[cfg(feature = "viewer")]
-            self.mirror(&recording, &summary, &outcome)?;
+            if let Err(error) = self.mirror(&recording, &summary, &outcome) {
+                replay_failure = Some(error.to_string());
+                self.output.leave_out("run.rrd")?;
+            }
             // Taken last: the replay is part of what a user waits for.
             summary.wall_s = progress.wall_s();
             self.write_texts(&outcome.calibration, &summary)?;
         }
         let corner_scatter_px = corner_scatter_px(&recording);
-        Ok(Finished { summary, calibration: outcome.calibration, corner_scatter_px })
+        Ok(Finished { summary, calibration: outcome.calibration, corner_scatter_px, replay_failure })
     }
 
     fn summary(&self, outcome: &Outcome, recording: &Recording) -> Result<RunSummary, RunError> {
@@ -181,7 +191,8 @@ impl Run<'_> {
         summary.asserts = scored.asserts.iter().map(assert_summary).collect();
         summary.capture.poses = outcome.poses;
         summary.capture.poses_skipped = outcome.poses_skipped;
-        summary.capture.targets_skipped = outcome.targets_skipped;
+        summary.capture.targets_skipped = outcome.skipped_targets.len();
+        summary.capture.skipped_targets.clone_from(&outcome.skipped_targets);
         summary.capture.collisions = Some(scored.collisions);
         summary.capture.min_clearance_m = scored.min_clearance_m;
         summary.capture.margins = scored.margins;
@@ -204,7 +215,12 @@ impl Run<'_> {
     }
 
     #[cfg(feature = "viewer")]
-    fn mirror(&self, recording: &Recording, summary: &RunSummary, outcome: &Outcome) -> Result<(), RunError> {
+    fn mirror(
+        &self,
+        recording: &Recording,
+        summary: &RunSummary,
+        outcome: &Outcome,
+    ) -> Result<(), armcal_replay::ReplayError> {
         let markdown = markdown(summary);
         let believed_links: Vec<_> = outcome.epochs.iter().map(|epoch| (epoch.from, epoch.links())).collect();
         let truth = self.partial("truth.mcap");
@@ -219,8 +235,7 @@ impl Run<'_> {
                 summary_markdown: Some(&markdown),
             },
             &self.partial("run.rrd"),
-        )?;
-        Ok(())
+        )
     }
 }
 

@@ -31,6 +31,10 @@ pub struct Score {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub nees: Option<f64>,
     pub joints: Vec<JointScore>,
+    /// Targets at which the arm came to rest before and after: errors of `before` and `after` are over these. Empty
+    /// where there is no such target, or one side only; each side is then over its own.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub compared_targets: Vec<usize>,
     /// Every `reach` step of the script. `before` is the first of them under the datasheet's sensors, `after` the last
     /// under calibrated ones.
     pub reaches: Vec<ReachScore>,
@@ -66,8 +70,11 @@ pub struct ScoreSide {
     pub tool_error_rad: Option<Summary>,
     /// Target against where the tool came to rest.
     pub reach_error_m: Option<Summary>,
-    /// Targets reached within the task's tolerance.
+    /// Targets reached within the task's tolerance; one that was skipped is none of them.
     pub hits: usize,
+    /// Targets that were asked for, with the skipped ones.
+    #[serde(default)]
+    pub targets: usize,
 }
 
 /// Error of one joint's believed angle, estimate less truth.

@@ -1,5 +1,6 @@
 //! The figures of a run: truth against belief.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use nalgebra::Vector3;
@@ -46,27 +47,25 @@ pub fn score(input: &ScoreInput<'_>) -> Result<Scored, SimError> {
     let beliefs: Vec<_> = outcome.epochs.iter().map(belief).collect();
     let rests = reaches(input.recording, input.robot, &beliefs);
     let compared: Vec<Compared> = rests.iter().filter_map(|rest| compare(rest, &truth)).collect();
-    let of_step = |step: &ReachStep| -> Vec<&Compared> {
-        compared.iter().filter(|c| (step.start..=step.end).contains(&c.rest.start)).collect()
+    let sides: Vec<Side<'_>> = outcome.reaches.iter().map(|step| Side::of(step, &compared)).collect();
+    let reaches = sides.iter().map(|side| reach_score(input, &truth, side)).collect();
+    let first = sides.iter().find(|side| side.step.attempt == ReachAttempt::Before);
+    let last = sides.iter().rev().find(|side| side.step.attempt == ReachAttempt::After);
+    let last = last.filter(|side| !side.rests.is_empty());
+    let common = common_targets(first, last);
+    let before = first.map(|side| side.at(&common)).unwrap_or_default();
+    let after = last.map(|side| side.at(&common)).unwrap_or_default();
+    let figures = |side: Option<&Side<'_>>, rests: &[&Compared<'_>]| ScoreSide {
+        hits: side.map_or(0, |side| side.hits(input.tolerance_m)),
+        targets: side.map_or(0, |side| side.step.targets),
+        ..side_figures(rests, input.tolerance_m)
     };
-    let reaches: Vec<ReachScore> = outcome
-        .reaches
-        .iter()
-        .map(|step| ReachScore {
-            step: step.step,
-            calibrated: step.attempt == ReachAttempt::After,
-            side: side_figures(&of_step(step), input.tolerance_m),
-            touches: touch::touches(input.recording, &truth, input.robot, step, input.tolerance_m),
-        })
-        .collect();
-    let first = outcome.reaches.iter().find(|step| step.attempt == ReachAttempt::Before).map(of_step);
-    let last = outcome.reaches.iter().rev().find(|step| step.attempt == ReachAttempt::After).map(of_step);
-    let (before, after) = (first.unwrap_or_default(), last.unwrap_or_default());
     let score = Score {
-        before: side_figures(&before, input.tolerance_m),
-        after: (!after.is_empty()).then(|| side_figures(&after, input.tolerance_m)),
-        nees: nees(input, &after),
+        before: figures(first, &before),
+        after: last.is_some().then(|| figures(last, &after)),
+        nees: nees(input, last.map_or(&[], |side| &side.rests)),
         joints: joint_scores(input, &before, &after),
+        compared_targets: common.into_iter().collect(),
         reaches,
     };
     let asserts = outcome.asserts.iter().map(|limit| completed(limit, &score, &truth)).collect();
@@ -81,6 +80,7 @@ fn completed(limit: &AssertResult, score: &Score, truth: &Truth) -> AssertResult
         AssertFigure::ToolError => Some(reach?.tool_error_m?.median),
         AssertFigure::ReachError => Some(reach?.reach_error_m?.median),
         AssertFigure::WorstReachError => Some(reach?.reach_error_m?.max),
+        AssertFigure::Hits => Some(reach?.hits as f64),
         AssertFigure::Contacts => Some(truth.contacts.iter().filter(|contact| contact.stamp <= at).count() as f64),
         AssertFigure::Clearance => {
             let until = truth.clearances.iter().filter(|clearance| clearance.stamp <= at);
@@ -89,13 +89,60 @@ fn completed(limit: &AssertResult, score: &Score, truth: &Truth) -> AssertResult
         AssertFigure::HeldOutRms
         | AssertFigure::HeldOutReprojection
         | AssertFigure::PredictedToolError
-        | AssertFigure::SimulatedTime => limit.value,
+        | AssertFigure::SimulatedTime
+        | AssertFigure::TargetsSkipped
+        | AssertFigure::Poses
+        | AssertFigure::PosesSkipped => limit.value,
     });
     AssertResult { value, ..limit.clone() }
 }
 
 fn belief(epoch: &Epoch) -> Belief<'_> {
     Belief { from: epoch.from, sensors: &epoch.sensors, links: epoch.links() }
+}
+
+/// One `reach` step with its rests.
+struct Side<'a> {
+    step: &'a ReachStep,
+    rests: Vec<&'a Compared<'a>>,
+}
+
+impl<'a> Side<'a> {
+    fn of(step: &'a ReachStep, compared: &'a [Compared<'a>]) -> Self {
+        let rests = compared.iter().filter(|c| (step.start..=step.end).contains(&c.rest.start)).collect();
+        Self { step, rests }
+    }
+
+    fn targets(&self) -> BTreeSet<usize> {
+        self.rests.iter().map(|c| c.rest.target_idx).collect()
+    }
+
+    /// The rests at these targets; all of them where none are named.
+    fn at(&self, targets: &BTreeSet<usize>) -> Vec<&'a Compared<'a>> {
+        let is_wanted = |c: &&&Compared<'_>| targets.is_empty() || targets.contains(&c.rest.target_idx);
+        self.rests.iter().filter(is_wanted).copied().collect()
+    }
+
+    fn hits(&self, tolerance_m: f64) -> usize {
+        self.rests.iter().filter(|c| c.reach_error_m <= tolerance_m).count()
+    }
+}
+
+/// Targets at which the arm came to rest on both sides: a target that one side skipped would make the other look worse
+/// or better than it is.
+fn common_targets(first: Option<&Side<'_>>, last: Option<&Side<'_>>) -> BTreeSet<usize> {
+    let targets = |side: Option<&Side<'_>>| side.map(Side::targets).unwrap_or_default();
+    targets(first).intersection(&targets(last)).copied().collect()
+}
+
+fn reach_score(input: &ScoreInput<'_>, truth: &Truth, side: &Side<'_>) -> ReachScore {
+    let figures = side_figures(&side.rests, input.tolerance_m);
+    ReachScore {
+        step: side.step.step,
+        calibrated: side.step.attempt == ReachAttempt::After,
+        side: ScoreSide { targets: side.step.targets, ..figures },
+        touches: touch::touches(input.recording, truth, input.robot, side.step, input.tolerance_m),
+    }
 }
 
 /// One rest, believed and true.
@@ -134,6 +181,7 @@ fn side_figures(compared: &[&Compared<'_>], tolerance_m: f64) -> ScoreSide {
         tool_error_rad: summary(|c| c.tool_error_rad),
         reach_error_m: summary(|c| c.reach_error_m),
         hits: compared.iter().filter(|c| c.reach_error_m <= tolerance_m).count(),
+        targets: compared.len(),
     }
 }
 

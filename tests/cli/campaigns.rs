@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
-use crate::support::{Answer, ShortRoutine, answer, program, read, root, temp, write};
+use crate::support::{Answer, ShortRoutine, answer, edit, program, read, robot_copy, root, temp, write};
 
 /// Least runs: three views are too few, so the calibration is refused. With nine tags of eight nothing can be planned.
 const MATRIX: &str = "[world.physics]\ntruth_rate_hz = 5.0\n\
@@ -162,6 +162,24 @@ fn overrides_pass_the_checks_of_the_file() {
     answer(&mut check).expect("check", 0, &["17 poses"]);
 }
 
+/// What the machine was at fault for is no row: the same command makes the run again. A limit on the size of files
+/// stands for the full disk.
+#[cfg(unix)]
+#[test]
+fn a_full_disk_is_no_row_and_the_run_is_made_again() {
+    let folder = temp();
+    let mut short = ShortRoutine { poses: 10, held_out: 3, ..ShortRoutine::default() };
+    short.targets_m.truncate(1);
+    let routine = short.write(folder.path());
+    let out = folder.path().join("c.csv");
+    let mut shell = Command::new("sh");
+    shell.arg("-c").arg("ulimit -f 400; exec \"$0\" \"$@\"").arg(env!("CARGO_BIN_EXE_armcal"));
+    shell.arg("campaign").arg(&routine).args(["--seeds", "1"]).arg("--out").arg(&out);
+    answer(&mut shell).expect("full", 1, &["seed 1", "cannot be written", "goes on from there"]);
+    assert!(!read(&folder.path().join("c.csv.partial")).contains("failed") && !out.exists());
+    answer(&mut campaign(&routine, &out, &["--seeds", "1"])).expect("with room", 0, &["1 accepted", "0 failed"]);
+}
+
 /// The gate stands open for the same program, and shuts when the camera or the controller is worse.
 #[test]
 fn a_regression_is_found_and_none_is_found_where_none_is() {
@@ -193,6 +211,46 @@ fn a_regression_is_found_and_none_is_found_where_none_is() {
     regress(&["--seeds", "3", "--baseline"]).expect("no such seed", 2, &["baseline.csv", "seeds"]);
 }
 
+/// Pairs with another routine, robot or format say nothing; what a build reads is there, and how long it takes is said.
+#[test]
+fn a_baseline_of_something_else_is_refused_and_builds_get_their_files() {
+    let folder = temp();
+    let mut short = ShortRoutine { poses: 10, held_out: 3, ..ShortRoutine::default() };
+    short.targets_m.truncate(1);
+    let routine = short.write(folder.path());
+    let baseline = folder.path().join("baseline.csv");
+    let regress = |more: &[&str]| answer(program().arg("regress").arg(&routine).args(more).arg(&baseline));
+    regress(&["--seeds", "1", "--write-baseline"]).expect("baseline", 0, &["1 runs on", "1 accepted"]);
+
+    let [junit, markdown] = ["r.xml", "r.md"].map(|name| folder.path().join(name).display().to_string());
+    let told = regress(&["--json", "--junit", &junit, "--markdown", &markdown, "--baseline"]);
+    told.expect("itself", 0, &["\"verdict\": \"not_worse\"", "s of the arm's time each: about"]);
+    serde_json::from_str::<serde_json::Value>(&told.stdout).expect("JSON alone on stdout");
+    assert!(read(Path::new(&junit)).contains("tests=\"11\" skipped=\"0\" failures=\"0\" errors=\"0\""));
+    assert!(read(Path::new(&markdown)).contains("| tool error"));
+
+    let refused = |what: &str, words: &[&str]| {
+        let mut words = words.to_vec();
+        words.extend(["baseline.csv", "--write-baseline"]);
+        regress(&["--baseline"]).expect(what, 2, &words);
+    };
+    let text = read(&baseline);
+    let table = text.lines().filter(|line| !line.starts_with('#')).collect::<Vec<_>>().join("\n");
+    write(&baseline, &table);
+    refused("no head", &["does not say which routine"]);
+    write(&baseline, &text.replace("armcal baseline 1", "armcal baseline 2"));
+    refused("format", &["format 2"]);
+    write(&baseline, &text.replace("targets_skipped,", "targets_omitted,"));
+    refused("columns", &["no column targets_skipped"]);
+    write(&baseline, &text);
+    let robot = robot_copy(folder.path());
+    edit(&robot.join("robot.toml"), "corner_std_px = ", "corner_std_px = 1");
+    let other = regress(&["--robot", robot.to_str().expect("UTF-8"), "--baseline"]);
+    other.expect("robot", 2, &["robot `titan4` has changed"]);
+    ShortRoutine { poses: 11, ..short }.write(folder.path());
+    refused("routine", &["routine `short` has changed"]);
+}
+
 /// What the project itself is held against: the stored baseline, in small. The whole of it:
 /// `armcal regress routines/regression.toml --baseline routines/regression-baseline.csv`.
 #[test]
@@ -205,5 +263,6 @@ fn the_routine_of_the_project_is_not_worse_than_its_baseline() {
     for figure in ["tool_error", "reach_error", "residual", "held_out"] {
         regress.args(["--set", &format!("regress.{figure}_ratio=1.5")]);
     }
-    answer(&mut regress).expect("regress", 0, &["not worse", "miss at the target"]);
+    regress.arg("--allow-inconclusive");
+    answer(&mut regress).expect("regress", 0, &["miss at the target"]);
 }

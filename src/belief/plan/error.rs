@@ -32,3 +32,14 @@ pub enum PlanError {
     #[error(transparent)]
     Path(#[from] PathError),
 }
+
+impl PlanError {
+    /// The same, where the target has number `number` in the task's list.
+    #[must_use]
+    pub fn of_target(mut self, number: usize) -> Self {
+        if let Self::TargetOutOfReach { target, .. } | Self::TargetTooClose { target, .. } = &mut self {
+            *target = number;
+        }
+        self
+    }
+}

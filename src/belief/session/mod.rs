@@ -33,7 +33,7 @@ mod unwatched;
 pub use error::SessionError;
 pub use held_joint::HeldJoint;
 pub use inputs::SessionInputs;
-pub use outcome::{AssertResult, Epoch, EstimateUpdate, Outcome, ReachStep, StillReachable, Visit};
+pub use outcome::{AssertResult, Epoch, EstimateUpdate, Outcome, ReachStep, SkippedTarget, StillReachable, Visit};
 pub use progress::{Approval, MotionAhead, Progress};
 pub use recorder::Recorder;
 pub use script::run;

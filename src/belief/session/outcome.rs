@@ -20,8 +20,8 @@ pub struct Outcome {
     pub poses: usize,
     /// Poses given up: no path, or the arm did not settle.
     pub poses_skipped: usize,
-    /// Targets given up, over all attempts.
-    pub targets_skipped: usize,
+    /// Targets given up, in the order of time.
+    pub skipped_targets: Vec<SkippedTarget>,
     /// Time of the whole run, by the arm's clock.
     pub duration_s: f64,
     /// Time for which the arm was moving, not standing, s.
@@ -128,12 +128,31 @@ pub struct EstimateUpdate {
 pub struct ReachStep {
     /// Number of the step in the script, from 1.
     pub step: usize,
+    /// Targets that it asks for.
+    pub targets: usize,
     /// Whether the arm believed in a calibration.
     pub attempt: ReachAttempt,
     /// Start of the step, by the arm's clock.
     pub start: Stamp,
     /// End of the step.
     pub end: Stamp,
+}
+
+/// A target of a `reach` step that the arm did not come to rest at.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SkippedTarget {
+    /// Number of the step in the script, from 1.
+    pub step: usize,
+    /// Number of the task's target, from 0.
+    pub target: usize,
+    /// The reason, in words.
+    pub reason: String,
+}
+
+impl fmt::Display for SkippedTarget {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "step {}, target {}: {}", self.step, self.target, self.reason)
+    }
 }
 
 /// One limit of an `assert` step, and how it came out.

@@ -1,13 +1,17 @@
 //! Reaches for the task's targets under the sensors believed in.
 
-use crate::plan::{PlanError, TargetRequest, plan_targets};
+use crate::plan::{TargetRequest, plan_targets};
 use crate::session::SessionError;
+use crate::session::outcome::SkippedTarget;
 use crate::session::runner::ScriptRunner;
 use armcal_core::routine::ReachSettings;
 use armcal_core::streams::{JointAngles, LogLevel, MarkKind, Phase, ReachAttempt};
 
 /// How long the arm is watched at a target, s.
 const REACH_DWELL_S: f64 = 0.6;
+
+/// Where the arm is to go, or has come to rest; or why not.
+type OrReason<T> = Result<T, String>;
 
 impl ScriptRunner<'_, '_> {
     /// Goes to each target and rests there for a moment; if it is to be touched, with open jaws, which then close on
@@ -23,17 +27,17 @@ impl ScriptRunner<'_, '_> {
         self.driver.phase(Phase::Reach)?;
         for (n, &target) in targets.iter().enumerate() {
             self.progress_at(Phase::Reach, n, targets.len());
-            let mut arrived = self.arrive(postures[n])?;
-            while !arrived && self.take_up_failures() {
+            let mut arrived = self.arrive(&postures[n])?;
+            while arrived.is_err() && self.take_up_failures() {
                 postures = self.postures(targets, attempt)?;
-                arrived = self.arrive(postures[n])?;
+                arrived = self.arrive(&postures[n])?;
             }
-            if !arrived {
-                self.tally.targets_skipped += 1;
-                if let Some(still) = self.still_reachable.as_mut().filter(|_| postures[n].is_some()) {
+            if let Err(reason) = arrived {
+                if let Some(still) = self.still_reachable.as_mut().filter(|_| postures[n].is_ok()) {
                     still.reachable -= 1;
                     still.no_path.push(target);
                 }
+                self.skip(SkippedTarget { step, target, reason })?;
                 continue;
             }
             let kind = MarkKind::Reach { attempt, target_idx: target as u32 };
@@ -51,16 +55,33 @@ impl ScriptRunner<'_, '_> {
         }
     }
 
-    fn arrive(&mut self, at: Option<JointAngles>) -> Result<bool, SessionError> {
-        match at {
-            Some(angles) => Ok(self.go(&angles)? && self.driver.settle()?),
-            None => Ok(false),
+    fn arrive(&mut self, at: &OrReason<JointAngles>) -> Result<OrReason<()>, SessionError> {
+        let angles = match at {
+            Ok(angles) => angles,
+            Err(reason) => return Ok(Err(reason.clone())),
+        };
+        let n_met = self.driver.n_met;
+        self.driver.why_blocked = None;
+        if !self.go(angles)? {
+            return Ok(Err(match &self.driver.why_blocked {
+                Some(blocked) => blocked.clone(),
+                None if self.driver.n_met > n_met => "the arm met something on its way".to_owned(),
+                None => "the arm did not follow its path to the end".to_owned(),
+            }));
         }
+        let is_at_rest = self.driver.settle()?;
+        Ok(is_at_rest.then_some(()).ok_or_else(|| "the arm did not come to rest".to_owned()))
+    }
+
+    fn skip(&mut self, skipped: SkippedTarget) -> Result<(), SessionError> {
+        self.driver.log(LogLevel::Warn, &format!("a target is left out: {skipped}"))?;
+        self.tally.skipped_targets.push(skipped);
+        Ok(())
     }
 
     /// Says once what the targets ask beyond what the calibration in use saw, if that is more than straight lines: a
     /// fitted shape is worth nothing where there were no views.
-    fn warn_beyond(&mut self, postures: &[Option<JointAngles>]) -> Result<(), SessionError> {
+    fn warn_beyond(&mut self, postures: &[OrReason<JointAngles>]) -> Result<(), SessionError> {
         let calibration = self.epochs.last().and_then(|epoch| epoch.calibration.as_ref());
         let Some(calibration) = calibration.filter(|c| c.reference.is_some()) else { return Ok(()) };
         let conditions = self.driver.conditions();
@@ -79,33 +100,27 @@ impl ScriptRunner<'_, '_> {
 
     /// Believed angles at each target. A target that a calibration puts out of reach is no reason to lose the rest: it
     /// is named and left out.
-    fn postures(&mut self, targets: &[usize], attempt: ReachAttempt) -> Result<Vec<Option<JointAngles>>, SessionError> {
+    fn postures(
+        &mut self,
+        targets: &[usize],
+        attempt: ReachAttempt,
+    ) -> Result<Vec<OrReason<JointAngles>>, SessionError> {
         let planned = self.planned.as_ref().map(|planned| planned.targets.clone()).unwrap_or_default();
         let preferred: Vec<JointAngles> = targets.iter().filter_map(|&target| planned.get(target)).copied().collect();
         let has_failed = !self.driver.held.is_empty();
         if let Some(held) = self.unlocated() {
-            let name = &self.robot.sensors[held.joint].joint;
-            let text = format!("all targets are left out: no view has shown yet where {name} stands");
-            self.driver.log(LogLevel::Warn, &text)?;
-            return Ok(vec![None; targets.len()]);
+            let reason = format!("no view has shown yet where {} stands", self.robot.sensors[held.joint].joint);
+            self.driver.log(LogLevel::Warn, &format!("all targets are left out: {reason}"))?;
+            return Ok(vec![Err(reason); targets.len()]);
         }
         if attempt == ReachAttempt::Before && preferred.len() == targets.len() && !has_failed {
-            return Ok(preferred.into_iter().map(Some).collect());
+            return Ok(preferred.into_iter().map(Ok).collect());
         }
         let targets_m: Vec<[f64; 3]> = targets.iter().map(|&t| self.setup.routine.task.targets_m[t]).collect();
         let request = TargetRequest { targets_m: &targets_m, preferred: Some(&preferred), margin_m: self.margin_m() };
         let solved = plan_targets(&self.robot, &self.clearance, &self.bounds, &request, &mut self.rng);
         self.note_reachable(targets, &solved);
-        solved.into_iter().map(|planned| self.or_skipped(planned)).collect()
-    }
-
-    fn or_skipped(&mut self, planned: Result<JointAngles, PlanError>) -> Result<Option<JointAngles>, SessionError> {
-        match planned {
-            Ok(angles) => Ok(Some(angles)),
-            Err(why) => {
-                self.driver.log(LogLevel::Warn, &format!("a target is left out: {why}"))?;
-                Ok(None)
-            }
-        }
+        let named = targets.iter().zip(solved);
+        Ok(named.map(|(&target, plan)| plan.map_err(|why| why.of_target(target).to_string())).collect())
     }
 }

@@ -9,7 +9,7 @@ use crate::calib::Calibration;
 use crate::plan::{ClearanceModel, JointErrorBounds, PosePlan};
 use crate::session::inputs::SessionInputs;
 use crate::session::motion::Driver;
-use crate::session::outcome::{AssertResult, Epoch, EstimateUpdate, ReachStep, StillReachable, Visit};
+use crate::session::outcome::{AssertResult, Epoch, EstimateUpdate, ReachStep, SkippedTarget, StillReachable, Visit};
 use armcal_core::kinematics::Chain;
 use armcal_core::robot::Robot;
 use armcal_core::sensor::ArmSensors;
@@ -21,7 +21,7 @@ use armcal_core::time::Stamp;
 pub(crate) struct Tally {
     pub poses: usize,
     pub poses_skipped: usize,
-    pub targets_skipped: usize,
+    pub skipped_targets: Vec<SkippedTarget>,
     pub calibration_wall_s: f64,
 }
 

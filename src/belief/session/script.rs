@@ -110,7 +110,8 @@ impl ScriptRunner<'_, '_> {
                 Step::Reach(reach) => {
                     let (start, attempt) = (self.driver.now(), self.attempt());
                     self.reach(number, reach)?;
-                    self.reaches.push(ReachStep { step: number, attempt, start, end: self.driver.now() });
+                    let (targets, end) = (reach.targets.len(), self.driver.now());
+                    self.reaches.push(ReachStep { step: number, targets, attempt, start, end });
                 }
                 Step::Capture(capture) => self.capture(capture).map_err(|error| after_motion(number, error))?,
                 Step::Identify(settings) => {
@@ -146,7 +147,7 @@ impl ScriptRunner<'_, '_> {
             calibration,
             poses: self.tally.poses,
             poses_skipped: self.tally.poses_skipped,
-            targets_skipped: self.tally.targets_skipped,
+            skipped_targets: self.tally.skipped_targets,
             duration_s: self.driver.elapsed_s(),
             motion_s: self.driver.motion_s,
             waited_s: self.driver.waited_s,
@@ -317,9 +318,13 @@ impl ScriptRunner<'_, '_> {
             AssertFigure::HeldOutReprojection => calibration?.held_out.rms_px,
             AssertFigure::PredictedToolError => calibration?.predicted_tool_error_m.map(|summary| summary.p95),
             AssertFigure::SimulatedTime => Some(self.driver.elapsed_s()),
+            AssertFigure::TargetsSkipped => Some(self.tally.skipped_targets.len() as f64),
+            AssertFigure::Poses => Some(self.tally.poses as f64),
+            AssertFigure::PosesSkipped => Some(self.tally.poses_skipped as f64),
             AssertFigure::ToolError
             | AssertFigure::ReachError
             | AssertFigure::WorstReachError
+            | AssertFigure::Hits
             | AssertFigure::Clearance
             | AssertFigure::Contacts => None,
         }

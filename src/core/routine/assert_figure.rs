@@ -37,6 +37,18 @@ pub enum AssertFigure {
     /// Since the start.
     #[serde(rename = "contacts")]
     Contacts,
+    /// Targets within the tolerance in the last reach, at least.
+    #[serde(rename = "hits")]
+    Hits,
+    /// Targets given up since the start.
+    #[serde(rename = "targets_skipped")]
+    TargetsSkipped,
+    /// Views captured since the start, at least.
+    #[serde(rename = "poses")]
+    Poses,
+    /// Poses given up since the start.
+    #[serde(rename = "poses_skipped")]
+    PosesSkipped,
 }
 
 /// What must have happened before there is a figure.
@@ -61,6 +73,10 @@ impl AssertFigure {
             Self::WorstReachError => "reach_error_max_m",
             Self::Clearance => "clearance_m",
             Self::Contacts => "contacts",
+            Self::Hits => "hits",
+            Self::TargetsSkipped => "targets_skipped",
+            Self::Poses => "poses",
+            Self::PosesSkipped => "poses_skipped",
         }
     }
 
@@ -70,7 +86,7 @@ impl AssertFigure {
         match self {
             Self::HeldOutReprojection => Unit::Pixels,
             Self::SimulatedTime => Unit::Seconds,
-            Self::Contacts => Unit::Count,
+            Self::Contacts | Self::Hits | Self::TargetsSkipped | Self::Poses | Self::PosesSkipped => Unit::Count,
             Self::HeldOutRms
             | Self::PredictedToolError
             | Self::ToolError
@@ -85,15 +101,23 @@ impl AssertFigure {
     pub const fn needs(self) -> Needs {
         match self {
             Self::HeldOutRms | Self::HeldOutReprojection | Self::PredictedToolError => Needs::Calibration,
-            Self::ToolError | Self::ReachError | Self::WorstReachError => Needs::Reach,
-            Self::SimulatedTime | Self::Clearance | Self::Contacts => Needs::Nothing,
+            Self::ToolError | Self::ReachError | Self::WorstReachError | Self::Hits => Needs::Reach,
+            Self::SimulatedTime
+            | Self::Clearance
+            | Self::Contacts
+            | Self::TargetsSkipped
+            | Self::Poses
+            | Self::PosesSkipped => Needs::Nothing,
         }
     }
 
-    /// Clearance is to be at least its limit, all else at most.
+    /// Clearance, hits and poses are to be at least their limits, all else at most.
     #[must_use]
     pub fn holds(self, value: f64, limit: f64) -> bool {
-        if self == Self::Clearance { value >= limit } else { value <= limit }
+        match self {
+            Self::Clearance | Self::Hits | Self::Poses => value >= limit,
+            _ => value <= limit,
+        }
     }
 }
 
@@ -134,9 +158,10 @@ mod tests {
     #[test]
     fn the_key_in_code_is_the_key_in_files() {
         let text = "contacts = 0.0\nclearance_m = 0.1\nheld_out_rms_m = 0.01\nsimulated_s = 9.0\nreach_error_m = 1.0\n\
-                    reach_error_max_m = 1.0\ntool_error_m = 1.0\npredicted_tool_error_m = 1.0\nheld_out_rms_px = 2.0";
+                    reach_error_max_m = 1.0\ntool_error_m = 1.0\npredicted_tool_error_m = 1.0\nheld_out_rms_px = 2.0\n\
+                    hits = 4\ntargets_skipped = 0\nposes = 10\nposes_skipped = 2";
         let limits: AssertLimits = toml::from_str(text).expect("all keys");
-        assert_eq!(limits.each().count(), 9);
+        assert_eq!(limits.each().count(), 13);
         for (figure, _) in limits.each() {
             assert_eq!(toml::Value::try_from(figure).expect("a name").as_str(), Some(figure.key()));
         }

@@ -81,6 +81,8 @@ pub struct RegressSettings {
     pub corner_scatter_ratio: f64,
     /// The same of the simulated time.
     pub time_ratio: f64,
+    /// Limit of poses captured, baseline over new.
+    pub poses_ratio: f64,
     /// Limits of the new value itself, median over the seeds, m.
     pub tool_error_m: Option<f64>,
     /// The same of the distance between target and tool; `None` sets no limit.
@@ -96,6 +98,7 @@ impl Default for RegressSettings {
             held_out_ratio: 1.10,
             corner_scatter_ratio: 1.10,
             time_ratio: 1.10,
+            poses_ratio: 1.10,
             tool_error_m: None,
             reach_error_m: None,
         }
@@ -111,6 +114,7 @@ impl RegressSettings {
             ("held_out_ratio", self.held_out_ratio),
             ("corner_scatter_ratio", self.corner_scatter_ratio),
             ("time_ratio", self.time_ratio),
+            ("poses_ratio", self.poses_ratio),
         ];
         for (key, value) in ratios {
             FileIssue::check_range(file, &format!("regress.{key}"), value, 1.0..=1000.0)?;

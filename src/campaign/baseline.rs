@@ -1,0 +1,44 @@
+//! Tables that runs of today can be compared with.
+
+use std::path::Path;
+
+use crate::campaign::store::read_summary;
+use crate::campaign::{CampaignError, Metric, Origin, Prepared, Table, parse_table, table_text};
+
+/// The table with what it is of in its first lines.
+///
+/// # Errors
+/// [`CampaignError::Read`] for a file that has vanished meanwhile.
+pub fn baseline_text(prepared: &Prepared, table: &Table) -> Result<String, CampaignError> {
+    Ok(Origin::of_campaign(prepared)?.head() + &table_text(table))
+}
+
+/// Reads a baseline, or a campaign's table with its summary beside it, that `prepared` can be compared with: of the
+/// same routine (overrides of today aside), robot and vehicle, and with all figures that are looked at.
+///
+/// # Errors
+/// [`CampaignError::Table`] saying what is different, and how to make the baseline anew.
+pub fn read_baseline(path: &Path, prepared: &Prepared) -> Result<Table, CampaignError> {
+    let bytes = std::fs::read(path).map_err(|source| CampaignError::Read { path: path.to_owned(), source })?;
+    let refused = |problem: String| CampaignError::Table { path: path.to_owned(), problem };
+    let anew = |problem: String| {
+        let routine = prepared.request.routine.display();
+        refused(format!("{problem}; make it anew: armcal regress {routine} --write-baseline {}", path.display()))
+    };
+    let table = parse_table(&bytes).map_err(refused)?;
+    let origin = match Origin::read(&String::from_utf8_lossy(&bytes)).map_err(anew)? {
+        Some(origin) => Some(origin),
+        None => read_summary(path)?.and_then(|summary| summary.origin),
+    };
+    let origin = origin.ok_or_else(|| anew("does not say which routine and robot it is of".to_owned()))?;
+    // The overrides are what is under test, unless the baseline was made with them.
+    let (plainly, with_overrides) = (Origin::of(prepared, &[])?, Origin::of_campaign(prepared)?);
+    if let (Some(difference), Some(_)) = (origin.difference(&plainly), origin.difference(&with_overrides)) {
+        return Err(anew(difference));
+    }
+    let lacks = |metric: &&Metric| table.place(**metric).is_none();
+    match Metric::COMPARED.iter().find(lacks) {
+        Some(metric) => Err(anew(format!("is of another version of armcal: it has no column {}", metric.name()))),
+        None => Ok(table),
+    }
+}

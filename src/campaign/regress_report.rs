@@ -1,0 +1,191 @@
+//! A comparison for people and for the machines that build and test: table, Markdown, JUnit.
+
+use comfy_table::Table as Grid;
+use comfy_table::presets::{ASCII_MARKDOWN, UTF8_FULL_CONDENSED};
+use quick_junit::{NonSuccessKind, Report, TestCase, TestCaseStatus, TestSuite};
+
+use crate::campaign::regress::{Check, Comparison, Verdict, WorstPair};
+
+impl Verdict {
+    fn word(self) -> &'static str {
+        match self {
+            Self::NotWorse => "ok",
+            Self::Inconclusive => "inconclusive",
+            Self::Worse => "WORSE",
+        }
+    }
+}
+
+impl Check {
+    fn value_text(&self) -> String {
+        self.value.map_or_else(|| "-".to_owned(), |value| self.shown(value))
+    }
+
+    fn interval_text(&self) -> String {
+        let (Some(low), Some(high)) = (self.low, self.high) else { return String::new() };
+        let number = |value| self.shown(value).trim_start_matches("x ").to_owned();
+        format!("{} .. {}", number(low), number(high))
+    }
+
+    fn budget_text(&self) -> String {
+        let below = if self.unit == armcal_core::units::Unit::Ratio { "below " } else { "" };
+        format!("{below}{}", self.shown(self.budget))
+    }
+
+    fn verdict_text(&self) -> &'static str {
+        match (self.verdict, self.n) {
+            (Verdict::NotWorse, 0) => "no pairs",
+            (verdict, _) => verdict.word(),
+        }
+    }
+
+    fn in_words(&self) -> String {
+        let interval = self.interval_text();
+        let interval = if interval.is_empty() { interval } else { format!(" ({interval})") };
+        format!("{}{interval} in {} pairs, budget {}", self.value_text(), self.n, self.budget_text())
+    }
+}
+
+impl WorstPair {
+    fn in_words(&self) -> String {
+        let setting = if self.settings.is_empty() { String::new() } else { format!(" ({})", self.settings) };
+        format!("{}: seed {}{setting}: {}", self.what, self.seed, self.detail)
+    }
+}
+
+fn grid(comparison: &Comparison, preset: &str) -> Grid {
+    let mut grid = Grid::new();
+    grid.load_preset(preset);
+    grid.set_header(["new over baseline, by seed", "pairs", "median", "90 % interval", "budget", ""]);
+    for check in &comparison.checks {
+        let (value, interval, budget) = (check.value_text(), check.interval_text(), check.budget_text());
+        grid.add_row([check.what, &check.n.to_string(), &value, &interval, &budget, check.verdict_text()]);
+    }
+    grid
+}
+
+/// The last line: what it comes to.
+fn conclusion(comparison: &Comparison) -> &'static str {
+    match comparison.verdict {
+        Verdict::Worse => "WORSE than the baseline",
+        Verdict::Inconclusive => {
+            "INCONCLUSIVE: the pairs fit both no change and more than the budget; take more seeds, or let it pass with \
+             --allow-inconclusive"
+        }
+        Verdict::NotWorse => "not worse than the baseline",
+    }
+}
+
+const SAME: &str = "every figure of every run is the same as in the baseline";
+
+/// Lays a comparison out for a terminal.
+#[must_use]
+pub fn regress_table(comparison: &Comparison) -> String {
+    let mut text = grid(comparison, UTF8_FULL_CONDENSED).to_string();
+    if comparison.identical && comparison.pairs > 0 {
+        text.push_str(&format!("\n{SAME}"));
+    }
+    for pair in &comparison.worst {
+        text.push_str(&format!("\n{}\n  {}", pair.in_words(), pair.command));
+    }
+    format!("{text}\nregress      {}", conclusion(comparison))
+}
+
+/// The same as Markdown, for the page of a build.
+#[must_use]
+pub fn regress_markdown(comparison: &Comparison, routine: &str) -> String {
+    let mut text =
+        format!("# Regression of `{routine}`\n\n{}\n\n{}\n", conclusion(comparison), grid(comparison, ASCII_MARKDOWN));
+    if comparison.identical && comparison.pairs > 0 {
+        text.push_str(&format!("\n{SAME}\n"));
+    }
+    for pair in &comparison.worst {
+        text.push_str(&format!("\n- {}; `{}`", pair.in_words(), pair.command));
+    }
+    if !comparison.worst.is_empty() {
+        text.push('\n');
+    }
+    text
+}
+
+/// The same as JUnit's XML: a test case a check, which fails where it is worse. `inconclusive`: what becomes of a check
+/// that decides nothing.
+///
+/// # Errors
+/// When the text cannot be made.
+pub fn regress_junit(
+    comparison: &Comparison,
+    routine: &str,
+    inconclusive: Undecided,
+) -> Result<String, quick_junit::SerializeError> {
+    let mut suite = TestSuite::new(format!("regression of {routine}"));
+    for check in &comparison.checks {
+        let mut status = match (check.verdict, inconclusive) {
+            (Verdict::NotWorse, _) => TestCaseStatus::success(),
+            (Verdict::Inconclusive, Undecided::Passes) => TestCaseStatus::skipped(),
+            (Verdict::Inconclusive, Undecided::Fails) | (Verdict::Worse, _) => {
+                TestCaseStatus::non_success(NonSuccessKind::Failure)
+            }
+        };
+        if check.verdict != Verdict::NotWorse {
+            status.set_message(check.in_words()).set_type(check.verdict.word());
+            let pairs = comparison.worst.iter().filter(|pair| pair.what == check.what);
+            let pairs = pairs.map(|pair| format!("{}\n  {}", pair.in_words(), pair.command));
+            status.set_description(pairs.collect::<Vec<_>>().join("\n"));
+        }
+        let mut case = TestCase::new(check.what, status);
+        case.set_classname(routine).set_system_out(check.in_words());
+        suite.add_test_case(case);
+    }
+    let mut report = Report::new("armcal regress");
+    report.add_test_suite(suite);
+    report.to_string()
+}
+
+/// What becomes of a check that decides nothing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Undecided {
+    Fails,
+    Passes,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::campaign::compare;
+    use crate::campaign::table_file::tests::{names, row};
+    use crate::campaign::{Row, Table};
+    use armcal_core::routine::RegressSettings;
+
+    fn comparison(factor: f64) -> Comparison {
+        let table = |factor: f64| {
+            let of = |seed| Row { figures: vec![Some(1.0), Some(0.0), Some(0.004 * factor)], ..row(0, seed) };
+            Table { names: names(), rows: (1..=6).map(of).collect() }
+        };
+        compare(&table(1.0), &table(factor), &RegressSettings::default())
+    }
+
+    #[test]
+    fn builds_read_which_check_failed_and_how_to_repeat_it() {
+        let worse = comparison(1.5);
+        let xml = regress_junit(&worse, "r", Undecided::Fails).expect("XML");
+        assert!(xml.contains("failures=\"1\"") && xml.contains("x 1.500") && xml.contains("--seed 1"), "{xml}");
+        assert!(xml.contains("name=\"tool error\" classname=\"r\""), "{xml}");
+        let same = regress_junit(&comparison(1.0), "r", Undecided::Fails).expect("XML");
+        assert!(same.contains("failures=\"0\""), "{same}");
+        let page = regress_markdown(&worse, "r");
+        assert!(page.contains("| tool error") && page.contains("WORSE") && page.contains("`armcal run"), "{page}");
+        let json = serde_json::to_value(&worse).expect("JSON");
+        assert_eq!((&json["verdict"], &json["pairs"]), (&"worse".into(), &6.into()));
+    }
+
+    #[test]
+    fn what_decides_nothing_fails_or_is_skipped() {
+        let mut undecided = comparison(1.0);
+        undecided.checks[5].verdict = Verdict::Inconclusive;
+        let fails = regress_junit(&undecided, "r", Undecided::Fails).expect("XML");
+        assert!(fails.contains("failures=\"1\"") && fails.contains("inconclusive"), "{fails}");
+        let passes = regress_junit(&undecided, "r", Undecided::Passes).expect("XML");
+        assert!(passes.contains("failures=\"0\"") && passes.contains("<skipped"), "{passes}");
+    }
+}
