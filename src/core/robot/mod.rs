@@ -24,6 +24,7 @@ mod self_pairs;
 mod shape;
 mod survey;
 mod urdf;
+mod urdf_text;
 mod vehicle;
 
 pub use allowed_pairs::AllowedPairs;
