@@ -57,3 +57,84 @@ fn a_deep_urdf_attached_to_a_recording_is_refused() {
     replay.arg("replay").arg(&recording).arg("--save").arg(folder.path().join("a.rrd"));
     answer(&mut replay).expect("replay", 2, &["titan4.urdf", "nested more than 64 deep"]);
 }
+
+/// All that a routine names, in one folder, each to be replaced by something that never ends.
+#[test]
+fn devices_and_pipes_in_place_of_files_are_refused_at_once() {
+    let folder = temp();
+    let names = ["robot.toml", "titan4.urdf", "self_collision.toml"];
+    for (name, link) in names.into_iter().flat_map(|name| [(name, true), (name, false)]) {
+        let robot = robot_copy(folder.path());
+        let file = robot.join(name);
+        never_ending(&file, link);
+        check(&robot).expect(name, 2, &[name, "cannot be read"]);
+        std::fs::remove_dir_all(&robot).expect("removed");
+    }
+    for link in [true, false] {
+        let file = folder.path().join("any.toml");
+        never_ending(&file, link);
+        let words = ["any.toml", "not a regular file"];
+        check(&file).expect("check", 2, &words);
+        run(&file, &folder.path().join("out")).expect("run", 2, &words);
+        answer(program().arg("export").arg(&file).args(["--as", "toml"])).expect("export", 2, &words);
+        let recording = folder.path().join("any.mcap");
+        never_ending(&recording, link);
+        let words = ["any.mcap", "not a regular file"];
+        answer(program().arg("inspect").arg(&recording)).expect("inspect", 2, &words);
+        calibrate(&recording, &root().join("robots/titan4"), folder.path()).expect("calibrate", 2, &words);
+        for mesh in ["any.stl", "any.obj"] {
+            never_ending(&folder.path().join(mesh), link);
+            let tail = format!(
+                "[[obstacle]]\nname = \"a\"\nshape = \"mesh\"\nfile = \"{mesh}\"\nposition_m = [9.0, 9.0, 9.0]\n"
+            );
+            let routine = ShortRoutine { tail, ..ShortRoutine::default() }.write(folder.path());
+            check(&routine).expect(mesh, 2, &[mesh, "not a regular file"]);
+        }
+        let tail = "[world.vehicle]\nmotion = \"recorded\"\nmotion_file = \"any.csv\"\n".to_owned();
+        never_ending(&folder.path().join("any.csv"), link);
+        let routine = ShortRoutine { tail, ..ShortRoutine::default() }.write(folder.path());
+        check(&routine).expect("motion", 2, &["any.csv", "not a regular file"]);
+    }
+}
+
+/// A link to /dev/zero, or a pipe that nobody writes to.
+fn never_ending(file: &Path, link: bool) {
+    let _ = std::fs::remove_file(file);
+    if link {
+        std::os::unix::fs::symlink("/dev/zero", file).expect("linked");
+    } else {
+        assert!(std::process::Command::new("mkfifo").arg(file).status().expect("mkfifo").success());
+    }
+}
+
+#[test]
+fn links_out_of_a_robot_folder_are_refused() {
+    let folder = temp();
+    for name in ["robot.toml", "titan4.urdf"] {
+        let robot = robot_copy(folder.path());
+        std::fs::rename(robot.join(name), folder.path().join(name)).expect("moved");
+        std::os::unix::fs::symlink(folder.path().join(name), robot.join(name)).expect("linked");
+        check(&robot).expect(name, 2, &[name, "a link out of its folder"]);
+        std::fs::remove_dir_all(&robot).expect("removed");
+    }
+}
+
+#[test]
+fn long_files_and_many_entries_are_refused() {
+    let folder = temp();
+    let file = folder.path().join("map.toml");
+    let tag = |k: usize| {
+        format!(
+            "[[tag]]\nid = {k}\nsize_m = 0.1\nposition_m = [0.0, 0.0, 1.0]\nquaternion_wxyz = [1.0, 0.0, 0.0, 0.0]\n"
+        )
+    };
+    let map = |n: usize| format!("version = 1\nframe = \"a\"\n{}", (0..n).map(tag).collect::<String>());
+    write(&file, &map(5_000));
+    check(&file).expect("5,000 tags", 0, &["5000 landmarks"]);
+    write(&file, &map(5_001));
+    check(&file).expect("5,001 tags", 2, &["map.toml", "5001 tags", "0 .. 5000"]);
+    write(&file, &map(60_000));
+    check(&file).expect("60,000 tags", 2, &["map.toml", "more than 100000 keys"]);
+    write(&file, &map(200_000));
+    check(&file).expect("200,000 tags", 2, &["map.toml", "more than 8388608 bytes"]);
+}

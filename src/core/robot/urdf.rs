@@ -7,7 +7,7 @@ use nalgebra::{Isometry3, Matrix3, Translation3, Unit, UnitQuaternion, Vector3};
 use urdf_rs::{Geometry, JointType};
 
 use super::body::LinkBody;
-use super::error::{FileIssue, RobotError, read_text};
+use super::error::{FileIssue, RobotError};
 use super::shape::{PlacedShape, Shape};
 use super::urdf_text::plain_urdf;
 use crate::joints::MAX_JOINTS;
@@ -55,12 +55,11 @@ impl UrdfModel {
         self.robot.joints.iter().find(|other| other.name == joint).map_or(0.0, |joint| joint.limit.effort)
     }
 
-    /// Reads `file` and checks that it is a tree of known links with finite numbers.
+    /// Parses the text of `file` and checks that it is a tree of known links with finite numbers.
     ///
     /// # Errors
     /// [`RobotError`] naming the file and the link or joint.
-    pub fn read(file: &Path) -> Result<Self, RobotError> {
-        let text = read_text(file)?;
+    pub fn parse(file: &Path, text: String) -> Result<Self, RobotError> {
         let robot = plain_urdf(&text)
             .and_then(|plain| urdf_rs::read_from_string(&plain).map_err(|error| error.to_string()))
             .map_err(|message| RobotError::Syntax { file: file.to_owned(), message })?;
