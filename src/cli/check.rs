@@ -9,6 +9,7 @@ use clap::Args;
 use crate::campaign::Request;
 use crate::cli::exit::{Exit, UsageError, explain};
 use crate::cli::overrides::OverrideArgs;
+use crate::cli::stdout::say;
 use armcal_belief::calib::{Calibration, CalibrationFileError};
 use armcal_belief::plan::{ClearanceModel, PlanFile, SceneCheck, SceneIssues, grips_at_first};
 use armcal_belief::tagmap::files::read_landmarks;
@@ -33,14 +34,14 @@ pub(super) fn check(args: &CheckArgs) -> Result<Exit> {
     for file in &args.files {
         match check_one(file, &overrides) {
             Ok(found) => {
-                println!("ok: {}: {}", file.display(), found.text);
+                say(&format!("ok: {}: {}", file.display(), found.text))?;
                 for warning in &found.warnings {
-                    println!("warning: {}: {warning}", file.display());
+                    say(&format!("warning: {}: {warning}", file.display()))?;
                 }
             }
             Err(error) => {
                 all_good = false;
-                println!("error: {}", explain(&error));
+                say(&format!("error: {}", explain(&error)))?;
             }
         }
     }

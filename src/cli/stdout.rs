@@ -3,11 +3,12 @@
 use std::io::{ErrorKind, Write};
 
 use anyhow::{Context, Result};
+use armcal_core::text::printable;
 
-/// Writes `text` and ends the line.
+/// Writes `text`, printable, and ends the line.
 pub(super) fn say(text: &str) -> Result<()> {
     let mut stdout = std::io::stdout().lock();
-    match writeln!(stdout, "{text}").and_then(|()| stdout.flush()) {
+    match writeln!(stdout, "{}", printable(text)).and_then(|()| stdout.flush()) {
         Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
         written => written.context("stdout: cannot be written"),
     }

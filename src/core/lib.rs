@@ -15,5 +15,6 @@ pub mod sensor;
 pub mod spatial;
 pub mod stats;
 pub mod streams;
+pub mod text;
 pub mod time;
 pub mod units;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use armcal::log::{RecordingHeader, RecordingWriter};
 
 use crate::support::{
-    Answer, ShortRoutine, answer, calibrate, program, robot_copy, root, run, temp, titan, write,
+    Answer, ShortRoutine, answer, calibrate, edit, program, robot_copy, root, run, temp, titan, write,
 };
 
 /// Deep enough to overflow the stack of a parser that recurs.
@@ -137,4 +137,27 @@ fn long_files_and_many_entries_are_refused() {
     check(&file).expect("60,000 tags", 2, &["map.toml", "more than 100000 keys"]);
     write(&file, &map(200_000));
     check(&file).expect("200,000 tags", 2, &["map.toml", "more than 8388608 bytes"]);
+}
+
+#[test]
+fn control_characters_never_reach_the_terminal() {
+    let folder = temp();
+    let robot = robot_copy(folder.path());
+    edit(&robot.join("robot.toml"), "name = \"titan4\"", "name = \"titan\\u001b[2J\\u009b4\"");
+    let good = check(&robot);
+    good.expect("a robot's name", 0, &["titan\\u{1b}[2J\\u{9b}4"]);
+    let broken = folder.path().join("broken.toml");
+    write(&broken, "version = 1\nname = \u{1b}]0;owned\u{7}\n");
+    let spoilt = check(&broken);
+    spoilt.expect("broken TOML", 2, &["\\u{1b}]0;owned\\u{7}"]);
+    let failed = run(&broken, &folder.path().join("out"));
+    failed.expect("broken TOML", 2, &["\\u{1b}]0;owned\\u{7}"]);
+    let map = folder.path().join("map.toml");
+    write(&map, "version = 1\nframe = \"a\\u001b[31m\"\n[[tag]]\nid = 1\nsize_m = 0.1\nposition_m = [0.0, 0.0, 1.0]\n");
+    let frame = check(&map);
+    frame.expect("a frame", 0, &["a\\u{1b}[31m"]);
+    for told in [good, spoilt, failed, frame] {
+        let steers = |c: char| c.is_control() && c != '\n' && c != '\t';
+        assert!(!told.stdout.contains(steers) && !told.stderr.contains(steers), "{told:#?}");
+    }
 }
