@@ -6,6 +6,7 @@
 mod allowed_pairs;
 mod body;
 mod camera;
+mod decomposition;
 mod drive;
 mod error;
 mod failed;
