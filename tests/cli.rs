@@ -7,6 +7,7 @@ mod output;
 mod recordings;
 mod situations;
 mod small;
+mod untrusted;
 
 use crate::support::{answer, calibrate, program, robot_folder, run, shared_run, temp, write};
 

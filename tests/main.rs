@@ -23,6 +23,7 @@ mod gripper_tag;
 mod kill;
 mod map;
 mod methods;
+mod mutations;
 mod oracle;
 mod planning;
 mod property;

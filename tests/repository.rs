@@ -3,6 +3,7 @@
 mod commands;
 mod links;
 mod names;
+mod readers;
 mod structure;
 
 use std::path::PathBuf;

@@ -4,6 +4,7 @@ use toml::Table;
 
 use crate::campaign::CampaignError;
 use crate::run::RunInputs;
+use armcal_core::files::{self, FileKind};
 
 /// A new meaning of rows gets a new version.
 const DOMAIN: &[u8] = b"armcal campaign 1";
@@ -25,7 +26,7 @@ pub fn fingerprint(effective: &Table, settings: &[RunInputs]) -> Result<String, 
     add(without_seeds(effective).to_string().as_bytes());
     for inputs in settings {
         for path in [inputs.robot.folder.join("robot.toml"), inputs.routine.vehicle_file.clone()] {
-            add(&std::fs::read(&path).map_err(|source| CampaignError::Read { path, source })?);
+            add(&files::read_bytes(&path, FileKind::Text).map_err(|source| CampaignError::Read { path, source })?);
         }
         add(inputs.robot.urdf_text.as_bytes());
     }

@@ -16,6 +16,7 @@ use crate::campaign::table_file::{Table, parse_table, read_table, row_line, tabl
 use crate::campaign::tables::markdown;
 use crate::campaign::{CampaignError, Origin, Row};
 use crate::output::{self, OutputError};
+use armcal_core::files::{self, FileKind};
 
 /// The rows of one campaign; no other process writes to them meanwhile.
 #[derive(Debug)]
@@ -227,7 +228,7 @@ fn results(out: &Path) -> [PathBuf; 4] {
 /// The summary beside a table; `None` where there is none.
 pub(super) fn read_summary(out: &Path) -> Result<Option<CampaignSummary>, CampaignError> {
     let [_, _, path, _] = results(out);
-    match std::fs::read(&path) {
+    match files::read_bytes(&path, FileKind::Table) {
         Ok(bytes) => serde_json::from_slice(&bytes)
             .map(Some)
             .map_err(|error| CampaignError::Table { path, problem: format!("is no summary of a campaign: {error}") }),

@@ -6,6 +6,7 @@ use crate::campaign::CampaignError;
 use crate::campaign::columns::Columns;
 use crate::campaign::metric::Metric;
 use crate::campaign::row::{Row, RunStatus};
+use armcal_core::files::{self, FileKind};
 use armcal_core::units::Unit;
 
 /// In front of the figures.
@@ -71,7 +72,8 @@ pub fn table_text(table: &Table) -> String {
 /// # Errors
 /// [`CampaignError::Read`], or [`CampaignError::Table`] naming the line.
 pub fn read_table(path: &Path) -> Result<Table, CampaignError> {
-    let bytes = std::fs::read(path).map_err(|source| CampaignError::Read { path: path.to_owned(), source })?;
+    let bytes = files::read_bytes(path, FileKind::Table)
+        .map_err(|source| CampaignError::Read { path: path.to_owned(), source })?;
     parse_table(&bytes).map_err(|problem| CampaignError::Table { path: path.to_owned(), problem })
 }
 

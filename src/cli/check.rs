@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use clap::Args;
 
 #[cfg(feature = "sim")]
@@ -60,8 +60,8 @@ fn check_one(file: &Path, overrides: &Overrides) -> Result<Found> {
     } else if file.file_name().is_some_and(|name| name == "robot.toml") {
         describe_robot(&robot::load(file.parent().unwrap_or(Path::new(".")))?)?
     } else {
-        let text = std::fs::read_to_string(file).with_context(|| format!("{}: cannot be read", file.display()))?;
-        let table: toml::Table = toml::from_str(&text).with_context(|| format!("{}: is no TOML", file.display()))?;
+        let text = robot::read_text(file)?;
+        let table: toml::Table = robot::parse_toml(file, &text)?;
         if table.contains_key("robot") && table.contains_key("vehicle") && !table.contains_key("inputs_hash") {
             return check_routine(file, overrides);
         }

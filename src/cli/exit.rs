@@ -13,6 +13,7 @@ use armcal_core::input::InputError;
 use armcal_core::log::LogError;
 use armcal_core::robot::{FileIssue, RobotError};
 use armcal_core::routine::RoutineError;
+use armcal_core::text::printable;
 
 /// How a command ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -112,7 +113,7 @@ fn is_write_failure(error: &LogError) -> bool {
     matches!(error, LogError::Write { .. } | LogError::Create { .. })
 }
 
-/// The chain of causes, each said once: many messages already hold that of their source.
+/// The chain of causes, printable, each said once: many messages already hold that of their source.
 pub(super) fn explain(error: &anyhow::Error) -> String {
     let mut text = error.to_string();
     for cause in error.chain().skip(1) {
@@ -122,5 +123,5 @@ pub(super) fn explain(error: &anyhow::Error) -> String {
             text.push_str(&cause);
         }
     }
-    text
+    printable(&text).into_owned()
 }

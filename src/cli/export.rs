@@ -1,6 +1,5 @@
 //! `armcal export`: a calibration in another form, on stdout.
 
-use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
@@ -10,6 +9,7 @@ use serde::Serialize;
 use crate::cli::exit::{Exit, UsageError};
 use crate::cli::stdout::say;
 use armcal_belief::calib::{Calibration, CalibrationFileError, CompactCalibration, CovarianceTable, LookupTable};
+use armcal_core::files::{self, FileKind};
 use armcal_core::robot::{self, Robot};
 use armcal_core::sensor::{ArmSensors, SensorModel};
 
@@ -34,9 +34,6 @@ enum Form {
     /// One line below 512 bytes
     Compact,
 }
-
-/// Larger inputs are no calibration; nothing larger is read.
-const MAX_INPUT_BYTES: u64 = 16 << 20;
 
 enum Input {
     Full(Box<Calibration>),
@@ -129,16 +126,12 @@ fn joints_of(sensors: ArmSensors) -> Vec<JointOfRobot> {
 fn read_input(file: &Path) -> Result<Input> {
     let is_stdin = file == Path::new("-");
     let name = if is_stdin { "stdin".to_owned() } else { file.display().to_string() };
-    let mut bytes = Vec::new();
-    let read = |source: Box<dyn Read>, bytes: &mut Vec<u8>| source.take(MAX_INPUT_BYTES).read_to_end(bytes);
-    let opened: std::io::Result<Box<dyn Read>> = if is_stdin {
-        Ok(Box::new(std::io::stdin().lock()))
+    let read = if is_stdin {
+        files::read_within(std::io::stdin().lock(), FileKind::Text)
     } else {
-        std::fs::File::open(file).map(|file| Box::new(file) as Box<dyn Read>)
+        files::read_bytes(file, FileKind::Text)
     };
-    opened
-        .and_then(|source| read(source, &mut bytes))
-        .map_err(|error| UsageError(format!("{name}: cannot be read: {error}")))?;
+    let bytes = read.map_err(|error| UsageError(format!("{name}: cannot be read: {error}")))?;
     let not_text = |_| UsageError(format!("{name}: is no text: neither a calibration.toml nor a compact calibration"));
     let text = std::str::from_utf8(&bytes).map_err(not_text)?;
     if text.trim_start().starts_with("armcal") {

@@ -15,6 +15,7 @@ use crate::output;
 use armcal_belief::plan::{
     ArmBelief, ClearanceModel, ItineraryRequest, PlanFile, PlanHeader, PoseTable, SetName, plan_itinerary,
 };
+use armcal_core::files::{self, FileKind};
 use armcal_core::robot::{Robot, Vehicle};
 use armcal_core::routine::{self, Overrides, Routine, Step, effective_table};
 use armcal_core::stats::stream_rng;
@@ -122,7 +123,9 @@ fn inputs_hash(
         hasher.update(&(bytes.len() as u64).to_le_bytes());
         hasher.update(bytes);
     };
-    let read = |path: &Path| std::fs::read(path).with_context(|| format!("{}: cannot be read", path.display()));
+    let read = |path: &Path| {
+        files::read_bytes(path, FileKind::Text).with_context(|| format!("{}: cannot be read", path.display()))
+    };
     let mut table = effective_table(routine, &overrides.set)?;
     for key in ["seed", "robot", "vehicle", "world", "campaign", "regress"] {
         table.remove(key);

@@ -7,9 +7,10 @@ use clap::Args;
 
 use crate::cli::exit::{Exit, UsageError};
 use crate::cli::losses::warn_of_losses;
-use crate::cli::stdout::say;
+use crate::cli::stdout::{note, say};
 use crate::output;
 use armcal_belief::calib::{Calibration, Status, surveyed};
+use armcal_core::files::{self, FileKind};
 use armcal_core::kinematics::LinkCorrections;
 use armcal_core::log::{Recording, read_attachments, read_recording};
 use armcal_core::robot::{self, Robot, Vehicle};
@@ -78,7 +79,7 @@ fn links_beside(recording: &Path, robot: &Robot) -> Vec<(Stamp, LinkCorrections)
         return Vec::new();
     }
     // Without its covariance, too: links are in the table.
-    let read = std::fs::read_to_string(&file).map_err(|error| error.to_string());
+    let read = files::read_text(&file, FileKind::Text).map_err(|error| error.to_string());
     match read.and_then(|text| Calibration::parse(&file, &text).map_err(|error| error.to_string())) {
         Ok(calibration)
             if calibration.robot == robot.name
@@ -89,7 +90,7 @@ fn links_beside(recording: &Path, robot: &Robot) -> Vec<(Stamp, LinkCorrections)
         }
         Ok(_) => Vec::new(),
         Err(why) => {
-            eprintln!("warning: the arm is shown as drawn: {why}");
+            note(format!("warning: the arm is shown as drawn: {}: {why}", file.display()));
             Vec::new()
         }
     }

@@ -8,11 +8,12 @@ use std::fmt::Display;
 use std::io::{ErrorKind, Result as IoResult, Write};
 
 use anyhow::{Context, Result};
+use armcal_core::text::printable;
 
-/// Writes `text` to stdout and ends the line.
+/// Writes `text`, printable, to stdout and ends the line.
 pub(super) fn say(text: &str) -> Result<()> {
     let mut stdout = std::io::stdout().lock();
-    is_written(writeln!(stdout, "{text}").and_then(|()| stdout.flush()))
+    is_written(writeln!(stdout, "{}", printable(text)).and_then(|()| stdout.flush()))
 }
 
 /// Whether stdout took what it was given.
@@ -23,7 +24,7 @@ pub(super) fn is_written(written: IoResult<()>) -> Result<()> {
     }
 }
 
-/// Writes a line to stderr. Where that cannot be written nobody can be told, and the work goes on.
+/// Writes a line, printable, to stderr. Where that cannot be written nobody can be told, and the work goes on.
 pub(super) fn note(text: impl Display) {
-    let _ = writeln!(std::io::stderr().lock(), "{text}");
+    let _ = writeln!(std::io::stderr().lock(), "{}", printable(&text.to_string()));
 }

@@ -16,6 +16,7 @@ use crate::cli::stdout::say;
 use crate::output;
 use crate::report::RunSummary;
 use armcal_belief::calib::Status;
+use armcal_core::files::{self, FileKind};
 use armcal_core::log::read_recording;
 use armcal_core::streams::Message;
 use armcal_study::{DrawnWorld, drawn_world};
@@ -103,8 +104,9 @@ fn run_one(args: &WorldsArgs, number: u64) -> Result<Row> {
         .context("this program cannot be started")?;
     let status = wait(&mut child, Duration::from_secs(args.timeout))?;
     let seconds = began.elapsed().as_secs_f64();
-    let said = String::from_utf8_lossy(&fs::read(&said).unwrap_or_default()).into_owned();
-    let summary = fs::read_to_string(out.join("summary.json")).ok().and_then(|text| serde_json::from_str(&text).ok());
+    let said = String::from_utf8_lossy(&files::read_bytes(&said, FileKind::Table).unwrap_or_default()).into_owned();
+    let summary = files::read_text(&out.join("summary.json"), FileKind::Text).ok();
+    let summary = summary.and_then(|text| serde_json::from_str(&text).ok());
     let (ending, reason) = ending(status, &said, summary.as_ref());
     Ok(Row { world, ending, reason, bumps: bumps_told(&out), summary, seconds })
 }

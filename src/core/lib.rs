@@ -2,6 +2,7 @@
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 
+pub mod files;
 pub mod input;
 pub mod joints;
 pub mod kinematics;
@@ -14,5 +15,6 @@ pub mod sensor;
 pub mod spatial;
 pub mod stats;
 pub mod streams;
+pub mod text;
 pub mod time;
 pub mod units;

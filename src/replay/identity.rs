@@ -1,10 +1,10 @@
 //! Identity of a recording in the viewer.
 
-use std::fs::File;
 use std::path::PathBuf;
 
 use crate::error::ReplayError;
 use crate::scene::ReplayInput;
+use armcal_core::files;
 use armcal_core::log::MessageHasher;
 use armcal_core::robot::{Robot, Vehicle};
 
@@ -24,7 +24,7 @@ impl Identity {
         }
         hasher.update(messages.hex().as_bytes());
         if let Some(path) = input.truth {
-            let read = File::open(path).and_then(|file| hasher.update_reader(file).map(|_| ()));
+            let read = files::open(path).and_then(|file| hasher.update_reader(file).map(|_| ()));
             read.map_err(|source| armcal_core::log::LogError::Read { path: path.to_owned(), source })?;
         }
         // Where files lie, and how that is spelled, is not part of the identity.

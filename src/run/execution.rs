@@ -14,6 +14,7 @@ use armcal_belief::calib::Calibration;
 use armcal_belief::session::{
     self, AssertResult, EstimateUpdate, HeldJoint, Outcome, Progress, Recorder, SessionInputs,
 };
+use armcal_core::files::{self, FileKind};
 use armcal_core::log::{Recording, RecordingHeader, RecordingWriter, read_recording};
 use armcal_core::streams::Arm;
 use armcal_sim::truth::TruthRecorder;
@@ -134,7 +135,7 @@ impl Run<'_> {
         let mut writer = recorder.into_writer();
         let (robot, routine) = (&self.inputs.robot, &self.inputs.routine);
         let path = robot.folder.join("robot.toml");
-        let bytes = std::fs::read(&path).map_err(OutputError::of(&path, "cannot be read"))?;
+        let bytes = files::read_bytes(&path, FileKind::Text).map_err(OutputError::of(&path, "cannot be read"))?;
         writer.attach("robot.toml", "application/toml", &bytes)?;
         writer.attach("vehicle.toml", "application/toml", self.inputs.vehicle.text.as_bytes())?;
         writer.attach(&robot.urdf_name, "application/xml", robot.urdf_text.as_bytes())?;

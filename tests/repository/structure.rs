@@ -108,7 +108,7 @@ struct Import {
 }
 
 /// A source without line comments and without its `mod tests { .. }`.
-fn without_tests(text: &str) -> String {
+pub(super) fn without_tests(text: &str) -> String {
     let code = text.lines().map(|line| line.split("//").next().unwrap_or_default()).collect::<Vec<_>>().join("\n");
     let end = code
         .match_indices("#[cfg(test)]")

@@ -1,6 +1,5 @@
 //! Files attached to a recording. They serve viewers; belief never reads them.
 
-use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
 
@@ -8,12 +7,16 @@ use mcap::records::{Record, op};
 
 use super::error::LogError;
 use super::raw::file_contents;
+use crate::files;
 
 /// Larger attachments are skipped; the URDF and other files of a robot are smaller.
 const MAX_BYTES: u64 = 16 << 20;
+/// Limits of all attachments that are read.
+const MAX_TOTAL_BYTES: u64 = 64 << 20;
+const MAX_ATTACHMENTS: usize = 1000;
 
-/// Name and bytes of every attachment that passes its checksum, in the order of the file. A cut file gives those before
-/// the cut. Messages are skipped.
+/// Name and bytes of every attachment that passes its checksum, in the order of the file, up to 64 MiB in all. A cut file
+/// gives those before the cut. Messages are skipped.
 ///
 /// # Errors
 /// As [`super::for_each_raw`].
@@ -21,9 +24,15 @@ pub fn read_attachments(path: impl AsRef<Path>) -> Result<Vec<(String, Vec<u8>)>
     let path = path.as_ref();
     let read = |source| LogError::Read { path: path.to_owned(), source };
     let contents = file_contents(path)?;
-    let mut file = File::open(path).map_err(read)?;
+    let mut file = files::open(path).map_err(read)?;
     let mut found = Vec::new();
-    for attachment in contents.attachments.iter().filter(|attachment| attachment.bytes <= MAX_BYTES) {
+    let mut left = MAX_TOTAL_BYTES;
+    let mut fits = |bytes: u64| {
+        let fits = bytes <= MAX_BYTES.min(left);
+        left -= if fits { bytes } else { 0 };
+        fits
+    };
+    for attachment in contents.attachments.iter().take(MAX_ATTACHMENTS).filter(|attachment| fits(attachment.bytes)) {
         let (at, len) = attachment.record;
         let mut record = Vec::new();
         file.seek(SeekFrom::Start(at)).map_err(read)?;
@@ -34,4 +43,24 @@ pub fn read_attachments(path: impl AsRef<Path>) -> Result<Vec<(String, Vec<u8>)>
         }
     }
     Ok(found)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::log::{RecordingHeader, RecordingWriter};
+
+    #[test]
+    fn attachments_are_read_up_to_a_total() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("a.mcap");
+        let mut writer = RecordingWriter::create(&path, RecordingHeader::new(Vec::new())).expect("a file");
+        let bytes = vec![0; MAX_BYTES as usize + 1];
+        for length in [MAX_BYTES as usize, MAX_BYTES as usize + 1, 3, 1 << 24, 1 << 24, 1 << 24, 5] {
+            writer.attach("a", "text/plain", &bytes[..length]).expect("attached");
+        }
+        writer.finish().expect("finished");
+        let lengths: Vec<usize> = read_attachments(&path).expect("it reads").iter().map(|(_, b)| b.len()).collect();
+        assert_eq!(lengths, [1 << 24, 3, 1 << 24, 1 << 24, 5], "the fourth of 16 MiB is too much");
+    }
 }

@@ -2,6 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
+use super::toml_text::check_entries;
+use crate::files::{self, FileKind};
+
 /// A wrong value in a file, with file, key and allowed values.
 #[derive(Clone, Debug, thiserror::Error, PartialEq)]
 #[error("{}: {key}: {problem}", file.display())]
@@ -56,13 +59,29 @@ impl FileIssue {
     }
 }
 
-/// Reads a text file; the error names it.
+/// Reads a text file within the limits of [`files`]; the error names it.
 pub fn read_text(file: &Path) -> Result<String, RobotError> {
-    std::fs::read_to_string(file).map_err(|source| RobotError::Unreadable { file: file.to_owned(), source })
+    read(file, FileKind::Text)
 }
 
-/// Parses TOML; the error names file, line and key.
+/// The same for a table of rows, which may be longer.
+pub fn read_table(file: &Path) -> Result<String, RobotError> {
+    read(file, FileKind::Table)
+}
+
+/// The same for a text file of a robot folder: a path may lead out of the folder, a link in it may not.
+pub(super) fn read_in(folder: &Path, file: &Path) -> Result<String, RobotError> {
+    files::check_within(folder, file).map_err(|source| RobotError::Unreadable { file: file.to_owned(), source })?;
+    read_text(file)
+}
+
+fn read(file: &Path, kind: FileKind) -> Result<String, RobotError> {
+    files::read_text(file, kind).map_err(|source| RobotError::Unreadable { file: file.to_owned(), source })
+}
+
+/// Parses TOML of a limited number of entries; the error names file, line and key.
 pub fn parse_toml<T: serde::de::DeserializeOwned>(file: &Path, text: &str) -> Result<T, RobotError> {
-    toml::from_str(text)
-        .map_err(|error| RobotError::Syntax { file: file.to_owned(), message: error.to_string().trim_end().to_owned() })
+    check_entries(text)
+        .and_then(|()| toml::from_str(text).map_err(|error| error.to_string().trim_end().to_owned()))
+        .map_err(|message| RobotError::Syntax { file: file.to_owned(), message })
 }

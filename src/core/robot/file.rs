@@ -9,7 +9,7 @@ use super::allowed_pairs::AllowedPairs;
 use super::body::LinkBody;
 use super::camera::{CameraFile, check_camera};
 use super::drive::{DriveSpec, HydraulicsFile, MotionSpec, check_displacements};
-use super::error::{FileIssue, RobotError, parse_toml, read_text};
+use super::error::{FileIssue, RobotError, parse_toml, read_in};
 use super::geometry::GeometryPriors;
 use super::gripper::GripperFile;
 use super::gripper_tag::GripperTagFile;
@@ -88,9 +88,9 @@ pub fn load(folder: &Path) -> Result<Robot, RobotError> {
 /// [`RobotError`] naming file, key and allowed range.
 pub fn load_without_pairs(folder: &Path) -> Result<Robot, RobotError> {
     let file = folder.join("robot.toml");
-    let raw: RobotFile = parse_toml(&file, &read_text(&file)?)?;
+    let raw: RobotFile = parse_toml(&file, &read_in(folder, &file)?)?;
     FileIssue::check_range(&file, "version", f64::from(raw.version), 1.0..=1.0)?;
-    let urdf = UrdfModel::read(&urdf_file(folder, &raw.urdf))?;
+    let urdf = read_urdf(folder, &raw.urdf)?;
     let chain = urdf.chain(&raw.base_link, &[&raw.tool.link, &raw.camera.link])?;
     let jaws = raw.gripper.as_ref().map(GripperFile::jaws).unwrap_or_default();
     let arm = UrdfChain { urdf: &urdf, base_link: &raw.base_link, chain: &chain };
@@ -147,6 +147,11 @@ pub fn load_without_pairs(folder: &Path) -> Result<Robot, RobotError> {
         camera,
         tags,
     })
+}
+
+fn read_urdf(folder: &Path, named: &Path) -> Result<UrdfModel, RobotError> {
+    let file = urdf_file(folder, named);
+    UrdfModel::parse(&file, read_in(folder, &file)?)
 }
 
 fn loads(geometry: &GeometryPriors, bodies: &[LinkBody], buoyancy_fraction: f64, tool: Attachment) -> ArmLoads {

@@ -44,6 +44,8 @@ pub enum HullError {
     TooManyPoints { got: usize },
     #[error("is flat: {thickness_m:.1e} m thick, at least {THINNEST_M:.0e} m are needed")]
     Flat { thickness_m: f64 },
+    #[error("needs {n:.0} {what} to be decomposed, at most {max:.0} are allowed; simplify it or use convex = \"hull\"")]
+    TooComplex { what: &'static str, n: f64, max: f64 },
     #[error("has no convex body: {0}")]
     Degenerate(String),
 }

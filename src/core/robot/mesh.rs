@@ -3,6 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use crate::files::{self, FileKind};
+
 /// Triangles with shared corners, in the file's own unit.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Mesh {
@@ -23,7 +25,8 @@ pub(super) enum MeshError {
 
 /// Limit of a mesh's triangles.
 const MAX_TRIANGLES: usize = 1_000_000;
-const MAX_BYTES: u64 = 200_000_000;
+/// Limit of its vertices: as many as triangles of their own have.
+const MAX_VERTICES: usize = 3 * MAX_TRIANGLES;
 /// Header and number of triangles of a binary STL.
 const STL_HEADER: usize = 84;
 const STL_TRIANGLE: usize = 50;
@@ -39,10 +42,7 @@ pub(super) fn read(file: &Path) -> Result<Mesh, MeshError> {
         Some("obj") => obj,
         _ => return Err(MeshError::Extension),
     };
-    if std::fs::metadata(file)?.len() > MAX_BYTES {
-        return Err(MeshError::Content(format!("more than {MAX_BYTES} bytes")));
-    }
-    let mesh = parse(&std::fs::read(file)?).map_err(MeshError::Content)?;
+    let mesh = parse(&files::read_bytes(file, FileKind::Mesh)?).map_err(MeshError::Content)?;
     if mesh.triangles.is_empty() {
         return Err(MeshError::Content("it has no triangles".to_owned()));
     }
@@ -141,6 +141,7 @@ fn obj(bytes: &[u8]) -> Result<Mesh, String> {
     for (n, line) in text.lines().enumerate() {
         let mut words = line.split_whitespace();
         match words.next() {
+            Some("v") if vertices.len() == MAX_VERTICES => return Err(format!("more than {MAX_VERTICES} vertices")),
             Some("v") => vertices.push(numbers(words, n)?),
             Some("f") => {
                 let corners =
@@ -232,6 +233,13 @@ mod tests {
             assert!(obj(format!("{OBJ}{bad}\n").as_bytes()).unwrap_err().contains(word), "{bad}");
         }
         assert!(obj(&[0xff, 0xfe]).is_err());
+    }
+
+    #[test]
+    fn many_vertices_are_refused() {
+        let vertices = "v 0 0 0\n".repeat(MAX_VERTICES + 1);
+        assert!(obj(&vertices.as_bytes()[..8 * MAX_VERTICES]).is_ok());
+        assert!(obj(vertices.as_bytes()).unwrap_err().contains("3000000 vertices"));
     }
 
     #[test]

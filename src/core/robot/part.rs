@@ -2,13 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use parry3d::math::Vec3;
-use parry3d::transformation::vhacd::{VHACD, VHACDParameters};
 use serde::{Deserialize, Serialize};
 
+use super::decomposition::decomposed;
 use super::error::{FileIssue, RobotError};
-use super::hull::{CenteredHull, Hull, HullError};
-use super::mesh::{self, Mesh};
+use super::hull::{CenteredHull, Hull};
+use super::mesh;
 use super::shape::{PlacedShape, Shape};
 use crate::spatial::{Pose, Vehicle as VehicleFrame};
 
@@ -61,8 +60,6 @@ pub struct PartFile {
 
 /// Limit of the shapes of one list.
 pub const MAX_PARTS: usize = 256;
-/// Limit of the hulls of one decomposed mesh.
-const MAX_HULLS: u32 = 32;
 
 fn no_rotation() -> [f64; 4] {
     [1.0, 0.0, 0.0, 0.0]
@@ -188,32 +185,10 @@ impl PartFile {
     }
 }
 
-/// Hulls of a convex decomposition of the mesh.
-fn decomposed(mesh: &Mesh) -> Result<Vec<CenteredHull>, HullError> {
-    // A flat mesh has no voxels to decompose.
-    Hull::centered(&mesh.vertices)?;
-    let vertices: Vec<Vec3> = mesh.vertices.iter().map(|p| Vec3::from_array(*p)).collect();
-    let parameters = VHACDParameters { max_convex_hulls: MAX_HULLS, ..VHACDParameters::default() };
-    let parts = VHACD::decompose(&parameters, &vertices, &mesh.triangles, true);
-    let mut hulls = Vec::new();
-    for points in parts.compute_primitive_intersections(&vertices, &mesh.triangles) {
-        let points: Vec<[f64; 3]> = points.iter().map(|p| p.to_array()).collect();
-        match Hull::centered(&points) {
-            Ok(hull) => hulls.push(hull),
-            // A flat piece of a face at the border of two parts; the neighbouring part has the same face.
-            Err(HullError::Flat { .. }) => {}
-            Err(error) => return Err(error),
-        }
-    }
-    if hulls.is_empty() {
-        return Err(HullError::Degenerate("no part of it is thick enough".to_owned()));
-    }
-    Ok(hulls)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use parry3d::math::Vec3;
 
     /// An L of two bars 1 m long and 0.2 m thick, in mm, as OBJ.
     const ANGLE_MM: &str = "v 0 0 0\nv 1000 0 0\nv 1000 200 0\nv 200 200 0\nv 200 1000 0\nv 0 1000 0\n\

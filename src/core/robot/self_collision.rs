@@ -8,7 +8,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::body::LinkBody;
-use super::error::{FileIssue, RobotError, parse_toml, read_text};
+use super::error::{FileIssue, RobotError, parse_toml, read_in};
 use super::nominal::Robot;
 use super::self_pairs::{SelfPair, SelfPairs};
 
@@ -69,10 +69,10 @@ impl SelfPairs {
 /// Reads the file of a robot folder where there is one.
 pub(super) fn read(folder: &Path, urdf_text: &str, bodies: &[LinkBody]) -> Result<Option<SelfPairs>, RobotError> {
     let file = folder.join(SELF_COLLISION_FILE);
-    if !file.is_file() {
+    if !file.exists() {
         return Ok(None);
     }
-    let raw: SelfCollisionFile = parse_toml(&file, &read_text(&file)?)?;
+    let raw: SelfCollisionFile = parse_toml(&file, &read_in(folder, &file)?)?;
     FileIssue::check_range(&file, "version", f64::from(raw.version), 1.0..=1.0)?;
     FileIssue::check_range(&file, "near_m", raw.near_m, 0.0..=10.0)?;
     if raw.urdf_blake3 != hash(urdf_text) {

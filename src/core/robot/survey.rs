@@ -9,6 +9,9 @@ use super::error::{FileIssue, RobotError};
 use super::part::check_place;
 use crate::spatial::{Base, Frame, Pose, Tag};
 
+/// Limit of the tags of one file; the family 36h11 has 587.
+pub const MAX_TAGS: usize = 5_000;
+
 /// A tag with a surveyed pose, or with an unknown one.
 #[derive(Clone, Debug)]
 pub struct SurveyedTag {
@@ -118,6 +121,9 @@ pub(super) fn check_tags<Owner: Frame>(
     base_tag: u32,
     base_from_owner: &Pose<Base, Owner>,
 ) -> Result<Vec<SurveyedTag>, RobotError> {
+    if raw.len() > MAX_TAGS {
+        return Err(FileIssue::new(file, "tag", format!("{} tags, 0 .. {MAX_TAGS} allowed", raw.len())).into());
+    }
     let mut seen = BTreeSet::new();
     let mut tags = Vec::new();
     for tag in raw {

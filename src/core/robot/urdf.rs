@@ -7,8 +7,9 @@ use nalgebra::{Isometry3, Matrix3, Translation3, Unit, UnitQuaternion, Vector3};
 use urdf_rs::{Geometry, JointType};
 
 use super::body::LinkBody;
-use super::error::{FileIssue, RobotError, read_text};
+use super::error::{FileIssue, RobotError};
 use super::shape::{PlacedShape, Shape};
+use super::urdf_text::plain_urdf;
 use crate::joints::MAX_JOINTS;
 use crate::kinematics::{Attachment, Chain, ChainJoint, JointLimits};
 
@@ -54,14 +55,14 @@ impl UrdfModel {
         self.robot.joints.iter().find(|other| other.name == joint).map_or(0.0, |joint| joint.limit.effort)
     }
 
-    /// Reads `file` and checks that it is a tree of known links with finite numbers.
+    /// Parses the text of `file` and checks that it is a tree of known links with finite numbers.
     ///
     /// # Errors
     /// [`RobotError`] naming the file and the link or joint.
-    pub fn read(file: &Path) -> Result<Self, RobotError> {
-        let text = read_text(file)?;
-        let robot = urdf_rs::read_from_string(&text)
-            .map_err(|error| RobotError::Syntax { file: file.to_owned(), message: error.to_string() })?;
+    pub fn parse(file: &Path, text: String) -> Result<Self, RobotError> {
+        let robot = plain_urdf(&text)
+            .and_then(|plain| urdf_rs::read_from_string(&plain).map_err(|error| error.to_string()))
+            .map_err(|message| RobotError::Syntax { file: file.to_owned(), message })?;
         let links: BTreeSet<&str> = robot.links.iter().map(|l| l.name.as_str()).collect();
         let mut joint_of_child = BTreeMap::new();
         let mut joint_names = BTreeSet::new();

@@ -8,7 +8,7 @@ use crate::error::SimError;
 use crate::recorded_motion::kinematics::VehicleKinematics;
 use crate::recorded_motion::spline::{Spline, Value};
 use crate::recorded_motion::table::{self, Header, Sample};
-use armcal_core::robot::{FileIssue, read_text};
+use armcal_core::robot::{FileIssue, read_table};
 
 /// A recorded motion, checked and ready to be followed.
 ///
@@ -46,7 +46,7 @@ impl RecordedMotion {
     /// # Errors
     /// [`SimError`] naming the file, and where it can the line, the column and the allowed range.
     pub fn read(path: &Path) -> Result<Self, SimError> {
-        Self::parse(path, read_text(path)?)
+        Self::parse(path, read_table(path)?)
     }
 
     /// The motion in `text`; `file` is for error messages.

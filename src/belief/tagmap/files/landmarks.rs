@@ -5,7 +5,7 @@ use std::path::Path;
 
 use crate::tagmap::files::landmark::{Landmark, LandmarkFile};
 use crate::tagmap::files::own;
-use crate::tagmap::files::read::{extension, read_tags};
+use crate::tagmap::files::read::{check_number, extension, read_tags};
 use crate::tagmap::files::tag_file::TagFile;
 use armcal_core::robot::{FileIssue, RobotError, read_text};
 use armcal_core::spatial::{Base, Pose, Tag};
@@ -42,6 +42,7 @@ fn of_tags(tags: &TagFile) -> LandmarkFile {
 }
 
 fn check(file: &Path, map: &LandmarkFile) -> Result<(), FileIssue> {
+    check_number(file, map.landmarks.len())?;
     let (mut ids, mut names) = (BTreeSet::new(), BTreeSet::new());
     for landmark in &map.landmarks {
         if !ids.insert(landmark.id) {

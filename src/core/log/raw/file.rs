@@ -7,6 +7,7 @@ use super::completeness::RawSummary;
 use super::contents::FileContents;
 use super::message::RawMessage;
 use super::scan::{ScanError, scan, scan_contents};
+use crate::files;
 use crate::log::error::LogError;
 
 /// Hands every readable message of an MCAP file to `visit`, in the order of the file.
@@ -33,11 +34,8 @@ pub fn file_contents(path: impl AsRef<Path>) -> Result<FileContents, LogError> {
 }
 
 fn open(path: &Path) -> Result<File, LogError> {
-    if path.is_dir() {
-        let source = std::io::Error::other(describe_folder(path));
-        return Err(LogError::Read { path: path.to_owned(), source });
-    }
-    File::open(path).map_err(|source| LogError::Read { path: path.to_owned(), source })
+    let found = if path.is_dir() { Err(std::io::Error::other(describe_folder(path))) } else { files::open(path) };
+    found.map_err(|source| LogError::Read { path: path.to_owned(), source })
 }
 
 /// Names the recordings in a folder, which may be that of a run or of a ROS 2 bag.

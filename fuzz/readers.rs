@@ -1,0 +1,234 @@
+//! Every reader of files that users name, as a function of bytes: for the fuzz targets here and for
+//! `tests/mutations.rs`.
+
+use std::borrow::Cow;
+use std::fs;
+use std::io::Cursor;
+use std::path::{Path, PathBuf};
+
+use armcal::calib::{Calibration, CompactCalibration, calibrate};
+use armcal::log::{RecordingHeader, RecordingWriter, for_each_raw, read_attachments, read_recording};
+use armcal::robot::{Robot, load, load_vehicle};
+use armcal::routine::Method;
+use armcal::streams::Message;
+use armcal::tagmap::files::{parse_cameras, parse_tags, read_landmarks};
+
+/// A robot, a vehicle and a recording in a folder of their own, where readers find the files that they expect beside
+/// the one that is read.
+pub struct Scratch {
+    folder: tempfile::TempDir,
+    robot: Robot,
+    recording: PathBuf,
+}
+
+impl Scratch {
+    /// `root`: this repository.
+    pub fn new(root: &Path) -> Self {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        for copy in ["robot", "of_urdf", "of_robot"] {
+            let copy = folder.path().join(copy);
+            fs::create_dir(&copy).expect("a folder");
+            for name in ["robot.toml", "titan4.urdf"] {
+                fs::copy(root.join("robots/titan4").join(name), copy.join(name)).expect("copied");
+            }
+        }
+        fs::copy(root.join("robots/vehicles/work-class-front.toml"), folder.path().join("vehicle.toml"))
+            .expect("copied");
+        let robot = load(&folder.path().join("robot")).expect("the robot reads");
+        Self { folder, robot, recording: root.join("fuzz/corpus/recording/views.mcap") }
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn write(&self, name: &str, bytes: &[u8]) -> PathBuf {
+        let path = self.path(name);
+        fs::write(&path, bytes).expect("written");
+        path
+    }
+}
+
+/// A reader: whether it takes these bytes.
+type Read = fn(&Scratch, &[u8]) -> bool;
+
+/// By the names of the targets and of the folders of their corpora.
+pub const READERS: [(&str, Read); 19] = [
+    ("urdf", urdf),
+    ("recording", recording),
+    ("cdr", cdr),
+    ("robot", robot),
+    ("vehicle", vehicle),
+    ("routine", routine),
+    ("calibration", calibration),
+    ("compact", compact),
+    ("tags", tags),
+    ("cameras", cameras),
+    ("tag_map", tag_map),
+    ("input_map", input_map),
+    ("task", task),
+    ("plan", plan),
+    ("stl", stl),
+    ("obj", obj),
+    ("campaign_table", campaign_table),
+    ("motion", motion),
+    ("views", views),
+];
+
+fn text(bytes: &[u8]) -> Cow<'_, str> {
+    String::from_utf8_lossy(bytes)
+}
+
+fn urdf(scratch: &Scratch, bytes: &[u8]) -> bool {
+    scratch.write("of_urdf/titan4.urdf", bytes);
+    // The names of links and joints of the drawings in the corpus.
+    load(&scratch.path("of_urdf")).is_ok()
+}
+
+fn robot(scratch: &Scratch, bytes: &[u8]) -> bool {
+    scratch.write("of_robot/robot.toml", bytes);
+    load(&scratch.path("of_robot")).is_ok()
+}
+
+fn vehicle(scratch: &Scratch, bytes: &[u8]) -> bool {
+    load_vehicle(&scratch.write("of_vehicle.toml", bytes)).is_ok()
+}
+
+fn routine(scratch: &Scratch, bytes: &[u8]) -> bool {
+    let Ok(routine) = armcal::routine::load(&scratch.write("routine.toml", bytes)) else { return false };
+    routine.load_arm().is_ok_and(|(robot, _)| armcal::sim::WorldSpec::from_routine(&routine, &robot).is_ok())
+}
+
+fn recording(scratch: &Scratch, bytes: &[u8]) -> bool {
+    let path = scratch.write("recording.mcap", bytes);
+    let _ = read_attachments(&path);
+    let _ = armcal::report::inspection::inspect(&path, None).map(|found| armcal::report::inspection::to_text(&found));
+    read_recording(&path).is_ok_and(|recording| !recording.messages.is_empty())
+}
+
+/// The first byte chooses one of the recording's topics, the rest is its message.
+fn cdr(scratch: &Scratch, bytes: &[u8]) -> bool {
+    let Some((&which, payload)) = bytes.split_first() else { return false };
+    let mut channels: Vec<(String, String, Vec<u8>)> = Vec::new();
+    for_each_raw(&scratch.recording, |message| {
+        if !channels.iter().any(|(topic, ..)| *topic == message.channel.topic) {
+            let schema = message.channel.schema.as_ref();
+            let (name, data) = schema.map(|schema| (schema.name.clone(), schema.data.to_vec())).unwrap_or_default();
+            channels.push((message.channel.topic.clone(), name, data));
+        }
+    })
+    .expect("the corpus reads");
+    let (topic, name, data) = &channels[usize::from(which) % channels.len()];
+    let mut out = Vec::new();
+    let options = mcap::WriteOptions::new().compression(None).compression_threads(0);
+    let mut writer = options.create(Cursor::new(&mut out)).expect("begun");
+    let schema = writer.add_schema(name, "ros2msg", data).expect("a schema");
+    let channel_id = writer.add_channel(schema, topic, "cdr", &Default::default()).expect("a channel");
+    let header = mcap::records::MessageHeader { channel_id, sequence: 0, log_time: 1, publish_time: 1 };
+    writer.write_to_known_channel(&header, payload).expect("written");
+    writer.finish().expect("finished");
+    drop(writer);
+    read_recording(scratch.write("cdr.mcap", &out)).is_ok_and(|recording| recording.rejected.is_empty())
+}
+
+fn calibration(scratch: &Scratch, bytes: &[u8]) -> bool {
+    let Ok(calibration) = Calibration::parse(Path::new("calibration.toml"), &text(bytes)) else { return false };
+    let _ = (calibration.to_toml(), calibration.lookup(), CompactCalibration::of(&calibration));
+    calibration.sensors(&scratch.robot).is_ok()
+}
+
+fn compact(scratch: &Scratch, bytes: &[u8]) -> bool {
+    let Ok(compact) = CompactCalibration::from_text(&text(bytes)) else { return false };
+    compact.to_text().is_ok() && compact.sensors(&scratch.robot).is_ok()
+}
+
+fn tags(_: &Scratch, bytes: &[u8]) -> bool {
+    parse_tags(Path::new("tags.yaml"), &text(bytes)).is_ok()
+}
+
+fn cameras(_: &Scratch, bytes: &[u8]) -> bool {
+    parse_cameras(Path::new("cameras.yaml"), &text(bytes)).is_ok()
+}
+
+fn tag_map(scratch: &Scratch, bytes: &[u8]) -> bool {
+    let _ = parse_tags(Path::new("map.toml"), &text(bytes));
+    read_landmarks(&scratch.write("map.toml", bytes)).is_ok()
+}
+
+fn input_map(_: &Scratch, bytes: &[u8]) -> bool {
+    armcal::input::parse_input_map(Path::new("input.toml"), &text(bytes)).is_ok()
+}
+
+fn task(_: &Scratch, bytes: &[u8]) -> bool {
+    armcal::input::parse_task(Path::new("task.toml"), &text(bytes)).is_ok()
+}
+
+fn plan(scratch: &Scratch, bytes: &[u8]) -> bool {
+    armcal::plan::PlanFile::read(&scratch.write("plan.toml", bytes)).is_ok()
+}
+
+fn stl(scratch: &Scratch, bytes: &[u8]) -> bool {
+    mesh(scratch, &scratch.write("a.stl", bytes))
+}
+
+fn obj(scratch: &Scratch, bytes: &[u8]) -> bool {
+    mesh(scratch, &scratch.write("a.obj", bytes))
+}
+
+/// As one hull. What a decomposition takes, seconds, is for `tests/mutations.rs` alone.
+fn mesh(scratch: &Scratch, file: &Path) -> bool {
+    let scene = format!(
+        "[[obstacle]]\nname = \"a\"\nshape = \"mesh\"\nfile = {file:?}\nscale_m = 0.001\nposition_m = [0.0, 0.0, 0.0]\n"
+    );
+    armcal::routine::load_scene(&scratch.write("scene.toml", scene.as_bytes())).is_ok()
+}
+
+fn campaign_table(scratch: &Scratch, bytes: &[u8]) -> bool {
+    armcal::campaign::read_table(&scratch.write("rows.csv", bytes)).is_ok()
+}
+
+fn motion(_: &Scratch, bytes: &[u8]) -> bool {
+    armcal::sim::RecordedMotion::parse(Path::new("motion.csv"), text(bytes).into_owned()).is_ok()
+}
+
+/// The corpus's recording with single values replaced, calibrated: each twelve bytes are a place and a number.
+fn views(scratch: &Scratch, bytes: &[u8]) -> bool {
+    let mut recording = read_recording(&scratch.recording).expect("the corpus reads");
+    for change in bytes.chunks_exact(12) {
+        let n = recording.messages.len();
+        let at = usize::from(u16::from_le_bytes([change[0], change[1]])) % n;
+        let number = f64::from_le_bytes(std::array::from_fn(|k| change[4 + k]));
+        if number.is_finite() {
+            replace(&mut recording.messages[at].1, usize::from(change[2]), number);
+        }
+    }
+    let path = scratch.path("views.mcap");
+    let mut writer =
+        RecordingWriter::create(&path, RecordingHeader::new(recording.joint_names.clone())).expect("a file");
+    for (stamp, message) in &recording.messages {
+        // What cannot be written cannot be read.
+        let _ = armcal::streams::Sink::record(&mut writer, *stamp, message);
+    }
+    writer.finish().expect("finished");
+    read_recording(&path).is_ok_and(|read| calibrate(&read, &scratch.robot, Method::Bundle).is_ok())
+}
+
+fn replace(message: &mut Message, place: usize, number: f64) {
+    match message {
+        Message::JointSensors(sample) => {
+            let n = sample.counts.len();
+            sample.counts[place % n] = number;
+        }
+        Message::Detections(detections) if !detections.tags.is_empty() => {
+            let n = detections.tags.len();
+            let tag = &mut detections.tags[place / 9 % n];
+            match place % 9 {
+                8 => tag.id = number.to_bits() as u32 % 600,
+                corner => tag.corners_px[corner / 2][corner % 2] = number,
+            }
+        }
+        Message::Temperature(sample) => sample.temperature_c = number,
+        Message::Attitude(sample) => sample.quaternion_wxyz[place % 4] = number,
+        _ => {}
+    }
+}
