@@ -9,7 +9,7 @@ use rerun::external::re_log_encoding::EncodeError;
 use rerun::external::re_log_types::external::re_tuid::Tuid;
 use rerun::log::{Chunk, ChunkId, RowId};
 use rerun::time::{TimeCell, TimePoint};
-use rerun::{AsComponents, EntityPath, SerializedComponentBatch};
+use rerun::{AsComponents, Clear, EntityPath, SerializedComponentBatch};
 
 /// The one timeline of a recording: seconds since its first log time.
 pub(super) const TIMELINE: &str = "sim_time";
@@ -28,6 +28,8 @@ type Row = (i64, Vec<SerializedComponentBatch>);
 pub(super) struct EntityLog {
     fixed: BTreeMap<String, Vec<SerializedComponentBatch>>,
     rows: BTreeMap<String, Vec<Row>>,
+    /// Ends of what an entity shows, in chunks of their own: the viewer panics where one chunk of images has both.
+    ends: BTreeMap<String, Vec<Row>>,
 }
 
 impl EntityLog {
@@ -38,11 +40,15 @@ impl EntityLog {
 
     /// Logs data from `time_s` on. Times of one entity must not go backwards.
     pub fn draw(&mut self, entity: &str, time_s: f64, what: &dyn AsComponents) {
-        let nanos = (time_s * 1e9).round() as i64;
-        self.rows.entry(entity.to_owned()).or_default().push((nanos, what.as_serialized_batches()));
+        self.rows.entry(entity.to_owned()).or_default().push(row(time_s, what));
     }
 
-    /// Chunks in the order of the entities' names.
+    /// The entity shows nothing from `time_s` on. Times of one entity must not go backwards.
+    pub fn clear(&mut self, entity: &str, time_s: f64) {
+        self.ends.entry(entity.to_owned()).or_default().push(row(time_s, &Clear::flat()));
+    }
+
+    /// Chunks in the order of the entities' names: what has no time, what has one, and the ends.
     pub fn into_chunks(self, timeline: &'static str, cell: fn(i64) -> TimeCell) -> Result<Vec<Chunk>, EncodeError> {
         let mut ids = (1u64..).map(|n| Tuid::from_nanos_and_inc(IDENTITY_NANOS, n * CHUNK_STRIDE));
         let mut next_id = || ids.next().unwrap_or(Tuid::MAX);
@@ -53,7 +59,7 @@ impl EntityLog {
                 .with_serialized_batches(RowId::from_tuid(id.next()), TimePoint::default(), batches);
             chunks.push(chunk.build()?);
         }
-        for (entity, rows) in self.rows {
+        for (entity, rows) in self.rows.into_iter().chain(self.ends) {
             let entity = EntityPath::parse_forgiving(&entity);
             let mut rows = rows.into_iter().peekable();
             while rows.peek().is_some() {
@@ -68,4 +74,8 @@ impl EntityLog {
         }
         Ok(chunks)
     }
+}
+
+fn row(time_s: f64, what: &dyn AsComponents) -> Row {
+    ((time_s * 1e9).round() as i64, what.as_serialized_batches())
 }
