@@ -384,6 +384,45 @@ fn what_broke_stands_in_the_log() {
     assert_eq!(entities(&out).get("/log/truth"), Some(&1));
 }
 
+/// A recorder's clock that is set a day ahead costs no frames, and the lines end before it.
+#[test]
+fn a_jump_of_log_time_is_a_gap() {
+    let (dir, mut recording, _, robot) = small();
+    let rows = |recording: &Recording| {
+        let out = dir.path().join("run.rrd");
+        write_rrd(&input(recording, &robot), &out).unwrap();
+        entities(&out)
+    };
+    let whole = rows(&recording);
+    let half = recording.messages.len() / 2;
+    for (log_time, message) in &mut recording.messages[half..] {
+        *log_time = log_time.plus_s(86_400.0);
+        if let Message::JointStates(states) = message {
+            states.stamp = *log_time;
+        }
+    }
+    let jumped = rows(&recording);
+    for entity in ["/plots/counts", "/plots/joint_angle/believed"] {
+        let more = jumped[entity] - whole[entity];
+        // Two seconds at 12.5 Hz, and the end of the line.
+        assert!((1..=27).contains(&more), "{entity}: {} {}", whole[entity], jumped[entity]);
+    }
+    let run = crate::recording::scene(&input(&recording, &robot)).unwrap();
+    assert_eq!(run.tracks.gaps().count(), 1);
+    assert!(run.tracks.frames().is_sorted());
+}
+
+/// Longer recordings are drawn at lower rates.
+#[test]
+fn days_of_readings_are_drawn_within_a_budget() {
+    let (_dir, mut recording, _, robot) = small();
+    let (start, first) = recording.messages[0].clone();
+    recording.messages = (0..4 * 86_400 / 20).map(|n| (start.plus_s(20.0 * f64::from(n)), first.clone())).collect();
+    let run = crate::recording::scene(&input(&recording, &robot)).unwrap();
+    let ticks = run.tracks.frames().count();
+    assert!((40_000..=90_001).contains(&ticks), "{ticks}");
+}
+
 #[test]
 fn same_input_gives_the_same_bytes() {
     let (dir, recording, truth, robot) = small();
