@@ -3,8 +3,8 @@
 //! `association` finds the readings and corners of each captured view, `frame_consensus` the frames of it that agree,
 //! `conditions` the temperatures and the pressure under which it was captured. `external` does the same for recordings
 //! that mark no views, `pooling` for several recordings. `scale_identification` measures the scale of an unknown
-//! sensor; `data_checks` refuses unusable recordings; `marked_spans` reads what views are made of and leaves the rest in
-//! the file.
+//! sensor; `data_checks` refuses unusable recordings; `marked_spans` reads what views are made of and leaves the
+//! rest in the file.
 
 pub(crate) mod association;
 pub(crate) mod calibration_data;
