@@ -9,11 +9,10 @@ use crate::cli::losses::{warn_of_external, warn_of_losses};
 use crate::cli::stdout::note;
 use armcal_belief::calib::{
     Calibration, CalibrationFileError, ExternalContext, Status, calibrate, calibrate_data, calibrate_with_survey,
-    prepare_external, prepare_pooled,
+    prepare_external, prepare_pooled, read_marked,
 };
 use armcal_belief::tagmap::files::{LandmarkFile, NamedSurvey, read_landmarks};
 use armcal_core::input::{ChildFrame, InputMap, TagUse, read_external, read_input_map, read_task};
-use armcal_core::log::read_recording;
 use armcal_core::robot::{FileIssue, Robot};
 use armcal_core::routine::Method;
 use armcal_core::streams::{Message, ReachTask};
@@ -54,7 +53,7 @@ impl CalibrationInputs<'_> {
         let mut recordings = Vec::new();
         let mut lost = false;
         for path in self.recordings {
-            let recording = read_recording(path)?;
+            let recording = read_marked(path)?;
             lost |= warn_of_losses(&recording);
             recordings.push(recording);
         }

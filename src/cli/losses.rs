@@ -1,8 +1,10 @@
 //! What of a recording could not be used, said on stderr.
 
+use std::path::Path;
+
 use crate::cli::stdout::note;
 use armcal_core::input::ExternalRecording;
-use armcal_core::log::{Completeness, Recording};
+use armcal_core::log::{ChunkOrder, Completeness, Recording};
 use armcal_core::robot::Robot;
 
 pub(super) fn describe(completeness: &Completeness) -> String {
@@ -25,10 +27,22 @@ pub(super) fn warn_of_losses(recording: &Recording) -> bool {
     for (what, n) in &recording.rejected {
         note(format_args!("warning: {file}: {n} messages rejected on {what}"));
     }
+    warn_of_order(&recording.path, recording.chunk_order);
     if recording.non_monotonic > 0 {
         note(format_args!("warning: {file}: log time went backwards {} times", recording.non_monotonic));
     }
     !whole || !recording.rejected.is_empty()
+}
+
+/// Says on stderr what was put right in the order of a file's chunks.
+fn warn_of_order(file: &Path, order: ChunkOrder) {
+    let file = file.display();
+    if order.moved > 0 {
+        note(format_args!("warning: {file}: {} chunks are not in the order of time; they were sorted", order.moved));
+    }
+    if order.copies > 0 {
+        note(format_args!("warning: {file}: {} chunks are exact copies of others; they were left out", order.copies));
+    }
 }
 
 /// Says on stderr what of a real arm's recording is not used; `true` if something was lost.
@@ -38,6 +52,7 @@ pub(super) fn warn_of_external(recording: &ExternalRecording, robot: &Robot) -> 
     if !is_whole {
         note(format_args!("warning: {file}: {}; what could be read is used", describe(&recording.completeness)));
     }
+    warn_of_order(&recording.path, recording.chunk_order);
     for (what, n) in &recording.left_out {
         note(format_args!("warning: {file}: {n} {what} left out"));
     }

@@ -12,11 +12,11 @@ use crate::output;
 use armcal_belief::calib::{Calibration, Status, surveyed};
 use armcal_core::files::{self, FileKind};
 use armcal_core::kinematics::LinkCorrections;
-use armcal_core::log::{Recording, read_attachments, read_recording};
+use armcal_core::log::{Recording, read_attachments};
 use armcal_core::robot::{self, Robot, Vehicle};
 use armcal_core::routine::{self, Scene};
 use armcal_core::time::Stamp;
-use armcal_replay::{ReplayInput, open_viewer, write_rrd};
+use armcal_replay::{ReplayInput, open_viewer, read_for_replay, write_rrd};
 
 #[derive(Debug, Args)]
 pub(super) struct ReplayArgs {
@@ -31,7 +31,7 @@ pub(super) struct ReplayArgs {
 }
 
 pub(super) fn replay(args: &ReplayArgs) -> Result<Exit> {
-    let recording = read_recording(&args.recording)?;
+    let recording = read_for_replay(&args.recording)?;
     let lost = warn_of_losses(&recording);
     let drawings = Drawings::find(args, &recording)?;
     let truth = truth_beside(&args.recording);

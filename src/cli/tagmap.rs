@@ -14,8 +14,9 @@ use armcal_belief::calib::surveyed;
 use armcal_belief::tagmap::files::{NamedCamera, TagFile, map_to_text, read_cameras, read_tags};
 use armcal_belief::tagmap::recording::{RecordedViews, read_views};
 use armcal_belief::tagmap::{Body, GroupFrame, MapInput, MapMode, MapSettings, TagMap, TagPrior, solve};
-use armcal_core::log::{Completeness, read_recording, topics};
+use armcal_core::log::{Completeness, TopicMap, scan_recording, topics};
 use armcal_core::robot::{self, Robot};
+use armcal_core::streams::Message;
 
 #[derive(Debug, Args)]
 pub(super) struct TagmapArgs {
@@ -89,7 +90,8 @@ type Known = (Vec<NamedCamera>, TagFile, MapSettings);
 
 /// The camera and the tags around an arm; those that the recording says were there, where it does.
 fn of_robot(recording: &Path, robot: &Robot) -> Result<Known> {
-    let read = read_recording(recording)?;
+    let is_survey = |_, message: &Message| matches!(message, Message::Survey(_));
+    let (read, _) = scan_recording(recording, &TopicMap::default(), |_| {}, is_survey)?;
     let robot = &*surveyed(&read, robot);
     let camera = NamedCamera {
         name: robot.camera.name.clone(),

@@ -16,6 +16,8 @@ use armcal_core::streams::{CaptureSet, JointAngles, MarkKind};
 /// The tool's path is drawn this far back, s, with so many points a second.
 const TRAIL_S: f64 = 12.0;
 const TRAIL_HZ: f64 = 5.0;
+/// Captured views that are drawn: each draws those before it anew.
+const MAX_CAPTURES: usize = 2000;
 /// Length of the lines of sight at the image's corners, m.
 const SIGHT_M: f64 = 0.22;
 
@@ -138,7 +140,11 @@ fn draw_trail(run: &ReplayScene, stream: &mut EntityLog) {
     let entity = format!("{BASE}/tool_path");
     stream.log_static(&entity, &LineStrips3D::update_fields().with_radii([0.004]).with_colors([colors::TRAIL]));
     let mut drawn: Vec<[f32; 3]> = Vec::new();
+    let mut gaps = run.tracks.gaps().peekable();
     for time_s in run.tracks.ticks(TRAIL_HZ) {
+        if gaps.next_if(|gap_s| *gap_s < time_s).is_some() {
+            points.clear();
+        }
         let Some(tool) = run.shown_tool(time_s) else { continue };
         points.push(vector(&tool.origin().vector()));
         let first = points.len().saturating_sub(kept);
@@ -158,6 +164,9 @@ fn draw_captures(run: &ReplayScene, stream: &mut EntityLog) {
     let mut marks: Vec<_> = run.tracks.marks.iter().collect();
     marks.sort_by(|a, b| a.end_s.total_cmp(&b.end_s));
     for mark in marks {
+        if places.len() == MAX_CAPTURES {
+            break;
+        }
         let MarkKind::Capture { set, .. } = mark.kind else { continue };
         let Some(angles) = run.shown_angles(mark.end_s) else { continue };
         let camera = run.robot.chain.link_poses(&angles).frame(&run.robot.camera.mount);

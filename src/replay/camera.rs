@@ -1,7 +1,7 @@
 //! The wrist camera's image plane: detections, rejects, and tags as the belief predicts them.
 
 use nalgebra::{Isometry3, Point3, Vector2, Vector3};
-use rerun::{Clear, EncodedImage, Image, LineStrips2D, Radius};
+use rerun::{EncodedImage, Image, LineStrips2D, Radius};
 
 use crate::colors;
 use crate::entities::CAMERA;
@@ -46,7 +46,7 @@ fn draw_images(run: &ReplayScene, stream: &mut EntityLog) {
         stream.draw(&entity, *time_s, &picture);
         let next_s = run.tracks.images.get(n + 1).map_or(f64::INFINITY, |(next_s, _)| *next_s);
         if next_s - time_s > STALE_IMAGE_S && time_s + STALE_IMAGE_S < run.tracks.duration_s {
-            stream.draw(&entity, time_s + STALE_IMAGE_S, &Clear::flat());
+            stream.clear(&entity, time_s + STALE_IMAGE_S);
         }
     }
 }

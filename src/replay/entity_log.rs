@@ -9,7 +9,7 @@ use rerun::external::re_log_encoding::EncodeError;
 use rerun::external::re_log_types::external::re_tuid::Tuid;
 use rerun::log::{Chunk, ChunkId, RowId};
 use rerun::time::{TimeCell, TimePoint};
-use rerun::{AsComponents, EntityPath, SerializedComponentBatch};
+use rerun::{AsComponents, Clear, EntityPath, SerializedComponentBatch};
 
 /// The one timeline of a recording: seconds since its first log time.
 pub(super) const TIMELINE: &str = "sim_time";
@@ -23,27 +23,67 @@ pub(super) const IDENTITY_NANOS: u64 = 1_000_000_000;
 /// One row of an entity: time in nanoseconds, and data.
 type Row = (i64, Vec<SerializedComponentBatch>);
 
-/// Drawn data by entity; entities are written in the order of their names.
+/// Rows of one entity; those of full chunks are packed, which takes a tenth of the memory.
 #[derive(Default)]
+struct Rows {
+    packed: Vec<Chunk>,
+    open: Vec<Row>,
+}
+
+/// Drawn data by entity; entities are written in the order of their names.
 pub(super) struct EntityLog {
+    timeline: &'static str,
+    cell: fn(i64) -> TimeCell,
     fixed: BTreeMap<String, Vec<SerializedComponentBatch>>,
-    rows: BTreeMap<String, Vec<Row>>,
+    rows: BTreeMap<String, Rows>,
+    /// Ends of what an entity shows, in chunks of their own: the viewer panics where one chunk of images has both.
+    ends: BTreeMap<String, Rows>,
+    failure: Option<EncodeError>,
 }
 
 impl EntityLog {
+    /// Of a recording, over time.
+    pub fn of_recording() -> Self {
+        Self::on(TIMELINE, TimeCell::from_duration_nanos)
+    }
+
+    /// Of a blueprint.
+    pub fn of_blueprint() -> Self {
+        Self::on("blueprint", TimeCell::from_sequence)
+    }
+
+    fn on(timeline: &'static str, cell: fn(i64) -> TimeCell) -> Self {
+        let (fixed, rows, ends) = Default::default();
+        Self { timeline, cell, fixed, rows, ends, failure: None }
+    }
+
     /// Logs data without a time.
     pub fn log_static(&mut self, entity: &str, what: &dyn AsComponents) {
         self.fixed.entry(entity.to_owned()).or_default().extend(what.as_serialized_batches());
     }
 
-    /// Logs data from `time_s` on. Times of one entity must not go backwards.
+    /// Logs data from `time_s` on.
     pub fn draw(&mut self, entity: &str, time_s: f64, what: &dyn AsComponents) {
-        let nanos = (time_s * 1e9).round() as i64;
-        self.rows.entry(entity.to_owned()).or_default().push((nanos, what.as_serialized_batches()));
+        let rows = self.rows.entry(entity.to_owned()).or_default();
+        rows.open.push(((time_s * 1e9).round() as i64, what.as_serialized_batches()));
+        if rows.open.len() == CHUNK_ROWS
+            && let Err(error) = rows.pack(entity, self.timeline, self.cell)
+        {
+            self.failure.get_or_insert(error);
+        }
     }
 
-    /// Chunks in the order of the entities' names.
-    pub fn into_chunks(self, timeline: &'static str, cell: fn(i64) -> TimeCell) -> Result<Vec<Chunk>, EncodeError> {
+    /// The entity shows nothing from `time_s` on.
+    pub fn clear(&mut self, entity: &str, time_s: f64) {
+        let end = ((time_s * 1e9).round() as i64, Clear::flat().as_serialized_batches());
+        self.ends.entry(entity.to_owned()).or_default().open.push(end);
+    }
+
+    /// Chunks in the order of the entities' names: what has no time, what has one, and the ends.
+    pub fn into_chunks(self) -> Result<Vec<Chunk>, EncodeError> {
+        if let Some(error) = self.failure {
+            return Err(error);
+        }
         let mut ids = (1u64..).map(|n| Tuid::from_nanos_and_inc(IDENTITY_NANOS, n * CHUNK_STRIDE));
         let mut next_id = || ids.next().unwrap_or(Tuid::MAX);
         let mut chunks = Vec::new();
@@ -53,19 +93,31 @@ impl EntityLog {
                 .with_serialized_batches(RowId::from_tuid(id.next()), TimePoint::default(), batches);
             chunks.push(chunk.build()?);
         }
-        for (entity, rows) in self.rows {
-            let entity = EntityPath::parse_forgiving(&entity);
-            let mut rows = rows.into_iter().peekable();
-            while rows.peek().is_some() {
+        for (entity, mut rows) in self.rows.into_iter().chain(self.ends) {
+            rows.pack(&entity, self.timeline, self.cell)?;
+            for chunk in rows.packed {
                 let id = next_id();
-                let mut chunk = Chunk::builder_with_id(ChunkId::from_tuid(id), entity.clone());
-                for (n, (nanos, batches)) in rows.by_ref().take(CHUNK_ROWS).enumerate() {
-                    let row_id = RowId::from_tuid(id.incremented_by(1 + n as u64));
-                    chunk = chunk.with_serialized_batches(row_id, [(timeline, cell(nanos))], batches);
-                }
-                chunks.push(chunk.build()?);
+                chunks.push(chunk.clone_as(ChunkId::from_tuid(id), RowId::from_tuid(id.next())));
             }
         }
         Ok(chunks)
+    }
+}
+
+impl Rows {
+    /// Packs the open rows into chunks, whose identities are given later.
+    fn pack(&mut self, entity: &str, timeline: &'static str, cell: fn(i64) -> TimeCell) -> Result<(), EncodeError> {
+        let entity = EntityPath::parse_forgiving(entity);
+        let mut rows = std::mem::take(&mut self.open).into_iter().peekable();
+        while rows.peek().is_some() {
+            let id = Tuid::from_nanos_and_inc(IDENTITY_NANOS, 0);
+            let mut chunk = Chunk::builder_with_id(ChunkId::from_tuid(id), entity.clone());
+            for (n, (nanos, batches)) in rows.by_ref().take(CHUNK_ROWS).enumerate() {
+                let row_id = RowId::from_tuid(id.incremented_by(1 + n as u64));
+                chunk = chunk.with_serialized_batches(row_id, [(timeline, cell(nanos))], batches);
+            }
+            self.packed.push(chunk.build()?);
+        }
+        Ok(())
     }
 }

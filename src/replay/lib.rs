@@ -16,6 +16,7 @@ mod identity;
 mod phases;
 mod plan;
 mod plots;
+mod read;
 mod recording;
 mod rrd;
 mod scene;
@@ -30,6 +31,7 @@ mod viewpoint;
 
 pub use error::ReplayError;
 pub use plan::{PlanInput, write_plan_rrd};
+pub use read::read_for_replay;
 pub use recording::write_rrd;
 pub use scene::ReplayInput;
 pub use viewer::{ViewerError, open_viewer};

@@ -35,8 +35,13 @@ fn draw_phases(run: &ReplayScene, stream: &mut EntityLog) {
     let look = StateConfiguration::new().with_values(PHASES.map(|(_, name, _)| name));
     stream.log_static(&entity, &look.with_colors(PHASES.map(|(_, _, color)| color)));
     let mut shown = None;
+    let mut gaps = run.tracks.gaps().peekable();
     for mark in &run.tracks.marks {
         let MarkKind::Phase(phase) = mark.kind else { continue };
+        while let Some(gap_s) = gaps.next_if(|gap_s| *gap_s < mark.start_s) {
+            stream.draw(&entity, gap_s, &StateChange::single(""));
+            shown = None;
+        }
         let name = PHASES.iter().find(|(other, ..)| *other == phase).map(|(_, name, _)| *name);
         if let Some(name) = name.filter(|_| shown != Some(phase)) {
             stream.draw(&entity, mark.start_s, &StateChange::single(name));

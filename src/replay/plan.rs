@@ -3,7 +3,6 @@
 //! The messages that a session would record are computed from the plan and drawn like a recording. Margins, detection
 //! probabilities and plots over the poses are added.
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use rerun::components::MarkerShape;
@@ -20,7 +19,7 @@ use crate::shapes::{Look, log_shapes, path_part, quaternion, vector};
 use crate::tracks::Tracks;
 use crate::{blueprint, recording, rrd};
 use armcal_belief::plan::{PlanFile, PoseTable, SetName, Timing};
-use armcal_core::log::{Completeness, Recording};
+use armcal_core::log::Recording;
 use armcal_core::robot::{Robot, Vehicle};
 use armcal_core::routine::{Scene, TaskSettings};
 use armcal_core::streams::{
@@ -84,12 +83,7 @@ fn plan_recording(input: &PlanInput<'_>) -> Recording {
         path: PathBuf::from("plan.toml"),
         messages: motions.messages,
         joint_names: input.plan.joints.clone(),
-        completeness: Completeness::Whole,
-        raw: Vec::new(),
-        unknown_topics: BTreeMap::new(),
-        rejected: BTreeMap::new(),
-        non_monotonic: 0,
-        stamp_regressions: BTreeMap::new(),
+        ..Default::default()
     }
 }
 

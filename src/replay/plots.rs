@@ -21,6 +21,7 @@ pub(super) fn draw(run: &ReplayScene, stream: &mut EntityLog) {
     draw_temperatures(run, stream);
     let names = run.robot.joint_names();
     style(stream, COUNTS, &names, &colors::JOINTS, 1.2);
+    interrupt(run, stream, COUNTS);
     for time_s in run.tracks.ticks(FAST_HZ) {
         if let Some(counts) = run.tracks.counts.at(time_s) {
             stream.draw(COUNTS, time_s, &Scalars::new(counts.iter().copied()));
@@ -34,6 +35,13 @@ fn style(stream: &mut EntityLog, entity: &str, names: &[String], shades: &[Rgba]
     stream.log_static(entity, &lines.with_widths(names.iter().map(|_| width)));
 }
 
+/// Ends the lines where nothing was recorded.
+fn interrupt(run: &ReplayScene, stream: &mut EntityLog, entity: &str) {
+    for gap_s in run.tracks.gaps() {
+        stream.draw(entity, gap_s, &Scalars::new([] as [f64; 0]));
+    }
+}
+
 /// What is believed as bright lines, what is true as dark ones of the same colours.
 fn draw_angles(run: &ReplayScene, stream: &mut EntityLog) {
     let names = run.robot.joint_names();
@@ -41,8 +49,10 @@ fn draw_angles(run: &ReplayScene, stream: &mut EntityLog) {
     if run.has_true_joints() {
         let true_names: Vec<String> = names.iter().map(|name| format!("{name} (true)")).collect();
         style(stream, &truth, &true_names, &colors::JOINTS.map(colors::dimmed), 2.5);
+        interrupt(run, stream, &truth);
     }
     style(stream, &believed, &names, &colors::JOINTS, 1.2);
+    interrupt(run, stream, &believed);
     for time_s in run.tracks.ticks(FAST_HZ) {
         if let Some(angles) = run.tracks.believed.at(time_s) {
             stream.draw(&believed, time_s, &degrees(angles));
@@ -61,12 +71,13 @@ fn degrees(angles: &JointAngles) -> Scalars {
 fn draw_joint_error(run: &ReplayScene, stream: &mut EntityLog) {
     let Some(truth) = run.truth.as_ref().filter(|_| run.has_true_joints()) else { return };
     style(stream, JOINT_ERROR, &run.robot.joint_names(), &colors::JOINTS, 1.5);
+    interrupt(run, stream, JOINT_ERROR);
     let mut next_s = 0.0;
     for (time_s, believed) in run.tracks.believed.iter() {
         if *time_s < next_s {
             continue;
         }
-        next_s = time_s + 0.9 / FAST_HZ;
+        next_s = time_s + 0.9 / run.tracks.affordable_hz(FAST_HZ);
         if let Some(angles) = truth.angles(*time_s) {
             let difference = |j: usize| (believed[j] - angles[j]).to_degrees();
             let errors = (0..believed.len()).map(|j| (difference(j) + 180.0).rem_euclid(360.0) - 180.0);
@@ -83,12 +94,13 @@ fn draw_tool_error(run: &ReplayScene, stream: &mut EntityLog) {
     let name = "believed tool to true tool".to_owned();
     let believed = format!("{TOOL_ERROR}/believed");
     style(stream, &believed, &[name], &[colors::BELIEVED], 1.5);
+    interrupt(run, stream, &believed);
     let mut next_s = 0.0;
     for (time_s, angles) in run.tracks.believed.iter() {
         if *time_s < next_s {
             continue;
         }
-        next_s = time_s + 0.9 / FAST_HZ;
+        next_s = time_s + 0.9 / run.tracks.affordable_hz(FAST_HZ);
         let Some(truth) = run.truth.as_ref().and_then(|truth| truth.base_from_tool(*time_s)) else { continue };
         let tool = run.believed_poses(*time_s, angles).frame(&run.robot.tool.mount);
         let error_m = (tool.translation.vector - truth.origin().vector()).norm();
@@ -122,6 +134,7 @@ fn draw_temperatures(run: &ReplayScene, stream: &mut EntityLog) {
     for (name, track, shade) in tracks.into_iter().filter(|(_, track, _)| !track.is_empty()) {
         let entity = format!("{TEMPERATURE}/{name}");
         style(stream, &entity, &[name.to_owned()], &[shade], 1.5);
+        interrupt(run, stream, &entity);
         for time_s in run.tracks.ticks(SLOW_HZ) {
             if let Some(value_c) = track.at(time_s) {
                 stream.draw(&entity, time_s, &Scalars::single(*value_c));

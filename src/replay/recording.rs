@@ -41,7 +41,7 @@ pub(super) fn scene<'a>(input: &ReplayInput<'a>) -> Result<ReplayScene<'a>, Repl
 
 /// All entities of a recording, measured or planned.
 pub(super) fn draw(run: &ReplayScene<'_>, input: &ReplayInput<'_>) -> EntityLog {
-    let mut stream = EntityLog::default();
+    let mut stream = EntityLog::of_recording();
     scenery::draw(run, &mut stream);
     arms::draw(run, &mut stream);
     targets::draw(run, &mut stream);

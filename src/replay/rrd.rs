@@ -8,11 +8,10 @@ use rerun::external::re_log_encoding::{EncodeError, Encoder, EncodingOptions};
 use rerun::external::re_log_types::external::re_tuid::Tuid;
 use rerun::external::re_log_types::{BlueprintActivationCommand, SetStoreInfo, StoreInfo, StoreSource};
 use rerun::log::LogMsg;
-use rerun::time::TimeCell;
 use rerun::{StoreId, StoreKind};
 
 use crate::blueprint::Entry;
-use crate::entity_log::{EntityLog, IDENTITY_NANOS, TIMELINE};
+use crate::entity_log::{EntityLog, IDENTITY_NANOS};
 use crate::error::ReplayError;
 use crate::identity::Identity;
 
@@ -34,16 +33,16 @@ fn encode(file: impl Write, identity: &Identity, entries: &[Entry], drawn: Entit
     encoder.do_not_emit_footer();
     encoder.append(&store_info(&recording))?;
     encoder.append(&store_info(&blueprint))?;
-    let mut blueprint_log = EntityLog::default();
+    let mut blueprint_log = EntityLog::of_blueprint();
     for entry in entries {
         blueprint_log.draw(&entry.path, 0.0, entry.what.as_ref());
     }
-    for chunk in blueprint_log.into_chunks("blueprint", TimeCell::from_sequence)? {
+    for chunk in blueprint_log.into_chunks()? {
         encoder.append(&LogMsg::ArrowMsg(blueprint.clone(), chunk.to_arrow_msg()?))?;
     }
     let command = BlueprintActivationCommand { blueprint_id: blueprint, make_active: true, make_default: true };
     encoder.append(&LogMsg::BlueprintActivationCommand(command))?;
-    for chunk in drawn.into_chunks(TIMELINE, TimeCell::from_duration_nanos)? {
+    for chunk in drawn.into_chunks()? {
         encoder.append(&LogMsg::ArrowMsg(recording.clone(), chunk.to_arrow_msg()?))?;
     }
     encoder.finish()?;

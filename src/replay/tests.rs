@@ -237,18 +237,26 @@ fn input<'a>(recording: &'a Recording, robot: &'a Robot) -> ReplayInput<'a> {
     }
 }
 
-/// Entities of the recording in a file, as Rerun's own decoder reads it, with their rows.
-fn entities(rrd: &Path) -> std::collections::BTreeMap<String, usize> {
+/// Chunks of the recording in a file, as Rerun's own decoder reads it.
+fn chunks(rrd: &Path) -> Vec<rerun::log::Chunk> {
     use rerun::external::re_log_encoding::DecoderApp;
     let file = std::io::BufReader::new(std::fs::File::open(rrd).unwrap());
-    let mut entities = std::collections::BTreeMap::new();
+    let mut chunks = Vec::new();
     for message in DecoderApp::decode_eager(file).unwrap() {
         if let rerun::log::LogMsg::ArrowMsg(store, message) = message.unwrap()
             && store.is_recording()
         {
-            let chunk = rerun::log::Chunk::from_arrow_msg(&message).unwrap();
-            *entities.entry(chunk.entity_path().to_string()).or_default() += chunk.num_rows();
+            chunks.push(rerun::log::Chunk::from_arrow_msg(&message).unwrap());
         }
+    }
+    chunks
+}
+
+/// Entities of the recording in a file with their rows.
+fn entities(rrd: &Path) -> std::collections::BTreeMap<String, usize> {
+    let mut entities = std::collections::BTreeMap::new();
+    for chunk in chunks(rrd) {
+        *entities.entry(chunk.entity_path().to_string()).or_default() += chunk.num_rows();
     }
     entities
 }
@@ -280,6 +288,13 @@ fn images_and_rejects_are_shown_where_there_are_any() {
     assert_eq!(entities.get("/camera/image"), Some(&11), "{entities:?}");
     assert_eq!(entities.get("/camera/rejected"), Some(&12), "{entities:?}");
     assert!(!entities.contains_key("/camera/background"));
+    // The viewer panics where one chunk holds images and their end.
+    let of_image = chunks(&out).into_iter().filter(|chunk| chunk.entity_path().to_string() == "/camera/image");
+    let has = |chunk: &rerun::log::Chunk, archetype: &str| {
+        chunk.component_descriptors().any(|c| c.archetype.is_some_and(|name| name.short_name() == archetype))
+    };
+    let kinds: Vec<_> = of_image.map(|chunk| (has(&chunk, "EncodedImage"), has(&chunk, "Clear"))).collect();
+    assert_eq!(kinds, [(true, false), (false, true)]);
 }
 
 #[test]
@@ -367,6 +382,45 @@ fn what_broke_stands_in_the_log() {
     let out = dir.path().join("run.rrd");
     write_rrd(&ReplayInput { truth: Some(&truth), ..input(&recording, &robot) }, &out).unwrap();
     assert_eq!(entities(&out).get("/log/truth"), Some(&1));
+}
+
+/// A recorder's clock that is set a day ahead costs no frames, and the lines end before it.
+#[test]
+fn a_jump_of_log_time_is_a_gap() {
+    let (dir, mut recording, _, robot) = small();
+    let rows = |recording: &Recording| {
+        let out = dir.path().join("run.rrd");
+        write_rrd(&input(recording, &robot), &out).unwrap();
+        entities(&out)
+    };
+    let whole = rows(&recording);
+    let half = recording.messages.len() / 2;
+    for (log_time, message) in &mut recording.messages[half..] {
+        *log_time = log_time.plus_s(86_400.0);
+        if let Message::JointStates(states) = message {
+            states.stamp = *log_time;
+        }
+    }
+    let jumped = rows(&recording);
+    for entity in ["/plots/counts", "/plots/joint_angle/believed"] {
+        let more = jumped[entity] - whole[entity];
+        // Two seconds at 12.5 Hz, and the end of the line.
+        assert!((1..=27).contains(&more), "{entity}: {} {}", whole[entity], jumped[entity]);
+    }
+    let run = crate::recording::scene(&input(&recording, &robot)).unwrap();
+    assert_eq!(run.tracks.gaps().count(), 1);
+    assert!(run.tracks.frames().is_sorted());
+}
+
+/// Longer recordings are drawn at lower rates.
+#[test]
+fn days_of_readings_are_drawn_within_a_budget() {
+    let (_dir, mut recording, _, robot) = small();
+    let (start, first) = recording.messages[0].clone();
+    recording.messages = (0..4 * 86_400 / 20).map(|n| (start.plus_s(20.0 * f64::from(n)), first.clone())).collect();
+    let run = crate::recording::scene(&input(&recording, &robot)).unwrap();
+    let ticks = run.tracks.frames().count();
+    assert!((40_000..=90_001).contains(&ticks), "{ticks}");
 }
 
 #[test]

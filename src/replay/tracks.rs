@@ -20,10 +20,20 @@ const CLOCKS_AGREE_S: f64 = 1.0;
 const MIN_SPACING_S: f64 = 0.0095;
 /// The same for images, which take most of the file.
 const MIN_IMAGE_SPACING_S: f64 = 0.095;
+/// Images that are kept, bytes; each time a quarter is reached, their rate halves.
+const MAX_IMAGE_BYTES: usize = 96 << 20;
+/// Marks that are drawn, and lines of the log.
+const MAX_MARKS: usize = 20_000;
 /// Longest recording. Beyond it a wrong log time is likely.
 const LONGEST_S: f64 = 7.0 * 24.0 * 3600.0;
 /// Steps of everything that moves.
 const FRAME_HZ: f64 = 25.0;
+/// Without any message for longer than this nothing is drawn, s: a clock that was set, or a recorder that was off.
+const GAP_S: f64 = 30.0;
+/// What was last shown is drawn this far into a gap, s.
+const HOLD_S: f64 = 2.0;
+/// Moments at which one thing is drawn, at most; longer recordings are drawn at lower rates. One hour of frames.
+const MAX_TICKS: f64 = 90_000.0;
 
 /// Values over time, s, ascending.
 #[derive(Clone, Debug)]
@@ -91,6 +101,8 @@ pub(super) struct Span {
 pub(super) struct Tracks<'a> {
     start: Stamp,
     pub duration_s: f64,
+    /// Spans with messages, s, ascending, with gaps between them.
+    covered: Vec<(f64, f64)>,
     pub believed: TimeSeries<JointAngles>,
     pub counts: TimeSeries<JointCounts>,
     pub attitude: TimeSeries<UnitQuaternion<f64>>,
@@ -122,6 +134,7 @@ impl<'a> Tracks<'a> {
         let mut tracks = Self {
             start: *start,
             duration_s,
+            covered: covered(recording, *start, duration_s),
             believed: TimeSeries::default(),
             counts: TimeSeries::default(),
             attitude: TimeSeries::default(),
@@ -165,9 +178,11 @@ impl<'a> Tracks<'a> {
             Message::Detections(m) => self.views.push((at(m.stamp), m)),
             Message::Rejects(m) => self.rejects.push((at(m.stamp), m)),
             Message::Task(m) => self.task = Some((at(m.stamp), m)),
-            Message::Mark(m) => self.marks.push(self.span(log_time, m)),
-            Message::Log(m) => self.log.push((at(m.stamp), m)),
-            Message::JointCommand(_)
+            Message::Mark(m) if self.marks.len() < MAX_MARKS => self.marks.push(self.span(log_time, m)),
+            Message::Log(m) if self.log.len() < MAX_MARKS => self.log.push((at(m.stamp), m)),
+            Message::Mark(_)
+            | Message::Log(_)
+            | Message::JointCommand(_)
             | Message::GripperCommand(_)
             | Message::Pressure(_)
             | Message::Survey(_)
@@ -178,8 +193,17 @@ impl<'a> Tracks<'a> {
 
     /// Takes the images, which a recording in memory leaves in its file, unless they follow each other too closely.
     pub fn take_images(&mut self, file: &Path) -> Result<(), LogError> {
-        let mut images = Vec::new();
-        for_each_image(file, |log_time, image| images.push((self.place_s(log_time, image.stamp), image)))?;
+        let (mut images, mut bytes, mut latest_s) = (Vec::<(f64, CameraImage)>::new(), 0, f64::NEG_INFINITY);
+        for_each_image(file, |log_time, image| {
+            let time_s = self.place_s(log_time, image.stamp);
+            let halvings = 4 * bytes / MAX_IMAGE_BYTES;
+            let spacing_s = MIN_IMAGE_SPACING_S * (1_u32 << halvings) as f64;
+            let is_too_close = halvings > 0 && (time_s - latest_s).abs() < spacing_s;
+            if !is_too_close && bytes + image.jpeg.len() <= MAX_IMAGE_BYTES {
+                (bytes, latest_s) = (bytes + image.jpeg.len(), time_s);
+                images.push((time_s, image));
+            }
+        })?;
         images.sort_by(|a, b| a.0.total_cmp(&b.0));
         for (time_s, image) in images {
             if self.images.last().is_none_or(|(last_s, _)| time_s - last_s >= MIN_IMAGE_SPACING_S) {
@@ -204,15 +228,43 @@ impl<'a> Tracks<'a> {
     }
 
     /// The moments at which moving things are drawn, s.
-    pub fn frames(&self) -> impl Iterator<Item = f64> + use<> {
+    pub fn frames(&self) -> impl Iterator<Item = f64> {
         self.ticks(FRAME_HZ)
     }
 
-    /// Moments at `rate_hz` from the start to the end, s.
-    pub fn ticks(&self, rate_hz: f64) -> impl Iterator<Item = f64> + use<> {
-        let n = (self.duration_s * rate_hz).floor() as u64;
-        (0..=n).map(move |i| i as f64 / rate_hz)
+    /// Moments at `rate_hz` from the start to the end, s, without those in gaps.
+    pub fn ticks(&self, rate_hz: f64) -> impl Iterator<Item = f64> {
+        let rate_hz = self.affordable_hz(rate_hz);
+        self.covered.iter().flat_map(move |(from_s, to_s)| {
+            let (first, last) = ((from_s * rate_hz).ceil() as u64, (to_s * rate_hz).floor() as u64);
+            (first..=last).map(move |i| i as f64 / rate_hz)
+        })
     }
+
+    /// `rate_hz`, or the share of it that a long recording can be drawn at.
+    pub fn affordable_hz(&self, rate_hz: f64) -> f64 {
+        let covered_s: f64 = self.covered.iter().map(|(from_s, to_s)| to_s - from_s).sum();
+        rate_hz / (covered_s * rate_hz / MAX_TICKS).ceil().max(1.0)
+    }
+
+    /// Starts of the gaps without messages, s.
+    pub fn gaps(&self) -> impl Iterator<Item = f64> {
+        self.covered.iter().rev().skip(1).rev().map(|(_, to_s)| *to_s)
+    }
+}
+
+/// Spans with messages no farther apart than [`GAP_S`], s since `start`.
+fn covered(recording: &Recording, start: Stamp, duration_s: f64) -> Vec<(f64, f64)> {
+    let mut spans = vec![(0.0, 0.0)];
+    for (log_time, _) in &recording.messages {
+        let time_s = log_time.since_s(start);
+        match spans.last_mut() {
+            Some((_, last_s)) if time_s - *last_s <= GAP_S => *last_s = last_s.max(time_s),
+            _ => spans.push((time_s, time_s)),
+        }
+    }
+    spans.iter_mut().for_each(|(_, last_s)| *last_s = (*last_s + HOLD_S).min(duration_s));
+    spans
 }
 
 fn joint_count(message: &Message) -> Option<usize> {

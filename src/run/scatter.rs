@@ -58,7 +58,6 @@ pub fn corner_scatter_px(recording: &Recording) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use armcal_core::log::Completeness;
     use armcal_core::streams::{CaptureSet, Mark, TagDetection, TagDetections};
 
     fn at(seconds: i64) -> Stamp {
@@ -73,17 +72,7 @@ mod tests {
     }
 
     fn recording(messages: Vec<(Stamp, Message)>) -> Recording {
-        Recording {
-            path: "r.mcap".into(),
-            messages,
-            joint_names: Vec::new(),
-            completeness: Completeness::Whole,
-            raw: Vec::new(),
-            unknown_topics: BTreeMap::new(),
-            rejected: BTreeMap::new(),
-            non_monotonic: 0,
-            stamp_regressions: Default::default(),
-        }
+        Recording { path: "r.mcap".into(), messages, joint_names: Vec::new(), ..Default::default() }
     }
 
     #[test]

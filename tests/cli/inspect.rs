@@ -176,8 +176,8 @@ fn flipped_bits_are_told_of_where_they_matter() {
         }
     }
     eprintln!("{told} of 300 told of");
-    // The others hit indexes and attachments, which no message depends on: a quarter of the file.
-    assert!(told > 190, "{told}");
+    // The checksum of all data covers indexes and attachments, too, which no message depends on.
+    assert!(told > 290, "{told}");
 }
 
 /// One change of the kinds that disks, copies and hands make.
@@ -276,8 +276,8 @@ fn wrong_structure_is_survived() {
     zeros.resize(bytes.len(), 0);
     check("zeros behind a crash", &zeros, 3, &["cut", "no record begins with 00"]);
     let twice = [&bytes[..chunk.0 + chunk.2], &bytes[chunk.0..]].concat();
-    let said = check("a chunk twice", &twice, 3, &["damaged"]);
-    assert!(said.stdout.contains("log time goes backwards 1 times"), "{said:#?}");
+    let said = check("a chunk twice", &twice, 3, &["damaged", "1 chunks are exact copies of others"]);
+    assert!(!said.stdout.contains("backwards"), "{said:#?}");
     // Lengths of records: of the chunk, of the attachment, of a schema at the end.
     for (at, _, _) in [chunk, *attachment, all[all.len() - 3]] {
         for len in [u64::MAX, u64::MAX / 2, 1 << 40, bytes.len() as u64, 0] {

@@ -134,6 +134,37 @@ fn a_recording_cut_anywhere_is_read_as_far_as_it_goes() {
     );
 }
 
+/// The records of a finished file before the end of its data, and the rest.
+fn data_records(bytes: &[u8]) -> (Vec<&[u8]>, &[u8]) {
+    let (mut records, mut at) = (Vec::new(), 8);
+    while bytes[at] != 15 {
+        let len = 9 + u64::from_le_bytes(bytes[at + 1..at + 9].try_into().expect("8 bytes")) as usize;
+        records.push(&bytes[at..at + len]);
+        at += len;
+    }
+    (records, &bytes[at..])
+}
+
+/// Sorted and read once, so that nothing of the result changes; told of, so that nobody takes the file for whole.
+#[test]
+fn chunks_swapped_or_doubled_calibrate_as_if_whole() {
+    let run = shared_run();
+    let bytes = run.bytes("run.mcap");
+    let (records, tail) = data_records(&bytes);
+    let chunks: Vec<usize> = (0..records.len()).filter(|&n| records[n][0] == 6).collect();
+    let (early, late) = (chunks[chunks.len() / 3], chunks[chunks.len() / 2]);
+    let mut swapped = records.clone();
+    swapped.swap(early, late);
+    let mut doubled = records.clone();
+    doubled.insert(late, records[early]);
+    for (records, words) in [(swapped, "not in the order of time"), (doubled, "exact copies of others")] {
+        let folder = temp();
+        let answer = calibrate_bytes(&[&bytes[..8], &records.concat(), tail].concat(), folder.path());
+        answer.expect(words, 3, &["given.mcap", "damaged", words, "ACCEPTED"]);
+        assert!(read(&folder.path().join("out/calibration.toml")) == read(&run.file("calibration.toml")), "{words}");
+    }
+}
+
 /// A flipped bit may cost data, but never silently and never a crash.
 #[test]
 fn flipped_bits_never_panic_and_never_change_the_result_silently() {

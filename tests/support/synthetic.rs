@@ -4,7 +4,7 @@
 
 use armcal::calib::Calibration;
 use armcal::kinematics::Attachment;
-use armcal::log::{Completeness, Recording};
+use armcal::log::Recording;
 use armcal::optics::CameraModel;
 use armcal::robot::Robot;
 use armcal::stats::{quantile, stream_rng};
@@ -166,12 +166,7 @@ impl<'a> TrueArm<'a> {
             path: "synthetic.mcap".into(),
             messages: self.messages(shots),
             joint_names: self.robot.joint_names(),
-            completeness: Completeness::Whole,
-            raw: Vec::new(),
-            unknown_topics: Default::default(),
-            rejected: Default::default(),
-            non_monotonic: 0,
-            stamp_regressions: Default::default(),
+            ..Default::default()
         }
     }
 }

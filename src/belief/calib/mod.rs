@@ -53,6 +53,6 @@ pub use result::{
 };
 pub use views::{
     CalibrationData, CaptureData, ConditionHistory, EndStopReading, ExternalContext, HeldOut, IdentifiedScale,
-    MeanCorners, ObservationRejection, TagMeasurement, TagObservation, TaskRests, View, associate, associate_within,
-    identify_scales, prepare_external, prepare_pooled, surveyed,
+    MarkedSpans, MeanCorners, ObservationRejection, TagMeasurement, TagObservation, TaskRests, View, associate,
+    associate_within, identify_scales, prepare_external, prepare_pooled, read_marked, surveyed,
 };

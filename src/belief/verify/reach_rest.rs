@@ -136,12 +136,7 @@ mod tests {
             path: "synthetic.mcap".into(),
             messages: messages.into_iter().map(|message| (SIMULATION_EPOCH, message)).collect(),
             joint_names: robot.joint_names(),
-            completeness: Completeness::Whole,
-            raw: Vec::new(),
-            unknown_topics: Default::default(),
-            rejected: Default::default(),
-            non_monotonic: 0,
-            stamp_regressions: Default::default(),
+            ..Default::default()
         };
         let reference = Conditions { oil_c: Some(20.0), ..Conditions::default() };
         let mut parameters = JointParameters { reference, ..JointParameters::default() };

@@ -7,7 +7,7 @@ use super::error::InputError;
 use super::joints::{JointReader, Reading};
 use super::map::{InputMap, TagUse};
 use super::tags::{TagFrame, TagReader};
-use crate::log::{Completeness, RawMessage, for_each_raw};
+use crate::log::{ChunkOrder, Completeness, RawMessage, for_each_raw};
 use crate::robot::Robot;
 
 /// Joint readings and detections of a recording of a real arm.
@@ -27,6 +27,8 @@ pub struct ExternalRecording {
     pub left_out: BTreeMap<String, u64>,
     /// Whether the file could be read to its end.
     pub completeness: Completeness,
+    /// What was put right in the order of the file's chunks.
+    pub chunk_order: ChunkOrder,
 }
 
 /// Reads the joint readings and tags of a recording; joints are matched by name.
@@ -63,11 +65,9 @@ pub fn read_external(path: &Path, map: &InputMap, robot: &Robot) -> Result<Exter
     if let Some(error) = first_error {
         return Err(error);
     }
-    for topic in [&map.joint_topic, &map.tag_topic] {
-        if !topics.contains_key(topic) {
-            let found = topics.into_keys().collect();
-            return Err(InputError::NoTopic { file: file.clone(), topic: topic.clone(), found });
-        }
+    if let Some(topic) = [&map.joint_topic, &map.tag_topic].into_iter().find(|topic| !topics.contains_key(*topic)) {
+        let found = topics.into_keys().collect();
+        return Err(InputError::NoTopic { file, topic: topic.clone(), found });
     }
     if readings.readings.is_empty() {
         return Err(readings.no_reading());
@@ -87,9 +87,16 @@ pub fn read_external(path: &Path, map: &InputMap, robot: &Robot) -> Result<Exter
     sorted.sort_by_key(|reading| reading.stamp);
     let (frames, of_tags) = tags.finish();
     left_out.extend(of_tags);
-    let completeness = summary.completeness;
-    let path = path.to_owned();
-    Ok(ExternalRecording { path, readings: sorted, frames, absent_joints, extra_joints, left_out, completeness })
+    Ok(ExternalRecording {
+        path: path.to_owned(),
+        readings: sorted,
+        frames,
+        absent_joints,
+        extra_joints,
+        left_out,
+        completeness: summary.completeness,
+        chunk_order: summary.chunk_order,
+    })
 }
 
 /// Hash of topic, log time and bytes.

@@ -37,8 +37,8 @@ pub use message_codec::Stream;
 pub use messages as ros;
 pub use order::{StampOrder, StampRegression};
 pub use raw::{
-    AttachmentInfo, Channel, ChunkTotals, Completeness, FileContents, RawMessage, RawSummary, Schema, file_contents,
-    for_each_raw,
+    AttachmentInfo, Channel, ChunkOrder, ChunkTotals, Completeness, FileContents, RawMessage, RawSummary, Schema,
+    file_contents, for_each_raw,
 };
 pub use reader::{RawRecord, Recording, TopicMap, read_recording, read_recording_with, scan_recording};
 pub use schema::{RosMessage, RosSchema};

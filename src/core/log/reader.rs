@@ -7,7 +7,7 @@ use super::error::{DecodeRejection, LogError};
 use super::message_codec::Stream;
 use super::messages::joints::FirstNames;
 use super::order::{StampOrder, StampRegression};
-use super::raw::{Completeness, RawMessage, RawSummary, for_each_raw};
+use super::raw::{ChunkOrder, Completeness, RawMessage, RawSummary, for_each_raw};
 use super::topics::VIEWER_TOPICS;
 use crate::streams::Message;
 use crate::time::Stamp;
@@ -21,6 +21,8 @@ pub struct TopicMap {
     pub detections: Option<String>,
     /// Topics whose messages are kept undecoded, such as `/tf`. None of them yields [`Message`]s.
     pub raw: BTreeSet<String>,
+    /// The streams that are read; `None` is all.
+    pub only: Option<BTreeSet<Stream>>,
 }
 
 /// A message kept undecoded, see [`TopicMap::raw`]; `super::decode` reads its bytes.
@@ -39,7 +41,7 @@ pub struct RawRecord {
 }
 
 /// The messages of a recording, checked: every number in them is finite, and all joint messages have the same joints.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Recording {
     /// The file, as given.
     pub path: PathBuf,
@@ -49,6 +51,10 @@ pub struct Recording {
     pub joint_names: Vec<String>,
     /// Whether the file could be read to its end.
     pub completeness: Completeness,
+    /// What was put right in the order of the file's chunks.
+    pub chunk_order: ChunkOrder,
+    /// Number of usable messages that are not among `messages`, by stream.
+    pub left_in_file: BTreeMap<Stream, u64>,
     /// Messages kept undecoded, in the same order.
     pub raw: Vec<RawRecord>,
     /// Number of messages on unknown topics, by topic.
@@ -96,7 +102,7 @@ pub fn scan_recording(
         on_raw(message);
         collector.take(message);
     })?;
-    Ok((collector.finish(path, summary.completeness.clone()), summary))
+    Ok((collector.finish(path, &summary), summary))
 }
 
 struct Collector<'a, F> {
@@ -106,6 +112,7 @@ struct Collector<'a, F> {
     /// Topic and joint names of each stream of joints.
     names: BTreeMap<Stream, (String, FirstNames)>,
     messages: Vec<(Stamp, Message)>,
+    left_in_file: BTreeMap<Stream, u64>,
     raw: Vec<RawRecord>,
     unknown_topics: BTreeMap<String, u64>,
     rejected: BTreeMap<String, u64>,
@@ -124,13 +131,15 @@ impl<'a, F: FnMut(Stamp, &Message) -> bool> Collector<'a, F> {
                 streams.insert(topic, stream);
             }
         }
-        streams.retain(|&topic, _| !map.raw.contains(topic));
+        let is_read = |stream: &Stream| map.only.as_ref().is_none_or(|only| only.contains(stream));
+        streams.retain(|&topic, stream| !map.raw.contains(topic) && is_read(stream));
         Self {
             keep,
             map,
             streams,
             names: BTreeMap::new(),
             messages: Vec::new(),
+            left_in_file: BTreeMap::new(),
             raw: Vec::new(),
             unknown_topics: BTreeMap::new(),
             rejected: BTreeMap::new(),
@@ -154,6 +163,8 @@ impl<'a, F: FnMut(Stamp, &Message) -> bool> Collector<'a, F> {
                 }
                 if (self.keep)(raw.log_time(), &message) {
                     self.messages.push((raw.log_time(), message));
+                } else {
+                    *self.left_in_file.entry(stream).or_default() += 1;
                 }
             }
             Err(rejection) => self.reject(topic, &rejection, 1),
@@ -172,7 +183,10 @@ impl<'a, F: FnMut(Stamp, &Message) -> bool> Collector<'a, F> {
                 data: raw.data.to_vec(),
             });
         } else if !VIEWER_TOPICS.contains(&topic) {
-            *self.unknown_topics.entry(topic.to_owned()).or_default() += 1;
+            match self.unknown_topics.get_mut(topic) {
+                Some(n) => *n += 1,
+                None => _ = self.unknown_topics.insert(topic.to_owned(), 1),
+            }
         }
     }
 
@@ -185,7 +199,7 @@ impl<'a, F: FnMut(Stamp, &Message) -> bool> Collector<'a, F> {
         *self.rejected.entry(format!("{topic}: {rejection}")).or_default() += count;
     }
 
-    fn finish(mut self, path: &Path, completeness: Completeness) -> Recording {
+    fn finish(mut self, path: &Path, summary: &RawSummary) -> Recording {
         let stamp_regressions = self
             .order
             .iter()
@@ -201,7 +215,9 @@ impl<'a, F: FnMut(Stamp, &Message) -> bool> Collector<'a, F> {
             path: path.to_owned(),
             messages: self.messages,
             joint_names,
-            completeness,
+            completeness: summary.completeness.clone(),
+            chunk_order: summary.chunk_order,
+            left_in_file: self.left_in_file,
             raw: self.raw,
             unknown_topics: self.unknown_topics,
             rejected: self.rejected,
@@ -224,7 +240,8 @@ impl<'a, F: FnMut(Stamp, &Message) -> bool> Collector<'a, F> {
         for (stream, topic, _) in named.iter().filter(|(_, _, names)| *names != joint_names) {
             let before = self.messages.len();
             self.messages.retain(|(_, message)| Stream::of(message) != *stream);
-            self.reject(topic, &DecodeRejection::OtherJoints, (before - self.messages.len()) as u64);
+            let n = (before - self.messages.len()) as u64 + self.left_in_file.remove(stream).unwrap_or(0);
+            self.reject(topic, &DecodeRejection::OtherJoints, n);
         }
         joint_names
     }

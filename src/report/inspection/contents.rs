@@ -31,6 +31,9 @@ pub struct Inspection {
     pub duration_s: Option<f64>,
     /// How often, in the order of the file, log time went backwards.
     pub non_monotonic: u64,
+    /// Chunks that lie behind later ones, and exact copies of others; read in the order of time, and once.
+    pub chunks_moved: u64,
+    pub chunk_copies: u64,
     /// Messages on armcal's topics that cannot be used, by "topic: reason".
     pub rejected: BTreeMap<String, u64>,
     pub compression: Vec<Compression>,
@@ -122,6 +125,8 @@ pub fn inspect(path: &Path, robot: Option<&Robot>) -> Result<Inspection, LogErro
         time_nanos,
         duration_s: time_nanos.map(|[first, last]| (last - first) as f64 * 1e-9),
         non_monotonic: recording.non_monotonic,
+        chunks_moved: summary.chunk_order.moved,
+        chunk_copies: summary.chunk_order.copies,
         rejected: recording.rejected.clone(),
         compression: compression(&summary.contents),
         topics,

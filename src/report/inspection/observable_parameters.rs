@@ -4,16 +4,13 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use crate::report::inspection::arm::is_capture;
 use armcal_belief::calib::associate;
 use armcal_belief::calib::{
-    JointParameters, MIN_VIEWS, MIN_VIEWS_PER_PARAMETER, Parameter, PositionProblem, View, free_parameters,
-    identify_scales, mount_by_gripper_tag, surveyed,
+    JointParameters, MIN_VIEWS, MIN_VIEWS_PER_PARAMETER, MarkedSpans, Parameter, PositionProblem, View,
+    free_parameters, identify_scales, mount_by_gripper_tag, surveyed,
 };
 use armcal_core::log::{LogError, Recording, TopicMap, scan_recording};
 use armcal_core::robot::Robot;
-use armcal_core::streams::{Mark, Message};
-use armcal_core::time::Stamp;
 
 /// Views and parameters, in words.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -55,13 +52,8 @@ pub(super) fn observable_parameters(
         determined.missing.push(format!("joint readings of this robot: the recording has [{found}], not [{wanted}]"));
         return Ok(determined);
     }
-    let spans = Spans::of(marked);
-    let (recording, _) = scan_recording(
-        path,
-        &TopicMap::default(),
-        |_| {},
-        |_, m| is_capture(m) || matches!(m, Message::Survey(_)) || stamp(m).is_some_and(|s| spans.hold(s)),
-    )?;
+    let spans = MarkedSpans::of(marked);
+    let (recording, _) = scan_recording(path, &TopicMap::default(), |_| {}, |_, message| spans.hold(message))?;
     let robot = &*surveyed(&recording, robot);
     let as_drawn = associate(&recording, robot);
     // A scale that cannot be measured leaves the datasheet's; what `calibrate` says of it is for `calibrate` to say.
@@ -109,41 +101,4 @@ fn missing(determined: &ObservableParameters) -> Vec<String> {
         missing.push("a sensor that the views determine".to_owned());
     }
     missing
-}
-
-/// The stamp of what a view is made of.
-fn stamp(message: &Message) -> Option<Stamp> {
-    match message {
-        Message::JointSensors(sample) => Some(sample.stamp),
-        Message::Detections(detections) => Some(detections.stamp),
-        _ => None,
-    }
-}
-
-/// Spans of time without overlap, in order.
-struct Spans(Vec<(Stamp, Stamp)>);
-
-impl Spans {
-    /// Those of the captured views.
-    fn of(recording: &Recording) -> Self {
-        let mark = |message: &Message| match message {
-            Message::Mark(Mark { start, end, .. }) if is_capture(message) => Some((*start, *end)),
-            _ => None,
-        };
-        let mut all: Vec<_> = recording.messages.iter().filter_map(|(_, message)| mark(message)).collect();
-        all.sort_unstable();
-        let mut joined: Vec<(Stamp, Stamp)> = Vec::new();
-        for (start, end) in all {
-            match joined.last_mut() {
-                Some(last) if start <= last.1 => last.1 = last.1.max(end),
-                _ => joined.push((start, end)),
-            }
-        }
-        Self(joined)
-    }
-
-    fn hold(&self, stamp: Stamp) -> bool {
-        let after = self.0.partition_point(|(start, _)| *start <= stamp);
-        after.checked_sub(1).is_some_and(|n| stamp <= self.0[n].1)
-    }
 }

@@ -74,6 +74,12 @@ fn head(inspection: &Inspection) -> Vec<String> {
     if i.non_monotonic > 0 {
         lines.push(format!("order        log time goes backwards {} times", i.non_monotonic));
     }
+    if i.chunks_moved > 0 {
+        lines.push(format!("order        {} chunks are not in the order of time; they were sorted", i.chunks_moved));
+    }
+    if i.chunk_copies > 0 {
+        lines.push(format!("copies       {} chunks are exact copies of others; they were left out", i.chunk_copies));
+    }
     for a in &i.attachments {
         lines.push(format!("attachment   {} ({}), {}", a.name, a.media_type, size(a.bytes)));
     }

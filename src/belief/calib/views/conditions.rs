@@ -12,9 +12,9 @@ use armcal_core::streams::{JointAngles, MAX_JOINTS, Mark, Message, Thermometer};
 use armcal_core::time::Stamp;
 
 /// A reading farther from a span than this says nothing of it, s.
-const NEAR_S: f64 = 60.0;
+pub(crate) const NEAR_S: f64 = 60.0;
 /// How far back a joint's last motion is looked for, s.
-const BACK_S: f64 = 30.0;
+pub(crate) const BACK_S: f64 = 30.0;
 /// A reading that is this many sigma of its noise from where the joint rests was taken before it came there.
 const CLEAR_SIGMAS: f64 = 8.0;
 /// Readings in a row that must agree: one alone may be a jump of the sensor.

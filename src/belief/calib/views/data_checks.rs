@@ -26,7 +26,8 @@ const MAX_NOT_FINITE_SHARE: f64 = 0.01;
 pub(crate) fn check_order(recording: &Recording) -> Result<(), CalibError> {
     let streams = [Stream::JointSensors, Stream::Detections];
     for stream in streams {
-        let n_read = recording.messages.iter().filter(|(_, m)| Stream::of(m) == stream).count() as u64;
+        let n_kept = recording.messages.iter().filter(|(_, m)| Stream::of(m) == stream).count() as u64;
+        let n_read = n_kept + recording.left_in_file.get(&stream).copied().unwrap_or(0);
         let start = format!("{}: ", stream.topic());
         for (what, &n) in &recording.rejected {
             if what.starts_with(&start)

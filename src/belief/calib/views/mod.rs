@@ -3,7 +3,8 @@
 //! `association` finds the readings and corners of each captured view, `frame_consensus` the frames of it that agree,
 //! `conditions` the temperatures and the pressure under which it was captured. `external` does the same for recordings
 //! that mark no views, `pooling` for several recordings. `scale_identification` measures the scale of an unknown
-//! sensor; `data_checks` refuses unusable recordings.
+//! sensor; `data_checks` refuses unusable recordings; `marked_spans` reads what views are made of and leaves the
+//! rest in the file.
 
 pub(crate) mod association;
 pub(crate) mod calibration_data;
@@ -11,6 +12,7 @@ pub(crate) mod conditions;
 pub(crate) mod data_checks;
 mod external;
 mod frame_consensus;
+mod marked_spans;
 mod message_index;
 mod pooling;
 pub(crate) mod scale_identification;
@@ -20,6 +22,7 @@ pub use association::{associate, associate_within, surveyed};
 pub use calibration_data::{CalibrationData, HeldOut};
 pub use conditions::ConditionHistory;
 pub use external::{ExternalContext, prepare_external};
+pub use marked_spans::{MarkedSpans, read_marked};
 pub use pooling::prepare_pooled;
 pub use scale_identification::{IdentifiedScale, identify_scales};
 pub use view::{

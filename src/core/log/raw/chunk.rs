@@ -1,32 +1,36 @@
 //! Chunks and summary, unpacked and verified by mcap's decompressors and checksums.
 
-use mcap::McapResult;
 use mcap::records::op;
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
+use mcap::{McapError, McapResult};
 
-use super::record::ChunkHead;
+use super::limits::{MAX_UNCHECKED_BYTES, record_limit, unpacked_limit};
+use super::record::{ChunkHead, PREFIX_BYTES};
 
-/// Limit of a chunk's unpacked size, whatever the chunk states.
-const MAX_CHUNK_BYTES: u64 = 1 << 30;
-/// Unpacked size that every chunk may have: zeros compress to almost nothing.
-const ALWAYS_ALLOWED_BYTES: u64 = 1 << 26;
-/// Largest compression ratio beyond that; recordings reach 10.
-const MAX_RATIO: u64 = 256;
-/// The largest record within a cut chunk.
-const MAX_CUT_RECORD_BYTES: usize = 1 << 26;
+/// Why a chunk is not read, or not to its end.
+#[derive(Debug, thiserror::Error)]
+pub enum ChunkError {
+    #[error(transparent)]
+    Mcap(#[from] McapError),
+    #[error("it unpacks to {bytes} bytes; for its size {limit} are believed")]
+    Bytes { bytes: u64, limit: u64 },
+    #[error("it has more than {limit} records")]
+    Records { limit: u64 },
+    #[error("no record begins with 00")]
+    NoRecord,
+}
 
 /// Passes the records of a whole chunk to `visit` after its checksum is verified (where it has one). `bytes` is the
 /// record from its opcode on, with a consistent `head`.
-pub fn for_each_record(bytes: &[u8], head: &ChunkHead, visit: impl FnMut(u8, &[u8])) -> McapResult<()> {
-    let limit = head.compressed_bytes.saturating_mul(MAX_RATIO).saturating_add(ALWAYS_ALLOWED_BYTES);
-    let limit = limit.min(MAX_CHUNK_BYTES).max(head.compressed_bytes);
+pub fn for_each_record(bytes: &[u8], head: &ChunkHead, visit: impl FnMut(u8, &[u8])) -> Result<(), ChunkError> {
+    let limit = unpacked_limit(head.compressed_bytes);
     if head.uncompressed_bytes > limit {
-        return Err(mcap::McapError::ChunkTooLarge(head.uncompressed_bytes));
+        return Err(ChunkError::Bytes { bytes: head.uncompressed_bytes, limit });
     }
     let options = options()
         .with_prevalidate_chunk_crcs(true)
         .with_record_length_limit(usize::try_from(limit).unwrap_or(usize::MAX));
-    drive(options, bytes, visit)
+    drive_chunk(options, bytes, head.compressed_bytes, visit)
 }
 
 /// Passes the whole records of a cut chunk to `visit`, unverified. `bytes` runs from the chunk's opcode to the end of
@@ -45,15 +49,21 @@ pub fn for_each_record_of_cut(bytes: &[u8], head: &ChunkHead, visit: impl FnMut(
     chunk.extend_from_slice(&(compressed.len() as u64).to_le_bytes());
     chunk.extend_from_slice(compressed);
     // The error comes from the cut.
-    let _ = drive(options().with_record_length_limit(MAX_CUT_RECORD_BYTES), &chunk, visit);
+    let options = options().with_record_length_limit(MAX_UNCHECKED_BYTES as usize);
+    let _ = drive_chunk(options, &chunk, compressed.len() as u64, visit);
 }
 
-/// Records of the summary section, footer included, if its checksum holds. `bytes` runs from the data end record in
-/// front of the summary to the end of the footer.
+/// Schemas, channels and statistics of the summary section, if its checksum holds. `bytes` runs from the data end
+/// record in front of the summary to the end of the footer.
 pub fn verified_summary(bytes: &[u8]) -> McapResult<Vec<(u8, Vec<u8>)>> {
     let mut records = Vec::new();
     let options = options().with_validate_summary_section_crc(true).with_record_length_limit(bytes.len());
-    drive(options, bytes, |opcode, body| records.push((opcode, body.to_vec())))?;
+    drive(options, bytes, |opcode, body| {
+        if matches!(opcode, op::SCHEMA | op::CHANNEL | op::STATISTICS) {
+            records.push((opcode, body.to_vec()));
+        }
+        Ok::<(), McapError>(())
+    })?;
     Ok(records)
 }
 
@@ -61,7 +71,35 @@ fn options() -> LinearReaderOptions {
     LinearReaderOptions::default().with_skip_start_magic(true).with_skip_end_magic(true)
 }
 
-fn drive(options: LinearReaderOptions, mut bytes: &[u8], mut visit: impl FnMut(u8, &[u8])) -> McapResult<()> {
+/// Passes records on until one is impossible, or they are too many or too long for what is stored.
+fn drive_chunk(
+    options: LinearReaderOptions,
+    bytes: &[u8],
+    compressed_bytes: u64,
+    mut visit: impl FnMut(u8, &[u8]),
+) -> Result<(), ChunkError> {
+    let (byte_limit, record_limit) = (unpacked_limit(compressed_bytes), record_limit(compressed_bytes));
+    let (mut unpacked, mut records) = (0, 0);
+    drive(options, bytes, |opcode, body| {
+        records += 1;
+        unpacked += (PREFIX_BYTES + body.len()) as u64;
+        match opcode {
+            0 => Err(ChunkError::NoRecord),
+            _ if records > record_limit => Err(ChunkError::Records { limit: record_limit }),
+            _ if unpacked > byte_limit => Err(ChunkError::Bytes { bytes: unpacked, limit: byte_limit }),
+            _ => {
+                visit(opcode, body);
+                Ok(())
+            }
+        }
+    })
+}
+
+fn drive<E: From<McapError>>(
+    options: LinearReaderOptions,
+    mut bytes: &[u8],
+    mut visit: impl FnMut(u8, &[u8]) -> Result<(), E>,
+) -> Result<(), E> {
     let mut reader = LinearReader::new_with_options(options);
     while let Some(event) = reader.next_event() {
         match event? {
@@ -71,7 +109,7 @@ fn drive(options: LinearReaderOptions, mut bytes: &[u8], mut visit: impl FnMut(u
                 reader.notify_read(next.len());
                 bytes = rest;
             }
-            LinearReadEvent::Record { opcode, data } => visit(opcode, data),
+            LinearReadEvent::Record { opcode, data } => visit(opcode, data)?,
         }
     }
     Ok(())

@@ -1,11 +1,14 @@
 //! Completeness of a recording.
 
 use super::contents::FileContents;
+use super::order::ChunkOrder;
 
-/// Whether all messages of a recording could be read. Attachments and metadata do not count: belief never reads them.
-#[derive(Clone, Debug, PartialEq, Eq)]
+/// Whether all messages of a recording could be read, and the file is as it was written. Attachments and metadata count
+/// where the file has a checksum over all of its data.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum Completeness {
     /// Footer and all messages are present.
+    #[default]
     Whole,
     /// The end is missing: still being written, killed, or copied in part.
     Cut {
@@ -36,6 +39,8 @@ pub struct RawSummary {
     pub completeness: Completeness,
     /// Number of messages read.
     pub readable_messages: u64,
+    /// What was put right in the order of the chunks.
+    pub chunk_order: ChunkOrder,
     /// Everything but the messages.
     pub contents: FileContents,
 }

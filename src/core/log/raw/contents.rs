@@ -9,6 +9,11 @@ use super::record::{ChunkHead, Fields};
 /// Bytes read of a header, metadata or attachment record.
 pub const MAX_HEAD_BYTES: u64 = 1 << 20;
 
+/// Bytes of such records that are kept in all.
+const MAX_KEPT_BYTES: usize = 16 << 20;
+/// What one of them costs beside its texts.
+const ENTRY_BYTES: usize = 128;
+
 /// Number and bytes of the chunks of one compression.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ChunkTotals {
@@ -48,6 +53,7 @@ pub struct FileContents {
     pub attachments: Vec<AttachmentInfo>,
     /// Name and key-value pairs of each record, in the order of the file.
     pub metadata: Vec<(String, BTreeMap<String, String>)>,
+    pub(super) kept_bytes: usize,
 }
 
 impl FileContents {
@@ -59,9 +65,14 @@ impl FileContents {
     }
 
     /// Adds a header, metadata or attachment record. `body` is the beginning of its fields, `record` their place.
-    /// `None` if it is malformed.
+    /// `None` if it is malformed, or beyond what is kept.
     pub(super) fn take(&mut self, opcode: u8, body: &[u8], record: (u64, u64)) -> Option<()> {
         let mut fields = Fields(body);
+        // The data of an attachment stay in the file.
+        self.kept_bytes += ENTRY_BYTES + if opcode == op::ATTACHMENT { 0 } else { body.len() };
+        if self.kept_bytes > MAX_KEPT_BYTES {
+            return None;
+        }
         match opcode {
             op::HEADER => (self.profile, self.library) = (fields.text()?, fields.text()?),
             op::METADATA => self.metadata.push((fields.text()?, fields.pairs()?)),

@@ -2,15 +2,19 @@
 //!
 //! A file may be whole, cut off at any byte, still being written, or hold flipped bits. Chunks that pass their checksum
 //! are read; damaged ones are skipped and counted. Each length is checked against the file's size before its use. The
-//! memory needed is that of the largest chunk, not of the file.
+//! memory needed is that of the largest chunk, not of the file; `limits` bounds what is unpacked. Chunks that lie in
+//! another order are read in the order of time, exact copies once.
 
+mod checksum;
 mod chunk;
 mod completeness;
 mod contents;
 
 mod file;
 mod file_type;
+mod limits;
 mod message;
+mod order;
 mod record;
 mod scan;
 mod window;
@@ -22,3 +26,4 @@ pub use completeness::{Completeness, RawSummary};
 pub use contents::{AttachmentInfo, ChunkTotals, FileContents};
 pub use file::{file_contents, for_each_raw};
 pub use message::{Channel, RawMessage, Schema};
+pub use order::ChunkOrder;

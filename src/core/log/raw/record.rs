@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
+use super::limits::MAX_DECLARED_BYTES;
 use super::message::{Channel, RawMessage, Schema};
 
 /// Bytes at both ends of the file.
@@ -14,6 +15,9 @@ pub const DATA_END_BYTES: u64 = 4;
 
 /// The longest chunk head: prefix, times, sizes, checksum and a compression name of four letters.
 pub const CHUNK_HEAD_BYTES: usize = PREFIX_BYTES + 44;
+
+/// What a schema or channel costs beside its texts.
+const DECLARATION_BYTES: usize = 1024;
 
 /// Opcode and length of a record.
 #[derive(Clone, Copy, Debug)]
@@ -86,6 +90,9 @@ impl<'a> Fields<'a> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ChunkHead {
     pub record_len: u64,
+    /// Log time of the earliest message, as the head states it; 0 without messages.
+    pub start_nanos: u64,
+    pub checksum: u32,
     pub uncompressed_bytes: u64,
     /// "zstd", "lz4" or "".
     pub compression: &'static str,
@@ -105,9 +112,8 @@ impl ChunkHead {
     pub fn parse_body(bytes: &[u8]) -> Option<Self> {
         let prefix = Prefix::parse(bytes)?;
         let mut fields = Fields(&bytes[PREFIX_BYTES..]);
-        let _start_and_end_time = (fields.u64()?, fields.u64()?);
-        let uncompressed_bytes = fields.u64()?;
-        let _checksum = fields.u32()?;
+        let (start_nanos, _end_nanos) = (fields.u64()?, fields.u64()?);
+        let (uncompressed_bytes, checksum) = (fields.u64()?, fields.u32()?);
         let compression = match fields.blob()? {
             b"" => "",
             b"zstd" => "zstd",
@@ -116,7 +122,8 @@ impl ChunkHead {
         };
         let compressed_bytes = fields.u64()?;
         let head_bytes = bytes.len() - fields.0.len();
-        Some(Self { record_len: prefix.len, uncompressed_bytes, compression, compressed_bytes, head_bytes })
+        let record_len = prefix.len;
+        Some(Self { record_len, start_nanos, checksum, uncompressed_bytes, compression, compressed_bytes, head_bytes })
     }
 
     /// Whether the record's two lengths agree and the record fits into the `available` bytes from its opcode on. Random
@@ -135,11 +142,20 @@ pub fn is_message_index(body: &[u8], len: u64) -> bool {
     fields.u32().is_some_and(|array_bytes| u64::from(array_bytes) + 6 == len && array_bytes % 16 == 0)
 }
 
+/// Log time of a message record's fields; `None` if they are too few.
+pub fn log_time_nanos(body: &[u8]) -> Option<u64> {
+    let mut fields = Fields(body);
+    let _channel_and_sequence = (fields.u16()?, fields.u32()?);
+    fields.u64()
+}
+
 /// Schemas and channels seen so far.
 #[derive(Debug, Default)]
 pub struct Tables {
     schemas: BTreeMap<u16, Rc<Schema>>,
     channels: BTreeMap<u16, Channel>,
+    /// Of all that were declared, repetitions aside.
+    declared_bytes: usize,
 }
 
 impl Tables {
@@ -148,7 +164,10 @@ impl Tables {
         let mut fields = Fields(body);
         let id = fields.u16()?;
         let schema = Schema { name: fields.text()?, encoding: fields.text()?, data: fields.blob()?.to_vec() };
-        self.schemas.insert(id, Rc::new(schema));
+        if self.schemas.get(&id).is_none_or(|known| **known != schema) {
+            self.declare(body)?;
+            self.schemas.insert(id, Rc::new(schema));
+        }
         Some(())
     }
 
@@ -159,9 +178,18 @@ impl Tables {
         let schema = self.schemas.get(&fields.u16()?).cloned();
         let topic = fields.text()?;
         let message_encoding = fields.text()?;
-        let metadata = fields.pairs()?;
-        self.channels.insert(id, Channel { topic, message_encoding, metadata, schema });
+        let channel = Channel { topic, message_encoding, metadata: fields.pairs()?, schema };
+        if self.channels.get(&id) != Some(&channel) {
+            self.declare(body)?;
+            self.channels.insert(id, channel);
+        }
         Some(())
+    }
+
+    /// `None` once a file has declared too much.
+    fn declare(&mut self, body: &[u8]) -> Option<()> {
+        self.declared_bytes += DECLARATION_BYTES + body.len();
+        (self.declared_bytes <= MAX_DECLARED_BYTES).then_some(())
     }
 
     /// The message of a record; `None` if it is malformed or its channel is unknown.

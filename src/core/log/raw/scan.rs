@@ -4,21 +4,23 @@ use std::io::{self, Read, Seek};
 
 use mcap::records::op;
 
-use super::chunk;
+use super::checksum::DataChecksum;
+use super::chunk::{self, ChunkError};
 use super::completeness::{Completeness, RawSummary};
 use super::contents::{FileContents, MAX_HEAD_BYTES};
 use super::file_type;
+use super::limits::{Budget, MAX_RECORD_BYTES, MAX_UNCHECKED_BYTES, unpacked_limit};
 use super::message::RawMessage;
+use super::order::{ChunkOrder, HeadOrder, SurveyedChunk, in_order};
 use super::record::{
     CHUNK_HEAD_BYTES, ChunkHead, DATA_END_BYTES, FOOTER_BYTES, Fields, MAGIC, PREFIX_BYTES, Prefix, Tables,
-    is_message_index,
+    is_message_index, log_time_nanos,
 };
 use super::window::Window;
 
-/// Bytes searched at once for the next chunk.
+/// Bytes searched at once for the next chunk: few at first, as it is often near, so that they are in memory already.
+const FIRST_SEARCH_BYTES: u64 = 1 << 10;
 const SEARCH_BYTES: u64 = 1 << 18;
-/// Longest summary or cut chunk that is read; nothing else bounds the memory for it.
-const MAX_UNCHECKED_BYTES: u64 = 1 << 28;
 /// Prefix and fields of the last record, and the magic after it.
 const TAIL_BYTES: u64 = PREFIX_BYTES as u64 + FOOTER_BYTES + MAGIC.len() as u64;
 
@@ -57,40 +59,87 @@ impl Damage {
     }
 }
 
+/// What a pass does with chunks.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum ChunkUse {
+    /// Their heads are looked at.
+    Heads,
+    /// They are read for their times and channels.
+    Survey,
+    /// Their messages are visited.
+    Messages,
+}
+
+/// What a pass has come to know.
+struct Pass {
+    chunk_use: ChunkUse,
+    damage: Damage,
+    cut: Option<String>,
+    has_chunks: bool,
+    is_past_data: bool,
+    contents: FileContents,
+    /// End of the last chunk, or of the opening magic: surely the beginning of a record.
+    verified_end: u64,
+    checksum: DataChecksum,
+    /// Whether a chunk has no checksum of its own. mcap 0.26 for Rust leaves such chunks out of that of all data.
+    has_unchecked_chunks: bool,
+    heads: HeadOrder,
+    surveyed: Vec<SurveyedChunk>,
+    budget: Budget,
+    /// Of all chunks.
+    records: u64,
+}
+
+impl Pass {
+    fn new(chunk_use: ChunkUse, bytes: u64) -> Self {
+        Self {
+            chunk_use,
+            damage: Damage::default(),
+            cut: None,
+            has_chunks: false,
+            is_past_data: false,
+            contents: FileContents { bytes, ..FileContents::default() },
+            verified_end: MAGIC.len() as u64,
+            checksum: DataChecksum::default(),
+            has_unchecked_chunks: false,
+            heads: HeadOrder::default(),
+            surveyed: Vec::new(),
+            budget: Budget::of_file(bytes),
+            records: 0,
+        }
+    }
+}
+
 struct Scan<R, F> {
     window: Window<R>,
     visit: F,
     tables: Tables,
-    damage: Damage,
-    cut: Option<String>,
     readable: u64,
-    /// Messages that the file's own summary counts.
+    /// Messages that the file's own summary counts, and those of them that are copies.
     counted: Option<u64>,
+    copied: u64,
     ends_with_magic: bool,
-    has_chunks: bool,
-    is_past_data: bool,
-    contents: FileContents,
-    /// Whether chunks are only counted.
-    skips_chunks: bool,
-    /// End of the last chunk, or of the opening magic: surely the beginning of a record.
-    verified_end: u64,
+    pass: Pass,
 }
 
 /// Passes every readable message of `source` to `visit`.
 pub fn scan<R: Read + Seek>(source: R, visit: impl FnMut(&RawMessage<'_>)) -> Result<RawSummary, ScanError> {
     let mut scan = begin(source, visit)?;
+    scan.walk()?;
+    let of_chunks = if scan.pass.heads.is_doubtful { ChunkUse::Survey } else { ChunkUse::Messages };
+    scan.pass = Pass::new(of_chunks, scan.window.len());
     scan.read_summary()?;
     scan.walk()?;
-    let contents = std::mem::take(&mut scan.contents);
-    Ok(RawSummary { readable_messages: scan.readable, completeness: scan.completeness(), contents })
+    let chunk_order = scan.visit_surveyed()?;
+    let contents = std::mem::take(&mut scan.pass.contents);
+    Ok(RawSummary { readable_messages: scan.readable, completeness: scan.completeness(), chunk_order, contents })
 }
 
 /// Contents of `source` other than messages; its chunks are not read.
 pub fn scan_contents<R: Read + Seek>(source: R) -> Result<FileContents, ScanError> {
     let mut scan = begin(source, |_| {})?;
-    scan.skips_chunks = true;
     scan.walk()?;
-    Ok(scan.contents)
+    Ok(scan.pass.contents)
 }
 
 fn begin<R: Read + Seek, F: FnMut(&RawMessage<'_>)>(source: R, visit: F) -> Result<Scan<R, F>, ScanError> {
@@ -107,16 +156,11 @@ fn begin<R: Read + Seek, F: FnMut(&RawMessage<'_>)>(source: R, visit: F) -> Resu
         window,
         visit,
         tables: Tables::default(),
-        damage: Damage::default(),
-        cut: None,
         readable: 0,
         counted: None,
+        copied: 0,
         ends_with_magic: false,
-        has_chunks: false,
-        is_past_data: false,
-        contents: FileContents { bytes, ..FileContents::default() },
-        skips_chunks: false,
-        verified_end: MAGIC.len() as u64,
+        pass: Pass::new(ChunkUse::Heads, bytes),
     })
 }
 
@@ -142,17 +186,17 @@ impl<R: Read + Seek, F: FnMut(&RawMessage<'_>)> Scan<R, F> {
         let end = len - MAGIC.len() as u64;
         let start = summary_start.checked_sub(PREFIX_BYTES as u64 + DATA_END_BYTES);
         let Some(start) = start.filter(|&start| start < end) else {
-            self.damage.note(len - TAIL_BYTES, "the footer points outside the file");
+            self.pass.damage.note(len - TAIL_BYTES, "the footer points outside the file");
             return Ok(());
         };
         if end - start > MAX_UNCHECKED_BYTES {
-            self.damage.note(summary_start, "the summary is too long");
+            self.pass.damage.note(summary_start, "the summary is too long");
             return Ok(());
         }
         let bytes = self.window.bytes(start, usize::try_from(end - start).unwrap_or(usize::MAX))?;
         match chunk::verified_summary(bytes) {
             Ok(records) => self.take_summary(&records),
-            Err(error) => self.damage.note(summary_start, &format!("the summary cannot be used: {error}")),
+            Err(error) => self.pass.damage.note(summary_start, &format!("the summary cannot be used: {error}")),
         }
         Ok(())
     }
@@ -172,6 +216,9 @@ impl<R: Read + Seek, F: FnMut(&RawMessage<'_>)> Scan<R, F> {
         let mut at = MAGIC.len() as u64;
         while let Next::At(next) = self.record(at)? {
             at = next;
+            if self.pass.chunk_use != ChunkUse::Heads && !self.pass.is_past_data {
+                self.pass.checksum.add_until(&mut self.window, at)?;
+            }
         }
         Ok(())
     }
@@ -202,13 +249,15 @@ impl<R: Read + Seek, F: FnMut(&RawMessage<'_>)> Scan<R, F> {
             return self.broken(at, opcode, what);
         }
         match prefix.opcode {
-            op::DATA_END => self.is_past_data = true,
-            op::SCHEMA | op::CHANNEL | op::MESSAGE if !self.skips_chunks => self.unchunked(at, prefix)?,
+            op::DATA_END => self.data_end(at)?,
+            op::SCHEMA | op::CHANNEL | op::MESSAGE if self.pass.chunk_use != ChunkUse::Heads => {
+                self.unchunked(at, prefix)?;
+            }
             op::HEADER | op::ATTACHMENT | op::METADATA => {
                 let (at, len) = (at + PREFIX_BYTES as u64, prefix.len);
                 let body = self.window.bytes(at, len.min(MAX_HEAD_BYTES) as usize)?;
                 // Malformed ones are skipped: belief never reads them.
-                let _ = self.contents.take(prefix.opcode, body, (at, len));
+                let _ = self.pass.contents.take(prefix.opcode, body, (at, len));
             }
             _ => {}
         }
@@ -229,18 +278,37 @@ impl<R: Read + Seek, F: FnMut(&RawMessage<'_>)> Scan<R, F> {
             opcode if is_first && opcode != op::HEADER => Some("the first record is no header"),
             op::DATA_END if prefix.len != DATA_END_BYTES => Some("the data end has a wrong length"),
             op::MESSAGE_INDEX if !is_index => Some("a message index has a wrong length"),
-            op::MESSAGE if self.is_past_data => Some("a message lies after the end of the data"),
-            op::MESSAGE if self.has_chunks && is_index => Some("a message index has another opcode"),
+            op::MESSAGE if self.pass.is_past_data => Some("a message lies after the end of the data"),
+            op::MESSAGE if self.pass.has_chunks && is_index => Some("a message index has another opcode"),
             _ => None,
         })
     }
 
     fn unchunked(&mut self, at: u64, prefix: Prefix) -> io::Result<()> {
-        let body = self.window.bytes(at + PREFIX_BYTES as u64, prefix.len as usize)?;
-        if deliver(&mut self.tables, &mut self.visit, &mut self.readable, prefix.opcode, body).is_none() {
-            self.damage.note(at, "a record cannot be used");
-            self.damage.bytes += PREFIX_BYTES as u64 + prefix.len;
+        let is_used = prefix.len <= MAX_RECORD_BYTES && {
+            let body = self.window.bytes(at + PREFIX_BYTES as u64, prefix.len as usize)?;
+            deliver(&mut self.tables, &mut self.visit, &mut self.readable, prefix.opcode, body).is_some()
+        };
+        if !is_used {
+            self.pass.damage.note(at, "a record cannot be used");
+            self.pass.damage.bytes += PREFIX_BYTES as u64 + prefix.len;
         }
+        Ok(())
+    }
+
+    /// The data section ends here; its checksum, where it has one, covers all bytes before.
+    fn data_end(&mut self, at: u64) -> io::Result<()> {
+        let body = self.window.bytes(at + PREFIX_BYTES as u64, DATA_END_BYTES as usize)?;
+        let stated = Fields(body).u32().unwrap_or(0);
+        let is_checked = stated != 0 && !self.pass.has_unchecked_chunks;
+        if self.pass.chunk_use != ChunkUse::Heads && !self.pass.is_past_data && is_checked {
+            self.pass.checksum.add_until(&mut self.window, at)?;
+            if self.pass.checksum.value() != stated {
+                let what = "the checksum of all data is wrong: something before was changed, moved, added or removed";
+                self.pass.damage.note(at, what);
+            }
+        }
+        self.pass.is_past_data = true;
         Ok(())
     }
 
@@ -253,7 +321,7 @@ impl<R: Read + Seek, F: FnMut(&RawMessage<'_>)> Scan<R, F> {
             return self.broken(at, Some(prefix.opcode), "the file ends within the closing bytes");
         }
         if !self.ends_with_magic {
-            self.damage.note(at, "the closing bytes after the footer are wrong");
+            self.pass.damage.note(at, "the closing bytes after the footer are wrong");
         }
         Ok(Next::End)
     }
@@ -264,50 +332,118 @@ impl<R: Read + Seek, F: FnMut(&RawMessage<'_>)> Scan<R, F> {
             return self.broken(at, Some(op::CHUNK), "the head of a chunk contradicts itself");
         };
         let record_bytes = PREFIX_BYTES as u64 + head.record_len;
-        self.has_chunks = true;
-        self.verified_end = at + record_bytes;
-        if self.skips_chunks {
+        self.pass.has_chunks = true;
+        self.pass.has_unchecked_chunks |= head.checksum == 0 && head.uncompressed_bytes > 0;
+        self.pass.verified_end = at + record_bytes;
+        if self.pass.chunk_use == ChunkUse::Heads {
+            self.pass.heads.add(&head);
             return Ok(Next::At(at + record_bytes));
         }
-        let bytes = self.window.bytes(at, usize::try_from(record_bytes).unwrap_or(usize::MAX))?;
+        if head.compressed_bytes > MAX_RECORD_BYTES {
+            let what = format!("a chunk of {} bytes; at most {MAX_RECORD_BYTES} are read", head.compressed_bytes);
+            self.lose_chunk(at, record_bytes, &what);
+            return Ok(Next::At(at + record_bytes));
+        }
+        let records = self.pass.records;
+        // A chunk that states more is not unpacked.
+        let is_unpacked = head.uncompressed_bytes <= unpacked_limit(head.compressed_bytes);
+        let unpacked = if is_unpacked { head.uncompressed_bytes } else { 0 };
+        let read = match self.pass.chunk_use {
+            ChunkUse::Survey => self.survey_chunk(at, &head)?,
+            _ => self.visit_chunk(at, &head)?,
+        };
+        match read {
+            Ok(()) => self.pass.contents.add_chunk(&head),
+            Err(error) => self.lose_chunk(at, record_bytes, &format!("a chunk cannot be read: {error}")),
+        }
+        if let Err(exhausted) = self.pass.budget.spend(unpacked, self.pass.records - records) {
+            self.pass.damage.note(at, &exhausted.to_string());
+            self.pass.damage.bytes += left - record_bytes;
+            return Ok(Next::End);
+        }
+        Ok(Next::At(at + record_bytes))
+    }
+
+    fn lose_chunk(&mut self, at: u64, record_bytes: u64, what: &str) {
+        self.pass.damage.note(at, what);
+        self.pass.damage.chunks += 1;
+        self.pass.damage.bytes += record_bytes;
+    }
+
+    /// Visits the messages of a chunk.
+    fn visit_chunk(&mut self, at: u64, head: &ChunkHead) -> io::Result<Result<(), ChunkError>> {
+        let bytes = self.window.bytes(at, PREFIX_BYTES + head.record_len as usize)?;
         let (tables, visit, readable) = (&mut self.tables, &mut self.visit, &mut self.readable);
-        let mut unusable = 0_u64;
-        let read = chunk::for_each_record(bytes, &head, |opcode, body| {
+        let (records, mut unusable) = (&mut self.pass.records, 0_u64);
+        let read = chunk::for_each_record(bytes, head, |opcode, body| {
+            *records += 1;
             if deliver(tables, visit, readable, opcode, body).is_none() {
                 unusable += 1;
             }
         });
-        if let Err(error) = read {
-            self.damage.note(at, &format!("a chunk cannot be read: {error}"));
-            self.damage.chunks += 1;
-            self.damage.bytes += record_bytes;
-            return Ok(Next::At(at + record_bytes));
-        }
-        self.contents.add_chunk(&head);
         if unusable > 0 {
-            self.damage
-                .note(at, &format!("{unusable} records of a chunk cannot be used, their topic's declaration is lost"));
+            let what = format!("{unusable} records of a chunk cannot be used, their topic's declaration is lost");
+            self.pass.damage.note(at, &what);
         }
-        Ok(Next::At(at + record_bytes))
+        Ok(read)
+    }
+
+    /// Takes the channels of a chunk and the time of its messages.
+    fn survey_chunk(&mut self, at: u64, head: &ChunkHead) -> io::Result<Result<(), ChunkError>> {
+        let record_bytes = PREFIX_BYTES + head.record_len as usize;
+        let bytes = self.window.bytes(at, record_bytes)?;
+        let hash = *blake3::hash(bytes).as_bytes();
+        let (tables, records) = (&mut self.tables, &mut self.pass.records);
+        let mut chunk = SurveyedChunk { at, record_bytes, hash, messages: 0, first_nanos: None };
+        let read = chunk::for_each_record(bytes, head, |opcode, body| {
+            *records += 1;
+            match opcode {
+                op::SCHEMA => _ = tables.add_schema(body),
+                op::CHANNEL => _ = tables.add_channel(body),
+                op::MESSAGE => {
+                    chunk.messages += 1;
+                    chunk.first_nanos = chunk.first_nanos.into_iter().chain(log_time_nanos(body)).min();
+                }
+                _ => {}
+            }
+        });
+        if read.is_ok() {
+            self.pass.surveyed.push(chunk);
+        }
+        Ok(read)
+    }
+
+    /// Visits the messages of the surveyed chunks in the order of time.
+    fn visit_surveyed(&mut self) -> io::Result<ChunkOrder> {
+        let (chunks, order, copied_messages) = in_order(std::mem::take(&mut self.pass.surveyed));
+        self.copied = copied_messages;
+        for chunk in chunks {
+            let bytes = self.window.bytes(chunk.at, chunk.record_bytes)?;
+            if let Some(head) = ChunkHead::parse(&bytes[..bytes.len().min(CHUNK_HEAD_BYTES)]) {
+                // It was read before.
+                let _ = self.visit_chunk(chunk.at, &head)?;
+            }
+        }
+        Ok(order)
     }
 
     /// Continues at the next chunk after an impossible record; without one, the pass ends.
     fn broken(&mut self, at: u64, opcode: Option<u8>, what: &str) -> io::Result<Next> {
         let is_chunk = opcode == Some(op::CHUNK);
         // Not from `at`: a wrong length before it may have skipped chunks. A broken chunk is no candidate.
-        if let Some(next) = self.find_chunk(self.verified_end)? {
-            self.damage.note(at, what);
-            self.damage.chunks += u64::from(is_chunk);
-            self.damage.bytes += next - self.verified_end;
+        if let Some(next) = self.find_chunk(self.pass.verified_end)? {
+            self.pass.damage.note(at, what);
+            self.pass.damage.chunks += u64::from(is_chunk);
+            self.pass.damage.bytes += next - self.pass.verified_end;
             return Ok(Next::At(next));
         }
         if self.ends_with_magic {
-            self.damage.note(at, what);
-            self.damage.chunks += u64::from(is_chunk);
-            self.damage.bytes += self.window.len() - at;
+            self.pass.damage.note(at, what);
+            self.pass.damage.chunks += u64::from(is_chunk);
+            self.pass.damage.bytes += self.window.len() - at;
             return Ok(Next::End);
         }
-        self.cut = Some(format!("at byte {at} of {}: {what}", self.window.len()));
+        self.pass.cut = Some(format!("at byte {at} of {}: {what}", self.window.len()));
         if is_chunk {
             self.salvage(at)?;
         }
@@ -316,7 +452,7 @@ impl<R: Read + Seek, F: FnMut(&RawMessage<'_>)> Scan<R, F> {
 
     /// Reads the messages at the beginning of a cut chunk.
     fn salvage(&mut self, at: u64) -> io::Result<()> {
-        if self.skips_chunks {
+        if self.pass.chunk_use == ChunkUse::Heads {
             return Ok(());
         }
         let left = (self.window.len() - at).min(MAX_UNCHECKED_BYTES) as usize;
@@ -334,11 +470,11 @@ impl<R: Read + Seek, F: FnMut(&RawMessage<'_>)> Scan<R, F> {
     /// The first place at or after `from` where a whole chunk may begin.
     fn find_chunk(&mut self, from: u64) -> io::Result<Option<u64>> {
         let overlap = CHUNK_HEAD_BYTES as u64 - 1;
-        let mut at = from;
+        let (mut at, mut step) = (from, FIRST_SEARCH_BYTES);
         while at < self.window.len() {
             let left = self.window.len() - at;
-            let bytes = self.window.bytes(at, left.min(SEARCH_BYTES + overlap) as usize)?;
-            let found = (0..bytes.len().min(SEARCH_BYTES as usize)).find(|&offset| {
+            let bytes = self.window.bytes(at, left.min(step + overlap) as usize)?;
+            let found = (0..bytes.len().min(step as usize)).find(|&offset| {
                 let bytes = &bytes[offset..];
                 bytes[0] == op::CHUNK
                     && ChunkHead::parse(&bytes[..bytes.len().min(CHUNK_HEAD_BYTES)])
@@ -347,22 +483,24 @@ impl<R: Read + Seek, F: FnMut(&RawMessage<'_>)> Scan<R, F> {
             if let Some(offset) = found {
                 return Ok(Some(at + offset as u64));
             }
-            at += SEARCH_BYTES;
+            at += step;
+            step = (2 * step).min(SEARCH_BYTES);
         }
         Ok(None)
     }
 
     fn completeness(self) -> Completeness {
-        let missing = self.counted.map(|counted| counted.saturating_sub(self.readable));
+        let missing = self.counted.map(|counted| counted.saturating_sub(self.readable + self.copied));
         let miscounted = missing
             .filter(|&missing| missing > 0)
             .map(|missing| format!("{missing} messages counted in the summary are missing"));
         let readable_messages = self.readable;
-        match (self.damage.reason.or(miscounted), self.cut) {
+        let Pass { damage, cut, .. } = self.pass;
+        match (damage.reason.or(miscounted), cut) {
             (Some(reason), cut) => Completeness::Damaged {
                 reason: cut.map_or_else(|| reason.clone(), |cut| format!("{reason}; and cut {cut}")),
-                lost_chunks: self.damage.chunks,
-                lost_bytes: self.damage.bytes,
+                lost_chunks: damage.chunks,
+                lost_bytes: damage.bytes,
                 lost_messages: missing,
                 readable_messages,
             },

@@ -267,3 +267,150 @@ fn empty_and_foreign_files_are_errors_that_name_the_file() {
     assert!(message.contains("notes.txt: not an MCAP recording"), "{message}");
     assert!(matches!(read(dir.path()), LogError::Read { .. }));
 }
+
+/// The bytes before the first chunk, each chunk with its index, and the bytes from the end of the data on.
+fn taken_apart(bytes: &[u8]) -> (Vec<u8>, Vec<Vec<u8>>, Vec<u8>) {
+    let chunks = chunks(bytes);
+    let (data_end, _) = *records(bytes).iter().find(|(at, _)| bytes[*at] == 15).unwrap();
+    let starts: Vec<usize> = chunks.iter().map(|(at, _)| *at).chain([data_end]).collect();
+    let groups = starts.windows(2).map(|pair| bytes[pair[0]..pair[1]].to_vec()).collect();
+    (bytes[..starts[0]].to_vec(), groups, bytes[data_end..].to_vec())
+}
+
+#[test]
+fn chunks_in_another_order_are_sorted_and_do_not_pass_for_whole() {
+    let (bytes, messages) = recording();
+    let (head, mut groups, mut tail) = taken_apart(&bytes);
+    groups.swap(1, 4);
+    let swapped = |tail: &[u8]| [head.clone(), groups.concat(), tail.to_vec()].concat();
+    let (read_back, summary) = read(&swapped(&tail)).unwrap();
+    assert!(read_back == messages);
+    // The chunks 2, 3 and 1 lie behind chunk 4.
+    assert_eq!(summary.chunk_order, ChunkOrder { moved: 3, copies: 0 });
+    let Completeness::Damaged { reason, lost_messages, .. } = summary.completeness else { panic!("{summary:?}") };
+    assert!(reason.contains("checksum of all data") && lost_messages == Some(0), "{reason}");
+    // Without a checksum, or with one of that order, a writer may well have written them so.
+    tail[9..13].fill(0);
+    let (read_back, summary) = read(&swapped(&tail)).unwrap();
+    assert!(read_back == messages);
+    assert_eq!((summary.completeness, summary.chunk_order.moved), (Completeness::Whole, 3));
+}
+
+#[test]
+fn copies_of_chunks_are_left_out() {
+    let (bytes, messages) = recording();
+    let (head, groups, tail) = taken_apart(&bytes);
+    for (copied, to) in [(2, 3), (2, 6), (0, 6)] {
+        let mut groups = groups.clone();
+        groups.insert(to, groups[copied].clone());
+        let doubled = [head.clone(), groups.concat()].concat();
+        let (read_back, summary) = read(&doubled).unwrap();
+        assert!(read_back == messages, "{copied} {to}");
+        assert_eq!(summary.chunk_order, ChunkOrder { moved: 0, copies: 1 }, "{copied} {to}");
+        assert!(matches!(summary.completeness, Completeness::Cut { .. }));
+        let (read_back, summary) = read(&[doubled, tail.clone()].concat()).unwrap();
+        assert!(read_back == messages, "{copied} {to}");
+        assert!(matches!(summary.completeness, Completeness::Damaged { .. }), "{summary:?}");
+    }
+}
+
+/// Times in the heads of chunks have no checksum of their own: a wrong one moves nothing.
+#[test]
+fn a_wrong_time_in_the_head_of_a_chunk_moves_nothing() {
+    let (mut bytes, messages) = recording();
+    let (at, _) = chunks(&bytes)[1];
+    bytes[at + 9..at + 17].copy_from_slice(&u64::MAX.to_le_bytes());
+    let (read_back, summary) = read(&bytes).unwrap();
+    assert!(read_back == messages);
+    assert_eq!(summary.chunk_order, ChunkOrder::default());
+    assert!(matches!(summary.completeness, Completeness::Damaged { .. }), "{summary:?}");
+}
+
+/// A file of one chunk by another writer: `write` puts messages on one channel.
+fn packed(write: impl Fn(&mut mcap::Writer<Cursor<Vec<u8>>>)) -> Vec<u8> {
+    let options = mcap::WriteOptions::new().compression_threads(0).chunk_size(None);
+    let options = options.compression(Some(mcap::Compression::Lz4)).emit_message_indexes(false);
+    let mut writer = options.create(Cursor::new(Vec::new())).unwrap();
+    write(&mut writer);
+    writer.finish().unwrap();
+    writer.into_inner().into_inner()
+}
+
+#[test]
+fn more_records_than_a_chunk_can_hold_are_not_read() {
+    let header = |channel_id| mcap::records::MessageHeader { channel_id, sequence: 0, log_time: 1, publish_time: 0 };
+    let bytes = packed(|writer| {
+        let channel = writer.add_channel(0, "/x", "json", &BTreeMap::new()).unwrap();
+        (0..1_500_000).for_each(|_| writer.write_to_known_channel(&header(channel), &[]).unwrap());
+    });
+    assert!(bytes.len() < 1_000_000, "{}", bytes.len());
+    let mut n = 0_u64;
+    let summary = scan(Cursor::new(&bytes), |_| n += 1).unwrap();
+    assert!((1_000_000..1_400_000).contains(&n), "{n}");
+    let Completeness::Damaged { reason, lost_chunks, .. } = summary.completeness else { panic!("{summary:?}") };
+    assert!(reason.contains("more than") && lost_chunks == 1, "{reason}");
+}
+
+#[test]
+fn zeros_in_a_chunk_are_no_records() {
+    let (bytes, messages) = recording();
+    let (at, len) = chunks(&bytes)[2];
+    let zeros = vec![0_u8; 1 << 24];
+    let mut chunk = vec![6];
+    chunk.extend((40 + zeros.len() as u64).to_le_bytes());
+    chunk.extend_from_slice(&bytes[at + 9..at + 25]);
+    chunk.extend((zeros.len() as u64).to_le_bytes());
+    chunk.extend([0; 8]);
+    chunk.extend((zeros.len() as u64).to_le_bytes());
+    chunk.extend(zeros);
+    let damaged = [&bytes[..at], &chunk, &bytes[at + len..]].concat();
+    let (read_back, summary) = read(&damaged).unwrap();
+    assert_eq!(read_back.len(), messages.len() - PER_CHUNK);
+    let Completeness::Damaged { reason, .. } = summary.completeness else { panic!("{summary:?}") };
+    // The summary is no more where the footer has it; its damage is told first.
+    assert!(reason.contains("summary") || reason.contains("no record begins with 00"), "{reason}");
+}
+
+#[test]
+fn declarations_are_kept_within_a_budget() {
+    let long: BTreeMap<String, String> = [("key".to_owned(), "x".repeat(1 << 20))].into();
+    let bytes = packed(|writer| {
+        for n in 0..100 {
+            let channel = writer.add_channel(0, &format!("/{n}"), "json", &long).unwrap();
+            let header =
+                mcap::records::MessageHeader { channel_id: channel, sequence: 0, log_time: 1, publish_time: 0 };
+            writer.write_to_known_channel(&header, &[]).unwrap();
+        }
+    });
+    let (read_back, summary) = read(&bytes).unwrap();
+    assert!((50..64).contains(&read_back.len()), "{}", read_back.len());
+    assert!(matches!(summary.completeness, Completeness::Damaged { .. }), "{summary:?}");
+}
+
+#[test]
+fn the_budget_of_a_file_ends() {
+    use super::limits::Budget;
+    let mut budget = Budget::of_file(1000);
+    assert!(budget.spend(8 << 30, (1 << 24) - 128).is_ok());
+    assert!(budget.spend(32_000, 122).is_ok());
+    assert!(budget.spend(0, 1).is_err());
+    assert!(Budget::of_file(1000).spend((8 << 30) + 32_001, 0).is_err());
+    assert!(Budget::of_file(u64::MAX).spend(u64::MAX, u64::MAX / 8).is_ok());
+}
+
+#[test]
+fn metadata_are_kept_within_a_budget() {
+    let (bytes, messages) = recording();
+    let (head, groups, tail) = taken_apart(&bytes);
+    let value = vec![b'x'; 1 << 19];
+    let mut body = vec![1, 0, 0, 0, b'm'];
+    body.extend((value.len() as u32 + 9).to_le_bytes());
+    body.extend([1, 0, 0, 0, b'k']);
+    body.extend((value.len() as u32).to_le_bytes());
+    body.extend(value);
+    let record = [&[12][..], &(body.len() as u64).to_le_bytes(), &body].concat();
+    let long = [head, record.repeat(100), groups.concat(), tail].concat();
+    let (read_back, summary) = read(&long).unwrap();
+    assert!(read_back == messages);
+    assert!((25..32).contains(&summary.contents.metadata.len()), "{}", summary.contents.metadata.len());
+}

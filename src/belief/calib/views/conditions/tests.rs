@@ -22,12 +22,7 @@ fn recording(robot: &Robot, messages: Vec<Message>) -> Recording {
         path: "synthetic.mcap".into(),
         messages: messages.into_iter().map(|message| (SIMULATION_EPOCH, message)).collect(),
         joint_names: robot.joint_names(),
-        completeness: Completeness::Whole,
-        raw: Vec::new(),
-        unknown_topics: Default::default(),
-        rejected: Default::default(),
-        non_monotonic: 0,
-        stamp_regressions: Default::default(),
+        ..Default::default()
     }
 }
 
