@@ -90,8 +90,7 @@ pub fn load_without_pairs(folder: &Path) -> Result<Robot, RobotError> {
     let file = folder.join("robot.toml");
     let raw: RobotFile = parse_toml(&file, &read_in(folder, &file)?)?;
     FileIssue::check_range(&file, "version", f64::from(raw.version), 1.0..=1.0)?;
-    let urdf_file = urdf_file(folder, &raw.urdf);
-    let urdf = UrdfModel::parse(&urdf_file, read_in(folder, &urdf_file)?)?;
+    let urdf = read_urdf(folder, &raw.urdf)?;
     let chain = urdf.chain(&raw.base_link, &[&raw.tool.link, &raw.camera.link])?;
     let jaws = raw.gripper.as_ref().map(GripperFile::jaws).unwrap_or_default();
     let arm = UrdfChain { urdf: &urdf, base_link: &raw.base_link, chain: &chain };
@@ -166,11 +165,12 @@ fn add_tip(body: &mut LinkBody, owner_from_shape: Isometry3<f64>, radius_m: f64)
 }
 
 /// The URDF that robot.toml names, or else a file of that name beside robot.toml, as in the attachments of a recording.
-fn urdf_file(folder: &Path, urdf: &Path) -> PathBuf {
+fn read_urdf(folder: &Path, urdf: &Path) -> Result<UrdfModel, RobotError> {
     let named = folder.join(urdf);
     let beside = urdf.file_name().map(|name| folder.join(name));
-    match beside {
+    let file = match beside {
         Some(beside) if !named.is_file() && beside.is_file() => beside,
         _ => named,
-    }
+    };
+    UrdfModel::parse(&file, read_in(folder, &file)?)
 }
