@@ -15,8 +15,8 @@ const MAX_BYTES: u64 = 16 << 20;
 const MAX_TOTAL_BYTES: u64 = 64 << 20;
 const MAX_ATTACHMENTS: usize = 1000;
 
-/// Name and bytes of every attachment that passes its checksum, in the order of the file, up to 64 MiB in all. A cut file
-/// gives those before the cut. Messages are skipped.
+/// Name and bytes of every attachment that passes its checksum, in the order of the file, up to 64 MiB in all. A cut
+/// file gives those before the cut. Messages are skipped.
 ///
 /// # Errors
 /// As [`super::for_each_raw`].

@@ -1,8 +1,8 @@
 //! Convex parts of a mesh by parry's V-HACD, within a budget.
 //!
-//! V-HACD works on voxels, 64 along the longest side, and tries planes that cut them; it cannot be stopped on its way. A
-//! mesh that is no body (a soup of triangles) fills the box with surface and takes minutes, so two counts that its work
-//! grows with are looked at first.
+//! V-HACD works on voxels, 64 along the longest side, and tries planes that cut them; it cannot be stopped on its way.
+//! A mesh that is no body (a soup of triangles) fills the box with surface and takes minutes, so two counts that its
+//! work grows with are looked at first.
 
 use nalgebra::Vector3;
 use parry3d::math::Vec3;

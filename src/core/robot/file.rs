@@ -170,11 +170,12 @@ fn add_tip(body: &mut LinkBody, owner_from_shape: Isometry3<f64>, radius_m: f64)
 }
 
 /// The URDF that robot.toml names, or else a file of that name beside robot.toml, as in the attachments of a recording.
-fn urdf_file(folder: &Path, urdf: &Path) -> PathBuf {
+fn read_urdf(folder: &Path, urdf: &Path) -> Result<UrdfModel, RobotError> {
     let named = folder.join(urdf);
     let beside = urdf.file_name().map(|name| folder.join(name));
-    match beside {
+    let file = match beside {
         Some(beside) if !named.is_file() && beside.is_file() => beside,
         _ => named,
-    }
+    };
+    UrdfModel::parse(&file, read_in(folder, &file)?)
 }

@@ -5,8 +5,8 @@ use std::path::Path;
 
 use crate::tagmap::files::landmark::{Landmark, LandmarkFile};
 use crate::tagmap::files::own;
-use crate::tagmap::files::read::{check_number, extension, read_tags};
-use crate::tagmap::files::tag_file::TagFile;
+use crate::tagmap::files::read::{extension, read_tags};
+use crate::tagmap::files::tag_file::{TagFile, check_number};
 use armcal_core::robot::{FileIssue, RobotError, read_text};
 use armcal_core::spatial::{Base, Pose, Tag};
 

@@ -4,9 +4,9 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use crate::tagmap::check::SIZE_RANGE_M;
-use crate::tagmap::files::tag_file::TagFile;
+use crate::tagmap::files::tag_file::{TagFile, check_number};
 use crate::tagmap::files::{kalibr, own, tagslam};
-use armcal_core::robot::{FileIssue, MAX_TAGS, RobotError, read_text};
+use armcal_core::robot::{FileIssue, RobotError, read_text};
 
 /// Reads a tag map of ours (.toml), a tagslam.yaml or a Kalibr target (.yaml, .yml).
 ///
@@ -48,14 +48,6 @@ fn check(file: &Path, tags: &TagFile) -> Result<(), RobotError> {
         FileIssue::check_range(file, "default tag size", size_m, SIZE_RANGE_M)?;
     }
     Ok(())
-}
-
-/// Many tags make a map slow long before they fill the memory.
-pub(super) fn check_number(file: &Path, n_tags: usize) -> Result<(), FileIssue> {
-    if n_tags <= MAX_TAGS {
-        return Ok(());
-    }
-    Err(FileIssue::new(file, "tag", format!("{n_tags} tags, 0 .. {MAX_TAGS} allowed")))
 }
 
 pub(super) fn extension(file: &Path) -> String {

@@ -1,8 +1,10 @@
 //! The contents of a file about tags.
 
 use std::collections::BTreeSet;
+use std::path::Path;
 
 use crate::tagmap::types::{Body, TagPrior};
+use armcal_core::robot::{FileIssue, MAX_TAGS};
 use armcal_core::time::Stamp;
 
 /// Detections of one tag that stand for another, in a span of time: a tag number that was hung up twice.
@@ -43,4 +45,12 @@ pub struct TagFile {
     pub remaps: Vec<Remap>,
     /// What the file asks for that has no effect here.
     pub ignored_keys: Vec<String>,
+}
+
+/// Many tags make a map slow long before they fill the memory.
+pub(super) fn check_number(file: &Path, n_tags: usize) -> Result<(), FileIssue> {
+    if n_tags <= MAX_TAGS {
+        return Ok(());
+    }
+    Err(FileIssue::new(file, "tag", format!("{n_tags} tags, 0 .. {MAX_TAGS} allowed")))
 }

@@ -8,7 +8,7 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 use serde::Deserialize;
 
 use crate::tagmap::check::SIZE_RANGE_M;
-use crate::tagmap::files::tag_file::{Remap, TagFile};
+use crate::tagmap::files::tag_file::{Remap, TagFile, check_number};
 use crate::tagmap::files::written::WrittenGroup;
 use crate::tagmap::files::yaml::{self, PoseYaml};
 use crate::tagmap::types::{Body, TagPrior};
@@ -144,6 +144,7 @@ fn add_body(file: &Path, out: &mut TagFile, name: &str, raw: &BodyYaml, noise: (
         FileIssue::check_range(file, &key("default_tag_size"), size_m, SIZE_RANGE_M)?;
     }
     let pose = raw.pose.map(|pose| pose.pose(file, &key("pose"))).transpose()?;
+    check_number(file, out.tags.len())?;
     out.bodies.push(Body { name: name.to_owned(), is_static: raw.is_static, pose: pose.filter(|_| raw.is_static) });
     out.ignored.extend(&raw.ignore_tags);
     if let Some(most) = raw.max_hamming_distance {
@@ -196,6 +197,7 @@ fn board_tags(file: &Path, body: usize, key: &str, raw: &BoardYaml, rows: Rows) 
     for (name, n) in [("tag_rows", raw.tag_rows), ("tag_columns", raw.tag_columns)] {
         FileIssue::check_range(file, &format!("{key}.{name}"), f64::from(n), 1.0..=1000.0)?;
     }
+    check_number(file, raw.tag_rows as usize * raw.tag_columns as usize)?;
     for (name, value) in [("position", raw.tag_position_noise), ("rotation", raw.tag_rotation_noise)] {
         FileIssue::check_range(file, &format!("{key}.tag_{name}_noise"), value, 0.0..=1e6)?;
     }

@@ -130,6 +130,23 @@ fn what_is_wrong_with_a_tag_file_is_said_with_file_key_and_range() {
     assert!(refusal("map.toml", &own.replace("size_m", "sise_m")).contains("sise_m"));
 }
 
+/// A few lines stand for millions of tags.
+#[test]
+fn boards_of_many_tags_are_refused_before_they_are_laid_out() {
+    let board = |k: u32, rows: u32| {
+        format!(
+            " - b{k}:\n     is_static: true\n     type: board\n     board:\n       tag_start_id: {}\n       \
+             tag_size: 0.05\n       tag_spacing: 0.5\n       tag_rows: {rows}\n       tag_columns: 100\n",
+            k * 10_000
+        )
+    };
+    let file = |n: u32, rows: u32| format!("bodies:\n{}", (0..n).map(|k| board(k, rows)).collect::<String>());
+    assert_eq!(tags("a.yaml", &file(1, 50)).tags.len(), 5000);
+    assert!(refusal("a.yaml", &file(1, 51)).contains("5100 tags, 0 .. 5000"));
+    // The second board already is too much: no more of the thousand is laid out.
+    assert!(refusal("a.yaml", &file(1000, 50)).contains("10000 tags, 0 .. 5000"));
+}
+
 #[test]
 fn kalibrs_grid_is_a_board_of_known_places() {
     let text = "target_type: 'aprilgrid' # of Kalibr\ntagCols: 6\ntagRows: 2\ntagSize: 0.088\ntagSpacing: 0.3\n";
