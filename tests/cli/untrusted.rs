@@ -63,14 +63,14 @@ fn a_deep_urdf_attached_to_a_recording_is_refused() {
 fn devices_and_pipes_in_place_of_files_are_refused_at_once() {
     let folder = temp();
     let names = ["robot.toml", "titan4.urdf", "self_collision.toml"];
-    for (name, link) in names.into_iter().flat_map(|name| [(name, true), (name, false)]) {
+    for (name, make) in names.into_iter().flat_map(|name| NEVER_ENDING.map(|make| (name, make))) {
         let robot = robot_copy(folder.path());
         let file = robot.join(name);
         make(&file);
         check(&robot).expect(name, 2, &[name, "cannot be read"]);
         std::fs::remove_dir_all(&robot).expect("removed");
     }
-    for make in [link_to_zeros, pipe_without_writer] {
+    for make in NEVER_ENDING {
         let file = folder.path().join("any.toml");
         make(&file);
         let words = ["any.toml", "not a regular file"];
@@ -97,7 +97,9 @@ fn devices_and_pipes_in_place_of_files_are_refused_at_once() {
     }
 }
 
-/// In the place of what is there.
+/// What has no end, or no beginning, in the place of what is there.
+const NEVER_ENDING: [fn(&Path); 2] = [link_to_zeros, pipe_without_writer];
+
 fn link_to_zeros(file: &Path) {
     let _ = std::fs::remove_file(file);
     std::os::unix::fs::symlink("/dev/zero", file).expect("linked");

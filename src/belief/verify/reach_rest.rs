@@ -105,7 +105,6 @@ pub fn reaches(recording: &Recording, robot: &Robot, beliefs: &[Belief<'_>]) -> 
 mod tests {
     use super::*;
     use crate::calib::JointParameters;
-    use armcal_core::log::Completeness;
     use armcal_core::streams::{JointSensorSample, Mark, ReachTask, TemperatureSample, Thermometer};
     use armcal_core::time::SIMULATION_EPOCH;
 

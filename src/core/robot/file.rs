@@ -149,11 +149,6 @@ pub fn load_without_pairs(folder: &Path) -> Result<Robot, RobotError> {
     })
 }
 
-fn read_urdf(folder: &Path, named: &Path) -> Result<UrdfModel, RobotError> {
-    let file = urdf_file(folder, named);
-    UrdfModel::parse(&file, read_in(folder, &file)?)
-}
-
 fn loads(geometry: &GeometryPriors, bodies: &[LinkBody], buoyancy_fraction: f64, tool: Attachment) -> ArmLoads {
     let mut loads = ArmLoads { up: Vector3::from(geometry.up).normalize(), tool, ..ArmLoads::default() };
     for (load, body) in loads.links.iter_mut().zip(bodies) {

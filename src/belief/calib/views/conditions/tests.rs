@@ -2,7 +2,6 @@ use rand_distr::{Distribution, StandardNormal};
 
 use crate::calib::views::association::associate;
 use crate::calib::views::conditions::*;
-use armcal_core::log::Completeness;
 use armcal_core::robot::Robot;
 use armcal_core::stats::stream_rng;
 use armcal_core::streams::{CaptureSet, JointCounts, JointSensorSample, MarkKind, PressureSample, TemperatureSample};
