@@ -24,6 +24,7 @@ mod scenery;
 mod shapes;
 mod summary;
 mod targets;
+mod touches;
 mod tracks;
 mod truth;
 mod viewer;

@@ -8,7 +8,7 @@ use crate::identity::Identity;
 use crate::scene::{ReplayInput, ReplayScene};
 use crate::tracks::Tracks;
 use crate::truth::Truth;
-use crate::{arms, blueprint, camera, phases, plots, rrd, scenery, summary, targets};
+use crate::{arms, blueprint, camera, phases, plots, rrd, scenery, summary, targets, touches};
 
 /// Writes `out`, an .rrd file with its blueprint, replacing one of that name.
 ///
@@ -45,6 +45,7 @@ pub(super) fn draw(run: &ReplayScene<'_>, input: &ReplayInput<'_>) -> EntityLog 
     scenery::draw(run, &mut stream);
     arms::draw(run, &mut stream);
     targets::draw(run, &mut stream);
+    touches::draw(run, &mut stream);
     camera::draw(run, &mut stream);
     plots::draw(run, &mut stream);
     phases::draw(run, &mut stream);

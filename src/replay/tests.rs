@@ -13,7 +13,7 @@ use armcal_core::sensor::ArmSensors;
 use armcal_core::streams::{
     CameraImage, CaptureSet, DetectionReject, DetectionRejects, GripperSample, JointAngles, JointSensorSample,
     JointStateBelief, LogLevel, LogLine, Mark, MarkKind, Message, Phase, ReachAttempt, ReachTask, RejectReason, Sink,
-    TagDetection, TagDetections, TemperatureSample, Thermometer,
+    TagDetection, TagDetections, TemperatureSample, Thermometer, ToolTouch,
 };
 use armcal_core::time::SIMULATION_EPOCH;
 
@@ -360,6 +360,35 @@ fn jaws_move_while_the_arm_rests() {
     recording.messages.sort_by_key(|(log_time, _)| *log_time);
     let (link, left, right) = rows(&recording, "opening.rrd");
     assert!(left > link + 20 && right == left, "{link} {left} {right}");
+}
+
+/// Each touch is there from its time on, with those before it.
+#[test]
+fn surfaces_that_were_touched_are_shown() {
+    let (dir, mut recording, _, robot) = small();
+    let out = dir.path().join("run.rrd");
+    let touched = |out: &Path| {
+        let entities = entities(out);
+        ["point", "normal"].map(|what| entities.get(&format!("/world/vehicle/base/touched/{what}")).copied())
+    };
+    write_rrd(&input(&recording, &robot), &out).unwrap();
+    assert_eq!(touched(&out), [None, None]);
+    for n in 1..=3 {
+        let stamp = SIMULATION_EPOCH.plus_s(f64::from(n));
+        let touch = ToolTouch {
+            stamp,
+            duration_s: 0.5,
+            surface: format!("plate {n}"),
+            point_m: [1.0, 0.0, -0.5],
+            normal: [0.0, 0.0, 1.0],
+            tip_radius_m: 0.02,
+            std_m: 0.001,
+        };
+        recording.messages.push((stamp, Message::Touch(touch)));
+    }
+    recording.messages.sort_by_key(|(log_time, _)| *log_time);
+    write_rrd(&input(&recording, &robot), &out).unwrap();
+    assert_eq!(touched(&out), [Some(3), Some(3)]);
 }
 
 #[test]

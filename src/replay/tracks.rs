@@ -10,7 +10,7 @@ use armcal_core::robot::Robot;
 use armcal_core::spatial::{Pose, Vehicle, World};
 use armcal_core::streams::{
     CameraImage, DetectionRejects, JointAngles, JointCounts, LogLine, Mark, MarkKind, Message, ReachTask,
-    TagDetections, Thermometer,
+    TagDetections, Thermometer, ToolTouch,
 };
 use armcal_core::time::Stamp;
 
@@ -24,6 +24,8 @@ const MIN_IMAGE_SPACING_S: f64 = 0.095;
 const MAX_IMAGE_BYTES: usize = 96 << 20;
 /// Marks that are drawn, and lines of the log.
 const MAX_MARKS: usize = 20_000;
+/// Touches that are drawn, each with those before it.
+const MAX_TOUCHES: usize = 200;
 /// Longest recording. Beyond it a wrong log time is likely.
 const LONGEST_S: f64 = 7.0 * 24.0 * 3600.0;
 /// Steps of everything that moves.
@@ -117,6 +119,7 @@ pub(super) struct Tracks<'a> {
     pub images: Vec<(f64, CameraImage)>,
     pub task: Option<(f64, &'a ReachTask)>,
     pub marks: Vec<Span>,
+    pub touches: Vec<(f64, &'a ToolTouch)>,
     pub log: Vec<(f64, &'a LogLine)>,
 }
 
@@ -146,6 +149,7 @@ impl<'a> Tracks<'a> {
             images: Vec::new(),
             task: None,
             marks: Vec::new(),
+            touches: Vec::new(),
             log: Vec::new(),
         };
         for (log_time, message) in &recording.messages {
@@ -180,6 +184,7 @@ impl<'a> Tracks<'a> {
             Message::Task(m) => self.task = Some((at(m.stamp), m)),
             Message::Mark(m) if self.marks.len() < MAX_MARKS => self.marks.push(self.span(log_time, m)),
             Message::Log(m) if self.log.len() < MAX_MARKS => self.log.push((at(m.stamp), m)),
+            Message::Touch(m) if self.touches.len() < MAX_TOUCHES => self.touches.push((at(m.stamp), m)),
             Message::Mark(_)
             | Message::Log(_)
             | Message::JointCommand(_)
