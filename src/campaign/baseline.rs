@@ -1,5 +1,6 @@
 //! Tables that runs of today can be compared with.
 
+use armcal_core::files::{self, FileKind};
 use std::path::Path;
 
 use crate::campaign::store::read_summary;
@@ -19,7 +20,8 @@ pub fn baseline_text(prepared: &Prepared, table: &Table) -> Result<String, Campa
 /// # Errors
 /// [`CampaignError::Table`] saying what is different, and how to make the baseline anew.
 pub fn read_baseline(path: &Path, prepared: &Prepared) -> Result<Table, CampaignError> {
-    let bytes = std::fs::read(path).map_err(|source| CampaignError::Read { path: path.to_owned(), source })?;
+    let bytes = files::read_bytes(path, FileKind::Table)
+        .map_err(|source| CampaignError::Read { path: path.to_owned(), source })?;
     let refused = |problem: String| CampaignError::Table { path: path.to_owned(), problem };
     let anew = |problem: String| {
         let routine = prepared.request.routine.display();

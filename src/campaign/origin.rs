@@ -7,6 +7,7 @@ use toml::{Table as Toml, Value};
 
 use crate::campaign::fingerprint::without_seeds;
 use crate::campaign::{CampaignError, Prepared};
+use armcal_core::files::{self, FileKind};
 use armcal_core::routine::effective_table;
 
 /// Of the lines before the table; a new meaning of its columns gets a new one.
@@ -62,8 +63,8 @@ impl Origin {
         let (mut robots, mut vehicles) = (Vec::new(), Vec::new());
         for inputs in &prepared.inputs {
             let path = inputs.robot.folder.join("robot.toml");
-            let text =
-                std::fs::read_to_string(&path).map_err(|source| CampaignError::Read { path: path.clone(), source })?;
+            let text = files::read_text(&path, FileKind::Text)
+                .map_err(|source| CampaignError::Read { path: path.clone(), source })?;
             let robot = Named::new(&inputs.robot.name, &[&plain(&text), &inputs.robot.urdf_text]);
             let vehicle = Named::new(&inputs.vehicle.name, &[&plain(&inputs.vehicle.text)]);
             if !robots.contains(&robot) {

@@ -85,7 +85,8 @@ mod tests {
             kept_by_hour[n as usize / 360_000] += u32::from(thinning.keep(stamp, &Message::JointSensors(sample)));
         }
         assert!(kept_by_hour[0] > 200_000 && kept_by_hour[0] < 360_000, "{kept_by_hour:?}");
-        assert!(kept_by_hour.is_sorted_by(|a, b| a >= b) && kept_by_hour[23] > 10_000, "{kept_by_hour:?}");
+        // One more or less at the ends of an hour.
+        assert!(kept_by_hour.is_sorted_by(|a, b| a + 1 >= *b) && kept_by_hour[23] > 10_000, "{kept_by_hour:?}");
         assert!(thinning.bytes < MAX_BYTES);
         let text = "x".repeat(1 << 20);
         let line = LogLine { stamp: SIMULATION_EPOCH, level: LogLevel::Info, name: String::new(), text };

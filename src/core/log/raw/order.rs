@@ -44,15 +44,16 @@ pub struct SurveyedChunk {
     /// Of the whole record.
     pub hash: [u8; 32],
     pub messages: u64,
-    /// Log time of the earliest message.
-    pub first_nanos: Option<u64>,
+    /// Log times of the earliest and the latest message.
+    pub nanos: Option<(u64, u64)>,
 }
 
-/// The chunks in the order of time, each once; the number of messages in the copies that are left out.
+/// The chunks in the order of time, each once; the number of messages in the copies that are left out. Where sorting
+/// does not make them overlap less, times go backwards within chunks, and they stay as they are.
 pub fn in_order(chunks: Vec<SurveyedChunk>) -> (Vec<SurveyedChunk>, ChunkOrder, u64) {
     let (mut order, mut copied_messages) = (ChunkOrder::default(), 0);
-    let (mut known, mut latest_nanos, mut nanos) = (BTreeSet::new(), 0, 0);
-    let mut kept: Vec<(u64, SurveyedChunk)> = Vec::new();
+    let (mut known, mut latest_nanos, mut nanos) = (BTreeSet::new(), 0, (0, 0));
+    let mut kept: Vec<((u64, u64), SurveyedChunk)> = Vec::new();
     for chunk in chunks {
         if !known.insert(chunk.hash) {
             order.copies += 1;
@@ -60,11 +61,57 @@ pub fn in_order(chunks: Vec<SurveyedChunk>) -> (Vec<SurveyedChunk>, ChunkOrder, 
             continue;
         }
         // One without messages stays where it is.
-        nanos = chunk.first_nanos.unwrap_or(nanos);
-        order.moved += u64::from(nanos < latest_nanos);
-        latest_nanos = latest_nanos.max(nanos);
+        nanos = chunk.nanos.unwrap_or(nanos);
+        order.moved += u64::from(nanos.0 < latest_nanos);
+        latest_nanos = latest_nanos.max(nanos.0);
         kept.push((nanos, chunk));
     }
-    kept.sort_by_key(|(nanos, _)| *nanos);
+    let mut sorted: Vec<(u64, u64)> = kept.iter().map(|(nanos, _)| *nanos).collect();
+    sorted.sort_unstable();
+    if overlap_nanos(&sorted) < overlap_nanos(kept.iter().map(|(nanos, _)| nanos)) {
+        kept.sort_by_key(|(nanos, _)| *nanos);
+    } else {
+        order.moved = 0;
+    }
     (kept.into_iter().map(|(_, chunk)| chunk).collect(), order, copied_messages)
+}
+
+/// By how much chunks of these times begin before the end of those before them, all together.
+fn overlap_nanos<'a>(spans: impl IntoIterator<Item = &'a (u64, u64)>) -> u128 {
+    let mut end = 0;
+    spans
+        .into_iter()
+        .map(|&(first, last)| {
+            let overlap = u128::from(u64::saturating_sub(end, first));
+            end = end.max(last);
+            overlap
+        })
+        .sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Numbers of the chunks as they are read.
+    fn read_as(spans: &[(u64, u64)]) -> (Vec<u64>, u64) {
+        let chunk = |(n, span): (usize, &(u64, u64))| SurveyedChunk {
+            at: n as u64,
+            record_bytes: 0,
+            hash: [n as u8; 32],
+            messages: 1,
+            nanos: Some(*span),
+        };
+        let (chunks, order, _) = in_order(spans.iter().enumerate().map(chunk).collect());
+        (chunks.iter().map(|chunk| chunk.at).collect(), order.moved)
+    }
+
+    #[test]
+    fn swapped_chunks_are_sorted_and_a_clock_that_steps_back_moves_nothing() {
+        assert_eq!(read_as(&[(1, 9), (20, 29), (10, 19), (30, 39)]), (vec![0, 2, 1, 3], 1));
+        // Writers on several threads overlap a little.
+        assert_eq!(read_as(&[(1, 11), (20, 31), (10, 21), (30, 39)]), (vec![0, 2, 1, 3], 1));
+        // One message of the third was stamped too early.
+        assert_eq!(read_as(&[(1, 9), (10, 19), (4, 29), (30, 39)]), (vec![0, 1, 2, 3], 0));
+    }
 }

@@ -394,7 +394,7 @@ impl<R: Read + Seek, F: FnMut(&RawMessage<'_>)> Scan<R, F> {
         let bytes = self.window.bytes(at, record_bytes)?;
         let hash = *blake3::hash(bytes).as_bytes();
         let (tables, records) = (&mut self.tables, &mut self.pass.records);
-        let mut chunk = SurveyedChunk { at, record_bytes, hash, messages: 0, first_nanos: None };
+        let mut chunk = SurveyedChunk { at, record_bytes, hash, messages: 0, nanos: None };
         let read = chunk::for_each_record(bytes, head, |opcode, body| {
             *records += 1;
             match opcode {
@@ -402,7 +402,10 @@ impl<R: Read + Seek, F: FnMut(&RawMessage<'_>)> Scan<R, F> {
                 op::CHANNEL => _ = tables.add_channel(body),
                 op::MESSAGE => {
                     chunk.messages += 1;
-                    chunk.first_nanos = chunk.first_nanos.into_iter().chain(log_time_nanos(body)).min();
+                    if let Some(nanos) = log_time_nanos(body) {
+                        let (first, last) = chunk.nanos.unwrap_or((nanos, nanos));
+                        chunk.nanos = Some((first.min(nanos), last.max(nanos)));
+                    }
                 }
                 _ => {}
             }
