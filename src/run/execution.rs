@@ -151,9 +151,8 @@ impl Run<'_> {
         let mut replay_failure = None;
         if self.keep == Keep::Everything {
             // The calibration is worth more than its picture; a full disk has room again for the small files.
-            #[cfg(feature = "viewer")]
-            if let Err(error) = self.mirror(&recording, &summary, &outcome) {
-                replay_failure = Some(error.to_string());
+            replay_failure = self.mirror(&recording, &summary, &outcome).err().map(|error| error.to_string());
+            if replay_failure.is_some() {
                 self.output.leave_out("run.rrd")?;
             }
             // Taken last: the replay is part of what a user waits for.
@@ -213,6 +212,11 @@ impl Run<'_> {
         let json = serde_json::to_string_pretty(summary)?;
         self.output.write("summary.json", format!("{json}\n").as_bytes())?;
         Ok(self.output.write("report.html", html(summary, calibration).as_bytes())?)
+    }
+
+    #[cfg(not(feature = "viewer"))]
+    fn mirror(&self, _: &Recording, _: &RunSummary, _: &Outcome) -> Result<(), RunError> {
+        Ok(())
     }
 
     #[cfg(feature = "viewer")]
