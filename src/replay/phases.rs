@@ -127,7 +127,7 @@ fn draw_log(run: &ReplayScene, stream: &mut EntityLog) {
         let verdict = if arrival.hit { "hit" } else { "missed" };
         let text = format!(
             "{when} calibration: target {} {verdict}, tool rests {:.1} mm away",
-            arrival.target_idx + 1,
+            arrival.target_idx,
             1000.0 * arrival.miss_m
         );
         lines.push((arrival.time_s, "truth".to_owned(), TextLog::new(text).with_level(TextLogLevel::INFO)));

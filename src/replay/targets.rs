@@ -82,11 +82,11 @@ impl<'a> TargetMarkers<'a> {
         let positions = self.task.targets_m.iter().map(|target| target.map(|v| v as f32));
         let shades = self.latest.iter().map(|latest| latest.map_or(colors::TARGET, verdict_color));
         let labels = self.latest.iter().enumerate().map(|(n, latest)| match latest {
-            None => (n + 1).to_string(),
+            None => n.to_string(),
             Some(arrival) => match self.missed_before_m(arrival) {
-                None => format!("{}: {:.0} mm", n + 1, 1000.0 * arrival.miss_m),
+                None => format!("{}: {:.0} mm", n, 1000.0 * arrival.miss_m),
                 Some(before_m) => {
-                    format!("{}: {:.0} \u{2192} {:.0} mm", n + 1, 1000.0 * before_m, 1000.0 * arrival.miss_m)
+                    format!("{}: {:.0} \u{2192} {:.0} mm", n, 1000.0 * before_m, 1000.0 * arrival.miss_m)
                 }
             },
         });
