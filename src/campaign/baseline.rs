@@ -1,10 +1,10 @@
 //! Tables that runs of today can be compared with.
 
-use armcal_core::files::{self, FileKind};
 use std::path::Path;
 
 use crate::campaign::store::read_summary;
 use crate::campaign::{CampaignError, Metric, Origin, Prepared, Table, parse_table, table_text};
+use armcal_core::files::{self, FileKind};
 
 /// The table with what it is of in its first lines.
 ///

@@ -1,6 +1,6 @@
 //! `armcal regress`: is it worse than it was?
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use anyhow::{Context, Result};
@@ -75,15 +75,15 @@ pub(super) fn regress(args: &RegressArgs) -> Result<Exit> {
         note("stopped; nothing was compared");
         return Ok(Exit::Failure);
     };
-    match baseline {
-        Some(baseline) => compared(args, &prepared, &baseline, &now),
-        None => written(args, &prepared, &now),
+    match (&baseline, &args.write_baseline) {
+        (Some(baseline), _) => compared(args, &prepared, baseline, &now),
+        (None, Some(out)) => written(out, &prepared, &now),
+        (None, None) => Ok(Exit::Ok),
     }
 }
 
 /// Puts the runs down as a baseline.
-fn written(args: &RegressArgs, prepared: &Prepared, now: &Table) -> Result<Exit> {
-    let out = args.write_baseline.as_deref().unwrap_or(&args.routine);
+fn written(out: &Path, prepared: &Prepared, now: &Table) -> Result<Exit> {
     output::write_whole(out, baseline_text(prepared, now)?.as_bytes())?;
     let summary = statistics(now, &prepared.routine.name, &prepared.fingerprint);
     say(&format!("{}written      {}", table(&summary), out.display()))?;
