@@ -272,12 +272,12 @@ impl Solids {
 
     /// The smallest distance of a moving link to anything that is not the arm, as placed; `None` if nothing is watched.
     pub(super) fn nearest(&self) -> Option<Nearest> {
+        let is_link = |solid: &Solid| (1..self.n_bodies).contains(&solid.part);
         let mut nearest: Option<Nearest> = None;
         for (i, a) in self.shapes.iter().enumerate() {
             for (j, b) in self.shapes.iter().enumerate().skip(i + 1) {
-                let links = [a, b].into_iter().filter(|solid| (1..self.n_bodies).contains(&solid.part)).count();
                 let is_own = a.part < self.n_bodies && b.part < self.n_bodies;
-                if links == 0 || is_own || !self.pairs.is_watched(a.part, b.part) {
+                if is_own || !(is_link(a) || is_link(b)) || !self.pairs.is_watched(a.part, b.part) {
                     continue;
                 }
                 let best = nearest.map_or(f64::INFINITY, |n| n.distance_m);

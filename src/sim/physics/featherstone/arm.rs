@@ -84,7 +84,7 @@ impl Engine for Featherstone {
         let first_place = multibody.chain().first_place();
         let rows = match contacts {
             Some((world, solids)) => {
-                world.update(solids.shapes(), &contact_state(&state, poses, (first_joint, first_place), drive))
+                world.update(solids.shapes(), &contact_state(&state, poses, first_joint, first_place, drive))
             }
             None => &[],
         };
@@ -140,7 +140,8 @@ fn prescribed_environment(drive: &Drive, stage: Stage) -> (Environment, BaseCoup
 fn contact_state<'a>(
     state: &'a SystemState,
     poses: &'a LinkPoses,
-    (first_joint, first_place): (usize, Isometry3<f64>),
+    first_joint: usize,
+    first_place: Isometry3<f64>,
     drive: &Drive,
 ) -> ContactState<'a> {
     let mut velocity = [0.0; MAX_DOF];
