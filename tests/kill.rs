@@ -220,18 +220,25 @@ fn check_interrupted(path: &Path) {
     assert!(moved < 500.0, "the set-point does not jump: {moved} counts");
 }
 
+/// A run on its way stops by this signal and keeps its recording.
+#[cfg(unix)]
+#[track_caller]
+fn stops_by(name: &str, routine: &Path, out: &Path) {
+    let mut child = start(routine, out);
+    wait_until_it_moves(&mut child, &out.join("run.mcap.partial"));
+    signal(&child, name);
+    let (code, said) = end(child);
+    assert_eq!(code, Some(1), "{said}");
+    check_interrupted(&out.join("run-cut-1.mcap"));
+}
+
 #[cfg(unix)]
 #[test]
 fn sigterm_stops_a_run_and_a_second_signal_ends_it_at_once() {
     let folder = temp();
     let routine = quick().write(folder.path());
     let out = folder.path().join("out");
-    let mut child = start(&routine, &out);
-    wait_until_it_moves(&mut child, &out.join("run.mcap.partial"));
-    signal(&child, "TERM");
-    let (code, said) = end(child);
-    assert_eq!(code, Some(1), "{said}");
-    check_interrupted(&out.join("run-cut-1.mcap"));
+    stops_by("TERM", &routine, &out);
 
     // While it plans the first signal waits; the second does not.
     let out = folder.path().join("twice");
@@ -306,12 +313,7 @@ fn a_hangup_stops_a_run_unless_it_was_started_to_ignore_it() {
     let folder = temp();
     let routine = quick().write(folder.path());
     let out = folder.path().join("out");
-    let mut child = start(&routine, &out);
-    wait_until_it_moves(&mut child, &out.join("run.mcap.partial"));
-    signal(&child, "HUP");
-    let (code, said) = end(child);
-    assert_eq!(code, Some(1), "{said}");
-    check_interrupted(&out.join("run-cut-1.mcap"));
+    stops_by("HUP", &routine, &out);
 
     let out = folder.path().join("nohup");
     let mut shell = Command::new("sh");

@@ -168,9 +168,7 @@ fn overrides_pass_the_checks_of_the_file() {
 #[test]
 fn a_full_disk_is_no_row_and_the_run_is_made_again() {
     let folder = temp();
-    let mut short = ShortRoutine { poses: 10, held_out: 3, ..ShortRoutine::default() };
-    short.targets_m.truncate(1);
-    let routine = short.write(folder.path());
+    let routine = ShortRoutine { poses: 10, ..least("") }.write(folder.path());
     let out = folder.path().join("c.csv");
     let mut shell = Command::new("sh");
     shell.arg("-c").arg("ulimit -f 400; exec \"$0\" \"$@\"").arg(env!("CARGO_BIN_EXE_armcal"));
@@ -184,9 +182,7 @@ fn a_full_disk_is_no_row_and_the_run_is_made_again() {
 #[test]
 fn a_regression_is_found_and_none_is_found_where_none_is() {
     let folder = temp();
-    let mut short = ShortRoutine { poses: 10, held_out: 3, ..ShortRoutine::default() };
-    short.targets_m.truncate(1);
-    let routine = short.write(folder.path());
+    let routine = ShortRoutine { poses: 10, ..least("") }.write(folder.path());
     let baseline = folder.path().join("baseline.csv");
     let regress = |more: &[&str]| {
         let mut command = program();
@@ -215,9 +211,7 @@ fn a_regression_is_found_and_none_is_found_where_none_is() {
 #[test]
 fn a_baseline_of_something_else_is_refused_and_builds_get_their_files() {
     let folder = temp();
-    let mut short = ShortRoutine { poses: 10, held_out: 3, ..ShortRoutine::default() };
-    short.targets_m.truncate(1);
-    let routine = short.write(folder.path());
+    let routine = ShortRoutine { poses: 10, ..least("") }.write(folder.path());
     let baseline = folder.path().join("baseline.csv");
     let regress = |more: &[&str]| answer(program().arg("regress").arg(&routine).args(more).arg(&baseline));
     regress(&["--seeds", "1", "--write-baseline"]).expect("baseline", 0, &["1 runs on", "1 accepted"]);
@@ -247,7 +241,7 @@ fn a_baseline_of_something_else_is_refused_and_builds_get_their_files() {
     edit(&robot.join("robot.toml"), "corner_std_px = ", "corner_std_px = 1");
     let other = regress(&["--robot", robot.to_str().expect("UTF-8"), "--baseline"]);
     other.expect("robot", 2, &["robot `titan4` has changed"]);
-    ShortRoutine { poses: 11, ..short }.write(folder.path());
+    ShortRoutine { poses: 11, ..least("") }.write(folder.path());
     refused("routine", &["routine `short` has changed"]);
 }
 
