@@ -6,11 +6,13 @@ use std::time::Instant;
 use anyhow::{Context, Result};
 use clap::Args;
 
+use crate::cli::calibrate_online::calibrate_online;
 use crate::cli::calibration_inputs::CalibrationInputs;
 use crate::cli::exit::{Exit, UsageError};
 use crate::cli::stdout::say;
 use crate::output;
 use crate::report::{RunSummary, table};
+use armcal_belief::calib::online::DriftModel;
 use armcal_belief::calib::{CompactCalibration, MapResult, Status, covariance_file};
 use armcal_core::robot::{self, FailedJoint, Robot};
 use armcal_core::routine::Method;
@@ -44,6 +46,12 @@ pub(super) struct CalibrateArgs {
     /// Where to write calibration.toml and summary.json
     #[arg(long, default_value = ".")]
     out: PathBuf,
+    /// Follow the recording view by view, as if the arm were at work, and write the belief over time (belief.jsonl)
+    #[arg(long, conflicts_with_all = ["compact", "prior"])]
+    online: bool,
+    /// With --online: nothing drifts between views
+    #[arg(long, requires = "online")]
+    stationary: bool,
     /// Print the calibration as one line below 512 bytes instead of the table
     #[arg(long)]
     compact: bool,
@@ -72,6 +80,10 @@ pub(super) fn calibrate(args: &CalibrateArgs) -> Result<Exit> {
         prior: args.prior.as_deref(),
         task: args.task.as_deref(),
     };
+    if args.online {
+        let drift = if args.stationary { DriftModel::Stationary } else { DriftModel::Tuned };
+        return calibrate_online(&given, drift, &args.out);
+    }
     let started = Instant::now();
     let (calibration, lost) = given.calibrate()?;
     let summary = RunSummary::of_calibration(&calibration, started.elapsed().as_secs_f64());

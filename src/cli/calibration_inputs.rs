@@ -7,12 +7,14 @@ use anyhow::Result;
 use crate::cli::exit::UsageError;
 use crate::cli::losses::{warn_of_external, warn_of_losses};
 use crate::cli::stdout::note;
+use armcal_belief::calib::online::{Follower, OnlineEvent, OnlineSettings};
 use armcal_belief::calib::{
-    Calibration, CalibrationFileError, ExternalContext, Status, calibrate, calibrate_data, calibrate_with_survey,
-    prepare_external, prepare_pooled, read_marked,
+    Calibration, CalibrationData, CalibrationFileError, ExternalContext, Status, calibrate, calibrate_data,
+    calibrate_with_survey, prepare_external, prepare_pooled, read_marked,
 };
 use armcal_belief::tagmap::files::{LandmarkFile, NamedSurvey, read_landmarks};
 use armcal_core::input::{ChildFrame, InputMap, TagUse, read_external, read_input_map, read_task};
+use armcal_core::log::{TopicMap, scan_recording};
 use armcal_core::robot::{FileIssue, Robot};
 use armcal_core::routine::Method;
 use armcal_core::streams::{Message, ReachTask};
@@ -85,6 +87,60 @@ impl CalibrationInputs<'_> {
         task: Option<ReachTask>,
         prior: Option<&Calibration>,
     ) -> Result<(Calibration, bool)> {
+        let (prepared, lost) = self.external_views(file, landmarks, task)?;
+        Ok((calibrate_data(prepared, self.method, prior)?, lost))
+    }
+
+    /// Feeds the recordings to a belief, message by message; `hear` is told after each of them. Returns whether a
+    /// recording had lost something.
+    pub fn follow(
+        &self,
+        settings: OnlineSettings,
+        hear: &mut dyn FnMut(&Follower, Vec<OnlineEvent>),
+    ) -> Result<(Follower, bool)> {
+        let task =
+            self.task.map(|file| Ok::<_, anyhow::Error>(read_task(file)?.for_robot(file, self.robot)?)).transpose()?;
+        let landmarks = self.tag_map.map(|file| Ok::<_, anyhow::Error>((file, read_landmarks(file)?))).transpose()?;
+        if let Some(file) = self.input {
+            let (prepared, lost) = self.external_views(file, landmarks, task)?;
+            let mut follower = Follower::new(prepared.robot.clone(), settings);
+            prepared.data.task.iter().for_each(|task| follower.set_task(task));
+            for view in prepared.data.fit {
+                let events = follower.add(vec![view]);
+                hear(&follower, events);
+            }
+            return Ok((follower, lost));
+        }
+        let survey = landmarks.map(|(file, map)| map.survey(file, self.robot, TagUse::Corners)).transpose()?;
+        let robot = survey.map(|named| self.robot.clone().with_survey(named.survey));
+        let mut follower = Follower::new(robot.unwrap_or_else(|| self.robot.clone()), settings);
+        task.iter().for_each(|task| follower.set_task(task));
+        let mut lost = false;
+        for path in self.recordings {
+            let (rest, _) = scan_recording(
+                path,
+                &TopicMap::default(),
+                |_| {},
+                |log_time, message| {
+                    let events = follower.push(log_time, message);
+                    hear(&follower, events);
+                    false
+                },
+            )?;
+            lost |= warn_of_losses(&rest);
+        }
+        let events = follower.finish();
+        hear(&follower, events);
+        Ok((follower, lost))
+    }
+
+    /// The views of recordings of a real arm, and whether one had lost something.
+    fn external_views(
+        &self,
+        file: &Path,
+        landmarks: Option<(&Path, LandmarkFile)>,
+        task: Option<ReachTask>,
+    ) -> Result<(CalibrationData, bool)> {
         let map = read_input_map(file)?;
         map.check_robot(file, &self.robot.joint_names())?;
         let named = match &landmarks {
@@ -109,8 +165,7 @@ impl CalibrationInputs<'_> {
             note("note: no task is named (--task), so that no tool error is predicted");
         }
         let context = ExternalContext { task, landmark_names: named.names, plain_landmark };
-        let prepared = prepare_external(&recordings, &map, &robot, context)?;
-        Ok((calibrate_data(prepared, self.method, prior)?, lost))
+        Ok((prepare_external(&recordings, &map, &robot, context)?, lost))
     }
 }
 

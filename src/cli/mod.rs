@@ -3,6 +3,7 @@
 #[cfg(feature = "sim")]
 mod batch;
 mod calibrate;
+mod calibrate_online;
 mod calibration_inputs;
 #[cfg(feature = "sim")]
 mod campaign;
@@ -31,6 +32,7 @@ mod sensitivity;
 mod stdout;
 #[cfg(feature = "sim")]
 mod study;
+mod study_dive;
 #[cfg(feature = "sim")]
 mod study_falsified;
 #[cfg(feature = "sim")]

@@ -9,6 +9,7 @@ use clap::{Args, Subcommand};
 
 use crate::cli::exit::Exit;
 use crate::cli::stdout::{note, say};
+use crate::cli::study_dive::{DiveArgs, dive};
 use crate::cli::study_falsified::{FalsifiedArgs, falsified};
 use crate::cli::study_paper::{PaperArgs, paper};
 use crate::cli::study_plan::{
@@ -53,6 +54,8 @@ enum Study {
     Falsified(FalsifiedArgs),
     /// Run a routine in worlds drawn from all that `[world]` allows, and look for what must not be
     Worlds(WorldsArgs),
+    /// Run a dive for several seeds, follow each recording online, and compare the belief with the truth at each task
+    Dive(DiveArgs),
 }
 
 #[derive(Debug, Args)]
@@ -91,6 +94,7 @@ pub(super) fn study(args: &StudyArgs) -> Result<Exit> {
         Study::Poses(args) => poses(args),
         Study::Falsified(args) => falsified(args),
         Study::Worlds(args) => worlds(args),
+        Study::Dive(args) => dive(args),
     }
 }
 

@@ -6,9 +6,11 @@
 //! tests/oracle/compare_detectors.py runs other detectors on the same images. `paper`: the paper's comparison of
 //! methods, and `sensitivity` its Figures 4 and 7; `poses`: error over poses and the arm's time, by how the poses are
 //! chosen; `charts` draws them. `falsified`: the verdict where drawing, survey or a sensor is wrong. `edges`: certified
-//! edges against brute force; `paths`: planning between random poses; `worlds`: closed loops in any world allowed.
+//! edges against brute force; `paths`: planning between random poses; `worlds`: closed loops in any world allowed;
+//! `dive`: the online belief over a dive.
 
 mod charts;
+mod dive;
 mod edges;
 mod falsified;
 mod noise_fit;
@@ -22,6 +24,7 @@ mod tracking_error;
 mod trials;
 mod worlds;
 
+pub use dive::{DiveStudy, DiveTask, dive_csv, dive_study, dive_table};
 pub use edges::{Edge, EdgeRow, EdgeStudy, edge_study, edges_csv, edges_json, mean_time_under_s, random_edges};
 pub use falsified::{
     Case, CaseKind, EquivalenceClasses, FalsifiedError, FalsifiedRow, FalsifiedStudy, RunStatus, Tier, falsified_cases,

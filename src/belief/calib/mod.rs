@@ -19,6 +19,7 @@ pub(crate) mod fixture;
 mod geometry_error;
 mod interim;
 mod methods;
+pub mod online;
 mod parameters;
 mod refusal;
 mod refusal_conditions;

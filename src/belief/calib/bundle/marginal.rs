@@ -42,6 +42,20 @@ impl Estimate<'_> {
         });
     }
 
+    /// Takes the scales whose squares are the means of what the data leave possible, see the module, and linearizes anew
+    /// under them.
+    pub(crate) fn take_mean_scales(&mut self, first: &Hyperparameters) {
+        let problem = &mut self.problem;
+        let target = ScaleTarget::mean(first);
+        let scales = updated(problem, &self.solved.state, &self.solved.normal, &self.posterior, &target);
+        problem.set_scales(scales);
+        if self.has_own_priors {
+            problem.prior.joint_info = joint_info(problem, &problem.scales);
+            problem.prior.mount_std = mount_std(problem.robot, &problem.scales);
+        }
+        self.solved.normal.update(problem, &self.solved.state, Loss::Square);
+    }
+
     /// Covariance of the common parameters as it leaves this estimate.
     pub(crate) fn wide_covariance(&self) -> &DMatrix<f64> {
         self.marginal.as_ref().map_or(&self.posterior.covariance, |marginal| &marginal.covariance)

@@ -66,6 +66,8 @@ pub struct Hyperparameters {
     /// The error that all tags of a view share (positions by SLAM have it): translation m, rotation rad. `None`: there
     /// is none.
     pub camera_error_std: Option<[f64; 2]>,
+    /// Of an image's stamp about the camera's clock, s: what a moving arm's angles are off by, times its rates.
+    pub time_jitter_std_s: f64,
 }
 
 /// Correlation length of a sensor's nonlinearity, half ranges. Assumed: four waves over the range are then still half
@@ -108,6 +110,7 @@ impl Hyperparameters {
             position_std_m: 0.005,
             rotation_std_rad: 0.02,
             camera_error_std: None,
+            time_jitter_std_s: 0.0,
         }
     }
 

@@ -4,6 +4,7 @@
 //! One corner that does not belong (occluded, blurred, beside an edge) leaves the other three in use if these fit. Two
 //! such corners, or chi-square of all without any, are a tag that is elsewhere or another one: all four go.
 
+use crate::calib::bundle::linearize::NormalEquations;
 use crate::calib::bundle::problem::{BundleProblem, ObservationTerm, WeightedMeasurement};
 use crate::calib::bundle::solve::Solved;
 use crate::calib::views::view::View;
@@ -42,8 +43,12 @@ impl Limits {
 
 /// Marks what does not belong; whether anything changed.
 pub(crate) fn reject(problem: &mut BundleProblem<'_>, solved: &Solved) -> bool {
+    reject_by(problem, &solved.normal)
+}
+
+/// The same by normal equations at the solution.
+pub(crate) fn reject_by(problem: &mut BundleProblem<'_>, normal: &NormalEquations) -> bool {
     let mut changed = false;
-    let normal = &solved.normal;
     for (at, observation) in problem.observations.iter_mut().enumerate() {
         let before = observation.used();
         let used = match observation.data {

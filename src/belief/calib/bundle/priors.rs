@@ -33,6 +33,7 @@ pub(crate) fn prior(input: &BundleInput<'_>, scales: &Hyperparameters) -> Prior 
         joint_info,
         mount: camera.mount.link_from_frame,
         mount_std: mount_std(robot, scales),
+        time_s: 0.0,
         time_std_s: 0.05,
         lens: camera.lens,
         lens_std: lens_std(camera).map(|std| std * scales.lens_scale),

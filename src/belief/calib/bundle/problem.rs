@@ -87,7 +87,7 @@ pub(crate) struct ViewData {
     /// d(angle)/d(parameter) of each column.
     pub basis: Vec<f64>,
     pub rate_rad_s: [f64; MAX_JOINTS],
-    /// Variance of the mean reading by its noise alone, rad^2.
+    /// Variance of the mean reading by its noise and the time of the image, rad^2.
     pub reading_var: [f64; MAX_JOINTS],
     pub observations: Range<usize>,
     pub gripper: Option<usize>,
@@ -99,10 +99,12 @@ pub(crate) struct ViewData {
 #[derive(Clone, Debug)]
 pub(crate) struct Prior {
     pub joint_mean: DVector<f64>,
-    /// Six rows more than the mean: the mount's prior is in it, and `mount_std` is not looked at.
+    /// Six rows more than the mean: the mount's prior is in it, and `mount_std` is not looked at. As many rows as there
+    /// are columns: all priors are in it, about the means below.
     pub joint_info: DMatrix<f64>,
     pub mount: Isometry3<f64>,
     pub mount_std: [f64; 6],
+    pub time_s: f64,
     pub time_std_s: f64,
     pub lens: CameraModel,
     pub lens_std: [f64; 8],
@@ -162,7 +164,14 @@ const MIN_STD: f64 = 1e-9;
 const CORNER_PRIOR_DOF: f64 = 16.0;
 
 impl Layout {
+    /// With columns of the tags that the views see.
     pub(crate) fn new(robot: &Robot, model: &Model, views: &[View]) -> Self {
+        let seen = |tag_idx: usize| views.iter().flat_map(|v| &v.tags).any(|tag| tag.tag_idx == tag_idx);
+        Self::with_tags(robot, model, seen)
+    }
+
+    /// With columns of those tags.
+    pub(crate) fn with_tags(robot: &Robot, model: &Model, has_column: impl Fn(usize) -> bool) -> Self {
         let mut layout = Self { tags: vec![None; robot.tags.len()], ..Self::default() };
         layout.parameters = model.parameters();
         let mut start = 0;
@@ -183,9 +192,8 @@ impl Layout {
         layout.mount = take(model.mount, 6);
         layout.time = take(model.time_offset, 1);
         layout.lens = take(model.lens, 8);
-        let seen = |tag_idx: usize| views.iter().flat_map(|v| &v.tags).any(|tag| tag.tag_idx == tag_idx);
         for tag_idx in 0..robot.tags.len() {
-            layout.tags[tag_idx] = take(model.tags && seen(tag_idx), 6);
+            layout.tags[tag_idx] = take(model.tags && has_column(tag_idx), 6);
         }
         layout.gripper_tag = take(model.gripper_tag, 6);
         layout
@@ -220,9 +228,13 @@ impl Layout {
 
 impl<'a> BundleProblem<'a> {
     pub(crate) fn new(input: &BundleInput<'a>, prior: Prior) -> Self {
+        Self::with_layout(input, Layout::new(input.robot, &input.model, input.views), prior)
+    }
+
+    /// The same with columns that may be more than the views' own.
+    pub(crate) fn with_layout(input: &BundleInput<'a>, layout: Layout, prior: Prior) -> Self {
         let BundleInput { robot, views, model, scales, .. } = input;
         let (robot, scales) = (*robot, scales.clone());
-        let layout = Layout::new(robot, model, views);
         let mut observations = Vec::new();
         let mut data = Vec::with_capacity(views.len());
         for view in *views {
@@ -286,7 +298,7 @@ impl<'a> BundleProblem<'a> {
         State {
             joint: DVector::from_iterator(parameters.len(), parameters.iter().map(|p| guess.get(*p))),
             mount: self.prior.mount,
-            time_s: 0.0,
+            time_s: self.prior.time_s,
             lens: self.prior.lens,
             tags: self.prior.tags.clone(),
             gripper_tag: self.prior.gripper_tag,
@@ -402,7 +414,8 @@ fn view_data(
         data.fixed_rad[joint] = fixed;
         data.rate_rad_s[joint] = view.rate_rad_s[joint];
         let reading_std_rad = spec.noise_std_counts / spec.counts_per_rad.abs();
-        data.reading_var[joint] = reading_std_rad.powi(2) / view.n_readings.max(1) as f64;
+        let jitter_rad = view.rate_rad_s[joint] * input.scales.time_jitter_std_s;
+        data.reading_var[joint] = reading_std_rad.powi(2) / view.n_readings.max(1) as f64 + jitter_rad.powi(2);
     }
     data
 }

@@ -115,7 +115,7 @@ fn solve_damped(
 }
 
 /// What the views' own parameters would save if the common ones stayed.
-fn own_gain(normal: &NormalEquations) -> f64 {
+pub(crate) fn own_gain(normal: &NormalEquations) -> f64 {
     normal.eliminated.iter().filter(|own| own.has_any).map(|own| own.gradient.dot(&(own.inverse * own.gradient))).sum()
 }
 
@@ -138,7 +138,7 @@ pub(crate) fn stepped(
 }
 
 /// Makes `next` of `state` by a step of the common parameters, the views' own following.
-fn take_step(
+pub(crate) fn take_step(
     problem: &BundleProblem<'_>,
     state: &State,
     normal: &NormalEquations,

@@ -78,7 +78,7 @@ pub fn associate_within(recording: &Recording, robot: &Robot, span: Option<(Stam
     let mut association = Association {
         robot,
         sensors: ArmSensors::nominal(robot),
-        index: MessageIndex::new(recording),
+        index: MessageIndex::new(&recording.messages),
         conditions: ConditionHistory::heard_until(recording, to),
         from,
         data: CaptureData::default(),
@@ -99,6 +99,29 @@ pub fn associate_within(recording: &Recording, robot: &Robot, span: Option<(Stam
     }
     association.data.sort();
     association.data
+}
+
+/// The view of the span `start ..= end` among `messages`, which hold what was read shortly before it, too. `None`
+/// where no joint was read in the span.
+pub(crate) fn view_of_span(
+    messages: &[(Stamp, Message)],
+    robot: &Robot,
+    pose_idx: u32,
+    (start, end): (Stamp, Stamp),
+) -> Option<View> {
+    let conditions = ConditionHistory::of_messages(messages, Stamp { nanos: i64::MAX });
+    let mut association = Association {
+        robot,
+        sensors: ArmSensors::nominal(robot),
+        index: MessageIndex::new(messages),
+        conditions,
+        from: start,
+        data: CaptureData::default(),
+        rested: BTreeMap::new(),
+    };
+    let mark = Mark { start, end, kind: MarkKind::Capture { set: CaptureSet::Fit, pose_idx } };
+    association.add_mark(0, &mark);
+    association.data.fit.pop()
 }
 
 /// A recording on its way to views.

@@ -49,8 +49,12 @@ impl ConditionHistory {
     /// recording gives the same result as the one that was still growing.
     #[must_use]
     pub fn heard_until(recording: &Recording, until: Stamp) -> Self {
+        Self::of_messages(&recording.messages, until)
+    }
+
+    pub(crate) fn of_messages(messages: &[(Stamp, Message)], until: Stamp) -> Self {
         let mut found = Self::default();
-        for (idx, (log_time, message)) in recording.messages.iter().enumerate() {
+        for (idx, (log_time, message)) in messages.iter().enumerate() {
             if *log_time > until {
                 continue;
             }
@@ -158,7 +162,7 @@ impl TravelRate {
 }
 
 /// From travel `b` to travel `a`, the short way round the word.
-fn apart_rad(spec: &JointSensorSpec, a: f64, b: f64) -> f64 {
+pub(crate) fn apart_rad(spec: &JointSensorSpec, a: f64, b: f64) -> f64 {
     wrap_symmetric(a - b, (spec.wrap_counts / spec.counts_per_rad).abs())
 }
 

@@ -1,6 +1,5 @@
 //! The messages of a recording by their own stamps.
 
-use armcal_core::log::Recording;
 use armcal_core::streams::{Mark, Message};
 use armcal_core::time::Stamp;
 
@@ -11,9 +10,8 @@ pub(crate) struct MessageIndex<'a> {
 }
 
 impl<'a> MessageIndex<'a> {
-    pub(crate) fn new(recording: &'a Recording) -> Self {
-        let mut by_stamp: Vec<(Stamp, usize)> = recording
-            .messages
+    pub(crate) fn new(messages: &'a [(Stamp, Message)]) -> Self {
+        let mut by_stamp: Vec<(Stamp, usize)> = messages
             .iter()
             .enumerate()
             .filter_map(|(idx, (_, message))| {
@@ -29,7 +27,7 @@ impl<'a> MessageIndex<'a> {
             })
             .collect();
         by_stamp.sort_unstable();
-        Self { messages: &recording.messages, by_stamp }
+        Self { messages, by_stamp }
     }
 
     pub(crate) fn span(&self, mark: &Mark) -> &[(Stamp, usize)] {

@@ -3,7 +3,7 @@
 mod baseline;
 mod calibration_prior;
 mod corner_outliers;
-mod data;
+pub(crate) mod data;
 mod drawing;
 mod equations;
 mod failures;

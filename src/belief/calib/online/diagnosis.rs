@@ -1,0 +1,143 @@
+//! What happened, by the evidence of the views: a view that the belief does not explain starts a race of explanations,
+//! each a belief of its own, until one of them leads or three more views were seen.
+
+use crate::calib::online::filter::{Filter, ViewUpdate};
+use crate::calib::online::hypothesis::Fault;
+use crate::calib::views::view::View;
+use armcal_core::robot::Robot;
+
+/// A view is suspicious beyond this quantile of the normal by its cost (one in ten thousand).
+const SUSPICIOUS_Z: f64 = 3.719;
+/// The same of a step of one joint's sensor: looked at more often, for it is one direction among many.
+const SUSPICIOUS_STEP_Z: f64 = 3.3;
+/// What a view costs an explanation under which none of its observations belongs, per observation; that of a rejected
+/// one.
+const NOTHING_FITS_NATS: f64 = 30.0;
+/// `ln` of the odds, before any view, that a named thing happened against nothing.
+const LN_PRIOR: f64 = -7.0;
+/// What leads by this is taken for true, in nats.
+const LEAD_NATS: f64 = 5.0;
+/// Explanations followed at most.
+const MAX_BRANCHES: usize = 6;
+/// Views after which the best explanation is taken.
+const MAX_VIEWS: usize = 4;
+
+/// One explanation, and the belief under it.
+#[derive(Clone)]
+pub(crate) struct Branch {
+    pub fault: Option<Fault>,
+    pub filter: Filter,
+    /// `ln` of its odds.
+    nats: f64,
+}
+
+/// Explanations of what the last views show.
+#[derive(Clone)]
+pub(crate) struct Race {
+    /// The best one first.
+    branches: Vec<Branch>,
+    /// The belief before the first suspicious view.
+    before: Filter,
+    n_views: usize,
+}
+
+/// What a race ended with.
+pub(crate) struct Verdict {
+    pub fault: Fault,
+    pub size: Option<f64>,
+    /// How far it leads the next explanation.
+    pub lead_nats: f64,
+    pub next: Option<Fault>,
+}
+
+/// Whether a view is beyond what its noise explains: by its cost, by an observation that does not belong, or by one
+/// joint's offset alone (the score test of a step there).
+pub(crate) fn is_suspicious(update: &ViewUpdate) -> bool {
+    let n = update.n_coordinates.max(1) as f64;
+    // Wilson and Hilferty 1931.
+    let by = 2.0 / (9.0 * n);
+    let is_costly = update.cost > n * (1.0 - by + SUSPICIOUS_Z * by.sqrt()).powi(3);
+    let has_step = update.walk.iter().any(|score| score.a * score.a > SUSPICIOUS_STEP_Z.powi(2) * score.b);
+    is_costly || has_step || !update.rejected.is_empty()
+}
+
+impl Race {
+    /// Of all that could explain `view`, which `before` (widened already) does not.
+    pub(crate) fn start(robot: &Robot, before: &Filter, view: &View) -> Self {
+        let mut tags: Vec<usize> = view.tags.iter().map(|tag| tag.tag_idx).collect();
+        tags.sort_unstable();
+        tags.dedup();
+        let faults = Fault::all(before, &tags).into_iter().map(Some);
+        let branch = |fault: Option<Fault>| {
+            let mut filter = before.clone();
+            if let Some(fault) = fault {
+                fault.open(&mut filter, robot);
+            }
+            let nats = if fault.is_some() { LN_PRIOR } else { 0.0 };
+            Branch { fault, filter, nats }
+        };
+        let branches = std::iter::once(None).chain(faults).map(branch).collect();
+        let mut race = Self { branches, before: before.clone(), n_views: 0 };
+        race.add(robot, view);
+        race.branches.truncate(MAX_BRANCHES);
+        race
+    }
+
+    /// Every explanation takes the view in.
+    pub(crate) fn add(&mut self, robot: &Robot, view: &View) {
+        self.n_views += 1;
+        for branch in &mut self.branches {
+            branch.nats += match branch.filter.update(robot, &seen_by(branch.fault, view)) {
+                Some(update) => update.log_evidence,
+                None => -NOTHING_FITS_NATS * view.tags.len() as f64,
+            };
+        }
+        self.branches.sort_by(|a, b| b.nats.total_cmp(&a.nats));
+    }
+
+    /// Widens every explanation.
+    pub(crate) fn widen(&mut self, by: impl Fn(&Filter) -> Vec<(usize, f64)>) {
+        for branch in &mut self.branches {
+            let columns = by(&branch.filter);
+            branch.filter.widen(&columns);
+        }
+    }
+
+    /// The best explanation so far.
+    pub(crate) fn best(&self) -> Option<&Branch> {
+        self.branches.first()
+    }
+
+    /// Whether it is decided.
+    pub(crate) fn is_over(&self) -> bool {
+        self.n_views >= MAX_VIEWS || self.lead_nats() > LEAD_NATS
+    }
+
+    fn lead_nats(&self) -> f64 {
+        match &self.branches[..] {
+            [first, second, ..] => first.nats - second.nats,
+            _ => f64::INFINITY,
+        }
+    }
+
+    /// What it ended with; `None` where nothing happened.
+    pub(crate) fn verdict(&self) -> Option<Verdict> {
+        let best = self.branches.first()?;
+        let fault = best.fault?;
+        Some(Verdict {
+            fault,
+            size: fault.size(&self.before, &best.filter),
+            lead_nats: self.lead_nats(),
+            next: self.branches.get(1).and_then(|branch| branch.fault),
+        })
+    }
+}
+
+/// A view under a fault: a failed sensor's reading is not looked at.
+pub(crate) fn seen_by(fault: Option<Fault>, view: &View) -> View {
+    let mut view = view.clone();
+    if let Some(Fault::Failed(joint)) = fault {
+        view.is_free[joint] = true;
+    }
+    view
+}

@@ -1,0 +1,118 @@
+//! The estimator that is fed view by view: beliefs under several lags of the sensors' temperature, and the one that
+//! explains the views best.
+
+use std::sync::Arc;
+
+use crate::calib::covariance::ParameterCovariance;
+use crate::calib::online::event::OnlineEvent;
+use crate::calib::online::member::Member;
+use crate::calib::online::settings::{DriftModel, OnlineSettings};
+use crate::calib::parameters::JointParameters;
+use crate::calib::views::view::View;
+use armcal_core::robot::Robot;
+use armcal_core::sensor::Conditions;
+use armcal_core::time::Stamp;
+
+/// Lags of the sensors' temperature behind the oil's, s. Assumed: from none to a housing full of oil.
+const LAGS_S: [f64; 4] = [0.0, 300.0, 900.0, 2700.0];
+/// A lag whose views are less probable by this is given up, in nats.
+const GIVEN_UP_NATS: f64 = 12.0;
+
+/// Keeps a calibration up to date, view by view. It has no clock and no thread; the same views give the same belief.
+#[derive(Clone)]
+pub struct OnlineEstimator {
+    robot: Arc<Robot>,
+    /// The best one first.
+    members: Vec<Member>,
+}
+
+impl OnlineEstimator {
+    /// For `robot` with the tags that are around it.
+    #[must_use]
+    pub fn new(robot: Robot, settings: OnlineSettings) -> Self {
+        let (robot, settings) = (Arc::new(robot), Arc::new(settings));
+        let lags = if settings.drift == DriftModel::Tuned { &LAGS_S[..] } else { &LAGS_S[..1] };
+        let members = lags.iter().map(|lag_s| Member::new(Arc::clone(&robot), Arc::clone(&settings), *lag_s));
+        Self { members: members.collect(), robot }
+    }
+
+    /// The arm that it is for, as drawn.
+    #[must_use]
+    pub fn robot(&self) -> &Robot {
+        &self.robot
+    }
+
+    /// Number of views taken in.
+    #[must_use]
+    pub fn n_views(&self) -> usize {
+        self.best().n_views()
+    }
+
+    /// A reading of the oil's thermometer: what a sensor's temperature follows, whether a view comes or not.
+    pub fn hear_temperature(&mut self, stamp: Stamp, oil_c: f64) {
+        self.members.iter_mut().for_each(|member| member.hear_temperature(stamp, oil_c));
+    }
+
+    /// Takes a view in; whether it told anything.
+    pub fn add_view(&mut self, view: &View) -> bool {
+        if view.tags.is_empty() && view.gripper_tag.is_none() {
+            return false;
+        }
+        let mut has_told = false;
+        for member in &mut self.members {
+            has_told |= member.add_view(view.clone());
+        }
+        // Stable: of equal ones the shorter lag comes first.
+        self.members.sort_by(|a, b| b.nats.total_cmp(&a.nats));
+        let best = self.best().nats;
+        self.members.retain(|member| best - member.nats < GIVEN_UP_NATS);
+        has_told
+    }
+
+    fn best(&self) -> &Member {
+        // At least the best one stays.
+        &self.members[0]
+    }
+
+    /// What happened since this was last asked for, in the order of time.
+    pub fn take_events(&mut self) -> Vec<OnlineEvent> {
+        let mut told = Vec::new();
+        for (place, member) in self.members.iter_mut().enumerate() {
+            let events = member.take_events();
+            if place == 0 {
+                told = events;
+            }
+        }
+        told
+    }
+
+    /// The sensors as believed; `None` before the first view.
+    #[must_use]
+    pub fn parameters(&self) -> Option<JointParameters> {
+        self.best().parameters()
+    }
+
+    /// `conditions` as the sensors have them, with their temperature behind the oil's.
+    #[must_use]
+    pub fn at_sensors(&self, conditions: &Conditions) -> Conditions {
+        self.best().lagged(conditions)
+    }
+
+    /// Covariance of the joints' parameters under `conditions`, with what may have changed since the last view.
+    #[must_use]
+    pub fn covariance(&self, conditions: &Conditions) -> Option<ParameterCovariance> {
+        self.best().covariance(conditions)
+    }
+
+    /// How much faster than by the datasheet offsets walk and lag, as factors of standard deviations.
+    #[must_use]
+    pub fn drift_factors(&self) -> Option<[f64; 2]> {
+        self.best().drift_factors()
+    }
+
+    /// Lag of the sensors' temperature that explains the views best, s.
+    #[must_use]
+    pub fn temperature_lag_s(&self) -> f64 {
+        self.best().lag_s()
+    }
+}

@@ -1,0 +1,371 @@
+//! One belief about all that views have in common: a state and its information matrix.
+//!
+//! A view is taken in by Gauss-Newton on its own residuals and the belief so far, both those of `bundle` (the iterated
+//! form of the information filter; Bell and Cathey 1993): the matrix of the normal equations at the end is the new
+//! information. Between views what drifts is widened, `(W^-1 + Q)^-1` by the matrix inversion lemma. Time and memory of
+//! a view do not depend on how many came before.
+
+use nalgebra::{Cholesky, DMatrix, Dyn, Isometry3};
+
+use crate::calib::bundle::estimate::Estimate;
+use crate::calib::bundle::input::{BundleInput, HyperparameterMode};
+use crate::calib::bundle::linearize::NormalEquations;
+use crate::calib::bundle::model::{Hyperparameters, Model};
+use crate::calib::bundle::outliers::{reject_by, rejected};
+use crate::calib::bundle::prior_terms::off_by;
+use crate::calib::bundle::priors::prior;
+use crate::calib::bundle::problem::{BundleProblem, Layout, ObservationTerm, Prior, State};
+use crate::calib::bundle::solve::{own_gain, take_step};
+use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
+use crate::calib::views::view::View;
+use armcal_core::joints::MAX_JOINTS;
+use armcal_core::numeric::Loss;
+use armcal_core::robot::Robot;
+
+/// Steps of a view at most; two are the rule.
+const MAX_STEPS: usize = 8;
+/// A step that would save less than this is not taken any more, in units of the cost (sums of squares in sigmas).
+const LAST_GAIN: f64 = 1e-4;
+/// Where a step does not lower the cost, this share of it is tried next.
+const SHORTER: f64 = 0.3;
+const CORNER_WIDTH: f64 = 3.0;
+
+/// Means and information of all columns, base to tags.
+#[derive(Clone)]
+pub(crate) struct Filter {
+    pub model: Model,
+    pub scales: Hyperparameters,
+    /// What has no column keeps its values; its reference is that of the terms.
+    pub guess: JointParameters,
+    layout: Layout,
+    state: State,
+    /// Inverse of the covariance.
+    info: DMatrix<f64>,
+    /// `ln det` of it.
+    log_det: f64,
+}
+
+/// What taking in a view did.
+#[derive(Clone, Debug)]
+pub(crate) struct ViewUpdate {
+    /// Sum of squares in sigmas at the solution, the pull of the belief so far included.
+    pub cost: f64,
+    /// Of the observations that are used.
+    pub n_coordinates: usize,
+    /// Logarithm of the probability of the view by the belief so far, up to what is the same for all beliefs.
+    pub log_evidence: f64,
+    /// Indices into the robot's tags of observations that were left out as a whole.
+    pub rejected: Vec<usize>,
+    /// What each joint is off in this view beyond its sensor's model, rad, and its variance before and after.
+    pub joint_error: [JointErrorOfView; MAX_JOINTS],
+    /// By joint with an offset: what the view says of a change of the offset since the view before.
+    pub walk: [WalkScore; MAX_JOINTS],
+}
+
+/// First and second derivative of the log-likelihood by an offset's variance before the view, for a change of the
+/// variance: `(a^2 - b) / 2` and `b^2 / 2`.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct WalkScore {
+    /// `S^-1` times the innovation, along the offset.
+    pub a: f64,
+    /// `S^-1`, along the offset.
+    pub b: f64,
+}
+
+/// A joint's own error in one view.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct JointErrorOfView {
+    pub error_rad: f64,
+    pub prior_var: f64,
+    pub var: f64,
+}
+
+/// A view at its solution.
+struct SolvedView {
+    state: State,
+    normal: NormalEquations,
+    factor: Cholesky<f64, Dyn>,
+}
+
+impl Filter {
+    /// The belief of a batch, with the priors of the tags that no view of it saw. `None` where the batch determines
+    /// nothing.
+    pub(crate) fn of_estimate(estimate: &Estimate<'_>, robot: &Robot) -> Option<Self> {
+        let (problem, solved) = (&estimate.problem, &estimate.solved);
+        let layout = Layout::with_tags(robot, &estimate.model, |_| true);
+        let n_common = problem.layout.first_of_tags();
+        let mut info = DMatrix::zeros(layout.n, layout.n);
+        // Column of the batch by column here.
+        let mut column_of: Vec<Option<usize>> = vec![None; layout.n];
+        (0..n_common).for_each(|column| column_of[column] = Some(column));
+        let poses = layout.tags.iter().zip(&problem.layout.tags);
+        let gripper = (&layout.gripper_tag, &problem.layout.gripper_tag);
+        for (here, there) in poses.chain([gripper]) {
+            let Some(here) = *here else { continue };
+            (0..6).for_each(|k| column_of[here + k] = there.map(|there| there + k));
+        }
+        for (row, of_row) in column_of.iter().enumerate() {
+            for (column, of_column) in column_of.iter().enumerate().take(row + 1) {
+                let (Some(i), Some(k)) = (of_row, of_column) else { continue };
+                let value = solved.normal.matrix[(*i.max(k), *i.min(k))];
+                (info[(row, column)], info[(column, row)]) = (value, value);
+            }
+        }
+        for (tag_idx, at) in layout.tags.iter().enumerate() {
+            let Some(at) = at.filter(|at| column_of[*at].is_none()) else { continue };
+            for (k, std) in problem.prior.tags_std[tag_idx].iter().enumerate() {
+                info[(at + k, at + k)] = BundleProblem::at_least(*std).powi(-2);
+            }
+        }
+        let mut state = solved.state.clone();
+        (state.joint_error, state.camera_error) = (vec![[0.0; MAX_JOINTS]], vec![Isometry3::identity()]);
+        let log_det = log_det(&Cholesky::new(info.clone())?);
+        let (model, scales, guess) = (estimate.model.clone(), problem.scales.clone(), estimate.guess);
+        Some(Self { model, scales, guess, layout, state, info, log_det })
+    }
+
+    /// Column of each joint's offset that has one.
+    pub(crate) fn offsets(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
+        let columns = self.layout.parameters.iter().enumerate();
+        columns.filter(|(_, p)| p.kind == ParameterKind::Offset).map(|(column, p)| (p.joint, column))
+    }
+
+    /// First of the six columns of the camera's mount.
+    pub(crate) fn mount_column(&self) -> Option<usize> {
+        self.layout.mount
+    }
+
+    /// First of the six columns of a tag.
+    pub(crate) fn tag_column(&self, tag_idx: usize) -> Option<usize> {
+        self.layout.tags[tag_idx]
+    }
+
+    /// Columns of a joint's sensor.
+    pub(crate) fn joint_columns(&self, joint: usize) -> std::ops::Range<usize> {
+        self.layout.of_joint[joint].clone()
+    }
+
+    /// The joints' parameters.
+    pub(crate) fn parameters(&self) -> JointParameters {
+        let mut parameters = self.guess;
+        for (parameter, value) in self.layout.parameters.iter().zip(self.state.joint.iter()) {
+            parameters.set(*parameter, *value);
+        }
+        parameters
+    }
+
+    /// What has a column of a sensor, in their order.
+    pub(crate) fn joint_parameters(&self) -> &[Parameter] {
+        &self.layout.parameters
+    }
+
+    /// `link_from_camera`, as believed.
+    pub(crate) fn mount(&self) -> &Isometry3<f64> {
+        &self.state.mount
+    }
+
+    /// `base_from_tag`, as believed.
+    pub(crate) fn tag(&self, tag_idx: usize) -> &Isometry3<f64> {
+        &self.state.tags[tag_idx]
+    }
+
+    /// Covariance of all columns; `None` only after an overflow.
+    pub(crate) fn covariance(&self) -> Option<DMatrix<f64>> {
+        Cholesky::new(self.info.clone()).map(|factor| factor.inverse())
+    }
+
+    /// Adds `variance` to each of the columns: what may have changed since the last view.
+    pub(crate) fn widen(&mut self, columns: &[(usize, f64)]) {
+        let columns: Vec<(usize, f64)> = columns.iter().copied().filter(|(_, variance)| *variance > 0.0).collect();
+        let k = columns.len();
+        if k == 0 {
+            return;
+        }
+        let along = DMatrix::from_fn(self.info.nrows(), k, |row, i| self.info[(row, columns[i].0)]);
+        let inner = DMatrix::from_fn(k, k, |i, j| {
+            let own = if i == j { 1.0 / columns[i].1 } else { 0.0 };
+            own + self.info[(columns[i].0, columns[j].0)]
+        });
+        let Some(factor) = Cholesky::new(inner) else { return };
+        self.log_det -= log_det(&factor) + columns.iter().map(|(_, variance)| variance.ln()).sum::<f64>();
+        let mut half = along.transpose();
+        factor.l_dirty().solve_lower_triangular_mut(&mut half);
+        self.info.gemm_tr(-1.0, &half, &half, 1.0);
+    }
+
+    /// Number of columns.
+    pub(crate) fn n_columns(&self) -> usize {
+        self.layout.n
+    }
+
+    /// Adds `D D^T` to the covariance.
+    pub(crate) fn widen_along(&mut self, directions: &DMatrix<f64>) {
+        let along = &self.info * directions;
+        let inner = DMatrix::identity(directions.ncols(), directions.ncols()) + directions.tr_mul(&along);
+        let Some(factor) = Cholesky::new(inner) else { return };
+        self.log_det -= log_det(&factor);
+        let mut half = along.transpose();
+        factor.l_dirty().solve_lower_triangular_mut(&mut half);
+        self.info.gemm_tr(-1.0, &half, &half, 1.0);
+    }
+
+    /// Takes a view in. `None`, and nothing changed, where it sees no tag or its numbers are not finite.
+    pub(crate) fn update(&mut self, robot: &Robot, view: &View) -> Option<ViewUpdate> {
+        let views = std::slice::from_ref(view);
+        let info = std::mem::replace(&mut self.info, DMatrix::zeros(0, 0));
+        let (log_det_before, before) = (self.log_det, self.state.clone());
+        let input = self.input(robot, views);
+        let prior = self.prior(&input, info);
+        let mut problem = BundleProblem::with_layout(&input, self.layout.clone(), prior);
+        let Some(solved) = solve_view(&mut problem, &before) else {
+            self.info = problem.prior.joint_info;
+            return None;
+        };
+        let update = view_update(&problem, &solved, log_det_before);
+        let SolvedView { state, normal, factor } = solved;
+        self.log_det = log_det(&factor);
+        self.info = normal.matrix;
+        self.info.fill_upper_triangle_with_lower_triangle();
+        self.state = state;
+        self.state.joint_error[0] = [0.0; MAX_JOINTS];
+        self.state.camera_error[0] = Isometry3::identity();
+        Some(update)
+    }
+
+    fn input<'a>(&self, robot: &'a Robot, views: &'a [View]) -> BundleInput<'a> {
+        BundleInput {
+            robot,
+            views,
+            model: self.model.clone(),
+            scales: self.scales.clone(),
+            guess: self.guess,
+            joint_prior: None,
+            evidence: HyperparameterMode::Given,
+        }
+    }
+
+    /// The belief so far as a view's prior.
+    fn prior(&self, input: &BundleInput<'_>, info: DMatrix<f64>) -> Prior {
+        let state = &self.state;
+        Prior {
+            joint_mean: state.joint.clone(),
+            joint_info: info,
+            mount: state.mount,
+            time_s: state.time_s,
+            lens: state.lens,
+            tags: state.tags.clone(),
+            gripper_tag: state.gripper_tag,
+            ..prior(input, &self.scales)
+        }
+    }
+}
+
+fn log_det(factor: &Cholesky<f64, Dyn>) -> f64 {
+    2.0 * factor.l_dirty().diagonal().map(f64::ln).sum()
+}
+
+/// By least squares; robustly first where something does not fit. `None` where nothing of the view is used.
+fn solve_view(problem: &mut BundleProblem<'_>, start: &State) -> Option<SolvedView> {
+    let mut normal = NormalEquations::new(problem);
+    let (mut state, mut factor) = iterate(problem, start, Loss::Square, &mut normal)?;
+    if reject_by(problem, &normal) {
+        // One wrong observation pulls the others off: what is left out is told by a robust solution.
+        problem.observations.iter_mut().for_each(|observation| observation.set_used([true; 4]));
+        (state, _) = iterate(problem, start, Loss::Cauchy { c: CORNER_WIDTH }, &mut normal)?;
+        reject_by(problem, &normal);
+        (state, factor) = iterate(problem, &state, Loss::Square, &mut normal)?;
+    }
+    problem.observations.iter().any(|observation| observation.is_used).then_some(SolvedView { state, normal, factor })
+}
+
+/// Gauss-Newton from `start`; `normal` and the factor are of the last state that was linearized at.
+fn iterate(
+    problem: &BundleProblem<'_>,
+    start: &State,
+    loss: Loss,
+    normal: &mut NormalEquations,
+) -> Option<(State, Cholesky<f64, Dyn>)> {
+    let mut state = start.clone();
+    normal.update(problem, &state, loss);
+    let mut factor = Cholesky::new(normal.matrix.clone())?;
+    let mut trial = state.clone();
+    for _ in 0..MAX_STEPS {
+        let mut step = normal.right.clone();
+        factor.solve_mut(&mut step);
+        let (gain, cost) = (step.dot(&normal.right) + own_gain(normal), normal.cost);
+        if !(gain.is_finite() && cost.is_finite()) {
+            return None;
+        }
+        let linearized = normal.clone();
+        loop {
+            take_step(problem, &state, &linearized, &step, &mut trial);
+            if gain < LAST_GAIN {
+                return Some((trial, factor));
+            }
+            normal.update(problem, &trial, loss);
+            // Not a number is no gain.
+            if normal.cost <= cost + LAST_GAIN || step.norm() < 1e-12 {
+                break;
+            }
+            step *= SHORTER;
+        }
+        std::mem::swap(&mut state, &mut trial);
+        factor = Cholesky::new(normal.matrix.clone())?;
+    }
+    Some((state, factor))
+}
+
+fn view_update(problem: &BundleProblem<'_>, solved: &SolvedView, log_det_before: f64) -> ViewUpdate {
+    let SolvedView { state, normal, factor } = solved;
+    let of_own: f64 = normal.eliminated.iter().map(|own| own.log_ratio).sum();
+    let left_out: f64 = problem.observations.iter().map(|observation| rejected(observation).chi2).sum();
+    let volume = log_det(factor) - log_det_before;
+    let used = problem.observations.iter().filter(|observation| observation.is_used);
+    let is_rejected = |observation: &&ObservationTerm| !observation.is_used;
+    ViewUpdate {
+        cost: normal.cost,
+        n_coordinates: used.map(|observation| observation.data.n_coordinates()).sum(),
+        log_evidence: 0.5 * (of_own - normal.cost - left_out - volume),
+        rejected: problem.observations.iter().filter(is_rejected).map(|observation| observation.tag).collect(),
+        joint_error: joint_errors(problem, solved),
+        walk: walk_scores(problem, state, factor),
+    }
+}
+
+/// Joint errors of the view, and their variances.
+fn joint_errors(problem: &BundleProblem<'_>, solved: &SolvedView) -> [JointErrorOfView; MAX_JOINTS] {
+    let SolvedView { state, normal, factor } = solved;
+    let mut errors = [JointErrorOfView::default(); MAX_JOINTS];
+    for group in normal.eliminated.iter().filter(|group| group.has_any) {
+        let by_columns = group.inverse * group.own_by_columns(problem, &normal.by_tag, 0);
+        let has_column = |joint: &usize| group.twists.column(*joint).iter().any(|v| *v != 0.0);
+        let joints: Vec<usize> = (0..MAX_JOINTS).filter(has_column).collect();
+        let mut right = DMatrix::from_fn(problem.layout.n, joints.len(), |k, i| by_columns[(joints[i], k)]);
+        factor.l_dirty().solve_lower_triangular_mut(&mut right);
+        for (k, &joint) in joints.iter().enumerate() {
+            errors[joint] = JointErrorOfView {
+                error_rad: state.joint_error[0][joint],
+                prior_var: problem.joint_error_var(&problem.views[0], joint),
+                var: group.inverse[(joint, joint)] + right.column(k).norm_squared(),
+            };
+        }
+    }
+    errors
+}
+
+/// With W the information before and P the covariance after, `a = W (x' - x)` and `b = W - W P W`, both along each
+/// offset.
+fn walk_scores(problem: &BundleProblem<'_>, state: &State, factor: &Cholesky<f64, Dyn>) -> [WalkScore; MAX_JOINTS] {
+    let mut scores = [WalkScore::default(); MAX_JOINTS];
+    let info = &problem.prior.joint_info;
+    let pull = info * off_by(problem, state, info.nrows());
+    for (column, parameter) in problem.layout.parameters.iter().enumerate() {
+        if parameter.kind != ParameterKind::Offset {
+            continue;
+        }
+        let mut half = info.column(column).into_owned();
+        factor.l_dirty().solve_lower_triangular_mut(&mut half);
+        scores[parameter.joint] = WalkScore { a: pull[column], b: info[(column, column)] - half.norm_squared() };
+    }
+    scores
+}

@@ -1,0 +1,178 @@
+//! A belief that is fed messages, and what it says over time.
+
+use serde::{Deserialize, Serialize};
+
+use crate::calib::covariance::task_angles;
+use crate::calib::online::estimator::OnlineEstimator;
+use crate::calib::online::event::OnlineEvent;
+use crate::calib::online::settings::OnlineSettings;
+use crate::calib::online::view_stream::ViewStream;
+use crate::calib::views::view::{TaskRests, View};
+use armcal_core::robot::Robot;
+use armcal_core::sensor::{ArmSensors, Conditions};
+use armcal_core::stats::Summary;
+use armcal_core::streams::{JointAngles, Message, ReachTask, Thermometer};
+use armcal_core::time::Stamp;
+
+/// How far ahead the error without any further view is predicted, h.
+const AHEAD_H: f64 = 1.0;
+/// The 95 % quantile of an error's length over its root mean square, alike in all directions: `sqrt(7.815 / 3)`.
+const P95_OVER_RMS: f64 = 1.614;
+
+/// Follows the messages of an arm: push messages, read belief, predicted tool error and events.
+///
+/// Memory and time a message are bounded whatever the length of the stream. The same messages give the same belief.
+#[derive(Clone)]
+pub struct Follower {
+    settings: OnlineSettings,
+    robot: Robot,
+    views: ViewStream,
+    estimator: OnlineEstimator,
+    conditions: Conditions,
+    targets: Vec<JointAngles>,
+    tolerance_m: Option<f64>,
+}
+
+/// What is believed at one time.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct BeliefRow {
+    /// ns since the epoch, by the joint sensors' clock.
+    pub stamp_nanos: i64,
+    /// Views so far.
+    pub views: usize,
+    /// Expected error of the tool over the task, one sigma in space, m: now.
+    pub tool_error_m: Summary,
+    /// The same in an hour without any view.
+    pub tool_error_in_an_hour_m: Summary,
+    /// Of each joint: offset, and its standard deviation, rad.
+    pub offset_rad: Vec<[f64; 2]>,
+}
+
+impl Follower {
+    /// For `robot`; tags that a recorded survey names take the place of its own.
+    #[must_use]
+    pub fn new(robot: Robot, settings: OnlineSettings) -> Self {
+        Self {
+            views: ViewStream::new(robot.clone()),
+            estimator: OnlineEstimator::new(robot.clone(), settings.clone()),
+            targets: vec![robot.stowed],
+            tolerance_m: None,
+            robot,
+            settings,
+            conditions: Conditions::default(),
+        }
+    }
+
+    /// Takes a message in; what it made known, in the order of time.
+    pub fn push(&mut self, log_time: Stamp, message: &Message) -> Vec<OnlineEvent> {
+        match message {
+            // The first word counts, as in a calibration.
+            Message::Survey(survey) if self.estimator.n_views() == 0 => {
+                let robot = self.robot.clone().with_survey(survey.survey());
+                let (targets, tolerance_m) = (std::mem::take(&mut self.targets), self.tolerance_m);
+                *self = Self { targets, tolerance_m, ..Self::new(robot, self.settings.clone()) };
+            }
+            Message::Task(task) => self.set_task(task),
+            Message::JointSensors(sample) => self.conditions.stamp = Some(sample.stamp),
+            Message::Pressure(sample) => self.conditions.pressure_pa = Some(sample.pressure_pa),
+            Message::Temperature(sample) if sample.thermometer == Thermometer::Oil => {
+                self.conditions.oil_c = Some(sample.temperature_c);
+                self.estimator.hear_temperature(sample.stamp, sample.temperature_c);
+            }
+            _ => {}
+        }
+        let views = self.views.push(log_time, message);
+        self.add(views)
+    }
+
+    /// What is complete when no more messages come.
+    pub fn finish(&mut self) -> Vec<OnlineEvent> {
+        let views = self.views.finish();
+        self.add(views)
+    }
+
+    /// Takes views in that were made elsewhere, of an external recording for instance.
+    pub fn add(&mut self, views: Vec<View>) -> Vec<OnlineEvent> {
+        for view in views {
+            self.estimator.add_view(&view);
+        }
+        self.estimator.take_events()
+    }
+
+    /// The targets that tool errors are predicted at.
+    pub fn set_task(&mut self, task: &ReachTask) {
+        let targets = task_angles(&self.robot, TaskRests { task, rests: &std::collections::BTreeMap::new() });
+        if !targets.is_empty() {
+            (self.targets, self.tolerance_m) = (targets, Some(task.tolerance_m));
+        }
+    }
+
+    /// Whether the tool is within the task's tolerance at each target, in 95 of 100 cases; `None` without a task or a
+    /// belief.
+    #[must_use]
+    pub fn is_good_enough(&self) -> Option<bool> {
+        let worst_m = self.tool_error_m(&self.conditions)?.max;
+        self.tolerance_m.map(|tolerance_m| P95_OVER_RMS * worst_m <= tolerance_m)
+    }
+
+    /// The estimator.
+    #[must_use]
+    pub fn estimator(&self) -> &OnlineEstimator {
+        &self.estimator
+    }
+
+    /// The sensors as believed under the conditions of now; those of the datasheet before the first view.
+    #[must_use]
+    pub fn sensors(&self) -> ArmSensors {
+        let Some(parameters) = self.estimator.parameters() else { return ArmSensors::nominal(&self.robot) };
+        let mut sensors = parameters.sensors(&self.robot);
+        // What the sensors are warmer than the oil, their reference is colder.
+        let at_sensors = self.estimator.at_sensors(&self.conditions);
+        if let (Some(reference_c), Some(oil_c), Some(sensor_c)) =
+            (&mut sensors.reference.oil_c, self.conditions.oil_c, at_sensors.oil_c)
+        {
+            *reference_c += oil_c - sensor_c;
+        }
+        sensors
+    }
+
+    /// Latest temperatures, pressure and time.
+    #[must_use]
+    pub fn conditions(&self) -> &Conditions {
+        &self.conditions
+    }
+
+    /// What is believed now; `None` before the first view.
+    #[must_use]
+    pub fn belief(&self) -> Option<BeliefRow> {
+        let stamp = self.conditions.stamp?;
+        let later = Conditions { stamp: Some(stamp.plus_s(3600.0 * AHEAD_H)), ..self.conditions };
+        let parameters = self.estimator.parameters()?;
+        let covariance = self.estimator.covariance(&self.conditions)?;
+        let std = |joint: usize| {
+            let offset = crate::calib::Parameter { joint, kind: crate::calib::ParameterKind::Offset };
+            covariance.std(offset).unwrap_or(self.robot.sensors[joint].offset_std_rad)
+        };
+        Some(BeliefRow {
+            stamp_nanos: stamp.nanos,
+            views: self.estimator.n_views(),
+            tool_error_m: self.tool_error_m(&self.conditions)?,
+            tool_error_in_an_hour_m: self.tool_error_m(&later)?,
+            offset_rad: (0..self.robot.n_joints()).map(|j| [parameters.offset_rad[j], std(j)]).collect(),
+        })
+    }
+
+    /// Expected error of the tool over the task under `conditions`, without further views until then.
+    #[must_use]
+    pub fn tool_error_m(&self, conditions: &Conditions) -> Option<Summary> {
+        let (covariance, sensors) = (self.estimator.covariance(conditions)?, self.sensors());
+        // What drifts is in the covariance already.
+        let at = Conditions { stamp: sensors.reference.stamp, ..*conditions };
+        let errors: Vec<f64> = self
+            .targets
+            .iter()
+            .map(|angles| covariance.tool_position_under_m2(&self.robot, &sensors, angles, &at).trace().max(0.0).sqrt())
+            .collect();
+        Summary::of(&errors)
+    }
+}

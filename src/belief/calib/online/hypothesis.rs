@@ -1,0 +1,128 @@
+//! What may have happened to the arm between two views: each is a belief that is widened where it re-opens.
+
+use nalgebra::{DMatrix, Matrix6};
+
+use crate::calib::finding::FindingKind;
+use crate::calib::online::filter::Filter;
+use crate::calib::parameters::{Parameter, ParameterKind};
+use armcal_core::robot::Robot;
+use armcal_core::spatial::adjoint;
+
+/// How far a sensor may slip, a tag or the camera be knocked aside: one sigma. Assumed: wide, the views tell it.
+const SLIP_STD_RAD: f64 = 0.1;
+const TAG_STD: [f64; 2] = [0.03, 0.06];
+const MOUNT_STD: [f64; 2] = [0.02, 0.1];
+const BASE_STD: [f64; 2] = [0.1, 0.1];
+const GAIN_STD: f64 = 1.0;
+
+/// What may have happened.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Fault {
+    /// The sensor of a joint turned on its shaft.
+    Slip(usize),
+    /// The sensor of a joint has another scale or sign.
+    Scale(usize),
+    /// The sensor of a joint says nothing any more.
+    Failed(usize),
+    /// The tag of that index was knocked aside.
+    Tag(usize),
+    /// The camera slipped on its mount.
+    Mount,
+    /// All tags together moved, or the arm's base.
+    Base,
+}
+
+impl Fault {
+    /// All that a view with these tags could tell of.
+    pub(crate) fn all(filter: &Filter, tags: &[usize]) -> Vec<Self> {
+        let joints: Vec<usize> = filter.offsets().map(|(joint, _)| joint).collect();
+        let of_joint = |joint: usize| [Self::Slip(joint), Self::Scale(joint), Self::Failed(joint)];
+        let of_tags = tags.iter().map(|&tag| Self::Tag(tag)).filter(|_| tags.len() > 1);
+        let of_mount = filter.mount_column().map(|_| Self::Mount);
+        let base = (tags.len() > 1).then_some(Self::Base);
+        joints.into_iter().flat_map(of_joint).chain(of_tags).chain(of_mount).chain(base).collect()
+    }
+
+    /// Widens the belief where the fault re-opens it.
+    pub(crate) fn open(self, filter: &mut Filter, robot: &Robot) {
+        match self {
+            Self::Slip(joint) => {
+                let columns: Vec<_> = column(filter, joint, ParameterKind::Offset).into_iter().collect();
+                filter.widen(&columns.iter().map(|at| (*at, SLIP_STD_RAD.powi(2))).collect::<Vec<_>>());
+            }
+            Self::Scale(joint) => {
+                let gain = column(filter, joint, ParameterKind::Gain).map(|at| (at, GAIN_STD.powi(2)));
+                let offset = column(filter, joint, ParameterKind::Offset).map(|at| (at, SLIP_STD_RAD.powi(2)));
+                filter.widen(&gain.into_iter().chain(offset).collect::<Vec<_>>());
+            }
+            // The views themselves are taken otherwise.
+            Self::Failed(_) => {}
+            Self::Tag(tag) => filter.widen(&six(filter.tag_column(tag), TAG_STD)),
+            Self::Mount => filter.widen(&six(filter.mount_column(), MOUNT_STD)),
+            Self::Base => {
+                let along = base_directions(filter, robot);
+                filter.widen_along(&along);
+            }
+        }
+    }
+
+    /// The kind as files write it.
+    #[must_use]
+    pub fn kind(self) -> FindingKind {
+        match self {
+            Self::Slip(_) => FindingKind::SensorSlip,
+            Self::Scale(_) => FindingKind::SensorScale,
+            Self::Failed(_) => FindingKind::SensorFailed,
+            Self::Tag(_) => FindingKind::TagMoved,
+            Self::Mount => FindingKind::CameraMount,
+            Self::Base => FindingKind::Base,
+        }
+    }
+
+    /// Joint or tag, as people know it.
+    #[must_use]
+    pub fn name(self, robot: &Robot) -> String {
+        match self {
+            Self::Slip(joint) | Self::Scale(joint) | Self::Failed(joint) => robot.sensors[joint].joint.clone(),
+            Self::Tag(tag) => robot.tags[tag].id.to_string(),
+            Self::Mount => "camera mount".to_owned(),
+            Self::Base => "base".to_owned(),
+        }
+    }
+
+    /// How far belief `after` is from belief `before` in what the fault is about: m or rad; `None` without a size.
+    pub(crate) fn size(self, before: &Filter, after: &Filter) -> Option<f64> {
+        match self {
+            Self::Slip(joint) => {
+                let offset = |filter: &Filter| filter.parameters().offset_rad[joint];
+                Some(offset(after) - offset(before))
+            }
+            Self::Scale(joint) => Some(after.parameters().gain[joint]),
+            Self::Failed(_) => None,
+            Self::Tag(tag) => Some((after.tag(tag).translation.vector - before.tag(tag).translation.vector).norm()),
+            Self::Mount => Some((before.mount().rotation.inverse() * after.mount().rotation).angle()),
+            Self::Base => Some((after.tag(0).translation.vector - before.tag(0).translation.vector).norm()),
+        }
+    }
+}
+
+fn column(filter: &Filter, joint: usize, kind: ParameterKind) -> Option<usize> {
+    filter.joint_parameters().iter().position(|p| *p == Parameter { joint, kind })
+}
+
+fn six(at: Option<usize>, [shift, turn]: [f64; 2]) -> Vec<(usize, f64)> {
+    let variance = |k: usize| if k < 3 { shift * shift } else { turn * turn };
+    at.into_iter().flat_map(|at| (0..6).map(move |k| (at + k, variance(k)))).collect()
+}
+
+/// All tags by a small motion of the frame that they are known in, each column times one sigma.
+fn base_directions(filter: &Filter, robot: &Robot) -> DMatrix<f64> {
+    let mut along = DMatrix::zeros(filter.n_columns(), 6);
+    let std = Matrix6::from_diagonal(&nalgebra::Vector6::from_fn(|k, _| BASE_STD[k / 3]));
+    for tag in 0..robot.tags.len() {
+        let Some(at) = filter.tag_column(tag) else { continue };
+        let by_base = adjoint(&filter.tag(tag).inverse()) * std;
+        along.fixed_view_mut::<6, 6>(at, 0).copy_from(&by_base);
+    }
+    along
+}

@@ -1,0 +1,246 @@
+//! The estimator under one lag of the sensors' temperature behind the thermometer's.
+
+use std::sync::Arc;
+
+use nalgebra::DMatrix;
+
+use crate::calib::bundle::estimate::estimate;
+use crate::calib::bundle::input::{BundleInput, HyperparameterMode};
+use crate::calib::bundle::model::Hyperparameters;
+use crate::calib::covariance::ParameterCovariance;
+use crate::calib::online::diagnosis::{Race, is_suspicious};
+use crate::calib::online::event::OnlineEvent;
+use crate::calib::online::filter::{Filter, ViewUpdate};
+use crate::calib::online::hypothesis::Fault;
+use crate::calib::online::lagged_temperature::LaggedTemperature;
+use crate::calib::online::process_noise::{JointErrorSize, ProcessNoise};
+use crate::calib::online::settings::{DriftModel, FaultSearch, OnlineSettings, online_model};
+use crate::calib::parameters::JointParameters;
+use crate::calib::views::view::View;
+use armcal_core::robot::Robot;
+use armcal_core::sensor::Conditions;
+use armcal_core::time::Stamp;
+
+/// Evidence of views of before counts less by this factor a view.
+const FORGETTING: f64 = 0.98;
+/// From so many views on the batch fits the scales.
+const VIEWS_FOR_EVIDENCE: usize = 12;
+/// Numbers of views at which the batch of the first ones is made anew.
+const START_AT: [usize; 9] = [1, 2, 3, 4, 6, 8, 12, 17, 24];
+
+/// A belief kept up view by view, for sensors that follow the thermometer with one lag.
+#[derive(Clone)]
+pub(crate) struct Member {
+    robot: Arc<Robot>,
+    settings: Arc<OnlineSettings>,
+    lag: LaggedTemperature,
+    /// `ln` of the probability of the views by this belief, older ones counting less.
+    pub nats: f64,
+    /// The first views, until the filter goes on alone.
+    first: Vec<View>,
+    n_views: usize,
+    running: Option<Running>,
+    suspect_since: Option<Stamp>,
+    events: Vec<OnlineEvent>,
+}
+
+/// The filter, and what it is tuned by.
+#[derive(Clone)]
+struct Running {
+    filter: Filter,
+    /// Explanations of views that the filter did not expect, while they are open.
+    race: Option<Race>,
+    /// Joints whose sensor says nothing any more.
+    failed: Vec<usize>,
+    noise: ProcessNoise,
+    errors: JointErrorSize,
+    /// Of the last view.
+    conditions: Conditions,
+}
+
+impl Member {
+    pub(crate) fn new(robot: Arc<Robot>, settings: Arc<OnlineSettings>, lag_s: f64) -> Self {
+        Self {
+            robot,
+            settings,
+            lag: LaggedTemperature::new(lag_s),
+            nats: 0.0,
+            first: Vec::new(),
+            n_views: 0,
+            running: None,
+            suspect_since: None,
+            events: Vec::new(),
+        }
+    }
+
+    /// Number of views taken in.
+    pub(crate) fn n_views(&self) -> usize {
+        self.n_views
+    }
+
+    /// A reading of the oil's thermometer.
+    pub(crate) fn hear_temperature(&mut self, stamp: Stamp, oil_c: f64) {
+        self.lag.hear(stamp, oil_c);
+    }
+
+    /// `conditions` as the sensors have them.
+    pub(crate) fn lagged(&self, conditions: &Conditions) -> Conditions {
+        Conditions { oil_c: conditions.oil_c.map(|now_c| self.lag.behind(now_c)), ..*conditions }
+    }
+
+    /// Takes a view in; whether it told anything.
+    pub(crate) fn add_view(&mut self, mut view: View) -> bool {
+        self.n_views += 1;
+        view.conditions = self.lagged(&view.conditions);
+        let is_start = self.running.is_none() || !self.first.is_empty();
+        if is_start {
+            return self.start_with(view);
+        }
+        self.carry_on(&view).is_some()
+    }
+
+    /// The batch of the first views.
+    fn start_with(&mut self, view: View) -> bool {
+        self.first.push(view);
+        let n = self.first.len();
+        if !START_AT.contains(&n) {
+            let view = self.first[n - 1].clone();
+            return self.running.is_some() && self.carry_on(&view).is_some();
+        }
+        let started = self.start();
+        if started.is_some() {
+            self.running = started;
+        }
+        if n == START_AT[START_AT.len() - 1] {
+            self.first = Vec::new();
+        }
+        self.running.is_some()
+    }
+
+    fn start(&self) -> Option<Running> {
+        let reference = self.first[0].conditions;
+        let (scales, evidence) = match &self.settings.scales {
+            Some(scales) => (scales.clone(), HyperparameterMode::Given),
+            None if self.first.len() < VIEWS_FOR_EVIDENCE => {
+                (Hyperparameters::datasheet(&self.robot), HyperparameterMode::Given)
+            }
+            None => (Hyperparameters::datasheet(&self.robot), HyperparameterMode::Fitted),
+        };
+        let input = BundleInput {
+            robot: &self.robot,
+            views: &self.first,
+            model: self.settings.model.clone().unwrap_or_else(|| online_model(&self.robot)),
+            scales,
+            guess: JointParameters { reference, ..JointParameters::default() },
+            joint_prior: None,
+            evidence,
+        };
+        let first_scales = input.scales.clone();
+        let mut estimate = estimate(&input)?;
+        if evidence == HyperparameterMode::Fitted {
+            estimate.take_mean_scales(&first_scales);
+        }
+        let filter = Filter::of_estimate(&estimate, &self.robot)?;
+        let noise = ProcessNoise::datasheet(&self.robot, &filter.scales);
+        let errors = JointErrorSize::new(&filter.scales);
+        let conditions = self.first.iter().max_by_key(|view| view.end)?.conditions;
+        Some(Running { filter, race: None, failed: Vec::new(), noise, errors, conditions })
+    }
+
+    fn carry_on(&mut self, view: &View) -> Option<ViewUpdate> {
+        let running = self.running.as_mut()?;
+        let mut view = view.clone();
+        running.failed.iter().for_each(|joint| view.is_free[*joint] = true);
+        let view = &view;
+        if self.settings.drift == DriftModel::Tuned {
+            let change = view.conditions.departure_from(&running.conditions);
+            if let Some(race) = &mut running.race {
+                race.widen(|filter| running.noise.widening(filter, &change));
+            } else {
+                running.noise.widen(&mut running.filter, &change);
+            }
+            running.conditions = view.conditions;
+        }
+        if let Some(race) = &mut running.race {
+            race.add(&self.robot, view);
+            self.settle_race(view.end);
+            return None;
+        }
+        let before = running.filter.clone();
+        let update = running.filter.update(&self.robot, view);
+        self.nats = FORGETTING * self.nats + update.as_ref().map_or(0.0, |update| update.log_evidence);
+        // A view of which nothing fits changes nothing.
+        if self.settings.faults == FaultSearch::On && update.as_ref().is_none_or(is_suspicious) {
+            running.race = Some(Race::start(&self.robot, &before, view));
+            self.suspect_since = Some(view.end);
+            self.settle_race(view.end);
+            return update;
+        }
+        let update = update?;
+        if self.settings.drift == DriftModel::Tuned {
+            running.noise.learn(&update);
+        }
+        if self.settings.scales.is_none() {
+            running.errors.learn(&update, &mut running.filter.scales);
+        }
+        Some(update)
+    }
+
+    /// The best explanation is the belief; once it is decided, it is told of.
+    fn settle_race(&mut self, now: Stamp) {
+        let Some(running) = &mut self.running else { return };
+        let Some(race) = &running.race else { return };
+        if let Some(best) = race.best() {
+            running.filter = best.filter.clone();
+        }
+        if !race.is_over() {
+            return;
+        }
+        if let Some(verdict) = race.verdict() {
+            if let Fault::Failed(joint) = verdict.fault {
+                running.failed.push(joint);
+            }
+            let since = self.suspect_since.take().unwrap_or(now);
+            self.events.push(OnlineEvent::of_verdict(&self.robot, &verdict, since, now));
+        }
+        running.race = None;
+    }
+
+    /// What happened since this was last asked for, in the order of time.
+    pub(crate) fn take_events(&mut self) -> Vec<OnlineEvent> {
+        std::mem::take(&mut self.events)
+    }
+
+    /// The sensors as believed; `None` before the first view.
+    pub(crate) fn parameters(&self) -> Option<JointParameters> {
+        self.running.as_ref().map(|running| running.filter.parameters())
+    }
+
+    /// Covariance of the joints' parameters under `conditions`, with what may have changed since the last view.
+    pub(crate) fn covariance(&self, conditions: &Conditions) -> Option<ParameterCovariance> {
+        let running = self.running.as_ref()?;
+        let mut filter = running.filter.clone();
+        if self.settings.drift == DriftModel::Tuned {
+            let change = self.lagged(conditions).departure_from(&running.conditions);
+            let widening = running.noise.widening(&filter, &change);
+            filter.widen(&widening);
+        }
+        let parameters = filter.joint_parameters().to_vec();
+        let n = parameters.len();
+        let matrix: DMatrix<f64> = filter.covariance()?.view((0, 0), (n, n)).into_owned();
+        let residual_std_rad = std::array::from_fn(|joint| match self.robot.sensors.get(joint) {
+            Some(spec) if filter.joint_columns(joint).is_empty() => spec.linearity_std_rad,
+            _ => filter.scales.joint_std_rad[joint],
+        });
+        Some(ParameterCovariance { parameters, matrix, residual_std_rad: Some(residual_std_rad) })
+    }
+
+    pub(crate) fn lag_s(&self) -> f64 {
+        self.lag.lag_s
+    }
+
+    /// How much faster than by the datasheet offsets walk and lag, as factors of standard deviations.
+    pub(crate) fn drift_factors(&self) -> Option<[f64; 2]> {
+        self.running.as_ref().map(|running| running.noise.factors())
+    }
+}

@@ -1,0 +1,28 @@
+//! ONLINE: the belief kept up through a dive, message by message.
+//!
+//! `view_stream` makes views of messages. `estimator` holds a `member` for each lag of the sensors' temperature; each
+//! starts from the first views by `bundle` and carries its belief on: `filter` is state and information,
+//! `process_noise` how fast sensors change. `diagnosis` races `hypothesis` against hypothesis where a view does not
+//! fit; `event` tells what happened. `follower` is all of it.
+
+mod diagnosis;
+mod estimator;
+mod event;
+mod filter;
+mod follower;
+mod hypothesis;
+mod lagged_temperature;
+mod member;
+mod process_noise;
+mod settings;
+mod view_stream;
+
+pub use estimator::OnlineEstimator;
+pub use event::OnlineEvent;
+pub use follower::{BeliefRow, Follower};
+pub use hypothesis::Fault;
+pub use settings::{DriftModel, FaultSearch, OnlineSettings, online_model};
+pub use view_stream::ViewStream;
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,5 @@
+//! The online estimator against the batch and against known truths, on views drawn from the estimator's own model.
+
+mod drifting;
+mod faults;
+mod stationary;

@@ -1,0 +1,80 @@
+//! Where nothing changes the belief is that of the batch of all views.
+
+use rand::seq::SliceRandom;
+
+use crate::calib::bundle::estimate::estimate;
+use crate::calib::bundle::input::{BundleInput, HyperparameterMode};
+use crate::calib::bundle::model::{Hyperparameters, Model};
+use crate::calib::bundle::tests::data::{Noise, Truth, reference, rng, titan, views};
+use crate::calib::online::estimator::OnlineEstimator;
+use crate::calib::online::settings::{DriftModel, FaultSearch, OnlineSettings, online_model};
+use crate::calib::parameters::JointParameters;
+use crate::calib::views::view::View;
+use armcal_core::robot::Robot;
+
+struct Case {
+    scales: Hyperparameters,
+    model: Model,
+    views: Vec<View>,
+}
+
+fn case(robot: &Robot, seed: u64, n_views: usize) -> Case {
+    let mut rng = rng(seed, "stationary");
+    let (scales, model) = (Hyperparameters::datasheet(robot), online_model(robot));
+    let truth = Truth::draw(robot, &model, &scales, &mut rng);
+    let noise = Noise { corner_px: 0.3, n_frames: 8, joint_rad: scales.joint_std_rad };
+    let mut views = views(robot, &truth, &noise, n_views, &mut rng);
+    views.iter_mut().for_each(|view| view.n_readings = 1_000_000);
+    Case { scales, model, views }
+}
+
+/// Largest difference over the joints' parameters between belief and batch, in the batch's sigmas.
+fn worst_sigmas(robot: &Robot, case: &Case, order: &[View]) -> f64 {
+    let settings = OnlineSettings {
+        model: Some(case.model.clone()),
+        scales: Some(case.scales.clone()),
+        drift: DriftModel::Stationary,
+        faults: FaultSearch::Off,
+    };
+    let mut online = OnlineEstimator::new(robot.clone(), settings);
+    for view in order {
+        online.add_view(view);
+    }
+    let guess = JointParameters { reference: reference(), ..JointParameters::default() };
+    let input = BundleInput {
+        robot,
+        views: &case.views,
+        model: case.model.clone(),
+        scales: case.scales.clone(),
+        guess: JointParameters { reference: order[0].conditions, ..guess },
+        joint_prior: None,
+        evidence: HyperparameterMode::Given,
+    };
+    let batch = estimate(&input).expect("the views determine something");
+    let (covariance, parameters) = (batch.joint_covariance(), online.parameters().expect("it runs"));
+    let of_batch = batch.parameters();
+    let sigmas = batch
+        .joint_parameters()
+        .iter()
+        .enumerate()
+        .map(|(k, p)| (parameters.get(*p) - of_batch.get(*p)).abs() / covariance[(k, k)].sqrt());
+    sigmas.fold(0.0, f64::max)
+}
+
+#[test]
+fn belief_is_that_of_the_batch_in_any_order_of_the_views() {
+    let robot = titan();
+    let mut worst = Vec::new();
+    for seed in 0..6 {
+        let case = case(&robot, seed, 40);
+        for shuffle in 0..2 {
+            let mut order = case.views.clone();
+            if shuffle > 0 {
+                order.shuffle(&mut rng(seed, "order"));
+            }
+            worst.push(worst_sigmas(&robot, &case, &order));
+        }
+    }
+    println!("largest difference over the parameters, sigmas: {worst:.4?}");
+    assert!(worst.iter().all(|sigmas| *sigmas < 0.1), "{worst:?}");
+}
