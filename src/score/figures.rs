@@ -38,6 +38,24 @@ pub struct Score {
     /// Every `reach` step of the script. `before` is the first of them under the datasheet's sensors, `after` the last
     /// under calibrated ones.
     pub reaches: Vec<ReachScore>,
+    /// Tasks of all `work` steps at which the arm came to rest, in the order of time.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub work: Vec<TaskScore>,
+}
+
+/// One task of a `work` step.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TaskScore {
+    /// Number of the step in the script, from 1.
+    pub step: usize,
+    /// Of the rest at the target, since the start.
+    pub time_s: f64,
+    /// Number of the task's target, from 0.
+    pub target: usize,
+    /// Where the arm believes its tool is, against where it is.
+    pub tool_error_m: f64,
+    /// Target against where the tool came to rest.
+    pub reach_error_m: f64,
 }
 
 /// One `reach` step.

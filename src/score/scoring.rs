@@ -5,7 +5,7 @@ use std::path::Path;
 
 use nalgebra::Vector3;
 
-use crate::score::{JointScore, MarginSummary, ReachScore, Score, ScoreSide, margins, touch};
+use crate::score::{JointScore, MarginSummary, ReachScore, Score, ScoreSide, TaskScore, margins, touch};
 use armcal_belief::session::{AssertResult, Epoch, Outcome, ReachStep};
 use armcal_belief::verify::{Belief, ReachRest, reaches};
 use armcal_core::log::Recording;
@@ -67,6 +67,7 @@ pub fn score(input: &ScoreInput<'_>) -> Result<Scored, SimError> {
         joints: joint_scores(input, &before, &after),
         compared_targets: common.into_iter().collect(),
         reaches,
+        work: sides.iter().filter(|side| side.step.is_work).flat_map(|side| task_scores(input, side)).collect(),
     };
     let asserts = outcome.asserts.iter().map(|limit| completed(limit, &score, &truth)).collect();
     let margins = margins::margins(&outcome.visits, input.robot, &truth);
@@ -143,6 +144,18 @@ fn reach_score(input: &ScoreInput<'_>, truth: &Truth, side: &Side<'_>) -> ReachS
         side: ScoreSide { targets: side.step.targets, ..figures },
         touches: touch::touches(input.recording, truth, input.robot, side.step, input.tolerance_m),
     }
+}
+
+fn task_scores(input: &ScoreInput<'_>, side: &Side<'_>) -> Vec<TaskScore> {
+    let start = input.outcome.epochs.first().map(|epoch| epoch.from);
+    let task_score = |c: &&Compared<'_>| TaskScore {
+        step: side.step.step,
+        time_s: start.map_or(0.0, |start| c.rest.start.since_s(start)),
+        target: c.rest.target_idx,
+        tool_error_m: c.tool_error_m.norm(),
+        reach_error_m: c.reach_error_m,
+    };
+    side.rests.iter().map(task_score).collect()
 }
 
 /// One rest, believed and true.

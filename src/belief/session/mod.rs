@@ -1,6 +1,6 @@
 //! Sessions: a routine's script carried out on any [`Arm`](armcal_core::streams::Arm), known only through its messages.
 //!
-//! `prepare` plans before the first motion, `script` carries out the steps: `reach`, `capture` (with `belief_update`),
+//! `prepare` plans before the first motion, `script` carries out the steps: `reach`, `work`, `capture` (with `belief_update`),
 //! `grip`, `touch`, `scale_identification`, `end_stops`. `motion` drives the arm, `settling` detects rest, `contact`
 //! detects contacts, `following` joints that do not follow (`held_joint`, `failed_joints`), and `approval` asks an
 //! operator before a motion. `recorder` keeps every message; `outcome` is the result.
@@ -29,6 +29,7 @@ mod script;
 mod settling;
 mod touch;
 mod unwatched;
+mod work;
 
 pub use error::SessionError;
 pub use held_joint::HeldJoint;

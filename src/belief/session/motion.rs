@@ -230,6 +230,12 @@ impl<'b> Driver<'b> {
         Ok(())
     }
 
+    /// Drives no joint faster from now on; as fast as the robot's file allows with `None`.
+    pub(crate) fn limit_rates(&mut self, rate_rad_s: Option<f64>) {
+        let full = Timing::new(self.robot);
+        self.timing = rate_rad_s.map_or(full.clone(), |rate| full.limited_to(rate));
+    }
+
     pub fn record(&mut self, message: &Message) -> Result<(), SessionError> {
         let now = self.arm.now();
         self.recorder.record(now, message).map_err(ArmError::Sink)?;

@@ -123,11 +123,13 @@ pub struct EstimateUpdate {
     pub expected_tool_error_m: f64,
 }
 
-/// One `reach` step.
+/// One `reach` or `work` step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ReachStep {
     /// Number of the step in the script, from 1.
     pub step: usize,
+    /// Whether it is a `work` step.
+    pub is_work: bool,
     /// Targets that it asks for.
     pub targets: usize,
     /// Whether the arm believed in a calibration.

@@ -8,10 +8,10 @@ use armcal_core::routine::ReachSettings;
 use armcal_core::streams::{JointAngles, LogLevel, MarkKind, Phase, ReachAttempt};
 
 /// How long the arm is watched at a target, s.
-const REACH_DWELL_S: f64 = 0.6;
+pub(crate) const REACH_DWELL_S: f64 = 0.6;
 
 /// Where the arm is to go, or has come to rest; or why not.
-type OrReason<T> = Result<T, String>;
+pub(crate) type OrReason<T> = Result<T, String>;
 
 impl ScriptRunner<'_, '_> {
     /// Goes to each target and rests there for a moment; if it is to be touched, with open jaws, which then close on
@@ -55,7 +55,7 @@ impl ScriptRunner<'_, '_> {
         }
     }
 
-    fn arrive(&mut self, at: &OrReason<JointAngles>) -> Result<OrReason<()>, SessionError> {
+    pub(crate) fn arrive(&mut self, at: &OrReason<JointAngles>) -> Result<OrReason<()>, SessionError> {
         let angles = match at {
             Ok(angles) => angles,
             Err(reason) => return Ok(Err(reason.clone())),
@@ -73,7 +73,7 @@ impl ScriptRunner<'_, '_> {
         Ok(is_at_rest.then_some(()).ok_or_else(|| "the arm did not come to rest".to_owned()))
     }
 
-    fn skip(&mut self, skipped: SkippedTarget) -> Result<(), SessionError> {
+    pub(crate) fn skip(&mut self, skipped: SkippedTarget) -> Result<(), SessionError> {
         self.driver.log(LogLevel::Warn, &format!("a target is left out: {skipped}"))?;
         self.tally.skipped_targets.push(skipped);
         Ok(())
@@ -81,7 +81,7 @@ impl ScriptRunner<'_, '_> {
 
     /// Says once what the targets ask beyond what the calibration in use saw, if that is more than straight lines: a
     /// fitted shape is worth nothing where there were no views.
-    fn warn_beyond(&mut self, postures: &[OrReason<JointAngles>]) -> Result<(), SessionError> {
+    pub(crate) fn warn_beyond(&mut self, postures: &[OrReason<JointAngles>]) -> Result<(), SessionError> {
         let calibration = self.epochs.last().and_then(|epoch| epoch.calibration.as_ref());
         let Some(calibration) = calibration.filter(|c| c.reference.is_some()) else { return Ok(()) };
         let conditions = self.driver.conditions();
@@ -108,16 +108,25 @@ impl ScriptRunner<'_, '_> {
         let planned = self.planned.as_ref().map(|planned| planned.targets.clone()).unwrap_or_default();
         let preferred: Vec<JointAngles> = targets.iter().filter_map(|&target| planned.get(target)).copied().collect();
         let has_failed = !self.driver.held.is_empty();
+        if attempt == ReachAttempt::Before && preferred.len() == targets.len() && !has_failed {
+            return Ok(preferred.into_iter().map(Ok).collect());
+        }
+        self.postures_near(targets, &preferred)
+    }
+
+    /// Believed angles at each target, near preferred ones where given.
+    pub(crate) fn postures_near(
+        &mut self,
+        targets: &[usize],
+        preferred: &[JointAngles],
+    ) -> Result<Vec<OrReason<JointAngles>>, SessionError> {
         if let Some(held) = self.unlocated() {
             let reason = format!("no view has shown yet where {} stands", self.robot.sensors[held.joint].joint);
             self.driver.log(LogLevel::Warn, &format!("all targets are left out: {reason}"))?;
             return Ok(vec![Err(reason); targets.len()]);
         }
-        if attempt == ReachAttempt::Before && preferred.len() == targets.len() && !has_failed {
-            return Ok(preferred.into_iter().map(Ok).collect());
-        }
         let targets_m: Vec<[f64; 3]> = targets.iter().map(|&t| self.setup.routine.task.targets_m[t]).collect();
-        let request = TargetRequest { targets_m: &targets_m, preferred: Some(&preferred), margin_m: self.margin_m() };
+        let request = TargetRequest { targets_m: &targets_m, preferred: Some(preferred), margin_m: self.margin_m() };
         let solved = plan_targets(&self.robot, &self.clearance, &self.bounds, &request, &mut self.rng);
         self.note_reachable(targets, &solved);
         let named = targets.iter().zip(solved);

@@ -107,12 +107,7 @@ impl ScriptRunner<'_, '_> {
             self.take_up_failures();
             match step {
                 Step::Move(goal) => self.move_to(number, goal)?,
-                Step::Reach(reach) => {
-                    let (start, attempt) = (self.driver.now(), self.attempt());
-                    self.reach(number, reach)?;
-                    let (targets, end) = (reach.targets.len(), self.driver.now());
-                    self.reaches.push(ReachStep { step: number, targets, attempt, start, end });
-                }
+                Step::Reach(_) | Step::Work(_) => self.reach_or_work(number, step)?,
                 Step::Capture(capture) => self.capture(capture).map_err(|error| after_motion(number, error))?,
                 Step::Identify(settings) => {
                     self.identify(number, settings).map_err(|error| after_motion(number, error))?;
@@ -137,6 +132,18 @@ impl ScriptRunner<'_, '_> {
             }
         }
         Ok(None)
+    }
+
+    fn reach_or_work(&mut self, number: usize, step: &Step) -> Result<(), SessionError> {
+        let (start, attempt) = (self.driver.now(), self.attempt());
+        let targets = match step {
+            Step::Reach(reach) => self.reach(number, reach).map(|()| reach.targets.len())?,
+            Step::Work(work) => self.work(number, work).map(|()| work.tasks as usize)?,
+            _ => return Ok(()),
+        };
+        let (is_work, end) = (matches!(step, Step::Work(_)), self.driver.now());
+        self.reaches.push(ReachStep { step: number, is_work, targets, attempt, start, end });
+        Ok(())
     }
 
     fn finish(self, stopped: Option<String>) -> Result<Outcome, SessionError> {
@@ -213,16 +220,20 @@ impl ScriptRunner<'_, '_> {
         planner.plan(&self.driver.set_point(), &self.robot.stowed, &mut self.rng).is_ok()
     }
 
+    /// Believed angles there.
+    pub fn goal(&self, goal: &MoveGoal) -> Result<JointAngles, String> {
+        match goal {
+            MoveGoal::Stowed => Ok(self.robot.stowed),
+            MoveGoal::Angles(angles) if angles.len() == self.robot.n_joints() => Ok(JointAngles::from_slice(angles)),
+            MoveGoal::Angles(angles) => {
+                Err(format!("to_rad has {} angles, the arm {} joints", angles.len(), self.robot.n_joints()))
+            }
+        }
+    }
+
     fn move_to(&mut self, step: usize, goal: &MoveGoal) -> Result<(), SessionError> {
         let wrong = |problem: String| SessionError::Step { step, problem };
-        let to = match goal {
-            MoveGoal::Stowed => self.robot.stowed,
-            MoveGoal::Angles(angles) if angles.len() == self.robot.n_joints() => JointAngles::from_slice(angles),
-            MoveGoal::Angles(angles) => {
-                let problem = format!("to_rad has {} angles, the arm {} joints", angles.len(), self.robot.n_joints());
-                return Err(wrong(problem));
-            }
-        };
+        let to = self.goal(goal).map_err(wrong)?;
         let to = with_held(&self.driver.held, &to);
         self.driver.phase(Phase::Move)?;
         self.progress_at(Phase::Move, 0, 1);
@@ -275,7 +286,7 @@ impl ScriptRunner<'_, '_> {
     }
 
     /// Widens the bounds by what time and temperature have done to the sensors since the calibration.
-    fn age(&mut self) {
+    pub fn age(&mut self) {
         let Some(fresh) = &self.fresh else { return };
         let warmed_k = self.driver.recorder.oil_c.zip(fresh.oil_c).map_or(0.0, |(now, then)| now - then);
         let age = Elapsed { seconds: self.driver.now().since_s(fresh.at), warmed_k };

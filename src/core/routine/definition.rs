@@ -116,6 +116,22 @@ impl Routine {
                 Step::Move(MoveGoal::Angles(angles)) if angles.len() != joints.len() => {
                     format!("to_rad has {} angles, robot `{}` has {} joints", angles.len(), robot.name, joints.len())
                 }
+                Step::Work(work) => {
+                    let rest = match &work.rest {
+                        MoveGoal::Angles(angles) => Some(angles),
+                        MoveGoal::Stowed => None,
+                    };
+                    let mut postures = work.looks_rad.iter().chain(rest);
+                    match postures.find(|angles| angles.len() != joints.len()) {
+                        None => continue,
+                        Some(angles) => format!(
+                            "a posture has {} angles, robot `{}` has {} joints",
+                            angles.len(),
+                            robot.name,
+                            joints.len()
+                        ),
+                    }
+                }
                 Step::Grip { .. } | Step::Reach(ReachSettings { touch: true, .. }) if robot.gripper.is_none() => {
                     format!("robot `{}` has no [gripper] in its robot.toml", robot.name)
                 }

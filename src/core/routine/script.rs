@@ -10,7 +10,7 @@ use super::error::RoutineError;
 use super::settings::{CaptureSettings, Margins, PoseCriterion, TaskSettings};
 use super::step::{
     CalibrateSettings, CalibrateViews, IdentifySettings, MoveGoal, OnRefusal, ReachSettings, Step, StopsSettings,
-    TouchSettings,
+    TouchSettings, WorkSettings,
 };
 use crate::robot::FileIssue;
 use crate::streams::PriorSource;
@@ -23,7 +23,8 @@ pub(super) fn standard(capture: CaptureSettings, task: &TaskSettings) -> Vec<Ste
     vec![reach(), Step::Capture(capture), Step::Calibrate(calibrate), reach()]
 }
 
-const NAMES: &str = "move, reach, grip, capture, identify, stops, touch, calibrate, recalibrate, wait, fault, assert";
+const NAMES: &str =
+    "move, reach, work, grip, capture, identify, stops, touch, calibrate, recalibrate, wait, fault, assert";
 
 /// Steps in order, and the tables of the faults in order, unread.
 pub(super) struct Script {
@@ -56,6 +57,7 @@ pub(super) fn read(
         let step = match name.as_str() {
             "move" => reader.move_goal()?,
             "reach" => reader.reach(task)?,
+            "work" => reader.work(task)?,
             "grip" => reader.grip()?,
             "capture" => reader.capture(capture)?,
             "identify" => reader.identify()?,
@@ -133,8 +135,13 @@ impl StepReader<'_> {
             #[serde(default)]
             touch: bool,
         }
-        let n = task.targets_m.len();
         let Raw { targets, touch } = self.parse()?;
+        Ok(Step::Reach(ReachSettings { targets: self.targets(targets, task)?, touch }))
+    }
+
+    /// Numbers of the task's targets; all of them where none are named.
+    fn targets(&self, targets: Option<Vec<usize>>, task: &TaskSettings) -> Result<Vec<usize>, FileIssue> {
+        let n = task.targets_m.len();
         let targets = targets.unwrap_or_else(|| (0..n).collect());
         if targets.is_empty() {
             return Err(FileIssue::new(self.file, self.key("targets"), "needs one number or more"));
@@ -142,7 +149,60 @@ impl StepReader<'_> {
         for &target in &targets {
             self.range("targets", target as f64, 0.0..=(n - 1) as f64)?;
         }
-        Ok(Step::Reach(ReachSettings { targets, touch }))
+        Ok(targets)
+    }
+
+    fn work(&self, task: &TaskSettings) -> Result<Step, FileIssue> {
+        #[derive(Deserialize)]
+        #[serde(deny_unknown_fields)]
+        struct Raw {
+            tasks: u32,
+            #[serde(default = "ten_minutes")]
+            every_s: f64,
+            targets: Option<Vec<usize>>,
+            rest_rad: Option<Vec<f64>>,
+            #[serde(default)]
+            looks_rad: Vec<Vec<f64>>,
+            #[serde(default = "three")]
+            look_every: u32,
+            #[serde(default = "one_second")]
+            look_s: f64,
+            #[serde(default)]
+            gaps_s: Vec<[f64; 2]>,
+            rate_rad_s: Option<f64>,
+        }
+        fn ten_minutes() -> f64 {
+            600.0
+        }
+        fn three() -> u32 {
+            3
+        }
+        fn one_second() -> f64 {
+            1.0
+        }
+        let raw: Raw = self.parse()?;
+        for angle in raw.looks_rad.iter().flatten() {
+            self.range("looks_rad", *angle, -100.0..=100.0)?;
+        }
+        for angle in raw.rest_rad.iter().flatten() {
+            self.range("rest_rad", *angle, -100.0..=100.0)?;
+        }
+        for [from_s, to_s] in &raw.gaps_s {
+            self.range("gaps_s", *from_s, 0.0..=1e6)?;
+            self.range("gaps_s (its end)", *to_s, *from_s..=1e6)?;
+        }
+        let rate_rad_s = raw.rate_rad_s.map(|rate| self.range("rate_rad_s", rate, 0.01..=10.0)).transpose()?;
+        Ok(Step::Work(WorkSettings {
+            tasks: self.range("tasks", f64::from(raw.tasks), 1.0..=10_000.0)? as u32,
+            every_s: self.range("every_s", raw.every_s, 1.0..=1e5)?,
+            targets: self.targets(raw.targets, task)?,
+            rest: raw.rest_rad.map_or(MoveGoal::Stowed, MoveGoal::Angles),
+            looks_rad: raw.looks_rad,
+            look_every: self.range("look_every", f64::from(raw.look_every), 1.0..=10_000.0)? as u32,
+            look_s: self.range("look_s", raw.look_s, 0.0..=600.0)?,
+            gaps_s: raw.gaps_s,
+            rate_rad_s,
+        }))
     }
 
     fn grip(&self) -> Result<Step, FileIssue> {
@@ -324,7 +384,7 @@ fn check_order(file: &Path, steps: &[Step]) -> Result<(), FileIssue> {
         };
         match step {
             Step::Move(_) | Step::Stops(_) | Step::Touch(_) => moved = true,
-            Step::Reach(_) => (reaches, moved) = (reaches + 1, true),
+            Step::Reach(_) | Step::Work(_) => (reaches, moved) = (reaches + 1, true),
             Step::Capture(_) => (captures, moved) = (captures + 1, true),
             Step::Identify(_) if moved => {
                 return wrong("must come before the first move, reach or capture: none of them is safe before it");
@@ -396,6 +456,18 @@ mod tests {
         assert_eq!((capture.poses, capture.held_out), (7, CaptureSettings::default().held_out));
     }
 
+    /// The last of every three tasks passes tags, by one posture after the other, and none does in a gap.
+    #[test]
+    fn work_passes_tags_in_a_third_of_its_tasks_and_in_no_gap() {
+        let text = "[[step]]\ndo = \"work\"\ntasks = 12\nlooks_rad = [[0.1], [0.2]]\ngaps_s = [[1200.0, 3600.0]]\n";
+        let script = script(&format!("{LOOP}{text}")).expect("a script");
+        let Step::Work(work) = &script.steps[2] else { panic!("work") };
+        let looks: Vec<_> = (0..work.tasks).filter_map(|task| Some((task, work.look_of(task)?))).collect();
+        assert_eq!(looks, [(8, 0), (11, 1)]);
+        assert_eq!((work.duration_s(), &work.targets[..], &work.rest), (7200.0, &[0, 1, 2][..], &MoveGoal::Stowed));
+        assert_eq!(WorkSettings { looks_rad: Vec::new(), ..work.clone() }.look_of(8), None);
+    }
+
     #[test]
     fn mistakes_are_named_by_step_key_and_what_would_be_right() {
         let cases = [
@@ -407,6 +479,11 @@ mod tests {
             ("[[step]]\ndo = \"move\"", "needs either to = \"stowed\""),
             ("[[step]]\ndo = \"reach\"\ntargets = [3]", "step 1 (reach): targets: 3 is outside 0 .. 2"),
             ("[[step]]\ndo = \"reach\"\ntargets = []", "needs one number"),
+            ("[[step]]\ndo = \"work\"", "step 1 (work): missing field `tasks`"),
+            ("[[step]]\ndo = \"work\"\ntasks = 0", "step 1 (work): tasks: 0 is outside 1 .. 10000"),
+            ("[[step]]\ndo = \"work\"\ntasks = 2\ntargets = [7]", "step 1 (work): targets: 7 is outside 0 .. 2"),
+            ("[[step]]\ndo = \"work\"\ntasks = 2\ngaps_s = [[9.0, 4.0]]", "gaps_s (its end): 4 is outside 9 .."),
+            ("[[step]]\ndo = \"work\"\ntasks = 2\nlook_every = 0", "step 1 (work): look_every: 0 is outside"),
             ("[[step]]\ndo = \"grip\"", "step 1 (grip): missing field `opening`"),
             ("[[step]]\ndo = \"grip\"\nopening = 1.5", "step 1 (grip): opening: 1.5 is outside 0 .. 1"),
             ("[[step]]\ndo = \"touch\"", "step 1 (touch): missing field `part`"),

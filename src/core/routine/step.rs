@@ -14,6 +14,8 @@ pub enum Step {
     Move(MoveGoal),
     /// Reaches for targets of the task under the sensors believed in.
     Reach(ReachSettings),
+    /// Works: targets of the task at times, tags seen by chance, rest between.
+    Work(WorkSettings),
     /// Opens or closes the gripper: 0 closed, 1 open.
     Grip {
         /// 0..1 of the largest opening.
@@ -50,6 +52,7 @@ impl Step {
         match self {
             Self::Move(_) => "move",
             Self::Reach(_) => "reach",
+            Self::Work(_) => "work",
             Self::Grip { .. } => "grip",
             Self::Capture(_) => "capture",
             Self::Identify(_) => "identify",
@@ -80,6 +83,47 @@ pub struct ReachSettings {
     pub targets: Vec<usize>,
     /// Whether the jaws close on each of them.
     pub touch: bool,
+}
+
+/// What working means.
+#[derive(Clone, Debug, PartialEq)]
+pub struct WorkSettings {
+    /// How many.
+    pub tasks: u32,
+    /// From the start of one task to that of the next.
+    pub every_s: f64,
+    /// Numbers of the task's targets, from 0, taken in turn.
+    pub targets: Vec<usize>,
+    /// Where the arm rests between tasks.
+    pub rest: MoveGoal,
+    /// Believed joint angles at which the work passes tags, rad, base first, taken in turn.
+    pub looks_rad: Vec<Vec<f64>>,
+    /// The last of so many tasks goes to its target by the next of them.
+    pub look_every: u32,
+    /// How long the arm stays there; it does not stop where this is 0.
+    pub look_s: f64,
+    /// Since the start of the step: what begins in one of these spans passes no tags.
+    pub gaps_s: Vec<[f64; 2]>,
+    /// No joint is driven faster.
+    pub rate_rad_s: Option<f64>,
+}
+
+impl WorkSettings {
+    /// Time of the whole step.
+    #[must_use]
+    pub fn duration_s(&self) -> f64 {
+        f64::from(self.tasks) * self.every_s
+    }
+
+    /// Number of the posture by which task `number` (from 0) passes tags, if it does.
+    #[must_use]
+    pub fn look_of(&self, number: u32) -> Option<usize> {
+        let at_s = f64::from(number) * self.every_s;
+        let is_in_gap = self.gaps_s.iter().any(|[from_s, to_s]| (*from_s..*to_s).contains(&at_s));
+        let is_due = (number + 1).is_multiple_of(self.look_every);
+        (is_due && !is_in_gap && !self.looks_rad.is_empty())
+            .then(|| (number / self.look_every) as usize % self.looks_rad.len())
+    }
 }
 
 /// How the scale of one sensor is measured.

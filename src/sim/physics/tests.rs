@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Matrix3, Unit, Vector3};
 
 use crate::dynamics::{Body, Force, JointLoad, WaterProperties};
 use crate::physics::*;
-use crate::spec::{EngineKind, PhysicsSpec, VehicleMotionSpec, WaterSpec};
+use crate::spec::{EngineKind, PhysicsSpec, Points, VehicleMotionSpec, WaterSpec};
 use crate::vehicle::{BaseState, VehicleMotion, WaterMotion};
 use armcal_core::kinematics::{Chain, ChainJoint};
 use armcal_core::robot::{GRAVITY_M_S2, LinkBody, Robot, load};
@@ -21,6 +21,8 @@ const DRY: WaterSpec = WaterSpec {
     pressure_bias_std_pa: 0.0,
     pressure_scale_std: 0.0,
     depth_m: 0.0,
+    dive_time_s: Points::NONE,
+    dive_depth_m: Points::NONE,
     pressure_noise_pa: 0.0,
     added_mass_coefficient: 0.0,
     current_m_s: [0.0; 3],

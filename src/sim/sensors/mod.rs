@@ -3,10 +3,11 @@
 pub(super) mod attitude;
 pub(super) mod camera;
 pub(super) mod joint;
+mod lag;
 mod oil_state;
 pub(super) mod thermometer;
 
-pub(super) use oil_state::OilState;
+pub(super) use oil_state::{OilState, SensorSurroundings};
 
 #[cfg(test)]
 mod tests;

@@ -7,11 +7,12 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use crate::as_built::GaugesAsBuilt;
+use crate::sensors::lag::Lag;
 use crate::spec::{TemperatureSpec, WaterSpec};
 use armcal_core::robot::GRAVITY_M_S2;
 use armcal_core::stats::stream_rng;
 use armcal_core::streams::{PressureSample, TemperatureSample, Thermometer};
-use armcal_core::time::Stamp;
+use armcal_core::time::{SIMULATION_EPOCH, Stamp};
 
 /// Of the air at the surface.
 const ATMOSPHERE_PA: f64 = 101_325.0;
@@ -27,24 +28,17 @@ pub(crate) struct SlowSensors {
     gauge: ChaCha8Rng,
 }
 
-/// The lag of a thermometer.
+/// A thermometer's own temperature.
 #[derive(Clone, Debug)]
 struct Probe {
     rng: ChaCha8Rng,
-    last: Option<Followed>,
-}
-
-/// At the last sample.
-#[derive(Clone, Copy, Debug)]
-struct Followed {
-    stamp: Stamp,
-    true_c: f64,
-    probe_c: f64,
+    lag: Lag,
+    read_at: Option<Stamp>,
 }
 
 impl SlowSensors {
     pub(crate) fn new(temperature: &TemperatureSpec, water: &WaterSpec, built: &GaugesAsBuilt, seed: u64) -> Self {
-        let probe = |name: &str| Probe { rng: stream_rng(seed, name), last: None };
+        let probe = |name: &str| Probe { rng: stream_rng(seed, name), lag: Lag::default(), read_at: None };
         Self {
             spec: *temperature,
             water: *water,
@@ -75,7 +69,7 @@ impl SlowSensors {
     /// Pressure at the vehicle, `heave_m` above its station.
     pub(crate) fn pressure(&mut self, heave_m: f64, stamp: Stamp) -> PressureSample {
         let noise: f64 = StandardNormal.sample(&mut self.gauge);
-        let depth_m = self.water.depth_m - heave_m;
+        let depth_m = self.water.station_depth_m(stamp.since_s(SIMULATION_EPOCH)) - heave_m;
         let true_pa = ATMOSPHERE_PA + gauge_pressure_pa(&self.water, depth_m);
         let noise_pa = self.water.pressure_noise_pa;
         let shown_pa = true_pa * (1.0 + self.built.pressure_scale_error) + self.built.pressure_bias_pa;
@@ -84,20 +78,10 @@ impl SlowSensors {
 }
 
 impl Probe {
-    /// A probe that was never read has had time to settle.
     fn follow(&mut self, true_c: f64, stamp: Stamp, lag_s: f64) -> f64 {
-        let probe_c = match self.last {
-            Some(last) if lag_s > 0.0 => {
-                let elapsed_s = stamp.since_s(last.stamp).max(f64::MIN_POSITIVE);
-                // Behind an even change the probe settles one lag late.
-                let late_k = lag_s * (true_c - last.true_c) / elapsed_s;
-                let unsettled_k = last.probe_c - (last.true_c - late_k);
-                true_c - late_k + unsettled_k * (-elapsed_s / lag_s).exp()
-            }
-            _ => true_c,
-        };
-        self.last = Some(Followed { stamp, true_c, probe_c });
-        probe_c
+        let elapsed_s = self.read_at.map_or(0.0, |read_at| stamp.since_s(read_at));
+        self.read_at = Some(stamp);
+        self.lag.follow(true_c, elapsed_s, lag_s)
     }
 }
 
@@ -109,7 +93,6 @@ pub(crate) fn gauge_pressure_pa(water: &WaterSpec, depth_m: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use armcal_core::time::SIMULATION_EPOCH;
 
     fn sensors(temperature: &TemperatureSpec, built: &GaugesAsBuilt) -> SlowSensors {
         let silent = TemperatureSpec { thermometer_noise_k: 0.0, ..*temperature };

@@ -65,14 +65,41 @@ table!(
         /// Of a resolver's offset with its cable and converter; standard deviation over joints. Assumed.
         resolver_temperature_std_rad_per_k = 0.0, in 0.0..=0.01;
     } and {
+        /// Time constant with which the sensors' own temperature follows the oil's. Assumed.
+        #[serde(skip_serializing_if = "is_zero")]
+        sensor_lag_s: f64 = 0.0;
+        /// Width of the pressure's hysteresis: its effects on the way down and up are as if the pressure differed by it.
+        /// Assumed.
+        #[serde(skip_serializing_if = "is_zero")]
+        pressure_hysteresis_mpa: f64 = 0.0;
+        /// Share of the pressure's effect that lags behind. Assumed.
+        #[serde(skip_serializing_if = "is_half")]
+        pressure_hysteresis_share: f64 = 0.5;
         /// Electrical turns of a resolver in one of its shaft, 1 .. 255.
         resolver_pole_pairs: NonZeroU8 = NonZeroU8::MIN;
     }
 );
 
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it")]
+fn is_zero(figure: &f64) -> bool {
+    *figure == 0.0
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it")]
+fn is_half(figure: &f64) -> bool {
+    *figure == 0.5
+}
+
 impl JointSensorsSpec {
     /// A bump as steep as the scale would give one reading to several angles.
     pub(super) fn check_relations(&self, file: &Path) -> Result<(), FileIssue> {
+        for (key, value, range) in [
+            ("sensor_lag_s", self.sensor_lag_s, 0.0..=36_000.0),
+            ("pressure_hysteresis_mpa", self.pressure_hysteresis_mpa, 0.0..=100.0),
+            ("pressure_hysteresis_share", self.pressure_hysteresis_share, 0.05..=1.0),
+        ] {
+            FileIssue::check_range(file, &format!("world.joint_sensors.{key}"), value, range)?;
+        }
         let (peak, width) = (self.worn_spot_peak_rad, self.worn_spot_width_rad);
         if peak > width {
             let problem = format!("{peak} is above worn_spot_width_rad, {width}");

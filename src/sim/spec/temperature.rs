@@ -5,11 +5,9 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+use crate::spec::points::{Points, Polyline};
 use crate::spec::table::{CheckedTable, table};
 use armcal_core::robot::FileIssue;
-
-/// The longest profile of the water.
-const MAX_POINTS: usize = 16;
 
 table!(
     /// Oil and water. The oil warms as `start + rise * (1 - exp(-t / time constant))`, or by the arm's work.
@@ -42,80 +40,28 @@ table!(
         thermometer_resolution_k = 0.0, in 0.0..=5.0;
     } and {
         /// Depths of `profile_c`, ascending, 16 at most; none for water that is the same everywhere.
-        profile_depth_m: Points = Points::default();
+        profile_depth_m: Points = Points::NONE;
         /// The water's temperature at those depths, linear between them and constant beyond; replaces `water_c`.
-        profile_c: Points = Points::default();
+        profile_c: Points = Points::NONE;
     }
 );
 
-/// A few figures, written as a list.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Vec<f64>", into = "Vec<f64>")]
-pub struct Points {
-    n: usize,
-    values: [f64; MAX_POINTS],
-}
-
-impl Points {
-    /// The figures of the list.
-    #[must_use]
-    pub fn as_slice(&self) -> &[f64] {
-        &self.values[..self.n]
-    }
-}
-
-impl TryFrom<Vec<f64>> for Points {
-    type Error = String;
-
-    fn try_from(list: Vec<f64>) -> Result<Self, String> {
-        let mut points = Self { n: list.len(), ..Self::default() };
-        let slots = points.values.get_mut(..list.len());
-        let too_long = || format!("a list of {} figures; {MAX_POINTS} at most", list.len());
-        slots.ok_or_else(too_long)?.copy_from_slice(&list);
-        Ok(points)
-    }
-}
-
-impl From<Points> for Vec<f64> {
-    fn from(points: Points) -> Self {
-        points.as_slice().to_vec()
-    }
-}
-
 impl TemperatureSpec {
     pub(super) fn check_relations(&self, file: &Path) -> Result<(), FileIssue> {
-        const DEPTHS: &str = "world.temperature.profile_depth_m";
-        const TEMPERATURES: &str = "world.temperature.profile_c";
-        let (depths, temperatures) = (self.profile_depth_m.as_slice(), self.profile_c.as_slice());
-        for depth in depths {
-            FileIssue::check_range(file, DEPTHS, *depth, 0.0..=12_000.0)?;
-        }
-        for temperature in temperatures {
-            FileIssue::check_range(file, TEMPERATURES, *temperature, -2.0..=30.0)?;
-        }
-        if let Some(pair) = depths.windows(2).find(|pair| pair[0] >= pair[1]) {
-            return Err(FileIssue::new(file, DEPTHS, format!("{} does not come before {}", pair[0], pair[1])));
-        }
-        if depths.len() != temperatures.len() {
-            let problem = format!("has {} figures for {} of profile_depth_m", temperatures.len(), depths.len());
-            return Err(FileIssue::new(file, TEMPERATURES, problem));
-        }
-        Ok(())
+        self.profile().check(
+            file,
+            ["world.temperature.profile_depth_m", "world.temperature.profile_c"],
+            [0.0..=12_000.0, -2.0..=30.0],
+        )
+    }
+
+    fn profile(&self) -> Polyline<'_> {
+        Polyline { at: &self.profile_depth_m, values: &self.profile_c }
     }
 
     /// The water at the start, at a depth.
     pub(crate) fn water_at_c(&self, depth_m: f64) -> f64 {
-        let (depths, temperatures) = (self.profile_depth_m.as_slice(), self.profile_c.as_slice());
-        let deeper = depths.partition_point(|depth| *depth <= depth_m);
-        match (deeper, temperatures.last()) {
-            (_, None) => self.water_c,
-            (0, Some(_)) => temperatures[0],
-            (n, Some(deepest)) if n == depths.len() => *deepest,
-            (n, Some(_)) => {
-                let share = (depth_m - depths[n - 1]) / (depths[n] - depths[n - 1]);
-                temperatures[n - 1] + share * (temperatures[n] - temperatures[n - 1])
-            }
-        }
+        self.profile().value_at(depth_m).unwrap_or(self.water_c)
     }
 }
 

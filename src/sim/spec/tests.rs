@@ -46,6 +46,46 @@ fn what_the_water_carries_is_the_arms_own_figure_unless_the_world_has_one() {
 }
 
 #[test]
+fn a_dive_has_a_depth_for_each_time() {
+    let text = "[water]\ndive_time_s = [600, 3000, 3600]\ndive_depth_m = [0.0, 4000.0, 1000.0]";
+    let spec = read(text).expect("valid");
+    for (t_s, depth_m) in [(0.0, 0.0), (600.0, 0.0), (1800.0, 2000.0), (3300.0, 2500.0), (9e4, 1000.0)] {
+        assert!((spec.water.station_depth_m(t_s) - depth_m).abs() < 1e-9, "{t_s} s");
+    }
+    assert_eq!(read(&spec.to_toml().expect("text")).expect("valid"), spec);
+    assert_eq!(WorldSpec::default().water.station_depth_m(77.0), 500.0);
+    for (text, reason) in [
+        (
+            "dive_time_s = [0.0, 60.0]\ndive_depth_m = [4.0]",
+            "world.water.dive_depth_m: has 1 figures for 2 of dive_time_s",
+        ),
+        ("dive_depth_m = [4.0]", "world.water.dive_depth_m: has 1 figures for 0"),
+        ("dive_time_s = [9.0, 9.0]\ndive_depth_m = [4.0, 5.0]", "world.water.dive_time_s: 9 does not come before 9"),
+        ("dive_time_s = [1.0]\ndive_depth_m = [-4.0]", "world.water.dive_depth_m: -4 is outside 0 .. 12000"),
+        ("dive_time_s = [2e6]\ndive_depth_m = [4.0]", "world.water.dive_time_s: 2000000 is outside 0 .. 1000000"),
+    ] {
+        let problem = problem(&format!("[water]\n{text}"));
+        assert!(problem.starts_with("r.toml: ") && problem.contains(reason), "{problem}");
+    }
+}
+
+#[test]
+fn what_lags_behind_oil_and_pressure_has_its_limits_and_is_written_where_it_is_set() {
+    for (text, key) in [
+        ("sensor_lag_s = -1.0", "world.joint_sensors.sensor_lag_s: -1 is outside 0 .. 36000"),
+        ("pressure_hysteresis_mpa = 101.0", "pressure_hysteresis_mpa: 101 is outside 0 .. 100"),
+        ("pressure_hysteresis_share = 0.0", "pressure_hysteresis_share: 0 is outside 0.05 .. 1"),
+    ] {
+        let problem = problem(&format!("[joint_sensors]\n{text}"));
+        assert!(problem.contains(key), "{problem}");
+    }
+    let standard = WorldSpec::default().to_toml().expect("text");
+    assert!(["sensor_lag_s", "pressure_hysteresis", "dive_"].iter().all(|key| !standard.contains(key)), "{standard}");
+    let set = read("[joint_sensors]\nsensor_lag_s = 300.0\npressure_hysteresis_share = 0.4").expect("valid");
+    assert_eq!(read(&set.to_toml().expect("text")).expect("valid"), set);
+}
+
+#[test]
 fn images_have_their_keys_and_limits() {
     let spec = read("[camera]\nmode = \"rendered\"\n[image]\nwater = \"coastal\"\nsnow_per_m3 = 10.0").expect("valid");
     assert_eq!((spec.camera.mode, spec.image.water), (CameraMode::Rendered, WaterKind::Coastal));

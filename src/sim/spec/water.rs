@@ -4,6 +4,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+use crate::spec::points::{Points, Polyline};
 use crate::spec::table::CheckedTable;
 use armcal_core::robot::FileIssue;
 
@@ -25,6 +26,12 @@ pub struct WaterSpec {
     pub pressure_scale_std: f64,
     /// Of the vehicle's station below the surface.
     pub depth_m: f64,
+    /// Times of `dive_depth_m` since the start, ascending, 16 at most; none for a vehicle that stays at its depth.
+    #[serde(skip_serializing_if = "Points::is_empty")]
+    pub dive_time_s: Points,
+    /// Depths of the station at those times, linear between them and constant beyond; they replace `depth_m`.
+    #[serde(skip_serializing_if = "Points::is_empty")]
+    pub dive_depth_m: Points,
     /// Noise of a single reading, one sigma.
     pub pressure_noise_pa: f64,
     /// Scale of the links' theoretical added mass; 0 for none.
@@ -49,6 +56,8 @@ impl Default for WaterSpec {
             pressure_bias_std_pa: 0.0,
             pressure_scale_std: 0.0,
             depth_m: 500.0,
+            dive_time_s: Points::NONE,
+            dive_depth_m: Points::NONE,
             pressure_noise_pa: 200.0,
             added_mass_coefficient: 1.0,
             current_m_s: [0.0; 3],
@@ -64,6 +73,20 @@ impl WaterSpec {
     pub(crate) fn buoyancy(&self) -> f64 {
         self.buoyancy_fraction.unwrap_or(0.0)
     }
+
+    /// Whether the station's depth changes with time.
+    pub(crate) fn dives(&self) -> bool {
+        !self.dive_time_s.is_empty()
+    }
+
+    /// Of the vehicle's station below the surface, so long after the start.
+    pub(crate) fn station_depth_m(&self, t_s: f64) -> f64 {
+        self.dive().value_at(t_s).unwrap_or(self.depth_m)
+    }
+
+    fn dive(&self) -> Polyline<'_> {
+        Polyline { at: &self.dive_time_s, values: &self.dive_depth_m }
+    }
 }
 
 impl CheckedTable for WaterSpec {
@@ -77,6 +100,8 @@ impl CheckedTable for WaterSpec {
         check("pressure_bias_std_pa", self.pressure_bias_std_pa, 0.0..=1e7)?;
         check("pressure_scale_std", self.pressure_scale_std, 0.0..=0.1)?;
         check("depth_m", self.depth_m, 0.0..=12000.0)?;
+        let keys = ["dive_time_s", "dive_depth_m"].map(|key| format!("{table}.{key}"));
+        self.dive().check(file, [&keys[0], &keys[1]], [0.0..=1e6, 0.0..=12_000.0])?;
         check("pressure_noise_pa", self.pressure_noise_pa, 0.0..=1e6)?;
         check("added_mass_coefficient", self.added_mass_coefficient, 0.0..=10.0)?;
         for (axis, speed) in self.current_m_s.iter().enumerate() {

@@ -21,11 +21,13 @@ pub(crate) struct Sea {
     /// Horizontal direction in which the waves run, unit.
     heading: Vector3<f64>,
     waves: Vec<Wave>,
+    /// Of a vehicle that dives.
+    dive: Option<WaterSpec>,
 }
 
 #[derive(Clone, Copy, Debug)]
 struct Wave {
-    /// Of the orbit at the vehicle's depth, m.
+    /// Of the orbit at the vehicle's depth, m; at the surface for a vehicle that dives.
     radius_m: f64,
     rate_rad_s: f64,
     phase_rad: f64,
@@ -44,7 +46,8 @@ impl Sea {
     pub(crate) fn new(spec: &WaterSpec, seed: u64) -> Self {
         let (sin, cos) = spec.wave_direction_rad.sin_cos();
         let waves = if spec.wave_height_m > 0.0 { draw_waves(spec, seed) } else { Vec::new() };
-        Self { current: Vector3::from(spec.current_m_s), heading: Vector3::new(cos, sin, 0.0), waves }
+        let dive = spec.dives().then_some(*spec);
+        Self { current: Vector3::from(spec.current_m_s), heading: Vector3::new(cos, sin, 0.0), waves, dive }
     }
 
     /// The water at `t_s`; z is up.
@@ -52,11 +55,19 @@ impl Sea {
         let mut motion = WaterMotion { velocity: self.current, acceleration: Vector3::zeros() };
         for wave in &self.waves {
             let (sin, cos) = (wave.rate_rad_s * t_s + wave.phase_rad).sin_cos();
-            let speed = wave.radius_m * wave.rate_rad_s;
+            let fade = self.dive.map_or(1.0, |water| (-wave.number_per_m() * water.station_depth_m(t_s)).exp());
+            let speed = wave.radius_m * wave.rate_rad_s * fade;
             motion.velocity += speed * (cos * self.heading + sin * Vector3::z());
             motion.acceleration += speed * wave.rate_rad_s * (-sin * self.heading + cos * Vector3::z());
         }
         motion
+    }
+}
+
+impl Wave {
+    /// Deep water's, times 2 pi.
+    fn number_per_m(&self) -> f64 {
+        self.rate_rad_s * self.rate_rad_s / GRAVITY_M_S2
     }
 }
 
@@ -76,9 +87,9 @@ fn draw_waves(spec: &WaterSpec, seed: u64) -> Vec<Wave> {
         .collect();
     // At the surface: the significant height is four times the standard deviation of the elevation.
     let std_m = waves.iter().map(|w| 0.5 * w.radius_m * w.radius_m).sum::<f64>().sqrt();
+    let depth_m = if spec.dives() { 0.0 } else { spec.depth_m };
     for wave in &mut waves {
-        let wave_number = wave.rate_rad_s * wave.rate_rad_s / GRAVITY_M_S2;
-        wave.radius_m *= 0.25 * spec.wave_height_m / std_m * (-wave_number * spec.depth_m).exp();
+        wave.radius_m *= 0.25 * spec.wave_height_m / std_m * (-wave.number_per_m() * depth_m).exp();
     }
     waves
 }
@@ -108,5 +119,19 @@ mod tests {
         assert!((rms(0.0) - 0.5).abs() < 1e-12);
         assert!(rms(20.0) < 0.5 * rms(0.0) && rms(20.0) > 0.05 * rms(0.0), "{}", rms(20.0));
         assert!(rms(500.0) < 1e-3 * rms(0.0), "{}", rms(500.0));
+    }
+
+    #[test]
+    fn a_vehicle_that_dives_feels_the_waves_of_its_depth() {
+        let spec: WaterSpec = toml::from_str(
+            "wave_height_m = 2.0\ncurrent_m_s = [0.3, 0.0, 0.0]\ndive_time_s = [100.0, 200.0]\n\
+             dive_depth_m = [0.0, 30.0]",
+        )
+        .expect("valid");
+        let diving = Sea::new(&spec, 7);
+        for (t_s, depth_m) in [(33.0, 0.0), (150.0, 15.0), (700.0, 30.0)] {
+            let apart = diving.at(t_s).velocity - sea(depth_m).at(t_s).velocity;
+            assert!(apart.norm() < 1e-12, "{t_s} s: {apart}");
+        }
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::spec::CONTROL_PERIOD_S;
 use crate::world::readings::SLOW_PERIODS;
-use crate::world::setup::{sample_joint_sensors, surroundings};
+use crate::world::setup::sample_joint_sensors;
 use crate::world::simulation::World;
 use armcal_core::streams::{Arm, ArmError, JointSensorSample, Message, Sink};
 
@@ -16,7 +16,7 @@ const UPSET_S: f64 = 10.0;
 impl World {
     /// Of the vehicle now, below the surface.
     pub(super) fn depth_m(&self) -> f64 {
-        self.spec.water.depth_m - self.base.world_from_vehicle.origin().vector().z
+        self.spec.water.station_depth_m(self.time_s()) - self.base.world_from_vehicle.origin().vector().z
     }
 
     /// Whole seconds at rest are skipped, with one reading of each slow stream and of the joints a second. The last
@@ -58,7 +58,7 @@ impl World {
             self.deliver(image.arrival.min(now), image);
         }
         self.warm(t_s, STRIDE_S);
-        let around = surroundings(&self.spec, &self.temperatures, t_s, self.depth_m());
+        let around = self.sensor_surroundings(STRIDE_S);
         let (angles, _) = self.shafts();
         self.measured = sample_joint_sensors(&mut self.joint_sensors, &angles, &around, STRIDE_S);
         self.outbox.push((now, Message::JointSensors(JointSensorSample { stamp: now, counts: self.measured })));

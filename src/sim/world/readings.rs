@@ -1,7 +1,8 @@
 //! Messages of the sensors, control period by control period.
 
+use crate::sensors::OilState;
 use crate::spec::CONTROL_PERIOD_S;
-use crate::world::setup::{sample_joint_sensors, surroundings};
+use crate::world::setup::{oil_state, sample_joint_sensors};
 use crate::world::simulation::World;
 use armcal_core::streams::{ArmError, JointSensorSample, Message, Sink, Thermometer};
 use armcal_core::time::Stamp;
@@ -18,7 +19,7 @@ impl World {
             self.deliver(image.arrival, image);
         }
         self.warm(t_s, CONTROL_PERIOD_S);
-        let around = surroundings(&self.spec, &self.temperatures, t_s, self.depth_m());
+        let around = self.sensor_surroundings(CONTROL_PERIOD_S);
         let (angles, _) = self.shafts();
         self.measured = sample_joint_sensors(&mut self.joint_sensors, &angles, &around, CONTROL_PERIOD_S);
         let sample = JointSensorSample { stamp: now, counts: self.measured };
@@ -36,6 +37,12 @@ impl World {
     /// Water and oil until `t_s`: what the drives take from the pump and do not pass on as work warms the oil.
     pub(super) fn warm(&mut self, t_s: f64, elapsed_s: f64) {
         self.temperatures.advance(t_s, elapsed_s, self.hydraulics.power_w().max(0.0), self.depth_m());
+    }
+
+    /// The joint sensors follow the oil's temperature and the pressure at the vehicle.
+    pub(super) fn sensor_surroundings(&mut self, elapsed_s: f64) -> OilState {
+        let oil = oil_state(&self.spec, &self.temperatures, self.time_s(), self.depth_m());
+        self.sensor_surroundings.follow(oil, elapsed_s)
     }
 
     /// Thermometers and depth gauge.

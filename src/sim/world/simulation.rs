@@ -13,6 +13,7 @@ use crate::fault::Timeline;
 use crate::gripper::Gripper;
 use crate::hydraulics::{Hydraulics, actuator_inputs};
 use crate::physics::{ArmPhysics, Drive};
+use crate::sensors::SensorSurroundings;
 use crate::sensors::attitude::AttitudeSensor;
 use crate::sensors::camera::{CameraInput, CameraShot, RenderInput, WristCamera};
 use crate::sensors::joint::JointSensor;
@@ -24,8 +25,8 @@ use crate::temperatures::Temperatures;
 use crate::truth::{TruthHeader, TruthSink};
 use crate::vehicle::{BaseState, FreeVehicle, Sea, VehicleMotion, WaterMotion};
 use crate::world::setup::{
-    WorldInput, arm_physics, flexible_arm, header, joint_sensors, sample_joint_sensors, scenery, stowed_angles,
-    surroundings,
+    WorldInput, arm_physics, flexible_arm, header, joint_sensors, oil_state, sample_joint_sensors, scenery,
+    stowed_angles,
 };
 use armcal_core::robot::{Robot, Vehicle};
 use armcal_core::streams::{ArmError, ImageDemand, JointAngles, JointCounts, MAX_JOINTS, Message};
@@ -54,6 +55,7 @@ pub struct World {
     pub(super) gripper: Option<Gripper>,
     pub(super) controller: Controller,
     pub(super) joint_sensors: Vec<JointSensor>,
+    pub(super) sensor_surroundings: SensorSurroundings,
     pub(super) temperatures: Temperatures,
     pub(super) slow: SlowSensors,
     pub(super) attitude: AttitudeSensor,
@@ -83,9 +85,11 @@ impl World {
         let built = AsBuilt::draw(robot, &spec, seed);
         let gear_ratios: Vec<f64> = built.joints.iter().map(|joint| joint.gear_ratio).collect();
         let step_s = CONTROL_PERIOD_S / spec.steps_per_period() as f64;
-        let temperatures = Temperatures::new(&spec.temperature, spec.water.depth_m);
+        let depth_m = spec.water.station_depth_m(0.0);
+        let temperatures = Temperatures::new(&spec.temperature, depth_m);
         let mut joint_sensors = joint_sensors(robot, &built, &spec.joint_sensors, seed);
-        let around = surroundings(&spec, &temperatures, 0.0, spec.water.depth_m);
+        let mut sensor_surroundings = SensorSurroundings::new(&spec.joint_sensors);
+        let around = sensor_surroundings.follow(oil_state(&spec, &temperatures, 0.0, depth_m), 0.0);
         let shafts = stowed_angles(robot, &mut joint_sensors, &around);
         let (scene, solids) = &scenery(&input)?;
         let motion = VehicleMotion::new(&spec.vehicle, spec.recorded.as_ref(), vehicle.vehicle_from_base, seed);
@@ -130,6 +134,7 @@ impl World {
             structure,
             hydraulics,
             joint_sensors,
+            sensor_surroundings,
             temperatures,
             measured,
         })

@@ -8,8 +8,8 @@ use crate::spec::{EngineKind, PhysicsSpec, WorldSpec};
 use crate::world::*;
 use armcal_core::robot::{Part, PlacedShape, Shape, load, load_vehicle};
 use armcal_core::routine::Scene;
-use armcal_core::streams::{Arm, JointAngles, MAX_JOINTS, Message, Sink};
-use armcal_core::time::Stamp;
+use armcal_core::streams::{Arm, JointAngles, MAX_JOINTS, Message, Sink, Thermometer};
+use armcal_core::time::{SIMULATION_EPOCH, Stamp};
 
 mod engines;
 
@@ -61,6 +61,105 @@ fn does_not_creep(engine: EngineKind) {
     eprintln!("{engine:?} crept {crept:.1e} rad in 10 minutes, swung by {swing:.1e}");
     assert!(crept < LIMIT_RAD, "{crept}");
     assert!(swing > crept && swing < 1e-3, "the oil gives: {swing}");
+}
+
+/// Keeps what comes.
+#[derive(Default)]
+struct Tape(Vec<Message>);
+
+impl Sink for Tape {
+    fn record(&mut self, _: Stamp, message: &Message) -> Result<(), armcal_core::streams::SinkError> {
+        self.0.push(message.clone());
+        Ok(())
+    }
+}
+
+fn stamp_of(message: &Message) -> Option<Stamp> {
+    match message {
+        Message::Pressure(sample) => Some(sample.stamp),
+        Message::Temperature(sample) => Some(sample.stamp),
+        Message::JointSensors(sample) => Some(sample.stamp),
+        _ => None,
+    }
+}
+
+const DIVE: &str = "
+    [water]
+    dive_time_s = [0.0, 3600.0, 7200.0]
+    dive_depth_m = [0.0, 4000.0, 0.0]
+    pressure_noise_pa = 0.0
+    [temperature]
+    profile_depth_m = [0.0, 4000.0]
+    profile_c = [25.0, 1.0]
+    oil_start_c = 25.0
+    oil_heat_capacity_j_per_k = 3.3e4
+    thermometer_noise_k = 0.0
+    [joint_sensors]
+    temperature_gain_std_per_k = 0.0
+    drift_rad_per_sqrt_h = 0.0
+    noise_rms_counts = 0.0
+    resolution_counts = 0.0
+    pressure_offset_std_rad_per_mpa = 2e-4
+    pressure_hysteresis_mpa = 2.0
+    sensor_lag_s = 600.0
+    [vehicle]
+    rotation_rms_rad = 0.0
+    translation_rms_m = 0.0";
+
+/// Down to 4000 m within an hour and back within another, at rest, in the strides of a wait: gauge, thermometers and
+/// joint sensors as the closed forms of two lags in a row and of the play have them.
+#[test]
+fn a_dive_is_felt_by_every_sensor() {
+    let spec = WorldSpec::from_table(&DIVE.parse().expect("TOML"), Path::new("r.toml")).expect("valid");
+    let mut world = world(spec, 5);
+    let (start, joints) = (world.measured, world.header.as_built.joints.clone());
+    let (oil_s, sensor_s) = (300.0_f64, 600.0_f64);
+    // What `lags` in a row make of a rise of 1 a second.
+    let oil = |t_s: f64| t_s - oil_s * (1.0 - (-t_s / oil_s).exp());
+    let both = |t_s: f64| {
+        let fading = oil_s.powi(2) * (-t_s / oil_s).exp() - sensor_s.powi(2) * (-t_s / sensor_s).exp();
+        t_s - oil_s - sensor_s + fading / (oil_s - sensor_s)
+    };
+    let there_and_back =
+        |of: &dyn Fn(f64) -> f64, t_s: f64| of(t_s) - if t_s > 3600.0 { 2.0 * of(t_s - 3600.0) } else { 0.0 };
+    let mut tape = Tape::default();
+    world.rest(7300.0, &mut tape).expect("it rests");
+    for (t_s, lag_mpa) in [(2000.0, -1.0), (3500.0, -1.0), (5400.0, 1.0), (7100.0, 1.0)] {
+        let depth_m = 4000.0 / 3600.0 * there_and_back(&|t_s| t_s, t_s);
+        let pressure_mpa = 1e-6 * 1025.0 * armcal_core::robot::GRAVITY_M_S2 * depth_m;
+        let k_per_s = -24.0 / 3600.0;
+        let mut seen = 0;
+        for message in tape.0.iter().filter(|message| stamp_of(message) == Some(SIMULATION_EPOCH.plus_s(t_s))) {
+            seen += 1;
+            match message {
+                Message::Pressure(sample) => {
+                    assert!((sample.pressure_pa - 101_325.0 - 1e6 * pressure_mpa).abs() < 1.0, "{sample:?}");
+                }
+                Message::Temperature(sample) => {
+                    let expected_c = 25.0
+                        + k_per_s
+                            * if sample.thermometer == Thermometer::Oil {
+                                there_and_back(&oil, t_s)
+                            } else {
+                                there_and_back(&|t_s| t_s, t_s)
+                            };
+                    // The water is held over each second.
+                    assert!((sample.temperature_c - expected_c).abs() < 0.01, "{sample:?} against {expected_c}");
+                }
+                Message::JointSensors(sample) => {
+                    for (j, joint) in joints.iter().enumerate() {
+                        let expected = joint.temperature_offset_rad_per_k * k_per_s * there_and_back(&both, t_s)
+                            + joint.pressure_offset_rad_per_mpa * (pressure_mpa + lag_mpa);
+                        let counts_per_rad = world.robot.sensors[j].counts_per_rad;
+                        let shift = (sample.counts[j] - start[j]) / counts_per_rad;
+                        assert!((shift - expected).abs() < 1e-5, "joint {j} at {t_s} s: {shift} against {expected}");
+                    }
+                }
+                _ => {}
+            }
+        }
+        assert_eq!(seen, 4, "{t_s} s");
+    }
 }
 
 fn floating(change: impl Fn(&mut WorldSpec)) -> World {

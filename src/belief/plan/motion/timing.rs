@@ -38,6 +38,12 @@ impl Timing {
         }
     }
 
+    /// The same for joints of which none shall go faster than `rate_rad_s`.
+    #[must_use]
+    pub fn limited_to(&self, rate_rad_s: f64) -> Self {
+        Self { rate_rad_s: self.rate_rad_s.iter().map(|rate| rate.min(rate_rad_s)).collect(), ..self.clone() }
+    }
+
     /// Of an edge at its speed, s; 0 where nothing moves.
     #[must_use]
     pub fn edge_duration_s(&self, edge: &Edge) -> f64 {

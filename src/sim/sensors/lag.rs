@@ -1,0 +1,31 @@
+//! A first-order lag, exact for inputs that change evenly between its samples.
+
+/// What follows an input with a time constant.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Lag {
+    last: Option<Sampled>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Sampled {
+    input: f64,
+    output: f64,
+}
+
+impl Lag {
+    /// The output `elapsed_s` after the last sample. What was never sampled has had time to settle.
+    pub(crate) fn follow(&mut self, input: f64, elapsed_s: f64, lag_s: f64) -> f64 {
+        let output = match self.last {
+            Some(last) if lag_s > 0.0 => {
+                let elapsed_s = elapsed_s.max(f64::MIN_POSITIVE);
+                // Behind an even change the output settles one lag late.
+                let late = lag_s * (input - last.input) / elapsed_s;
+                let unsettled = last.output - (last.input - late);
+                input - late + unsettled * (-elapsed_s / lag_s).exp()
+            }
+            _ => input,
+        };
+        self.last = Some(Sampled { input, output });
+        output
+    }
+}
