@@ -45,6 +45,8 @@ pub struct DiveStudy {
     pub views: usize,
     /// Walk and lag of the sensors over the first guess, at the end.
     pub drift_factors: Option<[f64; 2]>,
+    /// Lag of the sensors' temperature that explains the views best, s.
+    pub lag_s: f64,
 }
 
 /// The belief at the end of a reach mark.
@@ -91,7 +93,7 @@ pub fn dive_study(recording: &Recording, truth: &Truth, robot: &Robot, at_start:
         })
     });
     let (views, drift_factors) = (follower.estimator().n_views(), follower.estimator().drift_factors());
-    DiveStudy { tasks: tasks.collect(), events, views, drift_factors }
+    DiveStudy { tasks: tasks.collect(), events, views, drift_factors, lag_s: follower.estimator().temperature_lag_s() }
 }
 
 fn snapshot(follower: &Follower, from: Stamp) -> Option<Snapshot> {

@@ -13,14 +13,13 @@ const SUSPICIOUS_STEP_Z: f64 = 3.3;
 /// What a view costs an explanation under which none of its observations belongs, per observation; that of a rejected
 /// one.
 const NOTHING_FITS_NATS: f64 = 30.0;
-/// `ln` of the odds, before any view, that a named thing happened against nothing.
-const LN_PRIOR: f64 = -7.0;
 /// What leads by this is taken for true, in nats.
 const LEAD_NATS: f64 = 5.0;
 /// Explanations followed at most.
 const MAX_BRANCHES: usize = 6;
-/// Views after which the best explanation is taken.
+/// Views after which the best explanation is taken, and those that one needs.
 const MAX_VIEWS: usize = 4;
+const CONFIRMED_BY: usize = 2;
 
 /// One explanation, and the belief under it.
 #[derive(Clone)]
@@ -39,6 +38,8 @@ pub(crate) struct Race {
     /// The belief before the first suspicious view.
     before: Filter,
     n_views: usize,
+    /// Views of each tag of the robot.
+    n_views_of: Vec<usize>,
 }
 
 /// What a race ended with.
@@ -73,19 +74,25 @@ impl Race {
             if let Some(fault) = fault {
                 fault.open(&mut filter, robot);
             }
-            let nats = if fault.is_some() { LN_PRIOR } else { 0.0 };
+            let nats = fault.map_or(0.0, Fault::ln_prior);
             Branch { fault, filter, nats }
         };
         let branches = std::iter::once(None).chain(faults).map(branch).collect();
-        let mut race = Self { branches, before: before.clone(), n_views: 0 };
+        let n_views_of = vec![0; robot.tags.len()];
+        let mut race = Self { branches, before: before.clone(), n_views: 0, n_views_of };
         race.add(robot, view);
-        race.branches.truncate(MAX_BRANCHES);
+        let mut place = 0;
+        race.branches.retain(|branch| {
+            place += 1;
+            place <= MAX_BRANCHES || branch.fault.is_none()
+        });
         race
     }
 
     /// Every explanation takes the view in.
     pub(crate) fn add(&mut self, robot: &Robot, view: &View) {
         self.n_views += 1;
+        view.tags.iter().for_each(|tag| self.n_views_of[tag.tag_idx] += 1);
         for branch in &mut self.branches {
             branch.nats += match branch.filter.update(robot, &seen_by(branch.fault, view)) {
                 Some(update) => update.log_evidence,
@@ -108,9 +115,32 @@ impl Race {
         self.branches.first()
     }
 
-    /// Whether it is decided.
+    /// The belief to go on with: the best explanation's, that nothing happened where it is not confirmed.
+    pub(crate) fn belief(&self) -> Option<&Filter> {
+        let nothing = || self.branches.iter().find(|branch| branch.fault.is_none());
+        let best = self.best().filter(|best| self.is_confirmed(best.fault)).or_else(nothing).or(self.best());
+        best.map(|branch| &branch.filter)
+    }
+
+    /// `ln` of the odds of the best explanation so far.
+    pub(crate) fn nats(&self) -> f64 {
+        self.branches.first().map_or(0.0, |branch| branch.nats)
+    }
+
+    /// Whether it is decided: one view alone names nothing.
     pub(crate) fn is_over(&self) -> bool {
-        self.n_views >= MAX_VIEWS || self.lead_nats() > LEAD_NATS
+        let is_confirmed = self.best().is_some_and(|best| self.is_confirmed(best.fault));
+        self.n_views >= MAX_VIEWS || (self.lead_nats() > LEAD_NATS && is_confirmed)
+    }
+
+    /// Whether enough views could have spoken against it. A detection of another tag happens once; a tag that was moved
+    /// is there again.
+    fn is_confirmed(&self, fault: Option<Fault>) -> bool {
+        match fault {
+            None => true,
+            Some(Fault::Tag(tag)) => self.n_views_of[tag] >= CONFIRMED_BY,
+            Some(_) => self.n_views >= CONFIRMED_BY,
+        }
     }
 
     fn lead_nats(&self) -> f64 {
@@ -123,7 +153,7 @@ impl Race {
     /// What it ended with; `None` where nothing happened.
     pub(crate) fn verdict(&self) -> Option<Verdict> {
         let best = self.branches.first()?;
-        let fault = best.fault?;
+        let fault = best.fault.filter(|fault| *fault != Fault::Drift && self.is_confirmed(best.fault))?;
         Some(Verdict {
             fault,
             size: fault.size(&self.before, &best.filter),

@@ -14,14 +14,14 @@ use armcal_core::sensor::Conditions;
 use armcal_core::time::Stamp;
 
 /// Lags of the sensors' temperature behind the oil's, s. Assumed: from none to a housing full of oil.
-const LAGS_S: [f64; 4] = [0.0, 300.0, 900.0, 2700.0];
+const LAGS_S: [f64; 6] = [0.0, 150.0, 300.0, 600.0, 1200.0, 2400.0];
 /// A lag whose views are less probable by this is given up, in nats.
 const GIVEN_UP_NATS: f64 = 12.0;
 
 /// Keeps a calibration up to date, view by view. It has no clock and no thread; the same views give the same belief.
 #[derive(Clone)]
 pub struct OnlineEstimator {
-    robot: Arc<Robot>,
+    robot: Robot,
     /// The best one first.
     members: Vec<Member>,
 }
@@ -30,9 +30,9 @@ impl OnlineEstimator {
     /// For `robot` with the tags that are around it.
     #[must_use]
     pub fn new(robot: Robot, settings: OnlineSettings) -> Self {
-        let (robot, settings) = (Arc::new(robot), Arc::new(settings));
+        let settings = Arc::new(settings);
         let lags = if settings.drift == DriftModel::Tuned { &LAGS_S[..] } else { &LAGS_S[..1] };
-        let members = lags.iter().map(|lag_s| Member::new(Arc::clone(&robot), Arc::clone(&settings), *lag_s));
+        let members = lags.iter().map(|lag_s| Member::new(robot.clone(), Arc::clone(&settings), *lag_s));
         Self { members: members.collect(), robot }
     }
 

@@ -37,7 +37,7 @@ impl OnlineEvent {
         let unit = match verdict.fault {
             Fault::Slip(_) | Fault::Mount => FindingUnit::Radian,
             Fault::Tag(_) | Fault::Base => FindingUnit::Metre,
-            Fault::Scale(_) | Fault::Failed(_) => FindingUnit::One,
+            Fault::Scale(_) | Fault::Failed(_) | Fault::Drift => FindingUnit::One,
         };
         Self {
             since_nanos: since.nanos,

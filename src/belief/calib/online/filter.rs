@@ -16,6 +16,7 @@ use crate::calib::bundle::prior_terms::off_by;
 use crate::calib::bundle::priors::prior;
 use crate::calib::bundle::problem::{BundleProblem, Layout, ObservationTerm, Prior, State};
 use crate::calib::bundle::solve::{own_gain, take_step};
+use crate::calib::online::view_stream::is_moving;
 use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
 use crate::calib::views::view::View;
 use armcal_core::joints::MAX_JOINTS;
@@ -43,6 +44,8 @@ pub(crate) struct Filter {
     info: DMatrix<f64>,
     /// `ln det` of it.
     log_det: f64,
+    /// Noise of the images of a moving arm over that of one at rest.
+    pub noise_in_motion: f64,
 }
 
 /// What taking in a view did.
@@ -52,6 +55,8 @@ pub(crate) struct ViewUpdate {
     pub cost: f64,
     /// Of the observations that are used.
     pub n_coordinates: usize,
+    /// Their part of the cost.
+    pub observation_cost: f64,
     /// Logarithm of the probability of the view by the belief so far, up to what is the same for all beliefs.
     pub log_evidence: f64,
     /// Indices into the robot's tags of observations that were left out as a whole.
@@ -121,7 +126,7 @@ impl Filter {
         (state.joint_error, state.camera_error) = (vec![[0.0; MAX_JOINTS]], vec![Isometry3::identity()]);
         let log_det = log_det(&Cholesky::new(info.clone())?);
         let (model, scales, guess) = (estimate.model.clone(), problem.scales.clone(), estimate.guess);
-        Some(Self { model, scales, guess, layout, state, info, log_det })
+        Some(Self { model, scales, guess, layout, state, info, log_det, noise_in_motion: 1.0 })
     }
 
     /// Column of each joint's offset that has one.
@@ -237,11 +242,15 @@ impl Filter {
             robot,
             views,
             model: self.model.clone(),
-            scales: self.scales.clone(),
+            scales: Hyperparameters { noise: self.noise(&views[0]), ..self.scales.clone() },
             guess: self.guess,
             joint_prior: None,
             evidence: HyperparameterMode::Given,
         }
+    }
+
+    fn noise(&self, view: &View) -> f64 {
+        self.scales.noise * if is_moving(view) { self.noise_in_motion } else { 1.0 }
     }
 
     /// The belief so far as a view's prior.
@@ -321,9 +330,11 @@ fn view_update(problem: &BundleProblem<'_>, solved: &SolvedView, log_det_before:
     let left_out: f64 = problem.observations.iter().map(|observation| rejected(observation).chi2).sum();
     let volume = log_det(factor) - log_det_before;
     let used = problem.observations.iter().filter(|observation| observation.is_used);
+    let chi2 = problem.observations.iter().zip(&normal.chi2).filter(|(observation, _)| observation.is_used);
     let is_rejected = |observation: &&ObservationTerm| !observation.is_used;
     ViewUpdate {
         cost: normal.cost,
+        observation_cost: chi2.map(|(_, chi2)| chi2).sum(),
         n_coordinates: used.map(|observation| observation.data.n_coordinates()).sum(),
         log_evidence: 0.5 * (of_own - normal.cost - left_out - volume),
         rejected: problem.observations.iter().filter(is_rejected).map(|observation| observation.tag).collect(),

@@ -14,6 +14,9 @@ const TAG_STD: [f64; 2] = [0.03, 0.06];
 const MOUNT_STD: [f64; 2] = [0.02, 0.1];
 const BASE_STD: [f64; 2] = [0.1, 0.1];
 const GAIN_STD: f64 = 1.0;
+const DRIFT_STD_RAD: f64 = 2e-3;
+const LN_PRIOR_OF_DRIFT: f64 = -2.0;
+const LN_PRIOR: f64 = -7.0;
 
 /// What may have happened.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -30,6 +33,8 @@ pub enum Fault {
     Mount,
     /// All tags together moved, or the arm's base.
     Base,
+    /// All sensors drifted more than expected: nothing to tell of.
+    Drift,
 }
 
 impl Fault {
@@ -40,7 +45,17 @@ impl Fault {
         let of_tags = tags.iter().map(|&tag| Self::Tag(tag)).filter(|_| tags.len() > 1);
         let of_mount = filter.mount_column().map(|_| Self::Mount);
         let base = (tags.len() > 1).then_some(Self::Base);
-        joints.into_iter().flat_map(of_joint).chain(of_tags).chain(of_mount).chain(base).collect()
+        std::iter::once(Self::Drift)
+            .chain(joints.into_iter().flat_map(of_joint))
+            .chain(of_tags)
+            .chain(of_mount)
+            .chain(base)
+            .collect()
+    }
+
+    /// `ln` of its odds, before any view, against nothing.
+    pub(crate) fn ln_prior(self) -> f64 {
+        if self == Self::Drift { LN_PRIOR_OF_DRIFT } else { LN_PRIOR }
     }
 
     /// Widens the belief where the fault re-opens it.
@@ -54,6 +69,10 @@ impl Fault {
                 let gain = column(filter, joint, ParameterKind::Gain).map(|at| (at, GAIN_STD.powi(2)));
                 let offset = column(filter, joint, ParameterKind::Offset).map(|at| (at, SLIP_STD_RAD.powi(2)));
                 filter.widen(&gain.into_iter().chain(offset).collect::<Vec<_>>());
+            }
+            Self::Drift => {
+                let columns: Vec<_> = filter.offsets().map(|(_, at)| (at, DRIFT_STD_RAD.powi(2))).collect();
+                filter.widen(&columns);
             }
             // The views themselves are taken otherwise.
             Self::Failed(_) => {}
@@ -76,6 +95,7 @@ impl Fault {
             Self::Tag(_) => FindingKind::TagMoved,
             Self::Mount => FindingKind::CameraMount,
             Self::Base => FindingKind::Base,
+            Self::Drift => FindingKind::SensorWorn,
         }
     }
 
@@ -87,6 +107,7 @@ impl Fault {
             Self::Tag(tag) => robot.tags[tag].id.to_string(),
             Self::Mount => "camera mount".to_owned(),
             Self::Base => "base".to_owned(),
+            Self::Drift => "sensors".to_owned(),
         }
     }
 
@@ -98,7 +119,7 @@ impl Fault {
                 Some(offset(after) - offset(before))
             }
             Self::Scale(joint) => Some(after.parameters().gain[joint]),
-            Self::Failed(_) => None,
+            Self::Failed(_) | Self::Drift => None,
             Self::Tag(tag) => Some((after.tag(tag).translation.vector - before.tag(tag).translation.vector).norm()),
             Self::Mount => Some((before.mount().rotation.inverse() * after.mount().rotation).angle()),
             Self::Base => Some((after.tag(0).translation.vector - before.tag(0).translation.vector).norm()),

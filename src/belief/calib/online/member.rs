@@ -12,9 +12,11 @@ use crate::calib::online::diagnosis::{Race, is_suspicious};
 use crate::calib::online::event::OnlineEvent;
 use crate::calib::online::filter::{Filter, ViewUpdate};
 use crate::calib::online::hypothesis::Fault;
+use crate::calib::online::image_noise::{CornerNoise, MotionNoise};
 use crate::calib::online::lagged_temperature::LaggedTemperature;
-use crate::calib::online::process_noise::{JointErrorSize, ProcessNoise};
-use crate::calib::online::settings::{DriftModel, FaultSearch, OnlineSettings, online_model};
+use crate::calib::online::process_noise::{JitterSize, JointErrorSize, ProcessNoise};
+use crate::calib::online::settings::{DriftModel, FaultSearch, OnlineSettings, dive_scales, online_model};
+use crate::calib::online::view_stream::is_moving;
 use crate::calib::parameters::JointParameters;
 use crate::calib::views::view::View;
 use armcal_core::robot::Robot;
@@ -25,19 +27,24 @@ use armcal_core::time::Stamp;
 const FORGETTING: f64 = 0.98;
 /// From so many views on the batch fits the scales.
 const VIEWS_FOR_EVIDENCE: usize = 12;
+/// Views of a moving arm that make a start where no view at rest comes.
+const MOVING_FOR_START: usize = 40;
 /// Numbers of views at which the batch of the first ones is made anew.
 const START_AT: [usize; 9] = [1, 2, 3, 4, 6, 8, 12, 17, 24];
 
 /// A belief kept up view by view, for sensors that follow the thermometer with one lag.
 #[derive(Clone)]
 pub(crate) struct Member {
-    robot: Arc<Robot>,
+    robot: Robot,
     settings: Arc<OnlineSettings>,
     lag: LaggedTemperature,
+    corners: CornerNoise,
     /// `ln` of the probability of the views by this belief, older ones counting less.
     pub nats: f64,
     /// The first views, until the filter goes on alone.
     first: Vec<View>,
+    /// Views of a moving arm before the first one at rest.
+    moving: Vec<View>,
     n_views: usize,
     running: Option<Running>,
     suspect_since: Option<Stamp>,
@@ -54,18 +61,23 @@ struct Running {
     failed: Vec<usize>,
     noise: ProcessNoise,
     errors: JointErrorSize,
+    motion: MotionNoise,
+    jitter: JitterSize,
     /// Of the last view.
     conditions: Conditions,
 }
 
 impl Member {
-    pub(crate) fn new(robot: Arc<Robot>, settings: Arc<OnlineSettings>, lag_s: f64) -> Self {
+    pub(crate) fn new(robot: Robot, settings: Arc<OnlineSettings>, lag_s: f64) -> Self {
+        let corners = CornerNoise::new(robot.camera.corner_std_px);
         Self {
             robot,
             settings,
             lag: LaggedTemperature::new(lag_s),
+            corners,
             nats: 0.0,
             first: Vec::new(),
+            moving: Vec::new(),
             n_views: 0,
             running: None,
             suspect_since: None,
@@ -92,6 +104,13 @@ impl Member {
     pub(crate) fn add_view(&mut self, mut view: View) -> bool {
         self.n_views += 1;
         view.conditions = self.lagged(&view.conditions);
+        if self.settings.scales.is_none() {
+            self.corners.learn(&view);
+            self.robot.camera.corner_std_px = self.corners.std_px();
+        }
+        if is_moving(&view) && (self.running.is_none() || !self.first.is_empty()) {
+            return self.hold_back(view);
+        }
         let is_start = self.running.is_none() || !self.first.is_empty();
         if is_start {
             return self.start_with(view);
@@ -99,8 +118,24 @@ impl Member {
         self.carry_on(&view).is_some()
     }
 
+    /// Views of a moving arm are for later, unless there are no others.
+    fn hold_back(&mut self, view: View) -> bool {
+        if self.running.is_some() {
+            return false;
+        }
+        self.moving.push(view);
+        if self.moving.len() < MOVING_FOR_START {
+            return false;
+        }
+        self.first = std::mem::take(&mut self.moving);
+        self.running = self.start();
+        self.first = Vec::new();
+        self.running.is_some()
+    }
+
     /// The batch of the first views.
     fn start_with(&mut self, view: View) -> bool {
+        self.moving = Vec::new();
         self.first.push(view);
         let n = self.first.len();
         if !START_AT.contains(&n) {
@@ -121,10 +156,8 @@ impl Member {
         let reference = self.first[0].conditions;
         let (scales, evidence) = match &self.settings.scales {
             Some(scales) => (scales.clone(), HyperparameterMode::Given),
-            None if self.first.len() < VIEWS_FOR_EVIDENCE => {
-                (Hyperparameters::datasheet(&self.robot), HyperparameterMode::Given)
-            }
-            None => (Hyperparameters::datasheet(&self.robot), HyperparameterMode::Fitted),
+            None if self.first.len() < VIEWS_FOR_EVIDENCE => (dive_scales(&self.robot), HyperparameterMode::Given),
+            None => (dive_scales(&self.robot), HyperparameterMode::Fitted),
         };
         let input = BundleInput {
             robot: &self.robot,
@@ -143,8 +176,18 @@ impl Member {
         let filter = Filter::of_estimate(&estimate, &self.robot)?;
         let noise = ProcessNoise::datasheet(&self.robot, &filter.scales);
         let errors = JointErrorSize::new(&filter.scales);
+        let jitter = JitterSize::new(&filter.scales);
         let conditions = self.first.iter().max_by_key(|view| view.end)?.conditions;
-        Some(Running { filter, race: None, failed: Vec::new(), noise, errors, conditions })
+        Some(Running {
+            filter,
+            race: None,
+            failed: Vec::new(),
+            noise,
+            errors,
+            motion: MotionNoise::default(),
+            jitter,
+            conditions,
+        })
     }
 
     fn carry_on(&mut self, view: &View) -> Option<ViewUpdate> {
@@ -162,26 +205,37 @@ impl Member {
             running.conditions = view.conditions;
         }
         if let Some(race) = &mut running.race {
+            let before = race.nats();
             race.add(&self.robot, view);
+            self.nats = FORGETTING * self.nats + race.nats() - before;
             self.settle_race(view.end);
             return None;
         }
         let before = running.filter.clone();
         let update = running.filter.update(&self.robot, view);
-        self.nats = FORGETTING * self.nats + update.as_ref().map_or(0.0, |update| update.log_evidence);
         // A view of which nothing fits changes nothing.
         if self.settings.faults == FaultSearch::On && update.as_ref().is_none_or(is_suspicious) {
-            running.race = Some(Race::start(&self.robot, &before, view));
+            let race = Race::start(&self.robot, &before, view);
+            self.nats = FORGETTING * self.nats + race.nats();
+            running.race = Some(race);
             self.suspect_since = Some(view.end);
             self.settle_race(view.end);
             return update;
         }
         let update = update?;
+        self.nats = FORGETTING * self.nats + update.log_evidence;
         if self.settings.drift == DriftModel::Tuned {
             running.noise.learn(&update);
         }
         if self.settings.scales.is_none() {
-            running.errors.learn(&update, &mut running.filter.scales);
+            let scales = &mut running.filter.scales;
+            if is_moving(view) {
+                running.jitter.learn(view, &update, scales);
+                running.motion.learn(&update);
+                running.filter.noise_in_motion = running.motion.factor();
+            } else {
+                running.errors.learn(&update, scales);
+            }
         }
         Some(update)
     }
@@ -190,8 +244,8 @@ impl Member {
     fn settle_race(&mut self, now: Stamp) {
         let Some(running) = &mut self.running else { return };
         let Some(race) = &running.race else { return };
-        if let Some(best) = race.best() {
-            running.filter = best.filter.clone();
+        if let Some(belief) = race.belief() {
+            running.filter = belief.clone();
         }
         if !race.is_over() {
             return;

@@ -11,6 +11,7 @@ mod event;
 mod filter;
 mod follower;
 mod hypothesis;
+mod image_noise;
 mod lagged_temperature;
 mod member;
 mod process_noise;

@@ -8,6 +8,7 @@
 use crate::calib::bundle::calibration_prior::drift_std_rad_per_sqrt_h;
 use crate::calib::bundle::model::Hyperparameters;
 use crate::calib::online::filter::{Filter, ViewUpdate};
+use crate::calib::views::view::View;
 use armcal_core::joints::MAX_JOINTS;
 use armcal_core::robot::Robot;
 use armcal_core::sensor::ConditionChange;
@@ -17,11 +18,13 @@ const LN_STD: f64 = 1.4;
 /// A factor stays within its prior's this many sigmas.
 const LN_BOUND: f64 = 3.0 * LN_STD;
 /// The share of temperature and pressure effects that a sensor is behind by, at first. Assumed.
-const BEHIND_SHARE: f64 = 0.2;
+const BEHIND_SHARE: f64 = 0.12;
 /// Views of before count less by this factor a view: figures may change in a day.
 const FORGETTING: f64 = 0.99;
 /// Information that the first guess of a joint's error from view to view counts for.
 const ERROR_PRIOR_VIEWS: f64 = 12.0;
+/// A joint's error is never less than this share of the first guess.
+const LEAST_OF_FIRST: f64 = 0.1;
 
 /// The factor of one variance.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -127,6 +130,7 @@ impl ProcessNoise {
 /// What the sensors' model leaves from view to view, by the views so far.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct JointErrorSize {
+    first: [f64; MAX_JOINTS],
     sum_var: [f64; MAX_JOINTS],
     n: [f64; MAX_JOINTS],
 }
@@ -134,19 +138,47 @@ pub(crate) struct JointErrorSize {
 impl JointErrorSize {
     pub(crate) fn new(scales: &Hyperparameters) -> Self {
         Self {
+            first: scales.joint_std_rad,
             sum_var: scales.joint_std_rad.map(|std| ERROR_PRIOR_VIEWS * std * std),
             n: [ERROR_PRIOR_VIEWS; MAX_JOINTS],
         }
     }
 
-    /// MacKay's fixed point, one view at a time: what the data tell of an error counts, `1 - v / s^2`.
+    /// MacKay's fixed point, one view of an arm at rest at a time: what the data tell of an error counts, `1 - v / s^2`.
     pub(crate) fn learn(&mut self, update: &ViewUpdate, scales: &mut Hyperparameters) {
         for (joint, error) in update.joint_error.iter().enumerate().filter(|(_, error)| error.prior_var > 0.0) {
             let told = (1.0 - error.var / error.prior_var).clamp(0.0, 1.0);
             let reading_var = error.prior_var - scales.joint_std_rad[joint].powi(2);
-            self.sum_var[joint] += (error.error_rad.powi(2) - told * reading_var).max(0.0);
+            self.sum_var[joint] += error.error_rad.powi(2) - told * reading_var;
             self.n[joint] += told;
-            scales.joint_std_rad[joint] = (self.sum_var[joint] / self.n[joint]).sqrt();
+            let least = (LEAST_OF_FIRST * self.first[joint]).powi(2);
+            scales.joint_std_rad[joint] = (self.sum_var[joint] / self.n[joint]).max(least).sqrt();
         }
+    }
+}
+
+/// The time error of the images of a moving arm.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct JitterSize {
+    first_s: f64,
+    factor: LogFactor,
+}
+
+impl JitterSize {
+    pub(crate) fn new(scales: &Hyperparameters) -> Self {
+        Self { first_s: scales.time_jitter_std_s, factor: LogFactor::default() }
+    }
+
+    /// By the joints' errors of a view of a moving arm, of which its rates times the time error are a share.
+    pub(crate) fn learn(&mut self, view: &View, update: &ViewUpdate, scales: &mut Hyperparameters) {
+        let (mut score, mut information) = (0.0, 0.0);
+        for (rate, error) in view.rate_rad_s.iter().zip(&update.joint_error).filter(|(_, e)| e.prior_var > 0.0) {
+            let share = (rate * scales.time_jitter_std_s).powi(2) / error.prior_var;
+            let told = (1.0 - error.var / error.prior_var).clamp(0.0, 1.0);
+            score += 0.5 * share * (error.error_rad.powi(2) / error.prior_var - told);
+            information += 0.5 * (share * told).powi(2);
+        }
+        self.factor.learn(score, information);
+        scales.time_jitter_std_s = self.first_s * self.factor.value().sqrt();
     }
 }

@@ -4,6 +4,11 @@ use crate::calib::bundle::model::{Hyperparameters, Model, shape_kinds};
 use crate::calib::parameters::ParameterKind;
 use armcal_core::robot::Robot;
 
+/// How much larger an effect may be than its datasheet's figure.
+const WRONG_BY: f64 = 1.5;
+/// Of an image's stamp about the camera's clock, with what sensors of moving joints are late by. Assumed.
+const TIME_JITTER_STD_S: f64 = 0.005;
+
 /// How an online estimator works.
 #[derive(Clone, Debug)]
 pub struct OnlineSettings {
@@ -68,5 +73,17 @@ pub fn online_model(robot: &Robot) -> Model {
         tags: true,
         gripper_tag: robot.gripper_tag.is_some(),
         time_offset: true,
+    }
+}
+
+/// The datasheet's scales for a whole dive: what only a dive shows may be wrong by two, and images of a moving arm have
+/// a time of their own.
+pub(crate) fn dive_scales(robot: &Robot) -> Hyperparameters {
+    let datasheet = Hyperparameters::datasheet(robot);
+    Hyperparameters {
+        offset_std_rad_per_k: WRONG_BY * datasheet.offset_std_rad_per_k,
+        offset_std_rad_per_mpa: WRONG_BY * datasheet.offset_std_rad_per_mpa,
+        time_jitter_std_s: TIME_JITTER_STD_S,
+        ..datasheet
     }
 }

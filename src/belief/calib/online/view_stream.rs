@@ -31,7 +31,7 @@ const MARK_DELAY_S: f64 = 2.0;
 /// Readings this far about an image make a view of a moving arm, s.
 const ABOUT_IMAGE_S: f64 = 0.06;
 /// Between two views of a moving arm some joint moves this far at least, rad.
-const APART_RAD: f64 = 0.05;
+const APART_RAD: f64 = 0.15;
 /// An arm all of whose joints are slower rests, rad/s.
 const SLOWEST_RAD_S: f64 = 0.02;
 /// What is kept of the past: a rest, with what was read before it.
@@ -207,8 +207,7 @@ impl ViewStream {
         };
         let about: Vec<(Stamp, Message)> = self.window.iter().filter(belongs).cloned().collect();
         let mut view = view_of_span(&about, &self.robot, self.n_views, (start, end))?;
-        let is_slow = view.rate_rad_s.iter().all(|rate| rate.abs() < SLOWEST_RAD_S);
-        if view.tags.is_empty() || view.n_readings < 3 || is_slow || !self.is_apart(&view.travel_rad) {
+        if view.tags.is_empty() || view.n_readings < 3 || !is_moving(&view) || !self.is_apart(&view.travel_rad) {
             return None;
         }
         for (approach, rate) in view.approach.iter_mut().zip(view.rate_rad_s.iter()) {
@@ -228,4 +227,9 @@ impl ViewStream {
         };
         models.take(self.robot.camera.mount.n_joints).any(moved)
     }
+}
+
+/// Whether a joint moved while the view was taken.
+pub(crate) fn is_moving(view: &View) -> bool {
+    view.rate_rad_s.iter().any(|rate| rate.abs() > SLOWEST_RAD_S)
 }
