@@ -1,9 +1,9 @@
 //! Sessions: a routine's script carried out on any [`Arm`](armcal_core::streams::Arm), known only through its messages.
 //!
-//! `prepare` plans before the first motion, `script` carries out the steps: `reach`, `work`, `capture` (with `belief_update`),
-//! `grip`, `touch`, `scale_identification`, `end_stops`. `motion` drives the arm, `settling` detects rest, `contact`
-//! detects contacts, `following` joints that do not follow (`held_joint`, `failed_joints`), and `approval` asks an
-//! operator before a motion. `recorder` keeps every message; `outcome` is the result.
+//! `prepare` plans before the first motion, `script` carries out the steps: `reach`, `work`, `capture` (with
+//! `belief_update`), `grip`, `touch`, `scale_identification`, `end_stops`. `motion` drives the arm, `settling` detects
+//! rest, `contact` detects contacts, `following` joints that do not follow (`held_joint`, `failed_joints`), and
+//! `approval` asks an operator before a motion. `recorder` keeps every message; `outcome` is the result.
 
 mod approval;
 mod belief_update;

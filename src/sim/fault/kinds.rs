@@ -23,6 +23,38 @@ pub enum Fault {
         /// Name of the joint in the URDF.
         joint: String,
     },
+    /// The sensor's sense turns round: it reads the other side of the middle of the joint's range.
+    SensorReversed {
+        /// Name of the joint in the URDF.
+        joint: String,
+    },
+    /// A spot of the track wears: a bump on the reading about an angle.
+    SensorWorn {
+        /// Name of the joint in the URDF.
+        joint: String,
+        /// The middle of the spot, an angle of the joint.
+        at_rad: f64,
+        /// Height of the bump; not beyond its width.
+        by_rad: f64,
+        /// Its standard width.
+        width_rad: f64,
+    },
+    /// The wiper begins to lose contact, so often in a second.
+    SensorDying {
+        /// Name of the joint in the URDF.
+        joint: String,
+        /// Drop-outs, each as long as `world.joint_sensors.dropout_mean_s` has it.
+        dropout_per_s: f64,
+    },
+    /// The camera slips on its mount, by a translation and a rotation vector in its own axes.
+    CameraSlipped {
+        /// Translation along the camera's axes.
+        #[serde(default)]
+        by_m: [f64; 3],
+        /// Rotation vector along the camera's axes.
+        #[serde(default)]
+        by_rad: [f64; 3],
+    },
     /// The valve jams shut: the oil holds the joint where it is.
     JointLocked {
         /// Name of the joint in the URDF.
@@ -113,6 +145,10 @@ impl Fault {
             Self::SensorJump { .. } => "sensor_jump",
             Self::SensorStuck { .. } => "sensor_stuck",
             Self::SensorDead { .. } => "sensor_dead",
+            Self::SensorReversed { .. } => "sensor_reversed",
+            Self::SensorWorn { .. } => "sensor_worn",
+            Self::SensorDying { .. } => "sensor_dying",
+            Self::CameraSlipped { .. } => "camera_slipped",
             Self::JointLocked { .. } => "joint_locked",
             Self::PressureLost { .. } => "pressure_lost",
             Self::TagLost { .. } => "tag_lost",

@@ -1,7 +1,7 @@
 //! Check of a fault against the routine's robot: names, ids and allowed ranges.
 
 use crate::fault::kinds::Fault;
-use armcal_core::robot::{FileIssue, Robot};
+use armcal_core::robot::{FileIssue, Robot, SensorKind};
 use armcal_core::routine::Routine;
 
 /// The routine and the robot that faults are checked against.
@@ -17,8 +17,28 @@ impl RobotCheck<'_> {
                 self.check_joint(key, joint)?;
                 self.check_range(key, "by_rad", *by_rad, -3.2..=3.2)
             }
-            Fault::SensorStuck { joint } | Fault::SensorDead { joint } | Fault::JointLocked { joint } => {
-                self.check_joint(key, joint)
+            Fault::SensorStuck { joint }
+            | Fault::SensorDead { joint }
+            | Fault::SensorReversed { joint }
+            | Fault::JointLocked { joint } => self.check_joint(key, joint),
+            Fault::SensorWorn { joint, at_rad, by_rad, width_rad } => {
+                self.check_joint(key, joint)?;
+                self.check_range(key, "at_rad", *at_rad, -6.3..=6.3)?;
+                self.check_range(key, "width_rad", *width_rad, 1e-3..=1.0)?;
+                self.check_range(key, "by_rad (at most the width)", *by_rad, -width_rad..=*width_rad)
+            }
+            Fault::SensorDying { joint, dropout_per_s } => {
+                self.check_joint(key, joint)?;
+                let sensor = self.robot.sensors.iter().find(|sensor| sensor.joint == *joint);
+                if sensor.is_some_and(|sensor| sensor.kind != SensorKind::Potentiometer) {
+                    let problem = format!("`{joint}` has no potentiometer, and so no wiper that loses contact");
+                    return Err(FileIssue::new(&self.routine.file, key, problem));
+                }
+                self.check_range(key, "dropout_per_s", *dropout_per_s, 0.0..=100.0)
+            }
+            Fault::CameraSlipped { by_m, by_rad } => {
+                self.check_vector(key, "by_m", by_m, 0.5)?;
+                self.check_vector(key, "by_rad", by_rad, 3.2)
             }
             Fault::PressureLost { joint, ratio } => {
                 joint.as_ref().map_or(Ok(()), |joint| self.check_joint(key, joint))?;

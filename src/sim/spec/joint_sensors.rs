@@ -68,8 +68,8 @@ table!(
         /// Time constant with which the sensors' own temperature follows the oil's. Assumed.
         #[serde(skip_serializing_if = "is_zero")]
         sensor_lag_s: f64 = 0.0;
-        /// Width of the pressure's hysteresis: its effects on the way down and up are as if the pressure differed by it.
-        /// Assumed.
+        /// Width of the pressure's hysteresis: its effects on the way down and up are as if the pressure differed by
+        /// it. Assumed.
         #[serde(skip_serializing_if = "is_zero")]
         pressure_hysteresis_mpa: f64 = 0.0;
         /// Share of the pressure's effect that lags behind. Assumed.

@@ -2,6 +2,7 @@
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
+use crate::as_built::WornSpot;
 use crate::fault::{Fault, Impulse};
 use crate::sensors::joint::JointSensor;
 use crate::truth::TruthFault;
@@ -35,6 +36,15 @@ impl World {
             truth.fault(&record).map_err(ArmError::Sink)?;
         }
         match fault {
+            Fault::SensorReversed { joint } => self.at_sensor(&joint, JointSensor::reverse),
+            Fault::SensorWorn { joint, at_rad, by_rad, width_rad } => {
+                let spot = WornSpot { center_rad: at_rad, peak_rad: by_rad, width_rad };
+                self.at_sensor(&joint, |sensor| sensor.wear(spot));
+            }
+            Fault::SensorDying { joint, dropout_per_s } => {
+                self.at_sensor(&joint, |sensor| sensor.lose_contact(dropout_per_s));
+            }
+            Fault::CameraSlipped { by_m, by_rad } => self.camera.slip(motion(by_m, by_rad)),
             Fault::SensorJump { joint, by_rad } => self.at_sensor(&joint, |sensor| sensor.jump(by_rad)),
             Fault::SensorStuck { joint } => self.at_sensor(&joint, JointSensor::stick),
             Fault::SensorDead { joint } => self.at_sensor(&joint, JointSensor::die),
@@ -51,8 +61,7 @@ impl World {
             }
             Fault::TagLost { id } => self.camera.lose(id),
             Fault::TagMoved { id, by_m, by_rad } => {
-                let turn = UnitQuaternion::from_scaled_axis(Vector3::from(by_rad));
-                self.camera.move_tag(id, Isometry3::from_parts(Translation3::from(by_m), turn));
+                self.camera.move_tag(id, motion(by_m, by_rad));
             }
             Fault::TagMisread { id, as_id } => self.camera.misread(id, as_id),
             Fault::Silt { seconds } => self.camera.blind(stamp.plus_s(seconds)),
@@ -95,4 +104,10 @@ impl World {
             self.physics.push(body, &self.robot.bodies[body].com_m, &Vector3::from(force_n), duration_s);
         }
     }
+}
+
+/// A translation and a rotation vector in a body's own axes.
+fn motion(by_m: [f64; 3], by_rad: [f64; 3]) -> Isometry3<f64> {
+    let turn = UnitQuaternion::from_scaled_axis(Vector3::from(by_rad));
+    Isometry3::from_parts(Translation3::from(by_m), turn)
 }

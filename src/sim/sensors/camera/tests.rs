@@ -199,6 +199,25 @@ fn the_cameras_clock_gains_evenly_and_images_arrive_by_the_arms() {
 }
 
 #[test]
+fn a_camera_that_slips_on_its_mount_sees_from_there() {
+    let site = site(|_| {});
+    let mut camera = site.camera();
+    let turn = UnitQuaternion::from_scaled_axis(Vector3::new(0.01, -0.02, 0.03));
+    let motion = Isometry3::from_parts(Vector3::new(0.004, 0.0, -0.002).into(), turn);
+    let before = camera.base_from_camera(&site.links);
+    camera.slip(motion);
+    let (_, image) = site.image(&mut camera, 0.0, 1.0);
+    assert!(image.tags.len() > 3, "{image:?}");
+    for seen in &image.tags {
+        let tag = site.built.tags.iter().find(|tag| tag.id == seen.id).expect("a known tag");
+        let camera_from_tag = (before * motion).inverse() * tag.base_from_tag().isometry();
+        let expected = square_corners(tag.size_m)
+            .map(|corner| site.robot.camera.lens.project(&(camera_from_tag * corner).coords).expect("in view"));
+        assert!(largest_px(&seen.corners_px, &expected) < 1e-9, "tag {}", seen.id);
+    }
+}
+
+#[test]
 fn tags_get_lost_moved_and_misread() {
     let site = site(|_| {});
     let mut camera = site.camera();

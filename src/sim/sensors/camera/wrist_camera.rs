@@ -153,6 +153,11 @@ impl WristCamera {
         self.lost.insert(id);
     }
 
+    /// The camera is displaced on its mount; `motion` in its own axes.
+    pub(crate) fn slip(&mut self, motion: Isometry3<f64>) {
+        self.exposure.mount.link_from_frame *= motion;
+    }
+
     /// A tag is displaced; `motion` in its own axes.
     pub(crate) fn move_tag(&mut self, id: u32, motion: Isometry3<f64>) {
         for tag in self.tags.iter_mut().filter(|tag| tag.id == id) {

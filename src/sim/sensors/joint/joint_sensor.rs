@@ -1,6 +1,6 @@
 //! One joint sensor: backlash, sensing element, slip, gears and quantizer in a row.
 
-use crate::as_built::JointAsBuilt;
+use crate::as_built::{JointAsBuilt, WornSpot};
 use crate::sensors::OilState;
 use crate::sensors::joint::encoder::Encoder;
 use crate::sensors::joint::potentiometer::Potentiometer;
@@ -21,6 +21,10 @@ pub(crate) struct JointSensor {
     element: Element,
     /// Sum of the slips on the shaft, rad.
     jump_rad: f64,
+    /// Spots that wore on the way.
+    spots: Vec<WornSpot>,
+    /// -1 where it reads the other side of the middle of the joint's range.
+    sense: f64,
     word: Quantizer,
 }
 
@@ -56,6 +60,8 @@ impl JointSensor {
             shaft_rad: built.center_rad,
             element,
             jump_rad: 0.0,
+            spots: Vec::new(),
+            sense: 1.0,
             word: Quantizer::new(nominal, spec, seed),
         }
     }
@@ -75,12 +81,29 @@ impl JointSensor {
             Element::Encoder(encoder) => encoder.reading_rad(shaft_rad),
             Element::Resolver(resolver) => resolver.reading_rad(shaft_rad, around),
         };
-        read + self.jump_rad
+        self.spots.iter().fold(read + self.jump_rad, |read, spot| read + spot.bump_rad(shaft_rad))
     }
 
     /// Slip: the reading is `by_rad` larger from now on.
     pub(crate) fn jump(&mut self, by_rad: f64) {
         self.jump_rad += by_rad;
+    }
+
+    /// A spot of the track wears.
+    pub(crate) fn wear(&mut self, spot: WornSpot) {
+        self.spots.push(spot);
+    }
+
+    /// Its sense turns round.
+    pub(crate) fn reverse(&mut self) {
+        self.sense = -self.sense;
+    }
+
+    /// The wiper, where it has one, loses contact so often from now on.
+    pub(crate) fn lose_contact(&mut self, dropout_per_s: f64) {
+        if let Element::Potentiometer(pot) = &mut self.element {
+            pot.lose_contact(dropout_per_s);
+        }
     }
 
     /// Stuck: the last word stays from now on.
@@ -115,7 +138,7 @@ impl JointSensor {
             reading_rad = encoder.stepped_rad(reading_rad);
         }
         // Gears between shaft and sensor turn about the middle of the range, where both agree.
-        let travel_rad = self.gear_ratio * (reading_rad - self.center_rad);
+        let travel_rad = self.sense * self.gear_ratio * (reading_rad - self.center_rad);
         self.word.read((!is_open).then_some(self.center_rad + travel_rad))
     }
 }

@@ -65,6 +65,11 @@ impl Potentiometer {
         (contact_rad, self.is_open)
     }
 
+    /// So often from now on, anywhere on the track.
+    pub(super) fn lose_contact(&mut self, dropout_per_s: f64) {
+        self.spec.dropout_per_s = dropout_per_s;
+    }
+
     pub(super) fn reading_rad(&self, contact_rad: f64, around: &OilState) -> f64 {
         let built = &self.built;
         let warm_k = around.oil_c - self.spec.reference_c;

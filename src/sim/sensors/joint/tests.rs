@@ -117,6 +117,25 @@ fn each_static_effect_of_a_potentiometer_is_its_closed_form() {
     }
 }
 
+/// What breaks on the way: a spot wears, the sense turns round about the middle of the range, the wiper loses contact
+/// and finds it again.
+#[test]
+fn a_spot_wears_the_sense_turns_and_contact_is_lost_from_one_moment_on() {
+    let mut sensor = pot(&perfect(), &silent(), 1);
+    assert_word("new", sensor.sample(&at(-1.0)), -1.0);
+    sensor.wear(WornSpot { center_rad: -1.05, peak_rad: 0.02, width_rad: 0.05 });
+    assert_word("worn", sensor.sample(&at(-1.0)), -1.0 + 0.02 * (-0.5_f64).exp());
+    assert_word("worn elsewhere", sensor.sample(&at(0.2)), 0.2);
+    sensor.reverse();
+    assert_word("reversed", sensor.sample(&at(0.2)), -3.2);
+    sensor.reverse();
+    assert_word("reversed twice", sensor.sample(&at(0.2)), 0.2);
+    sensor.lose_contact(10.0);
+    let open = (0..2000).filter(|_| sensor.sample(&at(0.2)) == 0.0).count();
+    // A third of the time: 0.1 s between drop-outs of 0.05 s.
+    assert!((400..1000).contains(&open), "{open} of 2000");
+}
+
 /// rad, across the wrap.
 fn error_of(counts: f64, angle_rad: f64) -> f64 {
     let half = 0.5 * WRAP_COUNTS;

@@ -1,0 +1,153 @@
+//! Work on a dive: targets at times, tags passed by the way, and a world that changes meanwhile.
+
+use std::sync::OnceLock;
+
+use armcal::log::{Recording, read_recording};
+use armcal::streams::{JointCommand, MarkKind, Message, ReachAttempt};
+use armcal::time::Stamp;
+
+use crate::support::{FinishedRun, ShortRoutine, calibrate, finished, lasting_folder, read, robot_folder, temp};
+
+const EVERY_S: f64 = 120.0;
+/// Task 1 passes no tags for its time is in the gap, task 3 does.
+const STEPS: &str = "
+    [[step]]
+    do = \"capture\"
+    poses = 11
+    held_out = 3
+    [[step]]
+    do = \"calibrate\"
+    [[step]]
+    do = \"work\"
+    tasks = 4
+    every_s = 120.0
+    look_every = 2
+    look_s = 0.5
+    gaps_s = [[100.0, 130.0]]
+    rate_rad_s = 0.3
+    rest_rad = [-2.0, -0.32, 0.45, 0.85, 0.05, 0.0]
+    looks_rad = [[-1.64, -0.73, 0.55, -0.67, -0.25, 0.0], [-1.32, -0.32, -0.36, 0.33, -0.64, 0.0]]
+    [world.water]
+    dive_time_s = [0.0, 100.0, 400.0]
+    dive_depth_m = [0.0, 0.0, 1500.0]
+    [world.joint_sensors]
+    pressure_offset_std_rad_per_mpa = 1e-3
+";
+
+/// One run for all tests of this file, to be read only.
+fn worked() -> &'static FinishedRun {
+    static RUN: OnceLock<FinishedRun> = OnceLock::new();
+    RUN.get_or_init(|| {
+        let short = ShortRoutine {
+            targets_m: vec![[1.401, -1.220, 0.115], [1.375, -0.582, 0.391], [1.173, -0.947, 0.587]],
+            tail: STEPS.to_owned(),
+            ..ShortRoutine::default()
+        };
+        finished(&short, &lasting_folder())
+    })
+}
+
+fn recording() -> Recording {
+    read_recording(worked().file("run.mcap")).expect("it reads")
+}
+
+/// When each task began, and what the log says of it.
+fn tasks(recording: &Recording) -> Vec<(Stamp, String)> {
+    let line = |message: &Message| match message {
+        Message::Log(line) => Some((line.stamp, line.text.strip_prefix("work: task ")?.to_owned())),
+        _ => None,
+    };
+    recording.messages.iter().filter_map(|(_, message)| line(message)).collect()
+}
+
+/// When the arm came to rest at a target, and which.
+fn rests(recording: &Recording) -> Vec<(Stamp, u32)> {
+    let rest = |message: &Message| match message {
+        Message::Mark(mark) => match mark.kind {
+            MarkKind::Reach { attempt: ReachAttempt::After, target_idx } => Some((mark.start, target_idx)),
+            _ => None,
+        },
+        _ => None,
+    };
+    recording.messages.iter().filter_map(|(_, message)| rest(message)).collect()
+}
+
+#[test]
+fn tasks_begin_at_their_times_and_pass_tags_in_their_turns() {
+    let recording = recording();
+    let tasks = tasks(&recording);
+    let texts: Vec<&str> = tasks.iter().map(|(_, text)| text.as_str()).collect();
+    assert_eq!(texts, ["0 of 4, target 0", "1 of 4, target 1", "2 of 4, target 2", "3 of 4, target 0 by look 1"]);
+    for pair in tasks[1..].windows(2) {
+        assert!((pair[1].0.since_s(pair[0].0) - EVERY_S).abs() < 0.1, "{pair:?}");
+    }
+    assert_eq!(rests(&recording).iter().map(|(_, target)| *target).collect::<Vec<_>>(), [0, 1, 2, 0]);
+    let images_with_tags = |from: &Stamp| {
+        let sees = |message: &Message| match message {
+            Message::Detections(image) if !image.tags.is_empty() => {
+                (0.0..EVERY_S).contains(&image.stamp.since_s(*from))
+            }
+            _ => false,
+        };
+        recording.messages.iter().filter(|(_, message)| sees(message)).count()
+    };
+    let seen: Vec<usize> = tasks.iter().map(|(began, _)| images_with_tags(began)).collect();
+    // At rest there are three images; the others were taken on the way.
+    assert!(seen[..3] == [0, 0, 0] && seen[3] > 12, "{seen:?}");
+}
+
+#[test]
+fn between_tasks_the_arm_idles_and_in_them_it_is_as_slow_as_asked() {
+    let recording = recording();
+    let (tasks, rests) = (tasks(&recording), rests(&recording));
+    let (from, to) = (rests[1].0.plus_s(30.0), tasks[2].0.plus_s(-5.0));
+    let is_reading = |message: &Message| matches!(message, Message::JointSensors(_));
+    let readings = recording.messages.iter().filter(|(at, message)| is_reading(message) && *at > from && *at < to);
+    let (readings, seconds) = (readings.count() as f64, to.since_s(from));
+    assert!(seconds > 20.0 && readings < 1.1 * seconds + 2.0, "{readings} readings in {seconds} s");
+    let robot = armcal::load_robot(&robot_folder()).expect("it reads");
+    let commands: Vec<_> = recording
+        .messages
+        .iter()
+        .filter_map(|(_, message)| match message {
+            Message::JointCommand(command) if command.stamp > tasks[0].0 => Some(command),
+            _ => None,
+        })
+        .collect();
+    let rate = |pair: &[&JointCommand]| {
+        let seconds = pair[1].stamp.since_s(pair[0].stamp);
+        let joint = |j: usize| {
+            let sensor = &robot.sensors[j];
+            let half = 0.5 * sensor.wrap_counts;
+            let counts = (pair[1].counts[j] - pair[0].counts[j] + half).rem_euclid(sensor.wrap_counts) - half;
+            (counts / sensor.counts_per_rad / seconds).abs()
+        };
+        (0..robot.n_joints()).map(joint).fold(0.0, f64::max)
+    };
+    let fastest = commands.windows(2).map(rate).fold(0.0, f64::max);
+    // By the datasheet's scale, 5 % off at most.
+    assert!((0.27..0.32).contains(&fastest), "{fastest} rad/s");
+}
+
+/// 15 MPa of 1 mrad each: the sensors are wrong at depth, and the score says by how much at which time.
+#[test]
+fn each_task_is_scored_with_its_time() {
+    let score = worked().summary().score.expect("scored");
+    let rests = rests(&recording());
+    assert_eq!(score.work.len(), rests.len());
+    for (task, (at, target)) in score.work.iter().zip(&rests) {
+        assert_eq!((task.step, task.target), (3, *target as usize));
+        assert!((task.time_s - at.since_s(armcal::time::SIMULATION_EPOCH)).abs() < 0.02, "{task:?} {at:?}");
+    }
+    let errors_m: Vec<f64> = score.work.iter().map(|task| task.tool_error_m).collect();
+    let of_step = score.reaches.last().and_then(|reach| reach.side.tool_error_m).expect("reached");
+    assert_eq!((of_step.n, of_step.max), (4, errors_m.iter().copied().fold(0.0, f64::max)));
+    assert!(errors_m[0] < 0.01 && errors_m[3] > 0.01, "{errors_m:?}");
+}
+
+#[test]
+fn work_changes_nothing_of_the_calibration_before_it() {
+    let again = temp();
+    calibrate(&worked().file("run.mcap"), &robot_folder(), again.path()).expect("from the recording", 0, &["ACCEPTED"]);
+    assert!(read(&again.path().join("calibration.toml")) == read(&worked().file("calibration.toml")));
+}
