@@ -1,7 +1,7 @@
 //! `armcal study falsified`: the verdict where drawing, survey or a sensor is wrong.
 
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 use clap::Args;
@@ -9,16 +9,19 @@ use clap::Args;
 use crate::cli::exit::{Exit, UsageError};
 use crate::cli::stdout::say;
 use crate::output;
-use armcal_study::{Case, CaseKind, Tier, falsified_cases, falsified_csv, falsified_markdown, falsified_study};
+use armcal_study::{
+    Case, CaseKind, Tier, falsified_cases, falsified_csv, falsified_markdown, falsified_study, touched_cases,
+};
 
 #[derive(Debug, Args)]
 pub(super) struct FalsifiedArgs {
     /// Folder for rows.csv and report.md
     #[arg(long, value_name = "DIR", default_value = "recordings/study-falsified")]
     out: PathBuf,
-    /// Routine whose world, capture and task it is
-    #[arg(long, value_name = "FILE", default_value = "routines/titan4-quickstart.toml")]
-    routine: PathBuf,
+    /// Routine whose world, capture and task it is; routines/titan4-quickstart.toml if not given, with --touches
+    /// routines/titan4-touch.toml
+    #[arg(long, value_name = "FILE")]
+    routine: Option<PathBuf>,
     /// Captures, each of a world of its own
     #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u64).range(1..=10_000))]
     seeds: u64,
@@ -28,6 +31,9 @@ pub(super) struct FalsifiedArgs {
     /// Only this kind of falsification, as the table names it; may be given several times
     #[arg(long, value_name = "KIND")]
     kind: Vec<String>,
+    /// In place of all cases those that touches can tell of, each with the first three touches of the routine
+    #[arg(long)]
+    touches: bool,
     /// A dozen cases: seconds instead of minutes
     #[arg(long)]
     quick: bool,
@@ -37,10 +43,12 @@ pub(super) struct FalsifiedArgs {
 }
 
 pub(super) fn falsified(args: &FalsifiedArgs) -> Result<Exit> {
-    let routine = armcal_core::routine::load(&args.routine)?;
+    let of_arm = if args.touches { "routines/titan4-touch.toml" } else { "routines/titan4-quickstart.toml" };
+    let routine = armcal_core::routine::load(args.routine.as_deref().unwrap_or(Path::new(of_arm)))?;
     let (robot, vehicle) = routine.load_arm()?;
     let tier = if args.quick { Tier::Small } else { Tier::Full };
     let cases = chosen(falsified_cases(&robot, tier), &args.kind)?;
+    let cases = if args.touches { touched_cases(&cases) } else { cases };
     output::make_folder(&args.out)?;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(args.threads.unwrap_or(0).into()).build()?;
     let seeds = args.first_seed..args.first_seed.saturating_add(args.seeds);

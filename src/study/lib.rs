@@ -28,7 +28,7 @@ pub use dive::{DiveStudy, DiveTask, dive_csv, dive_study, dive_table};
 pub use edges::{Edge, EdgeRow, EdgeStudy, edge_study, edges_csv, edges_json, mean_time_under_s, random_edges};
 pub use falsified::{
     Case, CaseKind, EquivalenceClasses, FalsifiedError, FalsifiedRow, FalsifiedStudy, RunStatus, Tier, falsified_cases,
-    falsified_csv, falsified_markdown, falsified_study,
+    falsified_csv, falsified_markdown, falsified_study, touched_cases,
 };
 pub use noise_fit::{FittedNoise, fit_noise};
 pub use paths::{Belief, PathQueries, PathRow, PathSite, PathStudy, path_study, paths_csv, problem_json, queries_json};

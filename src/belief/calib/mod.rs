@@ -52,6 +52,7 @@ pub use result::{
     PriorTable, ReferenceTable, SagTable, Status, SurveyCoverage, TermsTable, ValidRange, VerdictTable,
     covariance_file,
 };
+pub(crate) use views::dropouts::replace_dropouts;
 pub use views::{
     CalibrationData, CaptureData, ConditionHistory, EndStopReading, ExternalContext, HeldOut, IdentifiedScale,
     MarkedSpans, MeanCorners, ObservationRejection, TagMeasurement, TagObservation, TaskRests, View, associate,

@@ -2,7 +2,7 @@
 //!
 //! Conditions and readings are averaged over each mark; the sensors are those believed at its start.
 
-use crate::calib::ConditionHistory;
+use crate::calib::{ConditionHistory, replace_dropouts};
 use armcal_core::kinematics::LinkCorrections;
 use armcal_core::log::Recording;
 use armcal_core::robot::Robot;
@@ -80,9 +80,12 @@ pub fn reaches(recording: &Recording, robot: &Robot, beliefs: &[Belief<'_>]) -> 
             let span = readings.get(from..to).filter(|span| !span.is_empty())?;
             let conditions = surroundings.over(mark.start, mark.end);
             // Angles, not raw words, are averaged: the words wrap.
+            let mut readings: Vec<JointAngles> =
+                span.iter().map(|sample| sensors.angles_under(&sample.counts, &conditions)).collect();
+            replace_dropouts(&mut readings);
             let mut believed = JointAngles::zeros(robot.n_joints());
-            for sample in span {
-                for (sum, angle) in believed.iter_mut().zip(sensors.angles_under(&sample.counts, &conditions).iter()) {
+            for angles in &readings {
+                for (sum, angle) in believed.iter_mut().zip(angles.iter()) {
                     *sum += angle / span.len() as f64;
                 }
             }
@@ -107,6 +110,40 @@ mod tests {
     use crate::calib::JointParameters;
     use armcal_core::streams::{JointSensorSample, Mark, ReachTask, TemperatureSample, Thermometer};
     use armcal_core::time::SIMULATION_EPOCH;
+
+    /// Ten of 61 readings are the word of a wiper that has lost its track.
+    #[test]
+    fn dropouts_at_a_rest_do_not_move_the_tool_that_is_believed() {
+        let folder = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("robots/titan4");
+        let robot = armcal_core::robot::load(&folder).expect("the robot reads");
+        let sensors = ArmSensors::nominal(&robot);
+        let sound = sensors.counts(&robot.stowed);
+        let mut lost = sound;
+        lost[0] = sensors.counts(&JointAngles::from_fn(robot.n_joints(), |j| robot.stowed[j] + 1.0))[0];
+        let at = |seconds: f64| SIMULATION_EPOCH.plus_s(seconds);
+        let targets_m = vec![[1.0, 0.0, 0.0]];
+        let task = Message::Task(ReachTask { stamp: at(0.0), targets_m, tolerance_m: 0.01 });
+        let reading = |k: usize| {
+            let counts = if k % 6 == 5 { lost } else { sound };
+            Message::JointSensors(JointSensorSample { stamp: at(10.0 + 0.01 * k as f64), counts })
+        };
+        let kind = MarkKind::Reach { attempt: ReachAttempt::After, target_idx: 0 };
+        let mark = Message::Mark(Mark { start: at(10.0), end: at(10.6), kind });
+        let messages = [task].into_iter().chain((0..=60).map(reading)).chain([mark]);
+        let recording = Recording {
+            path: "synthetic.mcap".into(),
+            messages: messages.map(|message| (SIMULATION_EPOCH, message)).collect(),
+            joint_names: robot.joint_names(),
+            ..Default::default()
+        };
+        let belief = Belief { from: at(0.0), sensors: &sensors, links: LinkCorrections::default() };
+        let rests = reaches(&recording, &robot, &[belief]);
+        let off = rests[0].believed.iter().zip(robot.stowed.iter()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(off < 1e-9, "{off} rad");
+        let data = crate::calib::associate(&recording, &robot);
+        let rest = data.rests.get(&0).expect("a rest");
+        assert!((rest[0] - robot.stowed[0]).abs() < 1e-9, "{rest:?}");
+    }
 
     /// Two rests with the same readings; in between the oil has warmed by 10 K.
     #[test]

@@ -106,9 +106,15 @@ impl Capture {
         if at > self.middle { CaptureHalf::Second } else { CaptureHalf::First }
     }
 
-    /// The recording with the wrong readings of `fault`, if any, and with the views of `case`.
+    /// Touches that the recording has.
+    pub(super) fn n_touches(&self) -> usize {
+        self.recording.messages.iter().filter(|(_, message)| matches!(message, Message::Touch(_))).count()
+    }
+
+    /// The recording with the wrong readings of `fault`, if any, and with the views and touches of `case`.
     pub(super) fn falsified(&self, case: &Case, fault: Option<&SensorFault>) -> Recording {
         let mut recording = self.recording.clone();
+        keep_touches(&mut recording, case.n_touches);
         if let Some(fault) = fault {
             self.falsify_readings(fault, &mut recording);
         }
@@ -176,6 +182,15 @@ fn is_capture(message: &Message) -> Option<&Mark> {
         Message::Mark(mark) if matches!(mark.kind, MarkKind::Capture { .. }) => Some(mark),
         _ => None,
     }
+}
+
+/// Keeps the first `n` touches: the arm takes each so that it tells most beside those before.
+fn keep_touches(recording: &mut Recording, n: usize) {
+    let mut n_before = 0;
+    recording.messages.retain(|(_, message)| {
+        n_before += usize::from(matches!(message, Message::Touch(_)));
+        !matches!(message, Message::Touch(_)) || n_before <= n
+    });
 }
 
 /// Takes away the marks of all captures but `n`.

@@ -11,6 +11,8 @@ pub struct Case {
     pub element: Element,
     /// In rad, m, px, a ratio or a number of views, by [`CaseKind::unit`].
     pub size: f64,
+    /// Touches of surveyed planes that the calibration has: the first ones of the recording.
+    pub n_touches: usize,
 }
 
 /// What is falsified.
@@ -76,6 +78,8 @@ pub enum Tier {
 
 const DEG: f64 = PI / 180.0;
 const MM: f64 = 1e-3;
+/// The least that a calibration uses.
+pub(super) const N_TOUCHES: usize = 3;
 pub(super) const AXES: [&str; 3] = ["x", "y", "z"];
 
 impl CaseKind {
@@ -161,9 +165,19 @@ impl CaseKind {
     }
 }
 
+pub(super) fn kind_name(kind: CaseKind, n_touches: usize) -> String {
+    if n_touches == 0 { kind.name().to_owned() } else { format!("{}, {n_touches} touches", kind.name()) }
+}
+
 impl Case {
     fn new(kind: CaseKind, element: Element, size: f64) -> Self {
-        Self { kind, element, size }
+        Self { kind, element, size, n_touches: 0 }
+    }
+
+    /// What is falsified in words, with the touches.
+    #[must_use]
+    pub fn kind_name(&self) -> String {
+        kind_name(self.kind, self.n_touches)
     }
 
     /// Indices into the survey of `n_tags` tags that a case on tags is about.
@@ -198,6 +212,28 @@ pub fn falsified_cases(robot: &Robot, tier: Tier) -> Vec<Case> {
         Tier::Small => small(),
         Tier::Full => full(robot),
     }
+}
+
+/// Those of `cases` that touches can tell of, with three of them: what moves the tool against the base at the readings.
+#[must_use]
+pub fn touched_cases(cases: &[Case]) -> Vec<Case> {
+    use CaseKind as K;
+    let is_told = |case: &&Case| {
+        matches!(
+            case.kind,
+            K::GoodArm
+                | K::MountTurned
+                | K::MountShifted
+                | K::LinkShifted
+                | K::LinkTurned
+                | K::ToolShifted
+                | K::GripperAxisTurned
+                | K::BaseShifted
+                | K::BaseTurned
+                | K::SurveyTurned
+        )
+    };
+    cases.iter().filter(is_told).map(|case| Case { n_touches: N_TOUCHES, ..*case }).collect()
 }
 
 fn tags(first: usize, n: usize) -> Element {

@@ -10,6 +10,8 @@ pub enum FalsifiedError {
     Scene(String),
     #[error("{what}: {problem}")]
     File { what: &'static str, problem: String },
+    #[error("seed {seed}: {n} touches were recorded, the cases have {n_touches}")]
+    Touches { seed: u64, n: usize, n_touches: usize },
     #[error(transparent)]
     World(#[from] SimError),
     #[error(transparent)]

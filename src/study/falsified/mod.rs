@@ -17,7 +17,7 @@ mod run;
 #[cfg(test)]
 mod tests;
 
-pub use cases::{Case, CaseKind, Tier, falsified_cases};
+pub use cases::{Case, CaseKind, Tier, falsified_cases, touched_cases};
 pub use classes::EquivalenceClasses;
 pub use error::FalsifiedError;
 pub use report::{falsified_csv, falsified_markdown};

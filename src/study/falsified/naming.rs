@@ -6,14 +6,30 @@
 use serde_json::Value;
 
 use crate::falsified::cases::{Case, CaseKind, Element};
-use armcal_belief::calib::{Calibration, Finding, Refusal};
+use armcal_belief::calib::{Calibration, Finding, FindingKind, Refusal};
 use armcal_core::robot::Robot;
 
 /// Causes that a result names first: those of its first finding, or else of its first refusal. None for a result
 /// without any.
 pub(super) fn first_causes(robot: &Robot, calibration: &Calibration) -> Vec<String> {
-    let finding = calibration.findings.first().map(|finding| causes_of_finding(robot, finding));
+    let of_touches = calibration.refusals.iter().find_map(causes_of_touches);
+    let finding = calibration.findings.first().map(|finding| match (finding.kind, &of_touches) {
+        (FindingKind::Tool, Some(causes)) => causes.clone(),
+        _ => causes_of_finding(robot, finding),
+    });
     finding.or_else(|| calibration.refusals.first().map(|refusal| cause_of_refusal(robot, refusal))).unwrap_or_default()
+}
+
+/// The class that touches name; `None` where they refuse nothing.
+fn causes_of_touches(refusal: &Refusal) -> Option<Vec<String>> {
+    let Refusal::Touch { causes, .. } = refusal else { return None };
+    let word = |cause: &String| match cause.split(' ').next() {
+        Some("tool") => "tool".to_owned(),
+        Some("the") if cause.contains("camera") => "camera_mount".to_owned(),
+        Some("a") if cause.contains("tag survey") => "base".to_owned(),
+        _ => cause.replace(' ', "_"),
+    };
+    Some(causes.iter().map(word).collect())
 }
 
 /// A group of tags or joints has one cause for each.
@@ -79,7 +95,13 @@ pub(super) fn right_causes(robot: &Robot, case: &Case, seed: u64) -> Vec<String>
         CaseKind::AllTagSizes => one("tag_size:all"),
         CaseKind::IdsSwapped => tags("tag_swapped"),
         CaseKind::FocalLength | CaseKind::ImageCentre => one("lens"),
-        CaseKind::LinkShifted | CaseKind::LinkTurned => of_joint("link"),
+        // The links beyond the camera and the tool point are one cause.
+        CaseKind::LinkShifted | CaseKind::LinkTurned => match case.element {
+            Element::JointAxis { joint, .. } if joint >= robot.camera.mount.n_joints => {
+                vec![format!("link:{}", robot.chain.joints()[joint].name), "tool".to_owned()]
+            }
+            _ => of_joint("link"),
+        },
         CaseKind::GripperAxisTurned => vec![format!("link:{joint}"), "tool".to_owned()],
         CaseKind::ToolShifted => one("tool"),
         CaseKind::BaseShifted | CaseKind::BaseTurned | CaseKind::SurveyTurned => one("base"),

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use crate::falsified::cases::CaseKind;
+use crate::falsified::cases::{CaseKind, kind_name};
 use crate::falsified::run::{FalsifiedRow, FalsifiedStudy, RunStatus};
 use armcal_core::stats::{Summary, quantile};
 
@@ -33,7 +33,7 @@ pub fn falsified_csv(rows: &[FalsifiedRow]) -> String {
         let true_per_unit = oracle.filter(|_| row.case.size != 0.0).map(|o| per_unit(o.tool_m / row.case.size.abs()));
         let columns = [
             row.seed.to_string(),
-            row.case.kind.name().to_owned(),
+            row.case.kind_name().replace(", ", " with "),
             row.element.clone(),
             format!("{:.3}", row.case.size * factor),
             unit.to_owned(),
@@ -68,6 +68,19 @@ fn share<'a>(rows: impl Iterator<Item = &'a FalsifiedRow>, holds: impl Fn(&Falsi
     if n == 0 { String::new() } else { format!("{n_held}/{n}") }
 }
 
+/// Rows of each kind, without touches and with them, then all.
+fn by_kind(rows: &[FalsifiedRow]) -> Vec<(String, Vec<&FalsifiedRow>)> {
+    let mut n_touches: Vec<usize> = rows.iter().map(|row| row.case.n_touches).collect();
+    n_touches.sort_unstable();
+    n_touches.dedup();
+    let each = n_touches.iter().flat_map(|n| CaseKind::ALL.map(|kind| (kind, *n)));
+    let of = |(kind, n)| rows.iter().filter(|row| (row.case.kind, row.case.n_touches) == (kind, n)).collect();
+    let mut kinds: Vec<_> = each.map(|(kind, n)| (kind_name(kind, n), of((kind, n)))).collect();
+    kinds.push(("all".to_owned(), rows.iter().collect()));
+    kinds.retain(|(_, of): &(String, Vec<&FalsifiedRow>)| !of.is_empty());
+    kinds
+}
+
 /// A line for each kind of falsification.
 #[must_use]
 pub fn falsified_markdown(study: &FalsifiedStudy) -> String {
@@ -85,21 +98,16 @@ pub fn falsified_markdown(study: &FalsifiedStudy) -> String {
          |---|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n",
         1e3 * good_p95_m
     );
-    let mut kinds: Vec<Option<CaseKind>> = CaseKind::ALL.into_iter().map(Some).collect();
-    kinds.push(None);
-    for kind in kinds {
-        let of: Vec<&FalsifiedRow> = rows.iter().filter(|row| kind.is_none_or(|kind| row.case.kind == kind)).collect();
-        if of.is_empty() {
-            continue;
-        }
+    for (name, of) in by_kind(rows) {
         let count = |holds: &dyn Fn(&FalsifiedRow) -> bool| of.iter().filter(|row| holds(row)).count();
         let each = || of.iter().copied();
         let seen = || each().filter(|row| row.is_seen());
-        let unseen = each().filter(|row| row.oracle.is_some() && !row.is_seen() && row.matters(1.0, good_p95_m));
+        let is_unseen = |row: &&FalsifiedRow| row.oracle.is_some() && !row.is_seen() && row.case.n_touches == 0;
+        let unseen = each().filter(is_unseen).filter(|row| row.matters(1.0, good_p95_m));
         let _ = writeln!(
             out,
             "| {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} |",
-            kind.map_or("all", CaseKind::name),
+            name,
             of.len(),
             count(&|row| row.status == RunStatus::Accepted),
             count(&|row| row.status != RunStatus::Accepted),
@@ -108,7 +116,7 @@ pub fn falsified_markdown(study: &FalsifiedStudy) -> String {
             seen().count(),
             share(seen().filter(|row| row.matters(3.0, good_p95_m)), FalsifiedRow::is_refused_or_repaired),
             seen().filter(|row| row.is_let_through(3.0 * good_p95_m)).count(),
-            share(seen().filter(|row| row.is_named.is_some()), |row| row.is_named == Some(true)),
+            share(each().filter(|row| row.is_to_be_named()), |row| row.is_named == Some(true)),
             share(unseen, FalsifiedRow::is_reserved_rightly),
         );
     }

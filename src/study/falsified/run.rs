@@ -84,6 +84,13 @@ impl FalsifiedRow {
         !self.is_refused_or_repaired() && self.true_m.is_none_or(|error| error.p95 > limit_m)
     }
 
+    /// Whether there is something to name: what the views see, or what touches refuse.
+    #[must_use]
+    pub fn is_to_be_named(&self) -> bool {
+        let is_told = self.case.n_touches > 0 && self.status != RunStatus::Accepted;
+        self.is_named.is_some() && (self.is_seen() || is_told)
+    }
+
     #[must_use]
     pub fn is_seen(&self) -> bool {
         self.oracle.is_some_and(|oracle| oracle.is_seen())
@@ -116,7 +123,15 @@ pub fn falsified_study(
     seeds: std::ops::Range<u64>,
 ) -> Result<FalsifiedStudy, FalsifiedError> {
     let scene = Scene { routine, robot, vehicle };
-    let first = Capture::simulate(&scene, seeds.start)?;
+    let n_touches = cases.iter().map(|case| case.n_touches).max().unwrap_or_default();
+    let simulate = |seed: u64| -> Result<Capture, FalsifiedError> {
+        let capture = Capture::simulate(&scene, seed)?;
+        match capture.n_touches() {
+            n if n < n_touches => Err(FalsifiedError::Touches { seed, n, n_touches }),
+            _ => Ok(capture),
+        }
+    };
+    let first = simulate(seeds.start)?;
     let first_oracle = Oracle::new(&first)?;
     let classes = equivalence_classes(&first_oracle);
     let rows_of = |capture: &Capture, oracle: &Oracle<'_>| -> Vec<FalsifiedRow> {
@@ -124,7 +139,7 @@ pub fn falsified_study(
     };
     let mut rows = rows_of(&first, &first_oracle);
     let of_seed = |seed: u64| -> Result<Vec<FalsifiedRow>, FalsifiedError> {
-        let capture = Capture::simulate(&scene, seed)?;
+        let capture = simulate(seed)?;
         Ok(rows_of(&capture, &Oracle::new(&capture)?))
     };
     let others = seeds.start + 1..seeds.end;

@@ -6,7 +6,7 @@ use std::sync::OnceLock;
 use nalgebra::Vector3;
 
 use crate::falsified::capture::{Capture, Scene};
-use crate::falsified::cases::{Case, CaseKind, Element, Tier, falsified_cases};
+use crate::falsified::cases::{Case, CaseKind, Element, Tier, falsified_cases, touched_cases};
 use crate::falsified::naming::{causes_of_finding, right_causes};
 use crate::falsified::oracle::Oracle;
 use crate::falsified::perturbation::{Perturbation, SensorFault, WrongReading};
@@ -17,7 +17,11 @@ use armcal_core::robot::{Robot, Vehicle};
 use armcal_core::routine::Routine;
 
 fn scene() -> (Routine, Robot, Vehicle) {
-    let file = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("routines/titan4-quickstart.toml");
+    scene_of("titan4-quickstart")
+}
+
+fn scene_of(routine: &str) -> (Routine, Robot, Vehicle) {
+    let file = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join(format!("routines/{routine}.toml"));
     let routine = armcal_core::routine::load(&file).expect("the routine reads");
     let (robot, vehicle) = routine.load_arm().expect("the robot reads");
     (routine, robot, vehicle)
@@ -90,6 +94,27 @@ fn what_no_view_shows_is_known_to_the_oracle() {
         // It does not hold yet that anything is said of it: the table counts it as wrongly accepted.
         assert!(row.status != RunStatus::Accepted || (true_p95_m(row) - 0.02).abs() < 0.004, "{row:?}");
     }
+}
+
+/// Three touches: what no view shows is refused by name, and a good arm is left alone.
+#[test]
+fn three_touches_refuse_a_tool_point_that_no_view_shows() {
+    let (routine, robot, vehicle) = scene_of("titan4-touch");
+    let wanted = [CaseKind::GoodArm, CaseKind::ToolShifted];
+    let cases = touched_cases(&falsified_cases(&robot, Tier::Small));
+    let cases: Vec<Case> = cases.into_iter().filter(|case| wanted.contains(&case.kind)).collect();
+    let study = falsified_study(&routine, (&robot, &vehicle), &cases, 1..2).expect("a study");
+    let [good, shifted] = &study.rows[..] else { panic!("{} rows", study.rows.len()) };
+    assert!(good.status == RunStatus::Accepted && !good.is_wrongly_accepted(), "{good:?}");
+    assert!(shifted.status == RunStatus::Refused && shifted.is_named == Some(true), "{shifted:?}");
+    assert!(shifted.named_first.contains(&"tool".to_owned()), "{shifted:?}");
+    let table = falsified_markdown(&study);
+    assert!(table.contains("| tool point shifted, 3 touches | 1 | 0 | 1 | 0 | 0 |"), "{table}");
+    assert!(falsified_csv(&study.rows).contains("1,tool point shifted with 3 touches,x,20.000,mm,refused"));
+    // The quickstart touches nothing.
+    let (routine, robot, vehicle) = scene();
+    let none = falsified_study(&routine, (&robot, &vehicle), &cases, 1..2).err().expect("no study");
+    assert!(none.to_string().contains("0 touches"), "{none}");
 }
 
 #[test]

@@ -213,7 +213,7 @@ impl<'a> BundleCalibration<'a> {
             self.drawing = better;
             return true;
         }
-        self.moved.revise(estimate, &mut self.data.robot)
+        self.moved.revise(estimate, setup.input().views, &mut self.data.robot)
     }
 
     fn nothing_observable(&self) -> CalibError {

@@ -94,7 +94,8 @@ impl Drawing {
             self.apply_new_faults(drawing, &mut robot);
             let mut other = BundleInput { robot: &robot, ..input.clone() };
             drawing.apply(&mut other);
-            estimate(&other).map_or(f64::NEG_INFINITY, |found| log_evidence_of_all(&found) - before)
+            let cost: f64 = drawing.tags[self.tags.len()..].iter().map(TagFault::cost_nats).sum();
+            estimate(&other).map_or(f64::NEG_INFINITY, |found| log_evidence_of_all(&found) - before - cost)
         };
         let mut gains: Vec<(f64, Self)> =
             self.alternatives(input, found).into_iter().map(|drawing| (gain(&drawing), drawing)).collect();
@@ -116,11 +117,15 @@ impl Drawing {
         if is_scaled { None } else { common_size_ratio(input.views, input.robot) }
     }
 
-    /// Tags that were moved together, if several are doubtful and none was found so far.
-    fn moved_group(&self, input: &BundleInput<'_>, found: &Estimate<'_>) -> Option<Self> {
-        let is_known = self.tags.iter().any(|fault| matches!(fault, TagFault::Moved { .. }));
-        let group = if is_known || found.doubtful_tags().len() < 2 { Vec::new() } else { moved_group(input) };
-        (!group.is_empty()).then(|| self.with_faults(group))
+    /// Tags that were moved together, if none were found so far: each by as much as it likes, if several are doubtful,
+    /// or all by one motion.
+    fn moved_groups(&self, input: &BundleInput<'_>, found: &Estimate<'_>) -> Vec<Self> {
+        if self.tags.iter().any(|fault| fault.moved_tag().is_some()) {
+            return Vec::new();
+        }
+        let group = if found.doubtful_tags().len() < 2 { Vec::new() } else { moved_group(input) };
+        let groups = [group, found.moved_alike(MIN_GAIN_NATS)].into_iter().filter(|group| !group.is_empty());
+        groups.map(|group| self.with_faults(group)).collect()
     }
 
     /// What else may explain the views, none where nothing is suspicious.
@@ -142,7 +147,7 @@ impl Drawing {
         }
         let new = faults.into_iter().filter(|fault| !self.tags.iter().any(|known| known.meets(fault)));
         all.extend(new.map(|fault| self.with_faults([fault])));
-        all.extend(self.moved_group(input, found));
+        all.extend(self.moved_groups(input, found));
         all
     }
 

@@ -164,7 +164,7 @@ impl Estimate<'_> {
                 let words = format!("all tags are {percent:+.1} % of the survey's size: taken so; measure one again");
                 (FindingKind::TagSize, "all".to_owned(), Some(ratio - 1.0), words)
             }
-            TagFault::Moved { .. } => return None,
+            TagFault::Moved { .. } | TagFault::Alike { .. } => return None,
         };
         let unit = size.map(|_| FindingUnit::One);
         Some((Finding { kind, name, size, unit, tool_error_m: None, time_s: None, repaired: true }, words))

@@ -259,6 +259,7 @@ impl TouchUpdate {
     pub(crate) fn refusal(&self, robot: &Robot) -> Refusal {
         let worst = self.innovations.iamax();
         let mut causes = vec![self.tool_point(robot), self.mount_turn()];
+        causes.extend(self.survey_turn(robot));
         causes.extend((0..self.names.len()).map(|k| self.surface(k)));
         let best = causes.iter().map(|cause| cause.chi2_left).fold(f64::INFINITY, f64::min);
         let alike = best + ALIKE_CHI2.max(ALIKE_SHARE * self.chi2);
@@ -292,6 +293,17 @@ impl TouchUpdate {
         let columns: Vec<DVector<f64>> =
             (0..3).map(|axis| self.along(|tool| tool.shift(&self.score, first, &Vector3::ith(axis, 1.0)))).collect();
         self.cause("the camera's turn about the last joint before it".to_owned(), &columns)
+    }
+
+    /// All tags together against the base, about the axes of which no view tells.
+    fn survey_turn(&self, robot: &Robot) -> Option<Cause> {
+        let (first, _) = columns(GeometryElement::Joint(0), ErrorKind::Turn);
+        let std = robot.geometry.link_rotation_std_rad;
+        let unseen = (0..3).filter(|axis| self.score.information[(first + axis, first + axis)] * std * std < 1.0);
+        let columns: Vec<DVector<f64>> = unseen
+            .map(|axis| self.along(|tool| -tool.followed(&self.score, first, &Vector3::ith(axis, 1.0))))
+            .collect();
+        (!columns.is_empty()).then(|| self.cause("a turn of the tag survey against the base".to_owned(), &columns))
     }
 
     fn surface(&self, k: usize) -> Cause {

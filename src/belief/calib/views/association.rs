@@ -10,6 +10,7 @@ use std::collections::BTreeMap;
 use nalgebra::Vector3;
 
 use crate::calib::views::conditions::{ConditionHistory, TravelRate};
+use crate::calib::views::dropouts::replace_dropouts;
 use crate::calib::views::frame_consensus::agreeing_mean;
 use crate::calib::views::message_index::MessageIndex;
 use crate::calib::views::view::{
@@ -181,7 +182,8 @@ impl Association<'_> {
             Message::JointSensors(sample) => Some((idx, self.sensors.angles(&sample.counts))),
             _ => None,
         });
-        let (read, angles): (Vec<usize>, Vec<JointAngles>) = readings.unzip();
+        let (read, mut angles): (Vec<usize>, Vec<JointAngles>) = readings.unzip();
+        replace_dropouts(&mut angles);
         if angles.is_empty() {
             return;
         }
@@ -218,20 +220,14 @@ impl Association<'_> {
     /// The view of a mark's span; `None` where no joint was read in it.
     fn view(&mut self, mark: &Mark, pose_idx: u32) -> Option<View> {
         let n_joints = self.robot.n_joints();
-        let mut travel_sum = JointAngles::zeros(n_joints);
-        let mut n_readings = 0usize;
-        let mut rate = TravelRate::over(mark);
+        let (mut stamps, mut readings) = (Vec::new(), Vec::new());
         let mut frames: BTreeMap<u32, Vec<[[f64; 2]; 4]>> = BTreeMap::new();
         let (index, data) = (&self.index, &mut self.data);
         for &(_, idx) in index.span(mark) {
             match &index.messages[idx].1 {
                 Message::JointSensors(sample) => {
-                    let travel_rad = self.sensors.travel_rad(&sample.counts);
-                    for (sum, travel_rad) in travel_sum.iter_mut().zip(travel_rad.iter()) {
-                        *sum += travel_rad;
-                    }
-                    rate.add(sample.stamp, &travel_rad, &self.sensors);
-                    n_readings += 1;
+                    stamps.push(sample.stamp);
+                    readings.push(self.sensors.travel_rad(&sample.counts));
                 }
                 Message::Detections(detections) => add_corners(detections, &mut frames),
                 Message::Rejects(rejects) => {
@@ -251,11 +247,16 @@ impl Association<'_> {
             }
             data.used.push(idx);
         }
+        let n_readings = readings.len();
         if n_readings == 0 {
             data.reject(ObservationRejection::NoReadings, frames.len().max(1));
             return None;
         }
-        let travel_rad = JointAngles::from_fn(n_joints, |j| travel_sum[j] / n_readings as f64);
+        replace_dropouts(&mut readings);
+        let mean = |j: usize| readings.iter().map(|travel_rad| travel_rad[j]).sum::<f64>() / n_readings as f64;
+        let travel_rad = JointAngles::from_fn(n_joints, mean);
+        let mut rate = TravelRate::over(mark);
+        stamps.iter().zip(&readings).for_each(|(stamp, travel_rad)| rate.add(*stamp, travel_rad, &self.sensors));
         let rate_rad_s = rate.rad_s(n_joints);
         let mut view = View { n_readings, rate_rad_s, ..View::of_reading(pose_idx, mark.end, travel_rad) };
         for (id, frames) in frames {

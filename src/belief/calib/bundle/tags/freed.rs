@@ -1,12 +1,15 @@
 //! Tags that were found moved: freed of their survey, estimated with the rest, and reported.
 
+use nalgebra::{Isometry3, Translation3};
+
 use crate::calib::bundle::drawing::Drawing;
 use crate::calib::bundle::estimate::Estimate;
 use crate::calib::bundle::tags::identity::TagFault;
 use crate::calib::finding::{Finding, FindingKind, FindingUnit};
 use crate::calib::result::calibration::Calibration;
+use crate::calib::views::view::View;
 use armcal_core::robot::{Robot, SurveyedTag};
-use armcal_core::spatial::log;
+use armcal_core::spatial::{Pose, log};
 use armcal_core::stats::quantile;
 
 /// Which tags were freed, and the survey as it was.
@@ -39,25 +42,25 @@ impl MovedTags {
     /// Takes over what `drawing` says of tags, so that a freed tag's distance is from there.
     pub(crate) fn resurveyed(&mut self, robot: &mut Robot, drawing: &Drawing) {
         for fault in &drawing.tags {
-            match *fault {
-                TagFault::Swapped(pair) => {
-                    pair.iter().for_each(|&tag| self.surveyed[tag].base_from_tag = robot.tags[tag].base_from_tag);
-                }
-                TagFault::Moved { tag_idx, .. } if !self.group.contains(&tag_idx) => self.group.push(tag_idx),
-                TagFault::Size { .. } | TagFault::AllSizes { .. } | TagFault::Moved { .. } => {}
+            if let TagFault::Swapped(pair) = fault {
+                pair.iter().for_each(|&tag| self.surveyed[tag].base_from_tag = robot.tags[tag].base_from_tag);
             }
+            self.group.extend(fault.moved_tag().filter(|tag| !self.group.contains(tag)));
         }
         free(robot, &self.group);
     }
 
     /// Frees the next tag of `robot` that `estimate` has elsewhere, or takes all of them back; whether it did either.
-    pub(crate) fn revise(&mut self, estimate: &Estimate<'_>, robot: &mut Robot) -> bool {
+    pub(crate) fn revise(&mut self, estimate: &Estimate<'_>, views: &[View], robot: &mut Robot) -> bool {
         if self.has_given_up {
             return false;
         }
-        let Some(moved) = estimate.moved_tag() else { return false };
         let trusted = robot.tags.iter().filter(|tag| tag.position_std_m < FREED_STD_M).count();
-        if self.freed.len() >= robot.tags.len() / 4 || trusted <= MIN_TRUSTED {
+        let has_room = self.freed.len() < robot.tags.len() / 4 && trusted > MIN_TRUSTED;
+        let Some(moved) = estimate.moved_tag() else {
+            return has_room && self.free_rejected(estimate, views, robot);
+        };
+        if !has_room {
             self.has_given_up = true;
             let had_any = !self.freed.is_empty();
             self.freed.clear();
@@ -67,6 +70,19 @@ impl MovedTags {
         }
         free(robot, &[moved.tag_idx]);
         self.freed.push(moved.tag_idx);
+        true
+    }
+
+    /// Frees a tag that the estimate has left out altogether, from where its observations have it.
+    fn free_rejected(&mut self, estimate: &Estimate<'_>, views: &[View], robot: &mut Robot) -> bool {
+        let rejected = estimate.rejected_tag(views);
+        let is_held = |tag: &usize| !self.freed.contains(tag) && !self.group.contains(tag);
+        let Some((tag_idx, place)) = rejected.filter(|(tag_idx, _)| is_held(tag_idx)) else { return false };
+        let tag = &mut robot.tags[tag_idx];
+        let turn = tag.base_from_tag.isometry().rotation;
+        tag.base_from_tag = Pose::from_isometry(Isometry3::from_parts(Translation3::from(place), turn));
+        free(robot, &[tag_idx]);
+        self.freed.push(tag_idx);
         true
     }
 

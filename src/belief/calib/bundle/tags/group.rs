@@ -97,7 +97,7 @@ impl Departures {
     /// Places in `tags` of those that were moved.
     fn moved(&self) -> Vec<usize> {
         let n = self.tags.len();
-        let most = n.saturating_sub(MIN_STAYING).min(n.saturating_sub(1) / 2);
+        let most = most_moved(n);
         let priced = |moved: Vec<usize>| (self.fit(&moved).1 + LEAST_SAVING * moved.len() as f64, moved);
         let cheapest = |all: Vec<Vec<usize>>| all.into_iter().map(priced).min_by(|a, b| a.0.total_cmp(&b.0));
         // One after the other finds the wrong ones where three of eight were moved.
@@ -149,6 +149,16 @@ impl Departures {
         let left = self.whitened.norm_squared() - fitted.dot(&right);
         (fitted, left)
     }
+}
+
+/// Of `n` tags so many may have moved.
+fn most_moved(n: usize) -> usize {
+    n.saturating_sub(MIN_STAYING).min(n.saturating_sub(1) / 2)
+}
+
+/// All pairs and threes that may have moved together, of `n` tags.
+pub(crate) fn candidate_sets(n: usize) -> Vec<Vec<usize>> {
+    small_sets(n, most_moved(n).min(3)).into_iter().filter(|set| set.len() > 1).collect()
 }
 
 /// All sets of up to `most` of `n`; of many only the empty one.

@@ -7,12 +7,13 @@
 //! of another size, so is each distance between two of them in one view: the median of `|p_a - p_b| / |m_a - m_b|`,
 //! which no joint has a part in.
 
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::{Isometry3, Point3, Vector3};
 
 use crate::calib::bundle::estimate::Estimate;
 use crate::calib::bundle::problem::WeightedMeasurement;
 use crate::calib::views::view::{TagObservation, View};
 use armcal_core::robot::Robot;
+use armcal_core::spatial::Pose;
 use armcal_core::stats::quantile;
 
 /// What a tag may be in place of what the survey says.
@@ -26,6 +27,8 @@ pub(crate) enum TagFault {
     AllSizes { ratio: f64 },
     /// Moved with others, by about so much in m and rad (module `group`).
     Moved { tag_idx: usize, std: [f64; 2] },
+    /// Moved with others, by one motion of the base frame; its share of what the motion costs, nats (module `alike`).
+    Alike { tag_idx: usize, base_motion: Isometry3<f64>, cost_nats: f64 },
 }
 
 impl TagFault {
@@ -46,14 +49,34 @@ impl TagFault {
                 let tag = &mut robot.tags[tag_idx];
                 [tag.position_std_m, tag.rotation_std_rad] = std;
             }
+            Self::Alike { tag_idx, base_motion, .. } => {
+                let tag = &mut robot.tags[tag_idx];
+                tag.base_from_tag = Pose::from_isometry(base_motion * tag.base_from_tag.isometry());
+            }
         }
     }
 
     fn tags(&self) -> Vec<usize> {
         match *self {
             Self::Swapped(pair) => pair.to_vec(),
-            Self::Size { tag_idx, .. } | Self::Moved { tag_idx, .. } => vec![tag_idx],
+            Self::Size { tag_idx, .. } | Self::Moved { tag_idx, .. } | Self::Alike { tag_idx, .. } => vec![tag_idx],
             Self::AllSizes { .. } => Vec::new(),
+        }
+    }
+
+    /// What it costs beside what an estimate under it counts, nats.
+    pub(crate) fn cost_nats(&self) -> f64 {
+        match *self {
+            Self::Alike { cost_nats, .. } => cost_nats,
+            _ => 0.0,
+        }
+    }
+
+    /// The tag, where it is one of several that were moved together.
+    pub(crate) fn moved_tag(&self) -> Option<usize> {
+        match *self {
+            Self::Moved { tag_idx, .. } | Self::Alike { tag_idx, .. } => Some(tag_idx),
+            _ => None,
         }
     }
 
@@ -98,6 +121,17 @@ impl Estimate<'_> {
         }
         faults.extend(seen.iter().filter_map(|tag| tag.size(robot)));
         faults
+    }
+
+    /// The tag most of whose observations are rejected, which agree on another place than its survey's, and that place,
+    /// base frame, m.
+    pub(crate) fn rejected_tag(&self, views: &[View]) -> Option<(usize, Vector3<f64>)> {
+        let robot = self.problem.robot;
+        let rejected = (0..robot.tags.len()).filter(|tag| self.rejected_share(*tag) > REJECTED_SHARE);
+        let seen = rejected.map(|tag_idx| self.seen(tag_idx, views));
+        let elsewhere = seen.filter(|tag| tag.observations.len() >= MIN_OBSERVATIONS && tag.is_elsewhere(robot));
+        let most = elsewhere.max_by_key(|tag| tag.observations.len())?;
+        Some((most.tag_idx, most.place(1.0)))
     }
 
     /// Tags that do not fit, or that the data have elsewhere.
@@ -159,10 +193,19 @@ impl SeenTag {
             let all = self
                 .observations
                 .iter()
-                .map(|(base_from_camera, at)| (base_from_camera * nalgebra::Point3::from(at * ratio))[axis]);
+                .map(|(base_from_camera, at)| (base_from_camera * Point3::from(at * ratio))[axis]);
             quantile(&all.collect::<Vec<f64>>(), 0.5).unwrap_or(0.0)
         };
         Vector3::new(along(0), along(1), along(2))
+    }
+
+    /// Whether the observations are nearer to one another than to the survey.
+    fn is_elsewhere(&self, robot: &Robot) -> bool {
+        let place = self.place(1.0);
+        let off = self.observations.iter().map(|(base_from_camera, at)| base_from_camera * Point3::from(*at) - place);
+        let spread_m: Vec<f64> = off.map(|off| off.coords.norm()).collect();
+        let survey = robot.tags[self.tag_idx].base_from_tag.isometry().translation.vector;
+        quantile(&spread_m, 0.5).is_some_and(|spread_m| spread_m < NEARER * (place - survey).norm())
     }
 
     fn is_at(&self, robot: &Robot, other: usize) -> bool {
@@ -185,7 +228,7 @@ impl SeenTag {
         let std = 1.4826 * quantile(&spread, 0.5)? / (ratios.len() as f64).sqrt();
         let distance_m = |ratio: f64| {
             let off = self.observations.iter().map(|(base_from_camera, at)| {
-                (base_from_camera * nalgebra::Point3::from(at * ratio) - nalgebra::Point3::from(survey)).norm()
+                (base_from_camera * Point3::from(at * ratio) - Point3::from(survey)).norm()
             });
             quantile(&off.collect::<Vec<f64>>(), 0.5).unwrap_or(f64::INFINITY)
         };

@@ -1,8 +1,10 @@
 //! Tags that do not fit their survey.
 //!
-//! `departure` tests each tag's estimate against its survey, `group` finds tags that moved together, `identity` tags of
-//! another size or with another's id. `freed` keeps those that are estimated without their survey, and reports them.
+//! `departure` tests each tag's estimate against its survey, `group` finds tags that moved together, `alike` those that
+//! one motion took elsewhere, `identity` tags of another size or with another's id. `freed` keeps those that are
+//! estimated without their survey, and reports them.
 
+pub(crate) mod alike;
 pub(crate) mod departure;
 pub(crate) mod freed;
 pub(crate) mod group;

@@ -239,6 +239,26 @@ fn a_camera_turned_about_the_last_joint_before_it_is_refused() {
     assert!(refused == SEEDS && u64::from(named) >= SEEDS - 1, "{refused}, {named} of {SEEDS}");
 }
 
+/// The views follow by the first joint's offset, and only the touches know where the base is.
+#[test]
+fn a_survey_turned_about_the_first_axis_is_refused_with_that_among_the_causes() {
+    let robot = titan();
+    const SEEDS: u64 = 20;
+    let (mut refused, mut named) = (0, 0);
+    for seed in 0..SEEDS {
+        let case = case(&robot, seed, |_, truth| {
+            let turn = UnitQuaternion::from_scaled_axis(Vector3::z() * 1.5f64.to_radians());
+            truth.tags.iter_mut().for_each(|tag| *tag = Translation3::identity() * turn * *tag);
+        });
+        let found = estimate(&input(&robot, &case.views, &case.model)).expect("solved");
+        let Some((words, _)) = refused_for(&robot, &found, &case.touches) else { continue };
+        refused += 1;
+        named += u32::from(words.contains("a turn of the tag survey against the base"));
+    }
+    println!("{refused} refused, {named} named of {SEEDS}");
+    assert!(refused >= 18 && named == refused, "{refused}, {named} of {SEEDS}");
+}
+
 #[test]
 fn reservations_of_what_touches_tell_vanish_with_three_of_them() {
     let robot = titan();
