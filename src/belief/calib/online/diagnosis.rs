@@ -1,9 +1,10 @@
 //! What happened, by the evidence of the views: a view that the belief does not explain starts a race of explanations,
 //! each a belief of its own, until one of them leads or three more views were seen.
 
-use crate::calib::online::filter::{Filter, ViewUpdate};
+use crate::calib::online::filter::{Filter, ViewUpdate, WalkScore};
 use crate::calib::online::hypothesis::Fault;
 use crate::calib::views::view::View;
+use armcal_core::joints::MAX_JOINTS;
 use armcal_core::robot::Robot;
 
 /// A view is suspicious beyond this quantile of the normal by its cost (one in ten thousand).
@@ -17,8 +18,11 @@ const NOTHING_FITS_NATS: f64 = 30.0;
 const LEAD_NATS: f64 = 5.0;
 /// Explanations followed at most.
 const MAX_BRANCHES: usize = 6;
+/// Views this close to each other are looked at together, s, and how many of them.
+const RECENT_S: f64 = 60.0;
+const MAX_RECENT: usize = 6;
 /// Views after which the best explanation is taken, and those that one needs.
-const MAX_VIEWS: usize = 4;
+const MAX_VIEWS: usize = 5;
 const CONFIRMED_BY: usize = 2;
 
 /// One explanation, and the belief under it.
@@ -38,6 +42,8 @@ pub(crate) struct Race {
     /// The belief before the first suspicious view.
     before: Filter,
     n_views: usize,
+    /// Of these, after it began.
+    n_later: usize,
     /// Views of each tag of the robot.
     n_views_of: Vec<usize>,
 }
@@ -51,6 +57,47 @@ pub(crate) struct Verdict {
     pub next: Option<Fault>,
 }
 
+/// The last few views close to each other in time: what one of them is too weak to show, they may show together.
+#[derive(Clone)]
+pub(crate) struct RecentViews {
+    /// The belief before them, widened until the first.
+    pub before: Filter,
+    /// Evidence before them.
+    pub nats_before: f64,
+    pub views: Vec<View>,
+    sums: [WalkScore; MAX_JOINTS],
+}
+
+impl RecentViews {
+    pub(crate) fn new(before: Filter, nats_before: f64) -> Self {
+        Self { before, nats_before, views: Vec::new(), sums: [WalkScore::default(); MAX_JOINTS] }
+    }
+
+    /// Whether `view` belongs to another group.
+    pub(crate) fn is_past(&self, view: &View) -> bool {
+        let last = self.views.last().map_or(view.end, |last| last.end);
+        self.views.len() >= MAX_RECENT || view.end.since_s(last) > RECENT_S
+    }
+
+    pub(crate) fn add(&mut self, view: &View, update: Option<&ViewUpdate>) {
+        self.views.push(view.clone());
+        for (sum, score) in self.sums.iter_mut().zip(update.iter().flat_map(|update| &update.walk)) {
+            sum.a += score.a;
+            sum.b += score.b;
+        }
+    }
+
+    /// Whether one joint's offset is pulled the same way by all of them: innovations have no memory, so that their
+    /// scores add up like independent numbers.
+    pub(crate) fn show_a_step(&self) -> bool {
+        self.views.len() > 1 && has_step(&self.sums)
+    }
+}
+
+fn has_step(scores: &[WalkScore; MAX_JOINTS]) -> bool {
+    scores.iter().any(|score| score.a * score.a > SUSPICIOUS_STEP_Z.powi(2) * score.b)
+}
+
 /// Whether a view is beyond what its noise explains: by its cost, by an observation that does not belong, or by one
 /// joint's offset alone (the score test of a step there).
 pub(crate) fn is_suspicious(update: &ViewUpdate) -> bool {
@@ -58,14 +105,13 @@ pub(crate) fn is_suspicious(update: &ViewUpdate) -> bool {
     // Wilson and Hilferty 1931.
     let by = 2.0 / (9.0 * n);
     let is_costly = update.cost > n * (1.0 - by + SUSPICIOUS_Z * by.sqrt()).powi(3);
-    let has_step = update.walk.iter().any(|score| score.a * score.a > SUSPICIOUS_STEP_Z.powi(2) * score.b);
-    is_costly || has_step || !update.rejected.is_empty()
+    is_costly || has_step(&update.walk) || !update.rejected.is_empty()
 }
 
 impl Race {
-    /// Of all that could explain `view`, which `before` (widened already) does not.
-    pub(crate) fn start(robot: &Robot, before: &Filter, view: &View) -> Self {
-        let mut tags: Vec<usize> = view.tags.iter().map(|tag| tag.tag_idx).collect();
+    /// Of all that could explain the views, which the belief before them does not.
+    pub(crate) fn start(robot: &Robot, RecentViews { before, views, .. }: &RecentViews) -> Self {
+        let mut tags: Vec<usize> = views.iter().flat_map(|view| &view.tags).map(|tag| tag.tag_idx).collect();
         tags.sort_unstable();
         tags.dedup();
         let faults = Fault::all(before, &tags).into_iter().map(Some);
@@ -79,8 +125,9 @@ impl Race {
         };
         let branches = std::iter::once(None).chain(faults).map(branch).collect();
         let n_views_of = vec![0; robot.tags.len()];
-        let mut race = Self { branches, before: before.clone(), n_views: 0, n_views_of };
-        race.add(robot, view);
+        let mut race = Self { branches, before: before.clone(), n_views: 0, n_later: 0, n_views_of };
+        views.iter().for_each(|view| race.add(robot, view));
+        race.n_later = 0;
         let mut place = 0;
         race.branches.retain(|branch| {
             place += 1;
@@ -92,6 +139,7 @@ impl Race {
     /// Every explanation takes the view in.
     pub(crate) fn add(&mut self, robot: &Robot, view: &View) {
         self.n_views += 1;
+        self.n_later += 1;
         view.tags.iter().for_each(|tag| self.n_views_of[tag.tag_idx] += 1);
         for branch in &mut self.branches {
             branch.nats += match branch.filter.update(robot, &seen_by(branch.fault, view)) {
@@ -130,7 +178,7 @@ impl Race {
     /// Whether it is decided: one view alone names nothing.
     pub(crate) fn is_over(&self) -> bool {
         let is_confirmed = self.best().is_some_and(|best| self.is_confirmed(best.fault));
-        self.n_views >= MAX_VIEWS || (self.lead_nats() > LEAD_NATS && is_confirmed)
+        self.n_later >= MAX_VIEWS || (self.lead_nats() > LEAD_NATS && is_confirmed)
     }
 
     /// Whether enough views could have spoken against it. A detection of another tag happens once; a tag that was moved
@@ -138,6 +186,8 @@ impl Race {
     fn is_confirmed(&self, fault: Option<Fault>) -> bool {
         match fault {
             None => true,
+            // What drifted shows in all views; a weak one must not settle it.
+            Some(Fault::Drift) => self.n_later >= MAX_VIEWS,
             Some(Fault::Tag(tag)) => self.n_views_of[tag] >= CONFIRMED_BY,
             Some(_) => self.n_views >= CONFIRMED_BY,
         }

@@ -14,7 +14,7 @@ const TAG_STD: [f64; 2] = [0.03, 0.06];
 const MOUNT_STD: [f64; 2] = [0.02, 0.1];
 const BASE_STD: [f64; 2] = [0.1, 0.1];
 const GAIN_STD: f64 = 1.0;
-const DRIFT_STD_RAD: f64 = 2e-3;
+const DRIFT_STD_RAD: f64 = 1.5e-3;
 const LN_PRIOR_OF_DRIFT: f64 = -2.0;
 const LN_PRIOR: f64 = -7.0;
 

@@ -8,7 +8,7 @@ use crate::calib::bundle::estimate::estimate;
 use crate::calib::bundle::input::{BundleInput, HyperparameterMode};
 use crate::calib::bundle::model::Hyperparameters;
 use crate::calib::covariance::ParameterCovariance;
-use crate::calib::online::diagnosis::{Race, is_suspicious};
+use crate::calib::online::diagnosis::{Race, RecentViews, is_suspicious};
 use crate::calib::online::event::OnlineEvent;
 use crate::calib::online::filter::{Filter, ViewUpdate};
 use crate::calib::online::hypothesis::Fault;
@@ -57,6 +57,7 @@ struct Running {
     filter: Filter,
     /// Explanations of views that the filter did not expect, while they are open.
     race: Option<Race>,
+    recent: Option<RecentViews>,
     /// Joints whose sensor says nothing any more.
     failed: Vec<usize>,
     noise: ProcessNoise,
@@ -181,6 +182,7 @@ impl Member {
         Some(Running {
             filter,
             race: None,
+            recent: None,
             failed: Vec::new(),
             noise,
             errors,
@@ -211,17 +213,21 @@ impl Member {
             self.settle_race(view.end);
             return None;
         }
-        let before = running.filter.clone();
+        let recent = running.recent.take().filter(|recent| !recent.is_past(view));
+        let mut recent = recent.unwrap_or_else(|| RecentViews::new(running.filter.clone(), self.nats));
         let update = running.filter.update(&self.robot, view);
+        recent.add(view, update.as_ref());
         // A view of which nothing fits changes nothing.
-        if self.settings.faults == FaultSearch::On && update.as_ref().is_none_or(is_suspicious) {
-            let race = Race::start(&self.robot, &before, view);
-            self.nats = FORGETTING * self.nats + race.nats();
+        let is_suspicious = update.as_ref().is_none_or(is_suspicious) || recent.show_a_step();
+        if self.settings.faults == FaultSearch::On && is_suspicious {
+            let race = Race::start(&self.robot, &recent);
+            self.nats = FORGETTING * recent.nats_before + race.nats();
+            self.suspect_since = recent.views.first().map(|first| first.end);
             running.race = Some(race);
-            self.suspect_since = Some(view.end);
             self.settle_race(view.end);
             return update;
         }
+        running.recent = Some(recent);
         let update = update?;
         self.nats = FORGETTING * self.nats + update.log_evidence;
         if self.settings.drift == DriftModel::Tuned {
