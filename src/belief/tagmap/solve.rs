@@ -46,12 +46,13 @@ pub fn solve(input: &MapInput<'_>, settings: &MapSettings) -> Result<TagMap, Tag
         extras: Vec::new(),
         links: Vec::new(),
         n_nodes: 0,
+        steps_left: adjust::MAX_STEPS,
     };
     let setting_up = ProblemBuilder { input, settings, screened: &screened, label: &layout.label };
     let mut groups = setting_up.build(&mut problem);
     approach(&mut problem);
     for _ in 0..3 {
-        if !repair(&mut problem) {
+        if problem.steps_left == 0 || !repair(&mut problem) {
             break;
         }
         approach(&mut problem);
@@ -63,7 +64,7 @@ pub fn solve(input: &MapInput<'_>, settings: &MapSettings) -> Result<TagMap, Tag
             groups = setting_up.build(&mut problem);
         }
         has_converged = finish(&mut problem);
-        if !changed {
+        if !changed || problem.steps_left == 0 {
             break;
         }
     }
@@ -78,6 +79,12 @@ pub fn solve(input: &MapInput<'_>, settings: &MapSettings) -> Result<TagMap, Tag
     map.has_converged = has_converged;
     map.scale_warnings = scale_warnings;
     map.warnings.extend(layout.warnings);
+    if problem.steps_left == 0 {
+        map.warnings.push(format!(
+            "the views contradict each other: after {} steps the map still moved, and no more are made",
+            adjust::MAX_STEPS
+        ));
+    }
     if map.n_used == 0 {
         return Err(nothing_left(&screened));
     }
