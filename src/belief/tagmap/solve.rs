@@ -79,16 +79,18 @@ pub fn solve(input: &MapInput<'_>, settings: &MapSettings) -> Result<TagMap, Tag
     map.has_converged = has_converged;
     map.scale_warnings = scale_warnings;
     map.warnings.extend(layout.warnings);
-    if problem.steps_left == 0 {
-        map.warnings.push(format!(
-            "the views contradict each other: after {} steps the map still moved, and no more are made",
-            adjust::MAX_STEPS
-        ));
-    }
+    map.warnings.extend(contradiction(&problem));
     if map.n_used == 0 {
         return Err(nothing_left(&screened));
     }
     Ok(map)
+}
+
+/// Why no more steps were made, where that was so.
+fn contradiction(problem: &MapProblem<'_>) -> Option<String> {
+    let n = adjust::MAX_STEPS;
+    let what = format!("the views contradict each other: after {n} steps the map still moved, and no more are made");
+    (problem.steps_left == 0).then_some(what)
 }
 
 fn nothing_left(screened: &Screened) -> TagMapError {

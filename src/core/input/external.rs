@@ -68,12 +68,8 @@ fn read_up_to(most: usize, path: &Path, map: &InputMap, robot: &Robot) -> Result
         } else {
             Ok(())
         };
-        let too_long = |topic: &String| InputError::TooLong { file: file.clone(), topic: topic.clone(), most };
-        first_error = match taken {
-            Ok(()) if readings.readings.len() > most => Some(too_long(&map.joint_topic)),
-            Ok(()) if tags.len() > most => Some(too_long(&map.tag_topic)),
-            taken => taken.err(),
-        };
+        let of_topics = [(&map.joint_topic, readings.readings.len()), (&map.tag_topic, tags.len())];
+        first_error = taken.err().or_else(|| too_long(&file, of_topics, most));
     })?;
     if let Some(error) = first_error {
         return Err(error);
@@ -110,6 +106,12 @@ fn read_up_to(most: usize, path: &Path, map: &InputMap, robot: &Robot) -> Result
         completeness: summary.completeness,
         chunk_order: summary.chunk_order,
     })
+}
+
+/// The error for the first topic with more messages in memory than `most`.
+fn too_long(file: &str, of_topics: [(&String, usize); 2], most: usize) -> Option<InputError> {
+    let (topic, _) = of_topics.into_iter().find(|(_, n)| *n > most)?;
+    Some(InputError::TooLong { file: file.to_owned(), topic: topic.clone(), most })
 }
 
 /// Hash of topic, log time and bytes.

@@ -186,7 +186,9 @@ mod tests {
             for (share, flip) in [(1.0, None), (0.7, None), (1.0, Some(0.3)), (0.9, Some(0.6))] {
                 let at = |share: f64| (share * whole.len() as f64) as usize;
                 let mut bytes = whole[..at(share)].to_vec();
-                flip.map(|share| bytes[at(share)] ^= 0x55);
+                if let Some(share) = flip {
+                    bytes[at(share)] ^= 0x55;
+                }
                 std::fs::write(&path, bytes).unwrap();
                 let (expected, found) = (read_all_twice(&path), read_marked(&path).unwrap());
                 assert!(!expected.messages.is_empty() && expected.left_in_file.len() > 2);
