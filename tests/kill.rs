@@ -288,6 +288,57 @@ fn a_full_disk_is_told_and_costs_nothing_that_was_there() {
     }
 }
 
+/// A limit at any size up to that of the largest result, and just below and above that of each: `ARMCAL_FULL_DISKS` of
+/// them.
+#[cfg(unix)]
+#[test]
+fn a_disk_that_fills_at_any_size_loses_nothing() {
+    const BLOCK_BYTES: u64 = 512;
+    let n: u64 = std::env::var("ARMCAL_FULL_DISKS").ok().and_then(|n| n.parse().ok()).unwrap_or(4);
+    let (reference, _) = reference();
+    let sizes = RESULTS.map(|name| fs::metadata(reference.file(name)).expect("a result").len() / BLOCK_BYTES);
+    // The last leaves room for all.
+    let largest = sizes.into_iter().max().unwrap_or(0) + 2;
+    let spread = (1..=n).map(|k| largest * k / n);
+    let edges = sizes.iter().flat_map(|blocks| [*blocks, *blocks + 2]).filter(|_| n >= 64);
+    let limits: Vec<u64> = spread.chain(edges).collect();
+    let (mut n_stopped, mut n_without_replay) = (0, 0);
+    for &limit in &limits {
+        let folder = temp();
+        let out = folder.path().join("out");
+        fs::create_dir_all(&out).expect("a folder");
+        for name in RESULTS {
+            fs::write(out.join(name), "earlier").expect("written");
+        }
+        let mut shell = Command::new("sh");
+        let line = format!("ulimit -f {limit}; exec \"$0\" run \"$1\" --out \"$2\"");
+        shell.arg("-c").arg(line).arg(env!("CARGO_BIN_EXE_armcal")).arg(&reference.routine).arg(&out);
+        let said = answer(&mut shell);
+        assert!(names(&out).iter().all(|name| !name.ends_with(".partial")), "limit {limit}: {:?}", names(&out));
+        let kept = out.join("run-cut-1.mcap");
+        if said.code == 0 {
+            for name in ["run.mcap", "truth.mcap", "calibration.toml"] {
+                assert!(fs::read(out.join(name)).expect("there") == reference.bytes(name), "limit {limit}: {name}");
+            }
+            let replay = fs::read(out.join("run.rrd")).ok();
+            assert!(replay.as_deref() != Some(b"earlier"), "limit {limit}: an old replay beside new results");
+            assert_eq!(replay.is_none(), said.stderr.contains("there is no replay"), "limit {limit}: {said:#?}");
+            n_without_replay += u32::from(replay.is_none());
+            continue;
+        }
+        n_stopped += 1;
+        assert_eq!(said.code, 1, "limit {limit}: {said:#?}");
+        assert!(said.stderr.contains("cannot be written"), "limit {limit}: {said:#?}");
+        for name in RESULTS {
+            assert_eq!(fs::read(out.join(name)).expect("there"), b"earlier", "limit {limit}: {name}");
+        }
+        let found = kept.exists().then(|| look(&kept, None).expect("it reads"));
+        assert!(found.is_none_or(|found| found.completeness.state != State::Damaged), "limit {limit}");
+    }
+    eprintln!("{n_stopped} of {} stopped, {n_without_replay} without a replay", limits.len());
+    assert!(n_stopped > 0 && n_stopped < limits.len());
+}
+
 /// The replay is larger than what is recorded: it alone does not fit, and costs nothing else.
 #[cfg(unix)]
 #[test]

@@ -44,6 +44,8 @@ pub(super) fn plan(args: &PlanArgs) -> Result<Exit> {
     let overrides = args.overrides.overrides();
     let routine = routine::load_with(&args.routine, &overrides)?;
     let (robot, vehicle) = routine.load_arm()?;
+    let out = args.out.clone().unwrap_or_else(|| Path::new("recordings").join(format!("{}-plan", routine.name)));
+    output::check_takes_files(&out)?;
     let belief = match &args.prior {
         None => ArmBelief::datasheet(&robot),
         Some(file) => ArmBelief::of(&robot, read_prior(file, &robot)?)?,
@@ -63,7 +65,6 @@ pub(super) fn plan(args: &PlanArgs) -> Result<Exit> {
     for left in &file.left_out {
         note(format_args!("warning: a pose is left out: {}", left.reason));
     }
-    let out = args.out.clone().unwrap_or_else(|| Path::new("recordings").join(format!("{}-plan", routine.name)));
     output::make_folder(&out)?;
     let (toml, markdown) = (file.to_toml(), markdown(&file));
     let (toml_path, markdown_path) = (out.join("plan.toml"), out.join("plan.md"));

@@ -12,7 +12,7 @@ use crate::output;
 use armcal_belief::calib::{Calibration, Status, surveyed};
 use armcal_core::files::{self, FileKind};
 use armcal_core::kinematics::LinkCorrections;
-use armcal_core::log::{Recording, read_attachments};
+use armcal_core::log::{Recording, Stream, read_attachments};
 use armcal_core::robot::{self, Robot, Vehicle};
 use armcal_core::routine::{self, Scene};
 use armcal_core::time::Stamp;
@@ -33,6 +33,7 @@ pub(super) struct ReplayArgs {
 pub(super) fn replay(args: &ReplayArgs) -> Result<Exit> {
     let recording = read_for_replay(&args.recording)?;
     let lost = warn_of_losses(&recording);
+    say_what_is_left_out(&recording);
     let drawings = Drawings::find(args, &recording)?;
     let truth = truth_beside(&args.recording);
     let believed_links = links_beside(&args.recording, &drawings.robot);
@@ -61,6 +62,16 @@ pub(super) fn replay(args: &ReplayArgs) -> Result<Exit> {
         }
     }
     Ok(if lost { Exit::DataLost } else { Exit::Ok })
+}
+
+/// A long recording is shown at a lower rate: how much of which streams. Images are never among the messages.
+fn say_what_is_left_out(recording: &Recording) {
+    let left_out = recording.left_in_file.iter().filter(|(stream, _)| **stream != Stream::Images);
+    let left_out: Vec<String> = left_out.map(|(stream, n)| format!("{n} of {}", stream.topic())).collect();
+    if !left_out.is_empty() {
+        let file = recording.path.display();
+        note(format_args!("note: {file}: long; shown at a lower rate, without {}", left_out.join(", ")));
+    }
 }
 
 /// The truth of the same run: truth-cut-2.mcap beside run-cut-2.mcap, else truth.mcap.

@@ -37,6 +37,7 @@ pub(super) struct SensitivityArgs {
 pub(super) fn sensitivity(args: &SensitivityArgs) -> Result<Exit> {
     let routine = routine::load_with(&args.routine, &args.overrides.overrides())?;
     let (robot, vehicle) = routine.load_arm()?;
+    output::check_takes_files(&args.out)?;
     let clearance = ClearanceModel::new(&robot, &vehicle, &routine.scene);
     let (poses, min_tags) = (usize::from(args.poses), usize::from(args.min_tags));
     let found = study::sensitivity(&robot, &clearance, poses, min_tags, args.seed.unwrap_or(routine.seed))

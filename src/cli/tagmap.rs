@@ -62,6 +62,9 @@ impl From<Mode> for MapMode {
     }
 }
 
+/// Above so many a map may take longer than people wait without a word. Assumed.
+const MANY_DETECTIONS: usize = 1000;
+
 /// Share of the detections that may be rejected before the map counts as made of bad data. Assumed.
 const MAX_REJECTED_SHARE: f64 = 0.2;
 
@@ -74,6 +77,10 @@ pub(super) fn tagmap(args: &TagmapArgs) -> Result<Exit> {
     };
     let settings = MapSettings { mode: args.mode.map_or(settings.mode, MapMode::from), ..settings };
     let read = read_views(&args.recording, &cameras, args.topic.as_deref(), &tags)?;
+    let n_detections: usize = read.views.iter().map(|view| view.tags.len()).sum();
+    if n_detections > MANY_DETECTIONS {
+        note(format_args!("{n_detections} detections in {} views; this may take a minute", read.views.len()));
+    }
     let models: Vec<_> = cameras.iter().map(|camera| camera.model).collect();
     let input = MapInput { cameras: &models, views: &read.views, bodies: &tags.bodies, tags: &tags.tags };
     let file = args.recording.display();

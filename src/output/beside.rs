@@ -97,6 +97,18 @@ pub(crate) fn check_writable(path: &Path) -> Result<(), OutputError> {
     Beside::begin(path).map(drop)
 }
 
+/// That a folder takes files, before the work that fills it. One that is made for this goes again: what comes to
+/// nothing leaves nothing.
+pub(crate) fn check_takes_files(folder: &Path) -> Result<(), OutputError> {
+    let is_new = !folder.exists();
+    check_writable(&folder.join("file"))?;
+    if is_new {
+        // Whatever came into it meanwhile keeps it.
+        let _ = fs::remove_dir(folder);
+    }
+    Ok(())
+}
+
 fn prefix(path: &Path) -> String {
     format!(".{}.", path.file_name().unwrap_or_default().to_string_lossy())
 }

@@ -10,7 +10,7 @@ mod lock;
 pub(crate) use beside::Beside;
 #[cfg(feature = "sim")]
 pub(crate) use beside::write_whole;
-pub(crate) use beside::{check_writable, write_together};
+pub(crate) use beside::{check_takes_files, check_writable, write_together};
 pub use files::OutputError;
 pub(crate) use files::{check_replaceable, make_folder, parent, refuse_link};
 #[cfg(feature = "sim")]

@@ -9,7 +9,7 @@ use armcal::stats::stream_rng;
 use rand::RngExt;
 
 use super::{names, reference};
-use crate::support::{answer, calibrate, program, read, robot_folder, shared_run, temp};
+use crate::support::{ShortRoutine, answer, calibrate, program, read, robot_folder, shared_run, temp};
 
 /// A command that writes into `out`, and what it leaves there, the one that vouches for the others last.
 struct Case {
@@ -153,6 +153,17 @@ fn where_nothing_can_be_written_is_found_before_the_work() {
         said.expect(words[0], 1, &["/proc/self"]);
         assert!(began.elapsed() < took.mul_f64(0.5), "{words:?}");
     }
+    // What comes first of a place that cannot be written and a task that cannot be done is the place.
+    let folder = temp();
+    let unreachable = ShortRoutine { targets_m: vec![[0.0, 0.0, 2.2]], ..ShortRoutine::default() }.write(folder.path());
+    for words in [&["plan"][..], &["sensitivity", "--min-tags=100"]] {
+        let said = answer(program().args(words).arg(&unreachable).arg("--out").arg("/proc/self"));
+        said.expect(words[0], 1, &["/proc/self"]);
+        let new = folder.path().join("new");
+        let said = answer(program().args(words).arg(&unreachable).arg("--out").arg(&new));
+        assert!(said.code != 0 && !said.stderr.contains("/proc/self"), "{said:#?}");
+        assert!(!new.exists(), "what comes to nothing leaves nothing");
+    }
 }
 
 #[cfg(unix)]
@@ -166,4 +177,91 @@ fn a_link_in_the_place_of_a_growing_file_is_not_followed() {
     campaign.arg("campaign").arg(&reference().0.routine).args(["--seeds=1", "--out"]).arg(&out);
     answer(&mut campaign).expect("a link", 1, &["c.csv.partial", "is a link"]);
     assert_eq!(read(&target), "precious");
+}
+
+/// kill -9 at random moments, again and again into the same campaign: `ARMCAL_KILLS` of them.
+#[test]
+fn a_killed_campaign_goes_on_to_the_same_rows() {
+    let kills: u32 = std::env::var("ARMCAL_KILLS").ok().and_then(|n| n.parse().ok()).unwrap_or(3);
+    let folder = temp();
+    let campaign = |name: &str, seeds: u32| {
+        let mut command = program();
+        command.arg("campaign").arg(&reference().0.routine).args(["--threads=2", "--seeds"]);
+        command.arg(format!("1..{seeds}")).arg("--out").arg(folder.path().join(name));
+        command
+    };
+    // A kill in the middle of each run or so, whatever the machine does beside.
+    let seeds = kills.div_ceil(2).max(2);
+    let began = Instant::now();
+    whole(&mut campaign("whole.csv", seeds));
+    let per_run = began.elapsed() / seeds;
+    let (mut rng, mut n_rows) = (stream_rng(3, "kills"), 0);
+    for _ in 0..kills {
+        let mut child =
+            campaign("killed.csv", seeds).stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("it starts");
+        std::thread::sleep(per_run.mul_f64(rng.random_range(0.0..2.5)));
+        child.kill().expect("killed");
+        child.wait().expect("gone");
+        let rows = ["killed.csv", "killed.csv.partial"].map(|name| fs::read_to_string(folder.path().join(name)));
+        let rows = rows.iter().flatten().map(|text| text.lines().count()).max().unwrap_or(0);
+        // The last may be cut, and goes when the campaign goes on.
+        assert!(rows + 1 >= n_rows, "{rows} rows after {n_rows}");
+        n_rows = rows;
+    }
+    eprintln!("{kills} kills of a campaign of {seeds} runs, {n_rows} lines before it went on to its end");
+    whole(&mut campaign("killed.csv", seeds));
+    for ending in ["csv", "parquet"] {
+        let [expected, found] =
+            ["whole", "killed"].map(|name| fs::read(folder.path().join(name).with_extension(ending)).expect("written"));
+        assert!(expected == found, "{ending}");
+    }
+    assert!(names(folder.path()).iter().all(|name| !name.contains("partial")), "{:?}", names(folder.path()));
+}
+
+/// Commands that write into `out`, an existing folder.
+fn that_write(out: &Path) -> Vec<Command> {
+    let recording = shared_run().file("run.mcap");
+    let routine = &reference().0.routine;
+    let with = |words: &[&str], paths: &[&Path]| {
+        let mut command = program();
+        command.args(words).args(paths);
+        command
+    };
+    let out_is = [Path::new("--out"), out];
+    let robot = [Path::new("--robot"), &robot_folder()].map(Path::to_owned);
+    vec![
+        with(&["run"], &[&[routine.as_path()], &out_is[..]].concat()),
+        with(&["plan"], &[&[routine.as_path()], &out_is[..]].concat()),
+        with(&["sensitivity"], &[&[routine.as_path()], &out_is[..]].concat()),
+        with(&["calibrate"], &[&[recording.as_path(), &robot[0], &robot[1]], &out_is[..]].concat()),
+        with(&["tagmap"], &[&recording, &robot[0], &robot[1], Path::new("--out"), &out.join("map.toml")]),
+        with(&["replay"], &[&recording, Path::new("--save"), &out.join("a.rrd")]),
+        with(&["campaign", "--seeds=1"], &[routine, Path::new("--out"), &out.join("c.csv")]),
+        with(&["regress", "--seeds=1"], &[routine, Path::new("--write-baseline"), &out.join("b.csv")]),
+    ]
+}
+
+/// A mount in a namespace of its own: root, too, cannot write there. Where none can be made, this is skipped.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_read_only_mount_is_named_and_nothing_is_left() {
+    let folder = temp();
+    let out = folder.path().join("out");
+    fs::create_dir(&out).expect("a folder");
+    fs::write(out.join("earlier"), "earlier").expect("written");
+    let mounted = "mount --bind \"$0\" \"$0\" && mount -o remount,ro,bind \"$0\" && exec \"$@\"";
+    let inside = |of: &Command| {
+        let mut command = Command::new("unshare");
+        command.args(["-rm", "sh", "-c", mounted]).arg(&out).arg(of.get_program()).args(of.get_args());
+        command
+    };
+    if !inside(&Command::new("true")).status().is_ok_and(|status| status.success()) {
+        eprintln!("SKIPPED: no mount can be made here");
+        return;
+    }
+    for command in that_write(&out) {
+        let said = answer(&mut inside(&command));
+        said.expect(&format!("{command:?}"), 1, &["Read-only file system", out.to_str().expect("UTF-8")]);
+        assert_eq!(names(&out), ["earlier"], "{command:?}");
+    }
 }

@@ -25,6 +25,8 @@ const SCALE_BOUNDS: (f64, f64) = (0.02, 50.0);
 /// The median of the length of a two-dimensional unit normal vector is sqrt(2 ln 2).
 const MEDIAN_OF_LENGTH: f64 = 1.177_41;
 const MAX_ITERATIONS: usize = 50;
+/// Of all adjustments of a map. Views that fit each other take 10 to 40; those that contradict each other never rest.
+pub(super) const MAX_STEPS: usize = 250;
 /// Steps that change the cost by less than this share of it end an adjustment.
 const CONVERGED: f64 = 1e-14;
 /// A chi-square that still falls by less than this a step moves nothing by a noticeable share of its standard
@@ -39,12 +41,17 @@ const ROUNDING: f64 = 1e-12;
 
 /// Lowers the cost from the state of `problem` on; whether it came to rest.
 pub(super) fn minimize(problem: &mut MapProblem<'_>, loss: Loss, converged: f64) -> bool {
+    let n_steps = MAX_ITERATIONS.min(problem.steps_left);
+    if n_steps == 0 {
+        return false;
+    }
     let mut normal = NormalEquations::new(problem);
     normal.update(problem, loss);
     let state = State::of(problem);
     let mut search = Search { problem, loss, normal, state, has_trial: false };
-    let stop = StopRule { gain: converged, rounding: ROUNDING, ..StopRule::after(MAX_ITERATIONS) };
+    let stop = StopRule { gain: converged, rounding: ROUNDING, ..StopRule::after(n_steps) };
     let report = numeric::minimize(&mut search, &DAMPING, &stop);
+    search.problem.steps_left -= report.iterations;
     search.restore();
     match report.stop {
         Stop::Iterations => report.last_gain * degrees_of_freedom(problem).max(1) as f64 <= AT_REST,

@@ -99,4 +99,6 @@ pub(super) struct MapProblem<'a> {
     pub(super) extras: Vec<Extra>,
     pub(super) links: Vec<AttitudeLink>,
     pub(super) n_nodes: usize,
+    /// Steps that adjustments may still make.
+    pub(super) steps_left: usize,
 }

@@ -46,12 +46,13 @@ pub fn solve(input: &MapInput<'_>, settings: &MapSettings) -> Result<TagMap, Tag
         extras: Vec::new(),
         links: Vec::new(),
         n_nodes: 0,
+        steps_left: adjust::MAX_STEPS,
     };
     let setting_up = ProblemBuilder { input, settings, screened: &screened, label: &layout.label };
     let mut groups = setting_up.build(&mut problem);
     approach(&mut problem);
     for _ in 0..3 {
-        if !repair(&mut problem) {
+        if problem.steps_left == 0 || !repair(&mut problem) {
             break;
         }
         approach(&mut problem);
@@ -63,7 +64,7 @@ pub fn solve(input: &MapInput<'_>, settings: &MapSettings) -> Result<TagMap, Tag
             groups = setting_up.build(&mut problem);
         }
         has_converged = finish(&mut problem);
-        if !changed {
+        if !changed || problem.steps_left == 0 {
             break;
         }
     }
@@ -78,10 +79,18 @@ pub fn solve(input: &MapInput<'_>, settings: &MapSettings) -> Result<TagMap, Tag
     map.has_converged = has_converged;
     map.scale_warnings = scale_warnings;
     map.warnings.extend(layout.warnings);
+    map.warnings.extend(contradiction(&problem));
     if map.n_used == 0 {
         return Err(nothing_left(&screened));
     }
     Ok(map)
+}
+
+/// Why no more steps were made, where that was so.
+fn contradiction(problem: &MapProblem<'_>) -> Option<String> {
+    let n = adjust::MAX_STEPS;
+    let what = format!("the views contradict each other: after {n} steps the map still moved, and no more are made");
+    (problem.steps_left == 0).then_some(what)
 }
 
 fn nothing_left(screened: &Screened) -> TagMapError {

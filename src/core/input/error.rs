@@ -43,6 +43,11 @@ pub enum InputError {
          `joint_sensors.names` of the input map"
     )]
     JointNames { file: String, topic: String, recorded: Vec<String>, missing: Vec<String>, expected: Vec<String> },
+    #[error(
+        "{file}: topic {topic}: more than {most} messages of use, which stay in memory; cut the recording into pieces, \
+         and give them all"
+    )]
+    TooLong { file: String, topic: String, most: usize },
     #[error("{file}: topic {topic}: no tag in it: {problem}")]
     NoTags { file: String, topic: String, problem: String },
     #[error("{file}: topic {topic} holds {held}; `tags.use` of the input map must be {allowed}")]

@@ -31,6 +31,10 @@ pub struct ExternalRecording {
     pub chunk_order: ChunkOrder,
 }
 
+/// Readings, and images with tags, of one recording: 22 hours at 100 Hz, 1 GB. Whether the arm rested between two
+/// images is seen from all readings between them, so that all are kept.
+const MAX_MESSAGES: usize = 8_000_000;
+
 /// Reads the joint readings and tags of a recording; joints are matched by name.
 ///
 /// Joints distal to the camera may be absent, unless the robot has a tag on its gripper.
@@ -38,6 +42,10 @@ pub struct ExternalRecording {
 /// # Errors
 /// [`InputError`], naming file, topic, message and field.
 pub fn read_external(path: &Path, map: &InputMap, robot: &Robot) -> Result<ExternalRecording, InputError> {
+    read_up_to(MAX_MESSAGES, path, map, robot)
+}
+
+fn read_up_to(most: usize, path: &Path, map: &InputMap, robot: &Robot) -> Result<ExternalRecording, InputError> {
     let file = path.display().to_string();
     let joints = robot.joint_names();
     let n_needed = if robot.gripper_tag.is_some() { joints.len() } else { robot.camera.mount.n_joints };
@@ -60,7 +68,8 @@ pub fn read_external(path: &Path, map: &InputMap, robot: &Robot) -> Result<Exter
         } else {
             Ok(())
         };
-        first_error = taken.err();
+        let of_topics = [(&map.joint_topic, readings.readings.len()), (&map.tag_topic, tags.len())];
+        first_error = taken.err().or_else(|| too_long(&file, of_topics, most));
     })?;
     if let Some(error) = first_error {
         return Err(error);
@@ -77,7 +86,7 @@ pub fn read_external(path: &Path, map: &InputMap, robot: &Robot) -> Result<Exter
             return Err(InputError::Disorder { file: file.clone(), topic: topic.clone(), disorder });
         }
     }
-    if tags.is_empty() {
+    if tags.len() == 0 {
         let (topic, problem) = (map.tag_topic.clone(), tags.problem());
         return Err(InputError::NoTags { file: file.clone(), topic, problem });
     }
@@ -97,6 +106,12 @@ pub fn read_external(path: &Path, map: &InputMap, robot: &Robot) -> Result<Exter
         completeness: summary.completeness,
         chunk_order: summary.chunk_order,
     })
+}
+
+/// The error for the first topic with more messages in memory than `most`.
+fn too_long(file: &str, of_topics: [(&String, usize); 2], most: usize) -> Option<InputError> {
+    let (topic, _) = of_topics.into_iter().find(|(_, n)| *n > most)?;
+    Some(InputError::TooLong { file: file.to_owned(), topic: topic.clone(), most })
 }
 
 /// Hash of topic, log time and bytes.
@@ -132,4 +147,34 @@ fn check_tags(file: &str, raw: &RawMessage<'_>, map: &InputMap) -> Result<(), In
         _ => return Ok(()),
     };
     Err(InputError::Use { file: file.to_owned(), topic: raw.topic().to_owned(), held, allowed })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::input::read_input_map;
+    use crate::log::ros::JointState;
+    use crate::log::{RecordingHeader, RecordingWriter, RosMessage};
+    use crate::time::SIMULATION_EPOCH;
+
+    #[test]
+    fn more_readings_than_memory_is_meant_for_are_refused() {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+        let robot = crate::robot::load(&root.join("robots/titan4")).unwrap();
+        let map = read_input_map(&root.join("fuzz/corpus/input_map/positions.toml")).unwrap();
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("long.mcap");
+        let mut writer = RecordingWriter::create(&path, RecordingHeader::new(robot.joint_names())).unwrap();
+        for n in 0..12 {
+            let recorded = |joint: &String| map.joint_names.get(joint).unwrap_or(joint).clone();
+            let name: Vec<String> = robot.joint_names().iter().map(recorded).collect();
+            let joints = JointState { position: vec![1.0; name.len()], name, ..JointState::default() };
+            let at = SIMULATION_EPOCH.plus_s(f64::from(n));
+            writer.write_ros(&map.joint_topic, &JointState::SCHEMA, at, &joints).unwrap();
+        }
+        writer.finish().unwrap();
+        let problem = |most| read_up_to(most, &path, &map, &robot).unwrap_err();
+        assert!(matches!(problem(11), InputError::TooLong { most: 11, topic, .. } if topic == map.joint_topic));
+        assert!(matches!(problem(12), InputError::NoTopic { .. }));
+    }
 }

@@ -220,8 +220,9 @@ impl<'a> TagReader<'a> {
         (frames, self.left_out)
     }
 
-    pub fn is_empty(&self) -> bool {
-        self.frames.is_empty()
+    /// Number of images.
+    pub fn len(&self) -> usize {
+        self.frames.len()
     }
 
     /// Why nothing of the topic could be used.

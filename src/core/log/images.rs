@@ -4,6 +4,7 @@ use std::path::Path;
 
 use super::error::LogError;
 use super::message_codec::Stream;
+use super::messages::joints::FirstJoints;
 use super::raw::for_each_raw;
 use crate::streams::{CameraImage, Message};
 use crate::time::Stamp;
@@ -15,7 +16,7 @@ use crate::time::Stamp;
 pub fn for_each_image(path: impl AsRef<Path>, mut take: impl FnMut(Stamp, CameraImage)) -> Result<(), LogError> {
     for_each_raw(path.as_ref(), |raw| {
         if raw.topic() == Stream::Images.topic()
-            && let Ok(Message::Image(image)) = Stream::Images.decode(raw.data, &mut None)
+            && let Ok(Message::Image(image)) = Stream::Images.decode(raw.data, &mut FirstJoints::default())
         {
             take(raw.log_time(), image);
         }

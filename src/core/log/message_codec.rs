@@ -3,7 +3,7 @@
 use super::cdr;
 use super::error::{DecodeRejection, EncodeError};
 use super::header::RecordingHeader;
-use super::messages::joints::FirstNames;
+use super::messages::joints::FirstJoints;
 use super::messages::{
     AprilTagDetectionArray, CompressedImage, DetectionRejects, FluidPressure, Imu, JointState, Log, Mark, ReachTask,
     TagSurvey, Temperature, Touch, attitude, detections, images, joints, log_line, marks, pressure, rejects, survey,
@@ -129,18 +129,18 @@ impl Stream {
     ///
     /// # Errors
     /// [`DecodeRejection`], whatever the bytes are.
-    pub(super) fn decode(self, bytes: &[u8], names: &mut FirstNames) -> Result<Message, DecodeRejection> {
+    pub(super) fn decode(self, bytes: &[u8], first: &mut FirstJoints) -> Result<Message, DecodeRejection> {
         Ok(match self {
             Self::JointSensors => {
-                let (stamp, position) = joints::decode(bytes, names)?;
+                let (stamp, position) = joints::decode(bytes, first)?;
                 Message::JointSensors(JointSensorSample { stamp, counts: JointCounts::from_slice(&position) })
             }
             Self::JointCommands => {
-                let (stamp, position) = joints::decode(bytes, names)?;
+                let (stamp, position) = joints::decode(bytes, first)?;
                 Message::JointCommand(JointCommand { stamp, counts: JointCounts::from_slice(&position) })
             }
             Self::JointStates => {
-                let (stamp, position) = joints::decode(bytes, names)?;
+                let (stamp, position) = joints::decode(bytes, first)?;
                 Message::JointStates(JointStateBelief { stamp, angles: JointAngles::from_slice(&position) })
             }
             Self::Detections => Message::Detections(detections::from_ros(&cdr::decode(bytes)?)?),
@@ -220,7 +220,7 @@ mod tests {
         for message in samples::one_of_each() {
             encode_message(&message, &samples::header(), &mut bytes).unwrap();
             let stream = Stream::of(&message);
-            assert_eq!(stream.decode(&bytes, &mut None), Ok(message));
+            assert_eq!(stream.decode(&bytes, &mut FirstJoints::default()), Ok(message));
             streams.insert(stream);
         }
         assert_eq!(streams, Stream::ALL.into());
@@ -235,8 +235,8 @@ mod tests {
             for at in 0..bytes.len() * 8 {
                 let mut damaged = bytes.clone();
                 damaged[at / 8] ^= 1 << (at % 8);
-                accepted += u32::from(stream.decode(&damaged, &mut None).is_ok());
-                let _ = stream.decode(&damaged[..at / 8], &mut None);
+                accepted += u32::from(stream.decode(&damaged, &mut FirstJoints::default()).is_ok());
+                let _ = stream.decode(&damaged[..at / 8], &mut FirstJoints::default());
             }
         }
         assert!(accepted > 0);

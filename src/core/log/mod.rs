@@ -40,7 +40,9 @@ pub use raw::{
     AttachmentInfo, Channel, ChunkOrder, ChunkTotals, Completeness, FileContents, RawMessage, RawSummary, Schema,
     file_contents, for_each_raw,
 };
-pub use reader::{RawRecord, Recording, TopicMap, read_recording, read_recording_with, scan_recording};
+pub use reader::{
+    Choice, RawRecord, Recording, TopicMap, read_chosen, read_recording, read_recording_with, scan_recording,
+};
 pub use schema::{RosMessage, RosSchema};
 pub use strip::strip;
 pub use writer::RecordingWriter;

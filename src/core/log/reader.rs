@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 
 use super::error::{DecodeRejection, LogError};
 use super::message_codec::Stream;
-use super::messages::joints::FirstNames;
+use super::messages::joints::FirstJoints;
 use super::order::{StampOrder, StampRegression};
-use super::raw::{ChunkOrder, Completeness, RawMessage, RawSummary, for_each_raw};
+use super::raw::{ChunkOrder, Completeness, RawMessage, RawSummary, for_each_raw, for_each_raw_twice};
 use super::topics::VIEWER_TOPICS;
 use crate::streams::Message;
 use crate::time::Stamp;
@@ -94,23 +94,59 @@ pub fn scan_recording(
     path: impl AsRef<Path>,
     map: &TopicMap,
     mut on_raw: impl FnMut(&RawMessage<'_>),
-    keep: impl FnMut(Stamp, &Message) -> bool,
+    mut keep: impl FnMut(Stamp, &Message) -> bool,
 ) -> Result<(Recording, RawSummary), LogError> {
     let path = path.as_ref();
-    let mut collector = Collector::new(map, keep);
+    let mut collector = Collector::new(map);
     let summary = for_each_raw(path, |message| {
         on_raw(message);
-        collector.take(message);
+        collector.take(message, |raw, message| keep(raw.log_time(), message));
     })?;
     Ok((collector.finish(path, &summary), summary))
 }
 
-struct Collector<'a, F> {
-    keep: F,
+/// What of a recording stays in memory, where that is known only after all of it was seen.
+pub trait Choice {
+    /// A message of the first pass, and the part of the file that it lies in.
+    fn note(&mut self, part: u64, message: &Message);
+    /// After the first pass: the parts that are read again.
+    fn parts(&mut self) -> BTreeSet<u64>;
+    /// Whether a message of these parts stays.
+    fn keeps(&self, message: &Message) -> bool;
+}
+
+/// Reads a recording of any length in two passes: all of it, then the parts that `choice` needs. The counts of the
+/// result are of all messages.
+///
+/// # Errors
+/// As [`read_recording_with`].
+pub fn read_chosen(path: &Path, map: &TopicMap, choice: &mut impl Choice) -> Result<Recording, LogError> {
+    let mut all = Collector::new(map);
+    let (summary, again) = for_each_raw_twice(path, |raw| {
+        all.take(raw, |raw, message| {
+            choice.note(raw.part, message);
+            false
+        });
+    })?;
+    let mut chosen = Collector { joints: all.joints.clone(), ..Collector::new(map) };
+    let parts = choice.parts();
+    again
+        .visit(parts, |raw| chosen.take(raw, |_, message| choice.keeps(message)))
+        .map_err(|source| LogError::Read { path: path.to_owned(), source })?;
+    for (_, message) in &chosen.messages {
+        if let Some(n) = all.left_in_file.get_mut(&Stream::of(message)) {
+            *n = n.saturating_sub(1);
+        }
+    }
+    all.left_in_file.retain(|_, n| *n > 0);
+    Ok(Collector { messages: chosen.messages, ..all }.finish(path, &summary))
+}
+
+struct Collector<'a> {
     map: &'a TopicMap,
     streams: BTreeMap<&'a str, Stream>,
-    /// Topic and joint names of each stream of joints.
-    names: BTreeMap<Stream, (String, FirstNames)>,
+    /// Topic of each stream, and what its first message says of joints.
+    joints: BTreeMap<Stream, (String, FirstJoints)>,
     messages: Vec<(Stamp, Message)>,
     left_in_file: BTreeMap<Stream, u64>,
     raw: Vec<RawRecord>,
@@ -121,8 +157,8 @@ struct Collector<'a, F> {
     order: BTreeMap<Stream, StampOrder>,
 }
 
-impl<'a, F: FnMut(Stamp, &Message) -> bool> Collector<'a, F> {
-    fn new(map: &'a TopicMap, keep: F) -> Self {
+impl<'a> Collector<'a> {
+    fn new(map: &'a TopicMap) -> Self {
         let mut streams: BTreeMap<&str, Stream> = Stream::ALL.iter().map(|&stream| (stream.topic(), stream)).collect();
         let mapped = [(Stream::JointSensors, &map.joint_sensors), (Stream::Detections, &map.detections)];
         for (stream, topic) in mapped {
@@ -134,10 +170,9 @@ impl<'a, F: FnMut(Stamp, &Message) -> bool> Collector<'a, F> {
         let is_read = |stream: &Stream| map.only.as_ref().is_none_or(|only| only.contains(stream));
         streams.retain(|&topic, stream| !map.raw.contains(topic) && is_read(stream));
         Self {
-            keep,
             map,
             streams,
-            names: BTreeMap::new(),
+            joints: BTreeMap::new(),
             messages: Vec::new(),
             left_in_file: BTreeMap::new(),
             raw: Vec::new(),
@@ -149,19 +184,19 @@ impl<'a, F: FnMut(Stamp, &Message) -> bool> Collector<'a, F> {
         }
     }
 
-    fn take(&mut self, raw: &RawMessage<'_>) {
+    fn take(&mut self, raw: &RawMessage<'_>, keep: impl FnOnce(&RawMessage<'_>, &Message) -> bool) {
         let topic = raw.topic();
         let Some(&stream) = self.streams.get(topic) else {
             return self.take_other(raw);
         };
-        let (_, names) = self.names.entry(stream).or_insert_with(|| (topic.to_owned(), None));
-        match check(stream, raw).and_then(|()| stream.decode(raw.data, names)) {
+        let (_, first) = self.joints.entry(stream).or_insert_with(|| (topic.to_owned(), FirstJoints::default()));
+        match check(stream, raw).and_then(|()| stream.decode(raw.data, first)) {
             Ok(message) => {
                 self.count_order(raw.log_time());
                 if let Some(stamp) = ordered_stamp(&message) {
                     self.order.entry(stream).or_default().add(stamp);
                 }
-                if (self.keep)(raw.log_time(), &message) {
+                if keep(raw, &message) {
                     self.messages.push((raw.log_time(), message));
                 } else {
                     *self.left_in_file.entry(stream).or_default() += 1;
@@ -230,9 +265,9 @@ impl<'a, F: FnMut(Stamp, &Message) -> bool> Collector<'a, F> {
     /// streams with other names are rejected.
     fn settle_joint_names(&mut self) -> Vec<String> {
         // Stream orders the sensors first.
-        let named: Vec<(Stream, String, Vec<String>)> = std::mem::take(&mut self.names)
+        let named: Vec<(Stream, String, Vec<String>)> = std::mem::take(&mut self.joints)
             .into_iter()
-            .filter_map(|(stream, (topic, names))| Some((stream, topic, names?)))
+            .filter_map(|(stream, (topic, first))| Some((stream, topic, first.names?)))
             .collect();
         let Some((_, _, joint_names)) = named.first().cloned() else {
             return Vec::new();

@@ -2,7 +2,9 @@
 //!
 //! V-HACD works on voxels, 64 along the longest side, and tries planes that cut them; it cannot be stopped on its way.
 //! A mesh that is no body (a soup of triangles) fills the box with surface and takes minutes, so two counts that its
-//! work grows with are looked at first.
+//! work grows with are looked at first; and the pieces into which voxels cut triangles, which become the hulls.
+
+use std::collections::BTreeSet;
 
 use nalgebra::Vector3;
 use parry3d::math::Vec3;
@@ -16,6 +18,8 @@ use super::mesh::Mesh;
 const MAX_HULLS: u32 = 32;
 /// Limit of tests of a triangle against a voxel; a million small triangles make 6e7.
 const MAX_TESTS: f64 = 1e8;
+/// Limit of pieces of triangles in voxels, each some 12 us and 0.8 kB; a body of 200,000 small triangles has as many.
+const MAX_PIECES: f64 = 400_000.0;
 /// Limit of voxels with surface in them; a cube has 24,000.
 const MAX_SURFACE_VOXELS: usize = 60_000;
 
@@ -27,11 +31,13 @@ pub(super) fn decomposed(mesh: &Mesh) -> Result<Vec<CenteredHull>, HullError> {
     // A flat mesh has no voxels to decompose.
     Hull::centered(&mesh.vertices)?;
     let vertices: Vec<Vec3> = mesh.vertices.iter().map(|p| Vec3::from_array(*p)).collect();
+    let triangles = without_repetitions(mesh);
     let parameters = VHACDParameters { max_convex_hulls: MAX_HULLS, ..VHACDParameters::default() };
-    check_work(mesh, &vertices, &parameters)?;
-    let parts = VHACD::decompose(&parameters, &vertices, &mesh.triangles, true);
+    check_work(mesh, &triangles, &vertices, &parameters)?;
+    let parts = VHACD::decompose(&parameters, &vertices, &triangles, true);
     let mut hulls = Vec::new();
-    for points in parts.compute_primitive_intersections(&vertices, &mesh.triangles) {
+    for part in parts.voxel_parts() {
+        let points = part.compute_primitive_intersections(&vertices, &triangles);
         let points: Vec<[f64; 3]> = points.iter().map(|p| p.to_array()).collect();
         match Hull::centered(&points) {
             Ok(hull) => hulls.push(hull),
@@ -46,7 +52,23 @@ pub(super) fn decomposed(mesh: &Mesh) -> Result<Vec<CenteredHull>, HullError> {
     Ok(hulls)
 }
 
-fn check_work(mesh: &Mesh, vertices: &[Vec3], parameters: &VHACDParameters) -> Result<(), HullError> {
+/// The triangles, each once: a face that a file repeats adds nothing but work.
+fn without_repetitions(mesh: &Mesh) -> Vec<[u32; 3]> {
+    let mut known = BTreeSet::new();
+    let is_new = |triangle: &&[u32; 3]| {
+        let mut corners = **triangle;
+        corners.sort_unstable();
+        known.insert(corners)
+    };
+    mesh.triangles.iter().filter(is_new).copied().collect()
+}
+
+fn check_work(
+    mesh: &Mesh,
+    triangles: &[[u32; 3]],
+    vertices: &[Vec3],
+    parameters: &VHACDParameters,
+) -> Result<(), HullError> {
     let of_corners = |corners: &[[f64; 3]]| {
         let bound = |pick: fn(f64, f64) -> f64| {
             Vector3::from_fn(|axis, _| corners.iter().map(|p| p[axis]).reduce(pick).unwrap_or_default())
@@ -54,7 +76,7 @@ fn check_work(mesh: &Mesh, vertices: &[Vec3], parameters: &VHACDParameters) -> R
         bound(f64::max) - bound(f64::min)
     };
     let side_m = of_corners(&mesh.vertices).max() / f64::from(parameters.resolution);
-    let tests = mesh.triangles.iter().map(|triangle| {
+    let tests = triangles.iter().map(|triangle| {
         let size_m = of_corners(&triangle.map(|corner| mesh.vertices[corner as usize]));
         // The voxels that it touches, and one more on either side.
         size_m.map(|length_m| (length_m / side_m).ceil() + 2.0).product()
@@ -64,11 +86,25 @@ fn check_work(mesh: &Mesh, vertices: &[Vec3], parameters: &VHACDParameters) -> R
     if n_tests > MAX_TESTS {
         return too_complex("tests of triangles against voxels", n_tests, MAX_TESTS);
     }
-    let voxels = VoxelSet::voxelize(vertices, &mesh.triangles, parameters.resolution, parameters.fill_mode, false);
+    let n_pieces: f64 =
+        triangles.iter().map(|triangle| pieces(triangle.map(|n| mesh.vertices[n as usize]), side_m)).sum();
+    if n_pieces > MAX_PIECES {
+        return too_complex("pieces of triangles in voxels", n_pieces, MAX_PIECES);
+    }
+    let voxels = VoxelSet::voxelize(vertices, triangles, parameters.resolution, parameters.fill_mode, false);
     match voxels.voxels().iter().filter(|voxel| voxel.is_on_surface).count() {
         n if n > MAX_SURFACE_VOXELS => too_complex("voxels of surface", n as f64, MAX_SURFACE_VOXELS as f64),
         _ => Ok(()),
     }
+}
+
+/// About how many voxels of this side cut something from a triangle: as many as its area has squares, and half as many
+/// as its edges have lengths.
+fn pieces(corners: [[f64; 3]; 3], side_m: f64) -> f64 {
+    let [a, b, c] = corners.map(Vector3::from);
+    let area_m2 = (b - a).cross(&(c - a)).norm() / 2.0;
+    let edges_m = (b - a).norm() + (c - b).norm() + (a - c).norm();
+    1.0 + area_m2 / side_m.powi(2) + edges_m / (2.0 * side_m)
 }
 
 #[cfg(test)]
@@ -89,6 +125,43 @@ mod tests {
             mesh.triangles.push([3 * k, 3 * k + 1, 3 * k + 2]);
         }
         mesh
+    }
+
+    /// An angle of two plates, with every face `n` times; each time by vertices of its own, `step_m` further, where
+    /// that is not zero.
+    fn angle(n: u32, step_m: f64) -> Mesh {
+        let outline = [[0.0, 0.0], [1.0, 0.0], [1.0, 0.2], [0.2, 0.2], [0.2, 1.0], [0.0, 1.0]];
+        let faces = [[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 5]];
+        let mut mesh = Mesh::default();
+        for k in 0..n {
+            let first = if step_m == 0.0 { 0 } else { mesh.vertices.len() as u32 };
+            if k == 0 || step_m != 0.0 {
+                let z = step_m * f64::from(k);
+                mesh.vertices.extend([0.0, 0.2].iter().flat_map(|h| outline.map(|[x, y]| [x, y, h + z])));
+            }
+            for [a, b, c] in faces {
+                mesh.triangles.extend([[a, c, b], [a + 6, b + 6, c + 6]].map(|of| of.map(|n| n + first)));
+            }
+            for a in 0..6 {
+                let b = (a + 1) % 6;
+                mesh.triangles.extend([[a, b, b + 6], [a, b + 6, a + 6]].map(|of| of.map(|n| n + first)));
+            }
+        }
+        mesh
+    }
+
+    #[test]
+    fn faces_that_are_repeated_cost_nothing_and_change_nothing() {
+        let (once, often) = (decomposed(&angle(1, 0.0)).unwrap(), decomposed(&angle(1000, 0.0)).unwrap());
+        assert!(!once.is_empty() && once.len() == often.len());
+        let points = |hulls: &[CenteredHull]| -> Vec<_> { hulls.iter().map(|hull| hull.points_m.clone()).collect() };
+        assert_eq!(points(&once), points(&often));
+    }
+
+    #[test]
+    fn faces_that_lie_upon_each_other_by_the_thousand_are_refused() {
+        let error = decomposed(&angle(500, 1e-6)).map(|hulls| hulls.len()).expect_err("refused").to_string();
+        assert!(error.contains("pieces of triangles in voxels") && error.contains("simplify"), "{error}");
     }
 
     #[test]

@@ -6,7 +6,6 @@ use nalgebra::DMatrix;
 
 use crate::calib::bundle::estimate::estimate;
 use crate::calib::bundle::input::{BundleInput, HyperparameterMode};
-use crate::calib::bundle::model::Hyperparameters;
 use crate::calib::covariance::ParameterCovariance;
 use crate::calib::online::diagnosis::{Race, RecentViews, is_suspicious};
 use crate::calib::online::event::OnlineEvent;

@@ -5,7 +5,7 @@ use rand::RngExt;
 
 use crate::tagmap::tests::fixture::{Scene, fisheye, look, looking, pinhole, settings, size_of, wall};
 use crate::tagmap::tests::{distances, position_errors};
-use crate::tagmap::{GroupFrame, MapDetection, MapMode, MapRejection, MapSettings, MapView, TagPrior, solve};
+use crate::tagmap::{GroupFrame, MapDetection, MapMode, MapRejection, MapSettings, MapView, TagMap, TagPrior, solve};
 use armcal_core::stats::stream_rng;
 use armcal_core::time::Stamp;
 
@@ -259,4 +259,47 @@ fn a_long_wall_of_tags_holds_together() {
     assert!((0.9..1.1).contains(&reduced), "{reduced}");
     // Errors of tags far from the base are nearly the same, so their distances are not independent.
     assert!(distances(&scene, &map).iter().all(|d2| *d2 < 30.0));
+}
+
+/// Squares at random, of random tags.
+fn nonsense(n_tags: u32, n_views: usize, seed: u64) -> Scene {
+    let mut scene = wall(pinhole(), n_tags, n_views, 0.3, seed);
+    let mut rng = stream_rng(seed, "nonsense");
+    for view in &mut scene.views {
+        let mut ids: Vec<u32> = (0..n_tags).collect();
+        view.tags.clear();
+        for _ in 0..6.min(n_tags) {
+            let id = ids.swap_remove(rng.random_range(0..ids.len()));
+            let at = Vector3::from_fn(|_, _| rng.random_range(-0.7..0.7)) + Vector3::new(0.0, 0.0, 2.0);
+            let camera_from_tag = looking(
+                at,
+                at + Vector3::new(rng.random_range(-0.5..0.5), rng.random_range(-0.5..0.5), -1.0),
+                rng.random_range(0.0..6.0),
+            );
+            view.tags.extend(look(
+                &scene.cameras[0],
+                &Isometry3::identity(),
+                &[(id, size_of(id), camera_from_tag)],
+                0.3,
+                &mut rng,
+            ));
+        }
+    }
+    scene
+}
+
+/// An end by a count of steps, the same on every machine, with the reason.
+#[test]
+fn views_that_contradict_each_other_end_by_the_budget() {
+    let scene = nonsense(40, 100, 0);
+    let map = solve(&scene.input(), &settings()).unwrap();
+    assert!(!map.has_converged);
+    assert!(
+        map.warnings.iter().any(|warning| warning.contains("contradict each other: after 250 steps")),
+        "{:?}",
+        map.warnings
+    );
+    let again = solve(&scene.input(), &settings()).unwrap();
+    let poses = |map: &TagMap| map.tags.iter().map(|tag| tag.frame_from_tag).collect::<Vec<_>>();
+    assert_eq!(poses(&map), poses(&again));
 }

@@ -14,8 +14,51 @@ use crate::time::Stamp;
 /// Name of the one joint on the gripper's topics.
 const GRIPPER_JOINT: &str = "gripper";
 
-/// Joint names of a topic's first message; `None` before it.
-pub(in crate::log) type FirstNames = Option<Vec<String>>;
+/// What the first message of a topic says of all: the joint names, and where the numbers lie.
+#[derive(Clone, Debug, Default)]
+pub(in crate::log) struct FirstJoints {
+    /// `None` before the first message.
+    pub(in crate::log) names: Option<Vec<String>>,
+    layout: Option<Layout>,
+}
+
+/// Bytes of a message that have stamp and positions only to differ from others of its topic: names need not be read
+/// again in each of millions.
+#[derive(Clone, Debug)]
+struct Layout {
+    bytes: Vec<u8>,
+    n_positions: usize,
+}
+
+impl Layout {
+    /// Little endian, after the encapsulation header.
+    const STAMP: std::ops::Range<usize> = 4..12;
+    /// Lengths of the empty velocities and efforts, in which our own messages end.
+    const TAIL_BYTES: usize = 8;
+
+    /// Of a message that decodes to these positions; `None` where they lie elsewhere.
+    fn of(bytes: &[u8], position: &[f64]) -> Option<Self> {
+        let layout = Self { bytes: bytes.to_vec(), n_positions: position.len() };
+        let is_little_endian = bytes.starts_with(&[0, 1]);
+        let (_, found) = layout.read(bytes).filter(|_| is_little_endian)?;
+        (found == position).then_some(layout)
+    }
+
+    /// Stamp and positions of a message that is otherwise the same.
+    fn read(&self, bytes: &[u8]) -> Option<(Time, Vec<f64>)> {
+        let tail = bytes.len().checked_sub(Self::TAIL_BYTES)?;
+        let start = tail.checked_sub(8 * self.n_positions).filter(|&start| start >= Self::STAMP.end)?;
+        let is_alike = |range: std::ops::Range<usize>| bytes[range.clone()] == self.bytes[range];
+        let is_same = bytes.len() == self.bytes.len()
+            && is_alike(0..Self::STAMP.start)
+            && is_alike(Self::STAMP.end..start)
+            && is_alike(tail..bytes.len())
+            && bytes[tail..] == [0; Self::TAIL_BYTES];
+        let (stamp, positions) = (bytes[Self::STAMP].as_chunks::<4>().0, bytes[start..tail].as_chunks::<8>().0);
+        let time = Time { sec: i32::from_le_bytes(stamp[0]), nanosec: u32::from_le_bytes(stamp[1]) };
+        is_same.then(|| (time, positions.iter().map(|number| f64::from_le_bytes(*number)).collect()))
+    }
+}
 
 /// sensor_msgs/msg/JointState; position in rad, or in raw counts on `/joint_sensors` and `/joint_commands`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -79,8 +122,12 @@ pub(in crate::log) fn encode(
     Ok(cdr::encode(&joints, out)?)
 }
 
-/// Stamp and one finite position per joint. The first message sets `names`; later ones must have the same.
-pub(in crate::log) fn decode(bytes: &[u8], names: &mut FirstNames) -> Result<(Stamp, Vec<f64>), DecodeRejection> {
+/// Stamp and one finite position per joint. The first message sets the names in `first`; later ones must have the same.
+pub(in crate::log) fn decode(bytes: &[u8], first: &mut FirstJoints) -> Result<(Stamp, Vec<f64>), DecodeRejection> {
+    if let Some((stamp, position)) = first.layout.as_ref().and_then(|layout| layout.read(bytes)) {
+        finite("position", position.iter().copied())?;
+        return Ok((stamp.try_into()?, position));
+    }
     let joints: JointStateIn<'_> = cdr::decode(bytes)?;
     let n = joints.position.len();
     if n > MAX_JOINTS {
@@ -89,6 +136,7 @@ pub(in crate::log) fn decode(bytes: &[u8], names: &mut FirstNames) -> Result<(St
     if n == 0 {
         return Err(DecodeRejection::NoJoints);
     }
+    let names = &mut first.names;
     if let Some(first) = names.as_ref().filter(|first| first.len() != n) {
         return Err(DecodeRejection::JointCount { got: n, expected: first.len() });
     }
@@ -100,6 +148,9 @@ pub(in crate::log) fn decode(bytes: &[u8], names: &mut FirstNames) -> Result<(St
     }
     finite("position", joints.position.iter().copied())?;
     names.get_or_insert_with(|| joints.name.iter().map(|name| (*name).to_owned()).collect());
+    if first.layout.is_none() {
+        first.layout = Layout::of(bytes, &joints.position);
+    }
     Ok((joints.stamp.try_into()?, joints.position))
 }
 
@@ -129,7 +180,7 @@ mod tests {
 
     #[test]
     fn joint_names_and_count_are_fixed_by_the_first_message() {
-        let mut first = None;
+        let mut first = FirstJoints::default();
         let mut decode = |names: &[&str], position: &[f64]| {
             let name = names.iter().map(|&name| name.into()).collect();
             let joints = JointState { name, position: position.to_vec(), ..Default::default() };
@@ -162,6 +213,26 @@ mod tests {
         let mut expected = Vec::new();
         cdr::encode(&owned, &mut expected).unwrap();
         assert_eq!(borrowed, expected);
+    }
+
+    #[test]
+    fn a_known_layout_reads_what_decoding_reads_and_refuses_what_it_refuses() {
+        let header = samples::header();
+        let (mut bytes, mut first, stamp) = (Vec::new(), FirstJoints::default(), Stamp { nanos: 1_500_000_000 });
+        encode(stamp, &[1.0, 2.0, 3.0], &header, &mut bytes).unwrap();
+        decode(&bytes, &mut first).unwrap();
+        assert!(first.layout.is_some());
+        let slow = FirstJoints { layout: None, ..first.clone() };
+        let mut n_read = 0;
+        for bit in 0..8 * bytes.len() {
+            let mut changed = bytes.clone();
+            changed[bit / 8] ^= 1 << (bit % 8);
+            let expected = decode(&changed, &mut slow.clone());
+            n_read += u32::from(expected.is_ok());
+            assert_eq!(decode(&changed, &mut first.clone()), expected, "bit {bit}");
+            assert_eq!(decode(&changed[..bit / 8], &mut first.clone()), decode(&changed[..bit / 8], &mut slow.clone()));
+        }
+        assert!(n_read > 100);
     }
 
     #[test]

@@ -4,7 +4,7 @@ use mcap::records::op;
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::{McapError, McapResult};
 
-use super::limits::{MAX_UNCHECKED_BYTES, record_limit, unpacked_limit};
+use super::limits::{MAX_RECORD_BYTES, MAX_UNCHECKED_BYTES, record_limit, unpacked_limit};
 use super::record::{ChunkHead, PREFIX_BYTES};
 
 /// Why a chunk is not read, or not to its end.
@@ -20,17 +20,36 @@ pub enum ChunkError {
     NoRecord,
 }
 
-/// Passes the records of a whole chunk to `visit` after its checksum is verified (where it has one). `bytes` is the
-/// record from its opcode on, with a consistent `head`.
-pub fn for_each_record(bytes: &[u8], head: &ChunkHead, visit: impl FnMut(u8, &[u8])) -> Result<(), ChunkError> {
-    let limit = unpacked_limit(head.compressed_bytes);
-    if head.uncompressed_bytes > limit {
-        return Err(ChunkError::Bytes { bytes: head.uncompressed_bytes, limit });
+/// Unpacks whole chunks. What it is made of is large, and serves for one chunk after the other.
+#[derive(Default)]
+pub struct Unpacker {
+    /// At the end of a chunk.
+    reader: Option<Box<LinearReader>>,
+}
+
+impl Unpacker {
+    /// Passes the records of a whole chunk to `visit` after its checksum is verified (where it has one). `bytes` is the
+    /// record from its opcode on, with a consistent `head`.
+    pub fn for_each_record(
+        &mut self,
+        bytes: &[u8],
+        head: &ChunkHead,
+        visit: impl FnMut(u8, &[u8]),
+    ) -> Result<(), ChunkError> {
+        let limit = unpacked_limit(head.compressed_bytes);
+        if head.uncompressed_bytes > limit {
+            return Err(ChunkError::Bytes { bytes: head.uncompressed_bytes, limit });
+        }
+        let options = options().with_prevalidate_chunk_crcs(true).with_record_length_limit(MAX_RECORD_BYTES as usize);
+        let mut reader = self.reader.take().unwrap_or_else(|| Box::new(LinearReader::new_with_options(options)));
+        let unpacked = drive_chunk(&mut reader, bytes, head, visit)?;
+        if unpacked == head.uncompressed_bytes {
+            self.reader = Some(reader);
+            return Ok(());
+        }
+        // The chunk ends within a record, or says a wrong size.
+        end(&mut reader)
     }
-    let options = options()
-        .with_prevalidate_chunk_crcs(true)
-        .with_record_length_limit(usize::try_from(limit).unwrap_or(usize::MAX));
-    drive_chunk(options, bytes, head.compressed_bytes, visit)
 }
 
 /// Passes the whole records of a cut chunk to `visit`, unverified. `bytes` runs from the chunk's opcode to the end of
@@ -50,7 +69,7 @@ pub fn for_each_record_of_cut(bytes: &[u8], head: &ChunkHead, visit: impl FnMut(
     chunk.extend_from_slice(compressed);
     // The error comes from the cut.
     let options = options().with_record_length_limit(MAX_UNCHECKED_BYTES as usize);
-    let _ = drive_chunk(options, &chunk, compressed.len() as u64, visit);
+    let _ = drive_chunk(&mut LinearReader::new_with_options(options), &chunk, head, visit);
 }
 
 /// Schemas, channels and statistics of the summary section, if its checksum holds. `bytes` runs from the data end
@@ -58,12 +77,14 @@ pub fn for_each_record_of_cut(bytes: &[u8], head: &ChunkHead, visit: impl FnMut(
 pub fn verified_summary(bytes: &[u8]) -> McapResult<Vec<(u8, Vec<u8>)>> {
     let mut records = Vec::new();
     let options = options().with_validate_summary_section_crc(true).with_record_length_limit(bytes.len());
-    drive(options, bytes, |opcode, body| {
+    let mut reader = LinearReader::new_with_options(options);
+    drive(&mut reader, bytes, |opcode, body| {
         if matches!(opcode, op::SCHEMA | op::CHANNEL | op::STATISTICS) {
             records.push((opcode, body.to_vec()));
         }
         Ok::<(), McapError>(())
     })?;
+    end::<McapError>(&mut reader)?;
     Ok(records)
 }
 
@@ -71,16 +92,17 @@ fn options() -> LinearReaderOptions {
     LinearReaderOptions::default().with_skip_start_magic(true).with_skip_end_magic(true)
 }
 
-/// Passes records on until one is impossible, or they are too many or too long for what is stored.
+/// Passes records on until one is impossible, or they are too many or too long for what is stored; their bytes.
 fn drive_chunk(
-    options: LinearReaderOptions,
+    reader: &mut LinearReader,
     bytes: &[u8],
-    compressed_bytes: u64,
+    head: &ChunkHead,
     mut visit: impl FnMut(u8, &[u8]),
-) -> Result<(), ChunkError> {
+) -> Result<u64, ChunkError> {
+    let compressed_bytes = (bytes.len() - head.head_bytes) as u64;
     let (byte_limit, record_limit) = (unpacked_limit(compressed_bytes), record_limit(compressed_bytes));
     let (mut unpacked, mut records) = (0, 0);
-    drive(options, bytes, |opcode, body| {
+    drive(reader, bytes, |opcode, body| {
         records += 1;
         unpacked += (PREFIX_BYTES + body.len()) as u64;
         match opcode {
@@ -92,17 +114,19 @@ fn drive_chunk(
                 Ok(())
             }
         }
-    })
+    })?;
+    Ok(unpacked)
 }
 
+/// Passes records on until the reader wants more than `bytes`.
 fn drive<E: From<McapError>>(
-    options: LinearReaderOptions,
+    reader: &mut LinearReader,
     mut bytes: &[u8],
     mut visit: impl FnMut(u8, &[u8]) -> Result<(), E>,
 ) -> Result<(), E> {
-    let mut reader = LinearReader::new_with_options(options);
     while let Some(event) = reader.next_event() {
         match event? {
+            LinearReadEvent::ReadRequest(_) if bytes.is_empty() => break,
             LinearReadEvent::ReadRequest(wanted) => {
                 let (next, rest) = bytes.split_at(wanted.min(bytes.len()));
                 reader.insert(next.len())[..next.len()].copy_from_slice(next);
@@ -110,6 +134,16 @@ fn drive<E: From<McapError>>(
                 bytes = rest;
             }
             LinearReadEvent::Record { opcode, data } => visit(opcode, data)?,
+        }
+    }
+    Ok(())
+}
+
+/// That nothing is missing, once no more bytes come.
+fn end<E: From<McapError>>(reader: &mut LinearReader) -> Result<(), E> {
+    while let Some(event) = reader.next_event() {
+        if let LinearReadEvent::ReadRequest(_) = event? {
+            reader.notify_read(0);
         }
     }
     Ok(())

@@ -6,7 +6,7 @@ use std::path::Path;
 use super::completeness::RawSummary;
 use super::contents::FileContents;
 use super::message::RawMessage;
-use super::scan::{ScanError, scan, scan_contents};
+use super::scan::{ScanError, SecondPass, scan, scan_contents};
 use crate::files;
 use crate::log::error::LogError;
 
@@ -19,7 +19,14 @@ use crate::log::error::LogError;
 /// [`LogError::Read`], [`LogError::Empty`], [`LogError::NotMcap`]. Damage and cuts are no errors, see
 /// [`super::Completeness`].
 pub fn for_each_raw(path: impl AsRef<Path>, visit: impl FnMut(&RawMessage<'_>)) -> Result<RawSummary, LogError> {
-    let path = path.as_ref();
+    for_each_raw_twice(path.as_ref(), visit).map(|(summary, _)| summary)
+}
+
+/// [`for_each_raw`], and what visits the messages of some parts again.
+pub fn for_each_raw_twice(
+    path: &Path,
+    visit: impl FnMut(&RawMessage<'_>),
+) -> Result<(RawSummary, SecondPass<File>), LogError> {
     scan(open(path)?, visit).map_err(|error| of_scan(path, error))
 }
 

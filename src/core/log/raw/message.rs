@@ -40,6 +40,8 @@ pub struct RawMessage<'a> {
     pub publish_time_nanos: u64,
     /// Counter of the sender or recorder within the topic.
     pub sequence: u32,
+    /// The part of the file that it lies in: messages of one chunk have the same.
+    pub part: u64,
     /// Encoded fields, without the record's header.
     pub data: &'a [u8],
 }

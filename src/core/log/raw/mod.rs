@@ -9,7 +9,6 @@ mod checksum;
 mod chunk;
 mod completeness;
 mod contents;
-
 mod file;
 mod file_type;
 mod limits;
@@ -24,6 +23,6 @@ mod tests;
 
 pub use completeness::{Completeness, RawSummary};
 pub use contents::{AttachmentInfo, ChunkTotals, FileContents};
-pub use file::{file_contents, for_each_raw};
+pub use file::{file_contents, for_each_raw, for_each_raw_twice};
 pub use message::{Channel, RawMessage, Schema};
 pub use order::ChunkOrder;

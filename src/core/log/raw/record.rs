@@ -192,12 +192,12 @@ impl Tables {
         (self.declared_bytes <= MAX_DECLARED_BYTES).then_some(())
     }
 
-    /// The message of a record; `None` if it is malformed or its channel is unknown.
-    pub fn message<'a>(&'a self, body: &'a [u8]) -> Option<RawMessage<'a>> {
+    /// The message of a record in a part of a file; `None` if it is malformed or its channel is unknown.
+    pub fn message<'a>(&'a self, body: &'a [u8], part: u64) -> Option<RawMessage<'a>> {
         let mut fields = Fields(body);
         let channel = self.channels.get(&fields.u16()?)?;
         let sequence = fields.u32()?;
         let (log_time_nanos, publish_time_nanos) = (fields.u64()?, fields.u64()?);
-        Some(RawMessage { channel, log_time_nanos, publish_time_nanos, sequence, data: fields.0 })
+        Some(RawMessage { channel, log_time_nanos, publish_time_nanos, sequence, part, data: fields.0 })
     }
 }

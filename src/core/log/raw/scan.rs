@@ -1,11 +1,12 @@
 //! Pass through a file, record by record. After damage it continues at the next chunk.
 
+use std::collections::BTreeSet;
 use std::io::{self, Read, Seek};
 
 use mcap::records::op;
 
 use super::checksum::DataChecksum;
-use super::chunk::{self, ChunkError};
+use super::chunk::{self, ChunkError, Unpacker};
 use super::completeness::{Completeness, RawSummary};
 use super::contents::{FileContents, MAX_HEAD_BYTES};
 use super::file_type;
@@ -21,6 +22,8 @@ use super::window::Window;
 /// Bytes searched at once for the next chunk: few at first, as it is often near, so that they are in memory already.
 const FIRST_SEARCH_BYTES: u64 = 1 << 10;
 const SEARCH_BYTES: u64 = 1 << 18;
+/// Stored bytes of a part of a file.
+const PART_BYTES: u64 = 1 << 16;
 /// Prefix and fields of the last record, and the magic after it.
 const TAIL_BYTES: u64 = PREFIX_BYTES as u64 + FOOTER_BYTES + MAGIC.len() as u64;
 
@@ -113,17 +116,23 @@ impl Pass {
 struct Scan<R, F> {
     window: Window<R>,
     visit: F,
+    unpacker: Unpacker,
     tables: Tables,
     readable: u64,
     /// Messages that the file's own summary counts, and those of them that are copies.
     counted: Option<u64>,
     copied: u64,
     ends_with_magic: bool,
+    /// Parts whose messages are visited; `None`: all.
+    parts: Option<BTreeSet<u64>>,
     pass: Pass,
 }
 
 /// Passes every readable message of `source` to `visit`.
-pub fn scan<R: Read + Seek>(source: R, visit: impl FnMut(&RawMessage<'_>)) -> Result<RawSummary, ScanError> {
+pub fn scan<R: Read + Seek, F: FnMut(&RawMessage<'_>)>(
+    source: R,
+    visit: F,
+) -> Result<(RawSummary, SecondPass<R>), ScanError> {
     let mut scan = begin(source, visit)?;
     scan.walk()?;
     let of_chunks = if scan.pass.heads.is_doubtful { ChunkUse::Survey } else { ChunkUse::Messages };
@@ -132,7 +141,27 @@ pub fn scan<R: Read + Seek>(source: R, visit: impl FnMut(&RawMessage<'_>)) -> Re
     scan.walk()?;
     let chunk_order = scan.visit_surveyed()?;
     let contents = std::mem::take(&mut scan.pass.contents);
-    Ok(RawSummary { readable_messages: scan.readable, completeness: scan.completeness(), chunk_order, contents })
+    let (readable_messages, completeness) = (scan.readable, scan.completeness());
+    let again = SecondPass { of_chunks, scan: scan.with_visit(()) };
+    Ok((RawSummary { readable_messages, completeness, chunk_order, contents }, again))
+}
+
+/// A file whose messages were visited, to visit those of some of its parts again.
+pub struct SecondPass<R> {
+    scan: Scan<R, ()>,
+    of_chunks: ChunkUse,
+}
+
+impl<R: Read + Seek> SecondPass<R> {
+    /// Visits the messages of these parts in the same order.
+    pub fn visit(self, parts: BTreeSet<u64>, visit: impl FnMut(&RawMessage<'_>)) -> io::Result<()> {
+        let mut scan = self.scan.with_visit(visit);
+        scan.pass = Pass::new(self.of_chunks, scan.window.len());
+        scan.parts = Some(parts);
+        scan.walk()?;
+        scan.visit_surveyed()?;
+        Ok(())
+    }
 }
 
 /// Contents of `source` other than messages; its chunks are not read.
@@ -155,13 +184,31 @@ fn begin<R: Read + Seek, F: FnMut(&RawMessage<'_>)>(source: R, visit: F) -> Resu
     Ok(Scan {
         window,
         visit,
+        unpacker: Unpacker::default(),
         tables: Tables::default(),
         readable: 0,
         counted: None,
         copied: 0,
         ends_with_magic: false,
+        parts: None,
         pass: Pass::new(ChunkUse::Heads, bytes),
     })
+}
+
+/// The part of a file that a record outside of chunks belongs to, a chunk whole.
+fn part_of(at: u64) -> u64 {
+    at / PART_BYTES
+}
+
+impl<R, F> Scan<R, F> {
+    fn with_visit<G>(self, visit: G) -> Scan<R, G> {
+        let Self { window, visit: _, unpacker, tables, readable, counted, copied, ends_with_magic, parts, pass } = self;
+        Scan { window, visit, unpacker, tables, readable, counted, copied, ends_with_magic, parts, pass }
+    }
+
+    fn is_visited(&self, at: u64) -> bool {
+        self.parts.as_ref().is_none_or(|parts| parts.contains(&part_of(at)))
+    }
 }
 
 impl<R: Read + Seek, F: FnMut(&RawMessage<'_>)> Scan<R, F> {
@@ -216,7 +263,7 @@ impl<R: Read + Seek, F: FnMut(&RawMessage<'_>)> Scan<R, F> {
         let mut at = MAGIC.len() as u64;
         while let Next::At(next) = self.record(at)? {
             at = next;
-            if self.pass.chunk_use != ChunkUse::Heads && !self.pass.is_past_data {
+            if self.pass.chunk_use != ChunkUse::Heads && !self.pass.is_past_data && self.parts.is_none() {
                 self.pass.checksum.add_until(&mut self.window, at)?;
             }
         }
@@ -285,9 +332,13 @@ impl<R: Read + Seek, F: FnMut(&RawMessage<'_>)> Scan<R, F> {
     }
 
     fn unchunked(&mut self, at: u64, prefix: Prefix) -> io::Result<()> {
+        if !self.is_visited(at) {
+            return Ok(());
+        }
         let is_used = prefix.len <= MAX_RECORD_BYTES && {
             let body = self.window.bytes(at + PREFIX_BYTES as u64, prefix.len as usize)?;
-            deliver(&mut self.tables, &mut self.visit, &mut self.readable, prefix.opcode, body).is_some()
+            let mut delivery = Delivery { tables: &mut self.tables, readable: &mut self.readable, part: part_of(at) };
+            delivery.record(prefix.opcode, body, &mut self.visit).is_some()
         };
         if !is_used {
             self.pass.damage.note(at, "a record cannot be used");
@@ -300,7 +351,7 @@ impl<R: Read + Seek, F: FnMut(&RawMessage<'_>)> Scan<R, F> {
     fn data_end(&mut self, at: u64) -> io::Result<()> {
         let body = self.window.bytes(at + PREFIX_BYTES as u64, DATA_END_BYTES as usize)?;
         let stated = Fields(body).u32().unwrap_or(0);
-        let is_checked = stated != 0 && !self.pass.has_unchecked_chunks;
+        let is_checked = stated != 0 && !self.pass.has_unchecked_chunks && self.parts.is_none();
         if self.pass.chunk_use != ChunkUse::Heads && !self.pass.is_past_data && is_checked {
             self.pass.checksum.add_until(&mut self.window, at)?;
             if self.pass.checksum.value() != stated {
@@ -372,12 +423,16 @@ impl<R: Read + Seek, F: FnMut(&RawMessage<'_>)> Scan<R, F> {
 
     /// Visits the messages of a chunk.
     fn visit_chunk(&mut self, at: u64, head: &ChunkHead) -> io::Result<Result<(), ChunkError>> {
+        if !self.is_visited(at) {
+            return Ok(Ok(()));
+        }
         let bytes = self.window.bytes(at, PREFIX_BYTES + head.record_len as usize)?;
-        let (tables, visit, readable) = (&mut self.tables, &mut self.visit, &mut self.readable);
+        let visit = &mut self.visit;
+        let mut delivery = Delivery { tables: &mut self.tables, readable: &mut self.readable, part: part_of(at) };
         let (records, mut unusable) = (&mut self.pass.records, 0_u64);
-        let read = chunk::for_each_record(bytes, head, |opcode, body| {
+        let read = self.unpacker.for_each_record(bytes, head, |opcode, body| {
             *records += 1;
-            if deliver(tables, visit, readable, opcode, body).is_none() {
+            if delivery.record(opcode, body, visit).is_none() {
                 unusable += 1;
             }
         });
@@ -395,7 +450,7 @@ impl<R: Read + Seek, F: FnMut(&RawMessage<'_>)> Scan<R, F> {
         let hash = *blake3::hash(bytes).as_bytes();
         let (tables, records) = (&mut self.tables, &mut self.pass.records);
         let mut chunk = SurveyedChunk { at, record_bytes, hash, messages: 0, nanos: None };
-        let read = chunk::for_each_record(bytes, head, |opcode, body| {
+        let read = self.unpacker.for_each_record(bytes, head, |opcode, body| {
             *records += 1;
             match opcode {
                 op::SCHEMA => _ = tables.add_schema(body),
@@ -455,7 +510,7 @@ impl<R: Read + Seek, F: FnMut(&RawMessage<'_>)> Scan<R, F> {
 
     /// Reads the messages at the beginning of a cut chunk.
     fn salvage(&mut self, at: u64) -> io::Result<()> {
-        if self.pass.chunk_use == ChunkUse::Heads {
+        if self.pass.chunk_use == ChunkUse::Heads || !self.is_visited(at) {
             return Ok(());
         }
         let left = (self.window.len() - at).min(MAX_UNCHECKED_BYTES) as usize;
@@ -463,10 +518,9 @@ impl<R: Read + Seek, F: FnMut(&RawMessage<'_>)> Scan<R, F> {
         let Some(head) = ChunkHead::parse(&bytes[..left.min(CHUNK_HEAD_BYTES)]) else {
             return Ok(());
         };
-        let (tables, visit, readable) = (&mut self.tables, &mut self.visit, &mut self.readable);
-        chunk::for_each_record_of_cut(bytes, &head, |opcode, body| {
-            let _ = deliver(tables, visit, readable, opcode, body);
-        });
+        let visit = &mut self.visit;
+        let mut delivery = Delivery { tables: &mut self.tables, readable: &mut self.readable, part: part_of(at) };
+        chunk::for_each_record_of_cut(bytes, &head, |opcode, body| _ = delivery.record(opcode, body, visit));
         Ok(())
     }
 
@@ -492,13 +546,13 @@ impl<R: Read + Seek, F: FnMut(&RawMessage<'_>)> Scan<R, F> {
         Ok(None)
     }
 
-    fn completeness(self) -> Completeness {
+    fn completeness(&mut self) -> Completeness {
         let missing = self.counted.map(|counted| counted.saturating_sub(self.readable + self.copied));
         let miscounted = missing
             .filter(|&missing| missing > 0)
             .map(|missing| format!("{missing} messages counted in the summary are missing"));
         let readable_messages = self.readable;
-        let Pass { damage, cut, .. } = self.pass;
+        let (damage, cut) = (std::mem::take(&mut self.pass.damage), self.pass.cut.take());
         match (damage.reason.or(miscounted), cut) {
             (Some(reason), cut) => Completeness::Damaged {
                 reason: cut.map_or_else(|| reason.clone(), |cut| format!("{reason}; and cut {cut}")),
@@ -513,23 +567,26 @@ impl<R: Read + Seek, F: FnMut(&RawMessage<'_>)> Scan<R, F> {
     }
 }
 
-/// Processes one schema, channel or message record; `None` if it cannot be used. Others are skipped.
-fn deliver(
-    tables: &mut Tables,
-    visit: &mut impl FnMut(&RawMessage<'_>),
-    readable: &mut u64,
-    opcode: u8,
-    body: &[u8],
-) -> Option<()> {
-    match opcode {
-        op::SCHEMA => tables.add_schema(body),
-        op::CHANNEL => tables.add_channel(body),
-        op::MESSAGE => {
-            let message = tables.message(body)?;
-            *readable += 1;
-            visit(&message);
-            Some(())
+/// Where records of one part of a file go to.
+struct Delivery<'a> {
+    tables: &'a mut Tables,
+    readable: &'a mut u64,
+    part: u64,
+}
+
+impl Delivery<'_> {
+    /// Processes one schema, channel or message record; `None` if it cannot be used. Others are skipped.
+    fn record(&mut self, opcode: u8, body: &[u8], visit: &mut impl FnMut(&RawMessage<'_>)) -> Option<()> {
+        match opcode {
+            op::SCHEMA => self.tables.add_schema(body),
+            op::CHANNEL => self.tables.add_channel(body),
+            op::MESSAGE => {
+                let message = self.tables.message(body, self.part)?;
+                *self.readable += 1;
+                visit(&message);
+                Some(())
+            }
+            _ => Some(()),
         }
-        _ => Some(()),
     }
 }

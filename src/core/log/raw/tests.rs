@@ -1,6 +1,6 @@
 //! Cuts, flipped bits and files of other types.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::Cursor;
 use std::path::Path;
 
@@ -24,7 +24,7 @@ fn recording() -> (Vec<u8>, Vec<Vec<u8>>) {
 
 fn read(bytes: &[u8]) -> Result<(Vec<Vec<u8>>, RawSummary), ScanError> {
     let mut messages = Vec::new();
-    let summary = scan(Cursor::new(bytes), |message| messages.push(message.data.to_vec()))?;
+    let (summary, _) = scan(Cursor::new(bytes), |message| messages.push(message.data.to_vec()))?;
     assert_eq!(summary.readable_messages, messages.len() as u64);
     Ok((messages, summary))
 }
@@ -345,10 +345,33 @@ fn more_records_than_a_chunk_can_hold_are_not_read() {
     });
     assert!(bytes.len() < 1_000_000, "{}", bytes.len());
     let mut n = 0_u64;
-    let summary = scan(Cursor::new(&bytes), |_| n += 1).unwrap();
+    let (summary, _) = scan(Cursor::new(&bytes), |_| n += 1).unwrap();
     assert!((1_000_000..1_400_000).contains(&n), "{n}");
     let Completeness::Damaged { reason, lost_chunks, .. } = summary.completeness else { panic!("{summary:?}") };
     assert!(reason.contains("more than") && lost_chunks == 1, "{reason}");
+}
+
+/// Whole and cut, and with chunks that lie in another order.
+#[test]
+fn chosen_parts_are_read_again_and_no_others() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("run.mcap");
+    samples::write(&path, &samples::stream(40_000), 4000);
+    let bytes = std::fs::read(&path).unwrap();
+    let (head, mut groups, tail) = taken_apart(&bytes);
+    groups.swap(2, 5);
+    let swapped = [head, groups.concat(), tail].concat();
+    for bytes in [&bytes[..], &bytes[..bytes.len() / 5 * 4], &swapped] {
+        let mut all: Vec<(u64, Vec<u8>)> = Vec::new();
+        let (_, again) = scan(Cursor::new(bytes), |message| all.push((message.part, message.data.to_vec()))).unwrap();
+        let parts: BTreeSet<u64> = all.iter().map(|(part, _)| *part).collect();
+        assert!(parts.len() > 4, "{parts:?}");
+        let chosen: BTreeSet<u64> = parts.into_iter().skip(1).step_by(2).collect();
+        let mut found = Vec::new();
+        again.visit(chosen.clone(), |message| found.push((message.part, message.data.to_vec()))).unwrap();
+        all.retain(|(part, _)| chosen.contains(part));
+        assert!(!found.is_empty() && found == all);
+    }
 }
 
 #[test]
