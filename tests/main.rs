@@ -24,6 +24,7 @@ mod kill;
 mod map;
 mod methods;
 mod mutations;
+mod online;
 mod oracle;
 mod planning;
 mod property;

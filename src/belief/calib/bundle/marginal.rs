@@ -42,7 +42,7 @@ impl Estimate<'_> {
         });
     }
 
-    /// Takes the scales whose squares are the means of what the data leave possible, see the module, and linearizes anew
+    /// Takes the scales whose squares are the means of what the data leave possible, see the module, and linearizes
     /// under them.
     pub(crate) fn take_mean_scales(&mut self, first: &Hyperparameters) {
         let problem = &mut self.problem;

@@ -94,6 +94,9 @@ impl Follower {
     /// Takes views in that were made elsewhere, of an external recording for instance.
     pub fn add(&mut self, views: Vec<View>) -> Vec<OnlineEvent> {
         for view in views {
+            let Conditions { oil_c, pressure_pa, stamp } = &mut self.conditions;
+            *stamp = (*stamp).max(Some(view.end));
+            (*oil_c, *pressure_pa) = (oil_c.or(view.conditions.oil_c), pressure_pa.or(view.conditions.pressure_pa));
             self.estimator.add_view(&view);
         }
         self.estimator.take_events()

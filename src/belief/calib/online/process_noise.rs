@@ -144,7 +144,7 @@ impl JointErrorSize {
         }
     }
 
-    /// MacKay's fixed point, one view of an arm at rest at a time: what the data tell of an error counts, `1 - v / s^2`.
+    /// MacKay's fixed point, one view of an arm at rest at a time: of an error what the data tell counts.
     pub(crate) fn learn(&mut self, update: &ViewUpdate, scales: &mut Hyperparameters) {
         for (joint, error) in update.joint_error.iter().enumerate().filter(|(_, error)| error.prior_var > 0.0) {
             let told = (1.0 - error.var / error.prior_var).clamp(0.0, 1.0);

@@ -61,7 +61,7 @@ impl<'a> Dive<'a> {
             use crate::calib::parameters::ParameterKind as Kind;
             kinds.retain(|kind| !matches!(kind, Kind::OffsetPerK | Kind::GainPerK | Kind::OffsetPerMpa));
         }
-        scales.joint_std_rad.iter_mut().for_each(|std| *std *= if seed % 2 == 0 { 0.5 } else { 1.5 });
+        scales.joint_std_rad.iter_mut().for_each(|std| *std *= if seed.is_multiple_of(2) { 0.5 } else { 1.5 });
         let truth = Truth::draw(robot, &model, &scales, &mut rng);
         let noise = Noise { corner_px: 0.5, n_frames: 6, joint_rad: scales.joint_std_rad };
         let mut draw = |std: f64| std::array::from_fn(|_| std * normal(&mut rng));

@@ -1,0 +1,80 @@
+//! The online belief on recordings of whole runs.
+
+use std::fs;
+use std::path::Path;
+
+use crate::support::{Answer, answer, program, robot_folder, temp};
+
+fn follow(recording: &Path, out: &Path) -> Answer {
+    answer(
+        program()
+            .arg("calibrate")
+            .arg(recording)
+            .arg("--online")
+            .arg("--robot")
+            .arg(robot_folder())
+            .arg("--out")
+            .arg(out),
+    )
+}
+
+fn root(path: &str) -> std::path::PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join(path)
+}
+
+/// The sample ends known as well as its batch says, by the same bytes each time.
+#[test]
+fn a_recording_is_followed_and_its_belief_written() {
+    let folder = temp();
+    let outs = ["one", "two"].map(|name| folder.path().join(name));
+    for out in &outs {
+        let said = follow(&root("recordings/sample/run.mcap"), out);
+        said.expect("the sample", 0, &["good enough for the task", "belief.jsonl"]);
+    }
+    let [one, two] = outs.map(|out| fs::read_to_string(out.join("belief.jsonl")).expect("written"));
+    assert_eq!(one, two);
+    let rows: Vec<serde_json::Value> = one.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
+    let beliefs: Vec<&serde_json::Value> = rows.iter().filter_map(|row| row.get("belief")).collect();
+    let median_m = |row: &serde_json::Value| row["tool_error_m"]["median"].as_f64().expect("a number");
+    let (first, last) = (beliefs[0], beliefs[beliefs.len() - 1]);
+    assert!(median_m(last) < 0.004, "{last}");
+    assert!(median_m(last) < median_m(first), "{first} {last}");
+    assert!(rows.iter().all(|row| row.get("event").is_none()), "nothing happened in the sample: {one}");
+    let later = last["tool_error_in_an_hour_m"]["median"].as_f64().expect("a number");
+    assert!(later > median_m(last), "without views the belief gets worse");
+}
+
+#[test]
+fn a_recording_without_tags_is_refused() {
+    let folder = temp();
+    let absent = folder.path().join("absent.mcap");
+    follow(&absent, folder.path()).expect("absent", 2, &["absent.mcap"]);
+}
+
+/// An hour under water: tags are passed in every other task, and the tool stays known while the calibration of the
+/// start becomes wrong.
+#[test]
+fn the_tool_stays_known_through_an_hour_of_a_dive() {
+    let folder = temp();
+    let mut study = program();
+    study.args(["study", "dive", "--first-seed", "3", "--seeds", "1", "--routine"]);
+    let said = answer(study.arg(root("routines/short-dive.toml")).arg("--out").arg(folder.path()));
+    said.expect("the study", 0, &["online, mm", "written"]);
+    let table = fs::read_to_string(folder.path().join("tasks.csv")).expect("written");
+    let column = |name: &str| -> Vec<f64> {
+        let mut lines = table.lines();
+        let at = lines.next().and_then(|head| head.split(',').position(|key| key == name)).expect(name);
+        let mut values: Vec<f64> =
+            lines.map(|line| line.split(',').nth(at).expect(name).parse().expect("a number")).collect();
+        values.sort_by(f64::total_cmp);
+        values
+    };
+    let (online, start) = (column("online_m"), column("start_m"));
+    let (n, median) = (online.len(), |values: &[f64]| values[values.len() / 2]);
+    assert!(n >= 20, "{n} tasks");
+    assert!(median(&online) < 0.003 && online[n * 95 / 100] < 0.008, "{online:?}");
+    assert!(median(&start) > 2.0 * median(&online), "{start:?}");
+    let nees = column("nees");
+    let mean = nees.iter().sum::<f64>() / nees.len() as f64;
+    assert!((0.5..8.0).contains(&mean), "{mean}");
+}
