@@ -65,7 +65,10 @@ fn told(seeds: &[u64], studies: &[DiveStudy]) -> String {
     let mut text = String::new();
     for (seed, study) in seeds.iter().zip(studies) {
         let [walk, lag] = study.drift_factors.unwrap_or([1.0; 2]);
-        text += &format!("seed {seed}: {} views, walk {walk:.2}, lag {lag:.2} of the first guess\n", study.views);
+        text += &format!(
+            "seed {seed}: {} views, walk {walk:.2}, lag {lag:.2} of the first guess, temperature {} s behind\n",
+            study.views, study.lag_s
+        );
         for event in &study.events {
             text += &format!("  {}\n", event.to_line());
         }

@@ -16,6 +16,8 @@ const SUSPICIOUS_STEP_Z: f64 = 3.3;
 const NOTHING_FITS_NATS: f64 = 30.0;
 /// What leads by this is taken for true, in nats.
 const LEAD_NATS: f64 = 5.0;
+/// A scale this close to the datasheet's is the drift of a sensor, not another sensor.
+const LEAST_SCALE: f64 = 0.2;
 /// Explanations followed at most.
 const MAX_BRANCHES: usize = 6;
 /// Views this close to each other are looked at together, s, and how many of them.
@@ -204,9 +206,13 @@ impl Race {
     pub(crate) fn verdict(&self) -> Option<Verdict> {
         let best = self.branches.first()?;
         let fault = best.fault.filter(|fault| *fault != Fault::Drift && self.is_confirmed(best.fault))?;
+        let size = fault.size(&self.before, &best.filter);
+        if matches!(fault, Fault::Scale(_)) && size.is_none_or(|gain| (gain - 1.0).abs() < LEAST_SCALE) {
+            return None;
+        }
         Some(Verdict {
             fault,
-            size: fault.size(&self.before, &best.filter),
+            size,
             lead_nats: self.lead_nats(),
             next: self.branches.get(1).and_then(|branch| branch.fault),
         })

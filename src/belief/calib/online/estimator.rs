@@ -110,6 +110,12 @@ impl OnlineEstimator {
         self.best().drift_factors()
     }
 
+    /// How much later the joint sensors' stamps are than the camera's, and one sigma, s; `None` before the first view.
+    #[must_use]
+    pub fn clock_offset_s(&self) -> Option<[f64; 2]> {
+        self.best().clock_offset_s()
+    }
+
     /// Lag of the sensors' temperature that explains the views best, s.
     #[must_use]
     pub fn temperature_lag_s(&self) -> f64 {

@@ -174,6 +174,11 @@ impl Filter {
         &self.state.tags[tag_idx]
     }
 
+    /// How much later the joint sensors' stamps are than the camera's, s, and its column.
+    pub(crate) fn clock_offset(&self) -> Option<(f64, usize)> {
+        self.layout.time.map(|at| (self.state.time_s, at))
+    }
+
     /// Covariance of all columns; `None` only after an overflow.
     pub(crate) fn covariance(&self) -> Option<DMatrix<f64>> {
         Cholesky::new(self.info.clone()).map(|factor| factor.inverse())

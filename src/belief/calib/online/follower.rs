@@ -46,6 +46,10 @@ pub struct BeliefRow {
     pub tool_error_in_an_hour_m: Summary,
     /// Of each joint: offset, and its standard deviation, rad.
     pub offset_rad: Vec<[f64; 2]>,
+    /// How much later the joint sensors' stamps are than the camera's, and one sigma, s.
+    pub clock_offset_s: Option<[f64; 2]>,
+    /// Lag of the sensors' temperature behind the oil's, s.
+    pub temperature_lag_s: f64,
 }
 
 impl Follower {
@@ -161,6 +165,8 @@ impl Follower {
             views: self.estimator.n_views(),
             tool_error_m: self.tool_error_m(&self.conditions)?,
             tool_error_in_an_hour_m: self.tool_error_m(&later)?,
+            clock_offset_s: self.estimator.clock_offset_s(),
+            temperature_lag_s: self.estimator.temperature_lag_s(),
             offset_rad: (0..self.robot.n_joints()).map(|j| [parameters.offset_rad[j], std(j)]).collect(),
         })
     }

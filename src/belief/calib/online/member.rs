@@ -294,6 +294,13 @@ impl Member {
         Some(ParameterCovariance { parameters, matrix, residual_std_rad: Some(residual_std_rad) })
     }
 
+    /// How much later the joint sensors' stamps are than the camera's, and one sigma, s.
+    pub(crate) fn clock_offset_s(&self) -> Option<[f64; 2]> {
+        let filter = &self.running.as_ref()?.filter;
+        let (offset_s, at) = filter.clock_offset()?;
+        Some([offset_s, filter.covariance()?[(at, at)].sqrt()])
+    }
+
     pub(crate) fn lag_s(&self) -> f64 {
         self.lag.lag_s
     }
