@@ -45,10 +45,15 @@ fn a_recording_is_followed_and_its_belief_written() {
 }
 
 #[test]
-fn a_recording_without_tags_is_refused() {
+fn what_cannot_be_followed_is_refused() {
     let folder = temp();
     let absent = folder.path().join("absent.mcap");
     follow(&absent, folder.path()).expect("absent", 2, &["absent.mcap"]);
+    let mut other = program();
+    other.arg("calibrate").arg(root("recordings/sample/run.mcap")).arg("--online");
+    let said = answer(other.arg("--robot").arg(root("robots/kraft-predator")).arg("--out").arg(folder.path()));
+    said.expect("another arm", 2, &["run.mcap", "shoulder"]);
+    assert!(!folder.path().join("belief.jsonl").exists(), "nothing was written");
 }
 
 /// An hour under water: tags are passed in every other task, and the tool stays known while the calibration of the

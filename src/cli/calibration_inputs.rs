@@ -10,7 +10,7 @@ use crate::cli::stdout::note;
 use armcal_belief::calib::online::{Follower, OnlineEvent, OnlineSettings};
 use armcal_belief::calib::{
     Calibration, CalibrationData, CalibrationFileError, ExternalContext, Status, calibrate, calibrate_data,
-    calibrate_with_survey, prepare_external, prepare_pooled, read_marked,
+    calibrate_with_survey, check_joints, prepare_external, prepare_pooled, read_marked,
 };
 use armcal_belief::tagmap::files::{LandmarkFile, NamedSurvey, read_landmarks};
 use armcal_core::input::{ChildFrame, InputMap, TagUse, read_external, read_input_map, read_task};
@@ -128,6 +128,7 @@ impl CalibrationInputs<'_> {
                 },
             )?;
             lost |= warn_of_losses(&rest);
+            check_joints(&rest, self.robot)?;
         }
         let events = follower.finish();
         hear(&follower, events);

@@ -56,5 +56,5 @@ pub(crate) use views::dropouts::replace_dropouts;
 pub use views::{
     CalibrationData, CaptureData, ConditionHistory, EndStopReading, ExternalContext, HeldOut, IdentifiedScale,
     MarkedSpans, MeanCorners, ObservationRejection, TagMeasurement, TagObservation, TaskRests, View, associate,
-    associate_within, identify_scales, prepare_external, prepare_pooled, read_marked, surveyed,
+    associate_within, check_joints, identify_scales, prepare_external, prepare_pooled, read_marked, surveyed,
 };

@@ -48,6 +48,13 @@ impl OnlineEstimator {
         self.best().n_views()
     }
 
+    /// From now on the sensor of `joint` is not looked at: somebody declared that it has failed.
+    pub fn leave_out(&mut self, joint: usize) {
+        if joint < self.robot.n_joints() {
+            self.members.iter_mut().for_each(|member| member.leave_out(joint));
+        }
+    }
+
     /// A reading of the oil's thermometer: what a sensor's temperature follows, whether a view comes or not.
     pub fn hear_temperature(&mut self, stamp: Stamp, oil_c: f64) {
         self.members.iter_mut().for_each(|member| member.hear_temperature(stamp, oil_c));

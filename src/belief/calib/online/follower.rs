@@ -11,7 +11,7 @@ use crate::calib::views::view::{TaskRests, View};
 use armcal_core::robot::Robot;
 use armcal_core::sensor::{ArmSensors, Conditions};
 use armcal_core::stats::Summary;
-use armcal_core::streams::{JointAngles, Message, ReachTask, Thermometer};
+use armcal_core::streams::{JointAngles, Mark, MarkKind, Message, ReachTask, Thermometer};
 use armcal_core::time::Stamp;
 
 /// How far ahead the error without any further view is predicted, h.
@@ -77,9 +77,14 @@ impl Follower {
                 *self = Self { targets, tolerance_m, ..Self::new(robot, self.settings.clone()) };
             }
             Message::Task(task) => self.set_task(task),
+            Message::Mark(Mark { kind: MarkKind::Failed(failed), .. }) => self.estimator.leave_out(failed.joint),
             Message::JointSensors(sample) => self.conditions.stamp = Some(sample.stamp),
-            Message::Pressure(sample) => self.conditions.pressure_pa = Some(sample.pressure_pa),
-            Message::Temperature(sample) if sample.thermometer == Thermometer::Oil => {
+            Message::Pressure(sample) if sample.pressure_pa.is_finite() => {
+                self.conditions.pressure_pa = Some(sample.pressure_pa)
+            }
+            Message::Temperature(sample)
+                if sample.thermometer == Thermometer::Oil && sample.temperature_c.is_finite() =>
+            {
                 self.conditions.oil_c = Some(sample.temperature_c);
                 self.estimator.hear_temperature(sample.stamp, sample.temperature_c);
             }

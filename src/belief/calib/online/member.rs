@@ -26,6 +26,8 @@ use armcal_core::time::Stamp;
 const FORGETTING: f64 = 0.98;
 /// From so many views on the batch fits the scales.
 const VIEWS_FOR_EVIDENCE: usize = 12;
+/// After a pause this long the first views are over, however many they were, s.
+const START_PAUSE_S: f64 = 300.0;
 /// Views of a moving arm that make a start where no view at rest comes.
 const MOVING_FOR_START: usize = 40;
 /// Numbers of views at which the batch of the first ones is made anew.
@@ -45,6 +47,8 @@ pub(crate) struct Member {
     /// Views of a moving arm before the first one at rest.
     moving: Vec<View>,
     n_views: usize,
+    /// Joints whose sensor says nothing any more.
+    failed: Vec<usize>,
     running: Option<Running>,
     suspect_since: Option<Stamp>,
     events: Vec<OnlineEvent>,
@@ -57,8 +61,6 @@ struct Running {
     /// Explanations of views that the filter did not expect, while they are open.
     race: Option<Race>,
     recent: Option<RecentViews>,
-    /// Joints whose sensor says nothing any more.
-    failed: Vec<usize>,
     noise: ProcessNoise,
     errors: JointErrorSize,
     motion: MotionNoise,
@@ -79,6 +81,7 @@ impl Member {
             first: Vec::new(),
             moving: Vec::new(),
             n_views: 0,
+            failed: Vec::new(),
             running: None,
             suspect_since: None,
             events: Vec::new(),
@@ -88,6 +91,13 @@ impl Member {
     /// Number of views taken in.
     pub(crate) fn n_views(&self) -> usize {
         self.n_views
+    }
+
+    /// From now on the sensor of `joint` is not looked at.
+    pub(crate) fn leave_out(&mut self, joint: usize) {
+        if !self.failed.contains(&joint) {
+            self.failed.push(joint);
+        }
     }
 
     /// A reading of the oil's thermometer.
@@ -104,9 +114,15 @@ impl Member {
     pub(crate) fn add_view(&mut self, mut view: View) -> bool {
         self.n_views += 1;
         view.conditions = self.lagged(&view.conditions);
+        self.failed.iter().for_each(|joint| view.is_free[*joint] = true);
         if self.settings.scales.is_none() {
             self.corners.learn(&view);
             self.robot.camera.corner_std_px = self.corners.std_px();
+        }
+        // A start that goes on no more is over; what came since its last batch is in the belief.
+        let is_late = self.first.last().is_some_and(|last| view.end.since_s(last.end) > START_PAUSE_S);
+        if is_late && self.running.is_some() {
+            self.first = Vec::new();
         }
         if is_moving(&view) && (self.running.is_none() || !self.first.is_empty()) {
             return self.hold_back(view);
@@ -182,7 +198,6 @@ impl Member {
             filter,
             race: None,
             recent: None,
-            failed: Vec::new(),
             noise,
             errors,
             motion: MotionNoise::default(),
@@ -193,9 +208,6 @@ impl Member {
 
     fn carry_on(&mut self, view: &View) -> Option<ViewUpdate> {
         let running = self.running.as_mut()?;
-        let mut view = view.clone();
-        running.failed.iter().for_each(|joint| view.is_free[*joint] = true);
-        let view = &view;
         if self.settings.drift == DriftModel::Tuned {
             let change = view.conditions.departure_from(&running.conditions);
             if let Some(race) = &mut running.race {
@@ -257,7 +269,7 @@ impl Member {
         }
         if let Some(verdict) = race.verdict() {
             if let Fault::Failed(joint) = verdict.fault {
-                running.failed.push(joint);
+                self.failed.push(joint);
             }
             let since = self.suspect_since.take().unwrap_or(now);
             self.events.push(OnlineEvent::of_verdict(&self.robot, &verdict, since, now));

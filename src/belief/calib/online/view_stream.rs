@@ -89,7 +89,7 @@ impl ViewStream {
     pub fn push(&mut self, log_time: Stamp, message: &Message) -> Vec<View> {
         let mut views = Vec::new();
         match message {
-            Message::JointSensors(sample) => {
+            Message::JointSensors(sample) if is_usable(sample, &self.robot) => {
                 self.keep(log_time, message);
                 self.read(sample, &mut views);
             }
@@ -131,7 +131,7 @@ impl ViewStream {
 
     fn read(&mut self, sample: &JointSensorSample, views: &mut Vec<View>) {
         let JointSensorSample { stamp, counts } = sample;
-        if self.last.is_some_and(|last| *stamp <= last) || counts.len() != self.robot.n_joints() {
+        if self.last.is_some_and(|last| *stamp <= last) {
             return;
         }
         self.last = Some(*stamp);
@@ -232,4 +232,9 @@ impl ViewStream {
 /// Whether a joint moved while the view was taken.
 pub(crate) fn is_moving(view: &View) -> bool {
     view.rate_rad_s.iter().any(|rate| rate.abs() > SLOWEST_RAD_S)
+}
+
+/// Readings of another arm, and what is no number, are not looked at.
+fn is_usable(sample: &JointSensorSample, robot: &Robot) -> bool {
+    sample.counts.len() == robot.n_joints() && sample.counts.iter().all(|counts| counts.is_finite())
 }

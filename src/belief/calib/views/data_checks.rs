@@ -5,7 +5,11 @@ use crate::calib::views::view::CaptureData;
 use armcal_core::log::{Recording, Stream};
 use armcal_core::robot::Robot;
 
-pub(crate) fn check_joints(recording: &Recording, robot: &Robot) -> Result<(), CalibError> {
+/// Refuses a recording of another arm.
+///
+/// # Errors
+/// [`CalibError::JointNames`].
+pub fn check_joints(recording: &Recording, robot: &Robot) -> Result<(), CalibError> {
     if recording.joint_names != robot.joint_names() {
         return Err(CalibError::JointNames {
             recording: recording.path.display().to_string(),

@@ -22,6 +22,7 @@ pub(crate) mod view;
 pub use association::{associate, associate_within, surveyed};
 pub use calibration_data::{CalibrationData, HeldOut};
 pub use conditions::ConditionHistory;
+pub use data_checks::check_joints;
 pub use external::{ExternalContext, prepare_external};
 pub use marked_spans::{MarkedSpans, read_marked};
 pub use pooling::prepare_pooled;

@@ -236,3 +236,25 @@ fn the_tool_stays_known_all_day_and_the_prediction_is_right() {
     assert!(median < 2.0 && p95 < 6.0, "{median} {p95}");
     assert!((2.0..4.3).contains(&nees), "{nees}");
 }
+
+/// A few views at rest in the morning, and tags passed by hours later: these count, too.
+#[test]
+fn tags_passed_after_a_short_start_are_used() {
+    let robot = titan();
+    let mut dive = Dive::new(&robot, 1);
+    let mut online = OnlineEstimator::new(robot.clone(), OnlineSettings::default());
+    for k in 0..8 {
+        dive.advance(&mut online, 12.0 * f64::from(k));
+        online.add_view(&dive.view());
+    }
+    dive.advance(&mut online, 3600.0);
+    let before = dive.task(&online).predicted_m;
+    for k in 0..6 {
+        dive.advance(&mut online, 3600.0 + f64::from(k));
+        let mut view = dive.view();
+        view.rate_rad_s[0] = 0.05;
+        assert!(online.add_view(&view), "it tells something");
+    }
+    let after = dive.task(&online).predicted_m;
+    assert!(after < 0.7 * before, "{before} {after}");
+}
