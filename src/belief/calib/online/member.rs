@@ -119,9 +119,11 @@ impl Member {
             self.corners.learn(&view);
             self.robot.camera.corner_std_px = self.corners.std_px();
         }
-        // A start that goes on no more is over; what came since its last batch is in the belief.
+        // A start that goes on no more is over; what came since its last batch is in the belief. Where nothing drifts,
+        // views at rest may come at any time.
         let is_late = self.first.last().is_some_and(|last| view.end.since_s(last.end) > START_PAUSE_S);
-        if is_late && self.running.is_some() {
+        let may_wait = self.settings.drift == DriftModel::Stationary && !is_moving(&view);
+        if is_late && !may_wait && self.running.is_some() {
             self.first = Vec::new();
         }
         if is_moving(&view) && (self.running.is_none() || !self.first.is_empty()) {
