@@ -32,6 +32,7 @@ mod sensitivity;
 mod stdout;
 #[cfg(feature = "sim")]
 mod study;
+#[cfg(feature = "sim")]
 mod study_dive;
 #[cfg(feature = "sim")]
 mod study_falsified;
