@@ -7,7 +7,10 @@ use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
 use armcal::calib::{Calibration, CompactCalibration, calibrate};
-use armcal::log::{RecordingHeader, RecordingWriter, for_each_raw, read_attachments, read_recording};
+use armcal::log::{
+    GrowingRecording, Growth, RecordingHeader, RecordingWriter, TopicMap, for_each_raw, read_attachments,
+    read_recording,
+};
 use armcal::robot::{Robot, load, load_vehicle};
 use armcal::routine::Method;
 use armcal::streams::Message;
@@ -102,8 +105,19 @@ fn routine(scratch: &Scratch, bytes: &[u8]) -> bool {
 fn recording(scratch: &Scratch, bytes: &[u8]) -> bool {
     let path = scratch.write("recording.mcap", bytes);
     let _ = read_attachments(&path);
+    followed(scratch, bytes);
     let _ = armcal::report::inspection::inspect(&path, None).map(|found| armcal::report::inspection::to_text(&found));
     read_recording(&path).is_ok_and(|recording| !recording.messages.is_empty())
+}
+
+/// The same while it grows: half of it, then all.
+fn followed(scratch: &Scratch, bytes: &[u8]) {
+    let (path, map) = (scratch.write("growing.mcap", &bytes[..bytes.len() / 2]), TopicMap::default());
+    let mut growing = GrowingRecording::open(&path, &map).expect("a file");
+    while growing.poll(|_, _| {}).is_ok_and(|growth| growth == Growth::Behind) {}
+    scratch.write("growing.mcap", bytes);
+    while growing.poll(|_, _| {}).is_ok_and(|growth| growth == Growth::Behind) {}
+    let _ = growing.finish(|_, _| {});
 }
 
 /// The first byte chooses one of the recording's topics, the rest is its message.

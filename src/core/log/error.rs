@@ -15,6 +15,10 @@ pub enum LogError {
     Empty { path: PathBuf },
     #[error("{}: not an MCAP recording: {found}", path.display())]
     NotMcap { path: PathBuf, found: String },
+    #[error("{}: it was cut to {bytes} bytes while it was read; {read} bytes were read before", path.display())]
+    Truncated { path: PathBuf, bytes: u64, read: u64 },
+    #[error("{}: another recording took its place while it was read", path.display())]
+    Replaced { path: PathBuf },
     #[error("{}: the directory {} does not exist", path.display(), directory.display())]
     NoDirectory { path: PathBuf, directory: PathBuf },
     #[error("{}: cannot be created: {source}", path.display())]

@@ -1,7 +1,8 @@
 //! Recordings: the streams of an arm as an MCAP file of ROS 2 messages.
 //!
 //! [`RecordingWriter`] is a sink of `streams`; its bytes depend on its input only. [`read_recording`] reads recordings
-//! of simulated and real arms and reports the losses of a cut or damaged file. [`for_each_raw`] and [`decode`] read any
+//! of simulated and real arms and reports the losses of a cut or damaged file, [`GrowingRecording`] one that is still
+//! being written. [`for_each_raw`] and [`decode`] read any
 //! topic of any MCAP file. The table `message_codec::Stream` names topic, ROS type and codec of each stream; `messages`
 //! holds the codecs. [`hash_messages`] hashes messages, not files; [`strip`] copies the messages alone.
 
@@ -11,6 +12,7 @@ mod schema;
 mod attachments;
 mod cdr;
 mod error;
+mod growing;
 mod hash;
 mod header;
 mod images;
@@ -29,6 +31,7 @@ mod samples;
 pub use attachments::read_attachments;
 pub use cdr::{CdrError, decode, encode};
 pub use error::{DecodeRejection, EncodeError, LogError};
+pub use growing::GrowingRecording;
 pub use hash::{MessageHasher, hash_messages};
 pub use header::RecordingHeader;
 pub use images::for_each_image;
@@ -37,8 +40,8 @@ pub use message_codec::Stream;
 pub use messages as ros;
 pub use order::{StampOrder, StampRegression};
 pub use raw::{
-    AttachmentInfo, Channel, ChunkOrder, ChunkTotals, Completeness, FileContents, RawMessage, RawSummary, Schema,
-    file_contents, for_each_raw,
+    AttachmentInfo, Channel, ChunkOrder, ChunkTotals, Completeness, FileContents, Growth, RawMessage, RawSummary,
+    Schema, file_contents, for_each_raw,
 };
 pub use reader::{
     Choice, RawRecord, Recording, TopicMap, read_chosen, read_recording, read_recording_with, scan_recording,

@@ -142,7 +142,8 @@ pub fn read_chosen(path: &Path, map: &TopicMap, choice: &mut impl Choice) -> Res
     Ok(Collector { messages: chosen.messages, ..all }.finish(path, &summary))
 }
 
-struct Collector<'a> {
+/// Decodes messages and counts what cannot be used.
+pub(super) struct Collector<'a> {
     map: &'a TopicMap,
     streams: BTreeMap<&'a str, Stream>,
     /// Topic of each stream, and what its first message says of joints.
@@ -158,7 +159,7 @@ struct Collector<'a> {
 }
 
 impl<'a> Collector<'a> {
-    fn new(map: &'a TopicMap) -> Self {
+    pub(super) fn new(map: &'a TopicMap) -> Self {
         let mut streams: BTreeMap<&str, Stream> = Stream::ALL.iter().map(|&stream| (stream.topic(), stream)).collect();
         let mapped = [(Stream::JointSensors, &map.joint_sensors), (Stream::Detections, &map.detections)];
         for (stream, topic) in mapped {
@@ -184,7 +185,7 @@ impl<'a> Collector<'a> {
         }
     }
 
-    fn take(&mut self, raw: &RawMessage<'_>, keep: impl FnOnce(&RawMessage<'_>, &Message) -> bool) {
+    pub(super) fn take(&mut self, raw: &RawMessage<'_>, keep: impl FnOnce(&RawMessage<'_>, &Message) -> bool) {
         let topic = raw.topic();
         let Some(&stream) = self.streams.get(topic) else {
             return self.take_other(raw);
@@ -204,6 +205,11 @@ impl<'a> Collector<'a> {
             }
             Err(rejection) => self.reject(topic, &rejection, 1),
         }
+    }
+
+    /// The joints that the sensors' messages name so far.
+    pub(super) fn sensor_joints(&self) -> Option<&[String]> {
+        self.joints.get(&Stream::JointSensors)?.1.names.as_deref()
     }
 
     fn take_other(&mut self, raw: &RawMessage<'_>) {
@@ -234,7 +240,7 @@ impl<'a> Collector<'a> {
         *self.rejected.entry(format!("{topic}: {rejection}")).or_default() += count;
     }
 
-    fn finish(mut self, path: &Path, summary: &RawSummary) -> Recording {
+    pub(super) fn finish(mut self, path: &Path, summary: &RawSummary) -> Recording {
         let stamp_regressions = self
             .order
             .iter()

@@ -33,7 +33,7 @@ pub enum Completeness {
 }
 
 /// Completeness and contents of a file whose messages have been read.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct RawSummary {
     /// Whether all messages could be read.
     pub completeness: Completeness,

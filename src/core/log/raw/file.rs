@@ -1,12 +1,12 @@
 //! Reads the messages or the other contents of a file.
 
-use std::fs::File;
+use std::fs::{File, Metadata};
 use std::path::Path;
 
 use super::completeness::RawSummary;
 use super::contents::FileContents;
 use super::message::RawMessage;
-use super::scan::{ScanError, SecondPass, scan, scan_contents};
+use super::scan::{GrowingScan, ScanError, SecondPass, scan, scan_contents};
 use crate::files;
 use crate::log::error::LogError;
 
@@ -40,6 +40,30 @@ pub fn file_contents(path: impl AsRef<Path>) -> Result<FileContents, LogError> {
     scan_contents(open(path)?).map_err(|error| of_scan(path, error))
 }
 
+/// The start of reading a file that another program may still be writing.
+pub fn begin_growing(path: &Path) -> Result<(GrowingScan<File>, Option<FileIdentity>), LogError> {
+    let file = open(path)?;
+    let read_error = |source| LogError::Read { path: path.to_owned(), source };
+    let identity = file.metadata().map(|metadata| identity(&metadata)).map_err(read_error)?;
+    Ok((GrowingScan::new(file).map_err(read_error)?, identity))
+}
+
+/// Device and number of a file, which stay when it is renamed.
+pub type FileIdentity = (u64, u64);
+
+/// What tells a file from another one in its place, where the system has that.
+#[cfg(unix)]
+pub fn identity(metadata: &Metadata) -> Option<FileIdentity> {
+    use std::os::unix::fs::MetadataExt;
+    Some((metadata.dev(), metadata.ino()))
+}
+
+/// What tells a file from another one in its place, where the system has that.
+#[cfg(not(unix))]
+pub fn identity(_: &Metadata) -> Option<FileIdentity> {
+    None
+}
+
 fn open(path: &Path) -> Result<File, LogError> {
     let found = if path.is_dir() { Err(std::io::Error::other(describe_folder(path))) } else { files::open(path) };
     found.map_err(|source| LogError::Read { path: path.to_owned(), source })
@@ -58,10 +82,12 @@ fn describe_folder(path: &Path) -> String {
     }
 }
 
-fn of_scan(path: &Path, error: ScanError) -> LogError {
+pub fn of_scan(path: &Path, error: ScanError) -> LogError {
     match error {
         ScanError::Read(source) => LogError::Read { path: path.to_owned(), source },
         ScanError::Empty => LogError::Empty { path: path.to_owned() },
+        ScanError::Truncated { bytes, read } => LogError::Truncated { path: path.to_owned(), bytes, read },
+        ScanError::Rewritten => LogError::Replaced { path: path.to_owned() },
         ScanError::NotMcap { found } => LogError::NotMcap { path: path.to_owned(), found },
     }
 }

@@ -58,6 +58,13 @@ impl Budget {
         }
     }
 
+    /// Adds what a file may cost more that has grown.
+    pub fn grow(&mut self, from_bytes: u64, to_bytes: u64) {
+        let more = to_bytes.saturating_sub(from_bytes);
+        self.bytes = self.bytes.saturating_add(more.saturating_mul(MAX_FILE_RATIO));
+        self.records = self.records.saturating_add(more / MIN_BYTES_PER_RECORD);
+    }
+
     /// Takes what a chunk has cost.
     pub fn spend(&mut self, bytes: u64, records: u64) -> Result<(), Exhausted> {
         let left = self.bytes.checked_sub(bytes).zip(self.records.checked_sub(records + RECORDS_PER_CHUNK));

@@ -1,27 +1,33 @@
 //! Pass through a file, record by record. After damage it continues at the next chunk.
 
+mod chunks;
+mod growing;
+mod recovery;
+
+pub use growing::{GrowingScan, Growth};
+
+use chunks::Delivery;
+use recovery::Damage;
+
 use std::collections::BTreeSet;
 use std::io::{self, Read, Seek};
 
 use mcap::records::op;
 
 use super::checksum::DataChecksum;
-use super::chunk::{self, ChunkError, Unpacker};
+use super::chunk::{self, Unpacker};
 use super::completeness::{Completeness, RawSummary};
 use super::contents::{FileContents, MAX_HEAD_BYTES};
 use super::file_type;
-use super::limits::{Budget, MAX_RECORD_BYTES, MAX_UNCHECKED_BYTES, unpacked_limit};
+use super::limits::{Budget, MAX_RECORD_BYTES, MAX_UNCHECKED_BYTES};
 use super::message::RawMessage;
-use super::order::{ChunkOrder, HeadOrder, SurveyedChunk, in_order};
+use super::order::{ChunkOrder, HeadOrder, SurveyedChunk};
 use super::record::{
     CHUNK_HEAD_BYTES, ChunkHead, DATA_END_BYTES, FOOTER_BYTES, Fields, MAGIC, PREFIX_BYTES, Prefix, Tables,
-    is_message_index, log_time_nanos,
+    is_message_index,
 };
 use super::window::Window;
 
-/// Bytes searched at once for the next chunk: few at first, as it is often near, so that they are in memory already.
-const FIRST_SEARCH_BYTES: u64 = 1 << 10;
-const SEARCH_BYTES: u64 = 1 << 18;
 /// Stored bytes of a part of a file.
 const PART_BYTES: u64 = 1 << 16;
 /// Prefix and fields of the last record, and the magic after it.
@@ -32,7 +38,16 @@ const TAIL_BYTES: u64 = PREFIX_BYTES as u64 + FOOTER_BYTES + MAGIC.len() as u64;
 pub enum ScanError {
     Read(io::Error),
     Empty,
-    NotMcap { found: String },
+    NotMcap {
+        found: String,
+    },
+    /// A growing file became shorter than what was read of it.
+    Truncated {
+        bytes: u64,
+        read: u64,
+    },
+    /// The bytes of a growing file that were read are others now.
+    Rewritten,
 }
 
 impl From<io::Error> for ScanError {
@@ -44,22 +59,19 @@ impl From<io::Error> for ScanError {
 /// Place where the pass continues after a record.
 enum Next {
     At(u64),
+    /// Here, once the file has grown.
+    Later,
     /// Nothing more can be read.
     End,
 }
 
-#[derive(Default)]
-struct Damage {
-    /// Of the first damage.
-    reason: Option<String>,
-    chunks: u64,
-    bytes: u64,
-}
-
-impl Damage {
-    fn note(&mut self, at: u64, what: &str) {
-        self.reason.get_or_insert_with(|| format!("at byte {at}: {what}"));
-    }
+/// Whether a file may still grow.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Ending {
+    /// What is incomplete is cut.
+    Closed,
+    /// What is incomplete is still being written.
+    Open,
 }
 
 /// What a pass does with chunks.
@@ -125,6 +137,9 @@ struct Scan<R, F> {
     ends_with_magic: bool,
     /// Parts whose messages are visited; `None`: all.
     parts: Option<BTreeSet<u64>>,
+    ending: Ending,
+    /// Length of an open file from which on a lost place is searched again.
+    search_at_bytes: u64,
     pass: Pass,
 }
 
@@ -140,10 +155,8 @@ pub fn scan<R: Read + Seek, F: FnMut(&RawMessage<'_>)>(
     scan.read_summary()?;
     scan.walk()?;
     let chunk_order = scan.visit_surveyed()?;
-    let contents = std::mem::take(&mut scan.pass.contents);
-    let (readable_messages, completeness) = (scan.readable, scan.completeness());
-    let again = SecondPass { of_chunks, scan: scan.with_visit(()) };
-    Ok((RawSummary { readable_messages, completeness, chunk_order, contents }, again))
+    let summary = RawSummary { chunk_order, ..scan.summary() };
+    Ok((summary, SecondPass { of_chunks, scan: scan.with_visit(()) }))
 }
 
 /// A file whose messages were visited, to visit those of some of its parts again.
@@ -172,27 +185,9 @@ pub fn scan_contents<R: Read + Seek>(source: R) -> Result<FileContents, ScanErro
 }
 
 fn begin<R: Read + Seek, F: FnMut(&RawMessage<'_>)>(source: R, visit: F) -> Result<Scan<R, F>, ScanError> {
-    let mut window = Window::new(source)?;
-    let bytes = window.len();
-    let start = window.bytes(0, bytes.min(file_type::START_BYTES as u64) as usize)?;
-    if start.is_empty() {
-        return Err(ScanError::Empty);
-    }
-    if !start.starts_with(MAGIC) {
-        return Err(ScanError::NotMcap { found: file_type::describe(start) });
-    }
-    Ok(Scan {
-        window,
-        visit,
-        unpacker: Unpacker::default(),
-        tables: Tables::default(),
-        readable: 0,
-        counted: None,
-        copied: 0,
-        ends_with_magic: false,
-        parts: None,
-        pass: Pass::new(ChunkUse::Heads, bytes),
-    })
+    let mut scan = Scan::new(Window::new(source)?, visit);
+    scan.check_start()?;
+    Ok(scan)
 }
 
 /// The part of a file that a record outside of chunks belongs to, a chunk whole.
@@ -200,10 +195,58 @@ fn part_of(at: u64) -> u64 {
     at / PART_BYTES
 }
 
-impl<R, F> Scan<R, F> {
+impl<R: Read + Seek, F> Scan<R, F> {
+    fn new(window: Window<R>, visit: F) -> Self {
+        let pass = Pass::new(ChunkUse::Heads, window.len());
+        Self {
+            window,
+            visit,
+            unpacker: Unpacker::default(),
+            tables: Tables::default(),
+            readable: 0,
+            counted: None,
+            copied: 0,
+            ends_with_magic: false,
+            parts: None,
+            ending: Ending::Closed,
+            search_at_bytes: 0,
+            pass,
+        }
+    }
+
+    fn check_start(&mut self) -> Result<(), ScanError> {
+        let bytes = self.window.len().min(file_type::START_BYTES as u64);
+        match self.window.bytes(0, bytes as usize)? {
+            [] => Err(ScanError::Empty),
+            start if start.starts_with(MAGIC) => Ok(()),
+            start => Err(ScanError::NotMcap { found: file_type::describe(start) }),
+        }
+    }
+
+    fn summary(&mut self) -> RawSummary {
+        RawSummary {
+            completeness: self.completeness(),
+            readable_messages: self.readable,
+            chunk_order: ChunkOrder::default(),
+            contents: std::mem::take(&mut self.pass.contents),
+        }
+    }
+
     fn with_visit<G>(self, visit: G) -> Scan<R, G> {
-        let Self { window, visit: _, unpacker, tables, readable, counted, copied, ends_with_magic, parts, pass } = self;
-        Scan { window, visit, unpacker, tables, readable, counted, copied, ends_with_magic, parts, pass }
+        Scan {
+            window: self.window,
+            visit,
+            unpacker: self.unpacker,
+            tables: self.tables,
+            readable: self.readable,
+            counted: self.counted,
+            copied: self.copied,
+            ends_with_magic: self.ends_with_magic,
+            parts: self.parts,
+            ending: self.ending,
+            search_at_bytes: self.search_at_bytes,
+            pass: self.pass,
+        }
     }
 
     fn is_visited(&self, at: u64) -> bool {
@@ -261,16 +304,28 @@ impl<R: Read + Seek, F: FnMut(&RawMessage<'_>)> Scan<R, F> {
 
     fn walk(&mut self) -> io::Result<()> {
         let mut at = MAGIC.len() as u64;
-        while let Next::At(next) = self.record(at)? {
+        while let Next::At(next) = self.step(at)? {
             at = next;
-            if self.pass.chunk_use != ChunkUse::Heads && !self.pass.is_past_data && self.parts.is_none() {
-                self.pass.checksum.add_until(&mut self.window, at)?;
-            }
         }
         Ok(())
     }
 
+    fn step(&mut self, at: u64) -> io::Result<Next> {
+        let next = self.record(at)?;
+        if let Next::At(next) = next
+            && self.pass.chunk_use != ChunkUse::Heads
+            && !self.pass.is_past_data
+            && self.parts.is_none()
+        {
+            self.pass.checksum.add_until(&mut self.window, next)?;
+        }
+        Ok(next)
+    }
+
     fn record(&mut self, at: u64) -> io::Result<Next> {
+        if self.ending == Ending::Open && self.is_unfinished(at)? {
+            return Ok(Next::Later);
+        }
         let left = self.window.len() - at;
         if left < PREFIX_BYTES as u64 {
             let what = if left == 0 { "the file ends without a footer" } else { "the file ends within a record" };
@@ -364,6 +419,10 @@ impl<R: Read + Seek, F: FnMut(&RawMessage<'_>)> Scan<R, F> {
     }
 
     fn footer(&mut self, at: u64, prefix: Prefix) -> io::Result<Next> {
+        if self.ending == Ending::Open {
+            // It was not there when the file was opened.
+            self.read_summary()?;
+        }
         let left = self.window.len() - at;
         if prefix.len != FOOTER_BYTES || left > TAIL_BYTES {
             return self.broken(at, Some(prefix.opcode), "a footer is not at the end");
@@ -375,218 +434,5 @@ impl<R: Read + Seek, F: FnMut(&RawMessage<'_>)> Scan<R, F> {
             self.pass.damage.note(at, "the closing bytes after the footer are wrong");
         }
         Ok(Next::End)
-    }
-
-    fn chunk(&mut self, at: u64, left: u64) -> io::Result<Next> {
-        let head = ChunkHead::parse(self.window.bytes(at, left.min(CHUNK_HEAD_BYTES as u64) as usize)?);
-        let Some(head) = head.filter(|head| head.is_consistent(left)) else {
-            return self.broken(at, Some(op::CHUNK), "the head of a chunk contradicts itself");
-        };
-        let record_bytes = PREFIX_BYTES as u64 + head.record_len;
-        self.pass.has_chunks = true;
-        self.pass.has_unchecked_chunks |= head.checksum == 0 && head.uncompressed_bytes > 0;
-        self.pass.verified_end = at + record_bytes;
-        if self.pass.chunk_use == ChunkUse::Heads {
-            self.pass.heads.add(&head);
-            return Ok(Next::At(at + record_bytes));
-        }
-        if head.compressed_bytes > MAX_RECORD_BYTES {
-            let what = format!("a chunk of {} bytes; at most {MAX_RECORD_BYTES} are read", head.compressed_bytes);
-            self.lose_chunk(at, record_bytes, &what);
-            return Ok(Next::At(at + record_bytes));
-        }
-        let records = self.pass.records;
-        // A chunk that states more is not unpacked.
-        let is_unpacked = head.uncompressed_bytes <= unpacked_limit(head.compressed_bytes);
-        let unpacked = if is_unpacked { head.uncompressed_bytes } else { 0 };
-        let read = match self.pass.chunk_use {
-            ChunkUse::Survey => self.survey_chunk(at, &head)?,
-            _ => self.visit_chunk(at, &head)?,
-        };
-        match read {
-            Ok(()) => self.pass.contents.add_chunk(&head),
-            Err(error) => self.lose_chunk(at, record_bytes, &format!("a chunk cannot be read: {error}")),
-        }
-        if let Err(exhausted) = self.pass.budget.spend(unpacked, self.pass.records - records) {
-            self.pass.damage.note(at, &exhausted.to_string());
-            self.pass.damage.bytes += left - record_bytes;
-            return Ok(Next::End);
-        }
-        Ok(Next::At(at + record_bytes))
-    }
-
-    fn lose_chunk(&mut self, at: u64, record_bytes: u64, what: &str) {
-        self.pass.damage.note(at, what);
-        self.pass.damage.chunks += 1;
-        self.pass.damage.bytes += record_bytes;
-    }
-
-    /// Visits the messages of a chunk.
-    fn visit_chunk(&mut self, at: u64, head: &ChunkHead) -> io::Result<Result<(), ChunkError>> {
-        if !self.is_visited(at) {
-            return Ok(Ok(()));
-        }
-        let bytes = self.window.bytes(at, PREFIX_BYTES + head.record_len as usize)?;
-        let visit = &mut self.visit;
-        let mut delivery = Delivery { tables: &mut self.tables, readable: &mut self.readable, part: part_of(at) };
-        let (records, mut unusable) = (&mut self.pass.records, 0_u64);
-        let read = self.unpacker.for_each_record(bytes, head, |opcode, body| {
-            *records += 1;
-            if delivery.record(opcode, body, visit).is_none() {
-                unusable += 1;
-            }
-        });
-        if unusable > 0 {
-            let what = format!("{unusable} records of a chunk cannot be used, their topic's declaration is lost");
-            self.pass.damage.note(at, &what);
-        }
-        Ok(read)
-    }
-
-    /// Takes the channels of a chunk and the time of its messages.
-    fn survey_chunk(&mut self, at: u64, head: &ChunkHead) -> io::Result<Result<(), ChunkError>> {
-        let record_bytes = PREFIX_BYTES + head.record_len as usize;
-        let bytes = self.window.bytes(at, record_bytes)?;
-        let hash = *blake3::hash(bytes).as_bytes();
-        let (tables, records) = (&mut self.tables, &mut self.pass.records);
-        let mut chunk = SurveyedChunk { at, record_bytes, hash, messages: 0, nanos: None };
-        let read = self.unpacker.for_each_record(bytes, head, |opcode, body| {
-            *records += 1;
-            match opcode {
-                op::SCHEMA => _ = tables.add_schema(body),
-                op::CHANNEL => _ = tables.add_channel(body),
-                op::MESSAGE => {
-                    chunk.messages += 1;
-                    if let Some(nanos) = log_time_nanos(body) {
-                        let (first, last) = chunk.nanos.unwrap_or((nanos, nanos));
-                        chunk.nanos = Some((first.min(nanos), last.max(nanos)));
-                    }
-                }
-                _ => {}
-            }
-        });
-        if read.is_ok() {
-            self.pass.surveyed.push(chunk);
-        }
-        Ok(read)
-    }
-
-    /// Visits the messages of the surveyed chunks in the order of time.
-    fn visit_surveyed(&mut self) -> io::Result<ChunkOrder> {
-        let (chunks, order, copied_messages) = in_order(std::mem::take(&mut self.pass.surveyed));
-        self.copied = copied_messages;
-        for chunk in chunks {
-            let bytes = self.window.bytes(chunk.at, chunk.record_bytes)?;
-            if let Some(head) = ChunkHead::parse(&bytes[..bytes.len().min(CHUNK_HEAD_BYTES)]) {
-                // It was read before.
-                let _ = self.visit_chunk(chunk.at, &head)?;
-            }
-        }
-        Ok(order)
-    }
-
-    /// Continues at the next chunk after an impossible record; without one, the pass ends.
-    fn broken(&mut self, at: u64, opcode: Option<u8>, what: &str) -> io::Result<Next> {
-        let is_chunk = opcode == Some(op::CHUNK);
-        // Not from `at`: a wrong length before it may have skipped chunks. A broken chunk is no candidate.
-        if let Some(next) = self.find_chunk(self.pass.verified_end)? {
-            self.pass.damage.note(at, what);
-            self.pass.damage.chunks += u64::from(is_chunk);
-            self.pass.damage.bytes += next - self.pass.verified_end;
-            return Ok(Next::At(next));
-        }
-        if self.ends_with_magic {
-            self.pass.damage.note(at, what);
-            self.pass.damage.chunks += u64::from(is_chunk);
-            self.pass.damage.bytes += self.window.len() - at;
-            return Ok(Next::End);
-        }
-        self.pass.cut = Some(format!("at byte {at} of {}: {what}", self.window.len()));
-        if is_chunk {
-            self.salvage(at)?;
-        }
-        Ok(Next::End)
-    }
-
-    /// Reads the messages at the beginning of a cut chunk.
-    fn salvage(&mut self, at: u64) -> io::Result<()> {
-        if self.pass.chunk_use == ChunkUse::Heads || !self.is_visited(at) {
-            return Ok(());
-        }
-        let left = (self.window.len() - at).min(MAX_UNCHECKED_BYTES) as usize;
-        let bytes = self.window.bytes(at, left)?;
-        let Some(head) = ChunkHead::parse(&bytes[..left.min(CHUNK_HEAD_BYTES)]) else {
-            return Ok(());
-        };
-        let visit = &mut self.visit;
-        let mut delivery = Delivery { tables: &mut self.tables, readable: &mut self.readable, part: part_of(at) };
-        chunk::for_each_record_of_cut(bytes, &head, |opcode, body| _ = delivery.record(opcode, body, visit));
-        Ok(())
-    }
-
-    /// The first place at or after `from` where a whole chunk may begin.
-    fn find_chunk(&mut self, from: u64) -> io::Result<Option<u64>> {
-        let overlap = CHUNK_HEAD_BYTES as u64 - 1;
-        let (mut at, mut step) = (from, FIRST_SEARCH_BYTES);
-        while at < self.window.len() {
-            let left = self.window.len() - at;
-            let bytes = self.window.bytes(at, left.min(step + overlap) as usize)?;
-            let found = (0..bytes.len().min(step as usize)).find(|&offset| {
-                let bytes = &bytes[offset..];
-                bytes[0] == op::CHUNK
-                    && ChunkHead::parse(&bytes[..bytes.len().min(CHUNK_HEAD_BYTES)])
-                        .is_some_and(|head| head.is_consistent(left - offset as u64))
-            });
-            if let Some(offset) = found {
-                return Ok(Some(at + offset as u64));
-            }
-            at += step;
-            step = (2 * step).min(SEARCH_BYTES);
-        }
-        Ok(None)
-    }
-
-    fn completeness(&mut self) -> Completeness {
-        let missing = self.counted.map(|counted| counted.saturating_sub(self.readable + self.copied));
-        let miscounted = missing
-            .filter(|&missing| missing > 0)
-            .map(|missing| format!("{missing} messages counted in the summary are missing"));
-        let readable_messages = self.readable;
-        let (damage, cut) = (std::mem::take(&mut self.pass.damage), self.pass.cut.take());
-        match (damage.reason.or(miscounted), cut) {
-            (Some(reason), cut) => Completeness::Damaged {
-                reason: cut.map_or_else(|| reason.clone(), |cut| format!("{reason}; and cut {cut}")),
-                lost_chunks: damage.chunks,
-                lost_bytes: damage.bytes,
-                lost_messages: missing,
-                readable_messages,
-            },
-            (None, Some(reason)) => Completeness::Cut { reason, readable_messages },
-            (None, None) => Completeness::Whole,
-        }
-    }
-}
-
-/// Where records of one part of a file go to.
-struct Delivery<'a> {
-    tables: &'a mut Tables,
-    readable: &'a mut u64,
-    part: u64,
-}
-
-impl Delivery<'_> {
-    /// Processes one schema, channel or message record; `None` if it cannot be used. Others are skipped.
-    fn record(&mut self, opcode: u8, body: &[u8], visit: &mut impl FnMut(&RawMessage<'_>)) -> Option<()> {
-        match opcode {
-            op::SCHEMA => self.tables.add_schema(body),
-            op::CHANNEL => self.tables.add_channel(body),
-            op::MESSAGE => {
-                let message = self.tables.message(body, self.part)?;
-                *self.readable += 1;
-                visit(&message);
-                Some(())
-            }
-            _ => Some(()),
-        }
     }
 }

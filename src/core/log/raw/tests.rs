@@ -4,6 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::io::Cursor;
 use std::path::Path;
 
+use mcap::{Compression, WriteOptions};
+
 use super::scan::{ScanError, scan};
 use super::*;
 use crate::log::{LogError, samples};
@@ -204,18 +206,20 @@ fn zeros_behind_a_crash_are_a_cut() {
     assert!(matches!(summary.completeness, Completeness::Cut { .. }), "{summary:?}");
 }
 
-#[test]
-fn files_of_other_writers_are_read() {
-    use mcap::{Compression, WriteOptions};
-    let plain = || WriteOptions::new().compression_threads(0);
-    let variants = [
+/// What writers beside ours leave out or do otherwise than `plain`.
+pub(super) fn other_writers(plain: impl Fn() -> WriteOptions) -> [WriteOptions; 5] {
+    [
         plain().compression(None),
         plain().compression(Some(Compression::Lz4)),
         plain().use_chunks(false),
         plain().calculate_chunk_crcs(false),
         plain().emit_summary_records(false).emit_summary_offsets(false),
-    ];
-    for (n, options) in variants.into_iter().enumerate() {
+    ]
+}
+
+#[test]
+fn files_of_other_writers_are_read() {
+    for (n, options) in other_writers(|| WriteOptions::new().compression_threads(0)).into_iter().enumerate() {
         let mut file = Cursor::new(Vec::new());
         let mut writer = options.create(&mut file).unwrap();
         let channel = writer.add_channel(0, "/x", "json", &BTreeMap::new()).unwrap();

@@ -5,7 +5,7 @@ use std::io::{Error, ErrorKind, Read, Result, Seek, SeekFrom};
 /// Bytes read at once when less is asked for.
 const READ_AHEAD_BYTES: usize = 1 << 18;
 
-/// A file of fixed length with one range in memory. Bytes appended after opening are not seen.
+/// A file with one range in memory. Bytes appended after opening are seen by [`Self::refresh`] alone.
 pub struct Window<R> {
     source: R,
     len: u64,
@@ -17,6 +17,13 @@ impl<R: Read + Seek> Window<R> {
     pub fn new(mut source: R) -> Result<Self> {
         let len = source.seek(SeekFrom::End(0))?;
         Ok(Self { source, len, start: 0, buffer: Vec::new() })
+    }
+
+    /// Looks at the file anew: its length, and its bytes.
+    pub fn refresh(&mut self) -> Result<()> {
+        self.buffer.clear();
+        self.len = self.source.seek(SeekFrom::End(0))?;
+        Ok(())
     }
 
     /// Length of the file, bytes.
