@@ -11,10 +11,11 @@ use nalgebra::{Const, DMatrix, DVector, Dyn, Matrix3, Matrix6, OMatrix, Vector3,
 
 use crate::calib::methods::gripper_tag::MountEstimate;
 use crate::calib::methods::position_problem::PositionProblem;
-use crate::calib::parameters::{JointParameters, Parameter};
+use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
 use crate::calib::views::view::{TagObservation, TaskRests};
 use armcal_core::kinematics::{IkGoal, IkSettings, JointLimits, solve_position};
-use armcal_core::robot::{FailedJoint, FailedKind, Robot};
+use armcal_core::robot::{FailedJoint, FailedKind, JointSensorSpec, Robot};
+use armcal_core::sensor::ConditionChange;
 use armcal_core::stats::Summary;
 use armcal_core::streams::{JointAngles, MAX_JOINTS};
 
@@ -28,6 +29,17 @@ pub struct ParameterCovariance {
     /// One sigma of what the parameters leave of each sensor's error at a new pose; `None` takes the datasheet's
     /// linearity.
     pub residual_std_rad: Option<[f64; MAX_JOINTS]>,
+}
+
+/// A joint at a travel of its sensor.
+#[derive(Clone, Copy, Debug)]
+pub struct JointAt<'a> {
+    /// Its sensor.
+    pub spec: &'a JointSensorSpec,
+    /// Index, base first.
+    pub joint: usize,
+    /// From the middle of its range by the datasheet, rad.
+    pub travel_rad: f64,
 }
 
 /// What the tool's position error is expected to be at the task's targets.
@@ -73,6 +85,43 @@ impl CommonErrors {
 }
 
 impl ParameterCovariance {
+    /// The same with gains and offsets as they are under other conditions than the reference's: what temperature and
+    /// pressure do is in them.
+    #[must_use]
+    pub fn under(&self, change: &ConditionChange) -> Self {
+        let mut to = DMatrix::identity(self.parameters.len(), self.parameters.len());
+        for (column, by) in self.parameters.iter().enumerate() {
+            let (kind, share) = match by.kind {
+                ParameterKind::OffsetPerK => (ParameterKind::Offset, change.oil_k),
+                ParameterKind::GainPerK => (ParameterKind::Gain, change.oil_k),
+                ParameterKind::OffsetPerMpa => (ParameterKind::Offset, change.pressure_mpa),
+                ParameterKind::DriftPerH => (ParameterKind::Offset, change.elapsed_h),
+                _ => continue,
+            };
+            let into = Parameter { joint: by.joint, kind };
+            if let Some(row) = self.parameters.iter().position(|p| *p == into) {
+                to[(row, column)] = share;
+            }
+        }
+        Self { matrix: &to * &self.matrix * to.transpose(), ..self.clone() }
+    }
+
+    /// Variance of a joint's angle there, rad^2: by its own parameters, and what is `besides`.
+    #[must_use]
+    pub fn angle_var_rad2(&self, at: JointAt<'_>, change: &ConditionChange, besides: f64) -> f64 {
+        let JointAt { spec, joint, travel_rad } = at;
+        let own = self.parameters.iter().enumerate().filter(|(_, p)| p.joint == joint);
+        let by: Vec<(usize, f64)> =
+            own.map(|(row, p)| (row, p.kind.angle_derivative(spec, travel_rad, change, 0.0))).collect();
+        let mut variance = besides;
+        for &(i, by_i) in &by {
+            for &(k, by_k) in &by {
+                variance += by_i * self.matrix[(i, k)] * by_k;
+            }
+        }
+        variance.max(0.0)
+    }
+
     /// Estimates the covariance at the solution, and by how much the parameters go along with an error of the mount
     /// (d parameter / d mount, six columns). A singular curvature gives infinite variances.
     #[must_use]

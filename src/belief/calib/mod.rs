@@ -31,7 +31,7 @@ mod views;
 
 pub use baseline_comparison::{BaselineComparison, SIGNIFICANCE};
 pub use calibrate::{MIN_VIEWS, calibrate, calibrate_data, calibrate_with_survey};
-pub use covariance::{CommonErrors, ParameterCovariance, ToolErrorPrediction};
+pub use covariance::{CommonErrors, JointAt, ParameterCovariance, ToolErrorPrediction};
 pub use error::CalibError;
 pub use finding::{Finding, FindingKind, FindingUnit};
 pub use geometry_error::{ErrorKind, GeometryError};

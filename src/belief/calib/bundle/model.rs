@@ -171,33 +171,45 @@ pub fn model_for(robot: &Robot, views: &[View]) -> Model {
     };
     let warmed = spread(&|c| c.oil_c) > 0.5;
     let dived = spread(&|c| c.pressure_pa) > 2e5;
-    let gripper_joints = robot.gripper_tag.map_or(0, |tag| tag.mount.n_joints);
-    let has_gripper = views.iter().filter(|view| view.gripper_tag.is_some()).count() >= MIN_GRIPPER_VIEWS;
-    let last = if has_gripper { gripper_joints } else { 0 }.max(robot.camera.mount.n_joints);
+    let gripper_tag = views.iter().filter(|view| view.gripper_tag.is_some()).count() >= MIN_GRIPPER_VIEWS;
+    let from_both_sides =
+        |joint: usize| [-1.0, 1.0].iter().all(|side| views.iter().any(|v| v.approach[joint] == *side));
+    model_of(robot, &Scope { warmed, dived, gripper_tag, from_both_sides: &from_both_sides, time_offset: false })
+}
+
+/// What a recording can tell of.
+pub(crate) struct Scope<'a> {
+    /// The oil's temperature and the pressure change.
+    pub warmed: bool,
+    pub dived: bool,
+    /// There are views of a tag on the gripper.
+    pub gripper_tag: bool,
+    /// Whether a joint came to rest from both sides.
+    pub from_both_sides: &'a dyn Fn(usize) -> bool,
+    /// Images are taken while the arm moves.
+    pub time_offset: bool,
+}
+
+/// Sensors before the camera, or before the tag on the gripper, with the mount and the tags.
+pub(crate) fn model_of(robot: &Robot, scope: &Scope<'_>) -> Model {
+    let gripper_joints = robot.gripper_tag.filter(|_| scope.gripper_tag).map_or(0, |tag| tag.mount.n_joints);
+    let last = gripper_joints.max(robot.camera.mount.n_joints);
     let joint = |joint: usize| {
         let spec = &robot.sensors[joint];
-        let mut kinds = Vec::new();
         // A datasheet that leaves nothing open leaves nothing to estimate.
         if joint >= last || (spec.gain_std <= 0.0 && spec.offset_std_rad <= 0.0) {
-            return kinds;
+            return Vec::new();
         }
-        let from_both_sides = [-1.0, 1.0].iter().all(|side| views.iter().any(|v| v.approach[joint] == *side));
-        for (wanted, kind) in [
+        let wanted = [
             (spec.gain_std > 0.0, ParameterKind::Gain),
             (spec.offset_std_rad > 0.0, ParameterKind::Offset),
-            (warmed, ParameterKind::OffsetPerK),
-            (warmed, ParameterKind::GainPerK),
-            (dived, ParameterKind::OffsetPerMpa),
-            (from_both_sides, ParameterKind::HalfBacklash),
-        ] {
-            if wanted {
-                kinds.push(kind);
-            }
-        }
-        if spec.linearity_std_rad > 0.0 {
-            kinds.extend(shape_kinds());
-        }
-        kinds
+            (scope.warmed, ParameterKind::OffsetPerK),
+            (scope.warmed, ParameterKind::GainPerK),
+            (scope.dived, ParameterKind::OffsetPerMpa),
+            ((scope.from_both_sides)(joint), ParameterKind::HalfBacklash),
+        ];
+        let kinds = wanted.into_iter().filter(|(wanted, _)| *wanted).map(|(_, kind)| kind);
+        kinds.chain(shape_kinds().filter(|_| spec.linearity_std_rad > 0.0)).collect()
     };
     Model {
         joints: (0..robot.n_joints()).map(joint).collect(),
@@ -206,8 +218,8 @@ pub fn model_for(robot: &Robot, views: &[View]) -> Model {
         mount: robot.camera.mount_std_m > 0.0 || robot.camera.mount_std_rad > 0.0,
         lens: false,
         tags: true,
-        gripper_tag: has_gripper,
-        time_offset: false,
+        gripper_tag: scope.gripper_tag,
+        time_offset: scope.time_offset,
     }
 }
 

@@ -1,5 +1,5 @@
 //! What happened, by the evidence of the views: a view that the belief does not explain starts a race of explanations,
-//! each a belief of its own, until one of them leads or three more views were seen.
+//! each a belief of its own, until one of them leads or five more views were seen.
 
 use crate::calib::online::filter::{Filter, ViewUpdate, WalkScore};
 use crate::calib::online::hypothesis::Fault;
@@ -26,6 +26,8 @@ const MAX_RECENT: usize = 6;
 /// Views after which the best explanation is taken, and those that one needs.
 const MAX_VIEWS: usize = 5;
 const CONFIRMED_BY: usize = 2;
+/// The same for another scale: its two numbers explain any two views.
+const SCALE_CONFIRMED_BY: usize = 3;
 
 /// One explanation, and the belief under it.
 #[derive(Clone)]
@@ -64,15 +66,15 @@ pub(crate) struct Verdict {
 pub(crate) struct RecentViews {
     /// The belief before them, widened until the first.
     pub before: Filter,
-    /// Evidence before them.
-    pub nats_before: f64,
+    /// Their evidence, as they were taken in.
+    pub nats: f64,
     pub views: Vec<View>,
     sums: [WalkScore; MAX_JOINTS],
 }
 
 impl RecentViews {
-    pub(crate) fn new(before: Filter, nats_before: f64) -> Self {
-        Self { before, nats_before, views: Vec::new(), sums: [WalkScore::default(); MAX_JOINTS] }
+    pub(crate) fn new(before: Filter) -> Self {
+        Self { before, nats: 0.0, views: Vec::new(), sums: [WalkScore::default(); MAX_JOINTS] }
     }
 
     /// Whether `view` belongs to another group.
@@ -83,6 +85,7 @@ impl RecentViews {
 
     pub(crate) fn add(&mut self, view: &View, update: Option<&ViewUpdate>) {
         self.views.push(view.clone());
+        self.nats += update.map_or(0.0, |update| update.log_evidence);
         for (sum, score) in self.sums.iter_mut().zip(update.iter().flat_map(|update| &update.walk)) {
             sum.a += score.a;
             sum.b += score.b;
@@ -116,7 +119,8 @@ impl Race {
         let mut tags: Vec<usize> = views.iter().flat_map(|view| &view.tags).map(|tag| tag.tag_idx).collect();
         tags.sort_unstable();
         tags.dedup();
-        let faults = Fault::all(before, &tags).into_iter().map(Some);
+        let is_free = views.last().map_or([false; MAX_JOINTS], |view| view.is_free);
+        let faults = Fault::all(before, &tags, &is_free).into_iter().map(Some);
         let branch = |fault: Option<Fault>| {
             let mut filter = before.clone();
             if let Some(fault) = fault {
@@ -191,6 +195,7 @@ impl Race {
             // What drifted shows in all views; a weak one must not settle it.
             Some(Fault::Drift) => self.n_later >= MAX_VIEWS,
             Some(Fault::Tag(tag)) => self.n_views_of[tag] >= CONFIRMED_BY,
+            Some(Fault::Scale(_)) => self.n_views >= SCALE_CONFIRMED_BY,
             Some(_) => self.n_views >= CONFIRMED_BY,
         }
     }

@@ -9,7 +9,7 @@ use crate::calib::online::member::Member;
 use crate::calib::online::settings::{DriftModel, OnlineSettings};
 use crate::calib::parameters::JointParameters;
 use crate::calib::views::view::View;
-use armcal_core::robot::Robot;
+use armcal_core::robot::{FailedJoint, FailedKind, Robot};
 use armcal_core::sensor::Conditions;
 use armcal_core::time::Stamp;
 
@@ -33,7 +33,14 @@ impl OnlineEstimator {
         let settings = Arc::new(settings);
         let lags = if settings.drift == DriftModel::Tuned { &LAGS_S[..] } else { &LAGS_S[..1] };
         let members = lags.iter().map(|lag_s| Member::new(robot.clone(), Arc::clone(&settings), *lag_s));
-        Self { members: members.collect(), robot }
+        let mut estimator = Self { members: members.collect(), robot };
+        // A slip is found and taken account of; all else that was declared says nothing of the angle.
+        let declared: Vec<FailedJoint> = estimator.robot.failed.clone();
+        declared
+            .iter()
+            .filter(|failed| failed.kind != FailedKind::Jumps)
+            .for_each(|failed| estimator.leave_out(failed.joint));
+        estimator
     }
 
     /// The arm that it is for, as drawn.
@@ -48,6 +55,13 @@ impl OnlineEstimator {
         self.best().n_views()
     }
 
+    /// A joint that is left out stands still, and is known to stand where it is believed to within one sigma, rad.
+    pub fn stands_still(&mut self, joint: usize, std_rad: f64) {
+        if joint < self.robot.n_joints() {
+            self.members.iter_mut().for_each(|member| member.stands_still(joint, std_rad));
+        }
+    }
+
     /// From now on the sensor of `joint` is not looked at: somebody declared that it has failed.
     pub fn leave_out(&mut self, joint: usize) {
         if joint < self.robot.n_joints() {
@@ -60,8 +74,10 @@ impl OnlineEstimator {
         self.members.iter_mut().for_each(|member| member.hear_temperature(stamp, oil_c));
     }
 
-    /// Takes a view in; whether it told anything.
+    /// Takes a view in; whether it told anything. Tags whose place nobody knows are not looked at: a map comes first.
     pub fn add_view(&mut self, view: &View) -> bool {
+        let mut view = view.clone();
+        view.tags.retain(|seen| self.robot.tags[seen.tag_idx].is_known());
         if view.tags.is_empty() && view.gripper_tag.is_none() {
             return false;
         }
@@ -72,7 +88,11 @@ impl OnlineEstimator {
         // Stable: of equal ones the shorter lag comes first.
         self.members.sort_by(|a, b| b.nats.total_cmp(&a.nats));
         let best = self.best().nats;
-        self.members.retain(|member| best - member.nats < GIVEN_UP_NATS);
+        let mut place = 0;
+        self.members.retain(|member| {
+            place += 1;
+            place == 1 || best - member.nats < GIVEN_UP_NATS
+        });
         has_told
     }
 

@@ -2,29 +2,26 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::calib::finding::{FindingKind, FindingUnit};
+use crate::calib::finding::{Finding, FindingKind, FindingUnit};
 use crate::calib::online::diagnosis::Verdict;
 use crate::calib::online::hypothesis::Fault;
 use armcal_core::robot::Robot;
 use armcal_core::time::Stamp;
 
+/// An explanation that leads by less than this is told with the next one, in nats (odds of twenty).
+const CLEAR_LEAD_NATS: f64 = 3.0;
+
 /// Something that happened, with the evidence for it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct OnlineEvent {
     /// End of the first view that shows it, ns since the epoch.
     pub since_nanos: i64,
     /// End of the view that decided it.
     pub decided_nanos: i64,
-    /// What it is.
-    pub kind: FindingKind,
-    /// Joint or tag.
-    pub name: String,
-    /// In `unit`; absent where it has none.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub size: Option<f64>,
-    /// Absent where there is no size.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub unit: Option<FindingUnit>,
+    /// What it is; the size of a slip or of something moved is how far, that of a scale the slope of the angle by the
+    /// reading.
+    pub finding: Finding,
     /// `ln` of the odds against the next explanation.
     pub lead_nats: f64,
     /// The next explanation, where it is not that nothing happened.
@@ -39,38 +36,51 @@ impl OnlineEvent {
             Fault::Tag(_) | Fault::Base => FindingUnit::Metre,
             Fault::Scale(_) | Fault::Failed(_) | Fault::Drift => FindingUnit::One,
         };
-        Self {
-            since_nanos: since.nanos,
-            decided_nanos: now.nanos,
-            kind: verdict.fault.kind(),
+        let is_reversed = matches!(verdict.fault, Fault::Scale(_)) && verdict.size.is_some_and(|slope| slope < 0.0);
+        let finding = Finding {
+            kind: if is_reversed { FindingKind::SensorReversed } else { verdict.fault.kind() },
             name: verdict.fault.name(robot),
             size: verdict.size,
             unit: verdict.size.map(|_| unit),
+            tool_error_m: None,
+            time_s: None,
+            repaired: true,
+        };
+        Self {
+            since_nanos: since.nanos,
+            decided_nanos: now.nanos,
+            finding,
             // Nothing else is left to lead against.
             lead_nats: verdict.lead_nats.min(1e3),
-            or_else: verdict.next.map(|fault| fault.name(robot)),
+            or_else: verdict.next.map(|fault| fault.phrase(robot)),
         }
     }
 
     /// One line for people.
     #[must_use]
     pub fn to_line(&self) -> String {
-        let what = match self.kind {
-            FindingKind::SensorSlip => "the sensor of {} slipped on its shaft",
-            FindingKind::SensorScale => "the sensor of {} has another scale",
-            FindingKind::SensorFailed => "the sensor of {} says nothing any more: the camera takes its place",
-            FindingKind::TagMoved => "tag {} was moved",
-            FindingKind::CameraMount => "the {} has moved",
-            _ => "the {} or all tags have moved",
+        let Finding { kind, name, size, .. } = &self.finding;
+        let size = size.unwrap_or(f64::NAN);
+        let mut line = match kind {
+            FindingKind::SensorSlip => {
+                format!("the sensor of {name} slipped on its shaft by {:.2} deg", size.to_degrees())
+            }
+            FindingKind::SensorScale => {
+                format!(
+                    "the sensor of {name} has another scale: the angle is {size:.3} of what the datasheet makes of it"
+                )
+            }
+            FindingKind::SensorReversed => {
+                format!("the sensor of {name} reads the other way ({size:.3} of the datasheet)")
+            }
+            FindingKind::SensorFailed => {
+                format!("the sensor of {name} says nothing any more: only views tell where the joint stands")
+            }
+            FindingKind::TagMoved => format!("tag {name} was moved by {:.1} mm", 1e3 * size),
+            FindingKind::CameraMount => format!("the camera turned on its mount by {:.2} deg", size.to_degrees()),
+            _ => format!("the {name} or all tags have moved by {:.1} mm", 1e3 * size),
         };
-        let mut line = what.replace("{}", &self.name);
-        match (self.size, self.unit) {
-            (Some(size), Some(FindingUnit::Radian)) => line += &format!(" by {:.2} deg", size.to_degrees()),
-            (Some(size), Some(FindingUnit::Metre)) => line += &format!(" by {:.1} mm", 1e3 * size),
-            (Some(size), Some(_)) => line += &format!(": {size:.3} of the believed one"),
-            _ => {}
-        }
-        if let Some(other) = self.or_else.as_ref().filter(|_| self.lead_nats < 3.0) {
+        if let Some(other) = self.or_else.as_ref().filter(|_| self.lead_nats < CLEAR_LEAD_NATS) {
             line += &format!(" (or: {other})");
         }
         line

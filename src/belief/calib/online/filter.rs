@@ -30,6 +30,8 @@ const LAST_GAIN: f64 = 1e-4;
 /// Where a step does not lower the cost, this share of it is tried next.
 const SHORTER: f64 = 0.3;
 const CORNER_WIDTH: f64 = 3.0;
+/// Of the place of a tag that nobody surveyed, m and rad: no view of it is used.
+const UNKNOWN_STD: f64 = 100.0;
 
 /// Means and information of all columns, base to tags.
 #[derive(Clone)]
@@ -119,7 +121,7 @@ impl Filter {
         for (tag_idx, at) in layout.tags.iter().enumerate() {
             let Some(at) = at.filter(|at| column_of[*at].is_none()) else { continue };
             for (k, std) in problem.prior.tags_std[tag_idx].iter().enumerate() {
-                info[(at + k, at + k)] = BundleProblem::at_least(*std).powi(-2);
+                info[(at + k, at + k)] = BundleProblem::at_least(std.min(UNKNOWN_STD)).powi(-2);
             }
         }
         let mut state = solved.state.clone();
@@ -196,11 +198,9 @@ impl Filter {
             let own = if i == j { 1.0 / columns[i].1 } else { 0.0 };
             own + self.info[(columns[i].0, columns[j].0)]
         });
-        let Some(factor) = Cholesky::new(inner) else { return };
-        self.log_det -= log_det(&factor) + columns.iter().map(|(_, variance)| variance.ln()).sum::<f64>();
-        let mut half = along.transpose();
-        factor.l_dirty().solve_lower_triangular_mut(&mut half);
-        self.info.gemm_tr(-1.0, &half, &half, 1.0);
+        if self.subtract(&along, inner).is_some() {
+            self.log_det -= columns.iter().map(|(_, variance)| variance.ln()).sum::<f64>();
+        }
     }
 
     /// Number of columns.
@@ -212,11 +212,17 @@ impl Filter {
     pub(crate) fn widen_along(&mut self, directions: &DMatrix<f64>) {
         let along = &self.info * directions;
         let inner = DMatrix::identity(directions.ncols(), directions.ncols()) + directions.tr_mul(&along);
-        let Some(factor) = Cholesky::new(inner) else { return };
+        self.subtract(&along, inner);
+    }
+
+    /// Takes `along inner^-1 along^T` off the information; `None`, and nothing changed, after an overflow.
+    fn subtract(&mut self, along: &DMatrix<f64>, inner: DMatrix<f64>) -> Option<()> {
+        let factor = Cholesky::new(inner)?;
         self.log_det -= log_det(&factor);
         let mut half = along.transpose();
         factor.l_dirty().solve_lower_triangular_mut(&mut half);
         self.info.gemm_tr(-1.0, &half, &half, 1.0);
+        Some(())
     }
 
     /// Takes a view in. `None`, and nothing changed, where it sees no tag or its numbers are not finite.
@@ -232,6 +238,10 @@ impl Filter {
             return None;
         };
         let update = view_update(&problem, &solved, log_det_before);
+        if !update.log_evidence.is_finite() {
+            self.info = problem.prior.joint_info;
+            return None;
+        }
         let SolvedView { state, normal, factor } = solved;
         self.log_det = log_det(&factor);
         self.info = normal.matrix;

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::calib::covariance::task_angles;
+use crate::calib::covariance::{JointAt, ParameterCovariance, task_angles};
 use crate::calib::online::estimator::OnlineEstimator;
 use crate::calib::online::event::OnlineEvent;
 use crate::calib::online::settings::OnlineSettings;
@@ -44,7 +44,8 @@ pub struct BeliefRow {
     pub tool_error_m: Summary,
     /// The same in an hour without any view.
     pub tool_error_in_an_hour_m: Summary,
-    /// Of each joint: offset, and its standard deviation, rad.
+    /// Of each joint: what its sensor is off at the middle of its range under the conditions of then, and one sigma,
+    /// rad.
     pub offset_rad: Vec<[f64; 2]>,
     /// How much later the joint sensors' stamps are than the camera's, and one sigma, s.
     pub clock_offset_s: Option<[f64; 2]>,
@@ -111,11 +112,12 @@ impl Follower {
         self.estimator.take_events()
     }
 
-    /// The targets that tool errors are predicted at.
+    /// The targets that tool errors are predicted at; where none is within reach, the stowed posture stays.
     pub fn set_task(&mut self, task: &ReachTask) {
         let targets = task_angles(&self.robot, TaskRests { task, rests: &std::collections::BTreeMap::new() });
+        self.tolerance_m = Some(task.tolerance_m);
         if !targets.is_empty() {
-            (self.targets, self.tolerance_m) = (targets, Some(task.tolerance_m));
+            self.targets = targets;
         }
     }
 
@@ -125,6 +127,11 @@ impl Follower {
     pub fn is_good_enough(&self) -> Option<bool> {
         let worst_m = self.tool_error_m(&self.conditions)?.max;
         self.tolerance_m.map(|tolerance_m| P95_OVER_RMS * worst_m <= tolerance_m)
+    }
+
+    /// A joint whose sensor is left out stands still where it is believed to stand, to one sigma, rad.
+    pub fn stands_still(&mut self, joint: usize, std_rad: f64) {
+        self.estimator.stands_still(joint, std_rad);
     }
 
     /// The estimator.
@@ -161,32 +168,54 @@ impl Follower {
         let later = Conditions { stamp: Some(stamp.plus_s(3600.0 * AHEAD_H)), ..self.conditions };
         let parameters = self.estimator.parameters()?;
         let covariance = self.estimator.covariance(&self.conditions)?;
-        let std = |joint: usize| {
-            let offset = crate::calib::Parameter { joint, kind: crate::calib::ParameterKind::Offset };
-            covariance.std(offset).unwrap_or(self.robot.sensors[joint].offset_std_rad)
+        let change = self.estimator.at_sensors(&self.conditions).departure_from(&parameters.reference);
+        let offset = |joint: usize| {
+            let spec = &self.robot.sensors[joint];
+            let off_rad = parameters.correction(joint).angle_rad(spec, 0.0, &change, 0.0) - spec.center_rad;
+            let is_estimated = covariance.parameters.iter().any(|p| p.joint == joint);
+            let std_rad = covariance.angle_var_rad2(JointAt { spec, joint, travel_rad: 0.0 }, &change, 0.0).sqrt();
+            [off_rad, if is_estimated { std_rad } else { spec.offset_std_rad }]
         };
         Some(BeliefRow {
             stamp_nanos: stamp.nanos,
             views: self.estimator.n_views(),
-            tool_error_m: self.tool_error_m(&self.conditions)?,
+            tool_error_m: self.tool_error_under_m(&covariance, &self.conditions)?,
             tool_error_in_an_hour_m: self.tool_error_m(&later)?,
             clock_offset_s: self.estimator.clock_offset_s(),
             temperature_lag_s: self.estimator.temperature_lag_s(),
-            offset_rad: (0..self.robot.n_joints()).map(|j| [parameters.offset_rad[j], std(j)]).collect(),
+            offset_rad: (0..self.robot.n_joints()).map(offset).collect(),
         })
     }
 
     /// Expected error of the tool over the task under `conditions`, without further views until then.
     #[must_use]
     pub fn tool_error_m(&self, conditions: &Conditions) -> Option<Summary> {
-        let (covariance, sensors) = (self.estimator.covariance(conditions)?, self.sensors());
+        self.tool_error_under_m(&self.estimator.covariance(conditions)?, conditions)
+    }
+
+    /// Error of the tool at believed `angles`, now, that is exceeded with a probability of 5 %, m.
+    #[must_use]
+    pub fn tool_error_p95_at_m(&self, angles: &JointAngles) -> Option<f64> {
+        let covariance = self.estimator.covariance(&self.conditions)?;
+        let sensors = self.sensors();
+        Some(P95_OVER_RMS * self.one_sigma_m(&covariance, &sensors, angles, &self.conditions))
+    }
+
+    fn one_sigma_m(
+        &self,
+        covariance: &ParameterCovariance,
+        sensors: &ArmSensors,
+        angles: &JointAngles,
+        conditions: &Conditions,
+    ) -> f64 {
         // What drifts is in the covariance already.
         let at = Conditions { stamp: sensors.reference.stamp, ..*conditions };
-        let errors: Vec<f64> = self
-            .targets
-            .iter()
-            .map(|angles| covariance.tool_position_under_m2(&self.robot, &sensors, angles, &at).trace().max(0.0).sqrt())
-            .collect();
-        Summary::of(&errors)
+        covariance.tool_position_under_m2(&self.robot, sensors, angles, &at).trace().max(0.0).sqrt()
+    }
+
+    fn tool_error_under_m(&self, covariance: &ParameterCovariance, conditions: &Conditions) -> Option<Summary> {
+        let sensors = self.sensors();
+        let error_m = |angles| self.one_sigma_m(covariance, &sensors, angles, conditions);
+        Summary::of(&self.targets.iter().map(error_m).collect::<Vec<_>>())
     }
 }

@@ -5,6 +5,7 @@ use nalgebra::{DMatrix, Matrix6};
 use crate::calib::finding::FindingKind;
 use crate::calib::online::filter::Filter;
 use crate::calib::parameters::{Parameter, ParameterKind};
+use armcal_core::joints::MAX_JOINTS;
 use armcal_core::robot::Robot;
 use armcal_core::spatial::adjoint;
 
@@ -38,9 +39,9 @@ pub enum Fault {
 }
 
 impl Fault {
-    /// All that a view with these tags could tell of.
-    pub(crate) fn all(filter: &Filter, tags: &[usize]) -> Vec<Self> {
-        let joints: Vec<usize> = filter.offsets().map(|(joint, _)| joint).collect();
+    /// All that views with these tags could tell of, where the sensors of some joints are not looked at.
+    pub(crate) fn all(filter: &Filter, tags: &[usize], is_free: &[bool; MAX_JOINTS]) -> Vec<Self> {
+        let joints: Vec<usize> = filter.offsets().map(|(joint, _)| joint).filter(|&joint| !is_free[joint]).collect();
         let of_joint = |joint: usize| [Self::Slip(joint), Self::Scale(joint), Self::Failed(joint)];
         let of_tags = tags.iter().map(|&tag| Self::Tag(tag)).filter(|_| tags.len() > 1);
         let of_mount = filter.mount_column().map(|_| Self::Mount);
@@ -111,12 +112,28 @@ impl Fault {
         }
     }
 
-    /// How far belief `after` is from belief `before` in what the fault is about: m or rad; `None` without a size.
+    /// What people read where it is one of several explanations.
+    pub(crate) fn phrase(self, robot: &Robot) -> String {
+        let name = self.name(robot);
+        match self {
+            Self::Slip(_) => format!("the sensor of {name} slipped on its shaft"),
+            Self::Scale(_) => format!("the sensor of {name} has another scale"),
+            Self::Failed(_) => format!("the sensor of {name} says nothing any more"),
+            Self::Tag(_) => format!("tag {name} was moved"),
+            Self::Mount => "the camera has moved on its mount".to_owned(),
+            Self::Base => "the base or all tags have moved".to_owned(),
+            Self::Drift => "all sensors drifted more than expected".to_owned(),
+        }
+    }
+
+    /// How far belief `after` is from belief `before` in what the fault is about: m, of a slip by how much the sensor
+    /// reads more since, rad, of a scale the slope of the angle by the reading; `None` without a size.
     pub(crate) fn size(self, before: &Filter, after: &Filter) -> Option<f64> {
         match self {
             Self::Slip(joint) => {
                 let offset = |filter: &Filter| filter.parameters().offset_rad[joint];
-                Some(offset(after) - offset(before))
+                // The angle falls by what the sensor reads more since.
+                Some(offset(before) - offset(after))
             }
             Self::Scale(joint) => Some(after.parameters().gain[joint]),
             Self::Failed(_) | Self::Drift => None,

@@ -18,6 +18,7 @@ use crate::calib::online::settings::{DriftModel, FaultSearch, OnlineSettings, di
 use crate::calib::online::view_stream::is_moving;
 use crate::calib::parameters::JointParameters;
 use crate::calib::views::view::View;
+use armcal_core::joints::MAX_JOINTS;
 use armcal_core::robot::Robot;
 use armcal_core::sensor::Conditions;
 use armcal_core::time::Stamp;
@@ -49,6 +50,8 @@ pub(crate) struct Member {
     n_views: usize,
     /// Joints whose sensor says nothing any more.
     failed: Vec<usize>,
+    /// Of those that stand still: one sigma of where.
+    stands_within_rad: [f64; MAX_JOINTS],
     running: Option<Running>,
     suspect_since: Option<Stamp>,
     events: Vec<OnlineEvent>,
@@ -82,6 +85,7 @@ impl Member {
             moving: Vec::new(),
             n_views: 0,
             failed: Vec::new(),
+            stands_within_rad: [f64::INFINITY; MAX_JOINTS],
             running: None,
             suspect_since: None,
             events: Vec::new(),
@@ -98,6 +102,11 @@ impl Member {
         if !self.failed.contains(&joint) {
             self.failed.push(joint);
         }
+    }
+
+    /// The joint that is left out stands where it is believed to stand, to one sigma.
+    pub(crate) fn stands_still(&mut self, joint: usize, std_rad: f64) {
+        self.stands_within_rad[joint] = std_rad;
     }
 
     /// A reading of the oil's thermometer.
@@ -119,21 +128,23 @@ impl Member {
             self.corners.learn(&view);
             self.robot.camera.corner_std_px = self.corners.std_px();
         }
-        // A start that goes on no more is over; what came since its last batch is in the belief. Where nothing drifts,
-        // views at rest may come at any time.
+        self.close_start(&view);
+        let is_start = self.running.is_none() || !self.first.is_empty();
+        match (is_start, is_moving(&view)) {
+            (true, true) => self.hold_back(view),
+            (true, false) => self.start_with(view),
+            (false, _) => self.carry_on(&view).is_some(),
+        }
+    }
+
+    /// A start that goes on no more is over; what came since its last batch is in the belief. Where nothing drifts,
+    /// views at rest may come at any time.
+    fn close_start(&mut self, view: &View) {
         let is_late = self.first.last().is_some_and(|last| view.end.since_s(last.end) > START_PAUSE_S);
-        let may_wait = self.settings.drift == DriftModel::Stationary && !is_moving(&view);
+        let may_wait = self.settings.drift == DriftModel::Stationary && !is_moving(view);
         if is_late && !may_wait && self.running.is_some() {
             self.first = Vec::new();
         }
-        if is_moving(&view) && (self.running.is_none() || !self.first.is_empty()) {
-            return self.hold_back(view);
-        }
-        let is_start = self.running.is_none() || !self.first.is_empty();
-        if is_start {
-            return self.start_with(view);
-        }
-        self.carry_on(&view).is_some()
     }
 
     /// Views of a moving arm are for later, unless there are no others.
@@ -154,12 +165,12 @@ impl Member {
     /// The batch of the first views.
     fn start_with(&mut self, view: View) -> bool {
         self.moving = Vec::new();
-        self.first.push(view);
-        let n = self.first.len();
+        let n = self.first.len() + 1;
         if !START_AT.contains(&n) {
-            let view = self.first[n - 1].clone();
-            return self.running.is_some() && self.carry_on(&view).is_some();
+            self.first.push(view.clone());
+            return self.carry_on(&view).is_some();
         }
+        self.first.push(view);
         let started = self.start();
         if started.is_some() {
             self.running = started;
@@ -227,14 +238,16 @@ impl Member {
             return None;
         }
         let recent = running.recent.take().filter(|recent| !recent.is_past(view));
-        let mut recent = recent.unwrap_or_else(|| RecentViews::new(running.filter.clone(), self.nats));
+        let mut recent = recent.unwrap_or_else(|| RecentViews::new(running.filter.clone()));
+        let nats_of_earlier = recent.nats;
         let update = running.filter.update(&self.robot, view);
         recent.add(view, update.as_ref());
         // A view of which nothing fits changes nothing.
         let is_suspicious = update.as_ref().is_none_or(is_suspicious) || recent.show_a_step();
         if self.settings.faults == FaultSearch::On && is_suspicious {
             let race = Race::start(&self.robot, &recent);
-            self.nats = FORGETTING * recent.nats_before + race.nats();
+            // Forgotten once a view, race or not: beliefs under other lags are compared by this.
+            self.nats = FORGETTING * self.nats + race.nats() - nats_of_earlier;
             self.suspect_since = recent.views.first().map(|first| first.end);
             running.race = Some(race);
             self.settle_race(view.end);
@@ -302,6 +315,8 @@ impl Member {
         let n = parameters.len();
         let matrix: DMatrix<f64> = filter.covariance()?.view((0, 0), (n, n)).into_owned();
         let residual_std_rad = std::array::from_fn(|joint| match self.robot.sensors.get(joint) {
+            // What says nothing leaves the angle open.
+            _ if self.failed.contains(&joint) => filter.scales.free_joint_std_rad.min(self.stands_within_rad[joint]),
             Some(spec) if filter.joint_columns(joint).is_empty() => spec.linearity_std_rad,
             _ => filter.scales.joint_std_rad[joint],
         });

@@ -3,8 +3,9 @@
 //! `view_stream` makes views of messages. `estimator` holds a `member` for each lag of the sensors' temperature; each
 //! starts from the first views by `bundle` and carries its belief on: `filter` is state and information,
 //! `process_noise` how fast sensors change. `diagnosis` races `hypothesis` against hypothesis where a view does not
-//! fit; `event` tells what happened. `follower` is all of it.
+//! fit; `event` tells what happened. `follower` is all of it, `belief_log` what it said over time.
 
+mod belief_log;
 mod diagnosis;
 mod estimator;
 mod event;
@@ -18,6 +19,7 @@ mod process_noise;
 mod settings;
 mod view_stream;
 
+pub use belief_log::{BeliefLine, BeliefLog};
 pub use estimator::OnlineEstimator;
 pub use event::OnlineEvent;
 pub use follower::{BeliefRow, Follower};

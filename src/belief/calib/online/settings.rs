@@ -1,7 +1,6 @@
 //! What an online estimator is told beforehand.
 
-use crate::calib::bundle::model::{Hyperparameters, Model, shape_kinds};
-use crate::calib::parameters::ParameterKind;
+use crate::calib::bundle::model::{Hyperparameters, Model, Scope, model_of};
 use armcal_core::robot::Robot;
 
 /// How much larger an effect may be than its datasheet's figure.
@@ -49,35 +48,12 @@ impl Default for OnlineSettings {
 /// All that a dive may change.
 #[must_use]
 pub fn online_model(robot: &Robot) -> Model {
-    let gripper_joints = robot.gripper_tag.map_or(0, |tag| tag.mount.n_joints);
-    let last = gripper_joints.max(robot.camera.mount.n_joints);
-    let joint = |joint: usize| {
-        let spec = &robot.sensors[joint];
-        if joint >= last || (spec.gain_std <= 0.0 && spec.offset_std_rad <= 0.0) {
-            return Vec::new();
-        }
-        let always = [ParameterKind::OffsetPerK, ParameterKind::GainPerK, ParameterKind::OffsetPerMpa];
-        let mut kinds = vec![ParameterKind::Gain, ParameterKind::Offset];
-        kinds.extend(always.into_iter().chain([ParameterKind::HalfBacklash]));
-        if spec.linearity_std_rad > 0.0 {
-            kinds.extend(shape_kinds());
-        }
-        kinds
-    };
-    Model {
-        joints: (0..robot.n_joints()).map(joint).collect(),
-        n_links: 0,
-        n_compliant: 0,
-        mount: robot.camera.mount_std_m > 0.0 || robot.camera.mount_std_rad > 0.0,
-        lens: false,
-        tags: true,
-        gripper_tag: robot.gripper_tag.is_some(),
-        time_offset: true,
-    }
+    let gripper_tag = robot.gripper_tag.is_some();
+    model_of(robot, &Scope { warmed: true, dived: true, gripper_tag, from_both_sides: &|_| true, time_offset: true })
 }
 
-/// The datasheet's scales for a whole dive: what only a dive shows may be wrong by two, and images of a moving arm have
-/// a time of their own.
+/// The datasheet's scales for a whole dive: what only a dive shows may be wrong by half, and images of a moving arm
+/// have a time of their own.
 pub(crate) fn dive_scales(robot: &Robot) -> Hyperparameters {
     let datasheet = Hyperparameters::datasheet(robot);
     Hyperparameters {

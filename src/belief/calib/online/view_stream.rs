@@ -34,6 +34,10 @@ const ABOUT_IMAGE_S: f64 = 0.06;
 const APART_RAD: f64 = 0.15;
 /// An arm all of whose joints are slower rests, rad/s.
 const SLOWEST_RAD_S: f64 = 0.02;
+/// In a faster arm readings within an image's time are too far apart to be told from drop-outs, rad/s.
+const FASTEST_RAD_S: f64 = 0.5;
+/// Images that wait for readings at most: without any nothing is made of them.
+const WAITING_IMAGES: usize = 1000;
 /// What is kept of the past: a rest, with what was read before it.
 const WINDOW_S: f64 = LONGEST_REST_S + BACK_S + NEAR_S + 10.0;
 /// Messages kept at most, whatever their rate.
@@ -98,6 +102,8 @@ impl ViewStream {
                 let is_resting = self.rest.is_some_and(|rest| detections.stamp.since_s(rest.since) > SETTLE_S);
                 if !is_resting && !detections.tags.is_empty() {
                     self.images.push_back(detections.stamp);
+                    let n_over = self.images.len().saturating_sub(WAITING_IMAGES);
+                    self.images.drain(..n_over);
                 }
             }
             Message::Rejects(_) | Message::Temperature(_) | Message::Pressure(_) => self.keep(log_time, message),
@@ -207,7 +213,9 @@ impl ViewStream {
         };
         let about: Vec<(Stamp, Message)> = self.window.iter().filter(belongs).cloned().collect();
         let mut view = view_of_span(&about, &self.robot, self.n_views, (start, end))?;
-        if view.tags.is_empty() || view.n_readings < 3 || !is_moving(&view) || !self.is_apart(&view.travel_rad) {
+        let is_slow_enough = view.rate_rad_s.iter().all(|rate| rate.abs() < FASTEST_RAD_S);
+        let is_usable = view.n_readings >= 3 && is_moving(&view) && is_slow_enough && !view.tags.is_empty();
+        if !is_usable || !self.is_apart(&view.travel_rad) {
             return None;
         }
         for (approach, rate) in view.approach.iter_mut().zip(view.rate_rad_s.iter()) {

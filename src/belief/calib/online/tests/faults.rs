@@ -9,7 +9,7 @@ use crate::calib::online::estimator::OnlineEstimator;
 use crate::calib::online::event::OnlineEvent;
 use crate::calib::online::settings::OnlineSettings;
 use crate::calib::online::tests::drifting::Dive;
-use armcal_core::robot::Robot;
+use armcal_core::robot::{FailedJoint, FailedKind, Robot};
 use armcal_core::spatial::exp;
 
 /// What happens at the view of that number after the first ones.
@@ -29,6 +29,11 @@ const AT: u32 = 5;
 
 /// An hour with a view every five minutes.
 fn hour(robot: &Robot, seed: u64, what: Happens) -> Vec<OnlineEvent> {
+    after_an_hour(robot, seed, what).0.take_events()
+}
+
+/// The estimator then, and the dive.
+fn after_an_hour<'a>(robot: &'a Robot, seed: u64, what: Happens) -> (OnlineEstimator, Dive<'a>) {
     let mut dive = Dive::new(robot, seed);
     let mut online = OnlineEstimator::new(robot.clone(), OnlineSettings::default());
     for k in 0..FIRST {
@@ -57,23 +62,21 @@ fn hour(robot: &Robot, seed: u64, what: Happens) -> Vec<OnlineEvent> {
         }
         online.add_view(&view);
     }
-    online.take_events()
+    (online, dive)
 }
 
 fn is_named(what: Happens, events: &[OnlineEvent], robot: &Robot) -> bool {
     let (kinds, name): (&[FindingKind], String) = match what {
         Happens::Nothing => return events.is_empty(),
         Happens::Slip { joint, .. } => (&[FindingKind::SensorSlip], robot.sensors[joint].joint.clone()),
-        Happens::Dead { joint } => {
-            (&[FindingKind::SensorFailed, FindingKind::SensorScale], robot.sensors[joint].joint.clone())
-        }
+        Happens::Dead { joint } => (&[FindingKind::SensorFailed], robot.sensors[joint].joint.clone()),
         Happens::Reversed { joint } => {
-            (&[FindingKind::SensorScale, FindingKind::SensorFailed], robot.sensors[joint].joint.clone())
+            (&[FindingKind::SensorReversed, FindingKind::SensorFailed], robot.sensors[joint].joint.clone())
         }
         Happens::Tag { tag, .. } => (&[FindingKind::TagMoved], robot.tags[tag].id.to_string()),
         Happens::Mount { .. } => (&[FindingKind::CameraMount], "camera mount".to_owned()),
     };
-    events.first().is_some_and(|event| kinds.contains(&event.kind) && event.name == name)
+    events.first().is_some_and(|OnlineEvent { finding, .. }| kinds.contains(&finding.kind) && finding.name == name)
 }
 
 #[test]
@@ -107,4 +110,20 @@ fn faults_are_named_and_nothing_else() {
     // A tag that no later view sees stays an outlier.
     assert!(missed.len() * 8 <= n, "{missed:?}");
     assert!(!missed.iter().any(|what| matches!(what, Happens::Nothing)), "a false alarm");
+}
+
+/// A joint without a sensor is known by the camera in its views alone: no sensor says where the tool is at a task.
+#[test]
+fn a_failed_sensor_leaves_the_tool_unknown() {
+    let robot = titan();
+    let (sound, mut dive) = after_an_hour(&robot, 1, Happens::Nothing);
+    let known_m = dive.task(&sound).predicted_m;
+    let (mut found, mut dive) = after_an_hour(&robot, 1, Happens::Dead { joint: 1 });
+    assert_eq!(found.take_events()[0].finding.kind, FindingKind::SensorFailed);
+    assert!(known_m < 0.005 && dive.task(&found).predicted_m > 0.1, "{known_m}");
+    let failed = FailedJoint { joint: 1, kind: FailedKind::Dead };
+    let declared = robot.clone().with_failed(&[failed]);
+    let (mut online, mut dive) = after_an_hour(&declared, 1, Happens::Dead { joint: 1 });
+    assert!(dive.task(&online).predicted_m > 0.1, "declared");
+    assert_eq!(online.take_events(), [], "what is known is not told again");
 }
