@@ -29,5 +29,5 @@ pub use scene::{Scene, load_scene};
 pub use settings::{CaptureSettings, Margins, PoseCriterion, TaskSettings};
 pub use step::{
     CalibrateSettings, CalibrateViews, IdentifySettings, MoveGoal, OnRefusal, ReachSettings, Step, StopsSettings,
-    TouchSettings, WorkSettings,
+    TouchSettings, WorkBelief, WorkSettings,
 };

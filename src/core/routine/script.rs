@@ -10,7 +10,7 @@ use super::error::RoutineError;
 use super::settings::{CaptureSettings, Margins, PoseCriterion, TaskSettings};
 use super::step::{
     CalibrateSettings, CalibrateViews, IdentifySettings, MoveGoal, OnRefusal, ReachSettings, Step, StopsSettings,
-    TouchSettings, WorkSettings,
+    TouchSettings, WorkBelief, WorkSettings,
 };
 use crate::robot::FileIssue;
 use crate::streams::PriorSource;
@@ -170,6 +170,13 @@ impl StepReader<'_> {
             #[serde(default)]
             gaps_s: Vec<[f64; 2]>,
             rate_rad_s: Option<f64>,
+            #[serde(default)]
+            belief: WorkBelief,
+            #[serde(default = "two")]
+            poses: u32,
+        }
+        fn two() -> u32 {
+            2
         }
         fn ten_minutes() -> f64 {
             600.0
@@ -202,6 +209,8 @@ impl StepReader<'_> {
             look_s: self.range("look_s", raw.look_s, 0.0..=600.0)?,
             gaps_s: raw.gaps_s,
             rate_rad_s,
+            belief: raw.belief,
+            poses: self.range("poses", f64::from(raw.poses), 0.0..=20.0)? as u32,
         }))
     }
 
@@ -484,6 +493,8 @@ mod tests {
             ("[[step]]\ndo = \"work\"\ntasks = 2\ntargets = [7]", "step 1 (work): targets: 7 is outside 0 .. 2"),
             ("[[step]]\ndo = \"work\"\ntasks = 2\ngaps_s = [[9.0, 4.0]]", "gaps_s (its end): 4 is outside 9 .."),
             ("[[step]]\ndo = \"work\"\ntasks = 2\nlook_every = 0", "step 1 (work): look_every: 0 is outside"),
+            ("[[step]]\ndo = \"work\"\ntasks = 2\nbelief = \"hope\"", "unknown variant `hope`"),
+            ("[[step]]\ndo = \"work\"\ntasks = 2\nposes = 21", "step 1 (work): poses: 21 is outside 0 .. 20"),
             ("[[step]]\ndo = \"grip\"", "step 1 (grip): missing field `opening`"),
             ("[[step]]\ndo = \"grip\"\nopening = 1.5", "step 1 (grip): opening: 1.5 is outside 0 .. 1"),
             ("[[step]]\ndo = \"touch\"", "step 1 (touch): missing field `part`"),

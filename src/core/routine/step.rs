@@ -106,6 +106,21 @@ pub struct WorkSettings {
     pub gaps_s: Vec<[f64; 2]>,
     /// No joint is driven faster.
     pub rate_rad_s: Option<f64>,
+    /// What it works by.
+    pub belief: WorkBelief,
+    /// Calibration poses that are asked for at once where a task would miss its tolerance; none for 0.
+    pub poses: u32,
+}
+
+/// What sensors a work step believes in.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum WorkBelief {
+    /// Those of the last accepted calibration.
+    #[default]
+    Calibration,
+    /// The online belief, by all that was recorded until then.
+    Online,
 }
 
 impl WorkSettings {
@@ -113,6 +128,12 @@ impl WorkSettings {
     #[must_use]
     pub fn duration_s(&self) -> f64 {
         f64::from(self.tasks) * self.every_s
+    }
+
+    /// Number of the target of task `number` (from 0).
+    #[must_use]
+    pub fn target_of(&self, number: u32) -> usize {
+        self.targets[number as usize % self.targets.len()]
     }
 
     /// Number of the posture by which task `number` (from 0) passes tags, if it does.
