@@ -12,10 +12,11 @@ use crate::output::{FolderLock, OutputError, check_replaceable, complete, partia
 use armcal_core::log::{LogError, for_each_raw, topics};
 
 /// What a run leaves, in the order in which it is put in place.
-const RESULTS: [&str; 8] = [
+const RESULTS: [&str; 9] = [
     "truth.mcap",
     "run.rrd",
     "tagmap.toml",
+    "belief.jsonl",
     "calibration.covariance.toml",
     "calibration.toml",
     "report.html",

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use crate::output::{OutputError, OutputFolder};
 #[cfg(feature = "viewer")]
 use crate::report::markdown;
-use crate::report::{AssertSummary, HeldJointSummary, RenewalSummary, RunSummary, WorldSummary, html};
+use crate::report::{AssertSummary, HeldJointSummary, OnlineSummary, RenewalSummary, RunSummary, WorldSummary, html};
 use crate::run::describe::describe;
 use crate::run::{Failure, RunError, RunInputs, Stage, corner_scatter_px};
 use crate::score::{ScoreInput, score};
@@ -157,7 +157,7 @@ impl Run<'_> {
             }
             // Taken last: the replay is part of what a user waits for.
             summary.wall_s = progress.wall_s();
-            self.write_texts(&outcome.calibration, &summary)?;
+            self.write_texts(&outcome, &summary)?;
         }
         let corner_scatter_px = corner_scatter_px(&recording);
         Ok(Finished { summary, calibration: outcome.calibration, corner_scatter_px, replay_failure })
@@ -198,20 +198,26 @@ impl Run<'_> {
         summary.capture.margins = scored.margins;
         summary.capture.renewals = outcome.renewals.iter().map(renewal_summary).collect();
         summary.capture.stop_reason.clone_from(&outcome.capture_ended);
+        summary.online = outcome.online.as_ref().and_then(OnlineSummary::of);
         summary.score = Some(scored.score);
         Ok(summary)
     }
 
-    fn write_texts(&self, calibration: &Calibration, summary: &RunSummary) -> Result<(), RunError> {
+    fn write_texts(&self, outcome: &Outcome, summary: &RunSummary) -> Result<(), RunError> {
+        let calibration = &outcome.calibration;
+        let log = outcome.online.as_ref().map(|online| &online.log);
         let files = calibration.to_files();
         self.output.write("calibration.covariance.toml", files.covariance.as_bytes())?;
         self.output.write("calibration.toml", files.calibration.as_bytes())?;
         if let Some(map) = &calibration.map {
             self.output.write("tagmap.toml", map.to_toml().as_bytes())?;
         }
+        if let Some(log) = log {
+            self.output.write("belief.jsonl", log.to_jsonl().as_bytes())?;
+        }
         let json = serde_json::to_string_pretty(summary)?;
         self.output.write("summary.json", format!("{json}\n").as_bytes())?;
-        Ok(self.output.write("report.html", html(summary, calibration).as_bytes())?)
+        Ok(self.output.write("report.html", html(summary, calibration, log).as_bytes())?)
     }
 
     #[cfg(not(feature = "viewer"))]
@@ -237,6 +243,7 @@ impl Run<'_> {
                 vehicle: Some(&self.inputs.vehicle),
                 scene: Some(&self.inputs.routine.scene),
                 believed_links: &believed_links,
+                online: outcome.online.as_ref().map(|online| &online.log),
                 summary_markdown: Some(&markdown),
             },
             &self.partial("run.rrd"),

@@ -298,6 +298,7 @@ impl Planner<'_> {
             belief: self.request.belief.calibration.as_ref(),
             taken: &[],
             prior: None,
+            known: None,
             detection_rate: &vec![1.0; robot.tags.len()],
             failed: &[],
             task: targets,

@@ -183,6 +183,7 @@ impl ScriptRunner<'_, '_> {
                 belief: views.belief.as_ref(),
                 taken: &self.taken(views),
                 prior: self.accepted.as_ref(),
+                known: self.known.as_ref(),
                 detection_rate: &views.trust(),
                 failed: &views.failed,
                 task: targets,

@@ -10,6 +10,13 @@ use armcal_core::sensor::{ArmSensors, Correction, Terms};
 use armcal_core::streams::{JointAngles, JointCounts};
 use armcal_core::time::Stamp;
 
+/// A bound is this many sigma.
+const BOUND_SIGMAS: f64 = 4.0;
+/// How far a joint may creep while its valve is shut, one sigma: 1 deg an hour. Assumed.
+const CREEP_RAD_PER_S: f64 = 4.85e-6;
+/// Where a joint was found this long ago is looked for again where it matters, s.
+const OLD_S: f64 = 1800.0;
+
 /// A joint of which no plan makes use any more.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HeldJoint {
@@ -27,6 +34,13 @@ pub struct HeldJoint {
     pub bound_rad: f64,
     /// Whether views have shown where it stands, or its sensor tells.
     pub is_located: bool,
+}
+
+impl HeldJoint {
+    /// One sigma of where a joint stands whose sensor still tells, rad.
+    pub(crate) fn locked_std_rad(&self) -> Option<f64> {
+        (self.kind == FailedKind::Locked && self.is_located).then_some(self.bound_rad / BOUND_SIGMAS)
+    }
 }
 
 /// How long a joint may have run before a failure is noticed, s.
@@ -80,4 +94,29 @@ pub(crate) fn hold_in(held: &[HeldJoint], robot: &mut Robot) {
 pub(crate) fn holding_bounds(held: &[HeldJoint], mut bounds: JointErrorBounds) -> JointErrorBounds {
     held.iter().for_each(|held| bounds.hold(held.joint, held.angle_rad, held.bound_rad));
     bounds
+}
+
+/// A joint that was given up and was found standing still.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct StandingJoint {
+    /// Index, base first.
+    pub joint: usize,
+    found_std_rad: f64,
+    since: Stamp,
+}
+
+impl StandingJoint {
+    pub(crate) fn new(held: &HeldJoint, since: Stamp) -> Self {
+        Self { joint: held.joint, found_std_rad: held.bound_rad / BOUND_SIGMAS, since }
+    }
+
+    /// Whether it was found long ago.
+    pub(crate) fn is_old(&self, now: Stamp) -> bool {
+        now.since_s(self.since) > OLD_S
+    }
+
+    /// One sigma of where it stands by `now`: a valve that is shut leaks.
+    pub(crate) fn std_rad(&self, now: Stamp) -> f64 {
+        self.found_std_rad + CREEP_RAD_PER_S * now.since_s(self.since).max(0.0)
+    }
 }

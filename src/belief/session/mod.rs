@@ -3,7 +3,8 @@
 //! `prepare` plans before the first motion, `script` carries out the steps: `reach`, `work`, `capture` (with
 //! `belief_update`), `grip`, `touch`, `scale_identification`, `end_stops`. `motion` drives the arm, `settling` detects
 //! rest, `contact` detects contacts, `following` joints that do not follow (`held_joint`, `failed_joints`), and
-//! `approval` asks an operator before a motion. `recorder` keeps every message; `outcome` is the result.
+//! `approval` asks an operator before a motion. `online_belief` hears what is recorded, `keeping_up` works by it.
+//! `recorder` keeps every message; `outcome` is the result.
 
 mod approval;
 mod belief_update;
@@ -17,7 +18,9 @@ mod following;
 mod grip;
 mod held_joint;
 mod inputs;
+mod keeping_up;
 mod motion;
+mod online_belief;
 mod outcome;
 mod prepare;
 mod progress;
@@ -34,6 +37,7 @@ mod work;
 pub use error::SessionError;
 pub use held_joint::HeldJoint;
 pub use inputs::SessionInputs;
+pub use online_belief::{AskedPoses, OnlineOutcome};
 pub use outcome::{AssertResult, Epoch, EstimateUpdate, Outcome, ReachStep, SkippedTarget, StillReachable, Visit};
 pub use progress::{Approval, MotionAhead, Progress};
 pub use recorder::Recorder;

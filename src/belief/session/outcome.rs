@@ -4,6 +4,7 @@ use std::fmt;
 
 use crate::calib::Calibration;
 use crate::session::held_joint::HeldJoint;
+use crate::session::online_belief::OnlineOutcome;
 use armcal_core::kinematics::LinkCorrections;
 use armcal_core::routine::AssertFigure;
 use armcal_core::sensor::ArmSensors;
@@ -48,6 +49,8 @@ pub struct Outcome {
     pub held: Vec<HeldJoint>,
     /// What they left within reach, by the last reach.
     pub still_reachable: Option<StillReachable>,
+    /// What was believed online; `None` where no step works by it.
+    pub online: Option<OnlineOutcome>,
 }
 
 /// Which targets of a reach an arm with joints that are given up still reaches.

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use crate::session::online_belief::OnlineBelief;
 use armcal_core::log::{LogError, Recording, RecordingWriter, read_recording};
 use armcal_core::streams::{JointCounts, MarkKind, Message, Sink, SinkError, Thermometer};
 use armcal_core::time::Stamp;
@@ -20,6 +21,8 @@ pub struct Recorder {
     pub(crate) tags_seen: usize,
     /// Which they were.
     pub(crate) ids_seen: BTreeSet<u32>,
+    /// Hears every message while the arm works.
+    pub(crate) online: Option<OnlineBelief>,
 }
 
 impl Recorder {
@@ -34,6 +37,7 @@ impl Recorder {
             opening_m: None,
             tags_seen: 0,
             ids_seen: BTreeSet::new(),
+            online: None,
         }
     }
 
@@ -69,6 +73,9 @@ impl Sink for Recorder {
             _ => {}
         }
         self.writer.record(log_time, message)?;
+        if let Some(online) = &mut self.online {
+            online.hear(log_time, message);
+        }
         // A view that was captured is on disk before the arm moves on.
         let is_touch = matches!(message, Message::Touch(_));
         if is_touch || matches!(message, Message::Mark(mark) if !matches!(mark.kind, MarkKind::Phase(_))) {

@@ -5,10 +5,12 @@ use std::rc::Rc;
 use nalgebra::Vector3;
 use rand_chacha::ChaCha8Rng;
 
-use crate::calib::Calibration;
+use crate::calib::{Calibration, ParameterCovariance};
 use crate::plan::{ClearanceModel, JointErrorBounds, PosePlan};
+use crate::session::held_joint::StandingJoint;
 use crate::session::inputs::SessionInputs;
 use crate::session::motion::Driver;
+use crate::session::online_belief::AskedPoses;
 use crate::session::outcome::{AssertResult, Epoch, EstimateUpdate, ReachStep, SkippedTarget, StillReachable, Visit};
 use armcal_core::kinematics::Chain;
 use armcal_core::robot::Robot;
@@ -85,6 +87,13 @@ pub(crate) struct ScriptRunner<'a, 'b> {
     pub n_held: usize,
     /// By the last reach with a joint that was given up.
     pub still_reachable: Option<StillReachable>,
+    /// How many of the joints that were given up were looked for at work, and those found standing still.
+    pub n_looked_for: usize,
+    pub standing: Vec<StandingJoint>,
+    /// What is known of the sensors, while the online belief asks for calibration poses.
+    pub known: Option<ParameterCovariance>,
+    /// Calibration poses that the online belief asked for.
+    pub asked: Vec<AskedPoses>,
 }
 
 /// What was planned before anything moved.

@@ -63,6 +63,10 @@ pub fn run(
         asserts: Vec::new(),
         n_held: 0,
         still_reachable: None,
+        n_looked_for: 0,
+        known: None,
+        standing: Vec::new(),
+        asked: Vec::new(),
         driver,
     };
     run.bounds = run.kept_clear(JointErrorBounds::datasheet(setup.robot));
@@ -146,7 +150,8 @@ impl ScriptRunner<'_, '_> {
         Ok(())
     }
 
-    fn finish(self, stopped: Option<String>) -> Result<Outcome, SessionError> {
+    fn finish(mut self, stopped: Option<String>) -> Result<Outcome, SessionError> {
+        let online = self.end_online();
         let calibration = self
             .calibration
             .ok_or_else(|| SessionError::Step { step: 0, problem: "the script calibrated nothing".to_owned() })?;
@@ -168,6 +173,7 @@ impl ScriptRunner<'_, '_> {
             stopped,
             held: self.driver.held,
             still_reachable: self.still_reachable,
+            online,
         })
     }
 
@@ -256,7 +262,7 @@ impl ScriptRunner<'_, '_> {
     }
 
     /// Calibrates from the recording's bytes; gives the reason if it was refused.
-    fn calibrate(&mut self, settings: &CalibrateSettings) -> Result<Option<String>, SessionError> {
+    pub(crate) fn calibrate(&mut self, settings: &CalibrateSettings) -> Result<Option<String>, SessionError> {
         self.driver.phase(Phase::Calibrate)?;
         self.progress_at(Phase::Calibrate, 0, 1);
         let end = self.driver.now();

@@ -4,7 +4,7 @@ use crate::session::SessionError;
 use crate::session::outcome::SkippedTarget;
 use crate::session::reach::REACH_DWELL_S;
 use crate::session::runner::ScriptRunner;
-use armcal_core::routine::WorkSettings;
+use armcal_core::routine::{WorkBelief, WorkSettings};
 use armcal_core::streams::{ImageDemand, JointAngles, LogLevel, MarkKind, Phase};
 use armcal_core::time::Stamp;
 
@@ -14,6 +14,9 @@ impl ScriptRunner<'_, '_> {
         let wrong = |problem: String| SessionError::Step { step, problem };
         let rest = self.goal(&settings.rest).map_err(wrong)?;
         let start = self.driver.now();
+        if settings.belief == WorkBelief::Online {
+            self.begin_online()?;
+        }
         self.driver.limit_rates(settings.rate_rad_s);
         self.leave_for(&rest)?;
         for number in 0..settings.tasks {
@@ -22,7 +25,14 @@ impl ScriptRunner<'_, '_> {
             self.age();
             self.take_up_failures();
             self.driver.arm.request_images(ImageDemand::All);
-            self.task(step, settings, [number, settings.tasks], &rest)?;
+            let is_known = match settings.belief {
+                WorkBelief::Online => self.keep_up(settings, number, &rest)?,
+                WorkBelief::Calibration => Ok(()),
+            };
+            match is_known {
+                Ok(()) => self.task(step, settings, [number, settings.tasks], &rest)?,
+                Err(reason) => self.skip(SkippedTarget { step, target: settings.target_of(number), reason })?,
+            }
             self.leave_for(&rest)?;
             self.driver.arm.request_images(ImageDemand::Few);
         }
@@ -40,13 +50,14 @@ impl ScriptRunner<'_, '_> {
         [number, of]: [u32; 2],
         rest: &JointAngles,
     ) -> Result<(), SessionError> {
-        let target = settings.targets[number as usize % settings.targets.len()];
+        let target = settings.target_of(number);
         let look = settings.look_of(number);
         let by = look.map_or(String::new(), |look| format!(" by look {look}"));
         self.driver.log(LogLevel::Info, &format!("work: task {number} of {of}, target {target}{by}"))?;
         self.driver.phase(Phase::Reach)?;
         if let Some(look) = look {
             self.look(&JointAngles::from_slice(&settings.looks_rad[look]), settings.look_s)?;
+            self.take_up_news()?;
         }
         let attempt = self.attempt();
         let postures = self.postures_near(&[target], &[*rest])?;

@@ -7,7 +7,7 @@
 //! worst gain allows; there the bound is what the worst gain makes of the way from the angle that is known. The least
 //! `a + k |angle - pivot|` above the lesser of the two is the bound.
 
-use crate::calib::{Calibration, Parameter, ParameterCovariance, ParameterKind};
+use crate::calib::{Calibration, JointAt, ParameterCovariance, ParameterKind};
 use crate::plan::bounds::joint_bounds::{JointBound, JointErrorBounds};
 use armcal_core::robot::Robot;
 use armcal_core::sensor::{ArmSensors, ConditionChange, SensorModel};
@@ -26,11 +26,16 @@ impl JointErrorBounds {
     /// `sensors` are the calibration's own.
     #[must_use]
     pub fn believed(robot: &Robot, calibration: &Calibration, sensors: &ArmSensors) -> Self {
-        let covariance = calibration.parameter_covariance(robot);
+        Self::by_covariance(robot, &calibration.parameter_covariance(robot), sensors)
+    }
+
+    /// Of `sensors` that are known as well as `covariance` says.
+    #[must_use]
+    pub fn by_covariance(robot: &Robot, covariance: &ParameterCovariance, sensors: &ArmSensors) -> Self {
         let mut bounds = Self::datasheet(robot);
         for (joint, bound) in bounds.joints.iter_mut().enumerate() {
             let Some(model) = sensors.models.get(joint) else { continue };
-            if let Some(found) = AngleStd::new(&covariance, robot, joint, model).and_then(|b| b.envelope()) {
+            if let Some(found) = AngleStd::new(covariance, robot, joint, model).and_then(|b| b.envelope()) {
                 *bound = found;
             }
         }
@@ -41,8 +46,7 @@ impl JointErrorBounds {
 /// One joint's sigma over its range.
 struct AngleStd<'a> {
     model: &'a SensorModel,
-    /// The joint's own parameters and their rows.
-    rows: Vec<(usize, ParameterKind)>,
+    joint: usize,
     covariance: &'a ParameterCovariance,
     residual_std_rad: f64,
     /// The farthest that the true gain may be from the estimated one, by the datasheet.
@@ -52,31 +56,22 @@ struct AngleStd<'a> {
 
 impl<'a> AngleStd<'a> {
     fn new(covariance: &'a ParameterCovariance, robot: &Robot, joint: usize, model: &'a SensorModel) -> Option<Self> {
-        let own = |(row, p): (usize, &Parameter)| (p.joint == joint).then_some((row, p.kind));
-        let rows: Vec<(usize, ParameterKind)> = covariance.parameters.iter().enumerate().filter_map(own).collect();
-        rows.iter().find(|(_, kind)| *kind == ParameterKind::Offset)?;
+        let mut kinds = covariance.parameters.iter().filter(|p| p.joint == joint).map(|p| p.kind);
+        kinds.clone().find(|kind| *kind == ParameterKind::Offset)?;
         let spec = &robot.sensors[joint];
-        let has_shape = rows.iter().any(|(_, kind)| matches!(kind, ParameterKind::Shape(_)));
+        let has_shape = kinds.any(|kind| matches!(kind, ParameterKind::Shape(_)));
         let own_residual_rad = covariance.residual_std_rad.map_or(spec.linearity_std_rad, |std_rad| std_rad[joint]);
         let residual_std_rad = if has_shape { own_residual_rad } else { own_residual_rad.max(spec.linearity_std_rad) };
         // The reading's gain is 1 + g, the estimated one that of its inverse.
         let (gain, g) = (model.correction.gain, spec.gain_bound);
         let gain_reach = (gain - 1.0 / (1.0 + g)).abs().max((1.0 / (1.0 - g) - gain).abs());
         let linearity_std_rad = spec.linearity_std_rad;
-        Some(Self { model, rows, covariance, residual_std_rad, gain_reach, linearity_std_rad })
+        Some(Self { model, joint, covariance, residual_std_rad, gain_reach, linearity_std_rad })
     }
 
     fn std_rad(&self, travel_rad: f64) -> f64 {
-        let at =
-            |kind: ParameterKind| kind.angle_derivative(&self.model.spec, travel_rad, &ConditionChange::default(), 0.0);
-        let by: Vec<(usize, f64)> = self.rows.iter().map(|&(row, kind)| (row, at(kind))).collect();
-        let mut variance = self.residual_std_rad.powi(2);
-        for &(i, by_i) in &by {
-            for &(k, by_k) in &by {
-                variance += by_i * self.covariance.matrix[(i, k)] * by_k;
-            }
-        }
-        variance.max(0.0).sqrt()
+        let at = JointAt { spec: &self.model.spec, joint: self.joint, travel_rad };
+        self.covariance.angle_var_rad2(at, &ConditionChange::default(), self.residual_std_rad.powi(2)).sqrt()
     }
 
     /// `None` where the covariance is none.

@@ -86,6 +86,7 @@ impl Site {
             belief: None,
             taken: &[],
             prior: None,
+            known: None,
             detection_rate: &self.detection_rate,
             failed: &self.failed,
             task: &self.task,

@@ -8,7 +8,7 @@
 use nalgebra::{DMatrix, Matrix6, Vector6};
 
 use crate::calib::bundle::{Hyperparameters, MOUNT_ROWS};
-use crate::calib::{Calibration, Parameter, ParameterKind};
+use crate::calib::{Calibration, Parameter, ParameterCovariance, ParameterKind};
 use crate::plan::view_planning::request::PoseRequest;
 use armcal_core::robot::{FailedKind, Robot};
 use armcal_core::sensor::{N_SHAPE, nonlinearity_basis};
@@ -59,6 +59,9 @@ impl ParameterPrior {
         }
         if let Some(known) = known {
             take_over(known, robot, &parameters, &mut covariance);
+        }
+        if let Some(known) = request.known {
+            take_over_sensors(known, &parameters, &mut covariance);
         }
         covariance.fixed_view_mut::<6, 6>(at + 6, at + 6).copy_from(&survey_covariance(robot));
         let mut joint_std_rad = scales.joint_std_rad;
@@ -121,6 +124,20 @@ fn take_over(known: &Calibration, robot: &Robot, parameters: &[Parameter], covar
         let Some(at) = at else { continue };
         for (k, from) in rows.iter().enumerate() {
             covariance[(i, k)] = from.map_or(0.0, |from| known.covariance.rows[*at][from]);
+        }
+    }
+}
+
+/// Puts what is known of the sensors by now in place of the rows so far; the mount is told apart from them.
+fn take_over_sensors(known: &ParameterCovariance, parameters: &[Parameter], covariance: &mut DMatrix<f64>) {
+    let rows: Vec<Option<usize>> = parameters.iter().map(|p| known.parameters.iter().position(|k| k == p)).collect();
+    for (i, row) in rows.iter().enumerate() {
+        let Some(row) = row else { continue };
+        covariance.row_mut(i).fill(0.0);
+        covariance.column_mut(i).fill(0.0);
+        for (k, column) in rows.iter().enumerate().take(i + 1) {
+            let value = column.map_or(0.0, |column| known.matrix[(*row, column)]);
+            (covariance[(i, k)], covariance[(k, i)]) = (value, value);
         }
     }
 }

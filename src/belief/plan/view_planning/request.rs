@@ -1,6 +1,6 @@
 //! Request and result of view planning.
 
-use crate::calib::Calibration;
+use crate::calib::{Calibration, ParameterCovariance};
 use crate::plan::bounds::joint_bounds::JointErrorBounds;
 use crate::plan::clearance::ClearanceModel;
 use crate::plan::visibility::VisibilityModel;
@@ -73,6 +73,8 @@ pub struct PoseRequest<'a> {
     pub taken: &'a [CapturedView],
     /// Prior of the estimate before the first of `taken`; `None`: the datasheets.
     pub prior: Option<&'a Calibration>,
+    /// What is known of the sensors by now, if that is not what `belief` and `prior` say.
+    pub known: Option<&'a ParameterCovariance>,
     /// Observed over predicted number of detections of each tag of the robot; 1: as predicted.
     pub detection_rate: &'a [f64],
     /// Poses without a captured view; no pose near them is chosen again.
