@@ -7,14 +7,13 @@ use anyhow::{Context, Result};
 use clap::Args;
 
 use crate::cli::calibrate_online::calibrate_online;
-use crate::cli::calibration_inputs::CalibrationInputs;
-use crate::cli::exit::{Exit, UsageError};
+use crate::cli::calibration_inputs::{CalibrationInputs, load_robot};
+use crate::cli::exit::Exit;
 use crate::cli::stdout::say;
 use crate::output;
 use crate::report::{RunSummary, table};
 use armcal_belief::calib::online::DriftModel;
 use armcal_belief::calib::{CompactCalibration, MapResult, Status, covariance_file};
-use armcal_core::robot::{self, FailedJoint, Robot};
 use armcal_core::routine::Method;
 
 #[derive(Debug, Args)]
@@ -47,7 +46,7 @@ pub(super) struct CalibrateArgs {
     #[arg(long, default_value = ".")]
     out: PathBuf,
     /// Follow the recording view by view, as if the arm were at work, and write the belief over time (belief.jsonl)
-    #[arg(long, conflicts_with_all = ["compact", "prior"])]
+    #[arg(long, conflicts_with_all = ["compact", "prior", "method"])]
     online: bool,
     /// With --online: nothing drifts between views
     #[arg(long, requires = "online")]
@@ -57,18 +56,8 @@ pub(super) struct CalibrateArgs {
     compact: bool,
 }
 
-/// `wrist_pitch=dead`.
-fn failed_joint(text: &str, robot: &Robot) -> Result<FailedJoint, UsageError> {
-    let (joint, kind) = text.split_once('=').unwrap_or((text, ""));
-    FailedJoint::of_names(joint, kind, &robot.joint_names())
-        .map_err(|problem| UsageError(format!("--failed {text}: {problem}")))
-}
-
 pub(super) fn calibrate(args: &CalibrateArgs) -> Result<Exit> {
-    let robot = robot::load(&args.robot)?;
-    let failed: Vec<FailedJoint> =
-        args.failed.iter().map(|text| failed_joint(text, &robot)).collect::<Result<_, _>>()?;
-    let robot = robot.with_failed(&failed);
+    let robot = load_robot(&args.robot, &args.failed)?;
     // Before minutes of work, not after.
     let _lock = output::FolderLock::take(&args.out)?;
     let given = CalibrationInputs {

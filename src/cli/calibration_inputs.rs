@@ -15,9 +15,10 @@ use armcal_belief::calib::{
 use armcal_belief::tagmap::files::{LandmarkFile, NamedSurvey, read_landmarks};
 use armcal_core::input::{ChildFrame, InputMap, TagUse, read_external, read_input_map, read_task};
 use armcal_core::log::{TopicMap, scan_recording};
-use armcal_core::robot::{FileIssue, Robot};
+use armcal_core::robot::{self, FailedJoint, FileIssue, Robot};
 use armcal_core::routine::Method;
 use armcal_core::streams::{Message, ReachTask};
+use armcal_core::time::Stamp;
 
 /// All that a calibration from files is made of.
 pub(super) struct CalibrationInputs<'a> {
@@ -34,8 +35,7 @@ impl CalibrationInputs<'_> {
     /// The calibration, and whether a recording had lost something.
     pub fn calibrate(&self) -> Result<(Calibration, bool)> {
         let prior = self.prior.map(|file| read_prior(file, self.robot)).transpose()?;
-        let task =
-            self.task.map(|file| Ok::<_, anyhow::Error>(read_task(file)?.for_robot(file, self.robot)?)).transpose()?;
+        let task = self.task()?;
         let landmarks = self.tag_map.map(|file| Ok::<_, anyhow::Error>((file, read_landmarks(file)?))).transpose()?;
         match self.input {
             Some(file) => self.of_external(file, landmarks, task, prior.as_ref()),
@@ -91,6 +91,21 @@ impl CalibrationInputs<'_> {
         Ok((calibrate_data(prepared, self.method, prior)?, lost))
     }
 
+    /// A belief that has heard nothing yet, of an arm whose recordings armcal makes.
+    pub fn listener(&self, settings: OnlineSettings) -> Result<Listener> {
+        let landmarks = self.tag_map.map(|file| Ok::<_, anyhow::Error>((file, read_landmarks(file)?))).transpose()?;
+        let survey = landmarks.map(|(file, map)| map.survey(file, self.robot, TagUse::Corners)).transpose()?;
+        let has_map = survey.is_some();
+        let robot = survey.map(|named| self.robot.clone().with_survey(named.survey));
+        let mut follower = Follower::new(robot.unwrap_or_else(|| self.robot.clone()), settings);
+        self.task()?.iter().for_each(|task| follower.set_task(task));
+        Ok(Listener { follower, has_map })
+    }
+
+    fn task(&self) -> Result<Option<ReachTask>> {
+        self.task.map(|file| Ok(read_task(file)?.for_robot(file, self.robot)?)).transpose()
+    }
+
     /// Feeds the recordings to a belief, message by message; `hear` is told after each of them. Returns whether a
     /// recording had lost something.
     pub fn follow(
@@ -98,10 +113,10 @@ impl CalibrationInputs<'_> {
         settings: OnlineSettings,
         hear: &mut dyn FnMut(&Follower, Vec<OnlineEvent>),
     ) -> Result<(Follower, bool)> {
-        let task =
-            self.task.map(|file| Ok::<_, anyhow::Error>(read_task(file)?.for_robot(file, self.robot)?)).transpose()?;
-        let landmarks = self.tag_map.map(|file| Ok::<_, anyhow::Error>((file, read_landmarks(file)?))).transpose()?;
         if let Some(file) = self.input {
+            let task = self.task()?;
+            let landmarks =
+                self.tag_map.map(|file| Ok::<_, anyhow::Error>((file, read_landmarks(file)?))).transpose()?;
             let (prepared, lost) = self.external_views(file, landmarks, task)?;
             let mut follower = Follower::new(prepared.robot.clone(), settings);
             prepared.data.task.iter().for_each(|task| follower.set_task(task));
@@ -111,28 +126,18 @@ impl CalibrationInputs<'_> {
             }
             return Ok((follower, lost));
         }
-        let survey = landmarks.map(|(file, map)| map.survey(file, self.robot, TagUse::Corners)).transpose()?;
-        let robot = survey.map(|named| self.robot.clone().with_survey(named.survey));
-        let mut follower = Follower::new(robot.unwrap_or_else(|| self.robot.clone()), settings);
-        task.iter().for_each(|task| follower.set_task(task));
+        let mut listener = self.listener(settings)?;
         let mut lost = false;
         for path in self.recordings {
-            let (rest, _) = scan_recording(
-                path,
-                &TopicMap::default(),
-                |_| {},
-                |log_time, message| {
-                    let events = follower.push(log_time, message);
-                    hear(&follower, events);
-                    false
-                },
-            )?;
+            let take = |log_time, message: &Message| {
+                listener.push(log_time, message, hear);
+                false
+            };
+            let (rest, _) = scan_recording(path, &TopicMap::default(), |_| {}, take)?;
             lost |= warn_of_losses(&rest);
             check_joints(&rest, self.robot)?;
         }
-        let events = follower.finish();
-        hear(&follower, events);
-        Ok((follower, lost))
+        Ok((listener.finish(hear), lost))
     }
 
     /// The views of recordings of a real arm, and whether one had lost something.
@@ -168,6 +173,42 @@ impl CalibrationInputs<'_> {
         let context = ExternalContext { task, landmark_names: named.names, plain_landmark };
         Ok((prepare_external(&recordings, &map, &robot, context)?, lost))
     }
+}
+
+/// A belief that hears messages.
+pub(super) struct Listener {
+    pub follower: Follower,
+    /// A map that is given is another one than the recording's.
+    has_map: bool,
+}
+
+impl Listener {
+    pub fn push(&mut self, log_time: Stamp, message: &Message, hear: &mut dyn FnMut(&Follower, Vec<OnlineEvent>)) {
+        if self.has_map && matches!(message, Message::Survey(_)) {
+            return;
+        }
+        let events = self.follower.push(log_time, message);
+        hear(&self.follower, events);
+    }
+
+    /// After the last message.
+    pub fn finish(mut self, hear: &mut dyn FnMut(&Follower, Vec<OnlineEvent>)) -> Follower {
+        let events = self.follower.finish();
+        hear(&self.follower, events);
+        self.follower
+    }
+}
+
+/// The robot of a folder, with the joints that are declared as failed, `wrist_pitch=dead`.
+pub(super) fn load_robot(folder: &Path, failed: &[String]) -> Result<Robot> {
+    let robot = robot::load(folder)?;
+    let failed_joint = |text: &String| {
+        let (joint, kind) = text.split_once('=').unwrap_or((text, ""));
+        FailedJoint::of_names(joint, kind, &robot.joint_names())
+            .map_err(|problem| UsageError(format!("--failed {text}: {problem}")))
+    };
+    let failed = failed.iter().map(failed_joint).collect::<Result<Vec<FailedJoint>, _>>()?;
+    Ok(robot.with_failed(&failed))
 }
 
 /// The landmark that a plain `child_frame` means: the one of that name, or the only one there is where it has none.

@@ -9,7 +9,7 @@ use clap::{CommandFactory, Parser, Subcommand};
 #[cfg(feature = "viewer")]
 use crate::cli::replay;
 use crate::cli::stdout::{is_written, note};
-use crate::cli::{calibrate, check, exit, export, inspect, plan, tagmap};
+use crate::cli::{calibrate, check, exit, export, inspect, plan, tagmap, watch};
 #[cfg(feature = "sim")]
 use crate::cli::{campaign, regress, run, sensitivity, study};
 
@@ -43,6 +43,8 @@ enum Command {
     Plan(plan::PlanArgs),
     /// Calibrate from recordings, simulated or of a real arm
     Calibrate(calibrate::CalibrateArgs),
+    /// Follow a recording that another program is still writing, and say what is believed of the arm
+    Watch(watch::WatchArgs),
     /// Find where the tags are, from camera views alone
     Tagmap(tagmap::TagmapArgs),
     /// Say what is in a recording, whether it is whole, and what could be calibrated from it
@@ -90,6 +92,7 @@ pub fn main() -> ExitCode {
         Command::Sensitivity(args) => sensitivity::sensitivity(&args),
         Command::Plan(args) => plan::plan(&args),
         Command::Calibrate(args) => calibrate::calibrate(&args),
+        Command::Watch(args) => watch::watch(&args),
         Command::Tagmap(args) => tagmap::tagmap(&args),
         Command::Inspect(args) => inspect::inspect(&args),
         Command::Export(args) => export::export(&args),

@@ -42,6 +42,7 @@ impl Interrupt {
     }
 
     /// The answer as a flag.
+    #[cfg(feature = "sim")]
     pub fn flag(&self) -> &AtomicBool {
         &self.requested
     }

@@ -2,6 +2,7 @@
 
 #[cfg(feature = "sim")]
 mod batch;
+mod belief_text;
 mod calibrate;
 mod calibrate_online;
 mod calibration_inputs;
@@ -14,7 +15,6 @@ mod confirm;
 mod exit;
 mod export;
 mod inspect;
-#[cfg(feature = "sim")]
 mod interrupt;
 mod losses;
 mod overrides;
@@ -45,6 +45,7 @@ mod study_poses;
 #[cfg(feature = "sim")]
 mod study_worlds;
 mod tagmap;
+mod watch;
 
 pub use command_line::{command, main};
 pub use exit::Exit;

@@ -9,6 +9,7 @@ use crate::cli::exit::{Exit, UsageError};
 use crate::cli::losses::warn_of_losses;
 use crate::cli::stdout::{note, say};
 use crate::output;
+use armcal_belief::calib::online::BeliefLog;
 use armcal_belief::calib::{Calibration, Status, surveyed};
 use armcal_core::files::{self, FileKind};
 use armcal_core::kinematics::LinkCorrections;
@@ -20,7 +21,8 @@ use armcal_replay::{ReplayInput, open_viewer, read_for_replay, write_rrd};
 
 #[derive(Debug, Args)]
 pub(super) struct ReplayArgs {
-    /// The recording (.mcap); a truth.mcap beside it is shown with it, and links and sag by a calibration.toml
+    /// The recording (.mcap); a truth.mcap beside it is shown with it, and links and sag by a calibration.toml,
+    /// the online belief by a belief.jsonl
     recording: PathBuf,
     /// Write this .rrd file instead of opening the viewer
     #[arg(long)]
@@ -37,6 +39,7 @@ pub(super) fn replay(args: &ReplayArgs) -> Result<Exit> {
     let drawings = Drawings::find(args, &recording)?;
     let truth = truth_beside(&args.recording);
     let believed_links = links_beside(&args.recording, &drawings.robot);
+    let online = belief_beside(&args.recording, &drawings.robot);
     let truth = (truth != args.recording && truth.is_file()).then_some(truth);
     let input = ReplayInput {
         recording: &recording,
@@ -45,6 +48,7 @@ pub(super) fn replay(args: &ReplayArgs) -> Result<Exit> {
         vehicle: drawings.vehicle.as_ref(),
         scene: drawings.scene.as_ref(),
         believed_links: &believed_links,
+        online: online.as_ref(),
         summary_markdown: None,
     };
     match &args.save {
@@ -103,6 +107,23 @@ fn links_beside(recording: &Path, robot: &Robot) -> Vec<(Stamp, LinkCorrections)
         Err(why) => {
             note(format!("warning: the arm is shown as drawn: {}: {why}", file.display()));
             Vec::new()
+        }
+    }
+}
+
+/// What was believed online, by a belief.jsonl of the same arm beside the recording.
+fn belief_beside(recording: &Path, robot: &Robot) -> Option<BeliefLog> {
+    let file = recording.with_file_name("belief.jsonl");
+    if !file.is_file() {
+        return None;
+    }
+    let read = files::read_text(&file, FileKind::Text).map_err(|error| error.to_string());
+    match read.and_then(|text| BeliefLog::from_jsonl(&text)) {
+        Ok(log) if log.beliefs().all(|row| row.offset_rad.len() == robot.n_joints()) => Some(log),
+        Ok(_) => None,
+        Err(why) => {
+            note(format!("warning: shown without the online belief: {}: {why}", file.display()));
+            None
         }
     }
 }

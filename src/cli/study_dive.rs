@@ -15,7 +15,7 @@ use armcal_belief::calib::Calibration;
 use armcal_core::log::read_recording;
 use armcal_core::routine;
 use armcal_sim::truth::read_truth;
-use armcal_study::{DiveStudy, DiveTask, dive_csv, dive_study, dive_table};
+use armcal_study::{AtStart, DiveStudy, DiveTask, dive_csv, dive_study, dive_table};
 
 #[derive(Debug, Args)]
 pub(super) struct DiveArgs {
@@ -87,8 +87,9 @@ fn one(args: &DiveArgs, seed: u64) -> Result<DiveStudy> {
     let (robot, _) = routine.load_arm()?;
     let recording = read_recording(run.join("run.mcap"))?;
     let truth = read_truth(run.join("truth.mcap"))?;
-    let start = Calibration::read(&run.join("calibration.toml"))?.sensors(&robot)?;
-    Ok(dive_study(&recording, &truth, &robot, &start))
+    let start = Calibration::read(&run.join("calibration.toml"))?;
+    let at_start = AtStart { sensors: &start.sensors(&robot)?, links: start.link_corrections() };
+    Ok(dive_study(&recording, &truth, &robot, at_start))
 }
 
 /// A process of its own, as a user would start it.

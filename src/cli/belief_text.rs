@@ -1,0 +1,66 @@
+//! What is believed of an arm, in words.
+
+use crate::cli::exit::{Exit, UsageError};
+use crate::cli::stdout::note;
+use armcal_belief::calib::online::{BeliefRow, Follower};
+use armcal_core::stats::Summary;
+
+/// What is believed at the end, with a note of the tags that were not used.
+///
+/// # Errors
+/// That no view was used, and why.
+pub(super) fn belief(follower: &Follower) -> Result<BeliefRow, UsageError> {
+    let tags = follower.estimator().robot().tags.iter().filter(|tag| !tag.is_known());
+    let ids: Vec<String> = tags.map(|tag| tag.id.to_string()).collect();
+    let unknown = format!("tags {}", ids.join(", "));
+    match follower.belief() {
+        None if ids.is_empty() => Err(UsageError("no view with tags: there is nothing to believe".to_owned())),
+        None => Err(UsageError(format!(
+            "no view of a tag whose place is known ({unknown} have none): map them with `armcal tagmap` and give the \
+             map with --tag-map"
+        ))),
+        Some(row) => {
+            if !ids.is_empty() {
+                note(format!("note: nobody knows where {unknown} are: they are not used"));
+            }
+            Ok(row)
+        }
+    }
+}
+
+fn mm(summary: &Summary) -> String {
+    format!("{:.2} mm median, {:.2} mm worst", 1e3 * summary.median, 1e3 * summary.max)
+}
+
+/// How it ended.
+pub(super) fn summary(follower: &Follower, row: &BeliefRow) -> String {
+    let health = match follower.is_good_enough() {
+        Some(true) => "good enough for the task, as far as the sensors go (links and tool point are taken as drawn)",
+        Some(false) => "not good enough for the task: views are needed",
+        None => "no task is named: no limit to compare with",
+    };
+    format!(
+        "views        {}\n\
+         tool error   {} over the targets now\n             {} over the targets in an hour without views\n\
+         health       {health}",
+        row.views,
+        mm(&row.tool_error_m),
+        mm(&row.tool_error_in_an_hour_m),
+    )
+}
+
+/// What is believed at one time, in a line.
+pub(super) fn line(follower: &Follower, row: &BeliefRow) -> String {
+    let health = match follower.is_good_enough() {
+        Some(true) => ", good enough",
+        Some(false) => ", NOT good enough",
+        None => "",
+    };
+    let (now, later) = (mm(&row.tool_error_m), mm(&row.tool_error_in_an_hour_m));
+    format!("{} views, tool error {now}; in an hour {later}{health}", row.views)
+}
+
+/// By the belief at the end; `else_by_data` where it is good enough or has no limit.
+pub(super) fn exit_of(follower: &Follower, else_by_data: Exit) -> Exit {
+    if follower.is_good_enough() == Some(false) { Exit::Refused } else { else_by_data }
+}
