@@ -15,7 +15,8 @@ use rerun::external::uuid::Uuid;
 
 use crate::colors;
 use crate::entities::{
-    CAMERA, CLEARANCE, COUNTS, JOINT_ANGLE, JOINT_ERROR, LOG, PREDICTED, STATE, SUMMARY, TEMPERATURE, TOOL_ERROR, WORLD,
+    CAMERA, CLEARANCE, COUNTS, JOINT_ANGLE, JOINT_ERROR, LOG, OFFSET_CHANGE, PREDICTED, STATE, SUMMARY, TEMPERATURE,
+    TOOL_ERROR, WORLD,
 };
 use crate::entity_log::TIMELINE;
 use crate::scene::ReplayScene;
@@ -53,7 +54,9 @@ pub(super) fn build(run: &ReplayScene) -> Vec<Entry> {
         main
     } else {
         let phases = b.view("StateTimeline", "What the arm does", STATE);
-        b.container(ContainerKind::Vertical, &[(main, 4.3), (phases, 1.0)])
+        // One lane more.
+        let share = if run.online.is_some() { 1.3 } else { 1.0 };
+        b.container(ContainerKind::Vertical, &[(main, 4.3), (phases, share)])
     };
     b.finish(&root, run)
 }
@@ -137,6 +140,10 @@ fn right_column(b: &mut Builder, run: &ReplayScene) -> Part {
     rows.push((b.plot(title, JOINT_ANGLE, colors_here, run), 2.2));
     if run.has_true_tool() {
         rows.push((b.plot("Tool error [mm]", TOOL_ERROR, legend(Corner2D::RightTop), run), 2.4));
+    }
+    if run.online.is_some() {
+        let title = "Offsets since the first belief [deg]: bright believed, dark one sigma";
+        rows.push((b.plot(title, OFFSET_CHANGE, legend(Corner2D::LeftTop).with_visible(false), run), 2.4));
     }
     if !run.tracks.oil_c.is_empty() || !run.tracks.water_c.is_empty() {
         rows.push((b.plot("Temperature [C]", TEMPERATURE, legend(Corner2D::LeftTop), run), 1.5));

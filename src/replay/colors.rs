@@ -24,6 +24,7 @@ pub(super) const TRAIL: Rgba = [240, 240, 245, 255];
 pub(super) const FIT_VIEW: Rgba = [90, 150, 255, 255];
 pub(super) const HELD_OUT_VIEW: Rgba = [255, 170, 60, 255];
 pub(super) const BASE_TAG: Rgba = [70, 140, 255, 255];
+pub(super) const EXPECTED: Rgba = [110, 235, 240, 255];
 pub(super) const OIL: Rgba = [255, 150, 60, 255];
 pub(super) const COLD: Rgba = [90, 170, 255, 255];
 

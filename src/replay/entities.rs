@@ -14,6 +14,7 @@ pub(super) const TEMPERATURE: &str = "/plots/temperature";
 pub(super) const COUNTS: &str = "/plots/counts";
 pub(super) const CLEARANCE: &str = "/plots/clearance";
 pub(super) const PREDICTED: &str = "/plots/predicted";
+pub(super) const OFFSET_CHANGE: &str = "/plots/offset_change";
 /// Lanes of states, and the lines of the log.
 pub(super) const STATE: &str = "/state";
 pub(super) const LOG: &str = "/log";

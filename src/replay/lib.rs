@@ -13,6 +13,7 @@ mod entities;
 mod entity_log;
 mod error;
 mod identity;
+mod online;
 mod phases;
 mod plan;
 mod plots;

@@ -56,11 +56,12 @@ pub fn write_plan_rrd(input: &PlanInput<'_>, out: &Path) -> Result<(), ReplayErr
         vehicle: Some(input.vehicle),
         scene: Some(input.scene),
         believed_links: &[],
+        online: None,
         summary_markdown: Some(input.markdown),
     };
     let tracks = Tracks::new(&messages, input.robot)?;
     let ReplayInput { robot, vehicle, scene, .. } = shown;
-    let run = ReplayScene { tracks, truth: None, robot, vehicle, scene, believed_chains: Vec::new() };
+    let run = ReplayScene { tracks, truth: None, robot, vehicle, scene, believed_chains: Vec::new(), online: None };
     let mut stream = recording::draw(&run, &shown);
     draw_tool_path(&run, &mut stream);
     draw_margins(input, &run, &mut stream);

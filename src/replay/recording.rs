@@ -8,7 +8,7 @@ use crate::identity::Identity;
 use crate::scene::{ReplayInput, ReplayScene};
 use crate::tracks::Tracks;
 use crate::truth::Truth;
-use crate::{arms, blueprint, camera, phases, plots, rrd, scenery, summary, targets, touches};
+use crate::{arms, blueprint, camera, online, phases, plots, rrd, scenery, summary, targets, touches};
 
 /// Writes `out`, an .rrd file with its blueprint, replacing one of that name.
 ///
@@ -35,8 +35,8 @@ pub(super) fn scene<'a>(input: &ReplayInput<'a>) -> Result<ReplayScene<'a>, Repl
     let believed = input.believed_links.iter();
     let believed_chains =
         believed.map(|(since, links)| (tracks.place_s(*since, *since), input.robot.chain.corrected(links))).collect();
-    let ReplayInput { robot, vehicle, scene, .. } = *input;
-    Ok(ReplayScene { tracks, truth, robot, vehicle, scene, believed_chains })
+    let ReplayInput { robot, vehicle, scene, online, .. } = *input;
+    Ok(ReplayScene { tracks, truth, robot, vehicle, scene, believed_chains, online })
 }
 
 /// All entities of a recording, measured or planned.
@@ -48,6 +48,7 @@ pub(super) fn draw(run: &ReplayScene<'_>, input: &ReplayInput<'_>) -> EntityLog 
     touches::draw(run, &mut stream);
     camera::draw(run, &mut stream);
     plots::draw(run, &mut stream);
+    online::draw(run, &mut stream);
     phases::draw(run, &mut stream);
     summary::draw(run, input, &mut stream);
     stream

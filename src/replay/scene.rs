@@ -4,6 +4,7 @@ use std::path::Path;
 
 use crate::tracks::Tracks;
 use crate::truth::Truth;
+use armcal_belief::calib::online::BeliefLog;
 use armcal_core::joints::JointAngles;
 use armcal_core::kinematics::{Chain, LinkCorrections, LinkPoses};
 use armcal_core::log::Recording;
@@ -21,6 +22,8 @@ pub struct ReplayInput<'a> {
     pub scene: Option<&'a Scene>,
     /// Since when the arm was believed to be other than drawn, and how; in the order of time.
     pub believed_links: &'a [(Stamp, LinkCorrections)],
+    /// What was believed online.
+    pub online: Option<&'a BeliefLog>,
     /// Shown as it is, in place of a short description of the recording.
     pub summary_markdown: Option<&'a str>,
 }
@@ -34,6 +37,8 @@ pub(crate) struct ReplayScene<'a> {
     pub scene: Option<&'a Scene>,
     /// Arms that were believed in since a time, s, before which there was the drawing.
     pub believed_chains: Vec<(f64, Chain)>,
+    /// What was believed online.
+    pub online: Option<&'a BeliefLog>,
 }
 
 impl ReplayScene<'_> {

@@ -233,6 +233,7 @@ fn input<'a>(recording: &'a Recording, robot: &'a Robot) -> ReplayInput<'a> {
         vehicle: None,
         scene: None,
         believed_links: &[],
+        online: None,
         summary_markdown: None,
     }
 }

@@ -2,9 +2,11 @@
 
 use maud::{DOCTYPE, Markup, html as markup};
 
+use crate::report::online::online_section;
 use crate::report::summary::RunSummary;
 use crate::report::table::{check_lines, labelled, score_rows};
 use crate::score::Score;
+use armcal_belief::calib::online::BeliefLog;
 use armcal_belief::calib::{Calibration, Status};
 
 const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;max-width:60em;margin:2em auto;\
@@ -15,7 +17,7 @@ td:first-child,th:first-child{text-align:left}.ok{color:#0a7d38}.no{color:#b3261
 
 /// Renders the report.
 #[must_use]
-pub fn html(summary: &RunSummary, calibration: &Calibration) -> String {
+pub fn html(summary: &RunSummary, calibration: &Calibration, online: Option<&BeliefLog>) -> String {
     let title = summary.routine.as_deref().unwrap_or("calibration");
     let (class, verdict) = match summary.status {
         Status::Accepted => ("ok", "accepted"),
@@ -35,6 +37,7 @@ pub fn html(summary: &RunSummary, calibration: &Calibration) -> String {
                         tr { td { (label) } td { (text) } }
                     }
                 }
+                @if let Some(log) = online { (online_section(log, summary)) }
                 (joint_section(calibration))
             }
         }

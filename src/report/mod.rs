@@ -7,13 +7,14 @@
 mod html;
 pub mod inspection;
 mod markdown;
+mod online;
 mod summary;
 mod table;
 
 pub use html::html;
 pub use markdown::markdown;
 pub use summary::{
-    AssertSummary, CalibrationSummary, CaptureSummary, HeldJointSummary, HeldOutSummary, RenewalSummary, RunSummary,
-    WorldSummary,
+    AssertSummary, CalibrationSummary, CaptureSummary, HeldJointSummary, HeldOutSummary, OnlineSummary, RenewalSummary,
+    RunSummary, WorldSummary,
 };
 pub use table::table;

@@ -5,11 +5,12 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use crate::score::{MarginSummary, Score};
+use armcal_belief::calib::online::OnlineEvent;
 use armcal_belief::calib::{
     BaselineComparison, Calibration, CameraMount, FailedJointTable, Finding, JointResult, MapResult,
     ObservabilityTable, PriorTable, Refusal, Reservation, Status, VerdictTable,
 };
-use armcal_belief::session::{SkippedTarget, StillReachable};
+use armcal_belief::session::{AskedPoses, OnlineOutcome, SkippedTarget, StillReachable};
 use armcal_core::numeric::Outcome;
 use armcal_core::robot::FailedKind;
 use armcal_core::routine::AssertFigure;
@@ -58,6 +59,42 @@ pub struct RunSummary {
     /// The script's `assert` steps.
     #[serde(default)]
     pub asserts: Vec<AssertSummary>,
+    /// Of `work` steps that follow the online belief.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub online: Option<OnlineSummary>,
+}
+
+/// What was believed online at the end, and what happened until then; over time it is in belief.jsonl.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct OnlineSummary {
+    /// Taken in.
+    pub views: usize,
+    /// Expected error of the tool over the task, one sigma in space: now.
+    pub tool_error_m: Summary,
+    /// The same in an hour without any view.
+    pub tool_error_in_an_hour_m: Summary,
+    /// Whether that of now is within the task's tolerance.
+    pub is_good_enough: Option<bool>,
+    /// What happened.
+    pub events: Vec<OnlineEvent>,
+    /// Calibration poses that it asked for between tasks.
+    pub asked: Vec<AskedPoses>,
+}
+
+impl OnlineSummary {
+    /// `None` where there was no belief.
+    #[must_use]
+    pub fn of(online: &OnlineOutcome) -> Option<Self> {
+        let last = online.log.beliefs().last()?;
+        Some(Self {
+            views: last.views,
+            tool_error_m: last.tool_error_m,
+            tool_error_in_an_hour_m: last.tool_error_in_an_hour_m,
+            is_good_enough: online.is_good_enough,
+            events: online.log.events().cloned().collect(),
+            asked: online.asked.clone(),
+        })
+    }
 }
 
 /// What simulated the arm.
@@ -266,6 +303,7 @@ impl RunSummary {
             motion_s: None,
             waited_s: None,
             stopped: None,
+            online: None,
             held_joints: Vec::new(),
             still_reachable: None,
             wall_s: calibration_wall_s,
@@ -303,10 +341,11 @@ impl RunSummary {
         }
     }
 
-    /// Accepted, and every `assert` of the script holds.
+    /// Accepted, every `assert` of the script holds, and what is believed online is good enough at the end.
     #[must_use]
     pub fn is_good(&self) -> bool {
-        self.status == Status::Accepted && self.asserts_hold()
+        let is_known = self.online.as_ref().is_none_or(|online| online.is_good_enough != Some(false));
+        self.status == Status::Accepted && self.asserts_hold() && is_known
     }
 
     /// Whether every `assert` of the script holds.

@@ -3,6 +3,7 @@
 use comfy_table::presets::UTF8_FULL_CONDENSED;
 use comfy_table::{CellAlignment, Table};
 
+use crate::report::online::online_lines;
 use crate::report::summary::{
     AssertSummary, CalibrationSummary, CaptureSummary, GainChange, HeldJointSummary, RenewalSummary, RunSummary,
 };
@@ -122,6 +123,7 @@ pub(super) fn check_lines(summary: &RunSummary) -> Vec<String> {
     lines.extend(coverage_lines(&summary.calibration));
     lines.extend(compared_line(summary));
     lines.extend(reach_lines(summary));
+    lines.extend(online_lines(summary));
     lines.extend(summary.asserts.iter().map(assert_line));
     lines.extend(summary.held_joints.iter().map(held_line));
     lines.extend(summary.still_reachable.iter().map(|still| format!("reachable    {still}")));
