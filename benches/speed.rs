@@ -5,17 +5,19 @@
 use std::hint::black_box;
 use std::path::Path;
 
+use armcal::calib::online::{DriftModel, FaultSearch, OnlineEstimator, OnlineSettings, ViewStream};
 use armcal::calib::{
     JointParameters, Parameter, ParameterKind, PositionMethod, PositionProblem, SearchOptions, TagMeasurement,
     TagObservation, View, minimum_distance,
 };
+use armcal::log::read_recording;
 use armcal::plan::{ClearanceModel, Edge, JointErrorBounds};
 use armcal::robot::{Robot, Vehicle, load, load_vehicle};
 use armcal::routine::Scene;
 use armcal::stats::stream_rng;
 use armcal::streams::JointAngles;
 use armcal::time::SIMULATION_EPOCH;
-use criterion::{Criterion, criterion_group, criterion_main};
+use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
 use rand::RngExt;
 
 const N_VIEWS: u32 = 40;
@@ -63,6 +65,7 @@ fn views(robot: &Robot) -> Vec<View> {
 }
 
 fn calibration(c: &mut Criterion) {
+    online(c, &robot());
     let robot = robot();
     let views = views(&robot);
     let problem = PositionProblem::new(&robot, &views);
@@ -142,6 +145,7 @@ fn choice(c: &mut Criterion, robot: &Robot, clearance: &ClearanceModel<'_>, boun
         belief: None,
         taken: &[],
         prior: None,
+        known: None,
         detection_rate: &[],
         failed: &[],
         task: &task,
@@ -381,6 +385,27 @@ fn detect(_: &mut Criterion) {}
 
 #[cfg(not(feature = "sim"))]
 fn simulation(_: &mut Criterion) {}
+
+/// One more view after those of the sample: six beliefs beside each other, and one alone.
+fn online(c: &mut Criterion, robot: &Robot) {
+    let sample = Path::new(env!("CARGO_MANIFEST_DIR")).join("recordings/sample/run.mcap");
+    let recording = read_recording(sample).expect("the sample is part of the repository");
+    let mut stream = ViewStream::new(robot.clone());
+    let mut views: Vec<View> = recording.messages.iter().flat_map(|(at, message)| stream.push(*at, message)).collect();
+    views.extend(stream.finish());
+    let last = views.iter().max_by_key(|view| view.tags.len()).expect("it has views");
+    let alone = OnlineSettings { drift: DriftModel::Stationary, faults: FaultSearch::Off, ..OnlineSettings::default() };
+    for (name, settings) in [("six beliefs", OnlineSettings::default()), ("one belief", alone)] {
+        let mut estimator = OnlineEstimator::new(robot.clone(), settings);
+        for view in &views {
+            estimator.add_view(view);
+        }
+        let name = format!("online view of {} tags, {name}", last.tags.len());
+        c.bench_function(&name, |b| {
+            b.iter_batched_ref(|| estimator.clone(), |estimator| estimator.add_view(last), BatchSize::SmallInput);
+        });
+    }
+}
 
 criterion_group! {
     name = benches;

@@ -57,9 +57,18 @@ struct Snapshot {
     conditions: Conditions,
 }
 
-/// Follows a recording and compares it with its truth; `at_start` are the sensors as calibrated at the start.
+/// The arm as calibrated at the start.
+#[derive(Clone, Copy, Debug)]
+pub struct AtStart<'a> {
+    /// Its sensors.
+    pub sensors: &'a ArmSensors,
+    /// Its links.
+    pub links: LinkCorrections,
+}
+
+/// Follows a recording and compares it with its truth.
 #[must_use]
-pub fn dive_study(recording: &Recording, truth: &Truth, robot: &Robot, at_start: &ArmSensors) -> DiveStudy {
+pub fn dive_study(recording: &Recording, truth: &Truth, robot: &Robot, at_start: AtStart<'_>) -> DiveStudy {
     let mut follower = Follower::new(robot.clone(), OnlineSettings::default());
     let (mut events, mut snapshots) = (Vec::new(), Vec::new());
     for (log_time, message) in &recording.messages {
@@ -72,8 +81,12 @@ pub fn dive_study(recording: &Recording, truth: &Truth, robot: &Robot, at_start:
     let online: Vec<Belief<'_>> = snapshots.iter().map(|at| fixed(at.from, &at.sensors)).collect();
     let nominal = ArmSensors::nominal(robot);
     let first = Stamp { nanos: i64::MIN };
-    let [by_belief, by_start, by_datasheet] =
-        [&online[..], &[fixed(first, at_start)], &[fixed(first, &nominal)]].map(|b| reaches(recording, robot, b));
+    let [by_belief, by_start, by_datasheet] = [
+        &online[..],
+        &[Belief { from: first, sensors: at_start.sensors, links: at_start.links }],
+        &[fixed(first, &nominal)],
+    ]
+    .map(|b| reaches(recording, robot, b));
     let begins = by_belief.first().map_or(first, |rest| rest.start);
     let rests = by_belief.iter().zip(&by_start).zip(&by_datasheet);
     let tasks = rests.filter_map(|((belief, start), datasheet)| {

@@ -24,7 +24,7 @@ mod tracking_error;
 mod trials;
 mod worlds;
 
-pub use dive::{DiveStudy, DiveTask, dive_csv, dive_study, dive_table};
+pub use dive::{AtStart, DiveStudy, DiveTask, dive_csv, dive_study, dive_table};
 pub use edges::{Edge, EdgeRow, EdgeStudy, edge_study, edges_csv, edges_json, mean_time_under_s, random_edges};
 pub use falsified::{
     Case, CaseKind, EquivalenceClasses, FalsifiedError, FalsifiedRow, FalsifiedStudy, RunStatus, Tier, falsified_cases,

@@ -141,6 +141,7 @@ impl Scene<'_> {
             belief: None,
             taken: &[],
             prior: None,
+            known: None,
             detection_rate: &[],
             failed: &[],
             task: &self.task,
