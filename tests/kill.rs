@@ -255,7 +255,15 @@ fn sigterm_stops_a_run_and_a_second_signal_ends_it_at_once() {
     assert!(matches!(code, Some(1 | 130)), "{code:?} {said}");
 }
 
-/// A limit on the size of files stands for the full disk: it needs no rights.
+/// A run where files cannot grow beyond `limit` blocks of 512 bytes: it stands for the full disk and needs no rights.
+#[cfg(unix)]
+fn run_on_full_disk(limit: u64, reference: &FinishedRun, out: &Path) -> Answer {
+    let mut shell = Command::new("sh");
+    let line = format!("ulimit -f {limit}; exec \"$0\" run \"$1\" --out \"$2\"");
+    shell.arg("-c").arg(line).arg(env!("CARGO_BIN_EXE_armcal")).arg(&reference.routine).arg(out);
+    answer(&mut shell)
+}
+
 #[cfg(unix)]
 #[test]
 fn a_full_disk_is_told_and_costs_nothing_that_was_there() {
@@ -267,10 +275,7 @@ fn a_full_disk_is_told_and_costs_nothing_that_was_there() {
         for name in RESULTS {
             fs::write(out.join(name), "earlier").expect("written");
         }
-        let mut shell = Command::new("sh");
-        let line = format!("ulimit -f {limit}; exec \"$0\" run \"$1\" --out \"$2\"");
-        shell.arg("-c").arg(line).arg(env!("CARGO_BIN_EXE_armcal")).arg(&reference.routine).arg(&out);
-        let said = answer(&mut shell);
+        let said = run_on_full_disk(limit, reference, &out);
         assert_eq!(said.code, 1, "limit {limit}: {said:#?}");
         assert!(said.stderr.contains(".partial: cannot be written"), "limit {limit}: {said:#?}");
         for name in RESULTS {
@@ -310,10 +315,7 @@ fn a_disk_that_fills_at_any_size_loses_nothing() {
         for name in RESULTS {
             fs::write(out.join(name), "earlier").expect("written");
         }
-        let mut shell = Command::new("sh");
-        let line = format!("ulimit -f {limit}; exec \"$0\" run \"$1\" --out \"$2\"");
-        shell.arg("-c").arg(line).arg(env!("CARGO_BIN_EXE_armcal")).arg(&reference.routine).arg(&out);
-        let said = answer(&mut shell);
+        let said = run_on_full_disk(limit, reference, &out);
         assert!(names(&out).iter().all(|name| !name.ends_with(".partial")), "limit {limit}: {:?}", names(&out));
         let kept = out.join("run-cut-1.mcap");
         if said.code == 0 {

@@ -8,7 +8,7 @@
 //! them; `determinism`, `closed_loop`, `script` and `cli` run the program, `kill` ends it badly; `sim` looks at the
 //! simulated world from outside; `uncalibrated` calibrates arms of which little is known; `real` reads recordings of
 //! real arms; `tagmap` maps tags in recordings that the test writes; `touch` feels surveyed plates
-//! with the tool; `work` works on a dive; `repository` reads sources and pages.
+//! with the tool; `work` works on a dive, `watch` follows recordings that grow; `repository` reads sources and pages.
 
 #![allow(clippy::print_stderr, reason = "figures of a test, for whoever reads its output")]
 
@@ -39,4 +39,5 @@ mod touch;
 mod uncalibrated;
 mod vehicles;
 mod wall;
+mod watch;
 mod work;

@@ -83,3 +83,33 @@ fn the_tool_stays_known_through_an_hour_of_a_dive() {
     let mean = nees.iter().sum::<f64>() / nees.len() as f64;
     assert!((0.5..8.0).contains(&mean), "{mean}");
 }
+
+/// A sensor that is declared dead says nothing of the arm between views: not good enough, whatever the views say.
+#[test]
+fn with_a_dead_sensor_the_arm_is_not_good_enough() {
+    let folder = temp();
+    let mut declared = program();
+    declared.arg("calibrate").arg(root("recordings/sample/run.mcap")).arg("--online");
+    declared.args(["--failed", "forearm_pitch=dead", "--robot"]).arg(robot_folder()).arg("--out").arg(folder.path());
+    answer(&mut declared).expect("a dead forearm", 4, &["not good enough"]);
+}
+
+/// Tags whose place nobody knows are mapped first; nothing is believed by them.
+#[test]
+fn tags_of_unknown_place_are_not_believed_in() {
+    let folder = temp();
+    let run = folder.path().join("run");
+    let said = answer(program().arg("run").arg(root("routines/titan4-unknown-map.toml")).arg("--out").arg(&run));
+    assert!(run.join("run.mcap").exists(), "{said:#?}");
+    let n_views = |said: &Answer| -> usize {
+        let line = said.stdout.lines().find_map(|line| line.strip_prefix("views ")).expect("a line");
+        line.trim().parse().expect("a number")
+    };
+    let by_one = follow(&run.join("run.mcap"), folder.path());
+    assert!(by_one.stderr.contains("tags 1, 2, 3, 4, 5, 6, 7 are: they are not used"), "{by_one:#?}");
+    let mut mapped = program();
+    mapped.arg("calibrate").arg(run.join("run.mcap")).args(["--online", "--robot"]).arg(robot_folder());
+    mapped.arg("--tag-map").arg(run.join("tagmap.toml")).arg("--out").arg(folder.path());
+    let by_map = answer(&mut mapped);
+    assert!(n_views(&by_map) > 2 * n_views(&by_one), "{by_map:#?}");
+}

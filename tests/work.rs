@@ -1,12 +1,17 @@
 //! Work on a dive: targets at times, tags passed by the way, and a world that changes meanwhile.
 
+use std::path::Path;
 use std::sync::OnceLock;
 
 use armcal::log::{Recording, read_recording};
+use armcal::report::RunSummary;
 use armcal::streams::{JointCommand, MarkKind, Message, ReachAttempt};
 use armcal::time::Stamp;
 
-use crate::support::{FinishedRun, ShortRoutine, calibrate, finished, lasting_folder, read, robot_folder, temp};
+use crate::support::{
+    FinishedRun, ShortRoutine, answer, calibrate, finished, lasting_folder, program, read, robot_folder, run, temp,
+    write,
+};
 
 const EVERY_S: f64 = 120.0;
 /// Task 1 passes no tags for its time is in the gap, task 3 does.
@@ -150,4 +155,72 @@ fn work_changes_nothing_of_the_calibration_before_it() {
     let again = temp();
     calibrate(&worked().file("run.mcap"), &robot_folder(), again.path()).expect("from the recording", 0, &["ACCEPTED"]);
     assert!(read(&again.path().join("calibration.toml")) == read(&worked().file("calibration.toml")));
+}
+
+/// Hours without tags at great depth, under a tolerance of 8 mm: where the next task would miss it, the arm looks
+/// before. It works by what it believes then, and says so.
+#[test]
+fn calibration_poses_are_asked_for_where_a_task_would_miss() {
+    let steps = STEPS
+        .replace("look_every = 2", "look_every = 1000\n    belief = \"online\"")
+        .replace("tasks = 4", "tasks = 6")
+        .replace("pressure_offset_std_rad_per_mpa = 1e-3", "pressure_offset_std_rad_per_mpa = 4e-4");
+    let short = ShortRoutine {
+        targets_m: vec![[1.401, -1.220, 0.115], [1.375, -0.582, 0.391], [1.173, -0.947, 0.587]],
+        tail: steps,
+        ..ShortRoutine::default()
+    };
+    let folder = temp();
+    let text = short.text().replace("tolerance_m = 0.03", "tolerance_m = 0.008");
+    let file = folder.path().join("asked.toml");
+    write(&file, &text);
+    let out = folder.path().join("out");
+    run(&file, &out).expect("a dive", 0, &["asked", "good enough for the task"]);
+    let summary: RunSummary = serde_json::from_str(&read(&out.join("summary.json"))).expect("a summary");
+    let online = summary.online.expect("it was followed");
+    assert!((1..=3).contains(&online.asked.len()), "{online:?}");
+    for asked in &online.asked {
+        let [before_m, after_m] = asked.tool_error_p95_m.expect("of a target");
+        assert!(before_m > 0.008 && after_m < 0.008 && asked.views == 2, "{asked:?}");
+    }
+    let work = summary.score.expect("scored").work;
+    assert!(work.len() == 6 && work.iter().all(|task| task.tool_error_m < 0.008), "{work:?}");
+    // What the run believed is what its recording says.
+    let followed = folder.path().join("followed");
+    let mut again = program();
+    again.arg("calibrate").arg(out.join("run.mcap")).args(["--online", "--robot"]).arg(robot_folder());
+    answer(again.arg("--out").arg(&followed)).expect("the recording", 0, &["good enough"]);
+    let last = |folder: &Path| read(&folder.join("belief.jsonl")).lines().last().map(str::to_owned);
+    assert_eq!(last(&out), last(&followed));
+}
+
+#[test]
+fn work_by_the_calibration_asks_for_nothing() {
+    let summary = worked().summary();
+    assert!(summary.online.is_none() && !worked().file("belief.jsonl").exists());
+}
+
+/// A wrist whose sensor dies is given up, looked for by the camera, and worked on without: no task is off by more than
+/// the tolerance.
+#[test]
+fn with_a_dead_sensor_the_arm_does_only_what_it_knows() {
+    let steps = STEPS
+        .replace("look_every = 2", "look_every = 1000\n    belief = \"online\"")
+        .replace("tasks = 4", "tasks = 5")
+        .replace("pressure_offset_std_rad_per_mpa = 1e-3", "")
+        + "[[world.fault]]\nat_s = 400.0\nkind = \"sensor_dead\"\njoint = \"wrist_pitch\"\n";
+    let short = ShortRoutine {
+        targets_m: vec![[1.401, -1.220, 0.115], [1.375, -0.582, 0.391], [1.173, -0.947, 0.587]],
+        tail: steps,
+        ..ShortRoutine::default()
+    };
+    let folder = temp();
+    let out = folder.path().join("out");
+    run(&short.write(folder.path()), &out).expect("a dead wrist", 0, &["wrist_pitch (dead)", "good enough"]);
+    let summary: RunSummary = serde_json::from_str(&read(&out.join("summary.json"))).expect("a summary");
+    let asked = summary.online.expect("it was followed").asked;
+    assert!(asked.iter().any(|asked| asked.tool_error_p95_m.is_none() && asked.views > 10), "looked for: {asked:?}");
+    let (work, skipped) = (summary.score.expect("scored").work, summary.capture.skipped_targets);
+    assert!(work.len() >= 3 && work.len() + skipped.len() == 5, "{work:?} {skipped:?}");
+    assert!(work.iter().all(|task| task.tool_error_m < 0.03), "{work:?}");
 }

@@ -54,6 +54,7 @@ fn every_subcommand(folder: &Path) -> Vec<Case> {
         Case::new(&["sensitivity", "--poses=3"]).with(&routine).leaves("--out", out("sensitivity"), "statement.md"),
         Case::new(&["plan"]).with(&routine).leaves("--out", out("plan"), "plan.toml"),
         Case::new(&["calibrate", "--robot"]).with(&robot).with(&recording).leaves("--out", out("c"), "summary.json"),
+        Case::new(&["watch", "--robot"]).with(&robot).with(&recording).leaves("--out", out("w"), "belief.jsonl"),
         Case::new(&["tagmap", "--robot"]).with(&robot).with(&recording).leaves("--out", out("map.toml"), ""),
         Case::new(&["replay"]).with(&recording).leaves("--save", out("replay.rrd"), ""),
         Case::new(&["study", "edges", "--n=20"]).leaves("--out", out("edges"), "edges.csv"),

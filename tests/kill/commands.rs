@@ -234,6 +234,7 @@ fn that_write(out: &Path) -> Vec<Command> {
         with(&["plan"], &[&[routine.as_path()], &out_is[..]].concat()),
         with(&["sensitivity"], &[&[routine.as_path()], &out_is[..]].concat()),
         with(&["calibrate"], &[&[recording.as_path(), &robot[0], &robot[1]], &out_is[..]].concat()),
+        with(&["watch"], &[&[recording.as_path(), &robot[0], &robot[1]], &out_is[..]].concat()),
         with(&["tagmap"], &[&recording, &robot[0], &robot[1], Path::new("--out"), &out.join("map.toml")]),
         with(&["replay"], &[&recording, Path::new("--save"), &out.join("a.rrd")]),
         with(&["campaign", "--seeds=1"], &[routine, Path::new("--out"), &out.join("c.csv")]),

@@ -42,7 +42,7 @@ const VIEWS: &str = "fuzz/corpus/recording/views.mcap";
 const CUT: &str = "fuzz/corpus/recording/cut.mcap";
 const TAGMAP: &str = "tagmap views.mcap --topic /camera/wrist/detections --camera cameras.yaml --tags";
 
-const CASES: [Case; 36] = [
+const CASES: [Case; 38] = [
     case("robots/titan4/titan4.urdf", "robot/titan4.urdf", "check robot"),
     case("robots/titan4/titan4.urdf", "robot/titan4.urdf", "inspect views.mcap --robot robot"),
     case("robots/kraft-predator/kraft-predator.urdf", "robot/titan4.urdf", "check robot"),
@@ -74,6 +74,8 @@ const CASES: [Case; 36] = [
     case(VIEWS, "given.mcap", "inspect given.mcap --robot robot"),
     case(CUT, "given.mcap", "inspect given.mcap --json"),
     case(CUT, "given.mcap", "replay given.mcap --save out.rrd"),
+    case(VIEWS, "given.mcap", "watch given.mcap --robot robot --idle-s 1"),
+    case(VIEWS, "changed.mcap", "watch changed.mcap --robot robot --idle-s 1 --json --out out"),
     case(VIEWS, "changed.mcap", "inspect changed.mcap --robot robot"),
     case(VIEWS, "changed.mcap", "calibrate changed.mcap --robot robot --out out --method minimum_distance"),
     case(VIEWS, "changed.mcap", "calibrate changed.mcap --robot robot --out out"),
