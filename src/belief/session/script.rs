@@ -191,7 +191,7 @@ impl ScriptRunner<'_, '_> {
             let is_stuck = match &outcome {
                 Err(PathError::StartTooNear { .. }) => true,
                 // Clear where it stands, and not for what a joint strays by as soon as it moves.
-                Err(PathError::Blocked { .. }) => !planner.is_free_to_arrive(&from),
+                Err(PathError::Blocked { is_stuck, .. }) => *is_stuck || !planner.is_free_to_arrive(&from),
                 _ => false,
             };
             if !is_stuck {

@@ -19,6 +19,8 @@ pub enum PathError {
         distance_m: f64,
         /// How far of the straight way an edge from the start is certified, 0 to 1.
         free_share: f64,
+        /// Whether no edge at all was found that leaves the start.
+        is_stuck: bool,
     },
     #[error("the start is too near: {distance_m:.3} m between {nearest}; {needed_m:.3} m are needed (0: in collision)")]
     StartTooNear { nearest: String, distance_m: f64, needed_m: f64 },

@@ -36,7 +36,7 @@ impl PathPlanner<'_> {
         let mut connect = RrtConnect::new(self, from, to);
         match connect.search(rng) {
             Some(waypoints) => Ok(connect.shortened(&waypoints, rng)),
-            None => Err(self.blocked(from, to, connect.n_tried())),
+            None => Err(self.blocked(from, to, &connect)),
         }
     }
 
@@ -68,7 +68,7 @@ impl PathPlanner<'_> {
         })
     }
 
-    pub(crate) fn blocked(&self, from: &JointAngles, to: &JointAngles, tried: usize) -> PathError {
+    pub(crate) fn blocked(&self, from: &JointAngles, to: &JointAngles, tried: &RrtConnect<'_, '_>) -> PathError {
         let places = (0..=PLACES).map(|k| between(from, to, f64::from(k) / f64::from(PLACES)));
         let nearest: Option<ClosestPair> = places
             .filter_map(|angles| self.clearance.find_violation(&angles, self.bounds, self.margin_m))
@@ -79,7 +79,8 @@ impl PathPlanner<'_> {
                 self.clearance.find_violation_along(&edge, self.bounds, self.margin_m)
             });
         PathError::Blocked {
-            tried,
+            tried: tried.n_tried(),
+            is_stuck: tried.is_stuck(),
             distance_m: nearest.as_ref().map_or(self.margin_m, ClosestPair::true_distance_m),
             nearest: nearest.map_or_else(String::new, |found| found.to_string()),
             free_share: halved(|share| self.is_edge_free(from, &between(from, to, share))),

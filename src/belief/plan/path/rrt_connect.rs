@@ -56,6 +56,11 @@ impl<'a, 'b> RrtConnect<'a, 'b> {
         self.n_tried
     }
 
+    /// Whether no edge was found that leaves the start.
+    pub fn is_stuck(&self) -> bool {
+        self.trees[0].nodes.len() == 1
+    }
+
     /// Waypoints from start to goal; `None` when none were found within the budget.
     pub fn search(&mut self, rng: &mut ChaCha8Rng) -> Option<Vec<JointAngles>> {
         while self.n_regions < MAX_REGIONS && self.n_tried < MAX_SAMPLES {

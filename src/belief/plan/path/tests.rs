@@ -257,13 +257,49 @@ fn a_blocked_way_says_what_blocks_it_and_how_far_it_is_free() {
             continue;
         }
         // As a search says that has found no way round.
-        let error = planner.blocked(&from, &to, 7);
-        let PathError::Blocked { tried: 7, nearest, distance_m, free_share } = &error else { panic!("{error:?}") };
+        let error = planner.blocked(&from, &to, &RrtConnect::new(&planner, &from, &to));
+        let PathError::Blocked { tried: 0, nearest, distance_m, free_share, is_stuck: true } = &error else {
+            panic!("{error:?}")
+        };
         blocked += 1;
         assert!(*distance_m < MARGIN_M && nearest.contains(" and "), "{error}");
         assert!(planner.is_edge_free(&from, &between(&from, &to, *free_share)));
         assert!(!planner.is_edge_free(&from, &between(&from, &to, free_share + 1.0 / 256.0)));
     }
+}
+
+/// Where some arm just keeps the margin no edge is proven to keep it, in whichever direction: a search says so, and half
+/// the margin lets the arm leave.
+#[test]
+fn a_start_at_the_verge_of_its_margin_cannot_be_left() {
+    let site = site("tight-basket");
+    let clearance = ClearanceModel::new(&site.robot, &site.vehicle, &site.scene);
+    let bounds = JointErrorBounds::alike(&site.robot, 0.014, 0.004);
+    let limits = bounds.safe_limits(&site.robot);
+    let planner = planner(&clearance, &bounds, &limits);
+    let mut rng = stream_rng(2, "verge");
+    let mut stuck = 0;
+    for _ in 0..12 {
+        let from = random_free(&planner, &mut rng);
+        let [mut kept_m, mut not_kept_m] = [MARGIN_M, MARGIN_M + 0.06];
+        if clearance.find_violation(&from, &bounds, not_kept_m).is_none() {
+            continue;
+        }
+        for _ in 0..20 {
+            let m = 0.5 * (kept_m + not_kept_m);
+            let is_kept = clearance.find_violation(&from, &bounds, m).is_none();
+            if is_kept { kept_m = m } else { not_kept_m = m }
+        }
+        let verge = PathPlanner { margin_m: kept_m, ..planner };
+        let to = random_free(&verge, &mut rng);
+        if !matches!(verge.plan(&from, &to, &mut rng), Err(PathError::Blocked { is_stuck: true, .. })) {
+            continue;
+        }
+        stuck += 1;
+        let half = PathPlanner { margin_m: 0.5 * kept_m, ..planner };
+        half.plan(&from, &to, &mut rng).expect("half the margin leaves room");
+    }
+    assert!(stuck > 1, "{stuck} of 12 are stuck");
 }
 
 fn planner<'a>(
