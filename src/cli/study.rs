@@ -10,6 +10,7 @@ use clap::{Args, Subcommand};
 use crate::cli::exit::Exit;
 use crate::cli::stdout::{note, say};
 use crate::cli::study_dive::{DiveArgs, dive};
+use crate::cli::study_dive_faults::{DiveFaultsArgs, dive_faults};
 use crate::cli::study_falsified::{FalsifiedArgs, falsified};
 use crate::cli::study_paper::{PaperArgs, paper};
 use crate::cli::study_plan::{
@@ -56,6 +57,8 @@ enum Study {
     Worlds(WorldsArgs),
     /// Run a dive for several seeds, follow each recording online, and compare the belief with the truth at each task
     Dive(DiveArgs),
+    /// Run a dive with each kind of fault at an unknown time, and compare when it is named with what an oracle could tell
+    DiveFaults(DiveFaultsArgs),
 }
 
 #[derive(Debug, Args)]
@@ -95,6 +98,7 @@ pub(super) fn study(args: &StudyArgs) -> Result<Exit> {
         Study::Falsified(args) => falsified(args),
         Study::Worlds(args) => worlds(args),
         Study::Dive(args) => dive(args),
+        Study::DiveFaults(args) => dive_faults(args),
     }
 }
 

@@ -81,7 +81,7 @@ fn one(args: &DiveArgs, seed: u64) -> Result<DiveStudy> {
     let folder = tempfile::tempdir_in(&args.out).context("no folder for a run can be made")?;
     let run = if args.keep { kept } else { folder.path().join("run") };
     if !run.join("truth.mcap").exists() {
-        run_dive(args, seed, &run)?;
+        run_dive(&args.routine, seed, &[], &run)?;
     }
     let routine = routine::load(&args.routine)?;
     let (robot, _) = routine.load_arm()?;
@@ -93,9 +93,12 @@ fn one(args: &DiveArgs, seed: u64) -> Result<DiveStudy> {
 }
 
 /// A process of its own, as a user would start it.
-fn run_dive(args: &DiveArgs, seed: u64, out: &Path) -> Result<()> {
+pub(super) fn run_dive(routine: &Path, seed: u64, settings: &[String], out: &Path) -> Result<()> {
     let mut command = Command::new(std::env::current_exe().context("this program cannot be found")?);
-    command.arg("run").arg(&args.routine).arg("--seed").arg(seed.to_string()).arg("--out").arg(out);
+    command.arg("run").arg(routine).arg("--seed").arg(seed.to_string()).arg("--out").arg(out);
+    settings.iter().for_each(|setting| {
+        command.arg("--set").arg(setting);
+    });
     let output = command.stdin(Stdio::null()).stdout(Stdio::null()).output().context("cannot be started")?;
     if !out.join("truth.mcap").exists() {
         bail!("seed {seed}: {}", String::from_utf8_lossy(&output.stderr));

@@ -7,10 +7,11 @@
 //! methods, and `sensitivity` its Figures 4 and 7; `poses`: error over poses and the arm's time, by how the poses are
 //! chosen; `charts` draws them. `falsified`: the verdict where drawing, survey or a sensor is wrong. `edges`: certified
 //! edges against brute force; `paths`: planning between random poses; `worlds`: closed loops in any world allowed;
-//! `dive`: the online belief over a dive.
+//! `dive`: the online belief over a dive, `dive_faults`: when it names what happens there.
 
 mod charts;
 mod dive;
+mod dive_faults;
 mod edges;
 mod falsified;
 mod noise_fit;
@@ -25,6 +26,9 @@ mod trials;
 mod worlds;
 
 pub use dive::{AtStart, DiveStudy, DiveTask, dive_csv, dive_study, dive_table};
+pub use dive_faults::{
+    DiveFault, DiveFaultKind, DiveFaultRow, dive_fault_study, dive_faults_csv, dive_faults_table, drawn_dive_fault,
+};
 pub use edges::{Edge, EdgeRow, EdgeStudy, edge_study, edges_csv, edges_json, mean_time_under_s, random_edges};
 pub use falsified::{
     Case, CaseKind, EquivalenceClasses, FalsifiedError, FalsifiedRow, FalsifiedStudy, RunStatus, Tier, falsified_cases,

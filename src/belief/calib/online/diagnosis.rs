@@ -13,9 +13,11 @@ const SUSPICIOUS_Z: f64 = 3.719;
 const SUSPICIOUS_STEP_Z: f64 = 3.3;
 /// What a view costs an explanation under which none of its observations belongs, per observation; that of a rejected
 /// one.
-const NOTHING_FITS_NATS: f64 = 30.0;
+pub(crate) const NOTHING_FITS_NATS: f64 = 30.0;
 /// What leads by this is taken for true, in nats.
 const LEAD_NATS: f64 = 5.0;
+/// The same over another explanation by the same sensor: which one it is matters more than how it failed.
+const LEAD_OF_SENSOR_NATS: f64 = 1.5;
 /// A scale this close to the datasheet's is the drift of a sensor, not another sensor.
 const LEAST_SCALE: f64 = 0.2;
 /// Explanations followed at most.
@@ -23,7 +25,9 @@ const MAX_BRANCHES: usize = 6;
 /// Views this close to each other are looked at together, s, and how many of them.
 const RECENT_S: f64 = 60.0;
 const MAX_RECENT: usize = 6;
-/// Views after which the best explanation is taken, and those that one needs.
+/// Views after which the best explanation is taken where it is clear that something happened, and in any case; and
+/// those that one needs.
+const MAX_VIEWS_TO_NAME: usize = 2;
 const MAX_VIEWS: usize = 5;
 const CONFIRMED_BY: usize = 2;
 /// The same for another scale: its two numbers explain any two views.
@@ -36,6 +40,19 @@ pub(crate) struct Branch {
     pub filter: Filter,
     /// `ln` of its odds.
     nats: f64,
+}
+
+impl Branch {
+    /// Whether it explains by another scale that is none.
+    fn is_void(&self, before: &Filter) -> bool {
+        let scale = self.fault.filter(|fault| matches!(fault, Fault::Scale(_)));
+        scale.is_some_and(|fault| fault.size(before, &self.filter).is_none_or(|gain| (gain - 1.0).abs() < LEAST_SCALE))
+    }
+
+    /// Whether it tells of something.
+    fn tells(&self) -> bool {
+        !matches!(self.fault, None | Some(Fault::Drift))
+    }
 }
 
 /// Explanations of what the last views show.
@@ -153,7 +170,8 @@ impl Race {
                 None => -NOTHING_FITS_NATS * view.tags.len() as f64,
             };
         }
-        self.branches.sort_by(|a, b| b.nats.total_cmp(&a.nats));
+        let is_void = |branch: &Branch| branch.is_void(&self.before);
+        self.branches.sort_by(|a, b| is_void(a).cmp(&is_void(b)).then(b.nats.total_cmp(&a.nats)));
     }
 
     /// Widens every explanation.
@@ -183,8 +201,16 @@ impl Race {
 
     /// Whether it is decided: one view alone names nothing.
     pub(crate) fn is_over(&self) -> bool {
-        let is_confirmed = self.best().is_some_and(|best| self.is_confirmed(best.fault));
-        self.n_later >= MAX_VIEWS || (self.lead_nats() > LEAD_NATS && is_confirmed)
+        let Some(best) = self.best().filter(|best| self.is_confirmed(best.fault)) else {
+            return self.n_later >= MAX_VIEWS;
+        };
+        let may_name = best.tells() && self.n_later >= MAX_VIEWS_TO_NAME;
+        let is_behind = |other: &Branch| {
+            let is_of_sensor = best.fault.zip(other.fault).is_some_and(|(one, other)| one.is_of_same_sensor(other));
+            let lead = if is_of_sensor { LEAD_OF_SENSOR_NATS } else { LEAD_NATS };
+            best.nats - other.nats > lead || (may_name && other.tells())
+        };
+        self.n_later >= MAX_VIEWS || self.others().all(is_behind)
     }
 
     /// Whether enough views could have spoken against it. A detection of another tag happens once; a tag that was moved
@@ -201,10 +227,15 @@ impl Race {
     }
 
     fn lead_nats(&self) -> f64 {
-        match &self.branches[..] {
-            [first, second, ..] => first.nats - second.nats,
+        match (self.best(), self.others().next()) {
+            (Some(first), Some(second)) => first.nats - second.nats,
             _ => f64::INFINITY,
         }
+    }
+
+    /// All explanations but the best, those aside that are none.
+    fn others(&self) -> impl Iterator<Item = &Branch> {
+        self.branches.iter().skip(1).filter(|branch| !branch.is_void(&self.before))
     }
 
     /// What it ended with; `None` where nothing happened.
@@ -212,14 +243,11 @@ impl Race {
         let best = self.branches.first()?;
         let fault = best.fault.filter(|fault| *fault != Fault::Drift && self.is_confirmed(best.fault))?;
         let size = fault.size(&self.before, &best.filter);
-        if matches!(fault, Fault::Scale(_)) && size.is_none_or(|gain| (gain - 1.0).abs() < LEAST_SCALE) {
-            return None;
-        }
         Some(Verdict {
             fault,
             size,
             lead_nats: self.lead_nats(),
-            next: self.branches.get(1).and_then(|branch| branch.fault),
+            next: self.others().next().and_then(|branch| branch.fault),
         })
     }
 }

@@ -5,7 +5,9 @@ use std::sync::Arc;
 
 use crate::calib::covariance::ParameterCovariance;
 use crate::calib::online::event::OnlineEvent;
+use crate::calib::online::hypothesis::Fault;
 use crate::calib::online::member::Member;
+use crate::calib::online::oracle::Oracle;
 use crate::calib::online::settings::{DriftModel, OnlineSettings};
 use crate::calib::parameters::JointParameters;
 use crate::calib::views::view::View;
@@ -99,6 +101,13 @@ impl OnlineEstimator {
     fn best(&self) -> &Member {
         // At least the best one stays.
         &self.members[0]
+    }
+
+    /// What each of `explanations`, all of whose faults happen now, makes of the views from now on; `None` before the
+    /// first belief. For studies that know what happened.
+    #[must_use]
+    pub fn oracle(&self, explanations: &[Vec<Fault>]) -> Option<Oracle> {
+        self.best().oracle(explanations)
     }
 
     /// What happened since this was last asked for, in the order of time.

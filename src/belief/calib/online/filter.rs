@@ -55,6 +55,8 @@ pub(crate) struct Filter {
 pub(crate) struct ViewUpdate {
     /// Sum of squares in sigmas at the solution, the pull of the belief so far included.
     pub cost: f64,
+    /// What the rejected ones cost beside, in the same units.
+    pub rejected_cost: f64,
     /// Of the observations that are used.
     pub n_coordinates: usize,
     /// Their part of the cost.
@@ -342,16 +344,17 @@ fn iterate(
 fn view_update(problem: &BundleProblem<'_>, solved: &SolvedView, log_det_before: f64) -> ViewUpdate {
     let SolvedView { state, normal, factor } = solved;
     let of_own: f64 = normal.eliminated.iter().map(|own| own.log_ratio).sum();
-    let left_out: f64 = problem.observations.iter().map(|observation| rejected(observation).chi2).sum();
+    let rejected_cost: f64 = problem.observations.iter().map(|observation| rejected(observation).chi2).sum();
     let volume = log_det(factor) - log_det_before;
     let used = problem.observations.iter().filter(|observation| observation.is_used);
     let chi2 = problem.observations.iter().zip(&normal.chi2).filter(|(observation, _)| observation.is_used);
     let is_rejected = |observation: &&ObservationTerm| !observation.is_used;
     ViewUpdate {
         cost: normal.cost,
+        rejected_cost,
         observation_cost: chi2.map(|(_, chi2)| chi2).sum(),
         n_coordinates: used.map(|observation| observation.data.n_coordinates()).sum(),
-        log_evidence: 0.5 * (of_own - normal.cost - left_out - volume),
+        log_evidence: 0.5 * (of_own - normal.cost - rejected_cost - volume),
         rejected: problem.observations.iter().filter(is_rejected).map(|observation| observation.tag).collect(),
         joint_error: joint_errors(problem, solved),
         walk: walk_scores(problem, state, factor),

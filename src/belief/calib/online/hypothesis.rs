@@ -86,6 +86,15 @@ impl Fault {
         }
     }
 
+    /// Whether both are about the same sensor.
+    pub(crate) fn is_of_same_sensor(self, other: Self) -> bool {
+        let joint = |fault| match fault {
+            Self::Slip(joint) | Self::Scale(joint) | Self::Failed(joint) => Some(joint),
+            _ => None,
+        };
+        joint(self).is_some() && joint(self) == joint(other)
+    }
+
     /// The kind as files write it.
     #[must_use]
     pub fn kind(self) -> FindingKind {

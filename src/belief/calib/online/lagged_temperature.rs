@@ -1,5 +1,6 @@
 //! The temperature of a sensor that follows the oil's with a lag: `dT/dt = (oil - T) / lag`.
 
+use armcal_core::sensor::Conditions;
 use armcal_core::time::Stamp;
 
 /// A first-order lag, exact for readings on straight steps.
@@ -28,8 +29,13 @@ impl LaggedTemperature {
         });
     }
 
+    /// `conditions` as the sensors have them.
+    pub(crate) fn of_sensors(&self, conditions: &Conditions) -> Conditions {
+        Conditions { oil_c: conditions.oil_c.map(|now_c| self.behind(now_c)), ..*conditions }
+    }
+
     /// The sensor's temperature where the oil has `oil_c`; that of the oil where nothing was heard.
-    pub(crate) fn behind(&self, oil_c: f64) -> f64 {
+    fn behind(&self, oil_c: f64) -> f64 {
         match self.last {
             Some((_, sensor_c)) if self.lag_s > 0.0 => sensor_c,
             _ => oil_c,

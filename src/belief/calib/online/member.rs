@@ -13,6 +13,7 @@ use crate::calib::online::filter::{Filter, ViewUpdate};
 use crate::calib::online::hypothesis::Fault;
 use crate::calib::online::image_noise::{CornerNoise, MotionNoise};
 use crate::calib::online::lagged_temperature::LaggedTemperature;
+use crate::calib::online::oracle::{Explained, Oracle};
 use crate::calib::online::process_noise::{JitterSize, JointErrorSize, ProcessNoise};
 use crate::calib::online::settings::{DriftModel, FaultSearch, OnlineSettings, dive_scales, online_model};
 use crate::calib::online::view_stream::is_moving;
@@ -116,7 +117,7 @@ impl Member {
 
     /// `conditions` as the sensors have them.
     pub(crate) fn lagged(&self, conditions: &Conditions) -> Conditions {
-        Conditions { oil_c: conditions.oil_c.map(|now_c| self.lag.behind(now_c)), ..*conditions }
+        self.lag.of_sensors(conditions)
     }
 
     /// Takes a view in; whether it told anything.
@@ -290,6 +291,20 @@ impl Member {
             self.events.push(OnlineEvent::of_verdict(&self.robot, &verdict, since, now));
         }
         running.race = None;
+    }
+
+    /// What each of `explanations` makes of the views from now on; `None` before the first belief.
+    pub(crate) fn oracle(&self, explanations: &[Vec<Fault>]) -> Option<Oracle> {
+        let Running { filter, noise, conditions, .. } = self.running.as_ref()?;
+        let explained = |faults: &[Fault]| Explained::new(faults.to_vec(), filter, &self.robot);
+        Some(Oracle {
+            robot: self.robot.clone(),
+            lag: self.lag,
+            noise: noise.clone(),
+            conditions: *conditions,
+            nothing: explained(&[]),
+            explanations: explanations.iter().map(|faults| explained(faults)).collect(),
+        })
     }
 
     /// What happened since this was last asked for, in the order of time.

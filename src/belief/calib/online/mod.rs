@@ -3,7 +3,7 @@
 //! `view_stream` makes views of messages. `estimator` holds a `member` for each lag of the sensors' temperature; each
 //! starts from the first views by `bundle` and carries its belief on: `filter` is state and information,
 //! `process_noise` how fast sensors change. `diagnosis` races `hypothesis` against hypothesis where a view does not
-//! fit; `event` tells what happened. `follower` is all of it, `belief_log` what it said over time.
+//! fit; `event` tells what happened. `follower` is all of it, `belief_log` what it said over time; `oracle` is what a study compares it with.
 
 mod belief_log;
 mod diagnosis;
@@ -15,6 +15,7 @@ mod hypothesis;
 mod image_noise;
 mod lagged_temperature;
 mod member;
+mod oracle;
 mod process_noise;
 mod settings;
 mod view_stream;
@@ -24,6 +25,7 @@ pub use estimator::OnlineEstimator;
 pub use event::OnlineEvent;
 pub use follower::{BeliefRow, Follower};
 pub use hypothesis::Fault;
+pub use oracle::{Oracle, OracleGain};
 pub use settings::{DriftModel, FaultSearch, OnlineSettings, online_model};
 pub use view_stream::ViewStream;
 

@@ -1,0 +1,98 @@
+//! An oracle that knows when something may have happened: what can be told of it by the views since then. For studies:
+//! a belief that finds out by itself cannot be faster.
+
+use crate::calib::online::diagnosis::{NOTHING_FITS_NATS, seen_by};
+use crate::calib::online::filter::Filter;
+use crate::calib::online::hypothesis::Fault;
+use crate::calib::online::lagged_temperature::LaggedTemperature;
+use crate::calib::online::process_noise::ProcessNoise;
+use crate::calib::views::view::View;
+use armcal_core::robot::Robot;
+use armcal_core::sensor::Conditions;
+use armcal_core::time::Stamp;
+
+/// Beliefs that took the same views in: that nothing happened, and each of some explanations, opened at its time.
+#[derive(Clone)]
+pub struct Oracle {
+    pub(crate) robot: Robot,
+    pub(crate) lag: LaggedTemperature,
+    pub(crate) noise: ProcessNoise,
+    pub(crate) conditions: Conditions,
+    pub(crate) nothing: Explained,
+    pub(crate) explanations: Vec<Explained>,
+}
+
+/// What the views say of one explanation.
+#[derive(Clone)]
+pub(crate) struct Explained {
+    pub faults: Vec<Fault>,
+    pub filter: Filter,
+    /// Sum of squares in sigmas.
+    pub cost: f64,
+    /// Logarithm of the probability of the views.
+    pub nats: f64,
+}
+
+/// How one explanation compares with that nothing happened.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OracleGain {
+    /// What it saves of the sum of squares in sigmas: 25 are five sigma of a fault that is one number.
+    pub chi2: f64,
+    /// `ln` of the odds that the views give it.
+    pub nats: f64,
+}
+
+impl Explained {
+    pub(crate) fn new(faults: Vec<Fault>, filter: &Filter, robot: &Robot) -> Self {
+        let mut filter = filter.clone();
+        faults.iter().for_each(|fault| fault.open(&mut filter, robot));
+        Self { faults, filter, cost: 0.0, nats: 0.0 }
+    }
+
+    fn add(&mut self, robot: &Robot, view: &View) {
+        let seen = self.faults.iter().fold(view.clone(), |view, fault| seen_by(Some(*fault), &view));
+        match self.filter.update(robot, &seen) {
+            Some(update) => {
+                self.cost += update.cost + update.rejected_cost;
+                self.nats += update.log_evidence;
+            }
+            None => {
+                let nats = NOTHING_FITS_NATS * view.tags.len() as f64;
+                self.cost += 2.0 * nats;
+                self.nats -= nats;
+            }
+        }
+    }
+}
+
+impl Oracle {
+    /// A reading of the oil's thermometer.
+    pub fn hear_temperature(&mut self, stamp: Stamp, oil_c: f64) {
+        self.lag.hear(stamp, oil_c);
+    }
+
+    /// Takes a view in.
+    pub fn add_view(&mut self, view: &View) {
+        let mut view = view.clone();
+        view.tags.retain(|seen| self.robot.tags[seen.tag_idx].is_known());
+        if view.tags.is_empty() {
+            return;
+        }
+        view.conditions = self.lag.of_sensors(&view.conditions);
+        let change = view.conditions.departure_from(&self.conditions);
+        self.conditions = view.conditions;
+        for explained in std::iter::once(&mut self.nothing).chain(&mut self.explanations) {
+            let columns = self.noise.widening(&explained.filter, &change);
+            explained.filter.widen(&columns);
+            explained.add(&self.robot, &view);
+        }
+    }
+
+    /// Of each explanation, in their order.
+    #[must_use]
+    pub fn gains(&self) -> Vec<OracleGain> {
+        let Explained { cost, nats, .. } = &self.nothing;
+        let gain = |of: &Explained| OracleGain { chi2: cost - of.cost, nats: of.nats - nats };
+        self.explanations.iter().map(gain).collect()
+    }
+}

@@ -1,0 +1,449 @@
+//! Faults at unknown times in a dive: when the online belief names what happened, against an oracle that knows what may
+//! have happened and when. The oracle says how much the views can tell at all, and which explanations they cannot tell
+//! apart.
+
+use std::f64::consts::TAU;
+use std::fmt::Write as _;
+
+use rand::{Rng, RngExt};
+
+use armcal_belief::calib::online::{Fault, Follower, OnlineEvent, OnlineSettings, Oracle, ViewStream};
+use armcal_belief::calib::{FindingKind, View};
+
+use armcal_core::log::Recording;
+use armcal_core::robot::{FailedJoint, Robot};
+use armcal_core::stats::stream_rng;
+use armcal_core::streams::{Mark, MarkKind, Message, Thermometer};
+use armcal_core::time::{SIMULATION_EPOCH, Stamp};
+
+/// Five sigma of a fault that is one number.
+const TOLD_CHI2: f64 = 25.0;
+/// Explanations that the oracle holds for this much less probable at most cannot be told apart, nats (odds of twenty).
+const ALIKE_NATS: f64 = 3.0;
+/// Views after the oracle's within which a fault is named in time.
+const IN_TIME: usize = 3;
+/// Views that the oracle goes on for after it is sure: what is told later is told too late.
+const ORACLE_GOES_ON: usize = 8;
+/// Faults happen between these, s: after the first tasks, before the last ones.
+const BETWEEN_S: [f64; 2] = [900.0, 2700.0];
+const DEG: f64 = std::f64::consts::PI / 180.0;
+
+/// What may happen on a dive.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum DiveFaultKind {
+    /// A sensor slips by 0.5 to 1.5 deg.
+    Slipped,
+    /// A sensor keeps the word that it has.
+    Stuck,
+    /// A sensor's wire breaks.
+    Dead,
+    /// A sensor's sense turns round.
+    Reversed,
+    /// A wiper loses contact ever more.
+    Dying,
+    /// A tag is knocked aside by 10 to 40 mm.
+    Tag,
+    /// Every other tag is: they are on one boom.
+    Boom,
+    /// The camera turns on its mount by 0.5 to 2 deg, about any axis.
+    Camera,
+}
+
+impl DiveFaultKind {
+    /// All of them.
+    pub const ALL: [Self; 8] =
+        [Self::Slipped, Self::Stuck, Self::Dead, Self::Reversed, Self::Dying, Self::Tag, Self::Boom, Self::Camera];
+
+    /// As tables have it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Slipped => "sensor slipped",
+            Self::Stuck => "sensor stuck",
+            Self::Dead => "sensor dead",
+            Self::Reversed => "sensor reversed",
+            Self::Dying => "sensor dying",
+            Self::Tag => "tag moved",
+            Self::Boom => "boom of tags moved",
+            Self::Camera => "camera slipped",
+        }
+    }
+}
+
+/// One fault of a dive.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DiveFault {
+    /// What happens.
+    pub kind: DiveFaultKind,
+    /// Of the draw and the run.
+    pub seed: u64,
+    /// Seconds after the start.
+    pub at_s: f64,
+    /// The joint it happens to.
+    joint: usize,
+    /// The tags, as indices.
+    tags: Vec<usize>,
+    /// Size, where it has one: rad or m.
+    pub size: Option<f64>,
+    /// The value of `world.fault` for `--set`.
+    pub setting: String,
+}
+
+/// Draws the fault of one kind and seed for `robot`: the same one each time.
+#[must_use]
+pub fn drawn_dive_fault(kind: DiveFaultKind, seed: u64, robot: &Robot) -> DiveFault {
+    use DiveFaultKind as K;
+    let mut rng = stream_rng(seed, kind.name());
+    let at_s = rng.random_range(BETWEEN_S[0]..BETWEEN_S[1]).round();
+    let joint = rng.random_range(0..robot.n_joints());
+    let name = &robot.sensors[joint].joint;
+    let first = rng.random_range(0..robot.tags.len());
+    let tags: Vec<usize> = match kind {
+        K::Tag => vec![first],
+        K::Boom => (first % 2..robot.tags.len()).step_by(2).collect(),
+        _ => Vec::new(),
+    };
+    let sign = if rng.random_bool(0.5) { 1.0 } else { -1.0 };
+    let direction = direction(&mut rng);
+    let along = |size: f64| direction.map(|of| of * size);
+    let plain = |kind: &str| format!("{{at_s={at_s:?}, kind=\"{kind}\", joint=\"{name}\"}}");
+    let (size, setting) = match kind {
+        K::Slipped => {
+            let by_rad = sign * rng.random_range(0.5..1.5) * DEG;
+            let text = format!("{{at_s={at_s:?}, kind=\"sensor_jump\", joint=\"{name}\", by_rad={by_rad:?}}}");
+            (Some(by_rad), text)
+        }
+        K::Stuck => (None, plain("sensor_stuck")),
+        K::Dead => (None, plain("sensor_dead")),
+        K::Reversed => (None, plain("sensor_reversed")),
+        K::Dying => {
+            let text = format!("{{at_s={at_s:?}, kind=\"sensor_dying\", joint=\"{name}\", dropout_per_s=5.0}}");
+            (None, text)
+        }
+        K::Tag | K::Boom => {
+            let by_m = rng.random_range(0.01..0.04);
+            // Off the plate that carries it: behind its face nobody sees it.
+            let [x, y, z] = along(by_m);
+            let by = [x, y, z.abs()];
+            let moved = |tag: &usize| {
+                let id = robot.tags[*tag].id;
+                format!("{{at_s={at_s:?}, kind=\"tag_moved\", id={id}, by_m={by:?}}}")
+            };
+            (Some(by_m), tags.iter().map(moved).collect::<Vec<_>>().join(", "))
+        }
+        K::Camera => {
+            let by_rad = rng.random_range(0.5..2.0) * DEG;
+            (Some(by_rad), format!("{{at_s={at_s:?}, kind=\"camera_slipped\", by_rad={:?}}}", along(by_rad)))
+        }
+    };
+    DiveFault { kind, seed, at_s, joint, tags, size, setting: format!("[{setting}]") }
+}
+
+/// Evenly over the sphere.
+fn direction(rng: &mut impl Rng) -> [f64; 3] {
+    let (up, around) = (rng.random_range(-1.0..1.0_f64), rng.random_range(0.0..TAU));
+    let across = (1.0 - up * up).sqrt();
+    [across * around.cos(), across * around.sin(), up]
+}
+
+impl DiveFault {
+    fn explanation(&self) -> Vec<Fault> {
+        use DiveFaultKind as K;
+        match self.kind {
+            K::Slipped => vec![Fault::Slip(self.joint)],
+            K::Stuck | K::Dead | K::Dying => vec![Fault::Failed(self.joint)],
+            K::Reversed => vec![Fault::Scale(self.joint)],
+            K::Tag | K::Boom => self.tags.iter().map(|tag| Fault::Tag(*tag)).collect(),
+            K::Camera => vec![Fault::Mount],
+        }
+    }
+
+    /// Whether it is what was named.
+    fn is(&self, named: Fault) -> bool {
+        use DiveFaultKind as K;
+        match (self.kind, named) {
+            (K::Slipped, Fault::Slip(joint)) => joint == self.joint,
+            // What reads the same everywhere has a slope of zero.
+            (K::Stuck | K::Dead | K::Dying | K::Reversed, Fault::Failed(joint) | Fault::Scale(joint)) => {
+                joint == self.joint
+            }
+            (K::Tag | K::Boom, Fault::Tag(tag)) => self.tags.contains(&tag),
+            (K::Camera, Fault::Mount) => true,
+            _ => false,
+        }
+    }
+}
+
+/// What was told of, and when.
+#[derive(Clone, Debug, PartialEq)]
+struct Told {
+    fault: Fault,
+    at: Stamp,
+    n_views: usize,
+    line: String,
+    nats: Option<f64>,
+    nats_of_truth: f64,
+}
+
+/// A dive with a fault, followed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DiveFaultRow {
+    /// What happened.
+    pub fault: DiveFault,
+    /// Views after it until the oracle is sure; `None`: they never tell it.
+    pub oracle_views: Option<usize>,
+    /// Views after it until it was named; `None`: it was not.
+    pub named_views: Option<usize>,
+    /// Of what was told since, each that is neither what happened nor what the views cannot tell from it.
+    pub wrong: Vec<String>,
+    /// What the views cannot tell from what happened, and was named in its place.
+    pub alike: Vec<String>,
+    /// What was told before it.
+    pub false_alarms: Vec<String>,
+}
+
+impl DiveFaultRow {
+    /// Whether it was named within three views after the oracle; `None` where the views do not tell it.
+    #[must_use]
+    pub fn is_in_time(&self) -> Option<bool> {
+        let oracle = self.oracle_views?;
+        Some(self.named_views.is_some_and(|named| named <= oracle + IN_TIME))
+    }
+}
+
+/// What a run is followed with.
+struct Followed<'a> {
+    fault: &'a DiveFault,
+    follower: Follower,
+    stream: ViewStream,
+    oracle: Option<Oracle>,
+    explanations: Vec<Vec<Fault>>,
+    n_views: usize,
+    oracle_views: Option<usize>,
+    told: Vec<Told>,
+    false_alarms: Vec<String>,
+}
+
+/// Follows the recording of a dive on which `fault` happened.
+#[must_use]
+pub fn dive_fault_study(recording: &Recording, robot: &Robot, fault: &DiveFault) -> DiveFaultRow {
+    let mut followed = Followed::new(robot, fault);
+    for (log_time, message) in &recording.messages {
+        followed.push(*log_time, message);
+    }
+    let last = followed.follower.finish();
+    followed.hear(last);
+    followed.row()
+}
+
+impl<'a> Followed<'a> {
+    fn new(robot: &Robot, fault: &'a DiveFault) -> Self {
+        let follower = Follower::new(robot.clone(), OnlineSettings::default());
+        let stream = ViewStream::new(robot.clone());
+        Self {
+            fault,
+            follower,
+            stream,
+            oracle: None,
+            explanations: Vec::new(),
+            n_views: 0,
+            oracle_views: None,
+            told: Vec::new(),
+            false_alarms: Vec::new(),
+        }
+    }
+
+    fn push(&mut self, log_time: Stamp, message: &Message) {
+        for view in self.stream.push(log_time, message) {
+            self.see(&view);
+        }
+        match (message, &mut self.oracle) {
+            (Message::Temperature(sample), Some(oracle)) if sample.thermometer == Thermometer::Oil => {
+                oracle.hear_temperature(sample.stamp, sample.temperature_c);
+            }
+            (Message::Survey(_), None) if self.follower.estimator().n_views() == 0 => {
+                // The follower takes the recorded survey; so does this.
+                self.follower.push(log_time, message);
+                self.stream = ViewStream::new(self.follower.estimator().robot().clone());
+                return;
+            }
+            (Message::Mark(Mark { kind: MarkKind::Failed(FailedJoint { joint, .. }), end, .. }), _) => {
+                self.tell(Fault::Failed(*joint), *end, format!("joint {joint} was given up"));
+            }
+            _ => {}
+        }
+        let events = self.follower.push(log_time, message);
+        self.hear(events);
+    }
+
+    /// A view: the oracle is first, so that it begins with what was believed before.
+    fn see(&mut self, view: &View) {
+        let robot = self.follower.estimator().robot();
+        let is_blind = view.tags.iter().all(|seen| !robot.tags[seen.tag_idx].is_known());
+        if view.end.since_s(SIMULATION_EPOCH) < self.fault.at_s || is_blind {
+            return;
+        }
+        if self.oracle.is_none() {
+            self.explanations = explanations(robot, self.fault);
+            self.oracle = self.follower.estimator().oracle(&self.explanations);
+        }
+        let Some(oracle) = &mut self.oracle else { return };
+        self.n_views += 1;
+        if self.oracle_views.is_some_and(|sure| self.n_views > sure + ORACLE_GOES_ON) {
+            return;
+        }
+        oracle.add_view(view);
+        if self.oracle_views.is_none() && oracle.gains().first().is_some_and(|gain| gain.chi2 > TOLD_CHI2) {
+            self.oracle_views = Some(self.n_views);
+        }
+    }
+
+    fn hear(&mut self, events: Vec<OnlineEvent>) {
+        for event in events {
+            let line = event.to_line();
+            let robot = self.follower.estimator().robot();
+            if let Some(fault) = fault_of(robot, &event) {
+                self.tell(fault, Stamp { nanos: event.decided_nanos }, line);
+            }
+        }
+    }
+
+    fn tell(&mut self, fault: Fault, at: Stamp, line: String) {
+        if at.since_s(SIMULATION_EPOCH) < self.fault.at_s {
+            self.false_alarms.push(line);
+            return;
+        }
+        let gains = self.oracle.as_ref().map(Oracle::gains).unwrap_or_default();
+        let place = self.explanations.iter().position(|of| of[..] == [fault]);
+        self.told.push(Told {
+            fault,
+            at,
+            n_views: self.n_views,
+            line,
+            nats: place.and_then(|place| gains.get(place)).map(|gain| gain.nats),
+            nats_of_truth: gains.first().map_or(f64::NAN, |gain| gain.nats),
+        });
+    }
+
+    fn row(self) -> DiveFaultRow {
+        let is_alike = |told: &Told| told.nats.is_some_and(|nats| nats > told.nats_of_truth - ALIKE_NATS);
+        let is_right = |told: &&Told| self.fault.is(told.fault);
+        let named = self.told.iter().find(|told| self.fault.is(told.fault) || is_alike(told));
+        // After a fault was named wrongly, more is to be expected: the first one counts.
+        let others = || self.told.iter().filter(|told| !is_right(told));
+        let lines = |of: Vec<&Told>| of.into_iter().map(|told| told.line.clone()).collect();
+        DiveFaultRow {
+            fault: self.fault.clone(),
+            oracle_views: self.oracle_views,
+            named_views: named.map(|told| told.n_views),
+            wrong: lines(others().filter(|told| !is_alike(told)).collect()),
+            alike: lines(others().filter(|told| is_alike(told)).collect()),
+            false_alarms: self.false_alarms,
+        }
+    }
+}
+
+/// What happened first, then all single faults.
+fn explanations(robot: &Robot, fault: &DiveFault) -> Vec<Vec<Fault>> {
+    let joints = (0..robot.n_joints()).flat_map(|j| [Fault::Slip(j), Fault::Scale(j), Fault::Failed(j)]);
+    let tags = (0..robot.tags.len()).map(Fault::Tag);
+    let others = joints.chain(tags).chain([Fault::Mount, Fault::Base]).map(|fault| vec![fault]);
+    std::iter::once(fault.explanation()).chain(others).collect()
+}
+
+fn fault_of(robot: &Robot, event: &OnlineEvent) -> Option<Fault> {
+    let name = &event.finding.name;
+    let joint = || robot.sensors.iter().position(|sensor| sensor.joint == *name);
+    let tag = || robot.tags.iter().position(|tag| tag.id.to_string() == *name);
+    match event.finding.kind {
+        FindingKind::SensorSlip => joint().map(Fault::Slip),
+        FindingKind::SensorScale | FindingKind::SensorReversed => joint().map(Fault::Scale),
+        FindingKind::SensorFailed => joint().map(Fault::Failed),
+        FindingKind::TagMoved => tag().map(Fault::Tag),
+        FindingKind::CameraMount => Some(Fault::Mount),
+        FindingKind::Base => Some(Fault::Base),
+        _ => None,
+    }
+}
+
+/// By kind, one line each, and what was named wrongly.
+#[must_use]
+pub fn dive_faults_table(rows: &[DiveFaultRow]) -> String {
+    let mut text = String::from(
+        "| fault | runs | the views tell it | named within three views after the oracle | later | not named | wrong \
+         beside or before it | false alarms |\n|---|--:|--:|--:|--:|--:|--:|--:|\n",
+    );
+    for kind in DiveFaultKind::ALL.map(Some).into_iter().chain([None]) {
+        let of: Vec<&DiveFaultRow> = rows.iter().filter(|row| kind.is_none_or(|kind| row.fault.kind == kind)).collect();
+        if of.is_empty() {
+            continue;
+        }
+        let count = |is: &dyn Fn(&DiveFaultRow) -> bool| of.iter().filter(|row| is(row)).count();
+        let in_time = count(&|row| row.is_in_time() == Some(true));
+        let late = count(&|row| row.is_in_time() == Some(false) && row.named_views.is_some());
+        let never = count(&|row| row.oracle_views.is_some() && row.named_views.is_none());
+        let _ = writeln!(
+            text,
+            "| {} | {} | {} | {in_time} | {late} | {never} | {} | {} |",
+            kind.map_or("all", DiveFaultKind::name),
+            of.len(),
+            count(&|row| row.oracle_views.is_some()),
+            count(&|row| !row.wrong.is_empty()),
+            count(&|row| !row.false_alarms.is_empty()),
+        );
+    }
+    text
+}
+
+/// One row a run.
+#[must_use]
+pub fn dive_faults_csv(rows: &[DiveFaultRow]) -> String {
+    let quoted = |lines: &[String]| format!("\"{}\"", lines.join("; ").replace('"', "'"));
+    let number = |n: Option<usize>| n.map(|n| n.to_string()).unwrap_or_default();
+    let mut text = "fault,seed,at_s,size,setting,oracle_views,named_views,wrong,alike,false_alarms\n".to_owned();
+    for row in rows {
+        let DiveFault { kind, seed, at_s, size, setting, .. } = &row.fault;
+        let _ = writeln!(
+            text,
+            "{},{seed},{at_s},{},{},{},{},{},{},{}",
+            kind.name(),
+            size.map(|size| size.to_string()).unwrap_or_default(),
+            quoted(std::slice::from_ref(setting)),
+            number(row.oracle_views),
+            number(row.named_views),
+            quoted(&row.wrong),
+            quoted(&row.alike),
+            quoted(&row.false_alarms),
+        );
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The same seed draws the same fault; each names what it happens to, and the oracle is told the same.
+    #[test]
+    fn faults_are_drawn_with_what_explains_them() {
+        let folder = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("robots/titan4");
+        let robot = armcal_core::robot::load(&folder).expect("the robot reads");
+        for kind in DiveFaultKind::ALL {
+            for seed in 0..20 {
+                let fault = drawn_dive_fault(kind, seed, &robot);
+                assert_eq!(fault, drawn_dive_fault(kind, seed, &robot));
+                assert!((BETWEEN_S[0]..=BETWEEN_S[1]).contains(&fault.at_s), "{fault:?}");
+                let about = fault.explanation();
+                assert!(!about.is_empty() && about.iter().all(|one| fault.is(*one)), "{fault:?}");
+                assert!(!fault.is(Fault::Base) && !fault.is(Fault::Drift), "{fault:?}");
+                let joint = &robot.sensors[fault.joint].joint;
+                let names = |text: &str| fault.setting.contains(text);
+                match kind {
+                    DiveFaultKind::Tag | DiveFaultKind::Boom | DiveFaultKind::Camera => assert!(!names("joint")),
+                    _ => assert!(names(joint), "{fault:?}"),
+                }
+                fault.tags.iter().for_each(|tag| assert!(names(&format!("id={}", robot.tags[*tag].id))));
+            }
+        }
+    }
+}
