@@ -84,6 +84,23 @@ fn the_tool_stays_known_through_an_hour_of_a_dive() {
     assert!((0.5..8.0).contains(&mean), "{mean}");
 }
 
+/// A sensor that slips on the way is named within three views after an oracle could tell it, and nothing else is.
+#[test]
+fn a_slip_on_a_dive_is_named_as_soon_as_views_tell_it() {
+    let folder = temp();
+    let mut study = program();
+    study.args(["study", "dive-faults", "--seeds", "2", "--only", "slipped", "--routine"]);
+    let said = answer(study.arg(root("routines/short-dive.toml")).arg("--out").arg(folder.path()));
+    said.expect("the study", 0, &["| sensor slipped | 2 | 2 | 2 | 0 | 0 | 0 | 0 |", "written"]);
+    let rows = fs::read_to_string(folder.path().join("rows.csv")).expect("written");
+    for row in rows.lines().skip(1) {
+        let [_, _, views, ..] = row.split('"').collect::<Vec<_>>()[..] else { panic!("{row}") };
+        let [oracle, named] = views.trim_matches(',').split(',').collect::<Vec<_>>()[..] else { panic!("{row}") };
+        let [oracle, named] = [oracle, named].map(|n| n.parse::<usize>().expect("a number"));
+        assert!(named <= oracle + 3, "{row}");
+    }
+}
+
 /// A sensor that is declared dead says nothing of the arm between views: not good enough, whatever the views say.
 #[test]
 fn with_a_dead_sensor_the_arm_is_not_good_enough() {
