@@ -57,7 +57,7 @@ enum Study {
     Worlds(WorldsArgs),
     /// Run a dive for several seeds, follow each recording online, and compare the belief with the truth at each task
     Dive(DiveArgs),
-    /// Run a dive with each kind of fault at an unknown time, and compare when it is named with what an oracle could tell
+    /// Run dives with each kind of fault, and compare when it is named with when an oracle could tell it
     DiveFaults(DiveFaultsArgs),
 }
 

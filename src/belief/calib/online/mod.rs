@@ -3,7 +3,8 @@
 //! `view_stream` makes views of messages. `estimator` holds a `member` for each lag of the sensors' temperature; each
 //! starts from the first views by `bundle` and carries its belief on: `filter` is state and information,
 //! `process_noise` how fast sensors change. `diagnosis` races `hypothesis` against hypothesis where a view does not
-//! fit; `event` tells what happened. `follower` is all of it, `belief_log` what it said over time; `oracle` is what a study compares it with.
+//! fit; `event` tells what happened. `follower` is all of it, `belief_log` what it said over time; `oracle` is what a
+//! study compares it with.
 
 mod belief_log;
 mod diagnosis;

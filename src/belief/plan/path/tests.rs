@@ -268,8 +268,8 @@ fn a_blocked_way_says_what_blocks_it_and_how_far_it_is_free() {
     }
 }
 
-/// Where some arm just keeps the margin no edge is proven to keep it, in whichever direction: a search says so, and half
-/// the margin lets the arm leave.
+/// Where some arm just keeps the margin no edge is proven to keep it, in whichever direction: a search says so, and
+/// half the margin lets the arm leave.
 #[test]
 fn a_start_at_the_verge_of_its_margin_cannot_be_left() {
     let site = site("tight-basket");
