@@ -25,9 +25,10 @@ const MAX_BRANCHES: usize = 6;
 /// Views this close to each other are looked at together, s, and how many of them.
 const RECENT_S: f64 = 60.0;
 const MAX_RECENT: usize = 6;
-/// Views after which the best explanation is taken where it is clear that something happened, and in any case; and
-/// those that one needs.
+/// Views after which the best explanation is taken where it is clear that something happened, where it may have been
+/// drift, and in any case; and those that one needs.
 const MAX_VIEWS_TO_NAME: usize = 2;
+const MAX_VIEWS_OF_DRIFT: usize = 3;
 const MAX_VIEWS: usize = 5;
 const CONFIRMED_BY: usize = 2;
 /// The same for another scale: its two numbers explain any two views.
@@ -204,11 +205,15 @@ impl Race {
         let Some(best) = self.best().filter(|best| self.is_confirmed(best.fault)) else {
             return self.n_later >= MAX_VIEWS;
         };
-        let may_name = best.tells() && self.n_later >= MAX_VIEWS_TO_NAME;
+        let may_name = |other: &Branch| match other.fault {
+            None => false,
+            Some(Fault::Drift) => best.tells() && self.n_later >= MAX_VIEWS_OF_DRIFT,
+            Some(_) => best.tells() && self.n_later >= MAX_VIEWS_TO_NAME,
+        };
         let is_behind = |other: &Branch| {
             let is_of_sensor = best.fault.zip(other.fault).is_some_and(|(one, other)| one.is_of_same_sensor(other));
             let lead = if is_of_sensor { LEAD_OF_SENSOR_NATS } else { LEAD_NATS };
-            best.nats - other.nats > lead || (may_name && other.tells())
+            best.nats - other.nats > lead || may_name(other)
         };
         self.n_later >= MAX_VIEWS || self.others().all(is_behind)
     }
