@@ -34,6 +34,7 @@ mod stdout;
 mod study;
 #[cfg(feature = "sim")]
 mod study_dive;
+#[cfg(feature = "sim")]
 mod study_dive_faults;
 #[cfg(feature = "sim")]
 mod study_falsified;

@@ -7,7 +7,7 @@ use anyhow::{Context, Result};
 use clap::Args;
 use rayon::prelude::*;
 
-use crate::cli::exit::Exit;
+use crate::cli::exit::{Exit, UsageError};
 use crate::cli::stdout::say;
 use crate::cli::study_dive::run_dive;
 use crate::output;
@@ -46,8 +46,14 @@ pub(super) fn dive_faults(args: &DiveFaultsArgs) -> Result<Exit> {
     output::make_folder(&args.out)?;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(args.threads.unwrap_or(0).into()).build()?;
     let seeds = args.first_seed..args.first_seed.saturating_add(args.seeds);
-    let kinds = DiveFaultKind::ALL.into_iter().filter(|kind| kind.name().contains(&args.only));
-    let all: Vec<(DiveFaultKind, u64)> = kinds.flat_map(|kind| seeds.clone().map(move |seed| (kind, seed))).collect();
+    let kinds: Vec<DiveFaultKind> =
+        DiveFaultKind::ALL.into_iter().filter(|kind| kind.name().contains(&args.only)).collect();
+    if kinds.is_empty() {
+        let names = DiveFaultKind::ALL.map(DiveFaultKind::name).join(", ");
+        return Err(UsageError(format!("--only {}: no kind has this in its name; there are {names}", args.only)).into());
+    }
+    let all: Vec<(DiveFaultKind, u64)> =
+        kinds.into_iter().flat_map(|kind| seeds.clone().map(move |seed| (kind, seed))).collect();
     let rows: Result<Vec<DiveFaultRow>> =
         pool.install(|| all.par_iter().map(|(kind, seed)| one(args, *kind, *seed)).collect());
     let rows = rows?;
@@ -70,8 +76,10 @@ fn one(args: &DiveFaultsArgs, kind: DiveFaultKind, seed: u64) -> Result<DiveFaul
     if !run.join("truth.mcap").exists() {
         // The arm works by the belief that is looked at.
         let works = routine.steps.iter().position(|step| matches!(step, Step::Work(_)));
-        let belief = works.map(|at| format!("step.{at}.belief=\"online\""));
-        let settings: Vec<String> = belief.into_iter().chain([format!("world.fault={}", fault.setting)]).collect();
+        let Some(works) = works else {
+            return Err(UsageError(format!("{}: it has no step `work`", args.routine.display())).into());
+        };
+        let settings = [format!("step.{works}.belief=\"online\""), format!("world.fault={}", fault.setting)];
         run_dive(&args.routine, seed, &settings, &run)?;
     }
     Ok(dive_fault_study(&read_recording(run.join("run.mcap"))?, &robot, &fault))

@@ -9,7 +9,6 @@ use rand::{Rng, RngExt};
 
 use armcal_belief::calib::online::{Fault, Follower, OnlineEvent, OnlineSettings, Oracle, ViewStream};
 use armcal_belief::calib::{FindingKind, View};
-
 use armcal_core::log::Recording;
 use armcal_core::robot::{FailedJoint, Robot};
 use armcal_core::stats::stream_rng;
@@ -178,7 +177,6 @@ impl DiveFault {
 #[derive(Clone, Debug, PartialEq)]
 struct Told {
     fault: Fault,
-    at: Stamp,
     n_views: usize,
     line: String,
     nats: Option<f64>,
@@ -268,7 +266,9 @@ impl<'a> Followed<'a> {
                 return;
             }
             (Message::Mark(Mark { kind: MarkKind::Failed(FailedJoint { joint, .. }), end, .. }), _) => {
-                self.tell(Fault::Failed(*joint), *end, format!("joint {joint} was given up"));
+                let name = &self.follower.estimator().robot().sensors[*joint].joint;
+                let line = format!("{name} was given up");
+                self.tell(Fault::Failed(*joint), *end, line);
             }
             _ => {}
         }
@@ -317,7 +317,6 @@ impl<'a> Followed<'a> {
         let place = self.explanations.iter().position(|of| of[..] == [fault]);
         self.told.push(Told {
             fault,
-            at,
             n_views: self.n_views,
             line,
             nats: place.and_then(|place| gains.get(place)).map(|gain| gain.nats),
@@ -329,7 +328,6 @@ impl<'a> Followed<'a> {
         let is_alike = |told: &Told| told.nats.is_some_and(|nats| nats > told.nats_of_truth - ALIKE_NATS);
         let is_right = |told: &&Told| self.fault.is(told.fault);
         let named = self.told.iter().find(|told| self.fault.is(told.fault) || is_alike(told));
-        // After a fault was named wrongly, more is to be expected: the first one counts.
         let others = || self.told.iter().filter(|told| !is_right(told));
         let lines = |of: Vec<&Told>| of.into_iter().map(|told| told.line.clone()).collect();
         DiveFaultRow {
@@ -370,8 +368,8 @@ fn fault_of(robot: &Robot, event: &OnlineEvent) -> Option<Fault> {
 #[must_use]
 pub fn dive_faults_table(rows: &[DiveFaultRow]) -> String {
     let mut text = String::from(
-        "| fault | runs | the views tell it | named within three views after the oracle | later | not named | wrong \
-         beside or before it | false alarms |\n|---|--:|--:|--:|--:|--:|--:|--:|\n",
+        "| fault | runs | views tell it | named in time | late | not named | wrong names | false alarms |\n\
+         |---|--:|--:|--:|--:|--:|--:|--:|\n",
     );
     for kind in DiveFaultKind::ALL.map(Some).into_iter().chain([None]) {
         let of: Vec<&DiveFaultRow> = rows.iter().filter(|row| kind.is_none_or(|kind| row.fault.kind == kind)).collect();
@@ -392,6 +390,9 @@ pub fn dive_faults_table(rows: &[DiveFaultRow]) -> String {
             count(&|row| !row.false_alarms.is_empty()),
         );
     }
+    text += "\nViews tell it: an oracle that knows kind and time is sure by them (five sigma). In time: within three views after \
+             it. Runs with wrong names: something was named that is not what happened, though the views tell them apart; \
+             with false alarms: something before anything happened.\n";
     text
 }
 

@@ -1,5 +1,5 @@
 //! What happened, by the evidence of the views: a view that the belief does not explain starts a race of explanations,
-//! each a belief of its own, until one of them leads or five more views were seen.
+//! each a belief of its own, until one of them leads, or two to five more views were seen.
 
 use crate::calib::online::filter::{Filter, ViewUpdate, WalkScore};
 use crate::calib::online::hypothesis::Fault;

@@ -302,6 +302,7 @@ impl Member {
             lag: self.lag,
             noise: noise.clone(),
             conditions: *conditions,
+            failed: self.failed.clone(),
             nothing: explained(&[]),
             explanations: explanations.iter().map(|faults| explained(faults)).collect(),
         })

@@ -2,6 +2,7 @@
 //! a belief that finds out by itself cannot be faster.
 
 use crate::calib::online::diagnosis::{NOTHING_FITS_NATS, seen_by};
+use crate::calib::online::estimator::of_known_tags;
 use crate::calib::online::filter::Filter;
 use crate::calib::online::hypothesis::Fault;
 use crate::calib::online::lagged_temperature::LaggedTemperature;
@@ -18,6 +19,8 @@ pub struct Oracle {
     pub(crate) lag: LaggedTemperature,
     pub(crate) noise: ProcessNoise,
     pub(crate) conditions: Conditions,
+    /// Joints whose sensor is not looked at.
+    pub(crate) failed: Vec<usize>,
     pub(crate) nothing: Explained,
     pub(crate) explanations: Vec<Explained>,
 }
@@ -73,11 +76,8 @@ impl Oracle {
 
     /// Takes a view in.
     pub fn add_view(&mut self, view: &View) {
-        let mut view = view.clone();
-        view.tags.retain(|seen| self.robot.tags[seen.tag_idx].is_known());
-        if view.tags.is_empty() {
-            return;
-        }
+        let Some(mut view) = of_known_tags(&self.robot, view) else { return };
+        self.failed.iter().for_each(|joint| view.is_free[*joint] = true);
         view.conditions = self.lag.of_sensors(&view.conditions);
         let change = view.conditions.departure_from(&self.conditions);
         self.conditions = view.conditions;

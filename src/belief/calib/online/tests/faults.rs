@@ -7,6 +7,7 @@ use crate::calib::bundle::tests::data::titan;
 use crate::calib::finding::FindingKind;
 use crate::calib::online::estimator::OnlineEstimator;
 use crate::calib::online::event::OnlineEvent;
+use crate::calib::online::hypothesis::Fault;
 use crate::calib::online::settings::OnlineSettings;
 use crate::calib::online::tests::drifting::Dive;
 use armcal_core::robot::{FailedJoint, FailedKind, Robot};
@@ -126,4 +127,28 @@ fn a_failed_sensor_leaves_the_tool_unknown() {
     let (mut online, mut dive) = after_an_hour(&declared, 1, Happens::Dead { joint: 1 });
     assert!(dive.task(&online).predicted_m > 0.1, "declared");
     assert_eq!(online.take_events(), [], "what is known is not told again");
+}
+
+/// An oracle is sure of a slip by the views after it, holds it for likelier than any other slip, and is sure of nothing
+/// where nothing happened.
+#[test]
+fn an_oracle_tells_what_happened_and_when_nothing_did() {
+    let robot = titan();
+    let explanations: Vec<Vec<Fault>> = (0..4).map(|joint| vec![Fault::Slip(joint)]).collect();
+    let mut told = 0;
+    for seed in 0..6 {
+        for slipped in [None, Some(1)] {
+            let (online, mut dive) = after_an_hour(&robot, seed, Happens::Nothing);
+            let mut oracle = online.oracle(&explanations).expect("a belief");
+            dive.befall(|_, at_start| slipped.into_iter().for_each(|joint: usize| at_start[joint] += 0.01));
+            (0..6).for_each(|_| oracle.add_view(&dive.view()));
+            let gains = oracle.gains();
+            let best = (0..4).max_by(|a, b| gains[*a].nats.total_cmp(&gains[*b].nats));
+            match slipped {
+                None => assert!(gains.iter().all(|gain| gain.chi2 < 25.0 && gain.nats < 5.0), "{seed}: {gains:?}"),
+                Some(joint) => told += usize::from(gains[joint].chi2 > 25.0 && best == slipped),
+            }
+        }
+    }
+    assert!(told >= 5, "{told} of 6");
 }
