@@ -78,7 +78,7 @@ impl OnlineEstimator {
 
     /// Takes a view in; whether it told anything. Tags whose place nobody knows are not looked at: a map comes first.
     pub fn add_view(&mut self, view: &View) -> bool {
-        let Some(view) = of_known_tags(&self.robot, view) else { return false };
+        let Some(view) = view.of_known_tags(&self.robot) else { return false };
         let mut has_told = false;
         for member in &mut self.members {
             has_told |= member.add_view(view.clone());
@@ -153,11 +153,4 @@ impl OnlineEstimator {
     pub fn temperature_lag_s(&self) -> f64 {
         self.best().lag_s()
     }
-}
-
-/// A view without the tags whose place nobody knows; `None` where nothing is left of it.
-pub(crate) fn of_known_tags(robot: &Robot, view: &View) -> Option<View> {
-    let mut view = view.clone();
-    view.tags.retain(|seen| robot.tags[seen.tag_idx].is_known());
-    (!view.tags.is_empty() || view.gripper_tag.is_some()).then_some(view)
 }

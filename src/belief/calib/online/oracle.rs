@@ -2,7 +2,6 @@
 //! a belief that finds out by itself cannot be faster.
 
 use crate::calib::online::diagnosis::{NOTHING_FITS_NATS, seen_by};
-use crate::calib::online::estimator::of_known_tags;
 use crate::calib::online::filter::Filter;
 use crate::calib::online::hypothesis::Fault;
 use crate::calib::online::lagged_temperature::LaggedTemperature;
@@ -76,7 +75,7 @@ impl Oracle {
 
     /// Takes a view in.
     pub fn add_view(&mut self, view: &View) {
-        let Some(mut view) = of_known_tags(&self.robot, view) else { return };
+        let Some(mut view) = view.of_known_tags(&self.robot) else { return };
         self.failed.iter().for_each(|joint| view.is_free[*joint] = true);
         view.conditions = self.lag.of_sensors(&view.conditions);
         let change = view.conditions.departure_from(&self.conditions);

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Isometry3, Vector3};
 
+use armcal_core::robot::Robot;
 use armcal_core::sensor::Conditions;
 use armcal_core::streams::{JointAngles, MAX_JOINTS, ReachTask, RejectReason};
 use armcal_core::time::Stamp;
@@ -34,6 +35,14 @@ pub struct View {
 }
 
 impl View {
+    /// The view without the tags whose place nobody knows; `None` where nothing is left of it.
+    #[must_use]
+    pub(crate) fn of_known_tags(&self, robot: &Robot) -> Option<Self> {
+        let mut view = self.clone();
+        view.tags.retain(|seen| robot.tags[seen.tag_idx].is_known());
+        (!view.tags.is_empty() || view.gripper_tag.is_some()).then_some(view)
+    }
+
     /// One reading of an arm at rest under unknown conditions, no tags yet.
     #[must_use]
     pub fn of_reading(pose_idx: u32, end: Stamp, travel_rad: JointAngles) -> Self {
