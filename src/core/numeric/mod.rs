@@ -1,9 +1,12 @@
-//! Numerical methods: nonlinear least squares and robust losses.
+//! Numerical methods: nonlinear least squares, robust losses, factors of matrices.
 //!
-//! `levenberg_marquardt` solves all least-squares fits; `loss` has the robust loss functions (Huber, Cauchy).
+//! `levenberg_marquardt` solves all least-squares fits; `loss` has the robust loss functions (Huber, Cauchy);
+//! `cholesky` factors matrices of a hundred columns by blocks.
 
+mod cholesky;
 mod levenberg_marquardt;
 mod loss;
 
+pub use cholesky::cholesky;
 pub use levenberg_marquardt::{Damping, LeastSquares, Outcome, Proposal, Report, Stop, StopRule, minimize};
 pub use loss::Loss;

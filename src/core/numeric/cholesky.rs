@@ -1,0 +1,89 @@
+//! Cholesky factors of dense matrices of a hundred columns or so, by blocks: most of the work is products of matrices,
+//! which are several times as fast as products of vectors (Golub and Van Loan, Matrix Computations, 4.2.9).
+
+use nalgebra::{Cholesky, DMatrix, Dyn};
+
+/// Columns of a block.
+const BLOCK: usize = 32;
+
+/// Factor of a symmetric matrix, of which the lower triangle is read; `None` where it is not positive definite.
+#[must_use]
+pub fn cholesky(mut matrix: DMatrix<f64>) -> Option<Cholesky<f64, Dyn>> {
+    assert!(matrix.is_square(), "a Cholesky factor is of a square matrix");
+    let n = matrix.nrows();
+    for first in (0..n).step_by(BLOCK) {
+        let end = (first + BLOCK).min(n);
+        for column in first..end {
+            factor_column(&mut matrix, first, column)?;
+        }
+        let (left, mut right) = matrix.columns_range_pair_mut(first..end, end..n);
+        let below = left.rows_range(end..n);
+        let across = below.transpose();
+        for start in (end..n).step_by(BLOCK) {
+            let width = BLOCK.min(n - start);
+            let mut block = right.view_mut((start, start - end), (n - start, width));
+            block.gemm(-1.0, &below.rows_range(start - end..), &across.columns(start - end, width), 1.0);
+        }
+    }
+    Some(Cholesky::pack_dirty(matrix))
+}
+
+/// Finishes `column`, from which those before `first` were subtracted already.
+fn factor_column(matrix: &mut DMatrix<f64>, first: usize, column: usize) -> Option<()> {
+    let n = matrix.nrows();
+    for before in first..column {
+        let factor = matrix[(column, before)];
+        let (done, mut own) = matrix.columns_range_pair_mut(before, column);
+        own.rows_range_mut(column..n).axpy(-factor, &done.rows_range(column..n), 1.0);
+    }
+    let pivot = matrix[(column, column)];
+    // Not a number is no pivot.
+    if !(pivot > 0.0 && pivot.is_finite()) {
+        return None;
+    }
+    let root = pivot.sqrt();
+    let mut own = matrix.view_mut((column, column), (n - column, 1));
+    own /= root;
+    Some(())
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    use super::*;
+
+    fn random(n: usize, seed: u64) -> DMatrix<f64> {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut unit = || f64::from(rng.next_u32()) / f64::from(u32::MAX) - 0.5;
+        DMatrix::from_fn(n, n, |_, _| unit())
+    }
+
+    #[test]
+    fn the_factor_times_its_transpose_is_the_matrix() {
+        for (seed, n) in [1, 2, 31, 32, 33, 64, 115, 200].into_iter().enumerate() {
+            let square = random(n, seed as u64);
+            let matrix = &square * square.transpose() + DMatrix::identity(n, n);
+            let mut lower = matrix.clone();
+            // The upper triangle is not read.
+            lower.fill_upper_triangle(f64::NAN, 1);
+            let factor = cholesky(lower).expect("positive definite").l();
+            let off = (&factor * factor.transpose() - &matrix).amax();
+            assert!(off < 1e-12 * matrix.amax() * n as f64, "{n}: {off}");
+        }
+    }
+
+    #[test]
+    fn what_is_not_positive_definite_has_none() {
+        for at in [0, 20, 40, 69] {
+            let square = random(70, 3);
+            let mut matrix = &square * square.transpose() + DMatrix::identity(70, 70);
+            matrix[(at, at)] = -1.0;
+            assert!(cholesky(matrix.clone()).is_none(), "{at}");
+            matrix[(at, at)] = f64::NAN;
+            assert!(cholesky(matrix).is_none(), "{at}");
+        }
+        assert!(cholesky(DMatrix::zeros(0, 0)).is_some());
+    }
+}
