@@ -64,6 +64,8 @@ pub(crate) struct NormalEquations {
     pub chi2: Vec<f64>,
     /// The same of each corner, used or not.
     pub corner_chi2: Vec<[f64; 4]>,
+    /// Where a prior of all columns is turned; empty until then.
+    pub(crate) room: DMatrix<f64>,
     /// Of the group at hand; kept, so that the loop does not allocate.
     infos: Vec<PoseInformation>,
     /// As many, where the lens has columns.
@@ -82,6 +84,7 @@ impl NormalEquations {
             by_tag: vec![(Matrix6::zeros(), None); problem.observations.len()],
             chi2: vec![0.0; problem.observations.len()],
             corner_chi2: vec![[0.0; 4]; problem.observations.len()],
+            room: DMatrix::zeros(0, 0),
             infos: Vec::new(),
             lens_infos: Vec::new(),
         }

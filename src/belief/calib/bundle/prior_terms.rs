@@ -1,26 +1,28 @@
 //! What is known before: the priors' part of the normal equations.
 
-use nalgebra::{DVector, Isometry3, Matrix6, Vector6};
+use nalgebra::{DVector, Dyn, Isometry3, Matrix6, OMatrix, U6, Vector6};
 
 use crate::calib::bundle::linearize::NormalEquations;
 use crate::calib::bundle::observation_term::right_jacobian_inverse;
-use crate::calib::bundle::problem::{BundleProblem, State};
+use crate::calib::bundle::problem::{BundleProblem, Layout, Prior, State};
+use armcal_core::optics::CameraModel;
 use armcal_core::spatial::log;
 
 impl NormalEquations {
     pub(crate) fn add_priors(&mut self, problem: &BundleProblem<'_>, state: &State) {
         let (layout, prior) = (&problem.layout, &problem.prior);
         let n = prior.joint_info.nrows();
-        let off = off_by(problem, state, n);
+        let off = off_by(layout, &prior.means(), state, n);
+        if n == layout.n {
+            self.add_full_prior(problem, &off);
+            return;
+        }
         let pull = &prior.joint_info * &off;
         self.cost += off.dot(&pull);
         let mut block = self.matrix.view_mut((0, 0), (n, n));
         block += &prior.joint_info;
         let mut right = self.right.rows_mut(0, n);
         right -= pull;
-        if n == layout.n {
-            return;
-        }
         if let Some(at) = layout.mount.filter(|_| n == layout.n_joint()) {
             self.add_pose_prior(at, &prior.mount, &state.mount, &prior.mount_std);
         }
@@ -40,6 +42,39 @@ impl NormalEquations {
                 self.add_number_prior(at + k, value - mean, prior.lens_std[k]);
             }
         }
+    }
+
+    /// Of all columns, `off` from their means: with `d` how far a pose is off, a small motion of the pose changes it by
+    /// the inverse of the right Jacobian at `d`. Taken as one it would let what is well known leak into what is not.
+    fn add_full_prior(&mut self, problem: &BundleProblem<'_>, off: &DVector<f64>) {
+        let (layout, info) = (&problem.layout, &problem.prior.joint_info);
+        let mut pull = info * off;
+        self.cost += off.dot(&pull);
+        if layout.poses().all(|at| off.fixed_rows::<6>(at).iter().all(|value| *value == 0.0)) {
+            self.matrix += info;
+            self.right -= pull;
+            return;
+        }
+        if self.room.shape() == info.shape() {
+            self.room.copy_from(info);
+        } else {
+            self.room.clone_from(info);
+        }
+        for at in layout.poses() {
+            let d: Vector6<f64> = off.fixed_rows::<6>(at).into_owned();
+            if d == Vector6::zeros() {
+                continue;
+            }
+            let jacobian = right_jacobian_inverse(&d);
+            let columns: OMatrix<f64, Dyn, U6> = self.room.fixed_columns::<6>(at) * jacobian;
+            self.room.fixed_columns_mut::<6>(at).copy_from(&columns);
+            let rows: OMatrix<f64, U6, Dyn> = jacobian.tr_mul(&self.room.fixed_rows::<6>(at));
+            self.room.fixed_rows_mut::<6>(at).copy_from(&rows);
+            let pulled = jacobian.tr_mul(&pull.fixed_rows::<6>(at));
+            pull.fixed_rows_mut::<6>(at).copy_from(&pulled);
+        }
+        self.matrix += &self.room;
+        self.right -= pull;
     }
 
     fn add_number_prior(&mut self, at: usize, off: f64, std: f64) {
@@ -62,12 +97,35 @@ impl NormalEquations {
     }
 }
 
-/// How far the first `n` columns are from the means of a prior that has a full matrix. Deviations are small: their
+/// Where all columns have their means.
+pub(crate) struct Means<'a> {
+    joint: &'a DVector<f64>,
+    mount: &'a Isometry3<f64>,
+    time_s: f64,
+    lens: &'a CameraModel,
+    tags: &'a [Isometry3<f64>],
+    gripper_tag: &'a Isometry3<f64>,
+}
+
+impl Prior {
+    pub(crate) fn means(&self) -> Means<'_> {
+        let Self { joint_mean: joint, mount, time_s, lens, tags, gripper_tag, .. } = self;
+        Means { joint, mount, time_s: *time_s, lens, tags, gripper_tag }
+    }
+}
+
+impl State {
+    pub(crate) fn means(&self) -> Means<'_> {
+        let Self { joint, mount, time_s, lens, tags, gripper_tag, .. } = self;
+        Means { joint, mount, time_s: *time_s, lens, tags, gripper_tag }
+    }
+}
+
+/// How far the first `n` columns of `state` are from `means`. Where `n` is not all, deviations are small, and their
 /// derivative by a pose's column is taken as one.
-pub(crate) fn off_by(problem: &BundleProblem<'_>, state: &State, n: usize) -> DVector<f64> {
-    let (layout, prior) = (&problem.layout, &problem.prior);
+pub(crate) fn off_by(layout: &Layout, means: &Means<'_>, state: &State, n: usize) -> DVector<f64> {
     let n_joint = layout.n_joint();
-    let mut off = (&state.joint - &prior.joint_mean).resize_vertically(n, 0.0);
+    let mut off = (&state.joint - means.joint).resize_vertically(n, 0.0);
     let mut set = |at: Option<usize>, mean: &Isometry3<f64>, pose: &Isometry3<f64>| {
         if let Some(at) = at.filter(|at| *at < n) {
             off.fixed_rows_mut::<6>(at).copy_from(&log(&mean.inv_mul(pose)));
@@ -76,16 +134,16 @@ pub(crate) fn off_by(problem: &BundleProblem<'_>, state: &State, n: usize) -> DV
     if n == n_joint {
         return off;
     }
-    set(layout.mount, &prior.mount, &state.mount);
+    set(layout.mount, means.mount, &state.mount);
     for (tag, column) in layout.tags.iter().enumerate() {
-        set(*column, &prior.tags[tag], &state.tags[tag]);
+        set(*column, &means.tags[tag], &state.tags[tag]);
     }
-    set(layout.gripper_tag, &prior.gripper_tag, &state.gripper_tag);
+    set(layout.gripper_tag, means.gripper_tag, &state.gripper_tag);
     if let Some(at) = layout.time.filter(|at| *at < n) {
-        off[at] = state.time_s - prior.time_s;
+        off[at] = state.time_s - means.time_s;
     }
     if let Some(at) = layout.lens.filter(|at| *at < n) {
-        for (k, (value, mean)) in state.lens.intrinsics().iter().zip(prior.lens.intrinsics()).enumerate() {
+        for (k, (value, mean)) in state.lens.intrinsics().iter().zip(means.lens.intrinsics()).enumerate() {
             off[at + k] = value - mean;
         }
     }

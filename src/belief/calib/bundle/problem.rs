@@ -204,6 +204,11 @@ impl Layout {
         self.tags.iter().flatten().chain(&self.gripper_tag).copied().min().unwrap_or(self.n)
     }
 
+    /// First column of each pose: mount, tags, the gripper's tag.
+    pub(crate) fn poses(&self) -> impl Iterator<Item = usize> + '_ {
+        self.mount.iter().chain(self.tags.iter().flatten()).chain(&self.gripper_tag).copied()
+    }
+
     /// The same with eight columns of the lens before the tags.
     pub(crate) fn with_lens(&self) -> Self {
         let moved = |at: &Option<usize>| at.map(|at| at + 8);

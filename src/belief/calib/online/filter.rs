@@ -5,7 +5,7 @@
 //! information. Between views what drifts is widened, `(W^-1 + Q)^-1` by the matrix inversion lemma. Time and memory of
 //! a view do not depend on how many came before.
 
-use nalgebra::{Cholesky, DMatrix, Dyn, Isometry3};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Isometry3};
 
 use crate::calib::bundle::estimate::Estimate;
 use crate::calib::bundle::input::{BundleInput, HyperparameterMode};
@@ -20,7 +20,7 @@ use crate::calib::online::view_stream::is_moving;
 use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
 use crate::calib::views::view::View;
 use armcal_core::joints::MAX_JOINTS;
-use armcal_core::numeric::Loss;
+use armcal_core::numeric::{Loss, cholesky};
 use armcal_core::robot::Robot;
 
 /// Steps of a view at most; two are the rule.
@@ -128,7 +128,7 @@ impl Filter {
         }
         let mut state = solved.state.clone();
         (state.joint_error, state.camera_error) = (vec![[0.0; MAX_JOINTS]], vec![Isometry3::identity()]);
-        let log_det = log_det(&Cholesky::new(info.clone())?);
+        let log_det = log_det(&cholesky(info.clone())?);
         let (model, scales, guess) = (estimate.model.clone(), problem.scales.clone(), estimate.guess);
         Some(Self { model, scales, guess, layout, state, info, log_det, noise_in_motion: 1.0 })
     }
@@ -185,7 +185,18 @@ impl Filter {
 
     /// Covariance of all columns; `None` only after an overflow.
     pub(crate) fn covariance(&self) -> Option<DMatrix<f64>> {
-        Cholesky::new(self.info.clone()).map(|factor| factor.inverse())
+        cholesky(self.info.clone()).map(|factor| factor.inverse())
+    }
+
+    /// How far its means are from those of `reference`, by column, in sigmas of `reference`; `None` where they do not
+    /// have the same columns.
+    pub(crate) fn sigmas_from(&self, reference: &Self) -> Option<DVector<f64>> {
+        if self.layout.parameters != reference.layout.parameters || self.layout.n != reference.layout.n {
+            return None;
+        }
+        let covariance = reference.covariance()?;
+        let off = off_by(&self.layout, &reference.state.means(), &self.state, self.layout.n);
+        Some(DVector::from_fn(self.layout.n, |k, _| off[k] / covariance[(k, k)].sqrt()))
     }
 
     /// Adds `variance` to each of the columns: what may have changed since the last view.
@@ -292,53 +303,67 @@ fn log_det(factor: &Cholesky<f64, Dyn>) -> f64 {
 
 /// By least squares; robustly first where something does not fit. `None` where nothing of the view is used.
 fn solve_view(problem: &mut BundleProblem<'_>, start: &State) -> Option<SolvedView> {
-    let mut normal = NormalEquations::new(problem);
-    let (mut state, mut factor) = iterate(problem, start, Loss::Square, &mut normal)?;
-    if reject_by(problem, &normal) {
+    let mut solver = ViewSolver::new(problem);
+    let (mut state, mut factor) = solver.iterate(problem, start, Loss::Square)?;
+    if reject_by(problem, &solver.normal) {
         // One wrong observation pulls the others off: what is left out is told by a robust solution.
         problem.observations.iter_mut().for_each(|observation| observation.set_used([true; 4]));
-        (state, _) = iterate(problem, start, Loss::Cauchy { c: CORNER_WIDTH }, &mut normal)?;
-        reject_by(problem, &normal);
-        (state, factor) = iterate(problem, &state, Loss::Square, &mut normal)?;
+        (state, _) = solver.iterate(problem, start, Loss::Cauchy { c: CORNER_WIDTH })?;
+        reject_by(problem, &solver.normal);
+        (state, factor) = solver.iterate(problem, &state, Loss::Square)?;
     }
-    problem.observations.iter().any(|observation| observation.is_used).then_some(SolvedView { state, normal, factor })
+    let is_any_used = problem.observations.iter().any(|observation| observation.is_used);
+    is_any_used.then_some(SolvedView { state, normal: solver.normal, factor })
 }
 
-/// Gauss-Newton from `start`; `normal` and the factor are of the last state that was linearized at.
-fn iterate(
-    problem: &BundleProblem<'_>,
-    start: &State,
-    loss: Loss,
-    normal: &mut NormalEquations,
-) -> Option<(State, Cholesky<f64, Dyn>)> {
-    let mut state = start.clone();
-    normal.update(problem, &state, loss);
-    let mut factor = Cholesky::new(normal.matrix.clone())?;
-    let mut trial = state.clone();
-    for _ in 0..MAX_STEPS {
-        let mut step = normal.right.clone();
-        factor.solve_mut(&mut step);
-        let (gain, cost) = (step.dot(&normal.right) + own_gain(normal), normal.cost);
-        if !(gain.is_finite() && cost.is_finite()) {
-            return None;
-        }
-        let linearized = normal.clone();
-        loop {
-            take_step(problem, &state, &linearized, &step, &mut trial);
-            if gain < LAST_GAIN {
-                return Some((trial, factor));
-            }
-            normal.update(problem, &trial, loss);
-            // Not a number is no gain.
-            if normal.cost <= cost + LAST_GAIN || step.norm() < 1e-12 {
-                break;
-            }
-            step *= SHORTER;
-        }
-        std::mem::swap(&mut state, &mut trial);
-        factor = Cholesky::new(normal.matrix.clone())?;
+/// Gauss-Newton, with the memory of two linearizations.
+struct ViewSolver {
+    /// At the last state that was taken.
+    normal: NormalEquations,
+    trial: NormalEquations,
+}
+
+impl ViewSolver {
+    fn new(problem: &BundleProblem<'_>) -> Self {
+        Self { normal: NormalEquations::new(problem), trial: NormalEquations::new(problem) }
     }
-    Some((state, factor))
+
+    /// From `start`; the factor is of the last state that was linearized at.
+    fn iterate(
+        &mut self,
+        problem: &BundleProblem<'_>,
+        start: &State,
+        loss: Loss,
+    ) -> Option<(State, Cholesky<f64, Dyn>)> {
+        let mut state = start.clone();
+        self.normal.update(problem, &state, loss);
+        let mut factor = cholesky(self.normal.matrix.clone())?;
+        let mut trial = state.clone();
+        for _ in 0..MAX_STEPS {
+            let mut step = self.normal.right.clone();
+            factor.solve_mut(&mut step);
+            let (gain, cost) = (step.dot(&self.normal.right) + own_gain(&self.normal), self.normal.cost);
+            if !(gain.is_finite() && cost.is_finite()) {
+                return None;
+            }
+            loop {
+                take_step(problem, &state, &self.normal, &step, &mut trial);
+                if gain < LAST_GAIN {
+                    return Some((trial, factor));
+                }
+                self.trial.update(problem, &trial, loss);
+                // Not a number is no gain.
+                if self.trial.cost <= cost + LAST_GAIN || step.norm() < 1e-12 {
+                    break;
+                }
+                step *= SHORTER;
+            }
+            std::mem::swap(&mut state, &mut trial);
+            std::mem::swap(&mut self.normal, &mut self.trial);
+            factor = cholesky(self.normal.matrix.clone())?;
+        }
+        Some((state, factor))
+    }
 }
 
 fn view_update(problem: &BundleProblem<'_>, solved: &SolvedView, log_det_before: f64) -> ViewUpdate {
@@ -387,7 +412,7 @@ fn joint_errors(problem: &BundleProblem<'_>, solved: &SolvedView) -> [JointError
 fn walk_scores(problem: &BundleProblem<'_>, state: &State, factor: &Cholesky<f64, Dyn>) -> [WalkScore; MAX_JOINTS] {
     let mut scores = [WalkScore::default(); MAX_JOINTS];
     let info = &problem.prior.joint_info;
-    let pull = info * off_by(problem, state, info.nrows());
+    let pull = info * off_by(&problem.layout, &problem.prior.means(), state, info.nrows());
     for (column, parameter) in problem.layout.parameters.iter().enumerate() {
         if parameter.kind != ParameterKind::Offset {
             continue;
