@@ -44,6 +44,20 @@ fn a_recording_is_followed_and_its_belief_written() {
     assert!(later > median_m(last), "without views the belief gets worse");
 }
 
+/// Where nothing drifts, views one by one come to what the batch of all makes of them.
+#[test]
+fn a_stationary_belief_ends_at_the_batch() {
+    let folder = temp();
+    let mut command = program();
+    command.args(["calibrate", "--online", "--stationary"]).arg(root("recordings/sample/run.mcap"));
+    let said = answer(command.arg("--robot").arg(robot_folder()).arg("--out").arg(folder.path()));
+    said.expect("the sample", 0, &["batch        accepted", "of its sigma in any sensor"]);
+    let line = said.stdout.lines().find(|line| line.starts_with("difference")).expect("a line of the difference");
+    let sigmas: f64 = line.split_whitespace().nth(3).and_then(|word| word.parse().ok()).expect("a number");
+    assert!(sigmas < 0.1, "{line}");
+    assert!(folder.path().join("belief.jsonl").exists());
+}
+
 #[test]
 fn what_cannot_be_followed_is_refused() {
     let folder = temp();

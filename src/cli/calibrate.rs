@@ -6,13 +6,12 @@ use std::time::Instant;
 use anyhow::{Context, Result};
 use clap::Args;
 
-use crate::cli::calibrate_online::calibrate_online;
+use crate::cli::calibrate_online::{calibrate_online, stationary};
 use crate::cli::calibration_inputs::{CalibrationInputs, load_robot};
 use crate::cli::exit::Exit;
 use crate::cli::stdout::say;
 use crate::output;
 use crate::report::{RunSummary, table};
-use armcal_belief::calib::online::DriftModel;
 use armcal_belief::calib::{CompactCalibration, MapResult, Status, covariance_file};
 use armcal_core::routine::Method;
 
@@ -48,7 +47,8 @@ pub(super) struct CalibrateArgs {
     /// Follow the recording view by view, as if the arm were at work, and write the belief over time (belief.jsonl)
     #[arg(long, conflicts_with_all = ["compact", "prior", "method"])]
     online: bool,
-    /// With --online: nothing drifts between views
+    /// With --online: nothing drifts, and model and scales are those of the batch of all views; says how far the last
+    /// belief is from that batch
     #[arg(long, requires = "online")]
     stationary: bool,
     /// Print the calibration as one line below 512 bytes instead of the table
@@ -70,8 +70,7 @@ pub(super) fn calibrate(args: &CalibrateArgs) -> Result<Exit> {
         task: args.task.as_deref(),
     };
     if args.online {
-        let drift = if args.stationary { DriftModel::Stationary } else { DriftModel::Tuned };
-        return calibrate_online(&given, drift, &args.out);
+        return if args.stationary { stationary(&given, &args.out) } else { calibrate_online(&given, &args.out) };
     }
     let started = Instant::now();
     let (calibration, lost) = given.calibrate()?;

@@ -7,15 +7,15 @@ use anyhow::Result;
 use crate::cli::exit::UsageError;
 use crate::cli::losses::{warn_of_external, warn_of_losses};
 use crate::cli::stdout::note;
-use armcal_belief::calib::online::{Follower, OnlineEvent, OnlineSettings};
+use armcal_belief::calib::online::{Batch, Follower, OnlineEvent, OnlineSettings};
 use armcal_belief::calib::{
     Calibration, CalibrationData, CalibrationFileError, ExternalContext, Status, calibrate, calibrate_data,
     calibrate_with_survey, check_joints, prepare_external, prepare_pooled, read_marked,
 };
 use armcal_belief::tagmap::files::{LandmarkFile, NamedSurvey, read_landmarks};
 use armcal_core::input::{ChildFrame, InputMap, TagUse, read_external, read_input_map, read_task};
-use armcal_core::log::{TopicMap, scan_recording};
-use armcal_core::robot::{self, FailedJoint, FileIssue, Robot};
+use armcal_core::log::{Recording, TopicMap, scan_recording};
+use armcal_core::robot::{self, FailedJoint, FileIssue, Robot, TagSurvey};
 use armcal_core::routine::Method;
 use armcal_core::streams::{Message, ReachTask};
 use armcal_core::time::Stamp;
@@ -36,7 +36,7 @@ impl CalibrationInputs<'_> {
     pub fn calibrate(&self) -> Result<(Calibration, bool)> {
         let prior = self.prior.map(|file| read_prior(file, self.robot)).transpose()?;
         let task = self.task()?;
-        let landmarks = self.tag_map.map(|file| Ok::<_, anyhow::Error>((file, read_landmarks(file)?))).transpose()?;
+        let landmarks = self.landmarks()?;
         match self.input {
             Some(file) => self.of_external(file, landmarks, task, prior.as_ref()),
             None => self.of_own(landmarks, task, prior.as_ref()),
@@ -50,15 +50,8 @@ impl CalibrationInputs<'_> {
         task: Option<ReachTask>,
         prior: Option<&Calibration>,
     ) -> Result<(Calibration, bool)> {
-        let survey = landmarks.map(|(file, map)| map.survey(file, self.robot, TagUse::Corners)).transpose()?;
-        let survey = survey.map(|named| named.survey);
-        let mut recordings = Vec::new();
-        let mut lost = false;
-        for path in self.recordings {
-            let recording = read_marked(path)?;
-            lost |= warn_of_losses(&recording);
-            recordings.push(recording);
-        }
+        let survey = self.survey(landmarks)?;
+        let (mut recordings, lost) = self.marked()?;
         if let ([recording], None) = (&mut recordings[..], prior) {
             // Its own marks say which views are for what.
             let names_task = recording.messages.iter().any(|(_, message)| matches!(message, Message::Task(_)));
@@ -93,10 +86,9 @@ impl CalibrationInputs<'_> {
 
     /// A belief that has heard nothing yet, of an arm whose recordings armcal makes.
     pub fn listener(&self, settings: OnlineSettings) -> Result<Listener> {
-        let landmarks = self.tag_map.map(|file| Ok::<_, anyhow::Error>((file, read_landmarks(file)?))).transpose()?;
-        let survey = landmarks.map(|(file, map)| map.survey(file, self.robot, TagUse::Corners)).transpose()?;
+        let survey = self.survey(self.landmarks()?)?;
         let has_map = survey.is_some();
-        let robot = survey.map(|named| self.robot.clone().with_survey(named.survey));
+        let robot = survey.map(|survey| self.robot.clone().with_survey(survey));
         let mut follower = Follower::new(robot.unwrap_or_else(|| self.robot.clone()), settings);
         self.task()?.iter().for_each(|task| follower.set_task(task));
         Ok(Listener { follower, has_map })
@@ -114,10 +106,7 @@ impl CalibrationInputs<'_> {
         hear: &mut dyn FnMut(&Follower, Vec<OnlineEvent>),
     ) -> Result<(Follower, bool)> {
         if let Some(file) = self.input {
-            let task = self.task()?;
-            let landmarks =
-                self.tag_map.map(|file| Ok::<_, anyhow::Error>((file, read_landmarks(file)?))).transpose()?;
-            let (prepared, lost) = self.external_views(file, landmarks, task)?;
+            let (prepared, lost) = self.external_views(file, self.landmarks()?, self.task()?)?;
             let mut follower = Follower::new(prepared.robot.clone(), settings);
             prepared.data.task.iter().for_each(|task| follower.set_task(task));
             for view in prepared.data.fit {
@@ -138,6 +127,41 @@ impl CalibrationInputs<'_> {
             check_joints(&rest, self.robot)?;
         }
         Ok((listener.finish(hear), lost))
+    }
+
+    /// The batch of all marked views, and whether a recording had lost something.
+    pub fn batch(&self) -> Result<(Batch, bool)> {
+        let (task, landmarks) = (self.task()?, self.landmarks()?);
+        let (prepared, lost) = match self.input {
+            Some(file) => self.external_views(file, landmarks, task)?,
+            None => {
+                let (recordings, lost) = self.marked()?;
+                let survey = self.survey(landmarks)?;
+                (prepare_pooled(&recordings, self.robot, survey.as_ref(), task.as_ref(), self.method)?, lost)
+            }
+        };
+        Ok((Batch::of(prepared)?, lost))
+    }
+
+    fn landmarks(&self) -> Result<Option<(&Path, LandmarkFile)>> {
+        self.tag_map.map(|file| Ok((file, read_landmarks(file)?))).transpose()
+    }
+
+    fn survey(&self, landmarks: Option<(&Path, LandmarkFile)>) -> Result<Option<TagSurvey>> {
+        let named = landmarks.map(|(file, map)| map.survey(file, self.robot, TagUse::Corners)).transpose()?;
+        Ok(named.map(|named| named.survey))
+    }
+
+    /// Recordings that armcal made, and whether one had lost something.
+    fn marked(&self) -> Result<(Vec<Recording>, bool)> {
+        let mut recordings = Vec::new();
+        let mut lost = false;
+        for path in self.recordings {
+            let recording = read_marked(path)?;
+            lost |= warn_of_losses(&recording);
+            recordings.push(recording);
+        }
+        Ok((recordings, lost))
     }
 
     /// The views of recordings of a real arm, and whether one had lost something.

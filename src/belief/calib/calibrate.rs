@@ -6,7 +6,7 @@ use armcal_core::routine::Method;
 use armcal_core::streams::{Mark, MarkKind, Message, PriorSource};
 use armcal_core::time::Stamp;
 
-use crate::calib::bundle::calibration::{BundleCalibration, EstimatePurpose};
+use crate::calib::bundle::calibration::{BundleCalibration, EstimateListener, EstimatePurpose};
 use crate::calib::bundle::slips_since::slips_since;
 use crate::calib::error::CalibError;
 use crate::calib::methods::calibration::calibrate_positions;
@@ -167,6 +167,18 @@ pub fn calibrate_data(
             calibrate_positions(data, method, prior)
         }
     }
+}
+
+/// By `bundle` from the datasheet; `listener` is told of the estimate by the views.
+///
+/// # Errors
+/// As [`calibrate`].
+pub(crate) fn calibrate_bundle(
+    data: CalibrationData,
+    listener: &mut EstimateListener<'_>,
+) -> Result<Calibration, CalibError> {
+    check_views(&data)?;
+    BundleCalibration::new(data, None, EstimatePurpose::Final)?.with_listener(listener).calibrate()
 }
 
 /// Refuses what holds too little to be fitted.

@@ -57,7 +57,12 @@ pub(crate) struct BundleCalibration<'a> {
     moved: MovedTags,
     /// What of the drawing is estimated.
     drawing: Drawing,
+    /// Who is told of the last estimate by the views.
+    listener: Option<&'a mut EstimateListener<'a>>,
 }
+
+/// Is told of an estimate and what it was made from.
+pub(crate) type EstimateListener<'a> = dyn FnMut(&BundleInput<'_>, &Estimate<'_>) + 'a;
 
 /// Fewer views do not determine how large noise and nonlinearity are: the datasheet's figures stand.
 const MIN_VIEWS_FOR_EVIDENCE: usize = 12;
@@ -125,7 +130,11 @@ impl<'a> BundleCalibration<'a> {
         let held_out = std::mem::take(&mut data.data.held_out);
         data.data.fit.extend(held_out);
         let moved = MovedTags::new(&data.robot);
-        Ok(Self { data, prior, map, purpose, moved, drawing: Drawing::default() })
+        Ok(Self { data, prior, map, purpose, moved, drawing: Drawing::default(), listener: None })
+    }
+
+    pub(crate) fn with_listener(self, listener: &'a mut EstimateListener<'a>) -> Self {
+        Self { listener: Some(listener), ..self }
     }
 
     /// # Errors
@@ -170,6 +179,9 @@ impl<'a> BundleCalibration<'a> {
     }
 
     fn finish(mut self, mut estimated: Estimated<'_>) -> Result<Calibration, CalibError> {
+        if let Some(listener) = self.listener.take() {
+            listener(&estimated.setup.input(), estimated.by_views());
+        }
         // What no sensor told at a rest stays as it was stowed.
         for failure in estimated.failures.iter().filter(|failure| failure.leaves_no_sensor()) {
             let stowed_rad = self.data.robot.stowed[failure.joint];

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use crate::calib::covariance::ParameterCovariance;
 use crate::calib::online::event::OnlineEvent;
+use crate::calib::online::filter::Filter;
 use crate::calib::online::hypothesis::Fault;
 use crate::calib::online::member::Member;
 use crate::calib::online::oracle::Oracle;
@@ -97,6 +98,11 @@ impl OnlineEstimator {
     fn best(&self) -> &Member {
         // At least the best one stays.
         &self.members[0]
+    }
+
+    /// State and information of the best one; `None` before the first view.
+    pub(crate) fn best_filter(&self) -> Option<&Filter> {
+        self.best().filter()
     }
 
     /// What each of `explanations`, all of whose faults happen now, makes of the views from now on; `None` before the

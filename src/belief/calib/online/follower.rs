@@ -105,8 +105,11 @@ impl Follower {
     pub fn add(&mut self, views: Vec<View>) -> Vec<OnlineEvent> {
         for view in views {
             let Conditions { oil_c, pressure_pa, stamp } = &mut self.conditions;
-            *stamp = (*stamp).max(Some(view.end));
-            (*oil_c, *pressure_pa) = (oil_c.or(view.conditions.oil_c), pressure_pa.or(view.conditions.pressure_pa));
+            if stamp.is_none_or(|latest| latest < view.end) {
+                *stamp = Some(view.end);
+                (*oil_c, *pressure_pa) =
+                    (view.conditions.oil_c.or(*oil_c), view.conditions.pressure_pa.or(*pressure_pa));
+            }
             self.estimator.add_view(&view);
         }
         self.estimator.take_events()

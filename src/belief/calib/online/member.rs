@@ -32,8 +32,10 @@ const VIEWS_FOR_EVIDENCE: usize = 12;
 const START_PAUSE_S: f64 = 300.0;
 /// Views of a moving arm that make a start where no view at rest comes.
 const MOVING_FOR_START: usize = 40;
-/// Numbers of views at which the batch of the first ones is made anew.
-const START_AT: [usize; 9] = [1, 2, 3, 4, 6, 8, 12, 17, 24];
+/// Numbers of views at which the batch of the first ones is made anew: what was linearized far from the end is again.
+const START_AT: [usize; 15] = [1, 2, 3, 4, 6, 8, 12, 17, 24, 34, 48, 68, 96, 136, 192];
+/// The first so many where sensors drift: the batch knows nothing of that.
+const N_STARTS_OF_DRIFTING: usize = 9;
 
 /// A belief kept up view by view, for sensors that follow the thermometer with one lag.
 #[derive(Clone)]
@@ -167,7 +169,11 @@ impl Member {
     fn start_with(&mut self, view: View) -> bool {
         self.moving = Vec::new();
         let n = self.first.len() + 1;
-        if !START_AT.contains(&n) {
+        let starts = match self.settings.drift {
+            DriftModel::Stationary => &START_AT[..],
+            DriftModel::Tuned => &START_AT[..N_STARTS_OF_DRIFTING],
+        };
+        if !starts.contains(&n) {
             self.first.push(view.clone());
             return self.carry_on(&view).is_some();
         }
@@ -176,7 +182,7 @@ impl Member {
         if started.is_some() {
             self.running = started;
         }
-        if n == START_AT[START_AT.len() - 1] {
+        if starts.last() == Some(&n) {
             self.first = Vec::new();
         }
         self.running.is_some()
@@ -194,7 +200,7 @@ impl Member {
             views: &self.first,
             model: self.settings.model.clone().unwrap_or_else(|| online_model(&self.robot)),
             scales,
-            guess: JointParameters { reference, ..JointParameters::default() },
+            guess: self.settings.guess.unwrap_or(JointParameters { reference, ..JointParameters::default() }),
             joint_prior: None,
             evidence,
         };
@@ -311,6 +317,11 @@ impl Member {
     /// What happened since this was last asked for, in the order of time.
     pub(crate) fn take_events(&mut self) -> Vec<OnlineEvent> {
         std::mem::take(&mut self.events)
+    }
+
+    /// State and information; `None` before the first view.
+    pub(crate) fn filter(&self) -> Option<&Filter> {
+        self.running.as_ref().map(|running| &running.filter)
     }
 
     /// The sensors as believed; `None` before the first view.

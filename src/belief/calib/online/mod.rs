@@ -3,9 +3,10 @@
 //! `view_stream` makes views of messages. `estimator` holds a `member` for each lag of the sensors' temperature; each
 //! starts from the first views by `bundle` and carries its belief on: `filter` is state and information,
 //! `process_noise` how fast sensors change. `diagnosis` races `hypothesis` against hypothesis where a view does not
-//! fit; `event` tells what happened. `follower` is all of it, `belief_log` what it said over time; `oracle` is what a
-//! study compares it with.
+//! fit; `event` tells what happened. `follower` is all of it, `belief_log` what it said over time; `oracle` and
+//! `batch` are what it is compared with.
 
+mod batch;
 mod belief_log;
 mod diagnosis;
 mod estimator;
@@ -21,6 +22,7 @@ mod process_noise;
 mod settings;
 mod view_stream;
 
+pub use batch::Batch;
 pub use belief_log::{BeliefLine, BeliefLog};
 pub use estimator::OnlineEstimator;
 pub use event::OnlineEvent;

@@ -1,6 +1,7 @@
 //! What an online estimator is told beforehand.
 
 use crate::calib::bundle::model::{Hyperparameters, Model, Scope, model_of};
+use crate::calib::parameters::JointParameters;
 use armcal_core::robot::Robot;
 
 /// How much larger an effect may be than its datasheet's figure.
@@ -15,6 +16,8 @@ pub struct OnlineSettings {
     pub model: Option<Model>,
     /// Sizes of noise and priors, if they are known; then they stay.
     pub scales: Option<Hyperparameters>,
+    /// Where the search begins, and the reference of the terms; `None`: the datasheet, under the first view's conditions.
+    pub guess: Option<JointParameters>,
     /// Whether sensors change between views.
     pub drift: DriftModel,
     /// Whether explanations are looked for where a view does not fit.
@@ -41,7 +44,7 @@ pub enum DriftModel {
 
 impl Default for OnlineSettings {
     fn default() -> Self {
-        Self { model: None, scales: None, drift: DriftModel::Tuned, faults: FaultSearch::On }
+        Self { model: None, scales: None, guess: None, drift: DriftModel::Tuned, faults: FaultSearch::On }
     }
 }
 
