@@ -109,5 +109,6 @@ fn poses_that_move_far_carry_their_information_along() {
     }
     worst.sort_by(f64::total_cmp);
     println!("largest difference over all columns, sigmas: {worst:.3?}");
-    assert!(worst[5] < 0.3 && worst[9] < 1.0, "{worst:?}");
+    // 0.36 and 0.52; with the derivative taken as one 0.53 and 0.81.
+    assert!(worst[5] < 0.45 && worst[9] < 0.66, "{worst:?}");
 }
