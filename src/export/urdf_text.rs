@@ -167,8 +167,9 @@ impl OriginTag {
 
 /// The attributes of an `origin`: m, and fixed-axis roll, pitch and yaw in rad.
 pub(super) fn xyz_rpy(pose: &Isometry3<f64>) -> String {
-    let [x, y, z]: [f64; 3] = pose.translation.vector.into();
-    let [roll, pitch, yaw] = roll_pitch_yaw(&pose.rotation);
+    // Adding 0 takes the sign from a zero.
+    let [x, y, z] = <[f64; 3]>::from(pose.translation.vector).map(|value| value + 0.0);
+    let [roll, pitch, yaw] = roll_pitch_yaw(&pose.rotation).map(|value| value + 0.0);
     format!("xyz=\"{x} {y} {z}\" rpy=\"{roll} {pitch} {yaw}\"")
 }
 
