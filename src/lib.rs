@@ -97,6 +97,8 @@ pub mod campaign;
 #[doc(hidden)]
 pub mod cli;
 #[doc(hidden)]
+pub mod export;
+#[doc(hidden)]
 pub mod output;
 #[doc(hidden)]
 pub mod report;

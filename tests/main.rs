@@ -17,6 +17,7 @@ mod cli;
 mod closed_loop;
 mod detections;
 mod determinism;
+mod export;
 mod failed;
 mod golden;
 mod gripper_tag;

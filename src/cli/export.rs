@@ -7,8 +7,14 @@ use clap::{Args, ValueEnum};
 use serde::Serialize;
 
 use crate::cli::exit::{Exit, UsageError};
-use crate::cli::stdout::say;
-use armcal_belief::calib::{Calibration, CalibrationFileError, CompactCalibration, CovarianceTable, LookupTable};
+use crate::cli::stdout::{note, say};
+use crate::export::{
+    MAX_POINTS, MIN_POINTS, SensorTable, calibrated_urdf, camchain, csv_rows, joints_with_terms, ros_parameters,
+    ros2_control, tagslam_map,
+};
+use armcal_belief::calib::{
+    Calibration, CalibrationFileError, CompactCalibration, CovarianceTable, LookupTable, Status,
+};
 use armcal_core::files::{self, FileKind};
 use armcal_core::robot::{self, Robot};
 use armcal_core::sensor::{ArmSensors, SensorModel};
@@ -20,9 +26,17 @@ pub(super) struct ExportArgs {
     /// The form that is wanted
     #[arg(long = "as", value_enum)]
     form: Form,
-    /// Robot folder: turns a compact text's corrections into the keys of calibration.toml
+    /// Robot folder with the arm's drawing, as the calibration had it: needed for urdf, ros2-control, ros-parameters,
+    /// table and kalibr; turns a compact text's corrections into the keys of calibration.toml
     #[arg(long)]
     robot: Option<PathBuf>,
+    /// Points a joint of a table, 2 .. 10000; default: as few as keep straight lines between them within 0.02 mm at the
+    /// tool
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(MIN_POINTS as i64..=MAX_POINTS as i64))]
+    points: Option<u16>,
+    /// Write a refused calibration in a driver's form nevertheless
+    #[arg(long)]
+    allow_refused: bool,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -33,6 +47,33 @@ enum Form {
     Toml,
     /// One line below 512 bytes
     Compact,
+    /// The robot's URDF with link corrections and camera mount written in; nothing of the sensors is in it
+    Urdf,
+    /// Block for the URDF: each joint's gain and offset as a transmission of `ros2_control`
+    Ros2Control,
+    /// ROS 2 parameter file: each joint's gain, offset, terms and their covariance
+    RosParameters,
+    /// CSV: counts to radians at points, for every joint over its whole range
+    Table,
+    /// CSV: one row a joint, with standard deviations
+    Csv,
+    /// All of it, for programs that read JSON; keys as in YAML
+    Json,
+    /// The camera as Kalibr's camchain.yaml
+    Kalibr,
+    /// The tags that were mapped, as TagSLAM's tagslam.yaml
+    Tagslam,
+}
+
+impl Form {
+    /// An arm moves by these.
+    fn is_for_drivers(self) -> bool {
+        matches!(self, Self::Urdf | Self::Ros2Control | Self::RosParameters | Self::Table)
+    }
+
+    fn name(self) -> String {
+        self.to_possible_value().map(|value| value.get_name().to_owned()).unwrap_or_default()
+    }
 }
 
 enum Input {
@@ -40,41 +81,115 @@ enum Input {
     Compact(Box<CompactCalibration>),
 }
 
+impl Input {
+    /// Why the calibration may not be used; `None` for an accepted one.
+    fn refusal(&self) -> Option<String> {
+        let (status, why) = match self {
+            Self::Full(calibration) => (calibration.status, &calibration.refusal),
+            Self::Compact(compact) => (compact.status, &compact.refusal_code),
+        };
+        let why = || why.clone().unwrap_or_else(|| "no reason given".to_owned());
+        (status == Status::Refused).then(why)
+    }
+}
+
 pub(super) fn export(args: &ExportArgs) -> Result<Exit> {
+    if args.points.is_some() && args.form != Form::Table {
+        return Err(UsageError(format!("--points goes with --as table, not with --as {}", args.form.name())).into());
+    }
     let robot = args.robot.as_deref().map(robot::load).transpose()?;
-    let text = match (read_input(&args.file)?, args.form) {
-        (Input::Full(calibration), form) => {
+    let input = read_input(&args.file)?;
+    if args.form.is_for_drivers()
+        && !args.allow_refused
+        && let Some(why) = input.refusal()
+    {
+        let (file, form) = (args.file.display(), args.form.name());
+        note(format!("error: {file}: the calibration is refused: {why}; --allow-refused writes {form} nevertheless"));
+        return Ok(Exit::Refused);
+    }
+    let text = match input {
+        Input::Full(calibration) => {
             if let Some(robot) = &robot {
                 calibration.sensors(robot)?;
             }
-            of_full(&calibration, form)?
+            of_full(&calibration, robot.as_ref(), args)?
         }
-        (Input::Compact(compact), form) => of_compact(&compact, robot.as_ref(), form)?,
+        Input::Compact(compact) => of_compact(&compact, robot.as_ref(), args)?,
     };
     say(text.trim_end())?;
     Ok(Exit::Ok)
 }
 
-fn of_full(calibration: &Calibration, form: Form) -> Result<String> {
-    Ok(match form {
-        Form::Yaml => {
-            let covariance = Some(&calibration.covariance).filter(|table| !table.parameters.is_empty());
-            to_yaml(&FullView { calibration, lookup: calibration.lookup(), covariance })?
+fn of_full(calibration: &Calibration, robot: Option<&Robot>, args: &ExportArgs) -> Result<String> {
+    let file = &args.file;
+    Ok(match args.form {
+        Form::Yaml => to_yaml(&FullView::of(calibration))?,
+        Form::Json => {
+            serde_json::to_string_pretty(&FullView::of(calibration)).context("the calibration has no JSON form")?
         }
         Form::Toml => calibration.to_toml(),
         Form::Compact => CompactCalibration::of(calibration)?.to_text()?,
+        Form::Csv => csv_rows(calibration),
+        Form::Tagslam => tagslam_map(file, calibration)?,
+        Form::Kalibr => camchain(file, calibration, drawing(robot, args.form)?)?,
+        Form::RosParameters => ros_parameters(drawing(robot, args.form)?, calibration),
+        Form::Urdf => {
+            let urdf = calibrated_urdf(file, calibration, drawing(robot, args.form)?)?;
+            for what in urdf.left_out {
+                note(format!("warning: left out, for a URDF cannot hold it: {what}"));
+            }
+            urdf.text
+        }
+        Form::Ros2Control | Form::Table => {
+            let robot = drawing(robot, args.form)?;
+            of_sensors(robot, &calibration.sensors(robot)?, args)
+        }
     })
 }
 
-fn of_compact(compact: &CompactCalibration, robot: Option<&Robot>, form: Form) -> Result<String> {
+fn of_compact(compact: &CompactCalibration, robot: Option<&Robot>, args: &ExportArgs) -> Result<String> {
     let sensors = robot.map(|robot| compact.sensors(robot)).transpose()?;
-    let lookup = sensors.iter().flat_map(|sensors| &sensors.models).filter_map(LookupTable::of).collect();
-    let view = CompactView { compact, joint_of_robot: sensors.map(joints_of), lookup };
-    Ok(match form {
-        Form::Yaml => to_yaml(&view)?,
-        Form::Toml => toml::to_string(&view).context("the compact calibration has no TOML form")?,
-        Form::Compact => compact.to_text()?,
+    let view = |sensors: Option<ArmSensors>| {
+        let lookup = sensors.iter().flat_map(|sensors| &sensors.models).filter_map(LookupTable::of).collect();
+        CompactView { compact, joint_of_robot: sensors.map(joints_of), lookup }
+    };
+    Ok(match (args.form, sensors) {
+        (Form::Yaml, sensors) => to_yaml(&view(sensors))?,
+        (Form::Json, sensors) => {
+            serde_json::to_string_pretty(&view(sensors)).context("the compact calibration has no JSON form")?
+        }
+        (Form::Toml, sensors) => toml::to_string(&view(sensors)).context("the compact calibration has no TOML form")?,
+        (Form::Compact, _) => compact.to_text()?,
+        (Form::Ros2Control | Form::Table, sensors) => {
+            let robot = drawing(robot, args.form)?;
+            of_sensors(robot, &sensors.map_or_else(|| compact.sensors(robot), Ok)?, args)
+        }
+        (Form::Urdf | Form::RosParameters | Form::Csv | Form::Kalibr | Form::Tagslam, _) => {
+            let (file, form) = (args.file.display(), args.form.name());
+            let problem =
+                format!("{file}: is a compact calibration, which lacks what {form} needs; give calibration.toml");
+            return Err(UsageError(problem).into());
+        }
     })
+}
+
+/// The forms that need no more than sensors. Terms that a transmission cannot hold are named.
+fn of_sensors(robot: &Robot, sensors: &ArmSensors, args: &ExportArgs) -> String {
+    if args.form == Form::Table {
+        return SensorTable::new(robot, sensors, args.points.map(usize::from)).to_csv(robot);
+    }
+    let bent = joints_with_terms(sensors).collect::<Vec<_>>().join(", ");
+    if !bent.is_empty() {
+        note(format!(
+            "warning: left out, for a transmission is a straight line: the terms of {bent}; a table has them"
+        ));
+    }
+    ros2_control(robot, sensors)
+}
+
+fn drawing(robot: Option<&Robot>, form: Form) -> Result<&Robot> {
+    let missing = || UsageError(format!("--as {} needs the arm's drawing: add --robot DIR", form.name()));
+    Ok(robot.ok_or_else(missing)?)
 }
 
 fn to_yaml<T: Serialize>(value: &T) -> Result<String> {
@@ -90,6 +205,13 @@ struct FullView<'a> {
     covariance: Option<&'a CovarianceTable>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     lookup: Vec<LookupTable>,
+}
+
+impl<'a> FullView<'a> {
+    fn of(calibration: &'a Calibration) -> Self {
+        let covariance = Some(&calibration.covariance).filter(|table| !table.parameters.is_empty());
+        Self { calibration, lookup: calibration.lookup(), covariance }
+    }
 }
 
 /// A compact calibration, and with its robot at hand the same corrections under the keys of calibration.toml.

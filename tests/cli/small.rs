@@ -109,7 +109,7 @@ fn every_form_comes_from_calibration_toml() {
     assert_eq!((toml.code, toml.stdout), (0, read(&sample())));
     let compact = export(file, &["--as", "compact"]);
     assert_eq!(compact.stdout.trim_end(), CompactCalibration::of(&calibration).unwrap().to_text().unwrap());
-    for form in ["urdf", "ros", "xml"] {
+    for form in ["sdf", "ros", "xml"] {
         export(file, &["--as", form]).expect(form, 2, &["yaml", "toml", "compact"]);
     }
     let other = root().join("robots/titan4");

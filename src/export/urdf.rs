@@ -1,0 +1,182 @@
+//! The robot's URDF with the calibrated geometry written in.
+
+use std::path::Path;
+
+use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
+use serde::Deserialize;
+
+use crate::export::urdf_text::{UrdfText, comment_text, xyz_rpy};
+use armcal_belief::calib::{Calibration, CameraMount};
+use armcal_core::robot::{FileIssue, Robot, RobotError, parse_toml, read_text};
+
+/// By these words an exported file is known again.
+const MARK: &str = "Calibrated by armcal";
+
+const CONVENTION: &str = "  \
+  Joint angles are calibrated angles; zeros and limits are the drawing's. Gain, offset and terms of the joint sensors
+  are not in this file. Apply them once, where counts become radians: by the table, by the ROS parameters, or by the
+  transmissions of ros2_control. Do not shift joint origins or limits by the offsets as well. With this file, do not
+  apply [[link]] and [camera_mount] of calibration.toml again.
+";
+
+/// A URDF with what was calibrated, and where to find it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CalibratedUrdf {
+    /// The file's text.
+    pub text: String,
+    /// The link whose frame is the camera's optical frame.
+    pub camera_link: String,
+    /// What the calibration has and no URDF can hold, in words.
+    pub left_out: Vec<String>,
+}
+
+/// Of robot.toml: the links that camera and tool hang on.
+#[derive(Deserialize)]
+struct RobotToml {
+    camera: OnLink,
+    tool: OnLink,
+}
+
+#[derive(Deserialize)]
+struct OnLink {
+    link: String,
+}
+
+/// New origins of the text's joints, what is added to it, and both in words.
+#[derive(Default)]
+struct Changes {
+    origins: Vec<(usize, Isometry3<f64>)>,
+    added: String,
+    in_words: Vec<String>,
+    camera_link: String,
+}
+
+/// The URDF of `robot`, whose sensors `calibration` is about: joint origins with the estimated link corrections, the
+/// camera at its estimated mount. Angles are calibrated ones; nothing of the sensors is in it. `file` is that of the
+/// calibration, for messages.
+///
+/// # Errors
+/// [`RobotError`] naming file and key: values out of range, or a URDF that is an exported one already.
+pub fn calibrated_urdf(file: &Path, calibration: &Calibration, robot: &Robot) -> Result<CalibratedUrdf, RobotError> {
+    let urdf_file = robot.folder.join(&robot.urdf_name);
+    if robot.urdf_text.contains(MARK) {
+        let problem = format!(
+            "has `{MARK}` in it: its corrections would be applied twice; give --robot the folder with the drawing"
+        );
+        return Err(FileIssue::new(&urdf_file, "robot", problem).into());
+    }
+    let urdf =
+        UrdfText::read(&robot.urdf_text).map_err(|message| RobotError::Syntax { file: urdf_file.clone(), message })?;
+    let mut changes = Changes::default();
+    move_joints(file, calibration, robot, &urdf, &mut changes)?;
+    place_camera(file, calibration, robot, &urdf, &mut changes)?;
+    let left_out = left_out(calibration);
+    let comment = comment(calibration, &changes, &left_out);
+    let text = urdf.edited(&changes.origins, &comment, &changes.added);
+    Ok(CalibratedUrdf { text, camera_link: changes.camera_link, left_out })
+}
+
+/// Joints with a link correction. The chain's place of a joint includes fixed joints before it; the joint's own origin
+/// takes the whole correction.
+fn move_joints(
+    file: &Path,
+    calibration: &Calibration,
+    robot: &Robot,
+    urdf: &UrdfText,
+    changes: &mut Changes,
+) -> Result<(), FileIssue> {
+    let corrections = calibration.link_corrections();
+    for link in &calibration.link {
+        let key = |of: &str| format!("link `{}`: {of}", link.joint);
+        for value in link.shift_m {
+            FileIssue::check_range(file, &key("shift_m"), value, -1.0..=1.0)?;
+        }
+        for value in link.turn_rad {
+            FileIssue::check_range(file, &key("turn_rad"), value, -1.0..=1.0)?;
+        }
+        let joint = robot.chain.joints().iter().position(|joint| joint.name == link.joint);
+        let in_text = urdf.joints.iter().position(|joint| joint.name == link.joint);
+        let (Some(joint), Some(in_text)) = (joint, in_text) else {
+            return Err(FileIssue::new(file, key("joint"), "is no moving joint of the arm"));
+        };
+        let drawn = &robot.chain.joints()[joint].parent_from_joint;
+        let corrected = urdf.joints[in_text].origin * drawn.inverse() * corrections[joint].applied_to(drawn);
+        changes.origins.push((in_text, corrected));
+        changes.in_words.push(format!("origin of joint {}: link correction", link.joint));
+    }
+    Ok(())
+}
+
+/// The camera's own joint is moved where it has one that nothing else hangs on; otherwise a link is added.
+fn place_camera(
+    file: &Path,
+    calibration: &Calibration,
+    robot: &Robot,
+    urdf: &UrdfText,
+    changes: &mut Changes,
+) -> Result<(), RobotError> {
+    let robot_file = robot.folder.join("robot.toml");
+    let RobotToml { camera: OnLink { link }, tool } = parse_toml(&robot_file, &read_text(&robot_file)?)?;
+    changes.camera_link.clone_from(&link);
+    let Some(mount) = &calibration.camera_mount else { return Ok(()) };
+    let estimated = link_from_camera(file, mount)?;
+    // From the frame of `link` by the drawing to where the camera is.
+    let shift = robot.camera.mount.link_from_frame.inverse() * estimated;
+    let is_alone = tool.link != link && urdf.joints.iter().all(|joint| joint.parent != link);
+    let own = urdf.joints.iter().position(|joint| joint.child == link && joint.is_fixed);
+    if let Some(own) = own.filter(|_| is_alone) {
+        changes.origins.push((own, urdf.joints[own].origin * shift));
+        changes.in_words.push(format!("origin of joint {}: camera mount", urdf.joints[own].name));
+        return Ok(());
+    }
+    let name = free_name("camera", |name| urdf.links.iter().any(|link| link == name));
+    let joint = free_name("camera_mount", |name| urdf.joints.iter().any(|joint| joint.name == name));
+    let parent = quick_xml::escape::escape(&link).into_owned();
+    changes.added = format!(
+        "  <link name=\"{name}\"/>\n  <joint name=\"{joint}\" type=\"fixed\">\n    <parent link=\"{parent}\"/>\
+         <child link=\"{name}\"/>\n    <origin {}/>\n  </joint>\n",
+        xyz_rpy(&shift)
+    );
+    changes.in_words.push(format!("link {name}, the camera's optical frame, by joint {joint} on {link}: camera mount"));
+    changes.camera_link = name;
+    Ok(())
+}
+
+/// `name`, or the first of `name_2`, `name_3`, .. that is not taken.
+fn free_name(name: &str, is_taken: impl Fn(&str) -> bool) -> String {
+    let others = (2..).map(|n| format!("{name}_{n}"));
+    std::iter::once(name.to_owned()).chain(others).find(|name| !is_taken(name)).unwrap_or_default()
+}
+
+/// The calibrated `link_from_camera` on the moving link that carries the camera.
+pub(super) fn link_from_camera(file: &Path, mount: &CameraMount) -> Result<Isometry3<f64>, FileIssue> {
+    for value in mount.position_m {
+        FileIssue::check_range(file, "camera_mount.position_m", value, -10.0..=10.0)?;
+    }
+    let [w, x, y, z] = mount.quaternion_wxyz;
+    let rotation = UnitQuaternion::try_new(Quaternion::new(w, x, y, z), 1e-6).filter(|turn| turn.norm().is_finite());
+    let key = "camera_mount.quaternion_wxyz";
+    let rotation = rotation.ok_or_else(|| FileIssue::new(file, key, "is no rotation; its length must not be 0"))?;
+    Ok(Isometry3::from_parts(Translation3::from(Vector3::from(mount.position_m)), rotation))
+}
+
+fn left_out(calibration: &Calibration) -> Vec<String> {
+    let sag = calibration.sag.iter().map(|_| "how the arm bends under its weight ([sag])".to_owned());
+    let failed = calibration.failed_joint.iter().map(|failed| format!("the failed joint {}", failed.joint));
+    sag.chain(failed).collect()
+}
+
+fn comment(calibration: &Calibration, changes: &Changes, left_out: &[String]) -> String {
+    let Calibration { robot, messages_hash, .. } = calibration;
+    let mut text = format!("  {MARK}: robot {robot}, messages_hash {messages_hash}.\n\n{CONVENTION}\n");
+    if changes.in_words.is_empty() {
+        text += "  Written in: nothing; the calibration has neither link corrections nor a camera mount.\n";
+    }
+    for change in &changes.in_words {
+        text += &format!("  Written in: {change}.\n");
+    }
+    for what in left_out {
+        text += &format!("  Left out, for a URDF cannot hold it: {what}.\n");
+    }
+    format!("<!--\n{}-->", comment_text(&text))
+}
