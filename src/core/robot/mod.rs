@@ -6,6 +6,7 @@
 mod allowed_pairs;
 mod body;
 mod camera;
+mod completeness;
 mod decomposition;
 mod drive;
 mod error;
@@ -26,6 +27,7 @@ mod shape;
 mod survey;
 mod toml_text;
 mod urdf;
+mod urdf_mesh;
 mod urdf_text;
 mod vehicle;
 
@@ -35,7 +37,7 @@ pub use camera::{CameraSpec, LensPriors};
 pub use drive::{DriveSpec, MotionSpec};
 pub use error::{FileIssue, RobotError, parse_toml, read_table, read_text};
 pub use failed::{FailedJoint, FailedKind};
-pub use file::{load, load_without_pairs};
+pub use file::{load, load_attached, load_without_pairs};
 pub use geometry::GeometryPriors;
 pub use gripper::{GripperSpec, Jaw};
 pub use gripper_tag::GripperTag;
