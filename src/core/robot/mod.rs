@@ -4,6 +4,7 @@
 //! Shapes are convex, meshes are convex hulls. As-built values are in `sim`, estimates in `calib`.
 
 mod allowed_pairs;
+mod arm_chain;
 mod body;
 mod camera;
 mod completeness;
@@ -19,6 +20,7 @@ mod hull;
 mod joint_sensor;
 mod light;
 mod mesh;
+mod new_folder;
 mod nominal;
 mod part;
 mod self_collision;
@@ -44,6 +46,7 @@ pub use gripper_tag::GripperTag;
 pub use hull::{Hull, HullError, MAX_HULL_POINTS};
 pub use joint_sensor::{JointSensorSpec, SensorKind};
 pub use light::VehicleLight;
+pub use new_folder::{DraftedMeshes, NewFile, NewRobot, draft_robot};
 pub use nominal::{Robot, ToolSpec};
 pub use part::{MAX_PARTS, Part, PartFile, check_parts};
 pub use self_collision::SELF_COLLISION_FILE;
