@@ -11,7 +11,7 @@ use armcal::log::{
     GrowingRecording, Growth, RecordingHeader, RecordingWriter, TopicMap, for_each_raw, read_attachments,
     read_recording,
 };
-use armcal::robot::{Robot, load, load_vehicle};
+use armcal::robot::{DraftedMeshes, NewRobot, Robot, draft_robot, load, load_vehicle};
 use armcal::routine::Method;
 use armcal::streams::Message;
 use armcal::tagmap::files::{parse_cameras, parse_tags, read_landmarks};
@@ -56,8 +56,9 @@ impl Scratch {
 type Read = fn(&Scratch, &[u8]) -> bool;
 
 /// By the names of the targets and of the folders of their corpora.
-pub const READERS: [(&str, Read); 19] = [
+pub const READERS: [(&str, Read); 20] = [
     ("urdf", urdf),
+    ("new_robot", new_robot),
     ("recording", recording),
     ("cdr", cdr),
     ("robot", robot),
@@ -86,6 +87,25 @@ fn urdf(scratch: &Scratch, bytes: &[u8]) -> bool {
     scratch.write("of_urdf/titan4.urdf", bytes);
     // The names of links and joints of the drawings in the corpus.
     load(&scratch.path("of_urdf")).is_ok()
+}
+
+/// A robot folder for any URDF, with the mesh of the corpus beside it.
+fn new_robot(scratch: &Scratch, bytes: &[u8]) -> bool {
+    let given = scratch.path("given");
+    fs::create_dir_all(&given).expect("a folder");
+    fs::write(given.join("hand.obj"), "v 0 0 0\nv 0 9 0\nv 9 0 0\nv 0 0 9\nf 1 2 3\nf 1 3 4\nf 1 4 2\n")
+        .expect("written");
+    let urdf = scratch.write("given/arm.urdf", bytes);
+    let wanted = NewRobot { urdf: &urdf, base: None, tip: None, camera: None, name: None };
+    let Ok(files) = draft_robot(&wanted, DraftedMeshes::Read) else { return false };
+    let made = tempfile::tempdir_in(scratch.folder.path()).expect("a folder");
+    for file in files {
+        let path = made.path().join(&file.path);
+        assert!(file.path.is_relative(), "{}", path.display());
+        fs::create_dir_all(path.parent().expect("a folder")).expect("made");
+        fs::write(path, file.bytes).expect("written");
+    }
+    load(made.path()).is_ok()
 }
 
 fn robot(scratch: &Scratch, bytes: &[u8]) -> bool {

@@ -8,10 +8,12 @@
 //! them; `determinism`, `closed_loop`, `script` and `cli` run the program, `kill` ends it badly; `sim` looks at the
 //! simulated world from outside; `uncalibrated` calibrates arms of which little is known; `real` reads recordings of
 //! real arms; `tagmap` maps tags in recordings that the test writes; `touch` feels surveyed plates
-//! with the tool; `work` works on a dive, `watch` follows recordings that grow; `repository` reads sources and pages.
+//! with the tool; `any_arm` makes robot folders for drawings of all sorts; `work` works on a dive, `watch` follows
+//! recordings that grow; `repository` reads sources and pages.
 
 #![allow(clippy::print_stderr, reason = "figures of a test, for whoever reads its output")]
 
+mod any_arm;
 mod bumps;
 mod cli;
 mod closed_loop;

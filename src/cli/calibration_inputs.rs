@@ -15,7 +15,7 @@ use armcal_belief::calib::{
 use armcal_belief::tagmap::files::{LandmarkFile, NamedSurvey, read_landmarks};
 use armcal_core::input::{ChildFrame, InputMap, TagUse, read_external, read_input_map, read_task};
 use armcal_core::log::{Recording, TopicMap, scan_recording};
-use armcal_core::robot::{self, FailedJoint, FileIssue, Robot, TagSurvey};
+use armcal_core::robot::{self, FailedJoint, FileIssue, Robot, SELF_COLLISION_FILE, TagSurvey};
 use armcal_core::routine::Method;
 use armcal_core::streams::{Message, ReachTask};
 use armcal_core::time::Stamp;
@@ -87,6 +87,7 @@ impl CalibrationInputs<'_> {
     /// A belief that has heard nothing yet, of an arm whose recordings armcal makes.
     pub fn listener(&self, settings: OnlineSettings) -> Result<Listener> {
         let survey = self.survey(self.landmarks()?)?;
+        self.robot.require_lens()?;
         let has_map = survey.is_some();
         let robot = survey.map(|survey| self.robot.clone().with_survey(survey));
         let mut follower = Follower::new(robot.unwrap_or_else(|| self.robot.clone()), settings);
@@ -154,6 +155,7 @@ impl CalibrationInputs<'_> {
 
     /// Recordings that armcal made, and whether one had lost something.
     fn marked(&self) -> Result<(Vec<Recording>, bool)> {
+        self.robot.require_lens()?;
         let mut recordings = Vec::new();
         let mut lost = false;
         for path in self.recordings {
@@ -173,6 +175,9 @@ impl CalibrationInputs<'_> {
     ) -> Result<(CalibrationData, bool)> {
         let map = read_input_map(file)?;
         map.check_robot(file, &self.robot.joint_names())?;
+        if map.tag_use == TagUse::Corners {
+            self.robot.require_lens()?;
+        }
         let named = match &landmarks {
             Some((file, landmarks)) => landmarks.survey(file, self.robot, map.tag_use)?,
             None => NamedSurvey { survey: self.robot.survey(), names: Default::default() },
@@ -226,6 +231,10 @@ impl Listener {
 /// The robot of a folder, with the joints that are declared as failed, `wrist_pitch=dead`.
 pub(super) fn load_robot(folder: &Path, failed: &[String]) -> Result<Robot> {
     let robot = robot::load(folder)?;
+    // Of no matter here, and refused where paths are planned.
+    if let Some(stale) = robot.planning_issues.iter().find(|issue| issue.key == SELF_COLLISION_FILE) {
+        note(format_args!("note: {}: {}", stale.file.display(), stale.problem));
+    }
     let failed_joint = |text: &String| {
         let (joint, kind) = text.split_once('=').unwrap_or((text, ""));
         FailedJoint::of_names(joint, kind, &robot.joint_names())

@@ -55,19 +55,18 @@ struct Found {
 }
 
 fn check_one(file: &Path, overrides: &Overrides) -> Result<Found> {
-    let text = if file.is_dir() {
-        describe_robot(&robot::load(file)?)?
-    } else if file.file_name().is_some_and(|name| name == "robot.toml") {
-        describe_robot(&robot::load(file.parent().unwrap_or(Path::new(".")))?)?
-    } else {
-        let text = robot::read_text(file)?;
-        let table: toml::Table = robot::parse_toml(file, &text)?;
-        if table.contains_key("robot") && table.contains_key("vehicle") && !table.contains_key("inputs_hash") {
-            return check_routine(file, overrides);
-        }
-        describe(file, &text, &table)?
-    };
-    Ok(Found { text, warnings: Vec::new() })
+    if file.is_dir() {
+        return check_robot(file);
+    }
+    if file.file_name().is_some_and(|name| name == "robot.toml") {
+        return check_robot(file.parent().unwrap_or(Path::new(".")));
+    }
+    let text = robot::read_text(file)?;
+    let table: toml::Table = robot::parse_toml(file, &text)?;
+    if table.contains_key("robot") && table.contains_key("vehicle") && !table.contains_key("inputs_hash") {
+        return check_routine(file, overrides);
+    }
+    Ok(Found { text: describe(file, &text, &table)?, warnings: Vec::new() })
 }
 
 /// What a file that is neither robot nor routine holds.
@@ -134,9 +133,18 @@ fn describe_input(map: &InputMap) -> String {
     format!("input map: joint readings on {}, {tags}", map.joint_topic)
 }
 
+/// What only planning lacks is a warning: an arm that records needs none of it.
+fn check_robot(folder: &Path) -> Result<Found> {
+    let robot = robot::load(folder)?;
+    let missing = robot.planning_issues.iter();
+    let warnings = missing.map(|issue| format!("run and plan will refuse it: {}: {}", issue.key, issue.problem));
+    Ok(Found { text: describe_robot(&robot)?, warnings: warnings.collect() })
+}
+
 fn describe_robot(robot: &Robot) -> Result<String> {
+    let is_stowed = !robot.planning_issues.iter().any(|issue| issue.key == "stowed_rad");
     let overlaps = ClearanceModel::of_arm_alone(robot).overlaps(&robot.stowed);
-    if let Some(pair) = overlaps.first() {
+    if let Some(pair) = overlaps.first().filter(|_| is_stowed) {
         let file = robot.folder.join("robot.toml");
         return Err(UsageError(format!(
             "{}: stowed_rad: {pair} overlap there ({} pairs in all). Links that touch by design belong to \

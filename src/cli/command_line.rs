@@ -9,7 +9,7 @@ use clap::{CommandFactory, Parser, Subcommand};
 #[cfg(feature = "viewer")]
 use crate::cli::replay;
 use crate::cli::stdout::{is_written, note};
-use crate::cli::{calibrate, check, exit, export, inspect, plan, tagmap, watch};
+use crate::cli::{calibrate, check, exit, export, inspect, new_robot, plan, tagmap, watch};
 #[cfg(feature = "sim")]
 use crate::cli::{campaign, regress, run, sensitivity, study};
 
@@ -54,6 +54,8 @@ enum Command {
     /// Open a recording in the Rerun viewer, or write it as .rrd
     #[cfg(feature = "viewer")]
     Replay(replay::ReplayArgs),
+    /// Write a commented robot folder for an arm's URDF
+    NewRobot(new_robot::NewRobotArgs),
     /// Read robot folders, routines, vehicles, calibrations, input maps, tag maps, tasks and plans, and say what is
     /// wrong with them
     Check(check::CheckArgs),
@@ -98,6 +100,7 @@ pub fn main() -> ExitCode {
         Command::Export(args) => export::export(&args),
         #[cfg(feature = "viewer")]
         Command::Replay(args) => replay::replay(&args),
+        Command::NewRobot(args) => new_robot::new_robot(&args),
         Command::Check(args) => check::check(&args),
     };
     ended(result)

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result};
 use clap::Args;
 
+use crate::cli::calibration_inputs::load_robot;
 use crate::cli::exit::Exit;
 use crate::cli::stdout::say;
 use crate::report::inspection::{State, inspect as look, to_text};
@@ -26,7 +27,7 @@ pub(super) struct InspectArgs {
 
 pub(super) fn inspect(args: &InspectArgs) -> Result<Exit> {
     let robot = match &args.robot {
-        Some(folder) => Some(robot::load(folder)?),
+        Some(folder) => Some(load_robot(folder, &[])?),
         None => attached_robot(&args.recording)?,
     };
     let inspection = look(&args.recording, robot.as_ref())?;
@@ -55,5 +56,5 @@ fn attached_robot(recording: &Path) -> Result<Option<Robot>, LogError> {
             return Ok(None);
         }
     }
-    Ok(robot::load(folder.path()).ok())
+    Ok(robot::load_attached(folder.path()).ok())
 }

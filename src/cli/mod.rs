@@ -17,6 +17,7 @@ mod export;
 mod inspect;
 mod interrupt;
 mod losses;
+mod new_robot;
 mod overrides;
 mod plan;
 #[cfg(feature = "sim")]

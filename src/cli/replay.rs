@@ -149,7 +149,7 @@ impl Drawings {
         let has = |name: &str| names.iter().any(|n| n == name);
         let robot = match &args.robot {
             Some(robot) => robot::load(robot)?,
-            None if has("robot.toml") => robot::load(folder.path())?,
+            None if has("robot.toml") => robot::load_attached(folder.path())?,
             None => {
                 let recording = args.recording.display();
                 let problem = "carries no drawings of its robot (attachment robot.toml); name its folder with --robot";

@@ -100,6 +100,7 @@ fn of_robot(recording: &Path, robot: &Robot) -> Result<Known> {
     let is_survey = |_, message: &Message| matches!(message, Message::Survey(_));
     let (read, _) = scan_recording(recording, &TopicMap::default(), |_| {}, is_survey)?;
     let robot = &*surveyed(&read, robot);
+    robot.require_lens()?;
     let camera = NamedCamera {
         name: robot.camera.name.clone(),
         model: robot.camera.lens,
@@ -116,12 +117,12 @@ fn of_robot(recording: &Path, robot: &Robot) -> Result<Known> {
         frame: robot.base_link.clone(),
         bodies: vec![Body { name: robot.base_link.clone(), is_static: true, pose: None }],
         tags: robot.tags.iter().map(prior).collect(),
-        base_tag: Some(robot.base_tag),
+        base_tag: robot.base_tag,
         ..TagFile::default()
     };
     let settings = MapSettings {
         mode: MapMode::Unknown,
-        base_tag: Some(robot.base_tag),
+        base_tag: robot.base_tag,
         corner_std_px: robot.camera.corner_std_px,
         ..MapSettings::default()
     };

@@ -37,6 +37,10 @@ pub fn camchain(file: &Path, calibration: &Calibration, robot: &Robot) -> Result
             }
             ("radtan", [k1, k2, p1, p2])
         }
+        LensModel::Unknown(_) => {
+            let problem = "gives no lens, and a camchain is a lens; add one to robot.toml";
+            return Err(FileIssue::new(&robot_file, "[camera]", problem));
+        }
     };
     let drawn = camera.mount.link_from_frame;
     let mount = calibration.camera_mount.as_ref();

@@ -90,7 +90,11 @@ impl Arm {
             let entity = format!("{BASE}/{name}/{n}_{}", path_part(&body.name));
             // The base does not move in itself: one drawing of it is enough.
             if n > 0 || matches!(look, Look::Drawn) {
-                log_shapes(stream, &entity, &body.visuals, look);
+                let shapes = if body.visuals.is_empty() { &body.collisions } else { &body.visuals };
+                log_shapes(stream, &entity, shapes, look);
+                if shapes.is_empty() {
+                    log_skeleton(run, stream, &entity, n);
+                }
             }
             bodies.push(Mover::new(entity));
         }
@@ -112,6 +116,17 @@ impl Arm {
         for (n, jaw) in self.jaws.iter_mut().enumerate() {
             jaw.place(stream, time_s, &(poses.link(gripper.body) * gripper.shift(n, opening_m)));
         }
+    }
+}
+
+/// A line from the joint that moves a body to the next one, or to the tool: for a body of which no shape is known.
+fn log_skeleton(run: &ReplayScene, stream: &mut EntityLog, entity: &str, body: usize) {
+    let (chain, tool) = (&run.robot.chain, &run.robot.tool.mount);
+    let next = chain.joints().get(body).map(|joint| joint.parent_from_joint.translation.vector);
+    let end = next.or_else(|| (tool.n_joints == body).then_some(tool.link_from_frame.translation.vector));
+    if let Some(end) = end.filter(|end| end.norm() > 0.0) {
+        let line = LineStrips3D::new([[[0.0; 3], vector(&end)]]).with_radii([0.01]).with_colors([colors::SKELETON]);
+        stream.log_static(&format!("{entity}/skeleton"), &line);
     }
 }
 

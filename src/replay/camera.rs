@@ -25,6 +25,9 @@ const RINGS_RAD: [f64; 2] = [std::f64::consts::FRAC_PI_6, std::f64::consts::FRAC
 /// Draws the image plane.
 pub(super) fn draw(run: &ReplayScene, stream: &mut EntityLog) {
     let lens = &run.robot.camera.lens;
+    if !lens.is_known() {
+        return;
+    }
     let [width, height] = lens.resolution_px();
     if run.tracks.images.is_empty() {
         stream.log_static(&format!("{CAMERA}/background"), &Image::from_rgb24(background(lens), [width, height]));

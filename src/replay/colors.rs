@@ -15,6 +15,8 @@ pub(super) const SEEN: Rgba = [60, 230, 120, 255];
 pub(super) const REJECTED: Rgba = [255, 120, 50, 255];
 /// The lens's reach into the scene and in the image.
 pub(super) const CAMERA: Rgba = [70, 200, 255, 255];
+/// Links without shapes.
+pub(super) const SKELETON: Rgba = [200, 205, 215, 255];
 pub(super) const TARGET: Rgba = [255, 205, 60, 255];
 pub(super) const HIT: Rgba = [60, 220, 90, 255];
 pub(super) const MISS: Rgba = [255, 70, 60, 255];

@@ -94,7 +94,7 @@ fn draw_tags(run: &ReplayScene, stream: &mut EntityLog) {
     let layers = [(1.25, 0.0), (1.0, 0.002), (0.5, 0.004)];
     let (mut centers, mut sizes, mut turns, mut shades) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for tag in tags {
-        let plate = if tag.id == run.robot.base_tag { colors::BASE_TAG } else { [245, 245, 245, 255] };
+        let plate = if Some(tag.id) == run.robot.base_tag { colors::BASE_TAG } else { [245, 245, 245, 255] };
         let fills = [plate, [15, 15, 15, 255], plate];
         for ((share, height_m), fill) in layers.into_iter().zip(fills) {
             let place = tag.base_from_tag.isometry() * Translation3::new(0.0, 0.0, height_m);
@@ -108,7 +108,7 @@ fn draw_tags(run: &ReplayScene, stream: &mut EntityLog) {
     let plates = Boxes3D::from_centers_and_half_sizes(centers, sizes).with_quaternions(turns);
     stream.log_static(&format!("{BASE}/tags"), &plates.with_colors(shades).with_fill_mode(FillMode::Solid));
     let label = |tag: &SurveyedTag| {
-        if tag.id == run.robot.base_tag { format!("base tag {}", tag.id) } else { format!("tag {}", tag.id) }
+        if Some(tag.id) == run.robot.base_tag { format!("base tag {}", tag.id) } else { format!("tag {}", tag.id) }
     };
     let anchors = tags.iter().map(|tag| vector(&tag.base_from_tag.origin().vector()));
     let anchors = Points3D::new(anchors).with_radii([0.004]).with_labels(tags.iter().map(label));

@@ -390,9 +390,9 @@ pub fn dive_faults_table(rows: &[DiveFaultRow]) -> String {
             count(&|row| !row.false_alarms.is_empty()),
         );
     }
-    text += "\nViews tell it: an oracle that knows kind and time is sure by them (five sigma). In time: within three views \
-             after it. Runs with wrong names: something was named that is not what happened, though the views tell them \
-             apart; with false alarms: something before anything happened.\n";
+    text += "\nViews tell it: an oracle that knows kind and time is sure by them (five sigma). In time: within three \
+             views after it. Runs with wrong names: something was named that is not what happened, though the views \
+             tell them apart; with false alarms: something before anything happened.\n";
     text
 }
 

@@ -163,7 +163,11 @@ const URDF: &[Spoilt] = &[
     ("<axis xyz=\"0 1 0\"/>", "<axis xyz=\"0 nan 0\"/>", &["titan4.urdf", "shoulder_yaw", "axis"]),
     ("lower=\"-3.6296\"", "lower=\"3.6296\"", &["titan4.urdf", "shoulder_yaw", "limit"]),
     ("<sphere radius=\"0.084\"/>", "<sphere radius=\"-1\"/>", &["titan4.urdf", "upperarm_link", "radius"]),
-    ("<sphere radius=\"0.084\"/>", "<mesh filename=\"a.stl\"/>", &["titan4.urdf", "upperarm_link", "mesh"]),
+    (
+        "<cylinder radius=\"0.075\" length=\"0.660874\"/>",
+        "<mesh filename=\"a.stl\"/>",
+        &["titan4.urdf", "upperarm_link", "a.stl", "copy it to"],
+    ),
     ("mass value=\"18.709626\"", "mass value=\"nan\"", &["titan4.urdf", "forearm_link", "mass"]),
     ("mass value=\"18.709626\"", "mass value=\"-18.7\"", &["titan4.urdf", "forearm_link", "mass"]),
     ("<link name=\"fisheye\">", "<link name=\"fisheye\"", &["titan4.urdf"]),

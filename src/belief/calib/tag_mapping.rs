@@ -121,8 +121,8 @@ struct Anchor {
 
 /// The base tag, or the first known one in the map.
 fn anchor(map: &TagMap, robot: &Robot) -> Option<Anchor> {
-    let base = robot.tags.iter().filter(|tag| tag.id == robot.base_tag);
-    let others = robot.tags.iter().filter(|tag| tag.id != robot.base_tag);
+    let base = robot.tags.iter().filter(|tag| Some(tag.id) == robot.base_tag);
+    let others = robot.tags.iter().filter(|tag| Some(tag.id) != robot.base_tag);
     let mut known = base.chain(others).filter(|tag| tag.is_known());
     known.find_map(|tag| {
         let found = map.tag(tag.id)?;
@@ -193,7 +193,7 @@ fn mapped(map: &TagMap, robot: &Robot, anchor: &Anchor, left_out: &BTreeMap<u32,
     let n_known = robot.tags.iter().filter(|tag| tag.is_known()).count();
     let result = MapResult {
         frame: robot.base_link.clone(),
-        base_tag: robot.base_tag,
+        base_tag: robot.base_tag.unwrap_or(anchor.id),
         known: if n_known > 1 { SurveyCoverage::Partly } else { SurveyCoverage::BaseTagAlone },
         views,
         rms_px: map.rms_px,

@@ -38,13 +38,59 @@ is_a_lens!(Fisheye);
 is_a_lens!(Radtan);
 is_a_lens!(CameraModel);
 
-/// A lens of either model.
+/// A lens of either model, or none that is known.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LensModel {
     /// Kannala and Brandt's fisheye.
     Equidistant(Fisheye),
     /// Without distortion it is the plain pinhole.
     Radtan(Radtan),
+    /// Nobody says what the lens is like.
+    Unknown(UnknownLens),
+}
+
+/// A lens of which nothing is known: nothing is seen through it, and all its numbers are NaN.
+#[derive(Clone, Copy, Debug)]
+pub struct UnknownLens {
+    focal_px: [f64; 2],
+    center_px: [f64; 2],
+    distortion: [f64; 4],
+    resolution_px: [u32; 2],
+}
+
+impl Default for UnknownLens {
+    fn default() -> Self {
+        Self { focal_px: [f64::NAN; 2], center_px: [f64::NAN; 2], distortion: [f64::NAN; 4], resolution_px: [0; 2] }
+    }
+}
+
+/// Nothing tells them apart.
+impl PartialEq for UnknownLens {
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
+}
+
+impl UnknownLens {
+    fn project(&self, _: &Vector3<f64>) -> Option<Vector2<f64>> {
+        None
+    }
+
+    fn project_with_jacobian(&self, _: &Vector3<f64>) -> Option<(Vector2<f64>, Matrix2x3<f64>)> {
+        None
+    }
+
+    fn unproject(&self, _: &Vector2<f64>) -> Option<Unit<Vector3<f64>>> {
+        None
+    }
+
+    fn by_intrinsics(&self, _: &Vector3<f64>) -> Option<SMatrix<f64, 2, 8>> {
+        None
+    }
+
+    fn is_monotonic(&self) -> bool {
+        false
+    }
 }
 
 /// Any camera: a lens, and the window before it.
@@ -56,17 +102,31 @@ pub struct CameraModel {
     pub port: Option<FlatPort>,
 }
 
-/// Calls the same of either lens.
+/// Calls the same of any lens.
 macro_rules! of_lens {
     ($camera:expr, $lens:ident => $value:expr) => {
         match &$camera.lens {
             LensModel::Equidistant($lens) => $value,
             LensModel::Radtan($lens) => $value,
+            LensModel::Unknown($lens) => $value,
         }
     };
 }
 
 impl CameraModel {
+    /// The camera of which nobody says what its lens is like: it sees nothing.
+    #[must_use]
+    pub fn unknown() -> Self {
+        Self { lens: LensModel::Unknown(UnknownLens::default()), port: None }
+    }
+
+    /// Whether the lens is known.
+    #[inline]
+    #[must_use]
+    pub fn is_known(&self) -> bool {
+        !matches!(self.lens, LensModel::Unknown(_))
+    }
+
     /// Pixel of a point (camera frame, m); `None` where the lens does not see.
     #[inline]
     #[must_use]
@@ -129,6 +189,7 @@ impl CameraModel {
                 (lens.focal_px, lens.center_px) = ([fx, fy], [cx, cy]);
                 lens.distortion[..4].copy_from_slice(&k);
             }
+            LensModel::Unknown(_) => {}
         }
         other
     }
@@ -166,6 +227,7 @@ impl CameraModel {
         match self.lens {
             LensModel::Equidistant(_) => "equidistant",
             LensModel::Radtan(_) => "plumb_bob",
+            LensModel::Unknown(_) => "unknown",
         }
     }
 
@@ -175,6 +237,7 @@ impl CameraModel {
         let angle_rad = match &self.lens {
             LensModel::Equidistant(lens) => lens.max_view_angle_rad,
             LensModel::Radtan(lens) => (lens.max_radius() * (1.0 - 1e-9)).atan(),
+            LensModel::Unknown(_) => 0.0,
         };
         match &self.port {
             None => angle_rad,
@@ -220,6 +283,18 @@ mod tests {
         let pinhole: CameraModel =
             Radtan::new([500.0, 501.0], [610.0, 515.0], [-0.12, 0.03, 5e-4, -3e-4, 0.01], [1224, 1024]).into();
         [lens(), pinhole, CameraModel { port: Some(port), ..lens() }, CameraModel { port: Some(port), ..pinhole }]
+    }
+
+    #[test]
+    fn an_unknown_lens_sees_nothing_and_has_no_numbers() {
+        let camera = CameraModel::unknown();
+        let ahead = Vector3::z();
+        assert!(!camera.is_known() && lens().is_known());
+        assert!(camera.project(&ahead).is_none() && camera.project_with_jacobian(&ahead).is_none());
+        assert!(camera.by_intrinsics(&ahead).is_none() && camera.unproject(&Vector2::zeros()).is_none());
+        assert!(!camera.contains(&Vector2::zeros()) && !camera.is_monotonic());
+        assert!(camera.intrinsics().iter().all(|value| value.is_nan()));
+        assert_eq!(camera.with_intrinsics([1.0; 8]), camera);
     }
 
     proptest! {

@@ -14,7 +14,7 @@ mod square;
 pub mod tag36h11;
 mod twist;
 
-pub use camera::{CameraModel, Lens, LensModel};
+pub use camera::{CameraModel, Lens, LensModel, UnknownLens};
 pub use corner_noise::{CornerNoise, DetectionChance};
 pub use fisheye::Fisheye;
 pub use flat_port::FlatPort;

@@ -19,6 +19,8 @@ pub struct LinkBody {
     pub com_m: Vector3<f64>,
     /// About the centre of mass, axes of the link.
     pub inertia_kg_m2: Matrix3<f64>,
+    /// A link of it whose inertia is not positive definite, so that it cannot be simulated.
+    pub bad_inertia: Option<String>,
     /// To display; without the jaws of a gripper.
     pub visuals: Vec<PlacedShape>,
     /// For clearance and contact.
@@ -32,6 +34,7 @@ impl LinkBody {
             mass_kg: 0.0,
             com_m: Vector3::zeros(),
             inertia_kg_m2: Matrix3::zeros(),
+            bad_inertia: None,
             visuals: Vec::new(),
             collisions: Vec::new(),
         }

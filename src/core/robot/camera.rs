@@ -15,9 +15,9 @@ pub struct CameraSpec {
     pub name: String,
     /// Nominal `link_from_camera` on the link that carries it.
     pub mount: Attachment,
-    /// Nominal lens.
+    /// Nominal lens; [`CameraModel::unknown`] where the folder gives none.
     pub lens: CameraModel,
-    /// One sigma of each coordinate of a detected corner.
+    /// One sigma of each coordinate of a detected corner; 0.3 px where the folder gives none (assumed).
     pub corner_std_px: f64,
     /// How well the lens is known.
     pub lens_priors: LensPriors,
@@ -49,19 +49,52 @@ impl Default for LensPriors {
 pub(super) struct CameraFile {
     name: String,
     pub(super) link: String,
-    model: String,
-    resolution_px: [u32; 2],
-    focal_px: [f64; 2],
-    center_px: [f64; 2],
-    distortion: Vec<f64>,
+    model: Option<String>,
+    resolution_px: Option<[u32; 2]>,
+    focal_px: Option<[f64; 2]>,
+    center_px: Option<[f64; 2]>,
+    distortion: Option<Vec<f64>>,
     max_view_angle_rad: Option<f64>,
     port: Option<PortFile>,
-    corner_std_px: f64,
+    corner_std_px: Option<f64>,
     focal_std: Option<f64>,
     center_std_px: Option<f64>,
     distortion_std: Option<f64>,
     mount_std_m: f64,
     mount_std_rad: f64,
+}
+
+/// Keys of a lens: all of them, or none for a camera that gives poses and no images.
+pub(super) const LENS_KEYS: [&str; 5] = ["model", "resolution_px", "focal_px", "center_px", "distortion"];
+/// Of a usual detector, px. Assumed.
+const CORNER_STD_PX: f64 = 0.3;
+
+/// A lens as the file gives it.
+struct LensFile<'a> {
+    model: &'a str,
+    resolution_px: [u32; 2],
+    focal_px: [f64; 2],
+    center_px: [f64; 2],
+    distortion: &'a [f64],
+    max_view_angle_rad: Option<f64>,
+}
+
+impl CameraFile {
+    /// `None` where none of the keys of a lens is there.
+    fn lens(&self, file: &Path) -> Result<Option<LensFile<'_>>, FileIssue> {
+        let given = (&self.model, self.resolution_px, self.focal_px, self.center_px, &self.distortion);
+        if let (Some(model), Some(resolution_px), Some(focal_px), Some(center_px), Some(distortion)) = given {
+            let max_view_angle_rad = self.max_view_angle_rad;
+            return Ok(Some(LensFile { model, resolution_px, focal_px, center_px, distortion, max_view_angle_rad }));
+        }
+        let has = [given.0.is_some(), given.1.is_some(), given.2.is_some(), given.3.is_some(), given.4.is_some()];
+        if !has.contains(&true) && self.max_view_angle_rad.is_none() && self.port.is_none() {
+            return Ok(None);
+        }
+        let missing = LENS_KEYS.iter().zip(has).filter(|(_, has)| !has).map(|(key, _)| *key);
+        let problem = format!("has no {}: a lens needs them all", missing.collect::<Vec<_>>().join(", "));
+        Err(FileIssue::new(file, "[camera]", problem))
+    }
 }
 
 /// A flat window before the lens.
@@ -97,10 +130,10 @@ impl PortFile {
 }
 
 /// The lens of `[camera]`, without the window.
-fn lens(file: &Path, raw: &CameraFile) -> Result<CameraModel, FileIssue> {
+fn lens(file: &Path, raw: &LensFile<'_>) -> Result<CameraModel, FileIssue> {
     let issue = |key: &str, problem: String| FileIssue::new(file, format!("camera.{key}"), problem);
     let (focal, center, resolution) = (raw.focal_px, raw.center_px, raw.resolution_px);
-    match (raw.model.as_str(), &raw.distortion[..]) {
+    match (raw.model, raw.distortion) {
         ("equidistant", &[k1, k2, k3, k4]) => {
             let angle = raw.max_view_angle_rad.ok_or_else(|| issue("max_view_angle_rad", "is missing".to_owned()))?;
             let lens = Fisheye {
@@ -134,18 +167,23 @@ fn lens(file: &Path, raw: &CameraFile) -> Result<CameraModel, FileIssue> {
     }
 }
 
-pub(super) fn check_camera(file: &Path, raw: CameraFile, mount: Attachment) -> Result<CameraSpec, RobotError> {
+pub(super) fn check_camera(file: &Path, raw: &CameraFile, mount: Attachment) -> Result<CameraSpec, RobotError> {
     let check = |key: &str, value: f64, range| FileIssue::check_range(file, &format!("camera.{key}"), value, range);
-    for k in 0..2 {
-        check("resolution_px", f64::from(raw.resolution_px[k]), 16.0..=65536.0)?;
-        check("focal_px", raw.focal_px[k], 1.0..=1e6)?;
-        check("center_px", raw.center_px[k], -1e6..=1e6)?;
-    }
-    for value in &raw.distortion {
-        check("distortion", *value, -10.0..=10.0)?;
-    }
     let port = raw.port.map(|port| port.check(file)).transpose()?;
-    let lens = CameraModel { port, ..lens(file, &raw)? };
+    let lens = match raw.lens(file)? {
+        None => CameraModel::unknown(),
+        Some(given) => {
+            for k in 0..2 {
+                check("resolution_px", f64::from(given.resolution_px[k]), 16.0..=65536.0)?;
+                check("focal_px", given.focal_px[k], 1.0..=1e6)?;
+                check("center_px", given.center_px[k], -1e6..=1e6)?;
+            }
+            for value in given.distortion {
+                check("distortion", *value, -10.0..=10.0)?;
+            }
+            CameraModel { port, ..lens(file, &given)? }
+        }
+    };
     let usual = LensPriors::default();
     let lens_priors = LensPriors {
         focal_std: check("focal_std", raw.focal_std.unwrap_or(usual.focal_std), 0.0..=0.1)?,
@@ -153,11 +191,11 @@ pub(super) fn check_camera(file: &Path, raw: CameraFile, mount: Attachment) -> R
         distortion_std: check("distortion_std", raw.distortion_std.unwrap_or(usual.distortion_std), 0.0..=1.0)?,
     };
     Ok(CameraSpec {
-        name: raw.name,
+        name: raw.name.clone(),
         mount,
         lens,
         lens_priors,
-        corner_std_px: check("corner_std_px", raw.corner_std_px, 1e-3..=100.0)?,
+        corner_std_px: check("corner_std_px", raw.corner_std_px.unwrap_or(CORNER_STD_PX), 1e-3..=100.0)?,
         mount_std_m: check("mount_std_m", raw.mount_std_m, 0.0..=1.0)?,
         mount_std_rad: check("mount_std_rad", raw.mount_std_rad, 0.0..=1.0)?,
     })

@@ -35,7 +35,11 @@ pub enum RobotError {
     ZeroMass { file: PathBuf, link: String, mass_kg: f64 },
     #[error("{}: no chain of joints leads from `{from}` to `{to}`", file.display())]
     NoChain { file: PathBuf, from: String, to: String },
-    #[error("{}: joint `{joint}` is {kind}; only revolute, continuous and fixed joints are supported", file.display())]
+    #[error(
+        "{}: joint `{joint}` between base_link and the tool or camera is {kind}; only revolute, continuous and fixed \
+         joints may be there: name a base_link beyond it, or a tool and camera before it",
+        file.display()
+    )]
     JointKind { file: PathBuf, joint: String, kind: String },
 }
 
@@ -44,6 +48,18 @@ impl FileIssue {
     #[must_use]
     pub fn new(file: &Path, key: impl Into<String>, problem: impl Into<String>) -> Self {
         Self { file: file.to_owned(), key: key.into(), problem: problem.into() }
+    }
+
+    /// One issue of `file` for several; `None` where there are none.
+    pub(super) fn all(file: &Path, issues: &[Self]) -> Option<Self> {
+        match issues {
+            [] => None,
+            [only] => Some(only.clone()),
+            several => {
+                let each = several.iter().map(|issue| format!("{}: {}", issue.key, issue.problem));
+                Some(Self::new(file, format!("{} keys", several.len()), each.collect::<Vec<_>>().join("; ")))
+            }
+        }
     }
 
     /// Checks that `value` is finite and within `low..=high`.

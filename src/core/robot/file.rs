@@ -7,18 +7,21 @@ use serde::Deserialize;
 
 use super::allowed_pairs::AllowedPairs;
 use super::body::LinkBody;
-use super::camera::{CameraFile, check_camera};
+use super::camera::{CameraFile, CameraSpec, check_camera};
+use super::completeness::check_complete;
 use super::drive::{DriveSpec, HydraulicsFile, MotionSpec, check_displacements};
 use super::error::{FileIssue, RobotError, parse_toml, read_in};
 use super::geometry::GeometryPriors;
 use super::gripper::GripperFile;
 use super::gripper_tag::GripperTagFile;
 use super::joint_sensor::{SensorFile, check_sensors};
-use super::nominal::{Robot, ToolSpec, check_stowed};
-use super::self_collision;
+use super::nominal::{BASE_TAG, Robot, STOWED, ToolSpec, check_stowed, lens_issue};
+use super::self_collision::{self, Stored};
 use super::shape::{PlacedShape, Shape};
 use super::survey::{TagFile, check_tags};
 use super::urdf::{UrdfChain, UrdfModel};
+use super::urdf_mesh::{CollisionMeshes, MeshFolders};
+use crate::joints::JointAngles;
 use crate::kinematics::{ArmLoads, Attachment};
 use crate::spatial::{Base, Pose};
 
@@ -29,8 +32,10 @@ struct RobotFile {
     name: String,
     urdf: PathBuf,
     base_link: String,
-    base_tag: u32,
-    stowed_rad: Vec<f64>,
+    base_tag: Option<u32>,
+    stowed_rad: Option<Vec<f64>>,
+    #[serde(default)]
+    collision_meshes: CollisionMeshes,
     #[serde(default)]
     allowed_pairs: Vec<[String; 2]>,
     #[serde(default = "default_buoyancy_fraction")]
@@ -72,14 +77,19 @@ fn default_buoyancy_fraction() -> f64 {
     0.22
 }
 
-/// Reads a robot folder: robot.toml and the URDF that it names.
+/// Reads a robot folder: robot.toml, the URDF that it names, the collision meshes that this names, and
+/// self_collision.toml. One of another URDF is left out and becomes a planning issue.
 ///
 /// # Errors
 /// [`RobotError`] naming file, key and allowed range.
 pub fn load(folder: &Path) -> Result<Robot, RobotError> {
-    let robot = load_without_pairs(folder)?;
-    let self_pairs = self_collision::read(folder, &robot.urdf_text, &robot.bodies)?;
-    Ok(Robot { self_pairs, ..robot })
+    let mut robot = load_without_pairs(folder)?;
+    match self_collision::read(folder, &robot.urdf_text, &robot.bodies)? {
+        Stored::Pairs(pairs) => robot.self_pairs = Some(pairs),
+        Stored::Stale(issue) => robot.planning_issues.push(issue),
+        Stored::None => {}
+    }
+    Ok(robot)
 }
 
 /// Reads a robot folder without its self_collision.toml, which may belong to another URDF.
@@ -87,26 +97,96 @@ pub fn load(folder: &Path) -> Result<Robot, RobotError> {
 /// # Errors
 /// [`RobotError`] naming file, key and allowed range.
 pub fn load_without_pairs(folder: &Path) -> Result<Robot, RobotError> {
+    let (raw, urdf) = read_files(folder)?;
+    robot_of(folder, raw, urdf, Meshes::Read)
+}
+
+/// Reads the attachments of a recording in `folder`: the URDF's meshes are not among them, nor is self_collision.toml.
+///
+/// # Errors
+/// [`RobotError`] naming file, key and allowed range.
+pub fn load_attached(folder: &Path) -> Result<Robot, RobotError> {
+    let (raw, urdf) = read_files(folder)?;
+    robot_of(folder, raw, urdf, Meshes::Skip)
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Meshes {
+    Read,
+    Skip,
+}
+
+fn read_files(folder: &Path) -> Result<(RobotFile, UrdfModel), RobotError> {
     let file = folder.join("robot.toml");
-    let raw: RobotFile = parse_toml(&file, &read_in(folder, &file)?)?;
+    let text = read_in(folder, &file)?;
+    let table: toml::Table = parse_toml(&file, &text)?;
+    check_complete(&file, &table, || joint_names(folder, &table))?;
+    let raw: RobotFile = parse_toml(&file, &text)?;
     FileIssue::check_range(&file, "version", f64::from(raw.version), 1.0..=1.0)?;
     let urdf = read_urdf(folder, &raw.urdf)?;
+    Ok((raw, urdf))
+}
+
+/// The chain's joints as far as a robot.toml that lacks keys tells them.
+fn joint_names(folder: &Path, robot: &toml::Table) -> Option<Vec<String>> {
+    let text = |table: &toml::Table, key: &str| Some(table.get(key)?.as_str()?.to_owned());
+    let link = |name: &str| text(robot.get(name)?.as_table()?, "link");
+    let tips: Vec<String> = [link("tool"), link("camera")].into_iter().flatten().collect();
+    let tips: Vec<&str> = tips.iter().map(String::as_str).collect();
+    let urdf = read_urdf(folder, Path::new(&text(robot, "urdf")?)).ok()?;
+    let chain = urdf.chain(&text(robot, "base_link")?, &tips).ok()?;
+    Some(chain.joints().iter().map(|joint| joint.name.clone()).collect())
+}
+
+/// What planning needs and `raw` does not give.
+fn planning_issues(file: &Path, raw: &RobotFile, camera: &CameraSpec, arm: &UrdfChain<'_>) -> Vec<FileIssue> {
+    let mut issues = Vec::new();
+    if raw.stowed_rad.is_none() {
+        let problem = "is missing; add one angle per joint, rad, at which the arm stands clear: paths start there";
+        issues.push(FileIssue::new(file, STOWED, problem));
+    }
+    if raw.base_tag.is_none() {
+        let problem = "is missing; add it and the [[tag]]s around the arm, or name a vehicle that carries tags";
+        issues.push(FileIssue::new(file, BASE_TAG, problem));
+    }
+    if !camera.lens.is_known() {
+        issues.push(lens_issue(file));
+    }
+    let mut ignored: Vec<&str> = arm.collision_meshes().iter().map(|mesh| mesh.link).collect();
+    ignored.dedup();
+    if raw.collision_meshes == CollisionMeshes::Ignore && !ignored.is_empty() {
+        let problem = format!(
+            "are ignored for the links {}: nothing keeps paths clear of them. Put the files into the folder and take \
+             the key out, or draw boxes, cylinders or spheres",
+            ignored.join(", ")
+        );
+        issues.push(FileIssue::new(file, "collision_meshes", problem));
+    }
+    issues
+}
+
+fn robot_of(folder: &Path, raw: RobotFile, urdf: UrdfModel, meshes: Meshes) -> Result<Robot, RobotError> {
+    let file = folder.join("robot.toml");
     let chain = urdf.chain(&raw.base_link, &[&raw.tool.link, &raw.camera.link])?;
     let jaws = raw.gripper.as_ref().map(GripperFile::jaws).unwrap_or_default();
     let arm = UrdfChain { urdf: &urdf, base_link: &raw.base_link, chain: &chain };
-    let mut bodies = arm.bodies(jaws)?;
+    let is_read = raw.collision_meshes == CollisionMeshes::Hull && meshes == Meshes::Read;
+    let beside = urdf.file.parent().unwrap_or(folder).to_owned();
+    let folders = is_read.then(|| MeshFolders { folders: [beside, folder.to_owned()] });
+    let mut bodies = arm.bodies(jaws, folders.as_ref())?;
+    let camera_mount = arm.attachment(&raw.camera.link)?;
+    let camera = check_camera(&file, &raw.camera, camera_mount)?;
+    let planning_issues = planning_issues(&file, &raw, &camera, &arm);
     let allowed_pairs = AllowedPairs::check(&file, raw.allowed_pairs, &bodies)?;
     let sensors = check_sensors(&file, &raw.joint_sensor, &chain)?;
     let drive = DriveSpec {
         pump_l_per_min: raw.hydraulics.map(|hydraulics| hydraulics.check(&file)).transpose()?,
-        displacement_l_per_rad: check_displacements(
-            &file,
-            raw.joint_sensor.iter().map(|sensor| (sensor.joint.as_str(), sensor.displacement_l_per_rad)),
-            &urdf,
-        )?,
+        displacement_l_per_rad: displacements_l_per_rad(&file, &raw.joint_sensor, &urdf)?,
         motion: raw.motion.check(&file)?,
     };
-    let stowed = check_stowed(&file, "stowed_rad", &raw.stowed_rad, chain.n_joints())?;
+    let middle = || JointAngles::from_fn(chain.n_joints(), |joint| sensors[joint].center_rad);
+    let stowed = raw.stowed_rad.map(|angles_rad| check_stowed(&file, STOWED, &angles_rad, chain.n_joints()));
+    let stowed = stowed.transpose()?.unwrap_or_else(middle);
     let mut tool = arm.attachment(&raw.tool.link)?;
     raw.tool.check_point(&file)?;
     let gripper = raw.gripper.map(|gripper| gripper.check(&file, &arm, &tool)).transpose()?;
@@ -115,8 +195,6 @@ pub fn load_without_pairs(folder: &Path) -> Result<Robot, RobotError> {
         FileIssue::check_range(&file, "tool.tip_radius_m", radius_m, 0.002..=0.2)?;
         add_tip(&mut bodies[tool.n_joints], tool.link_from_frame, radius_m);
     }
-    let camera_mount = arm.attachment(&raw.camera.link)?;
-    let camera = check_camera(&file, raw.camera, camera_mount)?;
     let tags = check_tags(&file, &raw.tag, raw.base_tag, &Pose::<Base, Base>::identity())?;
     let gripper_tag = raw.gripper_tag.map(|tag| tag.check(&file, &arm, &camera.mount)).transpose()?;
     if let Some(tag) = &gripper_tag {
@@ -132,6 +210,7 @@ pub fn load_without_pairs(folder: &Path) -> Result<Robot, RobotError> {
         urdf_text: urdf.text,
         base_link: raw.base_link,
         stowed,
+        planning_issues,
         buoyancy_fraction,
         tool: ToolSpec { mount: tool, tip_radius_m: raw.tool.tip_radius_m },
         gripper,
@@ -147,6 +226,10 @@ pub fn load_without_pairs(folder: &Path) -> Result<Robot, RobotError> {
         camera,
         tags,
     })
+}
+
+fn displacements_l_per_rad(file: &Path, sensors: &[SensorFile], urdf: &UrdfModel) -> Result<Vec<f64>, FileIssue> {
+    check_displacements(file, sensors.iter().map(|sensor| (sensor.joint.as_str(), sensor.displacement_l_per_rad)), urdf)
 }
 
 fn loads(geometry: &GeometryPriors, bodies: &[LinkBody], buoyancy_fraction: f64, tool: Attachment) -> ArmLoads {

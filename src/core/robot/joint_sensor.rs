@@ -103,8 +103,18 @@ pub(super) fn check_sensors(
     let names: Vec<&str> = raw.iter().map(|s| s.joint.as_str()).collect();
     let expected: Vec<&str> = chain.joints().iter().map(|j| j.name.as_str()).collect();
     if names != expected {
-        let problem =
-            format!("the URDF's moving joints are {expected:?}, in this order, but the sensors name {names:?}");
+        let without: Vec<&&str> = expected.iter().filter(|joint| !names.contains(joint)).collect();
+        let beside: Vec<&&str> = names.iter().filter(|name| !expected.contains(name)).collect();
+        let mut problem = format!("the chain's moving joints are {expected:?}, one sensor each, in this order");
+        if !without.is_empty() {
+            problem += &format!("; add one for {without:?}");
+        }
+        if !beside.is_empty() {
+            problem += &format!("; take out {beside:?}, which do not lie between base_link and tool or camera");
+        }
+        if without.is_empty() && beside.is_empty() {
+            problem += &format!("; the sensors name {names:?}");
+        }
         return Err(FileIssue::new(file, "joint_sensor", problem).into());
     }
     raw.iter().zip(chain.joints()).map(|(s, joint)| check_sensor(file, s, joint)).collect()

@@ -31,13 +31,21 @@ const MAX_VERTICES: usize = 3 * MAX_TRIANGLES;
 const STL_HEADER: usize = 84;
 const STL_TRIANGLE: usize = 50;
 
+fn extension(file: &Path) -> Option<String> {
+    file.extension().map(|e| e.to_string_lossy().to_ascii_lowercase())
+}
+
+/// Whether a file of this name is one of the formats that are read.
+pub(super) fn is_readable(file: &Path) -> bool {
+    matches!(extension(file).as_deref(), Some("stl" | "obj"))
+}
+
 /// Reads `file` by its extension.
 ///
 /// # Errors
 /// [`MeshError`], whatever the bytes are.
 pub(super) fn read(file: &Path) -> Result<Mesh, MeshError> {
-    let extension = file.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
-    let parse = match extension.as_deref() {
+    let parse = match extension(file).as_deref() {
         Some("stl") => stl,
         Some("obj") => obj,
         _ => return Err(MeshError::Extension),

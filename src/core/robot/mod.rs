@@ -4,8 +4,10 @@
 //! Shapes are convex, meshes are convex hulls. As-built values are in `sim`, estimates in `calib`.
 
 mod allowed_pairs;
+mod arm_chain;
 mod body;
 mod camera;
+mod completeness;
 mod decomposition;
 mod drive;
 mod error;
@@ -18,6 +20,7 @@ mod hull;
 mod joint_sensor;
 mod light;
 mod mesh;
+mod new_folder;
 mod nominal;
 mod part;
 mod self_collision;
@@ -26,6 +29,7 @@ mod shape;
 mod survey;
 mod toml_text;
 mod urdf;
+mod urdf_mesh;
 mod urdf_text;
 mod vehicle;
 
@@ -35,13 +39,14 @@ pub use camera::{CameraSpec, LensPriors};
 pub use drive::{DriveSpec, MotionSpec};
 pub use error::{FileIssue, RobotError, parse_toml, read_table, read_text};
 pub use failed::{FailedJoint, FailedKind};
-pub use file::{load, load_without_pairs};
+pub use file::{load, load_attached, load_without_pairs};
 pub use geometry::GeometryPriors;
 pub use gripper::{GripperSpec, Jaw};
 pub use gripper_tag::GripperTag;
 pub use hull::{Hull, HullError, MAX_HULL_POINTS};
 pub use joint_sensor::{JointSensorSpec, SensorKind};
 pub use light::VehicleLight;
+pub use new_folder::{DraftedMeshes, NewFile, NewRobot, draft_robot};
 pub use nominal::{Robot, ToolSpec};
 pub use part::{MAX_PARTS, Part, PartFile, check_parts};
 pub use self_collision::SELF_COLLISION_FILE;

@@ -6,7 +6,7 @@ use nalgebra::{Isometry3, Matrix6};
 
 use super::allowed_pairs::AllowedPairs;
 use super::body::LinkBody;
-use super::camera::CameraSpec;
+use super::camera::{CameraSpec, LENS_KEYS};
 use super::drive::DriveSpec;
 use super::error::{FileIssue, RobotError};
 use super::failed::FailedJoint;
@@ -57,14 +57,27 @@ pub struct Robot {
     pub camera: CameraSpec,
     /// Tags by survey, with those whose pose is unknown; without the tag on the gripper.
     pub tags: Vec<SurveyedTag>,
-    /// Id of the tag beside the base; one of `tags` where there are any.
-    pub base_tag: u32,
-    /// Joint angles in which the arm is stowed, rad.
+    /// Id of the tag beside the base; one of `tags` where there are any, `None` where there are none.
+    pub base_tag: Option<u32>,
+    /// Joint angles in which the arm is stowed, rad. Where robot.toml names none, the middle of each joint's range: a
+    /// start for what needs any angles, and no place to plan from (`planning_issues`).
     pub stowed: JointAngles,
+    /// What planning needs and the folder does not give; empty for an arm that `run` and `plan` can move.
+    pub planning_issues: Vec<FileIssue>,
     /// Weight of the displaced sea water divided by the arm's weight.
     pub buoyancy_fraction: f64,
     /// Joints declared to have failed; empty as loaded.
     pub failed: Vec<FailedJoint>,
+}
+
+/// Keys of what planning may lack.
+pub(super) const STOWED: &str = "stowed_rad";
+pub(super) const BASE_TAG: &str = "base_tag";
+
+/// That the camera's lens is missing.
+pub(super) fn lens_issue(file: &Path) -> FileIssue {
+    let problem = format!("is missing; images and the corners of tags need it: add {}", LENS_KEYS.join(", "));
+    FileIssue::new(file, "[camera] lens", problem)
 }
 
 /// `[tool]` of robot.toml.
@@ -98,6 +111,7 @@ impl Robot {
     /// The same arm with the tags of `survey`.
     #[must_use]
     pub fn with_survey(mut self, survey: TagSurvey) -> Self {
+        self.planning_issues.retain(|issue| issue.key != BASE_TAG);
         self.tags = survey.tags;
         self.base_tag = survey.base_tag;
         self
@@ -113,6 +127,7 @@ impl Robot {
         if let Some(stowed_rad) = vehicle.stowed_rad.get(&self.name) {
             let key = format!("stowed_rad.{}", self.name);
             self.stowed = check_stowed(&vehicle.file, &key, stowed_rad, self.n_joints())?;
+            self.planning_issues.retain(|issue| issue.key != STOWED);
         }
         let Some(survey) = &vehicle.survey else { return Ok(self) };
         if let Some(tag) = &self.gripper_tag {
@@ -145,19 +160,40 @@ impl Robot {
         TagSurvey { base_tag: self.base_tag, tags: self.tags.clone() }
     }
 
-    /// Checks that the arm can be simulated: each moving body has mass.
+    /// Checks that the arm can be simulated: each moving body has mass and an inertia.
     ///
     /// # Errors
-    /// [`RobotError::ZeroMass`] naming the first link without mass.
+    /// [`RobotError::ZeroMass`] or [`RobotError::Value`] naming the first link that has not.
     pub fn require_masses(&self) -> Result<(), RobotError> {
-        match self.bodies[1..].iter().find(|body| body.mass_kg <= 0.0) {
-            None => Ok(()),
-            Some(body) => Err(RobotError::ZeroMass {
-                file: self.folder.join(&self.urdf_name),
-                link: body.name.clone(),
-                mass_kg: body.mass_kg,
-            }),
+        let file = self.folder.join(&self.urdf_name);
+        for body in &self.bodies[1..] {
+            if body.mass_kg <= 0.0 {
+                return Err(RobotError::ZeroMass { file, link: body.name.clone(), mass_kg: body.mass_kg });
+            }
+            if let Some(link) = &body.bad_inertia {
+                let key = format!("link `{link}`: inertia");
+                return Err(
+                    FileIssue::new(&file, key, "is not positive definite, so the arm cannot be simulated").into()
+                );
+            }
         }
+        Ok(())
+    }
+
+    /// Checks that paths can be planned for the arm and views seen by its camera.
+    ///
+    /// # Errors
+    /// [`FileIssue`] naming all that the folder lacks for it, and what to add.
+    pub fn require_planning(&self) -> Result<(), FileIssue> {
+        FileIssue::all(&self.folder.join("robot.toml"), &self.planning_issues).map_or(Ok(()), Err)
+    }
+
+    /// Checks that the camera's lens is known: tags' corners mean nothing without it.
+    ///
+    /// # Errors
+    /// [`FileIssue`] naming the keys to add.
+    pub fn require_lens(&self) -> Result<(), FileIssue> {
+        if self.camera.lens.is_known() { Ok(()) } else { Err(lens_issue(&self.folder.join("robot.toml"))) }
     }
 
     /// The same arm with these joints declared to have failed. A later declaration of a joint replaces an earlier one.

@@ -66,21 +66,29 @@ impl SelfPairs {
     }
 }
 
+/// What a robot folder holds of its file.
+pub(super) enum Stored {
+    Pairs(SelfPairs),
+    /// Of another URDF: nothing may be planned with it.
+    Stale(FileIssue),
+    None,
+}
+
 /// Reads the file of a robot folder where there is one.
-pub(super) fn read(folder: &Path, urdf_text: &str, bodies: &[LinkBody]) -> Result<Option<SelfPairs>, RobotError> {
+pub(super) fn read(folder: &Path, urdf_text: &str, bodies: &[LinkBody]) -> Result<Stored, RobotError> {
     let file = folder.join(SELF_COLLISION_FILE);
     if !file.exists() {
-        return Ok(None);
+        return Ok(Stored::None);
     }
     let raw: SelfCollisionFile = parse_toml(&file, &read_in(folder, &file)?)?;
     FileIssue::check_range(&file, "version", f64::from(raw.version), 1.0..=1.0)?;
     FileIssue::check_range(&file, "near_m", raw.near_m, 0.0..=10.0)?;
     if raw.urdf_blake3 != hash(urdf_text) {
         let problem = format!(
-            "the URDF has changed; make the file again with `armcal study self-collision {}`, or remove it",
+            "is of another URDF; make the file again with `armcal study self-collision {}`, or remove it",
             folder.display()
         );
-        return Err(FileIssue::new(&file, "urdf_blake3", problem).into());
+        return Ok(Stored::Stale(FileIssue::new(&file, SELF_COLLISION_FILE, problem)));
     }
     let mut pairs = Vec::new();
     for (k, pair) in raw.pair.iter().enumerate() {
@@ -98,7 +106,7 @@ pub(super) fn read(folder: &Path, urdf_text: &str, bodies: &[LinkBody]) -> Resul
         FileIssue::check_range(&file, &format!("pair[{k}].nearest_m"), pair.nearest_m, 0.0..=10.0)?;
         pairs.push(SelfPair { bodies: [a.min(b), a.max(b)], nearest_m: pair.nearest_m });
     }
-    Ok(Some(SelfPairs { seed: raw.seed, n: raw.n, near_m: raw.near_m, pairs }))
+    Ok(Stored::Pairs(SelfPairs { seed: raw.seed, n: raw.n, near_m: raw.near_m, pairs }))
 }
 
 fn hash(urdf_text: &str) -> String {
@@ -110,7 +118,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_stored_list_is_read_again_and_refused_for_another_drawing() {
+    fn a_stored_list_is_read_again_and_a_stale_one_stops_planning_alone() {
         let source = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("robots/titan4");
         let folder = tempfile::tempdir().expect("a folder");
         for name in ["robot.toml", "titan4.urdf"] {
@@ -127,7 +135,9 @@ mod tests {
         assert!(read.has(1, 6) && !read.has(0, 4));
         let urdf = folder.path().join("titan4.urdf");
         std::fs::write(&urdf, robot.urdf_text.replace("0.83228", "0.83229")).expect("written");
-        let error = super::super::load(folder.path()).expect_err("another drawing").to_string();
+        let stale = super::super::load(folder.path()).expect("it reads without the stale list");
+        assert_eq!(stale.self_pairs, None);
+        let error = stale.require_planning().expect_err("another drawing").to_string();
         assert!(error.contains("self_collision.toml") && error.contains("armcal study self-collision"), "{error}");
         assert!(super::super::load_without_pairs(folder.path()).is_ok());
     }

@@ -59,8 +59,8 @@ pub struct BaseTagStd {
 /// All tags around an arm.
 #[derive(Clone, Debug)]
 pub struct TagSurvey {
-    /// The tag beside the base; the replay shows it.
-    pub base_tag: u32,
+    /// The tag beside the base; the replay shows it. `None` where there are no tags.
+    pub base_tag: Option<u32>,
     /// Each id once; the base tag is one of them.
     pub tags: Vec<SurveyedTag>,
 }
@@ -74,7 +74,7 @@ impl TagSurvey {
             None if ids.is_empty() => return Err("needs one tag or more".to_owned()),
             None => {}
         }
-        let base_tag = if ids.contains(&self.base_tag) { self.base_tag } else { ids[0] };
+        let base_tag = self.base_tag.filter(|id| ids.contains(id)).or(ids.first().copied());
         let tags = self.tags.iter().filter(|tag| ids.contains(&tag.id)).cloned().collect();
         Ok(Self { base_tag, tags })
     }
@@ -90,7 +90,7 @@ impl TagSurvey {
             return Err(format!("tag {id} is none of {ids:?}"));
         }
         for tag in &mut self.tags {
-            if tag.id == self.base_tag {
+            if Some(tag.id) == self.base_tag {
                 tag.position_std_m = base.position_std_m.unwrap_or(tag.position_std_m);
                 tag.rotation_std_rad = base.rotation_std_rad.unwrap_or(tag.rotation_std_rad);
             } else if *knowledge != MapKnowledge::Known && !known.contains(&tag.id) {
@@ -118,7 +118,7 @@ pub(super) struct TagFile {
 pub(super) fn check_tags<Owner: Frame>(
     file: &Path,
     raw: &[TagFile],
-    base_tag: u32,
+    base_tag: Option<u32>,
     base_from_owner: &Pose<Base, Owner>,
 ) -> Result<Vec<SurveyedTag>, RobotError> {
     if raw.len() > MAX_TAGS {
@@ -146,8 +146,15 @@ pub(super) fn check_tags<Owner: Frame>(
             rotation_std_rad: FileIssue::check_range(file, &key("rotation_std_rad"), tag.rotation_std_rad, 0.0..=1.0)?,
         });
     }
-    if !tags.is_empty() && !seen.contains(&base_tag) {
-        return Err(FileIssue::new(file, "base_tag", format!("tag {base_tag} is not among the [[tag]]s")).into());
+    match base_tag {
+        None if !tags.is_empty() => {
+            let problem = "is missing; it is the id of the [[tag]] beside the base, or of any other";
+            return Err(FileIssue::new(file, "base_tag", problem).into());
+        }
+        Some(id) if !tags.is_empty() && !seen.contains(&id) => {
+            return Err(FileIssue::new(file, "base_tag", format!("tag {id} is not among the [[tag]]s")).into());
+        }
+        _ => {}
     }
     Ok(tags)
 }

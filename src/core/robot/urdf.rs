@@ -9,6 +9,7 @@ use urdf_rs::{Geometry, JointType};
 use super::body::LinkBody;
 use super::error::{FileIssue, RobotError};
 use super::shape::{PlacedShape, Shape};
+use super::urdf_mesh::{MeshFolders, NamedMesh};
 use super::urdf_text::plain_urdf;
 use crate::joints::MAX_JOINTS;
 use crate::kinematics::{Attachment, Chain, ChainJoint, JointLimits};
@@ -21,9 +22,9 @@ pub const MAX_COLLISION_SHAPES: usize = 64;
 pub(super) struct UrdfModel {
     pub file: PathBuf,
     pub text: String,
-    robot: urdf_rs::Robot,
+    pub robot: urdf_rs::Robot,
     /// Child link -> joint index.
-    joint_of_child: BTreeMap<String, usize>,
+    pub joint_of_child: BTreeMap<String, usize>,
 }
 
 /// A URDF file and the chain of an arm in it.
@@ -34,11 +35,27 @@ pub(super) struct UrdfChain<'a> {
     pub chain: &'a Chain,
 }
 
-/// One visual or collision element of a link.
+/// A shape of a link, at its place in the link's frame.
 struct Element<'a> {
     origin: &'a urdf_rs::Pose,
-    geometry: &'a Geometry,
+    shape: Shape,
     color_rgb: [u8; 3],
+}
+
+/// The shape of a geometry that needs no file; `None` for a mesh.
+fn primitive(geometry: &Geometry) -> Option<Shape> {
+    match *geometry {
+        Geometry::Box { size } => Some(Shape::Box { size_m: size.0 }),
+        Geometry::Cylinder { radius, length } => Some(Shape::Cylinder { radius_m: radius, length_m: length }),
+        Geometry::Capsule { radius, length } => Some(Shape::Capsule { radius_m: radius, length_m: length }),
+        Geometry::Sphere { radius } => Some(Shape::Sphere { radius_m: radius }),
+        Geometry::Mesh { .. } => None,
+    }
+}
+
+fn named_mesh<'a>(link: &'a urdf_rs::Link, geometry: &'a Geometry) -> Option<NamedMesh<'a>> {
+    let Geometry::Mesh { filename, scale } = geometry else { return None };
+    Some(NamedMesh { link: &link.name, name: filename, scale: scale.map_or([1.0; 3], |scale| scale.0) })
 }
 
 fn isometry(origin: &urdf_rs::Pose) -> Isometry3<f64> {
@@ -82,7 +99,7 @@ impl UrdfModel {
             if joint_of_child.insert(joint.child.link.clone(), idx).is_some() {
                 return Err(RobotError::Loop { file: file.to_owned(), link: joint.child.link.clone() });
             }
-            check_joint_numbers(file, joint)?;
+            check_numbers(file, joint)?;
         }
         let model = Self { file: file.to_owned(), text, robot, joint_of_child };
         model.check_acyclic()?;
@@ -135,6 +152,7 @@ impl UrdfModel {
         let mut pending = Isometry3::identity();
         for &idx in &longest {
             let joint = &self.robot.joints[idx];
+            check_moving(&self.file, joint)?;
             pending *= isometry(&joint.origin);
             let limits = match joint.joint_type {
                 JointType::Fixed => continue,
@@ -173,11 +191,13 @@ impl UrdfModel {
         self.robot.links.iter().any(|link| link.name == name)
     }
 
+    /// Adds mass and collision shapes; collision meshes where `meshes` are read.
     fn add_link(
         &self,
         body: &mut LinkBody,
         link: &urdf_rs::Link,
         body_from_link: &Isometry3<f64>,
+        meshes: Option<&MeshFolders>,
     ) -> Result<(), RobotError> {
         let inertial = &link.inertial;
         let mass_key = format!("link `{}`: mass", link.name);
@@ -191,15 +211,28 @@ impl UrdfModel {
         if mass_kg > 0.0 {
             FileIssue::check_range(&self.file, &mass_key, mass_kg, 1e-6..=1e6)?;
             if inertia.cholesky().is_none() {
-                let key = format!("link `{}`: inertia", link.name);
-                return Err(FileIssue::new(&self.file, key, "is not positive definite").into());
+                body.bad_inertia.get_or_insert_with(|| link.name.clone());
             }
             let body_from_com = body_from_link * isometry(&inertial.origin);
             body.add_mass(mass_kg, &body_from_com, &inertia);
         }
         for collision in &link.collision {
-            let element = Element { origin: &collision.origin, geometry: &collision.geometry, color_rgb: [0; 3] };
-            body.collisions.push(self.placed(&link.name, &element, body_from_link)?);
+            let origin = &collision.origin;
+            let placed = match (named_mesh(link, &collision.geometry), meshes) {
+                (None, _) => {
+                    let Some(shape) = primitive(&collision.geometry) else { continue };
+                    self.placed(&link.name, Element { origin, shape, color_rgb: [0; 3] }, body_from_link)?
+                }
+                (Some(mesh), Some(folders)) => {
+                    let (shape, center_m) = folders.hull(&self.file, &mesh)?;
+                    let element = Element { origin, shape, color_rgb: [0; 3] };
+                    let mut placed = self.placed(&link.name, element, body_from_link)?;
+                    placed.owner_from_shape *= Translation3::from(center_m);
+                    placed
+                }
+                (Some(_), None) => continue,
+            };
+            body.collisions.push(placed);
         }
         Ok(())
     }
@@ -211,9 +244,11 @@ impl UrdfModel {
         body_from_link: &Isometry3<f64>,
     ) -> Result<(), RobotError> {
         for visual in &link.visual {
+            // Nothing is drawn of a mesh.
+            let Some(shape) = primitive(&visual.geometry) else { continue };
             let color_rgb = visual.material.as_ref().and_then(|m| self.color(m)).unwrap_or([160, 160, 160]);
-            let element = Element { origin: &visual.origin, geometry: &visual.geometry, color_rgb };
-            body.visuals.push(self.placed(&link.name, &element, body_from_link)?);
+            let element = Element { origin: &visual.origin, shape, color_rgb };
+            body.visuals.push(self.placed(&link.name, element, body_from_link)?);
         }
         Ok(())
     }
@@ -227,21 +262,10 @@ impl UrdfModel {
     fn placed(
         &self,
         link: &str,
-        element: &Element<'_>,
+        element: Element<'_>,
         body_from_link: &Isometry3<f64>,
     ) -> Result<PlacedShape, RobotError> {
-        let Element { origin, geometry, color_rgb } = *element;
-        let shape = match *geometry {
-            Geometry::Box { size } => Shape::Box { size_m: size.0 },
-            Geometry::Cylinder { radius, length } => Shape::Cylinder { radius_m: radius, length_m: length },
-            Geometry::Capsule { radius, length } => Shape::Capsule { radius_m: radius, length_m: length },
-            Geometry::Sphere { radius } => Shape::Sphere { radius_m: radius },
-            Geometry::Mesh { .. } => {
-                let key = format!("link `{link}`: geometry");
-                let problem = "meshes are not supported; use box, cylinder, capsule or sphere";
-                return Err(FileIssue::new(&self.file, key, problem).into());
-            }
-        };
+        let Element { origin, shape, color_rgb } = element;
         for (name, length) in shape.lengths() {
             FileIssue::check_range(&self.file, &format!("link `{link}`: {name}"), length, 1e-6..=1e4)?;
         }
@@ -289,36 +313,78 @@ impl UrdfChain<'_> {
     }
 
     /// Bodies 0..=n: the base with everything fixed to it, then one per joint of the chain. The links in `apart` move
-    /// by themselves; their visual shapes are omitted.
+    /// by themselves; their visual shapes are omitted. Collision meshes are left out where `meshes` is `None`.
     ///
     /// # Errors
-    /// [`RobotError::Value`] for invalid numbers or shapes.
-    pub fn bodies(&self, apart: &[String]) -> Result<Vec<LinkBody>, RobotError> {
+    /// [`RobotError::Value`] for invalid numbers, shapes or meshes; all meshes without a file at once.
+    pub fn bodies(&self, apart: &[String], meshes: Option<&MeshFolders>) -> Result<Vec<LinkBody>, RobotError> {
         let mut names = vec![self.base_link.to_owned()];
         names.extend(self.chain.joints().iter().map(|j| j.child_link.clone()));
         let mut bodies: Vec<LinkBody> = names.into_iter().map(LinkBody::empty).collect();
+        self.check_collisions(meshes)?;
         for link in &self.urdf.robot.links {
             let Ok(attachment) = self.attachment(&link.name) else { continue };
             let body = &mut bodies[attachment.n_joints];
-            self.urdf.add_link(body, link, &attachment.link_from_frame)?;
+            self.urdf.add_link(body, link, &attachment.link_from_frame, meshes)?;
             if !apart.contains(&link.name) {
                 self.urdf.add_visuals(body, link, &attachment.link_from_frame)?;
             }
         }
-        let n_shapes: usize = bodies.iter().map(|body| body.collisions.len()).sum();
+        Ok(bodies)
+    }
+
+    /// Before any mesh is read: the number of shapes, and whether the meshes are there.
+    fn check_collisions(&self, meshes: Option<&MeshFolders>) -> Result<(), RobotError> {
+        let named = self.collision_meshes();
+        let primitives = self.links().flat_map(|link| &link.collision).filter(|c| primitive(&c.geometry).is_some());
+        let n_shapes = primitives.count() + meshes.map_or(0, |_| named.len());
         if n_shapes > MAX_COLLISION_SHAPES {
             let problem = format!("{n_shapes} shapes on the chain, 0 .. {MAX_COLLISION_SHAPES} allowed");
             return Err(FileIssue::new(&self.urdf.file, "collision", problem).into());
         }
-        Ok(bodies)
+        let Some(folders) = meshes else { return Ok(()) };
+        let problems: Vec<String> = named
+            .iter()
+            .filter_map(|mesh| {
+                Some(format!("{} of link `{}`: {}", mesh.name, mesh.link, folders.find(mesh.name).err()?))
+            })
+            .collect();
+        if problems.is_empty() {
+            return Ok(());
+        }
+        let problem = format!(
+            "{} cannot be used: {}. Or write collision_meshes = \"ignore\" in robot.toml: then paths cannot be planned",
+            problems.len(),
+            problems.join("; ")
+        );
+        Err(FileIssue::new(&self.urdf.file, "collision meshes", problem).into())
+    }
+
+    /// The links that the chain carries.
+    fn links(&self) -> impl Iterator<Item = &urdf_rs::Link> {
+        self.urdf.robot.links.iter().filter(|link| self.attachment(&link.name).is_ok())
+    }
+
+    /// The collision meshes of the chain's links.
+    pub fn collision_meshes(&self) -> Vec<NamedMesh<'_>> {
+        let mut named = Vec::new();
+        for link in self.links() {
+            named.extend(link.collision.iter().filter_map(|collision| named_mesh(link, &collision.geometry)));
+        }
+        named
     }
 }
 
-fn check_joint_numbers(file: &Path, joint: &urdf_rs::Joint) -> Result<(), RobotError> {
-    let numbers = joint.origin.xyz.0.iter().chain(&joint.origin.rpy.0).chain(&joint.axis.xyz.0);
-    for value in numbers {
+/// Numbers that matter for joints of every kind, on the chain or beside it.
+fn check_numbers(file: &Path, joint: &urdf_rs::Joint) -> Result<(), RobotError> {
+    for value in joint.origin.xyz.0.iter().chain(&joint.origin.rpy.0).chain(&joint.axis.xyz.0) {
         FileIssue::check_range(file, &format!("joint `{}`: origin or axis", joint.name), *value, -1e4..=1e4)?;
     }
+    Ok(())
+}
+
+/// Axis, effort and limits of a joint of the chain.
+fn check_moving(file: &Path, joint: &urdf_rs::Joint) -> Result<(), RobotError> {
     if joint.joint_type == JointType::Fixed {
         return Ok(());
     }

@@ -184,6 +184,7 @@ fn check_survey(
         (None, false) => Err(FileIssue::new(file, "base_tag", "is missing; it is required with [[tag]]s").into()),
         (Some(_), true) => Err(FileIssue::new(file, "base_tag", "is not among the [[tag]]s: there are none").into()),
         (Some(base_tag), false) => {
+            let base_tag = Some(base_tag);
             let tags = check_tags(file, &raw.tag, base_tag, &vehicle_from_base.inverse())?;
             Ok(Some(TagSurvey { base_tag, tags }))
         }

@@ -75,6 +75,7 @@ impl Routine {
             robot = robot.with_survey(survey.clone());
             vehicle.survey = Some(survey);
         }
+        robot.require_planning()?;
         self.check_against(&robot, &vehicle)?;
         let failed = self.failed_of(&robot)?;
         let robot = robot.with_failed(&failed);

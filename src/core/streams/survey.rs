@@ -6,7 +6,7 @@ use crate::spatial::{Base, Pose, Tag};
 use crate::time::Stamp;
 
 impl RecordedSurvey {
-    /// The message of `survey` at `stamp`; unknown poses become the identity.
+    /// The message of `survey`, which has tags, at `stamp`; unknown poses become the identity.
     #[must_use]
     pub fn new(stamp: Stamp, survey: &TagSurvey) -> Self {
         // Of an unknown tag's place not even the drawing goes into a recording: nobody can use it by mistake.
@@ -22,7 +22,7 @@ impl RecordedSurvey {
                 rotation_std_rad: tag.rotation_std_rad,
             }
         };
-        Self { stamp, base_tag: survey.base_tag, tags: survey.tags.iter().map(tag).collect() }
+        Self { stamp, base_tag: survey.base_tag.unwrap_or_default(), tags: survey.tags.iter().map(tag).collect() }
     }
 
     /// The survey that it holds; a tag without a direction, which no recording gives back, is left out.
@@ -37,6 +37,6 @@ impl RecordedSurvey {
                 rotation_std_rad: tag.rotation_std_rad,
             })
         };
-        TagSurvey { base_tag: self.base_tag, tags: self.tags.iter().filter_map(tag).collect() }
+        TagSurvey { base_tag: Some(self.base_tag), tags: self.tags.iter().filter_map(tag).collect() }
     }
 }

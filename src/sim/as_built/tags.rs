@@ -29,7 +29,7 @@ impl TagAsBuilt {
 /// Each tag of the survey; the base tag has a standard deviation of its own.
 pub(super) fn draw_tags(robot: &Robot, spec: &TagsSpec, seed: u64) -> Vec<TagAsBuilt> {
     let draw_tag = |tag: &SurveyedTag| {
-        let (std_m, std_rad) = if tag.id == robot.base_tag { spec.base_tag_std() } else { spec.survey_std() };
+        let (std_m, std_rad) = if Some(tag.id) == robot.base_tag { spec.base_tag_std() } else { spec.survey_std() };
         let error = normal_twist(seed, &format!("as_built/tag/{}", tag.id), std_m, std_rad);
         TagAsBuilt { id: tag.id, size_m: tag.size_m, pose: PlainPose::of(&tag.base_from_tag.perturbed(&error)) }
     };

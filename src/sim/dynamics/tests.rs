@@ -251,6 +251,7 @@ fn a_neutrally_buoyant_link_hangs_still() {
         mass_kg: 13.0,
         com_m: Vector3::new(0.42, 0.0, 0.0),
         inertia_kg_m2: Matrix3::identity() * 0.8,
+        bad_inertia: None,
         visuals: Vec::new(),
         collisions: vec![PlacedShape {
             owner_from_shape: Isometry3::new(Vector3::new(0.42, 0.0, 0.0), Vector3::y() * 1.0),
@@ -290,6 +291,7 @@ fn ball(mass_kg: f64, radius_m: f64, drag_coefficient: f64) -> Multibody {
         mass_kg,
         com_m: Vector3::zeros(),
         inertia_kg_m2: Matrix3::identity() * (0.4 * mass_kg * radius_m * radius_m),
+        bad_inertia: None,
         visuals: Vec::new(),
         collisions: vec![PlacedShape { owner_from_shape: Isometry3::identity(), shape, color_rgb: [0; 3] }],
     };

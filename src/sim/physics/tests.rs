@@ -102,6 +102,7 @@ fn pendulum(
         mass_kg: MASS,
         com_m: LENGTH * along,
         inertia_kg_m2: Matrix3::identity() * INERTIA,
+        bad_inertia: None,
         visuals: Vec::new(),
         collisions: Vec::new(),
     };

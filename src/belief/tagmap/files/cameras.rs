@@ -126,6 +126,7 @@ pub fn cameras_to_yaml(cameras: &[NamedCamera]) -> String {
         let (model, coefficients) = match camera.model.lens {
             LensModel::Equidistant(lens) => ("equidistant", lens.distortion.to_vec()),
             LensModel::Radtan(lens) => ("radtan", lens.distortion.to_vec()),
+            LensModel::Unknown(_) => continue,
         };
         let ([fx, fy], [cx, cy]) = (camera.model.focal_px(), camera.model.center_px());
         let _ = writeln!(out, "{}:\n  camera_model: pinhole", camera.name);

@@ -72,8 +72,10 @@ impl LandmarkFile {
         let tags: Vec<SurveyedTag> =
             self.landmarks.iter().map(|landmark| landmark.surveyed(file, tag_use)).collect::<Result<_, _>>()?;
         let ids: Vec<u32> = tags.iter().map(|tag| tag.id).collect();
-        let base_tag = self.base_tag.or(Some(robot.base_tag)).filter(|id| ids.contains(id)).or(ids.first().copied());
-        let base_tag = base_tag.ok_or_else(|| FileIssue::new(file, "tag", "holds no tag in that frame"))?;
+        let base_tag = self.base_tag.or(robot.base_tag).filter(|id| ids.contains(id)).or(ids.first().copied());
+        if base_tag.is_none() {
+            return Err(FileIssue::new(file, "tag", "holds no tag in that frame"));
+        }
         let named = self.landmarks.iter().filter_map(|landmark| Some((landmark.id, landmark.name.clone()?)));
         Ok(NamedSurvey { survey: TagSurvey { base_tag, tags }, names: named.collect() })
     }

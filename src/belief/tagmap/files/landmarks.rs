@@ -86,7 +86,7 @@ mod tests {
         assert_eq!(named.names[&board.id], "board");
         assert!(board.size_m.is_nan() && board.rotation_std_rad == UNKNOWN_ROTATION_STD_RAD && board.is_known());
         assert_eq!(board.base_from_tag.origin().to_array(), [0.1, 0.2, 0.3]);
-        assert_eq!(named.survey.base_tag, 2, "the robot's own base tag, 0, is not there");
+        assert_eq!(named.survey.base_tag, Some(2), "the robot's own base tag, 0, is not there");
     }
 
     #[test]

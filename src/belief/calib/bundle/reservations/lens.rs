@@ -32,10 +32,10 @@ pub(super) struct HeldLens {
 }
 
 impl Estimate<'_> {
-    /// `None` where the lens is estimated.
+    /// `None` where the lens is estimated, or where nobody says what it is: then no view holds corners.
     pub(super) fn held_lens(&self) -> Option<HeldLens> {
         let (mut problem, at) = (self.problem.clone(), self.problem.layout.first_of_tags());
-        if problem.layout.lens.is_some() {
+        if problem.layout.lens.is_some() || !problem.robot.camera.lens.is_known() {
             return None;
         }
         problem.layout = Layout::with_lens(&self.problem.layout);

@@ -1,0 +1,108 @@
+//! `armcal new-robot`: a robot folder for a URDF.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result};
+use clap::Args;
+
+use crate::cli::exit::{Exit, UsageError};
+use crate::cli::stdout::say;
+use crate::output;
+use armcal_core::robot::{self, DraftedMeshes, NewFile, NewRobot, Robot, RobotError, draft_robot};
+
+#[derive(Debug, Args)]
+pub(super) struct NewRobotArgs {
+    /// The arm's URDF; its meshes are looked for beside it and in the folders above
+    urdf: PathBuf,
+    /// The folder to write; it must be empty or not there
+    #[arg(long)]
+    out: PathBuf,
+    /// Link whose frame is the base frame; default: the root
+    #[arg(long)]
+    base: Option<String>,
+    /// Link of the tool; default: the end of the longest chain of revolute joints
+    #[arg(long)]
+    tip: Option<String>,
+    /// Link of the camera's optical frame; default: a link that is called camera or optical, else the tool's
+    #[arg(long)]
+    camera_link: Option<String>,
+    /// Name of the robot; default: that in the URDF
+    #[arg(long)]
+    name: Option<String>,
+}
+
+pub(super) fn new_robot(args: &NewRobotArgs) -> Result<Exit> {
+    refuse_full(&args.out)?;
+    let wanted = NewRobot {
+        urdf: &args.urdf,
+        base: args.base.as_deref(),
+        tip: args.tip.as_deref(),
+        camera: args.camera_link.as_deref(),
+        name: args.name.as_deref(),
+    };
+    let files = draft_robot(&wanted, DraftedMeshes::Read)?;
+    let (files, robot) = match trial(&files, &args.out)? {
+        Ok(robot) => (files, robot),
+        Err(why) => {
+            let without = draft_robot(&wanted, DraftedMeshes::Ignored(&why))?;
+            let robot = trial(&without, &args.out)?.map_err(UsageError)?;
+            if robot.planning_issues.iter().all(|issue| issue.key != "collision_meshes") {
+                return Err(UsageError(why).into());
+            }
+            (without, robot)
+        }
+    };
+    write(&files, &args.out)?;
+    say(&described(&files, &robot, &args.out))?;
+    Ok(Exit::Ok)
+}
+
+/// Nothing that is there is ever overwritten.
+fn refuse_full(folder: &Path) -> Result<()> {
+    let is_free = !folder.exists() || folder.read_dir().is_ok_and(|mut entries| entries.next().is_none());
+    if is_free {
+        return Ok(());
+    }
+    Err(UsageError(format!("{}: is there and not an empty folder; name another --out", folder.display())).into())
+}
+
+/// The robot as it reads from a folder of these files, or why it does not.
+fn trial(files: &[NewFile], out: &Path) -> Result<Result<Robot, String>> {
+    let folder = tempfile::tempdir().context("no temporary folder can be made")?;
+    write(files, folder.path())?;
+    let in_words =
+        |error: RobotError| error.to_string().replace(&folder.path().display().to_string(), &out.display().to_string());
+    Ok(robot::load(folder.path()).map_err(in_words))
+}
+
+fn write(files: &[NewFile], folder: &Path) -> Result<()> {
+    let placed: Vec<PathBuf> = files.iter().map(|file| folder.join(&file.path)).collect();
+    for path in &placed {
+        output::make_folder(output::parent(path))?;
+    }
+    let files: Vec<(&Path, &[u8])> =
+        placed.iter().zip(files).map(|(path, file)| (path.as_path(), file.bytes.as_slice())).collect();
+    Ok(output::write_together(&files)?)
+}
+
+fn described(files: &[NewFile], robot: &Robot, out: &Path) -> String {
+    let camera = &robot.camera.name;
+    let mut text = format!(
+        "{}: robot `{}`, {} joints from `{}`: {}; camera `{camera}`; {} files",
+        out.display(),
+        robot.name,
+        robot.n_joints(),
+        robot.base_link,
+        robot.joint_names().join(", "),
+        files.len()
+    );
+    for issue in &robot.planning_issues {
+        text.push_str(&format!("\nleft for run and plan: {}: {}", issue.key, issue.problem));
+    }
+    text.push_str(&format!(
+        "\nnext: look at what {} says is assumed, then `armcal check {}`",
+        out.join("robot.toml").display(),
+        out.display()
+    ));
+    text
+}

@@ -1,0 +1,82 @@
+//! What robot.toml lacks, all of it at once.
+
+use std::path::Path;
+
+use toml::{Table, Value};
+
+use super::error::FileIssue;
+
+const ROBOT_KEYS: [&str; 7] = ["version", "name", "urdf", "base_link", "tool", "joint_sensor", "camera"];
+const TOOL_KEYS: [&str; 2] = ["link", "point_m"];
+const CAMERA_KEYS: [&str; 4] = ["name", "link", "mount_std_m", "mount_std_rad"];
+const SENSOR_KEYS: [&str; 12] = [
+    "joint",
+    "kind",
+    "offset_counts",
+    "scale_counts_per_deg",
+    "wrap_counts",
+    "gain_std",
+    "offset_std_rad",
+    "gain_bound",
+    "offset_bound_rad",
+    "noise_std_counts",
+    "linearity_std_rad",
+    "max_rate_rad_s",
+];
+const GRIPPER_KEYS: [&str; 5] = ["jaws", "opens_along", "rest_opening_m", "opening_max_m", "closing_time_s"];
+const TAG_KEYS: [&str; 7] =
+    ["id", "family", "size_m", "position_m", "quaternion_wxyz", "position_std_m", "rotation_std_rad"];
+
+/// Checks that `robot` has every key that all commands need. `joints` gives the moving joints of the URDF, where that
+/// can be read; it is asked only when something is missing.
+///
+/// # Errors
+/// [`FileIssue`] naming all missing keys, and all joints without a sensor.
+pub(super) fn check_complete(
+    file: &Path,
+    robot: &Table,
+    joints: impl FnOnce() -> Option<Vec<String>>,
+) -> Result<(), FileIssue> {
+    let mut missing: Vec<String> = missing_in("", robot, &ROBOT_KEYS).into_iter().collect();
+    let optional = [("gripper", &GRIPPER_KEYS[..]), ("gripper_tag", &TAG_KEYS), ("hydraulics", &["pump_l_per_min"])];
+    for (name, keys) in [("tool", &TOOL_KEYS[..]), ("camera", &CAMERA_KEYS)].into_iter().chain(optional) {
+        let table = robot.get(name).and_then(Value::as_table);
+        missing.extend(table.and_then(|table| missing_in(&format!("[{name}] "), table, keys)));
+    }
+    let sensors = tables(robot, "joint_sensor");
+    for (n, sensor) in sensors.iter().enumerate() {
+        let joint = sensor.get("joint").and_then(Value::as_str).map_or_else(|| format!("number {}", n + 1), quoted);
+        missing.extend(missing_in(&format!("[[joint_sensor]] {joint}: "), sensor, &SENSOR_KEYS));
+    }
+    for (n, tag) in tables(robot, "tag").iter().enumerate() {
+        let id = tag.get("id").map_or_else(|| format!("number {}", n + 1), Value::to_string);
+        missing.extend(missing_in(&format!("[[tag]] {id}: "), tag, &TAG_KEYS));
+    }
+    if missing.is_empty() {
+        return Ok(());
+    }
+    let named: Vec<&str> = sensors.iter().filter_map(|sensor| sensor.get("joint")?.as_str()).collect();
+    let without: Vec<String> = joints().into_iter().flatten().filter(|name| !named.contains(&name.as_str())).collect();
+    if !without.is_empty() {
+        let keys = SENSOR_KEYS[1..].join(", ");
+        let names: Vec<String> = without.iter().map(|name| quoted(name)).collect();
+        missing.push(format!("a [[joint_sensor]] for each of {} ({keys})", names.join(", ")));
+    }
+    let problem =
+        format!("{}. Add them: `armcal new-robot` writes all of them for a URDF, with their units", missing.join("; "));
+    Err(FileIssue::new(file, "missing", problem))
+}
+
+fn quoted(name: &str) -> String {
+    format!("`{name}`")
+}
+
+fn tables<'a>(robot: &'a Table, name: &str) -> Vec<&'a Table> {
+    robot.get(name).and_then(Value::as_array).into_iter().flatten().filter_map(Value::as_table).collect()
+}
+
+/// The missing keys of one table.
+fn missing_in(place: &str, table: &Table, keys: &[&str]) -> Option<String> {
+    let missing: Vec<&str> = keys.iter().filter(|key| !table.contains_key(**key)).copied().collect();
+    (!missing.is_empty()).then(|| format!("{place}{}", missing.join(", ")))
+}

@@ -1,0 +1,296 @@
+//! A robot folder for a URDF: robot.toml with what was read, what was assumed, and what is left to fill in.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use toml::Value;
+
+use super::arm_chain::{Ends, FoundArm, find_arm};
+use super::error::{RobotError, read_text};
+use super::mesh;
+use super::urdf::{MAX_COLLISION_SHAPES, UrdfChain, UrdfModel};
+use super::urdf_mesh::places;
+use crate::files::{self, FileKind};
+use crate::kinematics::{Chain, ChainJoint};
+
+/// What a robot folder is made from.
+#[derive(Clone, Copy, Debug)]
+pub struct NewRobot<'a> {
+    /// The URDF.
+    pub urdf: &'a Path,
+    /// Link whose frame is the base frame; the root, or what stands on a root called `world`.
+    pub base: Option<&'a str>,
+    /// Link of the tool; the end of the longest chain of revolute joints.
+    pub tip: Option<&'a str>,
+    /// Link whose frame is the camera's, x right, y down, z forward.
+    pub camera: Option<&'a str>,
+    /// Name of the robot; that of the URDF.
+    pub name: Option<&'a str>,
+}
+
+/// What the folder says of the collision meshes.
+#[derive(Clone, Copy, Debug)]
+pub enum DraftedMeshes<'a> {
+    /// They are copied and read.
+    Read,
+    /// They cannot all be read, and why.
+    Ignored(&'a str),
+}
+
+/// A file of the folder.
+#[derive(Clone, Debug)]
+pub struct NewFile {
+    /// Below the folder.
+    pub path: PathBuf,
+    /// What it holds.
+    pub bytes: Vec<u8>,
+}
+
+/// Folders above the URDF's in which packages are looked for.
+const MAX_ANCESTORS: usize = 8;
+
+/// The files of a robot folder: the URDF, those of its collision meshes that are found beside or above it, and
+/// robot.toml, the last.
+///
+/// # Errors
+/// [`RobotError`] for a URDF that cannot be read, that has no arm, or several and no tip is named.
+pub fn draft_robot(wanted: &NewRobot<'_>, meshes: DraftedMeshes<'_>) -> Result<Vec<NewFile>, RobotError> {
+    let (urdf, arm) = read_arm(wanted)?;
+    let camera = arm.camera.as_deref().unwrap_or(&arm.tip);
+    let chain = urdf.chain(&arm.base, &[&arm.tip, camera])?;
+    let on_chain = UrdfChain { urdf: &urdf, base_link: &arm.base, chain: &chain };
+    let urdf_name = wanted.urdf.file_name().map_or_else(|| "arm.urdf".into(), PathBuf::from);
+    let mut files = mesh_files(&on_chain, wanted.urdf)?;
+    files.push(NewFile { path: urdf_name.clone(), bytes: urdf.text.clone().into_bytes() });
+    let name = wanted.name.unwrap_or(&urdf.robot.name);
+    let draft = Draft { urdf: &urdf, urdf_name: &urdf_name, name, arm: &arm, chain: &chain, meshes };
+    files.push(NewFile { path: "robot.toml".into(), bytes: draft.text().into_bytes() });
+    Ok(files)
+}
+
+/// The URDF, and the arm in it.
+fn read_arm(wanted: &NewRobot<'_>) -> Result<(UrdfModel, FoundArm), RobotError> {
+    let text = read_text(wanted.urdf)?;
+    let has_xacro = text.contains("<xacro:");
+    let urdf = UrdfModel::parse(wanted.urdf, text)?;
+    if has_xacro && urdf.robot.joints.iter().all(|joint| joint.name.contains("${")) {
+        let message = "has elements of xacro: expand them first, `xacro ARM.urdf.xacro > ARM.urdf`".to_owned();
+        return Err(RobotError::Syntax { file: wanted.urdf.to_owned(), message });
+    }
+    let arm = find_arm(&urdf, &Ends { base: wanted.base, tip: wanted.tip, camera: wanted.camera })?;
+    Ok((urdf, arm))
+}
+
+/// The collision meshes that are found, each once, where the reader of robot folders looks for them.
+fn mesh_files(arm: &UrdfChain<'_>, urdf: &Path) -> Result<Vec<NewFile>, RobotError> {
+    let mut found: BTreeMap<PathBuf, PathBuf> = BTreeMap::new();
+    for mesh in arm.collision_meshes().iter().take(MAX_COLLISION_SHAPES) {
+        let Some(source) = mesh_source(urdf, mesh.name) else { continue };
+        // Formats come after their conversions, so the first place has the source's extension or none is read.
+        let extension = source.extension().unwrap_or_default();
+        let place = places(mesh.name).into_iter().next().unwrap_or_default().with_extension(extension);
+        found.insert(place, source);
+    }
+    let read = |(path, source): (PathBuf, PathBuf)| {
+        let bytes = files::read_bytes(&source, FileKind::Mesh);
+        let bytes = bytes.map_err(|error| RobotError::Unreadable { file: source, source: error })?;
+        Ok(NewFile { path, bytes })
+    };
+    found.into_iter().map(read).collect()
+}
+
+/// The file of a mesh beside the URDF, as its path says, or in a package above it; `None` where there is none that is
+/// read.
+fn mesh_source(urdf: &Path, name: &str) -> Option<PathBuf> {
+    let folder = urdf.parent().unwrap_or(Path::new("."));
+    let folder = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
+    let as_written = name.strip_prefix("file://").or((!name.contains("://")).then_some(name));
+    let mut sources: Vec<PathBuf> = Vec::new();
+    if let Some(path) = as_written {
+        let path = folder.join(path);
+        sources.extend(["stl", "obj"].map(|extension| path.with_extension(extension)));
+        sources.insert(0, path);
+    }
+    let places = places(name);
+    for ancestor in folder.ancestors().take(MAX_ANCESTORS) {
+        sources.extend(places.iter().map(|place| ancestor.join(place)));
+    }
+    sources.into_iter().find(|file| mesh::is_readable(file) && file.is_file())
+}
+
+/// What robot.toml is written from.
+struct Draft<'a> {
+    urdf: &'a UrdfModel,
+    urdf_name: &'a Path,
+    name: &'a str,
+    arm: &'a FoundArm,
+    chain: &'a Chain,
+    meshes: DraftedMeshes<'a>,
+}
+
+/// A TOML string.
+fn quoted(text: &str) -> String {
+    Value::from(text).to_string()
+}
+
+/// On one line of a comment.
+fn on_line(text: &str) -> String {
+    text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
+}
+
+impl Draft<'_> {
+    fn text(&self) -> String {
+        let mut out = String::new();
+        self.head(&mut out);
+        self.tool(&mut out);
+        out.push_str(SENSORS);
+        self.chain.joints().iter().for_each(|joint| self.sensor(&mut out, joint));
+        self.camera(&mut out);
+        out.push_str(REST);
+        out
+    }
+
+    fn head(&self, out: &mut String) {
+        let (n, arm) = (self.chain.n_joints(), self.arm);
+        let urdf = quoted(&self.urdf_name.to_string_lossy());
+        let _ = write!(
+            out,
+            "# Written by `armcal new-robot` from {}. \"Read\" is what the URDF says, \"assumed\" is not: look at it.\n\
+             # Angles in rad, lengths in m. Keys that begin with # are left to fill in.\n\
+             version = 1\nname = {}\nurdf = {urdf}\n\
+             # Read: the chain of {n} moving joints from here. Tags and targets are in this link's frame.\n\
+             base_link = {}\n\
+             # Assumed: the arm is in air. Under water: the displaced water's weight over the arm's.\n\
+             buoyancy_fraction = 0.0\n",
+            on_line(&self.urdf_name.to_string_lossy()),
+            quoted(self.name),
+            quoted(&arm.base)
+        );
+        if let DraftedMeshes::Ignored(why) = self.meshes {
+            let _ = write!(
+                out,
+                "# {}\n# Until that is done: links are without shape, and run and plan refuse the arm.\n\
+                 collision_meshes = \"ignore\"\n",
+                on_line(why)
+            );
+        }
+        let middle: Vec<String> = self.chain.joints().iter().map(middle_rad).collect();
+        let _ = write!(
+            out,
+            "# For run and plan: the angles at which the arm is stowed, clear of everything; paths start there.\n\
+             # Here the middle of each range.\n# stowed_rad = [{}]\n\
+             # With [[tag]]s below: the id of the one beside the base.\n# base_tag = 0\n",
+            middle.join(", ")
+        );
+    }
+
+    fn tool(&self, out: &mut String) {
+        let _ = write!(
+            out,
+            "\n[tool]\n# Read: the end of the chain.\nlink = {}\n\
+             # Assumed: the tool point is that link's origin.\npoint_m = [0.0, 0.0, 0.0]\n",
+            quoted(&self.arm.tip)
+        );
+    }
+
+    fn sensor(&self, out: &mut String, joint: &ChainJoint) {
+        let drawn = self.urdf.robot.joints.iter().find(|other| other.name == joint.name);
+        let velocity = drawn.map_or(0.0, |drawn| drawn.limit.velocity);
+        let (rate_rad_s, whose) = match velocity {
+            v if v.is_finite() && v > 0.0 => (v.clamp(1e-3, 20.0), "read"),
+            _ => (0.5, "assumed"),
+        };
+        let limits = joint.limits.map_or_else(
+            || "no limits".to_owned(),
+            |limits| format!("{} .. {} rad", limits.lower_rad, limits.upper_rad),
+        );
+        let mimics = drawn.and_then(|drawn| drawn.mimic.as_ref()).map_or_else(String::new, |mimic| {
+            let name = on_line(&mimic.joint);
+            format!("# Read: it follows the joint {name}; give it a sensor of its own only if it has one.\n")
+        });
+        let _ = write!(
+            out,
+            "\n[[joint_sensor]]\n# Read: {limits}.\n{mimics}joint = {}\n{SENSOR}\
+             max_rate_rad_s = {rate_rad_s:?}  # {whose}\n",
+            quoted(&joint.name),
+        );
+    }
+
+    fn camera(&self, out: &mut String) {
+        let (link, whose, std_m, std_rad) = match &self.arm.camera {
+            Some(link) => {
+                (link, "# Read: the camera's link. Its frame is optical: x right, y down, z forward.", 0.01, 0.05)
+            }
+            None => (
+                &self.arm.tip,
+                "# Assumed: the camera looks along z of the tool's link, for no link is called a camera. Add a link\n\
+                 # to the URDF where it is, in the optical frame: x right, y down, z forward.",
+                0.1,
+                0.3,
+            ),
+        };
+        let _ = write!(
+            out,
+            "\n[camera]\nname = {}\n{whose}\nlink = {}\n\
+             # Assumed: how well its place on the link is known, one sigma per axis. Measure it: they are priors.\n\
+             mount_std_m = {std_m:?}\nmount_std_rad = {std_rad:?}\n{LENS}",
+            quoted(link),
+            quoted(link)
+        );
+    }
+}
+
+/// The middle of the joint's range, to the millirad.
+fn middle_rad(joint: &ChainJoint) -> String {
+    let middle = joint.limits.map_or(0.0, |limits| 0.5 * (limits.lower_rad + limits.upper_rad));
+    // Adding zero turns -0 into 0.
+    format!("{:?}", (middle * 1e3).round() / 1e3 + 0.0)
+}
+
+const SENSORS: &str = "
+# Assumed: an electric arm's encoders, recorded in radians: one count is one radian. For raw words write the datasheet's
+# counts per degree, the reading at angle zero and the counts after which the word repeats. The figures with std are
+# priors, one sigma, and calibrate weighs them against the recording; planning keeps clear of the bounds.
+";
+
+const SENSOR: &str = "kind = \"encoder\"  # assumed; or potentiometer, resolver
+offset_counts = 0.0
+scale_counts_per_deg = 0.017453292519943295  # pi / 180
+wrap_counts = 1e6  # never repeats
+gain_std = 0.002
+offset_std_rad = 0.01
+gain_bound = 0.01
+offset_bound_rad = 0.05
+noise_std_counts = 1e-4
+linearity_std_rad = 2e-4
+temperature_std_rad_per_k = 1e-5
+drift_std_rad_per_sqrt_h = 1e-5
+";
+
+const LENS: &str = "# For images, for corners of tags, and for run and plan: the lens.
+# model = \"pinhole\"  # or equidistant, with max_view_angle_rad
+# resolution_px = [1280, 720]
+# focal_px = [900.0, 900.0]
+# center_px = [639.5, 359.5]
+# distortion = [0.0, 0.0, 0.0, 0.0]
+# corner_std_px = 0.3
+";
+
+const REST: &str = "
+# How well the drawing is known; the defaults.
+# [geometry]
+# link_position_std_m = 5e-4
+# link_rotation_std_rad = 5e-4
+# tool_position_std_m = 5e-4
+
+# Tags of the family 36h11 around the arm, in the base link's frame; z points out of the tag. Or a tag map, --tag-map.
+# [[tag]]
+# id = 0
+# family = \"36h11\"
+# size_m = 0.15
+# position_m = [0.5, 0.0, 0.2]
+# quaternion_wxyz = [1.0, 0.0, 0.0, 0.0]
+# position_std_m = 0.001
+# rotation_std_rad = 0.0035
+";

@@ -1,0 +1,369 @@
+//! Robot folders of any arm: what a URDF may hold, which keys robot.toml may leave out, and the folders that
+//! `new-robot` writes.
+
+use std::path::{Path, PathBuf};
+
+use armcal::robot::{Shape, load};
+
+use crate::support::external::{AS_IN_2018, INPUT_MAP, RealTitan, write_poses};
+use crate::support::{Answer, ShortRoutine, answer, edit, program, read, robot_copy, root, run, temp, titan, write};
+
+/// A tetrahedron of 0.1 m, as OBJ.
+const OBJ: &str = "v 0 0 0\nv 0 100 0\nv 100 0 0\nv 0 0 100\nf 1 2 3\nf 1 3 4\nf 1 4 2\nf 3 2 4\n";
+
+fn joint(name: &str, kind: &str, parent: &str, child: &str) -> String {
+    format!(
+        "<joint name=\"{name}\" type=\"{kind}\"><parent link=\"{parent}\"/><child link=\"{child}\"/>\
+         <origin xyz=\"0 0 0.2\"/><axis xyz=\"0 1 0\"/><limit lower=\"-1\" upper=\"2\" effort=\"9\" velocity=\"1.5\"/>\
+         </joint>\n"
+    )
+}
+
+/// A chain of `n` joints, `PREFIX1` and on, from the link `base` to `PREFIX_link1` and on.
+fn chain(prefix: &str, base: &str, n: usize) -> String {
+    let link = |k: usize| if k == 0 { base.to_owned() } else { format!("{prefix}_link{k}") };
+    let one = |k: usize| {
+        let of_joint = joint(&format!("{prefix}{k}"), "revolute", &link(k - 1), &link(k));
+        format!("<link name=\"{}\"/>\n{of_joint}", link(k))
+    };
+    (1..=n).map(one).collect()
+}
+
+fn urdf(body: &str) -> String {
+    format!("<robot name=\"bench\">\n<link name=\"base\"/>\n{body}</robot>\n")
+}
+
+/// A link with a collision mesh, fixed to the arm's third link.
+fn with_mesh(name: &str) -> String {
+    let mesh = format!("<geometry><mesh filename=\"{name}\" scale=\"0.001 0.001 0.001\"/></geometry>");
+    let hand = format!("<link name=\"hand\"><collision><origin xyz=\"1 0 0\"/>{mesh}</collision></link>");
+    urdf(&(chain("arm", "base", 3) + &hand + &joint("fixed", "fixed", "arm_link3", "hand")))
+}
+
+/// Files in a folder, and the robot folder that is made of them.
+struct Bench {
+    folder: tempfile::TempDir,
+}
+
+impl Bench {
+    fn new(urdf: &str) -> Self {
+        let bench = Self { folder: temp() };
+        std::fs::create_dir(bench.file("given")).expect("a folder");
+        write(&bench.file("given/arm.urdf"), urdf);
+        bench
+    }
+
+    fn file(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn put(&self, name: &str, text: &str) {
+        std::fs::create_dir_all(self.file(name).parent().expect("a folder")).expect("made");
+        write(&self.file(name), text);
+    }
+
+    fn new_robot(&self, more: &[&str]) -> Answer {
+        let mut command = program();
+        command.arg("new-robot").arg(self.file("given/arm.urdf")).arg("--out").arg(self.file("robot"));
+        answer(command.args(more))
+    }
+
+    fn check(&self) -> Answer {
+        check(&self.file("robot"))
+    }
+}
+
+fn check(folder: &Path) -> Answer {
+    answer(program().arg("check").arg(folder))
+}
+
+/// The folder that `new-robot` writes for this URDF reads and passes `check` as it is.
+#[track_caller]
+fn made(urdf: &str, more: &[&str]) -> Bench {
+    let bench = Bench::new(urdf);
+    bench.new_robot(more).expect("new-robot", 0, &["armcal check"]);
+    bench.check().expect("check", 0, &["ok: ", "stowed_rad"]);
+    bench
+}
+
+#[track_caller]
+fn joints(bench: &Bench) -> Vec<String> {
+    load(&bench.file("robot")).expect("it reads").joint_names()
+}
+
+#[test]
+fn what_stands_beside_the_chain_is_no_error() {
+    let visual = "<link name=\"cover\"><visual><geometry><mesh filename=\"package://none/a.dae\"/></geometry></visual>\
+                  </link>";
+    let beside = [
+        chain("arm", "base", 4),
+        visual.to_owned() + &joint("cover", "fixed", "arm_link1", "cover"),
+        // A stop of no range, a slide and a joint that follows another.
+        "<link name=\"flap\"/><link name=\"slide\"/><link name=\"tail\"/>".to_owned(),
+        joint("flap", "revolute", "base", "flap").replace("upper=\"2\"", "upper=\"-1\""),
+        joint("slide", "prismatic", "base", "slide"),
+        joint("tail", "revolute", "slide", "tail").replace("<axis", "<mimic joint=\"arm1\"/><axis"),
+    ];
+    let bench = made(&urdf(&beside.concat()), &[]);
+    assert_eq!(joints(&bench), ["arm1", "arm2", "arm3", "arm4"]);
+    assert!(load(&bench.file("robot")).expect("it reads").bodies.iter().all(|body| body.visuals.is_empty()));
+}
+
+#[test]
+fn a_prismatic_joint_in_the_chain_is_named() {
+    let text = urdf(&chain("arm", "base", 3));
+    let bench = made(&text, &[]);
+    write(&bench.file("robot/arm.urdf"), &text.replacen("revolute", "prismatic", 1));
+    bench.check().expect("check", 2, &["`arm1`", "prismatic", "only revolute, continuous and fixed"]);
+    // After a slide the chain begins.
+    let slide =
+        text.replacen("revolute", "prismatic", 1).replace("</robot>", &(chain("b", "arm_link3", 2) + "</robot>"));
+    let bench = made(&slide, &[]);
+    assert_eq!(joints(&bench), ["arm2", "arm3", "b1", "b2"]);
+    assert_eq!(load(&bench.file("robot")).expect("it reads").base_link, "arm_link1");
+}
+
+#[test]
+fn collision_meshes_become_hulls_wherever_their_paths_lead() {
+    for (name, place) in [
+        ("package://bench_description/meshes/hand.obj", "given/bench_description/meshes/hand.obj"),
+        ("package://given/meshes/hand.obj", "given/meshes/hand.obj"),
+        ("meshes/hand.obj", "given/meshes/hand.obj"),
+        ("../hand.OBJ", "hand.OBJ"),
+        // A converted file in the place of one that is not read.
+        ("hand.dae", "given/hand.obj"),
+    ] {
+        let bench = Bench::new(&with_mesh(name));
+        bench.put(place, OBJ);
+        bench.new_robot(&[]).expect(name, 0, &["3 files"]);
+        bench.check().expect(name, 0, &["ok: "]);
+        let robot = load(&bench.file("robot")).expect("it reads");
+        let [hull] = &robot.bodies[3].collisions[..] else { panic!("{name}: one shape") };
+        assert!(matches!(hull.shape, Shape::Hull(_)), "{hull:?}");
+        // The corner at the mesh's origin is at x = 1 m; the opposite face is 0.1 m away along each axis.
+        let at = |x: f64, y: f64, z: f64| hull.distance_m(&nalgebra::Point3::new(x, y, z + 0.2));
+        assert!(at(1.01, 0.01, 0.01) < 1e-9 && (at(0.9, 0.01, 0.01) - 0.1).abs() < 1e-6, "{name}");
+        assert!((at(1.1, 0.1, 0.1) - 0.2 / 3.0_f64.sqrt()).abs() < 1e-6, "{name}: {}", at(1.1, 0.1, 0.1));
+    }
+}
+
+#[test]
+fn a_collision_mesh_that_cannot_be_read_is_named_with_what_to_do() {
+    let bench = Bench::new(&with_mesh("package://bench/hand.stl"));
+    bench.new_robot(&[]).expect("new-robot", 0, &["left for run and plan", "collision_meshes", "hand"]);
+    bench.check().expect("check", 0, &["warning", "hand", "nothing keeps paths clear"]);
+    let robot_toml = bench.file("robot/robot.toml");
+    edit(&robot_toml, "\ncollision_meshes = \"ignore\"", "");
+    bench.check().expect("missing", 2, &["package://bench/hand.stl", "link `hand`", "copy it to", "\"ignore\""]);
+    bench.put("robot/hand.stl", "no mesh");
+    bench.check().expect("broken", 2, &["hand.stl", "is not a mesh"]);
+    std::fs::remove_file(bench.file("robot/hand.stl")).expect("removed");
+    bench.put("hand.stl", OBJ);
+    std::os::unix::fs::symlink(bench.file("hand.stl"), bench.file("robot/hand.stl")).expect("linked");
+    bench.check().expect("a link", 2, &["hand.stl", "a link out of its folder"]);
+    let urdf = bench.file("robot/arm.urdf");
+    edit(&urdf, "hand.stl", "hand.dae");
+    std::fs::remove_file(bench.file("robot/hand.stl")).expect("removed");
+    bench.put("robot/hand.dae", "<COLLADA/>");
+    bench.check().expect("dae", 2, &["hand.dae", "only .stl and .obj", "convert it"]);
+    let many = format!("<collision>{}</collision>", "<geometry><mesh filename=\"a.stl\"/></geometry>").repeat(65);
+    write(&urdf, &with_mesh("a.stl").replace("<collision>", &(many + "<collision>")));
+    bench.check().expect("many", 2, &["66 shapes", "0 .. 64"]);
+}
+
+/// Inertias matter to the simulator alone.
+#[test]
+fn an_arm_with_a_bad_inertia_records_and_is_not_simulated() {
+    let folder = temp();
+    let robot = robot_copy(folder.path());
+    let urdf = read(&robot.join("titan4.urdf"));
+    let at = urdf.rfind("ixx=\"").expect("an inertia") + "ixx=\"".len();
+    write(&robot.join("titan4.urdf"), &format!("{}-{}", &urdf[..at], &urdf[at..]));
+    check(&robot).expect("check", 0, &["cannot be simulated"]);
+    let routine = ShortRoutine { robot, ..ShortRoutine::default() }.write(folder.path());
+    run(&routine, &folder.path().join("out")).expect("run", 2, &["inertia", "not positive definite"]);
+}
+
+#[test]
+fn the_arm_ends_before_its_fingers() {
+    let fingers = |kind: &str| {
+        let links = "<link name=\"left\"/><link name=\"right\"/>";
+        let left = joint("left", kind, "arm_link5", "left");
+        left + &joint("right", kind, "arm_link5", "right") + links
+    };
+    for kind in ["revolute", "prismatic"] {
+        let bench = made(&urdf(&(chain("arm", "base", 5) + &fingers(kind))), &[]);
+        assert_eq!(joints(&bench).len(), 5, "{kind}");
+    }
+}
+
+#[test]
+fn several_arms_in_a_file_are_named_and_one_is_asked_for() {
+    let text = urdf(&(chain("left", "base", 6) + &chain("right", "base", 5)));
+    let bench = Bench::new(&text);
+    bench.new_robot(&[]).expect("two arms", 2, &["left_link6 (6 joints)", "right_link5 (5 joints)", "--tip"]);
+    assert!(!bench.file("robot").exists());
+    assert_eq!(joints(&made(&text, &["--tip", "right_link5"])).len(), 5);
+    let bench =
+        made(&text, &["--tip", "left_link6", "--base", "left_link1", "--camera-link", "left_link4", "--name", "x"]);
+    let robot = load(&bench.file("robot")).expect("it reads");
+    assert_eq!((robot.n_joints(), robot.camera.mount.n_joints), (5, 3));
+    assert_eq!((robot.name.as_str(), robot.base_link.as_str()), ("x", "left_link1"));
+    bench.new_robot(&["--tip", "none"]).expect("again", 2, &["not an empty folder"]);
+    let bench = Bench::new(&text);
+    bench.new_robot(&["--tip", "none"]).expect("no such link", 2, &["--tip", "`none`"]);
+}
+
+#[test]
+fn new_robot_reads_limits_rates_and_the_camera() {
+    let camera = "<link name=\"wrist_optical\"/>".to_owned() + &joint("c", "fixed", "arm_link2", "wrist_optical");
+    let text =
+        urdf(&(chain("arm", "world", 3) + &camera + &joint("w", "fixed", "world", "base") + "<link name=\"world\"/>"));
+    let text = text
+        .replacen("revolute", "continuous", 1)
+        .replace("parent link=\"world\"/><child link=\"arm", "parent link=\"base\"/><child link=\"arm");
+    let bench = made(&text, &[]);
+    let robot = load(&bench.file("robot")).expect("it reads");
+    assert_eq!((robot.base_link.as_str(), robot.camera.name.as_str()), ("base", "wrist_optical"));
+    assert_eq!(robot.camera.mount.n_joints, 2);
+    assert!(robot.chain.joints()[0].limits.is_none() && robot.chain.joints()[1].limits.is_some());
+    assert!(
+        robot.sensors.iter().all(|sensor| sensor.max_rate_rad_s == 1.5 && (sensor.counts_per_rad - 1.0).abs() < 1e-12)
+    );
+    // A xacro file, a file without an arm, one that is none.
+    for (text, words) in [
+        ("<robot name=\"a\" xmlns:xacro=\"x\"><xacro:macro name=\"b\"/></robot>", "expand them first"),
+        ("<robot name=\"a\"><link name=\"b\"/></robot>", "no chain of revolute"),
+        ("no URDF", "no element"),
+    ] {
+        let bench = Bench::new(text);
+        bench.new_robot(&[]).expect(text, 2, &["arm.urdf", words]);
+        assert!(!bench.file("robot").exists());
+    }
+}
+
+/// Names in a URDF cannot write keys of robot.toml.
+#[test]
+fn names_of_a_urdf_stay_names() {
+    let text = urdf(&chain("arm", "base", 3)).replace("arm2", "a&#10;stowed_rad = [9]&#10;&quot;");
+    let bench = made(&text, &["--name", "x\"\ny = 1"]);
+    let robot = load(&bench.file("robot")).expect("it reads");
+    assert_eq!((robot.name.as_str(), robot.joint_names()[1].as_str()), ("x\"\ny = 1", "a\nstowed_rad = [9]\n\""));
+}
+
+/// Every key of a robot.toml is optional, or named when it is missing; all of them at once.
+#[test]
+fn all_that_robot_toml_lacks_is_named_at_once() {
+    let folder = temp();
+    let robot = robot_copy(folder.path());
+    let file = robot.join("robot.toml");
+    let whole = read(&file);
+    let mut n_named = 0;
+    for line in whole.lines().filter(|line| line.contains(" = ") && !line.starts_with('#')) {
+        let key = line.split(" = ").next().expect("a key");
+        write(&file, &whole.replacen(&format!("{line}\n"), "", 1));
+        if let Err(error) = load(&robot) {
+            let text = error.to_string();
+            assert!(text.contains(key) && !text.contains("TOML parse error"), "{key}: {text}");
+            n_named += 1;
+        }
+    }
+    assert!(n_named > 15, "{n_named}");
+    let short = "name = \"a\"\nurdf = \"titan4.urdf\"\nbase_link = \"base_link\"\n[tool]\nlink = \"manipulator_link\"\n\
+                 [camera]\nlink = \"fisheye\"\n[[joint_sensor]]\njoint = \"forearm_pitch\"\nkind = \"encoder\"\n\
+                 gain_std = 0.1\n[[tag]]\nid = 7\n";
+    write(&file, short);
+    let words = [
+        "missing: version",
+        "[tool] point_m",
+        "[camera] name, mount_std_m, mount_std_rad",
+        "`forearm_pitch`: offset_counts",
+        "[[tag]] 7: family",
+        "`shoulder_yaw`, `shoulder_pitch`, `wrist_pitch`, `wrist_yaw`, `wrist_rotate`",
+    ];
+    check(&robot).expect("check", 2, &words);
+    let sensors = whole.replacen("joint = \"wrist_yaw\"", "joint = \"wrist_jaw\"", 1);
+    write(&file, &sensors);
+    check(&robot).expect("check", 2, &["add one for [\"wrist_yaw\"]", "take out [\"wrist_jaw\"]"]);
+    write(&file, &whole.replacen("focal_px", "# ", 1).replacen("center_px", "# ", 1));
+    check(&robot).expect("check", 2, &["[camera]", "has no focal_px, center_px"]);
+}
+
+/// A Titan without lens, stowed pose and tags.
+fn bare_titan(folder: &Path) -> PathBuf {
+    let robot = robot_copy(folder);
+    let text = read(&robot.join("robot.toml"));
+    let text = &text[..text.find("\n# base_from_tag").expect("the tags")];
+    let dropped = [
+        "model",
+        "resolution_px",
+        "focal_px",
+        "center_px",
+        "distortion",
+        "max_view_angle_rad",
+        "corner_std_px",
+        "base_tag",
+        "stowed_rad",
+    ];
+    let is_kept = |line: &&str| !dropped.iter().any(|key| line.starts_with(&format!("{key} =")));
+    write(&robot.join("robot.toml"), &text.lines().filter(is_kept).map(|line| format!("{line}\n")).collect::<String>());
+    robot
+}
+
+#[test]
+fn a_recording_of_positions_needs_neither_lens_nor_stowed_pose_nor_tags() {
+    let folder = temp();
+    let bare = bare_titan(folder.path());
+    check(&bare).expect("check", 0, &["ok: ", "warning", "stowed_rad", "base_tag", "lens"]);
+    let arm = RealTitan::new(&titan(), 30, AS_IN_2018, 1);
+    let [recording, map, tags] = ["arm.mcap", "map.toml", "tags.toml"].map(|name| folder.path().join(name));
+    write_poses(&recording, &arm.poses);
+    write(&map, INPUT_MAP);
+    write(&tags, &arm.tag_map());
+    let calibrate = |robot: &Path, method: &str, out: &str| {
+        let mut command = program();
+        command.arg("calibrate").arg(&recording).arg("--robot").arg(robot).arg("--input").arg(&map);
+        command.arg("--tag-map").arg(&tags).args(["--method", method]).arg("--out").arg(folder.path().join(out));
+        answer(&mut command)
+    };
+    for method in ["minimum_distance", "bundle"] {
+        let with = calibrate(&root().join("robots/titan4"), method, "with");
+        let without = calibrate(&bare, method, "without");
+        assert_eq!(
+            (with.code, &with.stdout.replace("/with/", "/")),
+            (without.code, &without.stdout.replace("/without/", "/"))
+        );
+        let of = |out: &str| read(&folder.path().join(out).join("calibration.toml"));
+        assert_eq!(of("with"), of("without"), "{method}");
+    }
+    write(&map, &INPUT_MAP.replace("position", "corners"));
+    calibrate(&bare, "bundle", "out").expect("corners", 2, &["lens", "model, resolution_px, focal_px"]);
+}
+
+#[test]
+fn what_plans_names_all_that_the_folder_lacks() {
+    let folder = temp();
+    let routine = ShortRoutine { robot: bare_titan(folder.path()), ..ShortRoutine::default() }.write(folder.path());
+    let words = ["stowed_rad", "base_tag", "lens", "model, resolution_px"];
+    run(&routine, &folder.path().join("out")).expect("run", 2, &words);
+    answer(program().arg("plan").arg(&routine).arg("--out").arg(folder.path())).expect("plan", 2, &words);
+    check(&routine).expect("check", 2, &words);
+}
+
+#[test]
+fn a_stale_list_of_pairs_stops_planning_alone() {
+    let folder = temp();
+    let robot = robot_copy(folder.path());
+    std::fs::copy(root().join("robots/titan4/self_collision.toml"), robot.join("self_collision.toml")).expect("copied");
+    let routine = ShortRoutine { robot: robot.clone(), ..ShortRoutine::default() }.write(folder.path());
+    check(&routine).expect("fresh", 0, &["ok: "]);
+    let urdf = robot.join("titan4.urdf");
+    write(&urdf, &(read(&urdf) + "<!-- another -->\n"));
+    let stale = ["self_collision.toml", "of another URDF", "armcal study self-collision"];
+    check(&robot).expect("check", 0, &["ok: ", "warning", stale[0], stale[1], stale[2]]);
+    check(&routine).expect("check a routine", 2, &stale);
+    let recording = root().join("fuzz/corpus/recording/views.mcap");
+    let found = answer(program().arg("inspect").arg(recording).arg("--robot").arg(&robot));
+    found.expect("inspect", 0, &stale);
+    assert_eq!(found.stderr.matches("of another URDF").count(), 1, "{found:?}");
+}
