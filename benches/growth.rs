@@ -1,6 +1,7 @@
 //! What one more view costs after many: time and memory of the online belief over a hundred thousand views.
 //!
-//! `cargo bench --bench growth > growth.csv`, then `tests/oracle/plot_growth.py growth.csv`. `ARMCAL_VIEWS` is how many.
+//! `cargo bench --bench growth > growth.csv`, then `tests/oracle/plot_growth.py growth.csv`; `ARMCAL_VIEWS` says how
+//! many.
 //! The views are those of the sample, one a minute, over and over again, with the thermometer's readings between them:
 //! drift, lags and races at work as in any dive.
 

@@ -16,7 +16,8 @@ pub struct OnlineSettings {
     pub model: Option<Model>,
     /// Sizes of noise and priors, if they are known; then they stay.
     pub scales: Option<Hyperparameters>,
-    /// Where the search begins, and the reference of the terms; `None`: the datasheet, under the first view's conditions.
+    /// Where the search begins, and the reference of the terms; `None`: the datasheet, under the first view's
+    /// conditions.
     pub guess: Option<JointParameters>,
     /// Whether sensors change between views.
     pub drift: DriftModel,
