@@ -60,11 +60,11 @@ impl Batch {
     }
 
     /// Largest difference between a belief and this batch over all that both estimate (sensors, links, mount, lens,
-    /// tags), in sigmas of the batch; `None` before the belief's first view.
+    /// tags), in sigmas of the batch; `None` before the belief's first view, or where a difference is not a number.
     #[must_use]
     pub fn largest_difference_sigmas(&self, online: &OnlineEstimator) -> Option<f64> {
         let off = online.best_filter()?.sigmas_from(&self.used.belief)?;
-        Some(off.iter().fold(0.0, |worst, off| worst.max(off.abs())))
+        off.iter().all(|off| off.is_finite()).then(|| off.amax())
     }
 }
 
