@@ -95,15 +95,16 @@ pub(super) fn places(name: &str) -> Vec<PathBuf> {
         }
     }
     let n = parts.len();
+    let mut firsts = vec![0, 1.min(n.saturating_sub(1)), n.saturating_sub(1)];
+    firsts.dedup();
     let mut places: Vec<PathBuf> = Vec::new();
-    for from in [0, 1.min(n.saturating_sub(1)), n.saturating_sub(1)] {
+    for from in firsts {
         let place: PathBuf = parts[from..].iter().collect();
         let converted = ["stl", "obj"].map(|extension| place.with_extension(extension));
         let is_readable = mesh::is_readable(&place);
         places.extend(converted.into_iter().filter(|_| !is_readable));
         places.push(place);
     }
-    places.dedup();
     places
 }
 
