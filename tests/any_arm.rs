@@ -171,6 +171,20 @@ fn a_collision_mesh_that_cannot_be_read_is_named_with_what_to_do() {
     bench.check().expect("many", 2, &["66 shapes", "0 .. 64"]);
 }
 
+#[test]
+fn meshes_beyond_what_memory_is_meant_for_are_not_copied() {
+    let names = ["a.stl", "b.stl", "c.stl"];
+    let of = |name: &str| format!("<collision><geometry><mesh filename=\"{name}\"/></geometry></collision>");
+    let hand = format!("<link name=\"hand\">{}</link>", names.map(of).concat());
+    let bench = Bench::new(&urdf(&(chain("arm", "base", 3) + &hand + &joint("fixed", "fixed", "arm_link3", "hand"))));
+    for name in names {
+        let file = std::fs::File::create(bench.file("given").join(name)).expect("made");
+        file.set_len(190_000_000).expect("a file with nothing in it");
+    }
+    bench.new_robot(&[]).expect("large meshes", 2, &["arm.urdf", "collision meshes", "570 MB", "500 MB"]);
+    assert!(!bench.file("robot").exists(), "nothing was written");
+}
+
 /// Inertias matter to the simulator alone.
 #[test]
 fn an_arm_with_a_bad_inertia_records_and_is_not_simulated() {

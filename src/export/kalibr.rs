@@ -38,7 +38,8 @@ pub fn camchain(file: &Path, calibration: &Calibration, robot: &Robot) -> Result
             ("radtan", [k1, k2, p1, p2])
         }
         LensModel::Unknown(_) => {
-            let problem = "gives no lens, and a camchain is a lens; add one to robot.toml";
+            let problem =
+                "has no lens, which a camchain describes: add model, resolution_px, focal_px, center_px, distortion";
             return Err(FileIssue::new(&robot_file, "[camera]", problem));
         }
     };

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use toml::Value;
 
 use super::arm_chain::{Ends, FoundArm, find_arm};
-use super::error::{RobotError, read_text};
+use super::error::{FileIssue, RobotError, read_text};
 use super::mesh;
 use super::urdf::{MAX_COLLISION_SHAPES, UrdfChain, UrdfModel};
 use super::urdf_mesh::places;
@@ -82,6 +82,9 @@ fn read_arm(wanted: &NewRobot<'_>) -> Result<(UrdfModel, FoundArm), RobotError> 
     Ok((urdf, arm))
 }
 
+/// Bytes of all collision meshes that are copied: they are in memory together.
+const MAX_MESH_BYTES: u64 = 500_000_000;
+
 /// The collision meshes that are found, each once, where the reader of robot folders looks for them.
 fn mesh_files(arm: &UrdfChain<'_>, urdf: &Path) -> Result<Vec<NewFile>, RobotError> {
     let mut found: BTreeMap<PathBuf, PathBuf> = BTreeMap::new();
@@ -91,6 +94,12 @@ fn mesh_files(arm: &UrdfChain<'_>, urdf: &Path) -> Result<Vec<NewFile>, RobotErr
         let extension = source.extension().unwrap_or_default();
         let place = places(mesh.name).into_iter().next().unwrap_or_default().with_extension(extension);
         found.insert(place, source);
+    }
+    let n_bytes: u64 = found.values().filter_map(|source| source.metadata().ok()).map(|of_file| of_file.len()).sum();
+    if n_bytes > MAX_MESH_BYTES {
+        let (have, most) = (n_bytes / 1_000_000, MAX_MESH_BYTES / 1_000_000);
+        let problem = format!("have {have} MB together, at most {most} MB are copied: simplify them");
+        return Err(FileIssue::new(urdf, "collision meshes", problem).into());
     }
     let read = |(path, source): (PathBuf, PathBuf)| {
         let bytes = files::read_bytes(&source, FileKind::Mesh);
