@@ -42,7 +42,7 @@ const VIEWS: &str = "fuzz/corpus/recording/views.mcap";
 const CUT: &str = "fuzz/corpus/recording/cut.mcap";
 const TAGMAP: &str = "tagmap views.mcap --topic /camera/wrist/detections --camera cameras.yaml --tags";
 
-const CASES: [Case; 38] = [
+const CASES: [Case; 45] = [
     case("robots/titan4/titan4.urdf", "robot/titan4.urdf", "check robot"),
     case("robots/titan4/titan4.urdf", "robot/titan4.urdf", "inspect views.mcap --robot robot"),
     case("robots/kraft-predator/kraft-predator.urdf", "robot/titan4.urdf", "check robot"),
@@ -67,6 +67,11 @@ const CASES: [Case; 38] = [
     case("recordings/sample/calibration.toml", "calibration.toml", "export calibration.toml --as yaml"),
     case("recordings/sample/calibration.covariance.toml", "calibration.covariance.toml", "check calibration.toml"),
     case("fuzz/corpus/compact/minimum_distance.txt", "line.txt", "export line.txt --as yaml --robot robot"),
+    case("robots/titan4/titan4.urdf", "given.urdf", "new-robot given.urdf --out made"),
+    case("fuzz/corpus/new_robot/hand.urdf", "given.urdf", "new-robot given.urdf --out made"),
+    case("robots/titan4/titan4.urdf", "robot/titan4.urdf", "export calibration.toml --as urdf --robot robot"),
+    case("recordings/sample/calibration.toml", "calibration.toml", "export calibration.toml --as table --robot robot"),
+    case("recordings/sample/calibration.toml", "calibration.toml", "export calibration.toml --as kalibr --robot robot"),
     case("fuzz/corpus/tags/tagslam.yaml", "tags.yaml", TAGMAP),
     case("fuzz/corpus/tags/kalibr.yaml", "tags.yaml", TAGMAP),
     case("fuzz/corpus/cameras/cameras.yaml", "cameras.yaml", TAGMAP),
@@ -79,6 +84,8 @@ const CASES: [Case; 38] = [
     case(VIEWS, "changed.mcap", "inspect changed.mcap --robot robot"),
     case(VIEWS, "changed.mcap", "calibrate changed.mcap --robot robot --out out --method minimum_distance"),
     case(VIEWS, "changed.mcap", "calibrate changed.mcap --robot robot --out out"),
+    case(VIEWS, "changed.mcap", "calibrate changed.mcap --robot robot --out out --online"),
+    case(VIEWS, "changed.mcap", "calibrate changed.mcap --robot robot --out out --online --stationary"),
     case(VIEWS, "changed.mcap", "replay changed.mcap --robot robot --save out.rrd"),
     case(VIEWS, "changed.mcap", "tagmap changed.mcap --robot robot --out out.toml"),
 ];
