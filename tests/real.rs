@@ -467,8 +467,8 @@ fn poses_are_averaged_as_rotations() {
     }
     writer.finish().expect("finished");
     let map = parse_input_map(Path::new("map.toml"), &INPUT_MAP.replace("position", "pose")).expect("good");
-    let only = robot.tags[..1].to_vec();
-    let prepared = prepared(&robot.with_survey(TagSurvey { base_tag: Some(0), tags: only }), &path, &map);
+    let only = TagSurvey { tags: robot.tags[..1].to_vec(), ..robot.survey() };
+    let prepared = prepared(&robot.with_survey(only), &path, &map);
     let TagMeasurement::Pose(first) = prepared.data.fit[0].tags[0].measured else { panic!("a pose") };
     assert_eq!(prepared.data.fit.len(), 3);
     assert!(first.rotation.angle_to(&turn(std::f64::consts::PI)) < 1e-9, "{first}");

@@ -7,13 +7,18 @@ use anyhow::{Context, Result};
 use clap::Args;
 
 use crate::cli::calibrate_online::{calibrate_online, stationary};
-use crate::cli::calibration_inputs::{CalibrationInputs, load_robot};
+use crate::cli::calibration_inputs::{Calibrated, CalibrationInputs, load_robot};
 use crate::cli::exit::Exit;
-use crate::cli::stdout::say;
+use crate::cli::stdout::{note, say};
 use crate::output;
-use crate::report::{RunSummary, table};
-use armcal_belief::calib::{CompactCalibration, MapResult, Status, covariance_file};
+#[cfg(feature = "viewer")]
+use crate::report::markdown;
+use crate::report::{RunSummary, html, table};
+use armcal_belief::calib::{Calibration, CompactCalibration, MapResult, Status, View, covariance_file};
+use armcal_core::robot::Robot;
 use armcal_core::routine::Method;
+#[cfg(feature = "viewer")]
+use armcal_core::{joints::JointAngles, sensor::ArmSensors};
 
 #[derive(Debug, Args)]
 pub(super) struct CalibrateArgs {
@@ -41,7 +46,7 @@ pub(super) struct CalibrateArgs {
     /// Calibration method
     #[arg(long, default_value_t)]
     method: Method,
-    /// Where to write calibration.toml and summary.json
+    /// Where to write calibration.toml, summary.json and report.html
     #[arg(long, default_value = ".")]
     out: PathBuf,
     /// Follow the recording view by view, as if the arm were at work, and write the belief over time (belief.jsonl)
@@ -73,7 +78,7 @@ pub(super) fn calibrate(args: &CalibrateArgs) -> Result<Exit> {
         return if args.stationary { stationary(&given, &args.out) } else { calibrate_online(&given, &args.out) };
     }
     let started = Instant::now();
-    let (calibration, lost) = given.calibrate()?;
+    let Calibrated { calibration, lost, external } = given.calibrate()?;
     let summary = RunSummary::of_calibration(&calibration, started.elapsed().as_secs_f64());
     // Before anything is written: what has no compact form shall leave no half of the answer.
     let shown =
@@ -83,18 +88,60 @@ pub(super) fn calibrate(args: &CalibrateArgs) -> Result<Exit> {
     let covariance_file = covariance_file(&calibration_file);
     let (map, texts) = (calibration.map.as_ref().map(MapResult::to_toml), calibration.to_files());
     let (summary_file, json) = (args.out.join("summary.json"), format!("{json}\n"));
+    let (report_file, report) = (args.out.join("report.html"), html(&summary, &calibration, None));
     let mut written: Vec<(&Path, &[u8])> = Vec::new();
     written.extend(map.iter().map(|map| (map_file.as_path(), map.as_bytes())));
     written.extend([
         (covariance_file.as_path(), texts.covariance.as_bytes()),
         (calibration_file.as_path(), texts.calibration.as_bytes()),
+        (report_file.as_path(), report.as_bytes()),
         (summary_file.as_path(), json.as_bytes()),
     ]);
     output::write_together(&written)?;
+    if let Some((views, robot)) = &external {
+        // What is calibrated is in place: a picture that does not come is a warning.
+        if let Err(error) = draw(&args.out, views, robot, (&calibration, &summary)) {
+            note(format_args!("warning: no replay: {error:#}"));
+        }
+    }
     say(&shown)?;
     Ok(match (calibration.status, lost) {
         (Status::Refused, _) => Exit::Refused,
         (Status::Accepted, true) => Exit::DataLost,
         (Status::Accepted, false) => Exit::Ok,
     })
+}
+
+/// The views as a file for the Rerun viewer, replay.rrd in `out`.
+#[cfg(feature = "viewer")]
+fn draw(out: &Path, views: &[View], robot: &Robot, of: (&Calibration, &RunSummary)) -> Result<()> {
+    let (calibration, summary) = of;
+    let (nominal, sensors, names) = (ArmSensors::nominal(robot), calibration.sensors(robot)?, robot.joint_names());
+    let first = views.iter().map(|view| view.end).min();
+    let angles_of = |view: &View| {
+        let read = |joint: usize| robot.sensors[joint].center_rad + view.travel_rad[joint];
+        let counts = nominal.counts(&JointAngles::from_fn(robot.n_joints(), read));
+        let angles = sensors.angles_under(&counts, &view.conditions);
+        let time_s = first.map_or(0.0, |first| view.end.since_s(first));
+        let slipped = |joint: usize| calibration.slipped_rad(&names[joint], time_s);
+        JointAngles::from_fn(robot.n_joints(), |joint| angles[joint] + slipped(joint))
+    };
+    let angles: Vec<JointAngles> = views.iter().map(angles_of).collect();
+    let input = armcal_replay::ViewsInput {
+        views,
+        drawn: robot,
+        calibrated: &calibration.applied_to(robot),
+        angles: &angles,
+        summary_markdown: &markdown(summary),
+    };
+    let file = out.join("replay.rrd");
+    let growing = output::Beside::begin(&file)?;
+    armcal_replay::write_views_rrd(&input, growing.grows_at())?;
+    growing.put_in_place()?;
+    Ok(())
+}
+
+#[cfg(not(feature = "viewer"))]
+fn draw(_: &Path, _: &[View], _: &Robot, _: (&Calibration, &RunSummary)) -> Result<()> {
+    Ok(())
 }

@@ -9,7 +9,7 @@ use crate::cli::losses::{warn_of_external, warn_of_losses};
 use crate::cli::stdout::note;
 use armcal_belief::calib::online::{Batch, Follower, OnlineEvent, OnlineSettings};
 use armcal_belief::calib::{
-    Calibration, CalibrationData, CalibrationFileError, ExternalContext, Status, calibrate, calibrate_data,
+    Calibration, CalibrationData, CalibrationFileError, ExternalContext, Status, View, calibrate, calibrate_data,
     calibrate_with_survey, check_joints, prepare_external, prepare_pooled, read_marked,
 };
 use armcal_belief::tagmap::files::{LandmarkFile, NamedSurvey, read_landmarks};
@@ -31,15 +31,26 @@ pub(super) struct CalibrationInputs<'a> {
     pub task: Option<&'a Path>,
 }
 
+/// What came of it.
+pub(super) struct Calibrated {
+    pub calibration: Calibration,
+    /// Whether a recording had lost something.
+    pub lost: bool,
+    /// The views of a real arm's recordings, and the arm with the tags that were around it.
+    pub external: Option<(Vec<View>, Robot)>,
+}
+
 impl CalibrationInputs<'_> {
-    /// The calibration, and whether a recording had lost something.
-    pub fn calibrate(&self) -> Result<(Calibration, bool)> {
+    pub fn calibrate(&self) -> Result<Calibrated> {
         let prior = self.prior.map(|file| read_prior(file, self.robot)).transpose()?;
         let task = self.task()?;
         let landmarks = self.landmarks()?;
         match self.input {
             Some(file) => self.of_external(file, landmarks, task, prior.as_ref()),
-            None => self.of_own(landmarks, task, prior.as_ref()),
+            None => {
+                let (calibration, lost) = self.of_own(landmarks, task, prior.as_ref())?;
+                Ok(Calibrated { calibration, lost, external: None })
+            }
         }
     }
 
@@ -79,9 +90,10 @@ impl CalibrationInputs<'_> {
         landmarks: Option<(&Path, LandmarkFile)>,
         task: Option<ReachTask>,
         prior: Option<&Calibration>,
-    ) -> Result<(Calibration, bool)> {
+    ) -> Result<Calibrated> {
         let (prepared, lost) = self.external_views(file, landmarks, task)?;
-        Ok((calibrate_data(prepared, self.method, prior)?, lost))
+        let external = Some((prepared.data.fit.clone(), prepared.robot.clone()));
+        Ok(Calibrated { calibration: calibrate_data(prepared, self.method, prior)?, lost, external })
     }
 
     /// A belief that has heard nothing yet, of an arm whose recordings armcal makes.

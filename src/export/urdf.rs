@@ -121,8 +121,10 @@ fn place_camera(
     let Some(mount) = &calibration.camera_mount else { return Ok(()) };
     let estimated = link_from_camera(file, mount)?;
     // From the frame of `link` by the drawing to where the camera is.
-    let shift = robot.camera.mount.link_from_frame.inverse() * estimated;
-    let is_alone = tool.link != link && urdf.joints.iter().all(|joint| joint.parent != link);
+    let drawn = robot.links.get(&link).unwrap_or(&robot.camera.mount);
+    let shift = drawn.link_from_frame.inverse() * estimated;
+    let is_alone =
+        *drawn == robot.camera.mount && tool.link != link && urdf.joints.iter().all(|joint| joint.parent != link);
     let own = urdf.joints.iter().position(|joint| joint.child == link && joint.is_fixed);
     if let Some(own) = own.filter(|_| is_alone) {
         changes.origins.push((own, urdf.joints[own].origin * shift));

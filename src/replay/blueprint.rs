@@ -15,8 +15,8 @@ use rerun::external::uuid::Uuid;
 
 use crate::colors;
 use crate::entities::{
-    CAMERA, CLEARANCE, COUNTS, JOINT_ANGLE, JOINT_ERROR, LOG, OFFSET_CHANGE, PREDICTED, STATE, SUMMARY, TEMPERATURE,
-    TOOL_ERROR, WORLD,
+    CAMERA, CLEARANCE, COUNTS, JOINT_ANGLE, JOINT_ERROR, LOG, OFFSET_CHANGE, PREDICTED, SIGHTING, STATE, SUMMARY,
+    TEMPERATURE, TOOL_ERROR, WORLD,
 };
 use crate::entity_log::TIMELINE;
 use crate::scene::ReplayScene;
@@ -80,6 +80,20 @@ pub(super) fn build_plan(run: &ReplayScene) -> Vec<Entry> {
     let main = b.container(ContainerKind::Horizontal, &[(left, 3.0), (right, 2.0)]);
     let phases = b.view("StateTimeline", "What the arm would do", STATE);
     let root = b.container(ContainerKind::Vertical, &[(main, 4.3), (phases, 1.0)]);
+    b.finish(&root, run)
+}
+
+/// The layout of a real arm's views.
+pub(super) fn build_views(run: &ReplayScene) -> Vec<Entry> {
+    let mut b = Builder::default();
+    let scene = titled_scene(&mut b, run, "Scene: the arm as calibrated; yellow = where it sees a tag");
+    let summary = b.view("TextDocument", "Summary", SUMMARY);
+    let left = b.container(ContainerKind::Vertical, &[(scene, 5.0), (summary, 4.0)]);
+    let title = "A view's sightings from the mean of their tag's [mm]";
+    let sightings = b.plot(title, SIGHTING, legend(Corner2D::RightTop), run);
+    let angles = b.plot("Joint angles as calibrated [deg]", JOINT_ANGLE, legend(Corner2D::RightTop), run);
+    let right = b.container(ContainerKind::Vertical, &[(sightings, 3.0), (angles, 2.2)]);
+    let root = b.container(ContainerKind::Horizontal, &[(left, 3.0), (right, 2.0)]);
     b.finish(&root, run)
 }
 

@@ -15,6 +15,8 @@ pub(super) const COUNTS: &str = "/plots/counts";
 pub(super) const CLEARANCE: &str = "/plots/clearance";
 pub(super) const PREDICTED: &str = "/plots/predicted";
 pub(super) const OFFSET_CHANGE: &str = "/plots/offset_change";
+/// How far sightings of a tag are from their mean.
+pub(super) const SIGHTING: &str = "/plots/sighting";
 /// Lanes of states, and the lines of the log.
 pub(super) const STATE: &str = "/state";
 pub(super) const LOG: &str = "/log";

@@ -1,10 +1,12 @@
 //! Identity of a recording in the viewer.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use crate::error::ReplayError;
 use crate::scene::ReplayInput;
 use armcal_core::files;
+use armcal_core::kinematics::Attachment;
 use armcal_core::log::MessageHasher;
 use armcal_core::robot::{Robot, Vehicle};
 
@@ -28,11 +30,15 @@ impl Identity {
             read.map_err(|source| armcal_core::log::LogError::Read { path: path.to_owned(), source })?;
         }
         // Where files lie, and how that is spelled, is not part of the identity.
-        let robot = Robot { folder: PathBuf::new(), ..input.robot.clone() };
+        let robot = Robot { folder: PathBuf::new(), links: BTreeMap::new(), ..input.robot.clone() };
         let vehicle = input.vehicle.map(|vehicle| Vehicle { file: PathBuf::new(), ..vehicle.clone() });
         // Optional parts that are absent are not part of the identity.
         let drawings = format!("{robot:?}{vehicle:?}{:?}", input.scene);
-        hasher.update(drawings.replace("gripper_tag: None, ", "").replace("lights: [], ", "").as_bytes());
+        let still = format!("tag_frame: {:?}, ", Attachment::base());
+        let drawings = ["gripper_tag: None, ", "lights: [], ", "links: {}, ", &still]
+            .iter()
+            .fold(drawings, |text, absent| text.replace(absent, ""));
+        hasher.update(drawings.as_bytes());
         hasher.update(input.summary_markdown.unwrap_or_default().as_bytes());
         Ok(Self { recording_id: hasher.finalize().to_hex()[..32].to_owned() })
     }

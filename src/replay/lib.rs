@@ -1,7 +1,7 @@
 //! Mirrors a run into a file for the Rerun viewer, after the fact and from recorded streams alone.
 //!
 //! [`write_rrd`] draws belief, detections and, with the simulator's truth file, the truth; [`write_plan_rrd`] draws the
-//! motions of a plan; [`open_viewer`] hands the file to an installed viewer, which is not linked. All entities
+//! motions of a plan, [`write_views_rrd`] the views of a real arm as its calibration has them; [`open_viewer`] hands the file to an installed viewer, which is not linked. All entities
 //! (`entities`) share one timeline, `sim_time`: seconds since the recording's first log time. The same input gives the
 //! same bytes.
 
@@ -30,6 +30,7 @@ mod tracks;
 mod truth;
 mod viewer;
 mod viewpoint;
+mod views;
 
 pub use error::ReplayError;
 pub use plan::{PlanInput, write_plan_rrd};
@@ -37,6 +38,7 @@ pub use read::read_for_replay;
 pub use recording::write_rrd;
 pub use scene::ReplayInput;
 pub use viewer::{ViewerError, open_viewer};
+pub use views::{ViewsInput, write_views_rrd};
 
 #[cfg(test)]
 mod tests;

@@ -8,11 +8,15 @@ use crate::entities::{BASE, VEHICLE, WORLD};
 use crate::entity_log::EntityLog;
 use crate::scene::ReplayScene;
 use crate::shapes::{Look, log_shapes, quaternion, transform, vector};
+use armcal_belief::tagmap::files::FIRST_NAMED_ID;
+use armcal_core::kinematics::Attachment;
 use armcal_core::robot::SurveyedTag;
 use armcal_core::spatial::{Pose, Vehicle, World};
 
 /// Half of the seafloor that is drawn, m.
 const SEAFLOOR_HALF_M: f64 = 8.0;
+/// Side of a landmark whose size nobody says.
+const LANDMARK_M: f64 = 0.1;
 /// Movements below these are not drawn again.
 const SAME_M: f64 = 2e-5;
 const SAME_RAD: f64 = 2e-5;
@@ -91,6 +95,15 @@ fn draw_tags(run: &ReplayScene, stream: &mut EntityLog) {
     if tags.is_empty() {
         return;
     }
+    // Tags that the arm carries move with it.
+    if run.robot.tag_frame != Attachment::base() {
+        let mut mover = Mover::new(format!("{BASE}/tags"));
+        for time_s in run.tracks.frames() {
+            if let Some(angles) = run.shown_angles(time_s) {
+                mover.place(stream, time_s, &run.robot.chain.frame(&angles, &run.robot.tag_frame));
+            }
+        }
+    }
     let layers = [(1.25, 0.0), (1.0, 0.002), (0.5, 0.004)];
     let (mut centers, mut sizes, mut turns, mut shades) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for tag in tags {
@@ -100,15 +113,17 @@ fn draw_tags(run: &ReplayScene, stream: &mut EntityLog) {
             let place = tag.base_from_tag.isometry() * Translation3::new(0.0, 0.0, height_m);
             centers.push(vector(&place.translation.vector));
             turns.push(quaternion(&place.rotation));
-            let half_m = (0.5 * share * tag.size_m) as f32;
+            let half_m = (0.5 * share * if tag.size_m.is_nan() { LANDMARK_M } else { tag.size_m }) as f32;
             sizes.push([half_m, half_m, 0.001]);
             shades.push(fill);
         }
     }
     let plates = Boxes3D::from_centers_and_half_sizes(centers, sizes).with_quaternions(turns);
     stream.log_static(&format!("{BASE}/tags"), &plates.with_colors(shades).with_fill_mode(FillMode::Solid));
-    let label = |tag: &SurveyedTag| {
-        if Some(tag.id) == run.robot.base_tag { format!("base tag {}", tag.id) } else { format!("tag {}", tag.id) }
+    let label = |tag: &SurveyedTag| match tag.id {
+        FIRST_NAMED_ID.. => "landmark".to_owned(),
+        id if Some(id) == run.robot.base_tag => format!("base tag {id}"),
+        id => format!("tag {id}"),
     };
     let anchors = tags.iter().map(|tag| vector(&tag.base_from_tag.origin().vector()));
     let anchors = Points3D::new(anchors).with_radii([0.004]).with_labels(tags.iter().map(label));

@@ -18,7 +18,10 @@ td:first-child,th:first-child{text-align:left}.ok{color:#0a7d38}.no{color:#b3261
 /// Renders the report.
 #[must_use]
 pub fn html(summary: &RunSummary, calibration: &Calibration, online: Option<&BeliefLog>) -> String {
-    let title = summary.routine.as_deref().unwrap_or("calibration");
+    let title = match &summary.routine {
+        Some(routine) => format!("{routine} on {}", summary.robot),
+        None => summary.robot.clone(),
+    };
     let (class, verdict) = match summary.status {
         Status::Accepted => ("ok", "accepted"),
         Status::Refused => ("no", "refused"),
@@ -28,7 +31,7 @@ pub fn html(summary: &RunSummary, calibration: &Calibration, online: Option<&Bel
         html lang="en" {
             head { meta charset="utf-8"; title { "armcal: " (title) } style { (STYLE) } }
             body {
-                h1 { (title) " on " (summary.robot) ": calibration " span class=(class) { (verdict) } }
+                h1 { (title) ": calibration " span class=(class) { (verdict) } }
                 @if let Some(seed) = summary.seed { p { small { "seed " (seed) ", method " (summary.method) } } }
                 @if let Some(score) = &summary.score { (score_section(score)) }
                 h2 { "How it went" }

@@ -14,7 +14,7 @@ const FINEST_STEP_RAD: f64 = 1e-4;
 
 /// Sets the travel of the view's free joints to what its tags show under `at`; leaves it where the view shows none.
 pub fn set_by_camera(robot: &Robot, view: &mut View, at: &JointParameters) {
-    let joints: Vec<usize> = (0..robot.camera.mount.n_joints).filter(|&joint| view.is_free[joint]).collect();
+    let joints: Vec<usize> = (0..robot.n_seen_joints()).filter(|&joint| view.is_free[joint]).collect();
     if joints.is_empty() {
         return;
     }
@@ -67,7 +67,7 @@ fn seen_angles(robot: &Robot, view: &View, joints: &[usize], at: &JointParameter
 }
 
 fn distance_cost(robot: &Robot, view: &View, angles: &JointAngles) -> f64 {
-    let base_from_camera = robot.chain.link_poses(angles).frame(&robot.camera.mount);
+    let base_from_camera = robot.tags_from_camera(angles);
     let of_tag = |tag: &TagObservation| {
         let predicted_m = base_from_camera * nalgebra::Point3::from(tag.center_in_camera_m);
         let off_m = predicted_m.coords - robot.tags[tag.tag_idx].base_from_tag.origin().vector();

@@ -240,7 +240,7 @@ pub fn linearity_scale(
             let robot = problem.robot;
             found_m2 += o.residual_m.norm_squared();
             from_drawing_m2 += free_share * drawing_variance_m2(robot, o.tag);
-            for (joint, spec) in robot.sensors.iter().enumerate().take(robot.camera.mount.n_joints) {
+            for (joint, spec) in robot.sensors.iter().enumerate().take(robot.n_seen_joints()) {
                 let by_angle = o.poses.point_jacobian(joint, &o.predicted_m);
                 from_sensors_m2 += free_share * (by_angle * spec.linearity_std_rad).norm_squared();
             }

@@ -38,7 +38,7 @@ pub const MIN_VIEWS_PER_PARAMETER: f64 = 1.0;
 /// The fewest fitted views that a calibration of all joints before the camera, from the datasheet, is accepted with.
 #[must_use]
 pub fn fewest_views(robot: &Robot) -> usize {
-    (MIN_VIEWS_PER_PARAMETER * 2.0 * robot.camera.mount.n_joints as f64).ceil() as usize
+    (MIN_VIEWS_PER_PARAMETER * 2.0 * robot.n_seen_joints() as f64).ceil() as usize
 }
 
 /// `None` to accept, else the first reason to refuse.

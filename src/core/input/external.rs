@@ -48,7 +48,7 @@ pub fn read_external(path: &Path, map: &InputMap, robot: &Robot) -> Result<Exter
 fn read_up_to(most: usize, path: &Path, map: &InputMap, robot: &Robot) -> Result<ExternalRecording, InputError> {
     let file = path.display().to_string();
     let joints = robot.joint_names();
-    let n_needed = if robot.gripper_tag.is_some() { joints.len() } else { robot.camera.mount.n_joints };
+    let n_needed = if robot.gripper_tag.is_some() { joints.len() } else { robot.n_seen_joints() };
     let mut topics: BTreeMap<String, String> = BTreeMap::new();
     let mut readings = JointReader::new(&file, map, &joints, n_needed);
     let mut tags = TagReader::new(&file, map);

@@ -13,6 +13,14 @@ pub struct Attachment {
     pub link_from_frame: Isometry3<f64>,
 }
 
+impl Attachment {
+    /// The base frame itself.
+    #[must_use]
+    pub fn base() -> Self {
+        Self { n_joints: 0, link_from_frame: Isometry3::identity() }
+    }
+}
+
 /// `base_from_link` for the base (index 0) and each joint's child link.
 #[derive(Clone, Copy, Debug)]
 pub struct LinkPoses {
@@ -35,6 +43,23 @@ impl LinkPoses {
     #[must_use]
     pub fn link(&self, body: usize) -> &Isometry3<f64> {
         &self.base_from_link[..=self.n_joints][body]
+    }
+
+    /// The same poses and axes in an attached frame instead of the base frame.
+    #[must_use]
+    pub fn in_frame(&self, attachment: &Attachment) -> Self {
+        if *attachment == Attachment::base() {
+            return *self;
+        }
+        let frame_from_base = self.frame(attachment).inverse();
+        let mut moved = *self;
+        for pose in &mut moved.base_from_link[..=self.n_joints] {
+            *pose = frame_from_base * *pose;
+        }
+        for axis in &mut moved.axes[..self.n_joints] {
+            *axis = frame_from_base.rotation * *axis;
+        }
+        moved
     }
 
     /// The pose of an attached frame in the base frame; the caller names it.

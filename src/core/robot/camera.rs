@@ -5,8 +5,10 @@ use std::path::Path;
 use serde::Deserialize;
 
 use super::error::{FileIssue, RobotError};
+use super::part::check_place;
 use crate::kinematics::Attachment;
 use crate::optics::{CameraModel, Fisheye, FlatPort, Radtan};
+use crate::spatial::{Camera, Link, Pose};
 
 /// The nominal camera.
 #[derive(Clone, Debug)]
@@ -49,6 +51,8 @@ impl Default for LensPriors {
 pub(super) struct CameraFile {
     name: String,
     pub(super) link: String,
+    position_m: Option<[f64; 3]>,
+    quaternion_wxyz: Option<[f64; 4]>,
     model: Option<String>,
     resolution_px: Option<[u32; 2]>,
     focal_px: Option<[f64; 2]>,
@@ -80,6 +84,22 @@ struct LensFile<'a> {
 }
 
 impl CameraFile {
+    /// The mount on a link whose frame is at `link`: the link's own frame, but where the file says more.
+    ///
+    /// # Errors
+    /// [`FileIssue`] naming the key.
+    fn mount(&self, file: &Path, link: Attachment) -> Result<Attachment, FileIssue> {
+        if self.position_m.is_none() && self.quaternion_wxyz.is_none() {
+            return Ok(link);
+        }
+        let position_m = self.position_m.unwrap_or_default();
+        check_place(file, "camera.position_m", &position_m)?;
+        let quaternion_wxyz = self.quaternion_wxyz.unwrap_or([1.0, 0.0, 0.0, 0.0]);
+        let place: Pose<Link, Camera> = Pose::from_position_quaternion_wxyz(position_m, quaternion_wxyz)
+            .ok_or_else(|| FileIssue::new(file, "camera.quaternion_wxyz", "must be finite, not zero"))?;
+        Ok(Attachment { link_from_frame: link.link_from_frame * place.isometry(), ..link })
+    }
+
     /// `None` where none of the keys of a lens is there.
     fn lens(&self, file: &Path) -> Result<Option<LensFile<'_>>, FileIssue> {
         let given = (&self.model, self.resolution_px, self.focal_px, self.center_px, &self.distortion);
@@ -167,7 +187,7 @@ fn lens(file: &Path, raw: &LensFile<'_>) -> Result<CameraModel, FileIssue> {
     }
 }
 
-pub(super) fn check_camera(file: &Path, raw: &CameraFile, mount: Attachment) -> Result<CameraSpec, RobotError> {
+pub(super) fn check_camera(file: &Path, raw: &CameraFile, link: Attachment) -> Result<CameraSpec, RobotError> {
     let check = |key: &str, value: f64, range| FileIssue::check_range(file, &format!("camera.{key}"), value, range);
     let port = raw.port.map(|port| port.check(file)).transpose()?;
     let lens = match raw.lens(file)? {
@@ -192,7 +212,7 @@ pub(super) fn check_camera(file: &Path, raw: &CameraFile, mount: Attachment) -> 
     };
     Ok(CameraSpec {
         name: raw.name.clone(),
-        mount,
+        mount: raw.mount(file, link)?,
         lens,
         lens_priors,
         corner_std_px: check("corner_std_px", raw.corner_std_px.unwrap_or(CORNER_STD_PX), 1e-3..=100.0)?,

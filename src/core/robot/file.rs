@@ -152,6 +152,10 @@ fn planning_issues(file: &Path, raw: &RobotFile, camera: &CameraSpec, arm: &Urdf
     if !camera.lens.is_known() {
         issues.push(lens_issue(file));
     }
+    if camera.mount.n_joints == 0 {
+        let problem = "no joint moves it; run and plan need a camera that the arm carries";
+        issues.push(FileIssue::new(file, "[camera] link", problem));
+    }
     let mut ignored: Vec<&str> = arm.collision_meshes().iter().map(|mesh| mesh.link).collect();
     ignored.dedup();
     if raw.collision_meshes == CollisionMeshes::Ignore && !ignored.is_empty() {
@@ -176,7 +180,7 @@ fn robot_of(folder: &Path, raw: RobotFile, urdf: UrdfModel, meshes: Meshes) -> R
     let mut bodies = arm.bodies(jaws, folders.as_ref())?;
     let camera_mount = arm.attachment(&raw.camera.link)?;
     let camera = check_camera(&file, &raw.camera, camera_mount)?;
-    let planning_issues = planning_issues(&file, &raw, &camera, &arm);
+    let (links, planning_issues) = (arm.attachments(), planning_issues(&file, &raw, &camera, &arm));
     let allowed_pairs = AllowedPairs::check(&file, raw.allowed_pairs, &bodies)?;
     let sensors = check_sensors(&file, &raw.joint_sensor, &chain)?;
     let drive = DriveSpec {
@@ -225,6 +229,8 @@ fn robot_of(folder: &Path, raw: RobotFile, urdf: UrdfModel, meshes: Meshes) -> R
         geometry,
         camera,
         tags,
+        tag_frame: Attachment::base(),
+        links,
     })
 }
 

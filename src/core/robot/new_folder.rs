@@ -226,7 +226,17 @@ impl Draft<'_> {
         );
     }
 
+    /// Whether no joint of the arm moves the camera.
+    fn stands_still(&self, link: &str) -> bool {
+        let arm = UrdfChain { urdf: self.urdf, base_link: &self.arm.base, chain: self.chain };
+        arm.attachment(link).is_ok_and(|attachment| attachment.n_joints == 0)
+    }
+
     fn camera(&self, out: &mut String) {
+        if let Some(link) = self.arm.camera.as_ref().filter(|link| self.stands_still(link)) {
+            let _ = write!(out, "\n[camera]\nname = {0}\n# Read.\nlink = {0}\n{STANDING}{LENS}", quoted(link));
+            return;
+        }
         let (link, whose, std_m, std_rad) = match &self.arm.camera {
             Some(link) => {
                 (link, "# Read: the camera's link. Its frame is optical: x right, y down, z forward.", 0.01, 0.05)
@@ -284,6 +294,15 @@ const LENS: &str = "# For images, for corners of tags, and for run and plan: the
 # center_px = [639.5, 359.5]
 # distortion = [0.0, 0.0, 0.0, 0.0]
 # corner_std_px = 0.3
+";
+
+const STANDING: &str = "# No joint moves this link: the camera stands still and sees tags or a board that the arm carries. The tag map says
+# where they are, in the frame of the arm's link that carries them. Left to fill in: where the camera is on its link
+# (optical frame: x right, y down, z forward), and how well that is known, one sigma per axis.
+position_m = [0.0, 0.0, 0.0]
+quaternion_wxyz = [1.0, 0.0, 0.0, 0.0]
+mount_std_m = 0.1
+mount_std_rad = 0.1
 ";
 
 const REST: &str = "

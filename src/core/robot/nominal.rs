@@ -1,5 +1,6 @@
 //! The nominal arm.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use nalgebra::{Isometry3, Matrix6};
@@ -57,6 +58,10 @@ pub struct Robot {
     pub camera: CameraSpec,
     /// Tags by survey, with those whose pose is unknown; without the tag on the gripper.
     pub tags: Vec<SurveyedTag>,
+    /// The frame that the tags' poses are in: the base's, or, before a camera that stands still, one that the arm moves.
+    pub tag_frame: Attachment,
+    /// Every link of the URDF that the arm carries, by name.
+    pub links: BTreeMap<String, Attachment>,
     /// Id of the tag beside the base; one of `tags` where there are any, `None` where there are none.
     pub base_tag: Option<u32>,
     /// Joint angles in which the arm is stowed, rad. Where robot.toml names none, the middle of each joint's range: a
@@ -96,6 +101,27 @@ impl Robot {
         self.chain.n_joints()
     }
 
+    /// How many joints, from the base on, move camera and tags against each other.
+    #[must_use]
+    pub fn n_seen_joints(&self) -> usize {
+        self.camera.mount.n_joints.max(self.tag_frame.n_joints)
+    }
+
+    /// The camera in the frame of the tags, at these angles by the sensors.
+    #[must_use]
+    pub fn tags_from_camera(&self, angles: &JointAngles) -> Isometry3<f64> {
+        if !self.is_watched() {
+            return self.chain.frame(angles, &self.camera.mount);
+        }
+        self.chain.link_poses(angles).in_frame(&self.tag_frame).frame(&self.camera.mount)
+    }
+
+    /// Whether the camera stands still beside the arm, which carries the tags (eye-to-hand).
+    #[must_use]
+    pub fn is_watched(&self) -> bool {
+        self.tag_frame.n_joints > self.camera.mount.n_joints
+    }
+
     /// The surveyed tag with this id; `None` for the tag on the gripper, too.
     #[must_use]
     pub fn tag(&self, id: u32) -> Option<&SurveyedTag> {
@@ -114,6 +140,7 @@ impl Robot {
         self.planning_issues.retain(|issue| issue.key != BASE_TAG);
         self.tags = survey.tags;
         self.base_tag = survey.base_tag;
+        self.tag_frame = survey.frame;
         self
     }
 
@@ -157,7 +184,7 @@ impl Robot {
     /// The tags around the arm.
     #[must_use]
     pub fn survey(&self) -> TagSurvey {
-        TagSurvey { base_tag: self.base_tag, tags: self.tags.clone() }
+        TagSurvey { base_tag: self.base_tag, frame: self.tag_frame, tags: self.tags.clone() }
     }
 
     /// Checks that the arm can be simulated: each moving body has mass and an inertia.

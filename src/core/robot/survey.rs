@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::error::{FileIssue, RobotError};
 use super::part::check_place;
+use crate::kinematics::Attachment;
 use crate::spatial::{Base, Frame, Pose, Tag};
 
 /// Limit of the tags of one file; the family 36h11 has 587.
@@ -19,7 +20,8 @@ pub struct SurveyedTag {
     pub id: u32,
     /// Side of the black square. NaN where it is unknown, for a landmark used by its position or pose alone.
     pub size_m: f64,
-    /// From a drawing at best where the pose is unknown.
+    /// From a drawing at best where the pose is unknown. In the frame of [`TagSurvey::frame`], which is the base's but
+    /// before a camera that stands still.
     pub base_from_tag: Pose<Base, Tag>,
     /// One sigma per axis; infinite where the pose is unknown.
     pub position_std_m: f64,
@@ -61,6 +63,8 @@ pub struct BaseTagStd {
 pub struct TagSurvey {
     /// The tag beside the base; the replay shows it. `None` where there are no tags.
     pub base_tag: Option<u32>,
+    /// The frame that the poses are in.
+    pub frame: Attachment,
     /// Each id once; the base tag is one of them.
     pub tags: Vec<SurveyedTag>,
 }
@@ -76,7 +80,7 @@ impl TagSurvey {
         }
         let base_tag = self.base_tag.filter(|id| ids.contains(id)).or(ids.first().copied());
         let tags = self.tags.iter().filter(|tag| ids.contains(&tag.id)).cloned().collect();
-        Ok(Self { base_tag, tags })
+        Ok(Self { base_tag, frame: self.frame, tags })
     }
 
     /// The survey limited to `knowledge`: the other tags get infinite standard deviations.

@@ -299,6 +299,12 @@ impl UrdfChain<'_> {
         Ok(Attachment { n_joints, link_from_frame })
     }
 
+    /// Every link that the chain carries, by name.
+    pub fn attachments(&self) -> BTreeMap<String, Attachment> {
+        let links = self.urdf.robot.links.iter();
+        links.filter_map(|link| Some((link.name.clone(), self.attachment(&link.name).ok()?))).collect()
+    }
+
     /// Visual shapes of the link `name`, in the frame of the chain's link that carries it.
     ///
     /// # Errors

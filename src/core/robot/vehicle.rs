@@ -9,6 +9,7 @@ use super::error::{FileIssue, RobotError, parse_toml, read_text};
 use super::light::{LightFile, VehicleLight};
 use super::part::{Part, PartFile, check_parts, check_place};
 use super::survey::{TagFile, TagSurvey, check_tags};
+use crate::kinematics::Attachment;
 use crate::spatial::{Base, Pose, Vehicle as VehicleFrame};
 
 /// The nominal vehicle.
@@ -186,7 +187,7 @@ fn check_survey(
         (Some(base_tag), false) => {
             let base_tag = Some(base_tag);
             let tags = check_tags(file, &raw.tag, base_tag, &vehicle_from_base.inverse())?;
-            Ok(Some(TagSurvey { base_tag, tags }))
+            Ok(Some(TagSurvey { base_tag, frame: Attachment::base(), tags }))
         }
     }
 }

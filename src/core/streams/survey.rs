@@ -1,6 +1,7 @@
 //! A survey of tags on its way into a recording and out of it.
 
 use super::message::{RecordedSurvey, RecordedTag};
+use crate::kinematics::Attachment;
 use crate::robot::{SurveyedTag, TagSurvey};
 use crate::spatial::{Base, Pose, Tag};
 use crate::time::Stamp;
@@ -37,6 +38,10 @@ impl RecordedSurvey {
                 rotation_std_rad: tag.rotation_std_rad,
             })
         };
-        TagSurvey { base_tag: Some(self.base_tag), tags: self.tags.iter().filter_map(tag).collect() }
+        TagSurvey {
+            base_tag: Some(self.base_tag),
+            frame: Attachment::base(),
+            tags: self.tags.iter().filter_map(tag).collect(),
+        }
     }
 }

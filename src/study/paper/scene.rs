@@ -8,6 +8,7 @@ use rand_distr::{Distribution, StandardNormal};
 use crate::paper::PaperStudyError;
 use armcal_belief::calib::{JointParameters, Parameter, ParameterKind, TagMeasurement, TagObservation, View};
 use armcal_core::joints::JointAngles;
+use armcal_core::kinematics::Attachment;
 use armcal_core::robot::{Robot, SurveyedTag, TagSurvey};
 use armcal_core::spatial::Pose;
 use armcal_core::stats::stream_rng;
@@ -168,7 +169,7 @@ fn with_landmarks(robot: &Robot, n: usize, rng: &mut ChaCha8Rng) -> Result<Robot
             SurveyedTag { id: id as u32, size_m: 0.15, base_from_tag, position_std_m, rotation_std_rad }
         })
         .collect();
-    Ok(robot.clone().with_survey(TagSurvey { base_tag: Some(0), tags }))
+    Ok(robot.clone().with_survey(TagSurvey { base_tag: Some(0), frame: Attachment::base(), tags }))
 }
 
 fn drawn_sensors(robot: &Robot, setting: &Setting, rng: &mut ChaCha8Rng) -> JointParameters {

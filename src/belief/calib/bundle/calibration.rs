@@ -233,7 +233,7 @@ impl<'a> BundleCalibration<'a> {
     }
 
     fn check_observable(&self, setup: &BundleSetup, declared: &[Failure]) -> Result<(), CalibError> {
-        let n = self.data.robot.camera.mount.n_joints;
+        let n = self.data.robot.n_seen_joints();
         let has_columns = setup.input().model.joints.iter().take(n).any(|kinds| !kinds.is_empty());
         if has_columns || !declared.is_empty() { Ok(()) } else { Err(self.nothing_observable()) }
     }

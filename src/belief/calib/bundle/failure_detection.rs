@@ -59,7 +59,7 @@ impl FailureSearch<'_> {
         }
         let unclear: Vec<usize> = known.iter().filter(|f| f.kind == FailedKind::Jumps).map(|f| f.joint).collect();
         self.look_into_jumps(&mut known, &unclear);
-        let n_before = self.robot.camera.mount.n_joints;
+        let n_before = self.robot.n_seen_joints();
         let still: Vec<usize> = (0..n_before).filter(|&j| !is_failed(&known, j) && self.is_still(j)).collect();
         if still.len() < n_before {
             self.classify_still(&mut known, &still);
@@ -114,7 +114,7 @@ impl FailureSearch<'_> {
         let mut known = known.to_vec();
         for _ in 0..MAX_FOUND {
             let without = self.score(&known);
-            let candidates = (0..self.robot.camera.mount.n_joints).filter(|&joint| !is_failed(&known, joint));
+            let candidates = (0..self.robot.n_seen_joints()).filter(|&joint| !is_failed(&known, joint));
             let mut best: Option<(f64, Failure)> = None;
             for failure in candidates.filter_map(|joint| self.hypothesis(&known, joint, FailureSource::Detected)) {
                 let with: Vec<Failure> = known.iter().cloned().chain([failure.clone()]).collect();
@@ -134,8 +134,7 @@ impl FailureSearch<'_> {
     /// The two sensors whose failures explain the most together, each by the angles that the camera shows with both
     /// ignored.
     fn two_at_once(&self, known: &[Failure]) -> Option<Vec<Failure>> {
-        let free: Vec<usize> =
-            (0..self.robot.camera.mount.n_joints).filter(|&joint| !is_failed(known, joint)).collect();
+        let free: Vec<usize> = (0..self.robot.n_seen_joints()).filter(|&joint| !is_failed(known, joint)).collect();
         let pairs = free.iter().enumerate().flat_map(|(k, &a)| free[k + 1..].iter().map(move |&b| [a, b]));
         let both = pairs.filter_map(|pair| {
             let mut with = known.to_vec();
@@ -275,7 +274,7 @@ fn score(found: &Estimate<'_>) -> f64 {
     sum += (&problem.prior.joint_info * &off).dot(&off);
     sum += PER_STEP * problem.layout.parameters.iter().filter(|p| p.is_step()).count() as f64;
     for (view, errors) in problem.views.iter().zip(&found.solved.state.joint_error) {
-        for (joint, error) in errors.iter().enumerate().take(problem.n_camera_joints) {
+        for (joint, error) in errors.iter().enumerate().take(problem.n_seen_joints) {
             let by_sensor = error.powi(2) / problem.joint_error_var(view, joint);
             sum += if view.is_free[joint] { PER_READING } else { by_sensor };
         }
@@ -329,7 +328,7 @@ pub(crate) fn is_suspicious(found: &Estimate<'_>) -> bool {
         return true;
     }
     is_beyond_datasheet(robot, found)
-        || (0..problem.n_camera_joints).any(|joint| {
+        || (0..problem.n_seen_joints).any(|joint| {
             let large = LARGE_STD_RAD.max(2.0 * robot.sensors[joint].linearity_std_rad);
             if found.scales().joint_std_rad[joint] > large {
                 return true;

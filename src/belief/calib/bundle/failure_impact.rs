@@ -2,7 +2,7 @@
 
 use crate::calib::bundle::estimate::Estimate;
 use crate::calib::bundle::failure_detection::is_suspicious;
-use crate::calib::bundle::failures::{Failure, FailureSource};
+use crate::calib::bundle::failures::{Failure, FailureSource, slip_in_words};
 use crate::calib::covariance::{ParameterCovariance, ToolErrorPrediction, predict_tool_error};
 use crate::calib::finding::{Finding, FindingKind, FindingUnit};
 use crate::calib::parameters::JointParameters;
@@ -68,7 +68,7 @@ impl FailureImpact<'_> {
                 FailureSource::Detected => "detected",
             }
             .to_owned(),
-            evidence: failure.evidence.clone(),
+            evidence: self.evidence(failure),
             poses: failure.views.iter().map(pose).collect(),
             since_pose: failure.since.as_ref().map(pose),
             angle_rad: angle.map(|(angle_rad, _)| angle_rad),
@@ -81,6 +81,16 @@ impl FailureImpact<'_> {
             tool_error_by_datasheet_m: has_no_sensor
                 .then(|| self.tool_error_where(joint, AngleSource::ByDatasheet))
                 .flatten(),
+        }
+    }
+
+    /// What shows it; a slip with its size as estimated in the end, with all else.
+    fn evidence(&self, failure: &Failure) -> String {
+        let step =
+            failure.since.and_then(|since| Some((since, self.found.step(failure.joint, self.views[since].end)?)));
+        match step {
+            Some((since, (step_rad, _))) => slip_in_words(step_rad, self.views, since),
+            None => failure.evidence.clone(),
         }
     }
 

@@ -193,7 +193,7 @@ pub(crate) struct Scope<'a> {
 /// Sensors before the camera, or before the tag on the gripper, with the mount and the tags.
 pub(crate) fn model_of(robot: &Robot, scope: &Scope<'_>) -> Model {
     let gripper_joints = robot.gripper_tag.filter(|_| scope.gripper_tag).map_or(0, |tag| tag.mount.n_joints);
-    let last = gripper_joints.max(robot.camera.mount.n_joints);
+    let last = gripper_joints.max(robot.n_seen_joints());
     let joint = |joint: usize| {
         let spec = &robot.sensors[joint];
         // A datasheet that leaves nothing open leaves nothing to estimate.

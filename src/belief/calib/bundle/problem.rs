@@ -125,8 +125,8 @@ pub(crate) struct BundleProblem<'a> {
     pub scales: Hyperparameters,
     /// Links as they were known before.
     pub guess_links: LinkCorrections,
-    /// Joints before the camera.
-    pub n_camera_joints: usize,
+    /// Joints that move camera and tags against each other.
+    pub n_seen_joints: usize,
 }
 
 /// Everything that is estimated.
@@ -272,8 +272,8 @@ impl<'a> BundleProblem<'a> {
             });
             data.push(view_data(input, view, &layout, from..to, gripper));
         }
-        let (guess_links, n_camera_joints) = (input.guess.links, robot.camera.mount.n_joints);
-        Self { robot, layout, views: data, observations, prior, scales, guess_links, n_camera_joints }
+        let (guess_links, n_seen_joints) = (input.guess.links, robot.n_seen_joints());
+        Self { robot, layout, views: data, observations, prior, scales, guess_links, n_seen_joints }
     }
 
     /// Takes `scales` over, with the weights that depend on them.
@@ -362,14 +362,16 @@ impl<'a> BundleProblem<'a> {
         all.links
     }
 
-    /// Poses of all links in a view.
+    /// Poses of all links in a view, in the frame of the tags.
     pub(crate) fn link_poses(&self, view_idx: usize, state: &State) -> LinkPoses {
         let angles = self.angles(view_idx, state);
         let corrections = self.link_corrections(state);
-        if corrections == LinkCorrections::default() {
-            return self.robot.chain.link_poses(&angles);
-        }
-        self.robot.chain.corrected_link_poses(&angles, &corrections)
+        let poses = if corrections == LinkCorrections::default() {
+            self.robot.chain.link_poses(&angles)
+        } else {
+            self.robot.chain.corrected_link_poses(&angles, &corrections)
+        };
+        poses.in_frame(&self.robot.tag_frame)
     }
 
     /// One sigma of a standard deviation that is in use: never zero.

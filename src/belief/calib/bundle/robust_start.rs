@@ -34,7 +34,7 @@ pub(crate) fn robust_start(input: &BundleInput<'_>) -> RobustStart {
     let linear = |kind: &ParameterKind| {
         matches!(kind, ParameterKind::Gain | ParameterKind::Offset | ParameterKind::StepBefore(_))
     };
-    let n_before = input.robot.camera.mount.n_joints;
+    let n_before = input.robot.n_seen_joints();
     let of_joint = |(joint, kinds): (usize, &Vec<ParameterKind>)| {
         if joint < n_before { kinds.iter().copied().filter(linear).collect() } else { Vec::new() }
     };

@@ -69,11 +69,12 @@ impl<'a> Group<'a> {
     ) -> impl Iterator<Item = Self> + use<'a> {
         let view = &problem.views[view_idx];
         let error = &state.camera_error[view_idx];
-        let before = poses.link(problem.n_camera_joints) * state.mount;
+        let before = poses.link(problem.robot.camera.mount.n_joints) * state.mount;
         let of_tags = Self {
             view_idx,
-            joints: 0..problem.n_camera_joints,
-            sign: 1.0,
+            joints: 0..problem.n_seen_joints,
+            // Before a camera that stands still the joints move the tags.
+            sign: if problem.robot.is_watched() { -1.0 } else { 1.0 },
             by_mount: adjoint(&error.inverse()),
             camera_error: problem.scales.camera_error_std.is_some().then_some(error),
             observations: view.observations.clone(),
@@ -82,7 +83,7 @@ impl<'a> Group<'a> {
         };
         let of_gripper = view.gripper.zip(problem.robot.gripper_tag).map(|(observation, tag)| Self {
             view_idx,
-            joints: problem.n_camera_joints..tag.mount.n_joints,
+            joints: problem.n_seen_joints..tag.mount.n_joints,
             // Joints distal to the camera move the tag, not the camera.
             sign: -1.0,
             by_mount: Matrix6::identity(),
@@ -194,8 +195,8 @@ impl SchurBlock {
     fn columns<'a>(&self, problem: &'a BundleProblem<'_>, view_idx: usize) -> Columns<'a> {
         let view = &problem.views[view_idx];
         let joints = match &problem.robot.gripper_tag {
-            Some(tag) if view.gripper == Some(self.range.start) => problem.n_camera_joints..tag.mount.n_joints,
-            _ => 0..problem.n_camera_joints,
+            Some(tag) if view.gripper == Some(self.range.start) => problem.n_seen_joints..tag.mount.n_joints,
+            _ => 0..problem.n_seen_joints,
         };
         Columns { layout: &problem.layout, view, joints }
     }

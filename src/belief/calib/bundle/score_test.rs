@@ -87,7 +87,7 @@ impl Estimate<'_> {
     pub(crate) fn n_seen_joints(&self) -> usize {
         match &self.problem.robot.gripper_tag {
             Some(tag) if self.problem.layout.gripper_tag.is_some() => tag.mount.n_joints,
-            _ => self.problem.n_camera_joints,
+            _ => self.problem.n_seen_joints,
         }
     }
 

@@ -23,7 +23,7 @@ pub(crate) struct BundleSetup {
 
 /// The declared failures of `robot`.
 pub(crate) fn declared(robot: &Robot, views: &[View]) -> Vec<Failure> {
-    let before_camera = robot.failed.iter().filter(|failed| failed.joint < robot.camera.mount.n_joints);
+    let before_camera = robot.failed.iter().filter(|failed| failed.joint < robot.n_seen_joints());
     before_camera.map(|&failed| Failure::declared(failed, views.len())).collect()
 }
 
@@ -63,7 +63,7 @@ impl BundleSetup {
 
     /// Gains and offsets that the views alone must tell.
     pub(crate) fn n_wanted(&self, robot: &Robot) -> usize {
-        let per_joint = 2 * robot.camera.mount.n_joints;
+        let per_joint = 2 * robot.n_seen_joints();
         let lost = self
             .applied
             .failures

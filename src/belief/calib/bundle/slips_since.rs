@@ -52,7 +52,7 @@ pub(crate) fn slips_since(before: &Calibration, now: &Calibration, robot: &Robot
     let old = Side { calibration: before, parameters: old, change };
     let new = Side { calibration: now, parameters: new, change: ConditionChange::default() };
     let elapsed_h = (now.valid.time_nanos - before.valid.time_nanos).max(0) as f64 / 3.6e12;
-    let joints = 0..robot.camera.mount.n_joints;
+    let joints = 0..robot.n_seen_joints();
     let mut slips: Vec<Finding> = joints.filter_map(|joint| slip(robot, joint, (&old, &new), elapsed_h)).collect();
     slips.sort_by(|a, b| b.size.map(f64::abs).partial_cmp(&a.size.map(f64::abs)).unwrap_or(std::cmp::Ordering::Equal));
     slips

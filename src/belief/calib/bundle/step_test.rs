@@ -105,7 +105,7 @@ impl Estimate<'_> {
             first_group.push(n_groups);
             n_groups += 1 + usize::from(view.gripper.is_some());
         }
-        let mut by_joint: Vec<Vec<JointError>> = (0..problem.n_camera_joints).map(|_| Vec::new()).collect();
+        let mut by_joint: Vec<Vec<JointError>> = (0..problem.n_seen_joints).map(|_| Vec::new()).collect();
         for &view_idx in views {
             let view = &problem.views[view_idx];
             let own = &self.solved.normal.eliminated[first_group[view_idx]];

@@ -200,7 +200,7 @@ impl VerdictInput<'_> {
         let robot = self.input.robot;
         let stated = Hyperparameters::datasheet(robot);
         let mut refusal = None;
-        for (joint, spec) in robot.sensors.iter().enumerate().take(robot.camera.mount.n_joints) {
+        for (joint, spec) in robot.sensors.iter().enumerate().take(robot.n_seen_joints()) {
             let std_rad = self.found.scales().joint_std_rad[joint];
             let limit_rad = MAX_OVER_LINEARITY * spec.linearity_std_rad.max(stated.joint_std_rad[joint]);
             let check = Check::at_most(format!("{}: error from view to view, rad", spec.joint), std_rad, limit_rad);
@@ -389,7 +389,7 @@ impl VerdictInput<'_> {
         }
         // Small sizes are harmless: what is not there needs none.
         let above = [0.0, SCALE_BOUNDS[1]];
-        for (joint, spec) in robot.sensors.iter().enumerate().take(robot.camera.mount.n_joints) {
+        for (joint, spec) in robot.sensors.iter().enumerate().take(robot.n_seen_joints()) {
             let (now_rad, first_rad) = (now.joint_std_rad[joint], first.joint_std_rad[joint]);
             all.push((format!("{}: error from view to view, rad", spec.joint), now_rad, first_rad, above));
             let (now_rad, first_rad) = (now.shape_std_rad[joint], first.shape_std_rad[joint]);
@@ -411,7 +411,7 @@ impl VerdictInput<'_> {
     /// Links between camera and tool that no tag shows.
     fn has_unseen_links(&self) -> bool {
         let robot = self.input.robot;
-        robot.tool.mount.n_joints > robot.camera.mount.n_joints && !self.input.model.gripper_tag
+        robot.tool.mount.n_joints > robot.n_seen_joints() && !self.input.model.gripper_tag
     }
 
     fn table(&self, found: &Observability) -> ObservabilityTable {

@@ -47,7 +47,7 @@ pub(crate) fn calibrate_positions(
     let start = start(&mut data, prior)?;
     let problem = PositionProblem::new(&start.robot, &data.data.fit);
     let (mut free, mut unobservable) = free_parameters(&problem, &start.guess);
-    let n_camera_joints = start.robot.camera.mount.n_joints;
+    let n_camera_joints = start.robot.n_seen_joints();
     let n_parameters = free.len() + unobservable.iter().filter(|u| u.parameter.joint < n_camera_joints).count();
     unobservable.retain(|u| !start.determined.contains(&u.parameter));
     let nothing = || CalibError::NothingObservable { recording: data.name.clone() };

@@ -40,7 +40,7 @@ pub fn free_parameters(problem: &PositionProblem<'_>, guess: &JointParameters) -
     for joint in 0..robot.n_joints() {
         for kind in [ParameterKind::Gain, ParameterKind::Offset] {
             let parameter = Parameter { joint, kind };
-            if joint >= robot.camera.mount.n_joints {
+            if joint >= robot.n_seen_joints() {
                 unobservable.push(Unobservable::distal(parameter));
             } else if parameter.prior_std(robot) > 0.0 {
                 free.push(parameter);

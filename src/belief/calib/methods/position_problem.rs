@@ -57,7 +57,7 @@ impl<'a> PositionProblem<'a> {
             } else {
                 self.angles(view, &departure, parameters)
             };
-            let poses = self.robot.chain.link_poses(&angles);
+            let poses = self.robot.chain.link_poses(&angles).in_frame(&self.robot.tag_frame);
             let base_from_camera = poses.frame(&self.robot.camera.mount);
             for tag in &view.tags {
                 let predicted_m = (base_from_camera * Point3::from(tag.center_in_camera_m)).coords;
@@ -109,7 +109,7 @@ impl<'a> PositionProblem<'a> {
             } else {
                 self.angles(view, &view.conditions.departure_from(&parameters.reference), parameters)
             };
-            let base_from_camera = self.robot.chain.frame(&angles, &self.robot.camera.mount);
+            let base_from_camera = self.robot.tags_from_camera(&angles);
             for tag in &view.tags {
                 let predicted_m = (base_from_camera * Point3::from(tag.center_in_camera_m)).coords;
                 sum += (predicted_m - self.robot.tags[tag.tag_idx].base_from_tag.origin().vector()).norm();
@@ -175,10 +175,12 @@ impl<'a> PositionProblem<'a> {
     /// d(residual)/d(parameter): a joint turns everything behind it, `axis x (point - origin)` times
     /// d(angle)/d(parameter).
     pub(crate) fn derivative(&self, o: &TagResidual<'_>, parameter: Parameter) -> Vector3<f64> {
-        if parameter.joint >= self.robot.camera.mount.n_joints {
+        if parameter.joint >= self.robot.n_seen_joints() {
             return Vector3::zeros();
         }
-        let by_angle = o.poses.point_jacobian(parameter.joint, &o.predicted_m);
+        // Before a camera that stands still the joint turns the tags' frame: the point moves the other way in it.
+        let sign = if self.robot.is_watched() { -1.0 } else { 1.0 };
+        let by_angle = o.poses.point_jacobian(parameter.joint, &o.predicted_m) * sign;
         let (travel_rad, approach) = (o.view.travel_rad[parameter.joint], o.view.approach[parameter.joint]);
         let spec = &self.robot.sensors[parameter.joint];
         by_angle * parameter.kind.angle_derivative(spec, travel_rad, &o.departure, approach)

@@ -233,7 +233,7 @@ impl ViewStream {
         let moved = |(joint, model): (usize, &armcal_core::sensor::SensorModel)| {
             apart_rad(&model.spec, travel_rad[joint], before[joint]).abs() > APART_RAD
         };
-        models.take(self.robot.camera.mount.n_joints).any(moved)
+        models.take(self.robot.n_seen_joints()).any(moved)
     }
 }
 

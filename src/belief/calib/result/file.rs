@@ -3,8 +3,10 @@
 use std::path::Path;
 
 use crate::calib::covariance::ParameterCovariance;
+use crate::calib::finding::FindingKind;
 use crate::calib::parameters::{JointParameters, Parameter};
 use crate::calib::result::calibration::{Calibration, JointResult};
+use crate::calib::result::camera_mount::CameraMount;
 use crate::calib::result::covariance_file::CovarianceTable;
 use crate::calib::result::file_error::CalibrationFileError;
 use crate::calib::result::link_table::LinkResult;
@@ -119,6 +121,26 @@ impl Calibration {
         let names = self.joint.iter().map(|joint| joint.name.as_str());
         corrections.sag = self.sag.as_ref().map(|sag| sag.sag(names)).unwrap_or_default();
         corrections
+    }
+
+    /// What is to be added to a joint's angle before its sensor slipped, at a time since the first view, rad.
+    #[must_use]
+    pub fn slipped_rad(&self, joint: &str, since_first_view_s: f64) -> f64 {
+        let slips = self.findings.iter().filter(|found| found.kind == FindingKind::SensorSlip && found.name == joint);
+        let later = slips.filter(|slip| slip.time_s.is_some_and(|time_s| since_first_view_s < time_s));
+        later.filter_map(|slip| slip.size).sum()
+    }
+
+    /// `robot` with its links and the camera's mount as calibrated; sensors and tags stay.
+    #[must_use]
+    pub fn applied_to(&self, robot: &Robot) -> Robot {
+        let mut robot = robot.clone();
+        robot.chain = robot.chain.corrected(&self.link_corrections());
+        let mount = self.camera_mount.as_ref().filter(|mount| mount.left_out.is_none());
+        if let Some(link_from_camera) = mount.and_then(CameraMount::link_from_camera) {
+            robot.camera.mount.link_from_frame = link_from_camera;
+        }
+        robot
     }
 
     /// The covariance of the estimated parameters for `robot`'s joints; rows that name no joint of it are left out.

@@ -56,7 +56,7 @@ const MOVED_SIGMAS: f64 = 6.0;
 pub(crate) fn check_pose_variation(name: &str, data: &CaptureData, robot: &Robot) -> Result<(), CalibError> {
     let views = || data.fit.iter().chain(&data.held_out).filter(|view| !view.tags.is_empty());
     let mut most: Option<(usize, f64)> = None;
-    for (joint, spec) in robot.sensors.iter().enumerate().take(robot.camera.mount.n_joints) {
+    for (joint, spec) in robot.sensors.iter().enumerate().take(robot.n_seen_joints()) {
         let travel = views().map(|view| view.travel_rad[joint]);
         let (low, high) = travel.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), t| (l.min(t), h.max(t)));
         let noise_rad = spec.noise_std_counts / spec.counts_per_rad.abs();

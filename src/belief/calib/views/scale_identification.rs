@@ -53,7 +53,7 @@ pub fn identify_scales(data: &CaptureData, robot: &Robot) -> Result<(Robot, Vec<
 fn identify(robot: &Robot, joint: usize, views: &[View]) -> Result<IdentifiedScale, CalibError> {
     let name = robot.sensors.get(joint).map_or_else(|| format!("number {joint}"), |s| s.joint.clone());
     let wrong = |problem: String| CalibError::Identify { joint: name.clone(), problem };
-    if joint >= robot.camera.mount.n_joints {
+    if joint >= robot.n_seen_joints() {
         return Err(wrong("it does not move the camera".to_owned()));
     }
     let seen: Vec<(f64, Isometry3<f64>)> =
@@ -94,7 +94,9 @@ fn slope(x: &DVector<f64>, y: &DVector<f64>) -> Option<(f64, f64)> {
 fn drawn_axis(robot: &Robot, joint: usize, travel_rad: &JointAngles) -> Vector3<f64> {
     let angles = JointAngles::from_fn(robot.n_joints(), |j| robot.sensors[j].center_rad + travel_rad[j]);
     let poses = robot.chain.link_poses(&angles);
-    poses.frame(&robot.camera.mount).rotation.inverse() * poses.axis(joint)
+    let axis = poses.frame(&robot.camera.mount).rotation.inverse() * poses.axis(joint);
+    // Tags that a joint turns one way see a camera that stands still turn the other way.
+    if robot.is_watched() { -axis } else { axis }
 }
 
 /// Principal direction of the rotation vectors, towards `drawn`.

@@ -9,6 +9,7 @@ use std::path::Path;
 use nalgebra::Isometry3;
 
 use armcal_core::input::TagUse;
+use armcal_core::kinematics::Attachment;
 use armcal_core::robot::{FileIssue, Robot, SurveyedTag, TagSurvey};
 use armcal_core::spatial::{Base, Pose, Tag};
 
@@ -65,10 +66,7 @@ impl LandmarkFile {
     /// # Errors
     /// [`FileIssue`] naming `file`, the landmark and the key.
     pub fn survey(&self, file: &Path, robot: &Robot, tag_use: TagUse) -> Result<NamedSurvey, FileIssue> {
-        if self.frame != robot.base_link {
-            let problem = format!("is `{}`; the arm's base is `{}`", self.frame, robot.base_link);
-            return Err(FileIssue::new(file, "frame", problem));
-        }
+        let frame = self.on_arm(file, robot)?;
         let tags: Vec<SurveyedTag> =
             self.landmarks.iter().map(|landmark| landmark.surveyed(file, tag_use)).collect::<Result<_, _>>()?;
         let ids: Vec<u32> = tags.iter().map(|tag| tag.id).collect();
@@ -77,7 +75,32 @@ impl LandmarkFile {
             return Err(FileIssue::new(file, "tag", "holds no tag in that frame"));
         }
         let named = self.landmarks.iter().filter_map(|landmark| Some((landmark.id, landmark.name.clone()?)));
-        Ok(NamedSurvey { survey: TagSurvey { base_tag, tags }, names: named.collect() })
+        Ok(NamedSurvey { survey: TagSurvey { base_tag, frame, tags }, names: named.collect() })
+    }
+}
+
+impl LandmarkFile {
+    /// The file's frame: the base's, or that of a link that moves before a camera that stands still.
+    fn on_arm(&self, file: &Path, robot: &Robot) -> Result<Attachment, FileIssue> {
+        let issue = |problem: String| Err(FileIssue::new(file, "frame", format!("is `{}`; {problem}", self.frame)));
+        if self.frame == robot.base_link {
+            return Ok(Attachment::base());
+        }
+        match robot.links.get(&self.frame) {
+            None => issue(format!("the arm's base is `{}`, and no link that it carries is called so", robot.base_link)),
+            Some(link) if link.n_joints == 0 => {
+                issue(format!("the arm's base is `{}`: give the places in its frame", robot.base_link))
+            }
+            Some(_) if robot.camera.mount.n_joints > 0 => issue(format!(
+                "tags on the arm are for a camera that stands still, and the arm moves this one ([camera] link); give \
+                 the places in the frame of the base, `{}`",
+                robot.base_link
+            )),
+            Some(_) if robot.gripper_tag.is_some() => {
+                issue("tags on the arm and [gripper_tag] do not go together: name that tag here, too".to_owned())
+            }
+            Some(link) => Ok(*link),
+        }
     }
 }
 

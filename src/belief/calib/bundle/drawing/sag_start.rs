@@ -43,7 +43,8 @@ impl Estimate<'_> {
         let robot = self.problem.robot;
         let n_joints = self.n_seen_joints();
         let mut best = (0.0, SagStart { n_joints, multiples: [1.0; 2] });
-        if !robot.chain.loads().are_known() {
+        // Before a camera that stands still, poses are in the frame of the tags, where gravity turns.
+        if !robot.chain.loads().are_known() || robot.is_watched() {
             return (best.1, 0.0);
         }
         let score = self.score_of(|group| self.sag_trials(group));

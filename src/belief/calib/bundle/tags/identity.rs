@@ -158,7 +158,7 @@ impl Estimate<'_> {
             let is_image = of_view.iter().all(|other| matches!(other.data, WeightedMeasurement::Corners { .. }));
             if is_image {
                 let state = &self.solved.state;
-                let link = *problem.link_poses(view_idx, state).link(problem.n_camera_joints);
+                let link = *problem.link_poses(view_idx, state).link(problem.robot.camera.mount.n_joints);
                 observations.push((link * state.mount * state.camera_error[view_idx], tag.center_in_camera_m));
             }
         }

@@ -50,7 +50,7 @@ fn case(seed: u64, slip: Option<(usize, f64)>, n_later: usize) -> Case {
     let applied = FailureAdjusted::new(&robot, &first, &[], &JointParameters::default());
     let found = estimate(&applied.input(HyperparameterMode::Given)).expect("solved");
     let prior = calibration(&robot, &found, &first);
-    for joint in 0..robot.camera.mount.n_joints {
+    for joint in 0..robot.n_seen_joints() {
         truth.parameters.offset_rad[joint] += DRIFT_RAD_PER_SQRT_H * HOURS.sqrt() * normal(&mut rng);
     }
     if let Some((joint, by_rad)) = slip {

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use nalgebra::{Isometry3, Vector6};
+use nalgebra::{Isometry3, UnitQuaternion, Vector3, Vector6};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -11,10 +11,11 @@ use crate::calib::bundle::model::{Hyperparameters, Model};
 use crate::calib::parameters::JointParameters;
 use crate::calib::views::view::{MeanCorners, TagMeasurement, TagObservation, View};
 use armcal_core::joints::{JointAngles, MAX_JOINTS};
+use armcal_core::kinematics::Attachment;
 use armcal_core::optics::square_corners;
-use armcal_core::robot::{Robot, load};
+use armcal_core::robot::{Robot, SurveyedTag, TagSurvey, load};
 use armcal_core::sensor::Conditions;
-use armcal_core::spatial::exp;
+use armcal_core::spatial::{Pose, exp};
 use armcal_core::stats::stream_rng;
 use armcal_core::time::SIMULATION_EPOCH;
 
@@ -25,6 +26,40 @@ pub fn titan() -> Robot {
 pub fn titan_with_gripper_tag() -> Robot {
     load(&Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("robots/titan4-gripper-tag"))
         .expect("the robot reads")
+}
+
+/// The titan before a camera that stands still and looks at it, with tags on all sides of its hand.
+pub fn watched_titan() -> Robot {
+    const N_AROUND: usize = 6;
+    let mut robot = titan();
+    let hand = robot.tool.mount;
+    let mut rng = rng(0, "where the hand goes");
+    let travel =
+        |j: usize, rng: &mut ChaCha8Rng| rng.random_range(-0.5..0.5) * robot.sensors[j].half_range_rad.min(1.3);
+    let places = (0..200).map(|_| {
+        let angles = JointAngles::from_fn(robot.n_joints(), |j| robot.sensors[j].center_rad + travel(j, &mut rng));
+        robot.chain.frame(&angles, &hand).translation.vector
+    });
+    let middle = places.sum::<Vector3<f64>>() / 200.0;
+    let eye = middle * (1.0 + 1.3 / middle.norm());
+    let look = Isometry3::face_towards(&eye.into(), &middle.into(), &Vector3::z());
+    robot.camera.mount = Attachment { n_joints: 0, link_from_frame: look };
+    let tag = |k: usize| {
+        // Rings about the hand's y axis, tilted towards either end.
+        let turn = UnitQuaternion::from_euler_angles(0.0, std::f64::consts::TAU * (k % N_AROUND) as f64 / 6.0, 0.0);
+        let tilt = UnitQuaternion::from_euler_angles([0.5, -0.5][k / N_AROUND], 0.0, 0.0);
+        let rotation = turn * tilt;
+        let pose = Isometry3::from_parts((rotation * Vector3::new(0.0, 0.0, 0.12)).into(), rotation);
+        SurveyedTag {
+            id: k as u32,
+            size_m: 0.08,
+            base_from_tag: Pose::from_isometry(pose),
+            position_std_m: 0.001,
+            rotation_std_rad: 0.0035,
+        }
+    };
+    let tags = (0..2 * N_AROUND).map(tag).collect();
+    robot.with_survey(TagSurvey { base_tag: Some(0), frame: hand, tags })
 }
 
 pub fn normal(rng: &mut ChaCha8Rng) -> f64 {
@@ -123,9 +158,9 @@ fn look(robot: &Robot, truth: &Truth, noise: &Noise, view: &mut View, rng: &mut 
     let poses = robot.chain.corrected_link_poses(&angles, &truth.parameters.links);
     let base_from_camera = poses.link(robot.camera.mount.n_joints) * truth.mount;
     for (tag_idx, tag) in robot.tags.iter().enumerate() {
-        let camera_from_tag = base_from_camera.inv_mul(&truth.tags[tag_idx]);
+        let camera_from_tag = base_from_camera.inv_mul(&(poses.frame(&robot.tag_frame) * truth.tags[tag_idx]));
         let center = camera_from_tag.translation.vector;
-        let facing = -(camera_from_tag.rotation * nalgebra::Vector3::z()).dot(&center) / center.norm();
+        let facing = -(camera_from_tag.rotation * Vector3::z()).dot(&center) / center.norm();
         if !(0.25..2.0).contains(&center.norm()) || facing < 0.45 {
             continue;
         }

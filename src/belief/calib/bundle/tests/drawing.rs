@@ -102,7 +102,7 @@ fn a_good_drawing_stays() {
 fn a_wrong_link_is_estimated_and_the_tool_as_good_as_with_the_right_one() {
     let robot = titan();
     const SEEDS: u64 = 6;
-    for joint in 1..robot.camera.mount.n_joints {
+    for joint in 1..robot.n_seen_joints() {
         let (mut wrong, mut right, mut drawn, mut n_named) = (Vec::new(), Vec::new(), Vec::new(), 0);
         for seed in 0..SEEDS {
             let real = with_link(&robot, joint, 0.01, Vector3::new(0.006, -0.006, 0.003));
@@ -137,7 +137,7 @@ fn size(link: &LinkCorrection) -> f64 {
 fn drawn_links(robot: &Robot, seed: u64) -> JointParameters {
     let mut rng = rng(seed, "links");
     let mut at = JointParameters { reference: reference(), ..JointParameters::default() };
-    for link in at.links.places.iter_mut().take(robot.camera.mount.n_joints) {
+    for link in at.links.places.iter_mut().take(robot.n_seen_joints()) {
         *link = LinkCorrection {
             shift_m: 0.002 * Vector3::from_fn(|_, _| normal(&mut rng)),
             turn_rad: 0.005 * Vector3::from_fn(|_, _| normal(&mut rng)),

@@ -10,7 +10,9 @@ use crate::calib::bundle::model::{Hyperparameters, Model};
 use crate::calib::bundle::priors::prior;
 use crate::calib::bundle::problem::{BundleProblem, State};
 use crate::calib::bundle::solve::{LOOSE, solve, stepped, until};
-use crate::calib::bundle::tests::data::{Noise, Truth, normal, reference, rng, titan_with_gripper_tag, views};
+use crate::calib::bundle::tests::data::{
+    Noise, Truth, normal, reference, rng, titan_with_gripper_tag, views, watched_titan,
+};
 use crate::calib::parameters::JointParameters;
 use crate::calib::views::view::{TagMeasurement, View};
 use armcal_core::joints::MAX_JOINTS;
@@ -25,19 +27,18 @@ struct Case {
 }
 
 /// A little of everything: corners, positions, poses, gripper tag, lens, clock.
-fn case(seed: u64) -> Case {
-    let robot = titan_with_gripper_tag();
+fn case(robot: Robot, seed: u64) -> Case {
     let mut rng = rng(seed, "equations");
     let mut scales = Hyperparameters::datasheet(&robot);
     scales.camera_error_std = Some([0.003, 0.004]);
     let mut model = Model {
         joints: vec![Vec::new(); robot.n_joints()],
         n_links: robot.n_joints(),
-        n_compliant: robot.n_joints(),
+        n_compliant: if robot.is_watched() { 0 } else { robot.n_joints() },
         mount: true,
         lens: true,
         tags: true,
-        gripper_tag: true,
+        gripper_tag: robot.gripper_tag.is_some(),
         time_offset: true,
     };
     let truth = Truth::draw(&robot, &model, &scales, &mut rng);
@@ -49,19 +50,17 @@ fn case(seed: u64) -> Case {
             *rate = rng.random_range(-0.05..0.05);
         }
         for tag in &mut view.tags {
-            let base_from_camera = robot
-                .chain
-                .link_poses(&truth.angles(
-                    &robot,
-                    &View {
-                        conditions: reference(),
-                        ..View::of_reading(0, armcal_core::time::SIMULATION_EPOCH, view.travel_rad)
-                    },
-                ))
-                .frame(&robot.camera.mount);
+            let poses = robot.chain.link_poses(&truth.angles(
+                &robot,
+                &View {
+                    conditions: reference(),
+                    ..View::of_reading(0, armcal_core::time::SIMULATION_EPOCH, view.travel_rad)
+                },
+            ));
+            let tags_from_camera = poses.frame(&robot.tag_frame).inv_mul(&poses.frame(&robot.camera.mount));
             match k % 3 {
                 1 => tag.measured = TagMeasurement::Position,
-                2 => tag.measured = TagMeasurement::Pose(base_from_camera.inv_mul(&truth.tags[tag.tag_idx])),
+                2 => tag.measured = TagMeasurement::Pose(tags_from_camera.inv_mul(&truth.tags[tag.tag_idx])),
                 _ => {}
             }
         }
@@ -107,11 +106,20 @@ fn cost(problem: &BundleProblem<'_>, state: &State) -> f64 {
 
 #[test]
 fn the_gradient_is_that_of_the_cost_for_each_column() {
+    has_the_costs_gradient(titan_with_gripper_tag);
+}
+
+#[test]
+fn the_gradient_is_that_of_the_cost_before_a_camera_that_stands_still() {
+    has_the_costs_gradient(watched_titan);
+}
+
+fn has_the_costs_gradient(robot: fn() -> Robot) {
     /// In units of a column's sigma with all others held; the difference quotient's own error is far below.
     const STEP: f64 = 1e-3;
     const TOLERANCE: f64 = 2e-3;
     for seed in 0..3 {
-        let case = case(seed);
+        let case = case(robot(), seed);
         let problem = problem(&case);
         let state = settled(&problem, seed);
         let mut normal = NormalEquations::new(&problem);
@@ -141,7 +149,7 @@ fn the_gradient_is_that_of_the_cost_for_each_column() {
 fn the_curvature_is_that_of_the_cost_where_nothing_is_off() {
     /// Residuals at the minimum bend the cost a little beside Gauss and Newton's matrix.
     const TOLERANCE: f64 = 0.03;
-    let case = case(7);
+    let case = case(titan_with_gripper_tag(), 7);
     let problem = problem(&case);
     let guess = JointParameters { reference: reference(), ..JointParameters::default() };
     let stop = until(200, 1e-16);

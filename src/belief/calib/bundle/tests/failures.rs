@@ -65,7 +65,7 @@ fn off_sigmas(case: &Case, found: &Estimate<'_>, without: usize) -> Vec<f64> {
     let covariance = found.joint_covariance();
     let parameters = found.parameters();
     let mut out = Vec::new();
-    for joint in (0..case.robot.camera.mount.n_joints).filter(|&joint| joint != without) {
+    for joint in (0..case.robot.n_seen_joints()).filter(|&joint| joint != without) {
         // The middle of the range: offset and nonlinearity together.
         let columns = found.joint_parameters().iter().enumerate().filter(|(_, p)| p.joint == joint);
         let spec = &case.robot.sensors[joint];

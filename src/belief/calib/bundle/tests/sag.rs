@@ -39,7 +39,7 @@ fn soft(robot: &Robot, rad_per_nm: f64, tool_load_n: f64, seed: u64) -> Sag {
     let mut rng = rng(seed, "soft");
     let mut draw = || rad_per_nm * (1.0 + 0.25 * normal(&mut rng)).clamp(0.5, 1.5);
     let mut sag = Sag { tool_load_n, ..Sag::default() };
-    sag.joint_rad_per_nm[..robot.camera.mount.n_joints].fill_with(&mut draw);
+    sag.joint_rad_per_nm[..robot.n_seen_joints()].fill_with(&mut draw);
     sag.mount_rad_per_nm = [draw(), draw(), 0.0];
     sag
 }
@@ -105,7 +105,7 @@ fn a_link_that_is_off_is_no_sag() {
     let robot = titan();
     let [mut n_sag, mut n_links] = [0; 2];
     for seed in 0..6 {
-        for joint in 1..robot.camera.mount.n_joints {
+        for joint in 1..robot.n_seen_joints() {
             let real = with_link(&robot, joint, 0.01, Vector3::new(0.006, -0.006, 0.003));
             let case = case_changed(&robot, &real, seed, |_| {});
             let drawing = revised(&input(&robot, &case.views, &case.model));

@@ -79,7 +79,7 @@ fn tool_error_m(case: &Case, found: &Estimate<'_>) -> f64 {
         });
         let tool = |parameters: &JointParameters, change: &ConditionChange| {
             let angles = JointAngles::from_fn(robot.n_joints(), |j| {
-                let parameters = if j < robot.camera.mount.n_joints { parameters } else { &truth };
+                let parameters = if j < robot.n_seen_joints() { parameters } else { &truth };
                 parameters.correction(j).angle_rad(&robot.sensors[j], travel[j], change, 0.0)
             });
             robot.chain.link_poses(&angles).frame(&robot.tool.mount).translation.vector

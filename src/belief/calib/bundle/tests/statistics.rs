@@ -12,7 +12,9 @@ use crate::calib::bundle::linearize::NormalEquations;
 use crate::calib::bundle::model::model_for;
 use crate::calib::bundle::model::{Hyperparameters, Model};
 use crate::calib::bundle::problem::State;
-use crate::calib::bundle::tests::data::{Noise, Truth, reference, rng, titan, titan_with_gripper_tag, views};
+use crate::calib::bundle::tests::data::{
+    Noise, Truth, reference, rng, titan, titan_with_gripper_tag, views, watched_titan,
+};
 use crate::calib::parameters::{JointParameters, Parameter};
 use crate::calib::views::view::{TagMeasurement, View};
 use armcal_core::joints::{JointAngles, MAX_JOINTS};
@@ -209,6 +211,11 @@ fn the_tool_error_is_at_the_bound_and_the_covariance_is_honest() {
 #[test]
 fn with_a_gripper_tag_too() {
     assert_at_the_bound(&tally(&titan_with_gripper_tag(), 0..60, 30), "with a gripper tag", 1.25);
+}
+
+#[test]
+fn before_a_camera_that_stands_still_too() {
+    assert_at_the_bound(&tally(&watched_titan(), 0..60, 30), "a camera that stands still", 1.15);
 }
 
 /// With a prior of information `P` common to both, the difference has the covariance `C1 + C2 - C1 P C2 - C2 P C1`.

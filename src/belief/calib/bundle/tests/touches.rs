@@ -220,7 +220,7 @@ fn no_tool_point_is_accepted_far_beyond_its_prediction() {
 #[test]
 fn a_camera_turned_about_the_last_joint_before_it_is_refused() {
     let robot = titan();
-    let n = robot.camera.mount.n_joints;
+    let n = robot.n_seen_joints();
     const SEEDS: u64 = 30;
     let (mut refused, mut named) = (0, 0);
     for seed in 0..SEEDS {

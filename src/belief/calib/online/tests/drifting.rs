@@ -136,7 +136,7 @@ impl<'a> Dive<'a> {
         let robot = self.robot;
         let posture = views(robot, &self.truth, &self.noise, 1, &mut self.rng).remove(0);
         let mut angles = self.truth.angles(robot, &posture);
-        for (angle, std) in angles.iter_mut().zip(self.noise.joint_rad).take(robot.camera.mount.n_joints) {
+        for (angle, std) in angles.iter_mut().zip(self.noise.joint_rad).take(robot.n_seen_joints()) {
             *angle += std * normal(&mut self.rng);
         }
         let parameters = online.parameters().expect("it runs");
@@ -146,18 +146,17 @@ impl<'a> Dive<'a> {
             correction.angle_rad(&robot.sensors[j], posture.travel_rad[j], &departure, 0.0)
         });
         // Sensors beyond the camera are not what this is about.
-        let believed = JointAngles::from_fn(robot.n_joints(), |j| {
-            if j < robot.camera.mount.n_joints { believed[j] } else { angles[j] }
-        });
+        let believed =
+            JointAngles::from_fn(robot.n_joints(), |j| if j < robot.n_seen_joints() { believed[j] } else { angles[j] });
         let tool_m = |at: &JointAngles| robot.chain.frame(at, &robot.tool.mount).translation.vector;
         let off_m = tool_m(&believed) - tool_m(&angles);
         let mut covariance = online.covariance(&self.conditions()).expect("it runs");
         let std = covariance.residual_std_rad.as_mut().expect("of each joint");
-        (robot.camera.mount.n_joints..robot.n_joints()).for_each(|j| std[j] = 0.0);
+        (robot.n_seen_joints()..robot.n_joints()).for_each(|j| std[j] = 0.0);
         let sensors = parameters.sensors(robot);
         let at = Conditions { stamp: parameters.reference.stamp, ..online.at_sensors(&self.conditions()) };
         let mut sound = robot.clone();
-        sound.sensors.iter_mut().skip(robot.camera.mount.n_joints).for_each(|spec| {
+        sound.sensors.iter_mut().skip(robot.n_seen_joints()).for_each(|spec| {
             (spec.gain_std, spec.offset_std_rad, spec.temperature_std_rad_per_k) = (0.0, 0.0, 0.0);
         });
         let predicted = covariance.tool_position_under_m2(&sound, &sensors, &believed, &at);

@@ -44,7 +44,7 @@ struct Maker<'a> {
 
 impl RecordingViews {
     pub fn of(recording: &ExternalRecording, map: &InputMap, robot: &Robot, plain_landmark: Option<u32>) -> Self {
-        let moving = &robot.sensors[..robot.camera.mount.n_joints];
+        let moving = &robot.sensors[..robot.n_seen_joints()];
         let mut maker = Maker {
             robot,
             plain_landmark,
