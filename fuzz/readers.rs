@@ -56,7 +56,7 @@ impl Scratch {
 type Read = fn(&Scratch, &[u8]) -> bool;
 
 /// By the names of the targets and of the folders of their corpora.
-pub const READERS: [(&str, Read); 20] = [
+pub const READERS: [(&str, Read); 22] = [
     ("urdf", urdf),
     ("new_robot", new_robot),
     ("recording", recording),
@@ -70,6 +70,8 @@ pub const READERS: [(&str, Read); 20] = [
     ("cameras", cameras),
     ("tag_map", tag_map),
     ("input_map", input_map),
+    ("table_csv", table_csv),
+    ("table_yaml", table_yaml),
     ("task", task),
     ("plan", plan),
     ("stl", stl),
@@ -191,6 +193,30 @@ fn tag_map(scratch: &Scratch, bytes: &[u8]) -> bool {
 
 fn input_map(_: &Scratch, bytes: &[u8]) -> bool {
     armcal::input::parse_input_map(Path::new("input.toml"), &text(bytes)).is_ok()
+}
+
+/// As poses of numbered tags at their times.
+fn table_csv(scratch: &Scratch, bytes: &[u8]) -> bool {
+    const MAP: &str = "version = 1\n[table]\ntime = { column = \"t\" }\n[joint_sensors]\n[tags]\nuse = \"pose\"\n\
+        [tags.columns]\ndirection = \"tag_from_camera\"\nposition = [\"x\", \"y\", \"z\"]\nid = \"tag\"\n\
+        rotation = [\"rx\", \"ry\", \"rz\"]\nrotation_form = \"fixed_xyz\"\n";
+    table(scratch, "rows.csv", (MAP, bytes))
+}
+
+/// As poses of one landmark.
+fn table_yaml(scratch: &Scratch, bytes: &[u8]) -> bool {
+    const MAP: &str = "version = 1\n[table]\nrows = \"views\"\n[joint_sensors]\n\
+        names = { shoulder_yaw = \"joints.0\", shoulder_pitch = \"joints.1\", forearm_pitch = \"joints.2\", \
+        wrist_pitch = \"joints.3\", wrist_yaw = \"joints.4\", wrist_rotate = \"joints.5\" }\n\
+        [tags]\nchild_frame = \"board\"\nuse = \"pose\"\n[tags.columns]\ndirection = \"camera_from_tag\"\n\
+        position = [\"pose.x\", \"pose.y\", \"pose.z\"]\nrotation_form = \"quaternion_wxyz\"\n\
+        rotation = [\"pose.r.0\", \"pose.r.1\", \"pose.r.2\", \"pose.r.3\"]\n";
+    table(scratch, "rows.yaml", (MAP, bytes))
+}
+
+fn table(scratch: &Scratch, name: &str, (map, bytes): (&str, &[u8])) -> bool {
+    let map = armcal::input::parse_input_map(Path::new("input.toml"), map).expect("a map");
+    armcal::input::read_external(&scratch.write(name, bytes), &map, &scratch.robot).is_ok()
 }
 
 fn task(_: &Scratch, bytes: &[u8]) -> bool {

@@ -4,14 +4,15 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use super::error::InputError;
-use super::joints::{JointReader, Reading};
-use super::map::{InputMap, TagUse};
+use super::joints::{JointReader, Reading, n_needed};
+use super::map::{InputMap, Source, TagUse, Topics};
+use super::table::read_table;
 use super::tags::{TagFrame, TagReader};
 use crate::log::{ChunkOrder, Completeness, RawMessage, for_each_raw};
 use crate::robot::Robot;
 
 /// Joint readings and detections of a recording of a real arm.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct ExternalRecording {
     /// The recording's file, as given.
     pub path: PathBuf,
@@ -35,23 +36,29 @@ pub struct ExternalRecording {
 /// images is seen from all readings between them, so that all are kept.
 const MAX_MESSAGES: usize = 8_000_000;
 
-/// Reads the joint readings and tags of a recording; joints are matched by name.
+/// Reads the joint readings and tags of a recording or of a table; joints are matched by name.
 ///
 /// Joints distal to the camera may be absent, unless the robot has a tag on its gripper.
 ///
 /// # Errors
 /// [`InputError`], naming file, topic, message and field.
 pub fn read_external(path: &Path, map: &InputMap, robot: &Robot) -> Result<ExternalRecording, InputError> {
-    read_up_to(MAX_MESSAGES, path, map, robot)
+    match &map.source {
+        Source::Topics(topics) => read_up_to(MAX_MESSAGES, path, (map, topics), robot),
+        Source::Table(layout) => read_table(path, map, layout, robot),
+    }
 }
 
-fn read_up_to(most: usize, path: &Path, map: &InputMap, robot: &Robot) -> Result<ExternalRecording, InputError> {
+fn read_up_to(
+    most: usize,
+    path: &Path,
+    (map, wanted): (&InputMap, &Topics),
+    robot: &Robot,
+) -> Result<ExternalRecording, InputError> {
     let file = path.display().to_string();
-    let joints = robot.joint_names();
-    let n_needed = if robot.gripper_tag.is_some() { joints.len() } else { robot.camera.mount.n_joints };
     let mut topics: BTreeMap<String, String> = BTreeMap::new();
-    let mut readings = JointReader::new(&file, map, &joints, n_needed);
-    let mut tags = TagReader::new(&file, map);
+    let mut readings = JointReader::new(&file, map, &wanted.joints, robot);
+    let mut tags = TagReader::new(&file, map, wanted.camera_frame.as_deref());
     let mut first_error = None;
     let summary = for_each_raw(path, |raw| {
         if !topics.contains_key(raw.topic()) {
@@ -60,37 +67,37 @@ fn read_up_to(most: usize, path: &Path, map: &InputMap, robot: &Robot) -> Result
         if first_error.is_some() {
             return;
         }
-        let taken = if raw.topic() == map.joint_topic {
+        let taken = if raw.topic() == wanted.joints {
             check_type(&file, raw, &["JointState"], "sensor_msgs/msg/JointState")
                 .and_then(|()| readings.take(raw, digest(raw)))
-        } else if raw.topic() == map.tag_topic {
+        } else if raw.topic() == wanted.tags {
             check_tags(&file, raw, map).and_then(|()| tags.take(raw, digest(raw)))
         } else {
             Ok(())
         };
-        let of_topics = [(&map.joint_topic, readings.readings.len()), (&map.tag_topic, tags.len())];
+        let of_topics = [(&wanted.joints, readings.readings.len()), (&wanted.tags, tags.len())];
         first_error = taken.err().or_else(|| too_long(&file, of_topics, most));
     })?;
     if let Some(error) = first_error {
         return Err(error);
     }
-    if let Some(topic) = [&map.joint_topic, &map.tag_topic].into_iter().find(|topic| !topics.contains_key(*topic)) {
+    if let Some(topic) = [&wanted.joints, &wanted.tags].into_iter().find(|topic| !topics.contains_key(*topic)) {
         let found = topics.into_keys().collect();
         return Err(InputError::NoTopic { file, topic: topic.clone(), found });
     }
     if readings.readings.is_empty() {
         return Err(readings.no_reading());
     }
-    for (topic, order) in [(&map.joint_topic, &readings.order), (&map.tag_topic, &tags.order)] {
+    for (topic, order) in [(&wanted.joints, &readings.order), (&wanted.tags, &tags.order)] {
         if let Some(disorder) = order.first_regression() {
             return Err(InputError::Disorder { file: file.clone(), topic: topic.clone(), disorder });
         }
     }
     if tags.len() == 0 {
-        let (topic, problem) = (map.tag_topic.clone(), tags.problem());
+        let (topic, problem) = (wanted.tags.clone(), tags.problem());
         return Err(InputError::NoTags { file: file.clone(), topic, problem });
     }
-    let absent_joints = (n_needed..joints.len()).filter(|joint| !readings.present.contains(joint)).collect();
+    let absent_joints = (n_needed(robot)..robot.n_joints()).filter(|joint| !readings.present.contains(joint)).collect();
     let extra_joints = readings.extra();
     let (mut sorted, mut left_out) = (readings.readings, readings.left_out);
     sorted.sort_by_key(|reading| reading.stamp);
@@ -162,6 +169,7 @@ mod tests {
         let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
         let robot = crate::robot::load(&root.join("robots/titan4")).unwrap();
         let map = read_input_map(&root.join("fuzz/corpus/input_map/positions.toml")).unwrap();
+        let Source::Topics(topics) = &map.source else { panic!("topics") };
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("long.mcap");
         let mut writer = RecordingWriter::create(&path, RecordingHeader::new(robot.joint_names())).unwrap();
@@ -170,11 +178,11 @@ mod tests {
             let name: Vec<String> = robot.joint_names().iter().map(recorded).collect();
             let joints = JointState { position: vec![1.0; name.len()], name, ..JointState::default() };
             let at = SIMULATION_EPOCH.plus_s(f64::from(n));
-            writer.write_ros(&map.joint_topic, &JointState::SCHEMA, at, &joints).unwrap();
+            writer.write_ros(&topics.joints, &JointState::SCHEMA, at, &joints).unwrap();
         }
         writer.finish().unwrap();
-        let problem = |most| read_up_to(most, &path, &map, &robot).unwrap_err();
-        assert!(matches!(problem(11), InputError::TooLong { most: 11, topic, .. } if topic == map.joint_topic));
+        let problem = |most| read_up_to(most, &path, (&map, topics), &robot).unwrap_err();
+        assert!(matches!(problem(11), InputError::TooLong { most: 11, topic, .. } if topic == topics.joints));
         assert!(matches!(problem(12), InputError::NoTopic { .. }));
     }
 }

@@ -43,9 +43,9 @@ pub struct TagFrame {
 }
 
 /// How far a quaternion's length may be from 1.
-const QUATERNION_LENGTH_TOLERANCE: f64 = 0.01;
+pub(super) const QUATERNION_LENGTH_TOLERANCE: f64 = 0.01;
 /// A landmark in the lens itself is a transform that nobody filled in, m.
-const MIN_DISTANCE_M: f64 = 1e-6;
+pub(super) const MIN_DISTANCE_M: f64 = 1e-6;
 /// Names of frames that an error lists.
 const MAX_LISTED: usize = 20;
 
@@ -53,6 +53,7 @@ const MAX_LISTED: usize = 20;
 pub(super) struct TagReader<'a> {
     file: &'a str,
     map: &'a InputMap,
+    camera_frame: Option<&'a str>,
     frames: BTreeMap<Stamp, TagFrame>,
     pub order: StampOrder,
     pub left_out: BTreeMap<String, u64>,
@@ -62,10 +63,11 @@ pub(super) struct TagReader<'a> {
 }
 
 impl<'a> TagReader<'a> {
-    pub fn new(file: &'a str, map: &'a InputMap) -> Self {
+    pub fn new(file: &'a str, map: &'a InputMap, camera_frame: Option<&'a str>) -> Self {
         Self {
             file,
             map,
+            camera_frame,
             frames: BTreeMap::new(),
             order: StampOrder::default(),
             left_out: BTreeMap::new(),
@@ -76,7 +78,7 @@ impl<'a> TagReader<'a> {
 
     pub fn take(&mut self, raw: &RawMessage<'_>, digest: [u8; 32]) -> Result<(), InputError> {
         self.messages += 1;
-        let place = BadPlace { topic: raw.topic().to_owned(), message: self.messages };
+        let place = BadPlace::Message { topic: raw.topic().to_owned(), message: self.messages };
         let undecodable = |error| InputError::Undecodable { file: self.file.to_owned(), place: place.clone(), error };
         if raw.schema_name().ends_with("/TFMessage") {
             let message: TfMessage = decode(raw.data).map_err(undecodable)?;
@@ -98,7 +100,7 @@ impl<'a> TagReader<'a> {
         digest: [u8; 32],
     ) -> Result<(), InputError> {
         let (parent, child) = (without_slash(&transform.header.frame_id), without_slash(&transform.child_frame_id));
-        let camera = self.map.camera_frame.as_deref();
+        let camera = self.camera_frame;
         let id_of = |frame: &str| self.map.child_frame.as_ref()?.id_of(frame);
         let (id, of, is_inverse) = match (id_of(child), id_of(parent)) {
             (Some(id), _) if Some(parent) == camera => (id, child, false),
@@ -109,7 +111,7 @@ impl<'a> TagReader<'a> {
             }
         };
         let stamp = stamp_or_log_time(transform.header.stamp, log_time);
-        self.order.add_of(place.message, stamp);
+        self.order.add_of(self.messages, stamp);
         let position: [f64; 3] = transform.transform.translation.into();
         let [w, x, y, z] = transform.transform.rotation.wxyz();
         if let Some(value) = position.into_iter().find(|value| !value.is_finite()) {
@@ -149,12 +151,12 @@ impl<'a> TagReader<'a> {
         digest: [u8; 32],
     ) -> Result<(), InputError> {
         let frame = without_slash(&message.header.frame_id);
-        if self.map.camera_frame.as_deref().is_some_and(|camera| !frame.is_empty() && frame != camera) {
+        if self.camera_frame.is_some_and(|camera| !frame.is_empty() && frame != camera) {
             self.others.insert(frame.to_owned());
             return Ok(());
         }
         let stamp = stamp_or_log_time(message.header.stamp, log_time);
-        self.order.add_of(place.message, stamp);
+        self.order.add_of(self.messages, stamp);
         for tag in &message.detections {
             let Ok(id) = u32::try_from(tag.id) else {
                 self.count("detections with a negative id");
@@ -233,7 +235,7 @@ impl<'a> TagReader<'a> {
             (false, _) => format!(
                 "the input map wants `{}` seen from `{}`; in its {} messages are {others:?}",
                 self.map.child_frame.as_ref().map_or_else(|| "any tag".to_owned(), super::map::ChildFrame::text),
-                self.map.camera_frame.as_deref().unwrap_or("any camera"),
+                self.camera_frame.unwrap_or("any camera"),
                 self.messages
             ),
             (true, false) => left_out.join(", "),
