@@ -129,7 +129,7 @@ fn describe_input(map: &InputMap) -> String {
         TagUse::Position => format!("positions of {landmark}"),
     };
     match &map.source {
-        Source::Topics(Topics { joints, tags, camera_frame }) => {
+        Source::Topics(Topics { joints, tags, camera_frame, .. }) => {
             let seen_from = match (map.tag_use, camera_frame) {
                 (TagUse::Pose | TagUse::Position, Some(camera)) => format!(" in `{camera}`"),
                 _ => String::new(),

@@ -64,6 +64,8 @@ pub enum InputError {
     Table { file: String, problem: String },
     #[error("{file}: {place}: {problem}")]
     Row { file: String, place: BadPlace, problem: String },
+    #[error("{file}: topic {topic}: the camera's lens {problem}")]
+    CameraInfo { file: String, topic: String, problem: String },
     #[error("{file}: topic {topic} holds {held}; `tags.use` of the input map must be {allowed}")]
     Use { file: String, topic: String, held: &'static str, allowed: &'static str },
 }

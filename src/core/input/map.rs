@@ -10,10 +10,16 @@
 //! names = { elbow = "joint_3" }      # optional: the robot's joint = the recorded name, where they differ
 //! unit = "counts"                    # optional: or "rad", "deg": angles made of the sensors by their datasheet
 //! [tags]
-//! topic = "/tf"                      # tf2_msgs/msg/TFMessage or apriltag_msgs/msg/AprilTagDetectionArray
+//! topic = "/tf"                      # tf2_msgs/msg/TFMessage, apriltag_msgs/msg/AprilTagDetectionArray, or
+//!                                    # sensor_msgs/msg/Image or CompressedImage (with use = "corners")
 //! camera_frame = "fisheye"
 //! child_frame = "tag36h11:{id}"      # or a plain name, for one landmark
 //! use = "position"                   # "position" | "pose" | "corners"
+//! image_period_s = 0.2               # optional, images alone: time between two that are looked at; absent: all
+//! camera_info = "/camera_info"       # optional, images alone: sensor_msgs/msg/CameraInfo, for robots without a lens
+//! [conditions]                       # optional
+//! oil_temperature = "/oil"           # sensor_msgs/msg/Temperature, deg C
+//! pressure = "/depth"                # sensor_msgs/msg/FluidPressure, Pa
 //! ```
 //!
 //! Tables have columns instead of topics: [`TableLayout`].
@@ -126,15 +132,48 @@ impl ChildFrame {
     }
 }
 
+/// What a slow sensor measures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum ConditionKind {
+    /// Degrees Celsius.
+    OilTemperature,
+    /// Pa, absolute.
+    Pressure,
+}
+
+/// Topics of slow sensors.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ConditionTopics {
+    /// Temperature of the oil, `sensor_msgs/msg/Temperature`.
+    pub oil_temperature: Option<String>,
+    /// Ambient pressure, `sensor_msgs/msg/FluidPressure`.
+    pub pressure: Option<String>,
+}
+
+impl ConditionTopics {
+    /// Those that are given.
+    pub(super) fn named(&self) -> Vec<(&String, ConditionKind)> {
+        let oil = self.oil_temperature.iter().map(|topic| (topic, ConditionKind::OilTemperature));
+        oil.chain(self.pressure.iter().map(|topic| (topic, ConditionKind::Pressure))).collect()
+    }
+}
+
 /// Where in a ROS recording the data are.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Topics {
     /// Joint readings, `sensor_msgs/msg/JointState`.
     pub joints: String,
-    /// Tags, `tf2_msgs/msg/TFMessage` or `apriltag_msgs/msg/AprilTagDetectionArray`.
+    /// Tags, `tf2_msgs/msg/TFMessage` or `apriltag_msgs/msg/AprilTagDetectionArray`, or images.
     pub tags: String,
     /// Without a leading slash, as all frames here.
     pub camera_frame: Option<String>,
+    /// The camera's lens, `sensor_msgs/msg/CameraInfo`, for a robot that has none.
+    pub camera_info: Option<String>,
+    /// Least time between two images that are looked at.
+    pub image_period_s: f64,
+    /// Slow sensors.
+    pub conditions: ConditionTopics,
 }
 
 /// Where the data are.
@@ -207,6 +246,8 @@ struct MapToml {
     table: Option<TableToml>,
     joint_sensors: JointsToml,
     tags: TagsToml,
+    #[serde(default)]
+    conditions: ConditionTopics,
 }
 
 #[derive(Deserialize)]
@@ -229,6 +270,9 @@ struct TagsToml {
     tag_use: TagUse,
     #[serde(default)]
     columns: Option<TagColumnsToml>,
+    #[serde(default)]
+    image_period_s: f64,
+    camera_info: Option<String>,
 }
 
 /// Assumed: half of what one pose a second leaves.
@@ -252,13 +296,15 @@ pub fn parse_input_map(file: &Path, text: &str) -> Result<InputMap, RobotError> 
     let raw: MapToml = parse_toml(file, text)?;
     FileIssue::check_range(file, "version", f64::from(raw.version), 1.0..=1.0)?;
     let child_frame = raw.tags.child_frame.as_deref().map(|frame| child_frame(file, frame)).transpose()?;
+    if raw.table.is_some() {
+        check_no_topics(file, &raw)?;
+    }
     let source = match raw.table {
         Some(table) => {
-            check_no_topics(file, &raw.joint_sensors, &raw.tags)?;
             let tags = (raw.tags.tag_use, child_frame.as_ref());
             Source::Table(Box::new(table::layout(file, table, raw.tags.columns, tags)?))
         }
-        None => Source::Topics(topics(file, &raw.joint_sensors, &raw.tags)?),
+        None => Source::Topics(topics(file, &raw.joint_sensors, &raw.tags, raw.conditions)?),
     };
     Ok(InputMap {
         source,
@@ -272,11 +318,14 @@ pub fn parse_input_map(file: &Path, text: &str) -> Result<InputMap, RobotError> 
     })
 }
 
-fn check_no_topics(file: &Path, joints: &JointsToml, tags: &TagsToml) -> Result<(), FileIssue> {
+fn check_no_topics(file: &Path, raw: &MapToml) -> Result<(), FileIssue> {
     let given = [
-        ("joint_sensors.topic", &joints.topic),
-        ("tags.topic", &tags.topic),
-        ("tags.camera_frame", &tags.camera_frame),
+        ("joint_sensors.topic", &raw.joint_sensors.topic),
+        ("tags.topic", &raw.tags.topic),
+        ("tags.camera_frame", &raw.tags.camera_frame),
+        ("tags.camera_info", &raw.tags.camera_info),
+        ("conditions.oil_temperature", &raw.conditions.oil_temperature),
+        ("conditions.pressure", &raw.conditions.pressure),
     ];
     match given.into_iter().find(|(_, value)| value.is_some()) {
         Some((key, _)) => Err(FileIssue::new(file, key, "is for recordings; a [table] has columns. Leave one out")),
@@ -284,7 +333,7 @@ fn check_no_topics(file: &Path, joints: &JointsToml, tags: &TagsToml) -> Result<
     }
 }
 
-fn topics(file: &Path, joints: &JointsToml, tags: &TagsToml) -> Result<Topics, FileIssue> {
+fn topics(file: &Path, joints: &JointsToml, tags: &TagsToml, conditions: ConditionTopics) -> Result<Topics, FileIssue> {
     let issue = |key: &str, problem: &str| Err(FileIssue::new(file, key, problem));
     let topic = |key: &str, topic: &Option<String>| match topic.as_deref() {
         Some("") => issue(key, "is empty; name a topic").map(|()| String::new()),
@@ -296,9 +345,18 @@ fn topics(file: &Path, joints: &JointsToml, tags: &TagsToml) -> Result<Topics, F
         joints: topic("joint_sensors.topic", &joints.topic)?,
         tags: topic("tags.topic", &tags.topic)?,
         camera_frame,
+        camera_info: tags.camera_info.clone(),
+        image_period_s: FileIssue::check_range(file, "tags.image_period_s", tags.image_period_s, 0.0..=3600.0)?,
+        conditions,
     };
     if found.joints == found.tags {
         issue("tags.topic", "is the topic of the joint sensors, too")?;
+    }
+    let mut named: Vec<&String> = found.conditions.named().into_iter().map(|(topic, _)| topic).collect();
+    named.extend([&found.joints, &found.tags]);
+    named.sort_unstable();
+    if named[0].is_empty() || named.windows(2).any(|two| two[0] == two[1]) {
+        issue("conditions", "has an empty topic, or one that is named twice")?;
     }
     if tags.columns.is_some() {
         issue("tags.columns", "is for a [table], which the input map lacks")?;
@@ -355,7 +413,10 @@ mod tests {
 
     #[test]
     fn what_is_wrong_is_named_with_file_and_key() {
-        let faults: [(&str, &str, &[&str]); 10] = [
+        let faults: [(&str, &str, &[&str]); 13] = [
+            ("[tags]", "[conditions]\noil_temperature = \"/tf\"\n[tags]", &["conditions", "twice"]),
+            ("[tags]", "[conditions]\nwater = \"/w\"\n[tags]", &["water", "oil_temperature", "pressure"]),
+            ("[tags]", "[tags]\nimage_period_s = -1.0", &["tags.image_period_s", "3600"]),
             ("version = 1", "version = 2", &["version", "1 .. 1"]),
             ("version = 1", "version = 1\nmax_gap_s = -1.0", &["max_gap_s", "60"]),
             ("version = 1", "version = 1\nmax_gap_s = nan", &["max_gap_s", "NaN"]),

@@ -5,22 +5,26 @@ use std::path::Path;
 use nalgebra::Isometry3;
 
 use super::error::{BadPlace, InputError};
-use super::external::ExternalRecording;
 use super::joints::{Reading, n_needed};
-use super::map::{InputMap, NotFinite, TableLayout, TagUse};
+use super::map::{InputMap, NotFinite, TableFormat, TableLayout, TagUse};
+use super::recording::ExternalRecording;
 use super::tags::{ExternalDetection, MIN_DISTANCE_M, RawMeasurement, TagFrame};
+use crate::files::{FileKind, read_text};
 use crate::joints::JointCounts;
 use crate::robot::Robot;
 use crate::time::Stamp;
 
 mod columns;
+mod csv_text;
 mod pose;
 mod rows;
 mod yaml;
 
 use columns::Columns;
+use csv_text::csv_rows;
 use pose::camera_from_tag;
-use rows::{Row, read_rows};
+use rows::{Row, Rows};
+use yaml::yaml_rows;
 
 /// Rows this close would pass for a stream of readings of a moving arm, s.
 const MIN_APART_S: f64 = 0.3;
@@ -51,6 +55,39 @@ pub(super) fn read_table(
         return Err(InputError::Table { file, problem: "no row of it could be used".to_owned() });
     }
     Ok(reader.recording)
+}
+
+/// Reads the columns `wanted` of a table.
+fn read_rows(path: &Path, layout: &TableLayout, wanted: &[String]) -> Result<Rows, InputError> {
+    let file = path.display().to_string();
+    let format = match layout.format {
+        Some(format) => format,
+        None => format_by_name(path).ok_or_else(|| InputError::Table {
+            file: file.clone(),
+            problem: "its name ends in neither .csv, .tsv, .txt nor .yaml, .yml, .json; set `table.format` of the \
+                      input map to \"csv\" or \"yaml\""
+                .to_owned(),
+        })?,
+    };
+    // YAML takes many times its bytes in memory.
+    let kind = if format == TableFormat::Csv { FileKind::Table } else { FileKind::Text };
+    let text = read_text(path, kind).map_err(|source| InputError::Unreadable { file: file.clone(), source })?;
+    let found = match format {
+        TableFormat::Csv => csv_rows(&file, &text, wanted)?,
+        TableFormat::Yaml => yaml_rows(&file, &text, layout, wanted)?,
+    };
+    if found.rows.is_empty() {
+        return Err(InputError::Table { file, problem: "it has no rows".to_owned() });
+    }
+    Ok(found)
+}
+
+fn format_by_name(path: &Path) -> Option<TableFormat> {
+    match path.extension()?.to_str()?.to_ascii_lowercase().as_str() {
+        "csv" | "tsv" | "txt" => Some(TableFormat::Csv),
+        "yaml" | "yml" | "json" => Some(TableFormat::Yaml),
+        _ => None,
+    }
 }
 
 struct TableReader<'a> {
