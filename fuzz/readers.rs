@@ -56,7 +56,7 @@ impl Scratch {
 type Read = fn(&Scratch, &[u8]) -> bool;
 
 /// By the names of the targets and of the folders of their corpora.
-pub const READERS: [(&str, Read); 22] = [
+pub const READERS: [(&str, Read); 23] = [
     ("urdf", urdf),
     ("new_robot", new_robot),
     ("recording", recording),
@@ -72,6 +72,7 @@ pub const READERS: [(&str, Read); 22] = [
     ("input_map", input_map),
     ("table_csv", table_csv),
     ("table_yaml", table_yaml),
+    ("image", image),
     ("task", task),
     ("plan", plan),
     ("stl", stl),
@@ -128,6 +129,10 @@ fn recording(scratch: &Scratch, bytes: &[u8]) -> bool {
     let path = scratch.write("recording.mcap", bytes);
     let _ = read_attachments(&path);
     followed(scratch, bytes);
+    let proposed = armcal::report::proposed_map::propose_input_map(&path, Some(&scratch.robot));
+    if let Some(map) = proposed.ok().and_then(|text| armcal::input::parse_input_map(&path, &text).ok()) {
+        let _ = armcal::input::read_external(&path, &map, &scratch.robot);
+    }
     let _ = armcal::report::inspection::inspect(&path, None).map(|found| armcal::report::inspection::to_text(&found));
     read_recording(&path).is_ok_and(|recording| !recording.messages.is_empty())
 }
@@ -217,6 +222,18 @@ fn table_yaml(scratch: &Scratch, bytes: &[u8]) -> bool {
 fn table(scratch: &Scratch, name: &str, (map, bytes): (&str, &[u8])) -> bool {
     let map = armcal::input::parse_input_map(Path::new("input.toml"), map).expect("a map");
     armcal::input::read_external(&scratch.write(name, bytes), &map, &scratch.robot).is_ok()
+}
+
+/// A compressed image of a small camera, in which tags are looked for.
+fn image(_: &Scratch, bytes: &[u8]) -> bool {
+    use armcal::input::{ImageDetector, RecordedImage};
+    let lens = armcal::optics::Radtan::new([60.0; 2], [31.5, 23.5], [0.0; 5], [64, 48]).into();
+    let image = armcal::log::ros::CompressedImage {
+        format: "png or jpeg".to_owned(),
+        data: bytes.to_vec(),
+        ..armcal::log::ros::CompressedImage::default()
+    };
+    armcal::recorded_images::RecordedImageDetector::new(&lens).detect(&RecordedImage::Compressed(image)).is_ok()
 }
 
 fn task(_: &Scratch, bytes: &[u8]) -> bool {

@@ -43,7 +43,7 @@ const CUT: &str = "fuzz/corpus/recording/cut.mcap";
 const TAGMAP: &str = "tagmap views.mcap --topic /camera/wrist/detections --camera cameras.yaml --tags";
 const TABLE: &str = "calibrate poses.csv --robot robot --input table.toml --out out --method minimum_distance";
 
-const CASES: [Case; 40] = [
+const CASES: [Case; 41] = [
     case("robots/titan4/titan4.urdf", "robot/titan4.urdf", "check robot"),
     case("robots/titan4/titan4.urdf", "robot/titan4.urdf", "inspect views.mcap --robot robot"),
     case("robots/kraft-predator/kraft-predator.urdf", "robot/titan4.urdf", "check robot"),
@@ -76,6 +76,7 @@ const CASES: [Case; 40] = [
     case("fuzz/corpus/campaign_table/rows.csv", "rows.csv", "campaign --merge rows.csv --out out.csv"),
     case(VIEWS, "given.mcap", "inspect given.mcap --robot robot"),
     case(CUT, "given.mcap", "inspect given.mcap --json"),
+    case(VIEWS, "changed.mcap", "inspect changed.mcap --robot robot --write-input map.toml"),
     case(CUT, "given.mcap", "replay given.mcap --save out.rrd"),
     case(VIEWS, "given.mcap", "watch given.mcap --robot robot --idle-s 1"),
     case(VIEWS, "changed.mcap", "watch changed.mcap --robot robot --idle-s 1 --json --out out"),
