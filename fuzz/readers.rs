@@ -56,7 +56,7 @@ impl Scratch {
 type Read = fn(&Scratch, &[u8]) -> bool;
 
 /// By the names of the targets and of the folders of their corpora.
-pub const READERS: [(&str, Read); 20] = [
+pub const READERS: [(&str, Read); 23] = [
     ("urdf", urdf),
     ("new_robot", new_robot),
     ("recording", recording),
@@ -70,6 +70,9 @@ pub const READERS: [(&str, Read); 20] = [
     ("cameras", cameras),
     ("tag_map", tag_map),
     ("input_map", input_map),
+    ("table_csv", table_csv),
+    ("table_yaml", table_yaml),
+    ("image", image),
     ("task", task),
     ("plan", plan),
     ("stl", stl),
@@ -126,6 +129,10 @@ fn recording(scratch: &Scratch, bytes: &[u8]) -> bool {
     let path = scratch.write("recording.mcap", bytes);
     let _ = read_attachments(&path);
     followed(scratch, bytes);
+    let proposed = armcal::report::proposed_map::propose_input_map(&path, Some(&scratch.robot));
+    if let Some(map) = proposed.ok().and_then(|text| armcal::input::parse_input_map(&path, &text).ok()) {
+        let _ = armcal::input::read_external(&path, &map, &scratch.robot);
+    }
     let _ = armcal::report::inspection::inspect(&path, None).map(|found| armcal::report::inspection::to_text(&found));
     read_recording(&path).is_ok_and(|recording| !recording.messages.is_empty())
 }
@@ -191,6 +198,42 @@ fn tag_map(scratch: &Scratch, bytes: &[u8]) -> bool {
 
 fn input_map(_: &Scratch, bytes: &[u8]) -> bool {
     armcal::input::parse_input_map(Path::new("input.toml"), &text(bytes)).is_ok()
+}
+
+/// As poses of numbered tags at their times.
+fn table_csv(scratch: &Scratch, bytes: &[u8]) -> bool {
+    const MAP: &str = "version = 1\n[table]\ntime = { column = \"t\" }\n[joint_sensors]\n[tags]\nuse = \"pose\"\n\
+        [tags.columns]\ndirection = \"tag_from_camera\"\nposition = [\"x\", \"y\", \"z\"]\nid = \"tag\"\n\
+        rotation = [\"rx\", \"ry\", \"rz\"]\nrotation_form = \"fixed_xyz\"\n";
+    table(scratch, "rows.csv", (MAP, bytes))
+}
+
+/// As poses of one landmark.
+fn table_yaml(scratch: &Scratch, bytes: &[u8]) -> bool {
+    const MAP: &str = "version = 1\n[table]\nrows = \"views\"\n[joint_sensors]\n\
+        names = { shoulder_yaw = \"joints.0\", shoulder_pitch = \"joints.1\", forearm_pitch = \"joints.2\", \
+        wrist_pitch = \"joints.3\", wrist_yaw = \"joints.4\", wrist_rotate = \"joints.5\" }\n\
+        [tags]\nchild_frame = \"board\"\nuse = \"pose\"\n[tags.columns]\ndirection = \"camera_from_tag\"\n\
+        position = [\"pose.x\", \"pose.y\", \"pose.z\"]\nrotation_form = \"quaternion_wxyz\"\n\
+        rotation = [\"pose.r.0\", \"pose.r.1\", \"pose.r.2\", \"pose.r.3\"]\n";
+    table(scratch, "rows.yaml", (MAP, bytes))
+}
+
+fn table(scratch: &Scratch, name: &str, (map, bytes): (&str, &[u8])) -> bool {
+    let map = armcal::input::parse_input_map(Path::new("input.toml"), map).expect("a map");
+    armcal::input::read_external(&scratch.write(name, bytes), &map, &scratch.robot).is_ok()
+}
+
+/// A compressed image of a small camera, in which tags are looked for.
+fn image(_: &Scratch, bytes: &[u8]) -> bool {
+    use armcal::input::{ImageDetector, RecordedImage};
+    let lens = armcal::optics::Radtan::new([60.0; 2], [31.5, 23.5], [0.0; 5], [64, 48]).into();
+    let image = armcal::log::ros::CompressedImage {
+        format: "png or jpeg".to_owned(),
+        data: bytes.to_vec(),
+        ..armcal::log::ros::CompressedImage::default()
+    };
+    armcal::recorded_images::RecordedImageDetector::new(&lens).detect(&RecordedImage::Compressed(image)).is_ok()
 }
 
 fn task(_: &Scratch, bytes: &[u8]) -> bool {

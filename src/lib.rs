@@ -100,6 +100,8 @@ pub mod cli;
 pub mod export;
 #[doc(hidden)]
 pub mod output;
+#[cfg(feature = "sim")]
+pub mod recorded_images;
 #[doc(hidden)]
 pub mod report;
 #[cfg(feature = "sim")]

@@ -7,9 +7,10 @@
 //! does not know; `vehicles` puts every arm on every vehicle; `bumps` runs into things that nobody has drawn;
 //! `planning` reads plans and holds random arms against them; `determinism`, `closed_loop`, `script` and `cli` run the
 //! program, `kill` ends it badly; `sim` looks at the simulated world from outside; `uncalibrated` calibrates arms of
-//! which little is known; `real` reads recordings of real arms; `tagmap` maps tags in recordings that the test writes;
-//! `touch` feels surveyed plates with the tool; `any_arm` makes robot folders for drawings of all sorts; `work` works
-//! on a dive, `watch` follows recordings that grow; `repository` reads sources and pages.
+//! which little is known; `real` reads recordings of real arms, `recorded_inputs` their slow sensors and images;
+//! `tagmap` maps tags in recordings that the test writes; `touch` feels surveyed plates with the tool; `any_arm` makes
+//! robot folders for drawings of all sorts; `work` works on a dive, `watch` follows recordings that grow; `repository`
+//! reads sources and pages.
 
 #![allow(clippy::print_stderr, reason = "figures of a test, for whoever reads its output")]
 
@@ -33,6 +34,7 @@ mod oracle;
 mod planning;
 mod property;
 mod real;
+mod recorded_inputs;
 mod recovery;
 mod repository;
 mod script;

@@ -248,6 +248,33 @@ fn several_recordings_count_as_one_in_any_order() {
     given.calibrate_of(&["a.mcap", "b.mcap", "a.mcap"], &[]).expect("twice", 2, &["a.mcap", "duplicate recording"]);
 }
 
+#[test]
+fn the_same_poses_as_a_table_give_the_same_sensors() {
+    let titan = RealTitan::new(&titan(), 30, AS_IN_2018, 15);
+    let given = Given::new(&titan);
+    given.calibrate(&[]).expect("messages", 0, &["ACCEPTED"]);
+    let of_messages = given.calibration();
+    let mut csv = titan.poses[0].joints.iter().map(|(name, _)| format!("{name},")).collect::<String>() + "x,y,z,tag\n";
+    for pose in &titan.poses {
+        let joints: String = pose.joints.iter().map(|(_, counts)| format!("{counts},")).collect();
+        for (id, (_, tag)) in pose.tags.iter().enumerate() {
+            let at = tag.translation.vector * 1e3;
+            csv += &format!("{joints}{},{},{},{id}\n", at.x, at.y, at.z);
+        }
+    }
+    write(&given.file("poses.csv"), &csv);
+    let map = "version = 1\n[table]\n[joint_sensors]\n[tags]\nuse = \"position\"\n[tags.columns]\n\
+        direction = \"camera_from_tag\"\nposition = [\"x\", \"y\", \"z\"]\nposition_unit = \"mm\"\nid = \"tag\"\n";
+    write(&given.file("map.toml"), map);
+    given.calibrate_of(&["poses.csv"], &[]).expect("a table", 0, &["ACCEPTED", "30 poses"]);
+    for (a, b) in of_messages.joint.iter().zip(&given.calibration().joint) {
+        assert!((a.offset_rad - b.offset_rad).abs() < 1e-7, "{a:?} {b:?}");
+        assert!((a.gain_rad_per_count / b.gain_rad_per_count - 1.0).abs() < 1e-7, "{a:?} {b:?}");
+    }
+    write(&given.file("map.toml"), &map.replace("\"tag\"", "\"id\""));
+    given.calibrate_of(&["poses.csv"], &[]).expect("no such column", 2, &["poses.csv", "\"id\"", "tags.columns"]);
+}
+
 /// What is done to the poses, and what the refusal must name.
 type Spoilt = (&'static str, fn(&mut Vec<Pose>), &'static [&'static str]);
 

@@ -13,7 +13,13 @@ use armcal_belief::calib::{
     calibrate_with_survey, check_joints, prepare_external, prepare_pooled, read_marked,
 };
 use armcal_belief::tagmap::files::{LandmarkFile, NamedSurvey, read_landmarks};
-use armcal_core::input::{ChildFrame, InputMap, TagUse, read_external, read_input_map, read_task};
+#[cfg(not(feature = "sim"))]
+use armcal_core::input::read_external;
+#[cfg(feature = "sim")]
+use armcal_core::input::read_external_images;
+use armcal_core::input::{
+    ChildFrame, ExternalRecording, InputMap, Source, TagUse, read_camera_info, read_input_map, read_task,
+};
 use armcal_core::log::{Recording, TopicMap, scan_recording};
 use armcal_core::robot::{self, FailedJoint, FileIssue, Robot, SELF_COLLISION_FILE, TagSurvey};
 use armcal_core::routine::Method;
@@ -187,15 +193,16 @@ impl CalibrationInputs<'_> {
     ) -> Result<(CalibrationData, bool)> {
         let map = read_input_map(file)?;
         map.check_robot(file, &self.robot.joint_names())?;
+        let mut robot = self.robot.clone();
         if map.tag_use == TagUse::Corners {
-            self.robot.require_lens()?;
+            self.add_lens(&mut robot, &map)?;
         }
         let named = match &landmarks {
-            Some((file, landmarks)) => landmarks.survey(file, self.robot, map.tag_use)?,
+            Some((file, landmarks)) => landmarks.survey(file, &robot, map.tag_use)?,
             None => NamedSurvey { survey: self.robot.survey(), names: Default::default() },
         };
         let plain_landmark = plain_landmark(file, &map, &named)?;
-        let robot = self.robot.clone().with_survey(named.survey);
+        let robot = robot.with_survey(named.survey);
         if robot.tags.is_empty() {
             return Err(
                 UsageError("name the landmarks with --tag-map: the robot has no tags of its own".to_owned()).into()
@@ -204,7 +211,7 @@ impl CalibrationInputs<'_> {
         let mut recordings = Vec::new();
         let mut lost = false;
         for path in self.recordings {
-            let recording = read_external(path, &map, &robot)?;
+            let recording = read_with_images(path, &map, &robot)?;
             lost |= warn_of_external(&recording, &robot);
             recordings.push(recording);
         }
@@ -214,6 +221,36 @@ impl CalibrationInputs<'_> {
         let context = ExternalContext { task, landmark_names: named.names, plain_landmark };
         Ok((prepare_external(&recordings, &map, &robot, context)?, lost))
     }
+
+    /// A robot without a lens takes that of the recordings, where the input map names it.
+    fn add_lens(&self, robot: &mut Robot, map: &InputMap) -> Result<()> {
+        let topic = match &map.source {
+            Source::Topics(topics) if !robot.camera.lens.is_known() => topics.camera_info.as_deref(),
+            _ => None,
+        };
+        let Some(topic) = topic else { return Ok(robot.require_lens()?) };
+        for path in self.recordings {
+            let lens = read_camera_info(path, topic)?;
+            if robot.camera.lens.is_known() && robot.camera.lens != lens {
+                let problem = format!("{}: the lens on {topic} is not that of the others", path.display());
+                return Err(UsageError(problem).into());
+            }
+            robot.camera.lens = lens;
+        }
+        Ok(())
+    }
+}
+
+/// Images are looked at as they are read, one at a time.
+#[cfg(feature = "sim")]
+fn read_with_images(path: &Path, map: &InputMap, robot: &Robot) -> Result<ExternalRecording> {
+    let mut detector = crate::recorded_images::RecordedImageDetector::new(&robot.camera.lens);
+    Ok(read_external_images(path, map, robot, &mut detector)?)
+}
+
+#[cfg(not(feature = "sim"))]
+fn read_with_images(path: &Path, map: &InputMap, robot: &Robot) -> Result<ExternalRecording> {
+    Ok(read_external(path, map, robot)?)
 }
 
 /// A belief that hears messages.

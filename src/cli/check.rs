@@ -13,7 +13,7 @@ use crate::cli::stdout::say;
 use armcal_belief::calib::{Calibration, CalibrationFileError};
 use armcal_belief::plan::{ClearanceModel, PlanFile, SceneCheck, SceneIssues, grips_at_first};
 use armcal_belief::tagmap::files::read_landmarks;
-use armcal_core::input::{InputMap, TagUse, read_input_map, read_task};
+use armcal_core::input::{InputMap, Source, TagUse, Topics, read_input_map, read_task};
 use armcal_core::robot::{self, Robot, Vehicle};
 use armcal_core::routine::{self, Overrides, Routine, Step};
 use armcal_core::stats::stream_rng;
@@ -122,15 +122,22 @@ fn describe_calibration(file: &Path, text: &str) -> Result<String> {
 }
 
 fn describe_input(map: &InputMap) -> String {
-    let tags = match (map.tag_use, &map.child_frame, &map.camera_frame) {
-        (TagUse::Corners, ..) => format!("corners on {}", map.tag_topic),
-        (tag_use, Some(child), Some(camera)) => {
-            let what = if tag_use == TagUse::Pose { "poses" } else { "positions" };
-            format!("{what} of `{}` in `{camera}` on {}", child.text(), map.tag_topic)
-        }
-        _ => map.tag_topic.clone(),
+    let landmark = map.child_frame.as_ref().map_or_else(|| "tags".to_owned(), |child| format!("`{}`", child.text()));
+    let what = match map.tag_use {
+        TagUse::Corners => "corners".to_owned(),
+        TagUse::Pose => format!("poses of {landmark}"),
+        TagUse::Position => format!("positions of {landmark}"),
     };
-    format!("input map: joint readings on {}, {tags}", map.joint_topic)
+    match &map.source {
+        Source::Topics(Topics { joints, tags, camera_frame, .. }) => {
+            let seen_from = match (map.tag_use, camera_frame) {
+                (TagUse::Pose | TagUse::Position, Some(camera)) => format!(" in `{camera}`"),
+                _ => String::new(),
+            };
+            format!("input map: joint readings on {joints}, {what}{seen_from} on {tags}")
+        }
+        Source::Table(table) => format!("input map: a table, {what} in {}", table.position.join(", ")),
+    }
 }
 
 /// What only planning lacks is a warning: an arm that records needs none of it.

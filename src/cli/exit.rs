@@ -4,6 +4,7 @@ use std::process::ExitCode;
 
 #[cfg(feature = "sim")]
 use crate::report::RunSummary;
+use crate::report::proposed_map::ProposalError;
 use armcal_belief::calib::{CalibError, CalibrationFileError, CompactError};
 use armcal_belief::plan::{ItineraryError, PlanError};
 use armcal_belief::session::SessionError;
@@ -71,6 +72,7 @@ pub(super) fn of_cause(error: &(dyn std::error::Error + 'static)) -> Exit {
             || cause.is::<RobotError>()
             || cause.is::<FileIssue>()
             || cause.is::<InputError>()
+            || cause.is::<ProposalError>()
             || cause.is::<RoutineError>()
             || cause.is::<CalibrationFileError>()
             || cause.is::<CalibError>()

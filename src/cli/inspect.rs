@@ -6,9 +6,11 @@ use anyhow::{Context, Result};
 use clap::Args;
 
 use crate::cli::calibration_inputs::load_robot;
-use crate::cli::exit::Exit;
-use crate::cli::stdout::say;
+use crate::cli::exit::{Exit, UsageError};
+use crate::cli::stdout::{note, say};
+use crate::output;
 use crate::report::inspection::{State, inspect as look, to_text};
+use crate::report::proposed_map::propose_input_map;
 use armcal_core::log::{LogError, read_attachments};
 use armcal_core::robot::{self, Robot};
 
@@ -23,6 +25,9 @@ pub(super) struct InspectArgs {
     /// Print JSON instead of text
     #[arg(long)]
     json: bool,
+    /// Write a proposed input map for `calibrate --input`; with --robot its joints are matched. Nothing is overwritten
+    #[arg(long, value_name = "FILE")]
+    write_input: Option<PathBuf>,
 }
 
 pub(super) fn inspect(args: &InspectArgs) -> Result<Exit> {
@@ -30,11 +35,19 @@ pub(super) fn inspect(args: &InspectArgs) -> Result<Exit> {
         Some(folder) => Some(load_robot(folder, &[])?),
         None => attached_robot(&args.recording)?,
     };
+    if let Some(file) = args.write_input.as_deref().filter(|file| file.symlink_metadata().is_ok()) {
+        return Err(UsageError(format!("{}: is there; name another --write-input", file.display())).into());
+    }
     let inspection = look(&args.recording, robot.as_ref())?;
     if args.json {
         say(&serde_json::to_string_pretty(&inspection).context("the inspection has no JSON form")?)?;
     } else {
         say(&to_text(&inspection))?;
+    }
+    if let Some(file) = &args.write_input {
+        let text = propose_input_map(&args.recording, robot.as_ref())?;
+        output::write_together(&[(file.as_path(), text.as_bytes())])?;
+        note(format_args!("written: {}; look at what it says was chosen", file.display()));
     }
     Ok(match inspection.completeness.state {
         State::Whole => Exit::Ok,

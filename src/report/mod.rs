@@ -2,12 +2,14 @@
 //!
 //! `RunSummary` is summary.json; `table` the closing table on the terminal; `html` report.html, one file that needs no
 //! network. `markdown` the replay's panel.
-//! All show the same figures. `inspection` is what a recording holds and what could be calibrated from it.
+//! All show the same figures. `inspection` is what a recording holds and what could be calibrated from it,
+//! `proposed_map` an input map for it.
 
 mod html;
 pub mod inspection;
 mod markdown;
 mod online;
+pub mod proposed_map;
 mod summary;
 mod table;
 

@@ -41,8 +41,9 @@ const fn case(seed: &'static str, name: &'static str, command: &'static str) -> 
 const VIEWS: &str = "fuzz/corpus/recording/views.mcap";
 const CUT: &str = "fuzz/corpus/recording/cut.mcap";
 const TAGMAP: &str = "tagmap views.mcap --topic /camera/wrist/detections --camera cameras.yaml --tags";
+const TABLE: &str = "calibrate poses.csv --robot robot --input table.toml --out out --method minimum_distance";
 
-const CASES: [Case; 45] = [
+const CASES: [Case; 48] = [
     case("robots/titan4/titan4.urdf", "robot/titan4.urdf", "check robot"),
     case("robots/titan4/titan4.urdf", "robot/titan4.urdf", "inspect views.mcap --robot robot"),
     case("robots/kraft-predator/kraft-predator.urdf", "robot/titan4.urdf", "check robot"),
@@ -61,6 +62,8 @@ const CASES: [Case; 45] = [
     case("routines/motion/hover.csv", "motion.csv", "check motion.toml"),
     case("fuzz/corpus/task/task.toml", "task.toml", "check task.toml"),
     case("fuzz/corpus/input_map/positions.toml", "input.toml", "check input.toml"),
+    case("fuzz/corpus/input_map/table.toml", "input.toml", "check input.toml"),
+    case("fuzz/corpus/table_csv/poses.csv", "poses.csv", TABLE),
     case("fuzz/corpus/plan/plan.toml", "plan.toml", "check plan.toml"),
     case("fuzz/corpus/tag_map/map.toml", "map.toml", "check map.toml"),
     case("recordings/sample/calibration.toml", "calibration.toml", "check calibration.toml"),
@@ -78,6 +81,7 @@ const CASES: [Case; 45] = [
     case("fuzz/corpus/campaign_table/rows.csv", "rows.csv", "campaign --merge rows.csv --out out.csv"),
     case(VIEWS, "given.mcap", "inspect given.mcap --robot robot"),
     case(CUT, "given.mcap", "inspect given.mcap --json"),
+    case(VIEWS, "changed.mcap", "inspect changed.mcap --robot robot --write-input map.toml"),
     case(CUT, "given.mcap", "replay given.mcap --save out.rrd"),
     case(VIEWS, "given.mcap", "watch given.mcap --robot robot --idle-s 1"),
     case(VIEWS, "changed.mcap", "watch changed.mcap --robot robot --idle-s 1 --json --out out"),
@@ -101,6 +105,7 @@ fn lay_out(folder: &Path) {
         (VIEWS, "views.mcap"),
         ("fuzz/corpus/cameras/cameras.yaml", "cameras.yaml"),
         ("fuzz/corpus/tags/tagslam.yaml", "tags.yaml"),
+        ("fuzz/corpus/input_map/table.toml", "table.toml"),
         ("recordings/sample/calibration.toml", "calibration.toml"),
         ("recordings/sample/calibration.covariance.toml", "calibration.covariance.toml"),
     ] {

@@ -2,18 +2,26 @@
 
 use crate::log::{CdrError, LogError, StampRegression};
 
-/// A message by its topic and its number there, from 1, in the order of the file.
+/// A message or a row of a table.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct BadPlace {
-    /// Name as recorded.
-    pub topic: String,
-    /// Number on its topic, from 1, in the order of the file.
-    pub message: u64,
+pub enum BadPlace {
+    /// One message.
+    Message {
+        /// Name of the topic as recorded.
+        topic: String,
+        /// Number on its topic, from 1, in the order of the file.
+        message: u64,
+    },
+    /// A row of a table, from 1, in the order of the file.
+    Row(u64),
 }
 
 impl std::fmt::Display for BadPlace {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "topic {}: message {}", self.topic, self.message)
+        match self {
+            Self::Message { topic, message } => write!(f, "topic {topic}: message {message}"),
+            Self::Row(row) => write!(f, "row {row}"),
+        }
     }
 }
 
@@ -50,6 +58,14 @@ pub enum InputError {
     TooLong { file: String, topic: String, most: usize },
     #[error("{file}: topic {topic}: no tag in it: {problem}")]
     NoTags { file: String, topic: String, problem: String },
+    #[error("{file}: cannot be read: {source}")]
+    Unreadable { file: String, source: std::io::Error },
+    #[error("{file}: {problem}")]
+    Table { file: String, problem: String },
+    #[error("{file}: {place}: {problem}")]
+    Row { file: String, place: BadPlace, problem: String },
+    #[error("{file}: topic {topic}: the camera's lens {problem}")]
+    CameraInfo { file: String, topic: String, problem: String },
     #[error("{file}: topic {topic} holds {held}; `tags.use` of the input map must be {allowed}")]
     Use { file: String, topic: String, held: &'static str, allowed: &'static str },
 }

@@ -1,117 +1,176 @@
 //! Reader of recordings of other systems, by an input map.
 
-use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::collections::BTreeSet;
+use std::path::Path;
 
+use super::conditions::ConditionReader;
 use super::error::InputError;
-use super::joints::{JointReader, Reading};
-use super::map::{InputMap, TagUse};
-use super::tags::{TagFrame, TagReader};
-use crate::log::{ChunkOrder, Completeness, RawMessage, for_each_raw};
+use super::images::{IMAGE_TYPES, ImageDetector};
+use super::joints::{JointReader, n_needed};
+use super::map::{ConditionKind, InputMap, Source, TagUse, Topics};
+use super::recording::ExternalRecording;
+use super::table::read_table;
+use super::tags::TagReader;
+use crate::log::{RawMessage, for_each_raw};
 use crate::robot::Robot;
-
-/// Joint readings and detections of a recording of a real arm.
-#[derive(Clone, Debug)]
-pub struct ExternalRecording {
-    /// The recording's file, as given.
-    pub path: PathBuf,
-    /// In the order of their stamps.
-    pub readings: Vec<Reading>,
-    /// In the order of their stamps; each has a tag.
-    pub frames: Vec<TagFrame>,
-    /// Joints of the robot that no reading has, by index; none of them moves the camera.
-    pub absent_joints: Vec<usize>,
-    /// Recorded joints that the robot lacks.
-    pub extra_joints: Vec<String>,
-    /// Number of unused messages by reason.
-    pub left_out: BTreeMap<String, u64>,
-    /// Whether the file could be read to its end.
-    pub completeness: Completeness,
-    /// What was put right in the order of the file's chunks.
-    pub chunk_order: ChunkOrder,
-}
 
 /// Readings, and images with tags, of one recording: 22 hours at 100 Hz, 1 GB. Whether the arm rested between two
 /// images is seen from all readings between them, so that all are kept.
 const MAX_MESSAGES: usize = 8_000_000;
 
-/// Reads the joint readings and tags of a recording; joints are matched by name.
+/// Reads the joint readings and tags of a recording or of a table; joints are matched by name.
 ///
 /// Joints distal to the camera may be absent, unless the robot has a tag on its gripper.
 ///
 /// # Errors
-/// [`InputError`], naming file, topic, message and field.
+/// [`InputError`], naming file, topic, message and field; images are refused.
 pub fn read_external(path: &Path, map: &InputMap, robot: &Robot) -> Result<ExternalRecording, InputError> {
-    read_up_to(MAX_MESSAGES, path, map, robot)
+    read_up_to(MAX_MESSAGES, path, map, (robot, None))
 }
 
-fn read_up_to(most: usize, path: &Path, map: &InputMap, robot: &Robot) -> Result<ExternalRecording, InputError> {
+/// The same, with someone who finds tags in images.
+///
+/// # Errors
+/// As [`read_external`], and where images are of no use.
+pub fn read_external_images(
+    path: &Path,
+    map: &InputMap,
+    robot: &Robot,
+    detector: &mut dyn ImageDetector,
+) -> Result<ExternalRecording, InputError> {
+    read_up_to(MAX_MESSAGES, path, map, (robot, Some(detector)))
+}
+
+fn read_up_to<'a>(
+    most: usize,
+    path: &Path,
+    map: &'a InputMap,
+    (robot, detector): (&'a Robot, Option<&'a mut dyn ImageDetector>),
+) -> Result<ExternalRecording, InputError> {
+    let topics = match &map.source {
+        Source::Topics(topics) => topics,
+        Source::Table(layout) => return read_table(path, map, layout, robot),
+    };
     let file = path.display().to_string();
-    let joints = robot.joint_names();
-    let n_needed = if robot.gripper_tag.is_some() { joints.len() } else { robot.n_seen_joints() };
-    let mut topics: BTreeMap<String, String> = BTreeMap::new();
-    let mut readings = JointReader::new(&file, map, &joints, n_needed);
-    let mut tags = TagReader::new(&file, map);
+    let mut reader = MessageReader {
+        file: &file,
+        map,
+        topics,
+        most,
+        seen: BTreeSet::new(),
+        joints: JointReader::new(&file, map, &topics.joints, robot),
+        tags: TagReader::new(&file, map, topics, detector.map(|detector| detector as &mut dyn ImageDetector)),
+        conditions: ConditionReader::new(&file, map, &topics.conditions),
+    };
     let mut first_error = None;
     let summary = for_each_raw(path, |raw| {
-        if !topics.contains_key(raw.topic()) {
-            topics.insert(raw.topic().to_owned(), raw.schema_name().to_owned());
+        if first_error.is_none() {
+            first_error = reader.take(raw).err();
         }
-        if first_error.is_some() {
-            return;
-        }
-        let taken = if raw.topic() == map.joint_topic {
-            check_type(&file, raw, &["JointState"], "sensor_msgs/msg/JointState")
-                .and_then(|()| readings.take(raw, digest(raw)))
-        } else if raw.topic() == map.tag_topic {
-            check_tags(&file, raw, map).and_then(|()| tags.take(raw, digest(raw)))
-        } else {
-            Ok(())
-        };
-        let of_topics = [(&map.joint_topic, readings.readings.len()), (&map.tag_topic, tags.len())];
-        first_error = taken.err().or_else(|| too_long(&file, of_topics, most));
     })?;
     if let Some(error) = first_error {
         return Err(error);
     }
-    if let Some(topic) = [&map.joint_topic, &map.tag_topic].into_iter().find(|topic| !topics.contains_key(*topic)) {
-        let found = topics.into_keys().collect();
-        return Err(InputError::NoTopic { file, topic: topic.clone(), found });
-    }
-    if readings.readings.is_empty() {
-        return Err(readings.no_reading());
-    }
-    for (topic, order) in [(&map.joint_topic, &readings.order), (&map.tag_topic, &tags.order)] {
-        if let Some(disorder) = order.first_regression() {
-            return Err(InputError::Disorder { file: file.clone(), topic: topic.clone(), disorder });
-        }
-    }
-    if tags.len() == 0 {
-        let (topic, problem) = (map.tag_topic.clone(), tags.problem());
-        return Err(InputError::NoTags { file: file.clone(), topic, problem });
-    }
-    let absent_joints = (n_needed..joints.len()).filter(|joint| !readings.present.contains(joint)).collect();
-    let extra_joints = readings.extra();
-    let (mut sorted, mut left_out) = (readings.readings, readings.left_out);
-    sorted.sort_by_key(|reading| reading.stamp);
-    let (frames, of_tags) = tags.finish();
-    left_out.extend(of_tags);
-    Ok(ExternalRecording {
-        path: path.to_owned(),
-        readings: sorted,
-        frames,
-        absent_joints,
-        extra_joints,
-        left_out,
-        completeness: summary.completeness,
-        chunk_order: summary.chunk_order,
-    })
+    reader.check()?;
+    let mut recording = reader.finish(robot);
+    recording.path = path.to_owned();
+    (recording.completeness, recording.chunk_order) = (summary.completeness, summary.chunk_order);
+    Ok(recording)
 }
 
-/// The error for the first topic with more messages in memory than `most`.
-fn too_long(file: &str, of_topics: [(&String, usize); 2], most: usize) -> Option<InputError> {
-    let (topic, _) = of_topics.into_iter().find(|(_, n)| *n > most)?;
-    Some(InputError::TooLong { file: file.to_owned(), topic: topic.clone(), most })
+/// Reads all messages of a recording.
+struct MessageReader<'a> {
+    file: &'a str,
+    map: &'a InputMap,
+    topics: &'a Topics,
+    /// Messages of a topic that may stay in memory.
+    most: usize,
+    seen: BTreeSet<String>,
+    joints: JointReader<'a>,
+    tags: TagReader<'a>,
+    conditions: ConditionReader<'a>,
+}
+
+impl MessageReader<'_> {
+    fn take(&mut self, raw: &RawMessage<'_>) -> Result<(), InputError> {
+        if !self.seen.contains(raw.topic()) {
+            self.seen.insert(raw.topic().to_owned());
+        }
+        let n_kept = if raw.topic() == self.topics.joints {
+            check_type(self.file, raw, &["JointState"], "sensor_msgs/msg/JointState")?;
+            self.joints.take(raw, digest(raw))?;
+            self.joints.readings.len()
+        } else if raw.topic() == self.topics.tags {
+            check_tags(self.file, raw, self.map)?;
+            self.tags.take(raw, digest(raw))?;
+            self.tags.len()
+        } else if let Some(kind) = self.conditions.kind_of(raw.topic()) {
+            match kind {
+                ConditionKind::OilTemperature => {
+                    check_type(self.file, raw, &["Temperature"], "sensor_msgs/msg/Temperature")?;
+                }
+                ConditionKind::Pressure => {
+                    check_type(self.file, raw, &["FluidPressure"], "sensor_msgs/msg/FluidPressure")?;
+                }
+            }
+            self.conditions.take(raw, kind, digest(raw))?;
+            self.conditions.readings.len()
+        } else {
+            0
+        };
+        if n_kept > self.most {
+            let (file, topic) = (self.file.to_owned(), raw.topic().to_owned());
+            return Err(InputError::TooLong { file, topic, most: self.most });
+        }
+        Ok(())
+    }
+
+    /// Checks that all is there, in the order of time.
+    fn check(&self) -> Result<(), InputError> {
+        let file = || self.file.to_owned();
+        let conditions = self.topics.conditions.named().into_iter().map(|(topic, _)| topic);
+        let mut wanted = [&self.topics.joints, &self.topics.tags].into_iter().chain(conditions);
+        if let Some(topic) = wanted.find(|topic| !self.seen.contains(*topic)) {
+            let found = self.seen.iter().cloned().collect();
+            return Err(InputError::NoTopic { file: file(), topic: topic.clone(), found });
+        }
+        if self.joints.readings.is_empty() {
+            return Err(self.joints.no_reading());
+        }
+        for (topic, order) in [(&self.topics.joints, &self.joints.order), (&self.topics.tags, &self.tags.order)] {
+            if let Some(disorder) = order.first_regression() {
+                return Err(InputError::Disorder { file: file(), topic: topic.clone(), disorder });
+            }
+        }
+        if self.tags.len() == 0 {
+            let (topic, problem) = (self.topics.tags.clone(), self.tags.problem());
+            return Err(InputError::NoTags { file: file(), topic, problem });
+        }
+        Ok(())
+    }
+
+    fn finish(self, robot: &Robot) -> ExternalRecording {
+        let absent_joints =
+            (n_needed(robot)..robot.n_joints()).filter(|joint| !self.joints.present.contains(joint)).collect();
+        let extra_joints = self.joints.extra();
+        let (mut readings, mut left_out) = (self.joints.readings, self.joints.left_out);
+        readings.sort_by_key(|reading| reading.stamp);
+        let (frames, of_tags) = self.tags.finish();
+        left_out.extend(of_tags);
+        if self.conditions.left_out > 0 {
+            left_out.insert("temperatures or pressures that are not finite".to_owned(), self.conditions.left_out);
+        }
+        let conditions = self.conditions.readings;
+        ExternalRecording {
+            readings,
+            frames,
+            conditions,
+            absent_joints,
+            extra_joints,
+            left_out,
+            ..ExternalRecording::default()
+        }
+    }
 }
 
 /// Hash of topic, log time and bytes.
@@ -138,8 +197,10 @@ fn check_type(file: &str, raw: &RawMessage<'_>, types: &[&str], expected: &'stat
 }
 
 fn check_tags(file: &str, raw: &RawMessage<'_>, map: &InputMap) -> Result<(), InputError> {
-    const EXPECTED: &str = "tf2_msgs/msg/TFMessage or apriltag_msgs/msg/AprilTagDetectionArray";
-    check_type(file, raw, &["TFMessage", "AprilTagDetectionArray"], EXPECTED)?;
+    const EXPECTED: &str = "tf2_msgs/msg/TFMessage, apriltag_msgs/msg/AprilTagDetectionArray, sensor_msgs/msg/Image \
+        or sensor_msgs/msg/CompressedImage";
+    let [image, compressed] = IMAGE_TYPES;
+    check_type(file, raw, &["TFMessage", "AprilTagDetectionArray", image, compressed], EXPECTED)?;
     let is_transform = raw.schema_name().ends_with("/TFMessage");
     let (held, allowed) = match (is_transform, map.tag_use) {
         (true, TagUse::Corners) => ("transforms, which have no corners", "\"position\" or \"pose\""),
@@ -162,6 +223,7 @@ mod tests {
         let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
         let robot = crate::robot::load(&root.join("robots/titan4")).unwrap();
         let map = read_input_map(&root.join("fuzz/corpus/input_map/positions.toml")).unwrap();
+        let Source::Topics(topics) = &map.source else { panic!("topics") };
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("long.mcap");
         let mut writer = RecordingWriter::create(&path, RecordingHeader::new(robot.joint_names())).unwrap();
@@ -170,11 +232,11 @@ mod tests {
             let name: Vec<String> = robot.joint_names().iter().map(recorded).collect();
             let joints = JointState { position: vec![1.0; name.len()], name, ..JointState::default() };
             let at = SIMULATION_EPOCH.plus_s(f64::from(n));
-            writer.write_ros(&map.joint_topic, &JointState::SCHEMA, at, &joints).unwrap();
+            writer.write_ros(&topics.joints, &JointState::SCHEMA, at, &joints).unwrap();
         }
         writer.finish().unwrap();
-        let problem = |most| read_up_to(most, &path, &map, &robot).unwrap_err();
-        assert!(matches!(problem(11), InputError::TooLong { most: 11, topic, .. } if topic == map.joint_topic));
+        let problem = |most| read_up_to(most, &path, &map, (&robot, None)).unwrap_err();
+        assert!(matches!(problem(11), InputError::TooLong { most: 11, topic, .. } if topic == topics.joints));
         assert!(matches!(problem(12), InputError::NoTopic { .. }));
     }
 }

@@ -7,6 +7,7 @@ use super::map::{InputMap, NotFinite};
 use crate::joints::JointCounts;
 use crate::log::ros::JointState;
 use crate::log::{RawMessage, StampOrder, decode};
+use crate::robot::{JointSensorSpec, Robot};
 use crate::time::Stamp;
 
 /// One raw reading of all joints, in the robot's order.
@@ -20,12 +21,18 @@ pub struct Reading {
     pub digest: [u8; 32],
 }
 
+/// The joints of the robot, from the base on, that a recording may not lack.
+pub(super) fn n_needed(robot: &Robot) -> usize {
+    if robot.gripper_tag.is_some() { robot.n_joints() } else { robot.n_seen_joints() }
+}
+
 /// Reads the messages of one topic.
 pub(super) struct JointReader<'a> {
     file: &'a str,
     map: &'a InputMap,
+    topic: &'a str,
     /// Of the robot, base first.
-    joints: &'a [String],
+    sensors: &'a [JointSensorSpec],
     /// The first joints, which may not be absent.
     n_needed: usize,
     /// Recorded names of the latest message, and where in it each of the robot's joints is.
@@ -40,13 +47,14 @@ pub(super) struct JointReader<'a> {
 }
 
 impl<'a> JointReader<'a> {
-    pub fn new(file: &'a str, map: &'a InputMap, joints: &'a [String], n_needed: usize) -> Self {
+    pub fn new(file: &'a str, map: &'a InputMap, topic: &'a str, robot: &'a Robot) -> Self {
         Self {
             file,
             map,
-            joints,
-            n_needed,
-            layout: (Vec::new(), vec![None; joints.len()]),
+            topic,
+            sensors: &robot.sensors,
+            n_needed: n_needed(robot),
+            layout: (Vec::new(), vec![None; robot.n_joints()]),
             readings: Vec::new(),
             order: StampOrder::default(),
             names: BTreeSet::new(),
@@ -59,7 +67,7 @@ impl<'a> JointReader<'a> {
     pub fn take(&mut self, raw: &RawMessage<'_>, digest: [u8; 32]) -> Result<(), InputError> {
         self.messages += 1;
         let file = || self.file.to_owned();
-        let place = BadPlace { topic: raw.topic().to_owned(), message: self.messages };
+        let place = BadPlace::Message { topic: raw.topic().to_owned(), message: self.messages };
         let message: JointState = match decode(raw.data) {
             Ok(message) => message,
             Err(error) => return Err(InputError::Undecodable { file: file(), place, error }),
@@ -77,17 +85,18 @@ impl<'a> JointReader<'a> {
             return Ok(());
         }
         self.order.add_of(self.messages, stamp);
-        let values = at.iter().map(|at| at.map_or(0.0, |k| message.position[k]));
-        let counts = JointCounts::from_slice(&values.collect::<Vec<_>>());
+        let counts = JointCounts::from_fn(at.len(), |j| {
+            at[j].map_or(0.0, |k| self.map.joint_unit.counts(&self.sensors[j], message.position[k]))
+        });
         if let Some(joint) = counts.iter().position(|value| !value.is_finite()) {
             if self.map.not_finite == NotFinite::LeaveOut {
                 *self.left_out.entry("joint messages with a position that is not finite".to_owned()).or_default() += 1;
                 return Ok(());
             }
-            let (of, value) = (self.joints[joint].clone(), counts[joint]);
+            let (of, value) = (self.sensors[joint].joint.clone(), counts[joint]);
             return Err(InputError::NotFinite { file: file(), place, field: "position", of, value });
         }
-        self.present.extend((self.n_needed..self.joints.len()).filter(|&joint| at[joint].is_some()));
+        self.present.extend((self.n_needed..self.sensors.len()).filter(|&joint| at[joint].is_some()));
         self.readings.push(Reading { stamp, counts, digest });
         Ok(())
     }
@@ -96,29 +105,30 @@ impl<'a> JointReader<'a> {
         if self.layout.0 == names {
             return;
         }
-        let is_it = |name: &String, joint: &String| name == self.map.joint_names.get(joint).unwrap_or(joint);
-        let at = self.joints.iter().map(|joint| names.iter().position(|name| is_it(name, joint))).collect();
+        let place = |spec: &JointSensorSpec| {
+            let recorded = self.map.recorded_name(&spec.joint);
+            names.iter().position(|name| name == recorded)
+        };
+        let at = self.sensors.iter().map(place).collect();
         self.names.extend(names.iter().cloned());
         self.layout = (names.to_vec(), at);
     }
 
     /// The error for a topic whose messages name other joints than the robot's.
     pub fn no_reading(&self) -> InputError {
-        let recorded_name = |joint: &String| self.map.joint_names.get(joint).unwrap_or(joint).clone();
-        let needed = self.joints[..self.n_needed].iter().map(recorded_name);
+        let needed = self.sensors[..self.n_needed].iter().map(|spec| self.map.recorded_name(&spec.joint).clone());
         InputError::JointNames {
             file: self.file.to_owned(),
-            topic: self.map.joint_topic.clone(),
+            topic: self.topic.to_owned(),
             recorded: self.names.iter().cloned().collect(),
             missing: needed.filter(|name| !self.names.contains(name)).collect(),
-            expected: self.joints.to_vec(),
+            expected: self.sensors.iter().map(|spec| spec.joint.clone()).collect(),
         }
     }
 
     /// Recorded joints that the robot does not have.
     pub fn extra(&self) -> Vec<String> {
-        let of_robot: BTreeSet<&String> =
-            self.joints.iter().map(|joint| self.map.joint_names.get(joint).unwrap_or(joint)).collect();
+        let of_robot: BTreeSet<&String> = self.sensors.iter().map(|spec| self.map.recorded_name(&spec.joint)).collect();
         self.names.iter().filter(|name| !of_robot.contains(name)).cloned().collect()
     }
 }

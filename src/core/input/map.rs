@@ -8,19 +8,32 @@
 //! [joint_sensors]
 //! topic = "/joint_states"            # sensor_msgs/msg/JointState, position[] = the raw sensor reading
 //! names = { elbow = "joint_3" }      # optional: the robot's joint = the recorded name, where they differ
+//! unit = "counts"                    # optional: or "rad", "deg": angles made of the sensors by their datasheet
 //! [tags]
-//! topic = "/tf"                      # tf2_msgs/msg/TFMessage or apriltag_msgs/msg/AprilTagDetectionArray
+//! topic = "/tf"                      # tf2_msgs/msg/TFMessage, apriltag_msgs/msg/AprilTagDetectionArray, or
+//!                                    # sensor_msgs/msg/Image or CompressedImage (with use = "corners")
 //! camera_frame = "fisheye"
 //! child_frame = "tag36h11:{id}"      # or a plain name, for one landmark
 //! use = "position"                   # "position" | "pose" | "corners"
+//! image_period_s = 0.2               # optional, images alone: time between two that are looked at; absent: all
+//! camera_info = "/camera_info"       # optional, images alone: sensor_msgs/msg/CameraInfo, for robots without a lens
+//! [conditions]                       # optional
+//! oil_temperature = "/oil"           # sensor_msgs/msg/Temperature, deg C
+//! pressure = "/depth"                # sensor_msgs/msg/FluidPressure, Pa
 //! ```
+//!
+//! Tables have columns instead of topics: [`TableLayout`].
 
 use std::collections::BTreeMap;
 use std::path::Path;
 
 use serde::Deserialize;
 
-use crate::robot::{FileIssue, RobotError, parse_toml, read_text};
+pub use self::table::{Direction, RotationColumns, RotationForm, TableFormat, TableLayout, TimeColumn};
+use self::table::{TableToml, TagColumnsToml};
+use crate::robot::{FileIssue, JointSensorSpec, RobotError, parse_toml, read_text};
+
+mod table;
 
 /// What of a tag's measurement counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
@@ -54,6 +67,30 @@ pub enum NotFinite {
     Refuse,
     /// The message (of a joint reading) or the tag is left out and counted.
     LeaveOut,
+}
+
+/// What the recorded numbers of the joints are.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum JointUnit {
+    /// Raw readings, in the unit of robot.toml's scale.
+    #[default]
+    Counts,
+    /// Angles made of the readings by the datasheet: robot.toml's scale and offset.
+    Rad,
+    /// The same in degrees.
+    Deg,
+}
+
+impl JointUnit {
+    /// The raw reading that `value` stands for.
+    pub(super) fn counts(self, spec: &JointSensorSpec, value: f64) -> f64 {
+        match self {
+            Self::Counts => value,
+            Self::Rad => spec.offset_counts + spec.counts_per_rad * value,
+            Self::Deg => Self::Rad.counts(spec, value.to_radians()),
+        }
+    }
 }
 
 /// How the frames of tags are called.
@@ -95,17 +132,68 @@ impl ChildFrame {
     }
 }
 
+/// What a slow sensor measures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum ConditionKind {
+    /// Degrees Celsius.
+    OilTemperature,
+    /// Pa, absolute.
+    Pressure,
+}
+
+/// Topics of slow sensors.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ConditionTopics {
+    /// Temperature of the oil, `sensor_msgs/msg/Temperature`.
+    pub oil_temperature: Option<String>,
+    /// Ambient pressure, `sensor_msgs/msg/FluidPressure`.
+    pub pressure: Option<String>,
+}
+
+impl ConditionTopics {
+    /// Those that are given.
+    pub(super) fn named(&self) -> Vec<(&String, ConditionKind)> {
+        let oil = self.oil_temperature.iter().map(|topic| (topic, ConditionKind::OilTemperature));
+        oil.chain(self.pressure.iter().map(|topic| (topic, ConditionKind::Pressure))).collect()
+    }
+}
+
+/// Where in a ROS recording the data are.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Topics {
+    /// Joint readings, `sensor_msgs/msg/JointState`.
+    pub joints: String,
+    /// Tags, `tf2_msgs/msg/TFMessage` or `apriltag_msgs/msg/AprilTagDetectionArray`, or images.
+    pub tags: String,
+    /// Without a leading slash, as all frames here.
+    pub camera_frame: Option<String>,
+    /// The camera's lens, `sensor_msgs/msg/CameraInfo`, for a robot that has none.
+    pub camera_info: Option<String>,
+    /// Least time between two images that are looked at.
+    pub image_period_s: f64,
+    /// Slow sensors.
+    pub conditions: ConditionTopics,
+}
+
+/// Where the data are.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Source {
+    /// Messages of a ROS recording.
+    Topics(Topics),
+    /// Columns of a table; boxed for its size.
+    Table(Box<TableLayout>),
+}
+
 /// A checked input map.
 #[derive(Clone, Debug, PartialEq)]
 pub struct InputMap {
-    /// Topic of the joint readings, `sensor_msgs/msg/JointState`.
-    pub joint_topic: String,
+    /// Topics or columns.
+    pub source: Source,
     /// Robot's joint to recorded name, where they differ.
     pub joint_names: BTreeMap<String, String>,
-    /// Topic of the tags, `tf2_msgs/msg/TFMessage` or `apriltag_msgs/msg/AprilTagDetectionArray`.
-    pub tag_topic: String,
-    /// Without a leading slash, as all frames here.
-    pub camera_frame: Option<String>,
+    /// What the recorded numbers of the joints are.
+    pub joint_unit: JointUnit,
     /// Names of the tags' frames; `None` with [`TagUse::Corners`] alone.
     pub child_frame: Option<ChildFrame>,
     /// What of a tag's measurement counts.
@@ -132,6 +220,11 @@ impl InputMap {
             }
         }
     }
+
+    /// The name that the recording has for `joint` of the robot.
+    pub(super) fn recorded_name<'a>(&'a self, joint: &'a String) -> &'a String {
+        self.joint_names.get(joint).unwrap_or(joint)
+    }
 }
 
 /// Old ROS names begin with a slash; both mean one frame.
@@ -149,26 +242,37 @@ struct MapToml {
     while_moving: WhileMoving,
     #[serde(default)]
     not_finite: NotFinite,
+    #[serde(default)]
+    table: Option<TableToml>,
     joint_sensors: JointsToml,
     tags: TagsToml,
+    #[serde(default)]
+    conditions: ConditionTopics,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct JointsToml {
-    topic: String,
+    topic: Option<String>,
     #[serde(default)]
     names: BTreeMap<String, String>,
+    #[serde(default)]
+    unit: JointUnit,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct TagsToml {
-    topic: String,
+    topic: Option<String>,
     camera_frame: Option<String>,
     child_frame: Option<String>,
     #[serde(rename = "use")]
     tag_use: TagUse,
+    #[serde(default)]
+    columns: Option<TagColumnsToml>,
+    #[serde(default)]
+    image_period_s: f64,
+    camera_info: Option<String>,
 }
 
 /// Assumed: half of what one pose a second leaves.
@@ -190,42 +294,82 @@ pub fn read_input_map(file: &Path) -> Result<InputMap, RobotError> {
 /// As [`read_input_map`].
 pub fn parse_input_map(file: &Path, text: &str) -> Result<InputMap, RobotError> {
     let raw: MapToml = parse_toml(file, text)?;
-    let issue = |key: &str, problem: &str| FileIssue::new(file, key, problem);
     FileIssue::check_range(file, "version", f64::from(raw.version), 1.0..=1.0)?;
-    for (key, topic) in [("joint_sensors.topic", &raw.joint_sensors.topic), ("tags.topic", &raw.tags.topic)] {
-        if topic.is_empty() {
-            return Err(issue(key, "is empty; name a topic").into());
-        }
-    }
-    if raw.joint_sensors.topic == raw.tags.topic {
-        return Err(issue("tags.topic", "is the topic of the joint sensors, too").into());
-    }
-    let camera_frame = raw.tags.camera_frame.as_deref().map(|frame| without_slash(frame).to_owned());
     let child_frame = raw.tags.child_frame.as_deref().map(|frame| child_frame(file, frame)).transpose()?;
-    if raw.tags.tag_use != TagUse::Corners {
-        let missing =
-            |key: &str| issue(key, "is missing; transforms need it: which frames are the camera's and the tags'");
-        if camera_frame.is_none() {
-            return Err(missing("tags.camera_frame").into());
-        }
-        if child_frame.is_none() {
-            return Err(missing("tags.child_frame").into());
-        }
+    if raw.table.is_some() {
+        check_no_topics(file, &raw)?;
     }
-    if camera_frame.as_deref() == Some("") {
-        return Err(issue("tags.camera_frame", "is empty; name a frame").into());
-    }
+    let source = match raw.table {
+        Some(table) => {
+            let tags = (raw.tags.tag_use, child_frame.as_ref());
+            Source::Table(Box::new(table::layout(file, table, raw.tags.columns, tags)?))
+        }
+        None => Source::Topics(topics(file, &raw.joint_sensors, &raw.tags, raw.conditions)?),
+    };
     Ok(InputMap {
-        joint_topic: raw.joint_sensors.topic,
+        source,
         joint_names: raw.joint_sensors.names,
-        tag_topic: raw.tags.topic,
-        camera_frame,
+        joint_unit: raw.joint_sensors.unit,
         child_frame,
         tag_use: raw.tags.tag_use,
         max_gap_s: FileIssue::check_range(file, "max_gap_s", raw.max_gap_s, 1e-6..=60.0)?,
         while_moving: raw.while_moving,
         not_finite: raw.not_finite,
     })
+}
+
+fn check_no_topics(file: &Path, raw: &MapToml) -> Result<(), FileIssue> {
+    let given = [
+        ("joint_sensors.topic", &raw.joint_sensors.topic),
+        ("tags.topic", &raw.tags.topic),
+        ("tags.camera_frame", &raw.tags.camera_frame),
+        ("tags.camera_info", &raw.tags.camera_info),
+        ("conditions.oil_temperature", &raw.conditions.oil_temperature),
+        ("conditions.pressure", &raw.conditions.pressure),
+    ];
+    match given.into_iter().find(|(_, value)| value.is_some()) {
+        Some((key, _)) => Err(FileIssue::new(file, key, "is for recordings; a [table] has columns. Leave one out")),
+        None => Ok(()),
+    }
+}
+
+fn topics(file: &Path, joints: &JointsToml, tags: &TagsToml, conditions: ConditionTopics) -> Result<Topics, FileIssue> {
+    let issue = |key: &str, problem: &str| Err(FileIssue::new(file, key, problem));
+    let topic = |key: &str, topic: &Option<String>| match topic.as_deref() {
+        Some("") => issue(key, "is empty; name a topic").map(|()| String::new()),
+        Some(topic) => Ok(topic.to_owned()),
+        None => issue(key, "is missing; name a topic, or give a [table]").map(|()| String::new()),
+    };
+    let camera_frame = tags.camera_frame.as_deref().map(|frame| without_slash(frame).to_owned());
+    let found = Topics {
+        joints: topic("joint_sensors.topic", &joints.topic)?,
+        tags: topic("tags.topic", &tags.topic)?,
+        camera_frame,
+        camera_info: tags.camera_info.clone(),
+        image_period_s: FileIssue::check_range(file, "tags.image_period_s", tags.image_period_s, 0.0..=3600.0)?,
+        conditions,
+    };
+    if found.joints == found.tags {
+        issue("tags.topic", "is the topic of the joint sensors, too")?;
+    }
+    let mut named: Vec<&String> = found.conditions.named().into_iter().map(|(topic, _)| topic).collect();
+    named.extend([&found.joints, &found.tags]);
+    named.sort_unstable();
+    if named[0].is_empty() || named.windows(2).any(|two| two[0] == two[1]) {
+        issue("conditions", "has an empty topic, or one that is named twice")?;
+    }
+    if tags.columns.is_some() {
+        issue("tags.columns", "is for a [table], which the input map lacks")?;
+    }
+    if found.camera_frame.as_deref() == Some("") {
+        issue("tags.camera_frame", "is empty; name a frame")?;
+    }
+    let frames = [("tags.camera_frame", &tags.camera_frame), ("tags.child_frame", &tags.child_frame)];
+    let absent = frames.into_iter().find(|(_, frame)| tags.tag_use != TagUse::Corners && frame.is_none());
+    if let Some((key, _)) = absent {
+        issue(key, "is missing; transforms need it: which frames are the camera's and the tags'")?;
+    }
+    Ok(found)
 }
 
 fn child_frame(file: &Path, frame: &str) -> Result<ChildFrame, FileIssue> {
@@ -255,7 +399,8 @@ mod tests {
     #[test]
     fn frames_are_told_with_and_without_slash_and_by_number() {
         let map = parse(GOOD).expect("good");
-        assert_eq!(map.camera_frame.as_deref(), Some("fisheye"));
+        let Source::Topics(topics) = &map.source else { panic!("topics") };
+        assert_eq!(topics.camera_frame.as_deref(), Some("fisheye"));
         let frame = map.child_frame.expect("a frame");
         assert_eq!(frame.id_of("tag36h11:7"), Some(7));
         assert_eq!(frame.id_of("/tag36h11:12"), Some(12));
@@ -268,7 +413,10 @@ mod tests {
 
     #[test]
     fn what_is_wrong_is_named_with_file_and_key() {
-        let faults: [(&str, &str, &[&str]); 10] = [
+        let faults: [(&str, &str, &[&str]); 13] = [
+            ("[tags]", "[conditions]\noil_temperature = \"/tf\"\n[tags]", &["conditions", "twice"]),
+            ("[tags]", "[conditions]\nwater = \"/w\"\n[tags]", &["water", "oil_temperature", "pressure"]),
+            ("[tags]", "[tags]\nimage_period_s = -1.0", &["tags.image_period_s", "3600"]),
             ("version = 1", "version = 2", &["version", "1 .. 1"]),
             ("version = 1", "version = 1\nmax_gap_s = -1.0", &["max_gap_s", "60"]),
             ("version = 1", "version = 1\nmax_gap_s = nan", &["max_gap_s", "NaN"]),
@@ -294,7 +442,8 @@ mod tests {
         let text = "version = 1\nmax_gap_s = 0.1\nwhile_moving = \"use\"\nnot_finite = \"leave_out\"\n\
             [joint_sensors]\ntopic = \"/a\"\nnames = { elbow = \"j3\" }\n[tags]\ntopic = \"/b\"\nuse = \"corners\"\n";
         let map = parse(text).expect("good");
-        assert_eq!((map.camera_frame, map.child_frame, map.max_gap_s), (None, None, 0.1));
+        let Source::Topics(topics) = &map.source else { panic!("topics") };
+        assert_eq!((&topics.camera_frame, &map.child_frame, map.max_gap_s), (&None, &None, 0.1));
         assert_eq!((map.while_moving, map.not_finite), (WhileMoving::Use, NotFinite::LeaveOut));
         assert_eq!(map.joint_names["elbow"], "j3");
     }

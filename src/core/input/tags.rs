@@ -1,11 +1,13 @@
-//! Detections from transforms (`tf2_msgs/msg/TFMessage`) or corners (`apriltag_msgs/msg/AprilTagDetectionArray`).
+//! Detections from transforms (`tf2_msgs/msg/TFMessage`), corners (`apriltag_msgs/msg/AprilTagDetectionArray`) or
+//! images.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 
 use super::error::{BadPlace, InputError};
-use super::map::{InputMap, NotFinite, TagUse, without_slash};
+use super::images::{ImageDetector, ImageProblem, RecordedImage};
+use super::map::{InputMap, NotFinite, TagUse, Topics, without_slash};
 use super::stamp::stamp_or_log_time;
 use crate::log::ros::{AprilTagDetectionArray, TfMessage, TransformStamped};
 use crate::log::{RawMessage, StampOrder, decode};
@@ -43,16 +45,27 @@ pub struct TagFrame {
 }
 
 /// How far a quaternion's length may be from 1.
-const QUATERNION_LENGTH_TOLERANCE: f64 = 0.01;
+pub(super) const QUATERNION_LENGTH_TOLERANCE: f64 = 0.01;
 /// A landmark in the lens itself is a transform that nobody filled in, m.
-const MIN_DISTANCE_M: f64 = 1e-6;
+pub(super) const MIN_DISTANCE_M: f64 = 1e-6;
 /// Names of frames that an error lists.
 const MAX_LISTED: usize = 20;
+
+/// What an image's tags need.
+pub(super) struct ImageSettings<'a> {
+    /// `None` where nobody looks at images.
+    pub detector: Option<&'a mut dyn ImageDetector>,
+    /// Least time between two that are looked at.
+    pub period_s: f64,
+}
 
 /// Reads the messages of one topic.
 pub(super) struct TagReader<'a> {
     file: &'a str,
     map: &'a InputMap,
+    camera_frame: Option<&'a str>,
+    images: ImageSettings<'a>,
+    last_image: Option<Stamp>,
     frames: BTreeMap<Stamp, TagFrame>,
     pub order: StampOrder,
     pub left_out: BTreeMap<String, u64>,
@@ -62,10 +75,18 @@ pub(super) struct TagReader<'a> {
 }
 
 impl<'a> TagReader<'a> {
-    pub fn new(file: &'a str, map: &'a InputMap) -> Self {
+    pub fn new(
+        file: &'a str,
+        map: &'a InputMap,
+        topics: &'a Topics,
+        detector: Option<&'a mut dyn ImageDetector>,
+    ) -> Self {
         Self {
             file,
             map,
+            camera_frame: topics.camera_frame.as_deref(),
+            images: ImageSettings { detector, period_s: topics.image_period_s },
+            last_image: None,
             frames: BTreeMap::new(),
             order: StampOrder::default(),
             left_out: BTreeMap::new(),
@@ -76,13 +97,16 @@ impl<'a> TagReader<'a> {
 
     pub fn take(&mut self, raw: &RawMessage<'_>, digest: [u8; 32]) -> Result<(), InputError> {
         self.messages += 1;
-        let place = BadPlace { topic: raw.topic().to_owned(), message: self.messages };
+        let place = BadPlace::Message { topic: raw.topic().to_owned(), message: self.messages };
         let undecodable = |error| InputError::Undecodable { file: self.file.to_owned(), place: place.clone(), error };
         if raw.schema_name().ends_with("/TFMessage") {
             let message: TfMessage = decode(raw.data).map_err(undecodable)?;
             for transform in &message.transforms {
                 self.transform(transform, raw.log_time(), &place, digest)?;
             }
+        } else if raw.schema_name().ends_with("Image") {
+            let image = RecordedImage::of(raw).map_err(undecodable)?;
+            self.image(&image, raw.log_time(), &place, digest)?;
         } else {
             let message: AprilTagDetectionArray = decode(raw.data).map_err(undecodable)?;
             self.detections(&message, raw.log_time(), &place, digest)?;
@@ -98,7 +122,7 @@ impl<'a> TagReader<'a> {
         digest: [u8; 32],
     ) -> Result<(), InputError> {
         let (parent, child) = (without_slash(&transform.header.frame_id), without_slash(&transform.child_frame_id));
-        let camera = self.map.camera_frame.as_deref();
+        let camera = self.camera_frame;
         let id_of = |frame: &str| self.map.child_frame.as_ref()?.id_of(frame);
         let (id, of, is_inverse) = match (id_of(child), id_of(parent)) {
             (Some(id), _) if Some(parent) == camera => (id, child, false),
@@ -109,7 +133,7 @@ impl<'a> TagReader<'a> {
             }
         };
         let stamp = stamp_or_log_time(transform.header.stamp, log_time);
-        self.order.add_of(place.message, stamp);
+        self.order.add_of(self.messages, stamp);
         let position: [f64; 3] = transform.transform.translation.into();
         let [w, x, y, z] = transform.transform.rotation.wxyz();
         if let Some(value) = position.into_iter().find(|value| !value.is_finite()) {
@@ -149,12 +173,12 @@ impl<'a> TagReader<'a> {
         digest: [u8; 32],
     ) -> Result<(), InputError> {
         let frame = without_slash(&message.header.frame_id);
-        if self.map.camera_frame.as_deref().is_some_and(|camera| !frame.is_empty() && frame != camera) {
+        if self.camera_frame.is_some_and(|camera| !frame.is_empty() && frame != camera) {
             self.others.insert(frame.to_owned());
             return Ok(());
         }
         let stamp = stamp_or_log_time(message.header.stamp, log_time);
-        self.order.add_of(place.message, stamp);
+        self.order.add_of(self.messages, stamp);
         for tag in &message.detections {
             let Ok(id) = u32::try_from(tag.id) else {
                 self.count("detections with a negative id");
@@ -166,6 +190,43 @@ impl<'a> TagReader<'a> {
                 continue;
             }
             self.add(stamp, digest, Some(id), RawMeasurement::Corners(corners_px));
+        }
+        Ok(())
+    }
+
+    fn image(
+        &mut self,
+        image: &RecordedImage,
+        log_time: Stamp,
+        place: &BadPlace,
+        digest: [u8; 32],
+    ) -> Result<(), InputError> {
+        let header = match image {
+            RecordedImage::Raw(image) => &image.header,
+            RecordedImage::Compressed(image) => &image.header,
+        };
+        let frame = without_slash(&header.frame_id);
+        if self.camera_frame.is_some_and(|camera| !frame.is_empty() && frame != camera) {
+            self.others.insert(frame.to_owned());
+            return Ok(());
+        }
+        let stamp = stamp_or_log_time(header.stamp, log_time);
+        self.order.add_of(self.messages, stamp);
+        if self.last_image.is_some_and(|last| stamp.since_s(last).abs() < self.images.period_s) {
+            return Ok(());
+        }
+        self.last_image = Some(stamp);
+        let problem =
+            |problem: String| Err(InputError::Row { file: self.file.to_owned(), place: place.clone(), problem });
+        let Some(detector) = &mut self.images.detector else {
+            return problem("is an image; this armcal is built without its detector (feature `sim`)".to_owned());
+        };
+        match detector.detect(image) {
+            Ok(tags) => tags
+                .into_iter()
+                .for_each(|(id, corners)| self.add(stamp, digest, Some(id), RawMeasurement::Corners(corners))),
+            Err(ImageProblem::Damaged) => self.count("images that cannot be decoded"),
+            Err(ImageProblem::Unusable(why)) => return problem(why),
         }
         Ok(())
     }
@@ -233,10 +294,13 @@ impl<'a> TagReader<'a> {
             (false, _) => format!(
                 "the input map wants `{}` seen from `{}`; in its {} messages are {others:?}",
                 self.map.child_frame.as_ref().map_or_else(|| "any tag".to_owned(), super::map::ChildFrame::text),
-                self.map.camera_frame.as_deref().unwrap_or("any camera"),
+                self.camera_frame.unwrap_or("any camera"),
                 self.messages
             ),
             (true, false) => left_out.join(", "),
+            (true, true) if self.last_image.is_some() => {
+                format!("no tag of family 36h11 was found in its {} images", self.messages)
+            }
             (true, true) => format!("its {} messages are empty", self.messages),
         }
     }

@@ -58,7 +58,7 @@ pub struct Robot {
     pub camera: CameraSpec,
     /// Tags by survey, with those whose pose is unknown; without the tag on the gripper.
     pub tags: Vec<SurveyedTag>,
-    /// The frame that the tags' poses are in: the base's, or, before a camera that stands still, one that the arm moves.
+    /// The frame that the tags' poses are in: the base's, or one that the arm moves before a camera that stands still.
     pub tag_frame: Attachment,
     /// Every link of the URDF that the arm carries, by name.
     pub links: BTreeMap<String, Attachment>,

@@ -157,7 +157,7 @@ impl Seen {
             }
             "CameraInfo" | "CameraCalibration" => "a camera's lens".to_owned(),
             "Image" | "CompressedImage" | "RawImage" | "CompressedVideo" => {
-                "images; armcal takes detections of tags, so a detector must look at them first".to_owned()
+                "images; `calibrate --input` looks for tags in png, jpeg and 8-bit ones".to_owned()
             }
             _ => return None,
         })

@@ -5,6 +5,7 @@
 //! line between the nearest before and after it. All is found by the messages' own stamps.
 
 use crate::calib::views::message_index::MessageIndex;
+use armcal_core::input::{ConditionKind, ConditionReading};
 use armcal_core::log::Recording;
 use armcal_core::robot::JointSensorSpec;
 use armcal_core::sensor::{ArmSensors, Conditions, wrap_symmetric};
@@ -70,10 +71,29 @@ impl ConditionHistory {
         }
         for samples in [&mut found.oil_c, &mut found.pressure_pa] {
             samples.retain(|sample| sample.value.is_finite() && sample.stamp <= until);
-            // By value where stamps are the same: the order of messages in the file does not matter.
+        }
+        found.sorted()
+    }
+
+    /// All readings of a recording of a real arm; `idx` is their place among them.
+    pub(crate) fn of_external(readings: &[ConditionReading]) -> Self {
+        let mut found = Self::default();
+        for (idx, reading) in readings.iter().enumerate() {
+            let samples = match reading.kind {
+                ConditionKind::OilTemperature => &mut found.oil_c,
+                ConditionKind::Pressure => &mut found.pressure_pa,
+            };
+            samples.push(Sample { stamp: reading.stamp, value: reading.value, idx });
+        }
+        found.sorted()
+    }
+
+    /// By value where stamps are the same: the order of messages in the file does not matter.
+    fn sorted(mut self) -> Self {
+        for samples in [&mut self.oil_c, &mut self.pressure_pa] {
             samples.sort_by(|a, b| a.stamp.cmp(&b.stamp).then(a.value.total_cmp(&b.value)));
         }
-        found
+        self
     }
 
     /// The conditions over the span `start ..= end`, at its middle.

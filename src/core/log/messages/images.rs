@@ -1,4 +1,4 @@
-//! Camera images as JPEG.
+//! Camera images, as JPEG in our recordings.
 
 use serde::{Deserialize, Serialize};
 
@@ -23,6 +23,33 @@ message!(
     CompressedImage,
     "sensor_msgs/msg/CompressedImage",
     "std_msgs/Header header\nstring format\nuint8[] data\n",
+    header!(),
+);
+
+/// sensor_msgs/msg/Image; armcal writes none.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Image {
+    /// Stamp of the exposure, and the frame of the camera.
+    pub header: Header,
+    /// Rows.
+    pub height: u32,
+    /// Columns.
+    pub width: u32,
+    /// Such as `mono8`, `bgr8` or `bayer_rggb8`.
+    pub encoding: String,
+    /// 0: little endian.
+    pub is_bigendian: u8,
+    /// Bytes from one row to the next.
+    pub step: u32,
+    /// `step * height` bytes.
+    pub data: Vec<u8>,
+}
+
+message!(
+    Image,
+    "sensor_msgs/msg/Image",
+    "std_msgs/Header header\nuint32 height\nuint32 width\nstring encoding\nuint8 is_bigendian\nuint32 step\n",
+    "uint8[] data\n",
     header!(),
 );
 

@@ -22,7 +22,7 @@ mod viewers;
 pub use attitude::Imu;
 pub use basic::{Header, PixelPoint, Point, Pose, Quaternion, Time, Transform, Vector3};
 pub use detections::{AprilTagDetection, AprilTagDetectionArray};
-pub use images::CompressedImage;
+pub use images::{CompressedImage, Image};
 pub use joints::JointState;
 pub use log_line::Log;
 pub use marks::Mark;

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use crate::calib::views::conditions::ConditionHistory;
 use crate::calib::views::external::landmarks::{Averaged, average};
 use crate::calib::views::external::pairing::{RATE_WINDOW_S, TravelSample, TravelSeries};
 use crate::calib::views::view::{ObservationRejection, TagObservation, View};
@@ -37,6 +38,8 @@ struct Maker<'a> {
     robot: &'a Robot,
     plain_landmark: Option<u32>,
     travels: TravelSeries<'a>,
+    recording: &'a ExternalRecording,
+    conditions: ConditionHistory,
     /// One sigma of a reading, rad, of the joints that move the camera.
     noise_rad: Vec<f64>,
     out: RecordingViews,
@@ -49,6 +52,8 @@ impl RecordingViews {
             robot,
             plain_landmark,
             travels: TravelSeries::new(recording, robot, map.max_gap_s),
+            recording,
+            conditions: ConditionHistory::of_external(&recording.conditions),
             noise_rad: moving.iter().map(|spec| spec.noise_std_counts / spec.counts_per_rad.abs()).collect(),
             out: Self { views: Vec::new(), digests: Vec::new(), ids_seen: Vec::new(), rejected: BTreeMap::new() },
         };
@@ -115,6 +120,8 @@ impl Maker<'_> {
         let (travel_rad, n_readings) = self.mean_travel(&frames);
         let mut view = View::of_reading(0, last.frame.stamp, travel_rad);
         view.n_readings = n_readings;
+        let mut heard = Vec::new();
+        view.conditions = self.conditions.over_noting(first.frame.stamp, last.frame.stamp, &mut heard);
         view.conditions.stamp = Some(last.frame.stamp);
         let rates: Vec<JointAngles> = frames.iter().filter_map(|frame| frame.paired.rate_rad_s).collect();
         if !rates.is_empty() {
@@ -130,6 +137,7 @@ impl Maker<'_> {
             self.out.digests.extend(&frame.frame.digests);
             self.out.digests.extend(self.travels.readings[from..=to].iter().map(|reading| reading.digest));
         }
+        self.out.digests.extend(heard.into_iter().map(|idx| self.recording.conditions[idx].digest));
         let (from, to) = (first.paired.readings.0, last.paired.readings.1);
         self.out.digests.extend(self.travels.readings[from..=to].iter().map(|reading| reading.digest));
         self.out.views.push((view, first.frame.digests[0]));

@@ -1,0 +1,288 @@
+//! The part of an input map that describes a table: which columns of a CSV or YAML file are what.
+
+use std::path::Path;
+
+use serde::Deserialize;
+
+use super::{ChildFrame, TagUse};
+use crate::robot::FileIssue;
+
+/// Form of a table's file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum TableFormat {
+    /// A line of names, then one line per pose; separated by comma, semicolon or tab.
+    Csv,
+    /// A list or a map with one entry per pose; columns are paths such as `pose.x` or `joints.0`.
+    Yaml,
+}
+
+/// How a rotation is written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum RotationForm {
+    /// Hamilton, the real part first.
+    QuaternionWxyz,
+    /// Hamilton, the real part last.
+    QuaternionXyzw,
+    /// Nine numbers, row by row.
+    Matrix,
+    /// Axis times angle.
+    RotationVector,
+    /// Angles about the fixed axes x, y, z in that order: Rz Ry Rx.
+    FixedXyz,
+}
+
+impl RotationForm {
+    fn n_columns(self) -> usize {
+        match self {
+            Self::QuaternionWxyz | Self::QuaternionXyzw => 4,
+            Self::Matrix => 9,
+            Self::RotationVector | Self::FixedXyz => 3,
+        }
+    }
+
+    /// As the input map writes it.
+    fn name(self) -> &'static str {
+        match self {
+            Self::QuaternionWxyz => "quaternion_wxyz",
+            Self::QuaternionXyzw => "quaternion_xyzw",
+            Self::Matrix => "matrix",
+            Self::RotationVector => "rotation_vector",
+            Self::FixedXyz => "fixed_xyz",
+        }
+    }
+
+    fn is_of_angles(self) -> bool {
+        matches!(self, Self::RotationVector | Self::FixedXyz)
+    }
+}
+
+/// Which of the two poses a row holds; `a_from_b` maps coordinates in b to coordinates in a.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Direction {
+    /// The tag's (board's) pose in the camera's frame.
+    CameraFromTag,
+    /// The camera's pose in the frame of the tag (board).
+    TagFromCamera,
+}
+
+/// Where a row's rotation is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RotationColumns {
+    /// As many as the form needs.
+    pub columns: Vec<String>,
+    /// Form of the numbers.
+    pub form: RotationForm,
+    /// Radians of one unit of the columns; 1 for quaternions and matrices.
+    pub unit_rad: f64,
+}
+
+/// Where a row's time is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TimeColumn {
+    /// Name of the column.
+    pub column: String,
+    /// Nanoseconds of one unit of the column.
+    pub unit_nanos: f64,
+}
+
+/// Columns of a CSV or YAML file in which each row is a pose at rest.
+///
+/// ```toml
+/// version = 1
+/// [table]
+/// format = "csv"                           # optional: "csv" or "yaml"; absent: by the end of the file's name
+/// rows = "poses"                           # optional, YAML alone: where the rows are, keys joined by dots
+/// time = { column = "t", unit = "s" }      # optional: "s" | "ms" | "us" | "ns"; absent: rows are 1 s apart
+/// [joint_sensors]
+/// names = { elbow = "q3" }                 # columns that are not called as the robot's joint
+/// unit = "rad"                             # optional: "counts" | "rad" | "deg"
+/// [tags]
+/// child_frame = "board"                    # the landmark; absent where a column has the tags' numbers
+/// use = "pose"                             # "position" | "pose"
+/// [tags.columns]
+/// direction = "tag_from_camera"            # or "camera_from_tag"
+/// position = ["x", "y", "z"]
+/// position_unit = "m"                      # optional: "m" | "mm"
+/// rotation = ["rx", "ry", "rz"]
+/// rotation_form = "fixed_xyz"              # or "quaternion_wxyz", "quaternion_xyzw", "matrix", "rotation_vector"
+/// rotation_unit = "rad"                    # optional: "rad" | "deg"
+/// id = "tag"                               # optional: column of the tag's number
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct TableLayout {
+    /// `None`: by the end of the file's name.
+    pub format: Option<TableFormat>,
+    /// Keys that lead to the rows in YAML; empty for the whole file.
+    pub rows: Vec<String>,
+    /// `None`: rows are a second apart.
+    pub time: Option<TimeColumn>,
+    /// Which pose the columns hold.
+    pub direction: Direction,
+    /// Columns of x, y, z.
+    pub position: [String; 3],
+    /// Metres of one unit of the position.
+    pub position_unit_m: f64,
+    /// `None` where positions are used and none is needed.
+    pub rotation: Option<RotationColumns>,
+    /// Column of the tag's number.
+    pub id: Option<String>,
+}
+
+#[derive(Clone, Copy, Debug, Default, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum TimeUnit {
+    #[default]
+    S,
+    Ms,
+    Us,
+    Ns,
+}
+
+#[derive(Clone, Copy, Debug, Default, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum LengthUnit {
+    #[default]
+    M,
+    Mm,
+}
+
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq)]
+#[serde(rename_all = "snake_case")]
+enum AngleUnit {
+    Rad,
+    Deg,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct TimeToml {
+    column: String,
+    #[serde(default)]
+    unit: TimeUnit,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct TableToml {
+    format: Option<TableFormat>,
+    rows: Option<String>,
+    time: Option<TimeToml>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct TagColumnsToml {
+    direction: Direction,
+    position: [String; 3],
+    #[serde(default)]
+    position_unit: LengthUnit,
+    rotation: Option<Vec<String>>,
+    rotation_form: Option<RotationForm>,
+    rotation_unit: Option<AngleUnit>,
+    id: Option<String>,
+}
+
+/// The layout by `[table]` and `[tags.columns]`.
+pub(super) fn layout(
+    file: &Path,
+    table: TableToml,
+    columns: Option<TagColumnsToml>,
+    tags: (TagUse, Option<&ChildFrame>),
+) -> Result<TableLayout, FileIssue> {
+    let issue = |key: &str, problem: &str| FileIssue::new(file, key, problem);
+    let Some(columns) = columns else {
+        return Err(issue("tags.columns", "is missing; a [table] needs it: direction, position, rotation"));
+    };
+    let (tag_use, child_frame) = tags;
+    if tag_use == TagUse::Corners {
+        return Err(issue("tags.use", "is \"corners\"; a table has \"position\" or \"pose\""));
+    }
+    if columns.id.is_some() != child_frame.is_none() || matches!(child_frame, Some(ChildFrame::Numbered { .. })) {
+        let problem = "a table has either child_frame, the plain name of its one landmark, or tags.columns.id";
+        return Err(issue("tags.child_frame", problem));
+    }
+    let rotation = rotation(file, &columns)?;
+    if rotation.is_none() && (tag_use == TagUse::Pose || columns.direction == Direction::TagFromCamera) {
+        let problem = "is missing; only positions with direction = \"camera_from_tag\" can do without";
+        return Err(issue("tags.columns.rotation", problem));
+    }
+    let time = table.time.map(|time| {
+        let unit_nanos = match time.unit {
+            TimeUnit::S => 1e9,
+            TimeUnit::Ms => 1e6,
+            TimeUnit::Us => 1e3,
+            TimeUnit::Ns => 1.0,
+        };
+        TimeColumn { column: time.column, unit_nanos }
+    });
+    Ok(TableLayout {
+        format: table.format,
+        rows: table.rows.map(|rows| rows.split('.').map(str::to_owned).collect()).unwrap_or_default(),
+        time,
+        direction: columns.direction,
+        position: columns.position,
+        position_unit_m: if matches!(columns.position_unit, LengthUnit::Mm) { 1e-3 } else { 1.0 },
+        rotation,
+        id: columns.id,
+    })
+}
+
+fn rotation(file: &Path, raw: &TagColumnsToml) -> Result<Option<RotationColumns>, FileIssue> {
+    let issue = |key: &str, problem: String| Err(FileIssue::new(file, format!("tags.columns.{key}"), problem));
+    let (columns, form) = match (&raw.rotation, raw.rotation_form) {
+        (Some(columns), Some(form)) => (columns, form),
+        (None, None) => return Ok(None),
+        (Some(_), None) => return issue("rotation_form", "is missing; say what the rotation's columns are".to_owned()),
+        (None, Some(_)) => return issue("rotation", "is missing; name the columns of `rotation_form`".to_owned()),
+    };
+    if columns.len() != form.n_columns() {
+        return issue("rotation", format!("has {} columns; {} needs {}", columns.len(), form.name(), form.n_columns()));
+    }
+    if raw.rotation_unit.is_some() && !form.is_of_angles() {
+        return issue("rotation_unit", "is for angles; quaternions and matrices have no unit".to_owned());
+    }
+    let unit_rad = if raw.rotation_unit == Some(AngleUnit::Deg) { 1_f64.to_radians() } else { 1.0 };
+    Ok(Some(RotationColumns { columns: columns.clone(), form, unit_rad }))
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::input::map::{Source, parse_input_map};
+    use std::path::Path;
+
+    const GOOD: &str = "version = 1\n[table]\n[joint_sensors]\n[tags]\nchild_frame = \"board\"\nuse = \"pose\"\n\
+        [tags.columns]\ndirection = \"tag_from_camera\"\nposition = [\"x\", \"y\", \"z\"]\n\
+        rotation = [\"a\", \"b\", \"c\"]\nrotation_form = \"fixed_xyz\"\nrotation_unit = \"deg\"\n";
+
+    #[test]
+    fn what_is_wrong_with_a_table_is_named_with_file_and_key() {
+        let parse = |text: &str| parse_input_map(Path::new("map.toml"), text).map_err(|error| error.to_string());
+        let Source::Table(layout) = parse(GOOD).expect("good").source else { panic!("a table") };
+        assert_eq!((layout.rotation.expect("angles").unit_rad, layout.position_unit_m), (1_f64.to_radians(), 1.0));
+        let faults: [(&str, &str, &[&str]); 11] = [
+            ("[table]\n", "[table]\nformat = \"xls\"\n", &["xls", "csv", "yaml"]),
+            ("[table]\n", "[table]\ntime = { column = \"t\", unit = \"h\" }\n", &["`h`", "ns"]),
+            ("[table]\n", "", &["joint_sensors.topic", "[table]"]),
+            ("[joint_sensors]\n", "[joint_sensors]\ntopic = \"/j\"\n", &["joint_sensors.topic", "columns"]),
+            ("[joint_sensors]\n", "[joint_sensors]\nunit = \"gon\"\n", &["gon", "counts", "deg"]),
+            ("\"pose\"", "\"corners\"", &["tags.use", "position"]),
+            ("\"c\"]", "\"c\", \"d\"]", &["tags.columns.rotation", "4", "3"]),
+            ("rotation_form = \"fixed_xyz\"\n", "", &["tags.columns.rotation_form", "missing"]),
+            ("fixed_xyz", "rotation_matrix", &["rotation_matrix", "quaternion_wxyz", "matrix"]),
+            ("rotation = [\"a\", \"b\", \"c\"]\n", "", &["tags.columns.rotation", "missing"]),
+            ("child_frame = \"board\"\n", "", &["tags.child_frame", "tags.columns.id"]),
+        ];
+        for (from, to, words) in faults {
+            assert!(GOOD.contains(from), "{from}");
+            let problem = parse(&GOOD.replacen(from, to, 1)).expect_err(to);
+            for word in words.iter().chain(&["map.toml"]) {
+                assert!(problem.contains(word), "{to}: no `{word}` in {problem}");
+            }
+        }
+        let quaternion = GOOD.replace("\"c\"]", "\"c\", \"d\"]").replace("fixed_xyz", "quaternion_xyzw");
+        assert!(parse(&quaternion).expect_err("a unit").contains("rotation_unit"));
+    }
+}

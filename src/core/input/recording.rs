@@ -1,0 +1,32 @@
+//! What the readers of external recordings hand on.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use super::conditions::ConditionReading;
+use super::joints::Reading;
+use super::tags::TagFrame;
+use crate::log::{ChunkOrder, Completeness};
+
+/// Joint readings and detections of a recording of a real arm.
+#[derive(Clone, Debug, Default)]
+pub struct ExternalRecording {
+    /// The recording's file, as given.
+    pub path: PathBuf,
+    /// In the order of their stamps.
+    pub readings: Vec<Reading>,
+    /// In the order of their stamps; each has a tag.
+    pub frames: Vec<TagFrame>,
+    /// Readings of slow sensors, in the order of the file.
+    pub conditions: Vec<ConditionReading>,
+    /// Joints of the robot that no reading has, by index; none of them moves the camera.
+    pub absent_joints: Vec<usize>,
+    /// Recorded joints that the robot lacks.
+    pub extra_joints: Vec<String>,
+    /// Number of unused messages by reason.
+    pub left_out: BTreeMap<String, u64>,
+    /// Whether the file could be read to its end.
+    pub completeness: Completeness,
+    /// What was put right in the order of the file's chunks.
+    pub chunk_order: ChunkOrder,
+}

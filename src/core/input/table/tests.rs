@@ -1,0 +1,209 @@
+use std::path::{Path, PathBuf};
+
+use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
+
+use crate::input::{ExternalRecording, InputError, RawMeasurement, parse_input_map, read_external};
+use crate::robot::Robot;
+
+const JOINTS: &str = "shoulder_yaw,shoulder_pitch,forearm_pitch,wrist_pitch,wrist_yaw,wrist_rotate";
+const MAP: &str = "version = 1\n[table]\n[joint_sensors]\n[tags]\nchild_frame = \"board\"\nuse = \"pose\"\n\
+    [tags.columns]\ndirection = \"camera_from_tag\"\nposition = [\"x\", \"y\", \"z\"]\n";
+/// Angles about the fixed axes x, y and z, rad.
+const ANGLES: [f64; 3] = [0.4, -1.1, 2.3];
+const POSITION_M: [f64; 3] = [0.1, -0.2, 0.9];
+
+fn titan() -> Robot {
+    crate::robot::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../robots/titan4")).expect("it reads")
+}
+
+/// What the map makes of a file of that name and content.
+fn read_with(map: &str, name: &str, text: &str) -> Result<ExternalRecording, InputError> {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file: PathBuf = folder.path().join(name);
+    std::fs::write(&file, text).expect("written");
+    read_external(&file, &parse_input_map(Path::new("map.toml"), map).expect("a map"), &titan())
+}
+
+fn problem(map: &str, name: &str, text: &str) -> String {
+    read_with(map, name, text).expect_err("refused").to_string()
+}
+
+/// Rz Ry Rx, multiplied out by hand.
+fn rotation() -> Matrix3<f64> {
+    let [(sx, cx), (sy, cy), (sz, cz)] = ANGLES.map(f64::sin_cos);
+    let rx = Matrix3::new(1.0, 0.0, 0.0, 0.0, cx, -sx, 0.0, sx, cx);
+    let ry = Matrix3::new(cy, 0.0, sy, 0.0, 1.0, 0.0, -sy, 0.0, cy);
+    let rz = Matrix3::new(cz, -sz, 0.0, sz, cz, 0.0, 0.0, 0.0, 1.0);
+    rz * ry * rx
+}
+
+fn pose() -> Isometry3<f64> {
+    let turn = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rotation()));
+    Isometry3::from_parts(Translation3::from(Vector3::from(POSITION_M)), turn)
+}
+
+fn names(n: usize) -> Vec<String> {
+    (0..n).map(|k| format!("r{k}")).collect()
+}
+
+#[test]
+fn every_form_of_a_pose_means_the_same() {
+    let q = pose().rotation;
+    let axis_angle = q.scaled_axis();
+    let degrees = ANGLES.map(f64::to_degrees);
+    let forms: [(&str, Vec<f64>); 6] = [
+        ("quaternion_wxyz", vec![q.w, q.i, q.j, q.k]),
+        ("quaternion_xyzw", vec![-q.i, -q.j, -q.k, -q.w]),
+        ("matrix", rotation().transpose().iter().copied().collect()),
+        ("rotation_vector", axis_angle.iter().copied().collect()),
+        ("fixed_xyz", ANGLES.to_vec()),
+        ("fixed_xyz\"\nrotation_unit = \"deg", degrees.to_vec()),
+    ];
+    for (form, values) in forms {
+        let columns = names(values.len());
+        let map = format!("{MAP}rotation = {columns:?}\nrotation_form = \"{form}\"\n");
+        let cells: Vec<String> = POSITION_M.iter().chain(&values).map(f64::to_string).collect();
+        let text = format!("{JOINTS},x,y,z,{}\n1,2,3,4,5,6,{}\n", columns.join(","), cells.join(","));
+        let found = read_with(&map, "poses.csv", &text).expect(form);
+        let RawMeasurement::Pose(read) = found.frames[0].tags[0].seen else { panic!("a pose") };
+        assert!((read.translation.vector - pose().translation.vector).norm() < 1e-12, "{form}");
+        assert!(read.rotation.angle_to(&q) < 1e-9, "{form}: {read}");
+        assert_eq!(&found.readings[0].counts[..], [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
+    }
+}
+
+#[test]
+fn the_camera_in_the_boards_frame_is_turned_round() {
+    let other = pose().inverse();
+    let at_mm = other.translation.vector * 1e3;
+    let (roll, pitch, yaw) = other.rotation.euler_angles();
+    let map = format!("{MAP}rotation = [\"a\", \"b\", \"c\"]\nrotation_form = \"fixed_xyz\"\nposition_unit = \"mm\"\n");
+    let map = map.replace("camera_from_tag", "tag_from_camera");
+    let text = format!(
+        "# from a rig\n{JOINTS},a,b,c,x,y,z\n1,2,3,4,5,6,{roll},{pitch},{yaw},{},{},{}\n",
+        at_mm.x, at_mm.y, at_mm.z
+    );
+    for (text, name) in [(text.clone(), "a.csv"), (text.replace(',', ";"), "a.txt"), (text.replace(',', "\t"), "a.tsv")]
+    {
+        let position = read_with(&map.replace("\"pose\"", "\"position\""), name, &text).expect("it reads");
+        let RawMeasurement::Position(read) = position.frames[0].tags[0].seen else { panic!("a position") };
+        assert!((read - Vector3::from(POSITION_M)).norm() < 1e-12, "{name}: {read}");
+    }
+}
+
+#[test]
+fn joints_of_the_datasheets_angles_become_counts() {
+    let robot = titan();
+    let map = format!("{MAP}rotation = [\"a\", \"b\", \"c\"]\nrotation_form = \"fixed_xyz\"\n");
+    let text = format!("{JOINTS},a,b,c,x,y,z\n-30,20,10,-20,15,5,0,0,0,0,0,1\n");
+    let (deg, rad) =
+        (map.replace("[tags]\n", "unit = \"deg\"\n[tags]\n"), map.replace("[tags]\n", "unit = \"rad\"\n[tags]\n"));
+    let found = read_with(&deg, "a.csv", &text).expect("it reads");
+    let sensors = crate::sensor::ArmSensors::nominal(&robot);
+    for (joint, degrees) in [-30.0_f64, 20.0, 10.0, -20.0, 15.0, 5.0].into_iter().enumerate() {
+        let angle = sensors.models[joint].angle_rad(found.readings[0].counts[joint]);
+        assert!((angle - degrees.to_radians()).abs() < 1e-9, "{joint}: {angle}");
+    }
+    let in_rad = read_with(&rad, "a.csv", &text.replace("-30,20,10,-20,15,5", "-0.5,0,0,0,0,0")).expect("it reads");
+    assert!((sensors.models[0].angle_rad(in_rad.readings[0].counts[0]) + 0.5).abs() < 1e-9);
+}
+
+/// As eye-to-hand rigs write it: an entry for each time, joints in a list, the pose in a map.
+#[test]
+fn yaml_entries_are_rows_in_a_list_or_a_map() {
+    let map = format!(
+        "{MAP}rotation = [\"pose.qw\", \"pose.qx\", \"pose.qy\", \"pose.qz\"]\nrotation_form = \"quaternion_wxyz\"\n"
+    );
+    let map = map.replace("\"x\", \"y\", \"z\"", "\"pose.x\", \"pose.y\", \"pose.z\"");
+    let named: Vec<String> = JOINTS.split(',').zip(0..).map(|(joint, k)| format!("{joint} = \"joints.{k}\"")).collect();
+    let map = map.replace("[tags]\n", &format!("names = {{ {} }}\n[tags]\n", named.join(", ")));
+    let q = pose().rotation;
+    let [x, y, z] = POSITION_M;
+    let entry = |k: usize| {
+        format!(
+            "joints: [{k}, 2, 3, 4, 5.5, 6e0], other: [], pose: {{ qw: {}, qx: {}, qy: {}, qz: {}, x: {x}, y: {y}, \
+             z: {z} }}",
+            q.w, q.i, q.j, q.k
+        )
+    };
+    let list = format!("- {{ {} }}\n- {{ {} }}\n", entry(1), entry(2));
+    let entries = format!("'1593701755': {{ {} }}\n'1593701808': {{ {} }}\n", entry(1), entry(2));
+    let below = format!("rig: one\nviews:\n  poses:\n    {}", entries.replace("\n'", "\n    '"));
+    let deeper = map.replace("[table]\n", "[table]\nrows = \"views.poses\"\n");
+    for (map, text) in [(&map, &list), (&map, &entries), (&deeper, &below)] {
+        let found = read_with(map, "poses.yaml", text).expect(text);
+        assert_eq!(found.readings.len(), 2);
+        assert_eq!(&found.readings[1].counts[..], [2.0, 2.0, 3.0, 4.0, 5.5, 6.0]);
+        let RawMeasurement::Pose(read) = found.frames[1].tags[0].seen else { panic!("a pose") };
+        assert!(read.rotation.angle_to(&q) < 1e-9 && (read.translation.vector.x - x).abs() < 1e-12);
+    }
+    assert!(problem(&deeper, "poses.yaml", &list).contains("views.poses"));
+    assert!(problem(&map, "poses.yaml", &list.replace("qx", "qX")).contains("pose.qx"));
+    assert!(problem(&map, "poses.yaml", &list.replace("6e0", "six")).contains("row 1: `joints.5` is \"six\""));
+    assert!(problem(&map, "poses.yaml", &"[".repeat(100)).contains("YAML"));
+}
+
+#[test]
+fn rows_of_several_tags_are_one_pose() {
+    let map = MAP.replace("child_frame = \"board\"\n", "").replace("\"pose\"", "\"position\"") + "id = \"tag\"\n";
+    let rows = "1,2,3,4,5,6,7,0,0,1,10\n1,2,3,4,5,6,3,0,1,1,10\n1,2,3,4,5,6,7,0,0,1,20\n1,2,3,4,5,7,7,0,0,1,30\n";
+    let text = format!("{JOINTS},tag,x,y,z,t\n{rows}");
+    let timed = map.replace("[table]\n", "[table]\ntime = { column = \"t\", unit = \"ms\" }\n");
+    let timed_text = text.replace(",20\n", ",1020\n").replace(",30\n", ",2030\n");
+    for (map, text, apart_s) in [(&map, &text, [2.0, 1.0]), (&timed, &timed_text, [1.01, 1.01])] {
+        let found = read_with(map, "tags.csv", text).expect("it reads");
+        let ids: Vec<Vec<u32>> =
+            found.frames.iter().map(|frame| frame.tags.iter().filter_map(|tag| tag.id).collect()).collect();
+        assert_eq!(ids, [vec![3, 7], vec![7], vec![7]]);
+        for (k, apart_s) in apart_s.into_iter().enumerate() {
+            let found_s = found.readings[k + 1].stamp.since_s(found.readings[k].stamp);
+            assert!((found_s - apart_s).abs() < 1e-9, "{found_s}");
+        }
+    }
+    let faults: [(&str, &str, &[&str]); 5] = [
+        (",1020\n", ",20\n", &["row 3", "0.01 s", "table.time"]),
+        (",1020\n", ",5\n", &["row 3", "order of time"]),
+        (",1020\n", ",10\n", &["row 3", "tag of the row before"]),
+        (",1020\n", ",-1\n", &["row 3", "1970"]),
+        ("5,6,3,", "5,9,3,", &["row 2", "other joints"]),
+    ];
+    for (from, to, words) in faults {
+        let found = problem(&timed, "tags.csv", &timed_text.replace(from, to));
+        assert!(words.iter().all(|word| found.contains(word)), "{to}: {found}");
+    }
+    assert!(problem(&map, "tags.csv", &text.replace(",7,0,0", ",7.5,0,0")).contains("not a tag's number"));
+}
+
+#[test]
+fn what_is_wrong_with_a_table_is_named() {
+    let map = format!("{MAP}rotation = {:?}\nrotation_form = \"quaternion_wxyz\"\n", names(4));
+    let text = format!("{JOINTS},x,y,z,r0,r1,r2,r3\n1,2,3,4,5,6,0,0,1,1,0,0,0\n1,2,3,4,5,6,0,0,2,1,0,0,0\n");
+    assert_eq!(read_with(&map, "a.csv", &text).expect("good").frames.len(), 2);
+    let faults: [(&str, &str, &[&str]); 8] = [
+        ("shoulder_yaw", "base", &["no column [\"shoulder_yaw\"]", "base", "joint_sensors.names"]),
+        ("r3", "r0", &["r0", "twice"]),
+        ("0,0,2,1", "0,0,2,1.1", &["row 2", "length 1.1"]),
+        ("0,0,2,1", "0,,2,1", &["row 2", "no value", "`y`"]),
+        ("0,0,2,1", "0,nan,2,1", &["row 2", "`y`", "NaN"]),
+        ("0,0,2,1", "0,0,0,1", &["row 2", "into the camera"]),
+        ("0,0,2,1", "0,0,2,1,7", &["is no CSV", "line: 3"]),
+        ("1,2,3,4,5,6,0,0,2,1", "x,2,3,4,5,6,0,0,2,1", &["row 2", "shoulder_yaw", "\"x\""]),
+    ];
+    for (from, to, words) in faults {
+        assert!(text.contains(from), "{from}");
+        let found = problem(&map, "a.csv", &text.replacen(from, to, 1));
+        assert!(words.iter().chain(&["a.csv"]).all(|word| found.contains(word)), "{to}: {found}");
+    }
+    let lenient = map.replace("[table]", "not_finite = \"leave_out\"\n[table]");
+    let found = read_with(&lenient, "a.csv", &text.replace("0,0,2,1", "0,nan,2,1")).expect("one row is left");
+    assert_eq!((found.frames.len(), found.left_out.values().sum::<u64>()), (1, 1));
+    assert!(problem(&map, "a.dat", &text).contains("table.format"));
+    assert!(problem(&map, "a.csv", text.lines().next().expect("a line")).contains("no rows"));
+    // The wrist's rotation moves no camera.
+    let without = text.replace(",wrist_rotate", "").replace(",6,0,0", ",0,0");
+    assert_eq!(read_with(&map, "a.csv", &without).expect("good").absent_joints, [5]);
+    let matrix = map.replace("quaternion_wxyz", "matrix").replace("\"r3\"]", "\"r3\",\"x\",\"y\",\"z\",\"r0\",\"r1\"]");
+    assert!(problem(&matrix, "a.csv", &text).contains("no rotation"));
+    let many = format!("{text}{}", "1,2,3,4,5,6,0,0,1,1,0,0,0\n".repeat(super::rows::MAX_ROWS));
+    assert!(problem(&map, "a.csv", &many).contains("more than 100000 rows"));
+}

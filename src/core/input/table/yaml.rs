@@ -1,0 +1,144 @@
+//! Rows from YAML, of which JSON is a part: a list or a map with one entry per row.
+
+use std::collections::BTreeSet;
+use std::fmt;
+
+use serde::de::{Deserialize, Deserializer, MapAccess, SeqAccess, Visitor};
+
+use super::rows::{Row, Rows, check_count, number};
+use crate::input::error::InputError;
+use crate::input::map::TableLayout;
+
+/// Maps and lists within each other.
+const MAX_DEPTH: usize = 32;
+/// Columns that are listed of one row.
+const MAX_COLUMNS: usize = 1000;
+
+/// A part of the file.
+#[derive(Debug)]
+enum Node {
+    /// Also a number: what it means is asked for later.
+    Scalar(String),
+    List(Vec<Node>),
+    /// In the order of the file.
+    Map(Vec<(String, Node)>),
+}
+
+impl Node {
+    /// The part that `key` leads to: a key of a map, or a place in a list, from 0.
+    fn get(&self, key: &str) -> Option<&Self> {
+        match self {
+            Self::Scalar(_) => None,
+            Self::List(list) => list.get(key.parse::<usize>().ok()?),
+            Self::Map(map) => map.iter().find(|(name, _)| name == key).map(|(_, node)| node),
+        }
+    }
+
+    fn at<'a>(&self, path: impl IntoIterator<Item = &'a str>) -> Option<&Self> {
+        path.into_iter().try_fold(self, |node, key| node.get(key))
+    }
+
+    /// The paths of all scalars.
+    fn columns(&self, before: &str, found: &mut BTreeSet<String>) {
+        if found.len() >= MAX_COLUMNS {
+            return;
+        }
+        let path = |key: &str| if before.is_empty() { key.to_owned() } else { format!("{before}.{key}") };
+        match self {
+            Self::Scalar(_) => drop(found.insert(before.to_owned())),
+            Self::List(list) => {
+                list.iter().enumerate().for_each(|(k, node)| node.columns(&path(&k.to_string()), found))
+            }
+            Self::Map(map) => map.iter().for_each(|(key, node)| node.columns(&path(key), found)),
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for Node {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(NodeVisitor)
+    }
+}
+
+struct NodeVisitor;
+
+impl<'de> Visitor<'de> for NodeVisitor {
+    type Value = Node;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a number, a text, a list or a map")
+    }
+
+    fn visit_bool<E>(self, value: bool) -> Result<Node, E> {
+        Ok(Node::Scalar(value.to_string()))
+    }
+
+    fn visit_i64<E>(self, value: i64) -> Result<Node, E> {
+        Ok(Node::Scalar(value.to_string()))
+    }
+
+    fn visit_u64<E>(self, value: u64) -> Result<Node, E> {
+        Ok(Node::Scalar(value.to_string()))
+    }
+
+    /// The shortest text that reads as the same number.
+    fn visit_f64<E>(self, value: f64) -> Result<Node, E> {
+        Ok(Node::Scalar(value.to_string()))
+    }
+
+    fn visit_str<E>(self, value: &str) -> Result<Node, E> {
+        Ok(Node::Scalar(value.to_owned()))
+    }
+
+    fn visit_unit<E>(self) -> Result<Node, E> {
+        Ok(Node::Scalar(String::new()))
+    }
+
+    fn visit_none<E>(self) -> Result<Node, E> {
+        Ok(Node::Scalar(String::new()))
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut given: A) -> Result<Node, A::Error> {
+        let mut list = Vec::new();
+        while let Some(node) = given.next_element()? {
+            list.push(node);
+        }
+        Ok(Node::List(list))
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut given: A) -> Result<Node, A::Error> {
+        let mut map = Vec::new();
+        while let Some(entry) = given.next_entry()? {
+            map.push(entry);
+        }
+        Ok(Node::Map(map))
+    }
+}
+
+/// Reads the paths `wanted` of each entry.
+pub(super) fn yaml_rows(file: &str, text: &str, layout: &TableLayout, wanted: &[String]) -> Result<Rows, InputError> {
+    let bad = |problem: String| InputError::Table { file: file.to_owned(), problem };
+    let options = serde_saphyr::options! { budget: serde_saphyr::budget! { max_depth: MAX_DEPTH } };
+    let all: Node = serde_saphyr::from_str_with_options(text, options)
+        .map_err(|error| bad(format!("is no YAML of this kind: {error}")))?;
+    let path = layout.rows.join(".");
+    let entries: Vec<&Node> = match all.at(layout.rows.iter().map(String::as_str)) {
+        Some(Node::List(list)) => list.iter().collect(),
+        Some(Node::Map(map)) => map.iter().map(|(_, node)| node).collect(),
+        Some(Node::Scalar(_)) | None => {
+            return Err(bad(format!("there is no list or map of rows at `table.rows` = {path:?} of the input map")));
+        }
+    };
+    check_count(file, entries.len())?;
+    let mut columns = BTreeSet::new();
+    entries.iter().take(1).for_each(|first| first.columns("", &mut columns));
+    let mut rows = Vec::new();
+    for (entry, row) in entries.into_iter().zip(1..) {
+        let value = |column: &String| match entry.at(column.split('.')) {
+            Some(Node::Scalar(cell)) => number(file, row, (column, cell)),
+            _ => Ok(None),
+        };
+        rows.push(Row { number: row, values: wanted.iter().map(value).collect::<Result<_, _>>()? });
+    }
+    Ok(Rows { rows, columns })
+}

@@ -1,0 +1,178 @@
+//! Grey pictures of recorded images.
+
+use std::io::Cursor;
+
+use armcal_core::input::{ImageProblem, RecordedImage};
+use armcal_core::log::ros::{CompressedImage, Image};
+use image::{ImageFormat, ImageReader, Limits};
+
+/// Encodings of `sensor_msgs/msg/Image` that are read.
+const ENCODINGS: &str = "mono8, 8UC1, rgb8, bgr8, rgba8, bgra8 and bayer_*8";
+/// Bytes that decoding one picture may take.
+const MAX_DECODED_BYTES: u64 = 1 << 30;
+
+/// Grey values row by row, as many as the camera's resolution has pixels.
+pub(super) fn grey(image: &RecordedImage, resolution_px: [u32; 2]) -> Result<Vec<u8>, ImageProblem> {
+    match image {
+        RecordedImage::Raw(image) => raw(image, resolution_px),
+        RecordedImage::Compressed(image) => compressed(image, resolution_px),
+    }
+}
+
+fn check_resolution(found: [u32; 2], wanted: [u32; 2]) -> Result<(), ImageProblem> {
+    if found == wanted {
+        return Ok(());
+    }
+    let ([width, height], [lens_width, lens_height]) = (found, wanted);
+    Err(ImageProblem::Unusable(format!(
+        "the image has {width} x {height} pixels, the camera's lens {lens_width} x {lens_height}; give the lens of \
+         these images in robot.toml, or name tags.camera_info"
+    )))
+}
+
+fn raw(image: &Image, resolution_px: [u32; 2]) -> Result<Vec<u8>, ImageProblem> {
+    check_resolution([image.width, image.height], resolution_px)?;
+    let (width, height, step) = (image.width as usize, image.height as usize, image.step as usize);
+    // Weights of the channels in 1/1000, as OpenCV's cvtColor has them.
+    let (n_channels, weights): (usize, &[u32]) = match image.encoding.as_str() {
+        "rgb8" | "8UC3" => (3, &[299, 587, 114]),
+        "bgr8" => (3, &[114, 587, 299]),
+        "rgba8" => (4, &[299, 587, 114]),
+        "bgra8" => (4, &[114, 587, 299]),
+        "mono8" | "8UC1" | "bayer_rggb8" | "bayer_bggr8" | "bayer_gbrg8" | "bayer_grbg8" => (1, &[1000]),
+        other => {
+            return Err(ImageProblem::Unusable(format!("the image is encoded as {other:?}; armcal reads {ENCODINGS}")));
+        }
+    };
+    if step < width * n_channels || step.checked_mul(height).is_none_or(|n| n > image.data.len()) {
+        return Err(ImageProblem::Damaged);
+    }
+    let pixel = |channels: &[u8]| {
+        let sum: u32 = channels.iter().zip(weights).map(|(value, weight)| u32::from(*value) * weight).sum();
+        ((sum + 500) / 1000) as u8
+    };
+    let rows = image.data.chunks_exact(step).take(height);
+    let grey: Vec<u8> = rows.flat_map(|row| row[..width * n_channels].chunks_exact(n_channels).map(pixel)).collect();
+    Ok(if image.encoding.starts_with("bayer") { without_mosaic(&grey, width) } else { grey })
+}
+
+/// A Bayer mosaic as grey: the binomial mean over 3 x 3 pixels has each colour with the same weight at every place, one
+/// red, two green, one blue, and moves no edge. Rows and columns beyond the rim are those before it, mirrored.
+fn without_mosaic(mosaic: &[u8], width: usize) -> Vec<u8> {
+    let height = mosaic.len() / width;
+    let mirrored = |at: isize, n: usize| {
+        let last = n as isize - 1;
+        (if at < 0 {
+            -at
+        } else if at > last {
+            2 * last - at
+        } else {
+            at
+        })
+        .clamp(0, last) as usize
+    };
+    let mean = |x: usize, y: usize| {
+        let mut sum = 8;
+        for (dy, wy) in [(-1, 1), (0, 2), (1, 1)] {
+            let row = mirrored(y as isize + dy, height) * width;
+            for (dx, wx) in [(-1, 1), (0, 2), (1, 1)] {
+                sum += wx * wy * u32::from(mosaic[row + mirrored(x as isize + dx, width)]);
+            }
+        }
+        (sum / 16) as u8
+    };
+    (0..mosaic.len()).map(|k| mean(k % width, k / width)).collect()
+}
+
+/// The bytes say whether it is PNG or JPEG; `format` is written in many ways.
+fn compressed(image: &CompressedImage, resolution_px: [u32; 2]) -> Result<Vec<u8>, ImageProblem> {
+    let format = match image::guess_format(&image.data) {
+        Ok(format @ (ImageFormat::Png | ImageFormat::Jpeg)) => format,
+        Err(_) if image.format.contains("jpeg") || image.format.contains("png") => return Err(ImageProblem::Damaged),
+        _ => {
+            let problem = format!("the image is compressed as {:?}; armcal reads png and jpeg", image.format);
+            return Err(ImageProblem::Unusable(problem));
+        }
+    };
+    let reader = || ImageReader::with_format(Cursor::new(&image.data), format);
+    let (width, height) = reader().into_dimensions().map_err(|_| ImageProblem::Damaged)?;
+    check_resolution([width, height], resolution_px)?;
+    let mut reader = reader();
+    let mut limits = Limits::default();
+    limits.max_alloc = Some(MAX_DECODED_BYTES);
+    reader.limits(limits);
+    Ok(reader.decode().map_err(|_| ImageProblem::Damaged)?.into_luma8().into_raw())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SIZE: [u32; 2] = [6, 4];
+
+    fn image(encoding: &str, n_channels: usize, fill: impl Fn(usize, usize) -> Vec<u8>) -> RecordedImage {
+        // Rows are padded, as some drivers do.
+        let step = 6 * n_channels + 2;
+        let row = |y: usize| (0..6).flat_map(|x| fill(x, y)).chain([7, 7]).collect::<Vec<u8>>();
+        let data = (0..4).flat_map(row).collect();
+        let (encoding, step) = (encoding.to_owned(), step as u32);
+        RecordedImage::Raw(Image { height: 4, width: 6, encoding, step, data, ..Image::default() })
+    }
+
+    #[test]
+    fn encodings_become_grey() {
+        let mono: Vec<u8> = (0..24).map(|k| (10 * k) as u8).collect();
+        let plain = grey(&image("mono8", 1, |x, y| vec![(10 * (6 * y + x)) as u8]), SIZE).expect("mono8");
+        assert_eq!(plain, mono);
+        // 0.299 * 200 + 0.587 * 100 + 0.114 * 50 = 124.2
+        let (rgb, bgr) = (vec![200, 100, 50], vec![50, 100, 200]);
+        assert_eq!(grey(&image("rgb8", 3, |_, _| rgb.clone()), SIZE).expect("rgb8"), [124; 24]);
+        assert_eq!(grey(&image("bgr8", 3, |_, _| bgr.clone()), SIZE).expect("bgr8"), [124; 24]);
+        let bgra: Vec<u8> = [&bgr[..], &[9]].concat();
+        assert_eq!(grey(&image("bgra8", 4, |_, _| bgra.clone()), SIZE).expect("bgra8"), [124; 24]);
+    }
+
+    #[test]
+    fn a_mosaic_of_one_colour_is_even_and_an_edge_stays_where_it_is() {
+        // Red 200, green 100, blue 40: a mean of (200 + 2 * 100 + 40) / 4.
+        let colour = |x: usize, y: usize| match (x % 2, y % 2) {
+            (0, 0) => 200,
+            (1, 1) => 40,
+            _ => 100,
+        };
+        let flat = grey(&image("bayer_rggb8", 1, |x, y| vec![colour(x, y)]), SIZE).expect("bayer");
+        assert_eq!(flat, [110; 24]);
+        let edge = grey(&image("bayer_bggr8", 1, |x, _| vec![if x < 3 { 0 } else { 160 }]), SIZE).expect("bayer");
+        assert_eq!(edge[6..12], [0, 0, 40, 120, 160, 160]);
+    }
+
+    #[test]
+    fn pictures_are_decoded_and_bad_ones_are_told_apart() {
+        let pixels: Vec<u8> = (0..24).map(|k| (10 * k) as u8).collect();
+        let mut png = Vec::new();
+        image::GrayImage::from_raw(6, 4, pixels.clone())
+            .expect("a picture")
+            .write_to(&mut Cursor::new(&mut png), ImageFormat::Png)
+            .expect("written");
+        let compressed = |format: &str, data: &[u8]| {
+            RecordedImage::Compressed(CompressedImage {
+                format: format.to_owned(),
+                data: data.to_vec(),
+                ..CompressedImage::default()
+            })
+        };
+        assert_eq!(grey(&compressed("mono8; png compressed ", &png), SIZE).expect("a png"), pixels);
+        assert_eq!(grey(&compressed("png", &png[..png.len() / 2]), SIZE), Err(ImageProblem::Damaged));
+        assert_eq!(grey(&compressed("png", &[1, 2, 3]), SIZE), Err(ImageProblem::Damaged));
+        let unusable = |image: &RecordedImage, size| match grey(image, size) {
+            Err(ImageProblem::Unusable(why)) => why,
+            other => panic!("{other:?}"),
+        };
+        assert!(unusable(&compressed("png", &png), [6, 5]).contains("6 x 4"));
+        assert!(unusable(&compressed("h264", &[1, 2, 3]), SIZE).contains("h264"));
+        assert!(unusable(&image("mono16", 2, |_, _| vec![0, 0]), SIZE).contains("bayer_*8"));
+        let RecordedImage::Raw(mut short) = image("mono8", 1, |_, _| vec![0]) else { panic!("raw") };
+        short.data.pop();
+        assert_eq!(grey(&RecordedImage::Raw(short), SIZE), Err(ImageProblem::Damaged));
+    }
+}

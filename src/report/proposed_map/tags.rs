@@ -1,0 +1,98 @@
+//! The choice of the tags: detections before transforms before images.
+
+use std::collections::BTreeMap;
+
+use super::contents::{Contents, Kind};
+use super::{comment, line, others, quoted};
+
+/// Words in the names of cameras' frames, and of tags' and boards'.
+const CAMERA_WORDS: [&str; 3] = ["cam", "optical", "fisheye"];
+const TAG_WORDS: [&str; 8] = ["tag", "board", "marker", "target", "aruco", "landmark", "fiducial", "pattern"];
+
+/// One landmark, or all numbered ones of a name, seen from one camera.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Candidate {
+    topic: String,
+    camera: String,
+    /// As `tags.child_frame` has it.
+    child: String,
+}
+
+/// `[tags]`; `None` where the recording has none.
+pub(super) fn choose_tags(contents: &Contents) -> Option<String> {
+    let chosen = of_detections(contents).or_else(|| of_transforms(contents)).or_else(|| of_images(contents));
+    let mut text = format!("\n[tags]\n{}", chosen?);
+    let topics = |kind| contents.of_kind(kind).map(|(topic, _)| topic);
+    text += &others("all topics with detections", topics(Kind::Detections));
+    text += &others("all topics with transforms", topics(Kind::Transforms));
+    text += &others("all topics with images (use = \"corners\")", topics(Kind::Images));
+    Some(text)
+}
+
+fn of_detections(contents: &Contents) -> Option<String> {
+    let (name, topic) = contents.of_kind(Kind::Detections).max_by_key(|(_, topic)| topic.messages)?;
+    let ids: Vec<String> = topic.ids.iter().map(i32::to_string).collect();
+    let ids = others("ids of the tags there", ids.iter());
+    Some(format!("topic = {}   # {} messages with corners\nuse = \"corners\"\n{ids}", quoted(name), topic.messages))
+}
+
+/// The best of all pairs of frames by their names; all of them are named beside it.
+fn of_transforms(contents: &Contents) -> Option<String> {
+    let mut found: BTreeMap<Candidate, u32> = BTreeMap::new();
+    for (name, topic) in contents.of_kind(Kind::Transforms) {
+        for (parent, child) in &topic.frames {
+            for (camera, tag) in [(parent, child), (child, parent)] {
+                let child = pattern(tag);
+                let is_numbered = child.ends_with("{id}");
+                let score = 4 * u32::from(has_word(tag, &TAG_WORDS))
+                    + 4 * u32::from(has_word(camera, &CAMERA_WORDS) && !has_word(tag, &CAMERA_WORDS))
+                    + u32::from(is_numbered)
+                    + u32::from(camera == parent);
+                found.insert(Candidate { topic: name.clone(), camera: camera.clone(), child }, score);
+            }
+        }
+    }
+    // One pair of frames alone can only be the camera and what it saw.
+    let least = if found.len() <= 2 { 0 } else { 4 };
+    let (best, _) = found.iter().filter(|(_, score)| **score >= least).min_by_key(|(_, score)| u32::MAX - **score)?;
+    let pairs: Vec<String> = found
+        .keys()
+        .filter(|other| *other != best)
+        .map(|other| format!("`{}` in `{}` on {}", other.child, other.camera, other.topic))
+        .collect();
+    let Candidate { topic, camera, child } = best;
+    Some(format!(
+        "topic = {}\ncamera_frame = {}\nchild_frame = {}\n\
+         use = \"pose\"   # or \"position\", where rotations are poor\n{}",
+        quoted(topic),
+        quoted(camera),
+        quoted(child),
+        others("other pairs of frames", pairs.iter())
+    ))
+}
+
+fn of_images(contents: &Contents) -> Option<String> {
+    let (name, topic) = contents.of_kind(Kind::Images).max_by_key(|(_, topic)| topic.messages)?;
+    let shared = |other: &str| other.chars().zip(name.chars()).take_while(|(a, b)| a == b).count();
+    let info = contents.of_kind(Kind::CameraInfo).map(|(topic, _)| topic).max_by_key(|topic| shared(topic));
+    Some(format!(
+        "topic = {}   # {} images; armcal looks for tags of family 36h11 in them\nuse = \"corners\"\n\
+         # image_period_s = 0.2   # looks at one image in so many seconds\n{}",
+        quoted(name),
+        topic.messages,
+        line("camera_info", info, "the lens, where robot.toml has none")
+    ))
+}
+
+fn has_word(frame: &str, words: &[&str]) -> bool {
+    let frame = frame.to_lowercase();
+    words.iter().any(|word| frame.contains(word))
+}
+
+/// `tag36h11:{id}` for `tag36h11:7`; a plain name otherwise. Braces are no part of names that maps can hold.
+fn pattern(frame: &str) -> String {
+    let stem = frame.trim_end_matches(|c: char| c.is_ascii_digit());
+    let is_number = frame[stem.len()..].parse::<u32>().is_ok();
+    let is_tag = has_word(stem, &TAG_WORDS) || stem.ends_with([':', '_', '/']);
+    if is_number && is_tag && !stem.contains(['{', '}']) { format!("{stem}{{id}}") } else { comment(frame) }
+}
