@@ -1,9 +1,9 @@
 //! Mirrors a run into a file for the Rerun viewer, after the fact and from recorded streams alone.
 //!
-//! [`write_rrd`] draws belief, detections and, with the simulator's truth file, the truth; [`write_plan_rrd`] draws the
-//! motions of a plan, [`write_views_rrd`] the views of a real arm as its calibration has them; [`open_viewer`] hands the
-//! file to an installed viewer, which is not linked. All entities (`entities`) share one timeline, `sim_time`: seconds
-//! since the recording's first log time. The same input gives the same bytes.
+//! [`write_rrd`] draws belief, detections and, with the simulator's truth file, the truth; [`write_plan_rrd`] draws
+//! the motions of a plan, [`write_views_rrd`] the views of a real arm as its calibration has them; [`open_viewer`]
+//! hands the file to an installed viewer, which is not linked. All entities (`entities`) share one timeline,
+//! `sim_time`: seconds since the recording's first log time. The same input gives the same bytes.
 
 mod arms;
 mod blueprint;

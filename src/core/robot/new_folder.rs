@@ -296,9 +296,10 @@ const LENS: &str = "# For images, for corners of tags, and for run and plan: the
 # corner_std_px = 0.3
 ";
 
-const STANDING: &str = "# No joint moves this link: the camera stands still and sees tags or a board that the arm carries. The
-# tag map says where they are, in the frame of the arm's link that carries them. Left to fill in: where the camera is on its link
-# (optical frame: x right, y down, z forward), and how well that is known, one sigma per axis.
+const STANDING: &str =
+    "# No joint moves this link: the camera stands still and sees tags or a board that the arm carries. The
+# tag map says where they are, in the frame of the arm's link that carries them. Left to fill in: where the camera is
+# on its link (optical frame: x right, y down, z forward), and how well that is known, one sigma per axis.
 position_m = [0.0, 0.0, 0.0]
 quaternion_wxyz = [1.0, 0.0, 0.0, 0.0]
 mount_std_m = 0.1

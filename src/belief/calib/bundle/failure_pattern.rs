@@ -1,11 +1,14 @@
 //! A joint's readings against the angles that the camera shows.
 
+use std::f64::consts::{PI, TAU};
+
 use nalgebra::{Matrix3, Vector3};
 
 use crate::calib::bundle::estimate::Estimate;
 use crate::calib::bundle::failures::{FAR_RAD, FAR_SIGMAS, SensorLine, SensorUse, slip_in_words};
 use crate::calib::views::view::View;
 use armcal_core::robot::{JointSensorSpec, Robot};
+use armcal_core::sensor::wrap_symmetric;
 use armcal_core::stats::quantile;
 
 /// One joint over the views that show tags, in the order of time.
@@ -58,6 +61,8 @@ const RIGHT_SIGMAS: f64 = 4.0;
 const STILL_SIGMAS: f64 = 8.0;
 /// Fewer views with the same reading are chance.
 pub(crate) const MIN_STILL_VIEWS: usize = 4;
+/// A range that lacks no more than twice this to a whole turn holds some angles twice.
+const WHOLE_TURN_RAD: f64 = 0.05;
 /// Motion that the camera must show meanwhile, over its sigma or [`LOCKED_RAD`].
 const STUCK_SIGMAS: f64 = 5.0;
 
@@ -79,13 +84,13 @@ impl Readings {
         seen.sort_by_key(|&k| (views[k].end, k));
         let angles: Vec<(f64, f64)> = seen.iter().map(|&k| found.angle(k, joint)).collect();
         debug_assert!(joint < robot.n_joints());
-        Self {
-            joint,
-            travel_rad: seen.iter().map(|&k| views[k].travel_rad[joint]).collect(),
-            angle_rad: angles.iter().map(|(angle, _)| *angle).collect(),
-            std_rad: angles.iter().map(|(_, std)| *std).collect(),
-            view_idx: seen,
+        let travel_rad: Vec<f64> = seen.iter().map(|&k| views[k].travel_rad[joint]).collect();
+        let mut angle_rad: Vec<f64> = angles.iter().map(|(angle, _)| *angle).collect();
+        let spec = &robot.sensors[joint];
+        if spec.half_range_rad > PI - WHOLE_TURN_RAD {
+            on_one_turn(&mut angle_rad[travel_rad.len() - n_still(&travel_rad, spec)..]);
         }
+        Self { joint, travel_rad, angle_rad, std_rad: angles.iter().map(|(_, std)| *std).collect(), view_idx: seen }
     }
 
     pub(crate) fn len(&self) -> usize {
@@ -248,6 +253,14 @@ impl Readings {
 
 fn rms(values: &[f64]) -> f64 {
     (values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64).sqrt()
+}
+
+/// The camera shows an angle but for whole turns, and a reading that stands still does not tell which: the first one's.
+fn on_one_turn(angles_rad: &mut [f64]) {
+    let Some(first_rad) = angles_rad.first().copied() else { return };
+    for angle_rad in angles_rad {
+        *angle_rad = first_rad + wrap_symmetric(*angle_rad - first_rad, TAU);
+    }
 }
 
 /// Root mean square about the mean.
