@@ -9,7 +9,6 @@ use crate::entity_log::EntityLog;
 use crate::scene::ReplayScene;
 use crate::shapes::{Look, log_shapes, quaternion, transform, vector};
 use armcal_belief::tagmap::files::FIRST_NAMED_ID;
-use armcal_core::kinematics::Attachment;
 use armcal_core::robot::SurveyedTag;
 use armcal_core::spatial::{Pose, Vehicle, World};
 
@@ -96,11 +95,11 @@ fn draw_tags(run: &ReplayScene, stream: &mut EntityLog) {
         return;
     }
     // Tags that the arm carries move with it.
-    if run.robot.tag_frame != Attachment::base() {
+    if run.robot.is_watched() {
         let mut mover = Mover::new(format!("{BASE}/tags"));
         for time_s in run.tracks.frames() {
             if let Some(angles) = run.shown_angles(time_s) {
-                mover.place(stream, time_s, &run.robot.chain.frame(&angles, &run.robot.tag_frame));
+                mover.place(stream, time_s, &run.robot.base_from_tags(&angles));
             }
         }
     }

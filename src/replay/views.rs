@@ -141,7 +141,7 @@ fn draw_sightings(input: &ViewsInput<'_>, times_s: &[f64], stream: &mut EntityLo
 fn draw_places(input: &ViewsInput<'_>, found: &[Sighting], times_s: &[f64], stream: &mut EntityLog) {
     let means = means(found);
     for (at, angles) in input.angles.iter().enumerate() {
-        let base_from_tags = input.calibrated.chain.frame(angles, &input.calibrated.tag_frame);
+        let base_from_tags = input.calibrated.base_from_tags(angles);
         let camera = base_from_tags * input.calibrated.tags_from_camera(angles);
         let of_view: Vec<&Sighting> = found.iter().filter(|(view, ..)| *view == at).collect();
         let places = of_view.iter().map(|(_, _, place)| vector(&(base_from_tags * place).coords));

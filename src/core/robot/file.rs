@@ -175,9 +175,7 @@ fn robot_of(folder: &Path, raw: RobotFile, urdf: UrdfModel, meshes: Meshes) -> R
     let jaws = raw.gripper.as_ref().map(GripperFile::jaws).unwrap_or_default();
     let arm = UrdfChain { urdf: &urdf, base_link: &raw.base_link, chain: &chain };
     let is_read = raw.collision_meshes == CollisionMeshes::Hull && meshes == Meshes::Read;
-    let beside = urdf.file.parent().unwrap_or(folder).to_owned();
-    let folders = is_read.then(|| MeshFolders { folders: [beside, folder.to_owned()] });
-    let mut bodies = arm.bodies(jaws, folders.as_ref())?;
+    let mut bodies = arm.bodies(jaws, is_read.then(|| mesh_folders(&urdf, folder)).as_ref())?;
     let camera_mount = arm.attachment(&raw.camera.link)?;
     let camera = check_camera(&file, &raw.camera, camera_mount)?;
     let (links, planning_issues) = (arm.attachments(), planning_issues(&file, &raw, &camera, &arm));
@@ -232,6 +230,11 @@ fn robot_of(folder: &Path, raw: RobotFile, urdf: UrdfModel, meshes: Meshes) -> R
         tag_frame: Attachment::base(),
         links,
     })
+}
+
+/// Where collision meshes may be: beside the URDF, and beside robot.toml.
+fn mesh_folders(urdf: &UrdfModel, folder: &Path) -> MeshFolders {
+    MeshFolders { folders: [urdf.file.parent().unwrap_or(folder).to_owned(), folder.to_owned()] }
 }
 
 fn displacements_l_per_rad(file: &Path, sensors: &[SensorFile], urdf: &UrdfModel) -> Result<Vec<f64>, FileIssue> {

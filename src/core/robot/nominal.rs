@@ -107,6 +107,12 @@ impl Robot {
         self.camera.mount.n_joints.max(self.tag_frame.n_joints)
     }
 
+    /// The frame of the tags in the base's, at these angles by the sensors. Tags beside the arm do not bend with its base.
+    #[must_use]
+    pub fn base_from_tags(&self, angles: &JointAngles) -> Isometry3<f64> {
+        if self.is_watched() { self.chain.frame(angles, &self.tag_frame) } else { Isometry3::identity() }
+    }
+
     /// The camera in the frame of the tags, at these angles by the sensors.
     #[must_use]
     pub fn tags_from_camera(&self, angles: &JointAngles) -> Isometry3<f64> {

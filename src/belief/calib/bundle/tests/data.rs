@@ -157,8 +157,10 @@ fn look(robot: &Robot, truth: &Truth, noise: &Noise, view: &mut View, rng: &mut 
     }
     let poses = robot.chain.corrected_link_poses(&angles, &truth.parameters.links);
     let base_from_camera = poses.link(robot.camera.mount.n_joints) * truth.mount;
+    // Tags beside the arm stay where they are when its base bends.
+    let base_from_tags = if robot.is_watched() { poses.frame(&robot.tag_frame) } else { Isometry3::identity() };
     for (tag_idx, tag) in robot.tags.iter().enumerate() {
-        let camera_from_tag = base_from_camera.inv_mul(&(poses.frame(&robot.tag_frame) * truth.tags[tag_idx]));
+        let camera_from_tag = base_from_camera.inv_mul(&(base_from_tags * truth.tags[tag_idx]));
         let center = camera_from_tag.translation.vector;
         let facing = -(camera_from_tag.rotation * Vector3::z()).dot(&center) / center.norm();
         if !(0.25..2.0).contains(&center.norm()) || facing < 0.45 {
