@@ -25,7 +25,7 @@ const CASES: [Case; 3] = [
             command.arg("--out").arg(out);
             command
         },
-        leaves: &["calibration.covariance.toml", "calibration.toml", "summary.json"],
+        leaves: &["calibration.covariance.toml", "calibration.toml", "report.html", "summary.json"],
     },
     Case {
         command: |out| {
