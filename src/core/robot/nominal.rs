@@ -107,7 +107,8 @@ impl Robot {
         self.camera.mount.n_joints.max(self.tag_frame.n_joints)
     }
 
-    /// The frame of the tags in the base's, at these angles by the sensors. Tags beside the arm do not bend with its base.
+    /// The frame of the tags in the base's, at these angles by the sensors. Tags beside the arm do not bend with its
+    /// base.
     #[must_use]
     pub fn base_from_tags(&self, angles: &JointAngles) -> Isometry3<f64> {
         if self.is_watched() { self.chain.frame(angles, &self.tag_frame) } else { Isometry3::identity() }
