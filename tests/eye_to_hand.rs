@@ -1,8 +1,9 @@
 //! A camera that stands still beside the arm and sees a board on its hand.
 
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
-use armcal::calib::Calibration;
+use armcal::calib::{Calibration, SagTable, covariance_file};
 use armcal::robot::{Robot, load};
 use armcal::stats::{quantile, stream_rng};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
@@ -48,12 +49,16 @@ impl Given {
     }
 
     fn calibrate(&self) -> Answer {
+        answer(self.command().arg("--out").arg(self.file("out")))
+    }
+
+    fn command(&self) -> Command {
         let mut command = program();
         command.arg("calibrate").arg(self.file("arm.mcap")).arg("--robot").arg(&self.robot.folder);
         for (option, name) in [("--input", "map.toml"), ("--tag-map", "board.toml"), ("--task", "task.toml")] {
             command.arg(option).arg(self.file(name));
         }
-        answer(command.arg("--out").arg(self.file("out")))
+        command
     }
 
     fn calibration(&self) -> Calibration {
@@ -145,4 +150,43 @@ fn a_frame_that_does_not_fit_is_named_with_what_to_do() {
     let file = Path::new(&given.robot.folder).join("robot.toml");
     edit(&file, "position_m = [2.5, 0.4, 0.6]", "position_m = [2.5, 0.4, inf]");
     given.calibrate().expect("a camera nowhere", 2, &["robot.toml", "camera.position_m"]);
+}
+
+/// Bending is known in a frame that turns with the wrist camera's arm: as a prior here it would be used in another.
+#[test]
+fn a_prior_that_knows_how_the_arm_bends_is_refused() {
+    let given = Given::new();
+    given.record(0);
+    given.calibrate().expect("without a prior", 0, &["ACCEPTED"]);
+    let mut prior = given.calibration();
+    let again =
+        || answer(given.command().arg("--prior").arg(given.file("prior.toml")).arg("--out").arg(given.file("b")));
+    let save = |prior: &Calibration| {
+        let (file, texts) = (given.file("prior.toml"), prior.to_files());
+        write(&covariance_file(&file), &texts.covariance);
+        write(&file, &texts.calibration);
+    };
+    save(&prior);
+    again().expect("a prior that knows nothing of it", 4, &["views that"]);
+    let (mount_rad_per_nm, mount_std_rad_per_nm) = ([1e-6; 3], [1e-7; 3]);
+    let (tool_load_n, tool_load_std_n, joint) = (0.0, 1.0, Vec::new());
+    prior.sag = Some(SagTable { mount_rad_per_nm, mount_std_rad_per_nm, tool_load_n, tool_load_std_n, joint });
+    save(&prior);
+    again().expect("a prior that knows", 1, &["bends under its weight", "--prior"]);
+}
+
+#[test]
+fn every_method_knows_which_way_the_camera_looks() {
+    let given = Given::new();
+    for (method, limit_m) in [("minimum_distance", 0.03), ("minimum_variance", 0.03)] {
+        let mut errors_m = Vec::new();
+        for seed in 0..3 {
+            let arm = given.record(seed);
+            answer(given.command().args(["--method", method]).arg("--out").arg(given.file("out")));
+            errors_m.push(arm.tool_figures(&given.calibration()).error_m);
+        }
+        eprintln!("{method}: {errors_m:?}");
+        let median_m = quantile(&errors_m, 0.5).expect("figures");
+        assert!(median_m < limit_m, "{method}: {errors_m:?}");
+    }
 }

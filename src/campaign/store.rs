@@ -89,7 +89,7 @@ impl Store {
     fn load(&mut self, partial: &Path, existing: ExistingRows) -> Result<(), CampaignError> {
         if existing == ExistingRows::Discard {
             for path in results(&self.out) {
-                remove(&path)?;
+                output::remove(&path)?;
             }
             return self.restart();
         }
@@ -199,7 +199,7 @@ impl Store {
         if !self.in_place {
             write_results(&self.out, &self.table, &summary)?;
         }
-        remove(&output::partial(&self.out))?;
+        output::remove(&output::partial(&self.out))?;
         Ok((self.table, summary))
     }
 }
@@ -207,15 +207,6 @@ impl Store {
 /// Length of the part of `bytes` that is whole lines; `None` for no whole line.
 fn whole_lines(bytes: &[u8]) -> Option<usize> {
     bytes.iter().rposition(|byte| *byte == b'\n').map(|last| last + 1)
-}
-
-fn remove(path: &Path) -> Result<(), CampaignError> {
-    match std::fs::remove_file(path) {
-        Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
-            Err(OutputError::of(path, "cannot be removed")(error).into())
-        }
-        _ => Ok(()),
-    }
 }
 
 /// The table and what is written beside it.

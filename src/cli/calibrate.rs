@@ -17,8 +17,6 @@ use crate::report::{RunSummary, html, table};
 use armcal_belief::calib::{Calibration, CompactCalibration, MapResult, Status, View, covariance_file};
 use armcal_core::robot::Robot;
 use armcal_core::routine::Method;
-#[cfg(feature = "viewer")]
-use armcal_core::{joints::JointAngles, sensor::ArmSensors};
 
 #[derive(Debug, Args)]
 pub(super) struct CalibrateArgs {
@@ -112,21 +110,13 @@ pub(super) fn calibrate(args: &CalibrateArgs) -> Result<Exit> {
     })
 }
 
-/// The views as a file for the Rerun viewer, replay.rrd in `out`.
+/// The views as a file for the Rerun viewer, replay.rrd in `out`; one of an earlier calibration does not stay.
 #[cfg(feature = "viewer")]
 fn draw(out: &Path, views: &[View], robot: &Robot, of: (&Calibration, &RunSummary)) -> Result<()> {
+    let file = out.join("replay.rrd");
+    output::remove(&file)?;
     let (calibration, summary) = of;
-    let (nominal, sensors, names) = (ArmSensors::nominal(robot), calibration.sensors(robot)?, robot.joint_names());
-    let first = views.iter().map(|view| view.end).min();
-    let angles_of = |view: &View| {
-        let read = |joint: usize| robot.sensors[joint].center_rad + view.travel_rad[joint];
-        let counts = nominal.counts(&JointAngles::from_fn(robot.n_joints(), read));
-        let angles = sensors.angles_under(&counts, &view.conditions);
-        let time_s = first.map_or(0.0, |first| view.end.since_s(first));
-        let slipped = |joint: usize| calibration.slipped_rad(&names[joint], time_s);
-        JointAngles::from_fn(robot.n_joints(), |joint| angles[joint] + slipped(joint))
-    };
-    let angles: Vec<JointAngles> = views.iter().map(angles_of).collect();
+    let angles = calibration.view_angles(robot, views)?;
     let input = armcal_replay::ViewsInput {
         views,
         drawn: robot,
@@ -134,7 +124,6 @@ fn draw(out: &Path, views: &[View], robot: &Robot, of: (&Calibration, &RunSummar
         angles: &angles,
         summary_markdown: &markdown(summary),
     };
-    let file = out.join("replay.rrd");
     let growing = output::Beside::begin(&file)?;
     armcal_replay::write_views_rrd(&input, growing.grows_at())?;
     growing.put_in_place()?;

@@ -67,6 +67,17 @@ pub(crate) fn complete(path: &Path) -> Result<(), OutputError> {
     std::fs::rename(partial(path), path).map_err(OutputError::of(path, "cannot be put in place"))
 }
 
+/// That nothing is at `path`: a file that is there goes.
+#[cfg(any(feature = "sim", feature = "viewer"))]
+pub(crate) fn remove(path: &Path) -> Result<(), OutputError> {
+    match std::fs::remove_file(path) {
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+            Err(OutputError::of(path, "cannot be removed")(error))
+        }
+        _ => Ok(()),
+    }
+}
+
 /// Makes the output folder.
 pub(crate) fn make_folder(folder: &Path) -> Result<(), OutputError> {
     std::fs::create_dir_all(folder).map_err(OutputError::of(folder, "cannot be made"))

@@ -5,10 +5,9 @@
 //! a killed or broken run leaves is moved to `run-cut-N.mcap` and `truth-cut-N.mcap`.
 
 use std::fs::{self, File};
-use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-use crate::output::{FolderLock, OutputError, check_replaceable, complete, partial};
+use crate::output::{FolderLock, OutputError, check_replaceable, complete, partial, remove};
 use armcal_core::log::{LogError, for_each_raw, topics};
 
 /// What a run leaves, in the order in which it is put in place.
@@ -151,13 +150,6 @@ fn is_worth_keeping(path: &Path) -> bool {
         Ok(_) => readings > 0,
         Err(LogError::Empty { .. }) => false,
         Err(_) => true,
-    }
-}
-
-fn remove(path: &Path) -> Result<(), OutputError> {
-    match fs::remove_file(path) {
-        Err(error) if error.kind() != ErrorKind::NotFound => Err(OutputError::of(path, "cannot be removed")(error)),
-        _ => Ok(()),
     }
 }
 

@@ -12,6 +12,8 @@ pub(crate) use beside::Beside;
 pub(crate) use beside::write_whole;
 pub(crate) use beside::{check_takes_files, check_writable, write_together};
 pub use files::OutputError;
+#[cfg(any(feature = "sim", feature = "viewer"))]
+pub(crate) use files::remove;
 pub(crate) use files::{check_replaceable, make_folder, parent, refuse_link};
 #[cfg(feature = "sim")]
 pub(crate) use files::{complete, partial, with_suffix};

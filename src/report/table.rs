@@ -261,9 +261,9 @@ fn mount_line(mount: &CameraMount) -> String {
             let worst = |v: [f64; 3]| v.into_iter().fold(0.0, f64::max);
             let (std_mm, std_deg) = (worst(mount.position_std_m) * 1e3, worst(mount.rotation_std_rad).to_degrees());
             let by_tag = match (mount.views, mount.rms_px) {
-                (0, _) => "by the tags around the arm".to_owned(),
+                (0, _) => "by the tags".to_owned(),
                 (views, Some(rms_px)) => format!("by the tag on the gripper in {views} views ({rms_px:.2} px)"),
-                (views, None) => format!("by the tags around the arm and the one on the gripper in {views} views"),
+                (views, None) => format!("by the tags and the one on the gripper in {views} views"),
             };
             format!("camera mount {by_tag}: known to {std_mm:.1} mm, {std_deg:.2} deg in its worst axis")
         }

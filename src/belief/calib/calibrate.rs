@@ -156,6 +156,9 @@ pub fn calibrate_data(
     method: Method,
     prior: Option<&Calibration>,
 ) -> Result<Calibration, CalibError> {
+    if data.robot.is_watched() && prior.is_some_and(|prior| prior.sag.is_some()) {
+        return Err(CalibError::PriorSag { recording: data.name });
+    }
     match method {
         Method::JointLimits => end_stops::calibrate(data, prior),
         Method::Bundle => {

@@ -37,6 +37,11 @@ pub enum CalibError {
     Twice { recording: String },
     #[error("{one} and {other} say different things of the tags; give a tag map that holds for both")]
     Surveys { one: String, other: String },
+    #[error(
+        "{recording}: the prior says how the arm bends under its weight, which is not estimated before a camera that \
+         stands still; calibrate without --prior, or start from a calibration before this camera"
+    )]
+    PriorSag { recording: String },
     #[error("{recording}: {n} of {of} messages rejected on {what}: too many to go on")]
     NotFinite { recording: String, what: String, n: u64, of: u64 },
     #[error("{recording}: no view is left: {reasons}")]

@@ -212,7 +212,7 @@ impl FailureImpact<'_> {
         if let Some(views) = failure.n_views_since(self.views)
             && views < MIN_VIEWS_SINCE
         {
-            return Some(Refusal::TooFewViewsSinceSlip { joint, evidence: failure.evidence.clone(), views });
+            return Some(Refusal::TooFewViewsSinceSlip { joint, evidence: self.evidence(failure), views });
         }
         let task = self.task?.task;
         let is_needed = failure.joint < self.robot.tool.mount.n_joints;

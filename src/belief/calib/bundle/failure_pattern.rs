@@ -268,3 +268,19 @@ fn deviation(values: &[f64]) -> f64 {
     let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
     (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / values.len().max(1) as f64).sqrt()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn angles_that_are_one_but_for_whole_turns_become_one() {
+        let mut angles = [PI - 0.01, -PI + 0.005, PI - 0.02, 3.0 * PI + 0.01];
+        on_one_turn(&mut angles);
+        assert!(deviation(&angles) < 0.02, "{angles:?}");
+        assert!((angles[1] - (PI + 0.005)).abs() < 1e-12, "{angles:?}");
+        let mut apart = [0.0, 1.0, -1.5];
+        on_one_turn(&mut apart);
+        assert_eq!(apart, [0.0, 1.0, -1.5]);
+    }
+}

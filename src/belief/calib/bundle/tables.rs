@@ -36,7 +36,7 @@ pub(crate) fn model_table(robot: &Robot, found: &Estimate<'_>, selections: &[Sel
     }
 }
 
-/// The camera mount as estimated; tags around the arm tell of it, too.
+/// The camera mount as estimated; the tags tell of it, too.
 pub(crate) fn camera_mount_table(robot: &Robot, found: &Estimate<'_>, views: &[View]) -> CameraMount {
     let (mount, covariance) = found.mount();
     let link_from_camera: Pose<Link, Camera> = Pose::from_isometry(mount);

@@ -11,6 +11,8 @@ use crate::calib::result::covariance_file::CovarianceTable;
 use crate::calib::result::file_error::CalibrationFileError;
 use crate::calib::result::link_table::LinkResult;
 use crate::calib::result::terms_table::TermsTable;
+use crate::calib::views::View;
+use armcal_core::joints::JointAngles;
 use armcal_core::kinematics::LinkCorrections;
 use armcal_core::robot::{FileIssue, JointSensorSpec, Robot, RobotError, parse_toml, read_text};
 use armcal_core::sensor::{ArmSensors, Correction};
@@ -129,6 +131,25 @@ impl Calibration {
         let slips = self.findings.iter().filter(|found| found.kind == FindingKind::SensorSlip && found.name == joint);
         let later = slips.filter(|slip| slip.time_s.is_some_and(|time_s| since_first_view_s < time_s));
         later.filter_map(|slip| slip.size).sum()
+    }
+
+    /// What the reading of each view means under this calibration, slips among it, rad; `views` with the travels by
+    /// the datasheet, which they are read with.
+    ///
+    /// # Errors
+    /// [`CalibrationFileError::OtherRobot`] when it was made for another arm.
+    pub fn view_angles(&self, robot: &Robot, views: &[View]) -> Result<Vec<JointAngles>, CalibrationFileError> {
+        let (nominal, sensors, names) = (ArmSensors::nominal(robot), self.sensors(robot)?, robot.joint_names());
+        let first = views.iter().map(|view| view.end).min();
+        let angles_of = |view: &View| {
+            let read = |joint: usize| robot.sensors[joint].center_rad + view.travel_rad[joint];
+            let counts = nominal.counts(&JointAngles::from_fn(robot.n_joints(), read));
+            let angles = sensors.angles_under(&counts, &view.conditions);
+            let time_s = first.map_or(0.0, |first| view.end.since_s(first));
+            let slipped_rad = |joint: usize| self.slipped_rad(&names[joint], time_s);
+            JointAngles::from_fn(robot.n_joints(), |joint| angles[joint] + slipped_rad(joint))
+        };
+        Ok(views.iter().map(angles_of).collect())
     }
 
     /// `robot` with its links and the camera's mount as calibrated; sensors and tags stay.
