@@ -99,7 +99,8 @@ fn new_robot(scratch: &Scratch, bytes: &[u8]) -> bool {
     fs::write(given.join("hand.obj"), "v 0 0 0\nv 0 9 0\nv 9 0 0\nv 0 0 9\nf 1 2 3\nf 1 3 4\nf 1 4 2\n")
         .expect("written");
     let urdf = scratch.write("given/arm.urdf", bytes);
-    let wanted = NewRobot { urdf: &urdf, base: None, tip: None, camera: None, name: None };
+    let wanted =
+        NewRobot { urdf: &urdf, base: None, tip: None, camera: None, name: None, touching: &[], clear_rad: None };
     let Ok(files) = draft_robot(&wanted, DraftedMeshes::Read) else { return false };
     let made = tempfile::tempdir_in(scratch.folder.path()).expect("a folder");
     for file in files {

@@ -167,7 +167,7 @@ fn a_prior_that_knows_how_the_arm_bends_is_refused() {
         write(&file, &texts.calibration);
     };
     save(&prior);
-    again().expect("a prior that knows nothing of it", 4, &["views that"]);
+    again().expect("a prior that knows nothing of it", 4, &["the prior rests on these very messages"]);
     let (mount_rad_per_nm, mount_std_rad_per_nm) = ([1e-6; 3], [1e-7; 3]);
     let (tool_load_n, tool_load_std_n, joint) = (0.0, 1.0, Vec::new());
     prior.sag = Some(SagTable { mount_rad_per_nm, mount_std_rad_per_nm, tool_load_n, tool_load_std_n, joint });

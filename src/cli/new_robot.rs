@@ -8,6 +8,7 @@ use clap::Args;
 use crate::cli::exit::{Exit, UsageError};
 use crate::cli::stdout::say;
 use crate::output;
+use armcal_belief::plan::{always_near, clear_angles};
 use armcal_core::robot::{self, DraftedMeshes, NewFile, NewRobot, Robot, RobotError, draft_robot};
 
 #[derive(Debug, Args)]
@@ -39,10 +40,12 @@ pub(super) fn new_robot(args: &NewRobotArgs) -> Result<Exit> {
         tip: args.tip.as_deref(),
         camera: args.camera_link.as_deref(),
         name: args.name.as_deref(),
+        touching: &[],
+        clear_rad: None,
     };
     let files = draft_robot(&wanted, DraftedMeshes::Read)?;
     let (files, robot) = match trial(&files, &args.out)? {
-        Ok(robot) => (files, robot),
+        Ok(robot) => with_shapes(&wanted, robot, &args.out)?,
         Err(why) => {
             let without = draft_robot(&wanted, DraftedMeshes::Ignored(&why))?;
             let robot = trial(&without, &args.out)?.map_err(UsageError)?;
@@ -55,6 +58,29 @@ pub(super) fn new_robot(args: &NewRobotArgs) -> Result<Exit> {
     write(&files, &args.out)?;
     say(&described(&files, &robot, &args.out))?;
     Ok(Exit::Ok)
+}
+
+/// Random poses for links that are near each other at nearly all of them, and for one at which none are.
+const N_POSES: u32 = 500;
+/// What planning keeps free by default, m: links that never are so far apart would leave it no way.
+const NEAR_M: f64 = 0.05;
+/// Distance that the arm keeps from itself where it is stowed, m.
+const STOWED_MARGIN_M: f64 = 0.03;
+
+/// The same with what the arm's shapes tell: links that are near each other at nearly every pose, and a pose
+/// where no others are.
+fn with_shapes(wanted: &NewRobot<'_>, robot: Robot, out: &Path) -> Result<(Vec<NewFile>, Robot)> {
+    let read = |wanted: &NewRobot<'_>| -> Result<(Vec<NewFile>, Robot)> {
+        let files = draft_robot(wanted, DraftedMeshes::Read)?;
+        let robot = trial(&files, out)?.map_err(UsageError)?;
+        Ok((files, robot))
+    };
+    let touching = always_near(&robot, NEAR_M, N_POSES, 1);
+    let wanted = NewRobot { touching: &touching, ..*wanted };
+    let robot = if touching.is_empty() { robot } else { read(&wanted)?.1 };
+    let clear = clear_angles(&robot, STOWED_MARGIN_M, N_POSES, 1);
+    let clear: Option<Vec<f64>> = clear.map(|angles| (0..robot.n_joints()).map(|joint| angles[joint]).collect());
+    read(&NewRobot { clear_rad: clear.as_deref(), ..wanted })
 }
 
 /// Nothing that is there is ever overwritten.

@@ -23,7 +23,9 @@ pub use capture_plan::{
     ArmBelief, CapturePlan, ItineraryError, ItineraryRequest, LeastClearance, PlannedVisit, UnreachablePose,
     plan_itinerary,
 };
-pub use clearance::{ClearanceModel, ClosestPair, SELF_MARGIN_REDUCTION_M, sample_self_pairs};
+pub use clearance::{
+    ClearanceModel, ClosestPair, SELF_MARGIN_REDUCTION_M, always_near, clear_angles, sample_self_pairs,
+};
 pub use error::PlanError;
 pub use file::{LeftOutTable, PathTable, PlanFile, PlanHeader, PlanTotals, PoseTable, SetName, TagTable};
 pub use motion::{Edge, Path, Timing, TrackingErrorBound};

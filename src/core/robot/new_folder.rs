@@ -27,6 +27,10 @@ pub struct NewRobot<'a> {
     pub camera: Option<&'a str>,
     /// Name of the robot; that of the URDF.
     pub name: Option<&'a str>,
+    /// Links that overlap or are near each other at nearly every pose.
+    pub touching: &'a [[String; 2]],
+    /// Angles at which the arm is clear of itself, rad, base first.
+    pub clear_rad: Option<&'a [f64]>,
 }
 
 /// What the folder says of the collision meshes.
@@ -64,7 +68,7 @@ pub fn draft_robot(wanted: &NewRobot<'_>, meshes: DraftedMeshes<'_>) -> Result<V
     let mut files = mesh_files(&on_chain, wanted.urdf)?;
     files.push(NewFile { path: urdf_name.clone(), bytes: urdf.text.clone().into_bytes() });
     let name = wanted.name.unwrap_or(&urdf.robot.name);
-    let draft = Draft { urdf: &urdf, urdf_name: &urdf_name, name, arm: &arm, chain: &chain, meshes };
+    let draft = Draft { wanted, urdf: &urdf, urdf_name: &urdf_name, name, arm: &arm, chain: &chain, meshes };
     files.push(NewFile { path: "robot.toml".into(), bytes: draft.text().into_bytes() });
     Ok(files)
 }
@@ -130,6 +134,7 @@ fn mesh_source(urdf: &Path, name: &str) -> Option<PathBuf> {
 
 /// What robot.toml is written from.
 struct Draft<'a> {
+    wanted: &'a NewRobot<'a>,
     urdf: &'a UrdfModel,
     urdf_name: &'a Path,
     name: &'a str,
@@ -184,13 +189,33 @@ impl Draft<'_> {
                 on_line(why)
             );
         }
-        let middle: Vec<String> = self.chain.joints().iter().map(middle_rad).collect();
+        self.shapes(out);
+        out.push_str("# With [[tag]]s below: the id of the one beside the base.\n# base_tag = 0\n");
+    }
+
+    fn shapes(&self, out: &mut String) {
+        let touching = self.wanted.touching;
+        if !touching.is_empty() {
+            let pairs: Vec<String> =
+                touching.iter().map(|[a, b]| format!("    [{}, {}],\n", quoted(a), quoted(b))).collect();
+            let _ = write!(
+                out,
+                "# Found: the shapes of these links overlap or are within 5 cm at nearly every pose, so that no plan could\n\
+                 # keep them apart. Look whether that is by design.\nallowed_pairs = [\n{}]\n",
+                pairs.concat()
+            );
+        }
+        let middle = self.chain.joints().iter().map(middle_rad);
+        let (angles_rad, whence) = match self.wanted.clear_rad {
+            Some(clear) => (clear.to_vec(), "angles near the middle of each range at which the arm is clear of itself"),
+            None => (middle.collect(), "the middle of each range"),
+        };
+        let angles: Vec<String> = angles_rad.into_iter().map(to_millirad).collect();
         let _ = write!(
             out,
             "# For run and plan: the angles at which the arm is stowed, clear of everything; paths start there.\n\
-             # Here the middle of each range.\n# stowed_rad = [{}]\n\
-             # With [[tag]]s below: the id of the one beside the base.\n# base_tag = 0\n",
-            middle.join(", ")
+             # Here {whence}.\n# stowed_rad = [{}]\n",
+            angles.join(", ")
         );
     }
 
@@ -260,11 +285,13 @@ impl Draft<'_> {
     }
 }
 
-/// The middle of the joint's range, to the millirad.
-fn middle_rad(joint: &ChainJoint) -> String {
-    let middle = joint.limits.map_or(0.0, |limits| 0.5 * (limits.lower_rad + limits.upper_rad));
+fn middle_rad(joint: &ChainJoint) -> f64 {
+    joint.limits.map_or(0.0, |limits| 0.5 * (limits.lower_rad + limits.upper_rad))
+}
+
+fn to_millirad(angle_rad: f64) -> String {
     // Adding zero turns -0 into 0.
-    format!("{:?}", (middle * 1e3).round() / 1e3 + 0.0)
+    format!("{:?}", (angle_rad * 1e3).round() / 1e3 + 0.0)
 }
 
 const SENSORS: &str = "

@@ -2,8 +2,8 @@
 //!
 //! Objective: `sum_j tr(C_j)`, `C_j` the covariance (divisor m - 1) of the m positions of landmark j in the base frame,
 //! over the landmarks seen at least twice. No map is needed, and so the objective knows nothing of what turns all
-//! positions together: an offset of the first joint turns them about its axis and changes no distance between any two
-//! of them. That is no weak direction but an exact freedom of gauge, which noise has nothing to do with. The offset is
+//! positions together: an offset of the first joint (of the last, where the arm carries the landmarks and they are in
+//! its hand's frame) turns them about its axis and changes no distance between any two of them. That is no weak direction but an exact freedom of gauge, which noise has nothing to do with. The offset is
 //! held, and so is everything else that the views leave without any effect.
 
 use nalgebra::{Const, DMatrix, DVector, Dyn, OMatrix, Vector3};
@@ -12,6 +12,7 @@ use crate::calib::covariance::{CommonErrors, ParameterCovariance};
 use crate::calib::methods::observability::Unobservable;
 use crate::calib::methods::position_problem::{PositionProblem, TagResidual};
 use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
+use armcal_core::robot::Robot;
 
 /// What becomes of the first joint's offset under minimum variance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -142,6 +143,11 @@ const NULL_SHARE: f64 = 1e-12;
 /// A parameter with more than this share of a null direction takes part in it.
 const PART_OF_NULL: f64 = 1e-6;
 
+/// The joint nearest to the tags: the first, or the last before tags that the arm carries.
+fn gauge_joint(robot: &Robot) -> usize {
+    if robot.is_watched() { robot.tag_frame.n_joints - 1 } else { 0 }
+}
+
 /// Of `free`, what minimum variance can determine, and what it is exactly blind to; linearized at `guess`.
 #[must_use]
 pub fn determined_by_variance(
@@ -149,15 +155,16 @@ pub fn determined_by_variance(
     free: &[Parameter],
     guess: &JointParameters,
 ) -> (Vec<Parameter>, Vec<Unobservable>) {
-    let is_first_offset = |p: &Parameter| p.joint == 0 && p.kind == ParameterKind::Offset;
-    let mut left: Vec<Parameter> = free.iter().copied().filter(|p| !is_first_offset(p)).collect();
+    let gauge = gauge_joint(problem.robot);
+    let is_gauge = |p: &Parameter| p.joint == gauge && p.kind == ParameterKind::Offset;
+    let mut left: Vec<Parameter> = free.iter().copied().filter(|p| !is_gauge(p)).collect();
     let mut blind: Vec<Unobservable> = free
         .iter()
         .copied()
-        .filter(is_first_offset)
+        .filter(is_gauge)
         .map(|parameter| {
-            let reason = "minimum variance is exactly blind to it: it turns every position about the first axis \
-                          alike. Held; only the place of a base tag determines it";
+            let reason = "minimum variance is exactly blind to it: it turns every position about the axis nearest \
+                          to the tags alike. Held; only the place of a base tag determines it";
             Unobservable { parameter, reason: reason.to_owned() }
         })
         .collect();

@@ -12,4 +12,4 @@ pub(crate) mod separation;
 pub(crate) mod shapes;
 
 pub use model::{ClearanceModel, ClosestPair, SELF_MARGIN_REDUCTION_M};
-pub use self_collision::sample_self_pairs;
+pub use self_collision::{always_near, clear_angles, sample_self_pairs};

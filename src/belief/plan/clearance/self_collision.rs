@@ -1,5 +1,7 @@
 //! Which links of an arm can ever come near each other, by sampling.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
@@ -37,16 +39,66 @@ pub fn sample_self_pairs(robot: &Robot, n: u64, seed: u64) -> SelfPairs {
     SelfPairs { seed, n, near_m: NEAR_M, pairs }
 }
 
+/// Share of the configurations from which links that are near each other there are taken to be so by design, or by hulls
+/// that are larger than the links. The rule of MoveIt's setup assistant.
+const NEARLY_ALWAYS: f64 = 0.95;
+
+/// Links that overlap or are nearer to each other than `margin_m` at nearly all of `n` random configurations: no plan
+/// could keep them apart.
+#[must_use]
+pub fn always_near(robot: &Robot, margin_m: f64, n: u32, seed: u64) -> Vec<[String; 2]> {
+    let clearance = ClearanceModel::of_arm_alone(robot);
+    let mut rng = stream_rng(seed, "links that are always near");
+    let limits = wide_limits(robot);
+    let mut n_near: BTreeMap<[usize; 2], u32> = BTreeMap::new();
+    for _ in 0..n {
+        let mut near = BTreeSet::new();
+        clearance.each_near_pair(&random_angles(&limits, &mut rng), margin_m, |bodies, _| {
+            near.insert(bodies);
+        });
+        near.into_iter().for_each(|bodies| *n_near.entry(bodies).or_default() += 1);
+    }
+    n_near.retain(|_, times| f64::from(*times) >= NEARLY_ALWAYS * f64::from(n));
+    n_near.into_keys().map(|bodies| bodies.map(|body| robot.bodies[body].name.clone())).collect()
+}
+
+/// Angles at which no two links are nearer than `margin_m`, as near to the middle of the ranges as `n` guesses find
+/// them; `None` where none of them is clear.
+#[must_use]
+pub fn clear_angles(robot: &Robot, margin_m: f64, n: u32, seed: u64) -> Option<JointAngles> {
+    let clearance = ClearanceModel::of_arm_alone(robot);
+    let mut rng = stream_rng(seed, "clear angles");
+    let limits = drawn_limits(robot);
+    let guess = |k: u32| {
+        let share = f64::from(k) / f64::from(n);
+        let random = random_angles(&limits, &mut rng);
+        JointAngles::from_fn(limits.len(), |j| {
+            let middle_rad = 0.5 * (limits[j].lower_rad + limits[j].upper_rad);
+            middle_rad + share * (random[j] - middle_rad)
+        })
+    };
+    (0..n).map(guess).find(|angles| !clearance.is_nearer_than(angles, margin_m))
+}
+
+/// The joints' own limits, or a whole turn.
+fn drawn_limits(robot: &Robot) -> Vec<JointLimits> {
+    let turn = JointLimits { lower_rad: -std::f64::consts::PI, upper_rad: std::f64::consts::PI };
+    robot.chain.joints().iter().map(|joint| joint.limits.unwrap_or(turn)).collect()
+}
+
 fn wide_limits(robot: &Robot) -> Vec<JointLimits> {
     let bounds = JointErrorBounds::datasheet(robot);
-    let wide = |(joint, limits): (usize, Option<JointLimits>)| match limits {
-        None => JointLimits { lower_rad: -std::f64::consts::PI, upper_rad: std::f64::consts::PI },
-        Some(JointLimits { lower_rad, upper_rad }) => JointLimits {
+    let wide = |(joint, limits): (usize, JointLimits)| {
+        let JointLimits { lower_rad, upper_rad } = limits;
+        if robot.chain.joints()[joint].limits.is_none() {
+            return limits;
+        }
+        JointLimits {
             lower_rad: lower_rad - bounds.error_rad(joint, lower_rad),
             upper_rad: upper_rad + bounds.error_rad(joint, upper_rad),
-        },
+        }
     };
-    robot.chain.joints().iter().map(|joint| joint.limits).enumerate().map(wide).collect()
+    drawn_limits(robot).into_iter().enumerate().map(wide).collect()
 }
 
 fn random_angles(limits: &[JointLimits], rng: &mut ChaCha8Rng) -> JointAngles {
@@ -56,6 +108,7 @@ fn random_angles(limits: &[JointLimits], rng: &mut ChaCha8Rng) -> JointAngles {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use armcal_core::robot::Shape;
 
     fn robot(name: &str) -> Robot {
         let folder = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("robots").join(name);
@@ -79,6 +132,19 @@ mod tests {
             eprintln!("{name}: {} of {possible} pairs", stored.pairs.len());
             assert!(!stored.pairs.is_empty());
         }
+    }
+
+    #[test]
+    fn links_that_are_always_near_are_told_from_those_that_can_meet() {
+        let mut robot = robot("titan4");
+        assert!(always_near(&robot, 0.03, 200, 1).is_empty());
+        let clear = clear_angles(&robot, 0.03, 100, 1).expect("it can stand clear of itself");
+        assert!(!ClearanceModel::of_arm_alone(&robot).is_nearer_than(&clear, 0.03));
+        // A base that reaches out to the forearm wherever that is.
+        robot.bodies[0].collisions[0].shape = Shape::Sphere { radius_m: 3.0 };
+        let found = always_near(&robot, 0.03, 200, 1);
+        assert!(found.contains(&["base_link".to_owned(), "forearm_link".to_owned()]), "{found:?}");
+        assert!(clear_angles(&robot, 0.03, 100, 1).is_none());
     }
 
     /// A list that leaves a pair out changes what planning tests, and a true one changes no answer.
