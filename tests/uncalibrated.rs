@@ -22,7 +22,7 @@ fn run(routine: &str, arm: &str, seed: u64, more: &[&str], out: &Path) -> RunSum
     serde_json::from_str(&read(&out.join("summary.json"))).expect("a summary")
 }
 
-/// One seed of each arm on each vehicle; the study has hundreds (docs/planning.md).
+/// One seed of each arm on each vehicle; the study has hundreds (docs/theory/planning.md).
 #[test]
 fn no_contact_on_the_way_to_a_good_calibration() {
     let (mut links, mut beyond) = (0, 0);

@@ -10,10 +10,10 @@ const HEAD: &str = "\
 # Joint sensors as calibrated by armcal. For each joint, in rad:
 #   travel = reading - center_counts, wrapped to half of wrap_counts either way
 #   angle = center_rad + offset_rad + gain_rad_per_count * travel
-# and terms where there are any; docs/files.md of armcal, calibration.toml, has their equation. Apply them once: no
-# transmission or table beside them. Zeros are those of the exported URDF. covariance.matrix is square, row by row, of
-# covariance.parameters: gains relative to the datasheet's, all else in the units of the keys; across joints it is in
-# calibration.covariance.toml.
+# and terms where there are any; docs/reference/files.md of armcal, calibration.toml, has their equation. Apply them
+# once: no transmission or table beside them. Zeros are those of the exported URDF. covariance.matrix is square, row by
+# row, of covariance.parameters: gains relative to the datasheet's, all else in the units of the keys; across joints it
+# is in calibration.covariance.toml.
 ";
 
 /// The parameters of `calibration`, which is one of `robot`'s, under `/**` and the prefix `calibration`.

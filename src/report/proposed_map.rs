@@ -49,8 +49,8 @@ pub fn propose_input_map(recording: &Path, robot: Option<&Robot>) -> Result<Stri
     let tags = choose_tags(&contents)
         .ok_or_else(|| missing("tags (transforms, apriltag_msgs/msg/AprilTagDetectionArray or sensor_msgs images)"))?;
     let mut text = format!(
-        "# Proposed by `armcal inspect --write-input` for {}.\n# Look at each choice; docs/real-arms.md says what the \
-         keys mean.\nversion = 1\n",
+        "# Proposed by `armcal inspect --write-input` for {}.\n# Look at each choice; docs/reference/real-arms.md says \
+         what the keys mean.\nversion = 1\n",
         comment(&file)
     );
     text += "# max_gap_s = 0.5   # a tag message farther than this from any joint reading is left out\n";

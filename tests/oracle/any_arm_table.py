@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Table of docs/any-arm.md: what `armcal new-robot` and `armcal check` make of well-known arms' URDFs.
+"""Table of docs/reference/any-arm.md: what `armcal new-robot` and `armcal check` make of well-known arms' URDFs.
 
     python tests/oracle/any_arm_table.py target/release/armcal [FOLDER...]
 

@@ -26,7 +26,7 @@ ROOT = Path(__file__).resolve().parents[2]
 STEP_S = 0.002
 STEPS_A_CALL = 500
 ROUNDS = 60
-# The standard world's hydraulics: docs/simulation.md.
+# The standard world's hydraulics: docs/theory/simulation.md.
 SUPPLY_PRESSURE_PA = 2.07e7
 BULK_MODULUS_PA = 1e9
 DEAD_VOLUME_RATIO = 2.0

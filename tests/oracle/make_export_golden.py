@@ -1,6 +1,6 @@
 """The exports of a calibration as Pinocchio and yourdfpy read them -> tests/golden/export/poses.json.
 
-Runs the program (target/release/armcal, or the path given) on tests/golden/export/calibration.toml and compares with docs/files.md,
+Runs the program (target/release/armcal, or the path given) on tests/golden/export/calibration.toml and compares with docs/reference/files.md,
 carried out here: counts to angles, link corrections and camera mount on Pinocchio's model of the drawing.
 """
 
@@ -59,7 +59,7 @@ def sensors(robot, model, calibration):
 
 
 def angle(sensor, counts, with_terms):
-    """The equation of docs/files.md at the reference's conditions."""
+    """The equation of docs/reference/files.md at the reference's conditions."""
     joint = sensor["joint"]
     wrap = sensor["wrap"]
     travel = (counts - sensor["center_counts"] + 0.5 * wrap) % wrap - 0.5 * wrap
@@ -223,7 +223,7 @@ def main():
 
 def write(cases, worst, joints):
     golden = {
-        "what": "calibration.toml beside this file on robots/titan4: counts to angles by docs/files.md (joint_angles_rad; without terms: "
+        "what": "calibration.toml beside this file on robots/titan4: counts to angles by docs/reference/files.md (joint_angles_rad; without terms: "
         "straight_angles_rad), tool point and camera by Pinocchio on the exported URDF. Base frame.",
         "tool": "pinocchio, yourdfpy",
         "tool_version": f"{pinocchio.__version__}, {yourdfpy.__version__}",

@@ -1,4 +1,4 @@
-"""Draws the checks of docs/physics.md: runs the tests, reads the lines that begin with `plot`, writes docs/checks/*.png.
+"""Draws the checks of docs/theory/physics.md: runs the tests, reads the lines that begin with `plot`, writes docs/results/checks/*.png.
 
     target/oracle/bin/python tests/oracle/plot_checks.py               # runs cargo test
     target/oracle/bin/python tests/oracle/plot_checks.py LOG [LOG..]   # reads what the tests printed before
@@ -21,7 +21,7 @@ import numpy as np
 from PIL import Image
 
 ROOT = Path(__file__).resolve().parents[2]
-CHECKS = ROOT / "docs" / "checks"
+CHECKS = ROOT / "docs" / "results" / "checks"
 TESTS = [
     ["--lib", "--", "sim::dynamics", "sim::physics", "sim::hydraulics", "sim::sensors"],
     ["--test", "main", "--", "oracle::steps"],

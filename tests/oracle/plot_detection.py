@@ -1,4 +1,4 @@
-"""Draws docs/checks/detection-rate.png and detection-error.png.
+"""Draws docs/results/checks/detection-rate.png and detection-error.png.
 
 From tests/golden/detection.csv (conditions.csv of `armcal study detection`) and tests/golden/detectors.csv (compare_detectors.py).
 """
@@ -14,7 +14,7 @@ import numpy as np
 
 ROOT = Path(__file__).parents[2]
 GOLDEN = ROOT / "tests/golden"
-OUT = ROOT / "docs/checks"
+OUT = ROOT / "docs/results/checks"
 WATERS = ["clear", "coastal", "turbid"]
 
 

@@ -1,4 +1,4 @@
-"""Draws docs/checks/online-growth.png from what `cargo bench --bench growth` printed.
+"""Draws docs/results/checks/online-growth.png from what `cargo bench --bench growth` printed.
 
     target/oracle/bin/python tests/oracle/plot_growth.py growth.csv
 """
@@ -12,7 +12,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
-CHECKS = Path(__file__).resolve().parents[2] / "docs" / "checks"
+CHECKS = Path(__file__).resolve().parents[2] / "docs" / "results" / "checks"
 
 table = np.genfromtxt(sys.argv[1], delimiter=",", names=True)
 figure, (time, memory) = plt.subplots(2, 1, sharex=True, figsize=(7, 5), constrained_layout=True)

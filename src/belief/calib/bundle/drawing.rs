@@ -49,7 +49,7 @@ pub(crate) struct LinkStart {
     mount_scale: [f64; 2],
 }
 
-/// What an alternative must bring. Of 60 good arms one reached 5 (docs/verdict.md).
+/// What an alternative must bring. Of 60 good arms one reached 5 (docs/theory/verdict.md).
 const MIN_GAIN_NATS: f64 = 6.0;
 /// Sizes of an error that are tried, over robot.toml's.
 pub(crate) const MULTIPLES: [f64; 5] = [2.0, 5.0, 10.0, 20.0, 40.0];
