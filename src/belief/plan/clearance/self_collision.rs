@@ -39,8 +39,8 @@ pub fn sample_self_pairs(robot: &Robot, n: u64, seed: u64) -> SelfPairs {
     SelfPairs { seed, n, near_m: NEAR_M, pairs }
 }
 
-/// Share of the configurations from which links that are near each other there are taken to be so by design, or by hulls
-/// that are larger than the links. The rule of MoveIt's setup assistant.
+/// Share of the configurations from which links that are near each other there are taken to be so by design, or by
+/// hulls that are larger than the links. The rule of MoveIt's setup assistant.
 const NEARLY_ALWAYS: f64 = 0.95;
 
 /// Links that overlap or are nearer to each other than `margin_m` at nearly all of `n` random configurations: no plan

@@ -24,6 +24,13 @@ pub(super) struct Quantizer {
     noise: ChaCha8Rng,
 }
 
+/// Nine bits a turn have 1.4 counts a degree. Whatever has fewer is no converter's word but an angle in rad or deg.
+const MIN_WORD_COUNTS_PER_DEG: f64 = 1.4;
+
+fn is_word(nominal: &JointSensorSpec) -> bool {
+    nominal.counts_per_rad.abs() * 1.0_f64.to_radians() >= MIN_WORD_COUNTS_PER_DEG
+}
+
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum State {
     Alive,
@@ -39,7 +46,7 @@ impl Quantizer {
             wrap_counts: nominal.wrap_counts,
             // An encoder counts lines; nothing is converted.
             noise_rms_counts: if nominal.kind == SensorKind::Encoder { 0.0 } else { spec.noise_rms_counts },
-            step_counts: spec.resolution_counts,
+            step_counts: if is_word(nominal) { spec.resolution_counts } else { 0.0 },
             state: State::Alive,
             counts: 0.0,
             noise: stream_rng(seed, &format!("pot/noise/{}", nominal.joint)),

@@ -305,6 +305,20 @@ fn the_converter_rounds_to_its_step_and_the_word_wraps() {
     assert!((counts - (65322.0 + 230.0 - 65536.0)).abs() < TOLERANCE_COUNTS, "{counts}");
 }
 
+/// A count of a radian is an angle as a driver reports it.
+#[test]
+fn readings_that_are_angles_are_not_rounded_to_whole_counts() {
+    let spec = JointSensorsSpec { resolution_counts: 1.0, ..silent() };
+    for (counts_per_rad, rounded) in
+        [(1.0, false), (1.0_f64.to_degrees(), false), (1024.0 / std::f64::consts::TAU, true)]
+    {
+        let nominal = crate::fixture::exact_sensor(counts_per_rad, 1.0);
+        let mut sensor = JointSensor::new(&nominal, &perfect(), &spec, 1);
+        let counts = sensor.sample(&at(0.3));
+        assert_eq!(counts.fract() == 0.0, rounded, "{counts_per_rad} counts per rad: {counts}");
+    }
+}
+
 #[test]
 fn an_encoder_has_eccentricity_and_steps_and_nothing_of_a_potentiometer() {
     let eccentricity = Some(Harmonic { order: 1.0, amplitude_rad: 0.003, phase_rad: 0.4 });
