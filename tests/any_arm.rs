@@ -8,6 +8,10 @@ use armcal::robot::{Shape, load};
 use crate::support::external::{AS_IN_2018, INPUT_MAP, RealTitan, write_poses};
 use crate::support::{Answer, ShortRoutine, answer, edit, program, read, robot_copy, root, run, temp, titan, write};
 
+/// What a user adds to a new robot.toml so that its arm can be simulated: lens, stowed pose, base tag.
+const LENS: &str = "model = \"equidistant\"\nmax_view_angle_rad = 1.4\nresolution_px = [1224, 1024]\n\
+                    focal_px = [387.0, 387.0]\ncenter_px = [611.5, 511.5]\ndistortion = [0.0, 0.0, 0.0, 0.0]\n";
+
 /// A tetrahedron of 0.1 m, as OBJ.
 const OBJ: &str = "v 0 0 0\nv 0 100 0\nv 100 0 0\nv 0 0 100\nf 1 2 3\nf 1 3 4\nf 1 4 2\nf 3 2 4\n";
 
@@ -380,4 +384,35 @@ fn a_stale_list_of_pairs_stops_planning_alone() {
     let found = answer(program().arg("inspect").arg(recording).arg("--robot").arg(&robot));
     found.expect("inspect", 0, &stale);
     assert_eq!(found.stderr.matches("of another URDF").count(), 1, "{found:?}");
+}
+
+/// From a URDF to a good calibration: nothing of the folder but lens, tags and the arm's place is our own.
+#[test]
+fn an_arm_of_a_urdf_alone_closes_the_loop() {
+    let urdf = read(&root().join("robots/titan4/titan4.urdf"));
+    let bench = Bench::new(&urdf);
+    bench.new_robot(&["--tip", "manipulator_link"]).expect("new-robot", 0, &["6 joints"]);
+    let file = bench.file("robot/robot.toml");
+    edit(&file, "# model = ", &format!("{LENS}# model = "));
+    edit(&file, "# base_tag = 0", "base_tag = 0");
+    edit(&file, "# stowed_rad = ", "stowed_rad = ");
+    let ours = read(&root().join("robots/titan4/robot.toml"));
+    let tags = ours.find("[[tag]]").expect("it has tags");
+    write(&file, &(read(&file) + &ours[tags..]));
+    let routine = ShortRoutine {
+        robot: bench.file("robot"),
+        vehicle: root().join("robots/vehicles/fixed-base.toml"),
+        poses: 16,
+        held_out: 0,
+        ..ShortRoutine::default()
+    };
+    let routine = routine.write(bench.folder.path());
+    let out = bench.file("run");
+    run(&routine, &out).expect("a run", 0, &["ACCEPTED", "contacts     0"]);
+    let summary: serde_json::Value = serde_json::from_str(&read(&out.join("summary.json"))).expect("JSON");
+    let median_mm = |when: &str| {
+        1e3 * summary["score"][when]["tool_error_m"]["median"].as_f64().unwrap_or_else(|| panic!("no {when}"))
+    };
+    let (before_mm, after_mm) = (median_mm("before"), median_mm("after"));
+    assert!(before_mm > 5.0 && after_mm < 2.0, "{before_mm} mm before, {after_mm} mm after");
 }
