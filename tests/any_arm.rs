@@ -144,6 +144,7 @@ fn collision_meshes_become_hulls_wherever_their_paths_lead() {
         let robot = load(&bench.file("robot")).expect("it reads");
         let [hull] = &robot.bodies[3].collisions[..] else { panic!("{name}: one shape") };
         assert!(matches!(hull.shape, Shape::Hull(_)), "{hull:?}");
+        assert_eq!(hull.color_rgb, [160; 3], "what has no material is grey");
         // The corner at the mesh's origin is at x = 1 m; the opposite face is 0.1 m away along each axis.
         let at = |x: f64, y: f64, z: f64| hull.distance_m(&nalgebra::Point3::new(x, y, z + 0.2));
         assert!(at(1.01, 0.01, 0.01) < 1e-9 && (at(0.9, 0.01, 0.01) - 0.1).abs() < 1e-6, "{name}");

@@ -16,6 +16,8 @@ use crate::kinematics::{Attachment, Chain, ChainJoint, JointLimits};
 
 /// Limit of an arm's collision shapes, so that planning places them without allocating.
 pub const MAX_COLLISION_SHAPES: usize = 64;
+/// Grey, for shapes without a material.
+const UNPAINTED_RGB: [u8; 3] = [160; 3];
 
 /// A checked URDF file: a tree of links.
 #[derive(Clone, Debug)]
@@ -216,16 +218,18 @@ impl UrdfModel {
             let body_from_com = body_from_link * isometry(&inertial.origin);
             body.add_mass(mass_kg, &body_from_com, &inertia);
         }
+        // Drawn where a link has nothing else.
+        let color_rgb = link.visual.iter().find_map(|visual| self.color(visual)).unwrap_or(UNPAINTED_RGB);
         for collision in &link.collision {
             let origin = &collision.origin;
             let placed = match (named_mesh(link, &collision.geometry), meshes) {
                 (None, _) => {
                     let Some(shape) = primitive(&collision.geometry) else { continue };
-                    self.placed(&link.name, Element { origin, shape, color_rgb: [0; 3] }, body_from_link)?
+                    self.placed(&link.name, Element { origin, shape, color_rgb }, body_from_link)?
                 }
                 (Some(mesh), Some(folders)) => {
                     let (shape, center_m) = folders.hull(&self.file, &mesh)?;
-                    let element = Element { origin, shape, color_rgb: [0; 3] };
+                    let element = Element { origin, shape, color_rgb };
                     let mut placed = self.placed(&link.name, element, body_from_link)?;
                     placed.owner_from_shape *= Translation3::from(center_m);
                     placed
@@ -246,14 +250,15 @@ impl UrdfModel {
         for visual in &link.visual {
             // Nothing is drawn of a mesh.
             let Some(shape) = primitive(&visual.geometry) else { continue };
-            let color_rgb = visual.material.as_ref().and_then(|m| self.color(m)).unwrap_or([160, 160, 160]);
+            let color_rgb = self.color(visual).unwrap_or(UNPAINTED_RGB);
             let element = Element { origin: &visual.origin, shape, color_rgb };
             body.visuals.push(self.placed(&link.name, element, body_from_link)?);
         }
         Ok(())
     }
 
-    fn color(&self, material: &urdf_rs::Material) -> Option<[u8; 3]> {
+    fn color(&self, visual: &urdf_rs::Visual) -> Option<[u8; 3]> {
+        let material = visual.material.as_ref()?;
         let named = self.robot.materials.iter().find(|m| m.name == material.name);
         let color = material.color.as_ref().or_else(|| named.and_then(|m| m.color.as_ref()))?;
         Some([0, 1, 2].map(|k| (color.rgba.0[k].clamp(0.0, 1.0) * 255.0).round() as u8))
