@@ -1,28 +1,32 @@
 #!/usr/bin/env python3
-"""Table of closed loops for well-known arms: `armcal new-robot`, `check`, `plan` and `run`, with tags around each arm.
+"""Table of closed loops for well-known arms: `armcal new-robot`, `check` and `run`, with tags around each arm.
 
     python tests/oracle/any_arm_loops.py target/release/armcal FOLDER [NAME...]
 
 Reads the URDFs of the wheel example-robot-data (requirements.txt). FOLDER takes the robot folders, routines and runs.
-What `new-robot` leaves to be filled in is filled in here, the same for every arm: a wrist lens 6 cm before the link that
-`new-robot` chose, known to 5 mm and 0.02 rad, joint rates of 0.5 rad/s, 50 N m where the URDF says none, 16 tags on a
-sphere about the arm, and eight targets that some configuration reaches; `stowed_rad` is the one that `new-robot` found.
-Prints Markdown.
+What a user has to do is done here, by the same rules for every arm: collision meshes that are COLLADA or have too many
+corners become STL hulls; a missing effort is that of the weakest other joint; an inertia that is none becomes a small
+one; a wrist lens 6 cm before the link that `new-robot` chose, known to 5 mm and 0.02 rad; joint rates of 0.5 rad/s;
+16 tags on a sphere about the arm; eight targets that some configuration reaches. `stowed_rad` is the one that
+`new-robot` found. Prints Markdown.
 """
 
 import json
 import pathlib
 import re
+import shutil
 import subprocess
 import sys
 import sysconfig
 import xml.etree.ElementTree as ElementTree
 
 import numpy as np
+import trimesh
 
 ROBOTS = "cmeel.prefix/share/example-robot-data/robots"
 ARMS = {
     "panda": ("panda_description/urdf/panda.urdf", []),
+    "ur3": ("ur_description/urdf/ur3_robot.urdf", []),
     "ur5": ("ur_description/urdf/ur5_robot.urdf", []),
     "ur10": ("ur_description/urdf/ur10_robot.urdf", []),
     "kinova": ("kinova_description/robots/kinova.urdf", ["--tip", "j2s6s200_end_effector"]),
@@ -34,6 +38,9 @@ ARMS = {
     "baxter": ("baxter_description/urdf/baxter.urdf", ["--tip", "left_gripper"]),
     "pr2": ("pr2_description/urdf/pr2.urdf", ["--tip", "r_wrist_roll_link"]),
 }
+# Weight that something else carries: water, or springs that are in no URDF.
+CARRIED = {"bravo7": 0.7, "pr2": 0.9, "baxter": 0.7}
+MOST_CORNERS = 1000
 LENS = """model = "equidistant"
 resolution_px = [1280, 1024]
 focal_px = [400.0, 400.0]
@@ -48,6 +55,10 @@ mount_std_rad = 0.02
 """
 VEHICLE = pathlib.Path(__file__).resolve().parents[2] / "robots/vehicles/fixed-base.toml"
 N_TAGS, N_TARGETS = 16, 8
+
+
+def robots_folder():
+    return pathlib.Path(sysconfig.get_path("purelib")) / ROBOTS
 
 
 def said(program, *args):
@@ -174,22 +185,46 @@ bulk_modulus_pa = 1e10
 """
 
 
-def add_efforts(drawing):
-    """Some URDFs have no effort limit, without which nothing can be simulated."""
+def mended(description, copy):
+    """A copy of the folder with meshes that armcal reads."""
+    shutil.copytree(description, copy)
+    for mesh in [*copy.rglob("*.[dD][aA][eE]"), *copy.rglob("*.[sS][tT][lL]")]:
+        scene = trimesh.load(mesh, force="scene")
+        hull = scene.to_geometry().convex_hull
+        if mesh.suffix.lower() == ".dae" or len(hull.vertices) > MOST_CORNERS:
+            directions = np.random.default_rng(1).normal(size=(MOST_CORNERS, 3))
+            corners = hull.vertices[np.unique(np.argmax(directions @ hull.vertices.T, axis=1))]
+            mesh.unlink()
+            place = mesh.with_suffix(".stl") if mesh.suffix.lower() == ".dae" else mesh
+            trimesh.convex.convex_hull(corners).export(place, file_type="stl")
+
+
+def add_dynamics(drawing):
     tree = ElementTree.parse(drawing)
-    for joint in tree.getroot().findall("joint"):
-        if joint.get("type") in ("revolute", "continuous"):
-            limit = joint.find("limit")
-            if limit is None:
-                limit = ElementTree.SubElement(joint, "limit", velocity="0.5")
-            if float(limit.get("effort") or 0) == 0:
-                limit.set("effort", "50")
+    moving = [j for j in tree.getroot().findall("joint") if j.get("type") in ("revolute", "continuous")]
+    efforts = [float(j.find("limit").get("effort") or 0) for j in moving if j.find("limit") is not None]
+    weakest = min((effort for effort in efforts if effort > 0), default=50.0)
+    for joint in moving:
+        limit = joint.find("limit")
+        if limit is None:
+            limit = ElementTree.SubElement(joint, "limit", velocity="0.5")
+        if float(limit.get("effort") or 0) == 0:
+            limit.set("effort", str(weakest))
+    for inertia in tree.getroot().iter("inertia"):
+        xx, yy, zz, xy, xz, yz = (float(inertia.get(k) or 0) for k in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz"))
+        if np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])[0] <= 0:
+            for key in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz"):
+                inertia.set(key, "1e-4" if key[1] == key[2] else "0")
     tree.write(drawing)
 
 
 def prepared(program, folder, name, urdf, more):
     robot = folder / name
-    code, text = said(program, "new-robot", urdf, "--name", name, "--out", robot, *more)
+    # ROBOTS/DESCRIPTION/.../ARM.urdf: `package://` paths begin with the folders above.
+    description = urdf.parents[len(urdf.relative_to(robots_folder()).parts) - 2]
+    copy = folder / "given" / name / "example-robot-data/robots" / description.name
+    mended(description, copy)
+    code, text = said(program, "new-robot", copy / urdf.relative_to(description), "--name", name, "--out", robot, *more)
     if code:
         raise RuntimeError(text.splitlines()[0])
     chain = Chain(robot)
@@ -203,9 +238,10 @@ def prepared(program, folder, name, urdf, more):
     targets = [chain.tool(chain.random(rng, 0.6)) for _ in range(N_TARGETS)]
     (folder / f"{name}.toml").write_text(routine(name, targets))
     toml = toml.replace("# stowed_rad = ", "stowed_rad = ")
+    toml = toml.replace("buoyancy_fraction = 0.0", f"buoyancy_fraction = {CARRIED.get(name, 0.0)}")
     toml = re.sub(r"\nmax_rate_rad_s = .*", "\nmax_rate_rad_s = 0.5", toml)
     drawing = robot / re.search(r'\nurdf = "([^"]*)"', toml).group(1)
-    add_efforts(drawing)
+    add_dynamics(drawing)
     (robot / "robot.toml").write_text(toml)
     code, text = said(program, "check", folder / f"{name}.toml")
     if code:
@@ -237,7 +273,7 @@ def row(program, folder, name, urdf, more):
 def main():
     program, folder = sys.argv[1], pathlib.Path(sys.argv[2])
     folder.mkdir(parents=True, exist_ok=True)
-    robots = pathlib.Path(sysconfig.get_path("purelib")) / ROBOTS
+    robots = robots_folder()
     print("| arm | verdict | before, mm | after, mm | predicted, mm | contacts |")
     print("|---|---|--:|--:|--:|--:|")
     for name, (urdf, more) in ARMS.items():
