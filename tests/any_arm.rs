@@ -8,7 +8,7 @@ use armcal::robot::{Shape, load};
 use crate::support::external::{AS_IN_2018, INPUT_MAP, RealTitan, write_poses};
 use crate::support::{Answer, ShortRoutine, answer, edit, program, read, robot_copy, root, run, temp, titan, write};
 
-/// What a user adds to a new robot.toml so that its arm can be simulated: lens, stowed pose, base tag.
+/// The lens that a user adds to a new robot.toml, for the simulator.
 const LENS: &str = "model = \"equidistant\"\nmax_view_angle_rad = 1.4\nresolution_px = [1224, 1024]\n\
                     focal_px = [387.0, 387.0]\ncenter_px = [611.5, 511.5]\ndistortion = [0.0, 0.0, 0.0, 0.0]\n";
 
@@ -397,6 +397,7 @@ fn an_arm_of_a_urdf_alone_closes_the_loop() {
     edit(&file, "# model = ", &format!("{LENS}# model = "));
     edit(&file, "# base_tag = 0", "base_tag = 0");
     edit(&file, "# stowed_rad = ", "stowed_rad = ");
+    edit(&file, "point_m = [0.0, 0.0, 0.0]", "point_m = [0.0, -0.253, 0.0]");
     let ours = read(&root().join("robots/titan4/robot.toml"));
     let tags = ours.find("[[tag]]").expect("it has tags");
     write(&file, &(read(&file) + &ours[tags..]));
