@@ -12,9 +12,7 @@ pub enum CalibError {
     NoCaptures { recording: String },
     #[error("{recording}: holds no view to fit; the arm came to rest for held-out views alone ({held_out})")]
     NoFitViews { recording: String, held_out: usize },
-    #[error(
-        "{recording}: no surveyed tag was seen in any view to fit; tags of robot `{robot}`: {known:?}, seen: {seen:?}"
-    )]
+    #[error("{recording}: {}", no_tags(robot, known, seen))]
     NoTags { recording: String, robot: String, known: Vec<u32>, seen: Vec<u32> },
     #[error("{recording}: only {views} captured views show a surveyed tag; at least {needed} are needed")]
     TooFewViews { recording: String, views: usize, needed: usize },
@@ -48,4 +46,14 @@ pub enum CalibError {
     AllRejected { recording: String, reasons: String },
     #[error("{recording}: topic {topic}: {disorder}")]
     Disorder { recording: String, topic: String, disorder: StampRegression },
+}
+
+/// Which tags there are and which were seen, and what to do.
+fn no_tags(robot: &str, known: &[u32], seen: &[u32]) -> String {
+    let todo = if seen.is_empty() {
+        "the camera saw no tag at all: check its images, light and water, and the topic of the tags"
+    } else {
+        "correct the ids in the tag map or in robot.toml"
+    };
+    format!("no surveyed tag was seen in any view to fit; tags of robot `{robot}`: {known:?}, seen: {seen:?}; {todo}")
 }

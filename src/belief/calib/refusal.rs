@@ -233,6 +233,17 @@ impl Refusal {
         matches!(self, Self::TooFewViews { .. } | Self::NotSolved { .. } | Self::TooFewViewsSinceSlip { .. })
     }
 
+    /// Which reason is told first: what makes all others a consequence. Those of one rank stay in their order.
+    pub(crate) fn rank(&self) -> u8 {
+        match self {
+            Self::TooFewViews { .. } | Self::TooFewViewsSinceSlip { .. } => 0,
+            // Where hardly any observation fits, the solver's end and every test of the rest say nothing.
+            Self::Outliers { outliers, observations } if 2 * outliers > *observations => 1,
+            Self::PriorContradicted { used_share, .. } if *used_share < MIN_USED_SHARE => 2,
+            _ => 3,
+        }
+    }
+
     /// A short code, for narrow links.
     #[must_use]
     pub fn code(&self) -> &'static str {
@@ -259,6 +270,9 @@ impl Refusal {
                 "keep the datasheet's sensors, or check tag map, camera mount and time stamps"
             }
             Self::Overfitted { .. } => "capture more views, or more different ones",
+            Self::PriorsBeyondTolerance { most: Some(most), .. } if most.starts_with("tag survey") => {
+                "measure how the frame of the tags stands to the arm's base, and state its sigmas in the tag map"
+            }
             Self::PriorsBeyondTolerance { .. } => {
                 "put a tag on the gripper, touch three surveyed surfaces (step `touch`), or measure the arm and state \
                  its sigmas in [geometry] of robot.toml"
@@ -291,7 +305,22 @@ impl fmt::Display for Refusal {
     }
 }
 
+/// A refusal without its remedy.
+struct Cause<'a>(&'a Refusal);
+
+impl fmt::Display for Cause<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.fmt_cause(f)
+    }
+}
+
 impl Refusal {
+    /// Cause and evidence in words, without [`Self::remedy`].
+    #[must_use]
+    pub fn cause(&self) -> String {
+        Cause(self).to_string()
+    }
+
     /// Cause and evidence.
     fn fmt_cause(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -345,19 +374,16 @@ impl Refusal {
                 mm(*held_out_m),
                 mm(*fit_m)
             ),
-            Self::BeyondTolerance { predicted_m, tolerance_m } => write!(
-                f,
-                "the predicted tool error of {:.1} mm exceeds the task's tolerance of {:.1} mm",
-                mm(*predicted_m),
-                mm(*tolerance_m)
-            ),
+            Self::BeyondTolerance { predicted_m, tolerance_m } => {
+                let [predicted, tolerance] = told_apart_mm([*predicted_m, *tolerance_m]);
+                write!(f, "the predicted tool error of {predicted} mm exceeds the task's tolerance of {tolerance} mm")
+            }
             Self::PriorsBeyondTolerance { predicted_m, tolerance_m, most } => {
+                let [predicted, tolerance] = told_apart_mm([*predicted_m, *tolerance_m]);
                 write!(
                     f,
-                    "predicted tool error with what no view shows is {:.1} mm (95 % of the targets), the task \
-                     tolerates {:.1} mm",
-                    predicted_m * 1e3,
-                    tolerance_m * 1e3
+                    "predicted tool error with what no view shows is {predicted} mm (95 % of the targets), the task \
+                     tolerates {tolerance} mm"
                 )?;
                 most.as_ref().map_or(Ok(()), |most| write!(f, "; most of it by the {most}"))
             }
@@ -464,6 +490,12 @@ impl Refusal {
     }
 }
 
+/// Two lengths in mm with one digit, or with as many as tell them apart, up to four.
+fn told_apart_mm(lengths_m: [f64; 2]) -> [String; 2] {
+    let with = |digits: usize| lengths_m.map(|m| format!("{:.digits$}", m * 1e3));
+    (1..4).map(with).find(|[a, b]| a != b).unwrap_or_else(|| with(4))
+}
+
 /// All reasons in one line, the first one first; `None` where there is none.
 #[must_use]
 pub fn in_words(refusals: &[Refusal]) -> Option<String> {
@@ -474,6 +506,22 @@ pub fn in_words(refusals: &[Refusal]) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn figures_that_differ_are_told_apart() {
+        let refusal = |predicted_m| Refusal::BeyondTolerance { predicted_m, tolerance_m: 0.003 };
+        assert!(refusal(0.0041).to_string().contains("4.1 mm exceeds the task's tolerance of 3.0 mm"));
+        assert!(refusal(0.003_04).to_string().contains("3.04 mm exceeds the task's tolerance of 3.00 mm"));
+    }
+
+    #[test]
+    fn what_explains_all_others_comes_first() {
+        let solver = Refusal::NotSolved { outcome: armcal_core::numeric::Outcome::Stalled, evaluations: 9 };
+        let outliers = |outliers| Refusal::Outliers { outliers, observations: 100 };
+        let few = Refusal::TooFewViews { views: 3, parameters: 9 };
+        assert!(outliers(60).rank() < solver.rank() && few.rank() < outliers(60).rank());
+        assert_eq!(outliers(40).rank(), solver.rank());
+    }
     use crate::calib::geometry_error::ErrorKind;
 
     #[test]
