@@ -12,6 +12,7 @@ use nalgebra::{Const, DMatrix, DVector, Dyn, Matrix3, Matrix6, OMatrix, Vector3,
 use crate::calib::methods::gripper_tag::MountEstimate;
 use crate::calib::methods::position_problem::PositionProblem;
 use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
+use crate::calib::result::details::TargetPrediction;
 use crate::calib::views::view::{TagObservation, TaskRests};
 use armcal_core::kinematics::{IkGoal, IkSettings, JointLimits, solve_position};
 use armcal_core::robot::{FailedJoint, FailedKind, JointSensorSpec, Robot};
@@ -47,8 +48,8 @@ pub struct JointAt<'a> {
 pub struct ToolErrorPrediction {
     /// Over the targets that inverse kinematics reaches.
     pub error_m: Summary,
-    /// The arm's angles at each target that inverse kinematics reaches, and the error there, m.
-    pub targets: Vec<(JointAngles, f64)>,
+    /// One by one.
+    pub targets: Vec<TargetPrediction>,
 }
 
 /// Distances below this do not make the objective's curvature larger: it is where pixel noise sits, m.
@@ -275,7 +276,12 @@ fn is_locked(robot: &Robot, joint: usize) -> bool {
 /// The arm's angles at each target that inverse kinematics reaches: from where the arm rested for it, as a `reach` goes
 /// there; where it did not, from the stowed pose or the other rests.
 #[must_use]
-pub fn task_angles(robot: &Robot, TaskRests { task, rests }: TaskRests<'_>) -> Vec<JointAngles> {
+pub fn task_angles(robot: &Robot, task: TaskRests<'_>) -> Vec<JointAngles> {
+    numbered_task_angles(robot, task).into_iter().map(|(_, angles)| angles).collect()
+}
+
+/// The same with the number of each target.
+fn numbered_task_angles(robot: &Robot, TaskRests { task, rests }: TaskRests<'_>) -> Vec<(u32, JointAngles)> {
     let open = JointLimits { lower_rad: -std::f64::consts::TAU, upper_rad: std::f64::consts::TAU };
     let settings = IkSettings {
         limits: robot.chain.joints().iter().map(|joint| joint.limits.unwrap_or(open)).collect(),
@@ -283,7 +289,7 @@ pub fn task_angles(robot: &Robot, TaskRests { task, rests }: TaskRests<'_>) -> V
         tolerance_m: 1e-4,
         max_iterations: 200,
     };
-    let reached = (0..).zip(&task.targets_m).filter_map(|(target_idx, target)| {
+    let reached = (0..).zip(&task.targets_m).filter_map(|(target_idx, target): (u32, _)| {
         let goal = IkGoal { position_m: Vector3::from(*target) };
         let from = |start: &JointAngles| solve_position(&robot.chain, &robot.tool.mount, &goal, start, &settings).ok();
         let rest = |rest: &JointAngles| {
@@ -291,7 +297,9 @@ pub fn task_angles(robot: &Robot, TaskRests { task, rests }: TaskRests<'_>) -> V
         };
         let own = rests.get(&target_idx).map(rest).and_then(|rest| from(&rest));
         // With a joint that is locked elsewhere the way there may lead past a limit.
-        own.or_else(|| from(&robot.stowed)).or_else(|| rests.values().find_map(|other| from(&rest(other))))
+        let angles =
+            own.or_else(|| from(&robot.stowed)).or_else(|| rests.values().find_map(|other| from(&rest(other))));
+        Some((target_idx, angles?))
     });
     reached.collect()
 }
@@ -306,8 +314,14 @@ pub fn predict_tool_error(
 ) -> Option<ToolErrorPrediction> {
     let sensors = at.sensors(robot);
     let error_m = |angles: &JointAngles| covariance.tool_position_m2(robot, &sensors, angles).trace().max(0.0).sqrt();
-    let targets: Vec<(JointAngles, f64)> = task_angles(robot, task?).into_iter().map(|at| (at, error_m(&at))).collect();
-    let errors: Vec<f64> = targets.iter().map(|(_, error_m)| *error_m).collect();
+    let predict = |(target_idx, angles): (u32, JointAngles)| TargetPrediction {
+        target_idx: target_idx as usize,
+        angles,
+        error_m: error_m(&angles),
+        with_priors_m: None,
+    };
+    let targets: Vec<TargetPrediction> = numbered_task_angles(robot, task?).into_iter().map(predict).collect();
+    let errors: Vec<f64> = targets.iter().map(|target| target.error_m).collect();
     Some(ToolErrorPrediction { error_m: Summary::of(&errors)?, targets })
 }
 

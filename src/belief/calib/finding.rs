@@ -65,6 +65,46 @@ pub enum FindingKind {
     Outliers,
 }
 
+impl FindingKind {
+    /// In words: `moved tag`.
+    #[must_use]
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::TagMoved => "tag moved",
+            Self::TagsMoved => "tags moved together",
+            Self::TagSize => "tag of another size",
+            Self::TagSwapped => "tags swapped",
+            Self::Lens => "lens not as stated",
+            Self::Link => "link not as drawn",
+            Self::Sag => "bends under its weight",
+            Self::CameraMount => "camera not mounted as drawn",
+            Self::Base => "base not where the survey has it",
+            Self::Tool => "tool point not as drawn",
+            Self::SensorSlip => "sensor slipped",
+            Self::SensorReversed => "sensor reads the other way",
+            Self::SensorScale => "sensor of another scale",
+            Self::SensorFailed => "joint or sensor failed",
+            Self::SensorWorn => "sensor worn",
+            Self::Outliers => "tag observations rejected",
+        }
+    }
+}
+
+impl Finding {
+    /// The size in units that people measure in: `12.0 mm`.
+    #[must_use]
+    pub fn size_in_words(&self) -> Option<String> {
+        let size = self.size?;
+        Some(match self.unit? {
+            FindingUnit::Metre => format!("{:.1} mm", size * 1e3),
+            FindingUnit::Radian => format!("{:.2} deg", size.to_degrees()),
+            FindingUnit::One => format!("{size:.3}"),
+            FindingUnit::RadianPerNewtonMetre => format!("{:.3} deg per kN m", 1e3 * size.to_degrees()),
+            FindingUnit::Newton => format!("{size:.0} N"),
+        })
+    }
+}
+
 /// SI, and plain numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum FindingUnit {

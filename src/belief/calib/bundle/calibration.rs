@@ -297,12 +297,13 @@ impl<'a> BundleCalibration<'a> {
         let parameters = estimate.parameters();
         let evidence = Evidence {
             held_out: diagnosis.held_out.clone(),
-            predicted_tool_error_m: self.impact(estimated, diagnosis, &parameters).tool_error_m(),
+            predicted: self.impact(estimated, diagnosis, &parameters).prediction(),
             n_parameters: setup.n_wanted(datasheet),
         };
         let mut calibration = assemble(&source, &fit, evidence);
         let n_corners = estimate.outliers.iter().filter(|outlier| outlier.corner.is_some()).count();
         calibration.fit.rejected_corners = (n_corners > 0).then_some(n_corners);
+        estimate.complete(&mut calibration.details);
         let kept = &calibration.covariance.parameters;
         let with_mount = covariance_with_mount(&robot, estimate, kept);
         Calibration {
@@ -383,13 +384,14 @@ impl<'a> BundleCalibration<'a> {
             calibration.reservations = by_priors(&views, median_m).told();
             return;
         };
-        let (targets, errors): (Vec<JointAngles>, Vec<f64>) = by_data.targets.into_iter().unzip();
+        let targets: Vec<JointAngles> = by_data.targets.iter().map(|target| target.angles).collect();
         let by_priors = by_priors(&targets, by_data.error_m.median);
-        let both = errors
-            .iter()
-            .zip(&by_priors.covariances_m2)
-            .map(|(error, by)| (error * error + by.trace()).max(0.0).sqrt());
-        let with_priors = Summary::of(&both.collect::<Vec<f64>>());
+        let both = by_data.targets.iter().zip(&by_priors.covariances_m2);
+        let both: Vec<f64> = both.map(|(at, by)| (at.error_m * at.error_m + by.trace()).max(0.0).sqrt()).collect();
+        let with_priors = Summary::of(&both);
+        for (target, with_priors_m) in calibration.details.targets.iter_mut().zip(both) {
+            target.with_priors_m = Some(with_priors_m);
+        }
         calibration.predicted_tool_error_with_priors_m = with_priors;
         calibration.reservations = by_priors.told();
         let task = self.data.data.task.as_ref();
@@ -405,7 +407,11 @@ impl<'a> BundleCalibration<'a> {
 
     /// Whether the views agree with the prior, and what that refuses for.
     fn prior_consistency(&self, setup: &BundleSetup) -> (Option<PriorConsistency>, Vec<Refusal>) {
-        let is_reused = self.prior.is_some_and(|prior| prior.messages_hash == self.data.messages_hash);
+        // The same views by another path, as from several recordings, have another hash and end at the same time.
+        let last = self.data.data.fit.iter().map(|view| view.end.nanos).max();
+        let is_reused = self.prior.is_some_and(|prior| {
+            prior.messages_hash == self.data.messages_hash || Some(prior.valid.time_nanos) == last
+        });
         let mut refusals: Vec<Refusal> = is_reused.then_some(Refusal::PriorReused).into_iter().collect();
         let consistency = match setup.prior() {
             None => None,

@@ -12,6 +12,8 @@ use crate::calib::bundle::problem::{BundleProblem, ObservationTerm, State, Weigh
 use crate::calib::bundle::robust_start::{RobustStart, robust_start, straight_sensor_std};
 use crate::calib::bundle::solve::{LOOSE, Solved, TIGHT, solve, until};
 use crate::calib::parameters::{JointParameters, Parameter};
+use crate::calib::result::details::FitDetails;
+use armcal_core::joints::JointAngles;
 use armcal_core::numeric::{Loss, Outcome};
 use armcal_core::robot::Robot;
 use armcal_core::spatial::Pose;
@@ -153,6 +155,23 @@ impl Estimate<'_> {
         let used = self.problem.observations.iter().filter(|observation| observation.is_used);
         let n: usize = used.map(|observation| observation.data.n_coordinates()).sum();
         n > 0 && self.cost_final < CONSISTENT_COST * n as f64
+    }
+
+    /// What `bundle` knows beyond the arm's residuals: what it rejected, and what each joint was off in each view.
+    pub(crate) fn complete(&self, details: &mut FitDetails) {
+        let n_joints = self.problem.robot.n_joints();
+        for (view, error_rad) in details.views.iter_mut().zip(&self.solved.state.joint_error) {
+            view.joint_error_rad = Some(JointAngles::from_fn(n_joints, |joint| error_rad[joint]));
+        }
+        for outlier in &self.outliers {
+            let Some(view) = details.views.get_mut(outlier.view_idx) else { continue };
+            for tag in view.tags.iter_mut().filter(|tag| tag.id == outlier.tag_id) {
+                match outlier.corner {
+                    None => tag.is_used = false,
+                    Some(corner) => tag.corners[corner].iter_mut().for_each(|corner| corner.is_used = false),
+                }
+            }
+        }
     }
 
     /// Whether any observation of a view is used.

@@ -72,8 +72,7 @@ pub(crate) fn calibrate_positions(
         identified: &data.identified,
     };
     let fit = Fit { problem: &problem, solution: &solution, covariance: &covariance, linearity_scale };
-    let predicted_tool_error_m = predicted.map(|predicted| predicted.error_m);
-    let calibration = assemble(&source, &fit, Evidence { held_out, predicted_tool_error_m, n_parameters });
+    let calibration = assemble(&source, &fit, Evidence { held_out, predicted, n_parameters });
     Ok(Calibration {
         unobservable: grouped_names(&start.robot, &unobservable),
         camera_mount: CameraMount::of(&start.robot, &start.mount),

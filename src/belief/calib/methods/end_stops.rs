@@ -38,11 +38,7 @@ pub(crate) fn calibrate(data: CalibrationData, prior: Option<&Calibration>) -> R
         identified: &identified,
     };
     let fit = Fit { problem: &problem, solution: &fitted.solution, covariance, linearity_scale };
-    let evidence = Evidence {
-        held_out: held_out_metrics(&held_out, at),
-        predicted_tool_error_m: predicted.map(|predicted| predicted.error_m),
-        n_parameters: 0,
-    };
+    let evidence = Evidence { held_out: held_out_metrics(&held_out, at), predicted, n_parameters: 0 };
     let unobservable = grouped_names(&robot, &fitted.left_out);
     Ok(Calibration { unobservable, ..assemble(&source, &fit, evidence) })
 }

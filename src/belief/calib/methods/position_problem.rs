@@ -84,7 +84,7 @@ impl<'a> PositionProblem<'a> {
         })
     }
 
-    fn angles(&self, view: &View, departure: &ConditionChange, parameters: &JointParameters) -> JointAngles {
+    pub(crate) fn angles(&self, view: &View, departure: &ConditionChange, parameters: &JointParameters) -> JointAngles {
         JointAngles::from_fn(self.robot.n_joints(), |j| {
             let spec = &self.robot.sensors[j];
             parameters.correction(j).angle_rad(spec, view.travel_rad[j], departure, view.approach[j])

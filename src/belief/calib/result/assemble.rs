@@ -1,12 +1,13 @@
 //! What every method's calibration.toml holds; each method adds its own tables.
 
-use crate::calib::covariance::ParameterCovariance;
+use crate::calib::covariance::{ParameterCovariance, ToolErrorPrediction};
 use crate::calib::methods::Solution;
 use crate::calib::methods::position_problem::PositionProblem;
 use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
 use crate::calib::refusal_conditions::{AcceptanceData, refusal};
 use crate::calib::result::calibration::{Calibration, JointResult, Status};
 use crate::calib::result::covariance_file::CovarianceTable;
+use crate::calib::result::details::FitDetails;
 use crate::calib::result::link_table::LinkResult;
 use crate::calib::result::metrics::{FitMetrics, HeldOutMetrics};
 use crate::calib::result::sag_table::SagTable;
@@ -18,7 +19,6 @@ use crate::calib::views::view::EndStopReading;
 use armcal_core::robot::Robot;
 use armcal_core::routine::Method;
 use armcal_core::sensor::{ConditionChange, SensorModel};
-use armcal_core::stats::Summary;
 
 /// What a calibration was made from.
 pub(crate) struct Provenance<'a> {
@@ -44,7 +44,7 @@ pub(crate) struct Fit<'a> {
 pub(crate) struct Evidence {
     pub held_out: HeldOutMetrics,
     /// Over the task's targets; `None` without a task.
-    pub predicted_tool_error_m: Option<Summary>,
+    pub predicted: Option<ToolErrorPrediction>,
     /// Parameters of sensors that move the camera, determined or not.
     pub n_parameters: usize,
 }
@@ -53,7 +53,9 @@ pub(crate) struct Evidence {
 pub(crate) fn assemble(source: &Provenance<'_>, fit: &Fit<'_>, evidence: Evidence) -> Calibration {
     let at = &fit.solution.parameters;
     let metrics = fit_metrics(source, fit);
-    let Evidence { held_out, predicted_tool_error_m, n_parameters } = evidence;
+    let Evidence { held_out, predicted, n_parameters } = evidence;
+    let predicted_tool_error_m = predicted.as_ref().map(|predicted| predicted.error_m);
+    let details = FitDetails::of(fit.problem, at, predicted.map_or_else(Vec::new, |predicted| predicted.targets));
     // `bundle` knows how sure its parameters are, and judges by that whether they must be better.
     let must_improve = source.method != Method::Bundle;
     let refusals: Vec<_> = refusal(&AcceptanceData {
@@ -104,6 +106,7 @@ pub(crate) fn assemble(source: &Provenance<'_>, fit: &Fit<'_>, evidence: Evidenc
             fit.covariance.parameters.iter().map(|p| p.name(source.robot)).collect(),
             &fit.covariance.matrix,
         ),
+        details,
     };
     calibration.refuse_for(refusals);
     calibration

@@ -2,6 +2,7 @@
 
 use crate::calib::result::calibration::{Calibration, Status};
 use crate::calib::result::covariance_file::CovarianceTable;
+use crate::calib::result::details::FitDetails;
 use crate::calib::result::metrics::{FitMetrics, HeldOutMetrics};
 use crate::calib::result::valid_range::ValidRange;
 use armcal_core::numeric::Outcome;
@@ -48,6 +49,7 @@ pub(in crate::calib) fn bare(robot: &str, method: Method) -> Calibration {
         prior: None,
         covariance_hash: None,
         covariance: CovarianceTable::default(),
+        details: FitDetails::default(),
     }
 }
 

@@ -9,6 +9,7 @@ use crate::calib::refusal::{Refusal, in_words};
 use crate::calib::reservation::Reservation;
 use crate::calib::result::camera_mount::CameraMount;
 use crate::calib::result::covariance_file::CovarianceTable;
+use crate::calib::result::details::FitDetails;
 use crate::calib::result::failed_joint::{FailedJointTable, PriorTable};
 use crate::calib::result::link_table::LinkResult;
 use crate::calib::result::map_table::MapResult;
@@ -114,6 +115,9 @@ pub struct Calibration {
     /// Not in calibration.toml, but in the file beside it; older files have it as a table.
     #[serde(default, skip_serializing)]
     pub covariance: CovarianceTable,
+    /// Residuals and predictions one by one, for reports; in no file.
+    #[serde(skip)]
+    pub details: FitDetails,
 }
 
 impl Calibration {
@@ -131,6 +135,7 @@ impl Calibration {
     }
 
     fn state_refusals(&mut self) {
+        self.refusals.sort_by_key(Refusal::rank);
         self.refusal = in_words(&self.refusals);
         self.status = if self.refusals.is_empty() { Status::Accepted } else { Status::Refused };
     }

@@ -2,7 +2,7 @@
 //!
 //! `calibration` is the file's content, `assemble` fills it; the other files are its tables. `file` reads and writes
 //! it, `covariance_file` the covariance beside it, `compact` is one line of less than 512 bytes, `lookup` a table from
-//! counts to radians.
+//! counts to radians. `details` has no file: residuals view by view, for reports.
 
 pub(crate) mod assemble;
 #[cfg(test)]
@@ -11,6 +11,7 @@ pub(crate) mod calibration;
 pub(crate) mod camera_mount;
 mod compact;
 pub(crate) mod covariance_file;
+pub(crate) mod details;
 pub(crate) mod failed_joint;
 mod file;
 mod file_error;
@@ -29,6 +30,7 @@ pub use calibration::{Calibration, JointResult, Status};
 pub use camera_mount::CameraMount;
 pub use compact::{CompactCalibration, CompactError, CompactJoint, MAX_COMPACT_BYTES, PredictedToolError};
 pub use covariance_file::{CovarianceTable, covariance_file};
+pub use details::{CornerResidual, FitDetails, ObservedTag, TargetPrediction, ViewResidual};
 pub use failed_joint::{FailedJointTable, PriorTable};
 pub use file::CalibrationFiles;
 pub use file_error::CalibrationFileError;

@@ -8,6 +8,8 @@ use crate::calib::bundle::estimate::{Estimate, estimate};
 use crate::calib::bundle::input::HyperparameterMode;
 use crate::calib::bundle::tests::data::{rng, titan};
 use crate::calib::bundle::tests::statistics::{Case, case, input, task, tool, tool_jacobian};
+use crate::calib::methods::position_problem::PositionProblem;
+use crate::calib::result::details::FitDetails;
 use crate::calib::views::view::{TagMeasurement, View};
 use armcal_core::stats::quantile;
 
@@ -121,4 +123,32 @@ fn what_fits_nowhere_goes_as_a_whole() {
             assert_eq!(out, [(7, id, None)], "seed {seed}, {n_off} corners");
         }
     }
+}
+
+/// What reports show as rejected is what the estimate rejected, and no more.
+#[test]
+fn details_mark_the_corners_and_observations_that_were_rejected() {
+    let robot = titan();
+    let mut case = case(&robot, 0, N_VIEWS);
+    let mut soil = |view_idx: usize, n_off: usize| {
+        let tag = &mut case.views[view_idx].tags[1];
+        let TagMeasurement::Corners(seen) = &mut tag.measured else { panic!("corners") };
+        seen.corners_px.iter_mut().skip(1).take(n_off).for_each(|corner| corner[0] += 20.0);
+        tag.id
+    };
+    let (whole, single) = (soil(7, 3), soil(3, 1));
+    let found = estimate(&input(&case, &case.views, HyperparameterMode::Fitted)).expect("solved");
+    let problem = PositionProblem::new(&robot, &case.views);
+    let mut details = FitDetails::of(&problem, &found.parameters(), Vec::new());
+    found.complete(&mut details);
+    let (mut tags, mut corners) = (Vec::new(), Vec::new());
+    for (view_idx, view) in details.views.iter().enumerate() {
+        assert!(view.joint_error_rad.is_some());
+        for tag in &view.tags {
+            tags.extend((!tag.is_used).then_some((view_idx, tag.id)));
+            let rejected = |n: &usize| tag.corners[*n].is_some_and(|corner| !corner.is_used);
+            corners.extend((0..4).filter(rejected).map(|n| (view_idx, tag.id, n)));
+        }
+    }
+    assert_eq!((tags, corners), (vec![(7, whole)], vec![(3, single, 1)]));
 }
