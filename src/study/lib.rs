@@ -5,11 +5,10 @@
 //! model of corner noise and detection that the geometric camera may draw from (`noise_fit`).
 //! tests/oracle/compare_detectors.py runs other detectors on the same images. `paper`: the paper's comparison of
 //! methods, and `sensitivity` its Figures 4 and 7; `poses`: error over poses and the arm's time, by how the poses are
-//! chosen; `charts` draws them. `falsified`: the verdict where drawing, survey or a sensor is wrong. `edges`: certified
-//! edges against brute force; `paths`: planning between random poses; `worlds`: closed loops in any world allowed;
-//! `dive`: the online belief over a dive, `dive_faults`: when it names what happens there.
+//! chosen; armcal-charts draws them. `falsified`: the verdict where drawing, survey or a sensor is wrong. `edges`:
+//! certified edges against brute force; `paths`: planning between random poses; `worlds`: closed loops in any world
+//! allowed; `dive`: the online belief over a dive, `dive_faults`: when it names what happens there.
 
-mod charts;
 mod dive;
 mod dive_faults;
 mod edges;

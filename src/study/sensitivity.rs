@@ -8,9 +8,9 @@ use std::fmt::Write as _;
 use nalgebra::Point3;
 use rand::RngExt;
 
-use crate::charts::{Axis, Panel, Series, Style, svg};
 use armcal_belief::calib::{JointParameters, PositionMethod, PositionProblem, TagMeasurement, TagObservation, View};
 use armcal_belief::plan::{ClearanceModel, VisibilityModel};
+use armcal_charts::{Axis, Panel, Series, Style, svg};
 use armcal_core::joints::JointAngles;
 use armcal_core::robot::Robot;
 use armcal_core::stats::stream_rng;
@@ -174,6 +174,7 @@ impl Sensitivity {
             let panel = |title: &str, unit: &str, value: fn(&SensitivityPoint) -> f64| {
                 let curve = |joint: usize| Series {
                     name: self.joints[joint].clone(),
+                    color: None,
                     style: Style::Line,
                     points: self.of(joint).map(|p| [p.offset_deg, value(p)]).collect(),
                 };

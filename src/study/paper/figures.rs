@@ -2,12 +2,12 @@
 
 use nalgebra::Point3;
 
-use crate::charts::{Axis, Panel, Series, Style, svg};
 use crate::paper::PaperStudyError;
 use crate::paper::contender::MethodVariant;
 use crate::paper::scene::{Draw, Setting};
 use crate::paper::trials::PaperRow;
 use armcal_belief::calib::{Gauge, JointParameters};
+use armcal_charts::{Axis, Panel, Series, Style, svg};
 use armcal_core::robot::Robot;
 
 /// Views in the picture of the clouds.
@@ -52,7 +52,7 @@ fn convergence(draw: &Draw) -> [Panel; 2] {
                 }
             });
             points.push([n, best]);
-            Series { name: name.to_owned(), style: Style::Line, points }
+            Series { name: name.to_owned(), color: None, style: Style::Line, points }
         };
         Panel {
             title: contender.name.to_owned(),
@@ -82,12 +82,12 @@ fn over_noise(rows: &[PaperRow]) -> Panel {
     let curve = |name: &str| {
         let own = of_noise.iter().filter(|row| row.contender == name);
         let points = own.map(|row| [1e3 * row.setting.noise_m, 1e3 * row.tool_rms_m]).collect();
-        Series { name: name.to_owned(), style: Style::Line, points }
+        Series { name: name.to_owned(), color: None, style: Style::Line, points }
     };
     let mut series: Vec<Series> = names.iter().map(|name| curve(name)).collect();
     let first = of_noise.iter().filter(|row| Some(&row.contender) == names.first());
     let bound = first.filter_map(|row| Some([1e3 * row.setting.noise_m, 1e3 * row.bound_rms_m?])).collect();
-    series.push(Series { name: "Cramer-Rao bound".to_owned(), style: Style::Dashes, points: bound });
+    series.push(Series { name: "Cramer-Rao bound".to_owned(), color: None, style: Style::Dashes, points: bound });
     Panel {
         title: "Tool error, 40 poses x 6 landmarks".to_owned(),
         x: label("noise of a position per axis, mm", Axis::Log),
@@ -107,7 +107,7 @@ fn tool_positions(draw: &Draw, setting: &Setting) -> [Panel; 2] {
                 [tool.x, tool.y]
             };
             let points = draw.tool_poses.iter().take(40).map(place).collect();
-            Series { name: name.to_owned(), style: Style::Dots, points }
+            Series { name: name.to_owned(), color: None, style: Style::Dots, points }
         };
         Panel {
             title: format!("{}, 1 cm", contender.name),
@@ -135,11 +135,12 @@ fn clouds(draw: &Draw, setting: &Setting) -> [Panel; 2] {
             let base_from_camera = draw.robot.chain.link_poses(&angles).frame(&draw.robot.camera.mount);
             view.tags.iter().map(move |tag| base_from_camera * Point3::from(tag.center_in_camera_m))
         });
-        Series { name: name.to_owned(), style: Style::Dots, points: seen.map(|p| [p.x, p.y]).collect() }
+        Series { name: name.to_owned(), color: None, style: Style::Dots, points: seen.map(|p| [p.x, p.y]).collect() }
     };
     let places = draw.robot.tags.iter().map(|tag| tag.base_from_tag.origin().vector());
     let landmarks = Series {
         name: "landmarks".to_owned(),
+        color: None,
         style: Style::Dots,
         points: places.map(|place| [place.x, place.y]).collect(),
     };

@@ -2,8 +2,8 @@
 
 use std::fmt::Write as _;
 
-use crate::charts::{Axis, Panel, Series, Style, svg};
 use crate::poses::study::{CRITERIA, POSES, PoseRow};
+use armcal_charts::{Axis, Panel, Series, Style, svg};
 use armcal_core::routine::PoseCriterion;
 use armcal_core::stats::quantile;
 
@@ -123,6 +123,7 @@ pub fn poses_figure(rows: &[PoseRow]) -> Result<String, String> {
     let series = |x: fn(&PoseRow) -> f64| -> Vec<Series> {
         let of_criterion = |criterion: &PoseCriterion| Series {
             name: name(*criterion).to_owned(),
+            color: None,
             style: if *criterion == PoseCriterion::Random { Style::Dashes } else { Style::Line },
             points: POSES
                 .iter()

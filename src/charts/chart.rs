@@ -2,6 +2,7 @@
 
 use plotters::coord::Shift;
 use plotters::prelude::*;
+use plotters::style::Color as _;
 
 /// How a series looks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -10,12 +11,49 @@ pub enum Style {
     Dots,
     /// Broken, for what is no measurement.
     Dashes,
+    /// Small crosses, for what does not belong.
+    Crosses,
+    /// Each two points are the ends of a stroke.
+    Strokes,
+    /// The points go around an area.
+    Area,
+}
+
+/// Of a series.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Color {
+    Blue,
+    Red,
+    Green,
+    Violet,
+    Orange,
+    Grey,
+    Cyan,
+}
+
+impl Color {
+    /// In the order of series that name none.
+    pub const ALL: [Self; 7] = [Self::Blue, Self::Red, Self::Green, Self::Violet, Self::Orange, Self::Grey, Self::Cyan];
+
+    /// `#1f77b4`.
+    #[must_use]
+    pub fn css(self) -> String {
+        let RGBColor(red, green, blue) = self.rgb();
+        format!("#{red:02x}{green:02x}{blue:02x}")
+    }
+
+    fn rgb(self) -> RGBColor {
+        COLORS[self as usize]
+    }
 }
 
 /// Points of one color.
 #[derive(Clone, Debug)]
 pub struct Series {
+    /// In the legend; one without a name is not there.
     pub name: String,
+    /// One after the other where none is named.
+    pub color: Option<Color>,
     pub style: Style,
     pub points: Vec<[f64; 2]>,
 }
@@ -69,15 +107,33 @@ pub fn svg(panels: &[Panel]) -> Result<String, String> {
     Ok(text)
 }
 
+/// Draws one panel of `size_px` without a background; black and white in it are those of the page, if its style says so
+/// for `fill` and `stroke`.
+///
+/// # Errors
+/// What the drawing library says.
+pub fn inlay(panel: &Panel, size_px: (u32, u32)) -> Result<String, String> {
+    let mut text = String::new();
+    {
+        let root = SVGBackend::with_string(&mut text, size_px).into_drawing_area();
+        draw(&root, panel).map_err(|error| error.to_string())?;
+        root.present().map_err(|error| error.to_string())?;
+    }
+    Ok(text)
+}
+
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 type DrawError = Box<dyn std::error::Error + Send + Sync>;
 
 fn draw(area: &Area<'_>, panel: &Panel) -> Result<(), DrawError> {
     let shown: Vec<Series> = panel.series.iter().map(|series| positive(panel, series)).collect();
-    let (x, y) = ranges(panel, &shown);
+    let (x, y) = ranges(panel, &shown, area.dim_in_pixel());
     let legend = free_corner(&shown, x, y);
     let mut builder = ChartBuilder::on(area);
-    builder.caption(&panel.title, ("sans-serif", 15)).margin(8).x_label_area_size(36).y_label_area_size(56);
+    if !panel.title.is_empty() {
+        builder.caption(&panel.title, ("sans-serif", 15));
+    }
+    builder.margin(8).x_label_area_size(36).y_label_area_size(56);
     // One type of chart for each pair of axes.
     macro_rules! chart {
         ($x:expr, $y:expr) => {{
@@ -85,18 +141,32 @@ fn draw(area: &Area<'_>, panel: &Panel) -> Result<(), DrawError> {
             let mut mesh = chart.configure_mesh();
             mesh.x_desc(&panel.x.0).y_desc(&panel.y.0).max_light_lines(0).x_labels(8).y_labels(8);
             mesh.x_label_formatter(&|v| number(*v)).y_label_formatter(&|v| number(*v)).draw().map_err(boxed)?;
-            for (series, color) in shown.iter().zip(COLORS.iter().cycle()) {
-                let points = series.points.iter().map(|p| (p[0], p[1]));
+            for (series, color) in shown.iter().zip(Color::ALL.iter().cycle()) {
+                let color = series.color.unwrap_or(*color).rgb();
+                let mut points = series.points.iter().map(|p| (p[0], p[1]));
                 let drawn = match series.style {
                     Style::Dots => chart.draw_series(points.map(|p| Circle::new(p, 2, color.filled()))),
+                    Style::Crosses => chart.draw_series(points.map(|p| Cross::new(p, 4, color.stroke_width(2)))),
                     Style::Line => chart.draw_series(LineSeries::new(points, color.stroke_width(2))),
                     Style::Dashes => chart.draw_series(DashedLineSeries::new(points, 6, 4, color.stroke_width(2))),
+                    Style::Strokes => chart.draw_series(std::iter::from_fn(|| {
+                        let ends = vec![points.next()?, points.next()?];
+                        Some(PathElement::new(ends, color.stroke_width(1)))
+                    })),
+                    Style::Area => {
+                        let around: Vec<(f64, f64)> = points.collect();
+                        chart.draw_series(std::iter::once(Polygon::new(around, color.mix(0.2).filled())))
+                    }
                 };
-                let color = *color;
-                drawn
-                    .map_err(boxed)?
-                    .label(&series.name)
-                    .legend(move |(x, y)| Rectangle::new([(x, y - 3), (x + 12, y + 3)], color.filled()));
+                let drawn = drawn.map_err(boxed)?;
+                if !series.name.is_empty() {
+                    drawn
+                        .label(&series.name)
+                        .legend(move |(x, y)| Rectangle::new([(x, y - 3), (x + 12, y + 3)], color.filled()));
+                }
+            }
+            if shown.iter().all(|series| series.name.is_empty()) {
+                return Ok(());
             }
             let mut labels = chart.configure_series_labels();
             labels.position(legend).background_style(WHITE.mix(0.8)).label_font(("sans-serif", 11));
@@ -112,9 +182,9 @@ fn draw(area: &Area<'_>, panel: &Panel) -> Result<(), DrawError> {
     Ok(())
 }
 
-/// Decades are all that a logarithmic axis has labels for: a range of less than two is better off without.
+/// Decades are all that a logarithmic axis has labels for: a range of much less than two is better off without.
 fn drawn(axis: Axis, (low, high): Range) -> Axis {
-    if high < 100.0 * low { Axis::Linear } else { axis }
+    if high < 50.0 * low { Axis::Linear } else { axis }
 }
 
 /// Of the four corners the one about which there are the fewest points.
@@ -143,7 +213,8 @@ fn boxed<E: std::error::Error + Send + Sync>(error: DrawingAreaErrorKind<E>) -> 
 /// Short: 0.001, 1e-7, 250.
 fn number(value: f64) -> String {
     let size = value.abs();
-    if size != 0.0 && !(1e-3..1e5).contains(&size) {
+    // What is left of a subtraction is no figure.
+    if size > 1e-12 && !(1e-3..1e5).contains(&size) {
         format!("{value:.0e}")
     } else {
         format!("{}", (value * 1e6).round() / 1e6)
@@ -161,7 +232,7 @@ fn positive(panel: &Panel, series: &Series) -> Series {
 type Range = (f64, f64);
 
 /// Of both axes, around all points.
-fn ranges(panel: &Panel, series: &[Series]) -> (Range, Range) {
+fn ranges(panel: &Panel, series: &[Series], size_px: (u32, u32)) -> (Range, Range) {
     let of = |axis: usize| {
         let values = series.iter().flat_map(|series| &series.points).map(|p| p[axis]);
         values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)))
@@ -171,7 +242,7 @@ fn ranges(panel: &Panel, series: &[Series]) -> (Range, Range) {
         return (widened(x, panel.x.1), widened(y, panel.y.1));
     }
     // Of the panel, what labels and margins leave.
-    let aspect = f64::from(PANEL.0 - 72) / f64::from(PANEL.1 - 72);
+    let aspect = f64::from(size_px.0.max(73) - 72) / f64::from(size_px.1.max(73) - 72);
     let half = (0.5 * (x.1 - x.0)).max(0.5 * (y.1 - y.0) * aspect) * 1.05 + 1e-9;
     let around = |(low, high): Range, half: f64| (0.5 * (low + high) - half, 0.5 * (low + high) + half);
     (around(x, half), around(y, half / aspect))
@@ -197,7 +268,7 @@ mod tests {
         let falling: Vec<[f64; 2]> = (0..20).map(|k| [f64::from(k), 20.0 - f64::from(k)]).collect();
         let rising: Vec<[f64; 2]> = falling.iter().map(|p| [p[0], 20.0 - p[1]]).collect();
         let corner = |points: &Vec<[f64; 2]>| {
-            let line = Series { name: "line".to_owned(), style: Style::Line, points: points.clone() };
+            let line = Series { name: "line".to_owned(), color: None, style: Style::Line, points: points.clone() };
             free_corner(&[line], (0.0, 20.0), (0.0, 20.0))
         };
         assert!(matches!(corner(&falling), SeriesLabelPosition::UpperRight));
@@ -206,8 +277,12 @@ mod tests {
 
     #[test]
     fn charts_hold_their_series_and_leave_out_what_an_axis_cannot_show() {
-        let line =
-            Series { name: "a line".to_owned(), style: Style::Line, points: vec![[1.0, 2.0], [2.0, -1.0], [3.0, 4.0]] };
+        let line = Series {
+            name: "a line".to_owned(),
+            color: None,
+            style: Style::Line,
+            points: vec![[1.0, 2.0], [2.0, -1.0], [3.0, 4.0]],
+        };
         for (axis, shown) in [(Axis::Linear, 3), (Axis::Log, 2)] {
             let label = |axis| ("m".to_owned(), axis);
             let panel = Panel {
