@@ -30,6 +30,7 @@ use crate::spatial::{Base, Pose};
 struct RobotFile {
     version: u32,
     name: String,
+    serial: Option<String>,
     urdf: PathBuf,
     base_link: String,
     base_tag: Option<u32>,
@@ -63,7 +64,10 @@ struct ToolFile {
 }
 
 impl ToolFile {
-    fn check_point(&self, file: &Path) -> Result<(), FileIssue> {
+    fn check(&self, file: &Path) -> Result<(), FileIssue> {
+        if let Some(radius_m) = self.tip_radius_m {
+            FileIssue::check_range(file, "tool.tip_radius_m", radius_m, 0.002..=0.2)?;
+        }
         self.point_m
             .iter()
             .try_for_each(|value| FileIssue::check_range(file, "tool.point_m", *value, -10.0..=10.0).map(drop))
@@ -190,11 +194,10 @@ fn robot_of(folder: &Path, raw: RobotFile, urdf: UrdfModel, meshes: Meshes) -> R
     let stowed = raw.stowed_rad.map(|angles_rad| check_stowed(&file, STOWED, &angles_rad, chain.n_joints()));
     let stowed = stowed.transpose()?.unwrap_or_else(middle);
     let mut tool = arm.attachment(&raw.tool.link)?;
-    raw.tool.check_point(&file)?;
+    raw.tool.check(&file)?;
     let gripper = raw.gripper.map(|gripper| gripper.check(&file, &arm, &tool)).transpose()?;
     tool.link_from_frame *= nalgebra::Translation3::from(raw.tool.point_m);
     if let Some(radius_m) = raw.tool.tip_radius_m {
-        FileIssue::check_range(&file, "tool.tip_radius_m", radius_m, 0.002..=0.2)?;
         add_tip(&mut bodies[tool.n_joints], tool.link_from_frame, radius_m);
     }
     let tags = check_tags(&file, &raw.tag, raw.base_tag, &Pose::<Base, Base>::identity())?;
@@ -207,8 +210,9 @@ fn robot_of(folder: &Path, raw: RobotFile, urdf: UrdfModel, meshes: Meshes) -> R
     Ok(Robot {
         failed: Vec::new(),
         name: raw.name,
+        serial: raw.serial,
         folder: folder.to_owned(),
-        urdf_name: raw.urdf.file_name().map_or_else(|| "robot.urdf".to_owned(), |n| n.to_string_lossy().into_owned()),
+        urdf_name: file_name(&raw.urdf),
         urdf_text: urdf.text,
         base_link: raw.base_link,
         stowed,
@@ -230,6 +234,10 @@ fn robot_of(folder: &Path, raw: RobotFile, urdf: UrdfModel, meshes: Meshes) -> R
         tag_frame: Attachment::base(),
         links,
     })
+}
+
+fn file_name(urdf: &Path) -> String {
+    urdf.file_name().map_or_else(|| "robot.urdf".to_owned(), |name| name.to_string_lossy().into_owned())
 }
 
 /// Where collision meshes may be: beside the URDF, and beside robot.toml.

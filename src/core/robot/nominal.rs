@@ -26,6 +26,8 @@ use crate::kinematics::{Attachment, Chain};
 pub struct Robot {
     /// Name in robot.toml.
     pub name: String,
+    /// Serial number of the arm, for reports; `None` where robot.toml has none.
+    pub serial: Option<String>,
     /// Folder of robot.toml.
     pub folder: PathBuf,
     /// File name of the URDF, without a folder.

@@ -19,6 +19,8 @@ pub struct Routine {
     pub file: PathBuf,
     /// Letters, digits, - and _: it names the output folder.
     pub name: String,
+    /// Who runs it, for reports; in no recording.
+    pub operator: Option<String>,
     /// Folder of robot.toml, relative to the working directory.
     pub robot_folder: PathBuf,
     /// The vehicle's file, relative to the working directory.

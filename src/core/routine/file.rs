@@ -22,6 +22,7 @@ use crate::robot::{FileIssue, PartFile};
 struct RoutineFile {
     version: u32,
     name: String,
+    operator: Option<String>,
     robot: PathBuf,
     vehicle: PathBuf,
     #[serde(default = "first_seed")]
@@ -112,6 +113,7 @@ pub fn load_with(file: &Path, overrides: &Overrides) -> Result<Routine, RoutineE
     Ok(Routine {
         file: file.to_owned(),
         name: raw.name,
+        operator: raw.operator,
         robot_folder: overrides.robot.clone().unwrap_or_else(|| folder.join(raw.robot)),
         vehicle_file: overrides.vehicle.clone().unwrap_or_else(|| folder.join(raw.vehicle)),
         seed: raw.seed,
