@@ -13,7 +13,8 @@ use armcal::streams::Arm;
 use nalgebra::Vector3;
 
 use crate::support::{
-    FinishedRun, Nowhere, ShortRoutine, answer, finished, program, read, root, run, temp, titan, vehicle_file,
+    FinishedRun, Nowhere, ShortRoutine, answer, finished, program, read, root, run, shared_run, temp, titan,
+    vehicle_file,
 };
 
 /// None left out.
@@ -136,4 +137,20 @@ fn an_arm_driven_into_the_vehicle_is_in_the_truth_file() {
     let touches = |name: &str| drawn.contains(&name);
     assert!(truth.contacts.iter().any(|c| touches(&c.part_a) || touches(&c.part_b)), "{:?}", truth.contacts);
     assert!(truth.min_clearance_m().is_some_and(|distance_m| distance_m < 1e-3));
+}
+
+/// Between states a second apart the arm may have been anywhere: a score from them would be of a place where it never
+/// was.
+#[test]
+fn a_truth_that_is_too_coarse_tells_no_state() {
+    let mut truth = read_truth(shared_run().file("truth.mcap")).expect("it reads");
+    let middle = |states: &[armcal::sim::truth::TruthState], n: usize| {
+        states[n].stamp.plus_s(0.5 * states[n + 1].stamp.since_s(states[n].stamp))
+    };
+    let stamp = middle(&truth.states, 200);
+    let fine = truth.state_at(stamp).expect("between two states");
+    assert!(fine.stamp == stamp);
+    truth.states = truth.states.iter().step_by(50).copied().collect();
+    assert!(truth.state_at(middle(&truth.states, 4)).is_none());
+    assert!(truth.state_at(truth.states[4].stamp).is_some(), "one of its own stamps");
 }

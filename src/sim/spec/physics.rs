@@ -18,7 +18,7 @@ table!(
         /// Step of the rigid-body integration; a control period (10 ms) must be a whole number of steps.
         step_s = 0.002, in 5e-5..=0.005;
         /// Rate of the truth's states, at most that of the controller.
-        truth_rate_hz = 50.0, in 0.1..=100.0;
+        truth_rate_hz = 50.0, in 5.0..=100.0;
         /// Rate at which the clearance is measured.
         clearance_rate_hz = 5.0, in 0.1..=100.0;
         /// Of two parts that touch (assumed: structure and hoses give, not steel alone), shared by their points of

@@ -11,6 +11,9 @@ use armcal_core::spatial::{Base, Camera, Frame, Pose, Tool, Vehicle, World};
 use armcal_core::streams::{JointAngles, MAX_JOINTS};
 use armcal_core::time::Stamp;
 
+/// States farther apart than this say nothing of the time between them, s.
+const MAX_GAP_S: f64 = 0.25;
+
 /// Contents of truth.mcap.
 #[derive(Clone, Debug)]
 pub struct Truth {
@@ -58,7 +61,8 @@ pub fn read_truth(path: impl AsRef<Path>) -> Result<Truth, SimError> {
 }
 
 impl Truth {
-    /// The state at `stamp`, interpolated between its neighbours; `None` before the first and after the last.
+    /// The state at `stamp`, interpolated between its neighbours; `None` before the first and after the last, and where
+    /// these are farther apart than the arm may be taken to have moved evenly.
     #[must_use]
     pub fn state_at(&self, stamp: Stamp) -> Option<TruthState> {
         let next = self.states.partition_point(|state| state.stamp < stamp);
@@ -67,8 +71,9 @@ impl Truth {
             return Some(*after);
         }
         let before = self.states.get(next.checked_sub(1)?)?;
-        let share = stamp.since_s(before.stamp) / after.stamp.since_s(before.stamp);
-        Some(interpolated(before, after, share, stamp))
+        let gap_s = after.stamp.since_s(before.stamp);
+        let share = stamp.since_s(before.stamp) / gap_s;
+        (gap_s <= MAX_GAP_S).then(|| interpolated(before, after, share, stamp))
     }
 
     /// The smallest distance of any two watched parts, m; `None` if none was measured.
