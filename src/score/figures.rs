@@ -35,12 +35,32 @@ pub struct Score {
     /// where there is no such target, or one side only; each side is then over its own.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub compared_targets: Vec<usize>,
+    /// Target by target, as far as the arm came to rest there.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub targets: Vec<TargetScore>,
     /// Every `reach` step of the script. `before` is the first of them under the datasheet's sensors, `after` the last
     /// under calibrated ones.
     pub reaches: Vec<ReachScore>,
     /// Tasks of all `work` steps at which the arm came to rest, in the order of time.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub work: Vec<TaskScore>,
+}
+
+/// One target of the task, before and after the calibration.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TargetScore {
+    /// Number of the task's target, from 0.
+    pub target: usize,
+    /// Where the arm believes its tool is, against where it is; absent where it did not come to rest there.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tool_error_before_m: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tool_error_after_m: Option<f64>,
+    /// Target against where the tool came to rest.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reach_error_before_m: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reach_error_after_m: Option<f64>,
 }
 
 /// One task of a `work` step.

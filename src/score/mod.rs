@@ -11,6 +11,6 @@ mod scoring;
 #[cfg(feature = "sim")]
 mod touch;
 
-pub use figures::{JointScore, MarginSummary, ReachScore, Score, ScoreSide, TaskScore, TouchScore};
+pub use figures::{JointScore, MarginSummary, ReachScore, Score, ScoreSide, TargetScore, TaskScore, TouchScore};
 #[cfg(feature = "sim")]
 pub use scoring::{ScoreInput, Scored, score};

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use nalgebra::Vector3;
 
-use crate::score::{JointScore, MarginSummary, ReachScore, Score, ScoreSide, TaskScore, margins, touch};
+use crate::score::{JointScore, MarginSummary, ReachScore, Score, ScoreSide, TargetScore, TaskScore, margins, touch};
 use armcal_belief::session::{AssertResult, Epoch, Outcome, ReachStep};
 use armcal_belief::verify::{Belief, ReachRest, reaches};
 use armcal_core::log::Recording;
@@ -65,6 +65,7 @@ pub fn score(input: &ScoreInput<'_>) -> Result<Scored, SimError> {
         after: last.is_some().then(|| figures(last, &after)),
         nees: nees(input, last.map_or(&[], |side| &side.rests)),
         joints: joint_scores(input, &before, &after),
+        targets: target_scores(first, last),
         compared_targets: common.into_iter().collect(),
         reaches,
         work: sides.iter().filter(|side| side.step.is_work).flat_map(|side| task_scores(input, side)).collect(),
@@ -134,6 +135,26 @@ impl<'a> Side<'a> {
 fn common_targets(first: Option<&Side<'_>>, last: Option<&Side<'_>>) -> BTreeSet<usize> {
     let targets = |side: Option<&Side<'_>>| side.map(Side::targets).unwrap_or_default();
     targets(first).intersection(&targets(last)).copied().collect()
+}
+
+/// Every target at which the arm came to rest in the first or the last reach.
+fn target_scores(first: Option<&Side<'_>>, last: Option<&Side<'_>>) -> Vec<TargetScore> {
+    let rest = |side: Option<&Side<'_>>, target: usize| {
+        let rests = side.into_iter().flat_map(|side| &side.rests);
+        rests.copied().find(|c| c.rest.target_idx == target).map(|c| (c.tool_error_m.norm(), c.reach_error_m))
+    };
+    let targets = first.into_iter().chain(last).flat_map(Side::targets).collect::<BTreeSet<usize>>();
+    let score = |target: usize| {
+        let (before, after) = (rest(first, target), rest(last, target));
+        TargetScore {
+            target,
+            tool_error_before_m: before.map(|(tool_m, _)| tool_m),
+            tool_error_after_m: after.map(|(tool_m, _)| tool_m),
+            reach_error_before_m: before.map(|(_, reach_m)| reach_m),
+            reach_error_after_m: after.map(|(_, reach_m)| reach_m),
+        }
+    };
+    targets.into_iter().map(score).collect()
 }
 
 fn reach_score(input: &ScoreInput<'_>, truth: &Truth, side: &Side<'_>) -> ReachScore {
