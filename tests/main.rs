@@ -9,8 +9,8 @@
 //! program, `kill` ends it badly; `sim` looks at the simulated world from outside; `uncalibrated` calibrates arms of
 //! which little is known; `real` reads recordings of real arms, `recorded_inputs` their slow sensors and images;
 //! `tagmap` maps tags in recordings that the test writes; `touch` feels surveyed plates with the tool; `any_arm` makes
-//! robot folders for drawings of all sorts; `work` works on a dive, `watch` follows recordings that grow; `repository`
-//! reads sources and pages.
+//! robot folders for drawings of all sorts; `report` reads report.html; `work` works on a dive, `watch` follows recordings
+//! that grow; `repository` reads sources and pages.
 
 #![allow(clippy::print_stderr, reason = "figures of a test, for whoever reads its output")]
 
@@ -36,6 +36,7 @@ mod property;
 mod real;
 mod recorded_inputs;
 mod recovery;
+mod report;
 mod repository;
 mod script;
 mod sim;

@@ -13,7 +13,7 @@ use crate::cli::stdout::{note, say};
 use crate::output;
 #[cfg(feature = "viewer")]
 use crate::report::markdown;
-use crate::report::{RunSummary, html, table};
+use crate::report::{About, Report, RunSummary, html, table};
 use armcal_belief::calib::{Calibration, CompactCalibration, MapResult, Status, View, covariance_file};
 use armcal_core::robot::Robot;
 use armcal_core::routine::Method;
@@ -86,7 +86,9 @@ pub(super) fn calibrate(args: &CalibrateArgs) -> Result<Exit> {
     let covariance_file = covariance_file(&calibration_file);
     let (map, texts) = (calibration.map.as_ref().map(MapResult::to_toml), calibration.to_files());
     let (summary_file, json) = (args.out.join("summary.json"), format!("{json}\n"));
-    let (report_file, report) = (args.out.join("report.html"), html(&summary, &calibration, None));
+    let about = About { recordings: names(&args.recordings), ..About::default() };
+    let report = Report { summary: &summary, calibration: &calibration, robot: &robot, online: None, about };
+    let (report_file, report) = (args.out.join("report.html"), html(&report));
     let mut written: Vec<(&Path, &[u8])> = Vec::new();
     written.extend(map.iter().map(|map| (map_file.as_path(), map.as_bytes())));
     written.extend([
@@ -108,6 +110,11 @@ pub(super) fn calibrate(args: &CalibrateArgs) -> Result<Exit> {
         (Status::Accepted, true) => Exit::DataLost,
         (Status::Accepted, false) => Exit::Ok,
     })
+}
+
+/// File names, for a report: a path would be of this machine alone.
+fn names(recordings: &[PathBuf]) -> Vec<String> {
+    recordings.iter().filter_map(|path| Some(path.file_name()?.to_string_lossy().into_owned())).collect()
 }
 
 /// The views as a file for the Rerun viewer, replay.rrd in `out`; one of an earlier calibration does not stay.

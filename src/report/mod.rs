@@ -13,7 +13,9 @@ pub mod proposed_map;
 mod summary;
 mod table;
 
-pub use html::html;
+pub use html::{About, Report, html};
+#[cfg(feature = "sim")]
+pub(crate) use html::{chart, page, panel};
 pub use markdown::markdown;
 pub use summary::{
     AssertSummary, CalibrationSummary, CaptureSummary, HeldJointSummary, HeldOutSummary, OnlineSummary, RenewalSummary,

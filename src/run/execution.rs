@@ -6,7 +6,9 @@ use std::path::PathBuf;
 use crate::output::{OutputError, OutputFolder};
 #[cfg(feature = "viewer")]
 use crate::report::markdown;
-use crate::report::{AssertSummary, HeldJointSummary, OnlineSummary, RenewalSummary, RunSummary, WorldSummary, html};
+use crate::report::{
+    About, AssertSummary, HeldJointSummary, OnlineSummary, RenewalSummary, Report, RunSummary, WorldSummary, html,
+};
 use crate::run::describe::describe;
 use crate::run::{Failure, RunError, RunInputs, Stage, corner_scatter_px};
 use crate::score::{ScoreInput, score};
@@ -217,7 +219,14 @@ impl Run<'_> {
         }
         let json = serde_json::to_string_pretty(summary)?;
         self.output.write("summary.json", format!("{json}\n").as_bytes())?;
-        Ok(self.output.write("report.html", html(summary, calibration, log).as_bytes())?)
+        let (robot, routine) = (&self.inputs.robot, &self.inputs.routine);
+        let about = About {
+            operator: routine.operator.clone(),
+            vehicle: Some(self.inputs.vehicle.name.clone()),
+            recordings: vec!["run.mcap".to_owned()],
+        };
+        let report = html(&Report { summary, calibration, robot, online: log, about });
+        Ok(self.output.write("report.html", report.as_bytes())?)
     }
 
     #[cfg(not(feature = "viewer"))]

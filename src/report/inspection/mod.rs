@@ -15,4 +15,5 @@ pub use arm::{ArmContents, TagSeen, TaskSeen};
 pub use contents::{Attachment, CompletenessReport, Compression, Inspection, Metadata, State, inspect};
 pub use observable_parameters::ObservableParameters;
 pub use text::to_text;
+pub(in crate::report) use text::utc;
 pub use topics::TopicContents;

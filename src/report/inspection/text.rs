@@ -193,7 +193,7 @@ fn size(bytes: u64) -> String {
 }
 
 /// `2026-01-01T00:00:00.000Z`.
-pub(super) fn utc(nanos: u64) -> String {
+pub(in crate::report) fn utc(nanos: u64) -> String {
     let (seconds, millis) = (nanos / 1_000_000_000, nanos / 1_000_000 % 1000);
     let (days, second) = (seconds / 86_400, seconds % 86_400);
     // Years from 1 March, so that the leap day is the last.

@@ -1,0 +1,141 @@
+//! How good the tool is: target by target, over the reach task, and against the number of views.
+
+use std::collections::BTreeMap;
+
+use armcal_charts::{Axis, Color, Panel, Style};
+use maud::{Markup, html as markup};
+
+use super::Report;
+use super::figure::{figure, panel, series};
+use crate::report::table::score_rows;
+use crate::score::{Score, TargetScore};
+use armcal_belief::calib::TargetPrediction;
+use armcal_core::units::Unit;
+
+pub(super) fn section(report: &Report<'_>) -> Markup {
+    let score = report.summary.score.as_ref();
+    let targets = targets(report);
+    markup! {
+        @if score.is_some() || !targets.is_empty() { h2 { "How good the tool is" } }
+        @if let Some(score) = score { (reach_task(score)) }
+        div.figures {
+            @if !targets.is_empty() { (target_chart(&targets)) }
+            (growth(report))
+        }
+        @if !targets.is_empty() { (target_table(&targets)) }
+    }
+}
+
+fn reach_task(score: &Score) -> Markup {
+    markup! {
+        div.wide {
+            table {
+                tr { th { "reach task, against the truth" } th { "before" } th { "after" } th { "ratio" } }
+                @for row in score_rows(&score.before, score.after.as_ref()) {
+                    tr { @for cell in row { td { (cell) } } }
+                }
+            }
+        }
+    }
+}
+
+/// All that is known of one target.
+#[derive(Clone, Copy, Default)]
+struct Target<'a> {
+    truth: Option<&'a TargetScore>,
+    predicted: Option<&'a TargetPrediction>,
+}
+
+impl<'a> Target<'a> {
+    fn before_m(self) -> Option<f64> {
+        self.truth?.tool_error_before_m
+    }
+
+    fn after_m(self) -> Option<f64> {
+        self.truth?.tool_error_after_m
+    }
+
+    fn predicted_m(self) -> Option<f64> {
+        Some(self.predicted?.error_m)
+    }
+
+    fn with_priors_m(self) -> Option<f64> {
+        self.predicted?.with_priors_m
+    }
+}
+
+/// By the number of the target, from 0.
+fn targets<'a>(report: &'a Report<'_>) -> BTreeMap<usize, Target<'a>> {
+    let mut all: BTreeMap<usize, Target<'a>> = BTreeMap::new();
+    for truth in report.summary.score.iter().flat_map(|score| &score.targets) {
+        all.entry(truth.target).or_default().truth = Some(truth);
+    }
+    for predicted in &report.calibration.details.targets {
+        all.entry(predicted.target_idx).or_default().predicted = Some(predicted);
+    }
+    all
+}
+
+fn target_chart<'a>(targets: &BTreeMap<usize, Target<'a>>) -> Markup {
+    let points = |of: fn(Target<'a>) -> Option<f64>| -> Vec<[f64; 2]> {
+        targets.iter().filter_map(|(at, target)| Some([*at as f64, 1e3 * of(*target)?])).collect()
+    };
+    let series = vec![
+        series("before, true", Color::Red, Style::Crosses, points(Target::before_m)),
+        series("after, true", Color::Green, Style::Dots, points(Target::after_m)),
+        series("predicted", Color::Blue, Style::Line, points(Target::predicted_m)),
+        series("predicted, with priors", Color::Grey, Style::Dashes, points(Target::with_priors_m)),
+    ];
+    let shown = series.into_iter().filter(|series| !series.points.is_empty()).collect();
+    let chart = Panel {
+        y: ("tool error, mm".to_owned(), Axis::Log),
+        ..panel("Tool error at each target", "number of the target", "", shown)
+    };
+    figure(&chart, "Predicted: one sigma in space. True errors are the simulator's.")
+}
+
+fn target_table(targets: &BTreeMap<usize, Target<'_>>) -> Markup {
+    let has_truth = targets.values().any(|target| target.truth.is_some());
+    let mm = |value: Option<f64>| Unit::Metres.shown_if(value, 2);
+    markup! {
+        div.wide {
+            table {
+                tr {
+                    th { "target" }
+                    @if has_truth { th { "before, true" } th { "after, true" } }
+                    th { "predicted" } th { "with priors" }
+                }
+                @for (number, target) in targets {
+                    tr {
+                        td { (number) }
+                        @if has_truth { td { (mm(target.before_m())) } td { (mm(target.after_m())) } }
+                        td { (mm(target.predicted_m())) } td { (mm(target.with_priors_m())) }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Predicted error by the number of views of the last capture, and the true one at its end.
+fn growth(report: &Report<'_>) -> Markup {
+    let renewals = &report.summary.capture.renewals;
+    let last = renewals.chunk_by(|before, after| before.views < after.views).last().unwrap_or_default();
+    if last.len() < 2 {
+        return Markup::default();
+    }
+    let mut predicted: Vec<[f64; 2]> =
+        last.iter().map(|renewal| [renewal.views as f64, 1e3 * renewal.predicted_tool_error_m]).collect();
+    let n_views = report.summary.capture.views as f64;
+    predicted.extend(report.summary.calibration.predicted_tool_error_m.map(|error| [n_views, 1e3 * error.median]));
+    let mut shown = vec![series("predicted", Color::Blue, Style::Line, predicted)];
+    let after = report.summary.score.as_ref().and_then(|score| score.after.as_ref()?.tool_error_m);
+    shown.extend(
+        after.map(|after| series("true, median", Color::Green, Style::Dots, vec![[n_views, 1e3 * after.median]])),
+    );
+    let chart = Panel {
+        y: ("tool error, mm".to_owned(), Axis::Log),
+        ..panel("Tool error by number of views", "views", "", shown)
+    };
+    figure(&chart, "What was predicted while views were captured.")
+}

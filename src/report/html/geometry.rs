@@ -1,0 +1,107 @@
+//! Where camera, links and tags were found, each with its standard deviation.
+
+use maud::{Markup, html as markup};
+
+use armcal_belief::calib::{Calibration, CameraMount, Finding, LinkResult, ModelTable, SagTable};
+use armcal_core::units::Unit;
+
+pub(super) fn section(calibration: &Calibration) -> Markup {
+    markup! {
+        @if !calibration.findings.is_empty() { (findings(&calibration.findings)) }
+        h2 { "Camera and geometry" }
+        @if let Some(mount) = &calibration.camera_mount { (camera_mount(mount)) }
+        @if !calibration.link.is_empty() { (links(&calibration.link)) }
+        @if let Some(sag) = &calibration.sag { (bending(sag)) }
+        @if let Some(model) = &calibration.model { (model_lines(model)) }
+    }
+}
+
+fn findings(findings: &[Finding]) -> Markup {
+    markup! {
+        h2 { "Found to be other than stated" }
+        table.notes {
+            tr { th { "what" } th { "which" } th { "how much" } th { "at the tool" } th { "repaired" } }
+            @for finding in findings {
+                tr {
+                    td { (finding.kind.words()) }
+                    td { (finding.name) }
+                    td { (finding.size_in_words().unwrap_or_else(|| "-".to_owned())) }
+                    td { (Unit::Metres.shown_if(finding.tool_error_m, 1)) }
+                    td { (if finding.repaired { "yes" } else { "no" }) }
+                }
+            }
+        }
+    }
+}
+
+/// `x, y, z` with a fixed number of digits.
+fn triple(values: [f64; 3], scale: f64, digits: usize) -> String {
+    values.map(|value| format!("{:.digits$}", value * scale)).join(", ")
+}
+
+fn camera_mount(mount: &CameraMount) -> Markup {
+    let rows = [
+        ("position on its link, mm", triple(mount.position_m, 1e3, 2)),
+        ("one sigma, mm", triple(mount.position_std_m, 1e3, 2)),
+        ("rotation, one sigma, deg", triple(mount.rotation_std_rad, 1f64.to_degrees(), 3)),
+    ];
+    markup! {
+        table.notes {
+            @if let Some(why) = &mount.left_out { tr { th { "by the drawing" } td { (why) } } }
+            @for (what, value) in rows { tr { th scope="row" { "camera, " (what) } td { (value) } } }
+        }
+    }
+}
+
+fn links(links: &[LinkResult]) -> Markup {
+    markup! {
+        div.wide {
+            table {
+                tr {
+                    th { "place of" } th { "shift, mm" } th { "1 sigma, mm" } th { "turn, deg" } th { "1 sigma, deg" }
+                }
+                @for link in links {
+                    tr {
+                        td { (link.joint) }
+                        td { (triple(link.shift_m, 1e3, 1)) } td { (triple(link.shift_std_m, 1e3, 1)) }
+                        td { (triple(link.turn_rad, 1f64.to_degrees(), 2)) }
+                        td { (triple(link.turn_std_rad, 1f64.to_degrees(), 2)) }
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn bending(sag: &SagTable) -> Markup {
+    let scale = 1e3 * 1f64.to_degrees();
+    markup! {
+        table {
+            tr { th { "bends under weight" } th { "deg per kN m" } th { "1 sigma" } }
+            @for joint in &sag.joint {
+                tr {
+                    td { (joint.joint) } td { (format!("{:.3}", joint.rad_per_nm * scale)) }
+                    td { (format!("{:.3}", joint.std_rad_per_nm * scale)) }
+                }
+            }
+        }
+    }
+}
+
+fn model_lines(model: &ModelTable) -> Markup {
+    markup! {
+        table.notes {
+            tr {
+                th scope="row" { "corner noise over what robot.toml states" }
+                td { (format!("{:.2}", model.noise_scale)) }
+            }
+            @if let Some([offset_s, std_s]) = model.time_offset_s {
+                tr {
+                    th scope="row" { "joint sensors' clock behind the camera's" }
+                    td { (format!("{:.1} ms, one sigma {:.1} ms", 1e3 * offset_s, 1e3 * std_s)) }
+                }
+            }
+            @for line in &model.decided { tr { th scope="row" { "decided by evidence" } td { (line) } } }
+        }
+    }
+}

@@ -1,0 +1,110 @@
+//! Each joint's sensor: the line found, and how far it is from the datasheet's over the range.
+
+use armcal_charts::{Color, Style};
+use maud::{Markup, html as markup};
+
+use super::Report;
+use super::figure::{figure, panel, series};
+use armcal_belief::calib::{Calibration, JointAt, JointResult, ParameterCovariance};
+use armcal_core::robot::Robot;
+use armcal_core::sensor::{ArmSensors, ConditionChange};
+
+/// Points of a curve.
+const POINTS: usize = 41;
+
+pub(super) fn section(report: &Report<'_>) -> Markup {
+    let calibration = report.calibration;
+    markup! {
+        h2 { "Joint sensors" }
+        (table(calibration))
+        @if let Some(curves) = Curves::of(report) {
+            div.figures {
+                @for joint in 0..calibration.joint.len() { (curves.figure(joint)) }
+            }
+            p { small {
+                "Line: calibrated less datasheet angle, over the joint's range. Band: two sigma. "
+                "Ticks: readings at which views were captured."
+            } }
+        }
+    }
+}
+
+fn table(calibration: &Calibration) -> Markup {
+    let is_estimated = |joint: &JointResult| joint.gain_estimated || joint.offset_estimated;
+    markup! {
+        div.wide {
+            table {
+                tr {
+                    th { "joint" } th { "gain, rad/count" } th { "1 sigma, %" } th { "offset, deg" }
+                    th { "1 sigma, deg" }
+                    th { "covered, deg" } th { "change, %" }
+                }
+                @for joint in &calibration.joint {
+                    tr {
+                        td { (joint.name) @if !is_estimated(joint) { " " small { "(not calibrated)" } } }
+                        td { (format!("{:.8}", joint.gain_rad_per_count)) }
+                        @let gain_std = joint.gain_std_rad_per_count / joint.gain_rad_per_count.abs();
+                        td { (format!("{:.2}", 100.0 * gain_std)) }
+                        td { (format!("{:+.3}", joint.offset_rad.to_degrees())) }
+                        td { (format!("{:.3}", joint.offset_std_rad.to_degrees())) }
+                        @let [from_deg, to_deg] = joint.covered_rad.map(f64::to_degrees);
+                        td { (format!("{from_deg:.0} .. {to_deg:.0}")) }
+                        @let change = joint.gain_over_datasheet.map(|gain| format!("{:+.2}", 100.0 * (gain - 1.0)));
+                        td { (change.unwrap_or_else(|| "-".to_owned())) }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// What the curves are drawn from.
+struct Curves<'a> {
+    calibration: &'a Calibration,
+    robot: Robot,
+    sensors: ArmSensors,
+    covariance: ParameterCovariance,
+}
+
+impl<'a> Curves<'a> {
+    /// `None` where the calibration is of other joints than the robot's.
+    fn of(report: &Report<'a>) -> Option<Self> {
+        let calibration = report.calibration;
+        let robot = calibration.scaled_robot(report.robot);
+        let sensors = calibration.sensors(&robot).ok()?;
+        let covariance = calibration.parameter_covariance(&robot);
+        (sensors.models.len() == calibration.joint.len()).then_some(Self { calibration, robot, sensors, covariance })
+    }
+
+    fn figure(&self, joint: usize) -> Markup {
+        let model = &self.sensors.models[joint];
+        let (spec, name) = (&model.spec, &self.calibration.joint[joint].name);
+        let departure = ConditionChange::default();
+        let std_rad = |travel_rad: f64| {
+            let at = JointAt { spec, joint, travel_rad };
+            self.covariance.angle_var_rad2(at, &departure, 0.0).sqrt()
+        };
+        let (mut line, mut upper, mut lower) = (Vec::new(), Vec::new(), Vec::new());
+        for n in 0..POINTS {
+            let travel_rad = (2.0 * n as f64 / (POINTS - 1) as f64 - 1.0) * spec.half_range_rad;
+            let read_rad = spec.center_rad + travel_rad;
+            let off_rad = model.correction.angle_rad(spec, travel_rad, &departure, 0.0) - read_rad;
+            let point = |off_rad: f64| [read_rad.to_degrees(), off_rad.to_degrees()];
+            line.push(point(off_rad));
+            upper.push(point(off_rad + 2.0 * std_rad(travel_rad)));
+            lower.push(point(off_rad - 2.0 * std_rad(travel_rad)));
+        }
+        let low = lower.iter().map(|[_, deg]| *deg).fold(0.0, f64::min);
+        let ticks = self.calibration.details.views.iter().map(|view| [view.datasheet_rad[joint].to_degrees(), low]);
+        upper.extend(lower.into_iter().rev());
+        let zero = vec![line[0], line[POINTS - 1]].into_iter().map(|[x, _]| [x, 0.0]).collect();
+        let shown = vec![
+            series("", Color::Blue, Style::Area, upper),
+            series("", Color::Grey, Style::Dashes, zero),
+            series("", Color::Blue, Style::Line, line),
+            series("", Color::Orange, Style::Dots, ticks.collect()),
+        ];
+        debug_assert_eq!(self.robot.n_joints(), self.sensors.models.len());
+        figure(&panel(name, "reading by the datasheet, deg", "off the datasheet, deg", shown), "")
+    }
+}

@@ -1,0 +1,184 @@
+//! What the fit leaves: by tag, by joint, over time, and over the image.
+
+use std::collections::BTreeMap;
+
+use armcal_charts::{Color, Panel, Series, Style};
+use maud::{Markup, html as markup};
+
+use super::Report;
+use super::figure::{figure, panel, series};
+use armcal_belief::calib::{CornerResidual, ObservedTag, ViewResidual};
+
+/// A residual in the picture of the image is this many times as long as it is.
+const MAGNIFIED: f64 = 40.0;
+
+pub(super) fn section(report: &Report<'_>) -> Markup {
+    let views = &report.calibration.details.views;
+    if views.iter().all(|view| view.tags.is_empty()) {
+        return Markup::default();
+    }
+    let names = report.robot.joint_names();
+    markup! {
+        h2 { "What the fit leaves" }
+        div.figures {
+            (over_time(views))
+            (over_image(views))
+            (joint_errors(views, &names))
+        }
+        (by_tag(views))
+        (by_joint(views, &names))
+    }
+}
+
+/// Sums over the observations of one tag.
+#[derive(Default)]
+struct TagSums {
+    views: usize,
+    rejected: usize,
+    squares_px2: f64,
+    mean_px: [f64; 2],
+    corners: usize,
+    squares_m2: f64,
+}
+
+impl TagSums {
+    fn add(&mut self, tag: &ObservedTag) {
+        if !tag.is_used {
+            self.rejected += 1;
+            return;
+        }
+        self.views += 1;
+        self.squares_m2 += tag.off_m * tag.off_m;
+        for CornerResidual { off_px: [x, y], .. } in tag.corners.iter().flatten().filter(|corner| corner.is_used) {
+            self.squares_px2 += x * x + y * y;
+            self.mean_px[0] += x;
+            self.mean_px[1] += y;
+            self.corners += 1;
+        }
+    }
+}
+
+fn by_tag(views: &[ViewResidual]) -> Markup {
+    let mut sums: BTreeMap<u32, TagSums> = BTreeMap::new();
+    for tag in views.iter().flat_map(|view| &view.tags) {
+        sums.entry(tag.id).or_default().add(tag);
+    }
+    let has_corners = sums.values().any(|sum| sum.corners > 0);
+    let rms = |squares: f64, n: usize| (squares / n.max(1) as f64).sqrt();
+    markup! {
+        h3 { "By tag" }
+        div.wide {
+            table {
+                tr {
+                    th { "tag" } th { "views" } th { "rejected" } th { "place off, mm rms" }
+                    @if has_corners { th { "corners off, px rms" } th { "mean x, px" } th { "mean y, px" } }
+                }
+                @for (id, sum) in &sums {
+                    tr.out[sum.rejected > sum.views] {
+                        td { (id) } td { (sum.views) } td { (sum.rejected) }
+                        td { (format!("{:.1}", 1e3 * rms(sum.squares_m2, sum.views))) }
+                        @if has_corners {
+                            td { (format!("{:.2}", rms(sum.squares_px2, sum.corners))) }
+                            @for mean in sum.mean_px { td { (format!("{:+.2}", mean / sum.corners.max(1) as f64)) } }
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn by_joint(views: &[ViewResidual], names: &[String]) -> Markup {
+    let errors: Vec<_> = views.iter().filter_map(|view| view.joint_error_rad).collect();
+    if errors.is_empty() {
+        return Markup::default();
+    }
+    let rms = |joint: usize| (errors.iter().map(|of| of[joint].powi(2)).sum::<f64>() / errors.len() as f64).sqrt();
+    let worst = |joint: usize| errors.iter().map(|of| of[joint].abs()).fold(0.0, f64::max);
+    markup! {
+        h3 { "By joint" }
+        table {
+            tr { th { "joint" } th { "off its calibrated sensor, deg rms" } th { "worst, deg" } }
+            @for (joint, name) in names.iter().enumerate() {
+                tr {
+                    td { (name) } td { (format!("{:.3}", rms(joint).to_degrees())) }
+                    td { (format!("{:.3}", worst(joint).to_degrees())) }
+                }
+            }
+        }
+    }
+}
+
+/// Seconds since the first view.
+fn time_s(views: &[ViewResidual], view: &ViewResidual) -> f64 {
+    views.iter().map(|view| view.end).min().map_or(0.0, |first| view.end.since_s(first))
+}
+
+/// Of each observation; in pixels where there are corners, or else in millimetres.
+fn over_time(views: &[ViewResidual]) -> Markup {
+    let has_corners = views.iter().flat_map(|view| &view.tags).any(|tag| tag.rms_px().is_some());
+    let (mut used, mut rejected) = (Vec::new(), Vec::new());
+    for view in views {
+        for tag in &view.tags {
+            let off = if has_corners { all_corners_px(tag) } else { Some(1e3 * tag.off_m) };
+            let points = if tag.is_used { &mut used } else { &mut rejected };
+            points.extend(off.map(|off| [time_s(views, view), off]));
+        }
+    }
+    // What was rejected would hide the rest: it stands at the upper edge.
+    let top = used.iter().map(|p: &[f64; 2]| p[1]).fold(0.0, f64::max) * 1.1;
+    rejected.iter_mut().for_each(|p| p[1] = p[1].min(top));
+    let y = if has_corners { "corners off, px rms" } else { "place off, mm" };
+    let shown = with_rejected(series("used", Color::Blue, Style::Dots, used), rejected);
+    figure(&panel("Each tag in each view, over time", "since the first view, s", y, shown), "")
+}
+
+fn all_corners_px(tag: &ObservedTag) -> Option<f64> {
+    let squares: Vec<f64> = tag.corners.iter().flatten().map(|c| c.off_px.iter().map(|px| px * px).sum()).collect();
+    (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
+}
+
+fn with_rejected(used: Series, rejected: Vec<[f64; 2]>) -> Vec<Series> {
+    let mut all = vec![used];
+    if !rejected.is_empty() {
+        all.push(series("rejected", Color::Red, Style::Crosses, rejected));
+    }
+    all
+}
+
+/// Every corner where it was seen, its residual as a stroke.
+fn over_image(views: &[ViewResidual]) -> Markup {
+    let (mut strokes, mut rejected) = (Vec::new(), Vec::new());
+    for tag in views.iter().flat_map(|view| &view.tags) {
+        for corner in tag.corners.iter().flatten() {
+            // Upwards in the chart, downwards in the image.
+            let [seen, off] = [corner.seen_px, corner.off_px].map(|[x, y]| [x, -y]);
+            if tag.is_used && corner.is_used {
+                strokes.extend([seen, [seen[0] - MAGNIFIED * off[0], seen[1] - MAGNIFIED * off[1]]]);
+            } else {
+                rejected.push(seen);
+            }
+        }
+    }
+    if strokes.is_empty() {
+        return Markup::default();
+    }
+    let shown = with_rejected(series("", Color::Blue, Style::Strokes, strokes), rejected);
+    let chart = Panel { is_map: true, ..panel("Corners over the image", "x, px", "-y, px", shown) };
+    figure(&chart, "Strokes: from where a corner was seen to where it is predicted, 40 times as long as it is.")
+}
+
+/// How far each joint was off its calibrated sensor.
+fn joint_errors(views: &[ViewResidual], names: &[String]) -> Markup {
+    let of_joint = |(joint, name): (usize, &String)| {
+        let point = |view: &ViewResidual| Some([time_s(views, view), view.joint_error_rad?[joint].to_degrees()]);
+        let points: Vec<[f64; 2]> = views.iter().filter_map(point).collect();
+        let is_still = points.iter().all(|[_, deg]| deg.abs() < 1e-6);
+        (!is_still).then(|| Series { name: name.clone(), color: None, style: Style::Line, points })
+    };
+    let shown: Vec<Series> = names.iter().enumerate().filter_map(of_joint).collect();
+    if shown.is_empty() {
+        return Markup::default();
+    }
+    figure(&panel("Each joint against its calibrated sensor", "since the first view, s", "off, deg", shown), "")
+}

@@ -1,0 +1,207 @@
+//! May it be used, why, what to do next; and what the report is of.
+
+use maud::{Markup, html as markup};
+
+use super::Report;
+use crate::report::inspection::utc;
+use crate::report::summary::RunSummary;
+use crate::report::table::{check_lines, labelled};
+use armcal_belief::calib::{Calibration, Status, ValidRange};
+use armcal_core::units::Unit;
+
+/// How a verdict reads at a glance.
+struct Verdict {
+    class: &'static str,
+    headline: &'static str,
+    reasons: Vec<String>,
+    next: Vec<String>,
+}
+
+pub(super) fn section(report: &Report<'_>) -> Markup {
+    let verdict = verdict(report);
+    markup! {
+        div class={ "verdict " (verdict.class) } {
+            strong { (verdict.headline) }
+            p { (in_one_sentence(report)) }
+            @if !verdict.reasons.is_empty() { ul { @for reason in &verdict.reasons { li { (reason) } } } }
+            p { b { "What to do next" } }
+            ul { @for step in &verdict.next { li { (step) } } }
+        }
+        (facts(report))
+    }
+}
+
+fn verdict(report: &Report<'_>) -> Verdict {
+    let (summary, calibration) = (report.summary, report.calibration);
+    if summary.status == Status::Refused {
+        let mut next: Vec<String> = Vec::new();
+        for remedy in calibration.refusals.iter().map(|refusal| sentence(refusal.remedy())) {
+            if !next.contains(&remedy) {
+                next.push(remedy);
+            }
+        }
+        next.push("Keep the sensors that were believed in before, and calibrate again.".to_owned());
+        let reasons = calibration.refusals.iter().map(|refusal| sentence(&refusal.cause())).collect();
+        return Verdict { class: "red", headline: "REFUSED: do not use this calibration", reasons, next };
+    }
+    let attention = attention(summary, calibration);
+    let mut next = vec!["Load calibration.toml, or export it (armcal export) for the arm's driver.".to_owned()];
+    if attention.is_empty() {
+        return Verdict { class: "green", headline: "ACCEPTED: use it", reasons: Vec::new(), next };
+    }
+    next.push("Look at each point above before work that depends on it.".to_owned());
+    Verdict { class: "amber", headline: "ACCEPTED, with points to look at", reasons: attention, next }
+}
+
+/// What an accepted calibration leaves to be looked at.
+fn attention(summary: &RunSummary, calibration: &Calibration) -> Vec<String> {
+    let mut points: Vec<String> = Vec::new();
+    for limit in summary.asserts.iter().filter(|limit| !limit.holds) {
+        points.push(format!("A limit of the script does not hold: step {}, {}.", limit.step, limit.key));
+    }
+    if summary.online.as_ref().is_some_and(|online| online.is_good_enough == Some(false)) {
+        points.push("What is believed at the end is not good enough for the task.".to_owned());
+    }
+    points.extend(summary.stopped.iter().map(|why| sentence(&format!("the script stopped early: {why}"))));
+    if calibration.prior.as_ref().is_some_and(|prior| !prior.agrees) {
+        points
+            .push("The earlier calibration contradicts the new views: something happened to the arm since.".to_owned());
+    }
+    for failed in &calibration.failed_joint {
+        let colon = if failed.evidence.is_empty() { "" } else { ": " };
+        points.push(format!("{} {}{colon}{}.", failed.joint, failed.kind.name(), failed.evidence));
+    }
+    let not_covered = calibration.verdict.iter().flat_map(|verdict| &verdict.not_covered);
+    points.extend(not_covered.map(|line| sentence(&format!("not covered by any view: {line}"))));
+    points
+}
+
+/// The figure that matters, in words.
+fn in_one_sentence(report: &Report<'_>) -> String {
+    let calibration = report.calibration;
+    let mm = |m: f64| Unit::Metres.shown(m, 1);
+    let mut words = match (calibration.predicted_tool_error_with_priors_m, calibration.predicted_tool_error_m) {
+        (Some(all), _) => {
+            format!(
+                "The tool is expected within {} of where it is believed (median of its targets; worst {}).",
+                mm(all.median),
+                mm(all.max)
+            )
+        }
+        (None, Some(data)) => format!(
+            "The tool is expected within {} of where it is believed (median; worst {}).",
+            mm(data.median),
+            mm(data.max)
+        ),
+        (None, None) => format!(
+            "No task was named, so no tool error is predicted. Views that were held out see the tags {} off (rms).",
+            Unit::Metres.shown_if(calibration.held_out.rms_m, 1)
+        ),
+    };
+    let truth = report.summary.score.as_ref();
+    let measured = truth.and_then(|score| Some((score.before.tool_error_m?, score.after.as_ref()?.tool_error_m?)));
+    if let Some((before, after)) = measured {
+        words += &format!(
+            " Against the simulator's truth: {} before, {} after (medians).",
+            mm(before.median),
+            mm(after.median)
+        );
+    }
+    words
+}
+
+/// A capital first, a full stop last.
+fn sentence(text: &str) -> String {
+    let mut letters = text.chars();
+    let first: String = letters.next().into_iter().flat_map(char::to_uppercase).collect();
+    let end = if text.ends_with(['.', '!', '?']) { "" } else { "." };
+    format!("{first}{}{end}", letters.as_str())
+}
+
+/// What this is a report of.
+fn facts(report: &Report<'_>) -> Markup {
+    let (summary, calibration, about) = (report.summary, report.calibration, &report.about);
+    let nanos = u64::try_from(calibration.valid.time_nanos).ok().filter(|nanos| *nanos > 0);
+    let simulated = summary.world.as_ref().map(|world| format!("simulated ({})", world.engine));
+    let rows = [
+        ("arm", Some(summary.robot.clone())),
+        ("serial number", report.robot.serial.clone()),
+        ("vehicle", about.vehicle.clone()),
+        ("operator", about.operator.clone()),
+        (
+            "last view",
+            nanos.map(|nanos| {
+                format!("{}{}", utc(nanos), simulated.as_ref().map_or("", |_| ", by the simulator's clock"))
+            }),
+        ),
+        ("arm and sea", simulated),
+        ("oil, water", conditions(&calibration.valid)),
+        ("depth", depth(&calibration.valid)),
+        ("recording", (!about.recordings.is_empty()).then(|| about.recordings.join(", "))),
+        ("hash of the messages used", Some(calibration.messages_hash.clone())),
+        ("seed", summary.seed.map(|seed| seed.to_string())),
+        ("method", Some(summary.method.clone())),
+        ("program", Some(format!("armcal {}", env!("CARGO_PKG_VERSION")))),
+    ];
+    markup! {
+        h2 { "What this is of" }
+        table.notes {
+            @for (what, value) in rows.iter().filter_map(|(what, value)| Some((what, value.as_ref()?))) {
+                tr { th scope="row" { (what) } td { code { (value) } } }
+            }
+        }
+    }
+}
+
+fn conditions(valid: &ValidRange) -> Option<String> {
+    let range =
+        |name: &str, range: Option<[f64; 2]>| range.map(|[low, high]| format!("{name} {low:.1} .. {high:.1} C"));
+    let both: Vec<String> = [range("oil", valid.oil_c), range("water", valid.water_c)].into_iter().flatten().collect();
+    (!both.is_empty()).then(|| both.join(", "))
+}
+
+/// Of sea water, 1025 kg/m^3, below one atmosphere.
+fn depth(valid: &ValidRange) -> Option<String> {
+    let [low, high] = valid.pressure_pa?;
+    let metres = |pa: f64| ((pa - 101_325.0) / (1025.0 * 9.806_65)).max(0.0);
+    let range = |low: String, high: String| if low == high { low } else { format!("{low} .. {high}") };
+    let metres = range(format!("{:.0}", metres(low)), format!("{:.0}", metres(high)));
+    let megapascals = range(format!("{:.2}", low * 1e-6), format!("{:.2}", high * 1e-6));
+    Some(format!("{metres} m ({megapascals} MPa)"))
+}
+
+/// The lines of the terminal's table, all of them.
+pub(super) fn all_lines(summary: &RunSummary) -> Markup {
+    markup! {
+        h2 { "How it went" }
+        table.notes {
+            @for (label, text) in check_lines(summary).iter().map(|line| labelled(line)) {
+                tr { th scope="row" { (label) } td { (text) } }
+            }
+        }
+    }
+}
+
+/// Lines to sign on.
+pub(super) fn signatures() -> Markup {
+    markup! { div.sign { p { "Date" } p { "Name" } p { "Signature" } } }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn reasons_are_sentences() {
+        assert_eq!(sentence("capture more views"), "Capture more views.");
+        assert_eq!(sentence("So it is."), "So it is.");
+        assert_eq!(sentence(""), ".");
+    }
+
+    #[test]
+    fn depth_is_that_of_the_water_column() {
+        let at = |pa: [f64; 2]| ValidRange { time_nanos: 0, oil_c: None, water_c: None, pressure_pa: Some(pa) };
+        // 4000 m of 1025 kg/m^3: 40.2 MPa and an atmosphere.
+        assert_eq!(depth(&at([101_325.0, 40_308_389.0])).expect("a depth"), "0 .. 4000 m (0.10 .. 40.31 MPa)");
+    }
+}
