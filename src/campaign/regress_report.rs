@@ -47,25 +47,33 @@ impl Check {
 }
 
 impl WorstPair {
-    fn in_words(&self) -> String {
+    pub(super) fn in_words(&self) -> String {
         let setting = if self.settings.is_empty() { String::new() } else { format!(" ({})", self.settings) };
         format!("{}: seed {}{setting}: {}", self.what, self.seed, self.detail)
     }
 }
 
+/// Header and rows of the table.
+pub(super) fn check_rows(comparison: &Comparison) -> Vec<[String; 6]> {
+    let header = ["new over baseline, by seed", "pairs", "median", "90 % interval", "budget", "result"];
+    let row = |check: &Check| {
+        let (value, interval, budget) = (check.value_text(), check.interval_text(), check.budget_text());
+        [check.what.to_owned(), check.n.to_string(), value, interval, budget, check.verdict_text().to_owned()]
+    };
+    [header.map(str::to_owned)].into_iter().chain(comparison.checks.iter().map(row)).collect()
+}
+
 fn grid(comparison: &Comparison, preset: &str) -> Grid {
     let mut grid = Grid::new();
     grid.load_preset(preset);
-    grid.set_header(["new over baseline, by seed", "pairs", "median", "90 % interval", "budget", ""]);
-    for check in &comparison.checks {
-        let (value, interval, budget) = (check.value_text(), check.interval_text(), check.budget_text());
-        grid.add_row([check.what, &check.n.to_string(), &value, &interval, &budget, check.verdict_text()]);
-    }
+    let mut rows = check_rows(comparison).into_iter();
+    grid.set_header(rows.next().unwrap_or_default());
+    grid.add_rows(rows);
     grid
 }
 
 /// The last line: what it comes to.
-fn conclusion(comparison: &Comparison) -> &'static str {
+pub(super) fn conclusion(comparison: &Comparison) -> &'static str {
     match comparison.verdict {
         Verdict::Worse => "WORSE than the baseline",
         Verdict::Inconclusive => {

@@ -23,10 +23,10 @@ const SHOWN: [(Metric, &str); 14] = [
     (Metric::SimulatedTime, "simulated time"),
 ];
 
-const HEADER: [&str; 6] =
+pub(super) const HEADER: [&str; 6] =
     ["figure over the seeds", "n", "median", "its 95 % interval", "95 % of seeds", "worst (seed)"];
 
-fn rows(setting: &SettingStatistics) -> Vec<[String; 6]> {
+pub(super) fn rows(setting: &SettingStatistics) -> Vec<[String; 6]> {
     let row = |&(metric, what): &(Metric, &str)| {
         let figure = setting.figures.iter().find(|figure| figure.name == metric.name())?;
         let unit = metric.unit();
@@ -43,7 +43,7 @@ fn rows(setting: &SettingStatistics) -> Vec<[String; 6]> {
     SHOWN.iter().filter_map(row).collect()
 }
 
-fn title(setting: &SettingStatistics) -> String {
+pub(super) fn title(setting: &SettingStatistics) -> String {
     let SettingStatistics { settings, runs, accepted, missed, refused, failed, with_contacts, .. } = setting;
     let which = if settings.is_empty() { String::new() } else { format!("{settings}: ") };
     format!(

@@ -28,7 +28,7 @@ pub(super) struct CampaignArgs {
     /// Only every N-th seed, beginning with the K-th
     #[arg(long, value_name = "K/N")]
     shard: Option<Shard>,
-    /// The table (.csv); .parquet, -summary.json and -summary.md are written beside it.
+    /// The table (.csv); .parquet, -summary.json, -summary.md and -report.html are written beside it.
     /// recordings/ROUTINE-NAME/campaign.csv if not given
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,

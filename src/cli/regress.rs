@@ -8,7 +8,7 @@ use clap::Args;
 
 use crate::campaign::{
     Comparison, Job, Metric, Prepared, Request, Row, Table, Undecided, Verdict, baseline_text, compare, jobs,
-    read_baseline, regress_junit, regress_markdown, regress_table, statistics, table, table_text,
+    read_baseline, regress_junit, regress_markdown, regress_page, regress_table, statistics, table, table_text,
 };
 use crate::cli::batch::{BatchRun, CampaignBar, check_name, range_of, run_many};
 use crate::cli::exit::{Exit, UsageError};
@@ -50,6 +50,9 @@ pub(super) struct RegressArgs {
     /// Write the comparison as JUnit's XML, too, a test case a check
     #[arg(long, value_name = "FILE", conflicts_with = "write_baseline")]
     junit: Option<PathBuf>,
+    /// Write the comparison as a page (.html), too
+    #[arg(long, value_name = "FILE", conflicts_with = "write_baseline")]
+    html: Option<PathBuf>,
     /// Write the comparison as Markdown, too
     #[arg(long, value_name = "FILE", conflicts_with = "write_baseline")]
     markdown: Option<PathBuf>,
@@ -61,7 +64,7 @@ pub(super) fn regress(args: &RegressArgs) -> Result<Exit> {
     if let Some(out) = args.write_baseline.as_ref().or(args.out.as_ref()) {
         check_name(out)?;
     }
-    for path in args.junit.iter().chain(&args.markdown) {
+    for path in args.junit.iter().chain(&args.markdown).chain(&args.html) {
         output::check_writable(path)?;
     }
     let prepared = Prepared::load(Request { routine: args.routine.clone(), overrides: args.overrides.overrides() })?;
@@ -99,6 +102,9 @@ fn compared(args: &RegressArgs, prepared: &Prepared, baseline: &Table, now: &Tab
     let name = &prepared.routine.name;
     if let Some(path) = &args.markdown {
         output::write_whole(path, regress_markdown(&comparison, name).as_bytes())?;
+    }
+    if let Some(path) = &args.html {
+        output::write_whole(path, regress_page(&comparison, name).as_bytes())?;
     }
     if let Some(path) = &args.junit {
         let undecided = if args.allow_inconclusive { Undecided::Passes } else { Undecided::Fails };

@@ -9,7 +9,7 @@ use crate::support::{Answer, ShortRoutine, answer, edit, program, read, robot_co
 /// Least runs: three views are too few, so the calibration is refused. With nine tags of eight nothing can be planned.
 const MATRIX: &str = "[world.physics]\ntruth_rate_hz = 5.0\n\
     [campaign]\nseeds = \"1..3\"\n[campaign.matrix]\n\"capture.min_tags\" = [3, 9]\n";
-const RESULTS: [&str; 4] = ["c.csv", "c.parquet", "c-summary.json", "c-summary.md"];
+const RESULTS: [&str; 5] = ["c.csv", "c.parquet", "c-summary.json", "c-summary.md", "c-report.html"];
 
 fn least(tail: &str) -> ShortRoutine {
     let mut routine = ShortRoutine { poses: 3, held_out: 3, tail: tail.to_owned(), ..ShortRoutine::default() };
@@ -23,7 +23,7 @@ fn campaign(routine: &Path, out: &Path, more: &[&str]) -> Command {
     command
 }
 
-fn results(folder: &Path) -> [Vec<u8>; 4] {
+fn results(folder: &Path) -> [Vec<u8>; 5] {
     RESULTS.map(|name| std::fs::read(folder.join(name)).expect("a result"))
 }
 

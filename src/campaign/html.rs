@@ -1,0 +1,169 @@
+//! The report of a campaign or of a regression as one page, in the look of a run's report.
+
+use armcal_charts::{Panel, Series, Style};
+use maud::{Markup, html as markup};
+
+use crate::campaign::regress::{Comparison, Verdict};
+use crate::campaign::regress_report::{check_rows, conclusion};
+use crate::campaign::statistics::{CampaignSummary, FailureLine};
+use crate::campaign::table_file::Table;
+use crate::campaign::tables::{HEADER, rows, title};
+use crate::campaign::{Metric, Row};
+use crate::report::{chart, page, panel};
+
+/// What is drawn over the seeds, and its axis.
+const DRAWN: [(Metric, &str); 4] = [
+    (Metric::ToolErrorAfterMedian, "tool error after, median over the targets"),
+    (Metric::ToolErrorAfterMax, "tool error after, worst target"),
+    (Metric::PredictedToolErrorP95, "tool error predicted, 95 %"),
+    (Metric::MinClearance, "nearest to anything"),
+];
+
+/// One file, no network.
+#[must_use]
+pub(super) fn campaign_page(table: &Table, summary: &CampaignSummary) -> String {
+    let body = markup! {
+        (verdict(summary))
+        div.figures { @for (metric, what) in DRAWN { (shares(table, metric, what)) } }
+        @for setting in &summary.settings {
+            h2 { (title(setting)) }
+            div.wide {
+                table {
+                    tr { @for name in HEADER { th { (name) } } }
+                    @for row in rows(setting) { tr { @for cell in row { td { (cell) } } } }
+                }
+            }
+            (failures(&setting.failures))
+        }
+        p { small {
+            "Intervals by the percentile bootstrap over the seeds. All rows are in the table beside this file."
+        } }
+    };
+    page(&format!("Campaign of {}", summary.routine), &body)
+}
+
+fn verdict(summary: &CampaignSummary) -> Markup {
+    let sum = |of: fn(&crate::campaign::SettingStatistics) -> usize| summary.settings.iter().map(of).sum::<usize>();
+    let (runs, accepted, missed) = (sum(|s| s.runs), sum(|s| s.accepted), sum(|s| s.missed));
+    let (refused, failed, touched) = (sum(|s| s.refused), sum(|s| s.failed), sum(|s| s.with_contacts));
+    let class = match () {
+        () if failed + touched > 0 => "red",
+        () if accepted < runs => "amber",
+        () => "green",
+    };
+    markup! {
+        div class={ "verdict " (class) } {
+            strong { (accepted) " of " (runs) " runs accepted" }
+            p {
+                (missed) " missed a limit of the script, " (refused) " refused, " (failed) " failed; "
+                (touched) " with contacts."
+            }
+        }
+    }
+}
+
+fn failures(failures: &[FailureLine]) -> Markup {
+    markup! {
+        @if !failures.is_empty() {
+            table.notes {
+                tr { th { "seed" } th { "ended" } th { "why, and how to repeat it" } }
+                @for FailureLine { seed, status, failure, command } in failures {
+                    tr { td { (seed) } td { (status) } td { (failure) br; code { (command) } } }
+                }
+            }
+        }
+    }
+}
+
+/// The share of the seeds up to each value of a figure, a line a setting.
+fn shares(table: &Table, metric: Metric, what: &str) -> Markup {
+    let Some(place) = table.place(metric) else { return Markup::default() };
+    let line = |rows: &[Row]| {
+        let values = rows.iter().filter_map(|row| row.figures[place]).filter(|value| value.is_finite());
+        let mut values: Vec<f64> = values.map(|value| value * metric.unit().scale()).collect();
+        values.sort_by(f64::total_cmp);
+        let n = values.len() as f64;
+        let step = |(k, value): (usize, f64)| [[value, k as f64 / n], [value, (k + 1) as f64 / n]];
+        let points = values.into_iter().enumerate().flat_map(step).collect();
+        Series { name: rows[0].settings.clone(), color: None, style: Style::Line, points }
+    };
+    let all: Vec<Series> = table.rows.chunk_by(|a, b| a.setting == b.setting).map(line).collect();
+    let shown: Vec<Series> = all.into_iter().filter(|series| !series.points.is_empty()).collect();
+    if shown.is_empty() {
+        return Markup::default();
+    }
+    let x = format!("{what}, {}", metric.unit().symbol());
+    chart(&Panel { title: what.to_owned(), ..panel(what, &x, "share of the seeds", shown) }, "")
+}
+
+/// The same of a comparison with a baseline.
+#[must_use]
+pub fn regress_page(comparison: &Comparison, routine: &str) -> String {
+    let class = match comparison.verdict {
+        Verdict::NotWorse => "green",
+        Verdict::Inconclusive => "amber",
+        Verdict::Worse => "red",
+    };
+    let body = markup! {
+        div class={ "verdict " (class) } {
+            strong { (conclusion(comparison)) }
+            p { (comparison.pairs) " pairs of runs, each of one seed." }
+        }
+        h2 { "Every check" }
+        div.wide {
+            table {
+                @for (number, cells) in check_rows(comparison).iter().enumerate() {
+                    tr {
+                        @for cell in cells {
+                            @if number == 0 { th { (cell) } } @else { td { (cell) } }
+                        }
+                    }
+                }
+            }
+        }
+        @if !comparison.worst.is_empty() {
+            h2 { "The worst pairs" }
+            table.notes {
+                @for pair in &comparison.worst { tr { td { (pair.in_words()) br; code { (pair.command) } } } }
+            }
+        }
+    };
+    page(&format!("Regression of {routine}"), &body)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::campaign::table_file::tests::{names, row};
+    use crate::campaign::{RunStatus, compare, statistics};
+    use armcal_core::routine::RegressSettings;
+
+    #[test]
+    fn a_campaign_that_went_well_is_green_and_one_with_failures_is_not() {
+        let page_of = |rows: Vec<Row>| {
+            let table = Table { names: names(), rows };
+            campaign_page(&table, &statistics(&table, "<r>", "f"))
+        };
+        let untouched = |seed| Row { figures: vec![Some(1.0), Some(0.0), Some(0.004)], ..row(0, seed) };
+        let good = page_of((1..=6).map(untouched).collect());
+        assert!(good.contains("verdict green") && good.contains("6 of 6 runs accepted"), "{good}");
+        assert!(good.contains("Campaign of &lt;r&gt;") && !good.contains("<r>"));
+        let failed = Row { status: RunStatus::Failed, failure: "<why>".to_owned(), ..untouched(7) };
+        let bad = page_of((1..=6).map(untouched).chain([failed]).collect());
+        assert!(bad.contains("verdict red") && bad.contains("6 of 7 runs") && bad.contains("&lt;why&gt;"), "{bad}");
+        let refused = Row { status: RunStatus::Refused, ..untouched(7) };
+        assert!(page_of(vec![untouched(1), refused]).contains("verdict amber"));
+    }
+
+    #[test]
+    fn a_worse_program_is_red_and_says_how_to_repeat_it() {
+        let table = |factor: f64| {
+            let of = |seed| Row { figures: vec![Some(1.0), Some(0.0), Some(0.004 * factor)], ..row(0, seed) };
+            Table { names: names(), rows: (1..=6).map(of).collect() }
+        };
+        let page_of = |factor| regress_page(&compare(&table(1.0), &table(factor), &RegressSettings::default()), "r");
+        let (same, worse) = (page_of(1.0), page_of(1.5));
+        assert!(same.contains("verdict green") && same.contains("not worse than the baseline"), "{same}");
+        assert!(worse.contains("verdict red") && worse.contains("armcal run") && worse.contains("x 1.500"), "{worse}");
+    }
+}
