@@ -40,6 +40,19 @@ fn usage_errors_exit_with_2() {
     answer(&mut unknown).expect("unknown method", 2, &["guess", "minimum_distance"]);
 }
 
+#[test]
+fn shells_and_man_know_every_command() {
+    let folder = temp();
+    let shell = answer(program().args(["completions", "bash"]));
+    shell.expect("completions", 0, &["calibrate", "regress", "--tag-map"]);
+    answer(program().arg("man").arg(folder.path().join("man"))).expect("man", 0, &["written"]);
+    for command in armcal::cli::command().get_subcommands() {
+        let page = folder.path().join(format!("man/armcal-{}.1", command.get_name()));
+        assert!(crate::support::read(&page).contains(".TH"), "{}", page.display());
+    }
+    answer(program().args(["completions", "abacus"])).expect("no such shell", 2, &["abacus", "zsh"]);
+}
+
 /// A folder below a file can be made by nobody, not even by root.
 #[test]
 fn an_output_folder_that_cannot_be_made_is_named() {

@@ -8,6 +8,7 @@ use clap::Args;
 
 use crate::cli::calibrate_online::{calibrate_online, stationary};
 use crate::cli::calibration_inputs::{Calibrated, CalibrationInputs, load_robot};
+use crate::cli::closing::say_closing;
 use crate::cli::exit::Exit;
 use crate::cli::stdout::{note, say};
 use crate::output;
@@ -104,7 +105,12 @@ pub(super) fn calibrate(args: &CalibrateArgs) -> Result<Exit> {
             note(format_args!("warning: no replay: {error:#}"));
         }
     }
-    say(&shown)?;
+    if args.compact {
+        say(&shown)?;
+    } else {
+        let out = args.out.display();
+        say_closing(&format!("{shown}\nwritten      {out}\nnext         {out}/report.html"))?;
+    }
     Ok(match (calibration.status, lost) {
         (Status::Refused, _) => Exit::Refused,
         (Status::Accepted, true) => Exit::DataLost,

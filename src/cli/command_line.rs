@@ -9,7 +9,7 @@ use clap::{CommandFactory, Parser, Subcommand};
 #[cfg(feature = "viewer")]
 use crate::cli::replay;
 use crate::cli::stdout::{is_written, note};
-use crate::cli::{calibrate, check, exit, export, inspect, new_robot, plan, tagmap, watch};
+use crate::cli::{calibrate, check, completions, exit, export, inspect, new_robot, plan, tagmap, watch};
 #[cfg(feature = "sim")]
 use crate::cli::{campaign, regress, run, sensitivity, study};
 
@@ -59,6 +59,10 @@ enum Command {
     /// Read robot folders, routines, vehicles, calibrations, input maps, tag maps, tasks and plans, and say what is
     /// wrong with them
     Check(check::CheckArgs),
+    /// Print the script with which a shell completes commands and options
+    Completions(completions::CompletionsArgs),
+    /// Write manual pages into a folder
+    Man(completions::ManArgs),
 }
 
 /// The definition of the command line, for those who check quoted command lines.
@@ -102,6 +106,8 @@ pub fn main() -> ExitCode {
         Command::Replay(args) => replay::replay(&args),
         Command::NewRobot(args) => new_robot::new_robot(&args),
         Command::Check(args) => check::check(&args),
+        Command::Completions(args) => completions::completions(&args),
+        Command::Man(args) => completions::man(&args),
     };
     ended(result)
 }

@@ -9,7 +9,9 @@ mod calibration_inputs;
 #[cfg(feature = "sim")]
 mod campaign;
 mod check;
+mod closing;
 mod command_line;
+mod completions;
 #[cfg(feature = "sim")]
 mod confirm;
 mod exit;

@@ -6,12 +6,13 @@ use std::time::Instant;
 use anyhow::Result;
 use clap::Args;
 
+use crate::cli::closing::say_closing;
 use crate::cli::confirm::Confirm;
 use crate::cli::exit::{Exit, of_summary};
 use crate::cli::interrupt::Interrupt;
 use crate::cli::overrides::OverrideArgs;
 use crate::cli::progress::Bar;
-use crate::cli::stdout::{note, say};
+use crate::cli::stdout::note;
 use crate::output::OutputFolder;
 use crate::report::table;
 use crate::run::{Failure, Keep, RunInputs, execute};
@@ -56,7 +57,11 @@ pub(super) fn run(args: &RunArgs) -> Result<Exit> {
     if let Some(why) = &finished.replay_failure {
         note(format_args!("warning: there is no replay, all other files are whole: {why}"));
     }
-    say(&format!("{}\nwritten      {}", table(&finished.summary), out.display()))?;
+    let shown = out.display();
+    say_closing(&format!(
+        "{}\nwritten      {shown}\nnext         {shown}/report.html; armcal replay {shown}/run.mcap",
+        table(&finished.summary)
+    ))?;
     Ok(of_summary(&finished.summary))
 }
 

@@ -12,8 +12,13 @@ use armcal_core::text::printable;
 
 /// Writes `text`, printable, to stdout and ends the line.
 pub(super) fn say(text: &str) -> Result<()> {
+    say_as_it_is(&printable(text))
+}
+
+/// The same of text that was made printable before it got its colors.
+pub(super) fn say_as_it_is(text: &str) -> Result<()> {
     let mut stdout = std::io::stdout().lock();
-    is_written(writeln!(stdout, "{}", printable(text)).and_then(|()| stdout.flush()))
+    is_written(writeln!(stdout, "{text}").and_then(|()| stdout.flush()))
 }
 
 /// Whether stdout took what it was given.

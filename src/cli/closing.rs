@@ -1,0 +1,108 @@
+//! The closing lines of a command: whole lines for programs; wrapped and colored on a terminal.
+
+use std::io::{IsTerminal, stdout};
+
+use anyhow::Result;
+use armcal_core::text::printable;
+
+use crate::cli::stdout::say_as_it_is;
+
+/// Every line begins with a label of this width; what goes on below begins where the text did.
+const LABEL_WIDTH: usize = 13;
+/// A terminal narrower than this gets lines of this width.
+const MIN_WIDTH: usize = 40;
+const GREEN: &str = "\u{1b}[32m";
+const RED: &str = "\u{1b}[31m";
+const DIM: &str = "\u{1b}[2m";
+const PLAIN: &str = "\u{1b}[0m";
+/// Words that say how it went.
+const COLORED: [(&str, &str); 4] = [("ACCEPTED", GREEN), ("REFUSED", RED), ("FAILS", RED), ("CONTRADICTS", RED)];
+
+/// What the place that lines go to can show.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Look {
+    /// Columns; `None` where nobody reads line by line, as in a pipe.
+    width: Option<usize>,
+    colors: bool,
+}
+
+impl Look {
+    fn of_stdout() -> Self {
+        let is_terminal = stdout().is_terminal();
+        let width = terminal_size::terminal_size().map(|(width, _)| usize::from(width.0));
+        // https://no-color.org: any value but none.
+        let wants_none = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
+        let is_dumb = std::env::var_os("TERM").is_none_or(|term| term == "dumb");
+        Self { width: width.filter(|_| is_terminal), colors: is_terminal && !wants_none && !is_dumb }
+    }
+}
+
+/// Writes the closing lines to stdout.
+pub(super) fn say_closing(text: &str) -> Result<()> {
+    say_as_it_is(&laid_out(&printable(text), Look::of_stdout()))
+}
+
+fn laid_out(text: &str, look: Look) -> String {
+    let lines = text.lines().map(|line| {
+        let wrapped = look.width.map_or_else(|| line.to_owned(), |width| wrapped(line, width.max(MIN_WIDTH)));
+        if look.colors { colored(&wrapped) } else { wrapped }
+    });
+    lines.collect::<Vec<String>>().join("\n")
+}
+
+/// Tables stay as they are: their lines are short.
+fn is_of_table(line: &str) -> bool {
+    line.starts_with(|c: char| ('\u{2500}'..='\u{257f}').contains(&c))
+}
+
+fn wrapped(line: &str, width: usize) -> String {
+    if is_of_table(line) {
+        return line.to_owned();
+    }
+    let indent = " ".repeat(LABEL_WIDTH);
+    let options = textwrap::Options::new(width).subsequent_indent(&indent).break_words(false);
+    textwrap::fill(line, options)
+}
+
+fn colored(line: &str) -> String {
+    if is_of_table(line) {
+        return line.to_owned();
+    }
+    let (label, rest) = line.split_at_checked(LABEL_WIDTH).unwrap_or(("", line));
+    let shade = |rest: String, (word, color): (&str, &str)| rest.replace(word, &format!("{color}{word}{PLAIN}"));
+    let rest = COLORED.into_iter().fold(rest.to_owned(), shade);
+    let label = if label.is_empty() { String::new() } else { format!("{DIM}{label}{PLAIN}") };
+    label + &rest
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LINES: &str = "│ a table stays │\ncalibration  ACCEPTED\nheld out     30 views, 5-fold cross-validation: tag \
+                         position error 6.8 mm rms (datasheet sensors: 161.8 mm)";
+
+    #[test]
+    fn a_pipe_gets_whole_lines() {
+        assert_eq!(laid_out(LINES, Look { width: None, colors: false }), LINES);
+    }
+
+    #[test]
+    fn a_terminal_gets_lines_that_fit_and_no_word_is_broken() {
+        for width in [80, 120] {
+            let shown = laid_out(LINES, Look { width: Some(width), colors: false });
+            assert!(shown.lines().all(|line| line.chars().count() <= width), "{shown}");
+            let words = |text: &str| text.split_whitespace().map(str::to_owned).collect::<Vec<String>>();
+            assert_eq!(words(&shown), words(LINES));
+        }
+        let narrow = laid_out(LINES, Look { width: Some(80), colors: false });
+        assert!(narrow.lines().nth(3).is_some_and(|line| line.starts_with("             ")), "{narrow}");
+    }
+
+    #[test]
+    fn the_verdict_has_a_color_where_colors_are_wanted() {
+        let shown = laid_out(LINES, Look { width: None, colors: true });
+        assert!(shown.contains("\u{1b}[32mACCEPTED\u{1b}[0m") && shown.contains("\u{1b}[2mheld out     \u{1b}[0m"));
+        assert!(shown.starts_with("│ a table stays │\n"));
+    }
+}
