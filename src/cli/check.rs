@@ -100,6 +100,14 @@ fn describe(file: &Path, text: &str, table: &toml::Table) -> Result<String> {
     if table.contains_key("messages_hash") {
         return describe_calibration(file, text);
     }
+    if table.contains_key("robot") && table.contains_key("task") {
+        return Err(UsageError(format!(
+            "{}: vehicle: is missing; a routine names the vehicle that carries the arm: \
+             robots/vehicles/fixed-base.toml is an arm bolted to the ground",
+            file.display()
+        ))
+        .into());
+    }
     Err(UsageError(format!(
         "{}: is none of robot, routine, vehicle, calibration, input map, tag map, task, plan",
         file.display()

@@ -13,7 +13,8 @@ pub enum ViewerError {
     NoFile { path: PathBuf },
     #[error(
         "no `{PROGRAM}` on PATH to show {} with; get it by `pip install rerun-sdk==0.36.3` or \
-         `cargo binstall rerun-cli@0.36.3`, or open the file at https://rerun.io/viewer",
+         `cargo binstall rerun-cli@0.36.3`, or keep the file with --save FILE.rrd and open it at \
+         https://rerun.io/viewer",
         path.display()
     )]
     NotInstalled { path: PathBuf },

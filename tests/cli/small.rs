@@ -224,8 +224,19 @@ fn terms_are_exported_as_tables_and_never_dropped() {
 }
 
 #[test]
+fn a_routine_without_its_vehicle_is_told_what_to_name() {
+    let folder = temp();
+    let routine = folder.path().join("routine.toml");
+    let text = read(&root().join("routines/titan4-quickstart.toml"));
+    let kept = text.lines().filter(|line| !line.starts_with("vehicle =")).collect::<Vec<_>>().join("\n");
+    write(&routine, &kept);
+    let told = answer(program().arg("check").arg(&routine));
+    told.expect("check", 2, &["routine.toml", "vehicle: is missing", "fixed-base.toml"]);
+}
+
+#[test]
 fn check_says_what_a_calibration_is_valid_for() {
     let told = answer(program().arg("check").arg(sample()));
-    told.expect("check", 0, &["calibration of `titan4`, 6 joints; valid for shoulder_yaw ", " rad, ", "since 1970"]);
+    told.expect("check", 0, &["calibration of `titan4`, 6 joints; valid for shoulder_yaw ", " rad, ", "h about 20"]);
     assert!(!told.stdout.contains("wrist_rotate"), "nothing was estimated of it: {}", told.stdout);
 }

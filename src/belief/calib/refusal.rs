@@ -271,7 +271,8 @@ impl Refusal {
             }
             Self::Overfitted { .. } => "capture more views, or more different ones",
             Self::PriorsBeyondTolerance { most: Some(most), .. } if most.starts_with("tag survey") => {
-                "measure how the frame of the tags stands to the arm's base, and state its sigmas in the tag map"
+                "measure how the frame of the tags stands to the arm's base and state the sigmas in [geometry] of \
+                 robot.toml, or touch three surveyed surfaces (step `touch`)"
             }
             Self::PriorsBeyondTolerance { .. } => {
                 "put a tag on the gripper, touch three surveyed surfaces (step `touch`), or measure the arm and state \

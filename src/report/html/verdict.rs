@@ -3,10 +3,10 @@
 use maud::{Markup, html as markup};
 
 use super::Report;
-use crate::report::inspection::utc;
 use crate::report::summary::RunSummary;
 use crate::report::table::{check_lines, labelled};
 use armcal_belief::calib::{Calibration, Status, ValidRange};
+use armcal_core::time::utc;
 use armcal_core::units::Unit;
 
 /// How a verdict reads at a glance.

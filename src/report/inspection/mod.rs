@@ -6,8 +6,6 @@
 mod arm;
 mod contents;
 mod observable_parameters;
-#[cfg(test)]
-mod tests;
 mod text;
 mod topics;
 
@@ -15,5 +13,4 @@ pub use arm::{ArmContents, TagSeen, TaskSeen};
 pub use contents::{Attachment, CompletenessReport, Compression, Inspection, Metadata, State, inspect};
 pub use observable_parameters::ObservableParameters;
 pub use text::to_text;
-pub(in crate::report) use text::utc;
 pub use topics::TopicContents;

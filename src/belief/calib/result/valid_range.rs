@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::calib::views::view::CaptureData;
 use armcal_core::sensor::Conditions;
-use armcal_core::time::Stamp;
+use armcal_core::time::{Stamp, utc};
 
 /// Excess that is not reported: oil (K), pressure (Pa), age (h). Assumed.
 const MARGIN_K: f64 = 2.0;
@@ -72,7 +72,8 @@ impl ValidRange {
         };
         let oil = range("oil", self.oil_c, "C", 1.0);
         let pressure = range("pressure", self.pressure_pa, "MPa", 1e-6);
-        let age = format!("some {MARGIN_H:.0} h about {} s since 1970", self.time_nanos.div_euclid(1_000_000_000));
+        let at = u64::try_from(self.time_nanos).map_or_else(|_| "a time before 1970".to_owned(), utc);
+        let age = format!("some {MARGIN_H:.0} h about {at}");
         oil.into_iter().chain(pressure).chain([age]).collect()
     }
 }
