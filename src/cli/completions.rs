@@ -6,7 +6,6 @@ use anyhow::{Context, Result};
 use clap::Args;
 use clap_complete::Shell;
 
-use crate::cli::command_line::command;
 use crate::cli::exit::Exit;
 use crate::cli::stdout::say;
 use crate::output;
@@ -18,9 +17,9 @@ pub(super) struct CompletionsArgs {
 }
 
 /// Prints the script that completes commands and options.
-pub(super) fn completions(args: &CompletionsArgs) -> Result<Exit> {
+pub(super) fn completions(args: &CompletionsArgs, mut command: clap::Command) -> Result<Exit> {
     let mut script = Vec::new();
-    clap_complete::generate(args.shell, &mut command(), "armcal", &mut script);
+    clap_complete::generate(args.shell, &mut command, "armcal", &mut script);
     say(String::from_utf8_lossy(&script).trim_end())?;
     Ok(Exit::Ok)
 }
@@ -32,10 +31,10 @@ pub(super) struct ManArgs {
 }
 
 /// Writes a page for the program and one for each command.
-pub(super) fn man(args: &ManArgs) -> Result<Exit> {
+pub(super) fn man(args: &ManArgs, command: clap::Command) -> Result<Exit> {
     output::make_folder(&args.folder)?;
     let shown = args.folder.display();
-    clap_mangen::generate_to(command(), &args.folder).with_context(|| format!("{shown}: cannot be written"))?;
+    clap_mangen::generate_to(command, &args.folder).with_context(|| format!("{shown}: cannot be written"))?;
     say(&format!("written      {shown}"))?;
     Ok(Exit::Ok)
 }

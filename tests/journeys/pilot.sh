@@ -15,7 +15,7 @@ sees 'with priors  tool error'
 step 'look at the run: the replay as a file, the report, the validity'
 expect 0 "$ARMCAL" replay "$FOLDER/dive/run.mcap" --save "$FOLDER/dive.rrd"
 finds "$FOLDER/dive.rrd"
-finds "$FOLDER/dive/report.html" 'accepted'
+finds "$FOLDER/dive/report.html" 'ACCEPTED'
 expect 0 "$ARMCAL" check "$FOLDER/dive/calibration.toml"
 sees 'valid for'
 

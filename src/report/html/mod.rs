@@ -11,15 +11,16 @@ mod geometry;
 mod joints;
 mod limits;
 mod outline;
+mod page;
 mod residuals;
 mod verdict;
 
-use maud::{DOCTYPE, Markup, PreEscaped, html as markup};
-
 #[cfg(feature = "sim")]
 pub(crate) use figure::{figure as chart, panel};
+pub use page::html;
+#[cfg(feature = "sim")]
+pub(crate) use page::page;
 
-use crate::report::online::online_section;
 use crate::report::summary::RunSummary;
 use armcal_belief::calib::Calibration;
 use armcal_belief::calib::online::BeliefLog;
@@ -41,52 +42,4 @@ pub struct About {
     pub operator: Option<String>,
     pub vehicle: Option<String>,
     pub recordings: Vec<String>,
-}
-
-/// Renders the report.
-#[must_use]
-pub fn html(report: &Report<'_>) -> String {
-    let title = format!("Calibration of {}", report.title());
-    let body = markup! {
-        (verdict::section(report))
-        (accuracy::section(report))
-        (arm::section(report))
-        (joints::section(report))
-        (geometry::section(report.calibration))
-        (residuals::section(report))
-        @if let Some(log) = report.online { (online_section(log, report.summary)) }
-        (limits::section(report))
-        (verdict::all_lines(report.summary))
-        (verdict::signatures())
-    };
-    page(&title, &body)
-}
-
-/// A whole page: one file without network.
-pub(crate) fn page(title: &str, body: &Markup) -> String {
-    markup! {
-        (DOCTYPE)
-        html lang="en" {
-            head {
-                meta charset="utf-8";
-                meta name="viewport" content="width=device-width, initial-scale=1";
-                meta name="color-scheme" content="light dark";
-                title { "armcal: " (title) }
-                style { (PreEscaped(include_str!("style.css"))) }
-            }
-            body {
-                main { h1 { (title) } (body) }
-            }
-        }
-    }
-    .into_string()
-}
-
-impl Report<'_> {
-    fn title(&self) -> String {
-        match &self.summary.routine {
-            Some(routine) => format!("{}, {routine}", self.summary.robot),
-            None => self.summary.robot.clone(),
-        }
-    }
 }
