@@ -214,6 +214,9 @@ impl CalibrationPrior {
     }
 
     fn chi_square(&self, moved: &DVector<f64>, moved_by: &DMatrix<f64>) -> Option<(f64, usize)> {
+        if moved.is_empty() {
+            return None;
+        }
         let lower = Cholesky::new(self.covariance.clone())?.l();
         let whitened = lower.solve_lower_triangular(moved)?;
         let half = lower.solve_lower_triangular(moved_by)?;

@@ -107,7 +107,7 @@ pub fn observability(input: &BundleInput<'_>) -> Option<Observability> {
         is_angle: is_angle(column),
     };
     let names: Vec<Name> = wanted.iter().map(named).collect();
-    Some(summarized(information, &names, input.views.len()))
+    (!names.is_empty()).then(|| summarized(information, &names, input.views.len()))
 }
 
 /// One prior sigma of each column.

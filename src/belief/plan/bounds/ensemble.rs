@@ -250,9 +250,9 @@ fn residual(rng: &mut ChaCha8Rng, std_rad: impl Fn(usize) -> f64, robot: &Robot)
     residual_rad
 }
 
-/// `L` with `L L^T = matrix`, eigenvalues that rounding made negative taken as zero.
+/// `L` with `L L^T = matrix`, eigenvalues that rounding made negative taken as zero; `None` where nothing was determined.
 fn root_of(matrix: &nalgebra::DMatrix<f64>) -> Option<nalgebra::DMatrix<f64>> {
-    if matrix.iter().any(|value| !value.is_finite()) {
+    if matrix.is_empty() || matrix.iter().any(|value| !value.is_finite()) {
         return None;
     }
     let eigen = nalgebra::SymmetricEigen::new(matrix.clone());
@@ -320,6 +320,21 @@ mod tests {
     }
 
     /// Every arm of an estimate is within the bounds that planning keeps clear for, but for its reading's noise.
+    /// As after a first view that told nothing.
+    #[test]
+    fn an_estimate_that_determined_nothing_leaves_the_datasheets_arms() {
+        let robot = titan();
+        let (parameters, nothing) = estimate(&robot, 0, 0.0, &mut stream_rng(1, "nothing"));
+        assert!(nothing.parameters.is_empty());
+        let calibration = with_terms(&robot, &parameters, &nothing);
+        let rng = || stream_rng(2, "arms");
+        let believed = ArmEnsemble::believed(&robot, &calibration, &Conditions::default(), &mut rng());
+        let datasheet = ArmEnsemble::datasheet(&robot, &mut rng());
+        let at = posture(&robot, &mut stream_rng(3, "posture"));
+        let arms = |ensemble: &ArmEnsemble| ensemble.arms(&at).collect::<Vec<JointAngles>>();
+        assert_eq!(arms(&believed), arms(&datasheet));
+    }
+
     #[test]
     fn bounds_hold_the_arms_that_the_estimate_allows() {
         let robot = titan();
