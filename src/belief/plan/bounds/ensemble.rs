@@ -250,7 +250,8 @@ fn residual(rng: &mut ChaCha8Rng, std_rad: impl Fn(usize) -> f64, robot: &Robot)
     residual_rad
 }
 
-/// `L` with `L L^T = matrix`, eigenvalues that rounding made negative taken as zero; `None` where nothing was determined.
+/// `L` with `L L^T = matrix`, eigenvalues that rounding made negative taken as zero; `None` where nothing was
+/// determined.
 fn root_of(matrix: &nalgebra::DMatrix<f64>) -> Option<nalgebra::DMatrix<f64>> {
     if matrix.is_empty() || matrix.iter().any(|value| !value.is_finite()) {
         return None;
