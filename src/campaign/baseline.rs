@@ -3,8 +3,9 @@
 use std::path::Path;
 
 use crate::campaign::store::read_summary;
-use crate::campaign::{CampaignError, Metric, Origin, Prepared, Table, parse_table, table_text};
+use crate::campaign::{CampaignError, Metric, Origin, Prepared, Request, Table, parse_table, table_text};
 use armcal_core::files::{self, FileKind};
+use armcal_core::routine::Overrides;
 
 /// The table with what it is of in its first lines.
 ///
@@ -24,8 +25,8 @@ pub fn read_baseline(path: &Path, prepared: &Prepared) -> Result<Table, Campaign
         .map_err(|source| CampaignError::Read { path: path.to_owned(), source })?;
     let refused = |problem: String| CampaignError::Table { path: path.to_owned(), problem };
     let anew = |problem: String| {
-        let routine = prepared.request.routine.display();
-        refused(format!("{problem}; make it anew: armcal regress {routine} --write-baseline {}", path.display()))
+        let (asked, file) = (command_options(&prepared.request), path.display());
+        refused(format!("{problem}; make it anew: armcal regress {asked} --write-baseline {file}"))
     };
     let table = parse_table(&bytes).map_err(refused)?;
     let origin = match Origin::read(&String::from_utf8_lossy(&bytes)).map_err(anew)? {
@@ -43,4 +44,17 @@ pub fn read_baseline(path: &Path, prepared: &Prepared) -> Result<Table, Campaign
         Some(metric) => Err(anew(format!("is of another version of armcal: it has no column {}", metric.name()))),
         None => Ok(table),
     }
+}
+
+/// The routine, the robot and the vehicle as they were asked for. What `--set` changes is under test, and no part of a
+/// baseline.
+fn command_options(request: &Request) -> String {
+    let mut words = request.routine.display().to_string();
+    let Overrides { robot, vehicle, .. } = &request.overrides;
+    for (option, path) in [("--robot", robot), ("--vehicle", vehicle)] {
+        if let Some(path) = path {
+            words += &format!(" {option} {}", path.display());
+        }
+    }
+    words
 }

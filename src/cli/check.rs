@@ -17,6 +17,7 @@ use armcal_core::input::{InputMap, Source, TagUse, Topics, read_input_map, read_
 use armcal_core::robot::{self, Robot, Vehicle};
 use armcal_core::routine::{self, Overrides, Routine, Step};
 use armcal_core::stats::stream_rng;
+use armcal_core::text::counted;
 
 #[derive(Debug, Args)]
 pub(super) struct CheckArgs {
@@ -82,7 +83,10 @@ fn describe(file: &Path, text: &str, table: &toml::Table) -> Result<String> {
     }
     if table.contains_key("part") {
         let vehicle = robot::load_vehicle(file)?;
-        let tags = vehicle.survey.as_ref().map_or_else(String::new, |survey| format!(", {} tags", survey.tags.len()));
+        let tags = vehicle
+            .survey
+            .as_ref()
+            .map_or_else(String::new, |survey| format!(", {}", counted(survey.tags.len(), "tag")));
         return Ok(format!("vehicle `{}`, {} parts{tags}", vehicle.name, vehicle.parts.len()));
     }
     if table.contains_key("joint_sensors") && table.contains_key("tags") {
@@ -90,7 +94,7 @@ fn describe(file: &Path, text: &str, table: &toml::Table) -> Result<String> {
     }
     if table.contains_key("frame") && table.contains_key("tag") {
         let map = read_landmarks(file)?;
-        return Ok(format!("tag map in the frame `{}`, {} landmarks", map.frame, map.landmarks.len()));
+        return Ok(format!("tag map in the frame `{}`, {}", map.frame, counted(map.landmarks.len(), "landmark")));
     }
     if table.contains_key("tolerance_m") {
         let task = read_task(file)?;
@@ -172,10 +176,10 @@ fn describe_robot(robot: &Robot) -> Result<String> {
     let mass_kg: f64 = robot.bodies.iter().map(|body| body.mass_kg).sum();
     let simulated = if robot.require_masses().is_ok() { "" } else { "; a link has no mass, so it cannot be simulated" };
     Ok(format!(
-        "robot `{}`, {} joints, {} tags, {mass_kg:.1} kg{simulated}",
+        "robot `{}`, {}, {}, {mass_kg:.1} kg{simulated}",
         robot.name,
-        robot.n_joints(),
-        robot.tags.len()
+        counted(robot.n_joints(), "joint"),
+        counted(robot.tags.len(), "tag")
     ))
 }
 

@@ -17,6 +17,7 @@ use armcal_belief::tagmap::{Body, GroupFrame, MapInput, MapMode, MapSettings, Ta
 use armcal_core::log::{Completeness, TopicMap, scan_recording, topics};
 use armcal_core::robot::{self, Robot};
 use armcal_core::streams::Message;
+use armcal_core::text::counted;
 
 #[derive(Debug, Args)]
 pub(super) struct TagmapArgs {
@@ -151,7 +152,7 @@ fn describe(map: &TagMap, read: &RecordedViews, cameras: &[NamedCamera]) -> Stri
             GroupFrame::Body(name) => format!("frame of `{name}`"),
             GroupFrame::Tag(id) => format!("frame of tag {id}: nothing ties these tags to the others"),
         };
-        out.push_str(&format!("{frame}; {} tags, {} views\n", group.tags.len(), group.n_views));
+        out.push_str(&format!("{frame}; {}, {}\n", counted(group.tags.len(), "tag"), counted(group.n_views, "view")));
         let mut table = Table::new();
         let header = [
             "tag",

@@ -10,6 +10,7 @@ use crate::report::summary::{
 use crate::score::{ReachScore, ScoreSide};
 use armcal_belief::calib::{CameraMount, FailedJointTable, MapResult, PriorTable, Status, SurveyCoverage};
 use armcal_core::stats::Summary;
+use armcal_core::text::counted;
 use armcal_core::units::Unit;
 
 /// Lays a summary out for a terminal.
@@ -304,9 +305,9 @@ fn map_lines(map: &MapResult) -> Vec<String> {
     };
     let worst_m = map.tag.iter().flat_map(|tag| tag.position_std_m).fold(0.0, f64::max);
     let mut lines = vec![format!(
-        "tag map      {} tags from {} views, {surveyed}: {:.2} px rms, known to {:.1} mm or better",
-        map.tag.len(),
-        map.views,
+        "tag map      {} from {}, {surveyed}: {:.2} px rms, known to {:.1} mm or better",
+        counted(map.tag.len(), "tag"),
+        counted(map.views, "view"),
         map.rms_px,
         worst_m * 1e3
     )];

@@ -15,6 +15,7 @@ use armcal_core::optics::square_corners;
 use armcal_core::robot::Robot;
 use armcal_core::routine::{Routine, Step};
 use armcal_core::streams::JointAngles;
+use armcal_core::text::counted;
 
 /// Configurations drawn evenly, and camera poses drawn for each tag, in search of one that sees it.
 const EVEN_DRAWS: usize = 2000;
@@ -108,7 +109,9 @@ impl SceneCheck<'_> {
         let n_seen = seen.iter().filter(|seen| **seen).count();
         let min_tags = self.routine.capture.min_tags as usize;
         if n_seen < min_tags && robot.tags.iter().all(|tag| tag.is_known()) {
-            issues.errors.push(format!("only {n_seen} tags can be seen at all; capture.min_tags is {min_tags}"));
+            issues
+                .errors
+                .push(format!("only {} can be seen at all; capture.min_tags is {min_tags}", counted(n_seen, "tag")));
         }
     }
 }

@@ -98,21 +98,21 @@ impl MovedTags {
         }
     }
 
-    /// The size is the median distance of the tags from their survey.
+    /// The size is the median distance of the tags from their survey. Whether several moved as one is not told: each
+    /// is estimated by itself.
     fn finding(&self, estimate: &Estimate<'_>, tags: &[usize]) -> (Finding, String) {
         let by = |&tag: &usize| log(&self.surveyed[tag].base_from_tag.isometry().inv_mul(&estimate.tag(tag).0));
-        let median = |first: usize| {
-            let all: Vec<f64> = tags.iter().map(|tag| by(tag).fixed_rows::<3>(first).norm()).collect();
-            quantile(&all, 0.5).unwrap_or(0.0)
-        };
-        let (shift_m, turn_rad) = (median(0), median(3));
+        let of_each =
+            |first: usize| -> Vec<f64> { tags.iter().map(|tag| by(tag).fixed_rows::<3>(first).norm()).collect() };
+        let (shifts_m, turns_rad) = (of_each(0), of_each(3));
+        let shift_m = quantile(&shifts_m, 0.5).unwrap_or(0.0);
         let name = list(&tags.iter().map(|&tag| self.surveyed[tag].id.to_string()).collect::<Vec<_>>());
         let (kind, what) = match tags {
             [_] => (FindingKind::TagMoved, format!("tag {name} is")),
-            _ => (FindingKind::TagsMoved, format!("tags {name} are together")),
+            _ => (FindingKind::TagsMoved, format!("tags {name} are")),
         };
-        let (shift_mm, turn_deg) = (1e3 * shift_m, turn_rad.to_degrees());
-        let words = format!("{what} {shift_mm:.1} mm and {turn_deg:.1} deg from the survey: estimated with the rest");
+        let (shift_mm, turn_deg) = (range(&shifts_m, 1e3), range(&turns_rad, 1f64.to_degrees()));
+        let words = format!("{what} {shift_mm} mm and {turn_deg} deg from the survey: estimated with the rest");
         let (size, unit) = (Some(shift_m), Some(FindingUnit::Metre));
         (Finding { kind, name, size, unit, tool_error_m: None, time_s: None, repaired: true }, words)
     }
@@ -124,6 +124,13 @@ fn free(robot: &mut Robot, tags: &[usize]) {
         let tag = &mut robot.tags[tag];
         (tag.position_std_m, tag.rotation_std_rad) = (FREED_STD_M, FREED_STD_RAD);
     }
+}
+
+/// `0.3`, or `0.3 to 4.1` where the values are not the same at that precision.
+fn range(values: &[f64], unit: f64) -> String {
+    let least = format!("{:.1}", unit * values.iter().copied().fold(f64::INFINITY, f64::min));
+    let most = format!("{:.1}", unit * values.iter().copied().fold(0.0, f64::max));
+    if least == most { most } else { format!("{least} to {most}") }
 }
 
 /// `1, 2 and 3`.
