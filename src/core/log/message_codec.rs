@@ -125,6 +125,15 @@ impl Stream {
         self.row().1
     }
 
+    /// Decodes and checks one message that stands alone, such as one that came over a network. Joints are in the order
+    /// of their names there.
+    ///
+    /// # Errors
+    /// [`DecodeRejection`], whatever the bytes are.
+    pub fn decode_alone(self, bytes: &[u8]) -> Result<Message, DecodeRejection> {
+        self.decode(bytes, &mut FirstJoints::default())
+    }
+
     /// Decodes and checks one of its messages. Every number that it gives back is finite.
     ///
     /// # Errors
@@ -175,11 +184,7 @@ impl Stream {
 ///
 /// # Errors
 /// [`EncodeError`] when a count, stamp or id has no ROS form.
-pub(super) fn encode_message(
-    message: &Message,
-    header: &RecordingHeader,
-    out: &mut Vec<u8>,
-) -> Result<(), EncodeError> {
+pub fn encode_message(message: &Message, header: &RecordingHeader, out: &mut Vec<u8>) -> Result<(), EncodeError> {
     match message {
         Message::JointSensors(m) => joints::encode(m.stamp, &m.counts, header, out)?,
         Message::JointCommand(m) => joints::encode(m.stamp, &m.counts, header, out)?,

@@ -35,7 +35,7 @@ pub use growing::GrowingRecording;
 pub use hash::{MessageHasher, hash_messages};
 pub use header::RecordingHeader;
 pub use images::for_each_image;
-pub use message_codec::Stream;
+pub use message_codec::{Stream, encode_message};
 /// The ROS types of the messages.
 pub use messages as ros;
 pub use order::{StampOrder, StampRegression};

@@ -30,6 +30,11 @@ pub enum ArmError {
     NoSuchFault { number: usize, known: usize },
     #[error("the camera: {0}")]
     Camera(#[source] Box<dyn std::error::Error + Send + Sync>),
+    /// The arm, or what guards it, has stopped; it takes no further set-points.
+    #[error("the arm was stopped: {why}")]
+    Stopped { why: String },
+    #[error("the connection to the arm: {0}")]
+    Connection(#[source] Box<dyn std::error::Error + Send + Sync>),
     #[error("the arm has no gripper that opens and closes")]
     NoGripper,
     #[error("gripper: an opening of {opening} is outside 0 (closed) .. 1 (open)")]

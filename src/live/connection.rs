@@ -1,0 +1,300 @@
+//! arm.toml: which topics carry what, and when the guard stops the arm.
+
+use std::collections::BTreeMap;
+use std::net::Ipv4Addr;
+use std::path::Path;
+
+use serde::Deserialize;
+
+use crate::LiveError;
+use armcal_core::log::topics;
+use armcal_core::robot::{FileIssue, RobotError, parse_toml, read_text};
+
+/// The connection map of an arm.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Connection {
+    /// Of this file's layout: 1.
+    pub version: u32,
+    /// ROS_DOMAIN_ID.
+    pub domain: u16,
+    /// Addresses of this machine's interfaces that DDS may use; all of them where none are named. The sockets stay
+    /// open to every interface.
+    pub networks: Vec<Ipv4Addr>,
+    /// `sensor_msgs/msg/JointState` with raw counts in `position`.
+    pub joint_sensors: String,
+    /// The driver's names of joints, by those of the robot's file, where they differ.
+    pub names: BTreeMap<String, String>,
+    /// Where set-points go.
+    pub commands: Commands,
+    /// `apriltag_msgs/msg/AprilTagDetectionArray`; empty where there is none, as all below.
+    pub detections: String,
+    /// `sensor_msgs/msg/CompressedImage`, recorded only.
+    pub images: String,
+    /// `sensor_msgs/msg/Temperature`.
+    pub oil_temperature: String,
+    /// `sensor_msgs/msg/Temperature`.
+    pub water_temperature: String,
+    /// `sensor_msgs/msg/FluidPressure`.
+    pub pressure: String,
+    /// `sensor_msgs/msg/Imu`.
+    pub imu: String,
+    /// How the arm is told to stop.
+    pub stop: StopWays,
+    /// `None` where nobody has to hold a switch.
+    pub deadman: Option<Deadman>,
+    /// Limits of the guard.
+    pub guard: GuardLimits,
+}
+
+impl Default for Connection {
+    fn default() -> Self {
+        let topic = str::to_owned;
+        Self {
+            version: 1,
+            domain: 0,
+            networks: Vec::new(),
+            joint_sensors: topic(topics::JOINT_SENSORS),
+            names: BTreeMap::new(),
+            commands: Commands::default(),
+            detections: topic(topics::DETECTIONS),
+            images: topic(topics::IMAGES),
+            oil_temperature: topic(topics::OIL_TEMPERATURE),
+            water_temperature: topic(topics::WATER_TEMPERATURE),
+            pressure: topic(topics::DEPTH_PRESSURE),
+            imu: topic(topics::VEHICLE_IMU),
+            stop: StopWays::default(),
+            deadman: None,
+            guard: GuardLimits::default(),
+        }
+    }
+}
+
+/// Where set-points go, raw counts.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Commands {
+    /// Name of the topic.
+    pub topic: String,
+    /// Type of its messages.
+    #[serde(rename = "type")]
+    pub message_type: CommandType,
+    /// Set-points a second, by the arm's clock.
+    pub rate_hz: f64,
+}
+
+impl Default for Commands {
+    fn default() -> Self {
+        let (topic, message_type) = (topics::JOINT_COMMANDS.to_owned(), CommandType::JointTrajectory);
+        Self { topic, message_type, rate_hz: 50.0 }
+    }
+}
+
+/// Messages that drivers take set-points from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+pub enum CommandType {
+    /// One point, to be reached one period later.
+    #[serde(rename = "trajectory_msgs/msg/JointTrajectory")]
+    JointTrajectory,
+    /// `data` alone, in the order of the robot's file.
+    #[serde(rename = "std_msgs/msg/Float64MultiArray")]
+    Float64MultiArray,
+    /// `position`, as our recordings have it.
+    #[serde(rename = "sensor_msgs/msg/JointState")]
+    JointState,
+}
+
+impl CommandType {
+    /// As ROS writes it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::JointTrajectory => "trajectory_msgs/msg/JointTrajectory",
+            Self::Float64MultiArray => "std_msgs/msg/Float64MultiArray",
+            Self::JointState => "sensor_msgs/msg/JointState",
+        }
+    }
+}
+
+/// How the arm is told to stop; every way that is named is used.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct StopWays {
+    /// `std_msgs/msg/Bool`, true.
+    pub topic: String,
+    /// `std_srvs/srv/Trigger`; empty where there is none.
+    pub service: String,
+    /// How the other side's middleware carries services.
+    pub mapping: ServiceMapping,
+}
+
+impl Default for StopWays {
+    fn default() -> Self {
+        Self { topic: "/stop".to_owned(), service: String::new(), mapping: ServiceMapping::Enhanced }
+    }
+}
+
+/// How services go over DDS.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ServiceMapping {
+    /// Fast DDS and others.
+    Enhanced,
+    /// Cyclone DDS.
+    Cyclone,
+}
+
+/// A switch that somebody holds as long as the arm may move.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Deadman {
+    /// `std_msgs/msg/Bool`.
+    pub topic: String,
+    /// The arm stops when the last `true` is older, s.
+    pub timeout_s: f64,
+}
+
+/// When the guard stops the arm.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct GuardLimits {
+    /// The first readings must come within this time, s.
+    pub connect_s: f64,
+    /// Readings must be sound and the arm at rest for so long before anything moves, s.
+    pub ready_s: f64,
+    /// Readings may be missing for so long, s.
+    pub stale_s: f64,
+    /// A joint may be so far from its set-point, deg,
+    pub tracking_deg: f64,
+    /// for so long by the arm's clock, s.
+    pub tracking_s: f64,
+    /// All readings may stay the same to the count for so long while set-points move, s.
+    pub frozen_s: f64,
+    /// The arm's clock may leap by so much between two readings, s.
+    pub clock_step_s: f64,
+}
+
+impl Default for GuardLimits {
+    fn default() -> Self {
+        Self {
+            connect_s: 10.0,
+            ready_s: 2.0,
+            stale_s: 0.25,
+            tracking_deg: 20.0,
+            tracking_s: 1.0,
+            frozen_s: 1.0,
+            clock_step_s: 0.5,
+        }
+    }
+}
+
+impl Connection {
+    /// Reads and checks a connection map.
+    ///
+    /// # Errors
+    /// [`LiveError::File`] with file, key and allowed range.
+    pub fn load(file: &Path) -> Result<Self, LiveError> {
+        let connection: Self = parse_toml(file, &read_text(file)?)?;
+        connection.check(file)?;
+        Ok(connection)
+    }
+
+    fn check(&self, file: &Path) -> Result<(), RobotError> {
+        if self.version != 1 {
+            return Err(FileIssue::new(file, "version", format!("{} is not 1", self.version)).into());
+        }
+        FileIssue::check_range(file, "domain", f64::from(self.domain), 0.0..=232.0)?;
+        FileIssue::check_range(file, "commands.rate_hz", self.commands.rate_hz, 5.0..=1000.0)?;
+        let guard = &self.guard;
+        for (key, value, range) in [
+            ("guard.connect_s", guard.connect_s, 0.1..=600.0),
+            ("guard.ready_s", guard.ready_s, 0.5..=60.0),
+            ("guard.stale_s", guard.stale_s, 0.02..=5.0),
+            ("guard.tracking_deg", guard.tracking_deg, 0.5..=180.0),
+            ("guard.tracking_s", guard.tracking_s, 0.0..=10.0),
+            ("guard.frozen_s", guard.frozen_s, 0.1..=10.0),
+            ("guard.clock_step_s", guard.clock_step_s, 0.05..=60.0),
+        ] {
+            FileIssue::check_range(file, key, value, range)?;
+        }
+        if let Some(deadman) = &self.deadman {
+            FileIssue::check_range(file, "deadman.timeout_s", deadman.timeout_s, 0.05..=10.0)?;
+        }
+        for (key, topic) in self.named() {
+            let allowed = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '/';
+            let is_name = topic.starts_with('/') && topic.len() > 1 && topic.chars().all(allowed);
+            let is_needed = ["joint_sensors", "commands.topic"].contains(&key);
+            if !is_name && (is_needed || !topic.is_empty()) {
+                let problem = format!("{topic:?} is no absolute name of a topic, such as \"/joint_sensors\"");
+                return Err(FileIssue::new(file, key, problem).into());
+            }
+        }
+        if self.stop.topic.is_empty() && self.stop.service.is_empty() {
+            let problem = "neither `topic` nor `service` is given: there must be a way to stop the arm";
+            return Err(FileIssue::new(file, "stop", problem).into());
+        }
+        Ok(())
+    }
+
+    /// Every topic and service by its key.
+    fn named(&self) -> Vec<(&'static str, &str)> {
+        let mut named = vec![
+            ("joint_sensors", self.joint_sensors.as_str()),
+            ("commands.topic", &self.commands.topic),
+            ("detections", &self.detections),
+            ("images", &self.images),
+            ("oil_temperature", &self.oil_temperature),
+            ("water_temperature", &self.water_temperature),
+            ("pressure", &self.pressure),
+            ("imu", &self.imu),
+            ("stop.topic", &self.stop.topic),
+            ("stop.service", &self.stop.service),
+        ];
+        named.extend(self.deadman.as_ref().map(|deadman| ("deadman.topic", deadman.topic.as_str())));
+        named
+    }
+
+    /// The driver's name of a joint.
+    pub(crate) fn driver_name<'a>(&'a self, joint: &'a str) -> &'a str {
+        self.names.get(joint).map_or(joint, String::as_str)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn checked(text: &str) -> Result<Connection, String> {
+        let file = Path::new("arm.toml");
+        let connection: Connection = parse_toml(file, text).map_err(|error| error.to_string())?;
+        connection.check(file).map_err(|error| error.to_string())?;
+        Ok(connection)
+    }
+
+    #[test]
+    fn an_empty_map_has_the_topics_of_our_own_recordings() {
+        let connection = checked("").unwrap();
+        assert_eq!(connection.joint_sensors, "/joint_sensors");
+        assert_eq!(connection, Connection::default());
+    }
+
+    #[test]
+    fn what_is_wrong_is_said_with_its_key() {
+        for (text, key) in [
+            ("version = 2", "version"),
+            ("joint_sensors = \"\"", "joint_sensors"),
+            ("detections = \"tags\"", "detections"),
+            ("[commands]\nrate_hz = 0.0", "commands.rate_hz"),
+            ("[commands]\ntype = \"std_msgs/msg/String\"", "type"),
+            ("[guard]\nstale_s = 60.0", "guard.stale_s"),
+            ("[guard]\nstale_s = nan", "guard.stale_s"),
+            ("[stop]\ntopic = \"\"", "stop"),
+            ("[deadman]\ntopic = \"/held\"\ntimeout_s = 0.0", "deadman.timeout_s"),
+            ("domain = 300", "domain"),
+            ("joint_sensor = \"/a\"", "joint_sensor"),
+        ] {
+            let problem = checked(text).expect_err(text);
+            assert!(problem.contains("arm.toml") && problem.contains(key), "{text}: {problem}");
+        }
+    }
+}

@@ -1,0 +1,24 @@
+//! Why a connection to an arm cannot be made or used.
+
+use armcal_core::robot::RobotError;
+
+/// Why there is no live arm.
+#[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "each variant's message says what it is")]
+pub enum LiveError {
+    #[error(transparent)]
+    File(#[from] RobotError),
+    #[error("DDS: {what}: {problem}")]
+    Dds { what: String, problem: String },
+    #[error("the arm is not ready: {0}")]
+    NotReady(String),
+    #[error("a message cannot be written: {0}")]
+    Encode(#[from] armcal_core::log::EncodeError),
+}
+
+impl LiveError {
+    /// For errors of the middleware, which are of many types.
+    pub(crate) fn dds<E: std::fmt::Debug>(what: &str) -> impl FnOnce(E) -> Self {
+        move |error| Self::Dds { what: what.to_owned(), problem: format!("{error:?}") }
+    }
+}

@@ -1,0 +1,191 @@
+//! When a live arm must stop: pure rules on readings, set-points and clocks.
+
+use std::time::Duration;
+
+use crate::{Deadman, GuardLimits};
+use armcal_core::robot::Robot;
+use armcal_core::sensor::ArmSensors;
+use armcal_core::streams::{JointCounts, JointSensorSample};
+use armcal_core::time::Stamp;
+
+/// Angles beyond the sensors' bounds that count as inside of a joint's range, rad.
+const RANGE_SLACK_RAD: f64 = 0.035;
+/// Set-points that moved less ask for nothing that frozen readings would miss, rad.
+const ASKED_RAD: f64 = 0.02;
+/// A clock that runs so many times as fast as ours is a simulator's; faster, and it has leapt.
+const MAX_PACE: f64 = 100.0;
+
+/// Why the guard stopped the arm.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[expect(missing_docs, reason = "each variant's message says what it is")]
+pub enum StopReason {
+    #[error("no joint readings for {silent_s:.2} s (guard.stale_s = {limit_s}): is the driver still there?")]
+    Stale { silent_s: f64, limit_s: f64 },
+    #[error("the dead man's switch was let go, or is silent (deadman.timeout_s = {limit_s})")]
+    Deadman { limit_s: f64 },
+    #[error(
+        "{joint} has been {off_deg:.1} deg from its set-point for {for_s:.1} s \
+         (guard.tracking_deg = {limit_deg}): it does not follow, or something is in its way"
+    )]
+    Tracking { joint: String, off_deg: f64, for_s: f64, limit_deg: f64 },
+    #[error("all joint readings have stayed the same to the count for {for_s:.1} s while set-points moved")]
+    Frozen { for_s: f64 },
+    #[error("the stamps of the joint readings leapt by {step_s:.3} s (guard.clock_step_s = {limit_s})")]
+    ClockStep { step_s: f64, limit_s: f64 },
+    #[error("{joint} would be sent to {angle_deg:.1} deg, beyond its range even for the worst sensor")]
+    Range { joint: String, angle_deg: f64 },
+    #[error("{0}")]
+    Asked(String),
+}
+
+/// Watches one arm.
+pub(crate) struct Guard {
+    limits: GuardLimits,
+    deadman_s: Option<f64>,
+    joints: Vec<String>,
+    nominal: ArmSensors,
+    counts_per_rad: Vec<f64>,
+    wrap_counts: Vec<f64>,
+    /// Least and greatest angle that a set-point may mean by the nominal sensor.
+    range_rad: Vec<[f64; 2]>,
+    last: Option<(JointSensorSample, Duration)>,
+    /// Silence counts from here.
+    listening_since: Duration,
+    held_at: Option<Duration>,
+    /// Since when each joint is too far from its set-point.
+    astray_since: Vec<Option<Stamp>>,
+    /// The readings that have not changed since, and the set-point then.
+    unchanged: Option<(JointCounts, Stamp, JointCounts)>,
+}
+
+impl Guard {
+    pub fn new(robot: &Robot, limits: GuardLimits, deadman: Option<&Deadman>) -> Self {
+        let range = |sensor: &armcal_core::robot::JointSensorSpec| {
+            let slack = sensor.offset_bound_rad + sensor.gain_bound * sensor.half_range_rad + RANGE_SLACK_RAD;
+            let half = sensor.half_range_rad + slack;
+            [sensor.center_rad - half, sensor.center_rad + half]
+        };
+        Self {
+            limits,
+            deadman_s: deadman.map(|deadman| deadman.timeout_s),
+            joints: robot.joint_names(),
+            nominal: ArmSensors::nominal(robot),
+            counts_per_rad: robot.sensors.iter().map(|sensor| sensor.counts_per_rad.abs()).collect(),
+            wrap_counts: robot.sensors.iter().map(|sensor| sensor.wrap_counts).collect(),
+            range_rad: robot.sensors.iter().map(range).collect(),
+            last: None,
+            listening_since: Duration::ZERO,
+            held_at: None,
+            astray_since: vec![None; robot.sensors.len()],
+            unchanged: None,
+        }
+    }
+
+    /// The newest reading.
+    pub fn latest(&self) -> Option<&JointSensorSample> {
+        self.last.as_ref().map(|(sample, _)| sample)
+    }
+
+    /// Way from one reading of a joint to another, rad; the short way round.
+    pub fn way_rad(&self, joint: usize, from: f64, to: f64) -> f64 {
+        let wrap = self.wrap_counts[joint];
+        let way = (to - from + wrap / 2.0).rem_euclid(wrap) - wrap / 2.0;
+        way / self.counts_per_rad[joint]
+    }
+
+    /// Reading of a joint, so far from another one.
+    pub fn moved(&self, joint: usize, from: f64, way_rad: f64) -> f64 {
+        (from + way_rad * self.counts_per_rad[joint]).rem_euclid(self.wrap_counts[joint])
+    }
+
+    /// A set-point before it is sent.
+    pub fn check_set_point(&self, counts: &JointCounts) -> Result<(), StopReason> {
+        let angles = self.nominal.angles(counts);
+        for (joint, (angle, [low, high])) in angles.iter().zip(&self.range_rad).enumerate() {
+            if !(low..=high).contains(&angle) {
+                return Err(StopReason::Range { joint: self.joints[joint].clone(), angle_deg: angle.to_degrees() });
+            }
+        }
+        Ok(())
+    }
+
+    /// When the dead man's switch was held, by our clock; `None` when it was let go.
+    pub fn hear_deadman(&mut self, held_at: Option<Duration>) {
+        self.held_at = held_at;
+    }
+
+    /// A reading that came at `at` by our clock, while `sent` was the last set-point; `false` for one that is older
+    /// than the newest.
+    pub fn hear(&mut self, sample: &JointSensorSample, sent: &JointCounts, at: Duration) -> Result<bool, StopReason> {
+        if let Some((last, last_at)) = &self.last {
+            let (step_s, ours_s) = (sample.stamp.since_s(last.stamp), (at.saturating_sub(*last_at)).as_secs_f64());
+            let limit_s = self.limits.clock_step_s;
+            if step_s < -limit_s || (step_s > limit_s && step_s > MAX_PACE * ours_s) {
+                return Err(StopReason::ClockStep { step_s, limit_s });
+            }
+            if step_s <= 0.0 {
+                return Ok(false);
+            }
+        }
+        self.last = Some((sample.clone(), at));
+        self.check_following(sample, sent)?;
+        self.check_frozen(sample, sent)?;
+        Ok(true)
+    }
+
+    fn check_following(&mut self, sample: &JointSensorSample, sent: &JointCounts) -> Result<(), StopReason> {
+        for joint in 0..self.joints.len() {
+            let off_deg = self.way_rad(joint, sent[joint], sample.counts[joint]).to_degrees().abs();
+            if off_deg <= self.limits.tracking_deg {
+                self.astray_since[joint] = None;
+                continue;
+            }
+            let since = *self.astray_since[joint].get_or_insert(sample.stamp);
+            let for_s = sample.stamp.since_s(since);
+            if for_s > self.limits.tracking_s {
+                let (joint, limit_deg) = (self.joints[joint].clone(), self.limits.tracking_deg);
+                return Err(StopReason::Tracking { joint, off_deg, for_s, limit_deg });
+            }
+        }
+        Ok(())
+    }
+
+    fn check_frozen(&mut self, sample: &JointSensorSample, sent: &JointCounts) -> Result<(), StopReason> {
+        match &self.unchanged {
+            Some((counts, since, sent_then)) if *counts == sample.counts => {
+                let for_s = sample.stamp.since_s(*since);
+                let asked = (0..sent.len()).map(|j| self.way_rad(j, sent_then[j], sent[j]).abs()).fold(0.0, f64::max);
+                if for_s > self.limits.frozen_s && asked > ASKED_RAD {
+                    return Err(StopReason::Frozen { for_s });
+                }
+            }
+            _ => self.unchanged = Some((sample.counts, sample.stamp, *sent)),
+        }
+        Ok(())
+    }
+
+    /// What silence says at `now` by our clock.
+    pub fn check_silence(&self, now: Duration) -> Result<(), StopReason> {
+        let Some((_, heard_at)) = &self.last else { return Ok(()) };
+        let silent_s = now.saturating_sub(self.listening_since.max(*heard_at)).as_secs_f64();
+        if silent_s > self.limits.stale_s {
+            return Err(StopReason::Stale { silent_s, limit_s: self.limits.stale_s });
+        }
+        self.check_deadman(now)
+    }
+
+    /// Whether somebody holds the switch, where there is one.
+    pub fn check_deadman(&self, now: Duration) -> Result<(), StopReason> {
+        let Some(limit_s) = self.deadman_s else { return Ok(()) };
+        let is_held = self.held_at.is_some_and(|at| now.saturating_sub(at).as_secs_f64() <= limit_s);
+        if is_held { Ok(()) } else { Err(StopReason::Deadman { limit_s }) }
+    }
+
+    /// Nothing was asked of the arm for a while, and nobody listened: silence begins anew.
+    pub fn resume(&mut self, now: Duration) {
+        self.listening_since = now;
+        if self.held_at.is_some() {
+            self.held_at = Some(now);
+        }
+    }
+}

@@ -1,0 +1,28 @@
+//! Arms that speak ROS 2, over DDS and without an installation of ROS.
+//!
+//! `connection` reads arm.toml: which topics carry what, and the limits of the guard. `wire` is what a connection
+//! carries, `ros2` that over DDS. [`LiveArm`] is an `Arm` on any wire: it paces a session by the arm's own readings and
+//! stops when `guard` says so. [`serve`] puts any `Arm`, such as the simulated one, behind the topics of a connection.
+//! None of this is a safety device.
+#![warn(missing_docs)]
+
+mod connection;
+mod error;
+mod guard;
+mod live_arm;
+mod ros2;
+mod server;
+#[cfg(test)]
+mod tests;
+mod wire;
+
+pub use connection::{CommandType, Commands, Connection, Deadman, GuardLimits, ServiceMapping, StopWays};
+pub use error::LiveError;
+pub use guard::StopReason;
+pub use live_arm::{LiveArm, Survey};
+pub use ros2::Ros2Wire;
+pub use server::{Pace, Served, serve};
+pub use wire::{Heard, Wire};
+
+/// The ROS 2 distribution that this build speaks with: it decides the layout of identifiers on the network.
+pub const ROS_DISTRIBUTION: &str = "humble";

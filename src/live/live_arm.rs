@@ -1,0 +1,366 @@
+//! A real arm as sessions know arms: paced by its own readings, and stopped by the guard.
+
+use std::time::Duration;
+
+use crate::guard::{Guard, StopReason};
+use crate::{Connection, Heard, LiveError, Wire};
+use armcal_core::robot::Robot;
+use armcal_core::streams::{Arm, ArmError, JointCounts, JointSensorSample, LogLevel, LogLine, Message, Sink};
+use armcal_core::time::Stamp;
+
+/// The longest wait for messages before silence is looked at again.
+const LISTEN: Duration = Duration::from_millis(5);
+/// A step ends with a reading that is at most so much of a period early.
+const EARLY_SHARE: f64 = 0.25;
+/// An arm at rest moves less while it is watched before its first motion, rad.
+const REST_RAD: f64 = 0.01;
+/// Fewer readings a second cannot steer an arm.
+const MIN_RATE_HZ: f64 = 5.0;
+/// Set-points move no joint faster than the robot's file allows, times this: the session plans up to that rate.
+const RATE_SLACK: f64 = 1.2;
+/// A joint that is told to stay within this of its reading is not moved, rad.
+const STAY_RAD: f64 = 0.005;
+/// Times from reading to set-point that are kept, the latest.
+const MAX_LATENCIES: usize = 1 << 16;
+
+/// An arm behind a wire. Set-points pass the guard before they are sent, and readings when they come.
+pub struct LiveArm<W> {
+    wire: W,
+    guard: Guard,
+    joint_names: Vec<String>,
+    max_rate_rad_s: Vec<f64>,
+    period_s: f64,
+    stale: Duration,
+    now: Stamp,
+    /// When the present control period ends.
+    due: Stamp,
+    goal: JointCounts,
+    sent: JointCounts,
+    sent_at: Stamp,
+    has_sent: bool,
+    /// Whether the present period has its set-point.
+    was_commanded: bool,
+    /// When the last call ended, our clock.
+    left_at: Duration,
+    /// When the newest reading came, our clock.
+    heard_at: Duration,
+    stopped: Option<StopReason>,
+    heard: Vec<Heard>,
+    unusable: u64,
+    latencies_s: Vec<f64>,
+    n_latencies: usize,
+}
+
+/// What was heard of an arm before anything moved.
+#[derive(Clone, Debug)]
+pub struct Survey {
+    /// Time that was listened, s.
+    pub seconds: f64,
+    /// Joint readings in it.
+    pub readings: usize,
+    /// The last ones.
+    pub counts: JointCounts,
+    /// Images with their tags, and tags in all of them.
+    pub images: usize,
+    /// Tags in all images.
+    pub tags: usize,
+    /// Messages that could not be used, and what was wrong with the last of them.
+    pub unusable: Option<(u64, String)>,
+}
+
+impl<W: Wire> LiveArm<W> {
+    /// Listens until readings have been sound and the arm at rest for `guard.ready_s`. Nothing is sent.
+    ///
+    /// # Errors
+    /// [`LiveError::NotReady`] with what is missing.
+    pub fn connect(mut wire: W, robot: &Robot, connection: &Connection) -> Result<(Self, Survey), LiveError> {
+        let limits = connection.guard;
+        let mut guard = Guard::new(robot, limits, connection.deadman.as_ref());
+        let survey = listen(&mut wire, &mut guard, connection)?;
+        let now = guard.latest().map_or(Stamp { nanos: 0 }, |sample| sample.stamp);
+        let left_at = wire.elapsed();
+        let arm = Self {
+            wire,
+            guard,
+            joint_names: robot.joint_names(),
+            max_rate_rad_s: robot.sensors.iter().map(|sensor| RATE_SLACK * sensor.max_rate_rad_s).collect(),
+            period_s: 1.0 / connection.commands.rate_hz,
+            stale: Duration::from_secs_f64(limits.stale_s),
+            now,
+            due: now,
+            goal: survey.counts,
+            sent: survey.counts,
+            sent_at: now,
+            has_sent: false,
+            was_commanded: false,
+            left_at,
+            heard_at: left_at,
+            stopped: None,
+            heard: Vec::new(),
+            unusable: 0,
+            latencies_s: Vec::new(),
+            n_latencies: 0,
+        };
+        Ok((arm, survey))
+    }
+
+    /// Stops the arm for good, in every way that the connection knows: it is told to stay where it reads to be, and no
+    /// later set-point is sent.
+    pub fn stop(&mut self, why: &str) {
+        self.halt(StopReason::Asked(why.to_owned()));
+    }
+
+    /// Why the arm was stopped.
+    #[must_use]
+    pub fn stopped(&self) -> Option<&StopReason> {
+        self.stopped.as_ref()
+    }
+
+    /// Times from a reading to the set-point that follows from it, s; of the latest set-points, in no order.
+    #[must_use]
+    pub fn latencies_s(&self) -> &[f64] {
+        &self.latencies_s
+    }
+
+    /// Messages that could not be used so far.
+    #[must_use]
+    pub fn unusable(&self) -> u64 {
+        self.unusable
+    }
+
+    fn halt(&mut self, reason: StopReason) -> ArmError {
+        if self.stopped.is_none() {
+            if let Some(latest) = self.guard.latest() {
+                // Both are tried, whatever becomes of the other.
+                let _ = self.wire.send(&latest.counts, self.period_s);
+            }
+            if let Err(error) = self.wire.stop() {
+                tracing::error!("the stop could not be sent: {error}");
+            }
+            self.stopped = Some(reason);
+        }
+        self.refusal()
+    }
+
+    fn refusal(&self) -> ArmError {
+        let why = self.stopped.as_ref().map_or_else(String::new, ToString::to_string);
+        ArmError::Stopped { why }
+    }
+
+    /// Takes what has come, and waits a little where nothing has.
+    fn listen(&mut self, sink: &mut dyn Sink) -> Result<(), ArmError> {
+        let mut heard = std::mem::take(&mut self.heard);
+        heard.clear();
+        let received = self.wire.receive(LISTEN, &mut heard);
+        let at = self.wire.elapsed();
+        let taken = heard.drain(..).try_for_each(|heard| self.take(heard, at, sink));
+        self.heard = heard;
+        received.map_err(|error| ArmError::Connection(Box::new(error)))?;
+        taken
+    }
+
+    fn take(&mut self, heard: Heard, at: Duration, sink: &mut dyn Sink) -> Result<(), ArmError> {
+        match heard {
+            Heard::Joints(sample) => match self.guard.hear(&sample, &self.sent, at) {
+                Ok(true) => {
+                    (self.now, self.heard_at) = (sample.stamp, at);
+                    sink.record(self.now, &Message::JointSensors(sample)).map_err(ArmError::Sink)
+                }
+                // Older than what is known already.
+                Ok(false) => Ok(()),
+                Err(reason) => Err(self.halt_saying(reason, sink)),
+            },
+            Heard::Other(message) => sink.record(self.now, &message).map_err(ArmError::Sink),
+            Heard::Deadman(is_held) => {
+                self.guard.hear_deadman(is_held.then_some(at));
+                Ok(())
+            }
+            Heard::Unusable(_) => {
+                self.unusable += 1;
+                Ok(())
+            }
+        }
+    }
+
+    /// Stops, and leaves the reason in the recording.
+    fn halt_saying(&mut self, reason: StopReason, sink: &mut dyn Sink) -> ArmError {
+        let text = format!("the guard stopped the arm: {reason}");
+        let error = self.halt(reason);
+        let line = LogLine { stamp: self.now, level: LogLevel::Error, name: "guard".to_owned(), text };
+        match sink.record(self.now, &Message::Log(line)) {
+            Ok(()) => error,
+            Err(sink) => ArmError::Sink(sink),
+        }
+    }
+
+    /// Sends the set-point that is next on the way to the goal, no faster than the joints may go.
+    fn send(&mut self) -> Result<(), ArmError> {
+        let elapsed_s = self.now.since_s(self.sent_at).clamp(0.0, 2.0 * self.period_s);
+        let Some(latest) = self.guard.latest() else { return Ok(()) };
+        let next = JointCounts::from_fn(self.goal.len(), |joint| {
+            let (goal, read) = (self.goal[joint], latest.counts[joint]);
+            let (way, most) =
+                (self.guard.way_rad(joint, self.sent[joint], goal), self.max_rate_rad_s[joint] * elapsed_s);
+            let stays = self.guard.way_rad(joint, read, goal).abs() <= STAY_RAD;
+            if stays || way.abs() <= most {
+                goal
+            } else {
+                self.guard.moved(joint, self.sent[joint], way.signum() * most)
+            }
+        });
+        if let Err(reason) = self.guard.check_deadman(self.wire.elapsed()) {
+            return Err(self.halt(reason));
+        }
+        self.wire.send(&next, self.period_s).map_err(|error| ArmError::Connection(Box::new(error)))?;
+        (self.sent, self.sent_at, self.has_sent) = (next, self.now, true);
+        let latency_s = self.wire.elapsed().saturating_sub(self.heard_at).as_secs_f64();
+        if self.latencies_s.len() < MAX_LATENCIES {
+            self.latencies_s.push(latency_s);
+        } else {
+            self.latencies_s[self.n_latencies % MAX_LATENCIES] = latency_s;
+        }
+        self.n_latencies += 1;
+        Ok(())
+    }
+}
+
+/// Hears the arm out before anything moves.
+fn listen(wire: &mut impl Wire, guard: &mut Guard, connection: &Connection) -> Result<Survey, LiveError> {
+    let limits = connection.guard;
+    let (start, mut heard) = (wire.elapsed(), Vec::new());
+    let mut first: Option<(JointSensorSample, Duration)> = None;
+    let mut survey =
+        Survey { seconds: 0.0, readings: 0, counts: JointCounts::zeros(0), images: 0, tags: 0, unusable: None };
+    loop {
+        heard.clear();
+        wire.receive(LISTEN, &mut heard)?;
+        let now = wire.elapsed();
+        for heard in heard.drain(..) {
+            match heard {
+                Heard::Joints(sample) => {
+                    let (anchor, _) = first.get_or_insert_with(|| (sample.clone(), now));
+                    let is_new = guard.hear(&sample, &anchor.counts, now).map_err(not_ready)?;
+                    let moved = |j: usize| guard.way_rad(j, anchor.counts[j], sample.counts[j]).abs();
+                    if (0..sample.counts.len()).any(|j| moved(j) > REST_RAD) {
+                        // It moves: wait for its rest from here on.
+                        first = Some((sample.clone(), now));
+                        survey.readings = 0;
+                    }
+                    survey.readings += usize::from(is_new);
+                    survey.counts = sample.counts;
+                }
+                Heard::Other(Message::Detections(detections)) => {
+                    survey.images += 1;
+                    survey.tags += detections.tags.len();
+                }
+                Heard::Other(_) => {}
+                Heard::Deadman(is_held) => guard.hear_deadman(is_held.then_some(now)),
+                Heard::Unusable(why) => survey.unusable = Some((survey.unusable.map_or(0, |(n, _)| n) + 1, why)),
+            }
+        }
+        guard.check_silence(now).or_else(|reason| match reason {
+            // Nothing moves yet: the switch is needed from the first set-point on.
+            StopReason::Deadman { .. } => Ok(()),
+            reason => Err(not_ready(reason)),
+        })?;
+        let waited_s = (now - start).as_secs_f64();
+        match &first {
+            Some((_, since)) if (now - *since).as_secs_f64() >= limits.ready_s => {
+                survey.seconds = (now - *since).as_secs_f64();
+                break;
+            }
+            None if waited_s > limits.connect_s => return Err(nothing_heard(connection, &survey)),
+            Some(_) if waited_s > limits.connect_s + limits.ready_s => {
+                return Err(LiveError::NotReady("it moves; calibration begins at rest".to_owned()));
+            }
+            _ => {}
+        }
+    }
+    if (survey.readings as f64) < MIN_RATE_HZ * survey.seconds {
+        let (n, seconds) = (survey.readings, survey.seconds);
+        return Err(LiveError::NotReady(format!(
+            "{n} joint readings in {seconds:.1} s; at least {MIN_RATE_HZ} a second are needed"
+        )));
+    }
+    guard.check_set_point(&survey.counts).map_err(|reason| {
+        LiveError::NotReady(format!("where it stands by its readings: {reason}; is this robot.toml the arm's?"))
+    })?;
+    Ok(survey)
+}
+
+fn not_ready(reason: StopReason) -> LiveError {
+    LiveError::NotReady(reason.to_string())
+}
+
+fn nothing_heard(connection: &Connection, survey: &Survey) -> LiveError {
+    let (topic, seconds) = (&connection.joint_sensors, connection.guard.connect_s);
+    let unusable = survey.unusable.as_ref().map(|(n, why)| format!("; {n} messages were of no use, the last: {why}"));
+    LiveError::NotReady(format!(
+        "no joint readings on {topic} in {seconds} s{}; is the driver running in ROS domain {}, and `networks` right?",
+        unusable.unwrap_or_default(),
+        connection.domain
+    ))
+}
+
+impl<W: Wire> Arm for LiveArm<W> {
+    fn now(&self) -> Stamp {
+        self.now
+    }
+
+    fn period_s(&self) -> f64 {
+        self.period_s
+    }
+
+    fn command(&mut self, set_point: &JointCounts) -> Result<(), ArmError> {
+        if self.stopped.is_some() {
+            return Err(self.refusal());
+        }
+        let expected = self.joint_names.len();
+        if set_point.len() != expected {
+            return Err(ArmError::JointCount { got: set_point.len(), expected });
+        }
+        if let Some((joint, &counts)) = set_point.iter().enumerate().find(|(_, counts)| !counts.is_finite()) {
+            return Err(ArmError::SetPoint { joint, counts });
+        }
+        if let Err(reason) = self.guard.check_set_point(set_point) {
+            return Err(self.halt(reason));
+        }
+        (self.goal, self.was_commanded) = (*set_point, true);
+        self.send()
+    }
+
+    fn step(&mut self, sink: &mut dyn Sink) -> Result<(), ArmError> {
+        if self.stopped.is_some() {
+            return Err(self.refusal());
+        }
+        let before = self.wire.elapsed();
+        if before.saturating_sub(self.left_at) > self.stale {
+            self.guard.resume(before);
+        }
+        self.due = self.due.plus_s(self.period_s);
+        if (self.due.since_s(self.now) - self.period_s).abs() > self.period_s {
+            self.due = self.now.plus_s(self.period_s);
+        }
+        let until = self.due.plus_s(-EARLY_SHARE * self.period_s);
+        loop {
+            self.listen(sink)?;
+            if self.now >= until {
+                break;
+            }
+            if let Err(reason) = self.guard.check_silence(self.wire.elapsed()) {
+                return Err(self.halt_saying(reason, sink));
+            }
+        }
+        if let Err(reason) = self.guard.check_deadman(self.wire.elapsed())
+            && self.has_sent
+        {
+            return Err(self.halt_saying(reason, sink));
+        }
+        // A set-point that was not renewed is sent again: it may be on its way still, and drivers want to hear of us.
+        if self.has_sent && !std::mem::take(&mut self.was_commanded) {
+            self.send()?;
+        }
+        self.left_at = self.wire.elapsed();
+        Ok(())
+    }
+}

@@ -1,0 +1,165 @@
+//! ROS types that recordings lack.
+
+use serde::{Deserialize, Serialize};
+
+use crate::{CommandType, LiveError};
+use armcal_core::log::ros::{Header, JointState, Time};
+use armcal_core::log::{CdrError, decode, encode};
+use armcal_core::time::Stamp;
+
+/// std_msgs/msg/Bool.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(crate) struct Bool {
+    pub data: bool,
+}
+
+/// std_srvs/srv/Trigger, asked; an empty request is one byte.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub(crate) struct TriggerRequest {
+    pub structure_needs_at_least_one_member: u8,
+}
+
+impl ros2_client::Message for TriggerRequest {}
+
+/// std_srvs/srv/Trigger, answered.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub(crate) struct TriggerResponse {
+    pub success: bool,
+    pub message: String,
+}
+
+impl ros2_client::Message for TriggerResponse {}
+
+/// trajectory_msgs/msg/JointTrajectory.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct JointTrajectory {
+    header: Header,
+    joint_names: Vec<String>,
+    points: Vec<JointTrajectoryPoint>,
+}
+
+/// trajectory_msgs/msg/JointTrajectoryPoint.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct JointTrajectoryPoint {
+    positions: Vec<f64>,
+    velocities: Vec<f64>,
+    accelerations: Vec<f64>,
+    effort: Vec<f64>,
+    time_from_start: Time,
+}
+
+/// std_msgs/msg/Float64MultiArray.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct Float64MultiArray {
+    dim: Vec<MultiArrayDimension>,
+    data_offset: u32,
+    data: Vec<f64>,
+}
+
+/// std_msgs/msg/MultiArrayDimension.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct MultiArrayDimension {
+    label: String,
+    size: u32,
+    stride: u32,
+}
+
+/// A set-point in any of the types that carry one.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Command {
+    pub stamp: Stamp,
+    /// The driver's; empty where the type has none.
+    pub names: Vec<String>,
+    pub positions: Vec<f64>,
+    /// Zero where the type has none.
+    pub within_s: f64,
+}
+
+impl Command {
+    pub fn encode(&self, message_type: CommandType, out: &mut Vec<u8>) -> Result<(), LiveError> {
+        let header = Header::new(self.stamp, "")?;
+        let positions = self.positions.clone();
+        match message_type {
+            CommandType::JointTrajectory => {
+                let nanos = (self.within_s * 1e9).round().clamp(0.0, 1e18) as i64;
+                let time_from_start =
+                    Time { sec: (nanos / 1_000_000_000) as i32, nanosec: (nanos % 1_000_000_000) as u32 };
+                let (velocities, accelerations, effort) = (Vec::new(), Vec::new(), Vec::new());
+                let point = JointTrajectoryPoint { positions, velocities, accelerations, effort, time_from_start };
+                let message = JointTrajectory { header, joint_names: self.names.clone(), points: vec![point] };
+                encode(&message, out)
+            }
+            CommandType::Float64MultiArray => {
+                encode(&Float64MultiArray { dim: Vec::new(), data_offset: 0, data: positions }, out)
+            }
+            CommandType::JointState => {
+                let name = self.names.clone();
+                encode(&JointState { header, name, position: positions, ..JointState::default() }, out)
+            }
+        }
+        .map_err(|error| LiveError::Encode(error.into()))
+    }
+
+    /// The last point of a trajectory is where the arm shall be.
+    pub fn decode(message_type: CommandType, bytes: &[u8]) -> Result<Self, CdrError> {
+        let stamp = |header: &Header| Stamp::try_from(header.stamp).unwrap_or(Stamp { nanos: 0 });
+        Ok(match message_type {
+            CommandType::JointTrajectory => {
+                let message: JointTrajectory = decode(bytes)?;
+                let last = message.points.last().ok_or(CdrError::Value)?;
+                let within_s = f64::from(last.time_from_start.sec) + 1e-9 * f64::from(last.time_from_start.nanosec);
+                let (stamp, positions) = (stamp(&message.header), last.positions.clone());
+                Self { stamp, names: message.joint_names, positions, within_s }
+            }
+            CommandType::Float64MultiArray => {
+                let message: Float64MultiArray = decode(bytes)?;
+                Self { stamp: Stamp { nanos: 0 }, names: Vec::new(), positions: message.data, within_s: 0.0 }
+            }
+            CommandType::JointState => {
+                let message: JointState = decode(bytes)?;
+                let stamp = stamp(&message.header);
+                Self { stamp, names: message.name, positions: message.position, within_s: 0.0 }
+            }
+        })
+    }
+
+    /// The positions in the order of `names`; `None` where one is missing or is no number.
+    pub fn in_order(&self, names: &[&str]) -> Option<Vec<f64>> {
+        let positions: Vec<f64> = if self.names.is_empty() {
+            self.positions.clone()
+        } else {
+            let position = |name: &&str| {
+                let index = self.names.iter().position(|own| own == name)?;
+                self.positions.get(index).copied()
+            };
+            names.iter().map(position).collect::<Option<_>>()?
+        };
+        (positions.len() == names.len() && positions.iter().all(|position| position.is_finite())).then_some(positions)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_set_point_survives_each_of_its_types() {
+        let names = vec!["a".to_owned(), "b".to_owned()];
+        let command =
+            Command { stamp: Stamp { nanos: 5_000_000_007 }, names, positions: vec![1.5, -2.5], within_s: 0.02 };
+        let mut bytes = Vec::new();
+        for message_type in [CommandType::JointTrajectory, CommandType::Float64MultiArray, CommandType::JointState] {
+            command.encode(message_type, &mut bytes).unwrap();
+            let back = Command::decode(message_type, &bytes).unwrap();
+            assert_eq!(back.in_order(&["a", "b"]), Some(vec![1.5, -2.5]), "{message_type:?}");
+            if message_type == CommandType::JointTrajectory {
+                assert_eq!(back, command);
+                assert_eq!(back.in_order(&["b", "a"]), Some(vec![-2.5, 1.5]));
+                assert_eq!(back.in_order(&["b", "c"]), None);
+            }
+            for end in 0..bytes.len() {
+                assert!(Command::decode(message_type, &bytes[..end]).is_err(), "{message_type:?}, {end} bytes");
+            }
+        }
+    }
+}

@@ -1,0 +1,12 @@
+//! ROS 2 over DDS, without ROS: `node` joins a domain, `raw` carries messages as bytes, that all are decoded and checked
+//! as those of recordings are, `messages` has the types that recordings lack, `wire` is an arm behind topics.
+
+mod messages;
+mod node;
+mod raw;
+mod wire;
+
+pub(crate) use messages::{Bool, Command, TriggerRequest, TriggerResponse};
+pub(crate) use node::{Node, Reader, Writer};
+pub use wire::Ros2Wire;
+pub(crate) use wire::{service_mapping, streams};

@@ -1,0 +1,132 @@
+//! A participant of a ROS 2 domain, with readers and writers of raw messages.
+
+use rustdds::no_key::{DataWriter, SimpleDataReader};
+use rustdds::policy::{History, Reliability};
+use rustdds::{
+    DomainParticipant, DomainParticipantBuilder, DomainParticipantStatusEvent, DomainParticipantStatusListener,
+    QosPolicies, QosPolicyBuilder, StatusEvented, TopicKind,
+};
+
+use super::raw::Raw;
+use crate::{Connection, LiveError};
+
+/// Messages that a reader keeps while nobody listens.
+const DEPTH: i32 = 200;
+
+/// Our place in the domain.
+pub(crate) struct Node {
+    participant: DomainParticipant,
+    publisher: rustdds::Publisher,
+    subscriber: rustdds::Subscriber,
+    status: DomainParticipantStatusListener,
+    pub ros: ros2_client::Node,
+}
+
+/// Reads one topic.
+pub(crate) struct Reader(pub SimpleDataReader<Vec<u8>, Raw>);
+
+/// Writes one topic.
+pub(crate) struct Writer(DataWriter<Vec<u8>, Raw>);
+
+impl Node {
+    pub fn new(connection: &Connection, name: &str) -> Result<Self, LiveError> {
+        let mut builder = DomainParticipantBuilder::new(connection.domain);
+        if !connection.networks.is_empty() {
+            builder = builder.with_only_networks(connection.networks.iter().copied());
+        }
+        let participant = builder.build().map_err(LiveError::dds("the domain cannot be joined"))?;
+        let status = participant.status_listener();
+        let context = ros2_client::Context::from_domain_participant(participant.clone());
+        let name = ros2_client::NodeName::new("/", name).map_err(LiveError::dds("the node"))?;
+        let options = ros2_client::NodeOptions::new().enable_rosout(false).start_parameter_services(false);
+        let ros = context
+            .map_err(LiveError::dds("the node"))?
+            .new_node(name, options)
+            .map_err(LiveError::dds("the node cannot be made"))?;
+        let publisher =
+            participant.create_publisher(&reliable()).map_err(LiveError::dds("no publisher can be made"))?;
+        let subscriber =
+            participant.create_subscriber(&best_effort()).map_err(LiveError::dds("no subscriber can be made"))?;
+        Ok(Self { participant, publisher, subscriber, status, ros })
+    }
+
+    pub fn reader(&self, topic: &str, ros_type: &str) -> Result<Reader, LiveError> {
+        let qos = best_effort();
+        let dds_topic = self.topic(topic, ros_type, &qos)?;
+        let reader = self.subscriber.create_simple_datareader_no_key(&dds_topic, Some(qos));
+        Ok(Reader(reader.map_err(LiveError::dds(topic))?))
+    }
+
+    pub fn writer(&self, topic: &str, ros_type: &str) -> Result<Writer, LiveError> {
+        let qos = reliable();
+        let dds_topic = self.topic(topic, ros_type, &qos)?;
+        Ok(Writer(self.publisher.create_datawriter_no_key(&dds_topic, Some(qos)).map_err(LiveError::dds(topic))?))
+    }
+
+    fn topic(&self, topic: &str, ros_type: &str, qos: &QosPolicies) -> Result<rustdds::Topic, LiveError> {
+        let created = self.participant.create_topic(format!("rt{topic}"), dds_type(ros_type), qos, TopicKind::NoKey);
+        created.map_err(LiveError::dds(topic))
+    }
+
+    /// Says what the other side offers in vain.
+    pub fn warn_of_mismatches(&self) {
+        while let Some(event) = self.status.try_recv_status() {
+            if let DomainParticipantStatusEvent::RemoteReaderQosIncompatible { requested_qos, .. } = event {
+                tracing::warn!("somebody asks for a quality of service that is not offered here: {requested_qos:?}");
+            } else if let DomainParticipantStatusEvent::RemoteWriterQosIncompatible { offered_qos, .. } = event {
+                tracing::warn!("somebody offers a quality of service that is too low for us: {offered_qos:?}");
+            }
+        }
+    }
+}
+
+impl Reader {
+    /// The oldest message that was not taken; `None` when there is none, the text when it could not be read.
+    pub fn take(&self) -> Option<Result<Vec<u8>, String>> {
+        self.0.drain_read_notifications();
+        match self.0.try_take_one() {
+            Ok(None) => None,
+            Ok(Some(sample)) => Some(Ok(sample.into_value())),
+            Err(error) => Some(Err(format!("{error:?}"))),
+        }
+    }
+}
+
+impl Writer {
+    pub fn write(&self, bytes: Vec<u8>) -> Result<(), LiveError> {
+        self.0.write(bytes, Some(rustdds::Timestamp::now())).map_err(|error| LiveError::Dds {
+            what: "a message cannot be sent".to_owned(),
+            problem: format!("{:?}", error.forget_data()),
+        })
+    }
+}
+
+/// Matches every writer.
+fn best_effort() -> QosPolicies {
+    let builder = QosPolicyBuilder::new().reliability(Reliability::BestEffort);
+    builder.history(History::KeepLast { depth: DEPTH }).build()
+}
+
+/// Matches every reader.
+fn reliable() -> QosPolicies {
+    let max_blocking_time = rustdds::Duration::from_millis(10);
+    let builder = QosPolicyBuilder::new().reliability(Reliability::Reliable { max_blocking_time });
+    builder.history(History::KeepLast { depth: 10 }).build()
+}
+
+/// `package/msg/Type` as DDS has it.
+fn dds_type(ros_type: &str) -> String {
+    let mut parts = ros_type.split('/');
+    let (package, kind, name) = (parts.next(), parts.next(), parts.next());
+    format!("{}::{}::dds_::{}_", package.unwrap_or_default(), kind.unwrap_or_default(), name.unwrap_or_default())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn types_are_named_as_dds_has_them() {
+        assert_eq!(dds_type("sensor_msgs/msg/JointState"), "sensor_msgs::msg::dds_::JointState_");
+    }
+}

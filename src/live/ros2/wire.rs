@@ -1,0 +1,204 @@
+//! An arm behind the topics of a connection.
+
+use std::time::{Duration, Instant};
+
+use rustdds::mio1::{Events, Interest, Poll, Token};
+
+use super::{Bool, Command, Node, Reader, TriggerRequest, TriggerResponse, Writer};
+use crate::{Connection, Heard, LiveError, ServiceMapping, Wire};
+use armcal_core::log::ros::JointState;
+use armcal_core::log::{Stream, decode, encode};
+use armcal_core::robot::Robot;
+use armcal_core::streams::{JointCounts, JointSensorSample};
+use armcal_core::time::Stamp;
+
+/// Messages of one topic that are taken at once; more wait for the next turn.
+const MAX_TAKEN: usize = 1000;
+
+/// A connection over DDS.
+pub struct Ros2Wire {
+    node: Node,
+    connection: Connection,
+    /// The driver's names, robot's order of joints.
+    names: Vec<String>,
+    readers: Vec<(What, Reader)>,
+    commands: Writer,
+    stop: Option<Writer>,
+    stop_service: Option<ros2_client::Client<TriggerRequest, TriggerResponse>>,
+    poll: Poll,
+    events: Events,
+    start: Instant,
+    newest: Stamp,
+}
+
+/// What a topic carries.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum What {
+    Joints,
+    Stream(Stream),
+    Deadman,
+}
+
+impl Ros2Wire {
+    /// Joins the domain and subscribes; nothing is sent.
+    ///
+    /// # Errors
+    /// [`LiveError::Dds`].
+    pub fn open(connection: &Connection, robot: &Robot) -> Result<Self, LiveError> {
+        let mut node = Node::new(connection, "armcal")?;
+        let names = robot.joint_names().iter().map(|name| connection.driver_name(name).to_owned()).collect();
+        let commands = node.writer(&connection.commands.topic, connection.commands.message_type.name())?;
+        let stop = &connection.stop;
+        let stop_topic = (!stop.topic.is_empty()).then(|| node.writer(&stop.topic, "std_msgs/msg/Bool")).transpose()?;
+        let stop_service = (!stop.service.is_empty()).then(|| trigger(&mut node, connection)).transpose()?;
+        let poll = Poll::new().map_err(LiveError::dds("polling"))?;
+        let mut readers = Vec::new();
+        for (what, topic, ros_type) in subscriptions(connection) {
+            let mut reader = node.reader(topic, ros_type)?;
+            let token = Token(readers.len());
+            poll.registry().register(&mut reader.0, token, Interest::READABLE).map_err(LiveError::dds(topic))?;
+            readers.push((what, reader));
+        }
+        Ok(Self {
+            node,
+            connection: connection.clone(),
+            names,
+            readers,
+            commands,
+            stop: stop_topic,
+            stop_service,
+            poll,
+            events: Events::with_capacity(64),
+            start: Instant::now(),
+            newest: Stamp { nanos: 0 },
+        })
+    }
+
+    /// Whether anything came.
+    fn drain(&mut self, heard: &mut Vec<Heard>) -> bool {
+        let before = heard.len();
+        for (what, reader) in &self.readers {
+            for _ in 0..MAX_TAKEN {
+                let Some(taken) = reader.take() else { break };
+                heard.push(taken.map_or_else(Heard::Unusable, |bytes| read(*what, &bytes, &self.names)));
+            }
+        }
+        let stamps = heard[before..].iter().filter_map(|heard| match heard {
+            Heard::Joints(sample) => Some(sample.stamp),
+            _ => None,
+        });
+        self.newest = stamps.fold(self.newest, Stamp::max);
+        heard.len() > before
+    }
+}
+
+fn subscriptions(connection: &Connection) -> Vec<(What, &str, &'static str)> {
+    let mut all: Vec<(What, &str, &'static str)> =
+        vec![(What::Joints, &connection.joint_sensors, Stream::JointSensors.schema().name)];
+    for (stream, topic) in streams(connection) {
+        all.push((What::Stream(stream), topic, stream.schema().name));
+    }
+    all.extend(connection.deadman.as_ref().map(|deadman| (What::Deadman, deadman.topic.as_str(), "std_msgs/msg/Bool")));
+    all
+}
+
+/// Streams beside the joints', with their topics.
+pub(crate) fn streams(connection: &Connection) -> Vec<(Stream, &str)> {
+    let all = [
+        (Stream::Detections, connection.detections.as_str()),
+        (Stream::Images, &connection.images),
+        (Stream::OilTemperature, &connection.oil_temperature),
+        (Stream::WaterTemperature, &connection.water_temperature),
+        (Stream::DepthPressure, &connection.pressure),
+        (Stream::VehicleImu, &connection.imu),
+    ];
+    all.into_iter().filter(|(_, topic)| !topic.is_empty()).collect()
+}
+
+fn trigger(
+    node: &mut Node,
+    connection: &Connection,
+) -> Result<ros2_client::Client<TriggerRequest, TriggerResponse>, LiveError> {
+    let name = ros2_client::Name::parse(&connection.stop.service).map_err(LiveError::dds("stop.service"))?;
+    let mapping = service_mapping(connection.stop.mapping);
+    let qos = ros2_client::QosProfile::publisher_default();
+    let type_name = ros2_client::ServiceTypeName::new("std_srvs", "Trigger");
+    node.ros.create_client(mapping, &name, &type_name, qos.clone(), qos).map_err(LiveError::dds("stop.service"))
+}
+
+pub(crate) fn service_mapping(mapping: ServiceMapping) -> ros2_client::ServiceMapping {
+    match mapping {
+        ServiceMapping::Enhanced => ros2_client::ServiceMapping::Enhanced,
+        ServiceMapping::Cyclone => ros2_client::ServiceMapping::Cyclone,
+    }
+}
+
+fn read(what: What, bytes: &[u8], names: &[String]) -> Heard {
+    match what {
+        What::Joints => joints(bytes, names).map_or_else(Heard::Unusable, Heard::Joints),
+        What::Stream(stream) => stream
+            .decode_alone(bytes)
+            .map_or_else(|error| Heard::Unusable(format!("{}: {error}", stream.topic())), Heard::Other),
+        What::Deadman => decode::<Bool>(bytes).map_or_else(
+            |error| Heard::Unusable(format!("the dead man's switch: {error}")),
+            |held| Heard::Deadman(held.data),
+        ),
+    }
+}
+
+/// Readings in the robot's order.
+fn joints(bytes: &[u8], names: &[String]) -> Result<JointSensorSample, String> {
+    let message: JointState = decode(bytes).map_err(|error| format!("joint readings: {error}"))?;
+    let stamp = Stamp::try_from(message.header.stamp).map_err(|error| format!("joint readings: {error}"))?;
+    let mut counts = JointCounts::zeros(names.len());
+    for (joint, name) in names.iter().enumerate() {
+        let index = message.name.iter().position(|own| own == name);
+        let position = index.and_then(|index| message.position.get(index)).copied();
+        counts[joint] = position
+            .filter(|position| position.is_finite())
+            .ok_or_else(|| format!("joint readings: no finite position of {name} among {:?}", message.name))?;
+    }
+    Ok(JointSensorSample { stamp, counts })
+}
+
+impl Wire for Ros2Wire {
+    fn elapsed(&self) -> Duration {
+        self.start.elapsed()
+    }
+
+    fn receive(&mut self, timeout: Duration, heard: &mut Vec<Heard>) -> Result<(), LiveError> {
+        if self.drain(heard) {
+            return Ok(());
+        }
+        if let Err(error) = self.poll.poll(&mut self.events, Some(timeout))
+            && error.kind() != std::io::ErrorKind::Interrupted
+        {
+            return Err(LiveError::dds("polling")(error));
+        }
+        self.drain(heard);
+        self.node.warn_of_mismatches();
+        Ok(())
+    }
+
+    fn send(&mut self, set_point: &JointCounts, within_s: f64) -> Result<(), LiveError> {
+        let command =
+            Command { stamp: self.newest, names: self.names.clone(), positions: set_point.to_vec(), within_s };
+        let mut bytes = Vec::new();
+        command.encode(self.connection.commands.message_type, &mut bytes)?;
+        self.commands.write(bytes)
+    }
+
+    fn stop(&mut self) -> Result<(), LiveError> {
+        let by_service = self.stop_service.as_ref().map(|client| {
+            let sent = client.send_request(TriggerRequest::default());
+            sent.map(|_| ()).map_err(LiveError::dds("the stop service"))
+        });
+        let by_topic = self.stop.as_ref().map(|stop| {
+            let mut bytes = Vec::new();
+            encode(&Bool { data: true }, &mut bytes).map_err(|error| LiveError::Encode(error.into()))?;
+            stop.write(bytes)
+        });
+        let mut all = by_service.into_iter().chain(by_topic);
+        all.try_for_each(|sent| sent)
+    }
+}
