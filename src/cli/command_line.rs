@@ -8,14 +8,22 @@ use clap::{CommandFactory, Parser, Subcommand};
 
 #[cfg(feature = "viewer")]
 use crate::cli::replay;
+#[cfg(feature = "live")]
+use crate::cli::serve;
 use crate::cli::stdout::{is_written, note};
 use crate::cli::{calibrate, check, completions, exit, export, inspect, new_robot, plan, tagmap, watch};
 #[cfg(feature = "sim")]
 use crate::cli::{campaign, regress, run, sensitivity, study};
 
+/// With what this build can do beside the defaults.
+#[cfg(feature = "live")]
+const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), " (live: ROS 2 humble)");
+#[cfg(not(feature = "live"))]
+const VERSION: &str = env!("CARGO_PKG_VERSION");
+
 /// Calibrates the joint sensors of arms that nobody can walk up to.
 #[derive(Debug, Parser)]
-#[command(name = "armcal", version, about, max_term_width = 100)]
+#[command(name = "armcal", version = VERSION, about, max_term_width = 100)]
 struct Cli {
     #[command(subcommand)]
     command: Command,
@@ -26,6 +34,9 @@ enum Command {
     /// Run a routine in simulation: reach, plan, capture, calibrate, reach again
     #[cfg(feature = "sim")]
     Run(run::RunArgs),
+    /// Put a routine's simulated arm behind the ROS 2 topics of a real one
+    #[cfg(feature = "live")]
+    Serve(serve::ServeArgs),
     /// Run a routine for many seeds and settings, and sum the figures up
     #[cfg(feature = "sim")]
     Campaign(Box<campaign::CampaignArgs>),
@@ -88,6 +99,8 @@ pub fn main() -> ExitCode {
     let result = match cli.command {
         #[cfg(feature = "sim")]
         Command::Run(args) => run::run(&args),
+        #[cfg(feature = "live")]
+        Command::Serve(args) => serve::serve(&args),
         #[cfg(feature = "sim")]
         Command::Campaign(args) => campaign::campaign(&args),
         #[cfg(feature = "sim")]

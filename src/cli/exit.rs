@@ -85,6 +85,7 @@ pub(super) fn of_cause(error: &(dyn std::error::Error + 'static)) -> Exit {
             || matches!(cause.downcast_ref::<SessionError>(), Some(SessionError::Plan(_) | SessionError::Calib(_)))
             || is_invalid_world(cause)
             || is_invalid_campaign(cause)
+            || is_invalid_connection(cause)
     });
     if invalid { Exit::InvalidInput } else { Exit::Failure }
 }
@@ -108,6 +109,17 @@ fn is_invalid_campaign(cause: &(dyn std::error::Error + 'static)) -> bool {
 
 #[cfg(not(feature = "sim"))]
 fn is_invalid_campaign(_: &(dyn std::error::Error + 'static)) -> bool {
+    false
+}
+
+/// A connection map; an arm that is not there is no fault of the files.
+#[cfg(feature = "live")]
+fn is_invalid_connection(cause: &(dyn std::error::Error + 'static)) -> bool {
+    matches!(cause.downcast_ref::<armcal_live::LiveError>(), Some(armcal_live::LiveError::File(_)))
+}
+
+#[cfg(not(feature = "live"))]
+fn is_invalid_connection(_: &(dyn std::error::Error + 'static)) -> bool {
     false
 }
 

@@ -18,6 +18,8 @@ mod exit;
 mod export;
 mod inspect;
 mod interrupt;
+#[cfg(feature = "live")]
+mod live;
 mod losses;
 mod new_robot;
 mod overrides;
@@ -32,6 +34,8 @@ mod replay;
 mod run;
 #[cfg(feature = "sim")]
 mod sensitivity;
+#[cfg(feature = "live")]
+mod serve;
 mod stdout;
 #[cfg(feature = "sim")]
 mod study;

@@ -1,4 +1,4 @@
-//! `armcal run`: the closed loop on a simulated arm.
+//! `armcal run`: the closed loop on a simulated arm, or on a real one.
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -10,12 +10,15 @@ use crate::cli::closing::say_closing;
 use crate::cli::confirm::Confirm;
 use crate::cli::exit::{Exit, of_summary};
 use crate::cli::interrupt::Interrupt;
+#[cfg(feature = "live")]
+use crate::cli::live::{self, LiveArgs};
 use crate::cli::overrides::OverrideArgs;
 use crate::cli::progress::Bar;
 use crate::cli::stdout::note;
 use crate::output::OutputFolder;
 use crate::report::table;
 use crate::run::{Failure, Keep, RunInputs, execute};
+use armcal_belief::session::Progress;
 
 #[derive(Debug, Args)]
 pub(super) struct RunArgs {
@@ -30,13 +33,23 @@ pub(super) struct RunArgs {
     /// Ask on stdin before each motion: y or nothing goes on, h holds, a aborts
     #[arg(long)]
     confirm: bool,
+    #[cfg(feature = "live")]
+    #[command(flatten)]
+    live: LiveArgs,
     #[command(flatten)]
     overrides: OverrideArgs,
 }
 
 pub(super) fn run(args: &RunArgs) -> Result<Exit> {
     let started = Instant::now();
-    let inputs = RunInputs::load(&args.routine, &args.overrides.overrides())?;
+    #[cfg_attr(not(feature = "live"), expect(unused_mut, reason = "a real arm may be slowed down"))]
+    let mut inputs = RunInputs::load(&args.routine, &args.overrides.overrides())?;
+    #[cfg(feature = "live")]
+    let arm = args.live.connect(&mut inputs)?;
+    #[cfg(feature = "live")]
+    if args.live.no_motion {
+        return Ok(Exit::Ok);
+    }
     let seed = args.seed.unwrap_or(inputs.routine.seed);
     let out = args.out.clone().unwrap_or_else(|| Path::new("recordings").join(&inputs.routine.name));
     let (output, left_behind) = OutputFolder::open(&out)?;
@@ -47,11 +60,15 @@ pub(super) fn run(args: &RunArgs) -> Result<Exit> {
         ));
     }
     let mut bar = Bar::new(started, Interrupt::install()?);
-    let result = if args.confirm {
-        execute(&inputs, seed, &output, Keep::Everything, &mut Confirm::new(&mut bar, std::io::stdin().lock()))
-    } else {
-        execute(&inputs, seed, &output, Keep::Everything, &mut bar)
+    let run = |progress: &mut dyn Progress| {
+        #[cfg(feature = "live")]
+        if let Some(arm) = arm {
+            return live::execute(arm, &inputs, seed, &output, progress);
+        }
+        execute(&inputs, seed, &output, Keep::Everything, progress)
     };
+    let result =
+        if args.is_attended() { run(&mut Confirm::new(&mut bar, std::io::stdin().lock())) } else { run(&mut bar) };
     bar.finish();
     let finished = result.map_err(explained)?;
     if let Some(why) = &finished.replay_failure {
@@ -63,6 +80,17 @@ pub(super) fn run(args: &RunArgs) -> Result<Exit> {
         table(&finished.summary)
     ))?;
     Ok(of_summary(&finished.summary))
+}
+
+impl RunArgs {
+    /// Whether somebody is asked before each motion.
+    fn is_attended(&self) -> bool {
+        #[cfg(feature = "live")]
+        let is_attended = self.confirm || self.live.is_attended();
+        #[cfg(not(feature = "live"))]
+        let is_attended = self.confirm;
+        is_attended
+    }
 }
 
 /// Names the recording that a broken run leaves.

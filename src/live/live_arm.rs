@@ -195,7 +195,7 @@ impl<W: Wire> LiveArm<W> {
 
     /// Sends the set-point that is next on the way to the goal, no faster than the joints may go.
     fn send(&mut self) -> Result<(), ArmError> {
-        let elapsed_s = self.now.since_s(self.sent_at).clamp(0.0, 2.0 * self.period_s);
+        let elapsed_s = self.now.since_s(self.sent_at).clamp(0.0, self.period_s);
         let Some(latest) = self.guard.latest() else { return Ok(()) };
         let next = JointCounts::from_fn(self.goal.len(), |joint| {
             let (goal, read) = (self.goal[joint], latest.counts[joint]);

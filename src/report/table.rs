@@ -223,6 +223,12 @@ fn time_line(summary: &RunSummary) -> Option<String> {
     let (simulated_s, motion_s) = (summary.simulated_s?, summary.motion_s?);
     let waited_s = summary.waited_s.unwrap_or(0.0);
     let waited = if waited_s > 0.0 { format!(", {waited_s:.0} s waiting") } else { String::new() };
+    if summary.world.is_none() {
+        return Some(format!(
+            "time         {simulated_s:.0} s of the arm's ({motion_s:.0} s of them moving{waited}), {:.1} s in all",
+            summary.wall_s
+        ));
+    }
     Some(format!(
         "time         {simulated_s:.0} s simulated ({motion_s:.0} s of them moving{waited}) in {:.1} s: {:.0} times \
          real time",

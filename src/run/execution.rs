@@ -19,6 +19,7 @@ use armcal_belief::session::{
 use armcal_core::files::{self, FileKind};
 use armcal_core::log::{Recording, RecordingHeader, RecordingWriter, read_recording};
 use armcal_core::streams::Arm;
+use armcal_core::time::Stamp;
 use armcal_sim::truth::TruthRecorder;
 use armcal_sim::{World, WorldInput};
 
@@ -54,8 +55,23 @@ pub fn execute(
     keep: Keep,
     progress: &mut dyn Progress,
 ) -> Result<Finished, Failure> {
-    let run = Run { inputs, seed, output, keep };
-    run.to_the_end(progress).map_err(|failure| run.broken_off(failure))
+    let run = Run { inputs, seed, output, keep, source: Source::World };
+    run.simulated(progress).map_err(|failure| run.broken_off(failure))
+}
+
+/// Runs the closed loop on an arm of which nobody knows the truth: there is no score. All else is as with [`execute`].
+///
+/// # Errors
+/// As [`execute`].
+pub fn execute_on(
+    arm: &mut dyn Arm,
+    inputs: &RunInputs,
+    seed: u64,
+    output: &OutputFolder,
+    progress: &mut dyn Progress,
+) -> Result<Finished, Failure> {
+    let run = Run { inputs, seed, output, keep: Keep::Everything, source: Source::Arm };
+    run.real(arm, progress).map_err(|failure| run.broken_off(failure))
 }
 
 struct Run<'a> {
@@ -63,11 +79,33 @@ struct Run<'a> {
     seed: u64,
     output: &'a OutputFolder,
     keep: Keep,
+    source: Source,
+}
+
+/// Where the streams come from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Source {
+    /// Simulated: the truth is known.
+    World,
+    Arm,
 }
 
 impl Run<'_> {
-    fn to_the_end(&self, progress: &mut dyn Progress) -> Result<Finished, Failure> {
-        let (outcome, recorder) = self.drive(progress)?;
+    fn simulated(&self, progress: &mut dyn Progress) -> Result<Finished, Failure> {
+        let mut world = self.world().map_err(Failure::at(Stage::World))?;
+        let driven = self.drive(&mut world, progress);
+        let finished = world.finish_truth();
+        let (outcome, recorder) = driven?;
+        finished.map_err(Failure::at(Stage::Motion))?;
+        self.keep_all(outcome, recorder, progress)
+    }
+
+    fn real(&self, arm: &mut dyn Arm, progress: &mut dyn Progress) -> Result<Finished, Failure> {
+        let (outcome, recorder) = self.drive(arm, progress)?;
+        self.keep_all(outcome, recorder, progress)
+    }
+
+    fn keep_all(&self, outcome: Outcome, recorder: Recorder, progress: &mut dyn Progress) -> Result<Finished, Failure> {
         self.finish_recording(recorder).map_err(Failure::at(Stage::Results))?;
         let finished = self.write_results(outcome, progress).map_err(Failure::at(Stage::Results))?;
         if self.keep == Keep::Everything {
@@ -81,18 +119,13 @@ impl Run<'_> {
         self.output.partial(name)
     }
 
-    fn drive(&self, progress: &mut dyn Progress) -> Result<(Outcome, Recorder), Failure> {
+    fn drive(&self, arm: &mut dyn Arm, progress: &mut dyn Progress) -> Result<(Outcome, Recorder), Failure> {
         let inputs = self.inputs;
-        let (mut world, mut recorder) = self.open().map_err(Failure::at(Stage::World))?;
+        let mut recorder = self.recorder(arm.now()).map_err(Failure::at(Stage::World))?;
         let setup =
             SessionInputs { robot: &inputs.robot, vehicle: &inputs.vehicle, routine: &inputs.routine, seed: self.seed };
-        let result = session::run(&setup, &mut world, &mut recorder, progress);
-        let finished = world.finish_truth();
-        match result {
-            Ok(outcome) => {
-                finished.map_err(Failure::at(Stage::Motion))?;
-                Ok((outcome, recorder))
-            }
+        match session::run(&setup, arm, &mut recorder, progress) {
+            Ok(outcome) => Ok((outcome, recorder)),
             Err(error) => {
                 // Whole up to here: what happened before the failure can be looked at. If the recording itself failed,
                 // this fails too, and `error` says why.
@@ -102,7 +135,7 @@ impl Run<'_> {
         }
     }
 
-    fn open(&self) -> Result<(World, Recorder), RunError> {
+    fn world(&self) -> Result<World, RunError> {
         let inputs = self.inputs;
         let mut world = World::new(WorldInput {
             robot: &inputs.robot,
@@ -113,10 +146,14 @@ impl Run<'_> {
         })?;
         let truth = TruthRecorder::create(self.partial("truth.mcap"))?;
         world.set_truth_sink(Box::new(truth))?;
-        let header = RecordingHeader::new(inputs.robot.joint_names());
+        Ok(world)
+    }
+
+    fn recorder(&self, now: Stamp) -> Result<Recorder, RunError> {
+        let header = RecordingHeader::new(self.inputs.robot.joint_names());
         let mut writer = RecordingWriter::create(self.partial("run.mcap"), header)?;
-        describe(&mut writer, inputs, world.now())?;
-        Ok((world, Recorder::new(writer)))
+        describe(&mut writer, self.inputs, now)?;
+        Ok(Recorder::new(writer))
     }
 
     /// Keeps and names the recording that a broken run leaves; one in which nothing moved yet is removed.
@@ -166,18 +203,9 @@ impl Run<'_> {
     }
 
     fn summary(&self, outcome: &Outcome, recording: &Recording) -> Result<RunSummary, RunError> {
-        let truth = self.partial("truth.mcap");
-        let scored = score(&ScoreInput {
-            recording,
-            truth: &truth,
-            robot: &self.inputs.robot,
-            outcome,
-            tolerance_m: self.inputs.routine.task.tolerance_m,
-        })?;
         let mut summary = RunSummary::of_calibration(&outcome.calibration, outcome.calibration_wall_s);
         summary.routine = Some(self.inputs.routine.name.clone());
         summary.seed = Some(self.seed);
-        summary.world = Some(WorldSummary { engine: self.inputs.spec.engine().name().to_owned() });
         summary.simulated_s = Some(outcome.duration_s);
         summary.motion_s = Some(outcome.motion_s);
         summary.waited_s = Some(outcome.waited_s);
@@ -190,19 +218,37 @@ impl Run<'_> {
         };
         summary.held_joints = outcome.held.iter().map(held).collect();
         summary.still_reachable.clone_from(&outcome.still_reachable);
-        summary.asserts = scored.asserts.iter().map(assert_summary).collect();
+        summary.asserts = outcome.asserts.iter().map(assert_summary).collect();
         summary.capture.poses = outcome.poses;
         summary.capture.poses_skipped = outcome.poses_skipped;
         summary.capture.targets_skipped = outcome.skipped_targets.len();
         summary.capture.skipped_targets.clone_from(&outcome.skipped_targets);
-        summary.capture.collisions = Some(scored.collisions);
-        summary.capture.min_clearance_m = scored.min_clearance_m;
-        summary.capture.margins = scored.margins;
         summary.capture.renewals = outcome.renewals.iter().map(renewal_summary).collect();
         summary.capture.stop_reason.clone_from(&outcome.capture_ended);
         summary.online = outcome.online.as_ref().and_then(OnlineSummary::of);
-        summary.score = Some(scored.score);
+        if self.source == Source::World {
+            self.add_score(&mut summary, outcome, recording)?;
+        }
         Ok(summary)
+    }
+
+    /// What only the truth knows.
+    fn add_score(&self, summary: &mut RunSummary, outcome: &Outcome, recording: &Recording) -> Result<(), RunError> {
+        let truth = self.partial("truth.mcap");
+        let scored = score(&ScoreInput {
+            recording,
+            truth: &truth,
+            robot: &self.inputs.robot,
+            outcome,
+            tolerance_m: self.inputs.routine.task.tolerance_m,
+        })?;
+        summary.world = Some(WorldSummary { engine: self.inputs.spec.engine().name().to_owned() });
+        summary.asserts = scored.asserts.iter().map(assert_summary).collect();
+        summary.capture.collisions = Some(scored.collisions);
+        summary.capture.min_clearance_m = scored.min_clearance_m;
+        summary.capture.margins = scored.margins;
+        summary.score = Some(scored.score);
+        Ok(())
     }
 
     fn write_texts(&self, outcome: &Outcome, summary: &RunSummary) -> Result<(), RunError> {
@@ -243,11 +289,11 @@ impl Run<'_> {
     ) -> Result<(), armcal_replay::ReplayError> {
         let markdown = markdown(summary);
         let believed_links: Vec<_> = outcome.epochs.iter().map(|epoch| (epoch.from, epoch.links())).collect();
-        let truth = self.partial("truth.mcap");
+        let truth = (self.source == Source::World).then(|| self.partial("truth.mcap"));
         armcal_replay::write_rrd(
             &armcal_replay::ReplayInput {
                 recording,
-                truth: Some(&truth),
+                truth: truth.as_deref(),
                 robot: &self.inputs.robot,
                 vehicle: Some(&self.inputs.vehicle),
                 scene: Some(&self.inputs.routine.scene),

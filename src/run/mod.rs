@@ -1,7 +1,7 @@
-//! One run of a routine in simulation, from checked files to scored figures.
+//! One run of a routine, from checked files to figures.
 //!
-//! `RunInputs` is everything read beforehand; `execute` drives the closed loop, writes the streams, scores, and leaves
-//! in the output folder what `Keep` says. It has no clock of its own: seconds come from the watcher.
+//! `RunInputs` is everything read beforehand; `execute` drives the closed loop in simulation, writes the streams, scores,
+//! and leaves in the output folder what `Keep` says; `execute_on` does so with an arm whose truth nobody knows. It has no clock of its own: seconds come from the watcher.
 
 mod describe;
 mod error;
@@ -10,6 +10,6 @@ mod inputs;
 mod scatter;
 
 pub use error::{Failure, RunError, Stage};
-pub use execution::{Finished, Keep, execute};
+pub use execution::{Finished, Keep, execute, execute_on};
 pub use inputs::RunInputs;
 pub use scatter::corner_scatter_px;
