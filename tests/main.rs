@@ -10,7 +10,7 @@
 //! of which little is known; `real` reads recordings of real arms, `recorded_inputs` their slow sensors and images;
 //! `tagmap` maps tags in recordings that the test writes; `touch` feels surveyed plates with the tool; `any_arm`
 //! makes robot folders for drawings of all sorts; `report` reads report.html; `work` works on a dive, `watch` follows
-//! recordings that grow; `repository` reads sources and pages.
+//! recordings that grow; `live` moves arms behind ROS 2 topics; `repository` reads sources and pages.
 
 #![allow(clippy::print_stderr, reason = "figures of a test, for whoever reads its output")]
 
@@ -26,6 +26,8 @@ mod failed;
 mod golden;
 mod gripper_tag;
 mod kill;
+#[cfg(feature = "live")]
+mod live;
 mod map;
 mod methods;
 mod mutations;

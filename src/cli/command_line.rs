@@ -8,12 +8,10 @@ use clap::{CommandFactory, Parser, Subcommand};
 
 #[cfg(feature = "viewer")]
 use crate::cli::replay;
-#[cfg(feature = "live")]
-use crate::cli::serve;
 use crate::cli::stdout::{is_written, note};
 use crate::cli::{calibrate, check, completions, exit, export, inspect, new_robot, plan, tagmap, watch};
 #[cfg(feature = "sim")]
-use crate::cli::{campaign, regress, run, sensitivity, study};
+use crate::cli::{campaign, regress, run, sensitivity, serve, study};
 
 /// With what this build can do beside the defaults.
 #[cfg(feature = "live")]
@@ -35,7 +33,7 @@ enum Command {
     #[cfg(feature = "sim")]
     Run(run::RunArgs),
     /// Put a routine's simulated arm behind the ROS 2 topics of a real one
-    #[cfg(feature = "live")]
+    #[cfg(feature = "sim")]
     Serve(serve::ServeArgs),
     /// Run a routine for many seeds and settings, and sum the figures up
     #[cfg(feature = "sim")]
@@ -99,7 +97,7 @@ pub fn main() -> ExitCode {
     let result = match cli.command {
         #[cfg(feature = "sim")]
         Command::Run(args) => run::run(&args),
-        #[cfg(feature = "live")]
+        #[cfg(feature = "sim")]
         Command::Serve(args) => serve::serve(&args),
         #[cfg(feature = "sim")]
         Command::Campaign(args) => campaign::campaign(&args),

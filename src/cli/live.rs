@@ -1,17 +1,15 @@
 //! `armcal run --arm`: a real arm in place of the simulated one.
 
-use anyhow::Result;
+#[cfg(feature = "live")]
+mod connected;
+
 use clap::Args;
 
 use crate::cli::exit::UsageError;
-use crate::cli::stdout::note;
-use crate::output::OutputFolder;
-use crate::run::{Failure, Finished, RunInputs, execute_on};
-use armcal_belief::session::Progress;
-use armcal_core::robot::Robot;
-use armcal_core::sensor::ArmSensors;
-use armcal_core::stats::quantile;
-use armcal_live::{Connection, LiveArm, Ros2Wire, Survey};
+#[cfg(feature = "live")]
+pub(super) use connected::ConnectedArm;
+#[cfg(not(feature = "live"))]
+pub(super) use unconnected::ConnectedArm;
 
 #[derive(Debug, Args)]
 pub(super) struct LiveArgs {
@@ -41,58 +39,50 @@ impl LiveArgs {
     }
 
     /// Connects to the arm, where one is named, and says what was heard of it.
-    pub fn connect(&self, inputs: &mut RunInputs) -> Result<Option<LiveArm<Ros2Wire>>> {
+    pub fn connect(&self, inputs: &mut crate::run::RunInputs) -> anyhow::Result<Option<ConnectedArm>> {
         let Some(arm) = &self.arm else { return Ok(None) };
         let Some(file) = arm.strip_prefix("ros2:") else {
-            return Err(UsageError(format!(
-                "--arm {arm}: it must be ros2: and a connection map, such as ros2:arm.toml"
-            ))
-            .into());
+            let problem = "it must be ros2: and a connection map, such as ros2:arm.toml";
+            return Err(UsageError(format!("--arm {arm}: {problem}")).into());
         };
-        let connection = Connection::load(file.as_ref())?;
         for sensor in &mut inputs.robot.sensors {
             sensor.max_rate_rad_s *= self.speed;
         }
-        let wire = Ros2Wire::open(&connection, &inputs.robot)?;
-        let (arm, survey) = LiveArm::connect(wire, &inputs.robot, &connection)?;
-        note(describe(&survey, &inputs.robot));
-        Ok(Some(arm))
+        ConnectedArm::open(file.as_ref(), inputs).map(Some)
     }
 }
 
-/// What was heard before anything moved.
-fn describe(survey: &Survey, robot: &Robot) -> String {
-    let Survey { seconds, readings, images, tags, .. } = survey;
-    let rate_hz = *readings as f64 / seconds.max(1e-9);
-    let mut text = format!(
-        "the arm is at rest; heard in {seconds:.1} s: {readings} joint readings ({rate_hz:.0} a second), {images} \
-         images with {tags} tags"
-    );
-    let angles = ArmSensors::nominal(robot).angles(&survey.counts);
-    for (joint, angle) in robot.joint_names().iter().zip(angles.iter()) {
-        text.push_str(&format!("\n  {joint:<20} {:8.2} deg by the datasheet", angle.to_degrees()));
-    }
-    if let Some((n, why)) = &survey.unusable {
-        text.push_str(&format!("\nwarning: {n} messages were of no use, the last: {why}"));
-    }
-    text
+/// This build has no such part.
+#[cfg(not(feature = "live"))]
+pub(super) fn not_built(what: &str) -> anyhow::Error {
+    UsageError(format!("{what}: this build of armcal knows no live arms; build it with `--features live`")).into()
 }
 
-/// Runs on the arm, tells it to stop where the run breaks off, and says how quickly it was answered.
-pub(super) fn execute(
-    mut arm: LiveArm<Ros2Wire>,
-    inputs: &RunInputs,
-    seed: u64,
-    output: &OutputFolder,
-    progress: &mut dyn Progress,
-) -> Result<Finished, Failure> {
-    let result = execute_on(&mut arm, inputs, seed, output, progress);
-    if result.is_err() {
-        arm.stop("the run broke off");
+#[cfg(not(feature = "live"))]
+mod unconnected {
+    use std::path::Path;
+
+    use super::not_built;
+    use crate::output::OutputFolder;
+    use crate::run::{Failure, Finished, RunInputs};
+    use armcal_belief::session::Progress;
+
+    /// There is none.
+    pub enum ConnectedArm {}
+
+    impl ConnectedArm {
+        pub fn open(_: &Path, _: &RunInputs) -> anyhow::Result<Self> {
+            Err(not_built("--arm"))
+        }
+
+        pub fn execute(
+            self,
+            _: &RunInputs,
+            _: u64,
+            _: &OutputFolder,
+            _: &mut dyn Progress,
+        ) -> Result<Finished, Failure> {
+            match self {}
+        }
     }
-    let latency_ms = |p: f64| quantile(arm.latencies_s(), p).map(|seconds| 1e3 * seconds);
-    if let (Some(median), Some(slow)) = (latency_ms(0.5), latency_ms(0.99)) {
-        note(format_args!("from a reading to its set-point: median {median:.2} ms, 99 % within {slow:.2} ms"));
-    }
-    result
 }

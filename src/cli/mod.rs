@@ -18,7 +18,7 @@ mod exit;
 mod export;
 mod inspect;
 mod interrupt;
-#[cfg(feature = "live")]
+#[cfg(feature = "sim")]
 mod live;
 mod losses;
 mod new_robot;
@@ -34,7 +34,7 @@ mod replay;
 mod run;
 #[cfg(feature = "sim")]
 mod sensitivity;
-#[cfg(feature = "live")]
+#[cfg(feature = "sim")]
 mod serve;
 mod stdout;
 #[cfg(feature = "sim")]

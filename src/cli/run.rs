@@ -10,8 +10,7 @@ use crate::cli::closing::say_closing;
 use crate::cli::confirm::Confirm;
 use crate::cli::exit::{Exit, of_summary};
 use crate::cli::interrupt::Interrupt;
-#[cfg(feature = "live")]
-use crate::cli::live::{self, LiveArgs};
+use crate::cli::live::LiveArgs;
 use crate::cli::overrides::OverrideArgs;
 use crate::cli::progress::Bar;
 use crate::cli::stdout::note;
@@ -33,7 +32,6 @@ pub(super) struct RunArgs {
     /// Ask on stdin before each motion: y or nothing goes on, h holds, a aborts
     #[arg(long)]
     confirm: bool,
-    #[cfg(feature = "live")]
     #[command(flatten)]
     live: LiveArgs,
     #[command(flatten)]
@@ -42,11 +40,8 @@ pub(super) struct RunArgs {
 
 pub(super) fn run(args: &RunArgs) -> Result<Exit> {
     let started = Instant::now();
-    #[cfg_attr(not(feature = "live"), expect(unused_mut, reason = "a real arm may be slowed down"))]
     let mut inputs = RunInputs::load(&args.routine, &args.overrides.overrides())?;
-    #[cfg(feature = "live")]
     let arm = args.live.connect(&mut inputs)?;
-    #[cfg(feature = "live")]
     if args.live.no_motion {
         return Ok(Exit::Ok);
     }
@@ -61,14 +56,16 @@ pub(super) fn run(args: &RunArgs) -> Result<Exit> {
     }
     let mut bar = Bar::new(started, Interrupt::install()?);
     let run = |progress: &mut dyn Progress| {
-        #[cfg(feature = "live")]
         if let Some(arm) = arm {
-            return live::execute(arm, &inputs, seed, &output, progress);
+            return arm.execute(&inputs, seed, &output, progress);
         }
         execute(&inputs, seed, &output, Keep::Everything, progress)
     };
-    let result =
-        if args.is_attended() { run(&mut Confirm::new(&mut bar, std::io::stdin().lock())) } else { run(&mut bar) };
+    let result = if args.confirm || args.live.is_attended() {
+        run(&mut Confirm::new(&mut bar, std::io::stdin().lock()))
+    } else {
+        run(&mut bar)
+    };
     bar.finish();
     let finished = result.map_err(explained)?;
     if let Some(why) = &finished.replay_failure {
@@ -80,17 +77,6 @@ pub(super) fn run(args: &RunArgs) -> Result<Exit> {
         table(&finished.summary)
     ))?;
     Ok(of_summary(&finished.summary))
-}
-
-impl RunArgs {
-    /// Whether somebody is asked before each motion.
-    fn is_attended(&self) -> bool {
-        #[cfg(feature = "live")]
-        let is_attended = self.confirm || self.live.is_attended();
-        #[cfg(not(feature = "live"))]
-        let is_attended = self.confirm;
-        is_attended
-    }
 }
 
 /// Names the recording that a broken run leaves.

@@ -2,17 +2,14 @@
 
 use std::path::PathBuf;
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use clap::Args;
 
 use crate::cli::exit::Exit;
-use crate::cli::interrupt::Interrupt;
 use crate::cli::overrides::OverrideArgs;
-use crate::cli::stdout::note;
-use crate::run::RunInputs;
-use armcal_live::{Connection, Pace};
-use armcal_sim::truth::TruthRecorder;
-use armcal_sim::{World, WorldInput};
+
+#[cfg(feature = "live")]
+mod served;
 
 #[derive(Debug, Args)]
 pub(super) struct ServeArgs {
@@ -42,35 +39,12 @@ fn factor(text: &str) -> Result<f64, String> {
     if (0.05..=50.0).contains(&factor) { Ok(factor) } else { Err("it must be 0.05 .. 50".to_owned()) }
 }
 
+#[cfg(feature = "live")]
 pub(super) fn serve(args: &ServeArgs) -> Result<Exit> {
-    let inputs = RunInputs::load(&args.routine, &args.overrides.overrides())?;
-    let connection = args.arm.as_deref().map_or_else(|| Ok(Connection::default()), Connection::load)?;
-    let mut world = World::new(WorldInput {
-        robot: &inputs.robot,
-        vehicle: &inputs.vehicle,
-        scene: &inputs.routine.scene,
-        spec: inputs.spec.clone(),
-        seed: args.seed.unwrap_or(inputs.routine.seed),
-    })?;
-    if let Some(file) = &args.truth {
-        world.set_truth_sink(Box::new(TruthRecorder::create(file)?))?;
-    }
-    let interrupt = Interrupt::install()?;
-    note(format_args!(
-        "serving {} in ROS domain {}: readings on {}, set-points from {}",
-        inputs.robot.name, connection.domain, connection.joint_sensors, connection.commands.topic
-    ));
-    let pace = Pace { factor: args.factor, seconds: args.seconds };
-    let served = armcal_live::serve(&mut world, &inputs.robot, &connection, pace, &|| interrupt.is_requested());
-    world.finish_truth().context("the truth")?;
-    let served = served?;
-    note(format_args!(
-        "served {:.1} s of the arm's time in {:.1} s: {} set-points, {} of no use{}",
-        served.arm_s,
-        served.wall_s,
-        served.commands,
-        served.unusable,
-        if served.stopped { "; it was told to stop" } else { "" }
-    ));
-    Ok(Exit::Ok)
+    served::serve(args)
+}
+
+#[cfg(not(feature = "live"))]
+pub(super) fn serve(_: &ServeArgs) -> Result<Exit> {
+    Err(crate::cli::live::not_built("serve"))
 }

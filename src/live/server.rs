@@ -64,7 +64,6 @@ pub fn serve(
 }
 
 struct Server<'a> {
-    node: Node,
     connection: &'a Connection,
     /// The driver's names, robot's order.
     names: Vec<String>,
@@ -75,6 +74,8 @@ struct Server<'a> {
     stop_service: Option<ros2_client::Server<TriggerRequest, TriggerResponse>>,
     latest: Option<JointCounts>,
     is_stopped: bool,
+    /// Last: readers and writers leave the domain before it does.
+    node: Node,
 }
 
 impl<'a> Server<'a> {

@@ -15,11 +15,11 @@ const DEPTH: i32 = 200;
 
 /// Our place in the domain.
 pub(crate) struct Node {
-    participant: DomainParticipant,
+    pub ros: ros2_client::Node,
     publisher: rustdds::Publisher,
     subscriber: rustdds::Subscriber,
     status: DomainParticipantStatusListener,
-    pub ros: ros2_client::Node,
+    participant: DomainParticipant,
 }
 
 /// Reads one topic.

@@ -17,7 +17,6 @@ const MAX_TAKEN: usize = 1000;
 
 /// A connection over DDS.
 pub struct Ros2Wire {
-    node: Node,
     connection: Connection,
     /// The driver's names, robot's order of joints.
     names: Vec<String>,
@@ -29,6 +28,8 @@ pub struct Ros2Wire {
     events: Events,
     start: Instant,
     newest: Stamp,
+    /// Last: readers and writers leave the domain before it does.
+    node: Node,
 }
 
 /// What a topic carries.

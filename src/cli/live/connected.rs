@@ -1,0 +1,65 @@
+//! A real arm over ROS 2.
+
+use std::path::Path;
+
+use anyhow::Result;
+
+use crate::cli::stdout::note;
+use crate::output::OutputFolder;
+use crate::run::{Failure, Finished, RunInputs, execute_on};
+use armcal_belief::session::Progress;
+use armcal_core::robot::Robot;
+use armcal_core::sensor::ArmSensors;
+use armcal_core::stats::quantile;
+use armcal_live::{Connection, LiveArm, Ros2Wire, Survey};
+
+/// An arm that was found ready.
+pub struct ConnectedArm(LiveArm<Ros2Wire>);
+
+/// What was heard before anything moved.
+fn describe(survey: &Survey, robot: &Robot) -> String {
+    let Survey { seconds, readings, images, tags, .. } = survey;
+    let rate_hz = *readings as f64 / seconds.max(1e-9);
+    let mut text = format!(
+        "the arm is at rest; heard in {seconds:.1} s: {readings} joint readings ({rate_hz:.0} a second), {images} \
+         images with {tags} tags"
+    );
+    let angles = ArmSensors::nominal(robot).angles(&survey.counts);
+    for (joint, angle) in robot.joint_names().iter().zip(angles.iter()) {
+        text.push_str(&format!("\n  {joint:<20} {:8.2} deg by the datasheet", angle.to_degrees()));
+    }
+    if let Some((n, why)) = &survey.unusable {
+        text.push_str(&format!("\nwarning: {n} messages were of no use, the last: {why}"));
+    }
+    text
+}
+
+impl ConnectedArm {
+    /// Waits until the arm is ready, and says what was heard of it.
+    pub fn open(file: &Path, inputs: &RunInputs) -> Result<Self> {
+        let connection = Connection::load(file)?;
+        let wire = Ros2Wire::open(&connection, &inputs.robot)?;
+        let (arm, survey) = LiveArm::connect(wire, &inputs.robot, &connection)?;
+        note(describe(&survey, &inputs.robot));
+        Ok(Self(arm))
+    }
+
+    /// Runs on the arm, tells it to stop where the run breaks off, and says how quickly it was answered.
+    pub fn execute(
+        mut self,
+        inputs: &RunInputs,
+        seed: u64,
+        output: &OutputFolder,
+        progress: &mut dyn Progress,
+    ) -> Result<Finished, Failure> {
+        let result = execute_on(&mut self.0, inputs, seed, output, progress);
+        if result.is_err() {
+            self.0.stop("the run broke off");
+        }
+        let latency_ms = |p: f64| quantile(self.0.latencies_s(), p).map(|seconds| 1e3 * seconds);
+        if let (Some(median), Some(slow)) = (latency_ms(0.5), latency_ms(0.99)) {
+            note(format_args!("from a reading to its set-point: median {median:.2} ms, 99 % within {slow:.2} ms"));
+        }
+        result
+    }
+}

@@ -1,0 +1,45 @@
+//! The world behind its topics, until somebody ends it.
+
+use anyhow::{Context, Result};
+
+use super::ServeArgs;
+use crate::cli::exit::Exit;
+use crate::cli::interrupt::Interrupt;
+use crate::cli::stdout::note;
+use crate::run::RunInputs;
+use armcal_live::{Connection, Pace};
+use armcal_sim::truth::TruthRecorder;
+use armcal_sim::{World, WorldInput};
+
+pub(super) fn serve(args: &ServeArgs) -> Result<Exit> {
+    let inputs = RunInputs::load(&args.routine, &args.overrides.overrides())?;
+    let connection = args.arm.as_deref().map_or_else(|| Ok(Connection::default()), Connection::load)?;
+    let mut world = World::new(WorldInput {
+        robot: &inputs.robot,
+        vehicle: &inputs.vehicle,
+        scene: &inputs.routine.scene,
+        spec: inputs.spec.clone(),
+        seed: args.seed.unwrap_or(inputs.routine.seed),
+    })?;
+    if let Some(file) = &args.truth {
+        world.set_truth_sink(Box::new(TruthRecorder::create(file)?))?;
+    }
+    let interrupt = Interrupt::install()?;
+    note(format_args!(
+        "serving {} in ROS domain {}: readings on {}, set-points from {}",
+        inputs.robot.name, connection.domain, connection.joint_sensors, connection.commands.topic
+    ));
+    let pace = Pace { factor: args.factor, seconds: args.seconds };
+    let served = armcal_live::serve(&mut world, &inputs.robot, &connection, pace, &|| interrupt.is_requested());
+    world.finish_truth().context("the truth")?;
+    let served = served?;
+    note(format_args!(
+        "served {:.1} s of the arm's time in {:.1} s: {} set-points, {} of no use{}",
+        served.arm_s,
+        served.wall_s,
+        served.commands,
+        served.unusable,
+        if served.stopped { "; it was told to stop" } else { "" }
+    ));
+    Ok(Exit::Ok)
+}

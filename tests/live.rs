@@ -1,0 +1,152 @@
+//! Arms behind ROS 2 topics: the program on both ends, in a network namespace of its own.
+//!
+//! `cargo test --release --features live --test main live -- --ignored`; user namespaces must be allowed, and `python3`
+//! must have cyclonedds (tests/oracle/requirements.txt) for the arm that is none of ours.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use armcal::log::read_recording;
+use armcal::sensor::ArmSensors;
+use armcal::sim::truth::{Truth, read_truth};
+use armcal::stats::quantile;
+use armcal::streams::{MarkKind, Message, ReachAttempt};
+use serde_json::Value;
+
+use crate::support::{Answer, ShortRoutine, answer, read, root, temp, titan, write};
+
+/// Joins nothing but the loopback of its own namespace.
+const NAMESPACE: &str = "ip link set lo up multicast on && ip route add 239.0.0.0/8 dev lo && exec bash -c \"$@\"";
+const CYCLONE: &str = "<CycloneDDS><Domain><General><Interfaces><NetworkInterface name=\"lo\" multicast=\"true\"/>\
+                       </Interfaces></General></Domain></CycloneDDS>";
+
+/// Runs a script in a namespace; `$ARMCAL`, `$OUT` and `$ROUTINE` are set.
+fn in_namespace(out: &Path, routine: &Path, script: &str) -> Answer {
+    let mut command = Command::new("unshare");
+    command.args(["-rn", "--pid", "--fork", "--kill-child", "bash", "-c", NAMESPACE, "netns", script]);
+    command.env("ARMCAL", env!("CARGO_BIN_EXE_armcal")).env("OUT", out).env("ROUTINE", routine);
+    command.env("CYCLONEDDS_URI", CYCLONE).env("PEER", root().join("tests/oracle/ros2_arm.py"));
+    let answer = answer(command.current_dir(out));
+    assert!(!answer.stderr.contains("unshare:"), "user namespaces are needed: {}", answer.stderr);
+    answer
+}
+
+fn connection(out: &Path, more: &str) -> PathBuf {
+    let file = out.join("arm.toml");
+    write(&file, &format!("networks = [\"127.0.0.1\"]\n{more}"));
+    file
+}
+
+/// How far the tool truly was from the target at each reach of this kind, m.
+fn reach_errors_m(recording: &Path, truth: &Truth, wanted: ReachAttempt) -> Vec<f64> {
+    let recording = read_recording(recording).expect("the recording reads");
+    let task = recording.messages.iter().find_map(|(_, message)| match message {
+        Message::Task(task) => Some(task.targets_m.clone()),
+        _ => None,
+    });
+    let task = task.expect("a task");
+    let reaches = recording.messages.iter().filter_map(|(_, message)| match message {
+        Message::Mark(mark) => match mark.kind {
+            MarkKind::Reach { attempt, target_idx } if attempt == wanted => Some((*mark, target_idx as usize)),
+            _ => None,
+        },
+        _ => None,
+    });
+    let error = |(mark, target): (armcal::streams::Mark, usize)| {
+        let middle = mark.start.plus_s(0.5 * mark.end.since_s(mark.start));
+        let tool = truth.state_at(middle).expect("the truth of that moment").base_from_tool;
+        (nalgebra::Vector3::from(task[target]) - tool.origin().vector()).norm()
+    };
+    reaches.map(error).collect()
+}
+
+/// The whole loop over the wire at five times real time: accepted, it reaches what it missed before, and `calibrate`
+/// on the recording gives the same bytes.
+#[test]
+#[ignore = "needs user namespaces"]
+fn a_served_arm_is_calibrated_and_reaches_its_targets() {
+    let out = temp();
+    let routine = ShortRoutine::default().write(out.path());
+    connection(out.path(), "");
+    let script = "$ARMCAL serve $ROUTINE --arm arm.toml --factor 5 --truth truth.mcap 2>serve.log & SERVER=$!; \
+                  $ARMCAL run $ROUTINE --arm ros2:arm.toml --unattended --out out; CODE=$?; \
+                  kill -INT $SERVER; wait $SERVER; exit $CODE";
+    let said = in_namespace(out.path(), &routine, script);
+    said.expect("run --arm", 0, &["ACCEPTED", "of the arm's"]);
+    assert!(said.stderr.contains("from a reading to its set-point"), "{}", said.stderr);
+    let recording = out.path().join("out/run.mcap");
+    let truth = read_truth(out.path().join("truth.mcap")).expect("the truth reads");
+    assert!(truth.contacts.is_empty(), "{:?}", truth.contacts.first());
+    let median = |attempt| quantile(&reach_errors_m(&recording, &truth, attempt), 0.5).expect("reaches");
+    let (before_m, after_m) = (median(ReachAttempt::Before), median(ReachAttempt::After));
+    assert!(before_m > 0.03 && after_m < 0.006, "{before_m} m before, {after_m} m after");
+
+    let again = crate::support::calibrate(&recording, &crate::support::robot_folder(), &out.path().join("again"));
+    again.expect("calibrate", 0, &[]);
+    for file in ["calibration.toml", "calibration.covariance.toml"] {
+        let [live, later] = ["out", "again"].map(|folder| read(&out.path().join(folder).join(file)));
+        assert_eq!(live, later, "{file}");
+    }
+}
+
+/// A driver that dies in mid-motion: the run ends within a second of the last reading, and what there is can be read.
+#[test]
+#[ignore = "needs user namespaces"]
+fn a_run_whose_arm_dies_stops_and_keeps_its_recording() {
+    let out = temp();
+    let routine = ShortRoutine::default().write(out.path());
+    connection(out.path(), "");
+    let script = "$ARMCAL serve $ROUTINE --arm arm.toml --factor 2 2>serve.log & SERVER=$!; \
+                  $ARMCAL run $ROUTINE --arm ros2:arm.toml --unattended --out out & RUN=$!; \
+                  sleep 15; kill -9 $SERVER; date +%s.%N >killed; wait $RUN; CODE=$?; date +%s.%N >ended; exit $CODE";
+    let said = in_namespace(out.path(), &routine, script);
+    said.expect("run --arm", 1, &[]);
+    assert!(said.stderr.contains("no joint readings for") && said.stderr.contains("run-cut-1.mcap"), "{}", said.stderr);
+    let [killed_s, ended_s] =
+        ["killed", "ended"].map(|name| read(&out.path().join(name)).trim().parse::<f64>().expect("a time"));
+    assert!(ended_s - killed_s < 5.0, "{} s", ended_s - killed_s);
+    let recording = read_recording(out.path().join("out/run-cut-1.mcap")).expect("it reads");
+    let is_told = |message: &Message| matches!(message, Message::Log(line) if line.name == "guard");
+    assert!(recording.messages.iter().any(|(_, message)| is_told(message)), "the recording does not say why it ends");
+}
+
+/// An arm by another middleware, in another language: it is read, it moves no faster than it may, and Ctrl-C stops it.
+#[test]
+#[ignore = "needs user namespaces and Python's cyclonedds"]
+fn an_arm_of_another_make_is_read_moved_and_stopped() {
+    let out = temp();
+    let routine = ShortRoutine::default().write(out.path());
+    connection(out.path(), "");
+    let robot = titan();
+    let counts = ArmSensors::nominal(&robot).counts(&robot.stowed);
+    let rates: Vec<f64> = robot.sensors.iter().map(|s| 1.5 * s.max_rate_rad_s * s.counts_per_rad.abs()).collect();
+    let start = serde_json::json!({
+        "names": robot.joint_names(), "counts": counts.to_vec(), "rate_counts": rates,
+    });
+    write(&out.path().join("start.json"), &start.to_string());
+    let script = "python3 $PEER peer.jsonl start.json & PEER=$!; \
+                  $ARMCAL run $ROUTINE --arm ros2:arm.toml --unattended --out out & RUN=$!; \
+                  sleep 20; kill -INT $RUN; wait $RUN; CODE=$?; sleep 1; kill $PEER; exit $CODE";
+    let said = in_namespace(out.path(), &routine, script);
+    said.expect("run --arm", 1, &[]);
+    assert!(said.stderr.contains("stopped on request"), "{}", said.stderr);
+    let log: Vec<Value> =
+        read(&out.path().join("peer.jsonl")).lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
+    let set_points: Vec<(f64, Vec<f64>)> = log.iter().filter_map(set_point).collect();
+    assert!(set_points.len() > 200, "{} set-points", set_points.len());
+    for (joint, rate) in rates.iter().enumerate() {
+        let moved = set_points.windows(2).map(|pair| (pair[1].1[joint] - pair[0].1[joint]).abs());
+        // Two set-points may come at once, none is further than two periods' way.
+        let most = moved.fold(0.0, f64::max);
+        assert!(most <= rate / 1.5 * 1.2 * 0.02 * 1.01, "joint {joint}: {most} counts at once");
+    }
+    let travelled = |joint: usize| (set_points.last().expect("some").1[joint] - counts[joint]).abs() / rates[joint];
+    assert!((0..rates.len()).any(|joint| travelled(joint) > 0.05), "it never moved");
+    let stop = log.iter().position(|line| line["stop"] == true).expect("it was told to stop");
+    assert!(log[stop..].iter().all(|line| set_point(line).is_none()), "a set-point after the stop");
+}
+
+fn set_point(line: &Value) -> Option<(f64, Vec<f64>)> {
+    let positions = line["set_point"].as_array()?.iter().filter_map(Value::as_f64).collect();
+    Some((line["at_s"].as_f64()?, positions))
+}
