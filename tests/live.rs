@@ -120,8 +120,10 @@ fn an_arm_of_another_make_is_read_moved_and_stopped() {
     let robot = titan();
     let counts = ArmSensors::nominal(&robot).counts(&robot.stowed);
     let rates: Vec<f64> = robot.sensors.iter().map(|s| 1.5 * s.max_rate_rad_s * s.counts_per_rad.abs()).collect();
+    let wraps: Vec<f64> = robot.sensors.iter().map(|s| s.wrap_counts).collect();
+    let way = |joint: usize, by: f64| (by + wraps[joint] / 2.0).rem_euclid(wraps[joint]) - wraps[joint] / 2.0;
     let start = serde_json::json!({
-        "names": robot.joint_names(), "counts": counts.to_vec(), "rate_counts": rates,
+        "names": robot.joint_names(), "counts": counts.to_vec(), "rate_counts": rates, "wrap_counts": wraps,
     });
     write(&out.path().join("start.json"), &start.to_string());
     let script = "python3 $PEER peer.jsonl start.json & PEER=$!; \
@@ -135,12 +137,13 @@ fn an_arm_of_another_make_is_read_moved_and_stopped() {
     let set_points: Vec<(f64, Vec<f64>)> = log.iter().filter_map(set_point).collect();
     assert!(set_points.len() > 200, "{} set-points", set_points.len());
     for (joint, rate) in rates.iter().enumerate() {
-        let moved = set_points.windows(2).map(|pair| (pair[1].1[joint] - pair[0].1[joint]).abs());
+        let moved = set_points.windows(2).map(|pair| way(joint, pair[1].1[joint] - pair[0].1[joint]).abs());
         // Two set-points may come at once, none is further than two periods' way.
         let most = moved.fold(0.0, f64::max);
         assert!(most <= rate / 1.5 * 1.2 * 0.02 * 1.01, "joint {joint}: {most} counts at once");
     }
-    let travelled = |joint: usize| (set_points.last().expect("some").1[joint] - counts[joint]).abs() / rates[joint];
+    let travelled =
+        |joint: usize| way(joint, set_points.last().expect("some").1[joint] - counts[joint]).abs() / rates[joint];
     assert!((0..rates.len()).any(|joint| travelled(joint) > 0.05), "it never moved");
     let stop = log.iter().position(|line| line["stop"] == true).expect("it was told to stop");
     assert!(log[stop..].iter().all(|line| set_point(line).is_none()), "a set-point after the stop");

@@ -1,7 +1,8 @@
 //! One run of a routine, from checked files to figures.
 //!
-//! `RunInputs` is everything read beforehand; `execute` drives the closed loop in simulation, writes the streams, scores,
-//! and leaves in the output folder what `Keep` says; `execute_on` does so with an arm whose truth nobody knows. It has no clock of its own: seconds come from the watcher.
+//! `RunInputs` is everything read beforehand; `execute` drives the closed loop in simulation, writes the streams,
+//! scores, and leaves in the output folder what `Keep` says; `execute_on` does so with an arm whose truth nobody
+//! knows. There is no clock in here: seconds come from the watcher.
 
 mod describe;
 mod error;

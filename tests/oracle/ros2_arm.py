@@ -1,8 +1,8 @@
 """An arm behind ROS 2 topics that shares no line with armcal: Eclipse Cyclone DDS by its Python package.
 
 usage: ros2_arm.py LOG.jsonl START.json
-START.json: {"names": [...], "counts": [...], "rate_counts": [...]}; joints follow their set-points no faster than
-`rate_counts` a second. Readings go out at 50 Hz; LOG gets a line for each set-point and each stop. Ends when killed.
+START.json: {"names": [...], "counts": [...], "rate_counts": [...], "wrap_counts": [...]}; joints follow their set-points
+the short way round, no faster than `rate_counts` a second. Readings go out at 50 Hz; LOG gets a line for each set-point and each stop. Ends when killed.
 """
 
 import json
@@ -90,9 +90,9 @@ def main():
             is_stopped = is_stopped or message.data
             log.write(json.dumps({"at_s": time.monotonic() - began, "stop": message.data}) + "\n")
         if not is_stopped:
-            for joint, most in enumerate(start["rate_counts"]):
-                way = goal[joint] - counts[joint]
-                counts[joint] += max(-most * PERIOD_S, min(most * PERIOD_S, way))
+            for joint, (most, wrap) in enumerate(zip(start["rate_counts"], start["wrap_counts"])):
+                way = (goal[joint] - counts[joint] + wrap / 2) % wrap - wrap / 2
+                counts[joint] = (counts[joint] + max(-most * PERIOD_S, min(most * PERIOD_S, way))) % wrap
         now = time.time_ns()
         header = Header(Time(now // 1_000_000_000, now % 1_000_000_000), "")
         # The last count is noise.

@@ -1,5 +1,5 @@
-//! ROS 2 over DDS, without ROS: `node` joins a domain, `raw` carries messages as bytes, that all are decoded and checked
-//! as those of recordings are, `messages` has the types that recordings lack, `wire` is an arm behind topics.
+//! ROS 2 over DDS, without ROS: `node` joins a domain, `raw` carries messages as bytes, that all are decoded and
+//! checked as those of recordings are, `messages` has the types that recordings lack, `wire` is an arm behind topics.
 
 mod messages;
 mod node;
