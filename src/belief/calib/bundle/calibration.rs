@@ -16,7 +16,7 @@ use crate::calib::bundle::setup::{BundleSetup, declared};
 use crate::calib::bundle::tables::{camera_mount_table, covariance_with_mount, map_table, model_table, prior_table};
 use crate::calib::bundle::tags::freed::MovedTags;
 use crate::calib::bundle::touch_term::TouchUpdate;
-use crate::calib::bundle::verdict::VerdictInput;
+use crate::calib::bundle::verdict::{MAX_OUTLIERS, VerdictInput};
 use crate::calib::covariance::{ParameterCovariance, task_angles};
 use crate::calib::cross_validation::{FOLDS, Fold, FoldSums, fold_of};
 use crate::calib::error::CalibError;
@@ -455,8 +455,24 @@ fn unobservable(robot: &Robot, setup: &BundleSetup, estimate: &Estimate<'_>) -> 
     missing.map(Unobservable::distal).chain(setup.unobservable()).collect()
 }
 
+/// Observations that the held-out figures leave out: those that were rejected, where they are no more than good
+/// recordings have. Where they are more, it may be the arm that is wrong, and not they.
+fn left_out<'b>(all: &'b Estimate<'_>) -> &'b [Outlier] {
+    let share = all.outliers.len() as f64 / all.problem.observations.len().max(1) as f64;
+    if share <= MAX_OUTLIERS { &all.outliers } else { &[] }
+}
+
+/// A view without the observations that were rejected as a whole; `None` if it shows no other.
+fn without_rejected(view_idx: usize, mut view: View, outliers: &[Outlier]) -> Option<View> {
+    let is_rejected =
+        |id: u32| outliers.iter().any(|out| out.view_idx == view_idx && out.tag_id == id && out.corner.is_none());
+    view.tags.retain(|tag| !is_rejected(tag.id));
+    (!view.tags.is_empty()).then_some(view)
+}
+
 /// Held-out views by what was estimated from the other folds, with the hyperparameters of all; and by mount and map
-/// alone about `datasheet`.
+/// alone about `datasheet`. Observations that the fit of all views rejected are in neither: what a tag of another id
+/// is off by says nothing of the arm.
 fn cross_validated(
     input: &BundleInput<'_>,
     all: &Estimate<'_>,
@@ -466,7 +482,7 @@ fn cross_validated(
     let baseline = Baseline::new(datasheet, input.views);
     let mut innovations = Vec::new();
     for fold in 0..FOLDS {
-        let (fitted, mut held_out) = fold_of(input.views, fold);
+        let (fitted, held_out) = fold_of(input.views, fold);
         let part = BundleInput {
             views: &fitted,
             model: all.model.clone(),
@@ -476,12 +492,15 @@ fn cross_validated(
         };
         let Some(found) = estimate(&part) else { continue };
         let as_found = found.as_found(input.robot);
+        let places = held_out.into_iter().enumerate().map(|(n, view)| (n * FOLDS + fold, view));
+        let mut with_places: Vec<(usize, View)> = places
+            .filter_map(|(view_idx, view)| Some((view_idx, without_rejected(view_idx, view, left_out(all))?)))
+            .collect();
         // Where no sensor tells an angle, the view's own tags tell where to linearize, with nothing of other folds.
-        for view in &mut held_out {
+        for (_, view) in &mut with_places {
             set_by_camera(&as_found, view, &found.parameters());
         }
-        let with_places: Vec<(usize, View)> =
-            held_out.iter().enumerate().map(|(n, view)| (n * FOLDS + fold, view.clone())).collect();
+        let held_out: Vec<View> = with_places.iter().map(|(_, view)| view.clone()).collect();
         innovations.extend(found.innovations(&part, &with_places, &all.outliers));
         sums.add(&Fold {
             views: &found.as_read_now(&held_out),

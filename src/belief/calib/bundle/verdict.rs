@@ -56,7 +56,7 @@ const MAX_SIGMAS_OFF: f64 = 6.0;
 /// Sensors that move the tool by more than this many times its predicted error claim more than chance.
 const MAX_UNCONFIRMED: f64 = 3.0;
 /// Share of the tag observations that may be outliers.
-const MAX_OUTLIERS: f64 = 0.25;
+pub(crate) const MAX_OUTLIERS: f64 = 0.25;
 /// Over chi-square's quantile, for pixel noise has longer tails than a normal one and the tags' corners common errors.
 /// Measured.
 const TAILS: f64 = 1.5;

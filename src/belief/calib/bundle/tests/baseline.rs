@@ -9,7 +9,7 @@ use crate::calib::parameters::JointParameters;
 use crate::calib::refusal::Refusal;
 use crate::calib::result::calibration::{Calibration, Status};
 use crate::calib::views::calibration_data::{CalibrationData, HeldOut};
-use crate::calib::views::view::CaptureData;
+use crate::calib::views::view::{CaptureData, View};
 use armcal_core::routine::Method;
 
 const SEEDS: std::ops::Range<u64> = 7000..7020;
@@ -25,6 +25,8 @@ enum Sensors {
     OutOfCalibration,
     /// The readings belong to other views.
     Shuffled,
+    /// Within the datasheet's sigmas; in two views a tag is told as another one.
+    TagsMisread,
 }
 
 fn calibrated(sensors: Sensors, method: Method, seed: u64) -> Calibration {
@@ -35,7 +37,7 @@ fn calibrated(sensors: Sensors, method: Method, seed: u64) -> Calibration {
     let mut model = model_for(&robot, &[]);
     model.joints.iter_mut().for_each(|kinds| kinds.truncate(2));
     let mut truth = Truth::draw(&robot, &model, &scales, &mut rng);
-    if sensors != Sensors::OutOfCalibration {
+    if !matches!(sensors, Sensors::OutOfCalibration | Sensors::TagsMisread) {
         truth.parameters = JointParameters { reference: truth.parameters.reference, ..JointParameters::default() };
     }
     let mut views = views(&robot, &truth, &noise, N_VIEWS, &mut rng);
@@ -43,6 +45,11 @@ fn calibrated(sensors: Sensors, method: Method, seed: u64) -> Calibration {
         let mut readings: Vec<_> = views.iter().map(|view| view.travel_rad).collect();
         readings.shuffle(&mut rng);
         views.iter_mut().zip(readings).for_each(|(view, reading)| view.travel_rad = reading);
+    }
+    if sensors == Sensors::TagsMisread {
+        for view in views.iter_mut().skip(4).step_by(7).take(2) {
+            misread_a_tag(view, robot.tags.len());
+        }
     }
     let data = CalibrationData {
         name: "synthetic".to_owned(),
@@ -54,6 +61,13 @@ fn calibrated(sensors: Sensors, method: Method, seed: u64) -> Calibration {
         identified: Vec::new(),
     };
     calibrate_data(data, method, None).expect("a result")
+}
+
+/// The first tag of `view` gets the id of one that the view does not show.
+fn misread_a_tag(view: &mut View, n_tags: usize) {
+    let unseen = (0..n_tags).find(|tag_idx| view.tags.iter().all(|tag| tag.tag_idx != *tag_idx));
+    let tag_idx = unseen.expect("a tag that is not in view");
+    (view.tags[0].tag_idx, view.tags[0].id) = (tag_idx, titan().tags[tag_idx].id);
 }
 
 #[derive(Debug, Default)]
@@ -102,6 +116,18 @@ fn a_method_of_the_paper_is_refused_where_it_beats_nothing() {
     for method in [Method::MinimumDistance, Method::MinimumVariance] {
         let counts = counts(Sensors::AsDrawn, method);
         assert!(counts.no_better + 1 >= SEEDS.count(), "{method:?}: {counts:?}");
+    }
+}
+
+#[test]
+fn misread_tags_are_in_no_held_out_figure() {
+    for seed in SEEDS.take(5) {
+        let clean = calibrated(Sensors::OutOfCalibration, Method::Bundle, seed);
+        let misread = calibrated(Sensors::TagsMisread, Method::Bundle, seed);
+        let [clean_m, misread_m] = [&clean, &misread].map(|found| found.held_out.rms_m.expect("held-out tags"));
+        println!("seed {seed}: held out {:.2} mm, with misread tags {:.2} mm", 1e3 * clean_m, 1e3 * misread_m);
+        assert!(misread.outliers.len() >= 2, "{:?}", misread.outliers);
+        assert!((0.8..1.25).contains(&(misread_m / clean_m)), "{misread_m} m against {clean_m} m");
     }
 }
 
