@@ -51,7 +51,7 @@ impl JointParameters {
             ParameterKind::DriftPerH => self.terms[parameter.joint].drift_rad_per_h,
             ParameterKind::HalfBacklash => self.terms[parameter.joint].half_backlash_rad,
             // These are the sensors as they are now.
-            ParameterKind::StepBefore(_) => 0.0,
+            ParameterKind::StepBefore(_) | ParameterKind::WalkMode(_) => 0.0,
             ParameterKind::LinkShift(axis) => self.links[parameter.joint].shift_m[usize::from(axis)],
             ParameterKind::LinkTurn(axis) => self.links[parameter.joint].turn_rad[usize::from(axis)],
             ParameterKind::Compliance => self.links.sag.joint_rad_per_nm[parameter.joint],
@@ -71,7 +71,7 @@ impl JointParameters {
             ParameterKind::OffsetPerMpa => self.terms[parameter.joint].offset_rad_per_mpa = value,
             ParameterKind::DriftPerH => self.terms[parameter.joint].drift_rad_per_h = value,
             ParameterKind::HalfBacklash => self.terms[parameter.joint].half_backlash_rad = value,
-            ParameterKind::StepBefore(_) => {}
+            ParameterKind::StepBefore(_) | ParameterKind::WalkMode(_) => {}
             ParameterKind::LinkShift(axis) => self.links[parameter.joint].shift_m[usize::from(axis)] = value,
             ParameterKind::LinkTurn(axis) => self.links[parameter.joint].turn_rad[usize::from(axis)] = value,
             ParameterKind::Compliance => self.links.sag.joint_rad_per_nm[parameter.joint] = value,
@@ -134,6 +134,8 @@ pub enum ParameterKind {
     HalfBacklash,
     /// What the angle was more at the same reading before the sensor slipped: in views that end before this stamp, rad.
     StepBefore(Stamp),
+    /// A mode of the random walk that led to the offset as it is at the last view, rad.
+    WalkMode(u8),
     /// Of the joint's origin along an axis of its parent link, m.
     LinkShift(u8),
     /// Of the joint's attitude about an axis of its parent link, rad.
@@ -189,7 +191,7 @@ impl ParameterKind {
             Self::OffsetPerMpa => departure.pressure_mpa,
             Self::DriftPerH => departure.elapsed_h,
             Self::HalfBacklash => approach,
-            Self::StepBefore(_) => 0.0,
+            Self::StepBefore(_) | Self::WalkMode(_) => 0.0,
             Self::LinkShift(_) | Self::LinkTurn(_) => 0.0,
             Self::Compliance | Self::MountCompliance(_) | Self::ToolLoad => 0.0,
         }
@@ -234,7 +236,13 @@ impl Parameter {
         }
     }
 
-    /// Whether it tells of the sensor before it slipped, and not of the sensor as it is.
+    /// Whether it tells of the sensor as it was, and not as it is at the last view.
+    #[must_use]
+    pub fn is_past(self) -> bool {
+        self.is_step() || matches!(self.kind, ParameterKind::WalkMode(_))
+    }
+
+    /// Whether it tells of the sensor before it slipped.
     #[must_use]
     pub fn is_step(self) -> bool {
         matches!(self.kind, ParameterKind::StepBefore(_))
@@ -253,6 +261,7 @@ impl Parameter {
             ParameterKind::DriftPerH => "drift per h",
             ParameterKind::HalfBacklash => "half play",
             ParameterKind::StepBefore(_) => "step",
+            ParameterKind::WalkMode(k) => return format!("{} walk {}", robot.sensors[self.joint].joint, k + 1),
             ParameterKind::LinkShift(axis) => {
                 return format!("{} place {}", robot.sensors[self.joint].joint, AXES[usize::from(axis)]);
             }

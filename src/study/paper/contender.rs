@@ -102,6 +102,7 @@ fn bundle(draw: &Draw, guess: &JointParameters) -> Solution {
         tags: false,
         gripper_tag: false,
         time_offset: false,
+        walk: None,
     };
     let input = BundleInput {
         robot: &draw.robot,

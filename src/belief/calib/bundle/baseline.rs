@@ -52,6 +52,7 @@ impl Baseline {
             tags: true,
             gripper_tag: false,
             time_offset: false,
+            walk: None,
         };
         let mut scales = Hyperparameters::datasheet(robot);
         for (std_rad, spec) in scales.joint_std_rad.iter_mut().zip(&robot.sensors) {

@@ -168,7 +168,12 @@ impl<'a> BundleCalibration<'a> {
             self.data.data.fit = views;
             return self.calibrate();
         }
-        let (estimate, selections) = estimated.ok_or_else(|| self.nothing_observable())?;
+        let (mut estimate, mut selections) = estimated.ok_or_else(|| self.nothing_observable())?;
+        if self.purpose == EstimatePurpose::Final {
+            let walks;
+            (estimate, walks) = estimate.with_walks(&setup.input(), |joint| !setup.has_no_sensor(joint));
+            selections.extend(walks);
+        }
         let estimated = Estimated { setup, failures: &failures, estimate, selections, touches: None };
         let touches: &[Touch] = match self.purpose {
             EstimatePurpose::Final => &self.data.data.touches,
@@ -268,7 +273,7 @@ impl<'a> BundleCalibration<'a> {
         });
         let matrix = estimate.joint_covariance();
         let all = ParameterCovariance { parameters, matrix, residual_std_rad: Some(residual_std_rad) };
-        let covariance = all.without(|parameter| parameter.is_step());
+        let covariance = all.without(|parameter| parameter.is_past());
         Diagnosis { robot: estimate.as_found(&setup.applied.robot), views, held_out, innovations, covariance }
     }
 

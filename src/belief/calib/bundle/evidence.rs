@@ -10,6 +10,7 @@ use crate::calib::bundle::linearize::NormalEquations;
 use crate::calib::bundle::model::{Hyperparameters, SHAPE_LENGTH};
 use crate::calib::bundle::problem::{BundleProblem, State, WeightedMeasurement};
 use crate::calib::bundle::schur::N_VIEW_PARAMETERS;
+use crate::calib::bundle::walk_modes::mode_std;
 use crate::calib::parameters::ParameterKind;
 use armcal_core::joints::MAX_JOINTS;
 use armcal_core::numeric::Loss;
@@ -199,6 +200,16 @@ impl ScaleUpdate<'_, '_> {
             let sums = of_kinds(&shape, columns.clone(), problem.scales.shape_std_rad[joint]);
             if sums != Sums::default() {
                 next.shape_std_rad[joint] = sums.std(NU_SHAPE, first.shape_std_rad[joint], moment);
+            }
+        }
+        let walk = |kind: ParameterKind| match kind {
+            ParameterKind::WalkMode(k) => Some(mode_std(k)),
+            _ => None,
+        };
+        for (joint, columns) in layout.of_joint.iter().enumerate() {
+            let sums = of_kinds(&walk, columns.clone(), problem.scales.walk_std_rad[joint]);
+            if sums != Sums::default() {
+                next.walk_std_rad[joint] = sums.std(NU_TERM, first.walk_std_rad[joint], moment);
             }
         }
         self.update_links(next);
@@ -435,6 +446,7 @@ pub(crate) fn change(a: &Hyperparameters, b: &Hyperparameters) -> f64 {
         ];
         all.extend(s.joint_std_rad);
         all.extend(s.shape_std_rad);
+        all.extend(s.walk_std_rad);
         all.extend(s.link_std.iter().flatten());
         all.extend(s.compliance_std);
         all.extend(s.mount_scale);

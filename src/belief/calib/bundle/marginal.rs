@@ -11,8 +11,9 @@ use crate::calib::bundle::estimate::Estimate;
 use crate::calib::bundle::evidence::{Marginal, Posterior, ScaleTarget, joint_info, updated};
 use crate::calib::bundle::innovations::Innovations;
 use crate::calib::bundle::linearize::NormalEquations;
-use crate::calib::bundle::model::Hyperparameters;
+use crate::calib::bundle::model::{Hyperparameters, Model};
 use crate::calib::bundle::priors::mount_std;
+use armcal_core::joints::MAX_JOINTS;
 use armcal_core::numeric::Loss;
 use nalgebra::DMatrix;
 
@@ -37,7 +38,7 @@ impl Estimate<'_> {
         let factor = chi2 / (n - 2.0);
         self.marginal = Posterior::of(&problem, &normal).map(|posterior| Marginal {
             covariance: posterior.covariance * factor,
-            joint_std_rad: problem.scales.joint_std_rad.map(|std_rad| std_rad * factor.sqrt()),
+            joint_std_rad: error_std_rad(&self.model, &problem.scales).map(|std_rad| std_rad * factor.sqrt()),
             factor,
         });
     }
@@ -61,8 +62,16 @@ impl Estimate<'_> {
         self.marginal.as_ref().map_or(&self.posterior.covariance, |marginal| &marginal.covariance)
     }
 
-    /// What a joint is off at a new pose beyond its sensor's model, one sigma.
+    /// What a joint is off at a new pose beyond its sensor's model, one sigma; where offsets walk, as long after the last
+    /// view as the first one was before it.
     pub(crate) fn residual_std_rad(&self, joint: usize) -> f64 {
-        self.marginal.as_ref().map_or(&self.problem.scales.joint_std_rad, |marginal| &marginal.joint_std_rad)[joint]
+        let fitted = || error_std_rad(&self.model, &self.problem.scales);
+        self.marginal.as_ref().map_or_else(fitted, |marginal| marginal.joint_std_rad)[joint]
     }
+}
+
+/// Of each joint at a new pose: what is new in each view, and a walk as long as that during the views.
+fn error_std_rad(model: &Model, scales: &Hyperparameters) -> [f64; MAX_JOINTS] {
+    let walked = |joint: usize| if model.walk.is_some() { scales.walk_std_rad[joint] } else { 0.0 };
+    std::array::from_fn(|joint| scales.joint_std_rad[joint].hypot(walked(joint)))
 }

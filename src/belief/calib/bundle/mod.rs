@@ -42,6 +42,8 @@ mod tables;
 mod tags;
 mod touch_term;
 mod verdict;
+mod walk;
+mod walk_modes;
 
 pub use calibration_prior::{CalibrationPrior, MOUNT_ROWS, PriorConsistency, with_mount_rows};
 pub use estimate::{Estimate, LeastSquares, estimate, least_squares};

@@ -1,10 +1,12 @@
 //! What is estimated, and how large the things are that are not known exactly.
 
+use crate::calib::bundle::walk_modes::mode_std;
 use crate::calib::parameters::{Parameter, ParameterKind};
 use crate::calib::views::view::View;
 use armcal_core::joints::MAX_JOINTS;
 use armcal_core::robot::{JointSensorSpec, Robot};
 use armcal_core::sensor::{Conditions, N_SHAPE, shape_prior};
+use armcal_core::time::Stamp;
 
 /// Which parameters have a column.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,6 +28,8 @@ pub struct Model {
     pub gripper_tag: bool,
     /// How much later the joint sensors' stamps are than the camera's.
     pub time_offset: bool,
+    /// When the first and the last view end between which offsets walk at random; `None`: they do not.
+    pub walk: Option<[Stamp; 2]>,
 }
 
 /// Standard deviations that the data themselves may tell.
@@ -47,6 +51,8 @@ pub struct Hyperparameters {
     pub drift_std_rad_per_h: f64,
     /// Half of the backlash between joint and sensor shaft.
     pub half_play_std_rad: f64,
+    /// Of the random walk of each joint's offset from the first view to the last, rad.
+    pub walk_std_rad: [f64; MAX_JOINTS],
     /// Of each joint's place on its parent link: shift m, turn rad.
     pub link_std: [[f64; 2]; MAX_JOINTS],
     /// Of the joints' compliances, and of the base's on what carries it, rad/(N m).
@@ -98,6 +104,7 @@ impl Hyperparameters {
             offset_std_rad_per_mpa: 1e-4,
             drift_std_rad_per_h: 1e-3,
             half_play_std_rad: 2e-4,
+            walk_std_rad: joint_std_rad,
             link_std: [[robot.geometry.link_position_std_m, robot.geometry.link_rotation_std_rad]; MAX_JOINTS],
             compliance_std: [
                 robot.geometry.joint_compliance_std_rad_per_nm,
@@ -127,6 +134,7 @@ impl Hyperparameters {
             ParameterKind::DriftPerH => self.drift_std_rad_per_h,
             ParameterKind::HalfBacklash => self.half_play_std_rad,
             ParameterKind::StepBefore(_) => STEP_STD_RAD,
+            ParameterKind::WalkMode(k) => self.walk_std_rad[joint] * mode_std(k),
             ParameterKind::LinkShift(_) => self.link_std[joint][0],
             ParameterKind::LinkTurn(_) => self.link_std[joint][1],
             ParameterKind::Compliance => self.compliance_std[0],
@@ -220,6 +228,7 @@ pub(crate) fn model_of(robot: &Robot, scope: &Scope<'_>) -> Model {
         tags: true,
         gripper_tag: scope.gripper_tag,
         time_offset: scope.time_offset,
+        walk: None,
     }
 }
 

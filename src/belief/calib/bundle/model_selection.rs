@@ -27,6 +27,8 @@ pub enum OptionalTerm {
     TimeOffset,
     /// Of every joint's offset; only in long sessions without a prior.
     Drift,
+    /// A random walk of every joint's offset; only without a prior, and after failures and drawing.
+    Walk,
 }
 
 /// Whether a doubtful term came in, and what it brought.
@@ -101,6 +103,8 @@ fn with<'a>(input: &BundleInput<'a>, term: OptionalTerm) -> BundleInput<'a> {
                 }
             }
         }
+        // It is tried when all else is known (`walk`).
+        OptionalTerm::Walk => {}
     }
     wider
 }

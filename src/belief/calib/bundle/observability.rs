@@ -70,7 +70,7 @@ pub fn observability(input: &BundleInput<'_>) -> Option<Observability> {
     let kept = |column: usize| {
         layout.parameters.get(column).map_or_else(
             || !layout.tags.iter().flatten().any(|at| (*at..at + 6).contains(&column)),
-            |p| !matches!(p.kind, ParameterKind::Shape(_) | ParameterKind::StepBefore(_)) && !p.kind.is_of_body(),
+            |p| !matches!(p.kind, ParameterKind::Shape(_)) && !p.is_past() && !p.kind.is_of_body(),
         )
     };
     let wanted: Vec<usize> = (0..layout.n).filter(|&column| kept(column)).collect();

@@ -6,12 +6,14 @@ use nalgebra::{DMatrix, DVector, Isometry3, Vector3};
 
 use crate::calib::bundle::input::BundleInput;
 use crate::calib::bundle::model::{Hyperparameters, Model};
+use crate::calib::bundle::walk_modes::mode;
 use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
 use crate::calib::views::view::{MeanCorners, TagMeasurement, View};
 use armcal_core::joints::{JointAngles, MAX_JOINTS};
 use armcal_core::kinematics::{LinkCorrections, LinkPoses};
 use armcal_core::optics::CameraModel;
 use armcal_core::robot::Robot;
+use armcal_core::time::Stamp;
 
 /// Where each parameter's column is.
 #[derive(Clone, Debug, Default)]
@@ -411,10 +413,9 @@ fn view_data(
         let travel_rad = view.travel_rad[joint];
         let mut fixed = guess.correction(joint).angle_rad(spec, travel_rad, &departure, view.approach[joint]);
         for parameter in &layout.parameters[layout.of_joint[joint].clone()] {
-            let by = match parameter.kind {
-                ParameterKind::StepBefore(since) => f64::from(view.end < since),
-                kind => kind.angle_derivative(spec, travel_rad, &departure, view.approach[joint]),
-            };
+            let kind = parameter.kind;
+            let by = past_derivative(kind, input.model.walk, view.end)
+                .unwrap_or_else(|| kind.angle_derivative(spec, travel_rad, &departure, view.approach[joint]));
             fixed -= by * guess.get(*parameter);
             data.basis.push(by);
         }
@@ -425,6 +426,15 @@ fn view_data(
         data.reading_var[joint] = reading_std_rad.powi(2) / view.n_readings.max(1) as f64 + jitter_rad.powi(2);
     }
     data
+}
+
+/// d(angle)/d(parameter) in a view that ends at `end`, of what tells of the sensor as it was; `None` for all else.
+pub(crate) fn past_derivative(kind: ParameterKind, walk: Option<[Stamp; 2]>, end: Stamp) -> Option<f64> {
+    match kind {
+        ParameterKind::StepBefore(since) => Some(f64::from(end < since)),
+        ParameterKind::WalkMode(k) => Some(walk.map_or(0.0, |span| mode(k, span, end))),
+        _ => None,
+    }
 }
 
 /// `base` with the estimated parameters of `state`.

@@ -47,6 +47,7 @@ pub(crate) fn robust_start(input: &BundleInput<'_>) -> RobustStart {
         tags: false,
         gripper_tag: false,
         time_offset: false,
+        walk: None,
     };
     let (mut parameters, mut steps) = (input.guess, Vec::new());
     let mut iterations = 0;

@@ -11,6 +11,7 @@ use crate::calib::bundle::failure_detection::FailureSearch;
 use crate::calib::bundle::failures::Failure;
 use crate::calib::bundle::model::STEP_STD_RAD;
 use crate::calib::bundle::model_selection::log_evidence_of_all;
+use crate::calib::bundle::problem::past_derivative;
 use crate::calib::bundle::step_test::{OffsetPrior, StepCandidate};
 use crate::calib::parameters::{Parameter, ParameterKind};
 use crate::calib::views::view::View;
@@ -105,24 +106,26 @@ impl Estimate<'_> {
         Some((self.solved.state.joint[column], self.posterior.covariance[(column, column)].max(0.0).sqrt()))
     }
 
-    /// `views` with the readings that the sensors as they are now would have had before they slipped.
+    /// `views` with the readings that the sensors as they are at the last view would have had before they slipped or
+    /// walked.
     pub(crate) fn as_read_now(&self, views: &[View]) -> Vec<View> {
         let mut views = views.to_vec();
         let parameters = self.parameters();
         let sensors = parameters.sensors(self.problem.robot);
-        let mut steps = [0.0; MAX_JOINTS];
+        let past = self.joint_parameters().iter().zip(self.solved.state.joint.iter()).filter(|(p, _)| p.is_past());
+        let past: Vec<_> = past.collect();
+        let mut off = [0.0; MAX_JOINTS];
         for view in &mut views {
-            steps.fill(0.0);
-            for (step, step_rad) in self.problem.steps(&self.solved.state) {
-                if matches!(step.kind, ParameterKind::StepBefore(since) if view.end < since) {
-                    steps[step.joint] += step_rad;
-                }
+            off.fill(0.0);
+            for (parameter, value) in &past {
+                let by = past_derivative(parameter.kind, self.model.walk, view.end).unwrap_or(0.0);
+                off[parameter.joint] += by * *value;
             }
             let change = view.conditions.departure_from(&parameters.reference);
-            for (joint, step_rad) in steps.iter().enumerate().filter(|(_, step_rad)| **step_rad != 0.0) {
+            for (joint, off_rad) in off.iter().enumerate().filter(|(_, off_rad)| **off_rad != 0.0) {
                 let sensor = &sensors.models[joint];
                 let angle_rad = sensor.correction.angle_rad(&sensor.spec, view.travel_rad[joint], &change, 0.0);
-                view.travel_rad[joint] = sensor.travel_under_rad(angle_rad + step_rad, &change);
+                view.travel_rad[joint] = sensor.travel_under_rad(angle_rad + off_rad, &change);
             }
         }
         views

@@ -48,6 +48,7 @@ fn at_most_stated(fitted: &Hyperparameters, input: &BundleInput<'_>) -> Hyperpar
     for (joint, spec) in input.robot.sensors.iter().enumerate() {
         let linearity_std_rad = spec.linearity_std_rad.max(stated.joint_std_rad[joint]);
         scales.joint_std_rad[joint] = fitted.joint_std_rad[joint].min(linearity_std_rad);
+        scales.walk_std_rad[joint] = fitted.walk_std_rad[joint].min(stated.walk_std_rad[joint]);
         scales.shape_std_rad[joint] = fitted.shape_std_rad[joint].min(linearity_std_rad);
         for (std, stated) in scales.link_std[joint].iter_mut().zip(stated.link_std[joint]) {
             *std = std.min(stated);

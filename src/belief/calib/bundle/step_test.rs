@@ -46,15 +46,15 @@ const LEAST_TOLD: f64 = 0.01;
 const SATURATED: f64 = 1.0 - 1e-6;
 
 /// A joint's error in one view.
-struct JointError {
-    view_idx: usize,
-    error_rad: f64,
+pub(crate) struct JointError {
+    pub view_idx: usize,
+    pub error_rad: f64,
     /// Inverse of the prior's variance.
-    weight: f64,
+    pub weight: f64,
     /// Posterior variance where the common parameters are known.
-    own_var: f64,
+    pub own_var: f64,
     /// Derivative by the common parameters.
-    by_common: DVector<f64>,
+    pub by_common: DVector<f64>,
     /// Share of the prior's variance that the view takes away.
     told: f64,
 }
@@ -97,7 +97,7 @@ impl Estimate<'_> {
     }
 
     /// Of each joint before the camera, in the views that tell of it.
-    fn joint_errors(&self, views: &[usize]) -> Vec<Vec<JointError>> {
+    pub(crate) fn joint_errors(&self, views: &[usize]) -> Vec<Vec<JointError>> {
         let problem = &self.problem;
         let mut first_group = Vec::with_capacity(problem.views.len());
         let mut n_groups = 0;

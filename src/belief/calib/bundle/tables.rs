@@ -21,6 +21,7 @@ pub(crate) fn model_table(robot: &Robot, found: &Estimate<'_>, selections: &[Sel
         OptionalTerm::CameraError => "camera error shared by a view",
         OptionalTerm::TimeOffset => "time offset",
         OptionalTerm::Drift => "drift",
+        OptionalTerm::Walk => "random walk of offsets",
     };
     let decided =
         |s: &Selection| format!("{}: {}, {:+.1} nats", name(s.term), if s.is_in { "in" } else { "out" }, s.gain_nats);

@@ -40,6 +40,7 @@ fn case(robot: Robot, seed: u64) -> Case {
         tags: true,
         gripper_tag: robot.gripper_tag.is_some(),
         time_offset: true,
+        walk: None,
     };
     let truth = Truth::draw(&robot, &model, &scales, &mut rng);
     let noise = Noise { corner_px: 0.3, n_frames: 5, joint_rad: [1e-3; MAX_JOINTS] };

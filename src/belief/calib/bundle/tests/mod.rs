@@ -16,4 +16,5 @@ mod slips;
 mod small_samples;
 mod statistics;
 mod touches;
+mod walks;
 mod within_sigmas;

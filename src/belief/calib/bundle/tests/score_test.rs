@@ -55,6 +55,7 @@ pub(super) fn views_of_changed(
         tags: true,
         gripper_tag: false,
         time_offset: false,
+        walk: None,
     };
     let noise = Noise { corner_px: 0.3, n_frames: 8, joint_rad: scales.joint_std_rad };
     let first = Truth::draw(robot, &model, &scales, &mut rng);

@@ -51,6 +51,7 @@ pub(super) fn case(robot: &Robot, seed: u64, n_views: usize) -> Case<'_> {
         tags: true,
         gripper_tag: robot.gripper_tag.is_some(),
         time_offset: false,
+        walk: None,
     };
     let noise = Noise { corner_px: 0.3, n_frames: N_FRAMES, joint_rad: scales.joint_std_rad };
     let drawn = Truth::draw(robot, &model, &scales, &mut rng);

@@ -58,6 +58,7 @@ fn case(robot: &Robot, seed: u64, change: impl FnOnce(&mut Robot, &mut Truth)) -
         tags: true,
         gripper_tag: false,
         time_offset: false,
+        walk: None,
     };
     let noise = Noise { corner_px: 0.3, n_frames: 8, joint_rad: scales.joint_std_rad };
     let mut real = built(robot, &mut rng);

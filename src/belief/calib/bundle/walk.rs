@@ -1,0 +1,113 @@
+//! Offsets that walk at random while the views are captured: found, and estimated as they are at the last view.
+//!
+//! Columns for the modes of a walk (`walk_modes`) cost time, so two figures of the estimate without them ask first: how
+//! much more than stated the offsets change with temperature, for that takes up what walks one way; and a score test of
+//! the walk's variance. With `z` and `I` of the joint's errors, all else eliminated (`step_test`),
+//! `T = sum_k l_k (phi_k^T z)^2` has the mean `sum_k l_k A_kk` and the variance `2 sum_kl l_k l_l A_kl^2` where nothing
+//! walks, `A = phi^T I phi` (Lin 1997). Then the evidence decides. What the offsets do afterwards no view tells: as much
+//! again as during the views is added to each joint's error.
+
+use crate::calib::bundle::estimate::{Estimate, estimate};
+use crate::calib::bundle::input::BundleInput;
+use crate::calib::bundle::model_selection::{OptionalTerm, Selection, evidence_gain_nats};
+use crate::calib::bundle::walk_modes::{N_WALK_MODES, mode, mode_std};
+use crate::calib::parameters::ParameterKind;
+use crate::calib::views::view::View;
+use armcal_core::joints::MAX_JOINTS;
+use armcal_core::time::Stamp;
+use nalgebra::{DVector, SMatrix, SVector};
+
+/// Fewer views do not tell a walk from anything else.
+const MIN_VIEWS: usize = 8;
+/// So few views tell little before columns are tried, and the trial is quick.
+const FEW_VIEWS: usize = 20;
+/// Columns are tried where offsets change with temperature by more than so many times what is stated: no good arm of 60.
+const WARMTH_WORTH_A_FIT: f64 = 1.6;
+/// Or where the score test's statistic lies so many of its standard deviations above its mean: one good arm of 60.
+const SCORE_WORTH_A_FIT: f64 = 3.0;
+/// A walk that is missed is an error beyond its bound, one too many a bound that is too wide. Good arms lose two nats or
+/// more by it (60 of 60), arms that walk by half a centimetre at the tool gain some.
+const MIN_WALK_NATS: f64 = 0.0;
+
+/// When the first and the last of `views` end; `None` for views that all end together.
+pub(crate) fn span(views: &[View]) -> Option<[Stamp; 2]> {
+    let ends = || views.iter().map(|view| view.end);
+    let (first, last) = (ends().min()?, ends().max()?);
+    (last > first).then_some([first, last])
+}
+
+impl<'a> Estimate<'a> {
+    /// This estimate, or one with walks of the offsets where the views ask for them; and what that brought, where it was
+    /// tried. `input` is what this estimate was made from, but for the terms that were chosen.
+    pub(crate) fn with_walks(
+        self,
+        input: &BundleInput<'a>,
+        has_sensor: impl Fn(usize) -> bool,
+    ) -> (Self, Option<Selection>) {
+        if input.joint_prior.is_some() || input.views.len() < MIN_VIEWS {
+            return (self, None);
+        }
+        let Some(span) = span(input.views) else { return (self, None) };
+        let warmth = self.scales().offset_std_rad_per_k / input.scales.offset_std_rad_per_k;
+        let is_quick = input.views.len() < FEW_VIEWS;
+        if !is_quick && warmth < WARMTH_WORTH_A_FIT && !self.walks_seem_likely(input.views, span) {
+            return (self, None);
+        }
+        let mut wider = BundleInput { model: self.model.clone(), ..input.clone() };
+        if self.scales().camera_error_std.is_some() {
+            wider.scales.camera_error_std = self.scales().camera_error_std;
+        }
+        wider.model.walk = Some(span);
+        wider.scales.walk_std_rad = self.first_walk_std_rad(input.views);
+        for (joint, kinds) in wider.model.joints.iter_mut().enumerate() {
+            if !kinds.is_empty() && has_sensor(joint) {
+                kinds.extend((0..N_WALK_MODES as u8).map(ParameterKind::WalkMode));
+            }
+        }
+        let Some(found) = estimate(&wider) else { return (self, None) };
+        let gain_nats = evidence_gain_nats(&found, &self);
+        // One that rejects more explains less.
+        let is_in = gain_nats > MIN_WALK_NATS && found.outliers.len() <= self.outliers.len();
+        let selection = Selection { term: OptionalTerm::Walk, is_in, gain_nats };
+        (if is_in { found } else { self }, Some(selection))
+    }
+
+    /// What a walk is tried with, rad: twice what each joint is off in each view, or what warmth was credited with. From
+    /// much smaller sizes the fit ends where all of it is new in each view.
+    fn first_walk_std_rad(&self, views: &[View]) -> [f64; MAX_JOINTS] {
+        let oil_c = || views.iter().filter_map(|view| view.conditions.oil_c);
+        let warmed_k = oil_c().fold(f64::NEG_INFINITY, f64::max) - oil_c().fold(f64::INFINITY, f64::min);
+        let by_warmth_rad = self.scales().offset_std_rad_per_k * warmed_k.max(0.0);
+        self.scales().joint_std_rad.map(|std_rad| (2.0 * std_rad).max(by_warmth_rad))
+    }
+
+    fn walks_seem_likely(&self, views: &[View], span: [Stamp; 2]) -> bool {
+        let all: Vec<usize> = (0..views.len()).collect();
+        self.joint_errors(&all).iter().any(|errors| {
+            let mut score = SVector::<f64, N_WALK_MODES>::zeros();
+            let mut information = SMatrix::<f64, N_WALK_MODES, N_WALK_MODES>::zeros();
+            let mut by_common = vec![DVector::zeros(self.problem.layout.n); N_WALK_MODES];
+            for error in errors {
+                let phi = SVector::<f64, N_WALK_MODES>::from_fn(|k, _| mode(k as u8, span, views[error.view_idx].end));
+                score += phi * (error.weight * error.error_rad);
+                information += phi * phi.transpose() * (error.weight - error.weight.powi(2) * error.own_var);
+                for (sum, phi) in by_common.iter_mut().zip(phi.iter()) {
+                    sum.axpy(error.weight * phi, &error.by_common, 1.0);
+                }
+            }
+            let propagated: Vec<DVector<f64>> = by_common.iter().map(|by| &self.posterior.covariance * by).collect();
+            information -= SMatrix::<f64, N_WALK_MODES, N_WALK_MODES>::from_fn(|k, l| by_common[k].dot(&propagated[l]));
+            sigmas(&score, &information) > SCORE_WORTH_A_FIT
+        })
+    }
+}
+
+/// How many of its standard deviations the statistic of a walk lies above its mean.
+fn sigmas(score: &SVector<f64, N_WALK_MODES>, information: &SMatrix<f64, N_WALK_MODES, N_WALK_MODES>) -> f64 {
+    let by_mode = SVector::<f64, N_WALK_MODES>::from_fn(|k, _| mode_std(k as u8).powi(2));
+    let statistic: f64 = (0..N_WALK_MODES).map(|k| by_mode[k] * score[k].powi(2)).sum();
+    let mean: f64 = (0..N_WALK_MODES).map(|k| by_mode[k] * information[(k, k)]).sum();
+    let pairs = (0..N_WALK_MODES).flat_map(|k| (0..N_WALK_MODES).map(move |l| (k, l)));
+    let variance: f64 = 2.0 * pairs.map(|(k, l)| by_mode[k] * by_mode[l] * information[(k, l)].powi(2)).sum::<f64>();
+    if variance > 0.0 { (statistic - mean) / variance.sqrt() } else { 0.0 }
+}
