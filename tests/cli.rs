@@ -3,6 +3,7 @@
 mod campaigns;
 mod inputs;
 mod inspect;
+mod live_view;
 mod long;
 mod output;
 mod recordings;

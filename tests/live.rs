@@ -110,6 +110,27 @@ fn a_run_whose_arm_dies_stops_and_keeps_its_recording() {
     assert!(recording.messages.iter().any(|(_, message)| is_told(message)), "the recording does not say why it ends");
 }
 
+/// A camera without a detector node: tags are found in the images that come over the wire.
+#[test]
+#[ignore = "needs user namespaces"]
+fn images_of_a_served_camera_are_searched_for_tags() {
+    let out = temp();
+    let routine = root().join("routines/titan4-rendered.toml");
+    // Rendering on a busy machine holds up the readings.
+    connection(out.path(), "detections = \"\"\n[guard]\nready_s = 10.0\nstale_s = 5.0\n");
+    let script = "$ARMCAL serve $ROUTINE --arm arm.toml 2>serve.log & SERVER=$!; \
+                  $ARMCAL run $ROUTINE --arm ros2:arm.toml --no-motion; CODE=$?; \
+                  kill -INT $SERVER; wait $SERVER; exit $CODE";
+    let said = in_namespace(out.path(), &routine, script);
+    said.expect("run --no-motion", 0, &[]);
+    let words: Vec<&str> = said.stderr.split_whitespace().collect();
+    let before =
+        |word: &str| words.windows(2).find(|pair| pair[1] == word).and_then(|pair| pair[0].parse::<u32>().ok());
+    let (images, tags) = (before("images").expect("images"), before("tags").expect("tags"));
+    assert!(images >= 3 && tags >= images, "{}", said.stderr);
+    assert!(!said.stderr.contains("of no use"), "{}", said.stderr);
+}
+
 /// An arm by another middleware, in another language: it is read, it moves no faster than it may, and Ctrl-C stops it.
 #[test]
 #[ignore = "needs user namespaces and Python's cyclonedds"]

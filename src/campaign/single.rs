@@ -6,7 +6,7 @@ use crate::campaign::row::one_line;
 use crate::campaign::{CampaignError, Job, Prepared, Row, RunStatus};
 use crate::output::OutputFolder;
 use crate::report::RunSummary;
-use crate::run::{Failure, Finished, Keep, RunError, RunInputs, execute};
+use crate::run::{Failure, Finished, Keep, RunError, RunInputs, RunOutput, execute};
 use armcal_belief::calib::Status;
 use armcal_belief::session::Progress;
 
@@ -63,7 +63,7 @@ fn in_folder(
         let _ = std::fs::remove_dir_all(folder);
     }
     let (output, _) = OutputFolder::open(folder).map_err(Failure::of_output)?;
-    execute(inputs, job.seed, &output, keep, progress)
+    execute(inputs, job.seed, RunOutput { folder: &output, keep, listener: None }, progress)
 }
 
 fn of_finished(run: &SingleRun<'_>, job: &Job, finished: &Finished) -> Row {

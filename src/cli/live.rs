@@ -2,14 +2,19 @@
 
 #[cfg(feature = "live")]
 mod connected;
+#[cfg(feature = "live")]
+mod nudging;
 
 use clap::Args;
 
 use crate::cli::exit::UsageError;
+use crate::cli::interrupt::Interrupt;
 #[cfg(feature = "live")]
 pub(super) use connected::ConnectedArm;
 #[cfg(not(feature = "live"))]
 pub(super) use unconnected::ConnectedArm;
+
+use armcal_core::robot::Robot;
 
 #[derive(Debug, Args)]
 pub(super) struct LiveArgs {
@@ -22,6 +27,9 @@ pub(super) struct LiveArgs {
     /// Listen to the arm, say what is heard, and move nothing
     #[arg(long, requires = "arm")]
     pub no_motion: bool,
+    /// First move one joint after the other by one degree and back, each after a yes, and go on only where all follow
+    #[arg(long, requires = "arm", conflicts_with_all = ["unattended", "no_motion"])]
+    nudge: bool,
     /// Drive every joint at this share of the rate that the robot's file allows
     #[arg(long, requires = "arm", value_name = "SHARE", default_value_t = 1.0, value_parser = share)]
     speed: f64,
@@ -36,6 +44,11 @@ impl LiveArgs {
     /// Whether the operator is asked: always, unless it is written out that nobody is there.
     pub fn is_attended(&self) -> bool {
         self.arm.is_some() && !self.unattended
+    }
+
+    /// Tries each joint by one degree, where that is asked for.
+    pub fn nudge(&self, arm: &mut ConnectedArm, robot: &Robot, interrupt: &Interrupt) -> anyhow::Result<()> {
+        if self.nudge { arm.nudge(robot, interrupt) } else { Ok(()) }
     }
 
     /// Connects to the arm, where one is named, and says what was heard of it.
@@ -63,9 +76,10 @@ mod unconnected {
     use std::path::Path;
 
     use super::not_built;
-    use crate::output::OutputFolder;
-    use crate::run::{Failure, Finished, RunInputs};
+    use crate::cli::interrupt::Interrupt;
+    use crate::run::{Failure, Finished, RunInputs, RunOutput};
     use armcal_belief::session::Progress;
+    use armcal_core::robot::Robot;
 
     /// There is none.
     pub enum ConnectedArm {}
@@ -75,11 +89,15 @@ mod unconnected {
             Err(not_built("--arm"))
         }
 
+        pub fn nudge(&mut self, _: &Robot, _: &Interrupt) -> anyhow::Result<()> {
+            match *self {}
+        }
+
         pub fn execute(
             self,
             _: &RunInputs,
             _: u64,
-            _: &OutputFolder,
+            _: RunOutput<'_>,
             _: &mut dyn Progress,
         ) -> Result<Finished, Failure> {
             match self {}

@@ -20,6 +20,7 @@ mod inspect;
 mod interrupt;
 #[cfg(feature = "sim")]
 mod live;
+mod live_view;
 mod losses;
 mod new_robot;
 mod overrides;

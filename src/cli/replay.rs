@@ -6,6 +6,7 @@ use anyhow::{Context, Result};
 use clap::Args;
 
 use crate::cli::exit::{Exit, UsageError};
+use crate::cli::live_view::LiveViewArgs;
 use crate::cli::losses::warn_of_losses;
 use crate::cli::stdout::{note, say};
 use crate::output;
@@ -17,7 +18,7 @@ use armcal_core::log::{Recording, Stream, read_attachments};
 use armcal_core::robot::{self, Robot, Vehicle};
 use armcal_core::routine::{self, Scene};
 use armcal_core::time::Stamp;
-use armcal_replay::{ReplayInput, open_viewer, read_for_replay, write_rrd};
+use armcal_replay::{ReplayInput, open_viewer, read_for_replay, show_recording, write_rrd};
 
 #[derive(Debug, Args)]
 pub(super) struct ReplayArgs {
@@ -27,6 +28,8 @@ pub(super) struct ReplayArgs {
     /// Write this .rrd file instead of opening the viewer
     #[arg(long)]
     save: Option<PathBuf>,
+    #[command(flatten)]
+    view: LiveViewArgs,
     /// Folder of the robot, where the recording does not carry its drawings
     #[arg(long)]
     robot: Option<PathBuf>,
@@ -51,14 +54,16 @@ pub(super) fn replay(args: &ReplayArgs) -> Result<Exit> {
         online: online.as_ref(),
         summary_markdown: None,
     };
-    match &args.save {
-        Some(out) => {
+    match (&args.view.live, &args.save) {
+        (Some(_), Some(_)) => return Err(UsageError("--live and --save: only one of them".to_owned()).into()),
+        (Some(address), None) => show_recording(&input, address)?,
+        (None, Some(out)) => {
             let growing = output::Beside::begin(out)?;
             write_rrd(&input, growing.grows_at())?;
             growing.put_in_place()?;
             say(&format!("written      {}", out.display()))?;
         }
-        None => {
+        (None, None) => {
             let folder = tempfile::tempdir().context("no temporary folder can be made")?.keep();
             let out = folder.join("replay.rrd");
             write_rrd(&input, &out)?;

@@ -1,7 +1,7 @@
 //! `armcal run`: the closed loop on a simulated arm, or on a real one.
 
 use std::path::{Path, PathBuf};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use anyhow::Result;
 use clap::Args;
@@ -11,12 +11,13 @@ use crate::cli::confirm::Confirm;
 use crate::cli::exit::{Exit, of_summary};
 use crate::cli::interrupt::Interrupt;
 use crate::cli::live::LiveArgs;
+use crate::cli::live_view::{LiveViewArgs, OpenView, ViewOf};
 use crate::cli::overrides::OverrideArgs;
 use crate::cli::progress::Bar;
 use crate::cli::stdout::note;
 use crate::output::OutputFolder;
 use crate::report::table;
-use crate::run::{Failure, Keep, RunInputs, execute};
+use crate::run::{Failure, Keep, RunInputs, RunOutput, execute};
 use armcal_belief::session::Progress;
 
 #[derive(Debug, Args)]
@@ -35,15 +36,21 @@ pub(super) struct RunArgs {
     #[command(flatten)]
     live: LiveArgs,
     #[command(flatten)]
+    view: LiveViewArgs,
+    #[command(flatten)]
     overrides: OverrideArgs,
 }
 
 pub(super) fn run(args: &RunArgs) -> Result<Exit> {
     let started = Instant::now();
     let mut inputs = RunInputs::load(&args.routine, &args.overrides.overrides())?;
-    let arm = args.live.connect(&mut inputs)?;
+    let mut arm = args.live.connect(&mut inputs)?;
     if args.live.no_motion {
         return Ok(Exit::Ok);
+    }
+    let interrupt = Interrupt::install()?;
+    if let Some(arm) = &mut arm {
+        args.live.nudge(arm, &inputs.robot, &interrupt)?;
     }
     let seed = args.seed.unwrap_or(inputs.routine.seed);
     let out = args.out.clone().unwrap_or_else(|| Path::new("recordings").join(&inputs.routine.name));
@@ -54,12 +61,16 @@ pub(super) fn run(args: &RunArgs) -> Result<Exit> {
             kept.display()
         ));
     }
-    let mut bar = Bar::new(started, Interrupt::install()?);
+    let mut bar = Bar::new(started, interrupt);
+    let of = ViewOf { robot: &inputs.robot, vehicle: Some(&inputs.vehicle), scene: Some(&inputs.routine.scene) };
+    let view = args.view.open(&of)?;
+    let listener = view.as_ref().map(|view| view.listener(Duration::ZERO));
     let run = |progress: &mut dyn Progress| {
-        if let Some(arm) = arm {
-            return arm.execute(&inputs, seed, &output, progress);
+        let output = RunOutput { folder: &output, keep: Keep::Everything, listener };
+        match arm {
+            Some(arm) => arm.execute(&inputs, seed, output, progress),
+            None => execute(&inputs, seed, output, progress),
         }
-        execute(&inputs, seed, &output, Keep::Everything, progress)
     };
     let result = if args.confirm || args.live.is_attended() {
         run(&mut Confirm::new(&mut bar, std::io::stdin().lock()))
@@ -67,6 +78,7 @@ pub(super) fn run(args: &RunArgs) -> Result<Exit> {
         run(&mut bar)
     };
     bar.finish();
+    view.into_iter().for_each(OpenView::end);
     let finished = result.map_err(explained)?;
     if let Some(why) = &finished.replay_failure {
         note(format_args!("warning: there is no replay, all other files are whole: {why}"));

@@ -10,6 +10,7 @@ use crate::cli::belief_text::{belief, exit_of, line, summary};
 use crate::cli::calibration_inputs::{CalibrationInputs, load_robot};
 use crate::cli::exit::{Exit, UsageError};
 use crate::cli::interrupt::Interrupt;
+use crate::cli::live_view::{LiveViewArgs, OpenView, ViewOf};
 use crate::cli::losses::warn_of_losses;
 use crate::cli::stdout::{note, say};
 use crate::output;
@@ -21,6 +22,8 @@ use armcal_core::routine::Method;
 use armcal_core::streams::Message;
 use armcal_core::time::Stamp;
 
+/// A recording that was there before is read faster than a viewer takes it: it is waited for so long in all.
+const VIEWER_PATIENCE: Duration = Duration::from_secs(20);
 /// Between two looks at the file.
 const POLL: Duration = Duration::from_millis(500);
 
@@ -52,6 +55,8 @@ pub(super) struct WatchArgs {
     /// Seconds without anything new after which the recording counts as ended; 0: never
     #[arg(long, default_value_t = 60, value_name = "SECONDS")]
     idle_s: u64,
+    #[command(flatten)]
+    view: LiveViewArgs,
 }
 
 pub(super) fn watch(args: &WatchArgs) -> Result<Exit> {
@@ -72,9 +77,14 @@ pub(super) fn watch(args: &WatchArgs) -> Result<Exit> {
     let map = TopicMap::default();
     let mut patience = Patience::new(args.idle_s, Interrupt::install()?);
     let recording = opened(&args.recording, &map, &mut patience)?;
+    let view = args.view.open(&ViewOf { robot: &robot, vehicle: None, scene: None })?;
+    let mut show = view.as_ref().map(|view| view.listener(VIEWER_PATIENCE));
     let (rest, taken_away) = follow(recording, &robot, &mut patience, &mut |log_time, message| {
+        show.iter_mut().for_each(|show| show(log_time, message));
         listener.push(log_time, message, &mut |follower, events| told.hear(follower, events));
     })?;
+    drop(show);
+    view.into_iter().for_each(OpenView::end);
     let by_data = if warn_of_losses(&rest) { Exit::DataLost } else { Exit::Ok };
     if !rest.joint_names.is_empty() {
         check_joints(&rest, &robot)?;

@@ -29,7 +29,7 @@ pub struct Connection {
     pub commands: Commands,
     /// `apriltag_msgs/msg/AprilTagDetectionArray`; empty where there is none, as all below.
     pub detections: String,
-    /// `sensor_msgs/msg/CompressedImage`, recorded only.
+    /// `sensor_msgs/msg/CompressedImage`, JPEG; searched for tags where nobody publishes detections.
     pub images: String,
     /// `sensor_msgs/msg/Temperature`.
     pub oil_temperature: String,
@@ -252,6 +252,12 @@ impl Connection {
         ];
         named.extend(self.deadman.as_ref().map(|deadman| ("deadman.topic", deadman.topic.as_str())));
         named
+    }
+
+    /// Whether tags are looked for in the images: there are images, and nobody else does.
+    #[must_use]
+    pub fn searches_images(&self) -> bool {
+        self.detections.is_empty() && !self.images.is_empty()
     }
 
     /// The driver's name of a joint.

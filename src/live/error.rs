@@ -14,6 +14,8 @@ pub enum LiveError {
     NotReady(String),
     #[error("a message cannot be written: {0}")]
     Encode(#[from] armcal_core::log::EncodeError),
+    #[error("no thread can be started: {0}")]
+    Thread(#[source] std::io::Error),
 }
 
 impl LiveError {

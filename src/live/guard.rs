@@ -45,6 +45,8 @@ pub(crate) struct Guard {
     joints: Vec<String>,
     nominal: ArmSensors,
     counts_per_rad: Vec<f64>,
+    /// Whether counts rise, 1, or fall, -1, with the angle.
+    senses: Vec<f64>,
     wrap_counts: Vec<f64>,
     /// Least and greatest angle that a set-point may mean by the nominal sensor.
     range_rad: Vec<[f64; 2]>,
@@ -71,6 +73,7 @@ impl Guard {
             joints: robot.joint_names(),
             nominal: ArmSensors::nominal(robot),
             counts_per_rad: robot.sensors.iter().map(|sensor| sensor.counts_per_rad.abs()).collect(),
+            senses: robot.sensors.iter().map(|sensor| sensor.counts_per_rad.signum()).collect(),
             wrap_counts: robot.sensors.iter().map(|sensor| sensor.wrap_counts).collect(),
             range_rad: robot.sensors.iter().map(range).collect(),
             last: None,
@@ -96,6 +99,22 @@ impl Guard {
     /// Reading of a joint, so far from another one.
     pub fn moved(&self, joint: usize, from: f64, way_rad: f64) -> f64 {
         (from + way_rad * self.counts_per_rad[joint]).rem_euclid(self.wrap_counts[joint])
+    }
+
+    /// Turn of a joint from one reading to another, rad, by the drawing's sense.
+    pub fn turn_rad(&self, joint: usize, from: f64, to: f64) -> f64 {
+        self.senses[joint] * self.way_rad(joint, from, to)
+    }
+
+    /// Reading of a joint, turned by so much from another one.
+    pub fn turned(&self, joint: usize, from: f64, turn_rad: f64) -> f64 {
+        self.moved(joint, from, self.senses[joint] * turn_rad)
+    }
+
+    /// The sense, 1 or -1, in which a joint turns towards the middle of its range.
+    pub fn inward(&self, joint: usize, counts: &JointCounts) -> f64 {
+        let [low, high] = self.range_rad[joint];
+        (0.5 * (low + high) - self.nominal.angles(counts)[joint]).signum()
     }
 
     /// A set-point before it is sent.

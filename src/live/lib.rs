@@ -2,16 +2,21 @@
 //!
 //! `connection` reads arm.toml: which topics carry what, and the limits of the guard. `wire` is what a connection
 //! carries, `ros2` that over DDS. [`LiveArm`] is an `Arm` on any wire: it paces a session by the arm's own readings and
-//! stops when `guard` says so. [`serve`] puts any `Arm`, such as the simulated one, behind the topics of a connection.
+//! stops when `guard` says so; `nudge` has its first set-points, and `tag_check`
+//! compares the tags in view with the datasheet before them. [`ImageSearch`] looks for tags in a wire's images.
+//! [`serve`] puts any `Arm`, such as the simulated one, behind the topics of a connection.
 //! None of this is a safety device.
 #![warn(missing_docs)]
 
 mod connection;
 mod error;
 mod guard;
+mod image_search;
 mod live_arm;
+mod nudge;
 mod ros2;
 mod server;
+mod tag_check;
 #[cfg(test)]
 mod tests;
 mod wire;
@@ -19,9 +24,12 @@ mod wire;
 pub use connection::{CommandType, Commands, Connection, Deadman, GuardLimits, ServiceMapping, StopWays};
 pub use error::LiveError;
 pub use guard::StopReason;
+pub use image_search::{ImageSearch, TagFinder};
 pub use live_arm::{LiveArm, Survey};
+pub use nudge::{Nudge, NudgeProblem};
 pub use ros2::Ros2Wire;
 pub use server::{Pace, Served, serve};
+pub use tag_check::TagCheck;
 pub use wire::{Heard, Wire};
 
 /// The ROS 2 distribution that this build speaks with: it decides the layout of identifiers on the network.

@@ -1,11 +1,15 @@
 //! A real arm as sessions know arms: paced by its own readings, and stopped by the guard.
 
+use std::collections::BTreeMap;
 use std::time::Duration;
 
 use crate::guard::{Guard, StopReason};
+use crate::tag_check::{TagCheck, check_tags};
 use crate::{Connection, Heard, LiveError, Wire};
 use armcal_core::robot::Robot;
-use armcal_core::streams::{Arm, ArmError, JointCounts, JointSensorSample, LogLevel, LogLine, Message, Sink};
+use armcal_core::streams::{
+    Arm, ArmError, JointCounts, JointSensorSample, LogLevel, LogLine, Message, Sink, TagDetection,
+};
 use armcal_core::time::Stamp;
 
 /// The longest wait for messages before silence is looked at again.
@@ -66,6 +70,18 @@ pub struct Survey {
     pub tags: usize,
     /// Messages that could not be used, and what was wrong with the last of them.
     pub unusable: Option<(u64, String)>,
+    /// The latest detection of each tag.
+    pub detections: BTreeMap<u32, TagDetection>,
+    /// Whether known tags are where they may be; `None` where none is in view.
+    pub tag_check: Option<TagCheck>,
+}
+
+impl Survey {
+    fn new() -> Self {
+        let (seconds, readings, images, tags) = (0.0, 0, 0, 0);
+        let (counts, detections) = (JointCounts::zeros(0), BTreeMap::new());
+        Self { seconds, readings, counts, images, tags, unusable: None, detections, tag_check: None }
+    }
 }
 
 impl<W: Wire> LiveArm<W> {
@@ -76,7 +92,9 @@ impl<W: Wire> LiveArm<W> {
     pub fn connect(mut wire: W, robot: &Robot, connection: &Connection) -> Result<(Self, Survey), LiveError> {
         let limits = connection.guard;
         let mut guard = Guard::new(robot, limits, connection.deadman.as_ref());
-        let survey = listen(&mut wire, &mut guard, connection)?;
+        let mut survey = listen(&mut wire, &mut guard, connection)?;
+        let detections: Vec<_> = survey.detections.values().cloned().collect();
+        survey.tag_check = check_tags(robot, &survey.counts, &detections)?;
         let now = guard.latest().map_or(Stamp { nanos: 0 }, |sample| sample.stamp);
         let left_at = wire.elapsed();
         let arm = Self {
@@ -126,6 +144,22 @@ impl<W: Wire> LiveArm<W> {
     #[must_use]
     pub fn unusable(&self) -> u64 {
         self.unusable
+    }
+
+    /// The newest reading.
+    pub(crate) fn reading(&self) -> Option<JointCounts> {
+        self.guard.latest().map(|sample| sample.counts)
+    }
+
+    /// Name of a joint, by its place from the base.
+    #[must_use]
+    pub fn joint_name(&self, joint: usize) -> String {
+        self.joint_names[joint].clone()
+    }
+
+    /// For the geometry of readings.
+    pub(crate) fn guard(&self) -> &Guard {
+        &self.guard
     }
 
     fn halt(&mut self, reason: StopReason) -> ArmError {
@@ -229,8 +263,7 @@ fn listen(wire: &mut impl Wire, guard: &mut Guard, connection: &Connection) -> R
     let limits = connection.guard;
     let (start, mut heard) = (wire.elapsed(), Vec::new());
     let mut first: Option<(JointSensorSample, Duration)> = None;
-    let mut survey =
-        Survey { seconds: 0.0, readings: 0, counts: JointCounts::zeros(0), images: 0, tags: 0, unusable: None };
+    let mut survey = Survey::new();
     loop {
         heard.clear();
         wire.receive(LISTEN, &mut heard)?;
@@ -245,6 +278,7 @@ fn listen(wire: &mut impl Wire, guard: &mut Guard, connection: &Connection) -> R
                         // It moves: wait for its rest from here on.
                         first = Some((sample.clone(), now));
                         survey.readings = 0;
+                        survey.detections.clear();
                     }
                     survey.readings += usize::from(is_new);
                     survey.counts = sample.counts;
@@ -252,6 +286,7 @@ fn listen(wire: &mut impl Wire, guard: &mut Guard, connection: &Connection) -> R
                 Heard::Other(Message::Detections(detections)) => {
                     survey.images += 1;
                     survey.tags += detections.tags.len();
+                    survey.detections.extend(detections.tags.into_iter().map(|tag| (tag.id, tag)));
                 }
                 Heard::Other(_) => {}
                 Heard::Deadman(is_held) => guard.hear_deadman(is_held.then_some(now)),

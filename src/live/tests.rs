@@ -1,5 +1,9 @@
 //! The guard against an arm in memory, with a clock that the test turns: each fault with the time it takes to stop.
 
+mod nudge;
+mod search;
+mod tag_check;
+
 use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::rc::Rc;

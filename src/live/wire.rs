@@ -41,3 +41,21 @@ pub trait Wire {
     /// When none of them could be sent.
     fn stop(&mut self) -> Result<(), LiveError>;
 }
+
+impl<W: Wire + ?Sized> Wire for Box<W> {
+    fn elapsed(&self) -> Duration {
+        (**self).elapsed()
+    }
+
+    fn receive(&mut self, timeout: Duration, heard: &mut Vec<Heard>) -> Result<(), LiveError> {
+        (**self).receive(timeout, heard)
+    }
+
+    fn send(&mut self, set_point: &JointCounts, within_s: f64) -> Result<(), LiveError> {
+        (**self).send(set_point, within_s)
+    }
+
+    fn stop(&mut self) -> Result<(), LiveError> {
+        (**self).stop()
+    }
+}

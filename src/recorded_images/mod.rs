@@ -1,9 +1,13 @@
-//! Tags in the images of recordings that hold no detections.
+//! Tags in the images of recordings that hold no detections, and of live cameras without a detector node.
 //!
 //! `grey` makes a grey picture of a message, `detector` looks for tags in it. The reader of `input` calls it with one
-//! image at a time and knows neither.
+//! image at a time and knows neither; `live` does the same for the images of a live arm.
 
 mod detector;
 mod grey;
+#[cfg(feature = "live")]
+mod live;
 
 pub use detector::RecordedImageDetector;
+#[cfg(feature = "live")]
+pub use live::LiveTagFinder;

@@ -9,6 +9,7 @@ use crate::entity_log::EntityLog;
 use crate::scene::ReplayScene;
 use crate::scenery::Mover;
 use crate::shapes::{Look, log_shapes, path_part, transform, vector};
+use crate::tracks::Tick;
 use armcal_core::kinematics::LinkPoses;
 use armcal_core::spatial::{Base, Pose, Tool};
 use armcal_core::streams::{CaptureSet, JointAngles, MarkKind};
@@ -156,7 +157,7 @@ fn draw_trail(run: &ReplayScene, stream: &mut EntityLog) {
     stream.log_static(&entity, &LineStrips3D::update_fields().with_radii([0.004]).with_colors([colors::TRAIL]));
     let mut drawn: Vec<[f32; 3]> = Vec::new();
     let mut gaps = run.tracks.gaps().peekable();
-    for time_s in run.tracks.ticks(TRAIL_HZ) {
+    for Tick { time_s, is_drawn } in run.tracks.ticks_with_lead(TRAIL_HZ, kept as u64) {
         if gaps.next_if(|gap_s| *gap_s < time_s).is_some() {
             points.clear();
         }
@@ -166,10 +167,10 @@ fn draw_trail(run: &ReplayScene, stream: &mut EntityLog) {
         // To a tenth of a millimetre, a tool at rest has one point.
         let mut trail: Vec<[f32; 3]> = points[first..].iter().map(|p| p.map(|v| (v * 1e4).round() / 1e4)).collect();
         trail.dedup();
-        if trail != drawn {
+        if trail != drawn && is_drawn {
             stream.draw(&entity, time_s, &LineStrips3D::update_fields().with_strips([trail.clone()]));
-            drawn = trail;
         }
+        drawn = trail;
     }
 }
 

@@ -19,7 +19,7 @@ use crate::entities::{
     TEMPERATURE, TOOL_ERROR, WORLD,
 };
 use crate::entity_log::TIMELINE;
-use crate::scene::ReplayScene;
+use crate::scene::{ReplayScene, RunState};
 use crate::viewpoint;
 
 /// One entity of the layout.
@@ -30,6 +30,8 @@ pub(super) struct Entry {
 
 /// Longer recordings play faster, to be over in about this time, s.
 const WATCHED_S: f64 = 120.0;
+/// Plots of a run that goes on show so much of it, s.
+const LATEST_S: f64 = 60.0;
 
 /// A view or container that was written down: its path, for the container around it.
 struct Part(String);
@@ -50,7 +52,7 @@ pub(super) fn build(run: &ReplayScene) -> Vec<Entry> {
     let left = b.container(ContainerKind::Vertical, &[(scene, 5.0), (below, 4.0)]);
     let right = right_column(&mut b, run);
     let main = b.container(ContainerKind::Horizontal, &[(left, 3.0), (right, 2.0)]);
-    let root = if run.tracks.marks.is_empty() {
+    let root = if run.tracks.marks.is_empty() && run.state == RunState::Over {
         main
     } else {
         let phases = b.view("StateTimeline", "What the arm does", STATE);
@@ -198,12 +200,16 @@ impl Builder {
         Part(path)
     }
 
-    /// A plot over the whole recording; by itself the viewer shows what is near the time cursor.
+    /// A plot over the whole recording, or the latest of a run that goes on; by itself the viewer shows what is near
+    /// the time cursor.
     fn plot(&mut self, title: &str, origin: &str, legend: PlotLegend, run: &ReplayScene) -> Part {
         let view = self.view("TimeSeries", title, origin);
         self.property(&view, "PlotLegend", legend);
-        let [start, end] =
-            [0.0, run.tracks.duration_s].map(|time_s| TimeRangeBoundary::Absolute(TimeInt((time_s * 1e9) as i64)));
+        let at = |time_s: f64| TimeInt((time_s * 1e9) as i64);
+        let [start, end] = match run.state {
+            RunState::Over => [0.0, run.tracks.duration_s].map(|time_s| TimeRangeBoundary::Absolute(at(time_s))),
+            RunState::GoesOn => [-LATEST_S, 0.0].map(|time_s| TimeRangeBoundary::CursorRelative(at(time_s))),
+        };
         self.property(&view, "TimeAxis", TimeAxis::new().with_view_range(TimeRange { start, end }));
         view
     }
@@ -244,9 +250,12 @@ impl Builder {
         for panel in ["blueprint_panel", "selection_panel"] {
             self.add(panel.to_owned(), PanelBlueprint::new().with_state(PanelState::Collapsed));
         }
-        let speed = (run.tracks.duration_s / WATCHED_S).ceil().max(1.0);
+        let (play, speed) = match run.state {
+            RunState::Over => (PlayState::Playing, (run.tracks.duration_s / WATCHED_S).ceil().max(1.0)),
+            RunState::GoesOn => (PlayState::Following, 1.0),
+        };
         let time = TimePanelBlueprint::new().with_state(PanelState::Collapsed).with_timeline(TIMELINE);
-        let time = time.with_play_state(PlayState::Playing).with_playback_speed(speed);
+        let time = time.with_play_state(play).with_playback_speed(speed);
         self.add("time_panel".to_owned(), time);
         self.entries
     }

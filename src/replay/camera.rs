@@ -7,6 +7,7 @@ use crate::colors;
 use crate::entities::CAMERA;
 use crate::entity_log::EntityLog;
 use crate::scene::ReplayScene;
+use crate::tracks::Tick;
 use armcal_core::optics::CameraModel;
 use armcal_core::robot::SurveyedTag;
 use armcal_core::streams::{DetectionReject, TagDetection};
@@ -29,11 +30,11 @@ pub(super) fn draw(run: &ReplayScene, stream: &mut EntityLog) {
         return;
     }
     let [width, height] = lens.resolution_px();
-    if run.tracks.images.is_empty() {
-        stream.log_static(&format!("{CAMERA}/background"), &Image::from_rgb24(background(lens), [width, height]));
-    } else {
-        draw_images(run, stream);
+    let nothing = format!("{CAMERA}/background");
+    if run.tracks.images.is_empty() && !stream.is_shown(&nothing) {
+        stream.log_static(&nothing, &Image::from_rgb24(background(lens), [width, height]));
     }
+    draw_images(run, stream);
     let rings = LineStrips2D::new(RINGS_RAD.iter().map(|&angle_rad| ring(lens, angle_rad)));
     stream.log_static(&format!("{CAMERA}/rings"), &rings.with_radii([0.7]).with_colors([[52, 76, 96, 255]]));
     draw_expected(run, stream);
@@ -107,12 +108,14 @@ fn draw_quads(run: &ReplayScene, stream: &mut EntityLog, entity: &str, mut views
     for (n, (time_s, view)) in views.iter().enumerate() {
         // Two frames of one moment: the later one stands.
         let next_s = views.get(n + 1).map_or(f64::INFINITY, |(next_s, _)| *next_s);
-        let is_last_for_long = next_s - time_s > STALE_S;
-        if drawn.is_some_and(|last_s| time_s - last_s < 1.0 / VIEWS_HZ) && !is_last_for_long {
+        let is_last_for_long = next_s.min(run.tracks.duration_s) - time_s > STALE_S;
+        // The first one of each slot, so that it does not matter where drawing began.
+        let slot = (time_s * VIEWS_HZ).floor();
+        if drawn == Some(slot) && !is_last_for_long {
             continue;
         }
         stream.draw(entity, *time_s, &quads(view.iter().cloned()));
-        drawn = Some(*time_s);
+        drawn = Some(slot);
         if is_last_for_long && time_s + STALE_S < run.tracks.duration_s {
             stream.draw(entity, time_s + STALE_S, &quads(std::iter::empty()));
         }
@@ -145,15 +148,15 @@ fn draw_expected(run: &ReplayScene, stream: &mut EntityLog) {
     let style = LineStrips2D::update_fields().with_radii([Radius::new_ui_points(1.0)]).with_colors([colors::BELIEVED]);
     stream.log_static(&entity, &style.with_draw_order(20.0));
     let mut drawn: Option<Vec<Vec<[f32; 2]>>> = None;
-    for time_s in run.tracks.ticks(VIEWS_HZ) {
+    for Tick { time_s, is_drawn } in run.tracks.ticks_with_lead(VIEWS_HZ, 1) {
         let Some(angles) = run.tracks.believed.at(time_s) else { continue };
         let base_from_camera = run.believed_poses(time_s, angles).frame(&run.robot.camera.mount);
         let strips: Vec<_> =
             run.robot.tags.iter().filter_map(|tag| expected_outline(run, &base_from_camera, tag)).collect();
-        if drawn.as_ref() != Some(&strips) {
+        if is_drawn && drawn.as_ref() != Some(&strips) {
             stream.draw(&entity, time_s, &LineStrips2D::update_fields().with_strips(strips.clone()));
-            drawn = Some(strips);
         }
+        drawn = Some(strips);
     }
 }
 

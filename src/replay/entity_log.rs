@@ -5,11 +5,14 @@
 
 use std::collections::BTreeMap;
 
+use nalgebra::Isometry3;
 use rerun::external::re_log_encoding::EncodeError;
 use rerun::external::re_log_types::external::re_tuid::Tuid;
 use rerun::log::{Chunk, ChunkId, RowId};
 use rerun::time::{TimeCell, TimePoint};
 use rerun::{AsComponents, Clear, EntityPath, SerializedComponentBatch};
+
+use crate::shown::Shown;
 
 /// The one timeline of a recording: seconds since its first log time.
 pub(super) const TIMELINE: &str = "sim_time";
@@ -39,12 +42,19 @@ pub(super) struct EntityLog {
     /// Ends of what an entity shows, in chunks of their own: the viewer panics where one chunk of images has both.
     ends: BTreeMap<String, Rows>,
     failure: Option<EncodeError>,
+    /// What a viewer has already: that is not logged again.
+    shown: Option<Shown>,
 }
 
 impl EntityLog {
     /// Of a recording, over time.
     pub fn of_recording() -> Self {
         Self::on(TIMELINE, TimeCell::from_duration_nanos)
+    }
+
+    /// Of a recording that goes on, without what was `shown`.
+    pub fn of_news(shown: Shown) -> Self {
+        Self { shown: Some(shown), ..Self::of_recording() }
     }
 
     /// Of a blueprint.
@@ -54,7 +64,7 @@ impl EntityLog {
 
     fn on(timeline: &'static str, cell: fn(i64) -> TimeCell) -> Self {
         let (fixed, rows, ends) = Default::default();
-        Self { timeline, cell, fixed, rows, ends, failure: None }
+        Self { timeline, cell, fixed, rows, ends, failure: None, shown: None }
     }
 
     /// Logs data without a time.
@@ -64,8 +74,12 @@ impl EntityLog {
 
     /// Logs data from `time_s` on.
     pub fn draw(&mut self, entity: &str, time_s: f64, what: &dyn AsComponents) {
+        let nanos = (time_s * 1e9).round() as i64;
+        if !self.is_new(entity, nanos) {
+            return;
+        }
         let rows = self.rows.entry(entity.to_owned()).or_default();
-        rows.open.push(((time_s * 1e9).round() as i64, what.as_serialized_batches()));
+        rows.open.push((nanos, what.as_serialized_batches()));
         if rows.open.len() == CHUNK_ROWS
             && let Err(error) = rows.pack(entity, self.timeline, self.cell)
         {
@@ -75,8 +89,40 @@ impl EntityLog {
 
     /// The entity shows nothing from `time_s` on.
     pub fn clear(&mut self, entity: &str, time_s: f64) {
-        let end = ((time_s * 1e9).round() as i64, Clear::flat().as_serialized_batches());
-        self.ends.entry(entity.to_owned()).or_default().open.push(end);
+        let nanos = (time_s * 1e9).round() as i64;
+        if self.is_new(&format!("{entity}, end"), nanos) {
+            let end = (nanos, Clear::flat().as_serialized_batches());
+            self.ends.entry(entity.to_owned()).or_default().open.push(end);
+        }
+    }
+
+    fn is_new(&mut self, row: &str, nanos: i64) -> bool {
+        self.shown.as_mut().is_none_or(|shown| shown.note_row(row, nanos))
+    }
+
+    /// Whether this entity, which never changes and takes long to draw, was shown before.
+    pub fn is_shown(&self, entity: &str) -> bool {
+        self.shown.as_ref().is_some_and(|shown| shown.has(entity))
+    }
+
+    /// Where a moving entity was shown last.
+    pub fn shown_pose(&self, entity: &str) -> Option<Isometry3<f64>> {
+        self.shown.as_ref()?.pose(entity)
+    }
+
+    /// Notes where a moving entity is shown now.
+    pub fn note_pose(&mut self, entity: &str, pose: &Isometry3<f64>) {
+        if let Some(shown) = &mut self.shown {
+            shown.note_pose(entity, pose);
+        }
+    }
+
+    /// What was shown up to the end of this drawing, and the chunks that are new.
+    pub fn into_news(mut self) -> Result<(Shown, Vec<Chunk>), EncodeError> {
+        let mut shown = self.shown.take().unwrap_or_default();
+        self.fixed.retain(|entity, batches| shown.note_fixed(entity, batches));
+        shown.end_drawing();
+        Ok((shown, self.into_chunks()?))
     }
 
     /// Chunks in the order of the entities' names: what has no time, what has one, and the ends.

@@ -27,4 +27,12 @@ pub enum ReplayError {
     Create { path: PathBuf, source: std::io::Error },
     #[error("{}: cannot be written: {source}", path.display())]
     Encode { path: PathBuf, source: EncodeError },
+    #[error("the viewer cannot be told: {0}")]
+    Live(EncodeError),
+    #[error("{address} is no address of a viewer; it must be HOST:PORT, such as 127.0.0.1:9876")]
+    Address { address: String },
+    #[error("no viewer took it at {address}; start one with `rerun --bind 127.0.0.1`, or use --save FILE.rrd")]
+    NoViewer { address: String },
+    #[error("no thread can be started: {source}")]
+    Thread { source: std::io::Error },
 }

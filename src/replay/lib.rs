@@ -1,18 +1,22 @@
-//! Mirrors a run into a file for the Rerun viewer, after the fact and from recorded streams alone.
+//! Mirrors a run into a file for the Rerun viewer, or into a viewer that is open, from recorded streams alone.
 //!
 //! [`write_rrd`] draws belief, detections and, with the simulator's truth file, the truth; [`write_plan_rrd`] draws
 //! the motions of a plan, [`write_views_rrd`] the views of a real arm as its calibration has them; [`open_viewer`]
-//! hands the file to an installed viewer, which is not linked. All entities (`entities`) share one timeline,
-//! `sim_time`: seconds since the recording's first log time. The same input gives the same bytes.
+//! hands the file to an installed viewer, which is not linked. [`LiveView`] sends a run that goes on to a viewer that
+//! is open, [`show_recording`] a whole one. All entities (`entities`) share one timeline, `sim_time`: seconds since
+//! the recording's first log time. The same input gives the same bytes of a file.
 
 mod arms;
 mod blueprint;
 mod camera;
 mod colors;
+mod connection;
 mod entities;
 mod entity_log;
 mod error;
 mod identity;
+mod live;
+mod news;
 mod online;
 mod phases;
 mod plan;
@@ -23,6 +27,7 @@ mod rrd;
 mod scene;
 mod scenery;
 mod shapes;
+mod shown;
 mod summary;
 mod targets;
 mod touches;
@@ -32,7 +37,10 @@ mod viewer;
 mod viewpoint;
 mod views;
 
+pub use connection::LOOPBACK_VIEWER;
 pub use error::ReplayError;
+pub use live::{LiveView, LiveViewEnd, show_recording};
+pub use news::LiveDrawings;
 pub use plan::{PlanInput, write_plan_rrd};
 pub use read::read_for_replay;
 pub use recording::write_rrd;

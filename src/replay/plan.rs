@@ -13,7 +13,7 @@ use crate::entities::{BASE, CLEARANCE, PREDICTED};
 use crate::entity_log::EntityLog;
 use crate::error::ReplayError;
 use crate::identity::Identity;
-use crate::scene::{ReplayInput, ReplayScene};
+use crate::scene::{ReplayInput, ReplayScene, RunState};
 use crate::scenery::Mover;
 use crate::shapes::{Look, log_shapes, path_part, quaternion, vector};
 use crate::tracks::Tracks;
@@ -61,7 +61,16 @@ pub fn write_plan_rrd(input: &PlanInput<'_>, out: &Path) -> Result<(), ReplayErr
     };
     let tracks = Tracks::new(&messages, input.robot)?;
     let ReplayInput { robot, vehicle, scene, .. } = shown;
-    let run = ReplayScene { tracks, truth: None, robot, vehicle, scene, believed_chains: Vec::new(), online: None };
+    let run = ReplayScene {
+        tracks,
+        truth: None,
+        robot,
+        vehicle,
+        scene,
+        believed_chains: Vec::new(),
+        online: None,
+        state: RunState::Over,
+    };
     let mut stream = recording::draw(&run, &shown);
     draw_tool_path(&run, &mut stream);
     draw_margins(input, &run, &mut stream);

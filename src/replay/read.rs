@@ -52,12 +52,13 @@ impl Thinning {
 }
 
 /// Memory of a message with what it points to.
-fn bytes_of(message: &Message) -> usize {
+pub(super) fn bytes_of(message: &Message) -> usize {
     let pointed = match message {
         Message::Detections(detections) => size_of_val(&detections.tags[..]),
         Message::Rejects(rejects) => size_of_val(&rejects.rejects[..]),
         Message::Task(task) => size_of_val(&task.targets_m[..]),
         Message::Survey(survey) => size_of_val(&survey.tags[..]),
+        Message::Image(image) => image.jpeg.len(),
         Message::Log(line) => line.name.len() + line.text.len(),
         _ => 0,
     };

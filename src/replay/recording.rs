@@ -5,7 +5,8 @@ use std::path::Path;
 use crate::entity_log::EntityLog;
 use crate::error::ReplayError;
 use crate::identity::Identity;
-use crate::scene::{ReplayInput, ReplayScene};
+use crate::scene::{ReplayInput, ReplayScene, RunState};
+use crate::shown::Shown;
 use crate::tracks::Tracks;
 use crate::truth::Truth;
 use crate::{arms, blueprint, camera, online, phases, plots, rrd, scenery, summary, targets, touches};
@@ -36,12 +37,20 @@ pub(super) fn scene<'a>(input: &ReplayInput<'a>) -> Result<ReplayScene<'a>, Repl
     let believed_chains =
         believed.map(|(since, links)| (tracks.place_s(*since, *since), input.robot.chain.corrected(links))).collect();
     let ReplayInput { robot, vehicle, scene, online, .. } = *input;
-    Ok(ReplayScene { tracks, truth, robot, vehicle, scene, believed_chains, online })
+    Ok(ReplayScene { tracks, truth, robot, vehicle, scene, believed_chains, online, state: RunState::Over })
 }
 
 /// All entities of a recording, measured or planned.
 pub(super) fn draw(run: &ReplayScene<'_>, input: &ReplayInput<'_>) -> EntityLog {
-    let mut stream = EntityLog::of_recording();
+    draw_into(EntityLog::of_recording(), run, input)
+}
+
+/// The same without what was shown already.
+pub(super) fn draw_news(run: &ReplayScene<'_>, input: &ReplayInput<'_>, shown: Shown) -> EntityLog {
+    draw_into(EntityLog::of_news(shown), run, input)
+}
+
+fn draw_into(mut stream: EntityLog, run: &ReplayScene<'_>, input: &ReplayInput<'_>) -> EntityLog {
     scenery::draw(run, &mut stream);
     arms::draw(run, &mut stream);
     targets::draw(run, &mut stream);

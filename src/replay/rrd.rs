@@ -15,7 +15,7 @@ use crate::entity_log::{EntityLog, IDENTITY_NANOS};
 use crate::error::ReplayError;
 use crate::identity::Identity;
 
-const APPLICATION: &str = "armcal";
+pub(super) const APPLICATION: &str = "armcal";
 
 /// Writes the blueprint, then the entities.
 pub(super) fn write(out: &Path, identity: &Identity, blueprint: &[Entry], drawn: EntityLog) -> Result<(), ReplayError> {
@@ -26,22 +26,14 @@ pub(super) fn write(out: &Path, identity: &Identity, blueprint: &[Entry], drawn:
 
 fn encode(file: impl Write, identity: &Identity, entries: &[Entry], drawn: EntityLog) -> Result<(), EncodeError> {
     let recording = StoreId::new(StoreKind::Recording, APPLICATION, identity.recording_id.clone());
-    let blueprint = StoreId::new(StoreKind::Blueprint, APPLICATION, format!("layout-{}", identity.recording_id));
     let version = rerun::build_info().version;
     let mut encoder = Encoder::new_eager(version, EncodingOptions::PROTOBUF_COMPRESSED, file)?;
     // A footer is an index that viewers do without, and the encoder orders it by chance.
     encoder.do_not_emit_footer();
     encoder.append(&store_info(&recording))?;
-    encoder.append(&store_info(&blueprint))?;
-    let mut blueprint_log = EntityLog::of_blueprint();
-    for entry in entries {
-        blueprint_log.draw(&entry.path, 0.0, entry.what.as_ref());
+    for message in layout(&recording, &format!("layout-{}", identity.recording_id), entries)? {
+        encoder.append(&message)?;
     }
-    for chunk in blueprint_log.into_chunks()? {
-        encoder.append(&LogMsg::ArrowMsg(blueprint.clone(), chunk.to_arrow_msg()?))?;
-    }
-    let command = BlueprintActivationCommand { blueprint_id: blueprint, make_active: true, make_default: true };
-    encoder.append(&LogMsg::BlueprintActivationCommand(command))?;
     for chunk in drawn.into_chunks()? {
         encoder.append(&LogMsg::ArrowMsg(recording.clone(), chunk.to_arrow_msg()?))?;
     }
@@ -49,7 +41,23 @@ fn encode(file: impl Write, identity: &Identity, entries: &[Entry], drawn: Entit
     encoder.flush_blocking()
 }
 
-fn store_info(store: &StoreId) -> LogMsg {
+/// A layout for the application of `recording`, and the word to use it.
+pub(super) fn layout(recording: &StoreId, id: &str, entries: &[Entry]) -> Result<Vec<LogMsg>, EncodeError> {
+    let blueprint = StoreId::new(StoreKind::Blueprint, recording.application_id().clone(), id);
+    let mut log = EntityLog::of_blueprint();
+    for entry in entries {
+        log.draw(&entry.path, 0.0, entry.what.as_ref());
+    }
+    let mut messages = vec![store_info(&blueprint)];
+    for chunk in log.into_chunks()? {
+        messages.push(LogMsg::ArrowMsg(blueprint.clone(), chunk.to_arrow_msg()?));
+    }
+    let command = BlueprintActivationCommand { blueprint_id: blueprint, make_active: true, make_default: true };
+    messages.push(LogMsg::BlueprintActivationCommand(command));
+    Ok(messages)
+}
+
+pub(super) fn store_info(store: &StoreId) -> LogMsg {
     let source = StoreSource::Other("armcal".to_owned());
     LogMsg::SetStoreInfo(SetStoreInfo {
         row_id: Tuid::from_nanos_and_inc(IDENTITY_NANOS, 0),

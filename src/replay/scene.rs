@@ -39,6 +39,15 @@ pub(crate) struct ReplayScene<'a> {
     pub believed_chains: Vec<(f64, Chain)>,
     /// What was believed online.
     pub online: Option<&'a BeliefLog>,
+    /// Whether more will come.
+    pub state: RunState,
+}
+
+/// How far a run is while it is shown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum RunState {
+    Over,
+    GoesOn,
 }
 
 impl ReplayScene<'_> {

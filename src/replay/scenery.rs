@@ -49,12 +49,14 @@ impl Mover {
 
     /// Draws the pose that the entity has in its parent from `time_s` on.
     pub fn place(&mut self, stream: &mut EntityLog, time_s: f64, pose: &Isometry3<f64>) {
-        let same = self.last.is_some_and(|last| {
+        let last = self.last.or_else(|| stream.shown_pose(&self.entity));
+        let same = last.is_some_and(|last| {
             (last.translation.vector - pose.translation.vector).norm() < SAME_M
                 && last.rotation.angle_to(&pose.rotation) < SAME_RAD
         });
         if !same {
             stream.draw(&self.entity, time_s, &transform(pose));
+            stream.note_pose(&self.entity, pose);
             self.last = Some(*pose);
         }
     }

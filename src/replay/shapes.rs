@@ -66,7 +66,10 @@ pub(super) fn log_shapes<'a>(
         let place = placed.owner_from_shape;
         match placed.shape {
             Shape::Hull(ref hull) => {
-                stream.log_static(&format!("{entity}/hulls/{n_hulls}"), &mesh(hull, &place, color));
+                let part = format!("{entity}/hulls/{n_hulls}");
+                if !stream.is_shown(&part) {
+                    stream.log_static(&part, &mesh(hull, &place, color));
+                }
                 n_hulls += 1;
             }
             Shape::Box { size_m } => boxes.push(size_m.map(|v| 0.5 * v), place, color),

@@ -1,5 +1,7 @@
 //! A small made-up run, shown.
 
+mod live_view;
+
 use std::path::{Path, PathBuf};
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};

@@ -99,10 +99,35 @@ pub(super) struct Span {
     pub kind: MarkKind,
 }
 
+/// The moments at which moving things are drawn: after one time, up to another.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Window {
+    pub after_s: f64,
+    pub until_s: f64,
+    /// Moments at which one thing is drawn, at most.
+    pub max_ticks: f64,
+}
+
+impl Default for Window {
+    fn default() -> Self {
+        Self { after_s: f64::NEG_INFINITY, until_s: f64::INFINITY, max_ticks: MAX_TICKS }
+    }
+}
+
+/// One moment at which something that moves is drawn.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Tick {
+    pub time_s: f64,
+    /// False before the window.
+    pub is_drawn: bool,
+}
+
 /// The recording, sorted by kind.
 pub(super) struct Tracks<'a> {
     start: Stamp,
     pub duration_s: f64,
+    /// All of the recording, unless the run goes on.
+    pub window: Window,
     /// Spans with messages, s, ascending, with gaps between them.
     covered: Vec<(f64, f64)>,
     pub believed: TimeSeries<JointAngles>,
@@ -137,6 +162,7 @@ impl<'a> Tracks<'a> {
         let mut tracks = Self {
             start: *start,
             duration_s,
+            window: Window::default(),
             covered: covered(recording, *start, duration_s),
             believed: TimeSeries::default(),
             counts: TimeSeries::default(),
@@ -218,6 +244,17 @@ impl<'a> Tracks<'a> {
         Ok(())
     }
 
+    /// Takes images that are among the messages.
+    pub fn take_images_in_memory(&mut self, recording: &Recording) {
+        for (log_time, message) in &recording.messages {
+            let Message::Image(image) = message else { continue };
+            let time_s = self.place_s(*log_time, image.stamp);
+            if self.images.last().is_none_or(|(last_s, _)| time_s - last_s >= MIN_IMAGE_SPACING_S) {
+                self.images.push((time_s, image.clone()));
+            }
+        }
+    }
+
     /// A mark is logged when its span is over.
     fn span(&self, log_time: Stamp, mark: &Mark) -> Span {
         let end_s = self.place_s(log_time, mark.end);
@@ -239,17 +276,29 @@ impl<'a> Tracks<'a> {
 
     /// Moments at `rate_hz` from the start to the end, s, without those in gaps.
     pub fn ticks(&self, rate_hz: f64) -> impl Iterator<Item = f64> {
+        self.ticks_with_lead(rate_hz, 0).map(|tick| tick.time_s)
+    }
+
+    /// The same with so many ticks before them that were drawn already: for what depends on the moments before.
+    pub fn ticks_with_lead(&self, rate_hz: f64, lead: u64) -> impl Iterator<Item = Tick> {
         let rate_hz = self.affordable_hz(rate_hz);
+        let Window { after_s, until_s, .. } = self.window;
+        let first_drawn = if after_s.is_finite() { (after_s * rate_hz).floor() as u64 + 1 } else { 0 };
         self.covered.iter().flat_map(move |(from_s, to_s)| {
-            let (first, last) = ((from_s * rate_hz).ceil() as u64, (to_s * rate_hz).floor() as u64);
-            (first..=last).map(move |i| i as f64 / rate_hz)
+            let first = ((from_s * rate_hz).ceil() as u64).max(first_drawn.saturating_sub(lead));
+            let last = (to_s.min(until_s) * rate_hz).floor() as u64;
+            // A window may end before the first tick.
+            let end = if until_s < 0.0 { first } else { last + 1 };
+            (first..end).map(move |i| Tick { time_s: i as f64 / rate_hz, is_drawn: i >= first_drawn })
         })
     }
 
     /// `rate_hz`, or the share of it that a long recording can be drawn at.
     pub fn affordable_hz(&self, rate_hz: f64) -> f64 {
-        let covered_s: f64 = self.covered.iter().map(|(from_s, to_s)| to_s - from_s).sum();
-        rate_hz / (covered_s * rate_hz / MAX_TICKS).ceil().max(1.0)
+        let Window { after_s, until_s, max_ticks } = self.window;
+        let in_window = |(from_s, to_s): &(f64, f64)| (to_s.min(until_s) - from_s.max(after_s)).max(0.0);
+        let covered_s: f64 = self.covered.iter().map(in_window).sum();
+        rate_hz / (covered_s * rate_hz / max_ticks).ceil().max(1.0)
     }
 
     /// Starts of the gaps without messages, s.

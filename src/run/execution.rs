@@ -14,7 +14,7 @@ use crate::run::{Failure, RunError, RunInputs, Stage, corner_scatter_px};
 use crate::score::{ScoreInput, score};
 use armcal_belief::calib::Calibration;
 use armcal_belief::session::{
-    self, AssertResult, EstimateUpdate, HeldJoint, Outcome, Progress, Recorder, SessionInputs,
+    self, AssertResult, EstimateUpdate, HeldJoint, MessageListener, Outcome, Progress, Recorder, SessionInputs,
 };
 use armcal_core::files::{self, FileKind};
 use armcal_core::log::{Recording, RecordingHeader, RecordingWriter, read_recording};
@@ -30,6 +30,14 @@ pub enum Keep {
     Everything,
     /// Recording and truth, which the score needs; the caller removes them.
     StreamsAlone,
+}
+
+/// Where a run goes.
+pub struct RunOutput<'a> {
+    pub folder: &'a OutputFolder,
+    pub keep: Keep,
+    /// Hears every message as it is recorded.
+    pub listener: Option<MessageListener>,
 }
 
 /// What a run gave.
@@ -51,12 +59,12 @@ pub struct Finished {
 pub fn execute(
     inputs: &RunInputs,
     seed: u64,
-    output: &OutputFolder,
-    keep: Keep,
+    output: RunOutput<'_>,
     progress: &mut dyn Progress,
 ) -> Result<Finished, Failure> {
-    let run = Run { inputs, seed, output, keep, source: Source::World };
-    run.simulated(progress).map_err(|failure| run.broken_off(failure))
+    let RunOutput { folder, keep, listener } = output;
+    let run = Run { inputs, seed, output: folder, keep, source: Source::World };
+    run.simulated(listener, progress).map_err(|failure| run.broken_off(failure))
 }
 
 /// Runs the closed loop on an arm of which nobody knows the truth: there is no score. All else is as with [`execute`].
@@ -67,11 +75,12 @@ pub fn execute_on(
     arm: &mut dyn Arm,
     inputs: &RunInputs,
     seed: u64,
-    output: &OutputFolder,
+    output: RunOutput<'_>,
     progress: &mut dyn Progress,
 ) -> Result<Finished, Failure> {
-    let run = Run { inputs, seed, output, keep: Keep::Everything, source: Source::Arm };
-    run.real(arm, progress).map_err(|failure| run.broken_off(failure))
+    let RunOutput { folder, keep, listener } = output;
+    let run = Run { inputs, seed, output: folder, keep, source: Source::Arm };
+    run.real(arm, listener, progress).map_err(|failure| run.broken_off(failure))
 }
 
 struct Run<'a> {
@@ -91,17 +100,22 @@ enum Source {
 }
 
 impl Run<'_> {
-    fn simulated(&self, progress: &mut dyn Progress) -> Result<Finished, Failure> {
+    fn simulated(&self, listener: Option<MessageListener>, progress: &mut dyn Progress) -> Result<Finished, Failure> {
         let mut world = self.world().map_err(Failure::at(Stage::World))?;
-        let driven = self.drive(&mut world, progress);
+        let driven = self.drive(&mut world, listener, progress);
         let finished = world.finish_truth();
         let (outcome, recorder) = driven?;
         finished.map_err(Failure::at(Stage::Motion))?;
         self.keep_all(outcome, recorder, progress)
     }
 
-    fn real(&self, arm: &mut dyn Arm, progress: &mut dyn Progress) -> Result<Finished, Failure> {
-        let (outcome, recorder) = self.drive(arm, progress)?;
+    fn real(
+        &self,
+        arm: &mut dyn Arm,
+        listener: Option<MessageListener>,
+        progress: &mut dyn Progress,
+    ) -> Result<Finished, Failure> {
+        let (outcome, recorder) = self.drive(arm, listener, progress)?;
         self.keep_all(outcome, recorder, progress)
     }
 
@@ -119,9 +133,15 @@ impl Run<'_> {
         self.output.partial(name)
     }
 
-    fn drive(&self, arm: &mut dyn Arm, progress: &mut dyn Progress) -> Result<(Outcome, Recorder), Failure> {
+    fn drive(
+        &self,
+        arm: &mut dyn Arm,
+        listener: Option<MessageListener>,
+        progress: &mut dyn Progress,
+    ) -> Result<(Outcome, Recorder), Failure> {
         let inputs = self.inputs;
-        let mut recorder = self.recorder(arm.now()).map_err(Failure::at(Stage::World))?;
+        let recorder = self.recorder(arm.now()).map_err(Failure::at(Stage::World))?;
+        let mut recorder = recorder.with_listener(listener);
         let setup =
             SessionInputs { robot: &inputs.robot, vehicle: &inputs.vehicle, routine: &inputs.routine, seed: self.seed };
         match session::run(&setup, arm, &mut recorder, progress) {

@@ -11,6 +11,6 @@ mod inputs;
 mod scatter;
 
 pub use error::{Failure, RunError, Stage};
-pub use execution::{Finished, Keep, execute, execute_on};
+pub use execution::{Finished, Keep, RunOutput, execute, execute_on};
 pub use inputs::RunInputs;
 pub use scatter::corner_scatter_px;

@@ -40,6 +40,6 @@ pub use inputs::SessionInputs;
 pub use online_belief::{AskedPoses, OnlineOutcome};
 pub use outcome::{AssertResult, Epoch, EstimateUpdate, Outcome, ReachStep, SkippedTarget, StillReachable, Visit};
 pub use progress::{Approval, MotionAhead, Progress};
-pub use recorder::Recorder;
+pub use recorder::{MessageListener, Recorder};
 pub use script::run;
 pub use unwatched::Unwatched;

@@ -7,6 +7,9 @@ use armcal_core::log::{LogError, Recording, RecordingWriter, read_recording};
 use armcal_core::streams::{JointCounts, MarkKind, Message, Sink, SinkError, Thermometer};
 use armcal_core::time::Stamp;
 
+/// Hears every message after it was recorded. It must not wait.
+pub type MessageListener = Box<dyn FnMut(Stamp, &Message) + Send>;
+
 /// A recording being written, and the latest readings.
 pub struct Recorder {
     pub(crate) writer: RecordingWriter,
@@ -23,6 +26,7 @@ pub struct Recorder {
     pub(crate) ids_seen: BTreeSet<u32>,
     /// Hears every message while the arm works.
     pub(crate) online: Option<OnlineBelief>,
+    listener: Option<MessageListener>,
 }
 
 impl Recorder {
@@ -38,7 +42,14 @@ impl Recorder {
             tags_seen: 0,
             ids_seen: BTreeSet::new(),
             online: None,
+            listener: None,
         }
+    }
+
+    /// Tells every message, such as to a viewer. Nothing of the recording depends on it.
+    #[must_use]
+    pub fn with_listener(self, listener: Option<MessageListener>) -> Self {
+        Self { listener, ..self }
     }
 
     /// The recording so far, read from its bytes on disk.
@@ -75,6 +86,9 @@ impl Sink for Recorder {
         self.writer.record(log_time, message)?;
         if let Some(online) = &mut self.online {
             online.hear(log_time, message);
+        }
+        if let Some(listener) = &mut self.listener {
+            listener(log_time, message);
         }
         // A view that was captured is on disk before the arm moves on.
         let is_touch = matches!(message, Message::Touch(_));

@@ -4,17 +4,19 @@ use std::path::Path;
 
 use anyhow::Result;
 
+use super::nudging::nudge_one;
+use crate::cli::interrupt::Interrupt;
 use crate::cli::stdout::note;
-use crate::output::OutputFolder;
-use crate::run::{Failure, Finished, RunInputs, execute_on};
+use crate::recorded_images::LiveTagFinder;
+use crate::run::{Failure, Finished, RunInputs, RunOutput, execute_on};
 use armcal_belief::session::Progress;
 use armcal_core::robot::Robot;
 use armcal_core::sensor::ArmSensors;
 use armcal_core::stats::quantile;
-use armcal_live::{Connection, LiveArm, Ros2Wire, Survey};
+use armcal_live::{Connection, ImageSearch, LiveArm, Ros2Wire, Survey, TagCheck, Wire};
 
 /// An arm that was found ready.
-pub struct ConnectedArm(LiveArm<Ros2Wire>);
+pub struct ConnectedArm(LiveArm<Box<dyn Wire>>);
 
 /// What was heard before anything moved.
 fn describe(survey: &Survey, robot: &Robot) -> String {
@@ -28,6 +30,14 @@ fn describe(survey: &Survey, robot: &Robot) -> String {
     for (joint, angle) in robot.joint_names().iter().zip(angles.iter()) {
         text.push_str(&format!("\n  {joint:<20} {:8.2} deg by the datasheet", angle.to_degrees()));
     }
+    match &survey.tag_check {
+        Some(TagCheck { tags, largest_rad, bound_rad }) => text.push_str(&format!(
+            "\n{tags} known tags are in view, up to {:.1} deg from where these angles put them; the datasheet allows {:.1}",
+            largest_rad.to_degrees(),
+            bound_rad.to_degrees()
+        )),
+        None => text.push_str("\nno known tag is in view: the angles are not checked"),
+    }
     if let Some((n, why)) = &survey.unusable {
         text.push_str(&format!("\nwarning: {n} messages were of no use, the last: {why}"));
     }
@@ -39,9 +49,26 @@ impl ConnectedArm {
     pub fn open(file: &Path, inputs: &RunInputs) -> Result<Self> {
         let connection = Connection::load(file)?;
         let wire = Ros2Wire::open(&connection, &inputs.robot)?;
+        let wire: Box<dyn Wire> = if connection.searches_images() {
+            inputs.robot.require_lens()?;
+            let lens = inputs.robot.camera.lens;
+            Box::new(ImageSearch::new(wire, move || LiveTagFinder::new(&lens))?)
+        } else {
+            Box::new(wire)
+        };
         let (arm, survey) = LiveArm::connect(wire, &inputs.robot, &connection)?;
         note(describe(&survey, &inputs.robot));
         Ok(Self(arm))
+    }
+
+    /// Moves one joint after the other by one degree and back, each after a yes, and ends at what is not as it should be.
+    pub fn nudge(&mut self, robot: &Robot, interrupt: &Interrupt) -> Result<()> {
+        let mut answers = std::io::stdin().lock();
+        for joint in 0..robot.n_joints() {
+            nudge_one(&mut self.0, joint, &mut answers, interrupt)?;
+        }
+        note("each joint follows its set-points with the right sign and scale");
+        Ok(())
     }
 
     /// Runs on the arm, tells it to stop where the run breaks off, and says how quickly it was answered.
@@ -49,7 +76,7 @@ impl ConnectedArm {
         mut self,
         inputs: &RunInputs,
         seed: u64,
-        output: &OutputFolder,
+        output: RunOutput<'_>,
         progress: &mut dyn Progress,
     ) -> Result<Finished, Failure> {
         let result = execute_on(&mut self.0, inputs, seed, output, progress);

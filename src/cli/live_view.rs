@@ -1,0 +1,64 @@
+//! `--live`: what happens, in a Rerun viewer that is open already.
+
+use anyhow::Result;
+use clap::Args;
+
+#[cfg(feature = "viewer")]
+mod open;
+#[cfg(feature = "viewer")]
+pub(super) use open::OpenView;
+#[cfg(not(feature = "viewer"))]
+pub(super) use unopened::OpenView;
+
+use armcal_core::robot::{Robot, Vehicle};
+use armcal_core::routine::Scene;
+
+#[derive(Debug, Args)]
+pub(super) struct LiveViewArgs {
+    /// Show what happens in the Rerun viewer that listens at HOST:PORT; 127.0.0.1:9876 if only --live is given
+    #[arg(long, value_name = "HOST:PORT", num_args = 0..=1, require_equals = true)]
+    #[arg(default_missing_value = "127.0.0.1:9876")]
+    pub live: Option<String>,
+}
+
+/// What is drawn around the messages.
+pub(super) struct ViewOf<'a> {
+    pub robot: &'a Robot,
+    pub vehicle: Option<&'a Vehicle>,
+    pub scene: Option<&'a Scene>,
+}
+
+impl LiveViewArgs {
+    /// Begins to look for the viewer, where one is asked for.
+    pub fn open(&self, of: &ViewOf<'_>) -> Result<Option<OpenView>> {
+        self.live.as_deref().map(|address| OpenView::open(address, of)).transpose()
+    }
+}
+
+/// This build has no such part.
+#[cfg(not(feature = "viewer"))]
+mod unopened {
+    use std::time::Duration;
+
+    use super::ViewOf;
+    use crate::cli::exit::UsageError;
+    use armcal_belief::session::MessageListener;
+
+    /// There is none.
+    pub enum OpenView {}
+
+    impl OpenView {
+        pub fn open(_: &str, _: &ViewOf<'_>) -> anyhow::Result<Self> {
+            let problem = "this build of armcal knows no viewer; build it with `--features viewer`";
+            Err(UsageError(format!("--live: {problem}")).into())
+        }
+
+        pub fn listener(&self, _: Duration) -> MessageListener {
+            match *self {}
+        }
+
+        pub fn end(self) {
+            match self {}
+        }
+    }
+}

@@ -1,0 +1,47 @@
+//! A view that was begun, and how it ended.
+
+use std::time::Duration;
+
+use anyhow::Result;
+
+use super::ViewOf;
+use crate::cli::exit::UsageError;
+use crate::cli::stdout::note;
+use armcal_belief::session::MessageListener;
+use armcal_replay::{LiveDrawings, LiveView, LiveViewEnd};
+
+/// A view of a run that goes on.
+pub struct OpenView {
+    view: LiveView,
+    address: String,
+}
+
+impl OpenView {
+    pub fn open(address: &str, of: &ViewOf<'_>) -> Result<Self> {
+        let drawings = LiveDrawings { robot: of.robot.clone(), vehicle: of.vehicle.cloned(), scene: of.scene.cloned() };
+        let view = LiveView::open(drawings, address).map_err(|error| UsageError(format!("--live: {error}")))?;
+        Ok(Self { view, address: address.to_owned() })
+    }
+
+    /// Takes messages; waits `patience` in all for a viewer that is too slow.
+    pub fn listener(&self, patience: Duration) -> MessageListener {
+        Box::new(self.view.listener(patience))
+    }
+
+    /// Says once what was not shown.
+    pub fn end(self) {
+        let Self { view, address } = self;
+        let LiveViewEnd { was_seen, was_taken, left_out, failure } = view.end();
+        if let Some(why) = failure {
+            note(format_args!("note: --live ended early: {why}"));
+        } else if !was_seen {
+            note(format_args!(
+                "note: --live: no viewer listened at {address}; start one before with `rerun --bind 127.0.0.1`"
+            ));
+        } else if left_out > 0 {
+            note(format_args!("note: --live: the viewer was too slow: {left_out} messages were not shown"));
+        } else if !was_taken {
+            note(format_args!("note: --live: the viewer went away, or was too slow for the end"));
+        }
+    }
+}

@@ -1,0 +1,106 @@
+//! The connection to a viewer that runs on its own.
+
+use std::sync::mpsc::channel;
+use std::time::Duration;
+
+use rerun::external::re_grpc_client::write::ClientConnectionState;
+use rerun::log::LogMsg;
+use rerun::sink::{GrpcSink, LogSink};
+use rerun::{StoreId, StoreKind};
+
+use crate::error::ReplayError;
+use crate::news::Update;
+use crate::rrd;
+
+/// Where a viewer listens by default: on this machine alone.
+pub const LOOPBACK_VIEWER: &str = "127.0.0.1:9876";
+
+/// Whether a viewer listens.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum State {
+    /// Not yet.
+    Away,
+    Connected,
+    /// It went away; nothing more can be sent over this connection.
+    Lost,
+}
+
+/// What a viewer took until the end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Taken {
+    Whole,
+    InPart,
+}
+
+/// A viewer that listens, or may listen some day.
+pub(super) struct Viewer {
+    address: String,
+    sink: GrpcSink,
+    recording: StoreId,
+    n_layouts: usize,
+}
+
+impl Viewer {
+    /// Begins to look for a viewer at `address`, host and port. Each call has its own recording in the viewer.
+    pub fn at(address: &str) -> Result<Self, ReplayError> {
+        Self::connect(address, StoreId::random(StoreKind::Recording, rrd::APPLICATION))
+    }
+
+    fn connect(address: &str, recording: StoreId) -> Result<Self, ReplayError> {
+        let wrong = || ReplayError::Address { address: address.to_owned() };
+        let (host, port) = address.rsplit_once(':').ok_or_else(wrong)?;
+        let is_port = port.parse::<u16>().is_ok_and(|port| port > 0);
+        if host.is_empty() || host.contains('/') || !is_port {
+            return Err(wrong());
+        }
+        let uri = format!("rerun+http://{address}/proxy").parse().map_err(|_| wrong())?;
+        Ok(Self { address: address.to_owned(), sink: GrpcSink::new(uri), recording, n_layouts: 0 })
+    }
+
+    pub fn state(&self) -> State {
+        match self.sink.status() {
+            ClientConnectionState::Connecting { .. } => State::Away,
+            ClientConnectionState::Connected => State::Connected,
+            ClientConnectionState::Disconnected(_) => State::Lost,
+        }
+    }
+
+    /// Looks for the viewer anew, after it was lost.
+    pub fn again(self) -> Result<Self, ReplayError> {
+        Self::connect(&self.address, self.recording)
+    }
+
+    /// Sends an update; waits while the viewer takes nothing.
+    pub fn tell(&mut self, update: Update) -> Result<(), ReplayError> {
+        if let Some(layout) = update.layout {
+            self.sink.send(rrd::store_info(&self.recording));
+            self.n_layouts += 1;
+            let id = format!("layout-{}-{}", self.recording.recording_id(), self.n_layouts);
+            for message in rrd::layout(&self.recording, &id, &layout).map_err(ReplayError::Live)? {
+                self.sink.send(message);
+            }
+        }
+        for chunk in update.chunks {
+            let message = chunk.to_arrow_msg().map_err(|error| ReplayError::Live(error.into()))?;
+            self.sink.send(LogMsg::ArrowMsg(self.recording.clone(), message));
+        }
+        Ok(())
+    }
+
+    /// Ends the connection; what the viewer does not take within `patience` it does not get.
+    pub fn finish(self, patience: Duration) -> Taken {
+        if self.state() != State::Connected {
+            // A sink that is dropped waits for whoever is not there.
+            std::mem::forget(self.sink);
+            return Taken::InPart;
+        }
+        let (done, is_done) = channel();
+        // Dropped it waits until all was taken, for ever where nothing is.
+        let finish = move || {
+            drop(self.sink);
+            let _ = done.send(());
+        };
+        let started = std::thread::Builder::new().name("live view's end".to_owned()).spawn(finish);
+        if started.is_ok() && is_done.recv_timeout(patience).is_ok() { Taken::Whole } else { Taken::InPart }
+    }
+}
