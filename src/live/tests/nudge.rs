@@ -130,7 +130,8 @@ fn a_sound_arm_passes_and_is_where_it_was() {
     assert_eq!(nudged.shares.len(), robot.n_joints());
     assert!(nudged.shares.iter().all(|share| (0.95..=1.05).contains(share)), "{:?}", nudged.shares);
     let farthest_deg = nudged.farthest_deg(&robot);
-    assert!((0.99..1.01).contains(&farthest_deg), "{farthest_deg}");
+    // A count of the coarsest sensor is 0.05 deg.
+    assert!((0.99..1.06).contains(&farthest_deg), "{farthest_deg}");
     let log = nudged.log.borrow();
     let (_, last) = log.set_points.last().expect("set-points");
     assert!((0..last.len()).all(|j| (last[j] - nudged.start[j]).abs() < 1.0), "{last:?}");

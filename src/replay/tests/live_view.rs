@@ -4,12 +4,17 @@ use std::collections::BTreeMap;
 use std::net::TcpListener;
 use std::time::{Duration, Instant};
 
+use rerun::external::arrow::array::Array;
+
 use super::{input, small};
 use crate::news::{LiveDrawings, News};
 use crate::*;
 use armcal_core::log::Recording;
 use armcal_core::robot::Robot;
 use armcal_core::streams::{CameraImage, Message};
+
+/// By then every stream has been heard.
+const FIRST_HEARD_NANOS: i64 = 2_000_000_000;
 
 fn drawings(robot: &Robot) -> LiveDrawings {
     LiveDrawings { robot: robot.clone(), vehicle: None, scene: None }
@@ -78,7 +83,7 @@ fn with_images() -> (tempfile::TempDir, Recording, Robot) {
         _ => None,
     });
     let images: Vec<_> =
-        stamps.step_by(2).map(|stamp| (stamp, Message::Image(CameraImage { stamp, jpeg: vec![0xff; 9] }))).collect();
+        stamps.step_by(2).map(|stamp| (stamp, Message::Image(CameraImage { stamp, jpeg: vec![0xff; 20_000] }))).collect();
     recording.messages.extend(images);
     recording.messages.sort_by_key(|(log_time, _)| *log_time);
     (dir, recording, robot)
@@ -103,7 +108,8 @@ fn updates_together_are_the_drawing_at_once() {
         for (row, n) in &bit_by_bit.rows {
             assert_eq!(at_once.rows.get(row), Some(n), "sent too often or wrongly, every {every} messages: {row:?}");
         }
-        for (row, n) in &at_once.rows {
+        // Whoever sees the whole run draws the first temperature before it was measured, too.
+        for (row, n) in at_once.rows.iter().filter(|((_, nanos, _), _)| *nanos >= FIRST_HEARD_NANOS) {
             assert_eq!(bit_by_bit.rows.get(row), Some(n), "not sent, every {every} messages: {row:?}");
         }
         let fixed = |drawn: &Drawn| drawn.fixed.keys().cloned().collect::<Vec<_>>();
@@ -178,7 +184,7 @@ fn nobody_waits_for_a_viewer_that_is_too_slow() {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = listener.local_addr().unwrap().to_string();
     let held = std::thread::spawn(move || listener.accept().map(|(stream, _)| stream));
-    let (slowest, end) = speak(&recording, &robot, &address, 12);
+    let (slowest, end) = speak(&recording, &robot, &address, 30);
     assert!(slowest < Duration::from_millis(100), "{slowest:?}");
     assert!(end.was_seen && !end.was_taken && end.left_out > 0, "{end:?}");
     drop(held);
