@@ -6,7 +6,7 @@ use armcal::log::{Completeness, for_each_raw};
 use armcal::robot::Robot;
 
 use crate::support::bag::{VERSIONS, write_bag};
-use crate::support::external::{AS_IN_2018, RealTitan, write_poses};
+use crate::support::external::{AS_IN_2018, INPUT_MAP, RealTitan, write_poses};
 use crate::support::{Answer, answer, program, read, robot_folder, root, temp, titan, write};
 
 /// Two folders with the same names of files: one with an MCAP file, one with bags.
@@ -23,6 +23,7 @@ impl Both {
         for folder in FOLDERS {
             std::fs::create_dir(both.file(folder, "")).expect("a folder");
             write(&both.file(folder, "tags.toml"), &titan.tag_map());
+            write(&both.file(folder, "given.toml"), INPUT_MAP);
         }
         write_poses(&both.file("mcap", "arm"), &titan.poses);
         write_bag(&both.file("bag", "arm"), version, &both.file("mcap", "arm"), |_| true);
@@ -40,7 +41,7 @@ impl Both {
     }
 }
 
-const CALIBRATE: &str = "--input map.toml --tag-map tags.toml --method minimum_distance --out out";
+const CALIBRATE: &str = "--input given.toml --tag-map tags.toml --method minimum_distance --out out";
 
 #[test]
 fn bags_give_the_calibration_of_their_messages() {
@@ -50,7 +51,6 @@ fn bags_give_the_calibration_of_their_messages() {
         let [mcap, bag] = FOLDERS.map(|folder| {
             both.answer(folder, "inspect arm --write-input map.toml").expect("proposed", 0, &["/joint_states", "/tf"]);
             both.answer(folder, &format!("calibrate arm {CALIBRATE}")).expect("57 poses", 0, &["ACCEPTED"]);
-            // Unknown to the map that is proposed: which joint is which.
             ["map.toml", "out/calibration.toml", "out/calibration.covariance.toml"]
                 .map(|name| read(&both.file(folder, name)))
         });
@@ -66,7 +66,6 @@ fn a_bag_in_several_files_is_one_in_any_order() {
     let mcap = both.file("mcap", "arm");
     write_bag(&both.file("bag", "arm_0.db3"), 3, &mcap, |place| place < 40);
     write_bag(&both.file("bag", "arm_1.db3"), 3, &mcap, |place| place >= 40);
-    both.answer("bag", "inspect arm --write-input map.toml").expect("proposed", 0, &[]);
     let calibrations = ["arm_0.db3 arm_1.db3", "arm_1.db3 arm_0.db3", "arm"].map(|names| {
         both.answer("bag", &format!("calibrate {names} {CALIBRATE}")).expect("57 poses", 0, &["ACCEPTED"]);
         read(&both.file("bag", "out/calibration.toml"))
@@ -76,15 +75,14 @@ fn a_bag_in_several_files_is_one_in_any_order() {
     // Named by its files.
     assert_eq!(there.replace("arm_0.db3, arm_1.db3", "arm"), whole);
     // A folder names its files.
-    both.answer("", &format!("calibrate bag {CALIBRATE}")).expect("a folder", 2, &["folder", "arm_0.db3, arm_1.db3"]);
+    both.answer("", "inspect bag").expect("a folder", 2, &["folder", "arm_0.db3, arm_1.db3"]);
 }
 
 #[test]
 fn what_is_no_bag_is_refused_by_name() {
     let both = Both::new(&titan(), 6, 4);
-    both.answer("bag", "inspect arm --write-input map.toml").expect("proposed", 0, &[]);
     let arm = both.file("bag", "arm");
-    rusqlite::Connection::open(&arm).expect("open").execute_batch("DROP TABLE topics").expect("dropped");
+    sqlite::open(&arm).expect("open").execute("DROP TABLE topics").expect("dropped");
     both.answer("bag", &format!("calibrate arm {CALIBRATE}")).expect("no topics", 2, &["arm", "no table `topics`"]);
     let bytes = std::fs::read(&arm).expect("it reads");
     std::fs::write(&arm, &bytes[..60]).expect("written");
@@ -96,7 +94,6 @@ fn what_is_no_bag_is_refused_by_name() {
 #[test]
 fn a_cut_bag_is_calibrated_from_what_is_there() {
     let both = Both::new(&titan(), 7, 3);
-    both.answer("bag", "inspect arm --write-input map.toml").expect("proposed", 0, &[]);
     let arm = both.file("bag", "arm");
     let bytes = std::fs::read(&arm).expect("it reads");
     std::fs::write(&arm, &bytes[..bytes.len() * 9 / 10]).expect("written");

@@ -1,19 +1,26 @@
-"""A ROS 2 bag that `rosbags` wrote, once in SQLite and once in MCAP -> tests/golden/bag/.
+"""A ROS 2 bag that `rosbags` wrote, once in SQLite and once in MCAP -> tests/golden/bag/; fuzz/corpus/bag/.
 
 Twelve poses of a two-joint arm before one tag, with an attitude sensor, and an image longer than a page of the file. Both files hold
 the same messages; what other writers make of them is not in armcal's hands.
+
+The corpus has the first messages of fuzz/corpus/recording/views.mcap in small pages, and those that follow in a log of writes, as a
+recorder leaves it that was killed.
 """
 
 import math
 import shutil
+import sqlite3
 import tempfile
 from pathlib import Path
 
 import numpy as np
 from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.rosbag2.storage_mcap import McapReader
 from rosbags.typesys import Stores, get_typestore
 
-OUT = Path(__file__).resolve().parents[1] / "golden" / "bag"
+ROOT = Path(__file__).resolve().parents[2]
+OUT = ROOT / "tests" / "golden" / "bag"
+CORPUS = ROOT / "fuzz" / "corpus"
 START_NS = 1_700_000_000_000_000_000
 N_POSES = 12
 
@@ -70,6 +77,43 @@ def write(folder, plugin):
             bag.write(connections[topic], nanos, store.serialize_cdr(message, message.__msgtype__))
 
 
+def write_corpus(scratch):
+    """Of each topic a few messages; page size 512."""
+    reader = McapReader(CORPUS / "recording" / "views.mcap")
+    reader.open()
+    kept, counts = [], {}
+    for connection, nanos, data in reader.messages(reader.connections):
+        counts[connection.topic] = counts.get(connection.topic, 0) + 1
+        if counts[connection.topic] <= 6:
+            kept.append((connection.topic, connection.msgtype, nanos, data))
+    file = Path(scratch) / "arm.db3"
+    bag = sqlite3.connect(file, isolation_level=None)
+    bag.execute("PRAGMA page_size=512")
+    bag.execute("CREATE TABLE schema(schema_version INTEGER PRIMARY KEY,ros_distro TEXT NOT NULL)")
+    bag.execute("INSERT INTO schema VALUES(3,'humble')")
+    bag.execute("CREATE TABLE topics(id INTEGER PRIMARY KEY,name TEXT,type TEXT,serialization_format TEXT,offered_qos_profiles TEXT)")
+    bag.execute("CREATE TABLE messages(id INTEGER PRIMARY KEY,topic_id INTEGER NOT NULL,timestamp INTEGER NOT NULL, data BLOB NOT NULL)")
+    topics = {}
+    bag.execute("PRAGMA journal_mode=WAL")
+    bag.execute("PRAGMA wal_autocheckpoint=0")
+    bag.execute("BEGIN")
+    for k, (topic, kind, nanos, data) in enumerate(kept):
+        if topic not in topics:
+            topics[topic] = len(topics) + 1
+            bag.execute("INSERT INTO topics VALUES(?,?,?,'cdr','')", (topics[topic], topic, kind))
+        bag.execute("INSERT INTO messages VALUES(NULL,?,?,?)", (topics[topic], nanos, data))
+        if k == len(kept) * 2 // 3:
+            bag.execute("COMMIT")
+            bag.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+            bag.execute("BEGIN")
+    bag.execute("COMMIT")
+    (CORPUS / "bag").mkdir(exist_ok=True)
+    for name in ("arm.db3", "arm.db3-wal"):
+        shutil.copy(Path(scratch) / name, CORPUS / "bag" / name)
+        print(name, (CORPUS / "bag" / name).stat().st_size, "bytes")
+    bag.close()
+
+
 def main():
     OUT.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as scratch:
@@ -79,6 +123,7 @@ def main():
             [made] = folder.glob(f"*.{ending}")
             shutil.copy(made, OUT / f"arm.{ending}")
             shutil.rmtree(folder)
+        write_corpus(scratch)
     for file in sorted(OUT.iterdir()):
         print(file.name, file.stat().st_size, "bytes")
 

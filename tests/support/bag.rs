@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use armcal::log::for_each_raw;
-use rusqlite::Connection;
+use sqlite::Connection;
 
 /// Versions of rosbag2's tables: before Humble, Humble, Iron and later.
 pub const VERSIONS: [u32; 3] = [2, 3, 4];
@@ -27,7 +27,7 @@ pub fn write_bag(bag: &Path, version: u32, recording: &Path, is_kept: impl Fn(us
         tables += "CREATE TABLE message_definitions(id INTEGER PRIMARY KEY,topic_type TEXT NOT NULL,encoding TEXT NOT \
             NULL,encoded_message_definition TEXT NOT NULL,type_description_hash TEXT NOT NULL);";
     }
-    bag.execute_batch(&tables).expect("tables");
+    bag.execute(&tables).expect("tables");
     let mut topics: Vec<String> = Vec::new();
     let mut place = 0;
     for_each_raw(recording, |raw| {
@@ -39,18 +39,35 @@ pub fn write_bag(bag: &Path, version: u32, recording: &Path, is_kept: impl Fn(us
             topics.push(raw.topic().to_owned());
             let schema = raw.channel.schema.as_ref().expect("a type");
             let more = if version >= 4 { ", ''" } else { "" };
-            let sql = format!("INSERT INTO topics VALUES(NULL, ?1, ?2, ?3, ''{more})");
-            bag.execute(&sql, (raw.topic(), &schema.name, &raw.channel.message_encoding)).expect("a topic");
+            let values = [raw.topic(), &schema.name, &raw.channel.message_encoding].map(str::as_bytes);
+            insert(&bag, &format!("INSERT INTO topics VALUES(NULL, ?, ?, ?, ''{more})"), None, &values);
             if version >= 4 {
-                let text = String::from_utf8(schema.data.clone()).expect("a text");
-                let sql = "INSERT INTO message_definitions VALUES(NULL, ?1, 'ros2msg', ?2, '')";
-                bag.execute(sql, (&schema.name, text)).expect("a type");
+                let sql = "INSERT INTO message_definitions VALUES(NULL, ?, 'ros2msg', ?, '')";
+                insert(&bag, sql, None, &[schema.name.as_bytes(), &schema.data]);
             }
         }
         let topic = topics.iter().position(|topic| topic == raw.topic()).expect("it is there") as i64 + 1;
-        let mut sql = bag.prepare_cached("INSERT INTO messages VALUES(NULL, ?1, ?2, ?3)").expect("sql");
-        sql.execute((topic, raw.log_time_nanos as i64, raw.data)).expect("a message");
+        let sql = "INSERT INTO messages VALUES(NULL, ?, ?, ?)";
+        insert(&bag, sql, Some([topic, raw.log_time_nanos as i64]), &[raw.data]);
     })
     .expect("it reads");
-    bag.execute_batch("COMMIT").expect("written");
+    bag.execute("COMMIT").expect("written");
+}
+
+/// Numbers and a blob; without numbers, texts.
+fn insert(bag: &Connection, sql: &str, numbers: Option<[i64; 2]>, rest: &[&[u8]]) {
+    let mut statement = bag.prepare(sql).expect("sql");
+    let mut at = 1;
+    for number in numbers.iter().flatten() {
+        statement.bind((at, *number)).expect("bound");
+        at += 1;
+    }
+    for bytes in rest {
+        match numbers {
+            Some(_) => statement.bind((at, *bytes)).expect("bound"),
+            None => statement.bind((at, std::str::from_utf8(bytes).expect("a text"))).expect("bound"),
+        }
+        at += 1;
+    }
+    statement.next().expect("inserted");
 }

@@ -11,6 +11,7 @@
 
 mod declaration;
 mod messages;
+mod numbers;
 mod pages;
 mod row;
 mod tree;

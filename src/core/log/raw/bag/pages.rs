@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::io::{self, Read, Seek};
 
+use super::numbers::{be_u16, be_u32};
 use super::write_ahead_log;
 use crate::log::raw::file_type::SQLITE;
 use crate::log::raw::scan::ScanError;
@@ -45,16 +46,6 @@ pub struct Pages<R> {
     newer: Option<(Window<R>, BTreeMap<u32, u64>)>,
     /// One bit per page.
     is_used: Vec<u64>,
-}
-
-/// Big-endian number at `at`.
-pub fn be_u16(bytes: &[u8], at: usize) -> Option<u16> {
-    bytes.get(at..at + 2)?.try_into().ok().map(u16::from_be_bytes)
-}
-
-/// Big-endian number at `at`.
-pub fn be_u32(bytes: &[u8], at: usize) -> Option<u32> {
-    bytes.get(at..at + 4)?.try_into().ok().map(u32::from_be_bytes)
 }
 
 impl<R: Read + Seek> Pages<R> {

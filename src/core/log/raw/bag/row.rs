@@ -1,19 +1,6 @@
 //! Columns of a row.
 
-/// A number of one to nine bytes, seven bits in each but the last, and the bytes after it.
-pub fn varint(bytes: &[u8]) -> Option<(u64, &[u8])> {
-    let mut value = 0_u64;
-    for (at, byte) in bytes.iter().take(9).enumerate() {
-        if at == 8 {
-            return Some((value << 8 | u64::from(*byte), &bytes[9..]));
-        }
-        value = value << 7 | u64::from(byte & 0x7f);
-        if byte & 0x80 == 0 {
-            return Some((value, &bytes[at + 1..]));
-        }
-    }
-    None
-}
+use super::numbers::varint;
 
 /// One column.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -3,7 +3,7 @@
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
-use rusqlite::Connection;
+use sqlite::Connection;
 
 use super::*;
 use crate::log::raw::completeness::{Completeness, RawSummary};
@@ -23,9 +23,9 @@ const VERSIONS: [u32; 3] = [2, 3, 4];
 
 fn create(path: &Path, page_bytes: u32, version: u32) -> Connection {
     let bag = Connection::open(path).expect("a file");
-    bag.pragma_update(None, "page_size", page_bytes).expect("set");
+    bag.execute(format!("PRAGMA page_size={page_bytes}")).expect("set");
     let more = if version >= 4 { ", type_description_hash TEXT NOT NULL" } else { "" };
-    bag.execute_batch(&format!(
+    bag.execute(format!(
         "CREATE TABLE topics(id INTEGER PRIMARY KEY,name TEXT NOT NULL,type TEXT NOT NULL,serialization_format TEXT \
          NOT NULL,offered_qos_profiles TEXT NOT NULL{more});\
          CREATE TABLE messages(id INTEGER PRIMARY KEY,topic_id INTEGER NOT NULL,timestamp INTEGER NOT NULL, data BLOB \
@@ -34,7 +34,7 @@ fn create(path: &Path, page_bytes: u32, version: u32) -> Connection {
     ))
     .expect("tables");
     if version >= 3 {
-        bag.execute_batch(&format!(
+        bag.execute(format!(
             "CREATE TABLE schema(schema_version INTEGER PRIMARY KEY,ros_distro TEXT NOT NULL);\
              CREATE TABLE metadata(id INTEGER PRIMARY KEY,metadata_version INTEGER NOT NULL,metadata TEXT NOT NULL);\
              INSERT INTO schema VALUES({version}, 'jazzy');"
@@ -42,7 +42,7 @@ fn create(path: &Path, page_bytes: u32, version: u32) -> Connection {
         .expect("tables");
     }
     if version >= 4 {
-        bag.execute_batch(
+        bag.execute(
             "CREATE TABLE message_definitions(id INTEGER PRIMARY KEY,topic_type TEXT NOT NULL,encoding TEXT NOT \
              NULL,encoded_message_definition TEXT NOT NULL,type_description_hash TEXT NOT NULL);\
              INSERT INTO message_definitions(topic_type,encoding,encoded_message_definition,type_description_hash) \
@@ -52,8 +52,7 @@ fn create(path: &Path, page_bytes: u32, version: u32) -> Connection {
     }
     for (name, kind) in TOPICS {
         let hash = if version >= 4 { ", ''" } else { "" };
-        let insert = format!("INSERT INTO topics VALUES(NULL, ?1, ?2, 'cdr', ''{hash})");
-        bag.execute(&insert, (name, kind)).expect("a topic");
+        bag.execute(format!("INSERT INTO topics VALUES(NULL, '{name}', '{kind}', 'cdr', ''{hash})")).expect("a topic");
     }
     bag
 }
@@ -68,16 +67,20 @@ fn data(n: usize) -> Vec<u8> {
 fn insert(bag: &Connection, messages: std::ops::Range<usize>) {
     let mut insert = bag.prepare("INSERT INTO messages (timestamp, topic_id, data) VALUES (?1, ?2, ?3)").expect("sql");
     for n in messages {
-        insert.execute((START_NANOS + n as i64 * 1_000_000, (n % 3 + 1) as i64, data(n))).expect("a message");
+        insert.reset().expect("sql");
+        insert.bind((1, START_NANOS + n as i64 * 1_000_000)).expect("bound");
+        insert.bind((2, (n % 3 + 1) as i64)).expect("bound");
+        insert.bind((3, &data(n)[..])).expect("bound");
+        insert.next().expect("a message");
     }
 }
 
 fn written(folder: &Path, page_bytes: u32, version: u32, n_messages: usize) -> PathBuf {
     let path = folder.join(format!("{page_bytes}-{version}-{n_messages}.db3"));
     let bag = create(&path, page_bytes, version);
-    bag.execute_batch("BEGIN").expect("begun");
+    bag.execute("BEGIN").expect("begun");
     insert(&bag, 0..n_messages);
-    bag.execute_batch("COMMIT").expect("committed");
+    bag.execute("COMMIT").expect("committed");
     path
 }
 
@@ -155,13 +158,12 @@ fn what_a_killed_recorder_left_in_the_log_is_read() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("open.db3");
     let bag = create(&path, 4096, 3);
-    let mode: String = bag.query_row("PRAGMA journal_mode=WAL", [], |row| row.get(0)).expect("set");
-    assert_eq!(mode, "wal");
-    bag.execute_batch("PRAGMA wal_autocheckpoint=0; BEGIN").expect("begun");
+    bag.execute("PRAGMA journal_mode=WAL").expect("set");
+    bag.execute("PRAGMA wal_autocheckpoint=0; BEGIN").expect("begun");
     insert(&bag, 0..100);
-    bag.execute_batch("COMMIT; PRAGMA wal_checkpoint(PASSIVE); BEGIN").expect("committed");
+    bag.execute("COMMIT; PRAGMA wal_checkpoint(PASSIVE); BEGIN").expect("committed");
     insert(&bag, 100..300);
-    bag.execute_batch("COMMIT; PRAGMA cache_size=10; BEGIN").expect("committed");
+    bag.execute("COMMIT; PRAGMA cache_size=10; BEGIN").expect("committed");
     insert(&bag, 300..400);
     // As a kill leaves it: the last transaction is partly in the log.
     let copy = folder.path().join("killed.db3");
@@ -262,7 +264,7 @@ fn databases_that_are_no_bags_are_named() {
     let folder = tempfile::tempdir().expect("a folder");
     let problem = |name: &str, sql: &str| {
         let path = folder.path().join(name);
-        Connection::open(&path).expect("a file").execute_batch(sql).expect("made");
+        Connection::open(&path).expect("a file").execute(sql).expect("made");
         let error = for_each_raw(&path, |_| {}).expect_err("refused");
         assert!(matches!(error, LogError::NotBag { .. }), "{error}");
         error.to_string()

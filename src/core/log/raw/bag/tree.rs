@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 use std::io::{self, Read, Seek};
 use std::ops::Range;
 
-use super::pages::{HEADER_BYTES, PageError, Pages, be_u16, be_u32};
-use super::row::varint;
+use super::numbers::{be_u16, be_u32, varint};
+use super::pages::{HEADER_BYTES, PageError, Pages};
 
 const TABLE_INNER: u8 = 5;
 const TABLE_LEAF: u8 = 13;

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::io::{self, Read, Seek};
 
-use super::pages::be_u32;
+use super::numbers::be_u32;
 use crate::log::raw::window::Window;
 
 /// First number of a log; its last bit tells the order of the checksum's words.
