@@ -1,7 +1,8 @@
 //! Ten rendered runs calibrated from their images alone, beside the runs' own results: docs/reference/real-arms.md.
 //!
-//! `cargo test --release --test main image_seeds -- --ignored --nocapture`: an hour, and with `ARMCAL_IMAGE_ALL=1`, where
-//! images between the views count as well, two. `ARMCAL_IMAGE_SEEDS=N` does fewer seeds; runs and results stay in target/image-seeds, or in the folder `ARMCAL_IMAGE_FOLDER`, and are used again.
+//! `cargo test --release --test main image_seeds -- --ignored --nocapture`: an hour, and with `ARMCAL_IMAGE_ALL=1`,
+//! where images between the views count as well, two. `ARMCAL_IMAGE_SEEDS=N` does fewer seeds; runs and results stay in
+//! target/image-seeds, or in the folder `ARMCAL_IMAGE_FOLDER`, and are used again.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -219,8 +219,8 @@ pub(crate) struct RestPose<'a> {
 }
 
 impl RestPose<'_> {
-    /// The way that each joint came here, by the readings before, the latest first, each with its place: by the last that
-    /// are clearly elsewhere. -1 or 1, 0 where it has not moved. Appends the readings that decided it.
+    /// The way that each joint came here, by the readings before, the latest first, each with its place: by the last
+    /// that are clearly elsewhere. -1 or 1, 0 where it has not moved. Appends the readings that decided it.
     pub(crate) fn approach<R>(
         &self,
         readings: impl Iterator<Item = (usize, R)>,
