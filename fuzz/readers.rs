@@ -56,10 +56,11 @@ impl Scratch {
 type Read = fn(&Scratch, &[u8]) -> bool;
 
 /// By the names of the targets and of the folders of their corpora.
-pub const READERS: [(&str, Read); 23] = [
+pub const READERS: [(&str, Read); 24] = [
     ("urdf", urdf),
     ("new_robot", new_robot),
     ("recording", recording),
+    ("bag", bag),
     ("cdr", cdr),
     ("robot", robot),
     ("vehicle", vehicle),
@@ -127,15 +128,30 @@ fn routine(scratch: &Scratch, bytes: &[u8]) -> bool {
 }
 
 fn recording(scratch: &Scratch, bytes: &[u8]) -> bool {
-    let path = scratch.write("recording.mcap", bytes);
-    let _ = read_attachments(&path);
     followed(scratch, bytes);
-    let proposed = armcal::report::proposed_map::propose_input_map(&path, Some(&scratch.robot));
-    if let Some(map) = proposed.ok().and_then(|text| armcal::input::parse_input_map(&path, &text).ok()) {
-        let _ = armcal::input::read_external(&path, &map, &scratch.robot);
+    any_recording(scratch, &scratch.write("recording.mcap", bytes))
+}
+
+/// A ROS 2 bag; what begins as a log of writes is one, beside the bag of the corpus.
+fn bag(scratch: &Scratch, bytes: &[u8]) -> bool {
+    if !bytes.starts_with(&[0x37, 0x7f, 0x06]) {
+        return any_recording(scratch, &scratch.write("bag.db3", bytes));
     }
-    let _ = armcal::report::inspection::inspect(&path, None).map(|found| armcal::report::inspection::to_text(&found));
-    read_recording(&path).is_ok_and(|recording| !recording.messages.is_empty())
+    let corpus = scratch.recording.with_file_name("../bag/arm.db3");
+    let path = scratch.path("logged.db3");
+    fs::copy(corpus, &path).expect("copied");
+    scratch.write("logged.db3-wal", bytes);
+    any_recording(scratch, &path)
+}
+
+fn any_recording(scratch: &Scratch, path: &Path) -> bool {
+    let _ = read_attachments(path);
+    let proposed = armcal::report::proposed_map::propose_input_map(path, Some(&scratch.robot));
+    if let Some(map) = proposed.ok().and_then(|text| armcal::input::parse_input_map(path, &text).ok()) {
+        let _ = armcal::input::read_external(path, &map, &scratch.robot);
+    }
+    let _ = armcal::report::inspection::inspect(path, None).map(|found| armcal::report::inspection::to_text(&found));
+    read_recording(path).is_ok_and(|recording| !recording.messages.is_empty())
 }
 
 /// The same while it grows: half of it, then all.

@@ -7,7 +7,8 @@
 //! belief does not know; `vehicles` puts every arm on every vehicle; `bumps` runs into things that nobody has drawn;
 //! `planning` reads plans and holds random arms against them; `determinism`, `closed_loop`, `script` and `cli` run
 //! the program, `kill` ends it badly; `sim` looks at the simulated world from outside; `uncalibrated` calibrates arms
-//! of which little is known; `real` reads recordings of real arms, `recorded_inputs` their slow sensors and images;
+//! of which little is known; `real` reads recordings of real arms, `bags` the same as SQLite files, `recorded_inputs`
+//! their slow sensors and images, `streams` those that were recorded all the time;
 //! `tagmap` maps tags in recordings that the test writes; `touch` feels surveyed plates with the tool; `any_arm`
 //! makes robot folders for drawings of all sorts; `report` reads report.html; `work` works on a dive, `watch` follows
 //! recordings that grow; `live` moves arms behind ROS 2 topics; `repository` reads sources and pages.
@@ -15,6 +16,7 @@
 #![allow(clippy::print_stderr, reason = "figures of a test, for whoever reads its output")]
 
 mod any_arm;
+mod bags;
 mod bumps;
 mod cli;
 mod closed_loop;
@@ -25,6 +27,7 @@ mod eye_to_hand;
 mod failed;
 mod golden;
 mod gripper_tag;
+mod image_seeds;
 mod kill;
 #[cfg(feature = "live")]
 mod live;
@@ -42,6 +45,7 @@ mod report;
 mod repository;
 mod script;
 mod sim;
+mod streams;
 mod support;
 mod tagmap;
 mod touch;

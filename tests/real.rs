@@ -16,7 +16,7 @@ use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use serde_json::Value;
 
 use crate::support::external::{
-    AS_IN_2018, INPUT_MAP, Noise, Pose, RealTitan, at, header, joint_state, transform, write_poses,
+    AS_IN_2018, INPUT_MAP, Noise, Pose, RealTitan, at, header, joint_state, transform, write_poses, write_stream,
 };
 use crate::support::synthetic::{N_SEEN, TrueArm, add_noise};
 use crate::support::{Answer, answer, program, read, robot_folder, temp, titan, write};
@@ -377,31 +377,7 @@ fn streams_become_one_view_for_each_rest_of_the_arm() {
     let folder = temp();
     let (path, tags) = (folder.path().join("arm.mcap"), folder.path().join("tags.toml"));
     write(&tags, &titan.tag_map());
-    let mut rng = stream_rng(9, "stream");
-    let mut writer = RecordingWriter::create(&path, RecordingHeader::new(Vec::new())).expect("a file");
-    for tick in 0..(2 * N - 1) * 50 {
-        let (k, on_the_way) = (tick / 100, ((tick % 100) as f64 - 50.0).max(0.0) / 50.0);
-        let now = at(0.02 * tick as f64);
-        let next = &titan.poses[(k + 1).min(N - 1)];
-        let joints: Vec<(String, f64)> = titan.poses[k]
-            .joints
-            .iter()
-            .zip(&next.joints)
-            .map(|((name, from), (_, to))| {
-                // The short way round the word, with the sensor's noise.
-                let way = (to - from + 32768.0).rem_euclid(65536.0) - 32768.0;
-                let word = from + on_the_way * way + crate::support::synthetic::normal(&mut rng);
-                (name.clone(), word.round().rem_euclid(65536.0))
-            })
-            .collect();
-        writer.write_ros("/joint_states", &ros::JointState::SCHEMA, now, &joint_state(now, &joints)).expect("written");
-        if tick % 5 == 0 {
-            let seen = titan.poses[k].tags.iter().map(|(frame, tag)| transform(now, "fisheye", frame, tag));
-            let message = ros::TfMessage { transforms: seen.collect() };
-            writer.write_ros("/tf", &ros::TfMessage::SCHEMA, now, &message).expect("written");
-        }
-    }
-    writer.finish().expect("finished");
+    write_stream(&path, &titan.poses, 9);
     let map = parse_input_map(Path::new("map.toml"), INPUT_MAP).expect("good");
     let named = read_landmarks(&tags).expect("it reads").survey(&tags, &robot, map.tag_use).expect("a survey");
     let prepared = prepared(&robot.clone().with_survey(named.survey), &path, &map);

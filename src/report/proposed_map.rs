@@ -65,7 +65,8 @@ pub fn propose_input_map(recording: &Path, robot: Option<&Robot>) -> Result<Stri
 fn conditions(contents: &Contents) -> String {
     let temperatures: Vec<&String> = contents.of_kind(Kind::Temperature).map(|(topic, _)| topic).collect();
     let pressures: Vec<&String> = contents.of_kind(Kind::Pressure).map(|(topic, _)| topic).collect();
-    if temperatures.is_empty() && pressures.is_empty() {
+    let attitudes: Vec<&String> = contents.of_kind(Kind::Attitude).map(|(topic, _)| topic).collect();
+    if temperatures.is_empty() && pressures.is_empty() && attitudes.is_empty() {
         return String::new();
     }
     let is_oil = |topic: &&&String| ["oil", "hydraulic"].iter().any(|word| topic.to_lowercase().contains(word));
@@ -73,6 +74,15 @@ fn conditions(contents: &Contents) -> String {
     let mut text = "\n[conditions]\n".to_owned();
     text += &line("oil_temperature", oil, "sensor_msgs/msg/Temperature, deg C");
     text += &line("pressure", pressures.first().copied(), "sensor_msgs/msg/FluidPressure, Pa");
+    // Where it sits, and how it is turned, no recording tells: one on a link of the arm would do harm.
+    if let Some(attitude) = attitudes.first() {
+        text += &format!(
+            "# attitude = {}   # sensor_msgs/msg/Imu, if it sits on what carries the arm\n\
+             # attitude_in_base_wxyz = [1.0, 0.0, 0.0, 0.0]   # how it is turned in the base link\n",
+            comment(&quoted(attitude))
+        );
+    }
+    text += &others("other attitude sensors", attitudes.into_iter().skip(1));
     text += &others("other thermometers", temperatures.into_iter().filter(|topic| Some(*topic) != oil));
     text += &others("other pressure gauges", pressures.into_iter().skip(1));
     text

@@ -23,7 +23,7 @@ const LONGEST_WAIT: Duration = Duration::from_secs(600);
 const GIVEN_KIB: u64 = 2 << 20;
 const MOST_KIB: u64 = 500_000;
 /// Runs in every test run; `ARMCAL_MUTATED_RUNS=20000` for a campaign.
-const RUNS: u64 = 48;
+const RUNS: u64 = 51;
 
 /// What is changed, its name in the folder of the case, and the command; `-` in front of a word is kept, a name of the
 /// folder becomes its path.
@@ -39,11 +39,12 @@ const fn case(seed: &'static str, name: &'static str, command: &'static str) -> 
 }
 
 const VIEWS: &str = "fuzz/corpus/recording/views.mcap";
+const BAG: &str = "fuzz/corpus/bag/arm.db3";
 const CUT: &str = "fuzz/corpus/recording/cut.mcap";
 const TAGMAP: &str = "tagmap views.mcap --topic /camera/wrist/detections --camera cameras.yaml --tags";
 const TABLE: &str = "calibrate poses.csv --robot robot --input table.toml --out out --method minimum_distance";
 
-const CASES: [Case; 48] = [
+const CASES: [Case; 51] = [
     case("robots/titan4/titan4.urdf", "robot/titan4.urdf", "check robot"),
     case("robots/titan4/titan4.urdf", "robot/titan4.urdf", "inspect views.mcap --robot robot"),
     case("robots/kraft-predator/kraft-predator.urdf", "robot/titan4.urdf", "check robot"),
@@ -83,6 +84,9 @@ const CASES: [Case; 48] = [
     case(CUT, "given.mcap", "inspect given.mcap --json"),
     case(VIEWS, "changed.mcap", "inspect changed.mcap --robot robot --write-input map.toml"),
     case(CUT, "given.mcap", "replay given.mcap --save out.rrd"),
+    case(BAG, "given.db3", "inspect given.db3 --robot robot"),
+    case(BAG, "given.db3", "inspect given.db3 --write-input map.toml"),
+    case(BAG, "given.db3", "calibrate given.db3 --robot robot --out out --method minimum_distance"),
     case(VIEWS, "given.mcap", "watch given.mcap --robot robot --idle-s 1"),
     case(VIEWS, "changed.mcap", "watch changed.mcap --robot robot --idle-s 1 --json --out out"),
     case(VIEWS, "changed.mcap", "inspect changed.mcap --robot robot"),

@@ -135,3 +135,35 @@ pub fn write_poses(path: &Path, poses: &[Pose]) {
     }
     writer.finish().expect("finished");
 }
+
+/// Writes 50 readings and 10 images a second: a second at rest at each pose, a second on the way to the next.
+pub fn write_stream(path: &Path, poses: &[Pose], seed: u64) {
+    let mut rng = stream_rng(seed, "stream");
+    let mut writer = RecordingWriter::create(path, RecordingHeader::new(Vec::new())).expect("a file");
+    for tick in 0..(2 * poses.len() - 1) * 50 {
+        let (k, on_the_way) = (tick / 100, ((tick % 100) as f64 - 50.0).max(0.0) / 50.0);
+        let now = at(0.02 * tick as f64);
+        let next = &poses[(k + 1).min(poses.len() - 1)];
+        let joints: Vec<(String, f64)> = poses[k]
+            .joints
+            .iter()
+            .zip(&next.joints)
+            .map(|((name, from), (_, to))| {
+                let word = from + on_the_way * way(*from, *to) + normal(&mut rng);
+                (name.clone(), word.round().rem_euclid(65536.0))
+            })
+            .collect();
+        writer.write_ros("/joint_states", &ros::JointState::SCHEMA, now, &joint_state(now, &joints)).expect("written");
+        if tick % 5 == 0 {
+            let seen = poses[k].tags.iter().map(|(frame, tag)| transform(now, "fisheye", frame, tag));
+            let message = ros::TfMessage { transforms: seen.collect() };
+            writer.write_ros("/tf", &ros::TfMessage::SCHEMA, now, &message).expect("written");
+        }
+    }
+    writer.finish().expect("finished");
+}
+
+/// From one word to another the short way round.
+pub fn way(from: f64, to: f64) -> f64 {
+    (to - from + 32768.0).rem_euclid(65536.0) - 32768.0
+}

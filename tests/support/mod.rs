@@ -1,6 +1,7 @@
 //! What several modules need: a short routine, the program's answers, one run that all share, and edited copies of
 //! files.
 
+pub mod bag;
 pub mod external;
 pub mod synthetic;
 

@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
+use super::attitude::AttitudeReader;
 use super::conditions::ConditionReader;
 use super::error::InputError;
 use super::images::{IMAGE_TYPES, ImageDetector};
@@ -61,6 +62,7 @@ fn read_up_to<'a>(
         joints: JointReader::new(&file, map, &topics.joints, robot),
         tags: TagReader::new(&file, map, topics, detector.map(|detector| detector as &mut dyn ImageDetector)),
         conditions: ConditionReader::new(&file, map, &topics.conditions),
+        attitudes: AttitudeReader::new(&file, map, topics),
     };
     let mut first_error = None;
     let summary = for_each_raw(path, |raw| {
@@ -89,6 +91,7 @@ struct MessageReader<'a> {
     joints: JointReader<'a>,
     tags: TagReader<'a>,
     conditions: ConditionReader<'a>,
+    attitudes: AttitudeReader<'a>,
 }
 
 impl MessageReader<'_> {
@@ -115,6 +118,10 @@ impl MessageReader<'_> {
             }
             self.conditions.take(raw, kind, digest(raw))?;
             self.conditions.readings.len()
+        } else if self.topics.conditions.attitude.as_deref() == Some(raw.topic()) {
+            check_type(self.file, raw, &["Imu"], "sensor_msgs/msg/Imu")?;
+            self.attitudes.take(raw, digest(raw))?;
+            self.attitudes.readings.len()
         } else {
             0
         };
@@ -128,7 +135,8 @@ impl MessageReader<'_> {
     /// Checks that all is there, in the order of time.
     fn check(&self) -> Result<(), InputError> {
         let file = || self.file.to_owned();
-        let conditions = self.topics.conditions.named().into_iter().map(|(topic, _)| topic);
+        let conditions =
+            self.topics.conditions.named().into_iter().map(|(topic, _)| topic).chain(&self.topics.conditions.attitude);
         let mut wanted = [&self.topics.joints, &self.topics.tags].into_iter().chain(conditions);
         if let Some(topic) = wanted.find(|topic| !self.seen.contains(*topic)) {
             let found = self.seen.iter().cloned().collect();
@@ -160,11 +168,16 @@ impl MessageReader<'_> {
         if self.conditions.left_out > 0 {
             left_out.insert("temperatures or pressures that are not finite".to_owned(), self.conditions.left_out);
         }
+        let (attitudes, not_finite) = self.attitudes.finish();
+        if not_finite > 0 {
+            left_out.insert("attitudes that are not finite".to_owned(), not_finite);
+        }
         let conditions = self.conditions.readings;
         ExternalRecording {
             readings,
             frames,
             conditions,
+            attitudes,
             absent_joints,
             extra_joints,
             left_out,

@@ -20,6 +20,8 @@
 //! [conditions]                       # optional
 //! oil_temperature = "/oil"           # sensor_msgs/msg/Temperature, deg C
 //! pressure = "/depth"                # sensor_msgs/msg/FluidPressure, Pa
+//! attitude = "/imu"                  # sensor_msgs/msg/Imu of what carries the arm: which way is up
+//! attitude_in_base_wxyz = [1.0, 0.0, 0.0, 0.0]   # optional: how the attitude sensor is turned in the base link
 //! ```
 //!
 //! Tables have columns instead of topics: [`TableLayout`].
@@ -27,6 +29,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use nalgebra::{Quaternion, UnitQuaternion};
 use serde::Deserialize;
 
 pub use self::table::{Direction, RotationColumns, RotationForm, TableFormat, TableLayout, TimeColumn};
@@ -34,6 +37,9 @@ use self::table::{TableToml, TagColumnsToml};
 use crate::robot::{FileIssue, JointSensorSpec, RobotError, parse_toml, read_text};
 
 mod table;
+
+/// How far a quaternion's length may be from 1.
+pub(super) const QUATERNION_LENGTH_TOLERANCE: f64 = 0.01;
 
 /// What of a tag's measurement counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
@@ -149,6 +155,10 @@ pub struct ConditionTopics {
     pub oil_temperature: Option<String>,
     /// Ambient pressure, `sensor_msgs/msg/FluidPressure`.
     pub pressure: Option<String>,
+    /// Attitude of what carries the arm, `sensor_msgs/msg/Imu`.
+    pub attitude: Option<String>,
+    /// base_from_sensor of the attitude's, as written; absent: as the base link.
+    attitude_in_base_wxyz: Option<[f64; 4]>,
 }
 
 impl ConditionTopics {
@@ -174,6 +184,8 @@ pub struct Topics {
     pub image_period_s: f64,
     /// Slow sensors.
     pub conditions: ConditionTopics,
+    /// How the attitude sensor is turned in the base link.
+    pub base_from_attitude: UnitQuaternion<f64>,
 }
 
 /// Where the data are.
@@ -326,6 +338,7 @@ fn check_no_topics(file: &Path, raw: &MapToml) -> Result<(), FileIssue> {
         ("tags.camera_info", &raw.tags.camera_info),
         ("conditions.oil_temperature", &raw.conditions.oil_temperature),
         ("conditions.pressure", &raw.conditions.pressure),
+        ("conditions.attitude", &raw.conditions.attitude),
     ];
     match given.into_iter().find(|(_, value)| value.is_some()) {
         Some((key, _)) => Err(FileIssue::new(file, key, "is for recordings; a [table] has columns. Leave one out")),
@@ -347,13 +360,14 @@ fn topics(file: &Path, joints: &JointsToml, tags: &TagsToml, conditions: Conditi
         camera_frame,
         camera_info: tags.camera_info.clone(),
         image_period_s: FileIssue::check_range(file, "tags.image_period_s", tags.image_period_s, 0.0..=3600.0)?,
+        base_from_attitude: base_from_attitude(file, &conditions)?,
         conditions,
     };
     if found.joints == found.tags {
         issue("tags.topic", "is the topic of the joint sensors, too")?;
     }
     let mut named: Vec<&String> = found.conditions.named().into_iter().map(|(topic, _)| topic).collect();
-    named.extend([&found.joints, &found.tags]);
+    named.extend([&found.joints, &found.tags].into_iter().chain(&found.conditions.attitude));
     named.sort_unstable();
     if named[0].is_empty() || named.windows(2).any(|two| two[0] == two[1]) {
         issue("conditions", "has an empty topic, or one that is named twice")?;
@@ -372,6 +386,18 @@ fn topics(file: &Path, joints: &JointsToml, tags: &TagsToml, conditions: Conditi
     Ok(found)
 }
 
+fn base_from_attitude(file: &Path, conditions: &ConditionTopics) -> Result<UnitQuaternion<f64>, FileIssue> {
+    let issue = |problem: &str| Err(FileIssue::new(file, "conditions.attitude_in_base_wxyz", problem));
+    let Some([w, x, y, z]) = conditions.attitude_in_base_wxyz else { return Ok(UnitQuaternion::identity()) };
+    let quaternion = Quaternion::new(w, x, y, z);
+    let is_unit = (quaternion.norm() - 1.0).abs() <= QUATERNION_LENGTH_TOLERANCE;
+    match (is_unit, &conditions.attitude) {
+        (true, Some(_)) => Ok(UnitQuaternion::from_quaternion(quaternion)),
+        (true, None) => issue("turns an attitude sensor; name its topic as conditions.attitude"),
+        (false, _) => issue("is no rotation; a quaternion w, x, y, z has the length 1, within 1 %"),
+    }
+}
+
 fn child_frame(file: &Path, frame: &str) -> Result<ChildFrame, FileIssue> {
     let issue = |problem: &str| FileIssue::new(file, "tags.child_frame", format!("`{frame}` {problem}"));
     let frame = without_slash(frame);
@@ -386,65 +412,4 @@ fn child_frame(file: &Path, frame: &str) -> Result<ChildFrame, FileIssue> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    const GOOD: &str = "version = 1\n[joint_sensors]\ntopic = \"/joint_states\"\n[tags]\ntopic = \"/tf\"\n\
-        camera_frame = \"/fisheye\"\nchild_frame = \"tag36h11:{id}\"\nuse = \"position\"\n";
-
-    fn parse(text: &str) -> Result<InputMap, String> {
-        parse_input_map(Path::new("map.toml"), text).map_err(|error| error.to_string())
-    }
-
-    #[test]
-    fn frames_are_told_with_and_without_slash_and_by_number() {
-        let map = parse(GOOD).expect("good");
-        let Source::Topics(topics) = &map.source else { panic!("topics") };
-        assert_eq!(topics.camera_frame.as_deref(), Some("fisheye"));
-        let frame = map.child_frame.expect("a frame");
-        assert_eq!(frame.id_of("tag36h11:7"), Some(7));
-        assert_eq!(frame.id_of("/tag36h11:12"), Some(12));
-        for other in ["tag36h11:", "tag36h11:+7", "tag36h11:7b", "tag25h9:7", "tag36h11:99999999999"] {
-            assert_eq!(frame.id_of(other), None, "{other}");
-        }
-        let plain = parse(&GOOD.replace("tag36h11:{id}", "board")).expect("good").child_frame.expect("a frame");
-        assert_eq!((plain.id_of("board"), plain.id_of("/board"), plain.id_of("board2")), (Some(0), Some(0), None));
-    }
-
-    #[test]
-    fn what_is_wrong_is_named_with_file_and_key() {
-        let faults: [(&str, &str, &[&str]); 13] = [
-            ("[tags]", "[conditions]\noil_temperature = \"/tf\"\n[tags]", &["conditions", "twice"]),
-            ("[tags]", "[conditions]\nwater = \"/w\"\n[tags]", &["water", "oil_temperature", "pressure"]),
-            ("[tags]", "[tags]\nimage_period_s = -1.0", &["tags.image_period_s", "3600"]),
-            ("version = 1", "version = 2", &["version", "1 .. 1"]),
-            ("version = 1", "version = 1\nmax_gap_s = -1.0", &["max_gap_s", "60"]),
-            ("version = 1", "version = 1\nmax_gap_s = nan", &["max_gap_s", "NaN"]),
-            ("[tags]", "[tags]\nframe = \"x\"", &["frame", "unknown field"]),
-            ("\"position\"", "\"posiiton\"", &["posiiton", "position", "pose", "corners"]),
-            ("{id}", "{ids}", &["tags.child_frame", "{ids}"]),
-            ("{id}", "{id}{id}", &["tags.child_frame"]),
-            ("camera_frame = \"/fisheye\"\n", "", &["tags.camera_frame", "missing"]),
-            ("child_frame = \"tag36h11:{id}\"\n", "", &["tags.child_frame", "missing"]),
-            ("topic = \"/tf\"", "topic = \"/joint_states\"", &["tags.topic"]),
-        ];
-        for (from, to, words) in faults {
-            assert!(GOOD.contains(from), "{from}");
-            let problem = parse(&GOOD.replacen(from, to, 1)).expect_err(to);
-            for word in words.iter().chain(&["map.toml"]) {
-                assert!(problem.contains(word), "{to}: no `{word}` in {problem}");
-            }
-        }
-    }
-
-    #[test]
-    fn corners_need_no_frames() {
-        let text = "version = 1\nmax_gap_s = 0.1\nwhile_moving = \"use\"\nnot_finite = \"leave_out\"\n\
-            [joint_sensors]\ntopic = \"/a\"\nnames = { elbow = \"j3\" }\n[tags]\ntopic = \"/b\"\nuse = \"corners\"\n";
-        let map = parse(text).expect("good");
-        let Source::Topics(topics) = &map.source else { panic!("topics") };
-        assert_eq!((&topics.camera_frame, &map.child_frame, map.max_gap_s), (&None, &None, 0.1));
-        assert_eq!((map.while_moving, map.not_finite), (WhileMoving::Use, NotFinite::LeaveOut));
-        assert_eq!(map.joint_names["elbow"], "j3");
-    }
-}
+mod tests;

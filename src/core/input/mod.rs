@@ -1,10 +1,11 @@
 //! Recordings of real arms by an input map (TOML).
 //!
 //! `map` reads the input map: topics or columns, frames and names. `external` reads a recording by it, message by
-//! message, into raw joint readings (`joints`), slow sensors (`conditions`) and detections (`tags`, those in images by
-//! an `images::ImageDetector` that is given), `table` a CSV or YAML file. Nothing is paired or averaged. `task` reads
+//! message, into raw joint readings (`joints`), slow sensors (`conditions`), attitudes (`attitude`) and detections
+//! (`tags`, those in images by an `images::ImageDetector` that is given), `table` a CSV or YAML file. Nothing is paired or averaged. `task` reads
 //! `--task` files, the targets that the arm is calibrated for.
 
+mod attitude;
 mod conditions;
 mod error;
 mod external;
@@ -17,6 +18,7 @@ mod table;
 mod tags;
 mod task;
 
+pub use attitude::AttitudeReading;
 pub use conditions::ConditionReading;
 pub use error::{BadPlace, InputError};
 pub use external::{read_external, read_external_images};

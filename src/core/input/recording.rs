@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
+use super::attitude::AttitudeReading;
 use super::conditions::ConditionReading;
 use super::joints::Reading;
 use super::tags::TagFrame;
@@ -19,6 +20,8 @@ pub struct ExternalRecording {
     pub frames: Vec<TagFrame>,
     /// Readings of slow sensors, in the order of the file.
     pub conditions: Vec<ConditionReading>,
+    /// Attitudes of what carries the arm, in the order of their stamps.
+    pub attitudes: Vec<AttitudeReading>,
     /// Joints of the robot that no reading has, by index; none of them moves the camera.
     pub absent_joints: Vec<usize>,
     /// Recorded joints that the robot lacks.

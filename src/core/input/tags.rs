@@ -7,7 +7,7 @@ use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 
 use super::error::{BadPlace, InputError};
 use super::images::{ImageDetector, ImageProblem, RecordedImage};
-use super::map::{InputMap, NotFinite, TagUse, Topics, without_slash};
+use super::map::{InputMap, NotFinite, QUATERNION_LENGTH_TOLERANCE, TagUse, Topics, without_slash};
 use super::stamp::stamp_or_log_time;
 use crate::log::ros::{AprilTagDetectionArray, TfMessage, TransformStamped};
 use crate::log::{RawMessage, StampOrder, decode};
@@ -44,8 +44,6 @@ pub struct TagFrame {
     pub digests: Vec<[u8; 32]>,
 }
 
-/// How far a quaternion's length may be from 1.
-pub(super) const QUATERNION_LENGTH_TOLERANCE: f64 = 0.01;
 /// A landmark in the lens itself is a transform that nobody filled in, m.
 pub(super) const MIN_DISTANCE_M: f64 = 1e-6;
 /// Names of frames that an error lists.

@@ -129,13 +129,25 @@ impl Chain {
     /// Poses of all links at `angles` by the sensors (rad).
     #[must_use]
     pub fn link_poses(&self, angles: &JointAngles) -> LinkPoses {
-        self.bent_poses(angles, &self.sag, |_, joint| joint.parent_from_joint)
+        self.bent_poses(angles, (&self.sag, &self.loads), |_, joint| joint.parent_from_joint)
     }
 
     /// The same for the arm with `corrections` of its drawing, its own sag aside.
     #[must_use]
     pub fn corrected_link_poses(&self, angles: &JointAngles, corrections: &LinkCorrections) -> LinkPoses {
-        self.bent_poses(angles, &corrections.sag, |i, joint| corrections[i].applied_to(&joint.parent_from_joint))
+        self.corrected_link_poses_under(angles, corrections, &self.loads)
+    }
+
+    /// The same under other loads, such as [`ArmLoads::with_up`] of a base that leans.
+    #[must_use]
+    pub fn corrected_link_poses_under(
+        &self,
+        angles: &JointAngles,
+        corrections: &LinkCorrections,
+        loads: &ArmLoads,
+    ) -> LinkPoses {
+        let place = |i: usize, joint: &ChainJoint| corrections[i].applied_to(&joint.parent_from_joint);
+        self.bent_poses(angles, (&corrections.sag, loads), place)
     }
 
     /// The chain with `corrections` of its drawing.
@@ -152,7 +164,7 @@ impl Chain {
     fn bent_poses(
         &self,
         angles: &JointAngles,
-        sag: &Sag,
+        (sag, loads): (&Sag, &ArmLoads),
         parent_from_joint: impl Fn(usize, &ChainJoint) -> Isometry3<f64>,
     ) -> LinkPoses {
         let straight = self.link_poses_by(angles, &Isometry3::identity(), &parent_from_joint);
@@ -162,7 +174,7 @@ impl Chain {
         // The load of the bent arm, for the straight one's is off by as much as bending turns a link.
         let mut poses = straight;
         for _ in 0..2 {
-            let bend: AboutAxes = sag.bend(&self.loads.torques(&poses, sag.tool_load_n));
+            let bend: AboutAxes = sag.bend(&loads.torques(&poses, sag.tool_load_n));
             let bent = JointAngles::from_fn(angles.len(), |joint| angles[joint] + bend.joints[joint]);
             let base = Isometry3::from_parts(Translation3::identity(), bend.base_turn());
             poses = self.link_poses_by(&bent, &base, &parent_from_joint);

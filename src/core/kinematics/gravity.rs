@@ -68,6 +68,12 @@ impl ArmLoads {
         self.links[1..].iter().any(|link| link.weight_n != 0.0)
     }
 
+    /// The same where gravity points against `up` (unit, base frame): on a base that leans.
+    #[must_use]
+    pub fn with_up(&self, up: Vector3<f64>) -> Self {
+        Self { up, ..*self }
+    }
+
     /// Torques of all links and of `tool_load_n` at the tool, N m.
     #[must_use]
     pub fn torques(&self, poses: &LinkPoses, tool_load_n: f64) -> AboutAxes {

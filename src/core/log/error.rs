@@ -15,6 +15,8 @@ pub enum LogError {
     Empty { path: PathBuf },
     #[error("{}: not an MCAP recording: {found}", path.display())]
     NotMcap { path: PathBuf, found: String },
+    #[error("{}: not a ROS 2 bag: {found}", path.display())]
+    NotBag { path: PathBuf, found: String },
     #[error("{}: it was cut to {bytes} bytes while it was read; {read} bytes were read before", path.display())]
     Truncated { path: PathBuf, bytes: u64, read: u64 },
     #[error("{}: another recording took its place while it was read", path.display())]

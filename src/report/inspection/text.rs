@@ -37,12 +37,16 @@ fn printable(line: &str) -> String {
     line.chars().map(|c| if c.is_control() && c != '\n' { '\u{fffd}' } else { c }).collect()
 }
 
+/// What the reader of bags in SQLite files says for their writer.
+const BAG_LIBRARY: &str = "rosbag2, SQLite";
+
 fn head(inspection: &Inspection) -> Vec<String> {
     let i = inspection;
     let mut lines = vec![format!("recording    {}, {}", i.recording, size(i.bytes))];
     let by = if i.library.is_empty() { String::new() } else { format!(", written by {}", i.library) };
     let profile = if i.profile.is_empty() { "no profile" } else { i.profile.as_str() };
-    lines.push(format!("format       MCAP, {profile}{by}"));
+    let kind = if i.library == BAG_LIBRARY { "bag" } else { "MCAP" };
+    lines.push(format!("format       {kind}, {profile}{by}"));
     let state = match i.completeness.state {
         State::Whole => "whole".to_owned(),
         State::Cut => format!("cut: {}", i.completeness.reason.as_deref().unwrap_or_default()),

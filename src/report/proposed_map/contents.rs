@@ -20,6 +20,7 @@ pub(super) enum Kind {
     CameraInfo,
     Temperature,
     Pressure,
+    Attitude,
     Other,
 }
 
@@ -33,6 +34,7 @@ impl Kind {
             "CameraInfo" => Self::CameraInfo,
             "Temperature" => Self::Temperature,
             "FluidPressure" => Self::Pressure,
+            "Imu" => Self::Attitude,
             _ => Self::Other,
         }
     }

@@ -14,7 +14,7 @@ pub(crate) fn body_twists(problem: &BundleProblem<'_>, group: &Group<'_>, correc
     let layout = &problem.layout;
     let n_links = layout.links.len();
     if !layout.sag.is_empty() {
-        let at = SagPoint::new(problem.robot.chain.loads(), &corrections.sag, group.poses);
+        let at = SagPoint::new(&problem.loads(group.view_idx), &corrections.sag, group.poses);
         for (k, column) in layout.sag.clone().enumerate() {
             let twist = sag_twist(group, &at.turns(layout.parameters[column]));
             twists.set_column(n_links + k, &twist);

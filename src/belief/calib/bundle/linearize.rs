@@ -385,7 +385,7 @@ fn directions(Point { problem, corrections, .. }: &Point<'_, '_>, group: &Group<
         let turned = rotation * poses.axis(joint) * group.sign;
         let mut twist = Vector6::new(moved.x, moved.y, moved.z, turned.x, turned.y, turned.z);
         if !sag.is_rigid() {
-            let change = problem.robot.chain.loads().torque_derivatives(poses, sag.tool_load_n, joint);
+            let change = problem.loads(group.view_idx).torque_derivatives(poses, sag.tool_load_n, joint);
             twist += sag_twist(group, &sag.bend(&change));
         }
         directions.set_column(joint, &twist);

@@ -10,7 +10,7 @@ use crate::calib::bundle::walk_modes::mode;
 use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
 use crate::calib::views::view::{MeanCorners, TagMeasurement, View};
 use armcal_core::joints::{JointAngles, MAX_JOINTS};
-use armcal_core::kinematics::{LinkCorrections, LinkPoses};
+use armcal_core::kinematics::{ArmLoads, LinkCorrections, LinkPoses};
 use armcal_core::optics::CameraModel;
 use armcal_core::robot::Robot;
 use armcal_core::time::Stamp;
@@ -95,6 +95,8 @@ pub(crate) struct ViewData {
     pub gripper: Option<usize>,
     /// Joints whose sensor says nothing in this view.
     pub is_free: [bool; MAX_JOINTS],
+    /// Against gravity, base frame, where the view knows better than robot.toml.
+    pub up: Option<Vector3<f64>>,
 }
 
 /// Priors of all but the views' own parameters.
@@ -364,6 +366,12 @@ impl<'a> BundleProblem<'a> {
         all.links
     }
 
+    /// What the arm has to carry in a view, which may lean.
+    pub(crate) fn loads(&self, view_idx: usize) -> ArmLoads {
+        let loads = self.robot.chain.loads();
+        self.views[view_idx].up.map_or(*loads, |up| loads.with_up(up))
+    }
+
     /// Poses of all links in a view, in the frame of the tags.
     pub(crate) fn link_poses(&self, view_idx: usize, state: &State) -> LinkPoses {
         let angles = self.angles(view_idx, state);
@@ -371,7 +379,7 @@ impl<'a> BundleProblem<'a> {
         let poses = if corrections == LinkCorrections::default() {
             self.robot.chain.link_poses(&angles)
         } else {
-            self.robot.chain.corrected_link_poses(&angles, &corrections)
+            self.robot.chain.corrected_link_poses_under(&angles, &corrections, &self.loads(view_idx))
         };
         poses.in_frame(&self.robot.tag_frame)
     }
@@ -408,6 +416,7 @@ fn view_data(
         observations,
         gripper,
         is_free: view.is_free,
+        up: view.up,
     };
     for (joint, spec) in robot.sensors.iter().enumerate() {
         let travel_rad = view.travel_rad[joint];

@@ -21,7 +21,7 @@ const CLEAR_SIGMAS: f64 = 8.0;
 /// Readings in a row that must agree: one alone may be a jump of the sensor.
 const CLEAR_READINGS: usize = 2;
 /// One sigma of rounding to whole counts.
-const ROUNDING_COUNTS: f64 = 0.288_675;
+pub(crate) const ROUNDING_COUNTS: f64 = 0.288_675;
 
 /// One reading of a slow sensor.
 #[derive(Clone, Copy, Debug)]
@@ -197,23 +197,51 @@ impl MessageIndex<'_> {
         sensors: &ArmSensors,
         used: &mut Vec<usize>,
     ) -> [f64; MAX_JOINTS] {
+        let before = &self.by_stamp[..self.by_stamp.partition_point(|(stamp, _)| *stamp < mark.start)];
+        let readings = before.iter().rev().filter_map(|&(stamp, idx)| match &self.messages[idx].1 {
+            Message::JointSensors(sample) => Some((stamp, idx, &sample.counts)),
+            _ => None,
+        });
+        let near = readings.take_while(|(stamp, ..)| mark.start.since_s(*stamp) <= BACK_S);
+        let travels = near.map(|(_, idx, counts)| (idx, counts));
+        let rest = RestPose { travel_rad: rest_rad, sensors, rounding_counts: ROUNDING_COUNTS };
+        rest.approach(travels, used, |counts, joint| sensors.models[joint].nominal_travel_rad(counts[joint]))
+    }
+}
+
+/// Where an arm rests.
+pub(crate) struct RestPose<'a> {
+    /// The mean of its readings.
+    pub travel_rad: &'a JointAngles,
+    pub sensors: &'a ArmSensors,
+    /// One sigma of what readings are rounded to.
+    pub rounding_counts: f64,
+}
+
+impl RestPose<'_> {
+    /// The way that each joint came here, by the readings before, the latest first, each with its place: by the last
+    /// that are clearly elsewhere. -1 or 1, 0 where it has not moved. Appends the readings that decided it.
+    pub(crate) fn approach<R>(
+        &self,
+        readings: impl Iterator<Item = (usize, R)>,
+        used: &mut Vec<usize>,
+        travel_rad: impl Fn(&R, usize) -> f64,
+    ) -> [f64; MAX_JOINTS] {
         let mut approach = [0.0; MAX_JOINTS];
         // Side on which the readings before lay, and how many in a row.
         let mut seen = [(0.0, 0_usize, 0_usize); MAX_JOINTS];
-        let mut left = sensors.models.len();
-        let before = &self.by_stamp[..self.by_stamp.partition_point(|(stamp, _)| *stamp < mark.start)];
-        for &(stamp, idx) in before.iter().rev() {
-            if left == 0 || mark.start.since_s(stamp) > BACK_S {
+        let mut left = self.sensors.models.len();
+        for (idx, reading) in readings {
+            if left == 0 {
                 break;
             }
-            let Message::JointSensors(sample) = &self.messages[idx].1 else { continue };
-            for (joint, model) in sensors.models.iter().enumerate() {
+            for (joint, model) in self.sensors.models.iter().enumerate() {
                 if approach[joint] != 0.0 {
                     continue;
                 }
                 let spec = &model.spec;
-                let noise_rad = spec.noise_std_counts.hypot(ROUNDING_COUNTS) / spec.counts_per_rad.abs();
-                let by_rad = apart_rad(spec, rest_rad[joint], model.nominal_travel_rad(sample.counts[joint]));
+                let noise_rad = spec.noise_std_counts.hypot(self.rounding_counts) / spec.counts_per_rad.abs();
+                let by_rad = apart_rad(spec, self.travel_rad[joint], travel_rad(&reading, joint));
                 let side = if by_rad.abs() > CLEAR_SIGMAS * noise_rad { by_rad.signum() } else { 0.0 };
                 let (side_before, n, idx_before) = seen[joint];
                 let n = if side != 0.0 && side == side_before { n + 1 } else { 1 };

@@ -28,6 +28,8 @@ pub struct View {
     pub is_free: [bool; MAX_JOINTS],
     /// Oil temperature, pressure and time of the readings.
     pub conditions: Conditions,
+    /// Against gravity in the base frame, unit, by an attitude sensor; `None`: as robot.toml has it.
+    pub up: Option<Vector3<f64>>,
     /// Surveyed tags that were seen, by id, each once.
     pub tags: Vec<TagObservation>,
     /// The tag on the gripper, where the robot has one and it was seen.
@@ -55,6 +57,7 @@ impl View {
             approach: [0.0; MAX_JOINTS],
             is_free: [false; MAX_JOINTS],
             conditions: Conditions::default(),
+            up: None,
             tags: Vec::new(),
             gripper_tag: None,
         }

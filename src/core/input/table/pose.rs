@@ -2,8 +2,8 @@
 
 use nalgebra::{Isometry3, Matrix3, Quaternion, Translation3, UnitQuaternion, Vector3};
 
+use crate::input::map::QUATERNION_LENGTH_TOLERANCE;
 use crate::input::map::{Direction, RotationForm, TableLayout};
-use crate::input::tags::QUATERNION_LENGTH_TOLERANCE;
 
 /// `camera_from_tag` of a row; the rotation is the identity where the table has none. The error is the end of a
 /// sentence about the row.

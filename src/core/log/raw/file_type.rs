@@ -5,14 +5,17 @@ use super::record::MAGIC;
 /// Bytes of the file's beginning that are compared.
 pub const START_BYTES: usize = 512;
 
+/// First bytes of an SQLite file.
+pub const SQLITE: &[u8] = b"SQLite format 3\0";
+
 const UNPACK: &str = "unpack it first";
 const CONVERT: &str = "convert it, for example with `mcap convert IN OUT.mcap`";
-const NO_RECORDING: &str = "name the .mcap recording";
+const NO_RECORDING: &str = "name the recording itself, an .mcap or .db3 file";
 
 /// First bytes, type and advice.
 const KINDS: [(&[u8], &str, &str); 20] = [
     (b"#ROSBAG V", "a ROS 1 bag", CONVERT),
-    (b"SQLite format 3\0", "an SQLite database, as ROS 2 bags in .db3 files are", CONVERT),
+    (SQLITE, "an SQLite database, as ROS 2 bags in .db3 files are", "only finished ones are read"),
     (b"RRF", "a file for the Rerun viewer (.rrd)", "name the recording that it was made from"),
     (b"RRIO", "a file for the Rerun viewer (.rrd)", "name the recording that it was made from"),
     (b"\x1f\x8b", "compressed with gzip", UNPACK),

@@ -1,10 +1,11 @@
-//! Every readable message of any MCAP file, as bytes.
+//! Every readable message of any MCAP file or ROS 2 bag, as bytes.
 //!
 //! A file may be whole, cut off at any byte, still being written, or hold flipped bits. Chunks that pass their checksum
 //! are read; damaged ones are skipped and counted. Each length is checked against the file's size before its use. The
 //! memory needed is that of the largest chunk, not of the file; `limits` bounds what is unpacked. Chunks that lie in
-//! another order are read in the order of time, exact copies once.
+//! another order are read in the order of time, exact copies once. `bag` reads ROS 2 bags in SQLite files.
 
+mod bag;
 mod checksum;
 mod chunk;
 mod completeness;

@@ -41,6 +41,10 @@ pub enum ScanError {
     NotMcap {
         found: String,
     },
+    /// An SQLite file that is no bag of rosbag2.
+    NotBag {
+        found: String,
+    },
     /// A growing file became shorter than what was read of it.
     Truncated {
         bytes: u64,

@@ -67,7 +67,7 @@ impl Estimate<'_> {
     }
 
     fn sag_trials(&self, group: &Group<'_>) -> SMatrix<f64, 6, N_TRIALS> {
-        let at = SagPoint::new(self.problem.robot.chain.loads(), &Sag::default(), group.poses);
+        let at = SagPoint::new(&self.problem.loads(group.view_idx), &Sag::default(), group.poses);
         let mut trials = SMatrix::<f64, 6, N_TRIALS>::zeros();
         let of_joints = group.joints.clone().map(|joint| (joint, Parameter::all_of_sag(joint + 1).nth(joint)));
         let of_base = (0..3).map(|axis| (MAX_JOINTS + axis, Parameter::all_of_sag(0).nth(axis)));

@@ -73,6 +73,8 @@ pub struct Truth {
     pub mount: Isometry3<f64>,
     pub tags: Vec<Isometry3<f64>>,
     pub gripper_tag: Option<Isometry3<f64>>,
+    /// One sigma of how far the base leans in each view, about each horizontal axis.
+    pub lean_rad: f64,
 }
 
 fn moved(pose: &Isometry3<f64>, std_m: f64, std_rad: f64, rng: &mut ChaCha8Rng) -> Isometry3<f64> {
@@ -99,7 +101,7 @@ impl Truth {
             .gripper_tag
             .filter(|_| model.gripper_tag)
             .map(|tag| moved(&tag.mount.link_from_frame, tag.position_std_m, tag.rotation_std_rad, rng));
-        Self { parameters, mount, tags, gripper_tag }
+        Self { parameters, mount, tags, gripper_tag, lean_rad: 0.0 }
     }
 
     pub fn angles(&self, robot: &Robot, view: &View) -> JointAngles {
@@ -142,6 +144,10 @@ pub fn views(robot: &Robot, truth: &Truth, noise: &Noise, n: usize, rng: &mut Ch
         for (joint, approach) in view.approach.iter_mut().enumerate().take(robot.n_joints()) {
             *approach = if (out.len() + joint).is_multiple_of(2) { 1.0 } else { -1.0 };
         }
+        if truth.lean_rad > 0.0 {
+            let turn = Vector3::new(truth.lean_rad * normal(rng), truth.lean_rad * normal(rng), 0.0);
+            view.up = Some(UnitQuaternion::from_scaled_axis(turn) * robot.chain.loads().up);
+        }
         look(robot, truth, noise, &mut view, rng);
         if view.tags.len() >= 3 {
             out.push(view);
@@ -155,7 +161,8 @@ fn look(robot: &Robot, truth: &Truth, noise: &Noise, view: &mut View, rng: &mut 
     for (angle, std) in angles.iter_mut().zip(noise.joint_rad) {
         *angle += std * normal(rng);
     }
-    let poses = robot.chain.corrected_link_poses(&angles, &truth.parameters.links);
+    let loads = view.up.map_or(*robot.chain.loads(), |up| robot.chain.loads().with_up(up));
+    let poses = robot.chain.corrected_link_poses_under(&angles, &truth.parameters.links, &loads);
     let base_from_camera = poses.link(robot.camera.mount.n_joints) * truth.mount;
     // Tags beside the arm stay where they are when its base bends.
     let base_from_tags = if robot.is_watched() { poses.frame(&robot.tag_frame) } else { Isometry3::identity() };

@@ -189,3 +189,33 @@ fn a_warm_start_knows_the_sag() {
     assert!((first.rad_per_nm - warm.rad_per_nm).abs() < 3.0 * first.std_rad_per_nm);
     assert!(warm.std_rad_per_nm <= first.std_rad_per_nm);
 }
+
+/// A vehicle that leans by 0.2 rad turns the weight: the attitude at each view says so.
+#[test]
+fn attitudes_of_a_leaning_base_are_used() {
+    let robot = titan();
+    let [mut level, mut told, mut untold] = [Vec::new(), Vec::new(), Vec::new()];
+    for seed in 0..8 {
+        let soft = || soft(&robot, 3e-5, 0.0, seed);
+        let error_m = |case: &Case, views: &[View]| {
+            let as_drawn = input(&robot, views, &case.model);
+            let mut wider = as_drawn.clone();
+            revised(&as_drawn).apply(&mut wider);
+            tool_errors_m(&robot, &case.truth, &robot, &estimate(&wider).expect("solved"), seed)
+        };
+        let case = soft_case(&robot, soft(), seed);
+        level.extend(error_m(&case, &case.views));
+        let leaning = case_changed(&robot, &robot, seed, |truth| {
+            truth.parameters.links.sag = soft();
+            truth.lean_rad = 0.2;
+        });
+        told.extend(error_m(&leaning, &leaning.views));
+        let views: Vec<View> = leaning.views.iter().map(|view| View { up: None, ..view.clone() }).collect();
+        untold.extend(error_m(&leaning, &views));
+    }
+    let of = |errors: &[f64]| [0.5, 0.95].map(|q| 1e3 * quantile(errors, q).expect("values"));
+    let [level, told, untold] = [&level, &told, &untold].map(|errors| of(errors));
+    println!("level {level:.2?}, leaning with attitudes {told:.2?}, without {untold:.2?} mm");
+    assert!(told[0] < 1.3 * level[0] && told[1] < 1.3 * level[1], "{told:?} mm, {level:?} mm");
+    assert!(untold[0] > 1.3 * told[0], "too little to tell: {untold:?} mm, {told:?} mm");
+}

@@ -4,10 +4,11 @@
 //! is interpolated, and its rate is known. Recordings with one reading a pose have no neighbours to go between: the
 //! nearest counts.
 
+use crate::calib::views::conditions::{BACK_S, ROUNDING_COUNTS, RestPose};
 use armcal_core::input::{ExternalRecording, Reading};
 use armcal_core::robot::Robot;
 use armcal_core::sensor::{ArmSensors, wrap_symmetric};
-use armcal_core::streams::JointAngles;
+use armcal_core::streams::{JointAngles, MAX_JOINTS};
 use armcal_core::time::Stamp;
 
 /// Readings this close to each other are a continuous stream, s. Assumed.
@@ -34,6 +35,9 @@ pub(crate) struct TravelSeries<'a> {
     /// Travel after which a reading repeats, by joint.
     period_rad: Vec<f64>,
     max_gap_s: f64,
+    sensors: ArmSensors,
+    /// One sigma of what readings are rounded to.
+    rounding_counts: f64,
 }
 
 impl<'a> TravelSeries<'a> {
@@ -52,7 +56,22 @@ impl<'a> TravelSeries<'a> {
             travel_rad: recording.readings.iter().map(travel).collect(),
             period_rad: robot.sensors.iter().map(|spec| spec.wrap_counts / spec.counts_per_rad.abs()).collect(),
             max_gap_s,
+            rounding_counts: if is_whole(&recording.readings) { ROUNDING_COUNTS } else { 0.0 },
+            sensors,
         }
+    }
+
+    /// The way that each joint came to where it rests, at `rest_rad` from reading number `from` on; 0 where it has not
+    /// moved in the stream of readings before. Appends the readings that decided it.
+    pub fn approach(&self, from: usize, rest_rad: &JointAngles, used: &mut Vec<usize>) -> [f64; MAX_JOINTS] {
+        let start = self.readings[from].stamp;
+        let is_before = |idx: &usize| {
+            let (this, next) = (self.readings[*idx].stamp, self.readings[*idx + 1].stamp);
+            next.since_s(this) <= CONTINUOUS_WITHIN_S && start.since_s(this) <= BACK_S
+        };
+        let earlier = (0..from).rev().take_while(is_before).map(|idx| (idx, &self.travel_rad[idx]));
+        let rest = RestPose { travel_rad: rest_rad, sensors: &self.sensors, rounding_counts: self.rounding_counts };
+        rest.approach(earlier, used, |travel_rad, joint| travel_rad[joint])
     }
 
     /// Travel from `from` to `to` the short way round.
@@ -102,4 +121,9 @@ impl<'a> TravelSeries<'a> {
             Some(JointAngles::from_fn(from.len(), |j| self.difference(&to, &from, j) / (to_s - from_s)))
         })
     }
+}
+
+/// Whether all readings are whole numbers, as words of a sensor are.
+fn is_whole(readings: &[Reading]) -> bool {
+    readings.iter().flat_map(|reading| reading.counts.iter()).all(|counts| counts.fract() == 0.0)
 }

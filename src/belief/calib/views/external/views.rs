@@ -2,19 +2,26 @@
 
 use std::collections::BTreeMap;
 
+use nalgebra::Vector3;
+
 use crate::calib::views::conditions::ConditionHistory;
 use crate::calib::views::external::landmarks::{Averaged, average};
 use crate::calib::views::external::pairing::{RATE_WINDOW_S, TravelSample, TravelSeries};
 use crate::calib::views::view::{ObservationRejection, TagObservation, View};
-use armcal_core::input::{ExternalRecording, InputMap, RawMeasurement, TagFrame, WhileMoving};
+use armcal_core::input::{AttitudeReading, ExternalRecording, InputMap, RawMeasurement, TagFrame, WhileMoving};
 use armcal_core::robot::Robot;
 use armcal_core::streams::JointAngles;
+use armcal_core::time::Stamp;
 
 /// Readings within this many sigma of each other are of one pose. Assumed.
 const SAME_POSE_SIGMAS: f64 = 5.0;
 /// Faster than this, beyond what noise makes of it, is on the way, rad/s: at a reach of 2 m and a camera clock 50 ms
 /// late, 1 mm.
 const REST_RATE_RAD_S: f64 = 0.01;
+/// An attitude farther from a view than this says nothing of it, s: a vehicle leans another way within seconds.
+const ATTITUDE_WITHIN_S: f64 = 0.5;
+/// Attitudes whose mean is shorter contradict each other.
+const MIN_MEAN_UP: f64 = 0.5;
 /// Noise of a rate that counts as none, sigma.
 const RATE_SIGMAS: f64 = 5.0;
 
@@ -132,6 +139,12 @@ impl Maker<'_> {
         if view.tags.is_empty() {
             return;
         }
+        let mut deciding = Vec::new();
+        if first.paired.is_continuous {
+            view.approach = self.travels.approach(first.paired.readings.0, &travel_rad, &mut deciding);
+        }
+        view.up = self.up_over(first.frame.stamp, last.frame.stamp);
+        self.out.digests.extend(deciding.into_iter().map(|idx| self.travels.readings[idx].digest));
         for frame in &frames {
             let (from, to) = frame.paired.readings;
             self.out.digests.extend(&frame.frame.digests);
@@ -141,6 +154,23 @@ impl Maker<'_> {
         let (from, to) = (first.paired.readings.0, last.paired.readings.1);
         self.out.digests.extend(self.travels.readings[from..=to].iter().map(|reading| reading.digest));
         self.out.views.push((view, first.frame.digests[0]));
+    }
+
+    /// The mean against gravity over the span, else the nearest in time; `None` without an attitude near enough.
+    fn up_over(&mut self, start: Stamp, end: Stamp) -> Option<Vector3<f64>> {
+        let attitudes = &self.recording.attitudes;
+        let from = attitudes.partition_point(|attitude| attitude.stamp < start);
+        let to = attitudes.partition_point(|attitude| attitude.stamp <= end).max(from);
+        let distance_s = |attitude: &AttitudeReading| start.since_s(attitude.stamp).max(attitude.stamp.since_s(end));
+        let beside = [from.checked_sub(1), Some(to)].into_iter().flatten().filter(|idx| *idx < attitudes.len());
+        let nearest = beside.min_by(|a, b| distance_s(&attitudes[*a]).total_cmp(&distance_s(&attitudes[*b])));
+        let used = match nearest.filter(|idx| from == to && distance_s(&attitudes[*idx]) <= ATTITUDE_WITHIN_S) {
+            Some(idx) => &attitudes[idx..=idx],
+            None => &attitudes[from..to],
+        };
+        self.out.digests.extend(used.iter().map(|attitude| attitude.digest));
+        let sum: Vector3<f64> = used.iter().map(|attitude| attitude.up).sum();
+        sum.try_normalize(MIN_MEAN_UP * used.len() as f64)
     }
 
     /// Over the readings while the group was seen; of one frame between two readings what lies between them.

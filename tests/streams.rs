@@ -1,0 +1,198 @@
+//! Recordings of real arms that hold everything all the time: which way joints came to rest, and which way is up.
+
+use std::path::Path;
+
+use armcal::calib::{Calibration, CalibrationData, ExternalContext, calibrate_data, prepare_external};
+use armcal::input::{parse_input_map, read_external};
+use armcal::log::{RecordingHeader, RecordingWriter, RosMessage, for_each_raw, ros};
+use armcal::robot::Robot;
+use armcal::routine::Method;
+use armcal::stats::quantile;
+use armcal::tagmap::files::read_landmarks;
+use nalgebra::{UnitQuaternion, Vector3};
+
+use crate::support::external::{
+    AS_IN_2018, INPUT_MAP, Noise, RealTitan, at, header, joint_state, transform, way, write_poses, write_stream,
+};
+use crate::support::synthetic::N_SEEN;
+use crate::support::{temp, titan, write};
+
+/// The views of a recording that `write` makes.
+fn prepared(robot: &Robot, titan: &RealTitan, map: &str, write_to: impl Fn(&Path)) -> CalibrationData {
+    let folder = temp();
+    let (path, tags) = (folder.path().join("arm.mcap"), folder.path().join("tags.toml"));
+    write_to(&path);
+    write(&tags, &titan.tag_map());
+    let map = parse_input_map(Path::new("map.toml"), map).expect("a map");
+    let named = read_landmarks(&tags).expect("it reads").survey(&tags, robot, map.tag_use).expect("a survey");
+    let robot = robot.clone().with_survey(named.survey);
+    let recording = read_external(&path, &map, &robot).expect("it reads");
+    prepare_external(&[recording], &map, &robot, ExternalContext::default()).expect("views")
+}
+
+/// Half of what each joint can move behind its sensor, rad.
+const HALF_BACKLASH_RAD: f64 = 0.006;
+/// A camera on a good mount: what is left in a view is not backlash's size.
+const STEADY: Noise = Noise { sensors: 1.0, camera_rad: 0.002, camera_m: 0.001, tag_m: 0.001 };
+
+/// Which way each joint came to pose `k`, by the words.
+fn came_from(robot: &Robot, titan: &RealTitan, k: usize, joint: usize) -> f64 {
+    let word = |k: usize| titan.poses[k].joints[joint].1;
+    (way(word(k - 1), word(k)) * robot.sensors[joint].counts_per_rad).signum()
+}
+
+/// An arm whose angle lags behind its sensor by half the backlash.
+fn with_backlash(robot: &Robot, n: usize, seed: u64) -> RealTitan {
+    let straight = RealTitan::new(robot, n, STEADY, seed);
+    let mut titan = RealTitan::new(robot, n, STEADY, seed);
+    for k in 1..n {
+        for joint in 0..robot.n_joints() {
+            let by = came_from(robot, &straight, k, joint) * HALF_BACKLASH_RAD * robot.sensors[joint].counts_per_rad;
+            let word = &mut titan.poses[k].joints[joint].1;
+            *word = (*word - by).round().rem_euclid(65536.0);
+        }
+    }
+    titan
+}
+
+#[test]
+fn streams_tell_which_way_each_joint_came_to_rest() {
+    let robot = titan();
+    let titan = RealTitan::new(&robot, 16, AS_IN_2018, 31);
+    let views = prepared(&robot, &titan, INPUT_MAP, |path| write_stream(path, &titan.poses, 31)).data.fit;
+    assert_eq!(views.len(), 16);
+    assert_eq!(views[0].approach, [0.0; 8], "nothing was recorded before");
+    for (k, view) in views.iter().enumerate().skip(1) {
+        // The last joint stands still.
+        for joint in 0..N_SEEN {
+            assert_eq!(view.approach[joint], came_from(&robot, &titan, k, joint), "view {k}, joint {joint}");
+        }
+    }
+    // Of single readings nobody knows what was between them.
+    let sparse = prepared(&robot, &titan, INPUT_MAP, |path| write_poses(path, &titan.poses)).data.fit;
+    assert!(sparse.len() == 16 && sparse.iter().all(|view| view.approach == [0.0; 8]));
+}
+
+/// Half the backlash of each joint before the camera and its sigma, rad.
+fn half_backlash(found: &Calibration) -> Vec<(f64, f64)> {
+    let of_joint = |joint: &armcal::calib::JointResult| {
+        let terms = joint.terms.as_ref()?;
+        Some((terms.half_backlash_rad?, terms.half_backlash_rad_std?))
+    };
+    found.joint.iter().take(N_SEEN).filter_map(of_joint).collect()
+}
+
+#[test]
+fn backlash_is_found_from_streams() {
+    const SEEDS: u64 = 8;
+    let robot = titan();
+    let (mut errors_rad, mut in_sigmas) = (Vec::new(), Vec::new());
+    for seed in 0..SEEDS {
+        let titan = with_backlash(&robot, 40, seed);
+        let data = prepared(&robot, &titan, INPUT_MAP, |path| write_stream(path, &titan.poses, seed));
+        let found = calibrate_data(data, Method::Bundle, None).expect("a result");
+        let halves = half_backlash(&found);
+        assert_eq!(halves.len(), N_SEEN, "seed {seed}: {:?}", found.refusal);
+        for (joint, (half_rad, std_rad)) in halves.into_iter().enumerate() {
+            // In counts it was one size for all: a gain shows it larger or smaller.
+            let error = half_rad - HALF_BACKLASH_RAD * titan.gain[joint];
+            errors_rad.push(error.abs());
+            in_sigmas.push(error.abs() / std_rad);
+        }
+    }
+    let of = |values: &[f64], q: f64| quantile(values, q).expect("values");
+    println!(
+        "half backlash of 6 mrad: off by {:.2} mrad in the median, {:.2} (95 %); in sigma {:.2}, {:.2}",
+        1e3 * of(&errors_rad, 0.5),
+        1e3 * of(&errors_rad, 0.95),
+        of(&in_sigmas, 0.5),
+        of(&in_sigmas, 0.95)
+    );
+    assert!(of(&errors_rad, 0.5) < 0.25 * HALF_BACKLASH_RAD, "{errors_rad:?}");
+    assert!(of(&in_sigmas, 0.95) < 2.6, "{in_sigmas:?}");
+}
+
+/// How the attitude sensor is turned in the base: a quarter about z, then about y.
+fn base_from_sensor() -> UnitQuaternion<f64> {
+    UnitQuaternion::from_euler_angles(0.0, 0.4, 1.2)
+}
+
+/// Up in the base at pose `k`: the vehicle leans more and more, and has turned.
+fn up_at(k: usize) -> Vector3<f64> {
+    world_from_base(k).inverse() * Vector3::z()
+}
+
+fn world_from_base(k: usize) -> UnitQuaternion<f64> {
+    UnitQuaternion::from_euler_angles(0.02 * k as f64, -0.3, 2.0 + 0.1 * k as f64)
+}
+
+/// Poses with an attitude half a second before and after each image of the first `n_told`; the frame is `imu`.
+fn write_leaning(path: &Path, titan: &RealTitan, n_told: usize, change: impl Fn(&mut ros::Imu)) {
+    let mut writer = RecordingWriter::create(path, RecordingHeader::new(Vec::new())).expect("a file");
+    for (k, pose) in titan.poses.iter().enumerate() {
+        let (now, later) = (at(2.0 * pose.joints_at_s), at(2.0 * pose.joints_at_s + 0.01));
+        let joints = joint_state(now, &pose.joints);
+        writer.write_ros("/joint_states", &ros::JointState::SCHEMA, now, &joints).expect("written");
+        let transforms = pose.tags.iter().map(|(frame, tag)| transform(later, "fisheye", frame, tag)).collect();
+        writer.write_ros("/tf", &ros::TfMessage::SCHEMA, later, &ros::TfMessage { transforms }).expect("written");
+        let stamp = later.plus_s(if k < n_told { 0.1 } else { 0.7 });
+        let q = world_from_base(k) * base_from_sensor();
+        let orientation = ros::Quaternion::from_wxyz([q.w, q.i, q.j, q.k]);
+        let mut imu = ros::Imu { header: header(stamp, "imu"), orientation, ..ros::Imu::default() };
+        change(&mut imu);
+        writer.write_ros("/imu", &ros::Imu::SCHEMA, stamp, &imu).expect("written");
+    }
+    writer.finish().expect("finished");
+}
+
+fn map_with_attitude() -> String {
+    let q = base_from_sensor();
+    let turn = [q.w, q.i, q.j, q.k];
+    format!("{INPUT_MAP}[conditions]\nattitude = \"/imu\"\nattitude_in_base_wxyz = {turn:?}\n")
+}
+
+#[test]
+fn attitudes_tell_each_view_which_way_is_up() {
+    let (robot, titan) = (titan(), RealTitan::new(&titan(), 12, AS_IN_2018, 33));
+    let of = |map: &str| prepared(&robot, &titan, map, |path| write_leaning(path, &titan, 10, |_| {}));
+    let with = of(&map_with_attitude());
+    assert_eq!(with.data.fit.len(), 12);
+    for (k, view) in with.data.fit.iter().enumerate() {
+        // The last two are too far from any attitude.
+        assert_eq!(view.up.is_some(), k < 10, "view {k}");
+        let off = view.up.map_or(0.0, |up| (up - up_at(k)).norm());
+        assert!(off < 1e-9, "view {k}: {off}");
+    }
+    let without = of(INPUT_MAP);
+    assert!(without.data.fit.iter().all(|view| view.up.is_none()));
+    assert!(without.messages_hash != with.messages_hash, "what is used is in the hash");
+}
+
+#[test]
+fn attitudes_that_are_none_are_refused_by_name() {
+    let folder = temp();
+    let (robot, titan) = (titan(), RealTitan::new(&titan(), 4, AS_IN_2018, 34));
+    let path = folder.path().join("arm.mcap");
+    let problem = |map: &str, change: &dyn Fn(&mut ros::Imu)| {
+        write_leaning(&path, &titan, 4, change);
+        let map = parse_input_map(Path::new("map.toml"), map).expect("a map");
+        read_external(&path, &map, &robot).map_err(|error| error.to_string())
+    };
+    let map = map_with_attitude();
+    let faults: [(&str, &dyn Fn(&mut ros::Imu), &[&str]); 4] = [
+        (&map, &|imu| imu.orientation_covariance[0] = -1.0, &["message 1", "no orientation", "conditions.attitude"]),
+        (&map, &|imu| imu.orientation = ros::Quaternion::from_wxyz([0.0; 4]), &["/imu", "length", "not 1"]),
+        (&map, &|imu| imu.orientation = ros::Quaternion::from_wxyz([f64::NAN; 4]), &["/imu", "orientation", "NaN"]),
+        (&map.replace("\"/imu\"", "\"/tf_static\""), &|_| {}, &["no message on topic /tf_static"]),
+    ];
+    for (map, change, words) in faults {
+        let found = problem(map, change).expect_err("refused");
+        assert!(words.iter().all(|word| found.contains(word)), "{found}");
+    }
+    let lenient = format!("not_finite = \"leave_out\"\n{map}");
+    let left = problem(&lenient, &|imu| imu.orientation = ros::Quaternion::from_wxyz([f64::NAN; 4])).expect("it reads");
+    assert_eq!((left.attitudes.len(), left.left_out["attitudes that are not finite"]), (0, 4));
+    let mut imus = 0;
+    for_each_raw(&path, |raw| imus += usize::from(raw.topic() == "/imu")).expect("it reads");
+    assert_eq!(imus, 4);
+}
