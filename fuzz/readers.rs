@@ -56,7 +56,7 @@ impl Scratch {
 type Read = fn(&Scratch, &[u8]) -> bool;
 
 /// By the names of the targets and of the folders of their corpora.
-pub const READERS: [(&str, Read); 23] = [
+pub const READERS: [(&str, Read); 24] = [
     ("urdf", urdf),
     ("new_robot", new_robot),
     ("recording", recording),
@@ -77,6 +77,7 @@ pub const READERS: [(&str, Read); 23] = [
     ("plan", plan),
     ("stl", stl),
     ("obj", obj),
+    ("dae", dae),
     ("campaign_table", campaign_table),
     ("motion", motion),
     ("views", views),
@@ -247,6 +248,10 @@ fn plan(scratch: &Scratch, bytes: &[u8]) -> bool {
 
 fn stl(scratch: &Scratch, bytes: &[u8]) -> bool {
     mesh(scratch, &scratch.write("a.stl", bytes))
+}
+
+fn dae(scratch: &Scratch, bytes: &[u8]) -> bool {
+    mesh(scratch, &scratch.write("a.dae", bytes))
 }
 
 fn obj(scratch: &Scratch, bytes: &[u8]) -> bool {
