@@ -9,6 +9,7 @@ mod error;
 mod execution;
 mod inputs;
 mod scatter;
+mod scene;
 
 pub use error::{Failure, RunError, Stage};
 pub use execution::{Finished, Keep, execute, execute_on};
