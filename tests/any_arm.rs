@@ -16,13 +16,14 @@ const LENS: &str = "model = \"equidistant\"\nmax_view_angle_rad = 1.4\nresolutio
 const OBJ: &str = "v 0 0 0\nv 0 100 0\nv 100 0 0\nv 0 0 100\nf 1 2 3\nf 1 3 4\nf 1 4 2\nf 3 2 4\n";
 
 /// The same corners with the same scale of 0.001 in the URDF: half as large, doubled by a node, 1 m along z and back.
-const DAE: &str = "<COLLADA><asset><unit meter=\"1\"/><up_axis>Y_UP</up_axis></asset><library_geometries><geometry id=\"g\">\
-    <mesh><source id=\"s\"><float_array>0 0 500 0 50 500 50 0 500 0 0 550</float_array></source>\
+const DAE: &str = "<COLLADA><asset><unit meter=\"1\"/><up_axis>Y_UP</up_axis></asset><library_geometries>\
+    <geometry id=\"g\"><mesh>\
+    <source id=\"s\"><float_array>0 0 500 0 50 500 50 0 500 0 0 550</float_array></source>\
     <vertices id=\"v\"><input semantic=\"POSITION\" source=\"#s\"/></vertices>\
-    <triangles><input semantic=\"VERTEX\" source=\"#v\" offset=\"0\"/><p>0 1 2 0 2 3 0 3 1 2 1 3</p></triangles></mesh></geometry>\
-    </library_geometries><library_visual_scenes><visual_scene id=\"w\"><node><scale>2 2 2</scale><node>\
-    <translate>0 0 -500</translate><instance_geometry url=\"#g\"/></node></node></visual_scene></library_visual_scenes>\
-    <scene><instance_visual_scene url=\"#w\"/></scene></COLLADA>";
+    <triangles><input semantic=\"VERTEX\" source=\"#v\" offset=\"0\"/><p>0 1 2 0 2 3 0 3 1 2 1 3</p></triangles>\
+    </mesh></geometry></library_geometries><library_visual_scenes><visual_scene id=\"w\">\
+    <node><scale>2 2 2</scale><node><translate>0 0 -500</translate><instance_geometry url=\"#g\"/></node></node>\
+    </visual_scene></library_visual_scenes><scene><instance_visual_scene url=\"#w\"/></scene></COLLADA>";
 
 fn joint(name: &str, kind: &str, parent: &str, child: &str) -> String {
     format!(

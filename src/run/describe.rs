@@ -1,4 +1,4 @@
-//! What viewers need to show the arm: its URDF with vehicle and tags, the camera's lens, and the frames that never move.
+//! What viewers need to show the arm: its URDF with vehicle and tags, the camera's lens, the frames that never move.
 
 use crate::run::RunInputs;
 use crate::run::scene::scene;
