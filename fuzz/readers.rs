@@ -78,6 +78,7 @@ pub const READERS: [(&str, Read); 24] = [
     ("plan", plan),
     ("stl", stl),
     ("obj", obj),
+    ("dae", dae),
     ("campaign_table", campaign_table),
     ("motion", motion),
     ("views", views),
@@ -263,6 +264,10 @@ fn plan(scratch: &Scratch, bytes: &[u8]) -> bool {
 
 fn stl(scratch: &Scratch, bytes: &[u8]) -> bool {
     mesh(scratch, &scratch.write("a.stl", bytes))
+}
+
+fn dae(scratch: &Scratch, bytes: &[u8]) -> bool {
+    mesh(scratch, &scratch.write("a.dae", bytes))
 }
 
 fn obj(scratch: &Scratch, bytes: &[u8]) -> bool {

@@ -15,6 +15,16 @@ const LENS: &str = "model = \"equidistant\"\nmax_view_angle_rad = 1.4\nresolutio
 /// A tetrahedron of 0.1 m, as OBJ.
 const OBJ: &str = "v 0 0 0\nv 0 100 0\nv 100 0 0\nv 0 0 100\nf 1 2 3\nf 1 3 4\nf 1 4 2\nf 3 2 4\n";
 
+/// The same corners with the same scale of 0.001 in the URDF: half as large, doubled by a node, 1 m along z and back.
+const DAE: &str = "<COLLADA><asset><unit meter=\"1\"/><up_axis>Y_UP</up_axis></asset><library_geometries>\
+    <geometry id=\"g\"><mesh>\
+    <source id=\"s\"><float_array>0 0 500 0 50 500 50 0 500 0 0 550</float_array></source>\
+    <vertices id=\"v\"><input semantic=\"POSITION\" source=\"#s\"/></vertices>\
+    <triangles><input semantic=\"VERTEX\" source=\"#v\" offset=\"0\"/><p>0 1 2 0 2 3 0 3 1 2 1 3</p></triangles>\
+    </mesh></geometry></library_geometries><library_visual_scenes><visual_scene id=\"w\">\
+    <node><scale>2 2 2</scale><node><translate>0 0 -500</translate><instance_geometry url=\"#g\"/></node></node>\
+    </visual_scene></library_visual_scenes><scene><instance_visual_scene url=\"#w\"/></scene></COLLADA>";
+
 fn joint(name: &str, kind: &str, parent: &str, child: &str) -> String {
     format!(
         "<joint name=\"{name}\" type=\"{kind}\"><parent link=\"{parent}\"/><child link=\"{child}\"/>\
@@ -136,9 +146,10 @@ fn collision_meshes_become_hulls_wherever_their_paths_lead() {
         ("../hand.OBJ", "hand.OBJ"),
         // A converted file in the place of one that is not read.
         ("hand.dae", "given/hand.obj"),
+        ("package://given/meshes/hand.dae", "given/meshes/hand.dae"),
     ] {
         let bench = Bench::new(&with_mesh(name));
-        bench.put(place, OBJ);
+        bench.put(place, if place.ends_with(".dae") { DAE } else { OBJ });
         bench.new_robot(&[]).expect(name, 0, &["3 files"]);
         bench.check().expect(name, 0, &["ok: "]);
         let robot = load(&bench.file("robot")).expect("it reads");
@@ -170,7 +181,10 @@ fn a_collision_mesh_that_cannot_be_read_is_named_with_what_to_do() {
     edit(&urdf, "hand.stl", "hand.dae");
     std::fs::remove_file(bench.file("robot/hand.stl")).expect("removed");
     bench.put("robot/hand.dae", "<COLLADA/>");
-    bench.check().expect("dae", 2, &["hand.dae", "only .stl and .obj", "convert it"]);
+    bench.check().expect("dae", 2, &["hand.dae", "is not a mesh", "no triangles"]);
+    edit(&urdf, "hand.dae", "hand.ply");
+    bench.put("robot/hand.ply", "ply");
+    bench.check().expect("ply", 2, &["hand.ply", "only .stl, .obj and .dae", "convert it"]);
     let many = format!("<collision>{}</collision>", "<geometry><mesh filename=\"a.stl\"/></geometry>").repeat(65);
     write(&urdf, &with_mesh("a.stl").replace("<collision>", &(many + "<collision>")));
     bench.check().expect("many", 2, &["66 shapes", "0 .. 64"]);

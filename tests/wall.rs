@@ -5,7 +5,7 @@ use std::fs;
 use std::path::Path;
 
 use armcal::calib::Calibration;
-use armcal::log::{RecordingHeader, RecordingWriter, for_each_raw, read_attachments, read_recording, strip};
+use armcal::log::{RecordingHeader, RecordingWriter, for_each_raw, read_attachments, read_recording, strip, topics};
 use armcal::sim::truth::read_truth;
 use armcal::streams::{JointCounts, Message, Sink};
 
@@ -44,6 +44,32 @@ fn attachments_and_metadata_do_not_matter() {
     strip(run.file("run.mcap"), &bare).expect("stripped");
     assert!(read_attachments(&bare).expect("it reads").is_empty());
     assert!(calibration_of(&bare, &robot_folder()) == read(&run.file("calibration.toml")));
+}
+
+/// What viewers draw by is told to nobody else: without it the calibration is the same, byte for byte.
+#[test]
+fn topics_for_viewers_do_not_matter() {
+    let run = shared_run();
+    let mut found = BTreeMap::new();
+    for_each_raw(run.file("run.mcap"), |message| *found.entry(message.channel.topic.clone()).or_insert(0) += 1)
+        .expect("it reads");
+    let n_of = |topic: &str| found.get(topic).copied().unwrap_or(0);
+    let mut without_images = topics::VIEWER_TOPICS.iter().filter(|topic| **topic != topics::IMAGE_MARKS);
+    assert!(without_images.all(|topic| n_of(topic) > 0), "{found:?}");
+    assert!(n_of(topics::TF) * 5 < n_of(topics::JOINT_STATES) * 2, "10 Hz of 25 at most: {found:?}");
+
+    let recording = read_recording(run.file("run.mcap")).expect("it reads");
+    let folder = temp();
+    let bare = folder.path().join("run.mcap");
+    let mut writer =
+        RecordingWriter::create(&bare, RecordingHeader::new(recording.joint_names.clone())).expect("a file");
+    for (log_time, message) in &recording.messages {
+        writer.record(*log_time, message).expect("recorded");
+    }
+    writer.finish().expect("finished");
+    assert!(calibration_of(&bare, &robot_folder()) == read(&run.file("calibration.toml")));
+    let (with, without) = (fs::metadata(run.file("run.mcap")).expect("a file"), fs::metadata(&bare).expect("a file"));
+    assert!(with.len() * 4 < without.len() * 5, "{} bytes, {} without", with.len(), without.len());
 }
 
 /// The same words twice as fine, in recording and datasheet alike.

@@ -1,34 +1,39 @@
-//! What viewers need to show the arm: its URDF, the camera's lens, and where the base is bolted on.
+//! What viewers need to show the arm: its URDF with vehicle and tags, the camera's lens, the frames that never move.
 
 use crate::run::RunInputs;
-use armcal_core::log::ros::{CameraInfo, Header, Quaternion, StringMessage, TfMessage, Transform, TransformStamped};
-use armcal_core::log::{LogError, RecordingWriter, RosMessage, topics};
-use armcal_core::robot::Robot;
+use crate::run::scene::scene;
+use armcal_core::log::ros::{CameraInfo, Header, SceneUpdate, StringMessage, TfMessage, Time, TransformStamped};
+use armcal_core::log::{EncodeError, LogError, RecordingHeader, RecordingWriter, RosMessage, topics};
+use armcal_core::robot::{Described, FrameTree, Robot};
 use armcal_core::time::Stamp;
 
 /// Writes the descriptions at `now`.
-pub(super) fn describe(writer: &mut RecordingWriter, inputs: &RunInputs, now: Stamp) -> Result<(), LogError> {
+pub(super) fn describe(
+    writer: &mut RecordingWriter,
+    inputs: &RunInputs,
+    tree: &FrameTree,
+    now: Stamp,
+) -> Result<(), LogError> {
     let robot = &inputs.robot;
-    let urdf = StringMessage { data: robot.urdf_text.clone() };
-    writer.write_ros(topics::ROBOT_DESCRIPTION, &StringMessage::SCHEMA, now, &urdf)?;
+    let Described { urdf, fixed } = Described::new(robot, &inputs.vehicle, tree);
+    writer.write_ros(topics::ROBOT_DESCRIPTION, &StringMessage::SCHEMA, now, &StringMessage { data: urdf })?;
     writer.write_ros(topics::CAMERA_INFO, &CameraInfo::SCHEMA, now, &camera_info(robot))?;
-    let pose = inputs.vehicle.vehicle_from_base;
-    let transform = TransformStamped {
-        header: Header { frame_id: "vehicle".to_owned(), ..Header::default() },
-        child_frame_id: robot.base_link.clone(),
-        transform: Transform {
-            translation: pose.origin().to_array().into(),
-            rotation: Quaternion::from_wxyz(pose.quaternion_wxyz()),
-        },
-    };
-    writer.write_ros(topics::TF_STATIC, &TfMessage::SCHEMA, now, &TfMessage { transforms: vec![transform] })
+    let transforms =
+        fixed.iter().map(|frame| TransformStamped::new(now, [&frame.parent, &frame.child], &frame.parent_from_child));
+    let transforms = transforms.collect::<Result<_, EncodeError>>();
+    let transforms = transforms.map_err(|source| writer.encode_error(topics::TF_STATIC, source))?;
+    writer.write_ros(topics::TF_STATIC, &TfMessage::SCHEMA, now, &TfMessage { transforms })?;
+    let time = Time::try_from(now).map_err(|source| writer.encode_error(topics::SCENE, source))?;
+    let task = &inputs.routine.task;
+    let scene = scene(robot, &task.targets_m, task.tolerance_m, time);
+    writer.write_ros(topics::SCENE, &SceneUpdate::SCHEMA, now, &scene)
 }
 
 fn camera_info(robot: &Robot) -> CameraInfo {
     let lens = &robot.camera.lens;
     let ([fx, fy], [cx, cy], [width, height]) = (lens.focal_px(), lens.center_px(), lens.resolution_px());
     CameraInfo {
-        header: Header { frame_id: robot.camera.name.clone(), ..Header::default() },
+        header: Header { frame_id: RecordingHeader::new(Vec::new()).camera_frame, ..Header::default() },
         width,
         height,
         distortion_model: lens.name().to_owned(),

@@ -14,10 +14,12 @@ use crate::run::{Failure, RunError, RunInputs, Stage, corner_scatter_px};
 use crate::score::{ScoreInput, score};
 use armcal_belief::calib::Calibration;
 use armcal_belief::session::{
-    self, AssertResult, EstimateUpdate, HeldJoint, MessageListener, Outcome, Progress, Recorder, SessionInputs,
+    self, AssertResult, BelievedFrames, EstimateUpdate, HeldJoint, MessageListener, Outcome, Progress, Recorder,
+    SessionInputs,
 };
 use armcal_core::files::{self, FileKind};
 use armcal_core::log::{Recording, RecordingHeader, RecordingWriter, read_recording};
+use armcal_core::robot::FrameTree;
 use armcal_core::streams::Arm;
 use armcal_core::time::Stamp;
 use armcal_sim::truth::TruthRecorder;
@@ -170,10 +172,13 @@ impl Run<'_> {
     }
 
     fn recorder(&self, now: Stamp) -> Result<Recorder, RunError> {
-        let header = RecordingHeader::new(self.inputs.robot.joint_names());
+        let robot = &self.inputs.robot;
+        let header = RecordingHeader::new(robot.joint_names());
+        let tree = FrameTree::of(robot)?;
+        let camera_frame = header.camera_frame.clone();
         let mut writer = RecordingWriter::create(self.partial("run.mcap"), header)?;
-        describe(&mut writer, self.inputs, now)?;
-        Ok(Recorder::new(writer))
+        describe(&mut writer, self.inputs, &tree, now)?;
+        Ok(Recorder::new(writer).with_frames(BelievedFrames::new(robot, tree, &camera_frame)))
     }
 
     /// Keeps and names the recording that a broken run leaves; one in which nothing moved yet is removed.

@@ -9,6 +9,7 @@ mod error;
 mod execution;
 mod inputs;
 mod scatter;
+mod scene;
 
 pub use error::{Failure, RunError, Stage};
 pub use execution::{Finished, Keep, RunOutput, execute, execute_on};

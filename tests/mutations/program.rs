@@ -44,7 +44,7 @@ const CUT: &str = "fuzz/corpus/recording/cut.mcap";
 const TAGMAP: &str = "tagmap views.mcap --topic /camera/wrist/detections --camera cameras.yaml --tags";
 const TABLE: &str = "calibrate poses.csv --robot robot --input table.toml --out out --method minimum_distance";
 
-const CASES: [Case; 51] = [
+const CASES: [Case; 53] = [
     case("robots/titan4/titan4.urdf", "robot/titan4.urdf", "check robot"),
     case("robots/titan4/titan4.urdf", "robot/titan4.urdf", "inspect views.mcap --robot robot"),
     case("robots/kraft-predator/kraft-predator.urdf", "robot/titan4.urdf", "check robot"),
@@ -58,6 +58,8 @@ const CASES: [Case; 51] = [
     case("routines/bad-dive.toml", "routine.toml", "check routine.toml"),
     case("fuzz/corpus/obj/angle.obj", "a.obj", "check hull-obj.toml"),
     case("fuzz/corpus/obj/angle.obj", "a.obj", "check parts-obj.toml"),
+    case("fuzz/corpus/dae/scene.dae", "a.dae", "check hull-dae.toml"),
+    case("fuzz/corpus/dae/scene.dae", "a.dae", "check parts-dae.toml"),
     case("fuzz/corpus/stl/binary.stl", "a.stl", "check hull-stl.toml"),
     case("fuzz/corpus/stl/text.stl", "a.stl", "check parts-stl.toml"),
     case("routines/motion/hover.csv", "motion.csv", "check motion.toml"),
@@ -117,7 +119,7 @@ fn lay_out(folder: &Path) {
     }
     let routine = std::fs::read_to_string(root().join("fuzz/corpus/routine/short.toml")).expect("it reads");
     for (name, convex) in [("hull", "hull"), ("parts", "decomposed")] {
-        for kind in ["stl", "obj"] {
+        for kind in ["stl", "obj", "dae"] {
             let mesh = format!("shape = \"mesh\"\nscale_m = 0.001\nfile = \"a.{kind}\"\nconvex = \"{convex}\"\n");
             let text = routine.replace("shape = \"sphere\"\nradius_m = 0.5\n", &mesh);
             write(&folder.join(format!("{name}-{kind}.toml")), &text);

@@ -4,8 +4,9 @@
 //! `belief_update`), `grip`, `touch`, `scale_identification`, `end_stops`. `motion` drives the arm, `settling` detects
 //! rest, `contact` detects contacts, `following` joints that do not follow (`held_joint`, `failed_joints`), and
 //! `approval` asks an operator before a motion. `online_belief` hears what is recorded, `keeping_up` works by it.
-//! `recorder` keeps every message; `outcome` is the result.
+//! `recorder` keeps every message, with `transforms` and `annotations` for viewers; `outcome` is the result.
 
+mod annotations;
 mod approval;
 mod belief_update;
 mod capture;
@@ -31,6 +32,7 @@ mod scale_identification;
 mod script;
 mod settling;
 mod touch;
+mod transforms;
 mod unwatched;
 mod work;
 
@@ -42,4 +44,5 @@ pub use outcome::{AssertResult, Epoch, EstimateUpdate, Outcome, ReachStep, Skipp
 pub use progress::{Approval, MotionAhead, Progress};
 pub use recorder::{MessageListener, Recorder};
 pub use script::run;
+pub use transforms::BelievedFrames;
 pub use unwatched::Unwatched;

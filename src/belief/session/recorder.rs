@@ -2,8 +2,11 @@
 
 use std::collections::BTreeSet;
 
+use crate::session::annotations::ImageMarks;
 use crate::session::online_belief::OnlineBelief;
-use armcal_core::log::{LogError, Recording, RecordingWriter, read_recording};
+use crate::session::transforms::BelievedFrames;
+use armcal_core::log::ros::{ImageAnnotations, TfMessage};
+use armcal_core::log::{LogError, Recording, RecordingWriter, RosMessage, read_recording, topics};
 use armcal_core::streams::{JointCounts, MarkKind, Message, Sink, SinkError, Thermometer};
 use armcal_core::time::Stamp;
 
@@ -27,6 +30,9 @@ pub struct Recorder {
     /// Hears every message while the arm works.
     pub(crate) online: Option<OnlineBelief>,
     listener: Option<MessageListener>,
+    /// Draws the arm for viewers.
+    pub(crate) frames: Option<BelievedFrames>,
+    image_marks: ImageMarks,
 }
 
 impl Recorder {
@@ -43,6 +49,8 @@ impl Recorder {
             ids_seen: BTreeSet::new(),
             online: None,
             listener: None,
+            frames: None,
+            image_marks: ImageMarks::default(),
         }
     }
 
@@ -52,6 +60,12 @@ impl Recorder {
         Self { listener, ..self }
     }
 
+    /// The same, with the arm as believed and the tags found in images for viewers.
+    #[must_use]
+    pub fn with_frames(self, frames: BelievedFrames) -> Self {
+        Self { frames: Some(frames), ..self }
+    }
+
     /// The recording so far, read from its bytes on disk.
     ///
     /// # Errors
@@ -59,6 +73,20 @@ impl Recorder {
     pub fn read_back(&mut self) -> Result<Recording, LogError> {
         self.writer.flush()?;
         read_recording(self.writer.path())
+    }
+
+    /// Writes what viewers draw by this message.
+    fn draw(&mut self, log_time: Stamp, message: &Message) -> Result<(), LogError> {
+        let Some(frames) = &mut self.frames else { return Ok(()) };
+        if let Message::JointStates(states) = message
+            && let Some(transforms) = frames.hear(states)
+        {
+            self.writer.write_ros(topics::TF, &TfMessage::SCHEMA, log_time, &transforms)?;
+        }
+        if let Some(marks) = self.image_marks.hear(message) {
+            self.writer.write_ros(topics::IMAGE_MARKS, &ImageAnnotations::SCHEMA, log_time, &marks)?;
+        }
+        Ok(())
     }
 
     /// The writer, to add to the recording or to finish it.
@@ -84,6 +112,7 @@ impl Sink for Recorder {
             _ => {}
         }
         self.writer.record(log_time, message)?;
+        self.draw(log_time, message)?;
         if let Some(online) = &mut self.online {
             online.hear(log_time, message);
         }

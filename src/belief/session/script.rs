@@ -313,6 +313,9 @@ impl ScriptRunner<'_, '_> {
         let (bounds, at, oil_c) = (self.bounds.clone(), self.driver.now(), self.driver.recorder.oil_c);
         self.fresh = Some(FreshBounds { bounds, at, oil_c });
         self.driver.believe(sensors);
+        if let Some(frames) = &mut self.driver.recorder.frames {
+            frames.believe(&calibration.applied_to(self.setup.robot));
+        }
         let (from, sensors) = (self.driver.now(), self.driver.sensors.clone());
         self.epochs.push(Epoch { from, sensors, calibration: Some(calibration.clone()) });
         Ok(())

@@ -20,12 +20,12 @@ pub trait RosMessage: Serialize + DeserializeOwned {
 
 /// A dependency: separator, name and fields.
 macro_rules! dependency {
-    ($name:literal, $fields:literal) => {
+    ($name:literal, $($fields:literal),+ $(,)?) => {
         concat!(
             "================================================================================\nMSG: ",
             $name,
             "\n",
-            $fields
+            $($fields),+
         )
     };
 }
@@ -72,13 +72,14 @@ macro_rules! message {
 #[cfg(test)]
 mod tests {
     use super::super::message_codec::Stream;
-    use super::super::messages::{CameraInfo, PoseStamped, StringMessage, TfMessage};
+    use super::super::messages::{CameraInfo, ImageAnnotations, PoseStamped, SceneUpdate, StringMessage, TfMessage};
     use super::*;
 
     #[test]
     fn every_type_that_a_definition_names_is_defined_in_it() {
+        let foxglove = [SceneUpdate::SCHEMA, ImageAnnotations::SCHEMA];
         let viewers = [StringMessage::SCHEMA, CameraInfo::SCHEMA, TfMessage::SCHEMA, PoseStamped::SCHEMA];
-        for schema in Stream::ALL.map(|stream| *stream.schema()).into_iter().chain(viewers) {
+        for schema in Stream::ALL.map(|stream| *stream.schema()).into_iter().chain(viewers).chain(foxglove) {
             for line in schema.text.lines().filter(|line| !line.starts_with("MSG: ") && !line.starts_with('=')) {
                 let field_type = line.split_whitespace().next().unwrap().split('[').next().unwrap();
                 if field_type.contains('/') {

@@ -35,14 +35,19 @@ pub const MARKS: &str = "/marks";
 /// Text for people, `rcl_interfaces/msg/Log`.
 pub const LOG: &str = "/log";
 
-/// The URDF as text, written once at the start.
+/// The URDF as text with vehicle and tags, written once at the start.
 pub const ROBOT_DESCRIPTION: &str = "/robot_description";
 /// The nominal lens, written once at the start, `sensor_msgs/msg/CameraInfo`.
 pub const CAMERA_INFO: &str = "/camera/wrist/camera_info";
-/// Mount of the arm on the vehicle, written once at the start, `tf2_msgs/msg/TFMessage`.
+/// Frames that never move against each other, written once at the start, `tf2_msgs/msg/TFMessage`.
 pub const TF_STATIC: &str = "/tf_static";
-/// Transforms in recordings of other systems, `tf2_msgs/msg/TFMessage`; not in ours.
+/// Transforms, `tf2_msgs/msg/TFMessage`. In ours the arm as believed, for viewers; read in those of other systems.
 pub const TF: &str = "/tf";
 
+/// Tags, targets and meshes as solids, written once at the start, `foxglove_msgs/msg/SceneUpdate`.
+pub const SCENE: &str = "/scene";
+/// Tags found in an image, beside images alone, `foxglove_msgs/msg/ImageAnnotations`.
+pub const IMAGE_MARKS: &str = "/camera/wrist/image/annotations";
+
 /// Topics for viewers; no message comes from them.
-pub const VIEWER_TOPICS: [&str; 4] = [ROBOT_DESCRIPTION, CAMERA_INFO, TF_STATIC, TF];
+pub const VIEWER_TOPICS: [&str; 6] = [ROBOT_DESCRIPTION, CAMERA_INFO, TF_STATIC, TF, SCENE, IMAGE_MARKS];

@@ -182,7 +182,9 @@ impl RecordingWriter {
         LogError::Write { path: self.path.clone(), source }
     }
 
-    fn encode_error(&self, topic: &str, source: EncodeError) -> LogError {
+    /// That a message of `topic` has no ROS form.
+    #[must_use]
+    pub fn encode_error(&self, topic: &str, source: EncodeError) -> LogError {
         LogError::Encode { path: self.path.clone(), topic: topic.to_owned(), source }
     }
 }

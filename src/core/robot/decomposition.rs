@@ -12,7 +12,7 @@ use parry3d::transformation::vhacd::{VHACD, VHACDParameters};
 use parry3d::transformation::voxelization::VoxelSet;
 
 use super::hull::{CenteredHull, Hull, HullError};
-use super::mesh::Mesh;
+use super::triangles::Mesh;
 
 /// Limit of the hulls of one decomposed mesh.
 const MAX_HULLS: u32 = 32;

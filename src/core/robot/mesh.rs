@@ -1,32 +1,22 @@
-//! Reader of triangle meshes: STL, binary and ASCII, and the vertices and faces of OBJ.
+//! Reader of triangle meshes: STL, binary and ASCII, the vertices and faces of OBJ, and COLLADA.
 
-use std::collections::BTreeMap;
 use std::path::Path;
 
+use super::collada::collada;
+use super::triangles::{MAX_VERTICES, Mesh, MeshBuilder};
 use crate::files::{self, FileKind};
-
-/// Triangles with shared corners, in the file's own unit.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Mesh {
-    pub vertices: Vec<[f64; 3]>,
-    pub triangles: Vec<[u32; 3]>,
-}
 
 /// Why a file is not a mesh.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum MeshError {
     #[error("cannot be read: {0}")]
     Unreadable(#[from] std::io::Error),
-    #[error("is neither .stl nor .obj")]
+    #[error("is none of .stl, .obj, .dae")]
     Extension,
     #[error("is not a mesh: {0}")]
     Content(String),
 }
 
-/// Limit of a mesh's triangles.
-const MAX_TRIANGLES: usize = 1_000_000;
-/// Limit of its vertices: as many as triangles of their own have.
-const MAX_VERTICES: usize = 3 * MAX_TRIANGLES;
 /// Header and number of triangles of a binary STL.
 const STL_HEADER: usize = 84;
 const STL_TRIANGLE: usize = 50;
@@ -37,6 +27,11 @@ fn extension(file: &Path) -> Option<String> {
 
 /// Whether a file of this name is one of the formats that are read.
 pub(super) fn is_readable(file: &Path) -> bool {
+    matches!(extension(file).as_deref(), Some("stl" | "obj" | "dae"))
+}
+
+/// Whether it is one of the formats that other meshes are converted to.
+pub(super) fn is_plain(file: &Path) -> bool {
     matches!(extension(file).as_deref(), Some("stl" | "obj"))
 }
 
@@ -48,6 +43,7 @@ pub(super) fn read(file: &Path) -> Result<Mesh, MeshError> {
     let parse = match extension(file).as_deref() {
         Some("stl") => stl,
         Some("obj") => obj,
+        Some("dae") => collada,
         _ => return Err(MeshError::Extension),
     };
     let mesh = parse(&files::read_bytes(file, FileKind::Mesh)?).map_err(MeshError::Content)?;
@@ -55,38 +51,6 @@ pub(super) fn read(file: &Path) -> Result<Mesh, MeshError> {
         return Err(MeshError::Content("it has no triangles".to_owned()));
     }
     Ok(mesh)
-}
-
-/// Mesh in the making; equal corners share one vertex.
-#[derive(Default)]
-struct Builder {
-    mesh: Mesh,
-    number: BTreeMap<[u64; 3], u32>,
-}
-
-impl Builder {
-    fn add(&mut self, corners: [[f64; 3]; 3]) -> Result<(), String> {
-        if self.mesh.triangles.len() == MAX_TRIANGLES {
-            return Err(format!("more than {MAX_TRIANGLES} triangles"));
-        }
-        if !corners.as_flattened().iter().all(|v| v.is_finite()) {
-            return Err(format!("triangle {} has a coordinate that is not finite", self.mesh.triangles.len()));
-        }
-        let Self { mesh, number } = self;
-        let triangle = corners.map(|corner| {
-            // Adding zero turns -0 into 0.
-            *number.entry(corner.map(|v| (v + 0.0).to_bits())).or_insert_with(|| {
-                mesh.vertices.push(corner);
-                mesh.vertices.len() as u32 - 1
-            })
-        });
-        let [a, b, c] = triangle;
-        // Degenerate triangles are skipped.
-        if a != b && b != c && c != a {
-            mesh.triangles.push(triangle);
-        }
-        Ok(())
-    }
 }
 
 /// A binary file may also begin with `solid`; its length distinguishes it.
@@ -106,7 +70,7 @@ fn stl(bytes: &[u8]) -> Result<Mesh, String> {
 }
 
 fn stl_binary(triangles: &[u8]) -> Result<Mesh, String> {
-    let mut builder = Builder::default();
+    let mut builder = MeshBuilder::default();
     for record in triangles.chunks_exact(STL_TRIANGLE) {
         // The normal comes first; the order of the corners implies it.
         let number = |k: usize| {
@@ -115,11 +79,11 @@ fn stl_binary(triangles: &[u8]) -> Result<Mesh, String> {
         };
         builder.add([0, 1, 2].map(|corner| [0, 1, 2].map(|axis| number(3 * corner + axis))))?;
     }
-    Ok(builder.mesh)
+    Ok(builder.finish())
 }
 
 fn stl_ascii(text: &str) -> Result<Mesh, String> {
-    let mut builder = Builder::default();
+    let mut builder = MeshBuilder::default();
     let mut corners = Vec::with_capacity(3);
     for (n, line) in text.lines().enumerate() {
         let mut words = line.split_whitespace();
@@ -134,7 +98,7 @@ fn stl_ascii(text: &str) -> Result<Mesh, String> {
             _ => {}
         }
     }
-    if corners.is_empty() { Ok(builder.mesh) } else { Err("it ends within a facet".to_owned()) }
+    if corners.is_empty() { Ok(builder.finish()) } else { Err("it ends within a facet".to_owned()) }
 }
 
 fn numbers<'a>(words: impl Iterator<Item = &'a str>, line: usize) -> Result<[f64; 3], String> {
@@ -145,7 +109,7 @@ fn numbers<'a>(words: impl Iterator<Item = &'a str>, line: usize) -> Result<[f64
 fn obj(bytes: &[u8]) -> Result<Mesh, String> {
     let text = std::str::from_utf8(bytes).map_err(|_| "not a text, as an OBJ must be".to_owned())?;
     let mut vertices: Vec<[f64; 3]> = Vec::new();
-    let mut builder = Builder::default();
+    let mut builder = MeshBuilder::default();
     for (n, line) in text.lines().enumerate() {
         let mut words = line.split_whitespace();
         match words.next() {
@@ -165,7 +129,7 @@ fn obj(bytes: &[u8]) -> Result<Mesh, String> {
             _ => {}
         }
     }
-    Ok(builder.mesh)
+    Ok(builder.finish())
 }
 
 /// `7`, `7/1/2` or, counted from the end, `-1`.

@@ -60,7 +60,8 @@ fn named_mesh<'a>(link: &'a urdf_rs::Link, geometry: &'a Geometry) -> Option<Nam
     Some(NamedMesh { link: &link.name, name: filename, scale: scale.map_or([1.0; 3], |scale| scale.0) })
 }
 
-fn isometry(origin: &urdf_rs::Pose) -> Isometry3<f64> {
+/// The pose that an `<origin>` gives.
+pub(super) fn isometry(origin: &urdf_rs::Pose) -> Isometry3<f64> {
     let [roll, pitch, yaw] = origin.rpy.0;
     Isometry3::from_parts(
         Translation3::from(Vector3::from(origin.xyz.0)),

@@ -57,7 +57,7 @@ impl MeshFolders {
         Err(if mesh::is_readable(Path::new(name)) {
             format!("copy it to {wanted}")
         } else {
-            format!("only .stl and .obj are read; convert it (Blender, assimp) to {wanted}")
+            format!("only .stl, .obj and .dae are read; convert it (Blender, assimp) to {wanted}")
         })
     }
 
@@ -101,8 +101,8 @@ pub(super) fn places(name: &str) -> Vec<PathBuf> {
     for from in firsts {
         let place: PathBuf = parts[from..].iter().collect();
         let converted = ["stl", "obj"].map(|extension| place.with_extension(extension));
-        let is_readable = mesh::is_readable(&place);
-        places.extend(converted.into_iter().filter(|_| !is_readable));
+        let is_plain = mesh::is_plain(&place);
+        places.extend(converted.into_iter().filter(|_| !is_plain));
         places.push(place);
     }
     places
@@ -122,6 +122,7 @@ mod tests {
         assert_eq!(names("file:///home/a.obj"), ["home/a.obj", "a.obj"]);
         assert_eq!(names("../../../../etc/passwd.stl"), ["etc/passwd.stl", "passwd.stl"]);
         assert_eq!(names("a.dae"), ["a.stl", "a.obj", "a.dae"]);
+        assert_eq!(names("a.ply"), ["a.stl", "a.obj", "a.ply"]);
         for odd in ["", "..", "package://", "/", "a"] {
             assert!(places(odd).iter().all(|place| place.is_relative()), "{odd}");
         }

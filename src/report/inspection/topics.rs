@@ -209,7 +209,9 @@ fn known_as(topic: &str, schema: &str) -> Option<&'static str> {
     match topic {
         topics::ROBOT_DESCRIPTION => Some("URDF, for viewers"),
         topics::CAMERA_INFO => Some("lens, for viewers"),
-        topics::TF_STATIC => Some("base on vehicle, for viewers"),
+        topics::TF_STATIC => Some("frames that stay, for viewers"),
+        topics::SCENE => Some("tags and targets, for viewers"),
+        topics::IMAGE_MARKS => Some("tags in images, for viewers"),
         _ => None,
     }
 }

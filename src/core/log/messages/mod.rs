@@ -7,6 +7,7 @@ pub(super) mod attitude;
 mod basic;
 mod checks;
 pub(super) mod detections;
+mod foxglove;
 pub(super) mod images;
 pub(super) mod joints;
 pub(super) mod log_line;
@@ -22,6 +23,10 @@ mod viewers;
 pub use attitude::Imu;
 pub use basic::{Header, PixelPoint, Point, Pose, Quaternion, Time, Transform, Vector3};
 pub use detections::{AprilTagDetection, AprilTagDetectionArray};
+pub use foxglove::{
+    Color, ImageAnnotations, NoneOfThem, PointsAnnotation, SceneEntity, SceneUpdate, SizedPrimitive, TextAnnotation,
+    TextPrimitive, TriangleListPrimitive,
+};
 pub use images::{CompressedImage, Image};
 pub use joints::JointState;
 pub use log_line::Log;

@@ -1,9 +1,12 @@
 //! Messages for viewers: robot description, camera model, transforms and poses.
 
+use nalgebra::Isometry3;
 use serde::{Deserialize, Serialize};
 
-use super::basic::{Header, Pose, Transform};
+use super::basic::{Header, Pose, Quaternion, Transform};
+use crate::log::error::EncodeError;
 use crate::log::schema::{RosMessage, RosSchema};
+use crate::time::Stamp;
 
 /// std_msgs/msg/String.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -73,6 +76,20 @@ pub struct TransformStamped {
     pub child_frame_id: String,
     /// Pose of the child in the parent frame.
     pub transform: Transform,
+}
+
+impl TransformStamped {
+    /// The pose of the second frame in the first.
+    ///
+    /// # Errors
+    /// [`EncodeError::StampRange`].
+    pub fn new(stamp: Stamp, frames: [&str; 2], parent_from_child: &Isometry3<f64>) -> Result<Self, EncodeError> {
+        let [parent, child] = frames;
+        let (shift, turn) = (&parent_from_child.translation.vector, &parent_from_child.rotation);
+        let rotation = Quaternion { x: turn.i, y: turn.j, z: turn.k, w: turn.w };
+        let transform = Transform { translation: <[f64; 3]>::from(*shift).into(), rotation };
+        Ok(Self { header: Header::new(stamp, parent)?, child_frame_id: child.to_owned(), transform })
+    }
 }
 
 /// tf2_msgs/msg/TFMessage.

@@ -1,0 +1,61 @@
+//! The tags found in an image, as marks on it for viewers.
+
+use armcal_core::log::ros::{Color, ImageAnnotations, PixelPoint, PointsAnnotation, TextAnnotation, Time};
+use armcal_core::streams::{Message, TagDetection, TagDetections};
+use armcal_core::time::Stamp;
+
+const OUTLINE: Color = Color { r: 0.1, g: 0.9, b: 0.3, a: 1.0 };
+const NOTHING: Color = Color { r: 0.0, g: 0.0, b: 0.0, a: 0.0 };
+/// A closed line.
+const LINE_LOOP: u8 = 2;
+
+/// Brings an image and its detections together, whichever comes first.
+#[derive(Default)]
+pub(crate) struct ImageMarks {
+    image: Option<Stamp>,
+    detections: Option<TagDetections>,
+}
+
+impl ImageMarks {
+    /// The marks, where this message is the second of the two.
+    pub(crate) fn hear(&mut self, message: &Message) -> Option<ImageAnnotations> {
+        match message {
+            Message::Image(image) => self.image = Some(image.stamp),
+            Message::Detections(detections) => self.detections = Some(detections.clone()),
+            _ => return None,
+        }
+        let detections = self.detections.as_ref().filter(|found| Some(found.stamp) == self.image)?;
+        let timestamp = Time::try_from(detections.stamp).ok()?;
+        self.image = None;
+        Some(ImageAnnotations {
+            timestamp,
+            points: detections.tags.iter().map(|tag| outline(timestamp, tag)).collect(),
+            texts: detections.tags.iter().map(|tag| name(timestamp, tag)).collect(),
+            ..ImageAnnotations::default()
+        })
+    }
+}
+
+fn outline(timestamp: Time, tag: &TagDetection) -> PointsAnnotation {
+    PointsAnnotation {
+        timestamp,
+        kind: LINE_LOOP,
+        points: tag.corners_px.iter().map(|&[x, y]| PixelPoint { x, y }).collect(),
+        outline_color: OUTLINE,
+        thickness: 2.0,
+        ..PointsAnnotation::default()
+    }
+}
+
+fn name(timestamp: Time, tag: &TagDetection) -> TextAnnotation {
+    let [x, y] = tag.corners_px[0];
+    TextAnnotation {
+        timestamp,
+        position: PixelPoint { x, y },
+        text: tag.id.to_string(),
+        font_size: 18.0,
+        text_color: OUTLINE,
+        background_color: NOTHING,
+        ..TextAnnotation::default()
+    }
+}

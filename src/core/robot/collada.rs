@@ -1,0 +1,420 @@
+//! Reader of COLLADA (.dae) meshes: triangles and polygons with the transforms of their nodes, in metres.
+//!
+//! Coordinates keep the axes of the file, whatever its `up_axis` says: RViz and MoveIt read a URDF's meshes so, and
+//! that is what drawings are checked with. Materials, normals, lights and animations are not looked at.
+
+use std::collections::BTreeMap;
+
+use nalgebra::{Matrix4, Point3, Rotation3, Translation3, Unit, Vector3, Vector4};
+
+use super::triangles::{MAX_VERTICES, Mesh, MeshBuilder};
+use super::xml_tree::{Element, XmlTree};
+
+/// Limit of nodes and instances that are visited, each as often as it is instanced.
+const MAX_NODES: usize = 10_000;
+/// Limit of nodes within each other, through instances, too.
+const MAX_DEPTH: usize = 64;
+
+/// Reads a COLLADA document.
+///
+/// # Errors
+/// A sentence, whatever the bytes are.
+pub(super) fn collada(bytes: &[u8]) -> Result<Mesh, String> {
+    let text = std::str::from_utf8(bytes).map_err(|_| "not a text in UTF-8, as a COLLADA must be".to_owned())?;
+    let tree = XmlTree::parse(text)?;
+    if tree.element(0).name != "COLLADA" {
+        return Err(format!("its root element is `{}`, `COLLADA` expected", tree.element(0).name));
+    }
+    let mut document =
+        Document { tree: &tree, ids: BTreeMap::new(), soups: BTreeMap::new(), mesh: MeshBuilder::default() };
+    for (at, element) in tree.elements().iter().enumerate() {
+        if let Some(id) = element.attribute("id") {
+            document.ids.entry(id).or_insert(at);
+        }
+    }
+    document.read()
+}
+
+type Triangle = [[f64; 3]; 3];
+
+struct Document<'a> {
+    tree: &'a XmlTree,
+    ids: BTreeMap<&'a str, usize>,
+    /// Triangles of each geometry that was used, in its own coordinates.
+    soups: BTreeMap<usize, Vec<Triangle>>,
+    mesh: MeshBuilder,
+}
+
+/// Where a node stands.
+#[derive(Clone, Copy)]
+struct Visit {
+    element: usize,
+    scene_from_parent: Matrix4<f64>,
+    depth: usize,
+}
+
+impl<'a> Document<'a> {
+    fn read(mut self) -> Result<Mesh, String> {
+        let unit = Matrix4::new_scaling(self.meters_per_unit()?);
+        let Some(scene) = self.scene()? else {
+            // Without a scene, every geometry stands where it was drawn.
+            let tree = self.tree;
+            for geometry in tree.named("geometry") {
+                self.place(geometry, &unit)?;
+            }
+            return Ok(self.mesh.finish());
+        };
+        let mut visits: Vec<Visit> = Vec::new();
+        let mut n_visited = 0;
+        self.push_children(&mut visits, Visit { element: scene, scene_from_parent: unit, depth: 0 });
+        while let Some(visit) = visits.pop() {
+            n_visited += 1;
+            if n_visited > MAX_NODES || visit.depth > MAX_DEPTH {
+                return Err(format!("more than {MAX_NODES} nodes, or more than {MAX_DEPTH} within each other"));
+            }
+            self.visit(visit, &mut visits)?;
+        }
+        Ok(self.mesh.finish())
+    }
+
+    fn meters_per_unit(&self) -> Result<f64, String> {
+        let asset = self.tree.child(0, "asset");
+        let Some(unit) = asset.and_then(|asset| self.tree.child(asset, "unit")) else { return Ok(1.0) };
+        let Some(meter) = self.tree.element(unit).attribute("meter") else { return Ok(1.0) };
+        let value: Option<f64> = meter.trim().parse().ok();
+        value.filter(|value| (1e-9..=1e9).contains(value)).ok_or_else(|| format!("its unit of `{meter}` m is none"))
+    }
+
+    fn scene(&self) -> Result<Option<usize>, String> {
+        let scene = self.tree.child(0, "scene");
+        match scene.and_then(|scene| self.tree.child(scene, "instance_visual_scene")) {
+            Some(instance) => self.target(instance, "url").map(Some),
+            None => Ok(self.tree.named("visual_scene").next()),
+        }
+    }
+
+    /// The element that `attribute` of an element refers to.
+    fn target(&self, at: usize, attribute: &str) -> Result<usize, String> {
+        let element = self.tree.element(at);
+        let Some(url) = element.attribute(attribute) else {
+            return Err(format!("a `{}` has no {attribute}", element.name));
+        };
+        let id = url.strip_prefix('#').ok_or_else(|| format!("`{url}` is in another file"))?;
+        self.ids.get(id).copied().ok_or_else(|| format!("no element has the id `{id}`"))
+    }
+
+    fn push_children(&self, visits: &mut Vec<Visit>, parent: Visit) {
+        let children = self.tree.children(parent.element).filter(|&child| {
+            matches!(
+                self.tree.element(child).name.as_str(),
+                "node" | "instance_node" | "instance_geometry" | "instance_controller"
+            )
+        });
+        visits.extend(children.map(|element| Visit { element, ..parent }));
+    }
+
+    fn visit(&mut self, visit: Visit, visits: &mut Vec<Visit>) -> Result<(), String> {
+        match self.tree.element(visit.element).name.as_str() {
+            "node" => {
+                let scene_from_parent = visit.scene_from_parent * self.parent_from_node(visit.element)?;
+                self.push_children(visits, Visit { scene_from_parent, depth: visit.depth + 1, ..visit });
+            }
+            "instance_node" => {
+                let element = self.target(visit.element, "url")?;
+                if self.tree.element(element).name == "node" {
+                    visits.push(Visit { element, depth: visit.depth + 1, ..visit });
+                }
+            }
+            "instance_geometry" => {
+                let geometry = self.target(visit.element, "url")?;
+                self.place(geometry, &visit.scene_from_parent)?;
+            }
+            _ => return Err("it has skinned parts (instance_controller), which are not read".to_owned()),
+        }
+        Ok(())
+    }
+
+    fn parent_from_node(&self, node: usize) -> Result<Matrix4<f64>, String> {
+        let mut parent_from_node = Matrix4::identity();
+        for child in self.tree.children(node) {
+            let element = self.tree.element(child);
+            let step = match element.name.as_str() {
+                "matrix" => Matrix4::from_row_slice(&numbers::<16>(element)?),
+                "translate" => Translation3::from(Vector3::from(numbers::<3>(element)?)).to_homogeneous(),
+                "scale" => Matrix4::new_nonuniform_scaling(&Vector3::from(numbers::<3>(element)?)),
+                "rotate" => {
+                    let [x, y, z, degrees] = numbers::<4>(element)?;
+                    let axis = Unit::try_new(Vector3::new(x, y, z), 1e-12);
+                    axis.map_or_else(Matrix4::identity, |axis| {
+                        Rotation3::from_axis_angle(&axis, degrees.to_radians()).to_homogeneous()
+                    })
+                }
+                "lookat" | "skew" => return Err(format!("a node has a `{}`, which is not read", element.name)),
+                _ => continue,
+            };
+            parent_from_node *= step;
+        }
+        if parent_from_node.row(3) != Vector4::new(0.0, 0.0, 0.0, 1.0).transpose() {
+            return Err("a node's matrix does not end in 0 0 0 1".to_owned());
+        }
+        Ok(parent_from_node)
+    }
+
+    /// Adds a geometry where an instance of it stands.
+    fn place(&mut self, geometry: usize, scene_from_geometry: &Matrix4<f64>) -> Result<(), String> {
+        if !self.soups.contains_key(&geometry) {
+            let soup = self.soup(geometry)?;
+            self.soups.insert(geometry, soup);
+        }
+        for triangle in &self.soups[&geometry] {
+            let corners = triangle.map(|at| scene_from_geometry.transform_point(&Point3::from(at)).coords.into());
+            self.mesh.add(corners)?;
+        }
+        Ok(())
+    }
+
+    fn soup(&self, geometry: usize) -> Result<Vec<Triangle>, String> {
+        let mut soup = Vec::new();
+        // A geometry without a mesh is a spline or a solid: nothing to read.
+        let Some(mesh) = self.tree.child(geometry, "mesh") else { return Ok(soup) };
+        for primitive in self.tree.children(mesh) {
+            let kind = match self.tree.element(primitive).name.as_str() {
+                "triangles" => Kind::Triangles,
+                "polylist" => Kind::Polylist,
+                "polygons" | "trifans" => Kind::Fans,
+                "tristrips" => Kind::Strips,
+                _ => continue,
+            };
+            self.add_primitive(primitive, kind, &mut soup)?;
+        }
+        Ok(soup)
+    }
+
+    fn add_primitive(&self, primitive: usize, kind: Kind, soup: &mut Vec<Triangle>) -> Result<(), String> {
+        let mut stride = 1;
+        let mut vertices = None;
+        for input in self.tree.children(primitive).filter(|&child| self.tree.element(child).name == "input") {
+            let element = self.tree.element(input);
+            let offset: usize = element
+                .attribute("offset")
+                .map_or(Ok(0), |offset| offset.trim().parse())
+                .map_err(|_| "the offset of an input is no number".to_owned())?;
+            // Real files have some four inputs.
+            if offset >= 64 {
+                return Err(format!("the offset {offset} of an input is beyond 63"));
+            }
+            stride = stride.max(offset + 1);
+            if element.attribute("semantic") == Some("VERTEX") {
+                vertices = Some((self.target(input, "source")?, offset));
+            }
+        }
+        let (vertices, offset) = vertices.ok_or("a primitive has no vertices")?;
+        let positions = self.positions(vertices)?;
+        let counts = match (kind, self.tree.child(primitive, "vcount")) {
+            (Kind::Polylist, Some(counts)) => indices(self.tree.element(counts))?,
+            _ => Vec::new(),
+        };
+        for list in self.index_lists(primitive) {
+            let all = indices(self.tree.element(list))?;
+            let corners = all.chunks_exact(stride).map(|corner| {
+                positions
+                    .get(corner[offset])
+                    .copied()
+                    .ok_or_else(|| format!("corner {} is none of {} vertices", corner[offset], positions.len()))
+            });
+            kind.add(&corners.collect::<Result<Vec<_>, String>>()?, &counts, soup)?;
+        }
+        Ok(())
+    }
+
+    /// The `p` of a primitive; of a polygon with holes its outline.
+    fn index_lists(&self, primitive: usize) -> Vec<usize> {
+        let children = self.tree.children(primitive);
+        children
+            .filter_map(|child| match self.tree.element(child).name.as_str() {
+                "p" => Some(child),
+                "ph" => self.tree.child(child, "p"),
+                _ => None,
+            })
+            .collect()
+    }
+
+    /// Positions that a `vertices` element names.
+    fn positions(&self, vertices: usize) -> Result<Vec<[f64; 3]>, String> {
+        let is_position = |&child: &usize| self.tree.element(child).attribute("semantic") == Some("POSITION");
+        let input = self.tree.children(vertices).find(is_position).ok_or("vertices have no positions")?;
+        let source = self.target(input, "source")?;
+        let technique = self.tree.child(source, "technique_common");
+        let accessor = technique.and_then(|technique| self.tree.child(technique, "accessor"));
+        let array = match accessor {
+            Some(accessor) => self.target(accessor, "source")?,
+            None => self.tree.child(source, "float_array").ok_or("a source has no numbers")?,
+        };
+        let setting = |name: &str, default: usize| -> Result<usize, String> {
+            let text = accessor.and_then(|accessor| self.tree.element(accessor).attribute(name));
+            text.map_or(Ok(default), |text| {
+                text.trim().parse().map_err(|_| format!("the {name} `{text}` is no number"))
+            })
+        };
+        let (stride, offset) = (setting("stride", 3)?, setting("offset", 0)?);
+        if stride < 3 {
+            return Err(format!("positions of {stride} numbers, 3 expected"));
+        }
+        let words = self.tree.element(array).text.split_ascii_whitespace().skip(offset);
+        let (mut positions, mut position) = (Vec::new(), [0.0; 3]);
+        for (n, word) in words.enumerate() {
+            let Some(place) = position.get_mut(n % stride) else { continue };
+            *place = word.parse().map_err(|_| format!("`{word}` is no number"))?;
+            if n % stride == 2 {
+                if positions.len() == MAX_VERTICES {
+                    return Err(format!("more than {MAX_VERTICES} vertices"));
+                }
+                positions.push(position);
+            }
+        }
+        Ok(positions)
+    }
+}
+
+/// How corners make triangles.
+#[derive(Clone, Copy, PartialEq)]
+enum Kind {
+    Triangles,
+    /// Polygons one after another, their numbers of corners apart.
+    Polylist,
+    /// One polygon or fan in each list.
+    Fans,
+    Strips,
+}
+
+impl Kind {
+    fn add(self, corners: &[[f64; 3]], counts: &[usize], soup: &mut Vec<Triangle>) -> Result<(), String> {
+        match self {
+            Self::Triangles => soup.extend(corners.as_chunks::<3>().0),
+            Self::Fans => add_fan(corners, soup),
+            Self::Strips => soup.extend(corners.windows(3).map(|three| [three[0], three[1], three[2]])),
+            Self::Polylist => {
+                let mut rest = corners;
+                for &count in counts {
+                    let polygon;
+                    (polygon, rest) = rest.split_at_checked(count).ok_or("its polygons have too few corners")?;
+                    add_fan(polygon, soup);
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A polygon as a fan about its first corner; nothing of fewer than three corners.
+fn add_fan(corners: &[[f64; 3]], soup: &mut Vec<Triangle>) {
+    if let Some((first, rest)) = corners.split_first() {
+        soup.extend(rest.windows(2).map(|pair| [*first, pair[0], pair[1]]));
+    }
+}
+
+fn numbers<const N: usize>(element: &Element) -> Result<[f64; N], String> {
+    let words = element.text.split_ascii_whitespace().take(N + 1);
+    let found: Option<Vec<f64>> = words.map(|word| word.parse().ok()).collect();
+    let found = found.and_then(|found| <[f64; N]>::try_from(found).ok());
+    found
+        .filter(|found| found.iter().all(|value| value.is_finite()))
+        .ok_or_else(|| format!("a `{}` needs {N} finite numbers", element.name))
+}
+
+fn indices(element: &Element) -> Result<Vec<usize>, String> {
+    let words = element.text.split_ascii_whitespace();
+    words.map(|word| word.parse().map_err(|_| format!("`{word}` in a `{}` is no index", element.name))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SCENE: &str = include_str!("../../../fuzz/corpus/dae/scene.dae");
+    const BARE: &str = include_str!("../../../fuzz/corpus/dae/bare.dae");
+
+    fn read(text: &str) -> Result<Mesh, String> {
+        collada(text.as_bytes())
+    }
+
+    #[test]
+    fn nodes_and_unit_put_every_kind_of_face_in_its_place() {
+        let mesh = read(SCENE).expect("it reads");
+        assert_eq!(mesh.triangles.len(), 4, "one triangle, two of a polylist, one polygon");
+        // Doubled along x, turned from x to y, 50 mm up, 1 m along x; the axes stay those of the file.
+        let mut expected = vec![[1.0, 0.0, 0.05], [1.0, 0.2, 0.05], [0.9, 0.0, 0.05], [1.0, 0.0, 0.15]];
+        for vertex in mesh.vertices {
+            let is_it = |at: &[f64; 3]| (0..3).all(|k| (at[k] - vertex[k]).abs() < 1e-12);
+            let found = expected.iter().position(is_it).unwrap_or_else(|| panic!("{vertex:?} of {expected:?}"));
+            expected.swap_remove(found);
+        }
+        assert!(expected.is_empty(), "{expected:?}");
+    }
+
+    #[test]
+    fn a_file_without_a_scene_is_read_as_it_is_drawn() {
+        let mesh = read(BARE).expect("it reads");
+        assert_eq!((mesh.vertices.len(), mesh.triangles.len()), (4, 5), "a strip of four and a fan of one");
+        assert_eq!(mesh.vertices[1], [0.1, 0.0, 0.0], "metres where no unit is named");
+    }
+
+    #[test]
+    fn what_is_wrong_is_named() {
+        for (from, to, word) in [
+            ("<COLLADA", "<!DOCTYPE x><COLLADA", "document type"),
+            ("url=\"#wedge\"", "url=\"other.dae#wedge\"", "in another file"),
+            ("url=\"#wedge\"", "url=\"#none\"", "`none`"),
+            ("meter=\"0.001\"", "meter=\"0\"", "unit of `0` m"),
+            ("1 2 3</p>", "1 2 4</p>", "corner 4 is none of 4"),
+            ("1 2 3</p>", "1 2 -3</p>", "`-3`"),
+            ("<vcount>3 3<", "<vcount>3 4<", "too few corners"),
+            ("100 0 0 0 100", "100 0 x 0 100", "`x`"),
+            ("100 0 0 0 100", "100 0 1e999 0 100", "not finite"),
+            ("stride=\"3\"", "stride=\"2\"", "positions of 2"),
+            ("offset=\"1\"", "offset=\"64\"", "offset 64"),
+            ("0 0 0 1</matrix>", "0 0 1 1</matrix>", "0 0 0 1"),
+            ("<translate>0 0", "<translate>0", "`translate` needs 3"),
+            ("<scale>2 1 1</scale>", "<skew>1</skew>", "`skew`"),
+            ("<instance_geometry url=\"#wedge\"/>", "<instance_controller url=\"#wedge\"/>", "skinned"),
+            ("<instance_geometry url=\"#wedge\"/>", "<instance_node url=\"#outer\"/>", "within each other"),
+        ] {
+            let text = SCENE.replacen(from, to, 1);
+            assert_ne!(text, SCENE, "{from}");
+            let problem = read(&text).expect_err(to);
+            assert!(problem.contains(word), "{to}: {problem}");
+        }
+        for (text, word) in [
+            ("<a/>", "root element"),
+            ("", "no element"),
+            ("<COLLADA><a>", "ends within"),
+            (&"<COLLADA>".repeat(65), "64 deep"),
+        ] {
+            assert!(read(text).unwrap_err().contains(word), "{text}");
+        }
+    }
+
+    /// Each node instances the next one ten times.
+    #[test]
+    fn nodes_that_multiply_are_refused() {
+        let mut nodes = String::new();
+        for level in 0..20 {
+            let instances = format!("<instance_node url=\"#n{}\"/>", level + 1).repeat(10);
+            nodes += &format!("<node id=\"n{level}\">{instances}</node>");
+        }
+        let text = format!(
+            "<COLLADA><library_visual_scenes><visual_scene id=\"s\">{nodes}<node id=\"n20\"/>\
+                            </visual_scene></library_visual_scenes></COLLADA>"
+        );
+        assert!(read(&text).unwrap_err().contains("10000 nodes"));
+    }
+
+    #[test]
+    fn cut_files_never_panic() {
+        for text in [SCENE, BARE] {
+            for length in 0..text.trim_end().len() {
+                assert!(read(&text[..length]).is_err(), "{length}");
+            }
+        }
+    }
+}

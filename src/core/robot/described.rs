@@ -1,0 +1,114 @@
+//! The arm with what stands around it as one URDF, for viewers: the vehicle and the tags as further links.
+
+use std::fmt::Write as _;
+
+use nalgebra::{Isometry3, Translation3};
+use quick_xml::escape::escape;
+
+use super::frame_tree::{FixedFrame, FrameTree};
+use super::nominal::Robot;
+use super::shape::{PlacedShape, Shape};
+use super::vehicle::Vehicle;
+
+/// Name of the vehicle's frame.
+const VEHICLE: &str = "vehicle";
+/// Thickness of a drawn tag, m: its face is at the tag's frame.
+const TAG_THICKNESS_M: f64 = 0.004;
+/// Of a drawn tag.
+const TAG_RGB: [u8; 3] = [245, 245, 235];
+
+/// What a viewer draws of an arm and its surroundings as belief knows them.
+#[derive(Clone, Debug)]
+pub struct Described {
+    /// The robot's URDF with links for vehicle and tags; for arms without names in the way.
+    pub urdf: String,
+    /// Frames that never move: the arm's on the vehicle, fixed links, tags.
+    pub fixed: Vec<FixedFrame>,
+}
+
+/// The frame of a tag by its number.
+#[must_use]
+pub fn tag_frame_name(id: u32) -> String {
+    format!("tag36h11:{id}")
+}
+
+impl Described {
+    /// Of an arm bolted onto a vehicle, with the tags whose poses the arm is given, as surveyed.
+    #[must_use]
+    pub fn new(robot: &Robot, vehicle: &Vehicle, tree: &FrameTree) -> Self {
+        let names = tree.names();
+        let mut fixed = Vec::new();
+        let mut added = String::new();
+        if !names.contains(VEHICLE) {
+            let shapes: Vec<&PlacedShape> = vehicle.parts.iter().map(|part| &part.placed).collect();
+            add_link(&mut added, VEHICLE, &shapes);
+            let parent_from_child = vehicle.vehicle_from_base.isometry() * tree.base_from_root;
+            fixed.push(FixedFrame { parent: VEHICLE.to_owned(), child: tree.root.clone(), parent_from_child });
+        }
+        // The link that carries the tags; its frame is that of the tags.
+        let carrier = robot.links.iter().find(|(_, place)| **place == robot.tag_frame).map(|(name, _)| name);
+        for tag in robot.tags.iter().filter(|tag| tag.is_known()) {
+            let (name, Some(carrier)) = (tag_frame_name(tag.id), carrier) else { continue };
+            if names.contains(name.as_str()) {
+                continue;
+            }
+            let size_m = if tag.size_m.is_finite() { tag.size_m } else { 0.05 };
+            let plate = PlacedShape {
+                owner_from_shape: Isometry3::from(Translation3::new(0.0, 0.0, -0.5 * TAG_THICKNESS_M)),
+                shape: Shape::Box { size_m: [size_m, size_m, TAG_THICKNESS_M] },
+                color_rgb: TAG_RGB,
+            };
+            add_link(&mut added, &name, &[&plate]);
+            let parent_from_child = *tag.base_from_tag.isometry();
+            fixed.push(FixedFrame { parent: carrier.clone(), child: name, parent_from_child });
+        }
+        for (number, frame) in fixed.iter().enumerate() {
+            add_joint(&mut added, number, frame);
+        }
+        let mut urdf = robot.urdf_text.clone();
+        if let Some(end) = urdf.rfind("</robot>") {
+            urdf.insert_str(end, &added);
+        }
+        fixed.extend(tree.fixed.iter().cloned());
+        Self { urdf, fixed }
+    }
+}
+
+fn add_link(text: &mut String, name: &str, shapes: &[&PlacedShape]) {
+    let _ = writeln!(text, "  <link name=\"{}\">", escape(name));
+    for (number, placed) in shapes.iter().enumerate() {
+        let geometry = match placed.shape {
+            Shape::Box { size_m: [x, y, z] } => format!("<box size=\"{x} {y} {z}\"/>"),
+            Shape::Cylinder { radius_m, length_m } | Shape::Capsule { radius_m, length_m } => {
+                format!("<cylinder radius=\"{radius_m}\" length=\"{length_m}\"/>")
+            }
+            Shape::Sphere { radius_m } => format!("<sphere radius=\"{radius_m}\"/>"),
+            // A URDF knows meshes as files alone.
+            Shape::Hull(_) => continue,
+        };
+        let [r, g, b] = placed.color_rgb.map(|part| f64::from(part) / 255.0);
+        let material = format!("{} {number}", escape(name));
+        let _ = writeln!(
+            text,
+            "    <visual>{}<geometry>{geometry}</geometry><material name=\"{material}\"><color rgba=\"{r:.3} {g:.3} \
+             {b:.3} 1\"/></material></visual>",
+            origin(&placed.owner_from_shape),
+        );
+    }
+    text.push_str("  </link>\n");
+}
+
+fn add_joint(text: &mut String, number: usize, frame: &FixedFrame) {
+    let (parent, child) = (escape(frame.parent.as_str()), escape(frame.child.as_str()));
+    let _ = writeln!(
+        text,
+        "  <joint name=\"armcal_fixed_{number}\" type=\"fixed\"><parent link=\"{parent}\"/><child link=\"{child}\"/>{}\
+         </joint>",
+        origin(&frame.parent_from_child),
+    );
+}
+
+fn origin(pose: &Isometry3<f64>) -> String {
+    let ([x, y, z], (roll, pitch, yaw)) = (pose.translation.vector.into(), pose.rotation.euler_angles());
+    format!("<origin xyz=\"{x} {y} {z}\" rpy=\"{roll} {pitch} {yaw}\"/>")
+}
