@@ -136,13 +136,9 @@ pub fn drawn_dive_fault(kind: DiveFaultKind, seed: u64, robot: &Robot, looks: &[
             (None, text)
         }
         K::Worn => {
-            let joint = rng.random_range(0..robot.n_seen_joints());
-            let look = looks.get(rng.random_range(0..looks.len().max(1))).and_then(|look| look.get(joint));
-            let width_rad = rng.random_range(1.5..4.0) * DEG;
-            let by_rad = sign * rng.random_range(0.5..1.5) * DEG;
-            let at_rad = look.copied().unwrap_or(robot.stowed[joint]) + rng.random_range(-0.5..0.5) * width_rad;
+            let Wear { joint, at_rad, by_rad, width_rad } = drawn_wear(&mut rng, robot, looks);
             spot = Some((joint, WornSpot::about(at_rad - robot.sensors[joint].center_rad)));
-            let name = &robot.sensors[joint].joint;
+            let (name, by_rad) = (&robot.sensors[joint].joint, sign * by_rad);
             let text = format!(
                 "{{at_s={at_s:?}, kind=\"sensor_worn\", joint=\"{name}\", at_rad={at_rad:?}, by_rad={by_rad:?}, \
                  width_rad={width_rad:?}}}"
@@ -167,6 +163,24 @@ pub fn drawn_dive_fault(kind: DiveFaultKind, seed: u64, robot: &Robot, looks: &[
     };
     let (joint, spot) = spot.map_or((joint, None), |(joint, spot)| (joint, Some(spot)));
     DiveFault { kind, seed, at_s, joint, spot, tags, size, setting: format!("[{setting}]") }
+}
+
+/// A worn spot as drawn, its height without a sign.
+struct Wear {
+    joint: usize,
+    at_rad: f64,
+    by_rad: f64,
+    width_rad: f64,
+}
+
+/// About where a joint stands in one of the looks at tags: elsewhere no view tells of it.
+fn drawn_wear(rng: &mut impl Rng, robot: &Robot, looks: &[Vec<f64>]) -> Wear {
+    let joint = rng.random_range(0..robot.n_seen_joints());
+    let look = looks.get(rng.random_range(0..looks.len().max(1))).and_then(|look| look.get(joint));
+    let width_rad = rng.random_range(1.5..4.0) * DEG;
+    let by_rad = rng.random_range(0.5..1.5) * DEG;
+    let at_rad = look.copied().unwrap_or(robot.stowed[joint]) + rng.random_range(-0.5..0.5) * width_rad;
+    Wear { joint, at_rad, by_rad, width_rad }
 }
 
 /// Evenly over the sphere.
