@@ -72,13 +72,16 @@ fn one(args: &DiveFaultsArgs, kind: DiveFaultKind, seed: u64) -> Result<DiveFaul
     let run = if args.keep { kept } else { folder.path().join("run") };
     let routine = routine::load(&args.routine)?;
     let (robot, _) = routine.load_arm()?;
-    let fault = drawn_dive_fault(kind, seed, &robot);
+    let works = routine.steps.iter().enumerate().find_map(|(place, step)| match step {
+        Step::Work(work) => Some((place, work)),
+        _ => None,
+    });
+    let Some((works, work)) = works else {
+        return Err(UsageError(format!("{}: it has no step `work`", args.routine.display())).into());
+    };
+    let fault = drawn_dive_fault(kind, seed, &robot, &work.looks_rad);
     if !run.join("truth.mcap").exists() {
         // The arm works by the belief that is looked at.
-        let works = routine.steps.iter().position(|step| matches!(step, Step::Work(_)));
-        let Some(works) = works else {
-            return Err(UsageError(format!("{}: it has no step `work`", args.routine.display())).into());
-        };
         let settings = [format!("step.{works}.belief=\"online\""), format!("world.fault={}", fault.setting)];
         run_dive(&args.routine, seed, &settings, &run)?;
     }

@@ -45,6 +45,7 @@ pub fn estimate(
             offset_rad_per_mpa: 3e-5 * normal(),
             drift_rad_per_h: 5e-4 * normal(),
             half_backlash_rad: 2e-4 * normal(),
+            ..Terms::default()
         };
     }
     let all = (0..n).flat_map(|joint| ParameterKind::all().map(move |kind| Parameter { joint, kind }));

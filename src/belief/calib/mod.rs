@@ -41,7 +41,7 @@ pub use methods::{
     SearchOptions, Solution, Unobservable, VarianceObjective, determined_by_variance, fisher_information, fit_stops,
     free_parameters, least_squares, minimum_distance, mount_by_gripper_tag,
 };
-pub use parameters::{JointParameters, Parameter, ParameterKind};
+pub use parameters::{JointParameters, Parameter, ParameterKind, WornSpot};
 pub use refusal::{InnovationQuantity, Refusal};
 pub use refusal_conditions::{MIN_HELD_OUT_VIEWS, MIN_VIEWS_PER_PARAMETER, fewest_views};
 pub use reservation::Reservation;

@@ -6,7 +6,9 @@
 
 use armcal_core::kinematics::LinkCorrections;
 use armcal_core::robot::{JointSensorSpec, Robot};
-use armcal_core::sensor::{ArmSensors, ConditionChange, Conditions, Correction, N_SHAPE, Terms, nonlinearity_basis};
+use armcal_core::sensor::{
+    ArmSensors, Bump, ConditionChange, Conditions, Correction, N_SHAPE, Terms, nonlinearity_basis,
+};
 use armcal_core::streams::MAX_JOINTS;
 use armcal_core::time::Stamp;
 
@@ -52,6 +54,7 @@ impl JointParameters {
             ParameterKind::HalfBacklash => self.terms[parameter.joint].half_backlash_rad,
             // These are the sensors as they are now.
             ParameterKind::StepBefore(_) | ParameterKind::WalkMode(_) => 0.0,
+            ParameterKind::Bump(_) => self.terms[parameter.joint].bump.height_rad,
             ParameterKind::LinkShift(axis) => self.links[parameter.joint].shift_m[usize::from(axis)],
             ParameterKind::LinkTurn(axis) => self.links[parameter.joint].turn_rad[usize::from(axis)],
             ParameterKind::Compliance => self.links.sag.joint_rad_per_nm[parameter.joint],
@@ -72,6 +75,7 @@ impl JointParameters {
             ParameterKind::DriftPerH => self.terms[parameter.joint].drift_rad_per_h = value,
             ParameterKind::HalfBacklash => self.terms[parameter.joint].half_backlash_rad = value,
             ParameterKind::StepBefore(_) | ParameterKind::WalkMode(_) => {}
+            ParameterKind::Bump(spot) => self.terms[parameter.joint].bump = spot.bump(value),
             ParameterKind::LinkShift(axis) => self.links[parameter.joint].shift_m[usize::from(axis)] = value,
             ParameterKind::LinkTurn(axis) => self.links[parameter.joint].turn_rad[usize::from(axis)] = value,
             ParameterKind::Compliance => self.links.sag.joint_rad_per_nm[parameter.joint] = value,
@@ -136,6 +140,8 @@ pub enum ParameterKind {
     StepBefore(Stamp),
     /// A mode of the random walk that led to the offset as it is at the last view, rad.
     WalkMode(u8),
+    /// Height of a worn spot's bump, rad; one a joint.
+    Bump(WornSpot),
     /// Of the joint's origin along an axis of its parent link, m.
     LinkShift(u8),
     /// Of the joint's attitude about an axis of its parent link, rad.
@@ -192,9 +198,54 @@ impl ParameterKind {
             Self::DriftPerH => departure.elapsed_h,
             Self::HalfBacklash => approach,
             Self::StepBefore(_) | Self::WalkMode(_) => 0.0,
+            Self::Bump(spot) => spot.bump(0.0).share(travel_rad),
             Self::LinkShift(_) | Self::LinkTurn(_) => 0.0,
             Self::Compliance | Self::MountCompliance(_) | Self::ToolLoad => 0.0,
         }
+    }
+}
+
+/// Where a sensor's track is worn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct WornSpot {
+    /// Travel of its middle from that of the joint's range, microradians: a whole number, so that kinds can be
+    /// compared.
+    at_urad: i32,
+}
+
+impl WornSpot {
+    /// Its standard width, rad. Assumed: some three degrees; a narrower one is seen at its middle alone, a wider one
+    /// takes two places.
+    pub const WIDTH_RAD: f64 = 0.05;
+
+    /// About `travel_rad` from the middle of the joint's range.
+    #[must_use]
+    pub fn about(travel_rad: f64) -> Self {
+        Self { at_urad: (1e6 * travel_rad).round() as i32 }
+    }
+
+    /// Travel of its middle from that of the joint's range, rad.
+    #[must_use]
+    pub fn at_rad(self) -> f64 {
+        1e-6 * f64::from(self.at_urad)
+    }
+
+    /// As high as that.
+    #[must_use]
+    pub fn bump(self, height_rad: f64) -> Bump {
+        Bump { at_rad: self.at_rad(), width_rad: Self::WIDTH_RAD, height_rad }
+    }
+
+    /// Whether a travel from the middle of the range is on it.
+    #[must_use]
+    pub fn is_about(self, travel_rad: f64) -> bool {
+        (travel_rad - self.at_rad()).abs() < Self::WIDTH_RAD
+    }
+
+    /// Whether what happens at a travel from the middle of the range is about something else.
+    #[must_use]
+    pub fn is_far_from(self, travel_rad: f64) -> bool {
+        (travel_rad - self.at_rad()).abs() > 3.0 * Self::WIDTH_RAD
     }
 }
 
@@ -262,6 +313,7 @@ impl Parameter {
             ParameterKind::HalfBacklash => "half play",
             ParameterKind::StepBefore(_) => "step",
             ParameterKind::WalkMode(k) => return format!("{} walk {}", robot.sensors[self.joint].joint, k + 1),
+            ParameterKind::Bump(_) => "bump",
             ParameterKind::LinkShift(axis) => {
                 return format!("{} place {}", robot.sensors[self.joint].joint, AXES[usize::from(axis)]);
             }

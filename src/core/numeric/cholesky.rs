@@ -28,6 +28,29 @@ pub fn cholesky(mut matrix: DMatrix<f64>) -> Option<Cholesky<f64, Dyn>> {
     Some(Cholesky::pack_dirty(matrix))
 }
 
+/// Solves `L x = right` in place for each column of `right`, with `L` the lower factor.
+pub fn solve_lower(factor: &Cholesky<f64, Dyn>, right: &mut DMatrix<f64>) {
+    let lower = factor.l_dirty();
+    let n = lower.nrows();
+    assert!(right.nrows() == n, "as many rows as the factor has");
+    for first in (0..n).step_by(BLOCK) {
+        let end = (first + BLOCK).min(n);
+        for mut column in right.column_iter_mut() {
+            for row in first..end {
+                let value = column[row] / lower[(row, row)];
+                column[row] = value;
+                let below = lower.view((row + 1, row), (end - row - 1, 1));
+                column.rows_range_mut(row + 1..end).axpy(-value, &below.column(0), 1.0);
+            }
+        }
+        if end == n {
+            break;
+        }
+        let (done, mut rest) = right.rows_range_pair_mut(first..end, end..n);
+        rest.gemm(-1.0, &lower.view((end, first), (n - end, end - first)), &done, 1.0);
+    }
+}
+
 /// Finishes `column`, from which those before `first` were subtracted already.
 fn factor_column(matrix: &mut DMatrix<f64>, first: usize, column: usize) -> Option<()> {
     let n = matrix.nrows();
@@ -71,6 +94,18 @@ mod tests {
             let factor = cholesky(lower).expect("positive definite").l();
             let off = (&factor * factor.transpose() - &matrix).amax();
             assert!(off < 1e-12 * matrix.amax() * n as f64, "{n}: {off}");
+        }
+    }
+
+    #[test]
+    fn columns_are_solved_by_blocks_as_one_by_one() {
+        for (seed, n) in [1, 31, 32, 33, 115].into_iter().enumerate() {
+            let square = random(n, seed as u64);
+            let factor = cholesky(&square * square.transpose() + DMatrix::identity(n, n)).expect("positive definite");
+            let right = random(n, 7).columns(0, n.min(5)).into_owned();
+            let mut solved = right.clone();
+            solve_lower(&factor, &mut solved);
+            assert!((factor.l() * solved - right).amax() < 1e-12 * n as f64, "{n}");
         }
     }
 

@@ -7,6 +7,6 @@ mod cholesky;
 mod levenberg_marquardt;
 mod loss;
 
-pub use cholesky::cholesky;
+pub use cholesky::{cholesky, solve_lower};
 pub use levenberg_marquardt::{Damping, LeastSquares, Outcome, Proposal, Report, Stop, StopRule, minimize};
 pub use loss::Loss;

@@ -9,7 +9,7 @@ pub const N_SHAPE: usize = 12;
 
 /// What calibration adds to the datasheet. With the travel t from the middle of the range, the angle is
 /// `center + (gain + gain_per_k T) t + offset + sum_h nonlinearity_h phi_h(t / half_range)` and
-/// `offset_per_k T + offset_per_mpa P + drift h + half_backlash a`, with T (K), P (MPa) and h (hours) the
+/// `offset_per_k T + offset_per_mpa P + drift h + half_backlash a + bump(t)`, with T (K), P (MPa) and h (hours) the
 /// [`ConditionChange`] from the calibration's reference and a the side that the joint came from.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Correction {
@@ -36,6 +36,30 @@ pub struct Terms {
     pub drift_rad_per_h: f64,
     /// Half of the play between joint and sensor shaft.
     pub half_backlash_rad: f64,
+    /// A worn spot of the sensor's track.
+    pub bump: Bump,
+}
+
+/// A local bump of a sensor's curve: it adds `height exp(-(t - at)^2 / 2 width^2)` to the angle at travel t.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Bump {
+    /// Travel from the middle of the range at its top.
+    pub at_rad: f64,
+    /// Its standard width; at most 0 where there is none.
+    pub width_rad: f64,
+    /// Added to the angle at its top.
+    pub height_rad: f64,
+}
+
+impl Bump {
+    /// The share of its height at a travel from the middle of the range: 1 at its top.
+    #[must_use]
+    pub fn share(&self, travel_rad: f64) -> f64 {
+        if self.width_rad <= 0.0 {
+            return 0.0;
+        }
+        (-0.5 * ((travel_rad - self.at_rad) / self.width_rad).powi(2)).exp()
+    }
 }
 
 impl Terms {
@@ -144,6 +168,17 @@ impl Correction {
             + terms.offset_rad_per_mpa * departure.pressure_mpa
             + terms.drift_rad_per_h * departure.elapsed_h
             + terms.half_backlash_rad * approach
+            + terms.bump.height_rad * terms.bump.share(travel_rad)
+    }
+}
+
+impl Correction {
+    /// d(angle)/d(travel) at `travel_rad` from the middle of the range, over two milliradians.
+    #[must_use]
+    pub fn slope(&self, spec: &JointSensorSpec, travel_rad: f64, departure: &ConditionChange) -> f64 {
+        const STEP_RAD: f64 = 1e-3;
+        let at = |travel_rad: f64| self.angle_rad(spec, travel_rad, departure, 0.0);
+        (at(travel_rad + STEP_RAD) - at(travel_rad - STEP_RAD)) / (2.0 * STEP_RAD)
     }
 }
 

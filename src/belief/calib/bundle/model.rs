@@ -83,6 +83,9 @@ pub const SHAPE_LENGTH: f64 = 0.16;
 /// How far a sensor may slip on its shaft, rad. Assumed: wide, the views tell it.
 pub(crate) const STEP_STD_RAD: f64 = 0.1;
 
+/// Height of a worn spot's bump, rad. Assumed: wide, the views tell it.
+pub(crate) const BUMP_STD_RAD: f64 = 0.03;
+
 impl Hyperparameters {
     /// What robot.toml says, and where it is silent what is usual (assumed; the data correct it).
     #[must_use]
@@ -135,6 +138,7 @@ impl Hyperparameters {
             ParameterKind::HalfBacklash => self.half_play_std_rad,
             ParameterKind::StepBefore(_) => STEP_STD_RAD,
             ParameterKind::WalkMode(k) => self.walk_std_rad[joint] * mode_std(k),
+            ParameterKind::Bump(_) => BUMP_STD_RAD,
             ParameterKind::LinkShift(_) => self.link_std[joint][0],
             ParameterKind::LinkTurn(_) => self.link_std[joint][1],
             ParameterKind::Compliance => self.compliance_std[0],

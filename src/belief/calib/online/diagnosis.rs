@@ -3,8 +3,10 @@
 
 use crate::calib::online::filter::{Filter, ViewUpdate, WalkScore};
 use crate::calib::online::hypothesis::Fault;
+use crate::calib::online::view_stream::is_moving;
+use crate::calib::parameters::WornSpot;
 use crate::calib::views::view::View;
-use armcal_core::joints::MAX_JOINTS;
+use armcal_core::joints::{JointAngles, MAX_JOINTS};
 use armcal_core::robot::Robot;
 
 /// A view is suspicious beyond this quantile of the normal by its cost (one in ten thousand).
@@ -18,10 +20,14 @@ pub(crate) const NOTHING_FITS_NATS: f64 = 30.0;
 const LEAD_NATS: f64 = 5.0;
 /// The same over another explanation by the same sensor: which one it is matters more than how it failed.
 const LEAD_OF_SENSOR_NATS: f64 = 1.5;
+/// What one view at rest tells by this is taken for a worn spot, in nats.
+const LONE_LEAD_NATS: f64 = 10.0;
 /// A scale this close to the datasheet's is the drift of a sensor, not another sensor.
 const LEAST_SCALE: f64 = 0.2;
 /// Explanations followed at most.
-const MAX_BRANCHES: usize = 6;
+const MAX_BRANCHES: usize = 8;
+/// What is less probable than the best one by this is not followed any more, in nats.
+const HOPELESS_NATS: f64 = 25.0;
 /// Views this close to each other are looked at together, s, and how many of them.
 const RECENT_S: f64 = 60.0;
 const MAX_RECENT: usize = 6;
@@ -68,6 +74,15 @@ pub(crate) struct Race {
     n_later: usize,
     /// Views of each tag of the robot.
     n_views_of: Vec<usize>,
+    /// Where the joints stood in each view.
+    seen: Vec<SeenAt>,
+}
+
+/// Where the joints stood in a view.
+#[derive(Clone)]
+struct SeenAt {
+    travel_rad: JointAngles,
+    is_resting: bool,
 }
 
 /// What a race ended with.
@@ -137,8 +152,8 @@ impl Race {
         let mut tags: Vec<usize> = views.iter().flat_map(|view| &view.tags).map(|tag| tag.tag_idx).collect();
         tags.sort_unstable();
         tags.dedup();
-        let is_free = views.last().map_or([false; MAX_JOINTS], |view| view.is_free);
-        let faults = Fault::all(before, &tags, &is_free).into_iter().map(Some);
+        let faults = views.last().map(|last| Fault::all(before, &tags, last)).unwrap_or_default();
+        let faults = faults.into_iter().map(Some);
         let branch = |fault: Option<Fault>| {
             let mut filter = before.clone();
             if let Some(fault) = fault {
@@ -149,14 +164,10 @@ impl Race {
         };
         let branches = std::iter::once(None).chain(faults).map(branch).collect();
         let n_views_of = vec![0; robot.tags.len()];
-        let mut race = Self { branches, before: before.clone(), n_views: 0, n_later: 0, n_views_of };
+        let mut race = Self { branches, before: before.clone(), n_views: 0, n_later: 0, n_views_of, seen: Vec::new() };
         views.iter().for_each(|view| race.add(robot, view));
         race.n_later = 0;
-        let mut place = 0;
-        race.branches.retain(|branch| {
-            place += 1;
-            place <= MAX_BRANCHES || branch.fault.is_none()
-        });
+        race.branches = keep_best(race.branches);
         race
     }
 
@@ -164,6 +175,7 @@ impl Race {
     pub(crate) fn add(&mut self, robot: &Robot, view: &View) {
         self.n_views += 1;
         self.n_later += 1;
+        self.seen.push(SeenAt { travel_rad: view.travel_rad, is_resting: !is_moving(view) });
         view.tags.iter().for_each(|tag| self.n_views_of[tag.tag_idx] += 1);
         for branch in &mut self.branches {
             branch.nats += match branch.filter.update(robot, &seen_by(branch.fault, view)) {
@@ -173,6 +185,8 @@ impl Race {
         }
         let is_void = |branch: &Branch| branch.is_void(&self.before);
         self.branches.sort_by(|a, b| is_void(a).cmp(&is_void(b)).then(b.nats.total_cmp(&a.nats)));
+        let best = self.nats();
+        self.branches.retain(|branch| branch.fault.is_none() || best - branch.nats < HOPELESS_NATS);
     }
 
     /// Widens every explanation.
@@ -226,9 +240,23 @@ impl Race {
             // What drifted shows in all views; a weak one must not settle it.
             Some(Fault::Drift) => self.n_later >= MAX_VIEWS,
             Some(Fault::Tag(tag)) => self.n_views_of[tag] >= CONFIRMED_BY,
+            Some(Fault::Worn(joint, spot)) => self.is_spot_confirmed(joint, spot),
             Some(Fault::Scale(_)) => self.n_views >= SCALE_CONFIRMED_BY,
             Some(_) => self.n_views >= CONFIRMED_BY,
         }
+    }
+
+    /// Views of the spot alone do not tell it from a slip; one view of it alone may be a mistake, unless the arm was at
+    /// rest and it is clear.
+    fn is_spot_confirmed(&self, joint: usize, spot: WornSpot) -> bool {
+        let later = &self.seen[self.seen.len() - self.n_later..];
+        if !later.iter().any(|seen| spot.is_far_from(seen.travel_rad[joint])) {
+            return false;
+        }
+        let about = || self.seen.iter().filter(|seen| spot.is_about(seen.travel_rad[joint]));
+        let nats = |fault| self.branches.iter().find(|branch| branch.fault == fault).map_or(f64::MIN, |b| b.nats);
+        let lead_nats = nats(Some(Fault::Worn(joint, spot))) - nats(None);
+        about().count() >= CONFIRMED_BY || (lead_nats > LONE_LEAD_NATS && about().any(|seen| seen.is_resting))
     }
 
     fn lead_nats(&self) -> f64 {
@@ -255,6 +283,13 @@ impl Race {
             next: self.others().next().and_then(|branch| branch.fault),
         })
     }
+}
+
+/// The best ones, and that nothing happened.
+fn keep_best(branches: Vec<Branch>) -> Vec<Branch> {
+    let all = branches.into_iter().enumerate();
+    let kept = all.filter(|(place, branch)| *place < MAX_BRANCHES || branch.fault.is_none());
+    kept.map(|(_, branch)| branch).collect()
 }
 
 /// A view under a fault: a failed sensor's reading is not looked at.

@@ -7,6 +7,7 @@ use crate::calib::covariance::ParameterCovariance;
 use crate::calib::online::event::OnlineEvent;
 use crate::calib::online::filter::Filter;
 use crate::calib::online::hypothesis::Fault;
+use crate::calib::online::lagged_temperature::LaggedTemperature;
 use crate::calib::online::member::Member;
 use crate::calib::online::oracle::Oracle;
 use crate::calib::online::settings::{DriftModel, OnlineSettings};
@@ -18,6 +19,9 @@ use armcal_core::time::Stamp;
 
 /// Lags of the sensors' temperature behind the oil's, s. Assumed: from none to a housing full of oil.
 const LAGS_S: [f64; 6] = [0.0, 150.0, 300.0, 600.0, 1200.0, 2400.0];
+/// A lag has a belief of its own once its temperature was this far from the oil's in a view, K: before that the
+/// belief without any lag is its own, to some thousandths of a degree.
+const APART_K: f64 = 0.25;
 /// A lag whose views are less probable by this is given up, in nats.
 const GIVEN_UP_NATS: f64 = 12.0;
 
@@ -27,6 +31,8 @@ pub struct OnlineEstimator {
     robot: Robot,
     /// The best one first.
     members: Vec<Member>,
+    /// Lags that do not yet differ from none.
+    waiting: Vec<LaggedTemperature>,
 }
 
 impl OnlineEstimator {
@@ -34,9 +40,11 @@ impl OnlineEstimator {
     #[must_use]
     pub fn new(robot: Robot, settings: OnlineSettings) -> Self {
         let settings = Arc::new(settings);
-        let lags = if settings.drift == DriftModel::Tuned { &LAGS_S[..] } else { &LAGS_S[..1] };
-        let members = lags.iter().map(|lag_s| Member::new(robot.clone(), Arc::clone(&settings), *lag_s));
-        let mut estimator = Self { members: members.collect(), robot };
+        let [without, lags @ ..] = LAGS_S;
+        let is_drifting = settings.drift == DriftModel::Tuned;
+        let waiting = lags.iter().filter(|_| is_drifting).map(|lag_s| LaggedTemperature::new(*lag_s)).collect();
+        let members = vec![Member::new(robot.clone(), Arc::clone(&settings), without)];
+        let mut estimator = Self { members, waiting, robot };
         // A slip is found and taken account of; all else that was declared says nothing of the angle.
         let declared: Vec<FailedJoint> = estimator.robot.failed.clone();
         declared
@@ -50,6 +58,14 @@ impl OnlineEstimator {
     #[must_use]
     pub fn robot(&self) -> &Robot {
         &self.robot
+    }
+
+    /// Lags of the sensors' temperature that are followed now, each with a belief of its own, and how much less
+    /// probable than the best one its views are, nats: the best one first.
+    #[must_use]
+    pub fn lags(&self) -> Vec<[f64; 2]> {
+        let best = self.best().nats;
+        self.members.iter().map(|member| [member.lag_s(), best - member.nats]).collect()
     }
 
     /// Number of views taken in.
@@ -75,11 +91,13 @@ impl OnlineEstimator {
     /// A reading of the oil's thermometer: what a sensor's temperature follows, whether a view comes or not.
     pub fn hear_temperature(&mut self, stamp: Stamp, oil_c: f64) {
         self.members.iter_mut().for_each(|member| member.hear_temperature(stamp, oil_c));
+        self.waiting.iter_mut().for_each(|lag| lag.hear(stamp, oil_c));
     }
 
     /// Takes a view in; whether it told anything. Tags whose place nobody knows are not looked at: a map comes first.
     pub fn add_view(&mut self, view: &View) -> bool {
         let Some(view) = view.of_known_tags(&self.robot) else { return false };
+        self.split(&view.conditions);
         let mut has_told = false;
         for member in &mut self.members {
             has_told |= member.add_view(view.clone());
@@ -93,6 +111,23 @@ impl OnlineEstimator {
             place == 1 || best - member.nats < GIVEN_UP_NATS
         });
         has_told
+    }
+
+    /// Gives lags whose temperature has become another one a belief of their own.
+    fn split(&mut self, conditions: &Conditions) {
+        let Some(without) = self.members.iter().find(|member| member.lag_s() == LAGS_S[0]) else {
+            // They had the same temperatures, and are as improbable.
+            self.waiting.clear();
+            return;
+        };
+        let is_apart = |lag: &LaggedTemperature| {
+            let temperatures = lag.of_sensors(conditions).oil_c.zip(conditions.oil_c);
+            temperatures.is_some_and(|(sensor_c, oil_c)| (sensor_c - oil_c).abs() > APART_K)
+        };
+        let (apart, waiting): (Vec<_>, Vec<_>) = self.waiting.iter().copied().partition(is_apart);
+        let new: Vec<Member> = apart.into_iter().map(|lag| without.with_lag(lag)).collect();
+        self.members.extend(new);
+        self.waiting = waiting;
     }
 
     fn best(&self) -> &Member {

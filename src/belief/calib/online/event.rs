@@ -22,6 +22,9 @@ pub struct OnlineEvent {
     /// What it is; the size of a slip or of something moved is how far, that of a scale the slope of the angle by the
     /// reading.
     pub finding: Finding,
+    /// Of a worn spot: the joint's angle at its middle by the datasheet, rad.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub at_rad: Option<f64>,
     /// `ln` of the odds against the next explanation.
     pub lead_nats: f64,
     /// The next explanation, where it is not that nothing happened.
@@ -32,7 +35,7 @@ pub struct OnlineEvent {
 impl OnlineEvent {
     pub(crate) fn of_verdict(robot: &Robot, verdict: &Verdict, since: Stamp, now: Stamp) -> Self {
         let unit = match verdict.fault {
-            Fault::Slip(_) | Fault::Mount => FindingUnit::Radian,
+            Fault::Slip(_) | Fault::Worn(..) | Fault::Mount => FindingUnit::Radian,
             Fault::Tag(_) | Fault::Base => FindingUnit::Metre,
             Fault::Scale(_) | Fault::Failed(_) | Fault::Drift => FindingUnit::One,
         };
@@ -50,6 +53,10 @@ impl OnlineEvent {
             since_nanos: since.nanos,
             decided_nanos: now.nanos,
             finding,
+            at_rad: match verdict.fault {
+                Fault::Worn(joint, spot) => Some(robot.sensors[joint].center_rad + spot.at_rad()),
+                _ => None,
+            },
             // Nothing else is left to lead against.
             lead_nats: verdict.lead_nats.min(1e3),
             or_else: verdict.next.map(|fault| fault.phrase(robot)),
@@ -75,6 +82,13 @@ impl OnlineEvent {
             }
             FindingKind::SensorFailed => {
                 format!("the sensor of {name} says nothing any more: only views tell where the joint stands")
+            }
+            FindingKind::SensorWorn => {
+                let at_deg = self.at_rad.unwrap_or(f64::NAN).to_degrees();
+                format!(
+                    "the sensor of {name} is worn about {at_deg:.1} deg: it reads {:.2} deg more there",
+                    size.to_degrees()
+                )
             }
             FindingKind::TagMoved => format!("tag {name} was moved by {:.1} mm", 1e3 * size),
             FindingKind::CameraMount => format!("the camera turned on its mount by {:.2} deg", size.to_degrees()),

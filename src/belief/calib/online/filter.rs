@@ -20,7 +20,7 @@ use crate::calib::online::view_stream::is_moving;
 use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
 use crate::calib::views::view::View;
 use armcal_core::joints::MAX_JOINTS;
-use armcal_core::numeric::{Loss, cholesky};
+use armcal_core::numeric::{Loss, cholesky, solve_lower};
 use armcal_core::robot::Robot;
 
 /// Steps of a view at most; two are the rule.
@@ -149,6 +149,12 @@ impl Filter {
         self.layout.tags[tag_idx]
     }
 
+    /// Whether a worn spot of a joint's sensor has a column.
+    pub(crate) fn has_bump(&self, joint: usize) -> bool {
+        let of_joint = &self.layout.parameters[self.joint_columns(joint)];
+        of_joint.iter().any(|parameter| matches!(parameter.kind, ParameterKind::Bump(_)))
+    }
+
     /// Columns of a joint's sensor.
     pub(crate) fn joint_columns(&self, joint: usize) -> std::ops::Range<usize> {
         self.layout.of_joint[joint].clone()
@@ -221,6 +227,21 @@ impl Filter {
         self.layout.n
     }
 
+    /// Adds a column of what nothing is known of but its prior: a parameter of a joint that none was of so far.
+    pub(crate) fn add_parameter(&mut self, robot: &Robot, parameter: Parameter) {
+        let Parameter { joint, kind } = parameter;
+        let at = self.layout.of_joint[joint].end;
+        let std = self.scales.prior_std(&robot.sensors[joint], joint, kind);
+        let info = std::mem::replace(&mut self.info, DMatrix::zeros(0, 0));
+        self.info = info.insert_row(at, 0.0).insert_column(at, 0.0);
+        self.info[(at, at)] = std.powi(-2);
+        self.log_det -= 2.0 * std.ln();
+        let means = std::mem::replace(&mut self.state.joint, DVector::zeros(0));
+        self.state.joint = means.insert_row(at, self.guess.get(parameter));
+        self.model.joints[joint].push(kind);
+        self.layout = Layout::with_tags(robot, &self.model, |_| true);
+    }
+
     /// Adds `D D^T` to the covariance.
     pub(crate) fn widen_along(&mut self, directions: &DMatrix<f64>) {
         let along = &self.info * directions;
@@ -234,7 +255,9 @@ impl Filter {
         self.log_det -= log_det(&factor);
         let mut half = along.transpose();
         factor.l_dirty().solve_lower_triangular_mut(&mut half);
-        self.info.gemm_tr(-1.0, &half, &half, 1.0);
+        // Products of matrices with the left one turned are several times as slow.
+        let turned = half.transpose();
+        self.info.gemm(-1.0, &turned, &half, 1.0);
         Some(())
     }
 
@@ -246,6 +269,7 @@ impl Filter {
         let input = self.input(robot, views);
         let prior = self.prior(&input, info);
         let mut problem = BundleProblem::with_layout(&input, self.layout.clone(), prior);
+        self.set_rates(&mut problem, robot, view);
         let Some(solved) = solve_view(&mut problem, &before) else {
             self.info = problem.prior.joint_info;
             return None;
@@ -265,6 +289,19 @@ impl Filter {
         Some(update)
     }
 
+    /// A joint turns as fast as its sensor's slope has it, which is not the datasheet's.
+    fn set_rates(&self, problem: &mut BundleProblem<'_>, robot: &Robot, view: &View) {
+        if !is_moving(view) {
+            return;
+        }
+        let parameters = self.parameters();
+        let change = view.conditions.departure_from(&parameters.reference);
+        for (joint, spec) in robot.sensors.iter().enumerate() {
+            let slope = parameters.correction(joint).slope(spec, view.travel_rad[joint], &change);
+            problem.views[0].rate_rad_s[joint] *= slope;
+        }
+    }
+
     fn input<'a>(&self, robot: &'a Robot, views: &'a [View]) -> BundleInput<'a> {
         BundleInput {
             robot,
@@ -272,7 +309,8 @@ impl Filter {
             model: self.model.clone(),
             scales: Hyperparameters { noise: self.noise(&views[0]), ..self.scales.clone() },
             guess: self.guess,
-            joint_prior: None,
+            // The belief so far is put in its place.
+            joint_prior: Some((DVector::zeros(0), DMatrix::zeros(0, 0))),
             evidence: HyperparameterMode::Given,
         }
     }
@@ -395,7 +433,7 @@ fn joint_errors(problem: &BundleProblem<'_>, solved: &SolvedView) -> [JointError
         let has_column = |joint: &usize| group.twists.column(*joint).iter().any(|v| *v != 0.0);
         let joints: Vec<usize> = (0..MAX_JOINTS).filter(has_column).collect();
         let mut right = DMatrix::from_fn(problem.layout.n, joints.len(), |k, i| by_columns[(joints[i], k)]);
-        factor.l_dirty().solve_lower_triangular_mut(&mut right);
+        solve_lower(factor, &mut right);
         for (k, &joint) in joints.iter().enumerate() {
             errors[joint] = JointErrorOfView {
                 error_rad: state.joint_error[0][joint],
@@ -413,13 +451,13 @@ fn walk_scores(problem: &BundleProblem<'_>, state: &State, factor: &Cholesky<f64
     let mut scores = [WalkScore::default(); MAX_JOINTS];
     let info = &problem.prior.joint_info;
     let pull = info * off_by(&problem.layout, &problem.prior.means(), state, info.nrows());
-    for (column, parameter) in problem.layout.parameters.iter().enumerate() {
-        if parameter.kind != ParameterKind::Offset {
-            continue;
-        }
-        let mut half = info.column(column).into_owned();
-        factor.l_dirty().solve_lower_triangular_mut(&mut half);
-        scores[parameter.joint] = WalkScore { a: pull[column], b: info[(column, column)] - half.norm_squared() };
+    let columns = problem.layout.parameters.iter().enumerate();
+    let offsets: Vec<(usize, usize)> =
+        columns.filter(|(_, p)| p.kind == ParameterKind::Offset).map(|(column, p)| (p.joint, column)).collect();
+    let mut half = DMatrix::from_fn(info.nrows(), offsets.len(), |row, k| info[(row, offsets[k].1)]);
+    solve_lower(factor, &mut half);
+    for (k, (joint, column)) in offsets.into_iter().enumerate() {
+        scores[joint] = WalkScore { a: pull[column], b: info[(column, column)] - half.column(k).norm_squared() };
     }
     scores
 }

@@ -4,8 +4,8 @@ use nalgebra::{DMatrix, Matrix6};
 
 use crate::calib::finding::FindingKind;
 use crate::calib::online::filter::Filter;
-use crate::calib::parameters::{Parameter, ParameterKind};
-use armcal_core::joints::MAX_JOINTS;
+use crate::calib::parameters::{Parameter, ParameterKind, WornSpot};
+use crate::calib::views::view::View;
 use armcal_core::robot::Robot;
 use armcal_core::spatial::adjoint;
 
@@ -18,6 +18,9 @@ const GAIN_STD: f64 = 1.0;
 const DRIFT_STD_RAD: f64 = 1.5e-3;
 const LN_PRIOR_OF_DRIFT: f64 = -2.0;
 const LN_PRIOR: f64 = -7.0;
+/// Less than a slip's by what a tighter height makes up for, and by the lead over the same sensor: where all views are
+/// at one place it is a slip.
+const LN_PRIOR_OF_WORN: f64 = -10.5;
 
 /// What may have happened.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -28,6 +31,8 @@ pub enum Fault {
     Scale(usize),
     /// The sensor of a joint says nothing any more.
     Failed(usize),
+    /// The track of a joint's sensor is worn at a place: a bump of its curve there.
+    Worn(usize, WornSpot),
     /// The tag of that index was knocked aside.
     Tag(usize),
     /// The camera slipped on its mount.
@@ -39,15 +44,20 @@ pub enum Fault {
 }
 
 impl Fault {
-    /// All that views with these tags could tell of, where the sensors of some joints are not looked at.
-    pub(crate) fn all(filter: &Filter, tags: &[usize], is_free: &[bool; MAX_JOINTS]) -> Vec<Self> {
-        let joints: Vec<usize> = filter.offsets().map(|(joint, _)| joint).filter(|&joint| !is_free[joint]).collect();
+    /// All that views with these tags could tell of, of which `last` is the last one; sensors that are not looked at
+    /// are not asked.
+    pub(crate) fn all(filter: &Filter, tags: &[usize], last: &View) -> Vec<Self> {
+        let joints = filter.offsets().map(|(joint, _)| joint).filter(|&joint| !last.is_free[joint]);
+        let joints: Vec<usize> = joints.collect();
+        let worn = |&joint: &usize| Self::Worn(joint, WornSpot::about(last.travel_rad[joint]));
+        let of_spots: Vec<Self> = joints.iter().filter(|joint| !filter.has_bump(**joint)).map(worn).collect();
         let of_joint = |joint: usize| [Self::Slip(joint), Self::Scale(joint), Self::Failed(joint)];
         let of_tags = tags.iter().map(|&tag| Self::Tag(tag)).filter(|_| tags.len() > 1);
         let of_mount = filter.mount_column().map(|_| Self::Mount);
         let base = (tags.len() > 1).then_some(Self::Base);
         std::iter::once(Self::Drift)
             .chain(joints.into_iter().flat_map(of_joint))
+            .chain(of_spots)
             .chain(of_tags)
             .chain(of_mount)
             .chain(base)
@@ -56,7 +66,11 @@ impl Fault {
 
     /// `ln` of its odds, before any view, against nothing.
     pub(crate) fn ln_prior(self) -> f64 {
-        if self == Self::Drift { LN_PRIOR_OF_DRIFT } else { LN_PRIOR }
+        match self {
+            Self::Drift => LN_PRIOR_OF_DRIFT,
+            Self::Worn(..) => LN_PRIOR_OF_WORN,
+            _ => LN_PRIOR,
+        }
     }
 
     /// Widens the belief where the fault re-opens it.
@@ -77,6 +91,9 @@ impl Fault {
             }
             // The views themselves are taken otherwise.
             Self::Failed(_) => {}
+            Self::Worn(joint, spot) => {
+                filter.add_parameter(robot, Parameter { joint, kind: ParameterKind::Bump(spot) });
+            }
             Self::Tag(tag) => filter.widen(&six(filter.tag_column(tag), TAG_STD)),
             Self::Mount => filter.widen(&six(filter.mount_column(), MOUNT_STD)),
             Self::Base => {
@@ -89,7 +106,7 @@ impl Fault {
     /// Whether both are about the same sensor.
     pub(crate) fn is_of_same_sensor(self, other: Self) -> bool {
         let joint = |fault| match fault {
-            Self::Slip(joint) | Self::Scale(joint) | Self::Failed(joint) => Some(joint),
+            Self::Slip(joint) | Self::Scale(joint) | Self::Failed(joint) | Self::Worn(joint, _) => Some(joint),
             _ => None,
         };
         joint(self).is_some() && joint(self) == joint(other)
@@ -105,7 +122,7 @@ impl Fault {
             Self::Tag(_) => FindingKind::TagMoved,
             Self::Mount => FindingKind::CameraMount,
             Self::Base => FindingKind::Base,
-            Self::Drift => FindingKind::SensorWorn,
+            Self::Worn(..) | Self::Drift => FindingKind::SensorWorn,
         }
     }
 
@@ -113,7 +130,9 @@ impl Fault {
     #[must_use]
     pub fn name(self, robot: &Robot) -> String {
         match self {
-            Self::Slip(joint) | Self::Scale(joint) | Self::Failed(joint) => robot.sensors[joint].joint.clone(),
+            Self::Slip(joint) | Self::Scale(joint) | Self::Failed(joint) | Self::Worn(joint, _) => {
+                robot.sensors[joint].joint.clone()
+            }
             Self::Tag(tag) => robot.tags[tag].id.to_string(),
             Self::Mount => "camera mount".to_owned(),
             Self::Base => "base".to_owned(),
@@ -128,6 +147,7 @@ impl Fault {
             Self::Slip(_) => format!("the sensor of {name} slipped on its shaft"),
             Self::Scale(_) => format!("the sensor of {name} has another scale"),
             Self::Failed(_) => format!("the sensor of {name} says nothing any more"),
+            Self::Worn(..) => format!("the sensor of {name} is worn at one place"),
             Self::Tag(_) => format!("tag {name} was moved"),
             Self::Mount => "the camera has moved on its mount".to_owned(),
             Self::Base => "the base or all tags have moved".to_owned(),
@@ -136,7 +156,8 @@ impl Fault {
     }
 
     /// How far belief `after` is from belief `before` in what the fault is about: m, of a slip by how much the sensor
-    /// reads more since, rad, of a scale the slope of the angle by the reading; `None` without a size.
+    /// reads more since, rad, of a worn spot the same at its middle, of a scale the slope of the angle by the reading;
+    /// `None` without a size.
     pub(crate) fn size(self, before: &Filter, after: &Filter) -> Option<f64> {
         match self {
             Self::Slip(joint) => {
@@ -145,6 +166,7 @@ impl Fault {
                 Some(offset(before) - offset(after))
             }
             Self::Scale(joint) => Some(after.parameters().gain[joint]),
+            Self::Worn(joint, _) => Some(-after.parameters().terms[joint].bump.height_rad),
             Self::Failed(_) | Self::Drift => None,
             Self::Tag(tag) => Some((after.tag(tag).translation.vector - before.tag(tag).translation.vector).norm()),
             Self::Mount => Some((before.mount().rotation.inverse() * after.mount().rotation).angle()),

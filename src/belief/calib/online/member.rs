@@ -95,6 +95,11 @@ impl Member {
         }
     }
 
+    /// The same belief from now on under another lag, whose temperatures were about the same so far.
+    pub(crate) fn with_lag(&self, lag: LaggedTemperature) -> Self {
+        Self { lag, ..self.clone() }
+    }
+
     /// Number of views taken in.
     pub(crate) fn n_views(&self) -> usize {
         self.n_views

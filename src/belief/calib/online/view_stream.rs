@@ -11,7 +11,7 @@ use std::collections::VecDeque;
 use crate::calib::views::association::view_of_span;
 use crate::calib::views::conditions::{BACK_S, NEAR_S, apart_rad};
 use crate::calib::views::view::View;
-use armcal_core::joints::{JointAngles, JointCounts};
+use armcal_core::joints::{JointAngles, JointCounts, MAX_JOINTS};
 use armcal_core::robot::Robot;
 use armcal_core::sensor::ArmSensors;
 use armcal_core::streams::{JointSensorSample, Mark, MarkKind, Message};
@@ -196,7 +196,8 @@ impl ViewStream {
         let view = view_of_span(self.window.as_slices().0, &self.robot, pose_idx, span)?;
         self.used_until = span.1;
         self.n_views += 1;
-        Some(view)
+        // An arm settles from both sides: which way its sensors' shafts are turned is known in motion alone.
+        Some(View { approach: [0.0; MAX_JOINTS], ..view })
     }
 
     /// The view of one image of a moving arm.
@@ -218,6 +219,7 @@ impl ViewStream {
         if !is_usable || !self.is_apart(&view.travel_rad) {
             return None;
         }
+        at_image(&mut view, &about, image);
         for (approach, rate) in view.approach.iter_mut().zip(view.rate_rad_s.iter()) {
             *approach = if rate.abs() < 0.1 * SLOWEST_RAD_S { 0.0 } else { rate.signum() };
         }
@@ -235,6 +237,17 @@ impl ViewStream {
         };
         models.take(self.robot.n_seen_joints()).any(moved)
     }
+}
+
+/// The readings' line at the time of the image: their mean is at the mean of their own stamps.
+fn at_image(view: &mut View, about: &[(Stamp, Message)], image: Stamp) {
+    let readings = about.iter().filter_map(|(_, message)| match message {
+        Message::JointSensors(sample) => Some(image.since_s(sample.stamp)),
+        _ => None,
+    });
+    let (sum_s, n) = readings.fold((0.0, 0), |(sum_s, n), late_s| (sum_s + late_s, n + 1));
+    let late_s = sum_s / f64::from(n.max(1));
+    view.travel_rad = JointAngles::from_fn(view.travel_rad.len(), |j| view.travel_rad[j] + view.rate_rad_s[j] * late_s);
 }
 
 /// Whether a joint moved while the view was taken.

@@ -143,6 +143,7 @@ impl TermsTable {
             offset_rad_per_mpa: self.offset_rad_per_mpa.unwrap_or(0.0),
             drift_rad_per_h: self.drift_rad_per_h.unwrap_or(0.0),
             half_backlash_rad: self.half_backlash_rad.unwrap_or(0.0),
+            ..Terms::default()
         }
     }
 

@@ -47,7 +47,7 @@ fn std_of(kind: ParameterKind) -> f64 {
         ParameterKind::OffsetPerMpa => 2e-4,
         ParameterKind::DriftPerH => 3e-4,
         ParameterKind::HalfBacklash => 1e-3,
-        ParameterKind::StepBefore(_) | ParameterKind::WalkMode(_) => 1e-2,
+        ParameterKind::StepBefore(_) | ParameterKind::WalkMode(_) | ParameterKind::Bump(_) => 1e-2,
         ParameterKind::LinkShift(_) => 1e-3,
         ParameterKind::LinkTurn(_) => 5e-4,
         ParameterKind::Compliance | ParameterKind::MountCompliance(_) => 2e-6,

@@ -46,6 +46,8 @@ fn any_terms() -> impl Strategy<Value = Terms> {
             offset_rad_per_mpa,
             drift_rad_per_h,
             half_backlash_rad: 0.0,
+            // A worn spot, no steeper than a tenth.
+            bump: Bump { at_rad: 0.4 * shape[0], width_rad: 0.05, height_rad: 0.005 * shape[1] },
         },
     )
 }

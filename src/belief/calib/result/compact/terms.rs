@@ -145,6 +145,8 @@ impl CompactTerms {
             offset_rad_per_mpa,
             drift_rad_per_h,
             half_backlash_rad,
+            // No calibration has any.
+            bump: _,
         } = *terms;
         let mut rounded = Self {
             nonlinearity_rad,
@@ -175,7 +177,15 @@ impl CompactTerms {
             drift_rad_per_h,
             half_backlash_rad,
         } = *self;
-        Terms { nonlinearity_rad, offset_rad_per_k, gain_per_k, offset_rad_per_mpa, drift_rad_per_h, half_backlash_rad }
+        Terms {
+            nonlinearity_rad,
+            offset_rad_per_k,
+            gain_per_k,
+            offset_rad_per_mpa,
+            drift_rad_per_h,
+            half_backlash_rad,
+            ..Terms::default()
+        }
     }
 
     /// The five scalars, then the shape up to its last coefficient that is not zero.
