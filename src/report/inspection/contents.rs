@@ -114,6 +114,11 @@ pub fn inspect(path: &Path, robot: Option<&Robot>) -> Result<Inspection, LogErro
         // Without raw readings, /joint_states is not armcal's own: every ROS arm has a topic of that name.
         topics.iter_mut().filter(|t| t.topic == log_topics::JOINT_STATES).for_each(|t| t.known_as = None);
     }
+    if topics.iter().any(|t| t.topic == log_topics::SCENE) {
+        // Every ROS arm has a topic of that name, too; it is armcal's own beside another one of its own.
+        let known_as = Some("arm as believed, for viewers");
+        topics.iter_mut().filter(|t| t.topic == log_topics::TF).for_each(|t| t.known_as = known_as);
+    }
     let mut inspection = Inspection {
         version: 1,
         recording: path.display().to_string(),
