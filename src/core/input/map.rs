@@ -182,8 +182,8 @@ pub struct Topics {
     pub camera_info: Option<String>,
     /// Least time between two images that are looked at.
     pub image_period_s: f64,
-    /// Slow sensors.
-    pub conditions: ConditionTopics,
+    /// Slow sensors; boxed for their size.
+    pub conditions: Box<ConditionTopics>,
     /// How the attitude sensor is turned in the base link.
     pub base_from_attitude: UnitQuaternion<f64>,
 }
@@ -361,7 +361,7 @@ fn topics(file: &Path, joints: &JointsToml, tags: &TagsToml, conditions: Conditi
         camera_info: tags.camera_info.clone(),
         image_period_s: FileIssue::check_range(file, "tags.image_period_s", tags.image_period_s, 0.0..=3600.0)?,
         base_from_attitude: base_from_attitude(file, &conditions)?,
-        conditions,
+        conditions: Box::new(conditions),
     };
     if found.joints == found.tags {
         issue("tags.topic", "is the topic of the joint sensors, too")?;
