@@ -82,8 +82,10 @@ fn with_images() -> (tempfile::TempDir, Recording, Robot) {
         Message::Detections(_) => Some(*stamp),
         _ => None,
     });
-    let images: Vec<_> =
-        stamps.step_by(2).map(|stamp| (stamp, Message::Image(CameraImage { stamp, jpeg: vec![0xff; 20_000] }))).collect();
+    let images: Vec<_> = stamps
+        .step_by(2)
+        .map(|stamp| (stamp, Message::Image(CameraImage { stamp, jpeg: vec![0xff; 20_000] })))
+        .collect();
     recording.messages.extend(images);
     recording.messages.sort_by_key(|(log_time, _)| *log_time);
     (dir, recording, robot)
