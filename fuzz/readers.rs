@@ -56,7 +56,7 @@ impl Scratch {
 type Read = fn(&Scratch, &[u8]) -> bool;
 
 /// By the names of the targets and of the folders of their corpora.
-pub const READERS: [(&str, Read); 24] = [
+pub const READERS: [(&str, Read); 25] = [
     ("urdf", urdf),
     ("new_robot", new_robot),
     ("recording", recording),
