@@ -85,7 +85,7 @@ fn what_is_no_recording_is_named_with_what_to_do() {
         (b"", &["empty"]),
         (b"\x89MCAP0\r", &["first 7 bytes"]),
         (b"#ROSBAG V2.0\n\x45\0\0\0", &["a ROS 1 bag", "convert"]),
-        (b"SQLite format 3\0\x10\0\x01\x01", &["SQLite", ".db3", "convert"]),
+        (b"SQLite format 3\0\x10\0\x01\x01", &["not a ROS 2 bag", "header is cut"]),
         (b"RRF2\0\0\0\0\x04", &["Rerun", "made from"]),
         (b"\x1f\x8b\x08\0\0\0", &["gzip", "unpack"]),
         (b"time,joint1,joint2\n0.0,1,2\n", &["CSV"]),

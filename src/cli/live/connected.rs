@@ -32,7 +32,8 @@ fn describe(survey: &Survey, robot: &Robot) -> String {
     }
     match &survey.tag_check {
         Some(TagCheck { tags, largest_rad, bound_rad }) => text.push_str(&format!(
-            "\n{tags} known tags are in view, up to {:.1} deg from where these angles put them; the datasheet allows {:.1}",
+            "\n{tags} known tags are in view, up to {:.1} deg from where these angles put them; the datasheet allows \
+             {:.1}",
             largest_rad.to_degrees(),
             bound_rad.to_degrees()
         )),
@@ -61,7 +62,8 @@ impl ConnectedArm {
         Ok(Self(arm))
     }
 
-    /// Moves one joint after the other by one degree and back, each after a yes, and ends at what is not as it should be.
+    /// Moves one joint after the other by one degree and back, each after a yes, and ends at what is not as it should
+    /// be.
     pub fn nudge(&mut self, robot: &Robot, interrupt: &Interrupt) -> Result<()> {
         let mut answers = std::io::stdin().lock();
         for joint in 0..robot.n_joints() {

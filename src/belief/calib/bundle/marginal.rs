@@ -62,8 +62,8 @@ impl Estimate<'_> {
         self.marginal.as_ref().map_or(&self.posterior.covariance, |marginal| &marginal.covariance)
     }
 
-    /// What a joint is off at a new pose beyond its sensor's model, one sigma; where offsets walk, as long after the last
-    /// view as the first one was before it.
+    /// What a joint is off at a new pose beyond its sensor's model, one sigma; where offsets walk, as long after the
+    /// last view as the first one was before it.
     pub(crate) fn residual_std_rad(&self, joint: usize) -> f64 {
         let fitted = || error_std_rad(&self.model, &self.problem.scales);
         self.marginal.as_ref().map_or_else(fitted, |marginal| marginal.joint_std_rad)[joint]

@@ -2,10 +2,10 @@
 //!
 //! Columns for the modes of a walk (`walk_modes`) cost time, so two figures of the estimate without them ask first: how
 //! much more than stated the offsets change with temperature, for that takes up what walks one way; and a score test of
-//! the walk's variance. With `z` and `I` of the joint's errors, all else eliminated (`step_test`),
-//! `T = sum_k l_k (phi_k^T z)^2` has the mean `sum_k l_k A_kk` and the variance `2 sum_kl l_k l_l A_kl^2` where nothing
-//! walks, `A = phi^T I phi` (Lin 1997). Then the evidence decides. What the offsets do afterwards no view tells: as much
-//! again as during the views is added to each joint's error.
+//! the walk's variance. With `z` and `I` of the joint's errors, all else eliminated (`step_test`), `T = sum_k l_k
+//! (phi_k^T z)^2` has the mean `sum_k l_k A_kk` and the variance `2 sum_kl l_k l_l A_kl^2` where nothing walks, `A =
+//! phi^T I phi` (Lin 1997). Then the evidence decides. What the offsets do afterwards no view tells: as much again as
+//! during the views is added to each joint's error.
 
 use crate::calib::bundle::estimate::{Estimate, estimate};
 use crate::calib::bundle::input::BundleInput;
@@ -21,12 +21,13 @@ use nalgebra::{DVector, SMatrix, SVector};
 const MIN_VIEWS: usize = 8;
 /// So few views tell little before columns are tried, and the trial is quick.
 const FEW_VIEWS: usize = 20;
-/// Columns are tried where offsets change with temperature by more than so many times what is stated: no good arm of 60.
+/// Columns are tried where offsets change with temperature by more than so many times what is stated: no good arm of
+/// 60.
 const WARMTH_WORTH_A_FIT: f64 = 1.6;
 /// Or where the score test's statistic lies so many of its standard deviations above its mean: one good arm of 60.
 const SCORE_WORTH_A_FIT: f64 = 3.0;
-/// A walk that is missed is an error beyond its bound, one too many a bound that is too wide. Good arms lose two nats or
-/// more by it (60 of 60), arms that walk by half a centimetre at the tool gain some.
+/// A walk that is missed is an error beyond its bound, one too many a bound that is too wide. Good arms lose two nats
+/// or more by it (60 of 60), arms that walk by half a centimetre at the tool gain some.
 const MIN_WALK_NATS: f64 = 0.0;
 
 /// When the first and the last of `views` end; `None` for views that all end together.
@@ -37,8 +38,8 @@ pub(crate) fn span(views: &[View]) -> Option<[Stamp; 2]> {
 }
 
 impl<'a> Estimate<'a> {
-    /// This estimate, or one with walks of the offsets where the views ask for them; and what that brought, where it was
-    /// tried. `input` is what this estimate was made from, but for the terms that were chosen.
+    /// This estimate, or one with walks of the offsets where the views ask for them; and what that brought, where it
+    /// was tried. `input` is what this estimate was made from, but for the terms that were chosen.
     pub(crate) fn with_walks(
         self,
         input: &BundleInput<'a>,
@@ -72,8 +73,8 @@ impl<'a> Estimate<'a> {
         (if is_in { found } else { self }, Some(selection))
     }
 
-    /// What a walk is tried with, rad: twice what each joint is off in each view, or what warmth was credited with. From
-    /// much smaller sizes the fit ends where all of it is new in each view.
+    /// What a walk is tried with, rad: twice what each joint is off in each view, or what warmth was credited with.
+    /// From much smaller sizes the fit ends where all of it is new in each view.
     fn first_walk_std_rad(&self, views: &[View]) -> [f64; MAX_JOINTS] {
         let oil_c = || views.iter().filter_map(|view| view.conditions.oil_c);
         let warmed_k = oil_c().fold(f64::NEG_INFINITY, f64::max) - oil_c().fold(f64::INFINITY, f64::min);
