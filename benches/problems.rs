@@ -91,6 +91,7 @@ fn model(robot: &Robot) -> Model {
         tags: true,
         gripper_tag: false,
         time_offset: false,
+        walk: None,
     }
 }
 

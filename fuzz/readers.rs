@@ -263,21 +263,21 @@ fn plan(scratch: &Scratch, bytes: &[u8]) -> bool {
 }
 
 fn stl(scratch: &Scratch, bytes: &[u8]) -> bool {
-    mesh(scratch, &scratch.write("a.stl", bytes))
+    mesh(scratch, &scratch.write("a.stl", bytes), 0.001)
 }
 
 fn dae(scratch: &Scratch, bytes: &[u8]) -> bool {
-    mesh(scratch, &scratch.write("a.dae", bytes))
+    mesh(scratch, &scratch.write("a.dae", bytes), 1.0)
 }
 
 fn obj(scratch: &Scratch, bytes: &[u8]) -> bool {
-    mesh(scratch, &scratch.write("a.obj", bytes))
+    mesh(scratch, &scratch.write("a.obj", bytes), 0.001)
 }
 
 /// As one hull. What a decomposition takes, seconds, is for `tests/mutations.rs` alone.
-fn mesh(scratch: &Scratch, file: &Path) -> bool {
+fn mesh(scratch: &Scratch, file: &Path, scale_m: f64) -> bool {
     let scene = format!(
-        "[[obstacle]]\nname = \"a\"\nshape = \"mesh\"\nfile = {file:?}\nscale_m = 0.001\nposition_m = [0.0, 0.0, 0.0]\n"
+        "[[obstacle]]\nname = \"a\"\nshape = \"mesh\"\nfile = {file:?}\nscale_m = {scale_m}\nposition_m = [0.0, 0.0, 0.0]\n"
     );
     armcal::routine::load_scene(&scratch.write("scene.toml", scene.as_bytes())).is_ok()
 }

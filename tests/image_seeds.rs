@@ -60,7 +60,7 @@ fn strip(run: &Path, to: &Path, images: Images) {
     for_each_raw(run, |raw| {
         let in_view = || spans.iter().any(|(start, end)| (*start..=*end).contains(&raw.log_time()));
         let is_wanted = matches!(images, Images::All) || in_view();
-        if !kept.contains(&raw.topic()) && !(raw.topic() == topics::IMAGES && is_wanted) {
+        if !(kept.contains(&raw.topic()) || raw.topic() == topics::IMAGES && is_wanted) {
             return;
         }
         let schema = raw.channel.schema.as_ref().expect("a type");
@@ -96,7 +96,7 @@ impl Seed {
         Calibration::read(&self.folder.join("calibration.toml")).expect("it reads")
     }
 
-    fn from_images(&self, images: Images) -> Calibration {
+    fn calibrated_by(&self, images: Images) -> Calibration {
         let out = self.folder.join(images.name());
         let result = out.join("calibration.toml");
         if !result.exists() {
@@ -178,7 +178,7 @@ fn ten_runs_from_their_images_alone() {
         let own_mm = median_mm(&own);
         let all = setting("ARMCAL_IMAGE_ALL").map(|_| Images::All);
         for images in [Images::OfViews].into_iter().chain(all) {
-            let found = run.from_images(images);
+            let found = run.calibrated_by(images);
             let (sigmas, gain, which) = differences(&own, &found);
             let images_mm = median_mm(&found);
             let name = images.name();

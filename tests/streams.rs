@@ -168,6 +168,9 @@ fn attitudes_tell_each_view_which_way_is_up() {
     assert!(without.messages_hash != with.messages_hash, "what is used is in the hash");
 }
 
+/// What is done to the attitudes.
+type Change = &'static dyn Fn(&mut ros::Imu);
+
 #[test]
 fn attitudes_that_are_none_are_refused_by_name() {
     let folder = temp();
@@ -179,7 +182,7 @@ fn attitudes_that_are_none_are_refused_by_name() {
         read_external(&path, &map, &robot).map_err(|error| error.to_string())
     };
     let map = map_with_attitude();
-    let faults: [(&str, &dyn Fn(&mut ros::Imu), &[&str]); 4] = [
+    let faults: [(&str, Change, &[&str]); 4] = [
         (&map, &|imu| imu.orientation_covariance[0] = -1.0, &["message 1", "no orientation", "conditions.attitude"]),
         (&map, &|imu| imu.orientation = ros::Quaternion::from_wxyz([0.0; 4]), &["/imu", "length", "not 1"]),
         (&map, &|imu| imu.orientation = ros::Quaternion::from_wxyz([f64::NAN; 4]), &["/imu", "orientation", "NaN"]),

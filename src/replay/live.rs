@@ -96,7 +96,6 @@ impl LiveView {
 
     /// Something that takes messages for this view. It waits `patience` in all for a viewer that is too slow, and then
     /// leaves messages out.
-    #[must_use]
     pub fn listener(&self, mut patience: Duration) -> impl FnMut(Stamp, &Message) + Send + use<> {
         let (queue, shared) = (self.queue.clone(), Arc::clone(&self.shared));
         move |log_time, message| {

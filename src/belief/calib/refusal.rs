@@ -342,13 +342,13 @@ impl Refusal {
             Self::Geometry(_)
             | Self::SensorError { .. }
             | Self::BeyondDatasheet { .. }
-            | Self::OffsetsWalk { .. }
             | Self::Nonlinearity { .. }
             | Self::SensorLine { .. }
             | Self::SensorFailed { .. }
             | Self::TooFewViewsSinceSlip { .. }
             | Self::Touch { .. } => self.fmt_of_arm(f),
             Self::Innovations { .. }
+            | Self::OffsetsWalk { .. }
             | Self::PriorReused
             | Self::PriorSingular
             | Self::PriorUntested
@@ -428,14 +428,6 @@ impl Refusal {
                 std_rad.to_degrees(),
                 datasheet_std_rad.to_degrees()
             ),
-            Self::OffsetsWalk { joint, walked_rad, predicted_m, tolerance_m } => write!(
-                f,
-                "the offset of {joint} walked at random by {:.2} deg while the views were captured; when as much time \
-                 has gone by again the tool is {:.1} mm off, the task tolerates {:.1} mm",
-                walked_rad.to_degrees(),
-                predicted_m * 1e3,
-                tolerance_m * 1e3
-            ),
             Self::BeyondDatasheet { parameter, sigmas } => write!(
                 f,
                 "{parameter} is estimated {sigmas:.0} sigma from its datasheet: the joint or its sensor has failed, \
@@ -492,6 +484,14 @@ impl Refusal {
                 "{}: chi-square per degree of freedom is {per_dof:.2}, above {limit:.2} (expected in 95 % of cases: \
                  {low:.2} .. {high:.2}): views that the fit did not use are worse than it predicts",
                 quantity.name()
+            ),
+            Self::OffsetsWalk { joint, walked_rad, predicted_m, tolerance_m } => write!(
+                f,
+                "the offset of {joint} walked at random by {:.2} deg while the views were captured; when as much time \
+                 has gone by again the tool is {:.1} mm off, the task tolerates {:.1} mm",
+                walked_rad.to_degrees(),
+                predicted_m * 1e3,
+                tolerance_m * 1e3
             ),
             Self::PriorReused => write!(f, "the prior rests on these very messages, which must not count twice"),
             Self::PriorSingular => write!(f, "the prior's covariance has no inverse"),

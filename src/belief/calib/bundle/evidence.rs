@@ -202,16 +202,7 @@ impl ScaleUpdate<'_, '_> {
                 next.shape_std_rad[joint] = sums.std(NU_SHAPE, first.shape_std_rad[joint], moment);
             }
         }
-        let walk = |kind: ParameterKind| match kind {
-            ParameterKind::WalkMode(k) => Some(mode_std(k)),
-            _ => None,
-        };
-        for (joint, columns) in layout.of_joint.iter().enumerate() {
-            let sums = of_kinds(&walk, columns.clone(), problem.scales.walk_std_rad[joint]);
-            if sums != Sums::default() {
-                next.walk_std_rad[joint] = sums.std(NU_TERM, first.walk_std_rad[joint], moment);
-            }
-        }
+        self.update_walks(next);
         self.update_links(next);
         self.update_sag(next);
         let all = 0..layout.n_joint();
@@ -242,6 +233,24 @@ impl ScaleUpdate<'_, '_> {
             let sums = of_kinds(&is(kind), all.clone(), std);
             if sums != Sums::default() {
                 *next = sums.std(NU_TERM, first, moment);
+            }
+        }
+    }
+
+    fn update_walks(&self, next: &mut Hyperparameters) {
+        let Self { problem, state, posterior, .. } = *self;
+        let ScaleTarget { first, moment } = *self.target;
+        for (joint, columns) in problem.layout.of_joint.iter().enumerate() {
+            let mut sums = Sums::default();
+            for column in columns.clone() {
+                if let ParameterKind::WalkMode(k) = problem.layout.parameters[column].kind {
+                    let unit = mode_std(k);
+                    let variance = posterior.covariance[(column, column)] / (unit * unit);
+                    sums.add(state.joint[column] / unit, variance, problem.scales.walk_std_rad[joint]);
+                }
+            }
+            if sums != Sums::default() {
+                next.walk_std_rad[joint] = sums.std(NU_TERM, first.walk_std_rad[joint], moment);
             }
         }
     }
