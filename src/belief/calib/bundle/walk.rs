@@ -2,10 +2,15 @@
 //!
 //! Columns for the modes of a walk (`walk_modes`) cost time, so two figures of the estimate without them ask first: how
 //! much more than stated the offsets change with temperature, for that takes up what walks one way; and a score test of
-//! the walk's variance. With `z` and `I` of the joint's errors, all else eliminated (`step_test`), `T = sum_k l_k
-//! (phi_k^T z)^2` has the mean `sum_k l_k A_kk` and the variance `2 sum_kl l_k l_l A_kl^2` where nothing walks, `A =
-//! phi^T I phi` (Lin 1997). Then the evidence decides. What the offsets do afterwards no view tells: as much again as
-//! during the views is added to each joint's error.
+//! the walk's variance (Lin 1997). With `z` and `I` of the joint's errors, all else eliminated (`step_test`), and the
+//! modes' variances l, where nothing walks
+//!
+//! ```text
+//! T = sum_k l_k (phi_k^T z)^2,   A = phi^T I phi,   mean sum_k l_k A_kk,   variance 2 sum_kl l_k l_l A_kl^2
+//! ```
+//!
+//! Then the evidence decides. What the offsets do afterwards no view tells: as much again as during the views is added
+//! to each joint's error.
 
 use crate::calib::bundle::estimate::{Estimate, estimate};
 use crate::calib::bundle::input::BundleInput;
@@ -27,7 +32,7 @@ const WARMTH_WORTH_A_FIT: f64 = 1.6;
 /// Or where the score test's statistic lies so many of its standard deviations above its mean: one good arm of 60.
 const SCORE_WORTH_A_FIT: f64 = 3.0;
 /// A walk that is missed is an error beyond its bound, one too many a bound that is too wide. Good arms lose two nats
-/// or more by it (60 of 60), arms that walk by half a centimetre at the tool gain some.
+/// or more by it (60 of 60); of 40 arms that walk by 0.29 deg in 14 views 34 gain some.
 const MIN_WALK_NATS: f64 = 0.0;
 
 /// When the first and the last of `views` end; `None` for views that all end together.
