@@ -2,6 +2,9 @@
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 
+// For its symbols: the sines of everything that is linked with this crate.
+use armcal_libm as _;
+
 pub mod files;
 pub mod input;
 pub mod joints;
