@@ -14,6 +14,7 @@ use armcal::log::read_recording;
 use armcal::plan::{ClearanceModel, Edge, JointErrorBounds};
 use armcal::robot::{Robot, Vehicle, load, load_vehicle};
 use armcal::routine::Scene;
+use armcal::sensor::Conditions;
 use armcal::stats::stream_rng;
 use armcal::streams::JointAngles;
 use armcal::time::SIMULATION_EPOCH;
@@ -386,7 +387,8 @@ fn detect(_: &mut Criterion) {}
 #[cfg(not(feature = "sim"))]
 fn simulation(_: &mut Criterion) {}
 
-/// One more view after those of the sample: six beliefs beside each other, and one alone.
+/// One more view after those of the sample: a belief for each lag beside each other, for the oil has cooled down, and one
+/// alone.
 fn online(c: &mut Criterion, robot: &Robot) {
     let sample = Path::new(env!("CARGO_MANIFEST_DIR")).join("recordings/sample/run.mcap");
     let recording = read_recording(sample).expect("the sample is part of the repository");
@@ -395,12 +397,15 @@ fn online(c: &mut Criterion, robot: &Robot) {
     views.extend(stream.finish());
     let last = views.iter().max_by_key(|view| view.tags.len()).expect("it has views");
     let alone = OnlineSettings { drift: DriftModel::Stationary, faults: FaultSearch::Off, ..OnlineSettings::default() };
-    for (name, settings) in [("six beliefs", OnlineSettings::default()), ("one belief", alone)] {
+    for settings in [OnlineSettings::default(), alone] {
         let mut estimator = OnlineEstimator::new(robot.clone(), settings);
-        for view in &views {
-            estimator.add_view(view);
+        for (k, view) in views.iter().enumerate() {
+            let oil_c = 20.0 - 0.2 * k as f64;
+            estimator.hear_temperature(view.end, oil_c);
+            let conditions = Conditions { oil_c: Some(oil_c), ..view.conditions };
+            estimator.add_view(&View { conditions, ..view.clone() });
         }
-        let name = format!("online view of {} tags, {name}", last.tags.len());
+        let name = format!("online view of {} tags, {} beliefs", last.tags.len(), estimator.lags().len());
         c.bench_function(&name, |b| {
             b.iter_batched_ref(|| estimator.clone(), |estimator| estimator.add_view(last), BatchSize::SmallInput);
         });

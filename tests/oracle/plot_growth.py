@@ -1,7 +1,5 @@
 """Draws docs/results/checks/online-growth.png from what `cargo bench --bench growth` printed.
 
-The picture is not stored in the repository.
-
     target/oracle/bin/python tests/oracle/plot_growth.py growth.csv
 """
 

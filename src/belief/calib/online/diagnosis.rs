@@ -24,6 +24,8 @@ const LEAD_OF_SENSOR_NATS: f64 = 1.5;
 const LONE_LEAD_NATS: f64 = 10.0;
 /// A scale this close to the datasheet's is the drift of a sensor, not another sensor.
 const LEAST_SCALE: f64 = 0.2;
+/// A lower bump is the nonlinearity of a sound sensor, rad: 0.15 deg.
+const LEAST_BUMP_RAD: f64 = 2.6e-3;
 /// Explanations followed at most.
 const MAX_BRANCHES: usize = 8;
 /// What is less probable than the best one by this is not followed any more, in nats.
@@ -50,10 +52,15 @@ pub(crate) struct Branch {
 }
 
 impl Branch {
-    /// Whether it explains by another scale that is none.
+    /// Whether it explains by another scale or a bump that is none.
     fn is_void(&self, before: &Filter) -> bool {
-        let scale = self.fault.filter(|fault| matches!(fault, Fault::Scale(_)));
-        scale.is_some_and(|fault| fault.size(before, &self.filter).is_none_or(|gain| (gain - 1.0).abs() < LEAST_SCALE))
+        let Some(fault) = self.fault else { return false };
+        let size = fault.size(before, &self.filter);
+        match fault {
+            Fault::Scale(_) => size.is_none_or(|gain| (gain - 1.0).abs() < LEAST_SCALE),
+            Fault::Worn(..) => size.is_none_or(|height_rad| height_rad.abs() < LEAST_BUMP_RAD),
+            _ => false,
+        }
     }
 
     /// Whether it tells of something.

@@ -17,8 +17,9 @@ use armcal_core::robot::{FailedJoint, FailedKind, Robot};
 use armcal_core::sensor::Conditions;
 use armcal_core::time::Stamp;
 
-/// Lags of the sensors' temperature behind the oil's, s. Assumed: from none to a housing full of oil.
-const LAGS_S: [f64; 6] = [0.0, 150.0, 300.0, 600.0, 1200.0, 2400.0];
+/// Lags of the sensors' temperature behind the oil's, s. Assumed: from none to a housing full of oil. Views hardly tell
+/// neighbours apart, and each costs as much as the first.
+const LAGS_S: [f64; 4] = [0.0, 200.0, 600.0, 1800.0];
 /// A lag has a belief of its own once its temperature was this far from the oil's in a view, K: before that the
 /// belief without any lag is its own, to some thousandths of a degree.
 const APART_K: f64 = 0.25;

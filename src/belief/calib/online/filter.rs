@@ -189,9 +189,20 @@ impl Filter {
         self.layout.time.map(|at| (self.state.time_s, at))
     }
 
-    /// Covariance of all columns; `None` only after an overflow.
-    pub(crate) fn covariance(&self) -> Option<DMatrix<f64>> {
-        cholesky(self.info.clone()).map(|factor| factor.inverse())
+    /// Covariance of the joints' parameters, which are the first columns; `None` only after an overflow.
+    pub(crate) fn joint_covariance(&self) -> Option<DMatrix<f64>> {
+        let (n, columns) = (self.layout.n, self.layout.parameters.len());
+        let mut half = DMatrix::identity(n, columns);
+        solve_lower(&cholesky(self.info.clone())?, &mut half);
+        Some(half.transpose() * half)
+    }
+
+    /// One sigma of a column by all others; `None` only after an overflow.
+    pub(crate) fn std_of(&self, column: usize) -> Option<f64> {
+        let mut half = DMatrix::zeros(self.layout.n, 1);
+        half[column] = 1.0;
+        solve_lower(&cholesky(self.info.clone())?, &mut half);
+        Some(half.norm())
     }
 
     /// How far its means are from those of `reference`, by column, in sigmas of `reference`; `None` where they do not
@@ -200,7 +211,7 @@ impl Filter {
         if self.layout.parameters != reference.layout.parameters || self.layout.n != reference.layout.n {
             return None;
         }
-        let covariance = reference.covariance()?;
+        let covariance = cholesky(reference.info.clone())?.inverse();
         let off = off_by(&self.layout, &reference.state.means(), &self.state, self.layout.n);
         Some(DVector::from_fn(self.layout.n, |k, _| off[k] / covariance[(k, k)].sqrt()))
     }
@@ -225,6 +236,18 @@ impl Filter {
     /// Number of columns.
     pub(crate) fn n_columns(&self) -> usize {
         self.layout.n
+    }
+
+    /// Half a backlash of which no view told anything yet: a sensor's shaft lags and never leads, so that what is of
+    /// size s about zero is 0.8 s, give or take 0.6 s (the moments of a half-normal).
+    pub(crate) fn expect_backlash(&mut self, joint: usize, std_rad: f64) {
+        let columns = self.joint_columns(joint);
+        let is_backlash = |at: &usize| self.layout.parameters[*at].kind == ParameterKind::HalfBacklash;
+        let Some(at) = columns.into_iter().find(is_backlash) else { return };
+        let info = (0.603 * std_rad).powi(-2);
+        self.log_det += (info / self.info[(at, at)]).ln();
+        self.info[(at, at)] = info;
+        self.state.joint[at] = 0.798 * std_rad;
     }
 
     /// Adds a column of what nothing is known of but its prior: a parameter of a joint that none was of so far.

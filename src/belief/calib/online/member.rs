@@ -2,8 +2,6 @@
 
 use std::sync::Arc;
 
-use nalgebra::DMatrix;
-
 use crate::calib::bundle::estimate::estimate;
 use crate::calib::bundle::input::{BundleInput, HyperparameterMode};
 use crate::calib::covariance::ParameterCovariance;
@@ -214,7 +212,12 @@ impl Member {
         if evidence == HyperparameterMode::Fitted {
             estimate.take_mean_scales(&first_scales);
         }
-        let filter = Filter::of_estimate(&estimate, &self.robot)?;
+        let mut filter = Filter::of_estimate(&estimate, &self.robot)?;
+        let is_untold = |joint: &usize| self.first.iter().all(|view| view.approach[*joint] == 0.0);
+        if evidence == HyperparameterMode::Fitted {
+            let untold = (0..self.robot.n_joints()).filter(is_untold);
+            untold.for_each(|joint| filter.expect_backlash(joint, first_scales.half_play_std_rad));
+        }
         let noise = ProcessNoise::datasheet(&self.robot, &filter.scales);
         let errors = JointErrorSize::new(&filter.scales);
         let jitter = JitterSize::new(&filter.scales);
@@ -344,13 +347,18 @@ impl Member {
             filter.widen(&widening);
         }
         let parameters = filter.joint_parameters().to_vec();
-        let n = parameters.len();
-        let matrix: DMatrix<f64> = filter.covariance()?.view((0, 0), (n, n)).into_owned();
+        let matrix = filter.joint_covariance()?;
+        let sensors = filter.parameters();
         let residual_std_rad = std::array::from_fn(|joint| match self.robot.sensors.get(joint) {
             // What says nothing leaves the angle open.
             _ if self.failed.contains(&joint) => filter.scales.free_joint_std_rad.min(self.stands_within_rad[joint]),
             Some(spec) if filter.joint_columns(joint).is_empty() => spec.linearity_std_rad,
-            _ => filter.scales.joint_std_rad[joint],
+            _ => {
+                // Rests do not say from which side a joint came, so that what they leave has the backlash in it, which
+                // the tool's error adds once more.
+                let half_backlash_rad = sensors.terms[joint].half_backlash_rad;
+                (filter.scales.joint_std_rad[joint].powi(2) - half_backlash_rad.powi(2)).max(0.0).sqrt()
+            }
         });
         Some(ParameterCovariance { parameters, matrix, residual_std_rad: Some(residual_std_rad) })
     }
@@ -359,7 +367,7 @@ impl Member {
     pub(crate) fn clock_offset_s(&self) -> Option<[f64; 2]> {
         let filter = &self.running.as_ref()?.filter;
         let (offset_s, at) = filter.clock_offset()?;
-        Some([offset_s, filter.covariance()?[(at, at)].sqrt()])
+        Some([offset_s, filter.std_of(at)?])
     }
 
     pub(crate) fn lag_s(&self) -> f64 {

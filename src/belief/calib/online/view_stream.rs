@@ -221,7 +221,8 @@ impl ViewStream {
         }
         at_image(&mut view, &about, image);
         for (approach, rate) in view.approach.iter_mut().zip(view.rate_rad_s.iter()) {
-            *approach = if rate.abs() < 0.1 * SLOWEST_RAD_S { 0.0 } else { rate.signum() };
+            // A slower one has the sign of its noise.
+            *approach = if rate.abs() < 0.5 * SLOWEST_RAD_S { 0.0 } else { rate.signum() };
         }
         self.moved_at = Some(view.travel_rad);
         self.used_until = image;

@@ -10,6 +10,8 @@ use crate::calib::online::event::OnlineEvent;
 use crate::calib::online::hypothesis::Fault;
 use crate::calib::online::settings::OnlineSettings;
 use crate::calib::online::tests::drifting::Dive;
+use crate::calib::parameters::WornSpot;
+use crate::calib::views::view::View;
 use armcal_core::robot::{FailedJoint, FailedKind, Robot};
 use armcal_core::spatial::exp;
 
@@ -151,4 +153,37 @@ fn an_oracle_tells_what_happened_and_when_nothing_did() {
         }
     }
     assert!(told >= 5, "{told} of 6");
+}
+
+/// A spot of a sensor's track that wears is named with its place, and nothing else is: the arm looks there twice, and
+/// elsewhere in between.
+#[test]
+fn a_worn_spot_is_named_with_its_place() {
+    const SPOT_RAD: f64 = 0.3;
+    const BY_RAD: f64 = 0.02;
+    let robot = titan();
+    let mut missed = Vec::new();
+    for joint in 0..5 {
+        let (mut online, mut dive) = after_an_hour(&robot, joint as u64, Happens::Nothing);
+        online.take_events();
+        dive.befall(|truth, _| truth.parameters.terms[joint].bump = WornSpot::about(SPOT_RAD).bump(-BY_RAD));
+        for k in 0..6 {
+            let is_wanted = |view: &View| k % 3 > 0 || (view.travel_rad[joint] - SPOT_RAD).abs() < 0.02;
+            let view = std::iter::repeat_with(|| dive.view()).find(is_wanted).expect("it ends");
+            online.add_view(&view);
+        }
+        let events = online.take_events();
+        let is_right = |event: &OnlineEvent| {
+            let at_rad = event.at_rad.unwrap_or(f64::NAN) - robot.sensors[joint].center_rad;
+            event.finding.kind == FindingKind::SensorWorn
+                && event.finding.name == robot.sensors[joint].joint
+                && (at_rad - SPOT_RAD).abs() < 0.05
+                && (event.finding.size.unwrap_or(f64::NAN) - BY_RAD).abs() < 0.5 * BY_RAD
+        };
+        if events.len() != 1 || !is_right(&events[0]) {
+            missed.push((joint, events.iter().map(OnlineEvent::to_line).collect::<Vec<_>>()));
+        }
+    }
+    println!("not named: {missed:?}");
+    assert!(missed.len() <= 1, "{missed:?}");
 }

@@ -2,4 +2,5 @@
 
 mod drifting;
 mod faults;
+mod moving;
 mod stationary;
