@@ -387,8 +387,8 @@ fn detect(_: &mut Criterion) {}
 #[cfg(not(feature = "sim"))]
 fn simulation(_: &mut Criterion) {}
 
-/// One more view after those of the sample: a belief for each lag beside each other, for the oil has cooled down, and one
-/// alone.
+/// One more view after those of the sample: a belief for each lag beside the others, for the oil has cooled down, and
+/// one alone.
 fn online(c: &mut Criterion, robot: &Robot) {
     let sample = Path::new(env!("CARGO_MANIFEST_DIR")).join("recordings/sample/run.mcap");
     let recording = read_recording(sample).expect("the sample is part of the repository");
