@@ -1,4 +1,4 @@
-//! Images of a moving arm: the clock offset, whatever the sensors' slopes are.
+//! Images of a moving arm: the clock offset, whatever the sensors' slopes are, and the backlash.
 
 use rand::RngExt;
 
