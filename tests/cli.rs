@@ -34,7 +34,7 @@ fn usage_errors_exit_with_2() {
     answer(program().args(["run"])).expect("no routine", 2, &["ROUTINE"]);
     answer(program().args(["run", "x.toml", "--seed=-3"])).expect("negative seed", 2, &["seed"]);
     answer(program().args(["calibrate", "x.mcap"])).expect("no robot", 2, &["--robot"]);
-    answer(program().arg("--version")).expect("version", 0, &[env!("CARGO_PKG_VERSION")]);
+    answer(program().arg("--version")).expect("version", 0, &[env!("CARGO_PKG_VERSION"), "simulator, replays"]);
     let mut unknown = program();
     unknown.arg("calibrate").arg(shared_run().file("run.mcap")).arg("--robot").arg(robot_folder());
     unknown.args(["--method", "guess"]).arg("--out").arg(folder.path());

@@ -2,6 +2,7 @@
 
 use std::io::Write;
 use std::process::ExitCode;
+use std::sync::LazyLock;
 
 use anyhow::Result;
 use clap::{CommandFactory, Parser, Subcommand};
@@ -13,15 +14,23 @@ use crate::cli::{calibrate, check, completions, exit, export, inspect, new_robot
 #[cfg(feature = "sim")]
 use crate::cli::{campaign, regress, run, sensitivity, serve, study};
 
-/// With what this build can do beside the defaults.
-#[cfg(feature = "live")]
-const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), " (live: ROS 2 humble)");
-#[cfg(not(feature = "live"))]
-const VERSION: &str = env!("CARGO_PKG_VERSION");
+/// What this build has of the parts that a build may leave out.
+const PARTS: [(bool, &str); 3] = [
+    (cfg!(feature = "sim"), "simulator"),
+    (cfg!(feature = "viewer"), "replays"),
+    (cfg!(feature = "live"), "live arms over ROS 2 humble"),
+];
+
+/// Version, commit of a release (`.ci/release` names it), parts: "0.3.0 (1a2b3c4d5e6f; simulator, replays)".
+static VERSION: LazyLock<String> = LazyLock::new(|| {
+    let commit = option_env!("ARMCAL_COMMIT").unwrap_or("no release");
+    let parts: Vec<_> = PARTS.into_iter().filter_map(|(is_built, name)| is_built.then_some(name)).collect();
+    format!("{} ({commit}; {})", env!("CARGO_PKG_VERSION"), parts.join(", "))
+});
 
 /// Calibrates the joint sensors of arms that nobody can walk up to.
 #[derive(Debug, Parser)]
-#[command(name = "armcal", version = VERSION, about, max_term_width = 100)]
+#[command(name = "armcal", version = VERSION.as_str(), about, max_term_width = 100)]
 struct Cli {
     #[command(subcommand)]
     command: Command,
