@@ -251,7 +251,9 @@ fn image(_: &Scratch, bytes: &[u8]) -> bool {
         data: bytes.to_vec(),
         ..armcal::log::ros::CompressedImage::default()
     };
-    armcal::recorded_images::RecordedImageDetector::new(&lens).detect(&RecordedImage::Compressed(image)).is_ok()
+    armcal::recorded_images::RecordedImageDetector::new(&lens, armcal::optics::TagFamily::default())
+        .detect(&RecordedImage::Compressed(image))
+        .is_ok()
 }
 
 fn task(_: &Scratch, bytes: &[u8]) -> bool {

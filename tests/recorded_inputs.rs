@@ -5,7 +5,7 @@ use std::path::Path;
 use armcal::calib::{ExternalContext, prepare_external};
 use armcal::input::{RawMeasurement, parse_input_map, read_camera_info, read_external, read_external_images};
 use armcal::log::{RecordingHeader, RecordingWriter, RosMessage, ros};
-use armcal::optics::{CameraModel, Radtan, square_corners, tag36h11};
+use armcal::optics::{CameraModel, Radtan, TagFamily, square_corners};
 use armcal::recorded_images::RecordedImageDetector;
 use armcal::robot::Robot;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector2};
@@ -94,6 +94,7 @@ fn slow_sensors_that_are_not_as_the_map_says_are_refused() {
 /// A pinhole camera that sees a wall with one tag.
 struct Camera {
     lens: CameraModel,
+    family: TagFamily,
     camera_from_tag: Isometry3<f64>,
 }
 
@@ -102,26 +103,27 @@ const SIZE_M: f64 = 0.16;
 const RESOLUTION: [u32; 2] = [320, 240];
 
 impl Camera {
-    fn new() -> Self {
+    fn before_a_tag_of(family: TagFamily) -> Self {
         let lens = Radtan::new([260.0, 262.0], [158.5, 121.0], [-0.05, 0.01, 0.001, -0.001, 0.0], RESOLUTION).into();
         let turn = UnitQuaternion::from_euler_angles(std::f64::consts::PI + 0.2, -0.15, 0.3);
-        Self { lens, camera_from_tag: Isometry3::from_parts(Translation3::new(0.03, -0.02, 0.5), turn) }
+        Self { lens, family, camera_from_tag: Isometry3::from_parts(Translation3::new(0.03, -0.02, 0.5), turn) }
     }
 
     /// Grey values: each pixel is the mean of 16 rays onto the plane of the tag.
     fn image(&self) -> Vec<u8> {
-        let cells = tag36h11::cells(ID).expect("an id");
+        let cells = self.family.cells(ID).expect("an id");
+        let n = self.family.n_cells() as f64;
         let tag_from_camera = self.camera_from_tag.inverse();
         let grey = |pixel: Vector2<f64>| {
             let Some(ray) = self.lens.unproject(&pixel) else { return 90.0 };
             let (origin, along) = (tag_from_camera.translation.vector, tag_from_camera.rotation * ray.into_inner());
             let on_wall = origin - along * (origin.z / along.z);
-            let cell = |value: f64| (value / SIZE_M * 8.0 + 4.0).floor();
+            let cell = |value: f64| (value / SIZE_M * n + 0.5 * n).floor();
             let (column, row) = (cell(on_wall.x), cell(-on_wall.y));
-            match (column, row) {
-                (0.0..8.0, 0.0..8.0) if cells[row as usize][column as usize] => 200.0,
-                (0.0..8.0, 0.0..8.0) => 30.0,
-                (-1.0..9.0, -1.0..9.0) => 200.0,
+            let is_within = |rim: f64| (-rim..n + rim).contains(&column) && (-rim..n + rim).contains(&row);
+            match cells.get(row as usize, column as usize) {
+                Some(false) if is_within(0.0) => 30.0,
+                _ if is_within(1.0) => 200.0,
                 _ => 90.0,
             }
         };
@@ -187,11 +189,38 @@ fn image_map(topic: &str) -> String {
     )
 }
 
+/// Without a family in the input map, that of the robot's tags is looked for.
+#[test]
+fn tags_of_the_family_that_the_input_map_names_are_found() {
+    let (folder, robot) = (temp(), titan());
+    for family in TagFamily::ALL {
+        let recording = folder.path().join(format!("{family}.mcap"));
+        Camera::before_a_tag_of(family).write(&recording, &robot);
+        let with_family = image_map("/png").replace("[tags]", &format!("[tags]\nfamily = \"{family}\""));
+        let read = |text: &str| {
+            let map = parse_input_map(Path::new("map.toml"), text).expect("a map");
+            let lens = read_camera_info(&recording, "/info").expect("a lens");
+            let family = map.tag_family.unwrap_or(robot.tag_family);
+            read_external_images(&recording, &map, &robot, &mut RecordedImageDetector::new(&lens, family))
+        };
+        let found = read(&with_family).expect("a tag");
+        assert_eq!(found.frames[0].tags[0].id, Some(ID), "{family}");
+        match (read(&image_map("/png")), family) {
+            (Ok(found), TagFamily::Tag36h11) => assert_eq!(found.frames[0].tags[0].id, Some(ID)),
+            (Err(problem), TagFamily::Tag16h5 | TagFamily::Tag25h9) => {
+                let text = problem.to_string();
+                assert!(text.contains("no tag of family 36h11") && text.contains("`family` in [tags]"), "{text}");
+            }
+            (other, _) => panic!("{family}: {other:?}"),
+        }
+    }
+}
+
 #[test]
 fn tags_are_found_in_recorded_images_of_each_form() {
     let folder = temp();
     let path = folder.path().join("arm.mcap");
-    let (camera, robot) = (Camera::new(), titan());
+    let (camera, robot) = (Camera::before_a_tag_of(TagFamily::Tag36h11), titan());
     camera.write(&path, &robot);
     let lens = read_camera_info(&path, "/info").expect("a lens");
     assert_eq!(lens, camera.lens);
@@ -199,7 +228,7 @@ fn tags_are_found_in_recorded_images_of_each_form() {
         .map(|corner| camera.lens.project(&(camera.camera_from_tag * corner).coords).expect("in view"));
     let read = |topic: &str, lens: &CameraModel| {
         let map = parse_input_map(Path::new("map.toml"), &image_map(topic)).expect("a map");
-        read_external_images(&path, &map, &robot, &mut RecordedImageDetector::new(lens))
+        read_external_images(&path, &map, &robot, &mut RecordedImageDetector::new(lens, robot.tag_family))
     };
     for topic in ["/mono8", "/bgr8", "/png"] {
         let found = read(topic, &lens).expect(topic);

@@ -260,7 +260,8 @@ fn what_is_wrong_with_a_vehicles_tags_is_named() {
     check("base_tag = 0\n", "base_tag = 9\n", &["v.toml", "base_tag", "tag 9"]);
     check("id = 1\n", "id = 0\n", &["v.toml", "tag 0: id", "twice"]);
     check("size_m = 0.15\n", "size_m = -0.15\n", &["v.toml", "tag 0: size_m", "0.001 .. 10"]);
-    check("family = \"36h11\"", "family = \"16h5\"", &["v.toml", "tag 0: family", "16h5"]);
+    check("family = \"36h11\"", "family = \"36h10\"", &["v.toml", "tag 0: family", "36h10", "\"25h9\""]);
+    check("id = 1\nfamily = \"36h11\"", "id = 1\nfamily = \"16h5\"", &["v.toml", "tag 1: family", "16h5", "36h11"]);
 
     write(&file, &read(&root().join("robots/vehicles/open-frame.toml")));
     edit(&file, "titan4 = [", "titan4 = [0.0, ");

@@ -244,7 +244,10 @@ impl CalibrationInputs<'_> {
 /// Images are looked at as they are read, one at a time.
 #[cfg(feature = "sim")]
 fn read_with_images(path: &Path, map: &InputMap, robot: &Robot) -> Result<ExternalRecording> {
-    let mut detector = crate::recorded_images::RecordedImageDetector::new(&robot.camera.lens);
+    let mut detector = crate::recorded_images::RecordedImageDetector::new(
+        &robot.camera.lens,
+        map.tag_family.unwrap_or(robot.tag_family),
+    );
     Ok(read_external_images(path, map, robot, &mut detector)?)
 }
 

@@ -1,14 +1,12 @@
 //! Candidate tags from the AprilTag project's C library, in the image as it is and in its contrast-normalized copy.
 
 use apriltag::{Detector, Family, Image};
+use armcal_core::optics::TagFamily;
 
 use crate::contrast::ContrastNormalizer;
 use crate::error::DetectError;
 use crate::image::GreyImage;
 
-/// Largest Hamming distance that the library decodes. The gates reject codes with more wrong bits than the settings
-/// allow.
-const DECODED_WRONG_BITS: usize = 2;
 /// The library has pixel centres at halves.
 const CENTER_SHIFT_PX: f64 = 0.5;
 /// Fixed, so that the result does not depend on the machine. Two threads are no faster: the library starts them for
@@ -36,10 +34,12 @@ pub(crate) struct QuadDecoder {
 }
 
 impl QuadDecoder {
-    pub(crate) fn new([width, height]: [usize; 2]) -> Result<Self, DetectError> {
+    /// Decodes tags of `family` with as many wrong bits as its codes can bear. The gates reject those with more than the
+    /// settings allow.
+    pub(crate) fn new(family: TagFamily, [width, height]: [usize; 2]) -> Result<Self, DetectError> {
         let library_error = |error: apriltag::Error| DetectError::Library(error.to_string());
         let mut library = Detector::builder()
-            .add_family_bits(Family::tag_36h11(), DECODED_WRONG_BITS)
+            .add_family_bits(library_family(family), corrected_bits(family))
             .build()
             .map_err(library_error)?;
         library.set_thread_number(LIBRARY_THREADS);
@@ -77,6 +77,23 @@ impl QuadDecoder {
         for (row, line) in rows.zip(image.data.chunks_exact(image.width)) {
             row[..image.width].copy_from_slice(line);
         }
+    }
+}
+
+pub(crate) fn library_family(family: TagFamily) -> Family {
+    match family {
+        TagFamily::Tag16h5 => Family::tag_16h5(),
+        TagFamily::Tag25h9 => Family::tag_25h9(),
+        TagFamily::Tag36h11 => Family::tag_36h11(),
+    }
+}
+
+/// How many wrong bits may be corrected. A random quadrilateral passes for a tag with the chance of
+/// `4 * tags * codes within reach / 2^bits`: 0.2 % for 16h5 (25 % with two bits), 0.1 % for 25h9, 0.002 % for 36h11.
+pub(crate) fn corrected_bits(family: TagFamily) -> usize {
+    match family {
+        TagFamily::Tag16h5 => 0,
+        TagFamily::Tag25h9 | TagFamily::Tag36h11 => 2,
     }
 }
 

@@ -12,7 +12,7 @@ use crate::gates::{gate_candidate, gate_fit};
 use crate::image::GreyImage;
 use crate::pattern::Cells;
 use crate::settings::DetectorSettings;
-use armcal_core::optics::{CameraModel, tag36h11};
+use armcal_core::optics::CameraModel;
 use armcal_core::streams::{RejectReason, TagDetection};
 
 /// Finds tags in images of one camera. The same image gives the same result.
@@ -37,7 +37,7 @@ impl TagDetector {
     /// # Errors
     /// [`DetectError::Library`] if the C library cannot start.
     pub fn new(lens: &CameraModel, settings: DetectorSettings) -> Result<Self, DetectError> {
-        let decoder = QuadDecoder::new(lens.resolution_px().map(|n| n as usize))?;
+        let decoder = QuadDecoder::new(settings.family, lens.resolution_px().map(|n| n as usize))?;
         let refiner = Refiner { lens: *lens, settings, table: BearingTable::new(lens), fitter: Fitter::new() };
         Ok(Self { decoder, refiner })
     }
@@ -99,8 +99,8 @@ impl Refiner {
     fn refine(&mut self, image: &GreyImage, candidate: &Candidate) -> Refined {
         let start_px = candidate.corners_px;
         gate_candidate(&self.settings, &self.lens, candidate).map_err(|reason| (reason, start_px))?;
-        let cells =
-            tag36h11::cells(candidate.id).map(|cells| Cells::new(&cells)).ok_or((RejectReason::UnknownId, start_px))?;
+        let cells = self.settings.family.cells(candidate.id).ok_or((RejectReason::UnknownId, start_px))?;
+        let cells = Cells::new(&cells);
         let fit = self.fitter.fit(image, &self.table, &cells, &start_px).ok_or((RejectReason::PoorEdges, start_px))?;
         gate_fit(&self.settings, &self.lens, &start_px, &fit).map_err(|reason| (reason, start_px))?;
         let detection =

@@ -14,7 +14,7 @@ use crate::homography::Homography;
 use crate::image::GreyImage;
 use crate::normal::NormalTable;
 use crate::pattern::Cells;
-use crate::samples::{HALF, Sample, TagRegion};
+use crate::samples::{Sample, TagRegion};
 
 const N: usize = 17;
 type NormalMatrix = SMatrix<f64, N, N>;
@@ -173,9 +173,10 @@ impl Fitter {
         // Black and white by linear regression on the pattern at the initial corners.
         let (homography, _) = scene.homography(start_px)?;
         let (mut sp, mut spp, mut sy, mut spy) = (0.0, 0.0, 0.0, 0.0);
+        let half = scene.cells.half();
         for sample in &self.samples[..n] {
             let point = homography.map(&sample.plane);
-            let at = [(point.s + 1.0) * HALF, (point.t + 1.0) * HALF];
+            let at = [(point.s + 1.0) * half, (point.t + 1.0) * half];
             let p = scene.cells.blurred(&self.normal, at, [0.1, 0.0, 0.1]).p;
             sp += p;
             spp += p * p;
@@ -250,7 +251,8 @@ impl Fitter {
     fn predict(&self, scene: &Scene, homography: &Homography, x: &Parameters, sample: &Sample) -> (f64, [f64; N]) {
         let point = homography.map(&sample.plane);
         let (s, t) = (point.s, point.t);
-        let m = homography.jacobian(&point) * sample.jacobian * HALF;
+        let half = scene.cells.half();
+        let m = homography.jacobian(&point) * sample.jacobian * half;
         let [xx, xy, yy] = [x[BLUR] + PIXEL_VARIANCE_PX2, x[BLUR + 1], x[BLUR + 2] + PIXEL_VARIANCE_PX2];
         let by_blur = |a: usize, b: usize| {
             let (ax, ay, bx, by) = (m[(a, 0)], m[(a, 1)], m[(b, 0)], m[(b, 1)]);
@@ -259,11 +261,11 @@ impl Fitter {
         let (uu, uv, vv) = (by_blur(0, 0), by_blur(0, 1), by_blur(1, 1));
         let dot = |w: [f64; 3]| w[0] * xx + w[1] * xy + w[2] * yy;
         let covariance = [dot(uu), dot(uv), dot(vv)];
-        let b = scene.cells.blurred(&self.normal, [(s + 1.0) * HALF, (t + 1.0) * HALF], covariance);
+        let b = scene.cells.blurred(&self.normal, [(s + 1.0) * half, (t + 1.0) * half], covariance);
         let black = x[BLACK] + x[BLACK + 1] * s + x[BLACK + 2] * t;
         let gain = x[GAIN] + x[GAIN + 1] * s + x[GAIN + 2] * t;
-        let d_s = x[BLACK + 1] + x[GAIN + 1] * b.p + gain * HALF * b.u;
-        let d_t = x[BLACK + 2] + x[GAIN + 2] * b.p + gain * HALF * b.v;
+        let d_s = x[BLACK + 1] + x[GAIN + 1] * b.p + gain * half * b.u;
+        let d_t = x[BLACK + 2] + x[GAIN + 2] * b.p + gain * half * b.v;
         let (px, py) = (sample.plane.x * point.scale, sample.plane.y * point.scale);
         let radial = d_s * s + d_t * t;
         let heat = |k: usize| gain * (0.5 * b.uu * uu[k] + b.uv * uv[k] + 0.5 * b.vv * vv[k]);

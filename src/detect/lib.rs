@@ -1,4 +1,4 @@
-//! Detection of AprilTags (family 36h11) in fisheye images.
+//! Detection of AprilTags (families 16h5, 25h9, 36h11) in fisheye images.
 //!
 //! `decoder` finds and decodes quadrilaterals with the AprilTag project's C library, which assumes straight sides.
 //! `fit` fits each tag again with the lens model, because a fisheye bends the sides. The fit gives corners and a
@@ -31,6 +31,6 @@ pub use settings::DetectorSettings;
 #[cfg(test)]
 mod synthetic;
 #[cfg(test)]
-mod tag36h11_tests;
+mod tag_family_tests;
 #[cfg(test)]
 mod tests;

@@ -1,18 +1,20 @@
 //! Reflectance of a blurred tag: its cells convolved with a Gaussian, with derivatives.
 //!
-//! Position (u, v) in cells from the bottom left corner of the black square as printed, u right, v up, 0 .. 8; beyond
+//! Position (u, v) in cells from the bottom left corner of the black square as printed, u right, v up, 0 .. n; beyond
 //! is white. The separable part is a product of normal integrals. The blur's cross term enters to first order:
 //! convolution with a Gaussian obeys the heat equation, dP/dC_uv = d2P/(du dv).
 
 use crate::normal::{NormalTable, REACH};
 
-pub(super) use armcal_core::optics::tag36h11::TAG_CELLS as N_CELLS;
-
-const MAX_CELLS: usize = N_CELLS + 2;
+use armcal_core::optics::{MAX_BOARD_CELLS as MAX_CELLS, TagCells};
 
 /// A tag's cells with a white rim: `[row from the bottom + 1][column + 1]`, 1 = white.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Cells([[f64; MAX_CELLS]; MAX_CELLS]);
+pub(super) struct Cells {
+    /// Cells along a side, without the rim.
+    n: usize,
+    rows: [[f64; MAX_CELLS]; MAX_CELLS],
+}
 
 /// Reflectance (0 black, 1 white) and its derivatives by u and v, cells.
 #[derive(Clone, Copy, Debug, Default)]
@@ -35,13 +37,14 @@ struct Axis {
 
 impl Axis {
     #[inline]
-    fn at(table: &NormalTable, position: f64, std: f64) -> Self {
-        let first_edge = (position - REACH * std).ceil().clamp(0.0, 9.0) as usize;
-        let last_edge = (position + REACH * std).floor().clamp(-1.0, N_CELLS as f64);
+    fn at(table: &NormalTable, n_cells: usize, position: f64, std: f64) -> Self {
+        let n_cells = n_cells as f64;
+        let first_edge = (position - REACH * std).ceil().clamp(0.0, n_cells + 1.0) as usize;
+        let last_edge = (position + REACH * std).floor().clamp(-1.0, n_cells);
         let mut axis = Self { first: 0, n: 1, weights: [[0.0; 3]; MAX_CELLS] };
         let n_edges = (last_edge + 1.0) as usize - first_edge.min((last_edge + 1.0) as usize);
         if n_edges == 0 {
-            axis.first = (position.floor() + 1.0).clamp(0.0, (MAX_CELLS - 1) as f64) as usize;
+            axis.first = (position.floor() + 1.0).clamp(0.0, n_cells + 1.0) as usize;
             axis.weights[0] = [1.0, 0.0, 0.0];
             return axis;
         }
@@ -62,25 +65,31 @@ impl Axis {
 }
 
 impl Cells {
-    /// From the cells as printed, rows from the top, true for white.
-    pub(super) fn new(printed: &[[bool; N_CELLS]; N_CELLS]) -> Self {
-        let mut cells = [[1.0; MAX_CELLS]; MAX_CELLS];
-        for (line, row) in cells[1..=N_CELLS].iter_mut().zip(printed.iter().rev()) {
-            for (cell, is_white) in line[1..=N_CELLS].iter_mut().zip(row) {
+    pub(super) fn new(printed: &TagCells) -> Self {
+        let n = printed.n();
+        let mut rows = [[1.0; MAX_CELLS]; MAX_CELLS];
+        for (line, row) in rows[1..].iter_mut().zip(printed.rows().rev()) {
+            for (cell, is_white) in line[1..].iter_mut().zip(row) {
                 *cell = f64::from(u8::from(*is_white));
             }
         }
-        Self(cells)
+        Self { n, rows }
+    }
+
+    /// Half of the tag's side in cells: s = +-1 at u = 0 and n.
+    #[inline]
+    pub(super) fn half(&self) -> f64 {
+        0.5 * self.n as f64
     }
 
     /// Blurred reflectance at a position. `covariance`: of the blur, uu, uv, vv, cells squared.
     #[inline]
     pub(super) fn blurred(&self, table: &NormalTable, position: [f64; 2], covariance: [f64; 3]) -> Blurred {
-        let along_u = Axis::at(table, position[0], covariance[0].sqrt());
-        let along_v = Axis::at(table, position[1], covariance[2].sqrt());
+        let along_u = Axis::at(table, self.n, position[0], covariance[0].sqrt());
+        let along_v = Axis::at(table, self.n, position[1], covariance[2].sqrt());
         let mut out = Blurred::default();
         for j in 0..along_v.n {
-            let line = &self.0[along_v.first + j];
+            let line = &self.rows[along_v.first + j];
             let mut sums = [0.0; 3];
             for i in 0..along_u.n {
                 let cell = line[along_u.first + i];
@@ -102,10 +111,10 @@ impl Cells {
 
     /// Whether all cells within a rectangle about a position have one colour.
     pub(super) fn is_flat(&self, position: [f64; 2], reach: [f64; 2]) -> bool {
-        let index = |x: f64| (x.floor() + 1.0).clamp(0.0, (MAX_CELLS - 1) as f64) as usize;
+        let index = |x: f64| (x.floor() + 1.0).clamp(0.0, (self.n + 1) as f64) as usize;
         let [columns, rows] = std::array::from_fn(|k| index(position[k] - reach[k])..=index(position[k] + reach[k]));
-        let first = self.0[*rows.start()][*columns.start()];
-        rows.clone().all(|row| columns.clone().all(|column| self.0[row][column] == first))
+        let first = self.rows[*rows.start()][*columns.start()];
+        rows.clone().all(|row| columns.clone().all(|column| self.rows[row][column] == first))
     }
 }
 
@@ -113,11 +122,15 @@ impl Cells {
 mod tests {
     use super::*;
 
+    /// A pattern with white inner cells at `(row * 7 + column * 5) % 3 == 0`, rows from the top.
     fn cells() -> Cells {
-        let is_inner = |k: usize| (1..=6).contains(&k);
-        Cells::new(&std::array::from_fn(|row| {
-            std::array::from_fn(|column| is_inner(row) && is_inner(column) && (row * 7 + column * 5) % 3 == 0)
-        }))
+        let n = 8;
+        let mut rows = [[1.0; MAX_CELLS]; MAX_CELLS];
+        for (row, column) in (0..n).flat_map(|row| (0..n).map(move |column| (row, column))) {
+            let is_inner = (1..n - 1).contains(&row) && (1..n - 1).contains(&column);
+            rows[n - row][column + 1] = f64::from(u8::from(is_inner && (row * 7 + column * 5) % 3 == 0));
+        }
+        Cells { n, rows }
     }
 
     #[test]

@@ -5,10 +5,8 @@ use nalgebra::{Matrix2, Vector2};
 use crate::bearings::RectifiedView;
 use crate::homography::Homography;
 use crate::image::GreyImage;
-use crate::pattern::{Cells, N_CELLS};
+use crate::pattern::Cells;
 
-/// Half of the tag's side in cells: s = +-1 at u = 0 and 8.
-pub(super) const HALF: f64 = N_CELLS as f64 / 2.0;
 /// Std of the blur assumed before the fit, px.
 const TYPICAL_BLUR_PX: f64 = 0.8;
 /// A pixel farther than this from the next cell edge has no information on the edge's position.
@@ -62,13 +60,14 @@ impl TagRegion<'_> {
             return None;
         }
         let (_, jacobian) = self.view.plane_with_jacobian(pixel)?;
-        let cells_by_pixel = self.homography.jacobian(&point) * jacobian * HALF;
+        let half = self.cells.half();
+        let cells_by_pixel = self.homography.jacobian(&point) * jacobian * half;
         let cells_per_px = [cells_by_pixel.row(0).norm(), cells_by_pixel.row(1).norm()];
-        let at = [(point.s + 1.0) * HALF, (point.t + 1.0) * HALF];
+        let at = [(point.s + 1.0) * half, (point.t + 1.0) * half];
         let is_within = |k: usize| {
             // The rim is one cell wide; the blur must not carry in light from beyond it.
             let rim = (1.0 - 2.5 * TYPICAL_BLUR_PX * cells_per_px[k]).clamp(0.3, 0.8);
-            (-rim..=2.0 * HALF + rim).contains(&at[k])
+            (-rim..=2.0 * half + rim).contains(&at[k])
         };
         if !(is_within(0) && is_within(1)) {
             return None;

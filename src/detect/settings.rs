@@ -1,13 +1,19 @@
 //! Settings of the detector.
 
+use armcal_core::optics::TagFamily;
+
+use crate::decoder::corrected_bits;
+
 /// Search resolution and gates of a detector. `study detection` measures the defaults.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DetectorSettings {
+    /// What is printed on the tags.
+    pub family: TagFamily,
     /// Image decimation for the quad search: 1 finds small tags, 2 is faster.
     pub decimation: f32,
     /// Image decimation of a second pass on the contrast-normalized image; 0 for no second pass. It finds tags in haze.
     pub second_decimation: f32,
-    /// Largest Hamming distance (of 36 bits) that is corrected, 0 .. 2. Ids differ in 11 bits and more.
+    /// Largest Hamming distance that is corrected, 0 .. 2; of 16h5 0 alone.
     pub max_wrong_bits: usize,
     /// Smallest contrast (white minus black) over the standard deviation of the fit's residuals.
     pub min_contrast_ratio: f64,
@@ -23,12 +29,15 @@ pub struct DetectorSettings {
     pub known_ids: Option<Vec<u32>>,
 }
 
-impl Default for DetectorSettings {
-    fn default() -> Self {
+impl DetectorSettings {
+    /// The defaults for tags of a family.
+    #[must_use]
+    pub fn of_family(family: TagFamily) -> Self {
         Self {
+            family,
             decimation: 1.0,
             second_decimation: 2.0,
-            max_wrong_bits: 2,
+            max_wrong_bits: corrected_bits(family),
             min_contrast_ratio: 3.0,
             min_contrast: 4.0,
             min_side_px: 8.0,
@@ -36,5 +45,11 @@ impl Default for DetectorSettings {
             max_corner_std_px: 1.5,
             known_ids: None,
         }
+    }
+}
+
+impl Default for DetectorSettings {
+    fn default() -> Self {
+        Self::of_family(TagFamily::default())
     }
 }

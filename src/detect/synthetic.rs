@@ -7,18 +7,19 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector2, Vector3};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use armcal_core::optics::{CameraModel, square_corners, tag36h11};
+use armcal_core::optics::{CameraModel, TagFamily, square_corners};
 
 /// A tag in the camera frame.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PlacedTag {
+    pub family: TagFamily,
     pub id: u32,
     pub size_m: f64,
     pub camera_from_tag: Isometry3<f64>,
 }
 
 impl PlacedTag {
-    /// A tag at `center_m` that faces the camera, tilted by `incidence_rad` about a line at `azimuth_rad`, turned by
+    /// A tag of family 36h11 at `center_m` that faces the camera, tilted by `incidence_rad` about a line at `azimuth_rad`, turned by
     /// `spin_rad`.
     pub(super) fn new(
         id: u32,
@@ -30,7 +31,8 @@ impl PlacedTag {
         let axis = Vector3::new(azimuth_rad.cos(), azimuth_rad.sin(), 0.0);
         let lean = UnitQuaternion::from_scaled_axis(axis * incidence_rad);
         let turn = UnitQuaternion::from_scaled_axis(Vector3::z() * spin_rad);
-        Self { id, size_m, camera_from_tag: Isometry3::from_parts(Translation3::from(center_m), facing * lean * turn) }
+        let camera_from_tag = Isometry3::from_parts(Translation3::from(center_m), facing * lean * turn);
+        Self { family: TagFamily::Tag36h11, id, size_m, camera_from_tag }
     }
 
     pub(super) fn corners_px(&self, lens: &CameraModel) -> Option<[[f64; 2]; 4]> {
@@ -59,15 +61,16 @@ pub(super) const CLEAN: Rendering = Rendering { black: 30.0, white: 200.0, aroun
 
 /// Reflectance at (x, y), m; `None` beside the tag and its rim.
 fn reflectance(tag: &PlacedTag, x: f64, y: f64) -> Option<bool> {
-    let cell = tag.size_m / 8.0;
-    let (column, row) = ((x / cell + 4.0).floor(), (4.0 - y / cell).floor());
-    if !(-1.0..=8.0).contains(&column) || !(-1.0..=8.0).contains(&row) {
+    let n = tag.family.n_cells() as f64;
+    let cell = tag.size_m / n;
+    let (column, row) = ((x / cell + 0.5 * n).floor(), (0.5 * n - y / cell).floor());
+    if !(-1.0..=n).contains(&column) || !(-1.0..=n).contains(&row) {
         return None;
     }
-    if !(0.0..=7.0).contains(&column) || !(0.0..=7.0).contains(&row) {
+    if !(0.0..n).contains(&column) || !(0.0..n).contains(&row) {
         return Some(true);
     }
-    Some(tag36h11::cells(tag.id).expect("an id of the family")[row as usize][column as usize])
+    tag.family.cells(tag.id).expect("an id of the family").get(row as usize, column as usize)
 }
 
 fn ray(lens: &CameraModel, rendering: &Rendering, tags: &[PlacedTag], pixel: Vector2<f64>) -> f64 {

@@ -8,7 +8,7 @@ use rand::RngExt;
 use crate::synthetic::{CLEAN, PlacedTag, Rendering, render};
 use crate::*;
 use armcal_core::optics::fixture::{fisheye, lens};
-use armcal_core::optics::{CameraModel, Fisheye};
+use armcal_core::optics::{CameraModel, Fisheye, TagFamily};
 use armcal_core::stats::{quantile, stream_rng};
 use armcal_core::streams::RejectReason;
 
@@ -147,6 +147,32 @@ fn noise_shows_nothing() {
     }
 }
 
+/// Each family's corners are those of 36h11 within its noise, and none of its tags is read as one of another family.
+#[test]
+fn tags_of_each_family_are_found_where_they_are() {
+    let lens = lens();
+    for family in TagFamily::ALL {
+        let settings = || DetectorSettings::of_family(family);
+        let mut errors_px = Vec::new();
+        for id in 0..10 {
+            let tag = PlacedTag { family, ..ahead(3 * id, 0.03 * f64::from(id), 0.7) };
+            let image = drawn(&lens, &Rendering { noise: 3.0, ..CLEAN }, &[tag]);
+            let found = detect_in(&lens, settings(), &image).tags;
+            assert_eq!(found.iter().map(|tag| tag.detection.id).collect::<Vec<_>>(), [3 * id], "{family}");
+            let truth = tag.corners_px(&lens).expect("in view");
+            let pairs = found[0].detection.corners_px.into_iter().zip(truth);
+            errors_px.extend(pairs.map(|(found, truth)| (found[0] - truth[0]).hypot(found[1] - truth[1])));
+            for other in TagFamily::ALL.into_iter().filter(|other| *other != family) {
+                assert!(
+                    detect_in(&lens, DetectorSettings::of_family(other), &image).tags.is_empty(),
+                    "{family} {other}"
+                );
+            }
+        }
+        assert!(quantile(&errors_px, 0.95).expect("some") < 0.1, "{family}: {errors_px:?}");
+    }
+}
+
 #[test]
 fn an_id_at_two_places_is_no_tag() {
     let lens = lens();
@@ -162,7 +188,7 @@ fn wrong_bits_are_counted() {
     let lens = lens();
     let tag = ahead(3, 0.02, 0.5);
     let clean = drawn(&lens, &CLEAN, &[tag]);
-    let cells = armcal_core::optics::tag36h11::cells(3).expect("in the family");
+    let cells = TagFamily::Tag36h11.cells(3).expect("in the family");
     let inverse = tag.camera_from_tag.inverse();
     // The first cells of the second row within the border, in the colour that they do not have.
     let painted = |n_wrong: usize| {
@@ -174,7 +200,7 @@ fn wrong_bits_are_counted() {
             let cell_m = tag.size_m / 8.0;
             let (column, row) = ((at.x / cell_m + 4.0).floor(), (4.0 - at.y / cell_m).floor());
             if row == 2.0 && (1.0..=n_wrong as f64).contains(&column) {
-                *value = if cells[2][column as usize] { CLEAN.black } else { CLEAN.white } as u8;
+                *value = if cells.get(2, column as usize) == Some(true) { CLEAN.black } else { CLEAN.white } as u8;
             }
         }
         data

@@ -95,7 +95,7 @@ impl<'a> Server<'a> {
         Ok(Self {
             node,
             connection,
-            header: RecordingHeader::new(names.clone()),
+            header: RecordingHeader::new(names.clone()).with_tags_of(robot.tag_family),
             names,
             writers,
             commands,

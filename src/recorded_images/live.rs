@@ -2,17 +2,18 @@
 
 use armcal_core::input::{ImageProblem, RecordedImage};
 use armcal_core::log::ros::CompressedImage;
-use armcal_core::optics::CameraModel;
+use armcal_core::optics::{CameraModel, TagFamily};
 use armcal_core::streams::{CameraImage, DetectionRejects, Message, TagDetections};
 use armcal_detect::{DetectorSettings, GreyImage, TagDetector};
 use armcal_live::TagFinder;
 
 use super::grey::grey;
 
-/// Finds tags of family 36h11 in the images of one live camera.
+/// Finds tags of one family in the images of one live camera.
 #[derive(Debug)]
 pub struct LiveTagFinder {
     lens: CameraModel,
+    family: TagFamily,
     /// Made for the first image.
     detector: Option<TagDetector>,
 }
@@ -20,8 +21,8 @@ pub struct LiveTagFinder {
 impl LiveTagFinder {
     /// A detector for images of `lens`.
     #[must_use]
-    pub fn new(lens: &CameraModel) -> Self {
-        Self { lens: *lens, detector: None }
+    pub fn new(lens: &CameraModel, family: TagFamily) -> Self {
+        Self { lens: *lens, family, detector: None }
     }
 }
 
@@ -39,7 +40,7 @@ impl TagFinder for LiveTagFinder {
         let detector = match &mut self.detector {
             Some(detector) => detector,
             none => {
-                let made = TagDetector::new(&self.lens, DetectorSettings::default());
+                let made = TagDetector::new(&self.lens, DetectorSettings::of_family(self.family));
                 none.insert(made.map_err(|error| error.to_string())?)
             }
         };

@@ -173,7 +173,7 @@ impl Run<'_> {
 
     fn recorder(&self, now: Stamp) -> Result<Recorder, RunError> {
         let robot = &self.inputs.robot;
-        let header = RecordingHeader::new(robot.joint_names());
+        let header = RecordingHeader::new(robot.joint_names()).with_tags_of(robot.tag_family);
         let tree = FrameTree::of(robot)?;
         let camera_frame = header.camera_frame.clone();
         let mut writer = RecordingWriter::create(self.partial("run.mcap"), header)?;

@@ -24,7 +24,7 @@ pub(super) fn scene(robot: &Robot, targets_m: &[[f64; 3]], tolerance_m: f64, now
     };
     let mut entities = Vec::new();
     for tag in robot.tags.iter().filter(|tag| tag.is_known()) {
-        let name = tag_frame_name(tag.id);
+        let name = tag_frame_name(robot.tag_family, tag.id);
         let text = TextPrimitive {
             pose: pose(&Isometry3::translation(0.0, 0.0, LETTERS_M)),
             billboard: true,

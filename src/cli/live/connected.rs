@@ -52,8 +52,8 @@ impl ConnectedArm {
         let wire = Ros2Wire::open(&connection, &inputs.robot)?;
         let wire: Box<dyn Wire> = if connection.searches_images() {
             inputs.robot.require_lens()?;
-            let lens = inputs.robot.camera.lens;
-            Box::new(ImageSearch::new(wire, move || LiveTagFinder::new(&lens))?)
+            let (lens, family) = (inputs.robot.camera.lens, inputs.robot.tag_family);
+            Box::new(ImageSearch::new(wire, move || LiveTagFinder::new(&lens, family))?)
         } else {
             Box::new(wire)
         };

@@ -5,7 +5,7 @@ use std::path::Path;
 use super::error::InputError;
 use crate::log::ros::{CameraInfo, CompressedImage, Image};
 use crate::log::{CdrError, RawMessage, decode, for_each_raw};
-use crate::optics::{CameraModel, Fisheye, Radtan};
+use crate::optics::{CameraModel, Fisheye, Radtan, TagFamily};
 
 /// One image as recorded.
 #[derive(Clone, Debug, PartialEq)]
@@ -30,6 +30,9 @@ pub enum ImageProblem {
 
 /// Finds tags in images.
 pub trait ImageDetector {
+    /// The family of tags that it knows.
+    fn family(&self) -> TagFamily;
+
     /// The tags of one image.
     ///
     /// # Errors

@@ -15,6 +15,7 @@
 //! camera_frame = "fisheye"
 //! child_frame = "tag36h11:{id}"      # or a plain name, for one landmark
 //! use = "position"                   # "position" | "pose" | "corners"
+//! family = "36h11"                   # optional, images alone: or "25h9", "16h5"; absent: that of the robot's tags
 //! image_period_s = 0.2               # optional, images alone: time between two that are looked at; absent: all
 //! camera_info = "/camera_info"       # optional, images alone: sensor_msgs/msg/CameraInfo, for robots without a lens
 //! [conditions]                       # optional
@@ -34,6 +35,7 @@ use serde::Deserialize;
 
 pub use self::table::{Direction, RotationColumns, RotationForm, TableFormat, TableLayout, TimeColumn};
 use self::table::{TableToml, TagColumnsToml};
+use crate::optics::TagFamily;
 use crate::robot::{FileIssue, JointSensorSpec, RobotError, parse_toml, read_text};
 
 mod table;
@@ -208,6 +210,8 @@ pub struct InputMap {
     pub joint_unit: JointUnit,
     /// Names of the tags' frames; `None` with [`TagUse::Corners`] alone.
     pub child_frame: Option<ChildFrame>,
+    /// What is printed on the tags in images; `None`: what is on the robot's.
+    pub tag_family: Option<TagFamily>,
     /// What of a tag's measurement counts.
     pub tag_use: TagUse,
     /// Largest gap between a tag message and the nearest joint reading; a tag farther off is left out.
@@ -282,6 +286,7 @@ struct TagsToml {
     tag_use: TagUse,
     #[serde(default)]
     columns: Option<TagColumnsToml>,
+    family: Option<String>,
     #[serde(default)]
     image_period_s: f64,
     camera_info: Option<String>,
@@ -308,6 +313,8 @@ pub fn parse_input_map(file: &Path, text: &str) -> Result<InputMap, RobotError> 
     let raw: MapToml = parse_toml(file, text)?;
     FileIssue::check_range(file, "version", f64::from(raw.version), 1.0..=1.0)?;
     let child_frame = raw.tags.child_frame.as_deref().map(|frame| child_frame(file, frame)).transpose()?;
+    let family = |text: &String| text.parse().map_err(|problem: String| FileIssue::new(file, "tags.family", problem));
+    let tag_family = raw.tags.family.as_ref().map(family);
     if raw.table.is_some() {
         check_no_topics(file, &raw)?;
     }
@@ -323,6 +330,7 @@ pub fn parse_input_map(file: &Path, text: &str) -> Result<InputMap, RobotError> 
         joint_names: raw.joint_sensors.names,
         joint_unit: raw.joint_sensors.unit,
         child_frame,
+        tag_family: tag_family.transpose()?,
         tag_use: raw.tags.tag_use,
         max_gap_s: FileIssue::check_range(file, "max_gap_s", raw.max_gap_s, 1e-6..=60.0)?,
         while_moving: raw.while_moving,
@@ -335,6 +343,7 @@ fn check_no_topics(file: &Path, raw: &MapToml) -> Result<(), FileIssue> {
         ("joint_sensors.topic", &raw.joint_sensors.topic),
         ("tags.topic", &raw.tags.topic),
         ("tags.camera_frame", &raw.tags.camera_frame),
+        ("tags.family", &raw.tags.family),
         ("tags.camera_info", &raw.tags.camera_info),
         ("conditions.oil_temperature", &raw.conditions.oil_temperature),
         ("conditions.pressure", &raw.conditions.pressure),

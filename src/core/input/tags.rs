@@ -11,6 +11,7 @@ use super::map::{InputMap, NotFinite, QUATERNION_LENGTH_TOLERANCE, TagUse, Topic
 use super::stamp::stamp_or_log_time;
 use crate::log::ros::{AprilTagDetectionArray, TfMessage, TransformStamped};
 use crate::log::{RawMessage, StampOrder, decode};
+use crate::optics::TagFamily;
 use crate::time::Stamp;
 
 /// One landmark in one image.
@@ -296,9 +297,11 @@ impl<'a> TagReader<'a> {
                 self.messages
             ),
             (true, false) => left_out.join(", "),
-            (true, true) if self.last_image.is_some() => {
-                format!("no tag of family 36h11 was found in its {} images", self.messages)
-            }
+            (true, true) if self.last_image.is_some() => format!(
+                "no tag of family {} was found in its {} images; `family` in [tags] of the input map names another",
+                self.images.detector.as_ref().map_or_else(TagFamily::default, |detector| detector.family()),
+                self.messages
+            ),
             (true, true) => format!("its {} messages are empty", self.messages),
         }
     }

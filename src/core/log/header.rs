@@ -1,5 +1,7 @@
 //! Joint and frame names of a recording.
 
+use crate::optics::TagFamily;
+
 /// What every message of a recording shares. It is written into the messages, not beside them.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RecordingHeader {
@@ -24,7 +26,14 @@ impl RecordingHeader {
             base_frame: "base_link".into(),
             camera_frame: "camera_wrist".into(),
             vehicle_frame: "vehicle".into(),
-            tag_family: "tag36h11".into(),
+            tag_family: TagFamily::default().long_name().into(),
         }
+    }
+
+    /// The same with tags of another family.
+    #[must_use]
+    pub fn with_tags_of(mut self, family: TagFamily) -> Self {
+        family.long_name().clone_into(&mut self.tag_family);
+        self
     }
 }

@@ -11,7 +11,7 @@ mod fisheye;
 mod flat_port;
 mod radtan;
 mod square;
-pub mod tag36h11;
+mod tag_family;
 mod twist;
 
 pub use camera::{CameraModel, Lens, LensModel, UnknownLens};
@@ -20,6 +20,7 @@ pub use fisheye::Fisheye;
 pub use flat_port::FlatPort;
 pub use radtan::Radtan;
 pub use square::{SquareError, SquarePose, solve_square, solve_square_both, square_corners};
+pub use tag_family::{MAX_BOARD_CELLS, MAX_TAG_CELLS, TagCells, TagFamily};
 pub use twist::image_jacobian;
 
 /// The wrist camera's lens, for tests.

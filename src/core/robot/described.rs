@@ -5,6 +5,8 @@ use std::fmt::Write as _;
 use nalgebra::{Isometry3, Translation3};
 use quick_xml::escape::escape;
 
+use crate::optics::TagFamily;
+
 use super::frame_tree::{FixedFrame, FrameTree};
 use super::nominal::Robot;
 use super::shape::{PlacedShape, Shape};
@@ -26,10 +28,10 @@ pub struct Described {
     pub fixed: Vec<FixedFrame>,
 }
 
-/// The frame of a tag by its number.
+/// The frame of a tag by its family and number: tag36h11:7.
 #[must_use]
-pub fn tag_frame_name(id: u32) -> String {
-    format!("tag36h11:{id}")
+pub fn tag_frame_name(family: TagFamily, id: u32) -> String {
+    format!("{}:{id}", family.long_name())
 }
 
 impl Described {
@@ -48,7 +50,7 @@ impl Described {
         // The link that carries the tags; its frame is that of the tags.
         let carrier = robot.links.iter().find(|(_, place)| **place == robot.tag_frame).map(|(name, _)| name);
         for tag in robot.tags.iter().filter(|tag| tag.is_known()) {
-            let (name, Some(carrier)) = (tag_frame_name(tag.id), carrier) else { continue };
+            let (name, Some(carrier)) = (tag_frame_name(robot.tag_family, tag.id), carrier) else { continue };
             if names.contains(name.as_str()) {
                 continue;
             }

@@ -200,10 +200,10 @@ fn robot_of(folder: &Path, raw: RobotFile, urdf: UrdfModel, meshes: Meshes) -> R
     if let Some(radius_m) = raw.tool.tip_radius_m {
         add_tip(&mut bodies[tool.n_joints], tool.link_from_frame, radius_m);
     }
-    let tags = check_tags(&file, &raw.tag, raw.base_tag, &Pose::<Base, Base>::identity())?;
+    let (tags, family) = check_tags(&file, &raw.tag, raw.base_tag, &Pose::<Base, Base>::identity())?;
     let gripper_tag = raw.gripper_tag.map(|tag| tag.check(&file, &arm, &camera.mount)).transpose()?;
     if let Some(tag) = &gripper_tag {
-        tag.check_id(&file, &tags)?;
+        tag.check_beside(&file, &tags, family)?;
     }
     let geometry = raw.geometry.check(&file)?;
     let buoyancy_fraction = FileIssue::check_range(&file, "buoyancy_fraction", raw.buoyancy_fraction, 0.0..=0.95)?;
@@ -232,6 +232,7 @@ fn robot_of(folder: &Path, raw: RobotFile, urdf: UrdfModel, meshes: Meshes) -> R
         camera,
         tags,
         tag_frame: Attachment::base(),
+        tag_family: family.or(gripper_tag.map(|tag| tag.family)).unwrap_or_default(),
         links,
     })
 }

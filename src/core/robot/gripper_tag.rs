@@ -11,12 +11,15 @@ use super::part::check_place;
 use super::survey::SurveyedTag;
 use super::urdf::UrdfChain;
 use crate::kinematics::Attachment;
+use crate::optics::TagFamily;
 use crate::spatial::{Link, Pose, Tag};
 
 /// A tag on a link distal to the camera.
 #[derive(Clone, Copy, Debug)]
 pub struct GripperTag {
-    /// Number in the family 36h11; none of the surveyed tags has it.
+    /// What is printed on it, as on the surveyed tags.
+    pub family: TagFamily,
+    /// Number in the family; none of the surveyed tags has it.
     pub id: u32,
     /// Side of the black square, m.
     pub size_m: f64,
@@ -35,11 +38,20 @@ impl GripperTag {
         camera_mount.n_joints..self.mount.n_joints
     }
 
-    /// Checks that none of `tags` has the same id.
+    /// Checks that it is of the surveyed tags' family, and that none of `tags` has the same id.
     ///
     /// # Errors
     /// [`FileIssue`] with the id.
-    pub(super) fn check_id(&self, file: &Path, tags: &[SurveyedTag]) -> Result<(), FileIssue> {
+    pub(super) fn check_beside(
+        &self,
+        file: &Path,
+        tags: &[SurveyedTag],
+        family: Option<TagFamily>,
+    ) -> Result<(), FileIssue> {
+        if let Some(other) = family.filter(|other| *other != self.family) {
+            let problem = format!("is {}, that of the surveyed tags is {other}; one family an arm", self.family);
+            return Err(FileIssue::new(file, "gripper_tag.family", problem));
+        }
         if tags.iter().any(|tag| tag.id == self.id) {
             return Err(FileIssue::new(
                 file,
@@ -79,9 +91,7 @@ impl GripperTagFile {
         let issue = |key: &str, problem: String| FileIssue::new(file, format!("gripper_tag.{key}"), problem);
         let check =
             |key: &str, value: f64, range| FileIssue::check_range(file, &format!("gripper_tag.{key}"), value, range);
-        if self.family != "36h11" {
-            return Err(issue("family", format!("`{}` is not supported; use \"36h11\"", self.family)).into());
-        }
+        let family: TagFamily = self.family.parse().map_err(|problem| issue("family", problem))?;
         if !arm.urdf.has_link(&self.link) {
             return Err(issue("link", format!("`{}` is not a link of the URDF", self.link)).into());
         }
@@ -96,6 +106,7 @@ impl GripperTagFile {
             .ok_or_else(|| issue("position_m, quaternion_wxyz", "must be finite, not zero".to_owned()))?;
         mount.link_from_frame *= link_from_tag.isometry();
         Ok(GripperTag {
+            family,
             id: self.id,
             size_m: check("size_m", self.size_m, 1e-3..=10.0)?,
             mount,

@@ -20,6 +20,7 @@ use super::survey::{SurveyedTag, TagSurvey};
 use super::vehicle::Vehicle;
 use crate::joints::JointAngles;
 use crate::kinematics::{Attachment, Chain};
+use crate::optics::TagFamily;
 
 /// The nominal arm: drawing, datasheets and survey.
 #[derive(Clone, Debug)]
@@ -62,6 +63,8 @@ pub struct Robot {
     pub tags: Vec<SurveyedTag>,
     /// The frame that the tags' poses are in: the base's, or one that the arm moves before a camera that stands still.
     pub tag_frame: Attachment,
+    /// What is printed on the tags.
+    pub tag_family: TagFamily,
     /// Every link of the URDF that the arm carries, by name.
     pub links: BTreeMap<String, Attachment>,
     /// Id of the tag beside the base; one of `tags` where there are any, `None` where there are none.
@@ -150,6 +153,7 @@ impl Robot {
         self.tags = survey.tags;
         self.base_tag = survey.base_tag;
         self.tag_frame = survey.frame;
+        self.tag_family = survey.family.unwrap_or(self.tag_family);
         self
     }
 
@@ -167,7 +171,7 @@ impl Robot {
         }
         let Some(survey) = &vehicle.survey else { return Ok(self) };
         if let Some(tag) = &self.gripper_tag {
-            tag.check_id(&vehicle.file, &survey.tags)?;
+            tag.check_beside(&vehicle.file, &survey.tags, survey.family)?;
         }
         Ok(self.with_survey(survey.clone()))
     }
@@ -193,7 +197,12 @@ impl Robot {
     /// The tags around the arm.
     #[must_use]
     pub fn survey(&self) -> TagSurvey {
-        TagSurvey { base_tag: self.base_tag, frame: self.tag_frame, tags: self.tags.clone() }
+        TagSurvey {
+            base_tag: self.base_tag,
+            frame: self.tag_frame,
+            family: Some(self.tag_family),
+            tags: self.tags.clone(),
+        }
     }
 
     /// Checks that the arm can be simulated: each moving body has mass and an inertia.

@@ -8,15 +8,16 @@ use serde::{Deserialize, Serialize};
 use super::error::{FileIssue, RobotError};
 use super::part::check_place;
 use crate::kinematics::Attachment;
+use crate::optics::TagFamily;
 use crate::spatial::{Base, Frame, Pose, Tag};
 
-/// Limit of the tags of one file; the family 36h11 has 587.
+/// Limit of the tags of one file; the largest family has 587.
 pub const MAX_TAGS: usize = 5_000;
 
 /// A tag with a surveyed pose, or with an unknown one.
 #[derive(Clone, Debug)]
 pub struct SurveyedTag {
-    /// Number in the family 36h11.
+    /// Number in the family of its survey.
     pub id: u32,
     /// Side of the black square. NaN where it is unknown, for a landmark used by its position or pose alone.
     pub size_m: f64,
@@ -65,6 +66,8 @@ pub struct TagSurvey {
     pub base_tag: Option<u32>,
     /// The frame that the poses are in.
     pub frame: Attachment,
+    /// What is printed on all of them; `None` where the source of the survey does not say.
+    pub family: Option<TagFamily>,
     /// Each id once; the base tag is one of them.
     pub tags: Vec<SurveyedTag>,
 }
@@ -80,7 +83,7 @@ impl TagSurvey {
         }
         let base_tag = self.base_tag.filter(|id| ids.contains(id)).or(ids.first().copied());
         let tags = self.tags.iter().filter(|tag| ids.contains(&tag.id)).cloned().collect();
-        Ok(Self { base_tag, frame: self.frame, tags })
+        Ok(Self { base_tag, tags, ..*self })
     }
 
     /// The survey limited to `knowledge`: the other tags get infinite standard deviations.
@@ -118,25 +121,26 @@ pub(super) struct TagFile {
     rotation_std_rad: f64,
 }
 
-/// Checks the tags of `file`, whose poses are in the frame `Owner`.
+/// Checks the tags of `file`, whose poses are in the frame `Owner`, and that they are of one family.
 pub(super) fn check_tags<Owner: Frame>(
     file: &Path,
     raw: &[TagFile],
     base_tag: Option<u32>,
     base_from_owner: &Pose<Base, Owner>,
-) -> Result<Vec<SurveyedTag>, RobotError> {
+) -> Result<(Vec<SurveyedTag>, Option<TagFamily>), RobotError> {
     if raw.len() > MAX_TAGS {
         return Err(FileIssue::new(file, "tag", format!("{} tags, 0 .. {MAX_TAGS} allowed", raw.len())).into());
     }
-    let mut seen = BTreeSet::new();
+    let (mut seen, mut family) = (BTreeSet::new(), None);
     let mut tags = Vec::new();
     for tag in raw {
         let key = |name: &str| format!("tag {}: {name}", tag.id);
         if !seen.insert(tag.id) {
             return Err(FileIssue::new(file, key("id"), "is defined twice").into());
         }
-        if tag.family != "36h11" {
-            let problem = format!("`{}` is not supported; use \"36h11\"", tag.family);
+        let own: TagFamily = tag.family.parse().map_err(|problem| FileIssue::new(file, key("family"), problem))?;
+        if *family.get_or_insert(own) != own {
+            let problem = format!("is {own}, that of tag {} is {}; one family an arm", raw[0].id, raw[0].family);
             return Err(FileIssue::new(file, key("family"), problem).into());
         }
         check_place(file, &key("position_m"), &tag.position_m)?;
@@ -160,5 +164,5 @@ pub(super) fn check_tags<Owner: Frame>(
         }
         _ => {}
     }
-    Ok(tags)
+    Ok((tags, family))
 }

@@ -186,8 +186,8 @@ fn check_survey(
         (Some(_), true) => Err(FileIssue::new(file, "base_tag", "is not among the [[tag]]s: there are none").into()),
         (Some(base_tag), false) => {
             let base_tag = Some(base_tag);
-            let tags = check_tags(file, &raw.tag, base_tag, &vehicle_from_base.inverse())?;
-            Ok(Some(TagSurvey { base_tag, frame: Attachment::base(), tags }))
+            let (tags, family) = check_tags(file, &raw.tag, base_tag, &vehicle_from_base.inverse())?;
+            Ok(Some(TagSurvey { base_tag, frame: Attachment::base(), family, tags }))
         }
     }
 }

@@ -81,7 +81,7 @@ pub struct TagDetections {
 /// that is tag-frame (-s/2, -s/2), (s/2, -s/2), (s/2, s/2), (-s/2, s/2).
 #[derive(Clone, Debug, PartialEq)]
 pub struct TagDetection {
-    /// Number in the family 36h11.
+    /// Number in the family of the arm's tags.
     pub id: u32,
     /// Order and frame: see above.
     pub corners_px: [[f64; 2]; 4],
@@ -253,7 +253,7 @@ pub struct RecordedSurvey {
 /// One tag of a survey: `base_from_tag` as numbers, that they come out of a file as they went in.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RecordedTag {
-    /// Number in the family 36h11.
+    /// Number in the family of the arm's tags.
     pub id: u32,
     /// Side of the black square.
     pub size_m: f64,

@@ -41,6 +41,7 @@ impl RecordedSurvey {
         TagSurvey {
             base_tag: Some(self.base_tag),
             frame: Attachment::base(),
+            family: None,
             tags: self.tags.iter().filter_map(tag).collect(),
         }
     }

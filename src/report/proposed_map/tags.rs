@@ -76,7 +76,8 @@ fn of_images(contents: &Contents) -> Option<String> {
     let shared = |other: &str| other.chars().zip(name.chars()).take_while(|(a, b)| a == b).count();
     let info = contents.of_kind(Kind::CameraInfo).map(|(topic, _)| topic).max_by_key(|topic| shared(topic));
     Some(format!(
-        "topic = {}   # {} images; armcal looks for tags of family 36h11 in them\nuse = \"corners\"\n\
+        "topic = {}   # {} images; armcal looks for tags in them\nuse = \"corners\"\n\
+         # family = \"36h11\"   # or \"25h9\", \"16h5\", where robot.toml has no [[tag]]s\n\
          # image_period_s = 0.2   # looks at one image in so many seconds\n{}",
         quoted(name),
         topic.messages,

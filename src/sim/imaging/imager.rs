@@ -18,7 +18,7 @@ use crate::imaging::shape::Form;
 use crate::imaging::tag_board::Board;
 use crate::imaging::tracer::Tracer;
 use crate::spec::ImageSpec;
-use armcal_core::optics::CameraModel;
+use armcal_core::optics::{CameraModel, TagFamily};
 use armcal_core::robot::Shape;
 use armcal_core::stats::stream_rng;
 
@@ -26,7 +26,9 @@ use armcal_core::stats::stream_rng;
 /// black border.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TagPlane {
-    /// Number in the family 36h11.
+    /// What is printed on it.
+    pub family: TagFamily,
+    /// Number in the family.
     pub id: u32,
     /// Outer side of its black border.
     pub size_m: f64,
@@ -35,10 +37,10 @@ pub struct TagPlane {
 }
 
 impl TagPlane {
-    /// A tag at rest relative to the base.
+    /// A tag of family 36h11 at rest relative to the base.
     #[must_use]
     pub fn fixed(id: u32, size_m: f64, base_from_tag: Isometry3<f64>) -> Self {
-        Self { id, size_m, base_from_tag: [base_from_tag; 3] }
+        Self { family: TagFamily::Tag36h11, id, size_m, base_from_tag: [base_from_tag; 3] }
     }
 }
 
@@ -151,7 +153,8 @@ impl Imager {
 
     fn draw(&mut self, shot: &Shot, shader: &Shader) {
         let focal_px = self.rays.focal_px;
-        let boards: Vec<Form> = shot.tags.iter().map(|tag| Form::Tag(Board::new(tag.id, tag.size_m))).collect();
+        let boards: Vec<Form> =
+            shot.tags.iter().map(|tag| Form::Tag(Board::new(tag.family, tag.id, tag.size_m))).collect();
         let tags = boards.iter().zip(shot.tags).map(|(board, tag)| {
             Object::new(board, Appearance::Tag, &tag.base_from_tag, &shot.base_from_camera, focal_px)
         });

@@ -1,7 +1,7 @@
 //! Tags: boards without thickness, one side printed.
 
 use crate::imaging::math::Rgb;
-use armcal_core::optics::tag36h11::{BOARD_CELLS, TAG_CELLS, cells};
+use armcal_core::optics::{MAX_BOARD_CELLS, TagFamily};
 
 /// Diffuse reflectance of the white and the black of a board. Assumed: matt laminate.
 pub(super) const WHITE: f32 = 0.85;
@@ -17,29 +17,32 @@ pub(super) const CLEAR_OF_BACKING_M: f32 = 0.006;
 /// A tag's printed pattern and size.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Board {
-    /// Row by row from the top of the board, the left cell the highest of 10 bits; 1 is black.
-    rows: [u16; BOARD_CELLS],
+    /// Row by row from the top of the board, the left cell the highest of `n` bits; 1 is black.
+    rows: [u16; MAX_BOARD_CELLS],
+    /// Cells along a side: the tag and a white ring of one cell around it.
+    n: usize,
     pub half_m: f32,
     cells_per_m: f32,
 }
 
 impl Board {
     /// An id that the family does not have is a blank board.
-    pub(super) fn new(id: u32, size_m: f64) -> Self {
-        let mut rows = [0; BOARD_CELLS];
-        if let Some(cells) = cells(id) {
-            for (row, cells) in rows[1..=TAG_CELLS].iter_mut().zip(&cells) {
+    pub(super) fn new(family: TagFamily, id: u32, size_m: f64) -> Self {
+        let mut rows = [0; MAX_BOARD_CELLS];
+        if let Some(cells) = family.cells(id) {
+            for (row, cells) in rows[1..].iter_mut().zip(cells.rows()) {
                 *row = cells.iter().fold(0, |bits, is_white| bits << 1 | u16::from(!is_white)) << 1;
             }
         }
-        let cell_m = size_m / TAG_CELLS as f64;
-        Self { rows, half_m: (0.5 * cell_m * BOARD_CELLS as f64) as f32, cells_per_m: (1.0 / cell_m) as f32 }
+        let n = family.n_cells() + 2;
+        let cell_m = size_m / family.n_cells() as f64;
+        Self { rows, n, half_m: (0.5 * cell_m * n as f64) as f32, cells_per_m: (1.0 / cell_m) as f32 }
     }
 
     /// The face at a place of the front, x right, y up, m.
     #[inline]
     pub(super) fn face(&self, x: f32, y: f32) -> u16 {
-        let last = BOARD_CELLS - 1;
+        let last = self.n - 1;
         let column = (((x + self.half_m) * self.cells_per_m) as usize).min(last);
         let row = (((self.half_m - y) * self.cells_per_m) as usize).min(last);
         if self.rows[row] >> (last - column) & 1 == 1 { FACE_BLACK } else { FACE_WHITE }

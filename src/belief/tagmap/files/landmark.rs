@@ -75,7 +75,7 @@ impl LandmarkFile {
             return Err(FileIssue::new(file, "tag", "holds no tag in that frame"));
         }
         let named = self.landmarks.iter().filter_map(|landmark| Some((landmark.id, landmark.name.clone()?)));
-        Ok(NamedSurvey { survey: TagSurvey { base_tag, frame, tags }, names: named.collect() })
+        Ok(NamedSurvey { survey: TagSurvey { base_tag, frame, family: None, tags }, names: named.collect() })
     }
 }
 

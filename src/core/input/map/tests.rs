@@ -40,6 +40,7 @@ fn what_is_wrong_is_named_with_file_and_key() {
         ),
         ("[tags]", "[conditions]\noil_temperature = \"/tf\"\n[tags]", &["conditions", "twice"]),
         ("[tags]", "[conditions]\nwater = \"/w\"\n[tags]", &["water", "oil_temperature", "pressure"]),
+        ("[tags]", "[tags]\nfamily = \"36h10\"", &["tags.family", "36h10", "25h9"]),
         ("[tags]", "[tags]\nimage_period_s = -1.0", &["tags.image_period_s", "3600"]),
         ("version = 1", "version = 2", &["version", "1 .. 1"]),
         ("version = 1", "version = 1\nmax_gap_s = -1.0", &["max_gap_s", "60"]),

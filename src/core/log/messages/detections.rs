@@ -12,7 +12,7 @@ use crate::streams::{TagDetection, TagDetections};
 /// apriltag_msgs/msg/AprilTagDetection; the corners in the order of `streams::TagDetection`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct AprilTagDetection {
-    /// `tag36h11` in our recordings; not read.
+    /// `tag36h11` and the like; not read.
     pub family: String,
     /// Number in the family; negative ones are rejected.
     pub id: i32,

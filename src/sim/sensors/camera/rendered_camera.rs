@@ -9,6 +9,7 @@ use crate::imaging::{Frame, Imager, Light, Shot, TagPlane};
 use crate::sensors::camera::ported_lens::PortedLens;
 use crate::sensors::camera::scenery::{ScenePoses, Scenery};
 use crate::spec::{ImageSpec, WorldSpec};
+use armcal_core::optics::TagFamily;
 use armcal_core::robot::{FileIssue, Robot, Vehicle};
 use armcal_core::routine::Scene;
 use armcal_core::streams::{DetectionReject, ImageDemand, TagDetection};
@@ -29,6 +30,7 @@ pub(super) struct RenderedCamera {
     imager: Imager,
     scenery: Scenery,
     detector: TagDetector,
+    family: TagFamily,
     spec: ImageSpec,
     number: u64,
     last_taken: Option<Stamp>,
@@ -82,12 +84,13 @@ impl RenderedCamera {
         let mut imager = Imager::new(&ported.lens, &image, &lights, seed);
         imager.set_solids(&scenery.shapes);
         // The detector knows the lens of the drawing.
-        let detector = TagDetector::new(&robot.camera.lens, DetectorSettings::default())
+        let detector = TagDetector::new(&robot.camera.lens, DetectorSettings::of_family(robot.tag_family))
             .map_err(|error| SimError::Detector(error.to_string()))?;
         Ok(Self {
             imager,
             scenery,
             detector,
+            family: robot.tag_family,
             spec: image,
             number: 0,
             last_taken: None,
@@ -95,6 +98,11 @@ impl RenderedCamera {
             grey: Vec::new(),
             solids: Vec::new(),
         })
+    }
+
+    /// What is printed on the tags.
+    pub(super) fn family(&self) -> TagFamily {
+        self.family
     }
 
     /// Whether an image is to be taken now.

@@ -208,11 +208,12 @@ impl WristCamera {
             std::array::from_fn(|k| base_from_camera[k] * seen_from[k].inverse())
         };
         let on_gripper = self.gripper_tag.map_or([Isometry3::identity(); 3], |tag| carried(tag.mount.n_joints));
+        let family = rendered.family();
         let plane = |(i, tag): (usize, TagInBase)| {
             let moved = if i < self.tags.len() { [Isometry3::identity(); 3] } else { on_gripper };
             let base_from_tag = moved.map(|moved| moved * tag.base_from_tag);
             let id = self.reader.usual_id(tag.id);
-            (!self.lost.contains(&tag.id)).then_some(TagPlane { id, size_m: tag.size_m, base_from_tag })
+            (!self.lost.contains(&tag.id)).then_some(TagPlane { family, id, size_m: tag.size_m, base_from_tag })
         };
         let tags: Vec<TagPlane> = self.tags_at(poses.links).into_iter().enumerate().filter_map(plane).collect();
         let is_silty = self.blind_until.is_some_and(|until| *closed < until);
