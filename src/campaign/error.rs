@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use crate::campaign::Shard;
 use crate::output::OutputError;
 use crate::run::RunError;
 use armcal_core::routine::RoutineError;
@@ -27,6 +28,13 @@ pub enum CampaignError {
     Busy { path: PathBuf },
     #[error("{}: the row of setting {setting}, seed {seed} is not the same in both files", path.display())]
     Conflict { path: PathBuf, setting: u32, seed: u64 },
+    #[error("{}: this campaign is not at its end; the command that began it goes on with it", path.display())]
+    Unfinished { path: PathBuf },
+    #[error(
+        "no table of {}: name theirs, too, or run the command of the shard again; --allow-missing leaves them out",
+        listed(shards)
+    )]
+    MissingShards { shards: Vec<Shard> },
     #[error("seed {seed}: {source}; the rows before are kept, and the same command goes on from there")]
     Machine { seed: u64, source: Box<RunError> },
     #[error("{0}")]
@@ -39,6 +47,12 @@ pub enum CampaignError {
     Json(#[from] serde_json::Error),
     #[error("no threads can be made: {0}")]
     Threads(#[from] rayon::ThreadPoolBuildError),
+}
+
+/// "shard 2/8" or "shards 2/8, 5/8".
+fn listed(shards: &[Shard]) -> String {
+    let names: Vec<String> = shards.iter().map(Shard::to_string).collect();
+    format!("shard{} {}", if names.len() == 1 { "" } else { "s" }, names.join(", "))
 }
 
 impl CampaignError {

@@ -3,8 +3,11 @@
 use std::fmt;
 use std::str::FromStr;
 
+use serde::{Deserialize, Serialize};
+
 /// The `k`-th of `n` shares, counted from 1: every n-th seed, beginning with the k-th.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
 pub struct Shard {
     k: u64,
     n: u64,
@@ -15,6 +18,33 @@ impl Shard {
     #[must_use]
     pub fn takes(self, place: u64) -> bool {
         place % self.n == self.k - 1
+    }
+
+    /// All shares of which this is one, in order.
+    pub fn all(self) -> impl Iterator<Item = Self> {
+        (1..=self.n).map(move |k| Self { k, ..self })
+    }
+}
+
+/// What a shard's summary says of it: which share, and of which seeds.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Share {
+    pub shard: Shard,
+    /// First and last seed of all shares together.
+    pub seeds: [u64; 2],
+}
+
+impl TryFrom<String> for Shard {
+    type Error = String;
+
+    fn try_from(text: String) -> Result<Self, String> {
+        text.parse()
+    }
+}
+
+impl From<Shard> for String {
+    fn from(shard: Shard) -> Self {
+        shard.to_string()
     }
 }
 

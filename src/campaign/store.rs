@@ -15,7 +15,7 @@ use crate::campaign::parquet_file::parquet_bytes;
 use crate::campaign::statistics::{CampaignSummary, statistics};
 use crate::campaign::table_file::{Table, parse_table, read_table, row_line, table_text};
 use crate::campaign::tables::markdown;
-use crate::campaign::{CampaignError, Origin, Row};
+use crate::campaign::{CampaignError, Origin, Row, Share};
 use crate::output::{self, OutputError};
 use armcal_core::files::{self, FileKind};
 
@@ -26,6 +26,7 @@ pub struct Store {
     file: File,
     fingerprint: String,
     origin: Option<Origin>,
+    share: Option<Share>,
     table: Table,
     /// Whether the files in place already hold all rows.
     in_place: bool,
@@ -71,6 +72,7 @@ impl Store {
             file,
             fingerprint: fingerprint.to_owned(),
             origin: None,
+            share: None,
             table,
             in_place: false,
         };
@@ -85,6 +87,12 @@ impl Store {
     #[must_use]
     pub fn of(self, origin: Origin) -> Self {
         Self { origin: Some(origin), ..self }
+    }
+
+    /// The same, with which share of a campaign the rows are.
+    #[must_use]
+    pub fn sharing(self, share: Option<Share>) -> Self {
+        Self { share, ..self }
     }
 
     fn load(&mut self, partial: &Path, existing: ExistingRows) -> Result<(), CampaignError> {
@@ -196,7 +204,7 @@ impl Store {
     pub fn finish(mut self, routine: &str) -> Result<(Table, CampaignSummary), CampaignError> {
         self.table.rows.sort_by_key(Row::key);
         let summary = statistics(&self.table, routine, &self.fingerprint);
-        let summary = CampaignSummary { origin: self.origin, ..summary };
+        let summary = CampaignSummary { origin: self.origin, share: self.share, ..summary };
         if !self.in_place {
             write_results(&self.out, &self.table, &summary)?;
         }

@@ -7,7 +7,9 @@ use anyhow::Result;
 use clap::Args;
 
 use crate::campaign::ExistingRows;
-use crate::campaign::{CampaignSummary, Origin, Prepared, Request, Shard, Store, jobs, merge, table, write_results};
+use crate::campaign::{
+    CampaignSummary, MissingShards, Origin, Prepared, Request, Shard, Share, Store, jobs, merge, table, write_results,
+};
 use crate::cli::batch::{BatchRun, CampaignBar, check_name, exit_of, range_of, run_many};
 use crate::cli::exit::{Exit, UsageError};
 use crate::cli::interrupt::Interrupt;
@@ -47,19 +49,23 @@ pub(super) struct CampaignArgs {
     #[arg(long, value_name = "FILE", num_args = 1.., requires = "out",
           conflicts_with_all = ["seeds", "shard", "threads", "keep", "fresh", "set", "robot", "vehicle"])]
     merge: Vec<PathBuf>,
+    /// Merge although tables of some shards are missing
+    #[arg(long, requires = "merge")]
+    allow_missing: bool,
 }
 
 pub(super) fn campaign(args: &CampaignArgs) -> Result<Exit> {
     match (&args.routine, &args.out) {
-        (None, Some(out)) => merged(&args.merge, out),
+        (None, Some(out)) => merged(args, out),
         (Some(routine), _) => run(args, routine),
         (None, None) => Err(UsageError("a routine is missing".to_owned()).into()),
     }
 }
 
-fn merged(paths: &[PathBuf], out: &Path) -> Result<Exit> {
+fn merged(args: &CampaignArgs, out: &Path) -> Result<Exit> {
     check_name(out)?;
-    let (rows, summary) = merge(paths)?;
+    let missing = if args.allow_missing { MissingShards::LeaveOut } else { MissingShards::Refuse };
+    let (rows, summary) = merge(&args.merge, missing)?;
     output::make_folder(output::parent(out))?;
     write_results(out, &rows, &summary)?;
     show(&summary, out)
@@ -76,7 +82,9 @@ fn run(args: &CampaignArgs, routine: &Path) -> Result<Exit> {
     let range = range_of(args.seeds, &prepared)?;
     let existing = if args.fresh { ExistingRows::Discard } else { ExistingRows::Keep };
     let store = Store::open(&out, &prepared.fingerprint, prepared.columns.names(), existing)?;
-    let mut store = store.of(Origin::of_campaign(&prepared)?);
+    let seeds = range.seeds();
+    let share = args.shard.map(|shard| Share { shard, seeds: [*seeds.start(), *seeds.end()] });
+    let mut store = store.of(Origin::of_campaign(&prepared)?).sharing(share);
     let n_before = store.table().rows.len();
     let jobs = jobs(&prepared, range, args.shard, &store.done());
     if n_before > 0 {
