@@ -143,7 +143,8 @@ mod tests {
         assert_eq!((rest.rows.len(), summary.share), (2, None));
         // Of another number of shards, or of other seeds.
         for other in [shard(2, 4, [1, 3]), shard(2, 3, [1, 9])] {
-            let problem = merge(&[first.clone(), other], MissingShards::LeaveOut).expect_err("other shares").to_string();
+            let problem =
+                merge(&[first.clone(), other], MissingShards::LeaveOut).expect_err("other shares").to_string();
             assert!(problem.contains("one number of shards"), "{problem}");
         }
         let under_way = folder.path().join("late.csv");

@@ -26,6 +26,7 @@ mod statistics;
 mod store;
 mod table_file;
 mod tables;
+mod until;
 
 pub use baseline::{baseline_text, read_baseline};
 pub use columns::Columns;
@@ -48,3 +49,4 @@ pub use store::{ExistingRows, Store, write_results};
 pub(crate) use table_file::parse_table;
 pub use table_file::{Table, read_table, table_text};
 pub use tables::{markdown, table};
+pub use until::{Answer, Stopping, Until, UntilResult};

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use crate::campaign::{Metric, Origin, Row, RunStatus, Share, Table, Worsening};
+use crate::campaign::{Metric, Origin, Row, RunStatus, Share, Table, UntilResult, Worsening};
 use armcal_core::stats::{median_interval, quantile};
 
 /// The summary beside a campaign's table.
@@ -19,6 +19,9 @@ pub struct CampaignSummary {
     /// Which share of a campaign the rows are; `None` for all of it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub share: Option<Share>,
+    /// What `--until` asked for; empty without.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub until: Vec<UntilResult>,
     pub settings: Vec<SettingStatistics>,
 }
 
@@ -76,7 +79,7 @@ pub fn statistics(table: &Table, routine: &str, fingerprint: &str) -> CampaignSu
     }
     let settings = by_setting.into_values().map(|rows| of_setting(table, &rows)).collect();
     let (routine, fingerprint) = (routine.to_owned(), fingerprint.to_owned());
-    CampaignSummary { version: 1, routine, fingerprint, origin: None, share: None, settings }
+    CampaignSummary { version: 1, routine, fingerprint, origin: None, share: None, until: Vec::new(), settings }
 }
 
 /// `rows`: one or more.

@@ -15,7 +15,7 @@ use crate::campaign::parquet_file::parquet_bytes;
 use crate::campaign::statistics::{CampaignSummary, statistics};
 use crate::campaign::table_file::{Table, parse_table, read_table, row_line, table_text};
 use crate::campaign::tables::markdown;
-use crate::campaign::{CampaignError, Origin, Row, Share};
+use crate::campaign::{CampaignError, Origin, Row, Share, Stopping, UntilResult};
 use crate::output::{self, OutputError};
 use armcal_core::files::{self, FileKind};
 
@@ -27,6 +27,7 @@ pub struct Store {
     fingerprint: String,
     origin: Option<Origin>,
     share: Option<Share>,
+    until: Vec<UntilResult>,
     table: Table,
     /// Whether the files in place already hold all rows.
     in_place: bool,
@@ -73,6 +74,7 @@ impl Store {
             fingerprint: fingerprint.to_owned(),
             origin: None,
             share: None,
+            until: Vec::new(),
             table,
             in_place: false,
         };
@@ -93,6 +95,17 @@ impl Store {
     #[must_use]
     pub fn sharing(self, share: Option<Share>) -> Self {
         Self { share, ..self }
+    }
+
+    /// The same, ended early: with the answers that it was run for, and without the seeds that these do not need.
+    #[must_use]
+    pub fn answered(mut self, stopping: &Stopping) -> Self {
+        let beyond = stopping.beyond();
+        let n_before = self.table.rows.len();
+        self.table.rows.retain(|row| !beyond.contains(&row.seed));
+        self.until = stopping.results();
+        self.in_place &= self.until.is_empty() && n_before == self.table.rows.len();
+        self
     }
 
     fn load(&mut self, partial: &Path, existing: ExistingRows) -> Result<(), CampaignError> {
@@ -204,7 +217,7 @@ impl Store {
     pub fn finish(mut self, routine: &str) -> Result<(Table, CampaignSummary), CampaignError> {
         self.table.rows.sort_by_key(Row::key);
         let summary = statistics(&self.table, routine, &self.fingerprint);
-        let summary = CampaignSummary { origin: self.origin, share: self.share, ..summary };
+        let summary = CampaignSummary { origin: self.origin, share: self.share, until: self.until, ..summary };
         if !self.in_place {
             write_results(&self.out, &self.table, &summary)?;
         }

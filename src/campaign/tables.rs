@@ -58,6 +58,9 @@ pub fn table(summary: &CampaignSummary) -> String {
     let mut text = String::new();
     for setting in &summary.settings {
         text.push_str(&title(setting));
+        for result in summary.until.iter().filter(|result| result.setting == setting.setting) {
+            text.push_str(&format!("\n{result}"));
+        }
         let mut grid = Grid::new();
         grid.load_preset(UTF8_FULL_CONDENSED).set_header(HEADER);
         let rows = rows(setting);

@@ -8,7 +8,7 @@ use anyhow::Result;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::campaign::{
-    CampaignError, CampaignSummary, Engine, Job, Prepared, Row, RunStatus, SingleRun, Table, run_job, run_jobs,
+    Answer, CampaignError, CampaignSummary, Engine, Job, Prepared, Row, RunStatus, SingleRun, Table, run_job, run_jobs,
 };
 use crate::cli::exit::{Exit, UsageError, of_cause, of_summary};
 use crate::cli::stdout::note;
@@ -60,6 +60,11 @@ fn exit_code(result: Result<&RunSummary, &RunError>) -> u8 {
 /// The worst that happened to any row.
 pub(super) fn exit_of(summary: &CampaignSummary) -> Exit {
     let any = |of: fn(&crate::campaign::SettingStatistics) -> usize| summary.settings.iter().any(|s| of(s) > 0);
+    // With limits, the campaign is good where they hold, whatever single runs came to.
+    if !summary.until.is_empty() {
+        let holds = summary.until.iter().all(|result| result.answer == Answer::Below);
+        return if holds { Exit::Ok } else { Exit::Refused };
+    }
     if any(|s| s.failed) {
         Exit::Failure
     } else if any(|s| s.refused + s.missed) {

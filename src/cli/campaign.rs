@@ -1,6 +1,7 @@
 //! `armcal campaign`: one routine, many seeds and settings.
 
 use std::path::{Path, PathBuf};
+use std::sync::atomic::Ordering;
 use std::time::Instant;
 
 use anyhow::Result;
@@ -8,7 +9,8 @@ use clap::Args;
 
 use crate::campaign::ExistingRows;
 use crate::campaign::{
-    CampaignSummary, MissingShards, Origin, Prepared, Request, Shard, Share, Store, jobs, merge, table, write_results,
+    CampaignSummary, MissingShards, Origin, Prepared, Request, Shard, Share, Stopping, Store, Until, jobs, merge,
+    table, write_results,
 };
 use crate::cli::batch::{BatchRun, CampaignBar, check_name, exit_of, range_of, run_many};
 use crate::cli::exit::{Exit, UsageError};
@@ -34,6 +36,10 @@ pub(super) struct CampaignArgs {
     /// recordings/ROUTINE-NAME/campaign.csv if not given
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
+    /// Stop as soon as a rate is known to be below a limit or above it, as "contacts < 0.001 at 95 %"; of contacts,
+    /// missed, refused, failed, not_accepted. May be given many times; --seeds says how many at most
+    #[arg(long, value_name = "LIMIT", conflicts_with = "shard")]
+    until: Vec<Until>,
     /// Threads, one run on each; all cores if not given
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
@@ -47,7 +53,7 @@ pub(super) struct CampaignArgs {
     fresh: bool,
     /// Put the tables of shards together, into --out
     #[arg(long, value_name = "FILE", num_args = 1.., requires = "out",
-          conflicts_with_all = ["seeds", "shard", "threads", "keep", "fresh", "set", "robot", "vehicle"])]
+          conflicts_with_all = ["seeds", "shard", "until", "threads", "keep", "fresh", "set", "robot", "vehicle"])]
     merge: Vec<PathBuf>,
     /// Merge although tables of some shards are missing
     #[arg(long, requires = "merge")]
@@ -87,24 +93,32 @@ fn run(args: &CampaignArgs, routine: &Path) -> Result<Exit> {
     let mut store = store.of(Origin::of_campaign(&prepared)?).sharing(share);
     let n_before = store.table().rows.len();
     let jobs = jobs(&prepared, range, args.shard, &store.done());
-    if n_before > 0 {
-        note(format_args!("{n_before} rows are there already; {} runs are left", jobs.len()));
-    }
     let folder = output::with_suffix(&out, if args.keep { ".runs" } else { ".work" });
     let keep = if args.keep { Keep::Everything } else { Keep::StreamsAlone };
     let many = BatchRun { prepared: &prepared, folder: &folder, keep, threads: args.threads, stop: stop.flag() };
+    let settings = prepared.settings.iter().map(|setting| setting.index).collect();
+    let mut stopping = Stopping::new(&args.until, seeds.collect(), settings, &store.table().names);
+    store.table().rows.iter().for_each(|row| stopping.add(row));
+    let jobs = if stopping.is_answered() { Vec::new() } else { jobs };
+    if n_before > 0 {
+        note(format_args!("{n_before} rows are there already; {} runs are left", jobs.len()));
+    }
     let mut bar = CampaignBar::new(&prepared, store.table(), jobs.len());
     let whole = run_many(&many, &jobs, &mut |row| {
         bar.add(&row);
+        stopping.add(&row);
+        if stopping.is_answered() {
+            stop.flag().store(true, Ordering::SeqCst);
+        }
         store.append(row)
     });
     bar.finish();
-    if !whole? {
+    if !whole? && !stopping.is_answered() {
         let done = store.table().rows.len();
         note(format_args!("stopped with {done} rows kept; the same command goes on from there"));
         return Ok(Exit::Failure);
     }
-    let (_, summary) = store.finish(&prepared.routine.name)?;
+    let (_, summary) = store.answered(&stopping).finish(&prepared.routine.name)?;
     if !jobs.is_empty() {
         note(format_args!("{} runs in {:.0} s", jobs.len(), started.elapsed().as_secs_f64()));
     }

@@ -1,0 +1,290 @@
+//! `--until`: a campaign that stops as soon as a rate is known to be below a limit, or above it.
+//!
+//! Rows count in the order of their seeds, so that the campaign ends at the same seed on any number of threads.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt;
+use std::str::FromStr;
+
+use serde::{Deserialize, Serialize};
+
+use crate::campaign::{Row, RunStatus};
+use armcal_core::stats::RateSequence;
+
+/// What a run can be counted for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum RunEvent {
+    /// The arm touched anything.
+    Contacts,
+    Missed,
+    Refused,
+    Failed,
+    /// Missed, refused or failed.
+    NotAccepted,
+}
+
+const EVENTS: [(&str, RunEvent); 5] = [
+    ("contacts", RunEvent::Contacts),
+    ("missed", RunEvent::Missed),
+    ("refused", RunEvent::Refused),
+    ("failed", RunEvent::Failed),
+    ("not_accepted", RunEvent::NotAccepted),
+];
+
+impl RunEvent {
+    /// `contacts`: the figure of that name, where the run has it.
+    fn is_in(self, row: &Row, contacts: Option<f64>) -> bool {
+        match self {
+            Self::Contacts => contacts.is_some_and(|n| n > 0.0),
+            Self::Missed => row.status == RunStatus::Missed,
+            Self::Refused => row.status == RunStatus::Refused,
+            Self::Failed => row.status == RunStatus::Failed,
+            Self::NotAccepted => row.status != RunStatus::Accepted,
+        }
+    }
+}
+
+/// "contacts < 0.001 at 95 %".
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Until {
+    event: RunEvent,
+    /// Of all runs.
+    limit: f64,
+    /// 0.95 for 95 %.
+    level: f64,
+}
+
+impl FromStr for Until {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let problem = |what: &str| format!("`{text}`: {what}; write it as \"contacts < 0.001 at 95 %\"");
+        let (event, rest) = text.split_once('<').ok_or_else(|| problem("has no `<`"))?;
+        let (limit, level) = rest.split_once(" at ").ok_or_else(|| problem("has no ` at `"))?;
+        let names = EVENTS.map(|(name, _)| name).join(", ");
+        let found = EVENTS.into_iter().find(|(name, _)| *name == event.trim());
+        let (_, event) = found.ok_or_else(|| problem(&format!("`{}` is none of {names}", event.trim())))?;
+        let number = |text: &str| text.trim().parse::<f64>().ok();
+        let limit = number(limit).filter(|rate| (1e-6..=0.9).contains(rate));
+        let level = level.trim().strip_suffix('%').and_then(number).filter(|level| (50.0..=99.999).contains(level));
+        Ok(Self {
+            event,
+            limit: limit.ok_or_else(|| problem("the rate is a number of 1e-6 .. 0.9"))?,
+            level: level.ok_or_else(|| problem("the level is 50 .. 99.999 %"))? / 100.0,
+        })
+    }
+}
+
+impl fmt::Display for Until {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let name = EVENTS.iter().find(|(_, event)| *event == self.event).map_or("", |(name, _)| name);
+        // 99.9, not 99.90000000000001.
+        let level = (1e5 * self.level).round() / 1e3;
+        write!(f, "{name} < {} at {level} %", self.limit)
+    }
+}
+
+/// What is known of a rate.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Answer {
+    /// The whole interval is below the limit.
+    Below,
+    /// The whole interval is above it.
+    Above,
+    /// The limit is in the interval.
+    Open,
+}
+
+/// What the campaign says of one limit, under one setting.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct UntilResult {
+    pub setting: u32,
+    pub until: String,
+    pub answer: Answer,
+    /// Runs with the event, and all runs, when the answer was there, or at the end.
+    pub events: u64,
+    pub runs: u64,
+    /// The interval of the rate then.
+    pub low: f64,
+    pub high: f64,
+}
+
+impl fmt::Display for UntilResult {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { until, events, runs, low, high, .. } = self;
+        let answer = match self.answer {
+            Answer::Below => "yes",
+            Answer::Above => "NO, it is above",
+            Answer::Open => "OPEN, more seeds are needed",
+        };
+        write!(f, "{until}: {answer}; {events} of {runs} runs, {low:.2e} .. {high:.2e}")
+    }
+}
+
+/// Counts rows until all limits have their answers.
+#[derive(Debug)]
+pub struct Stopping {
+    limits: Vec<Until>,
+    /// In the order in which they count.
+    seeds: Vec<u64>,
+    n_counted: usize,
+    /// Which settings of a seed are there, and for each limit whether the event was.
+    waiting: BTreeMap<u64, BTreeMap<u32, Vec<bool>>>,
+    settings: BTreeSet<u32>,
+    contacts: Option<usize>,
+    /// By setting, by limit.
+    sequences: BTreeMap<u32, Vec<(RateSequence, Option<UntilResult>)>>,
+}
+
+impl Stopping {
+    /// `names`: of the rows' figures.
+    #[must_use]
+    pub fn new(limits: &[Until], seeds: Vec<u64>, settings: BTreeSet<u32>, names: &[String]) -> Self {
+        let fresh = vec![(RateSequence::default(), None); limits.len()];
+        Self {
+            limits: limits.to_vec(),
+            seeds,
+            n_counted: 0,
+            waiting: BTreeMap::new(),
+            sequences: settings.iter().map(|setting| (*setting, fresh.clone())).collect(),
+            settings,
+            contacts: names.iter().position(|name| name == "contacts"),
+        }
+    }
+
+    /// Counts a row, in any order.
+    pub fn add(&mut self, row: &Row) {
+        let contacts = self.contacts.and_then(|place| row.figures.get(place).copied().flatten());
+        let events = self.limits.iter().map(|limit| limit.event.is_in(row, contacts)).collect();
+        self.waiting.entry(row.seed).or_default().insert(row.setting, events);
+        while !self.is_answered() {
+            let Some(seed) = self.seeds.get(self.n_counted) else { break };
+            let is_whole = self.waiting.get(seed).is_some_and(|found| found.len() == self.settings.len());
+            let Some(found) = is_whole.then(|| self.waiting.remove(seed)).flatten() else { break };
+            self.n_counted += 1;
+            for (setting, events) in found {
+                self.count(setting, &events);
+            }
+        }
+    }
+
+    fn count(&mut self, setting: u32, events: &[bool]) {
+        let Some(sequences) = self.sequences.get_mut(&setting) else { return };
+        for ((limit, has_event), (sequence, result)) in self.limits.iter().zip(events).zip(sequences) {
+            if result.is_some() {
+                continue;
+            }
+            sequence.add(*has_event);
+            let now = limit.result(setting, sequence);
+            *result = (now.answer != Answer::Open).then_some(now);
+        }
+    }
+
+    /// Whether nothing more has to be run.
+    #[must_use]
+    pub fn is_answered(&self) -> bool {
+        !self.limits.is_empty() && self.sequences.values().flatten().all(|(_, result)| result.is_some())
+    }
+
+    /// The seeds that are not needed for the answers.
+    #[must_use]
+    pub fn beyond(&self) -> BTreeSet<u64> {
+        if !self.is_answered() {
+            return BTreeSet::new();
+        }
+        self.seeds[self.n_counted..].iter().copied().collect()
+    }
+
+    /// The answers so far.
+    #[must_use]
+    pub fn results(&self) -> Vec<UntilResult> {
+        let of = |(setting, sequences): (&u32, &Vec<(RateSequence, Option<UntilResult>)>)| -> Vec<UntilResult> {
+            let each = self.limits.iter().zip(sequences);
+            each.map(|(limit, (sequence, result))| result.clone().unwrap_or_else(|| limit.result(*setting, sequence)))
+                .collect()
+        };
+        self.sequences.iter().flat_map(of).collect()
+    }
+}
+
+impl Until {
+    fn result(&self, setting: u32, sequence: &RateSequence) -> UntilResult {
+        let [low, high] = sequence.interval(self.level);
+        let answer = match () {
+            () if high < self.limit => Answer::Below,
+            () if low > self.limit => Answer::Above,
+            () => Answer::Open,
+        };
+        let [events, runs] = sequence.counts();
+        UntilResult { setting, until: self.to_string(), answer, events, runs, low, high }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::campaign::table_file::tests::{names, row};
+
+    fn stopping(limits: &[&str], n_seeds: u64, n_settings: u32) -> Stopping {
+        let limits: Vec<Until> = limits.iter().map(|text| text.parse().expect("a limit")).collect();
+        Stopping::new(&limits, (1..=n_seeds).collect(), (0..n_settings).collect(), &names())
+    }
+
+    fn refused_if(setting: u32, seed: u64, is_refused: bool) -> Row {
+        let status = if is_refused { RunStatus::Refused } else { RunStatus::Accepted };
+        Row { status, ..row(setting, seed) }
+    }
+
+    #[test]
+    fn a_limit_is_read_or_its_fault_is_named() {
+        let limit: Until = "contacts < 1e-3 at 99.9 %".parse().expect("a limit");
+        assert_eq!(limit.to_string(), "contacts < 0.001 at 99.9 %");
+        assert_eq!(limit.to_string().parse(), Ok(limit));
+        for (text, word) in [
+            ("contacts 1e-3 at 95 %", "`<`"),
+            ("contacts < 1e-3", "` at `"),
+            ("bumps < 1e-3 at 95 %", "not_accepted"),
+            ("contacts < 0 at 95 %", "1e-6 .. 0.9"),
+            ("contacts < nan at 95 %", "1e-6 .. 0.9"),
+            ("contacts < 0.1 at 95", "50 .. 99.999 %"),
+            ("contacts < 0.1 at 100 %", "50 .. 99.999 %"),
+        ] {
+            let problem = text.parse::<Until>().expect_err(text);
+            assert!(problem.contains(word) && problem.contains("contacts < 0.001 at 95 %"), "{problem}");
+        }
+    }
+
+    /// In whatever order rows come, the campaign ends at the same seed with the same answers.
+    #[test]
+    fn the_last_seed_does_not_depend_on_the_order_of_rows() {
+        let rows: Vec<Row> = (1..=400)
+            .flat_map(|seed| [refused_if(0, seed, seed % 50 == 7), refused_if(1, seed, seed % 2 == 0)])
+            .collect();
+        let run = |order: &dyn Fn(usize) -> usize| {
+            let mut stopping = stopping(&["refused < 0.2 at 95 %"], 400, 2);
+            for place in 0..rows.len() {
+                stopping.add(&rows[order(place)]);
+            }
+            (stopping.results(), stopping.beyond())
+        };
+        let (results, beyond) = run(&|place| place);
+        assert_eq!(results.iter().map(|result| result.answer).collect::<Vec<_>>(), [Answer::Below, Answer::Above]);
+        assert!(results[0].runs > 15 && beyond.len() > 300, "{results:?}");
+        let first = *beyond.first().expect("seeds that are left");
+        assert_eq!(first, results.iter().map(|result| result.runs).max().expect("two") + 1);
+        // 233 and 800 have no common divisor.
+        assert_eq!(run(&|place| (place * 233) % rows.len()), (results, beyond));
+    }
+
+    #[test]
+    fn without_enough_seeds_the_answer_is_open() {
+        let mut stopping = stopping(&["contacts < 0.001 at 95 %"], 20, 1);
+        (1..=20).for_each(|seed| stopping.add(&row(0, seed)));
+        assert!(!stopping.is_answered() && stopping.beyond().is_empty());
+        let [result] = &stopping.results()[..] else { panic!("one") };
+        assert_eq!((result.answer, result.runs), (Answer::Open, 20));
+        assert!(result.to_string().contains("more seeds are needed"), "{result}");
+    }
+}

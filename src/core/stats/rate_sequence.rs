@@ -1,0 +1,111 @@
+//! The rate of an event over runs, with an interval that holds however often one looks.
+//!
+//! A confidence sequence: the chance that the interval misses the true rate at any time at all is at most one minus its
+//! level, so that a campaign may stop as soon as the interval is narrow enough. By Ville's inequality for the ratio of
+//! the mixture of all rates under Jeffreys' prior, Beta(1/2, 1/2), to the likelihood of one rate (Robbins 1970; the
+//! mixture's predictions are those of Krichevsky and Trofimov 1981).
+
+/// Counts of runs with and without an event.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct RateSequence {
+    n_events: u64,
+    n_runs: u64,
+    /// Log of the mixture's likelihood of what was counted.
+    ln_mixture: f64,
+}
+
+/// Bisections of an interval's end: to the last bits.
+const BISECTIONS: usize = 60;
+
+impl RateSequence {
+    /// Counts one more run.
+    pub fn add(&mut self, has_event: bool) {
+        let same = if has_event { self.n_events } else { self.n_runs - self.n_events };
+        self.ln_mixture += ((same as f64 + 0.5) / (self.n_runs as f64 + 1.0)).ln();
+        self.n_events += u64::from(has_event);
+        self.n_runs += 1;
+    }
+
+    /// Runs with the event, and all runs.
+    #[must_use]
+    pub fn counts(&self) -> [u64; 2] {
+        [self.n_events, self.n_runs]
+    }
+
+    /// The interval of the rate at `level`, 0.95 for 95 %.
+    #[must_use]
+    pub fn interval(&self, level: f64) -> [f64; 2] {
+        let most = -(1.0 - level).ln();
+        let [events, others] = [self.n_events as f64, (self.n_runs - self.n_events) as f64];
+        let times_ln = |n: f64, x: f64| if n == 0.0 { 0.0 } else { n * x.ln() };
+        let is_inside = |rate: f64| self.ln_mixture - times_ln(events, rate) - times_ln(others, 1.0 - rate) < most;
+        let middle = if self.n_runs == 0 { 0.5 } else { events / self.n_runs as f64 };
+        [0.0, 1.0].map(|bound| {
+            let (mut inside, mut outside) = (middle, bound);
+            if is_inside(bound) {
+                return bound;
+            }
+            for _ in 0..BISECTIONS {
+                let half = 0.5 * (inside + outside);
+                *(if is_inside(half) { &mut inside } else { &mut outside }) = half;
+            }
+            outside
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::RngExt;
+
+    use super::*;
+    use crate::stats::stream_rng;
+
+    fn sequence(n_events: u64, n_runs: u64) -> RateSequence {
+        let mut sequence = RateSequence::default();
+        (0..n_runs).for_each(|k| sequence.add(k < n_events));
+        sequence
+    }
+
+    /// Looked at after each of 2000 runs, 300 times over: at most 5 % of sequences may ever miss the truth.
+    #[test]
+    fn the_interval_holds_however_often_one_looks() {
+        for (number, rate) in [0.002, 0.05, 0.5].into_iter().enumerate() {
+            let mut n_missed = 0;
+            for seed in 0..300 {
+                let mut rng = stream_rng(seed, &format!("rate sequence {number}"));
+                let mut sequence = RateSequence::default();
+                let is_missed = (0..2000).any(|_| {
+                    sequence.add(rng.random_range(0.0..1.0) < rate);
+                    let [low, high] = sequence.interval(0.95);
+                    !(low..=high).contains(&rate)
+                });
+                n_missed += u32::from(is_missed);
+            }
+            assert!(n_missed <= 15, "rate {rate}: {n_missed} of 300");
+        }
+    }
+
+    /// Against the closed form: the mixture's likelihood of s events in n runs is B(s + 1/2, n - s + 1/2) / B(1/2, 1/2).
+    #[test]
+    fn its_ends_are_where_the_ratio_says() {
+        // 1 event in 3 runs: B(1.5, 2.5) / B(0.5, 0.5) = (pi / 16) / pi.
+        assert!((sequence(1, 3).ln_mixture - (1.0_f64 / 16.0).ln()).abs() < 1e-12);
+        let none = sequence(0, 1000);
+        let [low, high] = none.interval(0.95);
+        assert_eq!(low, 0.0);
+        assert!((none.ln_mixture - 1000.0 * (1.0 - high).ln() - 20.0_f64.ln()).abs() < 1e-9, "{high}");
+        assert!((0.006..0.009).contains(&high), "{high}");
+        assert_eq!(RateSequence::default().interval(0.95), [0.0, 1.0]);
+        let [low, high] = sequence(100, 1000).interval(0.95);
+        assert!((0.06..0.08).contains(&low) && (0.12..0.14).contains(&high), "{low} {high}");
+    }
+
+    #[test]
+    fn the_order_of_events_does_not_matter() {
+        let mut other = RateSequence::default();
+        (0..40).for_each(|k| other.add(k % 8 == 7));
+        let (a, b) = (sequence(5, 40).interval(0.9), other.interval(0.9));
+        assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-12), "{a:?} {b:?}");
+    }
+}
