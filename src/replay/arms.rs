@@ -10,7 +10,7 @@ use crate::scene::ReplayScene;
 use crate::scenery::Mover;
 use crate::shapes::{Look, log_shapes, path_part, transform, vector};
 use crate::tracks::Tick;
-use armcal_core::kinematics::LinkPoses;
+use armcal_core::kinematics::{Attachment, LinkPoses};
 use armcal_core::spatial::{Base, Pose, Tool};
 use armcal_core::streams::{CaptureSet, JointAngles, MarkKind};
 
@@ -120,14 +120,17 @@ impl Arm {
     }
 }
 
-/// A line from the joint that moves a body to the next one, or to the tool: for a body of which no shape is known.
+/// Lines from the joint that moves a body to the next one, or to the tool, and to the camera that it carries: for a body
+/// of which no shape is known.
 fn log_skeleton(run: &ReplayScene, stream: &mut EntityLog, entity: &str, body: usize) {
-    let (chain, tool) = (&run.robot.chain, &run.robot.tool.mount);
+    let (chain, tool, camera) = (&run.robot.chain, &run.robot.tool.mount, &run.robot.camera.mount);
     let next = chain.joints().get(body).map(|joint| joint.parent_from_joint.translation.vector);
-    let end = next.or_else(|| (tool.n_joints == body).then_some(tool.link_from_frame.translation.vector));
-    if let Some(end) = end.filter(|end| end.norm() > 0.0) {
-        let line = LineStrips3D::new([[[0.0; 3], vector(&end)]]).with_radii([0.01]).with_colors([colors::SKELETON]);
-        stream.log_static(&format!("{entity}/skeleton"), &line);
+    let carried = |mount: &Attachment| (mount.n_joints == body).then_some(mount.link_from_frame.translation.vector);
+    let ends = next.or_else(|| carried(tool)).into_iter().chain(carried(camera));
+    let lines: Vec<_> = ends.filter(|end| end.norm() > 0.0).map(|end| [[0.0; 3], vector(&end)]).collect();
+    if !lines.is_empty() {
+        let lines = LineStrips3D::new(lines).with_radii([0.01]).with_colors([colors::SKELETON]);
+        stream.log_static(&format!("{entity}/skeleton"), &lines);
     }
 }
 
