@@ -224,18 +224,47 @@ fn bad_input_is_refused_with_file_and_key() {
     answer(program().args(["tagmap", "x.mcap"])).expect("usage", 2, &["--robot"]);
 }
 
+/// In the place of the size of tag 4.
+fn size_off_by_ten(hall: &Hall) -> String {
+    let place = hall.truth[4].translation.vector;
+    let rotation = hall.truth[4].rotation.scaled_axis();
+    format!(
+        "size: 1.0\n         pose:\n           position: {{x: {:?}, y: {:?}, z: {:?}}}\n           \
+         rotation: {{x: {:?}, y: {:?}, z: {:?}}}\n           position_noise: {{x: 0.001, y: 0.001, z: 0.001}}\n",
+        place.x, place.y, place.z, rotation.x, rotation.y, rotation.z
+    )
+}
+
+/// The page says what the table says, and what is wrong first; nothing of it comes from elsewhere.
+#[test]
+fn the_page_has_the_figures_of_the_table_and_the_warnings() {
+    let hall = Hall::new();
+    let page = hall.file("map.html");
+    let said = hall.map(&["--html", page.to_str().expect("text")]);
+    said.expect("a page", 0, &["2 (held)"]);
+    let text = read(&page);
+    let row = said.stdout.lines().find(|line| line.contains("│ 4 ")).expect("tag 4");
+    for cell in row.split(['│', '┆']).map(str::trim).filter(|cell| !cell.is_empty()) {
+        assert!(text.contains(&format!("<td>{cell}</td>")), "{cell}");
+    }
+    for word in ["The map can be used", "frame of `hall`", "From above", "reprojection", "<svg"] {
+        assert!(text.contains(word), "{word}");
+    }
+    for outside in [" src=", " href=", "@import", "url(", "<script", "http:", "https:"] {
+        assert!(!text.contains(outside), "{outside}");
+    }
+    edit(&hall.file("tagslam.yaml"), "size: 0.1\n", &size_off_by_ten(&hall));
+    hall.map(&["--html", page.to_str().expect("text")]).expect("off by ten", 3, &[]);
+    let text = read(&page);
+    let [refusal, warning] = ["Do not use the map", "size_m of tag 4 disagrees"].map(|word| text.find(word));
+    assert!(refusal.is_some() && refusal < warning, "{refusal:?} {warning:?}");
+}
+
 /// Size ten times too large, beside a tag of known distance.
 #[test]
 fn a_size_that_is_off_by_ten_is_warned_of() {
     let hall = Hall::new();
-    let place = hall.truth[4].translation.vector;
-    let rotation = hall.truth[4].rotation.scaled_axis();
-    let pose = format!(
-        "size: 1.0\n         pose:\n           position: {{x: {:?}, y: {:?}, z: {:?}}}\n           \
-         rotation: {{x: {:?}, y: {:?}, z: {:?}}}\n           position_noise: {{x: 0.001, y: 0.001, z: 0.001}}\n",
-        place.x, place.y, place.z, rotation.x, rotation.y, rotation.z
-    );
-    edit(&hall.file("tagslam.yaml"), "size: 0.1\n", &pose);
+    edit(&hall.file("tagslam.yaml"), "size: 0.1\n", &size_off_by_ten(&hall));
     let said = hall.map(&[]);
     said.expect("off by ten", 3, &["warning: size_m of tag 4 disagrees", "0.10"]);
 }

@@ -10,14 +10,14 @@ use comfy_table::{CellAlignment, Table};
 use crate::cli::exit::Exit;
 use crate::cli::stdout::{note, say};
 use crate::output;
+use crate::report::{TAG_COLUMNS, TagMapPage, fit_lines, group_title, tag_map_html, tag_rows};
 use armcal_belief::calib::surveyed;
 use armcal_belief::tagmap::files::{NamedCamera, TagFile, map_to_text, read_cameras, read_tags};
 use armcal_belief::tagmap::recording::{RecordedViews, read_views};
-use armcal_belief::tagmap::{Body, GroupFrame, MapInput, MapMode, MapSettings, TagMap, TagPrior, solve};
+use armcal_belief::tagmap::{Body, MapInput, MapMode, MapSettings, TagMap, TagPrior, solve};
 use armcal_core::log::{Completeness, TopicMap, scan_recording, topics};
 use armcal_core::robot::{self, Robot};
 use armcal_core::streams::Message;
-use armcal_core::text::counted;
 
 #[derive(Debug, Args)]
 pub(super) struct TagmapArgs {
@@ -41,6 +41,9 @@ pub(super) struct TagmapArgs {
     /// Where to write the map: .toml, or .yaml for TagSLAM
     #[arg(long)]
     out: Option<PathBuf>,
+    /// Write the map as a page (.html), with the tags drawn
+    #[arg(long, value_name = "FILE")]
+    html: Option<PathBuf>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -70,7 +73,7 @@ const MANY_DETECTIONS: usize = 1000;
 const MAX_REJECTED_SHARE: f64 = 0.2;
 
 pub(super) fn tagmap(args: &TagmapArgs) -> Result<Exit> {
-    args.out.as_deref().map(output::check_writable).transpose()?;
+    args.out.iter().chain(&args.html).try_for_each(|path| output::check_writable(path))?;
     let (cameras, tags, settings) = match (&args.robot, &args.camera, &args.tags) {
         (Some(folder), ..) => of_robot(&args.recording, &robot::load(folder)?)?,
         (None, Some(camera), Some(tags)) => of_files(camera, tags)?,
@@ -90,8 +93,16 @@ pub(super) fn tagmap(args: &TagmapArgs) -> Result<Exit> {
         let text = map_to_text(out, &map, &input).map_err(robot::RobotError::from)?;
         output::write_together(&[(out, text.as_bytes())])?;
     }
-    say(&describe(&map, &read, &cameras))?;
-    Ok(warn(&file.to_string(), &map, &read, &tags))
+    let sources: Vec<String> =
+        read.topics.iter().map(|(camera, topic)| format!("{topic} of camera {}", cameras[*camera].name)).collect();
+    let (warnings, is_sound) = warnings(&file.to_string(), &map, &read, &tags);
+    if let Some(out) = &args.html {
+        let page = TagMapPage { map: &map, file: &file.to_string(), sources: &sources, warnings: &warnings, is_sound };
+        output::write_together(&[(out, tag_map_html(&page).as_bytes())])?;
+    }
+    say(&describe(&map, &sources))?;
+    warnings.iter().for_each(|warning| note(format_args!("warning: {warning}")));
+    Ok(if is_sound { Exit::Ok } else { Exit::DataLost })
 }
 
 type Known = (Vec<NamedCamera>, TagFile, MapSettings);
@@ -145,92 +156,46 @@ fn of_files(camera: &Path, tags: &Path) -> Result<Known> {
 }
 
 /// Millimetres and degrees: people read it.
-fn describe(map: &TagMap, read: &RecordedViews, cameras: &[NamedCamera]) -> String {
+fn describe(map: &TagMap, sources: &[String]) -> String {
     let mut out = String::new();
     for (idx, group) in map.groups.iter().enumerate() {
-        let frame = match &group.frame {
-            GroupFrame::Body(name) => format!("frame of `{name}`"),
-            GroupFrame::Tag(id) => format!("frame of tag {id}: nothing ties these tags to the others"),
-        };
-        out.push_str(&format!("{frame}; {}, {}\n", counted(group.tags.len(), "tag"), counted(group.n_views, "view")));
+        out.push_str(&format!("{}\n", group_title(group)));
         let mut table = Table::new();
-        let header = [
-            "tag",
-            "size mm",
-            "x m",
-            "y m",
-            "z m",
-            "std x mm",
-            "std y mm",
-            "std z mm",
-            "std rot deg",
-            "views",
-            "rms px",
-        ];
-        table.load_preset(UTF8_FULL_CONDENSED).set_header(header);
-        for tag in map.tags.iter().filter(|tag| tag.group == idx) {
-            let position = tag.frame_from_tag.translation.vector;
-            let std = tag.position_std_m().map(|std| format!("{:.3}", std * 1e3));
-            let turn = tag.rotation_std_rad().into_iter().fold(0.0, f64::max).to_degrees();
-            let name = if tag.is_fixed { format!("{} (held)", tag.id) } else { tag.id.to_string() };
-            let mut row = vec![name, format!("{:.1}", tag.size_m * 1e3)];
-            row.extend(position.iter().map(|value| format!("{value:.5}")));
-            row.extend(std);
-            row.extend([format!("{turn:.3}"), tag.n_views.to_string(), format!("{:.4}", tag.rms_px)]);
+        table.load_preset(UTF8_FULL_CONDENSED).set_header(TAG_COLUMNS);
+        for row in tag_rows(map, idx) {
             table.add_row(row);
         }
-        for column in 1..header.len() {
+        for column in 1..TAG_COLUMNS.len() {
             if let Some(column) = table.column_mut(column) {
                 column.set_cell_alignment(CellAlignment::Right);
             }
         }
         out.push_str(&format!("{table}\n"));
     }
-    let used: Vec<String> =
-        read.topics.iter().map(|(camera, topic)| format!("{} of camera {}", topic, cameras[*camera].name)).collect();
-    out.push_str(&format!("detections   {} of {} used; {}\n", map.n_used, map.n_detections, used.join(", ")));
-    out.push_str(&format!(
-        "reprojection rms {:.4} px, median {:.4} px; with rejected ones rms {:.4} px\n",
-        map.rms_px, map.median_px, map.rms_all_px
-    ));
-    out.push_str(&format!(
-        "noise        chi-square {:.0} of {} degrees of freedom, corners' standard deviation times {:.3}\n",
-        map.chi_square, map.degrees_of_freedom, map.noise_scale
-    ));
-    let rejected: Vec<String> =
-        map.rejected_by_reason().iter().map(|(reason, n)| format!("{} {n}", reason.name())).collect();
-    let rejected = if rejected.is_empty() { "none".to_owned() } else { rejected.join(", ") };
-    out.push_str(&format!("rejected     {rejected}"));
-    out
+    let lines = fit_lines(map, sources).map(|(name, text)| format!("{name:12} {text}"));
+    out + &lines.join("\n")
 }
 
-/// Says on stderr what is wrong with data and map; how the command ends.
-fn warn(file: &str, map: &TagMap, read: &RecordedViews, tags: &TagFile) -> Exit {
+/// What is wrong with data and map, and whether the map is good nevertheless.
+fn warnings(file: &str, map: &TagMap, read: &RecordedViews, tags: &TagFile) -> (Vec<String>, bool) {
     let is_whole = read.completeness == Completeness::Whole;
+    let mut found = Vec::new();
     if !is_whole {
-        note(format_args!("warning: {file}: is not whole; what could be read is used"));
+        found.push(format!("{file}: is not whole; what could be read is used"));
     }
-    for (what, n) in &read.left_out {
-        note(format_args!("warning: {file}: {n} {what} left out"));
-    }
-    for key in &tags.ignored_keys {
-        note(format_args!("warning: {key} has no effect here"));
-    }
-    for warning in &map.scale_warnings {
-        note(format_args!("warning: {warning}"));
-    }
-    for warning in &map.warnings {
-        note(format_args!("warning: {warning}"));
-    }
+    found.extend(read.left_out.iter().map(|(what, n)| format!("{file}: {n} {what} left out")));
+    found.extend(tags.ignored_keys.iter().map(|key| format!("{key} has no effect here")));
+    found.extend(map.scale_warnings.iter().map(ToString::to_string));
+    found.extend(map.warnings.iter().cloned());
     if !map.has_converged {
-        note("warning: the fit did not come to rest");
+        found.push("the fit did not come to rest".to_owned());
     }
     let faults = map.rejected.iter().filter(|rejected| rejected.reason.is_fault()).count();
     let too_many = faults as f64 > MAX_REJECTED_SHARE * map.n_detections as f64;
     if too_many {
-        note(format_args!("warning: {file}: {faults} of {} detections rejected", map.n_detections));
+        found.push(format!("{file}: {faults} of {} detections rejected", map.n_detections));
     }
     let is_sound =
         is_whole && read.n_unreadable == 0 && !too_many && map.has_converged && map.scale_warnings.is_empty();
-    if is_sound { Exit::Ok } else { Exit::DataLost }
+    (found, is_sound)
 }

@@ -4,6 +4,7 @@
 //! network. `markdown` the replay's panel.
 //! All show the same figures. `inspection` is what a recording holds and what could be calibrated from it,
 //! `proposed_map` an input map for it.
+//! `tag_map` is a tag map as table and page.
 
 mod html;
 pub mod inspection;
@@ -12,9 +13,9 @@ mod online;
 pub mod proposed_map;
 mod summary;
 mod table;
+mod tag_map;
 
 pub use html::{About, Report, html};
-#[cfg(feature = "sim")]
 pub(crate) use html::{chart, page, panel};
 pub use markdown::markdown;
 pub use summary::{
@@ -22,3 +23,4 @@ pub use summary::{
     RunSummary, WorldSummary,
 };
 pub use table::table;
+pub use tag_map::{TAG_COLUMNS, TagMapPage, fit_lines, group_title, tag_map_html, tag_rows};

@@ -11,7 +11,7 @@ const MAP_PX: (u32, u32) = (440, 330);
 const NAME_SPACE: &str = " xmlns=\"http://www.w3.org/2000/svg\"";
 
 /// A series with its color.
-pub(super) fn series(name: &str, color: Color, style: Style, points: Vec<[f64; 2]>) -> Series {
+pub fn series(name: &str, color: Color, style: Style, points: Vec<[f64; 2]>) -> Series {
     Series { name: name.to_owned(), color: Some(color), style, points }
 }
 

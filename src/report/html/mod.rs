@@ -15,10 +15,8 @@ mod page;
 mod residuals;
 mod verdict;
 
-#[cfg(feature = "sim")]
-pub(crate) use figure::{figure as chart, panel};
+pub(crate) use figure::{figure as chart, panel, series};
 pub use page::html;
-#[cfg(feature = "sim")]
 pub(crate) use page::page;
 
 use crate::report::summary::RunSummary;
