@@ -61,7 +61,7 @@ fn background(lens: &CameraModel) -> Vec<u8> {
     let mut pixels = Vec::with_capacity(3 * width as usize * height as usize);
     for y in 0..height {
         for x in 0..width {
-            let inside = lens.unproject(&Vector2::new(f64::from(x), f64::from(y))).is_some();
+            let inside = lens.sees(&Vector2::new(f64::from(x), f64::from(y)));
             pixels.extend_from_slice(if inside { &[18, 34, 48] } else { &[4, 5, 6] });
         }
     }

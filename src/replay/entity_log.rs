@@ -6,12 +6,16 @@
 use std::collections::BTreeMap;
 
 use nalgebra::Isometry3;
+use rerun::external::arrow::array::{Array, ListArray};
+use rerun::external::arrow::buffer::{NullBuffer, OffsetBuffer};
+use rerun::external::arrow::datatypes::Field;
 use rerun::external::re_log_encoding::EncodeError;
 use rerun::external::re_log_types::external::re_tuid::Tuid;
-use rerun::log::{Chunk, ChunkId, RowId};
-use rerun::time::{TimeCell, TimePoint};
-use rerun::{AsComponents, Clear, EntityPath, SerializedComponentBatch};
+use rerun::log::{Chunk, ChunkId, RowId, TimeColumn};
+use rerun::time::{TimeCell, TimePoint, Timeline};
+use rerun::{AsComponents, Clear, EntityPath, SerializedComponentBatch, Transform3D};
 
+use crate::shapes::{quaternion, transform, vector};
 use crate::shown::Shown;
 
 /// The one timeline of a recording: seconds since its first log time.
@@ -24,7 +28,13 @@ const CHUNK_STRIDE: u64 = 1 << 16;
 pub(super) const IDENTITY_NANOS: u64 = 1_000_000_000;
 
 /// One row of an entity: time in nanoseconds, and data.
-type Row = (i64, Vec<SerializedComponentBatch>);
+type Row = (i64, RowData);
+
+/// What a row holds. Poses are by far the most: they become columns only when a chunk is full.
+enum RowData {
+    Batches(Vec<SerializedComponentBatch>),
+    Pose(Isometry3<f64>),
+}
 
 /// Rows of one entity; those of full chunks are packed, which takes a tenth of the memory.
 #[derive(Default)]
@@ -74,12 +84,24 @@ impl EntityLog {
 
     /// Logs data from `time_s` on.
     pub fn draw(&mut self, entity: &str, time_s: f64, what: &dyn AsComponents) {
+        self.push(entity, time_s, || RowData::Batches(what.as_serialized_batches()));
+    }
+
+    /// The entity has this pose in its parent from `time_s` on.
+    pub fn draw_pose(&mut self, entity: &str, time_s: f64, pose: &Isometry3<f64>) {
+        self.push(entity, time_s, || RowData::Pose(*pose));
+    }
+
+    fn push(&mut self, entity: &str, time_s: f64, data: impl FnOnce() -> RowData) {
         let nanos = (time_s * 1e9).round() as i64;
         if !self.is_new(entity, nanos) {
             return;
         }
-        let rows = self.rows.entry(entity.to_owned()).or_default();
-        rows.open.push((nanos, what.as_serialized_batches()));
+        if !self.rows.contains_key(entity) {
+            self.rows.insert(entity.to_owned(), Rows::default());
+        }
+        let Some(rows) = self.rows.get_mut(entity) else { return };
+        rows.open.push((nanos, data()));
         if rows.open.len() == CHUNK_ROWS
             && let Err(error) = rows.pack(entity, self.timeline, self.cell)
         {
@@ -91,7 +113,7 @@ impl EntityLog {
     pub fn clear(&mut self, entity: &str, time_s: f64) {
         let nanos = (time_s * 1e9).round() as i64;
         if self.is_new(&format!("{entity}, end"), nanos) {
-            let end = (nanos, Clear::flat().as_serialized_batches());
+            let end = (nanos, RowData::Batches(Clear::flat().as_serialized_batches()));
             self.ends.entry(entity.to_owned()).or_default().open.push(end);
         }
     }
@@ -154,16 +176,99 @@ impl Rows {
     /// Packs the open rows into chunks, whose identities are given later.
     fn pack(&mut self, entity: &str, timeline: &'static str, cell: fn(i64) -> TimeCell) -> Result<(), EncodeError> {
         let entity = EntityPath::parse_forgiving(entity);
-        let mut rows = std::mem::take(&mut self.open).into_iter().peekable();
-        while rows.peek().is_some() {
-            let id = Tuid::from_nanos_and_inc(IDENTITY_NANOS, 0);
-            let mut chunk = Chunk::builder_with_id(ChunkId::from_tuid(id), entity.clone());
-            for (n, (nanos, batches)) in rows.by_ref().take(CHUNK_ROWS).enumerate() {
-                let row_id = RowId::from_tuid(id.incremented_by(1 + n as u64));
-                chunk = chunk.with_serialized_batches(row_id, [(timeline, cell(nanos))], batches);
-            }
-            self.packed.push(chunk.build()?);
+        let mut rows = std::mem::take(&mut self.open);
+        while !rows.is_empty() {
+            let later = rows.split_off(rows.len().min(CHUNK_ROWS));
+            let is_pose = |row: &Row| matches!(row.1, RowData::Pose(_));
+            let chunk = if rows.iter().all(is_pose) { poses_chunk } else { batches_chunk };
+            self.packed.push(chunk(entity.clone(), timeline, cell, rows)?);
+            rows = later;
         }
         Ok(())
+    }
+}
+
+/// A chunk's identity until it has its own, and those of its rows.
+fn identities() -> (ChunkId, impl Iterator<Item = RowId>) {
+    let id = Tuid::from_nanos_and_inc(IDENTITY_NANOS, 0);
+    (ChunkId::from_tuid(id), (1u64..).map(move |n| RowId::from_tuid(id.incremented_by(n))))
+}
+
+fn batches_chunk(
+    entity: EntityPath,
+    timeline: &'static str,
+    cell: fn(i64) -> TimeCell,
+    rows: Vec<Row>,
+) -> Result<Chunk, EncodeError> {
+    let (id, row_ids) = identities();
+    let mut chunk = Chunk::builder_with_id(id, entity);
+    for ((nanos, data), row_id) in rows.into_iter().zip(row_ids) {
+        let batches = match data {
+            RowData::Batches(batches) => batches,
+            RowData::Pose(pose) => transform(&pose).as_serialized_batches(),
+        };
+        chunk = chunk.with_serialized_batches(row_id, [(timeline, cell(nanos))], batches);
+    }
+    Ok(chunk.build()?)
+}
+
+/// The same chunk of poses alone, column by column: row by row it takes ten times as long.
+fn poses_chunk(
+    entity: EntityPath,
+    timeline: &'static str,
+    cell: fn(i64) -> TimeCell,
+    rows: Vec<Row>,
+) -> Result<Chunk, EncodeError> {
+    let (id, row_ids) = identities();
+    let row_ids: Vec<RowId> = row_ids.take(rows.len()).collect();
+    let times: Vec<i64> = rows.iter().map(|(nanos, _)| cell(*nanos).value.get()).collect();
+    let times = TimeColumn::new(None, Timeline::new(timeline, cell(0).typ()), times.into());
+    let poses = || rows.iter().filter_map(|(_, data)| if let RowData::Pose(pose) = data { Some(pose) } else { None });
+    let columns = Transform3D::new()
+        .with_many_translation(poses().map(|pose| vector(&pose.translation.vector)))
+        .with_many_quaternion(poses().map(|pose| quaternion(&pose.rotation)));
+    let one_each = |batch: SerializedComponentBatch| {
+        let field = Field::new_list_field(batch.array.data_type().clone(), true);
+        let lengths = OffsetBuffer::from_lengths(std::iter::repeat_n(1, batch.array.len()));
+        let all = NullBuffer::new_valid(batch.array.len());
+        (batch.descriptor, ListArray::new(field.into(), lengths, batch.array, Some(all)))
+    };
+    let components = columns.as_serialized_batches().into_iter().map(one_each).collect();
+    let timelines = std::iter::once((*times.timeline().name(), times)).collect();
+    Ok(Chunk::from_native_row_ids(id, entity, None, &row_ids, timelines, components)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{UnitQuaternion, Vector3};
+
+    use super::*;
+
+    /// Written column by column, a chunk of poses has the bytes that it has row by row.
+    #[test]
+    fn a_chunk_of_poses_is_the_same_by_columns_as_by_rows() {
+        let pose = |n: i64| {
+            let turn = UnitQuaternion::from_scaled_axis(Vector3::new(0.1 * n as f64, -0.3, 0.2));
+            (n * 40_000_000, RowData::Pose(Isometry3::from_parts(Vector3::new(n as f64, 0.5, -1.0).into(), turn)))
+        };
+        let bytes =
+            |make: fn(EntityPath, &'static str, fn(i64) -> TimeCell, Vec<Row>) -> Result<Chunk, EncodeError>| {
+                let rows = (0..700).map(pose).collect();
+                let chunk = make(EntityPath::from("arm/link"), TIMELINE, TimeCell::from_duration_nanos, rows);
+                let message = chunk.expect("a chunk").to_arrow_msg().expect("a message");
+                let store = rerun::StoreId::new(rerun::StoreKind::Recording, "test", "test");
+                let mut out = Vec::new();
+                let options = rerun::external::re_log_encoding::EncodingOptions::PROTOBUF_COMPRESSED;
+                let version = rerun::build_info().version;
+                let mut encoder =
+                    rerun::external::re_log_encoding::Encoder::new_eager(version, options, &mut out).expect("");
+                encoder.do_not_emit_footer();
+                encoder.append(&rerun::log::LogMsg::ArrowMsg(store, message)).expect("it is encoded");
+                encoder.finish().expect("it ends");
+                drop(encoder);
+                out
+            };
+        let by_columns = bytes(poses_chunk);
+        assert!(by_columns.len() > 5_000 && by_columns == bytes(batches_chunk));
     }
 }

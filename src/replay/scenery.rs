@@ -55,7 +55,7 @@ impl Mover {
                 && last.rotation.angle_to(&pose.rotation) < SAME_RAD
         });
         if !same {
-            stream.draw(&self.entity, time_s, &transform(pose));
+            stream.draw_pose(&self.entity, time_s, pose);
             stream.note_pose(&self.entity, pose);
             self.last = Some(*pose);
         }

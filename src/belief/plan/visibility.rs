@@ -3,6 +3,7 @@
 use nalgebra::{Point3, Vector3};
 
 use crate::plan::clearance::ClearanceModel;
+use crate::plan::clearance::sight::Sights;
 use armcal_core::kinematics::LinkPoses;
 use armcal_core::robot::{GripperTag, Robot};
 use armcal_core::streams::JointAngles;
@@ -21,6 +22,9 @@ pub struct VisibilityModel {
     /// Kept free at the border of the image.
     pub border_px: f64,
 }
+
+/// Left out before a tag's corner, where its own plate is, m.
+const SIGHT_END_M: f64 = 0.01;
 
 impl Default for VisibilityModel {
     fn default() -> Self {
@@ -78,19 +82,18 @@ impl VisibilityModel {
             && armcal_core::optics::square_corners(tag.size_m).iter().all(|corner| {
                 let in_base = base_from_tag * corner;
                 self.in_image(robot, &(camera_from_base * in_base))
-                    && !clearance.blocks_sight(poses, &eye, &in_base.coords, 0.01)
+                    && !clearance.blocks_sight(poses, &eye, &in_base.coords, SIGHT_END_M)
             })
     }
 
     fn in_image(&self, robot: &Robot, in_camera: &Point3<f64>) -> bool {
         let lens = &robot.camera.lens;
-        let angle = in_camera.x.hypot(in_camera.y).atan2(in_camera.z);
         let [width, height] = lens.resolution_px().map(f64::from);
-        angle < lens.max_view_angle_rad() - self.edge_rad
-            && lens.project(&in_camera.coords).is_some_and(|pixel| {
-                (self.border_px..=width - self.border_px).contains(&pixel.x)
-                    && (self.border_px..=height - self.border_px).contains(&pixel.y)
-            })
+        let within_rad = lens.max_view_angle_rad() - self.edge_rad;
+        lens.project_within(&in_camera.coords, within_rad).is_some_and(|pixel| {
+            (self.border_px..=width - self.border_px).contains(&pixel.x)
+                && (self.border_px..=height - self.border_px).contains(&pixel.y)
+        })
     }
 
     /// What hides the first of the tags in view that something hides.
@@ -116,7 +119,7 @@ impl VisibilityModel {
         let (tag, eye) = (&robot.tags[idx], poses.frame(&robot.camera.mount).translation.vector);
         armcal_core::optics::square_corners(tag.size_m).iter().find_map(|corner| {
             let target = tag.base_from_tag.isometry() * corner;
-            clearance.sight_blocker(poses, [&eye, &target.coords], 0.01)
+            clearance.sight_blocker(poses, [&eye, &target.coords], SIGHT_END_M)
         })
     }
 
@@ -124,6 +127,13 @@ impl VisibilityModel {
     #[must_use]
     pub fn visible(&self, robot: &Robot, clearance: &ClearanceModel<'_>, angles: &JointAngles) -> Vec<usize> {
         let poses = robot.chain.link_poses(angles);
-        self.in_view(robot, &poses).filter(|&idx| self.tag_hidden_by(robot, clearance, &poses, idx).is_none()).collect()
+        let sights = Sights::new(clearance, &poses);
+        self.in_view(robot, &poses).filter(|&idx| !self.is_hidden(robot, &sights, idx)).collect()
+    }
+
+    /// Whether something hides a corner of a tag (by its index).
+    pub(crate) fn is_hidden(&self, robot: &Robot, sights: &Sights<'_>, idx: usize) -> bool {
+        let tag = &robot.tags[idx];
+        sights.hide(tag.base_from_tag.isometry(), &armcal_core::optics::square_corners(tag.size_m), SIGHT_END_M)
     }
 }

@@ -140,6 +140,30 @@ impl CameraModel {
         }
     }
 
+    /// The same of a point less than `within_rad` off the axis; `None` for others.
+    #[inline]
+    #[must_use]
+    pub fn project_within(&self, point_m: &Vector3<f64>, within_rad: f64) -> Option<Vector2<f64>> {
+        let radius_m = point_m.x.hypot(point_m.y);
+        let angle_rad = radius_m.atan2(point_m.z);
+        if angle_rad.partial_cmp(&within_rad) != Some(std::cmp::Ordering::Less) {
+            return None;
+        }
+        match (&self.port, &self.lens) {
+            (None, LensModel::Equidistant(lens)) => lens.project_at(point_m, radius_m, angle_rad),
+            _ => self.project(point_m),
+        }
+    }
+
+    /// Whether a pixel sees anything: whether [`Self::unproject`] has a direction for it.
+    #[must_use]
+    pub fn sees(&self, pixel_px: &Vector2<f64>) -> bool {
+        match (&self.port, &self.lens) {
+            (None, LensModel::Equidistant(lens)) => lens.radius_seen(pixel_px).is_some(),
+            _ => self.unproject(pixel_px).is_some(),
+        }
+    }
+
     /// Projection and d(pixel)/d(point), px/m; `None` where the lens does not see.
     #[inline]
     #[must_use]
@@ -323,6 +347,24 @@ mod tests {
                     let off = (by_intrinsics.column(k) - difference).norm();
                     prop_assert!(off < 1e-4 * (1.0 + difference.norm()), "{k}: {off}");
                 }
+            }
+        }
+
+        #[test]
+        fn what_is_within_an_angle_is_what_is_projected(x in -1.5f64..1.5, y in -1.5f64..1.5, z in -0.2f64..2.0) {
+            const WITHIN_RAD: f64 = 0.9;
+            let point = Vector3::new(x, y, z);
+            for camera in cameras() {
+                let is_within = x.hypot(y).atan2(z) < WITHIN_RAD;
+                prop_assert_eq!(camera.project_within(&point, WITHIN_RAD), camera.project(&point).filter(|_| is_within));
+            }
+        }
+
+        #[test]
+        fn what_sees_is_what_has_a_direction(x in -3000.0f64..4000.0, y in -3000.0f64..4000.0) {
+            let pixel = Vector2::new(x, y);
+            for camera in cameras() {
+                prop_assert_eq!(camera.sees(&pixel), camera.unproject(&pixel).is_some());
             }
         }
 

@@ -74,7 +74,12 @@ impl Fisheye {
     #[must_use]
     pub fn project(&self, point_m: &Vector3<f64>) -> Option<Vector2<f64>> {
         let r = point_m.x.hypot(point_m.y);
-        let theta = r.atan2(point_m.z);
+        self.project_at(point_m, r, r.atan2(point_m.z))
+    }
+
+    /// The same where the distance from the axis and the angle are known.
+    #[inline]
+    pub(super) fn project_at(&self, point_m: &Vector3<f64>, r: f64, theta: f64) -> Option<Vector2<f64>> {
         if theta > self.max_view_angle_rad || point_m.norm_squared() < 1e-18 {
             return None;
         }
@@ -147,15 +152,19 @@ impl Fisheye {
     /// The direction (camera frame, unit) that a pixel sees; `None` beyond the field of view.
     #[must_use]
     pub fn unproject(&self, pixel_px: &Vector2<f64>) -> Option<Unit<Vector3<f64>>> {
-        let mx = (pixel_px.x - self.center_px[0]) / self.focal_px[0];
-        let my = (pixel_px.y - self.center_px[1]) / self.focal_px[1];
-        let theta_d = mx.hypot(my);
-        if !theta_d.is_finite() || theta_d > self.distorted(self.max_view_angle_rad) {
-            return None;
-        }
+        let ([mx, my], theta_d) = self.radius_seen(pixel_px)?;
         let theta = self.undistorted(theta_d);
         let scale = if theta_d > 1e-12 { theta.sin() / theta_d } else { 1.0 };
         Some(Unit::new_normalize(Vector3::new(mx * scale, my * scale, theta.cos())))
+    }
+
+    /// A pixel over the focal lengths, and its distance from the axis there; `None` beyond the field of view.
+    pub(super) fn radius_seen(&self, pixel_px: &Vector2<f64>) -> Option<([f64; 2], f64)> {
+        let mx = (pixel_px.x - self.center_px[0]) / self.focal_px[0];
+        let my = (pixel_px.y - self.center_px[1]) / self.focal_px[1];
+        let theta_d = mx.hypot(my);
+        let is_seen = theta_d.is_finite() && theta_d <= self.distorted(self.max_view_angle_rad);
+        is_seen.then_some(([mx, my], theta_d))
     }
 
     /// Inverts [`Self::distorted`] by Newton's method kept inside a shrinking bracket, so that it cannot run away.

@@ -243,7 +243,11 @@ impl SensorModel {
         if !self.correction.terms.are_zero() {
             for _ in 0..STEPS {
                 let error = angle_rad - self.correction.angle_rad(spec, travel, departure, 0.0);
+                let before = travel;
                 travel += error / self.correction.gain;
+                if travel == before {
+                    break;
+                }
             }
         }
         travel

@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Point3};
 
-use crate::imaging::math::{Rgb, Vec3};
+use crate::imaging::math::{Rgb, Vec3, max};
 use crate::imaging::rays::Rays;
 use crate::imaging::shape::{Form, Lanes, Place};
 use armcal_core::spatial::{exp, log};
@@ -204,6 +204,12 @@ impl Form {
     }
 }
 
+/// The largest of several ranges.
+#[inline]
+pub(super) fn farthest<const N: usize>(range: &[f32; N]) -> f32 {
+    range.iter().fold(f32::NEG_INFINITY, |most, range| max(most, *range))
+}
+
 /// The nearest object on each of several rays at one time: range and number plus one.
 #[inline]
 pub(super) fn first_met<const N: usize>(
@@ -213,7 +219,7 @@ pub(super) fn first_met<const N: usize>(
 ) -> ([f32; N], [u16; N]) {
     let (mut range, mut number) = ([f32::INFINITY; N], [0; N]);
     for &(nearest_m, n) in candidates {
-        if range.iter().all(|range| *range < nearest_m) {
+        if farthest(&range) < nearest_m {
             break;
         }
         let object = &objects[n as usize];

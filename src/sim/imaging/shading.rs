@@ -180,8 +180,9 @@ impl Band<'_> {
             let [first, behind] = rays.spans[y];
             x0 >= first
                 && x1 <= behind
-                && self.faces[line.clone()].iter().all(|face| *face == own)
-                && self.swept.is_none_or(|swept| swept[line].iter().all(|mark| *mark == 0))
+                // Without a branch a pixel.
+                && self.faces[line.clone()].iter().fold(0, |other, face| other | (face ^ own)) == 0
+                && self.swept.is_none_or(|swept| swept[line].iter().fold(0, |any, mark| any | mark) == 0)
         })
     }
 
@@ -201,9 +202,9 @@ impl Band<'_> {
             return self.fill_ground(block, object, &corners.map(|(shade, _)| shade));
         }
         let radiance = corners.map(|(shade, albedo)| shade.radiance(&albedo));
-        for channel in 0..3 {
-            let corner = radiance.map(|rgb| rgb[channel]);
-            for y in top..bottom {
+        for y in top..bottom {
+            for channel in 0..3 {
+                let corner = radiance.map(|rgb| rgb[channel]);
                 let (start, step) = line(&corner, y - top, bottom - top, right - left);
                 let out = &mut self.planes[channel][y * width + left..y * width + right];
                 out.iter_mut().enumerate().for_each(|(k, value)| *value = start + step * k as f32);

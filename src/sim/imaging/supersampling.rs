@@ -1,7 +1,7 @@
 //! Radiance of a pixel on an edge: the mean over samples of position and time.
 
 use crate::imaging::math::{Rgb, Vec3};
-use crate::imaging::scene::{Appearance, FACE_BITS, Object, SAMPLES, first_met, offset};
+use crate::imaging::scene::{Appearance, FACE_BITS, Object, SAMPLES, farthest, first_met, offset};
 use crate::imaging::shader::Shade;
 use crate::imaging::shading::{Intersection, ShadeCache};
 use crate::imaging::shape::{Form, Lanes};
@@ -122,7 +122,7 @@ fn met_in_motion(
 ) -> ([f32; SAMPLES], [u16; SAMPLES]) {
     let (mut range, mut number) = ([f32::INFINITY; SAMPLES], [0; SAMPLES]);
     for &(nearest_m, n) in candidates {
-        if range.iter().all(|range| *range < nearest_m) {
+        if farthest(&range) < nearest_m {
             break;
         }
         let object = &objects[usize::from(n)];

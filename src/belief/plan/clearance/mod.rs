@@ -2,7 +2,7 @@
 //!
 //! `model` is the arm with its environment, `shapes` their collision shapes, `separation` the distance of two shapes,
 //! `pair` the tested pairs, `pair_distance` the distance that each pair needs; `self_collision` finds the pairs of
-//! links that can come near each other.
+//! links that can come near each other; `sight` says what stands on a line of sight.
 
 pub(crate) mod model;
 pub(crate) mod pair;
@@ -10,6 +10,7 @@ pub(crate) mod pair_distance;
 mod self_collision;
 pub(crate) mod separation;
 pub(crate) mod shapes;
+pub(crate) mod sight;
 
 pub use model::{ClearanceModel, ClosestPair, SELF_MARGIN_REDUCTION_M};
 pub use self_collision::{always_near, clear_angles, sample_self_pairs};

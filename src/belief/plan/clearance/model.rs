@@ -6,7 +6,6 @@
 
 use nalgebra::Vector3;
 use parry3d::math::{Pose3, Vec3};
-use parry3d::query;
 use parry3d::shape::SharedShape;
 
 use crate::plan::clearance::pair::Pair;
@@ -279,44 +278,6 @@ impl<'a> ClearanceModel<'a> {
             *slot = moving.placed(poses);
         }
         placed
-    }
-
-    /// Whether something stands on the line between two points of the base frame; `skip_m` is left out at its far end.
-    #[must_use]
-    pub fn blocks_sight(&self, poses: &LinkPoses, from_m: &Vector3<f64>, to_m: &Vector3<f64>, skip_m: f64) -> bool {
-        self.sight_blocker(poses, [from_m, to_m], skip_m).is_some()
-    }
-
-    /// The name of what stands there.
-    pub(crate) fn sight_blocker(
-        &self,
-        poses: &LinkPoses,
-        [from_m, to_m]: [&Vector3<f64>; 2],
-        skip_m: f64,
-    ) -> Option<&str> {
-        let sight = to_m - from_m;
-        let length = sight.norm();
-        let direction = sight / length.max(1e-9);
-        // The camera's own housing surrounds the start of the ray.
-        let near_m = 0.08;
-        let start = from_m + direction * near_m;
-        let ray = query::Ray::new(vec3(&start), vec3(&direction));
-        let reach = length - near_m - skip_m;
-        if reach <= 0.0 {
-            return None;
-        }
-        let hit = |pose: &Pose3, shape: &SharedShape| shape.cast_ray(pose, &ray, reach, true).is_some();
-        let beside = |center: &Vector3<f64>, radius_m: f64| {
-            let along = (center - start).dot(&direction).clamp(0.0, reach);
-            (center - (start + direction * along)).norm() > radius_m
-        };
-        let stands = |s: &&StaticShape| !beside(&s.center_m, s.radius_m) && hit(&s.placed.pose, &s.shape);
-        let moves = |m: &&LinkShape| {
-            let isometry = poses.link(m.body) * m.body_from_shape;
-            !beside(&isometry.translation.vector, m.radius_m) && hit(&parry_pose(&isometry), &m.shape)
-        };
-        let standing = self.standing.iter().find(stands).map(|s| s.name.as_str());
-        standing.or_else(|| self.moving.iter().find(moves).map(|m| m.name.as_str()))
     }
 }
 

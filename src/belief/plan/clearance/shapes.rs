@@ -77,9 +77,14 @@ impl LinkShape {
         self.placed_on(&parry_pose(poses.link(self.body)))
     }
 
+    /// The same with the shape itself there.
+    pub fn placed_at(&self, base_from_shape: &Pose3) -> Placed {
+        self.box_m.placed(base_from_shape)
+    }
+
     /// The same with its body in parry's terms.
     pub fn placed_on(&self, base_from_body: &Pose3) -> Placed {
-        self.box_m.placed(&(*base_from_body * self.body_from_shape_pose))
+        self.placed_at(&(*base_from_body * self.body_from_shape_pose))
     }
 }
 

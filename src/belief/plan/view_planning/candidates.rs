@@ -11,9 +11,10 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::plan::PlanError;
 use crate::plan::clearance::ClosestPair;
+use crate::plan::clearance::sight::Sights;
 use crate::plan::view_planning::camera_ik::CameraGoal;
 use crate::plan::view_planning::request::PoseRequest;
-use armcal_core::kinematics::JointLimits;
+use armcal_core::kinematics::{JointLimits, LinkPoses};
 use armcal_core::robot::Robot;
 use armcal_core::streams::{JointAngles, MAX_JOINTS};
 
@@ -88,8 +89,17 @@ pub(crate) struct Search<'a> {
     request: &'a PoseRequest<'a>,
     limits: Vec<JointLimits>,
     /// Joint errors in units of the bounds, -1..1.
-    arms: [[f64; MAX_JOINTS]; N_ARMS],
+    errors: [[f64; MAX_JOINTS]; N_ARMS],
+    /// Of the draw at hand.
+    arms: Vec<DrawnArm>,
     pub refused: InfeasibleCounts,
+}
+
+/// One of the arms that stand for the belief.
+struct DrawnArm {
+    poses: LinkPoses,
+    /// Tags in view, were there nothing to hide them.
+    in_view: Vec<usize>,
 }
 
 /// Joints from this one on do not move the camera; they stay where they are, but for those that turn a tag on the
@@ -106,7 +116,13 @@ fn shows_gripper_tag(robot: &Robot, joint: usize) -> bool {
 impl<'a> Search<'a> {
     pub(crate) fn new(request: &'a PoseRequest<'a>) -> Self {
         let limits = request.bounds.safe_limits(request.robot);
-        Self { request, limits, arms: arms(), refused: InfeasibleCounts::default() }
+        Self {
+            request,
+            limits,
+            errors: errors(),
+            arms: Vec::with_capacity(N_ARMS),
+            refused: InfeasibleCounts::default(),
+        }
     }
 
     /// Up to `enough` candidates.
@@ -215,7 +231,7 @@ impl<'a> Search<'a> {
             }
             return None;
         }
-        let tags = self.expected_tags(&angles);
+        let tags = self.expected_tags();
         if tags.iter().map(|(_, share)| share).sum::<f64>() < min_tags as f64 {
             // In view they are, for most arms.
             let blocker = request.visibility.hidden_by(robot, request.clearance, &angles).unwrap_or("the arm itself");
@@ -237,22 +253,31 @@ impl<'a> Search<'a> {
         self.request.detection_rate.get(tag).copied().unwrap_or(1.0).clamp(0.0, 1.0)
     }
 
-    /// Expected number of tags in view, were there nothing to hide them.
-    fn expected_in_view(&self, angles: &JointAngles) -> f64 {
+    /// Draws the arms; gives the expected number of tags in view, were there nothing to hide them.
+    fn expected_in_view(&mut self, angles: &JointAngles) -> f64 {
         let (robot, visibility) = (self.request.robot, self.request.visibility);
-        let sum = self.arms.iter().flat_map(|errors| {
-            let arm = self.arm(angles, errors);
-            visibility.in_view(robot, &robot.chain.link_poses(&arm))
-        });
-        sum.map(|tag| self.trust(tag)).sum::<f64>() / N_ARMS as f64
+        let mut arms = std::mem::take(&mut self.arms);
+        for (n, errors) in self.errors.iter().enumerate() {
+            let poses = robot.chain.link_poses(&self.arm(angles, errors));
+            if n == arms.len() {
+                arms.push(DrawnArm { poses, in_view: Vec::new() });
+            }
+            arms[n].poses = poses;
+            arms[n].in_view.clear();
+            arms[n].in_view.extend(visibility.in_view(robot, &poses));
+        }
+        self.arms = arms;
+        let seen = self.arms.iter().flat_map(|arm| &arm.in_view);
+        seen.map(|&tag| self.trust(tag)).sum::<f64>() / N_ARMS as f64
     }
 
-    /// Tags with the share of arms within the belief that see them there, times how far that can be trusted.
-    fn expected_tags(&self, angles: &JointAngles) -> Vec<(usize, f64)> {
-        let robot = self.request.robot;
+    /// Tags with the share of the drawn arms that see them, times how far that can be trusted.
+    fn expected_tags(&self) -> Vec<(usize, f64)> {
+        let (robot, visibility) = (self.request.robot, self.request.visibility);
         let mut count = vec![0usize; robot.tags.len()];
-        for errors in &self.arms {
-            for tag in self.request.visibility.visible(robot, self.request.clearance, &self.arm(angles, errors)) {
+        for DrawnArm { poses, in_view } in &self.arms {
+            let sights = Sights::new(self.request.clearance, poses);
+            for &tag in in_view.iter().filter(|&&tag| !visibility.is_hidden(robot, &sights, tag)) {
                 count[tag] += 1;
             }
         }
@@ -263,7 +288,7 @@ impl<'a> Search<'a> {
 
 /// Errors between the bounds by the distribution that the sum of a gain's and an offset's uniform error has: a
 /// triangle.
-fn arms() -> [[f64; MAX_JOINTS]; N_ARMS] {
+fn errors() -> [[f64; MAX_JOINTS]; N_ARMS] {
     let mut step = 1.0;
     let steps: [f64; MAX_JOINTS] = std::array::from_fn(|_| {
         step /= R8;

@@ -9,7 +9,7 @@ use nalgebra::{Cholesky, DMatrix, Matrix6, SMatrix, SymmetricEigen};
 
 use crate::calib::ParameterKind;
 use crate::plan::view_planning::parameter_prior::{N_COMMON, N_DIRECTIONS, ParameterPrior, WIDTH, columns};
-use crate::plan::view_planning::view_information::WhitenedView;
+use crate::plan::view_planning::view_information::{Twists, WhitenedView};
 use armcal_core::routine::PoseCriterion;
 use armcal_core::streams::MAX_JOINTS;
 
@@ -40,6 +40,14 @@ pub(crate) struct DesignState {
     linear: Linear,
     /// Logarithm of the measure, a variance.
     pub ln_value: f64,
+}
+
+/// Rows of `P E^T`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Rows {
+    All,
+    /// Those that `E P E^T` needs.
+    OfProducts,
 }
 
 /// Memory for [`DesignState::gain`].
@@ -92,7 +100,8 @@ impl DesignState {
     pub(crate) fn after(measure: DesignObjective, unknowns: &ParameterPrior, captured: &[WhitenedView]) -> Self {
         let mut state = Self::new(measure, unknowns);
         let mut scratch = state.scratch();
-        captured.iter().for_each(|view| state.take(view, &mut scratch));
+        captured.iter().for_each(|view| state.add(view, &mut scratch));
+        state.renew();
         state
     }
 
@@ -107,18 +116,20 @@ impl DesignState {
 
     /// Logarithm of the measure now less that after `view`: not negative.
     pub(crate) fn gain(&self, view: &WhitenedView, scratch: &mut Scratch) -> f64 {
-        let Some(half) = self.whitened(view, &mut scratch.by_joint) else { return 0.0 };
+        let Some(half) = self.whitened(view, &mut scratch.by_joint, Rows::OfProducts) else { return 0.0 };
         self.reach_along(view, &mut scratch.reached);
-        let (n_rows, _) = self.reach.shape();
-        let told = &mut scratch.told;
-        told.fill(0.0);
-        for direction in self.directions() {
-            let from = &scratch.reached.as_slice()[direction * n_rows..][..n_rows];
-            for k in 0..6 {
-                add_scaled(&mut told.as_mut_slice()[k * n_rows..][..n_rows], from, half[(k, direction)]);
+        let n_rows = self.reach.nrows();
+        let reached = scratch.reached.as_slice();
+        for k in 0..6 {
+            let mut terms = [(0, 0.0); N_DIRECTIONS];
+            let mut n = 0;
+            for direction in self.directions() {
+                terms[n] = (direction * n_rows, half[(k, direction)]);
+                n += 1;
             }
+            combine(&mut scratch.told.as_mut_slice()[k * n_rows..][..n_rows], reached, &terms[..n]);
         }
-        let after = self.ln_after(told);
+        let after = self.ln_after(&scratch.told);
         (self.ln_value - after).max(0.0)
     }
 
@@ -149,9 +160,15 @@ impl DesignState {
         }
     }
 
-    /// Takes `view`: its rank-6 update of the covariance.
+    /// Takes `view`: its rank-6 update of the covariance, and what follows from it.
     pub(crate) fn take(&mut self, view: &WhitenedView, scratch: &mut Scratch) {
-        let Some(half) = self.whitened(view, &mut scratch.by_joint) else { return };
+        self.add(view, scratch);
+        self.renew();
+    }
+
+    /// Takes `view` into the covariance alone: views may follow, and [`Self::renew`] has to before anything is asked.
+    pub(crate) fn add(&mut self, view: &WhitenedView, scratch: &mut Scratch) {
+        let Some(half) = self.whitened(view, &mut scratch.by_joint, Rows::All) else { return };
         let n = self.covariance.nrows();
         let mut moved = DMatrix::zeros(n, 6);
         let at = self.n_joints * WIDTH;
@@ -166,10 +183,10 @@ impl DesignState {
             }
         }
         self.covariance.gemm(-1.0, &moved, &moved.transpose(), 1.0);
-        self.renew();
     }
 
-    fn renew(&mut self) {
+    /// What the covariance means for the measure.
+    pub(crate) fn renew(&mut self) {
         self.reach = &self.measure.rows * &self.covariance;
         let linear = &self.reach * self.measure.rows.transpose();
         let n_rows = linear.nrows().max(1) as f64;
@@ -196,21 +213,22 @@ impl DesignState {
         (0..self.n_joints).chain(MAX_JOINTS..N_DIRECTIONS)
     }
 
-    /// `S^(-1/2) twists`, with `P E^T` of the joints in `by_joint`; `None` where S overflows.
-    fn whitened(
-        &self,
-        view: &WhitenedView,
-        by_joint: &mut DMatrix<f64>,
-    ) -> Option<crate::plan::view_planning::view_information::Twists> {
+    /// `S^(-1/2) twists`, with these rows of `P E^T` of the joints in `by_joint`; `None` where S overflows.
+    fn whitened(&self, view: &WhitenedView, by_joint: &mut DMatrix<f64>, rows: Rows) -> Option<Twists> {
         let n = self.covariance.nrows();
         let at = self.n_joints * WIDTH;
         let mut along = SMatrix::<f64, N_DIRECTIONS, N_DIRECTIONS>::zeros();
         let p = self.covariance.as_slice();
         for joint in 0..self.n_joints {
             let out = &mut by_joint.as_mut_slice()[joint * n..][..n];
-            out.fill(0.0);
-            for (k, by) in view.basis[joint].iter().enumerate() {
-                add_scaled(out, &p[(joint * WIDTH + k) * n..][..n], *by);
+            let mut terms = weighted(&view.basis[joint], joint * WIDTH * n, n);
+            match rows {
+                Rows::All => combine(out, p, &terms),
+                Rows::OfProducts => {
+                    combine(&mut out[..(joint + 1) * WIDTH], p, &terms);
+                    terms.iter_mut().for_each(|(from, _)| *from += at);
+                    combine(&mut out[at..], p, &terms);
+                }
             }
             for other in 0..=joint {
                 let dot = dot(&view.basis[other], &out[other * WIDTH..][..WIDTH]);
@@ -240,10 +258,7 @@ impl DesignState {
                 out.copy_from_slice(&reach[column * n_rows..][..n_rows]);
                 continue;
             }
-            out.fill(0.0);
-            for (k, by) in view.basis[direction].iter().enumerate() {
-                add_scaled(out, &reach[(direction * WIDTH + k) * n_rows..][..n_rows], *by);
-            }
+            combine(out, reach, &weighted(&view.basis[direction], direction * WIDTH * n_rows, n_rows));
         }
     }
 
@@ -259,10 +274,33 @@ fn largest(matrix: &Linear) -> f64 {
     values.max().max(1e-24).ln()
 }
 
-fn add_scaled(out: &mut [f64], from: &[f64], by: f64) {
-    for (out, from) in out.iter_mut().zip(from) {
-        *out += by * from;
+/// Columns of `n_rows` from `start` on, each with its weight.
+fn weighted(weights: &[f64; WIDTH], start: usize, n_rows: usize) -> [(usize, f64); WIDTH] {
+    std::array::from_fn(|k| (start + k * n_rows, weights[k]))
+}
+
+/// The sum of weighted columns, in the order of the terms: where each begins in `columns`, and its weight.
+fn combine(out: &mut [f64], columns: &[f64], terms: &[(usize, f64)]) {
+    let n_wide = combine_lanes::<8>(out, 0, columns, terms);
+    let n_pairs = combine_lanes::<2>(out, n_wide, columns, terms);
+    combine_lanes::<1>(out, n_pairs, columns, terms);
+}
+
+/// The same of as many whole lanes as there are from row `first` on; sums stay in registers. Gives the first row left.
+fn combine_lanes<const N: usize>(out: &mut [f64], first: usize, columns: &[f64], terms: &[(usize, f64)]) -> usize {
+    let (lanes, _) = out[first..].as_chunks_mut::<N>();
+    let mut row = first;
+    for lane in lanes {
+        let mut sum = [0.0; N];
+        for &(start, weight) in terms {
+            for (sum, from) in sum.iter_mut().zip(&columns[start + row..][..N]) {
+                *sum += weight * from;
+            }
+        }
+        *lane = sum;
+        row += N;
     }
+    row
 }
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {

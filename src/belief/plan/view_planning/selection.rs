@@ -148,9 +148,14 @@ impl ViewSelector<'_> {
 
     fn after(&self, order: &[usize]) -> DesignState {
         let mut design = self.design.clone();
-        let mut scratch = design.scratch();
-        order.iter().for_each(|&k| design.take(&self.whitened_views[k], &mut scratch));
+        self.add_all(&mut design, order);
+        design.renew();
         design
+    }
+
+    fn add_all(&self, design: &mut DesignState, order: &[usize]) {
+        let mut scratch = design.scratch();
+        order.iter().for_each(|&k| design.add(&self.whitened_views[k], &mut scratch));
     }
 
     fn time_s(&self, picks: &Picks) -> f64 {
@@ -158,13 +163,44 @@ impl ViewSelector<'_> {
     }
 
     pub(crate) fn exchanged(&self, mut picks: Picks) -> Picks {
+        // Where the last exchange of the round before was, and what that looked at: behind it nothing of that helped.
+        let mut looked_at: Option<(usize, Vec<usize>)> = None;
+        for _ in 0..MAX_ROUNDS {
+            let shortlist = self.shortlist(&picks);
+            let is_new = |k: &usize| looked_at.as_ref().is_none_or(|(_, before)| !before.contains(k));
+            let news: Vec<usize> = shortlist.iter().copied().filter(is_new).collect();
+            let mut helped_at = None;
+            // After the picks before the place.
+            let mut before = self.design.clone();
+            for place in 0..picks.order.len() {
+                let is_as_before = helped_at.is_none() && looked_at.as_ref().is_some_and(|(last, _)| place > *last);
+                let list = if is_as_before { &news } else { &shortlist };
+                if let Some(better) = self.exchange(&picks, place, &before, list) {
+                    if better.order[..place] != picks.order[..place] {
+                        before = self.design.clone();
+                        self.add_all(&mut before, &better.order[..place]);
+                    }
+                    picks = better;
+                    helped_at = Some(place);
+                }
+                self.add_all(&mut before, &picks.order[place..=place]);
+            }
+            let Some(last) = helped_at else { break };
+            looked_at = Some((last, shortlist));
+        }
+        picks
+    }
+
+    /// The same with all that was looked at before looked at anew.
+    #[cfg(test)]
+    pub(crate) fn exchanged_plainly(&self, mut picks: Picks) -> Picks {
         for _ in 0..MAX_ROUNDS {
             let shortlist = self.shortlist(&picks);
             let mut helped = false;
             for place in 0..picks.order.len() {
-                if let Some(better) = self.exchange(&picks, place, &shortlist) {
-                    picks = better;
-                    helped = true;
+                let before = self.after(&picks.order[..place]);
+                if let Some(better) = self.exchange(&picks, place, &before, &shortlist) {
+                    (picks, helped) = (better, true);
                 }
             }
             if !helped {
@@ -184,11 +220,14 @@ impl ViewSelector<'_> {
         gains.into_iter().take(SHORTLIST).map(|(_, k)| k).collect()
     }
 
-    /// The picks with one other in place of the one at `place`, if that is better.
-    fn exchange(&self, picks: &Picks, place: usize, shortlist: &[usize]) -> Option<Picks> {
+    /// The picks with one other in place of the one at `place`, if that is better; `before` is the state after the picks
+    /// before that.
+    fn exchange(&self, picks: &Picks, place: usize, before: &DesignState, shortlist: &[usize]) -> Option<Picks> {
         let out = picks.order[place];
         let rest = picks.without(place);
-        let design = self.after(&rest.order);
+        let mut design = before.clone();
+        self.add_all(&mut design, &rest.order[place..]);
+        design.renew();
         let mut scratch = design.scratch();
         let way_s = self.time_s(&rest) + self.view_s;
         let mut worth = |k: usize| {

@@ -174,6 +174,24 @@ fn exchange_never_makes_it_worse_and_greedy_beats_any_order() {
 /// The tool's variance is not submodular: what one view tells may need another. Stale gains then are no bounds, but the
 /// choice is worth about as much.
 #[test]
+fn exchange_leaves_out_what_it_looked_at_before_and_chooses_the_same() {
+    let site = Site::titan();
+    let clearance = site.clearance();
+    let request = site.request(&clearance);
+    let mut n_exchanged = 0;
+    for seed in 0..6 {
+        let pool = pool(&site, 200, seed);
+        let setup = DesignInputs::new(&request);
+        let picker = pool.picker(&request, &setup);
+        let greedy = picker.greedy(12);
+        let [quick, plain] = [picker.exchanged(greedy.clone()), picker.exchanged_plainly(greedy.clone())];
+        assert_eq!(quick.order, plain.order, "seed {seed}");
+        n_exchanged += usize::from(quick.order != greedy.order);
+    }
+    assert!(n_exchanged > 2, "{n_exchanged}: hardly anything is exchanged");
+}
+
+#[test]
 fn the_lazy_choice_is_worth_what_the_eager_one_is() {
     let site = Site::titan();
     let clearance = site.clearance();
