@@ -1,5 +1,8 @@
 //! Joint and frame names of a recording.
 
+/// The frame of the arm's base in our recordings.
+pub(super) const BASE_FRAME: &str = "base_link";
+
 /// What every message of a recording shares. It is written into the messages, not beside them.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RecordingHeader {
@@ -21,7 +24,7 @@ impl RecordingHeader {
     pub fn new(joint_names: Vec<String>) -> Self {
         Self {
             joint_names,
-            base_frame: "base_link".into(),
+            base_frame: BASE_FRAME.into(),
             camera_frame: "camera_wrist".into(),
             vehicle_frame: "vehicle".into(),
             tag_family: "tag36h11".into(),

@@ -92,10 +92,10 @@ pub(crate) struct Search<'a> {
     pub refused: InfeasibleCounts,
 }
 
-/// Joints from this one on do not move the camera; they stay where they are, but for those that turn a tag on the
-/// gripper.
+/// Joints from this one on do not move camera and tags against each other; they stay where they are, but for those that
+/// turn a tag on the gripper.
 fn n_seen(robot: &Robot) -> usize {
-    robot.camera.mount.n_joints
+    robot.n_seen_joints()
 }
 
 /// Whether a joint turns the tag on the gripper in the camera's view: then the views need many of its angles.
