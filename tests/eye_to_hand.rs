@@ -167,7 +167,10 @@ fn some_of_the_carried_tags_are_in_the_recording_with_their_link() {
     let routine = read(&root().join("routines/titan4-watched.toml"));
     let file = folder.path().join("some.toml");
     let routine = routine.replace("\"../robots/", &format!("\"{}/", root().join("robots").display()));
-    write(&file, &routine.replace("[site]", "[site]\ntags = [0, 1, 2, 3, 4, 5, 6]").replace("poses = 30", "poses = 12"));
+    write(
+        &file,
+        &routine.replace("[site]", "[site]\ntags = [0, 1, 2, 3, 4, 5, 6]").replace("poses = 30", "poses = 12"),
+    );
     let out = folder.path().join("run");
     run(&file, &out).expect("the loop", 0, &["ACCEPTED"]);
     let recording = read_recording(out.join("run.mcap")).expect("it reads");

@@ -85,7 +85,8 @@ pub fn bound_run(input: &BoundInput<'_>) -> Result<BoundRun, String> {
     let robot = &*surveyed(input.recording, input.robot);
     let data = associate(input.recording, robot);
     let views: Vec<View> = data.fit.into_iter().chain(data.held_out).collect();
-    let twin = has_bound(input.world).then(|| Twin::new(input, robot, &views)).transpose()?;
+    let built = &input.truth.header.as_built;
+    let twin = has_bound(input.world).then(|| Twin::of(robot, input.world, built, &views)).transpose()?;
     let scaled = input.calibration.scaled_robot(robot);
     let sensors = input.calibration.sensors(&scaled).map_err(|error| error.to_string())?;
     let predicted = input.calibration.parameter_covariance(&scaled);
@@ -136,8 +137,8 @@ struct Twin {
 }
 
 impl Twin {
-    fn new(input: &BoundInput<'_>, robot: &Robot, views: &[View]) -> Result<Self, String> {
-        let (world, built) = (input.world, &input.truth.header.as_built);
+    /// `robot`: nominal.
+    fn of(robot: &Robot, world: &WorldSpec, built: &AsBuilt, views: &[View]) -> Result<Self, String> {
         let robot = as_built(robot, world, built);
         let parameters = true_parameters(&built.joints);
         let views: Vec<View> = views.iter().map(|view| exact_view(&robot, world, &parameters, view)).collect();
@@ -371,4 +372,109 @@ pub fn bound_csv(worlds: &[(&str, &[BoundRun])]) -> String {
         }
     }
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use armcal_core::robot::load;
+    use armcal_core::routine::{Override, Overrides, load_with};
+    use armcal_core::time::SIMULATION_EPOCH;
+
+    fn root() -> &'static Path {
+        Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))
+    }
+
+    fn world(settings: &[&str]) -> WorldSpec {
+        let path = root().join("routines/titan4-watched.toml");
+        let set: Result<Vec<Override>, _> = settings.iter().map(|setting| setting.parse()).collect();
+        let overrides = Overrides { set: set.expect("settings"), ..Overrides::default() };
+        let routine = load_with(&path, &overrides).expect("the routine reads");
+        WorldSpec::from_table(&routine.world, &path).expect("a world")
+    }
+
+    #[test]
+    fn a_bound_is_for_worlds_as_modelled_alone() {
+        assert!(has_bound(&world(&AS_MODELLED)));
+        for left in 0..AS_MODELLED.len() {
+            let others: Vec<&str> = (0..AS_MODELLED.len()).filter(|k| *k != left).map(|k| AS_MODELLED[k]).collect();
+            assert!(!has_bound(&world(&others)), "{}", AS_MODELLED[left]);
+        }
+    }
+
+    /// Views of all tags, at angles spread over the joints' ranges.
+    fn views(robot: &Robot, n: usize) -> Vec<View> {
+        let mut rng = stream_rng(3, "views");
+        let view = |k: usize| {
+            let travel = JointAngles::from_fn(robot.n_joints(), |joint| {
+                rng.random_range(-0.7..0.7) * robot.sensors[joint].half_range_rad.min(1.3)
+            });
+            let mut view = View::of_reading(k as u32, SIMULATION_EPOCH, travel);
+            view.n_readings = 100;
+            let corners = MeanCorners { corners_px: [[0.0; 2]; 4], n_frames: 5, scatter_px2: 0.0 };
+            view.tags = (0..robot.tags.len())
+                .map(|tag_idx| TagObservation {
+                    id: robot.tags[tag_idx].id,
+                    tag_idx,
+                    center_in_camera_m: Vector3::zeros(),
+                    measured: TagMeasurement::Corners(corners),
+                })
+                .collect();
+            view
+        };
+        (0..n).map(view).collect()
+    }
+
+    /// The twin's readings are the true sensors': by the sensor's own equation the angle gives the reading back.
+    #[test]
+    fn true_parameters_are_those_of_the_sensors_as_built() {
+        let robot = load(&root().join("robots/titan4-watched")).expect("the robot reads");
+        let built = AsBuilt::draw(&robot, &world(&AS_MODELLED), 5);
+        let parameters = true_parameters(&built.joints);
+        for (joint, sensor) in built.joints.iter().enumerate() {
+            let angle_rad =
+                parameters.correction(joint).angle_rad(&robot.sensors[joint], 0.4, &ConditionChange::default(), 0.0);
+            let travel_rad = (1.0 + sensor.gain_error) * (angle_rad - sensor.center_rad) + sensor.offset_error_rad;
+            assert!((travel_rad - 0.4).abs() < 1e-12, "{}", sensor.name);
+        }
+    }
+
+    /// A bound falls as views come in and with less noise, and never below what the camera's place leaves open.
+    #[test]
+    fn the_bound_is_what_views_and_priors_leave() {
+        let world = world(&AS_MODELLED);
+        let robot = load(&root().join("robots/titan4-watched")).expect("the robot reads");
+        let built = AsBuilt::draw(&robot, &world, 5);
+        let bound_m = |n: usize, noise: f64| {
+            let mut world = world.clone();
+            world.camera.corner_noise_px *= noise;
+            let twin = Twin::of(&robot, &world, &built, &views(&robot, n)).expect("a bound");
+            let middle = JointAngles::from_fn(robot.n_joints(), |joint| robot.sensors[joint].center_rad);
+            twin.covariance.tool_position_m2(&twin.robot, &twin.sensors, &middle).trace().sqrt()
+        };
+        let [few, many, sharp] = [bound_m(6, 1.0), bound_m(40, 1.0), bound_m(40, 0.01)];
+        assert!(few > 1.2 * many && many > 1.02 * sharp, "{few} {many} {sharp}");
+        // The camera may have turned about the first joint's axis by 1 mrad, and nobody can tell.
+        assert!(sharp > 5e-4, "{sharp}");
+    }
+
+    #[test]
+    fn the_ratio_is_of_root_mean_squares_over_all_targets() {
+        let run = |seed: u64, pairs: &[[f64; 2]]| {
+            let target = |pair: &[f64; 2]| BoundTarget {
+                target_idx: 0,
+                at_rest_m2: pair[0],
+                predicted_m2: pair[1],
+                by_parameters_m2: Some(*pair),
+            };
+            BoundRun { seed, is_accepted: true, contacts: 0, views: 3, targets: pairs.iter().map(target).collect() }
+        };
+        let runs = [run(1, &[[4.0, 1.0], [1.0, 1.0]]), run(2, &[[4.0, 1.0]])];
+        let figures = BoundFigures::of(&runs).expect("targets");
+        assert!((figures.ratio - 3.0_f64.sqrt()).abs() < 1e-12);
+        assert!(figures.interval.low >= 2.5_f64.sqrt() - 1e-9 && figures.interval.high <= 2.0 + 1e-9);
+        assert_eq!(BoundFigures::of(&[]), None);
+    }
 }

@@ -135,8 +135,13 @@ impl Robot {
     /// The link that carries the tags before a camera that stands still; `None` for tags beside the arm.
     #[must_use]
     pub fn tag_link(&self) -> Option<&str> {
-        let carries = |place: &&Attachment| **place == self.tag_frame;
-        self.links.iter().filter(|_| self.is_watched()).find(|(_, place)| carries(place)).map(|(name, _)| name.as_str())
+        if !self.is_watched() {
+            return None;
+        }
+        // Links fixed to one that a joint moves may have its frame, too: the moved one is meant.
+        let moved = &self.bodies[self.tag_frame.n_joints].name;
+        let carries = |name: &&String| self.links.get(*name) == Some(&self.tag_frame);
+        std::iter::once(moved).chain(self.links.keys()).find(carries).map(String::as_str)
     }
 
     /// Whether the camera stands still beside the arm, which carries the tags (eye-to-hand).
