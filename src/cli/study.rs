@@ -9,6 +9,7 @@ use clap::{Args, Subcommand};
 
 use crate::cli::exit::Exit;
 use crate::cli::stdout::{note, say};
+use crate::cli::study_bound::{BoundArgs, bound};
 use crate::cli::study_dive::{DiveArgs, dive};
 use crate::cli::study_dive_faults::{DiveFaultsArgs, dive_faults};
 use crate::cli::study_falsified::{FalsifiedArgs, falsified};
@@ -55,6 +56,8 @@ enum Study {
     Falsified(FalsifiedArgs),
     /// Run a routine in worlds drawn from all that `[world]` allows, and look for what must not be
     Worlds(WorldsArgs),
+    /// Run a closed loop for several seeds, and compare the tool error with the Bayesian bound of the views
+    Bound(BoundArgs),
     /// Run a dive for several seeds, follow each recording online, and compare the belief with the truth at each task
     Dive(DiveArgs),
     /// Run dives with each kind of fault, and compare when it is named with when an oracle could tell it
@@ -97,6 +100,7 @@ pub(super) fn study(args: &StudyArgs) -> Result<Exit> {
         Study::Poses(args) => poses(args),
         Study::Falsified(args) => falsified(args),
         Study::Worlds(args) => worlds(args),
+        Study::Bound(args) => bound(args),
         Study::Dive(args) => dive(args),
         Study::DiveFaults(args) => dive_faults(args),
     }

@@ -177,7 +177,8 @@ fn draw_trail(run: &ReplayScene, stream: &mut EntityLog) {
     }
 }
 
-/// Camera position of each captured view: one colour for fitted views, one for held-out ones.
+/// Camera position of each captured view, before a camera that stands still that of the tags: one colour for fitted
+/// views, one for held-out ones.
 fn draw_captures(run: &ReplayScene, stream: &mut EntityLog) {
     let (mut places, mut shades) = (Vec::new(), Vec::new());
     let mut marks: Vec<_> = run.tracks.marks.iter().collect();
@@ -188,8 +189,9 @@ fn draw_captures(run: &ReplayScene, stream: &mut EntityLog) {
         }
         let MarkKind::Capture { set, .. } = mark.kind else { continue };
         let Some(angles) = run.shown_angles(mark.end_s) else { continue };
-        let camera = run.robot.chain.link_poses(&angles).frame(&run.robot.camera.mount);
-        places.push(vector(&camera.translation.vector));
+        let (camera, tags) = (&run.robot.camera.mount, &run.robot.tag_frame);
+        let moved = if run.robot.is_watched() { tags } else { camera };
+        places.push(vector(&run.robot.chain.frame(&angles, moved).translation.vector));
         shades.push(match set {
             CaptureSet::Fit => colors::FIT_VIEW,
             CaptureSet::HeldOut => colors::HELD_OUT_VIEW,

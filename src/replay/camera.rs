@@ -150,9 +150,10 @@ fn draw_expected(run: &ReplayScene, stream: &mut EntityLog) {
     let mut drawn: Option<Vec<Vec<[f32; 2]>>> = None;
     for Tick { time_s, is_drawn } in run.tracks.ticks_with_lead(VIEWS_HZ, 1) {
         let Some(angles) = run.tracks.believed.at(time_s) else { continue };
-        let base_from_camera = run.believed_poses(time_s, angles).frame(&run.robot.camera.mount);
+        let poses = run.believed_poses(time_s, angles).in_frame(&run.robot.tag_frame);
+        let tags_from_camera = poses.frame(&run.robot.camera.mount);
         let strips: Vec<_> =
-            run.robot.tags.iter().filter_map(|tag| expected_outline(run, &base_from_camera, tag)).collect();
+            run.robot.tags.iter().filter_map(|tag| expected_outline(run, &tags_from_camera, tag)).collect();
         if is_drawn && drawn.as_ref() != Some(&strips) {
             stream.draw(&entity, time_s, &LineStrips2D::update_fields().with_strips(strips.clone()));
         }
@@ -161,9 +162,9 @@ fn draw_expected(run: &ReplayScene, stream: &mut EntityLog) {
 }
 
 /// The outline of a tag in the image, rounded to a tenth of a pixel; `None` if the camera cannot see it.
-fn expected_outline(run: &ReplayScene, base_from_camera: &Isometry3<f64>, tag: &SurveyedTag) -> Option<Vec<[f32; 2]>> {
+fn expected_outline(run: &ReplayScene, tags_from_camera: &Isometry3<f64>, tag: &SurveyedTag) -> Option<Vec<[f32; 2]>> {
     let lens = &run.robot.camera.lens;
-    let camera_from_tag = base_from_camera.inv_mul(tag.base_from_tag.isometry());
+    let camera_from_tag = tags_from_camera.inv_mul(tag.base_from_tag.isometry());
     let normal = camera_from_tag.rotation * Vector3::z();
     if normal.dot(&camera_from_tag.translation.vector) >= 0.0 {
         return None;

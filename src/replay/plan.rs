@@ -248,9 +248,10 @@ fn draw_expected_tags(input: &PlanInput<'_>, stream: &mut EntityLog) {
     let mut since_s = 0.0;
     for pose in &input.plan.pose {
         let (mut centers, mut sizes, mut turns, mut shades) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        let base_from_tags = input.robot.base_from_tags(&JointAngles::from_slice(&pose.angles_rad));
         for expected in &pose.tags {
             let Some(tag) = input.robot.tag(expected.id) else { continue };
-            let place = tag.base_from_tag.isometry();
+            let place = base_from_tags * tag.base_from_tag.isometry();
             centers.push(vector(&place.translation.vector));
             turns.push(quaternion(&place.rotation));
             let half_m = (0.75 * tag.size_m) as f32;

@@ -34,7 +34,9 @@ pub(super) fn frame(run: &ReplayScene) -> Viewpoint {
             points.push(poses.frame(&run.robot.tool.mount).translation.vector);
         }
     }
-    points.extend(run.robot.tags.iter().map(|tag| tag.base_from_tag.origin().vector()));
+    // Tags that the arm carries are where its links are.
+    let beside = run.robot.tags.iter().filter(|_| !run.robot.is_watched());
+    points.extend(beside.map(|tag| tag.base_from_tag.origin().vector()));
     points.extend(run.tracks.task.iter().flat_map(|(_, task)| task.targets_m.iter().map(|t| Vector3::from(*t))));
     points.push(Vector3::zeros());
     // The axes of the picture: towards the viewer, to its right and up.

@@ -7,8 +7,9 @@
 //! methods, and `sensitivity` its Figures 4 and 7; `poses`: error over poses and the arm's time, by how the poses are
 //! chosen; armcal-charts draws them. `falsified`: the verdict where drawing, survey or a sensor is wrong. `edges`:
 //! certified edges against brute force; `paths`: planning between random poses; `worlds`: closed loops in any world
-//! allowed; `dive`: the online belief over a dive, `dive_faults`: when it names what happens there.
+//! allowed; `bound`: closed loops against the Bayesian bound of their views; `dive`: the online belief over a dive, `dive_faults`: when it names what happens there.
 
+mod bound;
 mod dive;
 mod dive_faults;
 mod edges;
@@ -24,6 +25,7 @@ mod tracking_error;
 mod trials;
 mod worlds;
 
+pub use bound::{AS_MODELLED, BoundFigures, BoundInput, BoundRun, BoundTarget, bound_csv, bound_run, bound_table};
 pub use dive::{AtStart, DiveStudy, DiveTask, dive_csv, dive_study, dive_table};
 pub use dive_faults::{
     DiveFault, DiveFaultKind, DiveFaultRow, dive_fault_study, dive_faults_csv, dive_faults_table, drawn_dive_fault,

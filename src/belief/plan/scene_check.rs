@@ -63,9 +63,10 @@ impl SceneCheck<'_> {
     }
 
     fn tags_inside(&self) -> Vec<String> {
+        let base_from_tags = self.robot.base_from_tags(&self.robot.stowed);
         let inside = |tag: &armcal_core::robot::SurveyedTag| {
             let holder = square_corners(tag.size_m).iter().find_map(|corner| {
-                let at = tag.base_from_tag.isometry() * corner;
+                let at = base_from_tags * tag.base_from_tag.isometry() * corner;
                 self.clearance.holder(&at.coords, INSIDE_M)
             })?;
             Some(format!("tag {}: a corner is inside `{holder}`", tag.id))

@@ -1,6 +1,6 @@
 //! Which tags a pose is expected to see.
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Isometry3, Point3, Vector3};
 
 use crate::plan::clearance::ClearanceModel;
 use crate::plan::clearance::sight::Sights;
@@ -39,9 +39,10 @@ impl VisibilityModel {
 
     /// Indices of the surveyed tags that `robot` at `angles` sees, occlusion not yet considered.
     pub fn in_view<'a>(&'a self, robot: &'a Robot, poses: &LinkPoses) -> impl Iterator<Item = usize> + use<'a> {
-        let base_from_camera = poses.frame(&robot.camera.mount);
-        let camera_from_base = base_from_camera.inverse();
-        let eye = base_from_camera.translation.vector;
+        // All in the frame of the tags, which the arm may carry.
+        let tags_from_camera = camera_in_tags(robot, poses);
+        let camera_from_tags = tags_from_camera.inverse();
+        let eye = tags_from_camera.translation.vector;
         robot
             .tags
             .iter()
@@ -54,7 +55,7 @@ impl VisibilityModel {
                 let incidence_ok = normal.dot(&sight) > range_m * self.max_incidence_rad.cos();
                 (self.min_range_m..=self.max_range_m).contains(&range_m) && incidence_ok && {
                     armcal_core::optics::square_corners(tag.size_m).iter().all(|corner| {
-                        let in_camera = camera_from_base * (tag.base_from_tag.isometry() * corner);
+                        let in_camera = camera_from_tags * (tag.base_from_tag.isometry() * corner);
                         self.in_image(robot, &in_camera)
                     })
                 }
@@ -117,8 +118,9 @@ impl VisibilityModel {
         idx: usize,
     ) -> Option<&'a str> {
         let (tag, eye) = (&robot.tags[idx], poses.frame(&robot.camera.mount).translation.vector);
+        let base_from_tag = robot.base_from_tags_at(poses) * tag.base_from_tag.isometry();
         armcal_core::optics::square_corners(tag.size_m).iter().find_map(|corner| {
-            let target = tag.base_from_tag.isometry() * corner;
+            let target = base_from_tag * corner;
             clearance.sight_blocker(poses, [&eye, &target.coords], SIGHT_END_M)
         })
     }
@@ -128,12 +130,58 @@ impl VisibilityModel {
     pub fn visible(&self, robot: &Robot, clearance: &ClearanceModel<'_>, angles: &JointAngles) -> Vec<usize> {
         let poses = robot.chain.link_poses(angles);
         let sights = Sights::new(clearance, &poses);
-        self.in_view(robot, &poses).filter(|&idx| !self.is_hidden(robot, &sights, idx)).collect()
+        self.in_view(robot, &poses).filter(|&idx| !self.is_hidden(robot, &poses, &sights, idx)).collect()
     }
 
     /// Whether something hides a corner of a tag (by its index).
-    pub(crate) fn is_hidden(&self, robot: &Robot, sights: &Sights<'_>, idx: usize) -> bool {
+    pub(crate) fn is_hidden(&self, robot: &Robot, poses: &LinkPoses, sights: &Sights<'_>, idx: usize) -> bool {
         let tag = &robot.tags[idx];
-        sights.hide(tag.base_from_tag.isometry(), &armcal_core::optics::square_corners(tag.size_m), SIGHT_END_M)
+        let base_from_tag = robot.base_from_tags_at(poses) * tag.base_from_tag.isometry();
+        sights.hide(&base_from_tag, &armcal_core::optics::square_corners(tag.size_m), SIGHT_END_M)
+    }
+}
+
+/// The camera in the frame of the tags.
+fn camera_in_tags(robot: &Robot, poses: &LinkPoses) -> Isometry3<f64> {
+    let base_from_camera = poses.frame(&robot.camera.mount);
+    if robot.is_watched() { poses.frame(&robot.tag_frame).inv_mul(&base_from_camera) } else { base_from_camera }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plan::view_planning::fixture::{clearance_of, vehicle, watched_titan};
+    use armcal_core::kinematics::Attachment;
+    use armcal_core::robot::TagSurvey;
+    use armcal_core::spatial::Pose;
+    use armcal_core::stats::stream_rng;
+    use rand::RngExt;
+
+    /// Tags that the arm carries are seen as tags that stand where it carries them.
+    #[test]
+    fn carried_tags_are_seen_where_they_are() {
+        let (robot, vehicle) = (watched_titan(), vehicle());
+        let clearance = clearance_of(&robot, &vehicle);
+        let (visibility, mut rng) = (VisibilityModel::default(), stream_rng(5, "configurations"));
+        let (mut in_view, mut visible) = (0, 0);
+        for _ in 0..300 {
+            let angles = JointAngles::from_fn(robot.n_joints(), |j| {
+                let sensor = &robot.sensors[j];
+                sensor.center_rad + rng.random_range(-0.9..0.9) * sensor.half_range_rad.min(1.5)
+            });
+            let poses = robot.chain.link_poses(&angles);
+            let mut tags = robot.tags.clone();
+            for tag in &mut tags {
+                tag.base_from_tag = Pose::from_isometry(poses.frame(&robot.tag_frame) * tag.base_from_tag.isometry());
+            }
+            let still = TagSurvey { base_tag: robot.base_tag, frame: Attachment::base(), family: None, tags };
+            let still = robot.clone().with_survey(still);
+            let of = |robot: &Robot| visibility.in_view(robot, &poses).collect::<Vec<_>>();
+            assert_eq!(of(&robot), of(&still));
+            let shown = visibility.visible(&robot, &clearance, &angles);
+            assert_eq!(shown, visibility.visible(&still, &clearance, &angles));
+            (in_view, visible) = (in_view + of(&robot).len(), visible + shown.len());
+        }
+        assert!(visible > 100 && in_view > visible + 20, "{in_view} in view, {visible} of them not hidden");
     }
 }

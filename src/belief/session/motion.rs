@@ -251,7 +251,7 @@ impl<'b> Driver<'b> {
     /// The tags, where the vehicle brings its own: the estimator has nothing but the recording and the robot's file.
     pub fn record_survey(&mut self, vehicle: &Vehicle) -> Result<(), SessionError> {
         let Some(survey) = &vehicle.survey else { return Ok(()) };
-        self.record(&Message::Survey(RecordedSurvey::new(self.arm.now(), survey)))
+        self.record(&Message::Survey(RecordedSurvey::new(self.arm.now(), survey, self.robot.tag_link())))
     }
 
     /// What the operator says of the arm goes the way of all that the estimator knows.

@@ -2,6 +2,9 @@
 
 use crate::optics::TagFamily;
 
+/// The frame of the arm's base in our recordings.
+pub(super) const BASE_FRAME: &str = "base_link";
+
 /// What every message of a recording shares. It is written into the messages, not beside them.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RecordingHeader {
@@ -23,7 +26,7 @@ impl RecordingHeader {
     pub fn new(joint_names: Vec<String>) -> Self {
         Self {
             joint_names,
-            base_frame: "base_link".into(),
+            base_frame: BASE_FRAME.into(),
             camera_frame: "camera_wrist".into(),
             vehicle_frame: "vehicle".into(),
             tag_family: TagFamily::default().long_name().into(),

@@ -92,7 +92,12 @@ pub fn one_of_each() -> Vec<Message> {
             tip_radius_m: 0.04,
             std_m: 0.001,
         }),
-        Message::Survey(RecordedSurvey { stamp, base_tag: 12, tags: vec![tag_at(3, 1.1), tag_at(12, -0.2)] }),
+        Message::Survey(RecordedSurvey {
+            stamp,
+            link: None,
+            base_tag: 12,
+            tags: vec![tag_at(3, 1.1), tag_at(12, -0.2)],
+        }),
     ];
     messages.extend(marks(stamp));
     messages.extend([LogLevel::Debug, LogLevel::Info, LogLevel::Warn, LogLevel::Error].map(log));

@@ -48,7 +48,9 @@ impl Described {
             fixed.push(FixedFrame { parent: VEHICLE.to_owned(), child: tree.root.clone(), parent_from_child });
         }
         // The link that carries the tags; its frame is that of the tags.
-        let carrier = robot.links.iter().find(|(_, place)| **place == robot.tag_frame).map(|(name, _)| name);
+        let fixed_to =
+            || robot.links.iter().find(|(_, place)| **place == robot.tag_frame).map(|(name, _)| name.as_str());
+        let carrier = robot.tag_link().or_else(fixed_to);
         for tag in robot.tags.iter().filter(|tag| tag.is_known()) {
             let (name, Some(carrier)) = (tag_frame_name(robot.tag_family, tag.id), carrier) else { continue };
             if names.contains(name.as_str()) {
@@ -62,7 +64,7 @@ impl Described {
             };
             add_link(&mut added, &name, &[&plate]);
             let parent_from_child = *tag.base_from_tag.isometry();
-            fixed.push(FixedFrame { parent: carrier.clone(), child: name, parent_from_child });
+            fixed.push(FixedFrame { parent: carrier.to_owned(), child: name, parent_from_child });
         }
         for (number, frame) in fixed.iter().enumerate() {
             add_joint(&mut added, number, frame);

@@ -1,5 +1,6 @@
 //! The file robot.toml and its checks.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use nalgebra::{Isometry3, Vector3};
@@ -15,7 +16,7 @@ use super::geometry::GeometryPriors;
 use super::gripper::GripperFile;
 use super::gripper_tag::GripperTagFile;
 use super::joint_sensor::{SensorFile, check_sensors};
-use super::nominal::{BASE_TAG, Robot, STOWED, ToolSpec, check_stowed, lens_issue};
+use super::nominal::{BASE_TAG, Robot, STOWED, TAG_LINK, ToolSpec, check_stowed, lens_issue};
 use super::self_collision::{self, Stored};
 use super::shape::{PlacedShape, Shape};
 use super::survey::{TagFile, check_tags};
@@ -34,6 +35,7 @@ struct RobotFile {
     urdf: PathBuf,
     base_link: String,
     base_tag: Option<u32>,
+    tag_link: Option<String>,
     stowed_rad: Option<Vec<f64>>,
     #[serde(default)]
     collision_meshes: CollisionMeshes,
@@ -156,8 +158,9 @@ fn planning_issues(file: &Path, raw: &RobotFile, camera: &CameraSpec, arm: &Urdf
     if !camera.lens.is_known() {
         issues.push(lens_issue(file));
     }
-    if camera.mount.n_joints == 0 {
-        let problem = "no joint moves it; run and plan need a camera that the arm carries";
+    if camera.mount.n_joints == 0 && raw.tag_link.is_none() {
+        let problem = "no joint moves it; run and plan need a camera that the arm carries, or tags that it carries \
+                       before this one (tag_link)";
         issues.push(FileIssue::new(file, "[camera] link", problem));
     }
     let mut ignored: Vec<&str> = arm.collision_meshes().iter().map(|mesh| mesh.link).collect();
@@ -201,9 +204,14 @@ fn robot_of(folder: &Path, raw: RobotFile, urdf: UrdfModel, meshes: Meshes) -> R
         add_tip(&mut bodies[tool.n_joints], tool.link_from_frame, radius_m);
     }
     let (tags, family) = check_tags(&file, &raw.tag, raw.base_tag, &Pose::<Base, Base>::identity())?;
+    let tag_frame = raw.tag_link.as_ref().map(|link| check_tag_link(&file, link, &links, &camera)).transpose()?;
     let gripper_tag = raw.gripper_tag.map(|tag| tag.check(&file, &arm, &camera.mount)).transpose()?;
     if let Some(tag) = &gripper_tag {
         tag.check_beside(&file, &tags, family)?;
+        if tag_frame.is_some() {
+            let problem = "does not go together with [gripper_tag]: name that tag as a [[tag]], too";
+            return Err(FileIssue::new(&file, TAG_LINK, problem).into());
+        }
     }
     let geometry = raw.geometry.check(&file)?;
     let buoyancy_fraction = FileIssue::check_range(&file, "buoyancy_fraction", raw.buoyancy_fraction, 0.0..=0.95)?;
@@ -231,10 +239,28 @@ fn robot_of(folder: &Path, raw: RobotFile, urdf: UrdfModel, meshes: Meshes) -> R
         geometry,
         camera,
         tags,
-        tag_frame: Attachment::base(),
+        tag_frame: tag_frame.unwrap_or_else(Attachment::base),
         tag_family: family.or(gripper_tag.map(|tag| tag.family)).unwrap_or_default(),
         links,
     })
+}
+
+/// The frame of the tags that the arm carries on `link`.
+fn check_tag_link(
+    file: &Path,
+    link: &str,
+    links: &BTreeMap<String, Attachment>,
+    camera: &CameraSpec,
+) -> Result<Attachment, FileIssue> {
+    let issue = |problem: &str| Err(FileIssue::new(file, TAG_LINK, format!("is `{link}`; {problem}")));
+    match links.get(link) {
+        None => issue("no link between base and tool or camera is called so"),
+        Some(place) if place.n_joints == 0 => issue("no joint moves it: leave the key out for tags beside the arm"),
+        Some(_) if camera.mount.n_joints > 0 => {
+            issue("the arm moves the camera ([camera] link); tags on the arm are for a camera that stands still")
+        }
+        Some(place) => Ok(*place),
+    }
 }
 
 fn file_name(urdf: &Path) -> String {

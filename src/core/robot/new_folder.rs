@@ -325,8 +325,9 @@ const LENS: &str = "# For images, for corners of tags, and for run and plan: the
 
 const STANDING: &str =
     "# No joint moves this link: the camera stands still and sees tags or a board that the arm carries. The
-# tag map says where they are, in the frame of the arm's link that carries them. Left to fill in: where the camera is
-# on its link (optical frame: x right, y down, z forward), and how well that is known, one sigma per axis.
+# tag map says where they are, in the frame of the arm's link that carries them; for run and plan that link is named
+# at the top of this file (tag_link = \"LINK\"), and the [[tag]]s below are in its frame. Left to fill in: where the
+# camera is on its link (optical frame: x right, y down, z forward), and how well that is known, one sigma per axis.
 position_m = [0.0, 0.0, 0.0]
 quaternion_wxyz = [1.0, 0.0, 0.0, 0.0]
 mount_std_m = 0.1

@@ -19,7 +19,7 @@ use super::self_pairs::SelfPairs;
 use super::survey::{SurveyedTag, TagSurvey};
 use super::vehicle::Vehicle;
 use crate::joints::JointAngles;
-use crate::kinematics::{Attachment, Chain};
+use crate::kinematics::{Attachment, Chain, LinkPoses};
 use crate::optics::TagFamily;
 
 /// The nominal arm: drawing, datasheets and survey.
@@ -83,6 +83,7 @@ pub struct Robot {
 /// Keys of what planning may lack.
 pub(super) const STOWED: &str = "stowed_rad";
 pub(super) const BASE_TAG: &str = "base_tag";
+pub(super) const TAG_LINK: &str = "tag_link";
 
 /// That the camera's lens is missing.
 pub(super) fn lens_issue(file: &Path) -> FileIssue {
@@ -119,6 +120,12 @@ impl Robot {
         if self.is_watched() { self.chain.frame(angles, &self.tag_frame) } else { Isometry3::identity() }
     }
 
+    /// The same where the links are at `poses`, whose frame is the base's.
+    #[must_use]
+    pub fn base_from_tags_at(&self, poses: &LinkPoses) -> Isometry3<f64> {
+        if self.is_watched() { poses.frame(&self.tag_frame) } else { Isometry3::identity() }
+    }
+
     /// The camera in the frame of the tags, at these angles by the sensors.
     #[must_use]
     pub fn tags_from_camera(&self, angles: &JointAngles) -> Isometry3<f64> {
@@ -126,6 +133,18 @@ impl Robot {
             return self.chain.frame(angles, &self.camera.mount);
         }
         self.chain.link_poses(angles).in_frame(&self.tag_frame).frame(&self.camera.mount)
+    }
+
+    /// The link that carries the tags before a camera that stands still; `None` for tags beside the arm.
+    #[must_use]
+    pub fn tag_link(&self) -> Option<&str> {
+        if !self.is_watched() {
+            return None;
+        }
+        // Links fixed to one that a joint moves may have its frame, too: the moved one is meant.
+        let moved = &self.bodies[self.tag_frame.n_joints].name;
+        let carries = |name: &&String| self.links.get(*name) == Some(&self.tag_frame);
+        std::iter::once(moved).chain(self.links.keys()).find(carries).map(String::as_str)
     }
 
     /// Whether the camera stands still beside the arm, which carries the tags (eye-to-hand).
@@ -157,7 +176,8 @@ impl Robot {
         self
     }
 
-    /// The arm on `vehicle`: with the vehicle's tags and its stowed configuration of this arm, where it has any.
+    /// The arm on `vehicle`: with the vehicle's tags and its stowed configuration of this arm, where it has any. An arm
+    /// that carries tags before a camera that stands still keeps them.
     ///
     /// # Errors
     /// [`RobotError`] naming the vehicle's file when it has another number of stowed angles, and robot.toml when it
@@ -169,7 +189,8 @@ impl Robot {
             self.stowed = check_stowed(&vehicle.file, &key, stowed_rad, self.n_joints())?;
             self.planning_issues.retain(|issue| issue.key != STOWED);
         }
-        let Some(survey) = &vehicle.survey else { return Ok(self) };
+        // Of tags that do not move a camera that stands still tells nothing.
+        let Some(survey) = vehicle.survey.as_ref().filter(|_| !self.is_watched()) else { return Ok(self) };
         if let Some(tag) = &self.gripper_tag {
             tag.check_beside(&vehicle.file, &survey.tags, survey.family)?;
         }

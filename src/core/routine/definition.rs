@@ -65,6 +65,9 @@ impl Routine {
     pub fn load_arm(&self) -> Result<(Robot, Vehicle), RoutineError> {
         let mut vehicle = robot::load_vehicle(&self.vehicle_file)?;
         let mut robot = robot::load(&self.robot_folder)?.mounted_on(&vehicle)?;
+        if robot.is_watched() {
+            vehicle.survey = None;
+        }
         if let Some(ids) = &self.tags {
             let survey =
                 robot.survey().only(ids).map_err(|problem| FileIssue::new(&self.file, "site.tags", problem))?;
@@ -107,7 +110,7 @@ impl Routine {
                 }
                 Step::Identify(settings) => match joints.iter().position(|name| *name == settings.joint) {
                     None => format!("joint `{}` is none of {joints:?}", settings.joint),
-                    Some(joint) if joint >= robot.camera.mount.n_joints => {
+                    Some(joint) if joint >= robot.n_seen_joints() => {
                         format!("joint `{}` does not move the camera, so no view can tell its scale", settings.joint)
                     }
                     Some(_) => continue,

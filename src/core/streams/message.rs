@@ -239,27 +239,29 @@ pub struct ReachTask {
     pub tolerance_m: f64,
 }
 
-/// Tags as surveyed before the dive, in the base frame: what belief takes for known.
+/// Tags as surveyed before the dive: what belief takes for known.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RecordedSurvey {
     /// Sender's clock.
     pub stamp: Stamp,
+    /// The link that carries the tags before a camera that stands still, in whose frame they are; `None`: the base's.
+    pub link: Option<String>,
     /// The tag beside the base; one of `tags`.
     pub base_tag: u32,
     /// Each id once.
     pub tags: Vec<RecordedTag>,
 }
 
-/// One tag of a survey: `base_from_tag` as numbers, that they come out of a file as they went in.
+/// One tag of a survey: its pose in the survey's frame as numbers, that they come out of a file as they went in.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RecordedTag {
     /// Number in the family of the arm's tags.
     pub id: u32,
     /// Side of the black square.
     pub size_m: f64,
-    /// Origin of the tag in the base frame.
+    /// Origin of the tag in the survey's frame.
     pub position_m: [f64; 3],
-    /// `base_from_tag`, unit.
+    /// Of the tag's axes in that frame, unit.
     pub quaternion_wxyz: [f64; 4],
     /// Infinite, as the rotation's, where only the tag's size is known; the pose is then the identity.
     pub position_std_m: f64,

@@ -2,14 +2,15 @@
 
 use super::message::{RecordedSurvey, RecordedTag};
 use crate::kinematics::Attachment;
-use crate::robot::{SurveyedTag, TagSurvey};
+use crate::robot::{Robot, SurveyedTag, TagSurvey};
 use crate::spatial::{Base, Pose, Tag};
 use crate::time::Stamp;
 
 impl RecordedSurvey {
-    /// The message of `survey`, which has tags, at `stamp`; unknown poses become the identity.
+    /// The message of `survey`, which has tags, at `stamp`, with the link that carries them, if one does; unknown poses
+    /// become the identity.
     #[must_use]
-    pub fn new(stamp: Stamp, survey: &TagSurvey) -> Self {
+    pub fn new(stamp: Stamp, survey: &TagSurvey, link: Option<&str>) -> Self {
         // Of an unknown tag's place not even the drawing goes into a recording: nobody can use it by mistake.
         let unknown = Pose::<Base, Tag>::from_position_rpy([0.0; 3], [0.0; 3]);
         let tag = |tag: &SurveyedTag| {
@@ -23,12 +24,17 @@ impl RecordedSurvey {
                 rotation_std_rad: tag.rotation_std_rad,
             }
         };
-        Self { stamp, base_tag: survey.base_tag.unwrap_or_default(), tags: survey.tags.iter().map(tag).collect() }
+        Self {
+            stamp,
+            link: link.map(str::to_owned),
+            base_tag: survey.base_tag.unwrap_or_default(),
+            tags: survey.tags.iter().map(tag).collect(),
+        }
     }
 
-    /// The survey that it holds; a tag without a direction, which no recording gives back, is left out.
+    /// The survey around `robot` that it holds; a tag without a direction, which no recording gives back, is left out.
     #[must_use]
-    pub fn survey(&self) -> TagSurvey {
+    pub fn survey(&self, robot: &Robot) -> TagSurvey {
         let tag = |tag: &RecordedTag| {
             Some(SurveyedTag {
                 id: tag.id,
@@ -38,9 +44,10 @@ impl RecordedSurvey {
                 rotation_std_rad: tag.rotation_std_rad,
             })
         };
+        let carrier = self.link.as_ref().and_then(|link| robot.links.get(link)).copied();
         TagSurvey {
             base_tag: Some(self.base_tag),
-            frame: Attachment::base(),
+            frame: carrier.unwrap_or_else(Attachment::base),
             family: None,
             tags: self.tags.iter().filter_map(tag).collect(),
         }

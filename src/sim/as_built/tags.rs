@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::as_built::pose::{PlainPose, normal_twist};
 use crate::spec::TagsSpec;
+use armcal_core::kinematics::Attachment;
 use armcal_core::robot::{Robot, SurveyedTag};
 use armcal_core::spatial::{Base, Link, Pose, Tag};
 
@@ -14,15 +15,24 @@ pub struct TagAsBuilt {
     pub id: u32,
     /// Side of the black square, as surveyed.
     pub size_m: f64,
-    /// `base_from_tag`.
+    /// In the survey's frame: the base's, or that of the link that carries the tags.
     pub pose: PlainPose,
 }
 
 impl TagAsBuilt {
-    /// True pose.
+    /// True pose of a tag beside the arm.
     #[must_use]
     pub fn base_from_tag(&self) -> Pose<Base, Tag> {
         self.pose.to_pose()
+    }
+
+    /// Where it is on the link that carries the tags, or on the base.
+    pub(crate) fn attachment(&self, robot: &Robot) -> Attachment {
+        let Attachment { n_joints, link_from_frame } = robot.tag_frame;
+        let pose = *self.base_from_tag().isometry();
+        // To the bit the pose itself beside the arm.
+        let link_from_frame = if robot.is_watched() { link_from_frame * pose } else { pose };
+        Attachment { n_joints, link_from_frame }
     }
 }
 

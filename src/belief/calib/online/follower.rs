@@ -73,7 +73,7 @@ impl Follower {
         match message {
             // The first word counts, as in a calibration.
             Message::Survey(survey) if self.estimator.n_views() == 0 => {
-                let robot = self.robot.clone().with_survey(survey.survey());
+                let robot = self.robot.clone().with_survey(survey.survey(&self.robot));
                 let (targets, tolerance_m) = (std::mem::take(&mut self.targets), self.tolerance_m);
                 *self = Self { targets, tolerance_m, ..Self::new(robot, self.settings.clone()) };
             }

@@ -42,7 +42,7 @@ fn recorded_survey(recording: &Recording) -> Option<(usize, &RecordedSurvey)> {
 #[must_use]
 pub fn surveyed<'a>(recording: &Recording, robot: &'a Robot) -> Cow<'a, Robot> {
     match recorded_survey(recording) {
-        Some((_, recorded)) => Cow::Owned(robot.clone().with_survey(recorded.survey())),
+        Some((_, recorded)) => Cow::Owned(robot.clone().with_survey(recorded.survey(robot))),
         None => Cow::Borrowed(robot),
     }
 }

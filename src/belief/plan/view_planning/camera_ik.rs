@@ -1,23 +1,26 @@
-//! Inverse kinematics of the camera: its eye to a place, its optical axis along a direction.
+//! Inverse kinematics of the camera: its eye to a place, its optical axis along a direction. Before a camera that stands
+//! still it is a tag that comes to a place, its normal along a direction.
 //!
-//! Levenberg's damped least squares on five numbers: the eye's distance (m) and the axis's turn `a x a*` (rad, weighted
-//! by the range, so that both count as displacements at the tag). The arm need not get there: what it comes to is
-//! tested like any other pose.
+//! Levenberg's damped least squares on five numbers: the origin's distance (m) and the axis's turn `a x a*` (rad,
+//! weighted by the range, so that both count as displacements at the tag). The arm need not get there: what it comes to
+//! is tested like any other pose.
 
-use nalgebra::{SMatrix, SVector, Vector3};
+use nalgebra::{SMatrix, SVector, UnitQuaternion, Vector3};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 use crate::plan::visibility::VisibilityModel;
-use armcal_core::kinematics::JointLimits;
+use armcal_core::kinematics::{Attachment, JointLimits};
 use armcal_core::numeric::{Damping, LeastSquares, Proposal, StopRule, minimize};
-use armcal_core::robot::Robot;
+use armcal_core::robot::{Robot, SurveyedTag};
 use armcal_core::streams::{JointAngles, MAX_JOINTS};
 
-/// Where the camera shall be and what it shall look at, base frame.
+/// Where a frame of the arm shall be and where its z axis shall point, base frame.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct CameraGoal {
-    pub eye_m: Vector3<f64>,
+    /// The camera's, or that of a tag that the arm carries.
+    pub frame: Attachment,
+    pub origin_m: Vector3<f64>,
     /// Unit.
     pub axis: Vector3<f64>,
 }
@@ -37,20 +40,42 @@ impl CameraGoal {
             return None;
         }
         let tag = &robot.tags[rng.random_range(0..robot.tags.len())];
-        let rotation = tag.base_from_tag.rotation();
         let highest_m = RANGES_M[1].min(visibility.max_range_m);
         let range_m = rng.random_range(RANGES_M[0].max(visibility.min_range_m).min(highest_m - 1e-3)..highest_m);
         // Evenly over the cone about the tag's normal.
         let cos = 1.0 - rng.random_range(0.0..1.0) * (1.0 - visibility.max_incidence_rad.cos());
         let sin = (1.0_f64 - cos * cos).max(0.0).sqrt();
         let around = rng.random_range(0.0..std::f64::consts::TAU);
-        let out = rotation * Vector3::new(sin * around.cos(), sin * around.sin(), cos);
-        let eye_m = tag.base_from_tag.origin().vector() + out * range_m;
+        let from_tag = Vector3::new(sin * around.cos(), sin * around.sin(), cos);
         let beside = Vector3::from_fn(|_, _| rng.random_range(-1.0..1.0)) * BESIDE_RAD;
-        Some(Self { eye_m, axis: (beside - out).normalize() })
+        if robot.is_watched() {
+            return Some(Self::of_carried_tag(robot, tag, range_m, &from_tag, &beside));
+        }
+        let out = tag.base_from_tag.rotation() * from_tag;
+        let origin_m = tag.base_from_tag.origin().vector() + out * range_m;
+        Some(Self { frame: robot.camera.mount, origin_m, axis: (beside - out).normalize() })
     }
 
-    /// The joints before the camera, from `seed`; the others stay.
+    /// A tag at this range from a camera that stands still, in the direction that is its optical axis's and `beside`.
+    /// `from_tag`: the line back to the camera in the tag's axes, unit.
+    fn of_carried_tag(
+        robot: &Robot,
+        tag: &SurveyedTag,
+        range_m: f64,
+        from_tag: &Vector3<f64>,
+        beside: &Vector3<f64>,
+    ) -> Self {
+        let base_from_camera = &robot.camera.mount.link_from_frame;
+        let sight = (base_from_camera.rotation * Vector3::z() + beside).normalize();
+        // Of all turns of the tag about the line of sight one: the goal does not ask for another.
+        let along = UnitQuaternion::rotation_between(from_tag, &-sight).unwrap_or_else(UnitQuaternion::identity);
+        let Attachment { n_joints, link_from_frame } = robot.tag_frame;
+        let frame = Attachment { n_joints, link_from_frame: link_from_frame * tag.base_from_tag.isometry() };
+        let origin_m = base_from_camera.translation.vector + sight * range_m;
+        Self { frame, origin_m, axis: along * Vector3::z() }
+    }
+
+    /// The joints before the frame, from `seed`; the others stay.
     pub(crate) fn solve(&self, robot: &Robot, limits: &[JointLimits], seed: &JointAngles) -> JointAngles {
         let error = self.error(robot, seed);
         let mut search = Search { goal: self, robot, limits, angles: *seed, error, trial: *seed, trial_error: error };
@@ -60,19 +85,19 @@ impl CameraGoal {
 
     /// Place (m), then direction.
     fn error(&self, robot: &Robot, angles: &JointAngles) -> SVector<f64, 6> {
-        let base_from_camera = robot.chain.frame(angles, &robot.camera.mount);
-        let off_m = self.eye_m - base_from_camera.translation.vector;
-        let turn = (base_from_camera.rotation * Vector3::z()).cross(&self.axis);
+        let base_from_frame = robot.chain.frame(angles, &self.frame);
+        let off_m = self.origin_m - base_from_frame.translation.vector;
+        let turn = (base_from_frame.rotation * Vector3::z()).cross(&self.axis);
         SVector::<f64, 6>::new(off_m.x, off_m.y, off_m.z, turn.x, turn.y, turn.z)
     }
 
     fn jacobian(&self, robot: &Robot, angles: &JointAngles, n: usize) -> SMatrix<f64, 6, MAX_JOINTS> {
         let poses = robot.chain.link_poses(angles);
-        let base_from_camera = poses.frame(&robot.camera.mount);
-        let axis = base_from_camera.rotation * Vector3::z();
+        let base_from_frame = poses.frame(&self.frame);
+        let axis = base_from_frame.rotation * Vector3::z();
         let mut out = SMatrix::<f64, 6, MAX_JOINTS>::zeros();
         for joint in 0..n {
-            let moved = poses.point_jacobian(joint, &base_from_camera.translation.vector);
+            let moved = poses.point_jacobian(joint, &base_from_frame.translation.vector);
             // The axis turns by omega x a; of `a x a*` that is the part of omega across the axis.
             let omega = poses.axis(joint);
             let turned = omega - axis * axis.dot(omega);
@@ -103,7 +128,7 @@ impl LeastSquares for Search<'_> {
     }
 
     fn propose(&mut self, damping: f64) -> Option<Proposal> {
-        let n = self.robot.camera.mount.n_joints;
+        let n = self.goal.frame.n_joints;
         let jacobian = self.goal.jacobian(self.robot, &self.angles, n);
         let mut normal = jacobian.tr_mul(&jacobian);
         for k in 0..MAX_JOINTS {
@@ -150,7 +175,8 @@ mod tests {
             let goal =
                 JointAngles::from_fn(robot.n_joints(), |j| rng.random_range(limits[j].lower_rad..limits[j].upper_rad));
             let frame = robot.chain.frame(&goal, &robot.camera.mount);
-            let aim = CameraGoal { eye_m: frame.translation.vector, axis: frame.rotation * Vector3::z() };
+            let (origin_m, axis) = (frame.translation.vector, frame.rotation * Vector3::z());
+            let aim = CameraGoal { frame: robot.camera.mount, origin_m, axis };
             let seed = JointAngles::from_fn(robot.n_joints(), |j| {
                 (goal[j] + rng.random_range(-0.5..0.5)).clamp(limits[j].lower_rad, limits[j].upper_rad)
             });
@@ -159,5 +185,32 @@ mod tests {
             there += usize::from(error.norm() < 0.05);
         }
         assert!(there * 10 > n * 9, "{there} of {n}");
+    }
+
+    /// Of goals before a camera that stands still many are met, and where they are a tag is in view at its range.
+    #[test]
+    fn a_carried_tag_gets_before_the_camera() {
+        let robot = crate::plan::view_planning::fixture::watched_titan();
+        let limits: Vec<JointLimits> = robot
+            .chain
+            .joints()
+            .iter()
+            .map(|joint| joint.limits.unwrap_or(JointLimits { lower_rad: -3.0, upper_rad: 3.0 }))
+            .collect();
+        let visibility = VisibilityModel::default();
+        let mut rng = armcal_core::stats::stream_rng(3, "aim");
+        let (mut met, mut shown) = (0, 0);
+        for _ in 0..300 {
+            let seed =
+                JointAngles::from_fn(robot.n_joints(), |j| rng.random_range(limits[j].lower_rad..limits[j].upper_rad));
+            let goal = CameraGoal::draw(&robot, &visibility, &mut rng).expect("there are tags");
+            let angles = goal.solve(&robot, &limits, &seed);
+            if goal.error(&robot, &angles).norm() > 0.02 {
+                continue;
+            }
+            met += 1;
+            shown += usize::from(visibility.in_view(&robot, &robot.chain.link_poses(&angles)).next().is_some());
+        }
+        assert!(met > 60 && shown * 10 > met * 8, "{met} met, {shown} of them show a tag");
     }
 }

@@ -102,10 +102,10 @@ struct DrawnArm {
     in_view: Vec<usize>,
 }
 
-/// Joints from this one on do not move the camera; they stay where they are, but for those that turn a tag on the
-/// gripper.
+/// Joints from this one on do not move camera and tags against each other; they stay where they are, but for those that
+/// turn a tag on the gripper.
 fn n_seen(robot: &Robot) -> usize {
-    robot.camera.mount.n_joints
+    robot.n_seen_joints()
 }
 
 /// Whether a joint turns the tag on the gripper in the camera's view: then the views need many of its angles.
@@ -277,7 +277,7 @@ impl<'a> Search<'a> {
         let mut count = vec![0usize; robot.tags.len()];
         for DrawnArm { poses, in_view } in &self.arms {
             let sights = Sights::new(self.request.clearance, poses);
-            for &tag in in_view.iter().filter(|&&tag| !visibility.is_hidden(robot, &sights, tag)) {
+            for &tag in in_view.iter().filter(|&&tag| !visibility.is_hidden(robot, poses, &sights, tag)) {
                 count[tag] += 1;
             }
         }

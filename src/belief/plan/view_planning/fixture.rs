@@ -33,6 +33,11 @@ pub(crate) fn titan() -> Robot {
     load(&root().join("robots/titan4")).expect("the robot reads").mounted_on(&vehicle()).expect("it fits")
 }
 
+/// Before a camera that stands still, with tags on its gripper.
+pub(crate) fn watched_titan() -> Robot {
+    load(&root().join("robots/titan4-watched")).expect("the robot reads").mounted_on(&vehicle()).expect("it fits")
+}
+
 pub(crate) fn clearance_of<'a>(robot: &'a Robot, vehicle: &Vehicle) -> ClearanceModel<'a> {
     ClearanceModel::new(robot, vehicle, &Scene { seafloor_z_m: Some(-2.2), obstacles: Vec::new() })
 }
@@ -67,6 +72,12 @@ impl Site {
 
     pub(crate) fn titan() -> Self {
         Self::of(titan())
+    }
+
+    pub(crate) fn watched() -> Self {
+        let mut site = Self::of(watched_titan());
+        site.capture.min_tags = 2;
+        site
     }
 
     pub(crate) fn clearance(&self) -> ClearanceModel<'_> {
@@ -126,7 +137,7 @@ fn moved(pose: &Isometry3<f64>, std_m: f64, std_rad: f64, rng: &mut ChaCha8Rng) 
 impl Truth {
     pub(crate) fn draw(robot: &Robot, scales: &Hyperparameters, rng: &mut ChaCha8Rng) -> Self {
         let mut parameters = JointParameters::default();
-        for p in columns(robot.camera.mount.n_joints) {
+        for p in columns(robot.n_seen_joints()) {
             let std = scales.prior_std(&robot.sensors[p.joint], p.joint, p.kind);
             parameters.set(p, parameters.get(p) + std * normal(rng));
         }
@@ -164,7 +175,8 @@ impl Truth {
             for (angle, std_rad) in angles.iter_mut().zip(scales.joint_std_rad) {
                 *angle += std_rad * normal(rng);
             }
-            let camera = robot.chain.link_poses(&angles).link(robot.camera.mount.n_joints) * self.mount;
+            let poses = robot.chain.link_poses(&angles).in_frame(&robot.tag_frame);
+            let camera = poses.link(robot.camera.mount.n_joints) * self.mount;
             for tag_idx in VisibilityModel::USUAL.visible(robot, clearance, &angles) {
                 let camera_from_tag = camera.inv_mul(&self.tags[tag_idx]);
                 let id = robot.tags[tag_idx].id;

@@ -10,7 +10,7 @@ pub(crate) mod camera_ik;
 mod candidates;
 mod criterion;
 #[cfg(test)]
-mod fixture;
+pub(crate) mod fixture;
 mod forecast;
 mod parameter_prior;
 mod pool;

@@ -1,8 +1,8 @@
 //! What is not known of the arm, as one covariance that every view makes smaller.
 //!
-//! Columns: of each joint before the camera gain, offset and the coefficients of its nonlinearity ([`WIDTH`] in all),
+//! Columns: of each joint that moves camera and tags against each other gain, offset and the coefficients of its nonlinearity ([`WIDTH`] in all),
 //! then the camera's mount (translation m, rotation rad, on the right) and the survey's common error (a twist of all
-//! tags together in the base frame). The covariance is what the estimator `bundle` takes for its prior, or the running
+//! tags together in their frame). The covariance is what the estimator `bundle` takes for its prior, or the running
 //! estimate's.
 
 use nalgebra::{DMatrix, Matrix6, Vector6};
@@ -31,7 +31,7 @@ const UNKNOWN_STD: f64 = 3.0;
 /// What is not known before the views to come.
 #[derive(Clone, Debug)]
 pub(crate) struct ParameterPrior {
-    /// Joints before the camera.
+    /// Joints that move camera and tags against each other.
     pub n_joints: usize,
     pub covariance: DMatrix<f64>,
     /// What each joint is off in each view anew, rad.
@@ -46,7 +46,7 @@ impl ParameterPrior {
         let scales = scales(robot, request.belief);
         // Views that are given are counted one by one, on top of what the first of them started from.
         let known = if request.taken.is_empty() { request.belief } else { request.prior };
-        let n_joints = robot.camera.mount.n_joints;
+        let n_joints = robot.n_seen_joints();
         let at = n_joints * WIDTH;
         let mut covariance = DMatrix::zeros(at + N_COMMON, at + N_COMMON);
         let parameters: Vec<Parameter> = columns(n_joints).collect();

@@ -40,7 +40,7 @@ fn camera_from_tag(
     by: f64,
     tag: usize,
 ) -> nalgebra::Isometry3<f64> {
-    let n = robot.camera.mount.n_joints;
+    let n = robot.n_seen_joints();
     let mut moved = *angles;
     let (mut mount, mut survey) = (Vector6::zeros(), Vector6::zeros());
     if column < n * WIDTH {
@@ -51,23 +51,32 @@ fn camera_from_tag(
     } else {
         survey[column - n * WIDTH - 6] = by;
     }
-    let camera = robot.chain.frame(&moved, &robot.camera.mount) * exp(&mount);
-    camera.inverse() * exp(&survey) * robot.tags[tag].base_from_tag.isometry()
+    let mut arm = robot.clone();
+    arm.camera.mount.link_from_frame *= exp(&mount);
+    arm.tags_from_camera(&moved).inverse() * exp(&survey) * robot.tags[tag].base_from_tag.isometry()
 }
 
 /// The information on all columns, `G^T H G`, against corners moved by finite differences.
 #[test]
 fn information_is_that_of_corners_moved_by_hand() {
-    let robot = titan();
-    let site = Site::titan();
-    let n = robot.camera.mount.n_joints * WIDTH + N_COMMON;
+    is_that_of_corners_moved_by_hand(&Site::titan());
+}
+
+#[test]
+fn information_of_carried_tags_is_that_of_corners_moved_by_hand() {
+    is_that_of_corners_moved_by_hand(&Site::watched());
+}
+
+fn is_that_of_corners_moved_by_hand(site: &Site) {
+    let robot = &site.robot;
+    let n = robot.n_seen_joints() * WIDTH + N_COMMON;
     let optics = CornerModel::new(1.0, 1.0);
-    for candidate in pool(&site, 12, 3).candidates() {
+    for candidate in pool(site, 12, 3).candidates() {
         let Candidate { angles, tags, .. } = candidate;
         let tag = tags[0].0;
-        let look = ViewJacobian::new(&robot, optics, angles, &[(tag, 1.0)]);
+        let look = ViewJacobian::new(robot, optics, angles, &[(tag, 1.0)]);
         let by_parameter = DMatrix::from_fn(6, n, |row, column| {
-            let at = robot.camera.mount.n_joints * WIDTH;
+            let at = robot.n_seen_joints() * WIDTH;
             if column < at {
                 look.twists[(row, column / WIDTH)] * look.basis[column / WIDTH][column % WIDTH]
             } else {
@@ -76,7 +85,7 @@ fn information_is_that_of_corners_moved_by_hand() {
         });
         let info = by_parameter.tr_mul(&(look.sights[0].info * &by_parameter));
         let pixels = |column: usize, by: f64| {
-            let pose = camera_from_tag(&robot, angles, column, by, tag);
+            let pose = camera_from_tag(robot, angles, column, by, tag);
             square_corners(robot.tags[tag].size_m)
                 .map(|corner| robot.camera.lens.project(&(pose * corner).coords).expect("in view"))
         };
@@ -90,7 +99,7 @@ fn information_is_that_of_corners_moved_by_hand() {
         // The same weights: the information of a pure shift of the camera, by each corner in turn, is not at hand; so
         // weights come from the corner noise of the undisturbed view.
         let weights =
-            optics.corner_weights(&robot, &camera_from_tag(&robot, angles, 0, 0.0, tag), robot.tags[tag].size_m);
+            optics.corner_weights(robot, &camera_from_tag(robot, angles, 0, 0.0, tag), robot.tags[tag].size_m);
         let weights = weights.expect("in view");
         let scale = info.amax();
         for a in 0..n {
@@ -356,8 +365,16 @@ fn views_taken_count_as_they_were_planned() {
 /// What `bundle` says of its own error after the same views, and what the error is: the forecast is within 25 %.
 #[test]
 fn the_predicted_tool_error_is_what_bundle_finds() {
-    let robot = titan();
-    let mut site = Site::titan();
+    predicts_what_bundle_finds(Site::titan());
+}
+
+#[test]
+fn the_predicted_tool_error_before_a_camera_that_stands_still_is_what_bundle_finds() {
+    predicts_what_bundle_finds(Site::watched());
+}
+
+fn predicts_what_bundle_finds(mut site: Site) {
+    let robot = site.robot.clone();
     let scales = Hyperparameters::datasheet(&robot);
     let clearance = crate::plan::view_planning::fixture::clearance_of(&robot, &site.vehicle);
     for n_views in [6, 25] {

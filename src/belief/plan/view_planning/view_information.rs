@@ -2,9 +2,10 @@
 //!
 //! The camera's pose perturbed on the right by `xi` (translation, rotation) moves a point p of its frame by
 //! `-rho - omega x p`, so that one tag has the information `H = sum over corners J^T W J`, J = d(pixel)/d(xi), W the
-//! inverse of the corner noise. Parameters move the camera by
-//! `xi = sum_j d_j (b_j . p_j) + mount - Ad(camera from base) survey`, d_j the twist that joint j gives it. The joints'
-//! own errors of a view add `sum_j d_j d_j^T s_j^2` to the noise `H^-1`.
+//! inverse of the corner noise. Parameters move the camera in the frame of the tags by
+//! `xi = sum_j d_j (b_j . p_j) + mount - Ad(camera from tags) survey`, d_j the twist that joint j gives it: of a camera
+//! that stands still before tags on the arm the opposite of the tags' own. The joints' own errors of a view add
+//! `sum_j d_j d_j^T s_j^2` to the noise `H^-1`.
 
 use nalgebra::{Cholesky, Isometry3, Matrix6, SMatrix, Vector3};
 
@@ -127,25 +128,27 @@ impl WhitenedView {
 impl ViewJacobian {
     /// `tags`: (index, probability that it is seen).
     pub(crate) fn new(robot: &Robot, optics: CornerModel, angles: &JointAngles, tags: &[(usize, f64)]) -> Self {
-        let poses = robot.chain.link_poses(angles);
-        let base_from_camera = poses.frame(&robot.camera.mount);
-        let camera_from_base = base_from_camera.inverse();
-        let (eye_m, turn) = (base_from_camera.translation.vector, camera_from_base.rotation);
-        let n_joints = robot.camera.mount.n_joints;
+        let poses = robot.chain.link_poses(angles).in_frame(&robot.tag_frame);
+        let tags_from_camera = poses.frame(&robot.camera.mount);
+        let camera_from_tags = tags_from_camera.inverse();
+        let (eye_m, turn) = (tags_from_camera.translation.vector, camera_from_tags.rotation);
+        let n_joints = robot.n_seen_joints();
+        // Before a camera that stands still the joints move the tags.
+        let sign = if robot.is_watched() { -1.0 } else { 1.0 };
         let mut twists = Twists::zeros();
         let mut by_joint: Basis = [[0.0; WIDTH]; MAX_JOINTS];
         for (joint, by_parameter) in by_joint.iter_mut().enumerate().take(n_joints) {
             *by_parameter = basis(robot, joint, angles[joint]);
-            let moved: Vector3<f64> = turn * poses.point_jacobian(joint, &eye_m);
-            let turned: Vector3<f64> = turn * poses.axis(joint);
+            let moved: Vector3<f64> = turn * poses.point_jacobian(joint, &eye_m) * sign;
+            let turned: Vector3<f64> = turn * poses.axis(joint) * sign;
             twists.fixed_view_mut::<3, 1>(0, joint).copy_from(&moved);
             twists.fixed_view_mut::<3, 1>(3, joint).copy_from(&turned);
         }
         twists.fixed_view_mut::<6, 6>(0, MAX_JOINTS).fill_diagonal(1.0);
-        twists.fixed_view_mut::<6, 6>(0, MAX_JOINTS + 6).copy_from(&-adjoint(&camera_from_base));
+        twists.fixed_view_mut::<6, 6>(0, MAX_JOINTS + 6).copy_from(&-adjoint(&camera_from_tags));
         let sight = |&(tag, probability): &(usize, f64)| {
             let surveyed = &robot.tags[tag];
-            let camera_from_tag = camera_from_base * surveyed.base_from_tag.isometry();
+            let camera_from_tag = camera_from_tags * surveyed.base_from_tag.isometry();
             let info = optics.information(robot, &camera_from_tag, surveyed.size_m)? * probability;
             Some(TagInformation { tag, info, adjoint: adjoint(&camera_from_tag) })
         };

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::basic::{Header, Pose, Quaternion};
 use super::checks::{finite, unit_quaternion_wxyz};
 use crate::log::error::{DecodeRejection, EncodeError};
-use crate::log::header::RecordingHeader;
+use crate::log::header::{BASE_FRAME, RecordingHeader};
 use crate::log::schema::{RosMessage, RosSchema};
 use crate::streams::{RecordedSurvey, RecordedTag};
 
@@ -18,7 +18,7 @@ pub struct SurveyedTag {
     pub id: u32,
     /// Side of the black square.
     pub size_m: f64,
-    /// `base_from_tag`; the identity where it is unknown.
+    /// The identity where it is unknown.
     pub pose: Pose,
     /// Infinite where the pose is unknown.
     pub position_std_m: f64,
@@ -29,7 +29,7 @@ pub struct SurveyedTag {
 /// armcal_msgs/msg/TagSurvey: where the tags are.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TagSurvey {
-    /// Stamp, and the frame of the arm's base.
+    /// Stamp, and the frame of the arm's base, or of the link that carries the tags.
     pub header: Header,
     /// Id of the tag beside the base; one of `tags`.
     pub base_tag: u32,
@@ -60,7 +60,7 @@ pub(in crate::log) fn to_ros(m: &RecordedSurvey, header: &RecordingHeader) -> Re
         rotation_std_rad: tag.rotation_std_rad,
     };
     Ok(TagSurvey {
-        header: Header::new(m.stamp, &header.base_frame)?,
+        header: Header::new(m.stamp, m.link.as_ref().unwrap_or(&header.base_frame))?,
         base_tag: m.base_tag,
         tags: m.tags.iter().map(tag).collect(),
     })
@@ -76,7 +76,10 @@ pub(in crate::log) fn from_ros(m: &TagSurvey) -> Result<RecordedSurvey, DecodeRe
     if !ids.contains(&m.base_tag) {
         return Err(DecodeRejection::NoBaseTag);
     }
-    Ok(RecordedSurvey { stamp: m.header.stamp.try_into()?, base_tag: m.base_tag, tags })
+    let frame = &m.header.frame_id;
+    // What is not said, or said as our recordings say it, is the base's.
+    let link = (!frame.is_empty() && frame != BASE_FRAME).then(|| frame.clone());
+    Ok(RecordedSurvey { stamp: m.header.stamp.try_into()?, link, base_tag: m.base_tag, tags })
 }
 
 fn tag_from_ros(tag: &SurveyedTag) -> Result<RecordedTag, DecodeRejection> {

@@ -19,7 +19,7 @@ pub(super) struct TagInBase {
     pub base_from_tag: Isometry3<f64>,
 }
 
-/// A tag on a moving link.
+/// A tag on a link, or on the base.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct TagOnLink {
     pub id: u32,
@@ -30,7 +30,9 @@ pub(super) struct TagOnLink {
 
 impl TagOnLink {
     pub(super) fn at(&self, links: &BodyPoses) -> TagInBase {
-        TagInBase { id: self.id, size_m: self.size_m, base_from_tag: links.frame(&self.mount) }
+        let Attachment { n_joints, link_from_frame } = self.mount;
+        let base_from_tag = if n_joints == 0 { link_from_frame } else { links.frame(&self.mount) };
+        TagInBase { id: self.id, size_m: self.size_m, base_from_tag }
     }
 }
 

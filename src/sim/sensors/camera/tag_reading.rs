@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-use crate::sensors::camera::tag_projection::TagInBase;
+use crate::sensors::camera::tag_projection::TagOnLink;
 use armcal_core::stats::stream_rng;
 
 #[derive(Debug)]
@@ -32,7 +32,7 @@ impl TagReader {
     }
 
     /// The id that is read in one image; a wrong one is that of another tag in `tags`.
-    pub(super) fn read_id(&mut self, id: u32, tags: &[TagInBase]) -> u32 {
+    pub(super) fn read_id(&mut self, id: u32, tags: &[TagOnLink]) -> u32 {
         let usual = self.usual_id(id);
         let others = tags.len().saturating_sub(1);
         if self.wrong_id_probability <= 0.0 || others == 0 {

@@ -18,6 +18,7 @@ use armcal_core::streams::{ImageDemand, JointAngles, TagDetections};
 use armcal_core::time::{SIMULATION_EPOCH, Stamp};
 
 mod rendered;
+mod watched;
 
 struct Site {
     robot: Robot,
@@ -29,9 +30,15 @@ struct Site {
 
 /// The stowed arm with exact sensors and a detector without noise, and what `change` makes of it.
 fn site(change: impl FnOnce(&mut WorldSpec)) -> Site {
+    site_of("titan4", |_| {}, change)
+}
+
+/// The same of another robot, changed.
+fn site_of(robot: &str, arm: impl FnOnce(&mut Robot), change: impl FnOnce(&mut WorldSpec)) -> Site {
     let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("robots");
     let vehicle = load_vehicle(&root.join("vehicles/work-class-front.toml")).expect("it reads");
-    let robot = load(&root.join("titan4")).expect("it reads").mounted_on(&vehicle).expect("it fits");
+    let mut robot = load(&root.join(robot)).expect("it reads").mounted_on(&vehicle).expect("it fits");
+    arm(&mut robot);
     let mut spec = WorldSpec::default();
     spec.camera.miss_probability = 0.0;
     spec.camera.corner_noise_px = 0.0;
@@ -64,9 +71,11 @@ impl Site {
     fn drawn_corners(&self, id: u32, rates_rad_s: f64, earlier_s: f64) -> [Vector2<f64>; 4] {
         let stowed = &self.robot.stowed;
         let angles = JointAngles::from_fn(stowed.len(), |j| stowed[j] - rates_rad_s * earlier_s);
-        let base_from_camera = self.robot.chain.link_poses(&angles).frame(&self.built.camera_attachment(&self.robot));
+        let poses = self.robot.chain.link_poses(&angles);
+        let base_from_camera = poses.frame(&self.built.camera_attachment(&self.robot));
         let tag = self.built.tags.iter().find(|tag| tag.id == id).expect("a known tag");
-        let camera_from_tag = base_from_camera.inverse() * tag.base_from_tag().isometry();
+        let base_from_tag = self.robot.base_from_tags_at(&poses) * tag.base_from_tag().isometry();
+        let camera_from_tag = base_from_camera.inverse() * base_from_tag;
         square_corners(tag.size_m)
             .map(|corner| self.robot.camera.lens.project(&(camera_from_tag * corner).coords).expect("in view"))
     }

@@ -1,4 +1,4 @@
-//! The wrist camera: one image when the shutter closes, by projection or by rendering.
+//! The camera, on the wrist or beside the arm: one image when the shutter closes, by projection or by rendering.
 
 use std::collections::BTreeSet;
 
@@ -31,8 +31,10 @@ pub(crate) struct WristCamera {
     spec: CameraWorldSpec,
     lens: PortedLens,
     exposure: Exposure,
-    /// As built, by id.
-    tags: Vec<TagInBase>,
+    /// As built, by id; beside the arm, or all on one link before a camera that stands still.
+    tags: Vec<TagOnLink>,
+    /// The body that carries them.
+    tag_body: usize,
     gripper_tag: Option<TagOnLink>,
     /// Indices of the shapes that hold the camera: they hide no tag.
     housing: Vec<usize>,
@@ -107,10 +109,10 @@ pub(crate) struct CameraShot {
 impl WristCamera {
     pub(crate) fn new(input: &CameraInput) -> Self {
         let CameraInput { robot, built, solids, spec, seed } = *input;
-        let mut tags: Vec<TagInBase> = built
+        let mut tags: Vec<TagOnLink> = built
             .tags
             .iter()
-            .map(|tag| TagInBase { id: tag.id, size_m: tag.size_m, base_from_tag: *tag.base_from_tag().isometry() })
+            .map(|tag| TagOnLink { id: tag.id, size_m: tag.size_m, mount: tag.attachment(robot) })
             .collect();
         tags.sort_by_key(|tag| tag.id);
         let gripper_tag = robot.gripper_tag.zip(built.gripper_tag_attachment(robot));
@@ -119,6 +121,7 @@ impl WristCamera {
             lens: PortedLens::new(&robot.camera.lens, built, &spec.camera),
             exposure: Exposure { exposure_s: spec.camera.exposure_s, mount: built.camera_attachment(robot) },
             tags,
+            tag_body: robot.tag_frame.n_joints,
             gripper_tag: gripper_tag.map(|(tag, mount)| TagOnLink { id: tag.id, size_m: tag.size_m, mount }),
             housing: solids.housing(robot),
             lost: BTreeSet::new(),
@@ -161,7 +164,7 @@ impl WristCamera {
     /// A tag is displaced; `motion` in its own axes.
     pub(crate) fn move_tag(&mut self, id: u32, motion: Isometry3<f64>) {
         for tag in self.tags.iter_mut().filter(|tag| tag.id == id) {
-            tag.base_from_tag *= motion;
+            tag.mount.link_from_frame *= motion;
         }
     }
 
@@ -207,10 +210,12 @@ impl WristCamera {
             let seen_from = self.exposure.poses(&at_end, motion, body);
             std::array::from_fn(|k| base_from_camera[k] * seen_from[k].inverse())
         };
-        let on_gripper = self.gripper_tag.map_or([Isometry3::identity(); 3], |tag| carried(tag.mount.n_joints));
+        let carried_by = |body: usize| if body == 0 { [Isometry3::identity(); 3] } else { carried(body) };
+        let on_gripper = carried_by(self.gripper_tag.map_or(0, |tag| tag.mount.n_joints));
+        let with_tags = carried_by(self.tag_body);
         let family = rendered.family();
         let plane = |(i, tag): (usize, TagInBase)| {
-            let moved = if i < self.tags.len() { [Isometry3::identity(); 3] } else { on_gripper };
+            let moved = if i < self.tags.len() { with_tags } else { on_gripper };
             let base_from_tag = moved.map(|moved| moved * tag.base_from_tag);
             let id = self.reader.usual_id(tag.id);
             (!self.lost.contains(&tag.id)).then_some(TagPlane { family, id, size_m: tag.size_m, base_from_tag })
@@ -225,21 +230,21 @@ impl WristCamera {
     pub(crate) fn project_tags(&mut self, shutter: &ShutterState) -> (Stamp, TagDetections) {
         let ShutterState { poses, solids, motion, closed, .. } = shutter;
         let base_from_camera = self.base_from_camera(poses.links);
-        let earlier = self.exposure.earlier_poses(&base_from_camera, motion, 0);
+        let earlier = self.exposure.earlier_poses(&base_from_camera, motion, self.tag_body);
         let earlier_by_gripper =
             self.gripper_tag.and_then(|tag| self.exposure.earlier_poses(&base_from_camera, motion, tag.mount.n_joints));
         let mut tags = Vec::new();
         let is_blind = self.blind_until.is_some_and(|until| *closed < until);
-        let n_fixed = self.tags.len();
+        let n_surveyed = self.tags.len();
         for (i, tag) in self.tags_at(poses.links).into_iter().enumerate() {
             // Every tag draws its random numbers, detected or not: one more tag in view does not change the noise of
             // another.
-            let is_fixed = i < n_fixed;
-            let random = if is_fixed { &mut self.random } else { &mut self.gripper_random };
+            let is_surveyed = i < n_surveyed;
+            let random = if is_surveyed { &mut self.random } else { &mut self.gripper_random };
             let (uniform, noise) = random.draw();
             let is_missed = self.fitted.is_none() && uniform < self.spec.miss_probability;
-            let id = if is_fixed { self.reader.read_id(tag.id, &self.tags) } else { tag.id };
-            let earlier = if is_fixed { &earlier } else { &earlier_by_gripper };
+            let id = if is_surveyed { self.reader.read_id(tag.id, &self.tags) } else { tag.id };
+            let earlier = if is_surveyed { &earlier } else { &earlier_by_gripper };
             if is_missed || is_blind || self.lost.contains(&tag.id) {
                 continue;
             }
@@ -262,9 +267,9 @@ impl WristCamera {
         (arrival, TagDetections { stamp, tags })
     }
 
-    /// All tags in the base frame: fixed ones by id, fallen ones among them, then the one on the gripper.
+    /// All tags in the base frame: those of the survey by id, fallen ones among them, then the one on the gripper.
     fn tags_at(&self, links: &BodyPoses) -> Vec<TagInBase> {
-        self.tags.iter().copied().chain(self.gripper_tag.map(|tag| tag.at(links))).collect()
+        self.tags.iter().chain(&self.gripper_tag).map(|tag| tag.at(links)).collect()
     }
 }
 
