@@ -21,4 +21,4 @@ pub use summary::{
     AssertSummary, CalibrationSummary, CaptureSummary, HeldJointSummary, HeldOutSummary, OnlineSummary, RenewalSummary,
     RunSummary, WorldSummary,
 };
-pub use table::table;
+pub use table::{closing, table};
