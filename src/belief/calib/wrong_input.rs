@@ -3,7 +3,8 @@
 //! Of two tags a and b in one view, a's pose in the camera `C_a` and the map's `a_from_b` say where b is. Its distance
 //! from where it is seen, over the distance between both, is the mismatch; the median over all pairs counts. One scale
 //! of all tags is taken out beforehand, by the median ratio of the map's distances to the seen ones. A large mismatch
-//! means that map or lens is wrong, and no joint has a part in it. The input that makes it small is named.
+//! means that map or lens is wrong, and no joint has a part in it. The input that makes it small is named. Where only
+//! some tags do not fit the others, they may hang in one another's places: their ids are exchanged.
 //!
 //! Where a view has one landmark with its rotation, the arm by its datasheet tells where that stands: the rotations of
 //! `base_from_tag` over the views must agree but for what sensors may be off.
@@ -15,7 +16,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::calib::views::view::{CaptureData, TagMeasurement, TagObservation, View};
 use armcal_core::joints::JointAngles;
-use armcal_core::optics::{CameraModel, solve_square_both};
+use armcal_core::optics::{CameraModel, Fisheye, LensModel, Radtan, solve_square_both};
 use armcal_core::robot::{Robot, SurveyedTag};
 use armcal_core::spatial::Pose;
 use armcal_core::stats::quantile;
@@ -33,7 +34,7 @@ pub struct WrongInput {
 }
 
 /// What may be wrong.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum WrongInputKind {
     /// The map's quaternions are x, y, z, w.
@@ -51,8 +52,12 @@ pub enum WrongInputKind {
     },
     /// The lens is that of an image of so many times the recorded one's size.
     ImageScale(f64),
+    /// The lens is of the other model: a fisheye called a pinhole, or the other way round.
+    LensModel,
     /// All tags are of so many times their stated size.
     TagSize(f64),
+    /// These tags hang in one another's places.
+    ExchangedIds(Vec<u32>),
     /// The tags do not stand to one another as the map says, whatever is tried.
     OtherMap,
 }
@@ -75,6 +80,8 @@ const SIZE_TOLERANCE: f64 = 0.03;
 /// Rotations of one landmark: spread that says nothing, and that of good ones, rad.
 const SPREAD_RAD: f64 = 0.5;
 const GOOD_SPREAD_RAD: f64 = 0.25;
+/// Half of the field of view of a fisheye that nobody describes, rad.
+const FISHEYE_RAD: f64 = 1.5;
 const MIN_ROTATIONS: usize = 5;
 
 /// A tag that stands beside its print: the black square has 8 of the 10 cells that the whole print with its white
@@ -115,7 +122,8 @@ fn by_pairs(views: &[&View], tags: &[SurveyedTag], lens: &CameraModel, as_writte
     let mut found: Option<(WrongInputKind, f64)> = None;
     let mut consider = |input, pairs: Option<Pairs>| {
         let Some(Pairs { mismatch, .. }) = pairs else { return };
-        if mismatch < GOOD.min(BETTER * as_written.mismatch) && found.is_none_or(|(_, least)| mismatch < least) {
+        let is_least = found.as_ref().is_none_or(|(_, least)| mismatch < *least);
+        if mismatch < GOOD.min(BETTER * as_written.mismatch) && is_least {
             found = Some((input, mismatch));
         }
     };
@@ -124,6 +132,7 @@ fn by_pairs(views: &[&View], tags: &[SurveyedTag], lens: &CameraModel, as_writte
     for scale in IMAGE_SCALES {
         consider(WrongInputKind::ImageScale(scale), mismatch(views, tags, &scaled(lens, 1.0 / scale)));
     }
+    consider(WrongInputKind::LensModel, mismatch(views, tags, &of_other_model(lens)));
     let wrong = |(input, otherwise): (WrongInputKind, Option<f64>)| WrongInput {
         input,
         mismatch: as_written.mismatch,
@@ -131,6 +140,10 @@ fn by_pairs(views: &[&View], tags: &[SurveyedTag], lens: &CameraModel, as_writte
     };
     if let Some((input, otherwise)) = found {
         return Some(wrong((input, Some(otherwise))));
+    }
+    if let Some((ids, before, after)) = exchanged_ids(views, tags, lens, as_written.ratio) {
+        let input = WrongInputKind::ExchangedIds(ids);
+        return Some(WrongInput { input, mismatch: before, mismatch_otherwise: Some(after) });
     }
     if as_written.mismatch > BAD {
         return Some(wrong((WrongInputKind::OtherMap, None)));
@@ -144,6 +157,18 @@ fn scaled(lens: &CameraModel, scale: f64) -> CameraModel {
     let [fx, fy, cx, cy, k @ ..] = lens.intrinsics();
     let [a, b, c, d] = k;
     lens.with_intrinsics([fx * scale, fy * scale, cx * scale, cy * scale, a, b, c, d])
+}
+
+/// A lens of the same focal length and centre, without distortion: a fisheye for a pinhole, and the other way round.
+fn of_other_model(lens: &CameraModel) -> CameraModel {
+    let (focal_px, center_px, resolution_px) = (lens.focal_px(), lens.center_px(), lens.resolution_px());
+    let other: CameraModel = match lens.lens {
+        LensModel::Radtan(_) => {
+            Fisheye { focal_px, center_px, distortion: [0.0; 4], resolution_px, max_view_angle_rad: FISHEYE_RAD }.into()
+        }
+        _ => Radtan::new(focal_px, center_px, [0.0; 5], resolution_px).into(),
+    };
+    CameraModel { port: lens.port, ..other }
 }
 
 /// A tag whose quaternion was written x, y, z, w.
@@ -229,12 +254,46 @@ impl PosedTag<'_> {
     }
 }
 
+/// Tags that hang in one another's places, as the others have them: their ids, and their mismatch as written and so
+/// taken.
+fn exchanged_ids(
+    views: &[&View],
+    tags: &[SurveyedTag],
+    lens: &CameraModel,
+    ratio: f64,
+) -> Option<(Vec<u32>, f64, f64)> {
+    let posed: Vec<Vec<PosedTag<'_>>> = views.iter().map(|view| posed_tags(view, tags, lens)).collect();
+    // How far the tag `id` is from where the tags of `others` have it, if it hangs at `place`.
+    let off = |id: u32, place: &SurveyedTag, others: &dyn Fn(u32) -> bool| {
+        let pairs = posed.iter().flat_map(|of_view| ordered_pairs(of_view));
+        let of_tag = pairs.filter(|(a, b)| b.surveyed.id == id && others(a.surveyed.id));
+        let at_place = |(a, b): (&PosedTag<'_>, &PosedTag<'_>)| {
+            a.mismatch_of(&PosedTag { surveyed: place, poses: b.poses.clone() }, ratio)
+        };
+        quantile(&of_tag.map(at_place).collect::<Vec<f64>>(), 0.5)
+    };
+    let is_off = |tag: &&SurveyedTag| off(tag.id, tag, &|_| true).is_some_and(|mismatch| mismatch > BAD);
+    let doubtful: Vec<&SurveyedTag> = tags.iter().filter(is_off).collect();
+    let is_sound = |id: u32| doubtful.iter().all(|tag| tag.id != id);
+    let (mut before, mut after) = (Vec::new(), Vec::new());
+    for tag in &doubtful {
+        let places = doubtful.iter().filter(|place| place.id != tag.id);
+        let nearest = places.filter_map(|place| off(tag.id, place, &is_sound)).reduce(f64::min)?;
+        if nearest > GOOD {
+            return None;
+        }
+        before.push(off(tag.id, tag, &is_sound)?);
+        after.push(nearest);
+    }
+    let ids = doubtful.iter().map(|tag| tag.id).collect();
+    (doubtful.len() > 1).then_some((ids, quantile(&before, 0.5)?, quantile(&after, 0.5)?))
+}
+
 /// Of recorded poses of one landmark a view.
 fn by_rotations(views: &[&View], robot: &Robot) -> Option<WrongInput> {
     let base_from_camera = |view: &View| {
         let angle_rad = |joint: usize| robot.sensors[joint].center_rad + view.travel_rad[joint];
-        let angles = JointAngles::from_fn(view.travel_rad.len(), angle_rad);
-        robot.chain.link_poses(&angles).frame(&robot.camera.mount)
+        robot.tags_from_camera(&JointAngles::from_fn(view.travel_rad.len(), angle_rad))
     };
     let posed: Vec<(usize, Isometry3<f64>, Isometry3<f64>)> = views
         .iter()
@@ -287,7 +346,7 @@ impl WrongInput {
     /// What to do about it.
     #[must_use]
     pub fn remedy(&self) -> &'static str {
-        match self.input {
+        match &self.input {
             WrongInputKind::MapQuaternions => "write quaternion_wxyz of the tag map in the order w, x, y, z",
             WrongInputKind::RecordedQuaternions => "set the other one of quaternion_wxyz and quaternion_xyzw as \
                                                     tags.columns.rotation_form of the input map",
@@ -298,10 +357,12 @@ impl WrongInput {
                 "state the lens of the recorded image size in [camera] of robot.toml, or record images of the size \
                  that it was measured for"
             }
+            WrongInputKind::LensModel => "state the model and the distortion of that lens in [camera] of robot.toml",
             WrongInputKind::TagSize(_) => "measure the black square of one tag and correct size_m",
+            WrongInputKind::ExchangedIds(_) => "give each of them the id that is printed there",
             WrongInputKind::OtherMap => {
                 "give the tag map of this site with --tag-map, check the tags' ids, or make the map anew with `armcal \
-                 tagmap`"
+                 tagmap`; if the map is right, check the lens in [camera] of robot.toml"
             }
         }
     }
@@ -315,7 +376,7 @@ impl fmt::Display for WrongInput {
         let otherwise = self.mismatch_otherwise.unwrap_or(f64::NAN);
         let of_pairs = format!("{} of their distances instead of {}", percent(otherwise), percent(self.mismatch));
         let of_turns = format!("{} instead of {}", degrees(otherwise), degrees(self.mismatch));
-        match self.input {
+        match &self.input {
             WrongInputKind::MapQuaternions => {
                 write!(f, "the tag map's quaternions are in the order x, y, z, w: so read, the tags of a view fit one ")?;
                 write!(f, "another within {of_pairs}")
@@ -337,9 +398,18 @@ impl fmt::Display for WrongInput {
                 write!(f, "the lens of robot.toml is that of an image {scale} times the size of the recorded one: with ")?;
                 write!(f, "that taken into account, the tags of a view fit one another within {of_pairs}")
             }
+            WrongInputKind::LensModel => {
+                write!(f, "the lens is not of the model that robot.toml names, but a fisheye (equidistant) or pinhole in ")?;
+                write!(f, "its place: so taken, the tags of a view fit one another within {of_pairs}")
+            }
             WrongInputKind::TagSize(ratio) => {
                 write!(f, "all tags are {:+.1} % of their stated size", 100.0 * (ratio - 1.0))?;
-                margin_hint(ratio).map_or(Ok(()), |hint| write!(f, ", {hint}"))
+                margin_hint(*ratio).map_or(Ok(()), |hint| write!(f, ", {hint}"))
+            }
+            WrongInputKind::ExchangedIds(ids) => {
+                let ids: Vec<String> = ids.iter().map(ToString::to_string).collect();
+                write!(f, "the tag map has the ids {} in one another's places: so exchanged, ", ids.join(", "))?;
+                write!(f, "the tags of a view fit one another within {of_pairs}")
             }
             WrongInputKind::OtherMap => write!(
                 f,

@@ -60,6 +60,20 @@ fn a_map_of_other_tags_is_told() {
 }
 
 #[test]
+fn ids_that_are_exchanged_among_a_few_tags_are_told() {
+    let (data, robot) = sample();
+    let places: Vec<Isometry3<f64>> = robot.tags.iter().map(|tag| *tag.base_from_tag.isometry()).collect();
+    let ring = with_tags(&robot, |k, pose| if k < 3 { places[(k + 1) % 3] } else { *pose });
+    let ids: Vec<u32> = robot.tags[..3].iter().map(|tag| tag.id).collect();
+    let wrong = wrong_input(&data, &ring.tags, &ring).expect("a wrong input");
+    assert!(matches!(&wrong.input, WrongInputKind::ExchangedIds(found) if *found == ids), "{wrong}");
+    // Tags that were moved elsewhere are no exchange.
+    let by = Isometry3::translation(0.4, 0.3, 0.0);
+    let moved = with_tags(&robot, |k, pose| if k < 2 { by * pose } else { *pose });
+    assert_eq!(found(&data, &moved), None);
+}
+
+#[test]
 fn a_lens_of_another_image_size_is_told() {
     let (data, robot) = sample();
     let with_lens = |scale: f64| {
@@ -69,8 +83,11 @@ fn a_lens_of_another_image_size_is_told() {
     };
     assert_eq!(found(&data, &with_lens(2.0)), Some(WrongInputKind::ImageScale(2.0)));
     assert_eq!(found(&data, &with_lens(0.5)), Some(WrongInputKind::ImageScale(0.5)));
+    let mut pinhole = robot.clone();
+    pinhole.camera.lens = of_other_model(&robot.camera.lens);
+    assert_eq!(found(&data, &pinhole), Some(WrongInputKind::LensModel));
     let mut half = with_lens(0.5);
-    let armcal_core::optics::LensModel::Equidistant(lens) = &mut half.camera.lens.lens else { panic!("a fisheye") };
+    let LensModel::Equidistant(lens) = &mut half.camera.lens.lens else { panic!("a fisheye") };
     lens.resolution_px = lens.resolution_px.map(|side| side / 2);
     assert!(matches!(found(&data, &half), Some(WrongInputKind::ImageSize { stated_px: [612, 512], .. })));
 }
