@@ -355,7 +355,7 @@ fn a_recording_of_positions_needs_neither_lens_nor_stowed_pose_nor_tags() {
     write(&tags, &arm.tag_map());
     let calibrate = |robot: &Path, method: &str, out: &str| {
         let mut command = program();
-        command.arg("calibrate").arg(&recording).arg("--robot").arg(robot).arg("--input").arg(&map);
+        command.arg("calibrate").arg("--details").arg(&recording).arg("--robot").arg(robot).arg("--input").arg(&map);
         command.arg("--tag-map").arg(&tags).args(["--method", method]).arg("--out").arg(folder.path().join(out));
         answer(&mut command)
     };

@@ -41,7 +41,7 @@ impl Both {
     }
 }
 
-const CALIBRATE: &str = "--input given.toml --tag-map tags.toml --method minimum_distance --out out";
+const CALIBRATE: &str = "--input given.toml --tag-map tags.toml --method minimum_distance --out out --details";
 
 #[test]
 fn bags_give_the_calibration_of_their_messages() {

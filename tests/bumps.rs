@@ -134,7 +134,7 @@ fn nothing_is_bumped_into_where_there_is_nothing() {
     for (n, routine) in routines.iter().enumerate() {
         let out = folder.path().join(n.to_string());
         let mut command = program();
-        command.arg("run").arg(routine).arg("--out").arg(&out).args(["--seed", &(n + 1).to_string()]);
+        command.arg("run").arg("--details").arg(routine).arg("--out").arg(&out).args(["--seed", &(n + 1).to_string()]);
         let answer = answer(&mut command);
         // With a joint that does not move no view may come about; that is no bump either, and what was recorded stays.
         let is_cut = out.join("run-cut-1.mcap").is_file();
@@ -152,7 +152,7 @@ fn confirmed(routine: &Path, out: &Path, answers: &str, folder: &Path) -> Answer
     let file = folder.join("answers");
     write(&file, answers);
     let stdin = Stdio::from(File::open(&file).expect("opened"));
-    answer(program().arg("run").arg(routine).arg("--confirm").arg("--out").arg(out).stdin(stdin))
+    answer(program().arg("run").arg("--details").arg(routine).arg("--confirm").arg("--out").arg(out).stdin(stdin))
 }
 
 #[test]

@@ -5,6 +5,7 @@ mod inputs;
 mod inspect;
 mod live_view;
 mod long;
+mod manners;
 mod output;
 mod recordings;
 mod situations;

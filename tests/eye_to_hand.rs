@@ -56,7 +56,7 @@ impl Given {
 
     fn command(&self) -> Command {
         let mut command = program();
-        command.arg("calibrate").arg(self.file("arm.mcap")).arg("--robot").arg(&self.robot.folder);
+        command.arg("calibrate").arg("--details").arg(self.file("arm.mcap")).arg("--robot").arg(&self.robot.folder);
         for (option, name) in [("--input", "map.toml"), ("--tag-map", "board.toml"), ("--task", "task.toml")] {
             command.arg(option).arg(self.file(name));
         }

@@ -69,7 +69,7 @@ fn a_served_arm_is_calibrated_and_reaches_its_targets() {
     let routine = ShortRoutine::default().write(out.path());
     connection(out.path(), "");
     let script = "$ARMCAL serve $ROUTINE --arm arm.toml --factor 5 --truth truth.mcap 2>serve.log & SERVER=$!; \
-                  $ARMCAL run $ROUTINE --arm ros2:arm.toml --unattended --out out; CODE=$?; \
+                  $ARMCAL run $ROUTINE --arm ros2:arm.toml --unattended --details --out out; CODE=$?; \
                   kill -INT $SERVER; wait $SERVER; exit $CODE";
     let said = in_namespace(out.path(), &routine, script);
     said.expect("run --arm", 0, &["ACCEPTED", "of the arm's"]);

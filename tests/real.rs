@@ -41,7 +41,7 @@ impl Given {
 
     fn calibrate_of(&self, recordings: &[&str], more: &[&str]) -> Answer {
         let mut command = program();
-        command.arg("calibrate").args(recordings.iter().map(|name| self.file(name)));
+        command.arg("calibrate").arg("--details").args(recordings.iter().map(|name| self.file(name)));
         command.arg("--robot").arg(robot_folder()).arg("--input").arg(self.file("map.toml"));
         command.arg("--tag-map").arg(self.file("tags.toml")).arg("--out").arg(self.file("out"));
         if !more.contains(&"--method") {
@@ -428,7 +428,7 @@ fn corners_of_an_external_detector_are_used_as_our_own_are() {
         camera_frame = \"wrist_optical\"\nuse = \"corners\"\n";
     write(&given.file("map.toml"), map);
     let mut command = program();
-    command.arg("calibrate").arg(given.file("arm.mcap")).arg("--robot").arg(robot_folder());
+    command.arg("calibrate").arg("--details").arg(given.file("arm.mcap")).arg("--robot").arg(robot_folder());
     command.arg("--input").arg(given.file("map.toml")).arg("--out").arg(given.file("out"));
     command.args(["--method", "minimum_distance"]);
     answer(&mut command).expect("corners", 0, &["ACCEPTED", "24 poses", "reprojection error"]);
@@ -545,7 +545,7 @@ fn several_recordings_of_our_own_are_pooled_in_any_order() {
     let out = folder.path().join("out");
     let calibrate = |names: [&str; 2]| {
         let mut command = program();
-        command.arg("calibrate").args(names.map(|name| folder.path().join(name)));
+        command.arg("calibrate").arg("--details").args(names.map(|name| folder.path().join(name)));
         command.args(["--method", "minimum_distance"]).arg("--robot").arg(robot_folder()).arg("--out").arg(&out);
         answer(&mut command)
     };

@@ -27,7 +27,7 @@ fn robot() -> Robot {
 fn run(seed: u64, folder: &Path) -> Run {
     let out = folder.join(seed.to_string());
     let routine = root().join("routines/titan4-touch.toml");
-    answer(program().arg("run").arg(routine).arg("--seed").arg(seed.to_string()).arg("--out").arg(&out)).expect(
+    answer(program().arg("run").arg("--details").arg(routine).arg("--seed").arg(seed.to_string()).arg("--out").arg(&out)).expect(
         "the run",
         0,
         &["ACCEPTED"],

@@ -12,7 +12,7 @@ const ARMS: [&str; 2] = ["titan4-uncalibrated", "kraft-predator-uncalibrated"];
 
 fn run(routine: &str, arm: &str, seed: u64, more: &[&str], out: &Path) -> RunSummary {
     let mut command = program();
-    command.arg("run").arg(root().join(format!("routines/{routine}.toml")));
+    command.arg("run").arg("--details").arg(root().join(format!("routines/{routine}.toml")));
     command.arg("--robot").arg(root().join("robots").join(arm)).args(["--seed", &seed.to_string()]);
     for set in more {
         command.args(["--set", set]);

@@ -11,7 +11,7 @@ use crate::campaign::{
     Answer, CampaignError, CampaignSummary, Engine, Job, Prepared, Row, RunStatus, SingleRun, Table, run_job, run_jobs,
 };
 use crate::cli::exit::{Exit, UsageError, of_cause, of_summary};
-use crate::cli::stdout::note;
+use crate::cli::stdout::{is_quiet, note};
 use crate::output;
 use crate::report::RunSummary;
 use crate::run::Keep;
@@ -114,7 +114,7 @@ pub(super) struct CampaignBar {
 impl CampaignBar {
     /// `before`: rows that are there already.
     pub fn new(prepared: &Prepared, before: &Table, n_jobs: usize) -> Self {
-        let bar = ProgressBar::new(n_jobs as u64);
+        let bar = if is_quiet() { ProgressBar::hidden() } else { ProgressBar::new(n_jobs as u64) };
         if let Ok(style) = ProgressStyle::with_template("{elapsed_precise} {msg} {wide_bar} {pos}/{len}, {eta} left") {
             bar.set_style(style);
         }

@@ -8,13 +8,13 @@ use clap::Args;
 
 use crate::cli::calibrate_online::{calibrate_online, stationary};
 use crate::cli::calibration_inputs::{Calibrated, CalibrationInputs, load_robot};
-use crate::cli::closing::say_closing;
+use crate::cli::closing::ClosingArgs;
 use crate::cli::exit::Exit;
 use crate::cli::stdout::{note, say};
 use crate::output;
 #[cfg(feature = "viewer")]
 use crate::report::markdown;
-use crate::report::{About, Report, RunSummary, html, table};
+use crate::report::{About, Report, RunSummary, html};
 use armcal_belief::calib::{Calibration, CompactCalibration, MapResult, Status, View, covariance_file};
 use armcal_core::robot::Robot;
 use armcal_core::routine::Method;
@@ -25,28 +25,29 @@ pub(super) struct CalibrateArgs {
     #[arg(required = true)]
     recordings: Vec<PathBuf>,
     /// Folder of the robot (robot.toml and its URDF)
-    #[arg(long)]
+    #[arg(long, value_name = "DIR")]
     robot: PathBuf,
     /// For recordings that armcal did not make: an input map (.toml), which names topics and frames
-    #[arg(long)]
+    #[arg(long, value_name = "FILE")]
     input: Option<PathBuf>,
     /// Where the tags are: a tag map (.toml) in the frame of the arm's base, instead of what recording and robot say
-    #[arg(long)]
+    #[arg(long, value_name = "FILE")]
     tag_map: Option<PathBuf>,
     /// An accepted calibration.toml of this arm to start from, instead of the datasheet
-    #[arg(long)]
+    #[arg(long, value_name = "FILE")]
     prior: Option<PathBuf>,
-    /// Tolerance and targets or poses (.toml) that the tool error is predicted for, where no recording names any
-    #[arg(long)]
+    /// Tolerance (m) and targets (m) or poses (rad) that the tool error is predicted for (.toml), where no recording
+    /// names any
+    #[arg(long, value_name = "FILE")]
     task: Option<PathBuf>,
     /// A joint that has failed: JOINT=locked, dead, stuck or jumps; may be given several times (method bundle)
     #[arg(long, value_name = "JOINT=KIND")]
     failed: Vec<String>,
     /// Calibration method
-    #[arg(long, default_value_t)]
+    #[arg(long, value_name = "METHOD", default_value_t)]
     method: Method,
     /// Where to write calibration.toml, summary.json and report.html
-    #[arg(long, default_value = ".")]
+    #[arg(long, value_name = "DIR", default_value = ".")]
     out: PathBuf,
     /// Follow the recording view by view, as if the arm were at work, and write the belief over time (belief.jsonl)
     #[arg(long, conflicts_with_all = ["compact", "prior", "method"])]
@@ -55,9 +56,11 @@ pub(super) struct CalibrateArgs {
     /// belief is from that batch
     #[arg(long, requires = "online")]
     stationary: bool,
-    /// Print the calibration as one line below 512 bytes instead of the table
-    #[arg(long)]
+    /// Print the calibration as one line below 512 bytes instead of the verdict
+    #[arg(long, conflicts_with_all = ["details", "json"])]
     compact: bool,
+    #[command(flatten)]
+    closing: ClosingArgs,
 }
 
 pub(super) fn calibrate(args: &CalibrateArgs) -> Result<Exit> {
@@ -73,6 +76,7 @@ pub(super) fn calibrate(args: &CalibrateArgs) -> Result<Exit> {
         prior: args.prior.as_deref(),
         task: args.task.as_deref(),
     };
+    given.check_kinds()?;
     if args.online {
         return if args.stationary { stationary(&given, &args.out) } else { calibrate_online(&given, &args.out) };
     }
@@ -80,8 +84,7 @@ pub(super) fn calibrate(args: &CalibrateArgs) -> Result<Exit> {
     let Calibrated { calibration, lost, external } = given.calibrate()?;
     let summary = RunSummary::of_calibration(&calibration, started.elapsed().as_secs_f64());
     // Before anything is written: what has no compact form shall leave no half of the answer.
-    let shown =
-        if args.compact { CompactCalibration::of(&calibration)?.to_text()? } else { table(&summary).to_string() };
+    let compact = args.compact.then(|| CompactCalibration::of(&calibration)?.to_text()).transpose()?;
     let json = serde_json::to_string_pretty(&summary).context("summary.json")?;
     let (map_file, calibration_file) = (args.out.join("tagmap.toml"), args.out.join("calibration.toml"));
     let covariance_file = covariance_file(&calibration_file);
@@ -105,11 +108,12 @@ pub(super) fn calibrate(args: &CalibrateArgs) -> Result<Exit> {
             note(format_args!("warning: no replay: {error:#}"));
         }
     }
-    if args.compact {
-        say(&shown)?;
-    } else {
-        let out = args.out.display();
-        say_closing(&format!("{shown}\nwritten      {out}\nnext         {out}/report.html"))?;
+    match &compact {
+        Some(line) => say(line)?,
+        None => {
+            let out = args.out.display();
+            args.closing.say(&summary, &format!("written      {out}\nnext         {out}/report.html"))?;
+        }
     }
     Ok(match (calibration.status, lost) {
         (Status::Refused, _) => Exit::Refused,

@@ -5,8 +5,10 @@ use std::path::{Path, PathBuf};
 use anyhow::Result;
 
 use crate::cli::exit::UsageError;
+use crate::cli::file_kind::{FileKind, expect_kind, expect_option, expect_recording};
 use crate::cli::losses::{warn_of_external, warn_of_losses};
 use crate::cli::stdout::note;
+use crate::cli::waiting::Waiting;
 use armcal_belief::calib::online::{Batch, Follower, OnlineEvent, OnlineSettings};
 use armcal_belief::calib::{
     Calibration, CalibrationData, CalibrationFileError, ExternalContext, Status, View, calibrate, calibrate_data,
@@ -16,14 +18,17 @@ use armcal_belief::tagmap::files::{LandmarkFile, NamedSurvey, read_landmarks};
 #[cfg(not(feature = "sim"))]
 use armcal_core::input::read_external;
 #[cfg(feature = "sim")]
-use armcal_core::input::read_external_images;
+use armcal_core::input::{ImageDetector, ImageProblem, RecordedImage, TagCorners, read_external_images};
 use armcal_core::input::{
     ChildFrame, ExternalRecording, InputMap, Source, TagUse, read_camera_info, read_input_map, read_task,
 };
+#[cfg(feature = "sim")]
+use armcal_core::log::for_each_raw;
 use armcal_core::log::{Recording, TopicMap, scan_recording};
 use armcal_core::robot::{self, FailedJoint, FileIssue, Robot, SELF_COLLISION_FILE, TagSurvey};
 use armcal_core::routine::Method;
 use armcal_core::streams::{Message, ReachTask};
+use armcal_core::text::counted;
 use armcal_core::time::Stamp;
 
 /// All that a calibration from files is made of.
@@ -47,6 +52,24 @@ pub(super) struct Calibrated {
 }
 
 impl CalibrationInputs<'_> {
+    /// Refuses files that are known to be something else.
+    pub fn check_kinds(&self) -> Result<()> {
+        self.recordings.iter().try_for_each(|path| expect_recording(path))?;
+        let is_own = |path: &&PathBuf| FileKind::of(path) == Some(FileKind::Bag);
+        if let Some(bag) = self.recordings.iter().find(is_own).filter(|_| self.input.is_none()) {
+            let file = bag.display();
+            return Err(UsageError(format!(
+                "{file}: is a ROS bag, which needs an input map: `armcal inspect {file} --write-input MAP.toml` proposes \
+                 one, then give --input MAP.toml"
+            ))
+            .into());
+        }
+        expect_option(self.input, FileKind::InputMap)?;
+        expect_option(self.tag_map, FileKind::TagMap)?;
+        expect_option(self.prior, FileKind::Calibration)?;
+        expect_option(self.task, FileKind::Task)
+    }
+
     pub fn calibrate(&self) -> Result<Calibrated> {
         let prior = self.prior.map(|file| read_prior(file, self.robot)).transpose()?;
         let task = self.task()?;
@@ -69,6 +92,7 @@ impl CalibrationInputs<'_> {
     ) -> Result<(Calibration, bool)> {
         let survey = self.survey(landmarks)?;
         let (mut recordings, lost) = self.marked()?;
+        let _waiting = Waiting::on(&format!("calibrating by {}", counted(recordings.len(), "recording")));
         if let ([recording], None) = (&mut recordings[..], prior) {
             // Its own marks say which views are for what.
             let names_task = recording.messages.iter().any(|(_, message)| matches!(message, Message::Task(_)));
@@ -99,6 +123,7 @@ impl CalibrationInputs<'_> {
     ) -> Result<Calibrated> {
         let (prepared, lost) = self.external_views(file, landmarks, task)?;
         let external = Some((prepared.data.fit.clone(), prepared.robot.clone()));
+        let _waiting = Waiting::on(&format!("calibrating by {}", counted(prepared.data.fit.len(), "view")));
         Ok(Calibrated { calibration: calibrate_data(prepared, self.method, prior)?, lost, external })
     }
 
@@ -244,11 +269,49 @@ impl CalibrationInputs<'_> {
 /// Images are looked at as they are read, one at a time.
 #[cfg(feature = "sim")]
 fn read_with_images(path: &Path, map: &InputMap, robot: &Robot) -> Result<ExternalRecording> {
-    let mut detector = crate::recorded_images::RecordedImageDetector::new(
-        &robot.camera.lens,
-        map.tag_family.unwrap_or(robot.tag_family),
-    );
-    Ok(read_external_images(path, map, robot, &mut detector)?)
+    let family = map.tag_family.unwrap_or(robot.tag_family);
+    let detector = crate::recorded_images::RecordedImageDetector::new(&robot.camera.lens, family);
+    let waiting = match &map.source {
+        Source::Topics(topics) => watched_images(path, &topics.tags, topics.image_period_s)?,
+        Source::Table(_) => None,
+    };
+    Ok(read_external_images(path, map, robot, &mut Watched { detector, waiting })?)
+}
+
+/// A sign of life for recordings whose tags are in images; their number is found in a pass of its own, which takes next
+/// to no time beside the search.
+#[cfg(feature = "sim")]
+fn watched_images(path: &Path, topic: &str, period_s: f64) -> Result<Option<Waiting>> {
+    if !Waiting::on("looking for images").is_seen() {
+        return Ok(None);
+    }
+    let (mut n, mut next_nanos) = (0, 0);
+    for_each_raw(path, |raw| {
+        let is_image = raw.topic() == topic && raw.schema_name().ends_with("Image");
+        if is_image && raw.log_time_nanos >= next_nanos {
+            (n, next_nanos) = (n + 1, raw.log_time_nanos.saturating_add((1e9 * period_s) as u64));
+        }
+    })?;
+    Ok((n > 0).then(|| Waiting::for_each_of(n, "searching images for tags")))
+}
+
+/// A search of images that says how far it is.
+#[cfg(feature = "sim")]
+struct Watched {
+    detector: crate::recorded_images::RecordedImageDetector,
+    waiting: Option<Waiting>,
+}
+
+#[cfg(feature = "sim")]
+impl ImageDetector for Watched {
+    fn family(&self) -> TagFamily {
+        self.detector.family()
+    }
+
+    fn detect(&mut self, image: &RecordedImage) -> Result<Vec<TagCorners>, ImageProblem> {
+        self.waiting.iter().for_each(Waiting::one_more);
+        self.detector.detect(image)
+    }
 }
 
 #[cfg(not(feature = "sim"))]
@@ -282,6 +345,7 @@ impl Listener {
 
 /// The robot of a folder, with the joints that are declared as failed, `wrist_pitch=dead`.
 pub(super) fn load_robot(folder: &Path, failed: &[String]) -> Result<Robot> {
+    expect_kind(folder, &[FileKind::RobotFolder])?;
     let robot = robot::load(folder)?;
     // Of no matter here, and refused where paths are planned.
     if let Some(stale) = robot.planning_issues.iter().find(|issue| issue.key == SELF_COLLISION_FILE) {

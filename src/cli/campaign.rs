@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 use clap::Args;
 
 use crate::campaign::ExistingRows;
@@ -14,6 +14,7 @@ use crate::campaign::{
 };
 use crate::cli::batch::{BatchRun, CampaignBar, check_name, exit_of, range_of, run_many};
 use crate::cli::exit::{Exit, UsageError};
+use crate::cli::file_kind::expect_routine;
 use crate::cli::interrupt::Interrupt;
 use crate::cli::overrides::OverrideArgs;
 use crate::cli::stdout::{note, say};
@@ -43,12 +44,15 @@ pub(super) struct CampaignArgs {
     /// Threads, one run on each; all cores if not given
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
+    /// Print the summary as JSON in place of the table, as -summary.json has it
+    #[arg(long)]
+    json: bool,
     #[command(flatten)]
     overrides: OverrideArgs,
     /// Keep each run's folder, as `armcal run` leaves it, in FILE.runs
     #[arg(long)]
     keep: bool,
-    /// Throw away the rows that are there
+    /// Discard existing rows
     #[arg(long)]
     fresh: bool,
     /// Put the tables of shards together, into --out
@@ -74,11 +78,12 @@ fn merged(args: &CampaignArgs, out: &Path) -> Result<Exit> {
     let (rows, summary) = merge(&args.merge, missing)?;
     output::make_folder(output::parent(out))?;
     write_results(out, &rows, &summary)?;
-    show(&summary, out)
+    show(args, &summary, out)
 }
 
 fn run(args: &CampaignArgs, routine: &Path) -> Result<Exit> {
     let started = Instant::now();
+    expect_routine(routine)?;
     let stop = Interrupt::install()?;
     let request = Request { routine: routine.to_owned(), overrides: args.overrides.overrides() };
     let prepared = Prepared::load(request)?;
@@ -122,10 +127,14 @@ fn run(args: &CampaignArgs, routine: &Path) -> Result<Exit> {
     if !jobs.is_empty() {
         note(format_args!("{} runs in {:.0} s", jobs.len(), started.elapsed().as_secs_f64()));
     }
-    show(&summary, &out)
+    show(args, &summary, &out)
 }
 
-fn show(summary: &CampaignSummary, out: &Path) -> Result<Exit> {
-    say(&format!("{}written      {}", table(summary), out.display()))?;
+fn show(args: &CampaignArgs, summary: &CampaignSummary, out: &Path) -> Result<Exit> {
+    if args.json {
+        say(&serde_json::to_string_pretty(summary).context("the summary has no JSON form")?)?;
+    } else {
+        say(&format!("{}written      {}", table(summary), out.display()))?;
+    }
     Ok(exit_of(summary))
 }

@@ -2,12 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 use clap::Args;
+use serde::Serialize;
 
 #[cfg(feature = "sim")]
 use crate::campaign::Request;
 use crate::cli::exit::{Exit, UsageError, explain};
+use crate::cli::file_kind::FileKind;
 use crate::cli::overrides::OverrideArgs;
 use crate::cli::stdout::say;
 use armcal_belief::calib::{Calibration, CalibrationFileError};
@@ -24,6 +26,9 @@ pub(super) struct CheckArgs {
     /// Robot folders or robot.toml files, routines, vehicles, calibrations, input maps, tag maps, tasks, plans
     #[arg(required = true)]
     files: Vec<PathBuf>,
+    /// Print JSON in place of text: a list, an entry a file
+    #[arg(long)]
+    json: bool,
     /// For the routines among them
     #[command(flatten)]
     overrides: OverrideArgs,
@@ -31,22 +36,49 @@ pub(super) struct CheckArgs {
 
 pub(super) fn check(args: &CheckArgs) -> Result<Exit> {
     let overrides = args.overrides.overrides();
-    let mut all_good = true;
-    for file in &args.files {
-        match check_one(file, &overrides) {
-            Ok(found) => {
-                say(&format!("ok: {}: {}", file.display(), found.text))?;
-                for warning in &found.warnings {
-                    say(&format!("warning: {}: {warning}", file.display()))?;
-                }
-            }
+    let checked = args.files.iter().map(|file| Checked::of(file, &overrides));
+    let checked: Vec<Checked> = if args.json {
+        let checked: Vec<Checked> = checked.collect();
+        say(&serde_json::to_string_pretty(&checked).context("the answer has no JSON form")?)?;
+        checked
+    } else {
+        checked.map(|checked| say(&checked.lines()).map(|()| checked)).collect::<Result<_>>()?
+    };
+    Ok(if checked.iter().all(|checked| checked.ok) { Exit::Ok } else { Exit::InvalidInput })
+}
+
+/// What was found of one file.
+#[derive(Serialize)]
+struct Checked {
+    file: String,
+    ok: bool,
+    /// What it holds.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    holds: Option<String>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    warnings: Vec<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    error: Option<String>,
+}
+
+impl Checked {
+    fn of(file: &Path, overrides: &Overrides) -> Self {
+        let name = file.display().to_string();
+        match check_one(file, overrides) {
+            Ok(Found { text, warnings }) => Self { file: name, ok: true, holds: Some(text), warnings, error: None },
             Err(error) => {
-                all_good = false;
-                say(&format!("error: {}", explain(&error)))?;
+                Self { file: name, ok: false, holds: None, warnings: Vec::new(), error: Some(explain(&error)) }
             }
         }
     }
-    Ok(if all_good { Exit::Ok } else { Exit::InvalidInput })
+
+    fn lines(&self) -> String {
+        let Self { file, holds, warnings, error, .. } = self;
+        let found = holds.iter().map(|holds| format!("ok: {file}: {holds}"));
+        let warnings = warnings.iter().map(|warning| format!("warning: {file}: {warning}"));
+        let errors = error.iter().map(|error| format!("error: {error}"));
+        found.chain(warnings).chain(errors).collect::<Vec<_>>().join("\n")
+    }
 }
 
 /// What a file holds, and what a run would go on without.
@@ -62,61 +94,68 @@ fn check_one(file: &Path, overrides: &Overrides) -> Result<Found> {
     if file.file_name().is_some_and(|name| name == "robot.toml") {
         return check_robot(file.parent().unwrap_or(Path::new(".")));
     }
+    expect_toml(file)?;
     let text = robot::read_text(file)?;
     let table: toml::Table = robot::parse_toml(file, &text)?;
-    if table.contains_key("robot") && table.contains_key("vehicle") && !table.contains_key("inputs_hash") {
-        return check_routine(file, overrides);
+    match FileKind::of_table(&table) {
+        Some(FileKind::Routine) => check_routine(file, overrides),
+        kind => Ok(Found { text: describe(file, &text, kind)?, warnings: Vec::new() }),
     }
-    Ok(Found { text: describe(file, &text, &table)?, warnings: Vec::new() })
+}
+
+/// Recordings and drawings have commands of their own.
+fn expect_toml(file: &Path) -> Result<()> {
+    let advice = match FileKind::of(file) {
+        Some(FileKind::Recording | FileKind::Bag) => "`armcal inspect` says what is in it",
+        Some(FileKind::Urdf) => "`armcal new-robot` makes a robot folder of it",
+        Some(FileKind::Rerun) => "open it with `rerun FILE`",
+        _ => return Ok(()),
+    };
+    let (name, kind) = (file.display(), FileKind::of(file).map_or("", FileKind::name));
+    Err(UsageError(format!("{name}: is {kind}, and not to be checked; {advice}")).into())
 }
 
 /// What a file that is neither robot nor routine holds.
-fn describe(file: &Path, text: &str, table: &toml::Table) -> Result<String> {
-    if table.contains_key("inputs_hash") {
-        let plan = PlanFile::read(file)?;
-        let (poses, least_m) = (plan.pose.len(), plan.totals.least_clearance_m);
-        let arm_min = plan.totals.arm_time_s / 60.0;
-        return Ok(format!(
-            "plan for `{}`, {poses} poses in {arm_min:.1} min, at least {least_m:.3} m clear",
-            plan.robot
-        ));
-    }
-    if table.contains_key("part") {
-        let vehicle = robot::load_vehicle(file)?;
-        let tags = vehicle
-            .survey
-            .as_ref()
-            .map_or_else(String::new, |survey| format!(", {}", counted(survey.tags.len(), "tag")));
-        return Ok(format!("vehicle `{}`, {} parts{tags}", vehicle.name, vehicle.parts.len()));
-    }
-    if table.contains_key("joint_sensors") && table.contains_key("tags") {
-        return Ok(describe_input(&read_input_map(file)?));
-    }
-    if table.contains_key("frame") && table.contains_key("tag") {
-        let map = read_landmarks(file)?;
-        return Ok(format!("tag map in the frame `{}`, {}", map.frame, counted(map.landmarks.len(), "landmark")));
-    }
-    if table.contains_key("tolerance_m") {
-        let task = read_task(file)?;
-        let (targets, poses) = (task.targets_m.len(), task.poses_rad.len());
-        return Ok(format!("task, {targets} targets and {poses} poses, tolerance {} mm", task.tolerance_m * 1e3));
-    }
-    if table.contains_key("messages_hash") {
-        return describe_calibration(file, text);
-    }
-    if table.contains_key("robot") && table.contains_key("task") {
-        return Err(UsageError(format!(
+fn describe(file: &Path, text: &str, kind: Option<FileKind>) -> Result<String> {
+    match kind {
+        Some(FileKind::Plan) => {
+            let plan = PlanFile::read(file)?;
+            let (poses, least_m) = (plan.pose.len(), plan.totals.least_clearance_m);
+            let arm_min = plan.totals.arm_time_s / 60.0;
+            Ok(format!(
+                "plan for `{}`, {poses} poses in {arm_min:.1} min, at least {least_m:.3} m clear",
+                plan.robot
+            ))
+        }
+        Some(FileKind::Vehicle) => {
+            let vehicle = robot::load_vehicle(file)?;
+            let n_tags = vehicle.survey.as_ref().map(|survey| survey.tags.len());
+            let tags = n_tags.map_or_else(String::new, |n| format!(", {}", counted(n, "tag")));
+            Ok(format!("vehicle `{}`, {} parts{tags}", vehicle.name, vehicle.parts.len()))
+        }
+        Some(FileKind::InputMap) => Ok(describe_input(&read_input_map(file)?)),
+        Some(FileKind::TagMap) => {
+            let map = read_landmarks(file)?;
+            Ok(format!("tag map in the frame `{}`, {}", map.frame, counted(map.landmarks.len(), "landmark")))
+        }
+        Some(FileKind::Task) => {
+            let task = read_task(file)?;
+            let (targets, poses) = (task.targets_m.len(), task.poses_rad.len());
+            Ok(format!("task, {targets} targets and {poses} poses, tolerance {} mm", task.tolerance_m * 1e3))
+        }
+        Some(FileKind::Calibration) => describe_calibration(file, text),
+        Some(FileKind::RoutineWithoutVehicle) => Err(UsageError(format!(
             "{}: vehicle: is missing; a routine names the vehicle that carries the arm: \
              robots/vehicles/fixed-base.toml is an arm bolted to the ground",
             file.display()
         ))
-        .into());
+        .into()),
+        _ => Err(UsageError(format!(
+            "{}: is none of robot, routine, vehicle, calibration, input map, tag map, task, plan",
+            file.display()
+        ))
+        .into()),
     }
-    Err(UsageError(format!(
-        "{}: is none of robot, routine, vehicle, calibration, input map, tag map, task, plan",
-        file.display()
-    ))
-    .into())
 }
 
 /// One without its covariance still moves an arm; one beside another's is wrong.
@@ -156,8 +195,12 @@ fn describe_input(map: &InputMap) -> String {
 fn check_robot(folder: &Path) -> Result<Found> {
     let robot = robot::load(folder)?;
     let missing = robot.planning_issues.iter();
-    let warnings = missing.map(|issue| format!("run and plan will refuse it: {}: {}", issue.key, issue.problem));
-    Ok(Found { text: describe_robot(&robot)?, warnings: warnings.collect() })
+    let refused = missing.map(|issue| format!("run and plan will refuse it: {}: {}", issue.key, issue.problem));
+    let lost = robot.base_tag.filter(|_| robot.tags.is_empty());
+    let lost = lost.map(|id| {
+        format!("base_tag: there is no [[tag]], so that tag {id} must be one of the vehicle's, or of a tag map")
+    });
+    Ok(Found { text: describe_robot(&robot)?, warnings: refused.chain(lost).collect() })
 }
 
 fn describe_robot(robot: &Robot) -> Result<String> {

@@ -2,10 +2,12 @@
 
 use std::io::{IsTerminal, stdout};
 
-use anyhow::Result;
+use anyhow::{Context, Result};
+use clap::Args;
 use armcal_core::text::printable;
 
-use crate::cli::stdout::say_as_it_is;
+use crate::cli::stdout::{is_quiet, say, say_as_it_is};
+use crate::report::{RunSummary, closing, table};
 
 /// Every line begins with a label of this width; what goes on below begins where the text did.
 const LABEL_WIDTH: usize = 13;
@@ -34,6 +36,32 @@ impl Look {
         let wants_none = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
         let is_dumb = std::env::var_os("TERM").is_none_or(|term| term == "dumb");
         Self { width: width.filter(|_| is_terminal), colors: is_terminal && !wants_none && !is_dumb }
+    }
+}
+
+/// What is said at the end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Args)]
+pub(super) struct ClosingArgs {
+    /// Print all tables, findings and counts at the end, and not the verdict and three figures alone
+    #[arg(long)]
+    details: bool,
+    /// Print summary.json in place of text
+    #[arg(long, conflicts_with = "details")]
+    pub json: bool,
+}
+
+impl ClosingArgs {
+    /// Writes the verdict and what it rests on, then `next`: where the files are, and what to do.
+    pub fn say(self, summary: &RunSummary, next: &str) -> Result<()> {
+        if self.json {
+            return say(&serde_json::to_string_pretty(summary).context("the summary has no JSON form")?);
+        }
+        let text = if self.details { table(summary) } else { closing(summary) };
+        let lines = if is_quiet() { 1 } else { usize::MAX };
+        let text = if self.details { text } else { text.lines().take(lines).collect::<Vec<_>>().join("\n") };
+        let next = if is_quiet() { String::new() } else { format!("\n{next}") };
+        let more = if self.details || is_quiet() { "" } else { "; all figures: --details" };
+        say_closing(&format!("{text}{next}{more}"))
     }
 }
 

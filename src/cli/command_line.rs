@@ -5,11 +5,12 @@ use std::process::ExitCode;
 use std::sync::LazyLock;
 
 use anyhow::Result;
-use clap::{CommandFactory, Parser, Subcommand};
+use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
 
 #[cfg(feature = "viewer")]
 use crate::cli::replay;
-use crate::cli::stdout::{is_written, note};
+use crate::cli::examples::with_examples;
+use crate::cli::stdout::{be_quiet, complain, is_written};
 use crate::cli::{calibrate, check, completions, exit, export, inspect, new_robot, plan, tagmap, watch};
 #[cfg(feature = "sim")]
 use crate::cli::{campaign, regress, run, sensitivity, serve, study};
@@ -32,8 +33,32 @@ static VERSION: LazyLock<String> = LazyLock::new(|| {
 #[derive(Debug, Parser)]
 #[command(name = "armcal", version = VERSION.as_str(), about, max_term_width = 100)]
 struct Cli {
+    #[command(flatten)]
+    loudness: Loudness,
     #[command(subcommand)]
     command: Command,
+}
+
+/// How much is said.
+#[derive(Debug, Args)]
+struct Loudness {
+    /// Say the verdict and errors alone: no progress, notes, warnings or further lines
+    #[arg(long, short, global = true, conflicts_with = "verbose")]
+    quiet: bool,
+    /// Say on stderr what is done; -vv: why, too
+    #[arg(long, short, global = true, action = clap::ArgAction::Count)]
+    verbose: u8,
+}
+
+impl Loudness {
+    fn level(&self) -> tracing::Level {
+        match (self.quiet, self.verbose) {
+            (true, _) => tracing::Level::ERROR,
+            (false, 0) => tracing::Level::WARN,
+            (false, 1) => tracing::Level::INFO,
+            (false, _) => tracing::Level::DEBUG,
+        }
+    }
 }
 
 #[derive(Debug, Subcommand)]
@@ -86,19 +111,23 @@ enum Command {
 /// The definition of the command line, for those who check quoted command lines.
 #[must_use]
 pub fn command() -> clap::Command {
-    Cli::command()
+    with_examples(Cli::command())
 }
 
 /// Parses the command line, does what it says and gives the exit code; errors go to stderr once, here.
 #[must_use]
 pub fn main() -> ExitCode {
-    let cli = match Cli::try_parse() {
+    let parsed = command().try_get_matches().and_then(|matches| Cli::from_arg_matches(&matches));
+    let cli = match parsed {
         Ok(cli) => cli,
         Err(answer) => return clap_answer(&answer),
     };
+    if cli.loudness.quiet {
+        be_quiet();
+    }
     tracing_subscriber::fmt()
         .with_writer(std::io::stderr)
-        .with_max_level(tracing::Level::WARN)
+        .with_max_level(cli.loudness.level())
         .without_time()
         .with_target(false)
         .log_internal_errors(false)
@@ -135,7 +164,7 @@ pub fn main() -> ExitCode {
 fn ended(result: Result<exit::Exit>) -> ExitCode {
     result
         .unwrap_or_else(|error| {
-            note(format_args!("error: {}", exit::explain(&error)));
+            complain(format_args!("error: {}", exit::explain(&error)));
             exit::of_error(&error)
         })
         .into()

@@ -6,8 +6,10 @@ use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 
+use crate::cli::calibration_inputs::load_robot;
 use crate::cli::exit::{Exit, UsageError};
-use crate::cli::stdout::{note, say};
+use crate::cli::file_kind::{FileKind, expect_kind};
+use crate::cli::stdout::{complain, note, say};
 use crate::export::{
     MAX_POINTS, MIN_POINTS, SensorTable, calibrated_urdf, camchain, csv_rows, joints_with_terms, ros_parameters,
     ros2_control, tagslam_map,
@@ -15,8 +17,8 @@ use crate::export::{
 use armcal_belief::calib::{
     Calibration, CalibrationFileError, CompactCalibration, CovarianceTable, LookupTable, Status,
 };
-use armcal_core::files::{self, FileKind};
-use armcal_core::robot::{self, Robot};
+use armcal_core::files::{self, FileKind as Size};
+use armcal_core::robot::Robot;
 use armcal_core::sensor::{ArmSensors, SensorModel};
 
 #[derive(Debug, Args)]
@@ -28,7 +30,7 @@ pub(super) struct ExportArgs {
     form: Form,
     /// Robot folder with the arm's drawing, as the calibration had it: needed for urdf, ros2-control, ros-parameters,
     /// table and kalibr; turns a compact text's corrections into the keys of calibration.toml
-    #[arg(long)]
+    #[arg(long, value_name = "DIR")]
     robot: Option<PathBuf>,
     /// Points a joint of a table, 2 .. 10000; default: as few as keep straight lines between them within 0.02 mm at the
     /// tool
@@ -97,14 +99,15 @@ pub(super) fn export(args: &ExportArgs) -> Result<Exit> {
     if args.points.is_some() && args.form != Form::Table {
         return Err(UsageError(format!("--points goes with --as table, not with --as {}", args.form.name())).into());
     }
-    let robot = args.robot.as_deref().map(robot::load).transpose()?;
+    expect_kind(&args.file, &[FileKind::Calibration])?;
+    let robot = args.robot.as_deref().map(|folder| load_robot(folder, &[])).transpose()?;
     let input = read_input(&args.file)?;
     if args.form.is_for_drivers()
         && !args.allow_refused
         && let Some(why) = input.refusal()
     {
         let (file, form) = (args.file.display(), args.form.name());
-        note(format!("error: {file}: the calibration is refused: {why}; --allow-refused writes {form} nevertheless"));
+        complain(format!("error: {file}: the calibration is refused: {why}; --allow-refused writes {form} nevertheless"));
         return Ok(Exit::Refused);
     }
     let text = match input {
@@ -249,9 +252,9 @@ fn read_input(file: &Path) -> Result<Input> {
     let is_stdin = file == Path::new("-");
     let name = if is_stdin { "stdin".to_owned() } else { file.display().to_string() };
     let read = if is_stdin {
-        files::read_within(std::io::stdin().lock(), FileKind::Text)
+        files::read_within(std::io::stdin().lock(), Size::Text)
     } else {
-        files::read_bytes(file, FileKind::Text)
+        files::read_bytes(file, Size::Text)
     };
     let bytes = read.map_err(|error| UsageError(format!("{name}: cannot be read: {error}")))?;
     let not_text = |_| UsageError(format!("{name}: is no text: neither a calibration.toml nor a compact calibration"));

@@ -7,6 +7,7 @@ use clap::Args;
 
 use crate::cli::calibration_inputs::load_robot;
 use crate::cli::exit::{Exit, UsageError};
+use crate::cli::file_kind::expect_recording;
 use crate::cli::stdout::{note, say};
 use crate::output;
 use crate::report::inspection::{State, inspect as look, to_text};
@@ -20,7 +21,7 @@ pub(super) struct InspectArgs {
     /// The recording (.mcap), of armcal or of any other arm
     recording: PathBuf,
     /// Robot folder: says which of its parameters the recording would determine; the attached drawings if not given
-    #[arg(long)]
+    #[arg(long, value_name = "DIR")]
     robot: Option<PathBuf>,
     /// Print JSON instead of text
     #[arg(long)]
@@ -31,6 +32,7 @@ pub(super) struct InspectArgs {
 }
 
 pub(super) fn inspect(args: &InspectArgs) -> Result<Exit> {
+    expect_recording(&args.recording)?;
     let robot = match &args.robot {
         Some(folder) => Some(load_robot(folder, &[])?),
         None => attached_robot(&args.recording)?,

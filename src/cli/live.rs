@@ -30,7 +30,7 @@ pub(super) struct LiveArgs {
     /// First move one joint after the other by one degree and back, each after a yes, and go on only where all follow
     #[arg(long, requires = "arm", conflicts_with_all = ["unattended", "no_motion"])]
     nudge: bool,
-    /// Drive every joint at this share of the rate that the robot's file allows
+    /// Drive every joint at this share of the rate that the robot's file allows, 0.01 .. 1
     #[arg(long, requires = "arm", value_name = "SHARE", default_value_t = 1.0, value_parser = share)]
     speed: f64,
 }

@@ -53,6 +53,9 @@ pub(super) fn warn_of_external(recording: &ExternalRecording, robot: &Robot) -> 
         note(format_args!("warning: {file}: {}; what could be read is used", describe(&recording.completeness)));
     }
     warn_of_order(&recording.path, recording.chunk_order);
+    if let Some(doubt) = &recording.unit_doubt {
+        note(format_args!("warning: {file}: {doubt}"));
+    }
     for (what, n) in &recording.left_out {
         note(format_args!("warning: {file}: {n} {what} left out"));
     }

@@ -14,8 +14,10 @@ mod command_line;
 mod completions;
 #[cfg(feature = "sim")]
 mod confirm;
+mod examples;
 mod exit;
 mod export;
+mod file_kind;
 mod inspect;
 mod interrupt;
 #[cfg(feature = "sim")]
@@ -57,6 +59,7 @@ mod study_poses;
 #[cfg(feature = "sim")]
 mod study_worlds;
 mod tagmap;
+mod waiting;
 mod watch;
 
 pub use command_line::{command, main};

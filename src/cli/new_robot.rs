@@ -6,6 +6,7 @@ use anyhow::{Context, Result};
 use clap::Args;
 
 use crate::cli::exit::{Exit, UsageError};
+use crate::cli::file_kind::{FileKind, expect_kind};
 use crate::cli::stdout::say;
 use crate::output;
 use armcal_belief::plan::{always_near, clear_angles};
@@ -16,23 +17,24 @@ pub(super) struct NewRobotArgs {
     /// The arm's URDF; its meshes are looked for beside it and in the folders above
     urdf: PathBuf,
     /// The folder to write; it must be empty or not there
-    #[arg(long)]
+    #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// Link whose frame is the base frame; default: the root
-    #[arg(long)]
+    #[arg(long, value_name = "LINK")]
     base: Option<String>,
     /// Link of the tool; default: the end of the longest chain of revolute joints
-    #[arg(long)]
+    #[arg(long, value_name = "LINK")]
     tip: Option<String>,
     /// Link of the camera's optical frame; default: a link that is called camera or optical, else the tool's
-    #[arg(long)]
+    #[arg(long, value_name = "LINK")]
     camera_link: Option<String>,
     /// Name of the robot; default: that in the URDF
-    #[arg(long)]
+    #[arg(long, value_name = "NAME")]
     name: Option<String>,
 }
 
 pub(super) fn new_robot(args: &NewRobotArgs) -> Result<Exit> {
+    expect_kind(&args.urdf, &[FileKind::Urdf])?;
     refuse_full(&args.out)?;
     let wanted = NewRobot {
         urdf: &args.urdf,

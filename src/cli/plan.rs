@@ -8,14 +8,16 @@ use comfy_table::presets::{ASCII_MARKDOWN, UTF8_FULL_CONDENSED};
 use comfy_table::{CellAlignment, Table};
 
 use crate::cli::calibration_inputs::read_prior;
+use crate::cli::closing::say_closing;
 use crate::cli::exit::Exit;
+use crate::cli::file_kind::{FileKind, expect_option, expect_routine};
 use crate::cli::overrides::OverrideArgs;
-use crate::cli::stdout::{note, say};
+use crate::cli::stdout::{is_quiet, note, say};
 use crate::output;
 use armcal_belief::plan::{
     ArmBelief, ClearanceModel, ItineraryRequest, PlanFile, PlanHeader, PoseTable, SetName, plan_itinerary,
 };
-use armcal_core::files::{self, FileKind};
+use armcal_core::files::{self, FileKind as Size};
 use armcal_core::robot::{Robot, Vehicle};
 use armcal_core::routine::{self, Overrides, Routine, Step, effective_table};
 use armcal_core::stats::stream_rng;
@@ -33,6 +35,12 @@ pub(super) struct PlanArgs {
     /// Output folder for plan.toml, plan.md and plan.rrd; recordings/ROUTINE-NAME-plan if not given
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Print each pose with its joints, counts and tags at the end, and not the figures alone
+    #[arg(long)]
+    details: bool,
+    /// Print the plan as JSON, with the keys of plan.toml
+    #[arg(long, conflicts_with = "details")]
+    json: bool,
     #[command(flatten)]
     overrides: OverrideArgs,
 }
@@ -41,6 +49,8 @@ pub(super) struct PlanArgs {
 const DOMAIN: &[u8] = b"armcal plan 1";
 
 pub(super) fn plan(args: &PlanArgs) -> Result<Exit> {
+    expect_routine(&args.routine)?;
+    expect_option(args.prior.as_deref(), FileKind::Calibration)?;
     let overrides = args.overrides.overrides();
     let routine = routine::load_with(&args.routine, &overrides)?;
     let (robot, vehicle) = routine.load_arm()?;
@@ -76,8 +86,25 @@ pub(super) fn plan(args: &PlanArgs) -> Result<Exit> {
         (&markdown_path, markdown.as_bytes()),
         (&toml_path, toml.as_bytes()),
     ])?;
-    say(&format!("{}\n{}\nwritten      {}", table(&file, UTF8_FULL_CONDENSED), totals(&file), out.display()))?;
+    say_plan(args, &file, &out)?;
     Ok(Exit::Ok)
+}
+
+fn say_plan(args: &PlanArgs, file: &PlanFile, out: &Path) -> Result<()> {
+    if args.json {
+        return say(&serde_json::to_string_pretty(file).context("the plan has no JSON form")?);
+    }
+    let totals = totals(file);
+    if is_quiet() {
+        return say(totals.lines().next().unwrap_or_default());
+    }
+    let out = out.display();
+    let next = format!("written      {out}\nnext         {out}/plan.md to fly by, {out}/plan.rrd to look at");
+    if args.details {
+        say_closing(&format!("{}\n{totals}\n{next}", table(file, UTF8_FULL_CONDENSED)))
+    } else {
+        say_closing(&format!("{totals}\n{next}; each pose: --details"))
+    }
 }
 
 fn planned(
@@ -125,7 +152,7 @@ fn inputs_hash(
         hasher.update(bytes);
     };
     let read = |path: &Path| {
-        files::read_bytes(path, FileKind::Text).with_context(|| format!("{}: cannot be read", path.display()))
+        files::read_bytes(path, Size::Text).with_context(|| format!("{}: cannot be read", path.display()))
     };
     let mut table = effective_table(routine, &overrides.set)?;
     for key in ["seed", "robot", "vehicle", "world", "campaign", "regress"] {
@@ -146,7 +173,7 @@ fn inputs_hash(
 fn table(file: &PlanFile, preset: &str) -> String {
     let mut table = Table::new();
     table.load_preset(preset);
-    table.set_header(["pose", "for", "joints, deg", "raw counts", "tags", "clear, mm", "tool error, mm", "at, s"]);
+    table.set_header(["pose", "for", "joints, deg", "counts by robot.toml", "tags", "clear, mm", "tool error, mm", "at, s"]);
     for pose in &file.pose {
         table.add_row(row(pose));
     }

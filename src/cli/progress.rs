@@ -5,7 +5,7 @@ use std::time::Instant;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::cli::interrupt::Interrupt;
-use crate::cli::stdout::note;
+use crate::cli::stdout::{complain, is_quiet};
 use armcal_belief::session::Progress;
 use armcal_core::streams::Phase;
 
@@ -14,22 +14,24 @@ pub(super) struct Bar {
     bar: ProgressBar,
     started: Instant,
     interrupt: Interrupt,
+    /// Time left is told of the present one.
+    phase: &'static str,
 }
 
 impl Bar {
     /// `started`: when the command began. Stops the run when `interrupt` says so.
     pub fn new(started: Instant, interrupt: Interrupt) -> Self {
-        let bar = ProgressBar::new(1);
-        let template = "{elapsed_precise} {msg:<44} {wide_bar} {pos}/{len}";
+        let bar = if is_quiet() { ProgressBar::hidden() } else { ProgressBar::new(1) };
+        let template = "{elapsed_precise} {msg:<44} {wide_bar} {pos}/{len}, {eta} left";
         if let Ok(style) = ProgressStyle::with_template(template) {
             bar.set_style(style);
         }
-        Self { bar, started, interrupt }
+        Self { bar, started, interrupt, phase: "" }
     }
 
-    /// A line above the bar, on stderr, whether that is a terminal or not.
+    /// A line above the bar, on stderr, whether that is a terminal or not: a question.
     pub fn say(&self, line: &str) {
-        self.bar.suspend(|| note(format_args!("{line}")));
+        self.bar.suspend(|| complain(format_args!("{line}")));
     }
 
     pub fn finish(&self) {
@@ -47,6 +49,9 @@ impl Progress for Bar {
             Phase::Wait => "waiting",
             Phase::Done => "done",
         };
+        if std::mem::replace(&mut self.phase, what) != what {
+            self.bar.reset_eta();
+        }
         self.bar.set_length(total as u64);
         self.bar.set_position(done as u64);
         self.bar.set_message(format!("{what}, {simulated_s:.0} s of simulated time"));

@@ -12,6 +12,7 @@ use crate::campaign::{
 };
 use crate::cli::batch::{BatchRun, CampaignBar, check_name, range_of, run_many};
 use crate::cli::exit::{Exit, UsageError};
+use crate::cli::file_kind::expect_routine;
 use crate::cli::interrupt::Interrupt;
 use crate::cli::overrides::OverrideArgs;
 use crate::cli::stdout::{note, say};
@@ -61,6 +62,7 @@ pub(super) struct RegressArgs {
 }
 
 pub(super) fn regress(args: &RegressArgs) -> Result<Exit> {
+    expect_routine(&args.routine)?;
     if let Some(out) = args.write_baseline.as_ref().or(args.out.as_ref()) {
         check_name(out)?;
     }

@@ -6,13 +6,14 @@ use anyhow::{Context, Result};
 use clap::Args;
 
 use crate::cli::exit::{Exit, UsageError};
+use crate::cli::file_kind::{FileKind, expect_kind};
 use crate::cli::live_view::LiveViewArgs;
 use crate::cli::losses::warn_of_losses;
 use crate::cli::stdout::{note, say};
 use crate::output;
 use armcal_belief::calib::online::BeliefLog;
 use armcal_belief::calib::{Calibration, Status, surveyed};
-use armcal_core::files::{self, FileKind};
+use armcal_core::files::{self, FileKind as Size};
 use armcal_core::kinematics::LinkCorrections;
 use armcal_core::log::{Recording, Stream, read_attachments};
 use armcal_core::robot::{self, Robot, Vehicle};
@@ -26,16 +27,17 @@ pub(super) struct ReplayArgs {
     /// the online belief by a belief.jsonl
     recording: PathBuf,
     /// Write this .rrd file instead of opening the viewer
-    #[arg(long)]
+    #[arg(long, visible_alias = "out", value_name = "FILE")]
     save: Option<PathBuf>,
     #[command(flatten)]
     view: LiveViewArgs,
     /// Folder of the robot, where the recording does not carry its drawings
-    #[arg(long)]
+    #[arg(long, value_name = "DIR")]
     robot: Option<PathBuf>,
 }
 
 pub(super) fn replay(args: &ReplayArgs) -> Result<Exit> {
+    expect_kind(&args.recording, &[FileKind::Recording])?;
     let recording = read_for_replay(&args.recording)?;
     let lost = warn_of_losses(&recording);
     say_what_is_left_out(&recording);
@@ -99,7 +101,7 @@ fn links_beside(recording: &Path, robot: &Robot) -> Vec<(Stamp, LinkCorrections)
         return Vec::new();
     }
     // Without its covariance, too: links are in the table.
-    let read = files::read_text(&file, FileKind::Text).map_err(|error| error.to_string());
+    let read = files::read_text(&file, Size::Text).map_err(|error| error.to_string());
     match read.and_then(|text| Calibration::parse(&file, &text).map_err(|error| error.to_string())) {
         Ok(calibration)
             if calibration.robot == robot.name
@@ -122,7 +124,7 @@ fn belief_beside(recording: &Path, robot: &Robot) -> Option<BeliefLog> {
     if !file.is_file() {
         return None;
     }
-    let read = files::read_text(&file, FileKind::Text).map_err(|error| error.to_string());
+    let read = files::read_text(&file, Size::Text).map_err(|error| error.to_string());
     match read.and_then(|text| BeliefLog::from_jsonl(&text)) {
         Ok(log) if log.beliefs().all(|row| row.offset_rad.len() == robot.n_joints()) => Some(log),
         Ok(_) => None,

@@ -6,9 +6,10 @@ use std::time::{Duration, Instant};
 use anyhow::Result;
 use clap::Args;
 
-use crate::cli::closing::say_closing;
+use crate::cli::closing::ClosingArgs;
 use crate::cli::confirm::Confirm;
 use crate::cli::exit::{Exit, of_summary};
+use crate::cli::file_kind::expect_routine;
 use crate::cli::interrupt::Interrupt;
 use crate::cli::live::LiveArgs;
 use crate::cli::live_view::{LiveViewArgs, OpenView, ViewOf};
@@ -16,21 +17,23 @@ use crate::cli::overrides::OverrideArgs;
 use crate::cli::progress::Bar;
 use crate::cli::stdout::note;
 use crate::output::OutputFolder;
-use crate::report::table;
 use crate::run::{Failure, Keep, RunInputs, RunOutput, execute};
 use armcal_belief::session::Progress;
+use armcal_core::routine::Step;
+use armcal_core::text::counted;
+use armcal_sim::CameraMode;
 
 #[derive(Debug, Args)]
 pub(super) struct RunArgs {
     /// The routine (.toml)
     routine: PathBuf,
     /// Seed of everything random in the world; the routine's own if not given
-    #[arg(long)]
+    #[arg(long, value_name = "N")]
     seed: Option<u64>,
     /// Output folder; recordings/ROUTINE-NAME if not given
-    #[arg(long)]
+    #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Ask on stdin before each motion: y or nothing goes on, h holds, a aborts
+    /// Ask on stdin before each motion; y or Enter: go, h: hold, a: abort
     #[arg(long)]
     confirm: bool,
     #[command(flatten)]
@@ -38,11 +41,14 @@ pub(super) struct RunArgs {
     #[command(flatten)]
     view: LiveViewArgs,
     #[command(flatten)]
+    closing: ClosingArgs,
+    #[command(flatten)]
     overrides: OverrideArgs,
 }
 
 pub(super) fn run(args: &RunArgs) -> Result<Exit> {
     let started = Instant::now();
+    expect_routine(&args.routine)?;
     let mut inputs = RunInputs::load(&args.routine, &args.overrides.overrides())?;
     let mut arm = args.live.connect(&mut inputs)?;
     if args.live.no_motion {
@@ -60,6 +66,9 @@ pub(super) fn run(args: &RunArgs) -> Result<Exit> {
             "warning: an earlier run into this folder did not end; its recording is now {}",
             kept.display()
         ));
+    }
+    if let Some(foretold) = rendering_foretold(&inputs).filter(|_| arm.is_none()) {
+        note(foretold);
     }
     let mut bar = Bar::new(started, interrupt);
     let of = ViewOf { robot: &inputs.robot, vehicle: Some(&inputs.vehicle), scene: Some(&inputs.routine.scene) };
@@ -84,11 +93,41 @@ pub(super) fn run(args: &RunArgs) -> Result<Exit> {
         note(format_args!("warning: there is no replay, all other files are whole: {why}"));
     }
     let shown = out.display();
-    say_closing(&format!(
-        "{}\nwritten      {shown}\nnext         {shown}/report.html; armcal replay {shown}/run.mcap",
-        table(&finished.summary)
-    ))?;
+    let next = format!("written      {shown}\nnext         {shown}/report.html; armcal replay {shown}/run.mcap");
+    args.closing.say(&finished.summary, &next)?;
     Ok(of_summary(&finished.summary))
+}
+
+/// Images while the arm stands for a view, over those in all: as many come while it is on its way. Measured.
+const IMAGES_PER_VIEW_IMAGE: f64 = 2.0;
+/// Frames of a view beside those of its dwell: the arm settles. Measured.
+const SETTLING_FRAMES: f64 = 2.0;
+/// Time to render and to search an image of this many pixels: what one thread does, and what is shared. Measured.
+const USUAL_PIXELS: f64 = 1224.0 * 1024.0;
+const ALONE_S: f64 = 0.05;
+const SHARED_S: f64 = 0.17;
+
+/// How long a run takes that renders its images; `None` for one that renders none.
+fn rendering_foretold(inputs: &RunInputs) -> Option<String> {
+    let camera = &inputs.spec.camera;
+    if camera.mode != CameraMode::Rendered {
+        return None;
+    }
+    let frames = |step: &Step| match step {
+        Step::Capture(capture) => {
+            f64::from(capture.poses + capture.held_out) * (capture.dwell_s * camera.rate_hz + SETTLING_FRAMES)
+        }
+        _ => 0.0,
+    };
+    let images = IMAGES_PER_VIEW_IMAGE * inputs.routine.steps.iter().map(frames).sum::<f64>();
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let [columns, rows] = inputs.robot.camera.lens.resolution_px().map(f64::from);
+    let each_s = (ALONE_S + SHARED_S / cores as f64) * columns * rows / USUAL_PIXELS;
+    Some(format!(
+        "about {images:.0} images are rendered and searched: some {:.0} s on {}",
+        images * each_s,
+        counted(cores, "core")
+    ))
 }
 
 /// Names the recording that a broken run leaves.

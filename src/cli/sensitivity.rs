@@ -7,6 +7,7 @@ use anyhow::{Context, Result};
 use clap::Args;
 
 use crate::cli::exit::{Exit, UsageError};
+use crate::cli::file_kind::expect_routine;
 use crate::cli::overrides::OverrideArgs;
 use crate::cli::stdout::say;
 use crate::output;
@@ -35,6 +36,7 @@ pub(super) struct SensitivityArgs {
 }
 
 pub(super) fn sensitivity(args: &SensitivityArgs) -> Result<Exit> {
+    expect_routine(&args.routine)?;
     let routine = routine::load_with(&args.routine, &args.overrides.overrides())?;
     let (robot, vehicle) = routine.load_arm()?;
     output::check_takes_files(&args.out)?;

@@ -19,10 +19,10 @@ pub(super) struct ServeArgs {
     #[arg(long, value_name = "ARM.toml")]
     arm: Option<PathBuf>,
     /// Seed of everything random in the world; the routine's own if not given
-    #[arg(long)]
+    #[arg(long, value_name = "N")]
     seed: Option<u64>,
-    /// The arm's time over ours
-    #[arg(long, default_value_t = 1.0, value_parser = factor)]
+    /// The arm's time over ours, 0.05 .. 50
+    #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = factor)]
     factor: f64,
     /// End after so many seconds; with Ctrl-C if not given
     #[arg(long = "for", value_name = "SECONDS")]

@@ -6,6 +6,7 @@
 
 use std::fmt::Display;
 use std::io::{ErrorKind, Result as IoResult, Write};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::{Context, Result};
 use armcal_core::text::printable;
@@ -29,7 +30,28 @@ pub(super) fn is_written(written: IoResult<()>) -> Result<()> {
     }
 }
 
-/// Writes a line, printable, to stderr. Where that cannot be written nobody can be told, and the work goes on.
+/// Whether `--quiet` was given.
+static QUIET: AtomicBool = AtomicBool::new(false);
+
+/// From now on notes and progress are left out.
+pub(super) fn be_quiet() {
+    QUIET.store(true, Ordering::Relaxed);
+}
+
+/// Whether notes and progress are left out.
+pub(super) fn is_quiet() -> bool {
+    QUIET.load(Ordering::Relaxed)
+}
+
+/// Writes a line of what goes on or is doubtful to stderr, unless `--quiet` was given.
 pub(super) fn note(text: impl Display) {
+    if !is_quiet() {
+        complain(text);
+    }
+}
+
+/// Writes a line that must be read, printable, to stderr: errors and questions. Where that cannot be written nobody can
+/// be told, and the work goes on.
+pub(super) fn complain(text: impl Display) {
     let _ = writeln!(std::io::stderr().lock(), "{}", printable(&text.to_string()));
 }

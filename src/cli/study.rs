@@ -19,6 +19,7 @@ use crate::cli::study_plan::{
 };
 use crate::cli::study_poses::{PosesArgs, poses};
 use crate::cli::study_worlds::{WorldsArgs, worlds};
+use crate::cli::waiting::Waiting;
 use crate::output;
 use armcal_core::optics::CameraModel;
 use armcal_core::stats::quantile;
@@ -78,10 +79,10 @@ struct DetectionArgs {
     /// Seed of places and noise
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Side of the blocks of pixels that the search takes for one
+    /// Image decimation for the quad search: side of the blocks of pixels taken for one, px
     #[arg(long, value_name = "N", default_value_t = 1.0)]
     decimation: f32,
-    /// The same of the second look, at an image of evened contrast; 0 for none
+    /// The same of the second search, in an image of normalized contrast, px; 0 for none
     #[arg(long, value_name = "N", default_value_t = 2.0)]
     second_decimation: f32,
     /// Folder for the images (PNG) and truth.csv, for other detectors
@@ -117,7 +118,7 @@ fn detection(args: &DetectionArgs) -> Result<Exit> {
     if let Some(folder) = &args.images {
         output::make_folder(folder)?;
     }
-    let mut clock = Clock { start: Instant::now(), images: args.images.as_deref() };
+    let mut clock = Clock { start: Instant::now(), images: args.images.as_deref(), waiting: None };
     let study = detection_study(&lens, &settings, &conditions(args.repeats), args.seed, &mut clock)?;
     let fitted = [WaterKind::Clear, WaterKind::Coastal, WaterKind::Turbid].map(|water| fit_noise(&study, water));
     let text = report(&study, &fitted);
@@ -140,6 +141,7 @@ fn detection(args: &DetectionArgs) -> Result<Exit> {
 struct Clock<'a> {
     start: Instant,
     images: Option<&'a Path>,
+    waiting: Option<Waiting>,
 }
 
 impl Watcher for Clock<'_> {
@@ -148,7 +150,10 @@ impl Watcher for Clock<'_> {
     }
 
     fn image(&mut self, name: &str, image: GreyImage, n_done: usize, n_all: usize) -> Result<(), StudyError> {
-        if n_done.is_multiple_of(50) {
+        let waiting =
+            self.waiting.get_or_insert_with(|| Waiting::for_each_of(n_all as u64, "rendering and searching images"));
+        waiting.one_more();
+        if n_done.is_multiple_of(50) && !waiting.is_seen() {
             note(format_args!("{n_done} of {n_all} images"));
         }
         let Some(folder) = self.images else { return Ok(()) };

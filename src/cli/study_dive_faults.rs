@@ -32,8 +32,8 @@ pub(super) struct DiveFaultsArgs {
     #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u64).range(1..=100_000))]
     seeds: u64,
     /// Only kinds whose names have this in them
-    #[arg(long, value_name = "TEXT", default_value = "")]
-    only: String,
+    #[arg(long, alias = "only", value_name = "KIND", default_value = "")]
+    kind: String,
     /// Dives at once; all cores if not given. The results do not depend on it
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
@@ -47,10 +47,10 @@ pub(super) fn dive_faults(args: &DiveFaultsArgs) -> Result<Exit> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(args.threads.unwrap_or(0).into()).build()?;
     let seeds = args.first_seed..args.first_seed.saturating_add(args.seeds);
     let kinds: Vec<DiveFaultKind> =
-        DiveFaultKind::ALL.into_iter().filter(|kind| kind.name().contains(&args.only)).collect();
+        DiveFaultKind::ALL.into_iter().filter(|kind| kind.name().contains(&args.kind)).collect();
     if kinds.is_empty() {
         let names = DiveFaultKind::ALL.map(DiveFaultKind::name).join(", ");
-        return Err(UsageError(format!("--only {}: no kind has this in its name; there are {names}", args.only)).into());
+        return Err(UsageError(format!("--only {}: no kind has this in its name; there are {names}", args.kind)).into());
     }
     let all: Vec<(DiveFaultKind, u64)> =
         kinds.into_iter().flat_map(|kind| seeds.clone().map(move |seed| (kind, seed))).collect();

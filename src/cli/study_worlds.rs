@@ -47,11 +47,12 @@ pub(super) struct WorldsArgs {
     #[arg(long, value_name = "N", default_value_t = 1000, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     runs: u64,
     /// Number of the first
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    first: u64,
+    #[arg(long, alias = "first", value_name = "N", default_value_t = 1)]
+    first_seed: u64,
     /// A run that takes longer hangs, s
-    #[arg(long, value_name = "S", default_value_t = 300, value_parser = clap::value_parser!(u64).range(1..=86_400))]
-    timeout: u64,
+    #[arg(long, alias = "timeout", value_name = "SECONDS", default_value_t = 300)]
+    #[arg(value_parser = clap::value_parser!(u64).range(1..=86_400))]
+    timeout_s: u64,
     /// Runs at once; all cores if not given. The results do not depend on it
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
@@ -73,7 +74,7 @@ struct Row {
 pub(super) fn worlds(args: &WorldsArgs) -> Result<Exit> {
     output::make_folder(&args.out)?;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(args.threads.unwrap_or(0).into()).build()?;
-    let numbers: Vec<u64> = (args.first..args.first.saturating_add(args.runs)).collect();
+    let numbers: Vec<u64> = (args.first_seed..args.first_seed.saturating_add(args.runs)).collect();
     let tolerances_m = args.routine.iter().map(|file| Ok(routine::load(file)?.task.tolerance_m));
     let tolerances_m = tolerances_m.collect::<Result<Vec<f64>>>()?;
     let growing = Growing::begin(args)?;
@@ -142,7 +143,7 @@ fn run_one(args: &WorldsArgs, number: u64, tolerances_m: &[f64]) -> Result<Row> 
         .stderr(stderr)
         .spawn()
         .context("this program cannot be started")?;
-    let status = wait(&mut child, Duration::from_secs(args.timeout))?;
+    let status = wait(&mut child, Duration::from_secs(args.timeout_s))?;
     let seconds = began.elapsed().as_secs_f64();
     let said = String::from_utf8_lossy(&files::read_bytes(&said, FileKind::Table).unwrap_or_default()).into_owned();
     let summary = files::read_text(&out.join("summary.json"), FileKind::Text).ok();

@@ -2,19 +2,24 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
 use comfy_table::presets::UTF8_FULL_CONDENSED;
 use comfy_table::{CellAlignment, Table};
+use serde_json::{Value, json};
 
+use crate::cli::calibration_inputs::load_robot;
 use crate::cli::exit::Exit;
+use crate::cli::file_kind::{FileKind, expect_option, expect_recording};
 use crate::cli::stdout::{note, say};
 use crate::output;
 use crate::report::{TAG_COLUMNS, TagMapPage, fit_lines, group_title, tag_map_html, tag_rows};
 use armcal_belief::calib::surveyed;
 use armcal_belief::tagmap::files::{NamedCamera, TagFile, map_to_text, read_cameras, read_tags};
 use armcal_belief::tagmap::recording::{RecordedViews, read_views};
-use armcal_belief::tagmap::{Body, MapInput, MapMode, MapSettings, TagMap, TagPrior, solve};
+use armcal_belief::tagmap::{
+    Body, GroupFrame, MapGroup, MapInput, MapMode, MapSettings, MappedTag, TagMap, TagPrior, solve,
+};
 use armcal_core::log::{Completeness, TopicMap, scan_recording, topics};
 use armcal_core::robot::{self, Robot};
 use armcal_core::streams::Message;
@@ -24,26 +29,30 @@ pub(super) struct TagmapArgs {
     /// The recording (.mcap)
     recording: PathBuf,
     /// Folder of the robot: its camera, its tags, its base tag
-    #[arg(long, required_unless_present_all = ["camera", "tags"], conflicts_with_all = ["camera", "tags"])]
+    #[arg(long, value_name = "DIR", required_unless_present_all = ["camera", "tags"])]
+    #[arg(conflicts_with_all = ["camera", "tags"])]
     robot: Option<PathBuf>,
     /// Cameras: cameras.yaml of TagSLAM or camchain.yaml of Kalibr
-    #[arg(long, requires = "tags")]
+    #[arg(long, value_name = "FILE", requires = "tags")]
     camera: Option<PathBuf>,
     /// Tags: tagslam.yaml, a target of Kalibr (.yaml), or a tag map (.toml)
-    #[arg(long, requires = "camera")]
+    #[arg(long, visible_alias = "tag-map", value_name = "FILE", requires = "camera")]
     tags: Option<PathBuf>,
     /// Topic of the detections; else the one that the camera file names, or the only one there is
-    #[arg(long)]
+    #[arg(long, value_name = "NAME")]
     topic: Option<String>,
     /// How much of the places given is believed; `unknown` with --robot, `partly-known` with --tags
     #[arg(long, value_enum)]
     mode: Option<Mode>,
-    /// Where to write the map: .toml, or .yaml for TagSLAM
-    #[arg(long)]
+    /// Where to write the map: .toml, or .yaml for TagSLAM; nowhere if not given
+    #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Write the map as a page (.html), with the tags drawn
     #[arg(long, value_name = "FILE")]
     html: Option<PathBuf>,
+    /// Print JSON in place of tables
+    #[arg(long)]
+    json: bool,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -73,9 +82,11 @@ const MANY_DETECTIONS: usize = 1000;
 const MAX_REJECTED_SHARE: f64 = 0.2;
 
 pub(super) fn tagmap(args: &TagmapArgs) -> Result<Exit> {
+    expect_recording(&args.recording)?;
+    expect_option(args.tags.as_deref(), FileKind::TagMap)?;
     args.out.iter().chain(&args.html).try_for_each(|path| output::check_writable(path))?;
     let (cameras, tags, settings) = match (&args.robot, &args.camera, &args.tags) {
-        (Some(folder), ..) => of_robot(&args.recording, &robot::load(folder)?)?,
+        (Some(folder), ..) => of_robot(&args.recording, &load_robot(folder, &[])?)?,
         (None, Some(camera), Some(tags)) => of_files(camera, tags)?,
         _ => return Err(crate::cli::exit::UsageError("name --robot, or --camera and --tags".to_owned()).into()),
     };
@@ -100,7 +111,7 @@ pub(super) fn tagmap(args: &TagmapArgs) -> Result<Exit> {
         let page = TagMapPage { map: &map, file: &file.to_string(), sources: &sources, warnings: &warnings, is_sound };
         output::write_together(&[(out, tag_map_html(&page).as_bytes())])?;
     }
-    say(&describe(&map, &sources))?;
+    say(&if args.json { to_json(&map)? } else { describe(&map, &sources) })?;
     warnings.iter().for_each(|warning| note(format_args!("warning: {warning}")));
     Ok(if is_sound { Exit::Ok } else { Exit::DataLost })
 }
@@ -174,6 +185,46 @@ fn describe(map: &TagMap, sources: &[String]) -> String {
     }
     let lines = fit_lines(map, sources).map(|(name, text)| format!("{name:12} {text}"));
     out + &lines.join("\n")
+}
+
+/// The map and how good it is; m, rad and px.
+fn to_json(map: &TagMap) -> Result<String> {
+    let group = |group: &MapGroup| match &group.frame {
+        GroupFrame::Body(name) => json!({ "body": name, "tags": group.tags, "views": group.n_views }),
+        GroupFrame::Tag(id) => json!({ "tag": id, "tags": group.tags, "views": group.n_views }),
+    };
+    let tag = |tag: &MappedTag| {
+        let (position_m, turn) = (tag.frame_from_tag.translation.vector, tag.frame_from_tag.rotation);
+        json!({
+            "id": tag.id,
+            "group": tag.group,
+            "size_m": tag.size_m,
+            "position_m": <[f64; 3]>::from(position_m),
+            "quaternion_wxyz": [turn.w, turn.i, turn.j, turn.k],
+            "position_std_m": tag.position_std_m(),
+            "rotation_std_rad": tag.rotation_std_rad(),
+            "views": tag.n_views,
+            "rms_px": tag.rms_px,
+            "held": tag.is_fixed,
+        })
+    };
+    let rejected: serde_json::Map<String, Value> =
+        map.rejected_by_reason().iter().map(|(reason, n)| (reason.name().to_owned(), json!(n))).collect();
+    let all = json!({
+        "version": 1,
+        "groups": map.groups.iter().map(group).collect::<Vec<_>>(),
+        "tags": map.tags.iter().map(tag).collect::<Vec<_>>(),
+        "detections": map.n_detections,
+        "used": map.n_used,
+        "rejected": rejected,
+        "rms_px": map.rms_px,
+        "median_px": map.median_px,
+        "chi_square": map.chi_square,
+        "degrees_of_freedom": map.degrees_of_freedom,
+        "converged": map.has_converged,
+        "warnings": map.warnings,
+    });
+    serde_json::to_string_pretty(&all).context("the map has no JSON form")
 }
 
 /// What is wrong with data and map, and whether the map is good nevertheless.

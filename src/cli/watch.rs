@@ -9,6 +9,7 @@ use clap::Args;
 use crate::cli::belief_text::{belief, exit_of, line, summary};
 use crate::cli::calibration_inputs::{CalibrationInputs, load_robot};
 use crate::cli::exit::{Exit, UsageError};
+use crate::cli::file_kind::{FileKind, expect_kind};
 use crate::cli::interrupt::Interrupt;
 use crate::cli::live_view::{LiveViewArgs, OpenView, ViewOf};
 use crate::cli::losses::warn_of_losses;
@@ -35,13 +36,14 @@ pub(super) struct WatchArgs {
     /// The recording (.mcap), which another program may still be writing; waited for where it does not exist yet
     recording: PathBuf,
     /// Folder of the robot (robot.toml and its URDF)
-    #[arg(long)]
+    #[arg(long, value_name = "DIR")]
     robot: PathBuf,
-    /// Tolerance and targets or poses (.toml) that the tool error is predicted for, until the recording names its own
-    #[arg(long)]
+    /// Tolerance (m) and targets (m) or poses (rad) that the tool error is predicted for (.toml), until the recording
+    /// names its own
+    #[arg(long, value_name = "FILE")]
     task: Option<PathBuf>,
     /// Where the tags are: a tag map (.toml) in the frame of the arm's base, instead of what recording and robot say
-    #[arg(long)]
+    #[arg(long, value_name = "FILE")]
     tag_map: Option<PathBuf>,
     /// A joint that has failed: JOINT=locked, dead, stuck or jumps; may be given several times
     #[arg(long, value_name = "JOINT=KIND")]
@@ -50,7 +52,7 @@ pub(super) struct WatchArgs {
     #[arg(long)]
     json: bool,
     /// Where to write belief.jsonl at the end; nowhere if not given
-    #[arg(long)]
+    #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Seconds without anything new after which the recording counts as ended; 0: never
     #[arg(long, default_value_t = 60, value_name = "SECONDS")]
@@ -60,6 +62,7 @@ pub(super) struct WatchArgs {
 }
 
 pub(super) fn watch(args: &WatchArgs) -> Result<Exit> {
+    expect_kind(&args.recording, &[FileKind::Recording])?;
     let robot = load_robot(&args.robot, &args.failed)?;
     let _lock = args.out.as_deref().map(output::FolderLock::take).transpose()?;
     let given = CalibrationInputs {
@@ -71,6 +74,7 @@ pub(super) fn watch(args: &WatchArgs) -> Result<Exit> {
         prior: None,
         task: args.task.as_deref(),
     };
+    given.check_kinds()?;
     let mut listener = given.listener(OnlineSettings::default())?;
     let form = if args.json { Form::Json } else { Form::Text };
     let mut told = Told { log: BeliefLog::default(), n_told: 0, form, printed: Ok(()) };

@@ -22,6 +22,45 @@ pub fn counted(n: usize, thing: &str) -> String {
     if n == 1 { format!("1 {thing}") } else { format!("{n} {thing}s") }
 }
 
+/// The one of `known` that `word` most likely stands for; `None` where it is like none of them.
+#[must_use]
+pub fn nearest<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    let distances = known.into_iter().map(|other| (edits(word, other), other));
+    let (edits, other) = distances.min_by_key(|(edits, _)| *edits)?;
+    (edits <= 1 + word.chars().count().max(other.chars().count()) / 4).then_some(other)
+}
+
+/// Letters that are put in, taken out or replaced to make one of the other (Levenshtein 1966), neighbours that are
+/// exchanged as one.
+fn edits(from: &str, to: &str) -> usize {
+    let (from, to): (Vec<char>, Vec<char>) = (from.chars().collect(), to.chars().collect());
+    let mut rows: Vec<Vec<usize>> = vec![(0..=to.len()).collect()];
+    for (i, a) in from.iter().enumerate() {
+        let mut row = vec![i + 1];
+        for (k, b) in to.iter().enumerate() {
+            let replaced = rows[i][k] + usize::from(!a.eq_ignore_ascii_case(b));
+            let mut least = replaced.min(rows[i][k + 1] + 1).min(row[k] + 1);
+            if i > 0 && k > 0 && *a == to[k - 1] && from[i - 1] == *b {
+                least = least.min(rows[i - 1][k - 1] + 1);
+            }
+            row.push(least);
+        }
+        rows.push(row);
+    }
+    rows[from.len()][to.len()]
+}
+
+/// A reader's message about an unknown name, with the likeliest of those that it lists: unknown field `a`, expected
+/// one of `b`, `c`.
+#[must_use]
+pub fn with_nearest(message: &str) -> String {
+    let unknown = message.rfind("unknown field `").or_else(|| message.rfind("unknown variant `"));
+    let Some(at) = unknown else { return message.to_owned() };
+    let mut names = message[at..].split('`').skip(1).step_by(2);
+    let Some(hint) = names.next().and_then(|word| nearest(word, names)) else { return message.to_owned() };
+    format!("{message}; did you mean `{hint}`?")
+}
+
 fn steers(c: char) -> bool {
     let is_bidirectional =
         matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
@@ -31,6 +70,19 @@ fn steers(c: char) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_likeliest_of_the_known_names_is_offered_and_none_where_none_is_like_it() {
+        let known = ["poses", "held_out", "min_tags", "clearance_m"];
+        let of = |word| nearest(word, known);
+        assert_eq!((of("posess"), of("Poses"), of("heldout")), (Some("poses"), Some("poses"), Some("held_out")));
+        assert_eq!((of("clearence_m"), of("psoes"), of("depth"), of("")), (Some("clearance_m"), Some("poses"), None, None));
+        let message = "unknown field `min_tag`, expected one of `poses`, `min_tags`";
+        assert_eq!(with_nearest(message), format!("{message}; did you mean `min_tags`?"));
+        for same in ["missing field `poses`", "unknown field `x`, there are no fields", "unknown field `zebra`, expected `poses`"] {
+            assert_eq!(with_nearest(same), same);
+        }
+    }
 
     #[test]
     fn one_thing_has_no_plural() {

@@ -8,7 +8,10 @@ use crate::report::summary::{
     AssertSummary, CalibrationSummary, CaptureSummary, GainChange, HeldJointSummary, RenewalSummary, RunSummary,
 };
 use crate::score::{ReachScore, ScoreSide};
-use armcal_belief::calib::{CameraMount, FailedJointTable, MapResult, PriorTable, Status, SurveyCoverage};
+use armcal_belief::calib::{
+    CameraMount, FailedJointTable, MapResult, PriorTable, Status, SurveyCoverage, UNSEEN_LINKS,
+};
+use armcal_core::robot::FailedKind;
 use armcal_core::stats::Summary;
 use armcal_core::text::counted;
 use armcal_core::units::Unit;
@@ -24,6 +27,53 @@ pub fn table(summary: &RunSummary) -> String {
     text.push_str(&joint_table(summary).map_or_else(String::new, |t| format!("{t}\n")));
     text.push_str(&check_lines(summary).join("\n"));
     text
+}
+
+/// Verdict, three figures, and what cannot wait: failed sensors, joints that were given up, limits of the script, the
+/// first warning.
+#[must_use]
+pub fn closing(summary: &RunSummary) -> String {
+    let mut accuracy = accuracy_lines(summary).into_iter();
+    let mut lines: Vec<String> = accuracy.by_ref().take(1).collect();
+    lines.extend(summary.asserts.iter().map(assert_line));
+    lines.extend(summary.stopped.iter().map(|why| format!("stopped      {why}")));
+    lines.extend(summary.calibration.failed_joint.iter().map(failed_line));
+    lines.extend(summary.held_joints.iter().map(held_line));
+    lines.extend(summary.still_reachable.iter().map(|still| format!("reachable    {still}")));
+    lines.extend(score_line(summary));
+    // Of a real arm nobody knows the truth: the held-out views stand for it.
+    let n_figures = if summary.score.is_some() { 2 } else { 3 };
+    let held_out = usize::from(summary.score.is_some());
+    lines.extend(accuracy.skip(held_out).take(n_figures));
+    lines.extend(first_warning(summary));
+    lines.join("\n")
+}
+
+/// What the truth says of the targets.
+fn score_line(summary: &RunSummary) -> Option<String> {
+    let score = summary.score.as_ref()?;
+    let median = |side: &ScoreSide| Unit::Metres.shown_if(side.tool_error_m.map(|error| error.median), 2);
+    let before = median(&score.before);
+    Some(match &score.after {
+        Some(after) => format!(
+            "tool error   {before} before, {} after, medians against the truth; {} of {} targets hit",
+            median(after),
+            after.hits,
+            after.targets
+        ),
+        None => format!("tool error   {before} before, median against the truth; nothing was reached for afterwards"),
+    })
+}
+
+/// The first warning, and how many more there are. What no view shows is in the figures with priors.
+fn first_warning(summary: &RunSummary) -> Option<String> {
+    let warnings = &summary.calibration.verdict.as_ref()?.warnings;
+    let is_known = |warning: &&String| warning.as_str() == UNSEEN_LINKS;
+    let first = warnings.iter().find(|warning| !is_known(warning)).or(warnings.first())?;
+    Some(match warnings.len() - 1 {
+        0 => format!("warning      {first}"),
+        n => format!("warning      {first}; and {}", counted(n, "more warning")),
+    })
 }
 
 /// One line of the score: which statistic, which figure of it, and in what unit people read it.
@@ -278,9 +328,14 @@ fn mount_line(mount: &CameraMount) -> String {
 }
 
 fn failed_line(failed: &FailedJointTable) -> String {
-    let FailedJointTable { joint, kind, found, evidence, .. } = failed;
+    let FailedJointTable { joint, kind, found, evidence, since_pose, .. } = failed;
     let colon = if evidence.is_empty() { "" } else { ": " };
-    format!("failed       {joint} {} ({found}){colon}{evidence}", kind.name())
+    let remedy = match (kind, since_pose) {
+        (_, Some(_)) => "calibrated as it is since then; fasten the sensor, and calibrate again if it slips once more",
+        (FailedKind::Locked, None) => "targets that need the joint are out of reach; free it",
+        (_, None) => "check this sensor, its shaft and its cable",
+    };
+    format!("failed       {joint} {} ({found}){colon}{evidence}; {remedy}", kind.name())
 }
 
 fn held_line(held: &HeldJointSummary) -> String {

@@ -35,7 +35,7 @@ sees 'calibration  REFUSED: predicted tool error with what no view shows is'
 sees 'put a tag on the gripper'
 
 step 'do what it says: put a tag on the gripper'
-expect 0 "$ARMCAL" run routines/titan4-quickstart.toml --set task.tolerance_m=0.0034 --robot robots/titan4-gripper-tag --out "$FOLDER/gripper"
+expect 0 "$ARMCAL" run routines/titan4-quickstart.toml --set task.tolerance_m=0.0034 --robot robots/titan4-gripper-tag --details --out "$FOLDER/gripper"
 sees 'calibration  ACCEPTED'
 sees 'the one on the gripper'
 

@@ -150,11 +150,11 @@ pub fn answer(command: &mut Command) -> Answer {
 }
 
 pub fn run(routine: &Path, out: &Path) -> Answer {
-    answer(program().arg("run").arg(routine).arg("--out").arg(out))
+    answer(program().arg("run").arg(routine).arg("--details").arg("--out").arg(out))
 }
 
 pub fn calibrate(recording: &Path, robot: &Path, out: &Path) -> Answer {
-    answer(program().arg("calibrate").arg(recording).arg("--robot").arg(robot).arg("--out").arg(out))
+    answer(program().arg("calibrate").arg(recording).arg("--details").arg("--robot").arg(robot).arg("--out").arg(out))
 }
 
 /// A finished run of the closed loop.

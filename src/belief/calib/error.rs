@@ -8,7 +8,15 @@ use armcal_core::log::StampRegression;
 pub enum CalibError {
     #[error("{recording}: the joints {recorded:?} are not those of robot `{robot}`: {expected:?}")]
     JointNames { recording: String, robot: String, recorded: Vec<String>, expected: Vec<String> },
-    #[error("{recording}: holds no captured views (no marks `capture_fit` on /marks), so there is nothing to fit")]
+    #[error(
+        "{recording}: holds no joint readings as armcal records them (topic /joint_sensors): where it is of another \
+         program, give an input map with --input; `armcal inspect {recording} --write-input MAP.toml` proposes one"
+    )]
+    NoReadings { recording: String },
+    #[error(
+        "{recording}: holds no captured views (no marks `capture_fit` on /marks), so there is nothing to fit; capture \
+         views again, or, where it is of another program, give an input map with --input"
+    )]
     NoCaptures { recording: String },
     #[error("{recording}: holds no view to fit; the arm came to rest for held-out views alone ({held_out})")]
     NoFitViews { recording: String, held_out: usize },
@@ -26,7 +34,8 @@ pub enum CalibError {
     Identify { joint: String, problem: String },
     #[error(
         "{recording}: all {views} views are of one pose: no joint between base and camera moved by more than its noise \
-         (the most: `{joint}`, {moved_deg:.3} deg), so nothing can be told of any"
+         (the most: `{joint}`, {moved_deg:.3} deg), so nothing can be told of any; check the topic and \
+         joint_sensors.unit of the joint readings, or capture views at different poses"
     )]
     OnePose { recording: String, views: usize, joint: String, moved_deg: f64 },
     #[error("{recording}: no interim estimate: {problem}")]

@@ -45,10 +45,32 @@ pub struct GeometryError {
     pub tool_error_m: f64,
 }
 
+/// What stands for the base, or for all tags together: no view tells them apart.
+pub(crate) const BASE: &str = "base (or all tags)";
+
+impl GeometryError {
+    /// What to do about it.
+    #[must_use]
+    pub fn remedy(&self) -> &'static str {
+        match (self.element.as_str(), &self.joint) {
+            (BASE, _) => {
+                "check the frame that the tag map is in, and where the arm stands, against the arm's base; then correct \
+                 the map"
+            }
+            (_, None) => "check how the camera is fastened, and its mount in the drawing",
+            _ => "check the drawing against the arm",
+        }
+    }
+}
+
 impl fmt::Display for GeometryError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { element, joint, error, size, chi2, limit, tool_error_m } = self;
-        let what = joint.as_ref().map_or_else(|| "the camera".to_owned(), |joint| joint.clone());
+        let what = match (element.as_str(), joint) {
+            (BASE, _) => "the arm on its base, or the tag map's frame,".to_owned(),
+            (_, None) => "the camera".to_owned(),
+            (_, Some(joint)) => joint.clone(),
+        };
         let (scale, unit) = error.display_unit();
         let [x, y, z] = size.map(|v| v * scale);
         let norm = (x * x + y * y + z * z).sqrt();

@@ -28,8 +28,10 @@ mod result;
 mod tag_mapping;
 mod tool_error;
 mod views;
+mod wrong_input;
 
 pub use baseline_comparison::{BaselineComparison, SIGNIFICANCE};
+pub use bundle::UNSEEN_LINKS;
 pub use calibrate::{MIN_VIEWS, calibrate, calibrate_data, calibrate_with_survey};
 pub use covariance::{CommonErrors, JointAt, ParameterCovariance, ToolErrorPrediction};
 pub use error::CalibError;
@@ -58,3 +60,4 @@ pub use views::{
     MarkedSpans, MeanCorners, ObservationRejection, TagMeasurement, TagObservation, TaskRests, View, associate,
     associate_within, check_joints, identify_scales, prepare_external, prepare_pooled, read_marked, surveyed,
 };
+pub use wrong_input::{WrongInput, WrongInputKind};

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::calib::baseline_comparison::SIGNIFICANCE;
 use crate::calib::geometry_error::GeometryError;
+use crate::calib::wrong_input::WrongInput;
 
 /// One reason to refuse. Angles in rad, lengths in m.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -77,6 +78,8 @@ pub enum Refusal {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         most: Option<String>,
     },
+    /// A file is not as it is said to be, and the images show it without the arm.
+    WrongInput(WrongInput),
     /// Another link geometry explains the data, and joint sensors do not.
     Geometry(GeometryError),
     /// A joint's error from view to view is beyond what such a sensor can have.
@@ -181,6 +184,9 @@ pub enum Refusal {
         limit: f64,
         /// Share of the observations that fit anything near the prior.
         used_share: f64,
+        /// How many joints are off by more than chance.
+        #[serde(default)]
+        joints_off: usize,
     },
     /// A sensor slipped, and too few views show it as it is now.
     TooFewViewsSinceSlip {
@@ -248,10 +254,12 @@ impl Refusal {
     pub(crate) fn rank(&self) -> u8 {
         match self {
             Self::TooFewViews { .. } | Self::TooFewViewsSinceSlip { .. } => 0,
+            Self::WrongInput(_) | Self::PriorReused => 1,
+            // Under a prior that does not hold, links and sensors seem to be off.
+            Self::PriorContradicted { .. } => 2,
             // Where hardly any observation fits, the solver's end and every test of the rest say nothing.
-            Self::Outliers { outliers, observations } if 2 * outliers > *observations => 1,
-            Self::PriorContradicted { used_share, .. } if *used_share < MIN_USED_SHARE => 2,
-            _ => 3,
+            Self::Outliers { outliers, observations } if 2 * outliers > *observations => 3,
+            _ => 4,
         }
     }
 
@@ -290,7 +298,8 @@ impl Refusal {
                  its sigmas in [geometry] of robot.toml"
             }
             Self::BeyondTolerance { .. } => "capture more views, or put a tag on the gripper",
-            Self::Geometry(_) => "check the drawing against the arm",
+            Self::WrongInput(wrong) => wrong.remedy(),
+            Self::Geometry(geometry) => geometry.remedy(),
             Self::CornerNoise { .. } => "check lens, corner noise and tag sizes in robot.toml, and the tag map",
             Self::SensorError { .. } | Self::SensorFailed { .. } => "check that joint's sensor",
             Self::SensorLine { .. } => "swap its ends, or correct scale_counts_per_deg and its sign in robot.toml",
@@ -307,7 +316,7 @@ impl Refusal {
             }
             Self::PriorReused => "give a prior that was made from other views",
             Self::PriorSingular => "make the prior anew",
-            Self::PriorContradicted { .. } => "calibrate without the prior",
+            Self::PriorContradicted { .. } => "calibrate without the prior (leave --prior out)",
         }
     }
 }
@@ -339,7 +348,8 @@ impl Refusal {
     /// Cause and evidence.
     fn fmt_cause(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Geometry(_)
+            Self::WrongInput(_)
+            | Self::Geometry(_)
             | Self::SensorError { .. }
             | Self::BeyondDatasheet { .. }
             | Self::Nonlinearity { .. }
@@ -420,6 +430,7 @@ impl Refusal {
     /// What is wrong with the arm.
     fn fmt_of_arm(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
+            Self::WrongInput(wrong) => write!(f, "{wrong}"),
             Self::Geometry(geometry) => write!(f, "{geometry}"),
             Self::SensorError { joint, std_rad, datasheet_std_rad } => write!(
                 f,
@@ -496,21 +507,32 @@ impl Refusal {
             Self::PriorReused => write!(f, "the prior rests on these very messages, which must not count twice"),
             Self::PriorSingular => write!(f, "the prior's covariance has no inverse"),
             Self::PriorUntested => write!(f, "the views determine too little to be tested against the prior"),
-            Self::PriorContradicted { joint, off_rad, off_std_rad, chi2, degrees_of_freedom, limit, used_share } => {
-                write!(
-                    f,
-                    "the new views contradict the prior: chi-square {chi2:.1} of {degrees_of_freedom}, expected below \
-                     {limit:.1} in 99.9 % of cases; {joint} is off by {:.2} deg ({:.3} deg allowed, one sigma)",
-                    off_rad.to_degrees(),
-                    off_std_rad.to_degrees()
-                )?;
-                if *used_share < MIN_USED_SHARE {
-                    write!(f, "; only {:.0} % of the tag observations fit anything near it", 100.0 * used_share)?;
+            Self::PriorContradicted { joint, off_rad, joints_off, .. } => {
+                let off_deg = off_rad.to_degrees();
+                write!(f, "the new views contradict the prior: ")?;
+                if *joints_off > 1 {
+                    write!(f, "{joints_off} joints are off, {joint} the most, by {off_deg:.2} deg, so that it is of ")?;
+                    write!(f, "another arm, or of one whose sensors were changed since")?;
+                } else {
+                    write!(f, "{joint} is off by {off_deg:.2} deg, so that its sensor slipped or was changed since")?;
                 }
-                Ok(())
+                self.fmt_evidence_against_prior(f)
             }
             _ => Ok(()),
         }
+    }
+
+    fn fmt_evidence_against_prior(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self::PriorContradicted { off_std_rad, chi2, degrees_of_freedom, limit, used_share, .. } = self else {
+            return Ok(());
+        };
+        let std_deg = off_std_rad.to_degrees();
+        write!(f, " (chi-square {chi2:.1} of {degrees_of_freedom}, expected below {limit:.1} in 99.9 % of cases; ")?;
+        write!(f, "{std_deg:.3} deg allowed, one sigma")?;
+        if *used_share < MIN_USED_SHARE {
+            write!(f, "; only {:.0} % of the tag observations fit anything near it", 100.0 * used_share)?;
+        }
+        write!(f, ")")
     }
 }
 

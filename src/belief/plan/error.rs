@@ -22,12 +22,19 @@ pub enum PlanError {
     StartTooClose { clearance_m: f64, nearest: String, needed_m: f64 },
     #[error(
         "no pose was found that sees {min_tags} of the {n_tags} surveyed tags and keeps {clearance_m:.3} m clear \
-         ({tried} tried): {hint}"
+         ({tried} tried): {hint}; place tags where the camera reaches them, or lower capture.min_tags or \
+         capture.clearance_m"
     )]
     NoUsefulPose { min_tags: u32, n_tags: usize, clearance_m: f64, tried: usize, hint: String },
-    #[error("no pose was found that sees {min_tags} of the {n_tags} surveyed tags: min_tags may be 1 to {n_tags}")]
+    #[error(
+        "no pose was found that sees {min_tags} of the {n_tags} surveyed tags: add tags, or lower capture.min_tags to 1 \
+         .. {n_tags}"
+    )]
     TooFewTags { min_tags: u32, n_tags: usize },
-    #[error("only {found} of {wanted} poses were found that see {min_tags} tags and keep clear: {hint}")]
+    #[error(
+        "only {found} of {wanted} poses were found that see {min_tags} tags and keep clear: {hint}; ask for fewer poses, \
+         place tags where the camera reaches them, or lower capture.min_tags or capture.clearance_m"
+    )]
     TooFewPoses { found: usize, wanted: usize, min_tags: u32, hint: String },
     #[error(transparent)]
     Path(#[from] PathError),

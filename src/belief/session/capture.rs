@@ -41,6 +41,8 @@ struct CaptureRun<'a> {
     restless: usize,
     /// Of these, the last ones in a row.
     in_vain: usize,
+    /// The last views in a row that saw no tag.
+    blind: usize,
     /// Readings at the captured views, and the tags (index) that were seen.
     taken: Vec<(JointCounts, Vec<usize>)>,
     /// Poses that were tried in vain.
@@ -72,6 +74,7 @@ impl<'a> CaptureRun<'a> {
             met: 0,
             restless: 0,
             in_vain: 0,
+            blind: 0,
             taken: Vec::new(),
             failed: Vec::new(),
             expected: none.clone(),
@@ -226,6 +229,9 @@ impl ScriptRunner<'_, '_> {
                     match self.choose(&views) {
                         Ok(plan) => plan,
                         Err(why) if views.n_fit >= LEAST_VIEWS && replans => break why.to_string(),
+                        Err(why) if views.blind > 0 => {
+                            return Err(SessionError::NothingSeen { poses: views.blind, why: why.to_string() });
+                        }
                         Err(why) => return Err(why.into()),
                     }
                 }
@@ -374,6 +380,7 @@ impl ScriptRunner<'_, '_> {
         self.poses_marked += 1;
         let tags = self.driver.dwell(views.settings.dwell_s, kind)?;
         self.learn(pose, views)?;
+        views.blind = if tags == 0 { views.blind + 1 } else { 0 };
         if tags == 0 {
             self.driver.log(LogLevel::Warn, &format!("pose {number} saw no tag"))?;
             views.failed.push(pose.angles);

@@ -25,6 +25,11 @@ pub enum SessionError {
          not come to rest by its own sensors (too noisy, or it oscillates?); {why}"
     )]
     TooFewViews { captured: usize, tried: usize, blocked: usize, met: usize, restless: usize, why: String },
+    #[error(
+        "the camera saw no tag at the last {poses} poses, where it should have: check camera, light, water, and what \
+         may hide the tags, and run again; {why}"
+    )]
+    NothingSeen { poses: usize, why: String },
     #[error("step {step}: the arm has no joint `{joint}`; it has {joints:?}")]
     UnknownJoint { step: usize, joint: String, joints: Vec<String> },
     #[error("step {step}: {problem}")]

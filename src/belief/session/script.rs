@@ -366,7 +366,9 @@ impl ScriptRunner<'_, '_> {
 /// A plan that fails in the middle of a script is no wrong input any more: there is a recording to be kept.
 fn after_motion(step: usize, error: SessionError) -> SessionError {
     match error {
-        SessionError::Plan(plan) => SessionError::Step { step, problem: plan.to_string() },
+        error @ (SessionError::Plan(_) | SessionError::NothingSeen { .. }) => {
+            SessionError::Step { step, problem: error.to_string() }
+        }
         error => error,
     }
 }

@@ -1,5 +1,6 @@
 //! Why a recording of a real arm cannot be used.
 
+use super::map::JointUnit;
 use crate::log::{CdrError, LogError, StampRegression};
 
 /// A message or a row of a table.
@@ -51,6 +52,14 @@ pub enum InputError {
          `joint_sensors.names` of the input map"
     )]
     JointNames { file: String, topic: String, recorded: Vec<String>, missing: Vec<String>, expected: Vec<String> },
+    #[error(
+        "{file}: the joints' numbers are {}, not {}: `{joint}` is {value:.3}, far outside of its range; set \
+         joint_sensors.unit = \"{}\" in the input map",
+        likely.name(),
+        stated.name(),
+        likely.key()
+    )]
+    Unit { file: String, joint: String, value: f64, stated: JointUnit, likely: JointUnit },
     #[error(
         "{file}: topic {topic}: more than {most} messages of use, which stay in memory; cut the recording into pieces, \
          and give them all"

@@ -7,6 +7,7 @@ use super::attitude::AttitudeReader;
 use super::conditions::ConditionReader;
 use super::error::InputError;
 use super::images::{IMAGE_TYPES, ImageDetector};
+use super::joint_unit::check_unit;
 use super::joints::{JointReader, n_needed};
 use super::map::{ConditionKind, InputMap, Source, TagUse, Topics};
 use super::recording::ExternalRecording;
@@ -76,6 +77,7 @@ fn read_up_to<'a>(
     reader.check()?;
     let mut recording = reader.finish(robot);
     recording.path = path.to_owned();
+    recording.unit_doubt = check_unit(&file, map, robot, &recording.readings)?;
     (recording.completeness, recording.chunk_order) = (summary.completeness, summary.chunk_order);
     Ok(recording)
 }

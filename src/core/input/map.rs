@@ -91,6 +91,26 @@ pub enum JointUnit {
 }
 
 impl JointUnit {
+    /// In words.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Counts => "counts",
+            Self::Rad => "radians",
+            Self::Deg => "degrees",
+        }
+    }
+
+    /// As the input map writes it.
+    #[must_use]
+    pub fn key(self) -> &'static str {
+        match self {
+            Self::Counts => "counts",
+            Self::Rad => "rad",
+            Self::Deg => "deg",
+        }
+    }
+
     /// The raw reading that `value` stands for.
     pub(super) fn counts(self, spec: &JointSensorSpec, value: f64) -> f64 {
         match self {

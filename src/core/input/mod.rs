@@ -10,6 +10,7 @@ mod conditions;
 mod error;
 mod external;
 mod images;
+mod joint_unit;
 mod joints;
 mod map;
 mod recording;

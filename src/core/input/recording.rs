@@ -26,6 +26,8 @@ pub struct ExternalRecording {
     pub absent_joints: Vec<usize>,
     /// Recorded joints that the robot lacks.
     pub extra_joints: Vec<String>,
+    /// What speaks for another unit of the joints' numbers than the input map says.
+    pub unit_doubt: Option<String>,
     /// Number of unused messages by reason.
     pub left_out: BTreeMap<String, u64>,
     /// Whether the file could be read to its end.

@@ -5,6 +5,7 @@ use std::path::Path;
 use nalgebra::Isometry3;
 
 use super::error::{BadPlace, InputError};
+use super::joint_unit::check_unit;
 use super::joints::{Reading, n_needed};
 use super::map::{InputMap, NotFinite, TableFormat, TableLayout, TagUse};
 use super::recording::ExternalRecording;
@@ -54,7 +55,9 @@ pub(super) fn read_table(
     if reader.recording.frames.is_empty() {
         return Err(InputError::Table { file, problem: "no row of it could be used".to_owned() });
     }
-    Ok(reader.recording)
+    let mut recording = reader.recording;
+    recording.unit_doubt = check_unit(&file, map, robot, &recording.readings)?;
+    Ok(recording)
 }
 
 /// Reads the columns `wanted` of a table.

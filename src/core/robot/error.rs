@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use super::toml_errors::explained;
 use super::toml_text::check_entries;
 use crate::files::{self, FileKind};
 
@@ -98,6 +99,6 @@ fn read(file: &Path, kind: FileKind) -> Result<String, RobotError> {
 /// Parses TOML of a limited number of entries; the error names file, line and key.
 pub fn parse_toml<T: serde::de::DeserializeOwned>(file: &Path, text: &str) -> Result<T, RobotError> {
     check_entries(text)
-        .and_then(|()| toml::from_str(text).map_err(|error| error.to_string().trim_end().to_owned()))
+        .and_then(|()| toml::from_str(text).map_err(|error| explained::<T>(text, &error)))
         .map_err(|message| RobotError::Syntax { file: file.to_owned(), message })
 }

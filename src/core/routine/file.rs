@@ -15,7 +15,7 @@ use super::script::{self, Script};
 use super::settings::{CaptureSettings, TaskSettings};
 use super::site::SiteFile;
 use super::step::Step;
-use crate::robot::{FileIssue, PartFile};
+use crate::robot::{FileIssue, PartFile, read_text};
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -107,7 +107,8 @@ pub fn load_with(file: &Path, overrides: &Overrides) -> Result<Routine, RoutineE
     let script = if raw.step.is_empty() {
         Script { steps: script::standard(raw.capture, &raw.task), faults: Vec::new() }
     } else {
-        script::read(file, raw.step, raw.capture, &raw.task)?
+        let lines = script::step_lines(&read_text(file)?);
+        script::read(file, (raw.step, &lines), raw.capture, &raw.task)?
     };
     check_held_out(file, raw.method, &script.steps)?;
     Ok(Routine {

@@ -11,6 +11,7 @@ use toml::{Table, Value};
 
 use super::error::RoutineError;
 use crate::robot::{FileIssue, parse_toml, read_text};
+use crate::text::with_nearest;
 
 /// One key and its new value.
 #[derive(Clone, Debug, PartialEq)]
@@ -132,7 +133,7 @@ pub(super) fn read_with<T: DeserializeOwned>(file: &Path, set: &[Override]) -> R
         // What is wrong without the overrides, too, is told with its line.
         read_alone().err().unwrap_or_else(|| {
             let given: Vec<String> = set.iter().map(|one| format!("--set {one}")).collect();
-            let problem = error.to_string().trim().replace('\n', " ");
+            let problem = with_nearest(&error.to_string().trim().replace('\n', " "));
             FileIssue::new(file, given.join(" "), problem).into()
         })
     })

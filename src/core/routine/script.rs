@@ -12,8 +12,9 @@ use super::step::{
     CalibrateSettings, CalibrateViews, IdentifySettings, MoveGoal, OnRefusal, ReachSettings, Step, StopsSettings,
     TouchSettings, WorkBelief, WorkSettings,
 };
-use crate::robot::FileIssue;
+use crate::robot::{FileIssue, from_table};
 use crate::streams::PriorSource;
+use crate::text::nearest;
 
 /// The script of a routine without `[[step]]`: the standard closed loop.
 pub(super) fn standard(capture: CaptureSettings, task: &TaskSettings) -> Vec<Step> {
@@ -26,34 +27,58 @@ pub(super) fn standard(capture: CaptureSettings, task: &TaskSettings) -> Vec<Ste
 const NAMES: &str =
     "move, reach, work, grip, capture, identify, stops, touch, calibrate, recalibrate, wait, fault, assert";
 
+/// The lines at which the `[[step]]` tables of a routine begin; none where it is no TOML.
+pub(super) fn step_lines(text: &str) -> Vec<usize> {
+    #[derive(Deserialize)]
+    struct Steps {
+        #[serde(default)]
+        step: Vec<toml::Spanned<toml::Table>>,
+    }
+    let steps = toml::from_str::<Steps>(text).map(|steps| steps.step).unwrap_or_default();
+    steps.iter().map(|step| 1 + text[..step.span().start].matches('\n').count()).collect()
+}
+
+/// How messages call steps: `line 41: step 3`.
+#[derive(Clone, Copy)]
+struct StepNames<'a>(&'a [usize]);
+
+impl StepNames<'_> {
+    /// The step at `index`, from 0.
+    fn name(self, index: usize) -> String {
+        let line = self.0.get(index).map_or_else(String::new, |line| format!("line {line}: "));
+        format!("{line}step {}", index + 1)
+    }
+}
+
 /// Steps in order, and the tables of the faults in order, unread.
 pub(super) struct Script {
     pub steps: Vec<Step>,
     pub faults: Vec<toml::Table>,
 }
 
-/// Reads `[[step]]` tables.
+/// Reads `[[step]]` tables, which begin at `lines` of the file.
 pub(super) fn read(
     file: &Path,
-    tables: Vec<toml::Table>,
+    (tables, lines): (Vec<toml::Table>, &[usize]),
     capture: CaptureSettings,
     task: &TaskSettings,
 ) -> Result<Script, RoutineError> {
     let mut script = Script { steps: Vec::new(), faults: Vec::new() };
+    let names = StepNames(lines);
     for (index, mut table) in tables.into_iter().enumerate() {
-        let number = index + 1;
+        let step_name = names.name(index);
         let name = match table.remove("do") {
             Some(toml::Value::String(name)) => name,
             Some(other) => {
                 let problem = format!("{other} is no text; it is one of {NAMES}");
-                return Err(FileIssue::new(file, format!("step {number}: do"), problem).into());
+                return Err(FileIssue::new(file, format!("{step_name}: do"), problem).into());
             }
             None => {
                 let problem = format!("is missing; it is one of {NAMES}");
-                return Err(FileIssue::new(file, format!("step {number}: do"), problem).into());
+                return Err(FileIssue::new(file, format!("{step_name}: do"), problem).into());
             }
         };
-        let reader = StepReader { file, key: format!("step {number} ({name})"), table };
+        let reader = StepReader { file, key: format!("{step_name} ({name})"), table };
         let step = match name.as_str() {
             "move" => reader.move_goal()?,
             "reach" => reader.reach(task)?,
@@ -72,13 +97,14 @@ pub(super) fn read(
                 Step::Fault { number: script.faults.len() - 1 }
             }
             other => {
-                let problem = format!("`{other}` is none of {NAMES}");
-                return Err(FileIssue::new(file, format!("step {number}: do"), problem).into());
+                let hint = nearest(other, NAMES.split(", ")).map(|name| format!("; did you mean `{name}`?"));
+                let problem = format!("`{other}` is none of {NAMES}{}", hint.unwrap_or_default());
+                return Err(FileIssue::new(file, format!("{step_name}: do"), problem).into());
             }
         };
         script.steps.push(step);
     }
-    check_order(file, &script.steps)?;
+    check_order(file, names, &script.steps)?;
     Ok(script)
 }
 
@@ -90,9 +116,7 @@ struct StepReader<'a> {
 
 impl StepReader<'_> {
     fn parse<T: DeserializeOwned>(&self) -> Result<T, FileIssue> {
-        toml::Value::Table(self.table.clone())
-            .try_into()
-            .map_err(|error: toml::de::Error| FileIssue::new(self.file, &self.key, error.message().trim_end()))
+        from_table(&self.table).map_err(|problem| FileIssue::new(self.file, &self.key, problem))
     }
 
     fn key(&self, name: &str) -> String {
@@ -385,11 +409,11 @@ impl StepReader<'_> {
 }
 
 /// What no step can do before another one did something.
-fn check_order(file: &Path, steps: &[Step]) -> Result<(), FileIssue> {
+fn check_order(file: &Path, names: StepNames<'_>, steps: &[Step]) -> Result<(), FileIssue> {
     let (mut captures, mut calibrations, mut reaches, mut moved) = (0, 0, 0, false);
     for (index, step) in steps.iter().enumerate() {
         let wrong = |problem: &str| {
-            Err(FileIssue::new(file, format!("step {} ({})", index + 1, step.name()), problem.to_owned()))
+            Err(FileIssue::new(file, format!("{} ({})", names.name(index), step.name()), problem.to_owned()))
         };
         match step {
             Step::Move(_) | Step::Stops(_) | Step::Touch(_) => moved = true,
@@ -438,7 +462,7 @@ mod tests {
         }
         let steps: Steps = toml::from_str(text).expect("valid TOML");
         let task = TaskSettings { tolerance_m: 0.02, targets_m: vec![[1.0, 0.0, 0.0]; 3] };
-        read(Path::new("r.toml"), steps.step, CaptureSettings::default(), &task)
+        read(Path::new("r.toml"), (steps.step, &step_lines(text)), CaptureSettings::default(), &task)
     }
 
     fn problem(text: &str) -> String {
@@ -475,6 +499,21 @@ mod tests {
         assert_eq!(looks, [(8, 0), (11, 1)]);
         assert_eq!((work.duration_s(), &work.targets[..], &work.rest), (7200.0, &[0, 1, 2][..], &MoveGoal::Stowed));
         assert_eq!(WorkSettings { looks_rad: Vec::new(), ..work.clone() }.look_of(8), None);
+    }
+
+    #[test]
+    fn a_step_is_named_with_its_line_and_the_likeliest_name() {
+        let text = format!("# a comment\n{LOOP}\n[[step]]\ndo = \"wait\"\nsecond = 3.0\n");
+        let found = problem(&text);
+        assert!(found.starts_with("r.toml: line 7: step 3 (wait): unknown field `second`"), "{found}");
+        assert!(found.ends_with("did you mean `seconds`?"), "{found}");
+        let misnamed = problem("\n[[step]]\ndo = \"captur\"");
+        assert!(misnamed.starts_with("r.toml: line 2: step 1: do: `captur` is none of"), "{misnamed}");
+        assert!(misnamed.ends_with("did you mean `capture`?"), "{misnamed}");
+        let several = problem("[[step]]\ndo = \"touch\"\npart = \"bar\"");
+        assert!(several.ends_with("missing field `point_m`; also missing: `normal`"), "{several}");
+        let order = problem(&format!("{LOOP}[[step]]\ndo = \"calibrate\""));
+        assert!(order.starts_with("r.toml: line 5: step 3 (calibrate): has no views"), "{order}");
     }
 
     #[test]

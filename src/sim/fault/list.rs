@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::fault::kinds::ScheduledFault;
-use armcal_core::robot::FileIssue;
+use armcal_core::robot::{FileIssue, toml_problem};
 
 const KINDS: &str = "sensor_jump (joint, by_rad), sensor_stuck (joint), sensor_dead (joint), joint_locked (joint), \
      pressure_lost (ratio; joint), tag_lost (id), tag_moved (id; by_m, by_rad), tag_misread (id, as_id), \
@@ -33,6 +33,6 @@ pub(crate) fn read_one<T: serde::de::DeserializeOwned>(
     key: &str,
 ) -> Result<T, FileIssue> {
     entry.try_into().map_err(|error: toml::de::Error| {
-        FileIssue::new(file, key, format!("{}; kinds: {KINDS}", error.message().trim_end()))
+        FileIssue::new(file, key, format!("{}; kinds: {KINDS}", toml_problem(&error)))
     })
 }

@@ -22,7 +22,7 @@ use crate::spec::table::{CheckedTable, Figure};
 use crate::spec::temperature::TemperatureSpec;
 use crate::spec::vehicle::{MotionKind, VehicleMotionSpec};
 use crate::spec::water::WaterSpec;
-use armcal_core::robot::{FileIssue, JointSensorSpec, PartFile, Robot, check_parts};
+use armcal_core::robot::{FileIssue, JointSensorSpec, PartFile, Robot, check_parts, toml_problem};
 use armcal_core::routine::Scene;
 
 /// `[world]`, checked.
@@ -325,7 +325,7 @@ impl Reader<'_> {
         match self.table.get(name) {
             None => Ok(T::default()),
             Some(value) => value.clone().try_into().map_err(|error: toml::de::Error| {
-                FileIssue::new(self.file, format!("world.{name}"), error.message().trim_end().to_owned())
+                FileIssue::new(self.file, format!("world.{name}"), toml_problem(&error))
             }),
         }
     }

@@ -26,14 +26,15 @@ use crate::calib::methods::position_problem::PositionProblem;
 use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
 use crate::calib::refusal::Refusal;
 use crate::calib::result::assemble::{Evidence, Fit, Provenance, assemble};
-use crate::calib::result::calibration::Calibration;
+use crate::calib::result::calibration::{Calibration, Status};
 use crate::calib::result::map_table::MapResult;
 use crate::calib::result::metrics::HeldOutMetrics;
 use crate::calib::tag_mapping::map_unknown_tags;
 use crate::calib::views::calibration_data::CalibrationData;
 use crate::calib::views::view::{ObservationRejection, Touch, View};
+use crate::calib::wrong_input::wrong_input;
 use armcal_core::joints::JointAngles;
-use armcal_core::robot::{JointSensorSpec, Robot};
+use armcal_core::robot::{JointSensorSpec, Robot, SurveyedTag};
 use armcal_core::routine::Method;
 use armcal_core::stats::Summary;
 
@@ -52,6 +53,8 @@ pub(crate) struct BundleCalibration<'a> {
     data: CalibrationData,
     prior: Option<&'a Calibration>,
     map: Option<MapResult>,
+    /// As they were given.
+    surveyed: Vec<SurveyedTag>,
     purpose: EstimatePurpose,
     /// Tags that were freed of their survey.
     moved: MovedTags,
@@ -121,6 +124,7 @@ impl<'a> BundleCalibration<'a> {
         prior: Option<&'a Calibration>,
         purpose: EstimatePurpose,
     ) -> Result<Self, CalibError> {
+        let surveyed = data.robot.tags.clone();
         // `bundle` moves the tags itself: the map is where it starts.
         let mapped = map_unknown_tags(&data.name, &mut data.data, &data.robot)?;
         let map = mapped.map(|mapped| {
@@ -130,7 +134,7 @@ impl<'a> BundleCalibration<'a> {
         let held_out = std::mem::take(&mut data.data.held_out);
         data.data.fit.extend(held_out);
         let moved = MovedTags::new(&data.robot);
-        Ok(Self { data, prior, map, purpose, moved, drawing: Drawing::default(), listener: None })
+        Ok(Self { data, prior, map, surveyed, purpose, moved, drawing: Drawing::default(), listener: None })
     }
 
     pub(crate) fn with_listener(self, listener: &'a mut EstimateListener<'a>) -> Self {
@@ -140,7 +144,8 @@ impl<'a> BundleCalibration<'a> {
     /// # Errors
     /// [`CalibError`] where the views determine nothing, or an interim estimate contradicts itself.
     pub(crate) fn calibrate(mut self) -> Result<Calibration, CalibError> {
-        let views = std::mem::take(&mut self.data.data.fit);
+        let mut views = std::mem::take(&mut self.data.data.fit);
+        let sizes_m: Vec<f64> = self.data.robot.tags.iter().map(|tag| tag.size_m).collect();
         let declared = declared(&self.data.robot, &views);
         let first = BundleSetup::new(&self.data.robot, &views, &declared, self.prior).with_drawing(&self.drawing);
         self.check_observable(&first, &declared)?;
@@ -165,6 +170,7 @@ impl<'a> BundleCalibration<'a> {
             && self.revise(setup, estimate)
         {
             drop(estimated);
+            rescale(&mut views, &sizes_m, &self.data.robot);
             self.data.data.fit = views;
             return self.calibrate();
         }
@@ -216,9 +222,18 @@ impl<'a> BundleCalibration<'a> {
                 let targets = task.map(|task| task_angles(&diagnosis.robot, task)).unwrap_or_default();
                 let at = if targets.is_empty() { found.view_angles() } else { targets };
                 found.report_drawing(&self.drawing, &at, &mut calibration);
+                self.blame_input(&mut calibration);
             }
         }
         Ok(calibration)
+    }
+
+    /// Where the calibration is refused and the images contradict a file, that comes first.
+    fn blame_input(&self, calibration: &mut Calibration) {
+        if calibration.status == Status::Refused {
+            let wrong = wrong_input(&self.data.data, &self.surveyed, &self.data.robot);
+            calibration.refuse_first_for(wrong.map(Refusal::WrongInput));
+        }
     }
 
     /// Whether survey or drawing are to be taken otherwise than so far.
@@ -434,6 +449,13 @@ impl<'a> BundleCalibration<'a> {
             }
         };
         (consistency, refusals)
+    }
+}
+
+/// Moves the centres of tags in the camera's frame to where tags of their present size are; `sizes_m` were before.
+fn rescale(views: &mut [View], sizes_m: &[f64], robot: &Robot) {
+    for seen in views.iter_mut().flat_map(|view| &mut view.tags).filter(|seen| seen.corners().is_some()) {
+        seen.center_in_camera_m *= robot.tags[seen.tag_idx].size_m / sizes_m[seen.tag_idx];
     }
 }
 

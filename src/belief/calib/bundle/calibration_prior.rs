@@ -76,6 +76,8 @@ pub struct PriorConsistency {
     pub off_std_rad: f64,
     /// Share of the observations that a fit under the widened prior uses.
     pub used_share: f64,
+    /// How many joints are off by more than chance.
+    pub joints_off: usize,
 }
 
 impl PriorConsistency {
@@ -97,6 +99,7 @@ impl PriorConsistency {
             degrees_of_freedom: self.degrees_of_freedom,
             limit: self.limit,
             used_share: self.used_share,
+            joints_off: self.joints_off,
         })
     }
 }
@@ -194,11 +197,14 @@ impl CalibrationPrior {
         let moved_by = 0.5 * (&moved_by + moved_by.transpose());
         let moved = self.moved(&found);
         let (chi2, degrees_of_freedom) = self.chi_square(&moved, &moved_by)?;
-        let (joint, off_rad, off_std_rad) = worst_joint(&found, &moved, &moved_by)?;
+        let joints = joints_moved(&found, &moved, &moved_by);
+        let sigmas = |(_, off, std): &(usize, f64, f64)| if *std > 0.0 { off.abs() / std } else { 0.0 };
+        let joints_off = joints.iter().filter(|moved| sigmas(moved) > Z_OF_JOINTS).count();
+        let (joint, off_rad, off_std_rad) = joints.into_iter().max_by(|a, b| sigmas(a).total_cmp(&sigmas(b)))?;
         let observations = &found.problem.observations;
         let used_share = observations.iter().filter(|s| s.is_used).count() as f64 / observations.len().max(1) as f64;
         let limit = chi_square_999(degrees_of_freedom);
-        Some(PriorConsistency { chi2, degrees_of_freedom, limit, joint, off_rad, off_std_rad, used_share })
+        Some(PriorConsistency { chi2, degrees_of_freedom, limit, joint, off_rad, off_std_rad, used_share, joints_off })
     }
 
     fn moved(&self, found: &Estimate<'_>) -> DVector<f64> {
@@ -234,7 +240,7 @@ impl CalibrationPrior {
 }
 
 /// (joint, mean change of its angle over the views, one sigma of that), rad.
-fn worst_joint(found: &Estimate<'_>, moved: &DVector<f64>, moved_by: &DMatrix<f64>) -> Option<(usize, f64, f64)> {
+fn joints_moved(found: &Estimate<'_>, moved: &DVector<f64>, moved_by: &DMatrix<f64>) -> Vec<(usize, f64, f64)> {
     let problem = &found.problem;
     let seen = problem.views.iter().filter(|view| !view.observations.is_empty()).count().max(1) as f64;
     let of_joint = |joint: usize| {
@@ -247,8 +253,7 @@ fn worst_joint(found: &Estimate<'_>, moved: &DVector<f64>, moved_by: &DMatrix<f6
         (joint, by.dot(moved), (moved_by * &by).dot(&by).max(0.0).sqrt())
     };
     let joints = (0..problem.layout.of_joint.len()).filter(|&joint| !problem.layout.of_joint[joint].is_empty());
-    let sigmas = |(_, off, std): &(usize, f64, f64)| if *std > 0.0 { off.abs() / std } else { 0.0 };
-    joints.map(of_joint).max_by(|a, b| sigmas(a).total_cmp(&sigmas(b)))
+    joints.map(of_joint).collect()
 }
 
 /// What the views can tell, and all that the prior knows.

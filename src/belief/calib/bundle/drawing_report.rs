@@ -11,9 +11,10 @@ use crate::calib::bundle::estimate::Estimate;
 use crate::calib::bundle::score_test::ToolJacobian;
 use crate::calib::bundle::tags::identity::TagFault;
 use crate::calib::finding::{Finding, FindingKind, FindingUnit};
-use crate::calib::geometry_error::{ErrorKind, GeometryError};
+use crate::calib::geometry_error::{BASE, ErrorKind, GeometryError};
 use crate::calib::refusal::Refusal;
 use crate::calib::result::calibration::Calibration;
+use crate::calib::wrong_input::margin_hint;
 use armcal_core::joints::JointAngles;
 use armcal_core::robot::Robot;
 use armcal_core::spatial::log;
@@ -82,7 +83,7 @@ impl Estimate<'_> {
             let covariance = self.covariance3(first);
             let size = self.solved.state.joint.fixed_rows::<3>(first).into_owned();
             let name = match joint {
-                0 => "base (or all tags)".to_owned(),
+                0 => BASE.to_owned(),
                 _ => robot.chain.joints()[joint - 1].child_link.clone(),
             };
             Departure {
@@ -161,7 +162,9 @@ impl Estimate<'_> {
             }
             TagFault::AllSizes { ratio } => {
                 let percent = 100.0 * (ratio - 1.0);
-                let words = format!("all tags are {percent:+.1} % of the survey's size: taken so; measure one again");
+                let hint = margin_hint(ratio).map_or(String::new(), |hint| format!(" ({hint})"));
+                let words =
+                    format!("all tags are {percent:+.1} % of the survey's size{hint}: taken so; measure one again");
                 (FindingKind::TagSize, "all".to_owned(), Some(ratio - 1.0), words)
             }
             TagFault::Moved { .. } | TagFault::Alike { .. } => return None,

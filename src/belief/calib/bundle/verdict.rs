@@ -12,7 +12,7 @@ use crate::calib::bundle::observability::{Observability, observability};
 use crate::calib::bundle::score_test::{GeometryElement, ScoreTestResult};
 use crate::calib::covariance::task_angles;
 use crate::calib::finding::{Finding, FindingKind, FindingUnit};
-use crate::calib::geometry_error::{ErrorKind, GeometryError};
+use crate::calib::geometry_error::{BASE, ErrorKind, GeometryError};
 use crate::calib::parameters::{Parameter, ParameterKind};
 use crate::calib::refusal::{InnovationQuantity, Refusal};
 use crate::calib::result::calibration::Calibration;
@@ -62,8 +62,8 @@ pub(crate) const MAX_OUTLIERS: f64 = 0.25;
 const TAILS: f64 = 1.5;
 /// So many times that limit is refused: innovations then are about three times as large as they should be.
 const FAR_BEYOND: f64 = 4.0;
-/// A warning that touches answer.
-pub(crate) const UNSEEN_LINKS: &str = "links distal to the camera: errors are unobservable without a gripper tag";
+/// A warning that touches answer, and that every arm without a tag on the gripper has.
+pub const UNSEEN_LINKS: &str = "links distal to the camera: errors are unobservable without a gripper tag";
 /// An offset that walks by more than so many times a sensor's usual error from view to view is named.
 const WALKED: f64 = 1.0;
 /// Standard deviation over the prior's above which the prior holds a parameter.
@@ -475,7 +475,7 @@ fn error_name(error: ErrorKind) -> &'static str {
 
 fn geometry_error(robot: &Robot, result: &ScoreTestResult, limit: f64) -> GeometryError {
     let (element, joint) = match result.element {
-        GeometryElement::Joint(0) => ("base (or all tags)".to_owned(), Some(0)),
+        GeometryElement::Joint(0) => (BASE.to_owned(), Some(0)),
         GeometryElement::Joint(joint) => (robot.chain.joints()[joint - 1].child_link.clone(), Some(joint)),
         GeometryElement::Mount => ("camera mount".to_owned(), None),
     };

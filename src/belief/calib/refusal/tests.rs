@@ -98,6 +98,7 @@ fn a_reason_survives_the_file() {
         degrees_of_freedom: 6,
         limit: 22.0,
         used_share: 0.4,
+        joints_off: 1,
     };
     let touch = Refusal::Touch {
         off_m: 0.018,

@@ -274,6 +274,7 @@ impl Association<'_> {
             data.reject(ObservationRejection::InconsistentFrame, n_apart);
         }
         let Some(corners) = corners else { return };
+        data.note_corners(&corners.corners_px);
         let added = match &robot.gripper_tag {
             Some(tag) if tag.id == id => {
                 check_square(robot, tag.size_m, &corners).map(|_| view.gripper_tag = Some(corners))

@@ -8,8 +8,11 @@ use armcal_core::robot::Robot;
 /// Refuses a recording of another arm.
 ///
 /// # Errors
-/// [`CalibError::JointNames`].
+/// [`CalibError::JointNames`], [`CalibError::NoReadings`].
 pub fn check_joints(recording: &Recording, robot: &Robot) -> Result<(), CalibError> {
+    if recording.joint_names.is_empty() {
+        return Err(CalibError::NoReadings { recording: recording.path.display().to_string() });
+    }
     if recording.joint_names != robot.joint_names() {
         return Err(CalibError::JointNames {
             recording: recording.path.display().to_string(),

@@ -172,6 +172,8 @@ pub struct CaptureData {
     pub rejected: BTreeMap<ObservationRejection, usize>,
     /// Ids seen in any view, unknown ones included; ascending, each once.
     pub ids_seen: Vec<u32>,
+    /// The largest column and row of any corner, px; zero without corners.
+    pub largest_px: [f64; 2],
     /// Names of landmarks that are no numbered tags, by the number that stands for them.
     pub landmark_names: BTreeMap<u32, String>,
     /// Lowest and highest reading over the captured spans, C.
@@ -201,6 +203,12 @@ impl CaptureData {
     #[must_use]
     pub fn task_rests(&self) -> Option<TaskRests<'_>> {
         Some(TaskRests { task: self.task.as_ref()?, rests: &self.rests })
+    }
+
+    pub(crate) fn note_corners(&mut self, corners_px: &[[f64; 2]; 4]) {
+        for corner in corners_px {
+            self.largest_px = std::array::from_fn(|axis| self.largest_px[axis].max(corner[axis]));
+        }
     }
 
     pub(crate) fn reject(&mut self, why: ObservationRejection, n: usize) {

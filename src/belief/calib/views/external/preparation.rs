@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use crate::calib::views::external::views::RecordingViews;
 use crate::calib::views::view::{CaptureData, ObservationRejection, View};
 use crate::calib::{CalibError, CalibrationData, HeldOut};
-use armcal_core::input::{ExternalRecording, InputMap};
+use armcal_core::input::{ExternalRecording, InputMap, RawMeasurement};
 use armcal_core::robot::Robot;
 use armcal_core::streams::ReachTask;
 
@@ -36,6 +36,11 @@ pub fn prepare_external(
     let mut views: Vec<(View, [u8; 32])> = Vec::new();
     let mut digests: Vec<[u8; 32]> = Vec::new();
     for recording in recordings {
+        for seen in recording.frames.iter().flat_map(|frame| &frame.tags) {
+            if let RawMeasurement::Corners(corners_px) = &seen.seen {
+                data.note_corners(corners_px);
+            }
+        }
         let made = RecordingViews::of(recording, map, robot, context.plain_landmark);
         if made.views.iter().any(|(_, first)| views.iter().any(|(_, other)| other == first)) {
             return Err(CalibError::Twice { recording: recording.path.display().to_string() });

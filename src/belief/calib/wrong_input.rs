@@ -1,0 +1,425 @@
+//! A file that the images contradict: how the tags stand to one another is seen without the arm.
+//!
+//! Of two tags a and b in one view, a's pose in the camera `C_a` and the map's `a_from_b` say where b is. Its distance
+//! from where it is seen, over the distance between both, is the mismatch; the median over all pairs counts. One scale
+//! of all tags is taken out beforehand, by the median ratio of the map's distances to the seen ones. A large mismatch
+//! means that map or lens is wrong, and no joint has a part in it. The input that makes it small is named. Where only
+//! some tags do not fit the others, they may hang in one another's places: their ids are exchanged.
+//!
+//! Where a view has one landmark with its rotation, the arm by its datasheet tells where that stands: the rotations of
+//! `base_from_tag` over the views must agree but for what sensors may be off.
+
+use std::fmt;
+
+use nalgebra::{Isometry3, Point3, Quaternion, UnitQuaternion, Vector3};
+use serde::{Deserialize, Serialize};
+
+use crate::calib::views::view::{CaptureData, TagMeasurement, TagObservation, View};
+use armcal_core::joints::JointAngles;
+use armcal_core::optics::{CameraModel, Fisheye, LensModel, Radtan, solve_square_both};
+use armcal_core::robot::{Robot, SurveyedTag};
+use armcal_core::spatial::Pose;
+use armcal_core::stats::quantile;
+
+/// An input that is not what it is said to be, and how well the views fit with it and without.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct WrongInput {
+    /// Which, and how it should be read.
+    pub input: WrongInputKind,
+    /// As it is written: of two tags, where the one is not seen over its distance from the other.
+    pub mismatch: f64,
+    /// The same with the input put right; absent where nothing puts it right.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mismatch_otherwise: Option<f64>,
+}
+
+/// What may be wrong.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum WrongInputKind {
+    /// The map's quaternions are x, y, z, w.
+    MapQuaternions,
+    /// The recorded rotations are quaternions in the other order.
+    RecordedQuaternions,
+    /// The recorded poses are those of the camera in the landmark's frame, or the other way round.
+    RecordedDirection,
+    /// The lens is that of an image of another size: columns and rows by robot.toml, and the largest ones of a corner.
+    ImageSize {
+        /// By robot.toml.
+        stated_px: [u32; 2],
+        /// At least.
+        seen_px: [f64; 2],
+    },
+    /// The lens is that of an image of so many times the recorded one's size.
+    ImageScale(f64),
+    /// The lens is of the other model: a fisheye called a pinhole, or the other way round.
+    LensModel,
+    /// All tags are of so many times their stated size.
+    TagSize(f64),
+    /// These tags hang in one another's places.
+    ExchangedIds(Vec<u32>),
+    /// The tags do not stand to one another as the map says, whatever is tried.
+    OtherMap,
+}
+
+/// Mismatches below this are those of good maps and lenses: the tilt of a small tag is not seen better.
+const GOOD: f64 = 0.12;
+/// Above this a map is of other tags.
+const BAD: f64 = 0.3;
+/// What puts an input right makes the mismatch this much smaller.
+const BETTER: f64 = 0.4;
+const MIN_PAIRS: usize = 6;
+/// More views tell no more.
+const MAX_VIEWS: usize = 40;
+/// Image sizes that are tried, over robot.toml's.
+const IMAGE_SCALES: [f64; 4] = [0.5, 2.0, 0.25, 4.0];
+/// A corner may lie so far outside of the stated image: detectors round.
+const BEYOND_IMAGE: f64 = 1.03;
+/// A size within this of the stated one is not called wrong.
+const SIZE_TOLERANCE: f64 = 0.03;
+/// Rotations of one landmark: spread that says nothing, and that of good ones, rad.
+const SPREAD_RAD: f64 = 0.5;
+const GOOD_SPREAD_RAD: f64 = 0.25;
+/// Half of the field of view of a fisheye that nobody describes, rad.
+const FISHEYE_RAD: f64 = 1.5;
+const MIN_ROTATIONS: usize = 5;
+
+/// A tag that stands beside its print: the black square has 8 of the 10 cells that the whole print with its white
+/// margin has. `None` where `ratio`, of the true size over the stated one, says neither.
+#[must_use]
+pub(crate) fn margin_hint(ratio: f64) -> Option<&'static str> {
+    let is = |of: f64| (ratio / of - 1.0).abs() < 0.02;
+    if is(0.8) {
+        Some("8/10: the stated size is that of the whole print with its white margin; state the black square's")
+    } else if is(1.25) {
+        Some("10/8: the margin was taken off a size that had none; state the black square's side as measured")
+    } else {
+        None
+    }
+}
+
+/// The input that explains why the views do not fit; `tags` as the map has them.
+pub(crate) fn wrong_input(data: &CaptureData, tags: &[SurveyedTag], robot: &Robot) -> Option<WrongInput> {
+    let views: Vec<&View> = data.fit.iter().chain(&data.held_out).take(MAX_VIEWS).collect();
+    let lens = &robot.camera.lens;
+    let stated_px = lens.resolution_px();
+    if beyond(stated_px, data.largest_px) {
+        let input = WrongInputKind::ImageSize { stated_px, seen_px: data.largest_px };
+        return Some(WrongInput { input, mismatch: 1.0, mismatch_otherwise: None });
+    }
+    match mismatch(&views, tags, lens) {
+        Some(pairs) => by_pairs(&views, tags, lens, &pairs),
+        None => by_rotations(&views, robot),
+    }
+}
+
+fn beyond(stated_px: [u32; 2], seen_px: [f64; 2]) -> bool {
+    let is_beyond = |axis: usize| seen_px[axis] > BEYOND_IMAGE * f64::from(stated_px[axis]);
+    stated_px[0] > 0 && (is_beyond(0) || is_beyond(1))
+}
+
+fn by_pairs(views: &[&View], tags: &[SurveyedTag], lens: &CameraModel, as_written: &Pairs) -> Option<WrongInput> {
+    let mut found: Option<(WrongInputKind, f64)> = None;
+    let mut consider = |input, pairs: Option<Pairs>| {
+        let Some(Pairs { mismatch, .. }) = pairs else { return };
+        let is_least = found.as_ref().is_none_or(|(_, least)| mismatch < *least);
+        if mismatch < GOOD.min(BETTER * as_written.mismatch) && is_least {
+            found = Some((input, mismatch));
+        }
+    };
+    let turned: Vec<SurveyedTag> = tags.iter().map(in_other_order).collect();
+    consider(WrongInputKind::MapQuaternions, mismatch(views, &turned, lens));
+    for scale in IMAGE_SCALES {
+        consider(WrongInputKind::ImageScale(scale), mismatch(views, tags, &scaled(lens, 1.0 / scale)));
+    }
+    consider(WrongInputKind::LensModel, mismatch(views, tags, &of_other_model(lens)));
+    let wrong = |(input, otherwise): (WrongInputKind, Option<f64>)| WrongInput {
+        input,
+        mismatch: as_written.mismatch,
+        mismatch_otherwise: otherwise,
+    };
+    if let Some((input, otherwise)) = found {
+        return Some(wrong((input, Some(otherwise))));
+    }
+    if let Some((ids, before, after)) = exchanged_ids(views, tags, lens, as_written.ratio) {
+        let input = WrongInputKind::ExchangedIds(ids);
+        return Some(WrongInput { input, mismatch: before, mismatch_otherwise: Some(after) });
+    }
+    if as_written.mismatch > BAD {
+        return Some(wrong((WrongInputKind::OtherMap, None)));
+    }
+    let is_of_size = (as_written.ratio - 1.0).abs() > SIZE_TOLERANCE && as_written.mismatch < GOOD;
+    is_of_size.then(|| wrong((WrongInputKind::TagSize(as_written.ratio), None)))
+}
+
+/// The lens of an image of `scale` times the size.
+fn scaled(lens: &CameraModel, scale: f64) -> CameraModel {
+    let [fx, fy, cx, cy, k @ ..] = lens.intrinsics();
+    let [a, b, c, d] = k;
+    lens.with_intrinsics([fx * scale, fy * scale, cx * scale, cy * scale, a, b, c, d])
+}
+
+/// A lens of the same focal length and centre, without distortion: a fisheye for a pinhole, and the other way round.
+fn of_other_model(lens: &CameraModel) -> CameraModel {
+    let (focal_px, center_px, resolution_px) = (lens.focal_px(), lens.center_px(), lens.resolution_px());
+    let other: CameraModel = match lens.lens {
+        LensModel::Radtan(_) => {
+            Fisheye { focal_px, center_px, distortion: [0.0; 4], resolution_px, max_view_angle_rad: FISHEYE_RAD }.into()
+        }
+        _ => Radtan::new(focal_px, center_px, [0.0; 5], resolution_px).into(),
+    };
+    CameraModel { port: lens.port, ..other }
+}
+
+/// A tag whose quaternion was written x, y, z, w.
+fn in_other_order(tag: &SurveyedTag) -> SurveyedTag {
+    let pose = tag.base_from_tag.isometry();
+    let turned = Isometry3::from_parts(pose.translation, reordered(&pose.rotation));
+    SurveyedTag { base_from_tag: Pose::from_isometry(turned), ..tag.clone() }
+}
+
+/// `[w, x, y, z]` as read, of what was `[x, y, z, w]`.
+fn reordered(read: &UnitQuaternion<f64>) -> UnitQuaternion<f64> {
+    let [x, y, z, w] = [read.w, read.i, read.j, read.k];
+    UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z))
+}
+
+/// The same the other way: `[x, y, z, w]` as read, of what was `[w, x, y, z]`.
+fn reordered_back(read: &UnitQuaternion<f64>) -> UnitQuaternion<f64> {
+    let [w, x, y, z] = [read.i, read.j, read.k, read.w];
+    UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z))
+}
+
+/// Of all pairs of tags in one view: the map's distances over those seen, and the mismatch with that scale.
+struct Pairs {
+    ratio: f64,
+    mismatch: f64,
+}
+
+/// A tag as one view has it.
+struct PosedTag<'a> {
+    surveyed: &'a SurveyedTag,
+    /// In the camera; two where a square has two.
+    poses: Vec<Isometry3<f64>>,
+}
+
+fn mismatch(views: &[&View], tags: &[SurveyedTag], lens: &CameraModel) -> Option<Pairs> {
+    let posed: Vec<Vec<PosedTag<'_>>> = views.iter().map(|view| posed_tags(view, tags, lens)).collect();
+    let pairs: Vec<(&PosedTag<'_>, &PosedTag<'_>)> = posed.iter().flat_map(|of_view| ordered_pairs(of_view)).collect();
+    if pairs.len() < MIN_PAIRS {
+        return None;
+    }
+    let of_pair = |(a, b): &(&PosedTag<'_>, &PosedTag<'_>)| {
+        let by_map = a.surveyed.base_from_tag.isometry().inv_mul(b.surveyed.base_from_tag.isometry());
+        by_map.translation.vector.norm() / (a.center() - b.center()).norm().max(1e-9)
+    };
+    let ratio = quantile(&pairs.iter().map(of_pair).collect::<Vec<f64>>(), 0.5)?;
+    let mismatches: Vec<f64> = pairs.iter().map(|(a, b)| a.mismatch_of(b, ratio)).collect();
+    Some(Pairs { ratio, mismatch: quantile(&mismatches, 0.5)? })
+}
+
+fn ordered_pairs<'a, 'b>(tags: &'b [PosedTag<'a>]) -> impl Iterator<Item = (&'b PosedTag<'a>, &'b PosedTag<'a>)> {
+    let each = move |(n, a)| tags.iter().enumerate().filter(move |(m, _)| *m != n).map(move |(_, b)| (a, b));
+    tags.iter().enumerate().flat_map(each)
+}
+
+fn posed_tags<'a>(view: &View, tags: &'a [SurveyedTag], lens: &CameraModel) -> Vec<PosedTag<'a>> {
+    let posed = |seen: &TagObservation| {
+        let surveyed = tags.get(seen.tag_idx).filter(|tag| tag.is_known())?;
+        let poses = match &seen.measured {
+            TagMeasurement::Corners(corners) => {
+                let (best, other) = solve_square_both(lens, surveyed.size_m, &corners.corners_px).ok()?;
+                [Some(best), other].into_iter().flatten().map(|pose| *pose.camera_from_tag.isometry()).collect()
+            }
+            TagMeasurement::Pose(pose) => vec![*pose],
+            TagMeasurement::Position => return None,
+        };
+        Some(PosedTag { surveyed, poses })
+    };
+    view.tags.iter().filter_map(posed).collect()
+}
+
+impl PosedTag<'_> {
+    fn center(&self) -> Vector3<f64> {
+        self.poses[0].translation.vector
+    }
+
+    /// Where this tag and the map have `other`, against where it is seen.
+    fn mismatch_of(&self, other: &Self, ratio: f64) -> f64 {
+        let (from, to) = (self.surveyed.base_from_tag.isometry(), other.surveyed.base_from_tag.isometry());
+        let place = Point3::from(from.inv_mul(to).translation.vector / ratio);
+        let off = |pose: &Isometry3<f64>| ((pose * place).coords - other.center()).norm();
+        let least = self.poses.iter().map(off).fold(f64::INFINITY, f64::min);
+        least / (self.center() - other.center()).norm().max(1e-9)
+    }
+}
+
+/// Tags that hang in one another's places, as the others have them: their ids, and their mismatch as written and so
+/// taken.
+fn exchanged_ids(
+    views: &[&View],
+    tags: &[SurveyedTag],
+    lens: &CameraModel,
+    ratio: f64,
+) -> Option<(Vec<u32>, f64, f64)> {
+    let posed: Vec<Vec<PosedTag<'_>>> = views.iter().map(|view| posed_tags(view, tags, lens)).collect();
+    // How far the tag `id` is from where the tags of `others` have it, if it hangs at `place`.
+    let off = |id: u32, place: &SurveyedTag, others: &dyn Fn(u32) -> bool| {
+        let pairs = posed.iter().flat_map(|of_view| ordered_pairs(of_view));
+        let of_tag = pairs.filter(|(a, b)| b.surveyed.id == id && others(a.surveyed.id));
+        let at_place = |(a, b): (&PosedTag<'_>, &PosedTag<'_>)| {
+            a.mismatch_of(&PosedTag { surveyed: place, poses: b.poses.clone() }, ratio)
+        };
+        quantile(&of_tag.map(at_place).collect::<Vec<f64>>(), 0.5)
+    };
+    let is_off = |tag: &&SurveyedTag| off(tag.id, tag, &|_| true).is_some_and(|mismatch| mismatch > BAD);
+    let doubtful: Vec<&SurveyedTag> = tags.iter().filter(is_off).collect();
+    let is_sound = |id: u32| doubtful.iter().all(|tag| tag.id != id);
+    let (mut before, mut after) = (Vec::new(), Vec::new());
+    for tag in &doubtful {
+        let places = doubtful.iter().filter(|place| place.id != tag.id);
+        let nearest = places.filter_map(|place| off(tag.id, place, &is_sound)).reduce(f64::min)?;
+        if nearest > GOOD {
+            return None;
+        }
+        before.push(off(tag.id, tag, &is_sound)?);
+        after.push(nearest);
+    }
+    let ids = doubtful.iter().map(|tag| tag.id).collect();
+    (doubtful.len() > 1).then_some((ids, quantile(&before, 0.5)?, quantile(&after, 0.5)?))
+}
+
+/// Of recorded poses of one landmark a view.
+fn by_rotations(views: &[&View], robot: &Robot) -> Option<WrongInput> {
+    let base_from_camera = |view: &View| {
+        let angle_rad = |joint: usize| robot.sensors[joint].center_rad + view.travel_rad[joint];
+        robot.tags_from_camera(&JointAngles::from_fn(view.travel_rad.len(), angle_rad))
+    };
+    let posed: Vec<(usize, Isometry3<f64>, Isometry3<f64>)> = views
+        .iter()
+        .flat_map(|view| {
+            let camera = base_from_camera(view);
+            view.tags.iter().filter_map(move |seen| match &seen.measured {
+                TagMeasurement::Pose(pose) => Some((seen.tag_idx, camera, *pose)),
+                _ => None,
+            })
+        })
+        .collect();
+    let spread = |read: &dyn Fn(&Isometry3<f64>) -> Isometry3<f64>| {
+        let turned = |&(tag, camera, pose): &(usize, Isometry3<f64>, Isometry3<f64>)| (tag, camera * read(&pose));
+        spread_rad(&posed.iter().map(turned).collect::<Vec<_>>())
+    };
+    let as_written = spread(&|pose| *pose)?;
+    let with = |pose: &Isometry3<f64>, turn: fn(&UnitQuaternion<f64>) -> UnitQuaternion<f64>| {
+        Isometry3::from_parts(pose.translation, turn(&pose.rotation))
+    };
+    let readings: [(WrongInputKind, &dyn Fn(&Isometry3<f64>) -> Isometry3<f64>); 5] = [
+        (WrongInputKind::RecordedQuaternions, &|pose| with(pose, reordered)),
+        (WrongInputKind::RecordedQuaternions, &|pose| with(pose, reordered_back)),
+        (WrongInputKind::RecordedQuaternions, &|pose| with(&pose.inverse(), reordered).inverse()),
+        (WrongInputKind::RecordedQuaternions, &|pose| with(&pose.inverse(), reordered_back).inverse()),
+        (WrongInputKind::RecordedDirection, &|pose: &Isometry3<f64>| pose.inverse()),
+    ];
+    let spreads = readings.into_iter().filter_map(|(input, read)| Some((input, spread(read)?)));
+    let (input, least) = spreads.min_by(|a, b| a.1.total_cmp(&b.1))?;
+    let is_better = as_written > SPREAD_RAD && least < GOOD_SPREAD_RAD.min(BETTER * as_written);
+    is_better.then_some(WrongInput { input, mismatch: as_written, mismatch_otherwise: Some(least) })
+}
+
+/// Median angle of a landmark's rotations from the one that is nearest to all others; the largest of all landmarks.
+fn spread_rad(poses: &[(usize, Isometry3<f64>)]) -> Option<f64> {
+    let mut tags: Vec<usize> = poses.iter().map(|(tag, _)| *tag).collect();
+    tags.sort_unstable();
+    tags.dedup();
+    let of_tag = |tag: usize| {
+        let turns: Vec<_> = poses.iter().filter(|(of, _)| *of == tag).map(|(_, pose)| pose.rotation).collect();
+        let median = |from: &UnitQuaternion<f64>| {
+            quantile(&turns.iter().map(|turn| from.angle_to(turn)).collect::<Vec<f64>>(), 0.5)
+        };
+        let spreads = turns.iter().filter_map(median);
+        (turns.len() >= MIN_ROTATIONS).then(|| spreads.fold(f64::INFINITY, f64::min))
+    };
+    tags.into_iter().filter_map(of_tag).reduce(f64::max)
+}
+
+impl WrongInput {
+    /// What to do about it.
+    #[must_use]
+    pub fn remedy(&self) -> &'static str {
+        match &self.input {
+            WrongInputKind::MapQuaternions => "write quaternion_wxyz of the tag map in the order w, x, y, z",
+            WrongInputKind::RecordedQuaternions => "set the other one of quaternion_wxyz and quaternion_xyzw as \
+                                                    tags.columns.rotation_form of the input map",
+            WrongInputKind::RecordedDirection => {
+                "set the other one of camera_from_tag and tag_from_camera as tags.columns.direction of the input map"
+            }
+            WrongInputKind::ImageSize { .. } | WrongInputKind::ImageScale(_) => {
+                "state the lens of the recorded image size in [camera] of robot.toml, or record images of the size \
+                 that it was measured for"
+            }
+            WrongInputKind::LensModel => "state the model and the distortion of that lens in [camera] of robot.toml",
+            WrongInputKind::TagSize(_) => "measure the black square of one tag and correct size_m",
+            WrongInputKind::ExchangedIds(_) => "give each of them the id that is printed there",
+            WrongInputKind::OtherMap => {
+                "give the tag map of this site with --tag-map, check the tags' ids, or make the map anew with `armcal \
+                 tagmap`; if the map is right, check the lens in [camera] of robot.toml"
+            }
+        }
+    }
+}
+
+/// The cause and its evidence.
+impl fmt::Display for WrongInput {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let percent = |share: f64| format!("{:.0} %", 100.0 * share);
+        let degrees = |rad: f64| format!("{:.0} deg", rad.to_degrees());
+        let otherwise = self.mismatch_otherwise.unwrap_or(f64::NAN);
+        let of_pairs = format!("{} of their distances instead of {}", percent(otherwise), percent(self.mismatch));
+        let of_turns = format!("{} instead of {}", degrees(otherwise), degrees(self.mismatch));
+        match &self.input {
+            WrongInputKind::MapQuaternions => {
+                write!(f, "the tag map's quaternions are in the order x, y, z, w: so read, the tags of a view fit one ")?;
+                write!(f, "another within {of_pairs}")
+            }
+            WrongInputKind::RecordedQuaternions => {
+                write!(f, "the recorded quaternions are in the other order: so read, the landmark's turns over the ")?;
+                write!(f, "views agree within {of_turns}")
+            }
+            WrongInputKind::RecordedDirection => {
+                write!(f, "the recorded poses are of the other direction: turned round, the landmark's turns over the ")?;
+                write!(f, "views agree within {of_turns}")
+            }
+            WrongInputKind::ImageSize { stated_px: [columns, rows], seen_px: [x, y] } => write!(
+                f,
+                "the lens of robot.toml is that of an image of {columns} x {rows} px, and corners were seen up to \
+                 ({x:.0}, {y:.0}) px"
+            ),
+            WrongInputKind::ImageScale(scale) => {
+                write!(f, "the lens of robot.toml is that of an image {scale} times the size of the recorded one: with ")?;
+                write!(f, "that taken into account, the tags of a view fit one another within {of_pairs}")
+            }
+            WrongInputKind::LensModel => {
+                write!(f, "the lens is not of the model that robot.toml names, but a fisheye (equidistant) or pinhole in ")?;
+                write!(f, "its place: so taken, the tags of a view fit one another within {of_pairs}")
+            }
+            WrongInputKind::TagSize(ratio) => {
+                write!(f, "all tags are {:+.1} % of their stated size", 100.0 * (ratio - 1.0))?;
+                margin_hint(*ratio).map_or(Ok(()), |hint| write!(f, ", {hint}"))
+            }
+            WrongInputKind::ExchangedIds(ids) => {
+                let ids: Vec<String> = ids.iter().map(ToString::to_string).collect();
+                write!(f, "the tag map has the ids {} in one another's places: so exchanged, ", ids.join(", "))?;
+                write!(f, "the tags of a view fit one another within {of_pairs}")
+            }
+            WrongInputKind::OtherMap => write!(
+                f,
+                "the tags do not stand to one another as the tag map says: in one and the same view they are off by \
+                 {} of their distances, whatever the arm does",
+                percent(self.mismatch)
+            ),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

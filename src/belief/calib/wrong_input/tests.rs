@@ -1,0 +1,131 @@
+use std::path::Path;
+
+use super::*;
+use crate::calib::fixture::titan;
+use crate::calib::views::{associate, surveyed};
+use armcal_core::log::read_recording;
+use armcal_core::optics::solve_square;
+
+/// The sample's views, and the arm with the tags that were around it.
+fn sample() -> (CaptureData, Robot) {
+    let file = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("recordings/sample/run.mcap");
+    let recording = read_recording(&file).expect("the sample reads");
+    let robot = surveyed(&recording, &titan()).into_owned();
+    (associate(&recording, &robot), robot)
+}
+
+fn found(data: &CaptureData, robot: &Robot) -> Option<WrongInputKind> {
+    wrong_input(data, &robot.tags, robot).map(|wrong| wrong.input)
+}
+
+/// Each tag's place as `change` makes it of its index and pose.
+fn with_tags(robot: &Robot, change: impl Fn(usize, &Isometry3<f64>) -> Isometry3<f64>) -> Robot {
+    let mut robot = robot.clone();
+    for (k, tag) in robot.tags.iter_mut().enumerate() {
+        tag.base_from_tag = Pose::from_isometry(change(k, tag.base_from_tag.isometry()));
+    }
+    robot
+}
+
+#[test]
+fn a_map_and_a_lens_that_are_right_are_not_blamed() {
+    let (data, robot) = sample();
+    let views: Vec<&View> = data.fit.iter().collect();
+    let pairs = mismatch(&views, &robot.tags, &robot.camera.lens).expect("pairs of tags");
+    assert!(pairs.mismatch < 0.5 * GOOD && (pairs.ratio - 1.0).abs() < 0.01, "{} {}", pairs.mismatch, pairs.ratio);
+    assert_eq!(found(&data, &robot), None);
+    // Nor is a frame that is turned or shifted as a whole: the arm has a part in it.
+    let turn = Isometry3::new(Vector3::new(0.3, 0.0, 0.1), Vector3::new(0.0, 0.0, 1.6));
+    assert_eq!(found(&data, &with_tags(&robot, |_, pose| turn * pose)), None);
+}
+
+#[test]
+fn quaternions_of_the_map_in_the_other_order_are_told() {
+    let (data, robot) = sample();
+    let written = |_: usize, pose: &Isometry3<f64>| Isometry3::from_parts(pose.translation, reordered_back(&pose.rotation));
+    let robot = with_tags(&robot, written);
+    let wrong = wrong_input(&data, &robot.tags, &robot).expect("a wrong input");
+    assert_eq!(wrong.input, WrongInputKind::MapQuaternions);
+    let words = format!("{wrong}; {}", wrong.remedy());
+    assert!(words.contains("in the order x, y, z, w") && words.contains("write quaternion_wxyz"), "{words}");
+}
+
+#[test]
+fn a_map_of_other_tags_is_told() {
+    let (data, robot) = sample();
+    let n = robot.tags.len();
+    let places: Vec<Isometry3<f64>> = robot.tags.iter().map(|tag| *tag.base_from_tag.isometry()).collect();
+    let exchanged = with_tags(&robot, |k, _| places[(k + 3) % n]);
+    assert_eq!(found(&data, &exchanged), Some(WrongInputKind::OtherMap));
+}
+
+#[test]
+fn ids_that_are_exchanged_among_a_few_tags_are_told() {
+    let (data, robot) = sample();
+    let places: Vec<Isometry3<f64>> = robot.tags.iter().map(|tag| *tag.base_from_tag.isometry()).collect();
+    let ring = with_tags(&robot, |k, pose| if k < 3 { places[(k + 1) % 3] } else { *pose });
+    let ids: Vec<u32> = robot.tags[..3].iter().map(|tag| tag.id).collect();
+    let wrong = wrong_input(&data, &ring.tags, &ring).expect("a wrong input");
+    assert!(matches!(&wrong.input, WrongInputKind::ExchangedIds(found) if *found == ids), "{wrong}");
+    // Tags that were moved elsewhere are no exchange.
+    let by = Isometry3::translation(0.4, 0.3, 0.0);
+    let moved = with_tags(&robot, |k, pose| if k < 2 { by * pose } else { *pose });
+    assert_eq!(found(&data, &moved), None);
+}
+
+#[test]
+fn a_lens_of_another_image_size_is_told() {
+    let (data, robot) = sample();
+    let with_lens = |scale: f64| {
+        let mut other = robot.clone();
+        other.camera.lens = scaled(&robot.camera.lens, scale);
+        other
+    };
+    assert_eq!(found(&data, &with_lens(2.0)), Some(WrongInputKind::ImageScale(2.0)));
+    assert_eq!(found(&data, &with_lens(0.5)), Some(WrongInputKind::ImageScale(0.5)));
+    let mut pinhole = robot.clone();
+    pinhole.camera.lens = of_other_model(&robot.camera.lens);
+    assert_eq!(found(&data, &pinhole), Some(WrongInputKind::LensModel));
+    let mut half = with_lens(0.5);
+    let LensModel::Equidistant(lens) = &mut half.camera.lens.lens else { panic!("a fisheye") };
+    lens.resolution_px = lens.resolution_px.map(|side| side / 2);
+    assert!(matches!(found(&data, &half), Some(WrongInputKind::ImageSize { stated_px: [612, 512], .. })));
+}
+
+#[test]
+fn a_tag_size_is_told_and_the_margin_of_the_print() {
+    let (data, robot) = sample();
+    for (share, hint) in [(1.25, "8/10"), (0.8, "10/8")] {
+        let mut other = robot.clone();
+        other.tags.iter_mut().for_each(|tag| tag.size_m *= share);
+        let wrong = wrong_input(&data, &other.tags, &other).expect("a wrong input");
+        assert!(matches!(wrong.input, WrongInputKind::TagSize(ratio) if (ratio * share - 1.0).abs() < 0.01), "{wrong}");
+        assert!(wrong.to_string().contains(hint), "{wrong}");
+    }
+    assert_eq!((margin_hint(1.1), margin_hint(1.0)), (None, None));
+}
+
+/// One landmark a view, by its pose as a program may have written it.
+fn posed(data: &CaptureData, robot: &Robot, write: impl Fn(&Isometry3<f64>) -> Isometry3<f64>) -> CaptureData {
+    let mut data = data.clone();
+    for view in data.fit.iter_mut().chain(&mut data.held_out) {
+        view.tags.retain(|seen| seen.tag_idx == 0);
+        for seen in &mut view.tags {
+            let corners = seen.corners().expect("corners").corners_px;
+            let pose = solve_square(&robot.camera.lens, robot.tags[0].size_m, &corners).expect("a pose");
+            seen.measured = TagMeasurement::Pose(write(pose.camera_from_tag.isometry()));
+        }
+    }
+    data
+}
+
+#[test]
+fn recorded_poses_in_another_order_or_direction_are_told() {
+    let (data, robot) = sample();
+    let found = |write: &dyn Fn(&Isometry3<f64>) -> Isometry3<f64>| found(&posed(&data, &robot, write), &robot);
+    assert_eq!(found(&|pose| *pose), None);
+    let turned = |pose: &Isometry3<f64>| Isometry3::from_parts(pose.translation, reordered_back(&pose.rotation));
+    assert_eq!(found(&turned), Some(WrongInputKind::RecordedQuaternions));
+    assert_eq!(found(&|pose| turned(&pose.inverse()).inverse()), Some(WrongInputKind::RecordedQuaternions));
+    assert_eq!(found(&|pose| pose.inverse()), Some(WrongInputKind::RecordedDirection));
+}

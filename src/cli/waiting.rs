@@ -1,0 +1,57 @@
+//! Signs of life on a terminal while something takes its time; nothing in a pipe, and nothing with `--quiet`.
+
+use std::time::Duration;
+
+use indicatif::{ProgressBar, ProgressStyle};
+
+use crate::cli::stdout::is_quiet;
+
+/// A line that says what is done, for how long already and, where the amount is known, for how long still. It goes away
+/// with this.
+pub(super) struct Waiting {
+    bar: ProgressBar,
+}
+
+const TICK: Duration = Duration::from_millis(500);
+
+impl Waiting {
+    /// For work whose amount nobody knows beforehand.
+    pub fn on(what: &str) -> Self {
+        let bar = if is_quiet() { ProgressBar::hidden() } else { ProgressBar::new_spinner() };
+        Self::with(bar, "{elapsed_precise} {msg} {spinner}", what)
+    }
+
+    /// For `total` pieces.
+    #[cfg(feature = "sim")]
+    pub fn for_each_of(total: u64, what: &str) -> Self {
+        let bar = if is_quiet() { ProgressBar::hidden() } else { ProgressBar::new(total) };
+        Self::with(bar, "{elapsed_precise} {msg} {wide_bar} {pos}/{len}, {eta} left", what)
+    }
+
+    fn with(bar: ProgressBar, template: &str, what: &str) -> Self {
+        if let Ok(style) = ProgressStyle::with_template(template) {
+            bar.set_style(style);
+        }
+        bar.set_message(what.to_owned());
+        bar.enable_steady_tick(TICK);
+        Self { bar }
+    }
+
+    /// One more is done.
+    #[cfg(feature = "sim")]
+    pub fn one_more(&self) {
+        self.bar.inc(1);
+    }
+
+    /// Whether anybody sees it.
+    #[cfg(feature = "sim")]
+    pub fn is_seen(&self) -> bool {
+        !self.bar.is_hidden()
+    }
+}
+
+impl Drop for Waiting {
+    fn drop(&mut self) {
+        self.bar.finish_and_clear();
+    }
+}

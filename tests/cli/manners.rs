@@ -1,0 +1,158 @@
+//! What the program says first, last and where something is wrong: verdict, figures, next step; one clear error.
+
+use std::path::Path;
+
+use armcal::log::ros::JointState;
+use armcal::log::{RecordingHeader, RecordingWriter, RosMessage};
+use armcal::time::SIMULATION_EPOCH;
+
+use crate::support::{Answer, answer, edit, program, robot_copy, robot_folder, shared_run, temp, vehicle_file, write};
+
+fn calibrated(more: &[&str], out: &Path) -> Answer {
+    let mut command = program();
+    command.arg("calibrate").arg(shared_run().file("run.mcap")).arg("--robot").arg(robot_folder());
+    answer(command.arg("--out").arg(out).args(more))
+}
+
+#[test]
+fn the_closing_lines_are_verdict_three_figures_and_the_next_step() {
+    let folder = temp();
+    let said = calibrated(&[], folder.path());
+    let labels: Vec<&str> = said.stdout.lines().map(|line| line.get(..13).unwrap_or(line).trim_end()).collect();
+    let expected = ["calibration", "held out", "predicted", "with priors", "warning", "written", "next"];
+    assert_eq!(labels, expected, "{said:#?}");
+    assert!(said.stdout.ends_with("/report.html; all figures: --details\n"), "{said:#?}");
+    let detailed = calibrated(&["--details"], folder.path());
+    for label in ["captured", "gains", "camera mount", "unobservable"] {
+        assert!(detailed.stdout.lines().any(|line| line.starts_with(label)), "no {label} in {detailed:#?}");
+        assert!(!labels.contains(&label));
+    }
+}
+
+#[test]
+fn json_is_summary_json_alone_and_quiet_says_the_verdict_alone() {
+    let folder = temp();
+    let told = calibrated(&["--json"], folder.path());
+    let json: serde_json::Value = serde_json::from_str(&told.stdout).expect("JSON alone on stdout");
+    let file = crate::support::read(&folder.path().join("summary.json"));
+    assert_eq!(json, serde_json::from_str::<serde_json::Value>(&file).expect("summary.json"));
+    assert_eq!((json["version"].as_u64(), json["status"].as_str()), (Some(1), Some("accepted")));
+    let quiet = calibrated(&["--quiet"], folder.path());
+    assert_eq!((quiet.stdout.as_str(), quiet.stderr.as_str()), ("calibration  ACCEPTED\n", ""));
+    answer(program().args(["check", "--quiet", "-v", "x.toml"])).expect("both", 2, &["cannot be used with"]);
+}
+
+#[test]
+fn checks_maps_and_plans_have_a_json_form() {
+    let folder = temp();
+    let wrong = folder.path().join("wrong.toml");
+    write(&wrong, "version = 1\n");
+    let told = answer(program().args(["check", "--json"]).arg(robot_folder()).arg(&wrong));
+    let json: serde_json::Value = serde_json::from_str(&told.stdout).expect("JSON alone on stdout");
+    assert_eq!((told.code, json[0]["ok"].as_bool(), json[1]["ok"].as_bool()), (2, Some(true), Some(false)));
+    assert!(json[1]["error"].as_str().is_some_and(|error| error.contains("is none of robot")), "{json}");
+    let mut command = program();
+    command.arg("tagmap").arg(shared_run().file("run.mcap")).arg("--robot").arg(robot_folder()).arg("--json");
+    let map: serde_json::Value = serde_json::from_str(&answer(&mut command).stdout).expect("JSON alone on stdout");
+    let tags = map["tags"].as_array().expect("tags");
+    assert!(tags.len() == 8 && tags.iter().all(|tag| tag["position_m"].as_array().is_some_and(|m| m.len() == 3)));
+    let mut command = program();
+    command.arg("plan").arg(&shared_run().routine).arg("--json").arg("--out").arg(folder.path().join("plan"));
+    let plan: serde_json::Value = serde_json::from_str(&answer(&mut command).stdout).expect("JSON alone on stdout");
+    let poses = plan["pose"].as_array().expect("poses");
+    assert!(poses.len() > 10 && poses[0]["raw_counts"].as_array().is_some_and(|counts| counts.len() == 6), "{plan}");
+}
+
+#[test]
+fn a_wrong_kind_of_file_is_named_with_the_command_that_takes_it() {
+    let (folder, run) = (temp(), shared_run());
+    let recording = run.file("run.mcap");
+    let (routine, calibration, urdf) =
+        (run.routine.clone(), run.file("calibration.toml"), robot_folder().join("titan4.urdf"));
+    let robot_file = robot_folder().join("robot.toml");
+    let out = folder.path().join("out");
+    let refused = |words: &[&str], files: &[&Path], expected: &[&str]| {
+        let mut command = program();
+        command.args(words).args(files);
+        answer(&mut command).expect(&format!("{words:?} {files:?}"), 2, expected);
+    };
+    refused(&["run"], &[&recording], &["run.mcap: is a recording (.mcap), not a routine", "`armcal calibrate`"]);
+    refused(&["plan"], &[&calibration], &["calibration.toml: is a calibration, not a routine", "`armcal export`"]);
+    refused(&["replay"], &[&routine], &["short.toml: is a routine, not a recording", "`armcal run`"]);
+    refused(&["inspect"], &[&urdf], &["titan4.urdf: is a URDF, not a recording", "`armcal new-robot`"]);
+    refused(&["export", "--as", "yaml"], &[&recording], &["is a recording (.mcap), not a calibration"]);
+    refused(&["check"], &[&recording], &["run.mcap: is a recording", "`armcal inspect` says what is in it"]);
+    refused(&["new-robot"], &[&recording, Path::new("--out"), &out], &["not a URDF"]);
+    let calibrate = |option: &str, file: &Path, expected: &[&str]| {
+        let mut command = program();
+        command.arg("calibrate").arg(&recording).arg("--robot").arg(robot_folder()).arg("--out").arg(&out);
+        answer(command.arg(option).arg(file)).expect(option, 2, expected);
+    };
+    calibrate("--input", &routine, &["is a routine, not an input map"]);
+    calibrate("--tag-map", &calibration, &["is a calibration, not a tag map"]);
+    calibrate("--task", &vehicle_file(), &["is a vehicle, not a task", "--vehicle"]);
+    calibrate("--prior", &run.file("summary.json"), &["summary.json"]);
+    let mut command = program();
+    command.arg("calibrate").arg(&recording).arg("--robot").arg(&robot_file).arg("--out").arg(&out);
+    answer(&mut command).expect("a file for a folder", 2, &["is a robot.toml, not a robot folder", "give its folder"]);
+}
+
+/// Joint readings on a topic of another program, and nothing that armcal records.
+fn recording_of_others(file: &Path) {
+    let mut writer = RecordingWriter::create(file, RecordingHeader::new(Vec::new())).expect("a file");
+    for n in 0..5 {
+        let joints = JointState { name: vec!["a".to_owned()], position: vec![1.0], ..JointState::default() };
+        writer.write_ros("/joint_states", &JointState::SCHEMA, SIMULATION_EPOCH.plus_s(f64::from(n)), &joints).unwrap();
+    }
+    writer.finish().expect("finished");
+}
+
+#[test]
+fn a_forgotten_input_map_is_told_and_how_to_get_one() {
+    let folder = temp();
+    let file = folder.path().join("field.mcap");
+    recording_of_others(&file);
+    let mut command = program();
+    command.arg("calibrate").arg(&file).arg("--robot").arg(robot_folder()).arg("--out").arg(folder.path().join("out"));
+    let words = ["field.mcap", "give an input map with --input", "--write-input MAP.toml` proposes one"];
+    answer(&mut command).expect("no map", 2, &words);
+}
+
+#[test]
+fn missing_keys_are_told_at_once_and_unknown_ones_with_the_nearest() {
+    let folder = temp();
+    let map = folder.path().join("map.toml");
+    write(&map, "version = 1\n[joint_sensors]\ntopic = \"/j\"\n[tags]\ntopics = \"/t\"\n");
+    let check = |file: &Path| answer(program().arg("check").arg(file));
+    check(&map).expect("unknown", 2, &["map.toml", "line 5", "`topics`", "did you mean `topic`?"]);
+    write(&map, "[joint_sensors]\ntopic = \"/j\"\n[tags]\n");
+    check(&map).expect("missing", 2, &["missing field `use`; also missing: `version`"]);
+    let routine = folder.path().join("r.toml");
+    write(&routine, "version = 1\nrobot = \"a\"\nvehicle = \"b\"\n[task]\n");
+    check(&routine).expect("routine", 2, &["missing field `tolerance_m`; also missing: `targets_m` in [task], `name`"]);
+    let robot = robot_copy(folder.path());
+    edit(&robot.join("robot.toml"), "mount_std_m", "mount_std");
+    check(&robot).expect("robot", 2, &["robot.toml", "mount_std"]);
+}
+
+#[test]
+fn a_rendered_run_says_at_its_start_how_long_it_takes() {
+    let folder = temp();
+    let routine = crate::support::ShortRoutine {
+        tail: "[camera]\nmode = \"rendered\"\n[world.vehicle]\nmotion = \"adrift\"\n".to_owned(),
+        ..crate::support::ShortRoutine::default()
+    };
+    // Refused before anything moves: nothing is foretold.
+    let said = crate::support::run(&routine.write(folder.path()), &folder.path().join("out"));
+    assert!(said.code == 2 && !said.stderr.contains("images are rendered"), "{said:#?}");
+    let routine = crate::support::ShortRoutine {
+        tail: "[camera]\nmode = \"rendered\"\n".to_owned(),
+        poses: 3,
+        held_out: 0,
+        min_tags: 9,
+        ..crate::support::ShortRoutine::default()
+    };
+    let said = crate::support::run(&routine.write(folder.path()), &folder.path().join("out"));
+    let words = ["about 30 images are rendered and searched: some ", " s on ", "add tags, or lower capture.min_tags"];
+    said.expect("too few tags", 2, &words);
+}
