@@ -5,13 +5,16 @@ use std::process::ExitCode;
 
 use anyhow::Result;
 use clap::{CommandFactory, Parser, Subcommand};
+use tracing_subscriber::filter::{LevelFilter, Targets};
+use tracing_subscriber::layer::SubscriberExt;
+use tracing_subscriber::util::SubscriberInitExt;
 
 #[cfg(feature = "viewer")]
 use crate::cli::replay;
 use crate::cli::stdout::{is_written, note};
 use crate::cli::{calibrate, check, completions, exit, export, inspect, new_robot, plan, tagmap, watch};
 #[cfg(feature = "sim")]
-use crate::cli::{campaign, regress, run, sensitivity, serve, study};
+use crate::cli::{campaign, discover, regress, run, sensitivity, serve, study};
 
 /// With what this build can do beside the defaults.
 #[cfg(feature = "live")]
@@ -35,6 +38,9 @@ enum Command {
     /// Put a routine's simulated arm behind the ROS 2 topics of a real one
     #[cfg(feature = "sim")]
     Serve(serve::ServeArgs),
+    /// Find out how an arm can be reached
+    #[cfg(feature = "sim")]
+    Live(discover::LiveCommandArgs),
     /// Run a routine for many seeds and settings, and sum the figures up
     #[cfg(feature = "sim")]
     Campaign(Box<campaign::CampaignArgs>),
@@ -87,18 +93,14 @@ pub fn main() -> ExitCode {
         Ok(cli) => cli,
         Err(answer) => return clap_answer(&answer),
     };
-    tracing_subscriber::fmt()
-        .with_writer(std::io::stderr)
-        .with_max_level(tracing::Level::WARN)
-        .without_time()
-        .with_target(false)
-        .log_internal_errors(false)
-        .init();
+    begin_log();
     let result = match cli.command {
         #[cfg(feature = "sim")]
         Command::Run(args) => run::run(&args),
         #[cfg(feature = "sim")]
         Command::Serve(args) => serve::serve(&args),
+        #[cfg(feature = "sim")]
+        Command::Live(args) => discover::live(&args),
         #[cfg(feature = "sim")]
         Command::Campaign(args) => campaign::campaign(&args),
         #[cfg(feature = "sim")]
@@ -121,6 +123,22 @@ pub fn main() -> ExitCode {
         Command::Man(args) => completions::man(&args, command()),
     };
     ended(result)
+}
+
+/// Warnings go to stderr, but for what the middleware says of every long message, and of no ROS on this machine.
+fn begin_log() {
+    let of_use = Targets::new()
+        .with_default(LevelFilter::WARN)
+        .with_target("rustdds::network", LevelFilter::ERROR)
+        .with_target("ros2_client::distributions", LevelFilter::ERROR);
+    tracing_subscriber::fmt()
+        .with_writer(std::io::stderr)
+        .without_time()
+        .with_target(false)
+        .log_internal_errors(false)
+        .finish()
+        .with(of_use)
+        .init();
 }
 
 fn ended(result: Result<exit::Exit>) -> ExitCode {
