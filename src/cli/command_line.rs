@@ -6,6 +6,9 @@ use std::sync::LazyLock;
 
 use anyhow::Result;
 use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
+use tracing_subscriber::filter::{LevelFilter, Targets};
+use tracing_subscriber::layer::SubscriberExt;
+use tracing_subscriber::util::SubscriberInitExt;
 
 #[cfg(feature = "viewer")]
 use crate::cli::replay;
@@ -13,7 +16,7 @@ use crate::cli::examples::with_examples;
 use crate::cli::stdout::{be_quiet, complain, is_written};
 use crate::cli::{calibrate, check, completions, exit, export, inspect, new_robot, plan, tagmap, watch};
 #[cfg(feature = "sim")]
-use crate::cli::{campaign, regress, run, sensitivity, serve, study};
+use crate::cli::{campaign, discover, regress, run, sensitivity, serve, study};
 
 /// What this build has of the parts that a build may leave out.
 const PARTS: [(bool, &str); 3] = [
@@ -69,6 +72,9 @@ enum Command {
     /// Put a routine's simulated arm behind the ROS 2 topics of a real one
     #[cfg(feature = "sim")]
     Serve(serve::ServeArgs),
+    /// Find out how an arm can be reached
+    #[cfg(feature = "sim")]
+    Live(discover::LiveCommandArgs),
     /// Run a routine for many seeds and settings, and sum the figures up
     #[cfg(feature = "sim")]
     Campaign(Box<campaign::CampaignArgs>),
@@ -125,18 +131,14 @@ pub fn main() -> ExitCode {
     if cli.loudness.quiet {
         be_quiet();
     }
-    tracing_subscriber::fmt()
-        .with_writer(std::io::stderr)
-        .with_max_level(cli.loudness.level())
-        .without_time()
-        .with_target(false)
-        .log_internal_errors(false)
-        .init();
+    begin_log(cli.loudness.level());
     let result = match cli.command {
         #[cfg(feature = "sim")]
         Command::Run(args) => run::run(&args),
         #[cfg(feature = "sim")]
         Command::Serve(args) => serve::serve(&args),
+        #[cfg(feature = "sim")]
+        Command::Live(args) => discover::live(&args),
         #[cfg(feature = "sim")]
         Command::Campaign(args) => campaign::campaign(&args),
         #[cfg(feature = "sim")]
@@ -159,6 +161,24 @@ pub fn main() -> ExitCode {
         Command::Man(args) => completions::man(&args, command()),
     };
     ended(result)
+}
+
+/// Words of the libraries go to stderr, but for what the middleware says of every long message, and of no ROS on this
+/// machine.
+fn begin_log(level: tracing::Level) {
+    let of_use = Targets::new()
+        .with_default(LevelFilter::from_level(level))
+        .with_target("rustdds::network", LevelFilter::ERROR)
+        .with_target("ros2_client::distributions", LevelFilter::ERROR);
+    tracing_subscriber::fmt()
+        .with_writer(std::io::stderr)
+        .without_time()
+        .with_target(false)
+        .with_max_level(level)
+        .log_internal_errors(false)
+        .finish()
+        .with(of_use)
+        .init();
 }
 
 fn ended(result: Result<exit::Exit>) -> ExitCode {

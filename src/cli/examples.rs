@@ -14,6 +14,8 @@ const EXAMPLES: &[(&str, &[&str])] = &[
         ],
     ),
     ("serve", &["armcal serve routines/titan4-quickstart.toml --factor 5 --for 600"]),
+    ("live", &["armcal live discover --robot my-arm --out arm.toml"]),
+    ("live discover", &["armcal live discover --domain 7 --robot my-arm --out arm.toml"]),
     (
         "campaign",
         &[
@@ -50,7 +52,7 @@ const EXAMPLES: &[(&str, &[&str])] = &[
     (
         "tagmap",
         &[
-            "armcal tagmap run.mcap --robot robots/titan4 --out tags.toml",
+            "armcal tagmap run.mcap --robot robots/titan4 --out tags.toml --html tags.html",
             "armcal tagmap bag.mcap --camera cameras.yaml --tags tagslam.yaml --mode partly-known",
         ],
     ),
@@ -90,6 +92,7 @@ const EXAMPLES: &[(&str, &[&str])] = &[
     ("study falsified", &["armcal study falsified --kind tag --seeds 10"]),
     ("study worlds", &["armcal study worlds --runs 100 --first-seed 1 --timeout-s 300"]),
     ("study dive", &["armcal study dive --seeds 10 --keep"]),
+    ("study bound", &["armcal study bound --routine routines/titan4-pinhole.toml --seeds 20"]),
     ("study dive-faults", &["armcal study dive-faults --seeds 5 --kind sensor"]),
 ];
 

@@ -194,7 +194,15 @@ impl Connection {
     /// # Errors
     /// [`LiveError::File`] with file, key and allowed range.
     pub fn load(file: &Path) -> Result<Self, LiveError> {
-        let connection: Self = parse_toml(file, &read_text(file)?)?;
+        Ok(Self::parse(file, &read_text(file)?)?)
+    }
+
+    /// Reads and checks the text of a connection map; `file` is named where it is wrong.
+    ///
+    /// # Errors
+    /// [`RobotError`] with file, key and allowed range.
+    pub fn parse(file: &Path, text: &str) -> Result<Self, RobotError> {
+        let connection: Self = parse_toml(file, text)?;
         connection.check(file)?;
         Ok(connection)
     }
@@ -221,10 +229,8 @@ impl Connection {
             FileIssue::check_range(file, "deadman.timeout_s", deadman.timeout_s, 0.05..=10.0)?;
         }
         for (key, topic) in self.named() {
-            let allowed = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '/';
-            let is_name = topic.starts_with('/') && topic.len() > 1 && topic.chars().all(allowed);
             let is_needed = ["joint_sensors", "commands.topic"].contains(&key);
-            if !is_name && (is_needed || !topic.is_empty()) {
+            if !is_name(topic) && (is_needed || !topic.is_empty()) {
                 let problem = format!("{topic:?} is no absolute name of a topic, such as \"/joint_sensors\"");
                 return Err(FileIssue::new(file, key, problem).into());
             }
@@ -266,15 +272,18 @@ impl Connection {
     }
 }
 
+/// Whether a connection map may name this topic or service.
+pub(crate) fn is_name(topic: &str) -> bool {
+    let is_allowed = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '/';
+    topic.starts_with('/') && topic.len() > 1 && topic.chars().all(is_allowed)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     fn checked(text: &str) -> Result<Connection, String> {
-        let file = Path::new("arm.toml");
-        let connection: Connection = parse_toml(file, text).map_err(|error| error.to_string())?;
-        connection.check(file).map_err(|error| error.to_string())?;
-        Ok(connection)
+        Connection::parse(Path::new("arm.toml"), text).map_err(|error| error.to_string())
     }
 
     #[test]

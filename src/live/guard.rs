@@ -14,6 +14,8 @@ const RANGE_SLACK_RAD: f64 = 0.035;
 const ASKED_RAD: f64 = 0.02;
 /// A clock that runs so many times as fast as ours is a simulator's; faster, and it has leapt.
 const MAX_PACE: f64 = 100.0;
+/// So many times its pace while the arm was heard out.
+const PACE_SLACK: f64 = 2.0;
 
 /// Why the guard stopped the arm.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -51,6 +53,8 @@ pub(crate) struct Guard {
     /// Least and greatest angle that a set-point may mean by the nominal sensor.
     range_rad: Vec<[f64; 2]>,
     last: Option<(JointSensorSample, Duration)>,
+    /// The arm's clock goes no faster than ours times this.
+    max_pace: f64,
     /// Silence counts from here.
     listening_since: Duration,
     held_at: Option<Duration>,
@@ -77,6 +81,7 @@ impl Guard {
             wrap_counts: robot.sensors.iter().map(|sensor| sensor.wrap_counts).collect(),
             range_rad: robot.sensors.iter().map(range).collect(),
             last: None,
+            max_pace: MAX_PACE,
             listening_since: Duration::ZERO,
             held_at: None,
             astray_since: vec![None; robot.sensors.len()],
@@ -139,7 +144,7 @@ impl Guard {
         if let Some((last, last_at)) = &self.last {
             let (step_s, ours_s) = (sample.stamp.since_s(last.stamp), (at.saturating_sub(*last_at)).as_secs_f64());
             let limit_s = self.limits.clock_step_s;
-            if step_s < -limit_s || (step_s > limit_s && step_s > MAX_PACE * ours_s) {
+            if step_s < -limit_s || (step_s > limit_s && step_s > self.max_pace * ours_s) {
                 return Err(StopReason::ClockStep { step_s, limit_s });
             }
             if step_s <= 0.0 {
@@ -198,6 +203,11 @@ impl Guard {
         let Some(limit_s) = self.deadman_s else { return Ok(()) };
         let is_held = self.held_at.is_some_and(|at| now.saturating_sub(at).as_secs_f64() <= limit_s);
         if is_held { Ok(()) } else { Err(StopReason::Deadman { limit_s }) }
+    }
+
+    /// The arm's clock went on by `arm_s` in `ours_s` of our time.
+    pub fn learn_pace(&mut self, arm_s: f64, ours_s: f64) {
+        self.max_pace = (PACE_SLACK * arm_s / ours_s.max(1e-9)).clamp(PACE_SLACK, MAX_PACE);
     }
 
     /// Nothing was asked of the arm for a while, and nobody listened: silence begins anew.

@@ -4,11 +4,13 @@
 //! carries, `ros2` that over DDS. [`LiveArm`] is an `Arm` on any wire: it paces a session by the arm's own readings and
 //! stops when `guard` says so; `nudge` has its first set-points, and `tag_check`
 //! compares the tags in view with the datasheet before them. [`ImageSearch`] looks for tags in a wire's images.
+//! `discover` proposes an arm.toml from what a domain has.
 //! [`serve`] puts any `Arm`, such as the simulated one, behind the topics of a connection.
 //! None of this is a safety device.
 #![warn(missing_docs)]
 
 mod connection;
+mod discover;
 mod error;
 mod guard;
 mod image_search;
@@ -22,12 +24,13 @@ mod tests;
 mod wire;
 
 pub use connection::{CommandType, Commands, Connection, Deadman, GuardLimits, ServiceMapping, StopWays};
+pub use discover::{Domain, ProposedConnection, Seen, SeenService, SeenTopic, propose_connection};
 pub use error::LiveError;
 pub use guard::StopReason;
 pub use image_search::{ImageSearch, TagFinder};
 pub use live_arm::{LiveArm, Survey};
 pub use nudge::{Nudge, NudgeProblem};
-pub use ros2::Ros2Wire;
+pub use ros2::{Ros2Wire, look_around};
 pub use server::{Pace, Served, serve};
 pub use tag_check::TagCheck;
 pub use wire::{Heard, Wire};

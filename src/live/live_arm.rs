@@ -300,8 +300,10 @@ fn listen(wire: &mut impl Wire, guard: &mut Guard, connection: &Connection) -> R
         })?;
         let waited_s = (now - start).as_secs_f64();
         match &first {
-            Some((_, since)) if (now - *since).as_secs_f64() >= limits.ready_s => {
+            Some((anchor, since)) if (now - *since).as_secs_f64() >= limits.ready_s => {
                 survey.seconds = (now - *since).as_secs_f64();
+                let arm_s = guard.latest().map_or(0.0, |latest| latest.stamp.since_s(anchor.stamp));
+                guard.learn_pace(arm_s, survey.seconds);
                 break;
             }
             None if waited_s > limits.connect_s => return Err(nothing_heard(connection, &survey)),

@@ -80,7 +80,7 @@ struct Server<'a> {
 
 impl<'a> Server<'a> {
     fn open(robot: &Robot, connection: &'a Connection) -> Result<Self, LiveError> {
-        let mut node = Node::new(connection, "armcal_arm")?;
+        let mut node = Node::new(connection.domain, &connection.networks, "armcal_arm")?;
         let names: Vec<String> =
             robot.joint_names().iter().map(|name| connection.driver_name(name).to_owned()).collect();
         let all = std::iter::once((Stream::JointSensors, connection.joint_sensors.as_str()));

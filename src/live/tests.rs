@@ -1,5 +1,6 @@
 //! The guard against an arm in memory, with a clock that the test turns: each fault with the time it takes to stop.
 
+mod discover;
 mod nudge;
 mod search;
 mod tag_check;
@@ -255,6 +256,7 @@ fn each_fault_stops_the_arm_within_its_time() {
         (Fault::Killed, default.stale_s + PERIOD_S, "no joint readings"),
         (Fault::LetGo, 0.0, "dead man"),
         (Fault::ClockLeaps { by_s: 60.0 }, 0.0, "leapt by 60"),
+        (Fault::ClockLeaps { by_s: 0.6 }, 0.0, "leapt by 0.6"),
         (Fault::ClockLeaps { by_s: -60.0 }, 0.0, "leapt by -59.98"),
         (Fault::Frozen, default.frozen_s + PERIOD_S, "stayed the same"),
         (Fault::Disobeys, 3.0, "does not follow"),

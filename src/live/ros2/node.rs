@@ -1,14 +1,16 @@
 //! A participant of a ROS 2 domain, with readers and writers of raw messages.
 
+use std::net::Ipv4Addr;
+
 use rustdds::no_key::{DataWriter, SimpleDataReader};
 use rustdds::policy::{History, Reliability};
 use rustdds::{
-    DomainParticipant, DomainParticipantBuilder, DomainParticipantStatusEvent, DomainParticipantStatusListener,
-    QosPolicies, QosPolicyBuilder, StatusEvented, TopicKind,
+    DomainParticipant, DomainParticipantBuilder, DomainParticipantStatusEvent, DomainParticipantStatusListener, GUID,
+    QosPolicies, QosPolicyBuilder, RTPSEntity, StatusEvented, TopicKind,
 };
 
 use super::raw::Raw;
-use crate::{Connection, LiveError};
+use crate::LiveError;
 
 /// Messages that a reader keeps while nobody listens.
 const DEPTH: i32 = 200;
@@ -18,8 +20,8 @@ pub(crate) struct Node {
     pub ros: ros2_client::Node,
     publisher: rustdds::Publisher,
     subscriber: rustdds::Subscriber,
-    status: DomainParticipantStatusListener,
-    participant: DomainParticipant,
+    pub(super) status: DomainParticipantStatusListener,
+    pub(super) participant: DomainParticipant,
 }
 
 /// Reads one topic.
@@ -29,10 +31,10 @@ pub(crate) struct Reader(pub SimpleDataReader<Vec<u8>, Raw>);
 pub(crate) struct Writer(DataWriter<Vec<u8>, Raw>);
 
 impl Node {
-    pub fn new(connection: &Connection, name: &str) -> Result<Self, LiveError> {
-        let mut builder = DomainParticipantBuilder::new(connection.domain);
-        if !connection.networks.is_empty() {
-            builder = builder.with_only_networks(connection.networks.iter().copied());
+    pub fn new(domain: u16, networks: &[Ipv4Addr], name: &str) -> Result<Self, LiveError> {
+        let mut builder = DomainParticipantBuilder::new(domain);
+        if !networks.is_empty() {
+            builder = builder.with_only_networks(networks.iter().copied());
         }
         let participant = builder.build().map_err(LiveError::dds("the domain cannot be joined"))?;
         let status = participant.status_listener();
@@ -48,6 +50,11 @@ impl Node {
         let subscriber =
             participant.create_subscriber(&best_effort()).map_err(LiveError::dds("no subscriber can be made"))?;
         Ok(Self { participant, publisher, subscriber, status, ros })
+    }
+
+    /// Everything of ours has this prefix.
+    pub fn guid(&self) -> GUID {
+        self.participant.guid()
     }
 
     pub fn reader(&self, topic: &str, ros_type: &str) -> Result<Reader, LiveError> {

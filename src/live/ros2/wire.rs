@@ -4,16 +4,13 @@ use std::time::{Duration, Instant};
 
 use rustdds::mio1::{Events, Interest, Poll, Token};
 
-use super::{Bool, Command, Node, Reader, TriggerRequest, TriggerResponse, Writer};
+use super::{Bool, Command, MAX_TAKEN, Node, Reader, TriggerRequest, TriggerResponse, Writer};
 use crate::{Connection, Heard, LiveError, ServiceMapping, Wire};
 use armcal_core::log::ros::JointState;
 use armcal_core::log::{Stream, decode, encode};
 use armcal_core::robot::Robot;
 use armcal_core::streams::{JointCounts, JointSensorSample};
 use armcal_core::time::Stamp;
-
-/// Messages of one topic that are taken at once; more wait for the next turn.
-const MAX_TAKEN: usize = 1000;
 
 /// A connection over DDS.
 pub struct Ros2Wire {
@@ -46,7 +43,7 @@ impl Ros2Wire {
     /// # Errors
     /// [`LiveError::Dds`].
     pub fn open(connection: &Connection, robot: &Robot) -> Result<Self, LiveError> {
-        let mut node = Node::new(connection, "armcal")?;
+        let mut node = Node::new(connection.domain, &connection.networks, "armcal")?;
         let names = robot.joint_names().iter().map(|name| connection.driver_name(name).to_owned()).collect();
         let commands = node.writer(&connection.commands.topic, connection.commands.message_type.name())?;
         let stop = &connection.stop;

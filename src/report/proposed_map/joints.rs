@@ -3,7 +3,7 @@
 use std::cmp::Reverse;
 
 use armcal_core::log::topics;
-use armcal_core::robot::Robot;
+use armcal_core::robot::{Robot, likely_name};
 
 use super::contents::{Contents, Kind, Topic};
 use super::{others, quoted};
@@ -17,12 +17,13 @@ const RADIANS_WITHIN: f64 = 1e-6;
 pub(super) fn choose_joints(contents: &Contents, robot: Option<&Robot>) -> Result<String, Option<String>> {
     let wanted = robot.map(Robot::joint_names).unwrap_or_default();
     let n_needed = robot.map_or(0, |robot| robot.camera.mount.n_joints);
-    let n_matched = |topic: &Topic| wanted.iter().filter(|joint| recorded_as(joint, topic).is_some()).count();
+    let n_matched = |topic: &Topic| wanted.iter().filter(|joint| likely_name(joint, &topic.joints).is_some()).count();
     let rank = |(name, topic): &(&String, &Topic)| {
         (n_matched(topic), *name == topics::JOINT_SENSORS, topic.joints.len(), topic.messages, Reverse((*name).clone()))
     };
     let (name, topic) = contents.of_kind(Kind::Joints).max_by_key(rank).ok_or(None)?;
-    let missing: Vec<&String> = wanted[..n_needed].iter().filter(|joint| recorded_as(joint, topic).is_none()).collect();
+    let missing: Vec<&String> =
+        wanted[..n_needed].iter().filter(|joint| likely_name(joint, &topic.joints).is_none()).collect();
     if !missing.is_empty() {
         return Err(Some(format!(
             "no topic has the joints {missing:?} of the robot; nearest is {name} with {:?}. Write \
@@ -32,7 +33,7 @@ pub(super) fn choose_joints(contents: &Contents, robot: Option<&Robot>) -> Resul
     }
     let renamed: Vec<String> = wanted
         .iter()
-        .filter_map(|joint| Some((joint, recorded_as(joint, topic)?)))
+        .filter_map(|joint| Some((joint, likely_name(joint, &topic.joints)?)))
         .filter(|(joint, recorded)| joint != recorded)
         .map(|(joint, recorded)| format!("{} = {}", quoted(joint), quoted(recorded)))
         .collect();
@@ -45,16 +46,6 @@ pub(super) fn choose_joints(contents: &Contents, robot: Option<&Robot>) -> Resul
     text +=
         &others("other joint readings", contents.of_kind(Kind::Joints).map(|(other, _)| other).filter(|o| *o != name));
     Ok(text)
-}
-
-/// The recorded name of a joint: its own, or the only one that begins or ends with it.
-fn recorded_as<'a>(joint: &str, topic: &'a Topic) -> Option<&'a String> {
-    if let Some(same) = topic.joints.get(joint) {
-        return Some(same);
-    }
-    let is_like = |name: &&String| name.ends_with(joint) || name.starts_with(joint);
-    let mut like = topic.joints.iter().filter(is_like);
-    like.next().filter(|_| like.next().is_none())
 }
 
 fn unit(topic: &Topic, robot: Option<&Robot>) -> String {

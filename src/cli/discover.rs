@@ -1,0 +1,63 @@
+//! `armcal live discover`: what a ROS 2 domain has, as a proposed connection map.
+
+use std::net::Ipv4Addr;
+use std::path::PathBuf;
+
+use anyhow::Result;
+use clap::{Args, Subcommand};
+
+use crate::cli::exit::Exit;
+
+#[cfg(feature = "live")]
+mod looked;
+
+#[derive(Debug, Args)]
+pub(super) struct LiveCommandArgs {
+    #[command(subcommand)]
+    command: LiveCommand,
+}
+
+#[derive(Debug, Subcommand)]
+enum LiveCommand {
+    /// Listen to a ROS 2 domain, and propose a connection map: which topic is what, and what is left to fill in
+    Discover(DiscoverArgs),
+}
+
+#[derive(Debug, Args)]
+struct DiscoverArgs {
+    /// ROS_DOMAIN_ID
+    #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u16).range(0..=232))]
+    domain: u16,
+    /// Address of an interface of this machine to listen on; may be given many times; all of them if not given
+    #[arg(long = "network", value_name = "ADDRESS")]
+    networks: Vec<Ipv4Addr>,
+    /// Robot folder: the driver's joints are matched to those of its robot.toml
+    #[arg(long)]
+    robot: Option<PathBuf>,
+    /// How long to listen
+    #[arg(long = "for", value_name = "SECONDS", default_value_t = 5.0, value_parser = seconds)]
+    seconds: f64,
+    /// Write the map here; to stdout if not given. Nothing is overwritten
+    #[arg(long, value_name = "ARM.toml")]
+    out: Option<PathBuf>,
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    let seconds: f64 = text.parse().map_err(|error| format!("{error}"))?;
+    if (1.0..=3600.0).contains(&seconds) { Ok(seconds) } else { Err("it must be 1 .. 3600".to_owned()) }
+}
+
+pub(super) fn live(args: &LiveCommandArgs) -> Result<Exit> {
+    let LiveCommand::Discover(args) = &args.command;
+    discover(args)
+}
+
+#[cfg(feature = "live")]
+fn discover(args: &DiscoverArgs) -> Result<Exit> {
+    looked::discover(args)
+}
+
+#[cfg(not(feature = "live"))]
+fn discover(_: &DiscoverArgs) -> Result<Exit> {
+    Err(crate::cli::live::not_built("live discover"))
+}

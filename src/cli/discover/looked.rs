@@ -1,0 +1,43 @@
+//! A look around, and what is proposed of it.
+
+use anyhow::{Result, bail};
+
+use super::DiscoverArgs;
+use crate::cli::calibration_inputs::load_robot;
+use crate::cli::exit::{Exit, UsageError};
+use crate::cli::interrupt::Interrupt;
+use crate::cli::stdout::{note, say};
+use crate::output;
+use armcal_core::text::counted;
+use armcal_live::{Domain, look_around, propose_connection};
+
+pub(super) fn discover(args: &DiscoverArgs) -> Result<Exit> {
+    let robot = args.robot.as_ref().map(|folder| load_robot(folder, &[])).transpose()?;
+    if let Some(file) = args.out.as_deref().filter(|file| file.symlink_metadata().is_ok()) {
+        return Err(UsageError(format!("{}: is there; name another --out", file.display())).into());
+    }
+    let interrupt = Interrupt::install()?;
+    let domain = Domain { number: args.domain, networks: args.networks.clone() };
+    let seen = look_around(&domain, args.seconds, &|| interrupt.is_requested())?;
+    if seen.topics.is_empty() {
+        bail!(
+            "nobody was seen in ROS domain {} in {} s; is the driver running there, and are --domain and --network right?",
+            args.domain,
+            args.seconds
+        );
+    }
+    let proposed = propose_connection(&seen, robot.as_ref());
+    match &args.out {
+        Some(file) => {
+            output::write_together(&[(file.as_path(), proposed.text.as_bytes())])?;
+            note(format_args!("written: {}; look at what it says was chosen", file.display()));
+        }
+        None => say(proposed.text.trim_end())?,
+    }
+    let (topics, services) = (counted(seen.topics.len(), "topic"), counted(seen.services.len(), "service"));
+    note(format_args!("{topics} and {services} were seen"));
+    if !proposed.missing.is_empty() {
+        note(format_args!("left to fill in: {}", proposed.missing.join(", ")));
+    }
+    Ok(Exit::Ok)
+}
