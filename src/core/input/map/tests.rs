@@ -26,7 +26,7 @@ fn frames_are_told_with_and_without_slash_and_by_number() {
 
 #[test]
 fn what_is_wrong_is_named_with_file_and_key() {
-    let faults: [(&str, &str, &[&str]); 16] = [
+    let faults: [(&str, &str, &[&str]); 17] = [
         ("[tags]", "[conditions]\nattitude = \"/tf\"\n[tags]", &["conditions", "twice"]),
         (
             "[tags]",
