@@ -25,6 +25,8 @@ use armcal_core::input::{
 #[cfg(feature = "sim")]
 use armcal_core::log::for_each_raw;
 use armcal_core::log::{Recording, TopicMap, scan_recording};
+#[cfg(feature = "sim")]
+use armcal_core::optics::TagFamily;
 use armcal_core::robot::{self, FailedJoint, FileIssue, Robot, SELF_COLLISION_FILE, TagSurvey};
 use armcal_core::routine::Method;
 use armcal_core::streams::{Message, ReachTask};
