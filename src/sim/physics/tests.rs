@@ -270,3 +270,27 @@ fn no_torque_is_missing_on_a_moving_base() {
     assert!(v.iter().any(|rate| rate.abs() > 0.5), "it must move");
     assert!(missing.iter().all(|torque| torque.abs() < LIMIT_N_M), "{missing:?}");
 }
+
+/// Our own engine takes no memory in a step. Rapier's factors a matrix that it allocates.
+#[test]
+fn a_step_of_our_own_equations_does_not_allocate() {
+    const STEPS: u64 = 50;
+    let robot = titan();
+    let (base, loads) = (still(Vector3::new(0.0, 0.0, -GRAVITY_M_S2)), [JointLoad::default(); MAX_JOINTS]);
+    let count = |engine: EngineKind| {
+        let mut physics = physics_by(engine, &robot.chain, &robot.bodies, 0.002, robot.stowed);
+        let before = physics.angles();
+        physics.step(&drive([&base, &base], &loads));
+        let counted = allocation_counter::measure(|| {
+            for _ in 0..STEPS {
+                physics.step(&drive([&base, &base], &loads));
+            }
+        });
+        assert!(physics.angles() != before, "the arm falls");
+        counted.count_total
+    };
+    let [own, rapiers] = [EngineKind::Featherstone, EngineKind::Rapier].map(count);
+    eprintln!("{} allocations a step of rapier's", rapiers / STEPS);
+    assert_eq!(own, 0);
+    assert!(rapiers > 0, "the counter counts");
+}

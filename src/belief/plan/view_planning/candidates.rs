@@ -370,7 +370,7 @@ mod tests {
 
     #[test]
     fn the_arms_that_stand_for_the_belief_are_spread_as_a_triangle() {
-        let arms = arms();
+        let arms = errors();
         for joint in 0..6 {
             let values: Vec<f64> = arms.iter().map(|errors| errors[joint]).collect();
             let mean = values.iter().sum::<f64>() / N_ARMS as f64;
