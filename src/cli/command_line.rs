@@ -6,9 +6,9 @@ use std::process::ExitCode;
 use anyhow::Result;
 use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
 
+use crate::cli::examples::with_examples;
 #[cfg(feature = "viewer")]
 use crate::cli::replay;
-use crate::cli::examples::with_examples;
 use crate::cli::stdout::{be_quiet, complain, is_written};
 use crate::cli::{calibrate, check, completions, exit, export, inspect, new_robot, plan, tagmap, watch};
 #[cfg(feature = "sim")]
