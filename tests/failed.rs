@@ -112,7 +112,14 @@ fn a_joint_is_declared_on_the_command_line() {
     let folder = temp();
     let with = |failed: &str| {
         let mut command = program();
-        command.arg("calibrate").arg("--details").arg(&run).arg("--robot").arg(robot_folder()).arg("--out").arg(folder.path());
+        command
+            .arg("calibrate")
+            .arg("--details")
+            .arg(&run)
+            .arg("--robot")
+            .arg(robot_folder())
+            .arg("--out")
+            .arg(folder.path());
         answer(command.arg("--failed").arg(failed))
     };
     let declared = with("wrist_pitch=dead");

@@ -130,7 +130,9 @@ fn with_a_dead_sensor_the_arm_is_not_good_enough() {
 fn tags_of_unknown_place_are_not_believed_in() {
     let folder = temp();
     let run = folder.path().join("run");
-    let said = answer(program().arg("run").arg("--details").arg(root("routines/titan4-unknown-map.toml")).arg("--out").arg(&run));
+    let said = answer(
+        program().arg("run").arg("--details").arg(root("routines/titan4-unknown-map.toml")).arg("--out").arg(&run),
+    );
     assert!(run.join("run.mcap").exists(), "{said:#?}");
     let n_views = |said: &Answer| -> usize {
         let line = said.stdout.lines().find_map(|line| line.strip_prefix("views ")).expect("a line");

@@ -269,7 +269,14 @@ fn a_proposed_input_map_works_and_overwrites_nothing() {
     // The positions of these tags are all that the tag map knows.
     write(&map, &proposed.replace("use = \"pose\"", "use = \"position\""));
     let mut command = program();
-    command.arg("calibrate").arg("--details").arg(&recording).arg("--robot").arg(robot_folder()).arg("--input").arg(&map);
+    command
+        .arg("calibrate")
+        .arg("--details")
+        .arg(&recording)
+        .arg("--robot")
+        .arg(robot_folder())
+        .arg("--input")
+        .arg(&map);
     command.arg("--tag-map").arg(&tags).arg("--out").arg(folder.path().join("out"));
     answer(command.args(["--method", "minimum_distance"])).expect("calibrated", 0, &["ACCEPTED", "30 poses"]);
 }

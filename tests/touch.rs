@@ -27,11 +27,10 @@ fn robot() -> Robot {
 fn run(seed: u64, folder: &Path) -> Run {
     let out = folder.join(seed.to_string());
     let routine = root().join("routines/titan4-touch.toml");
-    answer(program().arg("run").arg("--details").arg(routine).arg("--seed").arg(seed.to_string()).arg("--out").arg(&out)).expect(
-        "the run",
-        0,
-        &["ACCEPTED"],
-    );
+    answer(
+        program().arg("run").arg("--details").arg(routine).arg("--seed").arg(seed.to_string()).arg("--out").arg(&out),
+    )
+    .expect("the run", 0, &["ACCEPTED"]);
     let summary: armcal::report::RunSummary =
         serde_json::from_slice(&std::fs::read(out.join("summary.json")).expect("a summary")).expect("it reads");
     Run {

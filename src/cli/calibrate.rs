@@ -82,6 +82,8 @@ pub(super) fn calibrate(args: &CalibrateArgs) -> Result<Exit> {
     }
     let started = Instant::now();
     let Calibrated { calibration, lost, external } = given.calibrate()?;
+    let (views, tags, steps) = (calibration.fit.views, calibration.fit.tags_seen, calibration.fit.evaluations);
+    tracing::info!("{views} views with {tags} tag observations fitted in {steps} steps, method {:?}", args.method);
     let summary = RunSummary::of_calibration(&calibration, started.elapsed().as_secs_f64());
     // Before anything is written: what has no compact form shall leave no half of the answer.
     let compact = args.compact.then(|| CompactCalibration::of(&calibration)?.to_text()).transpose()?;
@@ -102,6 +104,7 @@ pub(super) fn calibrate(args: &CalibrateArgs) -> Result<Exit> {
         (summary_file.as_path(), json.as_bytes()),
     ]);
     output::write_together(&written)?;
+    written.iter().for_each(|(path, bytes)| tracing::info!("{}: {} bytes written", path.display(), bytes.len()));
     if let Some((views, robot)) = &external {
         // What is calibrated is in place: a picture that does not come is a warning.
         if let Err(error) = draw(&args.out, views, robot, (&calibration, &summary)) {

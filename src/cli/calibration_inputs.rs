@@ -17,11 +17,11 @@ use armcal_belief::calib::{
 use armcal_belief::tagmap::files::{LandmarkFile, NamedSurvey, read_landmarks};
 #[cfg(not(feature = "sim"))]
 use armcal_core::input::read_external;
-#[cfg(feature = "sim")]
-use armcal_core::input::{ImageDetector, ImageProblem, RecordedImage, TagCorners, read_external_images};
 use armcal_core::input::{
     ChildFrame, ExternalRecording, InputMap, Source, TagUse, read_camera_info, read_input_map, read_task,
 };
+#[cfg(feature = "sim")]
+use armcal_core::input::{ImageDetector, ImageProblem, RecordedImage, TagCorners, read_external_images};
 #[cfg(feature = "sim")]
 use armcal_core::log::for_each_raw;
 use armcal_core::log::{Recording, TopicMap, scan_recording};
@@ -61,8 +61,8 @@ impl CalibrationInputs<'_> {
         if let Some(bag) = self.recordings.iter().find(is_own).filter(|_| self.input.is_none()) {
             let file = bag.display();
             return Err(UsageError(format!(
-                "{file}: is a ROS bag, which needs an input map: `armcal inspect {file} --write-input MAP.toml` proposes \
-                 one, then give --input MAP.toml"
+                "{file}: is a ROS bag, which needs an input map: `armcal inspect {file} --write-input MAP.toml` \
+                 proposes one, then give --input MAP.toml"
             ))
             .into());
         }
@@ -205,6 +205,7 @@ impl CalibrationInputs<'_> {
         let mut lost = false;
         for path in self.recordings {
             let recording = read_marked(path)?;
+            tracing::info!("{}: {} messages about its marks", path.display(), recording.messages.len());
             lost |= warn_of_losses(&recording);
             recordings.push(recording);
         }
@@ -239,6 +240,8 @@ impl CalibrationInputs<'_> {
         let mut lost = false;
         for path in self.recordings {
             let recording = read_with_images(path, &map, &robot)?;
+            let (readings, frames) = (recording.readings.len(), recording.frames.len());
+            tracing::info!("{}: {readings} joint readings, {frames} frames with tags", path.display());
             lost |= warn_of_external(&recording, &robot);
             recordings.push(recording);
         }

@@ -122,10 +122,7 @@ fn describe(file: &Path, text: &str, kind: Option<FileKind>) -> Result<String> {
             let plan = PlanFile::read(file)?;
             let (poses, least_m) = (plan.pose.len(), plan.totals.least_clearance_m);
             let arm_min = plan.totals.arm_time_s / 60.0;
-            Ok(format!(
-                "plan for `{}`, {poses} poses in {arm_min:.1} min, at least {least_m:.3} m clear",
-                plan.robot
-            ))
+            Ok(format!("plan for `{}`, {poses} poses in {arm_min:.1} min, at least {least_m:.3} m clear", plan.robot))
         }
         Some(FileKind::Vehicle) => {
             let vehicle = robot::load_vehicle(file)?;

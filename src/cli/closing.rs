@@ -3,8 +3,8 @@
 use std::io::{IsTerminal, stdout};
 
 use anyhow::{Context, Result};
-use clap::Args;
 use armcal_core::text::printable;
+use clap::Args;
 
 use crate::cli::stdout::{is_quiet, say, say_as_it_is};
 use crate::report::{RunSummary, closing, table};

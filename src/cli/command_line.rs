@@ -10,9 +10,9 @@ use tracing_subscriber::filter::{LevelFilter, Targets};
 use tracing_subscriber::layer::SubscriberExt;
 use tracing_subscriber::util::SubscriberInitExt;
 
+use crate::cli::examples::with_examples;
 #[cfg(feature = "viewer")]
 use crate::cli::replay;
-use crate::cli::examples::with_examples;
 use crate::cli::stdout::{be_quiet, complain, is_written};
 use crate::cli::{calibrate, check, completions, exit, export, inspect, new_robot, plan, tagmap, watch};
 #[cfg(feature = "sim")]

@@ -43,7 +43,7 @@ const EXAMPLES: &[(&str, &[&str])] = &[
         "calibrate",
         &[
             "armcal calibrate run.mcap --robot robots/titan4 --out result",
-            "armcal calibrate field.mcap --robot my-arm --input map.toml --tag-map tags.toml --task task.toml --out result",
+            "armcal calibrate field.mcap --robot my-arm --input map.toml --tag-map tags.toml --out result",
             "armcal calibrate day-1.mcap day-2.mcap --robot robots/titan4 --prior result/calibration.toml --out new",
             "armcal calibrate dive.mcap --robot robots/titan4 --online --out belief",
         ],

@@ -107,7 +107,9 @@ pub(super) fn export(args: &ExportArgs) -> Result<Exit> {
         && let Some(why) = input.refusal()
     {
         let (file, form) = (args.file.display(), args.form.name());
-        complain(format!("error: {file}: the calibration is refused: {why}; --allow-refused writes {form} nevertheless"));
+        complain(format!(
+            "error: {file}: the calibration is refused: {why}; --allow-refused writes {form} nevertheless"
+        ));
         return Ok(Exit::Refused);
     }
     let text = match input {

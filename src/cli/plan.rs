@@ -173,7 +173,16 @@ fn inputs_hash(
 fn table(file: &PlanFile, preset: &str) -> String {
     let mut table = Table::new();
     table.load_preset(preset);
-    table.set_header(["pose", "for", "joints, deg", "counts by robot.toml", "tags", "clear, mm", "tool error, mm", "at, s"]);
+    table.set_header([
+        "pose",
+        "for",
+        "joints, deg",
+        "counts by robot.toml",
+        "tags",
+        "clear, mm",
+        "tool error, mm",
+        "at, s",
+    ]);
     for pose in &file.pose {
         table.add_row(row(pose));
     }

@@ -60,6 +60,8 @@ pub(super) fn run(args: &RunArgs) -> Result<Exit> {
     }
     let seed = args.seed.unwrap_or(inputs.routine.seed);
     let out = args.out.clone().unwrap_or_else(|| Path::new("recordings").join(&inputs.routine.name));
+    let (routine, robot) = (&inputs.routine.name, &inputs.robot.name);
+    tracing::info!("routine {routine}, robot {robot}, seed {seed}, results in {}", out.display());
     let (output, left_behind) = OutputFolder::open(&out)?;
     if let Some(kept) = left_behind {
         note(format_args!(

@@ -76,10 +76,14 @@ mod tests {
         let known = ["poses", "held_out", "min_tags", "clearance_m"];
         let of = |word| nearest(word, known);
         assert_eq!((of("posess"), of("Poses"), of("heldout")), (Some("poses"), Some("poses"), Some("held_out")));
-        assert_eq!((of("clearence_m"), of("psoes"), of("depth"), of("")), (Some("clearance_m"), Some("poses"), None, None));
+        assert_eq!(
+            (of("clearence_m"), of("psoes"), of("depth"), of("")),
+            (Some("clearance_m"), Some("poses"), None, None)
+        );
         let message = "unknown field `min_tag`, expected one of `poses`, `min_tags`";
         assert_eq!(with_nearest(message), format!("{message}; did you mean `min_tags`?"));
-        for same in ["missing field `poses`", "unknown field `x`, there are no fields", "unknown field `zebra`, expected `poses`"] {
+        let unlike = "unknown field `zebra`, expected `poses`";
+        for same in ["missing field `poses`", "unknown field `x`, there are no fields", unlike] {
             assert_eq!(with_nearest(same), same);
         }
     }

@@ -65,11 +65,12 @@ fn score_line(summary: &RunSummary) -> Option<String> {
     })
 }
 
-/// The first warning, and how many more there are. What no view shows is in the figures with priors.
+/// The first warning, and how many more there are, if any says more than that what no view shows rests on the drawing:
+/// the figures with priors say so.
 fn first_warning(summary: &RunSummary) -> Option<String> {
     let warnings = &summary.calibration.verdict.as_ref()?.warnings;
     let is_known = |warning: &&String| warning.as_str() == UNSEEN_LINKS;
-    let first = warnings.iter().find(|warning| !is_known(warning)).or(warnings.first())?;
+    let first = warnings.iter().find(|warning| !is_known(warning))?;
     Some(match warnings.len() - 1 {
         0 => format!("warning      {first}"),
         n => format!("warning      {first}; and {}", counted(n, "more warning")),
@@ -331,7 +332,7 @@ fn failed_line(failed: &FailedJointTable) -> String {
     let FailedJointTable { joint, kind, found, evidence, since_pose, .. } = failed;
     let colon = if evidence.is_empty() { "" } else { ": " };
     let remedy = match (kind, since_pose) {
-        (_, Some(_)) => "calibrated as it is since then; fasten the sensor, and calibrate again if it slips once more",
+        (_, Some(_)) => "fasten the sensor: the result is of it as it is since then",
         (FailedKind::Locked, None) => "targets that need the joint are out of reach; free it",
         (_, None) => "check this sensor, its shaft and its cable",
     };

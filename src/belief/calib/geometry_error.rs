@@ -54,8 +54,8 @@ impl GeometryError {
     pub fn remedy(&self) -> &'static str {
         match (self.element.as_str(), &self.joint) {
             (BASE, _) => {
-                "check the frame that the tag map is in, and where the arm stands, against the arm's base; then correct \
-                 the map"
+                "check the frame that the tag map is in, and where the arm stands, against the arm's base; then \
+                 correct the map"
             }
             (_, None) => "check how the camera is fastened, and its mount in the drawing",
             _ => "check the drawing against the arm",

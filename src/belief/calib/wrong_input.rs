@@ -348,8 +348,10 @@ impl WrongInput {
     pub fn remedy(&self) -> &'static str {
         match &self.input {
             WrongInputKind::MapQuaternions => "write quaternion_wxyz of the tag map in the order w, x, y, z",
-            WrongInputKind::RecordedQuaternions => "set the other one of quaternion_wxyz and quaternion_xyzw as \
-                                                    tags.columns.rotation_form of the input map",
+            WrongInputKind::RecordedQuaternions => {
+                "set the other one of quaternion_wxyz and quaternion_xyzw as \
+                                                    tags.columns.rotation_form of the input map"
+            }
             WrongInputKind::RecordedDirection => {
                 "set the other one of camera_from_tag and tag_from_camera as tags.columns.direction of the input map"
             }
@@ -378,16 +380,16 @@ impl fmt::Display for WrongInput {
         let of_turns = format!("{} instead of {}", degrees(otherwise), degrees(self.mismatch));
         match &self.input {
             WrongInputKind::MapQuaternions => {
-                write!(f, "the tag map's quaternions are in the order x, y, z, w: so read, the tags of a view fit one ")?;
-                write!(f, "another within {of_pairs}")
+                write!(f, "the tag map's quaternions are in the order x, y, z, w: so read, the tags of a view fit ")?;
+                write!(f, "one another within {of_pairs}")
             }
             WrongInputKind::RecordedQuaternions => {
-                write!(f, "the recorded quaternions are in the other order: so read, the landmark's turns over the ")?;
-                write!(f, "views agree within {of_turns}")
+                write!(f, "the recorded quaternions are in the other order: so read, the landmark's turns over ")?;
+                write!(f, "the views agree within {of_turns}")
             }
             WrongInputKind::RecordedDirection => {
-                write!(f, "the recorded poses are of the other direction: turned round, the landmark's turns over the ")?;
-                write!(f, "views agree within {of_turns}")
+                write!(f, "the recorded poses are of the other direction: turned round, the landmark's turns over ")?;
+                write!(f, "the views agree within {of_turns}")
             }
             WrongInputKind::ImageSize { stated_px: [columns, rows], seen_px: [x, y] } => write!(
                 f,
@@ -395,12 +397,12 @@ impl fmt::Display for WrongInput {
                  ({x:.0}, {y:.0}) px"
             ),
             WrongInputKind::ImageScale(scale) => {
-                write!(f, "the lens of robot.toml is that of an image {scale} times the size of the recorded one: with ")?;
-                write!(f, "that taken into account, the tags of a view fit one another within {of_pairs}")
+                write!(f, "the lens of robot.toml is that of an image {scale} times the size of the recorded one: ")?;
+                write!(f, "with that taken into account, the tags of a view fit one another within {of_pairs}")
             }
             WrongInputKind::LensModel => {
-                write!(f, "the lens is not of the model that robot.toml names, but a fisheye (equidistant) or pinhole in ")?;
-                write!(f, "its place: so taken, the tags of a view fit one another within {of_pairs}")
+                write!(f, "the lens is not of the model that robot.toml names, but a fisheye (equidistant) or ")?;
+                write!(f, "pinhole in its place: so taken, the tags of a view fit one another within {of_pairs}")
             }
             WrongInputKind::TagSize(ratio) => {
                 write!(f, "all tags are {:+.1} % of their stated size", 100.0 * (ratio - 1.0))?;

@@ -27,13 +27,13 @@ pub enum PlanError {
     )]
     NoUsefulPose { min_tags: u32, n_tags: usize, clearance_m: f64, tried: usize, hint: String },
     #[error(
-        "no pose was found that sees {min_tags} of the {n_tags} surveyed tags: add tags, or lower capture.min_tags to 1 \
-         .. {n_tags}"
+        "no pose was found that sees {min_tags} of the {n_tags} surveyed tags: add tags, or lower capture.min_tags to \
+         1 .. {n_tags}"
     )]
     TooFewTags { min_tags: u32, n_tags: usize },
     #[error(
-        "only {found} of {wanted} poses were found that see {min_tags} tags and keep clear: {hint}; ask for fewer poses, \
-         place tags where the camera reaches them, or lower capture.min_tags or capture.clearance_m"
+        "only {found} of {wanted} poses were found that see {min_tags} tags and keep clear: {hint}; ask for fewer \
+         poses, place tags where the camera reaches them, or lower capture.min_tags or capture.clearance_m"
     )]
     TooFewPoses { found: usize, wanted: usize, min_tags: u32, hint: String },
     #[error(transparent)]

@@ -80,8 +80,10 @@ struct Filled {
 }
 
 impl Filled {
+    /// The outermost table is where the text begins, whatever was put in there.
     fn is_inserted(&self, span: &Range<usize>) -> bool {
-        self.inserted.iter().any(|inserted| inserted.start <= span.start && span.end <= inserted.end)
+        !span.is_empty()
+            && self.inserted.iter().any(|inserted| inserted.start <= span.start && span.end <= inserted.end)
     }
 
     /// ` in [capture]`; nothing for the outermost table.
@@ -187,7 +189,11 @@ mod tests {
 
     #[test]
     fn all_missing_keys_are_named_at_once_with_their_tables() {
-        assert!(problem("").ends_with("missing field `version`; also missing: `name`, `camera`, `kind`"), "{}", problem(""));
+        assert!(
+            problem("").ends_with("missing field `version`; also missing: `name`, `camera`, `kind`"),
+            "{}",
+            problem("")
+        );
         let text = "version = 1\n[camera]\n[[tag]]\nid = 1\n[[tag]]\nid = 2\nsize_m = 0.1\n";
         let told = problem(text);
         assert!(told.contains("line 2") && told.contains("missing field `focal_px`"), "{told}");

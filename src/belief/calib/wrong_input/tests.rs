@@ -42,7 +42,8 @@ fn a_map_and_a_lens_that_are_right_are_not_blamed() {
 #[test]
 fn quaternions_of_the_map_in_the_other_order_are_told() {
     let (data, robot) = sample();
-    let written = |_: usize, pose: &Isometry3<f64>| Isometry3::from_parts(pose.translation, reordered_back(&pose.rotation));
+    let written =
+        |_: usize, pose: &Isometry3<f64>| Isometry3::from_parts(pose.translation, reordered_back(&pose.rotation));
     let robot = with_tags(&robot, written);
     let wrong = wrong_input(&data, &robot.tags, &robot).expect("a wrong input");
     assert_eq!(wrong.input, WrongInputKind::MapQuaternions);
