@@ -241,8 +241,23 @@ fn poses_chunk(
 #[cfg(test)]
 mod tests {
     use nalgebra::{UnitQuaternion, Vector3};
+    use rerun::external::re_log_encoding::{Encoder, EncodingOptions};
+    use rerun::log::LogMsg;
+    use rerun::{StoreId, StoreKind};
 
     use super::*;
+
+    fn bytes(chunk: &Chunk) -> Vec<u8> {
+        let mut out = Vec::new();
+        let version = rerun::build_info().version;
+        let mut encoder = Encoder::new_eager(version, EncodingOptions::PROTOBUF_COMPRESSED, &mut out).unwrap();
+        encoder.do_not_emit_footer();
+        let store = StoreId::new(StoreKind::Recording, "test", "test");
+        encoder.append(&LogMsg::ArrowMsg(store, chunk.to_arrow_msg().unwrap())).unwrap();
+        encoder.finish().unwrap();
+        drop(encoder);
+        out
+    }
 
     /// Written column by column, a chunk of poses has the bytes that it has row by row.
     #[test]
@@ -251,24 +266,10 @@ mod tests {
             let turn = UnitQuaternion::from_scaled_axis(Vector3::new(0.1 * n as f64, -0.3, 0.2));
             (n * 40_000_000, RowData::Pose(Isometry3::from_parts(Vector3::new(n as f64, 0.5, -1.0).into(), turn)))
         };
-        let bytes =
-            |make: fn(EntityPath, &'static str, fn(i64) -> TimeCell, Vec<Row>) -> Result<Chunk, EncodeError>| {
-                let rows = (0..700).map(pose).collect();
-                let chunk = make(EntityPath::from("arm/link"), TIMELINE, TimeCell::from_duration_nanos, rows);
-                let message = chunk.expect("a chunk").to_arrow_msg().expect("a message");
-                let store = rerun::StoreId::new(rerun::StoreKind::Recording, "test", "test");
-                let mut out = Vec::new();
-                let options = rerun::external::re_log_encoding::EncodingOptions::PROTOBUF_COMPRESSED;
-                let version = rerun::build_info().version;
-                let mut encoder =
-                    rerun::external::re_log_encoding::Encoder::new_eager(version, options, &mut out).expect("");
-                encoder.do_not_emit_footer();
-                encoder.append(&rerun::log::LogMsg::ArrowMsg(store, message)).expect("it is encoded");
-                encoder.finish().expect("it ends");
-                drop(encoder);
-                out
-            };
-        let by_columns = bytes(poses_chunk);
-        assert!(by_columns.len() > 5_000 && by_columns == bytes(batches_chunk));
+        let rows = || (0..700).map(pose).collect();
+        let (entity, cell) = (EntityPath::from("arm/link"), TimeCell::from_duration_nanos);
+        let by_columns = poses_chunk(entity.clone(), TIMELINE, cell, rows()).unwrap();
+        let by_rows = batches_chunk(entity, TIMELINE, cell, rows()).unwrap();
+        assert!(by_columns.num_rows() == 700 && bytes(&by_columns) == bytes(&by_rows));
     }
 }

@@ -106,22 +106,23 @@ impl<'a> Sights<'a> {
         let half_m = corners.iter().map(|corner| (corner - center).norm()).fold(0.0, f64::max);
         let rays = corners.map(|corner| Ray::between([&self.eye, &corner], skip_m));
         let sight = center - self.eye;
-        let length2 = sight.norm_squared().max(1e-18);
+        let per_length2 = 1.0 / sight.norm_squared().max(1e-18);
         // At the same share of its way, no ray is farther from the line to the centre than the corners from that.
         let is_far = |at: &Vector3<f64>, radius_m: f64| {
-            let share = ((at - self.eye).dot(&sight) / length2).clamp(0.0, 1.0);
-            (at - (self.eye + sight * share)).norm() > radius_m + half_m + MISS_M
+            let to_shape = at - self.eye;
+            let share = (to_shape.dot(&sight) * per_length2).clamp(0.0, 1.0);
+            (to_shape - sight * share).norm_squared() > (radius_m + half_m + MISS_M).powi(2)
         };
-        let meets = |at: &Vector3<f64>, radius_m: f64, pose: &Pose3, shape: &SharedShape, placed: &Placed| {
-            let meets = |ray: &Ray| ray.distance_m(at) <= radius_m && !ray.misses_box(placed) && ray.hits(pose, shape);
-            rays.iter().flatten().any(meets)
-        };
+        let near = |ray: &&Ray, at: &Vector3<f64>, radius_m: f64| ray.distance_m(at) <= radius_m;
         let stands = |s: &StaticShape| {
-            !is_far(&s.center_m, s.radius_m) && meets(&s.center_m, s.radius_m, &s.placed.pose, &s.shape, &s.placed)
+            let meets = |ray: &Ray| !ray.misses_box(&s.placed) && ray.hits(&s.placed.pose, &s.shape);
+            !is_far(&s.center_m, s.radius_m)
+                && rays.iter().flatten().filter(|ray| near(ray, &s.center_m, s.radius_m)).any(meets)
         };
         let moves = |(k, m): (usize, &LinkShape)| {
-            let at = &self.centers[k];
-            !is_far(at, m.radius_m) && meets(at, m.radius_m, &self.poses[k], &m.shape, &m.placed_at(&self.poses[k]))
+            let (at, pose) = (&self.centers[k], &self.poses[k]);
+            let meets = |ray: &Ray| !ray.misses_box(&m.placed_at(pose)) && ray.hits(pose, &m.shape);
+            !is_far(at, m.radius_m) && rays.iter().flatten().filter(|ray| near(ray, at, m.radius_m)).any(meets)
         };
         self.model.standing.iter().any(stands) || self.model.moving.iter().enumerate().any(moves)
     }
