@@ -36,6 +36,8 @@ pub struct LiveArm<W> {
     period_s: f64,
     stale: Duration,
     now: Stamp,
+    /// Nothing is recorded under an earlier time: what comes now, was not there when the last call ended.
+    not_before: Stamp,
     /// When the present control period ends.
     due: Stamp,
     goal: JointCounts,
@@ -105,6 +107,7 @@ impl<W: Wire> LiveArm<W> {
             period_s: 1.0 / connection.commands.rate_hz,
             stale: Duration::from_secs_f64(limits.stale_s),
             now,
+            not_before: now,
             due: now,
             goal: survey.counts,
             sent: survey.counts,
@@ -181,6 +184,10 @@ impl<W: Wire> LiveArm<W> {
         ArmError::Stopped { why }
     }
 
+    fn log_time(&self) -> Stamp {
+        self.now.max(self.not_before)
+    }
+
     /// Takes what has come, and waits a little where nothing has.
     fn listen(&mut self, sink: &mut dyn Sink) -> Result<(), ArmError> {
         let mut heard = std::mem::take(&mut self.heard);
@@ -204,7 +211,7 @@ impl<W: Wire> LiveArm<W> {
                 Ok(false) => Ok(()),
                 Err(reason) => Err(self.halt_saying(reason, sink)),
             },
-            Heard::Other(message) => sink.record(self.now, &message).map_err(ArmError::Sink),
+            Heard::Other(message) => sink.record(self.log_time(), &message).map_err(ArmError::Sink),
             Heard::Deadman(is_held) => {
                 self.guard.hear_deadman(is_held.then_some(at));
                 Ok(())
@@ -221,7 +228,7 @@ impl<W: Wire> LiveArm<W> {
         let text = format!("the guard stopped the arm: {reason}");
         let error = self.halt(reason);
         let line = LogLine { stamp: self.now, level: LogLevel::Error, name: "guard".to_owned(), text };
-        match sink.record(self.now, &Message::Log(line)) {
+        match sink.record(self.log_time(), &Message::Log(line)) {
             Ok(()) => error,
             Err(sink) => ArmError::Sink(sink),
         }
@@ -370,6 +377,8 @@ impl<W: Wire> Arm for LiveArm<W> {
         if self.stopped.is_some() {
             return Err(self.refusal());
         }
+        // Stamps of the next reading are later by far more.
+        self.not_before = Stamp { nanos: self.now.nanos.saturating_add(1) };
         let before = self.wire.elapsed();
         if before.saturating_sub(self.left_at) > self.stale {
             self.guard.resume(before);

@@ -14,7 +14,9 @@ use crate::{Connection, Deadman, Heard, LiveArm, LiveError, Wire};
 use armcal_core::robot::{Robot, load};
 use armcal_core::sensor::ArmSensors;
 use armcal_core::stats::stream_rng;
-use armcal_core::streams::{Arm, ArmError, JointCounts, JointSensorSample, Message, Sink, SinkError};
+use armcal_core::streams::{
+    Arm, ArmError, JointCounts, JointSensorSample, Message, Sink, SinkError, TemperatureSample, Thermometer,
+};
 use armcal_core::time::{SIMULATION_EPOCH, Stamp};
 use rand_distr::{Distribution, Uniform};
 
@@ -95,6 +97,9 @@ impl FakeWire {
             _ => {}
         }
         self.under_way.push_back((at_s + delay_s, Heard::Joints(JointSensorSample { stamp, counts })));
+        // Of the same moment, and a little later on the way.
+        let oil = TemperatureSample { stamp, thermometer: Thermometer::Oil, temperature_c: 10.0, variance_c2: 0.0 };
+        self.under_way.push_back((at_s + delay_s + 0.001, Heard::Other(Message::Temperature(oil))));
         if self.fault != Fault::NotHeld {
             self.under_way.push_back((at_s, Heard::Deadman(!(is_faulty && self.fault == Fault::LetGo))));
         }
@@ -191,7 +196,9 @@ fn play(fault: Fault, goal_step_rad: f64) -> Played {
         let goal = JointCounts::from_fn(counts.len(), |j| {
             counts[j] + if j == 1 { swing * robot.sensors[j].counts_per_rad } else { 0.0 }
         });
+        let (left_at, n) = (arm.now(), kept.0.len());
         result = arm.command(&goal).and_then(|()| arm.step(&mut kept));
+        assert!(kept.0[n..].iter().all(|(log_time, _)| *log_time > left_at), "recorded as if it had been there before");
         ended_s = arm.now().since_s(start);
         if result.is_err() {
             break;

@@ -79,7 +79,7 @@ pub fn associate_within(recording: &Recording, robot: &Robot, span: Option<(Stam
     let mut association = Association {
         robot,
         sensors: ArmSensors::nominal(robot),
-        index: MessageIndex::new(&recording.messages),
+        index: MessageIndex::heard_until(&recording.messages, to),
         conditions: ConditionHistory::heard_until(recording, to),
         from,
         data: CaptureData::default(),
@@ -114,7 +114,7 @@ pub(crate) fn view_of_span(
     let mut association = Association {
         robot,
         sensors: ArmSensors::nominal(robot),
-        index: MessageIndex::new(messages),
+        index: MessageIndex::heard_until(messages, Stamp { nanos: i64::MAX }),
         conditions,
         from: start,
         data: CaptureData::default(),

@@ -10,10 +10,13 @@ pub(crate) struct MessageIndex<'a> {
 }
 
 impl<'a> MessageIndex<'a> {
-    pub(crate) fn new(messages: &'a [(Stamp, Message)]) -> Self {
+    /// Those that were recorded by `until`: what came later, such as an image that was long on its way, no calibration
+    /// at that time could know.
+    pub(crate) fn heard_until(messages: &'a [(Stamp, Message)], until: Stamp) -> Self {
         let mut by_stamp: Vec<(Stamp, usize)> = messages
             .iter()
             .enumerate()
+            .filter(|(_, (log_time, _))| *log_time <= until)
             .filter_map(|(idx, (_, message))| {
                 let stamp = match message {
                     Message::JointSensors(sample) => sample.stamp,
@@ -34,5 +37,21 @@ impl<'a> MessageIndex<'a> {
         let from = self.by_stamp.partition_point(|(stamp, _)| *stamp < mark.start);
         let to = self.by_stamp.partition_point(|(stamp, _)| *stamp <= mark.end);
         &self.by_stamp[from..to.max(from)]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use armcal_core::streams::{CaptureSet, MarkKind, TagDetections};
+
+    #[test]
+    fn what_came_after_the_calibration_is_not_part_of_it() {
+        let at = |nanos: i64| Stamp { nanos };
+        let image = |stamp: i64| Message::Detections(TagDetections { stamp: at(stamp), tags: Vec::new() });
+        let messages = [(at(12), image(10)), (at(20), image(11)), (at(21), image(12))];
+        let mark = Mark { start: at(9), end: at(15), kind: MarkKind::Capture { set: CaptureSet::Fit, pose_idx: 0 } };
+        let heard = |until: i64| MessageIndex::heard_until(&messages, at(until)).span(&mark).len();
+        assert_eq!([heard(15), heard(20), heard(i64::MAX)], [1, 2, 3]);
     }
 }
