@@ -9,7 +9,6 @@
 use std::fmt::Write as _;
 
 use nalgebra::{DMatrix, DVector, Isometry3, Vector3};
-use rand::RngExt;
 
 use armcal_belief::calib::bundle::{BundleInput, HyperparameterMode, Hyperparameters, Model, estimate};
 use armcal_belief::calib::{
@@ -24,7 +23,7 @@ use armcal_core::optics::square_corners;
 use armcal_core::robot::Robot;
 use armcal_core::sensor::{ArmSensors, ConditionChange};
 use armcal_core::spatial::{Camera, Link, Pose};
-use armcal_core::stats::{Interval, quantile, stream_rng};
+use armcal_core::stats::{Interval, chi_square_quantile};
 use armcal_core::streams::{JointAngles, ReachAttempt};
 use armcal_core::time::Stamp;
 use armcal_sim::truth::Truth;
@@ -276,45 +275,23 @@ pub struct BoundFigures {
     pub interval: Interval,
 }
 
-/// Resamples of the runs.
-const RESAMPLES: usize = 2000;
-
 impl BoundFigures {
     /// `None` for no targets.
     #[must_use]
     pub fn of(runs: &[BoundRun]) -> Option<Self> {
         let targets = || runs.iter().flat_map(|run| &run.targets);
-        let n = targets().count() as f64;
-        let rms = |of: &dyn Fn(&BoundTarget) -> f64| (targets().map(of).sum::<f64>() / n).sqrt();
-        let has_bound = targets().all(|target| target.by_parameters_m2.is_some());
+        let n = targets().count();
+        let rms = |of: &dyn Fn(&BoundTarget) -> f64| (targets().map(of).sum::<f64>() / n as f64).sqrt();
+        let [at_rest_m, predicted_m] = [rms(&|target| target.at_rest_m2), rms(&|target| target.predicted_m2)];
         let side = |k: usize| rms(&|target| target.by_parameters_m2.map_or(0.0, |pair| pair[k]));
-        // Numerator and denominator of each run: a run's targets go together.
-        let sums: Vec<[f64; 2]> = runs.iter().map(|run| run.sums(has_bound)).collect();
-        let ratio_of = |pick: &mut dyn FnMut(usize) -> usize| {
-            let [above, below] =
-                (0..sums.len()).map(|k| sums[pick(k)]).fold([0.0; 2], |s, x| [s[0] + x[0], s[1] + x[1]]);
-            (above / below).sqrt()
-        };
-        let mut rng = stream_rng(0, "bootstrap of the ratio");
-        let ratios: Vec<f64> = (0..RESAMPLES).map(|_| ratio_of(&mut |_| rng.random_range(0..sums.len()))).collect();
-        Some(Self {
-            at_rest_m: rms(&|target| target.at_rest_m2),
-            predicted_m: rms(&|target| target.predicted_m2),
-            by_parameters_m: has_bound.then(|| [side(0), side(1)]),
-            ratio: (n > 0.0).then(|| ratio_of(&mut |k| k))?,
-            interval: Interval { low: quantile(&ratios, 0.025)?, high: quantile(&ratios, 0.975)? },
-        })
-    }
-}
-
-impl BoundRun {
-    /// Sums of squares over its targets: of the error and of its bound, or of what was predicted.
-    fn sums(&self, has_bound: bool) -> [f64; 2] {
-        let pair = |target: &BoundTarget| match target.by_parameters_m2 {
-            Some(pair) if has_bound => pair,
-            _ => [target.at_rest_m2, target.predicted_m2],
-        };
-        self.targets.iter().map(pair).fold([0.0; 2], |s, x| [s[0] + x[0], s[1] + x[1]])
+        let has_bound = targets().all(|target| target.by_parameters_m2.is_some());
+        let by_parameters_m = has_bound.then(|| [side(0), side(1)]);
+        let [error_m, least_m] = by_parameters_m.unwrap_or([at_rest_m, predicted_m]);
+        let ratio = (n > 0).then_some(error_m / least_m)?;
+        // The larger part of a bound is what no view tells, a direction or two: a run has one degree of freedom.
+        let at = |p: f64| ratio * (runs.len() as f64 / chi_square_quantile(p, runs.len())).sqrt();
+        let interval = Interval { low: at(0.975), high: at(0.025) };
+        Some(Self { at_rest_m, predicted_m, by_parameters_m, ratio, interval })
     }
 }
 
@@ -378,9 +355,12 @@ pub fn bound_csv(worlds: &[(&str, &[BoundRun])]) -> String {
 mod tests {
     use std::path::Path;
 
+    use rand::RngExt;
+
     use super::*;
     use armcal_core::robot::load;
     use armcal_core::routine::{Override, Overrides, load_with};
+    use armcal_core::stats::stream_rng;
     use armcal_core::time::SIMULATION_EPOCH;
 
     fn root() -> &'static Path {
@@ -474,7 +454,9 @@ mod tests {
         let runs = [run(1, &[[4.0, 1.0], [1.0, 1.0]]), run(2, &[[4.0, 1.0]])];
         let figures = BoundFigures::of(&runs).expect("targets");
         assert!((figures.ratio - 3.0_f64.sqrt()).abs() < 1e-12);
-        assert!(figures.interval.low >= 2.5_f64.sqrt() - 1e-9 && figures.interval.high <= 2.0 + 1e-9);
+        // Chi-square of two degrees of freedom: 7.378 at 97.5 %, 0.0506 at 2.5 %.
+        assert!((figures.interval.low / figures.ratio - (2.0_f64 / 7.378).sqrt()).abs() < 1e-3);
+        assert!((figures.interval.high / figures.ratio - (2.0_f64 / 0.0506).sqrt()).abs() < 0.02);
         assert_eq!(BoundFigures::of(&[]), None);
     }
 }
