@@ -123,7 +123,8 @@ impl JointErrorBounds {
     }
 
     /// The drawing's limits less the error there and what an arm overshoots that comes slowly: believed angles that no
-    /// arm within the bounds drives into a stop.
+    /// arm within the bounds drives into a stop. A joint that may be off by more than its range leaves none: it stays
+    /// at the one farthest from both stops.
     #[must_use]
     pub fn safe_limits(&self, robot: &Robot) -> Vec<JointLimits> {
         let arriving = TrackingErrorBound::arriving(robot);
@@ -135,13 +136,22 @@ impl JointErrorBounds {
             .map(|(joint, spec)| match spec.limits {
                 Some(limits) if limits.are_locked() => limits,
                 None => JointLimits { lower_rad: -std::f64::consts::PI, upper_rad: std::f64::consts::PI },
-                Some(limits) => JointLimits {
+                Some(limits) => uncrossed(JointLimits {
                     lower_rad: limits.lower_rad + self.error_rad(joint, limits.lower_rad) + arriving.end_rad(joint),
                     upper_rad: limits.upper_rad - self.error_rad(joint, limits.upper_rad) - arriving.end_rad(joint),
-                },
+                }),
             })
             .collect()
     }
+}
+
+/// Their middle where they leave no angle.
+fn uncrossed(limits: JointLimits) -> JointLimits {
+    if limits.lower_rad <= limits.upper_rad {
+        return limits;
+    }
+    let middle_rad = 0.5 * (limits.lower_rad + limits.upper_rad);
+    JointLimits { lower_rad: middle_rad, upper_rad: middle_rad }
 }
 
 #[cfg(test)]
@@ -170,6 +180,20 @@ mod tests {
         assert!((late - now - 3.0 * 2.0 * 0.00035).abs() < 1e-9, "{now} {late}");
         let worst = at(Elapsed { seconds: 1e9, warmed_k: 1e3 });
         assert!((worst - robot.sensors[0].offset_bound_rad / 0.95).abs() < 1e-9, "{worst}");
+    }
+
+    /// Targets are looked for between these limits, and a random angle between crossed ones is none.
+    #[test]
+    fn a_joint_that_may_be_off_by_more_than_its_range_has_one_angle_left() {
+        let robot = titan();
+        let usual = JointErrorBounds::datasheet(&robot).safe_limits(&robot);
+        let mut bounds = JointErrorBounds::datasheet(&robot);
+        bounds.hold(1, robot.sensors[1].center_rad, 5.0);
+        let limits = bounds.safe_limits(&robot);
+        let drawn = robot.chain.joints()[1].limits.expect("the shoulder has stops");
+        assert!(limits[1].are_locked() && !usual[1].are_locked());
+        assert!((limits[1].lower_rad - 0.5 * (drawn.lower_rad + drawn.upper_rad)).abs() < 1e-12);
+        assert_eq!((limits[0].lower_rad, limits[0].upper_rad), (usual[0].lower_rad, usual[0].upper_rad));
     }
 
     /// Every true scale up to the largest, either way round, keeps the joint within the bound.
