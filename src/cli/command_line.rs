@@ -1,6 +1,6 @@
 //! The commands: parse, dispatch, exit code.
 
-use std::io::Write;
+use std::io::{IsTerminal, Write};
 use std::process::ExitCode;
 use std::sync::LazyLock;
 
@@ -172,6 +172,7 @@ fn begin_log(level: tracing::Level) {
         .with_target("ros2_client::distributions", LevelFilter::ERROR);
     tracing_subscriber::fmt()
         .with_writer(std::io::stderr)
+        .with_ansi(std::io::stderr().is_terminal())
         .without_time()
         .with_target(false)
         .with_max_level(level)

@@ -141,7 +141,7 @@ fn by_pairs(views: &[&View], tags: &[SurveyedTag], lens: &CameraModel, as_writte
     if let Some((input, otherwise)) = found {
         return Some(wrong((input, Some(otherwise))));
     }
-    if let Some((ids, before, after)) = exchanged_ids(views, tags, lens, as_written.ratio) {
+    if let Some((ids, before, after)) = exchanged_ids(views, tags, lens) {
         let input = WrongInputKind::ExchangedIds(ids);
         return Some(WrongInput { input, mismatch: before, mismatch_otherwise: Some(after) });
     }
@@ -255,38 +255,46 @@ impl PosedTag<'_> {
 }
 
 /// Tags that hang in one another's places, as the others have them: their ids, and their mismatch as written and so
-/// taken.
-fn exchanged_ids(
-    views: &[&View],
-    tags: &[SurveyedTag],
-    lens: &CameraModel,
-    ratio: f64,
-) -> Option<(Vec<u32>, f64, f64)> {
+/// taken. The tag that fits the others least is set aside, until those that are left fit one another.
+fn exchanged_ids(views: &[&View], tags: &[SurveyedTag], lens: &CameraModel) -> Option<(Vec<u32>, f64, f64)> {
     let posed: Vec<Vec<PosedTag<'_>>> = views.iter().map(|view| posed_tags(view, tags, lens)).collect();
-    // How far the tag `id` is from where the tags of `others` have it, if it hangs at `place`.
-    let off = |id: u32, place: &SurveyedTag, others: &dyn Fn(u32) -> bool| {
-        let pairs = posed.iter().flat_map(|of_view| ordered_pairs(of_view));
-        let of_tag = pairs.filter(|(a, b)| b.surveyed.id == id && others(a.surveyed.id));
-        let at_place = |(a, b): (&PosedTag<'_>, &PosedTag<'_>)| {
-            a.mismatch_of(&PosedTag { surveyed: place, poses: b.poses.clone() }, ratio)
-        };
-        quantile(&of_tag.map(at_place).collect::<Vec<f64>>(), 0.5)
-    };
-    let is_off = |tag: &&SurveyedTag| off(tag.id, tag, &|_| true).is_some_and(|mismatch| mismatch > BAD);
-    let doubtful: Vec<&SurveyedTag> = tags.iter().filter(is_off).collect();
-    let is_sound = |id: u32| doubtful.iter().all(|tag| tag.id != id);
+    let (mut sound, mut doubtful) = (tags.iter().filter(|tag| tag.is_known()).collect::<Vec<_>>(), Vec::new());
+    loop {
+        let mismatch = |tag: &SurveyedTag| mismatch_at(&posed, tag.id, tag, &sound).unwrap_or(0.0);
+        let mismatches = sound.iter().map(|tag| mismatch(tag)).enumerate();
+        let (worst, most) = mismatches.max_by(|a, b| a.1.total_cmp(&b.1))?;
+        if most < GOOD {
+            break;
+        }
+        doubtful.push(sound.remove(worst));
+        if sound.len() < doubtful.len() {
+            return None;
+        }
+    }
     let (mut before, mut after) = (Vec::new(), Vec::new());
     for tag in &doubtful {
         let places = doubtful.iter().filter(|place| place.id != tag.id);
-        let nearest = places.filter_map(|place| off(tag.id, place, &is_sound)).reduce(f64::min)?;
+        let nearest = places.filter_map(|place| mismatch_at(&posed, tag.id, place, &sound)).reduce(f64::min)?;
         if nearest > GOOD {
             return None;
         }
-        before.push(off(tag.id, tag, &is_sound)?);
+        before.push(mismatch_at(&posed, tag.id, tag, &sound)?);
         after.push(nearest);
     }
-    let ids = doubtful.iter().map(|tag| tag.id).collect();
-    (doubtful.len() > 1).then_some((ids, quantile(&before, 0.5)?, quantile(&after, 0.5)?))
+    let mut ids: Vec<u32> = doubtful.iter().map(|tag| tag.id).collect();
+    ids.sort_unstable();
+    (ids.len() > 1).then_some((ids, quantile(&before, 0.5)?, quantile(&after, 0.5)?))
+}
+
+/// Where the tag `id` is seen against where the tags `others` have it, if it hangs at `place`; median.
+fn mismatch_at(posed: &[Vec<PosedTag<'_>>], id: u32, place: &SurveyedTag, others: &[&SurveyedTag]) -> Option<f64> {
+    let is_other = |of: u32| of != id && others.iter().any(|other| other.id == of);
+    let pairs = posed.iter().flat_map(|of_view| ordered_pairs(of_view));
+    let of_tag = pairs.filter(|(a, b)| b.surveyed.id == id && is_other(a.surveyed.id));
+    let mismatch = |(a, b): (&PosedTag<'_>, &PosedTag<'_>)| {
+        a.mismatch_of(&PosedTag { surveyed: place, poses: b.poses.clone() }, 1.0)
+    };
+    quantile(&of_tag.map(mismatch).collect::<Vec<f64>>(), 0.5)
 }
 
 /// Of recorded poses of one landmark a view.
