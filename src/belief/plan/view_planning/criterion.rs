@@ -122,12 +122,11 @@ impl DesignState {
         let reached = scratch.reached.as_slice();
         for k in 0..6 {
             let mut terms = [(0, 0.0); N_DIRECTIONS];
-            let mut n = 0;
-            for direction in self.directions() {
-                terms[n] = (direction * n_rows, half[(k, direction)]);
-                n += 1;
+            for (term, direction) in terms.iter_mut().zip(self.directions()) {
+                *term = (direction * n_rows, half[(k, direction)]);
             }
-            combine(&mut scratch.told.as_mut_slice()[k * n_rows..][..n_rows], reached, &terms[..n]);
+            let told = &mut scratch.told.as_mut_slice()[k * n_rows..][..n_rows];
+            combine(told, reached, &terms[..self.n_joints + N_COMMON]);
         }
         let after = self.ln_after(&scratch.told);
         (self.ln_value - after).max(0.0)
