@@ -45,8 +45,6 @@ mod stdout;
 #[cfg(feature = "sim")]
 mod study;
 #[cfg(feature = "sim")]
-mod study_bound;
-#[cfg(feature = "sim")]
 mod study_dive;
 #[cfg(feature = "sim")]
 mod study_dive_faults;

@@ -1,5 +1,7 @@
 //! `armcal study`: parts on their own, against known truth.
 
+mod bound;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -9,7 +11,7 @@ use clap::{Args, Subcommand};
 
 use crate::cli::exit::Exit;
 use crate::cli::stdout::{note, say};
-use crate::cli::study_bound::{BoundArgs, bound};
+use crate::cli::study::bound::{BoundArgs, bound};
 use crate::cli::study_dive::{DiveArgs, dive};
 use crate::cli::study_dive_faults::{DiveFaultsArgs, dive_faults};
 use crate::cli::study_falsified::{FalsifiedArgs, falsified};

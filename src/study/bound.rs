@@ -300,7 +300,8 @@ impl BoundFigures {
 pub fn bound_table(worlds: &[(&str, &[BoundRun])]) -> String {
     let mut text = String::from(
         "| world | accepted | contacts | views | tool at rest, rms mm | predicted, rms mm \
-         | by parameters alone, rms mm | bound, rms mm | error / bound (95 %) | at rest / predicted |\n|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n",
+         | by parameters alone, rms mm | bound, rms mm | error / bound (95 %) \
+         | at rest / predicted |\n|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n",
     );
     for (name, runs) in worlds {
         let accepted = runs.iter().filter(|run| run.is_accepted).count();

@@ -7,7 +7,8 @@
 //! methods, and `sensitivity` its Figures 4 and 7; `poses`: error over poses and the arm's time, by how the poses are
 //! chosen; armcal-charts draws them. `falsified`: the verdict where drawing, survey or a sensor is wrong. `edges`:
 //! certified edges against brute force; `paths`: planning between random poses; `worlds`: closed loops in any world
-//! allowed; `bound`: closed loops against the Bayesian bound of their views; `dive`: the online belief over a dive, `dive_faults`: when it names what happens there.
+//! allowed; `bound`: closed loops against the Bayesian bound of their views; `dive`: the online belief over a dive,
+//! `dive_faults`: when it names what happens there.
 
 mod bound;
 mod dive;

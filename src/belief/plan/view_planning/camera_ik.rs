@@ -1,5 +1,5 @@
-//! Inverse kinematics of the camera: its eye to a place, its optical axis along a direction. Before a camera that stands
-//! still it is a tag that comes to a place, its normal along a direction.
+//! Inverse kinematics of the camera: its eye to a place, its optical axis along a direction. Before a camera that
+//! stands still it is a tag that comes to a place, its normal along a direction.
 //!
 //! Levenberg's damped least squares on five numbers: the origin's distance (m) and the axis's turn `a x a*` (rad,
 //! weighted by the range, so that both count as displacements at the tag). The arm need not get there: what it comes to

@@ -1,9 +1,9 @@
 //! What is not known of the arm, as one covariance that every view makes smaller.
 //!
-//! Columns: of each joint that moves camera and tags against each other gain, offset and the coefficients of its nonlinearity ([`WIDTH`] in all),
-//! then the camera's mount (translation m, rotation rad, on the right) and the survey's common error (a twist of all
-//! tags together in their frame). The covariance is what the estimator `bundle` takes for its prior, or the running
-//! estimate's.
+//! Columns: of each joint that moves camera and tags against each other gain, offset and the coefficients of its
+//! nonlinearity ([`WIDTH`] in all), then the camera's mount (translation m, rotation rad, on the right) and the
+//! survey's common error (a twist of all tags together in their frame). The covariance is what the estimator `bundle`
+//! takes for its prior, or the running estimate's.
 
 use nalgebra::{DMatrix, Matrix6, Vector6};
 
