@@ -1,7 +1,7 @@
 //! Arms behind ROS 2 topics: the program on both ends, in a network namespace of its own.
 //!
 //! `cargo test --release --features live --test main live -- --ignored`; user namespaces must be allowed, and `python3`
-//! must have cyclonedds (tests/oracle/requirements.txt) for the arm that is none of ours.
+//! must have cyclonedds and rerun-sdk (tests/oracle/requirements.txt) for arm, relay and viewer that are none of ours.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -65,7 +65,7 @@ fn reach_errors_m(recording: &Path, truth: &Truth, wanted: ReachAttempt) -> Vec<
     reaches.map(error).collect()
 }
 
-/// The whole loop over the wire at five times real time: accepted, it reaches what it missed before, and `calibrate`
+/// The whole loop over the wire at eight times real time: accepted, it reaches what it missed before, and `calibrate`
 /// on the recording gives the same bytes.
 #[test]
 #[ignore = "needs user namespaces"]
@@ -73,7 +73,7 @@ fn a_served_arm_is_calibrated_and_reaches_its_targets() {
     let out = temp();
     let routine = ShortRoutine::default().write(out.path());
     connection(out.path(), "");
-    let script = "$ARMCAL serve $ROUTINE --arm arm.toml --factor 5 --truth truth.mcap 2>serve.log & SERVER=$!; \
+    let script = "$ARMCAL serve $ROUTINE --arm arm.toml --factor 8 --truth truth.mcap 2>serve.log & SERVER=$!; \
                   $ARMCAL run $ROUTINE --arm ros2:arm.toml --unattended --details --out out; CODE=$?; \
                   kill -INT $SERVER; wait $SERVER; exit $CODE";
     let said = in_namespace(out.path(), &routine, script);
@@ -141,6 +141,21 @@ fn a_run_whose_arm_dies_stops_and_keeps_its_recording() {
     let recording = read_recording(out.path().join("out/run-cut-1.mcap")).expect("it reads");
     let is_told = |message: &Message| matches!(message, Message::Log(line) if line.name == "guard");
     assert!(recording.messages.iter().any(|(_, message)| is_told(message)), "the recording does not say why it ends");
+}
+
+/// Each joint by one degree over the wire, with an operator who says yes to that and no to the first motion.
+#[test]
+#[ignore = "needs user namespaces"]
+fn a_served_arm_follows_one_degree_at_a_time() {
+    let out = temp();
+    let routine = ShortRoutine::default().write(out.path());
+    connection(out.path(), "");
+    let script = "$ARMCAL serve $ROUTINE --arm arm.toml --factor 8 2>serve.log & SERVER=$!; \
+                  (yes | head -n 12; echo a) | $ARMCAL run $ROUTINE --arm ros2:arm.toml --nudge --out out; CODE=$?; \
+                  kill -INT $SERVER; wait $SERVER; exit $CODE";
+    let said = in_namespace(out.path(), &routine, script);
+    said.expect("run --nudge", 1, &["each joint follows its set-points", "the operator said so"]);
+    assert_eq!(said.stderr.matches("came back to").count(), titan().n_joints(), "{}", said.stderr);
 }
 
 /// A camera without a detector node: tags are found in the images that come over the wire.

@@ -14,8 +14,8 @@ const RANGE_SLACK_RAD: f64 = 0.035;
 const ASKED_RAD: f64 = 0.02;
 /// A clock that runs so many times as fast as ours is a simulator's; faster, and it has leapt.
 const MAX_PACE: f64 = 100.0;
-/// So many times its pace while the arm was heard out.
-const PACE_SLACK: f64 = 2.0;
+/// One that went less than this times as fast while the arm was heard out is a real arm's, and never goes so fast.
+const REAL_PACE: f64 = 2.0;
 
 /// Why the guard stopped the arm.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -207,7 +207,7 @@ impl Guard {
 
     /// The arm's clock went on by `arm_s` in `ours_s` of our time.
     pub fn learn_pace(&mut self, arm_s: f64, ours_s: f64) {
-        self.max_pace = (PACE_SLACK * arm_s / ours_s.max(1e-9)).clamp(PACE_SLACK, MAX_PACE);
+        self.max_pace = if arm_s < REAL_PACE * ours_s { REAL_PACE } else { MAX_PACE };
     }
 
     /// Nothing was asked of the arm for a while, and nobody listened: silence begins anew.

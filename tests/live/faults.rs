@@ -18,18 +18,25 @@ use crate::support::{Answer, ShortRoutine, calibrate, read, robot_folder, temp, 
 const FACTOR: f64 = 8.0;
 /// A period of set-points, by the arm's clock, s.
 const PERIOD_S: f64 = 0.02;
+/// Readings may be missing for so long, by our clock, s.
+const STALE_S: f64 = 1.0;
 /// What a busy machine may add to a promise, s.
 const BUSY_S: f64 = 0.15;
-/// Set-points move no joint faster than the robot's rates, times this.
+/// Set-points move no joint faster than the robot's rates, times this;
 const RATE_SLACK: f64 = 1.2;
+/// but one that is told to stay so near to where it lately read to be, rad, may be told so at once:
+const STAY_RAD: f64 = 0.006;
+/// by one of so many readings.
+const LATELY: usize = 50;
 
 /// The views come first, so that there are some when the fault begins.
 const STEPS: &str = "[[step]]\ndo = \"capture\"\n[[step]]\ndo = \"calibrate\"\n[[step]]\ndo = \"reach\"\n";
 
 /// What the relay saw, in Unix seconds.
 struct Seen {
-    /// Time at which it was sent, and counts.
-    set_points: Vec<(f64, Vec<f64>)>,
+    /// Time at which it was sent, counts, and how many readings had been passed on.
+    set_points: Vec<(f64, Vec<f64>, usize)>,
+    readings: Vec<Vec<f64>>,
     stops_s: Vec<f64>,
     fault_s: f64,
 }
@@ -40,12 +47,15 @@ fn numbers(value: &Value) -> Option<Vec<f64>> {
 
 impl Seen {
     fn read(file: &Path) -> Self {
-        let mut seen = Self { set_points: Vec::new(), stops_s: Vec::new(), fault_s: f64::INFINITY };
+        let mut seen =
+            Self { set_points: Vec::new(), readings: Vec::new(), stops_s: Vec::new(), fault_s: f64::INFINITY };
         for line in read(file).lines() {
             let line: Value = serde_json::from_str(line).expect("JSON");
             let at_s = line["at_s"].as_f64().expect("a time");
             if let Some(counts) = numbers(&line["set_point"]) {
-                seen.set_points.push((at_s, counts));
+                seen.set_points.push((at_s, counts, seen.readings.len()));
+            } else if let Some(counts) = numbers(&line["reading"]) {
+                seen.readings.push(counts);
             } else if line["stop"] == true {
                 seen.stops_s.push(at_s);
             } else if line["fault"].is_string() {
@@ -58,26 +68,29 @@ impl Seen {
     /// Nothing that the arm was told was unsafe: no joint is led faster than it may go, and nothing comes after a stop.
     fn assert_safe(&self, name: &str) {
         for (joint, sensor) in titan().sensors.iter().enumerate() {
-            let ways = self.set_points.windows(2).map(|pair| way_rad(sensor, pair[0].1[joint], pair[1].1[joint]));
-            // The last set-point of a stopped arm is where it read to be.
-            let n = self.set_points.len() - 1 - usize::from(!self.stops_s.is_empty());
-            let (furthest, most) = (ways.take(n).fold(0.0, f64::max), RATE_SLACK * sensor.max_rate_rad_s * PERIOD_S);
-            assert!(furthest <= 1.01 * most, "{name}: joint {joint}: {furthest} rad at once, {most} allowed");
+            let most = 1.01 * RATE_SLACK * sensor.max_rate_rad_s * PERIOD_S;
+            for pair in self.set_points.windows(2) {
+                let ((_, from, _), (_, to, n)) = (&pair[0], &pair[1]);
+                let way = way_rad(sensor, from[joint], to[joint]);
+                let mut lately = self.readings[n.saturating_sub(LATELY)..*n].iter();
+                let stays = lately.any(|reading| way_rad(sensor, reading[joint], to[joint]) <= STAY_RAD);
+                assert!(way <= most || stays, "{name}: joint {joint}: {way} rad at once, {most} allowed");
+            }
         }
         let stop_s = self.stops_s.first().copied().unwrap_or(f64::INFINITY);
-        let later = self.set_points.iter().filter(|(at_s, _)| *at_s > stop_s).count();
+        let later = self.set_points.iter().filter(|(at_s, ..)| *at_s > stop_s).count();
         assert_eq!(later, 0, "{name}: set-points after the stop");
     }
 
     /// When a joint was first asked to move so far from where it was led when the fault began.
     fn asked_s(&self, deg: f64) -> f64 {
-        let before = self.set_points.iter().rfind(|(at_s, _)| *at_s <= self.fault_s).expect("a set-point");
+        let before = self.set_points.iter().rfind(|(at_s, ..)| *at_s <= self.fault_s).expect("a set-point");
         let robot = titan();
-        let is_asked = |(at_s, counts): &&(f64, Vec<f64>)| {
+        let is_asked = |(at_s, counts, _): &&(f64, Vec<f64>, usize)| {
             let mut ways = robot.sensors.iter().enumerate().map(|(j, sensor)| way_rad(sensor, before.1[j], counts[j]));
             *at_s > self.fault_s && ways.any(|way| way >= deg.to_radians())
         };
-        self.set_points.iter().find(is_asked).map_or(f64::INFINITY, |(at_s, _)| *at_s)
+        self.set_points.iter().find(is_asked).map_or(f64::INFINITY, |(at_s, ..)| *at_s)
     }
 }
 
@@ -91,7 +104,9 @@ fn way_rad(sensor: &JointSensorSpec, from: f64, to: f64) -> f64 {
 fn relayed(folder: &Path, fault: &str, steps: &str, ends: &str) -> (Answer, Seen) {
     let routine = ShortRoutine { tail: steps.to_owned(), ..ShortRoutine::default() }.write(folder);
     write(&folder.join("served.toml"), "domain = 1\nnetworks = [\"127.0.0.1\"]\n");
-    write(&folder.join("arm.toml"), "networks = [\"127.0.0.1\"]\n");
+    // A busy machine holds readings up for longer than the default allows.
+    let arm = format!("networks = [\"127.0.0.1\"]\n[guard]\nstale_s = {STALE_S}\n");
+    write(&folder.join("arm.toml"), &arm);
     let script = format!(
         "python3 $RELAY relay.jsonl {fault} & RELAY=$!; \
          $ARMCAL serve $ROUTINE --arm served.toml --factor {FACTOR} --truth truth.mcap 2>serve.log & SERVER=$!; \
@@ -130,11 +145,12 @@ fn cases() -> Vec<Case> {
     let jump = format!("jump joint=1 counts={}", counts(1, 30.0));
     let spike = format!("spike joint=1 counts={}", counts(1, 30.0));
     vec![
-        stops("cut s=1000", "no joint readings for", [0.25, PERIOD_S], 0.0),
-        stops("repeat", "no joint readings for", [0.25, PERIOD_S], 0.0),
+        stops("cut s=1000", "no joint readings for", [STALE_S, PERIOD_S], 0.0),
+        stops("repeat", "no joint readings for", [STALE_S, PERIOD_S], 0.0),
         stops("step s=0.8", "leapt by 0.8", [0.0, PERIOD_S], 0.0),
         stops("step s=-30", "leapt by -", [0.0, PERIOD_S], 0.0),
-        stops("freeze", "stayed the same", [0.0, 1.0 + PERIOD_S], 1.2),
+        // The session may first hold a joint that seems not to follow, and so ask nothing of it for a while.
+        stops("freeze", "stayed the same", [0.0, 10.0], 1.2),
         stops(&jump, "from its set-point", [0.0, 1.0 + PERIOD_S], 0.0),
         stops("ignore", "from its set-point", [0.0, 1.0 + PERIOD_S], 20.0),
         goes_on("cut s=0.15"),
@@ -147,9 +163,9 @@ fn cases() -> Vec<Case> {
 #[test]
 #[ignore = "needs user namespaces and Python's cyclonedds"]
 fn faults_between_arm_and_armcal_stop_it_in_time_or_not_at_all() {
-    for pair in cases().chunks(2) {
+    for few in cases().chunks(2) {
         std::thread::scope(|scope| {
-            for case in pair {
+            for case in few {
                 scope.spawn(|| judge(case));
             }
         });
@@ -164,7 +180,7 @@ fn judge(case: &Case) {
     assert!(seen.fault_s.is_finite(), "{name}: it never began: {}", said.stderr);
     seen.assert_safe(name);
     let stop_s = *seen.stops_s.first().unwrap_or_else(|| panic!("{name}: no stop: {}", said.stderr));
-    let n_later = seen.set_points.iter().filter(|(at_s, _)| *at_s > seen.fault_s).count();
+    let n_later = seen.set_points.iter().filter(|(at_s, ..)| *at_s > seen.fault_s).count();
     match case.stops_with {
         Some(word) => {
             assert!(said.stderr.contains(word), "{name}: {}", said.stderr);

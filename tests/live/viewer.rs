@@ -17,9 +17,9 @@ fn a_viewer_that_is_killed_does_not_disturb_the_arm() {
     let routine = ShortRoutine::default().write(out.path());
     connection(out.path(), "");
     let script = format!(
-        "{VIEWER} $ARMCAL serve $ROUTINE --arm arm.toml --factor 5 2>serve.log & SERVER=$!; \
+        "{VIEWER} $ARMCAL serve $ROUTINE --arm arm.toml --factor 8 2>serve.log & SERVER=$!; \
          $ARMCAL run $ROUTINE --arm ros2:arm.toml --unattended --live --out out & RUN=$!; \
-         sleep 15; kill -9 $VIEWER && kill -0 $RUN && echo killed; wait $RUN; CODE=$?; \
+         sleep 12; kill -9 $VIEWER && kill -0 $RUN && echo killed; wait $RUN; CODE=$?; \
          kill -INT $SERVER; wait $SERVER; exit $CODE"
     );
     let said = in_namespace(out.path(), &routine, &script);
