@@ -39,6 +39,9 @@ impl Look {
     }
 }
 
+/// Behind it the closing lines say how to see more.
+const REPORT: &str = "report.html";
+
 /// What is said at the end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Args)]
 pub(super) struct ClosingArgs {
@@ -59,9 +62,12 @@ impl ClosingArgs {
         let text = if self.details { table(summary) } else { closing(summary) };
         let lines = if is_quiet() { 1 } else { usize::MAX };
         let text = if self.details { text } else { text.lines().take(lines).collect::<Vec<_>>().join("\n") };
-        let next = if is_quiet() { String::new() } else { format!("\n{next}") };
-        let more = if self.details || is_quiet() { "" } else { "; all figures: --details" };
-        say_closing(&format!("{text}{next}{more}"))
+        let next = match (is_quiet(), self.details) {
+            (true, _) => String::new(),
+            (false, true) => format!("\n{next}"),
+            (false, false) => format!("\n{}", next.replacen(REPORT, &format!("{REPORT}; all figures: --details"), 1)),
+        };
+        say_closing(&format!("{text}{next}"))
     }
 }
 

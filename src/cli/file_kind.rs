@@ -1,6 +1,5 @@
 //! What a file is, by its content, and which command takes it: for those who name the wrong one.
 
-use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
@@ -8,6 +7,7 @@ use anyhow::Result;
 
 use crate::cli::exit::UsageError;
 use armcal_core::files::{self, FileKind as Size};
+use armcal_core::robot::parse_toml;
 
 /// What armcal reads and writes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,7 +45,7 @@ impl FileKind {
             };
         }
         let mut start = Vec::new();
-        File::open(path).ok()?.take(START_BYTES as u64).read_to_end(&mut start).ok()?;
+        files::open(path).ok()?.take(START_BYTES as u64).read_to_end(&mut start).ok()?;
         let begins = [
             (&b"\x89MCAP"[..], Self::Recording),
             (b"SQLite format 3", Self::Bag),
@@ -60,7 +60,7 @@ impl FileKind {
         if start.trim_ascii_start().starts_with(b"<") {
             return text.contains("<robot").then_some(Self::Urdf);
         }
-        Self::of_table(&toml::from_str(&text).ok()?)
+        Self::of_table(&parse_toml(path, &text).ok()?)
     }
 
     /// By the keys of a TOML file.

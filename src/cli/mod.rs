@@ -51,11 +51,7 @@ mod study_dive_faults;
 #[cfg(feature = "sim")]
 mod study_falsified;
 #[cfg(feature = "sim")]
-mod study_paper;
-#[cfg(feature = "sim")]
 mod study_plan;
-#[cfg(feature = "sim")]
-mod study_poses;
 #[cfg(feature = "sim")]
 mod study_worlds;
 mod tagmap;

@@ -9,17 +9,17 @@ use std::time::Instant;
 use anyhow::{Context, Result};
 use clap::{Args, Subcommand};
 
+use self::paper::{PaperArgs, paper};
+use self::poses::{PosesArgs, poses};
 use crate::cli::exit::Exit;
 use crate::cli::stdout::{note, say};
 use crate::cli::study::bound::{BoundArgs, bound};
 use crate::cli::study_dive::{DiveArgs, dive};
 use crate::cli::study_dive_faults::{DiveFaultsArgs, dive_faults};
 use crate::cli::study_falsified::{FalsifiedArgs, falsified};
-use crate::cli::study_paper::{PaperArgs, paper};
 use crate::cli::study_plan::{
     EdgesArgs, PathsArgs, SelfCollisionArgs, TrackingErrorArgs, edges, paths, self_collision, tracking_error,
 };
-use crate::cli::study_poses::{PosesArgs, poses};
 use crate::cli::study_worlds::{WorldsArgs, worlds};
 use crate::cli::waiting::Waiting;
 use crate::output;
@@ -30,6 +30,9 @@ use armcal_sim::WaterKind;
 use armcal_study::{
     StudyError, Watcher, conditions, conditions_csv, detection_study, fit_noise, report, trials_csv, truth_csv,
 };
+
+mod paper;
+mod poses;
 
 #[derive(Debug, Args)]
 pub(super) struct StudyArgs {

@@ -6,7 +6,11 @@ use armcal_core::log::StampRegression;
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "each variant's message says what it is")]
 pub enum CalibError {
-    #[error("{recording}: the joints {recorded:?} are not those of robot `{robot}`: {expected:?}")]
+    #[error(
+        "{recording}: the joints {recorded:?} are not those of robot `{robot}`: {expected:?}; name the folder of that \
+         robot, or, where it is of another program, give an input map with --input; `armcal inspect {recording} \
+         --write-input MAP.toml` proposes one"
+    )]
     JointNames { recording: String, robot: String, recorded: Vec<String>, expected: Vec<String> },
     #[error(
         "{recording}: holds no joint readings as armcal records them (topic /joint_sensors): where it is of another \

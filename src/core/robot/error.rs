@@ -2,9 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use super::toml_errors::explained;
+use self::toml_errors::explained;
+pub use self::toml_errors::{from_table, toml_problem};
 use super::toml_text::check_entries;
 use crate::files::{self, FileKind};
+
+mod toml_errors;
 
 /// A wrong value in a file, with file, key and allowed values.
 #[derive(Clone, Debug, thiserror::Error, PartialEq)]

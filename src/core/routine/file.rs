@@ -107,7 +107,7 @@ pub fn load_with(file: &Path, overrides: &Overrides) -> Result<Routine, RoutineE
     let script = if raw.step.is_empty() {
         Script { steps: script::standard(raw.capture, &raw.task), faults: Vec::new() }
     } else {
-        let lines = script::step_lines(&read_text(file)?);
+        let lines = script::step_lines(file, &read_text(file)?);
         script::read(file, (raw.step, &lines), raw.capture, &raw.task)?
     };
     check_held_out(file, raw.method, &script.steps)?;

@@ -12,7 +12,7 @@ use super::step::{
     CalibrateSettings, CalibrateViews, IdentifySettings, MoveGoal, OnRefusal, ReachSettings, Step, StopsSettings,
     TouchSettings, WorkBelief, WorkSettings,
 };
-use crate::robot::{FileIssue, from_table};
+use crate::robot::{FileIssue, from_table, parse_toml};
 use crate::streams::PriorSource;
 use crate::text::nearest;
 
@@ -28,13 +28,13 @@ const NAMES: &str =
     "move, reach, work, grip, capture, identify, stops, touch, calibrate, recalibrate, wait, fault, assert";
 
 /// The lines at which the `[[step]]` tables of a routine begin; none where it is no TOML.
-pub(super) fn step_lines(text: &str) -> Vec<usize> {
+pub(super) fn step_lines(file: &Path, text: &str) -> Vec<usize> {
     #[derive(Deserialize)]
     struct Steps {
         #[serde(default)]
         step: Vec<toml::Spanned<toml::Table>>,
     }
-    let steps = toml::from_str::<Steps>(text).map(|steps| steps.step).unwrap_or_default();
+    let steps = parse_toml::<Steps>(file, text).map(|steps| steps.step).unwrap_or_default();
     steps.iter().map(|step| 1 + text[..step.span().start].matches('\n').count()).collect()
 }
 
@@ -462,7 +462,12 @@ mod tests {
         }
         let steps: Steps = toml::from_str(text).expect("valid TOML");
         let task = TaskSettings { tolerance_m: 0.02, targets_m: vec![[1.0, 0.0, 0.0]; 3] };
-        read(Path::new("r.toml"), (steps.step, &step_lines(text)), CaptureSettings::default(), &task)
+        read(
+            Path::new("r.toml"),
+            (steps.step, &step_lines(Path::new("r.toml"), text)),
+            CaptureSettings::default(),
+            &task,
+        )
     }
 
     fn problem(text: &str) -> String {
