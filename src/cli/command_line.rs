@@ -25,7 +25,7 @@ const PARTS: [(bool, &str); 3] = [
     (cfg!(feature = "live"), "live arms over ROS 2 humble"),
 ];
 
-/// Version, commit of a release (`.ci/release` names it), parts: "0.3.0 (1a2b3c4d5e6f; simulator, replays)".
+/// Version, commit of a release (ARMCAL_COMMIT at compile time), parts: "0.3.0 (1a2b3c4d5e6f; simulator, replays)".
 static VERSION: LazyLock<String> = LazyLock::new(|| {
     let commit = option_env!("ARMCAL_COMMIT").unwrap_or("no release");
     let parts: Vec<_> = PARTS.into_iter().filter_map(|(is_built, name)| is_built.then_some(name)).collect();
