@@ -7,8 +7,9 @@ use crate::support::{files_below, read, root};
 /// What opens or reads a file without limits.
 const UNBOUNDED: [&str; 5] = ["fs::read(", "read_to_string(", "File::open(", "OpenOptions::new(", "toml::from_str"];
 /// Files that may, and why: the bounded reader itself; a run's own files, synced to disk; a campaign's own rows,
-/// locked; a plan's picture, read back; TOML with its entries counted, and read again for what it lacks; a value of the command line; the truth of the
-/// run itself; settings of tests; what the system says of this process; the lock of a growing file.
+/// locked; a plan's picture, read back; TOML with its entries counted, and read again for what it lacks; a value of the
+/// command line; the truth of the run itself; settings of tests; what the system says of this process; the lock of a
+/// growing file.
 const ALLOWED: [(&str, &str); 11] = [
     ("core/files.rs", "File::open("),
     ("output/folder.rs", "File::open("),
