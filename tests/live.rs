@@ -118,8 +118,8 @@ fn largest_difference_sigma(a: &Path, b: &Path) -> f64 {
     worst
 }
 
-/// A driver that dies in mid-motion: the run ends soon after the last reading, what there is can be read, and the driver
-/// that comes back is heard again.
+/// A driver that dies in mid-motion: the run ends soon after the last reading, what there is can be read, and the
+/// driver that comes back is heard again.
 #[test]
 #[ignore = "needs user namespaces"]
 fn a_run_whose_arm_dies_stops_and_keeps_its_recording() {
@@ -154,7 +154,7 @@ fn a_served_arm_follows_one_degree_at_a_time() {
                   (yes | head -n 12; echo a) | $ARMCAL run $ROUTINE --arm ros2:arm.toml --nudge --out out; CODE=$?; \
                   kill -INT $SERVER; wait $SERVER; exit $CODE";
     let said = in_namespace(out.path(), &routine, script);
-    said.expect("run --nudge", 1, &["each joint follows its set-points", "the operator said so"]);
+    said.expect("run --nudge", 1, &["each joint follows its set-points", "stopped on request"]);
     assert_eq!(said.stderr.matches("came back to").count(), titan().n_joints(), "{}", said.stderr);
 }
 

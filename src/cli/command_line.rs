@@ -11,12 +11,14 @@ use tracing_subscriber::layer::SubscriberExt;
 use tracing_subscriber::util::SubscriberInitExt;
 
 use crate::cli::examples::with_examples;
+#[cfg(feature = "sim")]
+use crate::cli::live::discover;
 #[cfg(feature = "viewer")]
 use crate::cli::replay;
 use crate::cli::stdout::{be_quiet, complain, is_written};
 use crate::cli::{calibrate, check, completions, exit, export, inspect, new_robot, plan, tagmap, watch};
 #[cfg(feature = "sim")]
-use crate::cli::{campaign, discover, regress, run, sensitivity, serve, study};
+use crate::cli::{campaign, regress, run, sensitivity, serve, study};
 
 /// What this build has of the parts that a build may leave out.
 const PARTS: [(bool, &str); 3] = [

@@ -1,7 +1,8 @@
-//! `armcal run --arm`: a real arm in place of the simulated one.
+//! `armcal run --arm`: a real arm in place of the simulated one; `discover` finds out how it is reached.
 
 #[cfg(feature = "live")]
 mod connected;
+pub(super) mod discover;
 #[cfg(feature = "live")]
 mod nudging;
 

@@ -14,8 +14,6 @@ mod command_line;
 mod completions;
 #[cfg(feature = "sim")]
 mod confirm;
-#[cfg(feature = "sim")]
-mod discover;
 mod examples;
 mod exit;
 mod export;

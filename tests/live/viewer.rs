@@ -6,7 +6,8 @@ use crate::support::{ShortRoutine, shared_run, temp};
 /// A viewer's server without a window; `$VIEWER` is its process.
 const VIEWER: &str = "VIEWER_PROGRAM=$(python3 -c 'import sysconfig; print(sysconfig.get_paths()[\"purelib\"])')\
                       /rerun_sdk/rerun_cli/rerun; \
-                      RUST_LOG=error $VIEWER_PROGRAM --serve-grpc --bind 127.0.0.1 --port 9876 2>viewer.log & VIEWER=$!; \
+                      export RUST_LOG=error; \
+                      $VIEWER_PROGRAM --serve-grpc --bind 127.0.0.1 --port 9876 2>viewer.log & VIEWER=$!; \
                       until ss -ltn | grep -q 127.0.0.1:9876 || ! kill -0 $VIEWER; do sleep 0.05; done;";
 
 /// A served arm is calibrated as if nobody had looked.

@@ -155,3 +155,13 @@ fn check_sensor(file: &Path, s: &SensorFile, joint: &ChainJoint) -> Result<Joint
         max_rate_rad_s: check("max_rate_rad_s", s.max_rate_rad_s, 1e-3..=20.0)?,
     })
 }
+
+/// The name that others have for a joint: its own, or the only one that begins or ends with it.
+#[must_use]
+pub fn likely_name<'a>(joint: &str, names: &'a std::collections::BTreeSet<String>) -> Option<&'a String> {
+    if let Some(same) = names.get(joint) {
+        return Some(same);
+    }
+    let mut like = names.iter().filter(|name| name.ends_with(joint) || name.starts_with(joint));
+    like.next().filter(|_| like.next().is_none())
+}

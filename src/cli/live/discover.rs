@@ -12,7 +12,7 @@ use crate::cli::exit::Exit;
 mod looked;
 
 #[derive(Debug, Args)]
-pub(super) struct LiveCommandArgs {
+pub(in crate::cli) struct LiveCommandArgs {
     #[command(subcommand)]
     command: LiveCommand,
 }
@@ -47,7 +47,7 @@ fn seconds(text: &str) -> Result<f64, String> {
     if (1.0..=3600.0).contains(&seconds) { Ok(seconds) } else { Err("it must be 1 .. 3600".to_owned()) }
 }
 
-pub(super) fn live(args: &LiveCommandArgs) -> Result<Exit> {
+pub(in crate::cli) fn live(args: &LiveCommandArgs) -> Result<Exit> {
     let LiveCommand::Discover(args) = &args.command;
     discover(args)
 }
@@ -59,5 +59,5 @@ fn discover(args: &DiscoverArgs) -> Result<Exit> {
 
 #[cfg(not(feature = "live"))]
 fn discover(_: &DiscoverArgs) -> Result<Exit> {
-    Err(crate::cli::live::not_built("live discover"))
+    Err(super::not_built("live discover"))
 }

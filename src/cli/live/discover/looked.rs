@@ -21,7 +21,8 @@ pub(super) fn discover(args: &DiscoverArgs) -> Result<Exit> {
     let seen = look_around(&domain, args.seconds, &|| interrupt.is_requested())?;
     if seen.topics.is_empty() {
         bail!(
-            "nobody was seen in ROS domain {} in {} s; is the driver running there, and are --domain and --network right?",
+            "nobody was seen in ROS domain {} in {} s; is the driver running there, and are --domain and --network \
+             right?",
             args.domain,
             args.seconds
         );
