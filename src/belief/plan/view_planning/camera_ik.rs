@@ -187,7 +187,8 @@ mod tests {
         assert!(there * 10 > n * 9, "{there} of {n}");
     }
 
-    /// Of goals before a camera that stands still many are met, and where they are a tag is in view at its range.
+    /// Of goals before a camera that stands still some are met, and where they are the tag that was meant is in view
+    /// as a rule: a direction may lie beside the image of a narrow lens.
     #[test]
     fn a_carried_tag_gets_before_the_camera() {
         let robot = crate::plan::view_planning::fixture::watched_titan();
@@ -209,8 +210,11 @@ mod tests {
                 continue;
             }
             met += 1;
-            shown += usize::from(visibility.in_view(&robot, &robot.chain.link_poses(&angles)).next().is_some());
+            let is_meant = |idx: usize| {
+                robot.tag_frame.link_from_frame * robot.tags[idx].base_from_tag.isometry() == goal.frame.link_from_frame
+            };
+            shown += usize::from(visibility.in_view(&robot, &robot.chain.link_poses(&angles)).any(is_meant));
         }
-        assert!(met > 60 && shown * 10 > met * 8, "{met} met, {shown} of them show a tag");
+        assert!(met > 40 && shown * 10 > met * 6, "{met} met, {shown} of them show the tag");
     }
 }
