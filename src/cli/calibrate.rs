@@ -50,7 +50,7 @@ pub(super) struct CalibrateArgs {
     #[arg(long, value_name = "DIR", default_value = ".")]
     out: PathBuf,
     /// Follow the recording view by view, as if the arm were at work, and write the belief over time (belief.jsonl)
-    #[arg(long, conflicts_with_all = ["compact", "prior", "method"])]
+    #[arg(long, conflicts_with_all = ["compact", "prior", "method", "json"])]
     online: bool,
     /// With --online: nothing drifts, and model and scales are those of the batch of all views; says how far the last
     /// belief is from that batch
