@@ -176,7 +176,11 @@ impl Stopping {
             if result.is_some() {
                 continue;
             }
-            sequence.add(*has_event);
+            if *has_event {
+                sequence.add_with();
+            } else {
+                sequence.add_without();
+            }
             let now = limit.result(setting, sequence);
             *result = (now.answer != Answer::Open).then_some(now);
         }

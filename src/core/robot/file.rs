@@ -14,7 +14,7 @@ use super::drive::{DriveSpec, HydraulicsFile, MotionSpec, check_displacements};
 use super::error::{FileIssue, RobotError, parse_toml, read_in};
 use super::geometry::GeometryPriors;
 use super::gripper::GripperFile;
-use super::gripper_tag::GripperTagFile;
+use super::gripper_tag::{GripperTag, GripperTagFile};
 use super::joint_sensor::{SensorFile, check_sensors};
 use super::nominal::{BASE_TAG, Robot, STOWED, TAG_LINK, ToolSpec, check_stowed, lens_issue};
 use super::self_collision::{self, Stored};
@@ -206,13 +206,8 @@ fn robot_of(folder: &Path, raw: RobotFile, urdf: UrdfModel, meshes: Meshes) -> R
     let (tags, family) = check_tags(&file, &raw.tag, raw.base_tag, &Pose::<Base, Base>::identity())?;
     let tag_frame = raw.tag_link.as_ref().map(|link| check_tag_link(&file, link, &links, &camera)).transpose()?;
     let gripper_tag = raw.gripper_tag.map(|tag| tag.check(&file, &arm, &camera.mount)).transpose()?;
-    if let Some(tag) = &gripper_tag {
-        tag.check_beside(&file, &tags, family)?;
-        if tag_frame.is_some() {
-            let problem = "does not go together with [gripper_tag]: name that tag as a [[tag]], too";
-            return Err(FileIssue::new(&file, TAG_LINK, problem).into());
-        }
-    }
+    gripper_tag.iter().try_for_each(|tag| tag.check_beside(&file, &tags, family))?;
+    check_one_carrier(&file, tag_frame.as_ref(), gripper_tag.as_ref())?;
     let geometry = raw.geometry.check(&file)?;
     let buoyancy_fraction = FileIssue::check_range(&file, "buoyancy_fraction", raw.buoyancy_fraction, 0.0..=0.95)?;
     Ok(Robot {
@@ -243,6 +238,21 @@ fn robot_of(folder: &Path, raw: RobotFile, urdf: UrdfModel, meshes: Meshes) -> R
         tag_family: family.or(gripper_tag.map(|tag| tag.family)).unwrap_or_default(),
         links,
     })
+}
+
+/// Tags that the arm carries are before a camera that stands still, the one on the gripper before one that moves.
+fn check_one_carrier(
+    file: &Path,
+    tag_frame: Option<&Attachment>,
+    gripper_tag: Option<&GripperTag>,
+) -> Result<(), FileIssue> {
+    match (tag_frame, gripper_tag) {
+        (Some(_), Some(_)) => {
+            let problem = "does not go together with [gripper_tag]: name that tag as a [[tag]], too";
+            Err(FileIssue::new(file, TAG_LINK, problem))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// The frame of the tags that the arm carries on `link`.

@@ -18,11 +18,20 @@ pub struct RateSequence {
 const BISECTIONS: usize = 60;
 
 impl RateSequence {
-    /// Counts one more run.
-    pub fn add(&mut self, has_event: bool) {
-        let same = if has_event { self.n_events } else { self.n_runs - self.n_events };
-        self.ln_mixture += ((same as f64 + 0.5) / (self.n_runs as f64 + 1.0)).ln();
-        self.n_events += u64::from(has_event);
+    /// Counts one more run that had the event.
+    pub fn add_with(&mut self) {
+        self.add(self.n_events);
+        self.n_events += 1;
+    }
+
+    /// Counts one more run that had it not.
+    pub fn add_without(&mut self) {
+        self.add(self.n_runs - self.n_events);
+    }
+
+    /// One more of which there were so many.
+    fn add(&mut self, n_alike: u64) {
+        self.ln_mixture += ((n_alike as f64 + 0.5) / (self.n_runs as f64 + 1.0)).ln();
         self.n_runs += 1;
     }
 
@@ -63,7 +72,8 @@ mod tests {
 
     fn sequence(n_events: u64, n_runs: u64) -> RateSequence {
         let mut sequence = RateSequence::default();
-        (0..n_runs).for_each(|k| sequence.add(k < n_events));
+        (0..n_events).for_each(|_| sequence.add_with());
+        (n_events..n_runs).for_each(|_| sequence.add_without());
         sequence
     }
 
@@ -76,7 +86,11 @@ mod tests {
                 let mut rng = stream_rng(seed, &format!("rate sequence {number}"));
                 let mut sequence = RateSequence::default();
                 let is_missed = (0..2000).any(|_| {
-                    sequence.add(rng.random_range(0.0..1.0) < rate);
+                    if rng.random_range(0.0..1.0) < rate {
+                        sequence.add_with();
+                    } else {
+                        sequence.add_without();
+                    }
                     let [low, high] = sequence.interval(0.95);
                     !(low..=high).contains(&rate)
                 });
@@ -104,7 +118,10 @@ mod tests {
     #[test]
     fn the_order_of_events_does_not_matter() {
         let mut other = RateSequence::default();
-        (0..40).for_each(|k| other.add(k % 8 == 7));
+        for _ in 0..5 {
+            (0..7).for_each(|_| other.add_without());
+            other.add_with();
+        }
         let (a, b) = (sequence(5, 40).interval(0.9), other.interval(0.9));
         assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-12), "{a:?} {b:?}");
     }
