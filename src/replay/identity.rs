@@ -32,12 +32,12 @@ impl Identity {
         // Where files lie, and how that is spelled, is not part of the identity.
         let robot = Robot { folder: PathBuf::new(), links: BTreeMap::new(), ..input.robot.clone() };
         let vehicle = input.vehicle.map(|vehicle| Vehicle { file: PathBuf::new(), ..vehicle.clone() });
-        // Optional parts that are absent are not part of the identity.
+        // Optional parts that are absent, and tags of the usual family, are not part of the identity.
         let drawings = format!("{robot:?}{vehicle:?}{:?}", input.scene);
         let still = format!("tag_frame: {:?}, ", Attachment::base());
-        let drawings = ["gripper_tag: None, ", "lights: [], ", "links: {}, ", &still]
-            .iter()
-            .fold(drawings, |text, absent| text.replace(absent, ""));
+        let families = ["tag_family: Tag36h11, ", "family: Some(Tag36h11), ", "family: Tag36h11, "];
+        let absent = ["gripper_tag: None, ", "lights: [], ", "links: {}, ", &still];
+        let drawings = absent.iter().chain(&families).fold(drawings, |text, part| text.replace(part, ""));
         hasher.update(drawings.as_bytes());
         hasher.update(input.summary_markdown.unwrap_or_default().as_bytes());
         Ok(Self { recording_id: hasher.finalize().to_hex()[..32].to_owned() })
