@@ -19,11 +19,12 @@ use super::joint_sensor::{SensorFile, check_sensors};
 use super::nominal::{BASE_TAG, Robot, STOWED, TAG_LINK, ToolSpec, check_stowed, lens_issue};
 use super::self_collision::{self, Stored};
 use super::shape::{PlacedShape, Shape};
-use super::survey::{TagFile, check_tags};
+use super::survey::{SurveyedTag, TagFile, check_tags};
 use super::urdf::{UrdfChain, UrdfModel};
 use super::urdf_mesh::{CollisionMeshes, MeshFolders};
 use crate::joints::JointAngles;
 use crate::kinematics::{ArmLoads, Attachment};
+use crate::optics::TagFamily;
 use crate::spatial::{Base, Pose};
 
 #[derive(Deserialize)]
@@ -206,8 +207,7 @@ fn robot_of(folder: &Path, raw: RobotFile, urdf: UrdfModel, meshes: Meshes) -> R
     let (tags, family) = check_tags(&file, &raw.tag, raw.base_tag, &Pose::<Base, Base>::identity())?;
     let tag_frame = raw.tag_link.as_ref().map(|link| check_tag_link(&file, link, &links, &camera)).transpose()?;
     let gripper_tag = raw.gripper_tag.map(|tag| tag.check(&file, &arm, &camera.mount)).transpose()?;
-    gripper_tag.iter().try_for_each(|tag| tag.check_beside(&file, &tags, family))?;
-    check_one_carrier(&file, tag_frame.as_ref(), gripper_tag.as_ref())?;
+    gripper_tag.iter().try_for_each(|tag| check_gripper_tag(&file, tag, (&tags, family), tag_frame.as_ref()))?;
     let geometry = raw.geometry.check(&file)?;
     let buoyancy_fraction = FileIssue::check_range(&file, "buoyancy_fraction", raw.buoyancy_fraction, 0.0..=0.95)?;
     Ok(Robot {
@@ -240,19 +240,19 @@ fn robot_of(folder: &Path, raw: RobotFile, urdf: UrdfModel, meshes: Meshes) -> R
     })
 }
 
-/// Tags that the arm carries are before a camera that stands still, the one on the gripper before one that moves.
-fn check_one_carrier(
+/// Checks the tag on the gripper beside the others. Those that the arm carries are for a camera that stands still, and
+/// that one is for a camera that moves.
+fn check_gripper_tag(
     file: &Path,
+    tag: &GripperTag,
+    (tags, family): (&[SurveyedTag], Option<TagFamily>),
     tag_frame: Option<&Attachment>,
-    gripper_tag: Option<&GripperTag>,
 ) -> Result<(), FileIssue> {
-    match (tag_frame, gripper_tag) {
-        (Some(_), Some(_)) => {
-            let problem = "does not go together with [gripper_tag]: name that tag as a [[tag]], too";
-            Err(FileIssue::new(file, TAG_LINK, problem))
-        }
-        _ => Ok(()),
+    if tag_frame.is_some() {
+        let problem = "does not go together with [gripper_tag]: name that tag as a [[tag]], too";
+        return Err(FileIssue::new(file, TAG_LINK, problem));
     }
+    tag.check_beside(file, tags, family)
 }
 
 /// The frame of the tags that the arm carries on `link`.
