@@ -320,16 +320,20 @@ fn listen(wire: &mut impl Wire, guard: &mut Guard, connection: &Connection) -> R
             _ => {}
         }
     }
-    if (survey.readings as f64) < MIN_RATE_HZ * survey.seconds {
-        let (n, seconds) = (survey.readings, survey.seconds);
-        return Err(LiveError::NotReady(format!(
-            "{n} joint readings in {seconds:.1} s; at least {MIN_RATE_HZ} a second are needed"
-        )));
-    }
+    check_rate(&survey)?;
     guard.check_set_point(&survey.counts).map_err(|reason| {
         LiveError::NotReady(format!("where it stands by its readings: {reason}; is this robot.toml the arm's?"))
     })?;
     Ok(survey)
+}
+
+fn check_rate(survey: &Survey) -> Result<(), LiveError> {
+    let (n, seconds) = (survey.readings, survey.seconds);
+    if n as f64 >= MIN_RATE_HZ * seconds {
+        return Ok(());
+    }
+    let problem = format!("{n} joint readings in {seconds:.1} s; at least {MIN_RATE_HZ} a second are needed");
+    Err(LiveError::NotReady(problem))
 }
 
 fn not_ready(reason: StopReason) -> LiveError {

@@ -297,6 +297,9 @@ fn mismatch_at(posed: &[Vec<PosedTag<'_>>], id: u32, place: &SurveyedTag, others
     quantile(&of_tag.map(mismatch).collect::<Vec<f64>>(), 0.5)
 }
 
+/// How a recorded pose may be meant.
+type Reading<'a> = &'a dyn Fn(&Isometry3<f64>) -> Isometry3<f64>;
+
 /// Of recorded poses of one landmark a view.
 fn by_rotations(views: &[&View], robot: &Robot) -> Option<WrongInput> {
     let base_from_camera = |view: &View| {
@@ -321,7 +324,7 @@ fn by_rotations(views: &[&View], robot: &Robot) -> Option<WrongInput> {
     let with = |pose: &Isometry3<f64>, turn: fn(&UnitQuaternion<f64>) -> UnitQuaternion<f64>| {
         Isometry3::from_parts(pose.translation, turn(&pose.rotation))
     };
-    let readings: [(WrongInputKind, &dyn Fn(&Isometry3<f64>) -> Isometry3<f64>); 5] = [
+    let readings: [(WrongInputKind, Reading<'_>); 5] = [
         (WrongInputKind::RecordedQuaternions, &|pose| with(pose, reordered)),
         (WrongInputKind::RecordedQuaternions, &|pose| with(pose, reordered_back)),
         (WrongInputKind::RecordedQuaternions, &|pose| with(&pose.inverse(), reordered).inverse()),

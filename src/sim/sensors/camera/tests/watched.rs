@@ -5,15 +5,21 @@ use rand::RngExt;
 use super::*;
 use armcal_core::stats::stream_rng;
 
-/// The watched arm at a random configuration, its links as drawn or without shapes.
-fn watched(seed: u64, has_shapes: bool, change: impl FnOnce(&mut WorldSpec)) -> Site {
+#[derive(Clone, Copy, PartialEq)]
+enum Links {
+    AsDrawn,
+    WithoutShapes,
+}
+
+/// The watched arm at a random configuration.
+fn watched(seed: u64, links: Links, change: impl FnOnce(&mut WorldSpec)) -> Site {
     let mut rng = stream_rng(seed, "configuration");
     let pose = |robot: &mut Robot| {
         let center = |j: usize| robot.sensors[j].center_rad;
         let reach = |j: usize| robot.sensors[j].half_range_rad.min(1.5);
         let angle = |j: usize| center(j) + 0.9 * reach(j) * rng.random_range(-1.0..1.0);
         robot.stowed = JointAngles::from_fn(robot.n_joints(), angle);
-        if !has_shapes {
+        if links == Links::WithoutShapes {
             robot.bodies.iter_mut().for_each(|body| body.collisions.clear());
         }
     };
@@ -24,7 +30,7 @@ fn watched(seed: u64, has_shapes: bool, change: impl FnOnce(&mut WorldSpec)) -> 
 fn carried_tags_are_where_their_link_is_and_the_camera_stays() {
     let mut n = 0;
     for seed in 0..60 {
-        let site = watched(seed, true, |_| {});
+        let site = watched(seed, Links::AsDrawn, |_| {});
         let (_, image) = site.image(&mut site.camera(), 0.2, 1.0);
         let stays = site.built.camera_attachment(&site.robot).link_from_frame;
         assert_eq!(site.camera().base_from_camera(&site.links), stays);
@@ -41,7 +47,7 @@ fn carried_tags_are_where_their_link_is_and_the_camera_stays() {
 fn carried_tags_blur_as_they_move() {
     let (mut n, exposure_s, rate_rad_s) = (0, 0.05, 0.3);
     for seed in 0..60 {
-        let site = watched(seed, true, |spec| spec.camera.exposure_s = exposure_s);
+        let site = watched(seed, Links::AsDrawn, |spec| spec.camera.exposure_s = exposure_s);
         let (_, image) = site.image(&mut site.camera(), rate_rad_s, 1.0);
         for tag in &image.tags {
             let [start, middle, end] =
@@ -60,8 +66,8 @@ fn carried_tags_blur_as_they_move() {
 fn the_arms_own_links_hide_its_tags() {
     let (mut hidden, mut seen) = (0, 0);
     for seed in 0..120 {
-        let [with, without] = [true, false].map(|has_shapes| {
-            let site = watched(seed, has_shapes, |_| {});
+        let [with, without] = [Links::AsDrawn, Links::WithoutShapes].map(|links| {
+            let site = watched(seed, links, |_| {});
             all_ids(&site.image(&mut site.camera(), 0.0, 1.0).1)
         });
         assert!(with.iter().all(|id| without.contains(id)), "{with:?} {without:?}");
