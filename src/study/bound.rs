@@ -379,9 +379,9 @@ mod tests {
     #[test]
     fn a_bound_is_for_worlds_as_modelled_alone() {
         assert!(has_bound(&world(&AS_MODELLED)));
-        for left in 0..AS_MODELLED.len() {
-            let others: Vec<&str> = (0..AS_MODELLED.len()).filter(|k| *k != left).map(|k| AS_MODELLED[k]).collect();
-            assert!(!has_bound(&world(&others)), "{}", AS_MODELLED[left]);
+        for left in AS_MODELLED {
+            let others: Vec<&str> = AS_MODELLED.into_iter().filter(|setting| *setting != left).collect();
+            assert!(!has_bound(&world(&others)), "{left}");
         }
     }
 
