@@ -9,7 +9,7 @@ use clap::Args;
 use crate::cli::belief_text::{belief, exit_of, line, summary};
 use crate::cli::calibration_inputs::{CalibrationInputs, load_robot};
 use crate::cli::exit::{Exit, UsageError};
-use crate::cli::file_kind::{FileKind, expect_kind};
+use crate::cli::file_kind::expect_recording;
 use crate::cli::interrupt::Interrupt;
 use crate::cli::live_view::{LiveViewArgs, OpenView, ViewOf};
 use crate::cli::losses::warn_of_losses;
@@ -62,7 +62,7 @@ pub(super) struct WatchArgs {
 }
 
 pub(super) fn watch(args: &WatchArgs) -> Result<Exit> {
-    expect_kind(&args.recording, &[FileKind::Recording])?;
+    expect_recording(&args.recording)?;
     let robot = load_robot(&args.robot, &args.failed)?;
     let _lock = args.out.as_deref().map(output::FolderLock::take).transpose()?;
     let given = CalibrationInputs {

@@ -34,8 +34,8 @@ pub(crate) struct QuadDecoder {
 }
 
 impl QuadDecoder {
-    /// Decodes tags of `family` with as many wrong bits as its codes can bear. The gates reject those with more than the
-    /// settings allow.
+    /// Decodes tags of `family` with as many wrong bits as its codes can bear. The gates reject those with more than
+    /// the settings allow.
     pub(crate) fn new(family: TagFamily, [width, height]: [usize; 2]) -> Result<Self, DetectError> {
         let library_error = |error: apriltag::Error| DetectError::Library(error.to_string());
         let mut library = Detector::builder()

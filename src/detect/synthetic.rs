@@ -19,8 +19,8 @@ pub(super) struct PlacedTag {
 }
 
 impl PlacedTag {
-    /// A tag of family 36h11 at `center_m` that faces the camera, tilted by `incidence_rad` about a line at `azimuth_rad`, turned by
-    /// `spin_rad`.
+    /// A tag of family 36h11 at `center_m` that faces the camera, tilted by `incidence_rad` about a line at
+    /// `azimuth_rad`, turned by `spin_rad`.
     pub(super) fn new(
         id: u32,
         size_m: f64,

@@ -6,9 +6,10 @@ use rerun::{LineStrips3D, Points3D};
 use crate::colors;
 use crate::entities::BASE;
 use crate::entity_log::EntityLog;
+use crate::poses::{transform, vector};
 use crate::scene::ReplayScene;
 use crate::scenery::Mover;
-use crate::shapes::{Look, log_shapes, path_part, transform, vector};
+use crate::shapes::{Look, log_shapes, path_part};
 use crate::tracks::Tick;
 use armcal_core::kinematics::{Attachment, LinkPoses};
 use armcal_core::spatial::{Base, Pose, Tool};
@@ -120,8 +121,8 @@ impl Arm {
     }
 }
 
-/// Lines from the joint that moves a body to the next one, or to the tool, and to the camera that it carries: for a body
-/// of which no shape is known.
+/// Lines from the joint that moves a body to the next one, or to the tool, and to the camera that it carries: for a
+/// body of which no shape is known.
 fn log_skeleton(run: &ReplayScene, stream: &mut EntityLog, entity: &str, body: usize) {
     let (chain, tool, camera) = (&run.robot.chain, &run.robot.tool.mount, &run.robot.camera.mount);
     let next = chain.joints().get(body).map(|joint| joint.parent_from_joint.translation.vector);

@@ -15,7 +15,7 @@ use rerun::log::{Chunk, ChunkId, RowId, TimeColumn};
 use rerun::time::{TimeCell, TimePoint, Timeline};
 use rerun::{AsComponents, Clear, EntityPath, SerializedComponentBatch, Transform3D};
 
-use crate::shapes::{quaternion, transform, vector};
+use crate::poses::{quaternion, transform, vector};
 use crate::shown::Shown;
 
 /// The one timeline of a recording: seconds since its first log time.

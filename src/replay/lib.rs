@@ -21,6 +21,7 @@ mod online;
 mod phases;
 mod plan;
 mod plots;
+mod poses;
 mod read;
 mod recording;
 mod rrd;

@@ -1,10 +1,11 @@
 //! Primitives and poses in Rerun's terms.
 
-use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
-use rerun::{Boxes3D, Capsules3D, Cylinders3D, Ellipsoids3D, FillMode, Mesh3D, Transform3D};
+use nalgebra::{Isometry3, Point3, Translation3, Vector3};
+use rerun::{Boxes3D, Capsules3D, Cylinders3D, Ellipsoids3D, FillMode, Mesh3D};
 
 use crate::colors::Rgba;
 use crate::entity_log::EntityLog;
+use crate::poses::{quaternion, transform, vector};
 use armcal_core::robot::{Hull, PlacedShape, Shape};
 
 /// How a body looks.
@@ -121,20 +122,6 @@ fn mesh(hull: &Hull, place: &Isometry3<f64>, color: Rgba) -> Mesh3D {
     let [r, g, b, a] = color;
     let color = rerun::Rgba32::from_unmultiplied_rgba(r, g, b, a);
     Mesh3D::new(corners).with_vertex_normals(normals).with_triangle_indices(triangles).with_albedo_factor(color)
-}
-
-/// Single precision, as Rerun has it.
-pub(super) fn vector(v: &Vector3<f64>) -> [f32; 3] {
-    [v.x as f32, v.y as f32, v.z as f32]
-}
-
-pub(super) fn quaternion(q: &UnitQuaternion<f64>) -> rerun::Quaternion {
-    rerun::Quaternion::from_xyzw([q.i as f32, q.j as f32, q.k as f32, q.w as f32])
-}
-
-/// The pose of an entity in its parent.
-pub(super) fn transform(pose: &Isometry3<f64>) -> Transform3D {
-    Transform3D::from_translation_rotation(vector(&pose.translation.vector), quaternion(&pose.rotation))
 }
 
 /// A name as one part of an entity's path.

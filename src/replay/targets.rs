@@ -6,8 +6,8 @@ use rerun::{LineStrips3D, Points3D};
 use crate::colors::{self, Rgba};
 use crate::entities::BASE;
 use crate::entity_log::EntityLog;
+use crate::poses::vector;
 use crate::scene::ReplayScene;
-use crate::shapes::vector;
 use crate::tracks::Span;
 use armcal_core::streams::{MarkKind, ReachAttempt, ReachTask};
 

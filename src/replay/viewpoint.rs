@@ -2,8 +2,8 @@
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
+use crate::poses::vector;
 use crate::scene::ReplayScene;
-use crate::shapes::vector;
 
 /// Tangents of half the viewer's field of view, upwards (55 degrees in all) and sideways (the view is about twice as
 /// wide).

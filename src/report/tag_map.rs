@@ -113,7 +113,8 @@ pub fn tag_map_html(given: &TagMapPage<'_>) -> String {
         h2 { "The fit" }
         table.notes { @for (name, text) in fit_lines(map, given.sources) { tr { th { (name) } td { (text) } } } }
         p { small {
-            "Standard deviations are along the axes of the frame, relative to what holds it; a tag that is held has none. \
+            "Standard deviations are along the axes of the frame, relative to what holds it; a tag that is held has \
+             none. \
              x, y, z are the middle of the black square."
         } }
     };

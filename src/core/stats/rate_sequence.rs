@@ -100,7 +100,8 @@ mod tests {
         }
     }
 
-    /// Against the closed form: the mixture's likelihood of s events in n runs is B(s + 1/2, n - s + 1/2) / B(1/2, 1/2).
+    /// Against the closed form: the mixture's likelihood of s events in n runs is
+    /// B(s + 1/2, n - s + 1/2) / B(1/2, 1/2).
     #[test]
     fn its_ends_are_where_the_ratio_says() {
         // 1 event in 3 runs: B(1.5, 2.5) / B(0.5, 0.5) = (pi / 16) / pi.

@@ -16,7 +16,8 @@ use armcal_core::robot::{MAX_COLLISION_SHAPES, parry_pose};
 
 /// The camera's own housing surrounds the start of the ray.
 const HOUSING_M: f64 = 0.08;
-/// A ray that passes a shape's box or sphere by more than this does not meet the shape, however its distance is rounded.
+/// A ray that passes a shape's box or sphere by more than this does not meet the shape, however its distance is
+/// rounded.
 const MISS_M: f64 = 1e-3;
 
 /// A line from an eye to a point, without its ends.

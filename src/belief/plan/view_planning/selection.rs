@@ -220,8 +220,8 @@ impl ViewSelector<'_> {
         gains.into_iter().take(SHORTLIST).map(|(_, k)| k).collect()
     }
 
-    /// The picks with one other in place of the one at `place`, if that is better; `before` is the state after the picks
-    /// before that.
+    /// The picks with one other in place of the one at `place`, if that is better; `before` is the state after the
+    /// picks before that.
     fn exchange(&self, picks: &Picks, place: usize, before: &DesignState, shortlist: &[usize]) -> Option<Picks> {
         let out = picks.order[place];
         let rest = picks.without(place);
