@@ -5,7 +5,7 @@ use rerun::{Boxes3D, Capsules3D, Cylinders3D, Ellipsoids3D, FillMode, Mesh3D};
 
 use crate::colors::Rgba;
 use crate::entity_log::EntityLog;
-use crate::poses::{quaternion, transform, vector};
+use crate::poses::{quaternion, vector};
 use armcal_core::robot::{Hull, PlacedShape, Shape};
 
 /// How a body looks.
