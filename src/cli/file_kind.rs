@@ -14,7 +14,6 @@ use armcal_core::robot::parse_toml;
 pub(super) enum FileKind {
     Recording,
     Bag,
-    BagOfRos1,
     Rerun,
     RobotFolder,
     RobotFile,
@@ -50,7 +49,6 @@ impl FileKind {
         let begins = [
             (&b"\x89MCAP"[..], Self::Recording),
             (b"SQLite format 3", Self::Bag),
-            (b"#ROSBAG V", Self::BagOfRos1),
             (b"RRF", Self::Rerun),
             (b"RRIO", Self::Rerun),
         ];
@@ -87,7 +85,6 @@ impl FileKind {
         match self {
             Self::Recording => "a recording (.mcap)",
             Self::Bag => "a ROS bag",
-            Self::BagOfRos1 => "a bag of ROS 1",
             Self::Rerun => "a file for the Rerun viewer (.rrd)",
             Self::RobotFolder => "a robot folder",
             Self::RobotFile => "a robot.toml",
@@ -108,7 +105,6 @@ impl FileKind {
         match self {
             Self::Recording => "`armcal calibrate`, `inspect`, `tagmap`, `watch` and `replay` take it",
             Self::Bag => "`armcal inspect`, and `armcal calibrate` with --input, take it",
-            Self::BagOfRos1 => "turn it into one of ROS 2: `rosbags-convert --src FILE --dst FOLDER` (PyPI: rosbags)",
             Self::Rerun => "open it with `rerun FILE`; other commands take the recording that it was made from",
             Self::RobotFolder => "give it as --robot",
             Self::RobotFile => "give its folder as --robot",

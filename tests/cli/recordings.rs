@@ -29,11 +29,7 @@ fn what_is_no_recording_is_refused_by_name() {
     calibrate(folder.path(), &robot_folder(), folder.path()).expect("a folder", 2, &["cannot be read"]);
     calibrate_bytes(b"", folder.path()).expect("empty", 2, &["given.mcap", "empty"]);
     calibrate_bytes(b"\x89MCAP", folder.path()).expect("cut in the magic", 2, &["given.mcap"]);
-    calibrate_bytes(b"#ROSBAG V2.0\n and more", folder.path()).expect(
-        "a bag",
-        2,
-        &["given.mcap", "a bag of ROS 1", "rosbags-convert"],
-    );
+    calibrate_bytes(b"#ROSBAG V2.0\n and more", folder.path()).expect("a bag", 2, &["given.mcap", "not an MCAP"]);
     calibrate_bytes(&[0; 4096], folder.path()).expect("zeros", 2, &["given.mcap", "not an MCAP"]);
     assert!(!folder.path().join("out").exists(), "nothing was written");
 }
