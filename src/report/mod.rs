@@ -16,6 +16,7 @@ mod table;
 mod tag_map;
 
 pub use html::{About, Report, html};
+#[cfg(feature = "sim")]
 pub(crate) use html::{chart, page, panel};
 pub use markdown::markdown;
 pub use summary::{
