@@ -110,7 +110,7 @@ fn relayed(folder: &Path, fault: &str, steps: &str, ends: &str) -> (Answer, Seen
     let script = format!(
         "python3 $RELAY relay.jsonl {fault} & RELAY=$!; \
          $ARMCAL serve $ROUTINE --arm served.toml --factor {FACTOR} --truth truth.mcap 2>serve.log & SERVER=$!; \
-         $ARMCAL run $ROUTINE --arm ros2:arm.toml --unattended --out out & RUN=$!; \
+         $ARMCAL run $ROUTINE --arm ros2:arm.toml --unattended --details --out out & RUN=$!; \
          {ends} wait $RUN; CODE=$?; sleep 0.5; kill $RELAY; kill -INT $SERVER; wait $SERVER; exit $CODE"
     );
     let said = in_namespace(folder, &routine, &script);
