@@ -159,16 +159,16 @@ impl LeastSquares for Search<'_> {
 mod tests {
     use super::*;
 
+    fn limits(robot: &Robot) -> Vec<JointLimits> {
+        let without = JointLimits { lower_rad: -3.0, upper_rad: 3.0 };
+        robot.chain.joints().iter().map(|joint| joint.limits.unwrap_or(without)).collect()
+    }
+
     /// The camera of a random pose is found again from another: place and direction within the tolerance of a look.
     #[test]
     fn the_camera_gets_where_another_pose_has_it() {
         let robot = crate::plan::view_planning::fixture::titan();
-        let limits: Vec<JointLimits> = robot
-            .chain
-            .joints()
-            .iter()
-            .map(|joint| joint.limits.unwrap_or(JointLimits { lower_rad: -3.0, upper_rad: 3.0 }))
-            .collect();
+        let limits = limits(&robot);
         let mut rng = armcal_core::stats::stream_rng(3, "aim");
         let (mut n, mut there) = (0, 0);
         for _ in 0..200 {
@@ -192,12 +192,7 @@ mod tests {
     #[test]
     fn a_carried_tag_gets_before_the_camera() {
         let robot = crate::plan::view_planning::fixture::watched_titan();
-        let limits: Vec<JointLimits> = robot
-            .chain
-            .joints()
-            .iter()
-            .map(|joint| joint.limits.unwrap_or(JointLimits { lower_rad: -3.0, upper_rad: 3.0 }))
-            .collect();
+        let limits = limits(&robot);
         let visibility = VisibilityModel::default();
         let mut rng = armcal_core::stats::stream_rng(3, "aim");
         let (mut met, mut shown) = (0, 0);
