@@ -2,8 +2,9 @@
 //!
 //! `Prepared` holds the settings' checked inputs, `jobs` what is to be run, `run_jobs` runs it on some threads, `Store`
 //! keeps every finished row at once and puts the sorted files in place at the end, `until` ends a campaign once a rate
-//! is known, `merge` puts shards together, `statistics` sums rows up, `regress` compares rows with those of a baseline, pair by pair. Rows hold no wall time: files do not depend on the number of
-//! threads, nor on how often a campaign was broken off. Exit codes come in from the command line.
+//! is known, `merge` puts shards together, `statistics` sums rows up, `regress` compares rows with those of a
+//! baseline, pair by pair. Rows hold no wall time: files do not depend on the number of threads, nor on how often a
+//! campaign was broken off. Exit codes come in from the command line.
 
 mod baseline;
 mod columns;

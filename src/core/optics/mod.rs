@@ -3,7 +3,8 @@
 //! `Fisheye` is the equidistant model of Kannala and Brandt (2006, eq. 6 to the fourth odd term), as in OpenCV's
 //! `cv::fisheye` and Kalibr's `equidistant`. `Radtan` is Brown's pinhole model, `CameraModel` either of them, with or
 //! without a window before it (`FlatPort`). `square`
-//! computes the pose of a tag from its four corners for any [`Lens`], `tag_family` has the printed patterns. Oracle: OpenCV (tests/oracle).
+//! computes the pose of a tag from its four corners for any [`Lens`], `tag_family` has the printed
+//! patterns. Oracle: OpenCV (tests/oracle).
 
 mod camera;
 mod corner_noise;
