@@ -283,11 +283,21 @@ mod tests {
 
     #[test]
     fn without_enough_seeds_the_answer_is_open() {
-        let mut stopping = stopping(&["contacts < 0.001 at 95 %"], 20, 1);
+        let mut stopping = stopping(&["refused < 0.001 at 95 %"], 20, 1);
         (1..=20).for_each(|seed| stopping.add(&row(0, seed)));
         assert!(!stopping.is_answered() && stopping.beyond().is_empty());
         let [result] = &stopping.results()[..] else { panic!("one") };
         assert_eq!((result.answer, result.runs), (Answer::Open, 20));
         assert!(result.to_string().contains("more seeds are needed"), "{result}");
+    }
+
+    /// Each of these rows has three contacts.
+    #[test]
+    fn contacts_are_read_from_the_figures() {
+        let mut stopping = stopping(&["contacts < 0.001 at 95 %"], 20, 1);
+        (1..=20).for_each(|seed| stopping.add(&row(0, seed)));
+        let [result] = &stopping.results()[..] else { panic!("one") };
+        assert_eq!((result.answer, result.events), (Answer::Above, result.runs), "{result}");
+        assert!(!stopping.beyond().is_empty(), "{result}");
     }
 }
