@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use crate::leaps::{Leaps, Leapt};
 use crate::{Deadman, GuardLimits};
 use armcal_core::robot::Robot;
 use armcal_core::sensor::ArmSensors;
@@ -12,6 +13,9 @@ use armcal_core::time::Stamp;
 const RANGE_SLACK_RAD: f64 = 0.035;
 /// Set-points that moved less ask for nothing that frozen readings would miss, rad.
 const ASKED_RAD: f64 = 0.02;
+/// Of the time for which readings may repeat themselves, so much must have passed since more was asked: an arm whose
+/// sensors have no noise repeats itself at rest, and follows late.
+const ASKED_SHARE: f64 = 0.5;
 /// A clock that runs so many times as fast as ours is a simulator's; faster, and it has leapt.
 const MAX_PACE: f64 = 100.0;
 /// One that went less than this times as fast while the arm was heard out is a real arm's, and never goes so fast.
@@ -30,6 +34,11 @@ pub enum StopReason {
          (guard.tracking_deg = {limit_deg}): it does not follow, or something is in its way"
     )]
     Tracking { joint: String, off_deg: f64, for_s: f64, limit_deg: f64 },
+    #[error(
+        "{joint} has read {off_deg:.1} deg from where it was for {for_s:.1} s, and no joint goes there from one reading \
+         to the next (guard.tracking_deg = {limit_deg}): its sensor, plug or driver is at fault"
+    )]
+    Leapt { joint: String, off_deg: f64, for_s: f64, limit_deg: f64 },
     #[error("all joint readings have stayed the same to the count for {for_s:.1} s while set-points moved")]
     Frozen { for_s: f64 },
     #[error("the stamps of the joint readings leapt by {step_s:.3} s (guard.clock_step_s = {limit_s})")]
@@ -38,6 +47,12 @@ pub enum StopReason {
     Range { joint: String, angle_deg: f64 },
     #[error("{0}")]
     Asked(String),
+}
+
+/// The short way round.
+fn way_rad(wrap_counts: f64, counts_per_rad: f64, from: f64, to: f64) -> f64 {
+    let way = (to - from + wrap_counts / 2.0).rem_euclid(wrap_counts) - wrap_counts / 2.0;
+    way / counts_per_rad
 }
 
 /// Watches one arm.
@@ -60,8 +75,24 @@ pub(crate) struct Guard {
     held_at: Option<Duration>,
     /// Since when each joint is too far from its set-point.
     astray_since: Vec<Option<Stamp>>,
-    /// The readings that have not changed since, and the set-point then.
-    unchanged: Option<(JointCounts, Stamp, JointCounts)>,
+    leaps: Leaps,
+    unchanged: Option<Unchanged>,
+}
+
+/// Readings that repeat themselves to the count.
+struct Unchanged {
+    counts: JointCounts,
+    since: Stamp,
+    /// The set-point then.
+    sent: JointCounts,
+    /// When a set-point first asked for more than they show.
+    asked_since: Option<Stamp>,
+}
+
+impl Unchanged {
+    fn new(sample: &JointSensorSample, sent: &JointCounts) -> Self {
+        Self { counts: sample.counts, since: sample.stamp, sent: *sent, asked_since: None }
+    }
 }
 
 impl Guard {
@@ -85,6 +116,7 @@ impl Guard {
             listening_since: Duration::ZERO,
             held_at: None,
             astray_since: vec![None; robot.sensors.len()],
+            leaps: Leaps::new(robot, limits.tracking_deg.to_radians()),
             unchanged: None,
         }
     }
@@ -96,9 +128,7 @@ impl Guard {
 
     /// Way from one reading of a joint to another, rad; the short way round.
     pub fn way_rad(&self, joint: usize, from: f64, to: f64) -> f64 {
-        let wrap = self.wrap_counts[joint];
-        let way = (to - from + wrap / 2.0).rem_euclid(wrap) - wrap / 2.0;
-        way / self.counts_per_rad[joint]
+        way_rad(self.wrap_counts[joint], self.counts_per_rad[joint], from, to)
     }
 
     /// Reading of a joint, so far from another one.
@@ -151,7 +181,8 @@ impl Guard {
                 return Ok(false);
             }
         }
-        self.last = Some((sample.clone(), at));
+        let last = self.last.replace((sample.clone(), at));
+        self.check_leaps(last.as_ref().map(|(last, _)| last), sample)?;
         self.check_following(sample, sent)?;
         self.check_frozen(sample, sent)?;
         Ok(true)
@@ -174,16 +205,38 @@ impl Guard {
         Ok(())
     }
 
+    fn check_leaps(&mut self, last: Option<&JointSensorSample>, sample: &JointSensorSample) -> Result<(), StopReason> {
+        let Some(last) = last else { return Ok(()) };
+        let Self { leaps, wrap_counts, counts_per_rad, .. } = self;
+        let way = |joint: usize, from, to| way_rad(wrap_counts[joint], counts_per_rad[joint], from, to);
+        let Some(Leapt { joint, off_rad, for_s }) = leaps.hear(last, sample, way) else { return Ok(()) };
+        if for_s <= self.limits.tracking_s {
+            return Ok(());
+        }
+        let (joint, limit_deg) = (self.joints[joint].clone(), self.limits.tracking_deg);
+        Err(StopReason::Leapt { joint, off_deg: off_rad.to_degrees(), for_s, limit_deg })
+    }
+
+    /// Whether the reading of a joint is in doubt: it leapt, and has not come back.
+    pub fn has_leapt(&self, joint: usize) -> bool {
+        self.leaps.has_leapt(joint)
+    }
+
+    /// What was asked counts even where it was taken back: a session that sees no joint move may hold it.
     fn check_frozen(&mut self, sample: &JointSensorSample, sent: &JointCounts) -> Result<(), StopReason> {
-        match &self.unchanged {
-            Some((counts, since, sent_then)) if *counts == sample.counts => {
-                let for_s = sample.stamp.since_s(*since);
-                let asked = (0..sent.len()).map(|j| self.way_rad(j, sent_then[j], sent[j]).abs()).fold(0.0, f64::max);
-                if for_s > self.limits.frozen_s && asked > ASKED_RAD {
+        let asks = |u: &Unchanged| (0..sent.len()).any(|j| self.way_rad(j, u.sent[j], sent[j]).abs() > ASKED_RAD);
+        let is_asked = self.unchanged.as_ref().is_some_and(asks);
+        match &mut self.unchanged {
+            Some(unchanged) if unchanged.counts == sample.counts => {
+                let asked_at = unchanged.asked_since.or_else(|| is_asked.then_some(sample.stamp));
+                let (for_s, frozen_s) = (sample.stamp.since_s(unchanged.since), self.limits.frozen_s);
+                unchanged.asked_since = asked_at;
+                let is_late = asked_at.is_some_and(|at| sample.stamp.since_s(at) > ASKED_SHARE * frozen_s);
+                if for_s > frozen_s && is_late {
                     return Err(StopReason::Frozen { for_s });
                 }
             }
-            _ => self.unchanged = Some((sample.counts, sample.stamp, *sent)),
+            _ => self.unchanged = Some(Unchanged::new(sample, sent)),
         }
         Ok(())
     }

@@ -14,6 +14,7 @@ mod discover;
 mod error;
 mod guard;
 mod image_search;
+mod leaps;
 mod live_arm;
 mod nudge;
 mod ros2;

@@ -168,8 +168,12 @@ impl<W: Wire> LiveArm<W> {
     fn halt(&mut self, reason: StopReason) -> ArmError {
         if self.stopped.is_none() {
             if let Some(latest) = self.guard.latest() {
+                // Where a reading is in doubt, the joint stays where it was sent last.
+                let stay = JointCounts::from_fn(self.sent.len(), |joint| {
+                    if self.guard.has_leapt(joint) { self.sent[joint] } else { latest.counts[joint] }
+                });
                 // Both are tried, whatever becomes of the other.
-                let _ = self.wire.send(&latest.counts, self.period_s);
+                let _ = self.wire.send(&stay, self.period_s);
             }
             if let Err(error) = self.wire.stop() {
                 tracing::error!("the stop could not be sent: {error}");
@@ -239,6 +243,9 @@ impl<W: Wire> LiveArm<W> {
         let elapsed_s = self.now.since_s(self.sent_at).clamp(0.0, self.period_s);
         let Some(latest) = self.guard.latest() else { return Ok(()) };
         let next = JointCounts::from_fn(self.goal.len(), |joint| {
+            if self.guard.has_leapt(joint) {
+                return self.sent[joint];
+            }
             let (goal, read) = (self.goal[joint], latest.counts[joint]);
             let (way, most) =
                 (self.guard.way_rad(joint, self.sent[joint], goal), self.max_rate_rad_s[joint] * elapsed_s);

@@ -1,6 +1,7 @@
 //! The guard against an arm in memory, with a clock that the test turns: each fault with the time it takes to stop.
 
 mod discover;
+mod guard;
 mod nudge;
 mod search;
 mod tag_check;
@@ -29,11 +30,23 @@ const REACTION_S: f64 = PERIOD_S + 0.005;
 enum Fault {
     None,
     Killed,
-    Lost { share: f64 },
-    Delayed { by_s: f64 },
-    ClockLeaps { by_s: f64 },
+    Lost {
+        share: f64,
+    },
+    Delayed {
+        by_s: f64,
+    },
+    ClockLeaps {
+        by_s: f64,
+    },
     Frozen,
-    Spike { counts: f64 },
+    Spike {
+        counts: f64,
+    },
+    /// Of the first joint, for good.
+    Jump {
+        counts: f64,
+    },
     Disobeys,
     LetGo,
     NotHeld,
@@ -94,6 +107,7 @@ impl FakeWire {
             Fault::ClockLeaps { by_s } if is_faulty => stamp = stamp.plus_s(by_s),
             Fault::Frozen if is_faulty => counts = JointCounts::from_fn(counts.len(), |j| self.set_point_then(j)),
             Fault::Spike { counts: by } if is_faulty && at_s < self.fault_s + 1.5 * PERIOD_S => counts[0] += by,
+            Fault::Jump { counts: by } if is_faulty => counts[0] += by,
             _ => {}
         }
         self.under_way.push_back((at_s + delay_s, Heard::Joints(JointSensorSample { stamp, counts })));
@@ -193,8 +207,12 @@ fn play(fault: Fault, goal_step_rad: f64) -> Played {
     let mut result = Ok(());
     for k in 0..500 {
         let swing = goal_step_rad * (f64::from(k) * PERIOD_S * 0.8).sin();
-        let goal = JointCounts::from_fn(counts.len(), |j| {
-            counts[j] + if j == 1 { swing * robot.sensors[j].counts_per_rad } else { 0.0 }
+        // As a session that holds a joint where it reads to be.
+        let held = arm.reading().filter(|_| matches!(fault, Fault::Jump { .. })).map_or(counts[0], |read| read[0]);
+        let goal = JointCounts::from_fn(counts.len(), |j| match j {
+            0 => held,
+            1 => counts[j] + swing * robot.sensors[j].counts_per_rad,
+            _ => counts[j],
         });
         let (left_at, n) = (arm.now(), kept.0.len());
         result = arm.command(&goal).and_then(|()| arm.step(&mut kept));
@@ -222,8 +240,8 @@ impl Played {
     fn assert_safe(&self, fault: Fault) {
         let log = self.log.borrow();
         let rates = log.set_points.windows(2).map(|pair| {
-            let way = (pair[1].1[1] - pair[0].1[1]).abs() / self.counts_per_rad[1];
-            way / (pair[1].0 - pair[0].0).max(PERIOD_S)
+            let way = |joint: usize| (pair[1].1[joint] - pair[0].1[joint]).abs() / self.counts_per_rad[joint];
+            way(0).max(way(1)) / (pair[1].0 - pair[0].0).max(PERIOD_S)
         });
         // The last set-point of a stopped arm is where it read to be: it lags.
         let n = rates.len() - usize::from(!log.stops_s.is_empty());
@@ -266,6 +284,7 @@ fn each_fault_stops_the_arm_within_its_time() {
         (Fault::ClockLeaps { by_s: 0.6 }, 0.0, "leapt by 0.6"),
         (Fault::ClockLeaps { by_s: -60.0 }, 0.0, "leapt by -59.98"),
         (Fault::Frozen, default.frozen_s + PERIOD_S, "stayed the same"),
+        (Fault::Jump { counts: 4000.0 }, default.tracking_s + PERIOD_S, "from where it was"),
         (Fault::Disobeys, 3.0, "does not follow"),
     ] {
         // Far enough that an arm which stays behind is 20 deg off.
