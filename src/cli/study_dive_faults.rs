@@ -50,7 +50,7 @@ pub(super) fn dive_faults(args: &DiveFaultsArgs) -> Result<Exit> {
         DiveFaultKind::ALL.into_iter().filter(|kind| kind.name().contains(&args.kind)).collect();
     if kinds.is_empty() {
         let names = DiveFaultKind::ALL.map(DiveFaultKind::name).join(", ");
-        return Err(UsageError(format!("--only {}: no kind has this in its name; there are {names}", args.kind)).into());
+        return Err(UsageError(format!("--kind {}: no kind has this in its name; there are {names}", args.kind)).into());
     }
     let all: Vec<(DiveFaultKind, u64)> =
         kinds.into_iter().flat_map(|kind| seeds.clone().map(move |seed| (kind, seed))).collect();
