@@ -53,7 +53,7 @@ impl Scratch {
 }
 
 /// A reader: whether it takes these bytes.
-type Read = fn(&Scratch, &[u8]) -> bool;
+pub type Read = fn(&Scratch, &[u8]) -> bool;
 
 /// By the names of the targets and of the folders of their corpora.
 pub const READERS: [(&str, Read); 25] = [

@@ -1,7 +1,7 @@
 //! The questions that planning asks of the proof: which pair of some arm within the bounds comes too near.
 
 use crate::plan::bounds::JointErrorBounds;
-use crate::plan::certify::sweep::Sweep;
+use crate::plan::certify::sweep::{Certificate, Sweep};
 use crate::plan::clearance::{ClearanceModel, ClosestPair};
 use crate::plan::motion::TrackingErrorBound;
 use crate::plan::motion::edge::Edge;
@@ -42,8 +42,14 @@ impl ClearanceModel<'_> {
         bounds: &JointErrorBounds,
         margin_m: f64,
     ) -> Option<ClosestPair> {
+        let (pair, distance_m) = self.certify_arriving(at, bounds, margin_m).violation?;
+        Some(self.named(pair, distance_m))
+    }
+
+    /// The same, with what it took.
+    pub(crate) fn certify_arriving(&self, at: &JointAngles, bounds: &JointErrorBounds, margin_m: f64) -> Certificate {
         let tracking_error = TrackingErrorBound::arriving(self.robot);
-        Sweep { model: self, from: *at, to: *at, bounds: Some(bounds), tracking_error, margin_m }.first_too_near()
+        Sweep { model: self, from: *at, to: *at, bounds: Some(bounds), tracking_error, margin_m }.verdict()
     }
 
     /// The same for every arm along an edge, driven as `Timing` has it: with what the joints stray on the way.

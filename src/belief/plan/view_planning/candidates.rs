@@ -53,6 +53,8 @@ const MOST_TAGS: usize = 31;
 const MAX_DRAWS: usize = 200_000;
 /// Poses that see enough and are not clear; then it is not for want of tags.
 const MAX_BLOCKED: usize = 20_000;
+/// Regions that all certificates may look at: under a belief that is wide, one pose may take thousands.
+const MAX_REGIONS: usize = 20_000_000;
 /// Capture poses keep their tool this far from every target, m.
 const TARGET_DISTANCE_M: f64 = 0.15;
 /// Nothing this near (largest joint difference) to a pose that failed is tried again, rad.
@@ -92,6 +94,8 @@ pub(crate) struct Search<'a> {
     errors: [[f64; MAX_JOINTS]; N_ARMS],
     /// Of the draw at hand.
     arms: Vec<DrawnArm>,
+    /// Regions that certificates have looked at.
+    n_regions: usize,
     pub refused: InfeasibleCounts,
 }
 
@@ -121,6 +125,7 @@ impl<'a> Search<'a> {
             limits,
             errors: errors(),
             arms: Vec::with_capacity(N_ARMS),
+            n_regions: 0,
             refused: InfeasibleCounts::default(),
         }
     }
@@ -129,7 +134,7 @@ impl<'a> Search<'a> {
     pub(crate) fn gather(&mut self, enough: usize, rng: &mut ChaCha8Rng) -> Vec<Candidate> {
         let mut found: Vec<Candidate> = Vec::with_capacity(enough);
         let mut spent = [0.0_f64; Source::ALL.len()];
-        while found.len() < enough && self.refused.tried < MAX_DRAWS && self.refused.blocked < MAX_BLOCKED {
+        while found.len() < enough && self.may_go_on() {
             let source = Source::ALL.into_iter().min_by(|a, b| spent[*a as usize].total_cmp(&spent[*b as usize]));
             let source = source.unwrap_or(Source::Uniform);
             let angles = self.draw(source, &found, rng);
@@ -140,7 +145,18 @@ impl<'a> Search<'a> {
                 found.push(Candidate { is_even: source == Source::Uniform, ..candidate });
             }
         }
+        tracing::debug!(
+            "{} poses that may be taken, of {} drawn; {} regions were certified",
+            found.len(),
+            self.refused.tried,
+            self.n_regions
+        );
         found
+    }
+
+    fn may_go_on(&self) -> bool {
+        let InfeasibleCounts { tried, blocked, .. } = self.refused;
+        tried < MAX_DRAWS && blocked < MAX_BLOCKED && self.n_regions < MAX_REGIONS
     }
 
     fn draw(&self, source: Source, found: &[Candidate], rng: &mut ChaCha8Rng) -> JointAngles {
@@ -222,7 +238,10 @@ impl<'a> Search<'a> {
             self.refused.unsure += 1;
             return None;
         }
-        if let Some(nearest) = request.clearance.find_violation_arriving(&angles, request.bounds, margin_m) {
+        let certificate = request.clearance.certify_arriving(&angles, request.bounds, margin_m);
+        self.n_regions += certificate.n_regions;
+        if let Some((pair, distance_m)) = certificate.violation {
+            let nearest = request.clearance.named(pair, distance_m);
             self.refused.blocked += 1;
             let tag = request.visibility.in_view(robot, &poses).next().map(|idx| robot.tags[idx].id);
             let best = |(_, most): &(u32, ClosestPair)| nearest.distance_m > most.distance_m;
