@@ -176,6 +176,9 @@ fn another_ones_recording_is_mapped_in_the_frame_of_its_own_file() {
         let out = hall.file(name);
         let said = hall.map(&["--out", out.to_str().expect("text")]);
         said.expect(name, 0, &["frame of `hall`", "2 (held)", "/cam/tags of camera cam0", "rejected     none"]);
+        let is_of_table = |line: &&str| line.starts_with(['│', '┌', '╞', '└']);
+        let widths: Vec<usize> = said.stdout.lines().filter(is_of_table).map(|line| line.chars().count()).collect();
+        assert!(widths.len() > 8 && widths.iter().all(|width| *width <= 80), "{}", said.stdout);
         let map = read_tags(&out).expect("what was written reads");
         assert_eq!((map.frame.as_str(), map.tags.len()), ("hall", 6));
         for tag in &map.tags {
