@@ -86,9 +86,9 @@ impl<'a> TargetMarkers<'a> {
         let labels = self.latest.iter().enumerate().map(|(n, latest)| match latest.filter(|_| last == Some(n)) {
             None => n.to_string(),
             Some(arrival) => match self.missed_before_m(&arrival) {
-                None => format!("{}: {:.0} mm", n, 1000.0 * arrival.miss_m),
+                None => format!("{}: {:.1} mm", n, 1000.0 * arrival.miss_m),
                 Some(before_m) => {
-                    format!("{}: {:.0} \u{2192} {:.0} mm", n, 1000.0 * before_m, 1000.0 * arrival.miss_m)
+                    format!("{}: {:.1} \u{2192} {:.1} mm", n, 1000.0 * before_m, 1000.0 * arrival.miss_m)
                 }
             },
         });
