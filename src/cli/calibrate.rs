@@ -49,8 +49,8 @@ pub(super) struct CalibrateArgs {
     /// Where to write calibration.toml, summary.json and report.html
     #[arg(long, value_name = "DIR", default_value = ".")]
     out: PathBuf,
-    /// Follow the recording view by view, as if the arm were at work, and write the belief over time (belief.jsonl); with
-    /// --json its lines are printed, too
+    /// Follow the recording view by view, as if the arm were at work, and write the belief over time (belief.jsonl);
+    /// with --json its lines are printed, too
     #[arg(long, conflicts_with_all = ["compact", "prior", "method", "details"])]
     online: bool,
     /// With --online: nothing drifts, and model and scales are those of the batch of all views; says how far the last

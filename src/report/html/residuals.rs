@@ -107,7 +107,8 @@ fn by_joint(views: &[ViewResidual], names: &[String]) -> Markup {
             tr { th { "joint" } th { "off its calibrated sensor, deg rms" } th { "worst, deg" } }
             @for (joint, name) in names.iter().enumerate() {
                 // What no view shows is never off.
-                @let shown = |rad: f64| if worst(joint) > 0.0 { format!("{:.3}", rad.to_degrees()) } else { "-".to_owned() };
+                @let is_off = worst(joint) > 0.0;
+                @let shown = |rad: f64| if is_off { format!("{:.3}", rad.to_degrees()) } else { "-".to_owned() };
                 tr { td { (name) } td { (shown(rms(joint))) } td { (shown(worst(joint))) } }
             }
         }
