@@ -151,7 +151,8 @@ fn any_recording(scratch: &Scratch, path: &Path) -> bool {
     if let Some(map) = proposed.ok().and_then(|text| armcal::input::parse_input_map(path, &text).ok()) {
         let _ = armcal::input::read_external(path, &map, &scratch.robot);
     }
-    let _ = armcal::report::inspection::inspect(path, None).map(|found| armcal::report::inspection::to_text(&found));
+    let _ = armcal::report::inspection::inspect(path, None)
+        .map(|found| armcal::report::inspection::to_text(&found, Some(80)));
     read_recording(path).is_ok_and(|recording| !recording.messages.is_empty())
 }
 

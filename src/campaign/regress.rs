@@ -274,8 +274,8 @@ mod tests {
         let base = table([0.004, 0.005, 0.006]);
         let comparison = compare(&base, &base, &RegressSettings::default());
         assert!(comparison.identical && comparison.verdict == Verdict::NotWorse && comparison.pairs == 3);
-        assert!(regress_table(&comparison).contains("x 1.000"));
-        assert!(regress_table(&comparison).contains("is the same"));
+        assert!(regress_table(&comparison, None).contains("x 1.000"));
+        assert!(regress_table(&comparison, None).contains("is the same"));
     }
 
     #[test]
@@ -324,7 +324,7 @@ mod tests {
         let comparison = compare(&base, &failed, &RegressSettings::default());
         assert_eq!(comparison.verdict, Verdict::Worse);
         assert_eq!(comparison.worst[0].seed, 2);
-        assert!(regress_table(&comparison).contains("--seed 2"), "{comparison:?}");
+        assert!(regress_table(&comparison, None).contains("--seed 2"), "{comparison:?}");
         assert!(!is_worse(&failed, &failed) && !is_worse(&failed, &base));
         let mut touched = base.clone();
         touched.rows[0].figures[1] = Some(2.0);

@@ -5,6 +5,7 @@ use comfy_table::presets::{ASCII_MARKDOWN, UTF8_FULL_CONDENSED};
 use quick_junit::{NonSuccessKind, Report, TestCase, TestCaseStatus, TestSuite};
 
 use crate::campaign::regress::{Check, Comparison, Verdict, WorstPair};
+use crate::campaign::tables::fit;
 
 impl Verdict {
     fn word(self) -> &'static str {
@@ -86,10 +87,12 @@ pub(super) fn conclusion(comparison: &Comparison) -> &'static str {
 
 const SAME: &str = "every figure of every run is the same as in the baseline";
 
-/// Lays a comparison out for a terminal.
+/// Lays a comparison out for a terminal of so many columns, or for anything of any width.
 #[must_use]
-pub fn regress_table(comparison: &Comparison) -> String {
-    let mut text = grid(comparison, UTF8_FULL_CONDENSED).to_string();
+pub fn regress_table(comparison: &Comparison, width: Option<usize>) -> String {
+    let mut grid = grid(comparison, UTF8_FULL_CONDENSED);
+    fit(&mut grid, width);
+    let mut text = grid.to_string();
     if comparison.identical && comparison.pairs > 0 {
         text.push_str(&format!("\n{SAME}"));
     }

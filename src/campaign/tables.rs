@@ -1,7 +1,7 @@
 //! A campaign's summary for people: millimetres, seconds, seeds.
 
 use comfy_table::presets::UTF8_FULL_CONDENSED;
-use comfy_table::{CellAlignment, Table as Grid};
+use comfy_table::{CellAlignment, ContentArrangement, Table as Grid};
 
 use crate::campaign::{CampaignSummary, FigureStatistics, Metric, SettingStatistics};
 
@@ -52,9 +52,16 @@ pub(super) fn title(setting: &SettingStatistics) -> String {
     )
 }
 
-/// Lays a summary out for a terminal.
+/// A grid that a terminal of so many columns takes: words go to a further line.
+pub(super) fn fit(grid: &mut Grid, width: Option<usize>) {
+    if let Some(width) = width.and_then(|width| u16::try_from(width).ok()) {
+        grid.set_content_arrangement(ContentArrangement::Dynamic).set_width(width);
+    }
+}
+
+/// Lays a summary out for a terminal of so many columns, or for anything of any width.
 #[must_use]
-pub fn table(summary: &CampaignSummary) -> String {
+pub fn table(summary: &CampaignSummary, width: Option<usize>) -> String {
     let mut text = String::new();
     for setting in &summary.settings {
         text.push_str(&title(setting));
@@ -73,6 +80,7 @@ pub fn table(summary: &CampaignSummary) -> String {
             }
         }
         if !rows.is_empty() {
+            fit(&mut grid, width);
             text.push_str(&format!("\n{grid}"));
         }
         for failure in &setting.failures {

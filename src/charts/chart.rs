@@ -217,7 +217,8 @@ fn number(value: f64) -> String {
     if size > 1e-12 && !(1e-3..1e5).contains(&size) {
         format!("{value:.0e}")
     } else {
-        format!("{}", (value * 1e6).round() / 1e6)
+        // Not -0.
+        format!("{}", (value * 1e6).round() / 1e6 + 0.0)
     }
 }
 

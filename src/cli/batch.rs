@@ -5,13 +5,14 @@ use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use anyhow::Result;
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::ProgressBar;
 
 use crate::campaign::{
     Answer, CampaignError, CampaignSummary, Engine, Job, Prepared, Row, RunStatus, SingleRun, Table, run_job, run_jobs,
 };
 use crate::cli::exit::{Exit, UsageError, of_cause, of_summary};
 use crate::cli::stdout::{is_quiet, note};
+use crate::cli::waiting::bar_style;
 use crate::output;
 use crate::report::RunSummary;
 use crate::run::Keep;
@@ -115,7 +116,7 @@ impl CampaignBar {
     /// `before`: rows that are there already.
     pub fn new(prepared: &Prepared, before: &Table, n_jobs: usize) -> Self {
         let bar = if is_quiet() { ProgressBar::hidden() } else { ProgressBar::new(n_jobs as u64) };
-        if let Ok(style) = ProgressStyle::with_template("{elapsed_precise} {msg} {wide_bar} {pos}/{len}, {eta} left") {
+        if let Some(style) = bar_style("{elapsed_precise} {msg} {wide_bar} {pos}/{len}{left}") {
             bar.set_style(style);
         }
         let tool_error = prepared.columns.names().iter().position(|name| name == "tool_error_after_median_m");

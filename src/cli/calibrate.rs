@@ -49,8 +49,9 @@ pub(super) struct CalibrateArgs {
     /// Where to write calibration.toml, summary.json and report.html
     #[arg(long, value_name = "DIR", default_value = ".")]
     out: PathBuf,
-    /// Follow the recording view by view, as if the arm were at work, and write the belief over time (belief.jsonl)
-    #[arg(long, conflicts_with_all = ["compact", "prior", "method", "json"])]
+    /// Follow the recording view by view, as if the arm were at work, and write the belief over time (belief.jsonl);
+    /// with --json its lines are printed, too
+    #[arg(long, conflicts_with_all = ["compact", "prior", "method", "details"])]
     online: bool,
     /// With --online: nothing drifts, and model and scales are those of the batch of all views; says how far the last
     /// belief is from that batch
@@ -78,7 +79,8 @@ pub(super) fn calibrate(args: &CalibrateArgs) -> Result<Exit> {
     };
     given.check_kinds()?;
     if args.online {
-        return if args.stationary { stationary(&given, &args.out) } else { calibrate_online(&given, &args.out) };
+        let follow = if args.stationary { stationary } else { calibrate_online };
+        return follow(&given, &args.out, args.closing.json);
     }
     let started = Instant::now();
     let Calibrated { calibration, lost, external } = given.calibrate()?;
@@ -115,7 +117,13 @@ pub(super) fn calibrate(args: &CalibrateArgs) -> Result<Exit> {
         Some(line) => say(line)?,
         None => {
             let out = args.out.display();
-            args.closing.say(&summary, &format!("written      {out}\nnext         {out}/report.html"))?;
+            let replay = args.out.join("replay.rrd");
+            let replay = if external.is_some() && replay.is_file() {
+                format!("; {} to look at", replay.display())
+            } else {
+                String::new()
+            };
+            args.closing.say(&summary, &format!("written      {out}\nnext         {out}/report.html{replay}"))?;
         }
     }
     Ok(match (calibration.status, lost) {

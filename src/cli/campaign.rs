@@ -13,6 +13,7 @@ use crate::campaign::{
     table, write_results,
 };
 use crate::cli::batch::{BatchRun, CampaignBar, check_name, exit_of, range_of, run_many};
+use crate::cli::closing::{say_wrapped, terminal_width};
 use crate::cli::exit::{Exit, UsageError};
 use crate::cli::file_kind::expect_routine;
 use crate::cli::interrupt::Interrupt;
@@ -134,7 +135,7 @@ fn show(args: &CampaignArgs, summary: &CampaignSummary, out: &Path) -> Result<Ex
     if args.json {
         say(&serde_json::to_string_pretty(summary).context("the summary has no JSON form")?)?;
     } else {
-        say(&format!("{}written      {}", table(summary), out.display()))?;
+        say_wrapped(&format!("{}written      {}", table(summary, terminal_width()), out.display()))?;
     }
     Ok(exit_of(summary))
 }

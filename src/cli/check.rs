@@ -8,6 +8,7 @@ use serde::Serialize;
 
 #[cfg(feature = "sim")]
 use crate::campaign::Request;
+use crate::cli::closing::say_wrapped;
 use crate::cli::exit::{Exit, UsageError, explain};
 use crate::cli::file_kind::FileKind;
 use crate::cli::overrides::OverrideArgs;
@@ -42,7 +43,7 @@ pub(super) fn check(args: &CheckArgs) -> Result<Exit> {
         say(&serde_json::to_string_pretty(&checked).context("the answer has no JSON form")?)?;
         checked
     } else {
-        checked.map(|checked| say(&checked.lines()).map(|()| checked)).collect::<Result<_>>()?
+        checked.map(|checked| say_wrapped(&checked.lines()).map(|()| checked)).collect::<Result<_>>()?
     };
     Ok(if checked.iter().all(|checked| checked.ok) { Exit::Ok } else { Exit::InvalidInput })
 }

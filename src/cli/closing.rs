@@ -71,6 +71,16 @@ impl ClosingArgs {
     }
 }
 
+/// Columns of the terminal that stdout is.
+pub(super) fn terminal_width() -> Option<usize> {
+    Look::of_stdout().width
+}
+
+/// Writes lines to stdout, wrapped where a terminal is narrower.
+pub(super) fn say_wrapped(text: &str) -> Result<()> {
+    say_as_it_is(&laid_out(&printable(text), Look { colors: false, ..Look::of_stdout() }))
+}
+
 /// Writes the closing lines to stdout.
 pub(super) fn say_closing(text: &str) -> Result<()> {
     say_as_it_is(&laid_out(&printable(text), Look::of_stdout()))

@@ -6,6 +6,7 @@ use anyhow::{Context, Result};
 use clap::Args;
 
 use crate::cli::calibration_inputs::load_robot;
+use crate::cli::closing::{say_wrapped, terminal_width};
 use crate::cli::exit::{Exit, UsageError};
 use crate::cli::file_kind::expect_recording;
 use crate::cli::stdout::{note, say};
@@ -44,7 +45,7 @@ pub(super) fn inspect(args: &InspectArgs) -> Result<Exit> {
     if args.json {
         say(&serde_json::to_string_pretty(&inspection).context("the inspection has no JSON form")?)?;
     } else {
-        say(&to_text(&inspection))?;
+        say_wrapped(&to_text(&inspection, terminal_width()))?;
     }
     if let Some(file) = &args.write_input {
         let text = propose_input_map(&args.recording, robot.as_ref())?;

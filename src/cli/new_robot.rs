@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result};
 use clap::Args;
 
+use crate::cli::closing::say_wrapped;
 use crate::cli::exit::{Exit, UsageError};
 use crate::cli::file_kind::{FileKind, expect_kind};
-use crate::cli::stdout::say;
 use crate::output;
 use armcal_belief::plan::{always_near, clear_angles};
 use armcal_core::robot::{self, DraftedMeshes, NewFile, NewRobot, Robot, RobotError, draft_robot};
@@ -58,7 +58,7 @@ pub(super) fn new_robot(args: &NewRobotArgs) -> Result<Exit> {
         }
     };
     write(&files, &args.out)?;
-    say(&described(&files, &robot, &args.out))?;
+    say_wrapped(&described(&files, &robot, &args.out))?;
     Ok(Exit::Ok)
 }
 

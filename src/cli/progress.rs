@@ -2,10 +2,11 @@
 
 use std::time::Instant;
 
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::ProgressBar;
 
 use crate::cli::interrupt::Interrupt;
 use crate::cli::stdout::{complain, is_quiet};
+use crate::cli::waiting::bar_style;
 use armcal_belief::session::Progress;
 use armcal_core::streams::Phase;
 
@@ -22,8 +23,7 @@ impl Bar {
     /// `started`: when the command began. Stops the run when `interrupt` says so.
     pub fn new(started: Instant, interrupt: Interrupt) -> Self {
         let bar = if is_quiet() { ProgressBar::hidden() } else { ProgressBar::new(1) };
-        let template = "{elapsed_precise} {msg:<44} {wide_bar} {pos}/{len}, {eta} left";
-        if let Ok(style) = ProgressStyle::with_template(template) {
+        if let Some(style) = bar_style("{elapsed_precise} {msg:<46} {wide_bar} {pos}/{len}{left}") {
             bar.set_style(style);
         }
         Self { bar, started, interrupt, phase: "" }

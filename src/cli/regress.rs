@@ -11,6 +11,7 @@ use crate::campaign::{
     read_baseline, regress_junit, regress_markdown, regress_page, regress_table, statistics, table, table_text,
 };
 use crate::cli::batch::{BatchRun, CampaignBar, check_name, range_of, run_many};
+use crate::cli::closing::{say_wrapped, terminal_width};
 use crate::cli::exit::{Exit, UsageError};
 use crate::cli::file_kind::expect_routine;
 use crate::cli::interrupt::Interrupt;
@@ -91,7 +92,7 @@ pub(super) fn regress(args: &RegressArgs) -> Result<Exit> {
 fn written(out: &Path, prepared: &Prepared, now: &Table) -> Result<Exit> {
     output::write_whole(out, baseline_text(prepared, now)?.as_bytes())?;
     let summary = statistics(now, &prepared.routine.name, &prepared.fingerprint);
-    say(&format!("{}written      {}", table(&summary), out.display()))?;
+    say_wrapped(&format!("{}written      {}", table(&summary, terminal_width()), out.display()))?;
     Ok(crate::cli::batch::exit_of(&summary))
 }
 
@@ -113,7 +114,11 @@ fn compared(args: &RegressArgs, prepared: &Prepared, baseline: &Table, now: &Tab
         let xml = regress_junit(&comparison, name, undecided).context("the comparison has no XML form")?;
         output::write_whole(path, xml.as_bytes())?;
     }
-    say(&if args.json { json(&comparison, args)? } else { regress_table(&comparison) })?;
+    if args.json {
+        say(&json(&comparison, args)?)?;
+    } else {
+        say_wrapped(&regress_table(&comparison, terminal_width()))?;
+    }
     Ok(match comparison.verdict {
         Verdict::Worse => Exit::Refused,
         Verdict::Inconclusive if !args.allow_inconclusive => Exit::Refused,

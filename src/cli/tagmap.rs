@@ -9,6 +9,7 @@ use comfy_table::{CellAlignment, Table};
 use serde_json::{Value, json};
 
 use crate::cli::calibration_inputs::load_robot;
+use crate::cli::closing::say_wrapped;
 use crate::cli::exit::Exit;
 use crate::cli::file_kind::{FileKind, expect_option, expect_recording};
 use crate::cli::stdout::{note, say};
@@ -111,7 +112,11 @@ pub(super) fn tagmap(args: &TagmapArgs) -> Result<Exit> {
         let page = TagMapPage { map: &map, file: &file.to_string(), sources: &sources, warnings: &warnings, is_sound };
         output::write_together(&[(out, tag_map_html(&page).as_bytes())])?;
     }
-    say(&if args.json { to_json(&map)? } else { describe(&map, &sources) })?;
+    if args.json {
+        say(&to_json(&map)?)?;
+    } else {
+        say_wrapped(&describe(&map, &sources))?;
+    }
     warnings.iter().for_each(|warning| note(format_args!("warning: {warning}")));
     Ok(if is_sound { Exit::Ok } else { Exit::DataLost })
 }
@@ -172,12 +177,14 @@ fn describe(map: &TagMap, sources: &[String]) -> String {
     for (idx, group) in map.groups.iter().enumerate() {
         out.push_str(&format!("{}\n", group_title(group)));
         let mut table = Table::new();
-        table.load_preset(UTF8_FULL_CONDENSED).set_header(TAG_COLUMNS);
+        table.load_preset(UTF8_FULL_CONDENSED).set_header(TAG_COLUMNS.map(|name| name.replace(' ', "\n")));
         for row in tag_rows(map, idx) {
             table.add_row(row);
         }
-        for column in 1..TAG_COLUMNS.len() {
-            if let Some(column) = table.column_mut(column) {
+        // Eleven columns within 80: names over three lines, no space around figures.
+        for (n, column) in table.column_iter_mut().enumerate() {
+            column.set_padding((0, 0));
+            if n > 0 {
                 column.set_cell_alignment(CellAlignment::Right);
             }
         }

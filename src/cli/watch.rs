@@ -8,6 +8,7 @@ use clap::Args;
 
 use crate::cli::belief_text::{belief, exit_of, line, summary};
 use crate::cli::calibration_inputs::{CalibrationInputs, load_robot};
+use crate::cli::closing::say_wrapped;
 use crate::cli::exit::{Exit, UsageError};
 use crate::cli::file_kind::expect_recording;
 use crate::cli::interrupt::Interrupt;
@@ -248,6 +249,6 @@ impl Told {
             ending += &format!("\nwritten      {}", file.display());
         }
         self.printed?;
-        if self.form == Form::Text { say(&ending) } else { Ok(()) }
+        if self.form == Form::Text { say_wrapped(&ending) } else { Ok(()) }
     }
 }

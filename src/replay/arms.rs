@@ -60,6 +60,12 @@ impl ReplayScene<'_> {
 
 /// Draws the arms and what belongs to them.
 pub(super) fn draw(run: &ReplayScene, stream: &mut EntityLog) {
+    draw_at_rest(run, stream);
+    draw_trail(run, stream);
+}
+
+/// The same without the tool's path: of views alone nobody knows it.
+pub(super) fn draw_at_rest(run: &ReplayScene, stream: &mut EntityLog) {
     let mut shown = Arm::new(run, stream, "arm", Look::Drawn);
     log_camera(run, stream, &shown);
     for time_s in run.tracks.frames() {
@@ -75,7 +81,6 @@ pub(super) fn draw(run: &ReplayScene, stream: &mut EntityLog) {
             }
         }
     }
-    draw_trail(run, stream);
     draw_captures(run, stream);
 }
 

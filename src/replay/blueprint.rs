@@ -3,14 +3,14 @@
 
 use rerun::AsComponents;
 use rerun::external::re_sdk_types::blueprint::archetypes::{
-    Background, ContainerBlueprint, EyeControls3D, LineGrid3D, PanelBlueprint, PlotLegend, TextLogColumns, TimeAxis,
-    TimePanelBlueprint, ViewBlueprint, ViewContents, ViewportBlueprint, VisualBounds2D,
+    Background, ContainerBlueprint, EyeControls3D, LineGrid3D, PanelBlueprint, PlotLegend, ScalarAxis, TextLogColumns,
+    TimeAxis, TimePanelBlueprint, ViewBlueprint, ViewContents, ViewportBlueprint, VisualBounds2D,
 };
 use rerun::external::re_sdk_types::blueprint::components::{
     BackgroundKind, ContainerKind, Corner2D, PanelState, PlayState, RootContainer,
 };
 use rerun::external::re_sdk_types::blueprint::datatypes::{TextLogColumn, TextLogColumnKind};
-use rerun::external::re_sdk_types::datatypes::{Range2D, TimeInt, TimeRange, TimeRangeBoundary};
+use rerun::external::re_sdk_types::datatypes::{Range1D, Range2D, TimeInt, TimeRange, TimeRangeBoundary};
 use rerun::external::uuid::Uuid;
 
 use crate::colors;
@@ -30,6 +30,10 @@ pub(super) struct Entry {
 
 /// Longer recordings play faster, to be over in about this time, s.
 const WATCHED_S: f64 = 120.0;
+/// Beside the plots of all errors are plots of small ones: of joints up to this, deg, and of the tool up to this share
+/// of the task's tolerance.
+const CLOSE_DEG: f64 = 0.3;
+const CLOSE_SHARE: f64 = 0.25;
 /// Plots of a run that goes on show so much of it, s.
 const LATEST_S: f64 = 60.0;
 
@@ -56,8 +60,9 @@ pub(super) fn build(run: &ReplayScene) -> Vec<Entry> {
         main
     } else {
         let phases = b.view("StateTimeline", "What the arm does", STATE);
-        // One lane more.
-        let share = if run.online.is_some() { 1.3 } else { 1.0 };
+        // Each of these has one lane more.
+        let has_faults = run.truth.as_ref().is_some_and(|truth| !truth.faults.is_empty());
+        let share = 1.0 + 0.3 * f32::from(u8::from(run.online.is_some()) + u8::from(has_faults));
         b.container(ContainerKind::Vertical, &[(main, 4.3), (phases, share)])
     };
     b.finish(&root, run)
@@ -67,7 +72,7 @@ pub(super) fn build(run: &ReplayScene) -> Vec<Entry> {
 pub(super) fn build_plan(run: &ReplayScene) -> Vec<Entry> {
     let mut b = Builder::default();
     let scene = titled_scene(&mut b, run, "Plan: solid = believed arm, amber = arms that the errors allow");
-    let camera = titled_camera(&mut b, run, "Wrist camera: tags where the believed arm expects them");
+    let camera = titled_camera(&mut b, run, "Wrist camera: tags as expected");
     let summary = b.view("TextDocument", "Plan", SUMMARY);
     let log = b.view("TextLog", "Poses", LOG);
     let columns = [TextLogColumn { kind: TextLogColumnKind::Body, visible: true.into() }];
@@ -144,7 +149,10 @@ fn titled_camera(b: &mut Builder, run: &ReplayScene, title: &str) -> Part {
 fn right_column(b: &mut Builder, run: &ReplayScene) -> Part {
     let mut rows = Vec::new();
     if run.has_true_joints() {
-        rows.push((b.plot("Joint error: believed - true [deg]", JOINT_ERROR, legend(Corner2D::RightTop), run), 3.0));
+        let all = b.plot("Joint error: believed - true [deg]", JOINT_ERROR, legend(Corner2D::RightTop), run);
+        let range = [-CLOSE_DEG, CLOSE_DEG];
+        let close = b.plot_within(&format!("within {CLOSE_DEG} deg"), JOINT_ERROR, range, run);
+        rows.push((b.tabs(&[all, close]), 3.0));
     }
     let title = if run.has_true_joints() {
         "Joint angles [deg]: bright believed, dark true"
@@ -155,7 +163,12 @@ fn right_column(b: &mut Builder, run: &ReplayScene) -> Part {
     let colors_here = legend(Corner2D::RightTop).with_visible(!run.has_true_joints());
     rows.push((b.plot(title, JOINT_ANGLE, colors_here, run), 2.2));
     if run.has_true_tool() {
-        rows.push((b.plot("Tool error [mm]", TOOL_ERROR, legend(Corner2D::RightTop), run), 2.4));
+        let mut shown = vec![b.plot("Tool error [mm]", TOOL_ERROR, legend(Corner2D::RightTop), run)];
+        if let Some((_, task)) = run.tracks.task {
+            let top_mm = (1e3 * CLOSE_SHARE * task.tolerance_m).max(1.0).round();
+            shown.push(b.plot_within(&format!("up to {top_mm} mm"), TOOL_ERROR, [0.0, top_mm], run));
+        }
+        rows.push((b.tabs(&shown), 2.4));
     }
     if run.online.is_some() {
         let title = "Offsets since the first belief [deg]: bright believed, dark one sigma";
@@ -211,6 +224,13 @@ impl Builder {
             RunState::GoesOn => [-LATEST_S, 0.0].map(|time_s| TimeRangeBoundary::CursorRelative(at(time_s))),
         };
         self.property(&view, "TimeAxis", TimeAxis::new().with_view_range(TimeRange { start, end }));
+        view
+    }
+
+    /// The same between two values: what is small beside the errors before calibration.
+    fn plot_within(&mut self, title: &str, origin: &str, range: [f64; 2], run: &ReplayScene) -> Part {
+        let view = self.plot(title, origin, legend(Corner2D::RightTop), run);
+        self.property(&view, "ScalarAxis", ScalarAxis::new().with_range(Range1D(range)));
         view
     }
 

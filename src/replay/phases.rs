@@ -1,6 +1,6 @@
-//! Phases, views and reaches as lanes of states, and the log.
+//! Phases, views, reaches and faults as lanes of states, and the log.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use rerun::{StateChange, StateConfiguration, TextLog, TextLogLevel};
 
@@ -12,11 +12,15 @@ use crate::shapes::path_part;
 use crate::tracks::Span;
 use armcal_core::streams::{CaptureSet, LogLevel, MarkKind, Phase, ReachAttempt};
 
+/// A lane.
+const LATEST_FAULT: &str = "latest_fault";
+
 /// Draws the lanes and the log.
 pub(super) fn draw(run: &ReplayScene, stream: &mut EntityLog) {
     draw_phases(run, stream);
     draw_lane(run, stream, "views", view_state);
     draw_lane(run, stream, "reach", reach_state);
+    draw_faults(run, stream);
     draw_log(run, stream);
 }
 
@@ -80,9 +84,20 @@ fn reach_state(run: &ReplayScene, mark: &Span) -> Option<State> {
         Some(arrival) if arrival.hit => ("hit", colors::HIT),
         Some(_) => ("missed", colors::MISS),
     };
-    let n = u64::from(target_idx) + 1;
-    let name = format!("target {n} {verdict}, {when} calibration");
-    Some(State { name, label: n.to_string(), color: colors::dimmed(color) })
+    let name = format!("target {target_idx} {verdict}, {when} calibration");
+    Some(State { name, label: target_idx.to_string(), color: colors::dimmed(color) })
+}
+
+/// The truth's latest fault, from when it happened: by itself a lane does not say how long a fault lasts.
+fn draw_faults(run: &ReplayScene, stream: &mut EntityLog) {
+    let Some(truth) = run.truth.as_ref().filter(|truth| !truth.faults.is_empty()) else { return };
+    let entity = format!("{STATE}/{LATEST_FAULT}");
+    let names: BTreeSet<&str> = truth.faults.iter().map(|(_, fault)| fault.as_str()).collect();
+    let look = StateConfiguration::new().with_values(names.iter().copied());
+    stream.log_static(&entity, &look.with_colors(names.iter().map(|_| colors::dimmed(colors::MISS))));
+    for (time_s, fault) in &truth.faults {
+        stream.draw(&entity, *time_s, &StateChange::single(fault.as_str()));
+    }
 }
 
 /// A lane with a state for each mark that `state` knows, and gaps between them.

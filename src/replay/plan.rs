@@ -175,9 +175,9 @@ impl PlanMessages<'_> {
 fn pose_text(pose: &PoseTable) -> String {
     let tags: Vec<String> =
         pose.tags.iter().map(|tag| format!("{} ({:.0} %)", tag.id, 100.0 * tag.probability)).collect();
-    let error = pose.predicted_tool_error_m.map_or_else(String::new, |m| format!(", {:.2} mm predicted", 1e3 * m));
+    let error = pose.predicted_tool_error_m.map_or_else(String::new, |m| format!(", predicted {:.2} mm", 1e3 * m));
     format!(
-        "pose {}: {:.0} mm clear for every arm, {:.0} for the believed one{error}; tags {}",
+        "pose {}: {:.0} mm clear{error}; {:.0} mm as believed; tags {}",
         pose.number,
         1e3 * pose.proven_clearance_m,
         1e3 * pose.clearance_m,

@@ -7,6 +7,7 @@ use crate::colors::{self, Rgba};
 use crate::entities::{COUNTS, JOINT_ANGLE, JOINT_ERROR, TEMPERATURE, TOOL_ERROR};
 use crate::entity_log::EntityLog;
 use crate::scene::ReplayScene;
+use crate::tracks::{GAP_S, HOLD_S};
 use armcal_core::streams::{JointAngles, ReachAttempt};
 
 /// Samples of what moves, and of what does not, a second.
@@ -42,6 +43,25 @@ fn interrupt(run: &ReplayScene, stream: &mut EntityLog, entity: &str) {
     }
 }
 
+/// Believed angles at the moments that are drawn, s; none where lines end, because for long nothing was believed: what
+/// happens in a wait is no ramp.
+pub(super) fn believed<'a>(run: &'a ReplayScene<'_>) -> Vec<(f64, Option<&'a JointAngles>)> {
+    let step_s = 0.9 / run.tracks.affordable_hz(FAST_HZ);
+    let (mut next_s, mut last_s) = (0.0, f64::INFINITY);
+    let mut drawn = Vec::new();
+    for (time_s, angles) in run.tracks.believed.iter() {
+        if time_s - last_s > GAP_S {
+            drawn.push((last_s + HOLD_S, None));
+        }
+        last_s = *time_s;
+        if *time_s >= next_s {
+            next_s = time_s + step_s;
+            drawn.push((*time_s, Some(angles)));
+        }
+    }
+    drawn
+}
+
 /// What is believed as bright lines, what is true as dark ones of the same colours.
 fn draw_angles(run: &ReplayScene, stream: &mut EntityLog) {
     let names = run.robot.joint_names();
@@ -71,17 +91,15 @@ fn degrees(angles: &JointAngles) -> Scalars {
 fn draw_joint_error(run: &ReplayScene, stream: &mut EntityLog) {
     let Some(truth) = run.truth.as_ref().filter(|_| run.has_true_joints()) else { return };
     style(stream, JOINT_ERROR, &run.robot.joint_names(), &colors::JOINTS, 1.5);
-    interrupt(run, stream, JOINT_ERROR);
-    let mut next_s = 0.0;
-    for (time_s, believed) in run.tracks.believed.iter() {
-        if *time_s < next_s {
+    for (time_s, believed) in believed(run) {
+        let Some(believed) = believed else {
+            stream.draw(JOINT_ERROR, time_s, &Scalars::new([] as [f64; 0]));
             continue;
-        }
-        next_s = time_s + 0.9 / run.tracks.affordable_hz(FAST_HZ);
-        if let Some(angles) = truth.angles(*time_s) {
+        };
+        if let Some(angles) = truth.angles(time_s) {
             let difference = |j: usize| (believed[j] - angles[j]).to_degrees();
             let errors = (0..believed.len()).map(|j| (difference(j) + 180.0).rem_euclid(360.0) - 180.0);
-            stream.draw(JOINT_ERROR, *time_s, &Scalars::new(errors));
+            stream.draw(JOINT_ERROR, time_s, &Scalars::new(errors));
         }
     }
 }
@@ -92,19 +110,17 @@ fn draw_tool_error(run: &ReplayScene, stream: &mut EntityLog) {
         return;
     }
     let name = "believed tool to true tool".to_owned();
-    let believed = format!("{TOOL_ERROR}/believed");
-    style(stream, &believed, &[name], &[colors::BELIEVED], 1.5);
-    interrupt(run, stream, &believed);
-    let mut next_s = 0.0;
-    for (time_s, angles) in run.tracks.believed.iter() {
-        if *time_s < next_s {
+    let entity = format!("{TOOL_ERROR}/believed");
+    style(stream, &entity, &[name], &[colors::BELIEVED], 1.5);
+    for (time_s, angles) in believed(run) {
+        let Some(angles) = angles else {
+            stream.draw(&entity, time_s, &Scalars::new([] as [f64; 0]));
             continue;
-        }
-        next_s = time_s + 0.9 / run.tracks.affordable_hz(FAST_HZ);
-        let Some(truth) = run.truth.as_ref().and_then(|truth| truth.base_from_tool(*time_s)) else { continue };
-        let tool = run.believed_poses(*time_s, angles).frame(&run.robot.tool.mount);
+        };
+        let Some(truth) = run.truth.as_ref().and_then(|truth| truth.base_from_tool(time_s)) else { continue };
+        let tool = run.believed_poses(time_s, angles).frame(&run.robot.tool.mount);
         let error_m = (tool.translation.vector - truth.origin().vector()).norm();
-        stream.draw(&believed, *time_s, &Scalars::single(1000.0 * error_m));
+        stream.draw(&entity, time_s, &Scalars::single(1000.0 * error_m));
     }
     let Some((since_s, task)) = run.tracks.task else { return };
     let tolerance = format!("{TOOL_ERROR}/tolerance");

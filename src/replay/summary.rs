@@ -54,7 +54,7 @@ fn legend(run: &ReplayScene) -> String {
     };
     let rests = if run.has_true_tool() {
         "; a line leads to where the tool truly came to rest (red missed, green hit, grey: before calibration), \
-         labels say by how much"
+         the latest says by how much"
     } else {
         ""
     };

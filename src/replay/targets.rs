@@ -81,12 +81,14 @@ impl<'a> TargetMarkers<'a> {
     fn draw_targets(&self, stream: &mut EntityLog, time_s: f64) {
         let positions = self.task.targets_m.iter().map(|target| target.map(|v| v as f32));
         let shades = self.latest.iter().map(|latest| latest.map_or(colors::TARGET, verdict_color));
-        let labels = self.latest.iter().enumerate().map(|(n, latest)| match latest {
+        // All figures at once would hide one another and the tags: those of earlier arrivals are in the log.
+        let last = self.all.last().map(|arrival| arrival.target_idx);
+        let labels = self.latest.iter().enumerate().map(|(n, latest)| match latest.filter(|_| last == Some(n)) {
             None => n.to_string(),
-            Some(arrival) => match self.missed_before_m(arrival) {
-                None => format!("{}: {:.0} mm", n, 1000.0 * arrival.miss_m),
+            Some(arrival) => match self.missed_before_m(&arrival) {
+                None => format!("{}: {:.1} mm", n, 1000.0 * arrival.miss_m),
                 Some(before_m) => {
-                    format!("{}: {:.0} \u{2192} {:.0} mm", n, 1000.0 * before_m, 1000.0 * arrival.miss_m)
+                    format!("{}: {:.1} \u{2192} {:.1} mm", n, 1000.0 * before_m, 1000.0 * arrival.miss_m)
                 }
             },
         });

@@ -414,6 +414,7 @@ fn what_broke_stands_in_the_log() {
     let out = dir.path().join("run.rrd");
     write_rrd(&ReplayInput { truth: Some(&truth), ..input(&recording, &robot) }, &out).unwrap();
     assert_eq!(entities(&out).get("/log/truth"), Some(&1));
+    assert!(entities(&out).contains_key("/state/latest_fault"), "a lane");
 }
 
 /// A recorder's clock that is set a day ahead costs no frames, and the lines end before it.
@@ -442,6 +443,30 @@ fn a_jump_of_log_time_is_a_gap() {
     let run = crate::recording::scene(&input(&recording, &robot)).unwrap();
     assert_eq!(run.tracks.gaps().count(), 1);
     assert!(run.tracks.frames().is_sorted());
+}
+
+/// Nothing is believed for a minute: a sensor that slipped meanwhile is drawn as no drift.
+#[test]
+fn a_wait_without_a_belief_ends_the_lines() {
+    let (_dir, mut recording, _, robot) = small();
+    let half = recording.messages.len() / 2;
+    let mut before_s = f64::NAN;
+    let start = recording.messages[0].0;
+    for (n, (log_time, message)) in recording.messages.iter_mut().enumerate() {
+        let Message::JointStates(states) = message else { continue };
+        if n < half {
+            before_s = states.stamp.since_s(start);
+        } else {
+            states.stamp = states.stamp.plus_s(60.0);
+            *log_time = states.stamp;
+        }
+    }
+    recording.messages.sort_by_key(|(log_time, _)| *log_time);
+    let run = crate::recording::scene(&input(&recording, &robot)).unwrap();
+    let drawn = crate::plots::believed(&run);
+    let ends: Vec<f64> = drawn.iter().filter(|(_, angles)| angles.is_none()).map(|(time_s, _)| *time_s).collect();
+    assert!(matches!(ends[..], [end_s] if (end_s - before_s - 2.0).abs() < 0.1), "{ends:?} after {before_s}");
+    assert!(drawn.is_sorted_by(|a, b| a.0 < b.0) && drawn.len() > 10);
 }
 
 /// Longer recordings are drawn at lower rates.

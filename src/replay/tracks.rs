@@ -31,9 +31,9 @@ const LONGEST_S: f64 = 7.0 * 24.0 * 3600.0;
 /// Steps of everything that moves.
 const FRAME_HZ: f64 = 25.0;
 /// Without any message for longer than this nothing is drawn, s: a clock that was set, or a recorder that was off.
-const GAP_S: f64 = 30.0;
+pub(super) const GAP_S: f64 = 30.0;
 /// What was last shown is drawn this far into a gap, s.
-const HOLD_S: f64 = 2.0;
+pub(super) const HOLD_S: f64 = 2.0;
 /// Moments at which one thing is drawn, at most; longer recordings are drawn at lower rates. One hour of frames.
 const MAX_TICKS: f64 = 90_000.0;
 

@@ -52,7 +52,7 @@ pub fn write_views_rrd(input: &ViewsInput<'_>, out: &Path) -> Result<(), ReplayE
     let run = scene(&shown)?;
     let mut stream = EntityLog::of_recording();
     scenery::draw(&run, &mut stream);
-    arms::draw(&run, &mut stream);
+    arms::draw_at_rest(&run, &mut stream);
     plots::draw(&run, &mut stream);
     stream.log_static(
         SUMMARY,

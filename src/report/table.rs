@@ -192,7 +192,7 @@ fn accuracy_lines(summary: &RunSummary) -> Vec<String> {
     }];
     let held_out = &summary.held_out;
     lines.push(format!(
-        "held out     {} views, {}: tag position error {} rms (datasheet sensors: {}{}), reprojection error {}",
+        "held out     {} views, {}: tag position error {} rms (datasheet sensors: {}{}){}",
         held_out.views,
         if held_out.cross_validated { "5-fold cross-validation" } else { "not fitted" },
         Unit::Metres.shown_if(held_out.rms_m, 1),
@@ -201,7 +201,7 @@ fn accuracy_lines(summary: &RunSummary) -> Vec<String> {
             ", and mount and map fitted: {}",
             Unit::Metres.shown(baseline.rms_m, 1)
         )),
-        Unit::Pixels.shown_if(held_out.rms_px, 1),
+        held_out.rms_px.map_or_else(String::new, |px| format!(", reprojection error {}", Unit::Pixels.shown(px, 1))),
     ));
     lines.extend(summary.calibration.predicted_tool_error_m.map(|predicted| {
         format!(

@@ -47,6 +47,22 @@ fn json_is_summary_json_alone_and_quiet_says_the_verdict_alone() {
     answer(program().args(["check", "--quiet", "-v", "x.toml"])).expect("both", 2, &["cannot be used with"]);
 }
 
+/// The lines of belief.jsonl alone; of a stationary belief a last line of the batch.
+#[test]
+fn a_belief_that_is_followed_has_a_json_form() {
+    let folder = temp();
+    let file = folder.path().join("belief.jsonl");
+    let told = calibrated(&["--online", "--json"], folder.path());
+    assert!(told.stdout.lines().count() > 1 && told.stdout == crate::support::read(&file), "{told:#?}");
+    let told = calibrated(&["--online", "--stationary", "--json"], folder.path());
+    let last = told.stdout.strip_prefix(&crate::support::read(&file)).expect("the file's lines come first");
+    let last: serde_json::Value = serde_json::from_str(last).expect("one line of JSON");
+    assert_eq!((last["batch"]["status"].as_str(), last["batch"]["refusal"].is_null()), (Some("accepted"), true));
+    assert!(last["batch"]["largest_difference_sigmas"].as_f64().is_some_and(|sigmas| sigmas < 0.1), "{last}");
+    let words = ["calibrate", "x.mcap", "--robot", "x", "--online", "--details"];
+    answer(program().args(words)).expect("tables of a belief", 2, &["cannot be used with"]);
+}
+
 #[test]
 fn checks_maps_and_plans_have_a_json_form() {
     let folder = temp();

@@ -80,6 +80,7 @@ fn target_chart<'a>(targets: &BTreeMap<usize, Target<'a>>) -> Markup {
     let points = |of: fn(Target<'a>) -> Option<f64>| -> Vec<[f64; 2]> {
         targets.iter().filter_map(|(at, target)| Some([*at as f64, 1e3 * of(*target)?])).collect()
     };
+    let has_truth = targets.values().any(|target| target.truth.is_some());
     let series = vec![
         series("before, true", Color::Red, Style::Crosses, points(Target::before_m)),
         series("after, true", Color::Green, Style::Dots, points(Target::after_m)),
@@ -91,7 +92,8 @@ fn target_chart<'a>(targets: &BTreeMap<usize, Target<'a>>) -> Markup {
         y: ("tool error, mm".to_owned(), Axis::Log),
         ..panel("Tool error at each target", "number of the target", "", shown)
     };
-    figure(&chart, "Predicted: one sigma in space. True errors are the simulator's.")
+    let of_truth = if has_truth { " True errors are the simulator's." } else { "" };
+    figure(&chart, &format!("Predicted: one sigma in space.{of_truth}"))
 }
 
 fn target_table(targets: &BTreeMap<usize, Target<'_>>) -> Markup {

@@ -19,7 +19,9 @@ pub(super) fn section(report: &Report<'_>) -> Markup {
         (table(calibration))
         @if let Some(curves) = Curves::of(report) {
             div.figures {
-                @for joint in 0..calibration.joint.len() { (curves.figure(joint)) }
+                @for (joint, result) in calibration.joint.iter().enumerate() {
+                    @if is_estimated(result) { (curves.figure(joint)) }
+                }
             }
             p { small {
                 "Line: calibrated less datasheet angle, over the joint's range. Band: two sigma. "
@@ -29,8 +31,11 @@ pub(super) fn section(report: &Report<'_>) -> Markup {
     }
 }
 
+fn is_estimated(joint: &JointResult) -> bool {
+    joint.gain_estimated || joint.offset_estimated
+}
+
 fn table(calibration: &Calibration) -> Markup {
-    let is_estimated = |joint: &JointResult| joint.gain_estimated || joint.offset_estimated;
     markup! {
         div.wide {
             table {

@@ -8,6 +8,7 @@ use maud::{Markup, html as markup};
 use super::Report;
 use super::figure::{figure, panel, series};
 use armcal_belief::calib::{CornerResidual, ObservedTag, ViewResidual};
+use armcal_belief::tagmap::files::FIRST_NAMED_ID;
 
 /// A residual in the picture of the image is this many times as long as it is.
 const MAGNIFIED: f64 = 40.0;
@@ -75,7 +76,7 @@ fn by_tag(views: &[ViewResidual]) -> Markup {
                 }
                 @for (id, sum) in &sums {
                     tr.out[sum.rejected > sum.views] {
-                        td { (id) } td { (sum.views) } td { (sum.rejected) }
+                        td { (tag_name(*id)) } td { (sum.views) } td { (sum.rejected) }
                         td { (format!("{:.1}", 1e3 * rms(sum.squares_m2, sum.views))) }
                         @if has_corners {
                             td { (format!("{:.2}", rms(sum.squares_px2, sum.corners))) }
@@ -86,6 +87,11 @@ fn by_tag(views: &[ViewResidual]) -> Markup {
             }
         }
     }
+}
+
+/// Landmarks without a number are counted.
+fn tag_name(id: u32) -> String {
+    id.checked_sub(FIRST_NAMED_ID).map_or_else(|| id.to_string(), |n| format!("landmark {n}"))
 }
 
 fn by_joint(views: &[ViewResidual], names: &[String]) -> Markup {
@@ -100,10 +106,10 @@ fn by_joint(views: &[ViewResidual], names: &[String]) -> Markup {
         table {
             tr { th { "joint" } th { "off its calibrated sensor, deg rms" } th { "worst, deg" } }
             @for (joint, name) in names.iter().enumerate() {
-                tr {
-                    td { (name) } td { (format!("{:.3}", rms(joint).to_degrees())) }
-                    td { (format!("{:.3}", worst(joint).to_degrees())) }
-                }
+                // What no view shows is never off.
+                @let is_off = worst(joint) > 0.0;
+                @let shown = |rad: f64| if is_off { format!("{:.3}", rad.to_degrees()) } else { "-".to_owned() };
+                tr { td { (name) } td { (shown(rms(joint))) } td { (shown(worst(joint))) } }
             }
         }
     }

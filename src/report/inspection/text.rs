@@ -11,13 +11,13 @@ use armcal_core::time::utc;
 const PA_PER_M: f64 = 10_055.0;
 const SURFACE_PA: f64 = 101_325.0;
 
-/// Lays an inspection out for a terminal.
+/// Lays an inspection out for a terminal of so many columns, or for anything of any width.
 #[must_use]
-pub fn to_text(inspection: &Inspection) -> String {
+pub fn to_text(inspection: &Inspection, width: Option<usize>) -> String {
     let mut lines = head(inspection);
     if !inspection.topics.is_empty() {
         lines.push(String::new());
-        lines.push(topic_table(inspection));
+        lines.extend(topic_lines(inspection, width.unwrap_or(usize::MAX)));
     }
     lines.push(String::new());
     lines.extend(arm_lines(inspection));
@@ -95,15 +95,29 @@ fn head(inspection: &Inspection) -> Vec<String> {
     lines
 }
 
-fn topic_table(inspection: &Inspection) -> String {
+/// The topics; where they do not fit, their types are left out.
+fn topic_lines(inspection: &Inspection, width: usize) -> Vec<String> {
+    let fits = |lines: &[String]| lines.iter().all(|line| line.chars().count() <= width);
+    let whole = topic_table(inspection, &[0, 1, 2, 3, 4, 5, 6, 7]);
+    if fits(&whole) {
+        return whole;
+    }
+    let mut narrow = topic_table(inspection, &[0, 3, 4, 7]);
+    narrow.push("note         types and times of the topics: with --json, or in a wider terminal".to_owned());
+    narrow
+}
+
+/// The columns with these numbers.
+fn topic_table(inspection: &Inspection, columns: &[usize]) -> Vec<String> {
+    const NAMES: [&str; 8] = ["topic", "type", "encoding", "messages", "Hz", "first s", "last s", "what"];
     let mut table = Table::new();
     table.load_preset(NOTHING);
-    table.set_header(["topic", "type", "encoding", "messages", "Hz", "first s", "last s", "what"]);
+    table.set_header(columns.iter().map(|&n| NAMES[n]));
     let start = inspection.time_nanos.map_or(0, |[first, _]| first);
     let seconds = |nanos: u64| format!("{:.2}", (nanos - start) as f64 * 1e-9);
     for t in &inspection.topics {
         let what = t.known_as.or(t.may_be.as_ref().map(|_| "see below")).unwrap_or_default();
-        table.add_row([
+        let cells = [
             t.topic.clone(),
             t.schema.clone(),
             t.encoding.clone(),
@@ -112,15 +126,16 @@ fn topic_table(inspection: &Inspection) -> String {
             seconds(t.time_nanos[0]),
             seconds(t.time_nanos[1]),
             what.to_owned(),
-        ]);
+        ];
+        table.add_row(columns.iter().map(|&n| &cells[n]));
     }
-    for column in 3..7 {
-        if let Some(column) = table.column_mut(column) {
+    for (column, n) in table.column_iter_mut().zip(columns) {
+        if (3..7).contains(n) {
             column.set_cell_alignment(CellAlignment::Right);
         }
     }
     // The last column is padded.
-    table.to_string().lines().map(str::trim_end).collect::<Vec<_>>().join("\n")
+    table.to_string().lines().map(|line| line.trim_end().to_owned()).collect()
 }
 
 fn arm_lines(inspection: &Inspection) -> Vec<String> {
