@@ -15,12 +15,14 @@ mod error;
 mod guard;
 mod image_search;
 mod live_arm;
+mod messages;
 mod nudge;
 mod ros2;
 mod server;
 mod tag_check;
 #[cfg(test)]
 mod tests;
+mod topics;
 mod wire;
 
 pub use connection::{CommandType, Commands, Connection, Deadman, GuardLimits, ServiceMapping, StopWays};
