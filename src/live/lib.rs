@@ -18,6 +18,7 @@ mod live_arm;
 mod messages;
 mod nudge;
 mod ros2;
+mod rosbridge;
 mod server;
 mod tag_check;
 #[cfg(test)]
@@ -25,7 +26,7 @@ mod tests;
 mod topics;
 mod wire;
 
-pub use connection::{CommandType, Commands, Connection, Deadman, GuardLimits, ServiceMapping, StopWays};
+pub use connection::{CommandType, Commands, Connection, Deadman, GuardLimits, Rosbridge, ServiceMapping, StopWays};
 pub use discover::{Domain, ProposedConnection, Seen, SeenService, SeenTopic, propose_connection};
 pub use error::LiveError;
 pub use guard::StopReason;
@@ -33,6 +34,7 @@ pub use image_search::{ImageSearch, TagFinder};
 pub use live_arm::{LiveArm, Survey};
 pub use nudge::{Nudge, NudgeProblem};
 pub use ros2::{Ros2Wire, look_around};
+pub use rosbridge::RosbridgeWire;
 pub use server::{Pace, Served, serve};
 pub use tag_check::TagCheck;
 pub use wire::{Heard, Wire};

@@ -93,12 +93,9 @@ impl Command {
             CommandType::Float64MultiArray => {
                 CommandMessage::Array(Float64MultiArray { layout: MultiArrayLayout::default(), data: positions })
             }
-            CommandType::JointState => CommandMessage::State(JointState {
-                header,
-                name: names,
-                position: positions,
-                ..JointState::default()
-            }),
+            CommandType::JointState => {
+                CommandMessage::State(JointState { header, name: names, position: positions, ..JointState::default() })
+            }
         })
     }
 

@@ -2,6 +2,7 @@
 
 mod discover;
 mod nudge;
+mod rosbridge;
 mod search;
 mod tag_check;
 
