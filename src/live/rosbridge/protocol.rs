@@ -16,6 +16,8 @@ const MAX_VALUES: usize = 4 << 20;
 /// Of what the other side says, so many characters are repeated.
 const MAX_SHOWN: usize = 200;
 
+/// Messages of a topic that the bridge keeps for us where the line is slow; older ones are dropped.
+const QUEUE_LENGTH: usize = 10;
 /// Marks our own call among the answers.
 const STOP_ID: &str = "armcal_stop";
 
@@ -142,7 +144,7 @@ pub(super) fn shown(text: &str) -> String {
 pub(super) fn greeting(connection: &Connection, bridge: &Rosbridge) -> Vec<String> {
     let subscribe = |(content, topic): (Content, &str)| {
         let type_name = bridge.type_name(content.ros_type());
-        json!({ "op": "subscribe", "topic": topic, "type": type_name }).to_string()
+        json!({ "op": "subscribe", "topic": topic, "type": type_name, "queue_length": QUEUE_LENGTH }).to_string()
     };
     let advertise = |topic: &str, ros_type: &str| {
         json!({ "op": "advertise", "topic": topic, "type": bridge.type_name(ros_type) }).to_string()
