@@ -19,8 +19,8 @@ use armcal_core::robot::Robot;
 
 #[derive(Debug, Args)]
 pub(super) struct LiveArgs {
-    /// A real arm in place of the simulated one, by its connection map: ros2:ARM.toml over DDS, rosbridge:ARM.toml over a
-    /// rosbridge of ROS 1 or 2. It asks before each motion
+    /// A real arm in place of the simulated one, by its connection map: ros2:ARM.toml over DDS, rosbridge:ARM.toml over
+    /// a rosbridge of ROS 1 or 2. It asks before each motion
     #[arg(long, value_name = "ros2:ARM.toml")]
     arm: Option<String>,
     /// Do not ask before each motion of a real arm

@@ -1,9 +1,9 @@
 //! Arms that speak ROS, without an installation of it: ROS 2 over DDS, and ROS 1 or 2 behind a rosbridge.
 //!
 //! `connection` reads arm.toml: which topics carry what, and the limits of the guard. `wire` is what a connection
-//! carries, `ros2` that over DDS, `rosbridge` over WebSocket; `topics` and `messages` serve both. [`LiveArm`] is an `Arm` on any wire: it paces a session by the arm's own readings and
-//! stops when `guard` says so; `nudge` has its first set-points, and `tag_check`
-//! compares the tags in view with the datasheet before them. [`ImageSearch`] looks for tags in a wire's images.
+//! carries, `ros2` that over DDS, `rosbridge` over WebSocket; `topics` and `messages` serve both. [`LiveArm`] is an
+//! `Arm` on any wire: it paces a session by the arm's own readings and stops when `guard` says so; `nudge` has its
+//! first set-points, and `tag_check` compares the tags in view with the datasheet before them. [`ImageSearch`] looks for tags in a wire's images.
 //! `discover` proposes an arm.toml from what a domain has.
 //! [`serve`] puts any `Arm`, such as the simulated one, behind the topics of a connection.
 //! None of this is a safety device.
