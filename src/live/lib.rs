@@ -3,7 +3,8 @@
 //! `connection` reads arm.toml: which topics carry what, and the limits of the guard. `wire` is what a connection
 //! carries, `ros2` that over DDS, `rosbridge` over WebSocket; `topics` and `messages` serve both. [`LiveArm`] is an
 //! `Arm` on any wire: it paces a session by the arm's own readings and stops when `guard` says so; `nudge` has its
-//! first set-points, and `tag_check` compares the tags in view with the datasheet before them. [`ImageSearch`] looks for tags in a wire's images.
+//! first set-points, and `tag_check` compares the tags in view with the datasheet before them. [`ImageSearch`] looks
+//! for tags in a wire's images.
 //! `discover` proposes an arm.toml from what a domain has.
 //! [`serve`] puts any `Arm`, such as the simulated one, behind the topics of a connection.
 //! None of this is a safety device.

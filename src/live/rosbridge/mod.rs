@@ -1,8 +1,8 @@
 //! ROS 1 or 2 behind a rosbridge (protocol 2): JSON over WebSocket.
 //!
 //! `handshake` opens a WebSocket, `link` keeps it on a thread of its own, `protocol` has what is said over it, `json`
-//! the spelling of messages there, `wire` is an arm behind topics. A message becomes the bytes that DDS would have brought,
-//! and is read and checked as those are.
+//! the spelling of messages there, `wire` is an arm behind topics. A message becomes the bytes that DDS would have
+//! brought, and is read and checked as those are.
 
 mod handshake;
 mod json;
