@@ -1,7 +1,8 @@
 //! Arms behind ROS 2 topics: the program on both ends, in a network namespace of its own.
 //!
 //! `cargo test --release --features live --test main live -- --ignored`; user namespaces must be allowed, and `python3`
-//! must have cyclonedds and rerun-sdk (tests/oracle/requirements.txt) for arm, relay and viewer that are none of ours.
+//! must have cyclonedds, websockets and rerun-sdk (tests/oracle/requirements.txt) for arm, relay, rosbridge and viewer
+//! that are none of ours.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -15,6 +16,7 @@ use serde_json::Value;
 
 mod discover;
 mod faults;
+mod rosbridge;
 mod viewer;
 
 use crate::support::{Answer, ShortRoutine, answer, read, root, temp, titan, write};
@@ -31,6 +33,7 @@ fn in_namespace(out: &Path, routine: &Path, script: &str) -> Answer {
     command.env("ARMCAL", env!("CARGO_BIN_EXE_armcal")).env("OUT", out).env("ROUTINE", routine);
     command.env("CYCLONEDDS_URI", CYCLONE).env("PEER", root().join("tests/oracle/ros2_arm.py"));
     command.env("RELAY", root().join("tests/oracle/ros2_relay.py"));
+    command.env("BRIDGE_SCRIPT", root().join("tests/oracle/ros2_rosbridge.py"));
     let answer = answer(command.current_dir(out));
     assert!(!answer.stderr.contains("unshare:"), "user namespaces are needed: {}", answer.stderr);
     answer

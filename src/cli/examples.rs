@@ -11,6 +11,7 @@ const EXAMPLES: &[(&str, &[&str])] = &[
             "armcal run routines/titan4-quickstart.toml --seed 2 --out dive-2 --details",
             "armcal run routines/titan4-quickstart.toml --set capture.poses=20 --json",
             "armcal run routines/my-arm.toml --arm ros2:arm.toml --speed 0.2",
+            "armcal run routines/my-arm.toml --arm rosbridge:arm.toml --no-motion",
         ],
     ),
     ("serve", &["armcal serve routines/titan4-quickstart.toml --factor 5 --for 600"]),

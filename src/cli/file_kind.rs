@@ -116,7 +116,7 @@ impl FileKind {
             Self::TagMap => "give it as --tag-map to `armcal calibrate`, or as --tags to `armcal tagmap`",
             Self::Task => "give it as --task to `armcal calibrate` or `watch`",
             Self::Plan => "`armcal check` reads it",
-            Self::Connection => "give it as --arm: `armcal run ROUTINE --arm ros2:FILE`",
+            Self::Connection => "give it as --arm: `armcal run ROUTINE --arm ros2:FILE`, or rosbridge:FILE",
         }
     }
 }

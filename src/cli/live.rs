@@ -1,4 +1,4 @@
-//! `armcal run --arm`: a real arm in place of the simulated one; `discover` finds out how it is reached.
+//! `armcal run --arm`: a real arm in place of the simulated one; `discover` finds out how it is reached over DDS.
 
 #[cfg(feature = "live")]
 mod connected;
@@ -19,7 +19,8 @@ use armcal_core::robot::Robot;
 
 #[derive(Debug, Args)]
 pub(super) struct LiveArgs {
-    /// A real arm in place of the simulated one, by its connection map: ros2:ARM.toml. It asks before each motion
+    /// A real arm in place of the simulated one, by its connection map: ros2:ARM.toml over DDS, rosbridge:ARM.toml over
+    /// a rosbridge of ROS 1 or 2. It asks before each motion
     #[arg(long, value_name = "ros2:ARM.toml")]
     arm: Option<String>,
     /// Do not ask before each motion of a real arm
@@ -34,6 +35,13 @@ pub(super) struct LiveArgs {
     /// Drive every joint at this share of the rate that the robot's file allows, 0.01 .. 1
     #[arg(long, requires = "arm", value_name = "SHARE", default_value_t = 1.0, value_parser = share)]
     speed: f64,
+}
+
+/// The way to an arm.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Way {
+    Dds,
+    Rosbridge,
 }
 
 fn share(text: &str) -> Result<f64, String> {
@@ -55,14 +63,18 @@ impl LiveArgs {
     /// Connects to the arm, where one is named, and says what was heard of it.
     pub fn connect(&self, inputs: &mut crate::run::RunInputs) -> anyhow::Result<Option<ConnectedArm>> {
         let Some(arm) = &self.arm else { return Ok(None) };
-        let Some(file) = arm.strip_prefix("ros2:") else {
-            let problem = "it must be ros2: and a connection map, such as ros2:arm.toml";
-            return Err(UsageError(format!("--arm {arm}: {problem}")).into());
+        let (way, file) = match arm.split_once(':') {
+            Some(("ros2", file)) => (Way::Dds, file),
+            Some(("rosbridge", file)) => (Way::Rosbridge, file),
+            _ => {
+                let problem = "it must be ros2: or rosbridge: and a connection map, such as ros2:arm.toml";
+                return Err(UsageError(format!("--arm {arm}: {problem}")).into());
+            }
         };
         for sensor in &mut inputs.robot.sensors {
             sensor.max_rate_rad_s *= self.speed;
         }
-        ConnectedArm::open(file.as_ref(), inputs).map(Some)
+        ConnectedArm::open(way, file.as_ref(), inputs).map(Some)
     }
 }
 
@@ -76,7 +88,7 @@ pub(super) fn not_built(what: &str) -> anyhow::Error {
 mod unconnected {
     use std::path::Path;
 
-    use super::not_built;
+    use super::{Way, not_built};
     use crate::cli::interrupt::Interrupt;
     use crate::run::{Failure, Finished, RunInputs, RunOutput};
     use armcal_belief::session::Progress;
@@ -86,7 +98,7 @@ mod unconnected {
     pub enum ConnectedArm {}
 
     impl ConnectedArm {
-        pub fn open(_: &Path, _: &RunInputs) -> anyhow::Result<Self> {
+        pub fn open(_: Way, _: &Path, _: &RunInputs) -> anyhow::Result<Self> {
             Err(not_built("--arm"))
         }
 

@@ -1,10 +1,14 @@
 //! arm.toml: which topics carry what, and when the guard stops the arm.
 
+mod bridge;
+
 use std::collections::BTreeMap;
 use std::net::Ipv4Addr;
 use std::path::Path;
 
 use serde::Deserialize;
+
+pub use bridge::Rosbridge;
 
 use crate::LiveError;
 use armcal_core::log::topics;
@@ -21,6 +25,8 @@ pub struct Connection {
     /// Addresses of this machine's interfaces that DDS may use; all of them where none are named. The sockets stay
     /// open to every interface.
     pub networks: Vec<Ipv4Addr>,
+    /// The bridge, where there is one; needed by a connection over it, and by nothing else.
+    pub rosbridge: Option<Rosbridge>,
     /// `sensor_msgs/msg/JointState` with raw counts in `position`.
     pub joint_sensors: String,
     /// The driver's names of joints, by those of the robot's file, where they differ.
@@ -54,6 +60,7 @@ impl Default for Connection {
             version: 1,
             domain: 0,
             networks: Vec::new(),
+            rosbridge: None,
             joint_sensors: topic(topics::JOINT_SENSORS),
             names: BTreeMap::new(),
             commands: Commands::default(),
@@ -94,13 +101,13 @@ impl Default for Commands {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 pub enum CommandType {
     /// One point, to be reached one period later.
-    #[serde(rename = "trajectory_msgs/msg/JointTrajectory")]
+    #[serde(rename = "trajectory_msgs/msg/JointTrajectory", alias = "trajectory_msgs/JointTrajectory")]
     JointTrajectory,
     /// `data` alone, in the order of the robot's file.
-    #[serde(rename = "std_msgs/msg/Float64MultiArray")]
+    #[serde(rename = "std_msgs/msg/Float64MultiArray", alias = "std_msgs/Float64MultiArray")]
     Float64MultiArray,
     /// `position`, as our recordings have it.
-    #[serde(rename = "sensor_msgs/msg/JointState")]
+    #[serde(rename = "sensor_msgs/msg/JointState", alias = "sensor_msgs/JointState")]
     JointState,
 }
 
@@ -225,6 +232,10 @@ impl Connection {
         ] {
             FileIssue::check_range(file, key, value, range)?;
         }
+        if let Some(bridge) = &self.rosbridge {
+            FileIssue::check_range(file, "rosbridge.ros", f64::from(bridge.ros), 1.0..=2.0)?;
+            bridge.address().map_err(|problem| FileIssue::new(file, "rosbridge.url", problem))?;
+        }
         if let Some(deadman) = &self.deadman {
             FileIssue::check_range(file, "deadman.timeout_s", deadman.timeout_s, 0.05..=10.0)?;
         }
@@ -240,6 +251,15 @@ impl Connection {
             return Err(FileIssue::new(file, "stop", problem).into());
         }
         Ok(())
+    }
+
+    /// The bridge of a connection map that was read from `file`.
+    ///
+    /// # Errors
+    /// [`LiveError::File`] where it names none.
+    pub fn require_rosbridge(&self, file: &Path) -> Result<&Rosbridge, LiveError> {
+        let problem = "the table is missing: write [rosbridge] and url = \"ws://HOST:PORT\"";
+        self.rosbridge.as_ref().ok_or_else(|| LiveError::File(FileIssue::new(file, "rosbridge", problem).into()))
     }
 
     /// Every topic and service by its key.
@@ -306,6 +326,8 @@ mod tests {
             ("[stop]\ntopic = \"\"", "stop"),
             ("[deadman]\ntopic = \"/held\"\ntimeout_s = 0.0", "deadman.timeout_s"),
             ("domain = 300", "domain"),
+            ("[rosbridge]\nurl = \"wss://a:9090\"", "rosbridge.url"),
+            ("[rosbridge]\nros = 3", "rosbridge.ros"),
             ("joint_sensor = \"/a\"", "joint_sensor"),
         ] {
             let problem = checked(text).expect_err(text);

@@ -10,6 +10,8 @@ pub enum LiveError {
     File(#[from] RobotError),
     #[error("DDS: {what}: {problem}")]
     Dds { what: String, problem: String },
+    #[error("rosbridge at {url}: {problem}")]
+    Rosbridge { url: String, problem: String },
     #[error("the arm is not ready: {0}")]
     NotReady(String),
     #[error("a message cannot be written: {0}")]
@@ -22,5 +24,9 @@ impl LiveError {
     /// For errors of the middleware, which are of many types.
     pub(crate) fn dds<E: std::fmt::Debug>(what: &str) -> impl FnOnce(E) -> Self {
         move |error| Self::Dds { what: what.to_owned(), problem: format!("{error:?}") }
+    }
+
+    pub(crate) fn rosbridge(url: &str, problem: impl Into<String>) -> Self {
+        Self::Rosbridge { url: url.to_owned(), problem: problem.into() }
     }
 }

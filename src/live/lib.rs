@@ -1,9 +1,10 @@
-//! Arms that speak ROS 2, over DDS and without an installation of ROS.
+//! Arms that speak ROS, without an installation of it: ROS 2 over DDS, and ROS 1 or 2 behind a rosbridge.
 //!
 //! `connection` reads arm.toml: which topics carry what, and the limits of the guard. `wire` is what a connection
-//! carries, `ros2` that over DDS. [`LiveArm`] is an `Arm` on any wire: it paces a session by the arm's own readings and
-//! stops when `guard` says so; `nudge` has its first set-points, and `tag_check`
-//! compares the tags in view with the datasheet before them. [`ImageSearch`] looks for tags in a wire's images.
+//! carries, `ros2` that over DDS, `rosbridge` over WebSocket; `topics` and `messages` serve both. [`LiveArm`] is an
+//! `Arm` on any wire: it paces a session by the arm's own readings and stops when `guard` says so; `nudge` has its
+//! first set-points, and `tag_check` compares the tags in view with the datasheet before them. [`ImageSearch`] looks
+//! for tags in a wire's images.
 //! `discover` proposes an arm.toml from what a domain has.
 //! [`serve`] puts any `Arm`, such as the simulated one, behind the topics of a connection.
 //! None of this is a safety device.
@@ -16,15 +17,18 @@ mod guard;
 mod image_search;
 mod leaps;
 mod live_arm;
+mod messages;
 mod nudge;
 mod ros2;
+mod rosbridge;
 mod server;
 mod tag_check;
 #[cfg(test)]
 mod tests;
+mod topics;
 mod wire;
 
-pub use connection::{CommandType, Commands, Connection, Deadman, GuardLimits, ServiceMapping, StopWays};
+pub use connection::{CommandType, Commands, Connection, Deadman, GuardLimits, Rosbridge, ServiceMapping, StopWays};
 pub use discover::{Domain, ProposedConnection, Seen, SeenService, SeenTopic, propose_connection};
 pub use error::LiveError;
 pub use guard::StopReason;
@@ -32,6 +36,7 @@ pub use image_search::{ImageSearch, TagFinder};
 pub use live_arm::{LiveArm, Survey};
 pub use nudge::{Nudge, NudgeProblem};
 pub use ros2::{Ros2Wire, look_around};
+pub use rosbridge::RosbridgeWire;
 pub use server::{Pace, Served, serve};
 pub use tag_check::TagCheck;
 pub use wire::{Heard, Wire};

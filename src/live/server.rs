@@ -2,7 +2,9 @@
 
 use std::time::{Duration, Instant};
 
-use crate::ros2::{Bool, Command, Node, Reader, TriggerRequest, TriggerResponse, Writer, service_mapping, streams};
+use crate::messages::{BOOL, Bool, Command};
+use crate::ros2::{Node, Reader, TriggerRequest, TriggerResponse, Writer, service_mapping};
+use crate::topics::streams;
 use crate::{Connection, LiveError};
 use armcal_core::log::{RecordingHeader, Stream, decode, encode_message};
 use armcal_core::robot::Robot;
@@ -90,7 +92,7 @@ impl<'a> Server<'a> {
             .collect::<Result<_, LiveError>>()?;
         let commands = node.reader(&connection.commands.topic, connection.commands.message_type.name())?;
         let stop = &connection.stop;
-        let stop_topic = (!stop.topic.is_empty()).then(|| node.reader(&stop.topic, "std_msgs/msg/Bool")).transpose()?;
+        let stop_topic = (!stop.topic.is_empty()).then(|| node.reader(&stop.topic, BOOL)).transpose()?;
         let stop_service = (!stop.service.is_empty()).then(|| trigger(&mut node, connection)).transpose()?;
         Ok(Self {
             node,

@@ -3,6 +3,7 @@
 mod discover;
 mod guard;
 mod nudge;
+mod rosbridge;
 mod search;
 mod tag_check;
 

@@ -1,9 +1,10 @@
-//! A real arm over ROS 2.
+//! A real arm over ROS 2, or over a rosbridge.
 
 use std::path::Path;
 
 use anyhow::Result;
 
+use super::Way;
 use super::nudging::nudge_one;
 use crate::cli::interrupt::Interrupt;
 use crate::cli::stdout::note;
@@ -13,7 +14,7 @@ use armcal_belief::session::Progress;
 use armcal_core::robot::Robot;
 use armcal_core::sensor::ArmSensors;
 use armcal_core::stats::quantile;
-use armcal_live::{Connection, ImageSearch, LiveArm, Ros2Wire, Survey, TagCheck, Wire};
+use armcal_live::{Connection, ImageSearch, LiveArm, Ros2Wire, RosbridgeWire, Survey, TagCheck, Wire};
 
 /// An arm that was found ready.
 pub struct ConnectedArm(LiveArm<Box<dyn Wire>>);
@@ -47,15 +48,21 @@ fn describe(survey: &Survey, robot: &Robot) -> String {
 
 impl ConnectedArm {
     /// Waits until the arm is ready, and says what was heard of it.
-    pub fn open(file: &Path, inputs: &RunInputs) -> Result<Self> {
+    pub fn open(way: Way, file: &Path, inputs: &RunInputs) -> Result<Self> {
         let connection = Connection::load(file)?;
-        let wire = Ros2Wire::open(&connection, &inputs.robot)?;
+        let wire: Box<dyn Wire> = match way {
+            Way::Dds => Box::new(Ros2Wire::open(&connection, &inputs.robot)?),
+            Way::Rosbridge => {
+                let bridge = connection.require_rosbridge(file)?;
+                Box::new(RosbridgeWire::open(&connection, bridge, &inputs.robot)?)
+            }
+        };
         let wire: Box<dyn Wire> = if connection.searches_images() {
             inputs.robot.require_lens()?;
             let (lens, family) = (inputs.robot.camera.lens, inputs.robot.tag_family);
             Box::new(ImageSearch::new(wire, move || LiveTagFinder::new(&lens, family))?)
         } else {
-            Box::new(wire)
+            wire
         };
         let (arm, survey) = LiveArm::connect(wire, &inputs.robot, &connection)?;
         note(describe(&survey, &inputs.robot));

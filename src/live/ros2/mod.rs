@@ -1,18 +1,18 @@
 //! ROS 2 over DDS, without ROS: `node` joins a domain, `raw` carries messages as bytes, that all are decoded and
-//! checked as those of recordings are, `messages` has the types that recordings lack, `wire` is an arm behind topics,
+//! checked as those of recordings are, `trigger` is the service that stops an arm, `wire` is an arm behind topics,
 //! `graph` looks at what others have in the domain.
 
 mod graph;
-mod messages;
 mod node;
 mod raw;
+mod trigger;
 mod wire;
 
 pub use graph::look_around;
-pub(crate) use messages::{Bool, Command, TriggerRequest, TriggerResponse};
 pub(crate) use node::{Node, Reader, Writer};
+pub(crate) use trigger::{TriggerRequest, TriggerResponse};
 pub use wire::Ros2Wire;
-pub(crate) use wire::{service_mapping, streams};
+pub(crate) use wire::service_mapping;
 
 /// Messages of one topic that are taken at once; more wait for the next turn.
 const MAX_TAKEN: usize = 1000;

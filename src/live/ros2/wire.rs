@@ -4,12 +4,13 @@ use std::time::{Duration, Instant};
 
 use rustdds::mio1::{Events, Interest, Poll, Token};
 
-use super::{Bool, Command, MAX_TAKEN, Node, Reader, TriggerRequest, TriggerResponse, Writer};
+use super::{MAX_TAKEN, Node, Reader, TriggerRequest, TriggerResponse, Writer};
+use crate::messages::{BOOL, Bool, Command};
+use crate::topics::{Content, contents, newest_stamp, read};
 use crate::{Connection, Heard, LiveError, ServiceMapping, Wire};
-use armcal_core::log::ros::JointState;
-use armcal_core::log::{Stream, decode, encode};
+use armcal_core::log::encode;
 use armcal_core::robot::Robot;
-use armcal_core::streams::{JointCounts, JointSensorSample};
+use armcal_core::streams::JointCounts;
 use armcal_core::time::Stamp;
 
 /// A connection over DDS.
@@ -17,7 +18,7 @@ pub struct Ros2Wire {
     connection: Connection,
     /// The driver's names, robot's order of joints.
     names: Vec<String>,
-    readers: Vec<(What, Reader)>,
+    readers: Vec<(Content, Reader)>,
     commands: Writer,
     stop: Option<Writer>,
     stop_service: Option<ros2_client::Client<TriggerRequest, TriggerResponse>>,
@@ -27,14 +28,6 @@ pub struct Ros2Wire {
     newest: Stamp,
     /// Last: readers and writers leave the domain before it does.
     node: Node,
-}
-
-/// What a topic carries.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum What {
-    Joints,
-    Stream(Stream),
-    Deadman,
 }
 
 impl Ros2Wire {
@@ -47,15 +40,15 @@ impl Ros2Wire {
         let names = robot.joint_names().iter().map(|name| connection.driver_name(name).to_owned()).collect();
         let commands = node.writer(&connection.commands.topic, connection.commands.message_type.name())?;
         let stop = &connection.stop;
-        let stop_topic = (!stop.topic.is_empty()).then(|| node.writer(&stop.topic, "std_msgs/msg/Bool")).transpose()?;
+        let stop_topic = (!stop.topic.is_empty()).then(|| node.writer(&stop.topic, BOOL)).transpose()?;
         let stop_service = (!stop.service.is_empty()).then(|| trigger(&mut node, connection)).transpose()?;
         let poll = Poll::new().map_err(LiveError::dds("polling"))?;
         let mut readers = Vec::new();
-        for (what, topic, ros_type) in subscriptions(connection) {
-            let mut reader = node.reader(topic, ros_type)?;
+        for (content, topic) in contents(connection) {
+            let mut reader = node.reader(topic, content.ros_type())?;
             let token = Token(readers.len());
             poll.registry().register(&mut reader.0, token, Interest::READABLE).map_err(LiveError::dds(topic))?;
-            readers.push((what, reader));
+            readers.push((content, reader));
         }
         Ok(Self {
             node,
@@ -75,42 +68,15 @@ impl Ros2Wire {
     /// Whether anything came.
     fn drain(&mut self, heard: &mut Vec<Heard>) -> bool {
         let before = heard.len();
-        for (what, reader) in &self.readers {
+        for (content, reader) in &self.readers {
             for _ in 0..MAX_TAKEN {
                 let Some(taken) = reader.take() else { break };
-                heard.push(taken.map_or_else(Heard::Unusable, |bytes| read(*what, &bytes, &self.names)));
+                heard.push(taken.map_or_else(Heard::Unusable, |bytes| read(*content, &bytes, &self.names)));
             }
         }
-        let stamps = heard[before..].iter().filter_map(|heard| match heard {
-            Heard::Joints(sample) => Some(sample.stamp),
-            _ => None,
-        });
-        self.newest = stamps.fold(self.newest, Stamp::max);
+        self.newest = newest_stamp(&heard[before..], self.newest);
         heard.len() > before
     }
-}
-
-fn subscriptions(connection: &Connection) -> Vec<(What, &str, &'static str)> {
-    let mut all: Vec<(What, &str, &'static str)> =
-        vec![(What::Joints, &connection.joint_sensors, Stream::JointSensors.schema().name)];
-    for (stream, topic) in streams(connection) {
-        all.push((What::Stream(stream), topic, stream.schema().name));
-    }
-    all.extend(connection.deadman.as_ref().map(|deadman| (What::Deadman, deadman.topic.as_str(), "std_msgs/msg/Bool")));
-    all
-}
-
-/// Streams beside the joints', with their topics.
-pub(crate) fn streams(connection: &Connection) -> Vec<(Stream, &str)> {
-    let all = [
-        (Stream::Detections, connection.detections.as_str()),
-        (Stream::Images, &connection.images),
-        (Stream::OilTemperature, &connection.oil_temperature),
-        (Stream::WaterTemperature, &connection.water_temperature),
-        (Stream::DepthPressure, &connection.pressure),
-        (Stream::VehicleImu, &connection.imu),
-    ];
-    all.into_iter().filter(|(_, topic)| !topic.is_empty()).collect()
 }
 
 fn trigger(
@@ -129,34 +95,6 @@ pub(crate) fn service_mapping(mapping: ServiceMapping) -> ros2_client::ServiceMa
         ServiceMapping::Enhanced => ros2_client::ServiceMapping::Enhanced,
         ServiceMapping::Cyclone => ros2_client::ServiceMapping::Cyclone,
     }
-}
-
-fn read(what: What, bytes: &[u8], names: &[String]) -> Heard {
-    match what {
-        What::Joints => joints(bytes, names).map_or_else(Heard::Unusable, Heard::Joints),
-        What::Stream(stream) => stream
-            .decode_alone(bytes)
-            .map_or_else(|error| Heard::Unusable(format!("{}: {error}", stream.topic())), Heard::Other),
-        What::Deadman => decode::<Bool>(bytes).map_or_else(
-            |error| Heard::Unusable(format!("the dead man's switch: {error}")),
-            |held| Heard::Deadman(held.data),
-        ),
-    }
-}
-
-/// Readings in the robot's order.
-fn joints(bytes: &[u8], names: &[String]) -> Result<JointSensorSample, String> {
-    let message: JointState = decode(bytes).map_err(|error| format!("joint readings: {error}"))?;
-    let stamp = Stamp::try_from(message.header.stamp).map_err(|error| format!("joint readings: {error}"))?;
-    let mut counts = JointCounts::zeros(names.len());
-    for (joint, name) in names.iter().enumerate() {
-        let index = message.name.iter().position(|own| own == name);
-        let position = index.and_then(|index| message.position.get(index)).copied();
-        counts[joint] = position
-            .filter(|position| position.is_finite())
-            .ok_or_else(|| format!("joint readings: no finite position of {name} among {:?}", message.name))?;
-    }
-    Ok(JointSensorSample { stamp, counts })
 }
 
 impl Wire for Ros2Wire {

@@ -1,4 +1,4 @@
-//! ROS types that recordings lack.
+//! ROS types that recordings lack, for every wire.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,32 +7,18 @@ use armcal_core::log::ros::{Header, JointState, Time};
 use armcal_core::log::{CdrError, decode, encode};
 use armcal_core::time::Stamp;
 
+/// Type of [`Bool`].
+pub(crate) const BOOL: &str = "std_msgs/msg/Bool";
+
 /// std_msgs/msg/Bool.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct Bool {
     pub data: bool,
 }
 
-/// std_srvs/srv/Trigger, asked; an empty request is one byte.
-#[derive(Clone, Debug, Default, Serialize, Deserialize)]
-pub(crate) struct TriggerRequest {
-    pub structure_needs_at_least_one_member: u8,
-}
-
-impl ros2_client::Message for TriggerRequest {}
-
-/// std_srvs/srv/Trigger, answered.
-#[derive(Clone, Debug, Default, Serialize, Deserialize)]
-pub(crate) struct TriggerResponse {
-    pub success: bool,
-    pub message: String,
-}
-
-impl ros2_client::Message for TriggerResponse {}
-
 /// trajectory_msgs/msg/JointTrajectory.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-struct JointTrajectory {
+pub(crate) struct JointTrajectory {
     header: Header,
     joint_names: Vec<String>,
     points: Vec<JointTrajectoryPoint>,
@@ -50,10 +36,16 @@ struct JointTrajectoryPoint {
 
 /// std_msgs/msg/Float64MultiArray.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-struct Float64MultiArray {
+pub(crate) struct Float64MultiArray {
+    layout: MultiArrayLayout,
+    data: Vec<f64>,
+}
+
+/// std_msgs/msg/MultiArrayLayout.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+struct MultiArrayLayout {
     dim: Vec<MultiArrayDimension>,
     data_offset: u32,
-    data: Vec<f64>,
 }
 
 /// std_msgs/msg/MultiArrayDimension.
@@ -62,6 +54,15 @@ struct MultiArrayDimension {
     label: String,
     size: u32,
     stride: u32,
+}
+
+/// A message that carries a set-point.
+#[derive(Clone, Debug, Serialize)]
+#[serde(untagged)]
+pub(crate) enum CommandMessage {
+    Trajectory(JointTrajectory),
+    Array(Float64MultiArray),
+    State(JointState),
 }
 
 /// A set-point in any of the types that carry one.
@@ -76,28 +77,30 @@ pub(crate) struct Command {
 }
 
 impl Command {
-    pub fn encode(&self, message_type: CommandType, out: &mut Vec<u8>) -> Result<(), LiveError> {
+    /// As one of the types that drivers take.
+    pub fn message(&self, message_type: CommandType) -> Result<CommandMessage, LiveError> {
         let header = Header::new(self.stamp, "")?;
-        let positions = self.positions.clone();
-        match message_type {
+        let (names, positions) = (self.names.clone(), self.positions.clone());
+        Ok(match message_type {
             CommandType::JointTrajectory => {
                 let nanos = (self.within_s * 1e9).round().clamp(0.0, 1e18) as i64;
                 let time_from_start =
                     Time { sec: (nanos / 1_000_000_000) as i32, nanosec: (nanos % 1_000_000_000) as u32 };
                 let (velocities, accelerations, effort) = (Vec::new(), Vec::new(), Vec::new());
                 let point = JointTrajectoryPoint { positions, velocities, accelerations, effort, time_from_start };
-                let message = JointTrajectory { header, joint_names: self.names.clone(), points: vec![point] };
-                encode(&message, out)
+                CommandMessage::Trajectory(JointTrajectory { header, joint_names: names, points: vec![point] })
             }
             CommandType::Float64MultiArray => {
-                encode(&Float64MultiArray { dim: Vec::new(), data_offset: 0, data: positions }, out)
+                CommandMessage::Array(Float64MultiArray { layout: MultiArrayLayout::default(), data: positions })
             }
             CommandType::JointState => {
-                let name = self.names.clone();
-                encode(&JointState { header, name, position: positions, ..JointState::default() }, out)
+                CommandMessage::State(JointState { header, name: names, position: positions, ..JointState::default() })
             }
-        }
-        .map_err(|error| LiveError::Encode(error.into()))
+        })
+    }
+
+    pub fn encode(&self, message_type: CommandType, out: &mut Vec<u8>) -> Result<(), LiveError> {
+        encode(&self.message(message_type)?, out).map_err(|error| LiveError::Encode(error.into()))
     }
 
     /// The last point of a trajectory is where the arm shall be.

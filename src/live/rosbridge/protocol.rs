@@ -1,0 +1,181 @@
+//! What is said over a rosbridge: one JSON object a message, with its operation in `op`.
+
+use serde_json::{Value, json};
+
+use super::json::{from_json, spell_as_ros1};
+use crate::connection::Rosbridge;
+use crate::messages::{BOOL, Bool, Command};
+use crate::topics::{Content, contents, read};
+use crate::{Connection, Heard, LiveError};
+use armcal_core::log::encode;
+use armcal_core::log::ros::{AprilTagDetectionArray, CompressedImage, FluidPressure, Imu, JointState, Temperature};
+use armcal_core::log::{RosMessage, Stream};
+
+/// Most values of one message: each takes many bytes of memory for two of text.
+const MAX_VALUES: usize = 4 << 20;
+/// Of what the other side says, so many characters are repeated.
+const MAX_SHOWN: usize = 200;
+
+/// Messages of a topic that the bridge keeps for us where the line is slow; older ones are dropped.
+const QUEUE_LENGTH: usize = 10;
+/// Marks our own call among the answers.
+const STOP_ID: &str = "armcal_stop";
+
+/// Something that the bridge said.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Said {
+    /// On a topic.
+    Heard(Content, Heard),
+    /// Of itself: an error or a warning, for people.
+    Complaint(String),
+    /// All else that is as it should be.
+    Nothing,
+}
+
+/// Understands what a bridge says.
+pub(crate) struct Listener {
+    topics: Vec<(Content, String)>,
+    names: Vec<String>,
+    ros: u32,
+}
+
+impl Listener {
+    /// `names` are the driver's, robot's order of joints.
+    pub fn new(connection: &Connection, bridge: &Rosbridge, names: &[String]) -> Self {
+        let topics = contents(connection).into_iter().map(|(content, topic)| (content, topic.to_owned()));
+        Self { topics: topics.collect(), names: names.to_vec(), ros: bridge.ros }
+    }
+
+    /// One message of the bridge, whatever it is.
+    pub fn read(&self, text: &str) -> Said {
+        if text.bytes().filter(|byte| *byte == b',').count() >= MAX_VALUES {
+            return Said::Complaint(format!("it sent a message of {MAX_VALUES} values or more"));
+        }
+        let message: Value = match serde_json::from_str(text) {
+            Ok(message) => message,
+            Err(error) => return Said::Complaint(format!("it sent what is no JSON: {error}")),
+        };
+        match message["op"].as_str() {
+            Some("publish") => self.published(&message),
+            Some("status") => status(&message),
+            Some("service_response") => answer(&message),
+            op => {
+                Said::Complaint(format!("it sent an operation that was not asked for: {}", shown(op.unwrap_or("none"))))
+            }
+        }
+    }
+
+    fn published(&self, message: &Value) -> Said {
+        let topic = message["topic"].as_str().unwrap_or("none");
+        let Some((content, _)) = self.topics.iter().find(|(_, own)| own == topic) else {
+            return Said::Complaint(format!("it sent a message of a topic that was not asked for: {}", shown(topic)));
+        };
+        let bytes = self.check_spelling(&message["msg"]).and_then(|()| recoded(*content, &message["msg"]));
+        let heard = match bytes {
+            Ok(bytes) => read(*content, &bytes, &self.names),
+            Err(why) => Heard::Unusable(format!("{topic}: {why}")),
+        };
+        Said::Heard(*content, if let Heard::Unusable(why) = heard { Heard::Unusable(shown(&why)) } else { heard })
+    }
+
+    /// Set-points that are spelled for the wrong ROS would not be understood: that shall be known before they are sent.
+    fn check_spelling(&self, message: &Value) -> Result<(), String> {
+        let (other, key) = if self.ros == 1 { (2, "sec") } else { (1, "secs") };
+        if message["header"]["stamp"].get(key).is_some() {
+            return Err(format!("its stamp is one of ROS {other}: set rosbridge.ros = {other}"));
+        }
+        Ok(())
+    }
+}
+
+/// A message as the bytes that DDS would have brought.
+fn recoded(content: Content, json: &Value) -> Result<Vec<u8>, String> {
+    match content {
+        Content::Joints => recode::<JointState>(json),
+        Content::Deadman => {
+            let held: Bool = from_json(json)?;
+            encoded(&held)
+        }
+        Content::Stream(stream) => match stream {
+            Stream::Detections => recode::<AprilTagDetectionArray>(json),
+            Stream::Images => recode::<CompressedImage>(json),
+            Stream::OilTemperature | Stream::WaterTemperature => recode::<Temperature>(json),
+            Stream::DepthPressure => recode::<FluidPressure>(json),
+            Stream::VehicleImu => recode::<Imu>(json),
+            other => Err(format!("{} is no stream of a connection", other.topic())),
+        },
+    }
+}
+
+fn recode<T: RosMessage>(json: &Value) -> Result<Vec<u8>, String> {
+    encoded(&from_json::<T>(json)?)
+}
+
+fn encoded<T: serde::Serialize>(message: &T) -> Result<Vec<u8>, String> {
+    let mut bytes = Vec::new();
+    encode(message, &mut bytes).map_err(|error| error.to_string())?;
+    Ok(bytes)
+}
+
+fn status(message: &Value) -> Said {
+    let (level, text) = (message["level"].as_str().unwrap_or_default(), message["msg"].as_str().unwrap_or_default());
+    match level {
+        "error" | "warning" => Said::Complaint(format!("{level}: {}", shown(text))),
+        _ => Said::Nothing,
+    }
+}
+
+/// To the call of the stop service.
+fn answer(message: &Value) -> Said {
+    let values = &message["values"];
+    if message["result"] == true && values["success"] != false {
+        return Said::Nothing;
+    }
+    let service = shown(message["service"].as_str().unwrap_or_default());
+    Said::Complaint(format!("the service {service} failed: {}", shown(&values.to_string())))
+}
+
+/// The beginning of a text of the other side, in one line.
+pub(super) fn shown(text: &str) -> String {
+    text.chars().take(MAX_SHOWN).map(|c| if c.is_control() { ' ' } else { c }).collect()
+}
+
+/// What is said first: everything that is heard of the arm, and everything that it will be told.
+pub(super) fn greeting(connection: &Connection, bridge: &Rosbridge) -> Vec<String> {
+    let subscribe = |(content, topic): (Content, &str)| {
+        let type_name = bridge.type_name(content.ros_type());
+        json!({ "op": "subscribe", "topic": topic, "type": type_name, "queue_length": QUEUE_LENGTH }).to_string()
+    };
+    let advertise = |topic: &str, ros_type: &str| {
+        json!({ "op": "advertise", "topic": topic, "type": bridge.type_name(ros_type) }).to_string()
+    };
+    let mut all = vec![advertise(&connection.commands.topic, connection.commands.message_type.name())];
+    if !connection.stop.topic.is_empty() {
+        all.push(advertise(&connection.stop.topic, BOOL));
+    }
+    all.extend(contents(connection).into_iter().map(subscribe));
+    all
+}
+
+/// A set-point.
+pub(super) fn set_point(connection: &Connection, bridge: &Rosbridge, command: &Command) -> Result<String, LiveError> {
+    let message = command.message(connection.commands.message_type)?;
+    let mut json =
+        serde_json::to_value(&message).map_err(|error| LiveError::rosbridge(&bridge.url, error.to_string()))?;
+    if bridge.ros == 1 {
+        spell_as_ros1(&mut json);
+    }
+    Ok(publish(&connection.commands.topic, &json))
+}
+
+/// Every way to stop the arm. A bridge may wait for the service before it does anything else: the topic comes first.
+pub(super) fn stop(connection: &Connection) -> Vec<String> {
+    let stop = &connection.stop;
+    let topic = (!stop.topic.is_empty()).then(|| publish(&stop.topic, &json!({ "data": true })));
+    let call = || json!({ "op": "call_service", "id": STOP_ID, "service": stop.service, "args": {} }).to_string();
+    topic.into_iter().chain((!stop.service.is_empty()).then(call)).collect()
+}
+
+fn publish(topic: &str, message: &Value) -> String {
+    json!({ "op": "publish", "topic": topic, "msg": message }).to_string()
+}

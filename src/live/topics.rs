@@ -1,0 +1,85 @@
+//! What the topics of a connection carry, and how their messages are read, whatever brought them.
+
+use crate::messages::{BOOL, Bool};
+use crate::{Connection, Heard};
+use armcal_core::log::ros::JointState;
+use armcal_core::log::{Stream, decode};
+use armcal_core::streams::{JointCounts, JointSensorSample};
+use armcal_core::time::Stamp;
+
+/// What a topic carries.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Content {
+    Joints,
+    Stream(Stream),
+    Deadman,
+}
+
+impl Content {
+    pub fn ros_type(self) -> &'static str {
+        match self {
+            Self::Joints => Stream::JointSensors.schema().name,
+            Self::Stream(stream) => stream.schema().name,
+            Self::Deadman => BOOL,
+        }
+    }
+}
+
+/// Everything that is heard of an arm, with its topics.
+pub(crate) fn contents(connection: &Connection) -> Vec<(Content, &str)> {
+    let mut all = vec![(Content::Joints, connection.joint_sensors.as_str())];
+    all.extend(streams(connection).into_iter().map(|(stream, topic)| (Content::Stream(stream), topic)));
+    all.extend(connection.deadman.as_ref().map(|deadman| (Content::Deadman, deadman.topic.as_str())));
+    all
+}
+
+/// Streams beside the joints', with their topics.
+pub(crate) fn streams(connection: &Connection) -> Vec<(Stream, &str)> {
+    let all = [
+        (Stream::Detections, connection.detections.as_str()),
+        (Stream::Images, &connection.images),
+        (Stream::OilTemperature, &connection.oil_temperature),
+        (Stream::WaterTemperature, &connection.water_temperature),
+        (Stream::DepthPressure, &connection.pressure),
+        (Stream::VehicleImu, &connection.imu),
+    ];
+    all.into_iter().filter(|(_, topic)| !topic.is_empty()).collect()
+}
+
+/// Reads and checks a message, as CDR; `names` are the driver's, robot's order of joints.
+pub(crate) fn read(content: Content, bytes: &[u8], names: &[String]) -> Heard {
+    match content {
+        Content::Joints => joints(bytes, names).map_or_else(Heard::Unusable, Heard::Joints),
+        Content::Stream(stream) => stream
+            .decode_alone(bytes)
+            .map_or_else(|error| Heard::Unusable(format!("{}: {error}", stream.topic())), Heard::Other),
+        Content::Deadman => decode::<Bool>(bytes).map_or_else(
+            |error| Heard::Unusable(format!("the dead man's switch: {error}")),
+            |held| Heard::Deadman(held.data),
+        ),
+    }
+}
+
+/// Readings in the robot's order.
+fn joints(bytes: &[u8], names: &[String]) -> Result<JointSensorSample, String> {
+    let message: JointState = decode(bytes).map_err(|error| format!("joint readings: {error}"))?;
+    let stamp = Stamp::try_from(message.header.stamp).map_err(|error| format!("joint readings: {error}"))?;
+    let mut counts = JointCounts::zeros(names.len());
+    for (joint, name) in names.iter().enumerate() {
+        let index = message.name.iter().position(|own| own == name);
+        let position = index.and_then(|index| message.position.get(index)).copied();
+        counts[joint] = position
+            .filter(|position| position.is_finite())
+            .ok_or_else(|| format!("joint readings: no finite position of {name} among {:?}", message.name))?;
+    }
+    Ok(JointSensorSample { stamp, counts })
+}
+
+/// The latest stamp of joint readings, `before` where there is none later.
+pub(crate) fn newest_stamp(heard: &[Heard], before: Stamp) -> Stamp {
+    let stamps = heard.iter().filter_map(|heard| match heard {
+        Heard::Joints(sample) => Some(sample.stamp),
+        _ => None,
+    });
+    stamps.fold(before, Stamp::max)
+}
