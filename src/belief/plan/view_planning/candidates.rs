@@ -46,6 +46,8 @@ pub(crate) struct InfeasibleCounts {
     hidden: Vec<(String, usize)>,
     /// See enough tags, and some arm within the bounds comes too near.
     blocked: usize,
+    /// Whether certificates took so much that the search ended before its time.
+    is_cut_short: bool,
 }
 
 /// More tags in view are counted as so many.
@@ -54,7 +56,7 @@ const MAX_DRAWS: usize = 200_000;
 /// Poses that see enough and are not clear; then it is not for want of tags.
 const MAX_BLOCKED: usize = 20_000;
 /// Regions that all certificates may look at: under a belief that is wide, one pose may take thousands.
-const MAX_REGIONS: usize = 20_000_000;
+const MAX_REGIONS: usize = 5_000_000;
 /// Capture poses keep their tool this far from every target, m.
 const TARGET_DISTANCE_M: f64 = 0.15;
 /// Nothing this near (largest joint difference) to a pose that failed is tried again, rad.
@@ -145,6 +147,7 @@ impl<'a> Search<'a> {
                 found.push(Candidate { is_even: source == Source::Uniform, ..candidate });
             }
         }
+        self.refused.is_cut_short = self.n_regions >= MAX_REGIONS;
         tracing::debug!(
             "{} poses that may be taken, of {} drawn; {} regions were certified",
             found.len(),
@@ -357,6 +360,11 @@ impl InfeasibleCounts {
                 None => "no tag comes into view of the camera from any pose tried".to_owned(),
             };
         }
+        if self.is_cut_short {
+            let poses =
+                "every arm that the belief allows was to be clear at each of them, which took too long to prove";
+            return format!("{poses}: the belief is very wide; check the joint sensors, and their noise in robot.toml");
+        }
         // The last test that any draw came to.
         if let Some((blocker, n)) = self.hidden.iter().max_by_key(|(_, n)| *n) {
             return format!("{n} poses keep clear and have enough tags in view, but `{blocker}` hides them");
@@ -386,6 +394,24 @@ impl InfeasibleCounts {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::plan::JointErrorBounds;
+    use crate::plan::view_planning::fixture::Site;
+    use armcal_core::stats::stream_rng;
+
+    /// Some arm within such bounds meets something wherever it goes; to prove it for each pose would take minutes.
+    #[test]
+    fn a_belief_that_is_very_wide_ends_the_search_by_budget() {
+        let mut site = Site::titan();
+        site.bounds = JointErrorBounds::alike(&site.robot, 0.6, 0.0);
+        let clearance = site.clearance();
+        let request = site.request(&clearance);
+        let mut search = Search::new(&request);
+        search.gather(300, &mut stream_rng(1, "plan"));
+        // The last certificate may go beyond.
+        assert!((MAX_REGIONS..MAX_REGIONS + 500_000).contains(&search.n_regions), "{}", search.n_regions);
+        let hint = search.refused.hint(&request);
+        assert!(hint.contains("very wide"), "{hint}");
+    }
 
     #[test]
     fn the_arms_that_stand_for_the_belief_are_spread_as_a_triangle() {
