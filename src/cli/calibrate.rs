@@ -6,7 +6,7 @@ use std::time::Instant;
 use anyhow::{Context, Result};
 use clap::Args;
 
-use crate::cli::calibrate_online::{calibrate_online, stationary};
+use crate::cli::calibrate_online::{Told, calibrate_online, stationary};
 use crate::cli::calibration_inputs::{Calibrated, CalibrationInputs, load_robot};
 use crate::cli::closing::ClosingArgs;
 use crate::cli::exit::Exit;
@@ -80,7 +80,7 @@ pub(super) fn calibrate(args: &CalibrateArgs) -> Result<Exit> {
     given.check_kinds()?;
     if args.online {
         let follow = if args.stationary { stationary } else { calibrate_online };
-        return follow(&given, &args.out, args.closing.json);
+        return follow(&given, &args.out, if args.closing.json { Told::Json } else { Told::Text });
     }
     let started = Instant::now();
     let Calibrated { calibration, lost, external } = given.calibrate()?;
@@ -113,24 +113,23 @@ pub(super) fn calibrate(args: &CalibrateArgs) -> Result<Exit> {
             note(format_args!("warning: no replay: {error:#}"));
         }
     }
+    let replay = external.map(|_| args.out.join("replay.rrd")).filter(|file| file.is_file());
     match &compact {
         Some(line) => say(line)?,
-        None => {
-            let out = args.out.display();
-            let replay = args.out.join("replay.rrd");
-            let replay = if external.is_some() && replay.is_file() {
-                format!("; {} to look at", replay.display())
-            } else {
-                String::new()
-            };
-            args.closing.say(&summary, &format!("written      {out}\nnext         {out}/report.html{replay}"))?;
-        }
+        None => args.closing.say(&summary, &next_step(&args.out, replay.as_deref()))?,
     }
     Ok(match (calibration.status, lost) {
         (Status::Refused, _) => Exit::Refused,
         (Status::Accepted, true) => Exit::DataLost,
         (Status::Accepted, false) => Exit::Ok,
     })
+}
+
+/// Where the results are, and what to look at.
+fn next_step(out: &Path, replay: Option<&Path>) -> String {
+    let replay = replay.map_or_else(String::new, |file| format!("; {} to look at", file.display()));
+    let out = out.display();
+    format!("written      {out}\nnext         {out}/report.html{replay}")
 }
 
 /// File names, for a report: a path would be of this machine alone.

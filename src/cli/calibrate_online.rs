@@ -14,29 +14,40 @@ use crate::output;
 use armcal_belief::calib::Status;
 use armcal_belief::calib::online::{BeliefLog, Follower, OnlineSettings};
 
-/// Follows the recordings, writes belief.jsonl into `out` and says how it ended, or with `json` the lines of that file.
-pub(super) fn calibrate_online(given: &CalibrationInputs<'_>, out: &Path, json: bool) -> Result<Exit> {
+/// What is said of a belief.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Told {
+    /// How it ended.
+    Text,
+    /// The lines of belief.jsonl.
+    Json,
+}
+
+/// Follows the recordings, writes belief.jsonl into `out` and says how it ended.
+pub(super) fn calibrate_online(given: &CalibrationInputs<'_>, out: &Path, told: Told) -> Result<Exit> {
     let mut log = BeliefLog::default();
     let (follower, lost) = given.follow(OnlineSettings::default(), &mut |follower, events| {
         log.hear(follower, events);
     })?;
-    let text = written(&follower, log, out, json)?;
-    let tell = if json { say } else { say_wrapped };
-    tell(&text)?;
+    let text = written(&follower, log, out, told)?;
+    match told {
+        Told::Text => say_wrapped(&text)?,
+        Told::Json => say(&text)?,
+    }
     Ok(exit_of(&follower, if lost { Exit::DataLost } else { Exit::Ok }))
 }
 
 /// Takes the views of a batch in one by one, nothing drifting, and says how far from the batch it ends.
-pub(super) fn stationary(given: &CalibrationInputs<'_>, out: &Path, json: bool) -> Result<Exit> {
+pub(super) fn stationary(given: &CalibrationInputs<'_>, out: &Path, told: Told) -> Result<Exit> {
     let (batch, lost) = given.batch()?;
     let mut log = BeliefLog::default();
     let follower = batch.follow(&mut |follower, events| {
         log.hear(follower, events);
     });
-    let text = written(&follower, log, out, json)?;
+    let text = written(&follower, log, out, told)?;
     let calibration = &batch.calibration;
     let off = batch.largest_difference_sigmas(follower.estimator());
-    if json {
+    if told == Told::Json {
         let batch = BatchLine {
             status: calibration.status,
             refusal: calibration.refusal.as_deref(),
@@ -71,13 +82,13 @@ struct BatchLine<'a> {
     largest_difference_sigmas: Option<f64>,
 }
 
-/// Writes belief.jsonl; what is told of it, or with `json` its lines.
-fn written(follower: &Follower, mut log: BeliefLog, out: &Path, json: bool) -> Result<String> {
+/// Writes belief.jsonl; what is told of it.
+fn written(follower: &Follower, mut log: BeliefLog, out: &Path, told: Told) -> Result<String> {
     let row = belief(follower)?;
     log.end(follower);
     let (file, lines) = (out.join("belief.jsonl"), log.to_jsonl());
     output::write_together(&[(&file, lines.as_bytes())])?;
-    if json {
+    if told == Told::Json {
         return Ok(lines.trim_end().to_owned());
     }
     Ok(format!("{}{}\nwritten      {}", log.told(), summary(follower, &row), file.display()))
