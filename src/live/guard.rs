@@ -35,8 +35,8 @@ pub enum StopReason {
     )]
     Tracking { joint: String, off_deg: f64, for_s: f64, limit_deg: f64 },
     #[error(
-        "{joint} has read {off_deg:.1} deg from where it was for {for_s:.1} s, and no joint goes there from one reading \
-         to the next (guard.tracking_deg = {limit_deg}): its sensor, plug or driver is at fault"
+        "{joint} has read {off_deg:.1} deg from where it was for {for_s:.1} s, and no joint goes there from one \
+         reading to the next (guard.tracking_deg = {limit_deg}): its sensor, plug or driver is at fault"
     )]
     Leapt { joint: String, off_deg: f64, for_s: f64, limit_deg: f64 },
     #[error("all joint readings have stayed the same to the count for {for_s:.1} s while set-points moved")]

@@ -350,10 +350,13 @@ fn not_ready(reason: StopReason) -> LiveError {
 fn nothing_heard(connection: &Connection, survey: &Survey) -> LiveError {
     let (topic, seconds) = (&connection.joint_sensors, connection.guard.connect_s);
     let unusable = survey.unusable.as_ref().map(|(n, why)| format!("; {n} messages were of no use, the last: {why}"));
+    let place = match &connection.rosbridge {
+        Some(bridge) => format!("and its topics known to the rosbridge at {}?", bridge.url),
+        None => format!("in ROS domain {}, and `networks` right?", connection.domain),
+    };
     LiveError::NotReady(format!(
-        "no joint readings on {topic} in {seconds} s{}; is the driver running in ROS domain {}, and `networks` right?",
-        unusable.unwrap_or_default(),
-        connection.domain
+        "no joint readings on {topic} in {seconds} s{}; is the driver running {place}",
+        unusable.unwrap_or_default()
     ))
 }
 
