@@ -217,6 +217,11 @@ impl Guard {
         Err(StopReason::Leapt { joint, off_deg: off_rad.to_degrees(), for_s, limit_deg })
     }
 
+    /// Nothing was asked yet: what the readings were before counts no more.
+    pub fn forget_leaps(&mut self) {
+        self.leaps.forget();
+    }
+
     /// Whether the reading of a joint is in doubt: it leapt, and has not come back.
     pub fn has_leapt(&self, joint: usize) -> bool {
         self.leaps.has_leapt(joint)

@@ -29,6 +29,11 @@ impl Leaps {
         Self { limit_rad, max_rate_rad_s, before: vec![None; robot.sensors.len()] }
     }
 
+    /// Readings are taken as they are from here on: an arm that is heard out may begin anywhere.
+    pub fn forget(&mut self) {
+        self.before.fill(None);
+    }
+
     /// Whether the joint's readings leapt, and have not come back.
     pub fn has_leapt(&self, joint: usize) -> bool {
         self.before[joint].is_some()

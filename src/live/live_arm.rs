@@ -291,6 +291,7 @@ fn listen(wire: &mut impl Wire, guard: &mut Guard, connection: &Connection) -> R
                     if (0..sample.counts.len()).any(|j| moved(j) > REST_RAD) {
                         // It moves: wait for its rest from here on.
                         first = Some((sample.clone(), now));
+                        guard.forget_leaps();
                         survey.readings = 0;
                         survey.detections.clear();
                     }

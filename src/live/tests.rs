@@ -48,6 +48,8 @@ enum Fault {
     Jump {
         counts: f64,
     },
+    /// The first readings of all are zeros.
+    BeginsWithZeros,
     Disobeys,
     LetGo,
     NotHeld,
@@ -109,6 +111,7 @@ impl FakeWire {
             Fault::Frozen if is_faulty => counts = JointCounts::from_fn(counts.len(), |j| self.set_point_then(j)),
             Fault::Spike { counts: by } if is_faulty && at_s < self.fault_s + 1.5 * PERIOD_S => counts[0] += by,
             Fault::Jump { counts: by } if is_faulty => counts[0] += by,
+            Fault::BeginsWithZeros if at_s < 3.5 * PERIOD_S => counts = JointCounts::zeros(counts.len()),
             _ => {}
         }
         self.under_way.push_back((at_s + delay_s, Heard::Joints(JointSensorSample { stamp, counts })));
@@ -263,6 +266,7 @@ fn a_sound_arm_is_followed_to_the_end() {
         Fault::Delayed { by_s: 0.2 },
         Fault::Spike { counts: 4000.0 },
         Fault::ClockLeaps { by_s: 0.3 },
+        Fault::BeginsWithZeros,
     ] {
         let played = play(fault, 0.3);
         assert!(played.result.is_ok(), "{fault:?}: {}", played.why());
