@@ -166,7 +166,7 @@ impl ScaleUpdate<'_, '_> {
                     continue;
                 }
                 sums.add(state.joint_error[view_idx][joint], variance, problem.joint_error_var(view, joint).sqrt());
-                reading_var += view.reading_var[joint];
+                reading_var += view.reading_var[joint] + problem.jitter_rad(view, joint).powi(2);
                 n += 1.0;
             }
             if n > 0.0 {

@@ -15,6 +15,7 @@ use crate::calib::bundle::problem::{BundleProblem, State};
 use crate::calib::bundle::schur::{
     BodyTwists, Columns, Directions, Group, MOUNT, N_DIRECTIONS, N_VIEW_PARAMETERS, Own, SchurBlock, TIME,
 };
+use crate::calib::bundle::time_error::TimeError;
 use armcal_core::joints::MAX_JOINTS;
 use armcal_core::kinematics::LinkCorrections;
 use armcal_core::numeric::Loss;
@@ -239,20 +240,20 @@ impl NormalEquations {
         let mut twists = SMatrix::<f64, 6, N_VIEW_PARAMETERS>::zeros();
         let mut info = SVector::<f64, N_VIEW_PARAMETERS>::repeat(1.0);
         let mut own = SVector::<f64, N_VIEW_PARAMETERS>::zeros();
+        let mut time_error = TimeError::none();
         for joint in group.joints.clone() {
-            let variance = problem.joint_error_var(view, joint);
             // An exact sensor has no error to eliminate.
-            if variance <= 0.0 {
+            if problem.joint_error_var(view, joint) <= 0.0 {
                 continue;
             }
             twists.set_column(joint, &directions.column(joint));
-            info[joint] = 1.0 / variance;
+            info[joint] = time_error.add(problem, view, joint);
             own[joint] = state.joint_error[group.view_idx][joint];
         }
         if group.camera_error.is_none() && twists.iter().all(|v| *v == 0.0) {
             return SchurBlock::none(group.observations.clone());
         }
-        let mut prior_gradient = -own.component_mul(&info);
+        let mut prior_gradient = -own.component_mul(&info) + time_error.pull(&own);
         if let (Some(error), Some([std_m, std_rad])) = (group.camera_error, problem.scales.camera_error_std) {
             twists.fixed_view_mut::<6, 6>(0, MAX_JOINTS).fill_diagonal(1.0);
             let d = log(error);
@@ -262,11 +263,12 @@ impl NormalEquations {
             let gradient = right_jacobian_inverse(&d).tr_mul(&d.component_mul(&weight));
             prior_gradient.fixed_rows_mut::<6>(MAX_JOINTS).copy_from(&-gradient);
         }
-        self.cost += own.component_mul(&own).dot(&info);
+        self.cost += own.component_mul(&own).dot(&info) - time_error.pull(&own).dot(&own);
         let mut normal: Own = twists.tr_mul(&(sums.h * twists));
         for k in 0..N_VIEW_PARAMETERS {
             normal[(k, k)] += info[k];
         }
+        time_error.loosen(&mut normal);
         let gradient = twists.tr_mul(&sums.g) + prior_gradient;
         // Positive definite: its diagonal has the priors. Only overflow makes it fail.
         let factor = normal.cholesky();
@@ -277,10 +279,11 @@ impl NormalEquations {
             inverse,
             gradient,
             by_common: SMatrix::zeros(),
-            log_ratio: info.map(f64::ln).sum() - log_det,
+            log_ratio: info.map(f64::ln).sum() - time_error.log_det() - log_det,
             range: group.observations.clone(),
             by_lens: SMatrix::zeros(),
             by_body: BodyTwists::zeros(),
+            time_error,
             has_any: true,
         }
     }

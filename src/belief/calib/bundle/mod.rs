@@ -40,6 +40,7 @@ mod stated_error;
 mod step_test;
 mod tables;
 mod tags;
+pub(crate) mod time_error;
 mod touch_term;
 mod verdict;
 mod walk;

@@ -89,7 +89,7 @@ pub(crate) struct ViewData {
     /// d(angle)/d(parameter) of each column.
     pub basis: Vec<f64>,
     pub rate_rad_s: [f64; MAX_JOINTS],
-    /// Variance of the mean reading by its noise and the time of the image, rad^2.
+    /// Variance of the mean reading by its noise, rad^2.
     pub reading_var: [f64; MAX_JOINTS],
     pub observations: Range<usize>,
     pub gripper: Option<usize>,
@@ -332,10 +332,20 @@ impl<'a> BundleProblem<'a> {
 
     /// Variance of what a joint is off in a view beyond the sensor's model, rad^2.
     pub(crate) fn joint_error_var(&self, view: &ViewData, joint: usize) -> f64 {
+        self.joint_own_var(view, joint) + self.jitter_rad(view, joint).powi(2)
+    }
+
+    /// The part of it that is the joint's own: the image's time error moves all joints of a view together.
+    pub(crate) fn joint_own_var(&self, view: &ViewData, joint: usize) -> f64 {
         if view.is_free[joint] {
             return self.scales.free_joint_std_rad.powi(2);
         }
         self.scales.joint_std_rad[joint].powi(2) + view.reading_var[joint]
+    }
+
+    /// How far a joint moves in one sigma of the image's time error, rad.
+    pub(crate) fn jitter_rad(&self, view: &ViewData, joint: usize) -> f64 {
+        if view.is_free[joint] { 0.0 } else { view.rate_rad_s[joint] * self.scales.time_jitter_std_s }
     }
 
     pub(crate) fn angles(&self, view_idx: usize, state: &State) -> JointAngles {
@@ -431,8 +441,7 @@ fn view_data(
         data.fixed_rad[joint] = fixed;
         data.rate_rad_s[joint] = view.rate_rad_s[joint];
         let reading_std_rad = spec.noise_std_counts / spec.counts_per_rad.abs();
-        let jitter_rad = view.rate_rad_s[joint] * input.scales.time_jitter_std_s;
-        data.reading_var[joint] = reading_std_rad.powi(2) / view.n_readings.max(1) as f64 + jitter_rad.powi(2);
+        data.reading_var[joint] = reading_std_rad.powi(2) / view.n_readings.max(1) as f64;
     }
     data
 }

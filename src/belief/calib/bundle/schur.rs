@@ -5,6 +5,7 @@ use std::ops::Range;
 use nalgebra::{Const, DMatrix, DVector, Isometry3, Matrix6, SMatrix, SVector, Vector6};
 
 use crate::calib::bundle::problem::{BundleProblem, Layout, State, ViewData};
+use crate::calib::bundle::time_error::TimeError;
 use armcal_core::joints::MAX_JOINTS;
 use armcal_core::kinematics::LinkPoses;
 use armcal_core::spatial::adjoint;
@@ -41,6 +42,8 @@ pub(crate) struct SchurBlock {
     pub by_lens: SMatrix<f64, 6, 8>,
     /// `sum H_i T` of the columns of links and sag.
     pub by_body: BodyTwists,
+    /// Of the view's image.
+    pub time_error: TimeError,
     /// Whether the group has any parameters of its own.
     pub has_any: bool,
 }
@@ -151,6 +154,7 @@ impl SchurBlock {
             log_ratio: 0.0,
             by_lens: SMatrix::zeros(),
             by_body: BodyTwists::zeros(),
+            time_error: TimeError::none(),
             has_any: false,
         }
     }

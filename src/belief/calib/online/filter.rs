@@ -5,7 +5,7 @@
 //! information. Between views what drifts is widened, `(W^-1 + Q)^-1` by the matrix inversion lemma. Time and memory of
 //! a view do not depend on how many came before.
 
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Isometry3};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Isometry3, SVector};
 
 use crate::calib::bundle::estimate::Estimate;
 use crate::calib::bundle::input::{BundleInput, HyperparameterMode};
@@ -16,6 +16,7 @@ use crate::calib::bundle::prior_terms::off_by;
 use crate::calib::bundle::priors::prior;
 use crate::calib::bundle::problem::{BundleProblem, Layout, ObservationTerm, Prior, State};
 use crate::calib::bundle::solve::{own_gain, take_step};
+use crate::calib::bundle::time_error::TimeErrorOfView;
 use crate::calib::online::view_stream::is_moving;
 use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
 use crate::calib::views::view::View;
@@ -67,6 +68,8 @@ pub(crate) struct ViewUpdate {
     pub rejected: Vec<usize>,
     /// What each joint is off in this view beyond its sensor's model, rad, and its variance before and after.
     pub joint_error: [JointErrorOfView; MAX_JOINTS],
+    /// Of the image's time.
+    pub time_error: TimeErrorOfView,
     /// By joint with an offset: what the view says of a change of the offset since the view before.
     pub walk: [WalkScore; MAX_JOINTS],
 }
@@ -435,6 +438,7 @@ fn view_update(problem: &BundleProblem<'_>, solved: &SolvedView, log_det_before:
     let used = problem.observations.iter().filter(|observation| observation.is_used);
     let chi2 = problem.observations.iter().zip(&normal.chi2).filter(|(observation, _)| observation.is_used);
     let is_rejected = |observation: &&ObservationTerm| !observation.is_used;
+    let (joint_error, time_error) = view_errors(problem, solved);
     ViewUpdate {
         cost: normal.cost,
         rejected_cost,
@@ -442,30 +446,40 @@ fn view_update(problem: &BundleProblem<'_>, solved: &SolvedView, log_det_before:
         n_coordinates: used.map(|observation| observation.data.n_coordinates()).sum(),
         log_evidence: 0.5 * (of_own - normal.cost - rejected_cost - volume),
         rejected: problem.observations.iter().filter(is_rejected).map(|observation| observation.tag).collect(),
-        joint_error: joint_errors(problem, solved),
+        joint_error,
+        time_error,
         walk: walk_scores(problem, state, factor),
     }
 }
 
-/// Joint errors of the view, and their variances.
-fn joint_errors(problem: &BundleProblem<'_>, solved: &SolvedView) -> [JointErrorOfView; MAX_JOINTS] {
+/// Joint errors of the view and their variances, and the error of its time.
+fn view_errors(problem: &BundleProblem<'_>, solved: &SolvedView) -> ([JointErrorOfView; MAX_JOINTS], TimeErrorOfView) {
     let SolvedView { state, normal, factor } = solved;
     let mut errors = [JointErrorOfView::default(); MAX_JOINTS];
-    for group in normal.eliminated.iter().filter(|group| group.has_any) {
+    let mut time_error = TimeErrorOfView { sigmas: 0.0, var: 1.0 };
+    for (k, group) in normal.eliminated.iter().enumerate().filter(|(_, group)| group.has_any) {
         let by_columns = group.inverse * group.own_by_columns(problem, &normal.by_tag, 0);
         let has_column = |joint: &usize| group.twists.column(*joint).iter().any(|v| *v != 0.0);
         let joints: Vec<usize> = (0..MAX_JOINTS).filter(has_column).collect();
         let mut right = DMatrix::from_fn(problem.layout.n, joints.len(), |k, i| by_columns[(joints[i], k)]);
         solve_lower(factor, &mut right);
+        let by_common = right.tr_mul(&right);
+        let (mut own, mut covariance) = (SVector::zeros(), group.inverse);
         for (k, &joint) in joints.iter().enumerate() {
+            own[joint] = state.joint_error[0][joint];
+            joints.iter().enumerate().for_each(|(i, &other)| covariance[(joint, other)] += by_common[(k, i)]);
             errors[joint] = JointErrorOfView {
-                error_rad: state.joint_error[0][joint],
+                error_rad: own[joint],
                 prior_var: problem.joint_error_var(&problem.views[0], joint),
-                var: group.inverse[(joint, joint)] + right.column(k).norm_squared(),
+                var: covariance[(joint, joint)],
             };
         }
+        // The tags about the arm tell of the time; the gripper's is behind one joint.
+        if k == 0 {
+            time_error = group.time_error.of_view(&own, &covariance);
+        }
     }
-    errors
+    (errors, time_error)
 }
 
 /// With W the information before and P the covariance after, `a = W (x' - x)` and `b = W - W P W`, both along each

@@ -277,7 +277,7 @@ impl Member {
         if self.settings.scales.is_none() {
             let scales = &mut running.filter.scales;
             if is_moving(view) {
-                running.jitter.learn(view, &update, scales);
+                running.jitter.learn(&update, scales);
                 running.motion.learn(&update);
                 running.filter.noise_in_motion = running.motion.factor();
             } else {

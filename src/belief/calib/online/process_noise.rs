@@ -7,8 +7,8 @@
 
 use crate::calib::bundle::calibration_prior::drift_std_rad_per_sqrt_h;
 use crate::calib::bundle::model::Hyperparameters;
+use crate::calib::bundle::time_error::TimeErrorOfView;
 use crate::calib::online::filter::{Filter, ViewUpdate};
-use crate::calib::views::view::View;
 use armcal_core::joints::MAX_JOINTS;
 use armcal_core::robot::Robot;
 use armcal_core::sensor::ConditionChange;
@@ -169,16 +169,11 @@ impl JitterSize {
         Self { first_s: scales.time_jitter_std_s, factor: LogFactor::default() }
     }
 
-    /// By the joints' errors of a view of a moving arm, of which its rates times the time error are a share.
-    pub(crate) fn learn(&mut self, view: &View, update: &ViewUpdate, scales: &mut Hyperparameters) {
-        let (mut score, mut information) = (0.0, 0.0);
-        for (rate, error) in view.rate_rad_s.iter().zip(&update.joint_error).filter(|(_, e)| e.prior_var > 0.0) {
-            let share = (rate * scales.time_jitter_std_s).powi(2) / error.prior_var;
-            let told = (1.0 - error.var / error.prior_var).clamp(0.0, 1.0);
-            score += 0.5 * share * (error.error_rad.powi(2) / error.prior_var - told);
-            information += 0.5 * (share * told).powi(2);
-        }
-        self.factor.learn(score, information);
+    /// By what a view of a moving arm tells of its time.
+    pub(crate) fn learn(&mut self, update: &ViewUpdate, scales: &mut Hyperparameters) {
+        let TimeErrorOfView { sigmas, var } = update.time_error;
+        let told = (1.0 - var).clamp(0.0, 1.0);
+        self.factor.learn(0.5 * (sigmas * sigmas - told), 0.5 * told * told);
         scales.time_jitter_std_s = self.first_s * self.factor.value().sqrt();
     }
 }

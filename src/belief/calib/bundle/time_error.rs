@@ -1,0 +1,74 @@
+//! The time error of one image: it moves all joints of a view together, each by its rate.
+//!
+//! The joints' errors of a view have the covariance `D + j j^T`, D of what each is off by itself and j the rates times
+//! one sigma of the time error. Its inverse is `D^-1 - u u^T / (1 + s)`, `u = D^-1 j`, `s = j^T u` (Sherman and
+//! Morrison 1950).
+
+use nalgebra::{SMatrix, SVector};
+
+use crate::calib::bundle::problem::{BundleProblem, ViewData};
+use crate::calib::bundle::schur::{N_VIEW_PARAMETERS, Own};
+
+/// Of what a joint of a moving arm is off by itself, rad^2: the inverse takes differences.
+const LEAST_OWN_VAR: f64 = 1e-14;
+
+/// What the time error takes off the information on a view's own parameters.
+#[derive(Clone, Debug)]
+pub(crate) struct TimeError {
+    /// `D^-1 j`.
+    by_sigma: SVector<f64, N_VIEW_PARAMETERS>,
+    /// `j^T D^-1 j`.
+    told: f64,
+}
+
+/// What a view tells of the time error of its image, in sigmas of it.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct TimeErrorOfView {
+    pub sigmas: f64,
+    /// Variance with all that the view told.
+    pub var: f64,
+}
+
+impl TimeError {
+    /// Of a view in which no joint moves.
+    pub(crate) fn none() -> Self {
+        Self { by_sigma: SVector::zeros(), told: 0.0 }
+    }
+
+    /// Takes a joint in; the inverse of what it is off by itself, 1/rad^2.
+    pub(crate) fn add(&mut self, problem: &BundleProblem<'_>, view: &ViewData, joint: usize) -> f64 {
+        let (own_var, jitter_rad) = (problem.joint_own_var(view, joint), problem.jitter_rad(view, joint));
+        let info = if jitter_rad == 0.0 { 1.0 / own_var } else { 1.0 / own_var.max(LEAST_OWN_VAR) };
+        self.by_sigma[joint] = info * jitter_rad;
+        self.told += info * jitter_rad * jitter_rad;
+        info
+    }
+
+    /// `u u^T own / (1 + s)`.
+    pub(crate) fn pull(&self, own: &SVector<f64, N_VIEW_PARAMETERS>) -> SVector<f64, N_VIEW_PARAMETERS> {
+        self.by_sigma * (self.by_sigma.dot(own) / (1.0 + self.told))
+    }
+
+    /// Takes `u u^T / (1 + s)` off.
+    pub(crate) fn loosen(&self, info: &mut Own) {
+        if self.told > 0.0 {
+            info.ger(-1.0 / (1.0 + self.told), &self.by_sigma, &self.by_sigma, 1.0);
+        }
+    }
+
+    /// `ln det (D + j j^T) - ln det D`.
+    pub(crate) fn log_det(&self) -> f64 {
+        self.told.ln_1p()
+    }
+
+    /// From the joints' errors and their covariance after the view.
+    pub(crate) fn of_view(
+        &self,
+        own: &SVector<f64, N_VIEW_PARAMETERS>,
+        covariance: &SMatrix<f64, N_VIEW_PARAMETERS, N_VIEW_PARAMETERS>,
+    ) -> TimeErrorOfView {
+        let by_error = self.by_sigma / (1.0 + self.told);
+        let var = 1.0 / (1.0 + self.told) + by_error.dot(&(covariance * by_error));
+        TimeErrorOfView { sigmas: by_error.dot(own), var }
+    }
+}
