@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 
 use rand::{Rng, RngExt};
 
-use armcal_belief::calib::online::{Fault, Follower, OnlineEvent, OnlineSettings, Oracle, ViewStream};
+use armcal_belief::calib::online::{Fault, Follower, OnlineEvent, OnlineSettings, Oracle, TagSet, ViewStream};
 use armcal_belief::calib::{FindingKind, View, WornSpot};
 use armcal_core::log::Recording;
 use armcal_core::robot::{FailedJoint, Robot};
@@ -216,6 +216,7 @@ impl DiveFault {
                 joint == self.joint
             }
             (K::Tag | K::Boom, Fault::Tag(tag)) => self.tags.contains(&tag),
+            (K::Boom, Fault::Tags(tags)) => tags.iter().all(|tag| self.tags.contains(&tag)),
             (K::Camera, Fault::Mount) => true,
             _ => false,
         }
@@ -398,6 +399,16 @@ fn explanations(robot: &Robot, fault: &DiveFault) -> Vec<Vec<Fault>> {
     std::iter::once(fault.explanation()).chain(others).collect()
 }
 
+/// The tags that a finding names: `1, 3 and 5`.
+fn tags_of(robot: &Robot, names: &str) -> Option<TagSet> {
+    let mut tags: Option<TagSet> = None;
+    for name in names.split(", ").flat_map(|part| part.split(" and ")) {
+        let tag = robot.tags.iter().position(|tag| tag.id.to_string() == name)?;
+        tags = tags.map_or_else(|| TagSet::of(tag), |tags| tags.with(tag));
+    }
+    tags
+}
+
 fn fault_of(robot: &Robot, event: &OnlineEvent) -> Option<Fault> {
     let name = &event.finding.name;
     let joint = || robot.sensors.iter().position(|sensor| sensor.joint == *name);
@@ -410,6 +421,7 @@ fn fault_of(robot: &Robot, event: &OnlineEvent) -> Option<Fault> {
             .zip(event.at_rad)
             .map(|(joint, at_rad)| Fault::Worn(joint, WornSpot::about(at_rad - robot.sensors[joint].center_rad))),
         FindingKind::TagMoved => tag().map(Fault::Tag),
+        FindingKind::TagsMoved => tags_of(robot, name).map(Fault::Tags),
         FindingKind::CameraMount => Some(Fault::Mount),
         FindingKind::Base => Some(Fault::Base),
         _ => None,

@@ -2,12 +2,14 @@
 //! each a belief of its own, until one of them leads, or two to five more views were seen.
 
 use crate::calib::online::filter::{Filter, ViewUpdate, WalkScore};
-use crate::calib::online::hypothesis::Fault;
+use crate::calib::online::hypothesis::{Fault, TagSet};
+use crate::calib::online::process_noise::ProcessNoise;
 use crate::calib::online::view_stream::is_moving;
 use crate::calib::parameters::WornSpot;
 use crate::calib::views::view::View;
-use armcal_core::joints::{JointAngles, MAX_JOINTS};
+use armcal_core::joints::MAX_JOINTS;
 use armcal_core::robot::Robot;
+use armcal_core::sensor::ConditionChange;
 
 /// A view is suspicious beyond this quantile of the normal by its cost (one in ten thousand).
 const SUSPICIOUS_Z: f64 = 3.719;
@@ -20,8 +22,12 @@ pub(crate) const NOTHING_FITS_NATS: f64 = 30.0;
 const LEAD_NATS: f64 = 5.0;
 /// The same over another explanation by the same sensor: which one it is matters more than how it failed.
 const LEAD_OF_SENSOR_NATS: f64 = 1.5;
-/// What one view at rest tells by this is taken for a worn spot, in nats.
+/// What one view at rest tells by this is taken for a worn spot, in nats; one in motion, whose readings may be torn.
 const LONE_LEAD_NATS: f64 = 10.0;
+const LONE_LEAD_IN_MOTION_NATS: f64 = 20.0;
+/// What one view tells of a tag is taken for true where it is not farther from its place than this, m.
+const LONE_TAG_M: f64 = 0.08;
+const LONE_TAG_LEAD_NATS: f64 = 1.5;
 /// A scale this close to the datasheet's is the drift of a sensor, not another sensor.
 const LEAST_SCALE: f64 = 0.2;
 /// A lower bump is the nonlinearity of a sound sensor, rad: 0.15 deg.
@@ -38,9 +44,14 @@ const MAX_RECENT: usize = 6;
 const MAX_VIEWS_TO_NAME: usize = 2;
 const MAX_VIEWS_OF_DRIFT: usize = 3;
 const MAX_VIEWS: usize = 5;
+/// Views after the first ones for which all explanations are opened.
+const OPEN_VIEWS: usize = 2;
+/// What a tag that moved with others explains at least, in nats.
+const JOINS_NATS: f64 = 3.0;
 const CONFIRMED_BY: usize = 2;
-/// The same for another scale: its two numbers explain any two views.
-const SCALE_CONFIRMED_BY: usize = 3;
+/// The same for another scale, whose two numbers explain any two views, and for a sensor that says nothing, which
+/// explains any.
+const OPEN_SENSOR_CONFIRMED_BY: usize = 3;
 
 /// One explanation, and the belief under it.
 #[derive(Clone)]
@@ -63,6 +74,14 @@ impl Branch {
         }
     }
 
+    /// Joint and place, where it is a worn spot.
+    fn worn_spot(&self) -> Option<(usize, WornSpot)> {
+        match self.fault {
+            Some(Fault::Worn(joint, spot)) => Some((joint, spot)),
+            _ => None,
+        }
+    }
+
     /// Whether it tells of something.
     fn tells(&self) -> bool {
         !matches!(self.fault, None | Some(Fault::Drift))
@@ -76,20 +95,30 @@ pub(crate) struct Race {
     branches: Vec<Branch>,
     /// The belief before the first suspicious view.
     before: Filter,
-    n_views: usize,
-    /// Of these, after it began.
+    steps: Vec<Step>,
+    /// Views after it began.
     n_later: usize,
-    /// Views of each tag of the robot.
-    n_views_of: Vec<usize>,
-    /// Where the joints stood in each view.
-    seen: Vec<SeenAt>,
 }
 
-/// Where the joints stood in a view.
+/// A view of a race, and what sensors may have changed since the one before.
 #[derive(Clone)]
-struct SeenAt {
-    travel_rad: JointAngles,
-    is_resting: bool,
+struct Step {
+    drift: Option<(ProcessNoise, ConditionChange)>,
+    view: View,
+}
+
+impl Step {
+    fn take_in(&self, robot: &Robot, branch: &mut Branch) {
+        let Branch { fault, filter, nats } = branch;
+        if let Some((noise, change)) = &self.drift {
+            let columns = noise.widening(filter, change);
+            filter.widen(&columns);
+        }
+        *nats += match filter.update(robot, &seen_by(*fault, &self.view)) {
+            Some(update) => update.log_evidence,
+            None => -NOTHING_FITS_NATS * self.view.tags.len() as f64,
+        };
+    }
 }
 
 /// What a race ended with.
@@ -156,52 +185,119 @@ pub(crate) fn is_suspicious(update: &ViewUpdate) -> bool {
 impl Race {
     /// Of all that could explain the views, which the belief before them does not.
     pub(crate) fn start(robot: &Robot, RecentViews { before, views, .. }: &RecentViews) -> Self {
-        let mut tags: Vec<usize> = views.iter().flat_map(|view| &view.tags).map(|tag| tag.tag_idx).collect();
-        tags.sort_unstable();
-        tags.dedup();
-        let faults = views.last().map(|last| Fault::all(before, &tags, last)).unwrap_or_default();
-        let faults = faults.into_iter().map(Some);
-        let branch = |fault: Option<Fault>| {
-            let mut filter = before.clone();
-            if let Some(fault) = fault {
-                fault.open(&mut filter, robot);
-            }
-            let nats = fault.map_or(0.0, Fault::ln_prior);
-            Branch { fault, filter, nats }
-        };
-        let branches = std::iter::once(None).chain(faults).map(branch).collect();
-        let n_views_of = vec![0; robot.tags.len()];
-        let mut race = Self { branches, before: before.clone(), n_views: 0, n_later: 0, n_views_of, seen: Vec::new() };
-        views.iter().for_each(|view| race.add(robot, view));
-        race.n_later = 0;
-        race.branches = keep_best(race.branches);
+        let steps = views.iter().map(|view| Step { drift: None, view: view.clone() }).collect();
+        let mut race = Self { branches: Vec::new(), before: before.clone(), steps, n_later: 0 };
+        race.open(robot);
         race
     }
 
-    /// Every explanation takes the view in.
-    pub(crate) fn add(&mut self, robot: &Robot, view: &View) {
-        self.n_views += 1;
+    /// Every explanation takes the view in, after what sensors may have changed before it. None is dropped at the first
+    /// ones, which open more: what a view of one tag cannot tell apart the next one does.
+    pub(crate) fn add(&mut self, robot: &Robot, drift: Option<(ProcessNoise, ConditionChange)>, view: &View) {
         self.n_later += 1;
-        self.seen.push(SeenAt { travel_rad: view.travel_rad, is_resting: !is_moving(view) });
-        view.tags.iter().for_each(|tag| self.n_views_of[tag.tag_idx] += 1);
-        for branch in &mut self.branches {
-            branch.nats += match branch.filter.update(robot, &seen_by(branch.fault, view)) {
-                Some(update) => update.log_evidence,
-                None => -NOTHING_FITS_NATS * view.tags.len() as f64,
-            };
+        let step = Step { drift, view: view.clone() };
+        self.branches.iter_mut().for_each(|branch| step.take_in(robot, branch));
+        self.steps.push(step);
+        if self.n_later <= OPEN_VIEWS {
+            self.open(robot);
+        } else {
+            self.sort();
         }
-        let is_void = |branch: &Branch| branch.is_void(&self.before);
-        self.branches.sort_by(|a, b| is_void(a).cmp(&is_void(b)).then(b.nats.total_cmp(&a.nats)));
-        let best = self.nats();
-        self.branches.retain(|branch| branch.fault.is_none() || best - branch.nats < HOPELESS_NATS);
+        if self.n_later >= OPEN_VIEWS {
+            self.drop_hopeless();
+        }
     }
 
-    /// Widens every explanation.
-    pub(crate) fn widen(&mut self, by: impl Fn(&Filter) -> Vec<(usize, f64)>) {
-        for branch in &mut self.branches {
-            let columns = by(&branch.filter);
-            branch.filter.widen(&columns);
+    /// All explanations of the views so far that are not followed yet.
+    fn open(&mut self, robot: &Robot) {
+        let views: Vec<&View> = self.steps.iter().map(|step| &step.view).collect();
+        let all = std::iter::once(None).chain(Fault::all(&self.before, &views).into_iter().map(Some));
+        for fault in all {
+            if self.of(fault).is_none() {
+                self.branches.push(self.branch(robot, fault));
+            }
         }
+        if let Some(nearer) = self.nearer_spot(robot) {
+            self.branches.push(nearer);
+        }
+        if let Some(together) = self.moved_together(robot) {
+            self.branches.retain(|branch| !matches!(branch.fault, Some(Fault::Tags(_))));
+            self.branches.push(together);
+        }
+        self.sort();
+    }
+
+    /// Keeps the best ones, and that nothing happened.
+    fn drop_hopeless(&mut self) {
+        let best = self.nats();
+        let mut place = 0;
+        self.branches.retain(|branch| {
+            place += 1;
+            branch.fault.is_none() || (place <= MAX_BRANCHES && best - branch.nats < HOPELESS_NATS)
+        });
+    }
+
+    fn of(&self, fault: Option<Fault>) -> Option<&Branch> {
+        self.branches.iter().find(|branch| branch.fault == fault)
+    }
+
+    /// An explanation that took all views in.
+    fn branch(&self, robot: &Robot, fault: Option<Fault>) -> Branch {
+        let mut filter = self.before.clone();
+        if let Some(fault) = fault {
+            fault.open(&mut filter, robot);
+        }
+        let mut branch = Branch { fault, filter, nats: fault.map_or(0.0, Fault::ln_prior) };
+        self.steps.iter().for_each(|step| step.take_in(robot, &mut branch));
+        branch
+    }
+
+    /// The worn spot that explains most, with its middle half a width aside where that explains more: a view stands
+    /// anywhere on it.
+    fn nearer_spot(&self, robot: &Robot) -> Option<Branch> {
+        let spots = self.branches.iter().filter_map(|branch| Some((branch, branch.worn_spot()?)));
+        let (found, (joint, spot)) = spots.max_by(|(a, _), (b, _)| a.nats.total_cmp(&b.nats))?;
+        let aside = [-0.5, 0.5].map(|by| WornSpot::about(spot.at_rad() + by * WornSpot::WIDTH_RAD));
+        let branches = aside.map(|spot| Some(Fault::Worn(joint, spot))).into_iter();
+        let new = branches.filter(|fault| self.of(*fault).is_none()).map(|fault| self.branch(robot, fault));
+        new.filter(|branch| branch.nats > found.nats).max_by(|a, b| a.nats.total_cmp(&b.nats))
+    }
+
+    /// From the tag that explains most, or those found so far, one tag after another that belongs to them; `None` where
+    /// no other does.
+    fn moved_together(&self, robot: &Robot) -> Option<Branch> {
+        let best = |is_wanted: fn(Fault) -> bool| {
+            let wanted = self.branches.iter().filter(|branch| branch.fault.is_some_and(is_wanted));
+            wanted.max_by(|a, b| a.nats.total_cmp(&b.nats))
+        };
+        let alone = best(|fault| matches!(fault, Fault::Tag(_)))?;
+        let found = best(|fault| matches!(fault, Fault::Tags(_))).filter(|found| found.nats > alone.nats);
+        let mut set = match found.unwrap_or(alone).fault {
+            Some(Fault::Tags(tags)) => tags,
+            Some(Fault::Tag(tag)) if alone.nats > self.of(None)?.nats => TagSet::of(tag)?,
+            _ => return None,
+        };
+        let mut tags: Vec<usize> = self.steps.iter().flat_map(|step| &step.view.tags).map(|tag| tag.tag_idx).collect();
+        tags.sort_unstable();
+        tags.dedup();
+        let mut together: Option<Branch> = None;
+        // All of them together are a moved base.
+        while set.iter().count() + 1 < tags.len() {
+            let wider = tags.iter().filter_map(|tag| set.with(*tag));
+            let branches = wider.map(|set| (set, self.branch(robot, Some(Fault::Tags(set)))));
+            let Some((wider, best)) = branches.max_by(|(_, a), (_, b)| a.nats.total_cmp(&b.nats)) else { break };
+            if best.nats < together.as_ref().or(found).unwrap_or(alone).nats + JOINS_NATS {
+                break;
+            }
+            (set, together) = (wider, Some(best));
+        }
+        together
+    }
+
+    /// The best one first; what is none comes last.
+    fn sort(&mut self) {
+        let before = &self.before;
+        self.branches.sort_by(|a, b| a.is_void(before).cmp(&b.is_void(before)).then(b.nats.total_cmp(&a.nats)));
     }
 
     /// The best explanation so far.
@@ -211,8 +307,7 @@ impl Race {
 
     /// The belief to go on with: the best explanation's, that nothing happened where it is not confirmed.
     pub(crate) fn belief(&self) -> Option<&Filter> {
-        let nothing = || self.branches.iter().find(|branch| branch.fault.is_none());
-        let best = self.best().filter(|best| self.is_confirmed(best.fault)).or_else(nothing).or(self.best());
+        let best = self.best().filter(|best| self.is_confirmed(best.fault)).or_else(|| self.of(None)).or(self.best());
         best.map(|branch| &branch.filter)
     }
 
@@ -246,24 +341,40 @@ impl Race {
             None => true,
             // What drifted shows in all views; a weak one must not settle it.
             Some(Fault::Drift) => self.n_later >= MAX_VIEWS,
-            Some(Fault::Tag(tag)) => self.n_views_of[tag] >= CONFIRMED_BY,
+            Some(Fault::Tag(tag)) => self.n_views_of(tag) >= CONFIRMED_BY || self.is_lone_tag_confirmed(tag),
+            Some(Fault::Tags(tags)) => tags.iter().map(|tag| self.n_views_of(tag)).sum::<usize>() > CONFIRMED_BY,
             Some(Fault::Worn(joint, spot)) => self.is_spot_confirmed(joint, spot),
-            Some(Fault::Scale(_)) => self.n_views >= SCALE_CONFIRMED_BY,
-            Some(_) => self.n_views >= CONFIRMED_BY,
+            Some(Fault::Scale(_) | Fault::Failed(_)) => self.steps.len() >= OPEN_SENSOR_CONFIRMED_BY,
+            Some(_) => self.steps.len() >= CONFIRMED_BY,
         }
     }
 
-    /// Views of the spot alone do not tell it from a slip; one view of it alone may be a mistake, unless the arm was at
-    /// rest and it is clear.
+    /// Views that saw a tag.
+    fn n_views_of(&self, tag: usize) -> usize {
+        self.steps.iter().filter(|step| step.view.tags.iter().any(|seen| seen.tag_idx == tag)).count()
+    }
+
+    /// A tag that one view saw: read as another one it would be as far away as they are from each other.
+    fn is_lone_tag_confirmed(&self, tag: usize) -> bool {
+        let fault = Fault::Tag(tag);
+        let (Some(moved), Some(nothing)) = (self.of(Some(fault)), self.of(None)) else { return false };
+        let is_near = fault.size(&self.before, &moved.filter).is_some_and(|by_m| by_m < LONE_TAG_M);
+        self.n_later >= MAX_VIEWS_TO_NAME && is_near && moved.nats - nothing.nats > LONE_TAG_LEAD_NATS
+    }
+
+    /// Views of the spot alone do not tell it from a slip; one view of it alone may be a mistake, unless it is clear.
     fn is_spot_confirmed(&self, joint: usize, spot: WornSpot) -> bool {
-        let later = &self.seen[self.seen.len() - self.n_later..];
-        if !later.iter().any(|seen| spot.is_far_from(seen.travel_rad[joint])) {
+        let travel_rad = |step: &Step| step.view.travel_rad[joint];
+        let later = &self.steps[self.steps.len() - self.n_later..];
+        if !later.iter().any(|step| spot.is_far_from(travel_rad(step))) {
             return false;
         }
-        let about = || self.seen.iter().filter(|seen| spot.is_about(seen.travel_rad[joint]));
-        let nats = |fault| self.branches.iter().find(|branch| branch.fault == fault).map_or(f64::MIN, |b| b.nats);
+        let about = || self.steps.iter().filter(|step| spot.is_about(travel_rad(step)));
+        let nats = |fault| self.of(fault).map_or(f64::MIN, |branch| branch.nats);
         let lead_nats = nats(Some(Fault::Worn(joint, spot))) - nats(None);
-        about().count() >= CONFIRMED_BY || (lead_nats > LONE_LEAD_NATS && about().any(|seen| seen.is_resting))
+        let is_clear =
+            |step: &Step| lead_nats > if is_moving(&step.view) { LONE_LEAD_IN_MOTION_NATS } else { LONE_LEAD_NATS };
+        about().count() >= CONFIRMED_BY || about().any(is_clear)
     }
 
     fn lead_nats(&self) -> f64 {
@@ -273,9 +384,14 @@ impl Race {
         }
     }
 
-    /// All explanations but the best, those aside that are none.
+    /// All explanations but the best, those aside that are none, and the same worn spot with its middle elsewhere.
     fn others(&self) -> impl Iterator<Item = &Branch> {
-        self.branches.iter().skip(1).filter(|branch| !branch.is_void(&self.before))
+        let best = self.best().and_then(Branch::worn_spot);
+        let is_same = move |branch: &Branch| {
+            let both = best.zip(branch.worn_spot());
+            both.is_some_and(|((joint, at), (other, near))| joint == other && at.is_about(near.at_rad()))
+        };
+        self.branches.iter().skip(1).filter(move |branch| !is_same(branch) && !branch.is_void(&self.before))
     }
 
     /// What it ended with; `None` where nothing happened.
@@ -290,13 +406,6 @@ impl Race {
             next: self.others().next().and_then(|branch| branch.fault),
         })
     }
-}
-
-/// The best ones, and that nothing happened.
-fn keep_best(branches: Vec<Branch>) -> Vec<Branch> {
-    let all = branches.into_iter().enumerate();
-    let kept = all.filter(|(place, branch)| *place < MAX_BRANCHES || branch.fault.is_none());
-    kept.map(|(_, branch)| branch).collect()
 }
 
 /// A view under a fault: a failed sensor's reading is not looked at.

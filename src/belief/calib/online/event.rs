@@ -36,7 +36,7 @@ impl OnlineEvent {
     pub(crate) fn of_verdict(robot: &Robot, verdict: &Verdict, since: Stamp, now: Stamp) -> Self {
         let unit = match verdict.fault {
             Fault::Slip(_) | Fault::Worn(..) | Fault::Mount => FindingUnit::Radian,
-            Fault::Tag(_) | Fault::Base => FindingUnit::Metre,
+            Fault::Tag(_) | Fault::Tags(_) | Fault::Base => FindingUnit::Metre,
             Fault::Scale(_) | Fault::Failed(_) | Fault::Drift => FindingUnit::One,
         };
         let is_reversed = matches!(verdict.fault, Fault::Scale(_)) && verdict.size.is_some_and(|slope| slope < 0.0);
@@ -91,6 +91,7 @@ impl OnlineEvent {
                 )
             }
             FindingKind::TagMoved => format!("tag {name} was moved by {:.1} mm", 1e3 * size),
+            FindingKind::TagsMoved => format!("tags {name} were moved together by {:.1} mm", 1e3 * size),
             FindingKind::CameraMount => format!("the camera turned on its mount by {:.2} deg", size.to_degrees()),
             _ => format!("the {name} or all tags have moved by {:.1} mm", 1e3 * size),
         };

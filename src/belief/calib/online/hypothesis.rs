@@ -22,6 +22,43 @@ const LN_PRIOR: f64 = -7.0;
 /// at one place it is a slip.
 const LN_PRIOR_OF_WORN: f64 = -10.5;
 
+/// Tags of one carrier, by their indices.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct TagSet {
+    /// In rising order, those in use first.
+    indices: [u16; Self::MOST],
+    n: u8,
+}
+
+impl TagSet {
+    /// More are not told apart from a moved base.
+    pub const MOST: usize = 12;
+
+    /// One tag; `None` beyond the index that fits.
+    #[must_use]
+    pub fn of(tag: usize) -> Option<Self> {
+        Self { indices: [0; Self::MOST], n: 0 }.with(tag)
+    }
+
+    /// With one more; `None` where it is among them, or there are too many.
+    #[must_use]
+    pub fn with(mut self, tag: usize) -> Option<Self> {
+        let (tag, n) = (u16::try_from(tag).ok()?, usize::from(self.n));
+        if n == Self::MOST || self.indices[..n].contains(&tag) {
+            return None;
+        }
+        self.indices[n] = tag;
+        self.n += 1;
+        self.indices[..=n].sort_unstable();
+        Some(self)
+    }
+
+    /// The indices, rising.
+    pub fn iter(&self) -> impl Iterator<Item = usize> + '_ {
+        self.indices[..usize::from(self.n)].iter().map(|tag| usize::from(*tag))
+    }
+}
+
 /// What may have happened.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Fault {
@@ -35,6 +72,8 @@ pub enum Fault {
     Worn(usize, WornSpot),
     /// The tag of that index was knocked aside.
     Tag(usize),
+    /// Tags on one carrier were knocked aside together.
+    Tags(TagSet),
     /// The camera slipped on its mount.
     Mount,
     /// All tags together moved, or the arm's base.
@@ -44,13 +83,21 @@ pub enum Fault {
 }
 
 impl Fault {
-    /// All that views with these tags could tell of, of which `last` is the last one; sensors that are not looked at
-    /// are not asked.
-    pub(crate) fn all(filter: &Filter, tags: &[usize], last: &View) -> Vec<Self> {
+    /// All that views could tell of; sensors that are not looked at are not asked. Tags that moved together are found
+    /// by the evidence of one.
+    pub(crate) fn all(filter: &Filter, views: &[&View]) -> Vec<Self> {
+        let (Some(first), Some(last)) = (views.first(), views.last()) else { return Vec::new() };
+        let mut tags: Vec<usize> = views.iter().flat_map(|view| &view.tags).map(|tag| tag.tag_idx).collect();
+        tags.sort_unstable();
+        tags.dedup();
         let joints = filter.offsets().map(|(joint, _)| joint).filter(|&joint| !last.is_free[joint]);
         let joints: Vec<usize> = joints.collect();
-        let worn = |&joint: &usize| Self::Worn(joint, WornSpot::about(last.travel_rad[joint]));
-        let of_spots: Vec<Self> = joints.iter().filter(|joint| !filter.has_bump(**joint)).map(worn).collect();
+        let worn = |&joint: &usize| {
+            let spots = [last, first].map(|view| WornSpot::about(view.travel_rad[joint]));
+            let is_other = !spots[0].is_about(spots[1].at_rad());
+            spots.into_iter().take(1 + usize::from(is_other)).map(move |spot| Self::Worn(joint, spot))
+        };
+        let of_spots: Vec<Self> = joints.iter().filter(|joint| !filter.has_bump(**joint)).flat_map(worn).collect();
         let of_joint = |joint: usize| [Self::Slip(joint), Self::Scale(joint), Self::Failed(joint)];
         let of_tags = tags.iter().map(|&tag| Self::Tag(tag)).filter(|_| tags.len() > 1);
         let of_mount = filter.mount_column().map(|_| Self::Mount);
@@ -95,6 +142,7 @@ impl Fault {
                 filter.add_parameter(robot, Parameter { joint, kind: ParameterKind::Bump(spot) });
             }
             Self::Tag(tag) => filter.widen(&six(filter.tag_column(tag), TAG_STD)),
+            Self::Tags(tags) => filter.widen_along(&carrier_directions(filter, tags)),
             Self::Mount => filter.widen(&six(filter.mount_column(), MOUNT_STD)),
             Self::Base => {
                 let along = base_directions(filter, robot);
@@ -120,6 +168,7 @@ impl Fault {
             Self::Scale(_) => FindingKind::SensorScale,
             Self::Failed(_) => FindingKind::SensorFailed,
             Self::Tag(_) => FindingKind::TagMoved,
+            Self::Tags(_) => FindingKind::TagsMoved,
             Self::Mount => FindingKind::CameraMount,
             Self::Base => FindingKind::Base,
             Self::Worn(..) | Self::Drift => FindingKind::SensorWorn,
@@ -134,6 +183,10 @@ impl Fault {
                 robot.sensors[joint].joint.clone()
             }
             Self::Tag(tag) => robot.tags[tag].id.to_string(),
+            Self::Tags(tags) => {
+                let ids: Vec<String> = tags.iter().map(|tag| robot.tags[tag].id.to_string()).collect();
+                ids.split_last().map_or_else(String::new, |(last, first)| format!("{} and {last}", first.join(", ")))
+            }
             Self::Mount => "camera mount".to_owned(),
             Self::Base => "base".to_owned(),
             Self::Drift => "sensors".to_owned(),
@@ -149,6 +202,7 @@ impl Fault {
             Self::Failed(_) => format!("the sensor of {name} says nothing any more"),
             Self::Worn(..) => format!("the sensor of {name} is worn at one place"),
             Self::Tag(_) => format!("tag {name} was moved"),
+            Self::Tags(_) => format!("tags {name} were moved together"),
             Self::Mount => "the camera has moved on its mount".to_owned(),
             Self::Base => "the base or all tags have moved".to_owned(),
             Self::Drift => "all sensors drifted more than expected".to_owned(),
@@ -168,11 +222,20 @@ impl Fault {
             Self::Scale(joint) => Some(after.parameters().gain[joint]),
             Self::Worn(joint, _) => Some(-after.parameters().terms[joint].bump.height_rad),
             Self::Failed(_) | Self::Drift => None,
-            Self::Tag(tag) => Some((after.tag(tag).translation.vector - before.tag(tag).translation.vector).norm()),
+            Self::Tag(tag) => Some(moved_m(before, after, tag)),
+            Self::Tags(tags) => {
+                let mut all_m: Vec<f64> = tags.iter().map(|tag| moved_m(before, after, tag)).collect();
+                all_m.sort_by(f64::total_cmp);
+                all_m.get(all_m.len() / 2).copied()
+            }
             Self::Mount => Some((before.mount().rotation.inverse() * after.mount().rotation).angle()),
-            Self::Base => Some((after.tag(0).translation.vector - before.tag(0).translation.vector).norm()),
+            Self::Base => Some(moved_m(before, after, 0)),
         }
     }
+}
+
+fn moved_m(before: &Filter, after: &Filter, tag: usize) -> f64 {
+    (after.tag(tag).translation.vector - before.tag(tag).translation.vector).norm()
 }
 
 fn column(filter: &Filter, joint: usize, kind: ParameterKind) -> Option<usize> {
@@ -182,6 +245,19 @@ fn column(filter: &Filter, joint: usize, kind: ParameterKind) -> Option<usize> {
 fn six(at: Option<usize>, [shift, turn]: [f64; 2]) -> Vec<(usize, f64)> {
     let variance = |k: usize| if k < 3 { shift * shift } else { turn * turn };
     at.into_iter().flat_map(|at| (0..6).map(move |k| (at + k, variance(k)))).collect()
+}
+
+/// Tags by a small motion of the first of them that carries the others along, each column times one sigma.
+fn carrier_directions(filter: &Filter, tags: TagSet) -> DMatrix<f64> {
+    let mut along = DMatrix::zeros(filter.n_columns(), 6);
+    let std = Matrix6::from_diagonal(&nalgebra::Vector6::from_fn(|k, _| TAG_STD[k / 3]));
+    let Some(first) = tags.iter().next().map(|tag| *filter.tag(tag)) else { return along };
+    for tag in tags.iter() {
+        let Some(at) = filter.tag_column(tag) else { continue };
+        let by_first = adjoint(&filter.tag(tag).inv_mul(&first)) * std;
+        along.fixed_view_mut::<6, 6>(at, 0).copy_from(&by_first);
+    }
+    along
 }
 
 /// All tags by a small motion of the frame that they are known in, each column times one sigma.

@@ -236,10 +236,11 @@ impl Member {
 
     fn carry_on(&mut self, view: &View) -> Option<ViewUpdate> {
         let running = self.running.as_mut()?;
+        let mut drift = None;
         if self.settings.drift == DriftModel::Tuned {
             let change = view.conditions.departure_from(&running.conditions);
-            if let Some(race) = &mut running.race {
-                race.widen(|filter| running.noise.widening(filter, &change));
+            if running.race.is_some() {
+                drift = Some((running.noise.clone(), change));
             } else {
                 running.noise.widen(&mut running.filter, &change);
             }
@@ -247,7 +248,7 @@ impl Member {
         }
         if let Some(race) = &mut running.race {
             let before = race.nats();
-            race.add(&self.robot, view);
+            race.add(&self.robot, drift, view);
             self.nats = FORGETTING * self.nats + race.nats() - before;
             self.settle_race(view.end);
             return None;

@@ -27,7 +27,7 @@ pub use belief_log::{BeliefLine, BeliefLog};
 pub use estimator::OnlineEstimator;
 pub use event::OnlineEvent;
 pub use follower::{BeliefRow, Follower};
-pub use hypothesis::Fault;
+pub use hypothesis::{Fault, TagSet};
 pub use oracle::{Oracle, OracleGain};
 pub use settings::{DriftModel, FaultSearch, OnlineSettings, online_model};
 pub use view_stream::ViewStream;

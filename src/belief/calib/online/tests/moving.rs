@@ -2,7 +2,7 @@
 
 use rand::RngExt;
 
-use crate::calib::bundle::tests::data::{rng, titan};
+use crate::calib::bundle::tests::data::{normal, rng, titan};
 use crate::calib::online::estimator::OnlineEstimator;
 use crate::calib::online::settings::OnlineSettings;
 use crate::calib::online::tests::drifting::Dive;
@@ -42,6 +42,41 @@ fn a_clock_offset_is_found_by_sensors_of_any_slope() {
     let mean_s = found_s.iter().sum::<f64>() / found_s.len() as f64;
     // By the datasheet's slope it would be 1.7 ms short.
     assert!((mean_s - LATE_S).abs() < 0.8e-3, "{found_s:?}");
+}
+
+/// An image's time error moves all joints together: its share in the clock offset is that of the number of images, not
+/// of joints.
+#[test]
+fn a_clock_offset_is_as_uncertain_as_it_says() {
+    const LATE_S: f64 = 0.035;
+    const JITTER_S: f64 = 0.005;
+    let robot = titan();
+    let mut sigmas = Vec::new();
+    for seed in 0..12 {
+        let mut dive = Dive::new(&robot, seed);
+        let mut rates = rng(seed, "rates");
+        let mut online = OnlineEstimator::new(robot.clone(), OnlineSettings::default());
+        for k in 0..24 {
+            dive.advance(&mut online, 12.0 * f64::from(k));
+            online.add_view(&dive.view());
+        }
+        for k in 0..60 {
+            dive.advance(&mut online, 300.0 + f64::from(k));
+            let mut view = dive.view();
+            let late_s = LATE_S + JITTER_S * normal(&mut rates);
+            for joint in 0..robot.n_joints() {
+                let rate_rad_s = rates.random_range(0.05..0.2) * if rates.random_bool(0.5) { 1.0 } else { -1.0 };
+                view.rate_rad_s[joint] = rate_rad_s;
+                view.travel_rad[joint] -= rate_rad_s * late_s;
+            }
+            online.add_view(&view);
+        }
+        let [offset_s, std_s] = online.clock_offset_s().expect("it runs");
+        sigmas.push((offset_s - LATE_S) / std_s);
+    }
+    let rms = (sigmas.iter().map(|by| by * by).sum::<f64>() / sigmas.len() as f64).sqrt();
+    println!("rms {rms:.2} of {sigmas:.2?}");
+    assert!((0.5..1.5).contains(&rms), "{sigmas:?}");
 }
 
 /// Rests scatter by the backlash, for their sides are not known, and images in motion tell its size: of what a rest's
