@@ -8,8 +8,7 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 
 use crate::calib::bundle::linearize::NormalEquations;
 use crate::calib::bundle::model::{Hyperparameters, SHAPE_LENGTH};
-use crate::calib::bundle::problem::{BundleProblem, State, WeightedMeasurement};
-use crate::calib::bundle::schur::N_VIEW_PARAMETERS;
+use crate::calib::bundle::problem::{BundleProblem, N_VIEW_PARAMETERS, State, WeightedMeasurement};
 use crate::calib::bundle::walk_modes::mode_std;
 use crate::calib::parameters::ParameterKind;
 use armcal_core::joints::MAX_JOINTS;

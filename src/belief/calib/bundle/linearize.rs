@@ -11,10 +11,8 @@ use nalgebra::{DMatrix, DVector, Matrix6, SMatrix, SVector, Vector6};
 
 use crate::calib::bundle::body_twists::{BodySums, body_twists, sag_twist};
 use crate::calib::bundle::observation_term::{LensInformation, PoseInformation, right_jacobian_inverse};
-use crate::calib::bundle::problem::{BundleProblem, State};
-use crate::calib::bundle::schur::{
-    BodyTwists, Columns, Directions, Group, MOUNT, N_DIRECTIONS, N_VIEW_PARAMETERS, Own, SchurBlock, TIME,
-};
+use crate::calib::bundle::problem::{BundleProblem, N_VIEW_PARAMETERS, Own, State};
+use crate::calib::bundle::schur::{BodyTwists, Columns, Directions, Group, MOUNT, N_DIRECTIONS, SchurBlock, TIME};
 use crate::calib::bundle::time_error::TimeError;
 use armcal_core::joints::MAX_JOINTS;
 use armcal_core::kinematics::LinkCorrections;

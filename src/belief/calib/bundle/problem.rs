@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use nalgebra::{DMatrix, DVector, Isometry3, Vector3};
+use nalgebra::{DMatrix, DVector, Isometry3, SMatrix, Vector3};
 
 use crate::calib::bundle::input::BundleInput;
 use crate::calib::bundle::model::{Hyperparameters, Model};
@@ -161,6 +161,11 @@ impl State {
         self.camera_error.copy_from_slice(&other.camera_error);
     }
 }
+
+/// A view's own parameters: an error of each joint, then the camera's six.
+pub(crate) const N_VIEW_PARAMETERS: usize = MAX_JOINTS + 6;
+/// Of a view's own parameters by one another.
+pub(crate) type Own = SMatrix<f64, N_VIEW_PARAMETERS, N_VIEW_PARAMETERS>;
 
 /// Least standard deviation of a prior: what is said to be exact stays where it is.
 const MIN_STD: f64 = 1e-9;

@@ -4,20 +4,17 @@ use std::ops::Range;
 
 use nalgebra::{Const, DMatrix, DVector, Isometry3, Matrix6, SMatrix, SVector, Vector6};
 
-use crate::calib::bundle::problem::{BundleProblem, Layout, State, ViewData};
+use crate::calib::bundle::problem::{BundleProblem, Layout, N_VIEW_PARAMETERS, Own, State, ViewData};
 use crate::calib::bundle::time_error::TimeError;
 use armcal_core::joints::MAX_JOINTS;
 use armcal_core::kinematics::LinkPoses;
 use armcal_core::spatial::adjoint;
 
-/// A view's own parameters: an error of each joint, then the camera's six.
-pub(crate) const N_VIEW_PARAMETERS: usize = MAX_JOINTS + 6;
 /// Directions of the common parameters: each joint, mount, time offset.
 pub(crate) const N_DIRECTIONS: usize = MAX_JOINTS + 7;
 pub(crate) const MOUNT: usize = MAX_JOINTS;
 pub(crate) const TIME: usize = MAX_JOINTS + 6;
 
-pub(crate) type Own = SMatrix<f64, N_VIEW_PARAMETERS, N_VIEW_PARAMETERS>;
 pub(crate) type Directions = SMatrix<f64, 6, N_DIRECTIONS>;
 
 /// Columns of all links that an arm may have, of their compliances, the base's and a load at the tool.

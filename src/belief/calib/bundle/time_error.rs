@@ -6,8 +6,7 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use crate::calib::bundle::problem::{BundleProblem, ViewData};
-use crate::calib::bundle::schur::{N_VIEW_PARAMETERS, Own};
+use crate::calib::bundle::problem::{BundleProblem, N_VIEW_PARAMETERS, Own, ViewData};
 
 /// Of what a joint of a moving arm is off by itself, rad^2: the inverse takes differences.
 const LEAST_OWN_VAR: f64 = 1e-14;
