@@ -59,16 +59,17 @@ pub enum FindingKind {
     SensorScale,
     /// A joint or sensor that failed otherwise.
     SensorFailed,
-    /// A sensor with more error from view to view than its datasheet allows; the size is one sigma.
+    /// A sensor with more error from view to view than its datasheet allows, or, repaired, one whose offset walks at
+    /// random; the size is one sigma.
     SensorWorn,
     /// Tag observations that the fit rejected; the size is their number.
     Outliers,
 }
 
 impl FindingKind {
-    /// In words: `moved tag`.
+    /// In words: `tag moved`.
     #[must_use]
-    pub fn words(self) -> &'static str {
+    fn words(self) -> &'static str {
         match self {
             Self::TagMoved => "tag moved",
             Self::TagsMoved => "tags moved together",
@@ -84,13 +85,23 @@ impl FindingKind {
             Self::SensorReversed => "sensor reads the other way",
             Self::SensorScale => "sensor of another scale",
             Self::SensorFailed => "joint or sensor failed",
-            Self::SensorWorn => "sensor worn",
+            Self::SensorWorn => "random error beyond the datasheet",
             Self::Outliers => "tag observations rejected",
         }
     }
 }
 
 impl Finding {
+    /// What was found, in words: `tag moved`.
+    #[must_use]
+    pub fn words(&self) -> &'static str {
+        match (self.kind, self.repaired) {
+            // A random error from view to view is not repaired; a walk is counted in.
+            (FindingKind::SensorWorn, true) => "offset walks at random",
+            (kind, _) => kind.words(),
+        }
+    }
+
     /// The size in units that people measure in: `12.0 mm`.
     #[must_use]
     pub fn size_in_words(&self) -> Option<String> {
