@@ -59,9 +59,10 @@ pub enum FindingKind {
     SensorScale,
     /// A joint or sensor that failed otherwise.
     SensorFailed,
-    /// A sensor with more error from view to view than its datasheet allows, or, repaired, one whose offset walks at
-    /// random; the size is one sigma.
+    /// A sensor with more error from view to view than its datasheet allows; the size is one sigma.
     SensorWorn,
+    /// A sensor whose offset walks at random; the size is one sigma over the views.
+    OffsetWalks,
     /// Tag observations that the fit rejected; the size is their number.
     Outliers,
 }
@@ -69,7 +70,7 @@ pub enum FindingKind {
 impl FindingKind {
     /// In words: `tag moved`.
     #[must_use]
-    fn words(self) -> &'static str {
+    pub fn words(self) -> &'static str {
         match self {
             Self::TagMoved => "tag moved",
             Self::TagsMoved => "tags moved together",
@@ -85,23 +86,14 @@ impl FindingKind {
             Self::SensorReversed => "sensor reads the other way",
             Self::SensorScale => "sensor of another scale",
             Self::SensorFailed => "joint or sensor failed",
-            Self::SensorWorn => "random error beyond the datasheet",
+            Self::SensorWorn => "sensor worn",
+            Self::OffsetWalks => "offset walks at random",
             Self::Outliers => "tag observations rejected",
         }
     }
 }
 
 impl Finding {
-    /// What was found, in words: `tag moved`.
-    #[must_use]
-    pub fn words(&self) -> &'static str {
-        match (self.kind, self.repaired) {
-            // A random error from view to view is not repaired; a walk is counted in.
-            (FindingKind::SensorWorn, true) => "offset walks at random",
-            (kind, _) => kind.words(),
-        }
-    }
-
     /// The size in units that people measure in: `12.0 mm`.
     #[must_use]
     pub fn size_in_words(&self) -> Option<String> {

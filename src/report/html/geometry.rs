@@ -23,7 +23,7 @@ fn findings(findings: &[Finding]) -> Markup {
             tr { th { "what" } th { "which" } th { "how much" } th { "at the tool" } th { "repaired" } }
             @for finding in findings {
                 tr {
-                    td { (finding.words()) }
+                    td { (finding.kind.words()) }
                     td { (finding.name) }
                     td { (finding.size_in_words().unwrap_or_else(|| "-".to_owned())) }
                     td { (Unit::Metres.shown_if(finding.tool_error_m, 1)) }
