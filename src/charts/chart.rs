@@ -201,7 +201,6 @@ fn most_labels(axis: Axis, (low, high): Range) -> usize {
 
 fn label(axis: Axis, value: f64) -> String {
     match axis {
-        Axis::Whole if (value - value.round()).abs() > 1e-6 => String::new(),
         Axis::Downward => number(-value),
         _ => number(value),
     }
