@@ -23,7 +23,7 @@ trap 'test -z "$viewer" || kill "$viewer" 2>/dev/null; rm -rf "$work"' EXIT INT 
 # One picture of the viewer: the arm at a target after calibration.
 seconds=325 port=9976
 RUST_LOG=error rerun "$work/run/run.rrd" --headless --bind 127.0.0.1 --port $port --renderer vulkan \
-    --window-size 1400x875 >"$work/viewer.log" 2>&1 &
+    --window-size 1600x1000 >"$work/viewer.log" 2>&1 &
 viewer=$!
 sleep 10
 ask() { # ID METHOD PARAMETERS
@@ -55,7 +55,7 @@ picture() { # PAGE WIDTH HEIGHT OUT: the top of a page, in light colors
 }
 
 # Without the viewer's own title bar.
-echo '<body style="margin:-26px 0 0"><img src="replay.png"></body>' >"$work/replay.html"
+echo '<body style="margin:-26px 0 0"><img src="replay.png" width="1400"></body>' >"$work/replay.html"
 picture "$work/replay.html" 1400 849 docs/replay.png
 picture "$work/run/report.html" 1000 1330 docs/report.png
 ls -l docs/replay.png docs/report.png
