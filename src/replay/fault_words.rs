@@ -37,9 +37,14 @@ impl Fault {
         parts.iter().filter_map(number).map(|part| part * part).sum::<f64>().sqrt()
     }
 
-    /// `by 41.2 mm and 5.7 deg`.
+    /// `by 41.2 mm and 5.7 deg`, or what there is of both.
     fn shift(&self) -> String {
-        format!("by {:.1} mm and {:.1} deg", 1e3 * self.length("by_m"), self.length("by_rad").to_degrees())
+        let (mm, deg) = (1e3 * self.length("by_m"), self.length("by_rad").to_degrees());
+        match (mm > 0.0, deg > 0.0) {
+            (_, false) => format!("by {mm:.1} mm"),
+            (false, true) => format!("by {deg:.1} deg"),
+            (true, true) => format!("by {mm:.1} mm and {deg:.1} deg"),
+        }
     }
 
     fn of_sensor(&self, kind: &str) -> Option<String> {
@@ -106,7 +111,7 @@ mod tests {
                 "by_m = [0.04, 0.0, 0.01], by_rad = [0.0, 0.0, 0.1], id = 1",
                 "tag 1 was knocked aside by 41.2 mm and 5.7 deg",
             ),
-            ("tag_moved", "by_m = [0.0, 0.003, 0.0], id = 4", "tag 4 was knocked aside by 3.0 mm and 0.0 deg"),
+            ("tag_moved", "by_m = [0.0, 0.003, 0.0], id = 4", "tag 4 was knocked aside by 3.0 mm"),
             ("tag_misread", "as_id = 2, id = 7", "tag 7 is read as tag 2"),
             ("silt", "seconds = 20.0", "silt: the camera sees nothing for 20 s"),
             ("pressure_lost", "ratio = 0.5", "the pump lost 50 % of its pressure"),

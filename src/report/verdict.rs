@@ -133,7 +133,7 @@ fn attention(summary: &RunSummary) -> Vec<String> {
 fn against_prior(prior: &PriorTable) -> String {
     let PriorTable { worst_joint: joint, worst_off_rad, used, .. } = prior;
     let fate = if *used { "it is in the result all the same" } else { "the result rests on the new views alone" };
-    let off_deg = worst_off_rad.to_degrees();
+    let off_deg = worst_off_rad.to_degrees().abs();
     format!("The earlier calibration contradicts the new views, {joint} the most, by {off_deg:.2} deg: {fate}.")
 }
 
