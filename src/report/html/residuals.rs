@@ -66,6 +66,7 @@ fn by_tag(views: &[ViewResidual]) -> Markup {
     }
     let has_corners = sums.values().any(|sum| sum.corners > 0);
     let rms = |squares: f64, n: usize| (squares / n.max(1) as f64).sqrt();
+    let name = |id: u32| spoken_name(id, sums.keys().copied()).trim_start_matches("tag ").to_owned();
     markup! {
         h3 { "By tag" }
         div.wide {
@@ -76,7 +77,7 @@ fn by_tag(views: &[ViewResidual]) -> Markup {
                 }
                 @for (id, sum) in &sums {
                     tr.out[sum.rejected > sum.views] {
-                        td { (spoken_name(*id, sums.keys().copied()).trim_start_matches("tag ")) } td { (sum.views) } td { (sum.rejected) }
+                        td { (name(*id)) } td { (sum.views) } td { (sum.rejected) }
                         td { (format!("{:.1}", 1e3 * rms(sum.squares_m2, sum.views))) }
                         @if has_corners {
                             td { (format!("{:.2}", rms(sum.squares_px2, sum.corners))) }
