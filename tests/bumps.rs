@@ -107,7 +107,7 @@ fn limits_of_hits_and_skipped_targets_fail_a_run_that_hits_few() {
     let told = crate::support::run(&routine, &folder.path().join("out"));
     let words = ["FAILS: step 4, hits 5 against 4", "FAILS: step 4, targets_skipped 0 against 1", "4 of 5"];
     told.expect("skipped", 4, &words);
-    told.expect("named", 4, &["skipped      step 3, target 3: the arm met something", "holds: step 4, poses 10"]);
+    told.expect("named", 4, &["skipped      step 3, target 4: the arm met something", "holds: step 4, poses 10"]);
 }
 
 /// Ten ordinary runs, among them rough water, worn sensors, a vehicle that floats and a joint that is declared locked.

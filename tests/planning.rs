@@ -166,7 +166,7 @@ fn what_cannot_be_planned_is_named() {
         plan(routine, &out, more).expect("refused", 2, words);
         assert!(!out.join("plan.toml").exists(), "{words:?}");
     };
-    refused(&far.write(folder.path()), &[], &["none of the 2 targets", "target 0", "4.000"]);
+    refused(&far.write(folder.path()), &[], &["none of the 2 targets", "target 1", "4.000"]);
     let rock = "[[obstacle]]\nname = \"rock\"\nshape = \"sphere\"\nradius_m = 0.5\nposition_m = [2.6, -0.6, 0.2]\n";
     refused(&short(folder.path(), rock), &[], &["the arm starts too close", "rock"]);
     let script = "[[step]]\ndo = \"move\"\nto_rad = [-2.4, -0.3, 0.0, 0.0, 0.0, 0.0]\n\
@@ -194,6 +194,6 @@ fn a_single_target_out_of_reach_is_a_warning() {
     routine.targets_m[2] = [3.5, 0.0, 0.0];
     let file = planned(&routine.write(folder.path()), folder.path(), &[]);
     assert_eq!(file.warnings.len(), 1, "{:?}", file.warnings);
-    assert!(file.warnings[0].contains("target 2"), "{:?}", file.warnings);
+    assert!(file.warnings[0].contains("target 3"), "{:?}", file.warnings);
     assert_eq!(file.totals.poses + file.totals.left_out, 16);
 }

@@ -34,7 +34,7 @@ fn the_verdict_comes_first_and_every_question_has_its_place() {
     for target in &score.targets {
         let [before, after] =
             [target.tool_error_before_m, target.tool_error_after_m].map(|m| m.expect("reached") * 1e3);
-        let row = format!("<td>{}</td><td>{before:.2} mm</td><td>{after:.2} mm</td>", target.target);
+        let row = format!("<td>{}</td><td>{before:.2} mm</td><td>{after:.2} mm</td>", target.target + 1);
         assert!(html.contains(&row), "{row}");
     }
     let n = |text: &str| html.matches(text).count();

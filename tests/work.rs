@@ -82,7 +82,7 @@ fn tasks_begin_at_their_times_and_pass_tags_in_their_turns() {
     let recording = recording();
     let tasks = tasks(&recording);
     let texts: Vec<&str> = tasks.iter().map(|(_, text)| text.as_str()).collect();
-    assert_eq!(texts, ["0 of 4, target 0", "1 of 4, target 1", "2 of 4, target 2", "3 of 4, target 0 by look 1"]);
+    assert_eq!(texts, ["1 of 4, target 1", "2 of 4, target 2", "3 of 4, target 3", "4 of 4, target 1 by look 2"]);
     for pair in tasks[1..].windows(2) {
         assert!((pair[1].0.since_s(pair[0].0) - EVERY_S).abs() < 0.1, "{pair:?}");
     }

@@ -64,6 +64,10 @@ pub enum Axis {
     Linear,
     /// Points that are not positive are left out.
     Log,
+    /// Of whole numbers: no other has a label.
+    Whole,
+    /// The rows of an image: grows downwards.
+    Downward,
 }
 
 /// One chart of a row.
@@ -126,7 +130,7 @@ type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 type DrawError = Box<dyn std::error::Error + Send + Sync>;
 
 fn draw(area: &Area<'_>, panel: &Panel) -> Result<(), DrawError> {
-    let shown: Vec<Series> = panel.series.iter().map(|series| positive(panel, series)).collect();
+    let shown: Vec<Series> = panel.series.iter().map(|series| upright(panel, positive(panel, series))).collect();
     let (x, y) = ranges(panel, &shown, area.dim_in_pixel());
     let legend = free_corner(&shown, x, y);
     let mut builder = ChartBuilder::on(area);
@@ -139,8 +143,10 @@ fn draw(area: &Area<'_>, panel: &Panel) -> Result<(), DrawError> {
         ($x:expr, $y:expr) => {{
             let mut chart = builder.build_cartesian_2d($x, $y).map_err(boxed)?;
             let mut mesh = chart.configure_mesh();
-            mesh.x_desc(&panel.x.0).y_desc(&panel.y.0).max_light_lines(0).x_labels(8).y_labels(8);
-            mesh.x_label_formatter(&|v| number(*v)).y_label_formatter(&|v| number(*v)).draw().map_err(boxed)?;
+            mesh.x_desc(&panel.x.0).y_desc(&panel.y.0).max_light_lines(0);
+            mesh.x_labels(most_labels(panel.x.1, x)).y_labels(most_labels(panel.y.1, y));
+            let labels = [panel.x.1, panel.y.1].map(|axis| move |value: &f64| label(axis, *value));
+            mesh.x_label_formatter(&labels[0]).y_label_formatter(&labels[1]).draw().map_err(boxed)?;
             for (series, color) in shown.iter().zip(Color::ALL.iter().cycle()) {
                 let color = series.color.unwrap_or(*color).rgb();
                 let mut points = series.points.iter().map(|p| (p[0], p[1]));
@@ -173,18 +179,31 @@ fn draw(area: &Area<'_>, panel: &Panel) -> Result<(), DrawError> {
             labels.draw().map_err(boxed)?;
         }};
     }
-    match (drawn(panel.x.1, x), drawn(panel.y.1, y)) {
-        (Axis::Linear, Axis::Linear) => chart!(x.0..x.1, y.0..y.1),
-        (Axis::Log, Axis::Linear) => chart!((x.0..x.1).log_scale(), y.0..y.1),
-        (Axis::Linear, Axis::Log) => chart!(x.0..x.1, (y.0..y.1).log_scale()),
-        (Axis::Log, Axis::Log) => chart!((x.0..x.1).log_scale(), (y.0..y.1).log_scale()),
+    match (is_log(panel.x.1, x), is_log(panel.y.1, y)) {
+        (false, false) => chart!(x.0..x.1, y.0..y.1),
+        (true, false) => chart!((x.0..x.1).log_scale(), y.0..y.1),
+        (false, true) => chart!(x.0..x.1, (y.0..y.1).log_scale()),
+        (true, true) => chart!((x.0..x.1).log_scale(), (y.0..y.1).log_scale()),
     }
     Ok(())
 }
 
 /// Decades are all that a logarithmic axis has labels for: a range of much less than two is better off without.
-fn drawn(axis: Axis, (low, high): Range) -> Axis {
-    if high < 50.0 * low { Axis::Linear } else { axis }
+fn is_log(axis: Axis, (low, high): Range) -> bool {
+    axis == Axis::Log && high >= 50.0 * low
+}
+
+/// Labels of an axis at most; of whole numbers no more than there are.
+fn most_labels(axis: Axis, (low, high): Range) -> usize {
+    const MOST: usize = 8;
+    if axis == Axis::Whole { ((high.floor() - low.ceil()) as usize + 1).min(MOST) } else { MOST }
+}
+
+fn label(axis: Axis, value: f64) -> String {
+    match axis {
+        Axis::Downward => number(-value),
+        _ => number(value),
+    }
 }
 
 /// Of the four corners the one about which there are the fewest points.
@@ -222,10 +241,17 @@ fn number(value: f64) -> String {
     }
 }
 
+/// Upwards in the chart is where an axis that grows downwards has the lower values.
+fn upright(panel: &Panel, mut series: Series) -> Series {
+    let turned = [panel.x.1, panel.y.1].map(|axis| if axis == Axis::Downward { -1.0 } else { 1.0 });
+    series.points.iter_mut().for_each(|p| *p = [p[0] * turned[0], p[1] * turned[1]]);
+    series
+}
+
 fn positive(panel: &Panel, series: &Series) -> Series {
     let axes = [panel.x.1, panel.y.1];
     let is_shown = |p: &&[f64; 2]| {
-        p.iter().zip(axes).all(|(value, axis)| value.is_finite() && (axis == Axis::Linear || *value > 0.0))
+        p.iter().zip(axes).all(|(value, axis)| value.is_finite() && (axis != Axis::Log || *value > 0.0))
     };
     Series { points: series.points.iter().filter(is_shown).copied().collect(), ..series.clone() }
 }
@@ -253,7 +279,8 @@ fn widened((low, high): Range, axis: Axis) -> Range {
     match axis {
         _ if low > high => (1.0, 2.0),
         Axis::Log => (low / 1.2, high * 1.2),
-        Axis::Linear => {
+        Axis::Whole => (low - 0.5, high + 0.5),
+        Axis::Linear | Axis::Downward => {
             let margin = (0.03 * (high - low)).max(1e-9);
             (low - margin, high + margin)
         }
@@ -274,6 +301,31 @@ mod tests {
         };
         assert!(matches!(corner(&falling), SeriesLabelPosition::UpperRight));
         assert!(matches!(corner(&rising), SeriesLabelPosition::UpperLeft));
+    }
+
+    /// The chart's labels that are numbers.
+    fn numbers(svg: &str) -> Vec<f64> {
+        let texts = svg.split("<text").skip(1).filter_map(|rest| rest.split_once('>')?.1.split_once("</text>"));
+        texts.filter_map(|(text, _)| text.trim().parse().ok()).collect()
+    }
+
+    #[test]
+    fn whole_numbers_and_rows_of_an_image_have_their_labels() {
+        let of = |x: Axis, y: Axis, points: Vec<[f64; 2]>| {
+            let series = vec![Series { name: String::new(), color: None, style: Style::Dots, points }];
+            let (x, y) = (("x".to_owned(), x), ("y".to_owned(), y));
+            inlay(&Panel { title: String::new(), x, y, is_map: false, series }, (440, 250)).expect("a chart")
+        };
+        for n in [1, 2, 3, 5, 14] {
+            let points = (1..=n).map(|k| [f64::from(k), 1.0e6]).collect();
+            let found: Vec<f64> =
+                numbers(&of(Axis::Whole, Axis::Log, points)).into_iter().filter(|v| *v < 100.0).collect();
+            assert!(!found.is_empty() && found.iter().all(|v| v.fract() == 0.0), "{n}: {found:?}");
+            assert!(n == 14 || found.len() == n as usize, "{n}: {found:?}");
+        }
+        let image = of(Axis::Linear, Axis::Downward, vec![[0.0, 100.0], [1.0, 900.0]]);
+        let rows: Vec<f64> = numbers(&image).into_iter().filter(|v| v.abs() > 1.5).collect();
+        assert!(rows.len() > 2 && rows.iter().all(|row| *row > 0.0), "{rows:?}");
     }
 
     #[test]

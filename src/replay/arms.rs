@@ -1,6 +1,7 @@
 //! The true and the believed arm, the camera's view cone, captured views and the tool's path.
 
 use nalgebra::Vector3;
+use rerun::components::Radius;
 use rerun::{LineStrips3D, Points3D};
 
 use crate::colors;
@@ -183,6 +184,9 @@ fn draw_trail(run: &ReplayScene, stream: &mut EntityLog) {
     }
 }
 
+/// As large at any distance, so that many of them do not hide a small arm: points of the screen.
+const VIEW_DOT_POINTS: f32 = 3.0;
+
 /// Camera position of each captured view, before a camera that stands still that of the tags: one colour for fitted
 /// views, one for held-out ones.
 fn draw_captures(run: &ReplayScene, stream: &mut EntityLog) {
@@ -203,6 +207,6 @@ fn draw_captures(run: &ReplayScene, stream: &mut EntityLog) {
             CaptureSet::HeldOut => colors::HELD_OUT_VIEW,
         });
         let points = Points3D::new(places.iter().copied()).with_colors(shades.iter().copied());
-        stream.draw(&format!("{BASE}/views"), mark.end_s, &points.with_radii([0.02]));
+        stream.draw(&format!("{BASE}/views"), mark.end_s, &points.with_radii([Radius::new_ui_points(VIEW_DOT_POINTS)]));
     }
 }

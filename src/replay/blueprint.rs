@@ -13,12 +13,14 @@ use rerun::external::re_sdk_types::blueprint::datatypes::{TextLogColumn, TextLog
 use rerun::external::re_sdk_types::datatypes::{Range1D, Range2D, TimeInt, TimeRange, TimeRangeBoundary};
 use rerun::external::uuid::Uuid;
 
+use crate::axis::labelled_range;
 use crate::colors;
 use crate::entities::{
-    CAMERA, CLEARANCE, COUNTS, JOINT_ANGLE, JOINT_ERROR, LOG, OFFSET_CHANGE, PREDICTED, SIGHTING, STATE, SUMMARY,
-    TEMPERATURE, TOOL_ERROR, WORLD,
+    CAMERA, CLEARANCE, COUNTS, EVENTS_LANE, FAULT_LANE, JOINT_ANGLE, JOINT_ERROR, LOG, OFFSET_CHANGE, PHASE_LANE,
+    PREDICTED, SIGHTING, SUMMARY, TARGETS_LANE, TEMPERATURE, TOOL_ERROR, VIEWS_LANE, WORLD,
 };
 use crate::entity_log::TIMELINE;
+use crate::plots;
 use crate::scene::{ReplayScene, RunState};
 use crate::viewpoint;
 
@@ -59,7 +61,7 @@ pub(super) fn build(run: &ReplayScene) -> Vec<Entry> {
     let root = if run.tracks.marks.is_empty() && run.state == RunState::Over {
         main
     } else {
-        let phases = b.view("StateTimeline", "What the arm does", STATE);
+        let phases = b.lanes("What the arm does");
         // Each of these has one lane more.
         let has_faults = run.truth.as_ref().is_some_and(|truth| !truth.faults.is_empty());
         let share = 1.0 + 0.3 * f32::from(u8::from(run.online.is_some()) + u8::from(has_faults));
@@ -85,7 +87,7 @@ pub(super) fn build_plan(run: &ReplayScene) -> Vec<Entry> {
     let angles = b.plot("Joint angles as believed [deg]", JOINT_ANGLE, legend(Corner2D::RightTop), run);
     let right = b.container(ContainerKind::Vertical, &[(clearance, 3.0), (predicted, 2.4), (angles, 2.2)]);
     let main = b.container(ContainerKind::Horizontal, &[(left, 3.0), (right, 2.0)]);
-    let phases = b.view("StateTimeline", "What the arm would do", STATE);
+    let phases = b.lanes("What the arm would do");
     let root = b.container(ContainerKind::Vertical, &[(main, 4.3), (phases, 1.0)]);
     b.finish(&root, run)
 }
@@ -131,7 +133,7 @@ fn camera_view(b: &mut Builder, run: &ReplayScene) -> Part {
     let title = if run.tracks.rejects.is_empty() {
         "Wrist camera: green = tags seen, pink = expected"
     } else {
-        "Wrist camera: green seen, orange rejected, pink expected"
+        "Tags: green seen, orange rejected, pink expected"
     };
     titled_camera(b, run, title)
 }
@@ -149,7 +151,9 @@ fn titled_camera(b: &mut Builder, run: &ReplayScene, title: &str) -> Part {
 fn right_column(b: &mut Builder, run: &ReplayScene) -> Part {
     let mut rows = Vec::new();
     if run.has_true_joints() {
+        let errors_deg = plots::joint_errors_deg(run).into_iter().flat_map(|(_, errors_deg)| errors_deg);
         let all = b.plot("Joint error: believed - true [deg]", JOINT_ERROR, legend(Corner2D::RightTop), run);
+        b.show_within(&all, labelled_range(errors_deg), run);
         let range = [-CLOSE_DEG, CLOSE_DEG];
         let close = b.plot_within(&format!("within {CLOSE_DEG} deg"), JOINT_ERROR, range, run);
         rows.push((b.tabs(&[all, close]), 3.0));
@@ -163,7 +167,12 @@ fn right_column(b: &mut Builder, run: &ReplayScene) -> Part {
     let colors_here = legend(Corner2D::RightTop).with_visible(!run.has_true_joints());
     rows.push((b.plot(title, JOINT_ANGLE, colors_here, run), 2.2));
     if run.has_true_tool() {
-        let mut shown = vec![b.plot("Tool error [mm]", TOOL_ERROR, legend(Corner2D::RightTop), run)];
+        let all = b.plot("Tool error [mm]", TOOL_ERROR, legend(Corner2D::RightTop), run);
+        let mut errors_mm: Vec<f64> = plots::tool_errors_mm(run).into_iter().filter_map(|(_, mm)| mm).collect();
+        errors_mm.extend(run.arrivals().iter().map(|arrival| 1e3 * arrival.miss_m));
+        errors_mm.extend(run.tracks.task.iter().map(|(_, task)| 1e3 * task.tolerance_m).chain([0.0]));
+        b.show_within(&all, labelled_range(errors_mm.into_iter()), run);
+        let mut shown = vec![all];
         if let Some((_, task)) = run.tracks.task {
             let top_mm = (1e3 * CLOSE_SHARE * task.tolerance_m).max(1.0).round();
             shown.push(b.plot_within(&format!("up to {top_mm} mm"), TOOL_ERROR, [0.0, top_mm], run));
@@ -175,7 +184,9 @@ fn right_column(b: &mut Builder, run: &ReplayScene) -> Part {
         rows.push((b.plot(title, OFFSET_CHANGE, legend(Corner2D::LeftTop).with_visible(false), run), 2.4));
     }
     if !run.tracks.oil_c.is_empty() || !run.tracks.water_c.is_empty() {
-        rows.push((b.plot("Temperature [C]", TEMPERATURE, legend(Corner2D::LeftTop), run), 1.5));
+        let temperature = b.plot("Temperature [C]", TEMPERATURE, legend(Corner2D::LeftTop), run);
+        b.show_within(&temperature, labelled_range(plots::temperatures_c(run).into_iter()), run);
+        rows.push((temperature, 1.5));
     }
     b.container(ContainerKind::Vertical, &rows)
 }
@@ -213,6 +224,15 @@ impl Builder {
         Part(path)
     }
 
+    /// The lanes of states that there are.
+    fn lanes(&mut self, title: &str) -> Part {
+        let path = format!("view/{}", self.next_id());
+        let lanes = [EVENTS_LANE, FAULT_LANE, PHASE_LANE, TARGETS_LANE, VIEWS_LANE];
+        self.add(format!("{path}/ViewContents"), ViewContents::new(lanes));
+        self.add(path.clone(), ViewBlueprint::new("StateTimeline").with_display_name(title).with_space_origin("/"));
+        Part(path)
+    }
+
     /// A plot over the whole recording, or the latest of a run that goes on; by itself the viewer shows what is near
     /// the time cursor.
     fn plot(&mut self, title: &str, origin: &str, legend: PlotLegend, run: &ReplayScene) -> Part {
@@ -232,6 +252,13 @@ impl Builder {
         let view = self.plot(title, origin, legend(Corner2D::RightTop), run);
         self.property(&view, "ScalarAxis", ScalarAxis::new().with_range(Range1D(range)));
         view
+    }
+
+    /// Sets a plot's range; that of a run that goes on follows what comes.
+    fn show_within(&mut self, plot: &Part, range: Option<[f64; 2]>, run: &ReplayScene) {
+        if let Some(range) = range.filter(|_| run.state == RunState::Over) {
+            self.property(plot, "ScalarAxis", ScalarAxis::new().with_range(Range1D(range)));
+        }
     }
 
     fn property(&mut self, view: &Part, name: &str, what: impl AsComponents + 'static) {

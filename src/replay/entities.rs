@@ -17,7 +17,12 @@ pub(super) const PREDICTED: &str = "/plots/predicted";
 pub(super) const OFFSET_CHANGE: &str = "/plots/offset_change";
 /// How far sightings of a tag are from their mean.
 pub(super) const SIGHTING: &str = "/plots/sighting";
-/// Lanes of states, and the lines of the log.
-pub(super) const STATE: &str = "/state";
+/// Lanes of states: the viewer names a lane by its path alone.
+pub(super) const PHASE_LANE: &str = "/phase";
+pub(super) const TARGETS_LANE: &str = "/targets";
+pub(super) const VIEWS_LANE: &str = "/views";
+pub(super) const FAULT_LANE: &str = "/latest_fault";
+pub(super) const EVENTS_LANE: &str = "/events";
+/// The lines of the log.
 pub(super) const LOG: &str = "/log";
 pub(super) const SUMMARY: &str = "/summary";

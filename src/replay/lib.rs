@@ -7,6 +7,7 @@
 //! the recording's first log time. The same input gives the same bytes of a file.
 
 mod arms;
+mod axis;
 mod blueprint;
 mod camera;
 mod colors;
@@ -14,6 +15,7 @@ mod connection;
 mod entities;
 mod entity_log;
 mod error;
+mod fault_words;
 mod identity;
 mod live;
 mod news;

@@ -3,7 +3,7 @@
 use rerun::{Scalars, SeriesLines, StateChange, StateConfiguration};
 
 use crate::colors;
-use crate::entities::{OFFSET_CHANGE, STATE, TOOL_ERROR};
+use crate::entities::{EVENTS_LANE, OFFSET_CHANGE, TOOL_ERROR};
 use crate::entity_log::EntityLog;
 use crate::scene::ReplayScene;
 use armcal_belief::calib::online::{BeliefLog, BeliefRow, OnlineEvent};
@@ -76,20 +76,19 @@ fn draw_events(run: &ReplayScene, log: &BeliefLog, stream: &mut EntityLog) {
     if events.is_empty() {
         return;
     }
-    let entity = format!("{STATE}/events");
     let lines: Vec<String> = events.iter().map(|event| event.to_line()).collect();
     let mut values: Vec<&str> = lines.iter().map(String::as_str).collect();
     values.sort_unstable();
     values.dedup();
     let look = StateConfiguration::new().with_values(values.iter().copied());
-    stream.log_static(&entity, &look.with_colors(values.iter().map(|_| colors::MISS)));
+    stream.log_static(EVENTS_LANE, &look.with_colors(values.iter().map(|_| colors::MISS)));
     for (n, (event, line)) in events.iter().zip(&lines).enumerate() {
         let since_s = place_s(run, event.since_nanos);
         let least_s = since_s + LEAST_SHARE * run.tracks.duration_s;
         let end_s = place_s(run, event.decided_nanos).max(least_s);
-        stream.draw(&entity, since_s, &StateChange::single(line.as_str()));
+        stream.draw(EVENTS_LANE, since_s, &StateChange::single(line.as_str()));
         if events.get(n + 1).is_none_or(|next| place_s(run, next.since_nanos) > end_s) {
-            stream.draw(&entity, end_s, &StateChange::single(""));
+            stream.draw(EVENTS_LANE, end_s, &StateChange::single(""));
         }
     }
 }

@@ -5,21 +5,18 @@ use std::collections::{BTreeMap, BTreeSet};
 use rerun::{StateChange, StateConfiguration, TextLog, TextLogLevel};
 
 use crate::colors::{self, Rgba};
-use crate::entities::{LOG, STATE};
+use crate::entities::{FAULT_LANE, LOG, PHASE_LANE, TARGETS_LANE, VIEWS_LANE};
 use crate::entity_log::EntityLog;
 use crate::scene::ReplayScene;
 use crate::shapes::path_part;
 use crate::tracks::Span;
 use armcal_core::streams::{CaptureSet, LogLevel, MarkKind, Phase, ReachAttempt};
 
-/// A lane.
-const LATEST_FAULT: &str = "latest_fault";
-
 /// Draws the lanes and the log.
 pub(super) fn draw(run: &ReplayScene, stream: &mut EntityLog) {
     draw_phases(run, stream);
-    draw_lane(run, stream, "views", view_state);
-    draw_lane(run, stream, "reach", reach_state);
+    draw_lane(run, stream, VIEWS_LANE, view_state);
+    draw_lane(run, stream, TARGETS_LANE, reach_state);
     draw_faults(run, stream);
     draw_log(run, stream);
 }
@@ -35,20 +32,19 @@ fn draw_phases(run: &ReplayScene, stream: &mut EntityLog) {
         (Phase::Wait, "wait", [90, 90, 120, 255]),
         (Phase::Done, "done", [110, 110, 110, 255]),
     ];
-    let entity = format!("{STATE}/phase");
     let look = StateConfiguration::new().with_values(PHASES.map(|(_, name, _)| name));
-    stream.log_static(&entity, &look.with_colors(PHASES.map(|(_, _, color)| color)));
+    stream.log_static(PHASE_LANE, &look.with_colors(PHASES.map(|(_, _, color)| color)));
     let mut shown = None;
     let mut gaps = run.tracks.gaps().peekable();
     for mark in &run.tracks.marks {
         let MarkKind::Phase(phase) = mark.kind else { continue };
         while let Some(gap_s) = gaps.next_if(|gap_s| *gap_s < mark.start_s) {
-            stream.draw(&entity, gap_s, &StateChange::single(""));
+            stream.draw(PHASE_LANE, gap_s, &StateChange::single(""));
             shown = None;
         }
         let name = PHASES.iter().find(|(other, ..)| *other == phase).map(|(_, name, _)| *name);
         if let Some(name) = name.filter(|_| shown != Some(phase)) {
-            stream.draw(&entity, mark.start_s, &StateChange::single(name));
+            stream.draw(PHASE_LANE, mark.start_s, &StateChange::single(name));
             shown = Some(phase);
         }
     }
@@ -84,40 +80,39 @@ fn reach_state(run: &ReplayScene, mark: &Span) -> Option<State> {
         Some(arrival) if arrival.hit => ("hit", colors::HIT),
         Some(_) => ("missed", colors::MISS),
     };
-    let name = format!("target {target_idx} {verdict}, {when} calibration");
-    Some(State { name, label: target_idx.to_string(), color: colors::dimmed(color) })
+    let n = u64::from(target_idx) + 1;
+    let name = format!("target {n} {verdict}, {when} calibration");
+    Some(State { name, label: n.to_string(), color: colors::dimmed(color) })
 }
 
 /// The truth's latest fault, from when it happened: by itself a lane does not say how long a fault lasts.
 fn draw_faults(run: &ReplayScene, stream: &mut EntityLog) {
     let Some(truth) = run.truth.as_ref().filter(|truth| !truth.faults.is_empty()) else { return };
-    let entity = format!("{STATE}/{LATEST_FAULT}");
     let names: BTreeSet<&str> = truth.faults.iter().map(|(_, fault)| fault.as_str()).collect();
     let look = StateConfiguration::new().with_values(names.iter().copied());
-    stream.log_static(&entity, &look.with_colors(names.iter().map(|_| colors::dimmed(colors::MISS))));
+    stream.log_static(FAULT_LANE, &look.with_colors(names.iter().map(|_| colors::dimmed(colors::MISS))));
     for (time_s, fault) in &truth.faults {
-        stream.draw(&entity, *time_s, &StateChange::single(fault.as_str()));
+        stream.draw(FAULT_LANE, *time_s, &StateChange::single(fault.as_str()));
     }
 }
 
 /// A lane with a state for each mark that `state` knows, and gaps between them.
-fn draw_lane(run: &ReplayScene, stream: &mut EntityLog, name: &str, state: fn(&ReplayScene, &Span) -> Option<State>) {
+fn draw_lane(run: &ReplayScene, stream: &mut EntityLog, lane: &str, state: fn(&ReplayScene, &Span) -> Option<State>) {
     let spans: Vec<_> =
         run.tracks.marks.iter().filter_map(|mark| Some((mark.start_s, mark.end_s, state(run, mark)?))).collect();
     if spans.is_empty() {
         return;
     }
-    let entity = format!("{STATE}/{name}");
     let looks: BTreeMap<&str, &State> = spans.iter().map(|(_, _, state)| (state.name.as_str(), state)).collect();
     let look = StateConfiguration::new().with_values(looks.keys().copied());
     let look = look.with_labels(looks.values().map(|state| state.label.as_str()));
-    stream.log_static(&entity, &look.with_colors(looks.values().map(|state| state.color)));
+    stream.log_static(lane, &look.with_colors(looks.values().map(|state| state.color)));
     for (n, (start_s, end_s, state)) in spans.iter().enumerate() {
-        stream.draw(&entity, *start_s, &StateChange::single(state.name.as_str()));
+        stream.draw(lane, *start_s, &StateChange::single(state.name.as_str()));
         let next_s = spans.get(n + 1).map_or(f64::INFINITY, |(next_s, ..)| *next_s);
         if *end_s < next_s && end_s > start_s {
             // An empty state is a gap.
-            stream.draw(&entity, *end_s, &StateChange::single(""));
+            stream.draw(lane, *end_s, &StateChange::single(""));
         }
     }
 }
@@ -142,7 +137,7 @@ fn draw_log(run: &ReplayScene, stream: &mut EntityLog) {
         let verdict = if arrival.hit { "hit" } else { "missed" };
         let text = format!(
             "{when} calibration: target {} {verdict}, tool rests {:.1} mm away",
-            arrival.target_idx,
+            arrival.target_idx + 1,
             1000.0 * arrival.miss_m
         );
         lines.push((arrival.time_s, "truth".to_owned(), TextLog::new(text).with_level(TextLogLevel::INFO)));

@@ -87,21 +87,40 @@ fn degrees(angles: &JointAngles) -> Scalars {
     Scalars::new(angles.iter().map(|angle_rad| angle_rad.to_degrees()))
 }
 
-/// Believed - true, by the shorter way round, at the moments of the belief so that motion adds nothing.
+/// Believed - true, by the shorter way round, at the moments of the belief so that motion adds nothing; nothing where
+/// lines end.
+pub(super) fn joint_errors_deg(run: &ReplayScene) -> Vec<(f64, Vec<f64>)> {
+    let Some(truth) = run.truth.as_ref().filter(|_| run.has_true_joints()) else { return Vec::new() };
+    let errors = |(time_s, believed): (f64, Option<&JointAngles>)| {
+        let Some(believed) = believed else { return Some((time_s, Vec::new())) };
+        let angles = truth.angles(time_s)?;
+        let difference = |j: usize| (believed[j] - angles[j]).to_degrees();
+        let errors = (0..believed.len()).map(|j| (difference(j) + 180.0).rem_euclid(360.0) - 180.0);
+        Some((time_s, errors.collect()))
+    };
+    believed(run).into_iter().filter_map(errors).collect()
+}
+
 fn draw_joint_error(run: &ReplayScene, stream: &mut EntityLog) {
-    let Some(truth) = run.truth.as_ref().filter(|_| run.has_true_joints()) else { return };
-    style(stream, JOINT_ERROR, &run.robot.joint_names(), &colors::JOINTS, 1.5);
-    for (time_s, believed) in believed(run) {
-        let Some(believed) = believed else {
-            stream.draw(JOINT_ERROR, time_s, &Scalars::new([] as [f64; 0]));
-            continue;
-        };
-        if let Some(angles) = truth.angles(time_s) {
-            let difference = |j: usize| (believed[j] - angles[j]).to_degrees();
-            let errors = (0..believed.len()).map(|j| (difference(j) + 180.0).rem_euclid(360.0) - 180.0);
-            stream.draw(JOINT_ERROR, time_s, &Scalars::new(errors));
-        }
+    if !run.has_true_joints() {
+        return;
     }
+    style(stream, JOINT_ERROR, &run.robot.joint_names(), &colors::JOINTS, 1.5);
+    for (time_s, errors_deg) in joint_errors_deg(run) {
+        stream.draw(JOINT_ERROR, time_s, &Scalars::new(errors_deg));
+    }
+}
+
+/// How far the believed tool is from the true one, mm; nothing where the line ends.
+pub(super) fn tool_errors_mm(run: &ReplayScene) -> Vec<(f64, Option<f64>)> {
+    let Some(truth) = run.truth.as_ref() else { return Vec::new() };
+    let error = |(time_s, angles): (f64, Option<&JointAngles>)| {
+        let Some(angles) = angles else { return Some((time_s, None)) };
+        let tool = run.believed_poses(time_s, angles).frame(&run.robot.tool.mount);
+        let actual = truth.base_from_tool(time_s)?.origin().vector();
+        Some((time_s, Some(1000.0 * (tool.translation.vector - actual).norm())))
+    };
+    believed(run).into_iter().filter_map(error).collect()
 }
 
 /// How far the believed tool is from the true one, and what each arrival missed its target by, mm.
@@ -112,15 +131,8 @@ fn draw_tool_error(run: &ReplayScene, stream: &mut EntityLog) {
     let name = "believed tool to true tool".to_owned();
     let entity = format!("{TOOL_ERROR}/believed");
     style(stream, &entity, &[name], &[colors::BELIEVED], 1.5);
-    for (time_s, angles) in believed(run) {
-        let Some(angles) = angles else {
-            stream.draw(&entity, time_s, &Scalars::new([] as [f64; 0]));
-            continue;
-        };
-        let Some(truth) = run.truth.as_ref().and_then(|truth| truth.base_from_tool(time_s)) else { continue };
-        let tool = run.believed_poses(time_s, angles).frame(&run.robot.tool.mount);
-        let error_m = (tool.translation.vector - truth.origin().vector()).norm();
-        stream.draw(&entity, time_s, &Scalars::single(1000.0 * error_m));
+    for (time_s, error_mm) in tool_errors_mm(run) {
+        stream.draw(&entity, time_s, &Scalars::new(error_mm));
     }
     let Some((since_s, task)) = run.tracks.task else { return };
     let tolerance = format!("{TOOL_ERROR}/tolerance");
@@ -143,6 +155,12 @@ fn draw_tool_error(run: &ReplayScene, stream: &mut EntityLog) {
             stream.draw(&entity, arrival.time_s, &Scalars::single(1000.0 * arrival.miss_m));
         }
     }
+}
+
+/// All that is drawn of them, C.
+pub(super) fn temperatures_c(run: &ReplayScene) -> Vec<f64> {
+    let both = [&run.tracks.oil_c, &run.tracks.water_c];
+    both.iter().flat_map(|track| run.tracks.ticks(SLOW_HZ).filter_map(|time_s| track.at(time_s).copied())).collect()
 }
 
 fn draw_temperatures(run: &ReplayScene, stream: &mut EntityLog) {

@@ -83,12 +83,12 @@ impl<'a> TargetMarkers<'a> {
         let shades = self.latest.iter().map(|latest| latest.map_or(colors::TARGET, verdict_color));
         // All figures at once would hide one another and the tags: those of earlier arrivals are in the log.
         let last = self.all.last().map(|arrival| arrival.target_idx);
-        let labels = self.latest.iter().enumerate().map(|(n, latest)| match latest.filter(|_| last == Some(n)) {
-            None => n.to_string(),
+        let labels = self.latest.iter().enumerate().map(|(at, latest)| match latest.filter(|_| last == Some(at)) {
+            None => (at + 1).to_string(),
             Some(arrival) => match self.missed_before_m(&arrival) {
-                None => format!("{}: {:.1} mm", n, 1000.0 * arrival.miss_m),
+                None => format!("{}: {:.1} mm", at + 1, 1000.0 * arrival.miss_m),
                 Some(before_m) => {
-                    format!("{}: {:.1} \u{2192} {:.1} mm", n, 1000.0 * before_m, 1000.0 * arrival.miss_m)
+                    format!("{}: {:.1} \u{2192} {:.1} mm", at + 1, 1000.0 * before_m, 1000.0 * arrival.miss_m)
                 }
             },
         });

@@ -66,7 +66,7 @@ pub fn write_views_rrd(input: &ViewsInput<'_>, out: &Path) -> Result<(), ReplayE
 const LEGEND: &str = "### How to read the picture\n\n\
     - the arm at each view as calibrated; links without shapes are lines\n\
     - blue cone: the camera's line of sight; blue dots: where it was in the views so far\n\
-    - yellow dot: where a tag or landmark was seen; its plate: where drawing and survey have it; green line: from the \
+    - yellow dot: where a tag or board was seen; its plate: where drawing and survey have it; green line: from the \
       camera to the mean of its sightings\n\
     - upper plot: how far a view's sightings are from their mean, by the datasheet and as calibrated\n";
 

@@ -2,14 +2,13 @@
 
 use crate::report::summary::RunSummary;
 use crate::report::table::{check_lines, labelled, score_rows};
+use crate::report::verdict::{Grade, Verdict, verdict};
 
 /// Lays a summary out as Markdown.
 #[must_use]
 pub fn markdown(summary: &RunSummary) -> String {
-    let lines = check_lines(summary);
     // The verdict comes first, and is seen without scrolling.
-    let (verdict, rest) = lines.split_at(lines.len().min(1));
-    let mut text: String = verdict.iter().map(|line| format!("**{}**\n\n", in_words(line))).collect();
+    let mut text = colored(&verdict(summary));
     if let Some(score) = &summary.score {
         text.push_str("| against the truth | before | after |\n|---|--:|--:|\n");
         for [what, before, after, _] in score_rows(&score.before, score.after.as_ref()) {
@@ -17,14 +16,43 @@ pub fn markdown(summary: &RunSummary) -> String {
         }
         text.push('\n');
     }
-    for line in rest.iter().filter(|line| !line.starts_with("time ")) {
+    // The first of them is the verdict.
+    for line in check_lines(summary).iter().skip(1).filter(|line| !line.starts_with("time ")) {
         let (label, rest) = labelled(line);
         text.push_str(&format!("- **{label}** {rest}\n"));
     }
     text
 }
 
-fn in_words(line: &str) -> String {
-    let (label, rest) = labelled(line);
-    format!("{label} {rest}")
+/// As the kind of quotation that the viewer draws in green, amber or red.
+fn colored(Verdict { grade, headline, reasons, next }: &Verdict) -> String {
+    let kind = match grade {
+        Grade::Green => "TIP",
+        Grade::Amber => "WARNING",
+        Grade::Red => "CAUTION",
+    };
+    let mut text = format!("> [!{kind}]\n> **{headline}**\n");
+    for (title, lines) in [("", reasons), ("What to do next", next)].iter().filter(|(_, lines)| !lines.is_empty()) {
+        text.push_str(&if title.is_empty() { ">\n".to_owned() } else { format!(">\n> **{title}**\n>\n") });
+        lines.iter().for_each(|line| text.push_str(&format!("> - {line}\n")));
+    }
+    text + "\n"
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_verdict_has_its_color_and_is_whole() {
+        let lines = |text: &str| vec![text.to_owned()];
+        let (reasons, next) = (lines("elbow slipped."), lines("Fasten it."));
+        for (grade, kind) in [(Grade::Green, "TIP"), (Grade::Amber, "WARNING"), (Grade::Red, "CAUTION")] {
+            let verdict = Verdict { grade, headline: "So it is", reasons: reasons.clone(), next: next.clone() };
+            let expected = format!(
+                "> [!{kind}]\n> **So it is**\n>\n> - elbow slipped.\n>\n> **What to do next**\n>\n> - Fasten it.\n\n"
+            );
+            assert_eq!(colored(&verdict), expected);
+        }
+    }
 }

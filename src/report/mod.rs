@@ -4,7 +4,7 @@
 //! network. `markdown` the replay's panel.
 //! All show the same figures. `inspection` is what a recording holds and what could be calibrated from it,
 //! `proposed_map` an input map for it.
-//! `tag_map` is a tag map as table and page.
+//! `verdict` is how a result is judged, in words. `tag_map` is a tag map as table and page.
 
 mod html;
 pub mod inspection;
@@ -14,6 +14,7 @@ pub mod proposed_map;
 mod summary;
 mod table;
 mod tag_map;
+mod verdict;
 
 pub use html::{About, Report, html};
 #[cfg(feature = "sim")]

@@ -7,11 +7,11 @@ use crate::report::online::online_lines;
 use crate::report::summary::{
     AssertSummary, CalibrationSummary, CaptureSummary, GainChange, HeldJointSummary, RenewalSummary, RunSummary,
 };
+use crate::report::verdict::{joint_remedy, repairs};
 use crate::score::{ReachScore, ScoreSide};
 use armcal_belief::calib::{
     CameraMount, FailedJointTable, MapResult, PriorTable, Status, SurveyCoverage, UNSEEN_LINKS,
 };
-use armcal_core::robot::FailedKind;
 use armcal_core::stats::Summary;
 use armcal_core::text::counted;
 use armcal_core::units::Unit;
@@ -37,7 +37,9 @@ pub fn closing(summary: &RunSummary) -> String {
     let mut lines: Vec<String> = accuracy.by_ref().take(1).collect();
     lines.extend(summary.asserts.iter().map(assert_line));
     lines.extend(summary.stopped.iter().map(|why| format!("stopped      {why}")));
-    lines.extend(summary.calibration.failed_joint.iter().map(failed_line));
+    // The first line has the first of an accepted result.
+    let n_told = if summary.status == Status::Accepted { 1 } else { 0 };
+    lines.extend(summary.calibration.failed_joint.iter().skip(n_told).map(failed_line));
     lines.extend(summary.held_joints.iter().map(held_line));
     lines.extend(summary.still_reachable.iter().map(|still| format!("reachable    {still}")));
     lines.extend(score_line(summary));
@@ -187,7 +189,7 @@ pub(super) fn check_lines(summary: &RunSummary) -> Vec<String> {
 /// The verdict and the errors that it rests on.
 fn accuracy_lines(summary: &RunSummary) -> Vec<String> {
     let mut lines = vec![match (summary.status, &summary.refusal) {
-        (Status::Accepted, _) => "calibration  ACCEPTED".to_owned(),
+        (Status::Accepted, _) => format!("calibration  ACCEPTED{}", repaired(summary)),
         (Status::Refused, why) => format!("calibration  REFUSED: {}", why.as_deref().unwrap_or("no reason given")),
     }];
     let held_out = &summary.held_out;
@@ -218,6 +220,17 @@ fn accuracy_lines(summary: &RunSummary) -> Vec<String> {
         )
     }));
     lines
+}
+
+/// What was found wrong and is taken as it is: the first of it, and what to do.
+fn repaired(summary: &RunSummary) -> String {
+    let repairs = repairs(summary);
+    let Some(first) = repairs.first() else { return String::new() };
+    let more = match repairs.len() - 1 {
+        0 => String::new(),
+        n => format!("; and {n} more"),
+    };
+    format!(", repaired: {}; {}{more}", first.cause, first.remedy)
 }
 
 /// How many views there were, what of them was left out, and why the capture ended.
@@ -329,14 +342,9 @@ fn mount_line(mount: &CameraMount) -> String {
 }
 
 fn failed_line(failed: &FailedJointTable) -> String {
-    let FailedJointTable { joint, kind, found, evidence, since_pose, .. } = failed;
+    let FailedJointTable { joint, kind, found, evidence, .. } = failed;
     let colon = if evidence.is_empty() { "" } else { ": " };
-    let remedy = match (kind, since_pose) {
-        (_, Some(_)) => "fasten the sensor: the result is of it as it is since then",
-        (FailedKind::Locked, None) => "targets that need the joint are out of reach; free it",
-        (_, None) => "check this sensor, its shaft and its cable",
-    };
-    format!("failed       {joint} {} ({found}){colon}{evidence}; {remedy}", kind.name())
+    format!("failed       {joint} {} ({found}){colon}{evidence}; {}", kind.predicate(), joint_remedy(failed))
 }
 
 fn held_line(held: &HeldJointSummary) -> String {
@@ -387,7 +395,7 @@ fn compared_line(summary: &RunSummary) -> Option<String> {
             "compared     no target was reached both before and after: the errors are of different ones".to_owned(),
         );
     }
-    let numbers = common.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
+    let numbers = common.iter().map(|target| (target + 1).to_string()).collect::<Vec<_>>().join(", ");
     (!common.is_empty() && common.len() < all)
         .then(|| format!("compared     errors before and after are over targets {numbers} of {all}"))
 }

@@ -26,7 +26,7 @@ fn a_target_out_of_reach_is_named_with_its_place() {
     let folder = temp();
     let mut routine = ShortRoutine::default();
     routine.targets_m[2] = [2.5, 0.0, 0.0];
-    run_short(&routine, folder.path()).expect("far", 2, &["target 2", "2.500", "out of reach"]);
+    run_short(&routine, folder.path()).expect("far", 2, &["target 3", "2.500", "out of reach"]);
     assert_nothing_left(folder.path());
 }
 
@@ -36,7 +36,7 @@ fn a_target_within_the_vehicle_is_named_with_what_is_in_the_way() {
     let mut routine = ShortRoutine::default();
     // The face of the starboard toe plate.
     routine.targets_m[1] = [1.34, -0.1, -0.99];
-    run_short(&routine, folder.path()).expect("inside", 2, &["target 1", "clearance", "toe_plate_starboard"]);
+    run_short(&routine, folder.path()).expect("inside", 2, &["target 2", "clearance", "toe_plate_starboard"]);
     assert_nothing_left(folder.path());
 }
 

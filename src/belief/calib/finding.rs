@@ -61,12 +61,14 @@ pub enum FindingKind {
     SensorFailed,
     /// A sensor with more error from view to view than its datasheet allows; the size is one sigma.
     SensorWorn,
+    /// A sensor whose offset walks at random; the size is one sigma over the views.
+    OffsetWalks,
     /// Tag observations that the fit rejected; the size is their number.
     Outliers,
 }
 
 impl FindingKind {
-    /// In words: `moved tag`.
+    /// In words: `tag moved`.
     #[must_use]
     pub fn words(self) -> &'static str {
         match self {
@@ -85,6 +87,7 @@ impl FindingKind {
             Self::SensorScale => "sensor of another scale",
             Self::SensorFailed => "joint or sensor failed",
             Self::SensorWorn => "sensor worn",
+            Self::OffsetWalks => "offset walks at random",
             Self::Outliers => "tag observations rejected",
         }
     }

@@ -460,10 +460,10 @@ impl Refusal {
                 let mm = |m: Option<f64>| m.unwrap_or(f64::INFINITY) * 1e3;
                 write!(
                     f,
-                    "the sensor of {joint} is {}, and the task needs that joint: without it the tool error is {:.0} \
+                    "the sensor of {joint} {}, and the task needs that joint: without it the tool error is {:.0} \
                      mm for a tolerance of {:.1} mm; while the camera sees tags and tells the joint's angle it is \
                      {:.1} mm",
-                    kind.name(),
+                    kind.predicate(),
                     mm(*tool_error_m),
                     tolerance_m * 1e3,
                     mm(*tool_error_by_camera_m)

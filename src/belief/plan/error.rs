@@ -8,12 +8,15 @@ use crate::plan::path::PathError;
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "each variant's message says what it is")]
 pub enum PlanError {
-    #[error("target {target} at ({x:.3}, {y:.3}, {z:.3}) m: {source}", x = at_m[0], y = at_m[1], z = at_m[2])]
+    #[error(
+        "target {n} at ({x:.3}, {y:.3}, {z:.3}) m: {source}",
+        n = target + 1, x = at_m[0], y = at_m[1], z = at_m[2]
+    )]
     TargetOutOfReach { target: usize, at_m: [f64; 3], source: IkError },
     #[error(
-        "target {target} at ({x:.3}, {y:.3}, {z:.3}) m: reached only with {clearance_m:.4} m of clearance between \
+        "target {n} at ({x:.3}, {y:.3}, {z:.3}) m: reached only with {clearance_m:.4} m of clearance between \
          {nearest}; {needed_m:.4} m are needed for every arm within the sensors' error",
-        x = at_m[0], y = at_m[1], z = at_m[2]
+        n = target + 1, x = at_m[0], y = at_m[1], z = at_m[2]
     )]
     TargetTooClose { target: usize, at_m: [f64; 3], clearance_m: f64, nearest: String, needed_m: f64 },
     #[error(

@@ -195,6 +195,6 @@ mod tests {
 
         let mut far = site("titan4-quickstart.toml");
         far.routine.task.targets_m[3] = [5.0, 0.0, 0.0];
-        one(&far.issues().errors, &["target 3", "out of reach"]);
+        one(&far.issues().errors, &["target 4", "out of reach"]);
     }
 }

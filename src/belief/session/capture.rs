@@ -364,7 +364,8 @@ impl ScriptRunner<'_, '_> {
     fn stand_and_look(&mut self, pose: &PlannedPose, views: &mut CaptureRun<'_>) -> Result<Visited, SessionError> {
         views.tried += 1;
         self.driver.phase(Phase::Settle)?;
-        let number = self.poses_marked;
+        let pose_idx = self.poses_marked;
+        let number = pose_idx + 1;
         if !self.driver.settle()? {
             self.driver.log(LogLevel::Warn, &format!("pose {number} is left out: the arm did not settle"))?;
             self.tally.poses_skipped += 1;
@@ -376,7 +377,7 @@ impl ScriptRunner<'_, '_> {
         views.in_vain = 0;
         self.driver.phase(Phase::Capture)?;
         self.note_visit(pose, views)?;
-        let kind = MarkKind::Capture { set: pose.set, pose_idx: number };
+        let kind = MarkKind::Capture { set: pose.set, pose_idx };
         self.poses_marked += 1;
         let tags = self.driver.dwell(views.settings.dwell_s, kind)?;
         self.learn(pose, views)?;

@@ -73,8 +73,8 @@ impl fmt::Display for StillReachable {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "still reachable: {} of {}", self.reachable, self.of)?;
         let joints = self.joints.join(", ");
-        self.needs.iter().try_for_each(|target| write!(f, "; target {target} needs {joints}"))?;
-        self.no_path.iter().try_for_each(|target| write!(f, "; no path to target {target} without {joints}"))
+        self.needs.iter().try_for_each(|target| write!(f, "; target {} needs {joints}", target + 1))?;
+        self.no_path.iter().try_for_each(|target| write!(f, "; no path to target {} without {joints}", target + 1))
     }
 }
 
@@ -156,7 +156,7 @@ pub struct SkippedTarget {
 
 impl fmt::Display for SkippedTarget {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "step {}, target {}: {}", self.step, self.target, self.reason)
+        write!(f, "step {}, target {}: {}", self.step, self.target + 1, self.reason)
     }
 }
 

@@ -52,8 +52,8 @@ impl ScriptRunner<'_, '_> {
     ) -> Result<(), SessionError> {
         let target = settings.target_of(number);
         let look = settings.look_of(number);
-        let by = look.map_or(String::new(), |look| format!(" by look {look}"));
-        self.driver.log(LogLevel::Info, &format!("work: task {number} of {of}, target {target}{by}"))?;
+        let by = look.map_or(String::new(), |look| format!(" by look {}", look + 1));
+        self.driver.log(LogLevel::Info, &format!("work: task {} of {of}, target {}{by}", number + 1, target + 1))?;
         self.driver.phase(Phase::Reach)?;
         if let Some(look) = look {
             self.look(&JointAngles::from_slice(&settings.looks_rad[look]), settings.look_s)?;

@@ -31,6 +31,17 @@ impl FailedKind {
         }
     }
 
+    /// After a name, in a sentence.
+    #[must_use]
+    pub fn predicate(self) -> &'static str {
+        match self {
+            Self::Locked => "is locked",
+            Self::Dead => "is dead",
+            Self::Stuck => "is stuck",
+            Self::Jumps => "slips",
+        }
+    }
+
     /// The kind of that name.
     #[must_use]
     pub fn of_name(name: &str) -> Option<Self> {

@@ -134,7 +134,7 @@ fn a_late_viewer_is_told_what_happened() {
     let mut late = Drawn::default();
     late.add(&news.take_rest().unwrap().unwrap().chunks);
     let rows = |drawn: &Drawn, part: &str| drawn.rows.keys().filter(|(entity, ..)| entity.starts_with(part)).count();
-    for part in ["/state", "/log", "/world/vehicle/base/views"] {
+    for part in ["/phase", "/log", "/world/vehicle/base/views"] {
         assert_eq!(rows(&late, part), rows(&at_once, part), "{part}");
     }
     assert_eq!(rows(&late, "/plots/joint_angle"), rows(&at_once, "/plots/joint_angle"));

@@ -64,21 +64,21 @@ impl<'a> Target<'a> {
     }
 }
 
-/// By the number of the target, from 0.
+/// By the number of the target, from 1.
 fn targets<'a>(report: &'a Report<'_>) -> BTreeMap<usize, Target<'a>> {
     let mut all: BTreeMap<usize, Target<'a>> = BTreeMap::new();
     for truth in report.summary.score.iter().flat_map(|score| &score.targets) {
-        all.entry(truth.target).or_default().truth = Some(truth);
+        all.entry(truth.target + 1).or_default().truth = Some(truth);
     }
     for predicted in &report.calibration.details.targets {
-        all.entry(predicted.target_idx).or_default().predicted = Some(predicted);
+        all.entry(predicted.target_idx + 1).or_default().predicted = Some(predicted);
     }
     all
 }
 
 fn target_chart<'a>(targets: &BTreeMap<usize, Target<'a>>) -> Markup {
     let points = |of: fn(Target<'a>) -> Option<f64>| -> Vec<[f64; 2]> {
-        targets.iter().filter_map(|(at, target)| Some([*at as f64, 1e3 * of(*target)?])).collect()
+        targets.iter().filter_map(|(number, target)| Some([*number as f64, 1e3 * of(*target)?])).collect()
     };
     let has_truth = targets.values().any(|target| target.truth.is_some());
     let series = vec![
@@ -89,8 +89,9 @@ fn target_chart<'a>(targets: &BTreeMap<usize, Target<'a>>) -> Markup {
     ];
     let shown = series.into_iter().filter(|series| !series.points.is_empty()).collect();
     let chart = Panel {
+        x: ("number of the target".to_owned(), Axis::Whole),
         y: ("tool error, mm".to_owned(), Axis::Log),
-        ..panel("Tool error at each target", "number of the target", "", shown)
+        ..panel("Tool error at each target", "", "", shown)
     };
     let of_truth = if has_truth { " True errors are the simulator's." } else { "" };
     figure(&chart, &format!("Predicted: one sigma in space.{of_truth}"))
@@ -136,8 +137,9 @@ fn growth(report: &Report<'_>) -> Markup {
         after.map(|after| series("true, median", Color::Green, Style::Dots, vec![[n_views, 1e3 * after.median]])),
     );
     let chart = Panel {
+        x: ("views".to_owned(), Axis::Whole),
         y: ("tool error, mm".to_owned(), Axis::Log),
-        ..panel("Tool error by number of views", "views", "", shown)
+        ..panel("Tool error by number of views", "", "", shown)
     };
     figure(&chart, "What was predicted while views were captured.")
 }

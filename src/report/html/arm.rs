@@ -151,7 +151,7 @@ fn picture(title: &str, robot: &Robot, most: &Posture, all: &[Posture], project:
                     @let [x, y] = scale.place(*after);
                     polyline points=(scale.path(&[*before, *after])) fill="none" stroke="#d62728" stroke-width="1" { }
                     circle cx=(format!("{x:.1}")) cy=(format!("{y:.1}")) r="3" fill="#2ca02c" {
-                        title { (number) ": " (format!("{:.1} mm", 1e3 * all[number].off_m())) }
+                        title { (number + 1) ": " (format!("{:.1} mm", 1e3 * all[number].off_m())) }
                     }
                 }
                 (scale_bar(&scale))

@@ -2,13 +2,13 @@
 
 use std::collections::BTreeMap;
 
-use armcal_charts::{Color, Panel, Series, Style};
+use armcal_charts::{Axis, Color, Panel, Series, Style};
 use maud::{Markup, html as markup};
 
 use super::Report;
 use super::figure::{figure, panel, series};
 use armcal_belief::calib::{CornerResidual, ObservedTag, ViewResidual};
-use armcal_belief::tagmap::files::FIRST_NAMED_ID;
+use armcal_belief::tagmap::files::spoken_name;
 
 /// A residual in the picture of the image is this many times as long as it is.
 const MAGNIFIED: f64 = 40.0;
@@ -66,6 +66,7 @@ fn by_tag(views: &[ViewResidual]) -> Markup {
     }
     let has_corners = sums.values().any(|sum| sum.corners > 0);
     let rms = |squares: f64, n: usize| (squares / n.max(1) as f64).sqrt();
+    let name = |id: u32| spoken_name(id, sums.keys().copied()).trim_start_matches("tag ").to_owned();
     markup! {
         h3 { "By tag" }
         div.wide {
@@ -76,7 +77,7 @@ fn by_tag(views: &[ViewResidual]) -> Markup {
                 }
                 @for (id, sum) in &sums {
                     tr.out[sum.rejected > sum.views] {
-                        td { (tag_name(*id)) } td { (sum.views) } td { (sum.rejected) }
+                        td { (name(*id)) } td { (sum.views) } td { (sum.rejected) }
                         td { (format!("{:.1}", 1e3 * rms(sum.squares_m2, sum.views))) }
                         @if has_corners {
                             td { (format!("{:.2}", rms(sum.squares_px2, sum.corners))) }
@@ -87,11 +88,6 @@ fn by_tag(views: &[ViewResidual]) -> Markup {
             }
         }
     }
-}
-
-/// Landmarks without a number are counted.
-fn tag_name(id: u32) -> String {
-    id.checked_sub(FIRST_NAMED_ID).map_or_else(|| id.to_string(), |n| format!("landmark {n}"))
 }
 
 fn by_joint(views: &[ViewResidual], names: &[String]) -> Markup {
@@ -157,8 +153,7 @@ fn over_image(views: &[ViewResidual]) -> Markup {
     let (mut strokes, mut rejected) = (Vec::new(), Vec::new());
     for tag in views.iter().flat_map(|view| &view.tags) {
         for corner in tag.corners.iter().flatten() {
-            // Upwards in the chart, downwards in the image.
-            let [seen, off] = [corner.seen_px, corner.off_px].map(|[x, y]| [x, -y]);
+            let (seen, off) = (corner.seen_px, corner.off_px);
             if tag.is_used && corner.is_used {
                 strokes.extend([seen, [seen[0] - MAGNIFIED * off[0], seen[1] - MAGNIFIED * off[1]]]);
             } else {
@@ -170,7 +165,8 @@ fn over_image(views: &[ViewResidual]) -> Markup {
         return Markup::default();
     }
     let shown = with_rejected(series("", Color::Blue, Style::Strokes, strokes), rejected);
-    let chart = Panel { is_map: true, ..panel("Corners over the image", "x, px", "-y, px", shown) };
+    let y = ("y, px".to_owned(), Axis::Downward);
+    let chart = Panel { is_map: true, y, ..panel("Corners over the image", "x, px", "", shown) };
     figure(&chart, "Strokes: from where a corner was seen to where it is predicted, 40 times as long as it is.")
 }
 

@@ -5,22 +5,15 @@ use maud::{Markup, html as markup};
 use super::Report;
 use crate::report::summary::RunSummary;
 use crate::report::table::{check_lines, labelled};
-use armcal_belief::calib::{Calibration, Status, ValidRange};
+use crate::report::verdict::verdict;
+use armcal_belief::calib::ValidRange;
 use armcal_core::time::utc;
 use armcal_core::units::Unit;
 
-/// How a verdict reads at a glance.
-struct Verdict {
-    class: &'static str,
-    headline: &'static str,
-    reasons: Vec<String>,
-    next: Vec<String>,
-}
-
 pub(super) fn section(report: &Report<'_>) -> Markup {
-    let verdict = verdict(report);
+    let verdict = verdict(report.summary);
     markup! {
-        div class={ "verdict " (verdict.class) } {
+        div class={ "verdict " (verdict.grade.class()) } {
             strong { (verdict.headline) }
             p { (in_one_sentence(report)) }
             @if !verdict.reasons.is_empty() { ul { @for reason in &verdict.reasons { li { (reason) } } } }
@@ -29,51 +22,6 @@ pub(super) fn section(report: &Report<'_>) -> Markup {
         }
         (facts(report))
     }
-}
-
-fn verdict(report: &Report<'_>) -> Verdict {
-    let (summary, calibration) = (report.summary, report.calibration);
-    if summary.status == Status::Refused {
-        let mut next: Vec<String> = Vec::new();
-        for remedy in calibration.refusals.iter().map(|refusal| sentence(refusal.remedy())) {
-            if !next.contains(&remedy) {
-                next.push(remedy);
-            }
-        }
-        next.push("Keep the sensors that were believed in before, and calibrate again.".to_owned());
-        let reasons = calibration.refusals.iter().map(|refusal| sentence(&refusal.cause())).collect();
-        return Verdict { class: "red", headline: "REFUSED: do not use this calibration", reasons, next };
-    }
-    let attention = attention(summary, calibration);
-    let mut next = vec!["Load calibration.toml, or export it (armcal export) for the arm's driver.".to_owned()];
-    if attention.is_empty() {
-        return Verdict { class: "green", headline: "ACCEPTED: use it", reasons: Vec::new(), next };
-    }
-    next.push("Look at each point above before work that depends on it.".to_owned());
-    Verdict { class: "amber", headline: "ACCEPTED, with points to look at", reasons: attention, next }
-}
-
-/// What an accepted calibration leaves to be looked at.
-fn attention(summary: &RunSummary, calibration: &Calibration) -> Vec<String> {
-    let mut points: Vec<String> = Vec::new();
-    for limit in summary.asserts.iter().filter(|limit| !limit.holds) {
-        points.push(format!("A limit of the script does not hold: step {}, {}.", limit.step, limit.key));
-    }
-    if summary.online.as_ref().is_some_and(|online| online.is_good_enough == Some(false)) {
-        points.push("What is believed at the end is not good enough for the task.".to_owned());
-    }
-    points.extend(summary.stopped.iter().map(|why| sentence(&format!("the script stopped early: {why}"))));
-    if calibration.prior.as_ref().is_some_and(|prior| !prior.agrees) {
-        points
-            .push("The earlier calibration contradicts the new views: something happened to the arm since.".to_owned());
-    }
-    for failed in &calibration.failed_joint {
-        let colon = if failed.evidence.is_empty() { "" } else { ": " };
-        points.push(format!("{} {}{colon}{}.", failed.joint, failed.kind.name(), failed.evidence));
-    }
-    let not_covered = calibration.verdict.iter().flat_map(|verdict| &verdict.not_covered);
-    points.extend(not_covered.map(|line| sentence(&format!("not covered by any view: {line}"))));
-    points
 }
 
 /// The figure that matters, in words.
@@ -108,14 +56,6 @@ fn in_one_sentence(report: &Report<'_>) -> String {
         );
     }
     words
-}
-
-/// A capital first, a full stop last.
-fn sentence(text: &str) -> String {
-    let mut letters = text.chars();
-    let first: String = letters.next().into_iter().flat_map(char::to_uppercase).collect();
-    let end = if text.ends_with(['.', '!', '?']) { "" } else { "." };
-    format!("{first}{}{end}", letters.as_str())
 }
 
 /// What this is a report of.
@@ -190,13 +130,6 @@ pub(super) fn signatures() -> Markup {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn reasons_are_sentences() {
-        assert_eq!(sentence("capture more views"), "Capture more views.");
-        assert_eq!(sentence("So it is."), "So it is.");
-        assert_eq!(sentence(""), ".");
-    }
 
     #[test]
     fn depth_is_that_of_the_water_column() {

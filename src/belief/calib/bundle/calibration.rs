@@ -465,11 +465,11 @@ fn with_datasheets(estimated: &Robot, datasheet: &Robot, setup: &BundleSetup) ->
     pairs.map(|(joint, (own, nominal))| if setup.has_no_sensor(joint) { nominal } else { own }.clone()).collect()
 }
 
-/// `pose 12: tag 3: 45 sigma`, or `pose 12: tag 3, corner 0: 45 sigma`.
+/// `view 12: tag 3: 45 sigma`, or `view 12: tag 3, corner 0: 45 sigma`; views count from 1.
 fn named(outlier: &Outlier, views: &[View]) -> String {
-    let pose_idx = views.get(outlier.view_idx).map_or(0, |view| view.pose_idx);
+    let number = views.get(outlier.view_idx).map_or(0, |view| view.pose_idx) + 1;
     let corner = outlier.corner.map_or(String::new(), |corner| format!(", corner {corner}"));
-    format!("pose {pose_idx}: tag {}{corner}: {:.0} sigma", outlier.tag_id, outlier.sigmas)
+    format!("view {number}: tag {}{corner}: {:.0} sigma", outlier.tag_id, outlier.sigmas)
 }
 
 /// Gains and offsets that keep the datasheet's value: of joints distal to the camera, and of failed ones.

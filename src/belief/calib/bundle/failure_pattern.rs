@@ -212,7 +212,7 @@ impl Readings {
         };
         let (read, shown) = (range_deg(&self.travel_rad), range_deg(&self.angle_rad));
         let n = self.len();
-        let pose = |k: usize| views[k].pose_idx;
+        let number = |k: usize| views[k].pose_idx + 1;
         match pattern {
             FailurePattern::Locked(SensorUse::Used) => {
                 format!("the camera shows one angle in {n} views (within {shown:.2} deg), as the sensor says")
@@ -243,8 +243,8 @@ impl Readings {
                  a line of slope {slope:.2}"
             ),
             FailurePattern::Single(of) => {
-                let poses: Vec<u32> = of.iter().map(|&k| pose(k)).collect();
-                format!("the reading is off in {} of {n} views (poses {poses:?})", of.len())
+                let numbers: Vec<String> = of.iter().map(|&k| number(k).to_string()).collect();
+                format!("the reading is off in {} of {n} views ({})", of.len(), numbers.join(", "))
             }
             FailurePattern::Lasting { since, step_rad } => slip_in_words(*step_rad, views, *since),
         }

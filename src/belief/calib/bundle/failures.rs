@@ -129,11 +129,11 @@ impl Failure {
     }
 }
 
-/// `the sensor slipped by 1.00 deg after 9 of 20 views, before that of pose 9`.
+/// `the sensor slipped by 1.00 deg after 9 of 20 views, before view 10`.
 pub(crate) fn slip_in_words(step_rad: f64, views: &[View], since: usize) -> String {
     let n_before = views.iter().filter(|view| view.end < views[since].end).count();
-    let (step_deg, n, pose_idx) = (step_rad.to_degrees(), views.len(), views[since].pose_idx);
-    format!("the sensor slipped by {step_deg:.2} deg after {n_before} of {n} views, before that of pose {pose_idx}")
+    let (step_deg, n, number) = (step_rad.to_degrees(), views.len(), views[since].pose_idx + 1);
+    format!("the sensor slipped by {step_deg:.2} deg after {n_before} of {n} views, before view {number}")
 }
 
 /// An arm and its views with the failed joints taken care of.

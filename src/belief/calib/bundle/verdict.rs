@@ -233,7 +233,8 @@ impl VerdictInput<'_> {
                 calibration.findings.push(worn(&joint, std_rad));
                 refusal = Some(Refusal::SensorError { joint, std_rad, datasheet_std_rad });
             } else if walked_rad > WALKED * stated.joint_std_rad[joint] {
-                calibration.findings.push(Finding { repaired: true, ..worn(&spec.joint, walked_rad) });
+                let kind = FindingKind::OffsetWalks;
+                calibration.findings.push(Finding { kind, repaired: true, ..worn(&spec.joint, walked_rad) });
                 table.warnings.push(format!(
                     "{} has an offset that walks at random, by {:.2} deg (std) while the views were captured: as much \
                      again is counted in the predicted tool error; calibrate again soon, or keep the belief up online",

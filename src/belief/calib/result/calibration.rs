@@ -56,7 +56,7 @@ pub struct Calibration {
     pub covariance_hash: Option<String>,
     /// What the data did not determine, and why; these keep the datasheet's values.
     pub unobservable: Vec<String>,
-    /// Tag observations that the fit rejected: `pose 12: tag 3: 45 sigma`.
+    /// Tag observations that the fit rejected: `view 12: tag 3: 45 sigma`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub outliers: Vec<String>,
     /// Solver and fitted views.

@@ -48,7 +48,8 @@ pub(crate) fn not_covered(calibration: &Calibration, postures: &[JointAngles]) -
         let beyond = postures.iter().map(|angles| past(angles[joint], [low, high])).filter(|by| *by > MARGIN_RAD);
         let (n, most) = beyond.fold((0usize, 0.0_f64), |(n, most), by| (n + 1, most.max(by)));
         let (name, all) = (&result.name, postures.len());
-        let words = || format!("{name}: {n} of {all} targets lie up to {most:.2} rad beyond {low:.2} .. {high:.2} rad");
+        let [most, low, high] = [most, low, high].map(f64::to_degrees);
+        let words = || format!("{name}: {n} of {all} targets lie up to {most:.0} deg beyond {low:.0} .. {high:.0} deg");
         (n > 0).then(words)
     };
     joints.filter_map(of_joint).collect()

@@ -18,6 +18,17 @@ pub const FIRST_NAMED_ID: u32 = 1_000_000;
 /// One sigma of a rotation of which nothing is known, rad: half a turn.
 pub const UNKNOWN_ROTATION_STD_RAD: f64 = std::f64::consts::PI;
 
+/// What people call the tag of number `id` among those of `ids`: `tag 3`; one that has a name and no number is a board,
+/// `board`, or `board 2` where there are several.
+#[must_use]
+pub fn spoken_name(id: u32, ids: impl IntoIterator<Item = u32>) -> String {
+    let Some(place) = id.checked_sub(FIRST_NAMED_ID) else { return format!("tag {id}") };
+    match ids.into_iter().filter(|id| *id >= FIRST_NAMED_ID).max() {
+        Some(last) if last > FIRST_NAMED_ID => format!("board {}", place + 1),
+        _ => "board".to_owned(),
+    }
+}
+
 /// A landmark as a tag map has it, in the frame of the file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Landmark {

@@ -60,7 +60,7 @@ fn check(file: &Path, map: &LandmarkFile) -> Result<(), FileIssue> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tagmap::files::landmark::{FIRST_NAMED_ID, NamedSurvey, UNKNOWN_ROTATION_STD_RAD};
+    use crate::tagmap::files::landmark::{FIRST_NAMED_ID, NamedSurvey, UNKNOWN_ROTATION_STD_RAD, spoken_name};
     use armcal_core::input::TagUse;
 
     const TWO: &str = "version = 1\nframe = \"base_link\"\n[[tag]]\nid = 2\nsize_m = 0.16\nposition_m = [0.0, 0.0, \
@@ -115,5 +115,13 @@ mod tests {
         let text = "version = 1\nframe = \"base_link\"\n[[tag]]\nid = 5\nsize_m = 0.1\n";
         let named = survey(text, TagUse::Corners).expect("good");
         assert!(!named.survey.tags[0].is_known());
+    }
+
+    #[test]
+    fn what_has_a_name_and_no_number_is_a_board() {
+        let [first, second] = [FIRST_NAMED_ID, FIRST_NAMED_ID + 1];
+        assert_eq!(spoken_name(7, [7, first]), "tag 7");
+        assert_eq!(spoken_name(first, [7, first]), "board");
+        assert_eq!([first, second].map(|id| spoken_name(id, [first, second])), ["board 1", "board 2"]);
     }
 }

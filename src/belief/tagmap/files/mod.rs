@@ -19,7 +19,7 @@ mod written;
 mod yaml;
 
 pub use cameras::{NamedCamera, cameras_to_yaml, parse_cameras, read_cameras};
-pub use landmark::{FIRST_NAMED_ID, Landmark, LandmarkFile, NamedSurvey, UNKNOWN_ROTATION_STD_RAD};
+pub use landmark::{FIRST_NAMED_ID, Landmark, LandmarkFile, NamedSurvey, UNKNOWN_ROTATION_STD_RAD, spoken_name};
 pub use landmarks::read_landmarks;
 pub use read::{parse_tags, read_tags};
 pub use tag_file::{Remap, TagFile};

@@ -1,0 +1,133 @@
+//! The truth's faults as sentences; the truth has them as a routine does, kind and values.
+
+use toml::{Table, Value};
+
+/// `sensor_jump`, `by_rad = 0.03, joint = "wrist_pitch"`: `the sensor of wrist_pitch slipped by 1.72 deg`. A fault that
+/// this version does not know is told as it is written.
+pub(super) fn sentence(kind: &str, details: &str) -> String {
+    let values: Option<Table> = format!("fault = {{ {details} }}").parse().ok();
+    let fault = values.and_then(|mut values| match values.remove("fault") {
+        Some(Value::Table(table)) => Some(Fault(table)),
+        _ => None,
+    });
+    let told =
+        fault.and_then(|fault| fault.of_sensor(kind).or_else(|| fault.of_tag(kind)).or_else(|| fault.other(kind)));
+    told.unwrap_or_else(|| format!("{}: {details}", kind.replace('_', " ")))
+}
+
+/// Values by their keys.
+struct Fault(Table);
+
+impl Fault {
+    fn text(&self, key: &str) -> Option<&str> {
+        self.0.get(key)?.as_str()
+    }
+
+    fn number(&self, key: &str) -> Option<f64> {
+        number(self.0.get(key)?)
+    }
+
+    fn id(&self, key: &str) -> Option<i64> {
+        self.0.get(key)?.as_integer()
+    }
+
+    /// Length of a vector; zero where there is none.
+    fn length(&self, key: &str) -> f64 {
+        let parts = self.0.get(key).and_then(Value::as_array).map(Vec::as_slice).unwrap_or_default();
+        parts.iter().filter_map(number).map(|part| part * part).sum::<f64>().sqrt()
+    }
+
+    /// `by 41.2 mm and 5.7 deg`, or what there is of both.
+    fn shift(&self) -> String {
+        let (mm, deg) = (1e3 * self.length("by_m"), self.length("by_rad").to_degrees());
+        match (mm > 0.0, deg > 0.0) {
+            (_, false) => format!("by {mm:.1} mm"),
+            (false, true) => format!("by {deg:.1} deg"),
+            (true, true) => format!("by {mm:.1} mm and {deg:.1} deg"),
+        }
+    }
+
+    fn of_sensor(&self, kind: &str) -> Option<String> {
+        let deg = |key: &str| self.number(key).map(f64::to_degrees);
+        let what = match kind {
+            "sensor_jump" => format!("slipped by {:.2} deg", deg("by_rad")?),
+            "sensor_stuck" => "is stuck".to_owned(),
+            "sensor_dead" => "is dead".to_owned(),
+            "sensor_reversed" => "reads the other way".to_owned(),
+            "sensor_worn" => format!("is worn about {:.1} deg, by {:.2} deg", deg("at_rad")?, deg("by_rad")?),
+            "sensor_dying" => format!("loses contact {} times a second", self.number("dropout_per_s")?),
+            _ => return None,
+        };
+        Some(format!("the sensor of {} {what}", self.text("joint")?))
+    }
+
+    fn of_tag(&self, kind: &str) -> Option<String> {
+        let what = match kind {
+            "tag_lost" => "fell off".to_owned(),
+            "tag_moved" => format!("was knocked aside {}", self.shift()),
+            "tag_misread" => format!("is read as tag {}", self.id("as_id")?),
+            _ => return None,
+        };
+        Some(format!("tag {} {what}", self.id("id")?))
+    }
+
+    fn other(&self, kind: &str) -> Option<String> {
+        let force = || Some(format!("{:.0} N for {} s", self.length("force_n"), self.number("duration_s")?));
+        Some(match kind {
+            "camera_slipped" => format!("the camera slipped on its mount {}", self.shift()),
+            "joint_locked" => format!("{} is locked", self.text("joint")?),
+            "pressure_lost" => {
+                let of =
+                    self.text("joint").map_or_else(|| "the pump".to_owned(), |joint| format!("the valve of {joint}"));
+                format!("{of} lost {:.0} % of its pressure", 100.0 * self.number("ratio")?)
+            }
+            "silt" => format!("silt: the camera sees nothing for {} s", self.number("seconds")?),
+            "vehicle_knocked" => format!("the vehicle was knocked, {}", force()?),
+            "arm_bumped" => format!("{} was bumped, {}", self.text("link")?, force()?),
+            _ => return None,
+        })
+    }
+}
+
+fn number(value: &Value) -> Option<f64> {
+    value.as_float().or_else(|| value.as_integer().map(|n| n as f64))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn faults_are_plain_sentences() {
+        for (kind, details, expected) in [
+            ("sensor_jump", "by_rad = 0.03, joint = \"wrist_pitch\"", "the sensor of wrist_pitch slipped by 1.72 deg"),
+            (
+                "sensor_dying",
+                "dropout_per_s = 2.0, joint = \"elbow\"",
+                "the sensor of elbow loses contact 2 times a second",
+            ),
+            (
+                "tag_moved",
+                "by_m = [0.04, 0.0, 0.01], by_rad = [0.0, 0.0, 0.1], id = 1",
+                "tag 1 was knocked aside by 41.2 mm and 5.7 deg",
+            ),
+            ("tag_moved", "by_m = [0.0, 0.003, 0.0], id = 4", "tag 4 was knocked aside by 3.0 mm"),
+            ("tag_misread", "as_id = 2, id = 7", "tag 7 is read as tag 2"),
+            ("silt", "seconds = 20.0", "silt: the camera sees nothing for 20 s"),
+            ("pressure_lost", "ratio = 0.5", "the pump lost 50 % of its pressure"),
+            (
+                "arm_bumped",
+                "duration_s = 0.2, force_n = [0.0, 300.0, 400.0], link = \"forearm\"",
+                "forearm was bumped, 500 N for 0.2 s",
+            ),
+        ] {
+            assert_eq!(sentence(kind, details), expected);
+        }
+    }
+
+    #[test]
+    fn what_is_not_known_is_told_as_it_is_written() {
+        assert_eq!(sentence("hose_cut", "at_m = 1.0"), "hose cut: at_m = 1.0");
+        assert_eq!(sentence("sensor_jump", "no values"), "sensor jump: no values");
+    }
+}

@@ -1,0 +1,224 @@
+//! May the result be used, why, and what to do next: the same words for report.html, the replay and the terminal.
+
+use crate::report::summary::RunSummary;
+use armcal_belief::calib::{FailedJointTable, Finding, FindingKind, PriorTable, Status};
+use armcal_core::robot::FailedKind;
+
+/// How a verdict reads at a glance.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Grade {
+    Green,
+    Amber,
+    Red,
+}
+
+impl Grade {
+    /// The class of a page's box.
+    pub fn class(self) -> &'static str {
+        match self {
+            Self::Green => "green",
+            Self::Amber => "amber",
+            Self::Red => "red",
+        }
+    }
+}
+
+pub(super) struct Verdict {
+    pub grade: Grade,
+    pub headline: &'static str,
+    pub reasons: Vec<String>,
+    pub next: Vec<String>,
+}
+
+/// Of a run, or of a calibration alone.
+pub(super) fn verdict(summary: &RunSummary) -> Verdict {
+    if summary.status == Status::Refused {
+        let reasons = summary.refusals.iter().map(|refusal| sentence(&refusal.cause())).collect();
+        let mut next: Vec<String> = Vec::new();
+        for remedy in summary.refusals.iter().map(|refusal| sentence(refusal.remedy())) {
+            if !next.contains(&remedy) {
+                next.push(remedy);
+            }
+        }
+        next.push("Keep the sensors that were believed in before, and calibrate again.".to_owned());
+        return Verdict { grade: Grade::Red, headline: "REFUSED: do not use this calibration", reasons, next };
+    }
+    let repairs = repairs(summary);
+    let mut reasons: Vec<String> = repairs.iter().map(|repair| sentence(&repair.cause)).collect();
+    reasons.extend(attention(summary));
+    let load = "Load calibration.toml, or export it (armcal export) for the arm's driver.".to_owned();
+    if reasons.is_empty() {
+        return Verdict { grade: Grade::Green, headline: "ACCEPTED: use it", reasons, next: vec![load] };
+    }
+    let mut next: Vec<String> = repairs.iter().map(|repair| sentence(&repair.remedy)).collect();
+    next.extend([load, "Look at each point above before work that depends on it.".to_owned()]);
+    Verdict { grade: Grade::Amber, headline: "ACCEPTED, with points to look at", reasons, next }
+}
+
+/// What was wrong with the arm or its survey, and is taken as it was found.
+pub(super) struct Repair {
+    pub cause: String,
+    pub remedy: String,
+}
+
+/// Of this result.
+pub(super) fn repairs(summary: &RunSummary) -> Vec<Repair> {
+    let calibration = &summary.calibration;
+    let since = if calibration.prior.is_some() { " since the earlier calibration" } else { "" };
+    repairs_of(&calibration.findings, &calibration.failed_joint, since)
+}
+
+/// Joints first.
+fn repairs_of(findings: &[Finding], failed: &[FailedJointTable], since: &str) -> Vec<Repair> {
+    let of_kind = |kind: FindingKind| findings.iter().filter(move |found| found.repaired && found.kind == kind);
+    let is_told = |name: &str| failed.iter().any(|failed| failed.joint == name);
+    let slip = |found: &Finding| Repair {
+        cause: format!("the sensor of {} slipped{}{since}", found.name, by(found)),
+        remedy: format!("fasten the sensor of {}: the result is of it as it is now", found.name),
+    };
+    let tag = |found: &Finding| Repair {
+        cause: format!("tag {} hangs {} from where the survey has it", found.name, size(found)),
+        remedy: format!("fasten tag {0}, or correct the survey: the result has tag {0} where it was seen", found.name),
+    };
+    let slips = of_kind(FindingKind::SensorSlip).filter(|found| !is_told(&found.name));
+    failed.iter().map(of_joint).chain(slips.map(slip)).chain(of_kind(FindingKind::TagMoved).map(tag)).collect()
+}
+
+fn size(found: &Finding) -> String {
+    found.size_in_words().unwrap_or_else(|| "away".to_owned())
+}
+
+/// ` by 1.74 deg`, where it has a size.
+fn by(found: &Finding) -> String {
+    found.size_in_words().map_or_else(String::new, |size| format!(" by {size}"))
+}
+
+fn of_joint(failed: &FailedJointTable) -> Repair {
+    let FailedJointTable { joint, kind, evidence, since_pose, .. } = failed;
+    let colon = if evidence.is_empty() { "" } else { ": " };
+    let cause = match evidence.strip_prefix("the sensor ").filter(|_| since_pose.is_some()) {
+        Some(slipped) => format!("the sensor of {joint} {slipped}"),
+        None if *kind == FailedKind::Locked => format!("{joint} is locked{colon}{evidence}"),
+        None => format!("the sensor of {joint} {}{colon}{evidence}", kind.predicate()),
+    };
+    Repair { cause, remedy: joint_remedy(failed) }
+}
+
+/// What to do about a failed joint.
+pub(super) fn joint_remedy(failed: &FailedJointTable) -> String {
+    let joint = &failed.joint;
+    match (failed.kind, failed.since_pose) {
+        (_, Some(_)) => format!("fasten the sensor of {joint}: the result is of it as it is since then"),
+        (FailedKind::Locked, None) => format!("targets that need {joint} are out of reach; free it"),
+        (_, None) => format!("check the sensor of {joint}, its shaft and its cable"),
+    }
+}
+
+/// What else an accepted calibration leaves to be looked at.
+fn attention(summary: &RunSummary) -> Vec<String> {
+    let mut points: Vec<String> = Vec::new();
+    for limit in summary.asserts.iter().filter(|limit| !limit.holds) {
+        points.push(format!("A limit of the script does not hold: step {}, {}.", limit.step, limit.key));
+    }
+    if summary.online.as_ref().is_some_and(|online| online.is_good_enough == Some(false)) {
+        points.push("What is believed at the end is not good enough for the task.".to_owned());
+    }
+    points.extend(summary.stopped.iter().map(|why| sentence(&format!("the script stopped early: {why}"))));
+    points.extend(summary.calibration.prior.as_ref().filter(|prior| !prior.agrees).map(against_prior));
+    let not_covered = summary.calibration.verdict.iter().flat_map(|verdict| &verdict.not_covered);
+    points.extend(not_covered.map(|line| sentence(&format!("not covered by any view: {line}"))));
+    points
+}
+
+fn against_prior(prior: &PriorTable) -> String {
+    let PriorTable { worst_joint: joint, worst_off_rad, used, .. } = prior;
+    let fate = if *used { "it is in the result all the same" } else { "the result rests on the new views alone" };
+    let off_deg = worst_off_rad.to_degrees().abs();
+    format!("The earlier calibration contradicts the new views, {joint} the most, by {off_deg:.2} deg: {fate}.")
+}
+
+/// A capital first, a full stop last; a name that begins with a small letter keeps it.
+pub(super) fn sentence(text: &str) -> String {
+    let first_word = text.split([' ', ':']).next().unwrap_or_default();
+    let end = if text.ends_with(['.', '!', '?']) { "" } else { "." };
+    if first_word.contains('_') {
+        return format!("{text}{end}");
+    }
+    let mut letters = text.chars();
+    let first: String = letters.next().into_iter().flat_map(char::to_uppercase).collect();
+    format!("{first}{}{end}", letters.as_str())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use armcal_belief::calib::FindingUnit;
+
+    #[test]
+    fn reasons_are_sentences() {
+        assert_eq!(sentence("capture more views"), "Capture more views.");
+        assert_eq!(sentence("So it is."), "So it is.");
+        assert_eq!(sentence("wrist_pitch is locked"), "wrist_pitch is locked.", "a name is a name");
+        assert_eq!(sentence(""), ".");
+    }
+
+    fn failed(kind: FailedKind, evidence: &str, since_pose: Option<u32>) -> FailedJointTable {
+        FailedJointTable {
+            joint: "elbow".to_owned(),
+            kind,
+            found: "detected".to_owned(),
+            evidence: evidence.to_owned(),
+            poses: Vec::new(),
+            since_pose,
+            angle_rad: None,
+            angle_std_rad: None,
+            camera_std_rad: None,
+            tool_error_m: None,
+            tool_error_by_camera_m: None,
+            tool_error_by_datasheet_m: None,
+        }
+    }
+
+    #[test]
+    fn a_repair_says_cause_joint_and_remedy() {
+        let slip = of_joint(&failed(FailedKind::Jumps, "the sensor slipped by 1.00 deg", Some(9)));
+        assert_eq!(slip.cause, "the sensor of elbow slipped by 1.00 deg");
+        assert!(slip.remedy.starts_with("fasten the sensor of elbow"), "{}", slip.remedy);
+        let dead = of_joint(&failed(FailedKind::Dead, "it follows nothing", None));
+        assert_eq!(dead.cause, "the sensor of elbow is dead: it follows nothing");
+        assert!(dead.remedy.starts_with("check the sensor of elbow"), "{}", dead.remedy);
+        assert_eq!(of_joint(&failed(FailedKind::Locked, "", None)).cause, "elbow is locked");
+    }
+
+    #[test]
+    fn slips_since_the_earlier_calibration_come_before_moved_tags() {
+        let finding = |kind, name: &str, size, unit| Finding {
+            kind,
+            name: name.to_owned(),
+            size: Some(size),
+            unit: Some(unit),
+            tool_error_m: None,
+            time_s: None,
+            repaired: true,
+        };
+        let mut findings = vec![
+            finding(FindingKind::TagMoved, "1", 0.0423, FindingUnit::Metre),
+            finding(FindingKind::SensorSlip, "wrist_pitch", 0.0303, FindingUnit::Radian),
+        ];
+        let causes = |findings: &[Finding], failed: &[FailedJointTable]| -> Vec<String> {
+            repairs_of(findings, failed, " since the earlier calibration").into_iter().map(|one| one.cause).collect()
+        };
+        assert_eq!(
+            causes(&findings, &[]),
+            [
+                "the sensor of wrist_pitch slipped by 1.74 deg since the earlier calibration",
+                "tag 1 hangs 42.3 mm from where the survey has it",
+            ]
+        );
+        // Of a joint that is told of already nothing is said twice; what was not repaired is a refusal's.
+        findings[1].name = "elbow".to_owned();
+        findings[0].repaired = false;
+        let told = failed(FailedKind::Jumps, "the sensor slipped by 1.74 deg", Some(3));
+        assert_eq!(causes(&findings, &[told]), ["the sensor of elbow slipped by 1.74 deg"]);
+    }
+}
