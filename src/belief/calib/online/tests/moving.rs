@@ -7,34 +7,43 @@ use crate::calib::online::estimator::OnlineEstimator;
 use crate::calib::online::settings::OnlineSettings;
 use crate::calib::online::tests::drifting::Dive;
 use armcal_core::joints::MAX_JOINTS;
+use armcal_core::robot::Robot;
+
+/// How much later than they were taken images are stamped, s.
+const LATE_S: f64 = 0.035;
+
+/// The clock offset and its sigma, s, after rests and images in motion by sensors of one slope, each image with a time
+/// error of its own.
+fn found_clock_offset_s(robot: &Robot, seed: u64, slope: f64, jitter_s: f64) -> [f64; 2] {
+    let mut dive = Dive::new(robot, seed);
+    let (mut rates, mut jitter) = (rng(seed, "rates"), rng(seed, "jitter"));
+    dive.befall(|truth, _| truth.parameters.gain = [slope; MAX_JOINTS]);
+    let mut online = OnlineEstimator::new(robot.clone(), OnlineSettings::default());
+    for k in 0..24 {
+        dive.advance(&mut online, 12.0 * f64::from(k));
+        online.add_view(&dive.view());
+    }
+    for k in 0..60 {
+        dive.advance(&mut online, 300.0 + f64::from(k));
+        let mut view = dive.view();
+        let late_s = LATE_S + jitter_s * normal(&mut jitter);
+        for joint in 0..robot.n_joints() {
+            let rate_rad_s = rates.random_range(0.05..0.2) * if rates.random_bool(0.5) { 1.0 } else { -1.0 };
+            view.rate_rad_s[joint] = rate_rad_s;
+            view.travel_rad[joint] -= rate_rad_s * late_s;
+        }
+        online.add_view(&view);
+    }
+    online.clock_offset_s().expect("it runs")
+}
 
 /// A sensor whose angle turns by less than the datasheet has it moves by less in the time that its stamps are late.
 #[test]
 fn a_clock_offset_is_found_by_sensors_of_any_slope() {
-    const LATE_S: f64 = 0.035;
-    const SLOPE: f64 = 0.95;
     let robot = titan();
     let mut found_s = Vec::new();
     for seed in 0..4 {
-        let mut dive = Dive::new(&robot, seed);
-        let mut rates = rng(seed, "rates");
-        dive.befall(|truth, _| truth.parameters.gain = [SLOPE; MAX_JOINTS]);
-        let mut online = OnlineEstimator::new(robot.clone(), OnlineSettings::default());
-        for k in 0..24 {
-            dive.advance(&mut online, 12.0 * f64::from(k));
-            online.add_view(&dive.view());
-        }
-        for k in 0..60 {
-            dive.advance(&mut online, 300.0 + f64::from(k));
-            let mut view = dive.view();
-            for joint in 0..robot.n_joints() {
-                let rate_rad_s = rates.random_range(0.05..0.2) * if rates.random_bool(0.5) { 1.0 } else { -1.0 };
-                view.rate_rad_s[joint] = rate_rad_s;
-                view.travel_rad[joint] -= rate_rad_s * LATE_S;
-            }
-            online.add_view(&view);
-        }
-        let [offset_s, std_s] = online.clock_offset_s().expect("it runs");
+        let [offset_s, std_s] = found_clock_offset_s(&robot, seed, 0.95, 0.0);
         assert!((offset_s - LATE_S).abs() < 4.0 * std_s, "seed {seed}: {offset_s} +- {std_s}");
         found_s.push(offset_s);
     }
@@ -44,36 +53,16 @@ fn a_clock_offset_is_found_by_sensors_of_any_slope() {
     assert!((mean_s - LATE_S).abs() < 0.8e-3, "{found_s:?}");
 }
 
-/// An image's time error moves all joints together: its share in the clock offset is that of the number of images, not
-/// of joints.
+/// Where images have a time error of their own, too.
 #[test]
 fn a_clock_offset_is_as_uncertain_as_it_says() {
-    const LATE_S: f64 = 0.035;
-    const JITTER_S: f64 = 0.005;
     let robot = titan();
-    let mut sigmas = Vec::new();
-    for seed in 0..12 {
-        let mut dive = Dive::new(&robot, seed);
-        let mut rates = rng(seed, "rates");
-        let mut online = OnlineEstimator::new(robot.clone(), OnlineSettings::default());
-        for k in 0..24 {
-            dive.advance(&mut online, 12.0 * f64::from(k));
-            online.add_view(&dive.view());
-        }
-        for k in 0..60 {
-            dive.advance(&mut online, 300.0 + f64::from(k));
-            let mut view = dive.view();
-            let late_s = LATE_S + JITTER_S * normal(&mut rates);
-            for joint in 0..robot.n_joints() {
-                let rate_rad_s = rates.random_range(0.05..0.2) * if rates.random_bool(0.5) { 1.0 } else { -1.0 };
-                view.rate_rad_s[joint] = rate_rad_s;
-                view.travel_rad[joint] -= rate_rad_s * late_s;
-            }
-            online.add_view(&view);
-        }
-        let [offset_s, std_s] = online.clock_offset_s().expect("it runs");
-        sigmas.push((offset_s - LATE_S) / std_s);
-    }
+    let sigmas: Vec<f64> = (0..12)
+        .map(|seed| {
+            let [offset_s, std_s] = found_clock_offset_s(&robot, seed, 1.0, 0.005);
+            (offset_s - LATE_S) / std_s
+        })
+        .collect();
     let rms = (sigmas.iter().map(|by| by * by).sum::<f64>() / sigmas.len() as f64).sqrt();
     println!("rms {rms:.2} of {sigmas:.2?}");
     assert!((0.5..1.5).contains(&rms), "{sigmas:?}");
