@@ -242,6 +242,12 @@ impl WornSpot {
         (travel_rad - self.at_rad()).abs() < Self::WIDTH_RAD
     }
 
+    /// Whether a view at a travel from the middle of the range tells of it: more than a tenth of its height.
+    #[must_use]
+    pub fn is_seen_from(self, travel_rad: f64) -> bool {
+        (travel_rad - self.at_rad()).abs() < 2.0 * Self::WIDTH_RAD
+    }
+
     /// Whether what happens at a travel from the middle of the range is about something else.
     #[must_use]
     pub fn is_far_from(self, travel_rad: f64) -> bool {

@@ -282,7 +282,8 @@ impl Refusal {
     #[must_use]
     pub fn remedy(&self) -> &'static str {
         match self {
-            Self::TooFewViews { .. } | Self::TooFewViewsSinceSlip { .. } | Self::PriorUntested => "capture more views",
+            Self::TooFewViews { .. } | Self::PriorUntested => "capture more views",
+            Self::TooFewViewsSinceSlip { .. } => "fasten that sensor on its shaft, then capture more views",
             Self::NotSolved { .. } => "capture views that move each joint over more of its range",
             Self::TooFewHeldOutViews { .. } | Self::NoHeldOutTag => "hold out more views that show tags",
             Self::NoBetterThanDatasheet { .. } | Self::NoBetterThanBaseline { .. } => {

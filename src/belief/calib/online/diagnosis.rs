@@ -1,23 +1,20 @@
 //! What happened, by the evidence of the views: a view that the belief does not explain starts a race of explanations,
 //! each a belief of its own, until one of them leads, or two to five more views were seen.
 
+use crate::calib::online::branch::{Branch, Step};
 use crate::calib::online::filter::{Filter, ViewUpdate, WalkScore};
 use crate::calib::online::hypothesis::{Fault, TagSet};
-use crate::calib::online::process_noise::ProcessNoise;
 use crate::calib::online::view_stream::is_moving;
 use crate::calib::parameters::WornSpot;
 use crate::calib::views::view::View;
 use armcal_core::joints::MAX_JOINTS;
 use armcal_core::robot::Robot;
-use armcal_core::sensor::ConditionChange;
+use armcal_core::time::Stamp;
 
 /// A view is suspicious beyond this quantile of the normal by its cost (one in ten thousand).
 const SUSPICIOUS_Z: f64 = 3.719;
 /// The same of a step of one joint's sensor: looked at more often, for it is one direction among many.
 const SUSPICIOUS_STEP_Z: f64 = 3.3;
-/// What a view costs an explanation under which none of its observations belongs, per observation; that of a rejected
-/// one.
-pub(crate) const NOTHING_FITS_NATS: f64 = 30.0;
 /// What leads by this is taken for true, in nats.
 const LEAD_NATS: f64 = 5.0;
 /// The same over another explanation by the same sensor: which one it is matters more than how it failed.
@@ -28,10 +25,8 @@ const LONE_LEAD_IN_MOTION_NATS: f64 = 20.0;
 /// What one view tells of a tag is taken for true where it is not farther from its place than this, m.
 const LONE_TAG_M: f64 = 0.08;
 const LONE_TAG_LEAD_NATS: f64 = 1.5;
-/// A scale this close to the datasheet's is the drift of a sensor, not another sensor.
-const LEAST_SCALE: f64 = 0.2;
-/// A lower bump is the nonlinearity of a sound sensor, rad: 0.15 deg.
-const LEAST_BUMP_RAD: f64 = 2.6e-3;
+/// A middle of a spot aside must explain more by this, in nats: views of one place fit all that are near.
+const NEARER_NATS: f64 = 1.0;
 /// Explanations followed at most.
 const MAX_BRANCHES: usize = 8;
 /// What is less probable than the best one by this is not followed any more, in nats.
@@ -40,10 +35,13 @@ const HOPELESS_NATS: f64 = 25.0;
 const RECENT_S: f64 = 60.0;
 const MAX_RECENT: usize = 6;
 /// Views after which the best explanation is taken where it is clear that something happened, where it may have been
-/// drift, and in any case; and those that one needs.
+/// drift, where a slip may be a worn spot, and in any case; and those that one needs.
 const MAX_VIEWS_TO_NAME: usize = 2;
 const MAX_VIEWS_OF_DRIFT: usize = 3;
+const MAX_VIEWS_OF_SLIP: usize = 3;
 const MAX_VIEWS: usize = 5;
+/// The same where it may be one joint's sensor that is worn or another's: the next look at tags may tell.
+const MAX_VIEWS_OF_TIE: usize = 20;
 /// Views after the first ones for which all explanations are opened.
 const OPEN_VIEWS: usize = 2;
 /// What a tag that moved with others explains at least, in nats.
@@ -53,41 +51,6 @@ const CONFIRMED_BY: usize = 2;
 /// explains any.
 const OPEN_SENSOR_CONFIRMED_BY: usize = 3;
 
-/// One explanation, and the belief under it.
-#[derive(Clone)]
-pub(crate) struct Branch {
-    pub fault: Option<Fault>,
-    pub filter: Filter,
-    /// `ln` of its odds.
-    nats: f64,
-}
-
-impl Branch {
-    /// Whether it explains by another scale or a bump that is none.
-    fn is_void(&self, before: &Filter) -> bool {
-        let Some(fault) = self.fault else { return false };
-        let size = fault.size(before, &self.filter);
-        match fault {
-            Fault::Scale(_) => size.is_none_or(|gain| (gain - 1.0).abs() < LEAST_SCALE),
-            Fault::Worn(..) => size.is_none_or(|height_rad| height_rad.abs() < LEAST_BUMP_RAD),
-            _ => false,
-        }
-    }
-
-    /// Joint and place, where it is a worn spot.
-    fn worn_spot(&self) -> Option<(usize, WornSpot)> {
-        match self.fault {
-            Some(Fault::Worn(joint, spot)) => Some((joint, spot)),
-            _ => None,
-        }
-    }
-
-    /// Whether it tells of something.
-    fn tells(&self) -> bool {
-        !matches!(self.fault, None | Some(Fault::Drift))
-    }
-}
-
 /// Explanations of what the last views show.
 #[derive(Clone)]
 pub(crate) struct Race {
@@ -95,36 +58,20 @@ pub(crate) struct Race {
     branches: Vec<Branch>,
     /// The belief before the first suspicious view.
     before: Filter,
+    /// That nothing happened until the view that it began with, the last of the first ones, and how many were before.
+    nothing_until: Branch,
+    n_until: usize,
     steps: Vec<Step>,
     /// Views after it began.
     n_later: usize,
-}
-
-/// A view of a race, and what sensors may have changed since the one before.
-#[derive(Clone)]
-struct Step {
-    drift: Option<(ProcessNoise, ConditionChange)>,
-    view: View,
-}
-
-impl Step {
-    fn take_in(&self, robot: &Robot, branch: &mut Branch) {
-        let Branch { fault, filter, nats } = branch;
-        if let Some((noise, change)) = &self.drift {
-            let columns = noise.widening(filter, change);
-            filter.widen(&columns);
-        }
-        *nats += match filter.update(robot, &seen_by(*fault, &self.view)) {
-            Some(update) => update.log_evidence,
-            None => -NOTHING_FITS_NATS * self.view.tags.len() as f64,
-        };
-    }
 }
 
 /// What a race ended with.
 pub(crate) struct Verdict {
     pub fault: Fault,
     pub size: Option<f64>,
+    /// The first view that shows it, where that was before the race.
+    pub since: Option<Stamp>,
     /// How far it leads the next explanation.
     pub lead_nats: f64,
     pub next: Option<Fault>,
@@ -185,18 +132,28 @@ pub(crate) fn is_suspicious(update: &ViewUpdate) -> bool {
 impl Race {
     /// Of all that could explain the views, which the belief before them does not.
     pub(crate) fn start(robot: &Robot, RecentViews { before, views, .. }: &RecentViews) -> Self {
-        let steps = views.iter().map(|view| Step { drift: None, view: view.clone() }).collect();
-        let mut race = Self { branches: Vec::new(), before: before.clone(), steps, n_later: 0 };
+        let steps: Vec<Step> = views.iter().map(|view| Step { drift: None, view: view.clone() }).collect();
+        let n_until = steps.len().saturating_sub(1);
+        let mut nothing_until = Branch::nothing(before.clone());
+        steps[..n_until].iter().for_each(|step| _ = step.take_in(robot, &mut nothing_until));
+        let branches = Vec::new();
+        let mut race = Self { branches, before: before.clone(), nothing_until, n_until, steps, n_later: 0 };
         race.open(robot);
         race
     }
 
     /// Every explanation takes the view in, after what sensors may have changed before it. None is dropped at the first
-    /// ones, which open more: what a view of one tag cannot tell apart the next one does.
-    pub(crate) fn add(&mut self, robot: &Robot, drift: Option<(ProcessNoise, ConditionChange)>, view: &View) {
+    /// ones, which open more: what a view of one tag cannot tell apart the next one does. What it says of the offsets
+    /// where nothing happened.
+    pub(crate) fn add(&mut self, robot: &Robot, step: Step) -> [WalkScore; MAX_JOINTS] {
         self.n_later += 1;
-        let step = Step { drift, view: view.clone() };
-        self.branches.iter_mut().for_each(|branch| step.take_in(robot, branch));
+        let mut walk = [WalkScore::default(); MAX_JOINTS];
+        for branch in &mut self.branches {
+            let update = step.take_in(robot, branch);
+            if let (None, Some(update)) = (branch.fault, update) {
+                walk = update.walk;
+            }
+        }
         self.steps.push(step);
         if self.n_later <= OPEN_VIEWS {
             self.open(robot);
@@ -206,6 +163,25 @@ impl Race {
         if self.n_later >= OPEN_VIEWS {
             self.drop_hopeless();
         }
+        walk
+    }
+
+    /// Explanations found in hindsight, each in the place of one that is less probable.
+    pub(crate) fn take_up(&mut self, branches: Vec<Branch>) {
+        for new in branches {
+            let same = self.branches.iter_mut().find(|branch| branch.fault == new.fault);
+            match same {
+                Some(same) if same.nats < new.nats => *same = new,
+                Some(_) => {}
+                None => self.branches.push(new),
+            }
+        }
+        self.sort();
+    }
+
+    /// Number of its views.
+    pub(crate) fn n_views(&self) -> usize {
+        self.steps.len()
     }
 
     /// All explanations of the views so far that are not followed yet.
@@ -241,15 +217,16 @@ impl Race {
         self.branches.iter().find(|branch| branch.fault == fault)
     }
 
-    /// An explanation that took all views in.
+    /// An explanation that took all views in: what happened before the first, or before the one that began the race.
     fn branch(&self, robot: &Robot, fault: Option<Fault>) -> Branch {
-        let mut filter = self.before.clone();
-        if let Some(fault) = fault {
-            fault.open(&mut filter, robot);
-        }
-        let mut branch = Branch { fault, filter, nats: fault.map_or(0.0, Fault::ln_prior) };
-        self.steps.iter().for_each(|step| step.take_in(robot, &mut branch));
-        branch
+        let since = |nothing: &Branch, n: usize| {
+            let mut branch = fault.map_or_else(|| nothing.clone(), |fault| nothing.with(robot, fault));
+            self.steps[n..].iter().for_each(|step| _ = step.take_in(robot, &mut branch));
+            branch
+        };
+        let early = since(&Branch::nothing(self.before.clone()), 0);
+        let late = fault.filter(|_| self.n_until > 0).map(|_| since(&self.nothing_until, self.n_until));
+        late.filter(|late| late.nats > early.nats).unwrap_or(early)
     }
 
     /// The worn spot that explains most, with its middle half a width aside where that explains more: a view stands
@@ -260,7 +237,7 @@ impl Race {
         let aside = [-0.5, 0.5].map(|by| WornSpot::about(spot.at_rad() + by * WornSpot::WIDTH_RAD));
         let branches = aside.map(|spot| Some(Fault::Worn(joint, spot))).into_iter();
         let new = branches.filter(|fault| self.of(*fault).is_none()).map(|fault| self.branch(robot, fault));
-        new.filter(|branch| branch.nats > found.nats).max_by(|a, b| a.nats.total_cmp(&b.nats))
+        new.filter(|branch| branch.nats > found.nats + NEARER_NATS).max_by(|a, b| a.nats.total_cmp(&b.nats))
     }
 
     /// From the tag that explains most, or those found so far, one tag after another that belongs to them; `None` where
@@ -324,14 +301,19 @@ impl Race {
         let may_name = |other: &Branch| match other.fault {
             None => false,
             Some(Fault::Drift) => best.tells() && self.n_later >= MAX_VIEWS_OF_DRIFT,
+            Some(Fault::Worn(..)) if matches!(best.fault, Some(Fault::Slip(_))) => self.n_later >= MAX_VIEWS_OF_SLIP,
             Some(_) => best.tells() && self.n_later >= MAX_VIEWS_TO_NAME,
         };
         let is_behind = |other: &Branch| {
             let is_of_sensor = best.fault.zip(other.fault).is_some_and(|(one, other)| one.is_of_same_sensor(other));
-            let lead = if is_of_sensor { LEAD_OF_SENSOR_NATS } else { LEAD_NATS };
+            // Where all views are of the spot, a slip leads by what it is more probable before any.
+            let may_be_worn = matches!(best.fault, Some(Fault::Slip(_))) && other.worn_spot().is_some();
+            let lead = if is_of_sensor && !may_be_worn { LEAD_OF_SENSOR_NATS } else { LEAD_NATS };
             best.nats - other.nats > lead || may_name(other)
         };
-        self.n_later >= MAX_VIEWS || self.others().all(is_behind)
+        let is_tied = |other: &Branch| other.worn_spot().is_some() && best.nats - other.nats < LEAD_OF_SENSOR_NATS;
+        let is_late = self.n_later >= MAX_VIEWS_OF_TIE || !(best.worn_spot().is_some() && self.others().any(is_tied));
+        self.n_later >= MAX_VIEWS && is_late || self.others().all(is_behind)
     }
 
     /// Whether enough views could have spoken against it. A detection of another tag happens once; a tag that was moved
@@ -341,17 +323,23 @@ impl Race {
             None => true,
             // What drifted shows in all views; a weak one must not settle it.
             Some(Fault::Drift) => self.n_later >= MAX_VIEWS,
-            Some(Fault::Tag(tag)) => self.n_views_of(tag) >= CONFIRMED_BY || self.is_lone_tag_confirmed(tag),
-            Some(Fault::Tags(tags)) => tags.iter().map(|tag| self.n_views_of(tag)).sum::<usize>() > CONFIRMED_BY,
+            Some(Fault::Tag(tag)) => self.n_views_of(tag, fault) >= CONFIRMED_BY || self.is_lone_tag_confirmed(tag),
+            Some(Fault::Tags(tags)) => tags.iter().map(|tag| self.n_views_of(tag, fault)).sum::<usize>() > CONFIRMED_BY,
             Some(Fault::Worn(joint, spot)) => self.is_spot_confirmed(joint, spot),
-            Some(Fault::Scale(_) | Fault::Failed(_)) => self.steps.len() >= OPEN_SENSOR_CONFIRMED_BY,
-            Some(_) => self.steps.len() >= CONFIRMED_BY,
+            Some(Fault::Scale(_) | Fault::Failed(_)) => self.n_views_since(fault) >= OPEN_SENSOR_CONFIRMED_BY,
+            Some(_) => self.n_views_since(fault) >= CONFIRMED_BY,
         }
     }
 
-    /// Views that saw a tag.
-    fn n_views_of(&self, tag: usize) -> usize {
-        self.steps.iter().filter(|step| step.view.tags.iter().any(|seen| seen.tag_idx == tag)).count()
+    /// Views since that may have happened.
+    fn n_views_since(&self, fault: Option<Fault>) -> usize {
+        self.of(fault).map_or(0, Branch::n_views)
+    }
+
+    /// Those of them that saw a tag.
+    fn n_views_of(&self, tag: usize, fault: Option<Fault>) -> usize {
+        let since = self.steps.iter().rev().take(self.n_views_since(fault));
+        since.filter(|step| step.view.tags.iter().any(|seen| seen.tag_idx == tag)).count()
     }
 
     /// A tag that one view saw: read as another one it would be as far away as they are from each other.
@@ -362,19 +350,15 @@ impl Race {
         self.n_later >= MAX_VIEWS_TO_NAME && is_near && moved.nats - nothing.nats > LONE_TAG_LEAD_NATS
     }
 
-    /// Views of the spot alone do not tell it from a slip; one view of it alone may be a mistake, unless it is clear.
+    /// One view that speaks for it may be a mistake, unless it is clear. Views of the spot alone do not tell it from a
+    /// slip, of which it is the less probable.
     fn is_spot_confirmed(&self, joint: usize, spot: WornSpot) -> bool {
-        let travel_rad = |step: &Step| step.view.travel_rad[joint];
-        let later = &self.steps[self.steps.len() - self.n_later..];
-        if !later.iter().any(|step| spot.is_far_from(travel_rad(step))) {
-            return false;
-        }
-        let about = || self.steps.iter().filter(|step| spot.is_about(travel_rad(step)));
-        let nats = |fault| self.of(fault).map_or(f64::MIN, |branch| branch.nats);
-        let lead_nats = nats(Some(Fault::Worn(joint, spot))) - nats(None);
-        let is_clear =
-            |step: &Step| lead_nats > if is_moving(&step.view) { LONE_LEAD_IN_MOTION_NATS } else { LONE_LEAD_NATS };
-        about().count() >= CONFIRMED_BY || about().any(is_clear)
+        let worn = self.of(Some(Fault::Worn(joint, spot)));
+        let Some((worn, nothing)) = worn.zip(self.of(None)).filter(|_| self.n_later > 0) else { return false };
+        let is_moving = self.steps.iter().any(|step| is_moving(&step.view));
+        let clear_nats = if is_moving { LONE_LEAD_IN_MOTION_NATS } else { LONE_LEAD_NATS };
+        let n_speak = worn.n_speak_before + worn.n_speak_for_it(nothing);
+        n_speak >= CONFIRMED_BY && worn.nats > nothing.nats + LEAD_NATS || worn.nats > nothing.nats + clear_nats
     }
 
     fn lead_nats(&self) -> f64 {
@@ -389,7 +373,7 @@ impl Race {
         let best = self.best().and_then(Branch::worn_spot);
         let is_same = move |branch: &Branch| {
             let both = best.zip(branch.worn_spot());
-            both.is_some_and(|((joint, at), (other, near))| joint == other && at.is_about(near.at_rad()))
+            both.is_some_and(|((joint, at), (other, near))| joint == other && !at.is_far_from(near.at_rad()))
         };
         self.branches.iter().skip(1).filter(move |branch| !is_same(branch) && !branch.is_void(&self.before))
     }
@@ -402,17 +386,9 @@ impl Race {
         Some(Verdict {
             fault,
             size,
+            since: best.since,
             lead_nats: self.lead_nats(),
             next: self.others().next().and_then(|branch| branch.fault),
         })
     }
-}
-
-/// A view under a fault: a failed sensor's reading is not looked at.
-pub(crate) fn seen_by(fault: Option<Fault>, view: &View) -> View {
-    let mut view = view.clone();
-    if let Some(Fault::Failed(joint)) = fault {
-        view.is_free[joint] = true;
-    }
-    view
 }

@@ -5,9 +5,11 @@ use std::sync::Arc;
 use crate::calib::bundle::estimate::estimate;
 use crate::calib::bundle::input::{BundleInput, HyperparameterMode};
 use crate::calib::covariance::ParameterCovariance;
+use crate::calib::online::branch::{Branch, Step};
 use crate::calib::online::diagnosis::{Race, RecentViews, is_suspicious};
 use crate::calib::online::event::OnlineEvent;
 use crate::calib::online::filter::{Filter, ViewUpdate};
+use crate::calib::online::hindsight::Hindsight;
 use crate::calib::online::hypothesis::Fault;
 use crate::calib::online::image_noise::{CornerNoise, MotionNoise};
 use crate::calib::online::lagged_temperature::LaggedTemperature;
@@ -65,6 +67,7 @@ struct Running {
     /// Explanations of views that the filter did not expect, while they are open.
     race: Option<Race>,
     recent: Option<RecentViews>,
+    hindsight: Hindsight,
     noise: ProcessNoise,
     errors: JointErrorSize,
     motion: MotionNoise,
@@ -226,6 +229,7 @@ impl Member {
             filter,
             race: None,
             recent: None,
+            hindsight: Hindsight::default(),
             noise,
             errors,
             motion: MotionNoise::default(),
@@ -236,56 +240,91 @@ impl Member {
 
     fn carry_on(&mut self, view: &View) -> Option<ViewUpdate> {
         let running = self.running.as_mut()?;
+        let is_searched = self.settings.faults == FaultSearch::On;
+        if is_searched && running.race.is_none() {
+            running.hindsight.begin(&running.filter);
+        }
         let mut drift = None;
         if self.settings.drift == DriftModel::Tuned {
             let change = view.conditions.departure_from(&running.conditions);
-            if running.race.is_some() {
-                drift = Some((running.noise.clone(), change));
-            } else {
-                running.noise.widen(&mut running.filter, &change);
-            }
+            drift = Some((running.noise.clone(), change));
             running.conditions = view.conditions;
         }
-        if let Some(race) = &mut running.race {
-            let before = race.nats();
-            race.add(&self.robot, drift, view);
-            self.nats = FORGETTING * self.nats + race.nats() - before;
-            self.settle_race(view.end);
+        let step = Step { drift, view: view.clone() };
+        if running.race.is_some() {
+            self.go_on_with_race(step);
             return None;
+        }
+        if let Some((_, change)) = &step.drift {
+            running.noise.widen(&mut running.filter, change);
         }
         let recent = running.recent.take().filter(|recent| !recent.is_past(view));
         let mut recent = recent.unwrap_or_else(|| RecentViews::new(running.filter.clone()));
         let nats_of_earlier = recent.nats;
         let update = running.filter.update(&self.robot, view);
         recent.add(view, update.as_ref());
-        // A view of which nothing fits changes nothing.
-        let is_suspicious = update.as_ref().is_none_or(is_suspicious) || recent.show_a_step();
-        if self.settings.faults == FaultSearch::On && is_suspicious {
-            let race = Race::start(&self.robot, &recent);
-            // Forgotten once a view, race or not: beliefs under other lags are compared by this.
-            self.nats = FORGETTING * self.nats + race.nats() - nats_of_earlier;
-            self.suspect_since = recent.views.first().map(|first| first.end);
-            running.race = Some(race);
-            self.settle_race(view.end);
-            return update;
+        if is_searched {
+            running.hindsight.add(step, update.as_ref().map(|update| update.walk).unwrap_or_default());
+            let suspicions = running.hindsight.suspicions(&running.filter);
+            // A view of which nothing fits changes nothing.
+            let is_suspicious = update.as_ref().is_none_or(is_suspicious) || recent.show_a_step();
+            let n_views = recent.views.len();
+            let found = running.hindsight.branches(&self.robot, &running.filter, &suspicions, n_views);
+            if is_suspicious || !found.is_empty() {
+                self.start_race(&recent, found, nats_of_earlier);
+                return update;
+            }
         }
         running.recent = Some(recent);
         let update = update?;
         self.nats = FORGETTING * self.nats + update.log_evidence;
-        if self.settings.drift == DriftModel::Tuned {
-            running.noise.learn(&update);
-        }
-        if self.settings.scales.is_none() {
-            let scales = &mut running.filter.scales;
-            if is_moving(view) {
-                running.jitter.learn(&update, scales);
-                running.motion.learn(&update);
-                running.filter.noise_in_motion = running.motion.factor();
-            } else {
-                running.errors.learn(&update, scales);
-            }
-        }
+        self.learn(&update, view);
         Some(update)
+    }
+
+    /// Of explanations of the last views, `found` in hindsight among them.
+    fn start_race(&mut self, recent: &RecentViews, found: Vec<Branch>, nats_of_earlier: f64) {
+        let Some(running) = &mut self.running else { return };
+        let mut race = Race::start(&self.robot, recent);
+        race.take_up(found);
+        // Forgotten once a view, race or not: beliefs under other lags are compared by this.
+        self.nats = FORGETTING * self.nats + race.nats() - nats_of_earlier;
+        self.suspect_since = recent.views.first().map(|first| first.end);
+        running.race = Some(race);
+        if let Some(last) = recent.views.last() {
+            self.settle_race(last.end);
+        }
+    }
+
+    fn go_on_with_race(&mut self, step: Step) {
+        let Some(running) = &mut self.running else { return };
+        let Running { race: Some(race), hindsight, filter, .. } = running else { return };
+        let (before, now) = (race.nats(), step.view.end);
+        let walk = race.add(&self.robot, step.clone());
+        hindsight.add(step, walk);
+        let suspicions = hindsight.suspicions(filter);
+        race.take_up(hindsight.branches(&self.robot, filter, &suspicions, race.n_views()));
+        self.nats = FORGETTING * self.nats + race.nats() - before;
+        self.settle_race(now);
+    }
+
+    /// How much sensors change and err.
+    fn learn(&mut self, update: &ViewUpdate, view: &View) {
+        let Some(running) = &mut self.running else { return };
+        if self.settings.drift == DriftModel::Tuned {
+            running.noise.learn(update);
+        }
+        if self.settings.scales.is_some() {
+            return;
+        }
+        let scales = &mut running.filter.scales;
+        if is_moving(view) {
+            running.jitter.learn(update, scales);
+            running.motion.learn(update);
+            running.filter.noise_in_motion = running.motion.factor();
+        } else {
+            running.errors.learn(update, scales);
+        }
     }
 
     /// The best explanation is the belief; once it is decided, it is told of.
@@ -302,8 +341,11 @@ impl Member {
             if let Fault::Failed(joint) = verdict.fault {
                 self.failed.push(joint);
             }
-            let since = self.suspect_since.take().unwrap_or(now);
+            let since = verdict.since.or(self.suspect_since.take()).unwrap_or(now);
             self.events.push(OnlineEvent::of_verdict(&self.robot, &verdict, since, now));
+            running.hindsight = Hindsight::default();
+        } else if race.best().is_some_and(|best| best.fault == Some(Fault::Drift)) {
+            running.hindsight.has_drifted(race.n_views());
         }
         running.race = None;
     }

@@ -3,16 +3,19 @@
 //! `view_stream` makes views of messages. `estimator` holds a `member` for each lag of the sensors' temperature; each
 //! starts from the first views by `bundle` and carries its belief on: `filter` is state and information,
 //! `process_noise` how fast sensors change. `diagnosis` races `hypothesis` against hypothesis where a view does not
-//! fit; `event` tells what happened. `follower` is all of it, `belief_log` what it said over time; `oracle` and
+//! fit, each with a `branch` of the belief; `hindsight` gathers what looks minutes apart say of one place of a sensor's
+//! track; `event` tells what happened. `follower` is all of it, `belief_log` what it said over time; `oracle` and
 //! `batch` are what it is compared with.
 
 mod batch;
 mod belief_log;
+mod branch;
 mod diagnosis;
 mod estimator;
 mod event;
 mod filter;
 mod follower;
+mod hindsight;
 mod hypothesis;
 mod image_noise;
 mod lagged_temperature;

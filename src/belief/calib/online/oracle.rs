@@ -1,7 +1,7 @@
 //! An oracle that knows when something may have happened: what can be told of it by the views since then. For studies:
 //! a belief that finds out by itself cannot be faster.
 
-use crate::calib::online::diagnosis::{NOTHING_FITS_NATS, seen_by};
+use crate::calib::online::branch::{NOTHING_FITS_NATS, seen_by};
 use crate::calib::online::filter::Filter;
 use crate::calib::online::hypothesis::Fault;
 use crate::calib::online::lagged_temperature::LaggedTemperature;

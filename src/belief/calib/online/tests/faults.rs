@@ -266,3 +266,37 @@ fn a_worn_spot_is_named_with_its_place() {
     println!("not named: {missed:?}");
     assert!(missed.len() <= 1, "{missed:?}");
 }
+
+/// A low spot that the arm looks across every few minutes, each time too little to tell it, is named by all looks
+/// together; where nothing is worn, nothing is.
+#[test]
+fn a_low_spot_is_named_by_looks_minutes_apart() {
+    const SPOT_RAD: f64 = 0.3;
+    const BY_RAD: f64 = 0.007;
+    const N_LOOKS: usize = 8;
+    let robot = titan();
+    let (mut named, mut told) = (0, Vec::new());
+    for (seed, joint) in (0..10).map(|seed| (seed, seed as usize % 5)) {
+        for by_rad in [BY_RAD, 0.0] {
+            let (mut online, mut dive) = after_an_hour(&robot, seed, Happens::Nothing);
+            online.take_events();
+            dive.befall(|truth, _| truth.parameters.terms[joint].bump = WornSpot::about(SPOT_RAD).bump(-by_rad));
+            for k in 0..7 * N_LOOKS {
+                let is_wanted = |view: &View| (view.travel_rad[joint] - SPOT_RAD).abs() < 0.02;
+                let is_elsewhere = |view: &View| WornSpot::about(SPOT_RAD).is_far_from(view.travel_rad[joint]);
+                let view = std::iter::repeat_with(|| dive.view())
+                    .find(|view| if k % 7 == 0 { is_wanted(view) } else { is_elsewhere(view) });
+                online.add_view(&view.expect("it ends"));
+            }
+            let is_right = |event: &OnlineEvent| {
+                event.finding.kind == FindingKind::SensorWorn && event.finding.name == robot.sensors[joint].joint
+            };
+            let events = online.take_events();
+            named += usize::from(by_rad > 0.0 && events.iter().any(is_right));
+            let others = events.iter().filter(|event| by_rad == 0.0 || !is_right(event));
+            told.extend(others.map(|event| (seed, by_rad, event.to_line())));
+        }
+    }
+    println!("{named} of 10 named; beside them {told:?}");
+    assert!(named >= 7 && told.len() <= 1, "{named} {told:?}");
+}
