@@ -29,7 +29,7 @@ mod table_file;
 mod tables;
 mod until;
 
-pub use baseline::{baseline_text, read_baseline};
+pub use baseline::{baseline_text, read_baseline, read_rows};
 pub use columns::Columns;
 pub use engine::{Engine, run_jobs};
 pub use error::CampaignError;

@@ -69,7 +69,7 @@ pub struct CampaignSettings {
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RegressSettings {
-    /// Limits of new over baseline, median over the pairs.
+    /// Limits of new over baseline, typical of the pairs.
     pub tool_error_ratio: f64,
     /// The same of the distance between target and tool.
     pub reach_error_ratio: f64,
@@ -83,6 +83,8 @@ pub struct RegressSettings {
     pub time_ratio: f64,
     /// Limit of poses captured, baseline over new.
     pub poses_ratio: f64,
+    /// How much nearer than the baseline the arm may come to anything, typical of the pairs, m.
+    pub clearance_drop_m: f64,
     /// Limits of the new value itself, median over the seeds, m.
     pub tool_error_m: Option<f64>,
     /// The same of the distance between target and tool; `None` sets no limit.
@@ -99,6 +101,7 @@ impl Default for RegressSettings {
             corner_scatter_ratio: 1.10,
             time_ratio: 1.10,
             poses_ratio: 1.10,
+            clearance_drop_m: 0.005,
             tool_error_m: None,
             reach_error_m: None,
         }
@@ -119,7 +122,12 @@ impl RegressSettings {
         for (key, value) in ratios {
             FileIssue::check_range(file, &format!("regress.{key}"), value, 1.0..=1000.0)?;
         }
-        for (key, value) in [("tool_error_m", self.tool_error_m), ("reach_error_m", self.reach_error_m)] {
+        let lengths = [
+            ("clearance_drop_m", Some(self.clearance_drop_m)),
+            ("tool_error_m", self.tool_error_m),
+            ("reach_error_m", self.reach_error_m),
+        ];
+        for (key, value) in lengths {
             if let Some(value) = value {
                 FileIssue::check_range(file, &format!("regress.{key}"), value, 1e-6..=10.0)?;
             }
