@@ -28,6 +28,8 @@ mod store;
 mod table_file;
 mod tables;
 mod until;
+mod weights;
+mod worst;
 
 pub use baseline::{baseline_text, read_baseline, read_rows};
 pub use columns::Columns;
@@ -50,4 +52,6 @@ pub use store::{ExistingRows, Store, write_results};
 pub(crate) use table_file::parse_table;
 pub use table_file::{Table, read_table, table_text};
 pub use tables::{markdown, table};
-pub use until::{Answer, Stopping, Until, UntilResult};
+pub use until::{Answer, MetSeed, Stopping, Until, UntilResult};
+pub use weights::{MixedRate, Weights};
+pub use worst::worst_rows;
