@@ -13,9 +13,9 @@ pub struct Setting {
     pub set: Vec<Override>,
     /// How often it occurs, of all together 1.
     pub weight: f64,
-    /// Of the seeds, the part that it meets: all of them for the most frequent one, and for the others the square root of
-    /// their weight over its: of allocations of equally many runs, the one that knows best the rate of an event that none
-    /// of them had. 1 without weights.
+    /// Of the seeds, the part that it meets: all of them for the most frequent one, and for the others the square root
+    /// of their weight over its: of allocations of equally many runs, the one that knows best the rate of an event that
+    /// none of them had. 1 without weights.
     pub share: f64,
 }
 
@@ -91,7 +91,8 @@ mod tests {
         assert!(settings(&huge, &[]).is_err());
     }
 
-    /// Of three points of weights 1, 0.25 and 0.01 every seed meets the first, every second the next, every tenth the last.
+    /// Of three points of weights 1, 0.25 and 0.01 every seed meets the first, every second the next, every tenth the
+    /// last.
     #[test]
     fn rare_points_meet_fewer_seeds_but_more_than_their_weight() {
         let numbers = [1, 2, 3].map(Value::Integer).to_vec();

@@ -1,11 +1,11 @@
 //! Is it worse than it was? New rows against a baseline's, pair by pair: the same setting, the same seed.
 //!
-//! A pair shares its world, so that what differs is the program or the setting under test, not luck with a seed. What is
-//! typical of the pairs is too much when it reaches the budget AND the pairs are worse beyond doubt: the lower end of
-//! the interval is on the worse side of no change. Noise alone moves pairs both ways, and meets the second condition in
-//! one case of twenty at most, whichever of all figures it is (Bonferroni's correction); a worsening of the budget's
-//! size in all pairs meets both. An interval that holds both no change and the budget decides nothing, and is said to be
-//! inconclusive.
+//! A pair shares its world, so that what differs is the program or the setting under test, not luck with a seed. What
+//! is typical of the pairs is too much when it reaches the budget AND the pairs are worse beyond doubt: the lower end
+//! of the interval is on the worse side of no change. Noise alone moves pairs both ways, and meets the second condition
+//! in one case of twenty at most, whichever of all figures it is (Bonferroni's correction); a worsening of the budget's
+//! size in all pairs meets both. An interval that holds both no change and the budget decides nothing, and is said to
+//! be inconclusive.
 
 mod paired;
 

@@ -55,7 +55,7 @@ pub(super) struct CampaignArgs {
     keep: bool,
     /// Keep the folders of the N worst runs, each with its replay, in FILE.worst: contacts, failures, refusals, limits
     /// that were missed, then the largest tool errors. They are made again at the end
-    #[arg(long, value_name = "N", default_value_t = 0, conflicts_with = "keep")]
+    #[arg(long, value_name = "N", default_value_t = 0)]
     #[arg(value_parser = clap::value_parser!(u16).range(0..=1000))]
     keep_worst: u16,
     /// Discard existing rows

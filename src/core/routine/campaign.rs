@@ -63,7 +63,8 @@ pub struct CampaignSettings {
     pub seeds: Option<SeedRange>,
     /// Keys with their values, sorted by key; the full product is run.
     pub matrix: Vec<(String, Vec<Value>)>,
-    /// Of keys of the matrix: how often each of its values occurs, over the others. Empty: all points are of equal worth.
+    /// Of keys of the matrix: how often each of its values occurs, over the others. Empty: all points are of equal
+    /// worth.
     pub weights: Vec<(String, Vec<f64>)>,
 }
 

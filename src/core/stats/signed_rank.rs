@@ -1,9 +1,9 @@
 //! How far pairs moved, beyond doubt: the Hodges-Lehmann estimate and Wilcoxon's interval about it.
 //!
 //! Both are order statistics of the Walsh averages, the means of all pairs of samples with each one itself (Hodges and
-//! Lehmann 1963; Hollander, Wolfe and Chicken, Nonparametric Statistical Methods, 3.2 and 3.3). For differences of pairs
-//! whose two sides are exchangeable they are symmetric about zero, so that the interval holds exactly, whatever else
-//! their distribution is. Of normal samples the median needs 57 % more for the same certainty.
+//! Lehmann 1963; Hollander, Wolfe and Chicken, Nonparametric Statistical Methods, 3.2 and 3.3). For differences of
+//! pairs whose two sides are exchangeable they are symmetric about zero, so that the interval holds exactly, whatever
+//! else their distribution is. Of normal samples the median needs 57 % more for the same certainty.
 
 use super::Interval;
 
@@ -16,8 +16,8 @@ pub struct Location {
     pub interval: Interval,
 }
 
-/// Beyond so many samples the rank sum is taken as normal, with the correction for continuity: its tail of 0.001 is then
-/// right to 1 %.
+/// Beyond so many samples the rank sum is taken as normal, with the correction for continuity: its tail of 0.001 is
+/// then right to 1 %.
 const EXACT_UP_TO: usize = 120;
 
 /// Location of `samples` with an interval that misses on either side with a chance of at most `tail`. With so few
@@ -172,8 +172,8 @@ mod tests {
         assert_eq!((few.low, few.high), (-1.0, 3.0), "three samples say no more");
     }
 
-    /// Differences that are symmetric with heavy tails: each end misses the truth as often as asked, and is nearer to it
-    /// than the median's would be.
+    /// Differences that are symmetric with heavy tails: each end misses the truth as often as asked, and is nearer to
+    /// it than the median's would be.
     #[test]
     fn each_end_misses_as_seldom_as_asked() {
         let (n_trials, tail) = (2000, 0.05);
