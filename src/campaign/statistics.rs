@@ -110,6 +110,9 @@ pub fn statistics(table: &Table, routine: &str, fingerprint: &str) -> CampaignSu
     }
 }
 
+/// What runs are counted for, and how many of a setting's have it.
+type CountedEvent = (&'static str, fn(&SettingStatistics) -> usize);
+
 impl CampaignSummary {
     /// The same, with rates over all settings where these have weights.
     #[must_use]
@@ -118,13 +121,13 @@ impl CampaignSummary {
         for setting in &mut self.settings {
             setting.weight = Some(weights.of(setting.setting));
         }
-        let events: [(&str, fn(&SettingStatistics) -> usize); 4] = [
+        let events: [CountedEvent; 4] = [
             ("contacts", |setting| setting.with_contacts),
             ("missed", |setting| setting.missed),
             ("refused", |setting| setting.refused),
             ("failed", |setting| setting.failed),
         ];
-        let rate = |(event, of): (&str, fn(&SettingStatistics) -> usize)| {
+        let rate = |(event, of): CountedEvent| {
             let counted = |number| {
                 let found = self.settings.iter().find(|setting| setting.setting == number);
                 found.map_or_else(RateSequence::default, |found| {
