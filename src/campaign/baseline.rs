@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::campaign::store::read_summary;
-use crate::campaign::{CampaignError, Metric, Origin, Prepared, Request, Table, parse_table, table_text};
+use crate::campaign::{CampaignError, Metric, Origin, Prepared, Request, Table, parse_table, read_table, table_text};
 use armcal_core::files::{self, FileKind};
 use armcal_core::routine::Overrides;
 
@@ -39,11 +39,43 @@ pub fn read_baseline(path: &Path, prepared: &Prepared) -> Result<Table, Campaign
     if let (Some(difference), Some(_)) = (origin.difference(&plainly), origin.difference(&with_overrides)) {
         return Err(anew(difference));
     }
-    let lacks = |metric: &&Metric| table.place(**metric).is_none();
-    match Metric::COMPARED.iter().find(lacks) {
+    match lacking(&table) {
         Some(metric) => Err(anew(format!("is of another version of armcal: it has no column {}", metric.name()))),
         None => Ok(table),
     }
+}
+
+/// A figure that is compared and that the table lacks.
+fn lacking(table: &Table) -> Option<Metric> {
+    Metric::COMPARED.iter().copied().find(|metric| table.place(*metric).is_none())
+}
+
+/// Reads the new rows from a campaign's table in place of making them: those that have a partner in `baseline`.
+///
+/// # Errors
+/// [`CampaignError::Table`] for a table without a figure that is compared, of another robot or vehicle, or with none of
+/// the baseline's seeds and settings.
+pub fn read_rows(path: &Path, prepared: &Prepared, baseline: &Table) -> Result<Table, CampaignError> {
+    let mut table = read_table(path)?;
+    let refused = |problem: String| Err(CampaignError::Table { path: path.to_owned(), problem });
+    if let Some(metric) = lacking(&table) {
+        return refused(format!("is of another version of armcal: it has no column {}", metric.name()));
+    }
+    if let Some(origin) = read_summary(path)?.and_then(|summary| summary.origin) {
+        let mut here = Origin::of(prepared, &[])?;
+        // What `--set` changed may be under test; another routine is not.
+        if here.routine.name == origin.routine.name {
+            here.routine = origin.routine.clone();
+        }
+        if let Some(difference) = origin.difference(&here) {
+            return refused(difference);
+        }
+    }
+    table.rows.retain(|row| baseline.rows.iter().any(|b| b.seed == row.seed && b.settings == row.settings));
+    if table.rows.is_empty() {
+        return refused("has none of the baseline's seeds and settings".to_owned());
+    }
+    Ok(table)
 }
 
 /// The routine, the robot and the vehicle as they were asked for. What `--set` changes is under test, and no part of a

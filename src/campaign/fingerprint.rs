@@ -10,8 +10,8 @@ use armcal_core::files::{self, FileKind};
 const DOMAIN: &[u8] = b"armcal campaign 1";
 
 /// BLAKE3 over the routine with its overrides, the files that its settings name, and the program's version; 64
-/// hexadecimal digits. Seeds and `[regress]` are left out: they say which rows there are and what is thought of them,
-/// not what stands in them. So are comments and the places of files.
+/// hexadecimal digits. Seeds, weights and `[regress]` are left out: they say which rows there are and what is thought
+/// of them, not what stands in them. So are comments and the places of files.
 ///
 /// # Errors
 /// [`CampaignError::Read`] for a file that has vanished meanwhile.
@@ -41,6 +41,7 @@ pub(super) fn without_seeds(effective: &Table) -> Table {
     }
     if let Some(campaign) = table.get_mut("campaign").and_then(toml::Value::as_table_mut) {
         campaign.remove("seeds");
+        campaign.remove("weights");
         if campaign.is_empty() {
             table.remove("campaign");
         }

@@ -7,7 +7,7 @@ use crate::campaign::regress::{Comparison, Verdict};
 use crate::campaign::regress_report::{check_rows, conclusion};
 use crate::campaign::statistics::{CampaignSummary, FailureLine};
 use crate::campaign::table_file::Table;
-use crate::campaign::tables::{HEADER, rows, title};
+use crate::campaign::tables::{HEADER, over_all, rows, title};
 use crate::campaign::{Metric, Row};
 use crate::report::{chart, page, panel};
 
@@ -35,6 +35,7 @@ pub(super) fn campaign_page(table: &Table, summary: &CampaignSummary) -> String 
             }
             (failures(&setting.failures))
         }
+        @for line in over_all(summary) { p { (line) } }
         p { small {
             "Intervals by the percentile bootstrap over the seeds. All rows are in the table beside this file."
         } }

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use crate::campaign::matrix::{Setting, settings};
-use crate::campaign::{CampaignError, Columns, Shard, fingerprint};
+use crate::campaign::{CampaignError, Columns, Shard, Weights, fingerprint};
 use crate::run::RunInputs;
 use armcal_core::routine::{self, Overrides, Routine, SeedRange, effective_table};
 
@@ -52,7 +52,7 @@ impl Prepared {
             let problem = format!("--set {twice}: campaign.matrix gives values of this key, too");
             return Err(CampaignError::Usage(problem));
         }
-        let settings = settings(matrix)?;
+        let settings = settings(matrix, &routine.campaign.weights)?;
         let load = |setting: &Setting| {
             let set = overrides.set.iter().chain(&setting.set).cloned().collect();
             RunInputs::load(file, &Overrides { set, ..overrides.clone() })
@@ -88,12 +88,26 @@ impl Prepared {
     }
 }
 
+impl Prepared {
+    /// Settings that the seed at `place` in the range, from 0, meets.
+    pub fn met_by(&self, place: u64) -> impl Iterator<Item = &Setting> {
+        self.settings.iter().filter(move |setting| setting.takes(place))
+    }
+
+    /// How often each setting occurs; `None` where the routine does not say.
+    #[must_use]
+    pub fn weights(&self) -> Option<Weights> {
+        let weights = self.settings.iter().map(|setting| (setting.index, setting.weight));
+        (!self.routine.campaign.weights.is_empty()).then(|| Weights::new(weights.collect()))
+    }
+}
+
 /// The jobs of a campaign that are not done yet, seed by seed, so that the settings of a seed stay together.
 #[must_use]
 pub fn jobs(prepared: &Prepared, range: SeedRange, shard: Option<Shard>, done: &BTreeSet<(u32, u64)>) -> Vec<Job> {
     let taken = (0..).zip(range.seeds()).filter(|(place, _)| shard.is_none_or(|shard| shard.takes(*place)));
     taken
-        .flat_map(|(_, seed)| prepared.settings.iter().map(move |setting| (setting, seed)))
+        .flat_map(|(place, seed)| prepared.met_by(place).map(move |setting| (setting, seed)))
         .filter(|(setting, seed)| !done.contains(&(setting.index, *seed)))
         .map(|(setting, seed)| prepared.job(setting, seed))
         .collect()

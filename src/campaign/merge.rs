@@ -4,7 +4,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use crate::campaign::store::read_summary;
-use crate::campaign::{CampaignError, CampaignSummary, Origin, Row, Shard, Share, Table, read_table, statistics};
+use crate::campaign::{
+    CampaignError, CampaignSummary, Origin, Row, Shard, Share, Table, Weights, read_table, statistics,
+};
 use crate::output;
 
 /// Whether the shards that are not there keep the others from being put together.
@@ -54,6 +56,7 @@ pub fn merge(paths: &[PathBuf], missing: MissingShards) -> Result<(Table, Campai
     let mut rows: BTreeMap<(u32, u64), Row> = BTreeMap::new();
     let mut names: Option<Vec<String>> = None;
     let mut of: Option<(String, String, Option<Origin>)> = None;
+    let mut weights: Option<Weights> = None;
     for path in paths {
         if !path.exists() && output::partial(path).exists() {
             return Err(CampaignError::Unfinished { path: path.clone() });
@@ -64,6 +67,10 @@ pub fn merge(paths: &[PathBuf], missing: MissingShards) -> Result<(Table, Campai
             return Err(problem("has other columns than the first table"));
         }
         if let Some(summary) = read_summary(path)? {
+            weights = match (weights, summary.weights()) {
+                (Some(known), Some(more)) => Some(known.joined(more)),
+                (known, more) => known.or(more),
+            };
             if let Some(share) = summary.share {
                 shares.add(path, share)?;
             }
@@ -86,7 +93,7 @@ pub fn merge(paths: &[PathBuf], missing: MissingShards) -> Result<(Table, Campai
     }
     let table = Table { names: names.unwrap_or_default(), rows: rows.into_values().collect() };
     let (routine, fingerprint, origin) = of.unwrap_or_default();
-    let summary = CampaignSummary { origin, ..statistics(&table, &routine, &fingerprint) };
+    let summary = CampaignSummary { origin, ..statistics(&table, &routine, &fingerprint) }.weighed(weights.as_ref());
     Ok((table, summary))
 }
 

@@ -114,6 +114,7 @@ impl Metric {
         Self::HeldOutRms,
         Self::CornerScatterPx,
         Self::SimulatedTime,
+        Self::MinClearance,
     ];
 
     /// As tables and summaries name it.

@@ -56,7 +56,7 @@ impl WorstPair {
 
 /// Header and rows of the table.
 pub(super) fn check_rows(comparison: &Comparison) -> Vec<[String; 6]> {
-    let header = ["new over baseline, by seed", "pairs", "median", "90 % interval", "budget", "result"];
+    let header = ["new over baseline, by seed", "pairs", "typical", "interval", "budget", "result"];
     let row = |check: &Check| {
         let (value, interval, budget) = (check.value_text(), check.interval_text(), check.budget_text());
         [check.what.to_owned(), check.n.to_string(), value, interval, budget, check.verdict_text().to_owned()]

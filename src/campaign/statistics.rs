@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use crate::campaign::{Metric, Origin, Row, RunStatus, Share, Table, UntilResult, Worsening};
-use armcal_core::stats::{median_interval, quantile};
+use crate::campaign::{Metric, MixedRate, Origin, Row, RunStatus, Share, Table, UntilResult, Weights, Worsening};
+use armcal_core::stats::{RateSequence, median_interval, quantile};
 
 /// The summary beside a campaign's table.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -22,7 +22,23 @@ pub struct CampaignSummary {
     /// What `--until` asked for; empty without.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub until: Vec<UntilResult>,
+    /// Where settings have weights: how often runs end in each way over all of them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub weighted: Vec<WeightedRate>,
     pub settings: Vec<SettingStatistics>,
+}
+
+/// How often something happens over all settings, each by its weight.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct WeightedRate {
+    /// contacts, missed, refused or failed.
+    pub event: String,
+    /// Absent while a setting has no run.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rate: Option<f64>,
+    /// 95 % interval, which holds however often one looks.
+    pub low: f64,
+    pub high: f64,
 }
 
 /// All runs of one point of the matrix.
@@ -30,6 +46,9 @@ pub struct CampaignSummary {
 pub struct SettingStatistics {
     pub setting: u32,
     pub settings: String,
+    /// How often it occurs, where the routine says so.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub weight: Option<f64>,
     pub runs: usize,
     pub accepted: usize,
     /// Accepted, but an `assert` of the routine does not hold.
@@ -79,7 +98,55 @@ pub fn statistics(table: &Table, routine: &str, fingerprint: &str) -> CampaignSu
     }
     let settings = by_setting.into_values().map(|rows| of_setting(table, &rows)).collect();
     let (routine, fingerprint) = (routine.to_owned(), fingerprint.to_owned());
-    CampaignSummary { version: 1, routine, fingerprint, origin: None, share: None, until: Vec::new(), settings }
+    CampaignSummary {
+        version: 1,
+        routine,
+        fingerprint,
+        origin: None,
+        share: None,
+        until: Vec::new(),
+        weighted: Vec::new(),
+        settings,
+    }
+}
+
+/// What runs are counted for, and how many of a setting's have it.
+type CountedEvent = (&'static str, fn(&SettingStatistics) -> usize);
+
+impl CampaignSummary {
+    /// The same, with rates over all settings where these have weights.
+    #[must_use]
+    pub fn weighed(mut self, weights: Option<&Weights>) -> Self {
+        let Some(weights) = weights else { return self };
+        for setting in &mut self.settings {
+            setting.weight = Some(weights.of(setting.setting));
+        }
+        let events: [CountedEvent; 4] = [
+            ("contacts", |setting| setting.with_contacts),
+            ("missed", |setting| setting.missed),
+            ("refused", |setting| setting.refused),
+            ("failed", |setting| setting.failed),
+        ];
+        let rate = |(event, of): CountedEvent| {
+            let counted = |number| {
+                let found = self.settings.iter().find(|setting| setting.setting == number);
+                found.map_or_else(RateSequence::default, |found| {
+                    RateSequence::of_counts(of(found) as u64, found.runs as u64)
+                })
+            };
+            let MixedRate { rate, low, high } = weights.mixed(counted, COVERAGE);
+            WeightedRate { event: event.to_owned(), rate, low, high }
+        };
+        self.weighted = events.map(rate).to_vec();
+        self
+    }
+
+    /// What [`Self::weighed`] was given.
+    #[must_use]
+    pub fn weights(&self) -> Option<Weights> {
+        let weight = |setting: &SettingStatistics| Some((setting.setting, setting.weight?));
+        self.settings.iter().map(weight).collect::<Option<_>>().filter(|_| !self.weighted.is_empty()).map(Weights::new)
+    }
 }
 
 /// `rows`: one or more.
@@ -91,6 +158,7 @@ fn of_setting(table: &Table, rows: &[&Row]) -> SettingStatistics {
     SettingStatistics {
         setting: rows[0].setting,
         settings: rows[0].settings.clone(),
+        weight: None,
         runs: rows.len(),
         accepted: count(RunStatus::Accepted),
         missed: count(RunStatus::Missed),
@@ -163,5 +231,17 @@ mod tests {
         let figure = &statistics(&table, "r", "f").settings[0].figures[0];
         assert_eq!((figure.worst, figure.worst_seed), (1.0, 1));
         assert!(figure.p95 < 2.0);
+    }
+
+    #[test]
+    fn rates_over_settings_go_by_their_weights_and_come_back() {
+        let refused = |seed| Row { status: RunStatus::Refused, ..row(1, seed) };
+        let table = Table { names: names(), rows: vec![row(0, 1), row(0, 2), refused(1), row(1, 2)] };
+        let weights = Weights::new([(0, 0.9), (1, 0.1)].into());
+        let summary = statistics(&table, "r", "f").weighed(Some(&weights));
+        let refused = summary.weighted.iter().find(|rate| rate.event == "refused").expect("refused");
+        assert!((refused.rate.expect("runs") - 0.05).abs() < 1e-15);
+        assert_eq!(summary.weights(), Some(weights));
+        assert_eq!(statistics(&table, "r", "f").weighed(None).weights(), None);
     }
 }

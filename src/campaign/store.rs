@@ -15,7 +15,7 @@ use crate::campaign::parquet_file::parquet_bytes;
 use crate::campaign::statistics::{CampaignSummary, statistics};
 use crate::campaign::table_file::{Table, parse_table, read_table, row_line, table_text};
 use crate::campaign::tables::markdown;
-use crate::campaign::{CampaignError, Origin, Row, Share, Stopping, UntilResult};
+use crate::campaign::{CampaignError, Origin, Row, Share, Stopping, UntilResult, Weights};
 use crate::output::{self, OutputError};
 use armcal_core::files::{self, FileKind};
 
@@ -28,6 +28,7 @@ pub struct Store {
     origin: Option<Origin>,
     share: Option<Share>,
     until: Vec<UntilResult>,
+    weights: Option<Weights>,
     table: Table,
     /// Whether the files in place already hold all rows.
     in_place: bool,
@@ -75,6 +76,7 @@ impl Store {
             origin: None,
             share: None,
             until: Vec::new(),
+            weights: None,
             table,
             in_place: false,
         };
@@ -95,6 +97,13 @@ impl Store {
     #[must_use]
     pub fn sharing(self, share: Option<Share>) -> Self {
         Self { share, ..self }
+    }
+
+    /// The same, with how often each setting occurs.
+    #[must_use]
+    pub fn weighed(self, weights: Option<Weights>) -> Self {
+        // Weights are no part of the fingerprint: rows in place may have been summed up by others.
+        Self { in_place: self.in_place && weights.is_none(), weights, ..self }
     }
 
     /// The same, ended early: with the answers that it was run for, and without the seeds that these do not need.
@@ -218,6 +227,7 @@ impl Store {
         self.table.rows.sort_by_key(Row::key);
         let summary = statistics(&self.table, routine, &self.fingerprint);
         let summary = CampaignSummary { origin: self.origin, share: self.share, until: self.until, ..summary };
+        let summary = summary.weighed(self.weights.as_ref());
         if !self.in_place {
             write_results(&self.out, &self.table, &summary)?;
         }

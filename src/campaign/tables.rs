@@ -3,6 +3,7 @@
 use comfy_table::presets::UTF8_FULL_CONDENSED;
 use comfy_table::{CellAlignment, ContentArrangement, Table as Grid};
 
+use crate::campaign::statistics::WeightedRate;
 use crate::campaign::{CampaignSummary, FigureStatistics, Metric, SettingStatistics};
 
 /// What people look at first, and what it is to them; the JSON has all of them.
@@ -45,7 +46,8 @@ pub(super) fn rows(setting: &SettingStatistics) -> Vec<[String; 6]> {
 
 pub(super) fn title(setting: &SettingStatistics) -> String {
     let SettingStatistics { settings, runs, accepted, missed, refused, failed, with_contacts, .. } = setting;
-    let which = if settings.is_empty() { String::new() } else { format!("{settings}: ") };
+    let weight = setting.weight.map_or_else(String::new, |weight| format!(" (weight {weight:.3})"));
+    let which = if settings.is_empty() { String::new() } else { format!("{settings}{weight}: ") };
     format!(
         "{which}{runs} runs: {accepted} accepted, {missed} missed a limit, {refused} refused, {failed} failed; \
          {with_contacts} with contacts"
@@ -65,7 +67,7 @@ pub fn table(summary: &CampaignSummary, width: Option<usize>) -> String {
     let mut text = String::new();
     for setting in &summary.settings {
         text.push_str(&title(setting));
-        for result in summary.until.iter().filter(|result| result.setting == setting.setting) {
+        for result in summary.until.iter().filter(|result| result.setting == Some(setting.setting)) {
             text.push_str(&format!("\n{result}"));
         }
         let mut grid = Grid::new();
@@ -91,7 +93,20 @@ pub fn table(summary: &CampaignSummary, width: Option<usize>) -> String {
         }
         text.push('\n');
     }
+    for line in over_all(summary) {
+        text.push_str(&format!("{line}\n"));
+    }
     text
+}
+
+/// What holds over all settings by their weights.
+pub(super) fn over_all(summary: &CampaignSummary) -> Vec<String> {
+    let rate = |rate: &WeightedRate| {
+        let found = rate.rate.map_or_else(|| "-".to_owned(), |rate| format!("{rate:.2e}"));
+        format!("{} over all settings by their weights: {found}, {:.2e} .. {:.2e}", rate.event, rate.low, rate.high)
+    };
+    let answers = summary.until.iter().filter(|result| result.setting.is_none());
+    summary.weighted.iter().map(rate).chain(answers.map(ToString::to_string)).collect()
 }
 
 /// The same as Markdown.
@@ -110,6 +125,12 @@ pub fn markdown(summary: &CampaignSummary) -> String {
         if !setting.failures.is_empty() {
             text.push('\n');
         }
+    }
+    for line in over_all(summary) {
+        text.push_str(&format!("\n- {line}"));
+    }
+    if !summary.weighted.is_empty() {
+        text.push('\n');
     }
     text.push_str(
         "\nIntervals by the percentile bootstrap over the seeds. All figures are in the JSON beside this file.\n",

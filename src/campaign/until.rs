@@ -8,7 +8,7 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
-use crate::campaign::{Row, RunStatus};
+use crate::campaign::{Row, RunStatus, Weights};
 use armcal_core::stats::RateSequence;
 
 /// What a run can be counted for.
@@ -97,10 +97,12 @@ pub enum Answer {
     Open,
 }
 
-/// What the campaign says of one limit, under one setting.
+/// What the campaign says of one limit, under one setting or over all by their weights.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct UntilResult {
-    pub setting: u32,
+    /// `None`: over all settings.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub setting: Option<u32>,
     pub until: String,
     pub answer: Answer,
     /// Runs with the event, and all runs, when the answer was there, or at the end.
@@ -123,25 +125,29 @@ impl fmt::Display for UntilResult {
     }
 }
 
+/// A seed with how many settings it meets.
+pub type MetSeed = (u64, usize);
+
 /// Counts rows until all limits have their answers.
 #[derive(Debug)]
 pub struct Stopping {
     limits: Vec<Until>,
     /// In the order in which they count.
-    seeds: Vec<u64>,
+    seeds: Vec<MetSeed>,
     n_counted: usize,
     /// Which settings of a seed are there, and for each limit whether the event was.
     waiting: BTreeMap<u64, BTreeMap<u32, Vec<bool>>>,
-    settings: BTreeSet<u32>,
     contacts: Option<usize>,
     /// By setting, by limit.
     sequences: BTreeMap<u32, Vec<(RateSequence, Option<UntilResult>)>>,
+    /// Where settings have weights, one answer to each limit is for all of them.
+    weights: Option<(Weights, Vec<Option<UntilResult>>)>,
 }
 
 impl Stopping {
-    /// `names`: of the rows' figures.
+    /// `names`: of the rows' figures. Each setting is answered by itself.
     #[must_use]
-    pub fn new(limits: &[Until], seeds: Vec<u64>, settings: BTreeSet<u32>, names: &[String]) -> Self {
+    pub fn new(limits: &[Until], seeds: Vec<MetSeed>, settings: BTreeSet<u32>, names: &[String]) -> Self {
         let fresh = vec![(RateSequence::default(), None); limits.len()];
         Self {
             limits: limits.to_vec(),
@@ -149,9 +155,16 @@ impl Stopping {
             n_counted: 0,
             waiting: BTreeMap::new(),
             sequences: settings.iter().map(|setting| (*setting, fresh.clone())).collect(),
-            settings,
             contacts: names.iter().position(|name| name == "contacts"),
+            weights: None,
         }
+    }
+
+    /// The same, answered for all settings together where they have weights.
+    #[must_use]
+    pub fn weighted(self, weights: Option<Weights>) -> Self {
+        let n_limits = self.limits.len();
+        Self { weights: weights.map(|weights| (weights, vec![None; n_limits])), ..self }
     }
 
     /// Counts a row, in any order.
@@ -160,18 +173,20 @@ impl Stopping {
         let events = self.limits.iter().map(|limit| limit.event.is_in(row, contacts)).collect();
         self.waiting.entry(row.seed).or_default().insert(row.setting, events);
         while !self.is_answered() {
-            let Some(seed) = self.seeds.get(self.n_counted) else { break };
-            let is_whole = self.waiting.get(seed).is_some_and(|found| found.len() == self.settings.len());
+            let Some((seed, n_met)) = self.seeds.get(self.n_counted) else { break };
+            let is_whole = self.waiting.get(seed).is_some_and(|found| found.len() == *n_met);
             let Some(found) = is_whole.then(|| self.waiting.remove(seed)).flatten() else { break };
             self.n_counted += 1;
             for (setting, events) in found {
                 self.count(setting, &events);
             }
+            self.answer_for_all();
         }
     }
 
     fn count(&mut self, setting: u32, events: &[bool]) {
         let Some(sequences) = self.sequences.get_mut(&setting) else { return };
+        let is_for_all = self.weights.is_some();
         for ((limit, has_event), (sequence, result)) in self.limits.iter().zip(events).zip(sequences) {
             if result.is_some() {
                 continue;
@@ -182,14 +197,37 @@ impl Stopping {
                 sequence.add_without();
             }
             let now = limit.result(setting, sequence);
+            *result = (now.answer != Answer::Open && !is_for_all).then_some(now);
+        }
+    }
+
+    /// Answers limits over all settings, where these have weights.
+    fn answer_for_all(&mut self) {
+        let Some((weights, mut results)) = self.weights.take() else { return };
+        for (place, result) in results.iter_mut().enumerate().filter(|(_, result)| result.is_none()) {
+            let now = self.result_for_all(&weights, place);
             *result = (now.answer != Answer::Open).then_some(now);
         }
+        self.weights = Some((weights, results));
+    }
+
+    fn result_for_all(&self, weights: &Weights, place: usize) -> UntilResult {
+        let limit = self.limits[place];
+        let counted = |setting| self.sequences.get(&setting).map(|each| each[place].0).unwrap_or_default();
+        let mixed = weights.mixed(counted, limit.level);
+        let counts = self.sequences.values().map(|each| each[place].0.counts());
+        let [events, runs] = counts.fold([0, 0], |sum, one| [sum[0] + one[0], sum[1] + one[1]]);
+        limit.answered(None, [events, runs], [mixed.low, mixed.high])
     }
 
     /// Whether nothing more has to be run.
     #[must_use]
     pub fn is_answered(&self) -> bool {
-        !self.limits.is_empty() && self.sequences.values().flatten().all(|(_, result)| result.is_some())
+        let are_answered = match &self.weights {
+            Some((_, results)) => results.iter().all(Option::is_some),
+            None => self.sequences.values().flatten().all(|(_, result)| result.is_some()),
+        };
+        !self.limits.is_empty() && are_answered
     }
 
     /// The seeds that are not needed for the answers.
@@ -198,12 +236,16 @@ impl Stopping {
         if !self.is_answered() {
             return BTreeSet::new();
         }
-        self.seeds[self.n_counted..].iter().copied().collect()
+        self.seeds[self.n_counted..].iter().map(|(seed, _)| *seed).collect()
     }
 
     /// The answers so far.
     #[must_use]
     pub fn results(&self) -> Vec<UntilResult> {
+        if let Some((weights, results)) = &self.weights {
+            let each = results.iter().enumerate();
+            return each.map(|(k, known)| known.clone().unwrap_or_else(|| self.result_for_all(weights, k))).collect();
+        }
         let of = |(setting, sequences): (&u32, &Vec<(RateSequence, Option<UntilResult>)>)| -> Vec<UntilResult> {
             let each = self.limits.iter().zip(sequences);
             each.map(|(limit, (sequence, result))| result.clone().unwrap_or_else(|| limit.result(*setting, sequence)))
@@ -215,13 +257,15 @@ impl Stopping {
 
 impl Until {
     fn result(&self, setting: u32, sequence: &RateSequence) -> UntilResult {
-        let [low, high] = sequence.interval(self.level);
+        self.answered(Some(setting), sequence.counts(), sequence.interval(self.level))
+    }
+
+    fn answered(&self, setting: Option<u32>, [events, runs]: [u64; 2], [low, high]: [f64; 2]) -> UntilResult {
         let answer = match () {
             () if high < self.limit => Answer::Below,
             () if low > self.limit => Answer::Above,
             () => Answer::Open,
         };
-        let [events, runs] = sequence.counts();
         UntilResult { setting, until: self.to_string(), answer, events, runs, low, high }
     }
 }
@@ -233,7 +277,8 @@ mod tests {
 
     fn stopping(limits: &[&str], n_seeds: u64, n_settings: u32) -> Stopping {
         let limits: Vec<Until> = limits.iter().map(|text| text.parse().expect("a limit")).collect();
-        Stopping::new(&limits, (1..=n_seeds).collect(), (0..n_settings).collect(), &names())
+        let seeds = (1..=n_seeds).map(|seed| (seed, n_settings as usize)).collect();
+        Stopping::new(&limits, seeds, (0..n_settings).collect(), &names())
     }
 
     /// Refused once in `every` seeds.
@@ -299,5 +344,23 @@ mod tests {
         let [result] = &stopping.results()[..] else { panic!("one") };
         assert_eq!((result.answer, result.events), (Answer::Above, result.runs), "{result}");
         assert!(!stopping.beyond().is_empty(), "{result}");
+    }
+
+    /// A rare setting that is always refused does not spoil the rate of all; one half of all does.
+    #[test]
+    fn weights_answer_for_all_settings_at_once() {
+        let answer = |rare: f64| {
+            let weights = Weights::new([(0, 1.0 - rare), (1, rare)].into());
+            let mut stopping = stopping(&["refused < 0.1 at 95 %"], 400, 2).weighted(Some(weights));
+            for seed in 1..=400 {
+                [row_of(0, seed, 1000), row_of(1, seed, 1)].iter().for_each(|row| stopping.add(row));
+            }
+            let [result] = &stopping.results()[..] else { panic!("one answer") };
+            assert_eq!(result.setting, None);
+            (result.answer, stopping.beyond().is_empty())
+        };
+        assert_eq!(answer(0.02), (Answer::Below, false));
+        assert_eq!(answer(0.5), (Answer::Above, false));
+        assert_eq!(answer(0.1), (Answer::Open, true));
     }
 }

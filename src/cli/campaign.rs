@@ -9,8 +9,8 @@ use clap::Args;
 
 use crate::campaign::ExistingRows;
 use crate::campaign::{
-    CampaignSummary, MissingShards, Origin, Prepared, Request, Shard, Share, Stopping, Store, Until, jobs, merge,
-    table, write_results,
+    CampaignSummary, MissingShards, Origin, Prepared, Request, Row, Shard, Share, Stopping, Store, Table, Until, jobs,
+    merge, table, worst_rows, write_results,
 };
 use crate::cli::batch::{BatchRun, CampaignBar, check_name, exit_of, range_of, run_many};
 use crate::cli::closing::{say_wrapped, terminal_width};
@@ -53,12 +53,18 @@ pub(super) struct CampaignArgs {
     /// Keep each run's folder, as `armcal run` leaves it, in FILE.runs
     #[arg(long)]
     keep: bool,
+    /// Keep the folders of the N worst runs, each with its replay, in FILE.worst: contacts, failures, refusals, limits
+    /// that were missed, then the largest tool errors. They are made again at the end
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    #[arg(value_parser = clap::value_parser!(u16).range(0..=1000))]
+    keep_worst: u16,
     /// Discard existing rows
     #[arg(long)]
     fresh: bool,
     /// Put the tables of shards together, into --out
     #[arg(long, value_name = "FILE", num_args = 1.., requires = "out",
-          conflicts_with_all = ["seeds", "shard", "until", "threads", "keep", "fresh", "set", "robot", "vehicle"])]
+          conflicts_with_all = ["seeds", "shard", "until", "threads", "keep", "keep_worst", "fresh", "set", "robot",
+                                "vehicle"])]
     merge: Vec<PathBuf>,
     /// Merge although tables of some shards are missing
     #[arg(long, requires = "merge")]
@@ -92,19 +98,13 @@ fn run(args: &CampaignArgs, routine: &Path) -> Result<Exit> {
         args.out.clone().unwrap_or_else(|| Path::new("recordings").join(&prepared.routine.name).join("campaign.csv"));
     check_name(&out)?;
     let range = range_of(args.seeds, &prepared)?;
-    let existing = if args.fresh { ExistingRows::Discard } else { ExistingRows::Keep };
-    let store = Store::open(&out, &prepared.fingerprint, prepared.columns.names(), existing)?;
-    let seeds = range.seeds();
-    let share = args.shard.map(|shard| Share { shard, seeds: [*seeds.start(), *seeds.end()] });
-    let mut store = store.of(Origin::of_campaign(&prepared)?).sharing(share);
+    let mut store = opened(args, &prepared, range, &out)?;
     let n_before = store.table().rows.len();
     let jobs = jobs(&prepared, range, args.shard, &store.done());
     let folder = output::with_suffix(&out, if args.keep { ".runs" } else { ".work" });
     let keep = if args.keep { Keep::Everything } else { Keep::StreamsAlone };
     let many = BatchRun { prepared: &prepared, folder: &folder, keep, threads: args.threads, stop: stop.flag() };
-    let settings = prepared.settings.iter().map(|setting| setting.index).collect();
-    let mut stopping = Stopping::new(&args.until, seeds.collect(), settings, &store.table().names);
-    store.table().rows.iter().for_each(|row| stopping.add(row));
+    let mut stopping = stopping(args, &prepared, range, &store);
     let jobs = if stopping.is_answered() { Vec::new() } else { jobs };
     if n_before > 0 {
         note(format_args!("{n_before} rows are there already; {} runs are left", jobs.len()));
@@ -124,11 +124,54 @@ fn run(args: &CampaignArgs, routine: &Path) -> Result<Exit> {
         note(format_args!("stopped with {done} rows kept; the same command goes on from there"));
         return Ok(Exit::Failure);
     }
-    let (_, summary) = store.answered(&stopping).finish(&prepared.routine.name)?;
+    let (rows, summary) = store.answered(&stopping).finish(&prepared.routine.name)?;
     if !jobs.is_empty() {
         note(format_args!("{} runs in {:.0} s", jobs.len(), started.elapsed().as_secs_f64()));
     }
+    // What ended the campaign by its answer does not end this.
+    stop.flag().store(false, Ordering::SeqCst);
+    keep_worst(
+        args,
+        &BatchRun { folder: &output::with_suffix(&out, ".worst"), keep: Keep::Everything, ..many },
+        &rows,
+    )?;
     show(args, &summary, &out)
+}
+
+/// The rows that are there, with what the summary says of them.
+fn opened(args: &CampaignArgs, prepared: &Prepared, range: SeedRange, out: &Path) -> Result<Store> {
+    let existing = if args.fresh { ExistingRows::Discard } else { ExistingRows::Keep };
+    let store = Store::open(out, &prepared.fingerprint, prepared.columns.names(), existing)?;
+    let seeds = range.seeds();
+    let share = args.shard.map(|shard| Share { shard, seeds: [*seeds.start(), *seeds.end()] });
+    Ok(store.of(Origin::of_campaign(prepared)?).sharing(share).weighed(prepared.weights()))
+}
+
+/// What `--until` asks for, with the rows that are there counted.
+fn stopping(args: &CampaignArgs, prepared: &Prepared, range: SeedRange, store: &Store) -> Stopping {
+    let seeds = (0..).zip(range.seeds()).map(|(place, seed)| (seed, prepared.met_by(place).count()));
+    let settings = prepared.settings.iter().map(|setting| setting.index).collect();
+    let stopping = Stopping::new(&args.until, seeds.collect(), settings, &store.table().names);
+    let mut stopping = stopping.weighted(prepared.weights());
+    store.table().rows.iter().for_each(|row| stopping.add(row));
+    stopping
+}
+
+/// Makes the worst runs again, for their folders: none was kept while nobody knew which they would be. Folders that are
+/// whole stay.
+fn keep_worst(args: &CampaignArgs, many: &BatchRun<'_>, rows: &Table) -> Result<()> {
+    let is_there = |row: &Row| many.folder.join(format!("{}-{}/summary.json", row.setting, row.seed)).exists();
+    let job = |row: &&Row| {
+        let setting = many.prepared.settings.iter().find(|setting| setting.index == row.setting)?;
+        (!is_there(row)).then(|| many.prepared.job(setting, row.seed))
+    };
+    let jobs: Vec<_> = worst_rows(rows, usize::from(args.keep_worst)).iter().filter_map(job).collect();
+    if jobs.is_empty() {
+        return Ok(());
+    }
+    note(format_args!("{} of the worst runs are made again, for {}", jobs.len(), many.folder.display()));
+    run_many(many, &jobs, &mut |_| Ok(()))?;
+    Ok(())
 }
 
 fn show(args: &CampaignArgs, summary: &CampaignSummary, out: &Path) -> Result<Exit> {

@@ -8,7 +8,8 @@ use clap::Args;
 
 use crate::campaign::{
     Comparison, Job, Metric, Prepared, Request, Row, Table, Undecided, Verdict, baseline_text, compare, jobs,
-    read_baseline, regress_junit, regress_markdown, regress_page, regress_table, statistics, table, table_text,
+    read_baseline, read_rows, regress_junit, regress_markdown, regress_page, regress_table, statistics, table,
+    table_text,
 };
 use crate::cli::batch::{BatchRun, CampaignBar, check_name, range_of, run_many};
 use crate::cli::closing::{say_wrapped, terminal_width};
@@ -40,6 +41,9 @@ pub(super) struct RegressArgs {
     /// Write the new runs here, too (.csv)
     #[arg(long, value_name = "FILE", conflicts_with = "write_baseline")]
     out: Option<PathBuf>,
+    /// Compare this table, which `armcal campaign` wrote, and run nothing: for runs made elsewhere
+    #[arg(long, value_name = "FILE", requires = "baseline", conflicts_with_all = ["seeds", "out", "threads"])]
+    rows: Option<PathBuf>,
     /// Threads, one run on each; all cores if not given
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
@@ -72,6 +76,9 @@ pub(super) fn regress(args: &RegressArgs) -> Result<Exit> {
     }
     let prepared = Prepared::load(Request { routine: args.routine.clone(), overrides: args.overrides.overrides() })?;
     let baseline = args.baseline.as_deref().map(|path| read_baseline(path, &prepared)).transpose()?;
+    if let (Some(baseline), Some(rows)) = (&baseline, &args.rows) {
+        return compared(args, &prepared, baseline, &read_rows(rows, &prepared, baseline)?);
+    }
     let jobs = match &baseline {
         Some(baseline) => jobs_of(baseline, args, &prepared)?,
         None => jobs(&prepared, range_of(args.seeds, &prepared)?, None, &std::collections::BTreeSet::new()),

@@ -63,13 +63,16 @@ pub struct CampaignSettings {
     pub seeds: Option<SeedRange>,
     /// Keys with their values, sorted by key; the full product is run.
     pub matrix: Vec<(String, Vec<Value>)>,
+    /// Of keys of the matrix: how often each of its values occurs, over the others. Empty: all points are of equal
+    /// worth.
+    pub weights: Vec<(String, Vec<f64>)>,
 }
 
 /// `[regress]`: how much worse than the baseline is still the same.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RegressSettings {
-    /// Limits of new over baseline, median over the pairs.
+    /// Limits of new over baseline, typical of the pairs.
     pub tool_error_ratio: f64,
     /// The same of the distance between target and tool.
     pub reach_error_ratio: f64,
@@ -83,6 +86,8 @@ pub struct RegressSettings {
     pub time_ratio: f64,
     /// Limit of poses captured, baseline over new.
     pub poses_ratio: f64,
+    /// How much nearer than the baseline the arm may come to anything, typical of the pairs, m.
+    pub clearance_drop_m: f64,
     /// Limits of the new value itself, median over the seeds, m.
     pub tool_error_m: Option<f64>,
     /// The same of the distance between target and tool; `None` sets no limit.
@@ -99,6 +104,7 @@ impl Default for RegressSettings {
             corner_scatter_ratio: 1.10,
             time_ratio: 1.10,
             poses_ratio: 1.10,
+            clearance_drop_m: 0.005,
             tool_error_m: None,
             reach_error_m: None,
         }
@@ -119,7 +125,12 @@ impl RegressSettings {
         for (key, value) in ratios {
             FileIssue::check_range(file, &format!("regress.{key}"), value, 1.0..=1000.0)?;
         }
-        for (key, value) in [("tool_error_m", self.tool_error_m), ("reach_error_m", self.reach_error_m)] {
+        let lengths = [
+            ("clearance_drop_m", Some(self.clearance_drop_m)),
+            ("tool_error_m", self.tool_error_m),
+            ("reach_error_m", self.reach_error_m),
+        ];
+        for (key, value) in lengths {
             if let Some(value) = value {
                 FileIssue::check_range(file, &format!("regress.{key}"), value, 1e-6..=10.0)?;
             }
@@ -128,12 +139,17 @@ impl RegressSettings {
     }
 }
 
+/// Of a setting over the others.
+const MIN_WEIGHT: f64 = 1e-9;
+
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct CampaignFile {
     seeds: Option<String>,
     #[serde(default)]
     matrix: Table,
+    #[serde(default)]
+    weights: Table,
 }
 
 impl CampaignFile {
@@ -144,8 +160,34 @@ impl CampaignFile {
         flatten(&self.matrix, "", &mut matrix)
             .map_err(|(key, problem)| FileIssue::new(file, format!("campaign.matrix.{key}"), problem))?;
         matrix.sort_by(|a, b| a.0.cmp(&b.0));
-        Ok(CampaignSettings { seeds, matrix })
+        let mut weights = Vec::new();
+        flatten(&self.weights, "", &mut weights)
+            .and_then(|()| weights.iter().map(|(key, values)| weights_of(key, values, &matrix)).collect())
+            .map(|weights| CampaignSettings { seeds, matrix, weights })
+            .map_err(|(key, problem)| FileIssue::new(file, format!("campaign.weights.{key}"), problem).into())
     }
+}
+
+/// Numbers above zero, one for each value that the matrix gives the key.
+fn weights_of(
+    key: &str,
+    values: &[Value],
+    matrix: &[(String, Vec<Value>)],
+) -> Result<(String, Vec<f64>), (String, String)> {
+    let problem = |problem: String| (key.to_owned(), problem);
+    let Some((_, points)) = matrix.iter().find(|(name, _)| name == key) else {
+        return Err(problem("is no key of campaign.matrix".to_owned()));
+    };
+    if points.len() != values.len() {
+        let (n, wanted) = (values.len(), points.len());
+        return Err(problem(format!("has {n} weights; the matrix gives the key {wanted} values")));
+    }
+    let number = |value: &Value| value.as_float().or_else(|| value.as_integer().map(|n| n as f64));
+    let weight = |value| number(value).filter(|weight| (MIN_WEIGHT..=1.0 / MIN_WEIGHT).contains(weight));
+    let weights = values.iter().map(weight).collect::<Option<Vec<f64>>>();
+    let weights =
+        weights.ok_or_else(|| problem(format!("must be numbers of {MIN_WEIGHT:e} .. {:e}", 1.0 / MIN_WEIGHT)))?;
+    Ok((key.to_owned(), weights))
 }
 
 /// Dotted keys stand quoted or not: unquoted ones are tables in tables.
@@ -198,12 +240,18 @@ mod tests {
             quoted.matrix.iter().map(|(key, _)| key.as_str()).collect::<Vec<_>>(),
             ["method", "world.camera.rate_hz"]
         );
+        let weighted = read("[matrix]\na = [true, false]\n[weights]\na = [0.99, 1]").expect("good");
+        assert_eq!(weighted.weights, [("a".to_owned(), vec![0.99, 1.0])]);
         for bad in [
             "seeds = \"3..1\"",
             "[matrix]\na = []",
             "[matrix]\na = 1",
             "[matrix]\nseed = [1]",
             "[matrix]\n\"a b\" = [1]",
+            "[weights]\na = [1]",
+            "[matrix]\na = [1, 2]\n[weights]\na = [1]",
+            "[matrix]\na = [1, 2]\n[weights]\na = [1, 0]",
+            "[matrix]\na = [1, 2]\n[weights]\na = [1, \"b\"]",
         ] {
             assert!(read(bad).expect_err(bad).to_string().contains("r.toml: campaign."), "{bad}");
         }

@@ -18,6 +18,15 @@ pub struct RateSequence {
 const BISECTIONS: usize = 60;
 
 impl RateSequence {
+    /// After so many runs, so many of them with the event; their order does not matter.
+    #[must_use]
+    pub fn of_counts(n_events: u64, n_runs: u64) -> Self {
+        let mut sequence = Self::default();
+        (0..n_events.min(n_runs)).for_each(|_| sequence.add_with());
+        (n_events..n_runs).for_each(|_| sequence.add_without());
+        sequence
+    }
+
     /// Counts one more run that had the event.
     pub fn add_with(&mut self) {
         self.add(self.n_events);
@@ -70,13 +79,6 @@ mod tests {
     use super::*;
     use crate::stats::stream_rng;
 
-    fn sequence(n_events: u64, n_runs: u64) -> RateSequence {
-        let mut sequence = RateSequence::default();
-        (0..n_events).for_each(|_| sequence.add_with());
-        (n_events..n_runs).for_each(|_| sequence.add_without());
-        sequence
-    }
-
     /// Looked at after each of 2000 runs, 300 times over: at most 5 % of sequences may ever miss the truth.
     #[test]
     fn the_interval_holds_however_often_one_looks() {
@@ -105,14 +107,14 @@ mod tests {
     #[test]
     fn its_ends_are_where_the_ratio_says() {
         // 1 event in 3 runs: B(1.5, 2.5) / B(0.5, 0.5) = (pi / 16) / pi.
-        assert!((sequence(1, 3).ln_mixture - (1.0_f64 / 16.0).ln()).abs() < 1e-12);
-        let none = sequence(0, 1000);
+        assert!((RateSequence::of_counts(1, 3).ln_mixture - (1.0_f64 / 16.0).ln()).abs() < 1e-12);
+        let none = RateSequence::of_counts(0, 1000);
         let [low, high] = none.interval(0.95);
         assert_eq!(low, 0.0);
         assert!((none.ln_mixture - 1000.0 * (1.0 - high).ln() - 20.0_f64.ln()).abs() < 1e-9, "{high}");
         assert!((0.006..0.009).contains(&high), "{high}");
         assert_eq!(RateSequence::default().interval(0.95), [0.0, 1.0]);
-        let [low, high] = sequence(100, 1000).interval(0.95);
+        let [low, high] = RateSequence::of_counts(100, 1000).interval(0.95);
         assert!((0.06..0.08).contains(&low) && (0.12..0.14).contains(&high), "{low} {high}");
     }
 
@@ -123,7 +125,7 @@ mod tests {
             (0..7).for_each(|_| other.add_without());
             other.add_with();
         }
-        let (a, b) = (sequence(5, 40).interval(0.9), other.interval(0.9));
+        let (a, b) = (RateSequence::of_counts(5, 40).interval(0.9), other.interval(0.9));
         assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-12), "{a:?} {b:?}");
     }
 }
