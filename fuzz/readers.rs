@@ -6,7 +6,7 @@ use std::fs;
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
-use armcal::calib::{Calibration, CompactCalibration, calibrate};
+use armcal::calib::{Calibration, CompactCalibration, ExternalContext, PlainLandmark, calibrate, prepare_external};
 use armcal::log::{
     GrowingRecording, Growth, RecordingHeader, RecordingWriter, TopicMap, for_each_raw, read_attachments,
     read_recording,
@@ -56,7 +56,7 @@ impl Scratch {
 pub type Read = fn(&Scratch, &[u8]) -> bool;
 
 /// By the names of the targets and of the folders of their corpora.
-pub const READERS: [(&str, Read); 25] = [
+pub const READERS: [(&str, Read); 26] = [
     ("urdf", urdf),
     ("new_robot", new_robot),
     ("recording", recording),
@@ -73,6 +73,7 @@ pub const READERS: [(&str, Read); 25] = [
     ("input_map", input_map),
     ("table_csv", table_csv),
     ("table_yaml", table_yaml),
+    ("table_board", table_board),
     ("image", image),
     ("task", task),
     ("plan", plan),
@@ -236,6 +237,23 @@ fn table_yaml(scratch: &Scratch, bytes: &[u8]) -> bool {
         position = [\"pose.x\", \"pose.y\", \"pose.z\"]\nrotation_form = \"quaternion_wxyz\"\n\
         rotation = [\"pose.r.0\", \"pose.r.1\", \"pose.r.2\", \"pose.r.3\"]\n";
     table(scratch, "rows.yaml", (MAP, bytes))
+}
+
+/// As corners of a board, up to the views; the corpus shows it near the middle of the image, face on.
+fn table_board(scratch: &Scratch, bytes: &[u8]) -> bool {
+    const MAP: &str = "version = 1\n[table]\n[joint_sensors]\n[tags]\nchild_frame = \"board\"\n\
+        use = \"board_corners\"\n[tags.columns]\nid = \"corner\"\npixel = [\"u\", \"v\"]\n";
+    const BOARD: &[u8] = b"version = 1\nframe = \"base_link\"\n[[tag]]\nname = \"board\"\nsquares = [4, 4]\n\
+        square_m = 0.05\nposition_m = [1.4, 0.5, 0.0]\nquaternion_wxyz = [0.5, -0.5, 0.5, -0.5]\n";
+    let map = armcal::input::parse_input_map(Path::new("input.toml"), MAP).expect("a map");
+    let tags = scratch.write("board.toml", BOARD);
+    let named = read_landmarks(&tags).expect("it reads").survey(&tags, &scratch.robot, map.tag_use).expect("a survey");
+    let (id, board) = named.boards.first_key_value().expect("a board");
+    let plain = PlainLandmark { id: Some(*id), board: Some(*board) };
+    let robot = scratch.robot.clone().with_survey(named.survey);
+    let read = armcal::input::read_external(&scratch.write("rows.csv", bytes), &map, &robot);
+    let context = ExternalContext { plain, ..ExternalContext::default() };
+    read.is_ok_and(|recording| prepare_external(&[recording], &map, &robot, context).is_ok())
 }
 
 fn table(scratch: &Scratch, name: &str, (map, bytes): (&str, &[u8])) -> bool {

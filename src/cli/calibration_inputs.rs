@@ -11,8 +11,8 @@ use crate::cli::stdout::note;
 use crate::cli::waiting::Waiting;
 use armcal_belief::calib::online::{Batch, Follower, OnlineEvent, OnlineSettings};
 use armcal_belief::calib::{
-    Calibration, CalibrationData, CalibrationFileError, ExternalContext, Status, View, calibrate, calibrate_data,
-    calibrate_with_survey, check_joints, prepare_external, prepare_pooled, read_marked,
+    Calibration, CalibrationData, CalibrationFileError, ExternalContext, PlainLandmark, Status, View, calibrate,
+    calibrate_data, calibrate_with_survey, check_joints, prepare_external, prepare_pooled, read_marked,
 };
 use armcal_belief::tagmap::files::{LandmarkFile, NamedSurvey, read_landmarks};
 #[cfg(not(feature = "sim"))]
@@ -222,14 +222,17 @@ impl CalibrationInputs<'_> {
         let map = read_input_map(file)?;
         map.check_robot(file, &self.robot.joint_names())?;
         let mut robot = self.robot.clone();
-        if map.tag_use == TagUse::Corners {
+        if map.tag_use.needs_lens() {
             self.add_lens(&mut robot, &map)?;
         }
         let named = match &landmarks {
             Some((file, landmarks)) => landmarks.survey(file, &robot, map.tag_use)?,
-            None => NamedSurvey { survey: self.robot.survey(), names: Default::default() },
+            None => {
+                let (names, boards) = Default::default();
+                NamedSurvey { survey: self.robot.survey(), names, boards }
+            }
         };
-        let plain_landmark = plain_landmark(file, &map, &named)?;
+        let plain = plain_landmark(file, &map, &named)?;
         let robot = robot.with_survey(named.survey);
         if robot.tags.is_empty() {
             return Err(
@@ -248,7 +251,7 @@ impl CalibrationInputs<'_> {
         if task.is_none() {
             note("note: no task is named (--task), so that no tool error is predicted");
         }
-        let context = ExternalContext { task, landmark_names: named.names, plain_landmark };
+        let context = ExternalContext { task, landmark_names: named.names, plain };
         Ok((prepare_external(&recordings, &map, &robot, context)?, lost))
     }
 
@@ -366,13 +369,20 @@ pub(super) fn load_robot(folder: &Path, failed: &[String]) -> Result<Robot> {
 }
 
 /// The landmark that a plain `child_frame` means: the one of that name, or the only one there is where it has none.
-fn plain_landmark(file: &Path, map: &InputMap, named: &NamedSurvey) -> Result<Option<u32>, FileIssue> {
-    let Some(ChildFrame::Plain(name)) = &map.child_frame else { return Ok(None) };
+fn plain_landmark(file: &Path, map: &InputMap, named: &NamedSurvey) -> Result<PlainLandmark, FileIssue> {
+    let Some(ChildFrame::Plain(name)) = &map.child_frame else { return Ok(PlainLandmark::default()) };
     if let Some((id, _)) = named.names.iter().find(|(_, known)| *known == name) {
-        return Ok(Some(*id));
+        let board = named.boards.get(id).copied().filter(|_| map.tag_use == TagUse::BoardCorners);
+        if board.is_none() && map.tag_use == TagUse::BoardCorners {
+            let problem = format!("is `{name}`, whose `squares` and `square_m` the tag map does not give");
+            return Err(FileIssue::new(file, "tags.child_frame", problem));
+        }
+        return Ok(PlainLandmark { id: Some(*id), board });
     }
     match &named.survey.tags[..] {
-        [only] if named.names.is_empty() => Ok(Some(only.id)),
+        [only] if named.names.is_empty() && map.tag_use != TagUse::BoardCorners => {
+            Ok(PlainLandmark { id: Some(only.id), board: None })
+        }
         tags => {
             let ids = tags.iter().map(|tag| named.names.get(&tag.id).cloned().unwrap_or_else(|| tag.id.to_string()));
             let problem = format!("no landmark `{name}` in the tag map; it has {:?}", ids.collect::<Vec<_>>());

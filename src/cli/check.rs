@@ -16,7 +16,7 @@ use crate::cli::stdout::say;
 use armcal_belief::calib::{Calibration, CalibrationFileError};
 use armcal_belief::plan::{ClearanceModel, PlanFile, SceneCheck, SceneIssues, grips_at_first};
 use armcal_belief::tagmap::files::read_landmarks;
-use armcal_core::input::{InputMap, Source, TagUse, Topics, read_input_map, read_task};
+use armcal_core::input::{InputMap, SeenColumns, Source, TagUse, Topics, read_input_map, read_task};
 use armcal_core::robot::{self, Robot, Vehicle};
 use armcal_core::routine::{self, Overrides, Routine, Step};
 use armcal_core::stats::stream_rng;
@@ -174,6 +174,7 @@ fn describe_input(map: &InputMap) -> String {
     let landmark = map.child_frame.as_ref().map_or_else(|| "tags".to_owned(), |child| format!("`{}`", child.text()));
     let what = match map.tag_use {
         TagUse::Corners => "corners".to_owned(),
+        TagUse::BoardCorners => format!("corners of the board {landmark}"),
         TagUse::Pose => format!("poses of {landmark}"),
         TagUse::Position => format!("positions of {landmark}"),
     };
@@ -185,7 +186,13 @@ fn describe_input(map: &InputMap) -> String {
             };
             format!("input map: joint readings on {joints}, {what}{seen_from} on {tags}")
         }
-        Source::Table(table) => format!("input map: a table, {what} in {}", table.position.join(", ")),
+        Source::Table(table) => {
+            let columns = match &table.seen {
+                SeenColumns::Pose(pose) => pose.position.join(", "),
+                SeenColumns::Pixel(pixel) => pixel.join(", "),
+            };
+            format!("input map: a table, {what} in {columns}")
+        }
     }
 }
 

@@ -8,6 +8,8 @@ pub enum DetectError {
     Size { bytes: usize, width: usize, height: usize },
     #[error("the image is {width} x {height} pixels, the lens's is {lens_width} x {lens_height}")]
     Resolution { width: usize, height: usize, lens_width: usize, lens_height: usize },
+    #[error("the JPEG cannot be read: {0}")]
+    Jpeg(String),
     #[error("the AprilTag library failed: {0}")]
     Library(String),
 }

@@ -17,6 +17,7 @@ mod fit;
 mod gates;
 mod homography;
 mod image;
+mod jpeg;
 mod normal;
 mod pattern;
 mod samples;
@@ -26,6 +27,7 @@ pub use detection::{DetectedTag, ImageDetections};
 pub use detector::TagDetector;
 pub use error::DetectError;
 pub use image::GreyImage;
+pub use jpeg::{GreyPicture, grey_of_jpeg};
 pub use settings::DetectorSettings;
 
 #[cfg(test)]

@@ -4,6 +4,7 @@ use std::io::Cursor;
 
 use armcal_core::input::{ImageProblem, RecordedImage};
 use armcal_core::log::ros::{CompressedImage, Image};
+use armcal_detect::grey_of_jpeg;
 use image::{ImageFormat, ImageReader, Limits};
 
 /// Encodings of `sensor_msgs/msg/Image` that are read.
@@ -97,6 +98,12 @@ fn compressed(image: &CompressedImage, resolution_px: [u32; 2]) -> Result<Vec<u8
     let reader = || ImageReader::with_format(Cursor::new(&image.data), format);
     let (width, height) = reader().into_dimensions().map_err(|_| ImageProblem::Damaged)?;
     check_resolution([width, height], resolution_px)?;
+    // As the simulator's camera has it; else (RGB, CMYK) by its colours.
+    if format == ImageFormat::Jpeg
+        && let Ok(picture) = grey_of_jpeg(&image.data)
+    {
+        return Ok(picture.data);
+    }
     let mut reader = reader();
     let mut limits = Limits::default();
     limits.max_alloc = Some(MAX_DECODED_BYTES);

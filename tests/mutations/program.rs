@@ -44,7 +44,7 @@ const CUT: &str = "fuzz/corpus/recording/cut.mcap";
 const TAGMAP: &str = "tagmap views.mcap --topic /camera/wrist/detections --camera cameras.yaml --tags";
 const TABLE: &str = "calibrate poses.csv --robot robot --input table.toml --out out --method minimum_distance";
 
-const CASES: [Case; 53] = [
+const CASES: [Case; 55] = [
     case("robots/titan4/titan4.urdf", "robot/titan4.urdf", "check robot"),
     case("robots/titan4/titan4.urdf", "robot/titan4.urdf", "inspect views.mcap --robot robot"),
     case("robots/kraft-predator/kraft-predator.urdf", "robot/titan4.urdf", "check robot"),
@@ -66,9 +66,11 @@ const CASES: [Case; 53] = [
     case("fuzz/corpus/task/task.toml", "task.toml", "check task.toml"),
     case("fuzz/corpus/input_map/positions.toml", "input.toml", "check input.toml"),
     case("fuzz/corpus/input_map/table.toml", "input.toml", "check input.toml"),
+    case("fuzz/corpus/input_map/board.toml", "input.toml", "check input.toml"),
     case("fuzz/corpus/table_csv/poses.csv", "poses.csv", TABLE),
     case("fuzz/corpus/plan/plan.toml", "plan.toml", "check plan.toml"),
     case("fuzz/corpus/tag_map/map.toml", "map.toml", "check map.toml"),
+    case("fuzz/corpus/tag_map/board.toml", "map.toml", "check map.toml"),
     case("recordings/sample/calibration.toml", "calibration.toml", "check calibration.toml"),
     case("recordings/sample/calibration.toml", "calibration.toml", "export calibration.toml --as yaml"),
     case("recordings/sample/calibration.covariance.toml", "calibration.covariance.toml", "check calibration.toml"),

@@ -210,13 +210,13 @@ pub fn add_noise(shots: &mut [Shot], std_px: f64, rng: &mut ChaCha8Rng) {
     }
 }
 
-fn small_motion(std_m: f64, std_rad: f64, rng: &mut ChaCha8Rng) -> Isometry3<f64> {
+pub fn small_motion(std_m: f64, std_rad: f64, rng: &mut ChaCha8Rng) -> Isometry3<f64> {
     let translation = Translation3::from(std_m * normal3(rng));
     Isometry3::from_parts(translation, UnitQuaternion::from_scaled_axis(std_rad * normal3(rng)))
 }
 
 /// Kannala-Brandt in polar form, within 1.25 rad of the axis and 10 px of the border.
-fn pixel(lens: &CameraModel, p: &Point3<f64>) -> Option<[f64; 2]> {
+pub fn pixel(lens: &CameraModel, p: &Point3<f64>) -> Option<[f64; 2]> {
     let theta = p.x.hypot(p.y).atan2(p.z);
     let [.., k1, k2, k3, k4] = lens.intrinsics();
     let radius = theta + k1 * theta.powi(3) + k2 * theta.powi(5) + k3 * theta.powi(7) + k4 * theta.powi(9);

@@ -97,13 +97,13 @@ impl FoldSums {
             self.n += 1;
             self.sum_m2 += o.residual_m.norm_squared();
             self.sum_m += o.residual_m.norm();
-            self.n_corners += usize::from(o.tag.corners().is_some());
+            self.n_corners += usize::from(o.tag.is_in_pixels());
             if let Some(off_m) = problem.camera_off_m(o) {
                 self.n_poses += 1;
                 self.camera_sum_m += off_m;
             }
         });
-        let seen = views.iter().flat_map(|view| &view.tags).filter(|tag| tag.corners().is_some()).count() as f64;
+        let seen = views.iter().flat_map(|view| &view.tags).filter(|tag| tag.is_in_pixels()).count() as f64;
         self.sum_px2 += problem.reprojection_rms_px(at).map_or(0.0, |rms_px| rms_px * rms_px * seen);
         PositionProblem::new(nominal, &by_drawing).each(&datasheet, |o| self.nominal_m2 += o.residual_m.norm_squared());
         self.n_views += views.iter().filter(|view| !view.tags.is_empty()).count();

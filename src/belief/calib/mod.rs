@@ -56,8 +56,9 @@ pub use result::{
 };
 pub(crate) use views::dropouts::replace_dropouts;
 pub use views::{
-    CalibrationData, CaptureData, ConditionHistory, EndStopReading, ExternalContext, HeldOut, IdentifiedScale,
-    MarkedSpans, MeanCorners, ObservationRejection, TagMeasurement, TagObservation, TaskRests, View, associate,
-    associate_within, check_joints, identify_scales, prepare_external, prepare_pooled, read_marked, surveyed,
+    BoardPoint, BoardPoints, CalibrationData, CaptureData, ConditionHistory, EndStopReading, ExternalContext, HeldOut,
+    IdentifiedScale, MarkedSpans, MeanCorners, ObservationRejection, PlainLandmark, TagMeasurement, TagObservation,
+    TaskRests, View, associate, associate_within, check_joints, identify_scales, prepare_external, prepare_pooled,
+    read_marked, surveyed,
 };
 pub use wrong_input::{WrongInput, WrongInputKind};

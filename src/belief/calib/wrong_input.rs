@@ -232,6 +232,7 @@ fn posed_tags<'a>(view: &View, tags: &'a [SurveyedTag], lens: &CameraModel) -> V
                 [Some(best), other].into_iter().flatten().map(|pose| *pose.camera_from_tag.isometry()).collect()
             }
             TagMeasurement::Pose(pose) => vec![*pose],
+            TagMeasurement::Board(seen) => vec![seen.camera_from_board],
             TagMeasurement::Position => return None,
         };
         Some(PosedTag { surveyed, poses })

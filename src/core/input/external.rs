@@ -217,9 +217,15 @@ fn check_tags(file: &str, raw: &RawMessage<'_>, map: &InputMap) -> Result<(), In
     let [image, compressed] = IMAGE_TYPES;
     check_type(file, raw, &["TFMessage", "AprilTagDetectionArray", image, compressed], EXPECTED)?;
     let is_transform = raw.schema_name().ends_with("/TFMessage");
-    let (held, allowed) = match (is_transform, map.tag_use) {
-        (true, TagUse::Corners) => ("transforms, which have no corners", "\"position\" or \"pose\""),
-        (false, TagUse::Position | TagUse::Pose) => ("corners in the image", "\"corners\""),
+    let is_image = raw.schema_name().ends_with("Image");
+    let (held, allowed) = match map.tag_use {
+        TagUse::Corners | TagUse::BoardCorners if is_transform => {
+            ("transforms, which have no corners", "\"position\" or \"pose\"")
+        }
+        TagUse::Position | TagUse::Pose if !is_transform => ("corners in the image", "\"corners\""),
+        TagUse::BoardCorners if is_image => {
+            ("images, in which armcal looks for tags, not for boards", "\"corners\"; name a topic with the corners")
+        }
         _ => return Ok(()),
     };
     Err(InputError::Use { file: file.to_owned(), topic: raw.topic().to_owned(), held, allowed })

@@ -14,7 +14,7 @@
 //!                                    # sensor_msgs/msg/Image or CompressedImage (with use = "corners")
 //! camera_frame = "fisheye"
 //! child_frame = "tag36h11:{id}"      # or a plain name, for one landmark
-//! use = "position"                   # "position" | "pose" | "corners"
+//! use = "position"                   # "position" | "pose" | "corners" | "board_corners"
 //! family = "36h11"                   # optional, images alone: or "25h9", "16h5"; absent: that of the robot's tags
 //! image_period_s = 0.2               # optional, images alone: time between two that are looked at; absent: all
 //! camera_info = "/camera_info"       # optional, images alone: sensor_msgs/msg/CameraInfo, for robots without a lens
@@ -33,7 +33,9 @@ use std::path::Path;
 use nalgebra::{Quaternion, UnitQuaternion};
 use serde::Deserialize;
 
-pub use self::table::{Direction, RotationColumns, RotationForm, TableFormat, TableLayout, TimeColumn};
+pub use self::table::{
+    Direction, PoseColumns, RotationColumns, RotationForm, SeenColumns, TableFormat, TableLayout, TimeColumn,
+};
 use self::table::{TableToml, TagColumnsToml};
 use crate::optics::TagFamily;
 use crate::robot::{FileIssue, JointSensorSpec, RobotError, parse_toml, read_text};
@@ -53,6 +55,16 @@ pub enum TagUse {
     Pose,
     /// The corner pixels.
     Corners,
+    /// Pixels of a board's inner corners, by their numbers.
+    BoardCorners,
+}
+
+impl TagUse {
+    /// Whether pixels are used, which a lens must turn into directions.
+    #[must_use]
+    pub fn needs_lens(self) -> bool {
+        matches!(self, Self::Corners | Self::BoardCorners)
+    }
 }
 
 /// What becomes of tags that were seen while the arm moved.
@@ -338,6 +350,10 @@ pub fn parse_input_map(file: &Path, text: &str) -> Result<InputMap, RobotError> 
     if raw.table.is_some() {
         check_no_topics(file, &raw)?;
     }
+    if raw.tags.tag_use == TagUse::BoardCorners && !matches!(child_frame, Some(ChildFrame::Plain(_))) {
+        let problem = "must be the plain name of the board in the tag map; its corners have numbers of their own";
+        return Err(FileIssue::new(file, "tags.child_frame", problem).into());
+    }
     let source = match raw.table {
         Some(table) => {
             let tags = (raw.tags.tag_use, child_frame.as_ref());
@@ -408,7 +424,7 @@ fn topics(file: &Path, joints: &JointsToml, tags: &TagsToml, conditions: Conditi
         issue("tags.camera_frame", "is empty; name a frame")?;
     }
     let frames = [("tags.camera_frame", &tags.camera_frame), ("tags.child_frame", &tags.child_frame)];
-    let absent = frames.into_iter().find(|(_, frame)| tags.tag_use != TagUse::Corners && frame.is_none());
+    let absent = frames.into_iter().find(|(_, frame)| !tags.tag_use.needs_lens() && frame.is_none());
     if let Some((key, _)) = absent {
         issue(key, "is missing; transforms need it: which frames are the camera's and the tags'")?;
     }

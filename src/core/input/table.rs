@@ -7,7 +7,7 @@ use nalgebra::Isometry3;
 use super::error::{BadPlace, InputError};
 use super::joint_unit::check_unit;
 use super::joints::{Reading, n_needed};
-use super::map::{InputMap, NotFinite, TableFormat, TableLayout, TagUse};
+use super::map::{InputMap, NotFinite, SeenColumns, TableFormat, TableLayout, TagUse};
 use super::recording::ExternalRecording;
 use super::tags::{ExternalDetection, MIN_DISTANCE_M, RawMeasurement, TagFrame};
 use crate::files::{FileKind, read_text};
@@ -109,15 +109,13 @@ impl TableReader<'_> {
             return Ok(());
         };
         let counts = self.counts(&values);
-        let id = self.id(row, &values)?;
-        let seen = self.measurement(row, &values)?;
-        let stamp = self.stamp(row, &values, (&counts, id))?;
+        let tag = self.detection(row, &values)?;
+        let stamp = self.stamp(row, &values, (&counts, &tag))?;
         let digest = digest(stamp, &values);
-        let tag = ExternalDetection { id, seen };
         match self.recording.frames.last_mut().filter(|frame| frame.stamp == stamp) {
             Some(frame) => {
                 frame.tags.push(tag);
-                frame.tags.sort_by_key(|tag| tag.id);
+                frame.tags.sort_by_key(ExternalDetection::key);
                 frame.digests.push(digest);
             }
             None => {
@@ -170,26 +168,36 @@ impl TableReader<'_> {
         Ok(Some(value as u32))
     }
 
-    fn measurement(&self, row: &Row, values: &[f64]) -> Result<RawMeasurement, InputError> {
-        let position = self.columns.position.clone().map(|at| values[at]);
+    fn detection(&self, row: &Row, values: &[f64]) -> Result<ExternalDetection, InputError> {
+        let id = self.id(row, values)?;
+        let place = self.columns.place.clone().map(|at| values[at]);
+        let layout = match &self.layout.seen {
+            SeenColumns::Pose(layout) => layout,
+            SeenColumns::Pixel(_) => {
+                let pixel = [values[self.columns.place.start], values[self.columns.place.start + 1]];
+                let seen = RawMeasurement::BoardCorner { number: id.unwrap_or_default(), pixel };
+                return Ok(ExternalDetection { id: None, seen });
+            }
+        };
         let rotation: Vec<f64> = self.columns.rotation.clone().map(|at| values[at]).collect();
-        let camera_from_tag: Isometry3<f64> = match camera_from_tag(self.layout, position, &rotation) {
+        let camera_from_tag: Isometry3<f64> = match camera_from_tag(layout, place, &rotation) {
             Ok(pose) => pose,
             Err(problem) => return self.problem(row, problem),
         };
         if camera_from_tag.translation.vector.norm() < MIN_DISTANCE_M {
             return self.problem(row, "puts the tag into the camera itself".to_owned());
         }
-        Ok(match self.map.tag_use {
+        let seen = match self.map.tag_use {
             TagUse::Pose => RawMeasurement::Pose(camera_from_tag),
             _ => RawMeasurement::Position(camera_from_tag.translation.vector),
-        })
+        };
+        Ok(ExternalDetection { id, seen })
     }
 
     /// Rows of one time are of one pose. Without a time, so are rows of different tags with the same joint readings.
-    fn stamp(&self, row: &Row, values: &[f64], pose: (&JointCounts, Option<u32>)) -> Result<Stamp, InputError> {
+    fn stamp(&self, row: &Row, values: &[f64], pose: (&JointCounts, &ExternalDetection)) -> Result<Stamp, InputError> {
         let last = self.recording.readings.last().zip(self.recording.frames.last());
-        let is_again = |frame: &TagFrame| frame.tags.iter().any(|tag| tag.id == pose.1);
+        let is_again = |frame: &TagFrame| frame.tags.iter().any(|tag| tag.key() == pose.1.key());
         let Some((time, at)) = self.layout.time.as_ref().zip(self.columns.time) else {
             let same = last.filter(|(reading, frame)| reading.counts == *pose.0 && !is_again(frame));
             let next = Stamp::default().plus_s(ROW_S * row.number as f64);

@@ -23,6 +23,17 @@ pub struct ExternalDetection {
     pub seen: RawMeasurement,
 }
 
+impl ExternalDetection {
+    /// What tells it from others of one frame: the landmark's number, and the corner's on a board.
+    #[must_use]
+    pub fn key(&self) -> (Option<u32>, Option<u32>) {
+        match self.seen {
+            RawMeasurement::BoardCorner { number, .. } => (self.id, Some(number)),
+            _ => (self.id, None),
+        }
+    }
+}
+
 /// How it was seen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum RawMeasurement {
@@ -32,6 +43,13 @@ pub enum RawMeasurement {
     Position(Vector3<f64>),
     /// `camera_from_tag`.
     Pose(Isometry3<f64>),
+    /// One inner corner of a board.
+    BoardCorner {
+        /// Its number on the board.
+        number: u32,
+        /// Raw pixel.
+        pixel: [f64; 2],
+    },
 }
 
 /// What the camera saw at one stamp.
@@ -183,6 +201,15 @@ impl<'a> TagReader<'a> {
                 self.count("detections with a negative id");
                 continue;
             };
+            if self.map.tag_use == TagUse::BoardCorners {
+                let pixel = [tag.centre.x, tag.centre.y];
+                if let Some(value) = pixel.into_iter().find(|value| !value.is_finite()) {
+                    self.not_finite(place, "centre", &format!("corner {id}"), value)?;
+                    continue;
+                }
+                self.add(stamp, digest, None, RawMeasurement::BoardCorner { number: id, pixel });
+                continue;
+            }
             let corners_px = tag.corners.map(|corner| [corner.x, corner.y]);
             if let Some(value) = corners_px.iter().flatten().find(|value| !value.is_finite()) {
                 self.not_finite(place, "corners", &format!("tag {id}"), *value)?;
@@ -263,14 +290,14 @@ impl<'a> TagReader<'a> {
             let mut once: Vec<ExternalDetection> = Vec::new();
             let mut twice = BTreeSet::new();
             for observation in std::mem::take(&mut frame.tags) {
-                match once.iter().find(|other| other.id == observation.id) {
+                match once.iter().find(|other| other.key() == observation.key()) {
                     Some(other) if other.seen == observation.seen => {}
-                    Some(_) => drop(twice.insert(observation.id)),
+                    Some(_) => drop(twice.insert(observation.key())),
                     None => once.push(observation),
                 }
             }
-            once.retain(|observation| !twice.contains(&observation.id));
-            once.sort_by_key(|observation| observation.id);
+            once.retain(|observation| !twice.contains(&observation.key()));
+            once.sort_by_key(ExternalDetection::key);
             frame.tags = once;
             for _ in &twice {
                 self.count("tags seen at two places at one time");

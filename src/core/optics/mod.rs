@@ -3,9 +3,10 @@
 //! `Fisheye` is the equidistant model of Kannala and Brandt (2006, eq. 6 to the fourth odd term), as in OpenCV's
 //! `cv::fisheye` and Kalibr's `equidistant`. `Radtan` is Brown's pinhole model, `CameraModel` either of them, with or
 //! without a window before it (`FlatPort`). `square`
-//! computes the pose of a tag from its four corners for any [`Lens`], `tag_family` has the printed
-//! patterns. Oracle: OpenCV (tests/oracle).
+//! computes the pose of a tag from its four corners for any [`Lens`], `board` that of a chessboard from the corners
+//! that were seen, `tag_family` has the printed patterns. Oracle: OpenCV (tests/oracle).
 
+mod board;
 mod camera;
 mod corner_noise;
 mod fisheye;
@@ -15,6 +16,7 @@ mod square;
 mod tag_family;
 mod twist;
 
+pub use board::{BoardPose, Chessboard, solve_board};
 pub use camera::{CameraModel, Lens, LensModel, UnknownLens};
 pub use corner_noise::{CornerNoise, DetectionChance};
 pub use fisheye::Fisheye;

@@ -118,6 +118,14 @@ fn start_from_homography(
         right[2 * k + 1] = v;
     }
     let h = system.lu().solve(&right).ok_or(SquareError::Degenerate)?;
+    pose_of_homography(&h, &turn)
+}
+
+/// The pose by a homography whose last number is 1, of bearings turned by `turn`.
+pub(super) fn pose_of_homography(
+    h: &SVector<f64, 8>,
+    turn: &UnitQuaternion<f64>,
+) -> Result<Isometry3<f64>, SquareError> {
     let (h1, h2, h3) = (Vector3::new(h[0], h[3], h[6]), Vector3::new(h[1], h[4], h[7]), Vector3::new(h[2], h[5], 1.0));
     let scale = 2.0 / (h1.norm() + h2.norm());
     if !scale.is_finite() {
@@ -134,7 +142,7 @@ fn start_from_homography(
 }
 
 /// The mirror solution: the tag's normal reflected about the line of sight.
-fn flipped(pose: &Isometry3<f64>) -> Isometry3<f64> {
+pub(super) fn flipped(pose: &Isometry3<f64>) -> Isometry3<f64> {
     let sight = pose.translation.vector.normalize();
     let normal = pose.rotation * Vector3::z();
     let mirrored = 2.0 * normal.dot(&sight) * sight - normal;
@@ -142,9 +150,10 @@ fn flipped(pose: &Isometry3<f64>) -> Isometry3<f64> {
     Isometry3::from_parts(pose.translation, turn * pose.rotation)
 }
 
-struct Refined {
-    pose: Isometry3<f64>,
-    cost: f64,
+pub(super) struct Refined {
+    pub pose: Isometry3<f64>,
+    /// Sum of squares, px^2.
+    pub cost: f64,
     normal: Matrix6<f64>,
 }
 
@@ -166,8 +175,8 @@ const STOP: StopRule = StopRule { step_length: 1e-12, ..StopRule::after(30) };
 
 struct Refinement<'a, L> {
     lens: &'a L,
-    corners_tag: &'a [Point3<f64>; 4],
-    corners_px: &'a [[f64; 2]; 4],
+    corners_tag: &'a [Point3<f64>],
+    corners_px: &'a [[f64; 2]],
     here: Linearized,
     trial_pose: Isometry3<f64>,
     trial: Option<Linearized>,
@@ -200,11 +209,23 @@ impl<L: Lens> LeastSquares for Refinement<'_, L> {
     }
 }
 
+/// A tag is printed on one side: its z axis must point towards the camera.
 fn refine(
     lens: &impl Lens,
     start: Isometry3<f64>,
     corners_tag: &[Point3<f64>; 4],
     corners_px: &[[f64; 2]; 4],
+) -> Option<Refined> {
+    let faces_camera = |pose: &Isometry3<f64>| (pose.rotation * Vector3::z()).dot(&pose.translation.vector) < 0.0;
+    refine_points(lens, start, corners_tag, corners_px).filter(|found| faces_camera(&found.pose))
+}
+
+/// The pose of points, from either side, that is nearest to `start`; `None` where they do not determine it.
+pub(super) fn refine_points(
+    lens: &impl Lens,
+    start: Isometry3<f64>,
+    corners_tag: &[Point3<f64>],
+    corners_px: &[[f64; 2]],
 ) -> Option<Refined> {
     let here = linearize(lens, &start, corners_tag, corners_px)?;
     let mut refinement = Refinement { lens, corners_tag, corners_px, here, trial_pose: start, trial: None };
@@ -212,9 +233,7 @@ fn refine(
         return None;
     }
     let best = refinement.here;
-    // A tag is printed on one side: its z axis must point towards the camera.
-    let faces_camera = (best.pose.rotation * Vector3::z()).dot(&best.pose.translation.vector) < 0.0;
-    faces_camera.then_some(Refined { pose: best.pose, cost: best.cost, normal: best.normal })
+    Some(Refined { pose: best.pose, cost: best.cost, normal: best.normal })
 }
 
 struct Linearized {
@@ -228,8 +247,8 @@ struct Linearized {
 fn linearize(
     lens: &impl Lens,
     pose: &Isometry3<f64>,
-    corners_tag: &[Point3<f64>; 4],
-    corners_px: &[[f64; 2]; 4],
+    corners_tag: &[Point3<f64>],
+    corners_px: &[[f64; 2]],
 ) -> Option<Linearized> {
     let rotation = pose.rotation.to_rotation_matrix();
     let mut out = Linearized { pose: *pose, cost: 0.0, normal: Matrix6::zeros(), gradient: Vector6::zeros() };

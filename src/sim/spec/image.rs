@@ -75,7 +75,7 @@ table!(
         preview_hz = 0.5, in 0.0..=100.0;
         /// Images are recorded at most once in this time.
         log_period_s = 1.0, in 0.0..=1e6;
-        /// Of the recorded images, as JPEG has it.
+        /// Of the images, as JPEG has it. The detector sees them so, too.
         jpeg_quality = 80.0, in 1.0..=100.0;
     } and {
         /// Class of the water.

@@ -222,8 +222,11 @@ impl Estimate<'_> {
     /// Root mean square of the standard deviation that the corners of a view have by their frames and robot.toml,
     /// before the fitted noise, px; `None` without corners.
     pub(crate) fn mean_corner_std_px(&self) -> Option<f64> {
-        let variance = |observation: &ObservationTerm| match observation.data {
+        let variance = |observation: &ObservationTerm| match &observation.data {
             WeightedMeasurement::Corners { info, .. } if observation.is_used => Some(1.0 / info),
+            WeightedMeasurement::Board { points } if observation.is_used => {
+                Some(points.iter().map(|point| 1.0 / point.info).sum::<f64>() / points.len() as f64)
+            }
             _ => None,
         };
         let variances: Vec<f64> = self.problem.observations.iter().filter_map(variance).collect();
@@ -233,10 +236,7 @@ impl Estimate<'_> {
     /// Whether positions or poses were measured in place of corners.
     #[must_use]
     pub fn has_positions(&self) -> bool {
-        self.problem
-            .observations
-            .iter()
-            .any(|observation| !matches!(observation.data, WeightedMeasurement::Corners { .. }))
+        self.problem.observations.iter().any(|observation| !observation.data.is_in_pixels())
     }
 
     /// Whether poses were measured in place of corners.

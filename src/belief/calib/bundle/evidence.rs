@@ -359,7 +359,9 @@ enum NoiseKind {
 impl NoiseKind {
     fn n_coordinates(self, data: &WeightedMeasurement) -> usize {
         match (self, data) {
-            (Self::Corner, WeightedMeasurement::Corners { .. }) => data.n_coordinates(),
+            (Self::Corner, WeightedMeasurement::Corners { .. } | WeightedMeasurement::Board { .. }) => {
+                data.n_coordinates()
+            }
             (Self::Position, WeightedMeasurement::Position { .. } | WeightedMeasurement::Pose { .. })
             | (Self::Rotation, WeightedMeasurement::Pose { .. }) => 3,
             _ => 0,

@@ -177,7 +177,9 @@ fn camera_numbers(problem: &BundleProblem<'_>, view_idx: usize) -> usize {
     for observation in used {
         match observation.data {
             WeightedMeasurement::Position { .. } => points += 1,
-            WeightedMeasurement::Corners { .. } | WeightedMeasurement::Pose { .. } => poses += 1,
+            WeightedMeasurement::Corners { .. }
+            | WeightedMeasurement::Pose { .. }
+            | WeightedMeasurement::Board { .. } => poses += 1,
         }
     }
     match (poses, points) {

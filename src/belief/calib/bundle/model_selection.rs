@@ -16,7 +16,6 @@ use crate::calib::bundle::outliers::{Rejected, rejected};
 use crate::calib::bundle::problem::{BundleProblem, WeightedMeasurement};
 use crate::calib::bundle::solve::{TIGHT, solve};
 use crate::calib::parameters::ParameterKind;
-use crate::calib::views::view::TagMeasurement;
 
 /// A term that not every recording has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -71,7 +70,7 @@ pub fn select_model<'a>(input: &BundleInput<'a>) -> Option<(Estimate<'a>, Vec<Se
 
 fn candidates(input: &BundleInput<'_>) -> Vec<OptionalTerm> {
     let positions = |view: &crate::calib::View| {
-        let other = |tag: &&crate::calib::TagObservation| !matches!(tag.measured, TagMeasurement::Corners(_));
+        let other = |tag: &&crate::calib::TagObservation| !tag.is_in_pixels();
         view.tags.iter().filter(other).count() >= 2
     };
     let moves = input.views.iter().any(|view| view.rate_rad_s.iter().any(|rate| rate.abs() > MIN_RATE_RAD_S));
@@ -143,7 +142,9 @@ pub(crate) fn log_evidence(problem: &BundleProblem<'_>, normal: &NormalEquations
     let log_noise = |data: &WeightedMeasurement| {
         let [position, rotation] = [problem.scales.position_std_m, problem.scales.rotation_std_rad].map(f64::ln);
         match data {
-            WeightedMeasurement::Corners { .. } => data.n_coordinates() as f64 * problem.scales.noise.ln(),
+            WeightedMeasurement::Corners { .. } | WeightedMeasurement::Board { .. } => {
+                data.n_coordinates() as f64 * problem.scales.noise.ln()
+            }
             WeightedMeasurement::Position { .. } => 3.0 * position,
             WeightedMeasurement::Pose { .. } => 3.0 * (position + rotation),
         }

@@ -7,7 +7,7 @@
 
 use nalgebra::{Isometry3, Matrix2x3, Matrix6, SMatrix, SVector, Vector2, Vector3, Vector6};
 
-use crate::calib::bundle::problem::WeightedMeasurement;
+use crate::calib::bundle::problem::{WeightedMeasurement, WeightedPoint};
 use armcal_core::optics::{CameraModel, image_jacobian};
 use armcal_core::spatial::{adjoint, log, skew};
 
@@ -86,6 +86,7 @@ impl PoseInformation {
             WeightedMeasurement::Pose { tag_from_camera, info_position, info_rotation } => {
                 Some(of_pose(tag_from_camera, *info_position, *info_rotation, camera_from_tag))
             }
+            WeightedMeasurement::Board { points } => of_board(points, camera_from_tag, lens, (scale, by_lens)),
         }
     }
 
@@ -160,6 +161,38 @@ fn of_corners(
     let h = Matrix6::from_fn(|i, k| info * if i >= k { h[i][k] } else { h[k][i] });
     let g = Vector6::from(g) * info;
     Some(PoseInformation { h, g, adjoint: adjoint(camera_from_tag), chi2: chi2 * info, corner_chi2 })
+}
+
+/// As corners of a tag, with a weight of each; `scale` multiplies the weights.
+fn of_board(
+    points: &[WeightedPoint],
+    camera_from_board: &Isometry3<f64>,
+    lens: &CameraModel,
+    (scale, mut by_lens): (f64, Option<&mut LensInformation>),
+) -> Option<PoseInformation> {
+    let (mut h, mut g, mut chi2) = (Matrix6::zeros(), Vector6::zeros(), 0.0);
+    for point in points {
+        let p = (camera_from_board * point.on_board).coords;
+        let (pixel, by_point) = lens.project_with_jacobian(&p)?;
+        let info = scale * point.info;
+        let rows = image_jacobian(&by_point, &p).map(Vector6::from);
+        for (axis, row) in rows.iter().enumerate() {
+            let r = point.pixel[axis] - pixel[axis];
+            chi2 += info * r * r;
+            g += row * (info * r);
+            h += row * (row * info).transpose();
+        }
+        if let Some(by_lens) = &mut by_lens {
+            let columns = lens.by_intrinsics(&p)?;
+            for (axis, row) in rows.iter().enumerate() {
+                let column = columns.row(axis).transpose();
+                by_lens.cross += row * (column * info).transpose();
+                by_lens.h += column * (column * info).transpose();
+                by_lens.g += column * (info * (point.pixel[axis] - pixel[axis]));
+            }
+        }
+    }
+    Some(PoseInformation { h, g, adjoint: adjoint(camera_from_board), chi2, corner_chi2: [0.0; 4] })
 }
 
 fn of_position(in_camera_m: &Vector3<f64>, info: f64, camera_from_tag: &Isometry3<f64>) -> PoseInformation {

@@ -95,7 +95,7 @@ pub(crate) fn rejected(observation: &ObservationTerm) -> Rejected {
 /// Positions and poses come with a standard deviation that is a guess until the scales are fitted.
 fn noise_excess(seen: &WeightedMeasurement) -> f64 {
     match seen {
-        WeightedMeasurement::Corners { .. } => 1.0,
+        WeightedMeasurement::Corners { .. } | WeightedMeasurement::Board { .. } => 1.0,
         WeightedMeasurement::Position { .. } | WeightedMeasurement::Pose { .. } => 4.0,
     }
 }

@@ -1,14 +1,15 @@
 //! What is solved: columns, priors, views and observations in the form that the loops want.
 
 use std::ops::Range;
+use std::sync::Arc;
 
-use nalgebra::{DMatrix, DVector, Isometry3, SMatrix, Vector3};
+use nalgebra::{DMatrix, DVector, Isometry3, Point3, SMatrix, Vector3};
 
 use crate::calib::bundle::input::BundleInput;
 use crate::calib::bundle::model::{Hyperparameters, Model};
 use crate::calib::bundle::walk_modes::mode;
 use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
-use crate::calib::views::view::{MeanCorners, TagMeasurement, View};
+use crate::calib::views::view::{BoardPoint, BoardPoints, MeanCorners, TagMeasurement, View};
 use armcal_core::joints::{JointAngles, MAX_JOINTS};
 use armcal_core::kinematics::{ArmLoads, LinkCorrections, LinkPoses};
 use armcal_core::optics::CameraModel;
@@ -68,6 +69,15 @@ pub(crate) enum WeightedMeasurement {
     Corners { corners_px: [[f64; 2]; 4], half_size_m: f64, info: f64, used: [bool; 4] },
     Position { in_camera_m: Vector3<f64>, info: f64 },
     Pose { tag_from_camera: Isometry3<f64>, info_position: f64, info_rotation: f64 },
+    Board { points: Arc<[WeightedPoint]> },
+}
+
+/// A corner of a board and where it was seen.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct WeightedPoint {
+    pub on_board: Point3<f64>,
+    pub pixel: [f64; 2],
+    pub info: f64,
 }
 
 impl WeightedMeasurement {
@@ -77,7 +87,13 @@ impl WeightedMeasurement {
             Self::Corners { used, .. } => 2 * used.iter().filter(|is_used| **is_used).count(),
             Self::Position { .. } => 3,
             Self::Pose { .. } => 6,
+            Self::Board { points } => 2 * points.len(),
         }
+    }
+
+    /// Whether it is of pixels, whose noise is that of corners.
+    pub(crate) fn is_in_pixels(&self) -> bool {
+        matches!(self, Self::Corners { .. } | Self::Board { .. })
     }
 }
 
@@ -266,6 +282,7 @@ impl<'a> BundleProblem<'a> {
                         info_position: scales.position_std_m.powi(-2),
                         info_rotation: scales.rotation_std_rad.powi(-2),
                     },
+                    TagMeasurement::Board(seen) => board(robot, seen),
                 };
                 observations.push(ObservationTerm { tag: tag.tag_idx, data, is_used: true });
             }
@@ -297,7 +314,7 @@ impl<'a> BundleProblem<'a> {
         let rotation = factor[1] * self.scales.rotation_std_rad.powi(-2);
         for observation in &mut self.observations {
             match &mut observation.data {
-                WeightedMeasurement::Corners { .. } => {}
+                WeightedMeasurement::Corners { .. } | WeightedMeasurement::Board { .. } => {}
                 WeightedMeasurement::Position { info, .. } => *info = position,
                 WeightedMeasurement::Pose { info_position, info_rotation, .. } => {
                     (*info_position, *info_rotation) = (position, rotation);
@@ -408,10 +425,24 @@ impl<'a> BundleProblem<'a> {
 /// Corners with the variance of their mean: the scatter between frames, with robot.toml's figure for a few frames more.
 fn corners(robot: &Robot, seen: &MeanCorners, size_m: f64) -> WeightedMeasurement {
     let dof = 8.0 * seen.n_frames.saturating_sub(1) as f64;
-    let known_px2 = robot.camera.corner_std_px.powi(2);
-    let one_frame_px2 = (CORNER_PRIOR_DOF * known_px2 + seen.scatter_px2) / (CORNER_PRIOR_DOF + dof);
-    let info = seen.n_frames.max(1) as f64 / one_frame_px2;
+    let info = seen.n_frames.max(1) as f64 / one_frame_px2(robot, seen.scatter_px2, dof);
     WeightedMeasurement::Corners { corners_px: seen.corners_px, half_size_m: 0.5 * size_m, info, used: [true; 4] }
+}
+
+/// Corners of a board in the same way.
+fn board(robot: &Robot, seen: &BoardPoints) -> WeightedMeasurement {
+    let variance_px2 = one_frame_px2(robot, seen.scatter_px2, seen.n_free as f64);
+    let weighted = |point: &BoardPoint| {
+        let BoardPoint { on_board, pixel, n_frames } = *point;
+        WeightedPoint { on_board, pixel, info: n_frames.max(1) as f64 / variance_px2 }
+    };
+    WeightedMeasurement::Board { points: seen.points.iter().map(weighted).collect() }
+}
+
+/// Variance of a corner in one frame, px^2.
+fn one_frame_px2(robot: &Robot, scatter_px2: f64, dof: f64) -> f64 {
+    let known_px2 = robot.camera.corner_std_px.powi(2);
+    (CORNER_PRIOR_DOF * known_px2 + scatter_px2) / (CORNER_PRIOR_DOF + dof)
 }
 
 fn view_data(

@@ -143,10 +143,9 @@ impl<'a> PositionProblem<'a> {
         self.each(parameters, |o| {
             let tag: &SurveyedTag = &self.robot.tags[o.tag.tag_idx];
             let camera_from_tag = o.base_from_camera.inverse() * tag.base_from_tag.isometry();
-            let Some(seen) = o.tag.corners() else { return };
-            for (corner, measured) in armcal_core::optics::square_corners(tag.size_m).iter().zip(&seen.corners_px) {
-                if let Some(pixel) = self.robot.camera.lens.project(&(camera_from_tag * corner).coords) {
-                    sum += (Vector2::from(*measured) - pixel).norm_squared();
+            for (point, measured) in o.tag.points(tag.size_m) {
+                if let Some(pixel) = self.robot.camera.lens.project(&(camera_from_tag * point).coords) {
+                    sum += (Vector2::from(measured) - pixel).norm_squared();
                     n += 1;
                 }
             }

@@ -27,7 +27,7 @@ use armcal_core::streams::{
 use armcal_core::time::Stamp;
 
 /// Corners that fit a square worse than this are no tag: three times the worst that the lens prior allows.
-const MAX_SQUARE_RMS_PX: f64 = 3.0;
+pub(crate) const MAX_SQUARE_RMS_PX: f64 = 3.0;
 
 /// The survey that a recording carries, and its index among the messages; the earliest, should there be several.
 fn recorded_survey(recording: &Recording) -> Option<(usize, &RecordedSurvey)> {

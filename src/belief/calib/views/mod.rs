@@ -23,10 +23,11 @@ pub use association::{associate, associate_within, surveyed};
 pub use calibration_data::{CalibrationData, HeldOut};
 pub use conditions::ConditionHistory;
 pub use data_checks::check_joints;
-pub use external::{ExternalContext, prepare_external};
+pub use external::{ExternalContext, PlainLandmark, prepare_external};
 pub use marked_spans::{MarkedSpans, read_marked};
 pub use pooling::prepare_pooled;
 pub use scale_identification::{IdentifiedScale, identify_scales};
 pub use view::{
-    CaptureData, EndStopReading, MeanCorners, ObservationRejection, TagMeasurement, TagObservation, TaskRests, View,
+    BoardPoint, BoardPoints, CaptureData, EndStopReading, MeanCorners, ObservationRejection, TagMeasurement,
+    TagObservation, TaskRests, View,
 };

@@ -1,9 +1,11 @@
 //! A view: averaged data of an arm at rest, and all views of a recording.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::{Isometry3, Point3, Vector3};
 
+use armcal_core::optics::square_corners;
 use armcal_core::robot::Robot;
 use armcal_core::sensor::Conditions;
 use armcal_core::streams::{JointAngles, MAX_JOINTS, ReachTask, RejectReason};
@@ -76,8 +78,32 @@ pub struct MeanCorners {
     pub scatter_px2: f64,
 }
 
+/// One inner corner of a board, averaged over the frames of a view.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BoardPoint {
+    /// In the board's frame, m; z is zero.
+    pub on_board: Point3<f64>,
+    /// Mean over the frames, raw pixels.
+    pub pixel: [f64; 2],
+    /// Number of averaged frames.
+    pub n_frames: usize,
+}
+
+/// Corners of a board, averaged over the frames of a view.
+#[derive(Clone, Debug)]
+pub struct BoardPoints {
+    /// Four or more, not on a line.
+    pub points: Arc<[BoardPoint]>,
+    /// By these points alone.
+    pub camera_from_board: Isometry3<f64>,
+    /// Sum over frames and coordinates of the squared deviation from the mean.
+    pub scatter_px2: f64,
+    /// Degrees of freedom of `scatter_px2`.
+    pub n_free: usize,
+}
+
 /// What was measured of a tag or landmark in a view.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub enum TagMeasurement {
     /// Its corners in the image.
     Corners(MeanCorners),
@@ -85,10 +111,12 @@ pub enum TagMeasurement {
     Position,
     /// `camera_from_tag`.
     Pose(Isometry3<f64>),
+    /// Corners of a board in the image.
+    Board(BoardPoints),
 }
 
 /// One tag in one view.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct TagObservation {
     /// Number of the tag, or that which stands for a named landmark.
     pub id: u32,
@@ -106,8 +134,25 @@ impl TagObservation {
     pub fn corners(&self) -> Option<&MeanCorners> {
         match &self.measured {
             TagMeasurement::Corners(seen) => Some(seen),
-            TagMeasurement::Position | TagMeasurement::Pose(_) => None,
+            TagMeasurement::Position | TagMeasurement::Pose(_) | TagMeasurement::Board(_) => None,
         }
+    }
+
+    /// Points in the tag's frame, m, and where in the image they were seen, px; of a tag of `size_m` or of a board.
+    /// Empty where the recording has no pixels.
+    #[must_use]
+    pub fn points(&self, size_m: f64) -> Vec<(Point3<f64>, [f64; 2])> {
+        match &self.measured {
+            TagMeasurement::Corners(seen) => square_corners(size_m).into_iter().zip(seen.corners_px).collect(),
+            TagMeasurement::Board(seen) => seen.points.iter().map(|point| (point.on_board, point.pixel)).collect(),
+            TagMeasurement::Position | TagMeasurement::Pose(_) => Vec::new(),
+        }
+    }
+
+    /// Whether pixels were measured.
+    #[must_use]
+    pub fn is_in_pixels(&self) -> bool {
+        matches!(self.measured, TagMeasurement::Corners(_) | TagMeasurement::Board(_))
     }
 }
 

@@ -10,6 +10,7 @@ use nalgebra::Isometry3;
 
 use armcal_core::input::TagUse;
 use armcal_core::kinematics::Attachment;
+use armcal_core::optics::Chessboard;
 use armcal_core::robot::{FileIssue, Robot, SurveyedTag, TagSurvey};
 use armcal_core::spatial::{Base, Pose, Tag};
 
@@ -46,6 +47,8 @@ pub struct Landmark {
     pub position_std_m: f64,
     /// Largest of the three axes; zero where the file says nothing.
     pub rotation_std_rad: f64,
+    /// Its squares, where it is a chessboard with corners of its own.
+    pub board: Option<Chessboard>,
 }
 
 /// What a tag map says of landmarks in its frame.
@@ -66,6 +69,8 @@ pub struct NamedSurvey {
     pub survey: TagSurvey,
     /// Names by id, of the landmarks that have one.
     pub names: BTreeMap<u32, String>,
+    /// Boards by id.
+    pub boards: BTreeMap<u32, Chessboard>,
 }
 
 impl LandmarkFile {
@@ -86,7 +91,9 @@ impl LandmarkFile {
             return Err(FileIssue::new(file, "tag", "holds no tag in that frame"));
         }
         let named = self.landmarks.iter().filter_map(|landmark| Some((landmark.id, landmark.name.clone()?)));
-        Ok(NamedSurvey { survey: TagSurvey { base_tag, frame, family: None, tags }, names: named.collect() })
+        let boards = self.landmarks.iter().filter_map(|landmark| Some((landmark.id, landmark.board?))).collect();
+        let survey = TagSurvey { base_tag, frame, family: None, tags };
+        Ok(NamedSurvey { survey, names: named.collect(), boards })
     }
 }
 
@@ -120,6 +127,10 @@ impl Landmark {
         let label = self.name.as_ref().map_or_else(|| format!("tag {}", self.id), |name| format!("tag `{name}`"));
         let missing =
             |key: &str, why: &str| FileIssue::new(file, format!("{label}: {key}"), format!("is missing; {why}"));
+        let is_board = tag_use == TagUse::BoardCorners && self.board.is_some();
+        if is_board && self.quaternion_wxyz.is_none() {
+            return Err(missing("quaternion_wxyz", "a board's place and rotation in the frame of the file are needed"));
+        }
         if tag_use == TagUse::Corners && self.size_m.is_none() {
             return Err(missing("size_m", "a tag's corners need its size"));
         }
@@ -127,7 +138,7 @@ impl Landmark {
         if tag_use != TagUse::Corners && self.position_m.is_none() {
             return Err(missing("position_m", "a landmark that is used by its position or pose needs it"));
         }
-        if tag_use != TagUse::Position && self.quaternion_wxyz.is_none() && !is_unknown {
+        if matches!(tag_use, TagUse::Corners | TagUse::Pose) && self.quaternion_wxyz.is_none() && !is_unknown {
             return Err(missing("quaternion_wxyz", "without it a landmark can be used by its position alone"));
         }
         let (position_std_m, rotation_std_rad) = match (self.position_m, self.quaternion_wxyz) {

@@ -35,6 +35,7 @@ fn of_tags(tags: &TagFile) -> LandmarkFile {
             quaternion_wxyz: pose.map(|pose| pose.quaternion_wxyz()),
             position_std_m: std[0],
             rotation_std_rad: std[3..].iter().copied().fold(0.0, f64::max),
+            board: None,
         }
     };
     let landmarks = tags.tags.iter().filter(|tag| tag.body == 0).map(landmark).collect();

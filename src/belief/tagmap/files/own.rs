@@ -3,7 +3,8 @@
 //! `version = 1`, `frame`, and one `[[tag]]` each with `id` (or `name`, for a landmark that is not an AprilTag),
 //! `size_m`, `position_m`, `quaternion_wxyz` and `position_std_m`; all but the first may be absent. Further optional
 //! keys: `base_tag` and `default_size_m` (of tags without an entry) at the top; `rotation_std_rad` and `frame` of a tag
-//! in another frame than the file's, such as a separate group; `[[body]]` with `name` and `moving`, for frames that
+//! in another frame than the file's, such as a separate group; `squares` and `square_m` of a chessboard or ChArUco
+//! board with a name, whose origin is an outer corner; `[[body]]` with `name` and `moving`, for frames that
 //! move.
 
 use std::fmt::Write as _;
@@ -17,8 +18,12 @@ use crate::tagmap::files::landmark::{FIRST_NAMED_ID, Landmark, LandmarkFile};
 use crate::tagmap::files::tag_file::TagFile;
 use crate::tagmap::files::written::WrittenGroup;
 use crate::tagmap::types::{Body, TagPrior};
+use armcal_core::optics::Chessboard;
 use armcal_core::robot::{FileIssue, RobotError, parse_toml};
 use armcal_core::spatial::{Base, Pose, Tag};
+
+/// Squares of a board along one side.
+const MAX_SQUARES: f64 = 100.0;
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -51,6 +56,8 @@ struct TagToml {
     quaternion_wxyz: Option<[f64; 4]>,
     position_std_m: Option<[f64; 3]>,
     rotation_std_rad: Option<[f64; 3]>,
+    squares: Option<[u32; 2]>,
+    square_m: Option<f64>,
 }
 
 fn raw(file: &Path, text: &str) -> Result<MapToml, RobotError> {
@@ -96,9 +103,29 @@ pub(super) fn parse_landmarks(file: &Path, text: &str) -> Result<LandmarkFile, R
             quaternion_wxyz: tag.quaternion_wxyz,
             position_std_m: std[0],
             rotation_std_rad: std[3..].iter().copied().fold(0.0, f64::max),
+            board: board(file, tag, &key)?,
         });
     }
     Ok(LandmarkFile { frame: raw.frame, base_tag: raw.base_tag, landmarks })
+}
+
+/// `None` where the file says nothing of squares.
+fn board(file: &Path, tag: &TagToml, key: &impl Fn(&str) -> String) -> Result<Option<Chessboard>, FileIssue> {
+    let missing = |of: &str| Err(FileIssue::new(file, key(of), "is missing; a board has `squares` and `square_m`"));
+    let (squares, square_m) = match (tag.squares, tag.square_m) {
+        (None, None) => return Ok(None),
+        (Some(_), None) => return missing("square_m"),
+        (None, Some(_)) => return missing("squares"),
+        (Some(squares), Some(square_m)) => (squares, square_m),
+    };
+    if tag.id.is_some() {
+        return Err(FileIssue::new(file, key("squares"), "is for a board, which has a name and no id"));
+    }
+    for n in squares {
+        FileIssue::check_range(file, &key("squares"), f64::from(n), 3.0..=MAX_SQUARES)?;
+    }
+    FileIssue::check_range(file, &key("square_m"), square_m, SIZE_RANGE_M)?;
+    Ok(Some(Chessboard { squares, square_m }))
 }
 
 pub(super) fn parse(file: &Path, text: &str) -> Result<TagFile, RobotError> {

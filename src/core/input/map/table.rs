@@ -111,6 +111,14 @@ pub struct TimeColumn {
 /// rotation_unit = "rad"                    # optional: "rad" | "deg"
 /// id = "tag"                               # optional: column of the tag's number
 /// ```
+///
+/// With `use = "board_corners"` a row is one inner corner of the board:
+///
+/// ```toml
+/// [tags.columns]
+/// id = "corner"                            # column of the corner's number
+/// pixel = ["u", "v"]                       # columns of its place in the image, px
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct TableLayout {
     /// `None`: by the end of the file's name.
@@ -119,6 +127,24 @@ pub struct TableLayout {
     pub rows: Vec<String>,
     /// `None`: rows are a second apart.
     pub time: Option<TimeColumn>,
+    /// What was seen.
+    pub seen: SeenColumns,
+    /// Column of the tag's number, or of the board's corner.
+    pub id: Option<String>,
+}
+
+/// What the columns of a row hold of the landmark.
+#[derive(Clone, Debug, PartialEq)]
+pub enum SeenColumns {
+    /// Its position or pose.
+    Pose(PoseColumns),
+    /// Columns of u and v of one corner of a board, raw pixels.
+    Pixel([String; 2]),
+}
+
+/// Where a row's pose is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PoseColumns {
     /// Which pose the columns hold.
     pub direction: Direction,
     /// Columns of x, y, z.
@@ -127,8 +153,6 @@ pub struct TableLayout {
     pub position_unit_m: f64,
     /// `None` where positions are used and none is needed.
     pub rotation: Option<RotationColumns>,
-    /// Column of the tag's number.
-    pub id: Option<String>,
 }
 
 #[derive(Clone, Copy, Debug, Default, Deserialize)]
@@ -175,8 +199,9 @@ pub(super) struct TableToml {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct TagColumnsToml {
-    direction: Direction,
-    position: [String; 3],
+    direction: Option<Direction>,
+    position: Option<[String; 3]>,
+    pixel: Option<[String; 2]>,
     #[serde(default)]
     position_unit: LengthUnit,
     rotation: Option<Vec<String>>,
@@ -198,36 +223,65 @@ pub(super) fn layout(
     };
     let (tag_use, child_frame) = tags;
     if tag_use == TagUse::Corners {
-        return Err(issue("tags.use", "is \"corners\"; a table has \"position\" or \"pose\""));
+        return Err(issue("tags.use", "is \"corners\"; a table has \"position\", \"pose\" or \"board_corners\""));
+    }
+    let time = table.time.map(time_column);
+    let rows = table.rows.map(|rows| rows.split('.').map(str::to_owned).collect()).unwrap_or_default();
+    let of = |seen, id| Ok(TableLayout { format: table.format, rows, time, seen, id });
+    if tag_use == TagUse::BoardCorners {
+        return of(SeenColumns::Pixel(pixel(file, &columns)?), columns.id);
     }
     if columns.id.is_some() != child_frame.is_none() || matches!(child_frame, Some(ChildFrame::Numbered { .. })) {
         let problem = "a table has either child_frame, the plain name of its one landmark, or tags.columns.id";
         return Err(issue("tags.child_frame", problem));
     }
-    let rotation = rotation(file, &columns)?;
-    if rotation.is_none() && (tag_use == TagUse::Pose || columns.direction == Direction::TagFromCamera) {
-        let problem = "is missing; only positions with direction = \"camera_from_tag\" can do without";
-        return Err(issue("tags.columns.rotation", problem));
+    let pose = pose(file, &columns, tag_use)?;
+    of(SeenColumns::Pose(pose), columns.id)
+}
+
+fn time_column(time: TimeToml) -> TimeColumn {
+    let unit_nanos = match time.unit {
+        TimeUnit::S => 1e9,
+        TimeUnit::Ms => 1e6,
+        TimeUnit::Us => 1e3,
+        TimeUnit::Ns => 1.0,
+    };
+    TimeColumn { column: time.column, unit_nanos }
+}
+
+fn pixel(file: &Path, columns: &TagColumnsToml) -> Result<[String; 2], FileIssue> {
+    let issue = |key: &str, problem: &str| Err(FileIssue::new(file, format!("tags.columns.{key}"), problem));
+    let of_poses = [
+        ("direction", columns.direction.is_some()),
+        ("position", columns.position.is_some()),
+        ("rotation", columns.rotation.is_some()),
+    ];
+    if let Some((key, _)) = of_poses.into_iter().find(|(_, is_given)| *is_given) {
+        return issue(key, "is for poses; \"board_corners\" has id and pixel alone");
     }
-    let time = table.time.map(|time| {
-        let unit_nanos = match time.unit {
-            TimeUnit::S => 1e9,
-            TimeUnit::Ms => 1e6,
-            TimeUnit::Us => 1e3,
-            TimeUnit::Ns => 1.0,
-        };
-        TimeColumn { column: time.column, unit_nanos }
-    });
-    Ok(TableLayout {
-        format: table.format,
-        rows: table.rows.map(|rows| rows.split('.').map(str::to_owned).collect()).unwrap_or_default(),
-        time,
-        direction: columns.direction,
-        position: columns.position,
-        position_unit_m: if matches!(columns.position_unit, LengthUnit::Mm) { 1e-3 } else { 1.0 },
-        rotation,
-        id: columns.id,
-    })
+    match (&columns.pixel, &columns.id) {
+        (Some(pixel), Some(_)) => Ok(pixel.clone()),
+        (None, _) => issue("pixel", "is missing; name the columns of a corner's u and v, px"),
+        (_, None) => issue("id", "is missing; name the column of the corner's number on the board"),
+    }
+}
+
+fn pose(file: &Path, columns: &TagColumnsToml, tag_use: TagUse) -> Result<PoseColumns, FileIssue> {
+    let issue = |key: &str, problem: &str| FileIssue::new(file, format!("tags.columns.{key}"), problem);
+    if columns.pixel.is_some() {
+        return Err(issue("pixel", "is for corners of a board; set use = \"board_corners\""));
+    }
+    let (Some(direction), Some(position)) = (columns.direction, columns.position.clone()) else {
+        let key = if columns.direction.is_none() { "direction" } else { "position" };
+        return Err(issue(key, "is missing; which pose the columns hold, and the columns of x, y, z"));
+    };
+    let rotation = rotation(file, columns)?;
+    if rotation.is_none() && (tag_use == TagUse::Pose || direction == Direction::TagFromCamera) {
+        let problem = "is missing; only positions with direction = \"camera_from_tag\" can do without";
+        return Err(issue("rotation", problem));
+    }
+    let position_unit_m = if matches!(columns.position_unit, LengthUnit::Mm) { 1e-3 } else { 1.0 };
+    Ok(PoseColumns { direction, position, position_unit_m, rotation })
 }
 
 fn rotation(file: &Path, raw: &TagColumnsToml) -> Result<Option<RotationColumns>, FileIssue> {
@@ -250,7 +304,7 @@ fn rotation(file: &Path, raw: &TagColumnsToml) -> Result<Option<RotationColumns>
 
 #[cfg(test)]
 mod tests {
-    use crate::input::map::{Source, parse_input_map};
+    use crate::input::map::{SeenColumns, Source, parse_input_map};
     use std::path::Path;
 
     const GOOD: &str = "version = 1\n[table]\n[joint_sensors]\n[tags]\nchild_frame = \"board\"\nuse = \"pose\"\n\
@@ -261,7 +315,8 @@ mod tests {
     fn what_is_wrong_with_a_table_is_named_with_file_and_key() {
         let parse = |text: &str| parse_input_map(Path::new("map.toml"), text).map_err(|error| error.to_string());
         let Source::Table(layout) = parse(GOOD).expect("good").source else { panic!("a table") };
-        assert_eq!((layout.rotation.expect("angles").unit_rad, layout.position_unit_m), (1_f64.to_radians(), 1.0));
+        let SeenColumns::Pose(pose) = layout.seen else { panic!("poses") };
+        assert_eq!((pose.rotation.expect("angles").unit_rad, pose.position_unit_m), (1_f64.to_radians(), 1.0));
         let faults: [(&str, &str, &[&str]); 11] = [
             ("[table]\n", "[table]\nformat = \"xls\"\n", &["xls", "csv", "yaml"]),
             ("[table]\n", "[table]\ntime = { column = \"t\", unit = \"h\" }\n", &["`h`", "ns"]),
@@ -284,5 +339,27 @@ mod tests {
         }
         let quaternion = GOOD.replace("\"c\"]", "\"c\", \"d\"]").replace("fixed_xyz", "quaternion_xyzw");
         assert!(parse(&quaternion).expect_err("a unit").contains("rotation_unit"));
+    }
+    #[test]
+    fn a_row_may_be_a_corner_of_a_board() {
+        const BOARD: &str = "version = 1\n[table]\n[joint_sensors]\n[tags]\nchild_frame = \"board\"\n\
+            use = \"board_corners\"\n[tags.columns]\nid = \"corner\"\npixel = [\"u\", \"v\"]\n";
+        let parse = |text: &str| parse_input_map(Path::new("map.toml"), text).map_err(|error| error.to_string());
+        let Source::Table(layout) = parse(BOARD).expect("good").source else { panic!("a table") };
+        assert_eq!(layout.seen, SeenColumns::Pixel(["u".to_owned(), "v".to_owned()]));
+        let faults: [(&str, &str, &[&str]); 5] = [
+            ("id = \"corner\"\n", "", &["tags.columns.id", "missing"]),
+            ("pixel = [\"u\", \"v\"]\n", "", &["tags.columns.pixel", "missing"]),
+            ("id = \"corner\"", "id = \"corner\"\nposition = [\"x\", \"y\", \"z\"]", &["tags.columns.position"]),
+            ("\"board\"", "\"tag:{id}\"", &["tags.child_frame", "plain name"]),
+            ("board_corners", "pose", &["tags.child_frame", "tags.columns.id"]),
+        ];
+        for (from, to, words) in faults {
+            assert!(BOARD.contains(from), "{from}");
+            let problem = parse(&BOARD.replacen(from, to, 1)).expect_err(to);
+            for word in words.iter().chain(&["map.toml"]) {
+                assert!(problem.contains(word), "{to}: no `{word}` in {problem}");
+            }
+        }
     }
 }

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::rows::Rows;
 use crate::input::error::InputError;
-use crate::input::map::{InputMap, TableLayout};
+use crate::input::map::{InputMap, SeenColumns, TableLayout};
 use crate::robot::Robot;
 
 /// Names of columns that an error lists.
@@ -13,8 +13,8 @@ const MAX_LISTED: usize = 30;
 /// Where in `names` the columns of each quantity are; the joints of the robot come first.
 pub(super) struct Columns {
     pub names: Vec<String>,
-    /// Three, of x, y, z.
-    pub position: Range<usize>,
+    /// Three, of x, y, z, or two, of a pixel.
+    pub place: Range<usize>,
     /// As many as the form has; none without a rotation.
     pub rotation: Range<usize>,
     pub time: Option<usize>,
@@ -29,16 +29,19 @@ impl Columns {
             names.extend_from_slice(columns);
             start..names.len()
         };
-        let position = add(&layout.position);
-        let rotation = add(layout.rotation.as_ref().map_or(&[], |rotation| &rotation.columns));
+        let (of_place, of_rotation): (&[String], &[String]) = match &layout.seen {
+            SeenColumns::Pose(pose) => (&pose.position, pose.rotation.as_ref().map_or(&[], |turn| &turn.columns)),
+            SeenColumns::Pixel(pixel) => (pixel, &[]),
+        };
+        let (place, rotation) = (add(of_place), add(of_rotation));
         let time = layout.time.as_ref().map(|time| add(std::slice::from_ref(&time.column)).start);
         let id = layout.id.as_ref().map(|id| add(std::slice::from_ref(id)).start);
-        Self { names, position, rotation, time, id }
+        Self { names, place, rotation, time, id }
     }
 
     /// Checks that the table has all columns but those of joints that may be absent.
     pub fn check_present(&self, file: &str, found: &Rows, n_needed: usize) -> Result<(), InputError> {
-        let n_joints = self.position.start;
+        let n_joints = self.place.start;
         let missing =
             |(k, name): &(usize, &String)| !(n_needed..n_joints).contains(k) && !found.columns.contains(*name);
         let missing: Vec<&String> = self.names.iter().enumerate().filter(missing).map(|(_, name)| name).collect();

@@ -3,12 +3,12 @@
 use nalgebra::{Isometry3, Matrix3, Quaternion, Translation3, UnitQuaternion, Vector3};
 
 use crate::input::map::QUATERNION_LENGTH_TOLERANCE;
-use crate::input::map::{Direction, RotationForm, TableLayout};
+use crate::input::map::{Direction, PoseColumns, RotationForm};
 
 /// `camera_from_tag` of a row; the rotation is the identity where the table has none. The error is the end of a
 /// sentence about the row.
 pub(super) fn camera_from_tag(
-    layout: &TableLayout,
+    layout: &PoseColumns,
     position: impl Iterator<Item = f64>,
     rotation: &[f64],
 ) -> Result<Isometry3<f64>, String> {

@@ -14,7 +14,7 @@ use armcal_core::robot::{FileIssue, Robot, Vehicle};
 use armcal_core::routine::Scene;
 use armcal_core::streams::{DetectionReject, ImageDemand, TagDetection};
 use armcal_core::time::Stamp;
-use armcal_detect::{DetectorSettings, GreyImage, TagDetector};
+use armcal_detect::{DetectError, DetectorSettings, GreyImage, TagDetector, grey_of_jpeg};
 
 /// Parts of a world that make a rendered camera.
 #[derive(Clone, Copy)]
@@ -35,7 +35,6 @@ pub(super) struct RenderedCamera {
     number: u64,
     last_taken: Option<Stamp>,
     last_logged: Option<Stamp>,
-    grey: Vec<u8>,
     solids: Vec<[Isometry3<f64>; 3]>,
 }
 
@@ -95,7 +94,6 @@ impl RenderedCamera {
             number: 0,
             last_taken: None,
             last_logged: None,
-            grey: Vec::new(),
             solids: Vec::new(),
         })
     }
@@ -130,9 +128,12 @@ impl RenderedCamera {
         });
         self.number += 1;
         self.last_taken = Some(now);
-        frame.grey(&mut self.grey);
-        let image = GreyImage { width: frame.width, height: frame.height, data: &self.grey };
-        let detections = self.detector.detect(image).map_err(|error| SimError::Detector(error.to_string()))?;
+        // The camera hands out JPEG. The detector sees what the recording will hold, whether or not this one goes in.
+        let jpeg = jpeg_bytes(frame, self.spec.jpeg_quality)?;
+        let unusable = |error: DetectError| SimError::Detector(error.to_string());
+        let seen = grey_of_jpeg(&jpeg).map_err(unusable)?;
+        let image = GreyImage { width: seen.width, height: seen.height, data: &seen.data };
+        let detections = self.detector.detect(image).map_err(unusable)?;
         let is_logged = self.last_logged.is_none_or(|last| now.since_s(last) >= self.spec.log_period_s - 1e-6);
         if is_logged {
             self.last_logged = Some(now);
@@ -140,7 +141,7 @@ impl RenderedCamera {
         Ok(DetectedImage {
             tags: detections.tags.into_iter().map(|tag| tag.detection).collect(),
             rejects: detections.rejects,
-            jpeg: is_logged.then(|| jpeg_bytes(frame, self.spec.jpeg_quality)).transpose()?,
+            jpeg: is_logged.then_some(jpeg),
         })
     }
 }

@@ -3,10 +3,21 @@
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
 use crate::calib::views::association::check_square;
+use crate::calib::views::external::board::{BoardBefore, mean_board};
 use crate::calib::views::frame_consensus::agreeing_mean;
 use crate::calib::views::view::{ObservationRejection, TagMeasurement};
 use armcal_core::input::RawMeasurement;
+use armcal_core::optics::Chessboard;
 use armcal_core::robot::Robot;
+
+/// The one landmark that the input map names.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PlainLandmark {
+    /// Its number.
+    pub id: Option<u32>,
+    /// Where it is a board with corners of its own.
+    pub board: Option<Chessboard>,
+}
 
 /// What a view tells of a landmark.
 pub(crate) struct Averaged {
@@ -18,6 +29,27 @@ pub(crate) struct Averaged {
 const USUAL_DISTANCES: f64 = 6.0;
 /// Closer than this is never left out, m: what positions from tags are good for at best. Assumed.
 const NEVER_APART_M: f64 = 2e-3;
+
+/// The mean of a board's corners over the frames, and how many of them were left out.
+pub(crate) fn average_board(
+    seen: &[RawMeasurement],
+    robot: &Robot,
+    board: Chessboard,
+) -> (Result<Averaged, ObservationRejection>, usize) {
+    let corner = |seen: &RawMeasurement| match seen {
+        RawMeasurement::BoardCorner { number, pixel } => Some((*number, *pixel)),
+        _ => None,
+    };
+    let corners: Vec<(u32, [f64; 2])> = seen.iter().filter_map(corner).collect();
+    let camera = &robot.camera;
+    let before = BoardBefore { board, lens: &camera.lens, corner_std_px: camera.corner_std_px };
+    let (found, n_apart) = mean_board(&corners, &before);
+    let averaged = found.map(|found| Averaged {
+        center_in_camera_m: found.camera_from_board.translation.vector,
+        measured: TagMeasurement::Board(found),
+    });
+    (averaged, n_apart)
+}
 
 /// The mean of the frames that agree, and how many do not; nothing where fewer than half of them do.
 pub(crate) fn average(
@@ -52,7 +84,7 @@ fn position(seen: &RawMeasurement) -> Option<Vector3<f64>> {
     match seen {
         RawMeasurement::Position(position) => Some(*position),
         RawMeasurement::Pose(pose) => Some(pose.translation.vector),
-        RawMeasurement::Corners(_) => None,
+        RawMeasurement::Corners(_) | RawMeasurement::BoardCorner { .. } => None,
     }
 }
 

@@ -3,6 +3,7 @@
 
 use std::collections::BTreeMap;
 
+use crate::calib::views::external::landmarks::PlainLandmark;
 use crate::calib::views::external::views::RecordingViews;
 use crate::calib::views::view::{CaptureData, ObservationRejection, View};
 use crate::calib::{CalibError, CalibrationData, HeldOut};
@@ -18,7 +19,7 @@ pub struct ExternalContext {
     /// Names of landmarks that are no numbered tags.
     pub landmark_names: BTreeMap<u32, String>,
     /// The landmark of a plain `child_frame`.
-    pub plain_landmark: Option<u32>,
+    pub plain: PlainLandmark,
 }
 
 /// Makes views of recordings of one arm; `robot` has the landmarks that were around it.
@@ -37,11 +38,13 @@ pub fn prepare_external(
     let mut digests: Vec<[u8; 32]> = Vec::new();
     for recording in recordings {
         for seen in recording.frames.iter().flat_map(|frame| &frame.tags) {
-            if let RawMeasurement::Corners(corners_px) = &seen.seen {
-                data.note_corners(corners_px);
+            match &seen.seen {
+                RawMeasurement::Corners(corners_px) => data.note_corners(corners_px),
+                RawMeasurement::BoardCorner { pixel, .. } => data.note_corners(&[*pixel; 4]),
+                RawMeasurement::Position(_) | RawMeasurement::Pose(_) => {}
             }
         }
-        let made = RecordingViews::of(recording, map, robot, context.plain_landmark);
+        let made = RecordingViews::of(recording, map, robot, context.plain);
         if made.views.iter().any(|(_, first)| views.iter().any(|(_, other)| other == first)) {
             return Err(CalibError::Twice { recording: recording.path.display().to_string() });
         }

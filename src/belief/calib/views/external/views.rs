@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::Vector3;
 
 use crate::calib::views::conditions::ConditionHistory;
-use crate::calib::views::external::landmarks::{Averaged, average};
+use crate::calib::views::external::landmarks::{Averaged, PlainLandmark, average, average_board};
 use crate::calib::views::external::pairing::{RATE_WINDOW_S, TravelSample, TravelSeries};
 use crate::calib::views::view::{ObservationRejection, TagObservation, View};
 use armcal_core::input::{AttitudeReading, ExternalRecording, InputMap, RawMeasurement, TagFrame, WhileMoving};
@@ -43,7 +43,7 @@ struct PairedFrame<'a> {
 
 struct Maker<'a> {
     robot: &'a Robot,
-    plain_landmark: Option<u32>,
+    plain: PlainLandmark,
     travels: TravelSeries<'a>,
     recording: &'a ExternalRecording,
     conditions: ConditionHistory,
@@ -53,11 +53,11 @@ struct Maker<'a> {
 }
 
 impl RecordingViews {
-    pub fn of(recording: &ExternalRecording, map: &InputMap, robot: &Robot, plain_landmark: Option<u32>) -> Self {
+    pub fn of(recording: &ExternalRecording, map: &InputMap, robot: &Robot, plain: PlainLandmark) -> Self {
         let moving = &robot.sensors[..robot.n_seen_joints()];
         let mut maker = Maker {
             robot,
-            plain_landmark,
+            plain,
             travels: TravelSeries::new(recording, robot, map.max_gap_s),
             recording,
             conditions: ConditionHistory::of_external(&recording.conditions),
@@ -193,7 +193,7 @@ impl Maker<'_> {
     fn add_tags(&mut self, view: &mut View, frames: &[PairedFrame<'_>]) {
         let mut by_id: BTreeMap<u32, Vec<RawMeasurement>> = BTreeMap::new();
         for observation in frames.iter().flat_map(|frame| &frame.frame.tags) {
-            if let Some(id) = observation.id.or(self.plain_landmark) {
+            if let Some(id) = observation.id.or(self.plain.id) {
                 by_id.entry(id).or_default().push(observation.seen);
             }
         }
@@ -203,7 +203,13 @@ impl Maker<'_> {
                 self.reject(ObservationRejection::UnknownTag, seen.len());
                 continue;
             };
-            let (averaged, n_apart) = average(&seen, self.robot, tag_idx);
+            let (averaged, n_apart) = match self.plain.board.filter(|_| self.plain.id == Some(id)) {
+                Some(board) => {
+                    let (averaged, n_apart) = average_board(&seen, self.robot, board);
+                    (averaged.map(Some), n_apart)
+                }
+                None => average(&seen, self.robot, tag_idx),
+            };
             if n_apart > 0 {
                 self.reject(ObservationRejection::InconsistentFrame, n_apart);
             }

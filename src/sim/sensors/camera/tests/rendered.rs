@@ -1,6 +1,7 @@
 //! The rendered camera against the geometric one.
 
 use crate::sensors::camera::tests::*;
+use armcal_detect::{DetectorSettings, GreyImage, TagDetector, grey_of_jpeg};
 
 impl Site {
     /// Images of a rendered camera, one a second.
@@ -79,4 +80,32 @@ fn faults_show_in_the_pixels() {
     assert!(ids[3].is_empty(), "{ids:?}");
     let jpeg = images[0].jpeg.as_ref().expect("the first image is kept");
     assert!(jpeg.starts_with(&[0xff, 0xd8]) && (10_000..400_000).contains(&jpeg.len()), "{}", jpeg.len());
+}
+
+/// The recording's own pixels give the same corners, to the last bit, and so do images that it leaves out.
+#[test]
+fn the_detector_sees_what_the_recording_holds() {
+    let images_kept_every = |period_s: f64| {
+        let site = site(|spec| {
+            clear_deep_water(spec);
+            spec.image.log_period_s = period_s;
+        });
+        let lens = site.robot.camera.lens;
+        (lens, site.rendered(0.0, 2, |_, _| {}))
+    };
+    let (lens, all) = images_kept_every(0.0);
+    let mut detector = TagDetector::new(&lens, DetectorSettings::default()).expect("a detector");
+    for image in &all {
+        let seen = grey_of_jpeg(image.jpeg.as_ref().expect("kept")).expect("a picture");
+        let seen = GreyImage { width: seen.width, height: seen.height, data: &seen.data };
+        let found = detector.detect(seen).expect("searched").tags;
+        let tags: Vec<_> = found.into_iter().map(|tag| tag.detection).collect();
+        assert!(tags.len() >= 3);
+        assert_eq!(tags, image.detections.tags);
+    }
+    let (_, few) = images_kept_every(10.0);
+    assert_eq!(few.iter().filter(|image| image.jpeg.is_some()).count(), 1);
+    for (kept, left_out) in all.iter().zip(&few) {
+        assert_eq!(kept.detections.tags, left_out.detections.tags);
+    }
 }
