@@ -31,10 +31,13 @@ const CSV_MAP: &str = "version = 1\n[table]\n[joint_sensors]\n[tags]\nchild_fram
 const MCAP_MAP: &str = "version = 1\n[joint_sensors]\ntopic = \"/joint_states\"\n[tags]\ntopic = \"/corners\"\n\
     child_frame = \"board\"\nuse = \"board_corners\"\n";
 
+/// Numbers of corners and where they were seen, px.
+type SeenCorners = Vec<(u32, [f64; 2])>;
+
 /// An arm's words and the corners that its camera saw, pose by pose.
 struct BoardTitan<'a> {
     arm: TrueArm<'a>,
-    poses: Vec<(Vec<f64>, Vec<(u32, [f64; 2])>)>,
+    poses: Vec<(Vec<f64>, SeenCorners)>,
 }
 
 /// As the map has it: upright before the arm, its printed side (against z) towards the base.
