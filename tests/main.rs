@@ -8,8 +8,8 @@
 //! `planning` reads plans and holds random arms against them; `determinism`, `closed_loop`, `script` and `cli` run
 //! the program, `kill` ends it badly; `sim` looks at the simulated world from outside; `uncalibrated` calibrates arms
 //! of which little is known; `real` reads recordings of real arms, `board_corners` those of a chessboard,
-//! `bags` the same as SQLite files, `recorded_inputs` their slow sensors and images, `streams` those that were recorded all the time;
-//! `tagmap` maps tags in recordings that the test writes; `touch` feels surveyed plates with the tool; `any_arm`
+//! `bags` the same as SQLite files, `recorded_inputs` their slow sensors and images, `streams` those that were
+//! recorded all the time; `tagmap` maps tags in recordings that the test writes; `touch` feels surveyed plates with the tool; `any_arm`
 //! makes robot folders for drawings of all sorts; `report` reads report.html; `work` works on a dive, `watch` follows
 //! recordings that grow; `live` moves arms behind ROS 2 topics; `repository` reads sources and pages.
 

@@ -135,9 +135,9 @@ impl Hindsight {
     }
 
     /// Beliefs in which something happened before the first view of the first of `suspicions`, and all views since were
-    /// taken in: the worn spots, and what they may be taken for; none where the first is not worth it. Their evidence is
-    /// over that nothing happened, but for the last `n_of_race` views, of which it is their own. `filter` has the noise
-    /// of now.
+    /// taken in: the worn spots, and what they may be taken for; none where the first is not worth it. Their evidence
+    /// is over that nothing happened, but for the last `n_of_race` views, of which it is their own. `filter` has the
+    /// noise of now.
     pub(crate) fn branches(
         &self,
         robot: &Robot,
