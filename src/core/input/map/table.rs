@@ -340,6 +340,7 @@ mod tests {
         let quaternion = GOOD.replace("\"c\"]", "\"c\", \"d\"]").replace("fixed_xyz", "quaternion_xyzw");
         assert!(parse(&quaternion).expect_err("a unit").contains("rotation_unit"));
     }
+
     #[test]
     fn a_row_may_be_a_corner_of_a_board() {
         const BOARD: &str = "version = 1\n[table]\n[joint_sensors]\n[tags]\nchild_frame = \"board\"\n\
