@@ -1,6 +1,6 @@
 //! What happened, by the evidence of the views: a view that the belief does not explain starts a race of explanations,
-//! each a belief of its own, until one of them leads, or two to five more views were seen: up to twenty where two joints
-//! may be the one whose sensor is worn.
+//! each a belief of its own, until one of them leads, or two to five more views were seen: up to twenty where two
+//! joints may be the one whose sensor is worn.
 
 use crate::calib::online::branch::{Branch, Step};
 use crate::calib::online::filter::{Filter, ViewUpdate, WalkScore};
