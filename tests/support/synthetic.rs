@@ -21,12 +21,14 @@ use rand_distr::{Distribution, StandardNormal};
 /// The first joints, those that the wrist camera sees.
 pub const N_SEEN: usize = 5;
 
-/// An arm as it really is. `theta = center + gain travel + offset`, travel by the datasheet.
+/// An arm as it really is. `theta = center + gain travel + offset + curve(travel)`, travel by the datasheet.
 #[derive(Clone, Debug)]
 pub struct TrueArm<'a> {
     pub robot: &'a Robot,
     pub gain: Vec<f64>,
     pub offset_rad: Vec<f64>,
+    /// What is left beyond gain and offset; zero for straight sensors.
+    pub curve: Vec<Curve>,
     pub camera: Attachment,
     pub base_from_tag: Vec<Isometry3<f64>>,
     /// The tag on the gripper, on the last link.
@@ -49,13 +51,51 @@ fn normal3(rng: &mut ChaCha8Rng) -> Vector3<f64> {
     Vector3::from_fn(|_, _| normal(rng))
 }
 
+/// A smooth curve over a joint's range, rad: waves whose sum is a Gaussian process with a squared exponential
+/// covariance of length 0.16 half ranges (Solin and Sarkka 2020, eqs. 6 and 8), as docs/theory/bundle.md has it.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Curve([f64; 12]);
+
+impl Curve {
+    const DOMAIN: f64 = 1.25;
+    const LENGTH: f64 = 0.16;
+
+    fn draw(std_rad: f64, rng: &mut ChaCha8Rng) -> Self {
+        let turn = std::f64::consts::PI / (2.0 * Self::DOMAIN);
+        Self(std::array::from_fn(|k| {
+            let w = turn * (k + 1) as f64;
+            let spectral = std::f64::consts::TAU.sqrt() * Self::LENGTH * (-0.5 * (Self::LENGTH * w).powi(2)).exp();
+            std_rad * spectral.sqrt() * normal(rng)
+        }))
+    }
+
+    /// At `x` half ranges from the middle; constant beyond the range.
+    fn at(&self, x: f64) -> f64 {
+        let turn = std::f64::consts::PI * (x.clamp(-1.0, 1.0) + Self::DOMAIN) / (2.0 * Self::DOMAIN);
+        let wave = |(k, by): (usize, &f64)| by * (turn * (k + 1) as f64).sin() / Self::DOMAIN.sqrt();
+        self.0.iter().enumerate().map(wave).sum()
+    }
+}
+
 impl<'a> TrueArm<'a> {
+    /// Gains, offsets and curves drawn from what robot.toml says of the sensors.
+    pub fn as_its_datasheet(robot: &'a Robot, rng: &mut ChaCha8Rng) -> Self {
+        let mut arm = Self::with_sensor_errors(robot, rng);
+        for (j, spec) in robot.sensors.iter().enumerate() {
+            arm.gain[j] = 1.0 + spec.gain_std * normal(rng);
+            arm.offset_rad[j] = spec.offset_std_rad * normal(rng);
+            arm.curve[j] = Curve::draw(spec.linearity_std_rad, rng);
+        }
+        arm
+    }
+
     /// Gains within 5 %, offsets within 5 deg, all else as drawn.
     pub fn with_sensor_errors(robot: &'a Robot, rng: &mut ChaCha8Rng) -> Self {
         Self {
             robot,
             gain: (0..robot.n_joints()).map(|_| 1.0 + rng.random_range(-0.05..0.05)).collect(),
             offset_rad: (0..robot.n_joints()).map(|_| rng.random_range(-0.0873..0.0873)).collect(),
+            curve: vec![Curve::default(); robot.n_joints()],
             camera: robot.camera.mount,
             base_from_tag: robot.tags.iter().map(|tag| *tag.base_from_tag.isometry()).collect(),
             link_from_gripper_tag: robot.gripper_tag.map(|tag| tag.mount.link_from_frame),
@@ -96,7 +136,12 @@ impl<'a> TrueArm<'a> {
     pub fn counts(&self, angles: &JointAngles) -> JointCounts {
         JointCounts::from_fn(angles.len(), |j| {
             let spec = &self.robot.sensors[j];
-            let travel_rad = (angles[j] - spec.center_rad - self.offset_rad[j]) / self.gain[j];
+            let straight_rad = angles[j] - spec.center_rad - self.offset_rad[j];
+            let mut travel_rad = straight_rad / self.gain[j];
+            // The curve is a hundred times less steep than the line: each round gains two digits.
+            for _ in 0..if self.curve[j].0 == [0.0; 12] { 0 } else { 10 } {
+                travel_rad = (straight_rad - self.curve[j].at(travel_rad / spec.half_range_rad)) / self.gain[j];
+            }
             (spec.offset_counts + spec.counts_per_rad * (spec.center_rad + travel_rad)).rem_euclid(spec.wrap_counts)
         })
     }

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use armcal_core::log::ros::{AprilTagDetectionArray, JointState, TfMessage};
+use armcal_core::log::ros::{AprilTagDetection, AprilTagDetectionArray, JointState, TfMessage};
 use armcal_core::log::{RawMessage, decode};
 
 /// Messages of a topic that are decoded.
@@ -51,8 +51,10 @@ pub(super) struct Topic {
     pub largest: f64,
     /// Parent and child of each transform.
     pub frames: BTreeSet<(String, String)>,
-    /// Numbers of detected tags.
+    /// Numbers of detected tags, or of a board's corners.
     pub ids: BTreeSet<i32>,
+    /// Detections that have an outline, as tags do.
+    pub outlines: u64,
 }
 
 /// The topics of a recording, by name.
@@ -70,7 +72,7 @@ impl Contents {
             let is_cdr = raw.channel.message_encoding == "cdr";
             let kind = if is_cdr { Kind::of(raw.schema_name()) } else { Kind::Other };
             let (joints, frames, ids) = Default::default();
-            let topic = Topic { kind, messages: 0, joints, largest: 0.0, frames, ids };
+            let topic = Topic { kind, messages: 0, joints, largest: 0.0, frames, ids, outlines: 0 };
             self.topics.insert(raw.topic().to_owned(), topic);
         }
         let Some(topic) = self.topics.get_mut(raw.topic()) else { return };
@@ -85,7 +87,17 @@ impl Contents {
     }
 }
 
+/// A corner of a board is a detection without one: nothing but its centre is a place in the image.
+fn has_outline(tag: &AprilTagDetection) -> bool {
+    tag.corners.iter().any(|corner| *corner != tag.corners[0])
+}
+
 impl Topic {
+    /// Whether all that was detected there are places without an outline: corners of a board.
+    pub fn has_board_corners(&self) -> bool {
+        !self.ids.is_empty() && self.outlines == 0
+    }
+
     fn look_into(&mut self, data: &[u8]) {
         match self.kind {
             Kind::Joints => {
@@ -108,6 +120,7 @@ impl Topic {
                 if let Ok(message) = decode::<AprilTagDetectionArray>(data) {
                     let room = MAX_NAMES.saturating_sub(self.ids.len());
                     self.ids.extend(message.detections.iter().take(room).map(|tag| tag.id));
+                    self.outlines += message.detections.iter().filter(|tag| has_outline(tag)).count() as u64;
                 }
             }
             _ => {}

@@ -32,6 +32,16 @@ pub(super) fn choose_tags(contents: &Contents) -> Option<String> {
 fn of_detections(contents: &Contents) -> Option<String> {
     let (name, topic) = contents.of_kind(Kind::Detections).max_by_key(|(_, topic)| topic.messages)?;
     let ids: Vec<String> = topic.ids.iter().map(i32::to_string).collect();
+    if topic.has_board_corners() {
+        return Some(format!(
+            "topic = {}   # {} messages; detections without an outline: the corners of a board\nuse = \
+             \"board_corners\"\nchild_frame = \"board\"   # as the tag map calls it, with its squares and \
+             square_m\n{}",
+            quoted(name),
+            topic.messages,
+            others("numbers of the corners there", ids.iter())
+        ));
+    }
     let ids = others("ids of the tags there", ids.iter());
     Some(format!("topic = {}   # {} messages with corners\nuse = \"corners\"\n{ids}", quoted(name), topic.messages))
 }
@@ -77,7 +87,7 @@ fn of_images(contents: &Contents) -> Option<String> {
     let info = contents.of_kind(Kind::CameraInfo).map(|(topic, _)| topic).max_by_key(|topic| shared(topic));
     Some(format!(
         "topic = {}   # {} images; armcal looks for tags in them\nuse = \"corners\"\n\
-         # family = \"36h11\"   # or \"25h9\", \"16h5\", where robot.toml has no [[tag]]s\n\
+         # family = \"36h11\"   # or \"25h9\", \"Standard41h12\" .., where robot.toml has no [[tag]]s\n\
          # image_period_s = 0.2   # looks at one image in so many seconds\n{}",
         quoted(name),
         topic.messages,

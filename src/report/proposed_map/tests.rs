@@ -2,8 +2,8 @@ use std::path::{Path, PathBuf};
 
 use armcal_core::input::{Source, TagUse, parse_input_map};
 use armcal_core::log::ros::{
-    AprilTagDetection, AprilTagDetectionArray, CameraInfo, CompressedImage, FluidPressure, JointState, Temperature,
-    TfMessage, TransformStamped,
+    AprilTagDetection, AprilTagDetectionArray, CameraInfo, CompressedImage, FluidPressure, JointState, PixelPoint,
+    Temperature, TfMessage, TransformStamped,
 };
 use armcal_core::log::{RecordingHeader, RecordingWriter, RosMessage};
 use armcal_core::robot::{Robot, load};
@@ -107,6 +107,29 @@ fn detections_come_before_images_and_images_bring_their_lens() {
     let text = given.proposed(None).1.expect("a map");
     assert_eq!(topics(&text).1.tags, "/tags");
     assert!(text.contains("ids of the tags there: 5") && text.contains("/image"), "{text}");
+}
+
+/// Detections without an outline; one tag among them makes all of them tags.
+#[test]
+fn corners_of_a_board_are_told_from_tags() {
+    let proposed = |outline: [f64; 4]| {
+        let mut given = Given::new();
+        given.joints("/words", &["a".to_owned()], 30_000.0);
+        let detection = |id: i32| {
+            let centre = PixelPoint { x: 100.0 + f64::from(id), y: 50.0 };
+            AprilTagDetection { id, centre, ..AprilTagDetection::default() }
+        };
+        let mut detections: Vec<AprilTagDetection> = (0..5).map(detection).collect();
+        detections[3].corners = outline.map(|x| PixelPoint { x, y: 7.0 });
+        given.add("/corners", &AprilTagDetectionArray { detections, ..AprilTagDetectionArray::default() });
+        given.proposed(None).1.expect("a map")
+    };
+    let text = proposed([0.0; 4]);
+    let (map, of_board) = topics(&text);
+    assert_eq!((of_board.tags.as_str(), map.tag_use), ("/corners", TagUse::BoardCorners));
+    assert_eq!(map.child_frame.expect("a frame").text(), "board");
+    assert!(text.contains("numbers of the corners there: 0, 1, 2, 3, 4"), "{text}");
+    assert_eq!(topics(&proposed([1.0, 2.0, 3.0, 2.0])).0.tag_use, TagUse::Corners);
 }
 
 #[test]

@@ -250,7 +250,8 @@ impl CaptureData {
         Some(TaskRests { task: self.task.as_ref()?, rests: &self.rests })
     }
 
-    pub(crate) fn note_corners(&mut self, corners_px: &[[f64; 2]; 4]) {
+    /// Widens `largest_px`; each corner once.
+    pub(crate) fn note_corners(&mut self, corners_px: &[[f64; 2]]) {
         for corner in corners_px {
             self.largest_px = std::array::from_fn(|axis| self.largest_px[axis].max(corner[axis]));
         }

@@ -40,7 +40,7 @@ pub fn prepare_external(
         for seen in recording.frames.iter().flat_map(|frame| &frame.tags) {
             match &seen.seen {
                 RawMeasurement::Corners(corners_px) => data.note_corners(corners_px),
-                RawMeasurement::BoardCorner { pixel, .. } => data.note_corners(&[*pixel; 4]),
+                RawMeasurement::BoardCorner { pixel, .. } => data.note_corners(&[*pixel]),
                 RawMeasurement::Position(_) | RawMeasurement::Pose(_) => {}
             }
         }
