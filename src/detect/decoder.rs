@@ -85,15 +85,27 @@ pub(crate) fn library_family(family: TagFamily) -> Family {
         TagFamily::Tag16h5 => Family::tag_16h5(),
         TagFamily::Tag25h9 => Family::tag_25h9(),
         TagFamily::Tag36h11 => Family::tag_36h11(),
+        TagFamily::Circle21h7 => Family::tag_circle_21h7(),
+        TagFamily::Circle49h12 => Family::tag_circle_49h12(),
+        TagFamily::Custom48h12 => Family::tag_custom_48h12(),
+        TagFamily::Standard41h12 => Family::tag_standard_41h12(),
+        TagFamily::Standard52h13 => Family::tag_standard_52h13(),
     }
 }
 
 /// How many wrong bits may be corrected. A random quadrilateral passes for a tag with the chance of
-/// `4 * tags * codes within reach / 2^bits`: 0.2 % for 16h5 (25 % with two bits), 0.1 % for 25h9, 0.002 % for 36h11.
+/// `4 * tags * codes within reach / 2^bits`: 0.2 % for 16h5 (25 % with two bits), 0.1 % for 25h9, 0.002 % for 36h11,
+/// 0.2 % for Circle21h7, below 1e-6 for the others. The library's table has an entry of 16 bytes, three times over, for
+/// each code within reach: of the large families some 150 MB with one bit, and gigabytes with two.
 pub(crate) fn corrected_bits(family: TagFamily) -> usize {
     match family {
         TagFamily::Tag16h5 => 0,
         TagFamily::Tag25h9 | TagFamily::Tag36h11 => 2,
+        TagFamily::Circle21h7
+        | TagFamily::Circle49h12
+        | TagFamily::Custom48h12
+        | TagFamily::Standard41h12
+        | TagFamily::Standard52h13 => 1,
     }
 }
 

@@ -99,8 +99,9 @@ impl Refiner {
     fn refine(&mut self, image: &GreyImage, candidate: &Candidate) -> Refined {
         let start_px = candidate.corners_px;
         gate_candidate(&self.settings, &self.lens, candidate).map_err(|reason| (reason, start_px))?;
-        let cells = self.settings.family.cells(candidate.id).ok_or((RejectReason::UnknownId, start_px))?;
-        let cells = Cells::new(&cells);
+        let family = self.settings.family;
+        let cells = family.cells(candidate.id).ok_or((RejectReason::UnknownId, start_px))?;
+        let cells = Cells::new(family, &cells);
         let fit = self.fitter.fit(image, &self.table, &cells, &start_px).ok_or((RejectReason::PoorEdges, start_px))?;
         gate_fit(&self.settings, &self.lens, &start_px, &fit).map_err(|reason| (reason, start_px))?;
         let detection =

@@ -1,4 +1,4 @@
-//! Detection of AprilTags (families 16h5, 25h9, 36h11) in fisheye images.
+//! Detection of AprilTags (those families of the C library that its crate has) in fisheye images.
 //!
 //! `decoder` finds and decodes quadrilaterals with the AprilTag project's C library, which assumes straight sides.
 //! `fit` fits each tag again with the lens model, because a fisheye bends the sides. The fit gives corners and a

@@ -1,19 +1,41 @@
 //! Reflectance of a blurred tag: its cells convolved with a Gaussian, with derivatives.
 //!
-//! Position (u, v) in cells from the bottom left corner of the black square as printed, u right, v up, 0 .. n; beyond
-//! is white. The separable part is a product of normal integrals. The blur's cross term enters to first order:
+//! Position (u, v) in cells from the bottom left corner of the border square as printed, u right, v up, 0 .. n. Beyond
+//! what is printed its outermost cells go on, and what is not printed in between is white. The separable part is a product of normal integrals. The blur's cross term enters to first order:
 //! convolution with a Gaussian obeys the heat equation, dP/dC_uv = d2P/(du dv).
 
 use crate::normal::{NormalTable, REACH};
 
-use armcal_core::optics::{MAX_BOARD_CELLS as MAX_CELLS, TagCells};
+use armcal_core::optics::{MAX_PRINT_CELLS as MAX_CELLS, TagCells, TagFamily};
 
-/// A tag's cells with a white rim: `[row from the bottom + 1][column + 1]`, 1 = white.
+/// A tag's cells: `[row from the bottom + margin][column + margin]`, 1 = white.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Cells {
-    /// Cells along a side, without the rim.
-    n: usize,
+    /// Cells along a side of the border square, and those printed beyond it on each side.
+    extent: Extent,
     rows: [[f64; MAX_CELLS]; MAX_CELLS],
+    /// Where nothing is printed, in the same order; `None` where everything is.
+    blank: Option<[[bool; MAX_CELLS]; MAX_CELLS]>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Extent {
+    n: usize,
+    margin: usize,
+}
+
+impl Extent {
+    /// Cells of the whole print along a side.
+    #[inline]
+    fn n_printed(self) -> usize {
+        self.n + 2 * self.margin
+    }
+
+    /// Index of the printed cell at a position, the outermost beyond the print.
+    #[inline]
+    fn index(self, position: f64) -> usize {
+        (position.floor() + self.margin as f64).clamp(0.0, (self.n_printed() - 1) as f64) as usize
+    }
 }
 
 /// Reflectance (0 black, 1 white) and its derivatives by u and v, cells.
@@ -29,7 +51,7 @@ pub(super) struct Blurred {
 
 /// Weights of the cells along one axis at a position, with derivatives.
 struct Axis {
-    /// Index of the first cell, rim included.
+    /// Index of the first cell of the print.
     first: usize,
     n: usize,
     weights: [[f64; 3]; MAX_CELLS],
@@ -37,23 +59,24 @@ struct Axis {
 
 impl Axis {
     #[inline]
-    fn at(table: &NormalTable, n_cells: usize, position: f64, std: f64) -> Self {
-        let n_cells = n_cells as f64;
-        let first_edge = (position - REACH * std).ceil().clamp(0.0, n_cells + 1.0) as usize;
-        let last_edge = (position + REACH * std).floor().clamp(-1.0, n_cells);
+    fn at(table: &NormalTable, extent: Extent, position: f64, std: f64) -> Self {
+        // Edges between printed cells.
+        let (low, high) = (1.0 - extent.margin as f64, (extent.n + extent.margin) as f64 - 1.0);
+        let first_edge = (position - REACH * std).ceil().clamp(low, high + 1.0);
+        let last_edge = (position + REACH * std).floor().clamp(low - 1.0, high);
         let mut axis = Self { first: 0, n: 1, weights: [[0.0; 3]; MAX_CELLS] };
-        let n_edges = (last_edge + 1.0) as usize - first_edge.min((last_edge + 1.0) as usize);
+        let n_edges = (last_edge - first_edge + 1.0).max(0.0) as usize;
         if n_edges == 0 {
-            axis.first = (position.floor() + 1.0).clamp(0.0, n_cells + 1.0) as usize;
+            axis.first = extent.index(position);
             axis.weights[0] = [1.0, 0.0, 0.0];
             return axis;
         }
-        axis.first = first_edge;
+        axis.first = (first_edge - low) as usize;
         axis.n = n_edges + 1;
         let mut before = [0.0; 3];
         let inverse = 1.0 / std;
         for k in 0..n_edges {
-            let z = ((first_edge + k) as f64 - position) * inverse;
+            let z = (first_edge + k as f64 - position) * inverse;
             let [integral, density] = table.at(z);
             let here = [integral, -density * inverse, -z * density * inverse * inverse];
             axis.weights[k] = [here[0] - before[0], here[1] - before[1], here[2] - before[2]];
@@ -65,28 +88,37 @@ impl Axis {
 }
 
 impl Cells {
-    pub(super) fn new(printed: &TagCells) -> Self {
-        let n = printed.n();
+    /// The cells of a tag of `family`.
+    pub(super) fn new(family: TagFamily, printed: &TagCells) -> Self {
+        let extent = Extent { n: family.n_cells(), margin: family.n_margin_cells() };
         let mut rows = [[1.0; MAX_CELLS]; MAX_CELLS];
-        for (line, row) in rows[1..].iter_mut().zip(printed.rows().rev()) {
-            for (cell, is_white) in line[1..].iter_mut().zip(row) {
-                *cell = f64::from(u8::from(*is_white));
+        let mut blank = [[false; MAX_CELLS]; MAX_CELLS];
+        for (k, row) in printed.rows().rev().enumerate() {
+            for (column, cell) in row.iter().enumerate() {
+                rows[k][column] = f64::from(u8::from(cell.unwrap_or(true)));
+                blank[k][column] = cell.is_none();
             }
         }
-        Self { n, rows }
+        Self { extent, rows, blank: blank.as_flattened().contains(&true).then_some(blank) }
     }
 
-    /// Half of the tag's side in cells: s = +-1 at u = 0 and n.
+    /// Half of the border square's side in cells: s = +-1 at u = 0 and n.
     #[inline]
     pub(super) fn half(&self) -> f64 {
-        0.5 * self.n as f64
+        0.5 * self.extent.n as f64
+    }
+
+    /// Cells printed beyond the border square, on each side.
+    #[inline]
+    pub(super) fn margin(&self) -> f64 {
+        self.extent.margin as f64
     }
 
     /// Blurred reflectance at a position. `covariance`: of the blur, uu, uv, vv, cells squared.
     #[inline]
     pub(super) fn blurred(&self, table: &NormalTable, position: [f64; 2], covariance: [f64; 3]) -> Blurred {
-        let along_u = Axis::at(table, self.n, position[0], covariance[0].sqrt());
-        let along_v = Axis::at(table, self.n, position[1], covariance[2].sqrt());
+        let along_u = Axis::at(table, self.extent, position[0], covariance[0].sqrt());
+        let along_v = Axis::at(table, self.extent, position[1], covariance[2].sqrt());
         let mut out = Blurred::default();
         for j in 0..along_v.n {
             let line = &self.rows[along_v.first + j];
@@ -111,10 +143,22 @@ impl Cells {
 
     /// Whether all cells within a rectangle about a position have one colour.
     pub(super) fn is_flat(&self, position: [f64; 2], reach: [f64; 2]) -> bool {
-        let index = |x: f64| (x.floor() + 1.0).clamp(0.0, (self.n + 1) as f64) as usize;
-        let [columns, rows] = std::array::from_fn(|k| index(position[k] - reach[k])..=index(position[k] + reach[k]));
+        let [columns, rows] = self.within(position, reach);
         let first = self.rows[*rows.start()][*columns.start()];
         rows.clone().all(|row| columns.clone().all(|column| self.rows[row][column] == first))
+    }
+
+    /// Whether all within a rectangle about a position is printed.
+    pub(super) fn is_printed(&self, position: [f64; 2], reach: [f64; 2]) -> bool {
+        let Some(blank) = &self.blank else { return true };
+        let [columns, mut rows] = self.within(position, reach);
+        rows.all(|row| columns.clone().all(|column| !blank[row][column]))
+    }
+
+    /// Columns and rows of the cells within a rectangle about a position.
+    fn within(&self, position: [f64; 2], reach: [f64; 2]) -> [std::ops::RangeInclusive<usize>; 2] {
+        let index = |x: f64| self.extent.index(x);
+        std::array::from_fn(|k| index(position[k] - reach[k])..=index(position[k] + reach[k]))
     }
 }
 
@@ -130,7 +174,7 @@ mod tests {
             let is_inner = (1..n - 1).contains(&row) && (1..n - 1).contains(&column);
             rows[n - row][column + 1] = f64::from(u8::from(is_inner && (row * 7 + column * 5) % 3 == 0));
         }
-        Cells { n, rows }
+        Cells { extent: Extent { n, margin: 1 }, rows, blank: None }
     }
 
     #[test]

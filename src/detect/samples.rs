@@ -1,4 +1,4 @@
-//! Pixels of a fit: those of the tag and its white rim near an edge of the pattern, and a few in flat areas.
+//! Pixels of a fit: those of the print near an edge of the pattern, and a few in flat areas.
 
 use nalgebra::{Matrix2, Vector2};
 
@@ -38,7 +38,9 @@ impl TagRegion<'_> {
     /// Fills `samples` with at most `limit` pixels in pseudo-random order, so that every prefix is spread over the tag.
     pub(super) fn sample(&self, limit: usize, samples: &mut Vec<Sample>) {
         samples.clear();
-        let Some([columns, rows]) = window(self.image, self.corners_px) else { return };
+        // Of a square's side; it is more where the camera looks at a slant.
+        let margin_share = 0.8 * self.cells.margin() / self.cells.half();
+        let Some([columns, rows]) = window(self.image, self.corners_px, margin_share) else { return };
         for y in rows {
             let line = &self.image.data[y * self.image.width..][..self.image.width];
             for x in columns.clone() {
@@ -56,20 +58,21 @@ impl TagRegion<'_> {
         let plane = self.view.plane(pixel)?;
         let point = self.homography.map(&plane);
         // A scale of 0 or less is beyond the horizon of the tag's plane.
-        if point.scale <= 0.0 || point.s.abs().max(point.t.abs()) > 1.25 {
+        let (half, margin) = (self.cells.half(), self.cells.margin());
+        if point.scale <= 0.0 || point.s.abs().max(point.t.abs()) > (half + margin) / half {
             return None;
         }
         let (_, jacobian) = self.view.plane_with_jacobian(pixel)?;
-        let half = self.cells.half();
         let cells_by_pixel = self.homography.jacobian(&point) * jacobian * half;
         let cells_per_px = [cells_by_pixel.row(0).norm(), cells_by_pixel.row(1).norm()];
         let at = [(point.s + 1.0) * half, (point.t + 1.0) * half];
         let is_within = |k: usize| {
-            // The rim is one cell wide; the blur must not carry in light from beyond it.
-            let rim = (1.0 - 2.5 * TYPICAL_BLUR_PX * cells_per_px[k]).clamp(0.3, 0.8);
+            // The blur must not carry in light from beyond the print's outermost cells.
+            let rim = margin - 1.0 + (1.0 - 2.5 * TYPICAL_BLUR_PX * cells_per_px[k]).clamp(0.3, 0.8);
             (-rim..=2.0 * half + rim).contains(&at[k])
         };
-        if !(is_within(0) && is_within(1)) {
+        let from_blank = cells_per_px.map(|c| (2.5 * TYPICAL_BLUR_PX * c).clamp(0.2, 0.7));
+        if !(is_within(0) && is_within(1) && self.cells.is_printed(at, from_blank)) {
             return None;
         }
         let order = hash_pixel(x as u32, y as u32);
@@ -79,14 +82,14 @@ impl TagRegion<'_> {
     }
 }
 
-/// Columns and rows that hold the tag with its rim.
-fn window(image: &GreyImage, corners_px: &[[f64; 2]; 4]) -> Option<[std::ops::Range<usize>; 2]> {
+/// Columns and rows that hold the print, which is `margin_share` of the border square larger on each side.
+fn window(image: &GreyImage, corners_px: &[[f64; 2]; 4], margin_share: f64) -> Option<[std::ops::Range<usize>; 2]> {
     let sizes = [image.width, image.height];
     let mut ranges = [0..0, 0..0];
     for (k, range) in ranges.iter_mut().enumerate() {
         let low = corners_px.iter().map(|c| c[k]).fold(f64::INFINITY, f64::min);
         let high = corners_px.iter().map(|c| c[k]).fold(f64::NEG_INFINITY, f64::max);
-        let rim = 3.0 + 0.2 * (high - low);
+        let rim = 3.0 + margin_share * (high - low);
         let (low, high) = ((low - rim).floor().max(0.0), (high + rim).ceil().min(sizes[k] as f64 - 1.0));
         if low.is_nan() || high.is_nan() || low >= high {
             return None;

@@ -13,7 +13,7 @@ pub struct DetectorSettings {
     pub decimation: f32,
     /// Image decimation of a second pass on the contrast-normalized image; 0 for no second pass. It finds tags in haze.
     pub second_decimation: f32,
-    /// Largest Hamming distance that is corrected, 0 .. 2; of 16h5 0 alone.
+    /// Largest Hamming distance that is corrected: at most 2 of 25h9 and 36h11, 0 of 16h5, 1 of the other families.
     pub max_wrong_bits: usize,
     /// Smallest contrast (white minus black) over the standard deviation of the fit's residuals.
     pub min_contrast_ratio: f64,

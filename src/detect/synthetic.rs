@@ -7,7 +7,7 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector2, Vector3};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use armcal_core::optics::{CameraModel, TagFamily, square_corners};
+use armcal_core::optics::{CameraModel, TagCells, TagFamily, square_corners};
 
 /// A tag in the camera frame.
 #[derive(Clone, Copy, Debug)]
@@ -59,29 +59,26 @@ pub(super) struct Rendering {
 
 pub(super) const CLEAN: Rendering = Rendering { black: 30.0, white: 200.0, around: 90.0, blur_px: 0.5, noise: 0.0 };
 
-/// Reflectance at (x, y), m; `None` beside the tag and its rim.
-fn reflectance(tag: &PlacedTag, x: f64, y: f64) -> Option<bool> {
-    let n = tag.family.n_cells() as f64;
-    let cell = tag.size_m / n;
-    let (column, row) = ((x / cell + 0.5 * n).floor(), (0.5 * n - y / cell).floor());
-    if !(-1.0..=n).contains(&column) || !(-1.0..=n).contains(&row) {
+/// Reflectance at (x, y), m; `None` where nothing is printed.
+fn reflectance(tag: &PlacedTag, cells: &TagCells, x: f64, y: f64) -> Option<bool> {
+    let cell = tag.size_m / tag.family.n_cells() as f64;
+    let half = 0.5 * cells.n() as f64;
+    let (column, row) = ((x / cell + half).floor(), (half - y / cell).floor());
+    if column < 0.0 || row < 0.0 {
         return None;
     }
-    if !(0.0..n).contains(&column) || !(0.0..n).contains(&row) {
-        return Some(true);
-    }
-    tag.family.cells(tag.id).expect("an id of the family").get(row as usize, column as usize)
+    cells.get(row as usize, column as usize)
 }
 
-fn ray(lens: &CameraModel, rendering: &Rendering, tags: &[PlacedTag], pixel: Vector2<f64>) -> f64 {
+fn ray(lens: &CameraModel, rendering: &Rendering, tags: &[(PlacedTag, TagCells)], pixel: Vector2<f64>) -> f64 {
     let Some(bearing) = lens.unproject(&pixel) else { return 0.0 };
-    for tag in tags {
+    for (tag, cells) in tags {
         let inverse = tag.camera_from_tag.inverse();
         let (origin, direction) = (inverse.translation.vector, inverse.rotation * bearing.into_inner());
         let along = -origin.z / direction.z;
         if along > 0.0 {
             let at = origin + direction * along;
-            if let Some(is_white) = reflectance(tag, at.x, at.y) {
+            if let Some(is_white) = reflectance(tag, cells, at.x, at.y) {
                 return if is_white { rendering.white } else { rendering.black };
             }
         }
@@ -101,7 +98,8 @@ pub(super) fn render(lens: &CameraModel, rendering: &Rendering, tags: &[PlacedTa
         let range = |axis: usize, size: usize| {
             let low = corners.iter().map(|c| c[axis]).fold(f64::INFINITY, f64::min);
             let high = corners.iter().map(|c| c[axis]).fold(0.0, f64::max);
-            let rim = 0.3 * (high - low) + 4.0;
+            let print = 1.7 * tag.family.n_margin_cells() as f64 / tag.family.n_cells() as f64;
+            let rim = print.max(0.3) * (high - low) + 4.0;
             (low - rim).max(0.0) as usize..((high + rim) as usize + 1).min(size)
         };
         draw(lens, rendering, tags, [range(0, width), range(1, height)], &mut grey);
@@ -124,8 +122,10 @@ fn draw(
     let width = lens.resolution_px()[0] as usize;
     let (nx, ny) = (columns.len() * N, rows.len() * N);
     let at = |start: usize, k: usize| start as f64 - 0.5 + (k as f64 + 0.5) / N as f64;
+    let printed = |tag: &PlacedTag| (*tag, tag.family.cells(tag.id).expect("an id of the family"));
+    let tags: Vec<(PlacedTag, TagCells)> = tags.iter().map(printed).collect();
     let fine: Vec<f64> = (0..nx * ny)
-        .map(|i| ray(lens, rendering, tags, Vector2::new(at(columns.start, i % nx), at(rows.start, i / nx))))
+        .map(|i| ray(lens, rendering, &tags, Vector2::new(at(columns.start, i % nx), at(rows.start, i / nx))))
         .collect();
     let across = blur(&fine, nx, 1, rendering.blur_px);
     let both = blur(&across, ny, nx, rendering.blur_px);

@@ -154,7 +154,9 @@ fn tags_of_each_family_are_found_where_they_are() {
     for family in TagFamily::ALL {
         let settings = || DetectorSettings::of_family(family);
         let mut errors_px = Vec::new();
-        for id in 0..10 {
+        // Tables of large families take seconds to make.
+        let n_images = if family.n_tags() > 1000 { 4 } else { 10 };
+        for id in 0..n_images {
             let tag = PlacedTag { family, ..ahead(3 * id, 0.03 * f64::from(id), 0.7) };
             let image = drawn(&lens, &Rendering { noise: 3.0, ..CLEAN }, &[tag]);
             let found = detect_in(&lens, settings(), &image).tags;
@@ -162,7 +164,9 @@ fn tags_of_each_family_are_found_where_they_are() {
             let truth = tag.corners_px(&lens).expect("in view");
             let pairs = found[0].detection.corners_px.into_iter().zip(truth);
             errors_px.extend(pairs.map(|(found, truth)| (found[0] - truth[0]).hypot(found[1] - truth[1])));
-            for other in TagFamily::ALL.into_iter().filter(|other| *other != family) {
+            // One image tells.
+            let others = TagFamily::ALL.into_iter().filter(|other| *other != family && id == 3);
+            for other in others {
                 assert!(
                     detect_in(&lens, DetectorSettings::of_family(other), &image).tags.is_empty(),
                     "{family} {other}"
@@ -200,7 +204,7 @@ fn wrong_bits_are_counted() {
             let cell_m = tag.size_m / 8.0;
             let (column, row) = ((at.x / cell_m + 4.0).floor(), (4.0 - at.y / cell_m).floor());
             if row == 2.0 && (1.0..=n_wrong as f64).contains(&column) {
-                *value = if cells.get(2, column as usize) == Some(true) { CLEAN.black } else { CLEAN.white } as u8;
+                *value = if cells.get(3, 1 + column as usize) == Some(true) { CLEAN.black } else { CLEAN.white } as u8;
             }
         }
         data

@@ -23,7 +23,7 @@ pub use fisheye::Fisheye;
 pub use flat_port::FlatPort;
 pub use radtan::Radtan;
 pub use square::{SquareError, SquarePose, solve_square, solve_square_both, square_corners};
-pub use tag_family::{MAX_BOARD_CELLS, MAX_TAG_CELLS, TagCells, TagFamily};
+pub use tag_family::{MAX_PRINT_CELLS, TagCells, TagFamily};
 pub use twist::image_jacobian;
 
 /// The wrist camera's lens, for tests.

@@ -1,19 +1,20 @@
-//! The printed patterns of the square AprilTag families (Olson 2011; Wang and Olson 2016).
+//! The printed patterns of the AprilTag families (Olson 2011; Wang and Olson 2016; Krogius et al. 2019).
 //!
-//! The codes come from OpenCV's dictionaries (tests/oracle/make_tag_families.py), turned upright: OpenCV holds them
-//! turned by half a turn against the AprilTag project's images. The AprilTag library reads every tag back, id and
-//! corners.
+//! Older families have their bits within a black border. Of the newer ones the border has two rings, black about white,
+//! with bits within and beyond it. The AprilTag library reads every tag back, id and corners.
+
+mod codes;
+mod layout;
 
 use std::fmt;
 use std::str::FromStr;
-use std::sync::LazyLock;
 
-/// Most cells along a side of a tag with its black border.
-pub const MAX_TAG_CELLS: usize = 8;
-/// Most cells along a side of a printed board: the tag and a white ring of one cell around it.
-pub const MAX_BOARD_CELLS: usize = MAX_TAG_CELLS + 2;
+use codes::codes;
+pub use layout::MAX_PRINT_CELLS;
+use layout::{LayoutCell, bit_places};
 
-/// A family of square tags with a black border, on whose outer edge a tag's size is measured.
+/// A family of tags. A tag's size is the side of its border square: the edge on which the border's black and white
+/// meet.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum TagFamily {
     /// 30 tags of 4 x 4 cells. Ids differ in 5 bits: what is no tag is often read as one.
@@ -23,18 +24,28 @@ pub enum TagFamily {
     /// 587 tags of 6 x 6 cells.
     #[default]
     Tag36h11,
+    /// 38 round tags; ids differ in 7 bits.
+    Circle21h7,
+    /// 65535 round tags.
+    Circle49h12,
+    /// 42211 tags whose middle is free for something else.
+    Custom48h12,
+    /// 2115 tags.
+    Standard41h12,
+    /// 48714 tags.
+    Standard52h13,
 }
 
-/// The cells of one tag as printed, its black border included; true is white.
+/// The cells of one tag as printed, all that belongs to it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TagCells {
     n: usize,
-    rows: [[bool; MAX_TAG_CELLS]; MAX_TAG_CELLS],
+    rows: [[Option<bool>; MAX_PRINT_CELLS]; MAX_PRINT_CELLS],
 }
 
 impl TagCells {
-    /// Rows from the top, each from the left.
-    pub fn rows(&self) -> impl DoubleEndedIterator<Item = &[bool]> {
+    /// Rows from the top, each from the left: white, black, or nothing printed.
+    pub fn rows(&self) -> impl DoubleEndedIterator<Item = &[Option<bool>]> {
         self.rows[..self.n].iter().map(|row| &row[..self.n])
     }
 
@@ -44,81 +55,90 @@ impl TagCells {
         self.n
     }
 
-    /// Whether a cell is white; `None` beside the tag.
+    /// Whether a cell is white; `None` beside the tag and where nothing is printed.
     #[must_use]
     pub fn get(&self, row: usize, column: usize) -> Option<bool> {
-        (row < self.n && column < self.n).then(|| self.rows[row][column])
+        self.rows.get(row)?.get(column).copied().flatten()
     }
 }
 
-/// Codes by id, row by row from the top left, the first cell the highest bit; 1 is white.
-type Codes = LazyLock<Vec<u64>>;
-
-fn codes(lines: &str) -> Vec<u64> {
-    lines.lines().filter_map(|line| u64::from_str_radix(line.trim(), 16).ok()).collect()
-}
-
-static TAG_16H5: Codes = LazyLock::new(|| codes(include_str!("tag_family/tag16h5.txt")));
-static TAG_25H9: Codes = LazyLock::new(|| codes(include_str!("tag_family/tag25h9.txt")));
-static TAG_36H11: Codes = LazyLock::new(|| codes(include_str!("tag_family/tag36h11.txt")));
-
 impl TagFamily {
     /// All that are supported.
-    pub const ALL: [Self; 3] = [Self::Tag16h5, Self::Tag25h9, Self::Tag36h11];
+    pub const ALL: [Self; 8] = [
+        Self::Tag16h5,
+        Self::Tag25h9,
+        Self::Tag36h11,
+        Self::Circle21h7,
+        Self::Circle49h12,
+        Self::Custom48h12,
+        Self::Standard41h12,
+        Self::Standard52h13,
+    ];
 
-    /// As files call it: 36h11.
+    /// As files call it: 36h11, Standard41h12.
     #[must_use]
     pub fn name(self) -> &'static str {
         &self.long_name()["tag".len()..]
     }
 
-    /// As messages and frames call it: tag36h11.
+    /// As messages and frames call it, and the AprilTag library: tag36h11, tagStandard41h12.
     #[must_use]
     pub fn long_name(self) -> &'static str {
         match self {
             Self::Tag16h5 => "tag16h5",
             Self::Tag25h9 => "tag25h9",
             Self::Tag36h11 => "tag36h11",
+            Self::Circle21h7 => "tagCircle21h7",
+            Self::Circle49h12 => "tagCircle49h12",
+            Self::Custom48h12 => "tagCustom48h12",
+            Self::Standard41h12 => "tagStandard41h12",
+            Self::Standard52h13 => "tagStandard52h13",
         }
     }
 
     /// How many tags the family has.
     #[must_use]
     pub fn n_tags(self) -> usize {
-        self.codes().len()
+        codes(self).len()
     }
 
-    /// Cells along a side of a tag with its black border.
+    /// Cells along a side of the border square.
     #[must_use]
     pub fn n_cells(self) -> usize {
         match self {
-            Self::Tag16h5 => 6,
+            Self::Circle21h7 | Self::Circle49h12 | Self::Standard41h12 => 5,
+            Self::Tag16h5 | Self::Custom48h12 | Self::Standard52h13 => 6,
             Self::Tag25h9 => 7,
             Self::Tag36h11 => 8,
+        }
+    }
+
+    /// Cells that belong to the tag beyond the border square, on each side: one white ring, or black and bits.
+    #[must_use]
+    pub fn n_margin_cells(self) -> usize {
+        match self {
+            Self::Tag16h5 | Self::Tag25h9 | Self::Tag36h11 => 1,
+            Self::Circle49h12 => 3,
+            Self::Circle21h7 | Self::Custom48h12 | Self::Standard41h12 | Self::Standard52h13 => 2,
         }
     }
 
     /// The cells of tag `id`; `None` for an id that the family does not have.
     #[must_use]
     pub fn cells(self, id: u32) -> Option<TagCells> {
-        let code = *self.codes().get(id as usize)?;
-        let n = self.n_cells();
-        let inner = n - 2;
-        let mut rows = [[false; MAX_TAG_CELLS]; MAX_TAG_CELLS];
-        for (row, line) in rows[1..=inner].iter_mut().enumerate() {
-            for (column, cell) in line[1..=inner].iter_mut().enumerate() {
-                *cell = code >> (inner * inner - 1 - (inner * row + column)) & 1 == 1;
-            }
+        let code = *codes(self).get(id as usize)?;
+        let (layout, n) = layout::cells(self);
+        let mut rows = layout.map(|row| {
+            row.map(|cell| match cell {
+                LayoutCell::Fixed(is_white) => Some(is_white),
+                LayoutCell::Bit | LayoutCell::Blank => None,
+            })
+        });
+        let places = bit_places(self);
+        for (bit, [row, column]) in places.iter().rev().enumerate() {
+            rows[*row][*column] = Some(code >> bit & 1 == 1);
         }
         Some(TagCells { n, rows })
-    }
-
-    fn codes(self) -> &'static [u64] {
-        match self {
-            Self::Tag16h5 => &TAG_16H5,
-            Self::Tag25h9 => &TAG_25H9,
-            Self::Tag36h11 => &TAG_36H11,
-        }
     }
 }
 
@@ -134,7 +154,10 @@ impl FromStr for TagFamily {
     /// With or without `tag` in front.
     fn from_str(text: &str) -> Result<Self, String> {
         let found = Self::ALL.into_iter().find(|family| text == family.name() || text == family.long_name());
-        found.ok_or_else(|| format!("`{text}` is not supported; use \"16h5\", \"25h9\" or \"36h11\""))
+        found.ok_or_else(|| {
+            let names: Vec<String> = Self::ALL.iter().map(|family| format!("\"{}\"", family.name())).collect();
+            format!("`{text}` is not supported; use one of {}", names.join(", "))
+        })
     }
 }
 
@@ -142,40 +165,75 @@ impl FromStr for TagFamily {
 mod tests {
     use super::*;
 
-    /// Codes of a family, turned in all ways, differ in as many bits as its name says.
+    fn bits(cells: &TagCells) -> u128 {
+        cells.rows().flatten().fold(0, |bits, cell| bits << 1 | u128::from(cell.unwrap_or(false)))
+    }
+
+    /// By a quarter.
+    fn turned(cells: &TagCells) -> TagCells {
+        let last = cells.n() - 1;
+        let mut out = *cells;
+        for row in 0..=last {
+            for column in 0..=last {
+                out.rows[row][column] = cells.rows[last - column][row];
+            }
+        }
+        out
+    }
+
+    /// Codes of a family, turned in all ways, differ in as many bits as its name says. Of large families every 499th is
+    /// held against all.
     #[test]
     fn any_two_tags_of_a_family_differ_in_the_bits_of_its_name() {
-        let turned = |cells: &TagCells| {
-            let last = cells.n() - 1;
-            let mut out = *cells;
-            for row in 0..=last {
-                for column in 0..=last {
-                    out.rows[row][column] = cells.rows[last - column][row];
-                }
-            }
-            out
-        };
-        let bits = |cells: &TagCells| cells.rows().flatten().fold(0_u64, |bits, cell| bits << 1 | u64::from(*cell));
-        for (family, n_tags, distance) in
-            [(TagFamily::Tag16h5, 30, 5), (TagFamily::Tag25h9, 35, 9), (TagFamily::Tag36h11, 587, 11)]
-        {
+        for (family, n_tags, distance) in [
+            (TagFamily::Tag16h5, 30, 5),
+            (TagFamily::Tag25h9, 35, 9),
+            (TagFamily::Tag36h11, 587, 11),
+            (TagFamily::Circle21h7, 38, 7),
+            (TagFamily::Circle49h12, 65535, 12),
+            (TagFamily::Custom48h12, 42211, 12),
+            (TagFamily::Standard41h12, 2115, 12),
+            (TagFamily::Standard52h13, 48714, 13),
+        ] {
             assert_eq!(family.n_tags(), n_tags);
             assert!(family.cells(n_tags as u32).is_none());
-            let all: Vec<TagCells> = (0..n_tags as u32).map(|id| family.cells(id).expect("an id")).collect();
+            let all: Vec<u128> = (0..n_tags as u32).map(|id| bits(&family.cells(id).expect("an id"))).collect();
             let mut least = u32::MAX;
-            for (a, first) in all.iter().enumerate() {
-                let mut other = *first;
+            for id in (0..n_tags).step_by(if n_tags > 1000 { 499 } else { 1 }) {
+                let mut other = family.cells(id as u32).expect("an id");
                 for turn in 0..4 {
-                    let from = a + usize::from(turn == 0);
-                    least = all[from..]
-                        .iter()
-                        .map(|second| (bits(&other) ^ bits(second)).count_ones())
-                        .fold(least, u32::min);
+                    let apart = all.iter().enumerate().filter(|(k, _)| turn > 0 || *k != id);
+                    let here = bits(&other);
+                    least = apart.map(|(_, second)| (here ^ second).count_ones()).fold(least, u32::min);
                     other = turned(&other);
                 }
             }
-            assert_eq!(least, distance, "{family}");
+            assert!(
+                least == distance || (n_tags > 1000 && least > distance && least < distance + 3),
+                "{family}: {least}"
+            );
         }
+    }
+
+    /// The border square: within its edge one colour all around, beyond it the other.
+    #[test]
+    fn the_border_is_where_black_and_white_meet() {
+        for family in TagFamily::ALL {
+            let cells = family.cells(1).expect("an id");
+            let (n, margin) = (family.n_cells(), family.n_margin_cells());
+            assert_eq!(cells.n(), n + 2 * margin, "{family}");
+            let ring = |from: usize, side: usize| {
+                let last = from + side - 1;
+                let along = (from..=last).flat_map(move |k| [[from, k], [last, k], [k, from], [k, last]]);
+                along.map(|[row, column]| cells.get(row, column)).collect::<Vec<_>>()
+            };
+            let is_classic = margin == 1;
+            assert!(ring(margin, n).iter().all(|cell| *cell == Some(!is_classic)), "{family}");
+            assert!(ring(margin - 1, n + 2).iter().all(|cell| *cell == Some(is_classic)), "{family}");
+        }
+        // A round tag has no corners, and one is free in the middle.
+        let nothing_at = |family: TagFamily, at: usize| family.cells(0).expect("an id").get(at, at).is_none();
+        assert!(nothing_at(TagFamily::Circle21h7, 0) && nothing_at(TagFamily::Custom48h12, 5));
     }
 
     #[test]
@@ -186,5 +244,6 @@ mod tests {
         }
         let problem = "36h10".parse::<TagFamily>().expect_err("no such family");
         assert!(problem.contains("`36h10`") && problem.contains("\"25h9\""), "{problem}");
+        assert!(problem.contains("\"Standard41h12\""), "{problem}");
     }
 }

@@ -341,7 +341,7 @@ const REST: &str = "
 # link_rotation_std_rad = 5e-4
 # tool_position_std_m = 5e-4
 
-# Tags of one family (36h11, 25h9 or 16h5) around the arm, in the base link's frame; z points out of the tag.
+# Tags of one family (36h11, 25h9, Standard41h12 ..) around the arm, in the base link's frame; z points out of the tag.
 # Or a tag map, --tag-map.
 # [[tag]]
 # id = 0

@@ -22,15 +22,14 @@ use armcal_core::optics::{CameraModel, TagFamily};
 use armcal_core::robot::Shape;
 use armcal_core::stats::stream_rng;
 
-/// A printed tag: its frame has x right and y up as printed, z out of the print; `size_m` is the outer side of its
-/// black border.
+/// A printed tag: its frame has x right and y up as printed, z out of the print.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TagPlane {
     /// What is printed on it.
     pub family: TagFamily,
     /// Number in the family.
     pub id: u32,
-    /// Outer side of its black border.
+    /// Side of its border square, as [`TagFamily`] has it.
     pub size_m: f64,
     /// When the shutter opens, halfway, and when it closes.
     pub base_from_tag: [Isometry3<f64>; 3],

@@ -1,7 +1,7 @@
 //! Tags: boards without thickness, one side printed.
 
 use crate::imaging::math::Rgb;
-use armcal_core::optics::{MAX_BOARD_CELLS, TagFamily};
+use armcal_core::optics::{MAX_PRINT_CELLS, TagFamily};
 
 /// Diffuse reflectance of the white and the black of a board. Assumed: matt laminate.
 pub(super) const WHITE: f32 = 0.85;
@@ -18,8 +18,8 @@ pub(super) const CLEAR_OF_BACKING_M: f32 = 0.006;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Board {
     /// Row by row from the top of the board, the left cell the highest of `n` bits; 1 is black.
-    rows: [u16; MAX_BOARD_CELLS],
-    /// Cells along a side: the tag and a white ring of one cell around it.
+    rows: [u16; MAX_PRINT_CELLS],
+    /// Cells along a side: all that belongs to the tag.
     n: usize,
     pub half_m: f32,
     cells_per_m: f32,
@@ -28,13 +28,14 @@ pub(super) struct Board {
 impl Board {
     /// An id that the family does not have is a blank board.
     pub(super) fn new(family: TagFamily, id: u32, size_m: f64) -> Self {
-        let mut rows = [0; MAX_BOARD_CELLS];
+        let mut rows = [0; MAX_PRINT_CELLS];
         if let Some(cells) = family.cells(id) {
-            for (row, cells) in rows[1..].iter_mut().zip(cells.rows()) {
-                *row = cells.iter().fold(0, |bits, is_white| bits << 1 | u16::from(!is_white)) << 1;
+            for (row, cells) in rows.iter_mut().zip(cells.rows()) {
+                // Where nothing is printed the board is white.
+                *row = cells.iter().fold(0, |bits, cell| bits << 1 | u16::from(*cell == Some(false)));
             }
         }
-        let n = family.n_cells() + 2;
+        let n = family.n_cells() + 2 * family.n_margin_cells();
         let cell_m = size_m / family.n_cells() as f64;
         Self { rows, n, half_m: (0.5 * cell_m * n as f64) as f32, cells_per_m: (1.0 / cell_m) as f32 }
     }

@@ -9,9 +9,10 @@ use crate::imaging::light::Lamp;
 use crate::imaging::math::Vec3;
 use crate::imaging::shape::{Form, Place};
 use crate::imaging::*;
-use armcal_core::optics::{fixture::lens, square_corners};
+use armcal_core::optics::{TagFamily, fixture::lens, square_corners};
 use armcal_core::robot::{Hull, Shape, parry_pose};
 use armcal_core::stats::stream_rng;
+use armcal_detect::{DetectorSettings, GreyImage, TagDetector};
 
 /// An id that the family does not have: a blank white board.
 const BLANK: u32 = 9999;
@@ -101,6 +102,31 @@ fn edges_lie_where_the_projection_puts_them() {
     let (mean, rms) = (sum / n, f64::sqrt(sum_squares / n));
     eprintln!("edges: mean {mean:.4} px, rms {rms:.4} px of {n}");
     assert!(mean.abs() < 0.01 && rms < 0.03, "mean {mean}, rms {rms}");
+}
+
+/// Each family as the imager draws it, read back by the detector: id, and corners where the projection puts them.
+#[test]
+fn tags_of_each_family_are_read_where_they_were_drawn() {
+    for family in TagFamily::ALL {
+        let mut detector = TagDetector::new(&lens(), DetectorSettings::of_family(family)).expect("a detector");
+        let mut worst_px = 0.0_f64;
+        for number in 0..3_u32 {
+            let off = 120.0 * f64::from(number);
+            let pose = ahead([center()[0] - off, center()[1] + 0.5 * off], 0.6, [0.3, 0.1 * f64::from(number), 0.4]);
+            let tag = TagPlane { family, ..TagPlane::fixed(7 * number, 0.12, pose) };
+            let frame = shot(&ImageSpec::clean(), &[], &[tag]);
+            let data: Vec<u8> = grey(&frame).into_iter().map(|value| value as u8).collect();
+            let image = GreyImage { width: frame.width, height: data.len() / frame.width, data: &data };
+            let found = detector.detect(image).expect("an image").tags;
+            assert_eq!(found.iter().map(|tag| tag.detection.id).collect::<Vec<_>>(), [7 * number], "{family}");
+            let truth = square_corners(0.12).map(|corner| lens().project(&(pose * corner).coords).expect("in view"));
+            for (corner, truth) in found[0].detection.corners_px.iter().zip(truth) {
+                worst_px = worst_px.max((Vector2::from(*corner) - truth).norm());
+            }
+        }
+        eprintln!("{family}: worst corner {worst_px:.3} px off");
+        assert!(worst_px < 0.1, "{family}: {worst_px} px");
+    }
 }
 
 /// I = J exp(-bD z) + Binf (1 - exp(-bB z)) for each channel, on white and black.
