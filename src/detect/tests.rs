@@ -152,20 +152,20 @@ fn noise_shows_nothing() {
 fn tags_of_each_family_are_found_where_they_are() {
     let lens = lens();
     for family in TagFamily::ALL {
-        let settings = || DetectorSettings::of_family(family);
+        // Tables of large families take seconds to make: one detector, few images.
+        let mut own = detector(&lens, DetectorSettings::of_family(family));
         let mut errors_px = Vec::new();
-        // Tables of large families take seconds to make.
         let n_images = if family.n_tags() > 1000 { 4 } else { 10 };
         for id in 0..n_images {
             let tag = PlacedTag { family, ..ahead(3 * id, 0.03 * f64::from(id), 0.7) };
             let image = drawn(&lens, &Rendering { noise: 3.0, ..CLEAN }, &[tag]);
-            let found = detect_in(&lens, settings(), &image).tags;
+            let found = own.detect(GreyImage { width: 1224, height: 1024, data: &image }).expect("detected").tags;
             assert_eq!(found.iter().map(|tag| tag.detection.id).collect::<Vec<_>>(), [3 * id], "{family}");
             let truth = tag.corners_px(&lens).expect("in view");
             let pairs = found[0].detection.corners_px.into_iter().zip(truth);
             errors_px.extend(pairs.map(|(found, truth)| (found[0] - truth[0]).hypot(found[1] - truth[1])));
-            // One image tells.
-            let others = TagFamily::ALL.into_iter().filter(|other| *other != family && id == 3);
+            let is_other = |other: &TagFamily| *other != family && id == 3 && other.n_tags() < 5000;
+            let others = TagFamily::ALL.into_iter().filter(is_other);
             for other in others {
                 assert!(
                     detect_in(&lens, DetectorSettings::of_family(other), &image).tags.is_empty(),
