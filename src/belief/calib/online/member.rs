@@ -370,6 +370,11 @@ impl Member {
         std::mem::take(&mut self.events)
     }
 
+    /// Of what nobody asked for yet.
+    pub(crate) fn forget_events(&mut self, is_past: impl Fn(&OnlineEvent) -> bool) {
+        self.events.retain(|event| !is_past(event));
+    }
+
     /// State and information; `None` before the first view.
     pub(crate) fn filter(&self) -> Option<&Filter> {
         self.running.as_ref().map(|running| &running.filter)
