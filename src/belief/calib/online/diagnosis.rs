@@ -149,16 +149,23 @@ impl Race {
     /// where nothing happened.
     pub(crate) fn add(&mut self, robot: &Robot, step: Step) -> [WalkScore; MAX_JOINTS] {
         self.n_later += 1;
-        if self.n_later <= OPEN_VIEWS {
-            let nothing = self.of(None).cloned();
-            self.nothing_until.extend(nothing.map(|nothing| (self.steps.len(), nothing)));
-        }
+        let nothing = self.of(None).cloned();
+        let is_told = self.best().is_some_and(Branch::tells);
         let mut walk = [WalkScore::default(); MAX_JOINTS];
         for branch in &mut self.branches {
             let update = step.take_in(robot, branch);
-            if let (None, Some(update)) = (branch.fault, update) {
-                walk = update.walk;
+            if branch.fault.is_some() {
+                continue;
             }
+            // What happens while nothing is found has a race of its own.
+            let is_new = self.n_later > OPEN_VIEWS && !is_told && update.as_ref().is_none_or(is_suspicious);
+            if is_new && self.steps.len() < MAX_VIEWS_OF_TIE {
+                self.n_later = 0;
+            }
+            walk = update.map(|update| update.walk).unwrap_or_default();
+        }
+        if self.n_later <= OPEN_VIEWS {
+            self.nothing_until.extend(nothing.map(|nothing| (self.steps.len(), nothing)));
         }
         self.steps.push(step);
         if self.n_later <= OPEN_VIEWS {

@@ -133,6 +133,9 @@ impl Member {
         self.n_views += 1;
         view.conditions = self.lagged(&view.conditions);
         self.failed.iter().for_each(|joint| view.is_free[*joint] = true);
+        if view.is_free.contains(&true) && self.corners.creeps(&view) {
+            return false;
+        }
         if self.settings.scales.is_none() {
             self.corners.learn(&view);
             self.robot.camera.corner_std_px = self.corners.std_px();
