@@ -27,7 +27,7 @@ pub fn set_by_camera(robot: &Robot, view: &mut View, at: &JointParameters) {
 
 /// All angles of a view, those of `joints` where the tags lie closest to their survey (sum of Cauchy losses): a grid
 /// over the joints' ranges, then smaller and smaller steps.
-fn seen_angles(robot: &Robot, view: &View, joints: &[usize], at: &JointParameters) -> JointAngles {
+pub(crate) fn seen_angles(robot: &Robot, view: &View, joints: &[usize], at: &JointParameters) -> JointAngles {
     let departure = view.conditions.departure_from(&at.reference);
     let mut best = JointAngles::from_fn(robot.n_joints(), |j| {
         at.correction(j).angle_rad(&robot.sensors[j], view.travel_rad[j], &departure, view.approach[j])

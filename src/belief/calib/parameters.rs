@@ -236,6 +236,14 @@ impl WornSpot {
         Bump { at_rad: self.at_rad(), width_rad: Self::WIDTH_RAD, height_rad }
     }
 
+    /// What a track that is worn otherwise is off at a travel from the middle of the range, one sigma, as a share of
+    /// the height: by the bump's slopes along its middle and its width, about a spot half as wide again.
+    #[must_use]
+    pub fn shape_error_share(self, travel_rad: f64) -> f64 {
+        let widths = (travel_rad - self.at_rad()) / (1.5 * Self::WIDTH_RAD);
+        SHAPE_STD * widths.abs() * (1.0 + widths * widths).sqrt() * (-0.5 * widths * widths).exp()
+    }
+
     /// Whether a travel from the middle of the range is on it.
     #[must_use]
     pub fn is_about(self, travel_rad: f64) -> bool {
@@ -254,6 +262,9 @@ impl WornSpot {
         (travel_rad - self.at_rad()).abs() > 3.0 * Self::WIDTH_RAD
     }
 }
+
+/// How far a spot's middle and its width are from the bump's, in widths. Assumed: tracks wear as they are used.
+const SHAPE_STD: f64 = 0.3;
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 

@@ -97,14 +97,31 @@ impl Step {
             let columns = noise.widening(filter, change);
             filter.widen(&columns);
         }
-        let update = filter.update(robot, &seen_by(*fault, &self.view));
-        let gain = match &update {
-            Some(update) => update.log_evidence,
-            None => -NOTHING_FITS_NATS * self.view.tags.len() as f64,
-        };
+        let may_read = matches!(fault, Some(Fault::Failed(joint)) if !self.view.is_free[*joint]);
+        let read = may_read.then(|| {
+            let mut filter = filter.clone();
+            let update = filter.update(robot, &self.view);
+            (self.evidence(update.as_ref()), filter, update)
+        });
+        let mut update = filter.update(robot, &seen_by(*fault, &self.view));
+        let mut gain = self.evidence(update.as_ref());
+        if let Some((of_reading, as_read, read)) = read {
+            let (most, least) = (gain.max(of_reading), gain.min(of_reading));
+            if of_reading > gain {
+                (*filter, update) = (as_read, read);
+            }
+            gain = most + (0.5 * (1.0 + (least - most).exp())).ln();
+        }
         *nats += gain;
         gains.push(gain);
         update
+    }
+}
+
+impl Step {
+    /// `ln` of the probability of the view, up to what is the same for all.
+    fn evidence(&self, update: Option<&ViewUpdate>) -> f64 {
+        update.map_or(-NOTHING_FITS_NATS * self.view.tags.len() as f64, |update| update.log_evidence)
     }
 }
 

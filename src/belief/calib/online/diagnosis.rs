@@ -59,9 +59,9 @@ pub(crate) struct Race {
     branches: Vec<Branch>,
     /// The belief before the first suspicious view.
     before: Filter,
-    /// That nothing happened until the view that it began with, the last of the first ones, and how many were before.
-    nothing_until: Branch,
-    n_until: usize,
+    /// That nothing happened until the view that it began with, the last of the first ones, and until each of those
+    /// after it for which explanations are opened: how many were before, and the belief.
+    nothing_until: Vec<(usize, Branch)>,
     steps: Vec<Step>,
     /// Views after it began.
     n_later: usize,
@@ -138,7 +138,8 @@ impl Race {
         let mut nothing_until = Branch::nothing(before.clone());
         steps[..n_until].iter().for_each(|step| _ = step.take_in(robot, &mut nothing_until));
         let branches = Vec::new();
-        let mut race = Self { branches, before: before.clone(), nothing_until, n_until, steps, n_later: 0 };
+        let nothing_until = if n_until > 0 { vec![(n_until, nothing_until)] } else { Vec::new() };
+        let mut race = Self { branches, before: before.clone(), nothing_until, steps, n_later: 0 };
         race.open(robot);
         race
     }
@@ -148,12 +149,23 @@ impl Race {
     /// where nothing happened.
     pub(crate) fn add(&mut self, robot: &Robot, step: Step) -> [WalkScore; MAX_JOINTS] {
         self.n_later += 1;
+        let nothing = self.of(None).cloned();
+        let is_told = self.best().is_some_and(Branch::tells);
         let mut walk = [WalkScore::default(); MAX_JOINTS];
         for branch in &mut self.branches {
             let update = step.take_in(robot, branch);
-            if let (None, Some(update)) = (branch.fault, update) {
-                walk = update.walk;
+            if branch.fault.is_some() {
+                continue;
             }
+            // What happens while nothing is found has a race of its own.
+            let is_new = self.n_later > OPEN_VIEWS && !is_told && update.as_ref().is_none_or(is_suspicious);
+            if is_new && self.steps.len() < MAX_VIEWS_OF_TIE {
+                self.n_later = 0;
+            }
+            walk = update.map(|update| update.walk).unwrap_or_default();
+        }
+        if self.n_later <= OPEN_VIEWS {
+            self.nothing_until.extend(nothing.map(|nothing| (self.steps.len(), nothing)));
         }
         self.steps.push(step);
         if self.n_later <= OPEN_VIEWS {
@@ -190,8 +202,16 @@ impl Race {
         let views: Vec<&View> = self.steps.iter().map(|step| &step.view).collect();
         let all = std::iter::once(None).chain(Fault::all(&self.before, &views).into_iter().map(Some));
         for fault in all {
-            if self.of(fault).is_none() {
-                self.branches.push(self.branch(robot, fault));
+            match self.branches.iter().position(|branch| branch.fault == fault) {
+                None => self.branches.push(self.branch(robot, fault)),
+                Some(at) => {
+                    let latest =
+                        self.nothing_until.last().filter(|(n, _)| fault.is_some() && n + 1 == self.steps.len());
+                    let later = latest.map(|latest| self.since(robot, fault, latest));
+                    if let Some(later) = later.filter(|later| later.nats > self.branches[at].nats) {
+                        self.branches[at] = later;
+                    }
+                }
             }
         }
         if let Some(nearer) = self.nearer_spot(robot) {
@@ -220,14 +240,19 @@ impl Race {
 
     /// An explanation that took all views in: what happened before the first, or before the one that began the race.
     fn branch(&self, robot: &Robot, fault: Option<Fault>) -> Branch {
-        let since = |nothing: &Branch, n: usize| {
-            let mut branch = fault.map_or_else(|| nothing.clone(), |fault| nothing.with(robot, fault));
-            self.steps[n..].iter().for_each(|step| _ = step.take_in(robot, &mut branch));
-            branch
-        };
-        let early = since(&Branch::nothing(self.before.clone()), 0);
-        let late = fault.filter(|_| self.n_until > 0).map(|_| since(&self.nothing_until, self.n_until));
-        late.filter(|late| late.nats > early.nats).unwrap_or(early)
+        let early = self.since(robot, fault, &(0, Branch::nothing(self.before.clone())));
+        if fault.is_none() {
+            return early;
+        }
+        let late = self.nothing_until.iter().map(|until| self.since(robot, fault, until));
+        late.fold(early, |best, late| if late.nats > best.nats { late } else { best })
+    }
+
+    /// What happened after so many views of which nothing is known to have happened before.
+    fn since(&self, robot: &Robot, fault: Option<Fault>, (n, nothing): &(usize, Branch)) -> Branch {
+        let mut branch = fault.map_or_else(|| nothing.clone(), |fault| nothing.with(robot, fault));
+        self.steps[*n..].iter().for_each(|step| _ = step.take_in(robot, &mut branch));
+        branch
     }
 
     /// The worn spot that explains most, with its middle half a width aside where that explains more: a view stands
@@ -327,7 +352,10 @@ impl Race {
             Some(Fault::Tag(tag)) => self.n_views_of(tag, fault) >= CONFIRMED_BY || self.is_lone_tag_confirmed(tag),
             Some(Fault::Tags(tags)) => tags.iter().map(|tag| self.n_views_of(tag, fault)).sum::<usize>() > CONFIRMED_BY,
             Some(Fault::Worn(joint, spot)) => self.is_spot_confirmed(joint, spot),
-            Some(Fault::Scale(_) | Fault::Failed(_)) => self.n_views_since(fault) >= OPEN_SENSOR_CONFIRMED_BY,
+            Some(Fault::Failed(_)) => {
+                self.n_views_since(fault) >= OPEN_SENSOR_CONFIRMED_BY && self.is_failure_clear(fault)
+            }
+            Some(Fault::Scale(_)) => self.n_views_since(fault) >= OPEN_SENSOR_CONFIRMED_BY,
             Some(_) => self.n_views_since(fault) >= CONFIRMED_BY,
         }
     }
@@ -335,6 +363,18 @@ impl Race {
     /// Views since that may have happened.
     fn n_views_since(&self, fault: Option<Fault>) -> usize {
         self.of(fault).map_or(0, Branch::n_views)
+    }
+
+    /// One view that speaks for it may be of a torn reading, unless it is clear.
+    fn is_failure_clear(&self, fault: Option<Fault>) -> bool {
+        let Some((failed, nothing)) = self.of(fault).zip(self.of(None)) else { return false };
+        self.n_speak(fault) >= CONFIRMED_BY || failed.nats > nothing.nats + LONE_LEAD_IN_MOTION_NATS
+    }
+
+    /// Those of them that speak for it.
+    fn n_speak(&self, fault: Option<Fault>) -> usize {
+        let both = self.of(fault).zip(self.of(None));
+        both.map_or(0, |(branch, nothing)| branch.n_speak_before + branch.n_speak_for_it(nothing))
     }
 
     /// Those of them that saw a tag.
@@ -358,8 +398,8 @@ impl Race {
         let Some((worn, nothing)) = worn.zip(self.of(None)).filter(|_| self.n_later > 0) else { return false };
         let is_moving = self.steps.iter().any(|step| is_moving(&step.view));
         let clear_nats = if is_moving { LONE_LEAD_IN_MOTION_NATS } else { LONE_LEAD_NATS };
-        let n_speak = worn.n_speak_before + worn.n_speak_for_it(nothing);
-        n_speak >= CONFIRMED_BY && worn.nats > nothing.nats + LEAD_NATS || worn.nats > nothing.nats + clear_nats
+        self.n_speak(worn.fault) >= CONFIRMED_BY && worn.nats > nothing.nats + LEAD_NATS
+            || worn.nats > nothing.nats + clear_nats
     }
 
     fn lead_nats(&self) -> f64 {

@@ -25,6 +25,8 @@ const LAGS_S: [f64; 4] = [0.0, 200.0, 600.0, 1800.0];
 const APART_K: f64 = 0.25;
 /// A lag whose views are less probable by this is given up, in nats.
 const GIVEN_UP_NATS: f64 = 12.0;
+/// What a belief decided longer ago than this is not told any more where it becomes the best one, ns.
+const TOLD_LATE_NANOS: i64 = 600_000_000_000;
 
 /// Keeps a calibration up to date, view by view. It has no clock and no thread; the same views give the same belief.
 #[derive(Clone)]
@@ -34,6 +36,10 @@ pub struct OnlineEstimator {
     members: Vec<Member>,
     /// Lags that do not yet differ from none.
     waiting: Vec<LaggedTemperature>,
+    /// Of the last minutes: a belief that becomes the best one may have decided the same, before or after.
+    told: Vec<OnlineEvent>,
+    /// That nobody asked for yet.
+    events: Vec<OnlineEvent>,
 }
 
 impl OnlineEstimator {
@@ -45,7 +51,7 @@ impl OnlineEstimator {
         let is_drifting = settings.drift == DriftModel::Tuned;
         let waiting = lags.iter().filter(|_| is_drifting).map(|lag_s| LaggedTemperature::new(*lag_s)).collect();
         let members = vec![Member::new(robot.clone(), Arc::clone(&settings), without)];
-        let mut estimator = Self { members, waiting, robot };
+        let mut estimator = Self { members, waiting, robot, told: Vec::new(), events: Vec::new() };
         // A slip is found and taken account of; all else that was declared says nothing of the angle.
         let declared: Vec<FailedJoint> = estimator.robot.failed.clone();
         declared
@@ -111,6 +117,7 @@ impl OnlineEstimator {
             place += 1;
             place == 1 || best - member.nats < GIVEN_UP_NATS
         });
+        self.collect_events(view.end);
         has_told
     }
 
@@ -148,16 +155,21 @@ impl OnlineEstimator {
         self.best().oracle(explanations)
     }
 
-    /// What happened since this was last asked for, in the order of time.
+    /// What happened since this was last asked for, in the order of time. What the best belief decided while it was not
+    /// yet the best one is told as soon as it is.
     pub fn take_events(&mut self) -> Vec<OnlineEvent> {
-        let mut told = Vec::new();
-        for (place, member) in self.members.iter_mut().enumerate() {
-            let events = member.take_events();
-            if place == 0 {
-                told = events;
-            }
-        }
-        told
+        std::mem::take(&mut self.events)
+    }
+
+    /// Of the best one; those of the others wait for them to become it.
+    fn collect_events(&mut self, now: Stamp) {
+        let is_past = |event: &OnlineEvent| now.nanos - event.decided_nanos > TOLD_LATE_NANOS;
+        self.told.retain(|event| !is_past(event));
+        self.members.iter_mut().for_each(|member| member.forget_events(is_past));
+        let mut new = self.members[0].take_events();
+        new.retain(|event| !self.told.iter().any(|told| told.covers(event)));
+        self.told.extend(new.iter().cloned());
+        self.events.extend(new);
     }
 
     /// The sensors as believed; `None` before the first view.

@@ -63,6 +63,11 @@ impl OnlineEvent {
         }
     }
 
+    /// Whether `other` is of the same thing, and began before this was decided.
+    pub(crate) fn covers(&self, other: &Self) -> bool {
+        self.finding.name == other.finding.name && other.since_nanos <= self.decided_nanos
+    }
+
     /// One line for people.
     #[must_use]
     pub fn to_line(&self) -> String {

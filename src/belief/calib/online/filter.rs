@@ -7,6 +7,7 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Isometry3, SVector};
 
+use crate::calib::angles_by_camera::seen_angles;
 use crate::calib::bundle::estimate::Estimate;
 use crate::calib::bundle::input::{BundleInput, HyperparameterMode};
 use crate::calib::bundle::linearize::NormalEquations;
@@ -296,7 +297,8 @@ impl Filter {
         let prior = self.prior(&input, info);
         let mut problem = BundleProblem::with_layout(&input, self.layout.clone(), prior);
         self.set_rates(&mut problem, robot, view);
-        let Some(solved) = solve_view(&mut problem, &before) else {
+        self.set_shape_errors(&mut problem, view);
+        let Some(solved) = self.solve(&mut problem, view, &before) else {
             self.info = problem.prior.joint_info;
             return None;
         };
@@ -326,6 +328,39 @@ impl Filter {
             let slope = parameters.correction(joint).slope(spec, view.travel_rad[joint], &change);
             problem.views[0].rate_rad_s[joint] *= slope;
         }
+    }
+
+    /// About a worn spot a sensor is off by more than its noise: a bump of one width is not how a track wears.
+    fn set_shape_errors(&self, problem: &mut BundleProblem<'_>, view: &View) {
+        for (parameter, height_rad) in self.layout.parameters.iter().zip(self.state.joint.iter()) {
+            if let ParameterKind::Bump(spot) = parameter.kind {
+                let share = spot.shape_error_share(view.travel_rad[parameter.joint]);
+                problem.views[0].reading_var[parameter.joint] += (share * height_rad).powi(2);
+            }
+        }
+    }
+
+    /// From `start`; where something does not fit and a joint may stand anywhere, from where the tags show it, too.
+    fn solve(&self, problem: &mut BundleProblem<'_>, view: &View, start: &State) -> Option<SolvedView> {
+        let solved = solve_view(problem, start);
+        let is_clean = solved.is_some() && problem.observations.iter().all(|observation| observation.is_used);
+        let robot = problem.robot;
+        let joints: Vec<usize> = (0..robot.n_seen_joints()).filter(|&joint| view.is_free[joint]).collect();
+        if is_clean || joints.is_empty() || view.tags.is_empty() {
+            return solved;
+        }
+        let mut by_camera = start.clone();
+        let seen = seen_angles(robot, view, &joints, &self.parameters());
+        let read = problem.angles(0, start);
+        joints.iter().for_each(|&joint| by_camera.joint_error[0][joint] += seen[joint] - read[joint]);
+        let used: Vec<[bool; 4]> = problem.observations.iter().map(ObservationTerm::used).collect();
+        let cost = solved.as_ref().map_or(f64::INFINITY, |solved| cost_of(problem, solved));
+        problem.observations.iter_mut().for_each(|observation| observation.set_used([true; 4]));
+        let other = solve_view(problem, &by_camera).filter(|other| cost_of(problem, other) < cost);
+        if other.is_none() {
+            problem.observations.iter_mut().zip(used).for_each(|(observation, used)| observation.set_used(used));
+        }
+        other.or(solved)
     }
 
     fn input<'a>(&self, robot: &'a Robot, views: &'a [View]) -> BundleInput<'a> {
@@ -363,6 +398,11 @@ impl Filter {
 
 fn log_det(factor: &Cholesky<f64, Dyn>) -> f64 {
     2.0 * factor.l_dirty().diagonal().map(f64::ln).sum()
+}
+
+/// Of what is used, and of what was rejected.
+fn cost_of(problem: &BundleProblem<'_>, solved: &SolvedView) -> f64 {
+    solved.normal.cost + problem.observations.iter().map(|observation| rejected(observation).chi2).sum::<f64>()
 }
 
 /// By least squares; robustly first where something does not fit. `None` where nothing of the view is used.

@@ -70,6 +70,8 @@ impl Hindsight {
         }
         if self.spans.len() == 2 {
             self.spans.remove(0);
+            // What was looked into was looked into for views that are gone.
+            self.looked_into = [0.0; MAX_JOINTS];
         }
         self.spans.push(Span { before: filter.clone(), steps: Vec::with_capacity(VIEWS_OF_SPAN) });
     }

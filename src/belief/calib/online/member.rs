@@ -133,6 +133,9 @@ impl Member {
         self.n_views += 1;
         view.conditions = self.lagged(&view.conditions);
         self.failed.iter().for_each(|joint| view.is_free[*joint] = true);
+        if view.is_free.contains(&true) && self.corners.creeps(&view) {
+            return false;
+        }
         if self.settings.scales.is_none() {
             self.corners.learn(&view);
             self.robot.camera.corner_std_px = self.corners.std_px();
@@ -368,6 +371,11 @@ impl Member {
     /// What happened since this was last asked for, in the order of time.
     pub(crate) fn take_events(&mut self) -> Vec<OnlineEvent> {
         std::mem::take(&mut self.events)
+    }
+
+    /// Of what nobody asked for yet.
+    pub(crate) fn forget_events(&mut self, is_past: impl Fn(&OnlineEvent) -> bool) {
+        self.events.retain(|event| !is_past(event));
     }
 
     /// State and information; `None` before the first view.

@@ -6,7 +6,7 @@
 //! what a sensor's model leaves is the same again at the same posture and must not count twice. Memory is bounded: a
 //! window of messages, whatever the length of the stream.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 
 use crate::calib::views::association::view_of_span;
 use crate::calib::views::conditions::{BACK_S, NEAR_S, apart_rad};
@@ -14,7 +14,7 @@ use crate::calib::views::view::View;
 use armcal_core::joints::{JointAngles, JointCounts, MAX_JOINTS};
 use armcal_core::robot::Robot;
 use armcal_core::sensor::ArmSensors;
-use armcal_core::streams::{JointSensorSample, Mark, MarkKind, Message};
+use armcal_core::streams::{JointSensorSample, Mark, MarkKind, Message, TagDetections};
 use armcal_core::time::Stamp;
 
 /// A joint that leaves this, and so many sigma of its noise, moves, rad.
@@ -26,6 +26,8 @@ const SETTLE_S: f64 = 0.5;
 const SHORTEST_REST_S: f64 = 0.5;
 /// A rest becomes a view after this at the latest, s.
 const LONGEST_REST_S: f64 = 20.0;
+/// Where the tags are this far apart in the first image and the last of a rest it is none, rad.
+const MOVES_RAD: f64 = 0.02;
 /// A mark may come this much later than the span it marks, s.
 const MARK_DELAY_S: f64 = 2.0;
 /// Readings this far about an image make a view of a moving arm, s.
@@ -192,12 +194,34 @@ impl ViewStream {
     }
 
     fn view(&mut self, pose_idx: u32, span: (Stamp, Stamp)) -> Option<View> {
+        if self.images_move(span) {
+            return None;
+        }
         self.window.make_contiguous();
         let view = view_of_span(self.window.as_slices().0, &self.robot, pose_idx, span)?;
         self.used_until = span.1;
         self.n_views += 1;
         // An arm settles from both sides: which way its sensors' shafts are turned is known in motion alone.
         Some(View { approach: [0.0; MAX_JOINTS], ..view })
+    }
+
+    /// Whether the images tell of a motion that no sensor does: one may have failed. By most of the tags, for an id may
+    /// be misread.
+    fn images_move(&self, (start, end): (Stamp, Stamp)) -> bool {
+        let mut seen: BTreeMap<u32, [[[f64; 2]; 4]; 2]> = BTreeMap::new();
+        for (_, message) in &self.window {
+            let Message::Detections(TagDetections { stamp, tags, .. }) = message else { continue };
+            for tag in tags.iter().filter(|_| (start..=end).contains(stamp)) {
+                seen.entry(tag.id).or_insert([tag.corners_px; 2])[1] = tag.corners_px;
+            }
+        }
+        let [fx, fy] = self.robot.camera.lens.focal_px();
+        let far_px = MOVES_RAD * fx.max(fy);
+        let moves = |[first, last]: &&[[[f64; 2]; 4]; 2]| {
+            first.iter().zip(last).any(|(a, b)| (b[0] - a[0]).hypot(b[1] - a[1]) > far_px)
+        };
+        let n_twice = seen.values().filter(|[first, last]| first != last).count();
+        2 * seen.values().filter(moves).count() > n_twice
     }
 
     /// The view of one image of a moving arm.

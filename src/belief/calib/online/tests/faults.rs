@@ -17,7 +17,7 @@ use armcal_core::spatial::exp;
 
 /// What happens at the view of that number after the first ones.
 #[derive(Clone, Copy, Debug)]
-enum Happens {
+pub(super) enum Happens {
     Nothing,
     Slip { joint: usize, by_rad: f64 },
     Dead { joint: usize },
@@ -36,7 +36,7 @@ fn hour(robot: &Robot, seed: u64, what: Happens) -> Vec<OnlineEvent> {
 }
 
 /// The estimator then, and the dive.
-fn after_an_hour<'a>(robot: &'a Robot, seed: u64, what: Happens) -> (OnlineEstimator, Dive<'a>) {
+pub(super) fn after_an_hour<'a>(robot: &'a Robot, seed: u64, what: Happens) -> (OnlineEstimator, Dive<'a>) {
     let mut dive = Dive::new(robot, seed);
     let mut online = OnlineEstimator::new(robot.clone(), OnlineSettings::default());
     for k in 0..FIRST {

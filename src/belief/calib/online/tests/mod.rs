@@ -1,6 +1,8 @@
 //! The online estimator against the batch and against known truths, on views drawn from the estimator's own model.
 
 mod drifting;
+mod failing;
 mod faults;
 mod moving;
 mod stationary;
+mod view_stream;
