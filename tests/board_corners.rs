@@ -280,8 +280,8 @@ fn errors_are_as_large_as_predicted(robot: &Robot, name: &str) {
 fn errors_by_a_boards_corners_are_as_large_as_predicted() {
     let robot = titan();
     errors_are_as_large_as_predicted(&robot, "sensors as their datasheets");
-    // Better sensors, and a datasheet that knows. Under one that does not, sigmas are too wide, as they must be: no view
-    // tells a straight sensor from a curve where no view was.
+    // Better sensors, and a datasheet that knows. Under one that does not, sigmas are too wide, as they must be: no
+    // view tells a straight sensor from a curve where no view was.
     let mut better = robot;
     for spec in &mut better.sensors {
         spec.linearity_std_rad *= 0.3;

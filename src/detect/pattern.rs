@@ -1,8 +1,9 @@
 //! Reflectance of a blurred tag: its cells convolved with a Gaussian, with derivatives.
 //!
 //! Position (u, v) in cells from the bottom left corner of the border square as printed, u right, v up, 0 .. n. Beyond
-//! what is printed its outermost cells go on, and what is not printed in between is white. The separable part is a product of normal integrals. The blur's cross term enters to first order:
-//! convolution with a Gaussian obeys the heat equation, dP/dC_uv = d2P/(du dv).
+//! what is printed its outermost cells go on, and what is not printed in between is white. The separable part is a
+//! product of normal integrals. The blur's cross term enters to first order: convolution with a Gaussian obeys the heat
+//! equation, dP/dC_uv = d2P/(du dv).
 
 use crate::normal::{NormalTable, REACH};
 

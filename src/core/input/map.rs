@@ -15,7 +15,7 @@
 //! camera_frame = "fisheye"
 //! child_frame = "tag36h11:{id}"      # or a plain name, for one landmark
 //! use = "position"                   # "position" | "pose" | "corners" | "board_corners"
-//! family = "36h11"                   # optional, images alone: or "25h9", "Standard41h12" ..; absent: that of the robot's tags
+//! family = "36h11"                   # optional, images alone: "Standard41h12" ..; absent: that of the robot's tags
 //! image_period_s = 0.2               # optional, images alone: time between two that are looked at; absent: all
 //! camera_info = "/camera_info"       # optional, images alone: sensor_msgs/msg/CameraInfo, for robots without a lens
 //! [conditions]                       # optional

@@ -116,9 +116,7 @@ impl Step {
         gains.push(gain);
         update
     }
-}
 
-impl Step {
     /// `ln` of the probability of the view, up to what is the same for all.
     fn evidence(&self, update: Option<&ViewUpdate>) -> f64 {
         update.map_or(-NOTHING_FITS_NATS * self.view.tags.len() as f64, |update| update.log_evidence)

@@ -59,8 +59,8 @@ pub(crate) struct Race {
     branches: Vec<Branch>,
     /// The belief before the first suspicious view.
     before: Filter,
-    /// That nothing happened until the view that it began with, the last of the first ones, and until each of those
-    /// after it for which explanations are opened: how many were before, and the belief.
+    /// How many views were before the one that it began with, the last of the first ones, and before each of those
+    /// after it for which explanations are opened, and the belief that nothing had happened until then.
     nothing_until: Vec<(usize, Branch)>,
     steps: Vec<Step>,
     /// Views after it began.
@@ -238,7 +238,8 @@ impl Race {
         self.branches.iter().find(|branch| branch.fault == fault)
     }
 
-    /// An explanation that took all views in: what happened before the first, or before the one that began the race.
+    /// An explanation that took all views in: what happened before the first, before the one that began the race, or
+    /// before one of those after it that opened explanations.
     fn branch(&self, robot: &Robot, fault: Option<Fault>) -> Branch {
         let early = self.since(robot, fault, &(0, Branch::nothing(self.before.clone())));
         if fault.is_none() {
