@@ -71,12 +71,19 @@ fn images_that_scatter_are_not_looked_at_where_a_sensor_failed() {
     let mut creeping = still.clone();
     for tag in &mut creeping.tags {
         let TagMeasurement::Corners(mean) = &mut tag.measured else { continue };
-        (mean.n_frames, mean.scatter_px2) = (5, 32.0 * (3.0 * robot.camera.corner_std_px).powi(2));
+        // This dive's corners are twice as noisy as robot.toml says.
+        (mean.n_frames, mean.scatter_px2) = (5, 32.0 * (6.0 * robot.camera.corner_std_px).powi(2));
     }
     let mut failed = online.clone();
     failed.leave_out(1);
-    assert!(failed.add_view(&still) && !failed.add_view(&creeping));
-    assert!(online.add_view(&creeping), "sensors average over the same time");
+    let before = failed.parameters();
+    failed.add_view(&creeping);
+    assert_eq!(failed.parameters(), before);
+    failed.add_view(&still);
+    assert_ne!(failed.parameters(), before);
+    let before = online.parameters();
+    online.add_view(&creeping);
+    assert_ne!(online.parameters(), before, "sensors average over the same time");
 }
 
 /// A sensor slips while a view of a misread tag is looked into, at once or some views later: it is named.
