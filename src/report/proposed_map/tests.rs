@@ -102,7 +102,8 @@ fn detections_come_before_images_and_images_bring_their_lens() {
     let mut given = Given::new();
     given.joints("/words", &["a".to_owned()], 30_000.0);
     given.add("/image", &CompressedImage::default());
-    let detections = vec![AprilTagDetection { id: 5, ..AprilTagDetection::default() }];
+    let corners = [[1.0, 1.0], [9.0, 1.0], [9.0, 9.0], [1.0, 9.0]].map(|[x, y]| PixelPoint { x, y });
+    let detections = vec![AprilTagDetection { id: 5, corners, ..AprilTagDetection::default() }];
     given.add("/tags", &AprilTagDetectionArray { detections, ..AprilTagDetectionArray::default() });
     let text = given.proposed(None).1.expect("a map");
     assert_eq!(topics(&text).1.tags, "/tags");
