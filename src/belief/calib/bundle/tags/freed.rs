@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Translation3};
 
 use crate::calib::bundle::drawing::Drawing;
 use crate::calib::bundle::estimate::Estimate;
-use crate::calib::bundle::tags::identity::TagFault;
+use crate::calib::bundle::tags::identity::{NEARER, SAME_PLACE_M, TagFault};
 use crate::calib::finding::{Finding, FindingKind, FindingUnit};
 use crate::calib::result::calibration::Calibration;
 use crate::calib::views::view::View;
@@ -86,16 +86,59 @@ impl MovedTags {
         true
     }
 
-    /// The freed tags as findings, which refuse nothing: those that were moved together in one.
+    /// The freed tags as findings, which refuse nothing: those in one another's places, and those that were moved
+    /// together, in one.
     pub(crate) fn report(&self, estimate: &Estimate<'_>, calibration: &mut Calibration) {
-        let alone = self.freed.iter().filter(|tag| !self.group.contains(tag)).map(std::slice::from_ref);
-        for tags in (!self.group.is_empty()).then_some(&self.group[..]).into_iter().chain(alone) {
-            let (finding, words) = self.finding(estimate, tags);
+        let rings = self.rings(estimate);
+        let is_left = |tag: &&usize| !rings.iter().flatten().any(|of_ring| of_ring == *tag);
+        let group: Vec<usize> = self.group.iter().filter(is_left).copied().collect();
+        let alone = self.freed.iter().filter(|tag| !self.group.contains(tag)).filter(is_left).map(std::slice::from_ref);
+        let moved = (!group.is_empty()).then_some(&group[..]).into_iter().chain(alone);
+        let moved = moved.map(|tags| self.finding(estimate, tags));
+        for (finding, words) in rings.iter().map(|ring| self.ring_finding(ring)).chain(moved) {
             calibration.findings.push(finding);
             if let Some(verdict) = &mut calibration.verdict {
                 verdict.warnings.push(words);
             }
         }
+    }
+
+    /// Freed tags that hang in one another's places: each where the next one is surveyed, the last where the first is.
+    pub(crate) fn rings(&self, estimate: &Estimate<'_>) -> Vec<Vec<usize>> {
+        let mut left: Vec<usize> = self.group.iter().chain(&self.freed).copied().collect();
+        left.sort_unstable();
+        left.dedup();
+        let surveyed = |tag: usize| self.surveyed[tag].base_from_tag.isometry().translation.vector;
+        let next = |tag: usize, of: &[usize]| {
+            let found = estimate.tag(tag).0.translation.vector;
+            let near_m = |other: &usize| (found - surveyed(*other)).norm();
+            let place = of.iter().copied().min_by(|a, b| near_m(a).total_cmp(&near_m(b)))?;
+            (near_m(&place) < SAME_PLACE_M && near_m(&place) < NEARER * near_m(&tag)).then_some(place)
+        };
+        let mut rings = Vec::new();
+        while let Some(&first) = left.first() {
+            let all = left.clone();
+            let ring: Vec<usize> =
+                std::iter::successors(Some(first), |tag| next(*tag, &all).filter(|tag| *tag != first))
+                    .take(all.len())
+                    .collect();
+            let is_closed = ring.len() > 1 && ring.last().is_some_and(|last| next(*last, &all) == Some(first));
+            left.retain(|tag| *tag != first && !(is_closed && ring.contains(tag)));
+            rings.extend(is_closed.then_some(ring));
+        }
+        rings
+    }
+
+    fn ring_finding(&self, ring: &[usize]) -> (Finding, String) {
+        let ids: Vec<String> = ring.iter().map(|&tag| self.surveyed[tag].id.to_string()).collect();
+        let places = ids.iter().zip(ids.iter().cycle().skip(1)).map(|(id, place)| format!("{id} at {place}'s"));
+        let words = format!(
+            "tags {} hang in one another's places ({}): estimated with the rest; correct the survey",
+            list(&ids),
+            places.collect::<Vec<_>>().join(", "),
+        );
+        let (kind, name) = (FindingKind::TagSwapped, list(&ids));
+        (Finding { kind, name, size: None, unit: None, tool_error_m: None, time_s: None, repaired: true }, words)
     }
 
     /// The size is the median distance of the tags from their survey. Whether several moved as one is not told: each

@@ -90,7 +90,7 @@ impl TagFault {
 const REJECTED_SHARE: f64 = 0.5;
 const MIN_OBSERVATIONS: usize = 3;
 /// Exchanged ids: so near each other's places, m, and so much nearer than to their own.
-const SAME_PLACE_M: f64 = 0.05;
+pub(crate) const SAME_PLACE_M: f64 = 0.05;
 pub(crate) const NEARER: f64 = 0.3;
 /// A size counts from this ratio on, and from so many of its standard errors.
 const LEAST_RATIO: f64 = 0.005;

@@ -152,3 +152,42 @@ fn tags_with_exchanged_ids_are_no_group() {
     println!("exchanged: named in {named} of {all}");
     assert!(named * 8 >= all * 7, "{named} of {all}");
 }
+
+/// Ids of three to five of eight tags, exchanged in a ring, as the revised survey names them.
+#[test]
+fn ids_exchanged_in_a_ring_are_named() {
+    let robot = titan();
+    let (mut named, mut all) = (0, 0);
+    for seed in 0..9 {
+        let n = 3 + seed as usize % 3;
+        // Each hangs where the one before it is surveyed.
+        let ring: Vec<usize> = (0..n).map(|k| (seed as usize + k) % robot.tags.len()).collect();
+        let (views, model) = views_of_changed(&robot, &robot, seed, |truth| {
+            let places = ring.clone().into_iter().map(|tag| truth.tags[tag]).collect::<Vec<_>>();
+            (0..n).for_each(|k| truth.tags[ring[(k + 1) % n]] = places[k]);
+        });
+        let (mut survey, mut moved, mut drawing) = (robot.clone(), MovedTags::new(&robot), Drawing::default());
+        let rings = loop {
+            let mut input = input(&survey, &views, &model);
+            drawing.apply(&mut input);
+            let found = estimate(&input).expect("solved");
+            let mut revised = survey.clone();
+            if let Some(better) = drawing.better(&input, &found, 0.0) {
+                drawing.apply_new_faults(&better, &mut revised);
+                moved.resurveyed(&mut revised, &better);
+                drawing = better;
+            } else if !moved.revise(&found, &views, &mut revised) {
+                break moved.rings(&found);
+            }
+            survey = revised;
+        };
+        let mut expected: Vec<usize> = ring.iter().rev().copied().collect();
+        let first = expected.iter().position(|tag| Some(tag) == ring.iter().min()).unwrap_or(0);
+        expected.rotate_left(first);
+        println!("seed {seed}: {expected:?}, named {rings:?}");
+        named += usize::from(rings == [expected]);
+        all += 1;
+    }
+    println!("rings: named in {named} of {all}");
+    assert!(named * 9 >= all * 8, "{named} of {all}");
+}
