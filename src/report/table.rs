@@ -7,7 +7,7 @@ use crate::report::online::online_lines;
 use crate::report::summary::{
     AssertSummary, CalibrationSummary, CaptureSummary, GainChange, HeldJointSummary, RenewalSummary, RunSummary,
 };
-use crate::report::verdict::{joint_remedy, repairs};
+use crate::report::verdict::{beside_refusal, joint_remedy, repairs};
 use crate::score::{ReachScore, ScoreSide};
 use armcal_belief::calib::{
     CameraMount, FailedJointTable, MapResult, PriorTable, Status, SurveyCoverage, UNSEEN_LINKS,
@@ -190,7 +190,9 @@ pub(super) fn check_lines(summary: &RunSummary) -> Vec<String> {
 fn accuracy_lines(summary: &RunSummary) -> Vec<String> {
     let mut lines = vec![match (summary.status, &summary.refusal) {
         (Status::Accepted, _) => format!("calibration  ACCEPTED{}", repaired(summary)),
-        (Status::Refused, why) => format!("calibration  REFUSED: {}", why.as_deref().unwrap_or("no reason given")),
+        (Status::Refused, why) => {
+            format!("calibration  REFUSED: {}{}", why.as_deref().unwrap_or("no reason given"), beside(summary))
+        }
     }];
     let held_out = &summary.held_out;
     lines.push(format!(
@@ -231,6 +233,12 @@ fn repaired(summary: &RunSummary) -> String {
         n => format!("; and {n} more"),
     };
     format!(", repaired: {}; {}{more}", first.cause, first.remedy)
+}
+
+/// The first of what else is wrong and may be the cause of a refusal.
+fn beside(summary: &RunSummary) -> String {
+    let first = beside_refusal(summary).into_iter().next();
+    first.map_or_else(String::new, |repair| format!("; besides, {}; {}", repair.cause, repair.remedy))
 }
 
 /// How many views there were, what of them was left out, and why the capture ended.

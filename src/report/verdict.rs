@@ -1,7 +1,7 @@
 //! May the result be used, why, and what to do next: the same words for report.html, the replay and the terminal.
 
 use crate::report::summary::RunSummary;
-use armcal_belief::calib::{FailedJointTable, Finding, FindingKind, PriorTable, Status};
+use armcal_belief::calib::{FailedJointTable, Finding, FindingKind, PriorTable, Refusal, Status};
 use armcal_core::robot::FailedKind;
 
 /// How a verdict reads at a glance.
@@ -33,9 +33,12 @@ pub(super) struct Verdict {
 /// Of a run, or of a calibration alone.
 pub(super) fn verdict(summary: &RunSummary) -> Verdict {
     if summary.status == Status::Refused {
-        let reasons = summary.refusals.iter().map(|refusal| sentence(&refusal.cause())).collect();
+        let mut reasons: Vec<String> = summary.refusals.iter().map(|refusal| sentence(&refusal.cause())).collect();
         let mut next: Vec<String> = Vec::new();
-        for remedy in summary.refusals.iter().map(|refusal| sentence(refusal.remedy())) {
+        let beside = beside_refusal(summary);
+        reasons.extend(beside.iter().map(|repair| sentence(&repair.cause)));
+        let remedies = summary.refusals.iter().map(|refusal| sentence(refusal.remedy()));
+        for remedy in remedies.chain(beside.iter().map(|repair| sentence(&repair.remedy))) {
             if !next.contains(&remedy) {
                 next.push(remedy);
             }
@@ -68,20 +71,93 @@ pub(super) fn repairs(summary: &RunSummary) -> Vec<Repair> {
     repairs_of(&calibration.findings, &calibration.failed_joint, since)
 }
 
+/// What survey, lens and drawing have wrong, where a calibration is refused for its accuracy alone: the cause of that,
+/// as likely as not.
+pub(super) fn beside_refusal(summary: &RunSummary) -> Vec<Repair> {
+    let is_of_accuracy =
+        |refusal: &Refusal| matches!(refusal, Refusal::BeyondTolerance { .. } | Refusal::PriorsBeyondTolerance { .. });
+    if !summary.refusals.iter().all(is_of_accuracy) {
+        return Vec::new();
+    }
+    let mut found = repairs_of(&summary.calibration.findings, &[], "");
+    found.truncate(MAX_BESIDE);
+    found
+}
+
+/// Of what is said beside a refusal.
+const MAX_BESIDE: usize = 3;
+
 /// Joints first.
 fn repairs_of(findings: &[Finding], failed: &[FailedJointTable], since: &str) -> Vec<Repair> {
-    let of_kind = |kind: FindingKind| findings.iter().filter(move |found| found.repaired && found.kind == kind);
-    let is_told = |name: &str| failed.iter().any(|failed| failed.joint == name);
-    let slip = |found: &Finding| Repair {
-        cause: format!("the sensor of {} slipped{}{since}", found.name, by(found)),
-        remedy: format!("fasten the sensor of {}: the result is of it as it is now", found.name),
+    let is_told = |found: &&Finding| {
+        found.kind == FindingKind::SensorSlip && failed.iter().any(|failed| failed.joint == found.name)
     };
-    let tag = |found: &Finding| Repair {
-        cause: format!("tag {} hangs {} from where the survey has it", found.name, size(found)),
-        remedy: format!("fasten tag {0}, or correct the survey: the result has tag {0} where it was seen", found.name),
+    let repaired = findings.iter().filter(|found| found.repaired && !is_told(found));
+    let mut placed: Vec<(usize, &Finding)> =
+        repaired.filter_map(|found| Some((REPAIRS.iter().position(|kind| *kind == found.kind)?, found))).collect();
+    placed.sort_by_key(|(place, _)| *place);
+    failed.iter().map(of_joint).chain(placed.into_iter().filter_map(|(_, found)| of_finding(found, since))).collect()
+}
+
+/// Findings that a user can act on, in the order in which they are told.
+const REPAIRS: [FindingKind; 8] = [
+    FindingKind::SensorSlip,
+    FindingKind::TagMoved,
+    FindingKind::TagsMoved,
+    FindingKind::TagSwapped,
+    FindingKind::TagSize,
+    FindingKind::Lens,
+    FindingKind::Base,
+    FindingKind::Link,
+];
+
+fn of_finding(found: &Finding, since: &str) -> Option<Repair> {
+    let name = &found.name;
+    let (cause, remedy) = match found.kind {
+        FindingKind::SensorSlip => (
+            format!("the sensor of {name} slipped{}{since}", by(found)),
+            format!("fasten the sensor of {name}: the result is of it as it is now"),
+        ),
+        FindingKind::TagMoved => (
+            format!("tag {name} hangs {} from where the survey has it", size(found)),
+            format!("fasten tag {name}, or correct the survey: the result has tag {name} where it was seen"),
+        ),
+        FindingKind::TagsMoved => (
+            format!("tags {name} hang {} (median) from where the survey has them", size(found)),
+            format!("fasten tags {name}, or correct the survey: the result has them where they were seen"),
+        ),
+        FindingKind::TagSwapped => (
+            format!("tags {name} hang in one another's places"),
+            "correct their ids in the survey: the result has them where they were seen".to_owned(),
+        ),
+        FindingKind::TagSize if name == "all" => (
+            format!("all tags are {} of the survey's size", percent(found)),
+            "measure one again, and correct the survey: the result has the size that was seen".to_owned(),
+        ),
+        FindingKind::TagSize => (
+            format!("tag {name} is {} of the survey's size", percent(found)),
+            format!("measure tag {name} again, and correct the survey: the result has the size that was seen"),
+        ),
+        FindingKind::Lens => (
+            format!("the focal length is {} of robot.toml's", percent(found)),
+            "measure the intrinsics again: the result has the lens that was seen".to_owned(),
+        ),
+        FindingKind::Base => (
+            format!("the arm's base is not where the survey has it, off{}", by(found)),
+            "check the tag map's frame and where the arm stands; correct the one that is wrong".to_owned(),
+        ),
+        FindingKind::Link => (
+            format!("{name} is not as drawn, off{}", by(found)),
+            "correct the drawing: the result has the link that was seen".to_owned(),
+        ),
+        _ => return None,
     };
-    let slips = of_kind(FindingKind::SensorSlip).filter(|found| !is_told(&found.name));
-    failed.iter().map(of_joint).chain(slips.map(slip)).chain(of_kind(FindingKind::TagMoved).map(tag)).collect()
+    Some(Repair { cause, remedy })
+}
+
+/// `+25.0 %`.
+fn percent(found: &Finding) -> String {
+    found.size.map_or_else(|| "off by some".to_owned(), |size| format!("{:+.1} %", 100.0 * size))
 }
 
 fn size(found: &Finding) -> String {
@@ -213,6 +289,20 @@ mod tests {
             [
                 "the sensor of wrist_pitch slipped by 1.74 deg since the earlier calibration",
                 "tag 1 hangs 42.3 mm from where the survey has it",
+            ]
+        );
+        let others = [
+            finding(FindingKind::Link, "forearm_link", 0.05, FindingUnit::Metre),
+            finding(FindingKind::TagSize, "all", 0.25, FindingUnit::One),
+            finding(FindingKind::TagSwapped, "0, 2 and 1", 0.0, FindingUnit::One),
+            finding(FindingKind::Sag, "base", 0.1, FindingUnit::RadianPerNewtonMetre),
+        ];
+        assert_eq!(
+            causes(&others, &[]),
+            [
+                "tags 0, 2 and 1 hang in one another's places",
+                "all tags are +25.0 % of the survey's size",
+                "forearm_link is not as drawn, off by 50.0 mm",
             ]
         );
         // Of a joint that is told of already nothing is said twice; what was not repaired is a refusal's.
