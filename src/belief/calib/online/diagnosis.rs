@@ -339,8 +339,10 @@ impl Race {
             best.nats - other.nats > lead || may_name(other)
         };
         let is_tied = |other: &Branch| other.worn_spot().is_some() && best.nats - other.nats < LEAD_OF_SENSOR_NATS;
-        let is_late = self.n_later >= MAX_VIEWS_OF_TIE || !(best.worn_spot().is_some() && self.others().any(is_tied));
-        self.n_later >= MAX_VIEWS && is_late || self.others().all(is_behind)
+        if best.worn_spot().is_some() && self.others().any(is_tied) {
+            return self.n_later >= MAX_VIEWS_OF_TIE;
+        }
+        self.n_later >= MAX_VIEWS || self.others().all(is_behind)
     }
 
     /// Whether enough views could have spoken against it. A detection of another tag happens once; a tag that was moved
