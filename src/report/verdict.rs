@@ -148,7 +148,7 @@ fn of_finding(found: &Finding, since: &str) -> Option<Repair> {
         ),
         FindingKind::Link => (
             format!("{name} is not as drawn, off{}", by(found)),
-            "correct the drawing: the result has the link that was seen".to_owned(),
+            format!("correct the drawing of {name}: the result has it as it was seen"),
         ),
         _ => return None,
     };

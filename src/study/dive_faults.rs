@@ -7,16 +7,18 @@ use std::fmt::Write as _;
 
 use rand::{Rng, RngExt};
 
-use armcal_belief::calib::online::{Fault, Follower, OnlineEvent, OnlineSettings, Oracle, TagSet, ViewStream};
+use armcal_belief::calib::online::{
+    Fault, Follower, OnlineEvent, OnlineSettings, Oracle, OracleGain, TagSet, ViewStream,
+};
 use armcal_belief::calib::{FindingKind, View, WornSpot};
 use armcal_core::log::Recording;
 use armcal_core::robot::{FailedJoint, Robot};
-use armcal_core::stats::stream_rng;
+use armcal_core::stats::{chi_square_above, stream_rng};
 use armcal_core::streams::{Mark, MarkKind, Message, Thermometer};
 use armcal_core::time::{SIMULATION_EPOCH, Stamp};
 
-/// Five sigma of a fault that is one number.
-const TOLD_CHI2: f64 = 25.0;
+/// The oracle is sure where chance does as well as a normal variable does five sigma, on either side.
+const FIVE_SIGMA: f64 = 5.733e-7;
 /// Explanations that the oracle holds for this much less probable at most cannot be told apart, nats (odds of twenty).
 const ALIKE_NATS: f64 = 3.0;
 /// Views after the oracle's within which a fault is named in time.
@@ -343,7 +345,7 @@ impl<'a> Followed<'a> {
             return;
         }
         oracle.add_view(view);
-        if self.oracle_views.is_none() && oracle.gains().first().is_some_and(|gain| gain.chi2 > TOLD_CHI2) {
+        if self.oracle_views.is_none() && oracle.gains().first().is_some_and(is_sure) {
             self.oracle_views = Some(self.n_views);
         }
     }
@@ -389,6 +391,11 @@ impl<'a> Followed<'a> {
             false_alarms: self.false_alarms,
         }
     }
+}
+
+/// 25.0 of the sum of squares by one number, 39.5 by six.
+fn is_sure(gain: &OracleGain) -> bool {
+    chi_square_above(gain.chi2, gain.numbers) < FIVE_SIGMA
 }
 
 /// What happened first, then all single faults.
@@ -510,6 +517,14 @@ mod tests {
                 }
                 fault.tags.iter().for_each(|tag| assert!(names(&format!("id={}", robot.tags[*tag].id))));
             }
+        }
+    }
+
+    #[test]
+    fn five_sigma_are_more_of_the_sum_of_squares_where_more_numbers_are_fitted() {
+        for (numbers, chi2) in [(1, 25.0), (2, 28.7437), (6, 39.4914), (24, 73.7974)] {
+            let gain = |chi2: f64| OracleGain { chi2, numbers, nats: 0.0 };
+            assert!(is_sure(&gain(chi2 + 0.01)) && !is_sure(&gain(chi2 - 0.01)), "{numbers}");
         }
     }
 }

@@ -151,6 +151,17 @@ impl Fault {
         }
     }
 
+    /// Numbers that are open under it from the start.
+    pub(crate) fn numbers(self) -> usize {
+        match self {
+            Self::Slip(_) | Self::Worn(..) => 1,
+            Self::Scale(_) => 2,
+            Self::Tags(_) | Self::Mount | Self::Base => 6,
+            // These depend on the views.
+            Self::Failed(_) | Self::Tag(_) | Self::Drift => 0,
+        }
+    }
+
     /// Whether both are about the same sensor.
     pub(crate) fn is_of_same_sensor(self, other: Self) -> bool {
         let joint = |fault| match fault {

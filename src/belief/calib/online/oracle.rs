@@ -33,13 +33,19 @@ pub(crate) struct Explained {
     pub cost: f64,
     /// Logarithm of the probability of the views.
     pub nats: f64,
+    /// Numbers that the faults leave open and the views see.
+    pub numbers: usize,
+    /// Tags that were seen.
+    pub tags: Vec<usize>,
 }
 
 /// How one explanation compares with that nothing happened.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OracleGain {
-    /// What it saves of the sum of squares in sigmas: 25 are five sigma of a fault that is one number.
+    /// What it saves of the sum of squares in sigmas.
     pub chi2: f64,
+    /// Numbers that it fits to the views for that: where nothing happened, `chi2` has about so many degrees of freedom.
+    pub numbers: usize,
     /// `ln` of the odds that the views give it.
     pub nats: f64,
 }
@@ -48,10 +54,28 @@ impl Explained {
     pub(crate) fn new(faults: Vec<Fault>, filter: &Filter, robot: &Robot) -> Self {
         let mut filter = filter.clone();
         faults.iter().for_each(|fault| fault.open(&mut filter, robot));
-        Self { faults, filter, cost: 0.0, nats: 0.0 }
+        let numbers = faults.iter().map(|fault| fault.numbers()).sum();
+        Self { faults, filter, cost: 0.0, nats: 0.0, numbers, tags: Vec::new() }
+    }
+
+    /// A tag counts once it is seen, a sensor that says nothing anew in each view.
+    fn count(&mut self, view: &View) {
+        let new = view.tags.iter().map(|seen| seen.tag_idx).filter(|tag| !self.tags.contains(tag));
+        let new: Vec<usize> = new.collect();
+        self.numbers += self
+            .faults
+            .iter()
+            .map(|fault| match fault {
+                Fault::Tag(tag) if new.contains(tag) => 6,
+                Fault::Failed(joint) if !view.is_free[*joint] => 1,
+                _ => 0,
+            })
+            .sum::<usize>();
+        self.tags.extend(new);
     }
 
     fn add(&mut self, robot: &Robot, view: &View) {
+        self.count(view);
         let seen = self.faults.iter().fold(view.clone(), |view, fault| seen_by(Some(*fault), &view));
         match self.filter.update(robot, &seen) {
             Some(update) => {
@@ -91,7 +115,7 @@ impl Oracle {
     #[must_use]
     pub fn gains(&self) -> Vec<OracleGain> {
         let Explained { cost, nats, .. } = &self.nothing;
-        let gain = |of: &Explained| OracleGain { chi2: cost - of.cost, nats: of.nats - nats };
+        let gain = |of: &Explained| OracleGain { chi2: cost - of.cost, numbers: of.numbers, nats: of.nats - nats };
         self.explanations.iter().map(gain).collect()
     }
 }
