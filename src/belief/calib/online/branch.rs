@@ -28,7 +28,8 @@ pub(crate) struct Branch {
     pub nats: f64,
     /// The evidence of each view since it was opened, nats.
     pub gains: Vec<f64>,
-    /// Of one that was found in hindsight, how many views before its race speak for it, and when the first was.
+    /// Of one that was found in hindsight, how many views before its race count for it, and when the first was: those
+    /// that speak for it, of a tag those that saw it.
     pub n_speak_before: usize,
     pub since: Option<Stamp>,
 }

@@ -3,7 +3,7 @@
 //! joints may be the one whose sensor is worn.
 
 use crate::calib::online::branch::{Branch, Step};
-use crate::calib::online::filter::{Filter, ViewUpdate, WalkScore};
+use crate::calib::online::filter::{Filter, Scores, ViewUpdate, WalkScore};
 use crate::calib::online::hypothesis::{Fault, TagSet};
 use crate::calib::online::view_stream::is_moving;
 use crate::calib::parameters::WornSpot;
@@ -103,7 +103,7 @@ impl RecentViews {
     pub(crate) fn add(&mut self, view: &View, update: Option<&ViewUpdate>) {
         self.views.push(view.clone());
         self.nats += update.map_or(0.0, |update| update.log_evidence);
-        for (sum, score) in self.sums.iter_mut().zip(update.iter().flat_map(|update| &update.walk)) {
+        for (sum, score) in self.sums.iter_mut().zip(update.iter().flat_map(|update| &update.scores.walk)) {
             sum.a += score.a;
             sum.b += score.b;
         }
@@ -127,7 +127,7 @@ pub(crate) fn is_suspicious(update: &ViewUpdate) -> bool {
     // Wilson and Hilferty 1931.
     let by = 2.0 / (9.0 * n);
     let is_costly = update.cost > n * (1.0 - by + SUSPICIOUS_Z * by.sqrt()).powi(3);
-    is_costly || has_step(&update.walk) || !update.rejected.is_empty()
+    is_costly || has_step(&update.scores.walk) || !update.rejected.is_empty()
 }
 
 impl Race {
@@ -145,13 +145,13 @@ impl Race {
     }
 
     /// Every explanation takes the view in, after what sensors may have changed before it. None is dropped at the first
-    /// ones, which open more: what a view of one tag cannot tell apart the next one does. What it says of the offsets
-    /// where nothing happened.
-    pub(crate) fn add(&mut self, robot: &Robot, step: Step) -> [WalkScore; MAX_JOINTS] {
+    /// ones, which open more: what a view of one tag cannot tell apart the next one does. What it says of offsets
+    /// and tags where nothing happened.
+    pub(crate) fn add(&mut self, robot: &Robot, step: Step) -> Scores {
         self.n_later += 1;
         let nothing = self.of(None).cloned();
         let is_told = self.best().is_some_and(Branch::tells);
-        let mut walk = [WalkScore::default(); MAX_JOINTS];
+        let mut scores = Scores::default();
         for branch in &mut self.branches {
             let update = step.take_in(robot, branch);
             if branch.fault.is_some() {
@@ -162,7 +162,7 @@ impl Race {
             if is_new && self.steps.len() < MAX_VIEWS_OF_TIE {
                 self.n_later = 0;
             }
-            walk = update.map(|update| update.walk).unwrap_or_default();
+            scores = update.map(|update| update.scores).unwrap_or_default();
         }
         if self.n_later <= OPEN_VIEWS {
             self.nothing_until.extend(nothing.map(|nothing| (self.steps.len(), nothing)));
@@ -176,7 +176,7 @@ impl Race {
         if self.n_later >= OPEN_VIEWS {
             self.drop_hopeless();
         }
-        walk
+        scores
     }
 
     /// Explanations found in hindsight, each in the place of one that is less probable.
@@ -383,7 +383,8 @@ impl Race {
     /// Those of them that saw a tag.
     fn n_views_of(&self, tag: usize, fault: Option<Fault>) -> usize {
         let since = self.steps.iter().rev().take(self.n_views_since(fault));
-        since.filter(|step| step.view.tags.iter().any(|seen| seen.tag_idx == tag)).count()
+        let before = self.of(fault).map_or(0, |branch| branch.n_speak_before);
+        before + since.filter(|step| step.view.sees(tag)).count()
     }
 
     /// A tag that one view saw: read as another one it would be as far away as they are from each other.

@@ -5,7 +5,7 @@
 //! information. Between views what drifts is widened, `(W^-1 + Q)^-1` by the matrix inversion lemma. Time and memory of
 //! a view do not depend on how many came before.
 
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Isometry3, SVector};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Isometry3, Matrix3, SVector, Vector3};
 
 use crate::calib::angles_by_camera::seen_angles;
 use crate::calib::bundle::estimate::Estimate;
@@ -71,8 +71,25 @@ pub(crate) struct ViewUpdate {
     pub joint_error: [JointErrorOfView; MAX_JOINTS],
     /// Of the image's time.
     pub time_error: TimeErrorOfView,
-    /// By joint with an offset: what the view says of a change of the offset since the view before.
+    /// What the view says of changes since the view before.
+    pub scores: Scores,
+}
+
+/// What a view says of what may have changed since the view before.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Scores {
+    /// By joint with an offset.
     pub walk: [WalkScore; MAX_JOINTS],
+    /// Of each tag that was seen.
+    pub tags: Vec<TagScore>,
+}
+
+/// First and second derivative of the log-likelihood by the place of a tag, in the tag's frame, m.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct TagScore {
+    pub tag: usize,
+    pub a: Vector3<f64>,
+    pub b: Matrix3<f64>,
 }
 
 /// First and second derivative of the log-likelihood by an offset's variance before the view, for a change of the
@@ -488,7 +505,7 @@ fn view_update(problem: &BundleProblem<'_>, solved: &SolvedView, log_det_before:
         rejected: problem.observations.iter().filter(is_rejected).map(|observation| observation.tag).collect(),
         joint_error,
         time_error,
-        walk: walk_scores(problem, state, factor),
+        scores: scores(problem, state, factor),
     }
 }
 
@@ -523,18 +540,33 @@ fn view_errors(problem: &BundleProblem<'_>, solved: &SolvedView) -> ([JointError
 }
 
 /// With W the information before and P the covariance after, `a = W (x' - x)` and `b = W - W P W`, both along each
-/// offset.
-fn walk_scores(problem: &BundleProblem<'_>, state: &State, factor: &Cholesky<f64, Dyn>) -> [WalkScore; MAX_JOINTS] {
-    let mut scores = [WalkScore::default(); MAX_JOINTS];
+/// offset and along the place of each tag.
+fn scores(problem: &BundleProblem<'_>, state: &State, factor: &Cholesky<f64, Dyn>) -> Scores {
     let info = &problem.prior.joint_info;
     let pull = info * off_by(&problem.layout, &problem.prior.means(), state, info.nrows());
     let columns = problem.layout.parameters.iter().enumerate();
     let offsets: Vec<(usize, usize)> =
         columns.filter(|(_, p)| p.kind == ParameterKind::Offset).map(|(column, p)| (p.joint, column)).collect();
-    let mut half = DMatrix::from_fn(info.nrows(), offsets.len(), |row, k| info[(row, offsets[k].1)]);
+    let seen = problem.observations.iter().filter(|observation| observation.is_used);
+    let tags: Vec<(usize, usize)> =
+        seen.filter_map(|of| Some((of.tag, (*problem.layout.tags.get(of.tag)?)?))).collect();
+    let all: Vec<usize> =
+        offsets.iter().map(|(_, column)| *column).chain(tags.iter().flat_map(|(_, at)| *at..at + 3)).collect();
+    let mut half = DMatrix::from_fn(info.nrows(), all.len(), |row, k| info[(row, all[k])]);
     solve_lower(factor, &mut half);
-    for (k, (joint, column)) in offsets.into_iter().enumerate() {
-        scores[joint] = WalkScore { a: pull[column], b: info[(column, column)] - half.column(k).norm_squared() };
+    let mut scores = Scores::default();
+    for (k, (joint, column)) in offsets.iter().enumerate() {
+        let b = info[(*column, *column)] - half.column(k).norm_squared();
+        scores.walk[*joint] = WalkScore { a: pull[*column], b };
     }
+    scores.tags = tags
+        .iter()
+        .enumerate()
+        .map(|(k, &(tag, at))| {
+            let half = half.fixed_columns::<3>(offsets.len() + 3 * k);
+            let b = info.fixed_view::<3, 3>(at, at) - half.tr_mul(&half);
+            TagScore { tag, a: pull.fixed_rows::<3>(at).into_owned(), b }
+        })
+        .collect();
     scores
 }

@@ -1,10 +1,12 @@
-//! Worn spots by looks that lie minutes apart, each of which is worth a few nats: a race about one of them is over
-//! before the next comes. What each view says of each joint's offset is kept. Innovations have no memory, so that the
-//! scores of one place of a track add up; where they are too many sigmas, the views since are taken in once more under
-//! what may have happened before the first of them.
+//! Worn spots and moved tags by looks that lie minutes apart, each of which is worth a few nats: a race about one of
+//! them is over before the next comes. What each view says of each joint's offset and of each tag's place is kept.
+//! Innovations have no memory, so that the scores of one place of a track, and of one tag, add up; where they are too
+//! many sigmas, the views since are taken in once more under what may have happened before the first of them.
+
+use nalgebra::{Matrix3, Vector3};
 
 use crate::calib::online::branch::{Branch, Step, speaks};
-use crate::calib::online::filter::{Filter, WalkScore};
+use crate::calib::online::filter::{Filter, Scores};
 use crate::calib::online::hypothesis::Fault;
 use crate::calib::parameters::WornSpot;
 use crate::calib::views::view::View;
@@ -25,8 +27,12 @@ const MIDDLES: [f64; 9] = [0.0, -0.5, 0.5, -1.0, 1.0, -1.5, 1.5, -2.0, 2.0];
 const FARTHER_BY: f64 = 1.0;
 /// Other joints' spots are compared where their own scores are beyond this, in sigmas.
 const COMPARED_Z: f64 = 2.5;
-/// Views of a spot at least.
+/// Views of a spot or a tag at least.
 const LEAST_VIEWS: usize = 2;
+/// Scores of a tag's place are looked into beyond this, chi-square of three: by chance once in 16,000.
+const SUSPICIOUS_CHI2: f64 = 22.0;
+/// Other tags are compared from this on, once in 50.
+const COMPARED_CHI2: f64 = 10.0;
 
 /// The last views, and the belief before them.
 #[derive(Clone, Default)]
@@ -35,6 +41,8 @@ pub(crate) struct Hindsight {
     spans: Vec<Span>,
     /// By joint, the square of the score that was looked into last.
     looked_into: [f64; MAX_JOINTS],
+    /// The same of the tag with the largest.
+    looked_into_tag: f64,
 }
 
 #[derive(Clone)]
@@ -46,14 +54,24 @@ struct Span {
 #[derive(Clone)]
 struct PastStep {
     step: Step,
-    walk: [WalkScore; MAX_JOINTS],
+    scores: Scores,
     /// All sensors had drifted more than expected.
     has_drifted: bool,
 }
 
+/// A tag that the views have elsewhere, all together.
+#[derive(Clone, Copy, Debug)]
+struct TagSuspicion {
+    tag: usize,
+    /// Views since the first from which on they do.
+    n_since: usize,
+    /// Chi-square of three.
+    chi2: f64,
+}
+
 /// A place of a track that the views say something of together.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Suspicion {
+struct Suspicion {
     joint: usize,
     spot: WornSpot,
     /// Views since the first that belongs to it.
@@ -71,15 +89,15 @@ impl Hindsight {
         if self.spans.len() == 2 {
             self.spans.remove(0);
             // What was looked into was looked into for views that are gone.
-            self.looked_into = [0.0; MAX_JOINTS];
+            (self.looked_into, self.looked_into_tag) = ([0.0; MAX_JOINTS], 0.0);
         }
         self.spans.push(Span { before: filter.clone(), steps: Vec::with_capacity(VIEWS_OF_SPAN) });
     }
 
-    /// A view that was taken in, and what it said of the offsets as nothing had happened.
-    pub(crate) fn add(&mut self, step: Step, walk: [WalkScore; MAX_JOINTS]) {
+    /// A view that was taken in, and what it said of offsets and tags as nothing had happened.
+    pub(crate) fn add(&mut self, step: Step, scores: Scores) {
         if let Some(span) = self.spans.last_mut() {
-            span.steps.push(PastStep { step, walk, has_drifted: false });
+            span.steps.push(PastStep { step, scores, has_drifted: false });
         }
     }
 
@@ -94,9 +112,74 @@ impl Hindsight {
         self.spans.iter().rev().flat_map(|span| span.steps.iter().rev())
     }
 
+    /// Explanations of the last views that these suggest together with those before them, by [`Self::branches`].
+    pub(crate) fn found(&mut self, robot: &Robot, filter: &Filter, n_of_race: usize) -> Vec<Branch> {
+        let suspicions = self.suspicions(filter);
+        let mut found = self.branches(robot, filter, &suspicions, n_of_race);
+        let tags = self.suspicious_tags();
+        found.extend(self.branches_of_tags(robot, filter, &tags, n_of_race));
+        found
+    }
+
+    /// The tags of the last view that the views have elsewhere together, that of which they are surest first; none
+    /// where that is no more than what was looked into before.
+    fn suspicious_tags(&mut self) -> Vec<TagSuspicion> {
+        let Some(last) = self.latest_first().next() else { return Vec::new() };
+        let tags: Vec<usize> = last.scores.tags.iter().map(|score| score.tag).collect();
+        let mut all: Vec<TagSuspicion> = tags.into_iter().filter_map(|tag| self.of_tag(tag)).collect();
+        all.retain(|it| it.chi2 > COMPARED_CHI2);
+        all.sort_by(|one, other| other.chi2.total_cmp(&one.chi2));
+        let least = SUSPICIOUS_CHI2.max(self.looked_into_tag + GROWN_BY);
+        match all.first() {
+            Some(first) if first.chi2 > least => self.looked_into_tag = first.chi2,
+            _ => all.clear(),
+        }
+        all
+    }
+
+    /// Since the view from which on its place is off the most; `None` where too few saw it.
+    fn of_tag(&self, tag: usize) -> Option<TagSuspicion> {
+        let (mut a, mut b, mut n_views) = (Vector3::zeros(), Matrix3::zeros(), 0);
+        let mut best: Option<TagSuspicion> = None;
+        for (place, past) in self.latest_first().enumerate() {
+            let Some(score) = past.scores.tags.iter().find(|score| score.tag == tag) else { continue };
+            a += score.a;
+            b += score.b;
+            n_views += 1;
+            let chi2 = b.cholesky().map_or(0.0, |factor| a.dot(&factor.solve(&a)));
+            if n_views >= LEAST_VIEWS && chi2 > best.map_or(0.0, |best| best.chi2) {
+                best = Some(TagSuspicion { tag, n_since: place + 1, chi2 });
+            }
+        }
+        best
+    }
+
+    /// The same as [`Self::branches`] of tags: each of `suspicions`, and what a moved tag may be taken for.
+    fn branches_of_tags(
+        &self,
+        robot: &Robot,
+        filter: &Filter,
+        suspicions: &[TagSuspicion],
+        n_of_race: usize,
+    ) -> Vec<Branch> {
+        let Some(first) = suspicions.first() else { return Vec::new() };
+        let Some(look_back) = self.look_back(robot, filter, first.n_since.max(n_of_race), n_of_race) else {
+            return Vec::new();
+        };
+        let mut branches = vec![look_back.branch(robot, Fault::Tag(first.tag))];
+        if branches[0].nats < look_back.nats_of_race() + WORTH_COMPARING_NATS {
+            return Vec::new();
+        }
+        let tags = suspicions[1..].iter().map(|it| Fault::Tag(it.tag));
+        let slips = filter.offsets().map(|(joint, _)| Fault::Slip(joint));
+        let others = tags.chain(slips).chain([Fault::Mount, Fault::Base]);
+        branches.extend(others.map(|fault| look_back.branch(robot, fault)));
+        branches
+    }
+
     /// The places about which the last view stands of which the views say something together, that of which they say
     /// most first; none where the most is not beyond what was looked into before.
-    pub(crate) fn suspicions(&mut self, filter: &Filter) -> Vec<Suspicion> {
+    fn suspicions(&mut self, filter: &Filter) -> Vec<Suspicion> {
         let Some(last) = self.latest_first().next().map(|past| &past.step.view) else { return Vec::new() };
         let joints = filter.offsets().map(|(joint, _)| joint);
         let open = joints.filter(|joint| !last.is_free[*joint] && !filter.has_bump(*joint));
@@ -125,8 +208,8 @@ impl Hindsight {
                 continue;
             }
             let share = spot.bump(0.0).share(travel_rad);
-            a += share * past.walk[joint].a;
-            b += share * share * past.walk[joint].b;
+            a += share * past.scores.walk[joint].a;
+            b += share * share * past.scores.walk[joint].b;
             n_views += usize::from(spot.is_seen_from(travel_rad));
             let chi2 = a * a / b;
             if n_views >= LEAST_VIEWS && chi2 > best.map_or(0.0, |best| best.chi2) {
@@ -140,13 +223,7 @@ impl Hindsight {
     /// taken in: the worn spots, and what they may be taken for; none where the first is not worth it. Their evidence
     /// is over that nothing happened, but for the last `n_of_race` views, of which it is their own. `filter` has the
     /// noise of now.
-    pub(crate) fn branches(
-        &self,
-        robot: &Robot,
-        filter: &Filter,
-        suspicions: &[Suspicion],
-        n_of_race: usize,
-    ) -> Vec<Branch> {
+    fn branches(&self, robot: &Robot, filter: &Filter, suspicions: &[Suspicion], n_of_race: usize) -> Vec<Branch> {
         let Some(first) = suspicions.first() else { return Vec::new() };
         let Some(look_back) = self.look_back(robot, filter, first.n_since.max(n_of_race), n_of_race) else {
             return Vec::new();
@@ -210,7 +287,7 @@ impl LookBack<'_> {
         let before_race = branch.gains.drain(..self.n_before_race).zip(&self.of_nothing).zip(&self.steps);
         let of_before: f64 = self.of_nothing[..self.n_before_race].iter().sum();
         for ((own, nothing), past) in before_race {
-            if speaks(own, *nothing) {
+            if counts(fault, past, [own, *nothing]) {
                 branch.n_speak_before += 1;
                 branch.since.get_or_insert(past.step.view.end);
             }
@@ -221,6 +298,14 @@ impl LookBack<'_> {
 
     fn worn(&self, robot: &Robot, suspicion: &Suspicion) -> Branch {
         self.branch(robot, Fault::Worn(suspicion.joint, suspicion.spot))
+    }
+}
+
+/// Whether a view of which a fault and nothing have the evidence, nats, counts for it.
+fn counts(fault: Fault, past: &PastStep, [own, nothing]: [f64; 2]) -> bool {
+    match fault {
+        Fault::Tag(tag) => past.step.view.sees(tag),
+        _ => speaks(own, nothing),
     }
 }
 

@@ -267,12 +267,11 @@ impl Member {
         let update = running.filter.update(&self.robot, view);
         recent.add(view, update.as_ref());
         if is_searched {
-            running.hindsight.add(step, update.as_ref().map(|update| update.walk).unwrap_or_default());
-            let suspicions = running.hindsight.suspicions(&running.filter);
+            running.hindsight.add(step, update.as_ref().map(|update| update.scores.clone()).unwrap_or_default());
             // A view of which nothing fits changes nothing.
             let is_suspicious = update.as_ref().is_none_or(is_suspicious) || recent.show_a_step();
             let n_views = recent.views.len();
-            let found = running.hindsight.branches(&self.robot, &running.filter, &suspicions, n_views);
+            let found = running.hindsight.found(&self.robot, &running.filter, n_views);
             if is_suspicious || !found.is_empty() {
                 self.start_race(&recent, found, nats_of_earlier);
                 return update;
@@ -303,10 +302,9 @@ impl Member {
         let Some(running) = &mut self.running else { return };
         let Running { race: Some(race), hindsight, filter, .. } = running else { return };
         let (before, now) = (race.nats(), step.view.end);
-        let walk = race.add(&self.robot, step.clone());
-        hindsight.add(step, walk);
-        let suspicions = hindsight.suspicions(filter);
-        race.take_up(hindsight.branches(&self.robot, filter, &suspicions, race.n_views()));
+        let scores = race.add(&self.robot, step.clone());
+        hindsight.add(step, scores);
+        race.take_up(hindsight.found(&self.robot, filter, race.n_views()));
         self.nats = FORGETTING * self.nats + race.nats() - before;
         self.settle_race(now);
     }

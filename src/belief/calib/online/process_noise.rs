@@ -111,7 +111,7 @@ impl ProcessNoise {
     /// Tunes the factors by a view.
     pub(crate) fn learn(&mut self, update: &ViewUpdate) {
         let [mut walk, mut behind] = [[0.0; 2]; 2];
-        for (added, score) in self.added.iter().zip(&update.walk) {
+        for (added, score) in self.added.iter().zip(&update.scores.walk) {
             for (sums, variance) in [&mut walk, &mut behind].into_iter().zip(added) {
                 sums[0] += 0.5 * variance * (score.a * score.a - score.b);
                 sums[1] += 0.5 * (variance * score.b).powi(2);

@@ -47,6 +47,11 @@ impl View {
         (!view.tags.is_empty() || view.gripper_tag.is_some()).then_some(view)
     }
 
+    /// Whether the tag of that index is in it.
+    pub(crate) fn sees(&self, tag_idx: usize) -> bool {
+        self.tags.iter().any(|seen| seen.tag_idx == tag_idx)
+    }
+
     /// One reading of an arm at rest under unknown conditions, no tags yet.
     #[must_use]
     pub fn of_reading(pose_idx: u32, end: Stamp, travel_rad: JointAngles) -> Self {
