@@ -87,7 +87,7 @@ impl Readings {
         let travel_rad: Vec<f64> = seen.iter().map(|&k| views[k].travel_rad[joint]).collect();
         let mut angle_rad: Vec<f64> = angles.iter().map(|(angle, _)| *angle).collect();
         let spec = &robot.sensors[joint];
-        if spec.half_range_rad > PI - WHOLE_TURN_RAD {
+        if !spec.moves.is_slide() && spec.half_range_rad > PI - WHOLE_TURN_RAD {
             on_one_turn(&mut angle_rad[travel_rad.len() - n_still(&travel_rad, spec)..]);
         }
         Self { joint, travel_rad, angle_rad, std_rad: angles.iter().map(|(_, std)| *std).collect(), view_idx: seen }
