@@ -126,3 +126,6 @@ impl LinkPoses {
         if self.is_slide(joint) { Vector3::zeros() } else { *self.axis(joint) }
     }
 }
+
+#[cfg(test)]
+mod tests;
