@@ -1,6 +1,7 @@
 //! The chain and its forward kinematics.
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, UnitVector3, Vector3};
+use serde::{Deserialize, Serialize};
 
 use crate::joints::{JointAngles, MAX_JOINTS};
 use crate::kinematics::gravity::{AboutAxes, ArmLoads, Sag};
@@ -9,7 +10,8 @@ use crate::kinematics::link_poses::{Attachment, LinkPoses, Slides};
 use crate::units::Unit;
 
 /// How a joint moves.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum JointKind {
     /// It turns about its axis: its coordinate is an angle, rad.
     #[default]
@@ -24,6 +26,12 @@ impl JointKind {
     #[must_use]
     pub fn is_slide(self) -> bool {
         self == Self::Prismatic
+    }
+
+    /// Whether it turns; for files, which say it of slides alone.
+    #[must_use]
+    pub fn is_turning(&self) -> bool {
+        *self == Self::Revolute
     }
 
     /// What its coordinate is measured in, and how that is shown: an angle, or a way.
