@@ -3,7 +3,7 @@
 //! `oracle` compares with tools that share no code with ours, `golden` with figures that others published; `property`
 //! holds for any input; `recovery` puts known errors in and gets them back, `gripper_tag` with a tag that ties tool to
 //! camera, `map` with tags that nobody surveyed, `methods` by the paper's other methods, `detections` with some that
-//! are wrong, `failed` with sensors that fail, `eye_to_hand` with a camera that stands still; `wall` proves what belief
+//! are wrong, `failed` with sensors that fail, `eye_to_hand` with a camera that stands still, `slides` with joints that slide; `wall` proves what belief
 //! does not know; `vehicles` puts every arm on every vehicle; `bumps` runs into things that nobody has drawn;
 //! `planning` reads plans and holds random arms against them; `determinism`, `closed_loop`, `script` and `cli` run the
 //! program, `kill` ends it badly; `sim` looks at the simulated world from outside; `uncalibrated` calibrates arms of
@@ -46,6 +46,7 @@ mod report;
 mod repository;
 mod script;
 mod sim;
+mod slides;
 mod streams;
 mod support;
 mod tagmap;

@@ -82,7 +82,8 @@ impl Values<'_> {
 
     fn is_within(&self, unit: JointUnit, reading: &Reading, joint: usize) -> bool {
         let spec = &self.sensors[joint];
-        let most_rad = if spec.is_limited() { RANGE_FACTOR * spec.half_range_rad + BEYOND_RANGE_RAD } else { TURNS_RAD };
+        let most_rad =
+            if spec.is_limited() { RANGE_FACTOR * spec.half_range_rad + BEYOND_RANGE_RAD } else { TURNS_RAD };
         (self.angle_rad(unit, reading, joint) - spec.center_rad).abs() <= most_rad
     }
 

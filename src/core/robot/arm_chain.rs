@@ -57,7 +57,9 @@ pub(super) fn find_arm(urdf: &UrdfModel, ends: &Ends<'_>) -> Result<FoundArm, Fi
     candidates.sort_by_key(|candidate| std::cmp::Reverse(candidate.joints.len()));
     let Some(best) = candidates.first() else {
         let problem = match (ends.base, ends.tip) {
-            (Some(base), Some(tip)) => format!("no revolute, continuous or prismatic joint lies between `{base}` and `{tip}`"),
+            (Some(base), Some(tip)) => {
+                format!("no revolute, continuous or prismatic joint lies between `{base}` and `{tip}`")
+            }
             _ => "no chain of revolute, continuous or prismatic joints was found".to_owned(),
         };
         return Err(FileIssue::new(&urdf.file, "joint", problem));

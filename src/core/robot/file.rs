@@ -160,8 +160,8 @@ fn planning_issues(file: &Path, raw: &RobotFile, camera: &CameraSpec, arm: &Urdf
         issues.push(lens_issue(file));
     }
     if let Some(slide) = arm.chain.joints().iter().find(|joint| joint.kind.is_slide()) {
-        let problem = "is prismatic; nothing plans, simulates or follows an arm with slides in its chain yet: calibrate \
-                       works on recordings of it";
+        let problem = "is prismatic, and an arm with slides is neither simulated nor planned for yet: `armcal \
+                       calibrate` works on recordings of it";
         issues.push(FileIssue::new(&arm.urdf.file, format!("joint `{}`", slide.name), problem));
     }
     if camera.mount.n_joints == 0 && raw.tag_link.is_none() {

@@ -305,14 +305,9 @@ fn check_sensor(file: &Path, s: &SensorFile, joint: &ChainJoint) -> Result<Joint
 }
 
 /// Oil per radian of each joint (per metre of a slide), where the file says it.
-pub(super) fn displacements(
-    file: &Path,
-    sensors: &[SensorFile],
-    chain: &Chain,
-) -> Result<Vec<Option<f64>>, FileIssue> {
-    let of_joint = |(table, joint): (&SensorFile, &ChainJoint)| {
-        OfJoint { file, table, kind: joint.kind }.given(&DISPLACEMENT)
-    };
+pub(super) fn displacements(file: &Path, sensors: &[SensorFile], chain: &Chain) -> Result<Vec<Option<f64>>, FileIssue> {
+    let of_joint =
+        |(table, joint): (&SensorFile, &ChainJoint)| OfJoint { file, table, kind: joint.kind }.given(&DISPLACEMENT);
     sensors.iter().zip(chain.joints()).map(of_joint).collect()
 }
 

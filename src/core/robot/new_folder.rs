@@ -323,7 +323,8 @@ temperature_std_rad_per_k = 1e-5
 drift_std_rad_per_sqrt_h = 1e-5
 ";
 
-const SLIDE_SENSOR: &str = "# A slide: its figures are in metres. Assumed: a linear encoder that counts metres, homed at a switch (5 mm), on a
+const SLIDE_SENSOR: &str =
+    "# A slide: its figures are in metres. Assumed: a linear encoder that counts metres, homed at a switch (5 mm), on a
 # drive whose scale is known to 2 mm in a metre; a metre of steel grows by 0.01 mm per kelvin. For raw words write the
 # datasheet's counts per millimetre.
 kind = \"encoder\"  # assumed; or potentiometer, resolver

@@ -409,7 +409,8 @@ fn check_moving(file: &Path, joint: &urdf_rs::Joint) -> Result<(), RobotError> {
     FileIssue::check_range(file, &format!("joint `{}`: effort", joint.name), joint.limit.effort, 0.0..=1e7)?;
     let (lower, upper) = (joint.limit.lower, joint.limit.upper);
     if matches!(joint.joint_type, JointType::Revolute | JointType::Prismatic)
-        && !(lower.is_finite() && upper.is_finite() && lower < upper) {
+        && !(lower.is_finite() && upper.is_finite() && lower < upper)
+    {
         let key = format!("joint `{}`: limit", joint.name);
         return Err(FileIssue::new(file, key, format!("lower {lower} must lie below upper {upper}")).into());
     }

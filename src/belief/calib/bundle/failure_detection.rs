@@ -214,9 +214,10 @@ impl FailureSearch<'_> {
                 let (kind, reading, views) = (FailedKind::Jumps, SensorUse::Used, views.clone());
                 Failure { kind, reading, views, evidence, ..all }
             }
-            FailurePattern::Lasting { since, step_rad } => {
-                Failure { found, ..Failure::slip((joint, self.robot.sensors[joint].unit()), *step_rad, self.views, *since) }
-            }
+            FailurePattern::Lasting { since, step_rad } => Failure {
+                found,
+                ..Failure::slip((joint, self.robot.sensors[joint].unit()), *step_rad, self.views, *since)
+            },
         }
     }
 

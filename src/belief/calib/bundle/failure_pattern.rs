@@ -229,9 +229,7 @@ impl Readings {
             FailurePattern::Stuck(n_still) => {
                 let shown = range(&self.angle_rad[n - n_still..], 1);
                 let since = if *n_still < n { "the last " } else { "" };
-                format!(
-                    "the reading stands still over {since}{n_still} views while the camera shows {shown} of motion"
-                )
+                format!("the reading stands still over {since}{n_still} views while the camera shows {shown} of motion")
             }
             FailurePattern::Dead => {
                 format!("the reading spans {} and does not follow the {} that the camera shows", read(1), shown(1))

@@ -221,7 +221,11 @@ impl VerdictInput<'_> {
             let walked_rad = if self.found.model.walk.is_some() { scales.walk_std_rad[joint] } else { 0.0 };
             let std_rad = scales.joint_std_rad[joint];
             let limit_rad = MAX_OVER_LINEARITY * spec.linearity_std_rad.max(stated.joint_std_rad[joint]);
-            let check = Check::at_most(format!("{}: error from view to view, {}", spec.joint, spec.moves.si()), std_rad, limit_rad);
+            let check = Check::at_most(
+                format!("{}: error from view to view, {}", spec.joint, spec.moves.si()),
+                std_rad,
+                limit_rad,
+            );
             if !check.holds && self.found.has_positions() {
                 // Their noise has no datasheet, and one landmark a view cannot part it from the joints' errors.
                 let (found, name) = (spec.unit().shown(std_rad, 2), &spec.joint);
@@ -418,7 +422,12 @@ impl VerdictInput<'_> {
         let above = [0.0, SCALE_BOUNDS[1]];
         for (joint, spec) in robot.sensors.iter().enumerate().take(robot.n_seen_joints()) {
             let (now_rad, first_rad) = (now.joint_std_rad[joint], first.joint_std_rad[joint]);
-            all.push((format!("{}: error from view to view, {}", spec.joint, spec.moves.si()), now_rad, first_rad, above));
+            all.push((
+                format!("{}: error from view to view, {}", spec.joint, spec.moves.si()),
+                now_rad,
+                first_rad,
+                above,
+            ));
             let (now_rad, first_rad) = (now.shape_std_rad[joint], first.shape_std_rad[joint]);
             all.push((format!("{}: nonlinearity, rad", spec.joint), now_rad, first_rad, above));
         }

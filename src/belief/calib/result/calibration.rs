@@ -122,6 +122,12 @@ pub struct Calibration {
 }
 
 impl Calibration {
+    /// Whether any joint slides.
+    #[must_use]
+    pub fn has_slide(&self) -> bool {
+        self.joint.iter().any(|joint| joint.moves.is_slide())
+    }
+
     /// Refuses for `reasons`, if there are any, behind those that it was refused for before.
     pub(crate) fn refuse_for(&mut self, reasons: impl IntoIterator<Item = Refusal>) {
         self.refusals.extend(reasons);

@@ -207,7 +207,7 @@ impl Calibration {
         let more = if self.reference.is_some() { TERMS_HEAD } else { "" };
         let hashed = Self { covariance_hash: self.hash_of_covariance(), ..self.clone() };
         let body = toml::to_string(&hashed).expect("plain tables and finite numbers have a TOML form");
-        let slides = if self.joint.iter().any(|joint| joint.moves.is_slide()) { SLIDE_HEAD } else { "" };
+        let slides = if self.has_slide() { SLIDE_HEAD } else { "" };
         format!("{head}{more}{slides}{}", in_metres(&body))
     }
 

@@ -84,9 +84,7 @@ fn slides_are_moved_to_reach_a_place_and_stay_within_their_limits() {
         let seed = angles(&mut rng);
         let mut there = seed;
         (0..N).filter(|j| chain.joints()[*j].kind.is_slide()).for_each(|j| there[j] = rng.random_range(-1.0..1.0));
-        let goal = |angles: &JointAngles| IkGoal {
-            position_m: (chain.frame(angles, &tip) * Point3::origin()).coords,
-        };
+        let goal = |angles: &JointAngles| IkGoal { position_m: (chain.frame(angles, &tip) * Point3::origin()).coords };
         let found = solve_position(&chain, &tip, &goal(&there), &seed, &settings).expect("two slides reach it");
         assert!((goal(&found).position_m - goal(&there).position_m).norm() < 1e-6);
         assert!(found.iter().all(|at| at.abs() <= 1.0));
