@@ -195,8 +195,8 @@ fn calibrated(data: CalibrationData) -> Calibration {
     calibrate_data(data, Method::Bundle, None).expect("calibrated")
 }
 
-/// Squared errors of gains and offsets over their covariance, two degrees of freedom a joint, and of the tool at one pose of
-/// the arm, three.
+/// Squared errors of gains and offsets over their covariance, two degrees of freedom a joint, and of the tool at one
+/// pose of the arm, three.
 pub struct SquaredErrors {
     pub parameters: f64,
     pub each: Vec<f64>,

@@ -3,8 +3,8 @@
 //! `oracle` compares with tools that share no code with ours, `golden` with figures that others published; `property`
 //! holds for any input; `recovery` puts known errors in and gets them back, `gripper_tag` with a tag that ties tool to
 //! camera, `map` with tags that nobody surveyed, `methods` by the paper's other methods, `detections` with some that
-//! are wrong, `failed` with sensors that fail, `eye_to_hand` with a camera that stands still, `slides` with joints that slide; `wall` proves what belief
-//! does not know; `vehicles` puts every arm on every vehicle; `bumps` runs into things that nobody has drawn;
+//! are wrong, `failed` with sensors that fail, `eye_to_hand` with a camera that stands still, `slides` with joints that
+//! slide; `wall` proves what belief does not know; `vehicles` puts every arm on every vehicle; `bumps` runs into things that nobody has drawn;
 //! `planning` reads plans and holds random arms against them; `determinism`, `closed_loop`, `script` and `cli` run the
 //! program, `kill` ends it badly; `sim` looks at the simulated world from outside; `uncalibrated` calibrates arms of
 //! which little is known; `real` reads recordings of real arms, `board_corners` those of a chessboard, `bags` the same

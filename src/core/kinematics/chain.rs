@@ -70,7 +70,8 @@ impl JointLimits {
     }
 }
 
-/// One moving joint: fixed transform from the parent joint's link frame, then a rotation about `axis`, or a way along it.
+/// One moving joint: fixed transform from the parent joint's link frame, then a rotation about `axis`, or a way along
+/// it.
 #[derive(Clone, Debug)]
 pub struct ChainJoint {
     /// Name of the joint in the URDF.

@@ -49,7 +49,10 @@ fn table(calibration: &Calibration) -> Markup {
                 @for joint in &calibration.joint {
                     tr {
                         @let unit = joint.moves.unit();
-                        td { (joint.name) @if joint.moves.is_slide() { " (slide, mm)" } @if !is_estimated(joint) { " " small { "(not calibrated)" } } }
+                        td {
+                            (joint.name) @if joint.moves.is_slide() { " (slide, mm)" }
+                            @if !is_estimated(joint) { " " small { "(not calibrated)" } }
+                        }
                         td { (format!("{:.8}", joint.gain_rad_per_count)) }
                         @let gain_std = joint.gain_std_rad_per_count / joint.gain_rad_per_count.abs();
                         td { (format!("{:.2}", 100.0 * gain_std)) }

@@ -240,8 +240,8 @@ impl VerdictInput<'_> {
                 let kind = FindingKind::OffsetWalks;
                 calibration.findings.push(Finding { kind, repaired: true, ..worn(spec, walked_rad) });
                 table.warnings.push(format!(
-                    "{} has an offset that walks at random, by {} (std) while the views were captured: as much again is \
-                     counted in the predicted tool error; calibrate again soon, or keep the belief up online",
+                    "{} has an offset that walks at random, by {} (std) while the views were captured: as much again \
+                     is counted in the predicted tool error; calibrate again soon, or keep the belief up online",
                     spec.joint,
                     spec.unit().shown(walked_rad, 2)
                 ));
