@@ -123,18 +123,61 @@ fn what_stands_beside_the_chain_is_no_error() {
     assert!(load(&bench.file("robot")).expect("it reads").bodies.iter().all(|body| body.visuals.is_empty()));
 }
 
+/// A chain of `n` joints whose first slides.
+fn on_a_slide(n: usize) -> String {
+    chain("arm", "base", n).replacen("revolute", "prismatic", 1)
+}
+
 #[test]
-fn a_prismatic_joint_in_the_chain_is_named() {
+fn slides_are_joints_of_the_arm() {
+    let bench = made(&urdf(&on_a_slide(4)), &[]);
+    assert_eq!(joints(&bench), ["arm1", "arm2", "arm3", "arm4"]);
+    bench.check().expect("check", 0, &["warning", "joint `arm1`", "prismatic", "calibrate"]);
+    let robot = load(&bench.file("robot")).expect("it reads");
+    let slide = &robot.sensors[0];
+    assert!(slide.moves.is_slide() && !robot.sensors[1].moves.is_slide());
+    // One count is one metre, as one is one radian for the others.
+    assert_eq!((slide.counts_per_rad, slide.center_rad, slide.half_range_rad), (1.0, 0.5, 1.5));
+    // Named without it, the arm begins behind the slide.
+    assert_eq!(joints(&made(&urdf(&on_a_slide(4)), &["--base", "arm_link1"])), ["arm2", "arm3", "arm4"]);
+    // What carries nine joints is not of the arm.
+    let bench = made(&urdf(&on_a_slide(9)), &[]);
+    assert_eq!((joints(&bench).len(), joints(&bench)[0].as_str()), (8, "arm2"));
+    assert_eq!(load(&bench.file("robot")).expect("it reads").base_link, "arm_link1");
+}
+
+#[test]
+fn a_gripper_of_one_jaw_that_slides_is_not_the_arm() {
+    let jaw = |upper: &str| {
+        let slide = joint("jaw", "prismatic", "arm_link4", "jaw");
+        "<link name=\"jaw\"/>".to_owned() + &slide.replace("lower=\"-1\" upper=\"2\"", upper)
+    };
+    let with = |upper: &str| joints(&made(&urdf(&(chain("arm", "base", 4) + &jaw(upper))), &[])).len();
+    assert_eq!(with("lower=\"0\" upper=\"0.08\""), 4);
+    assert_eq!(with("lower=\"0\" upper=\"0.2\""), 5, "the quill of a SCARA arm");
+}
+
+#[test]
+fn figures_of_a_slide_in_the_unit_of_an_angle_are_named() {
     let text = urdf(&chain("arm", "base", 3));
     let bench = made(&text, &[]);
     write(&bench.file("robot/arm.urdf"), &text.replacen("revolute", "prismatic", 1));
-    bench.check().expect("check", 2, &["`arm1`", "prismatic", "only revolute, continuous and fixed"]);
-    // After a slide the chain begins.
-    let slide =
-        text.replacen("revolute", "prismatic", 1).replace("</robot>", &(chain("b", "arm_link3", 2) + "</robot>"));
-    let bench = made(&slide, &[]);
-    assert_eq!(joints(&bench), ["arm2", "arm3", "b1", "b2"]);
-    assert_eq!(load(&bench.file("robot")).expect("it reads").base_link, "arm_link1");
+    bench.check().expect(
+        "rad",
+        2,
+        &["robot.toml", "`arm1`: scale_counts_per_deg", "scale_counts_per_mm, offset_std_m"],
+    );
+    let bench = made(&urdf(&on_a_slide(3)), &[]);
+    let robot_toml = bench.file("robot/robot.toml");
+    let whole = read(&robot_toml);
+    write(&robot_toml, &whole.replacen("offset_std_m", "offset_std_rad", 1));
+    bench.check().expect("one key", 2, &["[[joint_sensor]] `arm1`: offset_std_m"]);
+    write(&robot_toml, &whole.replacen("wrap_counts = 1e6", "wrap_counts = 2", 1));
+    bench.check().expect("a short word", 2, &["`arm1`: wrap_counts", "less than the 3 counts"]);
+    write(&robot_toml, &whole.replacen("max_rate_m_s = 1.5", "max_rate_m_s = 25.0", 1));
+    bench.check().expect("a fast slide", 2, &["`arm1`: max_rate_m_s", "0.001 .. 20"]);
+    write(&robot_toml, &whole[..whole.find("[[joint_sensor]]").expect("sensors")]);
+    bench.check().expect("none", 2, &["missing", "`arm1` (kind", "scale_counts_per_mm", "`arm2`, `arm3` (kind"]);
 }
 
 #[test]

@@ -53,7 +53,7 @@ fn drawn_board() -> Isometry3<f64> {
 }
 
 /// Where the joints are that were meant for `angles`: what no curve explains, a tenth of the datasheet's linearity.
-fn off_from_view_to_view(robot: &Robot, angles: &JointAngles, rng: &mut ChaCha8Rng) -> JointAngles {
+pub fn off_from_view_to_view(robot: &Robot, angles: &JointAngles, rng: &mut ChaCha8Rng) -> JointAngles {
     JointAngles::from_fn(angles.len(), |j| angles[j] + 0.1 * robot.sensors[j].linearity_std_rad * normal(rng))
 }
 
@@ -195,22 +195,24 @@ fn calibrated(data: CalibrationData) -> Calibration {
     calibrate_data(data, Method::Bundle, None).expect("calibrated")
 }
 
-/// Squared errors of gains and offsets over their covariance, ten degrees of freedom, and of the tool at one pose of
-/// the arm, three.
-struct SquaredErrors {
-    parameters: f64,
-    each: Vec<f64>,
-    tool: f64,
+/// Squared errors of gains and offsets over their covariance, two degrees of freedom a joint, and of the tool at one
+/// pose of the arm, three.
+pub struct SquaredErrors {
+    pub parameters: f64,
+    pub each: Vec<f64>,
+    pub tool: f64,
     /// The tool's predicted error there.
-    predicted_m: f64,
+    pub predicted_m: f64,
 }
 
-fn squared_errors(arm: &TrueArm<'_>, found: &Calibration, rng: &mut ChaCha8Rng) -> SquaredErrors {
+pub fn squared_errors(arm: &TrueArm<'_>, found: &Calibration, rng: &mut ChaCha8Rng) -> SquaredErrors {
     let robot = arm.robot;
     let (sensors, covariance) = (found.sensors(robot).expect("of this robot"), found.parameter_covariance(robot));
-    let is_wanted = |p: &Parameter| p.joint < N_SEEN && matches!(p.kind, ParameterKind::Gain | ParameterKind::Offset);
+    let is_wanted = |p: &Parameter| {
+        p.joint < robot.n_seen_joints() && matches!(p.kind, ParameterKind::Gain | ParameterKind::Offset)
+    };
     let rows: Vec<usize> = (0..covariance.parameters.len()).filter(|k| is_wanted(&covariance.parameters[*k])).collect();
-    assert_eq!(rows.len(), 2 * N_SEEN, "gain and offset of each joint before the camera");
+    assert_eq!(rows.len(), 2 * robot.n_seen_joints(), "gain and offset of each joint before the camera");
     let error = DVector::from_iterator(
         rows.len(),
         rows.iter().map(|row| {
@@ -237,7 +239,7 @@ fn squared_errors(arm: &TrueArm<'_>, found: &Calibration, rng: &mut ChaCha8Rng) 
 }
 
 /// A sum of squares of independent normals lies within this, but for one time in a thousand.
-fn by_chance(dof: usize) -> std::ops::Range<f64> {
+pub fn by_chance(dof: usize) -> std::ops::Range<f64> {
     chi_square_quantile(0.0005, dof)..chi_square_quantile(0.9995, dof)
 }
 

@@ -118,7 +118,7 @@ fn the_second_arm_has_the_lengths_and_the_reach_of_its_datasheet() {
     let zero = JointAngles::zeros(6);
     let poses = robot.chain.link_poses(&zero);
     let tool = tool_m(&robot, &poses);
-    let axes: Vec<Vector3<f64>> = (1..5).map(|joint| *poses.joint_origin(joint)).collect();
+    let axes: Vec<Vector3<f64>> = (1..5).map(|joint| poses.joint_origin(joint)).collect();
     let lengths = [axes[1] - axes[0], axes[2] - axes[1], axes[3] - axes[2], tool - axes[3]].map(|d| d.norm());
     for (length_m, published_m) in lengths.iter().zip([0.875, 0.566, 0.121, 0.359]) {
         assert!((length_m - published_m).abs() < TOLERANCE_M, "{lengths:?}");

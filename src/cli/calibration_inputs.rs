@@ -33,6 +33,9 @@ use armcal_core::streams::{Message, ReachTask};
 use armcal_core::text::counted;
 use armcal_core::time::Stamp;
 
+/// What keeps up a belief message by message.
+const ONLINE: &str = "the belief kept up online";
+
 /// All that a calibration from files is made of.
 pub(super) struct CalibrationInputs<'a> {
     pub recordings: &'a [PathBuf],
@@ -131,6 +134,7 @@ impl CalibrationInputs<'_> {
 
     /// A belief that has heard nothing yet, of an arm whose recordings armcal makes.
     pub fn listener(&self, settings: OnlineSettings) -> Result<Listener> {
+        self.robot.require_turning(ONLINE)?;
         let survey = self.survey(self.landmarks()?)?;
         self.robot.require_lens()?;
         let has_map = survey.is_some();
@@ -151,6 +155,7 @@ impl CalibrationInputs<'_> {
         settings: OnlineSettings,
         hear: &mut dyn FnMut(&Follower, Vec<OnlineEvent>),
     ) -> Result<(Follower, bool)> {
+        self.robot.require_turning(ONLINE)?;
         if let Some(file) = self.input {
             let (prepared, lost) = self.external_views(file, self.landmarks()?, self.task()?)?;
             let mut follower = Follower::new(prepared.robot.clone(), settings);
@@ -177,6 +182,7 @@ impl CalibrationInputs<'_> {
 
     /// The batch of all marked views, and whether a recording had lost something.
     pub fn batch(&self) -> Result<(Batch, bool)> {
+        self.robot.require_turning(ONLINE)?;
         let (task, landmarks) = (self.task()?, self.landmarks()?);
         let (prepared, lost) = match self.input {
             Some(file) => self.external_views(file, landmarks, task)?,

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
+use serde_json::Value;
 
 use crate::cli::calibration_inputs::load_robot;
 use crate::cli::exit::{Exit, UsageError};
@@ -15,7 +16,7 @@ use crate::export::{
     ros2_control, tagslam_map,
 };
 use armcal_belief::calib::{
-    Calibration, CalibrationFileError, CompactCalibration, CovarianceTable, LookupTable, Status,
+    Calibration, CalibrationFileError, CompactCalibration, CovarianceTable, LookupTable, Status, metric,
 };
 use armcal_core::files::{self, FileKind as Size};
 use armcal_core::robot::Robot;
@@ -128,7 +129,9 @@ pub(super) fn export(args: &ExportArgs) -> Result<Exit> {
 fn of_full(calibration: &Calibration, robot: Option<&Robot>, args: &ExportArgs) -> Result<String> {
     let file = &args.file;
     Ok(match args.form {
+        Form::Yaml if calibration.has_slide() => to_yaml(&FullView::of(calibration).in_own_units()?)?,
         Form::Yaml => to_yaml(&FullView::of(calibration))?,
+        Form::Json if calibration.has_slide() => format!("{:#}", FullView::of(calibration).in_own_units()?),
         Form::Json => {
             serde_json::to_string_pretty(&FullView::of(calibration)).context("the calibration has no JSON form")?
         }
@@ -217,6 +220,28 @@ impl<'a> FullView<'a> {
         let covariance = Some(&calibration.covariance).filter(|table| !table.parameters.is_empty());
         Self { calibration, lookup: calibration.lookup(), covariance }
     }
+
+    /// With the keys of slides in metres, as in calibration.toml.
+    fn in_own_units(&self) -> Result<Value> {
+        let mut view = serde_json::to_value(self).context("the calibration has no JSON form")?;
+        let is_slide = |name: Option<&str>| {
+            self.calibration.joint.iter().any(|joint| joint.moves.is_slide() && Some(joint.name.as_str()) == name)
+        };
+        for (list, name) in [("joint", "name"), ("lookup", "joint")] {
+            let entries = view.get_mut(list).and_then(Value::as_array_mut);
+            for entry in entries.into_iter().flatten() {
+                if is_slide(entry.get(name).and_then(Value::as_str)) {
+                    *entry = in_metres(entry);
+                }
+            }
+        }
+        Ok(view)
+    }
+}
+
+fn in_metres(value: &Value) -> Value {
+    let Value::Object(table) = value else { return value.clone() };
+    Value::Object(table.iter().map(|(key, value)| (metric(key), in_metres(value))).collect())
 }
 
 /// A compact calibration, and with its robot at hand the same corrections under the keys of calibration.toml.

@@ -22,7 +22,7 @@ pub(super) struct NewRobotArgs {
     /// Link whose frame is the base frame; default: the root
     #[arg(long, value_name = "LINK")]
     base: Option<String>,
-    /// Link of the tool; default: the end of the longest chain of revolute joints
+    /// Link of the tool; default: the end of the longest chain of joints
     #[arg(long, value_name = "LINK")]
     tip: Option<String>,
     /// Link of the camera's optical frame; default: a link that is called camera or optical, else the tool's

@@ -2,8 +2,10 @@
 
 use std::fmt::Write as _;
 
+use crate::export::table::own_key;
 use crate::export::yaml_text::{double, doubles, quoted};
 use armcal_belief::calib::{Calibration, JointResult, Status, TermsTable};
+use armcal_core::kinematics::JointKind;
 use armcal_core::robot::Robot;
 
 const HEAD: &str = "\
@@ -16,10 +18,18 @@ const HEAD: &str = "\
 # is in calibration.covariance.toml.
 ";
 
+const SLIDES: &str = "# Of joints with unit m, which slide, keys have _m in the place of _rad.\n";
+
 /// The parameters of `calibration`, which is one of `robot`'s, under `/**` and the prefix `calibration`.
 #[must_use]
 pub fn ros_parameters(robot: &Robot, calibration: &Calibration) -> String {
-    let mut file = Parameters { text: format!("{HEAD}/**:\n  ros__parameters:\n    calibration:\n"), indent: 6 };
+    let has_slide = calibration.has_slide();
+    let head = if has_slide { format!("{HEAD}{SLIDES}") } else { HEAD.to_owned() };
+    let mut file = Parameters {
+        text: format!("{head}/**:\n  ros__parameters:\n    calibration:\n"),
+        indent: 6,
+        moves: JointKind::Revolute,
+    };
     let status = if calibration.status == Status::Accepted { "accepted" } else { "refused" };
     file.text("robot", &calibration.robot);
     file.text("status", status);
@@ -35,6 +45,10 @@ pub fn ros_parameters(robot: &Robot, calibration: &Calibration) -> String {
     }
     for (joint, spec) in calibration.joint.iter().zip(&robot.sensors) {
         file.open(&quoted(&joint.name));
+        file.moves = joint.moves;
+        if joint.moves.is_slide() {
+            file.text("unit", joint.moves.si());
+        }
         file.number("center_rad", joint.center_rad);
         file.number("center_counts", spec.offset_counts + spec.counts_per_rad * spec.center_rad);
         file.number("wrap_counts", spec.wrap_counts);
@@ -44,6 +58,7 @@ pub fn ros_parameters(robot: &Robot, calibration: &Calibration) -> String {
             file.terms(terms, joint, spec.counts_per_rad);
         }
         file.covariance(calibration, &joint.name);
+        file.moves = JointKind::Revolute;
         file.close();
     }
     file.text
@@ -52,11 +67,13 @@ pub fn ros_parameters(robot: &Robot, calibration: &Calibration) -> String {
 struct Parameters {
     text: String,
     indent: usize,
+    /// Of the joint whose keys are written.
+    moves: JointKind,
 }
 
 impl Parameters {
     fn line(&mut self, key: &str, value: &str) {
-        let _ = writeln!(self.text, "{:1$}{key}: {value}", "", self.indent);
+        let _ = writeln!(self.text, "{:1$}{2}: {value}", "", self.indent, own_key(self.moves, key));
     }
 
     fn open(&mut self, key: &str) {

@@ -23,6 +23,9 @@ const HEAD: &str = "\
 #[must_use]
 pub fn ros2_control(robot: &Robot, sensors: &ArmSensors) -> String {
     let mut text = HEAD.to_owned();
+    if robot.first_slide().is_some() {
+        text += "  Of prismatic joints all that is in rad is in m.\n";
+    }
     for bent in joints_with_terms(sensors) {
         let _ = writeln!(text, "  Not in it: the terms of {} beyond gain and offset.", comment_text(bent));
     }

@@ -10,7 +10,8 @@ const SCALARS: [&str; 5] =
     ["offset_rad_per_k", "gain_per_k", "offset_rad_per_mpa", "drift_rad_per_h", "half_backlash_rad"];
 
 /// CSV with the keys of calibration.toml as columns; a term's column is followed by that of its standard deviation. A
-/// cell is empty where calibration.toml has no such key.
+/// cell is empty where calibration.toml has no such key. Where the arm has slides, names of columns have no `_rad`, and
+/// the last one, `unit`, says rad or m.
 #[must_use]
 pub fn csv_rows(calibration: &Calibration) -> String {
     let with_std = |key: String| [key.clone(), format!("{key}_std")];
@@ -32,7 +33,12 @@ pub fn csv_rows(calibration: &Calibration) -> String {
         "half_range_rad",
     ];
     let head: Vec<String> = fixed.map(str::to_owned).into_iter().chain(nonlinearity).chain(scalars).collect();
-    let rows = calibration.joint.iter().map(row);
+    let has_slide = calibration.has_slide();
+    // Columns of several units have it in a column.
+    let head = if has_slide { head.iter().map(|key| key.replace("_rad", "")).collect() } else { head };
+    let unit = |joint: &JointResult| has_slide.then(|| joint.moves.si().to_owned());
+    let head: Vec<String> = head.into_iter().chain(has_slide.then(|| "unit".to_owned())).collect();
+    let rows = calibration.joint.iter().map(|joint| row(joint).into_iter().chain(unit(joint)).collect());
     let lines: Vec<String> = std::iter::once(head).chain(rows).map(|cells| cells.join(",")).collect();
     lines.join("\n") + "\n"
 }

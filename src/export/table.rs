@@ -2,7 +2,8 @@
 
 use std::fmt::Write as _;
 
-use armcal_core::kinematics::JointLimits;
+use armcal_belief::calib::metric;
+use armcal_core::kinematics::{ChainJoint, JointKind, JointLimits};
 use armcal_core::robot::Robot;
 use armcal_core::sensor::{ArmSensors, ConditionChange, SensorModel};
 
@@ -29,8 +30,9 @@ pub struct SensorTable {
 #[derive(Clone, Debug, PartialEq)]
 struct JointTable {
     name: String,
+    moves: JointKind,
     wrap_counts: f64,
-    /// Counts, ascending and unwrapped, and the angle there, rad.
+    /// Counts, ascending and unwrapped, and the angle there, rad; m of a slide.
     points: Vec<(f64, f64)>,
 }
 
@@ -90,11 +92,17 @@ impl SensorTable {
         for line in &self.conditions {
             let _ = writeln!(text, "# {line}");
         }
-        text += "joint,counts,angle_rad\n";
+        let has_slide = self.joints.iter().any(|joint| joint.moves.is_slide());
+        if has_slide {
+            // What is said of the column above holds of this one.
+            text = text.replace("# angle_rad: exact", "# position: of joints that turn rad, of slides m; exact");
+        }
+        text += if has_slide { "joint,counts,position,unit\n" } else { "joint,counts,angle_rad\n" };
         for joint in &self.joints {
             let name = csv_field(&joint.name);
+            let unit = if has_slide { format!(",{}", joint.moves.si()) } else { String::new() };
             for (counts, angle_rad) in &joint.points {
-                let _ = writeln!(text, "{name},{counts},{angle_rad}");
+                let _ = writeln!(text, "{name},{counts},{angle_rad}{unit}");
             }
         }
         text
@@ -143,7 +151,7 @@ impl TravelRange {
         let place = |travel_rad: f64| (center_counts + spec.counts_per_rad * travel_rad, angle_rad(model, travel_rad));
         let mut points: Vec<(f64, f64)> = self.places_rad(points).into_iter().map(place).collect();
         points.sort_by(|a, b| a.0.total_cmp(&b.0));
-        JointTable { name: spec.joint.clone(), wrap_counts: spec.wrap_counts, points }
+        JointTable { name: spec.joint.clone(), moves: spec.moves, wrap_counts: spec.wrap_counts, points }
     }
 
     /// The largest difference between the sensor and straight lines between its points, rad.
@@ -175,10 +183,22 @@ fn levers_m(robot: &Robot) -> Vec<f64> {
     let mut lever_m = robot.tool.mount.link_from_frame.translation.vector.norm();
     let mut levers_m = vec![0.0; joints.len()];
     for joint in (0..joints.len()).rev() {
-        levers_m[joint] = lever_m;
-        lever_m += joints[joint].parent_from_joint.translation.vector.norm();
+        // A metre of a slide is a metre of the tool.
+        levers_m[joint] = if joints[joint].kind.is_slide() { 1.0 } else { lever_m };
+        lever_m += joints[joint].parent_from_joint.translation.vector.norm() + stroke_m(&joints[joint]);
     }
     levers_m
+}
+
+/// The farthest that a slide puts what it carries from its own place, m.
+fn stroke_m(joint: &ChainJoint) -> f64 {
+    let limits = joint.limits.filter(|_| joint.kind.is_slide());
+    limits.map_or(0.0, |limits| limits.lower_rad.abs().max(limits.upper_rad.abs()))
+}
+
+/// A key of calibration.toml as a joint has it: in m for a slide.
+pub(super) fn own_key(moves: JointKind, key: &str) -> String {
+    if moves.is_slide() { metric(key) } else { key.to_owned() }
 }
 
 fn conditions_of(model: &SensorModel) -> Option<String> {
@@ -190,8 +210,11 @@ fn conditions_of(model: &SensorModel) -> Option<String> {
         ("drift_rad_per_h", terms.drift_rad_per_h),
         ("half_backlash_rad", terms.half_backlash_rad),
     ];
-    let known: Vec<String> =
-        coefficients.iter().filter(|(_, value)| *value != 0.0).map(|(key, value)| format!("{key} {value}")).collect();
+    let known: Vec<String> = coefficients
+        .iter()
+        .filter(|(_, value)| *value != 0.0)
+        .map(|(key, value)| format!("{} {value}", own_key(model.spec.moves, key)))
+        .collect();
     let name = model.spec.joint.escape_debug();
     (!known.is_empty())
         .then(|| format!("{name}, not in its rows (calibration.toml, [joint.terms]): {}", known.join(", ")))

@@ -100,7 +100,7 @@ pub(super) fn build_views(run: &ReplayScene) -> Vec<Entry> {
     let left = b.container(ContainerKind::Vertical, &[(scene, 5.0), (summary, 4.0)]);
     let title = "A view's sightings from the mean of their tag's [mm]";
     let sightings = b.plot(title, SIGHTING, legend(Corner2D::RightTop), run);
-    let angles = b.plot("Joint angles as calibrated [deg]", JOINT_ANGLE, legend(Corner2D::RightTop), run);
+    let angles = b.plot(joints_title(run), JOINT_ANGLE, legend(Corner2D::RightTop), run);
     let right = b.container(ContainerKind::Vertical, &[(sightings, 3.0), (angles, 2.2)]);
     let root = b.container(ContainerKind::Horizontal, &[(left, 3.0), (right, 2.0)]);
     b.finish(&root, run)
@@ -305,5 +305,12 @@ impl Builder {
         let time = time.with_play_state(play).with_playback_speed(speed);
         self.add("time_panel".to_owned(), time);
         self.entries
+    }
+}
+
+fn joints_title(run: &ReplayScene) -> &'static str {
+    match run.robot.first_slide() {
+        Some(_) => "Joints as calibrated [deg; slides mm]",
+        None => "Joint angles as calibrated [deg]",
     }
 }

@@ -75,16 +75,17 @@ fn draw_angles(run: &ReplayScene, stream: &mut EntityLog) {
     interrupt(run, stream, &believed);
     for time_s in run.tracks.ticks(FAST_HZ) {
         if let Some(angles) = run.tracks.believed.at(time_s) {
-            stream.draw(&believed, time_s, &degrees(angles));
+            stream.draw(&believed, time_s, &shown(run, angles));
         }
         if let Some(angles) = run.truth.as_ref().and_then(|truth| truth.angles(time_s)) {
-            stream.draw(&truth, time_s, &degrees(&angles));
+            stream.draw(&truth, time_s, &shown(run, &angles));
         }
     }
 }
 
-fn degrees(angles: &JointAngles) -> Scalars {
-    Scalars::new(angles.iter().map(|angle_rad| angle_rad.to_degrees()))
+/// Degrees; millimetres of slides.
+fn shown(run: &ReplayScene, angles: &JointAngles) -> Scalars {
+    Scalars::new(angles.iter().zip(&run.robot.sensors).map(|(angle_rad, spec)| angle_rad * spec.unit().scale()))
 }
 
 /// Believed - true, by the shorter way round, at the moments of the belief so that motion adds nothing; nothing where

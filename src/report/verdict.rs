@@ -207,10 +207,10 @@ fn attention(summary: &RunSummary) -> Vec<String> {
 }
 
 fn against_prior(prior: &PriorTable) -> String {
-    let PriorTable { worst_joint: joint, worst_off_rad, used, .. } = prior;
+    let PriorTable { worst_joint: joint, moves, worst_off_rad, used, .. } = prior;
     let fate = if *used { "it is in the result all the same" } else { "the result rests on the new views alone" };
-    let off_deg = worst_off_rad.to_degrees().abs();
-    format!("The earlier calibration contradicts the new views, {joint} the most, by {off_deg:.2} deg: {fate}.")
+    let off = moves.unit().shown(worst_off_rad.abs(), 2);
+    format!("The earlier calibration contradicts the new views, {joint} the most, by {off}: {fate}.")
 }
 
 /// A capital first, a full stop last; a name that begins with a small letter keeps it.

@@ -6,6 +6,7 @@ use armcal_core::robot::{JointSensorSpec, SensorKind};
 pub(crate) fn exact_sensor(counts_per_rad: f64, max_rate_rad_s: f64) -> JointSensorSpec {
     JointSensorSpec {
         joint: "j".into(),
+        moves: Default::default(),
         kind: SensorKind::Potentiometer,
         offset_counts: 0.0,
         counts_per_rad,

@@ -161,7 +161,12 @@ const URDF: &[Spoilt] = &[
         "<parent link=\"trunk\"/>",
         &["titan4.urdf", "shoulder_pitch", "`trunk`", "does not define"],
     ),
-    ("type=\"revolute\"", "type=\"prismatic\"", &["titan4.urdf", "shoulder_yaw", "prismatic"]),
+    (
+        "type=\"revolute\"",
+        "type=\"prismatic\"",
+        &["robot.toml", "`shoulder_yaw`: scale_counts_per_deg", "prismatic", "scale_counts_per_mm, offset_std_m"],
+    ),
+    ("type=\"revolute\"", "type=\"planar\"", &["titan4.urdf", "shoulder_yaw", "planar"]),
     ("<axis xyz=\"0 1 0\"/>", "<axis xyz=\"0 0 0\"/>", &["titan4.urdf", "shoulder_yaw", "axis"]),
     ("<axis xyz=\"0 1 0\"/>", "<axis xyz=\"0 nan 0\"/>", &["titan4.urdf", "shoulder_yaw", "axis"]),
     ("lower=\"-3.6296\"", "lower=\"3.6296\"", &["titan4.urdf", "shoulder_yaw", "limit"]),

@@ -34,9 +34,9 @@ ARMS = {
     "z1": ("z1_description/urdf/z1.urdf", ["--tip", "gripperStator"]),
     "bravo7": ("bravo7_description/urdf/bravo7_no_ee.urdf", []),
     "talos": ("talos_data/robots/talos_left_arm.urdf", ["--tip", "gripper_left_base_link"]),
-    "tiago": ("tiago_description/robots/tiago_no_hand.urdf", []),
+    "tiago": ("tiago_description/robots/tiago_no_hand.urdf", ["--base", "torso_lift_link"]),
     "baxter": ("baxter_description/urdf/baxter.urdf", ["--tip", "left_gripper"]),
-    "pr2": ("pr2_description/urdf/pr2.urdf", ["--tip", "r_wrist_roll_link"]),
+    "pr2": ("pr2_description/urdf/pr2.urdf", ["--base", "torso_lift_link", "--tip", "r_wrist_roll_link"]),
 }
 # Weight that something else carries: water, or springs that are in no URDF.
 CARRIED = {"bravo7": 0.7, "pr2": 0.9, "baxter": 0.7}

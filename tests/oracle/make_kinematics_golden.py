@@ -8,7 +8,11 @@ import numpy as np
 import pinocchio
 
 ROOT = Path(__file__).resolve().parents[2]
-ROBOTS = {"titan4": "kinematics.json", "kraft-predator": "kinematics-kraft-predator.json"}
+ROBOTS = {
+    "robots/titan4": "kinematics.json",
+    "robots/kraft-predator": "kinematics-kraft-predator.json",
+    "tests/golden/slides": "kinematics-slides.json",
+}
 N_RANDOM = 49
 SEED = 20240117
 
@@ -26,7 +30,7 @@ def main():
 
 
 def make(name, out):
-    folder = ROOT / "robots" / name
+    folder = ROOT / name
     robot = tomllib.loads((folder / "robot.toml").read_text())
     model = pinocchio.buildModelFromUrdf(str(folder / robot["urdf"]))
     tool_link = model.getFrameId(robot["tool"]["link"])
@@ -65,8 +69,8 @@ def make(name, out):
         )
 
     golden = {
-        "what": f"Forward kinematics and geometric Jacobian of robots/{name}/{robot['urdf']}. Base frame throughout. Jacobian: 6 x n_joints, "
-        "rows vx vy vz (m per rad) then wx wy wz (rad per rad), of the tool point, in axes parallel to the base frame.",
+        "what": f"Forward kinematics and geometric Jacobian of {name}/{robot['urdf']}. Base frame throughout. Jacobian: 6 x n_joints, "
+        "rows vx vy vz (m per rad) then wx wy wz (rad per rad; of slides per m), of the tool point, in axes parallel to the base frame.",
         "tool": "pinocchio",
         "tool_version": pinocchio.__version__,
         "seed": SEED,

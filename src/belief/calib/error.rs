@@ -38,10 +38,10 @@ pub enum CalibError {
     Identify { joint: String, problem: String },
     #[error(
         "{recording}: all {views} views are of one pose: no joint between base and camera moved by more than its noise \
-         (the most: `{joint}`, {moved_deg:.3} deg), so nothing can be told of any; check the topic and \
+         (the most: `{joint}`, {moved}), so nothing can be told of any; check the topic and \
          joint_sensors.unit of the joint readings, or capture views at different poses"
     )]
-    OnePose { recording: String, views: usize, joint: String, moved_deg: f64 },
+    OnePose { recording: String, views: usize, joint: String, moved: String },
     #[error("{recording}: no interim estimate: {problem}")]
     NoInterimEstimate { recording: String, problem: String },
     #[error("{recording}: duplicate recording: give each recording once")]

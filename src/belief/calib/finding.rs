@@ -1,5 +1,6 @@
 //! What a calibration found to be other than robot.toml, survey and drawing say.
 
+use armcal_core::kinematics::JointKind;
 use serde::{Deserialize, Serialize};
 
 /// One finding; a repaired one does not refuse.
@@ -103,8 +104,17 @@ impl Finding {
             FindingUnit::Radian => format!("{:.2} deg", size.to_degrees()),
             FindingUnit::One => format!("{size:.3}"),
             FindingUnit::RadianPerNewtonMetre => format!("{:.3} deg per kN m", 1e3 * size.to_degrees()),
+            FindingUnit::MetrePerNewton => format!("{:.3} mm per kN", 1e6 * size),
             FindingUnit::Newton => format!("{size:.0} N"),
         })
+    }
+}
+
+impl FindingUnit {
+    /// Of a joint's coordinate.
+    #[must_use]
+    pub fn of_joint(kind: JointKind) -> Self {
+        if kind.is_slide() { Self::Metre } else { Self::Radian }
     }
 }
 
@@ -123,6 +133,9 @@ pub enum FindingUnit {
     /// Compliances.
     #[serde(rename = "rad/(N m)")]
     RadianPerNewtonMetre,
+    /// Compliances of slides.
+    #[serde(rename = "m/N")]
+    MetrePerNewton,
     /// Loads.
     #[serde(rename = "N")]
     Newton,

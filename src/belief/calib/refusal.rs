@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use armcal_core::kinematics::JointKind;
 use armcal_core::numeric::Outcome;
 use armcal_core::robot::FailedKind;
 use serde::{Deserialize, Serialize};
@@ -90,6 +91,9 @@ pub enum Refusal {
         std_rad: f64,
         /// The datasheet's linearity.
         datasheet_std_rad: f64,
+        /// Whether the joint slides: figures are in m then, not in rad.
+        #[serde(default, skip_serializing_if = "JointKind::is_turning")]
+        moves: JointKind,
     },
     /// Sensors' offsets walk at random, and what they do after the views is more than the task tolerates.
     OffsetsWalk {
@@ -97,6 +101,9 @@ pub enum Refusal {
         joint: String,
         /// One sigma of its walk from the first view to the last.
         walked_rad: f64,
+        /// Whether the joint slides: figures are in m then, not in rad.
+        #[serde(default, skip_serializing_if = "JointKind::is_turning")]
+        moves: JointKind,
         /// 95th percentile over the targets, with as much again.
         predicted_m: f64,
         /// The task's tolerance.
@@ -110,6 +117,9 @@ pub enum Refusal {
         std_rad: f64,
         /// Linearity by the datasheet.
         datasheet_std_rad: f64,
+        /// Whether the joint slides: figures are in m then, not in rad.
+        #[serde(default, skip_serializing_if = "JointKind::is_turning")]
+        moves: JointKind,
     },
     /// Corners are farther off than the stated noise explains.
     CornerNoise {
@@ -176,6 +186,9 @@ pub enum Refusal {
         off_rad: f64,
         /// One sigma of `off_rad`.
         off_std_rad: f64,
+        /// Whether the joint slides: figures are in m then, not in rad.
+        #[serde(default, skip_serializing_if = "JointKind::is_turning")]
+        moves: JointKind,
         /// Square of the estimate's move from the prior under its covariance.
         chi2: f64,
         /// Number of directions that the views tell enough of to be tested.
@@ -433,25 +446,25 @@ impl Refusal {
         match self {
             Self::WrongInput(wrong) => write!(f, "{wrong}"),
             Self::Geometry(geometry) => write!(f, "{geometry}"),
-            Self::SensorError { joint, std_rad, datasheet_std_rad } => write!(
+            Self::SensorError { joint, std_rad, datasheet_std_rad, moves } => write!(
                 f,
-                "joint sensors do not explain the data: {joint} needs a random error of {:.2} deg from view to view, \
-                 its datasheet has {:.2} deg: a joint that slips, or links that are not as in the drawing",
-                std_rad.to_degrees(),
-                datasheet_std_rad.to_degrees()
+                "joint sensors do not explain the data: {joint} needs a random error of {} from view to view, its \
+                 datasheet has {}: a joint that slips, or links that are not as in the drawing",
+                moves.unit().shown(*std_rad, 2),
+                moves.unit().shown(*datasheet_std_rad, 2)
             ),
             Self::BeyondDatasheet { parameter, sigmas } => write!(
                 f,
                 "{parameter} is estimated {sigmas:.0} sigma from its datasheet: the joint or its sensor has failed, \
                  or it is another sensor"
             ),
-            Self::Nonlinearity { joint, std_rad, datasheet_std_rad } => write!(
+            Self::Nonlinearity { joint, std_rad, datasheet_std_rad, moves } => write!(
                 f,
-                "{joint} is farther from a straight line than a sensor of its datasheet: {:.2} deg, {:.1} times the \
-                 datasheet's {:.2} deg",
-                std_rad.to_degrees(),
+                "{joint} is farther from a straight line than a sensor of its datasheet: {}, {:.1} times the \
+                 datasheet's {}",
+                moves.unit().shown(*std_rad, 2),
                 std_rad / datasheet_std_rad,
-                datasheet_std_rad.to_degrees()
+                moves.unit().shown(*datasheet_std_rad, 2)
             ),
             Self::SensorLine { joint, slope } => {
                 let what = if *slope < 0.0 { "reversed" } else { "of another scale than its datasheet's" };
@@ -497,25 +510,25 @@ impl Refusal {
                  {low:.2} .. {high:.2}): views that the fit did not use are worse than it predicts",
                 quantity.name()
             ),
-            Self::OffsetsWalk { joint, walked_rad, predicted_m, tolerance_m } => write!(
+            Self::OffsetsWalk { joint, walked_rad, moves, predicted_m, tolerance_m } => write!(
                 f,
-                "the offset of {joint} walked at random by {:.2} deg while the views were captured; when as much time \
-                 has gone by again the tool is {:.1} mm off, the task tolerates {:.1} mm",
-                walked_rad.to_degrees(),
+                "the offset of {joint} walked at random by {} while the views were captured; when as much time has \
+                 gone by again the tool is {:.1} mm off, the task tolerates {:.1} mm",
+                moves.unit().shown(*walked_rad, 2),
                 predicted_m * 1e3,
                 tolerance_m * 1e3
             ),
             Self::PriorReused => write!(f, "the prior rests on these very messages, which must not count twice"),
             Self::PriorSingular => write!(f, "the prior's covariance has no inverse"),
             Self::PriorUntested => write!(f, "the views determine too little to be tested against the prior"),
-            Self::PriorContradicted { joint, off_rad, joints_off, .. } => {
-                let off_deg = off_rad.to_degrees();
+            Self::PriorContradicted { joint, off_rad, joints_off, moves, .. } => {
+                let off = moves.unit().shown(*off_rad, 2);
                 write!(f, "the new views contradict the prior: ")?;
                 if *joints_off > 1 {
-                    write!(f, "{joints_off} joints are off, {joint} the most, by {off_deg:.2} deg, so that it is of ")?;
+                    write!(f, "{joints_off} joints are off, {joint} the most, by {off}, so that it is of ")?;
                     write!(f, "another arm, or of one whose sensors were changed since")?;
                 } else {
-                    write!(f, "{joint} is off by {off_deg:.2} deg, so that its sensor slipped or was changed since")?;
+                    write!(f, "{joint} is off by {off}, so that its sensor slipped or was changed since")?;
                 }
                 self.fmt_evidence_against_prior(f)
             }
@@ -524,12 +537,13 @@ impl Refusal {
     }
 
     fn fmt_evidence_against_prior(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self::PriorContradicted { off_std_rad, chi2, degrees_of_freedom, limit, used_share, .. } = self else {
+        let Self::PriorContradicted { off_std_rad, moves, chi2, degrees_of_freedom, limit, used_share, .. } = self
+        else {
             return Ok(());
         };
-        let std_deg = off_std_rad.to_degrees();
+        let std = moves.unit().shown(*off_std_rad, 3);
         write!(f, " (chi-square {chi2:.1} of {degrees_of_freedom}, expected below {limit:.1} in 99.9 % of cases; ")?;
-        write!(f, "{std_deg:.3} deg allowed, one sigma")?;
+        write!(f, "{std} allowed, one sigma")?;
         if *used_share < MIN_USED_SHARE {
             write!(f, "; only {:.0} % of the tag observations fit anything near it", 100.0 * used_share)?;
         }

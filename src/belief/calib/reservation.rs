@@ -40,6 +40,7 @@ impl fmt::Display for Reservation {
             FindingUnit::Metre => (1e3, "mm"),
             FindingUnit::Radian => (1f64.to_degrees(), "deg"),
             FindingUnit::One => (1e2, "%"),
+            FindingUnit::MetrePerNewton => (1e6, "mm per kN"),
             FindingUnit::RadianPerNewtonMetre => (1e3 * 1f64.to_degrees(), "deg per kN m"),
             FindingUnit::Newton => (1.0, "N"),
         };

@@ -60,7 +60,7 @@ impl ParameterCovariance {
         let mut estimated = DMatrix::zeros(R, self.parameters.len());
         let mut covariance = SMatrix::<f64, R, R>::zeros();
         for joint in 0..at.robot.tool.mount.n_joints {
-            let by_angle = of_twist(at.poses.point_jacobian(joint, &at.tool_m), *at.poses.axis(joint));
+            let by_angle = of_twist(at.poses.point_jacobian(joint, &at.tool_m), at.poses.turn_jacobian(joint));
             let model = &at.sensors.models[joint];
             let travel_rad = model.travel_under_rad(at.angles[joint], &at.departure);
             for kind in ParameterKind::all() {

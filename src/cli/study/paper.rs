@@ -29,6 +29,7 @@ pub(super) struct PaperArgs {
 
 pub(super) fn paper(args: &PaperArgs) -> Result<Exit> {
     let robot = armcal_core::robot::load(&args.robot)?;
+    robot.require_turning("this study")?;
     output::make_folder(&args.out)?;
     let experiments = experiments(if args.quick { Tier::Small } else { Tier::Full });
     let mut rows = Vec::new();

@@ -70,6 +70,7 @@ impl Values<'_> {
         match self.stated {
             JointUnit::Counts => counts,
             JointUnit::Rad => angle_rad,
+            JointUnit::Deg if spec.moves.is_slide() => angle_rad,
             JointUnit::Deg => angle_rad.to_degrees(),
         }
     }
@@ -81,8 +82,8 @@ impl Values<'_> {
 
     fn is_within(&self, unit: JointUnit, reading: &Reading, joint: usize) -> bool {
         let spec = &self.sensors[joint];
-        let is_limited = spec.half_range_rad < 0.999 * std::f64::consts::PI;
-        let most_rad = if is_limited { RANGE_FACTOR * spec.half_range_rad + BEYOND_RANGE_RAD } else { TURNS_RAD };
+        let most_rad =
+            if spec.is_limited() { RANGE_FACTOR * spec.half_range_rad + BEYOND_RANGE_RAD } else { TURNS_RAD };
         (self.angle_rad(unit, reading, joint) - spec.center_rad).abs() <= most_rad
     }
 

@@ -128,6 +128,7 @@ impl JointUnit {
         match self {
             Self::Counts => value,
             Self::Rad => spec.offset_counts + spec.counts_per_rad * value,
+            Self::Deg if spec.moves.is_slide() => Self::Rad.counts(spec, value),
             Self::Deg => Self::Rad.counts(spec, value.to_radians()),
         }
     }

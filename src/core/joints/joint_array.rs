@@ -6,7 +6,7 @@ use std::ops::{Deref, DerefMut};
 /// The most joints that an arm may have; arrays of this size live on the stack, so that loops do not allocate.
 pub const MAX_JOINTS: usize = 8;
 
-/// Unit marker: radians.
+/// Unit marker: radians; metres of a slide.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Radians;
 /// Unit marker: raw sensor counts.
@@ -21,7 +21,7 @@ pub struct JointArray<U> {
     unit: PhantomData<U>,
 }
 
-/// Angles of the joints, rad.
+/// Angles of the joints, rad; of a slide the way along its axis, m.
 pub type JointAngles = JointArray<Radians>;
 /// Raw readings of the joint sensors, counts. Not angles: a sensor model converts, and only it.
 ///

@@ -1,13 +1,59 @@
 //! The chain and its forward kinematics.
 
-use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, UnitVector3, Vector3};
+use serde::{Deserialize, Serialize};
 
 use crate::joints::{JointAngles, MAX_JOINTS};
 use crate::kinematics::gravity::{AboutAxes, ArmLoads, Sag};
 use crate::kinematics::link_correction::LinkCorrections;
-use crate::kinematics::link_poses::{Attachment, LinkPoses};
+use crate::kinematics::link_poses::{Attachment, LinkPoses, Slides};
+use crate::units::Unit;
 
-/// Joint range, rad.
+/// How a joint moves.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum JointKind {
+    /// It turns about its axis: its coordinate is an angle, rad.
+    #[default]
+    Revolute,
+    /// It slides along its axis (a slide): its coordinate is a way, m. Names with `_rad` then mean m.
+    Prismatic,
+}
+
+impl JointKind {
+    /// Whether it slides.
+    #[inline]
+    #[must_use]
+    pub fn is_slide(self) -> bool {
+        self == Self::Prismatic
+    }
+
+    /// Whether it turns; for files, which say it of slides alone.
+    #[must_use]
+    pub fn is_turning(&self) -> bool {
+        *self == Self::Revolute
+    }
+
+    /// What its coordinate is measured in, and how that is shown: an angle, or a way.
+    #[must_use]
+    pub fn unit(self) -> Unit {
+        match self {
+            Self::Revolute => Unit::Radians,
+            Self::Prismatic => Unit::Metres,
+        }
+    }
+
+    /// Unit of its coordinate as it is stored: `rad`, or `m`.
+    #[must_use]
+    pub fn si(self) -> &'static str {
+        match self {
+            Self::Revolute => "rad",
+            Self::Prismatic => "m",
+        }
+    }
+}
+
+/// Joint range, rad; m of a slide.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointLimits {
     /// Smallest angle.
@@ -24,22 +70,36 @@ impl JointLimits {
     }
 }
 
-/// One moving joint: fixed transform from the parent joint's link frame, then a rotation about `axis`.
+/// One moving joint: fixed transform from the parent joint's link frame, then a rotation about `axis`, or a way along
+/// it.
 #[derive(Clone, Debug)]
 pub struct ChainJoint {
     /// Name of the joint in the URDF.
     pub name: String,
     /// Name of the link that it moves.
     pub child_link: String,
+    /// Whether it turns or slides.
+    pub kind: JointKind,
     /// Pose of the joint's frame at angle zero in the frame of the parent link.
     pub parent_from_joint: Isometry3<f64>,
-    /// Axis of rotation in the joint's frame; angles count by the right-hand rule.
-    pub axis: Unit<Vector3<f64>>,
+    /// Axis of rotation in the joint's frame; angles count by the right-hand rule. The way of a slide.
+    pub axis: UnitVector3<f64>,
     /// `None` for a continuous joint.
     pub limits: Option<JointLimits>,
 }
 
-/// A serial chain of revolute joints, base first.
+impl ChainJoint {
+    /// The child link at `coordinate` (rad; m of a slide), where the joint's frame is at `base_from_joint`.
+    #[inline]
+    fn moved(&self, base_from_joint: Isometry3<f64>, coordinate: f64) -> Isometry3<f64> {
+        match self.kind {
+            JointKind::Revolute => base_from_joint * UnitQuaternion::from_axis_angle(&self.axis, coordinate),
+            JointKind::Prismatic => base_from_joint * Translation3::from(self.axis.into_inner() * coordinate),
+        }
+    }
+}
+
+/// A serial chain of revolute and prismatic joints, base first.
 #[derive(Clone, Debug)]
 pub struct Chain {
     joints: Vec<ChainJoint>,
@@ -126,7 +186,7 @@ impl Chain {
         self.joints.len()
     }
 
-    /// Poses of all links at `angles` by the sensors (rad).
+    /// Poses of all links at `angles` by the sensors (rad; m of slides).
     #[must_use]
     pub fn link_poses(&self, angles: &JointAngles) -> LinkPoses {
         self.bent_poses(angles, (&self.sag, &self.loads), |_, joint| joint.parent_from_joint)
@@ -202,17 +262,22 @@ impl Chain {
             n_joints: self.joints.len(),
             base_from_link: [*base; MAX_JOINTS + 1],
             axes: [Vector3::zeros(); MAX_JOINTS],
+            slides: Slides::default(),
         };
         for (i, (joint, &angle_rad)) in self.joints.iter().zip(angles.iter()).enumerate() {
             let base_from_joint = poses.base_from_link[i] * parent_from_joint(i, joint);
             poses.axes[i] = base_from_joint.rotation * joint.axis.into_inner();
             // The frames change inside the recursion, so it runs on raw isometries; callers name the frames.
-            poses.base_from_link[i + 1] = base_from_joint * UnitQuaternion::from_axis_angle(&joint.axis, angle_rad);
+            poses.base_from_link[i + 1] = joint.moved(base_from_joint, angle_rad);
+            if joint.kind.is_slide() {
+                poses.slides.add(i, angle_rad);
+            }
         }
         poses
     }
 
-    /// The pose of one attached frame in the base frame at `angles` (rad), to the bit that of [`Self::link_poses`].
+    /// The pose of one attached frame in the base frame at `angles` (rad; m of slides), to the bit that of
+    /// [`Self::link_poses`].
     #[inline]
     #[must_use]
     pub fn frame(&self, angles: &JointAngles, attachment: &Attachment) -> Isometry3<f64> {
@@ -221,8 +286,7 @@ impl Chain {
         }
         let mut base_from_link = Isometry3::identity();
         for (joint, &angle_rad) in self.joints[..attachment.n_joints].iter().zip(angles.iter()) {
-            let turn = UnitQuaternion::from_axis_angle(&joint.axis, angle_rad);
-            base_from_link = base_from_link * joint.parent_from_joint * turn;
+            base_from_link = joint.moved(base_from_link * joint.parent_from_joint, angle_rad);
         }
         base_from_link * attachment.link_from_frame
     }
@@ -244,8 +308,9 @@ mod tests {
         let joint = |k: usize, parent_from_joint: Isometry3<f64>| ChainJoint {
             name: format!("joint {k}"),
             child_link: format!("link {k}"),
+            kind: JointKind::Revolute,
             parent_from_joint,
-            axis: Unit::new_normalize(parent_from_joint.translation.vector),
+            axis: UnitVector3::new_normalize(parent_from_joint.translation.vector),
             limits: None,
         };
         let chain = Chain::new((0..6).map(|k| joint(k, pose())).collect());

@@ -8,6 +8,8 @@
 //! L   = sum_k s_k                          M     = u x L                   base, about its origin
 //! ```
 //!
+//! A slide's force is `-(a_j . u) W_j`, with the weight `W_j` beyond it, N in the place of N m.
+//!
 //! Each joint then turns by `c_j tau_j` behind its sensor, and the base by `(c_x M_x, c_y M_y, c_z M_z)` on what
 //! carries it. Torques are those of the arm bent by the torques of the straight one: what is left is of third order.
 
@@ -38,7 +40,8 @@ pub struct ArmLoads {
     pub tool: Attachment,
 }
 
-/// A number about each joint's axis, and about the base's axes: torques (N m) or angles (rad).
+/// A number about each joint's axis, and about the base's axes: torques (N m) or angles (rad). Of slides forces (N) or
+/// ways (m).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct AboutAxes {
     /// About the joints, base first.
@@ -50,7 +53,7 @@ pub struct AboutAxes {
 /// How much an arm gives.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sag {
-    /// Of each joint behind its sensor, rad/(N m).
+    /// Of each joint behind its sensor, rad/(N m); m/N of a slide.
     pub joint_rad_per_nm: [f64; MAX_JOINTS],
     /// Of the base on what carries it, about the base's axes, rad/(N m).
     pub mount_rad_per_nm: [f64; 3],
@@ -58,8 +61,25 @@ pub struct Sag {
     pub tool_load_n: f64,
 }
 
-/// Moments of the links distal to each joint about that joint's origin, and of all about the base's, N m.
-type Moments = ([Vector3<f64>; MAX_JOINTS], Vector3<f64>);
+/// Of the links distal to each joint, and of all.
+struct Moments {
+    /// About that joint's origin, N m.
+    about_joints: [Vector3<f64>; MAX_JOINTS],
+    /// N.
+    weights_n: [f64; MAX_JOINTS],
+    /// Of all about the base's origin, N m.
+    about_base: Vector3<f64>,
+}
+
+impl Moments {
+    /// How the moment of what joint `joint` carries changes with its angle, N m/rad; N of a slide.
+    fn change(&self, poses: &LinkPoses, joint: usize) -> Vector3<f64> {
+        if poses.is_slide(joint) {
+            return poses.axis(joint) * self.weights_n[joint];
+        }
+        poses.axis(joint).cross(&self.about_joints[joint])
+    }
+}
 
 impl ArmLoads {
     /// Whether any moving link has a weight.
@@ -89,28 +109,32 @@ impl ArmLoads {
     /// How the torques change with the angle of joint `by`, N m/rad.
     #[must_use]
     pub fn torque_derivatives(&self, poses: &LinkPoses, tool_load_n: f64, by: usize) -> AboutAxes {
-        let (moments, _) = self.moments(poses, 1.0, tool_load_n);
+        let moments = self.moments(poses, 1.0, tool_load_n);
         // The second derivative of a potential is symmetric.
         let derivative = |joint: usize| {
             let (near, far) = (joint.min(by), joint.max(by));
-            poses.axis(near).dot(&self.up.cross(&poses.axis(far).cross(&moments[far])))
+            // What is beyond a slide weighs the same wherever it is.
+            if poses.is_slide(near) { 0.0 } else { poses.axis(near).dot(&self.up.cross(&moments.change(poses, far))) }
         };
-        let mut change = AboutAxes { base: self.up.cross(&poses.axis(by).cross(&moments[by])), ..Default::default() };
+        let mut change = AboutAxes { base: self.up.cross(&moments.change(poses, by)), ..Default::default() };
         (0..poses.n_joints()).for_each(|joint| change.joints[joint] = derivative(joint));
         change
     }
 
-    fn torques_by(&self, poses: &LinkPoses, (moments, base): &Moments) -> AboutAxes {
-        let mut torques = AboutAxes { base: self.up.cross(base), ..Default::default() };
-        for (joint, moment) in moments.iter().enumerate().take(poses.n_joints()) {
-            torques.joints[joint] = poses.axis(joint).dot(&self.up.cross(moment));
+    fn torques_by(&self, poses: &LinkPoses, moments: &Moments) -> AboutAxes {
+        let mut torques = AboutAxes { base: self.up.cross(&moments.about_base), ..Default::default() };
+        for (joint, moment) in moments.about_joints.iter().enumerate().take(poses.n_joints()) {
+            torques.joints[joint] = match poses.is_slide(joint) {
+                true => -poses.axis(joint).dot(&self.up) * moments.weights_n[joint],
+                false => poses.axis(joint).dot(&self.up.cross(moment)),
+            };
         }
         torques
     }
 
     fn moments(&self, poses: &LinkPoses, of_links: f64, tool_load_n: f64) -> Moments {
         let (mut weight_n, mut about_base) = (0.0, Vector3::zeros());
-        let mut moments = [Vector3::zeros(); MAX_JOINTS];
+        let (mut about_joints, mut weights_n) = ([Vector3::zeros(); MAX_JOINTS], [0.0; MAX_JOINTS]);
         for body in (0..=poses.n_joints()).rev() {
             let (place, load) = (poses.link(body), &self.links[body]);
             weight_n += of_links * load.weight_n;
@@ -120,10 +144,11 @@ impl ArmLoads {
                 about_base += poses.frame(&self.tool).translation.vector * tool_load_n;
             }
             if let Some(joint) = body.checked_sub(1) {
-                moments[joint] = about_base - poses.joint_origin(joint) * weight_n;
+                weights_n[joint] = weight_n;
+                about_joints[joint] = about_base - poses.joint_origin(joint) * weight_n;
             }
         }
-        (moments, about_base)
+        Moments { about_joints, weights_n, about_base }
     }
 }
 
@@ -142,7 +167,7 @@ impl Sag {
         self.joint_rad_per_nm == [0.0; MAX_JOINTS] && self.mount_rad_per_nm == [0.0; 3]
     }
 
-    /// Angles by which joints and base turn under `torques`, rad.
+    /// Angles by which joints and base turn under `torques`, rad; m of slides.
     #[must_use]
     pub fn bend(&self, torques: &AboutAxes) -> AboutAxes {
         AboutAxes {
@@ -160,7 +185,7 @@ impl AboutAxes {
         let base = if joints.start == 0 { self.base } else { Vector3::zeros() };
         joints.fold([base.cross(point_m), base], |[moved, turned], joint| {
             let by = self.joints[joint];
-            [moved + poses.point_jacobian(joint, point_m) * by, turned + poses.axis(joint) * by]
+            [moved + poses.point_jacobian(joint, point_m) * by, turned + poses.turn_jacobian(joint) * by]
         })
     }
 

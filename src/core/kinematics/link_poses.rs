@@ -28,6 +28,21 @@ pub struct LinkPoses {
     pub(super) base_from_link: [Isometry3<f64>; MAX_JOINTS + 1],
     /// Unit axes of the joints in the base frame.
     pub(super) axes: [Vector3<f64>; MAX_JOINTS],
+    pub(super) slides: Slides,
+}
+
+/// Which joints slide, and how far they are out.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Slides {
+    are_slides: [bool; MAX_JOINTS],
+    out_m: [f64; MAX_JOINTS],
+}
+
+impl Slides {
+    #[inline]
+    pub fn add(&mut self, joint: usize, out_m: f64) {
+        (self.are_slides[joint], self.out_m[joint]) = (true, out_m);
+    }
 }
 
 impl LinkPoses {
@@ -69,25 +84,48 @@ impl LinkPoses {
         self.link(attachment.n_joints) * attachment.link_from_frame
     }
 
-    /// Axis of joint `joint` in the base frame, unit.
+    /// Whether joint `joint` slides along its axis.
+    #[inline]
+    #[must_use]
+    pub fn is_slide(&self, joint: usize) -> bool {
+        self.slides.are_slides[joint]
+    }
+
+    /// Axis of joint `joint` in the base frame, unit: what it turns about, or slides along.
     #[inline]
     #[must_use]
     pub fn axis(&self, joint: usize) -> &Vector3<f64> {
         &self.axes[..self.n_joints][joint]
     }
 
-    /// Origin of joint `joint` in the base frame, m.
+    /// Origin of joint `joint` in the base frame, m: of its frame on the parent link.
     #[inline]
     #[must_use]
-    pub fn joint_origin(&self, joint: usize) -> &Vector3<f64> {
+    pub fn joint_origin(&self, joint: usize) -> Vector3<f64> {
+        let child_m = self.base_from_link[joint + 1].translation.vector;
         // A joint's rotation leaves its own origin where it is, so the child link's origin serves.
-        &self.base_from_link[joint + 1].translation.vector
+        if self.is_slide(joint) { child_m - self.axis(joint) * self.slides.out_m[joint] } else { child_m }
     }
 
     /// d(point)/d(angle of `joint`), m/rad, for a point (base frame) carried by that joint: `axis x (point - origin)`.
+    /// Of a slide the axis, m/m.
     #[inline]
     #[must_use]
     pub fn point_jacobian(&self, joint: usize, point_m: &Vector3<f64>) -> Vector3<f64> {
+        if self.is_slide(joint) {
+            return *self.axis(joint);
+        }
         self.axis(joint).cross(&(point_m - self.joint_origin(joint)))
     }
+
+    /// d(attitude)/d(angle of `joint`), about the axes of the base frame, rad/rad, of what that joint carries: the
+    /// axis. Of a slide zero, rad/m.
+    #[inline]
+    #[must_use]
+    pub fn turn_jacobian(&self, joint: usize) -> Vector3<f64> {
+        if self.is_slide(joint) { Vector3::zeros() } else { *self.axis(joint) }
+    }
 }
+
+#[cfg(test)]
+mod tests;

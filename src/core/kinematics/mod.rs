@@ -9,7 +9,7 @@ mod inverse;
 mod link_correction;
 mod link_poses;
 
-pub use chain::{Chain, ChainJoint, JointLimits};
+pub use chain::{Chain, ChainJoint, JointKind, JointLimits};
 pub use gravity::{AboutAxes, ArmLoads, LinkLoad, Sag};
 pub use inverse::{IkError, IkGoal, IkSettings, solve_position};
 pub use link_correction::{LinkCorrection, LinkCorrections};

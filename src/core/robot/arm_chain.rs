@@ -1,13 +1,16 @@
-//! The arm in a URDF: its longest serial chain of revolute joints, without a gripper's fingers.
+//! The arm in a URDF: its longest serial chain of revolute joints and slides, without a gripper's fingers.
 
 use urdf_rs::JointType;
 
 use super::error::FileIssue;
 use super::urdf::UrdfModel;
+use crate::joints::MAX_JOINTS;
 
 /// Joints before a place where a chain branches, at the least, for what follows to be taken for fingers; and joints of
 /// its own that make another chain another arm.
 const FEW_JOINTS: usize = 3;
+/// A slide of less travel at the end of an arm is a gripper's jaw, m. Assumed: the strokes of SCARA arms begin there.
+const JAW_TRAVEL_M: f64 = 0.12;
 
 /// Links that a user names.
 #[derive(Clone, Copy, Default)]
@@ -26,7 +29,7 @@ pub(super) struct FoundArm {
     pub camera: Option<String>,
 }
 
-/// One chain of revolute joints.
+/// One chain of joints.
 #[derive(Clone, Debug, PartialEq, Eq)]
 struct Candidate {
     base: String,
@@ -54,8 +57,10 @@ pub(super) fn find_arm(urdf: &UrdfModel, ends: &Ends<'_>) -> Result<FoundArm, Fi
     candidates.sort_by_key(|candidate| std::cmp::Reverse(candidate.joints.len()));
     let Some(best) = candidates.first() else {
         let problem = match (ends.base, ends.tip) {
-            (Some(base), Some(tip)) => format!("no revolute or continuous joint lies between `{base}` and `{tip}`"),
-            _ => "no chain of revolute or continuous joints was found".to_owned(),
+            (Some(base), Some(tip)) => {
+                format!("no revolute, continuous or prismatic joint lies between `{base}` and `{tip}`")
+            }
+            _ => "no chain of revolute, continuous or prismatic joints was found".to_owned(),
         };
         return Err(FileIssue::new(&urdf.file, "joint", problem));
     };
@@ -82,10 +87,21 @@ fn is_moving(urdf: &UrdfModel, joint: usize) -> bool {
     urdf.robot.joints[joint].joint_type != JointType::Fixed
 }
 
-/// Revolute or continuous, and not driven by another joint.
+/// Revolute, continuous or prismatic, and not driven by another joint.
 fn is_of_arm(urdf: &UrdfModel, joint: usize) -> bool {
     let joint = &urdf.robot.joints[joint];
-    matches!(joint.joint_type, JointType::Revolute | JointType::Continuous) && joint.mimic.is_none()
+    let turns_or_slides =
+        matches!(joint.joint_type, JointType::Revolute | JointType::Continuous | JointType::Prismatic);
+    turns_or_slides && joint.mimic.is_none()
+}
+
+fn is_slide(urdf: &UrdfModel, joint: usize) -> bool {
+    urdf.robot.joints[joint].joint_type == JointType::Prismatic
+}
+
+fn is_jaw(urdf: &UrdfModel, joint: usize) -> bool {
+    let limit = &urdf.robot.joints[joint].limit;
+    is_slide(urdf, joint) && limit.upper - limit.lower < JAW_TRAVEL_M
 }
 
 fn leaves(urdf: &UrdfModel) -> impl Iterator<Item = &str> {
@@ -135,6 +151,17 @@ fn candidate(urdf: &UrdfModel, leaf: &str, ends: &Ends<'_>) -> Option<Candidate>
             (FEW_JOINTS..joints.len()).find(|n| branches_after(urdf, joints[n - 1]) && joints.len() <= 2 * n)
     {
         joints.truncate(n);
+    }
+    while ends.tip.is_none() && joints.len() > FEW_JOINTS && is_jaw(urdf, *joints.last()?) {
+        joints.pop();
+    }
+    // What carries too long an arm on slides is not of the arm.
+    while ends.base.is_none()
+        && joints.len() > MAX_JOINTS
+        && let Some(slide) = joints.iter().position(|joint| is_slide(urdf, *joint))
+    {
+        base.clone_from(&urdf.robot.joints[joints[slide]].child.link);
+        joints.drain(..=slide);
     }
     let last = *joints.last()?;
     let tip = ends.tip.map_or_else(|| deepest_fixed(urdf, &urdf.robot.joints[last].child.link), str::to_owned);

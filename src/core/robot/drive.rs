@@ -50,20 +50,9 @@ pub(super) struct HydraulicsFile {
 const SUPPLY_PRESSURE_PA: f64 = 2.07e7;
 const L_PER_M3: f64 = 1e3;
 
-/// Oil per radian of each joint, L/rad: from the file, else its largest torque divided by the supply pressure.
-pub(super) fn check_displacements<'a>(
-    file: &Path,
-    joints: impl Iterator<Item = (&'a str, Option<f64>)>,
-    urdf: &UrdfModel,
-) -> Result<Vec<f64>, FileIssue> {
-    let check = |(joint, given): (&str, Option<f64>)| match given {
-        None => Ok(L_PER_M3 * urdf.effort_n_m(joint) / SUPPLY_PRESSURE_PA),
-        Some(value) => {
-            let key = format!("joint_sensor `{joint}`: displacement_l_per_rad");
-            FileIssue::check_range(file, &key, value, 0.0..=100.0)
-        }
-    };
-    joints.map(check).collect()
+/// Oil per radian of a joint, L/rad: its largest torque (force of a slide, L/m) divided by the supply pressure.
+pub(super) fn usual_displacement(urdf: &UrdfModel, joint: &str) -> f64 {
+    L_PER_M3 * urdf.effort_n_m(joint) / SUPPLY_PRESSURE_PA
 }
 
 impl HydraulicsFile {

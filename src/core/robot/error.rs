@@ -40,8 +40,8 @@ pub enum RobotError {
     #[error("{}: no chain of joints leads from `{from}` to `{to}`", file.display())]
     NoChain { file: PathBuf, from: String, to: String },
     #[error(
-        "{}: joint `{joint}` between base_link and the tool or camera is {kind}; only revolute, continuous and fixed \
-         joints may be there: name a base_link beyond it, or a tool and camera before it",
+        "{}: joint `{joint}` between base_link and the tool or camera is {kind}; only revolute, continuous, \
+         prismatic and fixed joints may be there: name a base_link beyond it, or a tool and camera before it",
         file.display()
     )]
     JointKind { file: PathBuf, joint: String, kind: String },

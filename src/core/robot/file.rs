@@ -10,12 +10,12 @@ use super::allowed_pairs::AllowedPairs;
 use super::body::LinkBody;
 use super::camera::{CameraFile, CameraSpec, check_camera};
 use super::completeness::check_complete;
-use super::drive::{DriveSpec, HydraulicsFile, MotionSpec, check_displacements};
+use super::drive::{DriveSpec, HydraulicsFile, MotionSpec, usual_displacement};
 use super::error::{FileIssue, RobotError, parse_toml, read_in};
 use super::geometry::GeometryPriors;
 use super::gripper::GripperFile;
 use super::gripper_tag::{GripperTag, GripperTagFile};
-use super::joint_sensor::{SensorFile, check_sensors};
+use super::joint_sensor::{SensorFile, check_sensors, displacements};
 use super::nominal::{BASE_TAG, Robot, STOWED, TAG_LINK, ToolSpec, check_stowed, lens_issue};
 use super::self_collision::{self, Stored};
 use super::shape::{PlacedShape, Shape};
@@ -23,7 +23,7 @@ use super::survey::{SurveyedTag, TagFile, check_tags};
 use super::urdf::{UrdfChain, UrdfModel};
 use super::urdf_mesh::{CollisionMeshes, MeshFolders};
 use crate::joints::JointAngles;
-use crate::kinematics::{ArmLoads, Attachment};
+use crate::kinematics::{ArmLoads, Attachment, JointKind};
 use crate::optics::TagFamily;
 use crate::spatial::{Base, Pose};
 
@@ -127,7 +127,7 @@ fn read_files(folder: &Path) -> Result<(RobotFile, UrdfModel), RobotError> {
     let file = folder.join("robot.toml");
     let text = read_in(folder, &file)?;
     let table: toml::Table = parse_toml(&file, &text)?;
-    check_complete(&file, &table, || joint_names(folder, &table))?;
+    check_complete(&file, &table, || chain_joints(folder, &table))?;
     let raw: RobotFile = parse_toml(&file, &text)?;
     FileIssue::check_range(&file, "version", f64::from(raw.version), 1.0..=1.0)?;
     let urdf = read_urdf(folder, &raw.urdf)?;
@@ -135,14 +135,14 @@ fn read_files(folder: &Path) -> Result<(RobotFile, UrdfModel), RobotError> {
 }
 
 /// The chain's joints as far as a robot.toml that lacks keys tells them.
-fn joint_names(folder: &Path, robot: &toml::Table) -> Option<Vec<String>> {
+fn chain_joints(folder: &Path, robot: &toml::Table) -> Option<Vec<(String, JointKind)>> {
     let text = |table: &toml::Table, key: &str| Some(table.get(key)?.as_str()?.to_owned());
     let link = |name: &str| text(robot.get(name)?.as_table()?, "link");
     let tips: Vec<String> = [link("tool"), link("camera")].into_iter().flatten().collect();
     let tips: Vec<&str> = tips.iter().map(String::as_str).collect();
     let urdf = read_urdf(folder, Path::new(&text(robot, "urdf")?)).ok()?;
     let chain = urdf.chain(&text(robot, "base_link")?, &tips).ok()?;
-    Some(chain.joints().iter().map(|joint| joint.name.clone()).collect())
+    Some(chain.joints().iter().map(|joint| (joint.name.clone(), joint.kind)).collect())
 }
 
 /// What planning needs and `raw` does not give.
@@ -158,6 +158,11 @@ fn planning_issues(file: &Path, raw: &RobotFile, camera: &CameraSpec, arm: &Urdf
     }
     if !camera.lens.is_known() {
         issues.push(lens_issue(file));
+    }
+    if let Some(slide) = arm.chain.joints().iter().find(|joint| joint.kind.is_slide()) {
+        let problem = "is prismatic, and an arm with slides is neither simulated nor planned for yet: `armcal \
+                       calibrate` works on recordings of it";
+        issues.push(FileIssue::new(&arm.urdf.file, format!("joint `{}`", slide.name), problem));
     }
     if camera.mount.n_joints == 0 && raw.tag_link.is_none() {
         let problem = "no joint moves it; run and plan need a camera that the arm carries, or tags that it carries \
@@ -191,7 +196,7 @@ fn robot_of(folder: &Path, raw: RobotFile, urdf: UrdfModel, meshes: Meshes) -> R
     let sensors = check_sensors(&file, &raw.joint_sensor, &chain)?;
     let drive = DriveSpec {
         pump_l_per_min: raw.hydraulics.map(|hydraulics| hydraulics.check(&file)).transpose()?,
-        displacement_l_per_rad: displacements_l_per_rad(&file, &raw.joint_sensor, &urdf)?,
+        displacement_l_per_rad: displacements_l_per_rad(&file, &raw.joint_sensor, &arm)?,
         motion: raw.motion.check(&file)?,
     };
     let middle = || JointAngles::from_fn(chain.n_joints(), |joint| sensors[joint].center_rad);
@@ -282,8 +287,9 @@ fn mesh_folders(urdf: &UrdfModel, folder: &Path) -> MeshFolders {
     MeshFolders { folders: [urdf.file.parent().unwrap_or(folder).to_owned(), folder.to_owned()] }
 }
 
-fn displacements_l_per_rad(file: &Path, sensors: &[SensorFile], urdf: &UrdfModel) -> Result<Vec<f64>, FileIssue> {
-    check_displacements(file, sensors.iter().map(|sensor| (sensor.joint.as_str(), sensor.displacement_l_per_rad)), urdf)
+fn displacements_l_per_rad(file: &Path, sensors: &[SensorFile], arm: &UrdfChain<'_>) -> Result<Vec<f64>, FileIssue> {
+    let given = displacements(file, sensors, arm.chain)?.into_iter().zip(arm.chain.joints());
+    Ok(given.map(|(given, joint)| given.unwrap_or_else(|| usual_displacement(arm.urdf, &joint.name))).collect())
 }
 
 fn loads(geometry: &GeometryPriors, bodies: &[LinkBody], buoyancy_fraction: f64, tool: Attachment) -> ArmLoads {

@@ -1,11 +1,13 @@
 //! Joint sensors of robot.toml by their datasheets.
 
+use std::ops::RangeInclusive;
 use std::path::Path;
 
 use serde::Deserialize;
 
 use super::error::{FileIssue, RobotError};
-use crate::kinematics::{Chain, ChainJoint};
+use crate::kinematics::{Chain, ChainJoint, JointKind};
+use crate::units::Unit;
 
 /// Kind of joint sensor; it selects the effects that belief models.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
@@ -20,10 +22,14 @@ pub enum SensorKind {
 }
 
 /// A joint sensor by its datasheet: `angle = center + wrap(counts - counts(center)) / counts_per_rad`.
+///
+/// A slide's figures are in metres wherever a name says rad: `counts_per_rad` are counts per metre.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointSensorSpec {
     /// Name of the joint in the URDF.
     pub joint: String,
+    /// Whether the joint turns or slides.
+    pub moves: JointKind,
     /// See [`SensorKind`].
     pub kind: SensorKind,
     /// The reading at angle zero.
@@ -57,6 +63,18 @@ pub struct JointSensorSpec {
 }
 
 impl JointSensorSpec {
+    /// How the joint's coordinate is shown to people: degrees, or millimetres of a slide.
+    #[must_use]
+    pub fn unit(&self) -> Unit {
+        self.moves.unit()
+    }
+
+    /// Whether the joint turns within a range of less than a turn, or slides.
+    #[must_use]
+    pub fn is_limited(&self) -> bool {
+        self.moves.is_slide() || self.half_range_rad < 0.999 * std::f64::consts::PI
+    }
+
     /// The same sensor with `ratio` times as many counts per radian; the reading in the middle of the range stays.
     #[must_use]
     pub fn with_scale(&self, ratio: f64) -> Self {
@@ -72,27 +90,154 @@ pub(super) struct SensorFile {
     pub(super) joint: String,
     kind: SensorKind,
     offset_counts: f64,
-    /// Counts per degree: datasheets give this round figure.
-    scale_counts_per_deg: f64,
     wrap_counts: f64,
     gain_std: f64,
-    offset_std_rad: f64,
     gain_bound: f64,
-    offset_bound_rad: f64,
     noise_std_counts: f64,
-    linearity_std_rad: f64,
-    #[serde(default = "default_change")]
-    temperature_std_rad_per_k: f64,
-    #[serde(default = "default_change")]
-    drift_std_rad_per_sqrt_h: f64,
-    max_rate_rad_s: f64,
+    /// Counts per degree: datasheets give this round figure.
+    scale_counts_per_deg: Option<f64>,
+    offset_std_rad: Option<f64>,
+    offset_bound_rad: Option<f64>,
+    linearity_std_rad: Option<f64>,
+    temperature_std_rad_per_k: Option<f64>,
+    drift_std_rad_per_sqrt_h: Option<f64>,
+    max_rate_rad_s: Option<f64>,
     /// Computed from the URDF's effort where absent.
-    pub(super) displacement_l_per_rad: Option<f64>,
+    displacement_l_per_rad: Option<f64>,
+    /// The same of a slide.
+    scale_counts_per_mm: Option<f64>,
+    offset_std_m: Option<f64>,
+    offset_bound_m: Option<f64>,
+    linearity_std_m: Option<f64>,
+    temperature_std_m_per_k: Option<f64>,
+    drift_std_m_per_sqrt_h: Option<f64>,
+    max_rate_m_s: Option<f64>,
+    displacement_l_per_m: Option<f64>,
 }
 
-/// 0.02 deg per kelvin, or in one hour, for datasheets without a value.
-fn default_change() -> f64 {
-    0.00035
+/// A key whose unit is that of the joint: of one that turns, and of a slide.
+struct UnitKey {
+    names: [&'static str; 2],
+    of_file: fn(&SensorFile) -> [Option<f64>; 2],
+    allowed: [RangeInclusive<f64>; 2],
+    /// Where the file has none; `None`: it must have one.
+    usual: Option<[f64; 2]>,
+    /// Whether the size alone is to be within `allowed`.
+    is_signed: bool,
+}
+
+const SCALE: UnitKey = UnitKey {
+    names: ["scale_counts_per_deg", "scale_counts_per_mm"],
+    of_file: |s| [s.scale_counts_per_deg, s.scale_counts_per_mm],
+    allowed: [1e-3..=1e9, 1e-6..=1e9],
+    usual: None,
+    is_signed: true,
+};
+const OFFSET_STD: UnitKey = UnitKey {
+    names: ["offset_std_rad", "offset_std_m"],
+    of_file: |s| [s.offset_std_rad, s.offset_std_m],
+    allowed: [0.0..=6.3, 0.0..=10.0],
+    usual: None,
+    is_signed: false,
+};
+const OFFSET_BOUND: UnitKey = UnitKey {
+    names: ["offset_bound_rad", "offset_bound_m"],
+    of_file: |s| [s.offset_bound_rad, s.offset_bound_m],
+    allowed: [0.0..=3.2, 0.0..=10.0],
+    usual: None,
+    is_signed: false,
+};
+const LINEARITY: UnitKey = UnitKey {
+    names: ["linearity_std_rad", "linearity_std_m"],
+    of_file: |s| [s.linearity_std_rad, s.linearity_std_m],
+    allowed: [0.0..=1.0, 0.0..=1.0],
+    usual: None,
+    is_signed: false,
+};
+/// 0.02 deg per kelvin; of a metre of steel 0.01 mm, twice that.
+const TEMPERATURE: UnitKey = UnitKey {
+    names: ["temperature_std_rad_per_k", "temperature_std_m_per_k"],
+    of_file: |s| [s.temperature_std_rad_per_k, s.temperature_std_m_per_k],
+    allowed: [0.0..=0.1, 0.0..=0.1],
+    usual: Some([0.00035, 0.00002]),
+    is_signed: false,
+};
+/// 0.02 deg, or 0.02 mm, in one hour.
+const DRIFT: UnitKey = UnitKey {
+    names: ["drift_std_rad_per_sqrt_h", "drift_std_m_per_sqrt_h"],
+    of_file: |s| [s.drift_std_rad_per_sqrt_h, s.drift_std_m_per_sqrt_h],
+    allowed: [0.0..=0.1, 0.0..=0.1],
+    usual: Some([0.00035, 0.00002]),
+    is_signed: false,
+};
+const MAX_RATE: UnitKey = UnitKey {
+    names: ["max_rate_rad_s", "max_rate_m_s"],
+    of_file: |s| [s.max_rate_rad_s, s.max_rate_m_s],
+    allowed: [1e-3..=20.0, 1e-3..=20.0],
+    usual: None,
+    is_signed: false,
+};
+const DISPLACEMENT: UnitKey = UnitKey {
+    names: ["displacement_l_per_rad", "displacement_l_per_m"],
+    of_file: |s| [s.displacement_l_per_rad, s.displacement_l_per_m],
+    allowed: [0.0..=100.0, 0.0..=1000.0],
+    usual: None,
+    is_signed: false,
+};
+const UNIT_KEYS: [&UnitKey; 8] =
+    [&SCALE, &OFFSET_STD, &OFFSET_BOUND, &LINEARITY, &TEMPERATURE, &DRIFT, &MAX_RATE, &DISPLACEMENT];
+
+/// One sensor's table in its file, and the joint that it belongs to.
+struct OfJoint<'a> {
+    file: &'a Path,
+    table: &'a SensorFile,
+    kind: JointKind,
+}
+
+impl OfJoint<'_> {
+    /// Which of a [`UnitKey`]'s two is meant.
+    fn unit(&self) -> usize {
+        usize::from(self.kind.is_slide())
+    }
+
+    fn key(&self, name: &str) -> String {
+        format!("joint_sensor `{}`: {name}", self.table.joint)
+    }
+
+    fn check(&self, name: &str, value: f64, range: RangeInclusive<f64>) -> Result<f64, FileIssue> {
+        FileIssue::check_range(self.file, &self.key(name), value, range)
+    }
+
+    /// Refuses keys in the unit of a joint of the other kind.
+    fn check_units(&self) -> Result<(), FileIssue> {
+        let (own, other) = (self.unit(), 1 - self.unit());
+        let is_wrong = |key: &&&UnitKey| (key.of_file)(self.table)[other].is_some();
+        let wrong: Vec<&&UnitKey> = UNIT_KEYS.iter().filter(is_wrong).collect();
+        let Some(first) = wrong.first() else { return Ok(()) };
+        let instead: Vec<&str> = wrong.iter().map(|key| key.names[own]).collect();
+        let moves = ["turns", "is prismatic"][own];
+        let problem = format!("the joint {moves} in the URDF; write {} in its place", instead.join(", "));
+        Err(FileIssue::new(self.file, self.key(first.names[other]), problem))
+    }
+
+    /// The figure as the file has it, if it has one.
+    fn given(&self, key: &UnitKey) -> Result<Option<f64>, FileIssue> {
+        let Some(value) = (key.of_file)(self.table)[self.unit()] else { return Ok(None) };
+        let name = key.names[self.unit()];
+        let allowed = key.allowed[self.unit()].clone();
+        if key.is_signed {
+            self.check(&format!("{name} (size)"), value.abs(), allowed)?;
+        } else {
+            self.check(name, value, allowed)?;
+        }
+        Ok(Some(value))
+    }
+
+    fn figure(&self, key: &UnitKey) -> Result<f64, FileIssue> {
+        let usual = key.usual.map(|usual| usual[self.unit()]);
+        let missing = || FileIssue::new(self.file, self.key(key.names[self.unit()]), "is missing");
+        self.given(key)?.or(usual).ok_or_else(missing)
+    }
 }
 
 pub(super) fn check_sensors(
@@ -121,39 +266,49 @@ pub(super) fn check_sensors(
 }
 
 fn check_sensor(file: &Path, s: &SensorFile, joint: &ChainJoint) -> Result<JointSensorSpec, RobotError> {
-    let check = |key: &str, value: f64, range| {
-        FileIssue::check_range(file, &format!("joint_sensor `{}`: {key}", s.joint), value, range)
-    };
+    let of_joint = OfJoint { file, table: s, kind: joint.kind };
+    of_joint.check_units()?;
+    let counts_per_unit = of_joint.figure(&SCALE)?;
     if let Some(limits) = joint.limits {
-        let range_counts = (limits.upper_rad - limits.lower_rad).to_degrees() * s.scale_counts_per_deg.abs();
+        let range = limits.upper_rad - limits.lower_rad;
+        let range = if joint.kind.is_slide() { range * 1e3 } else { range.to_degrees() };
+        let range_counts = range * counts_per_unit.abs();
         if s.wrap_counts < range_counts {
-            let key = format!("joint_sensor `{}`: wrap_counts", s.joint);
             let problem = format!("{} is less than the {range_counts:.0} counts of the joint's range", s.wrap_counts);
-            return Err(FileIssue::new(file, key, problem).into());
+            return Err(FileIssue::new(file, of_joint.key("wrap_counts"), problem).into());
         }
     }
-    let sign = if s.scale_counts_per_deg < 0.0 { -1.0 } else { 1.0 };
     Ok(JointSensorSpec {
         joint: s.joint.clone(),
+        moves: joint.kind,
         kind: s.kind,
-        offset_counts: check("offset_counts", s.offset_counts, -1e9..=1e9)?,
-        counts_per_rad: sign * check("scale_counts_per_deg (size)", s.scale_counts_per_deg.abs(), 1e-3..=1e9)? * 180.0
-            / std::f64::consts::PI,
-        wrap_counts: check("wrap_counts", s.wrap_counts, 1.0..=1e12)?,
+        offset_counts: of_joint.check("offset_counts", s.offset_counts, -1e9..=1e9)?,
+        counts_per_rad: match joint.kind {
+            JointKind::Prismatic => counts_per_unit * 1e3,
+            JointKind::Revolute => counts_per_unit * 180.0 / std::f64::consts::PI,
+        },
+        wrap_counts: of_joint.check("wrap_counts", s.wrap_counts, 1.0..=1e12)?,
         center_rad: joint.limits.map_or(0.0, |l| 0.5 * (l.lower_rad + l.upper_rad)),
         half_range_rad: joint
             .limits
             .map_or(std::f64::consts::PI, |l| 0.5 * (l.upper_rad - l.lower_rad).max(f64::MIN_POSITIVE)),
-        gain_std: check("gain_std", s.gain_std, 0.0..=10.0)?,
-        offset_std_rad: check("offset_std_rad", s.offset_std_rad, 0.0..=6.3)?,
-        gain_bound: check("gain_bound", s.gain_bound, 0.0..=0.5)?,
-        offset_bound_rad: check("offset_bound_rad", s.offset_bound_rad, 0.0..=3.2)?,
-        linearity_std_rad: check("linearity_std_rad", s.linearity_std_rad, 0.0..=1.0)?,
-        temperature_std_rad_per_k: check("temperature_std_rad_per_k", s.temperature_std_rad_per_k, 0.0..=0.1)?,
-        drift_std_rad_per_sqrt_h: check("drift_std_rad_per_sqrt_h", s.drift_std_rad_per_sqrt_h, 0.0..=0.1)?,
-        noise_std_counts: check("noise_std_counts", s.noise_std_counts, 0.0..=1e6)?,
-        max_rate_rad_s: check("max_rate_rad_s", s.max_rate_rad_s, 1e-3..=20.0)?,
+        gain_std: of_joint.check("gain_std", s.gain_std, 0.0..=10.0)?,
+        offset_std_rad: of_joint.figure(&OFFSET_STD)?,
+        gain_bound: of_joint.check("gain_bound", s.gain_bound, 0.0..=0.5)?,
+        offset_bound_rad: of_joint.figure(&OFFSET_BOUND)?,
+        linearity_std_rad: of_joint.figure(&LINEARITY)?,
+        temperature_std_rad_per_k: of_joint.figure(&TEMPERATURE)?,
+        drift_std_rad_per_sqrt_h: of_joint.figure(&DRIFT)?,
+        noise_std_counts: of_joint.check("noise_std_counts", s.noise_std_counts, 0.0..=1e6)?,
+        max_rate_rad_s: of_joint.figure(&MAX_RATE)?,
     })
+}
+
+/// Oil per radian of each joint (per metre of a slide), where the file says it.
+pub(super) fn displacements(file: &Path, sensors: &[SensorFile], chain: &Chain) -> Result<Vec<Option<f64>>, FileIssue> {
+    let of_joint =
+        |(table, joint): (&SensorFile, &ChainJoint)| OfJoint { file, table, kind: joint.kind }.given(&DISPLACEMENT);
+    sensors.iter().zip(chain.joints()).map(of_joint).collect()
 }
 
 /// The name that others have for a joint: its own, or the only one that begins or ends with it.

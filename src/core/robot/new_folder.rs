@@ -12,7 +12,7 @@ use super::mesh;
 use super::urdf::{MAX_COLLISION_SHAPES, UrdfChain, UrdfModel};
 use super::urdf_mesh::places;
 use crate::files::{self, FileKind};
-use crate::kinematics::{Chain, ChainJoint};
+use crate::kinematics::{Chain, ChainJoint, JointKind};
 
 /// What a robot folder is made from.
 #[derive(Clone, Copy, Debug)]
@@ -21,7 +21,7 @@ pub struct NewRobot<'a> {
     pub urdf: &'a Path,
     /// Link whose frame is the base frame; the root, or what stands on a root called `world`.
     pub base: Option<&'a str>,
-    /// Link of the tool; the end of the longest chain of revolute joints.
+    /// Link of the tool; the end of the longest chain of joints.
     pub tip: Option<&'a str>,
     /// Link whose frame is the camera's, x right, y down, z forward.
     pub camera: Option<&'a str>,
@@ -29,7 +29,7 @@ pub struct NewRobot<'a> {
     pub name: Option<&'a str>,
     /// Links that overlap or are near each other at nearly every pose.
     pub touching: &'a [[String; 2]],
-    /// Angles at which the arm is clear of itself, rad, base first.
+    /// Angles at which the arm is clear of itself, rad (m of slides), base first.
     pub clear_rad: Option<&'a [f64]>,
 }
 
@@ -171,7 +171,7 @@ impl Draft<'_> {
         let _ = write!(
             out,
             "# Written by `armcal new-robot` from {}. \"Read\" is what the URDF says, \"assumed\" is not: look at it.\n\
-             # Angles in rad, lengths in m. Keys that begin with # are left to fill in.\n\
+             # Angles in rad, lengths and the ways of slides in m. Keys that begin with # are left to fill in.\n\
              version = 1\nname = {}\nurdf = {urdf}\n\
              # Read: the chain of {n} moving joints from here. Tags and targets are in this link's frame.\n\
              base_link = {}\n\
@@ -210,13 +210,18 @@ impl Draft<'_> {
             Some(clear) => (clear.to_vec(), "angles near the middle of each range at which the arm is clear of itself"),
             None => (middle.collect(), "the middle of each range"),
         };
+        let slides = if self.has_slide() { " Of a slide m; run and plan refuse slides so far." } else { "" };
         let angles: Vec<String> = angles_rad.into_iter().map(to_millirad).collect();
         let _ = write!(
             out,
             "# For run and plan: the angles at which the arm is stowed, clear of everything; paths start there.\n\
-             # Here {whence}.\n# stowed_rad = [{}]\n",
+             # Here {whence}.{slides}\n# stowed_rad = [{}]\n",
             angles.join(", ")
         );
+    }
+
+    fn has_slide(&self) -> bool {
+        self.chain.joints().iter().any(|joint| joint.kind.is_slide())
     }
 
     fn tool(&self, out: &mut String) {
@@ -237,16 +242,20 @@ impl Draft<'_> {
         };
         let limits = joint.limits.map_or_else(
             || "no limits".to_owned(),
-            |limits| format!("{} .. {} rad", limits.lower_rad, limits.upper_rad),
+            |limits| format!("{} .. {} {}", limits.lower_rad, limits.upper_rad, joint.kind.si()),
         );
         let mimics = drawn.and_then(|drawn| drawn.mimic.as_ref()).map_or_else(String::new, |mimic| {
             let name = on_line(&mimic.joint);
             format!("# Read: it follows the joint {name}; give it a sensor of its own only if it has one.\n")
         });
+        let (rest, max_rate) = match joint.kind {
+            JointKind::Revolute => (SENSOR, "max_rate_rad_s"),
+            JointKind::Prismatic => (SLIDE_SENSOR, "max_rate_m_s"),
+        };
         let _ = write!(
             out,
-            "\n[[joint_sensor]]\n# Read: {limits}.\n{mimics}joint = {}\n{SENSOR}\
-             max_rate_rad_s = {rate_rad_s:?}  # {whose}\n",
+            "\n[[joint_sensor]]\n# Read: {limits}.\n{mimics}joint = {}\n{rest}\
+             {max_rate} = {rate_rad_s:?}  # {whose}\n",
             quoted(&joint.name),
         );
     }
@@ -312,6 +321,24 @@ noise_std_counts = 1e-4
 linearity_std_rad = 2e-4
 temperature_std_rad_per_k = 1e-5
 drift_std_rad_per_sqrt_h = 1e-5
+";
+
+const SLIDE_SENSOR: &str =
+    "# A slide: its figures are in metres. Assumed: a linear encoder that counts metres, homed at a switch (5 mm), on a
+# drive whose scale is known to 2 mm in a metre; a metre of steel grows by 0.01 mm per kelvin. For raw words write the
+# datasheet's counts per millimetre.
+kind = \"encoder\"  # assumed; or potentiometer, resolver
+offset_counts = 0.0
+scale_counts_per_mm = 0.001
+wrap_counts = 1e6  # never repeats
+gain_std = 0.002
+offset_std_m = 0.005
+gain_bound = 0.005
+offset_bound_m = 0.01
+noise_std_counts = 2e-5
+linearity_std_m = 1e-4
+temperature_std_m_per_k = 1e-5
+drift_std_m_per_sqrt_h = 1e-5
 ";
 
 const LENS: &str = "# For images, for corners of tags, and for run and plan: the lens.

@@ -19,7 +19,7 @@ use super::self_pairs::SelfPairs;
 use super::survey::{SurveyedTag, TagSurvey};
 use super::vehicle::Vehicle;
 use crate::joints::JointAngles;
-use crate::kinematics::{Attachment, Chain, LinkPoses};
+use crate::kinematics::{Attachment, Chain, ChainJoint, LinkPoses};
 use crate::optics::TagFamily;
 
 /// The nominal arm: drawing, datasheets and survey.
@@ -252,6 +252,22 @@ impl Robot {
     /// [`FileIssue`] naming all that the folder lacks for it, and what to add.
     pub fn require_planning(&self) -> Result<(), FileIssue> {
         FileIssue::all(&self.folder.join("robot.toml"), &self.planning_issues).map_or(Ok(()), Err)
+    }
+
+    /// The first joint that slides.
+    #[must_use]
+    pub fn first_slide(&self) -> Option<&ChainJoint> {
+        self.chain.joints().iter().find(|joint| joint.kind.is_slide())
+    }
+
+    /// Checks that all joints turn, for `what`, which knows no slides.
+    ///
+    /// # Errors
+    /// [`FileIssue`] naming the URDF, the first slide and what does work.
+    pub fn require_turning(&self, what: &str) -> Result<(), FileIssue> {
+        let Some(slide) = self.first_slide() else { return Ok(()) };
+        let problem = format!("is prismatic, and {what} knows no slides yet: `armcal calibrate` on a recording does");
+        Err(FileIssue::new(&self.folder.join(&self.urdf_name), format!("joint `{}`", slide.name), problem))
     }
 
     /// Checks that the camera's lens is known: tags' corners mean nothing without it.

@@ -12,7 +12,7 @@ use super::shape::{PlacedShape, Shape};
 use super::urdf_mesh::{MeshFolders, NamedMesh};
 use super::urdf_text::plain_urdf;
 use crate::joints::MAX_JOINTS;
-use crate::kinematics::{Attachment, Chain, ChainJoint, JointLimits};
+use crate::kinematics::{Attachment, Chain, ChainJoint, JointKind, JointLimits};
 
 /// Limit of an arm's collision shapes, so that planning places them without allocating.
 pub const MAX_COLLISION_SHAPES: usize = 64;
@@ -157,10 +157,12 @@ impl UrdfModel {
             let joint = &self.robot.joints[idx];
             check_moving(&self.file, joint)?;
             pending *= isometry(&joint.origin);
-            let limits = match joint.joint_type {
+            let limits = JointLimits { lower_rad: joint.limit.lower, upper_rad: joint.limit.upper };
+            let (kind, limits) = match joint.joint_type {
                 JointType::Fixed => continue,
-                JointType::Continuous => None,
-                JointType::Revolute => Some(JointLimits { lower_rad: joint.limit.lower, upper_rad: joint.limit.upper }),
+                JointType::Continuous => (JointKind::Revolute, None),
+                JointType::Revolute => (JointKind::Revolute, Some(limits)),
+                JointType::Prismatic => (JointKind::Prismatic, Some(limits)),
                 ref other => {
                     return Err(RobotError::JointKind {
                         file: self.file.clone(),
@@ -172,6 +174,7 @@ impl UrdfModel {
             joints.push(ChainJoint {
                 name: joint.name.clone(),
                 child_link: joint.child.link.clone(),
+                kind,
                 parent_from_joint: pending,
                 axis: Unit::new_normalize(Vector3::from(joint.axis.xyz.0)),
                 limits,
@@ -405,7 +408,9 @@ fn check_moving(file: &Path, joint: &urdf_rs::Joint) -> Result<(), RobotError> {
     }
     FileIssue::check_range(file, &format!("joint `{}`: effort", joint.name), joint.limit.effort, 0.0..=1e7)?;
     let (lower, upper) = (joint.limit.lower, joint.limit.upper);
-    if joint.joint_type == JointType::Revolute && !(lower.is_finite() && upper.is_finite() && lower < upper) {
+    if matches!(joint.joint_type, JointType::Revolute | JointType::Prismatic)
+        && !(lower.is_finite() && upper.is_finite() && lower < upper)
+    {
         let key = format!("joint `{}`: limit", joint.name);
         return Err(FileIssue::new(file, key, format!("lower {lower} must lie below upper {upper}")).into());
     }

@@ -117,7 +117,7 @@ fn drawn(robot: &Robot, poses: &LinkPoses, project: &Projection) -> Drawn {
     let of_body = |body: usize| {
         robot.bodies[body].collisions.iter().map(move |placed| outline(placed, poses.link(body), project))
     };
-    let joints = (0..robot.n_joints()).map(|joint| project(&Point3::from(*poses.joint_origin(joint))));
+    let joints = (0..robot.n_joints()).map(|joint| project(&Point3::from(poses.joint_origin(joint))));
     let tool = project(&Point3::from(poses.frame(&robot.tool.mount).translation.vector));
     Drawn {
         outlines: (0..robot.bodies.len().min(robot.n_joints() + 1)).flat_map(of_body).collect(),

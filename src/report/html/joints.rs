@@ -36,24 +36,30 @@ fn is_estimated(joint: &JointResult) -> bool {
 }
 
 fn table(calibration: &Calibration) -> Markup {
+    let has_slide = calibration.has_slide();
+    let (si, shown) = if has_slide { ("rad or m", "deg or mm") } else { ("rad", "deg") };
     markup! {
         div.wide {
             table {
                 tr {
-                    th { "joint" } th { "gain, rad/count" } th { "1 sigma, %" } th { "offset, deg" }
-                    th { "1 sigma, deg" }
-                    th { "covered, deg" } th { "change, %" }
+                    th { "joint" } th { "gain, " (si) "/count" } th { "1 sigma, %" } th { "offset, " (shown) }
+                    th { "1 sigma, " (shown) }
+                    th { "covered, " (shown) } th { "change, %" }
                 }
                 @for joint in &calibration.joint {
                     tr {
-                        td { (joint.name) @if !is_estimated(joint) { " " small { "(not calibrated)" } } }
+                        @let unit = joint.moves.unit();
+                        td {
+                            (joint.name) @if joint.moves.is_slide() { " (slide, mm)" }
+                            @if !is_estimated(joint) { " " small { "(not calibrated)" } }
+                        }
                         td { (format!("{:.8}", joint.gain_rad_per_count)) }
                         @let gain_std = joint.gain_std_rad_per_count / joint.gain_rad_per_count.abs();
                         td { (format!("{:.2}", 100.0 * gain_std)) }
-                        td { (format!("{:+.3}", joint.offset_rad.to_degrees())) }
-                        td { (format!("{:.3}", joint.offset_std_rad.to_degrees())) }
-                        @let [from_deg, to_deg] = joint.covered_rad.map(f64::to_degrees);
-                        td { (format!("{from_deg:.0} .. {to_deg:.0}")) }
+                        td { (format!("{:+.3}", joint.offset_rad * unit.scale())) }
+                        td { (unit.number(joint.offset_std_rad, 3)) }
+                        @let [from, to] = joint.covered_rad.map(|end| unit.number(end, 0));
+                        td { (from) " .. " (to) }
                         @let change = joint.gain_over_datasheet.map(|gain| format!("{:+.2}", 100.0 * (gain - 1.0)));
                         td { (change.unwrap_or_else(|| "-".to_owned())) }
                     }
@@ -84,6 +90,7 @@ impl<'a> Curves<'a> {
     fn figure(&self, joint: usize) -> Markup {
         let model = &self.sensors.models[joint];
         let (spec, name) = (&model.spec, &self.calibration.joint[joint].name);
+        let (scale, symbol) = (spec.unit().scale(), spec.unit().symbol());
         let departure = ConditionChange::default();
         let std_rad = |travel_rad: f64| {
             let at = JointAt { spec, joint, travel_rad };
@@ -94,13 +101,13 @@ impl<'a> Curves<'a> {
             let travel_rad = (2.0 * n as f64 / (POINTS - 1) as f64 - 1.0) * spec.half_range_rad;
             let read_rad = spec.center_rad + travel_rad;
             let off_rad = model.correction.angle_rad(spec, travel_rad, &departure, 0.0) - read_rad;
-            let point = |off_rad: f64| [read_rad.to_degrees(), off_rad.to_degrees()];
+            let point = |off_rad: f64| [scale * read_rad, scale * off_rad];
             line.push(point(off_rad));
             upper.push(point(off_rad + 2.0 * std_rad(travel_rad)));
             lower.push(point(off_rad - 2.0 * std_rad(travel_rad)));
         }
-        let low = lower.iter().map(|[_, deg]| *deg).fold(0.0, f64::min);
-        let ticks = self.calibration.details.views.iter().map(|view| [view.datasheet_rad[joint].to_degrees(), low]);
+        let low = lower.iter().map(|[_, off]| *off).fold(0.0, f64::min);
+        let ticks = self.calibration.details.views.iter().map(|view| [scale * view.datasheet_rad[joint], low]);
         upper.extend(lower.into_iter().rev());
         let zero = vec![line[0], line[POINTS - 1]].into_iter().map(|[x, _]| [x, 0.0]).collect();
         let shown = vec![
@@ -110,6 +117,7 @@ impl<'a> Curves<'a> {
             series("", Color::Orange, Style::Dots, ticks.collect()),
         ];
         debug_assert_eq!(self.robot.n_joints(), self.sensors.models.len());
-        figure(&panel(name, "reading by the datasheet, deg", "off the datasheet, deg", shown), "")
+        let [x, y] = ["reading by", "off"].map(|what| format!("{what} the datasheet, {symbol}"));
+        figure(&panel(name, &x, &y, shown), "")
     }
 }

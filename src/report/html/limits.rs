@@ -42,14 +42,19 @@ fn reservations(reservations: &[Reservation]) -> Markup {
     }
 }
 
-/// How far one degree of each joint moves the tool, root mean square over `at`, m.
+/// One degree, rad; one millimetre of a slide, m.
+fn shown_step(robot: &Robot, joint: usize) -> f64 {
+    if robot.sensors[joint].moves.is_slide() { 1e-3 } else { 1f64.to_radians() }
+}
+
+/// How far one degree of each joint (one millimetre of a slide) moves the tool, root mean square over `at`, m.
 fn tool_per_degree_m(robot: &Robot, at: &[JointAngles]) -> Vec<f64> {
     let square_m2 = |joint: usize, angles: &JointAngles| {
         let poses = robot.chain.link_poses(angles);
         let tool_m: Vector3<f64> = poses.frame(&robot.tool.mount).translation.vector;
         let by_rad =
             if joint < robot.tool.mount.n_joints { poses.point_jacobian(joint, &tool_m) } else { Vector3::zeros() };
-        (by_rad * 1f64.to_radians()).norm_squared()
+        (by_rad * shown_step(robot, joint)).norm_squared()
     };
     let mean = |joint: usize| at.iter().map(|angles| square_m2(joint, angles)).sum::<f64>() / at.len().max(1) as f64;
     (0..robot.n_joints()).map(|joint| mean(joint).sqrt()).collect()
@@ -64,9 +69,13 @@ fn sensitivity(report: &Report<'_>) -> Markup {
         return Markup::default();
     }
     markup! {
-        h3 { "What one degree costs" }
+        @let has_slide = report.robot.first_slide().is_some();
+        h3 { "What one degree " @if has_slide { "or millimetre " } "costs" }
         table {
-            tr { th { "joint" } th { "tool moves, mm per degree (rms over the " (over) ")" } }
+            tr {
+                th { "joint" }
+                th { "tool moves, mm per degree" @if has_slide { " or mm" } " (rms over the " (over) ")" }
+            }
             @for (joint, m) in report.robot.joint_names().iter().zip(tool_per_degree_m(report.robot, &at)) {
                 tr { td { (joint) } td { (format!("{:.1}", 1e3 * m)) } }
             }

@@ -9,6 +9,7 @@ use super::Report;
 use super::figure::{figure, panel, series};
 use armcal_belief::calib::{CornerResidual, ObservedTag, ViewResidual};
 use armcal_belief::tagmap::files::spoken_name;
+use armcal_core::robot::JointSensorSpec;
 
 /// A residual in the picture of the image is this many times as long as it is.
 const MAGNIFIED: f64 = 40.0;
@@ -18,16 +19,15 @@ pub(super) fn section(report: &Report<'_>) -> Markup {
     if views.iter().all(|view| view.tags.is_empty()) {
         return Markup::default();
     }
-    let names = report.robot.joint_names();
     markup! {
         h2 { "What the fit leaves" }
         div.figures {
             (over_time(views))
             (over_image(views))
-            (joint_errors(views, &names))
+            (joint_errors(views, &report.robot.sensors))
         }
         (by_tag(views))
-        (by_joint(views, &names))
+        (by_joint(views, &report.robot.sensors))
     }
 }
 
@@ -90,7 +90,7 @@ fn by_tag(views: &[ViewResidual]) -> Markup {
     }
 }
 
-fn by_joint(views: &[ViewResidual], names: &[String]) -> Markup {
+fn by_joint(views: &[ViewResidual], sensors: &[JointSensorSpec]) -> Markup {
     let errors: Vec<_> = views.iter().filter_map(|view| view.joint_error_rad).collect();
     if errors.is_empty() {
         return Markup::default();
@@ -100,15 +100,21 @@ fn by_joint(views: &[ViewResidual], names: &[String]) -> Markup {
     markup! {
         h3 { "By joint" }
         table {
-            tr { th { "joint" } th { "off its calibrated sensor, deg rms" } th { "worst, deg" } }
-            @for (joint, name) in names.iter().enumerate() {
+            @let shown = units(sensors);
+            tr { th { "joint" } th { "off its calibrated sensor, " (shown) " rms" } th { "worst, " (shown) } }
+            @for (joint, spec) in sensors.iter().enumerate() {
                 // What no view shows is never off.
                 @let is_off = worst(joint) > 0.0;
-                @let shown = |rad: f64| if is_off { format!("{:.3}", rad.to_degrees()) } else { "-".to_owned() };
-                tr { td { (name) } td { (shown(rms(joint))) } td { (shown(worst(joint))) } }
+                @let shown = |rad: f64| if is_off { spec.unit().number(rad, 3) } else { "-".to_owned() };
+                tr { td { (spec.joint) } td { (shown(rms(joint))) } td { (shown(worst(joint))) } }
             }
         }
     }
+}
+
+/// What the joints' errors are shown in.
+fn units(sensors: &[JointSensorSpec]) -> &'static str {
+    if sensors.iter().any(|spec| spec.moves.is_slide()) { "deg (mm of slides)" } else { "deg" }
 }
 
 /// Seconds since the first view.
@@ -171,16 +177,18 @@ fn over_image(views: &[ViewResidual]) -> Markup {
 }
 
 /// How far each joint was off its calibrated sensor.
-fn joint_errors(views: &[ViewResidual], names: &[String]) -> Markup {
-    let of_joint = |(joint, name): (usize, &String)| {
-        let point = |view: &ViewResidual| Some([time_s(views, view), view.joint_error_rad?[joint].to_degrees()]);
+fn joint_errors(views: &[ViewResidual], sensors: &[JointSensorSpec]) -> Markup {
+    let of_joint = |(joint, spec): (usize, &JointSensorSpec)| {
+        let scale = spec.unit().scale();
+        let point = |view: &ViewResidual| Some([time_s(views, view), scale * view.joint_error_rad?[joint]]);
         let points: Vec<[f64; 2]> = views.iter().filter_map(point).collect();
-        let is_still = points.iter().all(|[_, deg]| deg.abs() < 1e-6);
-        (!is_still).then(|| Series { name: name.clone(), color: None, style: Style::Line, points })
+        let is_still = points.iter().all(|[_, off]| off.abs() < 1e-6);
+        (!is_still).then(|| Series { name: spec.joint.clone(), color: None, style: Style::Line, points })
     };
-    let shown: Vec<Series> = names.iter().enumerate().filter_map(of_joint).collect();
+    let shown: Vec<Series> = sensors.iter().enumerate().filter_map(of_joint).collect();
     if shown.is_empty() {
         return Markup::default();
     }
-    figure(&panel("Each joint against its calibrated sensor", "since the first view, s", "off, deg", shown), "")
+    let y = format!("off, {}", units(sensors));
+    figure(&panel("Each joint against its calibrated sensor", "since the first view, s", &y, shown), "")
 }

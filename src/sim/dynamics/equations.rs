@@ -213,7 +213,7 @@ impl Body {
 pub(super) fn joint_axes(poses: &LinkPoses, n: usize) -> [Motion; MAX_JOINTS] {
     let mut axes = [Motion::zero(); MAX_JOINTS];
     for (j, slot) in axes.iter_mut().enumerate().take(n) {
-        *slot = Motion::rotation(poses.axis(j), poses.joint_origin(j));
+        *slot = Motion::rotation(poses.axis(j), &poses.joint_origin(j));
     }
     axes
 }

@@ -166,6 +166,7 @@ fn a_light_vehicle_is_rocked_as_predicted() {
     let chain = Chain::new(vec![ChainJoint {
         name: "j".into(),
         child_link: "bar".into(),
+        kind: armcal_core::kinematics::JointKind::Revolute,
         parent_from_joint: Isometry3::identity(),
         axis: Vector3::y_axis(),
         limits: None,
@@ -242,6 +243,7 @@ fn a_neutrally_buoyant_link_hangs_still() {
     let joint = ChainJoint {
         name: "j".into(),
         child_link: "link".into(),
+        kind: armcal_core::kinematics::JointKind::Revolute,
         parent_from_joint: Isometry3::identity(),
         axis: Vector3::y_axis(),
         limits: None,

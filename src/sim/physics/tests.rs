@@ -93,6 +93,7 @@ fn pendulum(
     let joint = ChainJoint {
         name: "j".into(),
         child_link: "bar".into(),
+        kind: armcal_core::kinematics::JointKind::Revolute,
         parent_from_joint: Isometry3::translation(origin.x, origin.y, origin.z),
         axis,
         limits: None,
@@ -261,7 +262,7 @@ fn no_torque_is_missing_on_a_moving_base() {
         let force = mass * (acceleration + Vector3::z() * GRAVITY_M_S2);
         let spin = (momentum(body, 0.0, h) - momentum(body, -h, 0.0)) / h;
         for (j, torque) in torques.iter_mut().enumerate().take(body) {
-            let origin = (now.0 * nalgebra::Point3::from(*now.1.joint_origin(j))).coords;
+            let origin = (now.0 * nalgebra::Point3::from(now.1.joint_origin(j))).coords;
             *torque += (com(&now) - origin).cross(&force) + spin;
         }
     }

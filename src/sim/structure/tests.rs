@@ -24,6 +24,7 @@ fn joint(name: &str, at_m: f64) -> ChainJoint {
     ChainJoint {
         name: name.to_owned(),
         child_link: format!("{name} link"),
+        kind: armcal_core::kinematics::JointKind::Revolute,
         parent_from_joint: Isometry3::translation(at_m, 0.0, 0.0),
         axis: Unit::new_normalize(Vector3::y()),
         limits: None,

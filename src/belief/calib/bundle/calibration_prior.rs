@@ -95,6 +95,7 @@ impl PriorConsistency {
             joint: robot.sensors[self.joint].joint.clone(),
             off_rad: self.off_rad,
             off_std_rad: self.off_std_rad,
+            moves: robot.sensors[self.joint].moves,
             chi2: self.chi2,
             degrees_of_freedom: self.degrees_of_freedom,
             limit: self.limit,

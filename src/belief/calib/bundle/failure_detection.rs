@@ -197,7 +197,7 @@ impl FailureSearch<'_> {
 
     fn failure(&self, joint: usize, pattern: &FailurePattern, found: FailureSource, readings: &Readings) -> Failure {
         let all = Failure::without_sensor(joint, FailedKind::Dead, found, self.views.len());
-        let evidence = readings.in_words(pattern, self.views);
+        let evidence = readings.in_words(&self.robot.sensors[joint], pattern, self.views);
         match pattern {
             FailurePattern::Locked(SensorUse::Used) => {
                 let (kind, reading) = (FailedKind::Locked, SensorUse::Used);
@@ -214,9 +214,10 @@ impl FailureSearch<'_> {
                 let (kind, reading, views) = (FailedKind::Jumps, SensorUse::Used, views.clone());
                 Failure { kind, reading, views, evidence, ..all }
             }
-            FailurePattern::Lasting { since, step_rad } => {
-                Failure { found, ..Failure::slip(joint, *step_rad, self.views, *since) }
-            }
+            FailurePattern::Lasting { since, step_rad } => Failure {
+                found,
+                ..Failure::slip((joint, self.robot.sensors[joint].unit()), *step_rad, self.views, *since)
+            },
         }
     }
 

@@ -88,8 +88,9 @@ impl FailureImpact<'_> {
     fn evidence(&self, failure: &Failure) -> String {
         let step =
             failure.since.and_then(|since| Some((since, self.found.step(failure.joint, self.views[since].end)?)));
+        let unit = self.robot.sensors[failure.joint].unit();
         match step {
-            Some((since, (step_rad, _))) => slip_in_words(step_rad, self.views, since),
+            Some((since, (step_rad, _))) => slip_in_words(unit.shown(step_rad, 2), self.views, since),
             None => failure.evidence.clone(),
         }
     }
@@ -174,7 +175,10 @@ impl FailureImpact<'_> {
                 (FindingKind::SensorReversed, Some(line.slope), Some(FindingUnit::One))
             }
             (Some(_), _) => (FindingKind::SensorScale, Some(self.parameters.gain[joint]), Some(FindingUnit::One)),
-            (None, Some((size_rad, _))) => (FindingKind::SensorSlip, Some(size_rad), Some(FindingUnit::Radian)),
+            (None, Some((size_rad, _))) => {
+                let unit = FindingUnit::of_joint(self.robot.sensors[joint].moves);
+                (FindingKind::SensorSlip, Some(size_rad), Some(unit))
+            }
             (None, None) => (FindingKind::SensorFailed, None, None),
         };
         let is_repaired = failure.line.is_none() || self.is_calibrated_anew(failure);

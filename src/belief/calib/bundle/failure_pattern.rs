@@ -87,7 +87,7 @@ impl Readings {
         let travel_rad: Vec<f64> = seen.iter().map(|&k| views[k].travel_rad[joint]).collect();
         let mut angle_rad: Vec<f64> = angles.iter().map(|(angle, _)| *angle).collect();
         let spec = &robot.sensors[joint];
-        if spec.half_range_rad > PI - WHOLE_TURN_RAD {
+        if !spec.moves.is_slide() && spec.half_range_rad > PI - WHOLE_TURN_RAD {
             on_one_turn(&mut angle_rad[travel_rad.len() - n_still(&travel_rad, spec)..]);
         }
         Self { joint, travel_rad, angle_rad, std_rad: angles.iter().map(|(_, std)| *std).collect(), view_idx: seen }
@@ -204,49 +204,52 @@ impl Readings {
     }
 
     /// What shows the pattern.
-    pub(crate) fn in_words(&self, pattern: &FailurePattern, views: &[View]) -> String {
-        let range_deg = |values: &[f64]| {
+    pub(crate) fn in_words(&self, spec: &JointSensorSpec, pattern: &FailurePattern, views: &[View]) -> String {
+        let unit = spec.unit();
+        let range = |values: &[f64], digits: usize| {
             let (low, high) =
                 values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
-            (high - low).to_degrees()
+            unit.shown(high - low, digits)
         };
-        let (read, shown) = (range_deg(&self.travel_rad), range_deg(&self.angle_rad));
+        let read = |digits: usize| range(&self.travel_rad, digits);
+        let shown = |digits: usize| range(&self.angle_rad, digits);
         let n = self.len();
         let number = |k: usize| views[k].pose_idx + 1;
         match pattern {
             FailurePattern::Locked(SensorUse::Used) => {
-                format!("the camera shows one angle in {n} views (within {shown:.2} deg), as the sensor says")
+                format!("the camera shows one angle in {n} views (within {}), as the sensor says", shown(2))
             }
             FailurePattern::Locked(SensorUse::Ignored) => {
                 format!(
-                    "the camera shows one angle in {n} views (within {shown:.2} deg); the sensor reads {read:.2} deg \
-                     apart, or elsewhere"
+                    "the camera shows one angle in {n} views (within {}); the sensor reads {} apart, or elsewhere",
+                    shown(2),
+                    read(2)
                 )
             }
             FailurePattern::Stuck(n_still) => {
-                let shown = range_deg(&self.angle_rad[n - n_still..]);
+                let shown = range(&self.angle_rad[n - n_still..], 1);
                 let since = if *n_still < n { "the last " } else { "" };
-                format!(
-                    "the reading stands still over {since}{n_still} views while the camera shows {shown:.1} deg of \
-                     motion"
-                )
+                format!("the reading stands still over {since}{n_still} views while the camera shows {shown} of motion")
             }
             FailurePattern::Dead => {
-                format!("the reading spans {read:.1} deg and does not follow the {shown:.1} deg that the camera shows")
+                format!("the reading spans {} and does not follow the {} that the camera shows", read(1), shown(1))
             }
             FailurePattern::Reversed(SensorLine { slope, .. }) => format!(
-                "the reading goes the other way: over {n} views the {shown:.1} deg that the camera shows follow it \
-                 with a slope of {slope:.2}"
+                "the reading goes the other way: over {n} views the {} that the camera shows follow it with a \
+                 slope of {slope:.2}",
+                shown(1)
             ),
             FailurePattern::Scaled(SensorLine { slope, .. }) => format!(
-                "the {shown:.1} deg that the camera shows in {n} views follow the {read:.1} deg of the reading along \
-                 a line of slope {slope:.2}"
+                "the {} that the camera shows in {n} views follow the {} of the reading along a line of slope \
+                 {slope:.2}",
+                shown(1),
+                read(1)
             ),
             FailurePattern::Single(of) => {
                 let numbers: Vec<String> = of.iter().map(|&k| number(k).to_string()).collect();
                 format!("the reading is off in {} of {n} views ({})", of.len(), numbers.join(", "))
             }
-            FailurePattern::Lasting { since, step_rad } => slip_in_words(*step_rad, views, *since),
+            FailurePattern::Lasting { since, step_rad } => slip_in_words(unit.shown(*step_rad, 2), views, *since),
         }
     }
 }

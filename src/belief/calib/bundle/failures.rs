@@ -13,6 +13,7 @@ use crate::calib::parameters::{JointParameters, ParameterKind};
 use crate::calib::views::view::View;
 use armcal_core::robot::{FailedJoint, FailedKind, Robot};
 use armcal_core::stats::quantile;
+use armcal_core::units::Unit;
 
 /// A joint's error in one view that stands out: times the spread of the others (a robust sigma), and at all, rad.
 pub(crate) const FAR_SIGMAS: f64 = 6.0;
@@ -101,13 +102,13 @@ impl Failure {
         }
     }
 
-    /// A sensor that slipped by `step_rad` before the view `since`.
-    pub fn slip(joint: usize, step_rad: f64, views: &[View], since: usize) -> Self {
+    /// A sensor that slipped by `step_rad`, shown in `unit`, before the view `since`.
+    pub fn slip((joint, unit): (usize, Unit), step_rad: f64, views: &[View], since: usize) -> Self {
         Self {
             reading: SensorUse::Used,
             since: Some(since),
             step_rad: Some(step_rad),
-            evidence: slip_in_words(step_rad, views, since),
+            evidence: slip_in_words(unit.shown(step_rad, 2), views, since),
             ..Self::without_sensor(joint, FailedKind::Jumps, FailureSource::Detected, 0)
         }
     }
@@ -130,10 +131,10 @@ impl Failure {
 }
 
 /// `the sensor slipped by 1.00 deg after 9 of 20 views, before view 10`.
-pub(crate) fn slip_in_words(step_rad: f64, views: &[View], since: usize) -> String {
+pub(crate) fn slip_in_words(step: String, views: &[View], since: usize) -> String {
     let n_before = views.iter().filter(|view| view.end < views[since].end).count();
-    let (step_deg, n, number) = (step_rad.to_degrees(), views.len(), views[since].pose_idx + 1);
-    format!("the sensor slipped by {step_deg:.2} deg after {n_before} of {n} views, before view {number}")
+    let (n, number) = (views.len(), views[since].pose_idx + 1);
+    format!("the sensor slipped by {step} after {n_before} of {n} views, before view {number}")
 }
 
 /// An arm and its views with the failed joints taken care of.

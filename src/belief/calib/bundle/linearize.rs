@@ -383,7 +383,7 @@ fn directions(Point { problem, corrections, .. }: &Point<'_, '_>, group: &Group<
     for joint in group.joints.clone() {
         let rotation = base_from_camera.rotation.inverse();
         let moved = rotation * poses.point_jacobian(joint, &center) * group.sign;
-        let turned = rotation * poses.axis(joint) * group.sign;
+        let turned = rotation * poses.turn_jacobian(joint) * group.sign;
         let mut twist = Vector6::new(moved.x, moved.y, moved.z, turned.x, turned.y, turned.z);
         if !sag.is_rigid() {
             let change = problem.loads(group.view_idx).torque_derivatives(poses, sag.tool_load_n, joint);

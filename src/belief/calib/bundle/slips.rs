@@ -94,7 +94,7 @@ impl FailureSearch<'_> {
     }
 
     fn slip(&self, step: &StepCandidate) -> Failure {
-        Failure::slip(step.joint, step.size_rad, self.views, step.since)
+        Failure::slip((step.joint, self.robot.sensors[step.joint].unit()), step.size_rad, self.views, step.since)
     }
 }
 

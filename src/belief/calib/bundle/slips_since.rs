@@ -80,7 +80,7 @@ fn slip(robot: &Robot, joint: usize, (old, new): (&Side<'_>, &Side<'_>), elapsed
         kind: FindingKind::SensorSlip,
         name: b.name.clone(),
         size: Some(size_rad),
-        unit: Some(FindingUnit::Radian),
+        unit: Some(FindingUnit::of_joint(robot.sensors[joint].moves)),
         tool_error_m: None,
         // Before the first view.
         time_s: Some(0.0),

@@ -90,6 +90,7 @@ pub(crate) fn prior_table(
         degrees_of_freedom: consistency.degrees_of_freedom,
         chi_square_limit: consistency.limit,
         worst_joint: robot.sensors[consistency.joint].joint.clone(),
+        moves: robot.sensors[consistency.joint].moves,
         worst_off_rad: consistency.off_rad,
         worst_off_std_rad: consistency.off_std_rad,
     }

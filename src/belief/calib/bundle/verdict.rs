@@ -20,7 +20,7 @@ use crate::calib::result::validity::not_covered;
 use crate::calib::result::verdict_tables::{Check, ObservabilityTable, VerdictTable};
 use crate::calib::views::view::TaskRests;
 use armcal_core::joints::JointAngles;
-use armcal_core::robot::Robot;
+use armcal_core::robot::{JointSensorSpec, Robot};
 use armcal_core::sensor::ConditionChange;
 use armcal_core::stats::chi_square_quantile;
 
@@ -112,8 +112,8 @@ impl VerdictInput<'_> {
         })?;
         let (robot, walks) = (self.input.robot, self.found.scales().walk_std_rad);
         let most = (0..robot.n_seen_joints()).max_by(|a, b| walks[*a].total_cmp(&walks[*b]))?;
-        let joint = robot.sensors[most].joint.clone();
-        Some(Refusal::OffsetsWalk { joint, walked_rad: walks[most], predicted_m, tolerance_m })
+        let (joint, moves) = (robot.sensors[most].joint.clone(), robot.sensors[most].moves);
+        Some(Refusal::OffsetsWalk { joint, walked_rad: walks[most], moves, predicted_m, tolerance_m })
     }
 
     /// Whether other links would explain the data better.
@@ -221,25 +221,29 @@ impl VerdictInput<'_> {
             let walked_rad = if self.found.model.walk.is_some() { scales.walk_std_rad[joint] } else { 0.0 };
             let std_rad = scales.joint_std_rad[joint];
             let limit_rad = MAX_OVER_LINEARITY * spec.linearity_std_rad.max(stated.joint_std_rad[joint]);
-            let check = Check::at_most(format!("{}: error from view to view, rad", spec.joint), std_rad, limit_rad);
+            let check = Check::at_most(
+                format!("{}: error from view to view, {}", spec.joint, spec.moves.si()),
+                std_rad,
+                limit_rad,
+            );
             if !check.holds && self.found.has_positions() {
                 // Their noise has no datasheet, and one landmark a view cannot part it from the joints' errors.
-                let (found, name) = (std_rad.to_degrees(), &spec.joint);
+                let (found, name) = (spec.unit().shown(std_rad, 2), &spec.joint);
                 table.warnings.push(format!(
-                    "{name} has a random error of {found:.2} deg from view to view, or the positions have as much"
+                    "{name} has a random error of {found} from view to view, or the positions have as much"
                 ));
             } else if !check.holds && refusal.is_none() {
                 let (joint, datasheet_std_rad) = (spec.joint.clone(), spec.linearity_std_rad);
-                calibration.findings.push(worn(&joint, std_rad));
-                refusal = Some(Refusal::SensorError { joint, std_rad, datasheet_std_rad });
+                calibration.findings.push(worn(spec, std_rad));
+                refusal = Some(Refusal::SensorError { joint, std_rad, datasheet_std_rad, moves: spec.moves });
             } else if walked_rad > WALKED * stated.joint_std_rad[joint] {
                 let kind = FindingKind::OffsetWalks;
-                calibration.findings.push(Finding { kind, repaired: true, ..worn(&spec.joint, walked_rad) });
+                calibration.findings.push(Finding { kind, repaired: true, ..worn(spec, walked_rad) });
                 table.warnings.push(format!(
-                    "{} has an offset that walks at random, by {:.2} deg (std) while the views were captured: as much \
-                     again is counted in the predicted tool error; calibrate again soon, or keep the belief up online",
+                    "{} has an offset that walks at random, by {} (std) while the views were captured: as much again \
+                     is counted in the predicted tool error; calibrate again soon, or keep the belief up online",
                     spec.joint,
-                    walked_rad.to_degrees()
+                    spec.unit().shown(walked_rad, 2)
                 ));
             }
             table.checks.push(check);
@@ -262,22 +266,22 @@ impl VerdictInput<'_> {
             let is_refused = check.value > MAX_NONLINEARITY && !self.found.has_positions();
             if !check.holds && self.found.has_positions() {
                 table.warnings.push(format!(
-                    "{} has a nonlinearity of {:.2} deg, or the positions have as much",
+                    "{} has a nonlinearity of {}, or the positions have as much",
                     spec.joint,
-                    std_rad.to_degrees()
+                    spec.unit().shown(std_rad, 2)
                 ));
             } else if !check.holds {
-                calibration.findings.push(Finding { repaired: !is_refused, ..worn(&spec.joint, std_rad) });
+                calibration.findings.push(Finding { repaired: !is_refused, ..worn(spec, std_rad) });
                 table.warnings.push(format!(
-                    "{} is worn: its nonlinearity is {:.2} deg, {:.1} times its datasheet's; estimated with the rest",
+                    "{} is worn: its nonlinearity is {}, {:.1} times its datasheet's; estimated with the rest",
                     spec.joint,
-                    std_rad.to_degrees(),
+                    spec.unit().shown(std_rad, 2),
                     check.value
                 ));
             }
             if is_refused && refusal.is_none() {
                 let joint = spec.joint.clone();
-                refusal = Some(Refusal::Nonlinearity { joint, std_rad, datasheet_std_rad });
+                refusal = Some(Refusal::Nonlinearity { joint, std_rad, datasheet_std_rad, moves: spec.moves });
             }
             table.checks.push(check);
         }
@@ -418,7 +422,12 @@ impl VerdictInput<'_> {
         let above = [0.0, SCALE_BOUNDS[1]];
         for (joint, spec) in robot.sensors.iter().enumerate().take(robot.n_seen_joints()) {
             let (now_rad, first_rad) = (now.joint_std_rad[joint], first.joint_std_rad[joint]);
-            all.push((format!("{}: error from view to view, rad", spec.joint), now_rad, first_rad, above));
+            all.push((
+                format!("{}: error from view to view, {}", spec.joint, spec.moves.si()),
+                now_rad,
+                first_rad,
+                above,
+            ));
             let (now_rad, first_rad) = (now.shape_std_rad[joint], first.shape_std_rad[joint]);
             all.push((format!("{}: nonlinearity, rad", spec.joint), now_rad, first_rad, above));
         }
@@ -510,12 +519,12 @@ fn geometry_finding(result: &ScoreTestResult, geometry: &GeometryError) -> Findi
     }
 }
 
-fn worn(joint: &str, std_rad: f64) -> Finding {
+fn worn(spec: &JointSensorSpec, std_rad: f64) -> Finding {
     Finding {
         kind: FindingKind::SensorWorn,
-        name: joint.to_owned(),
+        name: spec.joint.clone(),
         size: Some(std_rad),
-        unit: Some(FindingUnit::Radian),
+        unit: Some(FindingUnit::of_joint(spec.moves)),
         tool_error_m: None,
         time_s: None,
         repaired: false,

@@ -35,7 +35,8 @@ pub struct OnlineEvent {
 impl OnlineEvent {
     pub(crate) fn of_verdict(robot: &Robot, verdict: &Verdict, since: Stamp, now: Stamp) -> Self {
         let unit = match verdict.fault {
-            Fault::Slip(_) | Fault::Worn(..) | Fault::Mount => FindingUnit::Radian,
+            Fault::Slip(joint) | Fault::Worn(joint, ..) => FindingUnit::of_joint(robot.sensors[joint].moves),
+            Fault::Mount => FindingUnit::Radian,
             Fault::Tag(_) | Fault::Tags(_) | Fault::Base => FindingUnit::Metre,
             Fault::Scale(_) | Fault::Failed(_) | Fault::Drift => FindingUnit::One,
         };

@@ -158,6 +158,7 @@ fn joint_result(source: &Provenance<'_>, fit: &Fit<'_>, joint: usize, model: &Se
     let gain_std_before = before.map_or(spec.gain_std / spec.counts_per_rad.abs(), |j| j.gain_std_rad_per_count);
     JointResult {
         name: spec.joint.clone(),
+        moves: spec.moves,
         center_rad: spec.center_rad,
         gain_rad_per_count: model.correction.gain / spec.counts_per_rad,
         offset_rad: model.correction.offset_rad,

@@ -1,5 +1,6 @@
 //! calibration.toml: the answer, how sure it is, what it rests on and where it holds.
 
+use armcal_core::kinematics::JointKind;
 use armcal_core::routine::Method;
 use armcal_core::stats::Summary;
 use serde::{Deserialize, Serialize};
@@ -121,6 +122,12 @@ pub struct Calibration {
 }
 
 impl Calibration {
+    /// Whether any joint slides.
+    #[must_use]
+    pub fn has_slide(&self) -> bool {
+        self.joint.iter().any(|joint| joint.moves.is_slide())
+    }
+
     /// Refuses for `reasons`, if there are any, behind those that it was refused for before.
     pub(crate) fn refuse_for(&mut self, reasons: impl IntoIterator<Item = Refusal>) {
         self.refusals.extend(reasons);
@@ -147,6 +154,9 @@ impl Calibration {
 pub struct JointResult {
     /// Name of the joint in the URDF.
     pub name: String,
+    /// Whether it slides: then all that is in rad here is in m, and calibration.toml's keys say so.
+    #[serde(default, skip_serializing_if = "JointKind::is_turning")]
+    pub moves: JointKind,
     /// Middle of the joint's range by the drawing.
     pub center_rad: f64,
     /// Negative where the reading falls as the angle grows.

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use armcal_core::kinematics::JointKind;
 use armcal_core::robot::FailedKind;
 use armcal_core::stats::Summary;
 
@@ -22,13 +23,13 @@ pub struct FailedJointTable {
     /// Of a slip that lasts: the first pose after it. The sensor is calibrated as it is since then.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub since_pose: Option<u32>,
-    /// Where a locked joint stands, with one sigma.
+    /// Where a locked joint stands, with one sigma; m of a slide.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub angle_rad: Option<f64>,
     /// Absent where `angle_rad` is.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub angle_std_rad: Option<f64>,
-    /// One sigma of the angle where the camera alone tells it, in a view like those.
+    /// One sigma of the angle where the camera alone tells it, in a view like those; m of a slide.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera_std_rad: Option<f64>,
     /// Predicted tool error over the task where the joint's angle is known ...
@@ -64,6 +65,9 @@ pub struct PriorTable {
     pub chi_square_limit: f64,
     /// The joint that is off the most in its own sigma: mean over the views.
     pub worst_joint: String,
+    /// Whether that joint slides: the two figures that follow are in m then.
+    #[serde(default, skip_serializing_if = "JointKind::is_turning")]
+    pub moves: JointKind,
     /// Positive where the new views put the joint's angle above the prior's.
     pub worst_off_rad: f64,
     /// One sigma of `worst_off_rad`.

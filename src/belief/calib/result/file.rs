@@ -10,11 +10,12 @@ use crate::calib::result::camera_mount::CameraMount;
 use crate::calib::result::covariance_file::CovarianceTable;
 use crate::calib::result::file_error::CalibrationFileError;
 use crate::calib::result::link_table::LinkResult;
+use crate::calib::result::slide_keys::{SLIDE_HEAD, in_metres, named_as_angles};
 use crate::calib::result::terms_table::TermsTable;
 use crate::calib::views::View;
 use armcal_core::joints::JointAngles;
 use armcal_core::kinematics::LinkCorrections;
-use armcal_core::robot::{FileIssue, JointSensorSpec, Robot, RobotError, parse_toml, read_text};
+use armcal_core::robot::{FileIssue, JointSensorSpec, Robot, RobotError, from_table, parse_toml, read_text};
 use armcal_core::sensor::{ArmSensors, Correction};
 
 /// The texts of a calibration's two files, which hold each other's hashes: to be put in place together.
@@ -56,7 +57,11 @@ impl Calibration {
     /// [`CalibrationFileError::OtherRobot`] when it was made for another arm.
     pub fn sensors(&self, robot: &Robot) -> Result<ArmSensors, CalibrationFileError> {
         let names: Vec<String> = self.joint.iter().map(|joint| joint.name.clone()).collect();
-        if self.robot != robot.name || names != robot.joint_names() {
+        let moves_as = |(joint, spec): (&JointResult, &JointSensorSpec)| joint.moves == spec.moves;
+        if self.robot != robot.name
+            || names != robot.joint_names()
+            || !self.joint.iter().zip(&robot.sensors).all(moves_as)
+        {
             return Err(CalibrationFileError::OtherRobot {
                 file: "calibration.toml".to_owned(),
                 found: self.robot.clone(),
@@ -202,7 +207,8 @@ impl Calibration {
         let more = if self.reference.is_some() { TERMS_HEAD } else { "" };
         let hashed = Self { covariance_hash: self.hash_of_covariance(), ..self.clone() };
         let body = toml::to_string(&hashed).expect("plain tables and finite numbers have a TOML form");
-        format!("{head}{more}{body}")
+        let slides = if self.has_slide() { SLIDE_HEAD } else { "" };
+        format!("{head}{more}{slides}{}", in_metres(&body))
     }
 
     /// Of the covariance that it has, or was said to have by a file that was read without.
@@ -231,7 +237,12 @@ impl Calibration {
     /// # Errors
     /// [`CalibrationFileError`] naming file, key and allowed range.
     pub fn parse(file: &Path, text: &str) -> Result<Self, CalibrationFileError> {
-        let calibration: Self = parse_toml(file, text)?;
+        let calibration: Self = if text.contains("prismatic") {
+            let table = named_as_angles(file, parse_toml(file, text)?).map_err(RobotError::from)?;
+            from_table(&table).map_err(|message| RobotError::Syntax { file: file.to_owned(), message })?
+        } else {
+            parse_toml(file, text)?
+        };
         calibration.check(file).map_err(RobotError::from)?;
         Ok(calibration)
     }

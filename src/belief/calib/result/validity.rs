@@ -48,8 +48,9 @@ pub(crate) fn not_covered(calibration: &Calibration, postures: &[JointAngles]) -
         let beyond = postures.iter().map(|angles| past(angles[joint], [low, high])).filter(|by| *by > MARGIN_RAD);
         let (n, most) = beyond.fold((0usize, 0.0_f64), |(n, most), by| (n + 1, most.max(by)));
         let (name, all) = (&result.name, postures.len());
-        let [most, low, high] = [most, low, high].map(f64::to_degrees);
-        let words = || format!("{name}: {n} of {all} targets lie up to {most:.0} deg beyond {low:.0} .. {high:.0} deg");
+        let unit = result.moves.unit();
+        let [most, low, high] = [unit.shown(most, 0), unit.number(low, 0), unit.shown(high, 0)];
+        let words = || format!("{name}: {n} of {all} targets lie up to {most} beyond {low} .. {high}");
         (n > 0).then(words)
     };
     joints.filter_map(of_joint).collect()

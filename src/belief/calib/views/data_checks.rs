@@ -75,6 +75,6 @@ pub(crate) fn check_pose_variation(name: &str, data: &CaptureData, robot: &Robot
         recording: name.to_owned(),
         views: views().count(),
         joint: robot.sensors[joint].joint.clone(),
-        moved_deg: moved_rad.to_degrees(),
+        moved: robot.sensors[joint].unit().shown(moved_rad, 3),
     })
 }

@@ -56,6 +56,9 @@ fn identify(robot: &Robot, joint: usize, views: &[View]) -> Result<IdentifiedSca
     if joint >= robot.n_seen_joints() {
         return Err(wrong("it does not move the camera".to_owned()));
     }
+    if robot.sensors[joint].moves.is_slide() {
+        return Err(wrong("it slides, and scales are found by how the camera turns".to_owned()));
+    }
     let seen: Vec<(f64, Isometry3<f64>)> =
         views.iter().filter_map(|view| Some((view.travel_rad[joint], camera_pose(robot, view)?))).collect();
     if seen.len() < MIN_VIEWS {

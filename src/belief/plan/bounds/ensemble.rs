@@ -224,7 +224,7 @@ fn resampled(drawn: &[(DVector<f64>, f64)], n: usize) -> Vec<usize> {
 #[must_use]
 pub fn link_ends(robot: &Robot, poses: &LinkPoses) -> Vec<Point3<f64>> {
     let n = robot.n_joints();
-    let mut ends: Vec<Point3<f64>> = (1..n).map(|joint| Point3::from(*poses.joint_origin(joint))).collect();
+    let mut ends: Vec<Point3<f64>> = (1..n).map(|joint| Point3::from(poses.joint_origin(joint))).collect();
     ends.push(Point3::from(poses.frame(&robot.tool.mount).translation.vector));
     ends
 }

@@ -111,7 +111,7 @@ impl ArmRegion {
             is_within: true,
         };
         for j in 0..n_joints {
-            let (axis, origin) = (vec3(poses.axis(j)), vec3(poses.joint_origin(j)));
+            let (axis, origin) = (vec3(poses.axis(j)), vec3(&poses.joint_origin(j)));
             region.base_from_body[j + 1] = parry_pose(poses.link(j + 1));
             (region.axes[j], region.origins[j]) = (axis, origin);
             region.reach_rad[j] = step_rad[j].abs() + error_half_rad[j];

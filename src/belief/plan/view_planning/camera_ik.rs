@@ -99,8 +99,8 @@ impl CameraGoal {
         for joint in 0..n {
             let moved = poses.point_jacobian(joint, &base_from_frame.translation.vector);
             // The axis turns by omega x a; of `a x a*` that is the part of omega across the axis.
-            let omega = poses.axis(joint);
-            let turned = omega - axis * axis.dot(omega);
+            let omega = poses.turn_jacobian(joint);
+            let turned = omega - axis * axis.dot(&omega);
             out.fixed_view_mut::<3, 1>(0, joint).copy_from(&moved);
             out.fixed_view_mut::<3, 1>(3, joint).copy_from(&turned);
         }

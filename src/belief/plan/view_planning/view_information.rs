@@ -140,7 +140,7 @@ impl ViewJacobian {
         for (joint, by_parameter) in by_joint.iter_mut().enumerate().take(n_joints) {
             *by_parameter = basis(robot, joint, angles[joint]);
             let moved: Vector3<f64> = turn * poses.point_jacobian(joint, &eye_m) * sign;
-            let turned: Vector3<f64> = turn * poses.axis(joint) * sign;
+            let turned: Vector3<f64> = turn * poses.turn_jacobian(joint) * sign;
             twists.fixed_view_mut::<3, 1>(0, joint).copy_from(&moved);
             twists.fixed_view_mut::<3, 1>(3, joint).copy_from(&turned);
         }

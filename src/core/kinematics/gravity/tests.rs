@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::*;
 use crate::joints::JointAngles;
-use crate::kinematics::{Chain, IkGoal, IkSettings, JointLimits, LinkCorrections, solve_position};
+use crate::kinematics::{Chain, IkGoal, IkSettings, JointKind, JointLimits, LinkCorrections, solve_position};
 use crate::robot::{Robot, load};
 use rand::RngExt;
 
@@ -12,6 +12,15 @@ const G_M_S2: f64 = 9.80665;
 
 fn titan() -> Robot {
     load(&Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("robots/titan4")).expect("the robot reads")
+}
+
+/// The same with slides for the first joint and for the forearm's.
+fn sliding() -> Robot {
+    let mut robot = titan();
+    let mut joints = robot.chain.joints().to_vec();
+    [0, 2].iter().for_each(|joint| joints[*joint].kind = JointKind::Prismatic);
+    robot.chain = Chain::new(joints).with_loads(*robot.chain.loads());
+    robot
 }
 
 fn drawn_angles(robot: &Robot, name: &str) -> Vec<JointAngles> {
@@ -37,19 +46,22 @@ fn potential_j(robot: &Robot, poses: &LinkPoses, tool_load_n: f64) -> f64 {
 
 #[test]
 fn torques_are_the_slope_of_the_potential_energy() {
+    [titan(), sliding()].iter().for_each(torques_of);
+}
+
+fn torques_of(robot: &Robot) {
     const STEP_RAD: f64 = 1e-5;
-    let robot = titan();
     let loads = robot.chain.loads();
     assert!(loads.are_known());
     let mut largest = 0.0_f64;
-    for angles in drawn_angles(&robot, "torques") {
+    for angles in drawn_angles(robot, "torques") {
         let poses = robot.chain.link_poses(&angles);
         let torques = loads.torques(&poses, 300.0);
         for joint in 0..robot.n_joints() {
             let moved = |by_rad: f64| {
                 let mut moved = angles;
                 moved[joint] += by_rad;
-                potential_j(&robot, &robot.chain.link_poses(&moved), 300.0)
+                potential_j(robot, &robot.chain.link_poses(&moved), 300.0)
             };
             let slope = (moved(STEP_RAD) - moved(-STEP_RAD)) / (2.0 * STEP_RAD);
             assert!((torques.joints[joint] + slope).abs() < 1e-5 * (1.0 + slope.abs()), "joint {joint}: {slope}");
@@ -78,10 +90,13 @@ fn torques_are_the_slope_of_the_potential_energy() {
 
 #[test]
 fn torque_derivatives_are_those_of_the_torques() {
+    [titan(), sliding()].iter().for_each(derivatives_of);
+}
+
+fn derivatives_of(robot: &Robot) {
     const STEP_RAD: f64 = 1e-5;
-    let robot = titan();
     let loads = robot.chain.loads();
-    for angles in drawn_angles(&robot, "derivatives") {
+    for angles in drawn_angles(robot, "derivatives") {
         let poses = robot.chain.link_poses(&angles);
         for by in 0..robot.n_joints() {
             let at = |by_rad: f64| {
@@ -102,12 +117,15 @@ fn torque_derivatives_are_those_of_the_torques() {
 
 #[test]
 fn an_arm_bends_by_its_compliances_and_no_other_way() {
-    let robot = titan();
+    [titan(), sliding()].iter().for_each(bends_of);
+}
+
+fn bends_of(robot: &Robot) {
     let mut sag = Sag { tool_load_n: 200.0, mount_rad_per_nm: [2e-6, 3e-6, 0.0], ..Sag::default() };
-    sag.joint_rad_per_nm[1] = 5e-6;
+    sag.joint_rad_per_nm[..3].copy_from_slice(&[1e-6, 5e-6, 1e-6]);
     let corrections = LinkCorrections { sag, ..LinkCorrections::default() };
     let bent = robot.chain.corrected(&corrections);
-    for angles in drawn_angles(&robot, "bends") {
+    for angles in drawn_angles(robot, "bends") {
         let straight = robot.chain.link_poses(&angles);
         let bend = sag.bend(&robot.chain.loads().torques(&straight, 200.0));
         let poses = bent.link_poses(&angles);

@@ -5,6 +5,7 @@ use proptest::prelude::*;
 fn spec() -> JointSensorSpec {
     JointSensorSpec {
         joint: "j".into(),
+        moves: Default::default(),
         kind: SensorKind::Potentiometer,
         offset_counts: 65322.0,
         counts_per_rad: 46.0 * 180.0 / std::f64::consts::PI,

@@ -206,7 +206,7 @@ impl Contact {
         for (carrier, sign) in [(self.pushed, 1.0), (self.against, -1.0)] {
             let Some(body) = carrier else { continue };
             for joint in 0..body.min(MAX_JOINTS) {
-                let turning = Motion::rotation(state.poses.axis(joint), state.poses.joint_origin(joint));
+                let turning = Motion::rotation(state.poses.axis(joint), &state.poses.joint_origin(joint));
                 direction[state.first_joint + joint] += sign * turning.dot(&unit);
             }
             if state.first_joint > 0 {

@@ -244,7 +244,7 @@ impl Engine for RapierArm {
             let carried = self.links.iter().enumerate().skip(j);
             let total =
                 carried.map(|(i, link)| link.weight(poses.link(i + 1), gravity)).fold(Force::zero(), |a, b| a + b);
-            crate::dynamics::Motion::rotation(poses.axis(j), poses.joint_origin(j)).dot(&total)
+            crate::dynamics::Motion::rotation(poses.axis(j), &poses.joint_origin(j)).dot(&total)
         })
     }
 

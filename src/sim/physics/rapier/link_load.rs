@@ -82,7 +82,7 @@ pub(super) fn link_wrenches(links: &[Link], state: &ArmState) -> [Force; MAX_JOI
     let base = &state.around.base_velocity;
     let (mut own, mut own_acceleration) = (Motion::zero(), Motion::zero());
     for (j, link) in links.iter().enumerate() {
-        let axis = Motion::rotation(state.poses.axis(j), state.poses.joint_origin(j));
+        let axis = Motion::rotation(state.poses.axis(j), &state.poses.joint_origin(j));
         let turning = axis * state.rates[j];
         own = own + turning;
         own_acceleration = own_acceleration + axis * state.accelerations[j] + own.cross(&turning);

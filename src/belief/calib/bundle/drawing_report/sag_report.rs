@@ -65,8 +65,15 @@ impl Estimate<'_> {
                     }
                     _ => self.problem.robot.sensors[parameter.joint].joint.clone(),
                 };
-                let what = format!("gives {:.2} deg per kN m (sigma {:.2})", per_kn_m(size), per_kn_m(std));
-                (name, FindingUnit::RadianPerNewtonMetre, what)
+                let is_slide =
+                    kind == ParameterKind::Compliance && self.problem.robot.sensors[parameter.joint].moves.is_slide();
+                if is_slide {
+                    let what = format!("gives {:.2} mm per kN (sigma {:.2})", 1e6 * size, 1e6 * std);
+                    (name, FindingUnit::MetrePerNewton, what)
+                } else {
+                    let what = format!("gives {:.2} deg per kN m (sigma {:.2})", per_kn_m(size), per_kn_m(std));
+                    (name, FindingUnit::RadianPerNewtonMetre, what)
+                }
             }
         };
         let words = format!("{name}: {what}: the tool hangs {:.1} mm by it", 1e3 * tool_m);

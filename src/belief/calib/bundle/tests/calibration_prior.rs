@@ -95,6 +95,7 @@ fn calibration(robot: &Robot, found: &Estimate<'_>, views: &[View]) -> Calibrati
     let sensors = parameters.sensors(robot);
     let joint = sensors.models.iter().enumerate().map(|(joint, model)| JointResult {
         name: model.spec.joint.clone(),
+        moves: model.spec.moves,
         center_rad: model.spec.center_rad,
         gain_rad_per_count: model.correction.gain / model.spec.counts_per_rad,
         offset_rad: model.correction.offset_rad,

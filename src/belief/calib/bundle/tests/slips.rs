@@ -51,7 +51,7 @@ fn slip(case: &mut Case, joint: usize, since: usize, by_rad: f64) {
 
 /// Of the step, under the true scales at the fit.
 fn noncentrality(case: &Case, joint: usize, since: usize) -> f64 {
-    let known = [Failure::slip(joint, 0.0, &case.views, since)];
+    let known = [Failure::slip((joint, armcal_core::units::Unit::Radians), 0.0, &case.views, since)];
     let applied = FailureAdjusted::new(&case.robot, &case.views, &known, &JointParameters::default());
     let found = applied.estimate(HyperparameterMode::Given).expect("solved");
     let (size_rad, std_rad) = found.step(joint, case.views[since].end).expect("a column");

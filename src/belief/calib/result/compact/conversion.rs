@@ -23,6 +23,9 @@ impl CompactCalibration {
         if !calibration.link.is_empty() || calibration.sag.is_some() {
             return Err(CompactError::Links);
         }
+        if let Some(slide) = calibration.joint.iter().find(|joint| joint.moves.is_slide()) {
+            return Err(CompactError::Slide { joint: slide.name.clone() });
+        }
         let n = calibration.joint.len();
         if !(1..=MAX_JOINTS).contains(&n) {
             return Err(CompactError::Joints { joints: n });

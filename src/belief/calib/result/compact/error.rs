@@ -21,6 +21,8 @@ pub enum CompactError {
     Range { joint: String, what: &'static str },
     #[error("joint `{joint}`: calibration.toml does not tell its gain relative to the datasheet")]
     NoRelativeGain { joint: String },
+    #[error("joint `{joint}` slides, and the compact form has angles alone: give calibration.toml")]
+    Slide { joint: String },
     #[error("joint `{joint}`: terms about a scale that was measured on the way have no compact form")]
     MeasuredScale { joint: String },
     #[error(

@@ -42,6 +42,7 @@ fn calibration(robot: &str, joints: &[Joint], refusal: Option<Refusal>) -> Calib
         }
         JointResult {
             name: joint.name.clone(),
+            moves: Default::default(),
             center_rad: 0.3,
             gain_rad_per_count: (1.0 + gain) / COUNTS_PER_RAD,
             offset_rad,
