@@ -161,7 +161,8 @@ fn planning_issues(file: &Path, raw: &RobotFile, camera: &CameraSpec, arm: &Urdf
     }
     if let Some(slide) = arm.chain.joints().iter().find(|joint| joint.kind.is_slide()) {
         let problem = "is prismatic, and an arm with slides is neither simulated nor planned for yet: `armcal \
-                       calibrate` works on recordings of it";
+                       calibrate` works on recordings of it; where it is a lift that stands still, name the link on \
+                       it as base_link";
         issues.push(FileIssue::new(&arm.urdf.file, format!("joint `{}`", slide.name), problem));
     }
     if camera.mount.n_joints == 0 && raw.tag_link.is_none() {
