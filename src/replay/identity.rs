@@ -32,12 +32,14 @@ impl Identity {
         // Where files lie, and how that is spelled, is not part of the identity.
         let robot = Robot { folder: PathBuf::new(), links: BTreeMap::new(), ..input.robot.clone() };
         let vehicle = input.vehicle.map(|vehicle| Vehicle { file: PathBuf::new(), ..vehicle.clone() });
-        // Optional parts that are absent, and tags of the usual family, are not part of the identity.
+        // Optional parts that are absent, tags of the usual family, and joints that turn are not part of the identity.
         let drawings = format!("{robot:?}{vehicle:?}{:?}", input.scene);
         let still = format!("tag_frame: {:?}, ", Attachment::base());
         let families = ["tag_family: Tag36h11, ", "family: Some(Tag36h11), ", "family: Tag36h11, "];
+        let turning = ["moves: Revolute, ", "kind: Revolute, "];
         let absent = ["gripper_tag: None, ", "lights: [], ", "links: {}, ", &still];
-        let drawings = absent.iter().chain(&families).fold(drawings, |text, part| text.replace(part, ""));
+        let drawings =
+            absent.iter().chain(&families).chain(&turning).fold(drawings, |text, part| text.replace(part, ""));
         hasher.update(drawings.as_bytes());
         hasher.update(input.summary_markdown.unwrap_or_default().as_bytes());
         Ok(Self { recording_id: hasher.finalize().to_hex()[..32].to_owned() })
