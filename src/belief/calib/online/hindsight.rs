@@ -29,7 +29,7 @@ const FARTHER_BY: f64 = 1.0;
 const COMPARED_Z: f64 = 2.5;
 /// Views of a spot or a tag at least.
 const LEAST_VIEWS: usize = 2;
-/// Scores of a tag's place are looked into beyond this, chi-square of three: by chance once in 16,000.
+/// Scores of a tag's place are looked into beyond this, chi-square of three: by chance once in 15,000.
 const SUSPICIOUS_CHI2: f64 = 22.0;
 /// Other tags are compared from this on, once in 50.
 const COMPARED_CHI2: f64 = 10.0;
