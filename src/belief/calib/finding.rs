@@ -37,7 +37,7 @@ pub enum FindingKind {
     TagsMoved,
     /// A tag of another size than the survey's; the size is the relative difference.
     TagSize,
-    /// Two tags, each with the other's id.
+    /// Tags with one another's ids: two, or more in a ring.
     TagSwapped,
     /// The lens against robot.toml; the size is the relative error of its focal length.
     Lens,
