@@ -232,7 +232,7 @@ fn repaired(summary: &RunSummary) -> String {
         0 => String::new(),
         n => format!("; and {n} more"),
     };
-    format!(", repaired: {}; {}{more}", first.cause, first.remedy)
+    format!(", repaired: {}; {}{more}", first.cause, first.remedy_and_result())
 }
 
 /// The first of what else is wrong and may be the cause of a refusal.

@@ -53,7 +53,7 @@ pub(super) fn verdict(summary: &RunSummary) -> Verdict {
     if reasons.is_empty() {
         return Verdict { grade: Grade::Green, headline: "ACCEPTED: use it", reasons, next: vec![load] };
     }
-    let mut next: Vec<String> = repairs.iter().map(|repair| sentence(&repair.remedy)).collect();
+    let mut next: Vec<String> = repairs.iter().map(|repair| sentence(&repair.remedy_and_result())).collect();
     next.extend([load, "Look at each point above before work that depends on it.".to_owned()]);
     Verdict { grade: Grade::Amber, headline: "ACCEPTED, with points to look at", reasons, next }
 }
@@ -61,7 +61,18 @@ pub(super) fn verdict(summary: &RunSummary) -> Verdict {
 /// What was wrong with the arm or its survey, and is taken as it was found.
 pub(super) struct Repair {
     pub cause: String,
+    /// What to do.
     pub remedy: String,
+    /// What the result has in its place; empty where the remedy says it.
+    taken: &'static str,
+}
+
+impl Repair {
+    /// What to do, and what an accepted result has meanwhile.
+    pub fn remedy_and_result(&self) -> String {
+        let colon = if self.taken.is_empty() { "" } else { ": " };
+        format!("{}{colon}{}", self.remedy, self.taken)
+    }
 }
 
 /// Of this result.
@@ -113,51 +124,61 @@ const REPAIRS: [FindingKind; 8] = [
 
 fn of_finding(found: &Finding, since: &str) -> Option<Repair> {
     let name = &found.name;
-    let (cause, remedy) = match found.kind {
+    let (cause, remedy, taken) = match found.kind {
         FindingKind::SensorSlip => (
             format!("the sensor of {name} slipped{}{since}", by(found)),
-            format!("fasten the sensor of {name}: the result is of it as it is now"),
+            format!("fasten the sensor of {name}"),
+            "the result is of it as it is now",
         ),
         FindingKind::TagMoved => (
             format!("tag {name} hangs {} from where the survey has it", size(found)),
-            format!("fasten tag {name}, or correct the survey: the result has tag {name} where it was seen"),
+            format!("fasten tag {name}, or correct the survey"),
+            "the result has it where it was seen",
         ),
         FindingKind::TagsMoved => (
             format!("tags {name} hang {} (median) from where the survey has them", size(found)),
-            format!("fasten tags {name}, or correct the survey: the result has them where they were seen"),
+            format!("fasten tags {name}, or correct the survey"),
+            "the result has them where they were seen",
         ),
         FindingKind::TagSwapped => (
             format!("tags {name} hang in one another's places"),
-            "correct their ids in the survey: the result has them where they were seen".to_owned(),
+            "correct their ids in the survey".to_owned(),
+            "the result has them where they were seen",
         ),
         FindingKind::TagSize if name == "all" => (
-            format!("all tags are {} of the survey's size", percent(found)),
-            "measure one again, and correct the survey: the result has the size that was seen".to_owned(),
+            format!("all tags are {} than the survey says", differs(found, ["larger", "smaller"])),
+            "measure the side of one black square again, and correct the survey".to_owned(),
+            "the result has the size that was seen",
         ),
         FindingKind::TagSize => (
-            format!("tag {name} is {} of the survey's size", percent(found)),
-            format!("measure tag {name} again, and correct the survey: the result has the size that was seen"),
+            format!("tag {name} is {} than the survey says", differs(found, ["larger", "smaller"])),
+            "measure the side of its black square again, and correct the survey".to_owned(),
+            "the result has the size that was seen",
         ),
         FindingKind::Lens => (
-            format!("the focal length is {} of robot.toml's", percent(found)),
-            "measure the intrinsics again: the result has the lens that was seen".to_owned(),
+            format!("the focal length is {} than robot.toml says", differs(found, ["longer", "shorter"])),
+            "measure the intrinsics again".to_owned(),
+            "the result has the lens that was seen",
         ),
         FindingKind::Base => (
             format!("the arm's base is not where the survey has it, off{}", by(found)),
             "check the tag map's frame and where the arm stands; correct the one that is wrong".to_owned(),
+            "",
         ),
         FindingKind::Link => (
             format!("{name} is not as drawn, off{}", by(found)),
-            format!("correct the drawing of {name}: the result has it as it was seen"),
+            format!("correct the drawing of {name}"),
+            "the result has it as it was seen",
         ),
         _ => return None,
     };
-    Some(Repair { cause, remedy })
+    Some(Repair { cause, remedy, taken })
 }
 
-/// `+25.0 %`.
-fn percent(found: &Finding) -> String {
-    found.size.map_or_else(|| "off by some".to_owned(), |size| format!("{:+.1} %", 100.0 * size))
+/// `25.0 % larger`.
+fn differs(found: &Finding, [more, less]: [&str; 2]) -> String {
+    let percent = 100.0 * found.size.unwrap_or(0.0);
+    format!("{:.1} % {}", percent.abs(), if percent < 0.0 { less } else { more })
 }
 
 fn size(found: &Finding) -> String {
@@ -177,7 +198,7 @@ fn of_joint(failed: &FailedJointTable) -> Repair {
         None if *kind == FailedKind::Locked => format!("{joint} is locked{colon}{evidence}"),
         None => format!("the sensor of {joint} {}{colon}{evidence}", kind.predicate()),
     };
-    Repair { cause, remedy: joint_remedy(failed) }
+    Repair { cause, remedy: joint_remedy(failed), taken: "" }
 }
 
 /// What to do about a failed joint.
@@ -301,7 +322,7 @@ mod tests {
             causes(&others, &[]),
             [
                 "tags 0, 2 and 1 hang in one another's places",
-                "all tags are +25.0 % of the survey's size",
+                "all tags are 25.0 % larger than the survey says",
                 "forearm_link is not as drawn, off by 50.0 mm",
             ]
         );
