@@ -1,10 +1,15 @@
 //! Cholesky factors of dense matrices of a hundred columns or so, by blocks: most of the work is products of matrices,
 //! which are several times as fast as products of vectors (Golub and Van Loan, Matrix Computations, 4.2.9).
 
+use std::ops::Range;
+
 use nalgebra::{Cholesky, DMatrix, Dyn};
 
-/// Columns of a block.
-const BLOCK: usize = 32;
+/// Columns of a block, and of a part of it that is factored column by column.
+const BLOCK: usize = 24;
+const PART: usize = 8;
+/// Rows that are solved one by one.
+const SOLVE_BLOCK: usize = 32;
 
 /// Factor of a symmetric matrix, of which the lower triangle is read; `None` where it is not positive definite.
 #[must_use]
@@ -13,16 +18,13 @@ pub fn cholesky(mut matrix: DMatrix<f64>) -> Option<Cholesky<f64, Dyn>> {
     let n = matrix.nrows();
     for first in (0..n).step_by(BLOCK) {
         let end = (first + BLOCK).min(n);
-        for column in first..end {
-            factor_column(&mut matrix, first, column)?;
-        }
-        let (left, mut right) = matrix.columns_range_pair_mut(first..end, end..n);
-        let below = left.rows_range(end..n);
-        let across = below.transpose();
-        for start in (end..n).step_by(BLOCK) {
-            let width = BLOCK.min(n - start);
-            let mut block = right.view_mut((start, start - end), (n - start, width));
-            block.gemm(-1.0, &below.rows_range(start - end..), &across.columns(start - end, width), 1.0);
+        subtract_before(&mut matrix, 0, first..end);
+        for part in (first..end).step_by(PART) {
+            let part_end = (part + PART).min(end);
+            subtract_before(&mut matrix, first, part..part_end);
+            for column in part..part_end {
+                factor_column(&mut matrix, part, column)?;
+            }
         }
     }
     Some(Cholesky::pack_dirty(matrix))
@@ -33,8 +35,8 @@ pub fn solve_lower(factor: &Cholesky<f64, Dyn>, right: &mut DMatrix<f64>) {
     let lower = factor.l_dirty();
     let n = lower.nrows();
     assert!(right.nrows() == n, "as many rows as the factor has");
-    for first in (0..n).step_by(BLOCK) {
-        let end = (first + BLOCK).min(n);
+    for first in (0..n).step_by(SOLVE_BLOCK) {
+        let end = (first + SOLVE_BLOCK).min(n);
         for mut column in right.column_iter_mut() {
             for row in first..end {
                 let value = column[row] / lower[(row, row)];
@@ -49,6 +51,19 @@ pub fn solve_lower(factor: &Cholesky<f64, Dyn>, right: &mut DMatrix<f64>) {
         let (done, mut rest) = right.rows_range_pair_mut(first..end, end..n);
         rest.gemm(-1.0, &lower.view((end, first), (n - end, end - first)), &done, 1.0);
     }
+}
+
+/// Subtracts what the finished columns from `from` to the first of `own` contribute to `own`.
+fn subtract_before(matrix: &mut DMatrix<f64>, from: usize, own: Range<usize>) {
+    if from == own.start {
+        return;
+    }
+    let (n, first, width) = (matrix.nrows(), own.start, own.len());
+    let (done, mut own) = matrix.columns_range_pair_mut(from..first, own);
+    let rows = done.rows_range(first..n);
+    // Products of matrices with the right one turned are several times as slow.
+    let across = rows.rows_range(..width).transpose();
+    own.rows_range_mut(first..n).gemm(-1.0, &rows, &across, 1.0);
 }
 
 /// Finishes `column`, from which those before `first` were subtracted already.

@@ -63,8 +63,6 @@ pub(crate) struct NormalEquations {
     pub chi2: Vec<f64>,
     /// The same of each corner, used or not.
     pub corner_chi2: Vec<[f64; 4]>,
-    /// Where a prior of all columns is turned; empty until then.
-    pub(crate) room: DMatrix<f64>,
     /// Of the group at hand; kept, so that the loop does not allocate.
     infos: Vec<PoseInformation>,
     /// As many, where the lens has columns.
@@ -83,7 +81,6 @@ impl NormalEquations {
             by_tag: vec![(Matrix6::zeros(), None); problem.observations.len()],
             chi2: vec![0.0; problem.observations.len()],
             corner_chi2: vec![[0.0; 4]; problem.observations.len()],
-            room: DMatrix::zeros(0, 0),
             infos: Vec::new(),
             lens_infos: Vec::new(),
         }
@@ -91,15 +88,24 @@ impl NormalEquations {
 
     /// Linearizes `problem` at `state`.
     pub(crate) fn update(&mut self, problem: &BundleProblem<'_>, state: &State, loss: Loss) {
-        self.matrix.fill(0.0);
-        self.right.fill(0.0);
+        let n = problem.layout.n;
+        // A prior of all columns is copied in the place of zeros.
+        let is_full = problem.prior.joint_info.nrows() == n && n > problem.layout.n_joint();
+        if is_full {
+            self.start_with_full_prior(problem, state);
+        } else {
+            self.matrix.fill(0.0);
+            self.right.fill(0.0);
+            self.cost = 0.0;
+        }
         self.eliminated.clear();
-        self.cost = 0.0;
         let at = Point { problem, state, corrections: problem.link_corrections(state), loss };
         for view_idx in 0..problem.views.len() {
             self.add_view(&at, view_idx);
         }
-        self.add_priors(problem, state);
+        if !is_full {
+            self.add_priors(problem, state);
+        }
     }
 
     fn add_view(&mut self, at: &Point<'_, '_>, view_idx: usize) {

@@ -13,10 +13,6 @@ impl NormalEquations {
         let (layout, prior) = (&problem.layout, &problem.prior);
         let n = prior.joint_info.nrows();
         let off = off_by(layout, &prior.means(), state, n);
-        if n == layout.n {
-            self.add_full_prior(problem, &off);
-            return;
-        }
         let pull = &prior.joint_info * &off;
         self.cost += off.dot(&pull);
         let mut block = self.matrix.view_mut((0, 0), (n, n));
@@ -44,37 +40,31 @@ impl NormalEquations {
         }
     }
 
-    /// Of all columns, `off` from their means: with `d` how far a pose is off, a small motion of the pose changes it by
-    /// the inverse of the right Jacobian at `d`. Taken as one it would let what is well known leak into what is not.
-    fn add_full_prior(&mut self, problem: &BundleProblem<'_>, off: &DVector<f64>) {
+    /// One of all columns: with `d` how far a pose is off, a small motion of the pose changes it by the inverse of the
+    /// right Jacobian at `d`. Taken as one it would let what is well known leak into what is not. The lower triangle.
+    pub(crate) fn start_with_full_prior(&mut self, problem: &BundleProblem<'_>, state: &State) {
         let (layout, info) = (&problem.layout, &problem.prior.joint_info);
-        let mut pull = info * off;
-        self.cost += off.dot(&pull);
-        if layout.poses().all(|at| off.fixed_rows::<6>(at).iter().all(|value| *value == 0.0)) {
-            self.matrix += info;
-            self.right -= pull;
-            return;
-        }
-        if self.room.shape() == info.shape() {
-            self.room.copy_from(info);
-        } else {
-            self.room.clone_from(info);
-        }
+        let off = off_by(layout, &problem.prior.means(), state, layout.n);
+        self.right.gemv(-1.0, info, &off, 0.0);
+        self.cost = -off.dot(&self.right);
+        self.matrix.copy_from(info);
         for at in layout.poses() {
             let d: Vector6<f64> = off.fixed_rows::<6>(at).into_owned();
             if d == Vector6::zeros() {
                 continue;
             }
             let jacobian = right_jacobian_inverse(&d);
-            let columns: OMatrix<f64, Dyn, U6> = self.room.fixed_columns::<6>(at) * jacobian;
-            self.room.fixed_columns_mut::<6>(at).copy_from(&columns);
-            let rows: OMatrix<f64, U6, Dyn> = jacobian.tr_mul(&self.room.fixed_rows::<6>(at));
-            self.room.fixed_rows_mut::<6>(at).copy_from(&rows);
-            let pulled = jacobian.tr_mul(&pull.fixed_rows::<6>(at));
-            pull.fixed_rows_mut::<6>(at).copy_from(&pulled);
+            for column in 0..at + 6 {
+                let mut rows = self.matrix.fixed_view_mut::<6, 1>(at, column);
+                let turned = jacobian.tr_mul(&rows);
+                rows.copy_from(&turned);
+            }
+            let mut below = self.matrix.view_mut((at, at), (layout.n - at, 6));
+            let turned: OMatrix<f64, Dyn, U6> = &below * jacobian;
+            below.copy_from(&turned);
+            let pulled = jacobian.tr_mul(&self.right.fixed_rows::<6>(at));
+            self.right.fixed_rows_mut::<6>(at).copy_from(&pulled);
         }
-        self.matrix += &self.room;
-        self.right -= pull;
     }
 
     fn add_number_prior(&mut self, at: usize, off: f64, std: f64) {

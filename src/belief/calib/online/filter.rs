@@ -244,12 +244,12 @@ impl Filter {
         if k == 0 {
             return;
         }
-        let along = DMatrix::from_fn(self.info.nrows(), k, |row, i| self.info[(row, columns[i].0)]);
+        let along = self.info.select_columns(columns.iter().map(|(column, _)| column));
         let inner = DMatrix::from_fn(k, k, |i, j| {
             let own = if i == j { 1.0 / columns[i].1 } else { 0.0 };
             own + self.info[(columns[i].0, columns[j].0)]
         });
-        if self.subtract(&along, inner).is_some() {
+        if self.subtract(along, inner).is_some() {
             self.log_det -= columns.iter().map(|(_, variance)| variance.ln()).sum::<f64>();
         }
     }
@@ -290,18 +290,23 @@ impl Filter {
     pub(crate) fn widen_along(&mut self, directions: &DMatrix<f64>) {
         let along = &self.info * directions;
         let inner = DMatrix::identity(directions.ncols(), directions.ncols()) + directions.tr_mul(&along);
-        self.subtract(&along, inner);
+        self.subtract(along, inner);
     }
 
     /// Takes `along inner^-1 along^T` off the information; `None`, and nothing changed, after an overflow.
-    fn subtract(&mut self, along: &DMatrix<f64>, inner: DMatrix<f64>) -> Option<()> {
+    fn subtract(&mut self, mut along: DMatrix<f64>, inner: DMatrix<f64>) -> Option<()> {
         let factor = Cholesky::new(inner)?;
         self.log_det -= log_det(&factor);
-        let mut half = along.transpose();
-        factor.l_dirty().solve_lower_triangular_mut(&mut half);
-        // Products of matrices with the left one turned are several times as slow.
-        let turned = half.transpose();
-        self.info.gemm(-1.0, &turned, &half, 1.0);
+        // `along L^-T`, by whole columns.
+        let lower = factor.l_dirty();
+        for k in 0..along.ncols() {
+            let (done, mut own) = along.columns_range_pair_mut(..k, k);
+            own.gemv(-1.0, &done, &lower.row(k).columns_range(..k).transpose(), 1.0);
+            own /= lower[(k, k)];
+        }
+        // Products of matrices with one turned are several times as slow.
+        let turned = along.transpose();
+        self.info.gemm(-1.0, &along, &turned, 1.0);
         Some(())
     }
 
@@ -552,7 +557,7 @@ fn scores(problem: &BundleProblem<'_>, state: &State, factor: &Cholesky<f64, Dyn
         seen.filter_map(|of| Some((of.tag, (*problem.layout.tags.get(of.tag)?)?))).collect();
     let all: Vec<usize> =
         offsets.iter().map(|(_, column)| *column).chain(tags.iter().flat_map(|(_, at)| *at..at + 3)).collect();
-    let mut half = DMatrix::from_fn(info.nrows(), all.len(), |row, k| info[(row, all[k])]);
+    let mut half = info.select_columns(&all);
     solve_lower(factor, &mut half);
     let mut scores = Scores::default();
     for (k, (joint, column)) in offsets.iter().enumerate() {
