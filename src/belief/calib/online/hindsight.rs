@@ -33,6 +33,9 @@ const LEAST_VIEWS: usize = 2;
 const SUSPICIOUS_CHI2: f64 = 22.0;
 /// Other tags are compared from this on, once in 50.
 const COMPARED_CHI2: f64 = 10.0;
+/// One sigma of how far aside a tag is that no view tells alone, m. In a direction of which the views tell less than
+/// this, scores are rounding.
+const A_LITTLE_ASIDE_M: f64 = 0.005;
 
 /// The last views, and the belief before them.
 #[derive(Clone, Default)]
@@ -41,8 +44,8 @@ pub(crate) struct Hindsight {
     spans: Vec<Span>,
     /// By joint, the square of the score that was looked into last.
     looked_into: [f64; MAX_JOINTS],
-    /// The same of the tag with the largest.
-    looked_into_tag: f64,
+    /// The same of each tag that was, by its index.
+    looked_into_tags: Vec<(usize, f64)>,
 }
 
 #[derive(Clone)]
@@ -61,8 +64,8 @@ struct PastStep {
 
 /// A tag that the views have elsewhere, all together.
 #[derive(Clone, Copy, Debug)]
-struct TagSuspicion {
-    tag: usize,
+pub(super) struct TagSuspicion {
+    pub tag: usize,
     /// Views since the first from which on they do.
     n_since: usize,
     /// Chi-square of three.
@@ -89,7 +92,8 @@ impl Hindsight {
         if self.spans.len() == 2 {
             self.spans.remove(0);
             // What was looked into was looked into for views that are gone.
-            (self.looked_into, self.looked_into_tag) = ([0.0; MAX_JOINTS], 0.0);
+            self.looked_into = [0.0; MAX_JOINTS];
+            self.looked_into_tags.clear();
         }
         self.spans.push(Span { before: filter.clone(), steps: Vec::with_capacity(VIEWS_OF_SPAN) });
     }
@@ -121,25 +125,30 @@ impl Hindsight {
         found
     }
 
-    /// The tags of the last view that the views have elsewhere together, that of which they are surest first; none
-    /// where that is no more than what was looked into before.
-    fn suspicious_tags(&mut self) -> Vec<TagSuspicion> {
+    /// The tags of the last view that the views have elsewhere together: first that of which they are surest among
+    /// those of which they are surer than when it was looked into; none where there is no such one.
+    pub(super) fn suspicious_tags(&mut self) -> Vec<TagSuspicion> {
         let Some(last) = self.latest_first().next() else { return Vec::new() };
         let tags: Vec<usize> = last.scores.tags.iter().map(|score| score.tag).collect();
         let mut all: Vec<TagSuspicion> = tags.into_iter().filter_map(|tag| self.of_tag(tag)).collect();
         all.retain(|it| it.chi2 > COMPARED_CHI2);
         all.sort_by(|one, other| other.chi2.total_cmp(&one.chi2));
-        let least = SUSPICIOUS_CHI2.max(self.looked_into_tag + GROWN_BY);
-        match all.first() {
-            Some(first) if first.chi2 > least => self.looked_into_tag = first.chi2,
-            _ => all.clear(),
-        }
+        let is_new = |it: &TagSuspicion| {
+            let looked_into = self.looked_into_tags.iter().find(|(tag, _)| *tag == it.tag);
+            it.chi2 > SUSPICIOUS_CHI2.max(looked_into.map_or(0.0, |(_, chi2)| *chi2) + GROWN_BY)
+        };
+        let Some(first) = all.iter().position(is_new) else { return Vec::new() };
+        all[..=first].rotate_right(1);
+        let TagSuspicion { tag, chi2, .. } = all[0];
+        self.looked_into_tags.retain(|(known, _)| *known != tag);
+        self.looked_into_tags.push((tag, chi2));
         all
     }
 
     /// Since the view from which on its place is off the most; `None` where too few saw it.
     fn of_tag(&self, tag: usize) -> Option<TagSuspicion> {
-        let (mut a, mut b, mut n_views) = (Vector3::zeros(), Matrix3::zeros(), 0);
+        let (mut a, mut n_views) = (Vector3::zeros(), 0);
+        let mut b = Matrix3::from_diagonal_element(A_LITTLE_ASIDE_M.powi(-2));
         let mut best: Option<TagSuspicion> = None;
         for (place, past) in self.latest_first().enumerate() {
             let Some(score) = past.scores.tags.iter().find(|score| score.tag == tag) else { continue };
@@ -177,8 +186,8 @@ impl Hindsight {
         branches
     }
 
-    /// The places about which the last view stands of which the views say something together, that of which they say
-    /// most first; none where the most is not beyond what was looked into before.
+    /// The places about which the last view stands of which the views say something together: first that of which they
+    /// say most among those beyond what was looked into before; none where there is no such one.
     fn suspicions(&mut self, filter: &Filter) -> Vec<Suspicion> {
         let Some(last) = self.latest_first().next().map(|past| &past.step.view) else { return Vec::new() };
         let joints = filter.offsets().map(|(joint, _)| joint);
@@ -191,9 +200,8 @@ impl Hindsight {
         let mut all: Vec<Suspicion> = open.filter_map(of_joint).filter(|it| it.chi2 > COMPARED_Z.powi(2)).collect();
         all.sort_by(|one, other| other.chi2.total_cmp(&one.chi2));
         let is_new = |it: &Suspicion| it.chi2 > SUSPICIOUS_Z.powi(2).max(self.looked_into[it.joint] + GROWN_BY);
-        if !all.first().is_some_and(is_new) {
-            return Vec::new();
-        }
+        let Some(first) = all.iter().position(is_new) else { return Vec::new() };
+        all[..=first].rotate_right(1);
         all.iter().for_each(|it| self.looked_into[it.joint] = it.chi2);
         all
     }

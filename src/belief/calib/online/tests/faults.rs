@@ -1,12 +1,15 @@
 //! Faults at unknown times in a dive of one hour, each far beyond what the belief leaves open at a new posture: most
 //! are named, with the right joint or tag, and nothing else is.
 
-use nalgebra::{Isometry3, Vector6};
+use nalgebra::{Isometry3, Matrix3, Vector3, Vector6};
 
 use crate::calib::bundle::tests::data::titan;
 use crate::calib::finding::FindingKind;
+use crate::calib::online::branch::Step;
 use crate::calib::online::estimator::OnlineEstimator;
 use crate::calib::online::event::OnlineEvent;
+use crate::calib::online::filter::{Scores, TagScore};
+use crate::calib::online::hindsight::Hindsight;
 use crate::calib::online::hypothesis::Fault;
 use crate::calib::online::settings::OnlineSettings;
 use crate::calib::online::tests::drifting::Dive;
@@ -332,4 +335,29 @@ fn a_tag_a_little_aside_is_named_by_looks_minutes_apart() {
     }
     println!("{named} of 10 named; beside them {told:?}");
     assert!(named >= 6 && told.len() <= 1, "{named} {told:?}");
+}
+
+/// What was looked into of one tag hides no other, and what no view tells is not suspicious.
+#[test]
+fn each_tag_is_suspicious_by_its_own_scores() {
+    let robot = titan();
+    let (online, mut dive) = after_an_hour(&robot, 0, Happens::Nothing);
+    let mut hindsight = Hindsight::default();
+    hindsight.begin(online.best_filter().expect("an hour of views"));
+    let mut suspicious = |tag: usize, a: [f64; 3], b: [f64; 3]| {
+        let score = TagScore { tag, a: Vector3::from(a), b: Matrix3::from_diagonal(&Vector3::from(b)) };
+        let step = Step { drift: None, view: dive.view() };
+        hindsight.add(step, Scores { tags: vec![score], ..Scores::default() });
+        hindsight.suspicious_tags().first().map(|it| it.tag)
+    };
+    // By 20 mm, each view good to 1 mm.
+    let mut far = || suspicious(1, [2e4, 0.0, 0.0], [1e6; 3]);
+    assert_eq!([far(), far()], [None, Some(1)]);
+    // Surer than before it is not.
+    assert_eq!(suspicious(1, [0.0; 3], [1e6; 3]), None);
+    let mut near = || suspicious(2, [6e3, 0.0, 0.0], [1e6; 3]);
+    assert_eq!([near(), near()], [None, Some(2)]);
+    // Thirty sigmas of one metre.
+    let mut untold = || suspicious(3, [0.0, 0.0, 30.0], [1e6, 1e6, 1.0]);
+    assert_eq!([untold(), untold()], [None, None]);
 }
