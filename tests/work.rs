@@ -224,3 +224,24 @@ fn with_a_dead_sensor_the_arm_does_only_what_it_knows() {
     assert!(work.len() >= 3 && work.len() + skipped.len() == 5, "{work:?} {skipped:?}");
     assert!(work.iter().all(|task| task.tool_error_m < 0.03), "{work:?}");
 }
+
+/// The same where all tags are gone, too: nobody knows where the wrist stands, and the dive goes on without it.
+#[test]
+fn a_dive_goes_on_where_no_view_shows_where_a_dead_joint_stands() {
+    let dead = "[[world.fault]]\nat_s = 400.0\nkind = \"sensor_dead\"\njoint = \"wrist_pitch\"\n".to_owned();
+    let lost = |id: u32| format!("[[world.fault]]\nat_s = 400.0\nkind = \"tag_lost\"\nid = {id}\n");
+    let faults = (0..8).map(lost).fold(dead, |all, one| all + &one);
+    let steps = STEPS
+        .replace("look_every = 2", "look_every = 1000\n    belief = \"online\"")
+        .replace("tasks = 4", "tasks = 5")
+        .replace("pressure_offset_std_rad_per_mpa = 1e-3", "");
+    let short = ShortRoutine {
+        targets_m: vec![[1.401, -1.220, 0.115], [1.375, -0.582, 0.391], [1.173, -0.947, 0.587]],
+        tail: steps + &faults,
+        ..ShortRoutine::default()
+    };
+    let folder = temp();
+    let out = folder.path().join("out");
+    // Exit code: the tool is not known well enough at the end.
+    run(&short.write(folder.path()), &out).expect("a lost wrist", 4, &["nobody knows where it stands"]);
+}

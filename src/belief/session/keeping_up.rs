@@ -127,9 +127,15 @@ impl ScriptRunner<'_, '_> {
             // What was accepted before may be hours old.
             let prior = PriorSource::Fresh;
             let settings = CalibrateSettings { prior, views: CalibrateViews::New, on_refusal: OnRefusal::Continue };
-            // Views of a joint that creeps contradict each other: then it is refused.
-            if self.calibrate(&settings)?.is_none() {
-                self.note_standing();
+            match self.calibrate(&settings) {
+                Ok(None) => self.note_standing(),
+                // Views of a joint that creeps contradict each other.
+                Ok(Some(_refused)) => {}
+                // Too few of them show tags; the arm does what it can do without that joint.
+                Err(SessionError::Calib(why)) => {
+                    self.driver.log(LogLevel::Warn, &format!("where they stand is not known: {why}"))?;
+                }
+                Err(other) => return Err(other),
             }
             if self.epochs.last().map(Epoch::links) != links {
                 self.begin_online()?;
@@ -155,7 +161,9 @@ impl ScriptRunner<'_, '_> {
         let captured = self.capture(&CaptureSettings { poses, held_out: 0, replan_every: 0, ..general });
         self.capture_ended = capture_ended;
         match captured {
-            Err(why @ (SessionError::Plan(_) | SessionError::TooFewViews { .. })) => {
+            Err(
+                why @ (SessionError::Plan(_) | SessionError::TooFewViews { .. } | SessionError::NothingSeen { .. }),
+            ) => {
                 self.driver.log(LogLevel::Warn, &format!("no calibration pose: {why}"))?;
             }
             other => other?,

@@ -274,9 +274,10 @@ impl ScriptRunner<'_, '_> {
         self.driver.record(&Message::Mark(Mark { start, end, kind }))?;
         let recording = self.driver.recorder.read_back()?;
         let began_s = self.driver.progress.wall_s();
-        let calibration = calibrate(&recording, self.setup.robot, self.setup.routine.method)?;
+        let calibrated = calibrate(&recording, self.setup.robot, self.setup.routine.method);
         self.tally.calibration_wall_s += self.driver.progress.wall_s() - began_s;
         self.views_since = end;
+        let calibration = calibrated?;
         self.driver.log(LogLevel::Info, &verdict_line(&calibration))?;
         if calibration.status == Status::Accepted {
             self.believe(&calibration)?;
