@@ -200,23 +200,29 @@ fn work_by_the_calibration_asks_for_nothing() {
     assert!(summary.online.is_none() && !worked().file("belief.jsonl").exists());
 }
 
-/// A wrist whose sensor dies is given up, looked for by the camera, and worked on without: no task is off by more than
-/// the tolerance.
-#[test]
-fn with_a_dead_sensor_the_arm_does_only_what_it_knows() {
+/// Five tasks worked by the online belief, at the fourth of which the wrist's sensor dies; `faults` are more of them.
+fn with_a_dead_wrist(faults: &str) -> ShortRoutine {
     let steps = STEPS
         .replace("look_every = 2", "look_every = 1000\n    belief = \"online\"")
         .replace("tasks = 4", "tasks = 5")
         .replace("pressure_offset_std_rad_per_mpa = 1e-3", "")
-        + "[[world.fault]]\nat_s = 400.0\nkind = \"sensor_dead\"\njoint = \"wrist_pitch\"\n";
-    let short = ShortRoutine {
+        + "[[world.fault]]\nat_s = 400.0\nkind = \"sensor_dead\"\njoint = \"wrist_pitch\"\n"
+        + faults;
+    ShortRoutine {
         targets_m: vec![[1.401, -1.220, 0.115], [1.375, -0.582, 0.391], [1.173, -0.947, 0.587]],
         tail: steps,
         ..ShortRoutine::default()
-    };
+    }
+}
+
+/// A wrist whose sensor dies is given up, looked for by the camera, and worked on without: no task is off by more than
+/// the tolerance.
+#[test]
+fn with_a_dead_sensor_the_arm_does_only_what_it_knows() {
     let folder = temp();
     let out = folder.path().join("out");
-    run(&short.write(folder.path()), &out).expect("a dead wrist", 0, &["wrist_pitch (dead)", "good enough"]);
+    let routine = with_a_dead_wrist("").write(folder.path());
+    run(&routine, &out).expect("a dead wrist", 0, &["wrist_pitch (dead)", "good enough"]);
     let summary: RunSummary = serde_json::from_str(&read(&out.join("summary.json"))).expect("a summary");
     let asked = summary.online.expect("it was followed").asked;
     assert!(asked.iter().any(|asked| asked.tool_error_p95_m.is_none() && asked.views > 10), "looked for: {asked:?}");
@@ -228,20 +234,11 @@ fn with_a_dead_sensor_the_arm_does_only_what_it_knows() {
 /// The same where all tags are gone, too: nobody knows where the wrist stands, and the dive goes on without it.
 #[test]
 fn a_dive_goes_on_where_no_view_shows_where_a_dead_joint_stands() {
-    let dead = "[[world.fault]]\nat_s = 400.0\nkind = \"sensor_dead\"\njoint = \"wrist_pitch\"\n".to_owned();
     let lost = |id: u32| format!("[[world.fault]]\nat_s = 400.0\nkind = \"tag_lost\"\nid = {id}\n");
-    let faults = (0..8).map(lost).fold(dead, |all, one| all + &one);
-    let steps = STEPS
-        .replace("look_every = 2", "look_every = 1000\n    belief = \"online\"")
-        .replace("tasks = 4", "tasks = 5")
-        .replace("pressure_offset_std_rad_per_mpa = 1e-3", "");
-    let short = ShortRoutine {
-        targets_m: vec![[1.401, -1.220, 0.115], [1.375, -0.582, 0.391], [1.173, -0.947, 0.587]],
-        tail: steps + &faults,
-        ..ShortRoutine::default()
-    };
+    let faults: String = (0..8).map(lost).collect();
     let folder = temp();
     let out = folder.path().join("out");
+    let routine = with_a_dead_wrist(&faults).write(folder.path());
     // Exit code: the tool is not known well enough at the end.
-    run(&short.write(folder.path()), &out).expect("a lost wrist", 4, &["nobody knows where it stands"]);
+    run(&routine, &out).expect("a lost wrist", 4, &["nobody knows where it stands"]);
 }
