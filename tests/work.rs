@@ -231,7 +231,8 @@ fn with_a_dead_sensor_the_arm_does_only_what_it_knows() {
     assert!(work.iter().all(|task| task.tool_error_m < 0.03), "{work:?}");
 }
 
-/// The same where all tags are gone, too: nobody knows where the wrist stands, and the dive goes on without it.
+/// The same where all tags are gone, too: nobody knows where the wrist stands, and the dive goes on without it. Whoever
+/// calibrates from the recording gets the calibration from before.
 #[test]
 fn a_dive_goes_on_where_no_view_shows_where_a_dead_joint_stands() {
     let lost = |id: u32| format!("[[world.fault]]\nat_s = 400.0\nkind = \"tag_lost\"\nid = {id}\n");
@@ -241,4 +242,12 @@ fn a_dive_goes_on_where_no_view_shows_where_a_dead_joint_stands() {
     let routine = with_a_dead_wrist(&faults).write(folder.path());
     // Exit code: the tool is not known well enough at the end.
     run(&routine, &out).expect("a lost wrist", 4, &["nobody knows where it stands"]);
+    let again = folder.path().join("again");
+    calibrate(&out.join("run.mcap"), &robot_folder(), &again).expect("the calibration before", 0, &["ACCEPTED"]);
+    let hash = |folder: &Path| {
+        let text = read(&folder.join("calibration.toml"));
+        text.lines().find(|line| line.starts_with("messages_hash")).map(str::to_owned)
+    };
+    assert!(hash(&out).is_some());
+    assert_eq!(hash(&again), hash(&out));
 }

@@ -127,7 +127,7 @@ impl ScriptRunner<'_, '_> {
             // What was accepted before may be hours old.
             let prior = PriorSource::Fresh;
             let settings = CalibrateSettings { prior, views: CalibrateViews::New, on_refusal: OnRefusal::Continue };
-            match self.calibrate(&settings) {
+            match self.try_calibrate(&settings) {
                 Ok(None) => self.note_standing(),
                 // Views of a joint that creeps contradict each other.
                 Ok(Some(_refused)) => {}

@@ -11,6 +11,7 @@ use crate::session::outcome::{AssertResult, Epoch, Outcome, ReachStep};
 use crate::session::runner::{FreshBounds, Jaws, ScriptRunner, Tally};
 use crate::session::{Progress, Recorder, SessionError};
 use armcal_core::kinematics::LinkCorrection;
+use armcal_core::log::Recording;
 use armcal_core::routine::{AssertFigure, AssertLimits, CalibrateSettings, CalibrateViews, MoveGoal, OnRefusal, Step};
 use armcal_core::sensor::ArmSensors;
 use armcal_core::stats::stream_rng;
@@ -263,6 +264,25 @@ impl ScriptRunner<'_, '_> {
 
     /// Calibrates from the recording's bytes; gives the reason if it was refused.
     pub(crate) fn calibrate(&mut self, settings: &CalibrateSettings) -> Result<Option<String>, SessionError> {
+        let mark = self.begin_calibration(settings)?;
+        self.driver.record(&mark)?;
+        let recording = self.driver.recorder.read_back()?;
+        self.calibrate_marked(&recording)
+    }
+
+    /// The same where the views may not be enough: the recording is marked only if a calibration comes of it, so that
+    /// others who read it do not fail there.
+    pub(crate) fn try_calibrate(&mut self, settings: &CalibrateSettings) -> Result<Option<String>, SessionError> {
+        let mark = self.begin_calibration(settings)?;
+        let mut recording = self.driver.recorder.read_back()?;
+        recording.messages.push((self.driver.now(), mark.clone()));
+        let refusal = self.calibrate_marked(&recording)?;
+        self.driver.record(&mark)?;
+        Ok(refusal)
+    }
+
+    /// The mark of its views.
+    fn begin_calibration(&mut self, settings: &CalibrateSettings) -> Result<Message, SessionError> {
         self.driver.phase(Phase::Calibrate)?;
         self.progress_at(Phase::Calibrate, 0, 1);
         let end = self.driver.now();
@@ -270,13 +290,14 @@ impl ScriptRunner<'_, '_> {
             CalibrateViews::New => self.views_since,
             CalibrateViews::All => self.began,
         };
-        let kind = MarkKind::Calibrate(settings.prior);
-        self.driver.record(&Message::Mark(Mark { start, end, kind }))?;
-        let recording = self.driver.recorder.read_back()?;
-        let began_s = self.driver.progress.wall_s();
-        let calibrated = calibrate(&recording, self.setup.robot, self.setup.routine.method);
-        self.tally.calibration_wall_s += self.driver.progress.wall_s() - began_s;
         self.views_since = end;
+        Ok(Message::Mark(Mark { start, end, kind: MarkKind::Calibrate(settings.prior) }))
+    }
+
+    fn calibrate_marked(&mut self, recording: &Recording) -> Result<Option<String>, SessionError> {
+        let began_s = self.driver.progress.wall_s();
+        let calibrated = calibrate(recording, self.setup.robot, self.setup.routine.method);
+        self.tally.calibration_wall_s += self.driver.progress.wall_s() - began_s;
         let calibration = calibrated?;
         self.driver.log(LogLevel::Info, &verdict_line(&calibration))?;
         if calibration.status == Status::Accepted {
