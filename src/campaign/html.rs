@@ -1,13 +1,17 @@
 //! The report of a campaign or of a regression as one page, in the look of a run's report.
 
+use std::collections::BTreeSet;
+
 use armcal_charts::{Panel, Series, Style};
 use maud::{Markup, html as markup};
 
+use crate::campaign::origin::Named;
 use crate::campaign::regress::{Comparison, Verdict};
 use crate::campaign::regress_report::{check_rows, conclusion};
 use crate::campaign::statistics::{CampaignSummary, FailureLine};
 use crate::campaign::table_file::Table;
 use crate::campaign::tables::{HEADER, over_all, rows, title};
+use crate::campaign::worst::worst_rows;
 use crate::campaign::{Metric, Row};
 use crate::report::{chart, page, panel};
 
@@ -23,7 +27,8 @@ const DRAWN: [(Metric, &str); 4] = [
 #[must_use]
 pub(super) fn campaign_page(table: &Table, summary: &CampaignSummary) -> String {
     let body = markup! {
-        (verdict(summary))
+        (verdict(table, summary))
+        (facts(table, summary))
         div.figures { @for (metric, what) in DRAWN { (shares(table, metric, what)) } }
         @for setting in &summary.settings {
             h2 { (title(setting)) }
@@ -43,7 +48,7 @@ pub(super) fn campaign_page(table: &Table, summary: &CampaignSummary) -> String 
     page(&format!("Campaign of {}", summary.routine), &body)
 }
 
-fn verdict(summary: &CampaignSummary) -> Markup {
+fn verdict(table: &Table, summary: &CampaignSummary) -> Markup {
     let sum = |of: fn(&crate::campaign::SettingStatistics) -> usize| summary.settings.iter().map(of).sum::<usize>();
     let (runs, accepted, missed) = (sum(|s| s.runs), sum(|s| s.accepted), sum(|s| s.missed));
     let (refused, failed, touched) = (sum(|s| s.refused), sum(|s| s.failed), sum(|s| s.with_contacts));
@@ -58,6 +63,47 @@ fn verdict(summary: &CampaignSummary) -> Markup {
             p {
                 (missed) " missed a limit of the script, " (refused) " refused, " (failed) " failed; "
                 (touched) " with contacts."
+            }
+            p { b { "What to do next" } }
+            ul {
+                @if let Some(worst) = worst_rows(table, 1).first() {
+                    li { "Look at the worst run (seed " (worst.seed) "): " code { (worst.command) } }
+                }
+                @if class == "green" {
+                    li { "Keep the table as a baseline, and hold later versions against it: " code { "armcal regress" } }
+                } @else {
+                    li { "Each run that did not go well stands below with its reason and the command that repeats it." }
+                }
+            }
+        }
+    }
+}
+
+/// What the rows are of.
+fn facts(table: &Table, summary: &CampaignSummary) -> Markup {
+    let seeds: BTreeSet<u64> = table.rows.iter().map(|row| row.seed).collect();
+    let span = match (seeds.first(), seeds.last()) {
+        (Some(first), Some(last)) if last - first + 1 == seeds.len() as u64 => {
+            format!("{first} to {last}, none left out")
+        }
+        (Some(first), Some(last)) => format!("{} from {first} to {last}", seeds.len()),
+        _ => "none".to_owned(),
+    };
+    let named = |of: &[Named]| of.iter().map(Named::in_words).collect::<Vec<_>>().join(", ");
+    let origin = summary.origin.as_ref();
+    let rows = [
+        ("routine", origin.map(|origin| origin.routine.in_words())),
+        ("arm", origin.map(|origin| named(&origin.robots))),
+        ("vehicle", origin.map(|origin| named(&origin.vehicles))),
+        ("seeds", Some(span)),
+        ("settings", Some(summary.settings.len().to_string())),
+        ("program", Some(format!("armcal {}", env!("CARGO_PKG_VERSION")))),
+    ];
+    markup! {
+        h2 { "What this is of" }
+        table.notes {
+            @for (what, value) in rows.into_iter().filter_map(|(what, value)| Some((what, value?))) {
+                tr { th scope="row" { (what) } td { code { (value) } } }
             }
         }
     }
@@ -109,6 +155,17 @@ pub fn regress_page(comparison: &Comparison, routine: &str) -> String {
         div class={ "verdict " (class) } {
             strong { (conclusion(comparison)) }
             p { (comparison.pairs) " pairs of runs, each of one seed." }
+            p { b { "What to do next" } }
+            ul { li {
+                @match comparison.verdict {
+                    Verdict::NotWorse => "Nothing: the change may go in.",
+                    Verdict::Inconclusive => "Run more seeds: the pairs fit both no change and more than the budget.",
+                    Verdict::Worse => {
+                        "Repeat one of the worst pairs below with the program of before and this one, and compare "
+                        "their replays."
+                    }
+                }
+            } }
         }
         h2 { "Every check" }
         div.wide {
@@ -149,8 +206,10 @@ mod tests {
         let good = page_of((1..=6).map(untouched).collect());
         assert!(good.contains("verdict green") && good.contains("6 of 6 runs accepted"), "{good}");
         assert!(good.contains("Campaign of &lt;r&gt;") && !good.contains("<r>"));
+        assert!(good.contains("1 to 6, none left out") && good.contains("armcal regress"), "{good}");
         let failed = Row { status: RunStatus::Failed, failure: "<why>".to_owned(), ..untouched(7) };
         let bad = page_of((1..=6).map(untouched).chain([failed]).collect());
+        assert!(bad.contains("Look at the worst run (seed 7)"), "{bad}");
         assert!(bad.contains("verdict red") && bad.contains("6 of 7 runs") && bad.contains("&lt;why&gt;"), "{bad}");
         let refused = Row { status: RunStatus::Refused, ..untouched(7) };
         assert!(page_of(vec![untouched(1), refused]).contains("verdict amber"));

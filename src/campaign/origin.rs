@@ -40,6 +40,11 @@ impl Named {
         }
         Self { name: name.to_owned(), hash: hasher.finalize().to_hex()[..16].to_owned() }
     }
+
+    /// `titan4 (hash 9be7058b2b0ac6d5)`.
+    pub(super) fn in_words(&self) -> String {
+        format!("{} (hash {})", self.name, self.hash)
+    }
 }
 
 /// The file's values without comments; as it is where it is no TOML.

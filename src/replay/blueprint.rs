@@ -1,6 +1,8 @@
 //! The viewer's layout, written down entry by entry: the SDK's builder cannot set the viewpoint, the axes or the
 //! legends, and names its parts by chance.
 
+use std::collections::BTreeSet;
+
 use rerun::AsComponents;
 use rerun::external::re_sdk_types::blueprint::archetypes::{
     Background, ContainerBlueprint, EyeControls3D, LineGrid3D, PanelBlueprint, PlotLegend, ScalarAxis, TextLogColumns,
@@ -16,8 +18,9 @@ use rerun::external::uuid::Uuid;
 use crate::axis::labelled_range;
 use crate::colors;
 use crate::entities::{
-    CAMERA, CLEARANCE, COUNTS, EVENTS_LANE, FAULT_LANE, JOINT_ANGLE, JOINT_ERROR, LOG, OFFSET_CHANGE, PHASE_LANE,
-    PREDICTED, SIGHTING, SUMMARY, TARGETS_LANE, TEMPERATURE, TOOL_ERROR, VIEWS_LANE, WORLD,
+    ARM_FAULT_LANE, CAMERA, CLEARANCE, COUNTS, EVENTS_LANE, JOINT_ANGLE, JOINT_ERROR, LOG, OFFSET_CHANGE, PHASE_LANE,
+    PREDICTED, SEA_FAULT_LANE, SIGHTING, SUMMARY, TAG_FAULT_LANE, TARGETS_LANE, TEMPERATURE, TOOL_ERROR, VIEWS_LANE,
+    WORLD,
 };
 use crate::entity_log::TIMELINE;
 use crate::plots;
@@ -63,8 +66,9 @@ pub(super) fn build(run: &ReplayScene) -> Vec<Entry> {
     } else {
         let phases = b.lanes("What the arm does");
         // Each of these has one lane more.
-        let has_faults = run.truth.as_ref().is_some_and(|truth| !truth.faults.is_empty());
-        let share = 1.0 + 0.3 * f32::from(u8::from(run.online.is_some()) + u8::from(has_faults));
+        let lanes: BTreeSet<&str> =
+            run.truth.iter().flat_map(|truth| &truth.faults).map(|fault| fault.of.lane()).collect();
+        let share = 1.0 + 0.3 * (usize::from(run.online.is_some()) + lanes.len()) as f32;
         b.container(ContainerKind::Vertical, &[(main, 4.3), (phases, share)])
     };
     b.finish(&root, run)
@@ -227,7 +231,8 @@ impl Builder {
     /// The lanes of states that there are.
     fn lanes(&mut self, title: &str) -> Part {
         let path = format!("view/{}", self.next_id());
-        let lanes = [EVENTS_LANE, FAULT_LANE, PHASE_LANE, TARGETS_LANE, VIEWS_LANE];
+        let faults = [ARM_FAULT_LANE, TAG_FAULT_LANE, SEA_FAULT_LANE];
+        let lanes = [EVENTS_LANE, faults[0], faults[1], faults[2], PHASE_LANE, TARGETS_LANE, VIEWS_LANE];
         self.add(format!("{path}/ViewContents"), ViewContents::new(lanes));
         self.add(path.clone(), ViewBlueprint::new("StateTimeline").with_display_name(title).with_space_origin("/"));
         Part(path)

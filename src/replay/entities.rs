@@ -21,7 +21,10 @@ pub(super) const SIGHTING: &str = "/plots/sighting";
 pub(super) const PHASE_LANE: &str = "/phase";
 pub(super) const TARGETS_LANE: &str = "/targets";
 pub(super) const VIEWS_LANE: &str = "/views";
-pub(super) const FAULT_LANE: &str = "/latest_fault";
+/// The latest fault of each kind; lanes stand in the order of their names.
+pub(super) const ARM_FAULT_LANE: &str = "/fault_arm";
+pub(super) const TAG_FAULT_LANE: &str = "/fault_tag";
+pub(super) const SEA_FAULT_LANE: &str = "/fault_sea";
 pub(super) const EVENTS_LANE: &str = "/events";
 /// The lines of the log.
 pub(super) const LOG: &str = "/log";

@@ -2,12 +2,51 @@
 
 use toml::{Table, Value};
 
+use crate::entities::{ARM_FAULT_LANE, SEA_FAULT_LANE, TAG_FAULT_LANE};
+
+/// What a fault is of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum FaultOf {
+    /// A joint, a sensor, the camera on it.
+    Arm,
+    Tag,
+    /// The water, the vehicle, and what this version does not know.
+    Sea,
+}
+
+/// Something that broke.
+#[derive(Clone, Debug)]
+pub(super) struct Fault {
+    pub time_s: f64,
+    pub of: FaultOf,
+    pub sentence: String,
+}
+
+impl FaultOf {
+    pub(super) fn of(kind: &str) -> Self {
+        let begins = |with: [&str; 5]| with.iter().any(|with| kind.starts_with(with));
+        match () {
+            () if kind.starts_with("tag_") => Self::Tag,
+            () if begins(["sensor_", "joint_", "pressure_", "camera_", "arm_"]) => Self::Arm,
+            () => Self::Sea,
+        }
+    }
+
+    pub(super) fn lane(self) -> &'static str {
+        match self {
+            Self::Arm => ARM_FAULT_LANE,
+            Self::Tag => TAG_FAULT_LANE,
+            Self::Sea => SEA_FAULT_LANE,
+        }
+    }
+}
+
 /// `sensor_jump`, `by_rad = 0.03, joint = "wrist_pitch"`: `the sensor of wrist_pitch slipped by 1.72 deg`. A fault that
 /// this version does not know is told as it is written.
 pub(super) fn sentence(kind: &str, details: &str) -> String {
     let values: Option<Table> = format!("fault = {{ {details} }}").parse().ok();
     let fault = values.and_then(|mut values| match values.remove("fault") {
-        Some(Value::Table(table)) => Some(Fault(table)),
+        Some(Value::Table(table)) => Some(FaultValues(table)),
         _ => None,
     });
     let told =
@@ -16,9 +55,9 @@ pub(super) fn sentence(kind: &str, details: &str) -> String {
 }
 
 /// Values by their keys.
-struct Fault(Table);
+struct FaultValues(Table);
 
-impl Fault {
+impl FaultValues {
     fn text(&self, key: &str) -> Option<&str> {
         self.0.get(key)?.as_str()
     }
@@ -123,6 +162,14 @@ mod tests {
         ] {
             assert_eq!(sentence(kind, details), expected);
         }
+    }
+
+    #[test]
+    fn each_fault_has_its_lane() {
+        let lanes = ["sensor_dead", "joint_locked", "pressure_lost", "camera_slipped", "arm_bumped"];
+        assert!(lanes.iter().all(|kind| FaultOf::of(kind) == FaultOf::Arm));
+        assert_eq!(FaultOf::of("tag_misread").lane(), "/fault_tag");
+        assert!(["silt", "vehicle_knocked", "hose_cut"].iter().all(|kind| FaultOf::of(kind) == FaultOf::Sea));
     }
 
     #[test]

@@ -5,8 +5,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use rerun::{StateChange, StateConfiguration, TextLog, TextLogLevel};
 
 use crate::colors::{self, Rgba};
-use crate::entities::{FAULT_LANE, LOG, PHASE_LANE, TARGETS_LANE, VIEWS_LANE};
+use crate::entities::{LOG, PHASE_LANE, TARGETS_LANE, VIEWS_LANE};
 use crate::entity_log::EntityLog;
+use crate::fault_words::Fault;
 use crate::scene::ReplayScene;
 use crate::shapes::path_part;
 use crate::tracks::Span;
@@ -85,14 +86,19 @@ fn reach_state(run: &ReplayScene, mark: &Span) -> Option<State> {
     Some(State { name, label: n.to_string(), color: colors::dimmed(color) })
 }
 
-/// The truth's latest fault, from when it happened: by itself a lane does not say how long a fault lasts.
+/// The truth's latest fault of each kind, from when it happened: by itself a lane does not say how long a fault lasts.
 fn draw_faults(run: &ReplayScene, stream: &mut EntityLog) {
-    let Some(truth) = run.truth.as_ref().filter(|truth| !truth.faults.is_empty()) else { return };
-    let names: BTreeSet<&str> = truth.faults.iter().map(|(_, fault)| fault.as_str()).collect();
-    let look = StateConfiguration::new().with_values(names.iter().copied());
-    stream.log_static(FAULT_LANE, &look.with_colors(names.iter().map(|_| colors::dimmed(colors::MISS))));
-    for (time_s, fault) in &truth.faults {
-        stream.draw(FAULT_LANE, *time_s, &StateChange::single(fault.as_str()));
+    let faults = || run.truth.iter().flat_map(|truth| &truth.faults);
+    let mut names: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
+    for fault in faults() {
+        names.entry(fault.of.lane()).or_default().insert(&fault.sentence);
+    }
+    for (lane, names) in names {
+        let look = StateConfiguration::new().with_values(names.iter().copied());
+        stream.log_static(lane, &look.with_colors(names.iter().map(|_| colors::dimmed(colors::MISS))));
+    }
+    for fault in faults() {
+        stream.draw(fault.of.lane(), fault.time_s, &StateChange::single(fault.sentence.as_str()));
     }
 }
 
@@ -142,8 +148,8 @@ fn draw_log(run: &ReplayScene, stream: &mut EntityLog) {
         );
         lines.push((arrival.time_s, "truth".to_owned(), TextLog::new(text).with_level(TextLogLevel::INFO)));
     }
-    for (time_s, fault) in run.truth.iter().flat_map(|truth| &truth.faults) {
-        let line = TextLog::new(format!("fault: {fault}")).with_level(TextLogLevel::WARN);
+    for Fault { time_s, sentence, .. } in run.truth.iter().flat_map(|truth| &truth.faults) {
+        let line = TextLog::new(format!("fault: {sentence}")).with_level(TextLogLevel::WARN);
         lines.push((*time_s, "truth".to_owned(), line));
     }
     lines.sort_by(|a, b| a.0.total_cmp(&b.0));

@@ -414,7 +414,7 @@ fn what_broke_stands_in_the_log() {
     let out = dir.path().join("run.rrd");
     write_rrd(&ReplayInput { truth: Some(&truth), ..input(&recording, &robot) }, &out).unwrap();
     assert_eq!(entities(&out).get("/log/truth"), Some(&1));
-    assert!(entities(&out).contains_key("/latest_fault"), "a lane");
+    assert!(entities(&out).contains_key("/fault_tag"), "a lane");
 }
 
 /// A recorder's clock that is set a day ahead costs no frames, and the lines end before it.

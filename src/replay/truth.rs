@@ -6,7 +6,7 @@ use nalgebra::Isometry3;
 use serde::Deserialize;
 
 use crate::error::ReplayError;
-use crate::fault_words::sentence;
+use crate::fault_words::{Fault, FaultOf, sentence};
 use crate::tracks::{TimeSeries, Tracks, blend_angles, blend_poses};
 use armcal_core::log::{CdrError, RawMessage, decode, for_each_raw, ros};
 use armcal_core::robot::Robot;
@@ -26,7 +26,7 @@ pub(super) struct Truth {
     world_from_vehicle: TimeSeries<Isometry3<f64>>,
     base_from_tool: TimeSeries<Isometry3<f64>>,
     /// Faults with their times, s, as sentences.
-    pub faults: Vec<(f64, String)>,
+    pub faults: Vec<Fault>,
 }
 
 /// armcal_msgs/msg/Fault.
@@ -105,7 +105,8 @@ impl Reader<'_> {
             FAULTS => {
                 let fault: FaultMessage = decode(message.data).map_err(failed)?;
                 let time_s = self.time_s(message, fault.header.stamp);
-                self.truth.faults.push((time_s, sentence(&fault.kind, &fault.details)));
+                let sentence = sentence(&fault.kind, &fault.details);
+                self.truth.faults.push(Fault { time_s, of: FaultOf::of(&fault.kind), sentence });
             }
             _ => {}
         }

@@ -240,8 +240,12 @@ struct Told {
 pub struct DiveFaultRow {
     /// What happened.
     pub fault: DiveFault,
-    /// Views after it until the oracle is sure; `None`: they never tell it.
+    /// Views after it until an oracle is sure that knows kind, time, and which joint or tag, and where; `None`: they
+    /// never tell it.
     pub oracle_views: Option<usize>,
+    /// The same of an oracle that knows kind and time alone, and has as many ways to be fooled as there are joints, tags
+    /// or places.
+    pub kind_oracle_views: Option<usize>,
     /// Views after it until it was named; `None`: it was not.
     pub named_views: Option<usize>,
     /// Of what was told since, each that is neither what happened nor what the views cannot tell from it.
@@ -253,11 +257,20 @@ pub struct DiveFaultRow {
 }
 
 impl DiveFaultRow {
-    /// Whether it was named within three views after the oracle; `None` where the views do not tell it.
+    /// Whether it was named within three views after the oracle that knows all; `None` where the views do not tell it.
     #[must_use]
     pub fn is_in_time(&self) -> Option<bool> {
-        let oracle = self.oracle_views?;
-        Some(self.named_views.is_some_and(|named| named <= oracle + IN_TIME))
+        self.oracle_views.map(|sure| self.is_named_soon_after(sure))
+    }
+
+    /// The same of the oracle that knows kind and time alone.
+    #[must_use]
+    pub fn is_in_time_by_kind(&self) -> Option<bool> {
+        self.kind_oracle_views.map(|sure| self.is_named_soon_after(sure))
+    }
+
+    fn is_named_soon_after(&self, sure: usize) -> bool {
+        self.named_views.is_some_and(|named| named <= sure + IN_TIME)
     }
 }
 
@@ -270,6 +283,9 @@ struct Followed<'a> {
     explanations: Vec<Vec<Fault>>,
     n_views: usize,
     oracle_views: Option<usize>,
+    kind_oracle_views: Option<usize>,
+    /// Of each joint, where the views since stood, far from each other.
+    places: Vec<Vec<WornSpot>>,
     told: Vec<Told>,
     false_alarms: Vec<String>,
 }
@@ -298,6 +314,8 @@ impl<'a> Followed<'a> {
             explanations: Vec::new(),
             n_views: 0,
             oracle_views: None,
+            kind_oracle_views: None,
+            places: vec![Vec::new(); robot.n_joints()],
             told: Vec::new(),
             false_alarms: Vec::new(),
         }
@@ -341,12 +359,43 @@ impl<'a> Followed<'a> {
         }
         let Some(oracle) = &mut self.oracle else { return };
         self.n_views += 1;
-        if self.oracle_views.is_some_and(|sure| self.n_views > sure + ORACLE_GOES_ON) {
+        if self.kind_oracle_views.is_some_and(|sure| self.n_views > sure + ORACLE_GOES_ON) {
             return;
         }
         oracle.add_view(view);
-        if self.oracle_views.is_none() && oracle.gains().first().is_some_and(is_sure) {
+        let Some(gain) = oracle.gains().first().copied() else { return };
+        self.stand_at(view);
+        let is_sure_of_kind = is_sure(&gain, self.n_candidates());
+        if self.oracle_views.is_none() && is_sure(&gain, 1) {
             self.oracle_views = Some(self.n_views);
+        }
+        if self.kind_oracle_views.is_none() && is_sure_of_kind {
+            self.kind_oracle_views = Some(self.n_views);
+        }
+    }
+
+    fn stand_at(&mut self, view: &View) {
+        for (joint, places) in self.places.iter_mut().enumerate() {
+            let at_rad = view.travel_rad[joint];
+            if places.iter().all(|place| place.is_far_from(at_rad)) {
+                places.push(WornSpot::about(at_rad));
+            }
+        }
+    }
+
+    /// What a fault of the kind may have happened to, as far as the views since may tell: joints, tags, or places of
+    /// joints.
+    fn n_candidates(&self) -> usize {
+        use DiveFaultKind as K;
+        let robot = self.follower.estimator().robot();
+        let seen_joints = robot.n_seen_joints();
+        match self.fault.kind {
+            K::Slipped | K::Stuck | K::Dead | K::Dying | K::Reversed => seen_joints,
+            K::Worn => self.places[..seen_joints].iter().map(Vec::len).sum(),
+            K::Tag => robot.tags.len(),
+            // The even or the odd ones.
+            K::Boom => 2,
+            K::Camera => 1,
         }
     }
 
@@ -385,6 +434,7 @@ impl<'a> Followed<'a> {
         DiveFaultRow {
             fault: self.fault.clone(),
             oracle_views: self.oracle_views,
+            kind_oracle_views: self.kind_oracle_views,
             named_views: named.map(|told| told.n_views),
             wrong: lines(others().filter(|told| !is_alike(told)).collect()),
             alike: lines(others().filter(|told| is_alike(told)).collect()),
@@ -393,9 +443,10 @@ impl<'a> Followed<'a> {
     }
 }
 
-/// 25.0 of the sum of squares by one number, 39.5 by six.
-fn is_sure(gain: &OracleGain) -> bool {
-    chi_square_above(gain.chi2, gain.numbers) < FIVE_SIGMA
+/// 25.0 of the sum of squares by one number, 39.5 by six. Of `n_candidates` that it might have been, each may be taken
+/// for it by chance (Bonferroni's bound): 28.5 by one number of six joints.
+fn is_sure(gain: &OracleGain, n_candidates: usize) -> bool {
+    chi_square_above(gain.chi2, gain.numbers) * (n_candidates as f64) < FIVE_SIGMA
 }
 
 /// What happened first, then all single faults.
@@ -439,8 +490,8 @@ fn fault_of(robot: &Robot, event: &OnlineEvent) -> Option<Fault> {
 #[must_use]
 pub fn dive_faults_table(rows: &[DiveFaultRow]) -> String {
     let mut text = String::from(
-        "| fault | runs | views tell it | named in time | late | not named | wrong names | false alarms |\n\
-         |---|--:|--:|--:|--:|--:|--:|--:|\n",
+        "| fault | runs | told | in time | late | not named | told by kind | in time | wrong names | false alarms |\n\
+         |---|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n",
     );
     for kind in DiveFaultKind::ALL.map(Some).into_iter().chain([None]) {
         let of: Vec<&DiveFaultRow> = rows.iter().filter(|row| kind.is_none_or(|kind| row.fault.kind == kind)).collect();
@@ -451,9 +502,11 @@ pub fn dive_faults_table(rows: &[DiveFaultRow]) -> String {
         let in_time = count(&|row| row.is_in_time() == Some(true));
         let late = count(&|row| row.is_in_time() == Some(false) && row.named_views.is_some());
         let never = count(&|row| row.oracle_views.is_some() && row.named_views.is_none());
+        let by_kind = count(&|row| row.kind_oracle_views.is_some());
+        let in_time_by_kind = count(&|row| row.is_in_time_by_kind() == Some(true));
         let _ = writeln!(
             text,
-            "| {} | {} | {} | {in_time} | {late} | {never} | {} | {} |",
+            "| {} | {} | {} | {in_time} | {late} | {never} | {by_kind} | {in_time_by_kind} | {} | {} |",
             kind.map_or("all", DiveFaultKind::name),
             of.len(),
             count(&|row| row.oracle_views.is_some()),
@@ -461,8 +514,9 @@ pub fn dive_faults_table(rows: &[DiveFaultRow]) -> String {
             count(&|row| !row.false_alarms.is_empty()),
         );
     }
-    text += "\nViews tell it: an oracle that knows kind and time is sure by them (five sigma). In time: within three \
-             views after it. Runs with wrong names: something was named that is not what happened, though the views \
+    text += "\nTold: the views tell it to an oracle that knows kind, time, joint or tag, and place (five sigma). By \
+             kind: to one that knows kind and time alone. In time: within three views after it; late and not named: \
+             after the first. Runs with wrong names: something was named that is not what happened, though the views \
              tell them apart; with false alarms: something before anything happened.\n";
     text
 }
@@ -472,16 +526,18 @@ pub fn dive_faults_table(rows: &[DiveFaultRow]) -> String {
 pub fn dive_faults_csv(rows: &[DiveFaultRow]) -> String {
     let quoted = |lines: &[String]| format!("\"{}\"", lines.join("; ").replace('"', "'"));
     let number = |n: Option<usize>| n.map(|n| n.to_string()).unwrap_or_default();
-    let mut text = "fault,seed,at_s,size,setting,oracle_views,named_views,wrong,alike,false_alarms\n".to_owned();
+    let mut text =
+        "fault,seed,at_s,size,setting,oracle_views,kind_oracle_views,named_views,wrong,alike,false_alarms\n".to_owned();
     for row in rows {
         let DiveFault { kind, seed, at_s, size, setting, .. } = &row.fault;
         let _ = writeln!(
             text,
-            "{},{seed},{at_s},{},{},{},{},{},{},{}",
+            "{},{seed},{at_s},{},{},{},{},{},{},{},{}",
             kind.name(),
             size.map(|size| size.to_string()).unwrap_or_default(),
             quoted(std::slice::from_ref(setting)),
             number(row.oracle_views),
+            number(row.kind_oracle_views),
             number(row.named_views),
             quoted(&row.wrong),
             quoted(&row.alike),
@@ -524,7 +580,9 @@ mod tests {
     fn five_sigma_are_more_of_the_sum_of_squares_where_more_numbers_are_fitted() {
         for (numbers, chi2) in [(1, 25.0), (2, 28.7437), (6, 39.4914), (24, 73.7974)] {
             let gain = |chi2: f64| OracleGain { chi2, numbers, nats: 0.0 };
-            assert!(is_sure(&gain(chi2 + 0.01)) && !is_sure(&gain(chi2 - 0.01)), "{numbers}");
+            assert!(is_sure(&gain(chi2 + 0.01), 1) && !is_sure(&gain(chi2 - 0.01), 1), "{numbers}");
         }
+        let of_six_joints = |chi2: f64| is_sure(&OracleGain { chi2, numbers: 1, nats: 0.0 }, 6);
+        assert!(of_six_joints(28.6) && !of_six_joints(28.4));
     }
 }
