@@ -183,6 +183,9 @@ pub struct CalibrationSummary {
     /// By the tag on the gripper, where the robot has one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera_mount: Option<CameraMount>,
+    /// How much later the joint sensors' stamps are than the camera's, and one sigma, where moving joints tell it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub time_offset_s: Option<[f64; 2]>,
     /// What rests on priors alone, the largest at the tool first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub reservations: Vec<Reservation>,
@@ -275,6 +278,7 @@ impl CalibrationSummary {
             predicted_tool_error_m: calibration.predicted_tool_error_m,
             predicted_tool_error_with_priors_m: calibration.predicted_tool_error_with_priors_m,
             camera_mount: calibration.camera_mount.clone(),
+            time_offset_s: calibration.model.as_ref().and_then(|model| model.time_offset_s),
             reservations: calibration.reservations.clone(),
             findings: calibration.findings.clone(),
             failed_joint: calibration.failed_joint.clone(),

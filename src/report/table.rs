@@ -266,6 +266,7 @@ fn capture_lines(capture: &CaptureSummary) -> Vec<String> {
 fn calibration_lines(calibration: &CalibrationSummary) -> Vec<String> {
     let mut lines: Vec<String> = calibration.largest_gain_change.as_ref().map(gain_line).into_iter().collect();
     lines.extend(calibration.camera_mount.as_ref().map(mount_line));
+    lines.extend(calibration.time_offset_s.map(clock_line));
     lines.extend(calibration.failed_joint.iter().map(failed_line));
     lines.extend(calibration.prior.as_ref().map(prior_line));
     lines.extend(calibration.map.iter().flat_map(map_lines));
@@ -330,6 +331,16 @@ fn gain_line(largest: &GainChange) -> String {
     let GainChange { joint, change, std } = largest;
     let how = if change.abs() < LITTLE { "changed little, at most by" } else { "changed by up to" };
     format!("gains        {how} {:+.2} % ({joint}), known to {:.2} %", 100.0 * change, 100.0 * std)
+}
+
+/// Of how much later the joint sensors' stamps are than the camera's, and one sigma.
+fn clock_line([offset_s, std_s]: [f64; 2]) -> String {
+    let which = if offset_s < 0.0 {
+        "the camera's stamps are later than the joints'"
+    } else {
+        "the joints' stamps are later than the camera's"
+    };
+    format!("clock        {which} by {:.1} ms, known to {:.1} ms", 1e3 * offset_s.abs(), 1e3 * std_s)
 }
 
 fn mount_line(mount: &CameraMount) -> String {

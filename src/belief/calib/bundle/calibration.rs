@@ -10,10 +10,12 @@ use crate::calib::bundle::failure_impact::FailureImpact;
 use crate::calib::bundle::failures::Failure;
 use crate::calib::bundle::innovations::Innovations;
 use crate::calib::bundle::input::{BundleInput, HyperparameterMode};
-use crate::calib::bundle::model_selection::Selection;
+use crate::calib::bundle::model_selection::{OptionalTerm, Selection};
 use crate::calib::bundle::outliers::Outlier;
 use crate::calib::bundle::setup::{BundleSetup, declared};
-use crate::calib::bundle::tables::{camera_mount_table, covariance_with_mount, map_table, model_table, prior_table};
+use crate::calib::bundle::tables::{
+    add_clock, camera_mount_table, covariance_with_mount, map_table, model_table, prior_table,
+};
 use crate::calib::bundle::tags::freed::MovedTags;
 use crate::calib::bundle::touch_term::TouchUpdate;
 use crate::calib::bundle::verdict::{MAX_OUTLIERS, VerdictInput};
@@ -60,6 +62,8 @@ pub(crate) struct BundleCalibration<'a> {
     moved: MovedTags,
     /// What of the drawing is estimated.
     drawing: Drawing,
+    /// By what the readings of moving joints were moved to the camera's clock, s, and what decided it.
+    clock: Option<(f64, Selection)>,
     /// Who is told of the last estimate by the views.
     listener: Option<&'a mut EstimateListener<'a>>,
 }
@@ -134,7 +138,17 @@ impl<'a> BundleCalibration<'a> {
         let held_out = std::mem::take(&mut data.data.held_out);
         data.data.fit.extend(held_out);
         let moved = MovedTags::new(&data.robot);
-        Ok(Self { data, prior, map, surveyed, purpose, moved, drawing: Drawing::default(), listener: None })
+        Ok(Self {
+            data,
+            prior,
+            map,
+            surveyed,
+            purpose,
+            moved,
+            drawing: Drawing::default(),
+            clock: None,
+            listener: None,
+        })
     }
 
     pub(crate) fn with_listener(self, listener: &'a mut EstimateListener<'a>) -> Self {
@@ -147,7 +161,11 @@ impl<'a> BundleCalibration<'a> {
         let mut views = std::mem::take(&mut self.data.data.fit);
         let sizes_m: Vec<f64> = self.data.robot.tags.iter().map(|tag| tag.size_m).collect();
         let declared = declared(&self.data.robot, &views);
-        let first = BundleSetup::new(&self.data.robot, &views, &declared, self.prior).with_drawing(&self.drawing);
+        let has_clock = self.clock.is_some();
+        let setup = |robot: &Robot, failures: &[Failure]| {
+            BundleSetup::new(robot, &views, failures, self.prior).with_drawing(&self.drawing).with_clock(has_clock)
+        };
+        let first = setup(&self.data.robot, &declared);
         self.check_observable(&first, &declared)?;
         let estimated = self.first_estimate(&first);
         let failures = match self.purpose {
@@ -162,9 +180,18 @@ impl<'a> BundleCalibration<'a> {
         let (setup, estimated) = if failures == declared {
             (&first, estimated)
         } else {
-            second = BundleSetup::new(&self.data.robot, &views, &failures, self.prior).with_drawing(&self.drawing);
+            second = setup(&self.data.robot, &failures);
             (&second, second.estimate())
         };
+        if self.purpose == EstimatePurpose::Final
+            && let Some((estimate, selections)) = &estimated
+            && let Some((offset_s, _)) = self.clock_of(estimate, selections)
+        {
+            drop(estimated);
+            views.iter_mut().for_each(|view| view.read_later(offset_s));
+            self.data.data.fit = views;
+            return self.calibrate();
+        }
         if self.purpose == EstimatePurpose::Final
             && let Some((estimate, _)) = &estimated
             && self.revise(setup, estimate)
@@ -234,6 +261,18 @@ impl<'a> BundleCalibration<'a> {
             let wrong = wrong_input(&self.data.data, &self.surveyed, &self.data.robot);
             calibration.refuse_first_for(wrong.map(Refusal::WrongInput));
         }
+    }
+
+    /// The offset between the clocks, where it is found for the first time; from then on the readings are at the times
+    /// of the images, for all that is made of the views.
+    fn clock_of(&mut self, estimate: &Estimate<'_>, selections: &[Selection]) -> Option<(f64, Selection)> {
+        if self.clock.is_some() {
+            return None;
+        }
+        let [offset_s, _] = estimate.time_offset_s()?;
+        let decided = selections.iter().find(|selection| selection.term == OptionalTerm::TimeOffset)?;
+        self.clock = Some((offset_s, *decided));
+        self.clock
     }
 
     /// Whether survey or drawing are to be taken otherwise than so far.
@@ -320,6 +359,10 @@ impl<'a> BundleCalibration<'a> {
             predicted: self.impact(estimated, diagnosis, &parameters).prediction(),
             n_parameters: setup.n_wanted(datasheet),
         };
+        let mut model = model_table(datasheet, estimate, selections);
+        if let Some((offset_s, decided)) = &self.clock {
+            add_clock(&mut model, *offset_s, decided);
+        }
         let mut calibration = assemble(&source, &fit, evidence);
         let n_corners = estimate.outliers.iter().filter(|outlier| outlier.corner.is_some()).count();
         calibration.fit.rejected_corners = (n_corners > 0).then_some(n_corners);
@@ -329,7 +372,7 @@ impl<'a> BundleCalibration<'a> {
         Calibration {
             unobservable: grouped_names(&robot, &unobservable(datasheet, setup, estimate)),
             camera_mount: Some(camera_mount_table(datasheet, estimate, &diagnosis.views)),
-            model: Some(model_table(datasheet, estimate, selections)),
+            model: Some(model),
             map: self.map.clone().map(|map| map_table(map, datasheet, estimate)),
             outliers: estimate.outliers.iter().map(|outlier| named(outlier, &diagnosis.views)).collect(),
             covariance: with_mount.unwrap_or_else(|| calibration.covariance.clone()),

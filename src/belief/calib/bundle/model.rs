@@ -80,6 +80,9 @@ pub struct Hyperparameters {
 /// as likely as one.
 pub const SHAPE_LENGTH: f64 = 0.16;
 
+/// Of an image's stamp about the camera's clock, with what sensors of moving joints are late by, s. Assumed.
+pub(crate) const TIME_JITTER_STD_S: f64 = 0.005;
+
 /// How far a sensor may slip on its shaft, rad. Assumed: wide, the views tell it.
 pub(crate) const STEP_STD_RAD: f64 = 0.1;
 

@@ -12,6 +12,7 @@ use nalgebra::Cholesky;
 use crate::calib::bundle::estimate::{Estimate, estimate};
 use crate::calib::bundle::input::BundleInput;
 use crate::calib::bundle::linearize::NormalEquations;
+use crate::calib::bundle::model::TIME_JITTER_STD_S;
 use crate::calib::bundle::outliers::{Rejected, rejected};
 use crate::calib::bundle::problem::{BundleProblem, WeightedMeasurement};
 use crate::calib::bundle::solve::{TIGHT, solve};
@@ -90,11 +91,17 @@ fn candidates(input: &BundleInput<'_>) -> Vec<OptionalTerm> {
     out
 }
 
+/// With the offset between the clocks goes what an image's stamp is off beside it.
+pub(crate) fn estimate_clock(input: &mut BundleInput<'_>) {
+    input.model.time_offset = true;
+    input.scales.time_jitter_std_s = TIME_JITTER_STD_S;
+}
+
 fn with<'a>(input: &BundleInput<'a>, term: OptionalTerm) -> BundleInput<'a> {
     let mut wider = input.clone();
     match term {
         OptionalTerm::CameraError => wider.scales.camera_error_std = Some(CAMERA_ERROR_STD),
-        OptionalTerm::TimeOffset => wider.model.time_offset = true,
+        OptionalTerm::TimeOffset => estimate_clock(&mut wider),
         OptionalTerm::Drift => {
             for kinds in wider.model.joints.iter_mut().filter(|kinds| !kinds.is_empty()) {
                 if !kinds.contains(&ParameterKind::DriftPerH) {

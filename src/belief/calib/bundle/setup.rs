@@ -5,7 +5,7 @@ use crate::calib::bundle::drawing::Drawing;
 use crate::calib::bundle::estimate::Estimate;
 use crate::calib::bundle::failures::{Failure, FailureAdjusted, SensorUse};
 use crate::calib::bundle::input::{BundleInput, HyperparameterMode};
-use crate::calib::bundle::model_selection::{Selection, select_model};
+use crate::calib::bundle::model_selection::{Selection, estimate_clock, select_model};
 use crate::calib::covariance::ParameterCovariance;
 use crate::calib::methods::observability::Unobservable;
 use crate::calib::parameters::{JointParameters, Parameter, ParameterKind};
@@ -19,6 +19,8 @@ pub(crate) struct BundleSetup {
     pub applied: FailureAdjusted,
     prior: Option<Result<CalibrationPrior, Refusal>>,
     drawing: Drawing,
+    /// Whether the offset between the clocks is a column.
+    has_clock: bool,
 }
 
 /// The declared failures of `robot`.
@@ -32,12 +34,17 @@ impl BundleSetup {
         let at = prior.map_or_else(JointParameters::default, |prior| prior.parameters(robot));
         let applied = FailureAdjusted::new(robot, views, failed, &at);
         let prior = prior.map(|prior| CalibrationPrior::new(prior, &applied).ok_or(Refusal::PriorSingular));
-        Self { applied, prior, drawing: Drawing::default() }
+        Self { applied, prior, drawing: Drawing::default(), has_clock: false }
     }
 
     /// The same with what of the drawing is estimated, too.
     pub(crate) fn with_drawing(self, drawing: &Drawing) -> Self {
         Self { drawing: drawing.clone(), ..self }
+    }
+
+    /// The same for views whose readings were moved to the camera's clock: what is left of the offset stays open.
+    pub(crate) fn with_clock(self, is_moved: bool) -> Self {
+        Self { has_clock: is_moved, ..self }
     }
 
     /// The prior, or why it is of no use.
@@ -54,6 +61,9 @@ impl BundleSetup {
             self.usable_prior().and_then(|prior| prior.input(&self.applied.views, HyperparameterMode::Fitted));
         let mut input = of_prior.unwrap_or_else(|| self.applied.input(HyperparameterMode::Fitted));
         self.drawing.apply(&mut input);
+        if self.has_clock {
+            estimate_clock(&mut input);
+        }
         input
     }
 

@@ -17,14 +17,6 @@ use armcal_core::spatial::{Base, Camera, Link, Pose, Tag};
 pub(crate) fn model_table(robot: &Robot, found: &Estimate<'_>, selections: &[Selection]) -> ModelTable {
     let scales = found.scales();
     let n_estimated = found.joint_parameters().last().map_or(0, |p| p.joint + 1);
-    let name = |term| match term {
-        OptionalTerm::CameraError => "camera error shared by a view",
-        OptionalTerm::TimeOffset => "time offset",
-        OptionalTerm::Drift => "drift",
-        OptionalTerm::Walk => "random walk of offsets",
-    };
-    let decided =
-        |s: &Selection| format!("{}: {}, {:+.1} nats", name(s.term), if s.is_in { "in" } else { "out" }, s.gain_nats);
     ModelTable {
         noise_scale: scales.noise,
         position_std_m: found.has_positions().then_some(scales.position_std_m),
@@ -35,6 +27,24 @@ pub(crate) fn model_table(robot: &Robot, found: &Estimate<'_>, selections: &[Sel
         nonlinearity_std_rad: scales.shape_std_rad[..n_estimated.min(robot.n_joints())].to_vec(),
         decided: selections.iter().map(decided).collect(),
     }
+}
+
+fn decided(selection: &Selection) -> String {
+    let name = match selection.term {
+        OptionalTerm::CameraError => "camera error shared by a view",
+        OptionalTerm::TimeOffset => "time offset",
+        OptionalTerm::Drift => "drift",
+        OptionalTerm::Walk => "random walk of offsets",
+    };
+    format!("{name}: {}, {:+.1} nats", if selection.is_in { "in" } else { "out" }, selection.gain_nats)
+}
+
+/// By what the readings had been moved to the camera's clock before: the estimate is of what was left.
+pub(crate) fn add_clock(model: &mut ModelTable, offset_s: f64, selection: &Selection) {
+    if let Some([left_s, _]) = &mut model.time_offset_s {
+        *left_s += offset_s;
+    }
+    model.decided.insert(0, decided(selection));
 }
 
 /// The camera mount as estimated; the tags tell of it, too.

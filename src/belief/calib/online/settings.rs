@@ -1,13 +1,11 @@
 //! What an online estimator is told beforehand.
 
-use crate::calib::bundle::model::{Hyperparameters, Model, Scope, model_of};
+use crate::calib::bundle::model::{Hyperparameters, Model, Scope, TIME_JITTER_STD_S, model_of};
 use crate::calib::parameters::JointParameters;
 use armcal_core::robot::Robot;
 
 /// How much larger an effect may be than its datasheet's figure.
 const WRONG_BY: f64 = 1.5;
-/// Of an image's stamp about the camera's clock, with what sensors of moving joints are late by. Assumed.
-const TIME_JITTER_STD_S: f64 = 0.005;
 
 /// How an online estimator works.
 #[derive(Clone, Debug)]

@@ -47,6 +47,13 @@ impl View {
         (!view.tags.is_empty() || view.gripper_tag.is_some()).then_some(view)
     }
 
+    /// What the sensors read `by_s` later, at the rates of the view.
+    pub(crate) fn read_later(&mut self, by_s: f64) {
+        for (travel_rad, rate_rad_s) in self.travel_rad.iter_mut().zip(self.rate_rad_s.iter()) {
+            *travel_rad += rate_rad_s * by_s;
+        }
+    }
+
     /// Whether the tag of that index is in it.
     pub(crate) fn sees(&self, tag_idx: usize) -> bool {
         self.tags.iter().any(|seen| seen.tag_idx == tag_idx)

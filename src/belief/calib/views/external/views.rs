@@ -18,6 +18,8 @@ const SAME_POSE_SIGMAS: f64 = 5.0;
 /// Faster than this, beyond what noise makes of it, is on the way, rad/s: at a reach of 2 m and a camera clock 50 ms
 /// late, 1 mm.
 const REST_RATE_RAD_S: f64 = 0.01;
+/// In a faster arm the readings about an image are too far apart for a line through them, rad/s.
+const FASTEST_RAD_S: f64 = 0.5;
 /// An attitude farther from a view than this says nothing of it, s: a vehicle leans another way within seconds.
 const ATTITUDE_WITHIN_S: f64 = 0.5;
 /// Attitudes whose mean is shorter contradict each other.
@@ -44,6 +46,7 @@ struct PairedFrame<'a> {
 struct Maker<'a> {
     robot: &'a Robot,
     plain: PlainLandmark,
+    while_moving: WhileMoving,
     travels: TravelSeries<'a>,
     recording: &'a ExternalRecording,
     conditions: ConditionHistory,
@@ -58,6 +61,7 @@ impl RecordingViews {
         let mut maker = Maker {
             robot,
             plain,
+            while_moving: map.while_moving,
             travels: TravelSeries::new(recording, robot, map.max_gap_s),
             recording,
             conditions: ConditionHistory::of_external(&recording.conditions),
@@ -70,7 +74,9 @@ impl RecordingViews {
                 maker.reject(ObservationRejection::NoReadings, frame.tags.len());
                 continue;
             };
-            if map.while_moving == WhileMoving::LeaveOut && maker.is_moving(&paired) {
+            let is_moving = maker.is_moving(&paired);
+            let is_too_fast = paired.rate_rad_s.is_some_and(|rate| rate.iter().any(|rate| rate.abs() > FASTEST_RAD_S));
+            if is_moving && (map.while_moving == WhileMoving::LeaveOut || is_too_fast) {
                 maker.reject(ObservationRejection::ArmMoving, frame.tags.len());
                 maker.close(&mut group);
                 continue;
@@ -140,7 +146,13 @@ impl Maker<'_> {
             return;
         }
         let mut deciding = Vec::new();
-        if first.paired.is_continuous {
+        if self.while_moving == WhileMoving::Use {
+            // An arm settles from both sides: the side that it is on is known in motion alone. A slower joint has the
+            // sign of its noise.
+            for (approach, rate) in view.approach.iter_mut().zip(view.rate_rad_s.iter()) {
+                *approach = if rate.abs() < REST_RATE_RAD_S { 0.0 } else { rate.signum() };
+            }
+        } else if first.paired.is_continuous {
             view.approach = self.travels.approach(first.paired.readings.0, &travel_rad, &mut deciding);
         }
         view.up = self.up_over(first.frame.stamp, last.frame.stamp);
