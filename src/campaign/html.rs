@@ -70,7 +70,9 @@ fn verdict(table: &Table, summary: &CampaignSummary) -> Markup {
                     li { "Look at the worst run (seed " (worst.seed) "): " code { (worst.command) } }
                 }
                 @if class == "green" {
-                    li { "Keep the table as a baseline, and hold later versions against it: " code { "armcal regress" } }
+                    li {
+                        "Keep the table as a baseline, and hold later versions against it: " code { "armcal regress" }
+                    }
                 } @else {
                     li { "Each run that did not go well stands below with its reason and the command that repeats it." }
                 }

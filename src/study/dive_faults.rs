@@ -243,8 +243,8 @@ pub struct DiveFaultRow {
     /// Views after it until an oracle is sure that knows kind, time, and which joint or tag, and where; `None`: they
     /// never tell it.
     pub oracle_views: Option<usize>,
-    /// The same of an oracle that knows kind and time alone, and has as many ways to be fooled as there are joints, tags
-    /// or places.
+    /// The same of an oracle that knows kind and time alone, and has as many ways to be fooled as there are joints,
+    /// tags or places.
     pub kind_oracle_views: Option<usize>,
     /// Views after it until it was named; `None`: it was not.
     pub named_views: Option<usize>,
