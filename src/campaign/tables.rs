@@ -55,7 +55,7 @@ pub(super) fn title(setting: &SettingStatistics) -> String {
 }
 
 /// A grid that a terminal of so many columns takes: words go to a further line.
-pub(super) fn fit(grid: &mut Grid, width: Option<usize>) {
+pub(crate) fn fit(grid: &mut Grid, width: Option<usize>) {
     if let Some(width) = width.and_then(|width| u16::try_from(width).ok()) {
         grid.set_content_arrangement(ContentArrangement::Dynamic).set_width(width);
     }

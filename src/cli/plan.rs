@@ -7,8 +7,9 @@ use clap::Args;
 use comfy_table::presets::{ASCII_MARKDOWN, UTF8_FULL_CONDENSED};
 use comfy_table::{CellAlignment, Table};
 
+use crate::campaign::fit;
 use crate::cli::calibration_inputs::read_prior;
-use crate::cli::closing::say_closing;
+use crate::cli::closing::{say_closing, terminal_width};
 use crate::cli::exit::Exit;
 use crate::cli::file_kind::{FileKind, expect_option, expect_routine};
 use crate::cli::overrides::OverrideArgs;
@@ -101,7 +102,7 @@ fn say_plan(args: &PlanArgs, file: &PlanFile, out: &Path) -> Result<()> {
     let out = out.display();
     let next = format!("written      {out}\nnext         {out}/plan.md to fly by, {out}/plan.rrd to look at");
     if args.details {
-        say_closing(&format!("{}\n{totals}\n{next}", table(file, UTF8_FULL_CONDENSED)))
+        say_closing(&format!("{}\n{totals}\n{next}", table(file, UTF8_FULL_CONDENSED, terminal_width())))
     } else {
         say_closing(&format!("{totals}\n{next}; each pose: --details"))
     }
@@ -170,14 +171,14 @@ fn inputs_hash(
 }
 
 /// Degrees, millimetres: people read it.
-fn table(file: &PlanFile, preset: &str) -> String {
+fn table(file: &PlanFile, preset: &str, width: Option<usize>) -> String {
     let mut table = Table::new();
     table.load_preset(preset);
     table.set_header([
         "pose",
         "for",
         "joints, deg",
-        "counts by robot.toml",
+        "counts by datasheet",
         "tags",
         "clear, mm",
         "tool error, mm",
@@ -191,6 +192,7 @@ fn table(file: &PlanFile, preset: &str) -> String {
             column.set_cell_alignment(CellAlignment::Right);
         }
     }
+    fit(&mut table, width);
     table.to_string()
 }
 
@@ -243,7 +245,7 @@ fn markdown(file: &PlanFile) -> String {
         "# Plan of `{}` for `{}`\n\n{}\n\n{}\n",
         file.routine,
         file.robot,
-        table(file, ASCII_MARKDOWN),
+        table(file, ASCII_MARKDOWN, None),
         lines.join("\n")
     )
 }

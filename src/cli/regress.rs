@@ -157,7 +157,7 @@ fn foretold(baseline: Option<&Table>, n_jobs: usize, n_threads: usize) -> String
     let runs = format!("{n_jobs} runs on {n_threads} threads");
     match quantile(&times_s, 0.5) {
         Some(each_s) => format!(
-            "{runs}, {each_s:.0} s of the arm's time each: about {:.0} s at the usual {USUAL_SPEED:.0} times real time",
+            "{runs}, {each_s:.0} s of the arm's time each: about {:.0} s",
             each_s / USUAL_SPEED * n_jobs.div_ceil(n_threads) as f64
         ),
         None => format!("{runs}; the first one says how long they take"),
