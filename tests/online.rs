@@ -105,7 +105,7 @@ fn a_slip_on_a_dive_is_named_as_soon_as_views_tell_it() {
     let mut study = program();
     study.args(["study", "dive-faults", "--seeds", "2", "--only", "sensor slipped", "--routine"]);
     let said = answer(study.arg(root("routines/short-dive.toml")).arg("--out").arg(folder.path()));
-    said.expect("the study", 0, &["| sensor slipped | 2 | 2 | 2 | 0 | 0 | 0 | 0 |", "written"]);
+    said.expect("the study", 0, &["| sensor slipped | 2 | 2 | 2 | 0 | 0 | 2 | 2 | 0 | 0 |", "written"]);
     let rows = fs::read_to_string(folder.path().join("rows.csv")).expect("written");
     for row in rows.lines().skip(1) {
         let [_, _, views, ..] = row.split('"').collect::<Vec<_>>()[..] else { panic!("{row}") };

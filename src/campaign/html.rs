@@ -73,8 +73,9 @@ fn verdict(table: &Table, summary: &CampaignSummary) -> Markup {
                     li {
                         "Keep the table as a baseline, and hold later versions against it: " code { "armcal regress" }
                     }
-                } @else {
-                    li { "Each run that did not go well stands below with its reason and the command that repeats it." }
+                }
+                @if summary.settings.iter().any(|setting| !setting.failures.is_empty()) {
+                    li { "Act on the reasons below; each has the command that repeats its run." }
                 }
             }
         }
@@ -84,8 +85,9 @@ fn verdict(table: &Table, summary: &CampaignSummary) -> Markup {
 /// What the rows are of.
 fn facts(table: &Table, summary: &CampaignSummary) -> Markup {
     let seeds: BTreeSet<u64> = table.rows.iter().map(|row| row.seed).collect();
+    let is_whole = table.rows.len() == seeds.len() * summary.settings.len();
     let span = match (seeds.first(), seeds.last()) {
-        (Some(first), Some(last)) if last - first + 1 == seeds.len() as u64 => {
+        (Some(first), Some(last)) if is_whole && last - first + 1 == seeds.len() as u64 => {
             format!("{first} to {last}, none left out")
         }
         (Some(first), Some(last)) => format!("{} from {first} to {last}", seeds.len()),

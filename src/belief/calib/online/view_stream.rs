@@ -10,7 +10,7 @@ use std::collections::{BTreeMap, VecDeque};
 
 use crate::calib::views::association::view_of_span;
 use crate::calib::views::conditions::{BACK_S, NEAR_S, apart_rad};
-use crate::calib::views::view::View;
+use crate::calib::views::view::{FASTEST_RAD_S, View};
 use armcal_core::joints::{JointAngles, JointCounts, MAX_JOINTS};
 use armcal_core::robot::Robot;
 use armcal_core::sensor::ArmSensors;
@@ -36,8 +36,6 @@ const ABOUT_IMAGE_S: f64 = 0.06;
 const APART_RAD: f64 = 0.15;
 /// An arm all of whose joints are slower rests, rad/s.
 const SLOWEST_RAD_S: f64 = 0.02;
-/// In a faster arm readings within an image's time are too far apart to be told from drop-outs, rad/s.
-const FASTEST_RAD_S: f64 = 0.5;
 /// Images that wait for readings at most: without any nothing is made of them.
 const WAITING_IMAGES: usize = 1000;
 /// What is kept of the past: a rest, with what was read before it.

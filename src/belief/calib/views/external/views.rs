@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 use crate::calib::views::conditions::ConditionHistory;
 use crate::calib::views::external::landmarks::{Averaged, PlainLandmark, average, average_board};
 use crate::calib::views::external::pairing::{RATE_WINDOW_S, TravelSample, TravelSeries};
-use crate::calib::views::view::{ObservationRejection, TagObservation, View};
+use crate::calib::views::view::{FASTEST_RAD_S, ObservationRejection, TagObservation, View};
 use armcal_core::input::{AttitudeReading, ExternalRecording, InputMap, RawMeasurement, TagFrame, WhileMoving};
 use armcal_core::robot::Robot;
 use armcal_core::streams::JointAngles;
@@ -18,8 +18,6 @@ const SAME_POSE_SIGMAS: f64 = 5.0;
 /// Faster than this, beyond what noise makes of it, is on the way, rad/s: at a reach of 2 m and a camera clock 50 ms
 /// late, 1 mm.
 const REST_RATE_RAD_S: f64 = 0.01;
-/// In a faster arm the readings about an image are too far apart for a line through them, rad/s.
-const FASTEST_RAD_S: f64 = 0.5;
 /// An attitude farther from a view than this says nothing of it, s: a vehicle leans another way within seconds.
 const ATTITUDE_WITHIN_S: f64 = 0.5;
 /// Attitudes whose mean is shorter contradict each other.
