@@ -12,7 +12,7 @@ use crate::calib::bundle::innovations::Innovations;
 use crate::calib::bundle::input::{BundleInput, HyperparameterMode};
 use crate::calib::bundle::model_selection::{OptionalTerm, Selection};
 use crate::calib::bundle::outliers::Outlier;
-use crate::calib::bundle::setup::{BundleSetup, declared};
+use crate::calib::bundle::setup::{BundleSetup, Clocks, declared};
 use crate::calib::bundle::tables::{
     add_clock, camera_mount_table, covariance_with_mount, map_table, model_table, prior_table,
 };
@@ -161,9 +161,9 @@ impl<'a> BundleCalibration<'a> {
         let mut views = std::mem::take(&mut self.data.data.fit);
         let sizes_m: Vec<f64> = self.data.robot.tags.iter().map(|tag| tag.size_m).collect();
         let declared = declared(&self.data.robot, &views);
-        let has_clock = self.clock.is_some();
+        let clocks = if self.clock.is_some() { Clocks::Aligned } else { Clocks::AsStamped };
         let setup = |robot: &Robot, failures: &[Failure]| {
-            BundleSetup::new(robot, &views, failures, self.prior).with_drawing(&self.drawing).with_clock(has_clock)
+            BundleSetup::new(robot, &views, failures, self.prior).with_drawing(&self.drawing).with_clocks(clocks)
         };
         let first = setup(&self.data.robot, &declared);
         self.check_observable(&first, &declared)?;

@@ -19,8 +19,16 @@ pub(crate) struct BundleSetup {
     pub applied: FailureAdjusted,
     prior: Option<Result<CalibrationPrior, Refusal>>,
     drawing: Drawing,
-    /// Whether the offset between the clocks is a column.
-    has_clock: bool,
+    clocks: Clocks,
+}
+
+/// When the readings of a view are of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Clocks {
+    /// The images' stamps, as they are.
+    AsStamped,
+    /// The images' own times, by the offset between the clocks that was found: what is left of it is a column.
+    Aligned,
 }
 
 /// The declared failures of `robot`.
@@ -34,7 +42,7 @@ impl BundleSetup {
         let at = prior.map_or_else(JointParameters::default, |prior| prior.parameters(robot));
         let applied = FailureAdjusted::new(robot, views, failed, &at);
         let prior = prior.map(|prior| CalibrationPrior::new(prior, &applied).ok_or(Refusal::PriorSingular));
-        Self { applied, prior, drawing: Drawing::default(), has_clock: false }
+        Self { applied, prior, drawing: Drawing::default(), clocks: Clocks::AsStamped }
     }
 
     /// The same with what of the drawing is estimated, too.
@@ -42,9 +50,9 @@ impl BundleSetup {
         Self { drawing: drawing.clone(), ..self }
     }
 
-    /// The same for views whose readings were moved to the camera's clock: what is left of the offset stays open.
-    pub(crate) fn with_clock(self, is_moved: bool) -> Self {
-        Self { has_clock: is_moved, ..self }
+    /// The same for views with these clocks.
+    pub(crate) fn with_clocks(self, clocks: Clocks) -> Self {
+        Self { clocks, ..self }
     }
 
     /// The prior, or why it is of no use.
@@ -61,7 +69,7 @@ impl BundleSetup {
             self.usable_prior().and_then(|prior| prior.input(&self.applied.views, HyperparameterMode::Fitted));
         let mut input = of_prior.unwrap_or_else(|| self.applied.input(HyperparameterMode::Fitted));
         self.drawing.apply(&mut input);
-        if self.has_clock {
+        if self.clocks == Clocks::Aligned {
             estimate_clock(&mut input);
         }
         input
