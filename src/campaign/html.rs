@@ -71,7 +71,8 @@ fn verdict(table: &Table, summary: &CampaignSummary) -> Markup {
                 }
                 @if class == "green" {
                     li {
-                        "Keep the table as a baseline, and hold later versions against it: " code { "armcal regress" }
+                        "Hold later versions against this table: "
+                        code { "armcal regress ROUTINE.toml --baseline TABLE.csv" }
                     }
                 }
                 @if summary.settings.iter().any(|setting| !setting.failures.is_empty()) {

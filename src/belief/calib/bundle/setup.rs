@@ -22,7 +22,7 @@ pub(crate) struct BundleSetup {
     clocks: Clocks,
 }
 
-/// When the readings of a view are of.
+/// Which times the readings of a view are of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Clocks {
     /// The images' stamps, as they are.
