@@ -51,7 +51,6 @@ pub use statistics::{CampaignSummary, FigureStatistics, SettingStatistics, stati
 pub use store::{ExistingRows, Store, write_results};
 pub(crate) use table_file::parse_table;
 pub use table_file::{Table, read_table, table_text};
-pub(crate) use tables::fit;
 pub use tables::{markdown, table};
 pub use until::{Answer, MetSeed, Stopping, Until, UntilResult};
 pub use weights::{MixedRate, Weights};

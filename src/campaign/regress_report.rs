@@ -5,7 +5,7 @@ use comfy_table::presets::{ASCII_MARKDOWN, UTF8_FULL_CONDENSED};
 use quick_junit::{NonSuccessKind, Report, TestCase, TestCaseStatus, TestSuite};
 
 use crate::campaign::regress::{Check, Comparison, Verdict, WorstPair};
-use crate::campaign::tables::fit;
+use crate::report::fit_columns;
 
 impl Verdict {
     fn word(self) -> &'static str {
@@ -91,7 +91,7 @@ const SAME: &str = "every figure of every run is the same as in the baseline";
 #[must_use]
 pub fn regress_table(comparison: &Comparison, width: Option<usize>) -> String {
     let mut grid = grid(comparison, UTF8_FULL_CONDENSED);
-    fit(&mut grid, width);
+    fit_columns(&mut grid, width);
     let mut text = grid.to_string();
     if comparison.identical && comparison.pairs > 0 {
         text.push_str(&format!("\n{SAME}"));

@@ -1,10 +1,11 @@
 //! A campaign's summary for people: millimetres, seconds, seeds.
 
 use comfy_table::presets::UTF8_FULL_CONDENSED;
-use comfy_table::{CellAlignment, ContentArrangement, Table as Grid};
+use comfy_table::{CellAlignment, Table as Grid};
 
 use crate::campaign::statistics::WeightedRate;
 use crate::campaign::{CampaignSummary, FigureStatistics, Metric, SettingStatistics};
+use crate::report::fit_columns;
 
 /// What people look at first, and what it is to them; the JSON has all of them.
 const SHOWN: [(Metric, &str); 14] = [
@@ -54,13 +55,6 @@ pub(super) fn title(setting: &SettingStatistics) -> String {
     )
 }
 
-/// A grid that a terminal of so many columns takes: words go to a further line.
-pub(crate) fn fit(grid: &mut Grid, width: Option<usize>) {
-    if let Some(width) = width.and_then(|width| u16::try_from(width).ok()) {
-        grid.set_content_arrangement(ContentArrangement::Dynamic).set_width(width);
-    }
-}
-
 /// Lays a summary out for a terminal of so many columns, or for anything of any width.
 #[must_use]
 pub fn table(summary: &CampaignSummary, width: Option<usize>) -> String {
@@ -82,7 +76,7 @@ pub fn table(summary: &CampaignSummary, width: Option<usize>) -> String {
             }
         }
         if !rows.is_empty() {
-            fit(&mut grid, width);
+            fit_columns(&mut grid, width);
             text.push_str(&format!("\n{grid}"));
         }
         for failure in &setting.failures {

@@ -22,6 +22,7 @@ pub(super) struct LiveViewArgs {
 }
 
 /// What is drawn around the messages.
+#[cfg_attr(not(feature = "viewer"), expect(dead_code, reason = "nothing is drawn"))]
 pub(super) struct ViewOf<'a> {
     pub robot: &'a Robot,
     pub vehicle: Option<&'a Vehicle>,

@@ -7,7 +7,6 @@ use clap::Args;
 use comfy_table::presets::{ASCII_MARKDOWN, UTF8_FULL_CONDENSED};
 use comfy_table::{CellAlignment, Table};
 
-use crate::campaign::fit;
 use crate::cli::calibration_inputs::read_prior;
 use crate::cli::closing::{say_closing, terminal_width};
 use crate::cli::exit::Exit;
@@ -15,6 +14,7 @@ use crate::cli::file_kind::{FileKind, expect_option, expect_routine};
 use crate::cli::overrides::OverrideArgs;
 use crate::cli::stdout::{is_quiet, note, say};
 use crate::output;
+use crate::report::fit_columns;
 use armcal_belief::plan::{
     ArmBelief, ClearanceModel, ItineraryRequest, PlanFile, PlanHeader, PoseTable, SetName, plan_itinerary,
 };
@@ -192,7 +192,7 @@ fn table(file: &PlanFile, preset: &str, width: Option<usize>) -> String {
             column.set_cell_alignment(CellAlignment::Right);
         }
     }
-    fit(&mut table, width);
+    fit_columns(&mut table, width);
     table.to_string()
 }
 

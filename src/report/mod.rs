@@ -24,5 +24,6 @@ pub use summary::{
     AssertSummary, CalibrationSummary, CaptureSummary, HeldJointSummary, HeldOutSummary, OnlineSummary, RenewalSummary,
     RunSummary, WorldSummary,
 };
+pub(crate) use table::fit_columns;
 pub use table::{closing, table};
 pub use tag_map::{TAG_COLUMNS, TagMapPage, fit_lines, group_title, tag_map_html, tag_rows};

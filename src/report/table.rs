@@ -1,7 +1,7 @@
 //! The closing table on the terminal. Millimetres and degrees: people read it.
 
 use comfy_table::presets::UTF8_FULL_CONDENSED;
-use comfy_table::{CellAlignment, Table};
+use comfy_table::{CellAlignment, ContentArrangement, Table};
 
 use crate::report::online::online_lines;
 use crate::report::summary::{
@@ -15,6 +15,13 @@ use armcal_belief::calib::{
 use armcal_core::stats::Summary;
 use armcal_core::text::counted;
 use armcal_core::units::Unit;
+
+/// A table that a terminal of so many columns takes: words go to a further line.
+pub(crate) fn fit_columns(table: &mut Table, width: Option<usize>) {
+    if let Some(width) = width.and_then(|width| u16::try_from(width).ok()) {
+        table.set_content_arrangement(ContentArrangement::Dynamic).set_width(width);
+    }
+}
 
 /// Lays a summary out for a terminal.
 #[must_use]
