@@ -87,6 +87,7 @@ fn model(robot: &Robot) -> Model {
         n_links: 0,
         n_compliant: 0,
         mount: true,
+        further_mounts: Vec::new(),
         lens: false,
         tags: true,
         gripper_tag: false,

@@ -270,8 +270,8 @@ fn image(_: &Scratch, bytes: &[u8]) -> bool {
         data: bytes.to_vec(),
         ..armcal::log::ros::CompressedImage::default()
     };
-    armcal::recorded_images::RecordedImageDetector::new(&lens, armcal::optics::TagFamily::default())
-        .detect(&RecordedImage::Compressed(image))
+    armcal::recorded_images::RecordedImageDetector::new([&lens], armcal::optics::TagFamily::default())
+        .detect(0, &RecordedImage::Compressed(image))
         .is_ok()
 }
 

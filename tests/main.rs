@@ -9,7 +9,7 @@
 //! `script` and `cli` run the program, `kill` ends it badly; `sim` looks at the simulated world from outside;
 //! `uncalibrated` calibrates arms of which little is known; `real` reads recordings of real arms, `board_corners` those
 //! of a chessboard, `bags` the same as SQLite files, `recorded_inputs` their slow sensors and images, `streams` those
-//! that were recorded all the time; `tagmap` maps tags in recordings that the test writes; `touch` feels surveyed
+//! that were recorded all the time, `cameras` those of arms with two cameras; `tagmap` maps tags in recordings that the test writes; `touch` feels surveyed
 //! plates with the tool; `any_arm` makes robot folders for drawings of all sorts; `report` reads report.html; `work`
 //! works on a dive, `watch` follows recordings that grow; `live` moves arms behind ROS 2 topics; `repository` reads
 //! sources and pages.
@@ -20,6 +20,7 @@ mod any_arm;
 mod bags;
 mod board_corners;
 mod bumps;
+mod cameras;
 mod cli;
 mod closed_loop;
 mod detections;

@@ -201,7 +201,7 @@ fn tags_of_the_family_that_the_input_map_names_are_found() {
             let map = parse_input_map(Path::new("map.toml"), text).expect("a map");
             let lens = read_camera_info(&recording, "/info").expect("a lens");
             let family = map.tag_family.unwrap_or(robot.tag_family);
-            read_external_images(&recording, &map, &robot, &mut RecordedImageDetector::new(&lens, family))
+            read_external_images(&recording, &map, &robot, &mut RecordedImageDetector::new([&lens], family))
         };
         let found = read(&with_family).expect("a tag");
         assert_eq!(found.frames[0].tags[0].id, Some(ID), "{family}");
@@ -228,7 +228,7 @@ fn tags_are_found_in_recorded_images_of_each_form() {
         .map(|corner| camera.lens.project(&(camera.camera_from_tag * corner).coords).expect("in view"));
     let read = |topic: &str, lens: &CameraModel| {
         let map = parse_input_map(Path::new("map.toml"), &image_map(topic)).expect("a map");
-        read_external_images(&path, &map, &robot, &mut RecordedImageDetector::new(lens, robot.tag_family))
+        read_external_images(&path, &map, &robot, &mut RecordedImageDetector::new([lens], robot.tag_family))
     };
     for topic in ["/mono8", "/bgr8", "/png"] {
         let found = read(topic, &lens).expect(topic);

@@ -1,5 +1,7 @@
 //! What `armcal calibrate` is given: recordings, and the files beside them, as the estimator takes them.
 
+#[cfg(feature = "sim")]
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
@@ -21,7 +23,7 @@ use armcal_core::input::{
     ChildFrame, ExternalRecording, InputMap, Source, TagUse, read_camera_info, read_input_map, read_task,
 };
 #[cfg(feature = "sim")]
-use armcal_core::input::{ImageDetector, ImageProblem, RecordedImage, TagCorners, read_external_images};
+use armcal_core::input::{ImageDetector, ImageProblem, RecordedImage, TagCorners, Topics, read_external_images};
 #[cfg(feature = "sim")]
 use armcal_core::log::for_each_raw;
 use armcal_core::log::{Recording, TopicMap, scan_recording};
@@ -157,7 +159,7 @@ impl CalibrationInputs<'_> {
     ) -> Result<(Follower, bool)> {
         self.robot.require_turning(ONLINE)?;
         if let Some(file) = self.input {
-            let (prepared, lost) = self.external_views(file, self.landmarks()?, self.task()?)?;
+            let (prepared, lost) = self.views_of_first_camera(file, self.landmarks()?, self.task()?)?;
             let mut follower = Follower::new(prepared.robot.clone(), settings);
             prepared.data.task.iter().for_each(|task| follower.set_task(task));
             for view in prepared.data.fit {
@@ -185,7 +187,7 @@ impl CalibrationInputs<'_> {
         self.robot.require_turning(ONLINE)?;
         let (task, landmarks) = (self.task()?, self.landmarks()?);
         let (prepared, lost) = match self.input {
-            Some(file) => self.external_views(file, landmarks, task)?,
+            Some(file) => self.views_of_first_camera(file, landmarks, task)?,
             None => {
                 let (recordings, lost) = self.marked()?;
                 let survey = self.survey(landmarks)?;
@@ -218,6 +220,21 @@ impl CalibrationInputs<'_> {
         Ok((recordings, lost))
     }
 
+    /// The same for a belief that is kept up, which knows one camera.
+    fn views_of_first_camera(
+        &self,
+        file: &Path,
+        landmarks: Option<(&Path, LandmarkFile)>,
+        task: Option<ReachTask>,
+    ) -> Result<(CalibrationData, bool)> {
+        let (mut prepared, lost) = self.external_views(file, landmarks, task)?;
+        let n = prepared.data.keep_first_camera();
+        if n > 0 {
+            note(format_args!("note: {} of further cameras are left out: {ONLINE} knows one", counted(n, "view")));
+        }
+        Ok((prepared, lost))
+    }
+
     /// The views of recordings of a real arm, and whether one had lost something.
     fn external_views(
         &self,
@@ -226,10 +243,12 @@ impl CalibrationInputs<'_> {
         task: Option<ReachTask>,
     ) -> Result<(CalibrationData, bool)> {
         let map = read_input_map(file)?;
-        map.check_robot(file, &self.robot.joint_names())?;
+        map.check_robot(file, self.robot)?;
         let mut robot = self.robot.clone();
         if map.tag_use.needs_lens() {
             self.add_lens(&mut robot, &map)?;
+            let further = map.further().iter().map(|further| &further.camera);
+            further.into_iter().try_for_each(|camera| robot.require_further_lens(camera))?;
         }
         let named = match &landmarks {
             Some((file, landmarks)) => landmarks.survey(file, &robot, map.tag_use)?,
@@ -249,7 +268,8 @@ impl CalibrationInputs<'_> {
         let mut lost = false;
         for path in self.recordings {
             let recording = read_with_images(path, &map, &robot)?;
-            let (readings, frames) = (recording.readings.len(), recording.frames.len());
+            let of_further: usize = recording.further_frames.iter().map(Vec::len).sum();
+            let (readings, frames) = (recording.readings.len(), recording.frames.len() + of_further);
             tracing::info!("{}: {readings} joint readings, {frames} frames with tags", path.display());
             lost |= warn_of_external(&recording, &robot);
             recordings.push(recording);
@@ -284,9 +304,10 @@ impl CalibrationInputs<'_> {
 #[cfg(feature = "sim")]
 fn read_with_images(path: &Path, map: &InputMap, robot: &Robot) -> Result<ExternalRecording> {
     let family = map.tag_family.unwrap_or(robot.tag_family);
-    let detector = crate::recorded_images::RecordedImageDetector::new(&robot.camera.lens, family);
+    let detector =
+        crate::recorded_images::RecordedImageDetector::new(robot.cameras().map(|camera| &camera.lens), family);
     let waiting = match &map.source {
-        Source::Topics(topics) => watched_images(path, &topics.tags, topics.image_period_s)?,
+        Source::Topics(topics) => watched_images(path, topics)?,
         Source::Table(_) => None,
     };
     Ok(read_external_images(path, map, robot, &mut Watched { detector, waiting })?)
@@ -295,15 +316,19 @@ fn read_with_images(path: &Path, map: &InputMap, robot: &Robot) -> Result<Extern
 /// A sign of life for recordings whose tags are in images; their number is found in a pass of its own, which takes next
 /// to no time beside the search.
 #[cfg(feature = "sim")]
-fn watched_images(path: &Path, topic: &str, period_s: f64) -> Result<Option<Waiting>> {
+fn watched_images(path: &Path, topics: &Topics) -> Result<Option<Waiting>> {
     if !Waiting::on("looking for images").is_seen() {
         return Ok(None);
     }
-    let (mut n, mut next_nanos) = (0, 0);
+    // Of each topic of images: when the next one is looked at.
+    let names = std::iter::once(&topics.tags).chain(topics.further.iter().map(|further| &further.topic));
+    let mut next_nanos: BTreeMap<&str, u64> = names.map(|topic| (topic.as_str(), 0)).collect();
+    let mut n = 0;
     for_each_raw(path, |raw| {
-        let is_image = raw.topic() == topic && raw.schema_name().ends_with("Image");
-        if is_image && raw.log_time_nanos >= next_nanos {
-            (n, next_nanos) = (n + 1, raw.log_time_nanos.saturating_add((1e9 * period_s) as u64));
+        let next_nanos = next_nanos.get_mut(raw.topic()).filter(|_| raw.schema_name().ends_with("Image"));
+        if let Some(next_nanos) = next_nanos.filter(|next_nanos| raw.log_time_nanos >= **next_nanos) {
+            *next_nanos = raw.log_time_nanos.saturating_add((1e9 * topics.image_period_s) as u64);
+            n += 1;
         }
     })?;
     Ok((n > 0).then(|| Waiting::for_each_of(n, "searching images for tags")))
@@ -322,9 +347,9 @@ impl ImageDetector for Watched {
         self.detector.family()
     }
 
-    fn detect(&mut self, image: &RecordedImage) -> Result<Vec<TagCorners>, ImageProblem> {
+    fn detect(&mut self, camera: usize, image: &RecordedImage) -> Result<Vec<TagCorners>, ImageProblem> {
         self.waiting.iter().for_each(Waiting::one_more);
-        self.detector.detect(image)
+        self.detector.detect(camera, image)
     }
 }
 

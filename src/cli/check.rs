@@ -179,12 +179,13 @@ fn describe_input(map: &InputMap) -> String {
         TagUse::Position => format!("positions of {landmark}"),
     };
     match &map.source {
-        Source::Topics(Topics { joints, tags, camera_frame, .. }) => {
+        Source::Topics(Topics { joints, tags, camera_frame, further, .. }) => {
             let seen_from = match (map.tag_use, camera_frame) {
                 (TagUse::Pose | TagUse::Position, Some(camera)) => format!(" in `{camera}`"),
                 _ => String::new(),
             };
-            format!("input map: joint readings on {joints}, {what}{seen_from} on {tags}")
+            let further = further.iter().map(|further| format!("; those of `{}` on {}", further.camera, further.topic));
+            format!("input map: joint readings on {joints}, {what}{seen_from} on {tags}{}", further.collect::<String>())
         }
         Source::Table(table) => {
             let columns = match &table.seen {

@@ -6,7 +6,7 @@ use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use serde::Deserialize;
 
 use crate::export::urdf_text::{UrdfText, comment_text, xyz_rpy};
-use armcal_belief::calib::{Calibration, CameraMount};
+use armcal_belief::calib::{Calibration, CameraMount, FurtherCamera};
 use armcal_core::robot::{FileIssue, Robot, RobotError, parse_toml, read_text};
 
 /// By these words an exported file is known again.
@@ -70,6 +70,7 @@ pub fn calibrated_urdf(file: &Path, calibration: &Calibration, robot: &Robot) ->
     let mut changes = Changes::default();
     move_joints(file, calibration, robot, &urdf, &mut changes)?;
     place_camera(file, calibration, robot, &urdf, &mut changes)?;
+    add_further_cameras(file, calibration, robot, &urdf, &mut changes)?;
     let left_out = left_out(calibration);
     let comment = comment(calibration, &changes, &left_out);
     let text = urdf.edited(&changes.origins, &comment, &changes.added);
@@ -133,15 +134,42 @@ fn place_camera(
     }
     let name = free_name("camera", |name| urdf.links.iter().any(|link| link == name));
     let joint = free_name("camera_mount", |name| urdf.joints.iter().any(|joint| joint.name == name));
-    let parent = quick_xml::escape::escape(&link).into_owned();
-    changes.added = format!(
-        "  <link name=\"{name}\"/>\n  <joint name=\"{joint}\" type=\"fixed\">\n    <parent link=\"{parent}\"/>\
-         <child link=\"{name}\"/>\n    <origin {}/>\n  </joint>\n",
-        xyz_rpy(&shift)
-    );
+    changes.added = fixed_link(&name, &joint, &link, &shift);
     changes.in_words.push(format!("link {name}, the camera's optical frame, by joint {joint} on {link}: camera mount"));
     changes.camera_link = name;
     Ok(())
+}
+
+/// Each further camera gets a link of its own name, on the moving link that carries it.
+fn add_further_cameras(
+    file: &Path,
+    calibration: &Calibration,
+    robot: &Robot,
+    urdf: &UrdfText,
+    changes: &mut Changes,
+) -> Result<(), FileIssue> {
+    for found in &calibration.further_camera {
+        let Some(camera) = robot.further_cameras.iter().find(|camera| camera.name == found.name) else { continue };
+        let body = camera.mount.n_joints.checked_sub(1).and_then(|joint| robot.chain.joints().get(joint));
+        let parent = body.map_or(robot.base_link.as_str(), |joint| joint.child_link.as_str());
+        let name = free_name(&found.name, |name| urdf.links.iter().any(|link| link == name));
+        let joint = free_name(&format!("{name}_mount"), |name| urdf.joints.iter().any(|joint| joint.name == name));
+        let place = further_from_camera(file, found)?;
+        changes.added += &fixed_link(&name, &joint, parent, &place);
+        let change = format!("link {name}, that camera's optical frame, by joint {joint} on {parent}: its mount");
+        changes.in_words.push(change);
+    }
+    Ok(())
+}
+
+/// A link without a shape, and the joint that holds it.
+fn fixed_link(name: &str, joint: &str, parent: &str, parent_from_link: &Isometry3<f64>) -> String {
+    let [name, joint, parent] = [name, joint, parent].map(|text| quick_xml::escape::escape(text).into_owned());
+    format!(
+        "  <link name=\"{name}\"/>\n  <joint name=\"{joint}\" type=\"fixed\">\n    <parent link=\"{parent}\"/>\
+         <child link=\"{name}\"/>\n    <origin {}/>\n  </joint>\n",
+        xyz_rpy(parent_from_link)
+    )
 }
 
 /// `name`, or the first of `name_2`, `name_3`, .. that is not taken.
@@ -152,14 +180,22 @@ fn free_name(name: &str, is_taken: impl Fn(&str) -> bool) -> String {
 
 /// The calibrated `link_from_camera` on the moving link that carries the camera.
 pub(super) fn link_from_camera(file: &Path, mount: &CameraMount) -> Result<Isometry3<f64>, FileIssue> {
-    for value in mount.position_m {
-        FileIssue::check_range(file, "camera_mount.position_m", value, -10.0..=10.0)?;
+    place(file, "camera_mount", mount.position_m, mount.quaternion_wxyz)
+}
+
+/// The same of a further camera.
+pub(super) fn further_from_camera(file: &Path, found: &FurtherCamera) -> Result<Isometry3<f64>, FileIssue> {
+    place(file, "further_camera", found.position_m, found.quaternion_wxyz)
+}
+
+fn place(file: &Path, table: &str, position_m: [f64; 3], [w, x, y, z]: [f64; 4]) -> Result<Isometry3<f64>, FileIssue> {
+    for value in position_m {
+        FileIssue::check_range(file, &format!("{table}.position_m"), value, -10.0..=10.0)?;
     }
-    let [w, x, y, z] = mount.quaternion_wxyz;
     let rotation = UnitQuaternion::try_new(Quaternion::new(w, x, y, z), 1e-6).filter(|turn| turn.norm().is_finite());
-    let key = "camera_mount.quaternion_wxyz";
+    let key = format!("{table}.quaternion_wxyz");
     let rotation = rotation.ok_or_else(|| FileIssue::new(file, key, "is no rotation; its length must not be 0"))?;
-    Ok(Isometry3::from_parts(Translation3::from(Vector3::from(mount.position_m)), rotation))
+    Ok(Isometry3::from_parts(Translation3::from(Vector3::from(position_m)), rotation))
 }
 
 fn left_out(calibration: &Calibration) -> Vec<String> {

@@ -6,20 +6,18 @@ use armcal_detect::{DetectorSettings, GreyImage, TagDetector};
 
 use super::grey::grey;
 
-/// Finds tags of one family in recorded images of one camera.
+/// Finds tags of one family in recorded images.
 #[derive(Debug)]
 pub struct RecordedImageDetector {
-    lens: CameraModel,
     family: TagFamily,
-    /// Made for the first image: most recordings have none.
-    detector: Option<TagDetector>,
+    /// By the camera's number; a detector is made for its first image: most recordings have none.
+    cameras: Vec<(CameraModel, Option<TagDetector>)>,
 }
 
 impl RecordedImageDetector {
-    /// A detector for images of `lens`.
-    #[must_use]
-    pub fn new(lens: &CameraModel, family: TagFamily) -> Self {
-        Self { lens: *lens, family, detector: None }
+    /// A detector for images through `lenses`, one of each camera.
+    pub fn new<'a>(lenses: impl IntoIterator<Item = &'a CameraModel>, family: TagFamily) -> Self {
+        Self { family, cameras: lenses.into_iter().map(|lens| (*lens, None)).collect() }
     }
 }
 
@@ -28,15 +26,17 @@ impl ImageDetector for RecordedImageDetector {
         self.family
     }
 
-    fn detect(&mut self, image: &RecordedImage) -> Result<Vec<TagCorners>, ImageProblem> {
+    fn detect(&mut self, camera: usize, image: &RecordedImage) -> Result<Vec<TagCorners>, ImageProblem> {
         let unusable = |error: armcal_detect::DetectError| ImageProblem::Unusable(error.to_string());
-        let data = grey(image, self.lens.resolution_px())?;
-        let [width, height] = self.lens.resolution_px().map(|n| n as usize);
-        let detector = match &mut self.detector {
+        let unknown = || ImageProblem::Unusable(format!("the image is of camera {camera}, whose lens is not known"));
+        let (lens, detector) = self.cameras.get_mut(camera).ok_or_else(unknown)?;
+        let data = grey(image, lens.resolution_px())?;
+        let [width, height] = lens.resolution_px().map(|n| n as usize);
+        let detector = match detector {
             Some(detector) => detector,
             none => {
                 let settings = DetectorSettings::of_family(self.family);
-                none.insert(TagDetector::new(&self.lens, settings).map_err(unusable)?)
+                none.insert(TagDetector::new(lens, settings).map_err(unusable)?)
             }
         };
         let found = detector.detect(GreyImage { width, height, data: &data }).map_err(unusable)?;

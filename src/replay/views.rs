@@ -98,7 +98,7 @@ type Sighting = (usize, usize, Point3<f64>);
 
 fn sightings(views: &[View], robot: &Robot, angles: &[JointAngles]) -> Vec<Sighting> {
     let of_view = |(at, view): (usize, &View)| {
-        let tags_from_camera = robot.tags_from_camera(&angles[at]);
+        let tags_from_camera = robot.tags_from(robot.camera_at(view.camera), &angles[at]);
         let place =
             move |seen: &TagObservation| (at, seen.tag_idx, tags_from_camera * Point3::from(seen.center_in_camera_m));
         view.tags.iter().map(place).collect::<Vec<Sighting>>()
@@ -141,9 +141,9 @@ fn draw_sightings(input: &ViewsInput<'_>, times_s: &[f64], stream: &mut EntityLo
 
 fn draw_places(input: &ViewsInput<'_>, found: &[Sighting], times_s: &[f64], stream: &mut EntityLog) {
     let means = means(found);
-    for (at, angles) in input.angles.iter().enumerate() {
+    for (at, (angles, view)) in input.angles.iter().zip(input.views).enumerate() {
         let base_from_tags = input.calibrated.base_from_tags(angles);
-        let camera = base_from_tags * input.calibrated.tags_from_camera(angles);
+        let camera = base_from_tags * input.calibrated.tags_from(input.calibrated.camera_at(view.camera), angles);
         let of_view: Vec<&Sighting> = found.iter().filter(|(view, ..)| *view == at).collect();
         let places = of_view.iter().map(|(_, _, place)| vector(&(base_from_tags * place).coords));
         let points = Points3D::new(places.clone()).with_colors([colors::TARGET]).with_radii([0.012]);

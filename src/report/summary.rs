@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::score::{MarginSummary, Score};
 use armcal_belief::calib::online::OnlineEvent;
 use armcal_belief::calib::{
-    BaselineComparison, Calibration, CameraMount, FailedJointTable, Finding, JointResult, MapResult,
+    BaselineComparison, Calibration, CameraMount, FailedJointTable, Finding, FurtherCamera, JointResult, MapResult,
     ObservabilityTable, PriorTable, Refusal, Reservation, Status, VerdictTable,
 };
 use armcal_belief::session::{AskedPoses, OnlineOutcome, SkippedTarget, StillReachable};
@@ -183,6 +183,9 @@ pub struct CalibrationSummary {
     /// By the tag on the gripper, where the robot has one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera_mount: Option<CameraMount>,
+    /// The further cameras whose mounts were estimated.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub further_camera: Vec<FurtherCamera>,
     /// How much later the joint sensors' stamps are than the camera's, and one sigma, where moving joints tell it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub time_offset_s: Option<[f64; 2]>,
@@ -278,6 +281,7 @@ impl CalibrationSummary {
             predicted_tool_error_m: calibration.predicted_tool_error_m,
             predicted_tool_error_with_priors_m: calibration.predicted_tool_error_with_priors_m,
             camera_mount: calibration.camera_mount.clone(),
+            further_camera: calibration.further_camera.clone(),
             time_offset_s: calibration.model.as_ref().and_then(|model| model.time_offset_s),
             reservations: calibration.reservations.clone(),
             findings: calibration.findings.clone(),

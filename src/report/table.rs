@@ -10,7 +10,7 @@ use crate::report::summary::{
 use crate::report::verdict::{beside_refusal, joint_remedy, repairs};
 use crate::score::{ReachScore, ScoreSide};
 use armcal_belief::calib::{
-    CameraMount, FailedJointTable, MapResult, PriorTable, Status, SurveyCoverage, UNSEEN_LINKS,
+    CameraMount, FailedJointTable, FurtherCamera, MapResult, PriorTable, Status, SurveyCoverage, UNSEEN_LINKS,
 };
 use armcal_core::stats::Summary;
 use armcal_core::text::counted;
@@ -273,6 +273,7 @@ fn capture_lines(capture: &CaptureSummary) -> Vec<String> {
 fn calibration_lines(calibration: &CalibrationSummary) -> Vec<String> {
     let mut lines: Vec<String> = calibration.largest_gain_change.as_ref().map(gain_line).into_iter().collect();
     lines.extend(calibration.camera_mount.as_ref().map(mount_line));
+    lines.extend(calibration.further_camera.iter().map(further_camera_line));
     lines.extend(calibration.time_offset_s.map(clock_line));
     lines.extend(calibration.failed_joint.iter().map(failed_line));
     lines.extend(calibration.prior.as_ref().map(prior_line));
@@ -354,17 +355,26 @@ fn mount_line(mount: &CameraMount) -> String {
     match &mount.left_out {
         Some(why) => format!("camera mount by the drawing: {why}"),
         None => {
-            // The axis that is known least: the others say nothing for it.
-            let worst = |v: [f64; 3]| v.into_iter().fold(0.0, f64::max);
-            let (std_mm, std_deg) = (worst(mount.position_std_m) * 1e3, worst(mount.rotation_std_rad).to_degrees());
             let by_tag = match (mount.views, mount.rms_px) {
                 (0, _) => "by the tags".to_owned(),
                 (views, Some(rms_px)) => format!("by the tag on the gripper in {views} views ({rms_px:.2} px)"),
                 (views, None) => format!("by the tags and the one on the gripper in {views} views"),
             };
-            format!("camera mount {by_tag}: known to {std_mm:.1} mm, {std_deg:.2} deg in its worst axis")
+            format!("camera mount {by_tag}: {}", known_to(mount.position_std_m, mount.rotation_std_rad))
         }
     }
+}
+
+fn further_camera_line(camera: &FurtherCamera) -> String {
+    let FurtherCamera { name, position_std_m, rotation_std_rad, views, .. } = camera;
+    format!("camera {name}: {}, its mount {}", counted(*views, "view"), known_to(*position_std_m, *rotation_std_rad))
+}
+
+/// The axis that is known least: the others say nothing for it.
+fn known_to(position_std_m: [f64; 3], rotation_std_rad: [f64; 3]) -> String {
+    let worst = |v: [f64; 3]| v.into_iter().fold(0.0, f64::max);
+    let (std_mm, std_deg) = (worst(position_std_m) * 1e3, worst(rotation_std_rad).to_degrees());
+    format!("known to {std_mm:.1} mm, {std_deg:.2} deg in its worst axis")
 }
 
 fn failed_line(failed: &FailedJointTable) -> String {

@@ -150,6 +150,7 @@ impl Twin {
             n_links: 0,
             n_compliant: 0,
             mount: true,
+            further_mounts: Vec::new(),
             lens: false,
             tags: true,
             gripper_tag: false,

@@ -67,7 +67,7 @@ pub(crate) fn seen_angles(robot: &Robot, view: &View, joints: &[usize], at: &Joi
 }
 
 fn distance_cost(robot: &Robot, view: &View, angles: &JointAngles) -> f64 {
-    let base_from_camera = robot.tags_from_camera(angles);
+    let base_from_camera = robot.tags_from(robot.camera_at(view.camera), angles);
     let of_tag = |tag: &TagObservation| {
         let predicted_m = base_from_camera * nalgebra::Point3::from(tag.center_in_camera_m);
         let off_m = predicted_m.coords - robot.tags[tag.tag_idx].base_from_tag.origin().vector();

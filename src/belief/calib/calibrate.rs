@@ -148,6 +148,7 @@ fn rests_on(prior: &Calibration, data: &CaptureData) -> bool {
 }
 
 /// Calibrates from views; a `prior` is where the search starts instead of the datasheet, and has weight under `bundle`.
+/// Other methods go by the first camera's views alone.
 ///
 /// # Errors
 /// As [`calibrate`].
@@ -166,6 +167,8 @@ pub fn calibrate_data(
             BundleCalibration::new(data, prior, EstimatePurpose::Final)?.calibrate()
         }
         Method::MinimumDistance | Method::MinimumVariance => {
+            let mut data = data;
+            data.data.keep_first_camera();
             check_views(&data)?;
             calibrate_positions(data, method, prior)
         }

@@ -49,10 +49,10 @@ pub use refusal_conditions::{MIN_HELD_OUT_VIEWS, MIN_VIEWS_PER_PARAMETER, fewest
 pub use reservation::Reservation;
 pub use result::{
     Calibration, CalibrationFileError, CalibrationFiles, CameraMount, Check, CompactCalibration, CompactError,
-    CompactJoint, CornerResidual, CovarianceTable, FailedJointTable, FitDetails, FitMetrics, HeldOutMetrics,
-    JointCompliance, JointResult, LinkResult, LookupTable, MAX_COMPACT_BYTES, MapResult, MapTag, ModelTable,
-    ObservabilityTable, ObservedTag, PredictedToolError, PriorTable, ReferenceTable, SagTable, Status, SurveyCoverage,
-    TargetPrediction, TermsTable, ValidRange, VerdictTable, ViewResidual, covariance_file, metric,
+    CompactJoint, CornerResidual, CovarianceTable, FailedJointTable, FitDetails, FitMetrics, FurtherCamera,
+    HeldOutMetrics, JointCompliance, JointResult, LinkResult, LookupTable, MAX_COMPACT_BYTES, MapResult, MapTag,
+    ModelTable, ObservabilityTable, ObservedTag, PredictedToolError, PriorTable, ReferenceTable, SagTable, Status,
+    SurveyCoverage, TargetPrediction, TermsTable, ValidRange, VerdictTable, ViewResidual, covariance_file, metric,
 };
 pub(crate) use views::dropouts::replace_dropouts;
 pub use views::{

@@ -14,6 +14,7 @@ use crate::calib::error::CalibError;
 use crate::calib::result::map_table::{MapResult, MapTag, SurveyCoverage};
 use crate::calib::views::view::{CaptureData, View};
 use crate::tagmap::{Body, MapDetection, MapInput, MapMode, MapSettings, MapView, NoiseScale, TagMap, TagPrior, solve};
+use armcal_core::optics::CameraModel;
 use armcal_core::robot::{Robot, SurveyedTag, TagSurvey};
 use armcal_core::spatial::{Base, Pose, Tag, skew};
 
@@ -63,7 +64,7 @@ fn map_tags(data: &mut CaptureData, robot: &Robot) -> Result<Mapped, String> {
     let views: Vec<MapView> = data.fit.iter().map(|view| map_view(view, robot)).collect();
     let bodies = [Body { name: robot.base_link.clone(), is_static: true, pose: Some(Isometry3::identity()) }];
     let priors: Vec<TagPrior> = robot.tags.iter().map(prior).collect();
-    let cameras = [robot.camera.lens];
+    let cameras: Vec<CameraModel> = robot.cameras().map(|camera| camera.lens).collect();
     let settings = MapSettings {
         mode: MapMode::PartlyKnown,
         corner_std_px: robot.camera.corner_std_px,
@@ -91,11 +92,11 @@ fn map_tags(data: &mut CaptureData, robot: &Robot) -> Result<Mapped, String> {
 fn map_view(view: &View, robot: &Robot) -> MapView {
     let corners = view.tags.iter().filter_map(|tag| Some((tag.id, tag.corners()?)));
     let tags = corners.map(|(id, seen)| {
-        let variance_px2 = robot.camera.corner_std_px.powi(2) / seen.n_frames.max(1) as f64;
+        let variance_px2 = robot.camera_at(view.camera).corner_std_px.powi(2) / seen.n_frames.max(1) as f64;
         let covariance_px2 = Some([Matrix2::from_diagonal_element(variance_px2); 4]);
         MapDetection { id, corners_px: seen.corners_px, covariance_px2 }
     });
-    MapView { camera: 0, stamp: view.end, tags: tags.collect(), attitude: None }
+    MapView { camera: view.camera, stamp: view.end, tags: tags.collect(), attitude: None }
 }
 
 fn prior(tag: &SurveyedTag) -> TagPrior {

@@ -100,7 +100,8 @@ pub(crate) fn margin_hint(ratio: f64) -> Option<&'static str> {
 
 /// The input that explains why the views do not fit; `tags` as the map has them.
 pub(crate) fn wrong_input(data: &CaptureData, tags: &[SurveyedTag], robot: &Robot) -> Option<WrongInput> {
-    let views: Vec<&View> = data.fit.iter().chain(&data.held_out).take(MAX_VIEWS).collect();
+    let of_first = data.fit.iter().chain(&data.held_out).filter(|view| view.camera == 0);
+    let views: Vec<&View> = of_first.take(MAX_VIEWS).collect();
     let lens = &robot.camera.lens;
     let stated_px = lens.resolution_px();
     if beyond(stated_px, data.largest_px) {

@@ -9,7 +9,7 @@ use super::error::InputError;
 use super::images::{IMAGE_TYPES, ImageDetector};
 use super::joint_unit::check_unit;
 use super::joints::{JointReader, n_needed};
-use super::map::{ConditionKind, InputMap, Source, TagUse, Topics};
+use super::map::{ConditionKind, FurtherTopic, InputMap, Source, TagUse, Topics};
 use super::recording::ExternalRecording;
 use super::table::read_table;
 use super::tags::TagReader;
@@ -61,7 +61,9 @@ fn read_up_to<'a>(
         most,
         seen: BTreeSet::new(),
         joints: JointReader::new(&file, map, &topics.joints, robot),
-        tags: TagReader::new(&file, map, topics, detector.map(|detector| detector as &mut dyn ImageDetector)),
+        tags: TagReader::new(&file, map, topics),
+        further: further_readers(&file, map, topics, robot),
+        detector: detector.map(|detector| detector as &mut dyn ImageDetector),
         conditions: ConditionReader::new(&file, map, &topics.conditions),
         attitudes: AttitudeReader::new(&file, map, topics),
     };
@@ -82,6 +84,15 @@ fn read_up_to<'a>(
     Ok(recording)
 }
 
+/// Of the further cameras that the map and the robot have.
+fn further_readers<'a>(file: &'a str, map: &'a InputMap, topics: &'a Topics, robot: &Robot) -> Vec<TagReader<'a>> {
+    let reader = |further: &'a FurtherTopic| {
+        let camera = robot.cameras().skip(1).position(|camera| camera.name == further.camera)?;
+        Some(TagReader::new(file, map, topics).of_further(camera + 1, further))
+    };
+    topics.further.iter().filter_map(reader).collect()
+}
+
 /// Reads all messages of a recording.
 struct MessageReader<'a> {
     file: &'a str,
@@ -92,6 +103,10 @@ struct MessageReader<'a> {
     seen: BTreeSet<String>,
     joints: JointReader<'a>,
     tags: TagReader<'a>,
+    /// Of the further cameras that the map names, in its order.
+    further: Vec<TagReader<'a>>,
+    /// `None` where nobody looks at images.
+    detector: Option<&'a mut dyn ImageDetector>,
     conditions: ConditionReader<'a>,
     attitudes: AttitudeReader<'a>,
 }
@@ -105,10 +120,15 @@ impl MessageReader<'_> {
             check_type(self.file, raw, &["JointState"], "sensor_msgs/msg/JointState")?;
             self.joints.take(raw, digest(raw))?;
             self.joints.readings.len()
-        } else if raw.topic() == self.topics.tags {
+        } else if self.cameras().any(|reader| reader.topic == raw.topic()) {
             check_tags(self.file, raw, self.map)?;
-            self.tags.take(raw, digest(raw))?;
-            self.tags.len()
+            let readers = std::iter::once(&mut self.tags).chain(&mut self.further);
+            let mut most = 0;
+            for reader in readers.filter(|reader| reader.topic == raw.topic()) {
+                reader.take(raw, digest(raw), &mut self.detector)?;
+                most = most.max(reader.len());
+            }
+            most
         } else if let Some(kind) = self.conditions.kind_of(raw.topic()) {
             match kind {
                 ConditionKind::OilTemperature => {
@@ -134,29 +154,37 @@ impl MessageReader<'_> {
         Ok(())
     }
 
+    fn cameras(&self) -> impl Iterator<Item = &TagReader<'_>> {
+        std::iter::once(&self.tags).chain(&self.further)
+    }
+
     /// Checks that all is there, in the order of time.
     fn check(&self) -> Result<(), InputError> {
         let file = || self.file.to_owned();
         let conditions =
             self.topics.conditions.named().into_iter().map(|(topic, _)| topic).chain(&self.topics.conditions.attitude);
-        let mut wanted = [&self.topics.joints, &self.topics.tags].into_iter().chain(conditions);
+        let tags = self.cameras().map(|reader| reader.topic);
+        let mut wanted = [self.topics.joints.as_str()].into_iter().chain(tags).chain(conditions.map(String::as_str));
         if let Some(topic) = wanted.find(|topic| !self.seen.contains(*topic)) {
             let found = self.seen.iter().cloned().collect();
-            return Err(InputError::NoTopic { file: file(), topic: topic.clone(), found });
+            return Err(InputError::NoTopic { file: file(), topic: topic.to_owned(), found });
         }
         if self.joints.readings.is_empty() {
             return Err(self.joints.no_reading());
         }
-        for (topic, order) in [(&self.topics.joints, &self.joints.order), (&self.topics.tags, &self.tags.order)] {
+        let of_tags = self.cameras().map(|reader| (reader.topic, &reader.order));
+        for (topic, order) in std::iter::once((self.topics.joints.as_str(), &self.joints.order)).chain(of_tags) {
             if let Some(disorder) = order.first_regression() {
-                return Err(InputError::Disorder { file: file(), topic: topic.clone(), disorder });
+                return Err(InputError::Disorder { file: file(), topic: topic.to_owned(), disorder });
             }
         }
-        if self.tags.len() == 0 {
-            let (topic, problem) = (self.topics.tags.clone(), self.tags.problem());
-            return Err(InputError::NoTags { file: file(), topic, problem });
+        match self.cameras().find(|reader| reader.len() == 0) {
+            Some(reader) => {
+                let (topic, problem) = (reader.topic.to_owned(), reader.problem());
+                Err(InputError::NoTags { file: file(), topic, problem })
+            }
+            None => Ok(()),
         }
-        Ok(())
     }
 
     fn finish(self, robot: &Robot) -> ExternalRecording {
@@ -167,6 +195,13 @@ impl MessageReader<'_> {
         readings.sort_by_key(|reading| reading.stamp);
         let (frames, of_tags) = self.tags.finish();
         left_out.extend(of_tags);
+        let mut further_frames = vec![Vec::new(); robot.further_cameras.len()];
+        for reader in self.further {
+            let camera = reader.camera;
+            let (frames, of_tags) = reader.finish();
+            of_tags.into_iter().for_each(|(why, n)| *left_out.entry(why).or_default() += n);
+            further_frames[camera - 1] = frames;
+        }
         if self.conditions.left_out > 0 {
             left_out.insert("temperatures or pressures that are not finite".to_owned(), self.conditions.left_out);
         }
@@ -178,6 +213,7 @@ impl MessageReader<'_> {
         ExternalRecording {
             readings,
             frames,
+            further_frames,
             conditions,
             attitudes,
             absent_joints,

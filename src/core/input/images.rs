@@ -33,11 +33,11 @@ pub trait ImageDetector {
     /// The family of tags that it knows.
     fn family(&self) -> TagFamily;
 
-    /// The tags of one image.
+    /// The tags of one image of the robot's camera of that number.
     ///
     /// # Errors
     /// [`ImageProblem`].
-    fn detect(&mut self, image: &RecordedImage) -> Result<Vec<TagCorners>, ImageProblem>;
+    fn detect(&mut self, camera: usize, image: &RecordedImage) -> Result<Vec<TagCorners>, ImageProblem>;
 }
 
 /// Names of the types that hold images.

@@ -18,6 +18,10 @@
 //! family = "36h11"                   # optional, images alone: "Standard41h12" ..; absent: that of the robot's tags
 //! image_period_s = 0.2               # optional, images alone: time between two that are looked at; absent: all
 //! camera_info = "/camera_info"       # optional, images alone: sensor_msgs/msg/CameraInfo, for robots without a lens
+//! [[further_tags]]                   # optional: what a [[further_camera]] of robot.toml saw, in the form of [tags]
+//! camera = "elbow_camera"            # its name in robot.toml
+//! topic = "/tf"
+//! camera_frame = "elbow_fisheye"
 //! [conditions]                       # optional
 //! oil_temperature = "/oil"           # sensor_msgs/msg/Temperature, deg C
 //! pressure = "/depth"                # sensor_msgs/msg/FluidPressure, Pa
@@ -38,7 +42,7 @@ pub use self::table::{
 };
 use self::table::{TableToml, TagColumnsToml};
 use crate::optics::TagFamily;
-use crate::robot::{FileIssue, JointSensorSpec, RobotError, parse_toml, read_text};
+use crate::robot::{FileIssue, JointSensorSpec, Robot, RobotError, parse_toml, read_text};
 
 mod table;
 
@@ -217,10 +221,38 @@ pub struct Topics {
     pub camera_info: Option<String>,
     /// Least time between two images that are looked at.
     pub image_period_s: f64,
+    /// What further cameras saw.
+    pub further: Vec<FurtherTopic>,
     /// Slow sensors; boxed for their size.
     pub conditions: Box<ConditionTopics>,
     /// How the attitude sensor is turned in the base link.
     pub base_from_attitude: UnitQuaternion<f64>,
+}
+
+impl Topics {
+    /// What cameras see is on topics of their own.
+    fn check_further(&self, file: &Path) -> Result<(), FileIssue> {
+        let conditions = self.conditions.named().into_iter().map(|(topic, _)| topic).chain(&self.conditions.attitude);
+        let others: Vec<&String> = conditions.chain([&self.joints]).collect();
+        match self.further.iter().find(|further| others.contains(&&further.topic)) {
+            Some(FurtherTopic { topic, .. }) => {
+                let problem = format!("is `{topic}`, which is named for something else, too");
+                Err(FileIssue::new(file, "further_tags.topic", problem))
+            }
+            None => Ok(()),
+        }
+    }
+}
+
+/// Where the tags are that a further camera saw; in the form of the first's.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FurtherTopic {
+    /// Name of a further camera in robot.toml.
+    pub camera: String,
+    /// As that of the first camera's tags, and maybe the same.
+    pub topic: String,
+    /// As that of the first camera.
+    pub camera_frame: Option<String>,
 }
 
 /// Where the data are.
@@ -256,17 +288,32 @@ pub struct InputMap {
 }
 
 impl InputMap {
-    /// Checks that `joint_sensors.names` are of this robot.
+    /// Checks that `joint_sensors.names` and the cameras of `further_tags` are of this robot.
     ///
     /// # Errors
-    /// [`FileIssue`] naming `file` and both names.
-    pub fn check_robot(&self, file: &Path, joints: &[String]) -> Result<(), FileIssue> {
-        match self.joint_names.keys().find(|name| !joints.contains(name)) {
+    /// [`FileIssue`] naming `file`, the name and those that the robot has.
+    pub fn check_robot(&self, file: &Path, robot: &Robot) -> Result<(), FileIssue> {
+        let joints = robot.joint_names();
+        if let Some(name) = self.joint_names.keys().find(|name| !joints.contains(name)) {
+            let problem = format!("`{name}` is no joint of the robot; it has {joints:?}");
+            return Err(FileIssue::new(file, "joint_sensors.names", problem));
+        }
+        let cameras: Vec<&String> = robot.further_cameras.iter().map(|camera| &camera.name).collect();
+        match self.further().iter().find(|further| !cameras.contains(&&further.camera)) {
             None => Ok(()),
-            Some(name) => {
-                let problem = format!("`{name}` is no joint of the robot; it has {joints:?}");
-                Err(FileIssue::new(file, "joint_sensors.names", problem))
+            Some(FurtherTopic { camera, .. }) => {
+                let problem = format!("`{camera}` is no [[further_camera]] of robot.toml; it has {cameras:?}");
+                Err(FileIssue::new(file, "further_tags.camera", problem))
             }
+        }
+    }
+
+    /// What further cameras saw.
+    #[must_use]
+    pub fn further(&self) -> &[FurtherTopic] {
+        match &self.source {
+            Source::Topics(topics) => &topics.further,
+            Source::Table(_) => &[],
         }
     }
 
@@ -296,7 +343,17 @@ struct MapToml {
     joint_sensors: JointsToml,
     tags: TagsToml,
     #[serde(default)]
+    further_tags: Vec<FurtherTagsToml>,
+    #[serde(default)]
     conditions: ConditionTopics,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FurtherTagsToml {
+    camera: String,
+    topic: String,
+    camera_frame: Option<String>,
 }
 
 #[derive(Deserialize)]
@@ -360,7 +417,12 @@ pub fn parse_input_map(file: &Path, text: &str) -> Result<InputMap, RobotError> 
             let tags = (raw.tags.tag_use, child_frame.as_ref());
             Source::Table(Box::new(table::layout(file, table, raw.tags.columns, tags)?))
         }
-        None => Source::Topics(topics(file, &raw.joint_sensors, &raw.tags, raw.conditions)?),
+        None => {
+            let further = further(file, &raw.tags, raw.further_tags)?;
+            let topics = Topics { further, ..topics(file, &raw.joint_sensors, &raw.tags, raw.conditions)? };
+            topics.check_further(file)?;
+            Source::Topics(topics)
+        }
     };
     Ok(InputMap {
         source,
@@ -386,10 +448,42 @@ fn check_no_topics(file: &Path, raw: &MapToml) -> Result<(), FileIssue> {
         ("conditions.pressure", &raw.conditions.pressure),
         ("conditions.attitude", &raw.conditions.attitude),
     ];
-    match given.into_iter().find(|(_, value)| value.is_some()) {
-        Some((key, _)) => Err(FileIssue::new(file, key, "is for recordings; a [table] has columns. Leave one out")),
+    let given = given.into_iter().find(|(_, value)| value.is_some()).map(|(key, _)| key);
+    match given.or((!raw.further_tags.is_empty()).then_some("further_tags")) {
+        Some(key) => Err(FileIssue::new(file, key, "is for recordings; a [table] has columns. Leave one out")),
         None => Ok(()),
     }
+}
+
+/// Each camera once, told from the others by its topic or its frame.
+fn further(file: &Path, first: &TagsToml, raw: Vec<FurtherTagsToml>) -> Result<Vec<FurtherTopic>, FileIssue> {
+    let mut seen = vec![(first.topic.clone().unwrap_or_default(), first.camera_frame.clone())];
+    let mut found: Vec<FurtherTopic> = Vec::with_capacity(raw.len());
+    for FurtherTagsToml { camera, topic, camera_frame } in raw {
+        let issue = |key: &str, problem: &str| Err(FileIssue::new(file, format!("further_tags.{key}"), problem));
+        if found.iter().any(|other| other.camera == camera) {
+            return issue("camera", &format!("names `{camera}` twice"));
+        }
+        if topic.is_empty() || camera_frame.as_deref() == Some("") {
+            return issue(if topic.is_empty() { "topic" } else { "camera_frame" }, "is empty; name one");
+        }
+        if camera_frame.is_none() && !first.tag_use.needs_lens() {
+            return issue("camera_frame", "is missing; transforms need it: which frame is this camera's");
+        }
+        let camera_frame = camera_frame.as_deref().map(|frame| without_slash(frame).to_owned());
+        let is_same = |(of, frame): &(String, Option<String>)| {
+            let both = frame.as_deref().map(without_slash).zip(camera_frame.as_deref());
+            *of == topic && both.is_none_or(|(a, b)| a == b)
+        };
+        if seen.iter().any(is_same) {
+            let problem =
+                "is that of another camera with the same camera_frame, or with none: nothing tells them apart";
+            return issue("topic", problem);
+        }
+        seen.push((topic.clone(), camera_frame.clone()));
+        found.push(FurtherTopic { camera, topic, camera_frame });
+    }
+    Ok(found)
 }
 
 fn topics(file: &Path, joints: &JointsToml, tags: &TagsToml, conditions: ConditionTopics) -> Result<Topics, FileIssue> {
@@ -407,6 +501,7 @@ fn topics(file: &Path, joints: &JointsToml, tags: &TagsToml, conditions: Conditi
         camera_info: tags.camera_info.clone(),
         image_period_s: FileIssue::check_range(file, "tags.image_period_s", tags.image_period_s, 0.0..=3600.0)?,
         base_from_attitude: base_from_attitude(file, &conditions)?,
+        further: Vec::new(),
         conditions: Box::new(conditions),
     };
     if found.joints == found.tags {

@@ -26,7 +26,7 @@ pub use external::{read_external, read_external_images};
 pub use images::{ImageDetector, ImageProblem, RecordedImage, TagCorners, read_camera_info};
 pub use joints::Reading;
 pub use map::{
-    ChildFrame, ConditionKind, ConditionTopics, Direction, InputMap, JointUnit, NotFinite, PoseColumns,
+    ChildFrame, ConditionKind, ConditionTopics, Direction, FurtherTopic, InputMap, JointUnit, NotFinite, PoseColumns,
     RotationColumns, RotationForm, SeenColumns, Source, TableFormat, TableLayout, TagUse, TimeColumn, Topics,
     WhileMoving, parse_input_map, read_input_map,
 };

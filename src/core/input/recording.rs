@@ -16,8 +16,10 @@ pub struct ExternalRecording {
     pub path: PathBuf,
     /// In the order of their stamps.
     pub readings: Vec<Reading>,
-    /// In the order of their stamps; each has a tag.
+    /// What the first camera saw, in the order of their stamps; each has a tag.
     pub frames: Vec<TagFrame>,
+    /// The same of each further camera of the robot; empty where the input map does not name it.
+    pub further_frames: Vec<Vec<TagFrame>>,
     /// Readings of slow sensors, in the order of the file.
     pub conditions: Vec<ConditionReading>,
     /// Attitudes of what carries the arm, in the order of their stamps.

@@ -7,7 +7,7 @@ use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 
 use super::error::{BadPlace, InputError};
 use super::images::{ImageDetector, ImageProblem, RecordedImage};
-use super::map::{InputMap, NotFinite, QUATERNION_LENGTH_TOLERANCE, TagUse, Topics, without_slash};
+use super::map::{FurtherTopic, InputMap, NotFinite, QUATERNION_LENGTH_TOLERANCE, TagUse, Topics, without_slash};
 use super::stamp::stamp_or_log_time;
 use crate::log::ros::{AprilTagDetectionArray, TfMessage, TransformStamped};
 use crate::log::{RawMessage, StampOrder, decode};
@@ -68,20 +68,18 @@ pub(super) const MIN_DISTANCE_M: f64 = 1e-6;
 /// Names of frames that an error lists.
 const MAX_LISTED: usize = 20;
 
-/// What an image's tags need.
-pub(super) struct ImageSettings<'a> {
-    /// `None` where nobody looks at images.
-    pub detector: Option<&'a mut dyn ImageDetector>,
-    /// Least time between two that are looked at.
-    pub period_s: f64,
-}
-
-/// Reads the messages of one topic.
+/// Reads what one camera saw.
 pub(super) struct TagReader<'a> {
     file: &'a str,
     map: &'a InputMap,
+    pub topic: &'a str,
+    /// Number of the robot's camera.
+    pub camera: usize,
     camera_frame: Option<&'a str>,
-    images: ImageSettings<'a>,
+    /// Least time between two images that are looked at.
+    image_period_s: f64,
+    /// What is looked for in images.
+    family: TagFamily,
     last_image: Option<Stamp>,
     frames: BTreeMap<Stamp, TagFrame>,
     pub order: StampOrder,
@@ -92,17 +90,16 @@ pub(super) struct TagReader<'a> {
 }
 
 impl<'a> TagReader<'a> {
-    pub fn new(
-        file: &'a str,
-        map: &'a InputMap,
-        topics: &'a Topics,
-        detector: Option<&'a mut dyn ImageDetector>,
-    ) -> Self {
+    /// Of the first camera.
+    pub fn new(file: &'a str, map: &'a InputMap, topics: &'a Topics) -> Self {
         Self {
             file,
             map,
+            topic: &topics.tags,
+            camera: 0,
             camera_frame: topics.camera_frame.as_deref(),
-            images: ImageSettings { detector, period_s: topics.image_period_s },
+            image_period_s: topics.image_period_s,
+            family: TagFamily::default(),
             last_image: None,
             frames: BTreeMap::new(),
             order: StampOrder::default(),
@@ -112,7 +109,17 @@ impl<'a> TagReader<'a> {
         }
     }
 
-    pub fn take(&mut self, raw: &RawMessage<'_>, digest: [u8; 32]) -> Result<(), InputError> {
+    /// Of a further camera, whose number is `camera`.
+    pub fn of_further(self, camera: usize, further: &'a FurtherTopic) -> Self {
+        Self { camera, topic: &further.topic, camera_frame: further.camera_frame.as_deref(), ..self }
+    }
+
+    pub fn take(
+        &mut self,
+        raw: &RawMessage<'_>,
+        digest: [u8; 32],
+        detector: &mut Option<&mut dyn ImageDetector>,
+    ) -> Result<(), InputError> {
         self.messages += 1;
         let place = BadPlace::Message { topic: raw.topic().to_owned(), message: self.messages };
         let undecodable = |error| InputError::Undecodable { file: self.file.to_owned(), place: place.clone(), error };
@@ -123,7 +130,7 @@ impl<'a> TagReader<'a> {
             }
         } else if raw.schema_name().ends_with("Image") {
             let image = RecordedImage::of(raw).map_err(undecodable)?;
-            self.image(&image, raw.log_time(), &place, digest)?;
+            self.image(&image, raw.log_time(), (&place, digest), detector)?;
         } else {
             let message: AprilTagDetectionArray = decode(raw.data).map_err(undecodable)?;
             self.detections(&message, raw.log_time(), &place, digest)?;
@@ -224,8 +231,8 @@ impl<'a> TagReader<'a> {
         &mut self,
         image: &RecordedImage,
         log_time: Stamp,
-        place: &BadPlace,
-        digest: [u8; 32],
+        (place, digest): (&BadPlace, [u8; 32]),
+        detector: &mut Option<&mut dyn ImageDetector>,
     ) -> Result<(), InputError> {
         let header = match image {
             RecordedImage::Raw(image) => &image.header,
@@ -238,16 +245,17 @@ impl<'a> TagReader<'a> {
         }
         let stamp = stamp_or_log_time(header.stamp, log_time);
         self.order.add_of(self.messages, stamp);
-        if self.last_image.is_some_and(|last| stamp.since_s(last).abs() < self.images.period_s) {
+        if self.last_image.is_some_and(|last| stamp.since_s(last).abs() < self.image_period_s) {
             return Ok(());
         }
         self.last_image = Some(stamp);
         let problem =
             |problem: String| Err(InputError::Row { file: self.file.to_owned(), place: place.clone(), problem });
-        let Some(detector) = &mut self.images.detector else {
+        let Some(detector) = detector else {
             return problem("is an image; this armcal is built without its detector (feature `sim`)".to_owned());
         };
-        match detector.detect(image) {
+        self.family = detector.family();
+        match detector.detect(self.camera, image) {
             Ok(tags) => tags
                 .into_iter()
                 .for_each(|(id, corners)| self.add(stamp, digest, Some(id), RawMeasurement::Corners(corners))),
@@ -326,8 +334,7 @@ impl<'a> TagReader<'a> {
             (true, false) => left_out.join(", "),
             (true, true) if self.last_image.is_some() => format!(
                 "no tag of family {} was found in its {} images; `family` in [tags] of the input map names another",
-                self.images.detector.as_ref().map_or_else(TagFamily::default, |detector| detector.family()),
-                self.messages
+                self.family, self.messages
             ),
             (true, true) => format!("its {} messages are empty", self.messages),
         }

@@ -1,10 +1,11 @@
-//! `[camera]` of robot.toml.
+//! `[camera]` and `[[further_camera]]` of robot.toml.
 
+use std::ops::RangeInclusive;
 use std::path::Path;
 
 use serde::Deserialize;
 
-use super::error::{FileIssue, RobotError};
+use super::error::FileIssue;
 use super::part::check_place;
 use crate::kinematics::Attachment;
 use crate::optics::{CameraModel, Fisheye, FlatPort, Radtan};
@@ -49,7 +50,7 @@ impl Default for LensPriors {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct CameraFile {
-    name: String,
+    pub(super) name: String,
     pub(super) link: String,
     position_m: Option<[f64; 3]>,
     quaternion_wxyz: Option<[f64; 4]>,
@@ -83,25 +84,43 @@ struct LensFile<'a> {
     max_view_angle_rad: Option<f64>,
 }
 
+/// The table of a camera: its file and its name there.
+#[derive(Clone, Copy)]
+pub(super) struct CameraTable<'a> {
+    pub file: &'a Path,
+    /// `camera`, or `further_camera` with its number.
+    pub name: &'a str,
+}
+
+impl CameraTable<'_> {
+    fn issue(&self, key: &str, problem: impl Into<String>) -> FileIssue {
+        FileIssue::new(self.file, format!("{}.{key}", self.name), problem)
+    }
+
+    fn check(&self, key: &str, value: f64, range: RangeInclusive<f64>) -> Result<f64, FileIssue> {
+        FileIssue::check_range(self.file, &format!("{}.{key}", self.name), value, range)
+    }
+}
+
 impl CameraFile {
     /// The mount on a link whose frame is at `link`: the link's own frame, but where the file says more.
     ///
     /// # Errors
     /// [`FileIssue`] naming the key.
-    fn mount(&self, file: &Path, link: Attachment) -> Result<Attachment, FileIssue> {
+    fn mount(&self, table: CameraTable<'_>, link: Attachment) -> Result<Attachment, FileIssue> {
         if self.position_m.is_none() && self.quaternion_wxyz.is_none() {
             return Ok(link);
         }
         let position_m = self.position_m.unwrap_or_default();
-        check_place(file, "camera.position_m", &position_m)?;
+        check_place(table.file, &format!("{}.position_m", table.name), &position_m)?;
         let quaternion_wxyz = self.quaternion_wxyz.unwrap_or([1.0, 0.0, 0.0, 0.0]);
         let place: Pose<Link, Camera> = Pose::from_position_quaternion_wxyz(position_m, quaternion_wxyz)
-            .ok_or_else(|| FileIssue::new(file, "camera.quaternion_wxyz", "must be finite, not zero"))?;
+            .ok_or_else(|| table.issue("quaternion_wxyz", "must be finite, not zero"))?;
         Ok(Attachment { link_from_frame: link.link_from_frame * place.isometry(), ..link })
     }
 
     /// `None` where none of the keys of a lens is there.
-    fn lens(&self, file: &Path) -> Result<Option<LensFile<'_>>, FileIssue> {
+    fn lens(&self, table: CameraTable<'_>) -> Result<Option<LensFile<'_>>, FileIssue> {
         let given = (&self.model, self.resolution_px, self.focal_px, self.center_px, &self.distortion);
         if let (Some(model), Some(resolution_px), Some(focal_px), Some(center_px), Some(distortion)) = given {
             let max_view_angle_rad = self.max_view_angle_rad;
@@ -113,7 +132,7 @@ impl CameraFile {
         }
         let missing = LENS_KEYS.iter().zip(has).filter(|(_, has)| !has).map(|(key, _)| *key);
         let problem = format!("has no {}: a lens needs them all", missing.collect::<Vec<_>>().join(", "));
-        Err(FileIssue::new(file, "[camera]", problem))
+        Err(FileIssue::new(table.file, format!("[{}]", table.name), problem))
     }
 }
 
@@ -138,8 +157,8 @@ fn water() -> f64 {
 }
 
 impl PortFile {
-    fn check(self, file: &Path) -> Result<FlatPort, FileIssue> {
-        let check = |key: &str, value, range| FileIssue::check_range(file, &format!("camera.port.{key}"), value, range);
+    fn check(self, table: CameraTable<'_>) -> Result<FlatPort, FileIssue> {
+        let check = |key: &str, value, range| table.check(&format!("port.{key}"), value, range);
         Ok(FlatPort {
             distance_m: check("distance_m", self.distance_m, 0.0..=0.5)?,
             thickness_m: check("thickness_m", self.thickness_m, 0.0..=0.1)?,
@@ -149,9 +168,9 @@ impl PortFile {
     }
 }
 
-/// The lens of `[camera]`, without the window.
-fn lens(file: &Path, raw: &LensFile<'_>) -> Result<CameraModel, FileIssue> {
-    let issue = |key: &str, problem: String| FileIssue::new(file, format!("camera.{key}"), problem);
+/// The lens of a camera, without the window.
+fn lens(table: CameraTable<'_>, raw: &LensFile<'_>) -> Result<CameraModel, FileIssue> {
+    let issue = |key: &str, problem: String| table.issue(key, problem);
     let (focal, center, resolution) = (raw.focal_px, raw.center_px, raw.resolution_px);
     match (raw.model, raw.distortion) {
         ("equidistant", &[k1, k2, k3, k4]) => {
@@ -161,7 +180,7 @@ fn lens(file: &Path, raw: &LensFile<'_>) -> Result<CameraModel, FileIssue> {
                 center_px: center,
                 distortion: [k1, k2, k3, k4],
                 resolution_px: resolution,
-                max_view_angle_rad: FileIssue::check_range(file, "camera.max_view_angle_rad", angle, 0.1..=3.0)?,
+                max_view_angle_rad: table.check("max_view_angle_rad", angle, 0.1..=3.0)?,
             };
             let problem =
                 "the projected radius does not grow up to max_view_angle_rad; lower the angle or correct distortion";
@@ -187,10 +206,14 @@ fn lens(file: &Path, raw: &LensFile<'_>) -> Result<CameraModel, FileIssue> {
     }
 }
 
-pub(super) fn check_camera(file: &Path, raw: &CameraFile, link: Attachment) -> Result<CameraSpec, RobotError> {
-    let check = |key: &str, value: f64, range| FileIssue::check_range(file, &format!("camera.{key}"), value, range);
-    let port = raw.port.map(|port| port.check(file)).transpose()?;
-    let lens = match raw.lens(file)? {
+pub(super) fn check_camera(
+    table: CameraTable<'_>,
+    raw: &CameraFile,
+    link: Attachment,
+) -> Result<CameraSpec, FileIssue> {
+    let check = |key: &str, value: f64, range| table.check(key, value, range);
+    let port = raw.port.map(|port| port.check(table)).transpose()?;
+    let lens = match raw.lens(table)? {
         None => CameraModel::unknown(),
         Some(given) => {
             for k in 0..2 {
@@ -201,7 +224,7 @@ pub(super) fn check_camera(file: &Path, raw: &CameraFile, link: Attachment) -> R
             for value in given.distortion {
                 check("distortion", *value, -10.0..=10.0)?;
             }
-            CameraModel { port, ..lens(file, &given)? }
+            CameraModel { port, ..lens(table, &given)? }
         }
     };
     let usual = LensPriors::default();
@@ -212,7 +235,7 @@ pub(super) fn check_camera(file: &Path, raw: &CameraFile, link: Attachment) -> R
     };
     Ok(CameraSpec {
         name: raw.name.clone(),
-        mount: raw.mount(file, link)?,
+        mount: raw.mount(table, link)?,
         lens,
         lens_priors,
         corner_std_px: check("corner_std_px", raw.corner_std_px.unwrap_or(CORNER_STD_PX), 1e-3..=100.0)?,

@@ -74,6 +74,10 @@ pub(super) fn check_complete(
         let id = tag.get("id").map_or_else(|| format!("number {}", n + 1), Value::to_string);
         missing.extend(missing_in(&format!("[[tag]] {id}: "), tag, &TAG_KEYS));
     }
+    for (n, camera) in tables(robot, "further_camera").iter().enumerate() {
+        let name = camera.get("name").map_or_else(|| format!("number {}", n + 1), Value::to_string);
+        missing.extend(missing_in(&format!("[[further_camera]] {name}: "), camera, &CAMERA_KEYS));
+    }
     if missing.is_empty() {
         return Ok(());
     }

@@ -8,10 +8,11 @@ use serde::Deserialize;
 
 use super::allowed_pairs::AllowedPairs;
 use super::body::LinkBody;
-use super::camera::{CameraFile, CameraSpec, check_camera};
+use super::camera::{CameraFile, CameraSpec, CameraTable, check_camera};
 use super::completeness::check_complete;
 use super::drive::{DriveSpec, HydraulicsFile, MotionSpec, usual_displacement};
 use super::error::{FileIssue, RobotError, parse_toml, read_in};
+use super::further_camera::check_further_cameras;
 use super::geometry::GeometryPriors;
 use super::gripper::GripperFile;
 use super::gripper_tag::{GripperTag, GripperTagFile};
@@ -54,6 +55,8 @@ struct RobotFile {
     #[serde(default)]
     geometry: GeometryPriors,
     camera: CameraFile,
+    #[serde(default)]
+    further_camera: Vec<CameraFile>,
     #[serde(default)]
     tag: Vec<TagFile>,
 }
@@ -190,8 +193,7 @@ fn robot_of(folder: &Path, raw: RobotFile, urdf: UrdfModel, meshes: Meshes) -> R
     let arm = UrdfChain { urdf: &urdf, base_link: &raw.base_link, chain: &chain };
     let is_read = raw.collision_meshes == CollisionMeshes::Hull && meshes == Meshes::Read;
     let mut bodies = arm.bodies(jaws, is_read.then(|| mesh_folders(&urdf, folder)).as_ref())?;
-    let camera_mount = arm.attachment(&raw.camera.link)?;
-    let camera = check_camera(&file, &raw.camera, camera_mount)?;
+    let (camera, further_cameras) = check_cameras(&file, &raw, &arm)?;
     let (links, planning_issues) = (arm.attachments(), planning_issues(&file, &raw, &camera, &arm));
     let allowed_pairs = AllowedPairs::check(&file, raw.allowed_pairs, &bodies)?;
     let sensors = check_sensors(&file, &raw.joint_sensor, &chain)?;
@@ -239,11 +241,23 @@ fn robot_of(folder: &Path, raw: RobotFile, urdf: UrdfModel, meshes: Meshes) -> R
         drive,
         geometry,
         camera,
+        further_cameras,
         tags,
         tag_frame: tag_frame.unwrap_or_else(Attachment::base),
         tag_family: family.or(gripper_tag.map(|tag| tag.family)).unwrap_or_default(),
         links,
     })
+}
+
+fn check_cameras(
+    file: &Path,
+    raw: &RobotFile,
+    arm: &UrdfChain<'_>,
+) -> Result<(CameraSpec, Vec<CameraSpec>), RobotError> {
+    let mount = arm.attachment(&raw.camera.link)?;
+    let camera = check_camera(CameraTable { file, name: "camera" }, &raw.camera, mount)?;
+    let further = check_further_cameras(file, &raw.further_camera, arm, &camera)?;
+    Ok((camera, further))
 }
 
 /// Checks the tag on the gripper beside the others. Those that the arm carries are for a camera that stands still, and

@@ -16,6 +16,7 @@ mod error;
 mod failed;
 mod file;
 mod frame_tree;
+mod further_camera;
 mod geometry;
 mod gripper;
 mod gripper_tag;
@@ -47,6 +48,7 @@ pub use error::{FileIssue, RobotError, from_table, parse_toml, read_table, read_
 pub use failed::{FailedJoint, FailedKind};
 pub use file::{load, load_attached, load_without_pairs};
 pub use frame_tree::{FixedFrame, FrameTree, MovingFrame};
+pub use further_camera::MAX_FURTHER_CAMERAS;
 pub use geometry::GeometryPriors;
 pub use gripper::{GripperSpec, Jaw};
 pub use gripper_tag::GripperTag;

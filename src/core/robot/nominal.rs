@@ -59,6 +59,9 @@ pub struct Robot {
     pub gripper_tag: Option<GripperTag>,
     /// Lens and mount of the wrist camera.
     pub camera: CameraSpec,
+    /// Cameras beside it, which see the same tags past no joint that it does not. Recordings may have them; the arm is
+    /// planned for by the first alone.
+    pub further_cameras: Vec<CameraSpec>,
     /// Tags by survey, with those whose pose is unknown; without the tag on the gripper.
     pub tags: Vec<SurveyedTag>,
     /// The frame that the tags' poses are in: the base's, or one that the arm moves before a camera that stands still.
@@ -110,7 +113,27 @@ impl Robot {
     /// How many joints, from the base on, move camera and tags against each other.
     #[must_use]
     pub fn n_seen_joints(&self) -> usize {
-        self.camera.mount.n_joints.max(self.tag_frame.n_joints)
+        self.n_joints_seen_by(&self.camera)
+    }
+
+    /// All cameras, the first one first.
+    pub fn cameras(&self) -> impl Iterator<Item = &CameraSpec> {
+        std::iter::once(&self.camera).chain(&self.further_cameras)
+    }
+
+    /// The camera of that number, the first's being 0.
+    ///
+    /// # Panics
+    /// Where there is none of that number.
+    #[must_use]
+    pub fn camera_at(&self, number: usize) -> &CameraSpec {
+        number.checked_sub(1).map_or(&self.camera, |further| &self.further_cameras[further])
+    }
+
+    /// How many joints, from the base on, move a camera and the tags against each other.
+    #[must_use]
+    pub fn n_joints_seen_by(&self, camera: &CameraSpec) -> usize {
+        camera.mount.n_joints.max(self.tag_frame.n_joints)
     }
 
     /// The frame of the tags in the base's, at these angles by the sensors. Tags beside the arm do not bend with its
@@ -129,10 +152,16 @@ impl Robot {
     /// The camera in the frame of the tags, at these angles by the sensors.
     #[must_use]
     pub fn tags_from_camera(&self, angles: &JointAngles) -> Isometry3<f64> {
+        self.tags_from(&self.camera, angles)
+    }
+
+    /// The same of any of its cameras.
+    #[must_use]
+    pub fn tags_from(&self, camera: &CameraSpec, angles: &JointAngles) -> Isometry3<f64> {
         if !self.is_watched() {
-            return self.chain.frame(angles, &self.camera.mount);
+            return self.chain.frame(angles, &camera.mount);
         }
-        self.chain.link_poses(angles).in_frame(&self.tag_frame).frame(&self.camera.mount)
+        self.chain.link_poses(angles).in_frame(&self.tag_frame).frame(&camera.mount)
     }
 
     /// The link that carries the tags before a camera that stands still; `None` for tags beside the arm.
@@ -276,6 +305,18 @@ impl Robot {
     /// [`FileIssue`] naming the keys to add.
     pub fn require_lens(&self) -> Result<(), FileIssue> {
         if self.camera.lens.is_known() { Ok(()) } else { Err(lens_issue(&self.folder.join("robot.toml"))) }
+    }
+
+    /// The same of the further camera of that name, if there is one.
+    ///
+    /// # Errors
+    /// As [`Self::require_lens`].
+    pub fn require_further_lens(&self, name: &str) -> Result<(), FileIssue> {
+        let Some(_) = self.further_cameras.iter().find(|camera| camera.name == name && !camera.lens.is_known()) else {
+            return Ok(());
+        };
+        let issue = lens_issue(&self.folder.join("robot.toml"));
+        Err(FileIssue { key: format!("[[further_camera]] `{name}` lens"), ..issue })
     }
 
     /// The same arm with these joints declared to have failed. A later declaration of a joint replaces an earlier one.

@@ -2,7 +2,7 @@
 
 use maud::{Markup, html as markup};
 
-use armcal_belief::calib::{Calibration, CameraMount, Finding, LinkResult, ModelTable, SagTable};
+use armcal_belief::calib::{Calibration, CameraMount, Finding, FurtherCamera, LinkResult, ModelTable, SagTable};
 use armcal_core::units::Unit;
 
 pub(super) fn section(calibration: &Calibration) -> Markup {
@@ -10,6 +10,7 @@ pub(super) fn section(calibration: &Calibration) -> Markup {
         @if !calibration.findings.is_empty() { (findings(&calibration.findings)) }
         h2 { "Camera and geometry" }
         @if let Some(mount) = &calibration.camera_mount { (camera_mount(mount)) }
+        @for camera in &calibration.further_camera { (further_camera(camera)) }
         @if !calibration.link.is_empty() { (links(&calibration.link)) }
         @if let Some(sag) = &calibration.sag { (bending(sag)) }
         @if let Some(model) = &calibration.model { (model_lines(model)) }
@@ -39,12 +40,33 @@ fn triple(values: [f64; 3], scale: f64, digits: usize) -> String {
     values.map(|value| format!("{:.digits$}", value * scale)).join(", ")
 }
 
+/// Where a camera is on its link, with one sigma.
+fn place_rows(
+    position_m: [f64; 3],
+    position_std_m: [f64; 3],
+    rotation_std_rad: [f64; 3],
+) -> [(&'static str, String); 3] {
+    [
+        ("position on its link, mm", triple(position_m, 1e3, 2)),
+        ("one sigma, mm", triple(position_std_m, 1e3, 2)),
+        ("rotation, one sigma, deg", triple(rotation_std_rad, 1f64.to_degrees(), 3)),
+    ]
+}
+
+fn further_camera(camera: &FurtherCamera) -> Markup {
+    let FurtherCamera { name, position_m, position_std_m, rotation_std_rad, views, .. } = camera;
+    markup! {
+        table.notes {
+            tr { th scope="row" { (name) ", views" } td { (views) } }
+            @for (what, value) in place_rows(*position_m, *position_std_m, *rotation_std_rad) {
+                tr { th scope="row" { (name) ", " (what) } td { (value) } }
+            }
+        }
+    }
+}
+
 fn camera_mount(mount: &CameraMount) -> Markup {
-    let rows = [
-        ("position on its link, mm", triple(mount.position_m, 1e3, 2)),
-        ("one sigma, mm", triple(mount.position_std_m, 1e3, 2)),
-        ("rotation, one sigma, deg", triple(mount.rotation_std_rad, 1f64.to_degrees(), 3)),
-    ];
+    let rows = place_rows(mount.position_m, mount.position_std_m, mount.rotation_std_rad);
     markup! {
         table.notes {
             @if let Some(why) = &mount.left_out { tr { th { "by the drawing" } td { (why) } } }

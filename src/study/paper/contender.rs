@@ -98,6 +98,7 @@ fn bundle(draw: &Draw, guess: &JointParameters) -> Solution {
         n_links: 0,
         n_compliant: 0,
         mount: false,
+        further_mounts: Vec::new(),
         lens: false,
         tags: false,
         gripper_tag: false,

@@ -6,7 +6,7 @@
 
 use crate::calib::bundle::estimate::{Estimate, estimate};
 use crate::calib::bundle::input::{BundleInput, HyperparameterMode};
-use crate::calib::bundle::model::{Hyperparameters, Model, reference};
+use crate::calib::bundle::model::{Hyperparameters, Model, further_mounts, is_loose, reference};
 use crate::calib::parameters::JointParameters;
 use crate::calib::views::view::View;
 use armcal_core::robot::Robot;
@@ -25,7 +25,7 @@ const SETTLED: f64 = 0.8;
 impl Baseline {
     /// `None` where the views determine nothing.
     pub(crate) fn new(robot: &Robot, views: &[View]) -> Option<Self> {
-        let (mut baseline, usual) = (Self::start(robot), Hyperparameters::datasheet(robot));
+        let (mut baseline, usual) = (Self::start(robot, views), Hyperparameters::datasheet(robot));
         for _ in 0..MAX_PASSES {
             let mut next = baseline.estimate(robot, views, HyperparameterMode::Fitted)?.scales().clone();
             for (std_rad, usual_rad) in next.joint_std_rad.iter_mut().zip(&usual.joint_std_rad) {
@@ -42,12 +42,13 @@ impl Baseline {
     }
 
     /// Before any view.
-    fn start(robot: &Robot) -> Self {
+    fn start(robot: &Robot, views: &[View]) -> Self {
         let model = Model {
             joints: vec![Vec::new(); robot.n_joints()],
             n_links: 0,
             n_compliant: 0,
-            mount: robot.camera.mount_std_m > 0.0 || robot.camera.mount_std_rad > 0.0,
+            mount: is_loose(&robot.camera),
+            further_mounts: further_mounts(robot, views),
             lens: false,
             tags: true,
             gripper_tag: false,

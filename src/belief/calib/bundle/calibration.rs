@@ -14,7 +14,7 @@ use crate::calib::bundle::model_selection::{OptionalTerm, Selection};
 use crate::calib::bundle::outliers::Outlier;
 use crate::calib::bundle::setup::{BundleSetup, Clocks, declared};
 use crate::calib::bundle::tables::{
-    add_clock, camera_mount_table, covariance_with_mount, map_table, model_table, prior_table,
+    add_clock, camera_mount_table, covariance_with_mount, further_camera_tables, map_table, model_table, prior_table,
 };
 use crate::calib::bundle::tags::freed::MovedTags;
 use crate::calib::bundle::touch_term::TouchUpdate;
@@ -372,6 +372,7 @@ impl<'a> BundleCalibration<'a> {
         Calibration {
             unobservable: grouped_names(&robot, &unobservable(datasheet, setup, estimate)),
             camera_mount: Some(camera_mount_table(datasheet, estimate, &diagnosis.views)),
+            further_camera: further_camera_tables(datasheet, estimate, &diagnosis.views),
             model: Some(model),
             map: self.map.clone().map(|map| map_table(map, datasheet, estimate)),
             outliers: estimate.outliers.iter().map(|outlier| named(outlier, &diagnosis.views)).collect(),

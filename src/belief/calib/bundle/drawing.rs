@@ -1,6 +1,6 @@
 //! Is the drawing right? Other explanations of the same views, compared by their evidence.
 //!
-//! Where the score test says that links, base or mount would explain the data better than joint sensors do, where tags
+//! Where the score test says that links, base or a mount would explain the data better than joint sensors do, where tags
 //! are not where they should be or do not fit at all, the views are estimated again under each alternative: link
 //! geometry with columns of its own, an arm that bends under its weight (`sag_start`), a lens with columns, tags of
 //! another size, two tags exchanged, tags that were moved together. The one of most evidence stays if it brings
@@ -15,7 +15,7 @@
 //! Alternatives reject other observations. For the comparison, a rejected one costs what it is rejected at (a truncated
 //! square), so that explaining it counts.
 
-use nalgebra::{Cholesky, DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector, Matrix6};
 
 use sag_start::SagStart;
 
@@ -23,11 +23,12 @@ use crate::calib::bundle::estimate::{Estimate, estimate};
 use crate::calib::bundle::evidence::SCALE_BOUNDS;
 use crate::calib::bundle::input::BundleInput;
 use crate::calib::bundle::model_selection::log_evidence_of_all;
-use crate::calib::bundle::score_test::GeometryElement;
+use crate::calib::bundle::schur::Group;
+use crate::calib::bundle::score_test::{GeometryElement, Score};
 use crate::calib::bundle::tags::group::moved_group;
 use crate::calib::bundle::tags::identity::{TagFault, common_size_ratio};
 use armcal_core::joints::MAX_JOINTS;
-use armcal_core::robot::Robot;
+use armcal_core::robot::{MAX_FURTHER_CAMERAS, Robot};
 
 mod sag_start;
 
@@ -47,6 +48,8 @@ pub(crate) struct LinkStart {
     /// Over robot.toml's: shift, turn.
     multiples: [[f64; 2]; MAX_JOINTS],
     mount_scale: [f64; 2],
+    /// The same of each further camera.
+    further_mount_scale: [[f64; 2]; MAX_FURTHER_CAMERAS],
 }
 
 /// What an alternative must bring. Of 60 good arms one reached 5 (docs/theory/verdict.md).
@@ -78,6 +81,7 @@ impl Drawing {
             *turn = by_turn * priors.link_rotation_std_rad;
         }
         input.scales.mount_scale = start.mount_scale;
+        input.scales.further_mount_scale = start.further_mount_scale;
     }
 
     /// The drawing of most evidence, if another than this explains the views much better, and by more than
@@ -188,8 +192,8 @@ impl Estimate<'_> {
         let mount = [robot.camera.mount_std_m, robot.camera.mount_std_rad];
         let of_joints = (0..n_links).flat_map(|joint| [0, 1].map(|kind| (GeometryElement::Joint(joint), kind)));
         let of_mount = self.problem.layout.mount.iter().flat_map(|_| [0, 1].map(|kind| (GeometryElement::Mount, kind)));
-        let mut best = (0.0, None, 1.0);
-        let mut consider = |columns: &[(usize, f64)], element| {
+        let mut best = (0.0, Loosened::AllLinks, 1.0);
+        let mut consider = |score: &Score, columns: &[(usize, f64)], element| {
             for multiple in MULTIPLES {
                 let gain = gain_nats(&score.score, &score.information, columns, multiple);
                 if gain > best.0 {
@@ -203,19 +207,50 @@ impl Estimate<'_> {
                 GeometryElement::Joint(joint) => (6 * joint + 3 * kind, priors[kind]),
                 GeometryElement::Mount => (6 * MAX_JOINTS + 3 * kind, mount[kind]),
             };
-            consider(&three(first, std).collect::<Vec<_>>(), Some((element, kind)));
+            consider(&score, &three(first, std).collect::<Vec<_>>(), Loosened::Element(element, kind));
+        }
+        for (further, camera) in robot.further_cameras.iter().enumerate() {
+            if self.problem.layout.mount_of(further + 1).is_none() {
+                continue;
+            }
+            let score = self.score_of(|group| by_mount_of(group, further + 1));
+            for (kind, std) in [camera.mount_std_m, camera.mount_std_rad].into_iter().enumerate() {
+                let columns: Vec<_> = three(3 * kind, std).collect();
+                consider(&score, &columns, Loosened::FurtherMount(further, kind));
+            }
         }
         let all = (0..n_links).flat_map(|joint| [0, 1].map(|kind| three(6 * joint + 3 * kind, priors[kind]))).flatten();
-        consider(&all.collect::<Vec<_>>(), None);
+        consider(&score, &all.collect::<Vec<_>>(), Loosened::AllLinks);
         let (gain, element, multiple) = best;
-        let mut start = LinkStart { n_links, multiples: [[1.0; 2]; MAX_JOINTS], mount_scale: [1.0; 2] };
+        let mut start = LinkStart {
+            n_links,
+            multiples: [[1.0; 2]; MAX_JOINTS],
+            mount_scale: [1.0; 2],
+            further_mount_scale: [[1.0; 2]; MAX_FURTHER_CAMERAS],
+        };
         match element {
-            Some((GeometryElement::Joint(joint), kind)) => start.multiples[joint][kind] = multiple,
-            Some((GeometryElement::Mount, kind)) => start.mount_scale[kind] = multiple,
-            None => start.multiples = [[multiple; 2]; MAX_JOINTS],
+            Loosened::Element(GeometryElement::Joint(joint), kind) => start.multiples[joint][kind] = multiple,
+            Loosened::Element(GeometryElement::Mount, kind) => start.mount_scale[kind] = multiple,
+            Loosened::FurtherMount(further, kind) => start.further_mount_scale[further][kind] = multiple,
+            Loosened::AllLinks => start.multiples = [[multiple; 2]; MAX_JOINTS],
         }
         (start, gain)
     }
+}
+
+/// What has wider priors than the drawing's at the start.
+#[derive(Clone, Copy)]
+enum Loosened {
+    /// Shift (0) or turn (1) of a joint's place or of the first camera's mount.
+    Element(GeometryElement, usize),
+    /// The same of a further camera, by its number among these.
+    FurtherMount(usize, usize),
+    AllLinks,
+}
+
+/// Twists of the camera of that number by its mount; of another none.
+fn by_mount_of(group: &Group<'_>, camera: usize) -> Matrix6<f64> {
+    if group.camera == camera { group.by_mount } else { Matrix6::zeros() }
 }
 
 /// What trial columns would bring under priors of `multiple` times their (column, std).

@@ -52,6 +52,8 @@ impl Estimate<'_> {
         } else {
             found.extend(self.mount_departures());
         }
+        // Their mounts are estimated in any case.
+        found.extend(self.further_mount_departures().filter(|departure| departure.weight() > NAMED_SIGMAS));
         found.sort_by(|a, b| b.weight().total_cmp(&a.weight()));
         // Where links were freed, the likeliest is named in any case.
         let n = found.iter().filter(|departure| departure.weight() > NAMED_SIGMAS).count();
@@ -100,16 +102,32 @@ impl Estimate<'_> {
     }
 
     fn mount_departures(&self) -> impl Iterator<Item = Departure> {
-        let camera = &self.problem.robot.camera;
+        let at = self.problem.layout.mount;
+        at.into_iter().flat_map(|at| self.departures_of_mount(0, at, "camera mount".to_owned()))
+    }
+
+    fn further_mount_departures(&self) -> impl Iterator<Item = Departure> {
+        let cameras = self.problem.robot.further_cameras.iter().zip(&self.problem.layout.further_mounts).enumerate();
+        cameras.filter_map(|(further, (camera, at))| Some((further + 1, camera, (*at)?))).flat_map(
+            |(number, camera, at)| {
+                let name = format!("mount of the camera {}", camera.name);
+                self.departures_of_mount(number, at, name)
+            },
+        )
+    }
+
+    /// Shift and turn of the mount of the camera of that number, whose columns begin at `at`.
+    fn departures_of_mount(&self, number: usize, at: usize, name: String) -> [Departure; 2] {
+        let camera = self.problem.robot.camera_at(number);
         let priors = [camera.mount_std_m, camera.mount_std_rad];
-        let off = log(&self.problem.prior.mount.inv_mul(&self.solved.state.mount));
-        let columns = self.problem.layout.mount.into_iter().flat_map(|at| [(at, 0), (at + 3, 1)]);
-        columns.map(move |(first, kind)| {
+        let drawn = number.checked_sub(1).map(|further| self.problem.prior.further_mounts[further].0);
+        let off = log(&drawn.unwrap_or(self.problem.prior.mount).inv_mul(self.solved.state.mount_of(number)));
+        [(at, 0), (at + 3, 1)].map(|(first, kind)| {
             let size = off.fixed_rows::<3>(3 * kind).into_owned();
             let covariance = self.covariance3(first);
             Departure {
                 kind: FindingKind::CameraMount,
-                name: "camera mount".to_owned(),
+                name: name.clone(),
                 unit: [FindingUnit::Metre, FindingUnit::Radian][kind],
                 sigmas: size.norm() / priors[kind].max(1e-9),
                 std: std_along(&covariance, &size),

@@ -277,6 +277,14 @@ impl Estimate<'_> {
         (self.solved.state.mount, covariance)
     }
 
+    /// The same of a further camera, by its number among these; `None` where it has no column.
+    #[must_use]
+    pub fn further_mount(&self, further: usize) -> Option<(Isometry3<f64>, Matrix6<f64>)> {
+        let at = self.problem.layout.further_mounts.get(further).copied().flatten()?;
+        let covariance = self.wide_covariance().fixed_view::<6, 6>(at, at).into_owned();
+        Some((self.solved.state.further_mounts[further], covariance))
+    }
+
     /// `base_from_tag` of each of the robot's tags, and its covariance (on the right); `None` for tags that were not
     /// seen.
     #[must_use]
@@ -291,6 +299,8 @@ impl Estimate<'_> {
     pub fn as_found(&self, robot: &Robot) -> Robot {
         let (mount, covariance) = self.mount();
         let mut found = self.parameters().with_links(robot.clone()).with_camera_at(mount, &covariance);
+        let mounts = self.solved.state.further_mounts.iter();
+        mounts.zip(&mut found.further_cameras).for_each(|(at, camera)| camera.mount.link_from_frame = *at);
         for (tag_idx, tag) in found.tags.iter_mut().enumerate() {
             let (pose, covariance) = self.tag(tag_idx);
             tag.base_from_tag = Pose::from_isometry(pose);

@@ -4,7 +4,7 @@
 //! are told by the data, and `s^2 = (sum x^2 + nu s0^2) / (gamma + nu)` (MacKay 1992, eq. 4.9), with nu
 //! pseudo-observations of the datasheet's s0. The noise: `(sum chi^2 + nu) / (N - gamma_all + nu)`.
 
-use nalgebra::{Cholesky, DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector, Vector6};
 
 use crate::calib::bundle::linearize::NormalEquations;
 use crate::calib::bundle::model::{Hyperparameters, SHAPE_LENGTH};
@@ -23,6 +23,8 @@ pub(crate) struct Posterior {
     pub covariance: DMatrix<f64>,
     /// Variances of each view's own parameters.
     pub own: Vec<[f64; N_VIEW_PARAMETERS]>,
+    /// The part of these that is left by the common ones.
+    pub by_common: Vec<[f64; N_VIEW_PARAMETERS]>,
 }
 
 /// What leaves an estimate as its covariance.
@@ -54,6 +56,7 @@ impl Posterior {
     pub(crate) fn of(problem: &BundleProblem<'_>, normal: &NormalEquations) -> Option<Self> {
         let factor = Cholesky::new(normal.matrix.clone())?;
         let mut own = vec![[0.0; N_VIEW_PARAMETERS]; problem.views.len()];
+        let mut by_common = own.clone();
         let mut groups = normal.eliminated.iter();
         for (view_idx, view) in problem.views.iter().enumerate() {
             for group in groups.by_ref().take(1 + usize::from(view.gripper.is_some())) {
@@ -63,11 +66,12 @@ impl Posterior {
                 let mut right = DMatrix::from_fn(problem.layout.n, used.len(), |k, row| by_columns[(used[row], k)]);
                 factor.l_dirty().solve_lower_triangular_mut(&mut right);
                 for (k, &row) in used.iter().enumerate() {
-                    own[view_idx][row] = group.inverse[(row, row)] + right.column(k).norm_squared();
+                    by_common[view_idx][row] = right.column(k).norm_squared();
+                    own[view_idx][row] = group.inverse[(row, row)] + by_common[view_idx][row];
                 }
             }
         }
-        Some(Self { covariance: factor.inverse(), own })
+        Some(Self { covariance: factor.inverse(), own, by_common })
     }
 }
 
@@ -83,6 +87,16 @@ impl Sums {
     fn add(&mut self, value: f64, variance: f64, std: f64) {
         self.squares += value * value;
         self.gamma += (1.0 - variance / (std * std)).clamp(0.0, 1.0);
+    }
+
+    /// Of an error of variance s^2 that n views share, each under a prior of n s^2. `left`: the shares of that which it
+    /// has after the views, all of it and what the common parameters leave open. With g = 1 - what its own view leaves
+    /// open, the estimate has the square `s^2 g (g + n (1 - g))` on average, less n times what the common parameters
+    /// take up; it counts once.
+    fn add_shared(&mut self, value: f64, [left, by_common]: [f64; 2], n: f64) {
+        let g = (1.0 - left + by_common).clamp(0.0, 1.0);
+        self.squares += value * value / n;
+        self.gamma += (g * (g + n * (1.0 - g)) - n * by_common).max(0.0) / n;
     }
 
     fn std(&self, nu: f64, first: f64, moment: ScaleMoment) -> f64 {
@@ -164,7 +178,13 @@ impl ScaleUpdate<'_, '_> {
                 if view.is_free[joint] || variance <= 0.0 {
                     continue;
                 }
-                sums.add(state.joint_error[view_idx][joint], variance, problem.joint_error_var(view, joint).sqrt());
+                let (value, var) = (state.joint_error[view_idx][joint], problem.joint_error_var(view, joint));
+                if view.n_cameras > 1.0 {
+                    let left = [variance, posterior.by_common[view_idx][joint]].map(|of| of / var);
+                    sums.add_shared(value, left, view.n_cameras);
+                } else {
+                    sums.add(value, variance, var.sqrt());
+                }
                 reading_var += view.reading_var[joint] + problem.jitter_rad(view, joint).powi(2);
                 n += 1.0;
             }
@@ -268,18 +288,34 @@ impl ScaleUpdate<'_, '_> {
             }
             next.link_std[k / 2][k % 2] = sums.std(NU_LINK, first.link_std[k / 2][k % 2], moment);
         }
-        if let (Some(at), false) = (layout.mount, layout.links.is_empty()) {
-            let off = log(&problem.prior.mount.inv_mul(&state.mount));
-            let unit = problem.prior.mount_std.map(BundleProblem::at_least);
-            for kind in 0..2 {
-                let (mut sums, scale) = (Sums::default(), problem.scales.mount_scale[kind]);
-                for row in 3 * kind..3 * kind + 3 {
-                    let unit = unit[row] / scale;
-                    sums.add(off[row] / unit, posterior.covariance[(at + row, at + row)] / (unit * unit), scale);
-                }
-                next.mount_scale[kind] = sums.std(NU_LINK, 1.0, moment);
-            }
+        if layout.links.is_empty() {
+            return;
         }
+        let prior = &problem.prior;
+        if let Some(at) = layout.mount {
+            let off = log(&prior.mount.inv_mul(&state.mount));
+            next.mount_scale = self.mount_scale((at, &prior.mount_std), &off, problem.scales.mount_scale);
+        }
+        for (further, (mean, std)) in prior.further_mounts.iter().enumerate() {
+            let Some(at) = layout.mount_of(further + 1) else { continue };
+            let (off, scale) =
+                (log(&mean.inv_mul(&state.further_mounts[further])), problem.scales.further_mount_scale[further]);
+            next.further_mount_scale[further] = self.mount_scale((at, std), &off, scale);
+        }
+    }
+
+    /// Of a mount whose columns begin at `at`, whose prior is `std`, and which is `off` its drawing: shift and turn.
+    fn mount_scale(&self, (at, std): (usize, &[f64; 6]), off: &Vector6<f64>, now: [f64; 2]) -> [f64; 2] {
+        let Self { posterior, .. } = *self;
+        let unit = std.map(BundleProblem::at_least);
+        [0, 1].map(|kind| {
+            let (mut sums, scale) = (Sums::default(), now[kind]);
+            for row in 3 * kind..3 * kind + 3 {
+                let unit = unit[row] / scale;
+                sums.add(off[row] / unit, posterior.covariance[(at + row, at + row)] / (unit * unit), scale);
+            }
+            sums.std(NU_LINK, 1.0, self.target.moment)
+        })
     }
 
     /// Joints share a size of their compliances; the base has its own.
@@ -407,6 +443,8 @@ pub(crate) fn determined(problem: &BundleProblem<'_>, posterior: &Posterior) -> 
     gamma -= posterior.covariance.view((0, 0), (n, n)).component_mul(&problem.prior.joint_info).sum();
     let mut poses = vec![(mount, problem.prior.mount_std), (layout.gripper_tag, problem.prior.gripper_tag_std)];
     poses.extend(layout.tags.iter().copied().zip(problem.prior.tags_std.iter().copied()));
+    let further = problem.prior.further_mounts.iter().map(|(_, std)| *std);
+    poses.extend(layout.further_mounts.iter().copied().zip(further));
     for (at, std) in poses.into_iter().filter_map(|(at, std)| Some((at?, std))) {
         gamma -= (0..6).map(|k| prior_share(at + k, std[k])).sum::<f64>();
     }
@@ -460,6 +498,7 @@ pub(crate) fn change(a: &Hyperparameters, b: &Hyperparameters) -> f64 {
         all.extend(s.link_std.iter().flatten());
         all.extend(s.compliance_std);
         all.extend(s.mount_scale);
+        all.extend(s.further_mount_scale.iter().flatten());
         all.extend(s.camera_error_std.into_iter().flatten());
         all
     };

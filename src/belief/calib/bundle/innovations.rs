@@ -115,6 +115,7 @@ impl Estimate<'_> {
         (prior.mount_std, prior.gripper_tag_std) = ([f64::INFINITY; 6], [f64::INFINITY; 6]);
         (prior.time_std_s, prior.lens_std) = (f64::INFINITY, [f64::INFINITY; 8]);
         prior.tags_std.fill([f64::INFINITY; 6]);
+        prior.further_mounts.iter_mut().for_each(|(_, std)| *std = [f64::INFINITY; 6]);
         let scales = self.problem.scales.clone();
         let mut problem = BundleProblem::new(&BundleInput { views, scales, ..input.clone() }, prior);
         problem.layout = self.problem.layout.clone();

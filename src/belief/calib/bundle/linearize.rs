@@ -216,9 +216,12 @@ impl NormalEquations {
             if problem.layout.lens.is_some() {
                 self.lens_infos.push(LensInformation::zeros());
             }
-            let by_lens = self.lens_infos.last_mut();
+            let camera = problem.views[group.view_idx].camera;
+            // A further camera's lens is as robot.toml has it.
+            let by_lens = self.lens_infos.last_mut().filter(|_| camera == 0);
+            let lens = problem.lens_of(camera, state);
             let mut info =
-                PoseInformation::of(&observation.data, &camera_from_tag, &state.lens, problem.scales.noise, by_lens)
+                PoseInformation::of(&observation.data, &camera_from_tag, lens, problem.scales.noise, by_lens)
                     .unwrap_or_else(|| PoseInformation::unseen(&observation.data));
             (self.chi2[at], self.corner_chi2[at]) = (info.chi2, info.corner_chi2);
             self.by_tag[at].1 = column;

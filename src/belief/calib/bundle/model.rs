@@ -4,7 +4,7 @@ use crate::calib::bundle::walk_modes::mode_std;
 use crate::calib::parameters::{Parameter, ParameterKind};
 use crate::calib::views::view::View;
 use armcal_core::joints::MAX_JOINTS;
-use armcal_core::robot::{JointSensorSpec, Robot};
+use armcal_core::robot::{CameraSpec, JointSensorSpec, MAX_FURTHER_CAMERAS, Robot};
 use armcal_core::sensor::{Conditions, N_SHAPE, shape_prior};
 use armcal_core::time::Stamp;
 
@@ -20,6 +20,8 @@ pub struct Model {
     pub n_compliant: usize,
     /// The camera's mount, about the drawing's.
     pub mount: bool,
+    /// The same of each further camera; those beyond its end have none.
+    pub further_mounts: Vec<bool>,
     /// Focal lengths, centre and distortion, about robot.toml's.
     pub lens: bool,
     /// The tags' poses, about the survey's.
@@ -61,6 +63,8 @@ pub struct Hyperparameters {
     pub tool_load_std_n: f64,
     /// Of the camera mount, over what robot.toml says of it: shift, turn.
     pub mount_scale: [f64; 2],
+    /// The same of each further camera.
+    pub further_mount_scale: [[f64; 2]; MAX_FURTHER_CAMERAS],
     /// Of the lens, over its prior's.
     pub lens_scale: f64,
     /// All measurements' standard deviations over what is stated for them.
@@ -118,6 +122,7 @@ impl Hyperparameters {
             ],
             tool_load_std_n: robot.geometry.tool_load_std_n,
             mount_scale: [1.0; 2],
+            further_mount_scale: [[1.0; 2]; MAX_FURTHER_CAMERAS],
             lens_scale: 1.0,
             noise: 1.0,
             position_std_m: 0.005,
@@ -189,7 +194,8 @@ pub fn model_for(robot: &Robot, views: &[View]) -> Model {
     let gripper_tag = views.iter().filter(|view| view.gripper_tag.is_some()).count() >= MIN_GRIPPER_VIEWS;
     let from_both_sides =
         |joint: usize| [-1.0, 1.0].iter().all(|side| views.iter().any(|v| v.approach[joint] == *side));
-    model_of(robot, &Scope { warmed, dived, gripper_tag, from_both_sides: &from_both_sides, time_offset: false })
+    let scope = Scope { warmed, dived, gripper_tag, from_both_sides: &from_both_sides, time_offset: false };
+    Model { further_mounts: further_mounts(robot, views), ..model_of(robot, &scope) }
 }
 
 /// What a recording can tell of.
@@ -203,6 +209,18 @@ pub(crate) struct Scope<'a> {
     pub from_both_sides: &'a dyn Fn(usize) -> bool,
     /// Images are taken while the arm moves.
     pub time_offset: bool,
+}
+
+/// By number, whether a further camera has views and a mount that is not exact.
+pub(crate) fn further_mounts(robot: &Robot, views: &[View]) -> Vec<bool> {
+    let has_views = |number: usize| views.iter().any(|view| view.camera == number && !view.tags.is_empty());
+    let further = robot.further_cameras.iter().enumerate();
+    further.map(|(at, camera)| is_loose(camera) && has_views(at + 1)).collect()
+}
+
+/// Whether the drawing leaves anything of a camera's mount open.
+pub(crate) fn is_loose(camera: &CameraSpec) -> bool {
+    camera.mount_std_m > 0.0 || camera.mount_std_rad > 0.0
 }
 
 /// Sensors before the camera, or before the tag on the gripper, with the mount and the tags.
@@ -230,7 +248,8 @@ pub(crate) fn model_of(robot: &Robot, scope: &Scope<'_>) -> Model {
         joints: (0..robot.n_joints()).map(joint).collect(),
         n_links: 0,
         n_compliant: 0,
-        mount: robot.camera.mount_std_m > 0.0 || robot.camera.mount_std_rad > 0.0,
+        mount: is_loose(&robot.camera),
+        further_mounts: Vec::new(),
         lens: false,
         tags: true,
         gripper_tag: scope.gripper_tag,

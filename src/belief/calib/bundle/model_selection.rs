@@ -141,10 +141,13 @@ pub(crate) fn log_evidence(problem: &BundleProblem<'_>, normal: &NormalEquations
         Cholesky::new(matrix.clone()).map(|f| 2.0 * f.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>())
     };
     let Some(of_normal) = log_det(&normal.matrix) else { return f64::NEG_INFINITY };
+    let further = problem.layout.further_mounts.iter().zip(&problem.prior.further_mounts);
+    let of_further_mounts: f64 = further.filter_map(|(at, (_, std))| at.map(|_| log_sum(std))).sum();
     let of_prior = log_det(&problem.prior.joint_info).unwrap_or(f64::NEG_INFINITY)
         - 2.0 * problem.layout.time.map_or(0.0, |_| problem.prior.time_std_s.ln())
         - 2.0 * problem.layout.lens.map_or(0.0, |_| log_sum(&problem.prior.lens_std))
-        - 2.0 * problem.layout.mount.map_or(0.0, |_| log_sum(&problem.prior.mount_std));
+        - 2.0 * problem.layout.mount.map_or(0.0, |_| log_sum(&problem.prior.mount_std))
+        - 2.0 * of_further_mounts;
     let of_views: f64 = normal.eliminated.iter().map(|own| own.log_ratio).sum();
     let log_noise = |data: &WeightedMeasurement| {
         let [position, rotation] = [problem.scales.position_std_m, problem.scales.rotation_std_rad].map(f64::ln);

@@ -86,6 +86,7 @@ pub fn observability(input: &BundleInput<'_>) -> Option<Observability> {
     }
     (priors.mount_std, priors.gripper_tag_std) = ([f64::INFINITY; 6], [f64::INFINITY; 6]);
     (priors.time_std_s, priors.lens_std) = (f64::INFINITY, [f64::INFINITY; 8]);
+    priors.further_mounts.iter_mut().for_each(|(_, std)| *std = [f64::INFINITY; 6]);
     let problem = BundleProblem::new(input, priors);
     let mut normal = NormalEquations::new(&problem);
     let mut state = problem.start(&start.parameters);
@@ -98,7 +99,11 @@ pub fn observability(input: &BundleInput<'_>) -> Option<Observability> {
     };
     let is_angle = |column: usize| match layout.parameters.get(column) {
         Some(p) => p.kind == ParameterKind::Offset,
-        None => [layout.mount, layout.gripper_tag].into_iter().flatten().any(|at| (at + 3..at + 6).contains(&column)),
+        None => {
+            let mut poses =
+                layout.mount.iter().chain(layout.further_mounts.iter().flatten()).chain(&layout.gripper_tag);
+            poses.any(|at| (at + 3..at + 6).contains(&column))
+        }
     };
     let named = |&column: &usize| Name {
         text: name(input.robot, &layout, column),
@@ -116,7 +121,9 @@ fn sigmas(layout: &Layout, input: &BundleInput<'_>, priors: &crate::calib::bundl
     for (column, p) in layout.parameters.iter().enumerate() {
         sigma[column] = input.scales.prior_std(&input.robot.sensors[p.joint], p.joint, p.kind);
     }
-    for (at, std) in [(layout.mount, priors.mount_std), (layout.gripper_tag, priors.gripper_tag_std)] {
+    let further = layout.further_mounts.iter().zip(&priors.further_mounts).map(|(at, (_, std))| (*at, *std));
+    let poses = [(layout.mount, priors.mount_std), (layout.gripper_tag, priors.gripper_tag_std)];
+    for (at, std) in poses.into_iter().chain(further) {
         if let Some(at) = at {
             sigma[at..at + 6].copy_from_slice(&std);
         }
@@ -237,6 +244,11 @@ fn name(robot: &Robot, layout: &Layout, column: usize) -> String {
     let within = |at: Option<usize>, n: usize| at.filter(|at| (*at..at + n).contains(&column)).map(|at| column - at);
     if let Some(k) = within(layout.mount, 6) {
         return format!("camera mount {}", axes[k]);
+    }
+    for (at, camera) in layout.further_mounts.iter().zip(&robot.further_cameras) {
+        if let Some(k) = within(*at, 6) {
+            return format!("mount of the camera {} {}", camera.name, axes[k]);
+        }
     }
     if let Some(k) = within(layout.gripper_tag, 6) {
         return format!("gripper tag {}", axes[k]);

@@ -22,6 +22,9 @@ impl NormalEquations {
         if let Some(at) = layout.mount.filter(|_| n == layout.n_joint()) {
             self.add_pose_prior(at, &prior.mount, &state.mount, &prior.mount_std);
         }
+        for (at, (mean, std), mount) in further(layout, &prior.further_mounts, &state.further_mounts) {
+            self.add_pose_prior(at, mean, mount, std);
+        }
         if let Some(at) = layout.gripper_tag {
             self.add_pose_prior(at, &prior.gripper_tag, &state.gripper_tag, &prior.gripper_tag_std);
         }
@@ -87,7 +90,17 @@ impl NormalEquations {
     }
 }
 
-/// Where all columns have their means.
+/// Column, prior and place of each further camera's mount that has a column.
+fn further<'a>(
+    layout: &Layout,
+    priors: &'a [(Isometry3<f64>, [f64; 6])],
+    mounts: &'a [Isometry3<f64>],
+) -> impl Iterator<Item = (usize, &'a (Isometry3<f64>, [f64; 6]), &'a Isometry3<f64>)> {
+    let columns = layout.further_mounts.iter().zip(priors).zip(mounts);
+    columns.filter_map(|((at, prior), mount)| Some(((*at)?, prior, mount)))
+}
+
+/// Where all columns have their means; a prior of all of them is of the first camera alone.
 pub(crate) struct Means<'a> {
     joint: &'a DVector<f64>,
     mount: &'a Isometry3<f64>,

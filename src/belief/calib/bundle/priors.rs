@@ -33,6 +33,7 @@ pub(crate) fn prior(input: &BundleInput<'_>, scales: &Hyperparameters) -> Prior 
         joint_info,
         mount: camera.mount.link_from_frame,
         mount_std: mount_std(robot, scales),
+        further_mounts: further_mounts(robot, scales),
         time_s: 0.0,
         time_std_s: 0.05,
         lens: camera.lens,
@@ -56,6 +57,16 @@ pub(crate) fn lens_std(camera: &CameraSpec) -> [f64; 8] {
 pub(crate) fn mount_std(robot: &Robot, scales: &Hyperparameters) -> [f64; 6] {
     let (camera, [shift, turn]) = (&robot.camera, scales.mount_scale);
     std::array::from_fn(|k| if k < 3 { shift * camera.mount_std_m } else { turn * camera.mount_std_rad })
+}
+
+/// Each further camera's mount by the drawing, and one sigma of it.
+pub(crate) fn further_mounts(robot: &Robot, scales: &Hyperparameters) -> Vec<(Isometry3<f64>, [f64; 6])> {
+    let cameras = robot.further_cameras.iter().zip(&scales.further_mount_scale);
+    let of_camera = |(camera, [shift, turn]): (&CameraSpec, &[f64; 2])| {
+        let [shift, turn] = [shift * camera.mount_std_m, turn * camera.mount_std_rad];
+        (camera.mount.link_from_frame, [shift, shift, shift, turn, turn, turn])
+    };
+    cameras.map(of_camera).collect()
 }
 
 /// One sigma of a tag's place; a landmark that is seen as a position alone has no attitude to speak of.

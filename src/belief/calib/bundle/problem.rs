@@ -13,7 +13,7 @@ use crate::calib::views::view::{BoardPoint, BoardPoints, MeanCorners, TagMeasure
 use armcal_core::joints::{JointAngles, MAX_JOINTS};
 use armcal_core::kinematics::{ArmLoads, LinkCorrections, LinkPoses};
 use armcal_core::optics::CameraModel;
-use armcal_core::robot::Robot;
+use armcal_core::robot::{CameraSpec, Robot};
 use armcal_core::time::Stamp;
 
 /// Where each parameter's column is.
@@ -27,6 +27,8 @@ pub(crate) struct Layout {
     /// Right after them those of how the arm bends.
     pub sag: Range<usize>,
     pub mount: Option<usize>,
+    /// By number of the further camera.
+    pub further_mounts: Vec<Option<usize>>,
     pub time: Option<usize>,
     pub lens: Option<usize>,
     /// By the robot's tags.
@@ -113,6 +115,12 @@ pub(crate) struct ViewData {
     pub is_free: [bool; MAX_JOINTS],
     /// Against gravity, base frame, where the view knows better than robot.toml.
     pub up: Option<Vector3<f64>>,
+    /// Number of the camera that saw the observations.
+    pub camera: usize,
+    /// Joints, base first, that move it and the tags against each other.
+    pub n_seen_joints: usize,
+    /// Cameras with a view of the same pose.
+    pub n_cameras: f64,
 }
 
 /// Priors of all but the views' own parameters.
@@ -124,6 +132,8 @@ pub(crate) struct Prior {
     pub joint_info: DMatrix<f64>,
     pub mount: Isometry3<f64>,
     pub mount_std: [f64; 6],
+    /// By number of the further camera.
+    pub further_mounts: Vec<(Isometry3<f64>, [f64; 6])>,
     pub time_s: f64,
     pub time_std_s: f64,
     pub lens: CameraModel,
@@ -154,7 +164,10 @@ pub(crate) struct BundleProblem<'a> {
 pub(crate) struct State {
     pub joint: DVector<f64>,
     pub mount: Isometry3<f64>,
+    /// By number of the further camera.
+    pub further_mounts: Vec<Isometry3<f64>>,
     pub time_s: f64,
+    /// Of the first camera.
     pub lens: CameraModel,
     pub tags: Vec<Isometry3<f64>>,
     pub gripper_tag: Isometry3<f64>,
@@ -169,12 +182,20 @@ impl State {
     pub(crate) fn copy_from(&mut self, other: &Self) {
         self.joint.copy_from(&other.joint);
         self.mount = other.mount;
+        self.further_mounts.copy_from_slice(&other.further_mounts);
         self.time_s = other.time_s;
         self.lens = other.lens;
         self.tags.copy_from_slice(&other.tags);
         self.gripper_tag = other.gripper_tag;
         self.joint_error.copy_from_slice(&other.joint_error);
         self.camera_error.copy_from_slice(&other.camera_error);
+    }
+}
+
+impl State {
+    /// Of the camera of that number.
+    pub(crate) fn mount_of(&self, camera: usize) -> &Isometry3<f64> {
+        camera.checked_sub(1).map_or(&self.mount, |further| &self.further_mounts[further])
     }
 }
 
@@ -215,6 +236,7 @@ impl Layout {
             })
         };
         layout.mount = take(model.mount, 6);
+        layout.further_mounts = model.further_mounts.iter().map(|wanted| take(*wanted, 6)).collect();
         layout.time = take(model.time_offset, 1);
         layout.lens = take(model.lens, 8);
         for tag_idx in 0..robot.tags.len() {
@@ -229,9 +251,16 @@ impl Layout {
         self.tags.iter().flatten().chain(&self.gripper_tag).copied().min().unwrap_or(self.n)
     }
 
-    /// First column of each pose: mount, tags, the gripper's tag.
+    /// First column of each pose: mounts, tags, the gripper's tag.
     pub(crate) fn poses(&self) -> impl Iterator<Item = usize> + '_ {
-        self.mount.iter().chain(self.tags.iter().flatten()).chain(&self.gripper_tag).copied()
+        let mounts = self.mount.iter().chain(self.further_mounts.iter().flatten());
+        mounts.chain(self.tags.iter().flatten()).chain(&self.gripper_tag).copied()
+    }
+
+    /// First column of the mount of the camera of that number.
+    pub(crate) fn mount_of(&self, camera: usize) -> Option<usize> {
+        let further = |at: usize| self.further_mounts.get(at).copied().flatten();
+        camera.checked_sub(1).map_or(self.mount, further)
     }
 
     /// The same with eight columns of the lens before the tags.
@@ -269,10 +298,11 @@ impl<'a> BundleProblem<'a> {
         let mut data = Vec::with_capacity(views.len());
         for view in *views {
             let from = observations.len();
+            let camera = robot.camera_at(view.camera);
             for tag in &view.tags {
                 let size_m = robot.tags[tag.tag_idx].size_m;
                 let data = match &tag.measured {
-                    TagMeasurement::Corners(seen) => corners(robot, seen, size_m),
+                    TagMeasurement::Corners(seen) => corners(camera, seen, size_m),
                     TagMeasurement::Position => WeightedMeasurement::Position {
                         in_camera_m: tag.center_in_camera_m,
                         info: scales.position_std_m.powi(-2),
@@ -282,7 +312,7 @@ impl<'a> BundleProblem<'a> {
                         info_position: scales.position_std_m.powi(-2),
                         info_rotation: scales.rotation_std_rad.powi(-2),
                     },
-                    TagMeasurement::Board(seen) => board(robot, seen),
+                    TagMeasurement::Board(seen) => board(camera, seen),
                 };
                 observations.push(ObservationTerm { tag: tag.tag_idx, data, is_used: true });
             }
@@ -291,7 +321,7 @@ impl<'a> BundleProblem<'a> {
             let gripper = view.gripper_tag.as_ref().zip(gripper_size_m).map(|(seen, size_m)| {
                 observations.push(ObservationTerm {
                     tag: robot.tags.len(),
-                    data: corners(robot, seen, size_m),
+                    data: corners(&robot.camera, seen, size_m),
                     is_used: true,
                 });
                 to
@@ -329,6 +359,7 @@ impl<'a> BundleProblem<'a> {
         State {
             joint: DVector::from_iterator(parameters.len(), parameters.iter().map(|p| guess.get(*p))),
             mount: self.prior.mount,
+            further_mounts: self.prior.further_mounts.iter().map(|(mount, _)| *mount).collect(),
             time_s: self.prior.time_s,
             lens: self.prior.lens,
             tags: self.prior.tags.clone(),
@@ -358,11 +389,15 @@ impl<'a> BundleProblem<'a> {
     }
 
     /// The part of it that is the joint's own: the image's time error moves all joints of a view together.
+    ///
+    /// Cameras that see one pose share it. Each of n has a view of its own here, under n times the variance: whatever
+    /// the errors have to do with each other, what they tell together is not more than it is (covariance intersection
+    /// with equal weights, Julier and Uhlmann 1997).
     pub(crate) fn joint_own_var(&self, view: &ViewData, joint: usize) -> f64 {
         if view.is_free[joint] {
             return self.scales.free_joint_std_rad.powi(2);
         }
-        self.scales.joint_std_rad[joint].powi(2) + view.reading_var[joint]
+        view.n_cameras * (self.scales.joint_std_rad[joint].powi(2) + view.reading_var[joint])
     }
 
     /// How far a joint moves in one sigma of the image's time error, rad.
@@ -377,6 +412,11 @@ impl<'a> BundleProblem<'a> {
             let estimated: f64 = columns.map(|column| view.basis[column] * state.joint[column]).sum();
             view.fixed_rad[j] + estimated + state.joint_error[view_idx][j] + view.rate_rad_s[j] * state.time_s
         })
+    }
+
+    /// The lens of the camera of that number.
+    pub(crate) fn lens_of<'b>(&'b self, camera: usize, state: &'b State) -> &'b CameraModel {
+        if camera == 0 { &state.lens } else { &self.robot.camera_at(camera).lens }
     }
 
     /// The links' corrections in `state`; those of the guess where they are not estimated.
@@ -423,15 +463,15 @@ impl<'a> BundleProblem<'a> {
 }
 
 /// Corners with the variance of their mean: the scatter between frames, with robot.toml's figure for a few frames more.
-fn corners(robot: &Robot, seen: &MeanCorners, size_m: f64) -> WeightedMeasurement {
+fn corners(camera: &CameraSpec, seen: &MeanCorners, size_m: f64) -> WeightedMeasurement {
     let dof = 8.0 * seen.n_frames.saturating_sub(1) as f64;
-    let info = seen.n_frames.max(1) as f64 / one_frame_px2(robot, seen.scatter_px2, dof);
+    let info = seen.n_frames.max(1) as f64 / one_frame_px2(camera, seen.scatter_px2, dof);
     WeightedMeasurement::Corners { corners_px: seen.corners_px, half_size_m: 0.5 * size_m, info, used: [true; 4] }
 }
 
 /// Corners of a board in the same way.
-fn board(robot: &Robot, seen: &BoardPoints) -> WeightedMeasurement {
-    let variance_px2 = one_frame_px2(robot, seen.scatter_px2, seen.n_free as f64);
+fn board(camera: &CameraSpec, seen: &BoardPoints) -> WeightedMeasurement {
+    let variance_px2 = one_frame_px2(camera, seen.scatter_px2, seen.n_free as f64);
     let weighted = |point: &BoardPoint| {
         let BoardPoint { on_board, pixel, n_frames } = *point;
         WeightedPoint { on_board, pixel, info: n_frames.max(1) as f64 / variance_px2 }
@@ -440,8 +480,8 @@ fn board(robot: &Robot, seen: &BoardPoints) -> WeightedMeasurement {
 }
 
 /// Variance of a corner in one frame, px^2.
-fn one_frame_px2(robot: &Robot, scatter_px2: f64, dof: f64) -> f64 {
-    let known_px2 = robot.camera.corner_std_px.powi(2);
+fn one_frame_px2(camera: &CameraSpec, scatter_px2: f64, dof: f64) -> f64 {
+    let known_px2 = camera.corner_std_px.powi(2);
     (CORNER_PRIOR_DOF * known_px2 + scatter_px2) / (CORNER_PRIOR_DOF + dof)
 }
 
@@ -463,6 +503,9 @@ fn view_data(
         gripper,
         is_free: view.is_free,
         up: view.up,
+        camera: view.camera,
+        n_seen_joints: robot.n_joints_seen_by(robot.camera_at(view.camera)),
+        n_cameras: view.n_cameras as f64,
     };
     for (joint, spec) in robot.sensors.iter().enumerate() {
         let travel_rad = view.travel_rad[joint];

@@ -43,6 +43,7 @@ pub(crate) fn robust_start(input: &BundleInput<'_>) -> RobustStart {
         n_links: 0,
         n_compliant: 0,
         mount: false,
+        further_mounts: Vec::new(),
         lens: false,
         tags: false,
         gripper_tag: false,

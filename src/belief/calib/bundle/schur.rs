@@ -48,6 +48,8 @@ pub(crate) struct SchurBlock {
 /// What carries a group of observations.
 pub(crate) struct Group<'a> {
     pub view_idx: usize,
+    /// Number of the camera.
+    pub camera: usize,
     /// The joints whose motion the observations see, and how.
     pub joints: Range<usize>,
     pub sign: f64,
@@ -69,10 +71,12 @@ impl<'a> Group<'a> {
     ) -> impl Iterator<Item = Self> + use<'a> {
         let view = &problem.views[view_idx];
         let error = &state.camera_error[view_idx];
-        let before = poses.link(problem.robot.camera.mount.n_joints) * state.mount;
+        let camera = problem.robot.camera_at(view.camera);
+        let before = poses.link(camera.mount.n_joints) * state.mount_of(view.camera);
         let of_tags = Self {
             view_idx,
-            joints: 0..problem.n_seen_joints,
+            camera: view.camera,
+            joints: 0..view.n_seen_joints,
             // Before a camera that stands still the joints move the tags.
             sign: if problem.robot.is_watched() { -1.0 } else { 1.0 },
             by_mount: adjoint(&error.inverse()),
@@ -83,6 +87,7 @@ impl<'a> Group<'a> {
         };
         let of_gripper = view.gripper.zip(problem.robot.gripper_tag).map(|(observation, tag)| Self {
             view_idx,
+            camera: 0,
             joints: problem.n_seen_joints..tag.mount.n_joints,
             // Joints distal to the camera move the tag, not the camera.
             sign: -1.0,
@@ -122,9 +127,14 @@ impl<'a> Columns<'a> {
 
     /// The directions that have columns.
     pub(crate) fn directions(&self) -> impl Iterator<Item = usize> + use<> {
-        let mount = if self.layout.mount.is_some() { MOUNT..MOUNT + 6 } else { 0..0 };
+        let mount = if self.mount().is_some() { MOUNT..MOUNT + 6 } else { 0..0 };
         let time = if self.layout.time.is_some() { TIME..TIME + 1 } else { 0..0 };
         self.joints.clone().chain(mount).chain(time)
+    }
+
+    /// First column of the mount of the camera that the view is of.
+    fn mount(&self) -> Option<usize> {
+        self.layout.mount_of(self.view.camera)
     }
 
     /// Calls `f` with each column of a direction and the direction's derivative by it.
@@ -133,7 +143,7 @@ impl<'a> Columns<'a> {
         let layout = self.layout;
         match direction {
             TIME => layout.time.into_iter().for_each(|at| f(at, 1.0)),
-            MOUNT..TIME => layout.mount.into_iter().for_each(|at| f(at + direction - MOUNT, 1.0)),
+            MOUNT..TIME => self.mount().into_iter().for_each(|at| f(at + direction - MOUNT, 1.0)),
             joint => layout.of_joint[joint].clone().for_each(|column| f(column, self.view.basis[column])),
         }
     }
@@ -197,7 +207,7 @@ impl SchurBlock {
         let view = &problem.views[view_idx];
         let joints = match &problem.robot.gripper_tag {
             Some(tag) if view.gripper == Some(self.range.start) => problem.n_seen_joints..tag.mount.n_joints,
-            _ => 0..problem.n_seen_joints,
+            _ => 0..view.n_seen_joints,
         };
         Columns { layout: &problem.layout, view, joints }
     }

@@ -178,7 +178,8 @@ impl Estimate<'_> {
             };
             let camera_from_tag = group.base_from_camera.inv_mul(&pose);
             let data: &WeightedMeasurement = &observation.data;
-            if let Some(info) = PoseInformation::of(data, &camera_from_tag, &state.lens, problem.scales.noise, None) {
+            let lens = problem.lens_of(group.camera, state);
+            if let Some(info) = PoseInformation::of(data, &camera_from_tag, lens, problem.scales.noise, None) {
                 h += info.h;
                 g += info.g;
             }
@@ -198,7 +199,9 @@ fn trials(group: &Group<'_>) -> Trials {
             trials.set_column(6 * joint + 3 + axis, &turn);
         }
     }
-    trials.fixed_view_mut::<6, 6>(0, MOUNT).copy_from(&group.by_mount);
+    if group.camera == 0 {
+        trials.fixed_view_mut::<6, 6>(0, MOUNT).copy_from(&group.by_mount);
+    }
     trials
 }
 

@@ -164,6 +164,11 @@ fn step_common(problem: &BundleProblem<'_>, state: &State, step: &DVector<f64>, 
     if let Some(at) = layout.mount {
         next.mount *= exp(&twist(at));
     }
+    for (mount, column) in next.further_mounts.iter_mut().zip(&layout.further_mounts) {
+        if let Some(at) = column {
+            *mount *= exp(&twist(*at));
+        }
+    }
     if let Some(at) = layout.time {
         next.time_s += step[at];
     }

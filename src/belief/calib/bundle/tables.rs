@@ -5,13 +5,13 @@ use crate::calib::bundle::estimate::Estimate;
 use crate::calib::bundle::model::MIN_GRIPPER_VIEWS;
 use crate::calib::bundle::model_selection::{OptionalTerm, Selection};
 use crate::calib::result::calibration::Calibration;
-use crate::calib::result::camera_mount::CameraMount;
+use crate::calib::result::camera_mount::{CameraMount, FurtherCamera};
 use crate::calib::result::covariance_file::CovarianceTable;
 use crate::calib::result::failed_joint::PriorTable;
 use crate::calib::result::map_table::MapResult;
 use crate::calib::result::model_table::ModelTable;
 use crate::calib::views::view::View;
-use armcal_core::robot::Robot;
+use armcal_core::robot::{CameraSpec, Robot};
 use armcal_core::spatial::{Base, Camera, Link, Pose, Tag};
 
 pub(crate) fn model_table(robot: &Robot, found: &Estimate<'_>, selections: &[Selection]) -> ModelTable {
@@ -65,6 +65,24 @@ pub(crate) fn camera_mount_table(robot: &Robot, found: &Estimate<'_>, views: &[V
         views: if found.model.gripper_tag { seen } else { 0 },
         rms_px: None,
     }
+}
+
+/// Each further camera whose mount was estimated.
+pub(crate) fn further_camera_tables(robot: &Robot, found: &Estimate<'_>, views: &[View]) -> Vec<FurtherCamera> {
+    let table = |(further, camera): (usize, &CameraSpec)| {
+        let (mount, covariance) = found.further_mount(further)?;
+        let link_from_camera: Pose<Link, Camera> = Pose::from_isometry(mount);
+        let std = |row: usize| covariance[(row, row)].max(0.0).sqrt();
+        Some(FurtherCamera {
+            name: camera.name.clone(),
+            position_m: link_from_camera.origin().to_array(),
+            quaternion_wxyz: link_from_camera.quaternion_wxyz(),
+            position_std_m: [0, 1, 2].map(std),
+            rotation_std_rad: [3, 4, 5].map(std),
+            views: views.iter().filter(|view| view.camera == further + 1).count(),
+        })
+    };
+    robot.further_cameras.iter().enumerate().filter_map(table).collect()
 }
 
 /// The map's tags where `bundle` found them.

@@ -58,7 +58,7 @@ impl<'a> PositionProblem<'a> {
                 self.angles(view, &departure, parameters)
             };
             let poses = self.robot.chain.link_poses(&angles).in_frame(&self.robot.tag_frame);
-            let base_from_camera = poses.frame(&self.robot.camera.mount);
+            let base_from_camera = poses.frame(&self.robot.camera_at(view.camera).mount);
             for tag in &view.tags {
                 let predicted_m = (base_from_camera * Point3::from(tag.center_in_camera_m)).coords;
                 let surveyed = self.robot.tags[tag.tag_idx].base_from_tag.origin().vector();
@@ -109,7 +109,7 @@ impl<'a> PositionProblem<'a> {
             } else {
                 self.angles(view, &view.conditions.departure_from(&parameters.reference), parameters)
             };
-            let base_from_camera = self.robot.tags_from_camera(&angles);
+            let base_from_camera = self.robot.tags_from(self.robot.camera_at(view.camera), &angles);
             for tag in &view.tags {
                 let predicted_m = (base_from_camera * Point3::from(tag.center_in_camera_m)).coords;
                 sum += (predicted_m - self.robot.tags[tag.tag_idx].base_from_tag.origin().vector()).norm();
@@ -144,7 +144,8 @@ impl<'a> PositionProblem<'a> {
             let tag: &SurveyedTag = &self.robot.tags[o.tag.tag_idx];
             let camera_from_tag = o.base_from_camera.inverse() * tag.base_from_tag.isometry();
             for (point, measured) in o.tag.points(tag.size_m) {
-                if let Some(pixel) = self.robot.camera.lens.project(&(camera_from_tag * point).coords) {
+                if let Some(pixel) = self.robot.camera_at(o.view.camera).lens.project(&(camera_from_tag * point).coords)
+                {
                     sum += (Vector2::from(measured) - pixel).norm_squared();
                     n += 1;
                 }
@@ -174,7 +175,7 @@ impl<'a> PositionProblem<'a> {
     /// d(residual)/d(parameter): a joint turns everything behind it, `axis x (point - origin)` times
     /// d(angle)/d(parameter).
     pub(crate) fn derivative(&self, o: &TagResidual<'_>, parameter: Parameter) -> Vector3<f64> {
-        if parameter.joint >= self.robot.n_seen_joints() {
+        if parameter.joint >= self.robot.n_joints_seen_by(self.robot.camera_at(o.view.camera)) {
             return Vector3::zeros();
         }
         // Before a camera that stands still the joint turns the tags' frame: the point moves the other way in it.

@@ -91,6 +91,7 @@ pub(crate) fn assemble(source: &Provenance<'_>, fit: &Fit<'_>, evidence: Evidenc
         valid: ValidRange::of(source.data),
         reference: ReferenceTable::of(at, fit.covariance),
         camera_mount: None,
+        further_camera: Vec::new(),
         map: None,
         observability: None,
         verdict: None,

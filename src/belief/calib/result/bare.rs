@@ -39,6 +39,7 @@ pub(in crate::calib) fn bare(robot: &str, method: Method) -> Calibration {
         valid: ValidRange { time_nanos: 0, oil_c: None, water_c: None, pressure_pa: None },
         reference: None,
         camera_mount: None,
+        further_camera: Vec::new(),
         map: None,
         model: None,
         outliers: Vec::new(),

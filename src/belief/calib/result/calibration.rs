@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use crate::calib::finding::Finding;
 use crate::calib::refusal::{Refusal, in_words};
 use crate::calib::reservation::Reservation;
-use crate::calib::result::camera_mount::CameraMount;
+use crate::calib::result::camera_mount::{CameraMount, FurtherCamera};
 use crate::calib::result::covariance_file::CovarianceTable;
 use crate::calib::result::details::FitDetails;
 use crate::calib::result::failed_joint::{FailedJointTable, PriorTable};
@@ -78,6 +78,9 @@ pub struct Calibration {
     /// Of `bundle`, and of other methods where the robot has a tag on the gripper.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera_mount: Option<CameraMount>,
+    /// Of `bundle`: the further cameras that have views and whose mounts robot.toml does not call exact.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub further_camera: Vec<FurtherCamera>,
     /// Where the tags were found to be, where no survey said it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub map: Option<MapResult>,

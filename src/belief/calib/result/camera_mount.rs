@@ -1,4 +1,4 @@
-//! `[camera_mount]` of calibration.toml.
+//! `[camera_mount]` and `[[further_camera]]` of calibration.toml.
 
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
@@ -29,12 +29,40 @@ pub struct CameraMount {
     pub rms_px: Option<f64>,
 }
 
+/// Where a further camera hangs, by the tags.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FurtherCamera {
+    /// Its name in robot.toml.
+    pub name: String,
+    /// `link_from_camera` on the link that carries the camera.
+    pub position_m: [f64; 3],
+    /// Rotation of `link_from_camera`.
+    pub quaternion_wxyz: [f64; 4],
+    /// One sigma per axis of the camera.
+    pub position_std_m: [f64; 3],
+    /// One sigma about each axis of the camera.
+    pub rotation_std_rad: [f64; 3],
+    /// Its views.
+    pub views: usize,
+}
+
+impl FurtherCamera {
+    /// `None` where the quaternion is none.
+    pub(crate) fn link_from_camera(&self) -> Option<Isometry3<f64>> {
+        isometry(&self.position_m, &self.quaternion_wxyz)
+    }
+}
+
+fn isometry(position_m: &[f64; 3], [w, x, y, z]: &[f64; 4]) -> Option<Isometry3<f64>> {
+    let rotation = UnitQuaternion::try_new(Quaternion::new(*w, *x, *y, *z), 1e-6)?;
+    Some(Isometry3::from_parts(Vector3::from(*position_m).into(), rotation))
+}
+
 impl CameraMount {
     /// `None` where the quaternion is none.
     pub(crate) fn link_from_camera(&self) -> Option<Isometry3<f64>> {
-        let [w, x, y, z] = self.quaternion_wxyz;
-        let rotation = UnitQuaternion::try_new(Quaternion::new(w, x, y, z), 1e-6)?;
-        Some(Isometry3::from_parts(Vector3::from(self.position_m).into(), rotation))
+        isometry(&self.position_m, &self.quaternion_wxyz)
     }
 
     /// Of `robot`, whose camera is where it was found to hang; `None` where no tag is on the gripper.

@@ -105,7 +105,7 @@ impl ObservedTag {
         let tag = &problem.robot.tags[o.tag.tag_idx];
         let camera_from_tag = o.base_from_camera.inverse() * tag.base_from_tag.isometry();
         let residual = |corner: &Point3<f64>, seen_px: [f64; 2]| {
-            let pixel = problem.robot.camera.lens.project(&(camera_from_tag * corner).coords)?;
+            let pixel = problem.robot.camera_at(o.view.camera).lens.project(&(camera_from_tag * corner).coords)?;
             Some(CornerResidual { seen_px, off_px: (Vector2::from(seen_px) - pixel).into(), is_used: true })
         };
         let corners = o.tag.corners().map_or([None; 4], |seen| {

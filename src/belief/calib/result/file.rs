@@ -6,7 +6,7 @@ use crate::calib::covariance::ParameterCovariance;
 use crate::calib::finding::FindingKind;
 use crate::calib::parameters::{JointParameters, Parameter};
 use crate::calib::result::calibration::{Calibration, JointResult};
-use crate::calib::result::camera_mount::CameraMount;
+use crate::calib::result::camera_mount::{CameraMount, FurtherCamera};
 use crate::calib::result::covariance_file::CovarianceTable;
 use crate::calib::result::file_error::CalibrationFileError;
 use crate::calib::result::link_table::LinkResult;
@@ -157,7 +157,7 @@ impl Calibration {
         Ok(views.iter().map(angles_of).collect())
     }
 
-    /// `robot` with its links and the camera's mount as calibrated; sensors and tags stay.
+    /// `robot` with its links and the cameras' mounts as calibrated; sensors and tags stay.
     #[must_use]
     pub fn applied_to(&self, robot: &Robot) -> Robot {
         let mut robot = robot.clone();
@@ -165,6 +165,12 @@ impl Calibration {
         let mount = self.camera_mount.as_ref().filter(|mount| mount.left_out.is_none());
         if let Some(link_from_camera) = mount.and_then(CameraMount::link_from_camera) {
             robot.camera.mount.link_from_frame = link_from_camera;
+        }
+        for camera in &mut robot.further_cameras {
+            let found = self.further_camera.iter().find(|found| found.name == camera.name);
+            if let Some(link_from_camera) = found.and_then(FurtherCamera::link_from_camera) {
+                camera.mount.link_from_frame = link_from_camera;
+            }
         }
         robot
     }

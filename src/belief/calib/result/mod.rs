@@ -28,7 +28,7 @@ pub(crate) mod validity;
 pub(crate) mod verdict_tables;
 
 pub use calibration::{Calibration, JointResult, Status};
-pub use camera_mount::CameraMount;
+pub use camera_mount::{CameraMount, FurtherCamera};
 pub use compact::{CompactCalibration, CompactError, CompactJoint, MAX_COMPACT_BYTES, PredictedToolError};
 pub use covariance_file::{CovarianceTable, covariance_file};
 pub use details::{CornerResidual, FitDetails, ObservedTag, TargetPrediction, ViewResidual};

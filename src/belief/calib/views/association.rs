@@ -18,7 +18,7 @@ use crate::calib::views::view::{
 };
 use armcal_core::log::Recording;
 use armcal_core::optics::{SquareError, SquarePose, solve_square};
-use armcal_core::robot::{FailedJoint, Robot};
+use armcal_core::robot::{CameraSpec, FailedJoint, Robot};
 use armcal_core::sensor::ArmSensors;
 use armcal_core::streams::{
     CaptureSet, JointAngles, Mark, MarkKind, Message, PriorSource, RecordedSurvey, TagDetections, Thermometer,
@@ -277,7 +277,7 @@ impl Association<'_> {
         data.note_corners(&corners.corners_px);
         let added = match &robot.gripper_tag {
             Some(tag) if tag.id == id => {
-                check_square(robot, tag.size_m, &corners).map(|_| view.gripper_tag = Some(corners))
+                check_square(&robot.camera, tag.size_m, &corners).map(|_| view.gripper_tag = Some(corners))
             }
             _ => tag_observation(robot, id, &corners).map(|tag| view.tags.push(tag)),
         };
@@ -295,14 +295,18 @@ fn add_corners(detections: &TagDetections, frames: &mut BTreeMap<u32, Vec<[[f64;
 
 fn tag_observation(robot: &Robot, id: u32, seen: &MeanCorners) -> Result<TagObservation, ObservationRejection> {
     let tag_idx = robot.tags.iter().position(|tag| tag.id == id).ok_or(ObservationRejection::UnknownTag)?;
-    let solved = check_square(robot, robot.tags[tag_idx].size_m, seen)?;
+    let solved = check_square(&robot.camera, robot.tags[tag_idx].size_m, seen)?;
     let center_in_camera_m = solved.camera_from_tag.origin().vector();
     Ok(TagObservation { id, tag_idx, center_in_camera_m, measured: TagMeasurement::Corners(*seen) })
 }
 
 /// The tag's pose by its corners, if they are those of a square of that size.
-pub(crate) fn check_square(robot: &Robot, size_m: f64, seen: &MeanCorners) -> Result<SquarePose, ObservationRejection> {
-    let solved = solve_square(&robot.camera.lens, size_m, &seen.corners_px).map_err(|e| match e {
+pub(crate) fn check_square(
+    camera: &CameraSpec,
+    size_m: f64,
+    seen: &MeanCorners,
+) -> Result<SquarePose, ObservationRejection> {
+    let solved = solve_square(&camera.lens, size_m, &seen.corners_px).map_err(|e| match e {
         SquareError::OutOfView => ObservationRejection::OutOfView,
         SquareError::Degenerate => ObservationRejection::NotASquare,
     })?;

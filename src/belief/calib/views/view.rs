@@ -36,6 +36,10 @@ pub struct View {
     pub conditions: Conditions,
     /// Against gravity in the base frame, unit, by an attitude sensor; `None`: as robot.toml has it.
     pub up: Option<Vector3<f64>>,
+    /// Number of the robot's camera that saw the tags.
+    pub camera: usize,
+    /// How many cameras have a view of this pose: what the joints are off there is in each of them.
+    pub n_cameras: usize,
     /// Surveyed tags that were seen, by id, each once.
     pub tags: Vec<TagObservation>,
     /// The tag on the gripper, where the robot has one and it was seen.
@@ -76,6 +80,8 @@ impl View {
             is_free: [false; MAX_JOINTS],
             conditions: Conditions::default(),
             up: None,
+            camera: 0,
+            n_cameras: 1,
             tags: Vec::new(),
             gripper_tag: None,
         }
@@ -271,6 +277,17 @@ impl CaptureData {
         for corner in corners_px {
             self.largest_px = std::array::from_fn(|axis| self.largest_px[axis].max(corner[axis]));
         }
+    }
+
+    /// Leaves no views but those of the first camera; how many are gone.
+    pub fn keep_first_camera(&mut self) -> usize {
+        let n_before = self.fit.len() + self.held_out.len();
+        self.fit.retain(|view| view.camera == 0);
+        self.held_out.retain(|view| view.camera == 0);
+        for view in self.fit.iter_mut().chain(&mut self.held_out) {
+            view.n_cameras = 1;
+        }
+        n_before - self.fit.len() - self.held_out.len()
     }
 
     pub(crate) fn reject(&mut self, why: ObservationRejection, n: usize) {

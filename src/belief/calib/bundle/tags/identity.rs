@@ -158,8 +158,10 @@ impl Estimate<'_> {
             let is_image = of_view.iter().all(|other| matches!(other.data, WeightedMeasurement::Corners { .. }));
             if is_image {
                 let state = &self.solved.state;
-                let link = *problem.link_poses(view_idx, state).link(problem.robot.camera.mount.n_joints);
-                observations.push((link * state.mount * state.camera_error[view_idx], tag.center_in_camera_m));
+                let camera = problem.robot.camera_at(view.camera);
+                let link = *problem.link_poses(view_idx, state).link(camera.mount.n_joints);
+                let base_from_camera = link * state.mount_of(view.camera) * state.camera_error[view_idx];
+                observations.push((base_from_camera, tag.center_in_camera_m));
             }
         }
         SeenTag { tag_idx, observations }

@@ -13,7 +13,7 @@ use crate::calib::views::view::{MeanCorners, TagMeasurement, TagObservation, Vie
 use armcal_core::joints::{JointAngles, MAX_JOINTS};
 use armcal_core::kinematics::Attachment;
 use armcal_core::optics::square_corners;
-use armcal_core::robot::{Robot, SurveyedTag, TagSurvey, load};
+use armcal_core::robot::{CameraSpec, Robot, SurveyedTag, TagSurvey, load};
 use armcal_core::sensor::Conditions;
 use armcal_core::spatial::{Pose, exp};
 use armcal_core::stats::stream_rng;
@@ -26,6 +26,20 @@ pub fn titan() -> Robot {
 pub fn titan_with_gripper_tag() -> Robot {
     load(&Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("robots/titan4-gripper-tag"))
         .expect("the robot reads")
+}
+
+/// The titan with a second camera before its last two joints, which in the middle of their ranges looks where the first
+/// one does, from beside it.
+pub fn titan_with_two_cameras() -> Robot {
+    let mut robot = titan();
+    let middle = JointAngles::from_fn(robot.n_joints(), |j| robot.sensors[j].center_rad);
+    let poses = robot.chain.link_poses(&middle);
+    let n_joints = robot.camera.mount.n_joints - 2;
+    let beside = Isometry3::translation(0.08, -0.05, 0.0);
+    let link_from_frame = poses.link(n_joints).inverse() * poses.frame(&robot.camera.mount) * beside;
+    let mount = Attachment { n_joints, link_from_frame };
+    robot.further_cameras.push(CameraSpec { name: "elbow".to_owned(), mount, ..robot.camera.clone() });
+    robot
 }
 
 /// The titan before a camera that stands still and looks at it, with tags on all sides of its hand.
@@ -71,6 +85,7 @@ pub fn normal(rng: &mut ChaCha8Rng) -> f64 {
 pub struct Truth {
     pub parameters: JointParameters,
     pub mount: Isometry3<f64>,
+    pub further_mounts: Vec<Isometry3<f64>>,
     pub tags: Vec<Isometry3<f64>>,
     pub gripper_tag: Option<Isometry3<f64>>,
     /// One sigma of how far the base leans in each view, about each horizontal axis.
@@ -101,7 +116,15 @@ impl Truth {
             .gripper_tag
             .filter(|_| model.gripper_tag)
             .map(|tag| moved(&tag.mount.link_from_frame, tag.position_std_m, tag.rotation_std_rad, rng));
-        Self { parameters, mount, tags, gripper_tag, lean_rad: 0.0 }
+        let further = robot.further_cameras.iter();
+        let further_mounts = further
+            .map(|camera| moved(&camera.mount.link_from_frame, camera.mount_std_m, camera.mount_std_rad, rng))
+            .collect();
+        Self { parameters, mount, further_mounts, tags, gripper_tag, lean_rad: 0.0 }
+    }
+
+    fn mount_of(&self, camera: usize) -> &Isometry3<f64> {
+        camera.checked_sub(1).map_or(&self.mount, |further| &self.further_mounts[further])
     }
 
     pub fn angles(&self, robot: &Robot, view: &View) -> JointAngles {
@@ -126,44 +149,56 @@ pub struct Noise {
     pub joint_rad: [f64; MAX_JOINTS],
 }
 
-/// `n` views at random poses that see three tags or more.
+/// Views by the first camera at `n` random poses where it sees three tags or more, each followed by those of the further
+/// cameras that see one there.
 pub fn views(robot: &Robot, truth: &Truth, noise: &Noise, n: usize, rng: &mut ChaCha8Rng) -> Vec<View> {
     let mut out: Vec<View> = Vec::new();
-    while out.len() < n {
+    let mut n_poses = 0;
+    while n_poses < n {
         let travel_rad = JointAngles::from_fn(robot.n_joints(), |j| {
             let half = robot.sensors[j].half_range_rad.min(1.3);
             rng.random_range(-0.85..0.85) * half
         });
-        let idx = out.len() as u32;
+        let idx = n_poses as u32;
         let mut view = View::of_reading(idx, SIMULATION_EPOCH.plus_s(20.0 * f64::from(idx)), travel_rad);
         view.conditions = Conditions {
-            oil_c: Some(10.0 + 6.0 * out.len() as f64 / n as f64),
+            oil_c: Some(10.0 + 6.0 * n_poses as f64 / n as f64),
             pressure_pa: Some(2e7),
             stamp: Some(view.end),
         };
         for (joint, approach) in view.approach.iter_mut().enumerate().take(robot.n_joints()) {
-            *approach = if (out.len() + joint).is_multiple_of(2) { 1.0 } else { -1.0 };
+            *approach = if (n_poses + joint).is_multiple_of(2) { 1.0 } else { -1.0 };
         }
         if truth.lean_rad > 0.0 {
             let turn = Vector3::new(truth.lean_rad * normal(rng), truth.lean_rad * normal(rng), 0.0);
             view.up = Some(UnitQuaternion::from_scaled_axis(turn) * robot.chain.loads().up);
         }
-        look(robot, truth, noise, &mut view, rng);
-        if view.tags.len() >= 3 {
-            out.push(view);
+        let mut angles = truth.angles(robot, &view);
+        for (angle, std) in angles.iter_mut().zip(noise.joint_rad) {
+            *angle += std * normal(rng);
+        }
+        let of_cameras = (0..=robot.further_cameras.len()).map(|camera| {
+            let mut view = View { camera, ..view.clone() };
+            look(robot, truth, noise, (&mut view, &angles), rng);
+            view
+        });
+        let mut of_pose: Vec<View> = of_cameras.collect();
+        if of_pose[0].tags.len() >= 3 {
+            n_poses += 1;
+            of_pose.retain(|view| !view.tags.is_empty());
+            let n_cameras = of_pose.len();
+            out.extend(of_pose.into_iter().map(|view| View { n_cameras, ..view }));
         }
     }
     out
 }
 
-fn look(robot: &Robot, truth: &Truth, noise: &Noise, view: &mut View, rng: &mut ChaCha8Rng) {
-    let mut angles = truth.angles(robot, view);
-    for (angle, std) in angles.iter_mut().zip(noise.joint_rad) {
-        *angle += std * normal(rng);
-    }
+/// What the view's camera sees at the arm's true angles.
+fn look(robot: &Robot, truth: &Truth, noise: &Noise, (view, angles): (&mut View, &JointAngles), rng: &mut ChaCha8Rng) {
     let loads = view.up.map_or(*robot.chain.loads(), |up| robot.chain.loads().with_up(up));
-    let poses = robot.chain.corrected_link_poses_under(&angles, &truth.parameters.links, &loads);
-    let base_from_camera = poses.link(robot.camera.mount.n_joints) * truth.mount;
+    let poses = robot.chain.corrected_link_poses_under(angles, &truth.parameters.links, &loads);
+    let camera = robot.camera_at(view.camera);
+    let base_from_camera = poses.link(camera.mount.n_joints) * truth.mount_of(view.camera);
     // Tags beside the arm stay where they are when its base bends.
     let base_from_tags = if robot.is_watched() { poses.frame(&robot.tag_frame) } else { Isometry3::identity() };
     for (tag_idx, tag) in robot.tags.iter().enumerate() {
@@ -173,19 +208,19 @@ fn look(robot: &Robot, truth: &Truth, noise: &Noise, view: &mut View, rng: &mut 
         if !(0.25..2.0).contains(&center.norm()) || facing < 0.45 {
             continue;
         }
-        if let Some(seen) = seen_corners(robot, &camera_from_tag, tag.size_m, noise, rng) {
+        if let Some(seen) = seen_corners(camera, &camera_from_tag, tag.size_m, noise, rng) {
             let measured = TagMeasurement::Corners(seen);
             view.tags.push(TagObservation { id: tag.id, tag_idx, center_in_camera_m: center, measured });
         }
     }
-    if let (Some(tag), Some(link_from_tag)) = (&robot.gripper_tag, &truth.gripper_tag) {
+    if let (Some(tag), Some(link_from_tag), 0) = (&robot.gripper_tag, &truth.gripper_tag, view.camera) {
         let camera_from_tag = base_from_camera.inv_mul(&(poses.link(tag.mount.n_joints) * link_from_tag));
-        view.gripper_tag = seen_corners(robot, &camera_from_tag, tag.size_m, noise, rng);
+        view.gripper_tag = seen_corners(camera, &camera_from_tag, tag.size_m, noise, rng);
     }
 }
 
 fn seen_corners(
-    robot: &Robot,
+    camera: &CameraSpec,
     camera_from_tag: &Isometry3<f64>,
     size_m: f64,
     noise: &Noise,
@@ -194,8 +229,8 @@ fn seen_corners(
     let std_px = noise.corner_px / (noise.n_frames as f64).sqrt();
     let mut corners_px = [[0.0; 2]; 4];
     for (pixel, corner) in corners_px.iter_mut().zip(square_corners(size_m)) {
-        let seen = robot.camera.lens.project(&(camera_from_tag * corner).coords)?;
-        if !robot.camera.lens.contains(&seen) {
+        let seen = camera.lens.project(&(camera_from_tag * corner).coords)?;
+        if !camera.lens.contains(&seen) {
             return None;
         }
         *pixel = [seen.x + std_px * normal(rng), seen.y + std_px * normal(rng)];

@@ -11,7 +11,7 @@ use crate::calib::bundle::priors::prior;
 use crate::calib::bundle::problem::{BundleProblem, State};
 use crate::calib::bundle::solve::{LOOSE, solve, stepped, until};
 use crate::calib::bundle::tests::data::{
-    Noise, Truth, normal, reference, rng, titan_with_gripper_tag, views, watched_titan,
+    Noise, Truth, normal, reference, rng, titan_with_gripper_tag, titan_with_two_cameras, views, watched_titan,
 };
 use crate::calib::parameters::JointParameters;
 use crate::calib::views::view::{TagMeasurement, View};
@@ -36,6 +36,7 @@ fn case(robot: Robot, seed: u64) -> Case {
         n_links: robot.n_joints(),
         n_compliant: if robot.is_watched() { 0 } else { robot.n_joints() },
         mount: true,
+        further_mounts: vec![true; robot.further_cameras.len()],
         lens: true,
         tags: true,
         gripper_tag: robot.gripper_tag.is_some(),
@@ -58,7 +59,8 @@ fn case(robot: Robot, seed: u64) -> Case {
                     ..View::of_reading(0, armcal_core::time::SIMULATION_EPOCH, view.travel_rad)
                 },
             ));
-            let tags_from_camera = poses.frame(&robot.tag_frame).inv_mul(&poses.frame(&robot.camera.mount));
+            let camera = robot.camera_at(view.camera);
+            let tags_from_camera = poses.frame(&robot.tag_frame).inv_mul(&poses.frame(&camera.mount));
             match k % 3 {
                 1 => tag.measured = TagMeasurement::Position,
                 2 => tag.measured = TagMeasurement::Pose(tags_from_camera.inv_mul(&truth.tags[tag.tag_idx])),
@@ -113,6 +115,11 @@ fn the_gradient_is_that_of_the_cost_for_each_column() {
 #[test]
 fn the_gradient_is_that_of_the_cost_before_a_camera_that_stands_still() {
     has_the_costs_gradient(watched_titan);
+}
+
+#[test]
+fn the_gradient_is_that_of_the_cost_with_a_second_camera() {
+    has_the_costs_gradient(titan_with_two_cameras);
 }
 
 fn has_the_costs_gradient(robot: fn() -> Robot) {

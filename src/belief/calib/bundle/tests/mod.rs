@@ -2,6 +2,7 @@
 
 mod baseline;
 mod calibration_prior;
+mod cameras;
 mod corner_outliers;
 pub(crate) mod data;
 mod drawing;

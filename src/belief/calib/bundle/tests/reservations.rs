@@ -87,7 +87,7 @@ fn with_estimate<T>(robot: &Robot, real: &Robot, mount: Isometry3<f64>, of: impl
     let tags = robot.tags.iter().map(|tag| *tag.base_from_tag.isometry()).collect();
     let gripper_tag = robot.gripper_tag.map(|tag| tag.mount.link_from_frame);
     let parameters = JointParameters { reference: reference(), ..JointParameters::default() };
-    let truth = Truth { parameters, mount, tags, gripper_tag, lean_rad: 0.0 };
+    let truth = Truth { parameters, mount, further_mounts: Vec::new(), tags, gripper_tag, lean_rad: 0.0 };
     let noise = Noise { corner_px: 0.3, n_frames: 8, joint_rad: [1e-4; MAX_JOINTS] };
     let views: Vec<View> = views(real, &truth, &noise, N_VIEWS, &mut rng);
     let model = model_for(robot, &views);

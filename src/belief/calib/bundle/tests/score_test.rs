@@ -51,6 +51,7 @@ pub(super) fn views_of_changed(
         n_links: 0,
         n_compliant: 0,
         mount: true,
+        further_mounts: Vec::new(),
         lens: false,
         tags: true,
         gripper_tag: false,

@@ -54,6 +54,7 @@ fn case(robot: &Robot, seed: u64, change: impl FnOnce(&mut Robot, &mut Truth)) -
         n_links: 0,
         n_compliant: 0,
         mount: true,
+        further_mounts: Vec::new(),
         lens: false,
         tags: true,
         gripper_tag: false,

@@ -8,7 +8,7 @@ use crate::calib::views::frame_consensus::agreeing_mean;
 use crate::calib::views::view::{ObservationRejection, TagMeasurement};
 use armcal_core::input::RawMeasurement;
 use armcal_core::optics::Chessboard;
-use armcal_core::robot::Robot;
+use armcal_core::robot::CameraSpec;
 
 /// The one landmark that the input map names.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -33,7 +33,7 @@ const NEVER_APART_M: f64 = 2e-3;
 /// The mean of a board's corners over the frames, and how many of them were left out.
 pub(crate) fn average_board(
     seen: &[RawMeasurement],
-    robot: &Robot,
+    camera: &CameraSpec,
     board: Chessboard,
 ) -> (Result<Averaged, ObservationRejection>, usize) {
     let corner = |seen: &RawMeasurement| match seen {
@@ -41,7 +41,6 @@ pub(crate) fn average_board(
         _ => None,
     };
     let corners: Vec<(u32, [f64; 2])> = seen.iter().filter_map(corner).collect();
-    let camera = &robot.camera;
     let before = BoardBefore { board, lens: &camera.lens, corner_std_px: camera.corner_std_px };
     let (found, n_apart) = mean_board(&corners, &before);
     let averaged = found.map(|found| Averaged {
@@ -54,17 +53,17 @@ pub(crate) fn average_board(
 /// The mean of the frames that agree, and how many do not; nothing where fewer than half of them do.
 pub(crate) fn average(
     seen: &[RawMeasurement],
-    robot: &Robot,
-    tag_idx: usize,
+    camera: &CameraSpec,
+    size_m: f64,
 ) -> (Result<Option<Averaged>, ObservationRejection>, usize) {
     let corners: Vec<[[f64; 2]; 4]> = seen
         .iter()
         .filter_map(|seen| if let RawMeasurement::Corners(corners) = seen { Some(*corners) } else { None })
         .collect();
     if !corners.is_empty() {
-        let (mean, n_apart) = agreeing_mean(&corners, robot.camera.corner_std_px);
+        let (mean, n_apart) = agreeing_mean(&corners, camera.corner_std_px);
         let averaged = mean.map(|mean| {
-            let solved = check_square(robot, robot.tags[tag_idx].size_m, &mean)?;
+            let solved = check_square(camera, size_m, &mean)?;
             let center_in_camera_m = solved.camera_from_tag.origin().vector();
             Ok(Averaged { center_in_camera_m, measured: TagMeasurement::Corners(mean) })
         });

@@ -45,10 +45,10 @@ pub fn prepare_external(
             }
         }
         let made = RecordingViews::of(recording, map, robot, context.plain);
-        if made.views.iter().any(|(_, first)| views.iter().any(|(_, other)| other == first)) {
+        if made.views.iter().any(|made| views.iter().any(|(_, other)| *other == made.first)) {
             return Err(CalibError::Twice { recording: recording.path.display().to_string() });
         }
-        views.extend(made.views);
+        views.extend(made.views.into_iter().map(|made| (made.view, made.first)));
         digests.extend(made.digests);
         data.ids_seen.extend(made.ids_seen);
         for (why, n) in made.rejected {

@@ -1,6 +1,6 @@
 //! From tag messages to views: what was seen while the arm stood still is one view.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::Vector3;
 
@@ -25,10 +25,17 @@ const MIN_MEAN_UP: f64 = 0.5;
 /// Noise of a rate that counts as none, sigma.
 const RATE_SIGMAS: f64 = 5.0;
 
+/// A view, the hash of its first message, and the first and the last reading that it comes from.
+pub(crate) struct MadeView {
+    pub view: View,
+    pub first: [u8; 32],
+    readings: (usize, usize),
+}
+
 /// The views of one recording.
+#[derive(Default)]
 pub(crate) struct RecordingViews {
-    /// Each with the hash of its first message.
-    pub views: Vec<(View, [u8; 32])>,
+    pub views: Vec<MadeView>,
     /// Hashes of all messages that they come from.
     pub digests: Vec<[u8; 32]>,
     pub ids_seen: Vec<u32>,
@@ -41,8 +48,11 @@ struct PairedFrame<'a> {
     paired: TravelSample,
 }
 
+/// Makes the views of one camera.
 struct Maker<'a> {
     robot: &'a Robot,
+    /// The camera's number.
+    camera: usize,
     plain: PlainLandmark,
     while_moving: WhileMoving,
     travels: TravelSeries<'a>,
@@ -55,38 +65,76 @@ struct Maker<'a> {
 
 impl RecordingViews {
     pub fn of(recording: &ExternalRecording, map: &InputMap, robot: &Robot, plain: PlainLandmark) -> Self {
-        let moving = &robot.sensors[..robot.n_seen_joints()];
-        let mut maker = Maker {
+        let mut all = Self::default();
+        let cameras = std::iter::once(&recording.frames).chain(&recording.further_frames);
+        for (camera, frames) in cameras.enumerate().filter(|(_, frames)| !frames.is_empty()) {
+            let of_camera = Maker::new(recording, map, (robot, camera), plain).views(frames);
+            all.views.extend(of_camera.views);
+            all.digests.extend(of_camera.digests);
+            all.ids_seen.extend(of_camera.ids_seen);
+            for (why, n) in of_camera.rejected {
+                *all.rejected.entry(why).or_default() += n;
+            }
+        }
+        all.count_cameras();
+        all
+    }
+
+    /// Readings that two cameras' views share are of one pose.
+    fn count_cameras(&mut self) {
+        let spans: Vec<_> = self.views.iter().map(|made| (made.view.camera, made.readings)).collect();
+        for MadeView { view, readings: (from, to), .. } in &mut self.views {
+            let is_shared =
+                |(camera, (a, b)): &&(usize, (usize, usize))| *camera != view.camera && a <= to && &*from <= b;
+            let others: BTreeSet<usize> = spans.iter().filter(is_shared).map(|(camera, _)| *camera).collect();
+            view.n_cameras = 1 + others.len();
+        }
+    }
+}
+
+impl<'a> Maker<'a> {
+    fn new(
+        recording: &'a ExternalRecording,
+        map: &InputMap,
+        (robot, camera): (&'a Robot, usize),
+        plain: PlainLandmark,
+    ) -> Self {
+        let moving = &robot.sensors[..robot.n_joints_seen_by(robot.camera_at(camera))];
+        Self {
             robot,
+            camera,
             plain,
             while_moving: map.while_moving,
             travels: TravelSeries::new(recording, robot, map.max_gap_s),
             recording,
             conditions: ConditionHistory::of_external(&recording.conditions),
             noise_rad: moving.iter().map(|spec| spec.noise_std_counts / spec.counts_per_rad.abs()).collect(),
-            out: Self { views: Vec::new(), digests: Vec::new(), ids_seen: Vec::new(), rejected: BTreeMap::new() },
-        };
+            out: RecordingViews::default(),
+        }
+    }
+
+    fn views(mut self, frames: &'a [TagFrame]) -> RecordingViews {
         let mut group: Vec<PairedFrame<'_>> = Vec::new();
-        for frame in &recording.frames {
-            let Some(paired) = maker.travels.at(frame.stamp) else {
-                maker.reject(ObservationRejection::NoReadings, frame.tags.len());
+        for frame in frames {
+            let Some(paired) = self.travels.at(frame.stamp) else {
+                self.reject(ObservationRejection::NoReadings, frame.tags.len());
                 continue;
             };
-            let is_moving = maker.is_moving(&paired);
+            let is_moving = self.is_moving(&paired);
             let is_too_fast = paired.rate_rad_s.is_some_and(|rate| rate.iter().any(|rate| rate.abs() > FASTEST_RAD_S));
-            if is_moving && (map.while_moving == WhileMoving::LeaveOut || is_too_fast) {
-                maker.reject(ObservationRejection::ArmMoving, frame.tags.len());
-                maker.close(&mut group);
+            if is_moving && (self.while_moving == WhileMoving::LeaveOut || is_too_fast) {
+                self.reject(ObservationRejection::ArmMoving, frame.tags.len());
+                self.close(&mut group);
                 continue;
             }
             let next = PairedFrame { frame, paired };
-            if !maker.belongs(&group, &next) {
-                maker.close(&mut group);
+            if !self.belongs(&group, &next) {
+                self.close(&mut group);
             }
             group.push(next);
         }
-        maker.close(&mut group);
-        maker.out
+        self.close(&mut group);
+        self.out
     }
 }
 
@@ -130,7 +178,7 @@ impl Maker<'_> {
         let (Some(first), Some(last)) = (frames.first(), frames.last()) else { return };
         let (travel_rad, n_readings) = self.mean_travel(&frames);
         let mut view = View::of_reading(0, last.frame.stamp, travel_rad);
-        view.n_readings = n_readings;
+        (view.n_readings, view.camera) = (n_readings, self.camera);
         let mut heard = Vec::new();
         view.conditions = self.conditions.over_noting(first.frame.stamp, last.frame.stamp, &mut heard);
         view.conditions.stamp = Some(last.frame.stamp);
@@ -163,7 +211,7 @@ impl Maker<'_> {
         self.out.digests.extend(heard.into_iter().map(|idx| self.recording.conditions[idx].digest));
         let (from, to) = (first.paired.readings.0, last.paired.readings.1);
         self.out.digests.extend(self.travels.readings[from..=to].iter().map(|reading| reading.digest));
-        self.out.views.push((view, first.frame.digests[0]));
+        self.out.views.push(MadeView { view, first: first.frame.digests[0], readings: (from, to) });
     }
 
     /// The mean against gravity over the span, else the nearest in time; `None` without an attitude near enough.
@@ -207,6 +255,7 @@ impl Maker<'_> {
                 by_id.entry(id).or_default().push(observation.seen);
             }
         }
+        let camera = self.robot.camera_at(self.camera);
         for (id, seen) in by_id {
             self.out.ids_seen.push(id);
             let Some(tag_idx) = self.robot.tags.iter().position(|tag| tag.id == id) else {
@@ -215,10 +264,10 @@ impl Maker<'_> {
             };
             let (averaged, n_apart) = match self.plain.board.filter(|_| self.plain.id == Some(id)) {
                 Some(board) => {
-                    let (averaged, n_apart) = average_board(&seen, self.robot, board);
+                    let (averaged, n_apart) = average_board(&seen, camera, board);
                     (averaged.map(Some), n_apart)
                 }
-                None => average(&seen, self.robot, tag_idx),
+                None => average(&seen, camera, self.robot.tags[tag_idx].size_m),
             };
             if n_apart > 0 {
                 self.reject(ObservationRejection::InconsistentFrame, n_apart);

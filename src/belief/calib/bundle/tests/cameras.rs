@@ -1,0 +1,60 @@
+//! Arms with a second camera.
+
+use nalgebra::Isometry3;
+
+use crate::calib::bundle::estimate::estimate;
+use crate::calib::bundle::input::HyperparameterMode;
+use crate::calib::bundle::tests::corner_outliers::tool_error;
+use crate::calib::bundle::tests::data::titan_with_two_cameras;
+use crate::calib::bundle::tests::statistics::{assert_honest, case, input, tally};
+use crate::calib::views::view::View;
+use armcal_core::robot::Robot;
+
+#[test]
+fn the_covariance_is_honest_with_a_second_camera() {
+    assert_honest(&tally(&titan_with_two_cameras(), 0..200, 20), "with a second camera");
+}
+
+/// The titan with two cameras beside each other on its wrist: what its joints are off in a pose is in both their views.
+fn stereo() -> Robot {
+    let mut robot = titan_with_two_cameras();
+    robot.further_cameras[0].mount = robot.camera.mount;
+    robot.further_cameras[0].mount.link_from_frame *= Isometry3::translation(0.06, 0.0, 0.0);
+    robot
+}
+
+/// Root mean square of the tool's error, mm, and mean NEES.
+#[derive(Clone, Copy, Debug, Default)]
+struct Errors {
+    rms_mm: f64,
+    nees: f64,
+}
+
+/// By the first camera alone, by both, and by both as if each had seen poses of its own.
+fn compared(robot: &Robot) -> [Errors; 3] {
+    const SEEDS: u64 = 100;
+    let mut sums = [Errors::default(); 3];
+    for seed in 0..SEEDS {
+        let case = case(robot, seed, 20);
+        let alone: Vec<View> = case.views.iter().map(|view| View { n_cameras: 1, ..view.clone() }).collect();
+        let first: Vec<View> = alone.iter().filter(|view| view.camera == 0).cloned().collect();
+        for (sum, views) in sums.iter_mut().zip([&first, &case.views, &alone]) {
+            let found = estimate(&input(&case, views, HyperparameterMode::Fitted)).expect("solved");
+            let [square_m2, nees] = tool_error(&case, &found, seed);
+            sum.rms_mm += 1e6 * square_m2 / SEEDS as f64;
+            sum.nees += nees / SEEDS as f64;
+        }
+    }
+    sums.map(|sum| Errors { rms_mm: sum.rms_mm.sqrt(), ..sum })
+}
+
+#[test]
+fn what_two_cameras_see_of_one_pose_is_not_counted_twice() {
+    for (robot, what) in [(stereo(), "beside each other"), (titan_with_two_cameras(), "on two links")] {
+        let [one, both, alone] = compared(&robot);
+        println!("{what}: one camera {one:?}, both {both:?}, as if of other poses {alone:?}");
+        assert!(both.rms_mm < 0.97 * one.rms_mm, "{what}: {both:?} {one:?}");
+        assert!((2.4..3.8).contains(&both.nees), "{what}: {both:?}");
+        assert!(alone.nees > both.nees + 0.5, "{what}: {alone:?} {both:?}");
+    }
+}

@@ -1,0 +1,57 @@
+//! `[[further_camera]]` of robot.toml: cameras beside the first one, which `calibrate` uses where a recording has them.
+
+use std::path::Path;
+
+use super::camera::{CameraFile, CameraSpec, CameraTable, check_camera};
+use super::error::{FileIssue, RobotError};
+use super::urdf::UrdfChain;
+
+/// An arm has no more cameras beside the first.
+pub const MAX_FURTHER_CAMERAS: usize = 7;
+
+/// Each sees the same tags as the first, past no joint that the first does not: `first` is the one farthest out.
+///
+/// # Errors
+/// [`RobotError`] naming the table's number and key.
+pub(super) fn check_further_cameras(
+    file: &Path,
+    raw: &[CameraFile],
+    arm: &UrdfChain<'_>,
+    first: &CameraSpec,
+) -> Result<Vec<CameraSpec>, RobotError> {
+    if raw.len() > MAX_FURTHER_CAMERAS {
+        let problem = format!("has {} entries, at most {MAX_FURTHER_CAMERAS} are allowed", raw.len());
+        return Err(FileIssue::new(file, "further_camera", problem).into());
+    }
+    let mut names = vec![&first.name];
+    let mut found = Vec::with_capacity(raw.len());
+    for (number, camera) in raw.iter().enumerate() {
+        let name = format!("further_camera[{}]", number + 1);
+        let issue = |key: &str, problem: String| FileIssue::new(file, format!("{name}.{key}"), problem);
+        if camera.name.is_empty() || names.contains(&&camera.name) {
+            let problem = format!("is `{}`; each camera needs a name of its own", camera.name);
+            return Err(issue("name", problem).into());
+        }
+        names.push(&camera.name);
+        let spec = check_camera(CameraTable { file, name: &name }, camera, arm.attachment(&camera.link)?)?;
+        let [n_joints, n_first] = [spec.mount.n_joints, first.mount.n_joints];
+        if n_joints > n_first {
+            let problem = format!(
+                "is `{}`, which more joints move than the link of [camera]: the camera farthest out on the arm is the \
+                 first, so exchange the two",
+                camera.link
+            );
+            return Err(issue("link", problem).into());
+        }
+        if n_joints == 0 && n_first > 0 {
+            let problem = format!(
+                "is `{}`, which no joint moves, while the arm moves [camera]: both see the same tags, and of tags \
+                 beside the arm a camera beside it tells nothing",
+                camera.link
+            );
+            return Err(issue("link", problem).into());
+        }
+        found.push(spec);
+    }
+    Ok(found)
+}
