@@ -9,10 +9,10 @@
 //! `script` and `cli` run the program, `kill` ends it badly; `sim` looks at the simulated world from outside;
 //! `uncalibrated` calibrates arms of which little is known; `real` reads recordings of real arms, `board_corners` those
 //! of a chessboard, `bags` the same as SQLite files, `recorded_inputs` their slow sensors and images, `streams` those
-//! that were recorded all the time, `cameras` those of arms with two cameras; `tagmap` maps tags in recordings that the test writes; `touch` feels surveyed
-//! plates with the tool; `any_arm` makes robot folders for drawings of all sorts; `report` reads report.html; `work`
-//! works on a dive, `watch` follows recordings that grow; `live` moves arms behind ROS 2 topics; `repository` reads
-//! sources and pages.
+//! that were recorded all the time, `cameras` those of arms with two cameras; `tagmap` maps tags in recordings that the
+//! test writes; `touch` feels surveyed plates with the tool; `any_arm` makes robot folders for drawings of all sorts;
+//! `report` reads report.html; `work` works on a dive, `watch` follows recordings that grow; `live` moves arms behind
+//! ROS 2 topics; `repository` reads sources and pages.
 
 #![allow(clippy::print_stderr, reason = "figures of a test, for whoever reads its output")]
 

@@ -11,6 +11,11 @@ use crate::kinematics::Attachment;
 use crate::optics::{CameraModel, Fisheye, FlatPort, Radtan};
 use crate::spatial::{Camera, Link, Pose};
 
+mod further;
+
+pub use further::MAX_FURTHER_CAMERAS;
+pub(super) use further::check_further_cameras;
+
 /// The nominal camera.
 #[derive(Clone, Debug)]
 pub struct CameraSpec {

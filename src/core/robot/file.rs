@@ -8,11 +8,10 @@ use serde::Deserialize;
 
 use super::allowed_pairs::AllowedPairs;
 use super::body::LinkBody;
-use super::camera::{CameraFile, CameraSpec, CameraTable, check_camera};
+use super::camera::{CameraFile, CameraSpec, CameraTable, check_camera, check_further_cameras};
 use super::completeness::check_complete;
 use super::drive::{DriveSpec, HydraulicsFile, MotionSpec, usual_displacement};
 use super::error::{FileIssue, RobotError, parse_toml, read_in};
-use super::further_camera::check_further_cameras;
 use super::geometry::GeometryPriors;
 use super::gripper::GripperFile;
 use super::gripper_tag::{GripperTag, GripperTagFile};

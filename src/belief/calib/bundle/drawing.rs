@@ -1,7 +1,7 @@
 //! Is the drawing right? Other explanations of the same views, compared by their evidence.
 //!
-//! Where the score test says that links, base or a mount would explain the data better than joint sensors do, where tags
-//! are not where they should be or do not fit at all, the views are estimated again under each alternative: link
+//! Where the score test says that links, base or a mount would explain the data better than joint sensors do, where
+//! tags are not where they should be or do not fit at all, the views are estimated again under each alternative: link
 //! geometry with columns of its own, an arm that bends under its weight (`sag_start`), a lens with columns, tags of
 //! another size, two tags exchanged, tags that were moved together. The one of most evidence stays if it brings
 //! [`MIN_GAIN_NATS`] or more, and more than freeing a tag that was moved (module `tags::freed`) would. Then all begins

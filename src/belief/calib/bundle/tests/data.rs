@@ -42,6 +42,16 @@ pub fn titan_with_two_cameras() -> Robot {
     robot
 }
 
+/// [`watched_titan`] with a second camera that stands beside the first and looks at the same place.
+pub fn titan_watched_by_two() -> Robot {
+    let mut robot = watched_titan();
+    let first = robot.camera.mount.link_from_frame;
+    let aside = first * Isometry3::new(Vector3::new(0.5, 0.1, 0.1), Vector3::new(0.0, -0.4, 0.0));
+    let mount = Attachment { n_joints: 0, link_from_frame: aside };
+    robot.further_cameras.push(CameraSpec { name: "aside".to_owned(), mount, ..robot.camera.clone() });
+    robot
+}
+
 /// The titan before a camera that stands still and looks at it, with tags on all sides of its hand.
 pub fn watched_titan() -> Robot {
     const N_AROUND: usize = 6;
@@ -149,8 +159,8 @@ pub struct Noise {
     pub joint_rad: [f64; MAX_JOINTS],
 }
 
-/// Views by the first camera at `n` random poses where it sees three tags or more, each followed by those of the further
-/// cameras that see one there.
+/// Views by the first camera at `n` random poses where it sees three tags or more, each followed by those of the
+/// further cameras that see one there.
 pub fn views(robot: &Robot, truth: &Truth, noise: &Noise, n: usize, rng: &mut ChaCha8Rng) -> Vec<View> {
     let mut out: Vec<View> = Vec::new();
     let mut n_poses = 0;

@@ -11,7 +11,8 @@ use crate::calib::bundle::priors::prior;
 use crate::calib::bundle::problem::{BundleProblem, State};
 use crate::calib::bundle::solve::{LOOSE, solve, stepped, until};
 use crate::calib::bundle::tests::data::{
-    Noise, Truth, normal, reference, rng, titan_with_gripper_tag, titan_with_two_cameras, views, watched_titan,
+    Noise, Truth, normal, reference, rng, titan_watched_by_two, titan_with_gripper_tag, titan_with_two_cameras, views,
+    watched_titan,
 };
 use crate::calib::parameters::JointParameters;
 use crate::calib::views::view::{TagMeasurement, View};
@@ -120,6 +121,7 @@ fn the_gradient_is_that_of_the_cost_before_a_camera_that_stands_still() {
 #[test]
 fn the_gradient_is_that_of_the_cost_with_a_second_camera() {
     has_the_costs_gradient(titan_with_two_cameras);
+    has_the_costs_gradient(titan_watched_by_two);
 }
 
 fn has_the_costs_gradient(robot: fn() -> Robot) {

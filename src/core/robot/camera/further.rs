@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use super::camera::{CameraFile, CameraSpec, CameraTable, check_camera};
-use super::error::{FileIssue, RobotError};
-use super::urdf::UrdfChain;
+use super::{CameraFile, CameraSpec, CameraTable, check_camera};
+use crate::robot::error::{FileIssue, RobotError};
+use crate::robot::urdf::UrdfChain;
 
 /// An arm has no more cameras beside the first.
 pub const MAX_FURTHER_CAMERAS: usize = 7;
@@ -13,7 +13,7 @@ pub const MAX_FURTHER_CAMERAS: usize = 7;
 ///
 /// # Errors
 /// [`RobotError`] naming the table's number and key.
-pub(super) fn check_further_cameras(
+pub(in crate::robot) fn check_further_cameras(
     file: &Path,
     raw: &[CameraFile],
     arm: &UrdfChain<'_>,
