@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::calib::views::view::{CaptureData, TagMeasurement, TagObservation, View};
 use armcal_core::joints::JointAngles;
-use armcal_core::optics::{CameraModel, Fisheye, LensModel, Radtan, solve_square_both};
+use armcal_core::optics::{CameraModel, Fisheye, LensModel, Radtan, TagFamily, solve_square_both};
 use armcal_core::robot::{Robot, SurveyedTag};
 use armcal_core::spatial::Pose;
 use armcal_core::stats::quantile;
@@ -31,6 +31,9 @@ pub struct WrongInput {
     /// The same with the input put right; absent where nothing puts it right.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mismatch_otherwise: Option<f64>,
+    /// What of the tags was measured in place of their size, in words, where their print tells it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub size_hint: Option<String>,
 }
 
 /// What may be wrong.
@@ -84,15 +87,23 @@ const GOOD_SPREAD_RAD: f64 = 0.25;
 const FISHEYE_RAD: f64 = 1.5;
 const MIN_ROTATIONS: usize = 5;
 
-/// A tag that stands beside its print: the black square has 8 of the 10 cells that the whole print with its white
-/// margin has. `None` where `ratio`, of the true size over the stated one, says neither.
+/// A size that stands beside its print: of tag36h11 the border square has 8 of the 10 cells that the whole print has.
+/// `None` where `ratio`, of the true size over the stated one, says neither.
 #[must_use]
-pub(crate) fn margin_hint(ratio: f64) -> Option<&'static str> {
-    let is = |of: f64| (ratio / of - 1.0).abs() < 0.02;
-    if is(0.8) {
-        Some("8/10: the stated size is that of the whole print with its white margin; state the black square's")
-    } else if is(1.25) {
-        Some("10/8: the margin was taken off a size that had none; state the black square's side as measured")
+pub(crate) fn margin_hint(family: TagFamily, ratio: f64) -> Option<String> {
+    let (border, whole) = (family.n_cells(), family.n_cells() + 2 * family.n_margin_cells());
+    let is = |of: usize, over: usize| (ratio / (of as f64 / over as f64) - 1.0).abs() < 0.02;
+    let [print, beyond, square] = match family {
+        TagFamily::Tag16h5 | TagFamily::Tag25h9 | TagFamily::Tag36h11 => {
+            ["the whole print with its white margin", "the margin", "black square"]
+        }
+        _ => ["the whole print", "what lies beyond the border", "border square"],
+    };
+    if is(border, whole) {
+        Some(format!("{border}/{whole}: the stated size is that of {print}; state the {square}'s"))
+    } else if is(whole, border) {
+        let was = format!("{beyond} was taken off a size that had none");
+        Some(format!("{whole}/{border}: {was}; state the {square}'s side as measured"))
     } else {
         None
     }
@@ -106,10 +117,10 @@ pub(crate) fn wrong_input(data: &CaptureData, tags: &[SurveyedTag], robot: &Robo
     let stated_px = lens.resolution_px();
     if beyond(stated_px, data.largest_px) {
         let input = WrongInputKind::ImageSize { stated_px, seen_px: data.largest_px };
-        return Some(WrongInput { input, mismatch: 1.0, mismatch_otherwise: None });
+        return Some(WrongInput { input, mismatch: 1.0, mismatch_otherwise: None, size_hint: None });
     }
     match mismatch(&views, tags, lens) {
-        Some(pairs) => by_pairs(&views, tags, lens, &pairs),
+        Some(pairs) => by_pairs(&views, tags, robot, &pairs),
         None => by_rotations(&views, robot),
     }
 }
@@ -119,7 +130,8 @@ fn beyond(stated_px: [u32; 2], seen_px: [f64; 2]) -> bool {
     stated_px[0] > 0 && (is_beyond(0) || is_beyond(1))
 }
 
-fn by_pairs(views: &[&View], tags: &[SurveyedTag], lens: &CameraModel, as_written: &Pairs) -> Option<WrongInput> {
+fn by_pairs(views: &[&View], tags: &[SurveyedTag], robot: &Robot, as_written: &Pairs) -> Option<WrongInput> {
+    let lens = &robot.camera.lens;
     let mut found: Option<(WrongInputKind, f64)> = None;
     let mut consider = |input, pairs: Option<Pairs>| {
         let Some(Pairs { mismatch, .. }) = pairs else { return };
@@ -138,19 +150,23 @@ fn by_pairs(views: &[&View], tags: &[SurveyedTag], lens: &CameraModel, as_writte
         input,
         mismatch: as_written.mismatch,
         mismatch_otherwise: otherwise,
+        size_hint: None,
     };
     if let Some((input, otherwise)) = found {
         return Some(wrong((input, Some(otherwise))));
     }
     if let Some((ids, before, after)) = exchanged_ids(views, tags, lens) {
         let input = WrongInputKind::ExchangedIds(ids);
-        return Some(WrongInput { input, mismatch: before, mismatch_otherwise: Some(after) });
+        return Some(WrongInput { input, mismatch: before, mismatch_otherwise: Some(after), size_hint: None });
     }
     if as_written.mismatch > BAD {
         return Some(wrong((WrongInputKind::OtherMap, None)));
     }
     let is_of_size = (as_written.ratio - 1.0).abs() > SIZE_TOLERANCE && as_written.mismatch < GOOD;
-    is_of_size.then(|| wrong((WrongInputKind::TagSize(as_written.ratio), None)))
+    is_of_size.then(|| WrongInput {
+        size_hint: margin_hint(robot.tag_family, as_written.ratio),
+        ..wrong((WrongInputKind::TagSize(as_written.ratio), None))
+    })
 }
 
 /// The lens of an image of `scale` times the size.
@@ -336,7 +352,7 @@ fn by_rotations(views: &[&View], robot: &Robot) -> Option<WrongInput> {
     let spreads = readings.into_iter().filter_map(|(input, read)| Some((input, spread(read)?)));
     let (input, least) = spreads.min_by(|a, b| a.1.total_cmp(&b.1))?;
     let is_better = as_written > SPREAD_RAD && least < GOOD_SPREAD_RAD.min(BETTER * as_written);
-    is_better.then_some(WrongInput { input, mismatch: as_written, mismatch_otherwise: Some(least) })
+    is_better.then_some(WrongInput { input, mismatch: as_written, mismatch_otherwise: Some(least), size_hint: None })
 }
 
 /// Median angle of a landmark's rotations from the one that is nearest to all others; the largest of all landmarks.
@@ -373,7 +389,9 @@ impl WrongInput {
                  that it was measured for"
             }
             WrongInputKind::LensModel => "state the model and the distortion of that lens in [camera] of robot.toml",
-            WrongInputKind::TagSize(_) => "measure the black square of one tag and correct size_m",
+            WrongInputKind::TagSize(_) => {
+                "measure the border square of one tag (of tag36h11 the black one) and correct size_m"
+            }
             WrongInputKind::ExchangedIds(_) => "give each of them the id that is printed there",
             WrongInputKind::OtherMap => {
                 "give the tag map of this site with --tag-map, check the tags' ids, or make the map anew with `armcal \
@@ -419,7 +437,7 @@ impl fmt::Display for WrongInput {
             }
             WrongInputKind::TagSize(ratio) => {
                 write!(f, "all tags are {:+.1} % of their stated size", 100.0 * (ratio - 1.0))?;
-                margin_hint(*ratio).map_or(Ok(()), |hint| write!(f, ", {hint}"))
+                self.size_hint.as_ref().map_or(Ok(()), |hint| write!(f, ", {hint}"))
             }
             WrongInputKind::ExchangedIds(ids) => {
                 let ids: Vec<String> = ids.iter().map(ToString::to_string).collect();

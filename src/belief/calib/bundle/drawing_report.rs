@@ -180,7 +180,8 @@ impl Estimate<'_> {
             }
             TagFault::AllSizes { ratio } => {
                 let percent = 100.0 * (ratio - 1.0);
-                let hint = margin_hint(ratio).map_or(String::new(), |hint| format!(" ({hint})"));
+                let family = self.problem.robot.tag_family;
+                let hint = margin_hint(family, ratio).map_or(String::new(), |hint| format!(" ({hint})"));
                 let words =
                     format!("all tags are {percent:+.1} % of the survey's size{hint}: taken so; measure one again");
                 (FindingKind::TagSize, "all".to_owned(), Some(ratio - 1.0), words)

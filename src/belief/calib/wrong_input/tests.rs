@@ -96,14 +96,22 @@ fn a_lens_of_another_image_size_is_told() {
 #[test]
 fn a_tag_size_is_told_and_the_margin_of_the_print() {
     let (data, robot) = sample();
-    for (share, hint) in [(1.25, "8/10"), (0.8, "10/8")] {
+    for (family, share, hint) in [
+        (TagFamily::Tag36h11, 1.25, "8/10: the stated size is that of the whole print with its white margin"),
+        (TagFamily::Tag36h11, 0.8, "10/8: the margin was taken off"),
+        (TagFamily::Tag25h9, 9.0 / 7.0, "7/9: the stated size is that of the whole print with its white margin"),
+        (TagFamily::Standard41h12, 9.0 / 5.0, "5/9: the stated size is that of the whole print; state the border"),
+        (TagFamily::Standard52h13, 0.6, "10/6: what lies beyond the border was taken off"),
+    ] {
         let mut other = robot.clone();
+        other.tag_family = family;
         other.tags.iter_mut().for_each(|tag| tag.size_m *= share);
         let wrong = wrong_input(&data, &other.tags, &other).expect("a wrong input");
         assert!(matches!(wrong.input, WrongInputKind::TagSize(ratio) if (ratio * share - 1.0).abs() < 0.01), "{wrong}");
         assert!(wrong.to_string().contains(hint), "{wrong}");
     }
-    assert_eq!((margin_hint(1.1), margin_hint(1.0)), (None, None));
+    let hint = |ratio| margin_hint(TagFamily::Tag36h11, ratio);
+    assert_eq!((hint(1.1), hint(1.0), hint(5.0 / 9.0)), (None, None, None));
 }
 
 /// A tag that nearly all views show.
