@@ -30,6 +30,7 @@ fn arm() -> Robot {
 
 /// Joint positions as `unit` has them ("rad", "deg", "counts"); slides always in metres, but for counts.
 fn input_map(unit: &str) -> String {
+    let unit = if unit == "mm" { "rad\"\nslide_unit = \"mm" } else { unit };
     format!(
         "version = 1\n[joint_sensors]\ntopic = \"/joint_states\"\nunit = \"{unit}\"\n[tags]\ntopic = \"/tags\"\n\
          camera_frame = \"wrist_optical\"\nuse = \"corners\"\n"
@@ -73,6 +74,7 @@ impl<'a> Recorded<'a> {
         match unit {
             "counts" => word,
             "deg" if !SLIDES.contains(&joint) => si.to_degrees(),
+            "mm" if SLIDES.contains(&joint) => 1e3 * si,
             _ => si,
         }
     }
@@ -168,9 +170,9 @@ fn errors_of_slides_come_back_and_are_as_large_as_predicted() {
 fn positions_in_metres_beside_angles_in_any_unit_give_one_calibration() {
     let robot = arm();
     let recorded = Recorded::new(&robot, "units", 1);
-    let [rad, deg, counts] = ["rad", "deg", "counts"]
+    let [rad, deg, mm, counts] = ["rad", "deg", "mm", "counts"]
         .map(|unit| calibrate_data(recorded.prepared(unit), Method::Bundle, None).expect("calibrated"));
-    for other in [deg, counts] {
+    for other in [deg, mm, counts] {
         for (a, b) in rad.joint.iter().zip(&other.joint) {
             let off = (a.gain_rad_per_count / b.gain_rad_per_count - 1.0).abs();
             assert!(off < 1e-6 && (a.offset_rad - b.offset_rad).abs() < 1e-6, "{}: {off:e}", a.name);
@@ -179,6 +181,25 @@ fn positions_in_metres_beside_angles_in_any_unit_give_one_calibration() {
 }
 
 /// The program's own files and words of an arm with slides.
+#[test]
+fn millimetres_for_metres_are_refused_by_name() {
+    let robot = arm();
+    let (recorded, folder) = (Recorded::new(&robot, "units", 1), temp());
+    let path = folder.path().join("arm.mcap");
+    for (written, stated, words) in [
+        ("mm", "rad", ["are millimetres, not metres", "slide_unit = \"mm\""]),
+        ("mm", "deg", ["are millimetres, not metres", "slide_unit = \"mm\""]),
+    ] {
+        recorded.write(&path, written);
+        let map = parse_input_map(Path::new("map.toml"), &input_map(stated)).expect("a map");
+        let problem = read_external(&path, &map, &robot).expect_err("another unit").to_string();
+        assert!(words.iter().all(|word| problem.contains(word)), "{problem}");
+    }
+    let map = input_map("mm").replace("unit = \"rad\"", "unit = \"counts\"");
+    let problem = parse_input_map(Path::new("map.toml"), &map).expect_err("raw readings").to_string();
+    assert!(problem.starts_with("map.toml: joint_sensors.slide_unit: is for numbers that are no raw"), "{problem}");
+}
+
 #[test]
 fn files_and_words_are_in_metres_for_slides() {
     let (robot, folder_out) = (arm(), temp());

@@ -1,6 +1,6 @@
 //! Why a recording of a real arm cannot be used.
 
-use super::map::JointUnit;
+use super::map::{JointUnit, SlideUnit};
 use crate::log::{CdrError, LogError, StampRegression};
 
 /// A message or a row of a table.
@@ -60,6 +60,14 @@ pub enum InputError {
         likely.key()
     )]
     Unit { file: String, joint: String, value: f64, stated: JointUnit, likely: JointUnit },
+    #[error(
+        "{file}: the slides' numbers are {}, not {}: `{joint}` is {value:.3}, far outside of its range; set \
+         joint_sensors.slide_unit = \"{}\" in the input map",
+        likely.name(),
+        stated.name(),
+        likely.key()
+    )]
+    SlideUnit { file: String, joint: String, value: f64, stated: SlideUnit, likely: SlideUnit },
     #[error(
         "{file}: topic {topic}: more than {most} messages of use, which stay in memory; cut the recording into pieces, \
          and give them all"

@@ -2,12 +2,13 @@
 
 use super::error::InputError;
 use super::joints::{Reading, n_needed};
-use super::map::{InputMap, JointUnit};
+use super::map::{InputMap, JointUnit, SlideUnit};
 use crate::robot::{JointSensorSpec, Robot};
 
 /// An angle may lie so far outside of the joint's range: sensors are off.
 const RANGE_FACTOR: f64 = 1.1;
 const BEYOND_RANGE_RAD: f64 = 0.2;
+const BEYOND_RANGE_M: f64 = 0.05;
 /// A joint without limits may have turned so far.
 const TURNS_RAD: f64 = 8.0 * std::f64::consts::PI;
 /// With fewer of the numbers within the joints' ranges the unit is wrong, if with another one nearly all are.
@@ -31,6 +32,9 @@ pub(super) fn check_unit(
 ) -> Result<Option<String>, InputError> {
     let values = Values { stated: map.joint_unit, sensors: &robot.sensors[..n_needed(robot)], readings };
     let stated = map.joint_unit;
+    if stated != JointUnit::Counts {
+        values.check_slides(file, map.slide_unit)?;
+    }
     let others = [JointUnit::Rad, JointUnit::Deg].into_iter().filter(|unit| *unit != stated);
     let fits = |unit: &JointUnit| values.share_within(*unit) > NEARLY_ALL;
     if let Some((joint, value)) = values.first_outside()
@@ -85,6 +89,26 @@ impl Values<'_> {
         let most_rad =
             if spec.is_limited() { RANGE_FACTOR * spec.half_range_rad + BEYOND_RANGE_RAD } else { TURNS_RAD };
         (self.angle_rad(unit, reading, joint) - spec.center_rad).abs() <= most_rad
+    }
+
+    /// Metres and millimetres are a factor apart that no range bridges.
+    fn check_slides(&self, file: &str, stated: SlideUnit) -> Result<(), InputError> {
+        let likely = if stated == SlideUnit::M { SlideUnit::Mm } else { SlideUnit::M };
+        let factor = likely.in_m() / stated.in_m();
+        for (joint, spec) in self.sensors.iter().enumerate().filter(|(_, spec)| spec.moves.is_slide()) {
+            let most_m = RANGE_FACTOR * spec.half_range_rad + BEYOND_RANGE_M;
+            let share = |factor: f64| {
+                let travel_m = |reading| factor * self.angle_rad(self.stated, reading, joint) - spec.center_rad;
+                let within = self.readings.iter().filter(|reading| travel_m(reading).abs() <= most_m);
+                within.count() as f64 / self.readings.len().max(1) as f64
+            };
+            if spec.is_limited() && !self.readings.is_empty() && share(1.0) < FEW && share(factor) > NEARLY_ALL {
+                let value = self.angle_rad(self.stated, &self.readings[0], joint) / stated.in_m();
+                let (file, joint) = (file.to_owned(), spec.joint.clone());
+                return Err(InputError::SlideUnit { file, joint, value, stated, likely });
+            }
+        }
+        Ok(())
     }
 
     fn each(&self) -> impl Iterator<Item = (&Reading, usize)> {

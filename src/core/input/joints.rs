@@ -86,7 +86,7 @@ impl<'a> JointReader<'a> {
         }
         self.order.add_of(self.messages, stamp);
         let counts = JointCounts::from_fn(at.len(), |j| {
-            at[j].map_or(0.0, |k| self.map.joint_unit.counts(&self.sensors[j], message.position[k]))
+            at[j].map_or(0.0, |k| self.map.counts(&self.sensors[j], message.position[k]))
         });
         if let Some(joint) = counts.iter().position(|value| !value.is_finite()) {
             if self.map.not_finite == NotFinite::LeaveOut {

@@ -9,6 +9,7 @@
 //! topic = "/joint_states"            # sensor_msgs/msg/JointState, position[] = the raw sensor reading
 //! names = { elbow = "joint_3" }      # optional: the robot's joint = the recorded name, where they differ
 //! unit = "counts"                    # optional: or "rad", "deg": angles made of the sensors by their datasheet
+//! slide_unit = "m"                   # optional, with "rad" or "deg": or "mm", of joints that slide
 //! [tags]
 //! topic = "/tf"                      # tf2_msgs/msg/TFMessage, apriltag_msgs/msg/AprilTagDetectionArray, or
 //!                                    # sensor_msgs/msg/Image or CompressedImage (with use = "corners")
@@ -41,10 +42,12 @@ pub use self::table::{
     Direction, PoseColumns, RotationColumns, RotationForm, SeenColumns, TableFormat, TableLayout, TimeColumn,
 };
 use self::table::{TableToml, TagColumnsToml};
+pub use self::units::{JointUnit, SlideUnit};
 use crate::optics::TagFamily;
 use crate::robot::{FileIssue, JointSensorSpec, Robot, RobotError, parse_toml, read_text};
 
 mod table;
+mod units;
 
 /// How far a quaternion's length may be from 1.
 pub(super) const QUATERNION_LENGTH_TOLERANCE: f64 = 0.01;
@@ -91,51 +94,6 @@ pub enum NotFinite {
     Refuse,
     /// The message (of a joint reading) or the tag is left out and counted.
     LeaveOut,
-}
-
-/// What the recorded numbers of the joints are.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum JointUnit {
-    /// Raw readings, in the unit of robot.toml's scale.
-    #[default]
-    Counts,
-    /// Angles made of the readings by the datasheet: robot.toml's scale and offset.
-    Rad,
-    /// The same in degrees.
-    Deg,
-}
-
-impl JointUnit {
-    /// In words.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Counts => "counts",
-            Self::Rad => "radians",
-            Self::Deg => "degrees",
-        }
-    }
-
-    /// As the input map writes it.
-    #[must_use]
-    pub fn key(self) -> &'static str {
-        match self {
-            Self::Counts => "counts",
-            Self::Rad => "rad",
-            Self::Deg => "deg",
-        }
-    }
-
-    /// The raw reading that `value` stands for.
-    pub(super) fn counts(self, spec: &JointSensorSpec, value: f64) -> f64 {
-        match self {
-            Self::Counts => value,
-            Self::Rad => spec.offset_counts + spec.counts_per_rad * value,
-            Self::Deg if spec.moves.is_slide() => Self::Rad.counts(spec, value),
-            Self::Deg => Self::Rad.counts(spec, value.to_radians()),
-        }
-    }
 }
 
 /// How the frames of tags are called.
@@ -273,6 +231,8 @@ pub struct InputMap {
     pub joint_names: BTreeMap<String, String>,
     /// What the recorded numbers of the joints are.
     pub joint_unit: JointUnit,
+    /// What those of slides are, where `joint_unit` is one of angles.
+    pub slide_unit: SlideUnit,
     /// Names of the tags' frames; `None` with [`TagUse::Corners`] alone.
     pub child_frame: Option<ChildFrame>,
     /// What is printed on the tags in images; `None`: what is on the robot's.
@@ -306,6 +266,12 @@ impl InputMap {
                 Err(FileIssue::new(file, "further_tags.camera", problem))
             }
         }
+    }
+
+    /// The raw reading that a recorded number stands for.
+    pub(super) fn counts(&self, spec: &JointSensorSpec, value: f64) -> f64 {
+        let is_metric = self.joint_unit != JointUnit::Counts && spec.moves.is_slide();
+        self.joint_unit.counts(spec, if is_metric { value * self.slide_unit.in_m() } else { value })
     }
 
     /// What further cameras saw.
@@ -364,6 +330,7 @@ struct JointsToml {
     names: BTreeMap<String, String>,
     #[serde(default)]
     unit: JointUnit,
+    slide_unit: Option<SlideUnit>,
 }
 
 #[derive(Deserialize)]
@@ -428,6 +395,7 @@ pub fn parse_input_map(file: &Path, text: &str) -> Result<InputMap, RobotError> 
         source,
         joint_names: raw.joint_sensors.names,
         joint_unit: raw.joint_sensors.unit,
+        slide_unit: slide_unit(file, raw.joint_sensors.unit, raw.joint_sensors.slide_unit)?,
         child_frame,
         tag_family: tag_family.transpose()?,
         tag_use: raw.tags.tag_use,
@@ -435,6 +403,14 @@ pub fn parse_input_map(file: &Path, text: &str) -> Result<InputMap, RobotError> 
         while_moving: raw.while_moving,
         not_finite: raw.not_finite,
     })
+}
+
+fn slide_unit(file: &Path, unit: JointUnit, slide_unit: Option<SlideUnit>) -> Result<SlideUnit, FileIssue> {
+    if slide_unit.is_some() && unit == JointUnit::Counts {
+        let problem = "is for numbers that are no raw readings: set unit = \"rad\" or \"deg\", too";
+        return Err(FileIssue::new(file, "joint_sensors.slide_unit", problem));
+    }
+    Ok(slide_unit.unwrap_or_default())
 }
 
 fn check_no_topics(file: &Path, raw: &MapToml) -> Result<(), FileIssue> {

@@ -155,7 +155,7 @@ impl TableReader<'_> {
             if self.recording.absent_joints.contains(&joint) {
                 return 0.0;
             }
-            self.map.joint_unit.counts(&self.robot.sensors[joint], values[joint])
+            self.map.counts(&self.robot.sensors[joint], values[joint])
         })
     }
 
