@@ -36,6 +36,7 @@ mod targets;
 mod touches;
 mod tracks;
 mod truth;
+mod uncertainty;
 mod viewer;
 mod viewpoint;
 mod views;

@@ -107,6 +107,7 @@ impl News {
             vehicle: vehicle.as_ref(),
             scene: scene.as_ref(),
             believed_links: &[],
+            tool_beliefs: &[],
             online: None,
             summary_markdown: Some(SUMMARY),
         };

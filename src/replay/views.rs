@@ -46,6 +46,7 @@ pub fn write_views_rrd(input: &ViewsInput<'_>, out: &Path) -> Result<(), ReplayE
         vehicle: None,
         scene: None,
         believed_links: &[],
+        tool_beliefs: &[],
         online: None,
         summary_markdown: Some(input.summary_markdown),
     };

@@ -5,7 +5,9 @@ use std::fmt;
 use crate::calib::Calibration;
 use crate::session::held_joint::HeldJoint;
 use crate::session::online_belief::OnlineOutcome;
+use crate::session::tool_belief::{Certainty, ToolBelief};
 use armcal_core::kinematics::LinkCorrections;
+use armcal_core::robot::Robot;
 use armcal_core::routine::AssertFigure;
 use armcal_core::sensor::ArmSensors;
 use armcal_core::streams::{JointAngles, ReachAttempt};
@@ -87,6 +89,8 @@ pub struct Epoch {
     pub sensors: ArmSensors,
     /// Where they come from; `None` for the datasheet.
     pub calibration: Option<Calibration>,
+    /// How well they are known.
+    pub certainty: Certainty,
 }
 
 impl Epoch {
@@ -94,6 +98,21 @@ impl Epoch {
     #[must_use]
     pub fn links(&self) -> LinkCorrections {
         self.calibration.as_ref().map(Calibration::link_corrections).unwrap_or_default()
+    }
+
+    /// How well the tool's place is known; `None` where nobody says.
+    #[must_use]
+    pub fn tool_belief(&self, robot: &Robot) -> Option<ToolBelief> {
+        match &self.certainty {
+            Certainty::Datasheet => Some(ToolBelief::by_datasheet(robot, &self.sensors)),
+            Certainty::Calibration => ToolBelief::by_calibration(robot, self.calibration.as_ref()?),
+            Certainty::Interim(estimate) => ToolBelief::by_calibration(robot, estimate),
+            Certainty::Online(covariance) => {
+                let robot = Robot { chain: robot.chain.corrected(&self.links()), ..robot.clone() };
+                Some(ToolBelief::online(robot, &self.sensors, covariance))
+            }
+            Certainty::Unknown => None,
+        }
     }
 }
 

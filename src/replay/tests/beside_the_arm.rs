@@ -1,0 +1,87 @@
+//! What is drawn about the arm: how sure it is of its tool.
+
+use std::path::Path;
+
+use nalgebra::{Point3, Vector3};
+use rerun::components::{HalfSize3D, Translation3D};
+use rerun::{Component, ComponentDescriptor, Ellipsoids3D};
+
+use super::{chunks, entities, input, small};
+use crate::*;
+use armcal_belief::session::ToolBelief;
+use armcal_core::robot::Robot;
+use armcal_core::sensor::{ArmSensors, Conditions};
+use armcal_core::time::SIMULATION_EPOCH;
+
+/// Rows of one component of an entity: times, s, and what it has.
+fn rows<C: Component>(rrd: &Path, entity: &str, component: &ComponentDescriptor) -> Vec<(f64, Vec<C>)> {
+    let mut rows = Vec::new();
+    for chunk in chunks(rrd).iter().filter(|chunk| chunk.entity_path().to_string() == entity && !chunk.is_static()) {
+        let (_, times) = chunk.timelines().iter().next().expect("a timeline");
+        for (row, time) in times.times_raw().iter().enumerate() {
+            if let Some(batch) = chunk.component_batch::<C>(component.component, row) {
+                rows.push((*time as f64 * 1e-9, batch.expect("it decodes")));
+            }
+        }
+    }
+    rows
+}
+
+/// With sensors by the datasheet, then ones a hundred times as good, then nobody knows which.
+#[test]
+fn the_ellipsoid_is_about_the_believed_tool_and_as_large_as_the_belief_says() {
+    let (dir, recording, truth, robot) = small();
+    let mut better = robot.clone();
+    for spec in &mut better.sensors {
+        spec.offset_std_rad *= 0.01;
+        spec.gain_std *= 0.01;
+        spec.linearity_std_rad *= 0.01;
+    }
+    let of = |robot: &Robot| Some(ToolBelief::by_datasheet(robot, &ArmSensors::nominal(robot)));
+    let at = |time_s: f64| SIMULATION_EPOCH.plus_s(time_s);
+    let beliefs = [(at(0.0), of(&robot)), (at(8.0), of(&better)), (at(12.0), None)];
+    let shown = ReplayInput { truth: Some(&truth), tool_beliefs: &beliefs, ..input(&recording, &robot) };
+    let out = dir.path().join("run.rrd");
+    write_rrd(&shown, &out).unwrap();
+    let run = crate::recording::scene(&shown).unwrap();
+    let carrier = entities(&out).into_keys().find(|entity| entity.ends_with("/tool_95_percent")).expect("an ellipsoid");
+    let carrier = carrier.trim_end_matches("tool_95_percent");
+    assert!(carrier.contains("/base/believed_arm/6_"), "{carrier}");
+    for (name, belief, span_s, factor) in [
+        ("tool_95_percent", &beliefs[0].1, 0.0..8.0, 1.0),
+        ("tool_95_percent_drawn_20_times_as_large", &beliefs[1].1, 8.0..12.0, 20.0),
+    ] {
+        let entity = format!("{carrier}{name}");
+        let centers = rows::<Translation3D>(&out, &entity, &Ellipsoids3D::descriptor_centers());
+        let sizes = rows::<HalfSize3D>(&out, &entity, &Ellipsoids3D::descriptor_half_sizes());
+        assert!(sizes.len() > 2 && centers.len() == sizes.len(), "{name}: {}", sizes.len());
+        for ((time_s, center), (_, size)) in centers.iter().zip(&sizes) {
+            assert!(span_s.contains(time_s), "{name}: {time_s}");
+            let angles = run.tracks.believed.at(*time_s).unwrap();
+            let poses = run.believed_poses(*time_s, angles);
+            let center = Point3::from(Vector3::from(center[0].0.0.map(f64::from)));
+            let off_m = (poses.link(6) * center).coords - poses.frame(&robot.tool.mount).translation.vector;
+            assert!(off_m.norm() < 1e-6, "{name}: {off_m}");
+            let covariance_m2 = belief.as_ref().unwrap().position_m2(angles, &Conditions::default()).unwrap();
+            // 95 % of three dimensions are 2.7955 sigma.
+            let longest_m = 2.7955 * covariance_m2.symmetric_eigenvalues().max().sqrt();
+            let drawn_m = size[0].0.0.into_iter().map(f64::from).fold(0.0, f64::max);
+            assert!((drawn_m / (factor * longest_m) - 1.0).abs() < 0.02, "{name}: {drawn_m} {longest_m}");
+        }
+        let style = entities(&out)[&entity] - sizes.len();
+        assert_eq!(style, 2, "{name}: its style, and its end");
+    }
+}
+
+/// Without truth there is one arm, and without a belief no ellipsoid.
+#[test]
+fn the_ellipsoid_belongs_to_the_one_arm_that_is_shown() {
+    let (dir, recording, _, robot) = small();
+    let out = dir.path().join("run.rrd");
+    let beliefs = [(SIMULATION_EPOCH, Some(ToolBelief::by_datasheet(&robot, &ArmSensors::nominal(&robot))))];
+    write_rrd(&ReplayInput { tool_beliefs: &beliefs, ..input(&recording, &robot) }, &out).unwrap();
+    let found = |out: &Path| entities(out).into_keys().filter(|entity| entity.contains("tool_95")).collect::<Vec<_>>();
+    assert!(found(&out).iter().all(|entity| entity.contains("/base/arm/6_")) && found(&out).len() == 2);
+    write_rrd(&input(&recording, &robot), &out).unwrap();
+    assert!(found(&out).is_empty());
+}
