@@ -59,6 +59,7 @@ pub(super) fn replay(args: &ReplayArgs) -> Result<Exit> {
         scene: drawings.scene.as_ref(),
         believed_links: &believed_links,
         tool_beliefs: &tool_beliefs,
+        residuals: &[],
         online: online.as_ref(),
         summary_markdown: None,
     };

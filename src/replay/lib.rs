@@ -26,6 +26,7 @@ mod plots;
 mod poses;
 mod read;
 mod recording;
+mod residuals;
 mod rrd;
 mod scene;
 mod scenery;

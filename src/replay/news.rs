@@ -108,6 +108,7 @@ impl News {
             scene: scene.as_ref(),
             believed_links: &[],
             tool_beliefs: &[],
+            residuals: &[],
             online: None,
             summary_markdown: Some(SUMMARY),
         };

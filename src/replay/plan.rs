@@ -58,6 +58,7 @@ pub fn write_plan_rrd(input: &PlanInput<'_>, out: &Path) -> Result<(), ReplayErr
         scene: Some(input.scene),
         believed_links: &[],
         tool_beliefs: &[],
+        residuals: &[],
         online: None,
         summary_markdown: Some(input.markdown),
     };

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use crate::tracks::Tracks;
 use crate::truth::Truth;
+use armcal_belief::calib::ViewResidual;
 use armcal_belief::calib::online::BeliefLog;
 use armcal_belief::session::ToolBelief;
 use armcal_core::joints::JointAngles;
@@ -25,6 +26,8 @@ pub struct ReplayInput<'a> {
     pub believed_links: &'a [(Stamp, LinkCorrections)],
     /// Since when it was believed how surely where the tool is, in the order of time; `None` where nobody said.
     pub tool_beliefs: &'a [(Stamp, Option<ToolBelief>)],
+    /// What each calibration left of the tags that it saw, since its time.
+    pub residuals: &'a [(Stamp, &'a [ViewResidual])],
     /// What was believed online.
     pub online: Option<&'a BeliefLog>,
     /// Shown as it is, in place of a short description of the recording.

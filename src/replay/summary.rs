@@ -64,9 +64,15 @@ fn legend(run: &ReplayScene, input: &ReplayInput) -> String {
     } else {
         ""
     };
+    let residuals = if input.residuals.is_empty() {
+        ""
+    } else {
+        "- frames about tags, once calibrated: how far off their corners are, root mean square; **green** fits, \
+         **amber** is worse than the others, **red** contradicts them or was rejected\n"
+    };
     format!(
         "### How to read the picture\n\n{arms}\
-         - numbered yellow balls: targets{rests}\n{region}\
+         - numbered yellow balls: targets{rests}\n{region}{residuals}\
          - white line: the tool's last seconds; blue cone: the camera's line of sight\n\
          - blue and orange dots: where views were taken to fit and to check the calibration\n\
          - camera: **green** outlines are tags as seen, **pink** ones are where the believed arm expects them; \

@@ -237,6 +237,7 @@ fn input<'a>(recording: &'a Recording, robot: &'a Robot) -> ReplayInput<'a> {
         scene: None,
         believed_links: &[],
         tool_beliefs: &[],
+        residuals: &[],
         online: None,
         summary_markdown: None,
     }

@@ -316,6 +316,8 @@ impl Run<'_> {
         let believed_links: Vec<_> = outcome.epochs.iter().map(|epoch| (epoch.from, epoch.links())).collect();
         let tool_beliefs: Vec<_> =
             outcome.epochs.iter().map(|epoch| (epoch.from, epoch.tool_belief(&self.inputs.robot))).collect();
+        let residuals: Vec<_> =
+            outcome.calibrations().into_iter().map(|(since, found)| (since, &found.details.views[..])).collect();
         let truth = (self.source == Source::World).then(|| self.partial("truth.mcap"));
         armcal_replay::write_rrd(
             &armcal_replay::ReplayInput {
@@ -326,6 +328,7 @@ impl Run<'_> {
                 scene: Some(&self.inputs.routine.scene),
                 believed_links: &believed_links,
                 tool_beliefs: &tool_beliefs,
+                residuals: &residuals,
                 online: outcome.online.as_ref().map(|online| &online.log),
                 summary_markdown: Some(&markdown),
             },

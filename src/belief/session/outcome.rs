@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::calib::Calibration;
+use crate::calib::{Calibration, Status};
 use crate::session::held_joint::HeldJoint;
 use crate::session::online_belief::OnlineOutcome;
 use crate::session::tool_belief::{Certainty, ToolBelief};
@@ -53,6 +53,25 @@ pub struct Outcome {
     pub still_reachable: Option<StillReachable>,
     /// What was believed online; `None` where no step works by it.
     pub online: Option<OnlineOutcome>,
+}
+
+impl Outcome {
+    /// The calibrations of the run: accepted ones with the times since which they were believed, then the last one, if
+    /// it was refused, with the end of its last view.
+    #[must_use]
+    pub fn calibrations(&self) -> Vec<(Stamp, &Calibration)> {
+        let mut found: Vec<(Stamp, &Calibration)> = Vec::new();
+        let epochs = self.epochs.iter().filter_map(|epoch| Some((epoch.from, epoch.calibration.as_ref()?)));
+        let refused = &self.calibration;
+        let end = Stamp { nanos: refused.valid.time_nanos };
+        let refused = (refused.status == Status::Refused).then_some((end, refused));
+        for (from, calibration) in epochs.chain(refused) {
+            if found.last().is_none_or(|(_, last)| last.messages_hash != calibration.messages_hash) {
+                found.push((from, calibration));
+            }
+        }
+        found
+    }
 }
 
 /// Which targets of a reach an arm with joints that are given up still reaches.

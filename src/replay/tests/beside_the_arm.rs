@@ -1,16 +1,18 @@
-//! What is drawn about the arm: how sure it is of its tool.
+//! What is drawn about the arm: how sure it is of its tool, how well tags fit, what is near.
 
 use std::path::Path;
 
 use nalgebra::{Point3, Vector3};
-use rerun::components::{HalfSize3D, Translation3D};
-use rerun::{Component, ComponentDescriptor, Ellipsoids3D};
+use rerun::components::{Color, HalfSize3D, Text, Translation3D};
+use rerun::{Boxes3D, Component, ComponentDescriptor, Ellipsoids3D, Points3D};
 
 use super::{chunks, entities, input, small};
 use crate::*;
+use armcal_belief::calib::{CornerResidual, ObservedTag, ViewResidual};
 use armcal_belief::session::ToolBelief;
 use armcal_core::robot::Robot;
 use armcal_core::sensor::{ArmSensors, Conditions};
+use armcal_core::streams::JointAngles;
 use armcal_core::time::SIMULATION_EPOCH;
 
 /// Rows of one component of an entity: times, s, and what it has.
@@ -84,4 +86,55 @@ fn the_ellipsoid_belongs_to_the_one_arm_that_is_shown() {
     assert!(found(&out).iter().all(|entity| entity.contains("/base/arm/6_")) && found(&out).len() == 2);
     write_rrd(&input(&recording, &robot), &out).unwrap();
     assert!(found(&out).is_empty());
+}
+
+/// Corners of one view: each tag's are off by so many px; a negative figure is rejected.
+fn seen(offs: &[(u32, f64)]) -> ViewResidual {
+    let tag = |&(id, off_px): &(u32, f64)| {
+        let corner = CornerResidual { seen_px: [9.0; 2], off_px: [off_px, 0.0], is_used: true };
+        ObservedTag { id, off_m: 0.001, corners: [Some(corner); 4], is_used: off_px >= 0.0 }
+    };
+    ViewResidual {
+        pose_idx: 0,
+        end: SIMULATION_EPOCH,
+        datasheet_rad: JointAngles::zeros(6),
+        calibrated_rad: JointAngles::zeros(6),
+        joint_error_rad: None,
+        tags: offs.iter().map(tag).collect(),
+    }
+}
+
+/// Frames about the tags that were seen, from the calibration on.
+#[test]
+fn tags_are_coloured_by_what_the_calibration_left_of_them() {
+    let (dir, recording, _, robot) = small();
+    let out = dir.path().join("run.rrd");
+    let ids: Vec<u32> = robot.tags.iter().map(|tag| tag.id).collect();
+    let offs = [0.3, 0.2, 0.4, 0.7, 2.0, -1.0];
+    let [first, second] = [1.0, 0.0].map(|more_px| {
+        let offs = ids.iter().copied().zip(offs.map(|px: f64| if px > 0.0 { px + more_px } else { px }));
+        vec![seen(&offs.collect::<Vec<_>>()), seen(&[])]
+    });
+    let at = |time_s: f64| SIMULATION_EPOCH.plus_s(time_s);
+    let residuals = [(at(5.0), &first[..]), (at(9.0), &second[..])];
+    write_rrd(&ReplayInput { residuals: &residuals, ..input(&recording, &robot) }, &out).unwrap();
+    let entity = "/world/vehicle/base/tags/residuals";
+    let shades = rows::<Color>(&out, entity, &Boxes3D::descriptor_colors());
+    let times_s: Vec<f64> = shades.iter().map(|(time_s, _)| *time_s).collect();
+    assert_eq!(times_s, [5.0, 9.0]);
+    let [green, amber, red] = [colors::HIT, colors::TARGET, colors::MISS].map(Color::from);
+    assert_eq!(shades[0].1, [green, green, green, green, amber, red], "off alike");
+    assert_eq!(shades[1].1, [green, green, green, amber, red, red]);
+    let centers = rows::<Translation3D>(&out, entity, &Boxes3D::descriptor_centers());
+    for (center, tag) in centers[1].1.iter().zip(&robot.tags) {
+        let off_m = Vector3::from(center.0.0.map(f64::from)) - tag.base_from_tag.origin().vector();
+        assert!(off_m.norm() < 1e-6, "{}: {off_m}", tag.id);
+    }
+    let labels = rows::<Text>(&out, "/world/vehicle/base/tags/ids", &Points3D::descriptor_labels());
+    let of_row = |row: usize| labels[row].1.iter().map(ToString::to_string).collect::<Vec<_>>();
+    let (before, after) = (of_row(0), of_row(2));
+    assert_eq!(before.len(), robot.tags.len());
+    assert_eq!(after[3], format!("{}: 0.70 px", before[3]));
+    assert_eq!(after[5], format!("{}: rejected", before[5]));
+    assert_eq!(after[6..], before[6..], "not seen");
 }
