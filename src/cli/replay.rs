@@ -60,6 +60,7 @@ pub(super) fn replay(args: &ReplayArgs) -> Result<Exit> {
         believed_links: &believed_links,
         tool_beliefs: &tool_beliefs,
         residuals: &[],
+        clearance_m: None,
         online: online.as_ref(),
         summary_markdown: None,
     };

@@ -18,6 +18,7 @@ mod error;
 mod fault_words;
 mod identity;
 mod live;
+mod nearest;
 mod news;
 mod online;
 mod phases;

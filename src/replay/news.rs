@@ -109,6 +109,7 @@ impl News {
             believed_links: &[],
             tool_beliefs: &[],
             residuals: &[],
+            clearance_m: None,
             online: None,
             summary_markdown: Some(SUMMARY),
         };

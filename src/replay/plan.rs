@@ -59,6 +59,7 @@ pub fn write_plan_rrd(input: &PlanInput<'_>, out: &Path) -> Result<(), ReplayErr
         believed_links: &[],
         tool_beliefs: &[],
         residuals: &[],
+        clearance_m: Some(input.plan.margin_m),
         online: None,
         summary_markdown: Some(input.markdown),
     };

@@ -10,7 +10,8 @@ use crate::shown::Shown;
 use crate::tracks::Tracks;
 use crate::truth::Truth;
 use crate::{
-    arms, blueprint, camera, online, phases, plots, residuals, rrd, scenery, summary, targets, touches, uncertainty,
+    arms, blueprint, camera, nearest, online, phases, plots, residuals, rrd, scenery, summary, targets, touches,
+    uncertainty,
 };
 
 /// Writes `out`, an .rrd file with its blueprint, replacing one of that name.
@@ -57,6 +58,7 @@ fn draw_into(mut stream: EntityLog, run: &ReplayScene<'_>, input: &ReplayInput<'
     residuals::draw(run, input.residuals, &mut stream);
     arms::draw(run, &mut stream);
     uncertainty::draw(run, input, &mut stream);
+    nearest::draw(run, input, &mut stream);
     targets::draw(run, &mut stream);
     touches::draw(run, &mut stream);
     camera::draw(run, &mut stream);

@@ -28,6 +28,8 @@ pub struct ReplayInput<'a> {
     pub tool_beliefs: &'a [(Stamp, Option<ToolBelief>)],
     /// What each calibration left of the tags that it saw, since its time.
     pub residuals: &'a [(Stamp, &'a [ViewResidual])],
+    /// What planning keeps clear around the arm, m; `None` where nobody says.
+    pub clearance_m: Option<f64>,
     /// What was believed online.
     pub online: Option<&'a BeliefLog>,
     /// Shown as it is, in place of a short description of the recording.

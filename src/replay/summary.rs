@@ -70,9 +70,16 @@ fn legend(run: &ReplayScene, input: &ReplayInput) -> String {
         "- frames about tags, once calibrated: how far off their corners are, root mean square; **green** fits, \
          **amber** is worse than the others, **red** contradicts them or was rejected\n"
     };
+    let nearest = input.clearance_m.map_or_else(String::new, |kept_m| {
+        let kept_mm = 1e3 * kept_m;
+        format!(
+            "- line from the arm to what is nearest to it: **red** below the {kept_mm:.0} mm that are kept clear, \
+             **amber** below twice, **green** below three times as much\n"
+        )
+    });
     format!(
         "### How to read the picture\n\n{arms}\
-         - numbered yellow balls: targets{rests}\n{region}{residuals}\
+         - numbered yellow balls: targets{rests}\n{region}{residuals}{nearest}\
          - white line: the tool's last seconds; blue cone: the camera's line of sight\n\
          - blue and orange dots: where views were taken to fit and to check the calibration\n\
          - camera: **green** outlines are tags as seen, **pink** ones are where the believed arm expects them; \

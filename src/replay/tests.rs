@@ -238,6 +238,7 @@ fn input<'a>(recording: &'a Recording, robot: &'a Robot) -> ReplayInput<'a> {
         believed_links: &[],
         tool_beliefs: &[],
         residuals: &[],
+        clearance_m: None,
         online: None,
         summary_markdown: None,
     }

@@ -30,7 +30,7 @@ const RATE_HZ: f64 = 5.0;
 /// Where the longest half axis is never above this, m, it is drawn larger.
 const SMALL_M: f64 = 0.015;
 /// The label's height above it, m.
-const LABEL_M: f64 = 0.08;
+const LABEL_M: f64 = 0.22;
 /// Beyond this, m, nothing is known of the tool.
 const UNKNOWN_M: f64 = 1.5;
 /// Changes of the covariance below this share of it are not drawn again.
@@ -134,16 +134,16 @@ impl Region {
     fn draw(&self, entity: &str, factor: f64, stream: &mut EntityLog) {
         let longest_m = self.half_axes_m.max();
         let label = if factor == 1.0 {
-            format!("95 %: {:.0} mm", 1e3 * longest_m)
+            format!("\u{b1}{:.0} mm", 1e3 * longest_m)
         } else {
-            format!("95 %: {:.1} mm, drawn x{factor:.0}", 1e3 * longest_m)
+            format!("\u{b1}{:.1} mm, drawn x{factor:.0}", 1e3 * longest_m)
         };
         let ellipsoid = Ellipsoids3D::update_fields()
             .with_half_sizes([vector(&(factor * self.half_axes_m))])
             .with_centers([vector(&self.center_m)])
             .with_quaternions([quaternion(&self.turn)]);
         stream.draw(entity, self.time_s, &ellipsoid);
-        // Above the ellipsoid, not to hide it.
+        // Above the ellipsoid, not to hide it: the viewer writes below the point.
         let above_m = self.center_m + (factor * longest_m + LABEL_M) * self.up;
         let label = Points3D::update_fields().with_positions([vector(&above_m)]).with_labels([label]);
         stream.draw(&format!("{entity}/size"), self.time_s, &label);

@@ -48,6 +48,7 @@ pub fn write_views_rrd(input: &ViewsInput<'_>, out: &Path) -> Result<(), ReplayE
         believed_links: &[],
         tool_beliefs: &[],
         residuals: &[],
+        clearance_m: None,
         online: None,
         summary_markdown: Some(input.summary_markdown),
     };

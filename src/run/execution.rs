@@ -329,6 +329,7 @@ impl Run<'_> {
                 believed_links: &believed_links,
                 tool_beliefs: &tool_beliefs,
                 residuals: &residuals,
+                clearance_m: Some(self.inputs.routine.capture.clearance_m),
                 online: outcome.online.as_ref().map(|online| &online.log),
                 summary_markdown: Some(&markdown),
             },

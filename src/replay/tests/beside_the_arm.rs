@@ -2,15 +2,17 @@
 
 use std::path::Path;
 
-use nalgebra::{Point3, Vector3};
-use rerun::components::{Color, HalfSize3D, Text, Translation3D};
-use rerun::{Boxes3D, Component, ComponentDescriptor, Ellipsoids3D, Points3D};
+use nalgebra::{Isometry3, Point3, Translation3, Vector3};
+use rerun::components::{Color, HalfSize3D, LineStrip3D, Text, Translation3D};
+use rerun::{Boxes3D, Component, ComponentDescriptor, Ellipsoids3D, LineStrips3D, Points3D};
 
 use super::{chunks, entities, input, small};
 use crate::*;
 use armcal_belief::calib::{CornerResidual, ObservedTag, ViewResidual};
 use armcal_belief::session::ToolBelief;
-use armcal_core::robot::Robot;
+use armcal_core::log::{RecordingHeader, RecordingWriter, ros};
+use armcal_core::robot::{Part, PlacedShape, Robot, Shape};
+use armcal_core::routine::Scene;
 use armcal_core::sensor::{ArmSensors, Conditions};
 use armcal_core::streams::JointAngles;
 use armcal_core::time::SIMULATION_EPOCH;
@@ -131,10 +133,67 @@ fn tags_are_coloured_by_what_the_calibration_left_of_them() {
         assert!(off_m.norm() < 1e-6, "{}: {off_m}", tag.id);
     }
     let labels = rows::<Text>(&out, "/world/vehicle/base/tags/ids", &Points3D::descriptor_labels());
-    let of_row = |row: usize| labels[row].1.iter().map(ToString::to_string).collect::<Vec<_>>();
+    let of_row = |row: usize| labels[row].1.iter().map(|text| text.as_str().to_owned()).collect::<Vec<_>>();
     let (before, after) = (of_row(0), of_row(2));
     assert_eq!(before.len(), robot.tags.len());
     assert_eq!(after[3], format!("{}: 0.70 px", before[3]));
     assert_eq!(after[5], format!("{}: rejected", before[5]));
     assert_eq!(after[6..], before[6..], "not seen");
+}
+
+/// The nearest two parts as truth.mcap has them, at times, s.
+fn write_clearances(truth: &Path, robot: &Robot, clearances: &[(f64, f64)]) {
+    #[derive(serde::Serialize)]
+    struct Clearance {
+        header: ros::Header,
+        distance_m: f64,
+        part_a: String,
+        part_b: &'static str,
+    }
+    let mut writer = RecordingWriter::create(truth, RecordingHeader::new(Vec::new())).unwrap();
+    let schema = armcal_core::log::RosSchema { name: "armcal_msgs/msg/Clearance", text: "" };
+    for &(time_s, distance_m) in clearances {
+        let stamp = SIMULATION_EPOCH.plus_s(time_s);
+        let header = ros::Header { stamp: stamp.try_into().unwrap(), frame_id: String::new() };
+        let part_a = robot.bodies[6].name.clone();
+        let clearance = Clearance { header, distance_m, part_a, part_b: "rock" };
+        writer.write_ros("/truth/clearance", &schema, stamp, &clearance).unwrap();
+    }
+    writer.finish().unwrap();
+}
+
+/// From the last link to a rock below the tool, by the truth's figures; not beyond three times what is kept clear.
+#[test]
+fn a_line_shows_how_near_the_nearest_part_is() {
+    let (dir, recording, _, robot) = small();
+    let (out, truth) = (dir.path().join("run.rrd"), dir.path().join("clearances.mcap"));
+    write_clearances(&truth, &robot, &[(3.0, 0.13), (9.0, 0.19), (6.0, 0.07), (13.0, 0.04)]);
+    let run = crate::recording::scene(&input(&recording, &robot)).unwrap();
+    let tool_m = |time_s: f64| run.believed_tool(time_s).unwrap().origin().vector();
+    let placed = PlacedShape {
+        owner_from_shape: Isometry3::from(Translation3::from(tool_m(3.0) - Vector3::new(0.0, 0.0, 0.2))),
+        shape: Shape::Sphere { radius_m: 0.05 },
+        color_rgb: [9; 3],
+    };
+    let scene = Scene { seafloor_z_m: None, obstacles: vec![Part { name: "rock".into(), placed: placed.clone() }] };
+    let shown =
+        ReplayInput { truth: Some(&truth), scene: Some(&scene), clearance_m: Some(0.06), ..input(&recording, &robot) };
+    write_rrd(&shown, &out).unwrap();
+    let entity = "/world/vehicle/base/nearest";
+    let shades = rows::<Color>(&out, entity, &LineStrips3D::descriptor_colors());
+    let [green, amber, red] = [colors::HIT, colors::TARGET, colors::MISS].map(Color::from);
+    let found: Vec<(f64, Color)> = shades.iter().map(|(time_s, shades)| (*time_s, shades[0])).collect();
+    assert_eq!(found, [(3.0, green), (6.0, amber), (13.0, red)]);
+    assert_eq!(entities(&out)[entity], 3 + 2, "with its style, and its end");
+    let strips = rows::<LineStrip3D>(&out, entity, &LineStrips3D::descriptor_strips());
+    let ends = strips[0].1[0].0.iter().map(|end| Vector3::from(end.0.map(f64::from))).collect::<Vec<_>>();
+    let center_m = placed.owner_from_shape.translation.vector;
+    assert!(((ends[1] - center_m).norm() - 0.05).abs() < 1e-6, "on the rock: {}", ends[1]);
+    let link = run.robot.chain.link_poses(run.tracks.believed.at(3.0).unwrap());
+    let on_link = |shape: &PlacedShape| {
+        let local = link.link(6).inverse_transform_point(&ends[0].into());
+        shape.distance_m(&local)
+    };
+    let off_m = robot.bodies[6].collisions.iter().map(on_link).fold(f64::INFINITY, f64::min);
+    assert!(off_m < 1e-6, "on the link: {off_m}");
 }
