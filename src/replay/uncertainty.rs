@@ -25,8 +25,9 @@ pub(super) const LARGER: &str = "tool_95_percent_drawn_20_times_as_large";
 pub(super) const FACTOR: f64 = 20.0;
 /// Share of the errors inside of the ellipsoid.
 const PROBABILITY: f64 = 0.95;
-/// Steps of its size.
+/// Steps of its size, and how many there are at most: longer recordings have them farther apart.
 const RATE_HZ: f64 = 5.0;
+const MOST_STEPS: f64 = 4000.0;
 /// Where the longest half axis is never above this, m, it is drawn larger.
 const SMALL_M: f64 = 0.015;
 /// The label's height above it, m.
@@ -43,9 +44,8 @@ const SAME_M: f64 = 2e-5;
 struct Region {
     time_s: f64,
     center_m: Vector3<f64>,
-    /// Of one sigma, m^2.
+    /// Of the errors, scaled so that its ellipsoid holds the probability, m^2.
     covariance_m2: Matrix3<f64>,
-    /// Of the probability.
     half_axes_m: Vector3<f64>,
     turn: UnitQuaternion<f64>,
     /// The base's upward direction.
@@ -59,14 +59,15 @@ pub(super) fn draw(run: &ReplayScene, input: &ReplayInput, stream: &mut EntityLo
         return;
     }
     let conditions = ConditionHistory::of(input.recording);
+    let within = chi_square_quantile(PROBABILITY, 3);
     let since_s: Vec<f64> = beliefs.iter().map(|(since, _)| run.tracks.place_s(*since, *since)).collect();
     let mut spans: Vec<Vec<Region>> = vec![Vec::new(); beliefs.len()];
-    for time_s in run.tracks.ticks(RATE_HZ) {
+    for time_s in run.tracks.ticks(RATE_HZ.min(MOST_STEPS / run.tracks.duration_s.max(1.0))) {
         let Some(at) = since_s.partition_point(|since_s| *since_s <= time_s).checked_sub(1) else { continue };
         let (Some(belief), Some(angles)) = (&beliefs[at].1, run.tracks.believed.at(time_s)) else { continue };
         let stamp = run.tracks.stamp_at(time_s);
         let covariance_m2 = belief.position_m2(angles, &conditions.over(stamp, stamp));
-        spans[at].extend(covariance_m2.and_then(|m2| Region::new(run, time_s, angles, &m2)));
+        spans[at].extend(covariance_m2.and_then(|m2| Region::new(run, time_s, angles, &(within * m2))));
     }
     draw_spans(run, &since_s, &spans, stream);
 }
@@ -114,8 +115,7 @@ impl Region {
         let up = turn * Vector3::z();
         let covariance_m2 = turn * covariance_m2 * turn.transpose();
         let eigen = SymmetricEigen::new(covariance_m2);
-        let within = chi_square_quantile(PROBABILITY, 3);
-        let half_axes_m = eigen.eigenvalues.map(|variance_m2| (within * variance_m2.max(0.0)).sqrt());
+        let half_axes_m = eigen.eigenvalues.map(|variance_m2| variance_m2.max(0.0).sqrt());
         let mut axes = eigen.eigenvectors;
         if axes.determinant() < 0.0 {
             axes.set_column(2, &-axes.column(2));
