@@ -13,8 +13,8 @@ use crate::cli::stdout::{note, say};
 use crate::output;
 use armcal_belief::calib::online::BeliefLog;
 use armcal_belief::calib::{Calibration, Status, surveyed};
+use armcal_belief::session::ToolBelief;
 use armcal_core::files::{self, FileKind as Size};
-use armcal_core::kinematics::LinkCorrections;
 use armcal_core::log::{Recording, Stream, read_attachments};
 use armcal_core::robot::{self, Robot, Vehicle};
 use armcal_core::routine::{self, Scene};
@@ -43,7 +43,12 @@ pub(super) fn replay(args: &ReplayArgs) -> Result<Exit> {
     say_what_is_left_out(&recording);
     let drawings = Drawings::find(args, &recording)?;
     let truth = truth_beside(&args.recording);
-    let believed_links = links_beside(&args.recording, &drawings.robot);
+    let calibration = calibration_beside(&args.recording, &drawings.robot);
+    let since = |calibration: &Calibration| Stamp { nanos: calibration.valid.time_nanos };
+    let believed_links: Vec<_> = calibration.iter().map(|found| (since(found), found.link_corrections())).collect();
+    let believed = calibration.iter();
+    let tool_beliefs: Vec<_> =
+        believed.map(|found| (since(found), ToolBelief::by_calibration(&drawings.robot, found))).collect();
     let online = belief_beside(&args.recording, &drawings.robot);
     let truth = (truth != args.recording && truth.is_file()).then_some(truth);
     let input = ReplayInput {
@@ -53,6 +58,9 @@ pub(super) fn replay(args: &ReplayArgs) -> Result<Exit> {
         vehicle: drawings.vehicle.as_ref(),
         scene: drawings.scene.as_ref(),
         believed_links: &believed_links,
+        tool_beliefs: &tool_beliefs,
+        residuals: &[],
+        clearance_m: None,
         online: online.as_ref(),
         summary_markdown: None,
     };
@@ -94,26 +102,29 @@ fn truth_beside(recording: &Path) -> PathBuf {
     recording.with_file_name(format!("truth{}", unfinished.unwrap_or(".mcap")))
 }
 
-/// Links and sag by the accepted calibration beside a recording of the same arm, from its last view on.
-fn links_beside(recording: &Path, robot: &Robot) -> Vec<(Stamp, LinkCorrections)> {
+/// The accepted calibration beside a recording of the same arm, which counts from its last view on.
+fn calibration_beside(recording: &Path, robot: &Robot) -> Option<Calibration> {
     let file = recording.with_file_name("calibration.toml");
     if !file.is_file() {
-        return Vec::new();
+        return None;
     }
     // Without its covariance, too: links are in the table.
-    let read = files::read_text(&file, Size::Text).map_err(|error| error.to_string());
-    match read.and_then(|text| Calibration::parse(&file, &text).map_err(|error| error.to_string())) {
+    let without = || {
+        let text = files::read_text(&file, Size::Text).map_err(|error| error.to_string())?;
+        Calibration::parse(&file, &text).map_err(|error| error.to_string())
+    };
+    match Calibration::read(&file).or_else(|_| without()) {
         Ok(calibration)
             if calibration.robot == robot.name
                 && calibration.joint.len() == robot.n_joints()
                 && calibration.status == Status::Accepted =>
         {
-            vec![(Stamp { nanos: calibration.valid.time_nanos }, calibration.link_corrections())]
+            Some(calibration)
         }
-        Ok(_) => Vec::new(),
+        Ok(_) => None,
         Err(why) => {
             note(format!("warning: the arm is shown as drawn: {}: {why}", file.display()));
-            Vec::new()
+            None
         }
     }
 }

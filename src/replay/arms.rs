@@ -24,6 +24,20 @@ const MAX_CAPTURES: usize = 2000;
 /// Length of the lines of sight at the image's corners, m.
 const SIGHT_M: f64 = 0.22;
 
+/// Names of the arm by truth, or as believed without any, and of the believed one beside a true one.
+const SHOWN_ARM: &str = "arm";
+const BELIEVED_ARM: &str = "believed_arm";
+
+/// The arm that is drawn as believed.
+pub(super) fn believed_arm(run: &ReplayScene) -> &'static str {
+    if run.has_true_joints() { BELIEVED_ARM } else { SHOWN_ARM }
+}
+
+/// Entity of an arm's body.
+pub(super) fn body_entity(run: &ReplayScene, arm: &str, body: usize) -> String {
+    format!("{BASE}/{arm}/{body}_{}", path_part(&run.robot.bodies[body].name))
+}
+
 impl ReplayScene<'_> {
     /// The best known joint angles: true, else believed.
     pub(super) fn shown_angles(&self, time_s: f64) -> Option<JointAngles> {
@@ -67,7 +81,7 @@ pub(super) fn draw(run: &ReplayScene, stream: &mut EntityLog) {
 
 /// The same without the tool's path: of views alone nobody knows it.
 pub(super) fn draw_at_rest(run: &ReplayScene, stream: &mut EntityLog) {
-    let mut shown = Arm::new(run, stream, "arm", Look::Drawn);
+    let mut shown = Arm::new(run, stream, SHOWN_ARM, Look::Drawn);
     log_camera(run, stream, &shown);
     for time_s in run.tracks.frames() {
         if let Some(angles) = run.shown_angles(time_s) {
@@ -75,7 +89,7 @@ pub(super) fn draw_at_rest(run: &ReplayScene, stream: &mut EntityLog) {
         }
     }
     if run.has_true_joints() && !run.tracks.believed.is_empty() {
-        let mut believed = Arm::new(run, stream, "believed_arm", Look::Ghost(colors::GHOST));
+        let mut believed = Arm::new(run, stream, BELIEVED_ARM, Look::Ghost(colors::GHOST));
         for time_s in run.tracks.frames() {
             if let Some(angles) = run.tracks.believed.at(time_s) {
                 believed.place(run, stream, time_s, &run.believed_poses(time_s, angles));
@@ -95,7 +109,7 @@ impl Arm {
     fn new(run: &ReplayScene, stream: &mut EntityLog, name: &str, look: Look) -> Self {
         let mut bodies = Vec::new();
         for (n, body) in run.robot.bodies.iter().enumerate() {
-            let entity = format!("{BASE}/{name}/{n}_{}", path_part(&body.name));
+            let entity = body_entity(run, name, n);
             // The base does not move in itself: one drawing of it is enough.
             if n > 0 || matches!(look, Look::Drawn) {
                 let shapes = if body.visuals.is_empty() { &body.collisions } else { &body.visuals };

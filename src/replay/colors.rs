@@ -8,6 +8,8 @@ pub(super) const WATER: Rgba = [16, 30, 44, 255];
 pub(super) const SEAFLOOR: Rgba = [92, 84, 66, 255];
 /// The arm as believed, drawn through the true one.
 pub(super) const GHOST: Rgba = [255, 60, 220, 110];
+/// Where the tool may be, as the arm believes.
+pub(super) const TOOL_REGION: Rgba = [205, 150, 255, 255];
 pub(super) const BELIEVED: Rgba = [255, 90, 225, 255];
 /// Detections.
 pub(super) const SEEN: Rgba = [60, 230, 120, 255];

@@ -107,6 +107,9 @@ impl News {
             vehicle: vehicle.as_ref(),
             scene: scene.as_ref(),
             believed_links: &[],
+            tool_beliefs: &[],
+            residuals: &[],
+            clearance_m: None,
             online: None,
             summary_markdown: Some(SUMMARY),
         };

@@ -57,6 +57,9 @@ pub fn write_plan_rrd(input: &PlanInput<'_>, out: &Path) -> Result<(), ReplayErr
         vehicle: Some(input.vehicle),
         scene: Some(input.scene),
         believed_links: &[],
+        tool_beliefs: &[],
+        residuals: &[],
+        clearance_m: Some(input.plan.margin_m),
         online: None,
         summary_markdown: Some(input.markdown),
     };

@@ -9,7 +9,10 @@ use crate::scene::{ReplayInput, ReplayScene, RunState};
 use crate::shown::Shown;
 use crate::tracks::Tracks;
 use crate::truth::Truth;
-use crate::{arms, blueprint, camera, online, phases, plots, rrd, scenery, summary, targets, touches};
+use crate::{
+    arms, blueprint, camera, nearest, online, phases, plots, residuals, rrd, scenery, summary, targets, touches,
+    uncertainty,
+};
 
 /// Writes `out`, an .rrd file with its blueprint, replacing one of that name.
 ///
@@ -52,7 +55,10 @@ pub(super) fn draw_news(run: &ReplayScene<'_>, input: &ReplayInput<'_>, shown: S
 
 fn draw_into(mut stream: EntityLog, run: &ReplayScene<'_>, input: &ReplayInput<'_>) -> EntityLog {
     scenery::draw(run, &mut stream);
+    residuals::draw(run, input.residuals, &mut stream);
     arms::draw(run, &mut stream);
+    uncertainty::draw(run, input, &mut stream);
+    nearest::draw(run, input, &mut stream);
     targets::draw(run, &mut stream);
     touches::draw(run, &mut stream);
     camera::draw(run, &mut stream);

@@ -4,7 +4,9 @@ use std::path::Path;
 
 use crate::tracks::Tracks;
 use crate::truth::Truth;
+use armcal_belief::calib::ViewResidual;
 use armcal_belief::calib::online::BeliefLog;
+use armcal_belief::session::ToolBelief;
 use armcal_core::joints::JointAngles;
 use armcal_core::kinematics::{Chain, LinkCorrections, LinkPoses};
 use armcal_core::log::Recording;
@@ -22,6 +24,12 @@ pub struct ReplayInput<'a> {
     pub scene: Option<&'a Scene>,
     /// Since when the arm was believed to be other than drawn, and how; in the order of time.
     pub believed_links: &'a [(Stamp, LinkCorrections)],
+    /// Since when it was believed how surely where the tool is, in the order of time; `None` where nobody said.
+    pub tool_beliefs: &'a [(Stamp, Option<ToolBelief>)],
+    /// What each calibration left of the tags that it saw, since its time.
+    pub residuals: &'a [(Stamp, &'a [ViewResidual])],
+    /// What planning keeps clear around the arm, m; `None` where nobody says.
+    pub clearance_m: Option<f64>,
     /// What was believed online.
     pub online: Option<&'a BeliefLog>,
     /// Shown as it is, in place of a short description of the recording.

@@ -1,7 +1,7 @@
 //! Surroundings of the arm: seafloor, obstacles, tags, and the moving vehicle.
 
 use nalgebra::{Isometry3, Translation3};
-use rerun::{Boxes3D, FillMode, Points3D, ViewCoordinates};
+use rerun::{Boxes3D, FillMode, ViewCoordinates};
 
 use crate::colors;
 use crate::entities::{BASE, VEHICLE, WORLD};
@@ -9,14 +9,12 @@ use crate::entity_log::EntityLog;
 use crate::poses::{quaternion, transform, vector};
 use crate::scene::ReplayScene;
 use crate::shapes::{Look, log_shapes};
-use armcal_belief::tagmap::files::{FIRST_NAMED_ID, spoken_name};
-use armcal_core::robot::SurveyedTag;
 use armcal_core::spatial::{Pose, Vehicle, World};
 
 /// Half of the seafloor that is drawn, m.
 const SEAFLOOR_HALF_M: f64 = 8.0;
-/// Side of a board whose size nobody says.
-const LANDMARK_M: f64 = 0.1;
+/// Side of a board whose size nobody says, m.
+pub(super) const LANDMARK_M: f64 = 0.1;
 /// Movements below these are not drawn again.
 const SAME_M: f64 = 2e-5;
 const SAME_RAD: f64 = 2e-5;
@@ -122,11 +120,4 @@ fn draw_tags(run: &ReplayScene, stream: &mut EntityLog) {
     }
     let plates = Boxes3D::from_centers_and_half_sizes(centers, sizes).with_quaternions(turns);
     stream.log_static(&format!("{BASE}/tags"), &plates.with_colors(shades).with_fill_mode(FillMode::Solid));
-    let label = |tag: &SurveyedTag| match tag.id {
-        id if Some(id) == run.robot.base_tag && id < FIRST_NAMED_ID => format!("base tag {id}"),
-        id => spoken_name(id, tags.iter().map(|tag| tag.id)),
-    };
-    let anchors = tags.iter().map(|tag| vector(&tag.base_from_tag.origin().vector()));
-    let anchors = Points3D::new(anchors).with_radii([0.004]).with_labels(tags.iter().map(label));
-    stream.log_static(&format!("{BASE}/tags/ids"), &anchors.with_show_labels(true).with_colors([[225, 225, 225, 255]]));
 }

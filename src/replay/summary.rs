@@ -13,8 +13,8 @@ use armcal_core::streams::ReachAttempt;
 /// Draws the page.
 pub(super) fn draw(run: &ReplayScene, input: &ReplayInput, stream: &mut EntityLog) {
     let text = match input.summary_markdown {
-        Some(text) => format!("{}\n\n{}", text.trim_end(), legend(run)),
-        None => format!("{}\n{}", contents(run, input), legend(run)),
+        Some(text) => format!("{}\n\n{}", text.trim_end(), legend(run, input)),
+        None => format!("{}\n{}", contents(run, input), legend(run, input)),
     };
     stream.log_static(SUMMARY, &TextDocument::from_markdown(text));
 }
@@ -46,7 +46,7 @@ fn contents(run: &ReplayScene, input: &ReplayInput) -> String {
     text
 }
 
-fn legend(run: &ReplayScene) -> String {
+fn legend(run: &ReplayScene, input: &ReplayInput) -> String {
     let arms = if run.has_true_joints() {
         "- solid arm: where it truly is; **pink ghost**: where it believes to be\n"
     } else {
@@ -58,9 +58,28 @@ fn legend(run: &ReplayScene) -> String {
     } else {
         ""
     };
+    let region = if input.tool_beliefs.iter().any(|(_, belief)| belief.is_some()) {
+        "- **violet ellipsoid**: where the arm believes its tool to be with 95 %, with the longest half axis; \
+         where the label says x20 it is drawn 20 times as large as it is\n"
+    } else {
+        ""
+    };
+    let residuals = if input.residuals.is_empty() {
+        ""
+    } else {
+        "- frames about tags, once calibrated: how far off their corners are, root mean square; **green** fits, \
+         **amber** is worse than the others, **red** contradicts them or was rejected\n"
+    };
+    let nearest = input.clearance_m.map_or_else(String::new, |kept_m| {
+        let kept_mm = 1e3 * kept_m;
+        format!(
+            "- line from the arm to what is nearest to it: **red** below the {kept_mm:.0} mm that are kept clear, \
+             **amber** below twice, **green** below three times as much\n"
+        )
+    });
     format!(
         "### How to read the picture\n\n{arms}\
-         - numbered yellow balls: targets{rests}\n\
+         - numbered yellow balls: targets{rests}\n{region}{residuals}{nearest}\
          - white line: the tool's last seconds; blue cone: the camera's line of sight\n\
          - blue and orange dots: where views were taken to fit and to check the calibration\n\
          - camera: **green** outlines are tags as seen, **pink** ones are where the believed arm expects them; \

@@ -1,5 +1,6 @@
 //! A small made-up run, shown.
 
+mod beside_the_arm;
 mod live_view;
 
 use std::path::{Path, PathBuf};
@@ -235,6 +236,9 @@ fn input<'a>(recording: &'a Recording, robot: &'a Robot) -> ReplayInput<'a> {
         vehicle: None,
         scene: None,
         believed_links: &[],
+        tool_beliefs: &[],
+        residuals: &[],
+        clearance_m: None,
         online: None,
         summary_markdown: None,
     }

@@ -269,6 +269,11 @@ impl<'a> Tracks<'a> {
         placed_s.clamp(0.0, self.duration_s)
     }
 
+    /// Log time at a moment of the timeline.
+    pub fn stamp_at(&self, time_s: f64) -> Stamp {
+        self.start.plus_s(time_s)
+    }
+
     /// The moments at which moving things are drawn, s.
     pub fn frames(&self) -> impl Iterator<Item = f64> {
         self.ticks(FRAME_HZ)

@@ -17,6 +17,7 @@ use armcal_core::time::Stamp;
 const JOINT_STATES: &str = "/truth/joint_states";
 const VEHICLE_POSE: &str = "/truth/vehicle_pose";
 const TOOL_POSE: &str = "/truth/tool_pose";
+const CLEARANCE: &str = "/truth/clearance";
 const FAULTS: &str = "/truth/faults";
 
 /// True states over time; any series may be empty.
@@ -25,8 +26,29 @@ pub(super) struct Truth {
     joints: TimeSeries<JointAngles>,
     world_from_vehicle: TimeSeries<Isometry3<f64>>,
     base_from_tool: TimeSeries<Isometry3<f64>>,
+    /// What was nearest to the arm, in the order of time.
+    pub clearances: Vec<Clearance>,
     /// Faults with their times, s, as sentences.
     pub faults: Vec<Fault>,
+}
+
+/// The nearest two parts at a moment.
+#[derive(Clone)]
+pub(super) struct Clearance {
+    pub time_s: f64,
+    /// Not above 0 where they touch.
+    pub distance_m: f64,
+    /// Names of a link and of what it is near to.
+    pub parts: [String; 2],
+}
+
+/// armcal_msgs/msg/Clearance.
+#[derive(Deserialize)]
+struct ClearanceMessage {
+    header: ros::Header,
+    distance_m: f64,
+    part_a: String,
+    part_b: String,
 }
 
 /// armcal_msgs/msg/Fault.
@@ -50,7 +72,7 @@ impl Truth {
         match failure {
             Some(error) => Err(error),
             None if reader.topics == 0 => Err(ReplayError::NoTruth { path: path.to_owned() }),
-            None => Ok(reader.truth),
+            None => Ok(reader.sorted()),
         }
     }
 
@@ -78,6 +100,12 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
+    /// A least clearance is noted after its time.
+    fn sorted(mut self) -> Truth {
+        self.truth.clearances.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
+        self.truth
+    }
+
     fn take(&mut self, message: &RawMessage<'_>) -> Result<(), ReplayError> {
         self.topics += u64::from(message.topic().starts_with("/truth/"));
         let failed = |source| self.failed(message, source);
@@ -101,6 +129,11 @@ impl Reader<'_> {
                 if let Some(pose) = isometry::<Base, Tool>(&pose.pose) {
                     self.truth.base_from_tool.push(time_s, pose);
                 }
+            }
+            CLEARANCE => {
+                let ClearanceMessage { header, distance_m, part_a, part_b } = decode(message.data).map_err(failed)?;
+                let (time_s, parts) = (self.time_s(message, header.stamp), [part_a, part_b]);
+                self.truth.clearances.push(Clearance { time_s, distance_m, parts });
             }
             FAULTS => {
                 let fault: FaultMessage = decode(message.data).map_err(failed)?;

@@ -14,7 +14,7 @@ use crate::poses::vector;
 use crate::recording::scene;
 use crate::scene::ReplayInput;
 use crate::shapes::path_part;
-use crate::{arms, blueprint, colors, plots, rrd, scenery};
+use crate::{arms, blueprint, colors, plots, residuals, rrd, scenery};
 use armcal_belief::calib::{TagObservation, View};
 use armcal_core::joints::JointAngles;
 use armcal_core::log::Recording;
@@ -46,12 +46,16 @@ pub fn write_views_rrd(input: &ViewsInput<'_>, out: &Path) -> Result<(), ReplayE
         vehicle: None,
         scene: None,
         believed_links: &[],
+        tool_beliefs: &[],
+        residuals: &[],
+        clearance_m: None,
         online: None,
         summary_markdown: Some(input.summary_markdown),
     };
     let run = scene(&shown)?;
     let mut stream = EntityLog::of_recording();
     scenery::draw(&run, &mut stream);
+    residuals::draw(&run, shown.residuals, &mut stream);
     arms::draw_at_rest(&run, &mut stream);
     plots::draw(&run, &mut stream);
     stream.log_static(

@@ -314,6 +314,10 @@ impl Run<'_> {
     ) -> Result<(), armcal_replay::ReplayError> {
         let markdown = markdown(summary);
         let believed_links: Vec<_> = outcome.epochs.iter().map(|epoch| (epoch.from, epoch.links())).collect();
+        let tool_beliefs: Vec<_> =
+            outcome.epochs.iter().map(|epoch| (epoch.from, epoch.tool_belief(&self.inputs.robot))).collect();
+        let residuals: Vec<_> =
+            outcome.calibrations().into_iter().map(|(since, found)| (since, &found.details.views[..])).collect();
         let truth = (self.source == Source::World).then(|| self.partial("truth.mcap"));
         armcal_replay::write_rrd(
             &armcal_replay::ReplayInput {
@@ -323,6 +327,9 @@ impl Run<'_> {
                 vehicle: Some(&self.inputs.vehicle),
                 scene: Some(&self.inputs.routine.scene),
                 believed_links: &believed_links,
+                tool_beliefs: &tool_beliefs,
+                residuals: &residuals,
+                clearance_m: Some(self.inputs.routine.capture.clearance_m),
                 online: outcome.online.as_ref().map(|online| &online.log),
                 summary_markdown: Some(&markdown),
             },

@@ -7,6 +7,7 @@ use crate::calib::{Calibration, interim_estimate};
 use crate::plan::JointErrorBounds;
 use crate::session::SessionError;
 use crate::session::runner::{SavedBelief, ScriptRunner};
+use crate::session::tool_belief::Certainty;
 use armcal_core::routine::{CaptureSettings, Margins, Method};
 use armcal_core::sensor::ArmSensors;
 use armcal_core::streams::{JointAngles, LogLevel};
@@ -53,7 +54,7 @@ impl ScriptRunner<'_, '_> {
         self.locate_held(&calibration);
         self.hold_failed();
         self.driver.believe(sensors);
-        self.note_belief();
+        self.note_belief(Certainty::Interim(Box::new(calibration.clone())));
         Ok(Some(calibration))
     }
 
@@ -63,7 +64,8 @@ impl ScriptRunner<'_, '_> {
         (self.bounds, self.fresh) = (bounds, fresh);
         self.hold_failed();
         self.driver.believe(sensors);
-        self.note_belief();
+        let is_calibrated = self.epochs.last().is_some_and(|epoch| epoch.calibration.is_some());
+        self.note_belief(if is_calibrated { Certainty::Calibration } else { Certainty::Datasheet });
     }
 
     pub(crate) fn bounds_of(&self, calibration: &Calibration, sensors: &ArmSensors) -> JointErrorBounds {

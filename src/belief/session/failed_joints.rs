@@ -7,6 +7,7 @@ use crate::session::SessionError;
 use crate::session::held_joint::{HeldJoint, hold_in, holding_bounds};
 use crate::session::outcome::{Epoch, StillReachable};
 use crate::session::runner::ScriptRunner;
+use crate::session::tool_belief::Certainty;
 use armcal_core::robot::FailedKind;
 use armcal_core::streams::JointAngles;
 
@@ -28,7 +29,7 @@ impl ScriptRunner<'_, '_> {
             (self.began, self.views_since) = (held.since, held.since);
         }
         self.hold_failed();
-        self.note_belief();
+        self.note_belief(Certainty::Unknown);
         true
     }
 
@@ -40,10 +41,16 @@ impl ScriptRunner<'_, '_> {
     }
 
     /// Sensors believed in from now on.
-    pub(crate) fn note_belief(&mut self) {
+    pub(crate) fn note_belief(&mut self, certainty: Certainty) {
         let calibration = self.epochs.last().and_then(|epoch| epoch.calibration.clone());
+        self.begin_epoch(calibration, certainty);
+    }
+
+    /// The same by a calibration. Of the tool of an arm with joints that were given up nobody says how sure it is.
+    pub(crate) fn begin_epoch(&mut self, calibration: Option<Calibration>, certainty: Certainty) {
+        let certainty = if self.driver.held.is_empty() { certainty } else { Certainty::Unknown };
         let (from, sensors) = (self.driver.now(), self.driver.sensors.clone());
-        self.epochs.push(Epoch { from, sensors, calibration });
+        self.epochs.push(Epoch { from, sensors, calibration, certainty });
     }
 
     /// Where the camera has the held joints by `calibration`.

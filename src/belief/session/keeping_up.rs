@@ -8,6 +8,7 @@ use crate::session::online_belief::{AskedPoses, OnlineBelief, OnlineOutcome};
 use crate::session::outcome::Epoch;
 use crate::session::reach::OrReason;
 use crate::session::runner::ScriptRunner;
+use crate::session::tool_belief::Certainty;
 use armcal_core::robot::FailedKind;
 use armcal_core::routine::{CalibrateSettings, CalibrateViews, CaptureSettings, OnRefusal, WorkSettings};
 use armcal_core::streams::{JointAngles, LogLevel, PriorSource};
@@ -216,7 +217,7 @@ impl ScriptRunner<'_, '_> {
         self.bounds = self.kept_clear(bounds);
         self.hold_failed();
         self.driver.believe(sensors);
-        self.note_belief();
+        self.note_belief(Certainty::Online(covariance));
     }
 
     /// What is left of it at the end.

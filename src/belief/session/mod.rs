@@ -4,7 +4,8 @@
 //! `belief_update`), `grip`, `touch`, `scale_identification`, `end_stops`. `motion` drives the arm, `settling` detects
 //! rest, `contact` detects contacts, `following` joints that do not follow (`held_joint`, `failed_joints`), and
 //! `approval` asks an operator before a motion. `online_belief` hears what is recorded, `keeping_up` works by it.
-//! `recorder` keeps every message, with `transforms` and `annotations` for viewers; `outcome` is the result.
+//! `recorder` keeps every message, with `transforms` and `annotations` for viewers; `outcome` is the result, with how
+//! sure the arm was of its tool (`tool_belief`).
 
 mod annotations;
 mod approval;
@@ -31,6 +32,7 @@ mod runner;
 mod scale_identification;
 mod script;
 mod settling;
+mod tool_belief;
 mod touch;
 mod transforms;
 mod unwatched;
@@ -44,5 +46,6 @@ pub use outcome::{AssertResult, Epoch, EstimateUpdate, Outcome, ReachStep, Skipp
 pub use progress::{Approval, MotionAhead, Progress};
 pub use recorder::{MessageListener, Recorder};
 pub use script::run;
+pub use tool_belief::{Certainty, ToolBelief};
 pub use transforms::BelievedFrames;
 pub use unwatched::Unwatched;

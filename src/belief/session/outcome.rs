@@ -2,10 +2,12 @@
 
 use std::fmt;
 
-use crate::calib::Calibration;
+use crate::calib::{Calibration, Status};
 use crate::session::held_joint::HeldJoint;
 use crate::session::online_belief::OnlineOutcome;
+use crate::session::tool_belief::{Certainty, ToolBelief};
 use armcal_core::kinematics::LinkCorrections;
+use armcal_core::robot::Robot;
 use armcal_core::routine::AssertFigure;
 use armcal_core::sensor::ArmSensors;
 use armcal_core::streams::{JointAngles, ReachAttempt};
@@ -53,6 +55,25 @@ pub struct Outcome {
     pub online: Option<OnlineOutcome>,
 }
 
+impl Outcome {
+    /// The calibrations of the run: accepted ones with the times since which they were believed, then the last one, if
+    /// it was refused, with the end of its last view.
+    #[must_use]
+    pub fn calibrations(&self) -> Vec<(Stamp, &Calibration)> {
+        let mut found: Vec<(Stamp, &Calibration)> = Vec::new();
+        let epochs = self.epochs.iter().filter_map(|epoch| Some((epoch.from, epoch.calibration.as_ref()?)));
+        let refused = &self.calibration;
+        let end = Stamp { nanos: refused.valid.time_nanos };
+        let refused = (refused.status == Status::Refused).then_some((end, refused));
+        for (from, calibration) in epochs.chain(refused) {
+            if found.last().is_none_or(|(_, last)| last.messages_hash != calibration.messages_hash) {
+                found.push((from, calibration));
+            }
+        }
+        found
+    }
+}
+
 /// Which targets of a reach an arm with joints that are given up still reaches.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StillReachable {
@@ -87,6 +108,8 @@ pub struct Epoch {
     pub sensors: ArmSensors,
     /// Where they come from; `None` for the datasheet.
     pub calibration: Option<Calibration>,
+    /// How well they are known.
+    pub certainty: Certainty,
 }
 
 impl Epoch {
@@ -94,6 +117,21 @@ impl Epoch {
     #[must_use]
     pub fn links(&self) -> LinkCorrections {
         self.calibration.as_ref().map(Calibration::link_corrections).unwrap_or_default()
+    }
+
+    /// How well the tool's place is known; `None` where nobody says.
+    #[must_use]
+    pub fn tool_belief(&self, robot: &Robot) -> Option<ToolBelief> {
+        match &self.certainty {
+            Certainty::Datasheet => Some(ToolBelief::by_datasheet(robot, &self.sensors)),
+            Certainty::Calibration => ToolBelief::by_calibration(robot, self.calibration.as_ref()?),
+            Certainty::Interim(estimate) => ToolBelief::by_calibration(robot, estimate),
+            Certainty::Online(covariance) => {
+                let robot = Robot { chain: robot.chain.corrected(&self.links()), ..robot.clone() };
+                Some(ToolBelief::online(robot, &self.sensors, covariance))
+            }
+            Certainty::Unknown => None,
+        }
     }
 }
 

@@ -9,6 +9,7 @@ use crate::session::inputs::SessionInputs;
 use crate::session::motion::{Driver, MotionOutcome};
 use crate::session::outcome::{AssertResult, Epoch, Outcome, ReachStep};
 use crate::session::runner::{FreshBounds, Jaws, ScriptRunner, Tally};
+use crate::session::tool_belief::Certainty;
 use crate::session::{Progress, Recorder, SessionError};
 use armcal_core::kinematics::LinkCorrection;
 use armcal_core::log::Recording;
@@ -59,7 +60,7 @@ pub fn run(
         renewals: Vec::new(),
         capture_ended: None,
         tally: Tally::default(),
-        epochs: vec![Epoch { from: began, sensors, calibration: None }],
+        epochs: vec![Epoch { from: began, sensors, calibration: None, certainty: Certainty::Datasheet }],
         reaches: Vec::new(),
         asserts: Vec::new(),
         n_held: 0,
@@ -338,8 +339,7 @@ impl ScriptRunner<'_, '_> {
         if let Some(frames) = &mut self.driver.recorder.frames {
             frames.believe(&calibration.applied_to(self.setup.robot));
         }
-        let (from, sensors) = (self.driver.now(), self.driver.sensors.clone());
-        self.epochs.push(Epoch { from, sensors, calibration: Some(calibration.clone()) });
+        self.begin_epoch(Some(calibration.clone()), Certainty::Calibration);
         Ok(())
     }
 

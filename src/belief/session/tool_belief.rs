@@ -1,0 +1,69 @@
+//! How far the tool may be from where the arm believes it, as the arm itself can tell: for viewers.
+
+use nalgebra::{DMatrix, Matrix3};
+
+use crate::calib::{Calibration, ParameterCovariance};
+use armcal_core::robot::Robot;
+use armcal_core::sensor::{ArmSensors, Conditions};
+use armcal_core::streams::JointAngles;
+
+/// What says how well the sensors of an epoch are known.
+#[derive(Clone, Debug)]
+pub enum Certainty {
+    /// Their datasheet.
+    Datasheet,
+    /// The epoch's calibration.
+    Calibration,
+    /// An estimate from the views captured so far.
+    Interim(Box<Calibration>),
+    /// The online belief, at the epoch's start.
+    Online(ParameterCovariance),
+    /// Nothing: a joint was given up.
+    Unknown,
+}
+
+/// Sensors that are believed in, with how well they are known.
+#[derive(Clone, Debug)]
+pub struct ToolBelief {
+    robot: Robot,
+    sensors: ArmSensors,
+    covariance: ParameterCovariance,
+    /// The only conditions that the covariance is for; `None` for any.
+    at: Option<Conditions>,
+}
+
+impl ToolBelief {
+    /// Of sensors that are known by their datasheet alone.
+    #[must_use]
+    pub fn by_datasheet(robot: &Robot, sensors: &ArmSensors) -> Self {
+        let covariance =
+            ParameterCovariance { parameters: Vec::new(), matrix: DMatrix::zeros(0, 0), residual_std_rad: None };
+        Self { robot: robot.clone(), sensors: sensors.clone(), covariance, at: None }
+    }
+
+    /// Of sensors by a calibration with its covariance; `None` without one, or for another robot.
+    #[must_use]
+    pub fn by_calibration(robot: &Robot, calibration: &Calibration) -> Option<Self> {
+        let robot = calibration.scaled_robot(robot);
+        let sensors = calibration.sensors(&robot).ok()?;
+        let covariance = calibration.parameter_covariance(&robot);
+        let is_known = !covariance.parameters.is_empty();
+        is_known.then_some(Self { robot, sensors, covariance, at: None })
+    }
+
+    /// Of sensors as believed online; time and temperature since their reference are in `covariance`.
+    #[must_use]
+    pub fn online(robot: Robot, sensors: &ArmSensors, covariance: &ParameterCovariance) -> Self {
+        let at = Some(sensors.reference);
+        Self { robot, sensors: sensors.clone(), covariance: covariance.clone(), at }
+    }
+
+    /// Covariance of the tool's position (base frame, m^2) at believed `angles` under `conditions`; `None` where
+    /// nothing bounds it.
+    #[must_use]
+    pub fn position_m2(&self, angles: &JointAngles, conditions: &Conditions) -> Option<Matrix3<f64>> {
+        let conditions = self.at.as_ref().unwrap_or(conditions);
+        let found = self.covariance.tool_position_under_m2(&self.robot, &self.sensors, angles, conditions);
+        found.iter().all(|v| v.is_finite()).then_some(found)
+    }
+}
