@@ -1,4 +1,4 @@
-//! The tags' names, and what a calibration left of each tag: a frame about it, green where it fits.
+//! The tags' names, and what a calibration left of each tag: a frame about it, green where it fits, and else a figure.
 
 use std::collections::BTreeMap;
 
@@ -43,7 +43,8 @@ pub(super) fn draw(run: &ReplayScene, residuals: &[(Stamp, &[ViewResidual])], st
     }
     let names = |left: &BTreeMap<u32, (Left, Rgba)>| {
         let label = |tag: &SurveyedTag| match left.get(&tag.id) {
-            None => name(run, tag),
+            // Names alone where all is well: many figures hide the scene.
+            None | Some((_, colors::HIT)) => name(run, tag),
             Some((left, _)) => format!("{}: {}", name(run, tag), left.in_words()),
         };
         let color = |tag: &SurveyedTag| left.get(&tag.id).map_or(NAME_COLOR, |(_, color)| *color);

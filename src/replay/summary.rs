@@ -68,7 +68,7 @@ fn legend(run: &ReplayScene, input: &ReplayInput) -> String {
         ""
     } else {
         "- frames about tags, once calibrated: how far off their corners are, root mean square; **green** fits, \
-         **amber** is worse than the others, **red** contradicts them or was rejected\n"
+         **amber** is worse than the others, **red** contradicts them or was rejected, both with the figure\n"
     };
     let nearest = input.clearance_m.map_or_else(String::new, |kept_m| {
         let kept_mm = 1e3 * kept_m;

@@ -136,6 +136,7 @@ fn tags_are_coloured_by_what_the_calibration_left_of_them() {
     let of_row = |row: usize| labels[row].1.iter().map(|text| text.as_str().to_owned()).collect::<Vec<_>>();
     let (before, after) = (of_row(0), of_row(2));
     assert_eq!(before.len(), robot.tags.len());
+    assert_eq!(after[..3], before[..3], "green");
     assert_eq!(after[3], format!("{}: 0.70 px", before[3]));
     assert_eq!(after[5], format!("{}: rejected", before[5]));
     assert_eq!(after[6..], before[6..], "not seen");
