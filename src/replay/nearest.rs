@@ -62,7 +62,7 @@ pub(super) fn draw(run: &ReplayScene, input: &ReplayInput, stream: &mut EntityLo
     let mut drawn: Option<([Vector3<f64>; 2], Rgba)> = None;
     for clearance in &found {
         let near = (clearance.distance_m <= far_m).then(|| points(run, &solids, clearance)).flatten();
-        let Some((points_m, apart_m)) = near else {
+        let Some(points_m) = near else {
             if drawn.take().is_some() {
                 stream.clear(&entity, clearance.time_s);
             }
@@ -77,9 +77,8 @@ pub(super) fn draw(run: &ReplayScene, input: &ReplayInput, stream: &mut EntityLo
         }
         drawn = Some((points_m, color));
         let line = LineStrips3D::update_fields().with_strips([points_m.map(|point_m| vector(&point_m))]);
-        // Planning's figure has the margin's allowances in it.
-        let distance_m = if run.truth.is_some() { clearance.distance_m.max(0.0) } else { apart_m };
-        let label = format!("{:.0} mm", 1e3 * distance_m);
+        // As the plots have it: planning's figure for two links is larger by what less is kept between them.
+        let label = format!("{:.0} mm", 1e3 * clearance.distance_m.max(0.0));
         stream.draw(&entity, clearance.time_s, &line.with_colors([color]).with_labels([label]));
     }
 }
@@ -140,8 +139,8 @@ fn solids<'a>(run: &'a ReplayScene<'_>) -> Vec<Solid<'a>> {
     solids
 }
 
-/// The nearest points of two parts in the base frame, m, and their distance; `None` where a part has no shape.
-fn points(run: &ReplayScene, solids: &[Solid<'_>], clearance: &Clearance) -> Option<([Vector3<f64>; 2], f64)> {
+/// The nearest points of two parts in the base frame, m; `None` where a part has no shape.
+fn points(run: &ReplayScene, solids: &[Solid<'_>], clearance: &Clearance) -> Option<[Vector3<f64>; 2]> {
     let poses = run.robot.chain.link_poses(&run.shown_angles(clearance.time_s)?);
     let vehicle_from_base = run.vehicle.map_or_else(Isometry3::identity, |v| *v.vehicle_from_base.isometry());
     let base_from_world = (*run.world_from_vehicle(clearance.time_s).isometry() * vehicle_from_base).inverse();
@@ -151,7 +150,7 @@ fn points(run: &ReplayScene, solids: &[Solid<'_>], clearance: &Clearance) -> Opt
     });
     let pairs = firsts.iter().flat_map(|a| seconds.iter().map(move |b| (a, b)));
     let apart = pairs.filter_map(|((a_pose, a), (b_pose, b))| between(a_pose, a, b_pose, b));
-    apart.min_by(|(_, a_m), (_, b_m)| a_m.total_cmp(b_m))
+    apart.min_by(|(_, a_m), (_, b_m)| a_m.total_cmp(b_m)).map(|(points_m, _)| points_m)
 }
 
 fn between(a_pose: &Pose3, a: &SharedShape, b_pose: &Pose3, b: &SharedShape) -> Option<([Vector3<f64>; 2], f64)> {
