@@ -109,8 +109,11 @@ fn new_robot(scratch: &Scratch, bytes: &[u8]) -> bool {
     for file in files {
         let path = made.path().join(&file.path);
         assert!(file.path.is_relative(), "{}", path.display());
-        fs::create_dir_all(path.parent().expect("a folder")).expect("made");
-        fs::write(path, file.bytes).expect("written");
+        // A mesh's name from the URDF may be longer than the system has it: the program says so and ends.
+        let is_made = fs::create_dir_all(path.parent().expect("a folder")).and_then(|()| fs::write(path, file.bytes));
+        if is_made.is_err() {
+            return false;
+        }
     }
     load(made.path()).is_ok()
 }
