@@ -246,7 +246,9 @@ fn the_program_finds_both_mounts_and_hands_them_on() {
         exported.expect(form, 0, &[words]);
     }
     let online = calibrate_in(folder.path(), &["--online", "--out", "online"]);
-    online.expect("online", 0, &["of further cameras are left out"]);
+    online.expect("online", 0, &["of further cameras are left out: the belief kept up online knows one"]);
+    let other = calibrate_in(folder.path(), &["--method", "minimum_distance", "--out", "other"]);
+    assert!(other.stderr.contains("of further cameras are left out: this method knows one"), "{other:?}");
 }
 
 #[test]

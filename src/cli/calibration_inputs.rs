@@ -128,7 +128,10 @@ impl CalibrationInputs<'_> {
         task: Option<ReachTask>,
         prior: Option<&Calibration>,
     ) -> Result<Calibrated> {
-        let (prepared, lost) = self.external_views(file, landmarks, task)?;
+        let (prepared, lost) = match self.method {
+            Method::Bundle => self.external_views(file, landmarks, task)?,
+            _ => self.views_of_first_camera(file, "this method", (landmarks, task))?,
+        };
         let external = Some((prepared.data.fit.clone(), prepared.robot.clone()));
         let _waiting = Waiting::on(&format!("calibrating by {}", counted(prepared.data.fit.len(), "view")));
         Ok(Calibrated { calibration: calibrate_data(prepared, self.method, prior)?, lost, external })
@@ -159,7 +162,7 @@ impl CalibrationInputs<'_> {
     ) -> Result<(Follower, bool)> {
         self.robot.require_turning(ONLINE)?;
         if let Some(file) = self.input {
-            let (prepared, lost) = self.views_of_first_camera(file, self.landmarks()?, self.task()?)?;
+            let (prepared, lost) = self.views_of_first_camera(file, ONLINE, (self.landmarks()?, self.task()?))?;
             let mut follower = Follower::new(prepared.robot.clone(), settings);
             prepared.data.task.iter().for_each(|task| follower.set_task(task));
             for view in prepared.data.fit {
@@ -187,7 +190,7 @@ impl CalibrationInputs<'_> {
         self.robot.require_turning(ONLINE)?;
         let (task, landmarks) = (self.task()?, self.landmarks()?);
         let (prepared, lost) = match self.input {
-            Some(file) => self.views_of_first_camera(file, landmarks, task)?,
+            Some(file) => self.views_of_first_camera(file, ONLINE, (landmarks, task))?,
             None => {
                 let (recordings, lost) = self.marked()?;
                 let survey = self.survey(landmarks)?;
@@ -220,17 +223,17 @@ impl CalibrationInputs<'_> {
         Ok((recordings, lost))
     }
 
-    /// The same for a belief that is kept up, which knows one camera.
+    /// The same for `what` knows one camera.
     fn views_of_first_camera(
         &self,
         file: &Path,
-        landmarks: Option<(&Path, LandmarkFile)>,
-        task: Option<ReachTask>,
+        what: &str,
+        (landmarks, task): (Option<(&Path, LandmarkFile)>, Option<ReachTask>),
     ) -> Result<(CalibrationData, bool)> {
         let (mut prepared, lost) = self.external_views(file, landmarks, task)?;
         let n = prepared.data.keep_first_camera();
         if n > 0 {
-            note(format_args!("note: {} of further cameras are left out: {ONLINE} knows one", counted(n, "view")));
+            note(format_args!("note: {} of further cameras are left out: {what} knows one", counted(n, "view")));
         }
         Ok((prepared, lost))
     }
