@@ -5,7 +5,7 @@ use std::path::Path;
 
 use nalgebra::Isometry3;
 
-use crate::export::urdf::{further_from_camera, link_from_camera};
+use crate::export::urdf::{carrier, further_from_camera, link_from_camera};
 use crate::export::yaml_text::{doubles, quoted};
 use armcal_belief::calib::Calibration;
 use armcal_core::optics::LensModel;
@@ -65,14 +65,12 @@ fn entry(
         }
     };
     let pose = place.unwrap_or(camera.mount.link_from_frame).to_homogeneous();
-    let body = camera.mount.n_joints.checked_sub(1).and_then(|joint| robot.chain.joints().get(joint));
-    let link = body.map_or(robot.base_link.as_str(), |joint| joint.child_link.as_str());
     let ([fx, fy], [cx, cy]) = (camera.lens.focal_px(), camera.lens.center_px());
     let intrinsics = doubles([fx, fy, cx, cy]);
     let mut text = format!("cam{number}:\n  camera_model: pinhole\n  intrinsics: {intrinsics}\n");
     let _ = write!(text, "  distortion_model: {model}\n  distortion_coeffs: {}\n", doubles(coefficients));
     let _ = writeln!(text, "  resolution: {:?}", camera.lens.resolution_px());
-    let _ = write!(text, "  link: {}\n  T_link_camera:\n", quoted(link));
+    let _ = write!(text, "  link: {}\n  T_link_camera:\n", quoted(carrier(robot, camera)));
     for row in 0..4 {
         let _ = writeln!(text, "  - {}", doubles([0, 1, 2, 3].map(|column| pose[(row, column)])));
     }

@@ -7,7 +7,7 @@ use serde::Deserialize;
 
 use crate::export::urdf_text::{UrdfText, comment_text, xyz_rpy};
 use armcal_belief::calib::{Calibration, CameraMount, FurtherCamera};
-use armcal_core::robot::{FileIssue, Robot, RobotError, parse_toml, read_text};
+use armcal_core::robot::{CameraSpec, FileIssue, Robot, RobotError, parse_toml, read_text};
 
 /// By these words an exported file is known again.
 const MARK: &str = "Calibrated by armcal";
@@ -150,8 +150,7 @@ fn add_further_cameras(
 ) -> Result<(), FileIssue> {
     for found in &calibration.further_camera {
         let Some(camera) = robot.further_cameras.iter().find(|camera| camera.name == found.name) else { continue };
-        let body = camera.mount.n_joints.checked_sub(1).and_then(|joint| robot.chain.joints().get(joint));
-        let parent = body.map_or(robot.base_link.as_str(), |joint| joint.child_link.as_str());
+        let parent = carrier(robot, camera);
         let name = free_name(&found.name, |name| urdf.links.iter().any(|link| link == name));
         let joint = free_name(&format!("{name}_mount"), |name| urdf.joints.iter().any(|joint| joint.name == name));
         let place = further_from_camera(file, found)?;
@@ -160,6 +159,12 @@ fn add_further_cameras(
         changes.in_words.push(change);
     }
     Ok(())
+}
+
+/// The moving link that carries a camera, or the base's.
+pub(super) fn carrier<'a>(robot: &'a Robot, camera: &CameraSpec) -> &'a str {
+    let body = camera.mount.n_joints.checked_sub(1).and_then(|joint| robot.chain.joints().get(joint));
+    body.map_or(robot.base_link.as_str(), |joint| joint.child_link.as_str())
 }
 
 /// A link without a shape, and the joint that holds it.
