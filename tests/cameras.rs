@@ -259,7 +259,11 @@ fn a_camera_that_hangs_elsewhere_is_named() {
     found.expect(
         "5 cm",
         0,
-        &["ACCEPTED", "mount of the camera elbow: shifted along its axes by [49.", "correct the drawing"],
+        &[
+            "ACCEPTED, repaired: the mount of the camera elbow is not as drawn, off by 49.",
+            "mount of the camera elbow: shifted along its axes by [49.",
+            "correct the drawing",
+        ],
     );
     let found = read(&folder.path().join("out/calibration.toml"));
     assert!(found.contains("name = \"mount of the camera elbow\""), "{found}");

@@ -223,7 +223,7 @@ impl CalibrationInputs<'_> {
         Ok((recordings, lost))
     }
 
-    /// The same for `what` knows one camera.
+    /// The same without further cameras, of which `what` knows nothing.
     fn views_of_first_camera(
         &self,
         file: &Path,
@@ -250,8 +250,7 @@ impl CalibrationInputs<'_> {
         let mut robot = self.robot.clone();
         if map.tag_use.needs_lens() {
             self.add_lens(&mut robot, &map)?;
-            let further = map.further().iter().map(|further| &further.camera);
-            further.into_iter().try_for_each(|camera| robot.require_further_lens(camera))?;
+            map.further().iter().try_for_each(|further| robot.require_further_lens(&further.camera))?;
         }
         let named = match &landmarks {
             Some((file, landmarks)) => landmarks.survey(file, &robot, map.tag_use)?,

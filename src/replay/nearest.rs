@@ -77,7 +77,7 @@ pub(super) fn draw(run: &ReplayScene, input: &ReplayInput, stream: &mut EntityLo
         }
         drawn = Some((points_m, color));
         let line = LineStrips3D::update_fields().with_strips([points_m.map(|point_m| vector(&point_m))]);
-        // As the plots have it: planning's figure for two links is larger by what less is kept between them.
+        // As the plots have it: to the distance between two links planning adds what less is kept between them.
         let label = format!("{:.0} mm", 1e3 * clearance.distance_m.max(0.0));
         stream.draw(&entity, clearance.time_s, &line.with_colors([color]).with_labels([label]));
     }

@@ -111,13 +111,14 @@ fn repairs_of(findings: &[Finding], failed: &[FailedJointTable], since: &str) ->
 }
 
 /// Findings that a user can act on, in the order in which they are told.
-const REPAIRS: [FindingKind; 8] = [
+const REPAIRS: [FindingKind; 9] = [
     FindingKind::SensorSlip,
     FindingKind::TagMoved,
     FindingKind::TagsMoved,
     FindingKind::TagSwapped,
     FindingKind::TagSize,
     FindingKind::Lens,
+    FindingKind::CameraMount,
     FindingKind::Base,
     FindingKind::Link,
 ];
@@ -164,6 +165,11 @@ fn of_finding(found: &Finding, since: &str) -> Option<Repair> {
             format!("the arm's base is not where the survey has it, off{}", by(found)),
             "check the tag map's frame and where the arm stands; correct the one that is wrong".to_owned(),
             "",
+        ),
+        FindingKind::CameraMount => (
+            format!("the {name} is not as drawn, off{}", by(found)),
+            "correct the camera's place in robot.toml, or fasten the camera".to_owned(),
+            "the result has it as it was seen",
         ),
         FindingKind::Link => (
             format!("{name} is not as drawn, off{}", by(found)),

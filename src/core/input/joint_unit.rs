@@ -91,7 +91,7 @@ impl Values<'_> {
         (self.angle_rad(unit, reading, joint) - spec.center_rad).abs() <= most_rad
     }
 
-    /// Metres and millimetres are a factor apart that no range bridges.
+    /// Refuses a slide whose numbers lie outside of its range, and within it in the other unit.
     fn check_slides(&self, file: &str, stated: SlideUnit) -> Result<(), InputError> {
         let likely = if stated == SlideUnit::M { SlideUnit::Mm } else { SlideUnit::M };
         let factor = likely.in_m() / stated.in_m();
