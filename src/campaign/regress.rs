@@ -5,8 +5,9 @@
 //! of the interval is on the worse side of no change. Noise alone moves pairs both ways, and meets the second condition
 //! in one case of twenty at most, whichever of all figures it is (Bonferroni's correction); a worsening of the budget's
 //! size in all pairs meets both. An interval that holds both no change and the budget decides nothing, and is said to
-//! be inconclusive.
+//! be inconclusive. Of the clearance the nearest runs are looked at as well as the typical pair.
 
+mod nearest;
 mod paired;
 
 use serde::Serialize;
@@ -49,7 +50,8 @@ pub struct Check {
     pub unit: Unit,
     /// Typical of the pairs (Hodges and Lehmann); the median of new figures; or the number of pairs that are worse.
     pub value: Option<f64>,
-    /// Of all such intervals together 5 % at most lie above their truth, and 5 % of each below.
+    /// Of all such intervals together 5 % at most lie above their truth, and 5 % of each below. No `high` where only a
+    /// worsening is looked for.
     pub low: Option<f64>,
     pub high: Option<f64>,
     pub budget: f64,

@@ -23,9 +23,12 @@ impl Check {
     }
 
     fn interval_text(&self) -> String {
-        let (Some(low), Some(high)) = (self.low, self.high) else { return String::new() };
         let number = |value| self.shown(value).trim_start_matches("x ").to_owned();
-        format!("{} .. {}", number(low), number(high))
+        match (self.low, self.high) {
+            (Some(low), Some(high)) => format!("{} .. {}", number(low), number(high)),
+            (Some(low), None) => format!("from {}", number(low)),
+            (None, _) => String::new(),
+        }
     }
 
     fn budget_text(&self) -> String {

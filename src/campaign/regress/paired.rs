@@ -66,7 +66,9 @@ impl<'a> Judge<'a> {
         let of =
             |(what, metric, scale, budget)| Figure { what, metric, scale, budget, pairs: self.moved(metric, scale) };
         let figures = compared(budgets).map(of);
-        let n_compared = figures.iter().filter(|figure| !figure.pairs.is_empty()).count();
+        // The clearance is looked at twice: typical of the pairs, and of the nearest runs.
+        let looks = |figure: &Figure<'_>| if figure.metric == Metric::MinClearance { 2 } else { 1 };
+        let n_compared: usize = figures.iter().filter(|figure| !figure.pairs.is_empty()).map(looks).sum();
         let tail = FALSE_ALARMS / n_compared.max(1) as f64;
         for figure in figures {
             let check = self.check(&figure, tail);
@@ -75,6 +77,7 @@ impl<'a> Judge<'a> {
             }
             self.checks.push(check);
         }
+        self.nearest(budgets.clearance_drop_m, tail);
     }
 
     /// How much worse each pair is that has the figure on both sides.
