@@ -316,39 +316,45 @@ fn images(c: &mut Criterion, robot: &Robot, vehicle: &Vehicle, scene: &Scene) {
     }
 }
 
-/// The arm on its oil columns in sea water, without sensors, hydraulics or contacts.
+/// The arm on its oil columns in sea water and in the dry, without sensors, hydraulics or contacts.
 #[cfg(feature = "sim")]
 fn one_step(c: &mut Criterion, robot: &Robot) {
+    use armcal::robot::LinkBody;
     use armcal::sim::dynamics::{
         BaseCoupling, Body, Environment, Force, JointLoad, Motion, Multibody, Stage, StepInput, SystemState,
     };
     use armcal::streams::MAX_JOINTS;
 
-    let bodies = robot.bodies.iter().map(|link| Body::in_sea_water(link, robot.buoyancy_fraction)).collect();
-    let arm = Multibody::new(robot.chain.clone(), bodies);
-    let mut state = SystemState {
-        angles: robot.stowed,
-        rates: JointAngles::from_fn(robot.n_joints(), |_| 0.0),
-        world_from_base: nalgebra::Isometry3::identity(),
-        base_velocity: Motion::zero(),
-    };
+    let wet = |link| Body::in_sea_water(link, robot.buoyancy_fraction);
+    let dry = |link: &LinkBody| Body::dry(link.mass_kg, link.com_m, &link.inertia_kg_m2);
     let loads = std::array::from_fn(|j| {
         JointLoad::spring(5e4, 500.0, if j < robot.n_joints() { robot.stowed[j] } else { 0.0 }, 0.0)
     });
     let around = |_: Stage, _: &SystemState| (Environment::still(9.806_65), BaseCoupling::Prescribed(Motion::zero()));
-    c.bench_function("dynamics: one step", |b| {
-        b.iter(|| {
-            let input = StepInput {
-                step_s: 0.002,
-                loads: &loads,
-                extra: &[Force::zero(); MAX_JOINTS + 1],
-                contacts: &[],
-                is_free: false,
-                around: &around,
-            };
-            arm.step(black_box(&mut state), &input);
+    let bodies: [(&str, Vec<Body>); 2] =
+        [("", robot.bodies.iter().map(wet).collect()), (", dry", robot.bodies.iter().map(dry).collect())];
+    for (name, bodies) in bodies {
+        let arm = Multibody::new(robot.chain.clone(), bodies);
+        let mut state = SystemState {
+            angles: robot.stowed,
+            rates: JointAngles::from_fn(robot.n_joints(), |_| 0.0),
+            world_from_base: nalgebra::Isometry3::identity(),
+            base_velocity: Motion::zero(),
+        };
+        c.bench_function(&format!("dynamics: one step{name}"), |b| {
+            b.iter(|| {
+                let input = StepInput {
+                    step_s: 0.002,
+                    loads: &loads,
+                    extra: &[Force::zero(); MAX_JOINTS + 1],
+                    contacts: &[],
+                    is_free: false,
+                    around: &around,
+                };
+                arm.step(black_box(&mut state), &input);
+            });
         });
-    });
+    }
 }
 
 /// Eight tags before the camera at 0.7 to 1.8 m, in clear water.

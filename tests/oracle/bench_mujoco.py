@@ -2,8 +2,8 @@
 
 MuJoCo gets the same URDF, a step of 2 ms, its `implicitfast` integrator, a spring and a damper at
 each joint as stiff as the closed oil columns, gravity, and the drives' torques moving slowly; no shapes, contacts or limits. armcal's
-figures come from `cargo bench --bench speed -- "physics:|dynamics:"`; they include the water (buoyancy, added mass, drag) and, for
-"physics: one second, all effects", hydraulics and sensors as well, all of which MuJoCo does not compute.
+figures come from `cargo bench --bench speed -- "physics:|dynamics:"`: the same arm without water, which is what MuJoCo computes; with the
+water (buoyancy, added mass, drag); and, "physics: one second, all effects", with hydraulics and sensors as well.
 
     target/oracle/bin/python tests/oracle/bench_mujoco.py               MuJoCo alone
     target/oracle/bin/python tests/oracle/bench_mujoco.py --with-armcal both, and their ratio
@@ -33,6 +33,7 @@ DEAD_VOLUME_RATIO = 2.0
 DAMPING_S = 0.01
 ONE_SECOND = "physics: one second, all effects"
 ONE_STEP = "dynamics: one step"
+DRY_STEP = "dynamics: one step, dry"
 
 
 def oil_columns(arm):
@@ -86,8 +87,8 @@ def criterion_estimate_s(target, name):
 
 def armcal(target):
     subprocess.run(["cargo", "bench", "--bench", "speed", "--", "physics:|dynamics:"], cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
-    second_s, step_s = criterion_estimate_s(target, ONE_SECOND), criterion_estimate_s(target, ONE_STEP)
-    return {"armcal_simulated_s_per_s": 1.0 / second_s, "armcal_steps_per_s": 1.0 / step_s}
+    second_s, step_s, dry_s = (criterion_estimate_s(target, name) for name in (ONE_SECOND, ONE_STEP, DRY_STEP))
+    return {"armcal_simulated_s_per_s": 1.0 / second_s, "armcal_steps_per_s": 1.0 / step_s, "armcal_dry_steps_per_s": 1.0 / dry_s}
 
 
 def main():
@@ -104,6 +105,7 @@ def main():
         result |= armcal(target)
         result["mujoco_after_steps_per_s"] = mujoco_steps_per_s()
         mean = 0.5 * (result["mujoco_steps_per_s"] + result["mujoco_after_steps_per_s"])
+        result["ratio_dry_step_to_mujoco_step"] = result["armcal_dry_steps_per_s"] / mean
         result["ratio_dynamics_step_to_mujoco_step"] = result["armcal_steps_per_s"] / mean
         result["ratio_whole_physics_to_mujoco"] = result["armcal_simulated_s_per_s"] / (mean * STEP_S)
     print(json.dumps({k: float(f"{v:.4g}") if isinstance(v, float) else v for k, v in result.items()}, indent=1))

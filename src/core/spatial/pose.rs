@@ -171,6 +171,7 @@ pub fn adjoint(a_from_b: &Isometry3<f64>) -> Matrix6<f64> {
 
 /// The cross-product matrix: `skew(a) * b = a x b`.
 #[must_use]
+#[inline]
 pub fn skew(v: &Vector3<f64>) -> Matrix3<f64> {
     v.cross_matrix()
 }

@@ -4,6 +4,7 @@ use nalgebra::{Isometry3, Matrix3, Vector3};
 
 use crate::dynamics::spatial::{Force, Inertia, Motion};
 use armcal_core::robot::{LinkBody, PlacedShape};
+use armcal_core::spatial::skew;
 
 /// A body in its own link's frame.
 #[derive(Clone, Debug)]
@@ -83,7 +84,7 @@ impl Body {
             center_of_buoyancy_m: link.volume_centroid_m().unwrap_or(link.com_m),
             rigid: Inertia::rigid(link.mass_kg, &link.com_m, &link.inertia_kg_m2),
             added,
-            surfaces: link.collisions.iter().map(|placed| Surface::of(placed, water)).collect(),
+            surfaces: link.collisions.iter().filter(|_| is_wet).map(|placed| Surface::of(placed, water)).collect(),
             hull: None,
         }
     }
@@ -107,6 +108,24 @@ impl Body {
             added: Inertia::zero(),
             surfaces: Vec::new(),
             hull: None,
+        }
+    }
+
+    /// Whether the water does nothing to it.
+    pub(super) fn is_dry(&self) -> bool {
+        self.surfaces.is_empty() && self.hull.is_none() && self.displaced_kg == 0.0 && self.added == Inertia::zero()
+    }
+
+    /// Dry inertia in the parent's frame: that about the centre of mass is turned, the rest is the centre's.
+    pub(super) fn placed_dry(&self, parent_from_body: &Isometry3<f64>) -> Inertia {
+        let at_origin = |c: &Vector3<f64>| (Matrix3::identity() * c.norm_squared() - c * c.transpose()) * self.mass_kg;
+        let about_com = self.rigid.rotational - at_origin(&self.com_m);
+        let r = parent_from_body.rotation.to_rotation_matrix();
+        let com = r * self.com_m + parent_from_body.translation.vector;
+        Inertia {
+            rotational: r * about_com * r.transpose() + at_origin(&com),
+            coupling: skew(&(com * self.mass_kg)),
+            linear: Matrix3::identity() * self.mass_kg,
         }
     }
 

@@ -191,6 +191,11 @@ impl Body {
         acceleration: &Motion,
         around: &Environment,
     ) -> (Inertia, Force) {
+        if self.is_dry() {
+            let all = self.placed_dry(place);
+            let inertial = all.momentum(acceleration) + velocity.cross_force(&all.momentum(velocity));
+            return (all, inertial - self.weight(place, &around.gravity, &around.water_acceleration));
+        }
         let against_water = Motion::new(velocity.angular, velocity.linear - around.water_velocity);
         let (inertia, inertial) = if around.water_moves() {
             let (rigid, added) = (self.rigid.placed(place), self.added.placed(place));

@@ -27,30 +27,35 @@ pub struct Force {
 impl Motion {
     /// From its two parts.
     #[must_use]
+    #[inline]
     pub fn new(angular: Vector3<f64>, linear: Vector3<f64>) -> Self {
         Self { angular, linear }
     }
 
     /// No motion.
     #[must_use]
+    #[inline]
     pub fn zero() -> Self {
         Self::new(Vector3::zeros(), Vector3::zeros())
     }
 
     /// Rotation about a unit axis through `origin`.
     #[must_use]
+    #[inline]
     pub fn rotation(axis: &Vector3<f64>, origin: &Vector3<f64>) -> Self {
         Self::new(*axis, origin.cross(axis))
     }
 
     /// Velocity of the body's point at `point`.
     #[must_use]
+    #[inline]
     pub fn at(&self, point: &Vector3<f64>) -> Vector3<f64> {
         self.linear + self.angular.cross(point)
     }
 
     /// The rate of change of `other`, fixed in a body that moves with `self`.
     #[must_use]
+    #[inline]
     pub fn cross(&self, other: &Self) -> Self {
         Self::new(
             self.angular.cross(&other.angular),
@@ -60,18 +65,21 @@ impl Motion {
 
     /// The rate of change of a force fixed in a body that moves with `self`.
     #[must_use]
+    #[inline]
     pub fn cross_force(&self, f: &Force) -> Force {
         Force::new(self.angular.cross(&f.moment) + self.linear.cross(&f.force), self.angular.cross(&f.force))
     }
 
     /// Power of a force, or a generalised force.
     #[must_use]
+    #[inline]
     pub fn dot(&self, f: &Force) -> f64 {
         self.angular.dot(&f.moment) + self.linear.dot(&f.force)
     }
 
     /// The six components, angular ones first.
     #[must_use]
+    #[inline]
     pub fn to_array(&self) -> [f64; 6] {
         let (a, l) = (self.angular, self.linear);
         [a.x, a.y, a.z, l.x, l.y, l.z]
@@ -79,6 +87,7 @@ impl Motion {
 
     /// The inverse of [`Self::to_array`].
     #[must_use]
+    #[inline]
     pub fn from_slice(values: &[f64]) -> Self {
         Self::new(Vector3::from_column_slice(&values[..3]), Vector3::from_column_slice(&values[3..6]))
     }
@@ -86,6 +95,7 @@ impl Motion {
 
 impl std::ops::Add for Motion {
     type Output = Self;
+    #[inline]
     fn add(self, other: Self) -> Self {
         Self::new(self.angular + other.angular, self.linear + other.linear)
     }
@@ -93,6 +103,7 @@ impl std::ops::Add for Motion {
 
 impl std::ops::Sub for Motion {
     type Output = Self;
+    #[inline]
     fn sub(self, other: Self) -> Self {
         Self::new(self.angular - other.angular, self.linear - other.linear)
     }
@@ -100,6 +111,7 @@ impl std::ops::Sub for Motion {
 
 impl std::ops::Mul<f64> for Motion {
     type Output = Self;
+    #[inline]
     fn mul(self, factor: f64) -> Self {
         Self::new(self.angular * factor, self.linear * factor)
     }
@@ -108,18 +120,21 @@ impl std::ops::Mul<f64> for Motion {
 impl Force {
     /// From its two parts.
     #[must_use]
+    #[inline]
     pub fn new(moment: Vector3<f64>, force: Vector3<f64>) -> Self {
         Self { moment, force }
     }
 
     /// No force.
     #[must_use]
+    #[inline]
     pub fn zero() -> Self {
         Self::new(Vector3::zeros(), Vector3::zeros())
     }
 
     /// The six components, those of the moment first.
     #[must_use]
+    #[inline]
     pub fn to_array(&self) -> [f64; 6] {
         let (m, f) = (self.moment, self.force);
         [m.x, m.y, m.z, f.x, f.y, f.z]
@@ -127,6 +142,7 @@ impl Force {
 
     /// A force that acts at `point`.
     #[must_use]
+    #[inline]
     pub fn at(point: &Vector3<f64>, force: &Vector3<f64>) -> Self {
         Self::new(point.cross(force), *force)
     }
@@ -134,6 +150,7 @@ impl Force {
 
 impl std::ops::Add for Force {
     type Output = Self;
+    #[inline]
     fn add(self, other: Self) -> Self {
         Self::new(self.moment + other.moment, self.force + other.force)
     }
@@ -141,12 +158,14 @@ impl std::ops::Add for Force {
 
 impl std::ops::Sub for Force {
     type Output = Self;
+    #[inline]
     fn sub(self, other: Self) -> Self {
         Self::new(self.moment - other.moment, self.force - other.force)
     }
 }
 
 impl std::ops::AddAssign for Force {
+    #[inline]
     fn add_assign(&mut self, other: Self) {
         *self = *self + other;
     }
@@ -167,12 +186,14 @@ pub struct Inertia {
 impl Inertia {
     /// No inertia.
     #[must_use]
+    #[inline]
     pub fn zero() -> Self {
         Self { rotational: Matrix3::zeros(), coupling: Matrix3::zeros(), linear: Matrix3::zeros() }
     }
 
     /// Of a rigid body: its inertia about the centre of mass in the frame's axes.
     #[must_use]
+    #[inline]
     pub fn rigid(mass_kg: f64, com_m: &Vector3<f64>, about_com_kg_m2: &Matrix3<f64>) -> Self {
         let centered =
             Self { rotational: *about_com_kg_m2, coupling: Matrix3::zeros(), linear: Matrix3::identity() * mass_kg };
@@ -181,6 +202,7 @@ impl Inertia {
 
     /// The same body about a frame in which its own frame's origin lies at `offset`, axes alike.
     #[must_use]
+    #[inline]
     pub fn shifted(&self, offset: &Vector3<f64>) -> Self {
         let p = skew(offset);
         let p_linear = p * self.linear;
@@ -194,6 +216,7 @@ impl Inertia {
 
     /// The same body in the parent's frame.
     #[must_use]
+    #[inline]
     pub fn placed(&self, parent_from_body: &Isometry3<f64>) -> Self {
         let r = parent_from_body.rotation.to_rotation_matrix();
         let turn = |m: &Matrix3<f64>| r * m * r.transpose();
@@ -204,6 +227,7 @@ impl Inertia {
 
     /// Momentum of a motion.
     #[must_use]
+    #[inline]
     pub fn momentum(&self, v: &Motion) -> Force {
         Force::new(
             self.rotational * v.angular + self.coupling * v.linear,
@@ -214,6 +238,7 @@ impl Inertia {
 
 impl std::ops::Add for Inertia {
     type Output = Self;
+    #[inline]
     fn add(self, other: Self) -> Self {
         Self {
             rotational: self.rotational + other.rotational,

@@ -61,10 +61,10 @@ impl Symmetric {
     }
 
     /// Solves `M x = b` by a factor L L' (Cholesky). A matrix that is not positive definite gives NaN, which the world
-    /// reports as a state that is no longer finite.
+    /// reports as a state that is no longer finite. The factor takes the matrix's place.
     #[must_use]
     #[allow(clippy::needless_range_loop, reason = "indices name rows and columns of several arrays at once")]
-    pub fn solve(mut self, b: &Coordinates) -> Coordinates {
+    pub fn solve(&mut self, b: &Coordinates) -> Coordinates {
         let n = self.n;
         let l = &mut self.lower;
         let mut x = *b;

@@ -340,7 +340,7 @@ fn accelerating_water_takes_a_ball_along() {
     let to_base = turned.rotation.inverse();
     let around = Environment { water_acceleration: to_base * acceleration, ..Environment::still(0.0) };
     let none = JointAngles::from_slice(&[]);
-    let e = equations(&system, &none, &none, &around, &BaseCoupling::Free);
+    let mut e = equations(&system, &none, &none, &around, &BaseCoupling::Free);
     let a = Motion::from_slice(&e.inertia.solve(&std::array::from_fn(|i| -e.bias[i]))).linear;
     let expected = to_base * acceleration * (1.5 * displaced / (mass + 0.5 * displaced));
     assert!((a - expected).norm() < 1e-12, "{a} {expected}");
@@ -361,7 +361,7 @@ fn a_current_carries_everything_along() {
             water_velocity: water,
             ..Environment::still(G)
         };
-        let e = equations(&system, &robot.stowed, &rates, &around, &BaseCoupling::Free);
+        let mut e = equations(&system, &robot.stowed, &rates, &around, &BaseCoupling::Free);
         let a = e.inertia.solve(&std::array::from_fn(|i| -e.bias[i]));
         // In inertial axes: a point's acceleration is that of the components plus w x v.
         let spatial = Motion::from_slice(&a);
@@ -373,4 +373,23 @@ fn a_current_carries_everything_along() {
     for (a, b) in still.2.iter().zip(&carried.2) {
         assert!((a - b).abs() < 1e-9, "{a} {b}");
     }
+}
+
+/// Turned and moved, what the water does nothing to has the inertia that the general way gives it.
+#[test]
+fn dry_bodies_are_placed_as_wet_ones_are() {
+    for (k, link) in titan().bodies.iter().enumerate() {
+        let dry = Body::dry(link.mass_kg, link.com_m, &link.inertia_kg_m2);
+        assert!(dry.is_dry());
+        let turn = UnitQuaternion::from_euler_angles(0.3 * k as f64, -0.8, 1.9);
+        let place = Isometry3::from_parts(Vector3::new(0.4, -1.1, 0.2 * k as f64).into(), turn);
+        let (found, general) = (dry.placed_dry(&place), dry.rigid.placed(&place));
+        let scale = general.rotational.norm();
+        for (a, b) in
+            [(found.rotational, general.rotational), (found.coupling, general.coupling), (found.linear, general.linear)]
+        {
+            assert!((a - b).norm() <= 1e-13 * scale.max(1.0), "body {k}: {a} {b}");
+        }
+    }
+    assert!(!Body::in_sea_water(&titan().bodies[1], 0.3).is_dry());
 }
